@@ -1,0 +1,30 @@
+// tutti: visual SLAM with an ensemble of Bayesian loop-closure filters. Parses, calls, prints.
+#include <cstdio>
+#include <exception>
+
+#include "commands.h"
+#include "tutti/core/error.h"
+
+int main(int argc, char** argv) {
+  CLI::App app{"tutti: visual SLAM with an ensemble of Bayesian loop-closure filters", "tutti"};
+  app.require_subcommand(1);
+  int exit_code = 0;
+  tutti::cli::AddRunCommand(app, exit_code);
+  tutti::cli::AddEvaluateCommand(app, exit_code);
+  tutti::cli::AddLoopsCommand(app, exit_code);
+  tutti::cli::AddOptimizeCommand(app, exit_code);
+  tutti::cli::AddGenerateCommand(app, exit_code);
+  tutti::cli::AddDemoCommand(app, exit_code);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e);
+  } catch (const tutti::InputError& e) {
+    std::fprintf(stderr, "tutti: %s\n", e.what());
+    return 1;
+  } catch (const std::exception& e) {
+    std::fprintf(stderr, "tutti: internal error: %s; please report it with the command line\n", e.what());
+    return 2;
+  }
+  return exit_code;
+}

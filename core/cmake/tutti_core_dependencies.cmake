@@ -1,0 +1,1 @@
+find_dependency(Eigen3 3.3 NO_MODULE)

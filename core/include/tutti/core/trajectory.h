@@ -1,0 +1,42 @@
+// A trajectory: poses with time stamps, and its file formats.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "tutti/core/pose.h"
+
+namespace tutti {
+
+/// Pose of a body at a time: T_world_body.
+struct StampedPose {
+  double stamp_s = 0.0;  ///< time stamp [s]
+  Pose pose;             ///< T_world_body
+};
+
+/// Poses in order of strictly growing time stamps.
+using Trajectory = std::vector<StampedPose>;
+
+/// kTum: "stamp tx ty tz qx qy qz qw", '#' comments. kKitti: 12 numbers a line, row-major 3x4, no stamps
+/// (the line number is the stamp, unless `times` are read beside it). kEuroc: ASL csv, "ns, p, q(w x y z), ...".
+enum class TrajectoryFormat { kTum, kKitti, kEuroc };
+
+/// "tum", "kitti", "euroc" -> format. Throws InputError for another word.
+TrajectoryFormat ParseTrajectoryFormat(const std::string& name);
+
+/// What the content looks like (12 columns: KITTI; commas: EuRoC; else TUM). Throws InputError if unreadable.
+TrajectoryFormat GuessTrajectoryFormat(const std::filesystem::path& file);
+
+/// Reads a trajectory. Quaternions are normalised. Throws InputError that names file and line for: missing file,
+/// wrong number of columns, NaN or infinity, a zero quaternion, time stamps that do not strictly grow.
+Trajectory ReadTrajectory(const std::filesystem::path& file, TrajectoryFormat format);
+
+/// Reads KITTI's times.txt: one time stamp [s] a line. Throws InputError with file and line.
+std::vector<double> ReadTimes(const std::filesystem::path& file);
+
+/// Writes a trajectory, with enough digits to be read back to 1e-9. Throws InputError when the disk is full or the folder
+/// can't be written. TUM: stamps with 9 decimals.
+void WriteTrajectory(const std::filesystem::path& file, const Trajectory& trajectory, TrajectoryFormat format);
+
+}  // namespace tutti

@@ -1,0 +1,174 @@
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <functional>
+
+#include "tutti/core/error.h"
+#include "tutti/core/text.h"
+#include "tutti/core/trajectory.h"
+
+namespace tutti {
+namespace {
+
+[[noreturn]] void Fail(const std::filesystem::path& file, std::size_t line, const std::string& what) {
+  throw InputError(file.string() + ":" + std::to_string(line) + ": " + what);
+}
+
+// Calls `use` for each line that carries data; '#' starts a comment.
+void ForEachLine(const std::filesystem::path& file,
+                 const std::function<void(std::size_t, const std::vector<std::string>&)>& use) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(file, ignored)) {
+    throw InputError(file.string() + ": is a folder; give a file");
+  }
+  std::ifstream in(file);
+  if (!in) throw InputError(file.string() + ": can't be opened; check the path and that it is readable");
+  std::string text;
+  for (std::size_t line = 1; std::getline(in, text); ++line) {
+    const std::size_t comment = text.find('#');
+    if (comment != std::string::npos) text.resize(comment);
+    const std::vector<std::string> words = SplitText(text);
+    if (!words.empty()) use(line, words);
+  }
+}
+
+double Number(const std::filesystem::path& file, std::size_t line, const std::string& word) {
+  const std::optional<double> value = ParseDouble(word);
+  if (!value) Fail(file, line, "'" + word + "' is not a number");
+  if (!std::isfinite(*value)) Fail(file, line, "'" + word + "' is not finite; remove this pose or repair the file");
+  return *value;
+}
+
+Pose QuaternionPose(const std::filesystem::path& file, std::size_t line, const Eigen::Vector3d& t, double x,
+                    double y, double z, double w) {
+  const Eigen::Quaterniond q(w, x, y, z);
+  if (q.norm() < 1e-6) Fail(file, line, "the quaternion is zero; a unit quaternion is needed");
+  return Pose(q.normalized(), t);
+}
+
+void RequireColumns(const std::filesystem::path& file, std::size_t line, std::size_t have, std::size_t want,
+                    const char* layout) {
+  if (have < want) {
+    Fail(file, line, "has " + std::to_string(have) + " columns; " + layout);
+  }
+}
+
+Trajectory ReadTum(const std::filesystem::path& file) {
+  Trajectory out;
+  ForEachLine(file, [&](std::size_t line, const std::vector<std::string>& w) {
+    if (w.size() != 8) {
+      Fail(file, line, "has " + std::to_string(w.size()) + " columns; the TUM format has 8: stamp tx ty tz qx qy qz qw");
+    }
+    double v[8];
+    for (int i = 0; i < 8; ++i) v[i] = Number(file, line, w[static_cast<std::size_t>(i)]);
+    if (!out.empty() && v[0] <= out.back().stamp_s) {
+      Fail(file, line, v[0] == out.back().stamp_s ? "repeats the time stamp of the pose before it; remove one of the two"
+                                                  : "goes back in time; sort the file by its first column");
+    }
+    out.push_back({v[0], QuaternionPose(file, line, {v[1], v[2], v[3]}, v[4], v[5], v[6], v[7])});
+  });
+  return out;
+}
+
+Trajectory ReadKitti(const std::filesystem::path& file) {
+  Trajectory out;
+  ForEachLine(file, [&](std::size_t line, const std::vector<std::string>& w) {
+    if (w.size() != 12) {
+      Fail(file, line, "has " + std::to_string(w.size()) + " columns; the KITTI format has 12: the 3x4 matrix [R|t] by rows");
+    }
+    Eigen::Matrix<double, 3, 4> m;
+    for (int i = 0; i < 12; ++i) m(i / 4, i % 4) = Number(file, line, w[static_cast<std::size_t>(i)]);
+    const Eigen::Matrix3d rotation = m.leftCols<3>();
+    if (std::abs(rotation.determinant() - 1.0) > 0.1) Fail(file, line, "its 3x3 part is not a rotation matrix");
+    out.push_back({static_cast<double>(out.size()), Pose::FromMatrix(m)});
+  });
+  return out;
+}
+
+Trajectory ReadEuroc(const std::filesystem::path& file) {
+  Trajectory out;
+  ForEachLine(file, [&](std::size_t line, const std::vector<std::string>& w) {
+    RequireColumns(file, line, w.size(), 8, "the EuRoC format has at least 8: stamp [ns], x, y, z, qw, qx, qy, qz");
+    double v[8];
+    for (int i = 0; i < 8; ++i) v[i] = Number(file, line, w[static_cast<std::size_t>(i)]);
+    const double stamp = v[0] * 1e-9;
+    if (!out.empty() && stamp <= out.back().stamp_s) Fail(file, line, "its time stamp does not grow; sort the file");
+    out.push_back({stamp, QuaternionPose(file, line, {v[1], v[2], v[3]}, v[5], v[6], v[7], v[4])});
+  });
+  return out;
+}
+
+}  // namespace
+
+TrajectoryFormat ParseTrajectoryFormat(const std::string& name) {
+  if (name == "tum") return TrajectoryFormat::kTum;
+  if (name == "kitti") return TrajectoryFormat::kKitti;
+  if (name == "euroc") return TrajectoryFormat::kEuroc;
+  throw InputError("unknown trajectory format '" + name + "'; use tum, kitti or euroc");
+}
+
+TrajectoryFormat GuessTrajectoryFormat(const std::filesystem::path& file) {
+  std::ifstream in(file);
+  if (!in) throw InputError(file.string() + ": can't be opened; check the path and that it is readable");
+  std::string text;
+  while (std::getline(in, text)) {
+    if (text.empty() || text[0] == '#') continue;
+    if (text.find(',') != std::string::npos) return TrajectoryFormat::kEuroc;
+    if (SplitText(text).size() == 12) return TrajectoryFormat::kKitti;
+    break;
+  }
+  return TrajectoryFormat::kTum;
+}
+
+Trajectory ReadTrajectory(const std::filesystem::path& file, TrajectoryFormat format) {
+  Trajectory out;
+  switch (format) {
+    case TrajectoryFormat::kTum: out = ReadTum(file); break;
+    case TrajectoryFormat::kKitti: out = ReadKitti(file); break;
+    case TrajectoryFormat::kEuroc: out = ReadEuroc(file); break;
+  }
+  if (out.empty()) throw InputError(file.string() + ": holds no pose");
+  return out;
+}
+
+std::vector<double> ReadTimes(const std::filesystem::path& file) {
+  std::vector<double> out;
+  ForEachLine(file, [&](std::size_t line, const std::vector<std::string>& w) {
+    out.push_back(Number(file, line, w[0]));
+  });
+  return out;
+}
+
+void WriteTrajectory(const std::filesystem::path& file, const Trajectory& trajectory, TrajectoryFormat format) {
+  std::ofstream out(file);
+  if (!out) throw InputError(file.string() + ": can't be written; check that the folder exists and is writable");
+  char line[512];
+  if (format == TrajectoryFormat::kTum) out << "# timestamp tx ty tz qx qy qz qw\n";
+  if (format == TrajectoryFormat::kEuroc) out << "#timestamp [ns],p_x [m],p_y [m],p_z [m],q_w,q_x,q_y,q_z\n";
+  for (const StampedPose& s : trajectory) {
+    const Eigen::Vector3d& t = s.pose.translation;
+    const Eigen::Quaterniond& q = s.pose.rotation;
+    switch (format) {
+      case TrajectoryFormat::kTum:
+        std::snprintf(line, sizeof line, "%.9f %.9f %.9f %.9f %.9f %.9f %.9f %.9f\n", s.stamp_s, t.x(), t.y(), t.z(),
+                      q.x(), q.y(), q.z(), q.w());
+        break;
+      case TrajectoryFormat::kKitti: {
+        const Eigen::Matrix4d m = s.pose.Matrix();
+        std::snprintf(line, sizeof line, "%.12e %.12e %.12e %.12e %.12e %.12e %.12e %.12e %.12e %.12e %.12e %.12e\n",
+                      m(0, 0), m(0, 1), m(0, 2), m(0, 3), m(1, 0), m(1, 1), m(1, 2), m(1, 3), m(2, 0), m(2, 1), m(2, 2),
+                      m(2, 3));
+        break;
+      }
+      case TrajectoryFormat::kEuroc:
+        std::snprintf(line, sizeof line, "%lld,%.9f,%.9f,%.9f,%.9f,%.9f,%.9f,%.9f\n", std::llround(s.stamp_s * 1e9), t.x(),
+                      t.y(), t.z(), q.w(), q.x(), q.y(), q.z());
+        break;
+    }
+    out << line;
+  }
+  out.flush();
+  if (!out) throw InputError(file.string() + ": could not be written in full; is the disk full?");
+}
+
+}  // namespace tutti

@@ -1,0 +1,36 @@
+// What a sensor delivers: one frame, and the rig that took it. Frames are rectified: a Dataset removes the lens
+// distortion and aligns stereo pairs before anything else sees an image.
+#pragma once
+
+#include <cstdint>
+#include <opencv2/core.hpp>
+#include <string>
+
+#include "tutti/core/camera.h"
+#include "tutti/core/pose.h"
+
+namespace tutti {
+
+enum class Sensor { kMono, kStereo, kRgbd };
+
+/// The sensor after rectification.
+struct CameraRig {
+  Sensor sensor = Sensor::kMono;
+  PinholeCamera camera;    ///< left (or only, or colour) camera; no distortion left
+  double baseline_m = 0;   ///< stereo: distance of the right camera along +x of the left one [m]
+  Pose T_body_camera;      ///< camera -> the frame that ground truth is of (identity for KITTI and TUM)
+  double rate_hz = 10;     ///< nominal frame rate [1/s]
+  double max_depth_m = 0;  ///< RGB-D: depth beyond this is not used [m]; 0 = no limit
+  bool calibrated = true;  ///< false: appearance only (no odometry is possible)
+};
+
+/// One rectified frame.
+struct InputFrame {
+  std::int64_t index = 0;  ///< 0-based index of the input frame in its data set
+  double stamp_s = 0;      ///< time stamp [s]
+  cv::Mat image;           ///< CV_8UC1, left (or only) camera
+  cv::Mat right;           ///< stereo: CV_8UC1, same size as image; else empty
+  cv::Mat depth_m;         ///< RGB-D: CV_32FC1 [m], registered to image, 0 = no measurement; else empty
+};
+
+}  // namespace tutti

@@ -1,0 +1,1 @@
+#include "tutti/loopclosure/detector.h"

@@ -1,0 +1,37 @@
+// Pose graphs as g2o text files.
+//
+//   VERTEX_SE2 id x y theta                     EDGE_SE2 i j x y theta  I11 I12 I13 I22 I23 I33
+//   VERTEX_SE3:QUAT id x y z qx qy qz qw        EDGE_SE3:QUAT i j x y z qx qy qz qw  I11 I12 .. I66 (21
+//   numbers, by rows) VERTEX_SIM3:QUAT id x y z qx qy qz qw s     EDGE_SIM3:QUAT i j x y z qx qy qz qw s  I11
+//   .. I77 (28 numbers)   [tutti's own] FIX id [id ...]
+// Poses are node-to-world, measurements S_i_j. Information: upper triangle of (translation, rotation[, log
+// scale]).
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "tutti/backend/pose_graph.h"
+
+namespace tutti {
+
+struct G2oFile {
+  PoseGraph graph;
+  std::vector<std::string>
+      warnings;  ///< unknown tags (once each, with count and first line), vertices without edges, ...
+  bool has_all_vertices =
+      false;  ///< false: some or all poses are missing and must be initialised from the edges
+};
+
+/// Reads a graph. Vertices may be missing; edges with |i - j| != 1 count as loops. Throws InputError with
+/// file and line for: a missing file, a line with too few or unreadable numbers, NaN, a vertex given twice, a
+/// zero quaternion, an information matrix that is not positive definite, an edge from a node to itself, kinds
+/// that are mixed, no edge at all.
+G2oFile ReadG2o(const std::filesystem::path& file);
+
+/// Writes a graph so that reading gives the same numbers (17 digits). Throws InputError when it can't be
+/// written in full.
+void WriteG2o(const std::filesystem::path& file, const PoseGraph& graph);
+
+}  // namespace tutti

@@ -1,0 +1,120 @@
+// Pose-graph optimisation: analytic Jacobians, sparse Cholesky (Ceres), robust losses on loop edges.
+//
+// With E = S_from_to^-1 S_world_from^-1 S_world_to the objective is the sum over the edges of rho(e^T Omega
+// e) (no 1/2):
+//   chi2     e = (t(E), vec(q(E)) with w >= 0)      in 2D (t(E), wrapped heading)       what g2o files mean
+//   chi2log  e = (t(E), rotation vector of E)       in 2D the same as chi2
+//   Sim(3) appends log(scale(E)) to both.
+// chordal is an evaluation only: sum kappa ||R_j - R_i R_ij||_F^2 + tau ||t_j - t_i - s_i R_i t_ij||^2 with
+// tau = 3 / trace(I_tt^-1), kappa = 3 / (2 trace(I_rr^-1)); 2D: tau = 2 / trace(I_tt^-1), kappa = I_heading
+// (SE-Sync's costs).
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "tutti/backend/pose_graph.h"
+
+namespace tutti {
+
+enum class GraphObjective { kChi2, kChi2Log };
+
+/// Loss on loop edges. kHuber: down-weights linearly (Huber 1964). kDcs: dynamic covariance scaling (Agarwal
+/// et al., ICRA 2013). kGnc: graduated non-convexity, truncated least squares (Yang et al., RA-L 2020):
+/// decides inlier or outlier for each loop.
+enum class RobustLoss { kNone, kHuber, kDcs, kGnc };
+
+/// kFile: poses as they are in the graph. kOdometry: spanning tree, odometry edges first. kChordal: linear
+/// relaxation (Carlone et al., ICRA 2015). kAuto: whichever of them has the lowest objective (robust loss
+/// included).
+enum class GraphInit { kAuto, kFile, kOdometry, kChordal };
+
+/// Words of the command line ("chi2log", "gnc", "chordal", ...). Throw InputError for another word.
+GraphObjective ParseGraphObjective(const std::string& name);
+RobustLoss ParseRobustLoss(const std::string& name);
+GraphInit ParseGraphInit(const std::string& name);
+const char* ToString(GraphObjective objective);
+const char* ToString(RobustLoss robust);
+const char* ToString(GraphInit init);
+
+struct PoseGraphOptions {
+  GraphObjective objective =
+      GraphObjective::kChi2Log;           ///< chi2log: rotations in rad; `tutti optimize` takes chi2
+  RobustLoss robust = RobustLoss::kNone;  ///< acts on loop edges only
+  /// Chi-square beyond which a loop edge is doubted (Huber's delta^2, DCS' Phi, GNC's c^2) [1]. 0: the 99 %
+  /// quantile of the chi-square distribution for the edge's degrees of freedom (11.34, 16.81, 18.48).
+  double robust_chi2 = 0;
+  GraphInit init = GraphInit::kAuto;
+  int max_iterations = 200;  ///< of Levenberg-Marquardt, in all rounds together
+  double function_tolerance =
+      1e-9;                 ///< stop when an iteration lowers the cost by less than this fraction [1]
+  double gnc_step = 1.4;    ///< factor by which GNC's convexity parameter grows each round [1], > 1
+  int gnc_max_rounds = 60;  ///< of GNC
+  double max_time_s =
+      0;         ///< stop after this time [s]; 0: no limit (a limit makes the result depend on the machine)
+  int seed = 0;  ///< nothing is random so far; kept so that callers set it in one place
+
+  /// Empty if usable, else what is wrong.
+  std::string Validate() const;
+};
+
+/// The three costs of a graph at its present poses, all edges with weight 1, no robust loss.
+struct GraphCosts {
+  double chi2 = 0;
+  double chi2log = 0;
+  double chordal = 0;
+};
+GraphCosts EvaluateCosts(const PoseGraph& graph);
+
+/// e^T Omega e of one edge at the present poses.
+double EdgeChi2(const PoseGraph& graph, const PoseGraphEdge& edge, GraphObjective objective);
+
+/// What became of one edge.
+struct EdgeOutcome {
+  double chi2 = 0;             ///< e^T Omega e in the optimiser's objective, weight not applied
+  double weight = 1;           ///< final weight of the robust loss, 0 to 1 (1 on odometry edges)
+  bool down_weighted = false;  ///< weight < 0.5: the optimiser does not believe this loop
+};
+
+/// One connected part of the graph.
+struct GraphComponent {
+  int anchor = 0;  ///< id of the node that holds it in place (the first fixed one, else the smallest id)
+  std::size_t nodes = 0;
+};
+
+struct PoseGraphReport {
+  bool success = false;  ///< the poses are usable (converged, or stopped at a limit with a lower cost)
+  std::string reason;    ///< why not; empty on success
+  GraphInit init = GraphInit::kFile;  ///< the initialisation that was taken
+  GraphCosts initial_costs;           ///< at the initialisation that was taken
+  GraphCosts costs;                   ///< of the result
+  double initial_objective = 0;       ///< what was minimised (robust loss included), before
+  double objective = 0;               ///< and after
+  int iterations = 0;
+  int gnc_rounds = 0;
+  std::string termination;  ///< "converged", "iteration limit", "time limit", "nothing to do", "failed"
+  double init_time_s = 0;
+  double time_s = 0;                       ///< wall time, initialisation included
+  std::vector<EdgeOutcome> edges;          ///< parallel to PoseGraph::edges()
+  std::vector<GraphComponent> components;  ///< more than one: they are not connected to each other
+  std::size_t down_weighted = 0;           ///< loop edges with weight < 0.5
+};
+
+/// Optimises pose graphs. Deterministic: one thread, fixed orders; the same graph gives the same bits.
+class PoseGraphOptimizer {
+ public:
+  /// Throws InputError if the options are not usable.
+  explicit PoseGraphOptimizer(const PoseGraphOptions& options = {});
+
+  /// Moves the nodes of `graph` to the optimum. On failure the graph keeps its poses and the report says why.
+  /// A component without a fixed node is anchored at its smallest id, which keeps its pose.
+  PoseGraphReport Optimize(PoseGraph& graph) const;
+
+  const PoseGraphOptions& options() const { return options_; }
+
+ private:
+  PoseGraphOptions options_;
+};
+
+}  // namespace tutti

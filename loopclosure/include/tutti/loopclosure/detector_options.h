@@ -33,7 +33,6 @@ struct VocabularyOptions {
   double nndr = 0.8;    ///< a descriptor is an old word if d1 <= nndr * d2; on TRUE distance, not on FLANN's squared one
   int trees = 4;        ///< kd-trees of the FLANN index (float descriptors)
   int checks = 32;      ///< leaves visited per search (float descriptors)
-  double rebuild_factor = 2.0;  ///< the kd-forest is rebuilt, in the background, when it has grown by this factor
   int hash_tables = 8;  ///< hash tables of the Hamming index (binary descriptors)
 
   /// Empty if usable, else what is wrong and what to do.

@@ -1,0 +1,46 @@
+// The features that one member takes from an image.
+#pragma once
+
+#include <memory>
+#include <opencv2/core.hpp>
+#include <opencv2/features2d.hpp>
+#include <string>
+#include <vector>
+
+#include "tutti/loopclosure/detector_options.h"
+
+namespace tutti {
+
+/// Keypoints and their descriptors, row by row.
+struct Features {
+  std::vector<cv::KeyPoint> keypoints;  ///< N, in pixels of the full image
+  cv::Mat descriptors;                  ///< N x D, CV_32F or CV_8U; empty if N = 0
+};
+
+/// The image as one 8-bit channel: colour to grey; 16-bit and float stretched from minimum to maximum; empty stays empty.
+cv::Mat ToGrey8(const cv::Mat& image);
+
+/// Indices of the strongest `count` keypoints spread over a grid of `columns` cells along the longer side: each cell's best
+/// first, up to an equal share, the rest by response. In order of strength; ties by position. Deterministic.
+std::vector<int> SelectSpread(const std::vector<cv::KeyPoint>& keypoints, cv::Size image_size, int count, int columns);
+
+/// SURF of dlib (its Hessian pyramid and 64 values per point) as a cv::Feature2D: CV_32F descriptors of unit length.
+cv::Ptr<cv::Feature2D> CreateDlibSurf(int max_features, int octaves, double threshold);
+
+/// Detects and describes with one cv::Feature2D, named as in LoopDetectorOptions::members.
+class FeatureExtractor {
+ public:
+  /// Throws InputError for an unknown name.
+  FeatureExtractor(const std::string& name, const ExtractionOptions& options);
+
+  /// Features of an 8-bit grey image, at most options.features. Never throws for hard images (blank, tiny, huge, empty).
+  Features Extract(const cv::Mat& grey) const;
+
+ private:
+  cv::Ptr<cv::Feature2D> Create(cv::Size size) const;
+
+  std::string name_;
+  ExtractionOptions options_;
+};
+
+}  // namespace tutti

@@ -1,0 +1,50 @@
+// p(L_t | S_t): how much an image looks like each location, and how much it looks like none of them.
+#pragma once
+
+#include <vector>
+
+#include "tutti/loopclosure/belief.h"
+#include "tutti/loopclosure/detector_options.h"
+#include "tutti/loopclosure/signature.h"
+
+namespace tutti {
+
+/// Inverted index over the signatures of all locations in STM and WM, and the scores computed by walking it.
+/// Locations are slots: 0, 1, 2, ... in the order of adding.
+class LikelihoodModel {
+ public:
+  explicit LikelihoodModel(LikelihoodKind kind) : kind_(kind) {}
+
+  /// Adds the signature of the next slot (empty for a bad signature).
+  void Add(const Signature& signature);
+  /// Takes a slot's words out of the index (merged by rehearsal, or transferred out of working memory).
+  void Remove(int slot);
+
+  /// Raw scores s_i of every slot (0 where nothing is shared). Section 2, both variants:
+  /// similarity: s_i = (sum over shared words of min(multiplicity)) / max(|z_t|, |z_i|);
+  /// tf-idf: s_i = sum over unique words w of z_t of (n_wi / n_i) * log10(N / n_w), with N locations in STM and WM, n_w of
+  /// them with w, n_wi occurrences of w in i, n_i words in i.
+  std::vector<double> Scores(const Signature& query) const;
+
+  /// Locations in the index, bad signatures included: N.
+  int NumLocations() const { return locations_; }
+
+ private:
+  struct Posting {
+    int slot = 0;
+    int count = 0;
+  };
+  LikelihoodKind kind_;
+  std::vector<std::vector<Posting>> postings_;  // by word id
+  std::vector<Signature> signatures_;           // by slot
+  std::vector<bool> present_;                   // by slot
+  int locations_ = 0;
+};
+
+/// Adjustment of the raw scores of the locations in `working_memory` (section 2; Labbe & Michaud 2013, eq. 5 and 6), with mu
+/// and sigma (sample deviation, n-1) over the non-zero scores:
+///   L_i = (s_i - (sigma - 1e-4)) / mu if s_i > mu + sigma, else 1;
+///   L_new = mu / sigma + 1 if sigma > 1e-4 and some s_i > mu + sigma, else 2.
+Belief AdjustLikelihood(const std::vector<double>& scores, const std::vector<int>& working_memory);
+
+}  // namespace tutti

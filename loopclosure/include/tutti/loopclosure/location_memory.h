@@ -1,0 +1,72 @@
+// The one memory of locations that all members share: which exist, how they are linked, which may be candidates.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <utility>
+#include <vector>
+
+namespace tutti {
+
+/// Short-term memory (STM, a FIFO of the newest locations, which are no candidates) and working memory (WM, the candidates),
+/// after Labbe & Michaud 2013, section III. Shared between the members (loop-closure.md section 6), so that a location is in
+/// every member's WM or in none.
+///
+/// Locations are slots 0, 1, 2, ... in the order of adding; the caller's ids are kept beside them.
+class LocationMemory {
+ public:
+  enum class State { kShortTerm, kWorking, kMerged };
+  /// kOdometry: neighbours in time, one graph level apart. kLoop: the same place, zero levels apart.
+  enum class LinkType { kOdometry, kLoop };
+  struct Link {
+    int slot = 0;
+    LinkType type = LinkType::kOdometry;
+  };
+
+  explicit LocationMemory(int stm_size) : stm_size_(stm_size) {}
+
+  /// Adds a location at the end of STM, linked to the one before it; returns its slot. `id` must be greater than all before.
+  int Add(std::int64_t id);
+  /// Links two locations; links that exist already are left as they are. Returns false if nothing changed.
+  bool AddLink(int a, int b, LinkType type);
+  /// Moves the oldest locations of STM to WM while |STM| > stm_size; returns the slots moved.
+  std::vector<int> Settle();
+  /// Rehearsal (section 9): the newest location is merged into the one before it, weight_old += 1 + weight_new, and dropped; its
+  /// id names the older one from now on. Returns the older slot, -1 if STM holds no older one (nothing changes then).
+  int DropNewest();
+  /// On a loop: the newer location takes over the older one's weight.
+  void TransferWeight(int newer, int older);
+
+  /// Slots in WM, ascending: the candidates.
+  const std::vector<int>& working_memory() const { return working_; }
+  const std::deque<int>& short_term_memory() const { return short_term_; }
+  State state(int slot) const { return nodes_[Index(slot)].state; }
+  const std::vector<Link>& links(int slot) const { return nodes_[Index(slot)].links; }
+  int weight(int slot) const { return nodes_[Index(slot)].weight; }
+  std::int64_t id(int slot) const { return nodes_[Index(slot)].id; }
+  int size() const { return static_cast<int>(nodes_.size()); }
+  /// Slot of a caller's id, -1 if there is none.
+  int Find(std::int64_t id) const;
+
+  /// Slots in WM within `levels` graph levels of `slot` (itself included), each with its level, in order of level, then slot.
+  /// Odometry links count 1, loop links 0. Only WM is walked.
+  std::vector<std::pair<int, int>> Neighbours(int slot, int levels) const;
+
+ private:
+  struct Node {
+    std::int64_t id = 0;
+    State state = State::kShortTerm;
+    int weight = 0;
+    std::vector<Link> links;
+  };
+  static std::size_t Index(int slot) { return static_cast<std::size_t>(slot); }
+
+  int stm_size_;
+  std::vector<Node> nodes_;
+  std::deque<int> short_term_;
+  std::vector<int> working_;
+  std::map<std::int64_t, int> slot_of_id_;
+};
+
+}  // namespace tutti

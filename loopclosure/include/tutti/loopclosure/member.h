@@ -1,0 +1,38 @@
+// One member of the ensemble: its features, its vocabulary, and what it takes for a bad signature.
+#pragma once
+
+#include <string>
+
+#include "tutti/loopclosure/detector_options.h"
+#include "tutti/loopclosure/features.h"
+#include "tutti/loopclosure/signature.h"
+#include "tutti/loopclosure/vocabulary.h"
+
+namespace tutti {
+
+/// Extracts and quantises for one kind of features (loop-closure.md section 1, steps 1 and 2).
+class Member {
+ public:
+  Member(const std::string& name, const LoopDetectorOptions& options, std::uint64_t seed);
+
+  const std::string& name() const { return name_; }
+
+  /// Step 1: features of an 8-bit grey image. Safe to call for several members at once.
+  Features Extract(const cv::Mat& grey) const { return extractor_.Extract(grey); }
+
+  /// Step 2: the signature. A bad one (fewer features than bad_signature_ratio x their running mean, or fewer than two) gets no
+  /// words and is empty: the member sits this image out.
+  Signature Quantise(const Features& features);
+
+  int num_words() const { return vocabulary_.size(); }
+
+ private:
+  std::string name_;
+  double bad_signature_ratio_;
+  FeatureExtractor extractor_;
+  Vocabulary vocabulary_;
+  double feature_sum_ = 0.0;
+  int images_ = 0;
+};
+
+}  // namespace tutti

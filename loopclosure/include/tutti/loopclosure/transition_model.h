@@ -1,0 +1,43 @@
+// p(S_t | S_{t-1}): where the camera may have gone since the last image.
+#pragma once
+
+#include <array>
+#include <utility>
+#include <vector>
+
+#include "tutti/loopclosure/belief.h"
+#include "tutti/loopclosure/location_memory.h"
+
+namespace tutti {
+
+/// Sparse, banded transition matrix (loop-closure.md section 2, "Prediction"; Labbe & Michaud 2013, section III-E). Column
+/// j = p(. | S_{t-1} = j):
+///   from the virtual place: p(-1 | -1) = 0.9, p(i | -1) = 0.1 / (m - 1);
+///   from a real place j: a Gaussian (sigma 1.6, 16 levels) over the graph neighbours in working memory, a deficit below 0.9
+///   given to j itself, the real places scaled to 0.9; p(-1 | j) = 0.1.
+/// Columns are cached; a change in the graph recomputes only those within 16 levels. A prediction costs O(|WM|).
+class TransitionModel {
+ public:
+  /// p(real place at this graph level), before scaling: self, level 1, ..., level 16.
+  static constexpr int kLevels = 16;
+  static const std::array<double, kLevels + 1>& LevelValues();
+  static constexpr double kToNewPlace = 0.1;  ///< p(-1 | j)
+
+  /// `virtual_place_prior`: p(-1 | -1), 0.9 in the specification.
+  explicit TransitionModel(double virtual_place_prior) : virtual_place_prior_(virtual_place_prior) {}
+
+  /// Takes in what has changed in the memory since the last call.
+  void Update(const LocationMemory& memory, const std::vector<int>& changed_slots);
+
+  /// One prediction: matrix times `posterior`. Both are over the slots of `working_memory`.
+  Belief Predict(const Belief& posterior, const std::vector<int>& working_memory) const;
+
+  /// p(. | j): pairs of slot and probability, ascending slots; without the virtual place's kToNewPlace.
+  const std::vector<std::pair<int, double>>& Column(int slot) const;
+
+ private:
+  double virtual_place_prior_;
+  std::vector<std::vector<std::pair<int, double>>> columns_;  // by slot; empty: not in WM
+};
+
+}  // namespace tutti

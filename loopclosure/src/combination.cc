@@ -1,0 +1,92 @@
+#include "tutti/loopclosure/combination.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tutti {
+
+Belief CombineMean(const std::vector<const Belief*>& members) {
+  Belief mean;
+  if (members.empty()) return mean;
+  std::size_t slots = 0;
+  for (const Belief* member : members) slots = std::max(slots, member->places.size());
+  mean.new_place = 0.0;
+  mean.places.assign(slots, 0.0);
+  const double share = 1.0 / static_cast<double>(members.size());
+  for (const Belief* member : members) {
+    mean.new_place += share * member->new_place;
+    for (std::size_t i = 0; i < member->places.size(); ++i) mean.places[i] += share * member->places[i];
+  }
+  return mean;
+}
+
+Belief CombineProduct(const std::vector<const Belief*>& members, const std::vector<int>& working_memory) {
+  constexpr double kFloor = 1e-9;
+  Belief product;
+  if (members.empty()) return product;
+  std::size_t slots = 0;
+  for (const Belief* member : members) slots = std::max(slots, member->places.size());
+  product.places.assign(slots, 0.0);
+  product.new_place = 1.0;
+  for (const Belief* member : members) product.new_place *= std::max(member->new_place, kFloor);
+  for (const int slot : working_memory) {
+    const std::size_t i = static_cast<std::size_t>(slot);
+    double value = 1.0;
+    for (const Belief* member : members) {
+      value *= std::max(i < member->places.size() ? member->places[i] : 0.0, kFloor);
+    }
+    product.places[i] = value;
+  }
+  product.Normalise();
+  return product;
+}
+
+CombinedBelief CombineMajority(const std::vector<const Belief*>& members, double threshold,
+                               const LocationMemory& memory) {
+  constexpr int kAgreementLevels = 2;
+  CombinedBelief result;
+  std::vector<const Belief*> voters;
+  for (const Belief* member : members) {
+    if (member->Hypothesis() >= threshold && member->Best() >= 0) voters.push_back(member);
+  }
+  // The largest group around one voter's choice wins; of equal ones that with the larger mean H, then the first member's.
+  for (const Belief* centre : voters) {
+    const int best = centre->Best();
+    const std::vector<std::pair<int, int>> near = memory.Neighbours(best, kAgreementLevels);
+    std::vector<const Belief*> group;
+    double sum = 0.0;
+    for (const Belief* voter : voters) {
+      const int vote = voter->Best();
+      if (std::any_of(near.begin(), near.end(), [vote](const auto& n) { return n.first == vote; })) {
+        group.push_back(voter);
+        sum += voter->Hypothesis();
+      }
+    }
+    if (group.size() < 2) continue;
+    const double hypothesis = sum / static_cast<double>(members.size());  // share x mean H
+    if (hypothesis > result.hypothesis) {
+      result.hypothesis = hypothesis;
+      result.best = best;
+      result.belief = CombineMean(group);
+    }
+  }
+  if (result.best < 0) {
+    result.belief = CombineMean(members);
+    result.best = result.belief.Best();
+  }
+  return result;
+}
+
+CombinedBelief Combine(CombinationRule rule, const std::vector<const Belief*>& members, double threshold,
+                       const LocationMemory& memory) {
+  if (rule == CombinationRule::kMajority) return CombineMajority(members, threshold, memory);
+  CombinedBelief result;
+  if (members.empty()) return result;
+  result.belief = rule == CombinationRule::kProduct ? CombineProduct(members, memory.working_memory())
+                                                    : CombineMean(members);
+  result.hypothesis = std::clamp(result.belief.Hypothesis(), 0.0, 1.0);
+  result.best = result.belief.Best();
+  return result;
+}
+
+}  // namespace tutti

@@ -1,0 +1,122 @@
+#include "tutti/loopclosure/detector_options.h"
+
+#include <algorithm>
+
+#include "tutti/core/error.h"
+#include "tutti/core/text.h"
+
+namespace tutti {
+namespace {
+
+const std::vector<std::string>& RuleWords() {
+  static const std::vector<std::string> words = {"mean", "product", "majority", "naive"};
+  return words;
+}
+
+std::string OutOf(const char* name, const char* range) {
+  return std::string(name) + " must be " + range;
+}
+
+}  // namespace
+
+std::string ExtractionOptions::Validate() const {
+  if (features < 1 || features > 10000) return OutOf("extraction.features", "1 to 10000");
+  if (grid_columns < 1 || grid_columns > 64) return OutOf("extraction.grid_columns", "1 to 64");
+  if (max_pixels < 1 << 12) return OutOf("extraction.max_pixels", "at least 4096");
+  if (surf_octaves < 1 || surf_octaves > 8) return OutOf("extraction.surf_octaves", "1 to 8");
+  if (!(surf_threshold >= 0)) return OutOf("extraction.surf_threshold", "0 or more");
+  if (sift_max_pixels < 1 << 12) return OutOf("extraction.sift_max_pixels", "at least 4096");
+  if (!(sift_contrast > 0)) return OutOf("extraction.sift_contrast", "above 0");
+  if (orb_fast_threshold < 1 || orb_fast_threshold > 255) return OutOf("extraction.orb_fast_threshold", "1 to 255");
+  return {};
+}
+
+std::string VocabularyOptions::Validate() const {
+  if (!(nndr > 0 && nndr <= 1)) return OutOf("vocabulary.nndr", "above 0 and at most 1 (a ratio of true distances)");
+  if (trees < 1 || trees > 64) return OutOf("vocabulary.trees", "1 to 64");
+  if (checks < 1) return OutOf("vocabulary.checks", "at least 1");
+  if (hash_tables < 1 || hash_tables > 64) return OutOf("vocabulary.hash_tables", "1 to 64");
+  return {};
+}
+
+std::string VerificationOptions::Validate() const {
+  if (max_hypotheses < 1) return OutOf("verification.max_hypotheses", "at least 1");
+  if (neighbours < 0 || neighbours > 16) return OutOf("verification.neighbours", "0 to 16");
+  if (!(match_ratio > 0 && match_ratio <= 1)) return OutOf("verification.match_ratio", "above 0 and at most 1");
+  if (min_inliers < 8) return OutOf("verification.min_inliers", "at least 8");
+  if (!(min_inlier_ratio >= 0 && min_inlier_ratio <= 1)) return OutOf("verification.min_inlier_ratio", "0 to 1");
+  if (!(min_spread >= 0 && min_spread < 1)) return OutOf("verification.min_spread", "0 to 1");
+  if (!(reprojection_px > 0)) return OutOf("verification.reprojection_px", "above 0");
+  if (!(epipolar_px > 0)) return OutOf("verification.epipolar_px", "above 0");
+  if (!(confidence > 0 && confidence < 1)) return OutOf("verification.confidence", "between 0 and 1");
+  if (max_iterations < 1) return OutOf("verification.max_iterations", "at least 1");
+  if (!(pixel_sigma > 0)) return OutOf("verification.pixel_sigma", "above 0");
+  if (!(min_depth_m >= 0 && max_depth_m > min_depth_m)) {
+    return "verification.min_depth_m must be at least 0 and below verification.max_depth_m";
+  }
+  return {};
+}
+
+std::string LoopDetectorOptions::Validate() const {
+  if (members.empty()) return "members must name at least one of surf, sift, orb, akaze, brisk";
+  for (std::size_t i = 0; i < members.size(); ++i) {
+    if (std::find(KnownMembers().begin(), KnownMembers().end(), members[i]) == KnownMembers().end()) {
+      return "members holds '" + members[i] + "', which is not known; did you mean '" +
+             NearestWord(members[i], KnownMembers()) + "'?";
+    }
+    if (std::find(members.begin(), members.begin() + static_cast<std::ptrdiff_t>(i), members[i]) !=
+        members.begin() + static_cast<std::ptrdiff_t>(i)) {
+      return "members holds '" + members[i] + "' twice; name each member once";
+    }
+  }
+  if (rule == CombinationRule::kSingle && members.size() != 1) {
+    return "the rule 'single' takes exactly one member, not " + std::to_string(members.size());
+  }
+  if (!(loop_threshold >= 0 && loop_threshold <= 1)) return OutOf("loop_threshold", "0 to 1");
+  if (stm_size < 1) return OutOf("stm_size", "at least 1");
+  if (threads < 1) return OutOf("threads", "at least 1");
+  if (!(bad_signature_ratio >= 0 && bad_signature_ratio <= 1)) return OutOf("bad_signature_ratio", "0 to 1");
+  if (!(virtual_place_prior > 0 && virtual_place_prior < 1)) return OutOf("virtual_place_prior", "between 0 and 1");
+  if (!(rehearsal_similarity > 0 && rehearsal_similarity <= 1)) return OutOf("rehearsal_similarity", "above 0, at most 1");
+  for (const std::string& problem : {extraction.Validate(), vocabulary.Validate(), verification.Validate()}) {
+    if (!problem.empty()) return problem;
+  }
+  return {};
+}
+
+const std::vector<std::string>& KnownMembers() {
+  static const std::vector<std::string> names = {"surf", "sift", "orb", "akaze", "brisk"};
+  return names;
+}
+
+void SetRule(const std::string& word, LoopDetectorOptions& options) {
+  const auto rule = std::find(RuleWords().begin(), RuleWords().end(), word);
+  if (rule != RuleWords().end()) {
+    constexpr CombinationRule kRules[] = {CombinationRule::kMean, CombinationRule::kProduct,
+                                          CombinationRule::kMajority, CombinationRule::kNaive};
+    options.rule = kRules[rule - RuleWords().begin()];
+    return;
+  }
+  if (std::find(KnownMembers().begin(), KnownMembers().end(), word) != KnownMembers().end()) {
+    options.rule = CombinationRule::kSingle;
+    options.members = {word};
+    return;
+  }
+  std::vector<std::string> all = RuleWords();
+  all.insert(all.end(), KnownMembers().begin(), KnownMembers().end());
+  throw InputError("unknown rule '" + word + "'; did you mean '" + NearestWord(word, all) +
+                   "'? Known: mean, product, majority, naive, or one member: surf, sift, orb, akaze, brisk");
+}
+
+std::string RuleName(const LoopDetectorOptions& options) {
+  switch (options.rule) {
+    case CombinationRule::kMean: return "mean";
+    case CombinationRule::kProduct: return "product";
+    case CombinationRule::kMajority: return "majority";
+    case CombinationRule::kNaive: return "naive";
+    case CombinationRule::kSingle: break;
+  }
+  return options.members.empty() ? "single" : options.members.front();
+}
+
+}  // namespace tutti

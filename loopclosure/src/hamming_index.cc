@@ -1,0 +1,99 @@
+#include <algorithm>
+#include <random>
+
+#include "hamming.h"
+#include "tutti/loopclosure/descriptor_index.h"
+
+namespace tutti {
+namespace {
+
+constexpr int kKeyBits = 14;         // 16384 buckets a table: a handful of words each at 100,000 words
+constexpr int kExactUpTo = 6000;     // below this an exact scan is as fast as the tables
+
+class HammingIndex : public DescriptorIndex {
+ public:
+  HammingIndex(int bytes, int tables, std::uint64_t seed) : bytes_(bytes), tables_(static_cast<std::size_t>(tables)) {
+    std::mt19937_64 generator(seed);
+    for (Table& table : tables_) {
+      table.buckets.resize(std::size_t{1} << kKeyBits);
+      for (int& bit : table.bits) {
+        bit = static_cast<int>(generator() % static_cast<std::uint64_t>(8 * bytes));
+      }
+    }
+  }
+
+  void Add(const cv::Mat& rows) override {
+    CV_Assert(rows.type() == CV_8U && rows.cols == bytes_);
+    for (int i = 0; i < rows.rows; ++i) {
+      const std::uint8_t* row = rows.ptr<std::uint8_t>(i);
+      words_.insert(words_.end(), row, row + bytes_);
+      for (Table& table : tables_) table.buckets[Key(table, row)].push_back(size_);
+      ++size_;
+    }
+  }
+
+  TwoNearest Search(const std::uint8_t* descriptor) const override {
+    return size_ <= kExactUpTo ? SearchAll(descriptor) : SearchTables(descriptor);
+  }
+
+  int size() const override { return size_; }
+
+ private:
+  struct Table {
+    int bits[kKeyBits] = {};
+    std::vector<std::vector<int>> buckets;
+  };
+
+  static std::size_t Key(const Table& table, const std::uint8_t* row) {
+    std::size_t key = 0;
+    for (const int bit : table.bits) key = (key << 1) | ((row[bit >> 3] >> (bit & 7)) & 1u);
+    return key;
+  }
+
+  const std::uint8_t* Word(int index) const {
+    return words_.data() + static_cast<std::size_t>(index) * static_cast<std::size_t>(bytes_);
+  }
+
+  TUTTI_POPCOUNT_CLONES TwoNearest SearchAll(const std::uint8_t* descriptor) const;
+  TUTTI_POPCOUNT_CLONES void Scan(const std::vector<int>& bucket, const std::uint8_t* descriptor,
+                                  TwoNearest& nearest) const;
+
+  TwoNearest SearchTables(const std::uint8_t* descriptor) const {
+    TwoNearest nearest;
+    for (const Table& table : tables_) {
+      const std::size_t key = Key(table, descriptor);
+      Scan(table.buckets[key], descriptor, nearest);
+      for (int b = 0; b < kKeyBits; ++b) Scan(table.buckets[key ^ (std::size_t{1} << b)], descriptor, nearest);
+    }
+    return nearest;
+  }
+
+  int bytes_;
+  int size_ = 0;
+  std::vector<Table> tables_;
+  std::vector<std::uint8_t> words_;
+};
+
+TwoNearest HammingIndex::SearchAll(const std::uint8_t* descriptor) const {
+  TwoNearest nearest;
+  for (int i = 0; i < size_; ++i) {
+    const float distance = static_cast<float>(internal::HammingDistance(descriptor, Word(i), bytes_));
+    if (distance < nearest.second_distance) nearest.Offer(i, distance);
+  }
+  return nearest;
+}
+
+void HammingIndex::Scan(const std::vector<int>& bucket, const std::uint8_t* descriptor, TwoNearest& nearest) const {
+  for (const int i : bucket) {
+    const float distance = static_cast<float>(internal::HammingDistance(descriptor, Word(i), bytes_));
+    if (distance <= nearest.second_distance) nearest.Offer(i, distance);
+  }
+}
+
+}  // namespace
+
+std::unique_ptr<DescriptorIndex> MakeHammingIndex(int bytes, int tables, std::uint64_t seed) {
+  return std::make_unique<HammingIndex>(bytes, tables, seed);
+}
+
+}  // namespace tutti

@@ -1,0 +1,74 @@
+#include "tutti/loopclosure/transition_model.h"
+
+#include <algorithm>
+
+namespace tutti {
+
+const std::array<double, TransitionModel::kLevels + 1>& TransitionModel::LevelValues() {
+  // The published row: a Gaussian of sigma 1.6 over graph levels, as RTAB-Map's default and the paper print it.
+  static const std::array<double, kLevels + 1> values = {0.36,    0.30,   0.16,    0.062,   0.0151,  0.00255,
+                                                         0.000324, 2.5e-5, 1.3e-6,  4.8e-8,  1.2e-9,  1.9e-11,
+                                                         2.2e-13, 1.7e-15, 8.5e-18, 2.9e-20, 6.9e-23};
+  return values;
+}
+
+void TransitionModel::Update(const LocationMemory& memory, const std::vector<int>& changed_slots) {
+  columns_.resize(static_cast<std::size_t>(memory.size()));
+  std::vector<int> dirty;
+  for (const int slot : changed_slots) {
+    if (memory.state(slot) != LocationMemory::State::kWorking) {
+      columns_[static_cast<std::size_t>(slot)].clear();
+      continue;
+    }
+    for (const auto& [neighbour, level] : memory.Neighbours(slot, kLevels)) dirty.push_back(neighbour);
+  }
+  std::sort(dirty.begin(), dirty.end());
+  dirty.erase(std::unique(dirty.begin(), dirty.end()), dirty.end());
+  for (const int j : dirty) {
+    std::vector<std::pair<int, double>>& column = columns_[static_cast<std::size_t>(j)];
+    column.clear();
+    double sum = 0.0;
+    for (const auto& [neighbour, level] : memory.Neighbours(j, kLevels)) {
+      const double value = LevelValues()[static_cast<std::size_t>(level)];
+      column.emplace_back(neighbour, value);
+      sum += value;
+    }
+    std::sort(column.begin(), column.end());
+    constexpr double kReal = 1.0 - kToNewPlace;
+    const double deficit = std::max(0.0, kReal - sum);  // chain ends and transferred neighbours
+    const double scale = kReal / (sum + deficit);
+    for (auto& [slot, value] : column) {
+      if (slot == j) value += deficit;
+      value *= scale;
+    }
+  }
+}
+
+Belief TransitionModel::Predict(const Belief& posterior, const std::vector<int>& working_memory) const {
+  Belief predicted;
+  predicted.places.assign(posterior.places.size(), 0.0);
+  double real = 0.0;
+  for (const int j : working_memory) {
+    const double p = posterior.places[static_cast<std::size_t>(j)];
+    if (p <= 0.0) continue;
+    real += p;
+    for (const auto& [i, value] : columns_[static_cast<std::size_t>(j)]) {
+      predicted.places[static_cast<std::size_t>(i)] += value * p;
+    }
+  }
+  if (working_memory.empty()) {
+    predicted.new_place = 1.0;
+    return predicted;
+  }
+  predicted.new_place = virtual_place_prior_ * posterior.new_place + kToNewPlace * real;
+  const double from_virtual =
+      (1.0 - virtual_place_prior_) * posterior.new_place / static_cast<double>(working_memory.size());
+  for (const int i : working_memory) predicted.places[static_cast<std::size_t>(i)] += from_virtual;
+  return predicted;
+}
+
+const std::vector<std::pair<int, double>>& TransitionModel::Column(int slot) const {
+  return columns_[static_cast<std::size_t>(slot)];
+}
+
+}  // namespace tutti

@@ -21,18 +21,24 @@ struct ReadResult {
 /// The layout of a data set on disk.
 enum class DatasetType { kAuto, kKitti, kTum, kEuroc, kImages, kVideo };
 
-/// How to read a data set. Every field has a key of the same name under `dataset:` and `camera:` in the YAML files.
+/// How to read a data set. Every field has a key of the same name under `dataset:` and `camera:` in the YAML
+/// files.
 struct DatasetOptions {
   DatasetType type = DatasetType::kAuto;  ///< kAuto: from what the folder holds
   Sensor sensor = Sensor::kMono;
-  std::optional<PinholeCamera> camera;    ///< as calibrated (with its distortion); EuRoC: from sensor.yaml where absent,
-                                          ///< KITTI: from calib.txt where absent
-  double baseline_m = 0;                  ///< stereo without sensor.yaml or calib.txt [m]
-  double depth_units_per_m = 5000;        ///< RGB-D: value in the depth image of one metre
-  double max_depth_m = 0;                 ///< RGB-D: farther depth is not used [m]; 0 = no limit
-  double max_association_s = 0.02;        ///< TUM: greatest difference of the stamps of colour and depth [s]
-  double rate_hz = 0;                     ///< frames per second where the data has no time stamps; 0: 10 Hz or the video's
-  int stride = 1;                         ///< use every stride-th frame
+  std::optional<PinholeCamera> camera;  ///< as calibrated (with its distortion); EuRoC: from sensor.yaml
+                                        ///< where absent, KITTI: from calib.txt where absent
+  double baseline_m = 0;            ///< stereo without sensor.yaml or calib.txt [m]
+  double depth_units_per_m = 5000;  ///< RGB-D: value in the depth image of one metre
+  double max_depth_m = 0;           ///< RGB-D: farther depth is not used [m]; 0 = no limit
+  double max_association_s = 0.02;  ///< TUM: greatest difference of the stamps of colour and depth [s]
+  double rate_hz = 0;  ///< frames per second where the data has no time stamps; 0: 10 Hz or the video's
+  int stride = 1;      ///< use every stride-th frame
+  bool mirrored_ground_truth = false;  ///< ground truth has its y axis up (left-handed, as ICL-NUIM with its
+                                       ///< negative fy): it is mirrored when read
+
+  /// Empty if usable, else what is wrong.
+  std::string Validate() const;
 };
 
 /// A sequence of frames with random access. Read() is safe to call from several threads at once.
@@ -43,21 +49,27 @@ class Dataset {
   virtual std::size_t Size() const = 0;
   /// Time stamp of frame i [s]; strictly growing.
   virtual double Stamp(std::size_t i) const = 0;
-  /// Reads and rectifies frame i. Unreadable, truncated, or of another size than the first: error, no exception.
+  /// Reads and rectifies frame i. Unreadable, truncated, or of another size than the first: error, no
+  /// exception.
   virtual ReadResult Read(std::size_t i) const = 0;
   /// The rig after rectification.
   virtual const CameraRig& Rig() const = 0;
   /// Ground truth in its usual place in the folder (T_world_body, stamps as Stamp()), if there is any.
   virtual std::optional<std::filesystem::path> GroundTruthFile() const = 0;
-  /// Reads a ground-truth file for this data set: format guessed, KITTI poses get the data set's stamps, and must be as many.
-  /// Throws InputError with file and line.
+  /// Reads a ground-truth file for this data set: format guessed, KITTI poses get the data set's stamps, and
+  /// must be as many. Throws InputError with file and line.
   virtual Trajectory ReadGroundTruth(const std::filesystem::path& file) const = 0;
   /// Notes for the log about what was found and decided: skipped duplicates, frames without depth, ...
   virtual const std::vector<std::string>& Warnings() const = 0;
 };
 
-/// Opens a data set (folder or video file). Throws InputError if there is nothing usable: missing or empty folder, no
-/// calibration where one is needed, unsorted time stamps, ... The message says what was expected where.
+/// What a folder (or file) looks like. Throws InputError for a missing path, an empty folder, or one that
+/// holds no data set.
+DatasetType DetectDatasetType(const std::filesystem::path& path);
+
+/// Opens a data set (folder or video file). Throws InputError if there is nothing usable: missing or empty
+/// folder, no calibration where one is needed, unsorted time stamps, ... The message says what was expected
+/// where.
 std::unique_ptr<Dataset> OpenDataset(const std::filesystem::path& path, const DatasetOptions& options);
 
 }  // namespace tutti

@@ -1,0 +1,105 @@
+#include "tutti/frontend/dataset.h"
+
+#include <array>
+#include <cmath>
+
+#include "dataset_folder.h"
+#include "tutti/core/error.h"
+
+namespace tutti {
+
+std::string DatasetOptions::Validate() const {
+  if (stride < 1) return "stride must be at least 1";
+  if (!(baseline_m >= 0)) return "baseline_m must not be negative";
+  if (!(depth_units_per_m > 0)) return "depth_units_per_m must be greater than 0";
+  if (!(max_depth_m >= 0)) return "max_depth_m must not be negative; 0 means no limit";
+  if (!(max_association_s >= 0)) return "max_association_s must not be negative";
+  if (!(rate_hz >= 0 && std::isfinite(rate_hz)))
+    return "rate_hz must not be negative; 0 means the data's own";
+  return {};
+}
+
+FolderContents FindImages(const std::filesystem::path& folder, const DatasetOptions& options) {
+  if (options.sensor != Sensor::kMono) {
+    throw InputError(folder.string() +
+                     ": a plain folder of images is mono; for stereo use the KITTI or EuRoC layout, for "
+                     "RGB-D the TUM layout (data/README.md shows them)");
+  }
+  FolderContents out;
+  out.folder = folder;
+  out.left = options.camera;
+  out.rate_hz = options.rate_hz > 0 ? options.rate_hz : 10.0;
+  const std::vector<std::filesystem::path> files = ListImages(folder);
+  if (files.empty()) throw InputError(folder.string() + ": holds no images (png, jpg, webp, ...)");
+  for (const std::filesystem::path& file : files) {
+    FrameFiles frame;
+    frame.index = static_cast<std::int64_t>(out.frames.size());
+    frame.stamp_s = static_cast<double>(frame.index) / out.rate_hz;
+    frame.image = file;
+    out.pose_stamps.emplace_back(frame.index, frame.stamp_s);
+    out.frames.push_back(std::move(frame));
+  }
+  out.pose_count = files.size();
+  if (!out.left) {
+    out.warnings.push_back(
+        folder.string() + ": no calibration is given (camera: fx, fy, cx, cy); appearance only, no odometry");
+  }
+  out.truth_places = {folder / "groundtruth.txt", folder / "poses.txt"};
+  return out;
+}
+
+DatasetType DetectDatasetType(const std::filesystem::path& path) {
+  std::error_code code;
+  if (!std::filesystem::exists(path, code)) {
+    throw InputError(path.string() +
+                     ": does not exist; give the folder of a data set, a folder of images, or a video file");
+  }
+  if (!std::filesystem::is_directory(path, code)) {
+    if (HasImageExtension(path))
+      throw InputError(path.string() + ": is a single image; give the folder that holds it");
+    return DatasetType::kVideo;
+  }
+  const auto folder = [&](const char* name) { return std::filesystem::is_directory(path / name, code); };
+  const auto file = [&](const char* name) { return std::filesystem::is_regular_file(path / name, code); };
+  if (folder("mav0/cam0") || file("cam0/sensor.yaml")) return DatasetType::kEuroc;
+  if (folder("image_0") || folder("image_2")) return DatasetType::kKitti;
+  if (file("rgb.txt") || file("associations.txt")) return DatasetType::kTum;
+  if (!ListImages(path).empty()) return DatasetType::kImages;
+  const std::filesystem::directory_iterator entries(path, code);
+  if (code)
+    throw InputError(path.string() + ": can't be listed (" + code.message() + "); check its permissions");
+  throw InputError(path.string() +
+                   (entries == std::filesystem::directory_iterator() ? ": is empty" : ": holds no data set") +
+                   "; expected image_0/ (KITTI), rgb.txt (TUM), mav0/cam0/ (EuRoC), or images");
+}
+
+std::unique_ptr<Dataset> OpenDataset(const std::filesystem::path& path, const DatasetOptions& options) {
+  const std::string problem = options.Validate();
+  if (!problem.empty()) throw InputError("dataset: " + problem);
+  const DatasetType seen = DetectDatasetType(path);  // missing or empty: the same words for every type
+  const DatasetType type = options.type == DatasetType::kAuto ? seen : options.type;
+  if ((type == DatasetType::kVideo) != (seen == DatasetType::kVideo)) {
+    throw InputError(path.string() + (type == DatasetType::kVideo
+                                          ? ": is a folder, but the type is video; give the video file"
+                                          : ": is a file; give the folder of the data set"));
+  }
+  DatasetOptions use = options;
+  if (use.camera && use.camera->fy < 0) {  // ICL-NUIM's own calibration: y up
+    use.camera->fy = -use.camera->fy;
+    use.mirrored_ground_truth = true;
+  }
+  switch (type) {
+    case DatasetType::kKitti:
+      return std::make_unique<FolderDataset>(FindKitti(path, use), use);
+    case DatasetType::kTum:
+      return std::make_unique<FolderDataset>(FindTum(path, use), use);
+    case DatasetType::kEuroc:
+      return std::make_unique<FolderDataset>(FindEuroc(path, use), use);
+    case DatasetType::kVideo:
+      return OpenVideo(path, use);
+    default:
+      return std::make_unique<FolderDataset>(FindImages(path, use), use);
+  }
+}
+
+}  // namespace tutti

@@ -1,0 +1,34 @@
+// Reads image files without trusting them.
+#pragma once
+
+#include <filesystem>
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+namespace tutti {
+
+/// An image, or what is wrong with the file (`error` is empty if there is an image).
+struct ImageFile {
+  cv::Mat image;
+  std::string error;
+};
+
+/// Reads an image in grey, 8 or 16 bit as stored. Decoders fill the missing part of a truncated JPEG, PNG or
+/// WebP with grey without a word, so the ends of these are checked first. Never throws; thread-safe.
+ImageFile ReadGreyFile(const std::filesystem::path& file);
+/// Reads a depth image as stored: one channel of 16 bit or float.
+ImageFile ReadDepthFile(const std::filesystem::path& file);
+
+/// To 8 bit. 16-bit images are divided by 2^(bits - 8) and saturated; `bits`: significant bits, 8 to 16.
+cv::Mat ToGrey8(const cv::Mat& grey, int bits);
+/// Bits that the greatest value of an image needs, rounded up to 8, 10, 12, 14 or 16 as sensors have them.
+int SignificantBits(const cv::Mat& grey);
+
+/// True if the name ends like an image file that OpenCV can read.
+bool HasImageExtension(const std::filesystem::path& file);
+/// The images in a folder in natural order (hidden and other files ignored); empty if the folder can't be
+/// read.
+std::vector<std::filesystem::path> ListImages(const std::filesystem::path& folder);
+
+}  // namespace tutti

@@ -1,5 +1,7 @@
 #include "tutti/core/camera.h"
 
+#include <Eigen/LU>
+
 #include <cmath>
 
 namespace tutti {

@@ -1,0 +1,16 @@
+// Scalar weights of the chordal cost. Private to the back end.
+#pragma once
+
+#include "tutti/backend/pose_graph.h"
+
+namespace tutti::internal {
+
+/// kappa (rotation) and tau (translation) of an edge: SE-Sync's, Rosen et al., IJRR 2019, from the
+/// information matrix.
+struct ChordalWeights {
+  double rotation = 1;
+  double translation = 1;
+};
+ChordalWeights MakeChordalWeights(const PoseGraphEdge& edge, GraphKind kind);
+
+}  // namespace tutti::internal

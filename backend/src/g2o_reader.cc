@@ -1,0 +1,213 @@
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <map>
+#include <optional>
+#include <set>
+
+#include "tutti/backend/g2o_io.h"
+#include "tutti/core/error.h"
+#include "tutti/core/text.h"
+
+namespace tutti {
+namespace {
+
+/// What a tag stands for.
+struct Tag {
+  GraphKind kind;
+  bool is_edge;
+};
+const std::map<std::string, Tag>& KnownTags() {
+  static const std::map<std::string, Tag> tags = {
+      {"VERTEX_SE2", {GraphKind::kSE2, false}},        {"EDGE_SE2", {GraphKind::kSE2, true}},
+      {"VERTEX_SE3:QUAT", {GraphKind::kSE3, false}},   {"EDGE_SE3:QUAT", {GraphKind::kSE3, true}},
+      {"VERTEX_SIM3:QUAT", {GraphKind::kSim3, false}}, {"EDGE_SIM3:QUAT", {GraphKind::kSim3, true}}};
+  return tags;
+}
+
+std::size_t PoseNumbers(GraphKind kind) {
+  return kind == GraphKind::kSE2 ? 3 : kind == GraphKind::kSE3 ? 7 : 8;
+}
+
+class Reader {
+ public:
+  explicit Reader(const std::filesystem::path& file) : file_(file) {}
+
+  G2oFile Read() {
+    std::error_code ignored;
+    if (std::filesystem::is_directory(file_, ignored))
+      throw InputError(file_.string() + ": is a folder; give a g2o file");
+    std::ifstream in(file_);
+    if (!in) throw InputError(file_.string() + ": can't be opened; check the path and that it is readable");
+    std::string text;
+    for (line_ = 1; std::getline(in, text); ++line_) {
+      const std::size_t comment = text.find('#');
+      if (comment != std::string::npos) text.resize(comment);
+      words_ = SplitText(text, " \t\r");
+      if (!words_.empty()) ReadLine();
+    }
+    if (in.bad()) throw InputError(file_.string() + ": could not be read to its end");
+    return Build();
+  }
+
+ private:
+  struct EdgeLine {
+    PoseGraphEdge edge;
+    std::size_t line;
+  };
+
+  [[noreturn]] void Fail(std::size_t line, const std::string& what) const {
+    throw InputError(file_.string() + ":" + std::to_string(line) + ": " + what);
+  }
+
+  void ReadLine() {
+    const std::string& tag = words_[0];
+    if (tag == "FIX") return ReadFix();
+    const auto known = KnownTags().find(tag);
+    if (known == KnownTags().end()) {
+      auto& [count, first] =
+          unknown_.emplace(tag, std::pair<std::size_t, std::size_t>(0, line_)).first->second;
+      (void)first;
+      ++count;
+      return;
+    }
+    const Tag& what = known->second;
+    if (kind_ && *kind_ != what.kind) {
+      Fail(line_, tag + " in a graph of " + ToString(*kind_) + "; a file holds one kind of poses");
+    }
+    kind_ = what.kind;
+    const std::size_t n = TangentCoordinates(what.kind).size();
+    const std::size_t want = 1 + (what.is_edge ? 2 + n * (n + 1) / 2 : 1) + PoseNumbers(what.kind);
+    if (words_.size() != want) {
+      Fail(line_, tag + " has " + std::to_string(words_.size() - 1) + " numbers; " +
+                      std::to_string(want - 1) + " are needed");
+    }
+    what.is_edge ? ReadEdge() : ReadVertex();
+  }
+
+  int Id(std::size_t word) const {
+    const std::optional<long long> value = ParseInteger(words_[word]);
+    if (!value || *value < -2000000000LL || *value > 2000000000LL) {
+      Fail(line_, "'" + words_[word] + "' is not a node id (a whole number)");
+    }
+    return static_cast<int>(*value);
+  }
+
+  double Number(std::size_t word) const {
+    const std::optional<double> value = ParseDouble(words_[word]);
+    if (!value) Fail(line_, "'" + words_[word] + "' is not a number");
+    if (!std::isfinite(*value))
+      Fail(line_, "'" + words_[word] + "' is not finite; remove or repair this line");
+    return *value;
+  }
+
+  Similarity ReadPose(std::size_t word) const {
+    Similarity pose;
+    if (*kind_ == GraphKind::kSE2) {
+      const double half = 0.5 * Number(word + 2);
+      pose.translation = Eigen::Vector3d(Number(word), Number(word + 1), 0);
+      pose.rotation = Eigen::Quaterniond(std::cos(half), 0, 0, std::sin(half));
+      return pose;
+    }
+    pose.translation = Eigen::Vector3d(Number(word), Number(word + 1), Number(word + 2));
+    pose.rotation =
+        Eigen::Quaterniond(Number(word + 6), Number(word + 3), Number(word + 4), Number(word + 5));
+    if (pose.rotation.norm() < 1e-6) Fail(line_, "the quaternion is zero; a unit quaternion is needed");
+    pose.rotation.normalize();
+    if (*kind_ == GraphKind::kSim3) {
+      pose.scale = Number(word + 7);
+      if (pose.scale <= 0) Fail(line_, "the scale must be positive");
+    }
+    return pose;
+  }
+
+  void ReadVertex() {
+    const int id = Id(1);
+    if (!vertices_.insert(id).second)
+      Fail(line_, "vertex " + std::to_string(id) + " was given before; remove one of them");
+    nodes_.push_back({id, ReadPose(2), false, true});
+  }
+
+  void ReadEdge() {
+    EdgeLine e{{Id(1), Id(2), ReadPose(3), Matrix7d::Zero(), EdgeKind::kOdometry}, line_};
+    if (e.edge.from == e.edge.to) Fail(line_, "the edge leads from node " + words_[1] + " to itself");
+    const long long gap = static_cast<long long>(e.edge.from) - e.edge.to;
+    if (gap != 1 && gap != -1) e.edge.kind = EdgeKind::kLoop;
+    const std::vector<int> used = TangentCoordinates(*kind_);
+    std::size_t word = 3 + PoseNumbers(*kind_);
+    for (std::size_t r = 0; r < used.size(); ++r) {
+      for (std::size_t c = r; c < used.size(); ++c, ++word) {
+        e.edge.information(used[r], used[c]) = e.edge.information(used[c], used[r]) = Number(word);
+      }
+    }
+    const std::string wrong = CheckInformation(e.edge.information, *kind_);
+    if (!wrong.empty()) Fail(line_, wrong);
+    edges_.push_back(e);
+  }
+
+  void ReadFix() {
+    if (words_.size() < 2) Fail(line_, "FIX names no node");
+    for (std::size_t word = 1; word < words_.size(); ++word) fixed_.emplace(Id(word), line_);
+  }
+
+  G2oFile Build() {
+    if (edges_.empty()) {
+      std::string hint;
+      if (!unknown_.empty()) hint = " (tutti does not know '" + unknown_.begin()->first + "')";
+      throw InputError(file_.string() + ": holds no edge of a pose graph" + hint + "; is it a g2o file?");
+    }
+    G2oFile out;
+    out.graph = PoseGraph(*kind_);
+    for (const PoseGraphNode& node : nodes_) out.graph.AddNode(node);
+    std::set<int> linked, missing;
+    for (const EdgeLine& e : edges_) {
+      for (int id : {e.edge.from, e.edge.to}) {
+        linked.insert(id);
+        if (!out.graph.Has(id)) missing.insert(id);
+      }
+    }
+    for (int id : missing) out.graph.AddNode(PoseGraphNode{id, Similarity(), false, false});
+    for (const EdgeLine& e : edges_) out.graph.AddEdge(e.edge);
+    for (const auto& [id, line] : fixed_) {
+      if (!out.graph.Has(id))
+        Fail(line, "FIX names node " + std::to_string(id) + ", which is not in the graph");
+      out.graph.SetFixed(id, true);
+    }
+    out.has_all_vertices = missing.empty();
+    Warn(out, linked.size(), missing.size());
+    return out;
+  }
+
+  void Warn(G2oFile& out, std::size_t linked, std::size_t missing) const {
+    for (const auto& [tag, where] : unknown_) {
+      out.warnings.push_back(file_.string() + ":" + std::to_string(where.second) + ": unknown tag '" + tag +
+                             "', " + std::to_string(where.first) + (where.first == 1 ? " line" : " lines") +
+                             " ignored");
+    }
+    if (missing > 0 && !nodes_.empty()) {
+      out.warnings.push_back(file_.string() + ": " + std::to_string(missing) +
+                             " nodes of edges have no vertex; their poses come from the edges");
+    }
+    const std::size_t alone = out.graph.nodes().size() - linked;
+    if (alone > 0) {
+      out.warnings.push_back(file_.string() + ": " + std::to_string(alone) +
+                             " vertices have no edge and stay as they are");
+    }
+  }
+
+  std::filesystem::path file_;
+  std::size_t line_ = 0;
+  std::vector<std::string> words_;
+  std::optional<GraphKind> kind_;
+  std::vector<PoseGraphNode> nodes_;
+  std::set<int> vertices_;
+  std::vector<EdgeLine> edges_;
+  std::map<int, std::size_t> fixed_;
+  std::map<std::string, std::pair<std::size_t, std::size_t>> unknown_;  ///< tag -> count, first line
+};
+
+}  // namespace
+
+G2oFile ReadG2o(const std::filesystem::path& file) { return Reader(file).Read(); }
+
+}  // namespace tutti

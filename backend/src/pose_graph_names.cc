@@ -1,0 +1,57 @@
+// Words of the command line for the optimiser's choices.
+#include <array>
+#include <utility>
+#include <vector>
+
+#include "tutti/backend/pose_graph_optimizer.h"
+#include "tutti/core/error.h"
+#include "tutti/core/text.h"
+
+namespace tutti {
+namespace {
+
+template <typename Enum>
+using Names = std::vector<std::pair<const char*, Enum>>;
+
+const Names<GraphObjective> kObjectives = {{"chi2", GraphObjective::kChi2},
+                                           {"chi2log", GraphObjective::kChi2Log}};
+const Names<RobustLoss> kRobust = {{"none", RobustLoss::kNone},
+                                   {"huber", RobustLoss::kHuber},
+                                   {"dcs", RobustLoss::kDcs},
+                                   {"gnc", RobustLoss::kGnc}};
+const Names<GraphInit> kInits = {{"auto", GraphInit::kAuto},
+                                 {"file", GraphInit::kFile},
+                                 {"odometry", GraphInit::kOdometry},
+                                 {"chordal", GraphInit::kChordal}};
+
+template <typename Enum>
+Enum Parse(const Names<Enum>& names, const std::string& name, const char* what) {
+  std::string all;
+  std::vector<std::string> words;
+  for (const auto& [word, value] : names) {
+    if (name == word) return value;
+    words.emplace_back(word);
+    all += (all.empty() ? "" : ", ") + words.back();
+  }
+  throw InputError(std::string(what) + " '" + name + "' is unknown; did you mean '" +
+                   NearestWord(name, words) + "'? There are: " + all);
+}
+
+template <typename Enum>
+const char* Name(const Names<Enum>& names, Enum value) {
+  for (const auto& [word, candidate] : names) {
+    if (candidate == value) return word;
+  }
+  return "?";
+}
+
+}  // namespace
+
+GraphObjective ParseGraphObjective(const std::string& name) { return Parse(kObjectives, name, "objective"); }
+RobustLoss ParseRobustLoss(const std::string& name) { return Parse(kRobust, name, "robust loss"); }
+GraphInit ParseGraphInit(const std::string& name) { return Parse(kInits, name, "initialisation"); }
+const char* ToString(GraphObjective objective) { return Name(kObjectives, objective); }
+const char* ToString(RobustLoss robust) { return Name(kRobust, robust); }
+const char* ToString(GraphInit init) { return Name(kInits, init); }
+
+}  // namespace tutti

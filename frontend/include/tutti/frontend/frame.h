@@ -1,8 +1,9 @@
-// What a sensor delivers: one frame, and the rig that took it. Frames are rectified: a Dataset removes the lens
-// distortion and aligns stereo pairs before anything else sees an image.
+// What a sensor delivers: one frame, and the rig that took it. Frames are rectified: a Dataset removes the
+// lens distortion and aligns stereo pairs before anything else sees an image.
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <opencv2/core.hpp>
 #include <string>
 
@@ -10,6 +11,8 @@
 #include "tutti/core/pose.h"
 
 namespace tutti {
+
+struct Features;
 
 enum class Sensor { kMono, kStereo, kRgbd };
 
@@ -31,6 +34,7 @@ struct InputFrame {
   cv::Mat image;           ///< CV_8UC1, left (or only) camera
   cv::Mat right;           ///< stereo: CV_8UC1, same size as image; else empty
   cv::Mat depth_m;         ///< RGB-D: CV_32FC1 [m], registered to image, 0 = no measurement; else empty
+  std::shared_ptr<const Features> features;  ///< optional: Odometry::Extract's result, made on another thread
 };
 
 }  // namespace tutti

@@ -21,27 +21,27 @@ const char* ToString(TrackingState state);
 /// What became of one frame.
 struct TrackResult {
   TrackingState state = TrackingState::kInitializing;
-  std::string reason;        ///< why the frame has no pose (empty when it has one)
-  Pose T_world_camera;       ///< valid if state == kTracking
-  int inliers = 0;           ///< landmarks that agree with the pose
-  int keyframe = -1;         ///< id of the keyframe that this frame became, or -1
+  std::string reason;   ///< why the frame has no pose (empty when it has one)
+  Pose T_world_camera;  ///< valid if state == kTracking
+  int inliers = 0;      ///< landmarks that agree with the pose
+  int keyframe = -1;    ///< id of the keyframe that this frame became, or -1
 };
 
 /// A keyframe's features as the loop closure and the pose graph see them. Frames of reference: the camera's.
 struct KeyframeView {
-  int id = -1;                                ///< grows by one with each keyframe
-  std::int64_t frame_index = 0;               ///< index of the input frame
+  int id = -1;                   ///< grows by one with each keyframe
+  std::int64_t frame_index = 0;  ///< index of the input frame
   double stamp_s = 0;
-  int map_piece = 0;                          ///< grows when tracking was lost and started again elsewhere
+  int map_piece = 0;  ///< grows when tracking was lost and started again elsewhere
   Pose T_world_camera;
-  std::vector<cv::KeyPoint> keypoints;        ///< size N
-  cv::Mat descriptors;                        ///< N x 32, CV_8U (ORB)
-  std::vector<Eigen::Vector3d> points;        ///< N points in the camera frame [m]; NaN where unknown
-  std::vector<int> landmarks;                 ///< N landmark ids, -1 where none
+  std::vector<cv::KeyPoint> keypoints;  ///< size N
+  cv::Mat descriptors;                  ///< N x 32, CV_8U (ORB)
+  std::vector<Eigen::Vector3d> points;  ///< N points in the camera frame [m]; NaN where unknown
+  std::vector<int> landmarks;           ///< N landmark ids, -1 where none
 };
 
-/// Odometry of one camera rig. A value type: a copy goes on independently (the pipeline uses that to know what
-/// the odometry alone would have done). Deterministic: the same frames give the same bits.
+/// Odometry of one camera rig. A value type: a copy goes on independently (the pipeline uses that to know
+/// what the odometry alone would have done). Deterministic: the same frames give the same bits.
 class Odometry {
  public:
   /// Throws InputError if options or rig are not usable (uncalibrated, no baseline for stereo, ...).
@@ -51,6 +51,10 @@ class Odometry {
   Odometry(Odometry&&) noexcept;
   Odometry& operator=(Odometry&&) noexcept;
   ~Odometry();
+
+  /// Features of a frame, the part of Track that needs nothing from before: pure, safe on any thread. Put the
+  /// result into InputFrame::features to take the work off Track's thread.
+  std::shared_ptr<const Features> Extract(const InputFrame& frame) const;
 
   /// Tracks the next frame; frames come in order of time. Never throws for hard images.
   TrackResult Track(const InputFrame& frame);
@@ -64,23 +68,27 @@ class Odometry {
   std::int64_t KeyframeFrameIndex(int id) const;
   double KeyframeStamp(int id) const;
 
-  /// Pairs of keyframes (older id, newer id) that see at least `min_shared` common landmarks, with that number.
+  /// Pairs of keyframes (older id, newer id) that see at least `min_shared` common landmarks, with that
+  /// number.
   std::vector<std::pair<std::pair<int, int>, int>> Covisibility(int min_shared) const;
 
-  /// Moves keyframes to corrected poses S_world_camera (scale 1 for metric sensors); landmarks and the current pose
-  /// go along with their keyframes, so that tracking goes on from the corrected place.
-  /// `merges`: pieces whose keyframes are now in one frame of reference: piece -> the piece that it joined.
-  void ApplyCorrection(const std::map<int, Similarity>& S_world_keyframe, const std::map<int, int>& merges = {});
+  /// Moves keyframes to corrected poses S_world_camera (scale 1 for metric sensors); landmarks and the
+  /// current pose go along with their keyframes, so that tracking goes on from the corrected place. `merges`:
+  /// pieces whose keyframes are now in one frame of reference: piece -> the piece that it joined.
+  void ApplyCorrection(const std::map<int, Similarity>& S_world_keyframe,
+                       const std::map<int, int>& merges = {});
 
-  /// All posed frames so far, T_world_camera, in order of time, through their reference keyframes (so corrections
-  /// and local bundle adjustment reach every frame). Only frames of `map_piece`; -1: of the piece with most frames.
+  /// All posed frames so far, T_world_camera, in order of time, through their reference keyframes (so
+  /// corrections and local bundle adjustment reach every frame). Only frames of `map_piece`; -1: of the piece
+  /// with most frames.
   Trajectory FrameTrajectory(int map_piece = -1) const;
   /// Same length as FrameTrajectory(map_piece): index of the input frame of each pose.
   std::vector<std::int64_t> FrameIndices(int map_piece = -1) const;
 
   /// Milliseconds spent so far, by stage ("extract", "track", "map", "local_ba", ...), summed.
   std::map<std::string, double> StageMilliseconds() const;
-  /// Stereo: median row difference over matches [px] and matches of the median frame, so far (0 if not stereo).
+  /// Stereo: median row difference over matches [px] and matches of the median frame, so far (0 if not
+  /// stereo).
   double StereoRowErrorPx() const;
   double StereoMatches() const;
 

@@ -1,0 +1,57 @@
+// ORB features of one frame, spread over the image, with depth where the sensor gives it.
+//
+// E. Rublee et al., "ORB: an efficient alternative to SIFT or SURF", ICCV 2011. The corners are spread over
+// the image by a grid on each pyramid level; OpenCV's ORB describes them.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+#include "tutti/frontend/frame.h"
+#include "tutti/frontend/odometry_options.h"
+
+namespace tutti {
+
+/// Number of differing bits of two 256-bit descriptors.
+int HammingDistance(const std::uint8_t* a, const std::uint8_t* b);
+
+/// Features of one rectified frame. N features.
+struct Features {
+  std::vector<cv::KeyPoint> keypoints;     ///< N, level-0 pixels, with octave and angle [deg]
+  cv::Mat descriptors;                     ///< N x 32, CV_8U
+  std::vector<float> inverse_depth;        ///< N [1/m]; 0 where unknown
+  std::vector<float> inverse_depth_sigma;  ///< N, standard deviation of inverse_depth [1/m]
+  double row_error_px = 0;                 ///< stereo: median absolute row difference of the matches [px]
+  int stereo_matches = 0;                  ///< stereo: features with a match in the right image
+
+  /// Indices of the features within `radius` [px] of `centre`, in octaves first..last, ascending.
+  void InArea(const cv::Point2f& centre, float radius, int first_octave, int last_octave,
+              std::vector<int>* out) const;
+  /// Fills the grid that InArea uses; call after the keypoints are set.
+  void BuildGrid(int width, int height);
+  std::size_t size() const { return keypoints.size(); }
+  const std::uint8_t* Descriptor(int i) const { return descriptors.ptr<std::uint8_t>(i); }
+
+ private:
+  static constexpr int kCell = 24;  // [px]
+  int columns_ = 0, rows_ = 0;
+  std::vector<std::vector<int>> cells_;
+};
+
+/// Scale of each pyramid level: level 0 has 1, level l scale_factor^l.
+std::vector<float> PyramidScales(const OdometryOptions& options);
+
+/// Image pyramid; level l is smaller by scale_factor^l.
+std::vector<cv::Mat> BuildPyramid(const cv::Mat& image, const OdometryOptions& options);
+
+/// Detects and describes features of one 8-bit grey image; no depth. Blank or tiny images give none.
+Features ExtractOrb(const std::vector<cv::Mat>& pyramid, const OdometryOptions& options);
+
+/// Everything for one frame of the rig: features of the (left) image, and depth from the depth image or from
+/// the right image (descriptor search along the row, then sub-pixel SAD). Pure: may run on any thread.
+Features ExtractFeatures(const InputFrame& frame, const CameraRig& rig, const OdometryOptions& options);
+
+}  // namespace tutti

@@ -1,0 +1,82 @@
+// The odometry's map: keyframes, landmarks and who sees what. A value type: copying it copies the map.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "tutti/core/pose.h"
+#include "tutti/frontend/features.h"
+
+namespace tutti {
+
+/// Feature `feature` of keyframe `keyframe` sees a landmark.
+struct Observation {
+  int keyframe = -1;
+  int feature = -1;
+};
+
+/// A 3D point.
+struct Landmark {
+  bool alive = false;
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< in the world [m]
+  Eigen::Vector3d normal =
+      Eigen::Vector3d::Zero();               ///< mean viewing direction (unit), from the cameras to the point
+  float min_distance = 0, max_distance = 0;  ///< distances at which its corner can be detected [m]
+  std::array<std::uint8_t, 32> descriptor{};  ///< the most central of its descriptors
+  std::vector<Observation> observations;      ///< ascending by keyframe; one per keyframe at most
+  int reference = -1;                         ///< keyframe that made it
+  int visible = 0, found = 0;                 ///< frames that should see it, and that did
+};
+
+/// A frame that stays in the map.
+struct Keyframe {
+  int id = -1;
+  std::int64_t frame_index = 0;
+  double stamp_s = 0;
+  int piece = 0;  ///< map piece
+  Pose T_world_camera;
+  std::shared_ptr<const Features> features;
+  std::vector<int> landmarks;    ///< per feature: landmark id or -1
+  std::map<int, int> covisible;  ///< other keyframe -> number of common landmarks
+};
+
+/// Map of one odometry. Ids are indices; dead landmarks stay as empty shells.
+class Map {
+ public:
+  explicit Map(std::vector<float> scales) : scales_(std::move(scales)) {}
+
+  int AddKeyframe(Keyframe keyframe);
+  /// Adds a landmark seen by one feature; returns its id.
+  int AddLandmark(const Eigen::Vector3d& position, int keyframe, int feature);
+  void AddObservation(int landmark, int keyframe, int feature);
+  void RemoveObservation(int landmark, int keyframe);
+  void RemoveLandmark(int landmark);
+  /// Lets `winner` take over all that `loser` sees.
+  void Merge(int loser, int winner);
+  /// Recomputes descriptor, viewing direction and distances of a landmark.
+  void UpdateLandmark(int landmark);
+
+  /// Keyframes with at least `min_shared` common landmarks, most first (ties: newest first), at most `count`.
+  std::vector<int> BestCovisible(int keyframe, int count, int min_shared) const;
+
+  const std::vector<Keyframe>& keyframes() const { return keyframes_; }
+  Keyframe& keyframe(int id) { return keyframes_[static_cast<std::size_t>(id)]; }
+  const Keyframe& keyframe(int id) const { return keyframes_[static_cast<std::size_t>(id)]; }
+  Landmark& landmark(int id) { return landmarks_[static_cast<std::size_t>(id)]; }
+  const Landmark& landmark(int id) const { return landmarks_[static_cast<std::size_t>(id)]; }
+  const std::vector<Landmark>& landmarks() const { return landmarks_; }
+  const std::vector<float>& scales() const { return scales_; }
+
+  /// Median depth of the landmarks that a keyframe sees [m]; 0 if it sees none.
+  double MedianDepth(int keyframe) const;
+
+ private:
+  std::vector<float> scales_;
+  std::vector<Keyframe> keyframes_;
+  std::vector<Landmark> landmarks_;
+};
+
+}  // namespace tutti

@@ -1,0 +1,36 @@
+// Camera pose from landmarks: robust refinement on all inliers.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "tutti/core/camera.h"
+#include "tutti/core/pose.h"
+
+namespace tutti {
+
+/// One landmark seen by a feature.
+struct PointObservation {
+  Eigen::Vector3d point;           ///< in the world [m]
+  Eigen::Vector2d pixel;           ///< measured [px]
+  double pixel_sigma = 1;          ///< standard deviation [px]
+  double inverse_depth = 0;        ///< measured 1/z [1/m]; 0 if unknown
+  double inverse_depth_sigma = 0;  ///< [1/m]; <= 0 if unknown
+};
+
+/// Reprojection residual, in standard deviations: (du, dv, d(1/z)); the last is 0 where depth is unknown.
+/// False if the point lies behind the camera. `jacobian`: d residual / d (translation, rotation) of a left
+/// perturbation of T_camera_world, 3x6; may be null.
+bool ReprojectionResidual(const PinholeCamera& camera, const Pose& T_camera_world,
+                          const PointObservation& observation, Eigen::Vector3d* residual,
+                          Eigen::Matrix<double, 3, 6>* jacobian);
+
+/// 95 % quantiles of chi2 for 2 and 3 degrees of freedom: the bound between inlier and outlier.
+inline double ChiSquareBound(const PointObservation& o) { return o.inverse_depth_sigma > 0 ? 7.815 : 5.991; }
+
+/// Minimises the Huber-robust reprojection error over the pose by Gauss-Newton in four rounds, each on the
+/// inliers of the round before. Returns the number of inliers; `inlier` has one flag per observation.
+int RefinePose(const PinholeCamera& camera, const std::vector<PointObservation>& observations,
+               Pose* T_camera_world, std::vector<char>* inlier);
+
+}  // namespace tutti

@@ -1,0 +1,39 @@
+// Relative pose of two views from matched pixels: mono initialisation.
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+#include "tutti/core/camera.h"
+#include "tutti/core/pose.h"
+
+namespace tutti {
+
+struct TwoViewOptions {
+  double pixel_sigma = 1.0;       ///< standard deviation of a matched pixel [px]
+  double min_parallax_deg = 1.0;  ///< median parallax of the triangulated points [deg]
+  int min_points = 60;            ///< points that must triangulate in front of both cameras
+};
+
+struct TwoViewResult {
+  bool success = false;
+  std::string reason;                   ///< why not, in plain words
+  bool homography = false;              ///< the planar model explained the matches better
+  Pose T_second_first;                  ///< |translation| = 1
+  std::vector<Eigen::Vector3d> points;  ///< in the first camera; one per match
+  std::vector<char> valid;              ///< one per match: triangulated well
+  double parallax_deg = 0;
+};
+
+/// Chooses between essential matrix (RANSAC) and homography by their robust scores (Mur-Artal et al., T-RO
+/// 2015, section IV), triangulates, and takes the motion that puts most points in front of both cameras.
+/// Deterministic.
+TwoViewResult EstimateTwoView(const PinholeCamera& camera, const std::vector<cv::Point2f>& first,
+                              const std::vector<cv::Point2f>& second, const TwoViewOptions& options);
+
+/// Linear triangulation of a point from two rays (x/z, y/z, 1) and T_second_first; in the first camera.
+Eigen::Vector3d Triangulate(const Eigen::Vector3d& first_ray, const Eigen::Vector3d& second_ray,
+                            const Pose& T_second_first);
+
+}  // namespace tutti

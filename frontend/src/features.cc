@@ -1,0 +1,260 @@
+#include "tutti/frontend/features.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <opencv2/features2d.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "stereo_matcher.h"
+
+namespace tutti {
+namespace {
+
+constexpr int kBorder = 19;     // [px] a descriptor's patch (rotated, 31 px) stays inside the image
+constexpr int kHalfPatch = 15;  // [px] radius of the orientation patch
+
+// Half width of the orientation patch at each row distance from its centre.
+const std::array<int, kHalfPatch + 1>& PatchWidths() {
+  static const std::array<int, kHalfPatch + 1> widths = [] {
+    std::array<int, kHalfPatch + 1> w{};
+    for (int v = 0; v <= kHalfPatch; ++v) {
+      w[static_cast<std::size_t>(v)] =
+          static_cast<int>(std::lround(std::sqrt(double(kHalfPatch * kHalfPatch - v * v))));
+    }
+    return w;
+  }();
+  return widths;
+}
+
+// Orientation by the intensity centroid (Rublee 2011, section 3.2) [deg].
+float Orientation(const cv::Mat& image, int x, int y) {
+  const auto& widths = PatchWidths();
+  int m01 = 0, m10 = 0;
+  const std::uint8_t* centre = image.ptr<std::uint8_t>(y) + x;
+  for (int u = -kHalfPatch; u <= kHalfPatch; ++u) m10 += u * centre[u];
+  for (int v = 1; v <= kHalfPatch; ++v) {
+    const std::uint8_t* below = image.ptr<std::uint8_t>(y + v) + x;
+    const std::uint8_t* above = image.ptr<std::uint8_t>(y - v) + x;
+    int row = 0;
+    const int w = widths[static_cast<std::size_t>(v)];
+    for (int u = -w; u <= w; ++u) {
+      row += below[u] - above[u];
+      m10 += u * (below[u] + above[u]);
+    }
+    m01 += v * row;
+  }
+  return cv::fastAtan2(static_cast<float>(m01), static_cast<float>(m10));
+}
+
+bool Stronger(const cv::KeyPoint& a, const cv::KeyPoint& b) {
+  if (a.response != b.response) return a.response > b.response;
+  if (a.pt.y != b.pt.y) return a.pt.y < b.pt.y;
+  return a.pt.x < b.pt.x;
+}
+
+// Keeps `wanted` corners, round by round the strongest left in each grid cell. Corners below the upper
+// threshold count only where a cell has nothing better, so that weak texture is covered without crowding out
+// strong corners.
+std::vector<cv::KeyPoint> Spread(std::vector<cv::KeyPoint> corners, const cv::Size& size, int wanted,
+                                 int threshold) {
+  if (static_cast<int>(corners.size()) <= wanted) return corners;
+  const double area = double(size.width) * size.height;
+  const double cell = std::max(8.0, std::sqrt(area / std::max(1, wanted)) * 1.2);
+  const int columns = std::max(1, static_cast<int>(std::ceil(size.width / cell)));
+  const int rows = std::max(1, static_cast<int>(std::ceil(size.height / cell)));
+  std::sort(corners.begin(), corners.end(), Stronger);
+  std::vector<std::vector<int>> cells(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const int c = std::min(columns - 1, static_cast<int>(corners[i].pt.x / cell));
+    const int r = std::min(rows - 1, static_cast<int>(corners[i].pt.y / cell));
+    auto& list = cells[static_cast<std::size_t>(r * columns + c)];
+    if (!list.empty() && corners[i].response < static_cast<float>(threshold)) continue;
+    list.push_back(static_cast<int>(i));
+  }
+  std::vector<int> chosen;
+  for (std::size_t round = 0; static_cast<int>(chosen.size()) < wanted; ++round) {
+    std::vector<int> layer;
+    for (const auto& list : cells) {
+      if (round < list.size()) layer.push_back(list[round]);
+    }
+    if (layer.empty()) break;
+    std::sort(layer.begin(), layer.end());  // by strength
+    const std::size_t room = static_cast<std::size_t>(wanted) - chosen.size();
+    if (layer.size() > room) layer.resize(room);
+    chosen.insert(chosen.end(), layer.begin(), layer.end());
+  }
+  std::sort(chosen.begin(), chosen.end());
+  std::vector<cv::KeyPoint> out;
+  out.reserve(chosen.size());
+  for (int i : chosen) out.push_back(corners[static_cast<std::size_t>(i)]);
+  return out;
+}
+
+std::vector<int> FeaturesPerLevel(const OdometryOptions& options) {
+  // A geometric series: each level gets features in proportion to its side length.
+  const double factor = 1.0 / options.scale_factor;
+  const int levels = options.pyramid_levels;
+  double share = options.features * (1 - factor) / (1 - std::pow(factor, levels));
+  std::vector<int> out;
+  int sum = 0;
+  for (int l = 0; l + 1 < levels; ++l) {
+    out.push_back(static_cast<int>(std::lround(share)));
+    sum += out.back();
+    share *= factor;
+  }
+  out.push_back(std::max(0, options.features - sum));
+  return out;
+}
+
+inline int PopCount(std::uint64_t x) {
+  x = x - ((x >> 1) & 0x5555555555555555ULL);
+  x = (x & 0x3333333333333333ULL) + ((x >> 2) & 0x3333333333333333ULL);
+  x = (x + (x >> 4)) & 0x0f0f0f0f0f0f0f0fULL;
+  return static_cast<int>((x * 0x0101010101010101ULL) >> 56);
+}
+
+}  // namespace
+
+int HammingDistance(const std::uint8_t* a, const std::uint8_t* b) {
+  int distance = 0;
+  for (int i = 0; i < 32; i += 8) {
+    std::uint64_t x, y;
+    std::memcpy(&x, a + i, 8);
+    std::memcpy(&y, b + i, 8);
+    distance += PopCount(x ^ y);
+  }
+  return distance;
+}
+
+void Features::BuildGrid(int width, int height) {
+  columns_ = width / kCell + 1;
+  rows_ = height / kCell + 1;
+  cells_.assign(static_cast<std::size_t>(columns_ * rows_), {});
+  for (std::size_t i = 0; i < keypoints.size(); ++i) {
+    const int c = std::clamp(static_cast<int>(keypoints[i].pt.x) / kCell, 0, columns_ - 1);
+    const int r = std::clamp(static_cast<int>(keypoints[i].pt.y) / kCell, 0, rows_ - 1);
+    cells_[static_cast<std::size_t>(r * columns_ + c)].push_back(static_cast<int>(i));
+  }
+}
+
+void Features::InArea(const cv::Point2f& centre, float radius, int first_octave, int last_octave,
+                      std::vector<int>* out) const {
+  out->clear();
+  if (cells_.empty()) return;
+  const int c0 = std::max(0, static_cast<int>(std::floor((centre.x - radius) / kCell)));
+  const int c1 = std::min(columns_ - 1, static_cast<int>(std::floor((centre.x + radius) / kCell)));
+  const int r0 = std::max(0, static_cast<int>(std::floor((centre.y - radius) / kCell)));
+  const int r1 = std::min(rows_ - 1, static_cast<int>(std::floor((centre.y + radius) / kCell)));
+  for (int r = r0; r <= r1; ++r) {
+    for (int c = c0; c <= c1; ++c) {
+      for (int i : cells_[static_cast<std::size_t>(r * columns_ + c)]) {
+        const cv::KeyPoint& k = keypoints[static_cast<std::size_t>(i)];
+        if (k.octave < first_octave || k.octave > last_octave) continue;
+        if (std::abs(k.pt.x - centre.x) <= radius && std::abs(k.pt.y - centre.y) <= radius) out->push_back(i);
+      }
+    }
+  }
+}
+
+std::vector<float> PyramidScales(const OdometryOptions& options) {
+  std::vector<float> scales;
+  for (int l = 0; l < options.pyramid_levels; ++l) {
+    scales.push_back(static_cast<float>(std::pow(options.scale_factor, l)));
+  }
+  return scales;
+}
+
+std::vector<cv::Mat> BuildPyramid(const cv::Mat& image, const OdometryOptions& options) {
+  std::vector<cv::Mat> pyramid{image};
+  for (int l = 1; l < options.pyramid_levels; ++l) {
+    const double scale = std::pow(options.scale_factor, -l);
+    const cv::Size size(static_cast<int>(std::lround(image.cols * scale)),
+                        static_cast<int>(std::lround(image.rows * scale)));
+    if (size.width < 2 * kBorder + 2 || size.height < 2 * kBorder + 2) break;
+    cv::Mat level;
+    cv::resize(pyramid.back(), level, size, 0, 0, cv::INTER_LINEAR);
+    pyramid.push_back(level);
+  }
+  return pyramid;
+}
+
+Features ExtractOrb(const std::vector<cv::Mat>& pyramid, const OdometryOptions& options) {
+  Features out;
+  if (pyramid.empty() || pyramid[0].empty()) return out;
+  const std::vector<float> scales = PyramidScales(options);
+  const std::vector<int> wanted = FeaturesPerLevel(options);
+  const cv::Ptr<cv::ORB> orb =
+      cv::ORB::create(1, 1.2F, 1, kBorder - 1, 0, 2, cv::ORB::FAST_SCORE, 2 * kHalfPatch + 1);
+  std::vector<cv::Mat> descriptors;
+  for (std::size_t l = 0; l < pyramid.size(); ++l) {
+    const cv::Mat& image = pyramid[l];
+    const int width = image.cols - 2 * kBorder, height = image.rows - 2 * kBorder;
+    if (width < 1 || height < 1) break;
+    std::vector<cv::KeyPoint> corners;
+    // The detector needs 3 px around the part in which corners may lie.
+    const cv::Rect part(kBorder - 3, kBorder - 3, width + 6, height + 6);
+    cv::FAST(image(part), corners, options.fast_threshold_min, true);
+    for (cv::KeyPoint& k : corners) k.pt += cv::Point2f(-3, -3);
+    corners = Spread(std::move(corners), cv::Size(width, height), wanted[l], options.fast_threshold);
+    for (cv::KeyPoint& k : corners) {
+      k.pt += cv::Point2f(kBorder, kBorder);
+      k.angle = Orientation(image, static_cast<int>(k.pt.x), static_cast<int>(k.pt.y));
+      k.octave = 0;
+      k.size = 2 * kHalfPatch + 1;
+    }
+    cv::Mat level_descriptors;
+    if (!corners.empty()) orb->compute(image, corners, level_descriptors);
+    if (corners.empty()) continue;
+    descriptors.push_back(level_descriptors);
+    for (cv::KeyPoint k : corners) {
+      k.octave = static_cast<int>(l);
+      k.pt *= scales[l];
+      k.size *= scales[l];
+      out.keypoints.push_back(k);
+    }
+  }
+  if (!descriptors.empty()) cv::vconcat(descriptors, out.descriptors);
+  out.inverse_depth.assign(out.keypoints.size(), 0.0F);
+  out.inverse_depth_sigma.assign(out.keypoints.size(), 0.0F);
+  out.BuildGrid(pyramid[0].cols, pyramid[0].rows);
+  return out;
+}
+
+namespace {
+
+void AddDepthFromImage(const cv::Mat& depth_m, const CameraRig& rig, const OdometryOptions& options,
+                       Features* features) {
+  for (std::size_t i = 0; i < features->size(); ++i) {
+    const cv::Point2f& p = features->keypoints[i].pt;
+    const int x = static_cast<int>(std::lround(p.x)), y = static_cast<int>(std::lround(p.y));
+    if (x < 1 || y < 1 || x + 1 >= depth_m.cols || y + 1 >= depth_m.rows) continue;
+    const float z = depth_m.at<float>(y, x);
+    if (!(z > 0.05F) || (rig.max_depth_m > 0 && z > rig.max_depth_m)) continue;
+    // At a depth edge the corner may belong to either side: trust it only where its neighbours agree.
+    bool edge = false;
+    for (const auto& [dx, dy] : {std::pair{-1, 0}, {1, 0}, {0, -1}, {0, 1}}) {
+      const float n = depth_m.at<float>(y + dy, x + dx);
+      edge |= n > 0 && std::abs(1 / n - 1 / z) > 6 * static_cast<float>(options.rgbd_inverse_sigma);
+    }
+    if (edge) continue;
+    features->inverse_depth[i] = 1.0F / z;
+    features->inverse_depth_sigma[i] = static_cast<float>(options.rgbd_inverse_sigma);
+  }
+}
+
+}  // namespace
+
+Features ExtractFeatures(const InputFrame& frame, const CameraRig& rig, const OdometryOptions& options) {
+  const std::vector<cv::Mat> pyramid = BuildPyramid(frame.image, options);
+  Features features = ExtractOrb(pyramid, options);
+  if (!frame.depth_m.empty()) AddDepthFromImage(frame.depth_m, rig, options, &features);
+  if (!frame.right.empty()) {
+    const std::vector<cv::Mat> right_pyramid = BuildPyramid(frame.right, options);
+    const Features right = ExtractOrb(right_pyramid, options);
+    MatchStereo(pyramid, right_pyramid, right, rig, options, &features);
+  }
+  return features;
+}
+
+}  // namespace tutti

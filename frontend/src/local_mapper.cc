@@ -1,0 +1,168 @@
+#include "local_mapper.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "matcher.h"
+#include "stopwatch.h"
+#include "tutti/frontend/pose_solver.h"
+#include "tutti/frontend/two_view.h"
+
+namespace tutti {
+
+int LocalMapper::AddDepthLandmarks(int id, int at_least, Map* map) {
+  const Keyframe& k = map->keyframe(id);
+  const Features& features = *k.features;
+  std::vector<std::pair<float, int>> order;  // depth, feature
+  for (std::size_t i = 0; i < features.size(); ++i) {
+    if (features.inverse_depth[i] > 0)
+      order.emplace_back(1.0F / features.inverse_depth[i], static_cast<int>(i));
+  }
+  std::sort(order.begin(), order.end());
+  const double far = rig_.sensor == Sensor::kStereo ? options_.max_depth_baselines * rig_.baseline_m : 1e9;
+  int count = 0, made = 0;
+  for (const auto& [depth, feature] : order) {
+    if (depth > far && count >= at_least) break;
+    // A depth that is uncertain by half its value is none.
+    const std::size_t f = static_cast<std::size_t>(feature);
+    if (features.inverse_depth_sigma[f] > 0.3F * features.inverse_depth[f]) continue;
+    ++count;
+    if (k.landmarks[f] >= 0) continue;
+    const cv::KeyPoint& p = features.keypoints[f];
+    const Eigen::Vector3d point = rig_.camera.Unproject({p.pt.x, p.pt.y}) * double(depth);
+    const int landmark = map->AddLandmark(k.T_world_camera * point, id, feature);
+    map->UpdateLandmark(landmark);
+    recent_.emplace_back(landmark, id);
+    ++made;
+  }
+  return made;
+}
+
+void LocalMapper::CullRecent(int id, Map* map) {
+  const std::size_t enough = rig_.sensor == Sensor::kMono ? 2 : 3;
+  std::vector<std::pair<int, int>> keep;
+  for (const auto& [landmark_id, born] : recent_) {
+    const Landmark& l = map->landmark(landmark_id);
+    if (!l.alive) continue;
+    if (4 * l.found < l.visible || (id - born >= 2 && l.observations.size() <= enough - 1)) {
+      map->RemoveLandmark(landmark_id);
+    } else if (id - born < 3) {
+      keep.emplace_back(landmark_id, born);
+    }
+  }
+  recent_ = std::move(keep);
+}
+
+int LocalMapper::Triangulate(int id, Map* map) {
+  const int neighbours = rig_.sensor == Sensor::kMono ? options_.triangulation_neighbours
+                                                      : std::min(4, options_.triangulation_neighbours);
+  int made = 0;
+  for (int other : map->BestCovisible(id, neighbours, 15)) {
+    const Pose T_world_a = map->keyframe(id).T_world_camera, T_world_b = map->keyframe(other).T_world_camera;
+    const double baseline = (T_world_a.translation - T_world_b.translation).norm();
+    const double median_depth = map->MedianDepth(other);
+    if (median_depth <= 0) continue;
+    if (rig_.sensor == Sensor::kMono ? baseline < 0.01 * median_depth : baseline < rig_.baseline_m) continue;
+    const auto pairs =
+        MatchEpipolar(*map, rig_.camera, map->keyframe(id), map->keyframe(other), median_depth);
+    const Pose T_a = T_world_a.Inverse(), T_b = T_world_b.Inverse(), T_b_a = T_b * T_world_a;
+    for (const auto& [fa, fb] : pairs) {
+      const Keyframe &a = map->keyframe(id), &b = map->keyframe(other);
+      const cv::KeyPoint &ka = a.features->keypoints[static_cast<std::size_t>(fa)],
+                         &kb = b.features->keypoints[static_cast<std::size_t>(fb)];
+      const Eigen::Vector3d ra = rig_.camera.Unproject({ka.pt.x, ka.pt.y}),
+                            rb = rig_.camera.Unproject({kb.pt.x, kb.pt.y});
+      const double cosine = ra.normalized().dot((T_b_a.rotation.conjugate() * rb).normalized());
+      if (cosine > 0.9999 || cosine < 0) continue;  // 0.8 deg of parallax at least
+      const Eigen::Vector3d in_a = tutti::Triangulate(ra, rb, T_b_a);
+      if (!in_a.allFinite()) continue;
+      const Eigen::Vector3d point = T_world_a * in_a;
+      bool good = true;
+      for (const auto& [pose, frame, feature] : {std::tuple{&T_a, &a, fa}, std::tuple{&T_b, &b, fb}}) {
+        const std::size_t f = static_cast<std::size_t>(feature);
+        const cv::KeyPoint& kp = frame->features->keypoints[f];
+        PointObservation o;
+        o.point = point;
+        o.pixel = {kp.pt.x, kp.pt.y};
+        o.pixel_sigma = options_.pixel_sigma * map->scales()[static_cast<std::size_t>(kp.octave)];
+        o.inverse_depth = frame->features->inverse_depth[f];
+        o.inverse_depth_sigma = o.inverse_depth > 0 ? frame->features->inverse_depth_sigma[f] : 0;
+        Eigen::Vector3d r;
+        good = good && ReprojectionResidual(rig_.camera, *pose, o, &r, nullptr) &&
+               r.squaredNorm() <= ChiSquareBound(o);
+      }
+      if (!good) continue;
+      // The corner's scale in both images must agree with its distances.
+      const double ratio = (point - T_world_b.translation).norm() / (point - T_world_a.translation).norm();
+      const double octaves = double(map->scales()[static_cast<std::size_t>(ka.octave)]) /
+                             map->scales()[static_cast<std::size_t>(kb.octave)];
+      const double factor = 1.5 * options_.scale_factor;
+      if (ratio * factor < octaves || ratio > octaves * factor) continue;
+      const int landmark = map->AddLandmark(point, id, fa);
+      map->AddObservation(landmark, other, fb);
+      map->UpdateLandmark(landmark);
+      recent_.emplace_back(landmark, id);
+      ++made;
+    }
+  }
+  return made;
+}
+
+void LocalMapper::Fuse(int id, Map* map) {
+  const std::vector<int> neighbours = map->BestCovisible(id, 12, 15);
+  const auto apply = [&](int keyframe, const std::vector<std::pair<int, int>>& pairs) {
+    for (const auto& [landmark, feature] : pairs) {
+      if (!map->landmark(landmark).alive) continue;
+      const int present = map->keyframe(keyframe).landmarks[static_cast<std::size_t>(feature)];
+      if (present < 0) {
+        map->AddObservation(landmark, keyframe, feature);
+      } else if (present != landmark) {
+        const bool keep_present =
+            map->landmark(present).observations.size() >= map->landmark(landmark).observations.size();
+        map->Merge(keep_present ? landmark : present, keep_present ? present : landmark);
+      }
+    }
+  };
+  const auto landmarks_of = [&](int keyframe) {
+    std::vector<int> out;
+    for (int l : map->keyframe(keyframe).landmarks) {
+      if (l >= 0) out.push_back(l);
+    }
+    return out;
+  };
+  for (int other : neighbours) {
+    apply(other, MatchForFusion(*map, rig_.camera, map->keyframe(other), landmarks_of(id), 3.0F));
+  }
+  std::vector<int> theirs;
+  for (int other : neighbours) {
+    const std::vector<int> l = landmarks_of(other);
+    theirs.insert(theirs.end(), l.begin(), l.end());
+  }
+  std::sort(theirs.begin(), theirs.end());
+  theirs.erase(std::unique(theirs.begin(), theirs.end()), theirs.end());
+  apply(id, MatchForFusion(*map, rig_.camera, map->keyframe(id), theirs, 3.0F));
+  for (int l : landmarks_of(id)) map->UpdateLandmark(l);
+}
+
+void LocalMapper::Process(int id, Map* map, std::map<std::string, double>* stages) {
+  {
+    const ScopedStopwatch watch(&(*stages)["map"]);
+    for (int l : map->keyframe(id).landmarks) {
+      if (l >= 0) map->UpdateLandmark(l);
+    }
+    CullRecent(id, map);
+    if (rig_.sensor != Sensor::kMono) AddDepthLandmarks(id, 100, map);
+    Triangulate(id, map);
+    Fuse(id, map);
+  }
+  const ScopedStopwatch watch(&(*stages)["local_ba"]);
+  BundleAdjustmentOptions ba;
+  ba.keyframes = options_.ba_keyframes;
+  ba.fixed_keyframes = options_.ba_fixed_keyframes;
+  ba.iterations = options_.ba_iterations;
+  ba.pixel_sigma = options_.pixel_sigma;
+  ba.metric = rig_.sensor != Sensor::kMono;
+  AdjustLocally(rig_.camera, id, ba, map);
+}
+
+}  // namespace tutti

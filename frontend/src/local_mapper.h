@@ -1,0 +1,40 @@
+// What happens when a frame becomes a keyframe: new landmarks, fusion of duplicates, culling, local bundle
+// adjustment.
+#pragma once
+
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tutti/frontend/bundle_adjustment.h"
+#include "tutti/frontend/frame.h"
+#include "tutti/frontend/map.h"
+#include "tutti/frontend/odometry_options.h"
+
+namespace tutti {
+
+/// Value type: copies with the odometry.
+class LocalMapper {
+ public:
+  LocalMapper(const OdometryOptions& options, const CameraRig& rig) : options_(options), rig_(rig) {}
+
+  /// Landmarks from the keyframe's own depth, for features that have none yet: the near ones, and at least
+  /// `at_least`.
+  int AddDepthLandmarks(int keyframe, int at_least, Map* map);
+
+  /// Full treatment of the newest keyframe; its landmark matches are already in the map. Adds milliseconds to
+  /// `stages`.
+  void Process(int keyframe, Map* map, std::map<std::string, double>* stages);
+
+ private:
+  void CullRecent(int keyframe, Map* map);
+  int Triangulate(int keyframe, Map* map);
+  void Fuse(int keyframe, Map* map);
+
+  OdometryOptions options_;
+  CameraRig rig_;
+  std::vector<std::pair<int, int>> recent_;  // landmark, keyframe in which it was made
+};
+
+}  // namespace tutti

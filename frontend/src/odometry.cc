@@ -1,0 +1,221 @@
+#include "tutti/frontend/odometry.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "odometry_impl.h"
+#include "tutti/core/error.h"
+
+namespace tutti {
+
+const char* ToString(TrackingState state) {
+  switch (state) {
+    case TrackingState::kInitializing:
+      return "initialising";
+    case TrackingState::kTracking:
+      return "tracking";
+    case TrackingState::kLost:
+      return "lost";
+  }
+  return "?";
+}
+
+std::string OdometryOptions::Validate() const {
+  if (features < 100) return "odometry.features must be at least 100";
+  if (pyramid_levels < 1 || pyramid_levels > 16) return "odometry.pyramid_levels must be 1 to 16";
+  if (!(scale_factor > 1.01 && scale_factor <= 2.0))
+    return "odometry.scale_factor must be above 1.01 and at most 2";
+  if (fast_threshold < 1 || fast_threshold_min < 1 || fast_threshold_min > fast_threshold) {
+    return "odometry.fast_threshold_min must be at least 1 and at most odometry.fast_threshold";
+  }
+  if (!(stereo_sigma_px > 0) || !(rgbd_inverse_sigma > 0) || !(pixel_sigma > 0))
+    return "odometry: every sigma must be positive";
+  if (!(max_depth_baselines > 1)) return "odometry.max_depth_baselines must be above 1";
+  if (min_inliers < 8) return "odometry.min_inliers must be at least 8";
+  if (!(relocalize_s >= 0)) return "odometry.relocalize_s must not be negative";
+  if (!(keyframe_inlier_ratio > 0 && keyframe_inlier_ratio < 1))
+    return "odometry.keyframe_inlier_ratio must lie between 0 and 1";
+  if (!(keyframe_max_interval_s > 0)) return "odometry.keyframe_max_interval_s must be positive";
+  if (keyframe_min_frames < 0) return "odometry.keyframe_min_frames must not be negative";
+  if (local_keyframes < 1 || triangulation_neighbours < 1)
+    return "odometry.local_keyframes and triangulation_neighbours must be at least 1";
+  if (!(min_parallax_deg > 0)) return "odometry.min_parallax_deg must be positive";
+  if (ba_keyframes < 2 || ba_fixed_keyframes < 0 || ba_iterations < 1) {
+    return "odometry.ba_keyframes must be at least 2, ba_fixed_keyframes at least 0, ba_iterations at least "
+           "1";
+  }
+  return {};
+}
+
+Odometry::Odometry(const OdometryOptions& options, const CameraRig& rig) {
+  std::string problem = options.Validate();
+  if (problem.empty()) problem = rig.camera.Validate();
+  if (problem.empty() && !rig.calibrated)
+    problem = "odometry needs a calibrated camera; give camera: fx, fy, cx, cy";
+  if (problem.empty() && rig.camera.distortion != Distortion::kNone)
+    problem = "odometry needs rectified frames; the rig still has distortion";
+  if (problem.empty() && rig.sensor == Sensor::kStereo && !(rig.baseline_m > 0)) {
+    problem = "stereo needs a positive camera.baseline_m [m]";
+  }
+  if (!problem.empty()) throw InputError(problem);
+  impl_ = std::make_unique<Impl>(options, rig);
+}
+
+Odometry::Odometry(const Odometry& other) : impl_(std::make_unique<Impl>(*other.impl_)) {}
+Odometry& Odometry::operator=(const Odometry& other) {
+  if (this != &other) impl_ = std::make_unique<Impl>(*other.impl_);
+  return *this;
+}
+Odometry::Odometry(Odometry&&) noexcept = default;
+Odometry& Odometry::operator=(Odometry&&) noexcept = default;
+Odometry::~Odometry() = default;
+
+std::shared_ptr<const Features> Odometry::Extract(const InputFrame& frame) const {
+  return std::make_shared<const Features>(ExtractFeatures(frame, impl_->rig, impl_->options));
+}
+
+TrackResult Odometry::Track(const InputFrame& frame) { return impl_->Track(frame); }
+
+std::vector<int> Odometry::KeyframeIds() const {
+  std::vector<int> ids;
+  for (const tutti::Keyframe& k : impl_->map.keyframes()) ids.push_back(k.id);
+  return ids;
+}
+
+KeyframeView Odometry::Keyframe(int id) const {
+  const tutti::Keyframe& k = impl_->map.keyframe(id);
+  KeyframeView view;
+  view.id = id;
+  view.frame_index = k.frame_index;
+  view.stamp_s = k.stamp_s;
+  view.map_piece = KeyframePiece(id);
+  view.T_world_camera = k.T_world_camera;
+  view.keypoints = k.features->keypoints;
+  view.descriptors = k.features->descriptors;
+  view.landmarks = k.landmarks;
+  const Pose T_camera_world = k.T_world_camera.Inverse();
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  view.points.assign(k.features->size(), Eigen::Vector3d::Constant(nan));
+  for (std::size_t f = 0; f < k.features->size(); ++f) {
+    const float inverse = k.features->inverse_depth[f];
+    if (k.landmarks[f] >= 0) {
+      const Eigen::Vector3d p = T_camera_world * impl_->map.landmark(k.landmarks[f]).position;
+      if (p.z() > 0) view.points[f] = p;
+    } else if (inverse > 0 && k.features->inverse_depth_sigma[f] < 0.1F * inverse) {
+      const cv::Point2f& p = k.features->keypoints[f].pt;
+      view.points[f] = impl_->rig.camera.Unproject({p.x, p.y}) / double(inverse);
+    }
+  }
+  return view;
+}
+
+Pose Odometry::KeyframePose(int id) const { return impl_->map.keyframe(id).T_world_camera; }
+std::int64_t Odometry::KeyframeFrameIndex(int id) const { return impl_->map.keyframe(id).frame_index; }
+double Odometry::KeyframeStamp(int id) const { return impl_->map.keyframe(id).stamp_s; }
+
+int Odometry::KeyframePiece(int id) const {
+  int piece = impl_->map.keyframe(id).piece;
+  for (auto joined = impl_->piece_joined.find(piece); joined != impl_->piece_joined.end();
+       joined = impl_->piece_joined.find(piece)) {
+    piece = joined->second;
+  }
+  return piece;
+}
+
+std::vector<std::pair<std::pair<int, int>, int>> Odometry::Covisibility(int min_shared) const {
+  std::vector<std::pair<std::pair<int, int>, int>> out;
+  for (const tutti::Keyframe& k : impl_->map.keyframes()) {
+    for (const auto& [other, shared] : k.covisible) {
+      if (other > k.id && shared >= min_shared) out.push_back({{k.id, other}, shared});
+    }
+  }
+  return out;
+}
+
+void Odometry::ApplyCorrection(const std::map<int, Similarity>& S_world_keyframe,
+                               const std::map<int, int>& merges) {
+  Map& map = impl_->map;
+  std::vector<Pose> old_T_camera_world;
+  std::vector<Similarity> corrected;
+  for (const tutti::Keyframe& k : map.keyframes()) {
+    old_T_camera_world.push_back(k.T_world_camera.Inverse());
+    const auto it = S_world_keyframe.find(k.id);
+    corrected.push_back(it != S_world_keyframe.end() ? it->second : Similarity(k.T_world_camera));
+  }
+  for (std::size_t i = 0; i < map.landmarks().size(); ++i) {
+    Landmark& l = map.landmark(static_cast<int>(i));
+    if (!l.alive) continue;
+    const std::size_t r = static_cast<std::size_t>(l.reference);
+    l.position = corrected[r] * (old_T_camera_world[r] * l.position);
+  }
+  if (impl_->reference() >= 0) {
+    const std::size_t r = static_cast<std::size_t>(impl_->reference());
+    impl_->MoveCurrent(old_T_camera_world[r].Inverse(), corrected[r]);
+  }
+  for (Impl::FrameRecord& record : impl_->records) {
+    record.T_reference_frame.translation *= corrected[static_cast<std::size_t>(record.reference)].scale;
+  }
+  for (std::size_t k = 0; k < corrected.size(); ++k)
+    map.keyframe(static_cast<int>(k)).T_world_camera = corrected[k].RigidPart();
+  for (std::size_t i = 0; i < map.landmarks().size(); ++i) map.UpdateLandmark(static_cast<int>(i));
+  for (const auto& [from, to] : merges) {
+    if (from != to) impl_->piece_joined[from] = to;
+  }
+}
+
+namespace {
+int LargestPiece(const std::map<int, int>& frames) {
+  int best = 0, most = -1;
+  for (const auto& [piece, count] : frames) {
+    if (count > most) {
+      most = count;
+      best = piece;
+    }
+  }
+  return best;
+}
+}  // namespace
+
+Trajectory Odometry::FrameTrajectory(int map_piece) const {
+  if (map_piece < 0) {
+    std::map<int, int> frames;
+    for (const Impl::FrameRecord& r : impl_->records) ++frames[KeyframePiece(r.reference)];
+    map_piece = LargestPiece(frames);
+  }
+  Trajectory out;
+  for (const Impl::FrameRecord& r : impl_->records) {
+    if (KeyframePiece(r.reference) != map_piece) continue;
+    out.push_back({r.stamp_s, impl_->map.keyframe(r.reference).T_world_camera * r.T_reference_frame});
+  }
+  return out;
+}
+
+std::vector<std::int64_t> Odometry::FrameIndices(int map_piece) const {
+  if (map_piece < 0) {
+    std::map<int, int> frames;
+    for (const Impl::FrameRecord& r : impl_->records) ++frames[KeyframePiece(r.reference)];
+    map_piece = LargestPiece(frames);
+  }
+  std::vector<std::int64_t> out;
+  for (const Impl::FrameRecord& r : impl_->records) {
+    if (KeyframePiece(r.reference) == map_piece) out.push_back(r.index);
+  }
+  return out;
+}
+
+std::map<std::string, double> Odometry::StageMilliseconds() const { return impl_->stages; }
+
+namespace {
+double Median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2),
+                   values.end());
+  return values[values.size() / 2];
+}
+}  // namespace
+
+double Odometry::StereoRowErrorPx() const { return Median(impl_->row_errors); }
+double Odometry::StereoMatches() const { return Median(impl_->stereo_matches); }
+
+}  // namespace tutti

@@ -53,7 +53,23 @@ void RequireColumns(const std::filesystem::path& file, std::size_t line, std::si
   }
 }
 
-Trajectory ReadTum(const std::filesystem::path& file) {
+// Poses that repeat a time stamp, left out where the caller wants to know of them instead of an error.
+struct Repeats {
+  bool tolerated = false;
+  std::size_t count = 0, first_line = 0;
+};
+
+// True if the pose is to be left out. Throws if time does not grow.
+bool LeaveOut(const std::filesystem::path& file, std::size_t line, const Trajectory& before, double stamp_s,
+              Repeats& repeats) {
+  if (before.empty() || stamp_s > before.back().stamp_s) return false;
+  if (stamp_s < before.back().stamp_s) Fail(file, line, "goes back in time; sort the file by its first column");
+  if (!repeats.tolerated) Fail(file, line, "repeats the time stamp of the pose before it; remove one of the two");
+  if (repeats.count++ == 0) repeats.first_line = line;
+  return true;
+}
+
+Trajectory ReadTum(const std::filesystem::path& file, Repeats& repeats) {
   Trajectory out;
   ForEachLine(file, [&](std::size_t line, const std::vector<std::string>& w) {
     if (w.size() != 8) {
@@ -61,10 +77,7 @@ Trajectory ReadTum(const std::filesystem::path& file) {
     }
     double v[8];
     for (int i = 0; i < 8; ++i) v[i] = Number(file, line, w[static_cast<std::size_t>(i)]);
-    if (!out.empty() && v[0] <= out.back().stamp_s) {
-      Fail(file, line, v[0] == out.back().stamp_s ? "repeats the time stamp of the pose before it; remove one of the two"
-                                                  : "goes back in time; sort the file by its first column");
-    }
+    if (LeaveOut(file, line, out, v[0], repeats)) return;
     out.push_back({v[0], QuaternionPose(file, line, {v[1], v[2], v[3]}, v[4], v[5], v[6], v[7])});
   });
   return out;
@@ -85,14 +98,14 @@ Trajectory ReadKitti(const std::filesystem::path& file) {
   return out;
 }
 
-Trajectory ReadEuroc(const std::filesystem::path& file) {
+Trajectory ReadEuroc(const std::filesystem::path& file, Repeats& repeats) {
   Trajectory out;
   ForEachLine(file, [&](std::size_t line, const std::vector<std::string>& w) {
     RequireColumns(file, line, w.size(), 8, "the EuRoC format has at least 8: stamp [ns], x, y, z, qw, qx, qy, qz");
     double v[8];
     for (int i = 0; i < 8; ++i) v[i] = Number(file, line, w[static_cast<std::size_t>(i)]);
     const double stamp = v[0] * 1e-9;
-    if (!out.empty() && stamp <= out.back().stamp_s) Fail(file, line, "its time stamp does not grow; sort the file");
+    if (LeaveOut(file, line, out, stamp, repeats)) return;
     out.push_back({stamp, QuaternionPose(file, line, {v[1], v[2], v[3]}, v[5], v[6], v[7], v[4])});
   });
   return out;
@@ -120,14 +133,22 @@ TrajectoryFormat GuessTrajectoryFormat(const std::filesystem::path& file) {
   return TrajectoryFormat::kTum;
 }
 
-Trajectory ReadTrajectory(const std::filesystem::path& file, TrajectoryFormat format) {
+Trajectory ReadTrajectory(const std::filesystem::path& file, TrajectoryFormat format,
+                          std::vector<std::string>* warnings) {
   Trajectory out;
+  Repeats repeats;
+  repeats.tolerated = warnings != nullptr;
   switch (format) {
-    case TrajectoryFormat::kTum: out = ReadTum(file); break;
+    case TrajectoryFormat::kTum: out = ReadTum(file, repeats); break;
     case TrajectoryFormat::kKitti: out = ReadKitti(file); break;
-    case TrajectoryFormat::kEuroc: out = ReadEuroc(file); break;
+    case TrajectoryFormat::kEuroc: out = ReadEuroc(file, repeats); break;
   }
   if (out.empty()) throw InputError(file.string() + ": holds no pose");
+  if (repeats.count > 0) {
+    warnings->push_back(file.string() + ":" + std::to_string(repeats.first_line) +
+                        ": repeats the time stamp of the pose before it; left out, with all such poses: " +
+                        std::to_string(repeats.count));
+  }
   return out;
 }
 

@@ -30,7 +30,10 @@ TrajectoryFormat GuessTrajectoryFormat(const std::filesystem::path& file);
 
 /// Reads a trajectory. Quaternions are normalised. Throws InputError that names file and line for: missing file,
 /// wrong number of columns, NaN or infinity, a zero quaternion, time stamps that do not strictly grow.
-Trajectory ReadTrajectory(const std::filesystem::path& file, TrajectoryFormat format);
+/// With `warnings`, a pose that repeats the time stamp before it (published ground truth has such lines) is left out instead,
+/// the first one stays, and one line about it is appended.
+Trajectory ReadTrajectory(const std::filesystem::path& file, TrajectoryFormat format,
+                          std::vector<std::string>* warnings = nullptr);
 
 /// Reads KITTI's times.txt: one time stamp [s] a line. Throws InputError with file and line.
 std::vector<double> ReadTimes(const std::filesystem::path& file);

@@ -49,7 +49,8 @@ CombinedBelief CombineMajority(const std::vector<const Belief*>& members, double
   for (const Belief* member : members) {
     if (member->Hypothesis() >= threshold && member->Best() >= 0) voters.push_back(member);
   }
-  // The largest group around one voter's choice wins; of equal ones that with the larger mean H, then the first member's.
+  // The largest group around one voter's choice wins; of equal ones that with the larger mean H, then the
+  // first member's.
   for (const Belief* centre : voters) {
     const int best = centre->Best();
     const std::vector<std::pair<int, int>> near = memory.Neighbours(best, kAgreementLevels);

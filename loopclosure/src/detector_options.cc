@@ -13,9 +13,7 @@ const std::vector<std::string>& RuleWords() {
   return words;
 }
 
-std::string OutOf(const char* name, const char* range) {
-  return std::string(name) + " must be " + range;
-}
+std::string OutOf(const char* name, const char* range) { return std::string(name) + " must be " + range; }
 
 }  // namespace
 
@@ -27,12 +25,14 @@ std::string ExtractionOptions::Validate() const {
   if (!(surf_threshold >= 0)) return OutOf("extraction.surf_threshold", "0 or more");
   if (sift_max_pixels < 1 << 12) return OutOf("extraction.sift_max_pixels", "at least 4096");
   if (!(sift_contrast > 0)) return OutOf("extraction.sift_contrast", "above 0");
-  if (orb_fast_threshold < 1 || orb_fast_threshold > 255) return OutOf("extraction.orb_fast_threshold", "1 to 255");
+  if (orb_fast_threshold < 1 || orb_fast_threshold > 255)
+    return OutOf("extraction.orb_fast_threshold", "1 to 255");
   return {};
 }
 
 std::string VocabularyOptions::Validate() const {
-  if (!(nndr > 0 && nndr <= 1)) return OutOf("vocabulary.nndr", "above 0 and at most 1 (a ratio of true distances)");
+  if (!(nndr > 0 && nndr <= 1))
+    return OutOf("vocabulary.nndr", "above 0 and at most 1 (a ratio of true distances)");
   if (trees < 1 || trees > 64) return OutOf("vocabulary.trees", "1 to 64");
   if (checks < 1) return OutOf("vocabulary.checks", "at least 1");
   if (hash_tables < 1 || hash_tables > 64) return OutOf("vocabulary.hash_tables", "1 to 64");
@@ -42,9 +42,11 @@ std::string VocabularyOptions::Validate() const {
 std::string VerificationOptions::Validate() const {
   if (max_hypotheses < 1) return OutOf("verification.max_hypotheses", "at least 1");
   if (neighbours < 0 || neighbours > 16) return OutOf("verification.neighbours", "0 to 16");
-  if (!(match_ratio > 0 && match_ratio <= 1)) return OutOf("verification.match_ratio", "above 0 and at most 1");
+  if (!(match_ratio > 0 && match_ratio <= 1))
+    return OutOf("verification.match_ratio", "above 0 and at most 1");
   if (min_inliers < 8) return OutOf("verification.min_inliers", "at least 8");
-  if (!(min_inlier_ratio >= 0 && min_inlier_ratio <= 1)) return OutOf("verification.min_inlier_ratio", "0 to 1");
+  if (!(min_inlier_ratio >= 0 && min_inlier_ratio <= 1))
+    return OutOf("verification.min_inlier_ratio", "0 to 1");
   if (!(min_spread >= 0 && min_spread < 1)) return OutOf("verification.min_spread", "0 to 1");
   if (!(reprojection_px > 0)) return OutOf("verification.reprojection_px", "above 0");
   if (!(epipolar_px > 0)) return OutOf("verification.epipolar_px", "above 0");
@@ -76,8 +78,10 @@ std::string LoopDetectorOptions::Validate() const {
   if (stm_size < 1) return OutOf("stm_size", "at least 1");
   if (threads < 1) return OutOf("threads", "at least 1");
   if (!(bad_signature_ratio >= 0 && bad_signature_ratio <= 1)) return OutOf("bad_signature_ratio", "0 to 1");
-  if (!(virtual_place_prior > 0 && virtual_place_prior < 1)) return OutOf("virtual_place_prior", "between 0 and 1");
-  if (!(rehearsal_similarity > 0 && rehearsal_similarity <= 1)) return OutOf("rehearsal_similarity", "above 0, at most 1");
+  if (!(virtual_place_prior > 0 && virtual_place_prior < 1))
+    return OutOf("virtual_place_prior", "between 0 and 1");
+  if (!(rehearsal_similarity > 0 && rehearsal_similarity <= 1))
+    return OutOf("rehearsal_similarity", "above 0, at most 1");
   for (const std::string& problem : {extraction.Validate(), vocabulary.Validate(), verification.Validate()}) {
     if (!problem.empty()) return problem;
   }
@@ -110,11 +114,16 @@ void SetRule(const std::string& word, LoopDetectorOptions& options) {
 
 std::string RuleName(const LoopDetectorOptions& options) {
   switch (options.rule) {
-    case CombinationRule::kMean: return "mean";
-    case CombinationRule::kProduct: return "product";
-    case CombinationRule::kMajority: return "majority";
-    case CombinationRule::kNaive: return "naive";
-    case CombinationRule::kSingle: break;
+    case CombinationRule::kMean:
+      return "mean";
+    case CombinationRule::kProduct:
+      return "product";
+    case CombinationRule::kMajority:
+      return "majority";
+    case CombinationRule::kNaive:
+      return "naive";
+    case CombinationRule::kSingle:
+      break;
   }
   return options.members.empty() ? "single" : options.members.front();
 }

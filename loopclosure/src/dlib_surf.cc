@@ -1,5 +1,5 @@
-// dlib's matrices scale through BLAS where dlib was configured with it. Here that is one vector of 64 numbers: our own
-// function takes its place, so that tutti needs neither BLAS nor libdlib at link time.
+// dlib's matrices scale through BLAS where dlib was configured with it. Here that is one vector of 64
+// numbers: our own function takes its place, so that tutti needs neither BLAS nor libdlib at link time.
 #define cblas_dscal tutti_cblas_dscal
 #include <dlib/image_keypoint/surf.h>
 #include <dlib/image_transforms/integral_image.h>
@@ -9,8 +9,10 @@
 
 #include "tutti/loopclosure/features.h"
 
-extern "C" void tutti_cblas_dscal(const CBLAS_INT_TYPE n, const double alpha, double* x, const CBLAS_INT_TYPE step);
-extern "C" void tutti_cblas_dscal(const CBLAS_INT_TYPE n, const double alpha, double* x, const CBLAS_INT_TYPE step) {
+extern "C" void tutti_cblas_dscal(const CBLAS_INT_TYPE n, const double alpha, double* x,
+                                  const CBLAS_INT_TYPE step);
+extern "C" void tutti_cblas_dscal(const CBLAS_INT_TYPE n, const double alpha, double* x,
+                                  const CBLAS_INT_TYPE step) {
   for (CBLAS_INT_TYPE i = 0; i < n; ++i) x[i * step] *= alpha;
 }
 
@@ -19,7 +21,8 @@ namespace {
 
 constexpr int kDescriptorSize = 64;
 constexpr double kBorder = 32.0;  // dlib describes a point from a window of this many scales
-constexpr float kSizePerScale = 20.0f;  // SURF describes a patch of 20 scales: the diameter that cv::KeyPoint wants
+constexpr float kSizePerScale =
+    20.0f;  // SURF describes a patch of 20 scales: the diameter that cv::KeyPoint wants
 
 using Integral = dlib::integral_image_generic<int>;
 

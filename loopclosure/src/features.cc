@@ -17,7 +17,8 @@ constexpr int kOversampling = 2;
 constexpr int kMinSide = 16;  // smaller images hold no feature of any member [px]
 
 // ORB drops points near the border; its default of 31 px leaves small images without upper pyramid levels
-// (loop-closure.md section 6). A twentieth of the shorter side keeps them; ORB reflects the image at its border.
+// (loop-closure.md section 6). A twentieth of the shorter side keeps them; ORB reflects the image at its
+// border.
 cv::Ptr<cv::Feature2D> CreateOrb(cv::Size size, int features, int fast_threshold) {
   constexpr float kScale = 1.2f;
   constexpr int kPatch = 31;
@@ -74,7 +75,8 @@ std::vector<int> SelectSpread(const std::vector<cv::KeyPoint>& keypoints, cv::Si
   std::sort(order.begin(), order.end(), [&](int a, int b) { return key(a) < key(b); });
   if (static_cast<int>(order.size()) <= count) return order;
 
-  const double cell = std::max(1.0, static_cast<double>(std::max(image_size.width, image_size.height)) / columns);
+  const double cell =
+      std::max(1.0, static_cast<double>(std::max(image_size.width, image_size.height)) / columns);
   const int cells_x = std::max(1, static_cast<int>(std::ceil(image_size.width / cell)));
   const int cells_y = std::max(1, static_cast<int>(std::ceil(image_size.height / cell)));
   const int share = std::max(1, count / (cells_x * cells_y));
@@ -123,7 +125,8 @@ cv::Ptr<cv::Feature2D> FeatureExtractor::Create(cv::Size size) const {
 Features FeatureExtractor::Extract(const cv::Mat& grey) const {
   Features features;
   if (grey.empty() || grey.type() != CV_8UC1 || std::min(grey.rows, grey.cols) < kMinSide) return features;
-  // Scaled down: by what it takes to respect max_pixels; SIFT doubles the image by itself, so that it sees it halved.
+  // Scaled down: by what it takes to respect max_pixels; SIFT doubles the image by itself, so that it sees it
+  // halved.
   double factor = std::max(1.0, std::sqrt(static_cast<double>(grey.total()) / options_.max_pixels));
   if (name_ == "sift") {
     while (static_cast<double>(grey.total()) / (factor * factor) > options_.sift_max_pixels) factor *= 2.0;

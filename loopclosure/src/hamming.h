@@ -23,7 +23,8 @@ inline int HammingDistance(const std::uint8_t* a, const std::uint8_t* b, int byt
 
 }  // namespace tutti::internal
 
-// Compiled once for plain x86-64 and once with the popcnt instruction, chosen at run time; both give the same numbers.
+// Compiled once for plain x86-64 and once with the popcnt instruction, chosen at run time; both give the same
+// numbers.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
     !defined(__SANITIZE_THREAD__)
 #define TUTTI_POPCOUNT_CLONES __attribute__((target_clones("default", "popcnt")))

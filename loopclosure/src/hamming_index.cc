@@ -7,12 +7,13 @@
 namespace tutti {
 namespace {
 
-constexpr int kKeyBits = 14;         // 16384 buckets a table: a handful of words each at 100,000 words
-constexpr int kExactUpTo = 6000;     // below this an exact scan is as fast as the tables
+constexpr int kKeyBits = 14;      // 16384 buckets a table: a handful of words each at 100,000 words
+constexpr int kExactUpTo = 6000;  // below this an exact scan is as fast as the tables
 
 class HammingIndex : public DescriptorIndex {
  public:
-  HammingIndex(int bytes, int tables, std::uint64_t seed) : bytes_(bytes), tables_(static_cast<std::size_t>(tables)) {
+  HammingIndex(int bytes, int tables, std::uint64_t seed)
+      : bytes_(bytes), tables_(static_cast<std::size_t>(tables)) {
     std::mt19937_64 generator(seed);
     for (Table& table : tables_) {
       table.buckets.resize(std::size_t{1} << kKeyBits);
@@ -63,7 +64,8 @@ class HammingIndex : public DescriptorIndex {
     for (const Table& table : tables_) {
       const std::size_t key = Key(table, descriptor);
       Scan(table.buckets[key], descriptor, nearest);
-      for (int b = 0; b < kKeyBits; ++b) Scan(table.buckets[key ^ (std::size_t{1} << b)], descriptor, nearest);
+      for (int b = 0; b < kKeyBits; ++b)
+        Scan(table.buckets[key ^ (std::size_t{1} << b)], descriptor, nearest);
     }
     return nearest;
   }
@@ -83,7 +85,8 @@ TwoNearest HammingIndex::SearchAll(const std::uint8_t* descriptor) const {
   return nearest;
 }
 
-void HammingIndex::Scan(const std::vector<int>& bucket, const std::uint8_t* descriptor, TwoNearest& nearest) const {
+void HammingIndex::Scan(const std::vector<int>& bucket, const std::uint8_t* descriptor,
+                        TwoNearest& nearest) const {
   for (const int i : bucket) {
     const float distance = static_cast<float>(internal::HammingDistance(descriptor, Word(i), bytes_));
     if (distance <= nearest.second_distance) nearest.Offer(i, distance);

@@ -47,7 +47,8 @@ class KdForestIndex : public DescriptorIndex {
   KdForestIndex(int dimensions, int trees, int checks, std::uint64_t seed)
       : dimensions_(static_cast<std::size_t>(dimensions)), checks_per_tree_(std::max(1, checks / trees)) {
     for (int t = 0; t < trees; ++t) {
-      trees_.push_back({nullptr, {}, std::mt19937_64(seed + 0x9e3779b97f4a7c15ull * static_cast<std::uint64_t>(t))});
+      trees_.push_back(
+          {nullptr, {}, std::mt19937_64(seed + 0x9e3779b97f4a7c15ull * static_cast<std::uint64_t>(t))});
     }
   }
 
@@ -89,7 +90,8 @@ class KdForestIndex : public DescriptorIndex {
     // A shuffle of our own: std::shuffle may differ between standard libraries.
     for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[tree.generator() % i]);
     for (const int row : order) {
-      float* point = const_cast<float*>(rows.ptr<float>(row));  // FLANN's matrices are not const; it only reads
+      float* point =
+          const_cast<float*>(rows.ptr<float>(row));  // FLANN's matrices are not const; it only reads
       const flann::Matrix<float> one(point, 1, dimensions_);
       if (!tree.index) {
         tree.index = std::make_unique<Tree>(one, flann::KDTreeIndexParams(1));
@@ -110,7 +112,8 @@ class KdForestIndex : public DescriptorIndex {
 
 }  // namespace
 
-std::unique_ptr<DescriptorIndex> MakeKdForestIndex(int dimensions, int trees, int checks, std::uint64_t seed) {
+std::unique_ptr<DescriptorIndex> MakeKdForestIndex(int dimensions, int trees, int checks,
+                                                   std::uint64_t seed) {
   return std::make_unique<KdForestIndex>(dimensions, trees, checks, seed);
 }
 

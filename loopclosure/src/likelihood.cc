@@ -43,7 +43,8 @@ std::vector<double> LikelihoodModel::Scores(const Signature& query) const {
       }
       continue;
     }
-    const double inverse_frequency = std::log10(static_cast<double>(locations_) / static_cast<double>(list.size()));
+    const double inverse_frequency =
+        std::log10(static_cast<double>(locations_) / static_cast<double>(list.size()));
     for (const Posting& posting : list) {
       const std::size_t slot = static_cast<std::size_t>(posting.slot);
       scores[slot] += static_cast<double>(posting.count) / signatures_[slot].size() * inverse_frequency;

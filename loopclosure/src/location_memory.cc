@@ -20,7 +20,8 @@ int LocationMemory::Add(std::int64_t id) {
 bool LocationMemory::AddLink(int a, int b, LinkType type) {
   if (a == b) return false;
   std::vector<Link>& links = nodes_[Index(a)].links;
-  const bool known = std::any_of(links.begin(), links.end(), [b](const Link& link) { return link.slot == b; });
+  const bool known =
+      std::any_of(links.begin(), links.end(), [b](const Link& link) { return link.slot == b; });
   if (known) return false;
   links.push_back({b, type});
   nodes_[Index(b)].links.push_back({a, type});

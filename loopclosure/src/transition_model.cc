@@ -5,10 +5,11 @@
 namespace tutti {
 
 const std::array<double, TransitionModel::kLevels + 1>& TransitionModel::LevelValues() {
-  // The published row: a Gaussian of sigma 1.6 over graph levels, as RTAB-Map's default and the paper print it.
-  static const std::array<double, kLevels + 1> values = {0.36,    0.30,   0.16,    0.062,   0.0151,  0.00255,
-                                                         0.000324, 2.5e-5, 1.3e-6,  4.8e-8,  1.2e-9,  1.9e-11,
-                                                         2.2e-13, 1.7e-15, 8.5e-18, 2.9e-20, 6.9e-23};
+  // The published row: a Gaussian of sigma 1.6 over graph levels, as RTAB-Map's default and the paper print
+  // it.
+  static const std::array<double, kLevels + 1> values = {0.36,     0.30,    0.16,    0.062,   0.0151, 0.00255,
+                                                         0.000324, 2.5e-5,  1.3e-6,  4.8e-8,  1.2e-9, 1.9e-11,
+                                                         2.2e-13,  1.7e-15, 8.5e-18, 2.9e-20, 6.9e-23};
   return values;
 }
 

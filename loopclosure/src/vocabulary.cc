@@ -31,7 +31,10 @@ TUTTI_POPCOUNT_CLONES float TrueDistance(const cv::Mat& a, int i, const cv::Mat&
 }
 
 std::string TypeName(int type, int width) {
-  return (type == CV_32F ? "CV_32F x " : type == CV_8U ? "CV_8U x " : "another type x ") + std::to_string(width);
+  return (type == CV_32F  ? "CV_32F x "
+          : type == CV_8U ? "CV_8U x "
+                          : "another type x ") +
+         std::to_string(width);
 }
 
 }  // namespace

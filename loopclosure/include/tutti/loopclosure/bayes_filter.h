@@ -8,10 +8,11 @@
 
 namespace tutti {
 
-/// p(S_t | L^t) = eta p(L_t | S_t) sum_i p(S_t | S_{t-1} = i) p(S_{t-1} = i | L^{t-1})    (loop-closure.md eq. 1)
+/// p(S_t | L^t) = eta p(L_t | S_t) sum_i p(S_t | S_{t-1} = i) p(S_{t-1} = i | L^{t-1})    (loop-closure.md
+/// eq. 1)
 ///
-/// The first step starts from a uniform belief; a location that is new in working memory enters with 0. An image with a bad
-/// signature does not call Step at all.
+/// The first step starts from a uniform belief; a location that is new in working memory enters with 0. An
+/// image with a bad signature does not call Step at all.
 class BayesFilter {
  public:
   /// One step: prediction over `working_memory`, times `likelihood`, normalised.

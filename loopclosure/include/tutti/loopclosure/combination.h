@@ -16,20 +16,20 @@ struct CombinedBelief {
   Belief belief;          ///< what ranks the candidates
 };
 
-/// Mean rule: Ens(L) = 1/d sum_i p((S^i)_t | (L^i)^t) over the d members that took part, virtual place included
-/// (loop-closure.md eq. 2; the paper's choice).
+/// Mean rule: Ens(L) = 1/d sum_i p((S^i)_t | (L^i)^t) over the d members that took part, virtual place
+/// included (loop-closure.md eq. 2; the paper's choice).
 Belief CombineMean(const std::vector<const Belief*>& members);
 
 /// Product rule: p(i) ~ prod_k max(p_k(i), 1e-9), virtual place included, renormalised (section 4).
 Belief CombineProduct(const std::vector<const Belief*>& members, const std::vector<int>& working_memory);
 
-/// Majority vote (section 4): each member with H >= threshold votes for its best location; votes within two graph levels
-/// agree; H = share of agreeing members x their mean H, 0 below two votes.
+/// Majority vote (section 4): each member with H >= threshold votes for its best location; votes within two
+/// graph levels agree; H = share of agreeing members x their mean H, 0 below two votes.
 CombinedBelief CombineMajority(const std::vector<const Belief*>& members, double threshold,
                                const LocationMemory& memory);
 
-/// One call for every rule. kNaive and kSingle have a single belief, which is the result. `members` holds those that took
-/// part; none: H = 0.
+/// One call for every rule. kNaive and kSingle have a single belief, which is the result. `members` holds
+/// those that took part; none: H = 0.
 CombinedBelief Combine(CombinationRule rule, const std::vector<const Belief*>& members, double threshold,
                        const LocationMemory& memory);
 

@@ -1,4 +1,5 @@
-// The one class that ties the loop-closure module together: image in, verified loop (or the reason why not) out.
+// The one class that ties the loop-closure module together: image in, verified loop (or the reason why not)
+// out.
 #pragma once
 
 #include <cstdint>
@@ -24,26 +25,29 @@ struct FeatureSet {
 
 /// One image with what is known about it.
 struct LoopQuery {
-  std::int64_t id = 0;                  ///< strictly greater than every id before
+  std::int64_t id = 0;  ///< strictly greater than every id before
   double stamp_s = 0;
-  cv::Mat image;                        ///< CV_8UC1, CV_8UC3 (BGR) or CV_16UC1; rectified if a camera is given
-  cv::Mat depth_m;                      ///< optional: CV_32FC1 [m], registered to image, 0 = unknown
+  cv::Mat image;    ///< CV_8UC1, CV_8UC3 (BGR) or CV_16UC1; rectified if a camera is given
+  cv::Mat depth_m;  ///< optional: CV_32FC1 [m], registered to image, 0 = unknown
   std::optional<PinholeCamera> camera;  ///< optional: without it verification uses the fundamental matrix
   FeatureSet features;                  ///< optional: the caller's own features
+  bool metric = true;  ///< features.points are in metres (stereo, RGB-D): PnP, kRigid. false: mono, their
+                       ///< scale drifts: essential matrix, then kSimilarity where both have points
 };
 
 /// What one member (or the whole ensemble) believes.
 struct MemberOpinion {
-  std::string name;            ///< "surf", "sift", "orb", ...
-  bool took_part = false;      ///< false: bad signature, the member sat this image out
+  std::string name;        ///< "surf", "sift", "orb", ...
+  bool took_part = false;  ///< false: bad signature, the member sat this image out
   int features = 0;
   int words = 0;
-  double hypothesis = 0;       ///< H = 1 - p(new place)
-  std::int64_t best = -1;      ///< id of its best location, -1 if none
-  double at_candidate = 0;     ///< its posterior at the ensemble's candidate
+  double hypothesis = 0;    ///< H = 1 - p(new place)
+  std::int64_t best = -1;   ///< id of its best location, -1 if none
+  double at_candidate = 0;  ///< its posterior at the ensemble's candidate
 };
 
-/// A matched feature: pixel in the query and in the candidate, and their indices in the callers' FeatureSets (-1: a member's).
+/// A matched feature: pixel in the query and in the candidate, and their indices in the callers' FeatureSets
+/// (-1: a member's).
 struct VerifiedMatch {
   cv::Point2f query, candidate;
   int query_feature = -1, candidate_feature = -1;
@@ -56,26 +60,26 @@ struct Verification {
   std::int64_t candidate = -1;
   bool accepted = false;
   ConstraintType type = ConstraintType::kNone;
-  Similarity S_candidate_query;                      ///< maps points of the query camera into the candidate camera (kRigid:
-                                                     ///< scale 1; kEssential: rotation and unit direction only)
-  Matrix6d information = Matrix6d::Zero();           ///< of (translation, rotation), from the inliers
+  Similarity S_candidate_query;  ///< maps points of the query camera into the candidate camera (kRigid:
+                                 ///< scale 1; kEssential: rotation and unit direction only)
+  Matrix6d information = Matrix6d::Zero();  ///< of (translation, rotation), from the inliers
   int matches = 0, inliers = 0;
-  std::string reason;                                ///< why not, in plain words; empty if accepted
+  std::string reason;  ///< why not, in plain words; empty if accepted
   std::vector<VerifiedMatch> inlier_matches;
 };
 
 /// Everything that Detect found out.
 struct LoopResult {
   std::int64_t query = -1;
-  double hypothesis = 0;                  ///< H of the combined posterior, 1 - p(new place)
-  std::int64_t candidate = -1;            ///< argmax of the combined posterior, -1 if there is no location yet
-  double posterior = 0;                   ///< combined posterior at the candidate
-  bool proposed = false;                  ///< H >= loop_threshold: went to verification
-  bool accepted = false;                  ///< the verification accepted it (or one of its neighbours)
-  std::string reason;                     ///< why it is not accepted, in plain words
+  double hypothesis = 0;        ///< H of the combined posterior, 1 - p(new place)
+  std::int64_t candidate = -1;  ///< argmax of the combined posterior, -1 if there is no location yet
+  double posterior = 0;         ///< combined posterior at the candidate
+  bool proposed = false;        ///< H >= loop_threshold: went to verification
+  bool accepted = false;        ///< the verification accepted it (or one of its neighbours)
+  std::string reason;           ///< why it is not accepted, in plain words
   std::vector<MemberOpinion> members;
-  Verification verification;              ///< the best one tried
-  std::vector<Verification> tried;        ///< all that were tried
+  Verification verification;                                           ///< the best one tried
+  std::vector<Verification> tried;                                     ///< all that were tried
   std::vector<std::pair<std::int64_t, double>> posterior_by_location;  ///< only with keep_posterior
   double extract_ms = 0, quantise_ms = 0, likelihood_ms = 0, filter_ms = 0, verify_ms = 0, memory_ms = 0;
 };
@@ -90,11 +94,12 @@ class LoopDetector {
   LoopDetector& operator=(LoopDetector&&) noexcept;
   ~LoopDetector();
 
-  /// Adds the image as a location and says whether it closes a loop. Never throws for hard images; throws InputError for
-  /// misuse (an id that does not grow, descriptors of another type than before).
+  /// Adds the image as a location and says whether it closes a loop. Never throws for hard images; throws
+  /// InputError for misuse (an id that does not grow, descriptors of another type than before).
   LoopResult Detect(const LoopQuery& query);
 
-  /// Adds a neighbour link between two locations (a caller's own odometry link); consecutive ids are linked by themselves.
+  /// Adds a neighbour link between two locations (a caller's own odometry link); consecutive ids are linked
+  /// by themselves.
   void AddLink(std::int64_t a, std::int64_t b);
 
   std::size_t NumLocations() const;

@@ -1,4 +1,5 @@
-// Options of the loop-closure detector. Every default is the one that the results in bench/ were measured with.
+// Options of the loop-closure detector. Every default is the one that the results in bench/ were measured
+// with.
 #pragma once
 
 #include <cstdint>
@@ -20,9 +21,9 @@ struct ExtractionOptions {
   int max_pixels = 1 << 21;     ///< images with more pixels are scaled down before anything else [px]
   int surf_octaves = 4;         ///< octaves of the Hessian pyramid (the paper's 4)
   double surf_threshold = 1.0;  ///< determinant of Hessian below which a SURF point is dropped (dlib's scale)
-  int sift_max_pixels = 1 << 17;   ///< SIFT sees the image halved until it has at most this many pixels [px]
-  double sift_contrast = 0.02;  ///< contrast threshold of SIFT (OpenCV's own default is 0.04)
-  int orb_fast_threshold = 10;  ///< FAST threshold of ORB [grey levels of 255]
+  int sift_max_pixels = 1 << 17;  ///< SIFT sees the image halved until it has at most this many pixels [px]
+  double sift_contrast = 0.02;    ///< contrast threshold of SIFT (OpenCV's own default is 0.04)
+  int orb_fast_threshold = 10;    ///< FAST threshold of ORB [grey levels of 255]
 
   /// Empty if usable, else what is wrong and what to do.
   std::string Validate() const;
@@ -30,7 +31,8 @@ struct ExtractionOptions {
 
 /// Options of one member's incremental vocabulary (loop-closure.md section 3).
 struct VocabularyOptions {
-  double nndr = 0.8;    ///< a descriptor is an old word if d1 <= nndr * d2; on TRUE distance, not on FLANN's squared one
+  double nndr =
+      0.8;  ///< a descriptor is an old word if d1 <= nndr * d2; on TRUE distance, not on FLANN's squared one
   int trees = 4;        ///< kd-trees of the FLANN index (float descriptors)
   int checks = 32;      ///< leaves visited per search (float descriptors)
   int hash_tables = 8;  ///< hash tables of the Hamming index (binary descriptors)
@@ -41,20 +43,20 @@ struct VocabularyOptions {
 
 /// Options of the geometric verification (loop-closure.md section 5).
 struct VerificationOptions {
-  bool enabled = true;             ///< false: every proposal is accepted as it is, without a constraint
-  int max_hypotheses = 3;          ///< separate places tried, best posterior first
-  int neighbours = 1;              ///< graph levels around each place that are tried as well; 0: none
-  double match_ratio = 0.8;        ///< Lowe's ratio test, on true distance
-  int min_inliers = 20;            ///< fewer inliers than this are no loop
-  double min_inlier_ratio = 0.3;   ///< inliers / matches, 0..1
-  double min_spread = 0.08;        ///< rms extent of the inliers over the image, as share of its diagonal
-  double reprojection_px = 2.5;    ///< RANSAC threshold of PnP, Sim(3) [px]
-  double epipolar_px = 1.5;        ///< RANSAC threshold of the essential and fundamental matrix [px]
-  double confidence = 0.9999;      ///< of RANSAC
-  int max_iterations = 1000;       ///< of RANSAC
-  double pixel_sigma = 1.5;        ///< standard deviation of a matched pixel, sets the information matrix [px]
-  double min_depth_m = 0.1;        ///< depths outside of the range count as unknown [m]
-  double max_depth_m = 80.0;       ///< [m]
+  bool enabled = true;            ///< false: every proposal is accepted as it is, without a constraint
+  int max_hypotheses = 3;         ///< separate places tried, best posterior first
+  int neighbours = 1;             ///< graph levels around each place that are tried as well; 0: none
+  double match_ratio = 0.8;       ///< Lowe's ratio test, on true distance
+  int min_inliers = 20;           ///< fewer inliers than this are no loop
+  double min_inlier_ratio = 0.3;  ///< inliers / matches, 0..1
+  double min_spread = 0.08;       ///< rms extent of the inliers over the image, as share of its diagonal
+  double reprojection_px = 2.5;   ///< RANSAC threshold of PnP, Sim(3) [px]
+  double epipolar_px = 1.5;       ///< RANSAC threshold of the essential and fundamental matrix [px]
+  double confidence = 0.9999;     ///< of RANSAC
+  int max_iterations = 1000;      ///< of RANSAC
+  double pixel_sigma = 1.5;       ///< standard deviation of a matched pixel, sets the information matrix [px]
+  double min_depth_m = 0.1;       ///< depths outside of the range count as unknown [m]
+  double max_depth_m = 80.0;      ///< [m]
 
   /// Empty if usable, else what is wrong and what to do.
   std::string Validate() const;
@@ -62,30 +64,34 @@ struct VerificationOptions {
 
 /// Options of LoopDetector.
 struct LoopDetectorOptions {
-  CombinationRule rule = CombinationRule::kMean;               ///< how members are combined
-  std::vector<std::string> members = {"surf", "sift", "orb"};  ///< of surf, sift, orb, akaze, brisk; kSingle: one
-  double loop_threshold = 0.11;                                ///< go to verification at H >= this, 0..1
-  int stm_size = 10;                                           ///< locations in short-term memory, no candidates
-  int threads = 2;                                             ///< most threads that Detect uses at once
-  std::uint64_t seed = 1;                                      ///< of kd-forests and RANSAC
+  CombinationRule rule = CombinationRule::kMean;  ///< how members are combined
+  std::vector<std::string> members = {"surf", "sift",
+                                      "orb"};  ///< of surf, sift, orb, akaze, brisk; kSingle: one
+  double loop_threshold = 0.11;                ///< go to verification at H >= this, 0..1
+  int stm_size = 10;                           ///< locations in short-term memory, no candidates
+  int threads = 2;                             ///< most threads that Detect uses at once
+  std::uint64_t seed = 1;                      ///< of kd-forests and RANSAC
 
   LikelihoodKind likelihood = LikelihoodKind::kTfIdf;  ///< how signatures are compared
-  double bad_signature_ratio = 0.2;    ///< a member sits out below this share of its mean number of features, 0..1
-  double virtual_place_prior = 0.9;    ///< p(new place | new place), 0..1
-  bool rehearsal = false;              ///< merge a location into its predecessor when they look the same
-  double rehearsal_similarity = 0.6;   ///< similarity from which on they do, 0..1
-  bool keep_posterior = false;         ///< fill LoopResult::posterior_by_location (costs O(locations) per image)
+  double bad_signature_ratio =
+      0.2;  ///< a member sits out below this share of its mean number of features, 0..1
+  double virtual_place_prior = 0.9;   ///< p(new place | new place), 0..1
+  bool rehearsal = false;             ///< merge a location into its predecessor when they look the same
+  double rehearsal_similarity = 0.6;  ///< similarity from which on they do, 0..1
+  bool keep_posterior = false;  ///< fill LoopResult::posterior_by_location (costs O(locations) per image)
 
-  ExtractionOptions extraction;        ///< features
-  VocabularyOptions vocabulary;        ///< words
-  VerificationOptions verification;    ///< geometry
+  ExtractionOptions extraction;      ///< features
+  VocabularyOptions vocabulary;      ///< words
+  VerificationOptions verification;  ///< geometry
 
   /// Empty if usable, else what is wrong and what to do.
   std::string Validate() const;
 };
 
-/// The one configuration key: "mean", "product", "majority" or "naive" over options.members, or a member's name
-/// ("surf", "sift", "orb", "akaze", "brisk") for that member alone. Throws InputError that names the nearest word.
+/// The one configuration key: "mean", "product", "majority" or "naive" over options.members, or a member's
+/// name
+/// ("surf", "sift", "orb", "akaze", "brisk") for that member alone. Throws InputError that names the nearest
+/// word.
 void SetRule(const std::string& word, LoopDetectorOptions& options);
 
 /// The word that SetRule takes for these options.

@@ -17,14 +17,18 @@ struct Features {
   cv::Mat descriptors;                  ///< N x D, CV_32F or CV_8U; empty if N = 0
 };
 
-/// The image as one 8-bit channel: colour to grey; 16-bit and float stretched from minimum to maximum; empty stays empty.
+/// The image as one 8-bit channel: colour to grey; 16-bit and float stretched from minimum to maximum; empty
+/// stays empty.
 cv::Mat ToGrey8(const cv::Mat& image);
 
-/// Indices of the strongest `count` keypoints spread over a grid of `columns` cells along the longer side: each cell's best
-/// first, up to an equal share, the rest by response. In order of strength; ties by position. Deterministic.
-std::vector<int> SelectSpread(const std::vector<cv::KeyPoint>& keypoints, cv::Size image_size, int count, int columns);
+/// Indices of the strongest `count` keypoints spread over a grid of `columns` cells along the longer side:
+/// each cell's best first, up to an equal share, the rest by response. In order of strength; ties by
+/// position. Deterministic.
+std::vector<int> SelectSpread(const std::vector<cv::KeyPoint>& keypoints, cv::Size image_size, int count,
+                              int columns);
 
-/// SURF of dlib (its Hessian pyramid and 64 values per point) as a cv::Feature2D: CV_32F descriptors of unit length.
+/// SURF of dlib (its Hessian pyramid and 64 values per point) as a cv::Feature2D: CV_32F descriptors of unit
+/// length.
 cv::Ptr<cv::Feature2D> CreateDlibSurf(int max_features, int octaves, double threshold);
 
 /// Detects and describes with one cv::Feature2D, named as in LoopDetectorOptions::members.
@@ -33,7 +37,8 @@ class FeatureExtractor {
   /// Throws InputError for an unknown name.
   FeatureExtractor(const std::string& name, const ExtractionOptions& options);
 
-  /// Features of an 8-bit grey image, at most options.features. Never throws for hard images (blank, tiny, huge, empty).
+  /// Features of an 8-bit grey image, at most options.features. Never throws for hard images (blank, tiny,
+  /// huge, empty).
   Features Extract(const cv::Mat& grey) const;
 
  private:

@@ -22,8 +22,8 @@ class LikelihoodModel {
 
   /// Raw scores s_i of every slot (0 where nothing is shared). Section 2, both variants:
   /// similarity: s_i = (sum over shared words of min(multiplicity)) / max(|z_t|, |z_i|);
-  /// tf-idf: s_i = sum over unique words w of z_t of (n_wi / n_i) * log10(N / n_w), with N locations in STM and WM, n_w of
-  /// them with w, n_wi occurrences of w in i, n_i words in i.
+  /// tf-idf: s_i = sum over unique words w of z_t of (n_wi / n_i) * log10(N / n_w), with N locations in STM
+  /// and WM, n_w of them with w, n_wi occurrences of w in i, n_i words in i.
   std::vector<double> Scores(const Signature& query) const;
 
   /// Locations in the index, bad signatures included: N.
@@ -41,8 +41,8 @@ class LikelihoodModel {
   int locations_ = 0;
 };
 
-/// Adjustment of the raw scores of the locations in `working_memory` (section 2; Labbe & Michaud 2013, eq. 5 and 6), with mu
-/// and sigma (sample deviation, n-1) over the non-zero scores:
+/// Adjustment of the raw scores of the locations in `working_memory` (section 2; Labbe & Michaud 2013, eq. 5
+/// and 6), with mu and sigma (sample deviation, n-1) over the non-zero scores:
 ///   L_i = (s_i - (sigma - 1e-4)) / mu if s_i > mu + sigma, else 1;
 ///   L_new = mu / sigma + 1 if sigma > 1e-4 and some s_i > mu + sigma, else 2.
 Belief AdjustLikelihood(const std::vector<double>& scores, const std::vector<int>& working_memory);

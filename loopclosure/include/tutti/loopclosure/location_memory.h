@@ -1,4 +1,5 @@
-// The one memory of locations that all members share: which exist, how they are linked, which may be candidates.
+// The one memory of locations that all members share: which exist, how they are linked, which may be
+// candidates.
 #pragma once
 
 #include <cstdint>
@@ -9,9 +10,9 @@
 
 namespace tutti {
 
-/// Short-term memory (STM, a FIFO of the newest locations, which are no candidates) and working memory (WM, the candidates),
-/// after Labbe & Michaud 2013, section III. Shared between the members (loop-closure.md section 6), so that a location is in
-/// every member's WM or in none.
+/// Short-term memory (STM, a FIFO of the newest locations, which are no candidates) and working memory (WM,
+/// the candidates), after Labbe & Michaud 2013, section III. Shared between the members (loop-closure.md
+/// section 6), so that a location is in every member's WM or in none.
 ///
 /// Locations are slots 0, 1, 2, ... in the order of adding; the caller's ids are kept beside them.
 class LocationMemory {
@@ -26,14 +27,16 @@ class LocationMemory {
 
   explicit LocationMemory(int stm_size) : stm_size_(stm_size) {}
 
-  /// Adds a location at the end of STM, linked to the one before it; returns its slot. `id` must be greater than all before.
+  /// Adds a location at the end of STM, linked to the one before it; returns its slot. `id` must be greater
+  /// than all before.
   int Add(std::int64_t id);
   /// Links two locations; links that exist already are left as they are. Returns false if nothing changed.
   bool AddLink(int a, int b, LinkType type);
   /// Moves the oldest locations of STM to WM while |STM| > stm_size; returns the slots moved.
   std::vector<int> Settle();
-  /// Rehearsal (section 9): the newest location is merged into the one before it, weight_old += 1 + weight_new, and dropped; its
-  /// id names the older one from now on. Returns the older slot, -1 if STM holds no older one (nothing changes then).
+  /// Rehearsal (section 9): the newest location is merged into the one before it, weight_old += 1 +
+  /// weight_new, and dropped; its id names the older one from now on. Returns the older slot, -1 if STM holds
+  /// no older one (nothing changes then).
   int DropNewest();
   /// On a loop: the newer location takes over the older one's weight.
   void TransferWeight(int newer, int older);
@@ -49,8 +52,8 @@ class LocationMemory {
   /// Slot of a caller's id, -1 if there is none.
   int Find(std::int64_t id) const;
 
-  /// Slots in WM within `levels` graph levels of `slot` (itself included), each with its level, in order of level, then slot.
-  /// Odometry links count 1, loop links 0. Only WM is walked.
+  /// Slots in WM within `levels` graph levels of `slot` (itself included), each with its level, in order of
+  /// level, then slot. Odometry links count 1, loop links 0. Only WM is walked.
   std::vector<std::pair<int, int>> Neighbours(int slot, int levels) const;
 
  private:

@@ -20,8 +20,8 @@ class Member {
   /// Step 1: features of an 8-bit grey image. Safe to call for several members at once.
   Features Extract(const cv::Mat& grey) const { return extractor_.Extract(grey); }
 
-  /// Step 2: the signature. A bad one (fewer features than bad_signature_ratio x their running mean, or fewer than two) gets no
-  /// words and is empty: the member sits this image out.
+  /// Step 2: the signature. A bad one (fewer features than bad_signature_ratio x their running mean, or fewer
+  /// than two) gets no words and is empty: the member sits this image out.
   Signature Quantise(const Features& features);
 
   int num_words() const { return vocabulary_.size(); }

@@ -10,12 +10,13 @@
 
 namespace tutti {
 
-/// Sparse, banded transition matrix (loop-closure.md section 2, "Prediction"; Labbe & Michaud 2013, section III-E). Column
-/// j = p(. | S_{t-1} = j):
+/// Sparse, banded transition matrix (loop-closure.md section 2, "Prediction"; Labbe & Michaud 2013, section
+/// III-E). Column j = p(. | S_{t-1} = j):
 ///   from the virtual place: p(-1 | -1) = 0.9, p(i | -1) = 0.1 / (m - 1);
-///   from a real place j: a Gaussian (sigma 1.6, 16 levels) over the graph neighbours in working memory, a deficit below 0.9
-///   given to j itself, the real places scaled to 0.9; p(-1 | j) = 0.1.
-/// Columns are cached; a change in the graph recomputes only those within 16 levels. A prediction costs O(|WM|).
+///   from a real place j: a Gaussian (sigma 1.6, 16 levels) over the graph neighbours in working memory, a
+///   deficit below 0.9 given to j itself, the real places scaled to 0.9; p(-1 | j) = 0.1.
+/// Columns are cached; a change in the graph recomputes only those within 16 levels. A prediction costs
+/// O(|WM|).
 class TransitionModel {
  public:
   /// p(real place at this graph level), before scaling: self, level 1, ..., level 16.

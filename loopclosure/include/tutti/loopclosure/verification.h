@@ -1,0 +1,57 @@
+// Geometric verification: do two images show the same place, and how were the cameras placed?
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tutti/core/camera.h"
+#include "tutti/loopclosure/detector.h"
+#include "tutti/loopclosure/detector_options.h"
+#include "tutti/loopclosure/features.h"
+
+namespace tutti {
+
+/// What is kept of an image for verification: the members' features and the caller's, with 3D points where
+/// known.
+struct View {
+  struct Set {
+    std::vector<cv::Point2f> pixels;      ///< N [px]
+    cv::Mat descriptors;                  ///< N rows
+    std::vector<Eigen::Vector3f> points;  ///< empty, or N points in the camera frame; NaN where unknown
+  };
+  std::int64_t id = -1;
+  cv::Size size;  ///< of the image [px]
+  std::optional<PinholeCamera> camera;
+  std::vector<Set> members;  ///< one per member
+  Set caller;                ///< the caller's own; may be empty
+  bool metric = true;        ///< 3D points are in metres
+};
+
+/// The view of a query. Depth at a keypoint is the median of the 3x3 pixels around it; unknown where they
+/// disagree by more than 5 % (the edge of an object) or lie outside of the options' range.
+View MakeView(const LoopQuery& query, const std::vector<Features>& members,
+              const VerificationOptions& options);
+
+/// Verifies one candidate (loop-closure.md section 5). The features of all members and the caller's are
+/// matched (ratio test and mutual check) and pooled, one match per place. Then, by what is known:
+///  * points in metres in the candidate: PnP by RANSAC, refined on the inliers -> kRigid with information;
+///  * camera only, or mono: essential matrix -> kEssential, and where both images have points (mono), Sim(3)
+///  by 3D-3D RANSAC ->
+///    kSimilarity; a Sim(3) that fails on enough points rejects;
+///  * no camera: fundamental matrix -> kFundamental.
+/// Inliers must be many, a good share of the matches, and spread over both images. Deterministic for options
+/// and seed.
+class GeometricVerifier {
+ public:
+  GeometricVerifier(const VerificationOptions& options, std::uint64_t seed)
+      : options_(options), seed_(seed) {}
+
+  Verification Verify(const View& query, const View& candidate, int threads = 1) const;
+
+ private:
+  VerificationOptions options_;
+  std::uint64_t seed_;
+};
+
+}  // namespace tutti

@@ -1,0 +1,36 @@
+// Essential and fundamental matrix by RANSAC. Internal.
+#pragma once
+
+#include <cstdint>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "tutti/core/camera.h"
+#include "tutti/core/pose.h"
+
+namespace tutti::internal {
+
+struct EpipolarSettings {
+  double threshold_px = 1.5;
+  double confidence = 0.9999;
+  int max_iterations = 1000;
+  std::uint64_t seed = 1;
+};
+
+struct EpipolarResult {
+  std::vector<int> inliers;  ///< ascending; empty if no model was found
+  Pose T_second_first;       ///< FitEssential: rotation and unit translation
+};
+
+/// OpenCV's USAC with a seed of its own and on one thread, so that the result is reproducible. At least 8
+/// matches.
+EpipolarResult FitFundamental(const std::vector<cv::Point2f>& first, const std::vector<cv::Point2f>& second,
+                              const EpipolarSettings& settings);
+
+/// The same with calibration (the cameras may differ, and may distort); points behind a camera are no
+/// inliers.
+EpipolarResult FitEssential(const std::vector<cv::Point2f>& first, const PinholeCamera& first_camera,
+                            const std::vector<cv::Point2f>& second, const PinholeCamera& second_camera,
+                            const EpipolarSettings& settings);
+
+}  // namespace tutti::internal

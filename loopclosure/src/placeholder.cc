@@ -1,1 +1,0 @@
-#include "tutti/loopclosure/detector.h"

@@ -1,0 +1,72 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "tutti/loopclosure/verification.h"
+
+namespace tutti {
+namespace {
+
+// Depth at a pixel: median of the valid among 3x3; 0 where it is unknown or the pixels disagree.
+float DepthAt(const cv::Mat& depth_m, const cv::Point2f& pixel, const VerificationOptions& options) {
+  constexpr float kMaxDisagreement = 0.05f;
+  const int x = static_cast<int>(std::lround(pixel.x));
+  const int y = static_cast<int>(std::lround(pixel.y));
+  std::array<float, 9> values{};
+  std::size_t count = 0;
+  for (int r = std::max(0, y - 1); r <= std::min(depth_m.rows - 1, y + 1); ++r) {
+    for (int c = std::max(0, x - 1); c <= std::min(depth_m.cols - 1, x + 1); ++c) {
+      const float z = depth_m.at<float>(r, c);
+      if (std::isfinite(z) && z > options.min_depth_m && z < options.max_depth_m) values[count++] = z;
+    }
+  }
+  if (count < 5) return 0.0f;
+  std::sort(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(count));
+  if (values[count - 1] - values[0] > kMaxDisagreement * values[0]) return 0.0f;
+  return values[count / 2];
+}
+
+View::Set MakeSet(const std::vector<cv::KeyPoint>& keypoints, const cv::Mat& descriptors) {
+  View::Set set;
+  set.pixels.reserve(keypoints.size());
+  for (const cv::KeyPoint& keypoint : keypoints) set.pixels.push_back(keypoint.pt);
+  set.descriptors = descriptors;
+  return set;
+}
+
+void LookUpDepth(const LoopQuery& query, const VerificationOptions& options, View::Set& set) {
+  if (query.depth_m.empty() || query.depth_m.type() != CV_32FC1 || !query.camera) return;
+  const Eigen::Vector3f unknown = Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN());
+  if (set.points.empty()) set.points.assign(set.pixels.size(), unknown);
+  for (std::size_t i = 0; i < set.pixels.size(); ++i) {
+    if (set.points[i].allFinite()) continue;
+    const float z = DepthAt(query.depth_m, set.pixels[i], options);
+    if (z <= 0.0f) continue;
+    const Eigen::Vector3d ray = query.camera->Unproject({set.pixels[i].x, set.pixels[i].y});
+    set.points[i] = ray.cast<float>() * z;
+  }
+}
+
+}  // namespace
+
+View MakeView(const LoopQuery& query, const std::vector<Features>& members,
+              const VerificationOptions& options) {
+  View view;
+  view.id = query.id;
+  view.size = query.image.size();
+  view.camera = query.camera;
+  view.metric = query.metric;
+  for (const Features& features : members) {
+    view.members.push_back(MakeSet(features.keypoints, features.descriptors));
+    if (query.metric) LookUpDepth(query, options, view.members.back());
+  }
+  // The caller owns its matrix and may write into it later: keep a copy.
+  view.caller = MakeSet(query.features.keypoints, query.features.descriptors.clone());
+  for (const Eigen::Vector3d& point : query.features.points)
+    view.caller.points.push_back(point.cast<float>());
+  if (query.metric) LookUpDepth(query, options, view.caller);
+  return view;
+}
+
+}  // namespace tutti

@@ -1,1 +1,0 @@
-#include "tutti/core/pose.h"

@@ -1,0 +1,236 @@
+#include "synthetic_world.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "scene.h"
+#include "synthetic_random.h"
+#include "tutti/core/error.h"
+
+namespace tutti {
+
+using synthetic::Face;
+using synthetic::Light;
+using synthetic::Random;
+
+std::string SyntheticOptions::Validate() const {
+  const bool size_given = width != 0 || height != 0;
+  if (size_given && (width < 32 || height < 32 || width > 8192 || height > 8192)) {
+    return "width and height must both be given, 32 to 8192 pixels";
+  }
+  if (!(focal_px >= 0) || !(baseline_m >= 0) || !(rate_hz >= 0) || !(max_depth_m >= 0) || !(speed_mps >= 0)) {
+    return "focal_px, baseline_m, rate_hz, max_depth_m and speed_mps must not be negative";
+  }
+  if (!(depth_units_per_m > 0)) return "depth_units_per_m must be greater than 0";
+  if (!(laps > 0 && laps <= 10000)) return "laps must be greater than 0 and at most 10000";
+  if (frames < 0) return "frames must not be negative; 0 means all";
+  if (blocks_x < 1 || blocks_y < 1 || blocks_x > 12 || blocks_y > 12)
+    return "blocks_x and blocks_y must be 1 to 12";
+  if (!(block_m >= 15 && block_m <= 200)) return "block_m must be 15 to 200 m";
+  if (!(street_m >= 9 && street_m <= 30)) return "street_m must be 9 to 30 m";
+  if (!(repeat_fraction >= 0 && repeat_fraction <= 1)) return "repeat_fraction must be 0 to 1";
+  if (!(noise_sigma >= 0 && noise_sigma <= 100)) return "noise_sigma must be 0 to 100 grey levels";
+  if (!(motion_blur_s >= 0 && motion_blur_s <= 0.1)) return "motion_blur_s must be 0 to 0.1 s";
+  if (moving_objects < 0 || moving_objects > 100) return "moving_objects must be 0 to 100";
+  if (supersample < 1 || supersample > 4) return "supersample must be 1 to 4";
+  return {};
+}
+
+SyntheticOptions SyntheticOptions::Resolved() const {
+  SyntheticOptions o = *this;
+  const bool town = o.scene == SyntheticScene::kTown;
+  const auto set = [](double& value, double otherwise) {
+    if (value == 0) value = otherwise;
+  };
+  if (o.width == 0) o.width = 640;
+  if (o.height == 0) o.height = town ? 320 : 480;
+  set(o.focal_px, (town ? 0.58 : 0.82) * o.width);
+  set(o.baseline_m, town ? 0.54 : 0.12);
+  set(o.rate_hz, town ? 10 : 15);
+  set(o.max_depth_m, town ? 13 : 8);
+  set(o.speed_mps, town ? 8 : 0.5);
+  return o;
+}
+
+struct SyntheticWorld::Impl {
+  SyntheticOptions options;
+  synthetic::Scene scene;
+  PinholeCamera camera;
+  std::size_t frames = 0;
+  Pose T_scene_first;
+
+  const synthetic::Route& Way() const { return scene.routes[0]; }
+
+  // Camera in the scene's frame at a time. Smooth in time, so it may be asked between frames.
+  Pose CameraAt(double t) const {
+    const double s = Way().DistanceAt(t);
+    // No lap runs in the tracks of the one before.
+    const double unit = scene.eye_height / 1.65;  // a walker sways less than a car's lane is wide
+    const double lateral = 0.3 * unit * std::sin(2 * M_PI * s / (0.73 * Way().Length()));
+    const double heading = Way().HeadingAt(s);
+    const Eigen::Vector2d point =
+        Way().PointAt(s) + lateral * Eigen::Vector2d(-std::sin(heading), std::cos(heading));
+    const double height =
+        scene.eye_height + 0.015 * std::sin(2 * M_PI * 0.9 * t) + 0.01 * std::sin(2 * M_PI * 0.37 * t + 1);
+    const double yaw = heading - scene.gaze_right + scene.sway * std::sin(2 * M_PI * 0.21 * t);
+    const double down = scene.gaze_down + scene.sway * std::sin(2 * M_PI * 0.43 * t + 0.7);
+    const double roll = scene.sway * std::sin(2 * M_PI * 0.31 * t + 2.1);
+    Eigen::Matrix3d level;  // columns: right, down, forward of a camera that looks along yaw
+    level << std::sin(yaw), 0, std::cos(yaw), -std::cos(yaw), 0, std::sin(yaw), 0, -1, 0;
+    const Eigen::Quaterniond rotation = Eigen::Quaterniond(level) *
+                                        Eigen::AngleAxisd(-down, Eigen::Vector3d::UnitX()) *
+                                        Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitZ());
+    return Pose(rotation.normalized(), {point.x(), point.y(), height});
+  }
+
+  double StampOf(std::size_t i) const { return static_cast<double>(i) / options.rate_hz; }
+
+  Light LightAt(double t) const {
+    Light light;
+    if (!options.lighting_change) return light;
+    // A cloud comes within three seconds as the second lap begins.
+    const double change = std::clamp((t - Way().LapTime()) / 3.0, 0.0, 1.0);
+    light.towards_sun =
+        ((1 - change) * light.towards_sun + change * Eigen::Vector3d(-0.6, 0.5, 0.62)).normalized();
+    light.ambient -= 0.15 * change;
+    light.gain -= 0.28 * change;
+    light.gamma += 0.2 * change;
+    return light;
+  }
+
+  std::vector<Face> FacesAt(double t) const {
+    std::vector<Face> faces = scene.faces;
+    for (int k = 0; k < options.moving_objects; ++k) {
+      const double spread = Way().Length() * (k + 0.4) / options.moving_objects;
+      const double s = spread + scene.mover_speed * t;
+      const double heading = Way().HeadingAt(s);
+      const Eigen::Vector2d at =
+          Way().PointAt(s) + scene.mover_left * Eigen::Vector2d(-std::sin(heading), std::cos(heading));
+      const auto& look = scene.movers[static_cast<std::size_t>(k) % scene.movers.size()];
+      AppendBox(faces, {at.x(), at.y(), 0.01}, scene.mover_size, heading, look);
+    }
+    return faces;
+  }
+
+  // Mean of what is seen over the exposure around t, shifted by `right_m` along the camera's x axis.
+  synthetic::Rendering View(double t, double right_m, bool blur) const {
+    const int steps = blur && options.motion_blur_s > 0 ? 5 : 1;
+    synthetic::Rendering sum;
+    for (int k = 0; k < steps; ++k) {
+      const double at = t + (steps == 1 ? 0.0 : options.motion_blur_s * (k - 2) / 5.0);
+      Pose pose = CameraAt(std::max(at, 0.0));
+      pose.translation += pose.rotation * Eigen::Vector3d(right_m, 0, 0);
+      synthetic::Rendering one =
+          synthetic::Render(FacesAt(at), scene.textures, camera, pose, LightAt(at), options.supersample);
+      if (k == 0) {
+        sum = std::move(one);
+      } else {
+        sum.image += one.image;
+        if (k == steps / 2) sum.depth_m = one.depth_m;  // the middle one
+      }
+    }
+    if (steps > 1) sum.image *= 1.0 / steps;
+    return sum;
+  }
+
+  cv::Mat Sense(const cv::Mat& grey, std::uint64_t stream) const {
+    cv::Mat out(grey.size(), CV_8UC1);
+    Random random(options.seed * 0x9E3779B1ULL + stream * 0xD1B54A32D192ED03ULL + 11);
+    const float sigma = static_cast<float>(options.noise_sigma);
+    for (int y = 0; y < grey.rows; ++y) {
+      const float* in = grey.ptr<float>(y);
+      std::uint8_t* row = out.ptr(y);
+      for (int x = 0; x < grey.cols; ++x) {
+        const float value = sigma > 0 ? in[x] + sigma * random.Normal() : in[x];
+        row[x] = static_cast<std::uint8_t>(std::clamp(value + 0.5F, 0.0F, 255.0F));
+      }
+    }
+    return out;
+  }
+
+  // Noise of a structured-light sensor: sigma_z = 0.0012 + 0.0019 (z - 0.4)^2 (Nguyen, Izadi, Lovell:
+  // "Modeling Kinect sensor noise", 3DIMPVT 2012), shadows beside depth edges, and some holes.
+  void DepthNoise(cv::Mat& depth, std::uint64_t stream) const {
+    Random random(options.seed * 0xC2B2AE3DULL + stream * 0x9FB21C651E98DF25ULL + 5);
+    const cv::Mat exact = depth.clone();
+    for (int y = 0; y < depth.rows; ++y) {
+      for (int x = 0; x < depth.cols; ++x) {
+        const float z = exact.at<float>(y, x);
+        if (z <= 0) continue;
+        const float left = exact.at<float>(y, std::max(0, x - 3)),
+                    right = exact.at<float>(y, std::min(depth.cols - 1, x + 3));
+        const bool shadow = z - std::min(left, right) > 0.08F * z;
+        float& out = depth.at<float>(y, x);
+        if (shadow || z < 0.45F || random.Unit() < 0.01) {
+          out = 0;
+          continue;
+        }
+        out = z + (0.0012F + 0.0019F * (z - 0.4F) * (z - 0.4F)) * random.Normal();
+      }
+    }
+  }
+};
+
+SyntheticWorld::SyntheticWorld(const SyntheticOptions& options) : impl_(std::make_unique<Impl>()) {
+  const std::string problem = options.Validate();
+  if (!problem.empty()) throw InputError("synthetic world: " + problem);
+  impl_->options = options.Resolved();
+  const SyntheticOptions& o = impl_->options;
+  impl_->scene = o.scene == SyntheticScene::kTown ? synthetic::BuildTown(o) : synthetic::BuildRoom(o);
+  PinholeCamera& c = impl_->camera;
+  c.width = o.width;
+  c.height = o.height;
+  c.fx = c.fy = o.focal_px;
+  c.cx = 0.5 * (o.width - 1);
+  c.cy = 0.5 * (o.height - 1);
+  const double all = std::floor(o.laps * impl_->Way().LapTime() * o.rate_hz) + 1;
+  impl_->frames = static_cast<std::size_t>(all);
+  if (o.frames > 0) impl_->frames = std::min(impl_->frames, static_cast<std::size_t>(o.frames));
+  impl_->T_scene_first = impl_->CameraAt(0);
+}
+
+SyntheticWorld::~SyntheticWorld() = default;
+SyntheticWorld::SyntheticWorld(SyntheticWorld&&) noexcept = default;
+
+const SyntheticOptions& SyntheticWorld::Options() const { return impl_->options; }
+const PinholeCamera& SyntheticWorld::Camera() const { return impl_->camera; }
+std::size_t SyntheticWorld::Size() const { return impl_->frames; }
+double SyntheticWorld::Stamp(std::size_t i) const { return impl_->StampOf(i); }
+double SyntheticWorld::LapLength() const { return impl_->Way().Length(); }
+std::size_t SyntheticWorld::FramesPerLap() const {
+  return static_cast<std::size_t>(impl_->Way().LapTime() * impl_->options.rate_hz);
+}
+
+Pose SyntheticWorld::PoseOf(std::size_t i) const {
+  if (i == 0) return Pose();
+  return impl_->T_scene_first.Inverse() * impl_->CameraAt(Stamp(i));
+}
+
+Trajectory SyntheticWorld::GroundTruth() const {
+  Trajectory out;
+  for (std::size_t i = 0; i < Size(); ++i) out.push_back({Stamp(i), PoseOf(i)});
+  return out;
+}
+
+SyntheticFrame SyntheticWorld::Render(std::size_t i) const {
+  const SyntheticOptions& o = impl_->options;
+  SyntheticFrame frame;
+  frame.stamp_s = Stamp(i);
+  frame.T_world_camera = PoseOf(i);
+  const synthetic::Rendering left = impl_->View(frame.stamp_s, 0, true);
+  frame.image = impl_->Sense(left.image, 2 * i);
+  if (o.sensor == SyntheticSensor::kStereo) {
+    frame.right = impl_->Sense(impl_->View(frame.stamp_s, o.baseline_m, true).image, 2 * i + 1);
+  }
+  if (o.sensor == SyntheticSensor::kRgbd) {
+    frame.depth_m = left.depth_m;
+    if (o.kinect_noise) impl_->DepthNoise(frame.depth_m, i);
+    const float limit = static_cast<float>(std::min(o.max_depth_m, 65535.0 / o.depth_units_per_m));
+    frame.depth_m.setTo(0, frame.depth_m > limit);
+  }
+  return frame;
+}
+
+cv::Mat SyntheticWorld::ExactDepth(std::size_t i) const { return impl_->View(Stamp(i), 0, false).depth_m; }
+
+}  // namespace tutti

@@ -1,0 +1,52 @@
+// A deterministic synthetic world for tests, demos and benchmarks: images, depth and exact poses, no
+// download.
+#pragma once
+
+#include <memory>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "synthetic_options.h"
+#include "tutti/core/camera.h"
+#include "tutti/core/trajectory.h"
+
+namespace tutti {
+
+/// One rendered frame. The same as what is written to disk, except that depth is not rounded to 16 bit.
+struct SyntheticFrame {
+  double stamp_s = 0;
+  cv::Mat image;        ///< CV_8UC1
+  cv::Mat right;        ///< stereo: CV_8UC1; else empty
+  cv::Mat depth_m;      ///< RGB-D: CV_32FC1, z [m], 0 = not measured; else empty
+  Pose T_world_camera;  ///< left camera at the middle of the exposure; world = camera of frame 0
+};
+
+/// A town or a room with a camera moving through it. Immutable after construction: Render() may be called
+/// from several threads.
+class SyntheticWorld {
+ public:
+  /// Throws InputError for options that are not usable.
+  explicit SyntheticWorld(const SyntheticOptions& options);
+  ~SyntheticWorld();
+  SyntheticWorld(SyntheticWorld&&) noexcept;
+
+  const SyntheticOptions& Options() const;  ///< resolved: without zeros that mean "default"
+  const PinholeCamera& Camera() const;  ///< of the left image; the right camera is baseline_m along its +x
+  std::size_t Size() const;
+  double Stamp(std::size_t i) const;
+  Pose PoseOf(std::size_t i) const;  ///< T_world_camera
+  Trajectory GroundTruth() const;
+  double LapLength() const;  ///< [m]
+  std::size_t FramesPerLap() const;
+
+  /// Renders frame i < Size().
+  SyntheticFrame Render(std::size_t i) const;
+  /// Exact z depth of frame i without noise, limits or moving blur (CV_32FC1 [m], 0 = nothing), for tests.
+  cv::Mat ExactDepth(std::size_t i) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace tutti

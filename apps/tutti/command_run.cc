@@ -1,5 +1,95 @@
+// tutti run: SLAM on a data set.
+#include <cstdio>
+#include <memory>
+#include <string>
+
 #include "commands.h"
+#include "tutti/core/error.h"
+#include "tutti/pipeline/config.h"
+#include "tutti/pipeline/outputs.h"
+#include "tutti/pipeline/runner.h"
 
 namespace tutti::cli {
-void AddRunCommand(CLI::App&, int&) {}
+namespace {
+
+struct RunArguments {
+  std::string config, dataset, out, ground_truth;
+  bool no_loops = false, quiet = false, help_config = false;
+  std::uint64_t seed = 1;
+  int threads = 2;
+  std::int64_t max_frames = 0;
+};
+
+void Require(const std::string& value, const char* option, const char* what) {
+  if (value.empty()) throw InputError(std::string("run: ") + option + " is missing; it names " + what);
+}
+
+// 130: ended by Ctrl-C, as shells say it; 1: no frame has a pose.
+int ExitCode(const RunResult& result, const std::string& out) {
+  if (result.interrupted) {
+    std::fprintf(stderr, "tutti: interrupted; what there was by then is in %s\n", out.c_str());
+    return 130;
+  }
+  if (result.frames_total > 0 && result.bad.size() == result.frames_total) {
+    std::fprintf(stderr, "tutti: the run is void: not one frame could be read; the first: %s\n",
+                 result.bad.front().error.c_str());
+    return 1;
+  }
+  if (result.Void()) {
+    const std::string reason = result.lost.empty() ? std::string("no frames") : result.lost.back().reason;
+    std::fprintf(
+        stderr,
+        "tutti: the run is void: no frame has a pose (%s); check the calibration and that the camera moves\n",
+        reason.c_str());
+    return 1;
+  }
+  return 0;
+}
+
+int Run(const CLI::App& command, const RunArguments& arguments) {
+  if (arguments.help_config) {
+    std::fputs(HelpConfig().c_str(), stdout);
+    return 0;
+  }
+  Require(arguments.config, "--config", "a YAML file, for example data/configs/tum_fr1_rgbd.yaml");
+  Require(arguments.dataset, "--dataset", "the data set's folder or a video file");
+  Require(arguments.out, "--out", "the folder for the results");
+  RunRequest request;
+  request.config = arguments.config;
+  request.dataset = arguments.dataset;
+  request.out = arguments.out;
+  request.no_loops = arguments.no_loops;
+  request.quiet = arguments.quiet;
+  if (!arguments.ground_truth.empty()) request.ground_truth = arguments.ground_truth;
+  if (command.count("--seed") > 0) request.seed = arguments.seed;
+  if (command.count("--threads") > 0) request.threads = arguments.threads;
+  if (command.count("--max-frames") > 0) request.max_frames = arguments.max_frames;
+  const RunResult result = RunSlam(request);
+  std::fputs(ResultTable(result).c_str(), stdout);
+  std::printf("\n  results are in %s\n", arguments.out.c_str());
+  return ExitCode(result, arguments.out);
+}
+
+}  // namespace
+
+void AddRunCommand(CLI::App& app, int& exit_code) {
+  CLI::App* command = app.add_subcommand("run", "visual SLAM on a data set: trajectories, loops, summary");
+  const auto arguments = std::make_shared<RunArguments>();
+  command->add_option("--config", arguments->config,
+                      "YAML file (data/configs has one for each public data set)");
+  command->add_option("--dataset", arguments->dataset, "folder of the data set, or a video file");
+  command->add_option("--out", arguments->out, "folder for the results");
+  command->add_option(
+      "--ground-truth", arguments->ground_truth,
+      "trajectory to evaluate against (default: the data set's own, if it has one; 'none': don't)");
+  command->add_flag("--no-loops", arguments->no_loops, "odometry alone");
+  command->add_option("--seed", arguments->seed, "of everything that draws random numbers");
+  command->add_option("--threads", arguments->threads, "most threads; the result is the same for any number");
+  command->add_option("--max-frames", arguments->max_frames, "the first frames only");
+  command->add_flag("--quiet", arguments->quiet, "no progress and no notes");
+  command->add_flag("--help-config", arguments->help_config,
+                    "print all keys of the configuration with their defaults");
+  command->callback([command, arguments, &exit_code] { exit_code = Run(*command, *arguments); });
+}
+
 }  // namespace tutti::cli

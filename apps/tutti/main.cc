@@ -1,13 +1,16 @@
 // tutti: visual SLAM with an ensemble of Bayesian loop-closure filters. Parses, calls, prints.
 #include <cstdio>
 #include <exception>
+#include <string>
 
 #include "commands.h"
 #include "tutti/core/error.h"
+#include "tutti/pipeline/version.h"
 
 int main(int argc, char** argv) {
   CLI::App app{"tutti: visual SLAM with an ensemble of Bayesian loop-closure filters", "tutti"};
   app.require_subcommand(1);
+  app.set_version_flag("--version", std::string("tutti ") + tutti::kVersion);
   int exit_code = 0;
   tutti::cli::AddRunCommand(app, exit_code);
   tutti::cli::AddEvaluateCommand(app, exit_code);

@@ -1,0 +1,45 @@
+// What became of one proposed loop, from the detector's first suspicion to its edge in the pose graph.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tutti/backend/pose_graph.h"
+#include "tutti/loopclosure/detector.h"
+
+namespace tutti {
+
+/// A loop as an edge between two keyframes of the odometry.
+struct LoopEdge {
+  int candidate = -1;                ///< keyframe id, the older one
+  int query = -1;                    ///< keyframe id, the newer one
+  std::int64_t candidate_frame = 0;  ///< their input frames
+  std::int64_t query_frame = 0;
+  Similarity S_candidate_query;                 ///< maps points of the query camera into the candidate camera
+  Matrix7d information = Matrix7d::Identity();  ///< of (translation, rotation, log scale)
+  double depth = 1;        ///< median scene depth in the candidate's keyframe [m, mono: map units]
+  std::size_t record = 0;  ///< index of its LoopRecord
+};
+
+/// One line of loops.csv. Only proposed loops (hypothesis above the detector's threshold) get one.
+struct LoopRecord {
+  std::int64_t query = -1;      ///< 0-based index of the input frame
+  std::int64_t candidate = -1;  ///< the same
+  double query_stamp_s = 0;
+  double candidate_stamp_s = 0;
+  std::vector<MemberOpinion> members;
+  double hypothesis = 0;  ///< of the ensemble: 1 - p(new place)
+  double posterior = 0;   ///< of the ensemble at its best location
+  int matches = 0, inliers = 0;
+  bool verified = false;                        ///< passed the detector's geometric verification
+  bool accepted = false;                        ///< in the pose graph in the end
+  bool pending = false;                         ///< waits for a second loop that agrees
+  std::string reason;                           ///< why it is not accepted, in plain words
+  std::optional<Similarity> S_candidate_query;  ///< the constraint, if one could be computed
+  bool has_scale = false;                       ///< false: rotation and unit direction only
+};
+
+}  // namespace tutti

@@ -1,0 +1,37 @@
+// The progress line of a long run: on a terminal one line that updates, else a line about every tenth.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdio>
+#include <string>
+
+namespace tutti {
+
+/// Writes to `out` (stderr by default; nullptr: silent). Never part of a result.
+class Progress {
+ public:
+  Progress(std::string title, std::size_t total, std::FILE* out = stderr);
+  ~Progress();
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+
+  /// `done` of `total` frames; `status` is free text (state, loops).
+  void Update(std::size_t done, const std::string& status);
+  /// A message above the progress line.
+  void Note(const std::string& message);
+  void Finish();
+
+ private:
+  std::string Line(std::size_t done, const std::string& status) const;
+
+  std::string title_;
+  std::size_t total_;
+  std::FILE* out_;
+  bool terminal_ = false;
+  bool line_open_ = false;
+  std::size_t next_tenth_ = 1;
+  std::chrono::steady_clock::time_point begin_, last_;
+};
+
+}  // namespace tutti

@@ -1,0 +1,65 @@
+// Visual SLAM in one class: odometry, ensemble loop closure, pose graph.
+//
+//   SlamSystem slam(config, dataset->Rig());
+//   for (each frame) slam.Track(frame);
+//   slam.Finish();
+//   slam.odometry()->FrameTrajectory();
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tutti/backend/pose_graph.h"
+#include "tutti/frontend/odometry.h"
+#include "tutti/pipeline/config.h"
+#include "tutti/pipeline/loop_record.h"
+
+namespace tutti {
+
+/// The pipeline. The odometry runs on the caller's thread, the loop detector on one of its own; what it finds
+/// enters the map a fixed number of frames after its keyframe (run.loop_delay_frames), so the result does not
+/// depend on the number of threads or on the machine's load. Without calibration only the detector runs
+/// (appearance only).
+class SlamSystem {
+ public:
+  /// Throws InputError if the configuration does not fit the rig.
+  SlamSystem(const RunConfig& config, const CameraRig& rig);
+  ~SlamSystem();
+  SlamSystem(const SlamSystem&) = delete;
+  SlamSystem& operator=(const SlamSystem&) = delete;
+
+  /// Tracks the next frame and brings in the loops that are due. Never throws for hard images.
+  TrackResult Track(const InputFrame& frame);
+  /// After the last frame: brings in the loops that are still on their way.
+  void Finish();
+
+  /// True if the rig has no calibration: there are loops but no poses.
+  bool AppearanceOnly() const;
+  /// The odometry with all corrections; nullptr if there are only appearances.
+  const Odometry* odometry() const;
+  /// The odometry as it was before the first correction, to be tracked on by whoever wants to know what it
+  /// would have done alone; nullptr if no loop moved the map.
+  Odometry* untouched();
+  /// Index of the first input frame that untouched() has not seen.
+  std::int64_t UntouchedNext() const;
+
+  /// Every proposed loop in the order of the queries.
+  const std::vector<LoopRecord>& loops() const;
+  std::size_t LoopsAccepted() const;
+  /// How often the map was moved.
+  int Corrections() const;
+  /// Keyframes, odometry edges and accepted loops at the present poses.
+  PoseGraph Graph() const;
+  /// Milliseconds spent, summed, by stage; the detector's run beside the odometry's.
+  std::map<std::string, double> StageMilliseconds() const;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace tutti

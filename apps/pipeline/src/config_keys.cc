@@ -1,0 +1,248 @@
+// Every key of the configuration: its name, what it means, and the field behind it. A test compares this
+// table with the option structs' headers, so a field without a key does not pass.
+#include "config_table.h"
+#include "tutti/core/error.h"
+
+namespace tutti {
+
+template <typename Enum>
+void ConfigTable::AddEnum(const char* name, Enum& field, EnumNames<Enum> names, const char* doc) {
+  Push(
+      name, doc,
+      [&field, names](const YAML::Node& node) -> std::string {
+        std::string valid;
+        for (const auto& [word, value] : names) {
+          if (node.IsScalar() && node.Scalar() == word) {
+            field = value;
+            return "";
+          }
+          valid += (valid.empty() ? "" : ", ") + word;
+        }
+        return (node.IsScalar() ? "'" + node.Scalar() + "' is not one of " : "needs one of ") + valid;
+      },
+      [&field, names]() -> std::string {
+        for (const auto& [word, value] : names) {
+          if (value == field) return word;
+        }
+        return "?";
+      });
+}
+
+ConfigTable::ConfigTable(RunConfig& config) {
+  AddDataset(config.dataset);
+  AddCamera(config.dataset);
+  AddOdometry(config.odometry);
+  AddLoops(config.loops);
+  AddExtraction(config.loops.extraction);
+  AddVocabulary(config.loops.vocabulary);
+  AddVerification(config.loops.verification);
+  AddGraph(config.graph);
+  AddRun(config.run);
+}
+
+void ConfigTable::AddDataset(DatasetOptions& o) {
+  section_ = "dataset";
+  AddEnum("type", o.type,
+          {{"auto", DatasetType::kAuto},
+           {"kitti", DatasetType::kKitti},
+           {"tum", DatasetType::kTum},
+           {"euroc", DatasetType::kEuroc},
+           {"images", DatasetType::kImages},
+           {"video", DatasetType::kVideo}},
+          "layout on disk: auto, kitti, tum, euroc, images, video");
+  AddEnum("sensor", o.sensor, {{"mono", Sensor::kMono}, {"stereo", Sensor::kStereo}, {"rgbd", Sensor::kRgbd}},
+          "mono, stereo or rgbd");
+  Add("depth_units_per_m", o.depth_units_per_m, "RGB-D: value in the depth image of one metre");
+  Add("max_depth_m", o.max_depth_m, "RGB-D: farther depth is not used [m]; 0: no limit");
+  Add("max_association_s", o.max_association_s, "TUM: greatest time difference of colour and depth [s]");
+  Add("rate_hz", o.rate_hz, "frame rate where the data has no time stamps [1/s]; 0: 10 Hz or the video's");
+  Add("stride", o.stride, "use every stride-th frame");
+  Add("mirrored_ground_truth", o.mirrored_ground_truth, "the ground truth has its y axis up (ICL-NUIM)");
+}
+
+void ConfigTable::AddCamera(DatasetOptions& o) {
+  section_ = "camera";
+  PinholeCamera& c = *o.camera;
+  Add("width", c.width, "image width [px]");
+  Add("height", c.height, "image height [px]");
+  Add("fx", c.fx, "focal length [px]");
+  Add("fy", c.fy, "focal length [px]");
+  Add("cx", c.cx, "principal point [px]; the centre of the top-left pixel is (0, 0)");
+  Add("cy", c.cy, "principal point [px]");
+  AddEnum("distortion", c.distortion,
+          {{"none", Distortion::kNone},
+           {"radtan", Distortion::kRadTan},
+           {"equidistant", Distortion::kEquidistant}},
+          "lens model: none, radtan, equidistant");
+  Add("coefficients", c.coefficients, "radtan: k1 k2 p1 p2 k3; equidistant: k1 k2 k3 k4");
+  Add("baseline_m", o.baseline_m, "stereo: distance of the cameras where the data does not say it [m]");
+}
+
+void ConfigTable::AddOdometry(OdometryOptions& o) {
+  section_ = "odometry";
+  Add("features", o.features, "ORB features per image");
+  Add("pyramid_levels", o.pyramid_levels, "levels of the image pyramid");
+  Add("scale_factor", o.scale_factor, "size ratio between two levels, > 1");
+  Add("fast_threshold", o.fast_threshold,
+      "FAST corner threshold [grey levels], where the image has enough corners");
+  Add("fast_threshold_min", o.fast_threshold_min,
+      "FAST threshold in parts of the image where there are too few [grey levels]");
+  Add("stereo_sigma_px", o.stereo_sigma_px, "standard deviation of a disparity at pyramid level 0 [px]");
+  Add("rgbd_inverse_sigma", o.rgbd_inverse_sigma,
+      "RGB-D: standard deviation of inverse depth [1/m]; Kinect: about 0.0015 to 0.005");
+  Add("max_depth_baselines", o.max_depth_baselines,
+      "stereo: farther points are not trusted when they are new [baselines]");
+  Add("pixel_sigma", o.pixel_sigma, "standard deviation of a keypoint at pyramid level 0 [px]");
+  Add("min_inliers", o.min_inliers, "fewer landmarks that agree with the pose: the frame is lost");
+  Add("relocalize_s", o.relocalize_s, "lost for longer than this [s]: start a new piece of map");
+  Add("local_keyframes", o.local_keyframes, "keyframes whose landmarks are searched in a frame");
+  Add("keyframe_inlier_ratio", o.keyframe_inlier_ratio,
+      "new keyframe when fewer than this share of the reference's landmarks is seen, 0..1");
+  Add("keyframe_max_interval_s", o.keyframe_max_interval_s,
+      "new keyframe at the latest after this time, if the camera moved [s]");
+  Add("keyframe_min_frames", o.keyframe_min_frames,
+      "at least this many frames between keyframes (unless tracking gets weak)");
+  Add("triangulation_neighbours", o.triangulation_neighbours,
+      "mono: keyframes with which new landmarks are triangulated");
+  Add("min_parallax_deg", o.min_parallax_deg, "mono initialisation: median parallax [deg]");
+  Add("ba_keyframes", o.ba_keyframes, "keyframes that local bundle adjustment moves");
+  Add("ba_fixed_keyframes", o.ba_fixed_keyframes, "keyframes that hold the window in place");
+  Add("ba_iterations", o.ba_iterations, "most iterations of a local bundle adjustment");
+  Add("seed", o.seed, "of RANSAC");
+}
+
+void ConfigTable::AddLoops(LoopDetectorOptions& o) {
+  section_ = "loops";
+  Push(
+      "rule", "mean, product, majority, naive over the members, or one member's name for that member alone",
+      [&o](const YAML::Node& node) -> std::string {
+        try {
+          SetRule(node.IsScalar() ? node.Scalar() : "", o);
+        } catch (const InputError& e) {
+          return e.what();
+        }
+        return "";
+      },
+      [&o] { return RuleName(o); });
+  Add("members", o.members, "members of the ensemble: surf, sift, orb, akaze, brisk");
+  AddEnum("likelihood", o.likelihood,
+          {{"similarity", LikelihoodKind::kSimilarity}, {"tfidf", LikelihoodKind::kTfIdf}},
+          "how signatures are compared: similarity (2013) or tfidf");
+  Add("loop_threshold", o.loop_threshold, "go to verification at H >= this, 0..1");
+  Add("stm_size", o.stm_size, "locations in short-term memory, no candidates");
+  Add("threads", o.threads, "most threads that Detect uses at once");
+  Add("seed", o.seed, "of kd-forests and RANSAC how signatures are compared");
+  Add("bad_signature_ratio", o.bad_signature_ratio,
+      "a member sits out below this share of its mean number of features, 0..1");
+  Add("virtual_place_prior", o.virtual_place_prior, "p(new place | new place), 0..1");
+  Add("rehearsal", o.rehearsal, "merge a location into its predecessor when they look the same");
+  Add("rehearsal_similarity", o.rehearsal_similarity, "similarity from which on they do, 0..1");
+  Add("keep_posterior", o.keep_posterior,
+      "fill LoopResult::posterior_by_location (costs O(locations) per image) features words geometry Empty "
+      "if usable, else what is wrong and what to do.");
+}
+
+void ConfigTable::AddExtraction(ExtractionOptions& o) {
+  section_ = "loops.extraction";
+  Add("features", o.features, "strongest features kept per member and image, spread over the image");
+  Add("grid_columns", o.grid_columns,
+      "cells over which they are spread, along the longer side; 1: no spreading");
+  Add("max_pixels", o.max_pixels, "images with more pixels are scaled down before anything else [px]");
+  Add("surf_octaves", o.surf_octaves, "octaves of the Hessian pyramid (the paper's 4)");
+  Add("surf_threshold", o.surf_threshold,
+      "determinant of Hessian below which a SURF point is dropped (dlib's scale)");
+  Add("sift_max_pixels", o.sift_max_pixels,
+      "SIFT sees the image halved until it has at most this many pixels [px]");
+  Add("sift_contrast", o.sift_contrast, "contrast threshold of SIFT (OpenCV's own default is 0.04)");
+  Add("orb_fast_threshold", o.orb_fast_threshold,
+      "FAST threshold of ORB [grey levels of 255]");
+}
+
+void ConfigTable::AddVocabulary(VocabularyOptions& o) {
+  section_ = "loops.vocabulary";
+  Add("nndr", o.nndr,
+      "a descriptor is an old word if d1 <= nndr * d2; on TRUE distance, not on FLANN's squared one");
+  Add("trees", o.trees, "kd-trees of the FLANN index (float descriptors)");
+  Add("checks", o.checks, "leaves visited per search (float descriptors)");
+  Add("hash_tables", o.hash_tables,
+      "hash tables of the Hamming index (binary descriptors)"
+      "do.");
+}
+
+void ConfigTable::AddVerification(VerificationOptions& o) {
+  section_ = "loops.verification";
+  Add("enabled", o.enabled, "false: every proposal is accepted as it is, without a constraint");
+  Add("max_hypotheses", o.max_hypotheses, "separate places tried, best posterior first");
+  Add("neighbours", o.neighbours, "graph levels around each place that are tried as well; 0: none");
+  Add("match_ratio", o.match_ratio, "Lowe's ratio test, on true distance");
+  Add("min_inliers", o.min_inliers, "fewer inliers than this are no loop");
+  Add("min_inlier_ratio", o.min_inlier_ratio, "inliers / matches, 0..1");
+  Add("min_spread", o.min_spread, "rms extent of the inliers over the image, as share of its diagonal");
+  Add("reprojection_px", o.reprojection_px, "RANSAC threshold of PnP, Sim(3) [px]");
+  Add("epipolar_px", o.epipolar_px, "RANSAC threshold of the essential and fundamental matrix [px]");
+  Add("confidence", o.confidence, "of RANSAC");
+  Add("max_iterations", o.max_iterations, "of RANSAC");
+  Add("pixel_sigma", o.pixel_sigma,
+      "standard deviation of a matched pixel, sets the information matrix [px]");
+  Add("min_depth_m", o.min_depth_m, "depths outside of the range count as unknown [m]");
+  Add("max_depth_m", o.max_depth_m, "[m]");
+}
+
+void ConfigTable::AddGraph(PoseGraphOptions& o) {
+  section_ = "graph";
+  AddEnum("objective", o.objective, {{"chi2", GraphObjective::kChi2}, {"chi2log", GraphObjective::kChi2Log}},
+          "rotation error as vector part of the quaternion (chi2) or as rotation vector (chi2log)");
+  AddEnum("robust", o.robust,
+          {{"none", RobustLoss::kNone},
+           {"huber", RobustLoss::kHuber},
+           {"dcs", RobustLoss::kDcs},
+           {"gnc", RobustLoss::kGnc}},
+          "loss on loop edges: none, huber, dcs, gnc");
+  Add("robust_chi2", o.robust_chi2, "chi-square beyond which a loop is doubted; 0: its 99 % quantile");
+  AddEnum("init", o.init,
+          {{"auto", GraphInit::kAuto},
+           {"file", GraphInit::kFile},
+           {"odometry", GraphInit::kOdometry},
+           {"chordal", GraphInit::kChordal}},
+          "start from the present poses (file), odometry, chordal relaxation, or the best of them (auto)");
+  Add("max_iterations", o.max_iterations, "of Levenberg-Marquardt");
+  Add("function_tolerance", o.function_tolerance,
+      "stop when an iteration lowers the cost by less than this share");
+  Add("gnc_step", o.gnc_step, "gnc: growth of the convexity parameter per round, > 1");
+  Add("gnc_max_rounds", o.gnc_max_rounds, "gnc: most rounds");
+  Add("max_time_s", o.max_time_s, "stop after this time [s]; 0: no limit (a limit is not reproducible)");
+  Add("seed", o.seed, "nothing is random so far");
+}
+
+void ConfigTable::AddRun(SlamOptions& o) {
+  section_ = "run";
+  Add("loops", o.loops, "search for loops and close them");
+  Add("threads", o.threads, "most threads; the result is the same for any number");
+  Add("loop_delay_frames", o.loop_delay_frames, "a detection enters this many frames after its keyframe");
+  Add("loop_every_keyframes", o.loop_every_keyframes, "every n-th keyframe is searched");
+  Add("loop_min_interval_s", o.loop_min_interval_s, "and no more often than this [s]");
+  Add("loop_min_age_s", o.loop_min_age_s,
+      "a candidate that is not this much older than the query is no loop [s]");
+  Add("loop_confirmations", o.loop_confirmations,
+      "loops that must agree before the map moves; 1: trust each alone");
+  Add("loop_confirmation_frames", o.loop_confirmation_frames, "and lie at most this many input frames apart");
+  Add("loop_agree_fraction", o.loop_agree_fraction, "they agree within this share of the median scene depth");
+  Add("loop_agree_deg", o.loop_agree_deg, "and within this angle [deg]");
+  Add("loop_agree_scale", o.loop_agree_scale, "mono: and within this |log of the scale ratio|");
+  Add("loop_after_fraction", o.loop_after_fraction,
+      "a loop that is off by more than this share of the median scene depth after optimisation is taken out");
+  Add("loop_after_deg", o.loop_after_deg, "the same for the angle [deg]");
+  Add("covisibility_min_shared", o.covisibility_min_shared,
+      "shared landmarks that make an edge in the pose graph");
+  Add("odometry_sigma_deg", o.odometry_sigma_deg, "standard deviation of an odometry edge's rotation [deg]");
+  Add("odometry_sigma_fraction", o.odometry_sigma_fraction, "of its translation, as a share of its length");
+  Add("odometry_sigma_scale", o.odometry_sigma_scale, "mono: of log(scale)");
+  Add("loop_sigma_deg", o.loop_sigma_deg, "least standard deviation of a loop's rotation [deg]");
+  Add("loop_sigma_fraction", o.loop_sigma_fraction,
+      "of its translation, as a share of the median scene depth");
+  Add("loop_sigma_scale", o.loop_sigma_scale, "mono: of log(scale)");
+  Add("odometry_pass", o.odometry_pass,
+      "after a correction, track the rest again without it for trajectory_odometry.txt");
+}
+
+}  // namespace tutti

@@ -1,0 +1,67 @@
+#include "loop_worker.h"
+
+#include <chrono>
+#include <utility>
+
+namespace tutti {
+
+LoopWorker::LoopWorker(const LoopDetectorOptions& options, bool own_thread) : detector_(options) {
+  if (own_thread) thread_ = std::thread(&LoopWorker::Work, this);
+}
+
+LoopWorker::~LoopWorker() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    stop_ = true;
+  }
+  changed_.notify_all();
+  if (thread_.joinable()) thread_.join();
+}
+
+LoopWorker::Outcome LoopWorker::Detect(const LoopQuery& query) {
+  Outcome outcome;
+  try {
+    outcome.result = detector_.Detect(query);
+  } catch (...) {
+    outcome.failure = std::current_exception();
+  }
+  return outcome;
+}
+
+void LoopWorker::Work() {
+  std::unique_lock<std::mutex> lock(mutex_);
+  while (true) {
+    changed_.wait(lock, [this] { return stop_ || !queries_.empty(); });
+    if (stop_) return;
+    const LoopQuery query = std::move(queries_.front());
+    queries_.pop_front();
+    lock.unlock();
+    Outcome outcome = Detect(query);
+    lock.lock();
+    outcomes_.push_back(std::move(outcome));
+    changed_.notify_all();
+  }
+}
+
+void LoopWorker::Submit(LoopQuery query) {
+  if (!thread_.joinable()) {
+    outcomes_.push_back(Detect(query));
+    return;
+  }
+  const std::lock_guard<std::mutex> lock(mutex_);
+  queries_.push_back(std::move(query));
+  changed_.notify_all();
+}
+
+LoopResult LoopWorker::Take() {
+  const auto begin = std::chrono::steady_clock::now();
+  std::unique_lock<std::mutex> lock(mutex_);
+  changed_.wait(lock, [this] { return !outcomes_.empty(); });
+  Outcome outcome = std::move(outcomes_.front());
+  outcomes_.pop_front();
+  waited_ms_ += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
+  if (outcome.failure) std::rethrow_exception(outcome.failure);
+  return std::move(outcome.result);
+}
+
+}  // namespace tutti

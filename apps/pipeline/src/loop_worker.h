@@ -1,0 +1,47 @@
+// Runs the loop-closure detector beside the odometry: queries go in and results come out in the same order.
+#pragma once
+
+#include <condition_variable>
+#include <deque>
+#include <exception>
+#include <mutex>
+#include <thread>
+
+#include "tutti/loopclosure/detector.h"
+
+namespace tutti {
+
+/// With `own_thread` the detector works on a thread of its own, else within Submit(); the results are the
+/// same.
+class LoopWorker {
+ public:
+  LoopWorker(const LoopDetectorOptions& options, bool own_thread);
+  ~LoopWorker();
+  LoopWorker(const LoopWorker&) = delete;
+  LoopWorker& operator=(const LoopWorker&) = delete;
+
+  void Submit(LoopQuery query);
+  /// The result of the oldest query that was not taken yet; waits for it. Rethrows what the detector threw.
+  LoopResult Take();
+  /// Milliseconds that Take() has waited so far.
+  double WaitedMs() const { return waited_ms_; }
+
+ private:
+  struct Outcome {
+    LoopResult result;
+    std::exception_ptr failure;
+  };
+  void Work();
+  Outcome Detect(const LoopQuery& query);
+
+  LoopDetector detector_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<LoopQuery> queries_;  // guarded by mutex_
+  std::deque<Outcome> outcomes_;   // guarded by mutex_
+  bool stop_ = false;              // guarded by mutex_
+  double waited_ms_ = 0;           // of the caller's thread only
+  std::thread thread_;             // last: starts when everything else is there
+};
+
+}  // namespace tutti

@@ -1,1 +1,0 @@
-#include "tutti/frontend/odometry.h"

@@ -1,0 +1,114 @@
+#include "run_evaluation.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "tutti/backend/evaluation.h"
+#include "tutti/core/error.h"
+
+namespace tutti {
+namespace {
+
+constexpr double kMaxDifference = 0.01;        // of time stamps [s], as evo
+constexpr double kMaxGap = 0.2;                // between reference poses to interpolate [s]
+constexpr double kMonoFalseDistance = 10.0;    // [m]
+constexpr double kMetricFalseDistance = 0.20;  // [m]
+constexpr double kMetricFalseAngle = 8.0;      // [deg]
+constexpr double kDegrees = 57.29577951308232;
+
+TrajectoryScore Score(const Trajectory& reference, const Trajectory& estimate, bool with_scale) {
+  TrajectoryScore score;
+  if (estimate.empty()) {
+    score.reason = "no frame has a pose";
+    return score;
+  }
+  EvaluationOptions options;
+  options.alignment = with_scale ? TrajectoryAlignment::kSim3 : TrajectoryAlignment::kSE3;
+  options.max_time_difference_s = kMaxDifference;
+  try {
+    const EvaluationReport report = EvaluateTrajectory(reference, estimate, options);
+    score.valid = true;
+    score.poses = report.pairs;
+    score.alignment = report.S_reference_estimate;
+    score.scale = score.alignment.scale;
+    score.ate = report.ate;
+    score.ate_rotation = report.ate_rotation;
+    score.rpe = report.rpe;
+    score.kitti = report.kitti;
+  } catch (const InputError& e) {
+    score.reason = e.what();
+  }
+  return score;
+}
+
+enum class Verdict { kTrue, kFalse, kUnknown };
+
+Verdict Judge(const LoopRecord& loop, const Trajectory& reference, const CameraRig& rig) {
+  const std::optional<Pose> candidate = PoseAt(reference, loop.candidate_stamp_s);
+  const std::optional<Pose> query = PoseAt(reference, loop.query_stamp_s);
+  if (!candidate || !query) return Verdict::kUnknown;
+  if (rig.sensor == Sensor::kMono || !loop.S_candidate_query) {
+    const double distance = (candidate->translation - query->translation).norm();
+    return distance > kMonoFalseDistance ? Verdict::kFalse : Verdict::kTrue;
+  }
+  const Pose T_candidate_query = (*candidate * rig.T_body_camera).Inverse() * (*query * rig.T_body_camera);
+  const Pose difference = T_candidate_query.Inverse() * loop.S_candidate_query->RigidPart();
+  const bool wrong = difference.translation.norm() > kMetricFalseDistance ||
+                     difference.Angle() * kDegrees > kMetricFalseAngle;
+  return wrong ? Verdict::kFalse : Verdict::kTrue;
+}
+
+}  // namespace
+
+std::optional<Pose> PoseAt(const Trajectory& reference, double stamp_s) {
+  const auto after = std::lower_bound(reference.begin(), reference.end(), stamp_s,
+                                      [](const StampedPose& a, double stamp) { return a.stamp_s < stamp; });
+  if (after != reference.end() && std::abs(after->stamp_s - stamp_s) < 1e-6) return after->pose;
+  if (after != reference.begin() && std::abs(std::prev(after)->stamp_s - stamp_s) < 1e-6)
+    return std::prev(after)->pose;
+  if (after == reference.begin() || after == reference.end()) return std::nullopt;
+  const StampedPose &a = *std::prev(after), &b = *after;
+  const double gap = b.stamp_s - a.stamp_s;
+  if (gap > kMaxGap) return std::nullopt;
+  const double share = (stamp_s - a.stamp_s) / gap;
+  return Pose(a.pose.rotation.slerp(share, b.pose.rotation),
+              (1 - share) * a.pose.translation + share * b.pose.translation);
+}
+
+void EvaluateRun(const Trajectory& reference, const std::string& file, RunResult& result) {
+  RunEvaluation evaluation;
+  const bool mono = result.rig.sensor == Sensor::kMono;
+  evaluation.file = file;
+  evaluation.alignment = mono ? "sim3" : "se3";
+  if (!result.appearance_only) {
+    evaluation.slam = Score(reference, result.trajectory, mono);
+    evaluation.odometry = Score(reference, result.trajectory_odometry, mono);
+  }
+  if (!result.trajectory.empty()) {
+    const double first = result.trajectory.front().stamp_s, last = result.trajectory.back().stamp_s;
+    for (const StampedPose& pose : reference) {
+      if (pose.stamp_s < first - kMaxDifference || pose.stamp_s > last + kMaxDifference) continue;
+      if (!result.reference.empty()) {
+        evaluation.path_m += (pose.pose.translation - result.reference.back().pose.translation).norm();
+      }
+      result.reference.push_back(pose);
+    }
+  }
+  for (const LoopRecord& loop : result.loops) {
+    if (!loop.accepted) continue;
+    switch (Judge(loop, reference, result.rig)) {
+      case Verdict::kTrue:
+        ++evaluation.loops_true;
+        break;
+      case Verdict::kFalse:
+        ++evaluation.loops_false;
+        break;
+      case Verdict::kUnknown:
+        ++evaluation.loops_unknown;
+        break;
+    }
+  }
+  result.evaluation = evaluation;
+}
+
+}  // namespace tutti

@@ -1,0 +1,301 @@
+#include "tutti/pipeline/slam_system.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <deque>
+#include <utility>
+
+#include "loop_constraint.h"
+#include "loop_gate.h"
+#include "loop_worker.h"
+#include "map_graph.h"
+
+namespace tutti {
+namespace {
+
+double MillisecondsSince(std::chrono::steady_clock::time_point begin) {
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
+}
+
+LoopDetectorOptions DetectorOptions(const RunConfig& config) {
+  LoopDetectorOptions options = config.loops;
+  options.threads = std::min(options.threads, config.run.threads);
+  return options;
+}
+
+}  // namespace
+
+class SlamSystem::Impl {
+ public:
+  Impl(const RunConfig& config, const CameraRig& rig)
+      : options_(config.run),
+        rig_(rig),
+        seed_(config.loops.seed),
+        gate_(config.run),
+        graph_(config.graph, config.run, rig.sensor) {
+    if (rig.calibrated) odometry_.emplace(config.odometry, rig);
+    if (config.run.loops)
+      worker_ = std::make_unique<LoopWorker>(DetectorOptions(config), config.run.threads > 1);
+  }
+
+  TrackResult Track(const InputFrame& frame) {
+    while (!submitted_.empty() && submitted_.front().due <= frames_) Deliver(frame.index);
+    ++frames_;
+    TrackResult result;
+    if (odometry_) {
+      result = odometry_->Track(frame);
+      if (result.keyframe >= 0)
+        graph_.AddKeyframe(result.keyframe, odometry_->KeyframePiece(result.keyframe));
+    } else {
+      result.reason = "no calibration";
+    }
+    if (worker_ && (result.keyframe >= 0 || !odometry_)) Submit(frame, result.keyframe);
+    return result;
+  }
+
+  void Finish() {
+    while (!submitted_.empty()) Deliver(-1);
+    for (LoopRecord& record : records_) {
+      if (!record.pending) continue;
+      record.pending = false;
+      record.reason = "no second loop nearby agreed with it";
+    }
+  }
+
+  // ---- what SlamSystem hands out
+  std::optional<Odometry> odometry_, untouched_;
+  std::int64_t untouched_next_ = 0;
+  std::vector<LoopRecord> records_;
+  int corrections_ = 0;
+
+  PoseGraph Graph() const { return odometry_ ? graph_.Build(*odometry_, gate_.accepted()) : PoseGraph(); }
+
+  std::map<std::string, double> StageMilliseconds() const {
+    std::map<std::string, double> stages = stages_;
+    if (odometry_) {
+      for (const auto& [name, ms] : odometry_->StageMilliseconds()) stages["odometry_" + name] = ms;
+    }
+    if (worker_) stages["loop_wait"] = worker_->WaitedMs();
+    return stages;
+  }
+
+ private:
+  struct Submission {
+    std::int64_t due = 0;  // number of frames after which its result enters
+    std::int64_t frame = 0;
+  };
+
+  void Submit(const InputFrame& frame, int keyframe) {
+    if (keyframes_seen_++ % options_.loop_every_keyframes != 0) return;
+    if (!stamps_.empty() && frame.stamp_s - stamps_.rbegin()->second < options_.loop_min_interval_s) return;
+    LoopQuery query;
+    query.id = frame.index;
+    query.stamp_s = frame.stamp_s;
+    query.image = frame.image;
+    query.depth_m = frame.depth_m;
+    if (odometry_) {
+      KeyframeView view = odometry_->Keyframe(keyframe);
+      query.camera = rig_.camera;
+      query.features = {std::move(view.keypoints), std::move(view.descriptors), std::move(view.points)};
+      keyframe_of_frame_[frame.index] = keyframe;
+    }
+    stamps_[frame.index] = frame.stamp_s;
+    submitted_.push_back({frames_ + options_.loop_delay_frames, frame.index});
+    const auto begin = std::chrono::steady_clock::now();
+    worker_->Submit(std::move(query));
+    if (options_.threads == 1) stages_["loop_inline"] += MillisecondsSince(begin);
+  }
+
+  void AddStages(const LoopResult& r) {
+    stages_["loop_extract"] += r.extract_ms;
+    stages_["loop_quantise"] += r.quantise_ms;
+    stages_["loop_likelihood"] += r.likelihood_ms;
+    stages_["loop_filter"] += r.filter_ms;
+    stages_["loop_verify"] += r.verify_ms;
+    stages_["loop_memory"] += r.memory_ms;
+  }
+
+  static LoopRecord Record(const LoopResult& r) {
+    LoopRecord record;
+    record.query = r.query;
+    record.candidate = r.verification.candidate >= 0 ? r.verification.candidate : r.candidate;
+    record.members = r.members;
+    record.hypothesis = r.hypothesis;
+    record.posterior = r.posterior;
+    record.matches = r.verification.matches;
+    record.inliers = r.verification.inliers;
+    record.verified = r.accepted;
+    record.reason = r.reason.empty() && !r.accepted ? r.verification.reason : r.reason;
+    return record;
+  }
+
+  // Takes the oldest result. `next_frame` is the input frame that comes next, -1 after the last one.
+  void Deliver(std::int64_t next_frame) {
+    submitted_.pop_front();
+    const LoopResult result = worker_->Take();
+    AddStages(result);
+    if (!result.proposed) return;
+    LoopRecord record = Record(result);
+    const auto stamp = [&](std::int64_t frame) {
+      return stamps_.count(frame) != 0 ? stamps_.at(frame) : 0.0;
+    };
+    record.query_stamp_s = stamp(record.query);
+    record.candidate_stamp_s = stamp(record.candidate);
+    records_.push_back(record);
+    if (!result.accepted) return;
+    if (!odometry_) {
+      records_.back().accepted = true;
+    } else {
+      Consider(result, next_frame);
+    }
+  }
+
+  LoopGate::Map Places() const {
+    const std::vector<int> ids = odometry_->KeyframeIds();
+    return [this, ids](int id) {
+      LoopGate::Place place;
+      place.alive = std::binary_search(ids.begin(), ids.end(), id);
+      if (!place.alive) return place;
+      place.piece = odometry_->KeyframePiece(id);
+      place.T_world_camera = odometry_->KeyframePose(id);
+      return place;
+    };
+  }
+
+  // A verified loop: measure it against the map, and close it if something else says the same.
+  void Consider(const LoopResult& result, std::int64_t next_frame) {
+    LoopRecord& record = records_.back();
+    const auto candidate = keyframe_of_frame_.find(record.candidate),
+               query = keyframe_of_frame_.find(record.query);
+    const std::vector<int> ids = odometry_->KeyframeIds();
+    if (candidate == keyframe_of_frame_.end() || query == keyframe_of_frame_.end() ||
+        !std::binary_search(ids.begin(), ids.end(), candidate->second) ||
+        !std::binary_search(ids.begin(), ids.end(), query->second)) {
+      record.reason = "one of its keyframes is no longer in the map";
+      return;
+    }
+    if (record.query_stamp_s - record.candidate_stamp_s < options_.loop_min_age_s) {
+      record.reason = "too recent: still in the local map";
+      return;
+    }
+    LoopConstraint constraint =
+        MakeLoopConstraint(result.verification, odometry_->Keyframe(candidate->second),
+                           odometry_->Keyframe(query->second), rig_, options_, seed_);
+    if (!constraint.usable) {
+      record.reason = constraint.reason;
+      return;
+    }
+    constraint.edge.record = records_.size() - 1;
+    record.S_candidate_query = constraint.edge.S_candidate_query;
+    record.has_scale = true;
+    const std::vector<LoopEdge> entering = gate_.Offer(constraint.edge, Places());
+    if (entering.empty()) {
+      record.pending = true;
+      record.reason = "waits for a second loop that agrees";
+      return;
+    }
+    Close(entering, next_frame);
+  }
+
+  bool Contradicts(const Disagreement& d) const {
+    return d.fraction > options_.loop_after_fraction || d.angle_deg > options_.loop_after_deg;
+  }
+
+  void Reject(const LoopEdge& loop, const std::string& reason) {
+    records_[loop.record].pending = false;
+    records_[loop.record].reason = reason;
+  }
+
+  // Optimises with the entering loops; those that the rest contradicts leave again. Then the map moves.
+  void Close(std::vector<LoopEdge> entering, std::int64_t next_frame) {
+    const auto begin = std::chrono::steady_clock::now();
+    MapGraph::Correction correction;
+    while (!entering.empty()) {
+      std::vector<LoopEdge> loops = gate_.accepted();
+      loops.insert(loops.end(), entering.begin(), entering.end());
+      correction = graph_.Optimize(*odometry_, loops);
+      if (!correction.success) {
+        for (const LoopEdge& loop : entering)
+          Reject(loop, "the pose graph could not be solved: " + correction.reason);
+        entering.clear();
+        break;
+      }
+      const std::size_t old = gate_.accepted().size();
+      bool old_broken = false;
+      for (std::size_t i = 0; i < old; ++i) old_broken = old_broken || Contradicts(correction.residuals[i]);
+      std::vector<LoopEdge> staying;
+      for (std::size_t i = 0; i < entering.size(); ++i) {
+        const Disagreement& d = correction.residuals[old + i];
+        if (!old_broken && !Contradicts(d)) {
+          staying.push_back(entering[i]);
+          continue;
+        }
+        char text[160];
+        std::snprintf(
+            text, sizeof text,
+            "contradicts the map: off by %.0f %% of the scene depth and %.1f deg after optimisation",
+            100 * d.fraction, d.angle_deg);
+        Reject(entering[i], old_broken ? "contradicts loops that were accepted before" : text);
+      }
+      if (staying.size() == entering.size()) break;
+      entering = std::move(staying);
+    }
+    if (!entering.empty()) Apply(correction, entering, next_frame);
+    stages_["loop_optimize"] += MillisecondsSince(begin);
+  }
+
+  void Apply(const MapGraph::Correction& correction, const std::vector<LoopEdge>& entering,
+             std::int64_t next_frame) {
+    for (const LoopEdge& loop : entering) {
+      LoopRecord& record = records_[loop.record];
+      record.accepted = true;
+      record.pending = false;
+      record.reason.clear();
+      gate_.Accepted(loop);
+    }
+    if (!untouched_) {
+      untouched_ = *odometry_;
+      untouched_next_ = next_frame;
+    }
+    graph_.Keep(*odometry_, correction, gate_.accepted(), gate_.waiting_loops());
+    odometry_->ApplyCorrection(correction.S_world_keyframe, correction.merges);
+    ++corrections_;
+  }
+
+  SlamOptions options_;
+  CameraRig rig_;
+  std::uint64_t seed_ = 1;
+  LoopGate gate_;
+  MapGraph graph_;
+  std::unique_ptr<LoopWorker> worker_;
+  std::deque<Submission> submitted_;
+  std::map<std::int64_t, int> keyframe_of_frame_;  // of the frames that the detector knows
+  std::map<std::int64_t, double> stamps_;          // the same
+  std::int64_t frames_ = 0;
+  std::int64_t keyframes_seen_ = 0;
+  std::map<std::string, double> stages_;
+};
+
+SlamSystem::SlamSystem(const RunConfig& config, const CameraRig& rig)
+    : impl_(std::make_unique<Impl>(config, rig)) {}
+SlamSystem::~SlamSystem() = default;
+
+TrackResult SlamSystem::Track(const InputFrame& frame) { return impl_->Track(frame); }
+void SlamSystem::Finish() { impl_->Finish(); }
+bool SlamSystem::AppearanceOnly() const { return !impl_->odometry_; }
+const Odometry* SlamSystem::odometry() const { return impl_->odometry_ ? &*impl_->odometry_ : nullptr; }
+Odometry* SlamSystem::untouched() { return impl_->untouched_ ? &*impl_->untouched_ : nullptr; }
+std::int64_t SlamSystem::UntouchedNext() const { return impl_->untouched_next_; }
+const std::vector<LoopRecord>& SlamSystem::loops() const { return impl_->records_; }
+int SlamSystem::Corrections() const { return impl_->corrections_; }
+PoseGraph SlamSystem::Graph() const { return impl_->Graph(); }
+std::map<std::string, double> SlamSystem::StageMilliseconds() const { return impl_->StageMilliseconds(); }
+
+std::size_t SlamSystem::LoopsAccepted() const {
+  std::size_t count = 0;
+  for (const LoopRecord& record : impl_->records_) count += record.accepted ? 1 : 0;
+  return count;
+}
+
+}  // namespace tutti

@@ -1,0 +1,179 @@
+#include "tutti/pipeline/config.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <regex>
+#include <set>
+#include <sstream>
+
+#include "test_data.h"
+#include "tutti/core/error.h"
+
+namespace tutti {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+std::string Message(const std::string& text) {
+  try {
+    ParseConfig(text, "my.yaml");
+  } catch (const InputError& e) {
+    return e.what();
+  }
+  return "";
+}
+
+TEST(Config, EmptyFileKeepsAllDefaults) {
+  const RunConfig config = ParseConfig("", "my.yaml");
+  EXPECT_EQ(config.run.loop_delay_frames, SlamOptions().loop_delay_frames);
+  EXPECT_FALSE(config.dataset.camera.has_value());
+}
+
+TEST(Config, ReadsEverySection) {
+  const RunConfig config = ParseConfig(
+      "dataset: {sensor: stereo, type: kitti, stride: 2}\n"
+      "camera: {width: 640, height: 480, fx: 520, fy: 521, cx: 318, cy: 236, baseline_m: 0.5}\n"
+      "odometry: {seed: 7}\n"
+      "loops:\n  members: [sift, orb]\n  verification: {min_inliers: 33}\n"
+      "graph: {robust: gnc}\n"
+      "run: {threads: 1}\n",
+      "my.yaml");
+  EXPECT_EQ(config.dataset.sensor, Sensor::kStereo);
+  EXPECT_EQ(config.dataset.stride, 2);
+  ASSERT_TRUE(config.dataset.camera.has_value());
+  EXPECT_EQ(config.dataset.camera->fy, 521);
+  EXPECT_EQ(config.dataset.baseline_m, 0.5);
+  EXPECT_EQ(config.odometry.seed, 7u);
+  EXPECT_EQ(config.loops.members, (std::vector<std::string>{"sift", "orb"}));
+  EXPECT_EQ(config.loops.verification.min_inliers, 33);
+  EXPECT_EQ(config.graph.robust, RobustLoss::kGnc);
+  EXPECT_EQ(config.run.threads, 1);
+}
+
+TEST(Config, UnknownKeyNamesLineAndNearestKey) {
+  EXPECT_THAT(Message("odometry:\n  seed: 1\nloops:\n  loop_treshold: 0.2\n"),
+              AllOf(HasSubstr("my.yaml:4:"), HasSubstr("loop_treshold"), HasSubstr("'loop_threshold'")));
+  EXPECT_THAT(Message("loops:\n  verification:\n    min_inlier: 3\n"),
+              AllOf(HasSubstr("my.yaml:3:"), HasSubstr("'min_inliers'")));
+}
+
+TEST(Config, UnknownSectionNamesNearestSection) {
+  EXPECT_THAT(Message("\nodometri:\n  seed: 1\n"), AllOf(HasSubstr("my.yaml:2:"), HasSubstr("'odometry'")));
+}
+
+TEST(Config, RepeatedKeyIsRefused) {
+  EXPECT_THAT(Message("run:\n  threads: 1\n  threads: 2\n"),
+              AllOf(HasSubstr("my.yaml:3:"), HasSubstr("twice")));
+}
+
+TEST(Config, WrongTypesAreRefusedWithTheirLine) {
+  EXPECT_THAT(Message("run:\n  threads: two\n"), AllOf(HasSubstr("my.yaml:2:"), HasSubstr("whole number")));
+  EXPECT_THAT(Message("run:\n  threads: 1.5\n"), HasSubstr("my.yaml:2:"));
+  EXPECT_THAT(Message("run:\n  loops: maybe\n"), HasSubstr("true or false"));
+  EXPECT_THAT(Message("run:\n  loop_agree_deg: .nan\n"), HasSubstr("finite number"));
+  EXPECT_THAT(Message("odometry:\n  seed: -3\n"), HasSubstr("not negative"));
+  EXPECT_THAT(Message("dataset:\n  sensor: sonar\n"), HasSubstr("mono, stereo, rgbd"));
+  EXPECT_THAT(Message("loops:\n  members: surf\n"), HasSubstr("list"));
+  EXPECT_THAT(Message("run: 5\n"), HasSubstr("my.yaml:1:"));
+  EXPECT_THAT(Message("run:\n  threads: [1]\n"), HasSubstr("my.yaml:2:"));
+}
+
+TEST(Config, ValuesOutOfRangePointToTheirLine) {
+  EXPECT_THAT(Message("run:\n  loops: true\n  loop_delay_frames: 0\n"),
+              AllOf(HasSubstr("my.yaml:3:"), HasSubstr("loop_delay_frames")));
+  EXPECT_THAT(Message("loops:\n  stm_size: 10\n  loop_threshold: 7\n"), HasSubstr("my.yaml:3:"));
+  EXPECT_THAT(Message("camera:\n  width: 640\n  height: 480\n  fx: -5\n  fy: 500\n  cx: 300\n  cy: 200\n"),
+              HasSubstr("my.yaml:"));
+}
+
+TEST(Config, BrokenYamlNamesTheLine) { EXPECT_THAT(Message("run:\n  threads: [1\n"), HasSubstr("my.yaml:")); }
+
+TEST(Config, MissingFileSaysWhatIsNeeded) {
+  try {
+    LoadConfig("/nowhere/x.yaml");
+    FAIL() << "no error";
+  } catch (const InputError& e) {
+    EXPECT_THAT(e.what(), AllOf(HasSubstr("/nowhere/x.yaml"), HasSubstr("--config")));
+  }
+}
+
+TEST(Config, HelpIsAValidFileWithTheDefaults) {
+  const RunConfig defaults;
+  std::string text = HelpConfig();
+  // The camera's defaults are zeros, "no camera": as a file that is not a usable camera.
+  const std::size_t camera = text.find("camera:"), odometry = text.find("odometry:");
+  text.erase(camera, odometry - camera);
+  const RunConfig config = ParseConfig(text, "help");
+  const auto a = DescribeConfig(config), b = DescribeConfig(defaults);
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i)
+    EXPECT_EQ(a[i].value, b[i].value) << a[i].section << "." << a[i].name;
+}
+
+TEST(Config, EveryConfigurationThatComesWithTheProjectLoads) {
+  int files = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(testing::SourceDir() / "data" / "configs")) {
+    if (entry.path().extension() != ".yaml") continue;
+    EXPECT_NO_THROW(LoadConfig(entry.path())) << entry.path();
+    ++files;
+  }
+  EXPECT_GE(files, 15);
+}
+
+// Names of the fields of a struct, read from its header.
+std::set<std::string> FieldsOf(const std::filesystem::path& header, const std::string& name) {
+  std::ifstream in(testing::SourceDir() / header);
+  std::stringstream buffer;
+  buffer << in.rdbuf();
+  const std::string text = buffer.str();
+  const std::size_t begin = text.find("struct " + name + " {"), end = text.find("\n};", begin);
+  EXPECT_NE(begin, std::string::npos) << name;
+  std::string body = text.substr(begin, end - begin);
+  body = std::regex_replace(body, std::regex("//[^\n]*"), "");
+  std::set<std::string> fields;
+  const std::regex field("\\s[\\w:<>, ]+\\s+(\\w+)\\s*(=[^;]*|\\{[^;]*)?;");
+  for (std::sregex_iterator it(body.begin(), body.end(), field), last; it != last; ++it)
+    fields.insert((*it)[1]);
+  return fields;
+}
+
+TEST(Config, EveryOptionFieldHasItsKey) {
+  std::map<std::string, std::set<std::string>> keys;
+  RunConfig config;
+  config.dataset.camera = PinholeCamera();
+  for (const ConfigEntry& entry : DescribeConfig(config)) {
+    keys[entry.section].insert(entry.name);
+    EXPECT_FALSE(entry.doc.empty()) << entry.section << "." << entry.name;
+  }
+  const std::string detector = "loopclosure/include/tutti/loopclosure/detector_options.h";
+  const struct {
+    std::string section, header, name;
+  } structs[] = {
+      {"dataset", "frontend/include/tutti/frontend/dataset.h", "DatasetOptions"},
+      {"camera", "core/include/tutti/core/camera.h", "PinholeCamera"},
+      {"odometry", "frontend/include/tutti/frontend/odometry_options.h", "OdometryOptions"},
+      {"loops", detector, "LoopDetectorOptions"},
+      {"loops.extraction", detector, "ExtractionOptions"},
+      {"loops.vocabulary", detector, "VocabularyOptions"},
+      {"loops.verification", detector, "VerificationOptions"},
+      {"graph", "backend/include/tutti/backend/pose_graph_optimizer.h", "PoseGraphOptions"},
+      {"run", "apps/pipeline/include/tutti/pipeline/slam_options.h", "SlamOptions"},
+  };
+  for (const auto& s : structs) {
+    const std::set<std::string> fields = FieldsOf(s.header, s.name);
+    EXPECT_GE(fields.size(), 4u) << s.name;
+    for (const std::string& field : fields) {
+      const bool elsewhere = field == "camera" || field == "baseline_m" || field == "extraction" ||
+                             field == "vocabulary" ||
+                             field == "verification";  // a section, or in section camera
+      EXPECT_TRUE(elsewhere || keys[s.section].count(field) == 1)
+          << s.section << ": no key for " << s.name << "::" << field;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tutti

@@ -1,5 +1,177 @@
+// tutti optimize: a g2o file in, its optimum out.
+#include <algorithm>
+#include <cstdio>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
 #include "commands.h"
+#include "tutti/backend/g2o_io.h"
+#include "tutti/backend/pose_graph_optimizer.h"
+#include "tutti/core/error.h"
 
 namespace tutti::cli {
-void AddOptimizeCommand(CLI::App&, int&) {}
+namespace {
+
+struct OptimizeArguments {
+  std::string in, out, json;
+  std::string init = "auto", objective = "chi2", robust = "none";
+  PoseGraphOptions options;
+};
+
+nlohmann::ordered_json ToJson(const GraphCosts& costs) {
+  return {{"chi2", costs.chi2}, {"chi2log", costs.chi2log}, {"chordal", costs.chordal}};
+}
+
+/// Loops that the robust loss does not believe, worst first.
+std::vector<std::size_t> DownWeighted(const PoseGraphReport& report) {
+  std::vector<std::size_t> out;
+  for (std::size_t e = 0; e < report.edges.size(); ++e) {
+    if (report.edges[e].down_weighted) out.push_back(e);
+  }
+  std::stable_sort(out.begin(), out.end(),
+                   [&](std::size_t a, std::size_t b) { return report.edges[a].chi2 > report.edges[b].chi2; });
+  return out;
+}
+
+nlohmann::ordered_json ToJson(const OptimizeArguments& arguments, const G2oFile& file,
+                              const PoseGraphReport& report) {
+  nlohmann::ordered_json json;
+  json["input"] = arguments.in;
+  json["kind"] = ToString(file.graph.kind());
+  json["nodes"] = file.graph.nodes().size();
+  json["edges"] = file.graph.edges().size();
+  json["objective"] = arguments.objective;
+  json["robust"] = arguments.robust;
+  json["init"] = ToString(report.init);
+  json["success"] = report.success;
+  json["reason"] = report.reason;
+  json["initial_costs"] = ToJson(report.initial_costs);
+  json["costs"] = ToJson(report.costs);
+  json["iterations"] = report.iterations;
+  json["gnc_rounds"] = report.gnc_rounds;
+  json["termination"] = report.termination;
+  json["time_s"] = report.time_s;
+  json["init_time_s"] = report.init_time_s;
+  json["components"] = nlohmann::ordered_json::array();
+  for (const GraphComponent& component : report.components) {
+    json["components"].push_back({{"anchor", component.anchor}, {"nodes", component.nodes}});
+  }
+  json["down_weighted"] = nlohmann::ordered_json::array();
+  for (std::size_t e : DownWeighted(report)) {
+    const PoseGraphEdge& edge = file.graph.edges()[e];
+    json["down_weighted"].push_back({{"from", edge.from},
+                                     {"to", edge.to},
+                                     {"chi2", report.edges[e].chi2},
+                                     {"weight", report.edges[e].weight}});
+  }
+  json["warnings"] = file.warnings;
+  return json;
+}
+
+void PrintCosts(const char* name, const GraphCosts& costs) {
+  std::printf("  %-8s %16.9g %16.9g %16.9g\n", name, costs.chi2, costs.chi2log, costs.chordal);
+}
+
+void Print(const G2oFile& file, const PoseGraphReport& report) {
+  std::printf("%zu poses in %s, %zu edges; initialisation: %s\n", file.graph.nodes().size(),
+              ToString(file.graph.kind()), file.graph.edges().size(), ToString(report.init));
+  std::printf("  %-8s %16s %16s %16s\n", "", "chi2", "chi2log", "chordal");
+  PrintCosts("start", report.initial_costs);
+  PrintCosts("result", report.costs);
+  std::printf("  %s after %d iterations, %.3f s (of which initialisation %.3f s)\n",
+              report.termination.c_str(), report.iterations, report.time_s, report.init_time_s);
+  if (report.components.size() > 1) {
+    std::printf("  the graph has %zu parts that no edge connects; each is held at one node:",
+                report.components.size());
+    for (std::size_t c = 0; c < report.components.size() && c < 10; ++c) {
+      std::printf(" %d (%zu)", report.components[c].anchor, report.components[c].nodes);
+    }
+    std::printf(report.components.size() > 10 ? " ...\n" : "\n");
+  }
+  if (report.down_weighted == 0) return;
+  std::printf("  %zu loops are not believed (weight < 0.5); the worst:\n", report.down_weighted);
+  const std::vector<std::size_t> worst = DownWeighted(report);
+  for (std::size_t k = 0; k < worst.size() && k < 10; ++k) {
+    const PoseGraphEdge& edge = file.graph.edges()[worst[k]];
+    std::printf("    %d -> %d: chi2 %.1f, weight %.3f\n", edge.from, edge.to, report.edges[worst[k]].chi2,
+                report.edges[worst[k]].weight);
+  }
+}
+
+void WriteJson(const OptimizeArguments& arguments, const G2oFile& file, const PoseGraphReport& report) {
+  if (arguments.json.empty()) return;
+  std::ofstream out(arguments.json);
+  out << ToJson(arguments, file, report).dump(2) << '\n';
+  out.flush();
+  if (!out)
+    throw InputError(arguments.json + ": can't be written; check that the folder exists and is writable");
+}
+
+void RunOptimize(OptimizeArguments arguments) {
+  arguments.options.init = ParseGraphInit(arguments.init);
+  arguments.options.objective = ParseGraphObjective(arguments.objective);
+  arguments.options.robust = ParseRobustLoss(arguments.robust);
+  const PoseGraphOptimizer optimizer(arguments.options);
+  G2oFile file = ReadG2o(arguments.in);
+  for (const std::string& warning : file.warnings)
+    std::fprintf(stderr, "tutti: warning: %s\n", warning.c_str());
+  if (arguments.options.init == GraphInit::kFile && !file.has_all_vertices) {
+    throw InputError(arguments.in +
+                     ": has edges to nodes without a vertex, so '--init file' has no start; use --init " +
+                     "auto, odometry or chordal");
+  }
+  const PoseGraphReport report = optimizer.Optimize(file.graph);
+  WriteJson(arguments, file, report);
+  if (!report.success) throw InputError(arguments.in + ": could not be optimised: " + report.reason);
+  WriteG2o(arguments.out, file.graph);
+  Print(file, report);
+}
+
+}  // namespace
+
+void AddOptimizeCommand(CLI::App& app, int&) {
+  CLI::App* command =
+      app.add_subcommand("optimize", "Optimise a pose graph (g2o file; 2D, 3D or with scale)");
+  const auto arguments = std::make_shared<OptimizeArguments>();
+  command->add_option("IN", arguments->in, "Graph to read (.g2o)")->required();
+  command->add_option("--out", arguments->out, "Where the optimised graph goes (.g2o)")->required();
+  command
+      ->add_option(
+          "--init", arguments->init,
+          "Start: file: the vertices; odometry: a spanning tree; chordal: linear relaxation, finds the right "
+          "valley where the others do not; auto: the one with the lowest cost")
+      ->check(CLI::IsMember({"auto", "file", "odometry", "chordal"}))
+      ->capture_default_str();
+  command
+      ->add_option("--objective", arguments->objective,
+                   "chi2: g2o's error (vector part of the quaternion); chi2log: rotation vectors")
+      ->check(CLI::IsMember({"chi2", "chi2log"}))
+      ->capture_default_str();
+  command
+      ->add_option(
+          "--robust", arguments->robust,
+          "Loss on loop edges (|i - j| != 1): huber tames, dcs switches off smoothly, gnc decides in or out")
+      ->check(CLI::IsMember({"none", "huber", "dcs", "gnc"}))
+      ->capture_default_str();
+  command
+      ->add_option("--robust-chi2", arguments->options.robust_chi2,
+                   "Chi-square beyond which a loop is doubted; 0: the 99 % quantile")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->add_option("--max-iterations", arguments->options.max_iterations, "Levenberg-Marquardt iterations")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command->add_option("--json", arguments->json,
+                      "Write costs, time and what became of the loops to this file");
+  command->footer(
+      "Costs are sums over all edges without a robust loss and without the factor 1/2. Compare only costs of "
+      "the same\n"
+      "column. A loop that is not believed keeps its place in the output file.\n"
+      "Example: tutti optimize graph.g2o --out optimised.g2o --robust gnc --json costs.json");
+  command->callback([arguments] { RunOptimize(*arguments); });
+}
+
 }  // namespace tutti::cli

@@ -1,5 +1,153 @@
+// tutti generate: renders the synthetic world to disk.
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <map>
+#include <memory>
+#include <string>
+#include <thread>
+
 #include "commands.h"
+#include "synthetic_writer.h"
+#include "tutti/core/error.h"
 
 namespace tutti::cli {
-void AddGenerateCommand(CLI::App&, int&) {}
+namespace {
+
+volatile std::sig_atomic_t interrupted = 0;
+void OnInterrupt(int) { interrupted = 1; }
+
+struct GenerateArguments {
+  std::string out;
+  SyntheticOptions world;
+  int threads = 0;
+  bool force = false;
+};
+
+// One line that is overwritten on a terminal, every tenth part elsewhere.
+class ProgressLine {
+ public:
+  bool operator()(std::size_t done, std::size_t total) {
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+    const bool terminal = ::isatty(STDERR_FILENO) != 0;
+    const std::size_t tenth = 10 * done / total;
+    if (terminal ? (done % 5 == 0 || done == total) : tenth != last_tenth_) {
+      const double rate = static_cast<double>(done) / std::max(seconds, 1e-3);
+      std::fprintf(stderr, "%sframe %zu of %zu, %.1f frames/s, %.0f s left%s", terminal ? "\r" : "", done,
+                   total, rate, static_cast<double>(total - done) / rate,
+                   terminal && done != total ? "   " : "\n");
+      last_tenth_ = tenth;
+    }
+    return interrupted == 0;
+  }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  std::size_t last_tenth_ = 0;
+};
+
+int Generate(const GenerateArguments& arguments) {
+  const SyntheticWorld world(arguments.world);
+  const SyntheticOptions& o = world.Options();
+  std::fprintf(stderr, "%zu frames of %dx%d, %.0f m a lap (%zu frames), into %s\n", world.Size(), o.width,
+               o.height, world.LapLength(), world.FramesPerLap(), arguments.out.c_str());
+  SyntheticWriteOptions write;
+  write.force = arguments.force;
+  write.threads = arguments.threads > 0 ? arguments.threads
+                                        : static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  ProgressLine progress;
+  write.progress = [&progress](std::size_t done, std::size_t total) { return progress(done, total); };
+  interrupted = 0;
+  const auto before = std::signal(SIGINT, OnInterrupt);
+  const std::size_t written = WriteSyntheticDataset(world, arguments.out, write);
+  std::signal(SIGINT, before);
+  const char* d = arguments.out.c_str();
+  if (written < world.Size()) {
+    std::fprintf(stderr, "\ninterrupted: %s holds the first %zu of %zu frames and can be used\n", d, written,
+                 world.Size());
+    return 130;
+  }
+  std::printf(
+      "%s: %zu frames with ground truth. Next:\n  tutti run --config %s/config.yaml --dataset %s --out "
+      "%s_run\n",
+      d, written, d, d, d);
+  return 0;
+}
+
+void AddOptions(CLI::App& c, GenerateArguments& a) {
+  SyntheticOptions& w = a.world;
+  const std::map<std::string, SyntheticSensor> sensors = {{"mono", SyntheticSensor::kMono},
+                                                          {"stereo", SyntheticSensor::kStereo},
+                                                          {"rgbd", SyntheticSensor::kRgbd}};
+  const std::map<std::string, SyntheticScene> scenes = {{"town", SyntheticScene::kTown},
+                                                        {"room", SyntheticScene::kRoom}};
+  c.add_option("--out", a.out, "folder to write; made if missing, must be empty")
+      ->required()
+      ->type_name("DIR");
+  c.add_option("--sensor", w.sensor, "mono, stereo (both in the KITTI layout) or rgbd (TUM layout)")
+      ->required()
+      ->transform(CLI::CheckedTransformer(sensors))
+      ->type_name("SENSOR");
+  c.add_option("--world", w.scene,
+               "town: streets driven through (default); room: furnished, walked around in")
+      ->transform(CLI::CheckedTransformer(scenes))
+      ->type_name("WORLD");
+  c.add_option("--seed", w.seed, "of houses, textures and noise; the same seed gives the same bytes")
+      ->capture_default_str();
+  c.add_option("--laps", w.laps,
+               "rounds of the closed route (fractions too); from the second on, places are seen again")
+      ->capture_default_str();
+  c.add_option("--frames", w.frames, "stop after so many frames; 0: all laps")->capture_default_str();
+  c.add_option("--width", w.width, "image width [px] (with --height; default 640)");
+  c.add_option("--height", w.height, "image height [px] (default: town 320, room 480)");
+  c.add_option("--focal", w.focal_px, "focal length [px] (default: town 0.58, room 0.82 of the width)");
+  c.add_option("--baseline", w.baseline_m,
+               "stereo: distance of the cameras [m] (default: town 0.54, room 0.12)");
+  c.add_option("--rate", w.rate_hz, "frames per second (default: town 10, room 15)");
+  c.add_option("--speed", w.speed_mps, "on straights [m/s] (default: town 8, room 0.5)");
+  c.add_option("--blocks-x", w.blocks_x, "town: blocks of houses that the route goes around, in x")
+      ->capture_default_str();
+  c.add_option("--blocks-y", w.blocks_y, "town: and in y (2 or more in both: an L)")->capture_default_str();
+  c.add_option("--block", w.block_m, "town: side of a block [m]")->capture_default_str();
+  c.add_option("--repeat", w.repeat_fraction,
+               "town: fraction of the houses that look alike (aliasing) [0..1]")
+      ->capture_default_str();
+  c.add_option("--noise", w.noise_sigma, "pixel noise [grey levels]; without a number 4")
+      ->expected(0, 1)
+      ->default_str("4");
+  c.add_option("--blur", w.motion_blur_s, "motion blur: exposure time [s]; without a number 0.02")
+      ->expected(0, 1)
+      ->default_str("0.02");
+  c.add_flag("--lighting-change", w.lighting_change, "another sun, darker, from the second lap on");
+  c.add_option("--moving-objects", w.moving_objects,
+               "number of oncoming cars (room: people); without a number 6")
+      ->expected(0, 1)
+      ->default_str("6");
+  c.add_flag("--kinect-noise", w.kinect_noise, "rgbd: depth noise and holes of a structured-light sensor");
+  c.add_option("--supersample", w.supersample, "samples per pixel and axis; 1 is fastest, with jagged edges")
+      ->capture_default_str();
+  c.add_option("--threads", a.threads, "frames rendered at the same time; 0: as many as cores");
+  c.add_flag("--force", a.force, "write into a folder that is not empty (its old frames are removed)");
+}
+
+}  // namespace
+
+void AddGenerateCommand(CLI::App& app, int& exit_code) {
+  CLI::App* command = app.add_subcommand(
+      "generate", "Render the synthetic world: images and exact ground truth, the same for the same options");
+  command->footer(
+      "Examples:\n"
+      "  tutti generate --out town --sensor stereo                         two laps of 315 m\n"
+      "  tutti generate --out block --sensor mono --blocks-x 1 --laps 1.3  a small loop, closed once\n"
+      "  tutti generate --out room --sensor rgbd --world room --kinect-noise\n"
+      "  tutti generate --out hard --sensor stereo --noise --blur --lighting-change --moving-objects\n"
+      "The folder also gets a config.yaml: tutti run --config town/config.yaml --dataset town --out result");
+  auto arguments = std::make_shared<GenerateArguments>();
+  AddOptions(*command, *arguments);
+  command->callback([arguments, &exit_code] { exit_code = Generate(*arguments); });
+}
+
 }  // namespace tutti::cli

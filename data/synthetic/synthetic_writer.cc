@@ -1,0 +1,225 @@
+#include "synthetic_writer.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cstdio>
+#include <exception>
+#include <fstream>
+#include <mutex>
+#include <opencv2/imgcodecs.hpp>
+#include <sstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "tutti/core/error.h"
+
+namespace tutti {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string Text(const char* format, double value) {
+  char text[64];
+  std::snprintf(text, sizeof text, format, value);
+  return text;
+}
+
+// "000012.png" (KITTI), "1.200000.png" (TUM).
+std::string NumberName(std::size_t i) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%06zu.png", i);
+  return text;
+}
+std::string StampName(double stamp_s) { return Text("%.6f", stamp_s) + ".png"; }
+
+void WriteImage(const fs::path& file, const cv::Mat& image) {
+  bool good = false;
+  try {
+    good = cv::imwrite(file.string(), image, {cv::IMWRITE_PNG_COMPRESSION, 1});
+  } catch (const cv::Exception&) {
+    good = false;
+  }
+  if (!good)
+    throw InputError(file.string() + ": can't be written; is the folder writable and the disk not full?");
+}
+
+void WriteText(const fs::path& file, const std::string& text) {
+  std::ofstream out(file);
+  out << text;
+  out.flush();
+  if (!out)
+    throw InputError(file.string() + ": can't be written; is the folder writable and the disk not full?");
+}
+
+void PrepareFolder(const fs::path& folder, const std::vector<std::string>& parts, bool force) {
+  std::error_code code;
+  if (fs::exists(folder, code) && !fs::is_directory(folder, code)) {
+    throw InputError(folder.string() + ": is a file; give a folder");
+  }
+  if (fs::exists(folder, code) && !fs::is_empty(folder, code)) {
+    if (!force)
+      throw InputError(folder.string() + ": is not empty; give another folder, or --force to write into it");
+    for (const char* old :
+         {"image_0", "image_1", "rgb", "depth"}) {  // or old frames would mix with the new ones
+      std::vector<fs::path> stale;
+      for (fs::directory_iterator it(folder / old, code), end; !code && it != end; it.increment(code)) {
+        if (it->path().extension() == ".png") stale.push_back(it->path());
+      }
+      for (const fs::path& file : stale) fs::remove(file, code);
+      fs::remove(folder / old, code);  // only if it is empty now
+    }
+    for (const char* old :
+         {"times.txt", "calib.txt", "poses.txt", "rgb.txt", "depth.txt", "groundtruth.txt"}) {
+      fs::remove(folder / old, code);
+    }
+  }
+  for (const std::string& part : parts) {
+    fs::create_directories(folder / part, code);
+    if (code) {
+      throw InputError((folder / part).string() + ": can't be made (" + code.message() +
+                       "); check the permissions");
+    }
+  }
+}
+
+// The file that `tutti run --config` takes.
+std::string ConfigText(const SyntheticWorld& world) {
+  const SyntheticOptions& o = world.Options();
+  const PinholeCamera& c = world.Camera();
+  std::ostringstream out;
+  out.precision(10);
+  const bool rgbd = o.sensor == SyntheticSensor::kRgbd, stereo = o.sensor == SyntheticSensor::kStereo;
+  out << "# Written by `tutti generate`: synthetic " << (o.scene == SyntheticScene::kTown ? "town" : "room")
+      << ", seed " << o.seed << ".\n# tutti run --config THIS_FILE --dataset THIS_FOLDER --out DIR\n"
+      << "dataset:\n  type: " << (rgbd ? "tum" : "kitti") << "  # layout on disk\n"
+      << "  sensor: "
+      << (rgbd     ? "rgbd"
+          : stereo ? "stereo"
+                   : "mono")
+      << "\n"
+      << "  rate_hz: " << o.rate_hz << "  # frames per second\n";
+  if (rgbd) {
+    out << "  depth_units_per_m: " << o.depth_units_per_m << "  # value in the depth image of one metre\n"
+        << "  max_depth_m: " << o.max_depth_m << "  # nothing is measured beyond [m]\n";
+  }
+  out << "camera:\n  width: " << c.width << "  # [px]\n  height: " << c.height << "\n  fx: " << c.fx
+      << "  # [px]\n  fy: " << c.fy << "\n  cx: " << c.cx << "\n  cy: " << c.cy << "\n  distortion: none\n";
+  if (stereo)
+    out << "  baseline_m: " << o.baseline_m << "  # the right camera lies so far to the right [m]\n";
+  return out.str();
+}
+
+std::string CalibrationText(const SyntheticWorld& world) {
+  const PinholeCamera& c = world.Camera();
+  std::string out;
+  for (int i = 0; i < 4; ++i) {  // P2 and P3 are KITTI's colour cameras: here the same ones
+    const double offset = i % 2 == 1 ? -c.fx * world.Options().baseline_m : 0.0;
+    const double p[12] = {c.fx, 0, c.cx, offset, 0, c.fy, c.cy, 0, 0, 0, 1, 0};
+    out += "P" + std::to_string(i) + ":";
+    for (const double value : p) out += Text(" %.12e", value);
+    out += "\n";
+  }
+  return out;
+}
+
+class Writer {
+ public:
+  Writer(const SyntheticWorld& world, fs::path folder, const SyntheticWriteOptions& options)
+      : world_(world), folder_(std::move(folder)), options_(options), sensor_(world.Options().sensor) {}
+
+  std::size_t Run() {
+    if (sensor_ == SyntheticSensor::kRgbd) {
+      PrepareFolder(folder_, {"rgb", "depth"}, options_.force);
+    } else if (sensor_ == SyntheticSensor::kStereo) {
+      PrepareFolder(folder_, {"image_0", "image_1"}, options_.force);
+    } else {
+      PrepareFolder(folder_, {"image_0"}, options_.force);
+    }
+    WriteText(folder_ / "config.yaml", ConfigText(world_));
+    std::vector<std::thread> threads;
+    for (int k = 1; k < std::max(1, options_.threads); ++k) threads.emplace_back([this] { Work(); });
+    Work();
+    for (std::thread& thread : threads) thread.join();
+    if (failure_) std::rethrow_exception(failure_);
+    const std::size_t count = std::min<std::size_t>(next_, world_.Size());
+    WriteLists(count);
+    return count;
+  }
+
+ private:
+  // Takes frames in order until all are taken or one thread stopped: then those taken so far are complete.
+  void Work() {
+    while (!stop_) {
+      std::size_t i = 0;
+      {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        if (stop_ || next_ >= world_.Size()) return;
+        i = next_++;
+      }
+      try {
+        WriteFrame(i);
+      } catch (...) {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        if (!failure_) failure_ = std::current_exception();
+        stop_ = true;
+      }
+      const std::lock_guard<std::mutex> lock(mutex_);
+      ++done_;
+      if (options_.progress && !options_.progress(done_, world_.Size())) stop_ = true;
+    }
+  }
+
+  void WriteFrame(std::size_t i) const {
+    const SyntheticFrame frame = world_.Render(i);
+    if (sensor_ == SyntheticSensor::kRgbd) {
+      const std::string name = StampName(frame.stamp_s);
+      WriteImage(folder_ / "rgb" / name, frame.image);
+      cv::Mat depth;
+      frame.depth_m.convertTo(depth, CV_16U, world_.Options().depth_units_per_m);
+      WriteImage(folder_ / "depth" / name, depth);
+    } else {
+      WriteImage(folder_ / "image_0" / NumberName(i), frame.image);
+      if (sensor_ == SyntheticSensor::kStereo) WriteImage(folder_ / "image_1" / NumberName(i), frame.right);
+    }
+  }
+
+  void WriteLists(std::size_t count) const {
+    Trajectory truth = world_.GroundTruth();
+    truth.resize(count);
+    if (sensor_ == SyntheticSensor::kRgbd) {
+      for (const char* part : {"rgb", "depth"}) {
+        std::string list = "# timestamp filename\n";
+        for (const StampedPose& p : truth) {
+          list += Text("%.6f", p.stamp_s) + " " + part + "/" + StampName(p.stamp_s) + "\n";
+        }
+        WriteText(folder_ / (std::string(part) + ".txt"), list);
+      }
+      WriteTrajectory(folder_ / "groundtruth.txt", truth, TrajectoryFormat::kTum);
+    } else {
+      std::string times;
+      for (const StampedPose& p : truth) times += Text("%.6e", p.stamp_s) + "\n";
+      WriteText(folder_ / "times.txt", times);
+      WriteText(folder_ / "calib.txt", CalibrationText(world_));
+      WriteTrajectory(folder_ / "poses.txt", truth, TrajectoryFormat::kKitti);
+    }
+  }
+
+  const SyntheticWorld& world_;
+  const fs::path folder_;
+  const SyntheticWriteOptions& options_;
+  const SyntheticSensor sensor_;
+  std::mutex mutex_;
+  std::size_t next_ = 0, done_ = 0;
+  std::atomic<bool> stop_{false};
+  std::exception_ptr failure_;
+};
+
+}  // namespace
+
+std::size_t WriteSyntheticDataset(const SyntheticWorld& world, const std::filesystem::path& folder,
+                                  const SyntheticWriteOptions& options) {
+  return Writer(world, folder, options).Run();
+}
+
+}  // namespace tutti

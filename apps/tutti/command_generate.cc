@@ -5,7 +5,6 @@
 #include <chrono>
 #include <csignal>
 #include <cstdio>
-#include <map>
 #include <memory>
 #include <string>
 #include <thread>
@@ -21,7 +20,7 @@ volatile std::sig_atomic_t interrupted = 0;
 void OnInterrupt(int) { interrupted = 1; }
 
 struct GenerateArguments {
-  std::string out;
+  std::string out, sensor, scene = "town";
   SyntheticOptions world;
   int threads = 0;
   bool force = false;
@@ -50,7 +49,12 @@ class ProgressLine {
 };
 
 int Generate(const GenerateArguments& arguments) {
-  const SyntheticWorld world(arguments.world);
+  SyntheticOptions wanted = arguments.world;
+  wanted.scene = arguments.scene == "room" ? SyntheticScene::kRoom : SyntheticScene::kTown;
+  wanted.sensor = arguments.sensor == "rgbd"     ? SyntheticSensor::kRgbd
+                  : arguments.sensor == "stereo" ? SyntheticSensor::kStereo
+                                                 : SyntheticSensor::kMono;
+  const SyntheticWorld world(wanted);
   const SyntheticOptions& o = world.Options();
   std::fprintf(stderr, "%zu frames of %dx%d, %.0f m a lap (%zu frames), into %s\n", world.Size(), o.width,
                o.height, world.LapLength(), world.FramesPerLap(), arguments.out.c_str());
@@ -79,22 +83,17 @@ int Generate(const GenerateArguments& arguments) {
 
 void AddOptions(CLI::App& c, GenerateArguments& a) {
   SyntheticOptions& w = a.world;
-  const std::map<std::string, SyntheticSensor> sensors = {{"mono", SyntheticSensor::kMono},
-                                                          {"stereo", SyntheticSensor::kStereo},
-                                                          {"rgbd", SyntheticSensor::kRgbd}};
-  const std::map<std::string, SyntheticScene> scenes = {{"town", SyntheticScene::kTown},
-                                                        {"room", SyntheticScene::kRoom}};
   c.add_option("--out", a.out, "folder to write; made if missing, must be empty")
       ->required()
       ->type_name("DIR");
-  c.add_option("--sensor", w.sensor, "mono, stereo (both in the KITTI layout) or rgbd (TUM layout)")
+  c.add_option("--sensor", a.sensor, "mono, stereo (both in the KITTI layout) or rgbd (TUM layout)")
       ->required()
-      ->transform(CLI::CheckedTransformer(sensors))
-      ->type_name("SENSOR");
-  c.add_option("--world", w.scene,
-               "town: streets driven through (default); room: furnished, walked around in")
-      ->transform(CLI::CheckedTransformer(scenes))
-      ->type_name("WORLD");
+      ->check(CLI::IsMember({"mono", "stereo", "rgbd"}))
+      ->type_name("NAME");
+  c.add_option("--world", a.scene, "town: streets driven through; room: furnished, walked around in")
+      ->check(CLI::IsMember({"town", "room"}))
+      ->type_name("NAME")
+      ->capture_default_str();
   c.add_option("--seed", w.seed, "of houses, textures and noise; the same seed gives the same bytes")
       ->capture_default_str();
   c.add_option("--laps", w.laps,

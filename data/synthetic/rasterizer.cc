@@ -7,6 +7,33 @@
 #include <opencv2/imgproc.hpp>
 
 namespace tutti::synthetic {
+
+// First in the file, so that the compiler can inline them into the inner loop.
+inline float Texture::Level::Bilinear(float u, float v) const {
+  const float x = u * static_cast<float>(width) - 0.5F, y = v * static_cast<float>(height) - 0.5F;
+  int ix = static_cast<int>(x), iy = static_cast<int>(y);  // floor: without SSE 4.1, std::floor is a call
+  ix -= x < static_cast<float>(ix) ? 1 : 0;
+  iy -= y < static_cast<float>(iy) ? 1 : 0;
+  const float ax = x - static_cast<float>(ix), ay = y - static_cast<float>(iy);
+  const int mask_x = width - 1, mask_y = height - 1;
+  const int x0 = ix & mask_x, x1 = (x0 + 1) & mask_x;
+  const std::uint8_t* row0 = &texels[static_cast<std::size_t>((iy & mask_y) * width)];
+  const std::uint8_t* row1 = &texels[static_cast<std::size_t>(((iy + 1) & mask_y) * width)];
+  const float top = row0[x0] + ax * static_cast<float>(row0[x1] - row0[x0]);
+  const float bottom = row1[x0] + ax * static_cast<float>(row1[x1] - row1[x0]);
+  return top + ay * (bottom - top);
+}
+
+float Texture::Sample(float u, float v, float lod) const {
+  const float last = static_cast<float>(levels_.size() - 1);
+  const float level = std::clamp(lod, 0.0F, last);
+  const std::size_t low = static_cast<std::size_t>(level);
+  const float fraction = level - static_cast<float>(low);
+  const float fine = levels_[low].Bilinear(u, v);
+  if (fraction <= 0.0F) return fine;
+  return fine + fraction * (levels_[low + 1].Bilinear(u, v) - fine);
+}
+
 namespace {
 
 constexpr double kNear = 0.05;  // [m]
@@ -61,7 +88,7 @@ struct Fill {
 };
 
 void FillRow(Target& target, const Fill& f, int y, int x_begin, int x_end) {
-  constexpr int kSpan = 8;  // pixels with one level of detail
+  constexpr int kSpan = 16;  // pixels with one level of detail
   float* grey = &target.grey[static_cast<std::size_t>(y) * static_cast<std::size_t>(target.width)];
   float* depth = &target.inverse_z[static_cast<std::size_t>(y) * static_cast<std::size_t>(target.width)];
   const double tw = f.texture->Width(), th = f.texture->Height();
@@ -186,29 +213,6 @@ Texture::Texture(const cv::Mat& image) {
                cv::INTER_AREA);
     level = half;
   }
-}
-
-float Texture::Level::Bilinear(float u, float v) const {
-  const float x = u * static_cast<float>(width) - 0.5F, y = v * static_cast<float>(height) - 0.5F;
-  const float fx = std::floor(x), fy = std::floor(y);
-  const float ax = x - fx, ay = y - fy;
-  const int mask_x = width - 1, mask_y = height - 1;
-  const int x0 = static_cast<int>(fx) & mask_x, x1 = (x0 + 1) & mask_x;
-  const std::uint8_t* row0 = &texels[static_cast<std::size_t>((static_cast<int>(fy) & mask_y) * width)];
-  const std::uint8_t* row1 = &texels[static_cast<std::size_t>(((static_cast<int>(fy) + 1) & mask_y) * width)];
-  const float top = row0[x0] + ax * static_cast<float>(row0[x1] - row0[x0]);
-  const float bottom = row1[x0] + ax * static_cast<float>(row1[x1] - row1[x0]);
-  return top + ay * (bottom - top);
-}
-
-float Texture::Sample(float u, float v, float lod) const {
-  const float last = static_cast<float>(levels_.size() - 1);
-  const float level = std::clamp(lod, 0.0F, last);
-  const std::size_t low = static_cast<std::size_t>(level);
-  const float fraction = level - static_cast<float>(low);
-  const float fine = levels_[low].Bilinear(u, v);
-  if (fraction <= 0.0F) return fine;
-  return fine + fraction * (levels_[low + 1].Bilinear(u, v) - fine);
 }
 
 Rendering Render(const std::vector<Face>& faces, const std::vector<Texture>& textures,

@@ -19,9 +19,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string Text(const char* format, double value) {
+// "1.200000"
+std::string Fixed(double value) {
   char text[64];
-  std::snprintf(text, sizeof text, format, value);
+  std::snprintf(text, sizeof text, "%.6f", value);
+  return text;
+}
+// "1.200000000000e+00"
+std::string Scientific(double value) {
+  char text[64];
+  std::snprintf(text, sizeof text, "%.12e", value);
   return text;
 }
 
@@ -31,7 +38,7 @@ std::string NumberName(std::size_t i) {
   std::snprintf(text, sizeof text, "%06zu.png", i);
   return text;
 }
-std::string StampName(double stamp_s) { return Text("%.6f", stamp_s) + ".png"; }
+std::string StampName(double stamp_s) { return Fixed(stamp_s) + ".png"; }
 
 void WriteImage(const fs::path& file, const cv::Mat& image) {
   bool good = false;
@@ -117,7 +124,7 @@ std::string CalibrationText(const SyntheticWorld& world) {
     const double offset = i % 2 == 1 ? -c.fx * world.Options().baseline_m : 0.0;
     const double p[12] = {c.fx, 0, c.cx, offset, 0, c.fy, c.cy, 0, 0, 0, 1, 0};
     out += "P" + std::to_string(i) + ":";
-    for (const double value : p) out += Text(" %.12e", value);
+    for (const double value : p) out += " " + Scientific(value);
     out += "\n";
   }
   return out;
@@ -191,14 +198,14 @@ class Writer {
       for (const char* part : {"rgb", "depth"}) {
         std::string list = "# timestamp filename\n";
         for (const StampedPose& p : truth) {
-          list += Text("%.6f", p.stamp_s) + " " + part + "/" + StampName(p.stamp_s) + "\n";
+          list += Fixed(p.stamp_s) + " " + part + "/" + StampName(p.stamp_s) + "\n";
         }
         WriteText(folder_ / (std::string(part) + ".txt"), list);
       }
       WriteTrajectory(folder_ / "groundtruth.txt", truth, TrajectoryFormat::kTum);
     } else {
       std::string times;
-      for (const StampedPose& p : truth) times += Text("%.6e", p.stamp_s) + "\n";
+      for (const StampedPose& p : truth) times += Scientific(p.stamp_s) + "\n";
       WriteText(folder_ / "times.txt", times);
       WriteText(folder_ / "calib.txt", CalibrationText(world_));
       WriteTrajectory(folder_ / "poses.txt", truth, TrajectoryFormat::kKitti);

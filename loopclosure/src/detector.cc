@@ -302,6 +302,23 @@ class LoopDetector::Impl {
     Verify(query, TopPlaces(combined.belief), result);
   }
 
+  // Tries a candidate unless it was tried before; keeps it as the best if it is.
+  const Verification& Try(const View& query, int candidate, LoopResult& result) {
+    const std::int64_t id = memory_.id(candidate);
+    for (const Verification& before : result.tried) {
+      if (before.candidate == id) return before;
+    }
+    result.tried.push_back(verifier_.Verify(query, views_[Index(candidate)], options_.threads));
+    const Verification& tried = result.tried.back();
+    const Verification& best = result.verification;
+    const bool first = result.tried.size() == 1;
+    if (first || (tried.accepted && !best.accepted) ||
+        (tried.accepted == best.accepted && tried.inliers > best.inliers)) {
+      result.verification = tried;
+    }
+    return tried;
+  }
+
   void Verify(const View& query, const std::vector<int>& places, LoopResult& result) {
     const VerificationOptions& options = options_.verification;
     for (const int place : places) {
@@ -309,19 +326,29 @@ class LoopDetector::Impl {
       for (const auto& [candidate, level] : memory_.Neighbours(place, options.neighbours)) {
         // Neighbours are worth a try where the place itself shows something, or for the best hypothesis.
         if (candidate != place && place != places.front() && inliers_here < options.min_inliers / 2) break;
-        Verification verification = verifier_.Verify(query, views_[Index(candidate)], options_.threads);
-        inliers_here = std::max(inliers_here, verification.inliers);
-        const bool better = result.tried.empty() || verification.accepted ||
-                            verification.inliers > result.verification.inliers;
-        result.tried.push_back(verification);
-        if (better) result.verification = std::move(verification);
-        if (result.verification.accepted) {
-          result.accepted = true;
-          return;
-        }
+        inliers_here = std::max(inliers_here, Try(query, candidate, result).inliers);
+        if (result.verification.accepted) break;
       }
+      if (result.verification.accepted) break;
     }
-    result.reason = result.verification.reason;
+    result.accepted = result.verification.accepted;
+    if (result.accepted) {
+      Climb(query, result);
+    } else {
+      result.reason = result.verification.reason;
+    }
+  }
+
+  // From an accepted candidate to the neighbour that shares the most with the query: the nearest view of the
+  // place, and the best constraint.
+  void Climb(const View& query, LoopResult& result) {
+    constexpr int kSteps = 3;
+    for (int step = 0; step < kSteps; ++step) {
+      const std::int64_t start = result.verification.candidate;
+      for (const auto& [candidate, level] : memory_.Neighbours(memory_.Find(start), 1))
+        Try(query, candidate, result);
+      if (result.verification.candidate == start) return;
+    }
   }
 
   void CloseLoop(int newer, int older) {

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <random>
 
-#include "hamming.h"
+#include "distances.h"
 #include "tutti/loopclosure/descriptor_index.h"
 
 namespace tutti {
@@ -55,9 +55,23 @@ class HammingIndex : public DescriptorIndex {
     return words_.data() + static_cast<std::size_t>(index) * static_cast<std::size_t>(bytes_);
   }
 
-  TUTTI_POPCOUNT_CLONES TwoNearest SearchAll(const std::uint8_t* descriptor) const;
-  TUTTI_POPCOUNT_CLONES void Scan(const std::vector<int>& bucket, const std::uint8_t* descriptor,
-                                  TwoNearest& nearest) const;
+  TwoNearest SearchAll(const std::uint8_t* descriptor) const {
+    constexpr int kBlock = 256;
+    float distances[kBlock];
+    TwoNearest nearest;
+    for (int begin = 0; begin < size_; begin += kBlock) {
+      const int count = std::min(kBlock, size_ - begin);
+      internal::HammingDistances(descriptor, Word(begin), count, bytes_, static_cast<std::size_t>(bytes_),
+                                 distances);
+      for (int i = 0; i < count; ++i) {
+        if (distances[i] < nearest.second_distance) nearest.Offer(begin + i, distances[i]);
+      }
+    }
+    return nearest;
+  }
+
+  TUTTI_CLONES("popcnt")
+  void Scan(const std::vector<int>& bucket, const std::uint8_t* descriptor, TwoNearest& nearest) const;
 
   TwoNearest SearchTables(const std::uint8_t* descriptor) const {
     TwoNearest nearest;
@@ -76,15 +90,7 @@ class HammingIndex : public DescriptorIndex {
   std::vector<std::uint8_t> words_;
 };
 
-TwoNearest HammingIndex::SearchAll(const std::uint8_t* descriptor) const {
-  TwoNearest nearest;
-  for (int i = 0; i < size_; ++i) {
-    const float distance = static_cast<float>(internal::HammingDistance(descriptor, Word(i), bytes_));
-    if (distance < nearest.second_distance) nearest.Offer(i, distance);
-  }
-  return nearest;
-}
-
+TUTTI_CLONES("popcnt")
 void HammingIndex::Scan(const std::vector<int>& bucket, const std::uint8_t* descriptor,
                         TwoNearest& nearest) const {
   for (const int i : bucket) {

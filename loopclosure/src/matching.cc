@@ -3,16 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "hamming.h"
-
-// Compiled twice, for plain x86-64 and for AVX2, chosen at run time. No fused multiply-add: both give the
-// same bits.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
-    !defined(__SANITIZE_THREAD__)
-#define TUTTI_AVX2_CLONES __attribute__((target_clones("default", "avx2")))
-#else
-#define TUTTI_AVX2_CLONES
-#endif
+#include "distances.h"
 
 namespace tutti {
 namespace {
@@ -20,37 +11,16 @@ namespace {
 constexpr float kSamePlace = 4.0f;  // [px]
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-// Squared distances of one row to all rows. `dimensions` is a multiple of 8; the rest is padding.
-TUTTI_AVX2_CLONES void SquaredDistances(const float* query, const float* rows, int count, int dimensions,
-                                        std::size_t step, float* distances) {
-  for (int j = 0; j < count; ++j) {
-    const float* row = rows + static_cast<std::size_t>(j) * step;
-    float sums[8] = {};
-    for (int k = 0; k < dimensions; k += 8) {
-      for (int l = 0; l < 8; ++l) {
-        const float d = query[k + l] - row[k + l];
-        sums[l] += d * d;
-      }
-    }
-    distances[j] = ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7]));
+// Distances of one query row to all candidate rows, squared.
+void Distances(const cv::Mat& query, int i, const cv::Mat& candidate, std::vector<float>& distances) {
+  if (query.type() == CV_32F) {
+    internal::SquaredDistances(query.ptr<float>(i), candidate.ptr<float>(), candidate.rows, candidate.cols,
+                               candidate.step1(), distances.data());
+    return;
   }
-}
-
-TUTTI_POPCOUNT_CLONES void HammingDistances(const std::uint8_t* query, const std::uint8_t* rows, int count,
-                                            int bytes, std::size_t step, float* distances) {
-  for (int j = 0; j < count; ++j) {
-    const float bits = static_cast<float>(
-        internal::HammingDistance(query, rows + static_cast<std::size_t>(j) * step, bytes));
-    distances[j] = bits * bits;
-  }
-}
-
-// A copy whose rows are padded with zeros to a multiple of 8 columns, if they are not already.
-cv::Mat Padded(const cv::Mat& rows) {
-  if (rows.cols % 8 == 0) return rows;
-  cv::Mat padded = cv::Mat::zeros(rows.rows, (rows.cols + 7) / 8 * 8, rows.type());
-  rows.copyTo(padded.colRange(0, rows.cols));
-  return padded;
+  internal::HammingDistances(query.ptr(i), candidate.ptr(), candidate.rows, candidate.cols, candidate.step[0],
+                             distances.data());
+  for (float& distance : distances) distance *= distance;
 }
 
 }  // namespace
@@ -63,19 +33,12 @@ std::vector<Match> MatchDescriptors(const cv::Mat& query, const cv::Mat& candida
       candidate_points.size() != static_cast<std::size_t>(candidate.rows)) {
     return matches;
   }
-  const bool binary = query.type() == CV_8U;
-  const cv::Mat q = binary ? query : Padded(query);
-  const cv::Mat c = binary ? candidate : Padded(candidate);
-  const std::size_t count = static_cast<std::size_t>(c.rows);
+  const std::size_t count = static_cast<std::size_t>(candidate.rows);
   std::vector<float> distances(count);
   std::vector<float> best_of_candidate(count, kInfinity);
   std::vector<int> query_of_candidate(count, -1);
-  for (int i = 0; i < q.rows; ++i) {
-    if (binary) {
-      HammingDistances(q.ptr(i), c.ptr(), c.rows, c.cols, c.step[0], distances.data());
-    } else {
-      SquaredDistances(q.ptr<float>(i), c.ptr<float>(), c.rows, c.cols, c.step1(), distances.data());
-    }
+  for (int i = 0; i < query.rows; ++i) {
+    Distances(query, i, candidate, distances);
     std::size_t best = 0;
     for (std::size_t j = 0; j < count; ++j) {
       if (distances[j] < distances[best]) best = j;

@@ -1,33 +1,31 @@
 #include "tutti/loopclosure/vocabulary.h"
 
+#include <algorithm>
 #include <cmath>
 
-#include "hamming.h"
+#include "distances.h"
 #include "tutti/core/error.h"
 #include "tutti/loopclosure/parallel.h"
 
 namespace tutti {
 namespace {
 
-// True distance of two descriptors of the given type.
-TUTTI_POPCOUNT_CLONES float TrueDistance(const cv::Mat& a, int i, const cv::Mat& b, int j) {
-  if (a.depth() == CV_8U) {
-    return static_cast<float>(internal::HammingDistance(a.ptr(i), b.ptr(j), a.cols));
+// The two nearest of the first `count` rows of `created`, exactly, merged into `best`.
+void OfferCreated(const cv::Mat& descriptors, int i, const cv::Mat& created, int count, int first_word,
+                  std::vector<float>& distances, TwoNearest& best) {
+  const bool binary = descriptors.depth() == CV_8U;
+  if (binary) {
+    internal::HammingDistances(descriptors.ptr(i), created.ptr(), count, created.cols, created.step[0],
+                               distances.data());
+  } else {
+    internal::SquaredDistances(descriptors.ptr<float>(i), created.ptr<float>(), count, created.cols,
+                               created.step1(), distances.data());
   }
-  const float* x = a.ptr<float>(i);
-  const float* y = b.ptr<float>(j);
-  // Eight sums side by side, so that the compiler may vectorise without reordering a sum.
-  float sums[8] = {};
-  int k = 0;
-  for (; k + 8 <= a.cols; k += 8) {
-    for (int l = 0; l < 8; ++l) {
-      const float d = x[k + l] - y[k + l];
-      sums[l] += d * d;
-    }
+  for (int k = 0; k < count; ++k) {
+    const float distance =
+        binary ? distances[static_cast<std::size_t>(k)] : std::sqrt(distances[static_cast<std::size_t>(k)]);
+    if (distance < best.second_distance) best.Offer(first_word + k, distance);
   }
-  float sum = ((sums[0] + sums[1]) + (sums[2] + sums[3])) + ((sums[4] + sums[5]) + (sums[6] + sums[7]));
-  for (; k < a.cols; ++k) sum += (x[k] - y[k]) * (x[k] - y[k]);
-  return std::sqrt(sum);
 }
 
 std::string TypeName(int type, int width) {
@@ -72,10 +70,11 @@ std::vector<int> Vocabulary::Quantise(const cv::Mat& descriptors, int threads) {
   const int old_words = index_->size();
   cv::Mat created(descriptors.rows, width_, type_);
   int num_created = 0;
+  std::vector<float> distances(nearest.size());
   words.reserve(nearest.size());
   for (int i = 0; i < descriptors.rows; ++i) {
     TwoNearest best = nearest[static_cast<std::size_t>(i)];
-    for (int k = 0; k < num_created; ++k) best.Offer(old_words + k, TrueDistance(descriptors, i, created, k));
+    OfferCreated(descriptors, i, created, num_created, old_words, distances, best);
     const bool is_new = best.second < 0 || best.first_distance > options_.nndr * best.second_distance;
     if (is_new) {
       descriptors.row(i).copyTo(created.row(num_created));

@@ -1,0 +1,52 @@
+// How good a loop-closure detector was: one evaluator for every row of every table (loop-closure.md section
+// 7).
+#pragma once
+
+#include <vector>
+
+#include "tutti/loopclosure/detector.h"
+#include "tutti/loopclosure/ground_truth.h"
+
+namespace tutti {
+
+/// What a detector said about one image. Images are rows and columns of the ground truth.
+struct LoopObservation {
+  int image = 0;          ///< row
+  double hypothesis = 0;  ///< H, the score that images are ranked by
+  int best = -1;          ///< argmax of the posterior, a column; -1: none
+  bool accepted = false;  ///< passed the verification
+  int verified = -1;      ///< the candidate that it passed with, a column
+};
+
+/// One threshold of a precision-recall curve: everything ranked down to here is taken as a loop.
+struct PrecisionRecall {
+  double precision = 1;  ///< TP / (TP + FP); 1 where nothing is taken
+  double recall = 0;     ///< TP / rows with a loop; 0 where there are none
+  double threshold = 0;  ///< H of the last one taken
+};
+
+struct LoopEvaluation {
+  int images = 0;
+  int rows_with_loop = 0;
+  double recall_at_100_precision = 0;  ///< the largest recall before the first false positive
+  double area_under_curve = 0;         ///< sum of precision x growth of recall
+  double best_f1 = 0;
+  PrecisionRecall at_default_threshold;
+  std::vector<PrecisionRecall> curve;
+  int true_positives = 0, false_positives = 0, ignored = 0;  ///< at the default threshold
+};
+
+/// Ranks by H alone and takes the posterior's best location: without verification. At the default threshold:
+/// H >= threshold.
+LoopEvaluation EvaluatePosterior(const std::vector<LoopObservation>& observations,
+                                 const LoopGroundTruth& truth, double threshold);
+
+/// Rejected images rank below all accepted ones; accepted ones count with the location that they were
+/// verified with. At the default threshold: the accepted ones.
+LoopEvaluation EvaluateVerified(const std::vector<LoopObservation>& observations,
+                                const LoopGroundTruth& truth, double threshold);
+
+/// A result of LoopDetector as an observation, where the query ids were the image numbers.
+LoopObservation Observe(const LoopResult& result);
+
+}  // namespace tutti

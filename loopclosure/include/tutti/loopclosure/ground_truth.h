@@ -1,0 +1,65 @@
+// Which images show the same place: loop matrices from files, or derived from a trajectory.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "tutti/core/trajectory.h"
+
+namespace tutti {
+
+/// Label of a pair of images.
+enum class LoopLabel : std::uint8_t { kNone = 0, kIgnore = 128, kLoop = 255 };
+
+/// Loop matrix (loop-closure.md section 7): row = current image, column = past image. Only column < row
+/// counts.
+class LoopGroundTruth {
+ public:
+  LoopGroundTruth() = default;
+  explicit LoopGroundTruth(int size);
+
+  int size() const { return size_; }
+  /// kNone for pairs outside of the matrix and for column >= row.
+  LoopLabel At(int row, int column) const;
+  void Set(int row, int column, LoopLabel label);
+  /// True if the row has at least one loop.
+  bool HasLoop(int row) const;
+  int RowsWithLoop() const;
+  /// Every `stride`-th row and column, from 0.
+  LoopGroundTruth Strided(int stride) const;
+
+  std::string description;  ///< where it comes from and by which rule, for tables
+
+ private:
+  int size_ = 0;
+  std::vector<LoopLabel> labels_;
+};
+
+/// When two poses are the same place.
+struct LoopRule {
+  double distance_m = 6.0;  ///< loop: nearer than this [m], and
+  double angle_deg = 30.0;  ///< turned by less than this [deg], and
+  double exclude_s = 10.0;  ///< at least this much older [s]; younger pairs are ignored
+  double ignore_m = 15.0;   ///< nearer than this but no loop: ignored [m]
+
+  /// Empty if usable, else what is wrong and what to do.
+  std::string Validate() const;
+};
+
+/// Reads a matrix: PNG, BMP or any image (white = loop, black = none, grey = ignore); MATLAB v5 .mat (the
+/// first square matrix, full or sparse, compressed or not); text with one row a line (1 or 255 = loop, 0 =
+/// none, between = ignore), or with two numbers a line: 0-based "row column" pairs of loops among
+/// `num_images` images. A matrix whose lower triangle is empty is transposed. Throws InputError that names
+/// the file (and line) for a missing, damaged or non-square one.
+LoopGroundTruth ReadLoopMatrix(const std::filesystem::path& file, int num_images);
+
+/// Derives the matrix from poses, one per image in the same order.
+LoopGroundTruth LoopsFromTrajectory(const Trajectory& trajectory, const LoopRule& rule);
+
+/// MATLAB v5: the first square numeric matrix with more than one row, row by row. Throws InputError. Used by
+/// ReadLoopMatrix.
+std::vector<double> ReadMatSquareMatrix(const std::filesystem::path& file, int& size);
+
+}  // namespace tutti

@@ -1,0 +1,43 @@
+// Distances of one descriptor to many. Internal.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+
+namespace tutti::internal {
+
+/// Differing bits of two descriptors of `bytes` bytes.
+inline int HammingDistance(const std::uint8_t* a, const std::uint8_t* b, int bytes) {
+  int bits = 0;
+  int i = 0;
+  for (; i + 8 <= bytes; i += 8) {
+    std::uint64_t x = 0;
+    std::uint64_t y = 0;
+    std::memcpy(&x, a + i, 8);
+    std::memcpy(&y, b + i, 8);
+    bits += __builtin_popcountll(x ^ y);
+  }
+  for (; i < bytes; ++i) bits += __builtin_popcount(static_cast<unsigned>(a[i] ^ b[i]));
+  return bits;
+}
+
+/// Squared Euclidean distances of a row to `count` rows that lie `step` floats apart. The same bits on every
+/// machine and for every alignment: sums in a fixed order, no fused multiply-add.
+void SquaredDistances(const float* query, const float* rows, int count, int dimensions, std::size_t step,
+                      float* distances);
+
+/// Hamming distances in bits of a row to `count` rows that lie `step` bytes apart.
+void HammingDistances(const std::uint8_t* query, const std::uint8_t* rows, int count, int bytes,
+                      std::size_t step, float* distances);
+
+}  // namespace tutti::internal
+
+// Functions compiled for plain x86-64 and once more with newer instructions, chosen at run time. Sanitizers
+// do not get along with the resolvers that choose.
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
+    !defined(__SANITIZE_THREAD__)
+#define TUTTI_CLONES(...) __attribute__((target_clones("default", __VA_ARGS__)))
+#else
+#define TUTTI_CLONES(...)
+#endif

@@ -154,8 +154,7 @@ void ConfigTable::AddExtraction(ExtractionOptions& o) {
   Add("sift_max_pixels", o.sift_max_pixels,
       "SIFT sees the image halved until it has at most this many pixels [px]");
   Add("sift_contrast", o.sift_contrast, "contrast threshold of SIFT (OpenCV's own default is 0.04)");
-  Add("orb_fast_threshold", o.orb_fast_threshold,
-      "FAST threshold of ORB [grey levels of 255]");
+  Add("orb_fast_threshold", o.orb_fast_threshold, "FAST threshold of ORB [grey levels of 255]");
 }
 
 void ConfigTable::AddVocabulary(VocabularyOptions& o) {
@@ -232,8 +231,12 @@ void ConfigTable::AddRun(SlamOptions& o) {
   Add("loop_after_fraction", o.loop_after_fraction,
       "a loop that is off by more than this share of the median scene depth after optimisation is taken out");
   Add("loop_after_deg", o.loop_after_deg, "the same for the angle [deg]");
+  Add("loop_defer_fraction", o.loop_defer_fraction,
+      "a loop that the map fulfils within this share of the depth waits for the next correction");
+  Add("loop_defer_deg", o.loop_defer_deg, "and within this angle [deg]; 0: each loop moves the map");
   Add("covisibility_min_shared", o.covisibility_min_shared,
       "shared landmarks that make an edge in the pose graph");
+  Add("covisibility_edges", o.covisibility_edges, "at most so many of them for each keyframe");
   Add("odometry_sigma_deg", o.odometry_sigma_deg, "standard deviation of an odometry edge's rotation [deg]");
   Add("odometry_sigma_fraction", o.odometry_sigma_fraction, "of its translation, as a share of its length");
   Add("odometry_sigma_scale", o.odometry_sigma_scale, "mono: of log(scale)");

@@ -40,11 +40,22 @@ bool LoopGate::Agree(const LoopEdge& a, const LoopEdge& b, const Map& map) const
   return Within(Measure(E, a.depth));
 }
 
-bool LoopGate::AgreesWithMap(const LoopEdge& loop, const Map& map) const {
+std::optional<Disagreement> LoopGate::WithMap(const LoopEdge& loop, const Map& map) const {
   const Place q = map(loop.query), c = map(loop.candidate);
-  if (!q.alive || !c.alive || q.piece != c.piece) return false;
+  if (!q.alive || !c.alive || q.piece != c.piece) return std::nullopt;
   const Similarity T_query_candidate(q.T_world_camera.Inverse() * c.T_world_camera);
-  return Within(Measure(loop.S_candidate_query * T_query_candidate, loop.depth));
+  return Measure(loop.S_candidate_query * T_query_candidate, loop.depth);
+}
+
+bool LoopGate::AgreesWithMap(const LoopEdge& loop, const Map& map) const {
+  const std::optional<Disagreement> d = WithMap(loop, map);
+  return d && Within(*d);
+}
+
+bool LoopGate::Fulfilled(const LoopEdge& loop, const Map& map) const {
+  const std::optional<Disagreement> d = WithMap(loop, map);
+  return d && d->fraction < options_.loop_defer_fraction && d->angle_deg < options_.loop_defer_deg &&
+         d->log_scale < options_.loop_defer_fraction;
 }
 
 std::vector<LoopEdge> LoopGate::Offer(const LoopEdge& loop, const Map& map) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "tutti/pipeline/loop_record.h"
@@ -41,6 +42,9 @@ class LoopGate {
   /// True if the present map says the same as the loop.
   bool AgreesWithMap(const LoopEdge& loop, const Map& map) const;
 
+  /// True if the present map fulfils the loop so well that it need not move for it.
+  bool Fulfilled(const LoopEdge& loop, const Map& map) const;
+
   /// To be told of what finally entered, and (mono) of the map's change of scale: waiting loops are measured
   /// again.
   void Accepted(const LoopEdge& loop) { accepted_.push_back(loop); }
@@ -48,9 +52,10 @@ class LoopGate {
   /// The loops that entered; the pose graph rescales them when it moves the map.
   std::vector<LoopEdge>& accepted() { return accepted_; }
   const std::vector<LoopEdge>& accepted() const { return accepted_; }
-  std::vector<LoopEdge>& waiting_loops() { return waiting_; }
+  std::vector<LoopEdge>& waiting() { return waiting_; }
 
  private:
+  std::optional<Disagreement> WithMap(const LoopEdge& loop, const Map& map) const;
   bool Within(const Disagreement& d) const;
   bool Near(const LoopEdge& a, const LoopEdge& b) const;
 

@@ -7,6 +7,7 @@ namespace tutti {
 namespace {
 
 constexpr double kRadians = 0.017453292519943295;
+constexpr int kRecentKeyframes = 20;  // ids apart: common landmarks are the odometry's own
 
 Similarity Rescaled(const Similarity& s, double scale_a, double scale_b) {
   return Similarity(scale_a * s.scale / scale_b, s.rotation, scale_a * s.translation);
@@ -40,11 +41,22 @@ std::map<MapGraph::Edge, Similarity> MapGraph::OdometryEdges(const Odometry& odo
   for (std::size_t i = 1; i < ids.size(); ++i) {
     if (same_birth(ids[i - 1], ids[i])) add(ids[i - 1], ids[i]);
   }
+  // The strongest few of each keyframe: more would count the same landmarks again and again.
+  std::map<int, std::vector<std::pair<int, int>>> older_of;  // newer id -> (-shared, older id)
   for (const auto& [pair, shared] : odometry.Covisibility(options_.covisibility_min_shared)) {
     // Keyframes that a loop brought together see common landmarks too; that is the loop's edge, not the
     // odometry's.
-    const bool recent = kept_.count(pair) != 0 || kept_.empty() || pair.second - pair.first < 20;
-    if (same_birth(pair.first, pair.second) && recent) add(pair.first, pair.second);
+    const bool recent =
+        kept_.count(pair) != 0 || kept_.empty() || pair.second - pair.first < kRecentKeyframes;
+    if (recent && same_birth(pair.first, pair.second) && edges.count(pair) == 0) {
+      older_of[pair.second].emplace_back(-shared, pair.first);
+    }
+  }
+  for (auto& [newer, candidates] : older_of) {
+    std::sort(candidates.begin(), candidates.end());
+    const std::size_t count =
+        std::min(candidates.size(), static_cast<std::size_t>(options_.covisibility_edges));
+    for (std::size_t i = 0; i < count; ++i) add(candidates[i].second, newer);
   }
   return edges;
 }

@@ -13,6 +13,9 @@ std::string SlamOptions::Validate() const {
   if (loop_confirmations < 1) return "loop_confirmations must be at least 1";
   if (loop_confirmation_frames < 1) return "loop_confirmation_frames must be at least 1";
   if (covisibility_min_shared < 10) return "covisibility_min_shared must be at least 10";
+  if (covisibility_edges < 0) return "covisibility_edges must not be negative";
+  if (!(loop_defer_fraction >= 0)) return "loop_defer_fraction must not be negative";
+  if (!(loop_defer_deg >= 0)) return "loop_defer_deg must not be negative";
   const std::pair<const char*, double> positive[] = {
       {"loop_agree_fraction", loop_agree_fraction},
       {"loop_agree_deg", loop_agree_deg},

@@ -56,6 +56,7 @@ class SlamSystem::Impl {
 
   void Finish() {
     while (!submitted_.empty()) Deliver(-1);
+    if (!deferred_.empty()) Close(std::exchange(deferred_, {}), -1);
     for (LoopRecord& record : records_) {
       if (!record.pending) continue;
       record.pending = false;
@@ -189,13 +190,21 @@ class SlamSystem::Impl {
     constraint.edge.record = records_.size() - 1;
     record.S_candidate_query = constraint.edge.S_candidate_query;
     record.has_scale = true;
-    const std::vector<LoopEdge> entering = gate_.Offer(constraint.edge, Places());
+    const LoopGate::Map places = Places();
+    std::vector<LoopEdge> entering = gate_.Offer(constraint.edge, places);
     if (entering.empty()) {
       record.pending = true;
       record.reason = "waits for a second loop that agrees";
       return;
     }
-    Close(entering, next_frame);
+    entering.insert(entering.begin(), deferred_.begin(), deferred_.end());
+    deferred_.clear();
+    const auto fulfilled = [&](const LoopEdge& loop) { return gate_.Fulfilled(loop, places); };
+    if (std::all_of(entering.begin(), entering.end(), fulfilled)) {
+      deferred_ = std::move(entering);
+    } else {
+      Close(std::move(entering), next_frame);
+    }
   }
 
   bool Contradicts(const Disagreement& d) const {
@@ -258,7 +267,7 @@ class SlamSystem::Impl {
       untouched_ = *odometry_;
       untouched_next_ = next_frame;
     }
-    graph_.Keep(*odometry_, correction, gate_.accepted(), gate_.waiting_loops());
+    graph_.Keep(*odometry_, correction, gate_.accepted(), gate_.waiting());
     odometry_->ApplyCorrection(correction.S_world_keyframe, correction.merges);
     ++corrections_;
   }
@@ -270,6 +279,7 @@ class SlamSystem::Impl {
   MapGraph graph_;
   std::unique_ptr<LoopWorker> worker_;
   std::deque<Submission> submitted_;
+  std::vector<LoopEdge> deferred_;  // agreed, and the map fulfils them: they enter with the next correction
   std::map<std::int64_t, int> keyframe_of_frame_;  // of the frames that the detector knows
   std::map<std::int64_t, double> stamps_;          // the same
   std::int64_t frames_ = 0;

@@ -22,7 +22,12 @@ struct SlamOptions {
   double loop_after_fraction = 0.5;  ///< a loop whose residual after optimisation is beyond this share of the
                                      ///< median scene depth contradicts the graph and is taken out again
   double loop_after_deg = 8.0;       ///< the same for its angle [deg]
+  double loop_defer_fraction =
+      0.02;                     ///< a loop that the map fulfils within this share of the median scene depth
+                                ///< enters the graph, but waits for the next correction to move the map
+  double loop_defer_deg = 0.3;  ///< and within this angle [deg]; 0: each loop moves the map
   int covisibility_min_shared = 100;  ///< landmarks that two keyframes share to get an edge in the pose graph
+  int covisibility_edges = 3;         ///< at most so many of them for each keyframe, the strongest
   double odometry_sigma_deg = 0.1;    ///< standard deviation of an odometry edge's rotation [deg]
   double odometry_sigma_fraction =
       0.01;  ///< of its translation, as a share of its length (plus 0.1 % of the depth)

@@ -1,0 +1,28 @@
+// Runs the real `tutti` executable, as a user would.
+#pragma once
+
+#include <sys/types.h>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace tutti::testing {
+
+/// What the process printed (both streams) and how it ended.
+struct ProcessResult {
+  int status = -1;  ///< exit status; 128 + signal if it was killed
+  std::string output;
+};
+
+/// Runs tutti with these arguments and waits for it.
+ProcessResult RunTutti(const std::vector<std::string>& arguments);
+
+/// Starts tutti, sends `signal` as soon as the output holds `text`, and waits for its end.
+ProcessResult RunTuttiAndSignal(const std::vector<std::string>& arguments, const std::string& text,
+                                int signal);
+
+std::string ReadAll(const std::filesystem::path& file);
+void WriteAll(const std::filesystem::path& file, const std::string& text);
+
+}  // namespace tutti::testing

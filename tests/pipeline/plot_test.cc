@@ -1,0 +1,82 @@
+#include "tutti/pipeline/plot.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <opencv2/imgcodecs.hpp>
+#include <sstream>
+
+#include "test_data.h"
+#include "tutti/core/error.h"
+
+namespace tutti {
+namespace {
+
+std::string ReadAll(const std::filesystem::path& file) {
+  std::ifstream in(file);
+  std::stringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+TrajectoryPlot Circle() {
+  TrajectoryPlot plot;
+  plot.title = "a < b & c";
+  PlotSeries series;
+  series.name = "reference";
+  series.color = "#0072b2";
+  for (int i = 0; i <= 100; ++i)
+    series.points.emplace_back(10 * std::cos(0.0628 * i), 0.01 * i, 10 * std::sin(0.0628 * i));
+  plot.series.push_back(series);
+  plot.edges.emplace_back(series.points[0], series.points[50]);
+  return plot;
+}
+
+TEST(Plot, SvgHasAxesUnitsLegendAndEscapedTitle) {
+  const auto file = testing::FreshFolder() / "p.svg";
+  WriteSvg(file, Circle());
+  const std::string svg = ReadAll(file);
+  EXPECT_NE(svg.find("a &lt; b &amp; c"), std::string::npos);
+  EXPECT_NE(svg.find("x [m]"), std::string::npos);  // the flat axis y is not drawn
+  EXPECT_NE(svg.find("z [m]"), std::string::npos);
+  EXPECT_NE(svg.find(">reference<"), std::string::npos);
+  EXPECT_NE(svg.find(">loops<"), std::string::npos);
+  EXPECT_NE(svg.find("</svg>"), std::string::npos);
+  EXPECT_EQ(svg.find("nan"), std::string::npos);
+}
+
+TEST(Plot, PngIsNotBlank) {
+  const auto file = testing::FreshFolder() / "p.png";
+  WritePng(file, Circle());
+  const cv::Mat image = cv::imread(file.string(), cv::IMREAD_COLOR);
+  ASSERT_FALSE(image.empty());
+  int blue = 0;
+  for (int y = 0; y < image.rows; ++y) {
+    for (int x = 0; x < image.cols; ++x)
+      blue += image.at<cv::Vec3b>(y, x) == cv::Vec3b(0xb2, 0x72, 0x00) ? 1 : 0;
+  }
+  EXPECT_GT(blue, 500);
+}
+
+TEST(Plot, EmptySinglePointAndNonFiniteAreDrawable) {
+  const auto folder = testing::FreshFolder();
+  TrajectoryPlot plot;
+  WriteSvg(folder / "empty.svg", plot);
+  plot.series.push_back({"one", {Eigen::Vector3d(1, 2, 3)}, "#000000", 1, false});
+  WriteSvg(folder / "one.svg", plot);
+  plot.series[0].points.push_back(Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()));
+  plot.series[0].dashed = true;
+  WritePng(folder / "nan.png", plot);
+  EXPECT_EQ(ReadAll(folder / "one.svg").find("nan"), std::string::npos);
+  EXPECT_TRUE(std::filesystem::exists(folder / "nan.png"));
+}
+
+TEST(Plot, UnwritableFileIsAnInputError) {
+  EXPECT_THROW(WriteSvg("/proc/no/plot.svg", Circle()), InputError);
+  EXPECT_THROW(WritePng("/proc/no/plot.png", Circle()), InputError);
+}
+
+}  // namespace
+}  // namespace tutti

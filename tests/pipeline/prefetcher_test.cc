@@ -1,0 +1,65 @@
+#include "prefetcher.h"
+
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+
+namespace tutti {
+namespace {
+
+/// Ten frames; number 3 is bad, number 5 makes the reader throw.
+class FakeDataset : public Dataset {
+ public:
+  std::size_t Size() const override { return 10; }
+  double Stamp(std::size_t i) const override { return static_cast<double>(i); }
+  ReadResult Read(std::size_t i) const override {
+    ReadResult result;
+    if (i == 5) throw std::runtime_error("frame 5 exploded");
+    if (i == 3) {
+      result.error = "frame 3 is damaged";
+    } else {
+      result.frame.emplace();
+      result.frame->index = static_cast<std::int64_t>(i);
+    }
+    return result;
+  }
+  const CameraRig& Rig() const override { return rig_; }
+  std::optional<std::filesystem::path> GroundTruthFile() const override { return std::nullopt; }
+  Trajectory ReadGroundTruth(const std::filesystem::path&) const override { return {}; }
+  const std::vector<std::string>& Warnings() const override { return warnings_; }
+
+ private:
+  CameraRig rig_;
+  std::vector<std::string> warnings_;
+};
+
+class PrefetcherAhead : public ::testing::TestWithParam<std::size_t> {};
+
+TEST_P(PrefetcherAhead, DeliversAllFramesInOrderAndErrorsInTheirPlace) {
+  const FakeDataset dataset;
+  Prefetcher frames(dataset, 1, dataset.Size(), GetParam());
+  for (std::size_t i = 1; i < dataset.Size(); ++i) {
+    const auto read = frames.Next();
+    ASSERT_TRUE(read.has_value());
+    if (i == 3) {
+      EXPECT_EQ(read->error, "frame 3 is damaged");
+    } else if (i == 5) {
+      EXPECT_EQ(read->error, "frame 5 exploded");
+    } else {
+      ASSERT_TRUE(read->frame.has_value());
+      EXPECT_EQ(read->frame->index, static_cast<std::int64_t>(i));
+    }
+  }
+  EXPECT_FALSE(frames.Next().has_value());
+}
+
+TEST_P(PrefetcherAhead, StopsInTheMiddleWithoutHanging) {
+  const FakeDataset dataset;
+  Prefetcher frames(dataset, 0, dataset.Size(), GetParam());
+  EXPECT_TRUE(frames.Next().has_value());
+}
+
+INSTANTIATE_TEST_SUITE_P(Ahead, PrefetcherAhead, ::testing::Values(0, 1, 4, 100));
+
+}  // namespace
+}  // namespace tutti

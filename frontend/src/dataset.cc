@@ -1,7 +1,8 @@
 #include "tutti/frontend/dataset.h"
 
-#include <array>
+#include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "dataset_folder.h"
 #include "tutti/core/error.h"
@@ -19,6 +20,29 @@ std::string DatasetOptions::Validate() const {
   return {};
 }
 
+namespace {
+
+// A picture of the ground truth or of a map among hundreds of frames is not a frame: types that make up less
+// than a tenth of the images are left out.
+void DropStrayTypes(const std::filesystem::path& folder, std::vector<std::filesystem::path>& files,
+                    std::vector<std::string>& warnings) {
+  std::map<std::string, std::size_t> counts;
+  for (const std::filesystem::path& file : files) ++counts[file.extension().string()];
+  const std::size_t all = files.size();
+  for (const auto& [extension, count] : counts) {
+    if (10 * count >= all) continue;
+    const std::string& type = extension;
+    files.erase(
+        std::remove_if(files.begin(), files.end(),
+                       [&](const std::filesystem::path& f) { return f.extension().string() == type; }),
+        files.end());
+    warnings.push_back(folder.string() + ": " + std::to_string(count) + " " + type + " image(s) among " +
+                       std::to_string(all) + " images of other types are left out");
+  }
+}
+
+}  // namespace
+
 FolderContents FindImages(const std::filesystem::path& folder, const DatasetOptions& options) {
   if (options.sensor != Sensor::kMono) {
     throw InputError(folder.string() +
@@ -29,8 +53,9 @@ FolderContents FindImages(const std::filesystem::path& folder, const DatasetOpti
   out.folder = folder;
   out.left = options.camera;
   out.rate_hz = options.rate_hz > 0 ? options.rate_hz : 10.0;
-  const std::vector<std::filesystem::path> files = ListImages(folder);
+  std::vector<std::filesystem::path> files = ListImages(folder);
   if (files.empty()) throw InputError(folder.string() + ": holds no images (png, jpg, webp, ...)");
+  DropStrayTypes(folder, files, out.warnings);
   for (const std::filesystem::path& file : files) {
     FrameFiles frame;
     frame.index = static_cast<std::int64_t>(out.frames.size());

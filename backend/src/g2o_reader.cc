@@ -63,6 +63,9 @@ class Reader {
   void ReadLine() {
     const std::string& tag = words_[0];
     if (tag == "FIX") return ReadFix();
+    for (const char c : tag) {
+      if (static_cast<unsigned char>(c) < 0x20) Fail(line_, "holds binary data; is it a g2o file?");
+    }
     const auto known = KnownTags().find(tag);
     if (known == KnownTags().end()) {
       auto& [count, first] =

@@ -58,9 +58,6 @@ class GraphProblem {
     for (const PoseGraphEdge& edge : graph.edges())
       costs_.emplace_back(MakeEdgeConstants<N>(edge, options.objective));
     threshold_ = options.robust_chi2 > 0 ? options.robust_chi2 : ChiSquare99(N);
-    if (options.robust == RobustLoss::kHuber)
-      loss_ = std::make_unique<ceres::HuberLoss>(std::sqrt(threshold_));
-    if (options.robust == RobustLoss::kDcs) loss_ = std::make_unique<DcsLoss>(threshold_);
     BuildCeresProblem();
   }
 
@@ -95,7 +92,11 @@ class GraphProblem {
     return sum;
   }
 
+  /// The loss on loop edges from now on; nullptr: least squares.
+  void SetLoss(ceres::LossFunction* owned) { loss_.Reset(owned, ceres::TAKE_OWNERSHIP); }
+
   double weight(std::size_t e) const { return weights_[e]; }
+  const std::vector<double>& weights() const { return weights_; }
   void SetWeight(std::size_t e, double weight) {
     weights_[e] = weight;
     costs_[e].SetWeight(weight);
@@ -152,8 +153,7 @@ class GraphProblem {
     }
     for (std::size_t e = 0; e < costs_.size(); ++e) {
       const EdgeEnds& ends = structure_.ends[e];
-      ceres_.AddResidualBlock(&costs_[e], IsLoop(e) ? loss_.get() : nullptr, Block(ends.from),
-                              Block(ends.to));
+      ceres_.AddResidualBlock(&costs_[e], IsLoop(e) ? &loss_ : nullptr, Block(ends.from), Block(ends.to));
     }
   }
 
@@ -165,7 +165,7 @@ class GraphProblem {
   std::vector<double> weights_;
   std::deque<EdgeCost<N>> costs_;  // a deque: cost functions can't be moved
   std::unique_ptr<ManifoldBase> manifold_;
-  std::unique_ptr<ceres::LossFunction> loss_;
+  ceres::LossFunctionWrapper loss_{nullptr, ceres::TAKE_OWNERSHIP};
   ceres::Problem ceres_;
 };
 

@@ -38,51 +38,67 @@ class Run {
         report_(report),
         problem_(graph, structure, options) {}
 
-  bool Initialize() {
-    std::vector<std::pair<GraphInit, std::vector<Similarity>>> candidates;
+  /// The places to start from. False, with the reason in the report, if there is none.
+  bool CollectStarts() {
     const bool every = options_.init == GraphInit::kAuto;
     std::string missing, reason;
     if (every || options_.init == GraphInit::kFile) {
       std::vector<Similarity> poses;
-      for (std::size_t k = 0; k < graph_.nodes().size(); ++k) {
-        const PoseGraphNode& node = graph_.nodes()[k];
+      for (const PoseGraphNode& node : graph_.nodes()) {
         if (!node.has_estimate && missing.empty()) missing = std::to_string(node.id);
         poses.push_back(node.pose);
       }
-      if (missing.empty()) candidates.emplace_back(GraphInit::kFile, std::move(poses));
+      if (missing.empty()) AddStart(GraphInit::kFile, std::move(poses));
     }
     if (every || options_.init == GraphInit::kOdometry) {
-      candidates.emplace_back(GraphInit::kOdometry, internal::OdometryInitialization(graph_, structure_));
+      AddStart(GraphInit::kOdometry, internal::OdometryInitialization(graph_, structure_));
     }
     if (every || options_.init == GraphInit::kChordal) {
       std::vector<Similarity> poses = internal::ChordalInitialization(graph_, structure_, reason);
-      if (!poses.empty()) candidates.emplace_back(GraphInit::kChordal, std::move(poses));
+      if (!poses.empty()) AddStart(GraphInit::kChordal, std::move(poses));
     }
-    if (candidates.empty()) {
-      report_.reason =
-          options_.init == GraphInit::kFile
-              ? "node " + missing + " has no pose; initialise from the edges (auto, odometry or chordal)"
-              : "the chordal initialisation failed: " + reason;
-      return false;
-    }
-    TakeBest(candidates);
-    return true;
+    std::stable_sort(starts_.begin(), starts_.end(),
+                     [](const Start& a, const Start& b) { return a.objective < b.objective; });
+    if (!starts_.empty()) return true;
+    report_.reason =
+        !reason.empty() ? "the chordal initialisation failed: " + reason
+        : !missing.empty()
+            ? "node " + missing + " has no pose; initialise from the edges (auto, odometry or chordal)"
+            : "the cost at the start is not finite; the poses or measurements are too large";
+    return false;
   }
 
+  /// Solves from the best start; with a robust loss from each, for the lowest cost at the start tells little
+  /// then.
   bool Solve() {
-    report_.initial_costs = EvaluateCosts(Copy());
-    report_.initial_objective = problem_.Objective();
-    if (!std::isfinite(report_.initial_objective)) {
-      report_.reason = "the cost at the start is not finite; the poses or measurements are too large";
-      return false;
+    const bool robust = options_.robust != RobustLoss::kNone && HasLoops();
+    if (!robust) starts_.resize(1);
+    bool found = false;
+    std::vector<Similarity> best;
+    std::vector<double> best_weights;
+    const std::size_t attempts = robust && options_.robust != RobustLoss::kHuber ? 2 : 1;
+    for (std::size_t k = 0; k < attempts * starts_.size(); ++k) {
+      const Start& start = starts_[k / attempts];
+      problem_.SetPoses(start.poses);
+      if (!(robust ? SolveRobust(k % attempts == 0) : SolveOnce(options_.max_iterations))) continue;
+      const double objective = problem_.Objective();
+      if (!std::isfinite(objective) || (found && objective >= report_.objective)) continue;
+      found = true;
+      report_.init = start.init;
+      report_.initial_objective = start.objective;
+      report_.objective = objective;
+      best = problem_.Poses();
+      best_weights = problem_.weights();
     }
-    const bool gnc = options_.robust == RobustLoss::kGnc && HasLoops();
-    const bool usable = gnc ? SolveGnc() : SolveOnce(options_.max_iterations);
-    report_.objective = problem_.Objective();
-    if (!usable || !std::isfinite(report_.objective)) {
+    if (!found) {
       if (report_.reason.empty()) report_.reason = "the solver found no usable step";
       return false;
     }
+    for (const Start& start : starts_) {
+      if (start.init == report_.init) report_.initial_costs = CostsAt(start.poses);
+    }
+    problem_.SetPoses(best);
+    for (std::size_t e = 0; e < best_weights.size(); ++e) problem_.SetWeight(e, best_weights[e]);
     return true;
   }
 
@@ -104,19 +120,20 @@ class Run {
   }
 
  private:
-  void TakeBest(std::vector<std::pair<GraphInit, std::vector<Similarity>>>& candidates) {
-    std::size_t best = 0;
-    double lowest = 0;
-    for (std::size_t k = 0; k < candidates.size(); ++k) {
-      problem_.SetPoses(candidates[k].second);
-      const double cost = problem_.Objective();
-      if (k == 0 || cost < lowest || !std::isfinite(lowest)) {
-        best = k;
-        lowest = cost;
-      }
+  struct Start {
+    GraphInit init;
+    std::vector<Similarity> poses;
+    double objective;
+  };
+
+  void AddStart(GraphInit init, std::vector<Similarity> poses) {
+    problem_.SetPoses(poses);
+    const double objective = problem_.Objective();
+    for (const Start& other : starts_) {
+      if (std::abs(objective - other.objective) <= 1e-9 * objective)
+        return;  // the file often is the odometry
     }
-    report_.init = candidates[best].first;
-    problem_.SetPoses(candidates[best].second);
+    if (std::isfinite(objective)) starts_.push_back({init, std::move(poses), objective});
   }
 
   bool HasLoops() const {
@@ -140,49 +157,73 @@ class Run {
     return true;
   }
 
-  double LargestLoopChi2() const {
-    double largest = 0;
+  std::vector<double> LoopChi2() const {
+    std::vector<double> out;
     for (std::size_t e = 0; e < graph_.edges().size(); ++e) {
-      if (problem_.IsLoop(e)) largest = std::max(largest, problem_.EdgeChi2(e));
+      if (problem_.IsLoop(e)) out.push_back(problem_.EdgeChi2(e));
     }
-    return largest;
+    return out;
   }
 
-  /// Yang et al., RA-L 2020, eq. (14) and remark 5: truncated least squares by graduated non-convexity.
-  bool SolveGnc() {
-    constexpr int kIterationsPerRound =
-        3;  // the surrogate moves on before it has converged; the last round converges
+  void SetLoss(double c2) {
+    switch (options_.robust) {
+      case RobustLoss::kNone:
+        problem_.SetLoss(nullptr);
+        break;
+      case RobustLoss::kHuber:
+        problem_.SetLoss(new ceres::HuberLoss(std::sqrt(c2)));
+        break;
+      case RobustLoss::kDcs:
+        problem_.SetLoss(new internal::DcsLoss(c2));
+        break;
+      case RobustLoss::kGnc:
+        problem_.SetLoss(new internal::GemanMcClureLoss(c2));
+        break;
+    }
+  }
+
+  /// Huber is convex enough to be solved directly. The others have many local minima: they start with a
+  /// threshold so large that every loop pulls (the drift of the odometry must not look like a false loop) and
+  /// tighten it round by round (graduated non-convexity, Yang et al., RA-L 2020).
+  bool SolveRobust(bool annealed) {
+    constexpr int kIterationsPerRound = 4;  // a round need not converge; the last one does
     const double c2 = problem_.threshold();
+    for (std::size_t e = 0; e < graph_.edges().size(); ++e) problem_.SetWeight(e, 1.0);
+    if (annealed && options_.robust != RobustLoss::kHuber) {
+      std::vector<double> chi2 = LoopChi2();
+      double loose = options_.gnc_start * *std::max_element(chi2.begin(), chi2.end());
+      for (int round = 0; loose > c2 && round < options_.gnc_max_rounds;
+           ++round, loose /= options_.gnc_step) {
+        ++report_.gnc_rounds;
+        SetLoss(loose);
+        if (!SolveOnce(kIterationsPerRound)) return false;
+        chi2 = LoopChi2();
+        // Loops that have come together need no further rounds.
+        loose =
+            std::min(loose, options_.gnc_step * std::max(c2, *std::max_element(chi2.begin(), chi2.end())));
+      }
+    }
+    SetLoss(c2);
     if (!SolveOnce(options_.max_iterations)) return false;
-    const double largest = LargestLoopChi2();
-    if (largest <= c2) return true;  // nothing to doubt: plain least squares is the answer
-    double mu = c2 / (2.0 * largest - c2);
-    for (int round = 0; round < options_.gnc_max_rounds; ++round, mu *= options_.gnc_step) {
-      ++report_.gnc_rounds;
-      if (UpdateGncWeights(mu, c2)) break;
-      if (report_.iterations >= options_.max_iterations) break;
-      if (!SolveOnce(kIterationsPerRound)) return false;
-    }
-    for (std::size_t e = 0; e < graph_.edges().size(); ++e) {
-      if (problem_.IsLoop(e)) problem_.SetWeight(e, problem_.weight(e) < 0.5 ? 0.0 : 1.0);
-    }
-    return SolveOnce(options_.max_iterations);
+    return options_.robust == RobustLoss::kGnc ? DecideLoops(c2) : true;
   }
 
-  /// True if every weight is 0 or 1.
-  bool UpdateGncWeights(double mu, double c2) {
-    bool binary = true;
-    for (std::size_t e = 0; e < graph_.edges().size(); ++e) {
-      if (!problem_.IsLoop(e)) continue;
-      const double s = problem_.EdgeChi2(e);
-      double weight = std::sqrt(c2 * mu * (mu + 1.0) / std::max(s, 1e-300)) - mu;
-      if (s >= (mu + 1.0) / mu * c2) weight = 0.0;
-      if (s <= mu / (mu + 1.0) * c2) weight = 1.0;
-      weight = std::clamp(weight, 0.0, 1.0);
-      if (weight > 1e-4 && weight < 1.0 - 1e-4) binary = false;
-      problem_.SetWeight(e, weight);
+  /// Truncated least squares: in or out for each loop, until the decision stands.
+  bool DecideLoops(double c2) {
+    constexpr int kRounds = 10;
+    problem_.SetLoss(nullptr);
+    for (int round = 0; round < kRounds; ++round) {
+      bool changed = round == 0;
+      for (std::size_t e = 0; e < graph_.edges().size(); ++e) {
+        if (!problem_.IsLoop(e)) continue;
+        const double weight = problem_.EdgeChi2(e) <= c2 ? 1.0 : 0.0;
+        changed = changed || weight != problem_.weight(e);
+        problem_.SetWeight(e, weight);
+      }
+      if (!changed) break;
+      if (!SolveOnce(options_.max_iterations)) return false;
     }
-    return binary;
+    return true;
   }
 
   void WritePoses(PoseGraph& graph) const {
@@ -192,10 +233,10 @@ class Run {
         graph.SetPose(graph.nodes()[k].id, poses[k]);
     }
   }
-  PoseGraph Copy() const {
+  GraphCosts CostsAt(const std::vector<Similarity>& poses) const {
     PoseGraph copy = graph_;
-    WritePoses(copy);
-    return copy;
+    for (std::size_t k = 0; k < poses.size(); ++k) copy.SetPose(graph_.nodes()[k].id, poses[k]);
+    return EvaluateCosts(copy);
   }
 
   PoseGraph& graph_;
@@ -203,6 +244,7 @@ class Run {
   const PoseGraphOptions& options_;
   PoseGraphReport& report_;
   GraphProblem<N> problem_;
+  std::vector<Start> starts_;
   Stopwatch watch_;
 };
 
@@ -211,7 +253,7 @@ void OptimizeAs(PoseGraph& graph, const GraphStructure& structure, const PoseGra
                 PoseGraphReport& report) {
   const Stopwatch watch;
   Run<N> run(graph, structure, options, report);
-  const bool initialized = run.Initialize();
+  const bool initialized = run.CollectStarts();
   report.init_time_s = watch.Seconds();
   if (initialized && run.Solve()) {
     run.Finish();
@@ -231,6 +273,7 @@ std::string PoseGraphOptions::Validate() const {
   if (!(function_tolerance > 0 && function_tolerance < 1))
     return "pose graph: function_tolerance must be in (0, 1)";
   if (!(gnc_step > 1) || !std::isfinite(gnc_step)) return "pose graph: gnc_step must be greater than 1";
+  if (!(gnc_start > 0) || !std::isfinite(gnc_start)) return "pose graph: gnc_start must be positive";
   if (gnc_max_rounds < 1) return "pose graph: gnc_max_rounds must be at least 1";
   if (!(max_time_s >= 0) || !std::isfinite(max_time_s))
     return "pose graph: max_time_s must be 0 (no limit) or positive";

@@ -29,6 +29,21 @@ inline double RobustWeight(RobustLoss robust, double s, double c2) {
   return 0.0;
 }
 
+/// Geman-McClure, rho = c2 s / (c2 + s): the surrogate that GNC tightens until only inliers matter.
+class GemanMcClureLoss final : public ceres::LossFunction {
+ public:
+  explicit GemanMcClureLoss(double c2) : c2_(c2) {}
+  void Evaluate(double s, double rho[3]) const override {
+    const double k = c2_ / (c2_ + s);
+    rho[0] = k * s;
+    rho[1] = k * k;
+    rho[2] = -2.0 * k * k / (c2_ + s);
+  }
+
+ private:
+  double c2_;
+};
+
 class DcsLoss final : public ceres::LossFunction {
  public:
   explicit DcsLoss(double c2) : c2_(c2) {}

@@ -48,9 +48,13 @@ struct PoseGraphOptions {
   GraphInit init = GraphInit::kAuto;
   int max_iterations = 200;  ///< of Levenberg-Marquardt, in all rounds together
   double function_tolerance =
-      1e-9;                 ///< stop when an iteration lowers the cost by less than this fraction [1]
-  double gnc_step = 1.4;    ///< factor by which GNC's convexity parameter grows each round [1], > 1
-  int gnc_max_rounds = 60;  ///< of GNC
+      1e-9;  ///< stop when an iteration lowers the cost by less than this fraction [1]
+  /// kDcs and kGnc start with a threshold of gnc_start x the largest chi-square of a loop [1], so that drift
+  /// does not look like a false loop, and divide it by gnc_step [1], > 1, in each of at most gnc_max_rounds
+  /// rounds.
+  double gnc_start = 1.0;
+  double gnc_step = 4.0;
+  int gnc_max_rounds = 60;
   double max_time_s =
       0;         ///< stop after this time [s]; 0: no limit (a limit makes the result depend on the machine)
   int seed = 0;  ///< nothing is random so far; kept so that callers set it in one place

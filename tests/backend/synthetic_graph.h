@@ -1,0 +1,39 @@
+// Pose graphs with a known answer.
+#pragma once
+
+#include <random>
+#include <vector>
+
+#include "tutti/backend/pose_graph.h"
+
+namespace tutti::testing {
+
+struct SyntheticGraphOptions {
+  GraphKind kind = GraphKind::kSE3;
+  int nodes = 120;                 ///< along two rounds of a circle, so that the second round meets the first
+  double noise_translation = 0.0;  ///< standard deviation per odometry edge [m]
+  double noise_rotation = 0.0;     ///< [rad]
+  double noise_log_scale = 0.0;    ///< kSim3 only
+  int loops = 40;                  ///< true loops between the rounds
+  int false_loops = 0;             ///< random wrong ones, added after the true ones
+  unsigned seed = 1;
+};
+
+struct SyntheticGraph {
+  PoseGraph graph;                       ///< poses: the odometry integrated
+  std::vector<Similarity> truth;         ///< by node id
+  std::vector<std::size_t> false_edges;  ///< positions in graph.edges()
+};
+
+SyntheticGraph MakeSyntheticGraph(const SyntheticGraphOptions& options);
+
+/// Root mean square distance of the nodes from the truth [m].
+double PositionError(const PoseGraph& graph, const std::vector<Similarity>& truth);
+
+/// A random similarity (scale 1 unless kSim3; planar for kSE2).
+Similarity RandomPose(GraphKind kind, std::mt19937& random, double translation, double rotation);
+
+/// A random positive definite matrix with strong off-diagonal terms.
+Matrix7d RandomInformation(std::mt19937& random);
+
+}  // namespace tutti::testing

@@ -6,12 +6,20 @@
 #include <mutex>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
+#include <opencv2/videoio/registry.hpp>
 
 #include "dataset_folder.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
 namespace {
+
+// FFmpeg and OpenCV's own motion JPEG; GStreamer only where OpenCV was built without FFmpeg.
+std::vector<int> Backends() {
+  const std::vector<cv::VideoCaptureAPIs> known = cv::videoio_registry::getBackends();
+  const bool ffmpeg = std::find(known.begin(), known.end(), cv::CAP_FFMPEG) != known.end();
+  return {ffmpeg ? cv::CAP_FFMPEG : cv::CAP_GSTREAMER, cv::CAP_OPENCV_MJPEG};
+}
 
 class VideoDataset : public Dataset {
  public:
@@ -111,11 +119,15 @@ class VideoDataset : public Dataset {
   }
 
   void Reopen() const {
+    // Not CAP_ANY: it tries every backend, and each reports its failure at length on stderr.
     bool opened = false;
-    try {
-      opened = capture_.open(file_.string());
-    } catch (const cv::Exception&) {
-      opened = false;
+    for (const int backend : Backends()) {
+      try {
+        opened = capture_.open(file_.string(), backend);
+      } catch (const cv::Exception&) {
+        opened = false;
+      }
+      if (opened) break;
     }
     if (!opened) {
       throw InputError(file_.string() +

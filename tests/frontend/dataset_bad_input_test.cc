@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
 
 #include "dataset_files.h"
 #include "gmock/gmock.h"
@@ -47,6 +49,43 @@ TEST(DatasetBadInputTest, TruncatedImagesOfEachFormatAreErrorsOfTheirFrame) {
       EXPECT_TRUE(data->Read(2).frame);
     }
   }
+}
+
+TEST(DatasetBadInputTest, DamagedBytesInsideAPngAreAnErrorOfTheirFrame) {
+  const auto folder = FreshFolder();
+  MakeKitti(folder, 3, false);
+  const auto file = folder / "image_0" / "000001.png";
+  std::fstream bytes(file, std::ios::in | std::ios::out | std::ios::binary);
+  bytes.seekp(static_cast<std::streamoff>(std::filesystem::file_size(file) / 2));
+  bytes << "damaged damaged";
+  bytes.close();
+  EXPECT_THAT(OpenDataset(folder, With(Sensor::kMono))->Read(1).error, HasSubstr("000001.png"));
+}
+
+TEST(DatasetBadInputTest, TruncatedVideoGivesItsFramesAndThenErrors) {
+  const auto file = FreshFolder() / "clip.avi";
+  {
+    cv::VideoWriter writer(file.string(), cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 25, cv::Size(64, 48));
+    if (!writer.isOpened()) GTEST_SKIP() << "this OpenCV can't write a video";
+    for (int i = 0; i < 30; ++i) {
+      cv::Mat frame;
+      cv::cvtColor(Picture(64, 48, i), frame, cv::COLOR_GRAY2BGR);
+      writer.write(frame);
+    }
+  }
+  Truncate(file, 0.6);
+  std::unique_ptr<Dataset> data;
+  try {
+    data = OpenDataset(file, With(Sensor::kMono));
+  } catch (const InputError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("clip.avi"));
+    return;
+  }
+  for (std::size_t i = 0; i < data->Size(); ++i) {
+    const ReadResult r = data->Read(i);
+    EXPECT_TRUE(r.frame || r.error.find("clip.avi") != std::string::npos) << r.error;
+  }
+  EXPECT_FALSE(data->Read(29).frame);
 }
 
 TEST(DatasetBadInputTest, TheFirstImageMayBeBrokenButNotAll) {

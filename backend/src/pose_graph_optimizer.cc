@@ -205,7 +205,10 @@ class Run {
     }
     SetLoss(c2);
     if (!SolveOnce(options_.max_iterations)) return false;
-    return options_.robust == RobustLoss::kGnc ? DecideLoops(c2) : true;
+    if (options_.robust != RobustLoss::kGnc) return true;
+    // Geman-McClure pulls less at true loops near the threshold than they deserve; DCS does not.
+    problem_.SetLoss(new internal::DcsLoss(c2));
+    return SolveOnce(options_.max_iterations) && DecideLoops(c2);
   }
 
   /// Truncated least squares: in or out for each loop, until the decision stands.

@@ -121,16 +121,19 @@ class TownBuilder {
         const bool alike = random_.Unit() < options_.repeat_fraction;
         if (alike) width = 9;
         if (options_.block_m - at - width < 6) width = options_.block_m - at;
-        AddHouse(start + at * right, right, width, alike);
+        AddHouse(start + at * right, right, width, alike, at == 0, at + width > options_.block_m - 0.01);
         at += width;
       }
     }
   }
 
-  void AddHouse(const Vector2d& left, const Vector2d& right, double width, bool alike) {
+  // `first`, `last`: at the corner of the block, where the front of the other street's house is the side
+  // wall.
+  void AddHouse(const Vector2d& left, const Vector2d& right, double width, bool alike, bool first,
+                bool last) {
     const Vector2d outward(right.y(), -right.x());
-    const double height = alike ? 9 : random_.In(6.5, 12.5), setback = alike ? 0.3 : random_.In(0, 0.9),
-                 depth = 5;
+    const double height = alike ? 9 : random_.In(6.5, 12.5), depth = 5;
+    const double setback = first || last ? 0.0 : alike ? 0.3 : random_.In(0, 0.9);
     const int which = alike ? random_.Int(0, kAlike - 1) : random_.Int(kAlike, kFacades - 1);
     const int wall = alike ? walls_[0] : Pick(walls_);
     const Vector3d base = Lift(left - setback * outward, 0), r = Lift(right, 0), n = Lift(outward, 0);
@@ -138,13 +141,15 @@ class TownBuilder {
     Face front = Quad(base + up, width * r, -up, facades_[static_cast<std::size_t>(which)]);
     scene_.faces.push_back(front);
     for (const bool left_side : {true, false}) {
+      if (left_side ? first : last) continue;
       Face side = left_side ? Quad(base - depth * n + up, depth * n, -up, wall)
                             : Quad(base + width * r + up, -depth * n, -up, wall);
       side.repeat_u = 1;
       side.repeat_v = 2;
       scene_.faces.push_back(side);
     }
-    const int signs = random_.Int(0, 2);  // unlike the facades, no two signs look the same
+    const int signs =
+        random_.Int(first || last ? 1 : 0, 2);  // unlike the facades, no two signs look the same
     for (int k = 0; k < signs; ++k) {
       const double w = random_.In(0.6, 1.5), h = random_.In(0.6, 1.3), z = random_.In(1.6, 4.5);
       const Vector3d at =

@@ -113,6 +113,7 @@ class TownBuilder {
     const Vector2d o(i * pitch_, j * pitch_);
     const Vector2d corners[4] = {o + Vector2d(low, low), o + Vector2d(high, low), o + Vector2d(high, high),
                                  o + Vector2d(low, high)};
+    corner_height_ = random_.In(7.5, 11);
     for (int side = 0; side < 4; ++side) {
       const Vector2d start = corners[side], right = (corners[(side + 1) % 4] - start).normalized();
       double at = 0;
@@ -132,7 +133,8 @@ class TownBuilder {
   void AddHouse(const Vector2d& left, const Vector2d& right, double width, bool alike, bool first,
                 bool last) {
     const Vector2d outward(right.y(), -right.x());
-    const double height = alike ? 9 : random_.In(6.5, 12.5), depth = 5;
+    const double own_height = alike ? 9 : random_.In(6.5, 12.5), depth = 5;
+    const double height = first || last ? corner_height_ : own_height;  // two fronts make one house
     const double setback = first || last ? 0.0 : alike ? 0.3 : random_.In(0, 0.9);
     const int which = alike ? random_.Int(0, kAlike - 1) : random_.Int(kAlike, kFacades - 1);
     const int wall = alike ? walls_[0] : Pick(walls_);
@@ -236,6 +238,7 @@ class TownBuilder {
   const SyntheticOptions options_;
   Random random_;
   double pitch_;
+  double corner_height_ = 9;  // of the block that is built [m]
   Scene scene_;
   std::vector<int> facades_, walls_, roads_, crossings_;
   std::vector<BoxTextures> cars_;

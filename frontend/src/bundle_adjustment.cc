@@ -98,11 +98,17 @@ BundleAdjustmentReport AdjustWindow(const PinholeCamera& camera, const std::vect
   BundleAdjustmentReport report;
   report.keyframes = static_cast<int>(moving.size());
   report.fixed = static_cast<int>(fixed.size());
-  std::map<int, CameraBlock> cameras;
+  // Side by side in the order of the ids: Ceres orders the blocks of a group by their addresses, and blocks scattered
+  // over the heap would make the last bits depend on what else the process does.
+  std::vector<CameraBlock> blocks;
+  blocks.reserve(moving.size() + fixed.size());
+  std::map<int, CameraBlock*> cameras;
   for (const std::vector<int>* set : {&moving, &fixed}) {
     for (int id : *set) {
       const Pose T = map->keyframe(id).T_world_camera.Inverse();
-      CameraBlock& block = cameras[id];
+      CameraBlock*& entry = cameras[id];
+      if (entry == nullptr) entry = &blocks.emplace_back();
+      CameraBlock& block = *entry;
       block.start = T.rotation;
       Eigen::Map<Eigen::Vector3d>(block.parameters.data()) = T.translation;
     }
@@ -135,22 +141,22 @@ BundleAdjustmentReport AdjustWindow(const PinholeCamera& camera, const std::vect
       if (block == cameras.end()) continue;
       const PointObservation m = Measurement(*map, map->keyframe(o.keyframe), o.feature, options.pixel_sigma);
       if (m.inverse_depth_sigma > 0) {
-        problem.AddResidualBlock(new ReprojectionCost<3>(&camera, &block->second, m), &huber3,
-                                 block->second.parameters.data(), points[i].data());
+        problem.AddResidualBlock(new ReprojectionCost<3>(&camera, block->second, m), &huber3,
+                                 block->second->parameters.data(), points[i].data());
       } else {
-        problem.AddResidualBlock(new ReprojectionCost<2>(&camera, &block->second, m), &huber2,
-                                 block->second.parameters.data(), points[i].data());
+        problem.AddResidualBlock(new ReprojectionCost<2>(&camera, block->second, m), &huber2,
+                                 block->second->parameters.data(), points[i].data());
       }
       used = true;
       ++report.observations;
     }
     if (used) ordering->AddElementToGroup(points[i].data(), 0);
   }
-  for (auto& [id, block] : cameras) {
-    if (!problem.HasParameterBlock(block.parameters.data())) continue;
-    ordering->AddElementToGroup(block.parameters.data(), 1);
+  for (const auto& [id, block] : cameras) {
+    if (!problem.HasParameterBlock(block->parameters.data())) continue;
+    ordering->AddElementToGroup(block->parameters.data(), 1);
     if (std::binary_search(fixed.begin(), fixed.end(), id))
-      problem.SetParameterBlockConstant(block.parameters.data());
+      problem.SetParameterBlockConstant(block->parameters.data());
   }
   ceres::Solver::Options solver;
   solver.linear_solver_type = ceres::DENSE_SCHUR;
@@ -168,7 +174,7 @@ BundleAdjustmentReport AdjustWindow(const PinholeCamera& camera, const std::vect
   if (!report.usable) return report;
 
   for (int id : moving) {
-    const Pose T = cameras[id].T_camera_world();
+    const Pose T = cameras.at(id)->T_camera_world();
     if (T.IsFinite()) map->keyframe(id).T_world_camera = T.Inverse();
   }
   std::vector<std::pair<int, int>> misfits;  // landmark, keyframe

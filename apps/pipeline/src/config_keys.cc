@@ -176,6 +176,9 @@ void ConfigTable::AddVerification(VerificationOptions& o) {
   Add("match_ratio", o.match_ratio, "Lowe's ratio test, on true distance");
   Add("min_inliers", o.min_inliers, "fewer inliers than this are no loop");
   Add("min_inlier_ratio", o.min_inlier_ratio, "inliers / matches, 0..1");
+  Add("min_epipolar_inliers", o.min_epipolar_inliers,
+      "essential, fundamental matrix: a match is held to a line only, so more are needed");
+  Add("min_epipolar_ratio", o.min_epipolar_ratio, "and a larger share of all matches, 0..1");
   Add("min_spread", o.min_spread, "rms extent of the inliers over the image, as share of its diagonal");
   Add("reprojection_px", o.reprojection_px, "RANSAC threshold of PnP, Sim(3) [px]");
   Add("epipolar_px", o.epipolar_px, "RANSAC threshold of the essential and fundamental matrix [px]");
@@ -209,6 +212,8 @@ void ConfigTable::AddGraph(PoseGraphOptions& o) {
       "stop when an iteration lowers the cost by less than this share");
   Add("gnc_step", o.gnc_step, "gnc: growth of the convexity parameter per round, > 1");
   Add("gnc_max_rounds", o.gnc_max_rounds, "gnc: most rounds");
+  Add("gnc_start", o.gnc_start,
+      "dcs, gnc: the threshold starts at this many times the largest chi-square of a loop");
   Add("max_time_s", o.max_time_s, "stop after this time [s]; 0: no limit (a limit is not reproducible)");
   Add("seed", o.seed, "nothing is random so far");
 }

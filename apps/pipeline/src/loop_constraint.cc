@@ -2,6 +2,9 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <opencv2/features2d.hpp>
+#include <set>
+#include <utility>
 
 #include "tutti/loopclosure/relative_pose.h"
 
@@ -10,6 +13,7 @@ namespace {
 
 constexpr double kRadians = 0.017453292519943295;
 constexpr int kMinSimilarityInliers = 12;  // of 3D-3D matches; fewer leave the scale open
+constexpr float kMaxHamming = 60;  // of 256 bits; beyond it two ORB descriptors have nothing in common
 
 Eigen::Vector2d Pixel(const cv::KeyPoint& keypoint) { return {keypoint.pt.x, keypoint.pt.y}; }
 
@@ -28,20 +32,61 @@ Matrix7d WithFloor(const Matrix7d& information, double sigma_translation, double
   return 0.5 * (inverse + inverse.transpose());
 }
 
+using Match = std::pair<int, int>;  // features of the candidate and of the query
+
+bool IsLandmark(const KeyframeView& view, int feature) {
+  return feature >= 0 && static_cast<std::size_t>(feature) < view.points.size() &&
+         view.points[static_cast<std::size_t>(feature)].allFinite();
+}
+
+// Rows of the features that are landmarks, and which features they are.
+cv::Mat LandmarkDescriptors(const KeyframeView& view, std::vector<int>& features) {
+  cv::Mat rows;
+  for (int i = 0; i < view.descriptors.rows; ++i) {
+    if (!IsLandmark(view, i)) continue;
+    features.push_back(i);
+    rows.push_back(view.descriptors.row(i));
+  }
+  return rows;
+}
+
+// What the verification matched, and the mutual best matches of the landmarks among themselves: the
+// verification saw the query when it was new and had few landmarks.
+std::vector<Match> LandmarkMatches(const Verification& verification, const KeyframeView& candidate,
+                                   const KeyframeView& query) {
+  std::vector<Match> matches;
+  std::set<int> used_candidate, used_query;
+  const auto add = [&](int c, int q) {
+    if (!IsLandmark(candidate, c) || !IsLandmark(query, q)) return;
+    if (!used_candidate.insert(c).second || !used_query.insert(q).second) return;
+    matches.emplace_back(c, q);
+  };
+  for (const VerifiedMatch& match : verification.inlier_matches)
+    add(match.candidate_feature, match.query_feature);
+  std::vector<int> features_c, features_q;
+  const cv::Mat rows_c = LandmarkDescriptors(candidate, features_c),
+                rows_q = LandmarkDescriptors(query, features_q);
+  if (rows_c.empty() || rows_q.empty()) return matches;
+  std::vector<cv::DMatch> mutual;
+  cv::BFMatcher(cv::NORM_HAMMING, true).match(rows_q, rows_c, mutual);
+  for (const cv::DMatch& match : mutual) {
+    if (match.distance > kMaxHamming) continue;
+    add(features_c[static_cast<std::size_t>(match.trainIdx)],
+        features_q[static_cast<std::size_t>(match.queryIdx)]);
+  }
+  return matches;
+}
+
 SimilarityResult SimilarityOfLandmarks(const Verification& verification, const KeyframeView& candidate,
                                        const KeyframeView& query, const CameraRig& rig, std::uint64_t seed) {
   std::vector<Eigen::Vector3d> points_c, points_q;
   std::vector<Eigen::Vector2d> pixels_c, pixels_q;
-  for (const VerifiedMatch& match : verification.inlier_matches) {
-    if (match.candidate_feature < 0 || match.query_feature < 0) continue;
-    const auto c = static_cast<std::size_t>(match.candidate_feature),
-               q = static_cast<std::size_t>(match.query_feature);
-    if (c >= candidate.points.size() || q >= query.points.size()) continue;
-    if (!candidate.points[c].allFinite() || !query.points[q].allFinite()) continue;
-    points_c.push_back(candidate.points[c]);
-    points_q.push_back(query.points[q]);
-    pixels_c.push_back(Pixel(candidate.keypoints[c]));
-    pixels_q.push_back(Pixel(query.keypoints[q]));
+  for (const auto& [c, q] : LandmarkMatches(verification, candidate, query)) {
+    const auto i = static_cast<std::size_t>(c), j = static_cast<std::size_t>(q);
+    points_c.push_back(candidate.points[i]);
+    points_q.push_back(query.points[j]);
+    pixels_c.push_back(Pixel(candidate.keypoints[i]));
+    pixels_q.push_back(Pixel(query.keypoints[j]));
   }
   RelativePoseOptions options;
   options.threshold_px = 4.0;  // landmarks of a mono map carry their own error

@@ -151,8 +151,12 @@ std::string SummaryJson(const RunResult& r) {
         {"slam", ScoreJson(r.evaluation->slam)}, {"odometry_complete", r.odometry_complete}};
   }
   Json config = Json::object();
-  for (const ConfigEntry& entry : DescribeConfig(r.config))
-    config[entry.section][entry.name] = ConfigValue(entry.value);
+  for (const ConfigEntry& entry : DescribeConfig(r.config)) {
+    const std::size_t dot = entry.section.find('.');
+    Json& section = config[entry.section.substr(0, dot)];
+    Json& place = dot == std::string::npos ? section : section[entry.section.substr(dot + 1)];
+    place[entry.name] = ConfigValue(entry.value);
+  }
   json["config"] = config;
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }

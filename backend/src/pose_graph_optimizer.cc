@@ -71,7 +71,7 @@ class Run {
   /// Solves from the best start; with a robust loss from each, for the lowest cost at the start tells little
   /// then.
   bool Solve() {
-    const bool robust = options_.robust != RobustLoss::kNone && HasLoops();
+    const bool robust = options_.robust != RobustLoss::kNone && HasLoops() && !LeastSquaresSuffices();
     if (!robust) starts_.resize(1);
     bool found = false;
     std::vector<Similarity> best;
@@ -80,7 +80,9 @@ class Run {
     for (std::size_t k = 0; k < attempts * starts_.size(); ++k) {
       const Start& start = starts_[k / attempts];
       problem_.SetPoses(start.poses);
-      if (!(robust ? SolveRobust(k % attempts == 0) : SolveOnce(options_.max_iterations))) continue;
+      if (plain_.empty() && !(robust ? SolveRobust(k % attempts == 0) : SolveOnce(options_.max_iterations)))
+        continue;
+      if (!plain_.empty()) problem_.SetPoses(plain_);
       const double objective = problem_.Objective();
       if (!std::isfinite(objective) || (found && objective >= report_.objective)) continue;
       found = true;
@@ -154,6 +156,17 @@ class Run {
     report_.termination = summary.termination_type == ceres::CONVERGENCE ? "converged"
                           : timed_out                                    ? "time limit"
                                                                          : "iteration limit";
+    return true;
+  }
+
+  /// The common case online: least squares brings every loop below the threshold, so no loss has anything to
+  /// do.
+  bool LeastSquaresSuffices() {
+    problem_.SetPoses(starts_.front().poses);
+    if (!SolveOnce(options_.max_iterations)) return false;
+    const std::vector<double> chi2 = LoopChi2();
+    if (!(*std::max_element(chi2.begin(), chi2.end()) <= problem_.threshold())) return false;
+    plain_ = problem_.Poses();
     return true;
   }
 
@@ -248,6 +261,7 @@ class Run {
   PoseGraphReport& report_;
   GraphProblem<N> problem_;
   std::vector<Start> starts_;
+  std::vector<Similarity> plain_;  ///< the least-squares solution, where it suffices
   Stopwatch watch_;
 };
 

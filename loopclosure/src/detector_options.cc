@@ -47,6 +47,9 @@ std::string VerificationOptions::Validate() const {
   if (min_inliers < 8) return OutOf("verification.min_inliers", "at least 8");
   if (!(min_inlier_ratio >= 0 && min_inlier_ratio <= 1))
     return OutOf("verification.min_inlier_ratio", "0 to 1");
+  if (min_epipolar_inliers < 8) return OutOf("verification.min_epipolar_inliers", "at least 8");
+  if (!(min_epipolar_ratio >= 0 && min_epipolar_ratio <= 1))
+    return OutOf("verification.min_epipolar_ratio", "0 to 1");
   if (!(min_spread >= 0 && min_spread < 1)) return OutOf("verification.min_spread", "0 to 1");
   if (!(reprojection_px > 0)) return OutOf("verification.reprojection_px", "above 0");
   if (!(epipolar_px > 0)) return OutOf("verification.epipolar_px", "above 0");

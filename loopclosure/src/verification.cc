@@ -1,5 +1,6 @@
 #include "tutti/loopclosure/verification.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -91,18 +92,21 @@ std::vector<PooledMatch> Pool(const View& query, const View& candidate, double m
   return OnePerPlace(std::move(pool));
 }
 
-// Root mean square distance of the pixels from their centre, as a share of the image's diagonal.
+// Standard deviation of the pixels along their narrowest direction, x as a share of the width and y of the
+// height: matches on one line or in one spot fit many camera motions.
 double Spread(const std::vector<cv::Point2f>& pixels, const cv::Size& size) {
-  if (pixels.empty()) return 0.0;
-  cv::Point2d mean(0, 0);
-  for (const cv::Point2f& p : pixels) mean += cv::Point2d(p) / static_cast<double>(pixels.size());
-  double squares = 0.0;
+  if (pixels.empty() || size.empty()) return 0.0;
+  const double n = static_cast<double>(pixels.size());
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  std::vector<Eigen::Vector2d> scaled;
   for (const cv::Point2f& p : pixels) {
-    const cv::Point2d d = cv::Point2d(p) - mean;
-    squares += d.dot(d);
+    scaled.emplace_back(p.x / size.width, p.y / size.height);
+    mean += scaled.back() / n;
   }
-  const double diagonal = std::hypot(size.width, size.height);
-  return std::sqrt(squares / static_cast<double>(pixels.size())) / std::max(1.0, diagonal);
+  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
+  for (const Eigen::Vector2d& p : scaled) covariance += (p - mean) * (p - mean).transpose() / n;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(covariance, Eigen::EigenvaluesOnly);
+  return std::sqrt(std::max(0.0, solver.eigenvalues()[0]));
 }
 
 __attribute__((format(printf, 1, 2))) std::string Format(const char* format, ...) {
@@ -129,20 +133,21 @@ std::string Judge(const std::vector<PooledMatch>& pool, const std::vector<int>& 
     in_query.push_back(m.query);
     in_candidate.push_back(m.candidate);
   }
-  if (result.inliers < options.min_inliers) {
-    return Format("only %d matches fit one camera motion, %d are needed", result.inliers,
-                  options.min_inliers);
+  const bool rigid = result.type == ConstraintType::kRigid;
+  const int min_inliers = rigid ? options.min_inliers : options.min_epipolar_inliers;
+  const double min_ratio = rigid ? options.min_inlier_ratio : options.min_epipolar_ratio;
+  if (result.inliers < min_inliers) {
+    return Format("only %d matches fit one camera motion, %d are needed", result.inliers, min_inliers);
   }
   const double ratio = static_cast<double>(inliers.size()) / static_cast<double>(considered);
-  if (ratio < options.min_inlier_ratio) {
+  if (ratio < min_ratio) {
     return Format("only %.0f %% of the matches fit one camera motion, %.0f %% are needed", 100 * ratio,
-                  100 * options.min_inlier_ratio);
+                  100 * min_ratio);
   }
   const double spread = std::min(Spread(in_query, query.size), Spread(in_candidate, candidate.size));
   if (spread < options.min_spread) {
-    return Format(
-        "the matches cover too small a part of the image (extent %.3f of the diagonal, %.3f is needed)",
-        spread, options.min_spread);
+    return Format("the matches cover too narrow a part of the image (%.3f of its size, %.3f is needed)",
+                  spread, options.min_spread);
   }
   return {};
 }

@@ -47,16 +47,20 @@ struct VerificationOptions {
   int max_hypotheses = 3;         ///< separate places tried, best posterior first
   int neighbours = 1;             ///< graph levels around each place that are tried as well; 0: none
   double match_ratio = 0.8;       ///< Lowe's ratio test, on true distance
-  int min_inliers = 20;           ///< fewer inliers than this are no loop
-  double min_inlier_ratio = 0.3;  ///< inliers / matches, 0..1
-  double min_spread = 0.08;       ///< rms extent of the inliers over the image, as share of its diagonal
-  double reprojection_px = 2.5;   ///< RANSAC threshold of PnP, Sim(3) [px]
-  double epipolar_px = 1.5;       ///< RANSAC threshold of the essential and fundamental matrix [px]
-  double confidence = 0.9999;     ///< of RANSAC
-  int max_iterations = 1000;      ///< of RANSAC
-  double pixel_sigma = 1.5;       ///< standard deviation of a matched pixel, sets the information matrix [px]
-  double min_depth_m = 0.1;       ///< depths outside of the range count as unknown [m]
-  double max_depth_m = 80.0;      ///< [m]
+  int min_inliers = 20;           ///< PnP: fewer inliers than this are no loop
+  double min_inlier_ratio = 0.3;  ///< PnP: inliers / matches with a 3D point, 0..1
+  int min_epipolar_inliers =
+      30;  ///< essential, fundamental matrix: a match is held to a line only, so more are needed
+  double min_epipolar_ratio = 0.55;  ///< and a larger share of all matches, 0..1
+  double min_spread = 0.045;  ///< standard deviation of the inliers' pixels, as a share of width and height,
+                              ///< along their narrowest direction; evenly spread: 0.29, on one line: 0
+  double reprojection_px = 2.5;  ///< RANSAC threshold of PnP, Sim(3) [px]
+  double epipolar_px = 1.5;      ///< RANSAC threshold of the essential and fundamental matrix [px]
+  double confidence = 0.9999;    ///< of RANSAC
+  int max_iterations = 1000;     ///< of RANSAC
+  double pixel_sigma = 1.5;      ///< standard deviation of a matched pixel, sets the information matrix [px]
+  double min_depth_m = 0.1;      ///< depths outside of the range count as unknown [m]
+  double max_depth_m = 80.0;     ///< [m]
 
   /// Empty if usable, else what is wrong and what to do.
   std::string Validate() const;
@@ -67,7 +71,7 @@ struct LoopDetectorOptions {
   CombinationRule rule = CombinationRule::kMean;  ///< how members are combined
   std::vector<std::string> members = {"surf", "sift",
                                       "orb"};  ///< of surf, sift, orb, akaze, brisk; kSingle: one
-  double loop_threshold = 0.11;                ///< go to verification at H >= this, 0..1
+  double loop_threshold = 0.07;                ///< go to verification at H >= this, 0..1
   int stm_size = 10;                           ///< locations in short-term memory, no candidates
   int threads = 2;                             ///< most threads that Detect uses at once
   std::uint64_t seed = 1;                      ///< of kd-forests and RANSAC

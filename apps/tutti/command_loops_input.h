@@ -1,0 +1,28 @@
+// Input of `tutti loops`: the images of a folder and the ground truth that fits them.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "tutti/loopclosure/ground_truth.h"
+
+namespace tutti::cli {
+
+/// Image files of a folder in natural order; files of other types are ignored. Throws InputError if there are
+/// none.
+std::vector<std::filesystem::path> ListImages(const std::filesystem::path& folder);
+
+struct GroundTruthArguments {
+  std::string file;  ///< a loop matrix or a trajectory
+  LoopRule rule;
+  int stride = 1;
+};
+
+/// Ground truth for every stride-th of `images`: from a matrix over those or over all images, or from a
+/// trajectory with a pose for each image (or, where the images are named by their time stamps, a pose near
+/// each). Throws InputError that names both sizes.
+LoopGroundTruth LoadGroundTruth(const GroundTruthArguments& arguments,
+                                const std::vector<std::filesystem::path>& images);
+
+}  // namespace tutti::cli

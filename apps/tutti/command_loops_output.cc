@@ -1,0 +1,162 @@
+#include "command_loops_output.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <fstream>
+#include <functional>
+#include <nlohmann/json.hpp>
+
+#include "tutti/core/error.h"
+
+namespace tutti::cli {
+namespace {
+
+// Of a copy, sorted; q in [0, 1]; 0 for none.
+double Quantile(std::vector<double> values, double q) {
+  if (values.empty()) return 0.0;
+  std::sort(values.begin(), values.end());
+  const double position = q * static_cast<double>(values.size() - 1);
+  return values[static_cast<std::size_t>(position + 0.5)];
+}
+
+std::vector<double> Collect(const std::vector<LoopRow>& rows,
+                            const std::function<double(const LoopRow&)>& value) {
+  std::vector<double> values;
+  for (const LoopRow& row : rows) {
+    if (row.read) values.push_back(value(row));
+  }
+  return values;
+}
+
+nlohmann::ordered_json Stages(const std::vector<LoopRow>& rows) {
+  const std::vector<std::pair<const char*, double LoopResult::*>> stages = {
+      {"extract", &LoopResult::extract_ms}, {"quantise", &LoopResult::quantise_ms},
+      {"memory", &LoopResult::memory_ms},   {"likelihood", &LoopResult::likelihood_ms},
+      {"filter", &LoopResult::filter_ms},   {"verify", &LoopResult::verify_ms}};
+  nlohmann::ordered_json json;
+  for (const auto& [name, field] : stages) {
+    const auto member = field;
+    json[name] = Quantile(Collect(rows, [member](const LoopRow& row) { return row.result.*member; }), 0.5);
+  }
+  return json;
+}
+
+nlohmann::ordered_json Rates(const PrecisionRecall& rates) {
+  return {{"precision", rates.precision}, {"recall", rates.recall}};
+}
+
+void WriteText(const std::filesystem::path& file, const std::string& text) {
+  std::ofstream out(file, std::ios::binary);
+  out << text;
+  out.close();
+  if (!out) throw InputError(file.string() + ": can't be written; is there space, and may you write there?");
+}
+
+const char* LabelName(LoopLabel label) {
+  return label == LoopLabel::kLoop ? "loop" : label == LoopLabel::kIgnore ? "ignored" : "none";
+}
+
+std::string Quoted(const std::string& text) {
+  std::string result = "\"";
+  for (const char c : text) result += c == '"' ? "\"\"" : std::string(1, c);
+  return result + "\"";
+}
+
+std::string Csv(const LoopRun& run) {
+  std::string text =
+      "image,file,hypothesis,candidate,posterior,proposed,accepted,verified_candidate,matches,inliers,truth,"
+      "row_has_loop";
+  for (const std::string& name : run.options.members) {
+    text += "," + name + "_hypothesis," + name + "_best," + name + "_at_candidate";
+  }
+  text += ",reason\n";
+  for (const LoopRow& row : run.rows) {
+    const LoopResult& r = row.result;
+    const int image = static_cast<int>(r.query);
+    const long verified = r.accepted ? static_cast<long>(r.verification.candidate) : -1;
+    const long location = r.accepted ? verified : static_cast<long>(r.candidate);
+    char numbers[256];
+    std::snprintf(numbers, sizeof numbers, ",%.9g,%ld,%.9g,%d,%d,%ld,%d,%d,%s,%d", r.hypothesis,
+                  static_cast<long>(r.candidate), r.posterior, r.proposed ? 1 : 0, r.accepted ? 1 : 0,
+                  verified, r.verification.matches, r.verification.inliers,
+                  location < 0 ? "-" : LabelName(run.truth.At(image, static_cast<int>(location))),
+                  run.truth.HasLoop(image) ? 1 : 0);
+    text += std::to_string(image) + "," + Quoted(row.file) + numbers;
+    for (std::size_t k = 0; k < run.options.members.size(); ++k) {
+      const MemberOpinion opinion = k < r.members.size() ? r.members[k] : MemberOpinion();
+      std::snprintf(numbers, sizeof numbers, ",%.9g,%ld,%.9g", opinion.hypothesis,
+                    static_cast<long>(opinion.best), opinion.at_candidate);
+      text += numbers;
+    }
+    text += "," + Quoted(row.read ? r.reason : "the image can't be read") + "\n";
+  }
+  return text;
+}
+
+}  // namespace
+
+void WriteLoopRun(const LoopRun& run, const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) throw InputError(folder.string() + ": can't be made (" + error.message() + ")");
+
+  std::vector<LoopObservation> observations;
+  for (const LoopRow& row : run.rows) observations.push_back(Observe(row.result));
+  const LoopEvaluation verified = EvaluateVerified(observations, run.truth, run.options.loop_threshold);
+  const LoopEvaluation posterior = EvaluatePosterior(observations, run.truth, run.options.loop_threshold);
+  const std::vector<double> ms = Collect(run.rows, [](const LoopRow& row) { return row.ms; });
+  const auto damaged =
+      std::count_if(run.rows.begin(), run.rows.end(), [](const LoopRow& row) { return !row.read; });
+
+  nlohmann::ordered_json json;
+  json["images"] = verified.images;
+  json["images_damaged"] = damaged;
+  json["rows_with_loop"] = verified.rows_with_loop;
+  json["recall_at_100_precision"] = verified.recall_at_100_precision;
+  json["recall_at_100_precision_posterior"] = posterior.recall_at_100_precision;
+  json["area_under_curve"] = verified.area_under_curve;
+  json["area_under_curve_posterior"] = posterior.area_under_curve;
+  json["best_f1"] = verified.best_f1;
+  json["best_f1_posterior"] = posterior.best_f1;
+  json["at_default_threshold"] = Rates(verified.at_default_threshold);
+  json["at_default_threshold"]["threshold"] = run.options.loop_threshold;
+  json["at_default_threshold_posterior"] = Rates(posterior.at_default_threshold);
+  json["accepted"] = {
+      {"true", verified.true_positives}, {"false", verified.false_positives}, {"ignored", verified.ignored}};
+  json["ms_per_image"] = {{"median", Quantile(ms, 0.5)}, {"p99", Quantile(ms, 0.99)}};
+  json["stage_ms_median"] = Stages(run.rows);
+  json["protocol"] = {
+      {"image_folder", run.images},
+      {"stride", run.stride},
+      {"ground_truth", run.truth.description},
+      {"tolerance_frames", 0},
+      {"exclusion", "the newest " + std::to_string(run.options.stm_size) + " images (short-term memory)"},
+      {"threshold", "recall_at_100_precision: chosen after the fact; at_default_threshold: fixed"},
+      {"rule", RuleName(run.options)},
+      {"members", run.options.members},
+      {"seed", run.options.seed},
+      {"threads", run.options.threads}};
+  WriteText(folder / "results.json", json.dump(2) + "\n");
+  WriteText(folder / "hypotheses.csv", Csv(run));
+
+  std::printf("%-34s %s\n", "rule", RuleName(run.options).c_str());
+  std::printf("%-34s %d (%d with a loop)\n", "images", verified.images, verified.rows_with_loop);
+  std::printf("%-34s %s\n", "ground truth", run.truth.description.c_str());
+  std::printf("%-34s %12s %12s\n", "", "verified", "posterior");
+  const auto line = [](const char* name, double a, double b) {
+    std::printf("%-34s %11.1f%% %11.1f%%\n", name, 100 * a, 100 * b);
+  };
+  line("recall at 100 % precision", verified.recall_at_100_precision, posterior.recall_at_100_precision);
+  line("area under the curve", verified.area_under_curve, posterior.area_under_curve);
+  line("best F1", verified.best_f1, posterior.best_f1);
+  line("precision at the default threshold", verified.at_default_threshold.precision,
+       posterior.at_default_threshold.precision);
+  line("recall at the default threshold", verified.at_default_threshold.recall,
+       posterior.at_default_threshold.recall);
+  std::printf("%-34s %d true, %d false, %d on ignored cells\n", "accepted", verified.true_positives,
+              verified.false_positives, verified.ignored);
+  std::printf("%-34s %.1f median, %.1f p99\n", "ms per image", Quantile(ms, 0.5), Quantile(ms, 0.99));
+  std::printf("written: %s, hypotheses.csv\n", (folder / "results.json").string().c_str());
+}
+
+}  // namespace tutti::cli

@@ -30,8 +30,8 @@ class Texture {
   std::vector<Level> levels_;
 };
 
-/// A textured parallelogram, visible from the side from which (edge_u, edge_v, towards the viewer) ... that
-/// is, where edge_u points to the right and edge_v down.
+/// A textured parallelogram. It has one visible side: that from which edge_u points to the right and edge_v
+/// down.
 struct Face {
   Eigen::Vector3d corner;  ///< of texture coordinate (0, 0) [m]
   Eigen::Vector3d edge_u;  ///< to the corner (repeat_u, 0)
@@ -62,11 +62,12 @@ Rendering Render(const std::vector<Face>& faces, const std::vector<Texture>& tex
                  const PinholeCamera& camera, const Pose& T_world_camera, const Light& light,
                  int supersample);
 
-/// Appends the six (or five, without the bottom) faces of a box that stands on `center` - size.z/2; turned by
-/// yaw about z.
+/// Looks of a box: its two ends (`front`), its two long sides, its top.
 struct BoxTextures {
   int front = 0, side = 0, top = 0;
 };
+/// Appends the five faces (no bottom) of a box that stands on `base_center`, its length (size.x) turned by
+/// yaw about z.
 void AppendBox(std::vector<Face>& faces, const Eigen::Vector3d& base_center, const Eigen::Vector3d& size,
                double yaw, const BoxTextures& textures);
 

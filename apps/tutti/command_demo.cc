@@ -26,8 +26,9 @@ SyntheticOptions DemoWorld() {
   options.sensor = SyntheticSensor::kStereo;
   options.blocks_x = 1;
   options.blocks_y = 1;
+  options.block_m = 28;
   options.laps = 1.2;
-  options.rate_hz = 8;
+  options.rate_hz = 6;
   options.supersample = 1;
   options.noise_sigma = 4;  // an odometry without drift would need no loop
   return options;

@@ -1,0 +1,231 @@
+#include "tutti/loopclosure/detector.h"
+
+#include <gtest/gtest.h>
+
+#include <opencv2/imgcodecs.hpp>
+#include <thread>
+
+#include "test_data.h"
+#include "textured_image.h"
+#include "tutti/core/error.h"
+#include "tutti/loopclosure/evaluation.h"
+
+namespace tutti {
+namespace {
+
+LoopQuery Query(std::int64_t id, const cv::Mat& image) {
+  LoopQuery query;
+  query.id = id;
+  query.stamp_s = static_cast<double>(id);
+  query.image = image;
+  return query;
+}
+
+// Twenty places, then the first ones again.
+std::vector<LoopResult> TwoLaps(const LoopDetectorOptions& options, int places = 18, int again = 8) {
+  LoopDetector detector(options);
+  std::vector<LoopResult> results;
+  for (int i = 0; i < places + again; ++i) {
+    const cv::Mat place = testing::TexturedImage(static_cast<std::uint32_t>(i % places));
+    results.push_back(detector.Detect(Query(i, i < places ? place : testing::SeenAgain(place))));
+  }
+  return results;
+}
+
+void ExpectEqual(const std::vector<LoopResult>& a, const std::vector<LoopResult>& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a[i].hypothesis, b[i].hypothesis) << i;
+    EXPECT_EQ(a[i].candidate, b[i].candidate) << i;
+    EXPECT_EQ(a[i].posterior, b[i].posterior) << i;
+    EXPECT_EQ(a[i].verification.candidate, b[i].verification.candidate) << i;
+    EXPECT_EQ(a[i].verification.inliers, b[i].verification.inliers) << i;
+    EXPECT_EQ(a[i].reason, b[i].reason) << i;
+  }
+}
+
+class EveryRule : public ::testing::TestWithParam<std::string> {};
+INSTANTIATE_TEST_SUITE_P(Rules, EveryRule,
+                         ::testing::Values("mean", "product", "majority", "naive", "surf", "sift", "orb"));
+
+TEST_P(EveryRule, FindsTheSecondLapAndNothingBefore) {
+  LoopDetectorOptions options;
+  SetRule(GetParam(), options);
+  EXPECT_EQ(RuleName(options), GetParam());
+  const std::vector<LoopResult> results = TwoLaps(options);
+  int found = 0;
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    if (i < 18) {
+      EXPECT_FALSE(results[i].accepted) << i;
+      EXPECT_FALSE(results[i].reason.empty()) << i;
+    } else if (results[i].accepted) {
+      EXPECT_EQ(results[i].verification.candidate, static_cast<std::int64_t>(i) - 18);
+      EXPECT_EQ(results[i].reason, "");
+      ++found;
+    }
+  }
+  // The product of the members' "new place" stays high until all of them are sure: it finds loops late.
+  EXPECT_GE(found, GetParam() == "product" ? 1 : 5);
+}
+
+TEST(LoopDetector, TheSameForAnyNumberOfThreadsAndBesideAnotherDetector) {
+  LoopDetectorOptions one;
+  one.threads = 1;
+  LoopDetectorOptions two;
+  two.threads = 2;
+  std::vector<LoopResult> beside;
+  std::thread other([&] { beside = TwoLaps(two, 14, 3); });
+  const std::vector<LoopResult> a = TwoLaps(one, 14, 3);
+  other.join();
+  ExpectEqual(a, beside);
+}
+
+TEST(LoopDetector, HardImagesNeverThrow) {
+  LoopDetectorOptions options;
+  options.stm_size = 2;
+  LoopDetector detector(options);
+  const cv::Mat texture = testing::TexturedImage(1);
+  cv::Mat colour, deep;
+  cv::cvtColor(texture, colour, cv::COLOR_GRAY2BGR);
+  texture.convertTo(deep, CV_16U, 100);
+  const std::vector<cv::Mat> images = {texture,
+                                       cv::Mat(),
+                                       cv::Mat(240, 320, CV_8UC1, cv::Scalar(0)),
+                                       cv::Mat::ones(1, 1, CV_8UC1),
+                                       cv::Mat(7, 900, CV_8UC1, cv::Scalar(9)),
+                                       colour,
+                                       deep,
+                                       testing::TexturedImage(2, 2500, 1600),
+                                       texture};
+  std::int64_t id = 0;
+  for (const cv::Mat& image : images) {
+    LoopResult result;
+    EXPECT_NO_THROW(result = detector.Detect(Query(id++, image)));
+    EXPECT_TRUE(result.hypothesis >= 0 && result.hypothesis <= 1);
+    EXPECT_TRUE(result.accepted || !result.reason.empty());
+  }
+  EXPECT_EQ(detector.NumLocations(), images.size());
+}
+
+TEST(LoopDetector, AMemberWithoutFeaturesSitsOut) {
+  LoopDetectorOptions options;
+  options.stm_size = 2;
+  options.extraction.surf_threshold = 1e12;
+  LoopDetector detector(options);
+  LoopResult result;
+  for (int i = 0; i < 6; ++i)
+    result = detector.Detect(Query(i, testing::TexturedImage(static_cast<std::uint32_t>(i))));
+  EXPECT_FALSE(result.members[0].took_part);
+  EXPECT_TRUE(result.members[1].took_part);
+  EXPECT_TRUE(result.members[2].took_part);
+  EXPECT_GE(result.candidate, 0);
+}
+
+TEST(LoopDetector, MisuseIsAnError) {
+  LoopDetector detector{LoopDetectorOptions()};
+  const cv::Mat image = testing::TexturedImage(1);
+  detector.Detect(Query(5, image));
+  EXPECT_THROW(detector.Detect(Query(5, image)), InputError);
+  EXPECT_THROW(detector.Detect(Query(4, image)), InputError);
+  EXPECT_THROW(detector.AddLink(5, 77), InputError);
+
+  LoopQuery query = Query(6, image);
+  query.features.keypoints.resize(3);
+  EXPECT_THROW(detector.Detect(query), InputError);
+  query.features.descriptors = cv::Mat::zeros(3, 32, CV_8U);
+  query.features.points.resize(2);
+  EXPECT_THROW(detector.Detect(query), InputError);
+  query.features.points.clear();
+  detector.Detect(query);
+  query.id = 7;
+  query.features.descriptors = cv::Mat::zeros(3, 64, CV_32F);
+  EXPECT_THROW(detector.Detect(query), InputError);
+  LoopQuery depth = Query(8, image);
+  depth.depth_m = cv::Mat::zeros(5, 5, CV_32F);
+  EXPECT_THROW(detector.Detect(depth), InputError);
+  EXPECT_EQ(detector.NumLocations(), 2u);
+}
+
+TEST(LoopDetector, UnusableOptionsAreRefusedWithTheFieldsName) {
+  LoopDetectorOptions options;
+  options.members = {"surf", "orbb"};
+  try {
+    LoopDetector detector(options);
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("did you mean 'orb'"), std::string::npos) << error.what();
+  }
+  options.members = {"orb", "orb"};
+  EXPECT_NE(options.Validate(), "");
+  options.members = {"orb"};
+  EXPECT_EQ(options.Validate(), "");
+  options.vocabulary.nndr = 2;
+  EXPECT_NE(options.Validate().find("nndr"), std::string::npos);
+  EXPECT_THROW(SetRule("meen", options), InputError);
+}
+
+TEST(LoopDetector, RehearsalMergesAStandingCamera) {
+  LoopDetectorOptions options;
+  options.rehearsal = true;
+  LoopDetector detector(options);
+  for (int i = 0; i < 6; ++i) detector.Detect(Query(i, testing::TexturedImage(1)));
+  EXPECT_EQ(detector.NumLocations(), 1u);
+  detector.Detect(Query(6, testing::TexturedImage(2)));
+  EXPECT_EQ(detector.NumLocations(), 2u);
+  EXPECT_NO_THROW(detector.AddLink(3, 6));
+}
+
+TEST(LoopDetector, KeepsThePosteriorOnlyWhenAsked) {
+  LoopDetectorOptions options;
+  options.stm_size = 2;
+  options.keep_posterior = true;
+  LoopDetector detector(options);
+  LoopResult result;
+  for (int i = 0; i < 6; ++i)
+    result = detector.Detect(Query(i, testing::TexturedImage(static_cast<std::uint32_t>(i))));
+  ASSERT_EQ(result.posterior_by_location.size(), 4u);
+  double sum = 0;
+  for (const auto& [id, p] : result.posterior_by_location) sum += p;
+  EXPECT_NEAR(sum, result.hypothesis, 1e-9);
+}
+
+TEST(LoopDetector, CorridorReachesThePapersClassWithoutAFalseLoop) {
+  TUTTI_REQUIRE_DATA(folder, "corridor");
+  LoopDetector detector{LoopDetectorOptions()};
+  std::vector<LoopObservation> observations;
+  for (int i = 0; i < 84; ++i) {
+    const cv::Mat image =
+        cv::imread((folder / (std::to_string(i + 1) + ".jpg")).string(), cv::IMREAD_GRAYSCALE);
+    ASSERT_FALSE(image.empty());
+    observations.push_back(Observe(detector.Detect(Query(i, image))));
+  }
+  const LoopGroundTruth truth = ReadLoopMatrix(folder / "ground_truth.bmp", 84);
+  const LoopEvaluation result = EvaluateVerified(observations, truth, detector.options().loop_threshold);
+  EXPECT_EQ(result.rows_with_loop, 44);
+  EXPECT_GE(result.recall_at_100_precision, 0.97);
+  EXPECT_GE(result.at_default_threshold.recall, 0.90);
+  EXPECT_EQ(result.false_positives, 0);
+}
+
+TEST(LoopDetector, KittiLoopIsFoundAndNothingElse) {
+  TUTTI_REQUIRE_DATA(folder, "kitti_00_head");
+  LoopDetectorOptions options;
+  LoopDetector detector(options);
+  const LoopGroundTruth truth = ReadLoopMatrix(folder / "loop_gt_stride5.png", 340);
+  int found = 0;
+  // The part that is driven again, some of the way between, and the second drive.
+  for (int i = 20; i < 328; i = i == 60 ? 290 : i + 1) {
+    char name[32];
+    std::snprintf(name, sizeof name, "image_0/%06d.webp", i * 5);
+    const cv::Mat image = cv::imread((folder / name).string(), cv::IMREAD_GRAYSCALE);
+    ASSERT_FALSE(image.empty()) << name;
+    const LoopResult result = detector.Detect(Query(i, image));
+    if (!result.accepted) continue;
+    EXPECT_NE(truth.At(i, static_cast<int>(result.verification.candidate)), LoopLabel::kNone) << i;
+    found += truth.HasLoop(i) ? 1 : 0;
+  }
+  EXPECT_GE(found, 13);
+}
+
+}  // namespace
+}  // namespace tutti

@@ -1,0 +1,116 @@
+#include "tutti/loopclosure/features.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "textured_image.h"
+#include "tutti/core/error.h"
+#include "tutti/loopclosure/matching.h"
+
+namespace tutti {
+namespace {
+
+std::vector<cv::Point2f> Pixels(const Features& features) {
+  std::vector<cv::Point2f> pixels;
+  for (const cv::KeyPoint& keypoint : features.keypoints) pixels.push_back(keypoint.pt);
+  return pixels;
+}
+
+class EveryMember : public ::testing::TestWithParam<std::string> {};
+INSTANTIATE_TEST_SUITE_P(Members, EveryMember, ::testing::ValuesIn(KnownMembers()));
+
+TEST_P(EveryMember, FindsFeaturesAndMatchesThemWhenSeenAgain) {
+  const FeatureExtractor extractor(GetParam(), ExtractionOptions());
+  const cv::Mat image = testing::TexturedImage(1, 480, 360);
+  const Features a = extractor.Extract(image);
+  const Features b = extractor.Extract(testing::SeenAgain(image));
+  ASSERT_GT(a.keypoints.size(), 100u);
+  EXPECT_LE(a.keypoints.size(), 400u);
+  EXPECT_EQ(a.descriptors.rows, static_cast<int>(a.keypoints.size()));
+  EXPECT_GT(MatchDescriptors(b.descriptors, a.descriptors, Pixels(a), 0.8).size(), 40u);
+}
+
+TEST_P(EveryMember, HardImagesGiveNoFeaturesAndNoCrash) {
+  const FeatureExtractor extractor(GetParam(), ExtractionOptions());
+  for (const cv::Size size : {cv::Size(1, 1), cv::Size(5, 200), cv::Size(17, 17), cv::Size(33, 20),
+                              cv::Size(64, 48), cv::Size(3000, 20)}) {
+    EXPECT_NO_THROW(extractor.Extract(testing::TexturedImage(2, size.width, size.height))) << size;
+    EXPECT_TRUE(extractor.Extract(cv::Mat(size, CV_8UC1, cv::Scalar(128))).keypoints.empty()) << size;
+  }
+  EXPECT_TRUE(extractor.Extract(cv::Mat()).keypoints.empty());
+}
+
+TEST_P(EveryMember, HugeImagesAreScaledAndKeypointsScaledBack) {
+  ExtractionOptions options;
+  options.max_pixels = 320 * 240;
+  cv::Mat image;
+  cv::resize(testing::TexturedImage(4, 320, 240), image, cv::Size(), 4, 4, cv::INTER_NEAREST);
+  const Features features = FeatureExtractor(GetParam(), options).Extract(image);
+  ASSERT_GT(features.keypoints.size(), 50u);
+  float right = 0;
+  for (const cv::KeyPoint& keypoint : features.keypoints) right = std::max(right, keypoint.pt.x);
+  EXPECT_GT(right, 900.0f);
+  EXPECT_LT(right, 1280.0f);
+}
+
+TEST(Features, SmallImagesKeepTheUpperPyramidLevelsOfOrb) {
+  const Features features =
+      FeatureExtractor("orb", ExtractionOptions()).Extract(testing::TexturedImage(1, 240, 192));
+  int top = 0;
+  for (const cv::KeyPoint& keypoint : features.keypoints) top = std::max(top, keypoint.octave);
+  EXPECT_GE(top, 4);
+}
+
+TEST(Features, SurfDescriptorsHaveUnitLength) {
+  const Features features = FeatureExtractor("surf", ExtractionOptions()).Extract(testing::TexturedImage(1));
+  ASSERT_FALSE(features.keypoints.empty());
+  EXPECT_EQ(features.descriptors.cols, 64);
+  for (int i = 0; i < features.descriptors.rows; ++i)
+    EXPECT_NEAR(cv::norm(features.descriptors.row(i)), 1.0, 1e-4);
+}
+
+TEST(Features, UnknownMemberNamesTheNearest) {
+  try {
+    FeatureExtractor("surg", ExtractionOptions());
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("did you mean 'surf'"), std::string::npos) << error.what();
+  }
+}
+
+TEST(ToGrey8, TakesAnyKindOfImage) {
+  const cv::Mat grey = testing::TexturedImage(1);
+  cv::Mat colour;
+  cv::cvtColor(grey, colour, cv::COLOR_GRAY2BGR);
+  EXPECT_EQ(cv::norm(ToGrey8(colour), grey, cv::NORM_INF), 0.0);
+  cv::Mat deep;
+  grey.convertTo(deep, CV_16U, 200.0, 1000.0);
+  EXPECT_EQ(ToGrey8(deep).type(), CV_8UC1);
+  double low = 0;
+  double high = 0;
+  cv::minMaxLoc(ToGrey8(deep), &low, &high);
+  EXPECT_EQ(low, 0.0);
+  EXPECT_EQ(high, 255.0);
+  cv::Mat real = cv::Mat::ones(20, 20, CV_32F);
+  real.at<float>(0, 0) = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_EQ(ToGrey8(real).type(), CV_8UC1);
+  EXPECT_EQ(ToGrey8(cv::Mat(20, 20, CV_8UC2, cv::Scalar(1, 2))).type(), CV_8UC1);
+  EXPECT_TRUE(ToGrey8(cv::Mat()).empty());
+}
+
+TEST(SelectSpread, GivesEveryCellItsShareBeforeTheStrongestTakeTheRest) {
+  std::vector<cv::KeyPoint> keypoints;
+  for (int i = 0; i < 100; ++i)
+    keypoints.emplace_back(static_cast<float>(i % 10), 1.0f, 5.0f, 0.0f, 100.0f - i);
+  keypoints.emplace_back(95.0f, 95.0f, 5.0f, 0.0f, 0.001f);  // weak and alone
+  const std::vector<int> chosen = SelectSpread(keypoints, cv::Size(100, 100), 32, 4);
+  EXPECT_EQ(chosen.size(), 32u);
+  EXPECT_EQ(chosen.front(), 0);
+  EXPECT_EQ(chosen.back(), 100);
+  EXPECT_EQ(SelectSpread(keypoints, cv::Size(100, 100), 200, 4).size(), 101u);
+  EXPECT_TRUE(SelectSpread({}, cv::Size(100, 100), 10, 4).empty());
+}
+
+}  // namespace
+}  // namespace tutti

@@ -1,0 +1,72 @@
+#include "tutti/loopclosure/likelihood.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace tutti {
+namespace {
+
+TEST(Likelihood, SimilarityWalksTheInvertedIndexToTheSameNumberAsThePair) {
+  LikelihoodModel model(LikelihoodKind::kSimilarity);
+  const Signature a({1, 1, 2, 3});
+  const Signature b({1, 4, 4, 9, 9});
+  model.Add(a);
+  model.Add(b);
+  const Signature query({1, 1, 1, 4});
+  const std::vector<double> scores = model.Scores(query);
+  EXPECT_DOUBLE_EQ(scores[0], Signature::Similarity(query, a));
+  EXPECT_DOUBLE_EQ(scores[1], Signature::Similarity(query, b));
+}
+
+TEST(Likelihood, TfIdfAddsTermFrequencyTimesInverseDocumentFrequency) {
+  LikelihoodModel model(LikelihoodKind::kTfIdf);
+  model.Add(Signature({1, 1, 2, 3}));  // n = 4
+  model.Add(Signature({1, 5}));        // n = 2
+  model.Add(Signature({8, 9}));
+  const std::vector<double> scores = model.Scores(Signature({1, 2, 2, 77}));
+  // Word 1 is in two of three locations, word 2 in one; the query's own counts do not matter.
+  EXPECT_NEAR(scores[0], 2.0 / 4.0 * std::log10(3.0 / 2.0) + 1.0 / 4.0 * std::log10(3.0 / 1.0), 1e-12);
+  EXPECT_NEAR(scores[1], 1.0 / 2.0 * std::log10(3.0 / 2.0), 1e-12);
+  EXPECT_EQ(scores[2], 0.0);
+}
+
+TEST(Likelihood, ARemovedLocationCountsNoMore) {
+  LikelihoodModel model(LikelihoodKind::kTfIdf);
+  model.Add(Signature({1, 2}));
+  model.Add(Signature({1, 3}));
+  model.Add(Signature({4, 5}));
+  model.Remove(1);
+  model.Remove(1);
+  EXPECT_EQ(model.NumLocations(), 2);
+  const std::vector<double> scores = model.Scores(Signature({1, 3}));
+  EXPECT_NEAR(scores[0], 0.5 * std::log10(2.0), 1e-12);
+  EXPECT_EQ(scores[1], 0.0);
+}
+
+TEST(Likelihood, AdjustmentFollowsTheEquations) {
+  const std::vector<double> scores = {0.1, 0.1, 0.1, 0.5, 0.0};
+  const Belief adjusted = AdjustLikelihood(scores, {0, 1, 2, 3, 4});
+  const double mean = 0.2;
+  const double sigma = std::sqrt((3 * 0.01 + 0.09) / 3.0);  // sample deviation over the non-zero ones
+  EXPECT_NEAR(adjusted.places[3], (0.5 - (sigma - 1e-4)) / mean, 1e-12);
+  EXPECT_EQ(adjusted.places[0], 1.0);
+  EXPECT_EQ(adjusted.places[4], 1.0);
+  EXPECT_NEAR(adjusted.new_place, mean / sigma + 1.0, 1e-12);
+}
+
+TEST(Likelihood, WhereNothingStandsOutTheNewPlaceGetsTwo) {
+  EXPECT_EQ(AdjustLikelihood({0.3, 0.3, 0.3}, {0, 1, 2}).new_place, 2.0);
+  EXPECT_EQ(AdjustLikelihood({0.0, 0.0}, {0, 1}).new_place, 2.0);
+  EXPECT_EQ(AdjustLikelihood({0.4}, {0}).new_place, 2.0);
+  EXPECT_EQ(AdjustLikelihood({}, {}).new_place, 2.0);
+}
+
+TEST(Likelihood, OnlyWorkingMemoryEntersTheAdjustment) {
+  const Belief adjusted = AdjustLikelihood({0.1, 0.1, 0.1, 0.5, 0.9}, {0, 1, 2, 3});
+  EXPECT_EQ(adjusted.places[4], 0.0);
+  EXPECT_GT(adjusted.places[3], 1.0);
+}
+
+}  // namespace
+}  // namespace tutti

@@ -26,7 +26,9 @@ SyntheticOptions DemoWorld() {
   options.sensor = SyntheticSensor::kStereo;
   options.blocks_x = 1;
   options.blocks_y = 1;
-  options.block_m = 28;
+  options.width = 512;
+  options.height = 256;
+  options.block_m = 26;
   options.laps = 1.2;
   options.rate_hz = 6;
   options.supersample = 1;

@@ -47,6 +47,34 @@ float Orientation(const cv::Mat& image, int x, int y) {
   return cv::fastAtan2(static_cast<float>(m01), static_cast<float>(m10));
 }
 
+// Sub-pixel corner: the point that is nearest to all the lines through the window's pixels along their edges
+// (Foerstner & Guelch 1987); the integer position where that is not well defined or more than a pixel away.
+cv::Point2f RefineCorner(const cv::Mat& image, const cv::Point2f& corner) {
+  constexpr int kWindow = 3;
+  const int x = static_cast<int>(corner.x), y = static_cast<int>(corner.y);
+  float a = 0, b = 0, c = 0, p = 0, q = 0;
+  for (int v = -kWindow; v <= kWindow; ++v) {
+    const std::uint8_t* row = image.ptr<std::uint8_t>(y + v) + x;
+    const std::uint8_t* above = image.ptr<std::uint8_t>(y + v - 1) + x;
+    const std::uint8_t* below = image.ptr<std::uint8_t>(y + v + 1) + x;
+    for (int u = -kWindow; u <= kWindow; ++u) {
+      const float gx = static_cast<float>(row[u + 1] - row[u - 1]), gy = static_cast<float>(below[u] - above[u]);
+      const float xx = gx * gx, xy = gx * gy, yy = gy * gy;
+      const float fu = static_cast<float>(u), fv = static_cast<float>(v);
+      a += xx;
+      b += xy;
+      c += yy;
+      p += xx * fu + xy * fv;
+      q += xy * fu + yy * fv;
+    }
+  }
+  const float determinant = a * c - b * b, trace = a + c;
+  if (determinant < 0.02F * trace * trace) return corner;  // an edge: free along its direction
+  const float du = (c * p - b * q) / determinant, dv = (a * q - b * p) / determinant;
+  if (std::abs(du) > 1 || std::abs(dv) > 1) return corner;
+  return {corner.x + du, corner.y + dv};
+}
+
 bool Stronger(const cv::KeyPoint& a, const cv::KeyPoint& b) {
   if (a.response != b.response) return a.response > b.response;
   if (a.pt.y != b.pt.y) return a.pt.y < b.pt.y;
@@ -207,9 +235,14 @@ Features ExtractOrb(const std::vector<cv::Mat>& pyramid, const OdometryOptions& 
     if (!corners.empty()) orb->compute(image, corners, level_descriptors);
     if (corners.empty()) continue;
     descriptors.push_back(level_descriptors);
+    // Pixel centres have integer coordinates on every level, so the levels' corners are half a pixel apart; and their
+    // sizes are rounded. Ignoring either biases coarse features by more than a pixel, and mono scale drifts with them.
+    const float sx = static_cast<float>(pyramid[0].cols) / static_cast<float>(image.cols);
+    const float sy = static_cast<float>(pyramid[0].rows) / static_cast<float>(image.rows);
     for (cv::KeyPoint k : corners) {
+      const cv::Point2f p = RefineCorner(image, k.pt);
       k.octave = static_cast<int>(l);
-      k.pt *= scales[l];
+      k.pt = cv::Point2f((p.x + 0.5F) * sx - 0.5F, (p.y + 0.5F) * sy - 0.5F);
       k.size *= scales[l];
       out.keypoints.push_back(k);
     }

@@ -9,6 +9,9 @@
 #include "tutti/frontend/two_view.h"
 
 namespace tutti {
+namespace {
+constexpr double kMaxCosine = 0.9996;  // 1.6 deg of parallax at least, for a depth from two views
+}  // namespace
 
 int LocalMapper::AddDepthLandmarks(int id, int at_least, Map* map) {
   const Keyframe& k = map->keyframe(id);
@@ -39,12 +42,14 @@ int LocalMapper::AddDepthLandmarks(int id, int at_least, Map* map) {
 }
 
 void LocalMapper::CullRecent(int id, Map* map) {
-  const std::size_t enough = rig_.sensor == Sensor::kMono ? 2 : 3;
+  // Two views with little parallax give depths that are too large on average, and scale drifts with them: mono landmarks
+  // must prove themselves in a third keyframe.
+  const std::size_t too_few = rig_.sensor == Sensor::kMono ? 2 : 1;
   std::vector<std::pair<int, int>> keep;
   for (const auto& [landmark_id, born] : recent_) {
     const Landmark& l = map->landmark(landmark_id);
     if (!l.alive) continue;
-    if (4 * l.found < l.visible || (id - born >= 2 && l.observations.size() <= enough - 1)) {
+    if (4 * l.found < l.visible || (id - born >= 2 && l.observations.size() <= too_few)) {
       map->RemoveLandmark(landmark_id);
     } else if (id - born < 3) {
       keep.emplace_back(landmark_id, born);
@@ -73,7 +78,7 @@ int LocalMapper::Triangulate(int id, Map* map) {
       const Eigen::Vector3d ra = rig_.camera.Unproject({ka.pt.x, ka.pt.y}),
                             rb = rig_.camera.Unproject({kb.pt.x, kb.pt.y});
       const double cosine = ra.normalized().dot((T_b_a.rotation.conjugate() * rb).normalized());
-      if (cosine > 0.9999 || cosine < 0) continue;  // 0.8 deg of parallax at least
+      if (cosine > kMaxCosine || cosine < 0) continue;
       const Eigen::Vector3d in_a = tutti::Triangulate(ra, rb, T_b_a);
       if (!in_a.allFinite()) continue;
       const Eigen::Vector3d point = T_world_a * in_a;

@@ -38,9 +38,9 @@ struct Refined {
 // Sub-pixel column of the match and its row difference; false if the minimum lies at the end of the range.
 bool Refine(const cv::Mat& left, const cv::Mat& right, float scale, const cv::Point2f& left_point,
             float right_u, Refined* out) {
-  const int x = static_cast<int>(std::lround(left_point.x / scale)),
-            y = static_cast<int>(std::lround(left_point.y / scale));
-  const int x0 = static_cast<int>(std::lround(right_u / scale));
+  const int x = static_cast<int>(std::lround((left_point.x + 0.5F) / scale - 0.5F)),
+            y = static_cast<int>(std::lround((left_point.y + 0.5F) / scale - 0.5F));
+  const int x0 = static_cast<int>(std::lround((right_u + 0.5F) / scale - 0.5F));
   const int margin = kHalf + 1;
   if (x < margin || y < margin || x + margin >= left.cols || y + margin >= left.rows) return false;
   if (x0 - kSearch < margin || x0 + kSearch + margin >= right.cols || y + margin >= right.rows) return false;

@@ -1,0 +1,68 @@
+// Example 01: loop closure alone. Reads the images of a folder in order and says where the camera was before.
+//
+//   01_loop_closure_on_a_folder DIR
+//
+// Three calls: construct a LoopDetector, give it each image, read the result.
+#include <algorithm>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <opencv2/imgcodecs.hpp>
+#include <string>
+#include <vector>
+
+#include "tutti/core/text.h"
+#include "tutti/loopclosure/detector.h"
+
+namespace {
+
+std::vector<std::string> FilesInOrder(const std::string& folder) {
+  std::vector<std::string> files;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    if (entry.is_regular_file() && cv::haveImageReader(entry.path().string()))
+      files.push_back(entry.path().string());
+  }
+  std::sort(files.begin(), files.end(), tutti::NaturalLess);  // 2.jpg before 10.jpg
+  return files;
+}
+
+int Run(const std::string& folder) {
+  tutti::LoopDetectorOptions options;  // SURF, SIFT and ORB, one Bayes filter each, the mean of the three
+  tutti::LoopDetector detector(options);
+
+  const std::vector<std::string> files = FilesInOrder(folder);
+  int loops = 0;
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    tutti::LoopQuery query;
+    query.id = static_cast<std::int64_t>(i);
+    query.image = cv::imread(files[i], cv::IMREAD_GRAYSCALE);
+
+    const tutti::LoopResult result = detector.Detect(query);
+    if (result.accepted) {
+      const tutti::Verification& v = result.verification;
+      std::printf("image %zu is where image %lld was (H = %.2f, %d of %d matches fit)\n", i,
+                  static_cast<long long>(v.candidate), result.hypothesis, v.inliers, v.matches);
+      ++loops;
+    } else if (result.proposed) {
+      std::printf("image %zu: no loop with %lld: %s\n", i, static_cast<long long>(result.candidate),
+                  result.reason.c_str());
+    }
+  }
+  std::printf("%zu images, %d loops\n", files.size(), loops);
+  return files.empty() ? 1 : 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 2) {
+    std::fprintf(stderr, "usage: %s DIR\n", argv[0]);
+    return 1;
+  }
+  try {
+    return Run(argv[1]);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return 1;
+  }
+}

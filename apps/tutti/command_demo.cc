@@ -29,8 +29,8 @@ SyntheticOptions DemoWorld() {
   options.width = 512;
   options.height = 256;
   options.block_m = 26;
-  options.laps = 1.2;
-  options.rate_hz = 6;
+  options.laps = 1.15;
+  options.rate_hz = 4.5;
   options.supersample = 1;
   options.noise_sigma = 4;  // an odometry without drift would need no loop
   return options;

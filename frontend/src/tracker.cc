@@ -331,13 +331,13 @@ void Odometry::Impl::Lose(const TrackedFrame&) {
 bool Odometry::Impl::NeedKeyframe(const TrackedFrame& frame, const FrameMatches& matches, int inliers) const {
   const tutti::Keyframe& last = map.keyframe(last_keyframe_);
   const bool early = frames_since_keyframe_ < options.keyframe_min_frames;
-  // Landmarks of the reference that are established.
+  // Landmarks of the reference that are established: what one keyframe alone has seen (most of what depth
+  // gives) may never be seen again, and would call for a keyframe all the time.
   const tutti::Keyframe& reference = map.keyframe(reference_);
-  const std::size_t established = map.keyframes().size() > 2 ? (rig.sensor == Sensor::kMono ? 3 : 2) : 2;
+  const std::size_t established = rig.sensor == Sensor::kMono && map.keyframes().size() > 2 ? 3 : 2;
   int reference_count = 0;
   for (int l : reference.landmarks) {
-    if (l >= 0 && map.landmark(l).observations.size() >= (rig.sensor == Sensor::kMono ? established : 1))
-      ++reference_count;
+    if (l >= 0 && map.landmark(l).observations.size() >= established) ++reference_count;
   }
   const bool weak = inliers < options.keyframe_inlier_ratio * reference_count;
   const bool very_weak = inliers < 0.4 * reference_count || inliers < 3 * options.min_inliers;

@@ -299,7 +299,7 @@ class LoopDetector::Impl {
       return;
     }
     const View& query = memory_.id(slot) == result.query ? views_[Index(slot)] : dropped_view_;
-    Verify(query, TopPlaces(combined.belief), result);
+    Verify(query, combined.belief, result);
   }
 
   // Tries a candidate unless it was tried before; keeps it as the best if it is.
@@ -319,11 +319,12 @@ class LoopDetector::Impl {
     return tried;
   }
 
-  void Verify(const View& query, const std::vector<int>& places, LoopResult& result) {
+  void Verify(const View& query, const Belief& belief, LoopResult& result) {
     const VerificationOptions& options = options_.verification;
+    const std::vector<int> places = TopPlaces(belief);
     for (const int place : places) {
       int inliers_here = 0;
-      for (const auto& [candidate, level] : memory_.Neighbours(place, options.neighbours)) {
+      for (const int candidate : ViewsOf(place, belief)) {
         // Neighbours are worth a try where the place itself shows something, or for the best hypothesis.
         if (candidate != place && place != places.front() && inliers_here < options.min_inliers / 2) break;
         inliers_here = std::max(inliers_here, Try(query, candidate, result).inliers);
@@ -339,14 +340,34 @@ class LoopDetector::Impl {
     }
   }
 
-  // From an accepted candidate to the neighbour that shares the most with the query: the nearest view of the
-  // place, and the best constraint.
+  // The place itself, then the best of its neighbours by posterior. A place that was visited often has many,
+  // which show the same.
+  std::vector<int> ViewsOf(int place, const Belief& belief) const {
+    constexpr std::size_t kMostNeighbours = 3;
+    std::vector<int> views;
+    for (const auto& [slot, level] : memory_.Neighbours(place, options_.verification.neighbours)) {
+      if (slot != place) views.push_back(slot);
+    }
+    const auto posterior = [&](int slot) {
+      return Index(slot) < belief.places.size() ? belief.places[Index(slot)] : 0.0;
+    };
+    std::stable_sort(views.begin(), views.end(), [&](int a, int b) { return posterior(a) > posterior(b); });
+    if (views.size() > kMostNeighbours) views.resize(kMostNeighbours);
+    views.insert(views.begin(), place);
+    return views;
+  }
+
+  // From an accepted candidate along the path to the neighbour that shares the most with the query: the
+  // nearest view of the place, and the best constraint.
   void Climb(const View& query, LoopResult& result) {
     constexpr int kSteps = 3;
     for (int step = 0; step < kSteps; ++step) {
       const std::int64_t start = result.verification.candidate;
-      for (const auto& [candidate, level] : memory_.Neighbours(memory_.Find(start), 1))
-        Try(query, candidate, result);
+      for (const LocationMemory::Link& link : memory_.links(memory_.Find(start))) {
+        if (link.type == LocationMemory::LinkType::kOdometry &&
+            memory_.state(link.slot) == LocationMemory::State::kWorking)
+          Try(query, link.slot, result);
+      }
       if (result.verification.candidate == start) return;
     }
   }

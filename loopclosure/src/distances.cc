@@ -1,5 +1,7 @@
 #include "distances.h"
 
+#include <limits>
+
 namespace tutti::internal {
 
 TUTTI_CLONES("avx2")
@@ -26,10 +28,36 @@ void SquaredDistances(const float* query, const float* rows, int count, int dime
 TUTTI_CLONES("popcnt")
 void HammingDistances(const std::uint8_t* query, const std::uint8_t* rows, int count, int bytes,
                       std::size_t step, float* distances) {
+  if (bytes == 32) {  // ORB: a fixed length unrolls
+    for (int j = 0; j < count; ++j) {
+      distances[j] =
+          static_cast<float>(HammingDistance(query, rows + static_cast<std::size_t>(j) * step, 32));
+    }
+    return;
+  }
   for (int j = 0; j < count; ++j) {
     distances[j] =
         static_cast<float>(HammingDistance(query, rows + static_cast<std::size_t>(j) * step, bytes));
   }
+}
+
+TUTTI_CLONES("avx2")
+float UpdateNearest(const float* distances, int count, int row, float* nearest, std::int32_t* nearest_row) {
+  // Floats that are not negative are ordered as their bits are, and integers need no order of evaluation.
+  std::int32_t least = std::numeric_limits<std::int32_t>::max();
+  for (int j = 0; j < count; ++j) {
+    std::int32_t bits = 0;
+    std::memcpy(&bits, distances + j, sizeof bits);
+    least = bits < least ? bits : least;
+  }
+  for (int j = 0; j < count; ++j) {
+    const bool nearer = distances[j] < nearest[j];
+    nearest[j] = nearer ? distances[j] : nearest[j];
+    nearest_row[j] = nearer ? row : nearest_row[j];
+  }
+  float result = 0;
+  std::memcpy(&result, &least, sizeof result);
+  return result;
 }
 
 }  // namespace tutti::internal

@@ -31,6 +31,10 @@ void SquaredDistances(const float* query, const float* rows, int count, int dime
 void HammingDistances(const std::uint8_t* query, const std::uint8_t* rows, int count, int bytes,
                       std::size_t step, float* distances);
 
+/// The least of `count` > 0 distances (none negative); and where distances[j] < nearest[j], nearest[j] and
+/// nearest_row[j] become distances[j] and `row`.
+float UpdateNearest(const float* distances, int count, int row, float* nearest, std::int32_t* nearest_row);
+
 }  // namespace tutti::internal
 
 // Functions compiled for plain x86-64 and once more with newer instructions, chosen at run time. Sanitizers

@@ -1,6 +1,8 @@
 #include "tutti/loopclosure/matching.h"
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 
 #include "distances.h"
@@ -35,25 +37,23 @@ std::vector<Match> MatchDescriptors(const cv::Mat& query, const cv::Mat& candida
   }
   const std::size_t count = static_cast<std::size_t>(candidate.rows);
   std::vector<float> distances(count);
-  std::vector<float> best_of_candidate(count, kInfinity);
-  std::vector<int> query_of_candidate(count, -1);
+  std::vector<float> nearest(count, kInfinity);         // to each candidate row, so far
+  std::vector<std::int32_t> query_of_candidate(count, -1);  // the query row that it is the distance of
   for (int i = 0; i < query.rows; ++i) {
     Distances(query, i, candidate, distances);
-    std::size_t best = 0;
-    for (std::size_t j = 0; j < count; ++j) {
-      if (distances[j] < distances[best]) best = j;
-      if (distances[j] < best_of_candidate[j]) {
-        best_of_candidate[j] = distances[j];
-        query_of_candidate[j] = i;
-      }
-    }
+    const float least =
+        internal::UpdateNearest(distances.data(), candidate.rows, i, nearest.data(), query_of_candidate.data());
+    const auto at = std::find(distances.begin(), distances.end(), least);
+    if (at == distances.end()) continue;  // descriptors with NaN
+    const std::size_t best = static_cast<std::size_t>(at - distances.begin());
+    if (query_of_candidate[best] != i) continue;  // an earlier row is as near: never mutual
     float second = kInfinity;
     for (std::size_t j = 0; j < count; ++j) {
       if (distances[j] >= second) continue;
       const cv::Point2f apart = candidate_points[j] - candidate_points[best];
       if (apart.dot(apart) > kSamePlace * kSamePlace) second = distances[j];
     }
-    const float ratio = second > 0.0f ? std::sqrt(distances[best] / second) : 1.0f;
+    const float ratio = second > 0.0f ? std::sqrt(least / second) : 1.0f;
     if (ratio <= max_ratio) matches.push_back({i, static_cast<int>(best), ratio});
   }
   std::vector<Match> mutual;

@@ -47,11 +47,6 @@ std::optional<Disagreement> LoopGate::WithMap(const LoopEdge& loop, const Map& m
   return Measure(loop.S_candidate_query * T_query_candidate, loop.depth);
 }
 
-bool LoopGate::AgreesWithMap(const LoopEdge& loop, const Map& map) const {
-  const std::optional<Disagreement> d = WithMap(loop, map);
-  return d && Within(*d);
-}
-
 bool LoopGate::Fulfilled(const LoopEdge& loop, const Map& map) const {
   const std::optional<Disagreement> d = WithMap(loop, map);
   return d && d->fraction < options_.loop_defer_fraction && d->angle_deg < options_.loop_defer_deg &&
@@ -70,7 +65,7 @@ std::vector<LoopEdge> LoopGate::Offer(const LoopEdge& loop, const Map& map) {
   for (const LoopEdge& other : accepted_) {
     if (Near(loop, other) && Agree(loop, other, map)) ++agreeing;
   }
-  if (agreeing < options_.loop_confirmations && !AgreesWithMap(loop, map)) {
+  if (agreeing < options_.loop_confirmations && !Fulfilled(loop, map)) {
     waiting_.push_back(loop);
     return {};
   }

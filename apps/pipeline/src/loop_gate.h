@@ -20,7 +20,7 @@ Disagreement Measure(const Similarity& E, double depth);
 
 /// A false loop ruins a map, a missed one costs little: a loop enters when it closes with another loop nearby
 /// (the cycle candidate A -> query A -> query B -> candidate B -> candidate A; pairwise consistency as in
-/// Mangelson et al., ICRA 2018), or when the odometry itself says the same.
+/// Mangelson et al., ICRA 2018), or when the map says the same so closely that chance is no explanation.
 class LoopGate {
  public:
   /// Pose of a keyframe in the present map, and the map piece that it belongs to.
@@ -39,9 +39,6 @@ class LoopGate {
 
   /// True if the two loops agree with each other through the odometry between their ends.
   bool Agree(const LoopEdge& a, const LoopEdge& b, const Map& map) const;
-  /// True if the present map says the same as the loop.
-  bool AgreesWithMap(const LoopEdge& loop, const Map& map) const;
-
   /// True if the present map fulfils the loop so well that it need not move for it.
   bool Fulfilled(const LoopEdge& loop, const Map& map) const;
 

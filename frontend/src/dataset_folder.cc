@@ -237,9 +237,10 @@ std::optional<std::filesystem::path> FolderDataset::GroundTruthFile() const {
   return std::nullopt;
 }
 
-Trajectory FolderDataset::ReadGroundTruth(const std::filesystem::path& file) const {
+Trajectory FolderDataset::ReadGroundTruth(const std::filesystem::path& file,
+                                          std::vector<std::string>* warnings) const {
   const TrajectoryFormat format = GuessTrajectoryFormat(file);
-  Trajectory poses = ReadTrajectory(file, format);
+  Trajectory poses = ReadTrajectory(file, format, warnings);
   if (format == TrajectoryFormat::kKitti) {
     if (contents_.pose_count == 0 && poses.size() != Size()) {
       throw InputError(file.string() + ": has " + std::to_string(poses.size()) +

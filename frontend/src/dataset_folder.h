@@ -51,7 +51,8 @@ class FolderDataset : public Dataset {
   ReadResult Read(std::size_t i) const override;
   const CameraRig& Rig() const override { return rig_; }
   std::optional<std::filesystem::path> GroundTruthFile() const override;
-  Trajectory ReadGroundTruth(const std::filesystem::path& file) const override;
+  Trajectory ReadGroundTruth(const std::filesystem::path& file,
+                             std::vector<std::string>* warnings) const override;
   const std::vector<std::string>& Warnings() const override { return contents_.warnings; }
 
  private:

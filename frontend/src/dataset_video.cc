@@ -51,9 +51,10 @@ class VideoDataset : public Dataset {
   std::optional<std::filesystem::path> GroundTruthFile() const override { return std::nullopt; }
   const std::vector<std::string>& Warnings() const override { return warnings_; }
 
-  Trajectory ReadGroundTruth(const std::filesystem::path& file) const override {
+  Trajectory ReadGroundTruth(const std::filesystem::path& file,
+                             std::vector<std::string>* warnings) const override {
     const TrajectoryFormat format = GuessTrajectoryFormat(file);
-    Trajectory poses = ReadTrajectory(file, format);
+    Trajectory poses = ReadTrajectory(file, format, warnings);
     if (format == TrajectoryFormat::kKitti) {
       if (poses.size() != frames_) {
         throw InputError(file.string() + ": has " + std::to_string(poses.size()) +

@@ -144,7 +144,7 @@ TEST(DatasetBadInputTest, WrongNumberOfPosesAndNaN) {
   const auto data = OpenDataset(folder, With(Sensor::kMono));
   const auto error = [&] {
     try {
-      data->ReadGroundTruth(folder / "poses.txt");
+      data->ReadGroundTruth(folder / "poses.txt", nullptr);
     } catch (const InputError& e) {
       return std::string(e.what());
     }
@@ -170,7 +170,7 @@ TEST(DatasetBadInputTest, TimeStampsMustGrow) {
   ASSERT_EQ(data->Size(), 3U);
   EXPECT_THAT(data->Warnings()[0], AllOf(HasSubstr("times.txt:3: "), HasSubstr("skipped")));
   EXPECT_EQ(data->Read(2).frame->index, 3);
-  EXPECT_EQ(data->ReadGroundTruth(folder / "poses.txt").size(), 3U);
+  EXPECT_EQ(data->ReadGroundTruth(folder / "poses.txt", nullptr).size(), 3U);
   WriteText(folder / "times.txt", "0\n0.2\n0.1\n0.3\n");
   EXPECT_THAT(OpenError(folder, With(Sensor::kMono)), AllOf(HasSubstr("times.txt:3: "), HasSubstr("sort")));
   WriteText(folder / "times.txt", "0\n0.1\nnan\n0.3\n");

@@ -31,7 +31,7 @@ TEST(DatasetTest, KittiStereoHasCalibrationBaselineStampsAndPoses) {
   EXPECT_EQ(cv::norm(frame.frame->image, Picture(64, 48, 2), cv::NORM_INF), 0);
   EXPECT_EQ(cv::norm(frame.frame->right, Picture(64, 48, 102), cv::NORM_INF), 0);
   ASSERT_TRUE(data->GroundTruthFile());
-  const Trajectory truth = data->ReadGroundTruth(*data->GroundTruthFile());
+  const Trajectory truth = data->ReadGroundTruth(*data->GroundTruthFile(), nullptr);
   ASSERT_EQ(truth.size(), 4U);
   EXPECT_DOUBLE_EQ(truth[3].stamp_s, 0.3);
   EXPECT_DOUBLE_EQ(truth[3].pose.translation.x(), 3);
@@ -46,7 +46,7 @@ TEST(DatasetTest, StrideKeepsIndicesAndStampsOfTheData) {
   ASSERT_EQ(data->Size(), 3U);
   EXPECT_EQ(data->Read(2).frame->index, 6);
   EXPECT_DOUBLE_EQ(data->Stamp(2), 0.6);
-  EXPECT_EQ(data->ReadGroundTruth(folder / "poses.txt").size(), 7U);
+  EXPECT_EQ(data->ReadGroundTruth(folder / "poses.txt", nullptr).size(), 7U);
 }
 
 TEST(DatasetTest, ReadsAnyImageFormat) {
@@ -120,7 +120,7 @@ TEST(DatasetTest, IclNuimHasDepthFirstFrameNumbersForStampsAndMirroredTruth) {
   EXPECT_NEAR(data->Stamp(1), 2.0 / 30, 1e-9);
   EXPECT_EQ(cv::norm(data->Read(1).frame->image, Picture(64, 48, 2), cv::NORM_INF), 0);
   EXPECT_GT(data->Rig().camera.fy, 0);
-  const Trajectory truth = data->ReadGroundTruth(*data->GroundTruthFile());
+  const Trajectory truth = data->ReadGroundTruth(*data->GroundTruthFile(), nullptr);
   EXPECT_NEAR(truth[1].stamp_s, data->Stamp(1), 1e-9);
   EXPECT_DOUBLE_EQ(truth[1].pose.translation.y(), -2);
   EXPECT_LT(truth[1].pose.rotation.x(), 0);
@@ -181,7 +181,7 @@ TEST(DatasetTest, RealKittiHead) {
   EXPECT_EQ(data->Size(), 1700U);
   EXPECT_NEAR(data->Rig().camera.fx, 718.856, 1e-6);
   EXPECT_EQ(data->Read(1699).frame->image.size(), cv::Size(1241, 376));
-  EXPECT_EQ(data->ReadGroundTruth(*data->GroundTruthFile()).size(), 1700U);
+  EXPECT_EQ(data->ReadGroundTruth(*data->GroundTruthFile(), nullptr).size(), 1700U);
   EXPECT_THAT(OpenError(path, With(Sensor::kStereo)), HasSubstr("image_1"));
 }
 

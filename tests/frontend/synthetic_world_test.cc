@@ -192,7 +192,7 @@ TEST(SyntheticWorldTest, WrittenStereoTownIsReadBackByTheKittiReader) {
   const SyntheticFrame frame = world.Render(3);
   EXPECT_EQ(cv::norm(data->Read(3).frame->image, frame.image, cv::NORM_INF), 0);
   EXPECT_EQ(cv::norm(data->Read(3).frame->right, frame.right, cv::NORM_INF), 0);
-  const Trajectory truth = data->ReadGroundTruth(*data->GroundTruthFile());
+  const Trajectory truth = data->ReadGroundTruth(*data->GroundTruthFile(), nullptr);
   EXPECT_LT((truth[4].pose.translation - world.PoseOf(4).translation).norm(), 1e-9);
 }
 
@@ -207,7 +207,7 @@ TEST(SyntheticWorldTest, WrittenRoomIsReadBackByTheTumReader) {
   const auto data = OpenDataset(folder, read);
   ASSERT_EQ(data->Size(), 4U);
   EXPECT_LT(cv::norm(data->Read(2).frame->depth_m, world.Render(2).depth_m, cv::NORM_INF), 2e-4);
-  const Trajectory truth = data->ReadGroundTruth(*data->GroundTruthFile());
+  const Trajectory truth = data->ReadGroundTruth(*data->GroundTruthFile(), nullptr);
   ASSERT_EQ(truth.size(), 4U);
   EXPECT_LT((truth[3].pose.translation - world.PoseOf(3).translation).norm(), 1e-8);
   EXPECT_NEAR(truth[3].stamp_s, data->Stamp(3), 1e-6);
@@ -240,7 +240,7 @@ TEST(SyntheticWorldTest, StoppingKeepsACompleteBeginning) {
   const auto data = OpenDataset(folder, With(Sensor::kMono));
   EXPECT_EQ(data->Size(), written);
   EXPECT_TRUE(data->Read(written - 1).frame);
-  EXPECT_EQ(data->ReadGroundTruth(folder / "poses.txt").size(), written);
+  EXPECT_EQ(data->ReadGroundTruth(folder / "poses.txt", nullptr).size(), written);
 }
 
 TEST(SyntheticWorldTest, BadOptionsAreNamed) {

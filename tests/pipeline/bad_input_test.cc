@@ -152,6 +152,22 @@ TEST_F(BadInput, GroundTruthOfAnotherTimeKeepsTheRun) {
   EXPECT_TRUE(fs::exists(folder_ / "out" / "trajectory.txt"));
 }
 
+TEST_F(BadInput, GroundTruthThatRepeatsATimeStampIsUsedAndNoted) {
+  const fs::path data = testing::CopyOfTinyTown(folder_ / "data");
+  std::string text;
+  for (int i = 0; i < 40; ++i) {
+    const std::string line = std::to_string(0.1 * i) + " " + std::to_string(0.8 * i) + " 0 " +
+                             std::to_string(0.02 * i * i) + " 0 0 0 1\n";
+    text += line;
+    if (i == 3) text += line;
+  }
+  testing::WriteAll(folder_ / "truth.txt", text);
+  const auto run =
+      Run(testing::TinyConfig(folder_), data, {"--ground-truth", (folder_ / "truth.txt").string()});
+  EXPECT_EQ(run.status, 0) << run.output;
+  EXPECT_THAT(run.output, AllOf(HasSubstr("truth.txt:5: repeats the time stamp"), HasSubstr("ATE")));
+}
+
 TEST_F(BadInput, UnsortedTimeStampsAreRefusedWithTheirLine) {
   const fs::path data = testing::CopyOfTinyTown(folder_ / "data");
   std::string text = ReadAll(data / "times.txt");

@@ -25,7 +25,9 @@ class FakeDataset : public Dataset {
   }
   const CameraRig& Rig() const override { return rig_; }
   std::optional<std::filesystem::path> GroundTruthFile() const override { return std::nullopt; }
-  Trajectory ReadGroundTruth(const std::filesystem::path&) const override { return {}; }
+  Trajectory ReadGroundTruth(const std::filesystem::path&, std::vector<std::string>*) const override {
+    return {};
+  }
   const std::vector<std::string>& Warnings() const override { return warnings_; }
 
  private:

@@ -47,13 +47,14 @@ RunConfig WithOverrides(RunConfig config, const RunRequest& request) {
 
 // The ground truth is read before the long work, so that a damaged file is known at once.
 std::optional<std::pair<Trajectory, std::string>> ReadReference(const Dataset& dataset,
-                                                                const RunRequest& request) {
+                                                                const RunRequest& request,
+                                                                std::vector<std::string>* warnings) {
   if (request.ground_truth && *request.ground_truth == "none") return std::nullopt;
   const std::optional<fs::path> file =
       request.ground_truth ? request.ground_truth : dataset.GroundTruthFile();
   if (!file) return std::nullopt;
   try {
-    return std::make_pair(dataset.ReadGroundTruth(*file), file->string());
+    return std::make_pair(dataset.ReadGroundTruth(*file, warnings), file->string());
   } catch (const InputError& e) {
     const char* hint = " (ground truth; --ground-truth none runs without it)";
     throw InputError(e.what() + std::string(hint));
@@ -216,11 +217,11 @@ RunResult RunSlam(const RunRequest& request, const RunConfig& given) {
   cv::setNumThreads(1);
   const std::unique_ptr<Dataset> dataset = OpenDataset(request.dataset, result.config.dataset);
   result.rig = dataset->Rig();
-  const auto reference = ReadReference(*dataset, request);
+  std::vector<std::string> warnings = dataset->Warnings();
+  const auto reference = ReadReference(*dataset, request, &warnings);
   PrepareOutputFolder(request.out);
   if (!request.quiet) {
-    for (const std::string& warning : dataset->Warnings())
-      std::fprintf(stderr, "tutti: %s\n", warning.c_str());
+    for (const std::string& warning : warnings) std::fprintf(stderr, "tutti: %s\n", warning.c_str());
     if (!result.rig.calibrated) {
       std::fprintf(stderr, "tutti: no camera calibration: appearance only, loops but no trajectory\n");
     }

@@ -28,10 +28,10 @@ struct DatasetOptions {
   Sensor sensor = Sensor::kMono;
   std::optional<PinholeCamera> camera;  ///< as calibrated (with its distortion); EuRoC: from sensor.yaml
                                         ///< where absent, KITTI: from calib.txt where absent
-  double baseline_m = 0;            ///< stereo without sensor.yaml or calib.txt [m]
-  double depth_units_per_m = 5000;  ///< RGB-D: value in the depth image of one metre
-  double max_depth_m = 0;           ///< RGB-D: farther depth is not used [m]; 0 = no limit
-  double max_association_s = 0.02;  ///< TUM: greatest difference of the stamps of colour and depth [s]
+  double baseline_m = 0;                ///< stereo without sensor.yaml or calib.txt [m]
+  double depth_units_per_m = 5000;      ///< RGB-D: value in the depth image of one metre
+  double max_depth_m = 0;               ///< RGB-D: farther depth is not used [m]; 0 = no limit
+  double max_association_s = 0.02;      ///< TUM: greatest difference of the stamps of colour and depth [s]
   double rate_hz = 0;  ///< frames per second where the data has no time stamps; 0: 10 Hz or the video's
   int stride = 1;      ///< use every stride-th frame
   bool mirrored_ground_truth = false;  ///< ground truth has its y axis up (left-handed, as ICL-NUIM with its
@@ -57,8 +57,10 @@ class Dataset {
   /// Ground truth in its usual place in the folder (T_world_body, stamps as Stamp()), if there is any.
   virtual std::optional<std::filesystem::path> GroundTruthFile() const = 0;
   /// Reads a ground-truth file for this data set: format guessed, KITTI poses get the data set's stamps, and
-  /// must be as many. Throws InputError with file and line.
-  virtual Trajectory ReadGroundTruth(const std::filesystem::path& file) const = 0;
+  /// must be as many. Throws InputError with file and line. A time stamp that stands there twice keeps its
+  /// first pose and says so in `warnings`; without `warnings` (null) it is an error.
+  virtual Trajectory ReadGroundTruth(const std::filesystem::path& file,
+                                     std::vector<std::string>* warnings) const = 0;
   /// Notes for the log about what was found and decided: skipped duplicates, frames without depth, ...
   virtual const std::vector<std::string>& Warnings() const = 0;
 };

@@ -25,6 +25,8 @@ struct PooledMatch {
   float ratio = 1;
 };
 
+constexpr double kLeastSpreadShare = 0.6;  // of min_spread, however many the inliers
+
 const Eigen::Vector3f kUnknown = Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN());
 
 Eigen::Vector3f PointOf(const View::Set& set, int index) {
@@ -144,10 +146,13 @@ std::string Judge(const std::vector<PooledMatch>& pool, const std::vector<int>& 
     return Format("only %.0f %% of the matches fit one camera motion, %.0f %% are needed", 100 * ratio,
                   100 * min_ratio);
   }
+  // What a motion is known by grows with number times spread squared: many inliers may lie closer together.
+  const double abundance = std::sqrt(1.5 * min_inliers / static_cast<double>(result.inliers));
+  const double needed = options.min_spread * std::clamp(abundance, kLeastSpreadShare, 1.0);
   const double spread = std::min(Spread(in_query, query.size), Spread(in_candidate, candidate.size));
-  if (spread < options.min_spread) {
+  if (spread < needed) {
     return Format("the matches cover too narrow a part of the image (%.3f of its size, %.3f is needed)",
-                  spread, options.min_spread);
+                  spread, needed);
   }
   return {};
 }

@@ -53,7 +53,9 @@ struct VerificationOptions {
       30;  ///< essential, fundamental matrix: a match is held to a line only, so more are needed
   double min_epipolar_ratio = 0.55;  ///< and a larger share of all matches, 0..1
   double min_spread = 0.045;  ///< standard deviation of the inliers' pixels, as a share of width and height,
-                              ///< along their narrowest direction; evenly spread: 0.29, on one line: 0
+                              ///< along their narrowest direction; evenly spread: 0.29, on one line: 0.
+                              ///< Inliers in abundance (beyond 1.5 times the least) may lie closer, down
+                              ///< to 0.6 of it
   double reprojection_px = 2.5;  ///< RANSAC threshold of PnP, Sim(3) [px]
   double epipolar_px = 1.5;      ///< RANSAC threshold of the essential and fundamental matrix [px]
   double confidence = 0.9999;    ///< of RANSAC

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <numeric>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -58,7 +59,8 @@ cv::Point2f RefineCorner(const cv::Mat& image, const cv::Point2f& corner) {
     const std::uint8_t* above = image.ptr<std::uint8_t>(y + v - 1) + x;
     const std::uint8_t* below = image.ptr<std::uint8_t>(y + v + 1) + x;
     for (int u = -kWindow; u <= kWindow; ++u) {
-      const float gx = static_cast<float>(row[u + 1] - row[u - 1]), gy = static_cast<float>(below[u] - above[u]);
+      const float gx = static_cast<float>(row[u + 1] - row[u - 1]),
+                  gy = static_cast<float>(below[u] - above[u]);
       const float xx = gx * gx, xy = gx * gy, yy = gy * gy;
       const float fu = static_cast<float>(u), fv = static_cast<float>(v);
       a += xx;
@@ -158,29 +160,41 @@ int HammingDistance(const std::uint8_t* a, const std::uint8_t* b) {
 void Features::BuildGrid(int width, int height) {
   columns_ = width / kCell + 1;
   rows_ = height / kCell + 1;
-  cells_.assign(static_cast<std::size_t>(columns_ * rows_), {});
+  std::vector<std::size_t> cell_of(keypoints.size());
+  first_entry_.assign(static_cast<std::size_t>(columns_ * rows_) + 1, 0);
   for (std::size_t i = 0; i < keypoints.size(); ++i) {
     const int c = std::clamp(static_cast<int>(keypoints[i].pt.x) / kCell, 0, columns_ - 1);
     const int r = std::clamp(static_cast<int>(keypoints[i].pt.y) / kCell, 0, rows_ - 1);
-    cells_[static_cast<std::size_t>(r * columns_ + c)].push_back(static_cast<int>(i));
+    cell_of[i] = static_cast<std::size_t>(r * columns_ + c);
+    ++first_entry_[cell_of[i] + 1];
+  }
+  std::partial_sum(first_entry_.begin(), first_entry_.end(), first_entry_.begin());
+  entries_.resize(keypoints.size());
+  std::vector<int> next(first_entry_.begin(), first_entry_.end() - 1);
+  for (std::size_t i = 0; i < keypoints.size(); ++i) {
+    entries_[static_cast<std::size_t>(next[cell_of[i]]++)] = {keypoints[i].pt, keypoints[i].octave,
+                                                              static_cast<int>(i)};
   }
 }
 
 void Features::InArea(const cv::Point2f& centre, float radius, int first_octave, int last_octave,
                       std::vector<int>* out) const {
   out->clear();
-  if (cells_.empty()) return;
+  if (entries_.empty()) return;
   const int c0 = std::max(0, static_cast<int>(std::floor((centre.x - radius) / kCell)));
   const int c1 = std::min(columns_ - 1, static_cast<int>(std::floor((centre.x + radius) / kCell)));
   const int r0 = std::max(0, static_cast<int>(std::floor((centre.y - radius) / kCell)));
   const int r1 = std::min(rows_ - 1, static_cast<int>(std::floor((centre.y + radius) / kCell)));
+  if (c0 > c1) return;
   for (int r = r0; r <= r1; ++r) {
-    for (int c = c0; c <= c1; ++c) {
-      for (int i : cells_[static_cast<std::size_t>(r * columns_ + c)]) {
-        const cv::KeyPoint& k = keypoints[static_cast<std::size_t>(i)];
-        if (k.octave < first_octave || k.octave > last_octave) continue;
-        if (std::abs(k.pt.x - centre.x) <= radius && std::abs(k.pt.y - centre.y) <= radius) out->push_back(i);
-      }
+    // The cells of a row lie one after the other.
+    const int begin = first_entry_[static_cast<std::size_t>(r * columns_ + c0)],
+              end = first_entry_[static_cast<std::size_t>(r * columns_ + c1 + 1)];
+    for (int e = begin; e < end; ++e) {
+      const Entry& entry = entries_[static_cast<std::size_t>(e)];
+      if (entry.octave < first_octave || entry.octave > last_octave) continue;
+      if (std::abs(entry.pixel.x - centre.x) <= radius && std::abs(entry.pixel.y - centre.y) <= radius)
+        out->push_back(entry.feature);
     }
   }
 }
@@ -235,8 +249,9 @@ Features ExtractOrb(const std::vector<cv::Mat>& pyramid, const OdometryOptions& 
     if (!corners.empty()) orb->compute(image, corners, level_descriptors);
     if (corners.empty()) continue;
     descriptors.push_back(level_descriptors);
-    // Pixel centres have integer coordinates on every level, so the levels' corners are half a pixel apart; and their
-    // sizes are rounded. Ignoring either biases coarse features by more than a pixel, and mono scale drifts with them.
+    // Pixel centres have integer coordinates on every level, so the levels' corners are half a pixel apart;
+    // and their sizes are rounded. Ignoring either biases coarse features by more than a pixel, and mono
+    // scale drifts with them.
     const float sx = static_cast<float>(pyramid[0].cols) / static_cast<float>(image.cols);
     const float sy = static_cast<float>(pyramid[0].rows) / static_cast<float>(image.rows);
     for (cv::KeyPoint k : corners) {

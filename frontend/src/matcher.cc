@@ -253,10 +253,11 @@ std::vector<std::pair<int, int>> MatchEpipolar(const Map& map, const PinholeCame
     // Walk along the segment in steps, so that only features near the line are looked at.
     const double length = std::min((a - b).norm(), double(camera.width));
     const int steps = std::max(1, static_cast<int>(std::ceil(length / 24.0)));
+    const Eigen::Vector2d direction = (a - b).normalized();
     Best best;
     int last_seen = -1;
     for (int s = 0; s <= steps; ++s) {
-      const Eigen::Vector2d p = b + (a - b).normalized() * (length * s / steps);
+      const Eigen::Vector2d p = b + direction * (length * s / steps);
       if (!p.allFinite() || !camera.Contains(p, -20)) continue;
       second.features->InArea(cv::Point2f(static_cast<float>(p.x()), static_cast<float>(p.y())), 14.0F,
                               k.octave - 1, k.octave + 1, &near);

@@ -27,7 +27,8 @@ struct Features {
   double row_error_px = 0;                 ///< stereo: median absolute row difference of the matches [px]
   int stereo_matches = 0;                  ///< stereo: features with a match in the right image
 
-  /// Indices of the features within `radius` [px] of `centre`, in octaves first..last, ascending.
+  /// Indices of the features within `radius` [px] of `centre`, in octaves first..last, cell by
+  /// cell of the grid.
   void InArea(const cv::Point2f& centre, float radius, int first_octave, int last_octave,
               std::vector<int>* out) const;
   /// Fills the grid that InArea uses; call after the keypoints are set.
@@ -37,8 +38,13 @@ struct Features {
 
  private:
   static constexpr int kCell = 24;  // [px]
+  struct Entry {                    // what InArea asks of a feature, side by side in memory
+    cv::Point2f pixel;
+    int octave = 0, feature = 0;
+  };
   int columns_ = 0, rows_ = 0;
-  std::vector<std::vector<int>> cells_;
+  std::vector<Entry> entries_;    // cell by cell, rows of cells first; ascending within a cell
+  std::vector<int> first_entry_;  // of each cell, and the number of entries at the end
 };
 
 /// Scale of each pyramid level: level 0 has 1, level l scale_factor^l.

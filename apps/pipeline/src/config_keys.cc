@@ -227,6 +227,8 @@ void ConfigTable::AddRun(SlamOptions& o) {
   Add("loop_min_interval_s", o.loop_min_interval_s, "and no more often than this [s]");
   Add("loop_min_age_s", o.loop_min_age_s,
       "a candidate that is not this much older than the query is no loop [s]");
+  Add("loop_apart_fraction", o.loop_apart_fraction,
+      "mono: the two cameras stand at most this share of the median scene depth apart");
   Add("loop_confirmations", o.loop_confirmations,
       "loops that must agree before the map moves; 1: trust each alone");
   Add("loop_confirmation_frames", o.loop_confirmation_frames, "and lie at most this many input frames apart");

@@ -2,6 +2,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <cmath>
 #include <opencv2/features2d.hpp>
 #include <set>
 #include <utility>
@@ -31,6 +32,8 @@ Matrix7d WithFloor(const Matrix7d& information, double sigma_translation, double
   const Matrix7d inverse = covariance.inverse();
   return 0.5 * (inverse + inverse.transpose());
 }
+
+std::string Percent(double share) { return std::to_string(std::lround(100 * share)) + " %"; }
 
 using Match = std::pair<int, int>;  // features of the candidate and of the query
 
@@ -136,6 +139,12 @@ LoopConstraint MakeLoopConstraint(const Verification& verification, const Keyfra
       return out;
     }
     edge.S_candidate_query = fit.S_a_b;
+    const double apart = fit.S_a_b.translation.norm() / edge.depth;
+    if (apart > options.loop_apart_fraction) {
+      out.reason = "the two cameras stand too far apart for a scale: " + Percent(apart) +
+                   " of the median scene depth, at most " + Percent(options.loop_apart_fraction);
+      return out;
+    }
     information = fit.information;
   } else {
     if (verification.type != ConstraintType::kRigid) {

@@ -17,6 +17,7 @@ std::string SlamOptions::Validate() const {
   if (!(loop_defer_fraction >= 0)) return "loop_defer_fraction must not be negative";
   if (!(loop_defer_deg >= 0)) return "loop_defer_deg must not be negative";
   const std::pair<const char*, double> positive[] = {
+      {"loop_apart_fraction", loop_apart_fraction},
       {"loop_agree_fraction", loop_agree_fraction},
       {"loop_agree_deg", loop_agree_deg},
       {"loop_agree_scale", loop_agree_scale},

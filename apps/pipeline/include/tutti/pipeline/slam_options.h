@@ -13,15 +13,17 @@ struct SlamOptions {
   int loop_every_keyframes = 1;       ///< every n-th keyframe is searched
   double loop_min_interval_s = 0.25;  ///< and no more often than this [s]
   double loop_min_age_s = 5.0;  ///< a candidate that is not this much older than the query is no loop [s]
-  int loop_confirmations = 2;   ///< verified loops that must agree before the map moves; 1 trusts each alone
+  double loop_apart_fraction = 0.5;  ///< mono: cameras farther apart than this share of the median scene
+                                     ///< depth see too little in common to fix a scale
+  int loop_confirmations = 2;  ///< verified loops that must agree before the map moves; 1 trusts each alone
   int loop_confirmation_frames = 60;  ///< and lie at most this many input frames apart, at both ends
   double loop_agree_fraction =
       0.02;                     ///< two loops agree if they close within this share of the median scene depth
   double loop_agree_deg = 1.5;  ///< and within this angle [deg]
-  double loop_agree_scale = 0.10;    ///< mono: and within this |log of the scale ratio|
-  double loop_after_fraction = 0.08;  ///< a loop whose residual after optimisation is beyond this share of the
-                                     ///< median scene depth contradicts the graph and is taken out again
-  double loop_after_deg = 3.0;       ///< the same for its angle [deg]
+  double loop_agree_scale = 0.10;     ///< mono: and within this |log of the scale ratio|
+  double loop_after_fraction = 0.08;  ///< a loop whose residual after optimisation is beyond this share of
+                                      ///< the median scene depth contradicts the graph and is taken out again
+  double loop_after_deg = 3.0;  ///< the same for its angle [deg]
   double loop_defer_fraction =
       0.02;                     ///< a loop that the map fulfils within this share of the median scene depth
                                 ///< enters the graph, but waits for the next correction to move the map

@@ -139,7 +139,7 @@ int MatchToLandmarks(const Map& map, const PinholeCamera& camera, const Pose& T_
                  current->features->keypoints[static_cast<std::size_t>(f)].octave);
     }
     if (best.distance > kLooseDistance) continue;
-    if (best.octave == best.second_octave && best.distance > 0.8 * best.second) continue;
+    if (best.octave == best.second_octave && best.distance >= 0.8 * best.second) continue;
     current->landmarks[static_cast<std::size_t>(best.feature)] = id;
     ++count;
   }
@@ -159,7 +159,7 @@ int MatchToKeyframe(const Map& map, const Keyframe& keyframe, FrameMatches* curr
       best.Offer(HammingDistance(d, current->features->Descriptor(static_cast<int>(f))), static_cast<int>(f),
                  0);
     }
-    if (best.distance > kStrictDistance + 10 || best.distance > 0.8 * best.second) continue;
+    if (best.distance > kStrictDistance + 10 || best.distance >= 0.8 * best.second) continue;
     const std::size_t f = static_cast<std::size_t>(best.feature);
     if (best.distance < taken[f]) {
       taken[f] = best.distance;
@@ -192,7 +192,7 @@ std::vector<std::pair<int, int>> MatchTwoViews(const Features& first, const Feat
     Best best;
     for (int f : near)
       best.Offer(HammingDistance(first.Descriptor(static_cast<int>(i)), second.Descriptor(f)), f, 0);
-    if (best.distance > kStrictDistance || best.distance > 0.9 * best.second) continue;
+    if (best.distance > kStrictDistance || best.distance >= 0.9 * best.second) continue;
     const std::size_t f = static_cast<std::size_t>(best.feature);
     if (best.distance < taken[f]) {
       taken[f] = best.distance;

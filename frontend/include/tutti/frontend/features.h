@@ -57,7 +57,7 @@ std::vector<cv::Mat> BuildPyramid(const cv::Mat& image, const OdometryOptions& o
 Features ExtractOrb(const std::vector<cv::Mat>& pyramid, const OdometryOptions& options);
 
 /// Everything for one frame of the rig: features of the (left) image, and depth from the depth image or from
-/// the right image (descriptor search along the row, then sub-pixel SAD). Pure: may run on any thread.
+/// the right image (descriptor search along the row, then a least-squares fit). Pure: may run on any thread.
 Features ExtractFeatures(const InputFrame& frame, const CameraRig& rig, const OdometryOptions& options);
 
 }  // namespace tutti

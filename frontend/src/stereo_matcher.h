@@ -7,9 +7,9 @@
 
 namespace tutti {
 
-/// Finds each left feature in the right image: best descriptor along its row, then the disparity at the keypoint by a
-/// least-squares fit of a slanted surface on the feature's pyramid level. Fills inverse_depth, its sigma, row_error_px
-/// and stereo_matches.
+/// Finds each left feature in the right image: best descriptor along its row, then the disparity at the
+/// keypoint by a least-squares fit of a slanted surface on the feature's pyramid level. Fills inverse_depth,
+/// its sigma, row_error_px and stereo_matches.
 void MatchStereo(const std::vector<cv::Mat>& left_pyramid, const std::vector<cv::Mat>& right_pyramid,
                  const Features& right, const CameraRig& rig, const OdometryOptions& options, Features* left);
 

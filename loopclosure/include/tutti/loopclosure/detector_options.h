@@ -47,7 +47,7 @@ struct VerificationOptions {
   int max_hypotheses = 3;         ///< separate places tried, best posterior first
   int neighbours = 1;             ///< graph levels around each place that are tried as well; 0: none
   double match_ratio = 0.8;       ///< Lowe's ratio test, on true distance
-  int min_inliers = 20;           ///< PnP: fewer inliers than this are no loop
+  int min_inliers = 30;           ///< PnP: fewer inliers than this are no loop
   double min_inlier_ratio = 0.3;  ///< PnP: inliers / matches with a 3D point, 0..1
   int min_epipolar_inliers =
       30;  ///< essential, fundamental matrix: a match is held to a line only, so more are needed

@@ -16,8 +16,9 @@ struct OdometryOptions {
   int fast_threshold_min = 7;  ///< FAST threshold in parts of the image where there are too few [grey levels]
 
   // Depth.
-  double stereo_sigma_px = 1.0;  ///< standard deviation of a disparity at pyramid level 0 [px]; below
-                                 ///< pixel_sigma, noise of the depths shortens the path
+  double stereo_sigma_px = 1.4;  ///< standard deviation of a disparity at pyramid level 0 [px]: of two
+                                 ///< corners' difference, sqrt(2) pixel_sigma; with less, noise of the
+                                 ///< depths shortens the path
   double rgbd_inverse_sigma =
       0.004;  ///< RGB-D: standard deviation of inverse depth [1/m]; Kinect: about 0.0015 to 0.005
   double max_depth_baselines = 60;  ///< stereo: farther points are not trusted when they are new [baselines]

@@ -1,5 +1,5 @@
-// The sub-commands of `tutti`. Each function adds one to the parser; its callback does the work, sets exit_code, and may
-// throw InputError, which main prints as one line.
+// The sub-commands of `tutti`. Each function adds one to the parser; its callback does the work, sets
+// exit_code, and may throw InputError, which main prints as one line.
 #pragma once
 
 #include <CLI/CLI.hpp>

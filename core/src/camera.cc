@@ -47,8 +47,10 @@ Eigen::Vector3d PinholeCamera::Unproject(const Eigen::Vector2d& pixel) const {
     if (error.squaredNorm() < 1e-22) break;
     constexpr double h = 1e-6;
     Eigen::Matrix2d jacobian;
-    jacobian.col(0) = (Distort(*this, p + Eigen::Vector2d(h, 0)) - Distort(*this, p - Eigen::Vector2d(h, 0))) / (2 * h);
-    jacobian.col(1) = (Distort(*this, p + Eigen::Vector2d(0, h)) - Distort(*this, p - Eigen::Vector2d(0, h))) / (2 * h);
+    jacobian.col(0) =
+        (Distort(*this, p + Eigen::Vector2d(h, 0)) - Distort(*this, p - Eigen::Vector2d(h, 0))) / (2 * h);
+    jacobian.col(1) =
+        (Distort(*this, p + Eigen::Vector2d(0, h)) - Distort(*this, p - Eigen::Vector2d(0, h))) / (2 * h);
     if (std::abs(jacobian.determinant()) < 1e-12) break;
     p -= jacobian.inverse() * error;
   }
@@ -67,13 +69,15 @@ bool PinholeCamera::Contains(const Eigen::Vector2d& pixel, double border) const 
 }
 
 std::string PinholeCamera::Validate() const {
-  if (width <= 0 || height <= 0) return "camera: width and height must be positive; give the image size in pixels";
+  if (width <= 0 || height <= 0)
+    return "camera: width and height must be positive; give the image size in pixels";
   if (!(std::isfinite(fx) && std::isfinite(fy) && std::isfinite(cx) && std::isfinite(cy))) {
     return "camera: fx, fy, cx, cy must be finite numbers";
   }
   if (fx <= 0 || fy <= 0) return "camera: fx and fy must be positive (focal length in pixels)";
   if (cx < 0 || cx > width || cy < 0 || cy > height) {
-    return "camera: the principal point (cx, cy) lies outside the image; is the calibration of another image size?";
+    return "camera: the principal point (cx, cy) lies outside the image; is the calibration of another image "
+           "size?";
   }
   for (double k : coefficients) {
     if (!std::isfinite(k)) return "camera: distortion coefficients must be finite numbers";

@@ -35,7 +35,8 @@ void ForEachLine(const std::filesystem::path& file,
 double Number(const std::filesystem::path& file, std::size_t line, const std::string& word) {
   const std::optional<double> value = ParseDouble(word);
   if (!value) Fail(file, line, "'" + word + "' is not a number");
-  if (!std::isfinite(*value)) Fail(file, line, "'" + word + "' is not finite; remove this pose or repair the file");
+  if (!std::isfinite(*value))
+    Fail(file, line, "'" + word + "' is not finite; remove this pose or repair the file");
   return *value;
 }
 
@@ -63,8 +64,10 @@ struct Repeats {
 bool LeaveOut(const std::filesystem::path& file, std::size_t line, const Trajectory& before, double stamp_s,
               Repeats& repeats) {
   if (before.empty() || stamp_s > before.back().stamp_s) return false;
-  if (stamp_s < before.back().stamp_s) Fail(file, line, "goes back in time; sort the file by its first column");
-  if (!repeats.tolerated) Fail(file, line, "repeats the time stamp of the pose before it; remove one of the two");
+  if (stamp_s < before.back().stamp_s)
+    Fail(file, line, "goes back in time; sort the file by its first column");
+  if (!repeats.tolerated)
+    Fail(file, line, "repeats the time stamp of the pose before it; remove one of the two");
   if (repeats.count++ == 0) repeats.first_line = line;
   return true;
 }
@@ -73,7 +76,8 @@ Trajectory ReadTum(const std::filesystem::path& file, Repeats& repeats) {
   Trajectory out;
   ForEachLine(file, [&](std::size_t line, const std::vector<std::string>& w) {
     if (w.size() != 8) {
-      Fail(file, line, "has " + std::to_string(w.size()) + " columns; the TUM format has 8: stamp tx ty tz qx qy qz qw");
+      Fail(file, line,
+           "has " + std::to_string(w.size()) + " columns; the TUM format has 8: stamp tx ty tz qx qy qz qw");
     }
     double v[8];
     for (int i = 0; i < 8; ++i) v[i] = Number(file, line, w[static_cast<std::size_t>(i)]);
@@ -87,12 +91,15 @@ Trajectory ReadKitti(const std::filesystem::path& file) {
   Trajectory out;
   ForEachLine(file, [&](std::size_t line, const std::vector<std::string>& w) {
     if (w.size() != 12) {
-      Fail(file, line, "has " + std::to_string(w.size()) + " columns; the KITTI format has 12: the 3x4 matrix [R|t] by rows");
+      Fail(file, line,
+           "has " + std::to_string(w.size()) +
+               " columns; the KITTI format has 12: the 3x4 matrix [R|t] by rows");
     }
     Eigen::Matrix<double, 3, 4> m;
     for (int i = 0; i < 12; ++i) m(i / 4, i % 4) = Number(file, line, w[static_cast<std::size_t>(i)]);
     const Eigen::Matrix3d rotation = m.leftCols<3>();
-    if (std::abs(rotation.determinant() - 1.0) > 0.1) Fail(file, line, "its 3x3 part is not a rotation matrix");
+    if (std::abs(rotation.determinant() - 1.0) > 0.1)
+      Fail(file, line, "its 3x3 part is not a rotation matrix");
     out.push_back({static_cast<double>(out.size()), Pose::FromMatrix(m)});
   });
   return out;
@@ -101,7 +108,8 @@ Trajectory ReadKitti(const std::filesystem::path& file) {
 Trajectory ReadEuroc(const std::filesystem::path& file, Repeats& repeats) {
   Trajectory out;
   ForEachLine(file, [&](std::size_t line, const std::vector<std::string>& w) {
-    RequireColumns(file, line, w.size(), 8, "the EuRoC format has at least 8: stamp [ns], x, y, z, qw, qx, qy, qz");
+    RequireColumns(file, line, w.size(), 8,
+                   "the EuRoC format has at least 8: stamp [ns], x, y, z, qw, qx, qy, qz");
     double v[8];
     for (int i = 0; i < 8; ++i) v[i] = Number(file, line, w[static_cast<std::size_t>(i)]);
     const double stamp = v[0] * 1e-9;
@@ -139,9 +147,15 @@ Trajectory ReadTrajectory(const std::filesystem::path& file, TrajectoryFormat fo
   Repeats repeats;
   repeats.tolerated = warnings != nullptr;
   switch (format) {
-    case TrajectoryFormat::kTum: out = ReadTum(file, repeats); break;
-    case TrajectoryFormat::kKitti: out = ReadKitti(file); break;
-    case TrajectoryFormat::kEuroc: out = ReadEuroc(file, repeats); break;
+    case TrajectoryFormat::kTum:
+      out = ReadTum(file, repeats);
+      break;
+    case TrajectoryFormat::kKitti:
+      out = ReadKitti(file);
+      break;
+    case TrajectoryFormat::kEuroc:
+      out = ReadEuroc(file, repeats);
+      break;
   }
   if (out.empty()) throw InputError(file.string() + ": holds no pose");
   if (repeats.count > 0) {
@@ -160,9 +174,11 @@ std::vector<double> ReadTimes(const std::filesystem::path& file) {
   return out;
 }
 
-void WriteTrajectory(const std::filesystem::path& file, const Trajectory& trajectory, TrajectoryFormat format) {
+void WriteTrajectory(const std::filesystem::path& file, const Trajectory& trajectory,
+                     TrajectoryFormat format) {
   std::ofstream out(file);
-  if (!out) throw InputError(file.string() + ": can't be written; check that the folder exists and is writable");
+  if (!out)
+    throw InputError(file.string() + ": can't be written; check that the folder exists and is writable");
   char line[512];
   if (format == TrajectoryFormat::kTum) out << "# timestamp tx ty tz qx qy qz qw\n";
   if (format == TrajectoryFormat::kEuroc) out << "#timestamp [ns],p_x [m],p_y [m],p_z [m],q_w,q_x,q_y,q_z\n";
@@ -171,19 +187,20 @@ void WriteTrajectory(const std::filesystem::path& file, const Trajectory& trajec
     const Eigen::Quaterniond& q = s.pose.rotation;
     switch (format) {
       case TrajectoryFormat::kTum:
-        std::snprintf(line, sizeof line, "%.9f %.9f %.9f %.9f %.9f %.9f %.9f %.9f\n", s.stamp_s, t.x(), t.y(), t.z(),
-                      q.x(), q.y(), q.z(), q.w());
+        std::snprintf(line, sizeof line, "%.9f %.9f %.9f %.9f %.9f %.9f %.9f %.9f\n", s.stamp_s, t.x(), t.y(),
+                      t.z(), q.x(), q.y(), q.z(), q.w());
         break;
       case TrajectoryFormat::kKitti: {
         const Eigen::Matrix4d m = s.pose.Matrix();
-        std::snprintf(line, sizeof line, "%.12e %.12e %.12e %.12e %.12e %.12e %.12e %.12e %.12e %.12e %.12e %.12e\n",
-                      m(0, 0), m(0, 1), m(0, 2), m(0, 3), m(1, 0), m(1, 1), m(1, 2), m(1, 3), m(2, 0), m(2, 1), m(2, 2),
-                      m(2, 3));
+        std::snprintf(line, sizeof line,
+                      "%.12e %.12e %.12e %.12e %.12e %.12e %.12e %.12e %.12e %.12e %.12e %.12e\n", m(0, 0),
+                      m(0, 1), m(0, 2), m(0, 3), m(1, 0), m(1, 1), m(1, 2), m(1, 3), m(2, 0), m(2, 1),
+                      m(2, 2), m(2, 3));
         break;
       }
       case TrajectoryFormat::kEuroc:
-        std::snprintf(line, sizeof line, "%lld,%.9f,%.9f,%.9f,%.9f,%.9f,%.9f,%.9f\n", std::llround(s.stamp_s * 1e9), t.x(),
-                      t.y(), t.z(), q.w(), q.x(), q.y(), q.z());
+        std::snprintf(line, sizeof line, "%lld,%.9f,%.9f,%.9f,%.9f,%.9f,%.9f,%.9f\n",
+                      std::llround(s.stamp_s * 1e9), t.x(), t.y(), t.z(), q.w(), q.x(), q.y(), q.z());
         break;
     }
     out << line;

@@ -98,8 +98,8 @@ BundleAdjustmentReport AdjustWindow(const PinholeCamera& camera, const std::vect
   BundleAdjustmentReport report;
   report.keyframes = static_cast<int>(moving.size());
   report.fixed = static_cast<int>(fixed.size());
-  // Side by side in the order of the ids: Ceres orders the blocks of a group by their addresses, and blocks scattered
-  // over the heap would make the last bits depend on what else the process does.
+  // Side by side in the order of the ids: Ceres orders the blocks of a group by their addresses, and blocks
+  // scattered over the heap would make the last bits depend on what else the process does.
   std::vector<CameraBlock> blocks;
   blocks.reserve(moving.size() + fixed.size());
   std::map<int, CameraBlock*> cameras;

@@ -42,8 +42,8 @@ int LocalMapper::AddDepthLandmarks(int id, int at_least, Map* map) {
 }
 
 void LocalMapper::CullRecent(int id, Map* map) {
-  // Two views with little parallax give depths that are too large on average, and scale drifts with them: mono landmarks
-  // must prove themselves in a third keyframe.
+  // Two views with little parallax give depths that are too large on average, and scale drifts with them:
+  // mono landmarks must prove themselves in a third keyframe.
   const std::size_t too_few = rig_.sensor == Sensor::kMono ? 2 : 1;
   std::vector<std::pair<int, int>> keep;
   for (const auto& [landmark_id, born] : recent_) {

@@ -240,17 +240,20 @@ class LoopDetector::Impl {
     }
     if (!options_.keep_posterior) return;
     for (const int slot : memory_.working_memory()) {
-      const double p =
-          Index(slot) < combined.belief.places.size() ? combined.belief.places[Index(slot)] : 0.0;
-      result.posterior_by_location.emplace_back(memory_.id(slot), p);
+      result.posterior_by_location.emplace_back(memory_.id(slot), PosteriorAt(combined.belief, slot));
     }
+  }
+
+  // 0 for a place that the belief does not reach.
+  static double PosteriorAt(const Belief& belief, int slot) {
+    return Index(slot) < belief.places.size() ? belief.places[Index(slot)] : 0.0;
   }
 
   // Best places by posterior, apart from each other, best first.
   std::vector<int> TopPlaces(const Belief& belief) const {
     std::vector<int> order;
     for (const int slot : memory_.working_memory()) {
-      if (Index(slot) < belief.places.size() && belief.places[Index(slot)] > 0.0) order.push_back(slot);
+      if (PosteriorAt(belief, slot) > 0.0) order.push_back(slot);
     }
     const std::size_t wanted = Index(options_.verification.max_hypotheses);
     // Within a place its neighbours follow closely: look at enough of the best to find `wanted` places.
@@ -348,10 +351,8 @@ class LoopDetector::Impl {
     for (const auto& [slot, level] : memory_.Neighbours(place, options_.verification.neighbours)) {
       if (slot != place) views.push_back(slot);
     }
-    const auto posterior = [&](int slot) {
-      return Index(slot) < belief.places.size() ? belief.places[Index(slot)] : 0.0;
-    };
-    std::stable_sort(views.begin(), views.end(), [&](int a, int b) { return posterior(a) > posterior(b); });
+    std::stable_sort(views.begin(), views.end(),
+                     [&](int a, int b) { return PosteriorAt(belief, a) > PosteriorAt(belief, b); });
     if (views.size() > kMostNeighbours) views.resize(kMostNeighbours);
     views.insert(views.begin(), place);
     return views;

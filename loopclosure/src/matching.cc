@@ -37,12 +37,12 @@ std::vector<Match> MatchDescriptors(const cv::Mat& query, const cv::Mat& candida
   }
   const std::size_t count = static_cast<std::size_t>(candidate.rows);
   std::vector<float> distances(count);
-  std::vector<float> nearest(count, kInfinity);         // to each candidate row, so far
+  std::vector<float> nearest(count, kInfinity);             // to each candidate row, so far
   std::vector<std::int32_t> query_of_candidate(count, -1);  // the query row that it is the distance of
   for (int i = 0; i < query.rows; ++i) {
     Distances(query, i, candidate, distances);
-    const float least =
-        internal::UpdateNearest(distances.data(), candidate.rows, i, nearest.data(), query_of_candidate.data());
+    const float least = internal::UpdateNearest(distances.data(), candidate.rows, i, nearest.data(),
+                                                query_of_candidate.data());
     const auto at = std::find(distances.begin(), distances.end(), least);
     if (at == distances.end()) continue;  // descriptors with NaN
     const std::size_t best = static_cast<std::size_t>(at - distances.begin());

@@ -4,20 +4,14 @@
 
 #include <random>
 
+#include "plain_camera.h"
+
 namespace tutti {
 namespace {
 
 constexpr int kKeyframes = 5, kPoints = 60;
 
-PinholeCamera Camera() {
-  PinholeCamera camera;
-  camera.width = 640;
-  camera.height = 480;
-  camera.fx = camera.fy = 500;
-  camera.cx = 320;
-  camera.cy = 240;
-  return camera;
-}
+PinholeCamera Camera() { return testing::PlainCamera(500); }
 
 // A camera that moves to the right past a cloud of points; every keyframe sees all of them.
 struct World {

@@ -5,18 +5,12 @@
 
 #include <random>
 
+#include "plain_camera.h"
+
 namespace tutti {
 namespace {
 
-PinholeCamera Camera() {
-  PinholeCamera camera;
-  camera.width = 640;
-  camera.height = 480;
-  camera.fx = camera.fy = 500;
-  camera.cx = 320;
-  camera.cy = 240;
-  return camera;
-}
+PinholeCamera Camera() { return testing::PlainCamera(500); }
 
 const Pose kMotion(ExpSO3({0.01, -0.06, 0.02}), {-0.9, 0.1, 0.3});  // T_second_first
 

@@ -10,8 +10,8 @@ std::filesystem::path SourceDir() { return TUTTI_SOURCE_DIR; }
 
 std::filesystem::path RealData(const std::string& name) {
   const char* root = std::getenv("TUTTI_DATA");
-  const std::filesystem::path base = root != nullptr && *root != 0 ? std::filesystem::path(root)
-                                                                  : SourceDir() / "../shared/data";
+  const std::filesystem::path base =
+      root != nullptr && *root != 0 ? std::filesystem::path(root) : SourceDir() / "../shared/data";
   std::error_code error;
   const std::filesystem::path path = base / name;
   return std::filesystem::exists(path, error) ? path : std::filesystem::path();

@@ -39,6 +39,7 @@ class LoopGate {
 
   /// True if the two loops agree with each other through the odometry between their ends.
   bool Agree(const LoopEdge& a, const LoopEdge& b, const Map& map) const;
+
   /// True if the present map fulfils the loop so well that it need not move for it.
   bool Fulfilled(const LoopEdge& loop, const Map& map) const;
 

@@ -7,8 +7,8 @@
 namespace tutti {
 
 /// Bad input: a missing file, a damaged line, a wrong setting. The message names the file and line (or the
-/// frame) and says what to do. Programs catch it in main, print it as one line and exit with a non-zero status.
-/// Algorithms never throw it for hard images; they return a result that says why they failed.
+/// frame) and says what to do. Programs catch it in main, print it as one line and exit with a non-zero
+/// status. Algorithms never throw it for hard images; they return a result that says why they failed.
 class InputError : public std::runtime_error {
  public:
   explicit InputError(const std::string& message) : std::runtime_error(message) {}

@@ -15,7 +15,8 @@ std::vector<std::string> SplitText(std::string_view text, std::string_view separ
 std::optional<double> ParseDouble(std::string_view text);
 std::optional<long long> ParseInteger(std::string_view text);
 
-/// Natural order: runs of digits compare as numbers, so that 2.jpg comes before 10.jpg. Total and deterministic.
+/// Natural order: runs of digits compare as numbers, so that 2.jpg comes before 10.jpg. Total and
+/// deterministic.
 bool NaturalLess(const std::string& a, const std::string& b);
 
 /// The candidate with the smallest edit distance to `word`; empty if there are none.

@@ -19,7 +19,8 @@ struct StampedPose {
 using Trajectory = std::vector<StampedPose>;
 
 /// kTum: "stamp tx ty tz qx qy qz qw", '#' comments. kKitti: 12 numbers a line, row-major 3x4, no stamps
-/// (the line number is the stamp, unless `times` are read beside it). kEuroc: ASL csv, "ns, p, q(w x y z), ...".
+/// (the line number is the stamp, unless `times` are read beside it). kEuroc: ASL csv, "ns, p, q(w x y z),
+/// ...".
 enum class TrajectoryFormat { kTum, kKitti, kEuroc };
 
 /// "tum", "kitti", "euroc" -> format. Throws InputError for another word.
@@ -28,18 +29,19 @@ TrajectoryFormat ParseTrajectoryFormat(const std::string& name);
 /// What the content looks like (12 columns: KITTI; commas: EuRoC; else TUM). Throws InputError if unreadable.
 TrajectoryFormat GuessTrajectoryFormat(const std::filesystem::path& file);
 
-/// Reads a trajectory. Quaternions are normalised. Throws InputError that names file and line for: missing file,
-/// wrong number of columns, NaN or infinity, a zero quaternion, time stamps that do not strictly grow.
-/// With `warnings`, a pose that repeats the time stamp before it (published ground truth has such lines) is left out instead,
-/// the first one stays, and one line about it is appended.
+/// Reads a trajectory. Quaternions are normalised. Throws InputError that names file and line for: missing
+/// file, wrong number of columns, NaN or infinity, a zero quaternion, time stamps that do not strictly grow.
+/// With `warnings`, a pose that repeats the time stamp before it (published ground truth has such lines) is
+/// left out instead, the first one stays, and one line about it is appended.
 Trajectory ReadTrajectory(const std::filesystem::path& file, TrajectoryFormat format,
                           std::vector<std::string>* warnings = nullptr);
 
 /// Reads KITTI's times.txt: one time stamp [s] a line. Throws InputError with file and line.
 std::vector<double> ReadTimes(const std::filesystem::path& file);
 
-/// Writes a trajectory, with enough digits to be read back to 1e-9. Throws InputError when the disk is full or the folder
-/// can't be written. TUM: stamps with 9 decimals.
-void WriteTrajectory(const std::filesystem::path& file, const Trajectory& trajectory, TrajectoryFormat format);
+/// Writes a trajectory, with enough digits to be read back to 1e-9. Throws InputError when the disk is full
+/// or the folder can't be written. TUM: stamps with 9 decimals.
+void WriteTrajectory(const std::filesystem::path& file, const Trajectory& trajectory,
+                     TrajectoryFormat format);
 
 }  // namespace tutti

@@ -23,7 +23,7 @@ struct SlamOptions {
   double loop_agree_scale = 0.10;     ///< mono: and within this |log of the scale ratio|
   double loop_after_fraction = 0.08;  ///< a loop whose residual after optimisation is beyond this share of
                                       ///< the median scene depth contradicts the graph and is taken out again
-  double loop_after_deg = 3.0;  ///< the same for its angle [deg]
+  double loop_after_deg = 3.0;        ///< the same for its angle [deg]
   double loop_defer_fraction =
       0.02;                     ///< a loop that the map fulfils within this share of the median scene depth
                                 ///< enters the graph, but waits for the next correction to move the map

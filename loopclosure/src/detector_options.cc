@@ -13,6 +13,12 @@ const std::vector<std::string>& RuleWords() {
   return words;
 }
 
+std::string JoinWords(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
+  return text;
+}
+
 std::string OutOf(const char* name, const char* range) { return std::string(name) + " must be " + range; }
 
 }  // namespace
@@ -33,7 +39,7 @@ std::string ExtractionOptions::Validate() const {
 std::string VocabularyOptions::Validate() const {
   if (!(nndr > 0 && nndr <= 1))
     return OutOf("vocabulary.nndr", "above 0 and at most 1 (a ratio of true distances)");
-  if (trees < 1 || trees > 64) return OutOf("vocabulary.trees", "1 to 64");
+  if (trees < 1 || trees > 32) return OutOf("vocabulary.trees", "1 to 32");
   if (checks < 1) return OutOf("vocabulary.checks", "at least 1");
   if (hash_tables < 1 || hash_tables > 64) return OutOf("vocabulary.hash_tables", "1 to 64");
   return {};
@@ -63,11 +69,13 @@ std::string VerificationOptions::Validate() const {
 }
 
 std::string LoopDetectorOptions::Validate() const {
-  if (members.empty()) return "members must name at least one of surf, sift, orb, akaze, brisk";
+  std::vector<std::string> known = KnownMembers();
+  known.insert(known.end(), external_members.begin(), external_members.end());
+  if (members.empty()) return "members must name at least one of " + JoinWords(KnownMembers());
   for (std::size_t i = 0; i < members.size(); ++i) {
-    if (std::find(KnownMembers().begin(), KnownMembers().end(), members[i]) == KnownMembers().end()) {
+    if (std::find(known.begin(), known.end(), members[i]) == known.end()) {
       return "members holds '" + members[i] + "', which is not known; did you mean '" +
-             NearestWord(members[i], KnownMembers()) + "'?";
+             NearestWord(members[i], known) + "'?";
     }
     if (std::find(members.begin(), members.begin() + static_cast<std::ptrdiff_t>(i), members[i]) !=
         members.begin() + static_cast<std::ptrdiff_t>(i)) {
@@ -83,6 +91,11 @@ std::string LoopDetectorOptions::Validate() const {
   if (!(bad_signature_ratio >= 0 && bad_signature_ratio <= 1)) return OutOf("bad_signature_ratio", "0 to 1");
   if (!(virtual_place_prior > 0 && virtual_place_prior < 1))
     return OutOf("virtual_place_prior", "between 0 and 1");
+  if (!(hypothesis_ratio >= 0 && hypothesis_ratio <= 1)) return OutOf("hypothesis_ratio", "0 to 1");
+  if (wm_limit < 0) return OutOf("wm_limit", "0 (no limit) or more");
+  if (!(time_budget_ms >= 0)) return OutOf("time_budget_ms", "0 (off) or more");
+  if (retrieval < 0 || retrieval > 100) return OutOf("retrieval", "0 to 100");
+  if (!(recent_share >= 0 && recent_share < 1)) return OutOf("recent_share", "0 or more, below 1");
   if (!(rehearsal_similarity > 0 && rehearsal_similarity <= 1))
     return OutOf("rehearsal_similarity", "above 0, at most 1");
   for (const std::string& problem : {extraction.Validate(), vocabulary.Validate(), verification.Validate()}) {
@@ -112,7 +125,55 @@ void SetRule(const std::string& word, LoopDetectorOptions& options) {
   std::vector<std::string> all = RuleWords();
   all.insert(all.end(), KnownMembers().begin(), KnownMembers().end());
   throw InputError("unknown rule '" + word + "'; did you mean '" + NearestWord(word, all) +
-                   "'? Known: mean, product, majority, naive, or one member: surf, sift, orb, akaze, brisk");
+                   "'? Known: mean, product, majority, naive, or one member: " + JoinWords(KnownMembers()));
+}
+
+const std::vector<std::string>& KnownPresets() {
+  static const std::vector<std::string> names = {"default", "paper-2013", "rtabmap-0.8.3"};
+  return names;
+}
+
+void ApplyPreset(const std::string& name, LoopDetectorOptions& options) {
+  const LoopDetectorOptions defaults;
+  if (name == "default") {
+    options.loop_threshold = defaults.loop_threshold;
+    options.hypothesis_ratio = defaults.hypothesis_ratio;
+    options.likelihood = defaults.likelihood;
+    options.stm_size = defaults.stm_size;
+    options.rehearsal = defaults.rehearsal;
+    options.rehearsal_similarity = defaults.rehearsal_similarity;
+    options.bad_signature_ratio = defaults.bad_signature_ratio;
+    options.ignore_bad_signatures = defaults.ignore_bad_signatures;
+    options.wm_limit = defaults.wm_limit;
+    options.extraction.features = defaults.extraction.features;
+  } else if (name == "paper-2013") {
+    options.loop_threshold = 0.11;  // swept in the paper; this is its system's own
+    options.hypothesis_ratio = 0.9;
+    options.likelihood = LikelihoodKind::kSimilarity;
+    options.stm_size = 30;
+    options.rehearsal = true;
+    options.rehearsal_similarity = 0.20;
+    options.bad_signature_ratio = 0.25;
+    options.ignore_bad_signatures = true;
+    options.wm_limit = 300;
+    options.extraction.features = 400;
+  } else if (name == "rtabmap-0.8.3") {
+    options.loop_threshold = 0.11;
+    options.hypothesis_ratio = 0.0;
+    options.likelihood = LikelihoodKind::kTfIdf;
+    options.stm_size = 10;
+    options.rehearsal = true;
+    options.rehearsal_similarity = 0.6;
+    options.bad_signature_ratio = 0.2;
+    options.ignore_bad_signatures = false;
+    options.wm_limit = 0;
+    options.extraction.features = 400;
+  } else {
+    throw InputError("unknown preset '" + name + "'; did you mean '" + NearestWord(name, KnownPresets()) +
+                     "'? Known: " + JoinWords(KnownPresets()));
+  }
+  options.recent_share = 0.2;
+  options.vocabulary.nndr = 0.8;
 }
 
 std::string RuleName(const LoopDetectorOptions& options) {

@@ -3,18 +3,28 @@
 #include <algorithm>
 #include <cmath>
 
+#include "byte_stream.h"
+
 namespace tutti {
 
 void LikelihoodModel::Add(const Signature& signature) {
-  const int slot = static_cast<int>(signatures_.size());
-  signatures_.push_back(signature);
-  present_.push_back(true);
+  signatures_.emplace_back();
+  present_.push_back(false);
+  Restore(static_cast<int>(signatures_.size()) - 1, signature);
+}
+
+void LikelihoodModel::Restore(int slot, const Signature& signature) {
+  const std::size_t index = static_cast<std::size_t>(slot);
+  if (present_[index]) return;
+  present_[index] = true;
   ++locations_;
-  if (signature.empty()) return;
-  const std::size_t words = static_cast<std::size_t>(signature.entries().back().word) + 1;
-  if (postings_.size() < words) postings_.resize(words);
-  for (const Signature::Entry& entry : signature.entries()) {
-    postings_[static_cast<std::size_t>(entry.word)].push_back({slot, entry.count});
+  signatures_[index] = signature;
+  Insert(slot);
+}
+
+void LikelihoodModel::Insert(int slot) {
+  for (const Signature::Entry& entry : signature(slot).entries()) {
+    postings_[entry.word].push_back({slot, entry.count});
   }
 }
 
@@ -24,9 +34,11 @@ void LikelihoodModel::Remove(int slot) {
   present_[index] = false;
   --locations_;
   for (const Signature::Entry& entry : signatures_[index].entries()) {
-    std::vector<Posting>& list = postings_[static_cast<std::size_t>(entry.word)];
+    const auto found = postings_.find(entry.word);
+    std::vector<Posting>& list = found->second;
     list.erase(std::remove_if(list.begin(), list.end(), [slot](const Posting& p) { return p.slot == slot; }),
                list.end());
+    if (list.empty()) postings_.erase(found);
   }
   signatures_[index] = Signature();
 }
@@ -34,9 +46,9 @@ void LikelihoodModel::Remove(int slot) {
 std::vector<double> LikelihoodModel::Scores(const Signature& query) const {
   std::vector<double> scores(signatures_.size(), 0.0);
   for (const Signature::Entry& entry : query.entries()) {
-    if (static_cast<std::size_t>(entry.word) >= postings_.size()) continue;
-    const std::vector<Posting>& list = postings_[static_cast<std::size_t>(entry.word)];
-    if (list.empty()) continue;
+    const auto found = postings_.find(entry.word);
+    if (found == postings_.end()) continue;
+    const std::vector<Posting>& list = found->second;
     if (kind_ == LikelihoodKind::kSimilarity) {
       for (const Posting& posting : list) {
         scores[static_cast<std::size_t>(posting.slot)] += std::min(posting.count, entry.count);
@@ -56,6 +68,26 @@ std::vector<double> LikelihoodModel::Scores(const Signature& query) const {
     }
   }
   return scores;
+}
+
+void LikelihoodModel::Save(internal::ByteWriter& out) const {
+  out.Put<std::uint64_t>(signatures_.size());
+  for (std::size_t i = 0; i < signatures_.size(); ++i) {
+    out.Put<char>(present_[i] ? 1 : 0);
+    signatures_[i].Save(out);
+  }
+}
+
+void LikelihoodModel::Load(internal::ByteReader& in) {
+  const std::size_t count = in.GetCount(1 + sizeof(std::uint64_t));
+  for (std::size_t i = 0; i < count; ++i) {
+    const bool present = in.Get<char>() != 0;
+    signatures_.push_back(Signature::Load(in));
+    present_.push_back(present);
+    if (!present) continue;
+    ++locations_;
+    Insert(static_cast<int>(i));
+  }
 }
 
 Belief AdjustLikelihood(const std::vector<double>& scores, const std::vector<int>& working_memory) {

@@ -1,12 +1,16 @@
 #include "tutti/loopclosure/location_memory.h"
 
 #include <algorithm>
+#include <tuple>
+
+#include "byte_stream.h"
 
 namespace tutti {
 
 int LocationMemory::Add(std::int64_t id) {
   const int slot = size();
-  nodes_.push_back({id, State::kShortTerm, 0, {}});
+  nodes_.push_back({id, State::kShortTerm, 0, 0, {}});
+  changed_.insert(slot);
   slot_of_id_.emplace(id, slot);
   if (!short_term_.empty()) {
     AddLink(short_term_.back(), slot, LinkType::kOdometry);
@@ -25,6 +29,7 @@ bool LocationMemory::AddLink(int a, int b, LinkType type) {
   if (known) return false;
   links.push_back({b, type});
   nodes_[Index(b)].links.push_back({a, type});
+  changed_.insert({a, b});
   return true;
 }
 
@@ -33,35 +38,106 @@ std::vector<int> LocationMemory::Settle() {
   while (static_cast<int>(short_term_.size()) > stm_size_) {
     const int slot = short_term_.front();
     short_term_.pop_front();
-    nodes_[Index(slot)].state = State::kWorking;
-    working_.push_back(slot);  // slots leave STM in ascending order
+    Enter(slot);
     moved.push_back(slot);
   }
   return moved;
 }
 
+void LocationMemory::Enter(int slot) {
+  nodes_[Index(slot)].state = State::kWorking;
+  nodes_[Index(slot)].entered = entries_++;
+  working_.insert(std::lower_bound(working_.begin(), working_.end(), slot), slot);
+  changed_.insert(slot);
+}
+
 int LocationMemory::DropNewest() {
-  if (short_term_.size() < 2) return -1;
+  return short_term_.size() < 2 ? -1 : Drop(1 + nodes_[Index(short_term_.back())].weight);
+}
+
+int LocationMemory::IgnoreNewest() { return short_term_.size() < 2 ? -1 : Drop(0); }
+
+int LocationMemory::Drop(int weight) {
   const int newest = short_term_.back();
   short_term_.pop_back();
   const int old = short_term_.back();
-  nodes_[Index(old)].weight += 1 + nodes_[Index(newest)].weight;
+  nodes_[Index(old)].weight += weight;
   const std::vector<Link> passed_on = nodes_[Index(newest)].links;
   nodes_[Index(newest)].links.clear();
   nodes_[Index(newest)].state = State::kMerged;
+  changed_.insert({newest, old});
   for (const Link& link : passed_on) {
     std::vector<Link>& back = nodes_[Index(link.slot)].links;
     back.erase(std::remove_if(back.begin(), back.end(), [newest](const Link& l) { return l.slot == newest; }),
                back.end());
+    changed_.insert(link.slot);
     AddLink(link.slot, old, link.type);
   }
   slot_of_id_[id(newest)] = old;
   return old;
 }
 
+int LocationMemory::NextToTransfer(double recent_share, const std::set<int>& immune) const {
+  const auto recent = static_cast<std::size_t>(recent_share * static_cast<double>(working_.size()));
+  std::vector<std::int64_t> entered;
+  for (const int slot : working_) entered.push_back(nodes_[Index(slot)].entered);
+  std::int64_t newest_allowed = entries_;  // entered before this
+  if (recent > 0 && recent < entered.size()) {
+    const auto bound = entered.end() - static_cast<std::ptrdiff_t>(recent);
+    std::nth_element(entered.begin(), bound, entered.end());
+    newest_allowed = *bound;
+  }
+  int next = -1;
+  const auto key = [this](int slot) {
+    const Node& node = nodes_[Index(slot)];
+    return std::make_tuple(node.weight, node.entered, slot);
+  };
+  for (const int slot : working_) {
+    if (nodes_[Index(slot)].entered >= newest_allowed || immune.count(slot) > 0) continue;
+    if (next >= 0 && key(next) < key(slot)) continue;
+    const std::vector<Link>& near = links(slot);
+    const bool in_use = std::any_of(
+        near.begin(), near.end(), [this](const Link& link) { return state(link.slot) == State::kShortTerm; });
+    if (!in_use) next = slot;
+  }
+  return next;
+}
+
+bool LocationMemory::Transfer(int slot) {
+  if (state(slot) != State::kWorking) return false;
+  nodes_[Index(slot)].state = State::kLongTerm;
+  working_.erase(std::lower_bound(working_.begin(), working_.end(), slot));
+  ++num_long_term_;
+  changed_.insert(slot);
+  return true;
+}
+
+bool LocationMemory::Retrieve(int slot) {
+  if (state(slot) != State::kLongTerm) return false;
+  --num_long_term_;
+  Enter(slot);
+  return true;
+}
+
+std::vector<int> LocationMemory::LongTermNeighbours(int slot, int levels, int count) const {
+  std::vector<int> found;
+  for (const auto& [near, level] : Walk(slot, levels, [](State) { return true; })) {
+    if (static_cast<int>(found.size()) == count) break;
+    if (state(near) == State::kLongTerm) found.push_back(near);
+  }
+  return found;
+}
+
+std::vector<int> LocationMemory::TakeChanged() {
+  std::vector<int> slots(changed_.begin(), changed_.end());
+  changed_.clear();
+  return slots;
+}
+
 void LocationMemory::TransferWeight(int newer, int older) {
   nodes_[Index(newer)].weight += nodes_[Index(older)].weight;
   nodes_[Index(older)].weight = 0;
+  changed_.insert({newer, older});
 }
 
 int LocationMemory::Find(std::int64_t id) const {
@@ -70,8 +146,13 @@ int LocationMemory::Find(std::int64_t id) const {
 }
 
 std::vector<std::pair<int, int>> LocationMemory::Neighbours(int slot, int levels) const {
+  return Walk(slot, levels, [](State state) { return state == State::kWorking; });
+}
+
+template <typename Walkable>
+std::vector<std::pair<int, int>> LocationMemory::Walk(int slot, int levels, const Walkable& walkable) const {
   std::vector<std::pair<int, int>> found;
-  if (nodes_[Index(slot)].state != State::kWorking) return found;
+  if (!walkable(state(slot))) return found;
   std::map<int, int> level_of;  // also marks the visited
   std::vector<int> ring = {slot};
   level_of[slot] = 0;
@@ -79,7 +160,7 @@ std::vector<std::pair<int, int>> LocationMemory::Neighbours(int slot, int levels
     // Loop links cost nothing: close the ring under them before it counts as complete.
     for (std::size_t i = 0; i < ring.size(); ++i) {
       for (const Link& link : links(ring[i])) {
-        if (link.type != LinkType::kLoop || state(link.slot) != State::kWorking) continue;
+        if (link.type != LinkType::kLoop || !walkable(state(link.slot))) continue;
         if (level_of.emplace(link.slot, level).second) ring.push_back(link.slot);
       }
     }
@@ -88,13 +169,79 @@ std::vector<std::pair<int, int>> LocationMemory::Neighbours(int slot, int levels
     for (const int node : ring) {
       found.emplace_back(node, level);
       for (const Link& link : links(node)) {
-        if (link.type != LinkType::kOdometry || state(link.slot) != State::kWorking) continue;
+        if (link.type != LinkType::kOdometry || !walkable(state(link.slot))) continue;
         if (level_of.emplace(link.slot, level + 1).second) next.push_back(link.slot);
       }
     }
     ring.swap(next);
   }
   return found;
+}
+
+void LocationMemory::SaveSlot(int slot, internal::ByteWriter& out) const {
+  const Node& node = nodes_[Index(slot)];
+  out.Put(node.id);
+  out.Put(node.state);
+  out.Put<std::int32_t>(node.weight);
+  out.Put(node.entered);
+  out.Put<std::int32_t>(Find(node.id));  // of a merged location: which one it was merged into
+  out.Put<std::uint64_t>(node.links.size());
+  for (const Link& link : node.links) {
+    out.Put<std::int32_t>(link.slot);
+    out.Put<char>(link.type == LinkType::kLoop ? 1 : 0);
+  }
+}
+
+void LocationMemory::LoadSlot(internal::ByteReader& in) {
+  Node node;
+  node.id = in.Get<std::int64_t>();
+  const auto state = in.Get<std::uint8_t>();
+  if (state > static_cast<std::uint8_t>(State::kLongTerm)) in.Damaged("a location in an unknown state");
+  node.state = static_cast<State>(state);
+  node.weight = in.Get<std::int32_t>();
+  node.entered = in.Get<std::int64_t>();
+  const int names = in.Get<std::int32_t>();
+  const std::size_t count = in.GetCount(sizeof(std::int32_t) + 1);
+  for (std::size_t i = 0; i < count; ++i) {
+    const int to = in.Get<std::int32_t>();
+    node.links.push_back({to, in.Get<char>() != 0 ? LinkType::kLoop : LinkType::kOdometry});
+  }
+  if (names < 0 || names > size()) in.Damaged("a location merged into one that is not there");
+  if (!nodes_.empty() && node.id <= nodes_.back().id) in.Damaged("locations out of order");
+  slot_of_id_.emplace(node.id, names);
+  nodes_.push_back(std::move(node));
+}
+
+void LocationMemory::FinishLoading() {
+  short_term_.clear();
+  working_.clear();
+  num_long_term_ = 0;
+  entries_ = 0;
+  for (int slot = 0; slot < size(); ++slot) {
+    Node& node = nodes_[Index(slot)];
+    // A link to a location that is not there: the process died before that one was stored.
+    node.links.erase(std::remove_if(node.links.begin(), node.links.end(),
+                                    [&](const Link& link) {
+                                      return link.slot < 0 || link.slot >= size() || link.slot == slot;
+                                    }),
+                     node.links.end());
+    entries_ = std::max(entries_, node.entered + 1);
+    if (node.state == State::kShortTerm) short_term_.push_back(slot);
+    if (node.state == State::kWorking) working_.push_back(slot);
+    if (node.state == State::kLongTerm) ++num_long_term_;
+  }
+  changed_.clear();
+}
+
+void LocationMemory::Save(internal::ByteWriter& out) const {
+  out.Put<std::int32_t>(size());
+  for (int slot = 0; slot < size(); ++slot) SaveSlot(slot, out);
+}
+
+void LocationMemory::Load(internal::ByteReader& in) {
+  const int count = in.Get<std::int32_t>();
+  for (int slot = 0; slot < count; ++slot) LoadSlot(in);
+  FinishLoading();
 }
 
 }  // namespace tutti

@@ -1,6 +1,9 @@
 #include "tutti/loopclosure/signature.h"
 
 #include <algorithm>
+#include <limits>
+
+#include "byte_stream.h"
 
 namespace tutti {
 
@@ -32,6 +35,48 @@ double Signature::Similarity(const Signature& a, const Signature& b) {
     }
   }
   return static_cast<double>(shared) / std::max(a.size_, b.size_);
+}
+
+Signature Signature::Concatenate(const std::vector<const Signature*>& parts) {
+  if (parts.size() == 1) return *parts.front();
+  Signature all;
+  for (std::size_t k = 0; k < parts.size(); ++k) {
+    for (const Entry& entry : parts[k]->entries_) {
+      all.entries_.push_back(
+          {entry.word * static_cast<int>(parts.size()) + static_cast<int>(k), entry.count});
+    }
+    all.size_ += parts[k]->size_;
+  }
+  std::sort(all.entries_.begin(), all.entries_.end(),
+            [](const Entry& a, const Entry& b) { return a.word < b.word; });
+  return all;
+}
+
+std::vector<Signature> Signature::Split(int parts) const {
+  std::vector<Signature> split(static_cast<std::size_t>(parts));
+  for (const Entry& entry : entries_) {
+    Signature& part = split[static_cast<std::size_t>(entry.word % parts)];
+    part.entries_.push_back({entry.word / parts, entry.count});
+    part.size_ += entry.count;
+  }
+  return split;
+}
+
+void Signature::Save(internal::ByteWriter& out) const { out.PutVector(entries_); }
+
+Signature Signature::Load(internal::ByteReader& in) {
+  Signature signature;
+  signature.entries_ = in.GetVector<Entry>();
+  std::int64_t size = 0;
+  int before = -1;
+  for (const Entry& entry : signature.entries_) {
+    if (entry.word <= before || entry.count < 1) in.Damaged("a signature out of order");
+    before = entry.word;
+    size += entry.count;
+  }
+  if (size > std::numeric_limits<int>::max()) in.Damaged("a signature of an impossible size");
+  signature.size_ = static_cast<int>(size);
+  return signature;
 }
 
 }  // namespace tutti

@@ -19,9 +19,13 @@ void TransitionModel::Update(const LocationMemory& memory, const std::vector<int
   for (const int slot : changed_slots) {
     if (memory.state(slot) != LocationMemory::State::kWorking) {
       columns_[static_cast<std::size_t>(slot)].clear();
+      // Paths that led through it are cut: all within reach of those that it was linked to.
+      for (const LocationMemory::Link& link : memory.links(slot)) {
+        for (const auto& [near, level] : memory.Neighbours(link.slot, kLevels)) dirty.push_back(near);
+      }
       continue;
     }
-    for (const auto& [neighbour, level] : memory.Neighbours(slot, kLevels)) dirty.push_back(neighbour);
+    for (const auto& [near, level] : memory.Neighbours(slot, kLevels)) dirty.push_back(near);
   }
   std::sort(dirty.begin(), dirty.end());
   dirty.erase(std::unique(dirty.begin(), dirty.end()), dirty.end());

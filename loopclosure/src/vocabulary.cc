@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
+#include "byte_stream.h"
 #include "distances.h"
 #include "tutti/core/error.h"
 #include "tutti/loopclosure/parallel.h"
@@ -37,21 +39,29 @@ std::string TypeName(int type, int width) {
 
 }  // namespace
 
+std::string Vocabulary::Problem(const cv::Mat& descriptors) const {
+  if (descriptors.rows == 0) return {};
+  if (descriptors.type() != CV_32F && descriptors.type() != CV_8U) {
+    return "descriptors must be CV_32F (Euclidean) or CV_8U (Hamming), one row each";
+  }
+  if (type_ < 0 || (descriptors.type() == type_ && descriptors.cols == width_)) return {};
+  return "descriptors are " + TypeName(descriptors.type(), descriptors.cols) +
+         " but this vocabulary was started with " + TypeName(type_, width_) +
+         "; give every image the same kind";
+}
+
 void Vocabulary::CheckType(const cv::Mat& descriptors) {
-  if (type_ < 0) {
-    if (descriptors.type() != CV_32F && descriptors.type() != CV_8U) {
-      throw InputError("descriptors must be CV_32F (Euclidean) or CV_8U (Hamming), one row each");
-    }
-    type_ = descriptors.type();
-    width_ = descriptors.cols;
-    index_ = type_ == CV_32F ? MakeKdForestIndex(width_, options_.trees, options_.checks, seed_)
-                             : MakeHammingIndex(width_, options_.hash_tables, seed_);
-  }
-  if (descriptors.type() != type_ || descriptors.cols != width_) {
-    throw InputError("descriptors are " + TypeName(descriptors.type(), descriptors.cols) +
-                     " but this vocabulary was started with " + TypeName(type_, width_) +
-                     "; give every image the same kind");
-  }
+  const std::string problem = Problem(descriptors);
+  if (!problem.empty()) throw InputError(problem);
+  if (type_ >= 0 || descriptors.rows == 0) return;
+  type_ = descriptors.type();
+  width_ = descriptors.cols;
+  MakeIndex();
+}
+
+void Vocabulary::MakeIndex() {
+  index_ = type_ == CV_32F ? MakeKdForestIndex(width_, options_.trees, options_.checks, seed_)
+                           : MakeHammingIndex(width_, options_.hash_tables, seed_);
 }
 
 std::vector<int> Vocabulary::Quantise(const cv::Mat& descriptors, int threads) {
@@ -67,7 +77,7 @@ std::vector<int> Vocabulary::Quantise(const cv::Mat& descriptors, int threads) {
     }
   });
 
-  const int old_words = index_->size();
+  const int old_words = created_;
   cv::Mat created(descriptors.rows, width_, type_);
   int num_created = 0;
   std::vector<float> distances(nearest.size());
@@ -83,8 +93,92 @@ std::vector<int> Vocabulary::Quantise(const cv::Mat& descriptors, int threads) {
       words.push_back(best.first);
     }
   }
-  if (num_created > 0) index_->Add(created.rowRange(0, num_created).clone());
+  if (num_created > 0) {
+    std::vector<int> ids(static_cast<std::size_t>(num_created));
+    std::iota(ids.begin(), ids.end(), old_words);
+    index_->Add(ids, created.rowRange(0, num_created));
+    created_ += num_created;
+  }
+  index_->Maintain();
   return words;
+}
+
+void Vocabulary::AddReferences(const Signature& signature) {
+  for (const Signature::Entry& entry : signature.entries()) ++references_[entry.word];
+}
+
+void Vocabulary::RemoveReferences(const Signature& signature) {
+  for (const Signature::Entry& entry : signature.entries()) {
+    const auto found = references_.find(entry.word);
+    if (found == references_.end() || --found->second > 0) continue;
+    references_.erase(found);
+    index_->Remove(entry.word);
+  }
+}
+
+std::vector<int> Vocabulary::WordsOnlyIn(const Signature& signature) const {
+  std::vector<int> words;
+  for (const Signature::Entry& entry : signature.entries()) {
+    const auto found = references_.find(entry.word);
+    if (found != references_.end() && found->second == 1) words.push_back(entry.word);
+  }
+  return words;
+}
+
+std::vector<int> Vocabulary::Missing(const Signature& signature) const {
+  std::vector<int> words;
+  for (const Signature::Entry& entry : signature.entries()) {
+    if (!index_ || index_->Find(entry.word) == nullptr) words.push_back(entry.word);
+  }
+  return words;
+}
+
+void Vocabulary::Restore(const std::vector<int>& words, const cv::Mat& descriptors) {
+  if (words.empty()) return;
+  CheckType(descriptors);
+  index_->Add(words, descriptors);
+  created_ = std::max(created_, *std::max_element(words.begin(), words.end()) + 1);
+}
+
+cv::Mat Vocabulary::Descriptor(int word) const {
+  const std::uint8_t* data = index_ ? index_->Find(word) : nullptr;
+  if (data == nullptr) return {};
+  cv::Mat row(1, width_, type_);
+  std::copy_n(data, row.elemSize() * row.total(), row.data);
+  return row;
+}
+
+void Vocabulary::Save(internal::ByteWriter& out) const {
+  out.Put<std::int32_t>(type_);
+  out.Put<std::int32_t>(width_);
+  out.Put<std::int32_t>(created_);
+  std::vector<std::pair<int, int>> references(references_.begin(), references_.end());
+  std::sort(references.begin(), references.end());
+  out.Put<std::uint64_t>(references.size());
+  for (const auto& [word, count] : references) {
+    out.Put<std::int32_t>(word);
+    out.Put<std::int32_t>(count);
+  }
+  if (index_) index_->Save(out);
+}
+
+void Vocabulary::Load(internal::ByteReader& in) {
+  constexpr int kMostColumns = 1 << 16;
+  type_ = in.Get<std::int32_t>();
+  width_ = in.Get<std::int32_t>();
+  created_ = in.Get<std::int32_t>();
+  if (type_ != -1 && type_ != CV_32F && type_ != CV_8U) in.Damaged("descriptors of an unknown type");
+  if (type_ != -1 && (width_ <= 0 || width_ > kMostColumns)) in.Damaged("descriptors of an impossible width");
+  if (created_ < 0) in.Damaged("a negative number of words");
+  const std::size_t count = in.GetCount(2 * sizeof(std::int32_t));
+  for (std::size_t i = 0; i < count; ++i) {
+    const int word = in.GetIndex(created_);
+    references_[word] = in.Get<std::int32_t>();
+    if (references_[word] < 1) in.Damaged("a word without a location");
+  }
+  if (type_ == -1) return;
+  MakeIndex();
+  index_->Load(in);
 }
 
 }  // namespace tutti

@@ -80,5 +80,69 @@ TEST(LocationMemory, ALinkIsMadeOnce) {
   EXPECT_FALSE(memory.AddLink(1, 1, LinkType::kLoop));
 }
 
+// Ten locations in WM (0..9) and one in STM (10).
+LocationMemory Chain() {
+  LocationMemory memory(1);
+  for (int i = 0; i < 11; ++i) {
+    memory.Add(i);
+    memory.Settle();
+  }
+  return memory;
+}
+
+TEST(LocationMemory, TheLightestThenTheOldestIsTransferredFirst) {
+  LocationMemory memory = Chain();
+  EXPECT_EQ(memory.NextToTransfer(0.0, {}), 0);
+  memory.AddLink(0, 4, LinkType::kLoop);
+  EXPECT_EQ(memory.NextToTransfer(0.0, {0, 1}), 2);
+  memory.Transfer(0);
+  memory.Transfer(1);
+  memory.Retrieve(0);  // entered WM after all others
+  EXPECT_EQ(memory.NextToTransfer(0.0, {}), 2);
+  EXPECT_EQ(memory.working_memory(), (std::vector<int>{0, 2, 3, 4, 5, 6, 7, 8, 9}));
+}
+
+TEST(LocationMemory, WeightKeepsALocationAndRecentOnesAndThoseLinkedToShortTermMemoryStay) {
+  LocationMemory memory(2);
+  memory.Add(0);
+  memory.Add(1);
+  memory.DropNewest();  // location 0 has weight 1
+  for (int i = 2; i < 7; ++i) {
+    memory.Add(i);
+    memory.Settle();
+  }
+  // WM: slots 0, 2, 3, 4; STM: 5, 6. Slot 4 is linked to 5.
+  EXPECT_EQ(memory.NextToTransfer(0.0, {}), 2);
+  EXPECT_EQ(memory.NextToTransfer(0.0, {2, 3}), 0);
+  EXPECT_EQ(memory.NextToTransfer(0.0, {0, 2, 3}), -1);
+  EXPECT_EQ(memory.NextToTransfer(0.75, {0}), -1);  // 2, 3 and 4 are the newest three quarters
+}
+
+TEST(LocationMemory, LongTermNeighboursAreFoundAcrossLongTermMemory) {
+  LocationMemory memory = Chain();
+  for (const int slot : {3, 4, 5}) EXPECT_TRUE(memory.Transfer(slot));
+  EXPECT_FALSE(memory.Transfer(3));
+  EXPECT_EQ(memory.state(4), State::kLongTerm);
+  EXPECT_EQ(memory.num_long_term(), 3);
+  EXPECT_EQ(memory.LongTermNeighbours(2, 10, 2), (std::vector<int>{3, 4}));
+  EXPECT_EQ(memory.LongTermNeighbours(7, 1, 2), std::vector<int>{});
+  EXPECT_EQ(memory.LongTermNeighbours(7, 10, 9), (std::vector<int>{5, 4, 3}));
+  // Neighbours for the filter do not reach through it.
+  for (const auto& [slot, level] : memory.Neighbours(2, 16)) EXPECT_LE(slot, 2);
+  EXPECT_TRUE(memory.Retrieve(4));
+  EXPECT_FALSE(memory.Retrieve(4));
+  EXPECT_EQ(memory.num_long_term(), 2);
+}
+
+TEST(LocationMemory, AnIgnoredLocationLeavesNoWeight) {
+  LocationMemory memory(5);
+  memory.Add(10);
+  EXPECT_EQ(memory.IgnoreNewest(), -1);
+  memory.Add(11);
+  EXPECT_EQ(memory.IgnoreNewest(), 0);
+  EXPECT_EQ(memory.weight(0), 0);
+  EXPECT_EQ(memory.Find(11), 0);
+}
+
 }  // namespace
 }  // namespace tutti

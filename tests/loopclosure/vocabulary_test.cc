@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <numeric>
 #include <random>
 
+#include "byte_stream.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -95,6 +97,12 @@ TEST(Vocabulary, AnotherTypeOrWidthIsRefused) {
   EXPECT_THROW(Vocabulary(VocabularyOptions(), 1).Quantise(cv::Mat::zeros(3, 8, CV_64F)), InputError);
 }
 
+std::vector<int> Ids(int begin, int end) {
+  std::vector<int> ids(static_cast<std::size_t>(end - begin));
+  std::iota(ids.begin(), ids.end(), begin);
+  return ids;
+}
+
 // Share of queries (stored rows with noise) whose true nearest row the index finds.
 template <typename Noise>
 double Recall(DescriptorIndex& index, const cv::Mat& rows, const Noise& noise) {
@@ -107,10 +115,115 @@ double Recall(DescriptorIndex& index, const cv::Mat& rows, const Noise& noise) {
   return found / (rows.rows / 10.0);
 }
 
+TEST(Vocabulary, AWordLeavesWithItsLastLocationAndComesBackUnderItsId) {
+  for (const cv::Mat& descriptors : {RandomFloats(60, 64, 1), RandomBytes(60, 1)}) {
+    Vocabulary vocabulary(VocabularyOptions(), 1);
+    const std::vector<int> words = vocabulary.Quantise(descriptors);
+    const Signature all(words);
+    const Signature half(std::vector<int>(words.begin(), words.begin() + 30));
+    vocabulary.AddReferences(all);
+    vocabulary.AddReferences(half);
+    EXPECT_EQ(vocabulary.WordsOnlyIn(all).size(), 30u);
+    EXPECT_TRUE(vocabulary.WordsOnlyIn(half).empty());
+    std::vector<cv::Mat> kept;
+    for (const int word : vocabulary.WordsOnlyIn(all)) kept.push_back(vocabulary.Descriptor(word));
+    vocabulary.RemoveReferences(all);
+    EXPECT_EQ(vocabulary.size(), 30);
+    const std::vector<int> missing = vocabulary.Missing(all);
+    ASSERT_EQ(missing.size(), 30u);
+    EXPECT_TRUE(vocabulary.Descriptor(missing.front()).empty());
+    cv::Mat rows;
+    cv::vconcat(kept, rows);
+    vocabulary.Restore(missing, rows);
+    EXPECT_EQ(vocabulary.size(), 60);
+    EXPECT_EQ(vocabulary.Quantise(descriptors), words);
+    EXPECT_EQ(vocabulary.created(), 60);
+  }
+}
+
+// Locations of `per_image` words come and, a while later, go; some words are seen again.
+class Churn {
+ public:
+  explicit Churn(bool binary) : binary_(binary), vocabulary_(VocabularyOptions(), 3) {}
+  void Step() {
+    const cv::Mat rows = binary_ ? RandomBytes(kPerImage, image_) : RandomFloats(kPerImage, 32, image_);
+    const Signature signature(vocabulary_.Quantise(rows));
+    vocabulary_.AddReferences(signature);
+    images_.emplace_back(rows, signature);
+    if (++image_ > kKept) vocabulary_.RemoveReferences(images_[image_ - kKept - 1].second);
+  }
+  // Share of the words of the last kept image that are found again.
+  double Recognised() {
+    const auto& [rows, signature] = images_[image_ - kKept];
+    int known = 0;
+    for (int i = 0; i < rows.rows; ++i) {
+      Vocabulary& v = vocabulary_;
+      const int before = v.created();
+      v.Quantise(rows.row(i));
+      known += v.created() == before ? 1 : 0;
+    }
+    return known / static_cast<double>(rows.rows);
+  }
+  static constexpr int kPerImage = 100;
+  static constexpr std::uint32_t kKept = 20;
+  bool binary_;
+  std::uint32_t image_ = 0;
+  Vocabulary vocabulary_;
+  std::vector<std::pair<cv::Mat, Signature>> images_;
+};
+
+TEST(Vocabulary, SearchStaysGoodWhileWordsComeAndGo) {
+  for (const bool binary : {false, true}) {
+    Churn churn(binary);
+    for (int i = 0; i < 150; ++i) churn.Step();
+    EXPECT_LE(churn.vocabulary_.size(), 101 * static_cast<int>(Churn::kKept));
+    EXPECT_GT(churn.Recognised(), 0.95) << (binary ? "binary" : "float");
+  }
+}
+
+TEST(Vocabulary, ALoadedOneGoesOnAsTheSavedOneWould) {
+  for (const bool binary : {false, true}) {
+    Churn churn(binary);
+    for (int i = 0; i < 77; ++i) churn.Step();  // in the middle of growing a tree anew
+    internal::ByteWriter out;
+    churn.vocabulary_.Save(out);
+    Vocabulary loaded(VocabularyOptions(), 3);
+    internal::ByteReader in(out.bytes(), "saved");
+    loaded.Load(in);
+    EXPECT_TRUE(in.AtEnd());
+    for (std::uint32_t seed = 60; seed < 130; ++seed) {
+      const cv::Mat rows = binary ? RandomBytes(40, seed) : RandomFloats(40, 32, seed);
+      const std::vector<int> words = churn.vocabulary_.Quantise(rows);
+      EXPECT_EQ(words, loaded.Quantise(rows)) << seed;
+      churn.vocabulary_.AddReferences(Signature(words));
+      loaded.AddReferences(Signature(words));
+      churn.vocabulary_.RemoveReferences(Signature(words));
+      loaded.RemoveReferences(Signature(words));
+    }
+    internal::ByteWriter a, b;
+    churn.vocabulary_.Save(a);
+    loaded.Save(b);
+    EXPECT_TRUE(a.bytes() == b.bytes());
+  }
+}
+
+TEST(Vocabulary, DamagedBytesAreRefused) {
+  Churn churn(false);
+  for (int i = 0; i < 3; ++i) churn.Step();
+  internal::ByteWriter out;
+  churn.vocabulary_.Save(out);
+  const std::string& bytes = out.bytes();
+  for (std::size_t length = 0; length < bytes.size(); length += 1 + bytes.size() / 50) {
+    Vocabulary loaded(VocabularyOptions(), 3);
+    internal::ByteReader in(std::string_view(bytes).substr(0, length), "saved");
+    EXPECT_THROW(loaded.Load(in), InputError) << length;
+  }
+}
+
 TEST(DescriptorIndex, KdForestFindsMostNearestNeighbours) {
   const cv::Mat rows = RandomFloats(5000, 64, 7);
   const std::unique_ptr<DescriptorIndex> index = MakeKdForestIndex(64, 4, 32, 1);
-  for (int i = 0; i < 5000; i += 100) index->Add(rows.rowRange(i, i + 100).clone());
+  for (int i = 0; i < 5000; i += 100) index->Add(Ids(i, i + 100), rows.rowRange(i, i + 100));
   std::mt19937 generator(3);
   EXPECT_GT(Recall(*index, rows,
                    [&](cv::Mat& q) {
@@ -123,7 +236,7 @@ TEST(DescriptorIndex, KdForestFindsMostNearestNeighbours) {
 TEST(DescriptorIndex, HammingTablesFindMostNearestNeighbours) {
   const cv::Mat rows = RandomBytes(12000, 7);
   const std::unique_ptr<DescriptorIndex> index = MakeHammingIndex(32, 8, 1);
-  index->Add(rows);
+  index->Add(Ids(0, rows.rows), rows);
   std::mt19937 generator(3);
   EXPECT_GT(Recall(*index, rows,
                    [&](cv::Mat& q) {

@@ -8,6 +8,11 @@
 
 namespace tutti {
 
+namespace internal {
+class ByteReader;
+class ByteWriter;
+}  // namespace internal
+
 /// p(S_t | L^t) = eta p(L_t | S_t) sum_i p(S_t | S_{t-1} = i) p(S_{t-1} = i | L^{t-1})    (loop-closure.md
 /// eq. 1)
 ///
@@ -19,8 +24,15 @@ class BayesFilter {
   void Step(const TransitionModel& transition, const std::vector<int>& working_memory,
             const Belief& likelihood);
 
+  /// A location has left working memory: should it come back, it starts with 0.
+  void Forget(int slot);
+
   /// p(S_t | L^t) after the last step; all mass on "new place" before the first.
   const Belief& posterior() const { return posterior_; }
+
+  /// The whole state. Load throws InputError.
+  void Save(internal::ByteWriter& out) const;
+  void Load(internal::ByteReader& in);
 
  private:
   Belief posterior_;

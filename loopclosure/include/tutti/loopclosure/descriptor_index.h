@@ -9,28 +9,43 @@
 
 namespace tutti {
 
+namespace internal {
+class ByteReader;
+class ByteWriter;
+}  // namespace internal
+
 /// The two nearest words of a descriptor, by TRUE distance (Euclidean, not squared; or Hamming in bits).
 struct TwoNearest {
-  int first = -1;   ///< index of the nearest, -1 if there is none
-  int second = -1;  ///< index of the second, -1 if there is none
+  int first = -1;   ///< word id of the nearest, -1 if there is none
+  int second = -1;  ///< word id of the second, -1 if there is none
   float first_distance = std::numeric_limits<float>::infinity();
   float second_distance = std::numeric_limits<float>::infinity();
 
-  /// Takes one more candidate in; a candidate that is there already changes nothing. Ties: the smaller index.
-  void Offer(int index, float distance);
+  /// Takes one more candidate in; a candidate that is there already changes nothing. Ties: the smaller id.
+  void Offer(int word, float distance);
 };
 
-/// An index that grows by insertion. Rows are numbered 0, 1, 2, ... in the order of insertion. Deterministic:
-/// equal insertions and queries give equal answers.
+/// An index of words that come, go and come back. Deterministic: equal histories give equal answers.
 class DescriptorIndex {
  public:
   virtual ~DescriptorIndex() = default;
-  /// Appends descriptors (N x D, type of the index); the rows are kept, not copied.
-  virtual void Add(const cv::Mat& rows) = 0;
-  /// The (approximately) two nearest rows of one descriptor, a row of a cv::Mat of the index's type and
-  /// width.
+  /// Adds words (one id and one row each; rows of the index's type and width, which are copied). A word that
+  /// was removed may come back, under its id and with its descriptor.
+  virtual void Add(const std::vector<int>& words, const cv::Mat& rows) = 0;
+  /// Takes a word out: no search finds it from now on. Words that are not there are left alone.
+  virtual void Remove(int word) = 0;
+  /// The (approximately) two nearest words of one descriptor, a row of a cv::Mat of the index's type and
+  /// width. Safe to call from several threads at once.
   virtual TwoNearest Search(const std::uint8_t* descriptor) const = 0;
+  /// One bounded step of clearing up behind removed words: once per image, so that no image pays for all.
+  virtual void Maintain() = 0;
+  /// A word's descriptor; nullptr if it is not in the index.
+  virtual const std::uint8_t* Find(int word) const = 0;
+  /// Words in the index.
   virtual int size() const = 0;
+  /// The whole state, such that a loaded index goes on as the saved one would. Load throws InputError.
+  virtual void Save(internal::ByteWriter& out) const = 0;
+  virtual void Load(internal::ByteReader& in) = 0;
 };
 
 /// kd-forest over CV_32F descriptors, on FLANN (Muja & Lowe 2009): `trees` randomised trees, `checks` leaves
@@ -39,7 +54,8 @@ class DescriptorIndex {
 /// FLANN's own forest draws from std::random_device and the process-wide rand(), so two runs never agree, and
 /// its rebuild on doubling stops the caller for a while. Here every tree is a FLANN index of its own that
 /// starts from one word and grows by insertion alone, each tree in a seeded order of its own: the trees
-/// differ, nothing is random, nothing is rebuilt.
+/// differ and nothing is random. Removed words stay in the trees as dead leaves; a tree in which they
+/// outnumber the living is grown anew beside the old one, a piece at each Maintain.
 std::unique_ptr<DescriptorIndex> MakeKdForestIndex(int dimensions, int trees, int checks, std::uint64_t seed);
 
 /// Hash tables over CV_8U descriptors, Hamming distance: each table indexes a seeded choice of bits, buckets

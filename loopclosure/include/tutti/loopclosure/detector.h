@@ -3,6 +3,8 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
+#include <map>
 #include <memory>
 #include <opencv2/core.hpp>
 #include <optional>
@@ -23,6 +25,12 @@ struct FeatureSet {
   std::vector<Eigen::Vector3d> points;  ///< empty, or N points in the camera frame [m]; NaN where unknown
 };
 
+/// Features of one member that the caller has extracted himself.
+struct MemberFeatures {
+  std::vector<cv::KeyPoint> keypoints;  ///< size N
+  cv::Mat descriptors;  ///< N rows; CV_8U: Hamming, CV_32F: Euclidean; N = 0: sits this image out
+};
+
 /// One image with what is known about it.
 struct LoopQuery {
   std::int64_t id = 0;  ///< strictly greater than every id before
@@ -31,6 +39,8 @@ struct LoopQuery {
   cv::Mat depth_m;  ///< optional: CV_32FC1 [m], registered to image, 0 = unknown
   std::optional<PinholeCamera> camera;  ///< optional: without it verification uses the fundamental matrix
   FeatureSet features;                  ///< optional: the caller's own features
+  std::map<std::string, MemberFeatures> member_features;  ///< optional: members that need not extract, by
+                                                          ///< name; one of options.external_members: required
   bool metric = true;  ///< features.points are in metres (stereo, RGB-D): PnP, kRigid. false: mono, their
                        ///< scale drifts: essential matrix, then kSimilarity where both have points
 };
@@ -44,6 +54,7 @@ struct MemberOpinion {
   double hypothesis = 0;    ///< H = 1 - p(new place)
   std::int64_t best = -1;   ///< id of its best location, -1 if none
   double at_candidate = 0;  ///< its posterior at the ensemble's candidate
+  std::vector<std::pair<std::int64_t, double>> posterior_by_location;  ///< only with keep_posterior
 };
 
 /// A matched feature: pixel in the query and in the candidate, and their indices in the callers' FeatureSets
@@ -81,6 +92,9 @@ struct LoopResult {
   Verification verification;                                           ///< the best one tried
   std::vector<Verification> tried;                                     ///< all that were tried
   std::vector<std::pair<std::int64_t, double>> posterior_by_location;  ///< only with keep_posterior
+  std::vector<std::int64_t> retrieved;    ///< locations that came back from long-term memory
+  std::vector<std::int64_t> transferred;  ///< locations that left working memory for it
+  std::string warning;  ///< trouble that did not stop Detect: the disk is full, a stored location is damaged
   double extract_ms = 0, quantise_ms = 0, likelihood_ms = 0, filter_ms = 0, verify_ms = 0, memory_ms = 0;
 };
 
@@ -88,7 +102,9 @@ struct LoopResult {
 /// Deterministic for any number of threads.
 class LoopDetector {
  public:
-  /// Throws InputError if the options are not usable.
+  /// Throws InputError if the options are not usable; or if ltm_file can't be used: it is in use by another
+  /// process, damaged, or belongs to other members or another kind of memory. A file with locations is gone
+  /// on with: all of them are there again, the filters start afresh.
   explicit LoopDetector(const LoopDetectorOptions& options);
   LoopDetector(LoopDetector&&) noexcept;
   LoopDetector& operator=(LoopDetector&&) noexcept;
@@ -97,12 +113,26 @@ class LoopDetector {
   /// Adds the image as a location and says whether it closes a loop. Never throws for hard images; throws
   /// InputError for misuse (an id that does not grow, descriptors of another type than before).
   LoopResult Detect(const LoopQuery& query);
+  /// The same for an image alone: CV_8UC1, CV_8UC3 (BGR) or CV_16UC1.
+  LoopResult Detect(const cv::Mat& image, std::int64_t id);
 
   /// Adds a neighbour link between two locations (a caller's own odometry link); consecutive ids are linked
   /// by themselves.
   void AddLink(std::int64_t a, std::int64_t b);
 
+  /// Saves everything (vocabularies, memory with its long-term part, filters) into one file; a file that is
+  /// there is replaced only by a complete one. Throws InputError if it can't be written.
+  void Save(const std::filesystem::path& file) const;
+  /// Takes up what Save wrote, in place of all that this object knows; it then goes on exactly as the saved
+  /// one would have, if the options are the same. Members, their extraction and kind of memory must be.
+  /// Throws InputError for another version, other members, or a damaged file; the object is then as it was.
+  void Load(const std::filesystem::path& file);
+
+  /// Locations in short-term and working memory; those in long-term memory.
   std::size_t NumLocations() const;
+  std::size_t NumLongTerm() const;
+  /// The last id that Detect was given; -1 if there was none.
+  std::int64_t LastId() const;
   const LoopDetectorOptions& options() const;
 
  private:

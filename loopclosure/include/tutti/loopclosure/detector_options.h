@@ -14,6 +14,12 @@ enum class CombinationRule { kMean, kProduct, kMajority, kNaive, kSingle };
 /// How a signature is compared with a location (loop-closure.md section 2).
 enum class LikelihoodKind { kSimilarity, kTfIdf };
 
+/// Whose locations they are (loop-closure.md section 6).
+enum class MemoryKind {
+  kShared,     ///< one memory for all members: a location is a candidate of every member, or of none
+  kPerMember,  ///< as the paper has it: each member rehearses, transfers and retrieves on its own
+};
+
 /// Options of the features that each member takes from an image.
 struct ExtractionOptions {
   int features = 400;           ///< strongest features kept per member and image, spread over the image
@@ -72,18 +78,34 @@ struct VerificationOptions {
 struct LoopDetectorOptions {
   CombinationRule rule = CombinationRule::kMean;  ///< how members are combined
   std::vector<std::string> members = {"surf", "sift",
-                                      "orb"};  ///< of surf, sift, orb, akaze, brisk; kSingle: one
-  double loop_threshold = 0.07;                ///< go to verification at H >= this, 0..1
-  int stm_size = 10;                           ///< locations in short-term memory, no candidates
-  int threads = 2;                             ///< most threads that Detect uses at once
-  std::uint64_t seed = 1;                      ///< of kd-forests and RANSAC
+                                      "orb"};  ///< of KnownMembers(), and of external_members; kSingle: one
+  std::vector<std::string> external_members;   ///< further names that members may hold: the caller extracts
+                                              ///< their features himself and gives them with each LoopQuery
+  double loop_threshold = 0.07;  ///< go to verification at H >= this, 0..1
+  int stm_size = 10;             ///< locations in short-term memory, no candidates
+  int threads = 2;               ///< most threads that Detect uses at once
+  std::uint64_t seed = 1;        ///< of kd-forests and RANSAC
 
   LikelihoodKind likelihood = LikelihoodKind::kTfIdf;  ///< how signatures are compared
+  double hypothesis_ratio = 0.0;  ///< and at H >= this x the H of the image before, 0: whatever it was (0.9
+                                  ///< in Labbe & Michaud 2013), 0..1
   double bad_signature_ratio =
       0.2;  ///< a member sits out below this share of its mean number of features, 0..1
-  double virtual_place_prior = 0.9;   ///< p(new place | new place), 0..1
-  bool rehearsal = false;             ///< merge a location into its predecessor when they look the same
-  double rehearsal_similarity = 0.6;  ///< similarity from which on they do, 0..1
+  bool ignore_bad_signatures = false;  ///< an image that is bad for every member is no location at all
+  double virtual_place_prior = 0.9;    ///< p(new place | new place), 0..1
+  bool rehearsal = false;              ///< merge a location into its predecessor when they look the same
+  double rehearsal_similarity = 0.6;   ///< similarity from which on they do, 0..1
+
+  MemoryKind memory = MemoryKind::kShared;  ///< shared, or one for each member
+  int wm_limit = 10000;  ///< most locations in working memory, others go to long-term memory; 0: no limit
+  double time_budget_ms =
+      0;              ///< transfer locations as well while an image takes longer than this [ms]; 0: off.
+                      ///< What is transferred then depends on the machine: results are not reproducible
+  int retrieval = 2;  ///< locations brought back from long-term memory per image, near the hypothesis
+  double recent_share = 0.2;  ///< share of working memory, the newest, that is never transferred, 0..1
+  std::string ltm_file;  ///< SQLite file of the long-term memory; all that Detect learns is stored in it, and
+                         ///< a later detector with the same file goes on from there. Empty: a temporary one
+
   bool keep_posterior = false;  ///< fill LoopResult::posterior_by_location (costs O(locations) per image)
 
   ExtractionOptions extraction;      ///< features
@@ -94,6 +116,14 @@ struct LoopDetectorOptions {
   std::string Validate() const;
 };
 
+/// A published set of parameters (loop-closure.md section 9) on top of `options`: "paper-2013" (Labbe &
+/// Michaud 2013), "rtabmap-0.8.3" (the reference system of the ensemble's paper), or "default" (ours).
+/// Features and verification stay as they are. Throws InputError that names the nearest word.
+void ApplyPreset(const std::string& name, LoopDetectorOptions& options);
+
+/// Names that ApplyPreset takes.
+const std::vector<std::string>& KnownPresets();
+
 /// The one configuration key: "mean", "product", "majority" or "naive" over options.members, or a member's
 /// name
 /// ("surf", "sift", "orb", "akaze", "brisk") for that member alone. Throws InputError that names the nearest
@@ -103,7 +133,7 @@ void SetRule(const std::string& word, LoopDetectorOptions& options);
 /// The word that SetRule takes for these options.
 std::string RuleName(const LoopDetectorOptions& options);
 
-/// Names that options.members may hold.
+/// Names that options.members may hold without further ado.
 const std::vector<std::string>& KnownMembers();
 
 }  // namespace tutti

@@ -1,6 +1,7 @@
 // p(L_t | S_t): how much an image looks like each location, and how much it looks like none of them.
 #pragma once
 
+#include <unordered_map>
 #include <vector>
 
 #include "tutti/loopclosure/belief.h"
@@ -8,6 +9,11 @@
 #include "tutti/loopclosure/signature.h"
 
 namespace tutti {
+
+namespace internal {
+class ByteReader;
+class ByteWriter;
+}  // namespace internal
 
 /// Inverted index over the signatures of all locations in STM and WM, and the scores computed by walking it.
 /// Locations are slots: 0, 1, 2, ... in the order of adding.
@@ -19,6 +25,10 @@ class LikelihoodModel {
   void Add(const Signature& signature);
   /// Takes a slot's words out of the index (merged by rehearsal, or transferred out of working memory).
   void Remove(int slot);
+  /// Puts a slot's words in again (retrieved from long-term memory).
+  void Restore(int slot, const Signature& signature);
+  /// Signature of a slot; empty for a bad one and for one that is not in the index.
+  const Signature& signature(int slot) const { return signatures_[static_cast<std::size_t>(slot)]; }
 
   /// Raw scores s_i of every slot (0 where nothing is shared). Section 2, both variants:
   /// similarity: s_i = (sum over shared words of min(multiplicity)) / max(|z_t|, |z_i|);
@@ -26,18 +36,27 @@ class LikelihoodModel {
   /// and WM, n_w of them with w, n_wi occurrences of w in i, n_i words in i.
   std::vector<double> Scores(const Signature& query) const;
 
+  /// Slots ever added.
+  int size() const { return static_cast<int>(signatures_.size()); }
   /// Locations in the index, bad signatures included: N.
   int NumLocations() const { return locations_; }
+
+  /// The whole state; Load into a new object of the same kind. Throws InputError.
+  void Save(internal::ByteWriter& out) const;
+  void Load(internal::ByteReader& in);
 
  private:
   struct Posting {
     int slot = 0;
     int count = 0;
   };
+  void Insert(int slot);
+
   LikelihoodKind kind_;
-  std::vector<std::vector<Posting>> postings_;  // by word id
-  std::vector<Signature> signatures_;           // by slot
-  std::vector<bool> present_;                   // by slot
+  std::unordered_map<int, std::vector<Posting>>
+      postings_;                       // by word id; words without locations are not there
+  std::vector<Signature> signatures_;  // by slot
+  std::vector<bool> present_;          // by slot
   int locations_ = 0;
 };
 

@@ -5,19 +5,27 @@
 #include <cstdint>
 #include <deque>
 #include <map>
+#include <set>
 #include <utility>
 #include <vector>
 
 namespace tutti {
 
+namespace internal {
+class ByteReader;
+class ByteWriter;
+}  // namespace internal
+
 /// Short-term memory (STM, a FIFO of the newest locations, which are no candidates) and working memory (WM,
 /// the candidates), after Labbe & Michaud 2013, section III. Shared between the members (loop-closure.md
-/// section 6), so that a location is in every member's WM or in none.
+/// section 6), so that a location is in every member's WM or in none; or one for each member, as in the
+/// paper. Locations that leave WM are in long-term memory (LTM): their links and weights stay here, what they
+/// look like is kept elsewhere.
 ///
 /// Locations are slots 0, 1, 2, ... in the order of adding; the caller's ids are kept beside them.
 class LocationMemory {
  public:
-  enum class State { kShortTerm, kWorking, kMerged };
+  enum class State : std::uint8_t { kShortTerm, kWorking, kMerged, kLongTerm };
   /// kOdometry: neighbours in time, one graph level apart. kLoop: the same place, zero levels apart.
   enum class LinkType { kOdometry, kLoop };
   struct Link {
@@ -38,8 +46,34 @@ class LocationMemory {
   /// weight_new, and dropped; its id names the older one from now on. Returns the older slot, -1 if STM holds
   /// no older one (nothing changes then).
   int DropNewest();
+  /// The newest location is dropped without a trace but its id, which names the one before it from now on
+  /// (a bad signature under bad_signatures: ignore). Returns the older slot, -1 as DropNewest.
+  int IgnoreNewest();
   /// On a loop: the newer location takes over the older one's weight.
   void TransferWeight(int newer, int older);
+
+  /// The location in WM to transfer to LTM next: lowest weight, then longest since it entered WM, then
+  /// smallest slot (section 9). Never one that is linked to STM, in `immune`, or of the newest
+  /// `recent_share` of WM. -1 if there is none.
+  int NextToTransfer(double recent_share, const std::set<int>& immune) const;
+  /// WM -> LTM and back. False if the slot was not there.
+  bool Transfer(int slot);
+  bool Retrieve(int slot);
+  /// Up to `count` locations in LTM near `slot` (any state) by graph level, nearest first, at most `levels`
+  /// away. Walks the whole graph, LTM included.
+  std::vector<int> LongTermNeighbours(int slot, int levels, int count) const;
+  int num_long_term() const { return num_long_term_; }
+  /// Slots whose state, weight or links changed since the last call, ascending.
+  std::vector<int> TakeChanged();
+
+  /// One slot's record, for the long-term memory's file; and the memory of all of them, slots ascending, of
+  /// which those that were in STM or WM are there again. Throws InputError.
+  void SaveSlot(int slot, internal::ByteWriter& out) const;
+  void LoadSlot(internal::ByteReader& in);
+  void FinishLoading();
+  /// The whole state; Load into a new object of the same options. Throws InputError.
+  void Save(internal::ByteWriter& out) const;
+  void Load(internal::ByteReader& in);
 
   /// Slots in WM, ascending: the candidates.
   const std::vector<int>& working_memory() const { return working_; }
@@ -61,15 +95,24 @@ class LocationMemory {
     std::int64_t id = 0;
     State state = State::kShortTerm;
     int weight = 0;
+    std::int64_t entered = 0;  // WM, by the count of all entries
     std::vector<Link> links;
   };
   static std::size_t Index(int slot) { return static_cast<std::size_t>(slot); }
+  int Drop(int weight);
+  void Enter(int slot);
+  // (slot, level) of every location within `levels` that `walkable` admits, `slot` first.
+  template <typename Walkable>
+  std::vector<std::pair<int, int>> Walk(int slot, int levels, const Walkable& walkable) const;
 
   int stm_size_;
   std::vector<Node> nodes_;
   std::deque<int> short_term_;
   std::vector<int> working_;
   std::map<std::int64_t, int> slot_of_id_;
+  std::int64_t entries_ = 0;
+  int num_long_term_ = 0;
+  std::set<int> changed_;
 };
 
 }  // namespace tutti

@@ -1,6 +1,7 @@
 // One member of the ensemble: its features, its vocabulary, and what it takes for a bad signature.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "tutti/loopclosure/detector_options.h"
@@ -17,19 +18,28 @@ class Member {
 
   const std::string& name() const { return name_; }
 
-  /// Step 1: features of an 8-bit grey image. Safe to call for several members at once.
-  Features Extract(const cv::Mat& grey) const { return extractor_.Extract(grey); }
+  /// Step 1: features of an 8-bit grey image. Safe to call for several members at once. None for an external
+  /// member.
+  Features Extract(const cv::Mat& grey) const { return extractor_ ? extractor_->Extract(grey) : Features(); }
+  /// True if the caller extracts this member's features.
+  bool external() const { return !extractor_; }
 
   /// Step 2: the signature. A bad one (fewer features than bad_signature_ratio x their running mean, or fewer
   /// than two) gets no words and is empty: the member sits this image out.
   Signature Quantise(const Features& features);
 
   int num_words() const { return vocabulary_.size(); }
+  Vocabulary& vocabulary() { return vocabulary_; }
+  const Vocabulary& vocabulary() const { return vocabulary_; }
+
+  /// Running figures, all of the state but the vocabulary. LoadStatistics throws InputError.
+  void SaveStatistics(internal::ByteWriter& out) const;
+  void LoadStatistics(internal::ByteReader& in);
 
  private:
   std::string name_;
   double bad_signature_ratio_;
-  FeatureExtractor extractor_;
+  std::optional<FeatureExtractor> extractor_;
   Vocabulary vocabulary_;
   double feature_sum_ = 0.0;
   int images_ = 0;

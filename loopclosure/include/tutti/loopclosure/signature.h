@@ -6,6 +6,11 @@
 
 namespace tutti {
 
+namespace internal {
+class ByteReader;
+class ByteWriter;
+}  // namespace internal
+
 /// Bag of words of one image: z_t of loop-closure.md section 1.
 class Signature {
  public:
@@ -27,6 +32,15 @@ class Signature {
   /// Similarity of two signatures (Labbe & Michaud 2013, eq. 1; loop-closure.md section 2):
   /// sum over shared words of min(multiplicity), divided by max(|a|, |b|). In [0, 1]; 0 if one is empty.
   static double Similarity(const Signature& a, const Signature& b);
+
+  /// Signatures of several members as one: d_1 + d_2 + ... (loop-closure.md eq. 3). Their words stay apart by
+  /// interleaving the ids. Split undoes it.
+  static Signature Concatenate(const std::vector<const Signature*>& parts);
+  std::vector<Signature> Split(int parts) const;
+
+  void Save(internal::ByteWriter& out) const;
+  /// Throws InputError.
+  static Signature Load(internal::ByteReader& in);
 
  private:
   std::vector<Entry> entries_;

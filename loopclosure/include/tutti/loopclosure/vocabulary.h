@@ -1,13 +1,17 @@
 // One member's incremental visual vocabulary: descriptors in, word ids out.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <opencv2/core.hpp>
+#include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "tutti/loopclosure/descriptor_index.h"
 #include "tutti/loopclosure/detector_options.h"
+#include "tutti/loopclosure/signature.h"
 
 namespace tutti {
 
@@ -17,6 +21,9 @@ namespace tutti {
 /// A descriptor becomes a new word if it has fewer than two neighbours or d1 > nndr * d2, on true distance,
 /// where the neighbours come from the index and, exactly, from the words that this same image has just
 /// created. The index grows by insertion after each image.
+///
+/// Words live as long as a location in memory refers to them: AddReferences and RemoveReferences count.
+/// A word whose last reference goes leaves the index; Restore brings it back under its old id.
 class Vocabulary {
  public:
   Vocabulary(const VocabularyOptions& options, std::uint64_t seed) : options_(options), seed_(seed) {}
@@ -26,17 +33,44 @@ class Vocabulary {
   /// InputError for another type or width than before.
   std::vector<int> Quantise(const cv::Mat& descriptors, int threads = 1);
 
-  /// Number of words. Word ids are 0 .. size() - 1.
+  /// One more location that has these words.
+  void AddReferences(const Signature& signature);
+  /// One location less; words that no location has any more leave the index.
+  void RemoveReferences(const Signature& signature);
+  /// Words that no other location refers to: they would leave with this one.
+  std::vector<int> WordsOnlyIn(const Signature& signature) const;
+  /// Words of a signature that are not in the index.
+  std::vector<int> Missing(const Signature& signature) const;
+  /// Brings words back that had left, one descriptor row each. Throws InputError for another type or width.
+  void Restore(const std::vector<int>& words, const cv::Mat& descriptors);
+
+  /// Empty if descriptors of this type and width fit, else what is wrong.
+  std::string Problem(const cv::Mat& descriptors) const;
+
+  /// A word's descriptor, 1 x D; empty if the word is not in the index.
+  cv::Mat Descriptor(int word) const;
+  /// Words in the index.
   int size() const { return index_ ? index_->size() : 0; }
+  /// Words ever created; ids are 0 .. created() - 1.
+  int created() const { return created_; }
+  /// Ids below this are taken, wherever their words may be.
+  void SkipIds(int created) { created_ = std::max(created_, created); }
+
+  /// The whole state; Load into a new object of the same options. Throws InputError.
+  void Save(internal::ByteWriter& out) const;
+  void Load(internal::ByteReader& in);
 
  private:
   void CheckType(const cv::Mat& descriptors);
+  void MakeIndex();
 
   VocabularyOptions options_;
   std::uint64_t seed_;
   int type_ = -1;
   int width_ = 0;
+  int created_ = 0;
   std::unique_ptr<DescriptorIndex> index_;
+  std::unordered_map<int, int> references_;  // by word
 };
 
 }  // namespace tutti

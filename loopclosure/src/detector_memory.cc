@@ -1,0 +1,239 @@
+// LoopDetector's long-term memory: retrieval, transfer, and the file that outlives the process.
+#include <algorithm>
+
+#include "byte_stream.h"
+#include "detector_impl.h"
+#include "tutti/core/error.h"
+#include "view_bytes.h"
+
+namespace tutti {
+
+using internal::ByteReader;
+using internal::ByteWriter;
+using internal::LocationStore;
+using internal::MemorySystem;
+using Kind = internal::LocationStore::Kind;
+using State = LocationMemory::State;
+
+namespace {
+
+// Meta records: what the file belongs to, and the members' running figures.
+constexpr int kFingerprint = 0;
+constexpr int kStatistics = 1;
+
+}  // namespace
+
+LocationStore& LoopDetector::Impl::store() {
+  if (!store_) store_ = std::make_unique<LocationStore>("");
+  return *store_;
+}
+
+bool LoopDetector::Impl::InMemory(int slot) const {
+  return std::any_of(systems_.begin(), systems_.end(), [slot](const auto& system) {
+    const State state = system->memory().state(slot);
+    return state == State::kShortTerm || state == State::kWorking;
+  });
+}
+
+// Step 7 of section 1.
+void LoopDetector::Impl::Retrieve(int best, LoopResult& result) {
+  std::set<int> retrieved;
+  for (auto& system : systems_) {
+    for (const int slot : system->Retrieve(best, store(), result.warning)) retrieved.insert(slot);
+  }
+  for (const int slot : retrieved) {
+    result.retrieved.push_back(memory().id(slot));
+    if (!Shared()) union_.Retrieve(slot);
+    if (!views_[Index(slot)].members.empty()) continue;  // another member's memory still had it
+    try {
+      FetchView(slot);
+    } catch (const InputError& error) {
+      result.warning = error.what();  // its words are there; it can't be verified
+    }
+  }
+}
+
+void LoopDetector::Impl::FetchView(int slot) {
+  const auto record = store().Get(Kind::kView, 0, slot);
+  if (!record) {
+    throw InputError(store().name() + ": is damaged (the features of location " +
+                     std::to_string(memory().id(slot)) +
+                     " are missing); give another file, or an older copy");
+  }
+  ByteReader in(*record, store().name());
+  View view = internal::LoadView(in);
+  if (view.members.size() != members_.size()) in.Damaged("features of other members");
+  views_[Index(slot)] = std::move(view);
+}
+
+void LoopDetector::Impl::PutView(int slot) {
+  ByteWriter record;
+  internal::SaveView(views_[Index(slot)], record);
+  store().Put(Kind::kView, 0, slot, record.bytes());
+}
+
+// Step 8 of section 1.
+void LoopDetector::Impl::Shrink(int best, double elapsed_ms, LoopResult& result) {
+  std::vector<int> retrieved;
+  for (const std::int64_t id : result.retrieved) retrieved.push_back(memory().Find(id));
+  for (auto& system : systems_) {
+    int surplus = 0;
+    if (options_.wm_limit > 0) {
+      surplus = static_cast<int>(system->memory().working_memory().size()) - options_.wm_limit;
+    }
+    // Over the time budget more must go than came: this image and what was retrieved.
+    if (options_.time_budget_ms > 0 && elapsed_ms > options_.time_budget_ms) {
+      surplus = std::max(surplus, 2 + static_cast<int>(retrieved.size()));
+    }
+    for (; surplus > 0; --surplus) {
+      const int slot = system->NextToTransfer(best, retrieved);
+      if (slot < 0 || !Transfer(*system, slot, result)) break;
+    }
+  }
+}
+
+// One location from WM to LTM. It stays where it is if it can't be stored.
+bool LoopDetector::Impl::Transfer(MemorySystem& system, int slot, LoopResult& result) {
+  if (store().durable()) {
+    if (unstored_slots_.count(slot) > 0) return false;  // the journal could not be written: see there
+  } else {
+    try {
+      store().Begin();
+      system.Store(slot, store());
+      PutView(slot);
+      store().Commit();
+    } catch (const InputError& error) {
+      store().Rollback();
+      result.warning = error.what();
+      return false;
+    }
+  }
+  system.Leave(slot);
+  if (!InMemory(slot)) {
+    views_[Index(slot)] = View();
+    if (!Shared()) union_.Transfer(slot);
+    result.transferred.push_back(memory().id(slot));
+  }
+  return true;
+}
+
+// A durable store learns of every image before Detect returns, in one step.
+void LoopDetector::Impl::Journal(int new_slot, LoopResult& result) {
+  const std::vector<int> changed_union = union_.TakeChanged();
+  std::vector<std::vector<int>> changed;
+  for (auto& system : systems_) changed.push_back(system->memory().TakeChanged());
+  if (!store_ || !store_->durable()) return;
+
+  unstored_slots_.insert(new_slot);
+  for (std::size_t s = 0; s < systems_.size(); ++s) {
+    unstored_nodes_[s].insert(changed[s].begin(), changed[s].end());
+  }
+  unstored_nodes_.back().insert(changed_union.begin(), changed_union.end());
+  try {
+    store_->Begin();
+    WriteUnstored();
+    store_->Commit();
+  } catch (const InputError& error) {
+    store_->Rollback();
+    result.warning = std::string(error.what()) + " (everything is still in memory, and is tried again)";
+    return;
+  }
+  MarkStored();
+}
+
+void LoopDetector::Impl::WriteUnstored() {
+  for (const int slot : unstored_slots_) {
+    if (!InMemory(slot)) continue;  // merged away
+    for (auto& system : systems_) system->StoreSignatures(slot, *store_);
+    PutView(slot);
+  }
+  WriteWords();
+  for (std::size_t s = 0; s < systems_.size(); ++s) systems_[s]->StoreNodes(unstored_nodes_[s], *store_);
+  for (const int slot : unstored_nodes_.back()) {
+    ByteWriter record;
+    union_.SaveSlot(slot, record);
+    store_->Put(Kind::kNode, static_cast<std::int64_t>(systems_.size()), slot, record.bytes());
+  }
+  store_->Put(Kind::kMeta, kStatistics, 0, Statistics());
+}
+
+void LoopDetector::Impl::MarkStored() {
+  unstored_slots_.clear();
+  for (std::set<int>& nodes : unstored_nodes_) nodes.clear();
+  for (std::size_t k = 0; k < members_.size(); ++k) stored_words_[k] = members_[k].vocabulary().created();
+}
+
+void LoopDetector::Impl::WriteWords() {
+  for (std::size_t k = 0; k < members_.size(); ++k) {
+    const Vocabulary& vocabulary = members_[k].vocabulary();
+    for (int word = stored_words_[k]; word < vocabulary.created(); ++word) {
+      const cv::Mat descriptor = vocabulary.Descriptor(word);
+      if (descriptor.empty()) continue;  // gone again with a location that was merged
+      ByteWriter record;
+      record.PutMat(descriptor);
+      store_->Put(Kind::kWord, static_cast<std::int64_t>(k), word, record.bytes());
+    }
+  }
+}
+
+std::string LoopDetector::Impl::Statistics() const {
+  ByteWriter out;
+  out.Put(last_id_);
+  out.Put(last_hypothesis_);
+  out.Put<std::int32_t>(caller_type_);
+  out.Put<std::int32_t>(caller_width_);
+  for (const Member& member : members_) member.SaveStatistics(out);
+  return out.bytes();
+}
+
+void LoopDetector::Impl::LoadStatistics(ByteReader& in) {
+  last_id_ = in.Get<std::int64_t>();
+  last_hypothesis_ = in.Get<double>();
+  caller_type_ = in.Get<std::int32_t>();
+  caller_width_ = in.Get<std::int32_t>();
+  for (Member& member : members_) member.LoadStatistics(in);
+}
+
+// What must be the same for stored locations to be of use.
+std::string LoopDetector::Impl::Fingerprint() const {
+  std::string text = "members";
+  for (const std::string& name : options_.members) text += " " + name;
+  text += options_.rule == CombinationRule::kNaive ? ", one naive filter" : ", a filter each";
+  text += options_.memory == MemoryKind::kShared ? ", shared memory" : ", a memory per member";
+  return text;
+}
+
+void LoopDetector::Impl::Reopen() {
+  const auto fingerprint = store_->Get(Kind::kMeta, kFingerprint, 0);
+  if (!fingerprint) {
+    store_->Put(Kind::kMeta, kFingerprint, 0, Fingerprint());
+    return;
+  }
+  if (*fingerprint != Fingerprint()) {
+    throw InputError(store_->name() + ": belongs to another configuration (" + *fingerprint +
+                     "; here: " + Fingerprint() + "); give another file, or the same members and memory");
+  }
+  const auto statistics = store_->Get(Kind::kMeta, kStatistics, 0);
+  if (!statistics) return;  // nothing was detected yet
+  ByteReader in(*statistics, store_->name());
+  LoadStatistics(in);
+  for (auto& system : systems_) system->Reopen(*store_);
+  if (!Shared()) {
+    const auto number = static_cast<std::int64_t>(systems_.size());
+    store_->ForEach(Kind::kNode, [&](std::int64_t memory, std::int64_t, std::string_view bytes) {
+      ByteReader node(bytes, store_->name());
+      if (memory == number) union_.LoadSlot(node);
+    });
+    union_.FinishLoading();
+  }
+  for (const auto& system : systems_) {
+    if (system->memory().size() != memory().size()) in.Damaged("the memories are of different lengths");
+  }
+  views_.resize(Index(memory().size()));
+  for (int slot = 0; slot < memory().size(); ++slot) {
+    if (InMemory(slot)) FetchView(slot);
+  }
+  for (std::size_t k = 0; k < members_.size(); ++k) stored_words_[k] = members_[k].vocabulary().created();
+}
+
+}  // namespace tutti

@@ -1,0 +1,42 @@
+// From a belief to a verified loop: which places to verify, in which order.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "tutti/loopclosure/belief.h"
+#include "tutti/loopclosure/detector.h"
+#include "tutti/loopclosure/location_memory.h"
+#include "tutti/loopclosure/verification.h"
+
+namespace tutti::internal {
+
+/// Step 6 of loop-closure.md section 1: the top few hypotheses and their neighbours, not only the best.
+class HypothesisSearch {
+ public:
+  HypothesisSearch(const LoopDetectorOptions& options, const LocationMemory& memory,
+                   const GeometricVerifier& verifier, std::function<const View&(int)> view_of)
+      : options_(options), memory_(memory), verifier_(verifier), view_of_(std::move(view_of)) {}
+
+  /// Fills verification, tried, accepted and reason of `result`.
+  void Verify(const View& query, const Belief& belief, LoopResult& result) const;
+
+ private:
+  std::vector<int> TopPlaces(const Belief& belief) const;
+  std::vector<int> ViewsOf(int place, const Belief& belief) const;
+  const Verification& Try(const View& query, int candidate, LoopResult& result) const;
+  void Climb(const View& query, LoopResult& result) const;
+
+  const LoopDetectorOptions& options_;
+  const LocationMemory& memory_;
+  const GeometricVerifier& verifier_;
+  std::function<const View&(int)> view_of_;
+};
+
+/// 0 for a place that the belief does not reach.
+inline double PosteriorAt(const Belief& belief, int slot) {
+  const std::size_t i = static_cast<std::size_t>(slot);
+  return i < belief.places.size() ? belief.places[i] : 0.0;
+}
+
+}  // namespace tutti::internal

@@ -1,0 +1,272 @@
+#include "memory_system.h"
+
+#include <algorithm>
+
+namespace tutti::internal {
+namespace {
+
+constexpr int kRetrievalLevels = 10;  // LTM is searched this far from the hypothesis
+constexpr int kImmuneLevels = 2;      // what is so near to the hypothesis stays in WM
+
+}  // namespace
+
+MemorySystem::MemorySystem(int number, const LoopDetectorOptions& options,
+                           const std::vector<std::vector<std::size_t>>& units, std::vector<Member>& members)
+    : number_(number),
+      options_(options),
+      members_(members),
+      memory_(options.stm_size),
+      transition_(options.virtual_place_prior) {
+  for (const std::vector<std::size_t>& sources : units) units_.emplace_back(sources, options.likelihood);
+}
+
+int MemorySystem::Remember(std::int64_t id, const std::vector<Signature>& signatures) {
+  int slot = memory_.Add(id);
+  bool any_took_part = false;
+  for (FilterUnit& unit : units_) {
+    std::vector<const Signature*> parts;
+    for (const std::size_t k : unit.members) parts.push_back(&signatures[k]);
+    const Signature signature = Signature::Concatenate(parts);
+    unit.took_part = !signature.empty();
+    any_took_part = any_took_part || unit.took_part;
+    unit.likelihood.Add(signature);
+    Reference(unit, signature);
+  }
+  int stands_for = -1;
+  if (!any_took_part && options_.ignore_bad_signatures) {
+    stands_for = memory_.IgnoreNewest();
+  } else if (options_.rehearsal && LooksLikePrevious(slot)) {
+    stands_for = memory_.DropNewest();
+  }
+  if (stands_for >= 0) {
+    for (FilterUnit& unit : units_) {
+      const Signature dropped = unit.likelihood.signature(slot);
+      unit.likelihood.Remove(slot);
+      Release(unit, dropped);
+    }
+    slot = stands_for;
+  }
+  transition_.Update(memory_, memory_.Settle());
+  return slot;
+}
+
+bool MemorySystem::LooksLikePrevious(int slot) const {
+  const std::deque<int>& recent = memory_.short_term_memory();
+  if (recent.size() < 2) return false;
+  const int previous = recent[recent.size() - 2];
+  double sum = 0.0;
+  for (const FilterUnit& unit : units_) {
+    sum += Signature::Similarity(unit.likelihood.signature(slot), unit.likelihood.signature(previous));
+  }
+  return sum / static_cast<double>(units_.size()) >= options_.rehearsal_similarity;
+}
+
+void MemorySystem::UpdateLikelihood(std::size_t u, const std::vector<Signature>& signatures) {
+  FilterUnit& unit = units_[u];
+  if (!unit.took_part) return;
+  std::vector<const Signature*> parts;
+  for (const std::size_t k : unit.members) parts.push_back(&signatures[k]);
+  unit.image_likelihood =
+      AdjustLikelihood(unit.likelihood.Scores(Signature::Concatenate(parts)), memory_.working_memory());
+}
+
+void MemorySystem::StepFilter(std::size_t u) {
+  FilterUnit& unit = units_[u];
+  if (unit.took_part) unit.filter.Step(transition_, memory_.working_memory(), unit.image_likelihood);
+}
+
+void MemorySystem::CloseLoop(int newer, int older) {
+  if (older < 0 || newer == older) return;
+  if (memory_.AddLink(newer, older, LocationMemory::LinkType::kLoop)) {
+    transition_.Update(memory_, {newer, older});
+  }
+  memory_.TransferWeight(newer, older);
+}
+
+void MemorySystem::AddLink(int a, int b) {
+  if (memory_.AddLink(a, b, LocationMemory::LinkType::kOdometry)) transition_.Update(memory_, {a, b});
+}
+
+std::vector<int> MemorySystem::Retrieve(int best, LocationStore& store, std::string& warning) {
+  if (best < 0 || memory_.num_long_term() == 0 || options_.retrieval == 0) return {};
+  std::vector<int> retrieved;
+  for (const int slot : memory_.LongTermNeighbours(best, kRetrievalLevels, options_.retrieval)) {
+    try {
+      Restore(slot, store);
+    } catch (const InputError& error) {
+      warning = error.what();
+      continue;
+    }
+    memory_.Retrieve(slot);
+    transition_.Update(memory_, {slot});
+    retrieved.push_back(slot);
+  }
+  return retrieved;
+}
+
+void MemorySystem::Restore(int slot, LocationStore& store) {
+  const auto stored = store.Get(LocationStore::Kind::kSignature, number_, slot);
+  if (!stored) {
+    throw InputError(store.name() + ": is damaged (location " + std::to_string(memory_.id(slot)) +
+                     " is missing); give another file, or an older copy");
+  }
+  const std::vector<Signature> unit_signatures = ReadRecord(*stored, store.name());
+  // First everything that may fail, then the changes.
+  std::vector<std::vector<int>> words(members_.size());
+  std::vector<cv::Mat> descriptors(members_.size());
+  for (std::size_t u = 0; u < units_.size(); ++u) {
+    const std::vector<Signature> parts = unit_signatures[u].Split(static_cast<int>(units_[u].members.size()));
+    for (std::size_t p = 0; p < parts.size(); ++p) {
+      const std::size_t k = units_[u].members[p];
+      words[k] = members_[k].vocabulary().Missing(parts[p]);
+      for (const int word : words[k]) ReadWord(k, word, store, descriptors[k]);
+    }
+  }
+  for (std::size_t k = 0; k < members_.size(); ++k) {
+    members_[k].vocabulary().Restore(words[k], descriptors[k]);
+  }
+  for (std::size_t u = 0; u < units_.size(); ++u) {
+    units_[u].likelihood.Restore(slot, unit_signatures[u]);
+    Reference(units_[u], unit_signatures[u]);
+  }
+}
+
+// Appends a stored word's descriptor.
+void MemorySystem::ReadWord(std::size_t member, int word, LocationStore& store, cv::Mat& descriptors) const {
+  const auto record = store.Get(LocationStore::Kind::kWord, static_cast<std::int64_t>(member), word);
+  const cv::Mat row = record ? ByteReader(*record, store.name()).GetMat() : cv::Mat();
+  const bool fits = descriptors.empty() || (row.cols == descriptors.cols && row.type() == descriptors.type());
+  if (row.rows != 1 || !fits) {
+    throw InputError(store.name() + ": is damaged (word " + std::to_string(word) + " of " +
+                     members_[member].name() + "); give another file, or an older copy");
+  }
+  descriptors.push_back(row);
+}
+
+int MemorySystem::NextToTransfer(int best, const std::vector<int>& retrieved) const {
+  std::set<int> immune(retrieved.begin(), retrieved.end());
+  if (best >= 0) {
+    immune.insert(best);
+    for (const auto& [slot, level] : memory_.Neighbours(best, kImmuneLevels)) immune.insert(slot);
+  }
+  return memory_.NextToTransfer(options_.recent_share, immune);
+}
+
+void MemorySystem::Store(int slot, LocationStore& store) const {
+  StoreSignatures(slot, store);
+  for (const FilterUnit& unit : units_) {
+    const std::vector<Signature> parts =
+        unit.likelihood.signature(slot).Split(static_cast<int>(unit.members.size()));
+    for (std::size_t p = 0; p < parts.size(); ++p) {
+      const std::size_t k = unit.members[p];
+      for (const int word : members_[k].vocabulary().WordsOnlyIn(parts[p])) {
+        ByteWriter record;
+        record.PutMat(members_[k].vocabulary().Descriptor(word));
+        store.Put(LocationStore::Kind::kWord, static_cast<std::int64_t>(k), word, record.bytes());
+      }
+    }
+  }
+}
+
+void MemorySystem::Leave(int slot) {
+  for (FilterUnit& unit : units_) {
+    const Signature signature = unit.likelihood.signature(slot);
+    unit.likelihood.Remove(slot);
+    Release(unit, signature);
+    unit.filter.Forget(slot);
+  }
+  memory_.Transfer(slot);
+  transition_.Update(memory_, {slot});
+}
+
+void MemorySystem::StoreSignatures(int slot, LocationStore& store) const {
+  store.Put(LocationStore::Kind::kSignature, number_, slot, Record(slot));
+}
+
+void MemorySystem::StoreNodes(const std::set<int>& slots, LocationStore& store) const {
+  for (const int slot : slots) {
+    ByteWriter record;
+    memory_.SaveSlot(slot, record);
+    store.Put(LocationStore::Kind::kNode, number_, slot, record.bytes());
+  }
+}
+
+void MemorySystem::Reopen(LocationStore& store) {
+  store.ForEach(LocationStore::Kind::kNode,
+                [&](std::int64_t number, std::int64_t slot, std::string_view bytes) {
+                  if (number != number_) return;
+                  ByteReader in(bytes, store.name());
+                  if (slot != memory_.size())
+                    in.Damaged("location " + std::to_string(memory_.size()) + " is missing");
+                  memory_.LoadSlot(in);
+                });
+  memory_.FinishLoading();
+  for (int slot = 0; slot < memory_.size(); ++slot) {
+    for (FilterUnit& unit : units_) {
+      unit.likelihood.Add(Signature());
+      unit.likelihood.Remove(slot);
+    }
+    const LocationMemory::State state = memory_.state(slot);
+    if (state != LocationMemory::State::kShortTerm && state != LocationMemory::State::kWorking) continue;
+    Restore(slot, store);
+  }
+  transition_.Update(memory_, memory_.working_memory());
+}
+
+std::string MemorySystem::Record(int slot) const {
+  ByteWriter out;
+  for (const FilterUnit& unit : units_) unit.likelihood.signature(slot).Save(out);
+  return out.bytes();
+}
+
+std::vector<Signature> MemorySystem::ReadRecord(std::string_view record, const std::string& source) const {
+  ByteReader in(record, source);
+  std::vector<Signature> signatures;
+  for (std::size_t u = 0; u < units_.size(); ++u) signatures.push_back(Signature::Load(in));
+  return signatures;
+}
+
+void MemorySystem::Reference(const FilterUnit& unit, const Signature& signature) {
+  const std::vector<Signature> parts = signature.Split(static_cast<int>(unit.members.size()));
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    members_[unit.members[p]].vocabulary().AddReferences(parts[p]);
+  }
+}
+
+void MemorySystem::Release(const FilterUnit& unit, const Signature& signature) {
+  const std::vector<Signature> parts = signature.Split(static_cast<int>(unit.members.size()));
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    members_[unit.members[p]].vocabulary().RemoveReferences(parts[p]);
+  }
+}
+
+void MemorySystem::Save(ByteWriter& out) const {
+  memory_.Save(out);
+  for (const FilterUnit& unit : units_) {
+    unit.likelihood.Save(out);
+    unit.filter.Save(out);
+  }
+}
+
+void MemorySystem::Load(ByteReader& in) {
+  memory_.Load(in);
+  for (FilterUnit& unit : units_) {
+    unit.likelihood.Load(in);
+    unit.filter.Load(in);
+    if (unit.likelihood.size() != memory_.size() ||
+        static_cast<int>(unit.filter.posterior().places.size()) > memory_.size()) {
+      in.Damaged("locations are missing");
+    }
+    for (int slot = 0; slot < memory_.size(); ++slot) {
+      const std::vector<Signature> parts =
+          unit.likelihood.signature(slot).Split(static_cast<int>(unit.members.size()));
+      for (std::size_t p = 0; p < parts.size(); ++p) {
+        if (!members_[unit.members[p]].vocabulary().Missing(parts[p]).empty())
+          in.Damaged("words are missing");
+      }
+    }
+  }
+  transition_.Update(memory_, memory_.working_memory());
+}
+
+}  // namespace tutti::internal

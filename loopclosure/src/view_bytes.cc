@@ -1,0 +1,81 @@
+#include "view_bytes.h"
+
+namespace tutti::internal {
+namespace {
+
+void SaveSet(const View::Set& set, ByteWriter& out) {
+  std::vector<float> pixels;
+  for (const cv::Point2f& pixel : set.pixels) pixels.insert(pixels.end(), {pixel.x, pixel.y});
+  out.PutVector(pixels);
+  out.PutMat(set.descriptors);
+  std::vector<float> points;
+  for (const Eigen::Vector3f& p : set.points) points.insert(points.end(), {p.x(), p.y(), p.z()});
+  out.PutVector(points);
+}
+
+View::Set LoadSet(ByteReader& in) {
+  View::Set set;
+  const std::vector<float> pixels = in.GetVector<float>();
+  for (std::size_t i = 0; i + 1 < pixels.size(); i += 2) set.pixels.emplace_back(pixels[i], pixels[i + 1]);
+  set.descriptors = in.GetMat();
+  const std::vector<float> points = in.GetVector<float>();
+  for (std::size_t i = 0; i + 2 < points.size(); i += 3) {
+    set.points.emplace_back(points[i], points[i + 1], points[i + 2]);
+  }
+  if (static_cast<std::size_t>(set.descriptors.rows) != set.pixels.size() ||
+      (!set.points.empty() && set.points.size() != set.pixels.size())) {
+    in.Damaged("features without descriptors");
+  }
+  return set;
+}
+
+void SaveCamera(const PinholeCamera& camera, ByteWriter& out) {
+  out.Put<std::int32_t>(camera.width);
+  out.Put<std::int32_t>(camera.height);
+  for (const double value : {camera.fx, camera.fy, camera.cx, camera.cy}) out.Put(value);
+  out.Put(static_cast<std::uint8_t>(camera.distortion));
+  for (const double value : camera.coefficients) out.Put(value);
+}
+
+PinholeCamera LoadCamera(ByteReader& in) {
+  PinholeCamera camera;
+  camera.width = in.Get<std::int32_t>();
+  camera.height = in.Get<std::int32_t>();
+  for (double* value : {&camera.fx, &camera.fy, &camera.cx, &camera.cy}) *value = in.Get<double>();
+  const auto distortion = in.Get<std::uint8_t>();
+  if (distortion > static_cast<std::uint8_t>(Distortion::kEquidistant))
+    in.Damaged("an unknown lens distortion");
+  camera.distortion = static_cast<Distortion>(distortion);
+  for (double& value : camera.coefficients) value = in.Get<double>();
+  if (!camera.Validate().empty()) in.Damaged("a camera that is not usable");
+  return camera;
+}
+
+}  // namespace
+
+void SaveView(const View& view, ByteWriter& out) {
+  out.Put(view.id);
+  out.Put<std::int32_t>(view.size.width);
+  out.Put<std::int32_t>(view.size.height);
+  out.Put<char>(view.metric ? 1 : 0);
+  out.Put<char>(view.camera ? 1 : 0);
+  if (view.camera) SaveCamera(*view.camera, out);
+  out.Put<std::uint64_t>(view.members.size());
+  for (const View::Set& set : view.members) SaveSet(set, out);
+  SaveSet(view.caller, out);
+}
+
+View LoadView(ByteReader& in) {
+  View view;
+  view.id = in.Get<std::int64_t>();
+  view.size.width = in.Get<std::int32_t>();
+  view.size.height = in.Get<std::int32_t>();
+  view.metric = in.Get<char>() != 0;
+  if (in.Get<char>() != 0) view.camera = LoadCamera(in);
+  const std::size_t sets = in.GetCount(2 * sizeof(std::uint64_t) + 1);
+  for (std::size_t i = 0; i < sets; ++i) view.members.push_back(LoadSet(in));
+  view.caller = LoadSet(in);
+  return view;
+}
+
+}  // namespace tutti::internal

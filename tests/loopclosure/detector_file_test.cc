@@ -1,0 +1,184 @@
+// LoopDetector::Save and Load.
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+
+#include "test_data.h"
+#include "tutti/core/error.h"
+#include "tutti/loopclosure/detector.h"
+#include "two_laps.h"
+
+namespace tutti {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::Walk;
+
+constexpr int kPlaces = 14;
+
+LoopDetectorOptions SmallOptions() {
+  LoopDetectorOptions options;
+  options.stm_size = 3;
+  options.extraction.features = 120;
+  options.wm_limit = 7;
+  options.threads = 1;
+  return options;
+}
+
+std::string Content(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return std::string((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+}
+
+void WriteContent(const fs::path& file, const std::string& bytes) {
+  std::ofstream(file, std::ios::binary) << bytes;
+}
+
+class SavedDetector : public ::testing::Test {
+ protected:
+  fs::path folder_ = testing::FreshFolder();
+  fs::path file_ = folder_ / "places.tutti";
+};
+
+TEST_F(SavedDetector, ALoadedOneGoesOnExactlyAsTheSavedOne) {
+  for (const char* rule : {"mean", "naive"}) {
+    for (const MemoryKind memory : {MemoryKind::kShared, MemoryKind::kPerMember}) {
+      LoopDetectorOptions options = SmallOptions();
+      SetRule(rule, options);
+      options.memory = memory;
+      LoopDetector saved(options);
+      Walk(saved, 0, 18, kPlaces);
+      EXPECT_GT(saved.NumLongTerm(), 0u);
+      saved.Save(file_);
+      LoopDetector loaded(options);
+      Walk(loaded, 0, 3, kPlaces);  // what it knew before is replaced
+      loaded.Load(file_);
+      EXPECT_EQ(loaded.NumLocations(), saved.NumLocations());
+      EXPECT_EQ(loaded.NumLongTerm(), saved.NumLongTerm());
+      testing::ExpectEqual(Walk(saved, 18, 28, kPlaces), Walk(loaded, 18, 28, kPlaces));
+    }
+  }
+}
+
+TEST_F(SavedDetector, SavingChangesNothingAndTwiceGivesTheSameFile) {
+  LoopDetector saved(SmallOptions());
+  LoopDetector other(SmallOptions());
+  Walk(saved, 0, 16, kPlaces);
+  Walk(other, 0, 16, kPlaces);
+  saved.Save(file_);
+  saved.Save(folder_ / "again.tutti");
+  EXPECT_TRUE(Content(file_) == Content(folder_ / "again.tutti"));
+  testing::ExpectEqual(Walk(saved, 16, 22, kPlaces), Walk(other, 16, 22, kPlaces));
+}
+
+TEST_F(SavedDetector, AnEmptyOneCanBeSavedAndLoaded) {
+  LoopDetector(SmallOptions()).Save(file_);
+  LoopDetector loaded(SmallOptions());
+  Walk(loaded, 0, 5, kPlaces);
+  loaded.Load(file_);
+  EXPECT_EQ(loaded.NumLocations(), 0u);
+  EXPECT_EQ(loaded.LastId(), -1);
+  EXPECT_NO_THROW(Walk(loaded, 0, 2, kPlaces));
+}
+
+TEST_F(SavedDetector, LoadingIntoAFileOfItsOwnFillsThatFile) {
+  LoopDetector saved(SmallOptions());
+  Walk(saved, 0, 16, kPlaces);
+  saved.Save(file_);
+  LoopDetectorOptions options = SmallOptions();
+  options.ltm_file = (folder_ / "places.ltm").string();
+  {
+    LoopDetector durable(options);
+    Walk(durable, 0, 4, kPlaces);
+    durable.Load(file_);
+    testing::ExpectEqual(Walk(saved, 16, 20, kPlaces), Walk(durable, 16, 20, kPlaces));
+  }
+  LoopDetector reopened(options);
+  EXPECT_EQ(reopened.LastId(), 19);
+  EXPECT_EQ(reopened.NumLocations() + reopened.NumLongTerm(), 20u);
+}
+
+// The message that loading fails with, after which the object must be as it was.
+std::string Refusal(const fs::path& file) {
+  LoopDetector detector(SmallOptions());
+  Walk(detector, 0, 6, kPlaces);
+  std::string message;
+  try {
+    detector.Load(file);
+  } catch (const InputError& error) {
+    message = error.what();
+  }
+  EXPECT_EQ(detector.NumLocations(), 6u);
+  EXPECT_EQ(detector.LastId(), 5);
+  return message;
+}
+
+TEST_F(SavedDetector, OtherFilesVersionsAndMembersAreRefused) {
+  LoopDetector saved(SmallOptions());
+  Walk(saved, 0, 5, kPlaces);
+  saved.Save(file_);
+  const std::string bytes = Content(file_);
+
+  EXPECT_NE(Refusal(folder_ / "absent").find("no such file"), std::string::npos);
+  WriteContent(folder_ / "text", "this is no detector at all");
+  EXPECT_NE(Refusal(folder_ / "text").find("is no saved loop detector"), std::string::npos);
+  std::string newer = bytes;
+  newer[8] = 9;
+  WriteContent(folder_ / "newer", newer);
+  EXPECT_NE(Refusal(folder_ / "newer").find("version 9"), std::string::npos);
+
+  LoopDetectorOptions options = SmallOptions();
+  options.members = {"orb"};
+  LoopDetector other(options);
+  try {
+    other.Load(file_);
+    FAIL() << "loaded with other members";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("surf sift orb"), std::string::npos) << error.what();
+  }
+}
+
+TEST_F(SavedDetector, ADamagedFileIsRefusedWhereverItIsDamaged) {
+  LoopDetector saved(SmallOptions());
+  Walk(saved, 0, 12, kPlaces);
+  saved.Save(file_);
+  const std::string bytes = Content(file_);
+  const fs::path damaged = folder_ / "damaged";
+  LoopDetector detector(SmallOptions());
+  Walk(detector, 0, 4, kPlaces);
+  for (std::size_t i = 0; i < 60; ++i) {
+    const std::size_t at = i * bytes.size() / 60;
+    WriteContent(damaged, bytes.substr(0, at));
+    EXPECT_THROW(detector.Load(damaged), InputError) << "cut off at " << at;
+    std::string flipped = bytes;
+    flipped[at] = static_cast<char>(flipped[at] ^ 0x10);
+    WriteContent(damaged, flipped);
+    EXPECT_THROW(detector.Load(damaged), InputError) << "another byte at " << at;
+  }
+  EXPECT_EQ(detector.NumLocations(), 4u);
+  EXPECT_NO_THROW(Walk(detector, 4, 6, kPlaces));
+}
+
+TEST_F(SavedDetector, AFullDiskOrNoFolderIsSaidAndTheOldFileStays) {
+  LoopDetector saved(SmallOptions());
+  Walk(saved, 0, 8, kPlaces);
+  EXPECT_THROW(saved.Save(folder_ / "no" / "such" / "folder"), InputError);
+  saved.Save(file_);
+  const std::string before = Content(file_);
+  Walk(saved, 8, 9, kPlaces);
+  std::signal(SIGXFSZ, SIG_IGN);
+  rlimit limit{};
+  getrlimit(RLIMIT_FSIZE, &limit);
+  const rlimit little = {64 << 10, limit.rlim_max};
+  setrlimit(RLIMIT_FSIZE, &little);
+  EXPECT_THROW(saved.Save(file_), InputError);
+  setrlimit(RLIMIT_FSIZE, &limit);
+  EXPECT_TRUE(Content(file_) == before);
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()), 1);
+}
+
+}  // namespace
+}  // namespace tutti

@@ -1,0 +1,73 @@
+#include "tutti/loopclosure/detector_options.h"
+
+#include <gtest/gtest.h>
+
+#include "tutti/core/error.h"
+#include "tutti/loopclosure/detector.h"
+
+namespace tutti {
+namespace {
+
+TEST(LoopDetectorOptions, DefaultsAndAllPresetsAreUsable) {
+  EXPECT_EQ(LoopDetectorOptions().Validate(), "");
+  for (const std::string& name : KnownPresets()) {
+    LoopDetectorOptions options;
+    ApplyPreset(name, options);
+    EXPECT_EQ(options.Validate(), "") << name;
+  }
+}
+
+TEST(LoopDetectorOptions, PresetsHoldThePublishedFigures) {
+  LoopDetectorOptions options;
+  ApplyPreset("paper-2013", options);
+  EXPECT_EQ(options.likelihood, LikelihoodKind::kSimilarity);
+  EXPECT_EQ(options.stm_size, 30);
+  EXPECT_EQ(options.rehearsal_similarity, 0.20);
+  EXPECT_EQ(options.wm_limit, 300);
+  EXPECT_EQ(options.hypothesis_ratio, 0.9);
+  ApplyPreset("rtabmap-0.8.3", options);
+  EXPECT_EQ(options.likelihood, LikelihoodKind::kTfIdf);
+  EXPECT_EQ(options.stm_size, 10);
+  EXPECT_EQ(options.loop_threshold, 0.11);
+  EXPECT_EQ(options.wm_limit, 0);
+  EXPECT_EQ(options.hypothesis_ratio, 0.0);
+  // Back to ours, whatever was set before.
+  ApplyPreset("default", options);
+  const LoopDetectorOptions defaults;
+  EXPECT_EQ(options.stm_size, defaults.stm_size);
+  EXPECT_EQ(options.loop_threshold, defaults.loop_threshold);
+  EXPECT_EQ(options.wm_limit, defaults.wm_limit);
+  EXPECT_EQ(options.rehearsal, defaults.rehearsal);
+}
+
+TEST(LoopDetectorOptions, AnUnknownPresetIsRefusedWithTheNearest) {
+  LoopDetectorOptions options;
+  try {
+    ApplyPreset("paper2013", options);
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("did you mean 'paper-2013'"), std::string::npos);
+  }
+}
+
+TEST(LoopDetectorOptions, ValuesOutOfRangeAreNamed) {
+  const auto problem = [](auto change) {
+    LoopDetectorOptions options;
+    change(options);
+    return options.Validate();
+  };
+  EXPECT_NE(problem([](auto& o) { o.wm_limit = -1; }).find("wm_limit"), std::string::npos);
+  EXPECT_NE(problem([](auto& o) { o.recent_share = 1; }).find("recent_share"), std::string::npos);
+  EXPECT_NE(problem([](auto& o) { o.retrieval = -2; }).find("retrieval"), std::string::npos);
+  EXPECT_NE(problem([](auto& o) { o.time_budget_ms = -2; }).find("time_budget_ms"), std::string::npos);
+  EXPECT_NE(problem([](auto& o) { o.hypothesis_ratio = 2; }).find("hypothesis_ratio"), std::string::npos);
+  EXPECT_NE(problem([](auto& o) { o.members = {"sirf"}; }).find("did you mean 'surf'"), std::string::npos);
+  EXPECT_EQ(problem([](auto& o) {
+              o.members = {"mine", "orb"};
+              o.external_members = {"mine"};
+            }),
+            "");
+}
+
+}  // namespace
+}  // namespace tutti

@@ -1,0 +1,59 @@
+// A walk past textured places, and past the same places again.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "textured_image.h"
+#include "tutti/loopclosure/detector.h"
+
+namespace tutti::testing {
+
+/// Image number i of a walk of `places` places that starts again and again.
+inline cv::Mat WalkImage(int i, int places) {
+  const cv::Mat place = TexturedImage(static_cast<std::uint32_t>(i % places), 240, 180);
+  return i < places ? place : SeenAgain(place);
+}
+
+/// Shows the images begin .. end - 1 of the walk.
+inline std::vector<LoopResult> Walk(LoopDetector& detector, int begin, int end, int places) {
+  std::vector<LoopResult> results;
+  for (int i = begin; i < end; ++i) results.push_back(detector.Detect(WalkImage(i, places), i));
+  return results;
+}
+
+/// Images whose loop was closed with the right place.
+inline int CountTrue(const std::vector<LoopResult>& results, int places) {
+  int found = 0;
+  for (const LoopResult& result : results) {
+    if (result.accepted && result.verification.candidate % places == result.query % places) ++found;
+  }
+  return found;
+}
+
+inline int CountFalse(const std::vector<LoopResult>& results, int places) {
+  int wrong = 0;
+  for (const LoopResult& result : results) {
+    if (result.accepted && result.verification.candidate % places != result.query % places) ++wrong;
+  }
+  return wrong;
+}
+
+/// Bit by bit the same.
+inline void ExpectEqual(const std::vector<LoopResult>& a, const std::vector<LoopResult>& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a[i].query, b[i].query) << i;
+    EXPECT_EQ(a[i].hypothesis, b[i].hypothesis) << i;
+    EXPECT_EQ(a[i].candidate, b[i].candidate) << i;
+    EXPECT_EQ(a[i].posterior, b[i].posterior) << i;
+    EXPECT_EQ(a[i].verification.candidate, b[i].verification.candidate) << i;
+    EXPECT_EQ(a[i].verification.inliers, b[i].verification.inliers) << i;
+    EXPECT_EQ(a[i].reason, b[i].reason) << i;
+    EXPECT_EQ(a[i].retrieved, b[i].retrieved) << i;
+    EXPECT_EQ(a[i].transferred, b[i].transferred) << i;
+  }
+}
+
+}  // namespace tutti::testing

@@ -133,7 +133,7 @@ void AddLoopsCommand(CLI::App& app, int& exit_code) {
   command->add_option("--stride", arguments->truth.stride, "every n-th image")->capture_default_str();
   command
       ->add_option("--rule", arguments->rule,
-                   "mean, product, majority, naive, or one member: surf, sift, orb, akaze, brisk")
+                   "mean, product, majority, naive, or one member: surf, sift, orb, akaze, brisk, kaze")
       ->capture_default_str();
   LoopRule& rule = arguments->truth.rule;
   command->add_option("--gt-distance", rule.distance_m, "trajectory: a loop is nearer than this [m]")

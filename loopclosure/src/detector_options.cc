@@ -4,6 +4,7 @@
 
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
+#include "tutti/loopclosure/features.h"
 
 namespace tutti {
 namespace {
@@ -104,8 +105,10 @@ std::string LoopDetectorOptions::Validate() const {
   return {};
 }
 
-const std::vector<std::string>& KnownMembers() {
-  static const std::vector<std::string> names = {"surf", "sift", "orb", "akaze", "brisk"};
+std::vector<std::string> KnownMembers() {
+  std::vector<std::string> names = {"surf", "sift", "orb", "akaze", "brisk", "kaze"};
+  const std::vector<std::string> registered = RegisteredFeatureTypes();
+  names.insert(names.end(), registered.begin(), registered.end());
   return names;
 }
 
@@ -117,15 +120,16 @@ void SetRule(const std::string& word, LoopDetectorOptions& options) {
     options.rule = kRules[rule - RuleWords().begin()];
     return;
   }
-  if (std::find(KnownMembers().begin(), KnownMembers().end(), word) != KnownMembers().end()) {
+  const std::vector<std::string> known = KnownMembers();
+  if (std::find(known.begin(), known.end(), word) != known.end()) {
     options.rule = CombinationRule::kSingle;
     options.members = {word};
     return;
   }
   std::vector<std::string> all = RuleWords();
-  all.insert(all.end(), KnownMembers().begin(), KnownMembers().end());
+  all.insert(all.end(), known.begin(), known.end());
   throw InputError("unknown rule '" + word + "'; did you mean '" + NearestWord(word, all) +
-                   "'? Known: mean, product, majority, naive, or one member: " + JoinWords(KnownMembers()));
+                   "'? Known: mean, product, majority, naive, or one member: " + JoinWords(known));
 }
 
 const std::vector<std::string>& KnownPresets() {

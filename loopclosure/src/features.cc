@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <mutex>
 #include <numeric>
 #include <opencv2/imgproc.hpp>
 #include <tuple>
@@ -39,7 +40,45 @@ void ScaleKeypoints(double factor, std::vector<cv::KeyPoint>& keypoints) {
   }
 }
 
+struct Registry {
+  std::mutex mutex;
+  std::vector<std::pair<std::string, FeatureFactory>> types;
+};
+
+Registry& TheRegistry() {
+  static Registry registry;
+  return registry;
+}
+
+FeatureFactory Registered(const std::string& name) {
+  Registry& registry = TheRegistry();
+  const std::lock_guard<std::mutex> lock(registry.mutex);
+  for (const auto& [known, factory] : registry.types) {
+    if (known == name) return factory;
+  }
+  throw InputError("unknown member '" + name + "'");
+}
+
 }  // namespace
+
+void RegisterFeatureType(const std::string& name, FeatureFactory factory) {
+  const std::vector<std::string> known = KnownMembers();
+  if (name.empty() || !factory || std::find(known.begin(), known.end(), name) != known.end()) {
+    throw InputError("feature type '" + name +
+                     "' can't be registered: the name is empty or taken, or there is no factory");
+  }
+  Registry& registry = TheRegistry();
+  const std::lock_guard<std::mutex> lock(registry.mutex);
+  registry.types.emplace_back(name, std::move(factory));
+}
+
+std::vector<std::string> RegisteredFeatureTypes() {
+  Registry& registry = TheRegistry();
+  const std::lock_guard<std::mutex> lock(registry.mutex);
+  std::vector<std::string> names;
+  for (const auto& type : registry.types) names.push_back(type.first);
+  return names;
+}
 
 cv::Mat ToGrey8(const cv::Mat& image) {
   if (image.empty() || image.dims != 2) return {};
@@ -107,7 +146,7 @@ std::vector<int> SelectSpread(const std::vector<cv::KeyPoint>& keypoints, cv::Si
 
 FeatureExtractor::FeatureExtractor(const std::string& name, const ExtractionOptions& options)
     : name_(name), options_(options) {
-  const std::vector<std::string>& known = KnownMembers();
+  const std::vector<std::string> known = KnownMembers();
   if (std::find(known.begin(), known.end(), name) == known.end()) {
     throw InputError("unknown member '" + name + "'; did you mean '" + NearestWord(name, known) + "'?");
   }
@@ -119,7 +158,9 @@ cv::Ptr<cv::Feature2D> FeatureExtractor::Create(cv::Size size) const {
   if (name_ == "sift") return cv::SIFT::create(wanted, 3, options_.sift_contrast);
   if (name_ == "orb") return CreateOrb(size, wanted, options_.orb_fast_threshold);
   if (name_ == "akaze") return cv::AKAZE::create();
-  return cv::BRISK::create();
+  if (name_ == "brisk") return cv::BRISK::create();
+  if (name_ == "kaze") return cv::KAZE::create();
+  return Registered(name_)(size, wanted);
 }
 
 Features FeatureExtractor::Extract(const cv::Mat& grey) const {

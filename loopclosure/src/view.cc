@@ -48,13 +48,28 @@ void LookUpDepth(const LoopQuery& query, const VerificationOptions& options, Vie
   }
 }
 
+// Of the image; without one (the caller extracts all features) of the camera, or what the features reach
+// over.
+cv::Size SizeOf(const LoopQuery& query, const std::vector<Features>& members) {
+  if (!query.image.empty()) return query.image.size();
+  if (query.camera) return {query.camera->width, query.camera->height};
+  cv::Point2f most(0, 0);
+  for (const Features& features : members) {
+    for (const cv::KeyPoint& keypoint : features.keypoints) {
+      most.x = std::max(most.x, keypoint.pt.x);
+      most.y = std::max(most.y, keypoint.pt.y);
+    }
+  }
+  return {static_cast<int>(std::ceil(most.x)) + 1, static_cast<int>(std::ceil(most.y)) + 1};
+}
+
 }  // namespace
 
 View MakeView(const LoopQuery& query, const std::vector<Features>& members,
               const VerificationOptions& options) {
   View view;
   view.id = query.id;
-  view.size = query.image.size();
+  view.size = SizeOf(query, members);
   view.camera = query.camera;
   view.metric = query.metric;
   for (const Features& features : members) {

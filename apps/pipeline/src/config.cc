@@ -34,7 +34,13 @@ void ReadSection(const std::string& file, const std::string& section, const YAML
   if (!content.IsMap()) Fail(file, content.Mark(), "section '" + section + "' needs lines of 'key: value'");
   const std::vector<std::string> sections = table.Sections();
   std::set<std::string> seen;
+  // A preset changes many values: it comes first, wherever it stands, and the file's other keys on top of it.
+  std::vector<std::pair<YAML::Node, YAML::Node>> items;
   for (const auto& item : content) {
+    const bool preset = item.first.IsScalar() && item.first.Scalar() == "preset";
+    items.emplace(preset ? items.begin() : items.end(), item.first, item.second);
+  }
+  for (const auto& item : items) {
     if (!item.first.IsScalar()) Fail(file, item.first.Mark(), "a key must be a word");
     const std::string name = item.first.Scalar();
     const YAML::Mark mark = item.first.Mark();

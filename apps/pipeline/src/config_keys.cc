@@ -124,22 +124,44 @@ void ConfigTable::AddLoops(LoopDetectorOptions& o) {
         return "";
       },
       [&o] { return RuleName(o); });
-  Add("members", o.members, "members of the ensemble: surf, sift, orb, akaze, brisk");
+  Push(
+      "preset", "published parameters that the other keys change: default, paper-2013, rtabmap-0.8.3",
+      [&o](const YAML::Node& node) -> std::string {
+        try {
+          ApplyPreset(node.IsScalar() ? node.Scalar() : "", o);
+        } catch (const InputError& e) {
+          return e.what();
+        }
+        return "";
+      },
+      [] { return "default"; });
+  Add("members", o.members, "members of the ensemble: surf, sift, orb, akaze, brisk, kaze");
   AddEnum("likelihood", o.likelihood,
           {{"similarity", LikelihoodKind::kSimilarity}, {"tfidf", LikelihoodKind::kTfIdf}},
           "how signatures are compared: similarity (2013) or tfidf");
   Add("loop_threshold", o.loop_threshold, "go to verification at H >= this, 0..1");
+  Add("hypothesis_ratio", o.hypothesis_ratio,
+      "and at H >= this x the H of the image before; 0: whatever it was, 0..1");
   Add("stm_size", o.stm_size, "locations in short-term memory, no candidates");
-  Add("threads", o.threads, "most threads that Detect uses at once");
-  Add("seed", o.seed, "of kd-forests and RANSAC how signatures are compared");
+  Add("threads", o.threads, "most threads that the detector uses at once");
+  Add("seed", o.seed, "of kd-forests and RANSAC");
   Add("bad_signature_ratio", o.bad_signature_ratio,
       "a member sits out below this share of its mean number of features, 0..1");
+  Add("ignore_bad_signatures", o.ignore_bad_signatures,
+      "an image that is bad for every member is no location at all");
   Add("virtual_place_prior", o.virtual_place_prior, "p(new place | new place), 0..1");
   Add("rehearsal", o.rehearsal, "merge a location into its predecessor when they look the same");
   Add("rehearsal_similarity", o.rehearsal_similarity, "similarity from which on they do, 0..1");
-  Add("keep_posterior", o.keep_posterior,
-      "fill LoopResult::posterior_by_location (costs O(locations) per image) features words geometry Empty "
-      "if usable, else what is wrong and what to do.");
+  AddEnum("memory", o.memory, {{"shared", MemoryKind::kShared}, {"per_member", MemoryKind::kPerMember}},
+          "shared: one memory for all members; per_member: one each, as in the paper");
+  Add("wm_limit", o.wm_limit, "most locations in working memory, others go to long-term memory; 0: no limit");
+  Add("time_budget_ms", o.time_budget_ms,
+      "transfer while an image takes longer than this; not reproducible; 0: off [ms]");
+  Add("retrieval", o.retrieval, "locations brought back from long-term memory per image");
+  Add("recent_share", o.recent_share, "newest share of working memory that is never transferred, 0..1");
+  Add("ltm_file", o.ltm_file,
+      "SQLite file of the long-term memory, gone on with if it is there; empty: a temporary one");
+  Add("keep_posterior", o.keep_posterior, "keep every posterior (costs time with many locations)");
 }
 
 void ConfigTable::AddExtraction(ExtractionOptions& o) {

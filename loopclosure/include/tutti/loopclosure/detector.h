@@ -35,8 +35,9 @@ struct MemberFeatures {
 struct LoopQuery {
   std::int64_t id = 0;  ///< strictly greater than every id before
   double stamp_s = 0;
-  cv::Mat image;    ///< CV_8UC1, CV_8UC3 (BGR) or CV_16UC1; rectified if a camera is given
-  cv::Mat depth_m;  ///< optional: CV_32FC1 [m], registered to image, 0 = unknown
+  cv::Mat image;  ///< CV_8UC1, CV_8UC3 (BGR) or CV_16UC1; rectified if a camera is given. May be empty where
+                  ///< member_features has all members
+  cv::Mat depth_m;                      ///< optional: CV_32FC1 [m], registered to image, 0 = unknown
   std::optional<PinholeCamera> camera;  ///< optional: without it verification uses the fundamental matrix
   FeatureSet features;                  ///< optional: the caller's own features
   std::map<std::string, MemberFeatures> member_features;  ///< optional: members that need not extract, by

@@ -80,11 +80,11 @@ struct LoopDetectorOptions {
   std::vector<std::string> members = {"surf", "sift",
                                       "orb"};  ///< of KnownMembers(), and of external_members; kSingle: one
   std::vector<std::string> external_members;   ///< further names that members may hold: the caller extracts
-                                              ///< their features himself and gives them with each LoopQuery
-  double loop_threshold = 0.07;  ///< go to verification at H >= this, 0..1
-  int stm_size = 10;             ///< locations in short-term memory, no candidates
-  int threads = 2;               ///< most threads that Detect uses at once
-  std::uint64_t seed = 1;        ///< of kd-forests and RANSAC
+                                               ///< their features himself and gives them with each LoopQuery
+  double loop_threshold = 0.07;                ///< go to verification at H >= this, 0..1
+  int stm_size = 10;                           ///< locations in short-term memory, no candidates
+  int threads = 2;                             ///< most threads that Detect uses at once
+  std::uint64_t seed = 1;                      ///< of kd-forests and RANSAC
 
   LikelihoodKind likelihood = LikelihoodKind::kTfIdf;  ///< how signatures are compared
   double hypothesis_ratio = 0.0;  ///< and at H >= this x the H of the image before, 0: whatever it was (0.9
@@ -133,7 +133,8 @@ void SetRule(const std::string& word, LoopDetectorOptions& options);
 /// The word that SetRule takes for these options.
 std::string RuleName(const LoopDetectorOptions& options);
 
-/// Names that options.members may hold without further ado.
-const std::vector<std::string>& KnownMembers();
+/// Names that options.members may hold without further ado: surf, sift, orb, akaze, brisk, kaze, and what
+/// RegisterFeatureType added.
+std::vector<std::string> KnownMembers();
 
 }  // namespace tutti

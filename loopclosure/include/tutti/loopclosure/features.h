@@ -1,6 +1,7 @@
 // The features that one member takes from an image.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <opencv2/core.hpp>
 #include <opencv2/features2d.hpp>
@@ -30,6 +31,18 @@ std::vector<int> SelectSpread(const std::vector<cv::KeyPoint>& keypoints, cv::Si
 /// SURF of dlib (its Hessian pyramid and 64 values per point) as a cv::Feature2D: CV_32F descriptors of unit
 /// length.
 cv::Ptr<cv::Feature2D> CreateDlibSurf(int max_features, int octaves, double threshold);
+
+/// Makes a detector and descriptor for images of this size that finds at least `features` features where
+/// there are so many. Called for each image, from several threads at once.
+using FeatureFactory = std::function<cv::Ptr<cv::Feature2D>(cv::Size image_size, int features)>;
+
+/// Any cv::Feature2D as a member of the ensemble, under a name of its own: options.members may hold it from
+/// now on, in this process. Its descriptors must be CV_8U (Hamming) or CV_32F (Euclidean). Throws InputError
+/// if the name is empty or taken.
+void RegisterFeatureType(const std::string& name, FeatureFactory factory);
+
+/// Names that were registered, in order.
+std::vector<std::string> RegisteredFeatureTypes();
 
 /// Detects and describes with one cv::Feature2D, named as in LoopDetectorOptions::members.
 class FeatureExtractor {

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <random>
 
+#include "bit_trie.h"
 #include "byte_stream.h"
 #include "distances.h"
 #include "tutti/loopclosure/descriptor_index.h"
@@ -9,20 +10,14 @@
 namespace tutti {
 namespace {
 
-constexpr int kKeyBits = 14;      // 16384 buckets a table: a handful of words each at 100,000 words
-constexpr int kExactUpTo = 6000;  // below this an exact scan is as fast as the tables
+constexpr int kExactUpTo = 1000;  // below this an exact scan is as fast as the tries
 
 class HammingIndex : public DescriptorIndex {
  public:
   HammingIndex(int bytes, int tables, std::uint64_t seed)
-      : bytes_(bytes), storage_(static_cast<std::size_t>(bytes)), tables_(static_cast<std::size_t>(tables)) {
+      : bytes_(bytes), storage_(static_cast<std::size_t>(bytes)) {
     std::mt19937_64 generator(seed);
-    for (Table& table : tables_) {
-      table.buckets.resize(std::size_t{1} << kKeyBits);
-      for (int& bit : table.bits) {
-        bit = static_cast<int>(generator() % static_cast<std::uint64_t>(8 * bytes));
-      }
-    }
+    for (int t = 0; t < tables; ++t) tries_.emplace_back(bytes, generator);
   }
 
   void Add(const std::vector<int>& words, const cv::Mat& rows) override {
@@ -32,7 +27,7 @@ class HammingIndex : public DescriptorIndex {
       const int word = words[static_cast<std::size_t>(i)];
       if (storage_.RowOf(word) >= 0) continue;
       const int row = storage_.Add(word, rows.ptr(i));
-      for (Table& table : tables_) table.buckets[Key(table, rows.ptr(i))].push_back(row);
+      for (internal::BitTrie& trie : tries_) trie.Insert(row, storage_);
       ++size_;
     }
   }
@@ -40,16 +35,13 @@ class HammingIndex : public DescriptorIndex {
   void Remove(int word) override {
     const int row = storage_.RowOf(word);
     if (row < 0) return;
-    for (Table& table : tables_) {
-      std::vector<int>& bucket = table.buckets[Key(table, storage_.At(row))];
-      bucket.erase(std::find(bucket.begin(), bucket.end(), row));
-    }
+    for (internal::BitTrie& trie : tries_) trie.Remove(row, storage_);
     storage_.Free(row);
     --size_;
   }
 
   TwoNearest Search(const std::uint8_t* descriptor) const override {
-    return size_ <= kExactUpTo ? SearchAll(descriptor) : SearchTables(descriptor);
+    return size_ <= kExactUpTo ? SearchAll(descriptor) : SearchTries(descriptor);
   }
 
   void Maintain() override {}  // Remove leaves nothing behind
@@ -61,7 +53,7 @@ class HammingIndex : public DescriptorIndex {
 
   int size() const override { return size_; }
 
-  // Which row a word lies in, and the order within a bucket, change no answer: words and descriptors are all.
+  // Which row a word lies in, and the order within a leaf, change no answer: words and descriptors are all.
   void Save(internal::ByteWriter& out) const override {
     out.Put<std::uint64_t>(static_cast<std::uint64_t>(size_));
     for (int row = 0; row < storage_.end(); ++row) {
@@ -83,17 +75,6 @@ class HammingIndex : public DescriptorIndex {
   }
 
  private:
-  struct Table {
-    int bits[kKeyBits] = {};
-    std::vector<std::vector<int>> buckets;  // row numbers
-  };
-
-  static std::size_t Key(const Table& table, const std::uint8_t* row) {
-    std::size_t key = 0;
-    for (const int bit : table.bits) key = (key << 1) | ((row[bit >> 3] >> (bit & 7)) & 1u);
-    return key;
-  }
-
   TwoNearest SearchAll(const std::uint8_t* descriptor) const {
     constexpr int kBlock = 256;
     static_assert(internal::WordStorage::kRowsPerBlock % kBlock == 0);
@@ -113,15 +94,16 @@ class HammingIndex : public DescriptorIndex {
   }
 
   TUTTI_CLONES("popcnt")
-  void Scan(const std::vector<int>& bucket, const std::uint8_t* descriptor, TwoNearest& nearest) const;
+  void Scan(const std::vector<int>& rows, const std::uint8_t* descriptor, TwoNearest& nearest) const;
 
-  TwoNearest SearchTables(const std::uint8_t* descriptor) const {
+  TwoNearest SearchTries(const std::uint8_t* descriptor) const {
     TwoNearest nearest;
-    for (const Table& table : tables_) {
-      const std::size_t key = Key(table, descriptor);
-      Scan(table.buckets[key], descriptor, nearest);
-      for (int b = 0; b < kKeyBits; ++b)
-        Scan(table.buckets[key ^ (std::size_t{1} << b)], descriptor, nearest);
+    std::vector<int> rows;
+    rows.reserve(256);
+    for (const internal::BitTrie& trie : tries_) {
+      rows.clear();
+      trie.Collect(descriptor, rows);
+      Scan(rows, descriptor, nearest);
     }
     return nearest;
   }
@@ -129,16 +111,18 @@ class HammingIndex : public DescriptorIndex {
   int bytes_;
   int size_ = 0;
   internal::WordStorage storage_;
-  std::vector<Table> tables_;
+  std::vector<internal::BitTrie> tries_;
 };
 
 TUTTI_CLONES("popcnt")
-void HammingIndex::Scan(const std::vector<int>& bucket, const std::uint8_t* descriptor,
+void HammingIndex::Scan(const std::vector<int>& rows, const std::uint8_t* descriptor,
                         TwoNearest& nearest) const {
-  for (const int row : bucket) {
+  constexpr std::size_t kAhead = 8;  // words lie anywhere in memory: ask for them before they are needed
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    if (i + kAhead < rows.size()) __builtin_prefetch(storage_.At(rows[i + kAhead]));
     const float distance =
-        static_cast<float>(internal::HammingDistance(descriptor, storage_.At(row), bytes_));
-    if (distance <= nearest.second_distance) nearest.Offer(storage_.WordOf(row), distance);
+        static_cast<float>(internal::HammingDistance(descriptor, storage_.At(rows[i]), bytes_));
+    if (distance <= nearest.second_distance) nearest.Offer(storage_.WordOf(rows[i]), distance);
   }
 }
 

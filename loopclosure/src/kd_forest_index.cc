@@ -58,6 +58,7 @@ class TopTwo : public flann::ResultSet<float> {
   void SetTree(const std::vector<int>* rows) { rows_ = rows; }
   bool full() const override { return nearest_.second >= 0; }
   void addPoint(float distance, size_t index) override {
+    if (distance > nearest_.second_distance) return;  // most of them: before memory is touched
     const int row = (*rows_)[index];
     if (alive_[Index(row)] != 0) nearest_.Offer(storage_.WordOf(row), distance);
   }

@@ -186,7 +186,7 @@ void ConfigTable::AddVocabulary(VocabularyOptions& o) {
   Add("trees", o.trees, "kd-trees of the FLANN index (float descriptors)");
   Add("checks", o.checks, "leaves visited per search (float descriptors)");
   Add("hash_tables", o.hash_tables,
-      "hash tables of the Hamming index (binary descriptors)"
+      "random tries of the Hamming index (binary descriptors)"
       "do.");
 }
 

@@ -58,8 +58,9 @@ class DescriptorIndex {
 /// outnumber the living is grown anew beside the old one, a piece at each Maintain.
 std::unique_ptr<DescriptorIndex> MakeKdForestIndex(int dimensions, int trees, int checks, std::uint64_t seed);
 
-/// Hash tables over CV_8U descriptors, Hamming distance: each table indexes a seeded choice of bits, buckets
-/// one bit away are probed as well; small vocabularies are searched exactly.
+/// Random tries over CV_8U descriptors, Hamming distance: each of `tables` tries takes the bits in a seeded
+/// order of its own; a search looks into the leaf that the descriptor falls into and into those that one other
+/// bit leads to. Small vocabularies are searched exactly.
 std::unique_ptr<DescriptorIndex> MakeHammingIndex(int bytes, int tables, std::uint64_t seed);
 
 }  // namespace tutti

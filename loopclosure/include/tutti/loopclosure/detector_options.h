@@ -41,7 +41,7 @@ struct VocabularyOptions {
       0.8;  ///< a descriptor is an old word if d1 <= nndr * d2; on TRUE distance, not on FLANN's squared one
   int trees = 4;        ///< kd-trees of the FLANN index (float descriptors)
   int checks = 32;      ///< leaves visited per search (float descriptors)
-  int hash_tables = 8;  ///< hash tables of the Hamming index (binary descriptors)
+  int hash_tables = 8;  ///< random tries of the Hamming index (binary descriptors)
 
   /// Empty if usable, else what is wrong and what to do.
   std::string Validate() const;

@@ -92,28 +92,37 @@ std::string Name(const LoopRun& run, long image) {
   return text;
 }
 
+// The loops of a row, and the one nearest to what was said; the middle one if nothing was.
 struct TruthOfRow {
-  long nearest = -1;  // to what was said
-  long first = -1, last = -1, count = 0;
+  std::vector<long> loops;
+  long shown = -1;
 };
 
 TruthOfRow LookUp(const LoopGroundTruth& truth, int row, long said) {
   TruthOfRow result;
   for (int c = 0; c < row; ++c) {
-    if (truth.At(row, c) != LoopLabel::kLoop) continue;
-    if (result.first < 0) result.first = c;
-    result.last = c;
-    ++result.count;
-    if (result.nearest < 0 || std::labs(c - said) < std::labs(result.nearest - said)) result.nearest = c;
+    if (truth.At(row, c) == LoopLabel::kLoop) result.loops.push_back(c);
   }
+  if (result.loops.empty()) return result;
+  const auto nearer = [said](long a, long b) { return std::labs(a - said) < std::labs(b - said); };
+  result.shown = said < 0 ? result.loops[result.loops.size() / 2]
+                          : *std::min_element(result.loops.begin(), result.loops.end(), nearer);
   return result;
+}
+
+std::string TruthText(const LoopRun& run, const TruthOfRow& truth) {
+  if (truth.loops.empty()) return "truth: no loop";
+  std::string text = "truth: " + Name(run, truth.shown);
+  if (truth.loops.size() > 1)
+    text += ", of " + std::to_string(truth.loops.size()) + " from " + std::to_string(truth.loops.front()) +
+            " to " + std::to_string(truth.loops.back());
+  return text;
 }
 
 std::string Numbers(const LoopResult& r) {
   char text[200];
-  const int written =
-      std::snprintf(text, sizeof text, "H = %.3f, posterior there %.3f", r.hypothesis, r.posterior);
-  std::string line(text, static_cast<std::size_t>(std::max(0, written)));
+  std::snprintf(text, sizeof text, "H = %.3f, posterior of the best %.3f", r.hypothesis, r.posterior);
+  const std::string line = text;
   if (r.verification.candidate < 0) return line + ", nothing was verified";
   std::snprintf(text, sizeof text, "; %d inliers of %d matches with image %ld", r.verification.inliers,
                 r.verification.matches, static_cast<long>(r.verification.candidate));
@@ -127,20 +136,29 @@ std::string Fitted(std::string text, double width) {
   return text + "...";
 }
 
+// One or two lines, broken between words.
+std::vector<std::string> Wrapped(const std::string& text, double width) {
+  std::size_t end = text.size();
+  while (TextWidth(text.substr(0, end), kTextHeight) > width) {
+    const std::size_t space = end == 0 ? std::string::npos : text.rfind(' ', end - 1);
+    if (space == std::string::npos) return {Fitted(text, width)};
+    end = space;
+  }
+  if (end == text.size()) return {text};
+  return {text.substr(0, end), Fitted(text.substr(end + 1), width)};
+}
+
 void DrawEntry(const LoopRun& run, const Entry& entry, cv::Mat strip) {
   const LoopRow& row = run.rows[entry.row];
   const LoopResult& r = row.result;
   const int image = static_cast<int>(r.query);
   const long said = static_cast<long>(r.accepted ? r.verification.candidate : r.candidate);
   const TruthOfRow truth = LookUp(run.truth, image, said);
-  const long shown[] = {image, said, truth.nearest};
+  const long shown[] = {image, said, truth.shown};
   const char* absent[] = {"", "nothing was proposed", "no loop in the ground truth"};
-  std::string loops = "truth: no loop";
-  if (truth.count > 0)
-    loops = "truth: " + Name(run, truth.nearest) + ", " + std::to_string(truth.count) + " in " +
-            std::to_string(truth.first) + " to " + std::to_string(truth.last);
   const std::string heads[] = {"image " + Name(run, image),
-                               (r.accepted ? "accepted: " : "best: ") + Name(run, said), loops};
+                               (r.accepted ? "accepted: " : "best: ") + Name(run, said),
+                               TruthText(run, truth)};
   const std::string color = entry.missed ? kMissedColor : kFalseColor;
   std::string reason = !row.read ? "the image can't be read" : r.reason;
   if (entry.missed && r.accepted) reason = "accepted on a pair that the ground truth ignores";
@@ -154,7 +172,11 @@ void DrawEntry(const LoopRun& run, const Entry& entry, cv::Mat strip) {
   }
   const std::string line =
       std::string(entry.missed ? "missed: " : "false positive: ") + Numbers(r) + "; " + reason;
-  shapes.push_back(PlotText({kMargin, 34}, Fitted(line, kWidth - 2 * kMargin), kTextHeight));
+  double y = 28;
+  for (const std::string& part : Wrapped(line, kWidth - 2 * kMargin)) {
+    shapes.push_back(PlotText({kMargin, y}, part, kTextHeight));
+    y += 21;
+  }
   DrawShapes(shapes, strip);
 }
 
@@ -173,7 +195,9 @@ void WriteContactSheet(const LoopRun& run, const LoopReport& report, const std::
                 wrong.size(), missed.size(), run.options.loop_threshold);
   std::string summary = text;
   if (entries.size() < wrong.size() + missed.size())
-    summary += "; " + std::to_string(entries.size()) + " are shown, hypotheses.csv has all";
+    summary +=
+        "; " + std::to_string(entries.size()) +
+        " are shown: the false ones of the highest H, the missed ones evenly; all are in hypotheses.csv";
   std::vector<PlotShape> shapes = {PlotText({kMargin, 34}, RunTitle(run, report), 20),
                                    PlotText({kMargin, 64}, summary, 16)};
   if (entries.empty())

@@ -65,13 +65,14 @@ void WriteCurves(const LoopRun& run, const LoopReport& report, const std::filesy
   plot.title = RunTitle(run, report);
   plot.x_name = "recall";
   plot.y_name = "precision";
-  PlotCurve posterior = Curve("posterior only", report.posterior);
-  posterior.color = kFalseColor;
-  posterior.dashed = true;
+  // The dashes lie over the broad line, so that both are seen where they run together.
   PlotCurve verified = Curve("with verification", report.verified);
   verified.color = kTrueColor;
-  verified.width = 3;
-  plot.curves = {posterior, verified};
+  verified.width = 5;
+  PlotCurve posterior = Curve("posterior only", report.posterior);
+  posterior.color = kMissedColor;
+  posterior.dashed = true;
+  plot.curves = {verified, posterior};
   char note[64];
   std::snprintf(note, sizeof note, "disc: at the default threshold, H >= %g", run.options.loop_threshold);
   plot.notes.push_back(note);

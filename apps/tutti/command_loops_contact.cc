@@ -191,7 +191,7 @@ void WriteContactSheet(const LoopRun& run, const LoopReport& report, const std::
   cv::Mat picture(height, kWidth, CV_8UC3, cv::Scalar::all(255));
 
   char text[200];
-  std::snprintf(text, sizeof text, "%zu false positives and %zu missed loops at H >= %g, verified",
+  std::snprintf(text, sizeof text, "false positives: %zu, missed loops: %zu, at H >= %g and verified",
                 wrong.size(), missed.size(), run.options.loop_threshold);
   std::string summary = text;
   if (entries.size() < wrong.size() + missed.size())

@@ -97,7 +97,7 @@ std::string Both(const Json& figures, const std::string& key, const char* inner 
 }
 
 std::string Line(const std::vector<std::string>& cells) {
-  static constexpr int kWidths[] = {8, 24, 13, 13, 24, 21, 12};
+  static constexpr int kWidths[] = {8, 25, 13, 13, 24, 22, 12};
   std::string line = "|";
   for (std::size_t k = 0; k < cells.size(); ++k) {
     std::string cell = cells[k];

@@ -131,7 +131,7 @@ std::vector<PlotShape> LayOut(const CurvePlot& plot) {
   PlotAxes axes;
   axes.low = {-0.02, -0.02};
   axes.high = {1.02, 1.02};
-  axes.x_ticks = axes.y_ticks = 10;
+  axes.x_ticks = axes.y_ticks = 11;  // steps of 0.1
   axes.title = plot.title;
   axes.x_name = plot.x_name;
   axes.y_name = plot.y_name;

@@ -78,8 +78,6 @@ LoopRow Process(const std::filesystem::path& file, int number, const std::option
 }
 
 ImageSet LoadImageSet(const LoopsArguments& arguments) {
-  const std::string problem = arguments.truth.rule.Validate();
-  if (!problem.empty()) throw InputError("ground truth: " + problem);
   std::vector<std::filesystem::path> images = ListImages(arguments.images);
   // The matrix may lie among the images (corridor/ground_truth.bmp).
   std::error_code error;
@@ -158,7 +156,9 @@ int RunTable(const LoopsArguments& arguments, const ImageSet& set) {
 int RunLoops(const LoopsArguments& given) {
   LoopsArguments arguments = given;
   if (arguments.truth.stride < 1) throw InputError("--stride must be at least 1");
-  if (!arguments.table) SetRule(arguments.rule, arguments.options);
+  SetRule(arguments.rule, arguments.options);
+  const std::string problem = arguments.truth.rule.Validate();
+  if (!problem.empty()) throw InputError("ground truth: " + problem);
   cv::setNumThreads(arguments.options.threads);
   const ImageSet set = LoadImageSet(arguments);
   const InterruptGuard interrupt;
@@ -191,16 +191,10 @@ void AddLoopsCommand(CLI::App& app, int& exit_code) {
   command->add_option("--out", arguments->out, "folder for results.json, hypotheses.csv, curves and pictures")
       ->required();
   command->add_option("--stride", arguments->truth.stride, "every n-th image")->capture_default_str();
-  CLI::Option* rule_option =
-      command
-          ->add_option("--rule", arguments->rule,
-                       "mean, product, majority, naive, or one member: surf, sift, orb, akaze, brisk")
-          ->capture_default_str();
   command
-      ->add_flag("--table", arguments->table,
-                 "every rule and each member alone, one after the other; table.json, .md, .csv, and a folder "
-                 "for each")
-      ->excludes(rule_option);
+      ->add_option("--rule", arguments->rule,
+                   "mean, product, majority, naive, or one member: surf, sift, orb, akaze, brisk")
+      ->capture_default_str();
   LoopRule& rule = arguments->truth.rule;
   command->add_option("--gt-distance", rule.distance_m, "trajectory: a loop is nearer than this [m]")
       ->capture_default_str();
@@ -212,6 +206,11 @@ void AddLoopsCommand(CLI::App& app, int& exit_code) {
       ->capture_default_str();
   command->add_option("--gt-exclude-s", rule.exclude_s, "trajectory: a loop is at least this much older [s]")
       ->capture_default_str();
+  command
+      ->add_flag("--table", arguments->table,
+                 "every rule and each member alone, one after the other; table.json, .md, .csv, and a folder "
+                 "for each")
+      ->excludes(command->get_option("--rule"));
   command->add_option("--camera", arguments->camera,
                       "fx,fy,cx,cy [px]: verify with the essential matrix (default: fundamental matrix)");
   command

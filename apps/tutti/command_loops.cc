@@ -12,6 +12,8 @@
 
 #include "command_loops_input.h"
 #include "command_loops_output.h"
+#include "command_loops_pictures.h"
+#include "command_loops_table.h"
 #include "commands.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
@@ -26,6 +28,14 @@ struct LoopsArguments {
   std::string images, out, rule = "mean", camera;
   GroundTruthArguments truth;
   LoopDetectorOptions options;
+  bool table = false;
+};
+
+// What every rule of a table shares.
+struct ImageSet {
+  std::vector<std::filesystem::path> images;  // strided
+  LoopGroundTruth truth;
+  std::optional<PinholeCamera> camera;
 };
 
 std::optional<PinholeCamera> ParseCamera(const std::string& text) {
@@ -67,18 +77,7 @@ LoopRow Process(const std::filesystem::path& file, int number, const std::option
   return row;
 }
 
-int RunLoops(const LoopsArguments& given) {
-  LoopsArguments arguments = given;
-  if (arguments.truth.stride < 1) throw InputError("--stride must be at least 1");
-  SetRule(arguments.rule, arguments.options);
-  const std::string problem = arguments.truth.rule.Validate();
-  if (!problem.empty()) throw InputError("ground truth: " + problem);
-  cv::setNumThreads(arguments.options.threads);
-
-  LoopRun run;
-  run.images = arguments.images;
-  run.stride = arguments.truth.stride;
-  run.options = arguments.options;
+ImageSet LoadImageSet(const LoopsArguments& arguments) {
   std::vector<std::filesystem::path> images = ListImages(arguments.images);
   // The matrix may lie among the images (corridor/ground_truth.bmp).
   std::error_code error;
@@ -87,31 +86,91 @@ int RunLoops(const LoopsArguments& given) {
                                 return std::filesystem::equivalent(p, arguments.truth.file, error);
                               }),
                images.end());
-  run.truth = LoadGroundTruth(arguments.truth, images);
-  const std::optional<PinholeCamera> camera = ParseCamera(arguments.camera);
-  LoopDetector detector(arguments.options);
+  ImageSet set;
+  set.truth = LoadGroundTruth(arguments.truth, images);
+  for (std::size_t i = 0; i < images.size(); i += static_cast<std::size_t>(arguments.truth.stride))
+    set.images.push_back(images[i]);
+  set.camera = ParseCamera(arguments.camera);
+  return set;
+}
 
-  const std::size_t total = static_cast<std::size_t>(run.truth.size());
-  const InterruptGuard interrupt;
+// Up to Ctrl-C: a run that ended early has the ground truth of its images only.
+LoopRun Run(const LoopsArguments& arguments, const LoopDetectorOptions& options, const ImageSet& set) {
+  LoopRun run;
+  run.images = arguments.images;
+  run.stride = arguments.truth.stride;
+  run.options = options;
+  LoopDetectorOptions with_posterior = options;
+  with_posterior.keep_posterior = true;  // for confusion.png
+  LoopDetector detector(with_posterior);
+  const int total = static_cast<int>(set.images.size());
   int loops = 0;
-  {
-    Progress progress("loops", total);
-    for (std::size_t i = 0; i < images.size(); i += static_cast<std::size_t>(run.stride)) {
-      if (InterruptGuard::Requested()) break;
-      run.rows.push_back(Process(images[i], static_cast<int>(run.rows.size()), camera, detector));
-      const LoopRow& row = run.rows.back();
-      if (!row.read)
-        progress.Note("tutti: warning: " + images[i].string() +
-                      ": can't be read; it counts as an image without features");
-      loops += row.result.accepted ? 1 : 0;
-      progress.Update(run.rows.size(), std::to_string(loops) + " loops");
-    }
-    progress.Finish();
+  Progress progress(arguments.table ? "loops, " + RuleName(options) : "loops", set.images.size());
+  for (const std::filesystem::path& image : set.images) {
+    if (InterruptGuard::Requested()) break;
+    run.rows.push_back(Process(image, static_cast<int>(run.rows.size()), set.camera, detector));
+    LoopRow& row = run.rows.back();
+    if (!row.read)
+      progress.Note("tutti: warning: " + image.string() +
+                    ": can't be read; it counts as an image without features");
+    AddPosterior(row.result, total, run.posterior);
+    row.result.posterior_by_location = {};  // what is written needs them no more
+    row.result.tried = {};
+    row.result.verification.inlier_matches = {};
+    loops += row.result.accepted ? 1 : 0;
+    progress.Update(run.rows.size(), std::to_string(loops) + " loops");
   }
-  WriteLoopRun(run, arguments.out);
-  if (run.rows.size() < total) {
+  progress.Finish();
+  run.truth = set.truth;
+  if (run.rows.size() < set.images.size()) {
+    const int done = static_cast<int>(run.rows.size());
+    run.truth = set.truth.First(done);
+    const int side = (done * run.posterior.rows + total - 1) / total;
+    run.posterior = run.posterior(cv::Rect(0, 0, side, side)).clone();
+  }
+  return run;
+}
+
+// All rules, each with the files of a run of its own in its folder.
+int RunTable(const LoopsArguments& arguments, const ImageSet& set) {
+  const std::filesystem::path folder = arguments.out;
+  LoopTable table;
+  for (const std::string& rule : TableRules(arguments.options)) {
+    LoopDetectorOptions options = arguments.options;
+    SetRule(rule, options);
+    const LoopRun run = Run(arguments, options, set);
+    if (run.rows.size() < set.images.size()) {
+      std::fprintf(stderr,
+                   "tutti: interrupted in the rule '%s'; no table is written, only the rules before\n",
+                   rule.c_str());
+      return 130;
+    }
+    const LoopReport report = EvaluateRun(run);
+    WriteLoopRun(run, report, folder / rule);
+    AddToTable(run, report, table);
+  }
+  WriteLoopTable(table, folder);
+  return 0;
+}
+
+int RunLoops(const LoopsArguments& given) {
+  LoopsArguments arguments = given;
+  if (arguments.truth.stride < 1) throw InputError("--stride must be at least 1");
+  SetRule(arguments.rule, arguments.options);
+  const std::string problem = arguments.truth.rule.Validate();
+  if (!problem.empty()) throw InputError("ground truth: " + problem);
+  cv::setNumThreads(arguments.options.threads);
+  const ImageSet set = LoadImageSet(arguments);
+  const InterruptGuard interrupt;
+  if (arguments.table) return RunTable(arguments, set);
+
+  const LoopRun run = Run(arguments, arguments.options, set);
+  const LoopReport report = EvaluateRun(run);
+  WriteLoopRun(run, report, arguments.out);
+  PrintLoopRun(run, report, arguments.out);
+  if (run.rows.size() < set.images.size()) {
     std::fprintf(stderr, "tutti: interrupted after %zu of %zu images; the results are of those\n",
-                 run.rows.size(), total);
+                 run.rows.size(), set.images.size());
     return 130;
   }
   return 0;
@@ -129,7 +188,8 @@ void AddLoopsCommand(CLI::App& app, int& exit_code) {
                    "loop matrix (PNG, BMP, text, MATLAB v5 .mat; row = current image) or trajectory (TUM, "
                    "KITTI, EuRoC)")
       ->required();
-  command->add_option("--out", arguments->out, "folder for results.json and hypotheses.csv")->required();
+  command->add_option("--out", arguments->out, "folder for results.json, hypotheses.csv, curves and pictures")
+      ->required();
   command->add_option("--stride", arguments->truth.stride, "every n-th image")->capture_default_str();
   command
       ->add_option("--rule", arguments->rule,
@@ -146,6 +206,11 @@ void AddLoopsCommand(CLI::App& app, int& exit_code) {
       ->capture_default_str();
   command->add_option("--gt-exclude-s", rule.exclude_s, "trajectory: a loop is at least this much older [s]")
       ->capture_default_str();
+  command
+      ->add_flag("--table", arguments->table,
+                 "every rule and each member alone, one after the other; table.json, .md, .csv, and a folder "
+                 "for each")
+      ->excludes(command->get_option("--rule"));
   command->add_option("--camera", arguments->camera,
                       "fx,fy,cx,cy [px]: verify with the essential matrix (default: fundamental matrix)");
   command

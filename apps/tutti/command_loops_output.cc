@@ -4,8 +4,9 @@
 #include <cstdio>
 #include <fstream>
 #include <functional>
-#include <nlohmann/json.hpp>
+#include <utility>
 
+#include "command_loops_pictures.h"
 #include "tutti/core/error.h"
 
 namespace tutti::cli {
@@ -43,13 +44,6 @@ nlohmann::ordered_json Stages(const std::vector<LoopRow>& rows) {
 
 nlohmann::ordered_json Rates(const PrecisionRecall& rates) {
   return {{"precision", rates.precision}, {"recall", rates.recall}};
-}
-
-void WriteText(const std::filesystem::path& file, const std::string& text) {
-  std::ofstream out(file, std::ios::binary);
-  out << text;
-  out.close();
-  if (!out) throw InputError(file.string() + ": can't be written; is there space, and may you write there?");
 }
 
 const char* LabelName(LoopLabel label) {
@@ -95,22 +89,38 @@ std::string Csv(const LoopRun& run) {
 
 }  // namespace
 
-void WriteLoopRun(const LoopRun& run, const std::filesystem::path& folder) {
+void MakeFolder(const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error) throw InputError(folder.string() + ": can't be made (" + error.message() + ")");
+}
 
+void WriteText(const std::filesystem::path& file, const std::string& text) {
+  std::ofstream out(file, std::ios::binary);
+  out << text;
+  out.close();
+  if (!out) throw InputError(file.string() + ": can't be written; is there space, and may you write there?");
+}
+
+LoopReport EvaluateRun(const LoopRun& run) {
   std::vector<LoopObservation> observations;
   for (const LoopRow& row : run.rows) observations.push_back(Observe(row.result));
-  const LoopEvaluation verified = EvaluateVerified(observations, run.truth, run.options.loop_threshold);
-  const LoopEvaluation posterior = EvaluatePosterior(observations, run.truth, run.options.loop_threshold);
+  LoopReport report;
+  report.verified = EvaluateVerified(observations, run.truth, run.options.loop_threshold);
+  report.posterior = EvaluatePosterior(observations, run.truth, run.options.loop_threshold);
   const std::vector<double> ms = Collect(run.rows, [](const LoopRow& row) { return row.ms; });
-  const auto damaged =
-      std::count_if(run.rows.begin(), run.rows.end(), [](const LoopRow& row) { return !row.read; });
+  report.ms_median = Quantile(ms, 0.5);
+  report.ms_p99 = Quantile(ms, 0.99);
+  report.damaged = static_cast<int>(
+      std::count_if(run.rows.begin(), run.rows.end(), [](const LoopRow& row) { return !row.read; }));
+  return report;
+}
 
+nlohmann::ordered_json FiguresJson(const LoopRun& run, const LoopReport& report) {
+  const LoopEvaluation &verified = report.verified, &posterior = report.posterior;
   nlohmann::ordered_json json;
   json["images"] = verified.images;
-  json["images_damaged"] = damaged;
+  json["images_damaged"] = report.damaged;
   json["rows_with_loop"] = verified.rows_with_loop;
   json["recall_at_100_precision"] = verified.recall_at_100_precision;
   json["recall_at_100_precision_posterior"] = posterior.recall_at_100_precision;
@@ -123,22 +133,39 @@ void WriteLoopRun(const LoopRun& run, const std::filesystem::path& folder) {
   json["at_default_threshold_posterior"] = Rates(posterior.at_default_threshold);
   json["accepted"] = {
       {"true", verified.true_positives}, {"false", verified.false_positives}, {"ignored", verified.ignored}};
-  json["ms_per_image"] = {{"median", Quantile(ms, 0.5)}, {"p99", Quantile(ms, 0.99)}};
+  json["ms_per_image"] = {{"median", report.ms_median}, {"p99", report.ms_p99}};
   json["stage_ms_median"] = Stages(run.rows);
-  json["protocol"] = {
-      {"image_folder", run.images},
-      {"stride", run.stride},
-      {"ground_truth", run.truth.description},
-      {"tolerance_frames", 0},
-      {"exclusion", "the newest " + std::to_string(run.options.stm_size) + " images (short-term memory)"},
-      {"threshold", "recall_at_100_precision: chosen after the fact; at_default_threshold: fixed"},
-      {"rule", RuleName(run.options)},
-      {"members", run.options.members},
-      {"seed", run.options.seed},
-      {"threads", run.options.threads}};
+  json["threshold_at_100_precision"] = verified.threshold_at_100_precision;
+  json["threshold_at_100_precision_posterior"] = posterior.threshold_at_100_precision;
+  return json;
+}
+
+nlohmann::ordered_json ProtocolJson(const LoopRun& run) {
+  return {{"image_folder", run.images},
+          {"stride", run.stride},
+          {"ground_truth", run.truth.description},
+          {"tolerance_frames", 0},
+          {"exclusion", "the newest " + std::to_string(run.options.stm_size) + " images (short-term memory)"},
+          {"threshold", "recall_at_100_precision: chosen after the fact; at_default_threshold: fixed"}};
+}
+
+void WriteLoopRun(const LoopRun& run, const LoopReport& report, const std::filesystem::path& folder) {
+  MakeFolder(folder);
+  nlohmann::ordered_json json = FiguresJson(run, report);
+  json["protocol"] = ProtocolJson(run);
+  json["protocol"]["rule"] = RuleName(run.options);
+  json["protocol"]["members"] = run.options.members;
+  json["protocol"]["seed"] = run.options.seed;
+  json["protocol"]["threads"] = run.options.threads;
   WriteText(folder / "results.json", json.dump(2) + "\n");
   WriteText(folder / "hypotheses.csv", Csv(run));
+  WriteCurves(run, report, folder);
+  WriteConfusion(run, report, folder / "confusion.png");
+  WriteContactSheet(run, report, folder / "contact_sheet.png");
+}
 
+void PrintLoopRun(const LoopRun& run, const LoopReport& report, const std::filesystem::path& folder) {
+  const LoopEvaluation &verified = report.verified, &posterior = report.posterior;
   std::printf("%-34s %s\n", "rule", RuleName(run.options).c_str());
   std::printf("%-34s %d (%d with a loop)\n", "images", verified.images, verified.rows_with_loop);
   std::printf("%-34s %s\n", "ground truth", run.truth.description.c_str());
@@ -155,8 +182,10 @@ void WriteLoopRun(const LoopRun& run, const std::filesystem::path& folder) {
        posterior.at_default_threshold.recall);
   std::printf("%-34s %d true, %d false, %d on ignored cells\n", "accepted", verified.true_positives,
               verified.false_positives, verified.ignored);
-  std::printf("%-34s %.1f median, %.1f p99\n", "ms per image", Quantile(ms, 0.5), Quantile(ms, 0.99));
-  std::printf("written: %s, hypotheses.csv\n", (folder / "results.json").string().c_str());
+  std::printf("%-34s %.1f median, %.1f p99\n", "ms per image", report.ms_median, report.ms_p99);
+  std::printf(
+      "written: %s, hypotheses.csv, precision_recall.{csv,svg,png}, confusion.png, contact_sheet.png\n",
+      (folder / "results.json").string().c_str());
 }
 
 }  // namespace tutti::cli

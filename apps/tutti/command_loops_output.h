@@ -1,7 +1,9 @@
-// Output of `tutti loops`: results.json, hypotheses.csv and the table on the terminal.
+// Output of `tutti loops`: results.json, hypotheses.csv, the pictures and the table on the terminal.
 #pragma once
 
 #include <filesystem>
+#include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
 #include <string>
 #include <vector>
 
@@ -26,10 +28,32 @@ struct LoopRun {
   int stride = 1;
   LoopGroundTruth truth;
   std::vector<LoopRow> rows;
+  cv::Mat posterior;  ///< CV_32FC1, square: the posterior of past images (columns), by AddPosterior; may be
+                      ///< empty
 };
 
-/// Writes both files into `folder` (made if missing) and prints the table. Throws InputError if the folder
-/// can't be written.
-void WriteLoopRun(const LoopRun& run, const std::filesystem::path& folder);
+/// What the figures of every table are.
+struct LoopReport {
+  LoopEvaluation verified, posterior;
+  double ms_median = 0, ms_p99 = 0;  ///< of Detect, over the images that could be read [ms]
+  int damaged = 0;
+};
+
+LoopReport EvaluateRun(const LoopRun& run);
+
+/// The figures of results.json, without the protocol.
+nlohmann::ordered_json FiguresJson(const LoopRun& run, const LoopReport& report);
+
+/// How they were measured, but for rule and members.
+nlohmann::ordered_json ProtocolJson(const LoopRun& run);
+
+/// Writes all files into `folder` (made if missing). Throws InputError if it can't be written.
+void WriteLoopRun(const LoopRun& run, const LoopReport& report, const std::filesystem::path& folder);
+
+/// Prints the figures of one run.
+void PrintLoopRun(const LoopRun& run, const LoopReport& report, const std::filesystem::path& folder);
+
+void MakeFolder(const std::filesystem::path& folder);
+void WriteText(const std::filesystem::path& file, const std::string& text);
 
 }  // namespace tutti::cli

@@ -1,61 +1,95 @@
 #include "tutti/loopclosure/evaluation.h"
 
 #include <algorithm>
+#include <cmath>
 #include <tuple>
 
 namespace tutti {
 namespace {
 
 struct Ranked {
-  bool accepted = false;  // ranks first
+  int image = -1;
+  bool says = false;      // there is a location and a finite H; else it is in no ranking
+  bool rejected = false;  // ranks last
   double hypothesis = 0;
   LoopLabel label = LoopLabel::kNone;
   bool taken = false;  // at the default threshold
 };
 
 bool SameRank(const Ranked& a, const Ranked& b) {
-  return a.accepted == b.accepted && a.hypothesis == b.hypothesis;
+  return a.rejected == b.rejected && a.hypothesis == b.hypothesis;
 }
 
 PrecisionRecall Rates(int true_positives, int false_positives, int rows) {
   PrecisionRecall rates;
+  rates.true_positives = true_positives;
+  rates.false_positives = false_positives;
   const int taken = true_positives + false_positives;
   if (taken > 0) rates.precision = static_cast<double>(true_positives) / taken;
   if (rows > 0) rates.recall = static_cast<double>(true_positives) / rows;
   return rates;
 }
 
-LoopEvaluation Evaluate(std::vector<Ranked> ranked, int images, int rows) {
-  LoopEvaluation result;
-  result.images = images;
-  result.rows_with_loop = rows;
+LoopOutcome OutcomeOf(const Ranked& r, bool has_loop) {
+  if (r.taken && r.label == LoopLabel::kLoop) return LoopOutcome::kTruePositive;
+  if (r.taken && r.label == LoopLabel::kNone) return LoopOutcome::kFalsePositive;
+  if (has_loop) return LoopOutcome::kMissed;
+  return r.taken ? LoopOutcome::kIgnored : LoopOutcome::kNothing;
+}
+
+// The counts at the default threshold.
+void Count(const std::vector<Ranked>& ranked, const LoopGroundTruth& truth, LoopEvaluation& result) {
   for (const Ranked& r : ranked) {
+    result.outcomes.push_back(OutcomeOf(r, truth.HasLoop(r.image)));
     if (!r.taken) continue;
     if (r.label == LoopLabel::kLoop) ++result.true_positives;
     if (r.label == LoopLabel::kNone) ++result.false_positives;
     if (r.label == LoopLabel::kIgnore) ++result.ignored;
   }
-  result.at_default_threshold = Rates(result.true_positives, result.false_positives, rows);
+  result.at_default_threshold = Rates(result.true_positives, result.false_positives, result.rows_with_loop);
+}
 
+// The curve and what is read from it.
+void Sweep(std::vector<Ranked> ranked, LoopEvaluation& result) {
+  ranked.erase(std::remove_if(ranked.begin(), ranked.end(), [](const Ranked& r) { return !r.says; }),
+               ranked.end());
   std::stable_sort(ranked.begin(), ranked.end(), [](const Ranked& a, const Ranked& b) {
-    return std::make_tuple(a.accepted, a.hypothesis) > std::make_tuple(b.accepted, b.hypothesis);
+    return std::make_tuple(a.rejected, -a.hypothesis) < std::make_tuple(b.rejected, -b.hypothesis);
   });
   int true_positives = 0;
   int false_positives = 0;
   double recall_before = 0.0;
+  std::vector<int>& found = result.found_at_100_precision;
+  std::size_t found_count = 0;
   for (std::size_t i = 0; i < ranked.size(); ++i) {
     if (ranked[i].label == LoopLabel::kLoop) ++true_positives;
     if (ranked[i].label == LoopLabel::kNone) ++false_positives;
+    if (ranked[i].label == LoopLabel::kLoop) found.push_back(ranked[i].image);
     if (i + 1 < ranked.size() && SameRank(ranked[i], ranked[i + 1])) continue;  // ties stay together
-    PrecisionRecall point = Rates(true_positives, false_positives, rows);
+    PrecisionRecall point = Rates(true_positives, false_positives, result.rows_with_loop);
     point.threshold = ranked[i].hypothesis;
-    if (false_positives == 0) result.recall_at_100_precision = point.recall;
+    point.rejected = ranked[i].rejected;
+    if (false_positives == 0) {
+      result.recall_at_100_precision = point.recall;
+      result.threshold_at_100_precision = point.threshold;
+      found_count = found.size();
+    }
     result.area_under_curve += point.precision * (point.recall - recall_before);
     recall_before = point.recall;
     const double sum = point.precision + point.recall;
     if (sum > 0) result.best_f1 = std::max(result.best_f1, 2 * point.precision * point.recall / sum);
     result.curve.push_back(point);
   }
+  found.resize(found_count);
+  std::sort(found.begin(), found.end());
+}
+
+LoopEvaluation Evaluate(const std::vector<Ranked>& ranked, const LoopGroundTruth& truth) {
+  LoopEvaluation result;
+  result.images = static_cast<int>(ranked.size());
+  result.rows_with_loop = truth.RowsWithLoop();
+  Count(ranked, truth, result);
+  Sweep(ranked, result);
   return result;
 }
 
@@ -65,10 +99,11 @@ LoopEvaluation EvaluatePosterior(const std::vector<LoopObservation>& observation
                                  const LoopGroundTruth& truth, double threshold) {
   std::vector<Ranked> ranked;
   for (const LoopObservation& o : observations) {
-    if (o.best < 0) continue;
-    ranked.push_back({false, o.hypothesis, truth.At(o.image, o.best), o.hypothesis >= threshold});
+    const bool says = o.best >= 0 && std::isfinite(o.hypothesis);
+    ranked.push_back(
+        {o.image, says, false, o.hypothesis, truth.At(o.image, o.best), says && o.hypothesis >= threshold});
   }
-  return Evaluate(std::move(ranked), static_cast<int>(observations.size()), truth.RowsWithLoop());
+  return Evaluate(ranked, truth);
 }
 
 LoopEvaluation EvaluateVerified(const std::vector<LoopObservation>& observations,
@@ -76,11 +111,11 @@ LoopEvaluation EvaluateVerified(const std::vector<LoopObservation>& observations
   std::vector<Ranked> ranked;
   for (const LoopObservation& o : observations) {
     const int location = o.accepted ? o.verified : o.best;
-    if (location < 0) continue;
-    ranked.push_back(
-        {o.accepted, o.hypothesis, truth.At(o.image, location), o.accepted && o.hypothesis >= threshold});
+    const bool says = location >= 0 && std::isfinite(o.hypothesis);
+    ranked.push_back({o.image, says, !o.accepted, o.hypothesis, truth.At(o.image, location),
+                      says && o.accepted && o.hypothesis >= threshold});
   }
-  return Evaluate(std::move(ranked), static_cast<int>(observations.size()), truth.RowsWithLoop());
+  return Evaluate(ranked, truth);
 }
 
 LoopObservation Observe(const LoopResult& result) {

@@ -163,6 +163,15 @@ LoopGroundTruth LoopGroundTruth::Strided(int stride) const {
   return result;
 }
 
+LoopGroundTruth LoopGroundTruth::First(int size) const {
+  LoopGroundTruth result(std::clamp(size, 0, size_));
+  result.description = description;
+  for (int r = 0; r < result.size_; ++r) {
+    for (int c = 0; c < r; ++c) result.Set(r, c, At(r, c));
+  }
+  return result;
+}
+
 std::string LoopRule::Validate() const {
   if (!(distance_m > 0)) return "the distance of a loop must be above 0 m";
   if (!(angle_deg > 0 && angle_deg <= 180)) return "the angle of a loop must be above 0 and at most 180 deg";

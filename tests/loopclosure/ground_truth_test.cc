@@ -82,6 +82,44 @@ TEST(LoopMatrix, StridedKeepsEveryNthRowAndColumn) {
   EXPECT_EQ(strided.RowsWithLoop(), 1);
 }
 
+TEST(LoopMatrix, FirstKeepsTheUpperLeftPart) {
+  LoopGroundTruth truth(10);
+  truth.Set(3, 1, LoopLabel::kLoop);
+  truth.Set(9, 3, LoopLabel::kLoop);
+  EXPECT_EQ(truth.First(4).size(), 4);
+  EXPECT_EQ(truth.First(4).At(3, 1), LoopLabel::kLoop);
+  EXPECT_EQ(truth.First(4).RowsWithLoop(), 1);
+  EXPECT_EQ(truth.First(0).size(), 0);
+  EXPECT_EQ(truth.First(99).size(), 10);
+}
+
+// Column-major doubles, uncompressed, as MATLAB's save -v6 writes them.
+std::string SmallMatFile(const std::vector<double>& values, std::int32_t rows, std::int32_t columns) {
+  const auto word = [](std::int32_t value) { return std::string(reinterpret_cast<const char*>(&value), 4); };
+  std::string data;
+  for (const double value : values) data += std::string(reinterpret_cast<const char*>(&value), 8);
+  const std::string body = word(6) + word(8) + word(6) + word(0) +           // flags: class double
+                           word(5) + word(8) + word(rows) + word(columns) +  // dimensions
+                           word(1) + word(5) + std::string("truth\0\0\0", 8) + word(9) +
+                           word(static_cast<std::int32_t>(data.size())) + data;
+  std::string header = "MATLAB 5.0 MAT-file";
+  header.resize(124, ' ');
+  return header + std::string("\x00\x01IM", 4) + word(14) + word(static_cast<std::int32_t>(body.size())) +
+         body;
+}
+
+TEST(LoopMatrix, MatlabValuesAreColumnMajor) {
+  const LoopGroundTruth truth =
+      ReadLoopMatrix(WriteFile("t.mat", SmallMatFile({0, 0, 0.5, 0, 0, 1, 0, 0, 0}, 3, 3)), 3);
+  EXPECT_EQ(truth.At(2, 0), LoopLabel::kIgnore);
+  EXPECT_EQ(truth.At(2, 1), LoopLabel::kLoop);
+  const LoopGroundTruth transposed =
+      ReadLoopMatrix(WriteFile("u.mat", SmallMatFile({0, 0, 0, 0, 0, 0, 0.5, 1, 0}, 3, 3)), 3);
+  EXPECT_EQ(transposed.At(2, 0), LoopLabel::kIgnore);
+  EXPECT_EQ(transposed.At(2, 1), LoopLabel::kLoop);
+  EXPECT_FALSE(Problem(WriteFile("v.mat", SmallMatFile({0, 0, 0, 0, 0, 0}, 3, 2))).empty());
+}
+
 TEST(LoopMatrix, OnlyThePastCounts) {
   LoopGroundTruth truth(5);
   truth.Set(1, 3, LoopLabel::kLoop);

@@ -10,6 +10,7 @@
 
 #include "test_data.h"
 #include "tutti/core/error.h"
+#include "tutti/pipeline/plot_shapes.h"
 
 namespace tutti {
 namespace {
@@ -73,9 +74,64 @@ TEST(Plot, EmptySinglePointAndNonFiniteAreDrawable) {
   EXPECT_TRUE(std::filesystem::exists(folder / "nan.png"));
 }
 
+CurvePlot Curves() {
+  CurvePlot plot;
+  plot.title = "mean & others";
+  plot.x_name = "recall";
+  plot.y_name = "precision";
+  PlotCurve curve;
+  curve.name = "verified";
+  curve.color = "#d55e00";
+  curve.points = {{0, 1}, {0.5, 1}, {0.5, 0.8}, {1, 0.8}};
+  curve.marks = {{0.5, 0.8}};
+  plot.curves.push_back(curve);
+  plot.notes.push_back("a note");
+  return plot;
+}
+
+TEST(Plot, CurvesHaveAxesLegendNotesAndMarks) {
+  const auto folder = testing::FreshFolder();
+  WriteSvg(folder / "p.svg", Curves());
+  const std::string svg = ReadAll(folder / "p.svg");
+  for (const char* text : {">recall<", ">precision<", ">verified<", ">a note<", ">0.5<", "mean &amp; others",
+                           "<circle", "</svg>"})
+    EXPECT_NE(svg.find(text), std::string::npos) << text;
+  WritePng(folder / "p.png", Curves());
+  const cv::Mat image = cv::imread((folder / "p.png").string(), cv::IMREAD_COLOR);
+  ASSERT_FALSE(image.empty());
+  cv::Mat of_the_curve;
+  cv::inRange(image, cv::Scalar(0x00, 0x5e, 0xd5), cv::Scalar(0x00, 0x5e, 0xd5), of_the_curve);
+  EXPECT_GT(cv::countNonZero(of_the_curve), 500);
+}
+
+TEST(Plot, CurvesThatAreEmptyOrNotFiniteAreDrawable) {
+  const auto folder = testing::FreshFolder();
+  WriteSvg(folder / "empty.svg", CurvePlot());
+  CurvePlot plot = Curves();
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  plot.curves[0].points = {{nan, 1}, {0.5, nan}};
+  plot.curves[0].marks = {{nan, nan}};
+  WriteSvg(folder / "nan.svg", plot);
+  WritePng(folder / "nan.png", plot);
+  EXPECT_EQ(ReadAll(folder / "nan.svg").find("nan"), std::string::npos);
+}
+
+TEST(Plot, AxesThatRunBackPutTheirLowValueAtTheTop) {
+  PlotAxes axes;
+  axes.low = {0, 10};
+  axes.high = {10, 0};
+  EXPECT_EQ(axes.Page({0, 0}), axes.top_left);
+  EXPECT_EQ(axes.Page({10, 10}), axes.bottom_right);
+  std::vector<PlotShape> shapes;
+  AddAxes(axes, shapes);
+  EXPECT_GT(shapes.size(), 10u);
+}
+
 TEST(Plot, UnwritableFileIsAnInputError) {
   EXPECT_THROW(WriteSvg("/proc/no/plot.svg", Circle()), InputError);
   EXPECT_THROW(WritePng("/proc/no/plot.png", Circle()), InputError);
+  EXPECT_THROW(WriteSvg("/proc/no/plot.svg", Curves()), InputError);
+  EXPECT_THROW(WritePng("/proc/no/plot.png", Curves()), InputError);
 }
 
 }  // namespace

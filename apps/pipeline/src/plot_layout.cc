@@ -3,17 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 
 namespace tutti {
 namespace {
-
-constexpr double kLeft = 80, kRight = 30, kTop = 50, kBottom = 70;  // margins [px]
-constexpr const char* kInk = "#333333";
-constexpr const char* kGrid = "#dddddd";
-
-using Anchor = PlotShape::Anchor;
 
 // Which part of the world is seen, and where it lies on the page; both axes have the same scale.
 struct View {
@@ -22,9 +15,13 @@ struct View {
   double scale = 1;  // [px/m]
 
   Eigen::Vector2d World(const Eigen::Vector3d& p) const { return {p[axis_x], p[axis_y]}; }
-  Eigen::Vector2d Page(const Eigen::Vector2d& w) const {
-    const Eigen::Vector2d middle(0.5 * (kLeft + kPlotWidth - kRight), 0.5 * (kTop + kPlotHeight - kBottom));
-    return {middle.x() + scale * (w.x() - center.x()), middle.y() - scale * (w.y() - center.y())};
+  // The box of the axes, at the same scale along both.
+  PlotAxes Axes() const {
+    PlotAxes axes;
+    const Eigen::Vector2d half = 0.5 * (axes.bottom_right - axes.top_left) / scale;
+    axes.low = center - half;
+    axes.high = center + half;
+    return axes;
   }
 };
 
@@ -56,116 +53,104 @@ View ChooseView(const TrajectoryPlot& plot) {
   view.axis_y = std::max(order[0], order[1]);
   view.center = 0.5 * (view.World(all.low) + view.World(all.high));
   const Eigen::Vector2d extent = (view.World(all.high) - view.World(all.low)).cwiseMax(1e-9);
-  view.scale = 0.94 * std::min((kPlotWidth - kLeft - kRight) / extent.x(),
-                               (kPlotHeight - kTop - kBottom) / extent.y());
+  const PlotAxes page;
+  view.scale = 0.94 * ((page.bottom_right - page.top_left).array() / extent.array()).minCoeff();
   return view;
 }
 
-PlotShape Line(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const char* color, double width) {
-  PlotShape shape;
-  shape.points = {a, b};
-  shape.color = color;
-  shape.size = width;
-  return shape;
+PlotShape LegendLine(double x, double y, const std::string& color, double width, bool dashed) {
+  PlotShape line = PlotLine({x, y - 5}, {x + 34, y - 5}, color, std::max(2.0, width));
+  line.dashed = dashed;
+  return line;
 }
 
-PlotShape Text(const Eigen::Vector2d& at, const std::string& text, double height, Anchor anchor,
-               bool vertical = false) {
-  PlotShape shape;
-  shape.kind = PlotShape::Kind::kText;
-  shape.points = {at};
-  shape.text = text;
-  shape.color = kInk;
-  shape.size = height;
-  shape.anchor = anchor;
-  shape.vertical = vertical;
-  return shape;
-}
-
-// 1, 2 or 5 times a power of ten, so that about `count` steps fill `length`.
-double NiceStep(double length, double count) {
-  const double raw = length / count, power = std::pow(10.0, std::floor(std::log10(raw)));
-  for (const double factor : {1.0, 2.0, 5.0}) {
-    if (raw <= factor * power) return factor * power;
-  }
-  return 10 * power;
-}
-
-void AddAxes(const TrajectoryPlot& plot, const View& view, std::vector<PlotShape>& shapes) {
-  const double left = kLeft, right = kPlotWidth - kRight, top = kTop, bottom = kPlotHeight - kBottom;
-  const char* names = "xyz";
-  for (int axis = 0; axis < 2; ++axis) {
-    const bool horizontal = axis == 0;
-    const double half = 0.5 * (horizontal ? right - left : bottom - top) / view.scale;
-    const double low = view.center[axis] - half, high = view.center[axis] + half;
-    const double step = NiceStep(high - low, horizontal ? 8 : 6);
-    for (double k = std::ceil(low / step); k * step <= high; ++k) {
-      const double value = k * step;
-      Eigen::Vector2d at = view.center;
-      at[axis] = value;
-      const Eigen::Vector2d page = view.Page(at);
-      char label[32];
-      std::snprintf(label, sizeof label, "%.6g", std::abs(value) < 1e-9 * step ? 0.0 : value);
-      if (horizontal) {
-        shapes.push_back(Line({page.x(), top}, {page.x(), bottom}, kGrid, 1));
-        shapes.push_back(Text({page.x(), bottom + 20}, label, 14, Anchor::kMiddle));
-      } else {
-        shapes.push_back(Line({left, page.y()}, {right, page.y()}, kGrid, 1));
-        shapes.push_back(Text({left - 8, page.y() + 5}, label, 14, Anchor::kEnd));
-      }
-    }
-  }
-  const Eigen::Vector2d corners[] = {{left, top}, {right, top}, {right, bottom}, {left, bottom}};
-  for (int i = 0; i < 4; ++i) shapes.push_back(Line(corners[i], corners[(i + 1) % 4], kInk, 1));
-  const std::string unit = " [" + plot.unit + "]";
-  shapes.push_back(Text({0.5 * (left + right), bottom + 48}, names[view.axis_x] + unit, 16, Anchor::kMiddle));
-  shapes.push_back(Text({24, 0.5 * (top + bottom)}, names[view.axis_y] + unit, 16, Anchor::kMiddle, true));
-  shapes.push_back(Text({0.5 * (left + right), 30}, plot.title, 18, Anchor::kMiddle));
-}
-
-void AddLegend(const TrajectoryPlot& plot, std::vector<PlotShape>& shapes) {
-  double y = kTop + 22;
-  const double x = kLeft + 14;
+void AddLegend(const TrajectoryPlot& plot, const PlotAxes& axes, std::vector<PlotShape>& shapes) {
+  double y = axes.top_left.y() + 22;
+  const double x = axes.top_left.x() + 14;
   const auto entry = [&](const std::string& name, const std::string& color, double width, bool dashed) {
-    PlotShape line = Line({x, y - 5}, {x + 34, y - 5}, color.c_str(), std::max(2.0, width));
-    line.dashed = dashed;
-    shapes.push_back(line);
-    shapes.push_back(Text({x + 42, y}, name, 14, Anchor::kStart));
+    shapes.push_back(LegendLine(x, y, color, width, dashed));
+    shapes.push_back(PlotText({x + 42, y}, name, 14));
     y += 20;
   };
   for (const PlotSeries& series : plot.series) entry(series.name, series.color, series.width, series.dashed);
   if (!plot.edges.empty()) entry(plot.edges_name, plot.edges_color, 2, false);
 }
 
+// At the lower left, where precision-recall curves rarely pass; on white, as they may.
+void AddLegend(const CurvePlot& plot, const PlotAxes& axes, std::vector<PlotShape>& shapes) {
+  const double lines = static_cast<double>(plot.curves.size() + plot.notes.size());
+  double width = 0;
+  for (const PlotCurve& curve : plot.curves) width = std::max(width, 42 + TextWidth(curve.name, 14));
+  for (const std::string& note : plot.notes) width = std::max(width, TextWidth(note, 14));
+  const double x = axes.top_left.x() + 20;
+  double y = axes.bottom_right.y() - 20 * lines;
+  shapes.push_back(PlotBox({x - 8, y - 20}, {x + width + 16, axes.bottom_right.y() - 8}, "#ffffff"));
+  for (const PlotCurve& curve : plot.curves) {
+    shapes.push_back(LegendLine(x, y, curve.color, curve.width, curve.dashed));
+    shapes.push_back(PlotText({x + 42, y}, curve.name, 14));
+    y += 20;
+  }
+  for (const std::string& note : plot.notes) {
+    shapes.push_back(PlotText({x, y}, note, 14));
+    y += 20;
+  }
+}
+
 }  // namespace
 
 std::vector<PlotShape> LayOut(const TrajectoryPlot& plot) {
   const View view = ChooseView(plot);
+  PlotAxes axes = view.Axes();
+  const char* names = "xyz";
+  axes.title = plot.title;
+  axes.x_name = names[view.axis_x] + (" [" + plot.unit + "]");
+  axes.y_name = names[view.axis_y] + (" [" + plot.unit + "]");
   std::vector<PlotShape> shapes;
-  AddAxes(plot, view, shapes);
+  AddAxes(axes, shapes);
   for (const PlotSeries& series : plot.series) {
     PlotShape line;
     line.color = series.color;
     line.size = series.width;
     line.dashed = series.dashed;
     for (const Eigen::Vector3d& p : series.points) {
-      if (p.allFinite()) line.points.push_back(view.Page(view.World(p)));
+      if (p.allFinite()) line.points.push_back(axes.Page(view.World(p)));
     }
     if (!line.points.empty()) shapes.push_back(std::move(line));
   }
   for (const auto& [a, b] : plot.edges) {
-    const Eigen::Vector2d from = view.Page(view.World(a)), to = view.Page(view.World(b));
-    shapes.push_back(Line(from, to, plot.edges_color.c_str(), 1.5));
-    for (const Eigen::Vector2d& end : {from, to}) {
-      PlotShape disc;
-      disc.kind = PlotShape::Kind::kDisc;
-      disc.points = {end};
-      disc.color = plot.edges_color;
-      disc.size = 3;
-      shapes.push_back(disc);
+    const Eigen::Vector2d from = axes.Page(view.World(a)), to = axes.Page(view.World(b));
+    shapes.push_back(PlotLine(from, to, plot.edges_color, 1.5));
+    for (const Eigen::Vector2d& end : {from, to}) shapes.push_back(PlotDisc(end, 3, plot.edges_color));
+  }
+  AddLegend(plot, axes, shapes);
+  return shapes;
+}
+
+std::vector<PlotShape> LayOut(const CurvePlot& plot) {
+  // A little room beyond 0 and 1, so that a curve along the frame is seen.
+  PlotAxes axes;
+  axes.low = {-0.02, -0.02};
+  axes.high = {1.02, 1.02};
+  axes.x_ticks = axes.y_ticks = 11;  // steps of 0.1
+  axes.title = plot.title;
+  axes.x_name = plot.x_name;
+  axes.y_name = plot.y_name;
+  std::vector<PlotShape> shapes;
+  AddAxes(axes, shapes);
+  AddLegend(plot, axes, shapes);
+  for (const PlotCurve& curve : plot.curves) {
+    PlotShape line;
+    line.color = curve.color;
+    line.size = curve.width;
+    line.dashed = curve.dashed;
+    for (const Eigen::Vector2d& p : curve.points) {
+      if (p.allFinite()) line.points.push_back(axes.Page(p));
+    }
+    if (!line.points.empty()) shapes.push_back(std::move(line));
+    for (const Eigen::Vector2d& p : curve.marks) {
+      if (p.allFinite()) shapes.push_back(PlotDisc(axes.Page(p), 6, curve.color));
     }
   }
-  AddLegend(plot, shapes);
   return shapes;
 }
 

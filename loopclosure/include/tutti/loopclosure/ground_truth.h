@@ -29,6 +29,8 @@ class LoopGroundTruth {
   int RowsWithLoop() const;
   /// Every `stride`-th row and column, from 0.
   LoopGroundTruth Strided(int stride) const;
+  /// The first `size` rows and columns.
+  LoopGroundTruth First(int size) const;
 
   std::string description;  ///< where it comes from and by which rule, for tables
 

@@ -1,0 +1,96 @@
+// tutti compare-loops: the paper's t-test between rules, over several image sets.
+#include <cstdio>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "command_loops_output.h"
+#include "commands.h"
+#include "tutti/core/error.h"
+#include "tutti/loopclosure/significance.h"
+
+namespace tutti::cli {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct CompareArguments {
+  std::vector<std::string> tables;
+  std::string out;
+};
+
+Json ReadTable(const std::string& file) {
+  std::ifstream in(file);
+  if (!in) throw InputError(file + ": can't be opened; give a table.json of `tutti loops --table`");
+  const Json table = Json::parse(in, nullptr, false);
+  if (!table.is_object() || !table.contains("rules") || !table.contains("best_single"))
+    throw InputError(file + ": is no table.json of `tutti loops --table`");
+  return table;
+}
+
+// One recall per table; `rule` "best single" is each table's own best member.
+std::vector<double> Recalls(const CompareArguments& arguments, const std::vector<Json>& tables,
+                            const std::string& rule, const std::string& ranking) {
+  const std::string key =
+      ranking == "verified" ? "recall_at_100_precision" : "recall_at_100_precision_posterior";
+  std::vector<double> recalls;
+  for (std::size_t i = 0; i < tables.size(); ++i) {
+    try {
+      const std::string name =
+          rule == "best single" ? tables[i].at("best_single").at(ranking).get<std::string>() : rule;
+      recalls.push_back(tables[i].at("rules").at(name).at(key).get<double>());
+    } catch (const Json::exception&) {
+      throw InputError(arguments.tables[i] + ": has no " + key + " of the rule '" + rule +
+                       "'; write it anew with `tutti loops --table`");
+    }
+  }
+  return recalls;
+}
+
+int CompareLoops(const CompareArguments& arguments) {
+  std::vector<Json> tables;
+  for (const std::string& file : arguments.tables) tables.push_back(ReadTable(file));
+  Json tests = Json::array();
+  const std::vector<std::pair<const char*, const char*>> pairs = {
+      {"mean", "naive"}, {"mean", "best single"}, {"naive", "best single"}};
+  std::printf("%-10s %-12s %-12s %5s %16s %9s %9s\n", "ranking", "a", "b", "sets", "mean difference", "t",
+              "p");
+  for (const char* ranking : {"verified", "posterior"}) {
+    for (const auto& [a, b] : pairs) {
+      const std::vector<double> recalls_a = Recalls(arguments, tables, a, ranking);
+      const std::vector<double> recalls_b = Recalls(arguments, tables, b, ranking);
+      const PairedTTestResult t = PairedTTest(recalls_a, recalls_b);
+      tests.push_back({{"ranking", ranking},
+                       {"a", a},
+                       {"b", b},
+                       {"recalls_a", recalls_a},
+                       {"recalls_b", recalls_b},
+                       {"sets", t.pairs},
+                       {"mean_difference", t.mean_difference},
+                       {"t", t.t},  // infinite: null
+                       {"p", t.p}});
+      std::printf("%-10s %-12s %-12s %5d %15.2f%% %9.3f %9.4f\n", ranking, a, b, t.pairs,
+                  100 * t.mean_difference, t.t, t.p);
+    }
+  }
+  if (tables.size() < 2) std::printf("one set alone says nothing: p is 1 by definition\n");
+  if (!arguments.out.empty()) WriteText(arguments.out, tests.dump(2) + "\n");
+  return 0;
+}
+
+}  // namespace
+
+void AddCompareLoopsCommand(CLI::App& app, int& exit_code) {
+  auto arguments = std::make_shared<CompareArguments>();
+  CLI::App* command = app.add_subcommand(
+      "compare-loops",
+      "paired t-test between rules over the tables of several image sets (recall at 100 % precision)");
+  command->add_option("tables", arguments->tables, "table.json files of `tutti loops --table`, one per set")
+      ->required();
+  command->add_option("--out", arguments->out, "JSON file for the outcome (default: print only)");
+  command->callback([arguments, &exit_code] { exit_code = CompareLoops(*arguments); });
+}
+
+}  // namespace tutti::cli

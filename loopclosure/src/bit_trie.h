@@ -18,7 +18,7 @@ namespace tutti::internal {
 /// about, and no insertion or removal costs more than a walk down.
 class BitTrie {
  public:
-  static constexpr int kLeaf = 4;
+  static constexpr int kLeaf = 8;
 
   BitTrie(int bytes, std::mt19937_64& generator) : order_(static_cast<std::size_t>(8 * bytes)) {
     std::iota(order_.begin(), order_.end(), 0);
@@ -66,10 +66,19 @@ class BitTrie {
 
   /// Appends the rows of the leaf that the descriptor falls into, and of those that one other bit leads to.
   void Collect(const std::uint8_t* descriptor, std::vector<int>& rows) const {
+    // The first bits in the trie's order, gathered once: the walks below ask for them again and again.
+    std::array<std::uint8_t, kGathered> bits;
+    const std::size_t gathered = std::min(kGathered, order_.size());
+    for (std::size_t d = 0; d < gathered; ++d) bits[d] = static_cast<std::uint8_t>(Bit(descriptor, d));
+    const auto bit_at = [&](std::size_t depth) -> std::size_t {
+      return depth < kGathered ? bits[depth] : Bit(descriptor, depth);
+    };
     int node = 0;
     for (std::size_t depth = 0; At(node).split; ++depth) {
-      const std::size_t bit = Bit(descriptor, depth);
-      CollectLeaf(descriptor, At(node).child[1 - bit], depth + 1, rows);
+      const std::size_t bit = bit_at(depth);
+      int other = At(node).child[1 - bit];
+      for (std::size_t below = depth + 1; At(other).split; ++below) other = At(other).child[bit_at(below)];
+      AppendRows(other, rows);
       node = At(node).child[bit];
     }
     AppendRows(node, rows);
@@ -157,12 +166,6 @@ class BitTrie {
     if (others.empty()) overflow_.erase(more);
   }
 
-  void CollectLeaf(const std::uint8_t* descriptor, int node, std::size_t depth,
-                   std::vector<int>& rows) const {
-    for (; At(node).split; ++depth) node = At(node).child[Bit(descriptor, depth)];
-    AppendRows(node, rows);
-  }
-
   void AppendRows(int node, std::vector<int>& rows) const {
     const Node& leaf = At(node);
     rows.insert(rows.end(), leaf.rows.data(), leaf.rows.data() + std::min(leaf.count, kLeaf));
@@ -170,6 +173,8 @@ class BitTrie {
     const std::vector<int>& more = overflow_.at(node);
     rows.insert(rows.end(), more.begin(), more.end());
   }
+
+  static constexpr std::size_t kGathered = 32;
 
   std::vector<int> order_;  // of the bits
   std::vector<Node> nodes_;

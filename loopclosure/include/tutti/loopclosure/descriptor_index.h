@@ -13,8 +13,8 @@ namespace tutti {
 struct TwoNearest {
   int first = -1;   ///< index of the nearest, -1 if there is none
   int second = -1;  ///< index of the second, -1 if there is none
-  float first_distance = std::numeric_limits<float>::infinity();
-  float second_distance = std::numeric_limits<float>::infinity();
+  float first_distance = std::numeric_limits<float>::infinity();   ///< to the nearest
+  float second_distance = std::numeric_limits<float>::infinity();  ///< to the second
 
   /// Takes one more candidate in; a candidate that is there already changes nothing. Ties: the smaller index.
   void Offer(int index, float distance);
@@ -30,6 +30,7 @@ class DescriptorIndex {
   /// The (approximately) two nearest rows of one descriptor, a row of a cv::Mat of the index's type and
   /// width.
   virtual TwoNearest Search(const std::uint8_t* descriptor) const = 0;
+  /// Number of rows.
   virtual int size() const = 0;
 };
 

@@ -25,15 +25,18 @@ struct PrecisionRecall {
   double threshold = 0;  ///< H of the last one taken
 };
 
+/// How good it was on one image set. Shares are 0..1.
 struct LoopEvaluation {
-  int images = 0;
-  int rows_with_loop = 0;
-  double recall_at_100_precision = 0;  ///< the largest recall before the first false positive
-  double area_under_curve = 0;         ///< sum of precision x growth of recall
-  double best_f1 = 0;
-  PrecisionRecall at_default_threshold;
-  std::vector<PrecisionRecall> curve;
-  int true_positives = 0, false_positives = 0, ignored = 0;  ///< at the default threshold
+  int images = 0;                        ///< observed
+  int rows_with_loop = 0;                ///< of the ground truth: what recall is a share of
+  double recall_at_100_precision = 0;    ///< the largest recall before the first false positive
+  double area_under_curve = 0;           ///< sum of precision x growth of recall
+  double best_f1 = 0;                    ///< the largest 2 P R / (P + R) over all thresholds
+  PrecisionRecall at_default_threshold;  ///< at the threshold that was given
+  std::vector<PrecisionRecall> curve;    ///< one point for each H that occurs, descending
+  int true_positives = 0;                ///< at the default threshold
+  int false_positives = 0;               ///< at the default threshold
+  int ignored = 0;                       ///< at the default threshold: on a grey cell of the ground truth
 };
 
 /// Ranks by H alone and takes the posterior's best location: without verification. At the default threshold:

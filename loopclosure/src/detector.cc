@@ -235,13 +235,19 @@ class LoopDetector::Impl {
         const int best = posterior.Best();
         if (best >= 0) opinion.best = memory_.id(best);
         if (combined.best >= 0) opinion.at_candidate = posterior.places[Index(combined.best)];
+        if (options_.keep_posterior) opinion.posterior_by_location = ByLocation(posterior);
       }
       result.members.push_back(opinion);
     }
-    if (!options_.keep_posterior) return;
-    for (const int slot : memory_.working_memory()) {
-      result.posterior_by_location.emplace_back(memory_.id(slot), PosteriorAt(combined.belief, slot));
-    }
+    if (options_.keep_posterior) result.posterior_by_location = ByLocation(combined.belief);
+  }
+
+  // Pairs of id and probability for all of working memory.
+  std::vector<std::pair<std::int64_t, double>> ByLocation(const Belief& belief) const {
+    std::vector<std::pair<std::int64_t, double>> all;
+    for (const int slot : memory_.working_memory())
+      all.emplace_back(memory_.id(slot), PosteriorAt(belief, slot));
+    return all;
   }
 
   // 0 for a place that the belief does not reach.

@@ -44,6 +44,7 @@ struct MemberOpinion {
   double hypothesis = 0;    ///< H = 1 - p(new place)
   std::int64_t best = -1;   ///< id of its best location, -1 if none
   double at_candidate = 0;  ///< its posterior at the ensemble's candidate
+  std::vector<std::pair<std::int64_t, double>> posterior_by_location;  ///< only with keep_posterior
 };
 
 /// A matched feature: pixel in the query and in the candidate, and their indices in the callers' FeatureSets

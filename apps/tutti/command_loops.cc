@@ -13,6 +13,8 @@
 #include "command_loops_input.h"
 #include "command_loops_output.h"
 #include "commands.h"
+#include "joined_pairs.h"
+#include "posteriors_csv.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 #include "tutti/loopclosure/detector.h"
@@ -47,14 +49,14 @@ std::optional<PinholeCamera> ParseCamera(const std::string& text) {
   return camera;
 }
 
-LoopRow Process(const std::filesystem::path& file, int number, const std::optional<PinholeCamera>& camera,
-                LoopDetector& detector) {
+LoopRow Process(const std::filesystem::path& file, const std::filesystem::path& right, int number,
+                const std::optional<PinholeCamera>& camera, LoopDetector& detector) {
   LoopRow row;
   row.file = file.filename().string();
   LoopQuery query;
   query.id = number;
   query.stamp_s = number;
-  query.image = cv::imread(file.string(), cv::IMREAD_UNCHANGED);
+  query.image = right.empty() ? cv::imread(file.string(), cv::IMREAD_UNCHANGED) : ReadJoined(file, right);
   row.read = !query.image.empty();
   if (row.read && camera) {
     query.camera = camera;
@@ -69,6 +71,9 @@ LoopRow Process(const std::filesystem::path& file, int number, const std::option
 
 int RunLoops(const LoopsArguments& given) {
   LoopsArguments arguments = given;
+  if (arguments.truth.join_pairs && !arguments.camera.empty())
+    throw InputError(
+        "--camera: images that --join-pairs joins have no common camera; leave one of the two out");
   if (arguments.truth.stride < 1) throw InputError("--stride must be at least 1");
   SetRule(arguments.rule, arguments.options);
   const std::string problem = arguments.truth.rule.Validate();
@@ -87,6 +92,8 @@ int RunLoops(const LoopsArguments& given) {
                                 return std::filesystem::equivalent(p, arguments.truth.file, error);
                               }),
                images.end());
+  std::vector<std::filesystem::path> rights(images.size());
+  if (arguments.truth.join_pairs) rights = TakeRightImages(arguments.images, images);
   run.truth = LoadGroundTruth(arguments.truth, images);
   const std::optional<PinholeCamera> camera = ParseCamera(arguments.camera);
   LoopDetector detector(arguments.options);
@@ -98,7 +105,7 @@ int RunLoops(const LoopsArguments& given) {
     Progress progress("loops", total);
     for (std::size_t i = 0; i < images.size(); i += static_cast<std::size_t>(run.stride)) {
       if (InterruptGuard::Requested()) break;
-      run.rows.push_back(Process(images[i], static_cast<int>(run.rows.size()), camera, detector));
+      run.rows.push_back(Process(images[i], rights[i], static_cast<int>(run.rows.size()), camera, detector));
       const LoopRow& row = run.rows.back();
       if (!row.read)
         progress.Note("tutti: warning: " + images[i].string() +
@@ -109,6 +116,8 @@ int RunLoops(const LoopsArguments& given) {
     progress.Finish();
   }
   WriteLoopRun(run, arguments.out);
+  if (run.options.keep_posterior)
+    WritePosteriors(run, std::filesystem::path(arguments.out) / "posteriors.csv");
   if (run.rows.size() < total) {
     std::fprintf(stderr, "tutti: interrupted after %zu of %zu images; the results are of those\n",
                  run.rows.size(), total);
@@ -131,6 +140,10 @@ void AddLoopsCommand(CLI::App& app, int& exit_code) {
       ->required();
   command->add_option("--out", arguments->out, "folder for results.json and hypotheses.csv")->required();
   command->add_option("--stride", arguments->truth.stride, "every n-th image")->capture_default_str();
+  command->add_flag("--join-pairs", arguments->truth.join_pairs,
+                    "two images in a row, left and right, make one image (City Centre, New College)");
+  command->add_flag("--keep-posterior", arguments->options.keep_posterior,
+                    "also write posteriors.csv: what each member believed of each location");
   command
       ->add_option("--rule", arguments->rule,
                    "mean, product, majority, naive, or one member: surf, sift, orb, akaze, brisk")

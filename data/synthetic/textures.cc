@@ -297,6 +297,48 @@ cv::Mat ShelfTexture(std::uint64_t seed) {
   return image;
 }
 
+cv::Mat PlasterTexture(std::uint64_t seed) {
+  cv::Mat image = Plain(256, 256, 182);
+  AddNoise(image, 128, 2.5, seed);
+  Box(image, 0, 246, 256, 10, 95);  // skirting board
+  return image;
+}
+
+cv::Mat PanelTexture(std::uint64_t seed, double grey) {
+  cv::Mat image = Plain(256, 256, grey);
+  AddNoise(image, 32, 2.5, seed);
+  for (int at = 0; at < 256; at += 64) {
+    Box(image, at, 0, 1, 256, grey - 22);
+    Box(image, 0, at, 256, 1, grey - 22);
+  }
+  return image;
+}
+
+cv::Mat DoorTexture(std::uint64_t seed) {
+  Random random(seed);
+  cv::Mat image = Plain(128, 256, random.In(205, 230));  // the frame
+  const double leaf = random.In(90, 150);
+  Box(image, 8, 8, 112, 248, leaf);
+  if (random.Unit() < 0.5) Box(image, 74, 26, 28, 90, leaf - 65);  // a pane
+  Box(image, 14, 132, 16, 5, 235);                                 // the handle
+  Box(image, 14, 120, 7, 30, 205);
+  Box(image, 8, 228, 112, 20, leaf - 25);
+  AddNoise(image, 64, 2, random.Bits());
+  return image;
+}
+
+cv::Mat LampTexture() {
+  cv::Mat image = Plain(64, 64, 250);
+  cv::rectangle(image, cv::Rect(0, 0, 64, 64), cv::Scalar(170), 3);
+  return image;
+}
+
+cv::Mat RadiatorTexture() {
+  cv::Mat image = Plain(128, 64, 205);
+  for (int x = 4; x < 128; x += 10) Box(image, x, 4, 3, 56, 150);
+  return image;
+}
+
 cv::Mat WallpaperTexture(std::uint64_t seed) {
   Random random(seed);
   cv::Mat image = Plain(512, 512, random.In(150, 200));

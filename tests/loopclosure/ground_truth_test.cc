@@ -72,6 +72,12 @@ TEST(LoopMatrix, BadFilesSayWhatIsWrongAndWhere) {
   EXPECT_FALSE(Problem(WriteFile("a.png", std::string("\x89PNG\r\n\x1a\n\0\0garbage", 18))).empty());
 }
 
+// Found by fuzzing (tests/fuzz): the message made an integer of it.
+TEST(LoopMatrix, APairBeyondAllIntegersIsAnErrorThatShowsIt) {
+  EXPECT_NE(Problem(WriteFile("t.txt", "444444444444444444444 4\n")).find("4.44444e+20 4"),
+            std::string::npos);
+}
+
 TEST(LoopMatrix, StridedKeepsEveryNthRowAndColumn) {
   LoopGroundTruth truth(10);
   truth.Set(8, 4, LoopLabel::kLoop);
@@ -80,6 +86,22 @@ TEST(LoopMatrix, StridedKeepsEveryNthRowAndColumn) {
   EXPECT_EQ(strided.size(), 3);
   EXPECT_EQ(strided.At(2, 1), LoopLabel::kLoop);
   EXPECT_EQ(strided.RowsWithLoop(), 1);
+}
+
+TEST(LoopMatrix, JoinedPairsTakeTheStrongestOfFourLabels) {
+  LoopGroundTruth single(6);
+  single.description = "singles.mat";
+  single.Set(1, 0, LoopLabel::kLoop);    // left and right of one pair: no loop
+  single.Set(4, 1, LoopLabel::kLoop);    // the way back: left against right
+  single.Set(5, 0, LoopLabel::kIgnore);  // weaker than the loop above
+  single.Set(5, 3, LoopLabel::kIgnore);
+  const LoopGroundTruth pairs = single.PairsJoined();
+  EXPECT_EQ(pairs.size(), 3);
+  EXPECT_EQ(pairs.At(2, 0), LoopLabel::kLoop);
+  EXPECT_EQ(pairs.At(2, 1), LoopLabel::kIgnore);
+  EXPECT_EQ(pairs.At(1, 0), LoopLabel::kNone);
+  EXPECT_EQ(pairs.RowsWithLoop(), 1);
+  EXPECT_NE(pairs.description.find("joined"), std::string::npos);
 }
 
 TEST(LoopMatrix, OnlyThePastCounts) {

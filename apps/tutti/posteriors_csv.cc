@@ -11,15 +11,16 @@ namespace {
 
 constexpr double kWorthALine = 1e-4;
 
-std::string Lines(const LoopRow& row) {
+std::string Lines(const LoopRow& row, const LoopGroundTruth& truth) {
   const LoopResult& r = row.result;
   std::string text;
   for (std::size_t i = 0; i < r.posterior_by_location.size(); ++i) {
     const auto& [location, combined] = r.posterior_by_location[i];
     double most = combined;
+    const LoopLabel label = truth.At(static_cast<int>(r.query), static_cast<int>(location));
     char number[64];
-    std::snprintf(number, sizeof number, "%ld,%ld,%.6g", static_cast<long>(r.query),
-                  static_cast<long>(location), combined);
+    std::snprintf(number, sizeof number, "%ld,%ld,%d,%.6g", static_cast<long>(r.query),
+                  static_cast<long>(location), static_cast<int>(label), combined);
     std::string line = number;
     for (const MemberOpinion& member : r.members) {
       // A member that sat this image out has no posterior of it.
@@ -29,7 +30,7 @@ std::string Lines(const LoopRow& row) {
       std::snprintf(number, sizeof number, ",%.6g", value);
       line += number;
     }
-    if (most >= kWorthALine) text += line + "\n";
+    if (most >= kWorthALine || label == LoopLabel::kLoop) text += line + "\n";
   }
   return text;
 }
@@ -38,10 +39,10 @@ std::string Lines(const LoopRow& row) {
 
 void WritePosteriors(const LoopRun& run, const std::filesystem::path& file) {
   std::ofstream out(file, std::ios::binary);
-  out << "image,location,combined";
+  out << "image,location,truth,combined";
   for (const std::string& name : run.options.members) out << "," << name;
   out << "\n";
-  for (const LoopRow& row : run.rows) out << Lines(row);
+  for (const LoopRow& row : run.rows) out << Lines(row, run.truth);
   out.close();
   if (!out) throw InputError(file.string() + ": can't be written; is there space, and may you write there?");
 }

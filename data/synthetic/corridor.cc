@@ -46,9 +46,7 @@ class CorridorBuilder {
 
  private:
   void MakeTextures() {
-    plaster_ = scene_.Add(PlasterTexture(random_.Bits()));
-    ceiling_ = scene_.Add(PanelTexture(random_.Bits(), 215));
-    floor_ = scene_.Add(PanelTexture(random_.Bits(), 120));
+    ceiling_ = scene_.Add(PanelTexture(random_.Bits(), 215, 0));
     lamp_ = scene_.Add(LampTexture());
     radiator_ = scene_.Add(RadiatorTexture());
     for (int i = 0; i < 3; ++i) doors_.push_back(scene_.Add(DoorTexture(random_.Bits())));
@@ -73,9 +71,17 @@ class CorridorBuilder {
     scene_.faces.push_back(face);
   }
 
+  // Floor and walls bear traces of use that no other place has; the ceiling is everywhere the same.
   void AddFloorAndCeiling(const Rectangle& r) {
     constexpr double kPanels = 2.4;  // side of what a texture shows [m]
-    Add({-r.x, r.y, 0}, {2 * r.x, 0, 0}, {0, -2 * r.y, 0}, floor_, 2 * r.x / kPanels, 2 * r.y / kPanels);
+    const double core_x = way_.x - kHalfWidth, core_y = way_.y - kHalfWidth;
+    for (double x = -r.x; x < r.x; x += kPanels) {
+      for (double y = -r.y; y < r.y; y += kPanels) {
+        if (x > -core_x && x + kPanels < core_x && y > -core_y && y + kPanels < core_y) continue;
+        Add({x, y + kPanels, 0}, {kPanels, 0, 0}, {0, -kPanels, 0},
+            scene_.Add(PanelTexture(random_.Bits(), 120, 6)));
+      }
+    }
     Add({r.x, r.y, kHeight}, {-2 * r.x, 0, 0}, {0, -2 * r.y, 0}, ceiling_, 2 * r.x / kPanels,
         2 * r.y / kPanels);
   }
@@ -97,7 +103,12 @@ class CorridorBuilder {
   void AddWall(const Vector2d& left, const Vector2d& right, double length) {
     const Vector3d start(left.x(), left.y(), 0), along(right.x(), right.y(), 0),
         out(right.y(), -right.x(), 0);
-    Add(start + Vector3d(0, 0, kHeight), length * along, {0, 0, -kHeight}, plaster_, length / kHeight);
+    const int pieces = static_cast<int>(std::ceil(length / kHeight));
+    const double piece = length / pieces;
+    for (int k = 0; k < pieces; ++k) {  // worn differently everywhere
+      Add(start + k * piece * along + Vector3d(0, 0, kHeight), piece * along, {0, 0, -kHeight},
+          scene_.Add(PlasterTexture(random_.Bits())));
+    }
     for (double at = random_.In(1.2, 3); at < length - 2.4;) {
       at += AddThing(start + at * along + kBesideDoors * out, along) + random_.In(0.8, 2.6);
     }
@@ -141,7 +152,7 @@ class CorridorBuilder {
   Random random_;
   const Rectangle way_;
   Scene scene_;
-  int plaster_ = 0, ceiling_ = 0, floor_ = 0, lamp_ = 0, radiator_ = 0;
+  int ceiling_ = 0, lamp_ = 0, radiator_ = 0;
   std::vector<int> doors_, notices_;
 };
 

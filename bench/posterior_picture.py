@@ -17,7 +17,7 @@ import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 PANEL, GAP, LEFT, TOP, CURVE = 250, 22, 46, 30, 70  # [px]
-FAINTEST = 0.01  # posteriors below are left white
+FAINTEST, DARKEST = 0.005, 0.3  # posteriors below are white, above of full colour
 COLOURS = {"surf": "#1b6ca8", "sift": "#2a8f4f", "orb": "#c8641b", "combined": "#222222"}
 
 
@@ -58,16 +58,26 @@ class Picture:
         for (image, location), p in posterior.items():
             if p < FAINTEST or not self.first <= image <= self.last or location >= self.locations:
                 continue
-            by_shade[max(1, min(10, round(10 * p ** 0.5)))].append((image, location))
+            by_shade[max(1, min(10, round(10 * (p / DARKEST) ** 0.5)))].append((image, location))
         for shade, cells in sorted(by_shade.items()):
             path = "".join(f"M{left + x * self.cell_x:.1f} {TOP + (y - self.first) * self.cell_y:.1f}"
                            f"h{self.cell_x:.1f}v{self.cell_y:.1f}h-{self.cell_x:.1f}z" for y, x in sorted(cells))
             self.parts.append(f'<path fill="{colour}" fill-opacity="{shade / 10}" d="{path}"/>')
 
     def truth(self, left, pairs):
-        path = "".join(f"M{left + x * self.cell_x:.1f} {TOP + (y - self.first) * self.cell_y:.1f}"
-                       f"h{self.cell_x:.1f}v{self.cell_y:.1f}h-{self.cell_x:.1f}z" for y, x in sorted(pairs))
-        self.parts.append(f'<path fill="none" stroke="#d03030" stroke-width="0.6" d="{path}"/>')
+        """The border of the true pairs."""
+        path = ""
+        for y, x in sorted(pairs):
+            px, py = left + x * self.cell_x, TOP + (y - self.first) * self.cell_y
+            if (y - 1, x) not in pairs:
+                path += f"M{px:.1f} {py:.1f}h{self.cell_x:.1f}"
+            if (y + 1, x) not in pairs:
+                path += f"M{px:.1f} {py + self.cell_y:.1f}h{self.cell_x:.1f}"
+            if (y, x - 1) not in pairs:
+                path += f"M{px:.1f} {py:.1f}v{self.cell_y:.1f}"
+            if (y, x + 1) not in pairs:
+                path += f"M{px + self.cell_x:.1f} {py:.1f}v{self.cell_y:.1f}"
+        self.parts.append(f'<path fill="none" stroke="#d03030" stroke-width="0.7" d="{path}"/>')
 
     def curve(self, left, values, colour):
         top = TOP + PANEL + GAP

@@ -42,7 +42,7 @@ SETS = {
         "Lip6 Indoor", 388, ["lip6_indoor", "Lip6IndoorDataSet"], ["Lip6IndoorGroundTruth.mat"],
         [74.77, 38.49, 2.21, 73.45, 80.53], "98 (RTAB-Map, tuned SURF)",
         ["--sensor", "mono", "--world", "corridor", "--width", "240", "--height", "192", "--corridor", "42",
-         "--speed", "0.65", "--rate", "1", "--laps", "3", "--repeat", "0.4", "--noise", "3", "--moving-objects", "2"],
+         "--speed", "0.65", "--rate", "1", "--laps", "3", "--repeat", "0.3", "--noise", "2", "--moving-objects", "2"],
         ["--gt-distance", "1.5", "--gt-angle", "30", "--gt-ignore", "4", "--gt-exclude-s", "30"]),
     "lip6_outdoor": DataSet(
         "Lip6 Outdoor", 1063, ["lip6_outdoor", "Lip6OutdoorDataSet"], ["Lip6OutdoorGroundTruth.mat"],

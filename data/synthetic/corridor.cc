@@ -46,10 +46,9 @@ class CorridorBuilder {
 
  private:
   void MakeTextures() {
-    ceiling_ = scene_.Add(PanelTexture(random_.Bits(), 215, 0));
     lamp_ = scene_.Add(LampTexture());
     radiator_ = scene_.Add(RadiatorTexture());
-    for (int i = 0; i < 3; ++i) doors_.push_back(scene_.Add(DoorTexture(random_.Bits())));
+    for (int i = 0; i < 5; ++i) doors_.push_back(scene_.Add(DoorTexture(random_.Bits())));
     for (int i = 0; i < 2; ++i) notices_.push_back(scene_.Add(SignTexture(random_.Bits())));
     const int cloth = scene_.Add(WallpaperTexture(random_.Bits())),
               hair = scene_.Add(FoliageTexture(random_.Bits()));
@@ -71,7 +70,7 @@ class CorridorBuilder {
     scene_.faces.push_back(face);
   }
 
-  // Floor and walls bear traces of use that no other place has; the ceiling is everywhere the same.
+  // Floor, ceiling and walls bear traces of use that no other place has.
   void AddFloorAndCeiling(const Rectangle& r) {
     constexpr double kPanels = 2.4;  // side of what a texture shows [m]
     const double core_x = way_.x - kHalfWidth, core_y = way_.y - kHalfWidth;
@@ -79,11 +78,11 @@ class CorridorBuilder {
       for (double y = -r.y; y < r.y; y += kPanels) {
         if (x > -core_x && x + kPanels < core_x && y > -core_y && y + kPanels < core_y) continue;
         Add({x, y + kPanels, 0}, {kPanels, 0, 0}, {0, -kPanels, 0},
-            scene_.Add(PanelTexture(random_.Bits(), 120, 6)));
+            scene_.Add(PanelTexture(random_.Bits(), 120, 8)));
+        Add({x + kPanels, y + kPanels, kHeight}, {-kPanels, 0, 0}, {0, -kPanels, 0},
+            scene_.Add(PanelTexture(random_.Bits(), 215, 3)));
       }
     }
-    Add({r.x, r.y, kHeight}, {-2 * r.x, 0, 0}, {0, -2 * r.y, 0}, ceiling_, 2 * r.x / kPanels,
-        2 * r.y / kPanels);
   }
 
   void AddLamps() {
@@ -94,8 +93,10 @@ class CorridorBuilder {
       scene_.faces.back().emits = true;
     };
     for (const double side : {-1.0, 1.0}) {
-      for (double x = -way_.x + 1; x < way_.x; x += kPitch) lamp({x, side * way_.y}, {kLong, kWide});
-      for (double y = -way_.y + 2.5; y < way_.y - 1; y += kPitch) lamp({side * way_.x, y}, {kWide, kLong});
+      for (double x = -way_.x + 1; x < way_.x; x += kPitch + random_.In(-0.6, 0.6))
+        lamp({x, side * way_.y}, {kLong, kWide});
+      for (double y = -way_.y + 2.5; y < way_.y - 1; y += kPitch + random_.In(-0.6, 0.6))
+        lamp({side * way_.x, y}, {kWide, kLong});
     }
   }
 
@@ -152,7 +153,7 @@ class CorridorBuilder {
   Random random_;
   const Rectangle way_;
   Scene scene_;
-  int ceiling_ = 0, lamp_ = 0, radiator_ = 0;
+  int lamp_ = 0, radiator_ = 0;
   std::vector<int> doors_, notices_;
 };
 

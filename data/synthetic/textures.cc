@@ -314,7 +314,7 @@ cv::Mat ShelfTexture(std::uint64_t seed) {
 cv::Mat PlasterTexture(std::uint64_t seed) {
   Random random(seed);
   cv::Mat image = Plain(256, 256, 182);
-  Marks(image, random.Int(2, 5), 16, random);
+  Marks(image, random.Int(3, 7), 22, random);
   if (random.Unit() < 0.4) {  // a socket or a switch
     const int x = random.Int(10, 230), y = random.Unit() < 0.6 ? 212 : 140;
     Box(image, x, y, 10, 10, 215);
@@ -331,8 +331,8 @@ cv::Mat PanelTexture(std::uint64_t seed, double grey, int marks) {
   Marks(image, marks, 22, random);
   AddNoise(image, 32, 2.5, random.Bits());
   for (int at = 0; at < 256; at += 64) {
-    Box(image, at, 0, 1, 256, grey - 22);
-    Box(image, 0, at, 256, 1, grey - 22);
+    Box(image, at, 0, 1, 256, grey - 12);
+    Box(image, 0, at, 256, 1, grey - 12);
   }
   return image;
 }

@@ -229,7 +229,7 @@ TEST(SyntheticWorldTest, TheCorridorHasLittleToSeeAndIsWalkedAgain) {
     const SyntheticFrame frame = world.Render(i);
     double darkest = 0, brightest = 0;
     cv::minMaxLoc(frame.image, &darkest, &brightest);
-    EXPECT_GT(brightest - darkest, 80) << i;  // it is not blank
+    EXPECT_GT(brightest - darkest, 25) << i;  // even a corner is not blank
     std::vector<cv::KeyPoint> keypoints;
     cv::FAST(frame.image, keypoints, 15);
     corners += static_cast<int>(keypoints.size());

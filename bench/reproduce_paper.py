@@ -92,7 +92,7 @@ def pairs_in(images, s):
     expected = s.images * (2 if s.pairs else 1)
     if count not in (expected, s.images):
         print(f"{s.title}: {count} images, {expected} expected; is the archive complete?", file=sys.stderr)
-    return s.pairs and count == expected
+    return s.pairs and count != s.images
 
 
 def stand_in(tutti, out, s, name):
@@ -180,7 +180,7 @@ def main():
     out.mkdir(parents=True, exist_ok=True)
     tutti = pathlib.Path(a.tutti).resolve()
     data = pathlib.Path(a.data).resolve() if a.data else None
-    runs = []
+    runs, failed = [], False
     for name in a.only or SETS:
         s = SETS[name]
         try:
@@ -192,14 +192,19 @@ def main():
             given, label = stand_in(tutti, out, s, name), f"{s.title} stand-in"
         folder = out / label.lower().replace(" ", "_").replace("-", "_")
         print(f"== {label}", file=sys.stderr)
-        runs.append((s, label, *run_rules(tutti, given, folder)))
+        try:
+            runs.append((s, label, *run_rules(tutti, given, folder)))
+        except subprocess.CalledProcessError as e:  # tutti has said why
+            print(f"{label}: FAILED: {' '.join(str(w) for w in e.cmd)}", file=sys.stderr)
+            failed = True
     if not runs:
-        print("nothing to run: give --data FOLDER, or --stand-ins", file=sys.stderr)
+        if not failed:
+            print("nothing to run: give --data FOLDER, or --stand-ins", file=sys.stderr)
         return 1
     text = report(runs)
     (out / "tables.md").write_text(text)
     print(text + f"written: {out / 'tables.md'}")
-    return 0
+    return 1 if failed else 0
 
 
 if __name__ == "__main__":

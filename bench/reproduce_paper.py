@@ -48,15 +48,15 @@ SETS = {
         "Lip6 Outdoor", 1063, ["lip6_outdoor", "Lip6OutdoorDataSet"], ["Lip6OutdoorGroundTruth.mat"],
         [95.3, 24.16, 59.86, 96.3, 97.79], "95 (RTAB-Map)",
         ["--sensor", "mono", "--world", "town", "--width", "240", "--height", "192", "--focal", "190", "--blocks-x", "3",
-         "--blocks-y", "3", "--speed", "1.4", "--rate", "1", "--laps", "4", "--noise", "3", "--lighting-change",
-         "--moving-objects", "8"],
+         "--blocks-y", "3", "--speed", "1.4", "--rate", "1", "--laps", "4", "--roads", "300", "--noise", "3",
+         "--lighting-change", "--moving-objects", "8"],
         ["--gt-distance", "3", "--gt-angle", "30", "--gt-ignore", "8", "--gt-exclude-s", "30"]),
     "city_centre": DataSet(
         "City Centre", 1237, ["city_centre", "CityCentre"],
         ["CityCentreGroundTruth.mat", "city_GT_final.mat", "city_centre_htmap.mat"],
         [86.36, 85.02, 64.39, 73.44, 87.92], "81 (RTAB-Map)",
         ["--sensor", "sides", "--world", "town", "--width", "320", "--height", "240", "--blocks-x", "5", "--blocks-y", "4",
-         "--speed", "6", "--rate", "4", "--laps", "4", "--repeat", "0.85", "--signs", "0.25", "--noise", "3",
+         "--speed", "6", "--rate", "4", "--laps", "4", "--repeat", "0.85", "--signs", "0.25", "--roads", "40", "--noise", "3",
          "--lighting-change", "--moving-objects", "10"],
         ["--gt-distance", "3", "--gt-angle", "30", "--gt-ignore", "8", "--gt-exclude-s", "10"], pairs=True),
 }

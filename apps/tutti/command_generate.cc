@@ -130,6 +130,8 @@ void AddOptions(CLI::App& c, GenerateArguments& a) {
       ->capture_default_str();
   c.add_option("--signs", w.sign_fraction, "town: part of the signs that are there [0..1]; no two look alike")
       ->capture_default_str();
+  c.add_option("--roads", w.road_surfaces, "town: number of road surfaces that differ; few are aliasing, too")
+      ->capture_default_str();
   c.add_option("--corridor", w.corridor_m, "corridor: longer side of the ring [m]; the other is half of it")
       ->capture_default_str();
   c.add_option("--sides", w.sides_deg, "sensor sides: each camera looks so far from the way [deg]")

@@ -42,6 +42,8 @@ struct SyntheticOptions {
   double repeat_fraction = 0.3;
   double sign_fraction =
       1;  ///< of the town's posters and shop signs that are there [0..1]; no two look alike
+  int road_surfaces =
+      6;  ///< different ones, each with its cracks, patches and manhole: few are aliasing, too
 
   // The corridor: a ring, twice as long as wide.
   double corridor_m = 40;  ///< its longer side [m]

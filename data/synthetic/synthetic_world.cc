@@ -30,6 +30,7 @@ std::string SyntheticOptions::Validate() const {
   if (!(street_m >= 9 && street_m <= 30)) return "street_m must be 9 to 30 m";
   if (!(repeat_fraction >= 0 && repeat_fraction <= 1)) return "repeat_fraction must be 0 to 1";
   if (!(sign_fraction >= 0 && sign_fraction <= 1)) return "sign_fraction must be 0 to 1";
+  if (road_surfaces < 1 || road_surfaces > 1000) return "road_surfaces must be 1 to 1000";
   if (!(corridor_m >= 12 && corridor_m <= 500)) return "corridor_m must be 12 to 500 m";
   if (!(sides_deg > 0 && sides_deg <= 120)) return "sides_deg must be above 0 and at most 120 degrees";
   if (!(noise_sigma >= 0 && noise_sigma <= 100)) return "noise_sigma must be 0 to 100 grey levels";

@@ -52,7 +52,7 @@ class TownBuilder {
   void MakeTextures() {
     for (int i = 0; i < kFacades; ++i) facades_.push_back(scene_.Add(FacadeTexture(Seed())));
     for (int i = 0; i < 8; ++i) walls_.push_back(scene_.Add(WallTexture(Seed())));
-    for (int i = 0; i < 6; ++i) roads_.push_back(scene_.Add(RoadTexture(Seed(), false)));
+    for (int i = 0; i < options_.road_surfaces; ++i) roads_.push_back(scene_.Add(RoadTexture(Seed(), false)));
     for (int i = 0; i < 3; ++i) crossings_.push_back(scene_.Add(RoadTexture(Seed(), true)));
     for (int i = 0; i < 6; ++i) {
       BoxTextures car;

@@ -50,9 +50,12 @@ class ProgressLine {
 
 int Generate(const GenerateArguments& arguments) {
   SyntheticOptions wanted = arguments.world;
-  wanted.scene = arguments.scene == "room" ? SyntheticScene::kRoom : SyntheticScene::kTown;
+  wanted.scene = arguments.scene == "room"       ? SyntheticScene::kRoom
+                 : arguments.scene == "corridor" ? SyntheticScene::kCorridor
+                                                 : SyntheticScene::kTown;
   wanted.sensor = arguments.sensor == "rgbd"     ? SyntheticSensor::kRgbd
                   : arguments.sensor == "stereo" ? SyntheticSensor::kStereo
+                  : arguments.sensor == "sides"  ? SyntheticSensor::kSides
                                                  : SyntheticSensor::kMono;
   const SyntheticWorld world(wanted);
   const SyntheticOptions& o = world.Options();
@@ -74,6 +77,13 @@ int Generate(const GenerateArguments& arguments) {
                  world.Size());
     return 130;
   }
+  if (o.sensor == SyntheticSensor::kSides) {
+    std::printf(
+        "%s: %zu pairs of images with ground truth. Next:\n  tutti loops --join-pairs --images %s/images "
+        "--ground-truth %s/poses.txt --out %s_loops\n",
+        d, written, d, d, d);
+    return 0;
+  }
   std::printf(
       "%s: %zu frames with ground truth. Next:\n  tutti run --config %s/config.yaml --dataset %s --out "
       "%s_run\n",
@@ -86,12 +96,16 @@ void AddOptions(CLI::App& c, GenerateArguments& a) {
   c.add_option("--out", a.out, "folder to write; made if missing, must be empty")
       ->required()
       ->type_name("DIR");
-  c.add_option("--sensor", a.sensor, "mono, stereo (both in the KITTI layout) or rgbd (TUM layout)")
+  c.add_option(
+       "--sensor", a.sensor,
+       "mono, stereo (both in the KITTI layout), rgbd (TUM layout) or sides (pairs that look left and right)")
       ->required()
-      ->check(CLI::IsMember({"mono", "stereo", "rgbd"}))
+      ->check(CLI::IsMember({"mono", "stereo", "rgbd", "sides"}))
       ->type_name("NAME");
-  c.add_option("--world", a.scene, "town: streets driven through; room: furnished, walked around in")
-      ->check(CLI::IsMember({"town", "room"}))
+  c.add_option(
+       "--world", a.scene,
+       "town: streets driven through; room: furnished, walked around in; corridor: plain walls and doors")
+      ->check(CLI::IsMember({"town", "room", "corridor"}))
       ->type_name("NAME")
       ->capture_default_str();
   c.add_option("--seed", w.seed, "of houses, textures and noise; the same seed gives the same bytes")
@@ -101,18 +115,26 @@ void AddOptions(CLI::App& c, GenerateArguments& a) {
       ->capture_default_str();
   c.add_option("--frames", w.frames, "stop after so many frames; 0: all laps")->capture_default_str();
   c.add_option("--width", w.width, "image width [px] (with --height; default 640)");
-  c.add_option("--height", w.height, "image height [px] (default: town 320, room 480)");
-  c.add_option("--focal", w.focal_px, "focal length [px] (default: town 0.58, room 0.82 of the width)");
+  c.add_option("--height", w.height, "image height [px] (default: town 320, else 480)");
+  c.add_option("--focal", w.focal_px, "focal length [px] (default: town 0.58, else 0.82 of the width)");
   c.add_option("--baseline", w.baseline_m,
-               "stereo: distance of the cameras [m] (default: town 0.54, room 0.12)");
-  c.add_option("--rate", w.rate_hz, "frames per second (default: town 10, room 15)");
-  c.add_option("--speed", w.speed_mps, "on straights [m/s] (default: town 8, room 0.5)");
+               "stereo: distance of the cameras [m] (default: town 0.54, else 0.12)");
+  c.add_option("--rate", w.rate_hz, "frames per second (default: town 10, else 15)");
+  c.add_option("--speed", w.speed_mps, "on straights [m/s] (default: town 8, else 0.5)");
   c.add_option("--blocks-x", w.blocks_x, "town: blocks of houses that the route goes around, in x")
       ->capture_default_str();
   c.add_option("--blocks-y", w.blocks_y, "town: and in y (2 or more in both: an L)")->capture_default_str();
   c.add_option("--block", w.block_m, "town: side of a block [m]")->capture_default_str();
   c.add_option("--repeat", w.repeat_fraction,
-               "town: fraction of the houses that look alike (aliasing) [0..1]")
+               "aliasing [0..1]: part of the houses (corridor: plates, posters) that look alike")
+      ->capture_default_str();
+  c.add_option("--signs", w.sign_fraction, "town: part of the signs that are there [0..1]; no two look alike")
+      ->capture_default_str();
+  c.add_option("--roads", w.road_surfaces, "town: number of road surfaces that differ; few are aliasing, too")
+      ->capture_default_str();
+  c.add_option("--corridor", w.corridor_m, "corridor: longer side of the ring [m]; the other is half of it")
+      ->capture_default_str();
+  c.add_option("--sides", w.sides_deg, "sensor sides: each camera looks so far from the way [deg]")
       ->capture_default_str();
   c.add_option("--noise", w.noise_sigma, "pixel noise [grey levels]; without a number 4")
       ->expected(0, 1)
@@ -122,7 +144,7 @@ void AddOptions(CLI::App& c, GenerateArguments& a) {
       ->default_str("0.02");
   c.add_flag("--lighting-change", w.lighting_change, "another sun, darker, from the second lap on");
   c.add_option("--moving-objects", w.moving_objects,
-               "number of oncoming cars (room: people); without a number 6")
+               "number of oncoming cars (indoors: people); without a number 6")
       ->expected(0, 1)
       ->default_str("6");
   c.add_flag("--kinect-noise", w.kinect_noise, "rgbd: depth noise and holes of a structured-light sensor");
@@ -142,6 +164,7 @@ void AddGenerateCommand(CLI::App& app, int& exit_code) {
       "  tutti generate --out town --sensor stereo                         two laps of 315 m\n"
       "  tutti generate --out block --sensor mono --blocks-x 1 --laps 1.3  a small loop, closed once\n"
       "  tutti generate --out room --sensor rgbd --world room --kinect-noise\n"
+      "  tutti generate --out ring --sensor mono --world corridor --rate 1 --width 240 --height 192\n"
       "  tutti generate --out hard --sensor stereo --noise --blur --lighting-change --moving-objects\n"
       "The folder also gets a config.yaml: tutti run --config town/config.yaml --dataset town --out result");
   auto arguments = std::make_shared<GenerateArguments>();

@@ -15,6 +15,8 @@
 #include "command_loops_pictures.h"
 #include "command_loops_table.h"
 #include "commands.h"
+#include "joined_pairs.h"
+#include "posteriors_csv.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 #include "tutti/loopclosure/detector.h"
@@ -25,7 +27,7 @@ namespace tutti::cli {
 namespace {
 
 struct LoopsArguments {
-  std::string images, out, rule = "mean", camera;
+  std::string images, out, rule = "mean", preset, camera;
   GroundTruthArguments truth;
   LoopDetectorOptions options;
   bool table = false;
@@ -34,6 +36,7 @@ struct LoopsArguments {
 // What every rule of a table shares.
 struct ImageSet {
   std::vector<std::filesystem::path> images;  // strided
+  std::vector<std::filesystem::path> rights;  // beside each of them; empty: none
   LoopGroundTruth truth;
   std::optional<PinholeCamera> camera;
 };
@@ -57,14 +60,14 @@ std::optional<PinholeCamera> ParseCamera(const std::string& text) {
   return camera;
 }
 
-LoopRow Process(const std::filesystem::path& file, int number, const std::optional<PinholeCamera>& camera,
-                LoopDetector& detector) {
+LoopRow Process(const std::filesystem::path& file, const std::filesystem::path& right, int number,
+                const std::optional<PinholeCamera>& camera, LoopDetector& detector) {
   LoopRow row;
   row.file = file.filename().string();
   LoopQuery query;
   query.id = number;
   query.stamp_s = number;
-  query.image = cv::imread(file.string(), cv::IMREAD_UNCHANGED);
+  query.image = right.empty() ? cv::imread(file.string(), cv::IMREAD_UNCHANGED) : ReadJoined(file, right);
   row.read = !query.image.empty();
   if (row.read && camera) {
     query.camera = camera;
@@ -86,10 +89,14 @@ ImageSet LoadImageSet(const LoopsArguments& arguments) {
                                 return std::filesystem::equivalent(p, arguments.truth.file, error);
                               }),
                images.end());
+  std::vector<std::filesystem::path> rights(images.size());
+  if (arguments.truth.join_pairs) rights = TakeRightImages(arguments.images, images);
   ImageSet set;
   set.truth = LoadGroundTruth(arguments.truth, images);
-  for (std::size_t i = 0; i < images.size(); i += static_cast<std::size_t>(arguments.truth.stride))
+  for (std::size_t i = 0; i < images.size(); i += static_cast<std::size_t>(arguments.truth.stride)) {
     set.images.push_back(images[i]);
+    set.rights.push_back(rights[i]);
+  }
   set.camera = ParseCamera(arguments.camera);
   return set;
 }
@@ -106,15 +113,19 @@ LoopRun Run(const LoopsArguments& arguments, const LoopDetectorOptions& options,
   const int total = static_cast<int>(set.images.size());
   int loops = 0;
   Progress progress(arguments.table ? "loops, " + RuleName(options) : "loops", set.images.size());
-  for (const std::filesystem::path& image : set.images) {
+  for (std::size_t i = 0; i < set.images.size(); ++i) {
     if (InterruptGuard::Requested()) break;
-    run.rows.push_back(Process(image, static_cast<int>(run.rows.size()), set.camera, detector));
+    const std::filesystem::path& image = set.images[i];
+    run.rows.push_back(Process(image, set.rights[i], static_cast<int>(i), set.camera, detector));
     LoopRow& row = run.rows.back();
     if (!row.read)
       progress.Note("tutti: warning: " + image.string() +
                     ": can't be read; it counts as an image without features");
     AddPosterior(row.result, total, run.posterior);
-    row.result.posterior_by_location = {};  // what is written needs them no more
+    if (!options.keep_posterior) {  // what is written needs them no more
+      row.result.posterior_by_location = {};
+      for (MemberOpinion& member : row.result.members) member.posterior_by_location = {};
+    }
     row.result.tried = {};
     row.result.verification.inlier_matches = {};
     loops += row.result.accepted ? 1 : 0;
@@ -155,7 +166,12 @@ int RunTable(const LoopsArguments& arguments, const ImageSet& set) {
 
 int RunLoops(const LoopsArguments& given) {
   LoopsArguments arguments = given;
+  if (arguments.truth.join_pairs && !arguments.camera.empty()) {
+    throw InputError(
+        "--camera: images that --join-pairs joins have no common camera; leave one of the two out");
+  }
   if (arguments.truth.stride < 1) throw InputError("--stride must be at least 1");
+  if (!arguments.preset.empty()) ApplyPreset(arguments.preset, arguments.options);
   SetRule(arguments.rule, arguments.options);
   const std::string problem = arguments.truth.rule.Validate();
   if (!problem.empty()) throw InputError("ground truth: " + problem);
@@ -168,6 +184,9 @@ int RunLoops(const LoopsArguments& given) {
   const LoopReport report = EvaluateRun(run);
   WriteLoopRun(run, report, arguments.out);
   PrintLoopRun(run, report, arguments.out);
+  if (run.options.keep_posterior) {
+    WritePosteriors(run, std::filesystem::path(arguments.out) / "posteriors.csv");
+  }
   if (run.rows.size() < set.images.size()) {
     std::fprintf(stderr, "tutti: interrupted after %zu of %zu images; the results are of those\n",
                  run.rows.size(), set.images.size());
@@ -191,10 +210,16 @@ void AddLoopsCommand(CLI::App& app, int& exit_code) {
   command->add_option("--out", arguments->out, "folder for results.json, hypotheses.csv, curves and pictures")
       ->required();
   command->add_option("--stride", arguments->truth.stride, "every n-th image")->capture_default_str();
+  command->add_flag("--join-pairs", arguments->truth.join_pairs,
+                    "two images in a row, left and right, make one image (City Centre, New College)");
+  command->add_flag("--keep-posterior", arguments->options.keep_posterior,
+                    "also write posteriors.csv: what each member believed of each location");
   command
       ->add_option("--rule", arguments->rule,
                    "mean, product, majority, naive, or one member: surf, sift, orb, akaze, brisk, kaze")
       ->capture_default_str();
+  command->add_option("--preset", arguments->preset,
+                      "published parameters: paper-2013, rtabmap-0.8.3, or default (ours)");
   LoopRule& rule = arguments->truth.rule;
   command->add_option("--gt-distance", rule.distance_m, "trajectory: a loop is nearer than this [m]")
       ->capture_default_str();

@@ -93,6 +93,10 @@ std::string RuleText(const LoopRule& rule) {
 
 LoopGroundTruth FromPoses(const GroundTruthArguments& arguments, const std::vector<fs::path>& images) {
   Trajectory poses = ReadPoses(arguments.file);
+  if (arguments.join_pairs && poses.size() == 2 * images.size()) {  // the left images' poses
+    for (std::size_t i = 0; i < images.size(); ++i) poses[i] = poses[2 * i];
+    poses.resize(images.size());
+  }
   if (poses.size() != images.size()) {
     const Trajectory by_name = PosesByName(poses, images);
     if (by_name.empty()) {
@@ -138,6 +142,7 @@ LoopGroundTruth LoadGroundTruth(const GroundTruthArguments& arguments, const std
   const int all = static_cast<int>(images.size());
   const int used = (all + arguments.stride - 1) / arguments.stride;
   LoopGroundTruth truth = ReadLoopMatrix(arguments.file, all);
+  if (arguments.join_pairs && truth.size() == 2 * all) truth = truth.PairsJoined();
   if (truth.size() == used) return truth;
   if (truth.size() == all) return truth.Strided(arguments.stride);
   std::string images_text = std::to_string(all) + " images";

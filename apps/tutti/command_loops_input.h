@@ -17,11 +17,13 @@ struct GroundTruthArguments {
   std::string file;  ///< a loop matrix or a trajectory
   LoopRule rule;
   int stride = 1;
+  bool join_pairs = false;  ///< each of the images is two, and the ground truth may be of the single ones
 };
 
 /// Ground truth for every stride-th of `images`: from a matrix over those or over all images, or from a
 /// trajectory with a pose for each image (or, where the images are named by their time stamps, a pose near
-/// each). Throws InputError that names both sizes.
+/// each). With join_pairs, a matrix or trajectory over the single images is joined, too. Throws InputError
+/// that names both sizes.
 LoopGroundTruth LoadGroundTruth(const GroundTruthArguments& arguments,
                                 const std::vector<std::filesystem::path>& images);
 

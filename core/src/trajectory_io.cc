@@ -44,6 +44,7 @@ Pose QuaternionPose(const std::filesystem::path& file, std::size_t line, const E
                     double y, double z, double w) {
   const Eigen::Quaterniond q(w, x, y, z);
   if (q.norm() < 1e-6) Fail(file, line, "the quaternion is zero; a unit quaternion is needed");
+  if (q.norm() > 1e6) Fail(file, line, "the quaternion is far from length 1; a unit quaternion is needed");
   return Pose(q.normalized(), t);
 }
 
@@ -98,7 +99,8 @@ Trajectory ReadKitti(const std::filesystem::path& file) {
     Eigen::Matrix<double, 3, 4> m;
     for (int i = 0; i < 12; ++i) m(i / 4, i % 4) = Number(file, line, w[static_cast<std::size_t>(i)]);
     const Eigen::Matrix3d rotation = m.leftCols<3>();
-    if (std::abs(rotation.determinant() - 1.0) > 0.1)
+    // Entries too big for a determinant make it NaN.
+    if (!(std::abs(rotation.determinant() - 1.0) <= 0.1 && rotation.cwiseAbs().maxCoeff() <= 2))
       Fail(file, line, "its 3x3 part is not a rotation matrix");
     out.push_back({static_cast<double>(out.size()), Pose::FromMatrix(m)});
   });

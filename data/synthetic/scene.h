@@ -54,6 +54,7 @@ std::vector<Eigen::Vector2d> SmoothLoop(const std::vector<Eigen::Vector2d>& corn
                                         double rounding_m);
 
 Scene BuildTown(const SyntheticOptions& options);
+Scene BuildCorridor(const SyntheticOptions& options);
 Scene BuildRoom(const SyntheticOptions& options);
 
 }  // namespace tutti::synthetic

@@ -6,36 +6,47 @@
 
 namespace tutti {
 
-enum class SyntheticScene { kTown, kRoom };
-enum class SyntheticSensor { kMono, kStereo, kRgbd };
+enum class SyntheticScene { kTown, kRoom, kCorridor };
+/// kSides: two cameras that look to the left and to the right of the way, for place recognition.
+enum class SyntheticSensor { kMono, kStereo, kRgbd, kSides };
 
 /// Options of SyntheticWorld. The same options give the same bytes, on any number of threads.
 struct SyntheticOptions {
-  std::uint64_t seed = 1;                           ///< of everything that is random: houses, textures, noise
-  SyntheticScene scene = SyntheticScene::kTown;     ///< a town driven through, or a room walked around in
+  std::uint64_t seed = 1;  ///< of everything that is random: houses, textures, noise
+  SyntheticScene scene =
+      SyntheticScene::kTown;  ///< a town driven through, a room walked around in, a corridor
   SyntheticSensor sensor = SyntheticSensor::kMono;  ///< what is rendered beside the left image
 
-  // The camera. 0: 640x320 with 0.58 * width in the town, 640x480 with 0.82 * width in the room.
+  // The camera. 0: 640x320 with 0.58 * width in the town, 640x480 with 0.82 * width indoors.
   int width = 0;           ///< [px]
   int height = 0;          ///< [px]
   double focal_px = 0;     ///< [px]
-  double baseline_m = 0;   ///< stereo [m]; 0: 0.54 in the town (as KITTI), 0.12 in the room
-  double rate_hz = 0;      ///< frames per second; 0: 10 in the town, 15 in the room
-  double max_depth_m = 0;  ///< RGB-D: farther depth is not measured [m]; 0: 13 in the town, 8 in the room
+  double baseline_m = 0;   ///< stereo [m]; 0: 0.54 in the town (as KITTI), 0.12 indoors
+  double sides_deg = 60;   ///< sides: each camera looks so far from the way [deg]
+  double rate_hz = 0;      ///< frames per second; 0: 10 in the town, 15 indoors
+  double max_depth_m = 0;  ///< RGB-D: farther depth is not measured [m]; 0: 13 in the town, 8 indoors
   double depth_units_per_m = 5000;  ///< RGB-D: value of one metre in the 16-bit files (which end at 65535)
 
   // The drive.
   double laps = 2;       ///< rounds of the closed route (fractions too); every round after the first revisits
   int frames = 0;        ///< stop after so many frames; 0: all of the laps
-  double speed_mps = 0;  ///< on straights [m/s]; 0: 8 in the town, 0.5 in the room; corners are driven slower
+  double speed_mps = 0;  ///< on straights [m/s]; 0: 8 in the town, 0.5 indoors; corners are driven slower
 
   // The town.
   int blocks_x = 2;      ///< the route goes around so many blocks of houses in x,
   int blocks_y = 1;      ///< and in y; two or more in both: an L shape
   double block_m = 40;   ///< side of a block [m]
   double street_m = 12;  ///< width of a street [m]
-  double repeat_fraction =
-      0.3;  ///< of the houses that look alike (one of four facades): perceptual aliasing [0..1]
+  /// Perceptual aliasing [0..1]: part of the houses that have one of four facades; in the corridor, of the
+  /// name plates and posters that are no landmarks.
+  double repeat_fraction = 0.3;
+  double sign_fraction =
+      1;  ///< of the town's posters and shop signs that are there [0..1]; no two look alike
+  int road_surfaces =
+      6;  ///< different ones, each with its cracks, patches and manhole: few are aliasing, too
+
+  // The corridor: a ring, twice as long as wide.
+  double corridor_m = 40;  ///< its longer side [m]
 
   // What makes it hard.
   double noise_sigma = 0;    ///< pixel noise [grey levels]

@@ -29,6 +29,10 @@ std::string SyntheticOptions::Validate() const {
   if (!(block_m >= 15 && block_m <= 200)) return "block_m must be 15 to 200 m";
   if (!(street_m >= 9 && street_m <= 30)) return "street_m must be 9 to 30 m";
   if (!(repeat_fraction >= 0 && repeat_fraction <= 1)) return "repeat_fraction must be 0 to 1";
+  if (!(sign_fraction >= 0 && sign_fraction <= 1)) return "sign_fraction must be 0 to 1";
+  if (road_surfaces < 1 || road_surfaces > 1000) return "road_surfaces must be 1 to 1000";
+  if (!(corridor_m >= 12 && corridor_m <= 500)) return "corridor_m must be 12 to 500 m";
+  if (!(sides_deg > 0 && sides_deg <= 120)) return "sides_deg must be above 0 and at most 120 degrees";
   if (!(noise_sigma >= 0 && noise_sigma <= 100)) return "noise_sigma must be 0 to 100 grey levels";
   if (!(motion_blur_s >= 0 && motion_blur_s <= 0.1)) return "motion_blur_s must be 0 to 0.1 s";
   if (moving_objects < 0 || moving_objects > 100) return "moving_objects must be 0 to 100";
@@ -62,7 +66,7 @@ struct SyntheticWorld::Impl {
   const synthetic::Route& Way() const { return scene.routes[0]; }
 
   // Camera in the scene's frame at a time. Smooth in time, so it may be asked between frames.
-  Pose CameraAt(double t) const {
+  Pose CameraAt(double t, double turned_left = 0) const {
     const double s = Way().DistanceAt(t);
     // No lap runs in the tracks of the one before.
     const double unit = scene.eye_height / 1.65;  // a walker sways less than a car's lane is wide
@@ -72,7 +76,7 @@ struct SyntheticWorld::Impl {
         Way().PointAt(s) + lateral * Eigen::Vector2d(-std::sin(heading), std::cos(heading));
     const double height =
         scene.eye_height + 0.015 * std::sin(2 * M_PI * 0.9 * t) + 0.01 * std::sin(2 * M_PI * 0.37 * t + 1);
-    const double yaw = heading - scene.gaze_right + scene.sway * std::sin(2 * M_PI * 0.21 * t);
+    const double yaw = heading - scene.gaze_right + turned_left + scene.sway * std::sin(2 * M_PI * 0.21 * t);
     const double down = scene.gaze_down + scene.sway * std::sin(2 * M_PI * 0.43 * t + 0.7);
     const double roll = scene.sway * std::sin(2 * M_PI * 0.31 * t + 2.1);
     Eigen::Matrix3d level;  // columns: right, down, forward of a camera that looks along yaw
@@ -112,13 +116,14 @@ struct SyntheticWorld::Impl {
     return faces;
   }
 
-  // Mean of what is seen over the exposure around t, shifted by `right_m` along the camera's x axis.
-  synthetic::Rendering View(double t, double right_m, bool blur) const {
+  // Mean of what is seen over the exposure around t by a camera that is turned to the left [rad] and shifted
+  // by `right_m` along its x axis.
+  synthetic::Rendering View(double t, double right_m, bool blur, double turned_left = 0) const {
     const int steps = blur && options.motion_blur_s > 0 ? 5 : 1;
     synthetic::Rendering sum;
     for (int k = 0; k < steps; ++k) {
       const double at = t + (steps == 1 ? 0.0 : options.motion_blur_s * (k - 2) / 5.0);
-      Pose pose = CameraAt(std::max(at, 0.0));
+      Pose pose = CameraAt(std::max(at, 0.0), turned_left);
       pose.translation += pose.rotation * Eigen::Vector3d(right_m, 0, 0);
       synthetic::Rendering one =
           synthetic::Render(FacesAt(at), scene.textures, camera, pose, LightAt(at), options.supersample);
@@ -176,7 +181,9 @@ SyntheticWorld::SyntheticWorld(const SyntheticOptions& options) : impl_(std::mak
   if (!problem.empty()) throw InputError("synthetic world: " + problem);
   impl_->options = options.Resolved();
   const SyntheticOptions& o = impl_->options;
-  impl_->scene = o.scene == SyntheticScene::kTown ? synthetic::BuildTown(o) : synthetic::BuildRoom(o);
+  impl_->scene = o.scene == SyntheticScene::kTown   ? synthetic::BuildTown(o)
+                 : o.scene == SyntheticScene::kRoom ? synthetic::BuildRoom(o)
+                                                    : synthetic::BuildCorridor(o);
   PinholeCamera& c = impl_->camera;
   c.width = o.width;
   c.height = o.height;
@@ -217,10 +224,14 @@ SyntheticFrame SyntheticWorld::Render(std::size_t i) const {
   SyntheticFrame frame;
   frame.stamp_s = Stamp(i);
   frame.T_world_camera = PoseOf(i);
-  const synthetic::Rendering left = impl_->View(frame.stamp_s, 0, true);
+  const double side = o.sensor == SyntheticSensor::kSides ? o.sides_deg * M_PI / 180 : 0.0;
+  const synthetic::Rendering left = impl_->View(frame.stamp_s, 0, true, side);
   frame.image = impl_->Sense(left.image, 2 * i);
   if (o.sensor == SyntheticSensor::kStereo) {
     frame.right = impl_->Sense(impl_->View(frame.stamp_s, o.baseline_m, true).image, 2 * i + 1);
+  }
+  if (o.sensor == SyntheticSensor::kSides) {
+    frame.right = impl_->Sense(impl_->View(frame.stamp_s, 0, true, -side).image, 2 * i + 1);
   }
   if (o.sensor == SyntheticSensor::kRgbd) {
     frame.depth_m = left.depth_m;

@@ -15,14 +15,15 @@ namespace tutti {
 /// One rendered frame. The same as what is written to disk, except that depth is not rounded to 16 bit.
 struct SyntheticFrame {
   double stamp_s = 0;
-  cv::Mat image;        ///< CV_8UC1
-  cv::Mat right;        ///< stereo: CV_8UC1; else empty
-  cv::Mat depth_m;      ///< RGB-D: CV_32FC1, z [m], 0 = not measured; else empty
-  Pose T_world_camera;  ///< left camera at the middle of the exposure; world = camera of frame 0
+  cv::Mat image;    ///< CV_8UC1
+  cv::Mat right;    ///< stereo and sides: CV_8UC1; else empty
+  cv::Mat depth_m;  ///< RGB-D: CV_32FC1, z [m], 0 = not measured; else empty
+  /// Left camera (sides: one between the two) at the middle of the exposure; world = that of frame 0.
+  Pose T_world_camera;
 };
 
-/// A town or a room with a camera moving through it. Immutable after construction: Render() may be called
-/// from several threads.
+/// A town, a room or a corridor with a camera moving through it. Immutable after construction: Render() may
+/// be called from several threads.
 class SyntheticWorld {
  public:
   /// Throws InputError for options that are not usable.

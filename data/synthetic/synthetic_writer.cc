@@ -68,7 +68,7 @@ void PrepareFolder(const fs::path& folder, const std::vector<std::string>& parts
     if (!force)
       throw InputError(folder.string() + ": is not empty; give another folder, or --force to write into it");
     for (const char* old :
-         {"image_0", "image_1", "rgb", "depth"}) {  // or old frames would mix with the new ones
+         {"image_0", "image_1", "images", "rgb", "depth"}) {  // or old frames would mix with the new ones
       std::vector<fs::path> stale;
       for (fs::directory_iterator it(folder / old, code), end; !code && it != end; it.increment(code)) {
         if (it->path().extension() == ".png") stale.push_back(it->path());
@@ -90,6 +90,10 @@ void PrepareFolder(const fs::path& folder, const std::vector<std::string>& parts
   }
 }
 
+const char* SceneName(SyntheticScene scene) {
+  return scene == SyntheticScene::kTown ? "town" : scene == SyntheticScene::kRoom ? "room" : "corridor";
+}
+
 // The file that `tutti run --config` takes.
 std::string ConfigText(const SyntheticWorld& world) {
   const SyntheticOptions& o = world.Options();
@@ -97,8 +101,8 @@ std::string ConfigText(const SyntheticWorld& world) {
   std::ostringstream out;
   out.precision(10);
   const bool rgbd = o.sensor == SyntheticSensor::kRgbd, stereo = o.sensor == SyntheticSensor::kStereo;
-  out << "# Written by `tutti generate`: synthetic " << (o.scene == SyntheticScene::kTown ? "town" : "room")
-      << ", seed " << o.seed << ".\n# tutti run --config THIS_FILE --dataset THIS_FOLDER --out DIR\n"
+  out << "# Written by `tutti generate`: synthetic " << SceneName(o.scene) << ", seed " << o.seed
+      << ".\n# tutti run --config THIS_FILE --dataset THIS_FOLDER --out DIR\n"
       << "dataset:\n  type: " << (rgbd ? "tum" : "kitti") << "  # layout on disk\n"
       << "  sensor: "
       << (rgbd     ? "rgbd"
@@ -140,10 +144,12 @@ class Writer {
       PrepareFolder(folder_, {"rgb", "depth"}, options_.force);
     } else if (sensor_ == SyntheticSensor::kStereo) {
       PrepareFolder(folder_, {"image_0", "image_1"}, options_.force);
+    } else if (sensor_ == SyntheticSensor::kSides) {
+      PrepareFolder(folder_, {"images"}, options_.force);
     } else {
       PrepareFolder(folder_, {"image_0"}, options_.force);
     }
-    WriteText(folder_ / "config.yaml", ConfigText(world_));
+    if (sensor_ != SyntheticSensor::kSides) WriteText(folder_ / "config.yaml", ConfigText(world_));
     std::vector<std::thread> threads;
     for (int k = 1; k < std::max(1, options_.threads); ++k) threads.emplace_back([this] { Work(); });
     Work();
@@ -185,6 +191,9 @@ class Writer {
       cv::Mat depth;
       frame.depth_m.convertTo(depth, CV_16U, world_.Options().depth_units_per_m);
       WriteImage(folder_ / "depth" / name, depth);
+    } else if (sensor_ == SyntheticSensor::kSides) {
+      WriteImage(folder_ / "images" / NumberName(2 * i + 1), frame.image);
+      WriteImage(folder_ / "images" / NumberName(2 * i + 2), frame.right);
     } else {
       WriteImage(folder_ / "image_0" / NumberName(i), frame.image);
       if (sensor_ == SyntheticSensor::kStereo) WriteImage(folder_ / "image_1" / NumberName(i), frame.right);
@@ -207,7 +216,7 @@ class Writer {
       std::string times;
       for (const StampedPose& p : truth) times += Scientific(p.stamp_s) + "\n";
       WriteText(folder_ / "times.txt", times);
-      WriteText(folder_ / "calib.txt", CalibrationText(world_));
+      if (sensor_ != SyntheticSensor::kSides) WriteText(folder_ / "calib.txt", CalibrationText(world_));
       WriteTrajectory(folder_ / "poses.txt", truth, TrajectoryFormat::kKitti);
     }
   }

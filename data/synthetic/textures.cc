@@ -35,6 +35,20 @@ void Bricks(cv::Mat& image, int height, double contrast, Random& random) {
   }
 }
 
+// Faint stains and scratches.
+void Marks(cv::Mat& image, int count, double contrast, Random& random) {
+  for (int i = 0; i < count; ++i) {
+    const cv::Point at(random.Int(0, image.cols - 1), random.Int(0, image.rows - 1));
+    const cv::Scalar tone(image.at<std::uint8_t>(at) - random.In(0.4, 1) * contrast);
+    if (random.Unit() < 0.5) {
+      cv::ellipse(image, at, {random.Int(3, 12), random.Int(2, 7)}, random.In(0, 180), 0, 360, tone,
+                  cv::FILLED);
+    } else {
+      cv::line(image, at, {at.x + random.Int(-45, 45), at.y + random.Int(-12, 12)}, tone, random.Int(1, 2));
+    }
+  }
+}
+
 // Strokes that look like a line of writing.
 void Writing(cv::Mat& image, const cv::Rect& where, double grey, Random& random) {
   std::string text;
@@ -294,6 +308,57 @@ cv::Mat ShelfTexture(std::uint64_t seed) {
   }
   Box(image, 0, 0, 5, 256, 150);
   Box(image, 251, 0, 5, 256, 150);
+  return image;
+}
+
+cv::Mat PlasterTexture(std::uint64_t seed) {
+  Random random(seed);
+  cv::Mat image = Plain(256, 256, 182);
+  Marks(image, random.Int(3, 7), 22, random);
+  if (random.Unit() < 0.4) {  // a socket or a switch
+    const int x = random.Int(10, 230), y = random.Unit() < 0.6 ? 212 : 140;
+    Box(image, x, y, 10, 10, 215);
+    Box(image, x + 3, y + 3, 4, 4, 110);
+  }
+  AddNoise(image, 128, 2.5, random.Bits());
+  Box(image, 0, 246, 256, 10, 95);  // skirting board
+  return image;
+}
+
+cv::Mat PanelTexture(std::uint64_t seed, double grey, int marks) {
+  Random random(seed);
+  cv::Mat image = Plain(256, 256, grey);
+  Marks(image, marks, 22, random);
+  AddNoise(image, 32, 2.5, random.Bits());
+  for (int at = 0; at < 256; at += 64) {
+    Box(image, at, 0, 1, 256, grey - 12);
+    Box(image, 0, at, 256, 1, grey - 12);
+  }
+  return image;
+}
+
+cv::Mat DoorTexture(std::uint64_t seed) {
+  Random random(seed);
+  cv::Mat image = Plain(128, 256, random.In(205, 230));  // the frame
+  const double leaf = random.In(90, 150);
+  Box(image, 8, 8, 112, 248, leaf);
+  if (random.Unit() < 0.5) Box(image, 74, 26, 28, 90, leaf - 65);  // a pane
+  Box(image, 14, 132, 16, 5, 235);                                 // the handle
+  Box(image, 14, 120, 7, 30, 205);
+  Box(image, 8, 228, 112, 20, leaf - 25);
+  AddNoise(image, 64, 2, random.Bits());
+  return image;
+}
+
+cv::Mat LampTexture() {
+  cv::Mat image = Plain(64, 64, 250);
+  cv::rectangle(image, cv::Rect(0, 0, 64, 64), cv::Scalar(170), 3);
+  return image;
+}
+
+cv::Mat RadiatorTexture() {
+  cv::Mat image = Plain(128, 64, 205);
+  for (int x = 4; x < 128; x += 10) Box(image, x, 4, 3, 56, 150);
   return image;
 }
 

@@ -21,6 +21,12 @@ cv::Mat FoliageTexture(std::uint64_t seed);         ///< 128x128
 cv::Mat SkyTexture(std::uint64_t seed);             ///< 512x256: faint clouds
 cv::Mat WoodTexture(std::uint64_t seed);            ///< 256x256: planks or boards of furniture
 cv::Mat ShelfTexture(std::uint64_t seed);           ///< 256x256: rows of books
-cv::Mat WallpaperTexture(std::uint64_t seed);       ///< 512x512
+cv::Mat PlasterTexture(std::uint64_t seed);         ///< 256x256: a painted wall with almost nothing to see
+/// 256x256: 4x4 panels of a floor or ceiling, with so many stains and scratches
+cv::Mat PanelTexture(std::uint64_t seed, double grey, int marks);
+cv::Mat DoorTexture(std::uint64_t seed);       ///< 128x256
+cv::Mat LampTexture();                         ///< 64x64
+cv::Mat RadiatorTexture();                     ///< 128x64
+cv::Mat WallpaperTexture(std::uint64_t seed);  ///< 512x512
 
 }  // namespace tutti::synthetic

@@ -52,7 +52,7 @@ class TownBuilder {
   void MakeTextures() {
     for (int i = 0; i < kFacades; ++i) facades_.push_back(scene_.Add(FacadeTexture(Seed())));
     for (int i = 0; i < 8; ++i) walls_.push_back(scene_.Add(WallTexture(Seed())));
-    for (int i = 0; i < 6; ++i) roads_.push_back(scene_.Add(RoadTexture(Seed(), false)));
+    for (int i = 0; i < options_.road_surfaces; ++i) roads_.push_back(scene_.Add(RoadTexture(Seed(), false)));
     for (int i = 0; i < 3; ++i) crossings_.push_back(scene_.Add(RoadTexture(Seed(), true)));
     for (int i = 0; i < 6; ++i) {
       BoxTextures car;
@@ -153,6 +153,7 @@ class TownBuilder {
     const int signs =
         random_.Int(first || last ? 1 : 0, 2);  // unlike the facades, no two signs look the same
     for (int k = 0; k < signs; ++k) {
+      if (options_.sign_fraction < 1 && random_.Unit() >= options_.sign_fraction) continue;
       const double w = random_.In(0.6, 1.5), h = random_.In(0.6, 1.3), z = random_.In(1.6, 4.5);
       const Vector3d at =
           base + random_.In(0.3, width - w - 0.3) * r + (0.05 + 0.01 * k) * n + Vector3d(0, 0, z);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
+#include <sstream>
 
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
@@ -105,8 +106,9 @@ LoopGroundTruth ReadText(const std::filesystem::path& file, int num_images) {
     for (const std::vector<double>& pair : rows) {
       if (pair[0] >= num_images || pair[1] >= num_images || pair[0] != std::floor(pair[0]) ||
           pair[1] != std::floor(pair[1])) {
-        throw InputError(file.string() + ": the pair " + std::to_string(static_cast<long long>(pair[0])) +
-                         " " + std::to_string(static_cast<long long>(pair[1])) + " is none of " +
+        std::ostringstream numbers;  // they may be too big for any integer
+        numbers << pair[0] << " " << pair[1];
+        throw InputError(file.string() + ": the pair " + numbers.str() + " is none of " +
                          std::to_string(num_images) + " images");
       }
       truth.Set(static_cast<int>(std::max(pair[0], pair[1])), static_cast<int>(std::min(pair[0], pair[1])),
@@ -168,6 +170,20 @@ LoopGroundTruth LoopGroundTruth::First(int size) const {
   result.description = description;
   for (int r = 0; r < result.size_; ++r) {
     for (int c = 0; c < r; ++c) result.Set(r, c, At(r, c));
+  }
+  return result;
+}
+
+LoopGroundTruth LoopGroundTruth::PairsJoined() const {
+  LoopGroundTruth result(size_ / 2);
+  result.description = description.empty() ? "" : description + " (of single images; joined in pairs)";
+  for (int r = 0; r < result.size_; ++r) {
+    for (int c = 0; c < r; ++c) {
+      // The labels' values grow from none over ignore to loop.
+      result.Set(
+          r, c,
+          std::max({At(2 * r, 2 * c), At(2 * r, 2 * c + 1), At(2 * r + 1, 2 * c), At(2 * r + 1, 2 * c + 1)}));
+    }
   }
   return result;
 }

@@ -2,10 +2,12 @@
 // checked against what is there, so that a damaged file is an error and nothing else.
 #include <zlib.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <fstream>
 #include <iterator>
+#include <limits>
 
 #include "tutti/core/error.h"
 #include "tutti/loopclosure/ground_truth.h"
@@ -154,8 +156,8 @@ std::vector<double> FromSparse(Reader& matrix, std::size_t n) {
   if (starts.size() < n + 1) matrix.Fail("a sparse matrix without column starts");
   std::vector<double> values(n * n, 0.0);
   for (std::size_t c = 0; c < n; ++c) {
-    if (starts[c] < 0 || starts[c + 1] < starts[c] || starts[c + 1] > static_cast<double>(rows.size()) ||
-        starts[c + 1] > static_cast<double>(numbers.size())) {
+    const bool in_order = starts[c] >= 0 && starts[c + 1] >= starts[c];  // false for NaN, too
+    if (!in_order || starts[c + 1] > static_cast<double>(std::min(rows.size(), numbers.size()))) {
       matrix.Fail("a sparse matrix with wrong column starts");
     }
     for (std::size_t k = static_cast<std::size_t>(starts[c]); k < static_cast<std::size_t>(starts[c + 1]);
@@ -173,7 +175,8 @@ std::vector<double> ReadVariable(const Element& element, const std::string& file
   Reader matrix(element.data, element.size, file);
   if (matrix.AtEnd()) return {};
   const std::vector<double> flags = Numbers(matrix.Next(), matrix);
-  if (flags.empty()) matrix.Fail("a variable without flags");
+  if (flags.empty() || !(flags[0] >= 0 && flags[0] <= std::numeric_limits<std::uint32_t>::max()))
+    matrix.Fail("a variable without flags");
   const std::uint32_t array_class = static_cast<std::uint32_t>(flags[0]) & 0xffu;
   if (array_class < kSparseClass || array_class > 15) return {};  // cells, structures, text
   const std::vector<double> dimensions = Numbers(matrix.Next(), matrix);

@@ -4,6 +4,7 @@
 
 #include <fstream>
 #include <opencv2/features2d.hpp>
+#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <sstream>
 
@@ -211,6 +212,52 @@ TEST(SyntheticWorldTest, WrittenRoomIsReadBackByTheTumReader) {
   ASSERT_EQ(truth.size(), 4U);
   EXPECT_LT((truth[3].pose.translation - world.PoseOf(3).translation).norm(), 1e-8);
   EXPECT_NEAR(truth[3].stamp_s, data->Stamp(3), 1e-6);
+}
+
+TEST(SyntheticWorldTest, TheCorridorHasLittleToSeeAndIsWalkedAgain) {
+  SyntheticOptions options;
+  options.scene = SyntheticScene::kCorridor;
+  options.width = 240;
+  options.height = 192;
+  options.rate_hz = 1;
+  options.laps = 2;
+  const SyntheticWorld world(options);
+  EXPECT_NEAR(world.LapLength(), 3 * options.corridor_m, 0.05 * 3 * options.corridor_m);
+  const std::size_t lap = world.FramesPerLap();
+  int corners = 0;
+  for (std::size_t i = 0; i < lap; i += lap / 10) {
+    const SyntheticFrame frame = world.Render(i);
+    double darkest = 0, brightest = 0;
+    cv::minMaxLoc(frame.image, &darkest, &brightest);
+    EXPECT_GT(brightest - darkest, 25) << i;  // even a corner is not blank
+    std::vector<cv::KeyPoint> keypoints;
+    cv::FAST(frame.image, keypoints, 15);
+    corners += static_cast<int>(keypoints.size());
+  }
+  EXPECT_LT(corners / 10, 300);  // what every view of town and room has more of
+  double nearest = 1e9;
+  for (std::size_t i = lap; i < lap + 3; ++i)
+    nearest = std::min(nearest, (world.PoseOf(i).translation - world.PoseOf(0).translation).norm());
+  EXPECT_LT(nearest, 1.0);
+}
+
+TEST(SyntheticWorldTest, SidesLookLeftAndRightAndAreNumberedInPairs) {
+  SyntheticOptions options = Small(SyntheticScene::kTown, SyntheticSensor::kSides);
+  options.frames = 3;
+  options.sides_deg = 40;
+  const SyntheticWorld world(options);
+  // A camera that looks 40 degrees to the left of the way sees at its right edge what lies ahead; the one to
+  // the right sees it at its left edge. So the two images are different and both are full.
+  const SyntheticFrame frame = world.Render(1);
+  ASSERT_EQ(frame.right.size(), frame.image.size());
+  EXPECT_GT(cv::norm(frame.image, frame.right, cv::NORM_L1) / static_cast<double>(frame.image.total()), 5);
+  const auto folder = FreshFolder();
+  EXPECT_EQ(WriteSyntheticDataset(world, folder), 3U);
+  const cv::Mat left = cv::imread((folder / "images/000003.png").string(), cv::IMREAD_UNCHANGED);
+  const cv::Mat right = cv::imread((folder / "images/000004.png").string(), cv::IMREAD_UNCHANGED);
+  EXPECT_EQ(cv::norm(left, frame.image, cv::NORM_INF), 0);
+  EXPECT_EQ(cv::norm(right, frame.right, cv::NORM_INF), 0);
+  EXPECT_EQ(ReadTrajectory(folder / "poses.txt", TrajectoryFormat::kKitti).size(), 3U);
 }
 
 TEST(SyntheticWorldTest, AFullFolderIsRefusedUnlessForced) {

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cstring>
 #include <fstream>
+#include <limits>
 #include <opencv2/imgcodecs.hpp>
 
 #include "test_data.h"
@@ -72,6 +74,12 @@ TEST(LoopMatrix, BadFilesSayWhatIsWrongAndWhere) {
   EXPECT_FALSE(Problem(WriteFile("a.png", std::string("\x89PNG\r\n\x1a\n\0\0garbage", 18))).empty());
 }
 
+// Found by fuzzing (tests/fuzz): the message made an integer of it.
+TEST(LoopMatrix, APairBeyondAllIntegersIsAnErrorThatShowsIt) {
+  EXPECT_NE(Problem(WriteFile("t.txt", "444444444444444444444 4\n")).find("4.44444e+20 4"),
+            std::string::npos);
+}
+
 TEST(LoopMatrix, StridedKeepsEveryNthRowAndColumn) {
   LoopGroundTruth truth(10);
   truth.Set(8, 4, LoopLabel::kLoop);
@@ -120,6 +128,22 @@ TEST(LoopMatrix, MatlabValuesAreColumnMajor) {
   EXPECT_FALSE(Problem(WriteFile("v.mat", SmallMatFile({0, 0, 0, 0, 0, 0}, 3, 2))).empty());
 }
 
+TEST(LoopMatrix, JoinedPairsTakeTheStrongestOfFourLabels) {
+  LoopGroundTruth single(6);
+  single.description = "singles.mat";
+  single.Set(1, 0, LoopLabel::kLoop);    // left and right of one pair: no loop
+  single.Set(4, 1, LoopLabel::kLoop);    // the way back: left against right
+  single.Set(5, 0, LoopLabel::kIgnore);  // weaker than the loop above
+  single.Set(5, 3, LoopLabel::kIgnore);
+  const LoopGroundTruth pairs = single.PairsJoined();
+  EXPECT_EQ(pairs.size(), 3);
+  EXPECT_EQ(pairs.At(2, 0), LoopLabel::kLoop);
+  EXPECT_EQ(pairs.At(2, 1), LoopLabel::kIgnore);
+  EXPECT_EQ(pairs.At(1, 0), LoopLabel::kNone);
+  EXPECT_EQ(pairs.RowsWithLoop(), 1);
+  EXPECT_NE(pairs.description.find("joined"), std::string::npos);
+}
+
 TEST(LoopMatrix, OnlyThePastCounts) {
   LoopGroundTruth truth(5);
   truth.Set(1, 3, LoopLabel::kLoop);
@@ -153,6 +177,46 @@ TEST(LoopMatrix, DamagedMatlabFilesAreErrorsAndNothingElse) {
       ReadLoopMatrix(WriteFile("bad.mat", bad), 388);
     } catch (const InputError&) {
     }
+  }
+}
+
+// One element of a MATLAB v5 file: type, length, data, padding to 8 bytes.
+template <typename T>
+std::string MatElement(std::uint32_t type, const std::vector<T>& data) {
+  const std::uint32_t tag[2] = {type, static_cast<std::uint32_t>(data.size() * sizeof(T))};
+  std::string bytes(sizeof tag + (tag[1] + 7) / 8 * 8, '\0');
+  std::memcpy(bytes.data(), tag, sizeof tag);
+  std::memcpy(bytes.data() + sizeof tag, data.data(), tag[1]);
+  return bytes;
+}
+
+// A file with one variable of these elements.
+fs::path MatFile(const std::string& content) {
+  constexpr std::uint32_t kMatrix = 14;
+  std::string header = "MATLAB 5.0 MAT-file";
+  header.resize(124, ' ');
+  return WriteFile("t.mat", header + std::string("\0\1IM", 4) +
+                                MatElement(kMatrix, std::vector<char>(content.begin(), content.end())));
+}
+
+TEST(LoopMatrix, MatlabNumbersThatNoIntegerHoldsAreErrors) {
+  constexpr std::uint32_t kInt8 = 1, kInt32 = 5, kUint32 = 6, kDouble = 9;
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const std::string size = MatElement<std::int32_t>(kInt32, {2, 2}),
+                    name = MatElement<char>(kInt8, {'g', 't'});
+  const std::string full = MatElement<double>(kDouble, {0, 1, 0, 0});
+  constexpr std::uint32_t kDoubleClass = 6, kSparseClass = 5;
+  EXPECT_EQ(Problem(MatFile(MatElement<std::uint32_t>(kUint32, {kDoubleClass, 0}) + size + name + full)), "");
+  for (const double flags : {nan, -1.0, 1e300}) {
+    EXPECT_NE(Problem(MatFile(MatElement<double>(kDouble, {flags}) + size + name + full)).find("flags"),
+              std::string::npos)
+        << flags;
+  }
+  for (const double start : {nan, -1.0, 1e300}) {
+    const std::string sparse = MatElement<std::uint32_t>(kUint32, {kSparseClass, 0}) + size + name +
+                               MatElement<std::int32_t>(kInt32, {1}) +
+                               MatElement<double>(kDouble, {0, start, 1}) + MatElement<double>(kDouble, {1});
+    EXPECT_NE(Problem(MatFile(sparse)).find("column starts"), std::string::npos) << start;
   }
 }
 

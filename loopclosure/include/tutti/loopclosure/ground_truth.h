@@ -18,19 +18,28 @@ enum class LoopLabel : std::uint8_t { kNone = 0, kIgnore = 128, kLoop = 255 };
 class LoopGroundTruth {
  public:
   LoopGroundTruth() = default;
+  /// For `size` images, without a loop.
   explicit LoopGroundTruth(int size);
 
+  /// Number of images.
   int size() const { return size_; }
   /// kNone for pairs outside of the matrix and for column >= row.
   LoopLabel At(int row, int column) const;
+  /// Does nothing for a pair that At would not answer for.
   void Set(int row, int column, LoopLabel label);
   /// True if the row has at least one loop.
   bool HasLoop(int row) const;
+  /// Number of images with at least one loop: what recall is a share of.
   int RowsWithLoop() const;
   /// Every `stride`-th row and column, from 0.
   LoopGroundTruth Strided(int stride) const;
   /// The first `size` rows and columns.
   LoopGroundTruth First(int size) const;
+  /// For a matrix of single images (left, right, left, right...), that of the pairs: images 2i and 2i + 1
+  /// make image i. A pair shows the place of another one if one of its images shows that of one of the
+  /// other's (left and right change sides when a way is gone back); else it is ignored if one of the four
+  /// labels says so.
+  LoopGroundTruth PairsJoined() const;
 
   std::string description;  ///< where it comes from and by which rule, for tables
 

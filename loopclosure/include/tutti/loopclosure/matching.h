@@ -8,9 +8,9 @@ namespace tutti {
 
 /// A pair of descriptors that are each other's nearest.
 struct Match {
-  int query = -1;
-  int candidate = -1;
-  float ratio = 1;  ///< d1 / d2 of the ratio test, 0 (certain) .. 1
+  int query = -1;      ///< row of the query's descriptors
+  int candidate = -1;  ///< row of the candidate's
+  float ratio = 1;     ///< d1 / d2 of the ratio test, 0 (certain) .. 1
 };
 
 /// Ratio test (Lowe 2004) and mutual check over all pairs, on true distance: CV_32F rows Euclidean, CV_8U

@@ -14,8 +14,11 @@ namespace tutti {
 /// Extracts and quantises for one kind of features (loop-closure.md section 1, steps 1 and 2).
 class Member {
  public:
+  /// `name`: surf, sift, orb, akaze or brisk; `seed`: of its vocabulary's index. Throws InputError for
+  /// another name.
   Member(const std::string& name, const LoopDetectorOptions& options, std::uint64_t seed);
 
+  /// As given.
   const std::string& name() const { return name_; }
 
   /// Step 1: features of an 8-bit grey image. Safe to call for several members at once. None for an external
@@ -28,6 +31,7 @@ class Member {
   /// than two) gets no words and is empty: the member sits this image out.
   Signature Quantise(const Features& features);
 
+  /// Words of its vocabulary so far.
   int num_words() const { return vocabulary_.size(); }
   Vocabulary& vocabulary() { return vocabulary_; }
   const Vocabulary& vocabulary() const { return vocabulary_; }

@@ -30,7 +30,7 @@ struct RelativePoseOptions {
 
 /// Outcome of SolvePnp.
 struct PnpResult {
-  bool success = false;
+  bool success = false;                     ///< enough inliers; else only `reason` means something
   std::string reason;                       ///< why not, in plain words
   Pose T_camera_points;                     ///< maps the points' frame into the camera of the pixels
   Matrix6d information = Matrix6d::Zero();  ///< of T_points_camera = T_camera_points^-1; see SolvePnp
@@ -51,9 +51,9 @@ PnpResult SolvePnp(const std::vector<Eigen::Vector3d>& points, const std::vector
 
 /// Outcome of SolveSimilarity.
 struct SimilarityResult {
-  bool success = false;
-  std::string reason;  ///< why not, in plain words
-  Similarity S_a_b;    ///< maps points of camera b into camera a
+  bool success = false;  ///< enough inliers; else only `reason` means something
+  std::string reason;    ///< why not, in plain words
+  Similarity S_a_b;      ///< maps points of camera b into camera a
   Matrix7d information =
       Matrix7d::Zero();      ///< under S * (Exp(translation, rotation), e^scale), log scale last
   std::vector<int> inliers;  ///< indices, ascending

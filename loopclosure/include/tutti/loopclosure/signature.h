@@ -14,6 +14,7 @@ class ByteWriter;
 /// Bag of words of one image: z_t of loop-closure.md section 1.
 class Signature {
  public:
+  /// A word and how often it occurs.
   struct Entry {
     int word = 0;   ///< word id
     int count = 0;  ///< occurrences in the image, at least 1
@@ -27,6 +28,7 @@ class Signature {
   const std::vector<Entry>& entries() const { return entries_; }
   /// |z|: number of quantised features.
   int size() const { return size_; }
+  /// True for a bad signature.
   bool empty() const { return size_ == 0; }
 
   /// Similarity of two signatures (Labbe & Michaud 2013, eq. 1; loop-closure.md section 2):

@@ -19,8 +19,8 @@ namespace tutti {
 /// O(|WM|).
 class TransitionModel {
  public:
+  static constexpr int kLevels = 16;  ///< graph levels that a camera may go in one step
   /// p(real place at this graph level), before scaling: self, level 1, ..., level 16.
-  static constexpr int kLevels = 16;
   static const std::array<double, kLevels + 1>& LevelValues();
   static constexpr double kToNewPlace = 0.1;  ///< p(-1 | j)
 

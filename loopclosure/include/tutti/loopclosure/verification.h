@@ -15,17 +15,18 @@ namespace tutti {
 /// What is kept of an image for verification: the members' features and the caller's, with 3D points where
 /// known.
 struct View {
+  /// The features of one source.
   struct Set {
     std::vector<cv::Point2f> pixels;      ///< N [px]
     cv::Mat descriptors;                  ///< N rows
     std::vector<Eigen::Vector3f> points;  ///< empty, or N points in the camera frame; NaN where unknown
   };
-  std::int64_t id = -1;
-  cv::Size size;  ///< of the image [px]
-  std::optional<PinholeCamera> camera;
-  std::vector<Set> members;  ///< one per member
-  Set caller;                ///< the caller's own; may be empty
-  bool metric = true;        ///< 3D points are in metres
+  std::int64_t id = -1;                 ///< of the query that it was made of
+  cv::Size size;                        ///< of the image [px]
+  std::optional<PinholeCamera> camera;  ///< of the image; none: fundamental matrix
+  std::vector<Set> members;             ///< one per member
+  Set caller;                           ///< the caller's own; may be empty
+  bool metric = true;                   ///< 3D points are in metres
 };
 
 /// The view of a query. Depth at a keypoint is the median of the 3x3 pixels around it; unknown where they
@@ -44,9 +45,12 @@ View MakeView(const LoopQuery& query, const std::vector<Features>& members,
 /// and seed.
 class GeometricVerifier {
  public:
+  /// `seed`: of RANSAC.
   GeometricVerifier(const VerificationOptions& options, std::uint64_t seed)
       : options_(options), seed_(seed) {}
 
+  /// Says whether both views show the same place, with the relative pose as far as it is known, or why not.
+  /// On at most `threads` threads, with the same result for any number.
   Verification Verify(const View& query, const View& candidate, int threads = 1) const;
 
  private:

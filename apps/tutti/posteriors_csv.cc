@@ -1,0 +1,50 @@
+#include "posteriors_csv.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <fstream>
+
+#include "tutti/core/error.h"
+
+namespace tutti::cli {
+namespace {
+
+constexpr double kWorthALine = 1e-4;
+
+std::string Lines(const LoopRow& row, const LoopGroundTruth& truth) {
+  const LoopResult& r = row.result;
+  std::string text;
+  for (std::size_t i = 0; i < r.posterior_by_location.size(); ++i) {
+    const auto& [location, combined] = r.posterior_by_location[i];
+    double most = combined;
+    const LoopLabel label = truth.At(static_cast<int>(r.query), static_cast<int>(location));
+    char number[64];
+    std::snprintf(number, sizeof number, "%ld,%ld,%d,%.6g", static_cast<long>(r.query),
+                  static_cast<long>(location), static_cast<int>(label), combined);
+    std::string line = number;
+    for (const MemberOpinion& member : r.members) {
+      // A member that sat this image out has no posterior of it.
+      const auto& posterior = member.posterior_by_location;
+      const double value = i < posterior.size() ? posterior[i].second : 0.0;
+      most = std::max(most, value);
+      std::snprintf(number, sizeof number, ",%.6g", value);
+      line += number;
+    }
+    if (most >= kWorthALine || label == LoopLabel::kLoop) text += line + "\n";
+  }
+  return text;
+}
+
+}  // namespace
+
+void WritePosteriors(const LoopRun& run, const std::filesystem::path& file) {
+  std::ofstream out(file, std::ios::binary);
+  out << "image,location,truth,combined";
+  for (const std::string& name : run.options.members) out << "," << name;
+  out << "\n";
+  for (const LoopRow& row : run.rows) out << Lines(row, run.truth);
+  out.close();
+  if (!out) throw InputError(file.string() + ": can't be written; is there space, and may you write there?");
+}
+
+}  // namespace tutti::cli

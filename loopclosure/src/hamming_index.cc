@@ -70,19 +70,31 @@ class HammingIndex : public DescriptorIndex {
     return nearest;
   }
 
-  TUTTI_CLONES("popcnt")
-  void Scan(const std::vector<int>& bucket, const std::uint8_t* descriptor, TwoNearest& nearest) const;
-
+  // Four rounds over all buckets, each asking for the memory that the next one reads: nearly every access
+  // misses the caches, and waiting for one at a time would take most of the search.
   TwoNearest SearchTables(const std::uint8_t* descriptor) const {
-    TwoNearest nearest;
+    constexpr std::size_t kProbes = kKeyBits + 1;
+    std::vector<const std::vector<int>*> buckets;
+    buckets.reserve(tables_.size() * kProbes);
     for (const Table& table : tables_) {
       const std::size_t key = Key(table, descriptor);
-      Scan(table.buckets[key], descriptor, nearest);
-      for (int b = 0; b < kKeyBits; ++b)
-        Scan(table.buckets[key ^ (std::size_t{1} << b)], descriptor, nearest);
+      buckets.push_back(&table.buckets[key]);
+      for (int b = 0; b < kKeyBits; ++b) buckets.push_back(&table.buckets[key ^ (std::size_t{1} << b)]);
     }
-    return nearest;
+    for (const std::vector<int>* bucket : buckets) __builtin_prefetch(bucket);
+    for (const std::vector<int>* bucket : buckets) __builtin_prefetch(bucket->data());
+    std::vector<int> candidates;
+    for (const std::vector<int>* bucket : buckets) {
+      for (const int i : *bucket) {
+        __builtin_prefetch(Word(i));
+        candidates.push_back(i);
+      }
+    }
+    return Scan(candidates, descriptor);
   }
+
+  TUTTI_CLONES("popcnt")
+  TwoNearest Scan(const std::vector<int>& candidates, const std::uint8_t* descriptor) const;
 
   int bytes_;
   int size_ = 0;
@@ -91,12 +103,13 @@ class HammingIndex : public DescriptorIndex {
 };
 
 TUTTI_CLONES("popcnt")
-void HammingIndex::Scan(const std::vector<int>& bucket, const std::uint8_t* descriptor,
-                        TwoNearest& nearest) const {
-  for (const int i : bucket) {
+TwoNearest HammingIndex::Scan(const std::vector<int>& candidates, const std::uint8_t* descriptor) const {
+  TwoNearest nearest;
+  for (const int i : candidates) {
     const float distance = static_cast<float>(internal::HammingDistance(descriptor, Word(i), bytes_));
     if (distance <= nearest.second_distance) nearest.Offer(i, distance);
   }
+  return nearest;
 }
 
 }  // namespace

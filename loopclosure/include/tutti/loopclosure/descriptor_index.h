@@ -59,8 +59,8 @@ class DescriptorIndex {
 std::unique_ptr<DescriptorIndex> MakeKdForestIndex(int dimensions, int trees, int checks, std::uint64_t seed);
 
 /// Random tries over CV_8U descriptors, Hamming distance: each of `tables` tries takes the bits in a seeded
-/// order of its own; a search looks into the leaf that the descriptor falls into and into those that one other
-/// bit leads to. Small vocabularies are searched exactly.
+/// order of its own; a search looks into the leaf that the descriptor falls into and into those that one
+/// other bit leads to. Small vocabularies are searched exactly.
 std::unique_ptr<DescriptorIndex> MakeHammingIndex(int bytes, int tables, std::uint64_t seed);
 
 }  // namespace tutti

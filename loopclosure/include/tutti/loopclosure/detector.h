@@ -75,6 +75,8 @@ struct Verification {
   Similarity S_candidate_query;  ///< maps points of the query camera into the candidate camera (kRigid:
                                  ///< scale 1; kEssential: rotation and unit direction only)
   Matrix6d information = Matrix6d::Zero();  ///< of (translation, rotation), from the inliers
+  double ahead = 1;  ///< kEssential, kFundamental: share of the translation that is along the candidate's
+                     ///< optical axis, 0..1; without a camera by a guessed focal length
   int matches = 0, inliers = 0;
   std::string reason;  ///< why not, in plain words; empty if accepted
   std::vector<VerifiedMatch> inlier_matches;

@@ -84,9 +84,7 @@ LoopResult LoopDetector::Impl::Detect(const LoopQuery& query) {
   const std::vector<Features> features = Extract(query);
   result.extract_ms = watch.LapMs();
 
-  std::vector<Signature> signatures(members_.size());
-  RunParallel(static_cast<int>(members_.size()), options_.threads,
-              [&](int k) { signatures[Index(k)] = members_[Index(k)].Quantise(features[Index(k)]); });
+  const std::vector<Signature> signatures = Quantise(features);
   result.quantise_ms = watch.LapMs();
 
   const int slot = Remember(query, features, signatures);
@@ -201,6 +199,37 @@ std::vector<Features> LoopDetector::Impl::Extract(const LoopQuery& query) const 
     }
   });
   return features;
+}
+
+// Step 2 of section 1. The searches of all members are shared out among the threads in pieces; what they find
+// does not depend on who searched.
+std::vector<Signature> LoopDetector::Impl::Quantise(const std::vector<Features>& features) {
+  constexpr int kBlock = 25;
+  struct Piece {
+    std::size_t member;
+    int begin;
+  };
+  std::vector<Piece> pieces;
+  std::vector<std::vector<TwoNearest>> nearest(members_.size());
+  std::vector<char> usable(members_.size());
+  for (std::size_t k = 0; k < members_.size(); ++k) {
+    usable[k] = members_[k].Judge(features[k]) ? 1 : 0;
+    if (usable[k] == 0) continue;
+    nearest[k].resize(Index(features[k].descriptors.rows));
+    for (int i = 0; i < features[k].descriptors.rows; i += kBlock) pieces.push_back({k, i});
+  }
+  RunParallel(static_cast<int>(pieces.size()), options_.threads, [&](int p) {
+    const auto& [k, begin] = pieces[Index(p)];
+    const cv::Mat& rows = features[k].descriptors;
+    members_[k].vocabulary().Search(rows, begin, std::min(rows.rows, begin + kBlock), nearest[k]);
+  });
+  std::vector<Signature> signatures(members_.size());
+  RunParallel(static_cast<int>(members_.size()), options_.threads, [&](int i) {
+    const std::size_t k = Index(i);
+    if (usable[k] == 0) return;
+    signatures[k] = Signature(members_[k].vocabulary().Assign(features[k].descriptors, nearest[k]));
+  });
+  return signatures;
 }
 
 // Steps 3 and 4 of section 1. Returns the slot that now stands for the query.

@@ -48,6 +48,7 @@ class LoopDetector::Impl {
   void CheckCallersFeatures(const LoopQuery& query, const std::string& which) const;
   void CheckMemberFeatures(const LoopQuery& query, const std::string& which) const;
   std::vector<Features> Extract(const LoopQuery& query) const;
+  std::vector<Signature> Quantise(const std::vector<Features>& features);
   int Remember(const LoopQuery& query, const std::vector<Features>& features,
                const std::vector<Signature>& signatures);
   void ForEachUnit(const std::function<void(internal::MemorySystem&, std::size_t)>& call);

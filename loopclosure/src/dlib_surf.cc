@@ -149,7 +149,7 @@ class DlibSurf : public cv::Feature2D {
 
   void Detect(const Integral& integral, const cv::Mat& mask, std::vector<cv::KeyPoint>& keypoints) const {
     dlib::hessian_pyramid pyramid;
-    pyramid.build_pyramid(integral, octaves_, 6, 2);
+    pyramid.build_pyramid(integral, octaves_, 4, 2);
     std::vector<dlib::interest_point> points;
     dlib::get_interest_points(pyramid, threshold_, points);
     std::stable_sort(points.begin(), points.end(),

@@ -125,11 +125,12 @@ void HypothesisSearch::TryNeighbours(const View& query, std::int64_t id, LoopRes
 // Where no scale is known, the direction of the translation tells which view is nearer: on a path, the query
 // lies ahead of the views that come too early, behind those that come too late, and beside the nearest.
 void HypothesisSearch::TakeNearer(double enough, LoopResult& result) const {
+  constexpr double kOnAPath = 0.9;   // elsewhere (hand-held) the direction says little about the distance
   constexpr double kClearly = 0.02;  // beyond the noise of the direction
   const auto scale_free = [](const Verification& v) {
     return v.type == ConstraintType::kEssential || v.type == ConstraintType::kFundamental;
   };
-  if (!scale_free(result.verification)) return;
+  if (!scale_free(result.verification) || result.verification.ahead < kOnAPath) return;
   const Verification* nearest = &result.verification;
   for (const LocationMemory::Link& link : memory_.links(memory_.Find(result.verification.candidate))) {
     for (const Verification& tried : result.tried) {

@@ -15,13 +15,16 @@ Member::Member(const std::string& name, const LoopDetectorOptions& options, std:
   }
 }
 
-Signature Member::Quantise(const Features& features) {
+bool Member::Judge(const Features& features) {
   const double count = static_cast<double>(features.keypoints.size());
   feature_sum_ += count;
   ++images_;
   const double mean = feature_sum_ / images_;
-  if (count < 2 || count < bad_signature_ratio_ * mean) return {};
-  return Signature(vocabulary_.Quantise(features.descriptors));
+  return count >= 2 && count >= bad_signature_ratio_ * mean;
+}
+
+Signature Member::Quantise(const Features& features) {
+  return Judge(features) ? Signature(vocabulary_.Quantise(features.descriptors)) : Signature();
 }
 
 void Member::SaveStatistics(internal::ByteWriter& out) const {

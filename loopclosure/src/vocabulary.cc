@@ -65,18 +65,27 @@ void Vocabulary::MakeIndex() {
 }
 
 std::vector<int> Vocabulary::Quantise(const cv::Mat& descriptors, int threads) {
-  std::vector<int> words;
-  if (descriptors.rows == 0) return words;
-  CheckType(descriptors);
-
+  if (descriptors.rows == 0) return {};
   std::vector<TwoNearest> nearest(static_cast<std::size_t>(descriptors.rows));
   constexpr int kBlock = 50;
   RunParallel((descriptors.rows + kBlock - 1) / kBlock, threads, [&](int block) {
-    for (int i = block * kBlock; i < std::min(descriptors.rows, (block + 1) * kBlock); ++i) {
-      nearest[static_cast<std::size_t>(i)] = index_->Search(descriptors.ptr(i));
-    }
+    Search(descriptors, block * kBlock, std::min(descriptors.rows, (block + 1) * kBlock), nearest);
   });
+  return Assign(descriptors, nearest);
+}
 
+void Vocabulary::Search(const cv::Mat& descriptors, int begin, int end,
+                        std::vector<TwoNearest>& nearest) const {
+  if (!index_ || !Problem(descriptors).empty()) return;  // Assign throws
+  for (int i = begin; i < end; ++i) {
+    nearest[static_cast<std::size_t>(i)] = index_->Search(descriptors.ptr(i));
+  }
+}
+
+std::vector<int> Vocabulary::Assign(const cv::Mat& descriptors, const std::vector<TwoNearest>& nearest) {
+  std::vector<int> words;
+  if (descriptors.rows == 0) return words;
+  CheckType(descriptors);
   const int old_words = created_;
   cv::Mat created(descriptors.rows, width_, type_);
   int num_created = 0;

@@ -41,7 +41,7 @@ struct VocabularyOptions {
       0.8;  ///< a descriptor is an old word if d1 <= nndr * d2; on TRUE distance, not on FLANN's squared one
   int trees = 4;        ///< kd-trees of the FLANN index (float descriptors)
   int checks = 32;      ///< leaves visited per search (float descriptors)
-  int hash_tables = 8;  ///< random tries of the Hamming index (binary descriptors)
+  int hash_tables = 5;  ///< random tries of the Hamming index (binary descriptors)
 
   /// Empty if usable, else what is wrong and what to do.
   std::string Validate() const;
@@ -49,14 +49,14 @@ struct VocabularyOptions {
 
 /// Options of the geometric verification (loop-closure.md section 5).
 struct VerificationOptions {
-  bool enabled = true;        ///< false: every proposal is accepted as it is, without a constraint
-  int max_hypotheses = 3;     ///< separate places tried, best posterior first
-  int neighbours = 1;         ///< graph levels around each place that are tried as well; 0: none
-  double nearer_share = 0.8;  ///< without metric points: a neighbour with this share of the inliers of the
-                              ///< best view is taken in its place if the query lies less ahead of it (or
-                              ///< behind) and more beside it: the nearer view of the place; 1: never, 0..1
-  double match_ratio = 0.8;       ///< Lowe's ratio test, on true distance
-  int min_inliers = 30;           ///< PnP: fewer inliers than this are no loop
+  bool enabled = true;         ///< false: every proposal is accepted as it is, without a constraint
+  int max_hypotheses = 3;      ///< separate places tried, best posterior first
+  int neighbours = 1;          ///< graph levels around each place that are tried as well; 0: none
+  double nearer_share = 0.85;  ///< without metric points: a neighbour with this share of the inliers of the
+                               ///< best view is taken in its place if the query lies less ahead of it (or
+                               ///< behind) and more beside it: the nearer view of the place; 1: never, 0..1
+  double match_ratio = 0.8;    ///< Lowe's ratio test, on true distance
+  int min_inliers = 30;        ///< PnP: fewer inliers than this are no loop
   double min_inlier_ratio = 0.3;  ///< PnP: inliers / matches with a 3D point, 0..1
   int min_epipolar_inliers =
       30;  ///< essential, fundamental matrix: a match is held to a line only, so more are needed

@@ -27,11 +27,12 @@ class Member {
   /// True if the caller extracts this member's features.
   bool external() const { return !extractor_; }
 
-  /// Step 2: the signature. A bad one (fewer features than bad_signature_ratio x their running mean, or fewer
-  /// than two) gets no words and is empty: the member sits this image out.
+  /// Step 2: false for a bad signature (fewer features than bad_signature_ratio x their running mean, or
+  /// fewer than two), which gets no words: the member sits this image out. Once per image: keeps the mean.
+  bool Judge(const Features& features);
+  /// Step 2 in one call: Judge, then the words. A bad signature is empty.
   Signature Quantise(const Features& features);
 
-  /// Words of its vocabulary so far.
   int num_words() const { return vocabulary_.size(); }
   Vocabulary& vocabulary() { return vocabulary_; }
   const Vocabulary& vocabulary() const { return vocabulary_; }

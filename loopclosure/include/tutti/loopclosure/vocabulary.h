@@ -33,6 +33,12 @@ class Vocabulary {
   /// InputError for another type or width than before.
   std::vector<int> Quantise(const cv::Mat& descriptors, int threads = 1);
 
+  /// Quantise in two steps, for callers that spread the first over threads: the two nearest words of rows
+  /// begin .. end - 1, into nearest[begin] .. (size N); then the words, of which new ones are added. Search
+  /// is safe to call from several threads at once.
+  void Search(const cv::Mat& descriptors, int begin, int end, std::vector<TwoNearest>& nearest) const;
+  std::vector<int> Assign(const cv::Mat& descriptors, const std::vector<TwoNearest>& nearest);
+
   /// One more location that has these words.
   void AddReferences(const Signature& signature);
   /// One location less; words that no location has any more leave the index.

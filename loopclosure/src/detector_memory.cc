@@ -61,8 +61,20 @@ void LoopDetector::Impl::FetchView(int slot) {
                      " are missing); give another file, or an older copy");
   }
   ByteReader in(*record, store().name());
+  LoadView(slot, in);
+}
+
+// Features of a stored location: its own, of the members and kinds that this detector has.
+void LoopDetector::Impl::LoadView(int slot, ByteReader& in) {
   View view = internal::LoadView(in);
-  if (view.members.size() != members_.size()) in.Damaged("features of other members");
+  if (view.id != memory().id(slot)) in.Damaged("features of another location");
+  bool good = view.members.size() == members_.size();
+  for (std::size_t k = 0; good && k < members_.size(); ++k) {
+    good = members_[k].vocabulary().Problem(view.members[k].descriptors).empty();
+  }
+  const cv::Mat& own = view.caller.descriptors;
+  if (!own.empty()) good = good && own.type() == caller_type_ && own.cols == caller_width_;
+  if (!good) in.Damaged("features of other members");
   views_[Index(slot)] = std::move(view);
 }
 
@@ -191,6 +203,10 @@ void LoopDetector::Impl::LoadStatistics(ByteReader& in) {
   last_hypothesis_ = in.Get<double>();
   caller_type_ = in.Get<std::int32_t>();
   caller_width_ = in.Get<std::int32_t>();
+  const bool known_type = caller_type_ == -1 || caller_type_ == CV_8U || caller_type_ == CV_32F;
+  if (last_id_ < -1 || !(last_hypothesis_ >= 0.0 && last_hypothesis_ <= 1.0 + 1e-6) || !known_type) {
+    in.Damaged("the detector's statistics");
+  }
   for (Member& member : members_) member.LoadStatistics(in);
 }
 

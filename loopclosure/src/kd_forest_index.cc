@@ -194,6 +194,7 @@ class KdForestIndex : public DescriptorIndex {
     for (const int row : pending_) {
       if (row < 0 || row >= storage_.end()) in.Damaged("a word that is not there");
     }
+    if (growing_ < 0 && !(shadow_.rows.empty() && pending_.empty())) in.Damaged("a kd-tree out of place");
     if (!storage_.SetFreeRows(in.GetVector<int>())) in.Damaged("free rows that are in use");
   }
 

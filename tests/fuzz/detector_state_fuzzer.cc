@@ -5,6 +5,8 @@
 #include <cstdlib>
 #include <filesystem>
 #include <limits>
+#include <stdexcept>
+#include <string>
 
 #include "detector_state.h"
 #include "memory_file.h"

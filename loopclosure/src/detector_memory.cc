@@ -49,6 +49,10 @@ void LoopDetector::Impl::Retrieve(int best, LoopResult& result) {
       FetchView(slot);
     } catch (const InputError& error) {
       result.warning = error.what();  // its words are there; it can't be verified
+      View& without_features = views_[Index(slot)];
+      without_features.id = memory().id(slot);
+      without_features.size = {1, 1};
+      without_features.members.resize(members_.size());
     }
   }
 }
@@ -64,17 +68,15 @@ void LoopDetector::Impl::FetchView(int slot) {
   LoadView(slot, in);
 }
 
-// Features of a stored location: its own, of the members and kinds that this detector has.
+// Features of a stored location.
 void LoopDetector::Impl::LoadView(int slot, ByteReader& in) {
   View view = internal::LoadView(in);
   if (view.id != memory().id(slot)) in.Damaged("features of another location");
-  bool good = view.members.size() == members_.size();
-  for (std::size_t k = 0; good && k < members_.size(); ++k) {
-    good = members_[k].vocabulary().Problem(view.members[k].descriptors).empty();
-  }
+  if (view.members.size() != members_.size()) in.Damaged("features of other members");
   const cv::Mat& own = view.caller.descriptors;
-  if (!own.empty()) good = good && own.type() == caller_type_ && own.cols == caller_width_;
-  if (!good) in.Damaged("features of other members");
+  if (!own.empty() && (own.type() != caller_type_ || own.cols != caller_width_)) {
+    in.Damaged("features of another kind");
+  }
   views_[Index(slot)] = std::move(view);
 }
 

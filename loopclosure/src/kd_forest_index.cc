@@ -177,7 +177,9 @@ class KdForestIndex : public DescriptorIndex {
         storage_.AddFree();
         alive_.push_back(0);
       } else {
-        if (storage_.RowOf(word) >= 0) in.Damaged("a word is there twice");
+        if (word >= internal::WordStorage::kMostWords || storage_.RowOf(word) >= 0) {
+          in.Damaged("an impossible word, or one that is there twice");
+        }
         alive_.push_back(in.Get<char>() != 0 ? 1 : 0);
         in.GetRaw(descriptor.data(), descriptor.size());
         storage_.Add(word, descriptor.data());

@@ -8,6 +8,7 @@
 #include "distances.h"
 #include "tutti/core/error.h"
 #include "tutti/loopclosure/parallel.h"
+#include "word_storage.h"
 
 namespace tutti {
 namespace {
@@ -163,6 +164,7 @@ void Vocabulary::Save(internal::ByteWriter& out) const {
 }
 
 void Vocabulary::Load(internal::ByteReader& in) {
+  static_assert(kMostWords == internal::WordStorage::kMostWords);
   constexpr int kMostColumns = 1 << 16;
   type_ = in.Get<std::int32_t>();
   width_ = in.Get<std::int32_t>();

@@ -20,6 +20,7 @@
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 #include "tutti/loopclosure/detector.h"
+#include "tutti/pipeline/config.h"
 #include "tutti/pipeline/interrupt.h"
 #include "tutti/pipeline/progress.h"
 
@@ -29,6 +30,7 @@ namespace {
 struct LoopsArguments {
   std::string images, out, rule = "mean", preset, camera;
   GroundTruthArguments truth;
+  std::vector<std::string> set;  // key=value, keys of the section `loops` of a configuration
   LoopDetectorOptions options;
   bool table = false;
 };
@@ -173,6 +175,7 @@ int RunLoops(const LoopsArguments& given) {
   if (arguments.truth.stride < 1) throw InputError("--stride must be at least 1");
   if (!arguments.preset.empty()) ApplyPreset(arguments.preset, arguments.options);
   SetRule(arguments.rule, arguments.options);
+  SetLoopOptions(arguments.set, arguments.options);
   const std::string problem = arguments.truth.rule.Validate();
   if (!problem.empty()) throw InputError("ground truth: " + problem);
   cv::setNumThreads(arguments.options.threads);
@@ -244,6 +247,10 @@ void AddLoopsCommand(CLI::App& app, int& exit_code) {
       ->capture_default_str();
   command->add_option("--seed", arguments->options.seed, "seed of kd-forests and RANSAC")
       ->capture_default_str();
+  command->add_option(
+      "--set", arguments->set,
+      "key=value: an option of the detector, with the keys of section 'loops' in --help-config "
+      "(extraction.features=300); may be given again");
   command->callback([arguments, &exit_code] { exit_code = RunLoops(*arguments); });
 }
 

@@ -49,6 +49,8 @@ std::string VocabularyOptions::Validate() const {
 std::string VerificationOptions::Validate() const {
   if (max_hypotheses < 1) return OutOf("verification.max_hypotheses", "at least 1");
   if (neighbours < 0 || neighbours > 16) return OutOf("verification.neighbours", "0 to 16");
+  if (!(nearer_share > 0 && nearer_share <= 1))
+    return OutOf("verification.nearer_share", "above 0, at most 1");
   if (!(match_ratio > 0 && match_ratio <= 1))
     return OutOf("verification.match_ratio", "above 0 and at most 1");
   if (min_inliers < 8) return OutOf("verification.min_inliers", "at least 8");

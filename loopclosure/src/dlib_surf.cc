@@ -2,11 +2,13 @@
 // numbers: our own function takes its place, so that tutti needs neither BLAS nor libdlib at link time.
 #define cblas_dscal tutti_cblas_dscal
 #include <dlib/image_keypoint/surf.h>
-#include <dlib/image_transforms/integral_image.h>
 
 #include <algorithm>
-#include <opencv2/imgproc.hpp>
+#include <array>
+#include <cmath>
+#include <utility>
 
+#include "surf_integral.h"
 #include "tutti/loopclosure/features.h"
 
 extern "C" void tutti_cblas_dscal(const CBLAS_INT_TYPE n, const double alpha, double* x,
@@ -24,7 +26,100 @@ constexpr double kBorder = 32.0;  // dlib describes a point from a window of thi
 constexpr float kSizePerScale =
     20.0f;  // SURF describes a patch of 20 scales: the diameter that cv::KeyPoint wants
 
-using Integral = dlib::integral_image_generic<int>;
+using Integral = internal::SurfIntegral;
+
+// Gaussian of dlib::compute_dominant_angle by squared distance from the centre [samples].
+const std::array<double, 36>& AngleWeights() {
+  static const std::array<double, 36> weights = [] {
+    std::array<double, 36> values{};
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      values[i] = dlib::gaussian(std::sqrt(static_cast<double>(i)), 0.0, 2.5);
+    }
+    return values;
+  }();
+  return weights;
+}
+
+// As dlib::compute_dominant_angle, sum for sum; but a sample is offered only to those of the overlapping
+// slices of the circle that it can lie in, a fifth of them.
+double DominantAngle(const Integral& image, const dlib::vector<double, 2>& centre, double scale) {
+  constexpr int kSlices = 45;
+  constexpr int kRadius = 6;
+  constexpr double kPi = CV_PI;
+  constexpr double kStep = 2 * kPi / kSlices;
+  constexpr double kWidth = kPi / 3;
+  constexpr int kReach = 9;  // slices back from the newest that can hold an angle: kWidth / kStep, rounded up
+  std::array<dlib::vector<double, 2>, kSlices> sums;
+  const long sc = static_cast<long>(scale + 0.5);
+  for (long r = -kRadius; r <= kRadius; ++r) {
+    for (long c = -kRadius; c <= kRadius; ++c) {
+      if (r * r + c * c >= kRadius * kRadius) continue;
+      const double weight = AngleWeights()[static_cast<std::size_t>(r * r + c * c)];
+      const auto [x, y] = image.Haar(sc * dlib::point(c, r) + centre, 4 * sc);
+      const dlib::vector<double, 2> sample(weight * x, weight * y);
+      const double angle = std::atan2(sample.y(), sample.x());
+      const int newest = static_cast<int>((angle + kPi) / kStep) + 1;
+      for (int s = newest - kReach; s <= newest; ++s) {
+        const int slice = (s + kSlices) % kSlices;
+        const double begin = kStep * slice - kPi;
+        const double end = begin + kWidth;
+        const bool inside = begin <= angle && angle <= end;
+        if (inside || (end > kPi && (angle >= begin || angle <= -2 * kPi + end))) {
+          sums[static_cast<std::size_t>(slice)] += sample;
+        }
+      }
+    }
+  }
+  double longest = 0.0;
+  dlib::vector<double, 2> best(1.0, 0.0);
+  for (const dlib::vector<double, 2>& sum : sums) {
+    if (sum.length_squared() <= longest) continue;
+    longest = sum.length_squared();
+    best = sum;
+  }
+  return std::atan2(best.y(), best.x());
+}
+
+// As dlib::compute_surf_descriptor, sum for sum; but its 4 x 4 cells overlap, and each of the 20 x 20 samples
+// is taken from the image once.
+void SurfDescriptor(const Integral& image, const dlib::vector<double, 2>& centre, double scale, double angle,
+                    float* descriptor) {
+  constexpr int kSide = 20;
+  constexpr int kCell = 5;
+  const dlib::point_rotator rotate(angle);
+  const dlib::point_rotator rotate_back(-angle);
+  const long sc = static_cast<long>(scale + 0.5);
+  std::array<std::pair<int, int>, kSide * kSide> samples;
+  for (int y = 0; y < kSide; ++y) {
+    for (int x = 0; x < kSide; ++x) {
+      const dlib::vector<double, 2> offset(scale * (x - kSide / 2), scale * (y - kSide / 2));
+      samples[static_cast<std::size_t>(y * kSide + x)] =
+          image.Haar(dlib::point(rotate(offset) + centre), 2 * sc);
+    }
+  }
+  std::array<double, kDescriptorSize> values{};
+  double* value = values.data();
+  for (int r = 0; r < kSide; r += kCell) {
+    for (int c = 0; c < kSide; c += kCell) {
+      for (int y = std::max(0, r - 1); y < std::min(kSide, r + kCell + 1); ++y) {
+        for (int x = std::max(0, c - 1); x < std::min(kSide, c + kCell + 1); ++x) {
+          const double weight = 1.0 / (4 + std::abs(r + 2 - y) + std::abs(c + 2 - x));
+          const auto [dx, dy] = samples[static_cast<std::size_t>(y * kSide + x)];
+          const dlib::vector<double, 2> d = rotate_back(dlib::vector<double, 2>(weight * dx, weight * dy));
+          value[0] += d.x();
+          value[1] += d.y();
+          value[2] += std::abs(d.x());
+          value[3] += std::abs(d.y());
+        }
+      }
+      value += 4;
+    }
+  }
+  double squares = 0.0;
+  for (const double v : values) squares += v * v;
+  const double length = std::sqrt(squares) + 1e-7;
+  for (std::size_t i = 0; i < values.size(); ++i) descriptor[i] = static_cast<float>(values[i] / length);
+}
 
 class DlibSurf : public cv::Feature2D {
  public:
@@ -35,8 +130,7 @@ class DlibSurf : public cv::Feature2D {
                         cv::OutputArray descriptors, bool use_provided) override {
     const cv::Mat grey = image.getMat();
     CV_Assert(grey.type() == CV_8UC1);
-    Integral integral;
-    LoadIntegral(grey, integral);
+    const Integral integral(grey);
     if (!use_provided) Detect(integral, mask.getMat(), keypoints);
     if (descriptors.needed()) Describe(integral, keypoints, descriptors);
   }
@@ -47,15 +141,10 @@ class DlibSurf : public cv::Feature2D {
   cv::String getDefaultName() const override { return "tutti.DlibSurf"; }
 
  private:
-  static void LoadIntegral(const cv::Mat& grey, Integral& integral) {
-    dlib::array2d<unsigned char> copy(grey.rows, grey.cols);
-    for (int r = 0; r < grey.rows; ++r) std::copy_n(grey.ptr(r), grey.cols, &copy[r][0]);
-    integral.load(copy);
-  }
-
   static bool Describable(const Integral& integral, const dlib::vector<double, 2>& centre, double scale) {
     const unsigned long border = static_cast<unsigned long>(kBorder * scale);
-    return get_rect(integral).contains(dlib::centered_rect(dlib::point(centre), border, border));
+    const dlib::rectangle image(0, 0, integral.nc() - 1, integral.nr() - 1);
+    return image.contains(dlib::centered_rect(dlib::point(centre), border, border));
   }
 
   void Detect(const Integral& integral, const cv::Mat& mask, std::vector<cv::KeyPoint>& keypoints) const {
@@ -86,11 +175,8 @@ class DlibSurf : public cv::Feature2D {
       const dlib::vector<double, 2> centre(keypoint.pt.x, keypoint.pt.y);
       const double scale = static_cast<double>(keypoint.size / kSizePerScale);
       if (scale <= 0 || !Describable(integral, centre, scale)) continue;
-      const double angle = dlib::compute_dominant_angle(integral, centre, scale);
-      dlib::matrix<double, kDescriptorSize, 1> values;
-      dlib::compute_surf_descriptor(integral, centre, scale, angle, values);
-      float* row = rows.ptr<float>(static_cast<int>(kept.size()));
-      for (int i = 0; i < kDescriptorSize; ++i) row[i] = static_cast<float>(values(i));
+      const double angle = DominantAngle(integral, centre, scale);
+      SurfDescriptor(integral, centre, scale, angle, rows.ptr<float>(static_cast<int>(kept.size())));
       keypoint.angle = static_cast<float>(angle * 180.0 / CV_PI);
       if (keypoint.angle < 0) keypoint.angle += 360.0f;
       kept.push_back(keypoint);

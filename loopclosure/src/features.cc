@@ -30,6 +30,14 @@ cv::Ptr<cv::Feature2D> CreateOrb(cv::Size size, int features, int fast_threshold
   return cv::ORB::create(features, kScale, levels, edge, 0, 2, cv::ORB::HARRIS_SCORE, kPatch, fast_threshold);
 }
 
+std::vector<cv::KeyPoint> Picked(const std::vector<cv::KeyPoint>& keypoints,
+                                 const std::vector<int>& selected) {
+  std::vector<cv::KeyPoint> picked;
+  picked.reserve(selected.size());
+  for (const int i : selected) picked.push_back(keypoints[static_cast<std::size_t>(i)]);
+  return picked;
+}
+
 void ScaleKeypoints(double factor, std::vector<cv::KeyPoint>& keypoints) {
   if (factor == 1.0) return;
   const float f = static_cast<float>(factor);
@@ -178,17 +186,26 @@ Features FeatureExtractor::Extract(const cv::Mat& grey) const {
     if (std::min(size.width, size.height) < kMinSide) return features;
     cv::resize(grey, image, size, 0, 0, cv::INTER_AREA);
   }
-  std::vector<cv::KeyPoint> keypoints;
-  cv::Mat descriptors;
-  Create(image.size())->detectAndCompute(image, cv::noArray(), keypoints, descriptors);
-  if (keypoints.empty() || descriptors.rows != static_cast<int>(keypoints.size())) return features;
-
-  const std::vector<int> selected =
-      SelectSpread(keypoints, image.size(), options_.features, options_.grid_columns);
-  features.descriptors.create(static_cast<int>(selected.size()), descriptors.cols, descriptors.type());
-  for (std::size_t i = 0; i < selected.size(); ++i) {
-    features.keypoints.push_back(keypoints[static_cast<std::size_t>(selected[i])]);
-    descriptors.row(selected[i]).copyTo(features.descriptors.row(static_cast<int>(i)));
+  const cv::Ptr<cv::Feature2D> member = Create(image.size());
+  if (name_ == "surf") {
+    // Describing costs more than detecting, and what was detected stays valid: describe what is kept.
+    std::vector<cv::KeyPoint> detected;
+    member->detect(image, detected);
+    features.keypoints =
+        Picked(detected, SelectSpread(detected, image.size(), options_.features, options_.grid_columns));
+    member->compute(image, features.keypoints, features.descriptors);
+  } else {
+    std::vector<cv::KeyPoint> keypoints;
+    cv::Mat descriptors;
+    member->detectAndCompute(image, cv::noArray(), keypoints, descriptors);
+    if (keypoints.empty() || descriptors.rows != static_cast<int>(keypoints.size())) return features;
+    const std::vector<int> selected =
+        SelectSpread(keypoints, image.size(), options_.features, options_.grid_columns);
+    features.keypoints = Picked(keypoints, selected);
+    features.descriptors.create(static_cast<int>(selected.size()), descriptors.cols, descriptors.type());
+    for (std::size_t i = 0; i < selected.size(); ++i) {
+      descriptors.row(selected[i]).copyTo(features.descriptors.row(static_cast<int>(i)));
+    }
   }
   ScaleKeypoints(factor, features.keypoints);
   return features;

@@ -93,19 +93,53 @@ std::vector<int> HypothesisSearch::ViewsOf(int place, const Belief& belief) cons
   return views;
 }
 
-// From an accepted candidate along the path to the neighbour that shares the most with the query: the
-// nearest view of the place, and the best constraint.
+// From an accepted candidate along the path to the neighbour that shares the most with the query: the best
+// constraint. Of views that share about as much, the nearest.
 void HypothesisSearch::Climb(const View& query, LoopResult& result) const {
   constexpr int kSteps = 3;
   for (int step = 0; step < kSteps; ++step) {
     const std::int64_t start = result.verification.candidate;
-    for (const LocationMemory::Link& link : memory_.links(memory_.Find(start))) {
-      if (link.type == LocationMemory::LinkType::kOdometry &&
-          memory_.state(link.slot) == LocationMemory::State::kWorking)
-        Try(query, link.slot, result);
-    }
-    if (result.verification.candidate == start) return;
+    TryNeighbours(query, start, result);
+    if (result.verification.candidate == start) break;
   }
+  const double enough = options_.verification.nearer_share * result.verification.inliers;
+  for (int step = 0; step < kSteps; ++step) {
+    const std::int64_t start = result.verification.candidate;
+    TakeNearer(enough, result);
+    if (result.verification.candidate == start) return;
+    const Verification nearer = result.verification;
+    TryNeighbours(query, nearer.candidate, result);
+    result.verification = nearer;
+  }
+}
+
+// The views before and after one on the path. Keeps result.verification unless one has more inliers.
+void HypothesisSearch::TryNeighbours(const View& query, std::int64_t id, LoopResult& result) const {
+  for (const LocationMemory::Link& link : memory_.links(memory_.Find(id))) {
+    if (link.type == LocationMemory::LinkType::kOdometry &&
+        memory_.state(link.slot) == LocationMemory::State::kWorking)
+      Try(query, link.slot, result);
+  }
+}
+
+// Where no scale is known, the direction of the translation tells which view is nearer: on a path, the query
+// lies ahead of the views that come too early, behind those that come too late, and beside the nearest.
+void HypothesisSearch::TakeNearer(double enough, LoopResult& result) const {
+  constexpr double kClearly = 0.02;  // beyond the noise of the direction
+  const auto scale_free = [](const Verification& v) {
+    return v.type == ConstraintType::kEssential || v.type == ConstraintType::kFundamental;
+  };
+  if (!scale_free(result.verification)) return;
+  const Verification* nearest = &result.verification;
+  for (const LocationMemory::Link& link : memory_.links(memory_.Find(result.verification.candidate))) {
+    for (const Verification& tried : result.tried) {
+      if (tried.candidate == memory_.id(link.slot) && tried.accepted && scale_free(tried) &&
+          tried.inliers >= enough && tried.ahead < nearest->ahead - kClearly) {
+        nearest = &tried;
+      }
+    }
+  }
+  if (nearest != &result.verification) result.verification = Verification(*nearest);
 }
 
 }  // namespace tutti::internal

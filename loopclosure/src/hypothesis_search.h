@@ -26,6 +26,8 @@ class HypothesisSearch {
   std::vector<int> ViewsOf(int place, const Belief& belief) const;
   const Verification& Try(const View& query, int candidate, LoopResult& result) const;
   void Climb(const View& query, LoopResult& result) const;
+  void TryNeighbours(const View& query, std::int64_t id, LoopResult& result) const;
+  void TakeNearer(double enough, LoopResult& result) const;
 
   const LoopDetectorOptions& options_;
   const LocationMemory& memory_;

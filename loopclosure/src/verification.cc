@@ -231,6 +231,15 @@ void AddSimilarity(const std::vector<PooledMatch>& pool, const std::vector<int>&
   if (fit.information(6, 6) > 0) result.information -= cross * cross.transpose() / fit.information(6, 6);
 }
 
+// Share of the translation along the candidate's optical axis, from the pixel of the query's centre in it.
+// The focal length is a guess that most cameras are within a factor of two of.
+double AheadFromEpipole(const Eigen::Vector3d& epipole, const cv::Size& size) {
+  const double focal = 0.8 * std::max(size.width, size.height);
+  const Eigen::Vector3d direction(epipole.x() - 0.5 * size.width * epipole.z(),
+                                  epipole.y() - 0.5 * size.height * epipole.z(), focal * epipole.z());
+  return direction.norm() > 0 ? std::abs(direction.z()) / direction.norm() : 1.0;
+}
+
 void VerifyEpipolar(const std::vector<PooledMatch>& pool, const View& query, const View& candidate,
                     const VerificationOptions& options, std::uint64_t seed, Verification& result) {
   std::vector<cv::Point2f> pixels_q;
@@ -248,7 +257,11 @@ void VerifyEpipolar(const std::vector<PooledMatch>& pool, const View& query, con
   result.type = calibrated ? ConstraintType::kEssential : ConstraintType::kFundamental;
   result.reason = Judge(pool, fit.inliers, pool.size(), query, candidate, options, result);
   result.accepted = result.reason.empty();
-  if (calibrated) result.S_candidate_query = Similarity(fit.T_second_first.Inverse());
+  result.ahead = AheadFromEpipole(fit.epipole, candidate.size);
+  if (calibrated) {
+    result.S_candidate_query = Similarity(fit.T_second_first.Inverse());
+    result.ahead = std::abs(result.S_candidate_query.translation.normalized().z());
+  }
   if (calibrated && result.accepted && !(query.metric && candidate.metric)) {
     AddSimilarity(pool, fit.inliers, query, candidate, options, seed, result);
   }

@@ -147,6 +147,39 @@ RunConfig LoadConfig(const std::filesystem::path& file) {
   return ParseConfig(text.str(), file.string());
 }
 
+void SetLoopOptions(const std::vector<std::string>& assignments, LoopDetectorOptions& options) {
+  RunConfig config;
+  config.dataset.camera = PinholeCamera();  // the table binds to it
+  config.loops = options;
+  const ConfigTable table(config);
+  for (const std::string& assignment : assignments) {
+    const std::size_t equals = assignment.find('=');
+    if (equals == std::string::npos) throw InputError("'" + assignment + "': write it as key=value");
+    const std::string path = "loops." + assignment.substr(0, equals);
+    const std::size_t dot = path.rfind('.');
+    const ConfigKey* key = table.Find(path.substr(0, dot), path.substr(dot + 1));
+    if (key == nullptr) {
+      std::vector<std::string> valid;
+      for (const ConfigKey& known : table.keys()) {
+        const std::string name = known.section + "." + known.name;
+        if (name.rfind("loops.", 0) == 0) valid.push_back(name.substr(6));
+      }
+      const std::string given = path.substr(6);
+      throw InputError("'" + assignment + "': unknown key '" + given + "'" + NearestHint(given, valid));
+    }
+    std::string wrong;
+    try {
+      wrong = key->read(YAML::Load(assignment.substr(equals + 1)));
+    } catch (const YAML::Exception& e) {
+      wrong = "not valid YAML: " + e.msg;
+    }
+    if (!wrong.empty()) throw InputError("'" + assignment + "': " + wrong);
+  }
+  const std::string problem = config.loops.Validate();
+  if (!problem.empty()) throw InputError("loops: " + problem);
+  options = config.loops;
+}
+
 std::vector<ConfigEntry> DescribeConfig(const RunConfig& config) {
   RunConfig copy = config;
   if (!copy.dataset.camera) copy.dataset.camera = PinholeCamera();

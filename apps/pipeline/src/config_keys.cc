@@ -195,6 +195,9 @@ void ConfigTable::AddVerification(VerificationOptions& o) {
   Add("enabled", o.enabled, "false: every proposal is accepted as it is, without a constraint");
   Add("max_hypotheses", o.max_hypotheses, "separate places tried, best posterior first");
   Add("neighbours", o.neighbours, "graph levels around each place that are tried as well; 0: none");
+  Add("nearer_share", o.nearer_share,
+      "without metric points: a nearer neighbour with this share of the best view's inliers is taken; 1: "
+      "never");
   Add("match_ratio", o.match_ratio, "Lowe's ratio test, on true distance");
   Add("min_inliers", o.min_inliers, "fewer inliers than this are no loop");
   Add("min_inlier_ratio", o.min_inlier_ratio, "inliers / matches, 0..1");

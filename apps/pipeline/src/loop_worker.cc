@@ -3,9 +3,17 @@
 #include <chrono>
 #include <utility>
 
+#include "tutti/core/error.h"
+
 namespace tutti {
 
 LoopWorker::LoopWorker(const LoopDetectorOptions& options, bool own_thread) : detector_(options) {
+  // Frames are numbered from 0 in every run: what an earlier run stored has no frame in this one.
+  if (detector_.LastId() >= 0) {
+    throw InputError(
+        options.ltm_file +
+        ": holds the locations of an earlier run; remove it, or give another file in loops.ltm_file");
+  }
   if (own_thread) thread_ = std::thread(&LoopWorker::Work, this);
 }
 

@@ -136,6 +136,10 @@ class SlamSystem::Impl {
     submitted_.pop_front();
     const LoopResult result = worker_->Take();
     AddStages(result);
+    if (!result.warning.empty() && result.warning != loop_warning_) {
+      loop_warning_ = result.warning;
+      std::fprintf(stderr, "\ntutti: warning: %s\n", result.warning.c_str());
+    }
     if (!result.proposed) return;
     LoopRecord record = Record(result);
     const auto stamp = [&](std::int64_t frame) {
@@ -278,6 +282,7 @@ class SlamSystem::Impl {
   LoopGate gate_;
   MapGraph graph_;
   std::unique_ptr<LoopWorker> worker_;
+  std::string loop_warning_;  // the last one said
   std::deque<Submission> submitted_;
   std::vector<LoopEdge> deferred_;  // agreed, and the map fulfils them: they enter with the next correction
   std::map<std::int64_t, int> keyframe_of_frame_;  // of the frames that the detector knows

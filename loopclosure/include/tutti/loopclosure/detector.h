@@ -83,10 +83,12 @@ struct Verification {
   ConstraintType type = ConstraintType::kNone;  ///< which geometry decided
   Similarity S_candidate_query;  ///< maps points of the query camera into the candidate camera (kRigid:
                                  ///< scale 1; kEssential: rotation and unit direction only)
-  Matrix6d information = Matrix6d::Zero();    ///< of (translation [m], rotation [rad]), from the inliers
-  int matches = 0;                            ///< that were considered (kRigid: those with a 3D point)
-  int inliers = 0;                            ///< of these, those that fit one camera motion
-  std::string reason;                         ///< why not, in plain words; empty if accepted
+  Matrix6d information = Matrix6d::Zero();  ///< of (translation [m], rotation [rad]), from the inliers
+  double ahead = 1;    ///< kEssential, kFundamental: share of the translation that is along the candidate's
+                       ///< optical axis, 0..1; without a camera by a guessed focal length
+  int matches = 0;     ///< that were considered (kRigid: those with a 3D point)
+  int inliers = 0;     ///< of these, those that fit one camera motion
+  std::string reason;  ///< why not, in plain words; empty if accepted
   std::vector<VerifiedMatch> inlier_matches;  ///< the inliers
 };
 

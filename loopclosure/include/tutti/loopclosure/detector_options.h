@@ -49,9 +49,12 @@ struct VocabularyOptions {
 
 /// Options of the geometric verification (loop-closure.md section 5).
 struct VerificationOptions {
-  bool enabled = true;            ///< false: every proposal is accepted as it is, without a constraint
-  int max_hypotheses = 3;         ///< separate places tried, best posterior first
-  int neighbours = 1;             ///< graph levels around each place that are tried as well; 0: none
+  bool enabled = true;        ///< false: every proposal is accepted as it is, without a constraint
+  int max_hypotheses = 3;     ///< separate places tried, best posterior first
+  int neighbours = 1;         ///< graph levels around each place that are tried as well; 0: none
+  double nearer_share = 0.8;  ///< without metric points: a neighbour with this share of the inliers of the
+                              ///< best view is taken in its place if the query lies less ahead of it (or
+                              ///< behind) and more beside it: the nearer view of the place; 1: never, 0..1
   double match_ratio = 0.8;       ///< Lowe's ratio test, on true distance
   int min_inliers = 30;           ///< PnP: fewer inliers than this are no loop
   double min_inlier_ratio = 0.3;  ///< PnP: inliers / matches with a 3D point, 0..1

@@ -1,0 +1,55 @@
+// The integral image that dlib's SURF reads its sums from. Internal.
+#pragma once
+
+#include <dlib/geometry.h>
+
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+#include <utility>
+
+namespace tutti::internal {
+
+/// In place of dlib::integral_image: with a row and a column of zeros before the first, so that no sum has to
+/// ask whether it touches the border. The same sums, in a fraction of the time.
+class SurfIntegral {
+ public:
+  using value_type = int;
+
+  /// Of an 8-bit grey image of at most 2^23 pixels.
+  explicit SurfIntegral(const cv::Mat& grey) { cv::integral(grey, sums_, CV_32S); }
+
+  long nr() const { return sums_.rows - 1; }
+  long nc() const { return sums_.cols - 1; }
+
+  /// Sum over a rectangle inside of the image, its last row and column included.
+  int get_sum_of_area(const dlib::rectangle& area) const {
+    return Sum(area.left(), area.top(), area.right() + 1, area.bottom() + 1);
+  }
+
+  /// Haar wavelets of `width` pixels around a point, as dlib::haar_x and dlib::haar_y define them; both share
+  /// their corners.
+  std::pair<int, int> Haar(const dlib::point& p, long width) const {
+    const long left = p.x() - width / 2;
+    const long top = p.y() - width / 2;
+    const long right = left + width;
+    const int* t = Row(top);
+    const int* m = Row(p.y());
+    const int* b = Row(top + width);
+    const int x = (b[right] - 2 * b[p.x()] + b[left]) - (t[right] - 2 * t[p.x()] + t[left]);
+    const int y = (b[right] - b[left]) - 2 * (m[right] - m[left]) + (t[right] - t[left]);
+    return {x, y};
+  }
+
+ private:
+  const int* Row(long r) const { return sums_.ptr<int>(static_cast<int>(r)); }
+
+  int Sum(long left, long top, long right, long bottom) const {
+    const int* above = Row(top);
+    const int* below = Row(bottom);
+    return below[right] - below[left] - above[right] + above[left];
+  }
+
+  cv::Mat sums_;
+};
+
+}  // namespace tutti::internal

@@ -1,0 +1,132 @@
+#include "tutti/loopclosure/verification.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+namespace tutti {
+namespace {
+
+constexpr int kPoints = 200;
+constexpr std::uint32_t kSeed = 7;
+
+PinholeCamera Camera() {
+  PinholeCamera camera;
+  camera.width = 640;
+  camera.height = 480;
+  camera.fx = camera.fy = 500;
+  camera.cx = 320;
+  camera.cy = 240;
+  return camera;
+}
+
+// A cloud in front of the camera of the query, 4 to 12 m away.
+std::vector<Eigen::Vector3d> Cloud() {
+  std::mt19937 generator(kSeed);
+  std::uniform_real_distribution<double> x(-3, 3), y(-2, 2), z(4, 12);
+  std::vector<Eigen::Vector3d> cloud;
+  for (int i = 0; i < kPoints; ++i) cloud.emplace_back(x(generator), y(generator), z(generator));
+  return cloud;
+}
+
+// What a camera at this pose sees of the cloud: every point with a descriptor of its own, and half a pixel of
+// noise.
+View See(const Pose& T_world_camera, std::int64_t id, bool calibrated, bool with_points) {
+  const std::vector<Eigen::Vector3d> cloud = Cloud();
+  std::mt19937 generator(static_cast<std::uint32_t>(100 + id));
+  std::normal_distribution<double> noise(0, 0.5);
+  View view;
+  view.id = id;
+  view.size = {640, 480};
+  if (calibrated) view.camera = Camera();
+  View::Set set;
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const Eigen::Vector3d p = T_world_camera.Inverse() * cloud[i];
+    const Eigen::Vector2d pixel = Camera().Project(p);
+    if (p.z() < 0.1 || !Camera().Contains(pixel)) continue;
+    std::mt19937 own(static_cast<std::uint32_t>(i + 1));
+    cv::Mat row(1, 32, CV_8U);
+    for (int c = 0; c < 32; ++c) row.at<std::uint8_t>(0, c) = static_cast<std::uint8_t>(own());
+    set.descriptors.push_back(row);
+    set.pixels.emplace_back(static_cast<float>(pixel.x() + noise(generator)),
+                            static_cast<float>(pixel.y() + noise(generator)));
+    if (with_points) set.points.push_back(p.cast<float>());
+  }
+  view.members.push_back(set);
+  return view;
+}
+
+Pose At(double x, double z, double turn = 0.0) { return Pose(ExpSO3({0, turn, 0}), {x, 0, z}); }
+
+TEST(GeometricVerifier, WithMetricPointsTheConstraintIsTheRelativePose) {
+  const GeometricVerifier verifier({}, 1);
+  const Pose query = At(0.4, 0.2, 0.05);
+  const Verification v = verifier.Verify(See(query, 9, true, true), See(Pose(), 1, true, true));
+  ASSERT_TRUE(v.accepted) << v.reason;
+  EXPECT_EQ(v.type, ConstraintType::kRigid);
+  EXPECT_EQ(v.candidate, 1);
+  EXPECT_LT((v.S_candidate_query.translation - query.translation).norm(), 0.02);
+  EXPECT_EQ(v.S_candidate_query.scale, 1.0);
+  EXPECT_GT(v.information.diagonal().minCoeff(), 0.0);
+}
+
+TEST(GeometricVerifier, WithCalibrationAloneTheDirectionIsKnown) {
+  const GeometricVerifier verifier({}, 1);
+  const Verification v = verifier.Verify(See(At(0.8, 0.0), 9, true, false), See(Pose(), 1, true, false));
+  ASSERT_TRUE(v.accepted) << v.reason;
+  EXPECT_EQ(v.type, ConstraintType::kEssential);
+  EXPECT_NEAR(std::abs(v.S_candidate_query.translation.normalized().x()), 1.0, 0.02);
+}
+
+class Ahead : public ::testing::TestWithParam<bool> {};
+INSTANTIATE_TEST_SUITE_P(Calibrated, Ahead, ::testing::Bool());
+
+TEST_P(Ahead, IsOneForAQueryFurtherOnAndSmallForOneBeside) {
+  const GeometricVerifier verifier({}, 1);
+  const View candidate = See(Pose(), 1, GetParam(), false);
+  const auto ahead = [&](const Pose& query) {
+    const Verification v = verifier.Verify(See(query, 9, GetParam(), false), candidate);
+    EXPECT_TRUE(v.accepted) << v.reason;
+    return v.ahead;
+  };
+  EXPECT_GT(ahead(At(0.0, 1.5)), 0.97);
+  EXPECT_GT(ahead(At(0.0, -1.5)), 0.97);
+  EXPECT_LT(ahead(At(1.0, 0.0)), 0.25);
+  // Along a path that passes by, it falls towards the nearest point and rises again.
+  EXPECT_GT(ahead(At(0.7, -2.0)), ahead(At(0.7, -0.5)));
+  EXPECT_GT(ahead(At(0.7, 2.0)), ahead(At(0.7, 0.5)));
+}
+
+TEST(GeometricVerifier, AnotherPlaceIsRefusedWithAReason) {
+  const GeometricVerifier verifier({}, 1);
+  View other = See(Pose(), 1, true, true);
+  std::mt19937 generator(3);
+  for (cv::Point2f& p : other.members[0].pixels) {  // the same features, elsewhere in the image
+    p = {static_cast<float>(generator() % 640u), static_cast<float>(generator() % 480u)};
+  }
+  const Verification v = verifier.Verify(See(At(0.2, 0), 9, false, false), other);
+  EXPECT_FALSE(v.accepted);
+  EXPECT_FALSE(v.reason.empty());
+}
+
+TEST(GeometricVerifier, MatchesInOneSpotAreRefused) {
+  View query = See(At(0.8, 0), 9, false, false), candidate = See(Pose(), 1, false, false);
+  for (View* view : {&query, &candidate}) {
+    for (cv::Point2f& p : view->members[0].pixels)
+      p = cv::Point2f(300, 200) + (p - cv::Point2f(320, 240)) * 0.08f;
+  }
+  const Verification spot = GeometricVerifier({}, 1).Verify(query, candidate);
+  EXPECT_FALSE(spot.accepted);
+}
+
+TEST(GeometricVerifier, IsDeterministicForASeedAndAnyNumberOfThreads) {
+  const GeometricVerifier verifier({}, 5);
+  const View query = See(At(0.5, 0.3), 9, false, false), candidate = See(Pose(), 1, false, false);
+  const Verification a = verifier.Verify(query, candidate, 1), b = verifier.Verify(query, candidate, 2);
+  EXPECT_EQ(a.inliers, b.inliers);
+  EXPECT_EQ(a.ahead, b.ahead);
+}
+
+}  // namespace
+}  // namespace tutti

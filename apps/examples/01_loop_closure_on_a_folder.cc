@@ -3,41 +3,26 @@
 //   01_loop_closure_on_a_folder DIR
 //
 // Three calls: construct a LoopDetector, give it each image, read the result.
-#include <algorithm>
 #include <cstdio>
 #include <exception>
-#include <filesystem>
 #include <opencv2/imgcodecs.hpp>
 #include <string>
 #include <vector>
 
-#include "tutti/core/text.h"
+#include "image_folder.h"
 #include "tutti/loopclosure/detector.h"
 
 namespace {
-
-std::vector<std::string> FilesInOrder(const std::string& folder) {
-  std::vector<std::string> files;
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-    if (entry.is_regular_file() && cv::haveImageReader(entry.path().string()))
-      files.push_back(entry.path().string());
-  }
-  std::sort(files.begin(), files.end(), tutti::NaturalLess);  // 2.jpg before 10.jpg
-  return files;
-}
 
 int Run(const std::string& folder) {
   tutti::LoopDetectorOptions options;  // SURF, SIFT and ORB, one Bayes filter each, the mean of the three
   tutti::LoopDetector detector(options);
 
-  const std::vector<std::string> files = FilesInOrder(folder);
+  const std::vector<std::string> files = examples::FilesInOrder(folder);
   int loops = 0;
   for (std::size_t i = 0; i < files.size(); ++i) {
-    tutti::LoopQuery query;
-    query.id = static_cast<std::int64_t>(i);
-    query.image = cv::imread(files[i], cv::IMREAD_GRAYSCALE);
-
-    const tutti::LoopResult result = detector.Detect(query);
+    const cv::Mat image = cv::imread(files[i], cv::IMREAD_GRAYSCALE);
+    const tutti::LoopResult result = detector.Detect(image, static_cast<std::int64_t>(i));
     if (result.accepted) {
       const tutti::Verification& v = result.verification;
       std::printf("image %zu is where image %lld was (H = %.2f, %d of %d matches fit)\n", i,

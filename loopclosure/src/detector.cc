@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 
 #include "detector_impl.h"
@@ -42,6 +43,14 @@ std::vector<std::vector<std::size_t>> UnitsOf(const LoopDetectorOptions& options
     }
   }
   return units;
+}
+
+void CheckPixels(const std::vector<cv::KeyPoint>& keypoints, const std::string& which) {
+  const auto is_pixel = [](float value) { return std::abs(value) <= View::kFarthestPixel; };  // NaN: false
+  if (!std::all_of(keypoints.begin(), keypoints.end(),
+                   [&](const cv::KeyPoint& k) { return is_pixel(k.pt.x) && is_pixel(k.pt.y); })) {
+    throw InputError(which + "a keypoint is not a finite number, or more than a million pixels away");
+  }
 }
 
 }  // namespace
@@ -151,6 +160,7 @@ void LoopDetector::Impl::CheckCallersFeatures(const LoopQuery& query, const std:
                      " points; give none or one each (NaN where unknown)");
   }
   if (n == 0) return;
+  CheckPixels(f.keypoints, which);
   if (f.descriptors.type() != CV_8U && f.descriptors.type() != CV_32F) {
     throw InputError(which + "descriptors must be CV_8U (Hamming) or CV_32F (Euclidean)");
   }
@@ -171,6 +181,7 @@ void LoopDetector::Impl::CheckMemberFeatures(const LoopQuery& query, const std::
       throw InputError(which + name + ": " + std::to_string(f.keypoints.size()) + " keypoints but " +
                        std::to_string(f.descriptors.rows) + " descriptor rows");
     }
+    CheckPixels(f.keypoints, which + name + ": ");
     const std::string problem = member->vocabulary().Problem(f.descriptors);
     if (!problem.empty()) throw InputError(which + name + ": " + problem);
   }

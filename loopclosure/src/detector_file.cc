@@ -248,14 +248,31 @@ std::unique_ptr<LoopDetector::Impl> LoopDetector::Impl::Load(const std::filesyst
   return loaded;
 }
 
+// The memories, and the one of what is in any of them, must be about the same locations.
+void LoopDetector::Impl::CheckMemories(const std::string& source) const {
+  const ByteReader in("", source);
+  const int size = memory().size();
+  const std::int64_t newest = size > 0 ? memory().id(size - 1) : -1;
+  if (newest != last_id_) in.Damaged("the last location is missing");
+  for (const auto& system : systems_) {
+    if (system->memory().size() != size) in.Damaged("the memories are of different lengths");
+    for (int slot = 0; slot < size; ++slot) {
+      if (system->memory().id(slot) != memory().id(slot)) in.Damaged("memories of different locations");
+    }
+  }
+  for (int slot = 0; slot < size; ++slot) {
+    const State state = memory().state(slot);
+    if (InMemory(slot) != (state == State::kShortTerm || state == State::kWorking)) {
+      in.Damaged("a location that is in no memory");
+    }
+  }
+}
+
 // `next` gives one section after the other, and false at the end.
 void LoopDetector::Impl::LoadViewsAndRecords(const std::function<bool(bool&, std::string&)>& next,
                                              const std::string& source) {
   const int size = memory().size();
-  for (const auto& system : systems_) {
-    if (system->memory().size() != size)
-      ByteReader("", source).Damaged("the memories are of different lengths");
-  }
+  CheckMemories(source);
   views_.resize(Index(size));
   bool is_view = false;
   std::string section;
@@ -264,8 +281,7 @@ void LoopDetector::Impl::LoadViewsAndRecords(const std::function<bool(bool&, std
     ByteReader bytes(section, source);
     if (is_view) {
       const int slot = bytes.GetIndex(size);
-      views_[Index(slot)] = internal::LoadView(bytes);
-      if (views_[Index(slot)].members.size() != members_.size()) bytes.Damaged("features of other members");
+      LoadView(slot, bytes);
       continue;
     }
     const auto kind = bytes.Get<std::int32_t>();

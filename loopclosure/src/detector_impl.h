@@ -67,6 +67,7 @@ class LoopDetector::Impl {
   bool InMemory(int slot) const;
   void PutView(int slot);
   void FetchView(int slot);
+  void LoadView(int slot, internal::ByteReader& in);
   void Journal(int new_slot, LoopResult& result);
   void WriteUnstored();
   void WriteWords();
@@ -78,6 +79,7 @@ class LoopDetector::Impl {
 
   // Saving and loading.
   void SaveLongTerm(const std::function<void(const std::string&)>& write) const;
+  void CheckMemories(const std::string& source) const;
   void LoadViewsAndRecords(const std::function<bool(bool&, std::string&)>& next, const std::string& source);
 
   LoopDetectorOptions options_;

@@ -49,6 +49,10 @@ void LoopDetector::Impl::Retrieve(int best, LoopResult& result) {
       FetchView(slot);
     } catch (const InputError& error) {
       result.warning = error.what();  // its words are there; it can't be verified
+      View& without_features = views_[Index(slot)];
+      without_features.id = memory().id(slot);
+      without_features.size = {1, 1};
+      without_features.members.resize(members_.size());
     }
   }
 }
@@ -61,8 +65,18 @@ void LoopDetector::Impl::FetchView(int slot) {
                      " are missing); give another file, or an older copy");
   }
   ByteReader in(*record, store().name());
+  LoadView(slot, in);
+}
+
+// Features of a stored location.
+void LoopDetector::Impl::LoadView(int slot, ByteReader& in) {
   View view = internal::LoadView(in);
+  if (view.id != memory().id(slot)) in.Damaged("features of another location");
   if (view.members.size() != members_.size()) in.Damaged("features of other members");
+  const cv::Mat& own = view.caller.descriptors;
+  if (!own.empty() && (own.type() != caller_type_ || own.cols != caller_width_)) {
+    in.Damaged("features of another kind");
+  }
   views_[Index(slot)] = std::move(view);
 }
 
@@ -191,6 +205,10 @@ void LoopDetector::Impl::LoadStatistics(ByteReader& in) {
   last_hypothesis_ = in.Get<double>();
   caller_type_ = in.Get<std::int32_t>();
   caller_width_ = in.Get<std::int32_t>();
+  const bool known_type = caller_type_ == -1 || caller_type_ == CV_8U || caller_type_ == CV_32F;
+  if (last_id_ < -1 || !(last_hypothesis_ >= 0.0 && last_hypothesis_ <= 1.0 + 1e-6) || !known_type) {
+    in.Damaged("the detector's statistics");
+  }
   for (Member& member : members_) member.LoadStatistics(in);
 }
 

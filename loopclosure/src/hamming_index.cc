@@ -69,7 +69,9 @@ class HammingIndex : public DescriptorIndex {
     for (std::size_t i = 0; i < count; ++i) {
       const int word = in.Get<std::int32_t>();
       in.GetRaw(descriptor.data, storage_.row_bytes());
-      if (word < 0 || storage_.RowOf(word) >= 0) in.Damaged("a word is there twice");
+      if (word < 0 || word >= internal::WordStorage::kMostWords || storage_.RowOf(word) >= 0) {
+        in.Damaged("an impossible word, or one that is there twice");
+      }
       Add({word}, descriptor);
     }
   }

@@ -177,7 +177,9 @@ class KdForestIndex : public DescriptorIndex {
         storage_.AddFree();
         alive_.push_back(0);
       } else {
-        if (storage_.RowOf(word) >= 0) in.Damaged("a word is there twice");
+        if (word >= internal::WordStorage::kMostWords || storage_.RowOf(word) >= 0) {
+          in.Damaged("an impossible word, or one that is there twice");
+        }
         alive_.push_back(in.Get<char>() != 0 ? 1 : 0);
         in.GetRaw(descriptor.data(), descriptor.size());
         storage_.Add(word, descriptor.data());
@@ -194,6 +196,7 @@ class KdForestIndex : public DescriptorIndex {
     for (const int row : pending_) {
       if (row < 0 || row >= storage_.end()) in.Damaged("a word that is not there");
     }
+    if (growing_ < 0 && !(shadow_.rows.empty() && pending_.empty())) in.Damaged("a kd-tree out of place");
     if (!storage_.SetFreeRows(in.GetVector<int>())) in.Damaged("free rows that are in use");
   }
 

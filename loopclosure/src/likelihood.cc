@@ -84,6 +84,7 @@ void LikelihoodModel::Load(internal::ByteReader& in) {
     const bool present = in.Get<char>() != 0;
     signatures_.push_back(Signature::Load(in));
     present_.push_back(present);
+    if (!present && !signatures_.back().empty()) in.Damaged("words of a location that is not in memory");
     if (!present) continue;
     ++locations_;
     Insert(static_cast<int>(i));

@@ -206,8 +206,17 @@ void LocationMemory::LoadSlot(internal::ByteReader& in) {
     const int to = in.Get<std::int32_t>();
     node.links.push_back({to, in.Get<char>() != 0 ? LinkType::kLoop : LinkType::kOdometry});
   }
-  if (names < 0 || names > size()) in.Damaged("a location merged into one that is not there");
-  if (!nodes_.empty() && node.id <= nodes_.back().id) in.Damaged("locations out of order");
+  // One that was merged names the location that it was merged into, any other itself.
+  const bool merged = node.state == State::kMerged;
+  if (names < 0 || names > size() || merged != (names < size()) ||
+      (merged && nodes_[Index(names)].state == State::kMerged)) {
+    in.Damaged("a location merged into one that is not there");
+  }
+  if (node.id < 0 || (!nodes_.empty() && node.id <= nodes_.back().id)) in.Damaged("locations out of order");
+  constexpr std::int64_t kMostEntries = std::int64_t{1} << 62;
+  if (node.weight < 0 || node.entered < 0 || node.entered > kMostEntries) {
+    in.Damaged("a location with an impossible weight or age");
+  }
   slot_of_id_.emplace(node.id, names);
   nodes_.push_back(std::move(node));
 }
@@ -242,6 +251,15 @@ void LocationMemory::Load(internal::ByteReader& in) {
   const int count = in.Get<std::int32_t>();
   for (int slot = 0; slot < count; ++slot) LoadSlot(in);
   FinishLoading();
+  // A weight counts the locations that were merged into one, so all together are no more than there are.
+  std::int64_t weights = 0;
+  for (const Node& node : nodes_) weights += node.weight;
+  if (weights > size()) in.Damaged("locations with impossible weights");
+  int newest = size() - 1;
+  while (newest >= 0 && state(newest) == State::kMerged) --newest;
+  if (newest >= 0 && state(newest) != State::kShortTerm) {
+    in.Damaged("the newest location is not in short-term memory");
+  }
 }
 
 }  // namespace tutti

@@ -37,7 +37,9 @@ void Member::LoadStatistics(internal::ByteReader& in) {
   feature_sum_ = in.Get<double>();
   images_ = in.Get<std::int32_t>();
   const int created = in.Get<std::int32_t>();
-  if (!(feature_sum_ >= 0) || !std::isfinite(feature_sum_) || images_ < 0 || created < 0) {
+  constexpr int kMostImages = 1 << 30;
+  if (!(feature_sum_ >= 0) || !std::isfinite(feature_sum_) || images_ < 0 || images_ > kMostImages ||
+      created < 0 || created > Vocabulary::kMostWords) {
     in.Damaged("a member's statistics");
   }
   vocabulary_.SkipIds(created);

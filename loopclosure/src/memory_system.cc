@@ -119,7 +119,13 @@ void MemorySystem::Restore(int slot, LocationStore& store) {
     for (std::size_t p = 0; p < parts.size(); ++p) {
       const std::size_t k = units_[u].members[p];
       words[k] = members_[k].vocabulary().Missing(parts[p]);
-      for (const int word : words[k]) ReadWord(k, word, store, descriptors[k]);
+      for (const int word : words[k]) {
+        if (word >= members_[k].vocabulary().created()) {
+          throw InputError(store.name() + ": is damaged (a word that " + members_[k].name() +
+                           " never made); give another file, or an older copy");
+        }
+        ReadWord(k, word, store, descriptors[k]);
+      }
     }
   }
   for (std::size_t k = 0; k < members_.size(); ++k) {
@@ -136,7 +142,7 @@ void MemorySystem::ReadWord(std::size_t member, int word, LocationStore& store, 
   const auto record = store.Get(LocationStore::Kind::kWord, static_cast<std::int64_t>(member), word);
   const cv::Mat row = record ? ByteReader(*record, store.name()).GetMat() : cv::Mat();
   const bool fits = descriptors.empty() || (row.cols == descriptors.cols && row.type() == descriptors.type());
-  if (row.rows != 1 || !fits) {
+  if (row.rows != 1 || !fits || !members_[member].vocabulary().Problem(row).empty()) {
     throw InputError(store.name() + ": is damaged (word " + std::to_string(word) + " of " +
                      members_[member].name() + "); give another file, or an older copy");
   }
@@ -258,6 +264,10 @@ void MemorySystem::Load(ByteReader& in) {
       in.Damaged("locations are missing");
     }
     for (int slot = 0; slot < memory_.size(); ++slot) {
+      const LocationMemory::State state = memory_.state(slot);
+      const bool in_memory =
+          state == LocationMemory::State::kShortTerm || state == LocationMemory::State::kWorking;
+      if (unit.likelihood.Has(slot) != in_memory) in.Damaged("locations in memory without their words");
       const std::vector<Signature> parts =
           unit.likelihood.signature(slot).Split(static_cast<int>(unit.members.size()));
       for (std::size_t p = 0; p < parts.size(); ++p) {

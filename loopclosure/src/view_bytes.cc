@@ -1,5 +1,8 @@
 #include "view_bytes.h"
 
+#include <algorithm>
+#include <cmath>
+
 namespace tutti::internal {
 namespace {
 
@@ -16,13 +19,17 @@ void SaveSet(const View::Set& set, ByteWriter& out) {
 View::Set LoadSet(ByteReader& in) {
   View::Set set;
   const std::vector<float> pixels = in.GetVector<float>();
+  const auto is_pixel = [](float value) { return std::abs(value) <= View::kFarthestPixel; };  // false for NaN
+  if (pixels.size() % 2 != 0 || !std::all_of(pixels.begin(), pixels.end(), is_pixel)) {
+    in.Damaged("a feature at an impossible pixel");
+  }
   for (std::size_t i = 0; i + 1 < pixels.size(); i += 2) set.pixels.emplace_back(pixels[i], pixels[i + 1]);
   set.descriptors = in.GetMat();
   const std::vector<float> points = in.GetVector<float>();
   for (std::size_t i = 0; i + 2 < points.size(); i += 3) {
     set.points.emplace_back(points[i], points[i + 1], points[i + 2]);
   }
-  if (static_cast<std::size_t>(set.descriptors.rows) != set.pixels.size() ||
+  if (static_cast<std::size_t>(set.descriptors.rows) != set.pixels.size() || points.size() % 3 != 0 ||
       (!set.points.empty() && set.points.size() != set.pixels.size())) {
     in.Damaged("features without descriptors");
   }
@@ -70,6 +77,7 @@ View LoadView(ByteReader& in) {
   view.id = in.Get<std::int64_t>();
   view.size.width = in.Get<std::int32_t>();
   view.size.height = in.Get<std::int32_t>();
+  if (view.size.width < 1 || view.size.height < 1) in.Damaged("an image of an impossible size");
   view.metric = in.Get<char>() != 0;
   if (in.Get<char>() != 0) view.camera = LoadCamera(in);
   const std::size_t sets = in.GetCount(2 * sizeof(std::uint64_t) + 1);

@@ -8,6 +8,7 @@
 #include "distances.h"
 #include "tutti/core/error.h"
 #include "tutti/loopclosure/parallel.h"
+#include "word_storage.h"
 
 namespace tutti {
 namespace {
@@ -172,22 +173,24 @@ void Vocabulary::Save(internal::ByteWriter& out) const {
 }
 
 void Vocabulary::Load(internal::ByteReader& in) {
+  static_assert(kMostWords == internal::WordStorage::kMostWords);
   constexpr int kMostColumns = 1 << 16;
   type_ = in.Get<std::int32_t>();
   width_ = in.Get<std::int32_t>();
   created_ = in.Get<std::int32_t>();
   if (type_ != -1 && type_ != CV_32F && type_ != CV_8U) in.Damaged("descriptors of an unknown type");
   if (type_ != -1 && (width_ <= 0 || width_ > kMostColumns)) in.Damaged("descriptors of an impossible width");
-  if (created_ < 0) in.Damaged("a negative number of words");
+  if (created_ < 0 || created_ > kMostWords) in.Damaged("an impossible number of words");
   const std::size_t count = in.GetCount(2 * sizeof(std::int32_t));
   for (std::size_t i = 0; i < count; ++i) {
     const int word = in.GetIndex(created_);
     references_[word] = in.Get<std::int32_t>();
-    if (references_[word] < 1) in.Damaged("a word without a location");
+    if (references_[word] < 1 || references_[word] > kMostWords) in.Damaged("a word without a location");
   }
   if (type_ == -1) return;
   MakeIndex();
   index_->Load(in);
+  if (index_->size() > created_) in.Damaged("more words than were ever made");
 }
 
 }  // namespace tutti

@@ -73,6 +73,7 @@ class WordStorage {
   std::size_t row_bytes() const { return row_bytes_; }
 
   static constexpr std::size_t kRowsPerBlock = 1024;
+  static constexpr int kMostWords = 1 << 28;  ///< word ids are below this
 
  private:
   std::size_t row_bytes_;

@@ -2,14 +2,21 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
+#include <cmath>
 #include <csignal>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <functional>
+#include <limits>
 
+#include "byte_stream.h"
 #include "test_data.h"
 #include "tutti/core/error.h"
 #include "tutti/loopclosure/detector.h"
+#include "tutti/loopclosure/verification.h"
 #include "two_laps.h"
+#include "view_bytes.h"
 
 namespace tutti {
 namespace {
@@ -160,6 +167,71 @@ TEST_F(SavedDetector, ADamagedFileIsRefusedWhereverItIsDamaged) {
   }
   EXPECT_EQ(detector.NumLocations(), 4u);
   EXPECT_NO_THROW(Walk(detector, 4, 6, kPlaces));
+}
+
+// A saved detector's bytes with the content of all sections of one kind changed, under right checksums.
+std::string Changed(const std::string& bytes, std::uint32_t kind,
+                    const std::function<std::string(const std::string&)>& change) {
+  constexpr std::size_t kHeader = 16;
+  internal::ByteWriter out;
+  out.PutRaw(bytes.data(), kHeader);
+  internal::ByteReader in(std::string_view(bytes).substr(kHeader), "test");
+  while (!in.AtEnd()) {
+    const auto tag = in.Get<std::uint32_t>();
+    in.Get<std::uint32_t>();  // checksum
+    std::string content = in.GetString();
+    if (tag == kind) content = change(content);
+    out.Put(tag);
+    out.Put(internal::Crc32(content));
+    out.PutString(content);
+  }
+  return out.bytes();
+}
+
+TEST_F(SavedDetector, FeaturesThatNoImageCouldHaveAreRefusedThoughTheChecksumsAreRight) {
+  constexpr std::uint32_t kView = 5;
+  LoopDetector saved(SmallOptions());
+  Walk(saved, 0, 5, kPlaces);
+  saved.Save(file_);
+  const std::string bytes = Content(file_);
+  const auto load = [&](const std::function<void(View&)>& change) {
+    WriteContent(file_, Changed(bytes, kView, [&](const std::string& section) {
+                   internal::ByteReader in(section, "test");
+                   internal::ByteWriter out;
+                   out.Put(in.Get<std::int32_t>());
+                   View view = internal::LoadView(in);
+                   change(view);
+                   internal::SaveView(view, out);
+                   return out.bytes();
+                 }));
+    LoopDetector(SmallOptions()).Load(file_);
+  };
+  EXPECT_NO_THROW(load([](View&) {}));
+  EXPECT_THROW(load([](View& view) { view.id += 1000; }), InputError);
+  EXPECT_THROW(load([](View& view) { view.size = {0, 0}; }), InputError);
+  EXPECT_THROW(load([](View& view) { view.members.pop_back(); }), InputError);
+  EXPECT_THROW(load([](View& view) { view.members[0].pixels[0].x = std::nanf(""); }), InputError);
+  EXPECT_THROW(load([](View& view) { view.members[1].pixels[0].y = -1e30f; }), InputError);
+}
+
+TEST_F(SavedDetector, MemoriesOfOtherLocationsThanTheStatisticsSayAreRefused) {
+  constexpr std::uint32_t kStatistics = 7;
+  LoopDetector saved(SmallOptions());
+  Walk(saved, 0, 5, kPlaces);
+  saved.Save(file_);
+  const std::string bytes = Content(file_);
+  const auto load = [&](std::size_t at, const auto& value) {
+    WriteContent(file_, Changed(bytes, kStatistics, [&](std::string section) {
+                   std::memcpy(section.data() + at, &value, sizeof value);
+                   return section;
+                 }));
+    LoopDetector(SmallOptions()).Load(file_);
+  };
+  constexpr std::size_t kLastId = 0, kLastHypothesis = 8, kCallerType = 16;
+  EXPECT_NO_THROW(load(kLastId, std::int64_t{4}));
+  EXPECT_THROW(load(kLastId, std::int64_t{3}), InputError);
+  EXPECT_THROW(load(kLastHypothesis, std::numeric_limits<double>::quiet_NaN()), InputError);
+  EXPECT_THROW(load(kCallerType, std::int32_t{77}), InputError);
 }
 
 TEST_F(SavedDetector, AFullDiskOrNoFolderIsSaidAndTheOldFileStays) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <opencv2/imgcodecs.hpp>
 #include <thread>
 
@@ -270,6 +271,9 @@ TEST(LoopDetector, MisuseOfMemberFeaturesIsRefusedAndChangesNothing) {
   EXPECT_THROW(detector.Detect(query), InputError);
   query.member_features.erase("yours");
   query.member_features["mine"].keypoints.pop_back();
+  EXPECT_THROW(detector.Detect(query), InputError);
+  query.member_features["mine"] = OwnFeatures(image);
+  query.member_features["mine"].keypoints[0].pt.x = std::numeric_limits<float>::quiet_NaN();
   EXPECT_THROW(detector.Detect(query), InputError);
   EXPECT_EQ(detector.NumLocations(), 0u);
   query.member_features["mine"] = OwnFeatures(image);

@@ -4,6 +4,9 @@
 
 #include <cmath>
 
+#include "byte_stream.h"
+#include "tutti/core/error.h"
+
 namespace tutti {
 namespace {
 
@@ -66,6 +69,24 @@ TEST(Likelihood, OnlyWorkingMemoryEntersTheAdjustment) {
   const Belief adjusted = AdjustLikelihood({0.1, 0.1, 0.1, 0.5, 0.9}, {0, 1, 2, 3});
   EXPECT_EQ(adjusted.places[4], 0.0);
   EXPECT_GT(adjusted.places[3], 1.0);
+}
+
+TEST(Likelihood, ASavedOneWithWordsOfALocationThatIsNotThereIsRefused) {
+  for (const bool present : {true, false}) {
+    internal::ByteWriter out;
+    out.Put<std::uint64_t>(1);
+    out.Put<char>(present ? 1 : 0);
+    Signature({4, 4, 9}).Save(out);
+    LikelihoodModel model(LikelihoodKind::kTfIdf);
+    internal::ByteReader in(out.bytes(), "test");
+    if (present) {
+      model.Load(in);
+      EXPECT_TRUE(model.Has(0));
+      EXPECT_EQ(model.signature(0).size(), 3);
+    } else {
+      EXPECT_THROW(model.Load(in), InputError);
+    }
+  }
 }
 
 }  // namespace

@@ -2,6 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+
+#include "byte_stream.h"
+#include "tutti/core/error.h"
+
 namespace tutti {
 namespace {
 
@@ -142,6 +147,51 @@ TEST(LocationMemory, AnIgnoredLocationLeavesNoWeight) {
   EXPECT_EQ(memory.IgnoreNewest(), 0);
   EXPECT_EQ(memory.weight(0), 0);
   EXPECT_EQ(memory.Find(11), 0);
+}
+
+struct Record {
+  std::int64_t id;
+  State state;
+  int weight;
+  std::int64_t entered;
+  int names;
+};
+
+int LoadedSize(const std::vector<Record>& records) {
+  internal::ByteWriter out;
+  out.Put<std::int32_t>(static_cast<std::int32_t>(records.size()));
+  for (const Record& record : records) {
+    out.Put(record.id);
+    out.Put(record.state);
+    out.Put<std::int32_t>(record.weight);
+    out.Put(record.entered);
+    out.Put<std::int32_t>(record.names);
+    out.Put<std::uint64_t>(0);  // links
+  }
+  LocationMemory memory(2);
+  internal::ByteReader in(out.bytes(), "test");
+  memory.Load(in);
+  return memory.size();
+}
+
+TEST(LocationMemory, WhatNoMemoryWouldHaveSavedIsRefused) {
+  const std::vector<Record> good = {
+      {10, State::kWorking, 1, 0, 0}, {11, State::kMerged, 0, 0, 0}, {12, State::kShortTerm, 0, 0, 2}};
+  EXPECT_EQ(LoadedSize(good), 3);
+  const auto refused = [&](std::size_t i, const Record& record) {
+    std::vector<Record> records = good;
+    records[i] = record;
+    EXPECT_THROW(LoadedSize(records), InputError) << "record " << i << ", id " << record.id;
+  };
+  refused(0, {-1, State::kWorking, 1, 0, 0});                                         // a negative id
+  refused(0, {11, State::kWorking, 1, 0, 0});                                         // an id twice
+  refused(0, {10, State::kWorking, -1, 0, 0});                                        // less than no weight
+  refused(0, {10, State::kWorking, std::numeric_limits<int>::max(), 0, 0});           // more than all weigh
+  refused(0, {10, State::kWorking, 1, std::numeric_limits<std::int64_t>::max(), 0});  // entries overflow
+  refused(1, {11, State::kMerged, 0, 0, 1});                                          // merged into itself
+  refused(1, {11, State::kWorking, 0, 0, 0});  // not merged, but another's
+  refused(2, {12, State::kMerged, 0, 0, 1});   // into a merged one
+  refused(2, {12, State::kWorking, 0, 0, 2});  // nothing in STM
 }
 
 }  // namespace

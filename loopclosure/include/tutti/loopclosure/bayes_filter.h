@@ -30,8 +30,9 @@ class BayesFilter {
   /// p(S_t | L^t) after the last step; all mass on "new place" before the first.
   const Belief& posterior() const { return posterior_; }
 
-  /// The whole state. Load throws InputError.
+  /// Appends the whole state.
   void Save(internal::ByteWriter& out) const;
+  /// Takes up what Save wrote, into a new object. Throws InputError if it is damaged.
   void Load(internal::ByteReader& in);
 
  private:

@@ -18,8 +18,8 @@ class ByteWriter;
 struct TwoNearest {
   int first = -1;   ///< word id of the nearest, -1 if there is none
   int second = -1;  ///< word id of the second, -1 if there is none
-  float first_distance = std::numeric_limits<float>::infinity();
-  float second_distance = std::numeric_limits<float>::infinity();
+  float first_distance = std::numeric_limits<float>::infinity();   ///< to the nearest
+  float second_distance = std::numeric_limits<float>::infinity();  ///< to the second, at least first_distance
 
   /// Takes one more candidate in; a candidate that is there already changes nothing. Ties: the smaller id.
   void Offer(int word, float distance);
@@ -43,8 +43,10 @@ class DescriptorIndex {
   virtual const std::uint8_t* Find(int word) const = 0;
   /// Words in the index.
   virtual int size() const = 0;
-  /// The whole state, such that a loaded index goes on as the saved one would. Load throws InputError.
+  /// Appends the whole state, such that a loaded index goes on as the saved one would.
   virtual void Save(internal::ByteWriter& out) const = 0;
+  /// Takes up what Save wrote, into a new index of the same kind, width and seed. Throws InputError if it is
+  /// damaged.
   virtual void Load(internal::ByteReader& in) = 0;
 };
 

@@ -34,7 +34,7 @@ struct MemberFeatures {
 /// One image with what is known about it.
 struct LoopQuery {
   std::int64_t id = 0;  ///< strictly greater than every id before
-  double stamp_s = 0;
+  double stamp_s = 0;   ///< when it was taken [s]; for the caller's own records, decides nothing
   cv::Mat image;  ///< CV_8UC1, CV_8UC3 (BGR) or CV_16UC1; rectified if a camera is given. May be empty where
                   ///< member_features has all members
   cv::Mat depth_m;                      ///< optional: CV_32FC1 [m], registered to image, 0 = unknown
@@ -48,10 +48,10 @@ struct LoopQuery {
 
 /// What one member (or the whole ensemble) believes.
 struct MemberOpinion {
-  std::string name;        ///< "surf", "sift", "orb", ...
-  bool took_part = false;  ///< false: bad signature, the member sat this image out
-  int features = 0;
-  int words = 0;
+  std::string name;         ///< "surf", "sift", "orb", ...
+  bool took_part = false;   ///< false: bad signature, the member sat this image out
+  int features = 0;         ///< found in this image
+  int words = 0;            ///< in its vocabulary by now
   double hypothesis = 0;    ///< H = 1 - p(new place)
   std::int64_t best = -1;   ///< id of its best location, -1 if none
   double at_candidate = 0;  ///< its posterior at the ensemble's candidate
@@ -61,44 +61,59 @@ struct MemberOpinion {
 /// A matched feature: pixel in the query and in the candidate, and their indices in the callers' FeatureSets
 /// (-1: a member's).
 struct VerifiedMatch {
-  cv::Point2f query, candidate;
-  int query_feature = -1, candidate_feature = -1;
+  cv::Point2f query;           ///< pixel in the query's image [px]
+  cv::Point2f candidate;       ///< pixel in the candidate's image [px]
+  int query_feature = -1;      ///< index in the query's LoopQuery::features, -1: a member's
+  int candidate_feature = -1;  ///< index in the candidate's LoopQuery::features, -1: a member's
 };
 
-enum class ConstraintType { kNone, kFundamental, kEssential, kRigid, kSimilarity };
+/// What geometry says about two images (loop-closure.md section 5).
+enum class ConstraintType {
+  kNone,         ///< nothing: too few matches, or verification is off
+  kFundamental,  ///< no camera given: they show the same scene, no pose
+  kEssential,    ///< camera, no points: rotation and direction of the translation
+  kRigid,        ///< points in metres: pose in SE(3), with information
+  kSimilarity,   ///< mono with points of a drifting scale: pose and scale in Sim(3), with information
+};
 
 /// Outcome of the geometric verification of one candidate.
 struct Verification {
-  std::int64_t candidate = -1;
-  bool accepted = false;
-  ConstraintType type = ConstraintType::kNone;
+  std::int64_t candidate = -1;                  ///< id of the location it was tried with, -1: none was
+  bool accepted = false;                        ///< it is a loop
+  ConstraintType type = ConstraintType::kNone;  ///< which geometry decided
   Similarity S_candidate_query;  ///< maps points of the query camera into the candidate camera (kRigid:
                                  ///< scale 1; kEssential: rotation and unit direction only)
-  Matrix6d information = Matrix6d::Zero();  ///< of (translation, rotation), from the inliers
-  double ahead = 1;  ///< kEssential, kFundamental: share of the translation that is along the candidate's
-                     ///< optical axis, 0..1; without a camera by a guessed focal length
-  int matches = 0, inliers = 0;
+  Matrix6d information = Matrix6d::Zero();  ///< of (translation [m], rotation [rad]), from the inliers
+  double ahead = 1;    ///< kEssential, kFundamental: share of the translation that is along the candidate's
+                       ///< optical axis, 0..1; without a camera by a guessed focal length
+  int matches = 0;     ///< that were considered (kRigid: those with a 3D point)
+  int inliers = 0;     ///< of these, those that fit one camera motion
   std::string reason;  ///< why not, in plain words; empty if accepted
-  std::vector<VerifiedMatch> inlier_matches;
+  std::vector<VerifiedMatch> inlier_matches;  ///< the inliers
 };
 
 /// Everything that Detect found out.
 struct LoopResult {
-  std::int64_t query = -1;
-  double hypothesis = 0;        ///< H of the combined posterior, 1 - p(new place)
-  std::int64_t candidate = -1;  ///< argmax of the combined posterior, -1 if there is no location yet
-  double posterior = 0;         ///< combined posterior at the candidate
-  bool proposed = false;        ///< H >= loop_threshold: went to verification
-  bool accepted = false;        ///< the verification accepted it (or one of its neighbours)
-  std::string reason;           ///< why it is not accepted, in plain words
-  std::vector<MemberOpinion> members;
-  Verification verification;                                           ///< the best one tried
-  std::vector<Verification> tried;                                     ///< all that were tried
+  std::int64_t query = -1;             ///< id of the image
+  double hypothesis = 0;               ///< H of the combined posterior, 1 - p(new place)
+  std::int64_t candidate = -1;         ///< argmax of the combined posterior, -1 if there is no location yet
+  double posterior = 0;                ///< combined posterior at the candidate
+  bool proposed = false;               ///< H >= loop_threshold: went to verification
+  bool accepted = false;               ///< the verification accepted it (or one of its neighbours)
+  std::string reason;                  ///< why it is not accepted, in plain words
+  std::vector<MemberOpinion> members;  ///< in the order of options.members
+  Verification verification;           ///< the best one tried
+  std::vector<Verification> tried;     ///< all that were tried
   std::vector<std::pair<std::int64_t, double>> posterior_by_location;  ///< only with keep_posterior
   std::vector<std::int64_t> retrieved;    ///< locations that came back from long-term memory
   std::vector<std::int64_t> transferred;  ///< locations that left working memory for it
   std::string warning;  ///< trouble that did not stop Detect: the disk is full, a stored location is damaged
-  double extract_ms = 0, quantise_ms = 0, likelihood_ms = 0, filter_ms = 0, verify_ms = 0, memory_ms = 0;
+  double extract_ms = 0;     ///< wall time of features [ms]
+  double quantise_ms = 0;    ///< of words [ms]
+  double likelihood_ms = 0;  ///< of likelihoods [ms]
+  double filter_ms = 0;      ///< of Bayes filters and their combination [ms]
+  double verify_ms = 0;      ///< of geometric verification [ms]
+  double memory_ms = 0;      ///< of memory: rehearsal, retrieval, transfer, storing [ms]
 };
 
 /// Ensemble loop-closure detector (loop-closure.md sections 1 to 6). Not thread-safe: one caller at a time.
@@ -109,7 +124,9 @@ class LoopDetector {
   /// process, damaged, or belongs to other members or another kind of memory. A file with locations is gone
   /// on with: all of them are there again, the filters start afresh.
   explicit LoopDetector(const LoopDetectorOptions& options);
+  /// Moves; what was moved from can only be destroyed or assigned to.
   LoopDetector(LoopDetector&&) noexcept;
+  /// Moves; what was moved from can only be destroyed or assigned to.
   LoopDetector& operator=(LoopDetector&&) noexcept;
   ~LoopDetector();
 
@@ -131,11 +148,13 @@ class LoopDetector {
   /// Throws InputError for another version, other members, or a damaged file; the object is then as it was.
   void Load(const std::filesystem::path& file);
 
-  /// Locations in short-term and working memory; those in long-term memory.
+  /// Locations in short-term and working memory.
   std::size_t NumLocations() const;
+  /// Locations in long-term memory.
   std::size_t NumLongTerm() const;
   /// The last id that Detect was given; -1 if there was none.
   std::int64_t LastId() const;
+  /// As given; after Load with the saved detector's seed.
   const LoopDetectorOptions& options() const;
 
  private:

@@ -121,16 +121,16 @@ struct LoopDetectorOptions {
 
 /// A published set of parameters (loop-closure.md section 9) on top of `options`: "paper-2013" (Labbe &
 /// Michaud 2013), "rtabmap-0.8.3" (the reference system of the ensemble's paper), or "default" (ours).
-/// Features and verification stay as they are. Throws InputError that names the nearest word.
+/// Features (but their number) and verification stay as they are. Throws InputError that names the nearest
+/// word.
 void ApplyPreset(const std::string& name, LoopDetectorOptions& options);
 
 /// Names that ApplyPreset takes.
 const std::vector<std::string>& KnownPresets();
 
 /// The one configuration key: "mean", "product", "majority" or "naive" over options.members, or a member's
-/// name
-/// ("surf", "sift", "orb", "akaze", "brisk") for that member alone. Throws InputError that names the nearest
-/// word.
+/// name ("surf", "sift", "orb", "akaze", "brisk") for that member alone. Throws InputError that names the
+/// nearest word.
 void SetRule(const std::string& word, LoopDetectorOptions& options);
 
 /// The word that SetRule takes for these options.

@@ -19,6 +19,7 @@ class ByteWriter;
 /// Locations are slots: 0, 1, 2, ... in the order of adding.
 class LikelihoodModel {
  public:
+  /// Empty. `kind`: which of the two scores.
   explicit LikelihoodModel(LikelihoodKind kind) : kind_(kind) {}
 
   /// Adds the signature of the next slot (empty for a bad signature).
@@ -36,13 +37,16 @@ class LikelihoodModel {
   /// and WM, n_w of them with w, n_wi occurrences of w in i, n_i words in i.
   std::vector<double> Scores(const Signature& query) const;
 
+  /// True if a slot is in the index, be it with a bad signature.
+  bool Has(int slot) const { return present_[static_cast<std::size_t>(slot)]; }
   /// Slots ever added.
   int size() const { return static_cast<int>(signatures_.size()); }
   /// Locations in the index, bad signatures included: N.
   int NumLocations() const { return locations_; }
 
-  /// The whole state; Load into a new object of the same kind. Throws InputError.
+  /// Appends the whole state.
   void Save(internal::ByteWriter& out) const;
+  /// Takes up what Save wrote, into a new object of the same kind. Throws InputError if it is damaged.
   void Load(internal::ByteReader& in);
 
  private:

@@ -25,14 +25,25 @@ class ByteWriter;
 /// Locations are slots 0, 1, 2, ... in the order of adding; the caller's ids are kept beside them.
 class LocationMemory {
  public:
-  enum class State : std::uint8_t { kShortTerm, kWorking, kMerged, kLongTerm };
-  /// kOdometry: neighbours in time, one graph level apart. kLoop: the same place, zero levels apart.
-  enum class LinkType { kOdometry, kLoop };
+  /// Where a location is.
+  enum class State : std::uint8_t {
+    kShortTerm,  ///< in STM: no candidate yet
+    kWorking,    ///< in WM: a candidate
+    kMerged,     ///< nowhere: rehearsal merged it into an older one, which its id names from then on
+    kLongTerm,   ///< in LTM: left WM, can be retrieved
+  };
+  /// How two locations are linked.
+  enum class LinkType {
+    kOdometry,  ///< neighbours in time, one graph level apart
+    kLoop,      ///< the same place, zero levels apart
+  };
+  /// A location's link to another; the other has one back.
   struct Link {
-    int slot = 0;
-    LinkType type = LinkType::kOdometry;
+    int slot = 0;                         ///< the other location
+    LinkType type = LinkType::kOdometry;  ///< how they are linked
   };
 
+  /// Empty. `stm_size`: locations that STM holds after Settle, at least 1.
   explicit LocationMemory(int stm_size) : stm_size_(stm_size) {}
 
   /// Adds a location at the end of STM, linked to the one before it; returns its slot. `id` must be greater
@@ -42,7 +53,7 @@ class LocationMemory {
   bool AddLink(int a, int b, LinkType type);
   /// Moves the oldest locations of STM to WM while |STM| > stm_size; returns the slots moved.
   std::vector<int> Settle();
-  /// Rehearsal (section 9): the newest location is merged into the one before it, weight_old += 1 +
+  /// Rehearsal (section 6): the newest location is merged into the one before it, weight_old += 1 +
   /// weight_new, and dropped; its id names the older one from now on. Returns the older slot, -1 if STM holds
   /// no older one (nothing changes then).
   int DropNewest();
@@ -53,35 +64,47 @@ class LocationMemory {
   void TransferWeight(int newer, int older);
 
   /// The location in WM to transfer to LTM next: lowest weight, then longest since it entered WM, then
-  /// smallest slot (section 9). Never one that is linked to STM, in `immune`, or of the newest
+  /// smallest slot (section 6). Never one that is linked to STM, in `immune`, or of the newest
   /// `recent_share` of WM. -1 if there is none.
   int NextToTransfer(double recent_share, const std::set<int>& immune) const;
-  /// WM -> LTM and back. False if the slot was not there.
+  /// WM -> LTM. False, and nothing happens, if the slot is not in WM.
   bool Transfer(int slot);
+  /// LTM -> WM, as the newest there. False, and nothing happens, if the slot is not in LTM.
   bool Retrieve(int slot);
   /// Up to `count` locations in LTM near `slot` (any state) by graph level, nearest first, at most `levels`
   /// away. Walks the whole graph, LTM included.
   std::vector<int> LongTermNeighbours(int slot, int levels, int count) const;
+  /// Locations in LTM.
   int num_long_term() const { return num_long_term_; }
   /// Slots whose state, weight or links changed since the last call, ascending.
   std::vector<int> TakeChanged();
 
-  /// One slot's record, for the long-term memory's file; and the memory of all of them, slots ascending, of
-  /// which those that were in STM or WM are there again. Throws InputError.
+  /// Appends one slot's record (id, state, weight, links), for the long-term memory's file.
   void SaveSlot(int slot, internal::ByteWriter& out) const;
+  /// Takes up the record of slot size(): call for all of them, slots ascending, then FinishLoading. Throws
+  /// InputError for a record that can't be one.
   void LoadSlot(internal::ByteReader& in);
+  /// Makes a memory of the records: those that were in STM or WM are there again. Links to slots that were
+  /// never loaded are dropped.
   void FinishLoading();
-  /// The whole state; Load into a new object of the same options. Throws InputError.
+  /// Appends the whole state.
   void Save(internal::ByteWriter& out) const;
+  /// Takes up what Save wrote, into a new object of the same options. Throws InputError if it is damaged.
   void Load(internal::ByteReader& in);
 
   /// Slots in WM, ascending: the candidates.
   const std::vector<int>& working_memory() const { return working_; }
+  /// Slots in STM, ascending; the newest location last.
   const std::deque<int>& short_term_memory() const { return short_term_; }
+  /// Where a slot is. This and the next three: `slot` in 0 .. size() - 1.
   State state(int slot) const { return nodes_[Index(slot)].state; }
+  /// A slot's links to others, in the order in which they were added.
   const std::vector<Link>& links(int slot) const { return nodes_[Index(slot)].links; }
+  /// How often a place was seen: the locations that rehearsal or a loop merged into it.
   int weight(int slot) const { return nodes_[Index(slot)].weight; }
+  /// The caller's id of a slot.
   std::int64_t id(int slot) const { return nodes_[Index(slot)].id; }
+  /// Slots ever added, whatever has become of them.
   int size() const { return static_cast<int>(nodes_.size()); }
   /// Slot of a caller's id, -1 if there is none.
   int Find(std::int64_t id) const;

@@ -34,11 +34,14 @@ class Member {
   Signature Quantise(const Features& features);
 
   int num_words() const { return vocabulary_.size(); }
+  /// Its vocabulary, for the memory: words leave and return with locations.
   Vocabulary& vocabulary() { return vocabulary_; }
+  /// Its vocabulary.
   const Vocabulary& vocabulary() const { return vocabulary_; }
 
-  /// Running figures, all of the state but the vocabulary. LoadStatistics throws InputError.
+  /// Appends its running figures: all of the state but the vocabulary.
   void SaveStatistics(internal::ByteWriter& out) const;
+  /// Takes up what SaveStatistics wrote. Throws InputError if it is damaged.
   void LoadStatistics(internal::ByteReader& in);
 
  private:

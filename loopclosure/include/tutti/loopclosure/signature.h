@@ -36,12 +36,14 @@ class Signature {
   static double Similarity(const Signature& a, const Signature& b);
 
   /// Signatures of several members as one: d_1 + d_2 + ... (loop-closure.md eq. 3). Their words stay apart by
-  /// interleaving the ids. Split undoes it.
+  /// interleaving the ids: word w of part k becomes w * parts + k.
   static Signature Concatenate(const std::vector<const Signature*>& parts);
+  /// What Concatenate made one of: `parts` signatures, in their order.
   std::vector<Signature> Split(int parts) const;
 
+  /// Appends the entries.
   void Save(internal::ByteWriter& out) const;
-  /// Throws InputError.
+  /// What Save wrote. Throws InputError if it is damaged.
   static Signature Load(internal::ByteReader& in);
 
  private:

@@ -8,10 +8,11 @@ namespace tutti {
 
 /// Outcome of McNemar's test: only the pairs on which the two detectors differ count.
 struct McNemarResult {
-  int only_a = 0, only_b = 0;  ///< images that one detector found and the other did not
-  bool exact = true;           ///< exact binomial p; else from chi-square
-  double chi_square = 0;       ///< (|only_a - only_b| - 1)^2 / (only_a + only_b); 0 if exact
-  double p = 1;                ///< two-sided
+  int only_a = 0;         ///< images that a found and b did not
+  int only_b = 0;         ///< images that b found and a did not
+  bool exact = true;      ///< exact binomial p; else from chi-square
+  double chi_square = 0;  ///< (|only_a - only_b| - 1)^2 / (only_a + only_b); 0 if exact
+  double p = 1;           ///< two-sided
 };
 
 /// McNemar's test (McNemar, Psychometrika 12, 1947) that both find equally many. Fewer than 25 discordant
@@ -25,7 +26,7 @@ McNemarResult McNemarTest(const std::vector<bool>& a, const std::vector<bool>& b
 
 /// Outcome of the paired t-test.
 struct PairedTTestResult {
-  int pairs = 0;
+  int pairs = 0;               ///< values that were compared
   double mean_difference = 0;  ///< mean of a - b
   double t = 0;  ///< mean / (s / sqrt(pairs)), pairs - 1 degrees of freedom; infinite if all differences are
                  ///< the same but not 0

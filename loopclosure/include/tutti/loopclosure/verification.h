@@ -15,6 +15,8 @@ namespace tutti {
 /// What is kept of an image for verification: the members' features and the caller's, with 3D points where
 /// known.
 struct View {
+  /// Keypoints further than this from pixel (0, 0), in x or y, are refused as nonsense [px].
+  static constexpr float kFarthestPixel = 1e6f;
   /// The features of one source.
   struct Set {
     std::vector<cv::Point2f> pixels;      ///< N [px]

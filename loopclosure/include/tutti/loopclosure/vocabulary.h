@@ -26,6 +26,11 @@ namespace tutti {
 /// A word whose last reference goes leaves the index; Restore brings it back under its old id.
 class Vocabulary {
  public:
+  /// Words that a vocabulary may ever create; a saved one with more is damaged. Small enough for the naive
+  /// rule, which multiplies word ids by the number of members.
+  static constexpr int kMostWords = 1 << 28;
+
+  /// Empty; the first descriptors settle type and width. `seed`: of the index.
   Vocabulary(const VocabularyOptions& options, std::uint64_t seed) : options_(options), seed_(seed) {}
 
   /// Words of N descriptors (CV_32F: Euclidean, CV_8U: Hamming), one per row, in row order; new ones are
@@ -62,8 +67,9 @@ class Vocabulary {
   /// Ids below this are taken, wherever their words may be.
   void SkipIds(int created) { created_ = std::max(created_, created); }
 
-  /// The whole state; Load into a new object of the same options. Throws InputError.
+  /// Appends the whole state.
   void Save(internal::ByteWriter& out) const;
+  /// Takes up what Save wrote, into a new object of the same options. Throws InputError if it is damaged.
   void Load(internal::ByteReader& in);
 
  private:

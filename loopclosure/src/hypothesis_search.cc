@@ -122,10 +122,23 @@ void HypothesisSearch::TryNeighbours(const View& query, std::int64_t id, LoopRes
   }
 }
 
+// True if the views before and after are both nearer by their directions: noise, not a path.
+bool HypothesisSearch::NearerOnBothSides(const LoopResult& result) const {
+  int nearer = 0;
+  for (const LocationMemory::Link& link : memory_.links(memory_.Find(result.verification.candidate))) {
+    if (link.type != LocationMemory::LinkType::kOdometry) continue;
+    for (const Verification& tried : result.tried) {
+      const bool neighbour = tried.candidate == memory_.id(link.slot) && tried.accepted;
+      if (neighbour && tried.ahead < result.verification.ahead) ++nearer;
+    }
+  }
+  return nearer > 1;
+}
+
 // Where no scale is known, the direction of the translation tells which view is nearer: on a path, the query
 // lies ahead of the views that come too early, behind those that come too late, and beside the nearest.
 void HypothesisSearch::TakeNearer(double enough, LoopResult& result) const {
-  constexpr double kOnAPath = 0.9;   // elsewhere (hand-held) the direction says little about the distance
+  constexpr double kOnAPath = 0.95;  // elsewhere (hand-held) the direction says little about the distance
   constexpr double kClearly = 0.02;  // beyond the noise of the direction
   const auto scale_free = [](const Verification& v) {
     return v.type == ConstraintType::kEssential || v.type == ConstraintType::kFundamental;
@@ -134,12 +147,13 @@ void HypothesisSearch::TakeNearer(double enough, LoopResult& result) const {
   const Verification* nearest = &result.verification;
   for (const LocationMemory::Link& link : memory_.links(memory_.Find(result.verification.candidate))) {
     for (const Verification& tried : result.tried) {
-      if (tried.candidate == memory_.id(link.slot) && tried.accepted && scale_free(tried) &&
-          tried.inliers >= enough && tried.ahead < nearest->ahead - kClearly) {
+      if (tried.candidate != memory_.id(link.slot) || !scale_free(tried)) continue;
+      if (tried.accepted && tried.inliers >= enough && tried.ahead < nearest->ahead - kClearly) {
         nearest = &tried;
       }
     }
   }
+  if (NearerOnBothSides(result)) return;
   if (nearest != &result.verification) result.verification = Verification(*nearest);
 }
 

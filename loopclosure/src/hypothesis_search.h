@@ -28,6 +28,7 @@ class HypothesisSearch {
   void Climb(const View& query, LoopResult& result) const;
   void TryNeighbours(const View& query, std::int64_t id, LoopResult& result) const;
   void TakeNearer(double enough, LoopResult& result) const;
+  bool NearerOnBothSides(const LoopResult& result) const;
 
   const LoopDetectorOptions& options_;
   const LocationMemory& memory_;

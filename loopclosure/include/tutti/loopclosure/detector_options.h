@@ -52,7 +52,7 @@ struct VerificationOptions {
   bool enabled = true;         ///< false: every proposal is accepted as it is, without a constraint
   int max_hypotheses = 3;      ///< separate places tried, best posterior first
   int neighbours = 1;          ///< graph levels around each place that are tried as well; 0: none
-  double nearer_share = 0.85;  ///< without metric points: a neighbour with this share of the inliers of the
+  double nearer_share = 0.75;  ///< without metric points: a neighbour with this share of the inliers of the
                                ///< best view is taken in its place if the query lies less ahead of it (or
                                ///< behind) and more beside it: the nearer view of the place; 1: never, 0..1
   double match_ratio = 0.8;    ///< Lowe's ratio test, on true distance

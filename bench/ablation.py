@@ -42,7 +42,13 @@ VARIANTS = {
     "SIFT on a quarter of the pixels": ["--set", "extraction.sift_max_pixels=32768"],
     "2 kd-trees": ["--set", "vocabulary.trees=2"],
     "16 kd-tree checks": ["--set", "vocabulary.checks=16"],
-    "4 hash tables": ["--set", "vocabulary.hash_tables=4"],
+    "8 random tries": ["--set", "vocabulary.hash_tables=8"],
+    "not the nearer view": ["--set", "verification.nearer_share=1"],
+    "a memory per member": ["--set", "memory=per_member"],
+    "rehearsal": ["--set", "rehearsal=true"],
+    "preset paper-2013": ["--preset", "paper-2013"],
+    "preset rtabmap-0.8.3": ["--preset", "rtabmap-0.8.3"],
+    "five members": ["--set", "members=[surf, sift, orb, akaze, brisk]"],
 }
 
 

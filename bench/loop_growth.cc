@@ -29,8 +29,8 @@ class Landmarks {
   explicit Landmarks(int features) : features_(features) {}
 
   // Features of the place with this number: landmarks place * n/2 .. place * n/2 + n.
-  tutti::MemberFeatures See(int member, std::int64_t place, std::uint64_t sight) const {
-    tutti::MemberFeatures result;
+  tutti::Features See(int member, std::int64_t place, std::uint64_t sight) const {
+    tutti::Features result;
     const int width = member == 0 ? 64 : member == 1 ? 128 : 32;
     result.descriptors.create(features_, width, member == 2 ? CV_8U : CV_32F);
     for (int i = 0; i < features_; ++i) {

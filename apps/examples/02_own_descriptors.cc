@@ -22,11 +22,11 @@ namespace {
 
 // Any descriptor will do that is CV_8U (compared by Hamming distance) or CV_32F (Euclidean), with one row for
 // each keypoint and the same type and width in every image.
-tutti::MemberFeatures MyFeatures(const cv::Mat& grey) {
+tutti::Features MyFeatures(const cv::Mat& grey) {
   constexpr int kCorners = 300;
   constexpr int kPatch = 24;  // side of the patch [px]
   constexpr int kCells = 8;   // it is averaged into 8 x 8 values
-  tutti::MemberFeatures features;
+  tutti::Features features;
   if (grey.empty()) return features;
   std::vector<cv::KeyPoint> corners;
   cv::GFTTDetector::create(kCorners, 0.01, 5.0)->detect(grey, corners);

@@ -60,14 +60,7 @@ class CorridorBuilder {
 
   void Add(const Vector3d& corner, const Vector3d& u, const Vector3d& v, int texture, double repeat_u = 1,
            double repeat_v = 1) {
-    Face face;
-    face.corner = corner;
-    face.edge_u = u;
-    face.edge_v = v;
-    face.texture = texture;
-    face.repeat_u = repeat_u;
-    face.repeat_v = repeat_v;
-    scene_.faces.push_back(face);
+    scene_.faces.push_back(Quad(corner, u, v, texture, repeat_u, repeat_v));
   }
 
   // Floor, ceiling and walls bear traces of use that no other place has.

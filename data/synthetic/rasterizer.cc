@@ -262,14 +262,7 @@ void AppendBox(std::vector<Face>& faces, const Eigen::Vector3d& base_center, con
   const Eigen::Vector3d x(std::cos(yaw), std::sin(yaw), 0), y(-std::sin(yaw), std::cos(yaw), 0), z(0, 0, 1);
   const Eigen::Vector3d top = base_center + size.z() * z;
   const auto add = [&](const Eigen::Vector3d& corner, const Eigen::Vector3d& u, const Eigen::Vector3d& v,
-                       int texture) {
-    Face face;
-    face.corner = corner;
-    face.edge_u = u;
-    face.edge_v = v;
-    face.texture = texture;
-    faces.push_back(face);
-  };
+                       int texture) { faces.push_back(Quad(corner, u, v, texture)); };
   const Eigen::Vector3d hx = 0.5 * size.x() * x, hy = 0.5 * size.y() * y, down = -size.z() * z;
   // Seen from outside, edge_u goes to the right and edge_v down.
   add(top + hx - hy, 2 * hy, down, textures.front);   // +x side

@@ -42,6 +42,19 @@ struct Face {
   bool emits = false;                 ///< not shaded (the sky)
 };
 
+/// A face from its corner and edges.
+inline Face Quad(const Eigen::Vector3d& corner, const Eigen::Vector3d& edge_u, const Eigen::Vector3d& edge_v,
+                 int texture, double repeat_u = 1, double repeat_v = 1) {
+  Face face;
+  face.corner = corner;
+  face.edge_u = edge_u;
+  face.edge_v = edge_v;
+  face.texture = texture;
+  face.repeat_u = repeat_u;
+  face.repeat_v = repeat_v;
+  return face;
+}
+
 /// Light of a moment: brightness = gain * (ambient + (1 - ambient) * max(0, n . towards_sun)), then
 /// value^gamma.
 struct Light {

@@ -14,14 +14,7 @@ constexpr double kLength = 8, kWidth = 6, kHeight = 2.8;  // x, y, z [m]
 
 void Add(Scene& scene, const Vector3d& corner, const Vector3d& u, const Vector3d& v, int texture,
          double repeat_u = 1, double repeat_v = 1) {
-  Face face;
-  face.corner = corner;
-  face.edge_u = u;
-  face.edge_v = v;
-  face.texture = texture;
-  face.repeat_u = repeat_u;
-  face.repeat_v = repeat_v;
-  scene.faces.push_back(face);
+  scene.faces.push_back(Quad(corner, u, v, texture, repeat_u, repeat_v));
 }
 
 // A wall with pictures, and furniture before it. `left`: its upper left corner as seen from inside.

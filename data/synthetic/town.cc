@@ -19,15 +19,6 @@ constexpr double kPavement = 0.125;  // of the street's width, on each side
 
 Vector3d Lift(const Vector2d& p, double z) { return {p.x(), p.y(), z}; }
 
-Face Quad(const Vector3d& corner, const Vector3d& u, const Vector3d& v, int texture) {
-  Face face;
-  face.corner = corner;
-  face.edge_u = u;
-  face.edge_v = v;
-  face.texture = texture;
-  return face;
-}
-
 class TownBuilder {
  public:
   explicit TownBuilder(const SyntheticOptions& o)

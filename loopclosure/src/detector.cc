@@ -45,7 +45,13 @@ std::vector<std::vector<std::size_t>> UnitsOf(const LoopDetectorOptions& options
   return units;
 }
 
-void CheckPixels(const std::vector<cv::KeyPoint>& keypoints, const std::string& which) {
+// As many descriptors as keypoints, and those where pixels can be.
+void CheckKeypoints(const std::vector<cv::KeyPoint>& keypoints, const cv::Mat& descriptors,
+                    const std::string& which) {
+  if (static_cast<std::size_t>(descriptors.rows) != keypoints.size()) {
+    throw InputError(which + std::to_string(keypoints.size()) + " keypoints but " +
+                     std::to_string(descriptors.rows) + " descriptor rows");
+  }
   const auto is_pixel = [](float value) { return std::abs(value) <= View::kFarthestPixel; };  // NaN: false
   if (!std::all_of(keypoints.begin(), keypoints.end(),
                    [&](const cv::KeyPoint& k) { return is_pixel(k.pt.x) && is_pixel(k.pt.y); })) {
@@ -99,7 +105,7 @@ LoopResult LoopDetector::Impl::Detect(const LoopQuery& query) {
   const int slot = Remember(query, features, signatures);
   result.memory_ms = watch.LapMs();
 
-  ForEachUnit([&](MemorySystem& system, std::size_t u) { system.UpdateLikelihood(u, signatures); });
+  ForEachUnit([](MemorySystem& system, std::size_t u) { system.UpdateLikelihood(u); });
   result.likelihood_ms = watch.LapMs();
 
   ForEachUnit([](MemorySystem& system, std::size_t u) { system.StepFilter(u); });
@@ -151,16 +157,12 @@ void LoopDetector::Impl::CheckQuery(const LoopQuery& query) const {
 void LoopDetector::Impl::CheckCallersFeatures(const LoopQuery& query, const std::string& which) const {
   const FeatureSet& f = query.features;
   const std::size_t n = f.keypoints.size();
-  if (static_cast<std::size_t>(f.descriptors.rows) != n) {
-    throw InputError(which + std::to_string(n) + " keypoints but " + std::to_string(f.descriptors.rows) +
-                     " descriptor rows");
-  }
+  CheckKeypoints(f.keypoints, f.descriptors, which);
   if (!f.points.empty() && f.points.size() != n) {
     throw InputError(which + std::to_string(n) + " keypoints but " + std::to_string(f.points.size()) +
                      " points; give none or one each (NaN where unknown)");
   }
   if (n == 0) return;
-  CheckPixels(f.keypoints, which);
   if (f.descriptors.type() != CV_8U && f.descriptors.type() != CV_32F) {
     throw InputError(which + "descriptors must be CV_8U (Hamming) or CV_32F (Euclidean)");
   }
@@ -177,11 +179,7 @@ void LoopDetector::Impl::CheckMemberFeatures(const LoopQuery& query, const std::
     if (member == members_.end()) {
       throw InputError(which + "features of member '" + name + "', which is not in options.members");
     }
-    if (static_cast<std::size_t>(f.descriptors.rows) != f.keypoints.size()) {
-      throw InputError(which + name + ": " + std::to_string(f.keypoints.size()) + " keypoints but " +
-                       std::to_string(f.descriptors.rows) + " descriptor rows");
-    }
-    CheckPixels(f.keypoints, which + name + ": ");
+    CheckKeypoints(f.keypoints, f.descriptors, which + name + ": ");
     const std::string problem = member->vocabulary().Problem(f.descriptors);
     if (!problem.empty()) throw InputError(which + name + ": " + problem);
   }
@@ -205,8 +203,7 @@ std::vector<Features> LoopDetector::Impl::Extract(const LoopQuery& query) const 
       features[Index(k)] = members_[Index(k)].Extract(grey);
     } else {
       // The caller owns the matrix and may write into it later: keep a copy.
-      features[Index(k)].keypoints = given->second.keypoints;
-      features[Index(k)].descriptors = given->second.descriptors.clone();
+      features[Index(k)] = {given->second.keypoints, given->second.descriptors.clone()};
     }
   });
   return features;
@@ -285,7 +282,7 @@ CombinedBelief LoopDetector::Impl::CombineUnits() const {
   std::vector<const Belief*> beliefs;
   for (const auto& system : systems_) {
     for (const FilterUnit& unit : system->units()) {
-      if (unit.took_part) beliefs.push_back(&unit.filter.posterior());
+      if (unit.took_part()) beliefs.push_back(&unit.filter.posterior());
     }
   }
   return Combine(options_.rule, beliefs, options_.loop_threshold, memory());
@@ -320,9 +317,9 @@ void LoopDetector::Impl::FillOpinions(const std::vector<Features>& features, con
     opinion.features = static_cast<int>(features[k].keypoints.size());
     opinion.words = members_[k].num_words();
     const FilterUnit& unit = UnitOf(k);
-    opinion.took_part = unit.took_part;
+    opinion.took_part = unit.took_part();
     const Belief& posterior = unit.filter.posterior();
-    if (unit.took_part) {
+    if (unit.took_part()) {
       opinion.hypothesis = posterior.Hypothesis();
       const int best = posterior.Best();
       if (best >= 0) opinion.best = memory().id(best);

@@ -193,7 +193,7 @@ void LoopDetector::Impl::SaveLongTerm(const std::function<void(const std::string
     const std::size_t number = static_cast<std::size_t>(a);
     const int index = static_cast<int>(b);
     if (kind == Kind::kWord) {
-      return number < members_.size() && members_[number].vocabulary().Descriptor(index).empty();
+      return number < members_.size() && !members_[number].vocabulary().Has(index);
     }
     if (number >= systems_.size() || index < 0 || index >= memory().size()) return false;
     if (kind == Kind::kView) return !InMemory(index);
@@ -299,33 +299,6 @@ void LoopDetector::Impl::LoadViewsAndRecords(const std::function<bool(bool&, std
       ByteReader("", source).Damaged("features of a location are missing");
     }
   }
-}
-
-void LoopDetector::Impl::MoveInto(std::unique_ptr<LocationStore>& target) {
-  std::swap(store_, target);
-  for (int slot = 0; slot < memory().size(); ++slot) {
-    unstored_slots_.insert(slot);
-    for (std::set<int>& nodes : unstored_nodes_) nodes.insert(slot);
-  }
-  if (Shared()) unstored_nodes_.back().clear();
-  try {
-    store_->Begin();
-    store_->Clear();
-    store_->Put(Kind::kMeta, 0, 0, Fingerprint());
-    for (const Kind kind : {Kind::kSignature, Kind::kView, Kind::kWord}) {
-      if (!target) break;
-      target->ForEach(kind, [&](std::int64_t a, std::int64_t b, std::string_view bytes) {
-        store_->Put(kind, a, b, bytes);
-      });
-    }
-    WriteUnstored();
-    store_->Commit();
-  } catch (const InputError&) {
-    store_->Rollback();
-    std::swap(store_, target);
-    throw;
-  }
-  MarkStored();
 }
 
 void LoopDetector::Load(const std::filesystem::path& file) {

@@ -42,6 +42,8 @@ class LoopDetector::Impl {
  private:
   static std::size_t Index(int i) { return static_cast<std::size_t>(i); }
   bool Shared() const { return systems_.size() == 1; }
+  // Of union_ in the store: the one after those of the systems.
+  int UnionNumber() const { return static_cast<int>(systems_.size()); }
 
   // What happens to an image.
   void CheckQuery(const LoopQuery& query) const;

@@ -37,6 +37,7 @@ bool LoopDetector::Impl::InMemory(int slot) const {
 
 // Step 7 of section 1.
 void LoopDetector::Impl::Retrieve(int best, LoopResult& result) {
+  if (!store_) return;  // nothing has ever left
   std::set<int> retrieved;
   for (auto& system : systems_) {
     for (const int slot : system->Retrieve(best, store(), result.warning)) retrieved.insert(slot);
@@ -162,12 +163,10 @@ void LoopDetector::Impl::WriteUnstored() {
     PutView(slot);
   }
   WriteWords();
-  for (std::size_t s = 0; s < systems_.size(); ++s) systems_[s]->StoreNodes(unstored_nodes_[s], *store_);
-  for (const int slot : unstored_nodes_.back()) {
-    ByteWriter record;
-    union_.SaveSlot(slot, record);
-    store_->Put(Kind::kNode, static_cast<std::int64_t>(systems_.size()), slot, record.bytes());
+  for (std::size_t s = 0; s < systems_.size(); ++s) {
+    internal::StoreNodes(systems_[s]->memory(), static_cast<int>(s), unstored_nodes_[s], *store_);
   }
+  internal::StoreNodes(union_, UnionNumber(), unstored_nodes_.back(), *store_);
   store_->Put(Kind::kMeta, kStatistics, 0, Statistics());
 }
 
@@ -181,13 +180,37 @@ void LoopDetector::Impl::WriteWords() {
   for (std::size_t k = 0; k < members_.size(); ++k) {
     const Vocabulary& vocabulary = members_[k].vocabulary();
     for (int word = stored_words_[k]; word < vocabulary.created(); ++word) {
-      const cv::Mat descriptor = vocabulary.Descriptor(word);
-      if (descriptor.empty()) continue;  // gone again with a location that was merged
-      ByteWriter record;
-      record.PutMat(descriptor);
-      store_->Put(Kind::kWord, static_cast<std::int64_t>(k), word, record.bytes());
+      if (!vocabulary.Has(word)) continue;  // gone again with a location that was merged
+      internal::StoreWord(vocabulary, k, word, *store_);
     }
   }
+}
+
+void LoopDetector::Impl::MoveInto(std::unique_ptr<LocationStore>& target) {
+  std::swap(store_, target);
+  for (int slot = 0; slot < memory().size(); ++slot) {
+    unstored_slots_.insert(slot);
+    for (std::set<int>& nodes : unstored_nodes_) nodes.insert(slot);
+  }
+  if (Shared()) unstored_nodes_.back().clear();
+  try {
+    store_->Begin();
+    store_->Clear();
+    store_->Put(Kind::kMeta, kFingerprint, 0, Fingerprint());
+    for (const Kind kind : {Kind::kSignature, Kind::kView, Kind::kWord}) {
+      if (!target) break;
+      target->ForEach(kind, [&](std::int64_t a, std::int64_t b, std::string_view bytes) {
+        store_->Put(kind, a, b, bytes);
+      });
+    }
+    WriteUnstored();
+    store_->Commit();
+  } catch (const InputError&) {
+    store_->Rollback();
+    std::swap(store_, target);
+    throw;
+  }
+  MarkStored();
 }
 
 std::string LoopDetector::Impl::Statistics() const {
@@ -236,14 +259,7 @@ void LoopDetector::Impl::Reopen() {
   ByteReader in(*statistics, store_->name());
   LoadStatistics(in);
   for (auto& system : systems_) system->Reopen(*store_);
-  if (!Shared()) {
-    const auto number = static_cast<std::int64_t>(systems_.size());
-    store_->ForEach(Kind::kNode, [&](std::int64_t memory, std::int64_t, std::string_view bytes) {
-      ByteReader node(bytes, store_->name());
-      if (memory == number) union_.LoadSlot(node);
-    });
-    union_.FinishLoading();
-  }
+  if (!Shared()) internal::LoadNodes(UnionNumber(), *store_, union_);
   for (const auto& system : systems_) {
     if (system->memory().size() != memory().size()) in.Damaged("the memories are of different lengths");
   }

@@ -139,47 +139,56 @@ const std::vector<std::string>& KnownPresets() {
   return names;
 }
 
-void ApplyPreset(const std::string& name, LoopDetectorOptions& options) {
-  const LoopDetectorOptions defaults;
-  if (name == "default") {
-    options.loop_threshold = defaults.loop_threshold;
-    options.hypothesis_ratio = defaults.hypothesis_ratio;
-    options.likelihood = defaults.likelihood;
-    options.stm_size = defaults.stm_size;
-    options.rehearsal = defaults.rehearsal;
-    options.rehearsal_similarity = defaults.rehearsal_similarity;
-    options.bad_signature_ratio = defaults.bad_signature_ratio;
-    options.ignore_bad_signatures = defaults.ignore_bad_signatures;
-    options.wm_limit = defaults.wm_limit;
-    options.extraction.features = defaults.extraction.features;
-  } else if (name == "paper-2013") {
-    options.loop_threshold = 0.11;  // swept in the paper; this is its system's own
-    options.hypothesis_ratio = 0.9;
-    options.likelihood = LikelihoodKind::kSimilarity;
-    options.stm_size = 30;
-    options.rehearsal = true;
-    options.rehearsal_similarity = 0.20;
-    options.bad_signature_ratio = 0.25;
-    options.ignore_bad_signatures = true;
-    options.wm_limit = 300;
-    options.extraction.features = 400;
+namespace {
+
+// Our defaults with a published set in their place.
+LoopDetectorOptions Published(const std::string& name) {
+  LoopDetectorOptions preset;
+  if (name == "default") return preset;
+  preset.loop_threshold = 0.11;  // swept in the 2013 paper; this is its system's own
+  preset.recent_share = 0.2;
+  preset.extraction.features = 400;
+  preset.vocabulary.nndr = 0.8;
+  preset.rehearsal = true;
+  if (name == "paper-2013") {
+    preset.hypothesis_ratio = 0.9;
+    preset.likelihood = LikelihoodKind::kSimilarity;
+    preset.stm_size = 30;
+    preset.rehearsal_similarity = 0.20;
+    preset.bad_signature_ratio = 0.25;
+    preset.ignore_bad_signatures = true;
+    preset.wm_limit = 300;
   } else if (name == "rtabmap-0.8.3") {
-    options.loop_threshold = 0.11;
-    options.hypothesis_ratio = 0.0;
-    options.likelihood = LikelihoodKind::kTfIdf;
-    options.stm_size = 10;
-    options.rehearsal = true;
-    options.rehearsal_similarity = 0.6;
-    options.bad_signature_ratio = 0.2;
-    options.ignore_bad_signatures = false;
-    options.wm_limit = 0;
-    options.extraction.features = 400;
+    preset.hypothesis_ratio = 0.0;
+    preset.likelihood = LikelihoodKind::kTfIdf;
+    preset.stm_size = 10;
+    preset.rehearsal_similarity = 0.6;
+    preset.bad_signature_ratio = 0.2;
+    preset.ignore_bad_signatures = false;
+    preset.wm_limit = 0;
   } else {
     throw InputError("unknown preset '" + name + "'; did you mean '" + NearestWord(name, KnownPresets()) +
                      "'? Known: " + JoinWords(KnownPresets()));
   }
-  options.recent_share = 0.2;
-  options.vocabulary.nndr = 0.8;
+  return preset;
+}
+
+}  // namespace
+
+void ApplyPreset(const std::string& name, LoopDetectorOptions& options) {
+  const LoopDetectorOptions preset = Published(name);
+  options.loop_threshold = preset.loop_threshold;
+  options.hypothesis_ratio = preset.hypothesis_ratio;
+  options.likelihood = preset.likelihood;
+  options.stm_size = preset.stm_size;
+  options.rehearsal = preset.rehearsal;
+  options.rehearsal_similarity = preset.rehearsal_similarity;
+  options.bad_signature_ratio = preset.bad_signature_ratio;
+  options.ignore_bad_signatures = preset.ignore_bad_signatures;
+  options.wm_limit = preset.wm_limit;
+  options.recent_share = preset.recent_share;
+  options.extraction.features = preset.extraction.features;
+  options.vocabulary.nndr = preset.vocabulary.nndr;
 }
 
 std::string RuleName(const LoopDetectorOptions& options) {

@@ -40,12 +40,18 @@ std::vector<int> HypothesisSearch::TopPlaces(const Belief& belief) const {
   return places;
 }
 
+// What came of a location, nullptr if it was not tried.
+const Verification* HypothesisSearch::Tried(int slot, const LoopResult& result) const {
+  const std::int64_t id = memory_.id(slot);
+  for (const Verification& tried : result.tried) {
+    if (tried.candidate == id) return &tried;
+  }
+  return nullptr;
+}
+
 // Tries a candidate unless it was tried before; keeps it as the best if it is.
 const Verification& HypothesisSearch::Try(const View& query, int candidate, LoopResult& result) const {
-  const std::int64_t id = memory_.id(candidate);
-  for (const Verification& before : result.tried) {
-    if (before.candidate == id) return before;
-  }
+  if (const Verification* before = Tried(candidate, result)) return *before;
   result.tried.push_back(verifier_.Verify(query, view_of_(candidate), options_.threads));
   const Verification& tried = result.tried.back();
   const Verification& best = result.verification;
@@ -127,10 +133,8 @@ bool HypothesisSearch::NearerOnBothSides(const LoopResult& result) const {
   int nearer = 0;
   for (const LocationMemory::Link& link : memory_.links(memory_.Find(result.verification.candidate))) {
     if (link.type != LocationMemory::LinkType::kOdometry) continue;
-    for (const Verification& tried : result.tried) {
-      const bool neighbour = tried.candidate == memory_.id(link.slot) && tried.accepted;
-      if (neighbour && tried.ahead < result.verification.ahead) ++nearer;
-    }
+    const Verification* tried = Tried(link.slot, result);
+    if (tried != nullptr && tried->accepted && tried->ahead < result.verification.ahead) ++nearer;
   }
   return nearer > 1;
 }
@@ -144,16 +148,13 @@ void HypothesisSearch::TakeNearer(double enough, LoopResult& result) const {
     return v.type == ConstraintType::kEssential || v.type == ConstraintType::kFundamental;
   };
   if (!scale_free(result.verification) || result.verification.ahead < kOnAPath) return;
+  if (NearerOnBothSides(result)) return;
   const Verification* nearest = &result.verification;
   for (const LocationMemory::Link& link : memory_.links(memory_.Find(result.verification.candidate))) {
-    for (const Verification& tried : result.tried) {
-      if (tried.candidate != memory_.id(link.slot) || !scale_free(tried)) continue;
-      if (tried.accepted && tried.inliers >= enough && tried.ahead < nearest->ahead - kClearly) {
-        nearest = &tried;
-      }
-    }
+    const Verification* tried = Tried(link.slot, result);
+    if (tried == nullptr || !tried->accepted || !scale_free(*tried)) continue;
+    if (tried->inliers >= enough && tried->ahead < nearest->ahead - kClearly) nearest = tried;
   }
-  if (NearerOnBothSides(result)) return;
   if (nearest != &result.verification) result.verification = Verification(*nearest);
 }
 

@@ -24,6 +24,7 @@ class HypothesisSearch {
  private:
   std::vector<int> TopPlaces(const Belief& belief) const;
   std::vector<int> ViewsOf(int place, const Belief& belief) const;
+  const Verification* Tried(int slot, const LoopResult& result) const;
   const Verification& Try(const View& query, int candidate, LoopResult& result) const;
   void Climb(const View& query, LoopResult& result) const;
   void TryNeighbours(const View& query, std::int64_t id, LoopResult& result) const;

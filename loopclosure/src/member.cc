@@ -23,10 +23,6 @@ bool Member::Judge(const Features& features) {
   return count >= 2 && count >= bad_signature_ratio_ * mean;
 }
 
-Signature Member::Quantise(const Features& features) {
-  return Judge(features) ? Signature(vocabulary_.Quantise(features.descriptors)) : Signature();
-}
-
 void Member::SaveStatistics(internal::ByteWriter& out) const {
   out.Put(feature_sum_);
   out.Put<std::int32_t>(images_);

@@ -10,6 +10,33 @@ constexpr int kImmuneLevels = 2;      // what is so near to the hypothesis stays
 
 }  // namespace
 
+void StoreNodes(const LocationMemory& memory, int number, const std::set<int>& slots, LocationStore& store) {
+  for (const int slot : slots) {
+    ByteWriter record;
+    memory.SaveSlot(slot, record);
+    store.Put(LocationStore::Kind::kNode, number, slot, record.bytes());
+  }
+}
+
+void LoadNodes(int number, LocationStore& store, LocationMemory& memory) {
+  store.ForEach(LocationStore::Kind::kNode,
+                [&](std::int64_t stored_number, std::int64_t slot, std::string_view bytes) {
+                  if (stored_number != number) return;
+                  ByteReader in(bytes, store.name());
+                  if (slot != memory.size()) {
+                    in.Damaged("location " + std::to_string(memory.size()) + " is missing");
+                  }
+                  memory.LoadSlot(in);
+                });
+  memory.FinishLoading();
+}
+
+void StoreWord(const Vocabulary& vocabulary, std::size_t member, int word, LocationStore& store) {
+  ByteWriter record;
+  record.PutMat(vocabulary.Descriptor(word));
+  store.Put(LocationStore::Kind::kWord, static_cast<std::int64_t>(member), word, record.bytes());
+}
+
 MemorySystem::MemorySystem(int number, const LoopDetectorOptions& options,
                            const std::vector<std::vector<std::size_t>>& units, std::vector<Member>& members)
     : number_(number),
@@ -26,11 +53,10 @@ int MemorySystem::Remember(std::int64_t id, const std::vector<Signature>& signat
   for (FilterUnit& unit : units_) {
     std::vector<const Signature*> parts;
     for (const std::size_t k : unit.members) parts.push_back(&signatures[k]);
-    const Signature signature = Signature::Concatenate(parts);
-    unit.took_part = !signature.empty();
-    any_took_part = any_took_part || unit.took_part;
-    unit.likelihood.Add(signature);
-    Reference(unit, signature);
+    unit.signature = Signature::Concatenate(parts);
+    any_took_part = any_took_part || unit.took_part();
+    unit.likelihood.Add(unit.signature);
+    Reference(unit, unit.signature);
   }
   int stands_for = -1;
   if (!any_took_part && options_.ignore_bad_signatures) {
@@ -40,9 +66,8 @@ int MemorySystem::Remember(std::int64_t id, const std::vector<Signature>& signat
   }
   if (stands_for >= 0) {
     for (FilterUnit& unit : units_) {
-      const Signature dropped = unit.likelihood.signature(slot);
       unit.likelihood.Remove(slot);
-      Release(unit, dropped);
+      Release(unit, unit.signature);
     }
     slot = stands_for;
   }
@@ -61,18 +86,15 @@ bool MemorySystem::LooksLikePrevious(int slot) const {
   return sum / static_cast<double>(units_.size()) >= options_.rehearsal_similarity;
 }
 
-void MemorySystem::UpdateLikelihood(std::size_t u, const std::vector<Signature>& signatures) {
+void MemorySystem::UpdateLikelihood(std::size_t u) {
   FilterUnit& unit = units_[u];
-  if (!unit.took_part) return;
-  std::vector<const Signature*> parts;
-  for (const std::size_t k : unit.members) parts.push_back(&signatures[k]);
-  unit.image_likelihood =
-      AdjustLikelihood(unit.likelihood.Scores(Signature::Concatenate(parts)), memory_.working_memory());
+  if (!unit.took_part()) return;
+  unit.image_likelihood = AdjustLikelihood(unit.likelihood.Scores(unit.signature), memory_.working_memory());
 }
 
 void MemorySystem::StepFilter(std::size_t u) {
   FilterUnit& unit = units_[u];
-  if (unit.took_part) unit.filter.Step(transition_, memory_.working_memory(), unit.image_likelihood);
+  if (unit.took_part()) unit.filter.Step(transition_, memory_.working_memory(), unit.image_likelihood);
 }
 
 void MemorySystem::CloseLoop(int newer, int older) {
@@ -166,9 +188,7 @@ void MemorySystem::Store(int slot, LocationStore& store) const {
     for (std::size_t p = 0; p < parts.size(); ++p) {
       const std::size_t k = unit.members[p];
       for (const int word : members_[k].vocabulary().WordsOnlyIn(parts[p])) {
-        ByteWriter record;
-        record.PutMat(members_[k].vocabulary().Descriptor(word));
-        store.Put(LocationStore::Kind::kWord, static_cast<std::int64_t>(k), word, record.bytes());
+        StoreWord(members_[k].vocabulary(), k, word, store);
       }
     }
   }
@@ -189,24 +209,8 @@ void MemorySystem::StoreSignatures(int slot, LocationStore& store) const {
   store.Put(LocationStore::Kind::kSignature, number_, slot, Record(slot));
 }
 
-void MemorySystem::StoreNodes(const std::set<int>& slots, LocationStore& store) const {
-  for (const int slot : slots) {
-    ByteWriter record;
-    memory_.SaveSlot(slot, record);
-    store.Put(LocationStore::Kind::kNode, number_, slot, record.bytes());
-  }
-}
-
 void MemorySystem::Reopen(LocationStore& store) {
-  store.ForEach(LocationStore::Kind::kNode,
-                [&](std::int64_t number, std::int64_t slot, std::string_view bytes) {
-                  if (number != number_) return;
-                  ByteReader in(bytes, store.name());
-                  if (slot != memory_.size())
-                    in.Damaged("location " + std::to_string(memory_.size()) + " is missing");
-                  memory_.LoadSlot(in);
-                });
-  memory_.FinishLoading();
+  LoadNodes(number_, store, memory_);
   for (int slot = 0; slot < memory_.size(); ++slot) {
     for (FilterUnit& unit : units_) {
       unit.likelihood.Add(Signature());

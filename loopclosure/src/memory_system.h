@@ -19,6 +19,13 @@
 
 namespace tutti::internal {
 
+/// Records of a memory's nodes under its number, and all of them back again, slots ascending. LoadNodes
+/// throws InputError.
+void StoreNodes(const LocationMemory& memory, int number, const std::set<int>& slots, LocationStore& store);
+void LoadNodes(int number, LocationStore& store, LocationMemory& memory);
+/// Record of a word of a member (its number), which must be in the vocabulary.
+void StoreWord(const Vocabulary& vocabulary, std::size_t member, int word, LocationStore& store);
+
 /// One Bayes filter and the members whose signatures it sees: one each for mean, product, majority and
 /// single; all of them, concatenated, for naive (loop-closure.md eq. 3).
 struct FilterUnit {
@@ -27,8 +34,9 @@ struct FilterUnit {
   std::vector<std::size_t> members;
   LikelihoodModel likelihood;
   BayesFilter filter;
+  Signature signature;      ///< of the present image, empty if bad
   Belief image_likelihood;  ///< of the present image
-  bool took_part = false;   ///< in the present image
+  bool took_part() const { return !signature.empty(); }
 };
 
 /// Steps 3 to 5, 7 and 8 of loop-closure.md section 1. Slots are the same in every memory of one detector.
@@ -44,7 +52,7 @@ class MemorySystem {
   int Remember(std::int64_t id, const std::vector<Signature>& signatures);
 
   /// Step 5. Different units may run at the same time.
-  void UpdateLikelihood(std::size_t unit, const std::vector<Signature>& signatures);
+  void UpdateLikelihood(std::size_t unit);
   void StepFilter(std::size_t unit);
 
   /// The newer location closes a loop with the older one.
@@ -64,7 +72,6 @@ class MemorySystem {
 
   /// For a durable store: signatures of a new location; then all nodes that changed since the last time.
   void StoreSignatures(int slot, LocationStore& store) const;
-  void StoreNodes(const std::set<int>& slots, LocationStore& store) const;
   /// Takes up what a durable store holds: nodes first, then signatures of all in STM and WM, with their
   /// words.
   void Reopen(LocationStore& store);

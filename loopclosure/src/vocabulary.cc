@@ -138,7 +138,7 @@ std::vector<int> Vocabulary::WordsOnlyIn(const Signature& signature) const {
 std::vector<int> Vocabulary::Missing(const Signature& signature) const {
   std::vector<int> words;
   for (const Signature::Entry& entry : signature.entries()) {
-    if (!index_ || index_->Find(entry.word) == nullptr) words.push_back(entry.word);
+    if (!Has(entry.word)) words.push_back(entry.word);
   }
   return words;
 }

@@ -59,9 +59,9 @@ inline LoopQuery StateQuery(std::int64_t id, std::uint32_t place, bool calibrate
     query.depth_m = cv::Mat(24, 32, CV_32FC1, cv::Scalar(2.0));
   }
   std::mt19937 generator(place);
-  MemberFeatures floats;
+  Features floats;
   floats.descriptors.create(kFeatures, 4, CV_32F);
-  MemberFeatures bits;
+  Features bits;
   bits.descriptors.create(kFeatures, 4, CV_8U);
   for (int i = 0; i < kFeatures; ++i) {
     const float x = static_cast<float>(3 + 6 * (i % 5)) + static_cast<float>(generator() % 3);

@@ -230,8 +230,8 @@ TEST(LoopDetector, KittiLoopIsFoundAndNothingElse) {
 }
 
 // A caller's own features: ORB's on the image, under another name.
-MemberFeatures OwnFeatures(const cv::Mat& image) {
-  MemberFeatures features;
+Features OwnFeatures(const cv::Mat& image) {
+  Features features;
   cv::ORB::create(200)->detectAndCompute(image, cv::noArray(), features.keypoints, features.descriptors);
   return features;
 }

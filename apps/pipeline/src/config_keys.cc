@@ -113,28 +113,21 @@ void ConfigTable::AddOdometry(OdometryOptions& o) {
 
 void ConfigTable::AddLoops(LoopDetectorOptions& o) {
   section_ = "loops";
-  Push(
-      "rule", "mean, product, majority, naive over the members, or one member's name for that member alone",
-      [&o](const YAML::Node& node) -> std::string {
-        try {
-          SetRule(node.IsScalar() ? node.Scalar() : "", o);
-        } catch (const InputError& e) {
-          return e.what();
-        }
-        return "";
-      },
-      [&o] { return RuleName(o); });
-  Push(
-      "preset", "published parameters that the other keys change: default, paper-2013, rtabmap-0.8.3",
-      [&o](const YAML::Node& node) -> std::string {
-        try {
-          ApplyPreset(node.IsScalar() ? node.Scalar() : "", o);
-        } catch (const InputError& e) {
-          return e.what();
-        }
-        return "";
-      },
-      [] { return "default"; });
+  // A word that `take` understands or refuses with an InputError.
+  const auto word = [&o](void (*take)(const std::string&, LoopDetectorOptions&)) {
+    return [&o, take](const YAML::Node& node) -> std::string {
+      try {
+        take(node.IsScalar() ? node.Scalar() : "", o);
+      } catch (const InputError& e) {
+        return e.what();
+      }
+      return "";
+    };
+  };
+  Push("rule", "mean, product, majority, naive over the members, or one member's name for that member alone",
+       word(&SetRule), [&o] { return RuleName(o); });
+  Push("preset", "published parameters that the other keys change: default, paper-2013, rtabmap-0.8.3",
+       word(&ApplyPreset), [] { return "default"; });
   Add("members", o.members, "members of the ensemble: surf, sift, orb, akaze, brisk, kaze");
   AddEnum("likelihood", o.likelihood,
           {{"similarity", LikelihoodKind::kSimilarity}, {"tfidf", LikelihoodKind::kTfIdf}},

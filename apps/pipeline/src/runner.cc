@@ -91,10 +91,12 @@ class Run {
         result_.bad.push_back({static_cast<std::int64_t>(done), read->error});
         progress.Note("tutti: frame " + std::to_string(done) + " is skipped: " + read->error);
       }
+      NoteWarnings(progress);
       progress.Update(++done, Status());
     }
     result_.interrupted = InterruptGuard::Requested();
     slam_.Finish();
+    NoteWarnings(progress);
     progress.Finish();
     if (result_.interrupted) {
       progress.Note("tutti: interrupted after " + std::to_string(done) + " of " + std::to_string(total_) +
@@ -153,6 +155,10 @@ class Run {
  private:
   std::FILE* Out() const { return request_.quiet ? nullptr : stderr; }
   std::size_t Ahead() const { return config_.run.threads > 1 ? 4 : 0; }
+
+  void NoteWarnings(Progress& progress) {
+    for (const std::string& warning : slam_.TakeWarnings()) progress.Note("tutti: warning: " + warning);
+  }
 
   void TrackOne(const InputFrame& frame) {
     const Clock::time_point begin = Clock::now();

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cstdio>
 #include <deque>
 #include <utility>
 
@@ -66,6 +65,7 @@ class SlamSystem::Impl {
 
   // ---- what SlamSystem hands out
   std::optional<Odometry> odometry_, untouched_;
+  std::vector<std::string> warnings_;  // not taken yet
   std::int64_t untouched_next_ = 0;
   std::vector<LoopRecord> records_;
   int corrections_ = 0;
@@ -138,7 +138,7 @@ class SlamSystem::Impl {
     AddStages(result);
     if (!result.warning.empty() && result.warning != loop_warning_) {
       loop_warning_ = result.warning;
-      std::fprintf(stderr, "\ntutti: warning: %s\n", result.warning.c_str());
+      warnings_.push_back(result.warning);
     }
     if (!result.proposed) return;
     LoopRecord record = Record(result);
@@ -282,7 +282,7 @@ class SlamSystem::Impl {
   LoopGate gate_;
   MapGraph graph_;
   std::unique_ptr<LoopWorker> worker_;
-  std::string loop_warning_;  // the last one said
+  std::string loop_warning_;  // the last one
   std::deque<Submission> submitted_;
   std::vector<LoopEdge> deferred_;  // agreed, and the map fulfils them: they enter with the next correction
   std::map<std::int64_t, int> keyframe_of_frame_;  // of the frames that the detector knows
@@ -302,6 +302,7 @@ bool SlamSystem::AppearanceOnly() const { return !impl_->odometry_; }
 const Odometry* SlamSystem::odometry() const { return impl_->odometry_ ? &*impl_->odometry_ : nullptr; }
 Odometry* SlamSystem::untouched() { return impl_->untouched_ ? &*impl_->untouched_ : nullptr; }
 std::int64_t SlamSystem::UntouchedNext() const { return impl_->untouched_next_; }
+std::vector<std::string> SlamSystem::TakeWarnings() { return std::exchange(impl_->warnings_, {}); }
 const std::vector<LoopRecord>& SlamSystem::loops() const { return impl_->records_; }
 int SlamSystem::Corrections() const { return impl_->corrections_; }
 PoseGraph SlamSystem::Graph() const { return impl_->Graph(); }

@@ -15,6 +15,7 @@
 #include "tutti/core/camera.h"
 #include "tutti/core/pose.h"
 #include "tutti/loopclosure/detector_options.h"
+#include "tutti/loopclosure/features.h"
 
 namespace tutti {
 
@@ -23,12 +24,6 @@ struct FeatureSet {
   std::vector<cv::KeyPoint> keypoints;  ///< size N
   cv::Mat descriptors;                  ///< N rows; CV_8U: Hamming, CV_32F: Euclidean
   std::vector<Eigen::Vector3d> points;  ///< empty, or N points in the camera frame [m]; NaN where unknown
-};
-
-/// Features of one member that the caller has extracted himself.
-struct MemberFeatures {
-  std::vector<cv::KeyPoint> keypoints;  ///< size N
-  cv::Mat descriptors;  ///< N rows; CV_8U: Hamming, CV_32F: Euclidean; N = 0: sits this image out
 };
 
 /// One image with what is known about it.
@@ -40,8 +35,8 @@ struct LoopQuery {
   cv::Mat depth_m;                      ///< optional: CV_32FC1 [m], registered to image, 0 = unknown
   std::optional<PinholeCamera> camera;  ///< optional: without it verification uses the fundamental matrix
   FeatureSet features;                  ///< optional: the caller's own features
-  std::map<std::string, MemberFeatures> member_features;  ///< optional: members that need not extract, by
-                                                          ///< name; one of options.external_members: required
+  std::map<std::string, Features> member_features;  ///< optional: members that need not extract, by
+                                                    ///< name; one of options.external_members: required
   bool metric = true;  ///< features.points are in metres (stereo, RGB-D): PnP, kRigid. false: mono, their
                        ///< scale drifts: essential matrix, then kSimilarity where both have points
 };

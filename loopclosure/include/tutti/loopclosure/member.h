@@ -6,7 +6,6 @@
 
 #include "tutti/loopclosure/detector_options.h"
 #include "tutti/loopclosure/features.h"
-#include "tutti/loopclosure/signature.h"
 #include "tutti/loopclosure/vocabulary.h"
 
 namespace tutti {
@@ -30,9 +29,6 @@ class Member {
   /// Step 2: false for a bad signature (fewer features than bad_signature_ratio x their running mean, or
   /// fewer than two), which gets no words: the member sits this image out. Once per image: keeps the mean.
   bool Judge(const Features& features);
-  /// Step 2 in one call: Judge, then the words. A bad signature is empty.
-  Signature Quantise(const Features& features);
-
   int num_words() const { return vocabulary_.size(); }
   /// Its vocabulary, for the memory: words leave and return with locations.
   Vocabulary& vocabulary() { return vocabulary_; }

@@ -58,6 +58,8 @@ class Vocabulary {
   /// Empty if descriptors of this type and width fit, else what is wrong.
   std::string Problem(const cv::Mat& descriptors) const;
 
+  /// True if the word is in the index.
+  bool Has(int word) const { return index_ && index_->Find(word) != nullptr; }
   /// A word's descriptor, 1 x D; empty if the word is not in the index.
   cv::Mat Descriptor(int word) const;
   /// Words in the index.

@@ -37,6 +37,9 @@ class SlamSystem {
   /// After the last frame: brings in the loops that are still on their way.
   void Finish();
 
+  /// What went wrong without stopping it (the long-term memory's disk is full) since the last call.
+  std::vector<std::string> TakeWarnings();
+
   /// True if the rig has no calibration: there are loops but no poses.
   bool AppearanceOnly() const;
   /// The odometry with all corrections; nullptr if there are only appearances.

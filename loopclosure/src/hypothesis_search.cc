@@ -1,13 +1,31 @@
 #include "hypothesis_search.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "tutti/loopclosure/transition_model.h"
 
 namespace tutti::internal {
 namespace {
 
+constexpr int kPatience = 3;                     // locations in vain on a way along the path
+constexpr double kBeside = 22.0 * M_PI / 180.0;  // so much aside is near enough: the way off is short
+
 std::size_t Index(int i) { return static_cast<std::size_t>(i); }
+
+// Only the direction of the translation is known.
+bool ScaleFree(const Verification& v) {
+  return v.type == ConstraintType::kEssential || v.type == ConstraintType::kFundamental;
+}
+
+// Angle of the translation to the candidate's optical axis, 0 to pi/2 [rad].
+double Aside(const Verification& v) { return std::acos(std::clamp(v.ahead, 0.0, 1.0)); }
+
+// One camera lies ahead of the other, or behind it.
+bool IsAhead(const Verification& v) {
+  constexpr double kMostAside = 18.0 * M_PI / 180.0;
+  return v.accepted && ScaleFree(v) && Aside(v) <= kMostAside;
+}
 
 }  // namespace
 
@@ -99,63 +117,83 @@ std::vector<int> HypothesisSearch::ViewsOf(int place, const Belief& belief) cons
   return views;
 }
 
-// From an accepted candidate along the path to the neighbour that shares the most with the query: the best
-// constraint. Of views that share about as much, the nearest.
+// From an accepted candidate along the path, both ways, to the view that shares the most with the query: the
+// best constraint. A few that share less lie between: number of inliers is noisy. Of views that share about
+// as much, the nearest.
 void HypothesisSearch::Climb(const View& query, LoopResult& result) const {
-  constexpr int kSteps = 3;
-  for (int step = 0; step < kSteps; ++step) {
-    const std::int64_t start = result.verification.candidate;
-    TryNeighbours(query, start, result);
-    if (result.verification.candidate == start) break;
+  constexpr int kReach = 8;  // locations each way
+  const int start = memory_.Find(result.verification.candidate);
+  for (const int neighbour : OnThePath(start)) {
+    int in_vain = 0;
+    PathWalk walk{start, neighbour};
+    for (int step = 0; step < kReach && in_vain < kPatience && walk.next >= 0; ++step) {
+      const int inliers = Try(query, walk.next, result).inliers;
+      if (2 * inliers < result.verification.inliers) break;
+      in_vain = result.verification.candidate == memory_.id(walk.next) ? 0 : in_vain + 1;
+      Advance(walk);
+    }
   }
-  const double enough = options_.verification.nearer_share * result.verification.inliers;
-  for (int step = 0; step < kSteps; ++step) {
-    const std::int64_t start = result.verification.candidate;
-    TakeNearer(enough, result);
-    if (result.verification.candidate == start) return;
-    const Verification nearer = result.verification;
-    TryNeighbours(query, nearer.candidate, result);
-    result.verification = nearer;
-  }
+  TakeNearest(query, result);
 }
 
-// The views before and after one on the path. Keeps result.verification unless one has more inliers.
-void HypothesisSearch::TryNeighbours(const View& query, std::int64_t id, LoopResult& result) const {
-  for (const LocationMemory::Link& link : memory_.links(memory_.Find(id))) {
+// Its neighbours by odometry that are candidates.
+std::vector<int> HypothesisSearch::OnThePath(int slot) const {
+  std::vector<int> slots;
+  for (const LocationMemory::Link& link : memory_.links(slot)) {
     if (link.type == LocationMemory::LinkType::kOdometry &&
         memory_.state(link.slot) == LocationMemory::State::kWorking)
-      Try(query, link.slot, result);
+      slots.push_back(link.slot);
   }
+  return slots;
 }
 
-// True if the views before and after are both nearer by their directions: noise, not a path.
-bool HypothesisSearch::NearerOnBothSides(const LoopResult& result) const {
-  int nearer = 0;
-  for (const LocationMemory::Link& link : memory_.links(memory_.Find(result.verification.candidate))) {
-    if (link.type != LocationMemory::LinkType::kOdometry) continue;
-    const Verification* tried = Tried(link.slot, result);
-    if (tried != nullptr && tried->accepted && tried->ahead < result.verification.ahead) ++nearer;
-  }
-  return nearer > 1;
+// One location further in the direction of the walk; next < 0 at its end.
+void HypothesisSearch::Advance(PathWalk& walk) const {
+  const std::vector<int> on = OnThePath(walk.next);
+  const auto further = std::find_if(on.begin(), on.end(), [&](int slot) { return slot != walk.last; });
+  walk = {walk.next, further == on.end() ? -1 : *further};
 }
 
 // Where no scale is known, the direction of the translation tells which view is nearer: on a path, the query
 // lies ahead of the views that come too early, behind those that come too late, and beside the nearest.
-void HypothesisSearch::TakeNearer(double enough, LoopResult& result) const {
-  constexpr double kOnAPath = 0.95;  // elsewhere (hand-held) the direction says little about the distance
-  constexpr double kClearly = 0.02;  // beyond the noise of the direction
-  const auto scale_free = [](const Verification& v) {
-    return v.type == ConstraintType::kEssential || v.type == ConstraintType::kFundamental;
-  };
-  if (!scale_free(result.verification) || result.verification.ahead < kOnAPath) return;
-  if (NearerOnBothSides(result)) return;
-  const Verification* nearest = &result.verification;
-  for (const LocationMemory::Link& link : memory_.links(memory_.Find(result.verification.candidate))) {
-    const Verification* tried = Tried(link.slot, result);
-    if (tried == nullptr || !tried->accepted || !scale_free(*tried)) continue;
-    if (tried->inliers >= enough && tried->ahead < nearest->ahead - kClearly) nearest = tried;
+void HypothesisSearch::TakeNearest(const View& query, LoopResult& result) const {
+  const Verification best = result.verification;
+  if (!ScaleFree(best) || Aside(best) > kBeside) return;
+  std::vector<Verification> nearer;
+  const int start = memory_.Find(best.candidate);
+  for (const int neighbour : OnThePath(start)) {
+    // Of a camera that is held by hand and moves anywhere, the direction says little about the distance.
+    if (!IsAhead(verifier_.Verify(view_of_(neighbour), view_of_(start), options_.threads))) continue;
+    const std::int64_t nearest = Nearest(query, {start, neighbour}, result);
+    if (nearest != best.candidate) nearer.push_back(*Tried(memory_.Find(nearest), result));
   }
-  if (nearest != &result.verification) result.verification = Verification(*nearest);
+  // Nearer on both sides is noise, not a path.
+  result.verification = nearer.size() == 1 ? nearer.front() : best;
+}
+
+// Away from the best view as long as the views show about as much: the id of that which the query lies most
+// aside of, the best view's own if none does clearly.
+std::int64_t HypothesisSearch::Nearest(const View& query, PathWalk walk, LoopResult& result) const {
+  constexpr int kReach = 5;                        // locations
+  constexpr double kClearly = 2.0 * M_PI / 180.0;  // beyond the noise of the direction
+  const Verification* best = Tried(walk.last, result);
+  const double enough = options_.verification.nearer_share * best->inliers;
+  double aside = Aside(*best);
+  const double clearly = aside + kClearly;
+  std::int64_t nearest = best->candidate;
+  int in_vain = 0;
+  for (int step = 0; step < kReach && in_vain < kPatience && aside < kBeside && walk.next >= 0; ++step) {
+    const Verification& view = Try(query, walk.next, result);
+    if (!view.accepted || !ScaleFree(view) || view.inliers < enough) break;
+    ++in_vain;
+    if (Aside(view) > std::max(aside, clearly)) {
+      aside = Aside(view);
+      nearest = view.candidate;
+      in_vain = 0;
+    }
+    Advance(walk);
+  }
+  return nearest;
 }
 
 }  // namespace tutti::internal

@@ -22,14 +22,20 @@ class HypothesisSearch {
   void Verify(const View& query, const Belief& belief, LoopResult& result) const;
 
  private:
+  // A way along the odometry links.
+  struct PathWalk {
+    int last, next;  // slots
+  };
+
   std::vector<int> TopPlaces(const Belief& belief) const;
   std::vector<int> ViewsOf(int place, const Belief& belief) const;
   const Verification* Tried(int slot, const LoopResult& result) const;
   const Verification& Try(const View& query, int candidate, LoopResult& result) const;
   void Climb(const View& query, LoopResult& result) const;
-  void TryNeighbours(const View& query, std::int64_t id, LoopResult& result) const;
-  void TakeNearer(double enough, LoopResult& result) const;
-  bool NearerOnBothSides(const LoopResult& result) const;
+  std::vector<int> OnThePath(int slot) const;
+  void TakeNearest(const View& query, LoopResult& result) const;
+  std::int64_t Nearest(const View& query, PathWalk walk, LoopResult& result) const;
+  void Advance(PathWalk& walk) const;
 
   const LoopDetectorOptions& options_;
   const LocationMemory& memory_;

@@ -2,22 +2,37 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace tutti {
 
-Belief CombineMean(const std::vector<const Belief*>& members) {
+Belief CombineMean(const std::vector<const Belief*>& members, const std::vector<double>& weights) {
   Belief mean;
   if (members.empty()) return mean;
   std::size_t slots = 0;
   for (const Belief* member : members) slots = std::max(slots, member->places.size());
   mean.new_place = 0.0;
   mean.places.assign(slots, 0.0);
-  const double share = 1.0 / static_cast<double>(members.size());
-  for (const Belief* member : members) {
-    mean.new_place += share * member->new_place;
-    for (std::size_t i = 0; i < member->places.size(); ++i) mean.places[i] += share * member->places[i];
+  const double sum = std::accumulate(weights.begin(), weights.end(), 0.0);
+  for (std::size_t k = 0; k < members.size(); ++k) {
+    const Belief& member = *members[k];
+    const double share = weights.empty() ? 1.0 / static_cast<double>(members.size()) : weights[k] / sum;
+    mean.new_place += share * member.new_place;
+    for (std::size_t i = 0; i < member.places.size(); ++i) mean.places[i] += share * member.places[i];
   }
   return mean;
+}
+
+double Certainty(const Belief& belief, const std::vector<int>& working_memory) {
+  constexpr double kFloor = 0.05;
+  const auto entropy = [](double p) { return p > 0 ? -p * std::log(p) : 0.0; };
+  double sum = entropy(belief.new_place);
+  for (const int slot : working_memory) {
+    const std::size_t i = static_cast<std::size_t>(slot);
+    if (i < belief.places.size()) sum += entropy(belief.places[i]);
+  }
+  const double largest = std::log(1.0 + static_cast<double>(working_memory.size()));
+  return largest > 0 ? std::clamp(1.0 - sum / largest, kFloor, 1.0) : 1.0;
 }
 
 Belief CombineProduct(const std::vector<const Belief*>& members, const std::vector<int>& working_memory) {
@@ -79,12 +94,12 @@ CombinedBelief CombineMajority(const std::vector<const Belief*>& members, double
 }
 
 CombinedBelief Combine(CombinationRule rule, const std::vector<const Belief*>& members, double threshold,
-                       const LocationMemory& memory) {
+                       const LocationMemory& memory, const std::vector<double>& weights) {
   if (rule == CombinationRule::kMajority) return CombineMajority(members, threshold, memory);
   CombinedBelief result;
   if (members.empty()) return result;
   result.belief = rule == CombinationRule::kProduct ? CombineProduct(members, memory.working_memory())
-                                                    : CombineMean(members);
+                                                    : CombineMean(members, weights);
   result.hypothesis = std::clamp(result.belief.Hypothesis(), 0.0, 1.0);
   result.best = result.belief.Best();
   return result;

@@ -285,7 +285,23 @@ CombinedBelief LoopDetector::Impl::CombineUnits() const {
       if (unit.took_part()) beliefs.push_back(&unit.filter.posterior());
     }
   }
-  return Combine(options_.rule, beliefs, options_.loop_threshold, memory());
+  return Combine(options_.rule, beliefs, options_.loop_threshold, memory(), Weights());
+}
+
+// Of the beliefs that CombineUnits takes; none for equal ones.
+std::vector<double> LoopDetector::Impl::Weights() const {
+  constexpr double kLeast = 0.1;  // a member that was never right may come to be
+  std::vector<double> weights;
+  if (options_.weights == MemberWeights::kEqual) return weights;
+  for (const auto& system : systems_) {
+    for (const FilterUnit& unit : system->units()) {
+      if (!unit.took_part()) continue;
+      weights.push_back(options_.weights == MemberWeights::kEntropy
+                            ? Certainty(unit.filter.posterior(), system->memory().working_memory())
+                            : std::max(kLeast, unit.agreement));
+    }
+  }
+  return weights;
 }
 
 const FilterUnit& LoopDetector::Impl::UnitOf(std::size_t member) const {
@@ -341,7 +357,15 @@ void LoopDetector::Impl::Decide(int slot, const CombinedBelief& combined, LoopRe
     return;
   }
   const double threshold = std::max(options_.loop_threshold, options_.hypothesis_ratio * last_hypothesis_);
+  FollowCandidate(combined.best);
   result.proposed = result.hypothesis >= threshold;
+  if (result.proposed && candidates_in_a_row_ < options_.consistent_images) {
+    result.proposed = false;
+    result.reason = "the candidates of the images before lie elsewhere (" +
+                    std::to_string(candidates_in_a_row_) + " in a row, " +
+                    std::to_string(options_.consistent_images) + " are needed)";
+    return;
+  }
   if (!result.proposed) {
     char text[128];
     std::snprintf(text, sizeof text, "the hypothesis is too weak (%.3f, the threshold is %.3f)",
@@ -361,10 +385,22 @@ void LoopDetector::Impl::Decide(int slot, const CombinedBelief& combined, LoopRe
   search.Verify(query, combined.belief, result);
 }
 
+// Counts the images in a row whose candidates lie near that of the image before.
+void LoopDetector::Impl::FollowCandidate(int best) {
+  constexpr int kLevels = 3;
+  const int before = last_candidate_ < 0 ? -1 : memory().Find(last_candidate_);
+  const auto near = before < 0 ? std::vector<std::pair<int, int>>() : memory().Neighbours(before, kLevels);
+  const bool follows =
+      std::any_of(near.begin(), near.end(), [best](const auto& n) { return n.first == best; });
+  candidates_in_a_row_ = follows ? candidates_in_a_row_ + 1 : 0;
+  last_candidate_ = memory().id(best);
+}
+
 void LoopDetector::Impl::CloseLoop(std::int64_t newer, std::int64_t older) {
   if (!Shared()) union_.AddLink(union_.Find(newer), union_.Find(older), LocationMemory::LinkType::kLoop);
   for (auto& system : systems_) {
     system->CloseLoop(system->memory().Find(newer), system->memory().Find(older));
+    system->Agree(system->memory().Find(older));
   }
 }
 

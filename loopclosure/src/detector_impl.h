@@ -55,9 +55,11 @@ class LoopDetector::Impl {
                const std::vector<Signature>& signatures);
   void ForEachUnit(const std::function<void(internal::MemorySystem&, std::size_t)>& call);
   CombinedBelief CombineUnits() const;
+  std::vector<double> Weights() const;
   const internal::FilterUnit& UnitOf(std::size_t member) const;
   void FillOpinions(const std::vector<Features>& features, const CombinedBelief& combined,
                     LoopResult& result) const;
+  void FollowCandidate(int best);
   void Decide(int slot, const CombinedBelief& combined, LoopResult& result);
   void CloseLoop(std::int64_t newer, std::int64_t older);
 
@@ -93,6 +95,8 @@ class LoopDetector::Impl {
   View dropped_view_;        // of a query that rehearsal has just merged away
   std::int64_t last_id_ = -1;
   double last_hypothesis_ = 0.0;
+  std::int64_t last_candidate_ = -1;
+  int candidates_in_a_row_ = 0;
   int caller_type_ = -1;
   int caller_width_ = 0;
 

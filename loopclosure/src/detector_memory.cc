@@ -217,22 +217,36 @@ std::string LoopDetector::Impl::Statistics() const {
   ByteWriter out;
   out.Put(last_id_);
   out.Put(last_hypothesis_);
+  out.Put(last_candidate_);
+  out.Put<std::int32_t>(candidates_in_a_row_);
   out.Put<std::int32_t>(caller_type_);
   out.Put<std::int32_t>(caller_width_);
   for (const Member& member : members_) member.SaveStatistics(out);
+  for (const auto& system : systems_) {
+    for (const internal::FilterUnit& unit : system->units()) out.Put(unit.agreement);
+  }
   return out.bytes();
 }
 
 void LoopDetector::Impl::LoadStatistics(ByteReader& in) {
   last_id_ = in.Get<std::int64_t>();
   last_hypothesis_ = in.Get<double>();
+  last_candidate_ = in.Get<std::int64_t>();
+  candidates_in_a_row_ = in.Get<std::int32_t>();
   caller_type_ = in.Get<std::int32_t>();
   caller_width_ = in.Get<std::int32_t>();
   const bool known_type = caller_type_ == -1 || caller_type_ == CV_8U || caller_type_ == CV_32F;
-  if (last_id_ < -1 || !(last_hypothesis_ >= 0.0 && last_hypothesis_ <= 1.0 + 1e-6) || !known_type) {
+  if (last_id_ < -1 || !(last_hypothesis_ >= 0.0 && last_hypothesis_ <= 1.0 + 1e-6) || !known_type ||
+      last_candidate_ < -1 || last_candidate_ > last_id_ || candidates_in_a_row_ < 0) {
     in.Damaged("the detector's statistics");
   }
   for (Member& member : members_) member.LoadStatistics(in);
+  for (auto& system : systems_) {
+    for (internal::FilterUnit& unit : system->units()) {
+      unit.agreement = in.Get<double>();
+      if (!(unit.agreement >= 0.0 && unit.agreement <= 1.0)) in.Damaged("a member's agreement");
+    }
+  }
 }
 
 // What must be the same for stored locations to be of use.

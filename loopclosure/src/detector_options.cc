@@ -34,6 +34,7 @@ std::string ExtractionOptions::Validate() const {
   if (!(sift_contrast > 0)) return OutOf("extraction.sift_contrast", "above 0");
   if (orb_fast_threshold < 1 || orb_fast_threshold > 255)
     return OutOf("extraction.orb_fast_threshold", "1 to 255");
+  if (!(orb_border > 0 && orb_border <= 1)) return OutOf("extraction.orb_border", "above 0, at most 1");
   return {};
 }
 
@@ -95,6 +96,8 @@ std::string LoopDetectorOptions::Validate() const {
   if (!(virtual_place_prior > 0 && virtual_place_prior < 1))
     return OutOf("virtual_place_prior", "between 0 and 1");
   if (!(hypothesis_ratio >= 0 && hypothesis_ratio <= 1)) return OutOf("hypothesis_ratio", "0 to 1");
+  if (island_levels < 0 || island_levels > 16) return OutOf("island_levels", "0 to 16");
+  if (consistent_images < 0) return OutOf("consistent_images", "0 or more");
   if (wm_limit < 0) return OutOf("wm_limit", "0 (no limit) or more");
   if (!(time_budget_ms >= 0)) return OutOf("time_budget_ms", "0 (off) or more");
   if (retrieval < 0 || retrieval > 100) return OutOf("retrieval", "0 to 100");

@@ -20,14 +20,15 @@ constexpr int kMinSide = 16;  // smaller images hold no feature of any member [p
 // ORB drops points near the border; its default of 31 px leaves small images without upper pyramid levels
 // (loop-closure.md section 6). A twentieth of the shorter side keeps them; ORB reflects the image at its
 // border.
-cv::Ptr<cv::Feature2D> CreateOrb(cv::Size size, int features, int fast_threshold) {
+cv::Ptr<cv::Feature2D> CreateOrb(cv::Size size, int features, const ExtractionOptions& options) {
   constexpr float kScale = 1.2f;
   constexpr int kPatch = 31;
   const int side = std::min(size.width, size.height);
-  const int edge = std::clamp(side / 20, 3, 31);
+  const int edge = std::clamp(static_cast<int>(options.orb_border * side), 3, 31);
   int levels = 1;
   for (double s = side / kScale; levels < 8 && s > 2 * edge + kPatch; s /= kScale) ++levels;
-  return cv::ORB::create(features, kScale, levels, edge, 0, 2, cv::ORB::HARRIS_SCORE, kPatch, fast_threshold);
+  return cv::ORB::create(features, kScale, levels, edge, 0, 2, cv::ORB::HARRIS_SCORE, kPatch,
+                         options.orb_fast_threshold);
 }
 
 std::vector<cv::KeyPoint> Picked(const std::vector<cv::KeyPoint>& keypoints,
@@ -45,6 +46,19 @@ void ScaleKeypoints(double factor, std::vector<cv::KeyPoint>& keypoints) {
     // Pixel centres: 0.5 of the small image's pixel is 0.5 * factor of the large one's.
     keypoint.pt = (keypoint.pt + cv::Point2f(0.5f, 0.5f)) * f - cv::Point2f(0.5f, 0.5f);
     keypoint.size *= f;
+  }
+}
+
+// Square roots of the shares of the sum, at SIFT's own length of 512: their Euclidean distance is the
+// Hellinger distance of the histograms.
+void TakeRoots(cv::Mat& descriptors) {
+  constexpr float kLength = 512.0f;
+  for (int r = 0; r < descriptors.rows; ++r) {
+    cv::Mat row = descriptors.row(r);
+    const double sum = cv::norm(row, cv::NORM_L1);
+    if (sum <= 0) continue;
+    cv::sqrt(row / sum, row);
+    row *= kLength;
   }
 }
 
@@ -164,7 +178,7 @@ cv::Ptr<cv::Feature2D> FeatureExtractor::Create(cv::Size size) const {
   const int wanted = options_.features * kOversampling;
   if (name_ == "surf") return CreateDlibSurf(wanted, options_.surf_octaves, options_.surf_threshold);
   if (name_ == "sift") return cv::SIFT::create(wanted, 3, options_.sift_contrast);
-  if (name_ == "orb") return CreateOrb(size, wanted, options_.orb_fast_threshold);
+  if (name_ == "orb") return CreateOrb(size, wanted, options_);
   if (name_ == "akaze") return cv::AKAZE::create();
   if (name_ == "brisk") return cv::BRISK::create();
   if (name_ == "kaze") return cv::KAZE::create();
@@ -207,6 +221,7 @@ Features FeatureExtractor::Extract(const cv::Mat& grey) const {
       descriptors.row(selected[i]).copyTo(features.descriptors.row(static_cast<int>(i)));
     }
   }
+  if (name_ == "sift" && options_.root_sift) TakeRoots(features.descriptors);
   ScaleKeypoints(factor, features.keypoints);
   return features;
 }

@@ -28,6 +28,7 @@ class HypothesisSearch {
   };
 
   std::vector<int> TopPlaces(const Belief& belief) const;
+  void RankByIsland(const Belief& belief, std::vector<int>& places) const;
   std::vector<int> ViewsOf(int place, const Belief& belief) const;
   const Verification* Tried(int slot, const LoopResult& result) const;
   const Verification& Try(const View& query, int candidate, LoopResult& result) const;

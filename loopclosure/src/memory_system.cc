@@ -97,6 +97,19 @@ void MemorySystem::StepFilter(std::size_t u) {
   if (unit.took_part()) unit.filter.Step(transition_, memory_.working_memory(), unit.image_likelihood);
 }
 
+void MemorySystem::Agree(int location) {
+  constexpr int kNear = 2;       // graph levels
+  constexpr double kNews = 0.1;  // weight of the newest loop
+  const std::vector<std::pair<int, int>> near = memory_.Neighbours(location, kNear);
+  for (FilterUnit& unit : units_) {
+    if (!unit.took_part()) continue;
+    const int best = unit.filter.posterior().Best();
+    const bool right =
+        std::any_of(near.begin(), near.end(), [best](const auto& n) { return n.first == best; });
+    unit.agreement += kNews * ((right ? 1.0 : 0.0) - unit.agreement);
+  }
+}
+
 void MemorySystem::CloseLoop(int newer, int older) {
   if (older < 0 || newer == older) return;
   if (memory_.AddLink(newer, older, LocationMemory::LinkType::kLoop)) {

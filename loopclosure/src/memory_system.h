@@ -36,6 +36,7 @@ struct FilterUnit {
   BayesFilter filter;
   Signature signature;      ///< of the present image, empty if bad
   Belief image_likelihood;  ///< of the present image
+  double agreement = 1.0;   ///< running share of the verified loops that it had found, 0..1
   bool took_part() const { return !signature.empty(); }
 };
 
@@ -55,6 +56,8 @@ class MemorySystem {
   void UpdateLikelihood(std::size_t unit);
   void StepFilter(std::size_t unit);
 
+  /// A loop with this location was verified: which filters had it?
+  void Agree(int location);
   /// The newer location closes a loop with the older one.
   void CloseLoop(int newer, int older);
   void AddLink(int a, int b);

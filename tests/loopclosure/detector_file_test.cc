@@ -26,10 +26,8 @@ using testing::Walk;
 
 constexpr int kPlaces = 14;
 
-LoopDetectorOptions SmallOptions() {
-  LoopDetectorOptions options;
-  options.stm_size = 3;
-  options.extraction.features = 120;
+LoopDetectorOptions BoundedOptions() {
+  LoopDetectorOptions options = testing::SmallOptions();
   options.wm_limit = 7;
   options.threads = 1;
   return options;
@@ -53,7 +51,7 @@ class SavedDetector : public ::testing::Test {
 TEST_F(SavedDetector, ALoadedOneGoesOnExactlyAsTheSavedOne) {
   for (const char* rule : {"mean", "naive"}) {
     for (const MemoryKind memory : {MemoryKind::kShared, MemoryKind::kPerMember}) {
-      LoopDetectorOptions options = SmallOptions();
+      LoopDetectorOptions options = BoundedOptions();
       SetRule(rule, options);
       options.memory = memory;
       LoopDetector saved(options);
@@ -70,9 +68,21 @@ TEST_F(SavedDetector, ALoadedOneGoesOnExactlyAsTheSavedOne) {
   }
 }
 
+TEST_F(SavedDetector, WhatTheMembersWereRightAboutIsSavedToo) {
+  LoopDetectorOptions options = BoundedOptions();
+  options.weights = MemberWeights::kAgreement;
+  options.consistent_images = 1;
+  LoopDetector saved(options);
+  Walk(saved, 0, 20, kPlaces);
+  saved.Save(file_);
+  LoopDetector loaded(options);
+  loaded.Load(file_);
+  testing::ExpectEqual(Walk(saved, 20, 28, kPlaces), Walk(loaded, 20, 28, kPlaces));
+}
+
 TEST_F(SavedDetector, SavingChangesNothingAndTwiceGivesTheSameFile) {
-  LoopDetector saved(SmallOptions());
-  LoopDetector other(SmallOptions());
+  LoopDetector saved(BoundedOptions());
+  LoopDetector other(BoundedOptions());
   Walk(saved, 0, 16, kPlaces);
   Walk(other, 0, 16, kPlaces);
   saved.Save(file_);
@@ -82,8 +92,8 @@ TEST_F(SavedDetector, SavingChangesNothingAndTwiceGivesTheSameFile) {
 }
 
 TEST_F(SavedDetector, AnEmptyOneCanBeSavedAndLoaded) {
-  LoopDetector(SmallOptions()).Save(file_);
-  LoopDetector loaded(SmallOptions());
+  LoopDetector(BoundedOptions()).Save(file_);
+  LoopDetector loaded(BoundedOptions());
   Walk(loaded, 0, 5, kPlaces);
   loaded.Load(file_);
   EXPECT_EQ(loaded.NumLocations(), 0u);
@@ -92,10 +102,10 @@ TEST_F(SavedDetector, AnEmptyOneCanBeSavedAndLoaded) {
 }
 
 TEST_F(SavedDetector, LoadingIntoAFileOfItsOwnFillsThatFile) {
-  LoopDetector saved(SmallOptions());
+  LoopDetector saved(BoundedOptions());
   Walk(saved, 0, 16, kPlaces);
   saved.Save(file_);
-  LoopDetectorOptions options = SmallOptions();
+  LoopDetectorOptions options = BoundedOptions();
   options.ltm_file = (folder_ / "places.ltm").string();
   {
     LoopDetector durable(options);
@@ -110,7 +120,7 @@ TEST_F(SavedDetector, LoadingIntoAFileOfItsOwnFillsThatFile) {
 
 // The message that loading fails with, after which the object must be as it was.
 std::string Refusal(const fs::path& file) {
-  LoopDetector detector(SmallOptions());
+  LoopDetector detector(BoundedOptions());
   Walk(detector, 0, 6, kPlaces);
   std::string message;
   try {
@@ -124,7 +134,7 @@ std::string Refusal(const fs::path& file) {
 }
 
 TEST_F(SavedDetector, OtherFilesVersionsAndMembersAreRefused) {
-  LoopDetector saved(SmallOptions());
+  LoopDetector saved(BoundedOptions());
   Walk(saved, 0, 5, kPlaces);
   saved.Save(file_);
   const std::string bytes = Content(file_);
@@ -137,7 +147,7 @@ TEST_F(SavedDetector, OtherFilesVersionsAndMembersAreRefused) {
   WriteContent(folder_ / "newer", newer);
   EXPECT_NE(Refusal(folder_ / "newer").find("version 9"), std::string::npos);
 
-  LoopDetectorOptions options = SmallOptions();
+  LoopDetectorOptions options = BoundedOptions();
   options.members = {"orb"};
   LoopDetector other(options);
   try {
@@ -149,12 +159,12 @@ TEST_F(SavedDetector, OtherFilesVersionsAndMembersAreRefused) {
 }
 
 TEST_F(SavedDetector, ADamagedFileIsRefusedWhereverItIsDamaged) {
-  LoopDetector saved(SmallOptions());
+  LoopDetector saved(BoundedOptions());
   Walk(saved, 0, 12, kPlaces);
   saved.Save(file_);
   const std::string bytes = Content(file_);
   const fs::path damaged = folder_ / "damaged";
-  LoopDetector detector(SmallOptions());
+  LoopDetector detector(BoundedOptions());
   Walk(detector, 0, 4, kPlaces);
   for (std::size_t i = 0; i < 60; ++i) {
     const std::size_t at = i * bytes.size() / 60;
@@ -190,7 +200,7 @@ std::string Changed(const std::string& bytes, std::uint32_t kind,
 
 TEST_F(SavedDetector, FeaturesThatNoImageCouldHaveAreRefusedThoughTheChecksumsAreRight) {
   constexpr std::uint32_t kView = 5;
-  LoopDetector saved(SmallOptions());
+  LoopDetector saved(BoundedOptions());
   Walk(saved, 0, 5, kPlaces);
   saved.Save(file_);
   const std::string bytes = Content(file_);
@@ -204,7 +214,7 @@ TEST_F(SavedDetector, FeaturesThatNoImageCouldHaveAreRefusedThoughTheChecksumsAr
                    internal::SaveView(view, out);
                    return out.bytes();
                  }));
-    LoopDetector(SmallOptions()).Load(file_);
+    LoopDetector(BoundedOptions()).Load(file_);
   };
   EXPECT_NO_THROW(load([](View&) {}));
   EXPECT_THROW(load([](View& view) { view.id += 1000; }), InputError);
@@ -216,7 +226,7 @@ TEST_F(SavedDetector, FeaturesThatNoImageCouldHaveAreRefusedThoughTheChecksumsAr
 
 TEST_F(SavedDetector, MemoriesOfOtherLocationsThanTheStatisticsSayAreRefused) {
   constexpr std::uint32_t kStatistics = 7;
-  LoopDetector saved(SmallOptions());
+  LoopDetector saved(BoundedOptions());
   Walk(saved, 0, 5, kPlaces);
   saved.Save(file_);
   const std::string bytes = Content(file_);
@@ -225,7 +235,7 @@ TEST_F(SavedDetector, MemoriesOfOtherLocationsThanTheStatisticsSayAreRefused) {
                    std::memcpy(section.data() + at, &value, sizeof value);
                    return section;
                  }));
-    LoopDetector(SmallOptions()).Load(file_);
+    LoopDetector(BoundedOptions()).Load(file_);
   };
   constexpr std::size_t kLastId = 0, kLastHypothesis = 8, kCallerType = 16;
   EXPECT_NO_THROW(load(kLastId, std::int64_t{4}));
@@ -235,7 +245,7 @@ TEST_F(SavedDetector, MemoriesOfOtherLocationsThanTheStatisticsSayAreRefused) {
 }
 
 TEST_F(SavedDetector, AFullDiskOrNoFolderIsSaidAndTheOldFileStays) {
-  LoopDetector saved(SmallOptions());
+  LoopDetector saved(BoundedOptions());
   Walk(saved, 0, 8, kPlaces);
   EXPECT_THROW(saved.Save(folder_ / "no" / "such" / "folder"), InputError);
   saved.Save(file_);

@@ -18,16 +18,10 @@ namespace {
 
 using testing::CountFalse;
 using testing::CountTrue;
+using testing::SmallOptions;
 using testing::Walk;
 
 constexpr int kPlaces = 16;
-
-LoopDetectorOptions SmallOptions() {
-  LoopDetectorOptions options;
-  options.stm_size = 3;
-  options.extraction.features = 150;
-  return options;
-}
 
 class EveryMemory : public ::testing::TestWithParam<std::tuple<MemoryKind, std::string>> {
  protected:

@@ -60,6 +60,9 @@ TEST(LoopDetectorOptions, ValuesOutOfRangeAreNamed) {
   EXPECT_NE(problem([](auto& o) { o.recent_share = 1; }).find("recent_share"), std::string::npos);
   EXPECT_NE(problem([](auto& o) { o.retrieval = -2; }).find("retrieval"), std::string::npos);
   EXPECT_NE(problem([](auto& o) { o.time_budget_ms = -2; }).find("time_budget_ms"), std::string::npos);
+  EXPECT_NE(problem([](auto& o) { o.island_levels = -1; }).find("island_levels"), std::string::npos);
+  EXPECT_NE(problem([](auto& o) { o.consistent_images = -1; }).find("consistent_images"), std::string::npos);
+  EXPECT_NE(problem([](auto& o) { o.extraction.orb_border = 0; }).find("orb_border"), std::string::npos);
   EXPECT_NE(problem([](auto& o) { o.hypothesis_ratio = 2; }).find("hypothesis_ratio"), std::string::npos);
   EXPECT_NE(problem([](auto& o) { o.members = {"sirf"}; }).find("did you mean 'surf'"), std::string::npos);
   EXPECT_EQ(problem([](auto& o) {

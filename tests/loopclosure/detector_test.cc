@@ -11,6 +11,7 @@
 #include "tutti/core/error.h"
 #include "tutti/loopclosure/evaluation.h"
 #include "tutti/loopclosure/features.h"
+#include "two_laps.h"
 
 namespace tutti {
 namespace {
@@ -32,18 +33,6 @@ std::vector<LoopResult> TwoLaps(const LoopDetectorOptions& options, int places =
     results.push_back(detector.Detect(Query(i, i < places ? place : testing::SeenAgain(place))));
   }
   return results;
-}
-
-void ExpectEqual(const std::vector<LoopResult>& a, const std::vector<LoopResult>& b) {
-  ASSERT_EQ(a.size(), b.size());
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    EXPECT_EQ(a[i].hypothesis, b[i].hypothesis) << i;
-    EXPECT_EQ(a[i].candidate, b[i].candidate) << i;
-    EXPECT_EQ(a[i].posterior, b[i].posterior) << i;
-    EXPECT_EQ(a[i].verification.candidate, b[i].verification.candidate) << i;
-    EXPECT_EQ(a[i].verification.inliers, b[i].verification.inliers) << i;
-    EXPECT_EQ(a[i].reason, b[i].reason) << i;
-  }
 }
 
 class EveryRule : public ::testing::TestWithParam<std::string> {};
@@ -79,7 +68,7 @@ TEST(LoopDetector, TheSameForAnyNumberOfThreadsAndBesideAnotherDetector) {
   std::thread other([&] { beside = TwoLaps(two, 14, 3); });
   const std::vector<LoopResult> a = TwoLaps(one, 14, 3);
   other.join();
-  ExpectEqual(a, beside);
+  testing::ExpectEqual(a, beside);
 }
 
 TEST(LoopDetector, HardImagesNeverThrow) {
@@ -175,6 +164,38 @@ TEST(LoopDetector, RehearsalMergesAStandingCamera) {
   detector.Detect(Query(6, testing::TexturedImage(2)));
   EXPECT_EQ(detector.NumLocations(), 2u);
   EXPECT_NO_THROW(detector.AddLink(3, 6));
+}
+
+TEST(LoopDetector, ConsistentImagesMustComeBeforeALoop) {
+  constexpr int kPlaces = 16;
+  LoopDetectorOptions options = testing::SmallOptions();
+  LoopDetector at_once(options);
+  options.consistent_images = 3;
+  LoopDetector patient(options);
+  const std::vector<LoopResult> first = testing::Walk(at_once, 0, 2 * kPlaces, kPlaces);
+  const std::vector<LoopResult> later = testing::Walk(patient, 0, 2 * kPlaces, kPlaces);
+  const auto begin = [](const std::vector<LoopResult>& results) {
+    return std::find_if(results.begin(), results.end(), [](const LoopResult& r) { return r.accepted; });
+  };
+  ASSERT_NE(begin(first), first.end());
+  ASSERT_NE(begin(later), later.end());
+  EXPECT_LT(begin(first)->query, begin(later)->query);
+  EXPECT_GE(begin(later)->query, kPlaces + 3);
+  const auto said_why = [](const LoopResult& r) { return r.reason.find("in a row") != std::string::npos; };
+  EXPECT_TRUE(std::any_of(later.begin(), later.end(), said_why));
+}
+
+TEST(LoopDetector, EveryWeightAndIslandsFindTheSecondLap) {
+  constexpr int kPlaces = 16;
+  for (const MemberWeights weights : {MemberWeights::kEntropy, MemberWeights::kAgreement}) {
+    LoopDetectorOptions options = testing::SmallOptions();
+    options.weights = weights;
+    options.island_levels = 2;
+    LoopDetector detector(options);
+    const std::vector<LoopResult> results = testing::Walk(detector, 0, 2 * kPlaces, kPlaces);
+    EXPECT_EQ(testing::CountFalse(results, kPlaces), 0);
+    EXPECT_GE(testing::CountTrue(results, kPlaces), kPlaces - 4);
+  }
 }
 
 TEST(LoopDetector, KeepsThePosteriorOnlyWhenAsked) {

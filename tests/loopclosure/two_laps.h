@@ -10,6 +10,14 @@
 
 namespace tutti::testing {
 
+/// Few features and a short-term memory that a short walk leaves.
+inline LoopDetectorOptions SmallOptions() {
+  LoopDetectorOptions options;
+  options.stm_size = 3;
+  options.extraction.features = 150;
+  return options;
+}
+
 /// Image number i of a walk of `places` places that starts again and again.
 inline cv::Mat WalkImage(int i, int places) {
   const cv::Mat place = TexturedImage(static_cast<std::uint32_t>(i % places), 240, 180);

@@ -133,6 +133,15 @@ void ConfigTable::AddLoops(LoopDetectorOptions& o) {
           {{"similarity", LikelihoodKind::kSimilarity}, {"tfidf", LikelihoodKind::kTfIdf}},
           "how signatures are compared: similarity (2013) or tfidf");
   Add("loop_threshold", o.loop_threshold, "go to verification at H >= this, 0..1");
+  AddEnum("weights", o.weights,
+          {{"equal", MemberWeights::kEqual},
+           {"entropy", MemberWeights::kEntropy},
+           {"agreement", MemberWeights::kAgreement}},
+          "of the members in the mean: equal, entropy of the posterior, agreement with verified loops");
+  Add("island_levels", o.island_levels,
+      "candidates are ranked by the posterior of all within so many graph levels; 0: by their own");
+  Add("consistent_images", o.consistent_images,
+      "candidates of so many images before must lie on one path with this one; 0: no need");
   Add("hypothesis_ratio", o.hypothesis_ratio,
       "and at H >= this x the H of the image before; 0: whatever it was, 0..1");
   Add("stm_size", o.stm_size, "locations in short-term memory, no candidates");
@@ -170,6 +179,9 @@ void ConfigTable::AddExtraction(ExtractionOptions& o) {
       "SIFT sees the image halved until it has at most this many pixels [px]");
   Add("sift_contrast", o.sift_contrast, "contrast threshold of SIFT (OpenCV's own default is 0.04)");
   Add("orb_fast_threshold", o.orb_fast_threshold, "FAST threshold of ORB [grey levels of 255]");
+  Add("orb_border", o.orb_border,
+      "border without ORB points, share of the shorter side, at most 31 px (1: OpenCV's own)");
+  Add("root_sift", o.root_sift, "SIFT compared by the Hellinger kernel");
 }
 
 void ConfigTable::AddVocabulary(VocabularyOptions& o) {

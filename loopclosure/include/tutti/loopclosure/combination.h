@@ -17,8 +17,13 @@ struct CombinedBelief {
 };
 
 /// Mean rule: Ens(L) = 1/d sum_i p((S^i)_t | (L^i)^t) over the d members that took part, virtual place
-/// included (loop-closure.md eq. 2; the paper's choice).
-Belief CombineMean(const std::vector<const Belief*>& members);
+/// included (loop-closure.md eq. 2; the paper's choice). With weights, one above 0 for each member, the
+/// weighted mean.
+Belief CombineMean(const std::vector<const Belief*>& members, const std::vector<double>& weights = {});
+
+/// How little a belief is spread: 1 minus its entropy as a share of the largest one possible over the new
+/// place and `working_memory`; from 0.05 to 1.
+double Certainty(const Belief& belief, const std::vector<int>& working_memory);
 
 /// Product rule: p(i) ~ prod_k max(p_k(i), 1e-9), virtual place included, renormalised (section 4).
 Belief CombineProduct(const std::vector<const Belief*>& members, const std::vector<int>& working_memory);
@@ -29,8 +34,8 @@ CombinedBelief CombineMajority(const std::vector<const Belief*>& members, double
                                const LocationMemory& memory);
 
 /// One call for every rule. kNaive and kSingle have a single belief, which is the result. `members` holds
-/// those that took part; none: H = 0.
+/// those that took part; none: H = 0. `weights`: of the mean, none for equal ones.
 CombinedBelief Combine(CombinationRule rule, const std::vector<const Belief*>& members, double threshold,
-                       const LocationMemory& memory);
+                       const LocationMemory& memory, const std::vector<double>& weights = {});
 
 }  // namespace tutti

@@ -11,6 +11,13 @@ namespace tutti {
 /// How the members' posteriors become one (loop-closure.md section 4).
 enum class CombinationRule { kMean, kProduct, kMajority, kNaive, kSingle };
 
+/// What a member's posterior counts in the mean.
+enum class MemberWeights {
+  kEqual,      ///< the same: the paper's mean
+  kEntropy,    ///< the more, the less spread the posterior is in this image
+  kAgreement,  ///< the more, the more often the member was right when geometry had verified a loop
+};
+
 /// How a signature is compared with a location (loop-closure.md section 2).
 enum class LikelihoodKind { kSimilarity, kTfIdf };
 
@@ -30,6 +37,10 @@ struct ExtractionOptions {
   int sift_max_pixels = 1 << 17;  ///< SIFT sees the image halved until it has at most this many pixels [px]
   double sift_contrast = 0.02;    ///< contrast threshold of SIFT (OpenCV's own default is 0.04)
   int orb_fast_threshold = 10;    ///< FAST threshold of ORB [grey levels of 255]
+  double orb_border =
+      0.05;                ///< no ORB point is nearer to the border than this share of the shorter side, but
+                           ///< for 31 px (OpenCV's own default for images of any size), above 0, at most 1
+  bool root_sift = false;  ///< SIFT compared by the Hellinger kernel (Arandjelovic & Zisserman, CVPR 2012)
 
   /// Empty if usable, else what is wrong and what to do.
   std::string Validate() const;
@@ -90,6 +101,11 @@ struct LoopDetectorOptions {
   std::uint64_t seed = 1;                      ///< of kd-forests and RANSAC
 
   LikelihoodKind likelihood = LikelihoodKind::kTfIdf;  ///< how signatures are compared
+  MemberWeights weights = MemberWeights::kEqual;       ///< of the members in the mean
+  int island_levels = 0;      ///< candidates are ranked by the posterior of all within so many graph levels,
+                              ///< 0: by their own (islands as in iBoW-LCD, Garcia-Fidalgo & Ortiz 2018)
+  int consistent_images = 0;  ///< go to verification only if the candidates of so many images before lie on
+                              ///< one path with this one, 0: at once
   double hypothesis_ratio = 0.0;  ///< and at H >= this x the H of the image before, 0: whatever it was (0.9
                                   ///< in Labbe & Michaud 2013), 0..1
   double bad_signature_ratio =

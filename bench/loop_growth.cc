@@ -23,6 +23,14 @@ namespace {
 constexpr int kStretch = 1000;  // locations between returns
 constexpr int kReturn = 100;    // locations of a return
 
+// Spreads the bits of a number (splitmix64): neighbouring landmarks have nothing in common.
+std::uint64_t Mixed(std::uint64_t x) {
+  x += 0x9e3779b97f4a7c15ull;
+  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ull;
+  x = (x ^ (x >> 27)) * 0x94d049bb133111ebull;
+  return x ^ (x >> 31);
+}
+
 // Descriptor of a landmark for a member, with noise of its own at each sight.
 class Landmarks {
  public:
@@ -35,20 +43,20 @@ class Landmarks {
     result.descriptors.create(features_, width, member == 2 ? CV_8U : CV_32F);
     for (int i = 0; i < features_; ++i) {
       const std::uint64_t landmark = static_cast<std::uint64_t>(place * (features_ / 2) + i);
-      std::mt19937 generator(
-          static_cast<std::uint32_t>(landmark * 2654435761u + static_cast<unsigned>(member)));
+      std::minstd_rand generator(
+          static_cast<std::uint32_t>(Mixed(3 * landmark + static_cast<unsigned>(member))));
       std::minstd_rand noise(static_cast<std::uint32_t>(sight * 977 + static_cast<std::uint64_t>(i) + 1));
       result.keypoints.emplace_back(static_cast<float>(i % 20) * 30.0f, static_cast<float>(i / 20) * 20.0f,
                                     10.0f);
       if (member == 2) {
         std::uint8_t* row = result.descriptors.ptr(i);
-        for (int c = 0; c < width; ++c) row[c] = static_cast<std::uint8_t>(generator());
+        for (int c = 0; c < width; ++c) row[c] = static_cast<std::uint8_t>(generator() >> 8);
         for (int flip = 0; flip < 12; ++flip)
           row[noise() % 32u] ^= static_cast<std::uint8_t>(1u << (noise() % 8u));
       } else {
         float* row = result.descriptors.ptr<float>(i);
         for (int c = 0; c < width; ++c) {
-          row[c] = static_cast<float>(generator() % 256u) + static_cast<float>(noise() % 21u) - 10.0f;
+          row[c] = static_cast<float>(generator() >> 8 & 255u) + static_cast<float>(noise() % 21u) - 10.0f;
         }
       }
     }

@@ -18,6 +18,7 @@ void TransitionModel::Update(const LocationMemory& memory, const std::vector<int
   std::vector<int> dirty;
   for (const int slot : changed_slots) {
     if (memory.state(slot) != LocationMemory::State::kWorking) {
+      if (columns_[static_cast<std::size_t>(slot)].empty()) continue;  // no path led through it
       columns_[static_cast<std::size_t>(slot)].clear();
       // Paths that led through it are cut: all within reach of those that it was linked to.
       for (const LocationMemory::Link& link : memory.links(slot)) {

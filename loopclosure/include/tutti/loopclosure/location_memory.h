@@ -44,10 +44,11 @@ class LocationMemory {
     LinkType type = LinkType::kOdometry;  ///< how they are linked
   };
 
-  /// Loop links of one location that are walked, and loop links of one walk: however often a place is seen
-  /// again, its neighbourhood stays as large as that of a few laps. Both bounds are the same from either end,
-  /// so that a is a neighbour of b whenever b is one of a.
+  /// Loop links of one location that are walked. With kMostLoopsOfAWalk it keeps the neighbourhood of a place
+  /// that is seen over and over as large as that of a few laps. Both bounds are the same from either end, so
+  /// that a is a neighbour of b whenever b is one of a.
   static constexpr int kMostLoops = 4;
+  /// Loop links that one path takes at most.
   static constexpr int kMostLoopsOfAWalk = 2;
 
   /// Empty. `stm_size`: locations that STM holds after Settle, at least 1.

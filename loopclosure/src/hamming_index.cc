@@ -28,7 +28,6 @@ class HammingIndex : public DescriptorIndex {
       if (storage_.RowOf(word) >= 0) continue;
       const int row = storage_.Add(word, rows.ptr(i));
       for (internal::BitTrie& trie : tries_) trie.Insert(row, storage_);
-      ++size_;
     }
   }
 
@@ -37,30 +36,33 @@ class HammingIndex : public DescriptorIndex {
     if (row < 0) return;
     for (internal::BitTrie& trie : tries_) trie.Remove(row, storage_);
     storage_.Free(row);
-    --size_;
   }
 
-  TwoNearest Search(const std::uint8_t* descriptor) const override {
-    return size_ <= kExactUpTo ? SearchAll(descriptor) : SearchTries(descriptor);
+  std::vector<TwoNearest> Search(const cv::Mat& descriptors) const override {
+    std::vector<TwoNearest> found;
+    std::vector<internal::BitTrie::Walk> walks;
+    std::vector<int> rows;
+    for (int i = 0; i < descriptors.rows; ++i) {
+      found.push_back(size() <= kExactUpTo ? SearchAll(descriptors.ptr(i))
+                                           : SearchTries(descriptors.ptr(i), walks, rows));
+    }
+    return found;
   }
-
-  void Maintain() override {}  // Remove leaves nothing behind
 
   const std::uint8_t* Find(int word) const override {
     const int row = storage_.RowOf(word);
     return row < 0 ? nullptr : storage_.At(row);
   }
 
-  int size() const override { return size_; }
+  int size() const override { return storage_.size(); }
 
   // Which row a word lies in, and the order within a leaf, change no answer: words and descriptors are all.
   void Save(internal::ByteWriter& out) const override {
-    out.Put<std::uint64_t>(static_cast<std::uint64_t>(size_));
-    for (int row = 0; row < storage_.end(); ++row) {
-      if (storage_.WordOf(row) < 0) continue;
-      out.Put<std::int32_t>(storage_.WordOf(row));
+    out.Put<std::uint64_t>(static_cast<std::uint64_t>(size()));
+    storage_.ForEach([&](int word, int row) {
+      out.Put<std::int32_t>(word);
       out.PutRaw(storage_.At(row), storage_.row_bytes());
-    }
+    });
   }
 
   void Load(internal::ByteReader& in) override {
@@ -98,20 +100,16 @@ class HammingIndex : public DescriptorIndex {
   TUTTI_CLONES("popcnt")
   void Scan(const std::vector<int>& rows, const std::uint8_t* descriptor, TwoNearest& nearest) const;
 
-  TwoNearest SearchTries(const std::uint8_t* descriptor) const {
+  TwoNearest SearchTries(const std::uint8_t* descriptor, std::vector<internal::BitTrie::Walk>& walks,
+                         std::vector<int>& rows) const {
     TwoNearest nearest;
-    std::vector<int> rows;
-    rows.reserve(256);
-    for (const internal::BitTrie& trie : tries_) {
-      rows.clear();
-      trie.Collect(descriptor, rows);
-      Scan(rows, descriptor, nearest);
-    }
+    rows.clear();
+    internal::BitTrie::Collect(tries_, descriptor, walks, rows);
+    Scan(rows, descriptor, nearest);
     return nearest;
   }
 
   int bytes_;
-  int size_ = 0;
   internal::WordStorage storage_;
   std::vector<internal::BitTrie> tries_;
 };

@@ -34,11 +34,10 @@ void LikelihoodModel::Remove(int slot) {
   present_[index] = false;
   --locations_;
   for (const Signature::Entry& entry : signatures_[index].entries()) {
-    const auto found = postings_.find(entry.word);
-    std::vector<Posting>& list = found->second;
+    std::vector<Posting>& list = *postings_.Find(entry.word);
     list.erase(std::remove_if(list.begin(), list.end(), [slot](const Posting& p) { return p.slot == slot; }),
                list.end());
-    if (list.empty()) postings_.erase(found);
+    if (list.empty()) postings_.Erase(entry.word);
   }
   signatures_[index] = Signature();
 }
@@ -46,9 +45,9 @@ void LikelihoodModel::Remove(int slot) {
 std::vector<double> LikelihoodModel::Scores(const Signature& query) const {
   std::vector<double> scores(signatures_.size(), 0.0);
   for (const Signature::Entry& entry : query.entries()) {
-    const auto found = postings_.find(entry.word);
-    if (found == postings_.end()) continue;
-    const std::vector<Posting>& list = found->second;
+    const std::vector<Posting>* found = postings_.Find(entry.word);
+    if (found == nullptr) continue;
+    const std::vector<Posting>& list = *found;
     if (kind_ == LikelihoodKind::kSimilarity) {
       for (const Posting& posting : list) {
         scores[static_cast<std::size_t>(posting.slot)] += std::min(posting.count, entry.count);

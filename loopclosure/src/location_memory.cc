@@ -1,7 +1,9 @@
 #include "tutti/loopclosure/location_memory.h"
 
 #include <algorithm>
+#include <array>
 #include <tuple>
+#include <unordered_map>
 
 #include "byte_stream.h"
 
@@ -27,10 +29,22 @@ bool LocationMemory::AddLink(int a, int b, LinkType type) {
   const bool known =
       std::any_of(links.begin(), links.end(), [b](const Link& link) { return link.slot == b; });
   if (known) return false;
-  links.push_back({b, type});
-  nodes_[Index(b)].links.push_back({a, type});
+  const LinkType bounded = Bounded(a, b, type);
+  links.push_back({b, bounded});
+  nodes_[Index(b)].links.push_back({a, bounded});
   changed_.insert({a, b});
   return true;
+}
+
+LocationMemory::LinkType LocationMemory::Bounded(int a, int b, LinkType type) const {
+  if (type == LinkType::kOdometry) return type;
+  for (const int slot : {a, b}) {
+    const std::vector<Link>& near = links(slot);
+    const auto loops = std::count_if(near.begin(), near.end(),
+                                     [](const Link& link) { return link.type == LinkType::kLoop; });
+    if (loops >= kMostLoops) return LinkType::kMoreLoop;
+  }
+  return LinkType::kLoop;
 }
 
 std::vector<int> LocationMemory::Settle() {
@@ -153,26 +167,32 @@ template <typename Walkable>
 std::vector<std::pair<int, int>> LocationMemory::Walk(int slot, int levels, const Walkable& walkable) const {
   std::vector<std::pair<int, int>> found;
   if (!walkable(state(slot))) return found;
-  std::map<int, int> level_of;  // also marks the visited
-  std::vector<int> ring = {slot};
-  level_of[slot] = 0;
-  for (int level = 0; level <= levels && !ring.empty(); ++level) {
-    // Loop links cost nothing: close the ring under them before it counts as complete.
-    for (std::size_t i = 0; i < ring.size(); ++i) {
-      for (const Link& link : links(ring[i])) {
-        if (link.type != LinkType::kLoop || !walkable(state(link.slot))) continue;
-        if (level_of.emplace(link.slot, level).second) ring.push_back(link.slot);
+  // Level by level; the places of a ring by how many loop links their paths have taken.
+  using Ring = std::array<std::vector<int>, kMostLoopsOfAWalk + 1>;
+  std::unordered_map<int, std::size_t> fewest_loops;
+  Ring ring;
+  ring[0] = {slot};
+  for (int level = 0; level <= levels; ++level) {
+    Ring next;
+    std::vector<int> reached;
+    for (std::size_t loops = 0; loops < ring.size(); ++loops) {
+      for (const int node : ring[loops]) {
+        const auto [known, is_new] = fewest_loops.emplace(node, loops);
+        if (is_new) {
+          reached.push_back(node);
+        } else if (known->second <= loops) {
+          continue;
+        }
+        known->second = loops;
+        for (const Link& link : links(node)) {
+          if (!walkable(state(link.slot))) continue;
+          if (link.type == LinkType::kOdometry) next[loops].push_back(link.slot);
+          if (link.type == LinkType::kLoop && loops + 1 < ring.size()) ring[loops + 1].push_back(link.slot);
+        }
       }
     }
-    std::sort(ring.begin(), ring.end());
-    std::vector<int> next;
-    for (const int node : ring) {
-      found.emplace_back(node, level);
-      for (const Link& link : links(node)) {
-        if (link.type != LinkType::kOdometry || !walkable(state(link.slot))) continue;
-        if (level_of.emplace(link.slot, level + 1).second) next.push_back(link.slot);
-      }
-    }
+    std::sort(reached.begin(), reached.end());
+    for (const int node : reached) found.emplace_back(node, level);
     ring.swap(next);
   }
   return found;
@@ -188,7 +208,7 @@ void LocationMemory::SaveSlot(int slot, internal::ByteWriter& out) const {
   out.Put<std::uint64_t>(node.links.size());
   for (const Link& link : node.links) {
     out.Put<std::int32_t>(link.slot);
-    out.Put<char>(link.type == LinkType::kLoop ? 1 : 0);
+    out.Put(static_cast<std::uint8_t>(link.type));
   }
 }
 
@@ -204,7 +224,9 @@ void LocationMemory::LoadSlot(internal::ByteReader& in) {
   const std::size_t count = in.GetCount(sizeof(std::int32_t) + 1);
   for (std::size_t i = 0; i < count; ++i) {
     const int to = in.Get<std::int32_t>();
-    node.links.push_back({to, in.Get<char>() != 0 ? LinkType::kLoop : LinkType::kOdometry});
+    const auto type = in.Get<std::uint8_t>();
+    if (type > static_cast<std::uint8_t>(LinkType::kMoreLoop)) in.Damaged("a link of an unknown type");
+    node.links.push_back({to, static_cast<LinkType>(type)});
   }
   // One that was merged names the location that it was merged into, any other itself.
   const bool merged = node.state == State::kMerged;

@@ -112,14 +112,17 @@ void MemorySystem::Agree(int location) {
 
 void MemorySystem::CloseLoop(int newer, int older) {
   if (older < 0 || newer == older) return;
-  if (memory_.AddLink(newer, older, LocationMemory::LinkType::kLoop)) {
-    transition_.Update(memory_, {newer, older});
-  }
+  Link(newer, older, LocationMemory::LinkType::kLoop);
   memory_.TransferWeight(newer, older);
 }
 
-void MemorySystem::AddLink(int a, int b) {
-  if (memory_.AddLink(a, b, LocationMemory::LinkType::kOdometry)) transition_.Update(memory_, {a, b});
+void MemorySystem::AddLink(int a, int b) { Link(a, b, LocationMemory::LinkType::kOdometry); }
+
+void MemorySystem::Link(int a, int b, LocationMemory::LinkType type) {
+  if (!memory_.AddLink(a, b, type)) return;
+  // A link to a location outside WM takes effect when that one enters it.
+  const auto in_wm = [this](int slot) { return memory_.state(slot) == LocationMemory::State::kWorking; };
+  if (in_wm(a) && in_wm(b)) transition_.Update(memory_, {a, b});
 }
 
 std::vector<int> MemorySystem::Retrieve(int best, LocationStore& store, std::string& warning) {

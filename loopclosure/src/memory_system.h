@@ -96,6 +96,7 @@ class MemorySystem {
   void Reference(const FilterUnit& unit, const Signature& signature);
   void Release(const FilterUnit& unit, const Signature& signature);
   bool LooksLikePrevious(int slot) const;
+  void Link(int a, int b, LocationMemory::LinkType type);
 
   int number_;
   const LoopDetectorOptions& options_;

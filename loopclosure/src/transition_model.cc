@@ -18,7 +18,8 @@ void TransitionModel::Update(const LocationMemory& memory, const std::vector<int
   std::vector<int> dirty;
   for (const int slot : changed_slots) {
     if (memory.state(slot) != LocationMemory::State::kWorking) {
-      columns_[static_cast<std::size_t>(slot)].clear();
+      if (columns_[static_cast<std::size_t>(slot)].runs.empty()) continue;  // no path led through it
+      columns_[static_cast<std::size_t>(slot)] = Runs();
       // Paths that led through it are cut: all within reach of those that it was linked to.
       for (const LocationMemory::Link& link : memory.links(slot)) {
         for (const auto& [near, level] : memory.Neighbours(link.slot, kLevels)) dirty.push_back(near);
@@ -29,24 +30,31 @@ void TransitionModel::Update(const LocationMemory& memory, const std::vector<int
   }
   std::sort(dirty.begin(), dirty.end());
   dirty.erase(std::unique(dirty.begin(), dirty.end()), dirty.end());
-  for (const int j : dirty) {
-    std::vector<std::pair<int, double>>& column = columns_[static_cast<std::size_t>(j)];
-    column.clear();
-    double sum = 0.0;
-    for (const auto& [neighbour, level] : memory.Neighbours(j, kLevels)) {
-      const double value = LevelValues()[static_cast<std::size_t>(level)];
-      column.emplace_back(neighbour, value);
-      sum += value;
-    }
-    std::sort(column.begin(), column.end());
-    constexpr double kReal = 1.0 - kToNewPlace;
-    const double deficit = std::max(0.0, kReal - sum);  // chain ends and transferred neighbours
-    const double scale = kReal / (sum + deficit);
-    for (auto& [slot, value] : column) {
-      if (slot == j) value += deficit;
-      value *= scale;
-    }
+  for (const int j : dirty) columns_[static_cast<std::size_t>(j)] = ComputeColumn(memory, j);
+}
+
+TransitionModel::Runs TransitionModel::ComputeColumn(const LocationMemory& memory, int slot) {
+  std::vector<std::pair<int, double>> column;
+  double sum = 0.0;
+  for (const auto& [neighbour, level] : memory.Neighbours(slot, kLevels)) {
+    const double value = LevelValues()[static_cast<std::size_t>(level)];
+    column.emplace_back(neighbour, value);
+    sum += value;
   }
+  std::sort(column.begin(), column.end());
+  constexpr double kReal = 1.0 - kToNewPlace;
+  const double deficit = std::max(0.0, kReal - sum);  // chain ends and transferred neighbours
+  const double scale = kReal / (sum + deficit);
+  Runs result;
+  result.values.reserve(column.size());
+  for (const auto& [neighbour, value] : column) {
+    if (result.runs.empty() || result.runs.back().first + result.runs.back().count != neighbour) {
+      result.runs.push_back({neighbour, 0});
+    }
+    ++result.runs.back().count;
+    result.values.push_back((neighbour == slot ? value + deficit : value) * scale);
+  }
+  return result;
 }
 
 Belief TransitionModel::Predict(const Belief& posterior, const std::vector<int>& working_memory) const {
@@ -57,8 +65,12 @@ Belief TransitionModel::Predict(const Belief& posterior, const std::vector<int>&
     const double p = posterior.places[static_cast<std::size_t>(j)];
     if (p <= 0.0) continue;
     real += p;
-    for (const auto& [i, value] : columns_[static_cast<std::size_t>(j)]) {
-      predicted.places[static_cast<std::size_t>(i)] += value * p;
+    const Runs& column = columns_[static_cast<std::size_t>(j)];
+    const double* value = column.values.data();
+    for (const auto& [first, count] : column.runs) {
+      double* const to = predicted.places.data() + first;
+      for (int i = 0; i < count; ++i) to[i] += value[i] * p;
+      value += count;
     }
   }
   if (working_memory.empty()) {
@@ -72,8 +84,13 @@ Belief TransitionModel::Predict(const Belief& posterior, const std::vector<int>&
   return predicted;
 }
 
-const std::vector<std::pair<int, double>>& TransitionModel::Column(int slot) const {
-  return columns_[static_cast<std::size_t>(slot)];
+std::vector<std::pair<int, double>> TransitionModel::Column(int slot) const {
+  std::vector<std::pair<int, double>> column;
+  const Runs& stored = columns_[static_cast<std::size_t>(slot)];
+  for (const auto& [first, count] : stored.runs) {
+    for (int i = 0; i < count; ++i) column.emplace_back(first + i, stored.values[column.size()]);
+  }
+  return column;
 }
 
 }  // namespace tutti

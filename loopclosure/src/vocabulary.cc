@@ -78,9 +78,8 @@ std::vector<int> Vocabulary::Quantise(const cv::Mat& descriptors, int threads) {
 void Vocabulary::Search(const cv::Mat& descriptors, int begin, int end,
                         std::vector<TwoNearest>& nearest) const {
   if (!index_ || !Problem(descriptors).empty()) return;  // Assign throws
-  for (int i = begin; i < end; ++i) {
-    nearest[static_cast<std::size_t>(i)] = index_->Search(descriptors.ptr(i));
-  }
+  const std::vector<TwoNearest> found = index_->Search(descriptors.rowRange(begin, end));
+  std::copy(found.begin(), found.end(), nearest.begin() + begin);
 }
 
 std::vector<int> Vocabulary::Assign(const cv::Mat& descriptors, const std::vector<TwoNearest>& nearest) {
@@ -109,7 +108,6 @@ std::vector<int> Vocabulary::Assign(const cv::Mat& descriptors, const std::vecto
     index_->Add(ids, created.rowRange(0, num_created));
     created_ += num_created;
   }
-  index_->Maintain();
   return words;
 }
 
@@ -119,9 +117,9 @@ void Vocabulary::AddReferences(const Signature& signature) {
 
 void Vocabulary::RemoveReferences(const Signature& signature) {
   for (const Signature::Entry& entry : signature.entries()) {
-    const auto found = references_.find(entry.word);
-    if (found == references_.end() || --found->second > 0) continue;
-    references_.erase(found);
+    int* count = references_.Find(entry.word);
+    if (count == nullptr || --*count > 0) continue;
+    references_.Erase(entry.word);
     index_->Remove(entry.word);
   }
 }
@@ -129,8 +127,8 @@ void Vocabulary::RemoveReferences(const Signature& signature) {
 std::vector<int> Vocabulary::WordsOnlyIn(const Signature& signature) const {
   std::vector<int> words;
   for (const Signature::Entry& entry : signature.entries()) {
-    const auto found = references_.find(entry.word);
-    if (found != references_.end() && found->second == 1) words.push_back(entry.word);
+    const int* count = references_.Find(entry.word);
+    if (count != nullptr && *count == 1) words.push_back(entry.word);
   }
   return words;
 }
@@ -162,13 +160,11 @@ void Vocabulary::Save(internal::ByteWriter& out) const {
   out.Put<std::int32_t>(type_);
   out.Put<std::int32_t>(width_);
   out.Put<std::int32_t>(created_);
-  std::vector<std::pair<int, int>> references(references_.begin(), references_.end());
-  std::sort(references.begin(), references.end());
-  out.Put<std::uint64_t>(references.size());
-  for (const auto& [word, count] : references) {
+  out.Put<std::uint64_t>(references_.size());
+  references_.ForEach([&out](int word, int count) {
     out.Put<std::int32_t>(word);
     out.Put<std::int32_t>(count);
-  }
+  });
   if (index_) index_->Save(out);
 }
 
@@ -184,8 +180,9 @@ void Vocabulary::Load(internal::ByteReader& in) {
   const std::size_t count = in.GetCount(2 * sizeof(std::int32_t));
   for (std::size_t i = 0; i < count; ++i) {
     const int word = in.GetIndex(created_);
-    references_[word] = in.Get<std::int32_t>();
-    if (references_[word] < 1 || references_[word] > kMostWords) in.Damaged("a word without a location");
+    const int references = in.Get<std::int32_t>();
+    if (references < 1 || references > kMostWords) in.Damaged("a word without a location");
+    references_[word] = references;
   }
   if (type_ == -1) return;
   MakeIndex();

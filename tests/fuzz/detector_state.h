@@ -14,7 +14,7 @@
 namespace tutti::fuzz {
 
 constexpr int kKinds = 4;
-constexpr std::string_view kHeader("TUTTILC\n\x01\0\0\0\x04\x03\x02\x01", 16);
+constexpr std::string_view kHeader("TUTTILC\n\x02\0\0\0\x04\x03\x02\x01", 16);
 constexpr std::string_view kGeneratorMark = "<RNG>";
 constexpr std::uint32_t kEndTag = 8;
 
@@ -30,7 +30,7 @@ inline LoopDetectorOptions StateOptions(int kind) {
   options.loop_threshold = 0.01;
   options.vocabulary.trees = 2;
   options.vocabulary.hash_tables = 2;
-  options.verification.min_inliers = 6;
+  options.verification.min_inliers = 8;
   options.verification.min_epipolar_inliers = 8;
   options.verification.max_iterations = 20;
   options.ignore_bad_signatures = kind % 2 == 1;

@@ -2,6 +2,7 @@
 #include <cctype>
 #include <filesystem>
 #include <fstream>
+#include <stdexcept>
 
 #include "detector_state.h"
 
@@ -27,6 +28,9 @@ std::string ShortenGenerators(std::string content) {
 }
 
 std::string Unwrap(const std::string& file, int kind) {
+  if (file.substr(0, tutti::fuzz::kHeader.size()) != tutti::fuzz::kHeader) {
+    throw std::logic_error("kHeader is not that of a saved detector: every input would be refused at once");
+  }
   tutti::internal::ByteReader in(std::string_view(file).substr(tutti::fuzz::kHeader.size()), "seed");
   std::string seed(1, static_cast<char>(kind));
   while (!in.AtEnd()) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <map>
 
 #include "byte_stream.h"
 #include "tutti/core/error.h"
@@ -105,6 +106,42 @@ TEST(LocationMemory, TheLightestThenTheOldestIsTransferredFirst) {
   memory.Retrieve(0);  // entered WM after all others
   EXPECT_EQ(memory.NextToTransfer(0.0, {}), 2);
   EXPECT_EQ(memory.working_memory(), (std::vector<int>{0, 2, 3, 4, 5, 6, 7, 8, 9}));
+}
+
+TEST(LocationMemory, APlaceSeenOverAndOverKeepsAFewLoopLinksToWalk) {
+  LocationMemory memory(1);
+  for (int i = 0; i < 41; ++i) {
+    memory.Add(i);
+    memory.Settle();
+  }
+  for (int i = 4; i < 40; i += 4) {
+    EXPECT_TRUE(memory.AddLink(i, 0, LinkType::kLoop));
+    EXPECT_FALSE(memory.AddLink(i, 0, LinkType::kLoop));
+  }
+  EXPECT_EQ(memory.links(0).size(), 10u);  // all are known
+  const auto same_place = memory.Neighbours(0, 0);
+  EXPECT_EQ(same_place, (std::vector<std::pair<int, int>>{{0, 0}, {4, 0}, {8, 0}, {12, 0}, {16, 0}}));
+  EXPECT_EQ(memory.Neighbours(36, 0), (std::vector<std::pair<int, int>>{{36, 0}}));
+}
+
+TEST(LocationMemory, ANeighbourIsOneFromEitherEnd) {
+  LocationMemory memory(1);
+  for (int i = 0; i < 201; ++i) {
+    memory.Add(i);
+    memory.Settle();
+  }
+  for (unsigned i = 0; i < 300; ++i) {
+    memory.AddLink(static_cast<int>(i * 7919u % 200u), static_cast<int>(i * 104729u % 197u), LinkType::kLoop);
+  }
+  std::map<std::pair<int, int>, int> levels;
+  for (int a = 0; a < 200; ++a) {
+    for (const auto& [b, level] : memory.Neighbours(a, 3)) levels[{a, b}] = level;
+  }
+  for (const auto& [pair, level] : levels) {
+    const auto back = levels.find({pair.second, pair.first});
+    ASSERT_NE(back, levels.end());
+    EXPECT_EQ(back->second, level);
+  }
 }
 
 TEST(LocationMemory, WeightKeepsALocationAndRecentOnesAndThoseLinkedToShortTermMemoryStay) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <map>
 
 namespace tutti {
@@ -73,6 +74,37 @@ TEST(TransitionModel, CachedColumnsEqualThoseOfAFreshModel) {
   TransitionModel fresh(0.9);
   fresh.Update(memory, memory.working_memory());
   for (const int j : memory.working_memory()) EXPECT_EQ(grown.Column(j), fresh.Column(j)) << j;
+}
+
+// Laps around a block: every location closes a loop with one of the lap before, or of the first.
+std::size_t LargestColumn(int laps, int block, bool with_the_first, TransitionModel& model) {
+  LocationMemory memory(1);
+  for (int i = 0; i < laps * block; ++i) {
+    memory.Add(i);
+    model.Update(memory, memory.Settle());
+    const int older = with_the_first ? i % block : i - block;
+    // It is in short-term memory still: its links count from when it enters working memory.
+    if (i >= block) memory.AddLink(i, older, LocationMemory::LinkType::kLoop);
+  }
+  std::size_t most = 0;
+  for (const int j : memory.working_memory()) most = std::max(most, model.Column(j).size());
+  TransitionModel fresh(0.9);
+  fresh.Update(memory, memory.working_memory());
+  for (const int j : memory.working_memory()) {
+    EXPECT_EQ(model.Column(j), fresh.Column(j)) << j;
+    EXPECT_NEAR(Sum(model, j), 0.9, 1e-12) << j;
+  }
+  return most;
+}
+
+TEST(TransitionModel, ColumnsStayBoundedHoweverManyLaps) {
+  for (const bool with_the_first : {false, true}) {
+    TransitionModel few(0.9);
+    TransitionModel many(0.9);
+    const std::size_t of_few = LargestColumn(8, 25, with_the_first, few);
+    EXPECT_EQ(LargestColumn(50, 25, with_the_first, many), of_few);
+    EXPECT_LE(of_few, 33u * 5u);  // the neighbours in one lap, five times
+  }
 }
 
 TEST(TransitionModel, PredictionEqualsTheDenseProduct) {

@@ -97,24 +97,6 @@ TEST(Vocabulary, AnotherTypeOrWidthIsRefused) {
   EXPECT_THROW(Vocabulary(VocabularyOptions(), 1).Quantise(cv::Mat::zeros(3, 8, CV_64F)), InputError);
 }
 
-std::vector<int> Ids(int begin, int end) {
-  std::vector<int> ids(static_cast<std::size_t>(end - begin));
-  std::iota(ids.begin(), ids.end(), begin);
-  return ids;
-}
-
-// Share of queries (stored rows with noise) whose true nearest row the index finds.
-template <typename Noise>
-double Recall(DescriptorIndex& index, const cv::Mat& rows, const Noise& noise) {
-  int found = 0;
-  for (int i = 0; i < rows.rows; i += 10) {
-    cv::Mat query = rows.row(i).clone();
-    noise(query);
-    found += index.Search(query.ptr()).first == i ? 1 : 0;
-  }
-  return found / (rows.rows / 10.0);
-}
-
 TEST(Vocabulary, AWordLeavesWithItsLastLocationAndComesBackUnderItsId) {
   for (const cv::Mat& descriptors : {RandomFloats(60, 64, 1), RandomBytes(60, 1)}) {
     Vocabulary vocabulary(VocabularyOptions(), 1);
@@ -184,7 +166,7 @@ TEST(Vocabulary, SearchStaysGoodWhileWordsComeAndGo) {
 TEST(Vocabulary, ALoadedOneGoesOnAsTheSavedOneWould) {
   for (const bool binary : {false, true}) {
     Churn churn(binary);
-    for (int i = 0; i < 77; ++i) churn.Step();  // in the middle of growing a tree anew
+    for (int i = 0; i < 77; ++i) churn.Step();
     internal::ByteWriter out;
     churn.vocabulary_.Save(out);
     Vocabulary loaded(VocabularyOptions(), 3);
@@ -218,34 +200,6 @@ TEST(Vocabulary, DamagedBytesAreRefused) {
     internal::ByteReader in(std::string_view(bytes).substr(0, length), "saved");
     EXPECT_THROW(loaded.Load(in), InputError) << length;
   }
-}
-
-TEST(DescriptorIndex, KdForestFindsMostNearestNeighbours) {
-  const cv::Mat rows = RandomFloats(5000, 64, 7);
-  const std::unique_ptr<DescriptorIndex> index = MakeKdForestIndex(64, 4, 32, 1);
-  for (int i = 0; i < 5000; i += 100) index->Add(Ids(i, i + 100), rows.rowRange(i, i + 100));
-  std::mt19937 generator(3);
-  EXPECT_GT(Recall(*index, rows,
-                   [&](cv::Mat& q) {
-                     for (int j = 0; j < 64; ++j)
-                       q.at<float>(0, j) += static_cast<float>(generator() % 100u) / 1000.0f - 0.05f;
-                   }),
-            0.9);
-}
-
-TEST(DescriptorIndex, HammingTablesFindMostNearestNeighbours) {
-  const cv::Mat rows = RandomBytes(12000, 7);
-  const std::unique_ptr<DescriptorIndex> index = MakeHammingIndex(32, 8, 1);
-  index->Add(Ids(0, rows.rows), rows);
-  std::mt19937 generator(3);
-  EXPECT_GT(Recall(*index, rows,
-                   [&](cv::Mat& q) {
-                     for (int flips = 0; flips < 35; ++flips) {
-                       const unsigned bit = generator() % 256u;
-                       q.data[bit / 8] = static_cast<std::uint8_t>(q.data[bit / 8] ^ (1u << (bit % 8)));
-                     }
-                   }),
-            0.95);
 }
 
 }  // namespace

@@ -34,11 +34,9 @@ class DescriptorIndex {
   virtual void Add(const std::vector<int>& words, const cv::Mat& rows) = 0;
   /// Takes a word out: no search finds it from now on. Words that are not there are left alone.
   virtual void Remove(int word) = 0;
-  /// The (approximately) two nearest words of one descriptor, a row of a cv::Mat of the index's type and
-  /// width. Safe to call from several threads at once.
-  virtual TwoNearest Search(const std::uint8_t* descriptor) const = 0;
-  /// One bounded step of clearing up behind removed words: once per image, so that no image pays for all.
-  virtual void Maintain() = 0;
+  /// The (approximately) two nearest words of each descriptor: rows of the index's type and width. What is
+  /// found for one does not depend on the others. Safe to call from several threads at once.
+  virtual std::vector<TwoNearest> Search(const cv::Mat& descriptors) const = 0;
   /// A word's descriptor; nullptr if it is not in the index.
   virtual const std::uint8_t* Find(int word) const = 0;
   /// Words in the index.
@@ -50,14 +48,15 @@ class DescriptorIndex {
   virtual void Load(internal::ByteReader& in) = 0;
 };
 
-/// kd-forest over CV_32F descriptors, on FLANN (Muja & Lowe 2009): `trees` randomised trees, `checks` leaves
-/// per search.
+/// kd-forest over CV_32F descriptors (Muja & Lowe 2009): `trees` randomised trees, `checks` leaves per
+/// search.
 ///
-/// FLANN's own forest draws from std::random_device and the process-wide rand(), so two runs never agree, and
-/// its rebuild on doubling stops the caller for a while. Here every tree is a FLANN index of its own that
-/// starts from one word and grows by insertion alone, each tree in a seeded order of its own: the trees
-/// differ and nothing is random. Removed words stay in the trees as dead leaves; a tree in which they
-/// outnumber the living is grown anew beside the old one, a piece at each Maintain.
+/// Trees and search follow FLANN's rules, and the tests compare the answers with FLANN's. FLANN itself would
+/// do for a few thousand words only: it clears a bitset and reserves a heap of the size of the index for each
+/// tree and query, can't let go of a removed word, draws from std::random_device, and stops the caller to
+/// build all anew when the index has doubled. Here every tree starts from one word and changes by insertion
+/// and removal alone, each in a seeded order of its own: the trees differ, nothing is random, and no image
+/// pays for the others.
 std::unique_ptr<DescriptorIndex> MakeKdForestIndex(int dimensions, int trees, int checks, std::uint64_t seed);
 
 /// Random tries over CV_8U descriptors, Hamming distance: each of `tables` tries takes the bits in a seeded

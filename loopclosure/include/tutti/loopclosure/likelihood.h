@@ -1,12 +1,12 @@
 // p(L_t | S_t): how much an image looks like each location, and how much it looks like none of them.
 #pragma once
 
-#include <unordered_map>
 #include <vector>
 
 #include "tutti/loopclosure/belief.h"
 #include "tutti/loopclosure/detector_options.h"
 #include "tutti/loopclosure/signature.h"
+#include "tutti/loopclosure/word_map.h"
 
 namespace tutti {
 
@@ -57,10 +57,9 @@ class LikelihoodModel {
   void Insert(int slot);
 
   LikelihoodKind kind_;
-  std::unordered_map<int, std::vector<Posting>>
-      postings_;                       // by word id; words without locations are not there
-  std::vector<Signature> signatures_;  // by slot
-  std::vector<bool> present_;          // by slot
+  WordMap<std::vector<Posting>> postings_;  // of words that a location has
+  std::vector<Signature> signatures_;       // by slot
+  std::vector<bool> present_;               // by slot
   int locations_ = 0;
 };
 

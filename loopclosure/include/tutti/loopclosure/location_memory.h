@@ -36,6 +36,7 @@ class LocationMemory {
   enum class LinkType {
     kOdometry,  ///< neighbours in time, one graph level apart
     kLoop,      ///< the same place, zero levels apart
+    kMoreLoop,  ///< the same place, but one of them has kMostLoops already: known, and not walked
   };
   /// A location's link to another; the other has one back.
   struct Link {
@@ -43,13 +44,21 @@ class LocationMemory {
     LinkType type = LinkType::kOdometry;  ///< how they are linked
   };
 
+  /// Loop links of one location that are walked. With kMostLoopsOfAWalk it keeps the neighbourhood of a place
+  /// that is seen over and over as large as that of a few laps. Both bounds are the same from either end, so
+  /// that a is a neighbour of b whenever b is one of a.
+  static constexpr int kMostLoops = 4;
+  /// Loop links that one path takes at most.
+  static constexpr int kMostLoopsOfAWalk = 2;
+
   /// Empty. `stm_size`: locations that STM holds after Settle, at least 1.
   explicit LocationMemory(int stm_size) : stm_size_(stm_size) {}
 
   /// Adds a location at the end of STM, linked to the one before it; returns its slot. `id` must be greater
   /// than all before.
   int Add(std::int64_t id);
-  /// Links two locations; links that exist already are left as they are. Returns false if nothing changed.
+  /// Links two locations; links that exist already are left as they are. A loop link beyond kMostLoops of
+  /// either becomes kMoreLoop. Returns false if nothing changed.
   bool AddLink(int a, int b, LinkType type);
   /// Moves the oldest locations of STM to WM while |STM| > stm_size; returns the slots moved.
   std::vector<int> Settle();
@@ -110,7 +119,8 @@ class LocationMemory {
   int Find(std::int64_t id) const;
 
   /// Slots in WM within `levels` graph levels of `slot` (itself included), each with its level, in order of
-  /// level, then slot. Odometry links count 1, loop links 0. Only WM is walked.
+  /// level, then slot. Odometry links count 1, loop links 0, of which a walk takes kMostLoopsOfAWalk. Only WM
+  /// is walked.
   std::vector<std::pair<int, int>> Neighbours(int slot, int levels) const;
 
  private:
@@ -121,6 +131,7 @@ class LocationMemory {
     std::int64_t entered = 0;  // WM, by the count of all entries
     std::vector<Link> links;
   };
+  LinkType Bounded(int a, int b, LinkType type) const;
   static std::size_t Index(int slot) { return static_cast<std::size_t>(slot); }
   int Drop(int weight);
   void Enter(int slot);

@@ -16,7 +16,8 @@ namespace tutti {
 ///   from a real place j: a Gaussian (sigma 1.6, 16 levels) over the graph neighbours in working memory, a
 ///   deficit below 0.9 given to j itself, the real places scaled to 0.9; p(-1 | j) = 0.1.
 /// Columns are cached; a change in the graph recomputes only those within 16 levels. A prediction costs
-/// O(|WM|).
+/// O(|WM|), whatever the camera's path: LocationMemory bounds the neighbours of a place that is seen over and
+/// over.
 class TransitionModel {
  public:
   static constexpr int kLevels = 16;  ///< graph levels that a camera may go in one step
@@ -34,11 +35,22 @@ class TransitionModel {
   Belief Predict(const Belief& posterior, const std::vector<int>& working_memory) const;
 
   /// p(. | j): pairs of slot and probability, ascending slots; without the virtual place's kToNewPlace.
-  const std::vector<std::pair<int, double>>& Column(int slot) const;
+  std::vector<std::pair<int, double>> Column(int slot) const;
 
  private:
+  // A column's values by ascending slots, which mostly follow one another: the stretches in which they do.
+  struct Run {
+    int first;
+    int count;
+  };
+  struct Runs {
+    std::vector<Run> runs;
+    std::vector<double> values;
+  };
+  static Runs ComputeColumn(const LocationMemory& memory, int slot);
+
   double virtual_place_prior_;
-  std::vector<std::vector<std::pair<int, double>>> columns_;  // by slot; empty: not in WM
+  std::vector<Runs> columns_;  // by slot; empty: not in WM
 };
 
 }  // namespace tutti

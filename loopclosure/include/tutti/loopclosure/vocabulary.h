@@ -6,12 +6,12 @@
 #include <memory>
 #include <opencv2/core.hpp>
 #include <string>
-#include <unordered_map>
 #include <vector>
 
 #include "tutti/loopclosure/descriptor_index.h"
 #include "tutti/loopclosure/detector_options.h"
 #include "tutti/loopclosure/signature.h"
+#include "tutti/loopclosure/word_map.h"
 
 namespace tutti {
 
@@ -84,7 +84,7 @@ class Vocabulary {
   int width_ = 0;
   int created_ = 0;
   std::unique_ptr<DescriptorIndex> index_;
-  std::unordered_map<int, int> references_;  // by word
+  WordMap<int> references_;  // locations that have a word
 };
 
 }  // namespace tutti

@@ -52,7 +52,8 @@ class Landmarks {
       std::minstd_rand generator(
           static_cast<std::uint32_t>(Mixed(3 * landmark + static_cast<unsigned>(member))));
       std::minstd_rand noise(static_cast<std::uint32_t>(sight * 977 + static_cast<std::uint64_t>(i) + 1));
-      result.keypoints.emplace_back(static_cast<float>(i % 20) * 30.0f, static_cast<float>(i / 20) * 20.0f,
+      const int line = i / 20;
+      result.keypoints.emplace_back(static_cast<float>(i % 20) * 30.0f, static_cast<float>(line) * 20.0f,
                                     10.0f);
       if (member == 2) {
         std::uint8_t* row = result.descriptors.ptr(i);

@@ -40,6 +40,7 @@ class HammingIndex : public DescriptorIndex {
 
   std::vector<TwoNearest> Search(const cv::Mat& descriptors) const override {
     std::vector<TwoNearest> found;
+    found.reserve(static_cast<std::size_t>(descriptors.rows));
     std::vector<internal::BitTrie::Walk> walks;
     std::vector<int> rows;
     for (int i = 0; i < descriptors.rows; ++i) {

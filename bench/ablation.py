@@ -42,6 +42,7 @@ VARIANTS = {
     "SIFT on a quarter of the pixels": ["--set", "extraction.sift_max_pixels=32768"],
     "2 kd-trees": ["--set", "vocabulary.trees=2"],
     "16 kd-tree checks": ["--set", "vocabulary.checks=16"],
+    "FLANN's own kd-trees": ["--set", "vocabulary.float_index=flann"],
     "8 random tries": ["--set", "vocabulary.hash_tables=8"],
     "not the nearer view": ["--set", "verification.nearer_share=1"],
     "members weighted by entropy": ["--set", "weights=entropy"],

@@ -1,10 +1,9 @@
 #include <algorithm>
 #include <cmath>
-#include <random>
-#include <sstream>
 
 #include "byte_stream.h"
 #include "kd_tree.h"
+#include "shuffle.h"
 #include "tutti/loopclosure/descriptor_index.h"
 #include "word_storage.h"
 
@@ -27,11 +26,6 @@ namespace {
 
 constexpr int kTogether = 12;  // searches that take turns: enough to hide memory, few enough for the cache
 
-// A shuffle of our own: std::shuffle may differ between standard libraries.
-void Shuffle(std::vector<int>& order, std::mt19937_64& generator) {
-  for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[generator() % i]);
-}
-
 class KdForestIndex : public DescriptorIndex {
  public:
   KdForestIndex(int dimensions, int trees, int checks, std::uint64_t seed)
@@ -39,8 +33,7 @@ class KdForestIndex : public DescriptorIndex {
         checks_per_tree_(std::max(1, checks / trees)),
         storage_(static_cast<std::size_t>(dimensions) * sizeof(float)) {
     for (int t = 0; t < trees; ++t) {
-      trees_.push_back({internal::KdTree(dimensions),
-                        std::mt19937_64(seed + 0x9e3779b97f4a7c15ull * static_cast<std::uint64_t>(t))});
+      trees_.push_back({internal::KdTree(dimensions), internal::Shuffler(seed, t)});
     }
   }
 
@@ -54,7 +47,7 @@ class KdForestIndex : public DescriptorIndex {
     }
     for (GrownTree& tree : trees_) {
       std::vector<int> order = added;
-      Shuffle(order, tree.generator);
+      tree.shuffler.Shuffle(order);
       for (const int row : order) tree.tree.Insert(row, storage_);
     }
   }
@@ -104,9 +97,7 @@ class KdForestIndex : public DescriptorIndex {
     });
     out.Put<std::uint64_t>(trees_.size());
     for (const GrownTree& tree : trees_) {
-      std::ostringstream generator;
-      generator << tree.generator;
-      out.PutString(generator.str());
+      tree.shuffler.Save(out);
       tree.tree.Save(rank, out);
     }
   }
@@ -124,9 +115,7 @@ class KdForestIndex : public DescriptorIndex {
     }
     if (in.Get<std::uint64_t>() != trees_.size()) in.Damaged("another number of kd-trees");
     for (GrownTree& tree : trees_) {
-      std::istringstream generator(in.GetString());
-      generator >> tree.generator;
-      if (!generator) in.Damaged("the state of a random generator");
+      tree.shuffler.Load(in);
       tree.tree.Load(size(), in);
     }
   }
@@ -135,7 +124,7 @@ class KdForestIndex : public DescriptorIndex {
   // Each tree takes new words in an order of its own.
   struct GrownTree {
     internal::KdTree tree;
-    std::mt19937_64 generator;
+    internal::Shuffler shuffler;
   };
 
   int dimensions_;

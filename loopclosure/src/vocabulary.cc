@@ -61,8 +61,13 @@ void Vocabulary::CheckType(const cv::Mat& descriptors) {
 }
 
 void Vocabulary::MakeIndex() {
-  index_ = type_ == CV_32F ? MakeKdForestIndex(width_, options_.trees, options_.checks, seed_)
-                           : MakeHammingIndex(width_, options_.hash_tables, seed_);
+  if (type_ == CV_8U) {
+    index_ = MakeHammingIndex(width_, options_.hash_tables, seed_);
+  } else if (options_.float_index == FloatIndex::kFlann) {
+    index_ = MakeFlannIndex(width_, options_.trees, options_.checks, seed_);
+  } else {
+    index_ = MakeKdForestIndex(width_, options_.trees, options_.checks, seed_);
+  }
 }
 
 std::vector<int> Vocabulary::Quantise(const cv::Mat& descriptors, int threads) {

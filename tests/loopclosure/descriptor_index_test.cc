@@ -1,7 +1,5 @@
 #include "tutti/loopclosure/descriptor_index.h"
 
-#include <flann/algorithms/dist.h>
-#include <flann/algorithms/kdtree_index.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -75,61 +73,23 @@ TEST(DescriptorIndex, HammingTablesFindMostNearestNeighbours) {
             0.95);
 }
 
-// FLANN's own answer: a tree per order of insertion, `checks` leaves of each.
-class FlannForest {
- public:
-  FlannForest(const cv::Mat& rows, const std::vector<std::vector<int>>& orders, int checks)
-      : rows_(rows.clone()), orders_(orders), checks_(checks) {
-    for (const std::vector<int>& order : orders_) {
-      for (const int row : order) {
-        const flann::Matrix<float> point(rows_.ptr<float>(row), 1, static_cast<std::size_t>(rows_.cols));
-        if (row == order.front()) {
-          trees_.push_back(std::make_unique<Tree>(point, flann::KDTreeIndexParams(1)));
-          trees_.back()->buildIndex();
-        } else {
-          trees_.back()->addPoints(point, 0.0f);
-        }
-      }
-    }
-  }
-  TwoNearest Search(const cv::Mat& query) const {
-    Nearest nearest;
-    for (std::size_t t = 0; t < trees_.size(); ++t) {
-      nearest.order = &orders_[t];
-      trees_[t]->findNeighbors(nearest, query.ptr<float>(), flann::SearchParams(checks_));
-    }
-    return nearest.two;
-  }
-
- private:
-  using Tree = flann::KDTreeIndex<flann::L2<float>>;
-  struct Nearest : flann::ResultSet<float> {
-    bool full() const override { return two.second >= 0; }
-    void addPoint(float distance, std::size_t index) override { two.Offer((*order)[index], distance); }
-    float worstDist() const override { return two.second_distance; }
-    const std::vector<int>* order = nullptr;
-    TwoNearest two;
-  };
-  cv::Mat rows_;
-  std::vector<std::vector<int>> orders_;
-  int checks_;
-  std::vector<std::unique_ptr<Tree>> trees_;
-};
-
 TEST(DescriptorIndex, KdForestAnswersAsFlannsTreesDo) {
   // One word at a time: then every tree has the same order of insertion.
   const cv::Mat rows = RandomFloats(3000, 32, 11);
   const std::unique_ptr<DescriptorIndex> index = MakeKdForestIndex(32, 2, 32, 1);
-  for (int i = 0; i < rows.rows; ++i) index->Add({i}, rows.row(i));
-  const std::vector<int> order = Ids(0, rows.rows);
-  const FlannForest flann(rows, {order, order}, 16);
+  const std::unique_ptr<DescriptorIndex> flann = MakeFlannIndex(32, 2, 32, 1);
+  for (int i = 0; i < rows.rows; ++i) {
+    index->Add({i}, rows.row(i));
+    flann->Add({i}, rows.row(i));
+  }
   const cv::Mat queries = RandomFloats(500, 32, 12);
   const std::vector<TwoNearest> found = index->Search(queries);
+  const std::vector<TwoNearest> expected_of = flann->Search(queries);
   for (int i = 0; i < queries.rows; ++i) {
-    const TwoNearest expected = flann.Search(queries.row(i));
+    const TwoNearest& expected = expected_of[static_cast<std::size_t>(i)];
     EXPECT_EQ(found[static_cast<std::size_t>(i)].first, expected.first) << i;
     EXPECT_EQ(found[static_cast<std::size_t>(i)].second, expected.second) << i;
-    EXPECT_NEAR(found[static_cast<std::size_t>(i)].first_distance, std::sqrt(expected.first_distance), 1e-5);
+    EXPECT_NEAR(found[static_cast<std::size_t>(i)].first_distance, expected.first_distance, 1e-5);
   }
 }
 
@@ -155,10 +115,11 @@ TEST(DescriptorIndex, WhatIsFoundForOneDoesNotDependOnTheOthers) {
 TEST(DescriptorIndex, RemovedWordsLeaveNothingBehind) {
   const cv::Mat floats = RandomFloats(3000, 16, 3);
   const cv::Mat bytes = RandomBytes(3000, 3);
-  for (const bool binary : {false, true}) {
-    const cv::Mat& rows = binary ? bytes : floats;
-    const std::unique_ptr<DescriptorIndex> index =
-        binary ? MakeHammingIndex(32, 8, 1) : MakeKdForestIndex(16, 4, 32, 1);
+  std::vector<std::pair<std::unique_ptr<DescriptorIndex>, cv::Mat>> all;
+  all.emplace_back(MakeKdForestIndex(16, 4, 32, 1), floats);
+  all.emplace_back(MakeFlannIndex(16, 4, 32, 1), floats);
+  all.emplace_back(MakeHammingIndex(32, 8, 1), bytes);
+  for (const auto& [index, rows] : all) {
     for (int i = 0; i < rows.rows; ++i) {
       index->Add({i}, rows.row(i));
       if (i % 3 != 0) index->Remove(i / 2);
@@ -185,9 +146,11 @@ TEST(DescriptorIndex, RemovedWordsLeaveNothingBehind) {
 TEST(DescriptorIndex, EqualDescriptorsComeAndGo) {
   const cv::Mat floats = cv::Mat::ones(40, 8, CV_32F);
   const cv::Mat bytes = cv::Mat::ones(1200, 32, CV_8U);
-  for (const cv::Mat& rows : {floats, bytes}) {
-    const std::unique_ptr<DescriptorIndex> index =
-        rows.type() == CV_8U ? MakeHammingIndex(32, 2, 1) : MakeKdForestIndex(8, 2, 8, 1);
+  std::vector<std::pair<std::unique_ptr<DescriptorIndex>, cv::Mat>> all;
+  all.emplace_back(MakeKdForestIndex(8, 2, 8, 1), floats);
+  all.emplace_back(MakeFlannIndex(8, 2, 8, 1), floats);
+  all.emplace_back(MakeHammingIndex(32, 2, 1), bytes);
+  for (const auto& [index, rows] : all) {
     index->Add(Ids(0, rows.rows), rows);
     EXPECT_EQ(index->Search(rows.row(0))[0].second_distance, 0.0f);
     for (int i = 0; i < rows.rows - 1; ++i) index->Remove(i);

@@ -68,6 +68,17 @@ TEST_F(SavedDetector, ALoadedOneGoesOnExactlyAsTheSavedOne) {
   }
 }
 
+TEST_F(SavedDetector, FlannsTreesGoOnExactlyToo) {
+  LoopDetectorOptions options = BoundedOptions();
+  options.vocabulary.float_index = FloatIndex::kFlann;
+  LoopDetector saved(options);
+  Walk(saved, 0, 20, kPlaces);
+  saved.Save(file_);
+  LoopDetector loaded(options);
+  loaded.Load(file_);
+  testing::ExpectEqual(Walk(saved, 20, 28, kPlaces), Walk(loaded, 20, 28, kPlaces));
+}
+
 TEST_F(SavedDetector, WhatTheMembersWereRightAboutIsSavedToo) {
   LoopDetectorOptions options = BoundedOptions();
   options.weights = MemberWeights::kAgreement;

@@ -186,13 +186,12 @@ void ConfigTable::AddExtraction(ExtractionOptions& o) {
 
 void ConfigTable::AddVocabulary(VocabularyOptions& o) {
   section_ = "loops.vocabulary";
-  Add("nndr", o.nndr,
-      "a descriptor is an old word if d1 <= nndr * d2; on TRUE distance, not on FLANN's squared one");
-  Add("trees", o.trees, "kd-trees of the FLANN index (float descriptors)");
+  Add("nndr", o.nndr, "a descriptor is an old word if d1 <= nndr * d2; on TRUE distance, not on its square");
+  AddEnum("float_index", o.float_index, {{"forest", FloatIndex::kForest}, {"flann", FloatIndex::kFlann}},
+          "for float descriptors: forest (ours) or flann (slower, for comparison)");
+  Add("trees", o.trees, "kd-trees of the index (float descriptors)");
   Add("checks", o.checks, "leaves visited per search (float descriptors)");
-  Add("hash_tables", o.hash_tables,
-      "random tries of the Hamming index (binary descriptors)"
-      "do.");
+  Add("hash_tables", o.hash_tables, "random tries of the Hamming index (binary descriptors)");
 }
 
 void ConfigTable::AddVerification(VerificationOptions& o) {

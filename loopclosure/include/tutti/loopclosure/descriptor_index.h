@@ -51,13 +51,15 @@ class DescriptorIndex {
 /// kd-forest over CV_32F descriptors (Muja & Lowe 2009): `trees` randomised trees, `checks` leaves per
 /// search.
 ///
-/// Trees and search follow FLANN's rules, and the tests compare the answers with FLANN's. FLANN itself would
-/// do for a few thousand words only: it clears a bitset and reserves a heap of the size of the index for each
-/// tree and query, can't let go of a removed word, draws from std::random_device, and stops the caller to
-/// build all anew when the index has doubled. Here every tree starts from one word and changes by insertion
-/// and removal alone, each in a seeded order of its own: the trees differ, nothing is random, and no image
-/// pays for the others.
+/// Trees and search follow FLANN's rules. Every tree starts from one word and changes by insertion and
+/// removal alone, each in a seeded order of its own: the trees differ, nothing is random, and no image pays
+/// for the others.
 std::unique_ptr<DescriptorIndex> MakeKdForestIndex(int dimensions, int trees, int checks, std::uint64_t seed);
+
+/// The same forest of FLANN's own KDTreeIndex: for comparison, and for a few thousand words. Beyond, FLANN
+/// costs more: it clears a bitset and reserves a heap of the size of the index for each tree and query, and
+/// can't let go of a removed word, so that all trees are grown anew once most of their words are gone.
+std::unique_ptr<DescriptorIndex> MakeFlannIndex(int dimensions, int trees, int checks, std::uint64_t seed);
 
 /// Random tries over CV_8U descriptors, Hamming distance: each of `tables` tries takes the bits in a seeded
 /// order of its own; a search looks into the leaf that the descriptor falls into and into those that one

@@ -27,6 +27,12 @@ enum class MemoryKind {
   kPerMember,  ///< as the paper has it: each member rehearses, transfers and retrieves on its own
 };
 
+/// Who searches the words of float descriptors (descriptor_index.h).
+enum class FloatIndex {
+  kForest,  ///< kd-trees of our own, by FLANN's rules
+  kFlann,   ///< FLANN's: much the same answers, slower from a few thousand words on
+};
+
 /// Options of the features that each member takes from an image.
 struct ExtractionOptions {
   int features = 400;           ///< strongest features kept per member and image, spread over the image
@@ -48,11 +54,11 @@ struct ExtractionOptions {
 
 /// Options of one member's incremental vocabulary (loop-closure.md section 3).
 struct VocabularyOptions {
-  double nndr =
-      0.8;  ///< a descriptor is an old word if d1 <= nndr * d2; on TRUE distance, not on FLANN's squared one
-  int trees = 4;        ///< kd-trees of the FLANN index (float descriptors)
-  int checks = 32;      ///< leaves visited per search (float descriptors)
-  int hash_tables = 5;  ///< random tries of the Hamming index (binary descriptors)
+  double nndr = 0.8;  ///< a descriptor is an old word if d1 <= nndr * d2; on TRUE distance, not on its square
+  FloatIndex float_index = FloatIndex::kForest;  ///< for float descriptors
+  int trees = 4;                                 ///< kd-trees of the index (float descriptors)
+  int checks = 32;                               ///< leaves visited per search (float descriptors)
+  int hash_tables = 5;                           ///< random tries of the Hamming index (binary descriptors)
 
   /// Empty if usable, else what is wrong and what to do.
   std::string Validate() const;

@@ -199,6 +199,12 @@ void Features::InArea(const cv::Point2f& centre, float radius, int first_octave,
   }
 }
 
+std::shared_ptr<const Features> WithoutImages(const Features& features) {
+  auto out = std::make_shared<Features>(features);
+  out->pyramid.reset();
+  return out;
+}
+
 std::vector<float> PyramidScales(const OdometryOptions& options) {
   std::vector<float> scales;
   for (int l = 0; l < options.pyramid_levels; ++l) {
@@ -265,6 +271,7 @@ Features ExtractOrb(const std::vector<cv::Mat>& pyramid, const OdometryOptions& 
   if (!descriptors.empty()) cv::vconcat(descriptors, out.descriptors);
   out.inverse_depth.assign(out.keypoints.size(), 0.0F);
   out.inverse_depth_sigma.assign(out.keypoints.size(), 0.0F);
+  out.aligned.assign(out.keypoints.size(), -1);
   out.BuildGrid(pyramid[0].cols, pyramid[0].rows);
   return out;
 }
@@ -294,8 +301,10 @@ void AddDepthFromImage(const cv::Mat& depth_m, const CameraRig& rig, const Odome
 }  // namespace
 
 Features ExtractFeatures(const InputFrame& frame, const CameraRig& rig, const OdometryOptions& options) {
-  const std::vector<cv::Mat> pyramid = BuildPyramid(frame.image, options);
+  const auto shared = std::make_shared<const std::vector<cv::Mat>>(BuildPyramid(frame.image, options));
+  const std::vector<cv::Mat>& pyramid = *shared;
   Features features = ExtractOrb(pyramid, options);
+  features.pyramid = shared;
   if (!frame.depth_m.empty()) AddDepthFromImage(frame.depth_m, rig, options, &features);
   if (!frame.right.empty()) {
     const std::vector<cv::Mat> right_pyramid = BuildPyramid(frame.right, options);

@@ -4,12 +4,14 @@
 #include <cmath>
 
 #include "matcher.h"
+#include "patch_aligner.h"
 #include "stopwatch.h"
 #include "tutti/frontend/pose_solver.h"
 #include "tutti/frontend/two_view.h"
 
 namespace tutti {
 namespace {
+constexpr int kImages = 20;            // newest keyframes that keep their images
 constexpr double kMaxCosine = 0.9996;  // 1.6 deg of parallax at least, for a depth from two views
 }  // namespace
 
@@ -149,6 +151,22 @@ void LocalMapper::Fuse(int id, Map* map) {
   for (int l : landmarks_of(id)) map->UpdateLandmark(l);
 }
 
+// What was found by corners alone, in this keyframe or in older ones, gets its precise position.
+void LocalMapper::Align(int id, Map* map) {
+  std::vector<int> window = map->BestCovisible(id, kImages, 15);
+  window.push_back(id);
+  for (int k : window) {
+    const Keyframe& frame = map->keyframe(k);
+    if (!frame.features->pyramid) continue;
+    auto moved =
+        AlignFeatures(*map, rig_.camera, frame.T_world_camera.Inverse(), frame.landmarks, *frame.features);
+    if (moved) map->keyframe(k).features = moved;
+  }
+  if (id < kImages) return;
+  Keyframe& old = map->keyframe(id - kImages);
+  old.features = WithoutImages(*old.features);
+}
+
 void LocalMapper::Process(int id, Map* map, std::map<std::string, double>* stages) {
   {
     const ScopedStopwatch watch(&(*stages)["map"]);
@@ -159,6 +177,7 @@ void LocalMapper::Process(int id, Map* map, std::map<std::string, double>* stage
     if (rig_.sensor != Sensor::kMono) AddDepthLandmarks(id, 100, map);
     Triangulate(id, map);
     Fuse(id, map);
+    Align(id, map);
   }
   const ScopedStopwatch watch(&(*stages)["local_ba"]);
   BundleAdjustmentOptions ba;
@@ -167,7 +186,9 @@ void LocalMapper::Process(int id, Map* map, std::map<std::string, double>* stage
   ba.iterations = options_.ba_iterations;
   ba.pixel_sigma = options_.pixel_sigma;
   ba.metric = rig_.sensor != Sensor::kMono;
-  AdjustLocally(rig_.camera, id, ba, map);
+  if (lens_.Enabled()) ba.lens = lens_.Remaining();
+  const BundleAdjustmentReport report = AdjustLocally(rig_.camera, id, ba, map);
+  if (report.usable) lens_.Learn(report.lens, report.keyframes, map);
 }
 
 }  // namespace tutti

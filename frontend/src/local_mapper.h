@@ -3,10 +3,12 @@
 #pragma once
 
 #include <map>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "self_calibration.h"
 #include "tutti/frontend/bundle_adjustment.h"
 #include "tutti/frontend/frame.h"
 #include "tutti/frontend/map.h"
@@ -17,11 +19,15 @@ namespace tutti {
 /// Value type: copies with the odometry.
 class LocalMapper {
  public:
-  LocalMapper(const OdometryOptions& options, const CameraRig& rig) : options_(options), rig_(rig) {}
+  LocalMapper(const OdometryOptions& options, const CameraRig& rig)
+      : options_(options), rig_(rig), lens_(options, rig) {}
 
   /// Landmarks from the keyframe's own depth, for features that have none yet: the near ones, and at least
   /// `at_least`.
   int AddDepthLandmarks(int keyframe, int at_least, Map* map);
+
+  /// What the camera's calibration turned out to have left over.
+  const SelfCalibration& lens() const { return lens_; }
 
   /// Full treatment of the newest keyframe; its landmark matches are already in the map. Adds milliseconds to
   /// `stages`.
@@ -31,9 +37,11 @@ class LocalMapper {
   void CullRecent(int keyframe, Map* map);
   int Triangulate(int keyframe, Map* map);
   void Fuse(int keyframe, Map* map);
+  void Align(int keyframe, Map* map);
 
   OdometryOptions options_;
   CameraRig rig_;
+  SelfCalibration lens_;
   std::vector<std::pair<int, int>> recent_;  // landmark, keyframe in which it was made
 };
 

@@ -4,6 +4,8 @@
 #include <cstring>
 #include <limits>
 
+#include "patch_aligner.h"
+
 namespace tutti {
 
 int Map::AddKeyframe(Keyframe keyframe) {
@@ -22,6 +24,8 @@ int Map::AddLandmark(const Eigen::Vector3d& position, int keyframe, int feature)
   l.position = position;
   l.reference = keyframe;
   l.visible = l.found = 1;
+  if (camera_) l.patch = CutPatch(*camera_, *this->keyframe(keyframe).features, feature);
+  l.patch_source = {keyframe, feature};
   AddObservation(id, keyframe, feature);
   return id;
 }
@@ -72,6 +76,7 @@ void Map::RemoveLandmark(int landmark_id) {
   Landmark& l = landmark(landmark_id);
   l.alive = false;
   l.observations.shrink_to_fit();
+  l.patch.reset();
 }
 
 void Map::Merge(int loser, int winner) {
@@ -82,6 +87,15 @@ void Map::Merge(int loser, int winner) {
   for (const Observation& o : seen) AddObservation(winner, o.keyframe, o.feature);
   landmark(winner).visible += visible;
   landmark(winner).found += found;
+}
+
+double Map::RelativeSigma(const Features& features, int keyframe, int feature, int id) const {
+  const std::size_t f = static_cast<std::size_t>(feature);
+  const double corner = scales_[static_cast<std::size_t>(features.keypoints[f].octave)];
+  const Landmark& l = landmark(id);
+  const bool source = l.patch && l.patch_source.keyframe == keyframe && l.patch_source.feature == feature;
+  const bool aligned = f < features.aligned.size() && features.aligned[f] == id;
+  return source || aligned ? aligned_sigma_ * corner : corner;
 }
 
 void Map::UpdateLandmark(int id) {

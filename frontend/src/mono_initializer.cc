@@ -29,6 +29,7 @@ bool MonoInitializer::Offer(const TrackedFrame& frame, int piece, const Pose& T_
   const auto wait = [&](const std::string& why) {
     *reason = why;
     pending_.push_back(frame);
+    pending_.back().features = WithoutImages(*frame.features);
     if (pending_.size() > kMaxPending) pending_.erase(pending_.begin());
     return false;
   };

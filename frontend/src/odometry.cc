@@ -29,6 +29,9 @@ std::string OdometryOptions::Validate() const {
   if (fast_threshold < 1 || fast_threshold_min < 1 || fast_threshold_min > fast_threshold) {
     return "odometry.fast_threshold_min must be at least 1 and at most odometry.fast_threshold";
   }
+  if (!(lens_sigma >= 0)) return "odometry.lens_sigma must not be negative";
+  if (!(aligned_sigma > 0 && aligned_sigma <= 1))
+    return "odometry.aligned_sigma must be above 0 and at most 1";
   if (!(stereo_sigma_px > 0) || !(rgbd_inverse_sigma > 0) || !(pixel_sigma > 0))
     return "odometry: every sigma must be positive";
   if (!(max_depth_baselines > 1)) return "odometry.max_depth_baselines must be above 1";

@@ -41,7 +41,7 @@ class Odometry::Impl {
 
  private:
   TrackResult Initialize(const TrackedFrame& frame);
-  TrackResult TrackMap(const TrackedFrame& frame);
+  TrackResult TrackMap(TrackedFrame frame);
   void PoseBackwards(const std::vector<TrackedFrame>& frames, int first_keyframe);
   bool TrackFromLastFrame(FrameMatches* matches, Pose* T_camera_world, const Pose& prediction);
   bool TrackFromKeyframe(int keyframe, FrameMatches* matches, Pose* T_camera_world);

@@ -4,6 +4,7 @@
 #include <opencv2/calib3d.hpp>
 
 #include "odometry_impl.h"
+#include "patch_aligner.h"
 #include "stopwatch.h"
 #include "tutti/frontend/pose_solver.h"
 
@@ -19,7 +20,7 @@ PointObservation Measured(const Map& map, const OdometryOptions& options, const 
   const cv::KeyPoint& k = features.keypoints[f];
   o.point = map.landmark(landmark).position;
   o.pixel = {k.pt.x, k.pt.y};
-  o.pixel_sigma = options.pixel_sigma * map.scales()[static_cast<std::size_t>(k.octave)];
+  o.pixel_sigma = options.pixel_sigma * map.RelativeSigma(features, -1, static_cast<int>(f), landmark);
   o.inverse_depth = features.inverse_depth[f];
   o.inverse_depth_sigma = o.inverse_depth > 0 ? features.inverse_depth_sigma[f] : 0;
   return o;
@@ -49,7 +50,11 @@ std::map<int, int> Votes(const Map& map, const std::vector<int>& landmarks) {
 }  // namespace
 
 Odometry::Impl::Impl(const OdometryOptions& o, const CameraRig& r)
-    : options(o), rig(r), map(PyramidScales(o)), mapper_(o, r), initializer_(o, r) {}
+    : options(o),
+      rig(r),
+      map(PyramidScales(o), r.camera, o.aligned_sigma),
+      mapper_(o, r),
+      initializer_(o, r) {}
 
 TrackResult Odometry::Impl::Track(const InputFrame& input) {
   TrackedFrame frame{input.index, input.stamp_s, input.features};
@@ -57,6 +62,7 @@ TrackResult Odometry::Impl::Track(const InputFrame& input) {
     const ScopedStopwatch watch(&stages["extract"]);
     frame.features = std::make_shared<const Features>(ExtractFeatures(input, rig, options));
   }
+  frame.features = mapper_.lens().Correct(frame.features);
   if (rig.sensor == Sensor::kStereo) {
     row_errors.push_back(frame.features->row_error_px);
     stereo_matches.push_back(frame.features->stereo_matches);
@@ -260,7 +266,7 @@ int Odometry::Impl::TrackLocalMap(FrameMatches* matches, Pose* T_camera_world) {
   return inliers;
 }
 
-TrackResult Odometry::Impl::TrackMap(const TrackedFrame& frame) {
+TrackResult Odometry::Impl::TrackMap(TrackedFrame frame) {
   TrackResult result;
   FrameMatches matches{frame.features.get(), std::vector<int>(frame.features->size(), -1)};
   Pose T = last_T_camera_world_;
@@ -285,6 +291,11 @@ TrackResult Odometry::Impl::TrackMap(const TrackedFrame& frame) {
     }
     if (tracked) {
       inliers = TrackLocalMap(&matches, &T);
+      if (const auto moved = AlignFeatures(map, rig.camera, T, matches.landmarks, *matches.features)) {
+        frame.features = moved;
+        matches.features = moved.get();
+        inliers = Refine(&matches, &T);
+      }
       tracked = inliers >= (state_ == TrackingState::kLost ? 2 * options.min_inliers : options.min_inliers);
     }
   }

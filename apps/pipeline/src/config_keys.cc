@@ -92,7 +92,12 @@ void ConfigTable::AddOdometry(OdometryOptions& o) {
       "RGB-D: standard deviation of inverse depth [1/m]; Kinect: about 0.0015 to 0.005");
   Add("max_depth_baselines", o.max_depth_baselines,
       "stereo: farther points are not trusted when they are new [baselines]");
+  Add("lens_sigma", o.lens_sigma,
+      "mono: radial distortion that the calibration may have left over, standard deviation [1]; 0: none");
   Add("pixel_sigma", o.pixel_sigma, "standard deviation of a keypoint at pyramid level 0 [px]");
+  Add("aligned_sigma", o.aligned_sigma,
+      "standard deviation of a keypoint aligned with its landmark's patch, relative to a corner's, above 0 "
+      "to 1");
   Add("min_inliers", o.min_inliers, "fewer landmarks that agree with the pose: the frame is lost");
   Add("relocalize_s", o.relocalize_s, "lost for longer than this [s]: start a new piece of map");
   Add("local_keyframes", o.local_keyframes, "keyframes whose landmarks are searched in a frame");

@@ -1,9 +1,10 @@
-// Local bundle adjustment in Ceres: a window of keyframes and the landmarks that they see.
+// Local bundle adjustment: a window of keyframes and the landmarks that they see.
 #pragma once
 
 #include <vector>
 
 #include "tutti/core/camera.h"
+#include "tutti/frontend/lens_error.h"
 #include "tutti/frontend/map.h"
 
 namespace tutti {
@@ -14,6 +15,7 @@ struct BundleAdjustmentOptions {
   int iterations = 6;        ///< most Levenberg-Marquardt iterations
   double pixel_sigma = 1.0;  ///< standard deviation of a keypoint at pyramid level 0 [px]
   bool metric = false;       ///< depth measurements fix the scale: one fixed keyframe is enough, else two
+  LensError lens;            ///< what is known of the camera's error; as it is: the camera has none
 };
 
 struct BundleAdjustmentReport {
@@ -21,6 +23,7 @@ struct BundleAdjustmentReport {
   int keyframes = 0, fixed = 0, landmarks = 0, observations = 0;
   int removed = 0;  ///< observations that do not fit (95 % chi2) and were removed
   double initial_cost = 0, final_cost = 0;
+  LensError lens;  ///< what is known after the window; the window's own part counts in full
 };
 
 /// Adjusts the window around `keyframe`: Huber loss, analytic Jacobians, dense Schur complement, one thread

@@ -4,8 +4,10 @@
 // the image by a grid on each pyramid level; OpenCV's ORB describes them.
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <opencv2/core.hpp>
 #include <string>
 #include <vector>
@@ -20,12 +22,16 @@ int HammingDistance(const std::uint8_t* a, const std::uint8_t* b);
 
 /// Features of one rectified frame. N features.
 struct Features {
-  std::vector<cv::KeyPoint> keypoints;     ///< N, level-0 pixels, with octave and angle [deg]
-  cv::Mat descriptors;                     ///< N x 32, CV_8U
-  std::vector<float> inverse_depth;        ///< N [1/m]; 0 where unknown
-  std::vector<float> inverse_depth_sigma;  ///< N, standard deviation of inverse_depth [1/m]
-  double row_error_px = 0;                 ///< stereo: median absolute row difference of the matches [px]
-  int stereo_matches = 0;                  ///< stereo: features with a match in the right image
+  std::vector<cv::KeyPoint> keypoints;             ///< N, level-0 pixels, with octave and angle [deg]
+  cv::Mat descriptors;                             ///< N x 32, CV_8U
+  std::vector<float> inverse_depth;                ///< N [1/m]; 0 where unknown
+  std::vector<float> inverse_depth_sigma;          ///< N, standard deviation of inverse_depth [1/m]
+  Eigen::Vector2d lens = Eigen::Vector2d::Zero();  ///< correction of the lens in the keypoints (LensError)
+  std::vector<int> aligned;  ///< N, landmark whose patch the position was aligned with, or -1
+  std::shared_ptr<const std::vector<cv::Mat>>
+      pyramid;              ///< of the (left) image; null where it is not needed any more
+  double row_error_px = 0;  ///< stereo: median absolute row difference of the matches [px]
+  int stereo_matches = 0;   ///< stereo: features with a match in the right image
 
   /// Indices of the features within `radius` [px] of `centre`, in octaves first..last, cell by
   /// cell of the grid.
@@ -46,6 +52,9 @@ struct Features {
   std::vector<Entry> entries_;    // cell by cell, rows of cells first; ascending within a cell
   std::vector<int> first_entry_;  // of each cell, and the number of entries at the end
 };
+
+/// A copy that holds no images.
+std::shared_ptr<const Features> WithoutImages(const Features& features);
 
 /// Scale of each pyramid level: level 0 has 1, level l scale_factor^l.
 std::vector<float> PyramidScales(const OdometryOptions& options);

@@ -5,8 +5,10 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <vector>
 
+#include "tutti/core/camera.h"
 #include "tutti/core/pose.h"
 #include "tutti/frontend/features.h"
 
@@ -16,6 +18,15 @@ namespace tutti {
 struct Observation {
   int keyframe = -1;
   int feature = -1;
+};
+
+/// What a landmark looks like in the keyframe that made it, at the pyramid level of its corner.
+struct Patch {
+  static constexpr int kHalf = 8;  // [px of the level]
+  static constexpr int kSide = 2 * kHalf + 1;
+  std::array<std::uint8_t, kSide * kSide> grey{};
+  float offset_x = 0, offset_y = 0;  ///< of the landmark from the patch's centre [px of the level]
+  float scale_x = 1, scale_y = 1;    ///< level-0 pixels per pixel of the level
 };
 
 /// A 3D point.
@@ -28,6 +39,8 @@ struct Landmark {
   std::array<std::uint8_t, 32> descriptor{};  ///< the most central of its descriptors
   std::vector<Observation> observations;      ///< ascending by keyframe; one per keyframe at most
   int reference = -1;                         ///< keyframe that made it
+  std::shared_ptr<const Patch> patch;         ///< null if there was no image
+  Observation patch_source;                   ///< what the patch is of
   int visible = 0, found = 0;                 ///< frames that should see it, and that did
 };
 
@@ -47,6 +60,9 @@ struct Keyframe {
 class Map {
  public:
   explicit Map(std::vector<float> scales) : scales_(std::move(scales)) {}
+  /// With a camera and `aligned_sigma` (OdometryOptions), landmarks get patches.
+  Map(std::vector<float> scales, const PinholeCamera& camera, double aligned_sigma)
+      : scales_(std::move(scales)), camera_(camera), aligned_sigma_(aligned_sigma) {}
 
   int AddKeyframe(Keyframe keyframe);
   /// Adds a landmark seen by one feature; returns its id.
@@ -56,6 +72,9 @@ class Map {
   void RemoveLandmark(int landmark);
   /// Lets `winner` take over all that `loser` sees.
   void Merge(int loser, int winner);
+  /// Standard deviation of a feature as a view of a landmark, where a corner's at level 0 is 1; `keyframe`:
+  /// -1 for a frame that is none.
+  double RelativeSigma(const Features& features, int keyframe, int feature, int landmark) const;
   /// Recomputes descriptor, viewing direction and distances of a landmark.
   void UpdateLandmark(int landmark);
 
@@ -75,6 +94,8 @@ class Map {
 
  private:
   std::vector<float> scales_;
+  std::optional<PinholeCamera> camera_;
+  double aligned_sigma_ = 1;
   std::vector<Keyframe> keyframes_;
   std::vector<Landmark> landmarks_;
 };

@@ -23,11 +23,17 @@ struct OdometryOptions {
       0.004;  ///< RGB-D: standard deviation of inverse depth [1/m]; Kinect: about 0.0015 to 0.005
   double max_depth_baselines = 60;  ///< stereo: farther points are not trusted when they are new [baselines]
 
+  // Lens.
+  double lens_sigma = 0.01;  ///< mono: radial distortion (of r^2 and of r^4) that the calibration may have
+                             ///< left over, standard deviation [1]; learnt on the way; 0: there is none
+
   // Tracking.
-  double pixel_sigma = 1.0;   ///< standard deviation of a keypoint at pyramid level 0 [px]
-  int min_inliers = 20;       ///< fewer landmarks that agree with the pose: the frame is lost
-  double relocalize_s = 1.0;  ///< lost for longer than this [s]: start a new piece of map
-  int local_keyframes = 40;   ///< keyframes whose landmarks are searched in a frame
+  double pixel_sigma = 1.0;    ///< standard deviation of a keypoint at pyramid level 0 [px]
+  double aligned_sigma = 0.5;  ///< standard deviation of a keypoint whose position was aligned with its
+                               ///< landmark's patch, relative to a corner's, above 0 to 1
+  int min_inliers = 20;        ///< fewer landmarks that agree with the pose: the frame is lost
+  double relocalize_s = 1.0;   ///< lost for longer than this [s]: start a new piece of map
+  int local_keyframes = 40;    ///< keyframes whose landmarks are searched in a frame
 
   // Keyframes.
   double keyframe_inlier_ratio =

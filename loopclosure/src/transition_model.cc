@@ -3,6 +3,11 @@
 #include <algorithm>
 
 namespace tutti {
+namespace {
+
+constexpr int kInner = 2 * TransitionModel::kLevels + 1;  // values of a column in the middle of a path
+
+}  // namespace
 
 const std::array<double, TransitionModel::kLevels + 1>& TransitionModel::LevelValues() {
   // The published row: a Gaussian of sigma 1.6 over graph levels, as RTAB-Map's default and the paper print
@@ -18,7 +23,7 @@ void TransitionModel::Update(const LocationMemory& memory, const std::vector<int
   std::vector<int> dirty;
   for (const int slot : changed_slots) {
     if (memory.state(slot) != LocationMemory::State::kWorking) {
-      if (columns_[static_cast<std::size_t>(slot)].runs.empty()) continue;  // no path led through it
+      if (columns_[static_cast<std::size_t>(slot)].Empty()) continue;  // no path led through it
       columns_[static_cast<std::size_t>(slot)] = Runs();
       // Paths that led through it are cut: all within reach of those that it was linked to.
       for (const LocationMemory::Link& link : memory.links(slot)) {
@@ -30,7 +35,20 @@ void TransitionModel::Update(const LocationMemory& memory, const std::vector<int
   }
   std::sort(dirty.begin(), dirty.end());
   dirty.erase(std::unique(dirty.begin(), dirty.end()), dirty.end());
-  for (const int j : dirty) columns_[static_cast<std::size_t>(j)] = ComputeColumn(memory, j);
+  for (const int j : dirty) {
+    Runs& column = columns_[static_cast<std::size_t>(j)];
+    column = ComputeColumn(memory, j);
+    ShareInner(column);
+  }
+}
+
+void TransitionModel::ShareInner(Runs& column) {
+  if (column.runs.size() != 1 || column.runs[0].count != kInner) return;
+  if (inner_.empty()) inner_ = column.values;
+  if (column.values != inner_) return;
+  const int first = column.runs[0].first;
+  column = Runs();
+  column.inner_first = first;
 }
 
 TransitionModel::Runs TransitionModel::ComputeColumn(const LocationMemory& memory, int slot) {
@@ -66,6 +84,11 @@ Belief TransitionModel::Predict(const Belief& posterior, const std::vector<int>&
     if (p <= 0.0) continue;
     real += p;
     const Runs& column = columns_[static_cast<std::size_t>(j)];
+    if (column.inner_first >= 0) {
+      double* const to = predicted.places.data() + column.inner_first;
+      for (int i = 0; i < kInner; ++i) to[i] += inner_[static_cast<std::size_t>(i)] * p;
+      continue;
+    }
     const double* value = column.values.data();
     for (const auto& [first, count] : column.runs) {
       double* const to = predicted.places.data() + first;
@@ -87,6 +110,11 @@ Belief TransitionModel::Predict(const Belief& posterior, const std::vector<int>&
 std::vector<std::pair<int, double>> TransitionModel::Column(int slot) const {
   std::vector<std::pair<int, double>> column;
   const Runs& stored = columns_[static_cast<std::size_t>(slot)];
+  if (stored.inner_first >= 0) {
+    for (int i = 0; i < kInner; ++i) {
+      column.emplace_back(stored.inner_first + i, inner_[static_cast<std::size_t>(i)]);
+    }
+  }
   for (const auto& [first, count] : stored.runs) {
     for (int i = 0; i < count; ++i) column.emplace_back(first + i, stored.values[column.size()]);
   }

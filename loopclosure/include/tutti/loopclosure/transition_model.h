@@ -46,11 +46,16 @@ class TransitionModel {
   struct Runs {
     std::vector<Run> runs;
     std::vector<double> values;
+    int inner_first = -1;  // of a column with the values of inner_, which then has nothing else
+    bool Empty() const { return inner_first < 0 && runs.empty(); }
   };
   static Runs ComputeColumn(const LocationMemory& memory, int slot);
+  void ShareInner(Runs& column);
 
   double virtual_place_prior_;
   std::vector<Runs> columns_;  // by slot; empty: not in WM
+  std::vector<double> inner_;  // values in the middle of a path: nearly all columns are the same, and stay in
+                               // the processor's cache
 };
 
 }  // namespace tutti

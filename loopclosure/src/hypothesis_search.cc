@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "tutti/loopclosure/parallel.h"
 #include "tutti/loopclosure/transition_model.h"
 
 namespace tutti::internal {
@@ -86,8 +88,31 @@ const Verification* HypothesisSearch::Tried(int slot, const LoopResult& result) 
 
 // Tries a candidate unless it was tried before; keeps it as the best if it is.
 const Verification& HypothesisSearch::Try(const View& query, int candidate, LoopResult& result) const {
-  if (const Verification* before = Tried(candidate, result)) return *before;
-  result.tried.push_back(verifier_.Verify(query, view_of_(candidate), options_.threads));
+  if (Tried(candidate, result) == nullptr) {
+    Take(verifier_.Verify(query, view_of_(candidate), options_.threads), result);
+  }
+  return *Tried(candidate, result);
+}
+
+// Tries several at the same time: what comes of it is as one after the other.
+void HypothesisSearch::TryAll(const View& query, const std::vector<int>& candidates,
+                              LoopResult& result) const {
+  std::vector<int> untried;
+  for (const int slot : candidates) {
+    if (Tried(slot, result) == nullptr) untried.push_back(slot);
+  }
+  if (untried.empty()) return;
+  const int count = static_cast<int>(untried.size());
+  const int threads_each = std::max(1, options_.threads / count);
+  std::vector<Verification> verifications(untried.size());
+  RunParallel(count, options_.threads, [&](int i) {
+    verifications[Index(i)] = verifier_.Verify(query, view_of_(untried[Index(i)]), threads_each);
+  });
+  for (Verification& verification : verifications) Take(std::move(verification), result);
+}
+
+void HypothesisSearch::Take(Verification verification, LoopResult& result) {
+  result.tried.push_back(std::move(verification));
   const Verification& tried = result.tried.back();
   const Verification& best = result.verification;
   const bool first = result.tried.size() == 1;
@@ -95,7 +120,6 @@ const Verification& HypothesisSearch::Try(const View& query, int candidate, Loop
       (tried.accepted == best.accepted && tried.inliers > best.inliers)) {
     result.verification = tried;
   }
-  return tried;
 }
 
 void HypothesisSearch::Verify(const View& query, const Belief& belief, LoopResult& result) const {
@@ -138,17 +162,25 @@ std::vector<int> HypothesisSearch::ViewsOf(int place, const Belief& belief) cons
 // best constraint. A few that share less lie between: number of inliers is noisy. Of views that share about
 // as much, the nearest.
 void HypothesisSearch::Climb(const View& query, LoopResult& result) const {
-  constexpr int kReach = 8;  // locations each way
+  constexpr int kReach = 8;              // locations each way
+  constexpr double kAboutAsMany = 0.75;  // with fewer, what shares the most is behind
+  std::vector<PathWalk> walks;
   const int start = memory_.Find(result.verification.candidate);
-  for (const int neighbour : OnThePath(start)) {
-    int in_vain = 0;
-    PathWalk walk{start, neighbour};
-    for (int step = 0; step < kReach && in_vain < kPatience && walk.next >= 0; ++step) {
-      const int inliers = Try(query, walk.next, result).inliers;
-      if (2 * inliers < result.verification.inliers) break;
-      in_vain = result.verification.candidate == memory_.id(walk.next) ? 0 : in_vain + 1;
+  for (const int neighbour : OnThePath(start)) walks.push_back({start, neighbour, 0});
+  for (int step = 0; step < kReach && !walks.empty(); ++step) {
+    std::vector<int> next;
+    for (const PathWalk& walk : walks) next.push_back(walk.next);
+    TryAll(query, next, result);
+    std::vector<PathWalk> going_on;
+    for (PathWalk& walk : walks) {
+      const bool best = result.verification.candidate == memory_.id(walk.next);
+      walk.in_vain = best ? 0 : walk.in_vain + 1;
+      const int inliers = Tried(walk.next, result)->inliers;
+      if (inliers < kAboutAsMany * result.verification.inliers || walk.in_vain == kPatience) continue;
       Advance(walk);
+      if (walk.next >= 0) going_on.push_back(walk);
     }
+    walks = std::move(going_on);
   }
   TakeNearest(query, result);
 }
@@ -168,7 +200,7 @@ std::vector<int> HypothesisSearch::OnThePath(int slot) const {
 void HypothesisSearch::Advance(PathWalk& walk) const {
   const std::vector<int> on = OnThePath(walk.next);
   const auto further = std::find_if(on.begin(), on.end(), [&](int slot) { return slot != walk.last; });
-  walk = {walk.next, further == on.end() ? -1 : *further};
+  walk.last = std::exchange(walk.next, further == on.end() ? -1 : *further);
 }
 
 // Where no scale is known, the direction of the translation tells which view is nearer: on a path, the query
@@ -181,7 +213,7 @@ void HypothesisSearch::TakeNearest(const View& query, LoopResult& result) const 
   for (const int neighbour : OnThePath(start)) {
     // Of a camera that is held by hand and moves anywhere, the direction says little about the distance.
     if (!IsAhead(verifier_.Verify(view_of_(neighbour), view_of_(start), options_.threads))) continue;
-    const std::int64_t nearest = Nearest(query, {start, neighbour}, result);
+    const std::int64_t nearest = Nearest(query, {start, neighbour, 0}, result);
     if (nearest != best.candidate) nearer.push_back(*Tried(memory_.Find(nearest), result));
   }
   // Nearer on both sides is noise, not a path.
@@ -198,15 +230,14 @@ std::int64_t HypothesisSearch::Nearest(const View& query, PathWalk walk, LoopRes
   double aside = Aside(*best);
   const double clearly = aside + kClearly;
   std::int64_t nearest = best->candidate;
-  int in_vain = 0;
-  for (int step = 0; step < kReach && in_vain < kPatience && aside < kBeside && walk.next >= 0; ++step) {
+  for (int step = 0; step < kReach && walk.in_vain < kPatience && aside < kBeside && walk.next >= 0; ++step) {
     const Verification& view = Try(query, walk.next, result);
     if (!view.accepted || !ScaleFree(view) || view.inliers < enough) break;
-    ++in_vain;
+    ++walk.in_vain;
     if (Aside(view) > std::max(aside, clearly)) {
       aside = Aside(view);
       nearest = view.candidate;
-      in_vain = 0;
+      walk.in_vain = 0;
     }
     Advance(walk);
   }

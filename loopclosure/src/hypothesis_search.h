@@ -25,6 +25,7 @@ class HypothesisSearch {
   // A way along the odometry links.
   struct PathWalk {
     int last, next;  // slots
+    int in_vain;     // steps since the last one that was better
   };
 
   std::vector<int> TopPlaces(const Belief& belief) const;
@@ -32,6 +33,8 @@ class HypothesisSearch {
   std::vector<int> ViewsOf(int place, const Belief& belief) const;
   const Verification* Tried(int slot, const LoopResult& result) const;
   const Verification& Try(const View& query, int candidate, LoopResult& result) const;
+  void TryAll(const View& query, const std::vector<int>& candidates, LoopResult& result) const;
+  static void Take(Verification verification, LoopResult& result);
   void Climb(const View& query, LoopResult& result) const;
   std::vector<int> OnThePath(int slot) const;
   void TakeNearest(const View& query, LoopResult& result) const;

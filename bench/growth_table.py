@@ -2,7 +2,7 @@
 """Measures how time and memory grow with the number of locations, and writes docs/loop-closure-growth.md.
 
 usage: bench/growth_table.py --program build/release/bench/loop_growth [--locations N] [--limit N] [--saved N] [--out DIR]
-                             [--reuse] [--document FILE]
+                             [--reuse] [--remark TEXT] [--document FILE]
 Runs bench/loop_growth three times: without a limit, with a limit of working memory and long-term memory in a file,
 and with as many locations as are saved and loaded again. --reuse makes the document of the CSV files that an earlier
 run left in --out. Needs nothing but Python 3; 20,000 locations without a limit need about 13 GB of memory.
@@ -53,7 +53,7 @@ def kb_per_location(rows):
     return 1024 * (last["resident_mb"] - first["resident_mb"]) / (last["in_memory"] - first["in_memory"])
 
 
-def document(free, limited, saving, limit):
+def document(free, limited, saving, limit, remark):
     last, full = free[-1], next(r for r in limited if r["locations"] >= limit + 1000)
     end = limited[-1]
     beyond = end["locations"] - full["locations"]
@@ -62,7 +62,7 @@ def document(free, limited, saving, limit):
              "signatures, three members of 400 features (`bench/loop_growth.cc` says what the walk is like). "
              "Milliseconds per image without extraction and verification, medians over the last 1,000 locations; "
              "`processor` is processor time of all threads (2 at most), which a busy machine changes less than the "
-             f"time on the clock. Machine: {platform.machine()}.", "", "## Without a limit", ""]
+             f"time on the clock. Machine: {platform.machine()}. {remark}".rstrip(), "", "## Without a limit", ""]
     lines += table(free)
     lines += ["", f"At {last['locations']:,.0f} locations filter and vocabulary take "
               f"{last['quantise_ms'] + last['likelihood_ms'] + last['filter_ms']:.1f} ms "
@@ -90,6 +90,7 @@ def main():
     parser.add_argument("--saved", type=int, default=5000, help="locations of the detector that is saved and loaded")
     parser.add_argument("--out", default="/tmp/tutti-growth", help="folder for the CSV files (kept)")
     parser.add_argument("--reuse", action="store_true", help="take CSV files that are there instead of running")
+    parser.add_argument("--remark", default="", help="a sentence about the machine or the runs, for the document")
     parser.add_argument("--document", default=DOCUMENT, help="file to write")
     a = parser.parse_args()
     out = pathlib.Path(a.out)
@@ -101,7 +102,7 @@ def main():
     with tempfile.TemporaryDirectory(dir=out) as folder:
         rows, saving = run(program, out / "saved.csv", a.saved, 0, folder, a.reuse)
     saving["locations"] = rows[-1]["locations"]
-    pathlib.Path(a.document).write_text("\n".join(document(free, limited, saving, a.limit)))
+    pathlib.Path(a.document).write_text("\n".join(document(free, limited, saving, a.limit, a.remark)))
     print(f"written: {a.document}")
     return 0
 

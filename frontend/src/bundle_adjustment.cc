@@ -3,23 +3,11 @@
 #include <algorithm>
 #include <map>
 
-#include "tutti/frontend/pose_solver.h"
+#include "measured.h"
 #include "window_solver.h"
 
 namespace tutti {
 namespace {
-
-PointObservation Measurement(const Map& map, const Keyframe& k, int feature, int landmark,
-                             double pixel_sigma) {
-  const std::size_t f = static_cast<std::size_t>(feature);
-  const cv::KeyPoint& keypoint = k.features->keypoints[f];
-  PointObservation o;
-  o.pixel = {keypoint.pt.x, keypoint.pt.y};
-  o.pixel_sigma = pixel_sigma * map.RelativeSigma(*k.features, k.id, feature, landmark);
-  o.inverse_depth = k.features->inverse_depth[f];
-  o.inverse_depth_sigma = o.inverse_depth > 0 ? k.features->inverse_depth_sigma[f] : 0;
-  return o;
-}
 
 // Landmarks that the moving keyframes see, ascending.
 std::vector<int> LandmarksOf(const Map& map, const std::vector<int>& keyframes) {
@@ -54,7 +42,7 @@ Window MakeWindow(const Map& map, const std::vector<int>& moving, const std::vec
       const auto camera = cameras.find(o.keyframe);
       if (camera == cameras.end()) continue;
       window.observations.push_back(
-          {camera->second, Measurement(map, map.keyframe(o.keyframe), o.feature, id, options.pixel_sigma)});
+          {camera->second, Measured(map, *map.keyframe(o.keyframe).features, o, id, options.pixel_sigma)});
     }
     window.first_observation.push_back(window.observations.size());
   }
@@ -75,9 +63,8 @@ int RemoveMisfits(const PinholeCamera& camera, const std::vector<int>& moving, c
     for (const Observation& o : l.observations) {
       const auto pose = T_camera_world.find(o.keyframe);
       if (pose == T_camera_world.end()) continue;
-      PointObservation m = Measurement(*map, map->keyframe(o.keyframe), o.feature, id, options.pixel_sigma);
-      m.point = l.position;
-      m.pixel += LensError::Jacobian(camera, m.pixel) * lens.value;
+      PointObservation m = Measured(*map, *map->keyframe(o.keyframe).features, o, id, options.pixel_sigma);
+      m.pixel = LensError::Correct(camera, lens.value, m.pixel);
       Eigen::Vector3d r;
       if (!ReprojectionResidual(camera, pose->second, m, &r, nullptr) || r.squaredNorm() > ChiSquareBound(m))
         misfits.emplace_back(id, o.keyframe);

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "matcher.h"
+#include "measured.h"
 #include "patch_aligner.h"
 #include "stopwatch.h"
 #include "tutti/frontend/pose_solver.h"
@@ -86,14 +87,10 @@ int LocalMapper::Triangulate(int id, Map* map) {
       const Eigen::Vector3d point = T_world_a * in_a;
       bool good = true;
       for (const auto& [pose, frame, feature] : {std::tuple{&T_a, &a, fa}, std::tuple{&T_b, &b, fb}}) {
-        const std::size_t f = static_cast<std::size_t>(feature);
-        const cv::KeyPoint& kp = frame->features->keypoints[f];
-        PointObservation o;
-        o.point = point;
-        o.pixel = {kp.pt.x, kp.pt.y};
-        o.pixel_sigma = options_.pixel_sigma * map->scales()[static_cast<std::size_t>(kp.octave)];
-        o.inverse_depth = frame->features->inverse_depth[f];
-        o.inverse_depth_sigma = o.inverse_depth > 0 ? frame->features->inverse_depth_sigma[f] : 0;
+        const int octave = frame->features->keypoints[static_cast<std::size_t>(feature)].octave;
+        const PointObservation o =
+            Measured(*frame->features, feature, point,
+                     options_.pixel_sigma * map->scales()[static_cast<std::size_t>(octave)]);
         Eigen::Vector3d r;
         good = good && ReprojectionResidual(rig_.camera, *pose, o, &r, nullptr) &&
                r.squaredNorm() <= ChiSquareBound(o);
@@ -186,7 +183,7 @@ void LocalMapper::Process(int id, Map* map, std::map<std::string, double>* stage
   ba.iterations = options_.ba_iterations;
   ba.pixel_sigma = options_.pixel_sigma;
   ba.metric = rig_.sensor != Sensor::kMono;
-  if (lens_.Enabled()) ba.lens = lens_.Remaining();
+  ba.lens = lens_.Remaining();
   const BundleAdjustmentReport report = AdjustLocally(rig_.camera, id, ba, map);
   if (report.usable) lens_.Learn(report.lens, report.keyframes, map);
 }

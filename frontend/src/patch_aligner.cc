@@ -2,8 +2,10 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 
+#include "grey_window.h"
 #include "tutti/frontend/lens_error.h"
 
 namespace tutti {
@@ -13,36 +15,13 @@ constexpr int kHalf = 4;  // half of the window that is compared [px of its leve
 constexpr int kSide = 2 * kHalf + 1;
 constexpr int kPixels = kSide * kSide;
 constexpr int kIterations = 10;
-constexpr double kWindowSigma = 3;    // of the window's weights [px]
 constexpr float kConverged = 0.02F;   // [px]
 constexpr float kMaxShift = 2.5F;     // from the detected corner [px of its level]
 constexpr float kMaxResidual = 0.2F;  // of the window's variance
 constexpr float kMinGradient = 30;    // least weighted mean square gradient in any direction [grey levels^2]
 
-using Window = Eigen::Matrix<float, kPixels, 1>;  // row by row
+using Window = GreyWindow<kHalf>;
 using Vector4f = Eigen::Matrix<float, 4, 1>;
-
-const Window& WindowWeights() {
-  static const Window weights = [] {
-    Window w;
-    for (int v = -kHalf, n = 0; v <= kHalf; ++v) {
-      for (int u = -kHalf; u <= kHalf; ++u, ++n)
-        w(n) = static_cast<float>(std::exp(-0.5 * (u * u + v * v) / (kWindowSigma * kWindowSigma)));
-    }
-    return Window(w / w.sum());
-  }();
-  return weights;
-}
-
-float Bilinear(const std::uint8_t* data, std::size_t step, float x, float y) {
-  const int ix = static_cast<int>(x), iy = static_cast<int>(y);
-  const float ax = x - static_cast<float>(ix), ay = y - static_cast<float>(iy);
-  const std::uint8_t* r0 = data + static_cast<std::size_t>(iy) * step + ix;
-  const std::uint8_t* r1 = r0 + step;
-  const float top = r0[0] + ax * static_cast<float>(r0[1] - r0[0]);
-  const float bottom = r1[0] + ax * static_cast<float>(r1[1] - r1[0]);
-  return top + ay * (bottom - top);
-}
 
 // Level-0 pixels per pixel of a level; sizes of levels are rounded.
 Eigen::Vector2d LevelScale(const std::vector<cv::Mat>& pyramid, std::size_t level) {
@@ -79,7 +58,7 @@ struct Template {
 };
 
 bool Prepare(const float (*grey)[kSide + 2], Template* t) {
-  const Window& weights = WindowWeights();
+  const Window& weights = WindowWeights<kHalf>();
   for (int v = 0, n = 0; v < kSide; ++v) {
     for (int u = 0; u < kSide; ++u, ++n) t->grey(n) = grey[v + 1][u + 1];
   }
@@ -116,9 +95,9 @@ bool Fit(const Template& t, const cv::Mat& image, float* x, float* y) {
       for (int u = -kHalf; u <= kHalf; ++u, ++n)
         r(n) = Bilinear(image.data, image.step, *x + float(u), *y + float(v));
     }
-    if (iteration == 0) offset = WindowWeights().dot(r);
+    if (iteration == 0) offset = WindowWeights<kHalf>().dot(r);
     r.array() -= gain * t.grey.array() + offset;
-    residual = WindowWeights().dot(r.cwiseAbs2());
+    residual = WindowWeights<kHalf>().dot(r.cwiseAbs2());
     const Vector4f step = t.solver.solve(t.weighted.transpose() * r);
     *x -= step(0) / std::max(gain, 0.1F);
     *y -= step(1) / std::max(gain, 0.1F);
@@ -139,8 +118,8 @@ std::shared_ptr<const Patch> CutPatch(const PinholeCamera& camera, const Feature
   const std::size_t level = static_cast<std::size_t>(k.octave);
   if (!features.pyramid || level >= features.pyramid->size()) return nullptr;
   const cv::Mat& image = (*features.pyramid)[level];
-  const Eigen::Vector2d p = ToLevel(LensError::Uncorrect(camera, features.lens, {k.pt.x, k.pt.y}),
-                                    LevelScale(*features.pyramid, level));
+  const Eigen::Vector2d scale = LevelScale(*features.pyramid, level);
+  const Eigen::Vector2d p = ToLevel(LensError::Uncorrect(camera, features.lens, {k.pt.x, k.pt.y}), scale);
   const int x = static_cast<int>(std::lround(p.x())), y = static_cast<int>(std::lround(p.y()));
   if (x < Patch::kHalf || y < Patch::kHalf || x + Patch::kHalf >= image.cols ||
       y + Patch::kHalf >= image.rows)
@@ -148,7 +127,6 @@ std::shared_ptr<const Patch> CutPatch(const PinholeCamera& camera, const Feature
   auto patch = std::make_shared<Patch>();
   patch->offset_x = static_cast<float>(p.x() - x);
   patch->offset_y = static_cast<float>(p.y() - y);
-  const Eigen::Vector2d scale = LevelScale(*features.pyramid, level);
   patch->scale_x = static_cast<float>(scale.x());
   patch->scale_y = static_cast<float>(scale.y());
   for (int v = 0; v < Patch::kSide; ++v) {

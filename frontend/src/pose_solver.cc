@@ -29,7 +29,6 @@ bool ReprojectionResidual(const PinholeCamera& camera, const Pose& T_camera_worl
 int RefinePose(const PinholeCamera& camera, const std::vector<PointObservation>& observations,
                Pose* T_camera_world, std::vector<char>* inlier) {
   inlier->assign(observations.size(), 1);
-  const double kHuber2 = std::sqrt(5.991), kHuber3 = std::sqrt(7.815);
   int inliers = 0;
   for (int round = 0; round < 4; ++round) {
     const bool robust = round < 3;
@@ -44,7 +43,7 @@ int RefinePose(const PinholeCamera& camera, const std::vector<PointObservation>&
         Eigen::Matrix<double, 3, 6> j;
         if (!ReprojectionResidual(camera, *T_camera_world, observations[i], &r, &j)) continue;
         const double n = r.norm();
-        const double k = observations[i].inverse_depth_sigma > 0 ? kHuber3 : kHuber2;
+        const double k = HuberBound(observations[i]);
         const double w = robust && n > k ? k / n : 1.0;
         cost += robust && n > k ? k * (2 * n - k) : n * n;
         h.noalias() += w * j.transpose() * j;
@@ -53,9 +52,7 @@ int RefinePose(const PinholeCamera& camera, const std::vector<PointObservation>&
       const Vector6d step = (h + 1e-9 * h.trace() * Matrix6d::Identity()).ldlt().solve(-g);
       if (!step.allFinite()) break;
       // Left perturbation: translation and rotation act on the point in the camera frame.
-      const Eigen::Quaterniond dr = ExpSO3(step.tail<3>());
-      *T_camera_world = Pose((dr * T_camera_world->rotation).normalized(),
-                             dr * T_camera_world->translation + step.head<3>());
+      *T_camera_world = Pose(ExpSO3(step.tail<3>()), step.head<3>()) * *T_camera_world;
       if (step.norm() < 1e-7 || (iteration > 0 && std::abs(last_cost - cost) < 1e-5 * cost)) break;
       last_cost = cost;
     }

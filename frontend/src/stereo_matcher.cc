@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "grey_window.h"
+
 namespace tutti {
 namespace {
 
@@ -14,7 +16,6 @@ constexpr int kHalf = 5;          // half of the window [px]
 constexpr int kSide = 2 * kHalf + 1;
 constexpr int kPixels = kSide * kSide;
 constexpr int kSearch = 5;              // half of the SAD search range [px]
-constexpr double kWindowSigma = 3;      // of the window's weights [px]
 constexpr float kGreySigma = 4;         // differences that interpolation and noise make [grey levels]
 constexpr float kMaxStretch = 0.3F;     // of a wall along the way: baseline / distance from it
 constexpr float kMaxShear = 0.8F;       // of the ground: baseline / height
@@ -34,30 +35,8 @@ int Sad(const cv::Mat& a, int ax, int ay, const cv::Mat& b, int bx, int by) {
   return sum;
 }
 
-using Window = Eigen::Matrix<float, kPixels, 1>;  // row by row
+using Window = GreyWindow<kHalf>;
 using Vector5f = Eigen::Matrix<float, 5, 1>;
-
-const Window& WindowWeights() {
-  static const Window weights = [] {
-    Window w;
-    for (int j = -kHalf, n = 0; j <= kHalf; ++j) {
-      for (int i = -kHalf; i <= kHalf; ++i, ++n)
-        w(n) = static_cast<float>(std::exp(-0.5 * (i * i + j * j) / (kWindowSigma * kWindowSigma)));
-    }
-    return Window(w / w.sum());
-  }();
-  return weights;
-}
-
-float Bilinear(const cv::Mat& image, float x, float y) {
-  const int ix = static_cast<int>(x), iy = static_cast<int>(y);
-  const float ax = x - static_cast<float>(ix), ay = y - static_cast<float>(iy);
-  const std::uint8_t* r0 = image.ptr<std::uint8_t>(iy) + ix;
-  const std::uint8_t* r1 = image.ptr<std::uint8_t>(iy + 1) + ix;
-  const float top = r0[0] + ax * static_cast<float>(r0[1] - r0[0]);
-  const float bottom = r1[0] + ax * static_cast<float>(r1[1] - r1[0]);
-  return top + ay * (bottom - top);
-}
 
 // How a window of the left image appears in the right one, in pixels of the level:
 // right(x + i + shift + stretch i + shear j, y + j + row) = left(x + i, y + j) + brightness.
@@ -78,7 +57,7 @@ bool SampleWarped(const cv::Mat& right, int x, int y, const Warp& w, Window* gre
   for (int j = -kHalf, n = 0; j <= kHalf; ++j) {
     const float start = fx + w.shift + w.shear * static_cast<float>(j);
     for (int i = -kHalf; i <= kHalf; ++i, ++n)
-      (*grey)(n) = Bilinear(right, start + (1 + w.stretch) * static_cast<float>(i),
+      (*grey)(n) = Bilinear(right.data, right.step, start + (1 + w.stretch) * static_cast<float>(i),
                             fy + static_cast<float>(j) + w.row);
   }
   return true;
@@ -88,7 +67,7 @@ bool SampleWarped(const cv::Mat& right, int x, int y, const Warp& w, Window* gre
 // on the ground or on a wall along the way is sheared or stretched by pixels: a mere shift has errors of half
 // a pixel there.
 bool FitWarp(const cv::Mat& left, const cv::Mat& right, int x, int y, Warp* warp) {
-  const Window& weights = WindowWeights();
+  const Window& weights = WindowWeights<kHalf>();
   Eigen::Matrix<float, kPixels, 5> jacobian;
   Window grey;
   for (int j = -kHalf, n = 0; j <= kHalf; ++j) {

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <opencv2/calib3d.hpp>
 
+#include "measured.h"
 #include "odometry_impl.h"
 #include "patch_aligner.h"
 #include "stopwatch.h"
@@ -13,18 +14,6 @@ namespace {
 
 constexpr int kMinDepthFeatures = 50;  // features with depth that a metric map starts from
 constexpr int kMinProjected = 20;      // matches by projection below which the search is widened
-
-PointObservation Measured(const Map& map, const OdometryOptions& options, const Features& features,
-                          std::size_t f, int landmark) {
-  PointObservation o;
-  const cv::KeyPoint& k = features.keypoints[f];
-  o.point = map.landmark(landmark).position;
-  o.pixel = {k.pt.x, k.pt.y};
-  o.pixel_sigma = options.pixel_sigma * map.RelativeSigma(features, -1, static_cast<int>(f), landmark);
-  o.inverse_depth = features.inverse_depth[f];
-  o.inverse_depth_sigma = o.inverse_depth > 0 ? features.inverse_depth_sigma[f] : 0;
-  return o;
-}
 
 // Keyframe with most votes by the landmarks seen (ties: the newest); -1 if there is none.
 int MostVoted(const std::map<int, int>& votes) {
@@ -170,7 +159,8 @@ int Odometry::Impl::Refine(FrameMatches* matches, Pose* T_camera_world) const {
   for (std::size_t f = 0; f < matches->landmarks.size(); ++f) {
     const int l = matches->landmarks[f];
     if (l < 0) continue;
-    observations.push_back(Measured(map, options, *matches->features, f, l));
+    observations.push_back(
+        Measured(map, *matches->features, {-1, static_cast<int>(f)}, l, options.pixel_sigma));
     feature.push_back(f);
   }
   if (observations.size() < 6) return 0;

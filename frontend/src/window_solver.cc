@@ -16,7 +16,6 @@ constexpr double kBehindResidual = 1e3;  // of a point behind its camera; the Hu
 constexpr double kStartDamping = 1e-4;   // relative to the diagonal
 constexpr double kCostTolerance = 1e-5;  // at 1e-4 the result depends on where the axes of the world point
 constexpr double kMinDepth = 1e-3;       // in front of the camera [m]
-const double kHuber2 = std::sqrt(5.991), kHuber3 = std::sqrt(7.815);  // 95 % of good residuals are below
 
 double HuberCost(double squared, double k) {
   return squared <= k * k ? 0.5 * squared : k * (std::sqrt(squared) - 0.5 * k);
@@ -106,7 +105,7 @@ class WindowSolver {
         Eigen::Vector3d p, r;
         const double squared =
             Residual(e, o, i, &p, &r) ? r.squaredNorm() : kBehindResidual * kBehindResidual;
-        cost += HuberCost(squared, o.measured.inverse_depth_sigma > 0 ? kHuber3 : kHuber2);
+        cost += HuberCost(squared, HuberBound(o.measured));
       }
     }
     return cost;
@@ -142,7 +141,7 @@ class WindowSolver {
     Eigen::Vector3d p, full;
     pose_point_[n].setZero();
     if (!Residual(now_, o, i, &p, &full)) return;
-    const double norm = full.norm(), k = N == 3 ? kHuber3 : kHuber2;
+    const double norm = full.norm(), k = HuberBound(m);
     const double root = norm > k ? std::sqrt(k / norm) : 1.0;  // of the Huber loss's weight
     const double iz = 1 / p.z(), wx = root * camera_.fx / m.pixel_sigma,
                  wy = root * camera_.fy / m.pixel_sigma;
@@ -230,9 +229,7 @@ class WindowSolver {
     for (int c = 0; c < window_.moving; ++c) {
       const std::size_t s = static_cast<std::size_t>(c);
       const Vector6d d = step.segment<6>(6 * c);
-      Pose& pose = trial->poses[s];
-      const Eigen::Quaterniond turn = ExpSO3(d.tail<3>());
-      pose = Pose((turn * pose.rotation).normalized(), turn * pose.translation + d.head<3>());
+      trial->poses[s] = Pose(ExpSO3(d.tail<3>()), d.head<3>()) * trial->poses[s];
       *predicted += 0.5 * d.dot(damping * pose_hessian_[s].diagonal().cwiseProduct(d) - pose_gradient_[s]);
     }
     for (std::size_t i = 0; i < now_.points.size(); ++i) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "chunked_vector.h"
+#include "shuffle.h"
 #include "word_storage.h"
 
 namespace tutti::internal {
@@ -23,7 +24,7 @@ class BitTrie {
 
   BitTrie(int bytes, std::mt19937_64& generator) : order_(static_cast<std::size_t>(8 * bytes)) {
     std::iota(order_.begin(), order_.end(), 0);
-    for (std::size_t i = order_.size(); i > 1; --i) std::swap(order_[i - 1], order_[generator() % i]);
+    Shuffle(order_, generator);
     root_ = NewLeaf();
   }
 

@@ -357,7 +357,7 @@ void LoopDetector::Impl::Decide(int slot, const CombinedBelief& combined, LoopRe
     return;
   }
   const double threshold = std::max(options_.loop_threshold, options_.hypothesis_ratio * last_hypothesis_);
-  FollowCandidate(combined.best);
+  if (options_.consistent_images > 0) FollowCandidate(combined.best);
   result.proposed = result.hypothesis >= threshold;
   if (result.proposed && candidates_in_a_row_ < options_.consistent_images) {
     result.proposed = false;

@@ -127,13 +127,10 @@ class FlannIndex : public DescriptorIndex {
     const std::size_t count = in.GetCount(sizeof(std::int32_t) + 1 + storage_.row_bytes());
     std::vector<std::uint8_t> descriptor(storage_.row_bytes());
     for (std::size_t i = 0; i < count; ++i) {
-      const int word = in.Get<std::int32_t>();
+      const int word = storage_.ReadNewWord(in);
       alive_.push_back(in.Get<char>() != 0 ? 1 : 0);
       size_ += alive_.back();
       in.GetRaw(descriptor.data(), descriptor.size());
-      if (word < 0 || word >= internal::WordStorage::kMostWords || storage_.RowOf(word) >= 0) {
-        in.Damaged("an impossible word, or one that is there twice");
-      }
       storage_.Add(word, descriptor.data());
     }
     for (GrownTree& tree : trees_) {

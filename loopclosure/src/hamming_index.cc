@@ -70,11 +70,8 @@ class HammingIndex : public DescriptorIndex {
     const std::size_t count = in.GetCount(sizeof(std::int32_t) + storage_.row_bytes());
     cv::Mat descriptor(1, bytes_, CV_8U);
     for (std::size_t i = 0; i < count; ++i) {
-      const int word = in.Get<std::int32_t>();
+      const int word = storage_.ReadNewWord(in);
       in.GetRaw(descriptor.data, storage_.row_bytes());
-      if (word < 0 || word >= internal::WordStorage::kMostWords || storage_.RowOf(word) >= 0) {
-        in.Damaged("an impossible word, or one that is there twice");
-      }
       Add({word}, descriptor);
     }
   }

@@ -206,37 +206,36 @@ void HypothesisSearch::Advance(PathWalk& walk) const {
 // Where no scale is known, the direction of the translation tells which view is nearer: on a path, the query
 // lies ahead of the views that come too early, behind those that come too late, and beside the nearest.
 void HypothesisSearch::TakeNearest(const View& query, LoopResult& result) const {
-  const Verification best = result.verification;
-  if (!ScaleFree(best) || Aside(best) > kBeside) return;
-  std::vector<Verification> nearer;
-  const int start = memory_.Find(best.candidate);
-  for (const int neighbour : OnThePath(start)) {
+  if (!ScaleFree(result.verification) || Aside(result.verification) > kBeside) return;
+  const int best = memory_.Find(result.verification.candidate);
+  std::vector<int> nearer;
+  for (const int neighbour : OnThePath(best)) {
     // Of a camera that is held by hand and moves anywhere, the direction says little about the distance.
-    if (!IsAhead(verifier_.Verify(view_of_(neighbour), view_of_(start), options_.threads))) continue;
-    const std::int64_t nearest = Nearest(query, {start, neighbour, 0}, result);
-    if (nearest != best.candidate) nearer.push_back(*Tried(memory_.Find(nearest), result));
+    if (!IsAhead(verifier_.Verify(view_of_(neighbour), view_of_(best), options_.threads))) continue;
+    const int nearest = Nearest(query, {best, neighbour, 0}, result);
+    if (nearest != best) nearer.push_back(nearest);
   }
   // Nearer on both sides is noise, not a path.
-  result.verification = nearer.size() == 1 ? nearer.front() : best;
+  result.verification = *Tried(nearer.size() == 1 ? nearer.front() : best, result);
 }
 
-// Away from the best view as long as the views show about as much: the id of that which the query lies most
-// aside of, the best view's own if none does clearly.
-std::int64_t HypothesisSearch::Nearest(const View& query, PathWalk walk, LoopResult& result) const {
+// Away from the best view as long as the views show about as much: the one that the query lies most aside of,
+// the best view itself if of none clearly.
+int HypothesisSearch::Nearest(const View& query, PathWalk walk, LoopResult& result) const {
   constexpr int kReach = 5;                        // locations
   constexpr double kClearly = 2.0 * M_PI / 180.0;  // beyond the noise of the direction
   const Verification* best = Tried(walk.last, result);
   const double enough = options_.verification.nearer_share * best->inliers;
   double aside = Aside(*best);
   const double clearly = aside + kClearly;
-  std::int64_t nearest = best->candidate;
+  int nearest = walk.last;
   for (int step = 0; step < kReach && walk.in_vain < kPatience && aside < kBeside && walk.next >= 0; ++step) {
     const Verification& view = Try(query, walk.next, result);
     if (!view.accepted || !ScaleFree(view) || view.inliers < enough) break;
     ++walk.in_vain;
     if (Aside(view) > std::max(aside, clearly)) {
       aside = Aside(view);
-      nearest = view.candidate;
+      nearest = walk.next;
       walk.in_vain = 0;
     }
     Advance(walk);

@@ -38,7 +38,7 @@ class HypothesisSearch {
   void Climb(const View& query, LoopResult& result) const;
   std::vector<int> OnThePath(int slot) const;
   void TakeNearest(const View& query, LoopResult& result) const;
-  std::int64_t Nearest(const View& query, PathWalk walk, LoopResult& result) const;
+  int Nearest(const View& query, PathWalk walk, LoopResult& result) const;
   void Advance(PathWalk& walk) const;
 
   const LoopDetectorOptions& options_;

@@ -106,11 +106,8 @@ class KdForestIndex : public DescriptorIndex {
     const std::size_t count = in.GetCount(sizeof(std::int32_t) + storage_.row_bytes());
     std::vector<std::uint8_t> descriptor(storage_.row_bytes());
     for (std::size_t i = 0; i < count; ++i) {
-      const int word = in.Get<std::int32_t>();
+      const int word = storage_.ReadNewWord(in);
       in.GetRaw(descriptor.data(), descriptor.size());
-      if (word < 0 || word >= internal::WordStorage::kMostWords || storage_.RowOf(word) >= 0) {
-        in.Damaged("an impossible word, or one that is there twice");
-      }
       storage_.Add(word, descriptor.data());
     }
     if (in.Get<std::uint64_t>() != trees_.size()) in.Damaged("another number of kd-trees");

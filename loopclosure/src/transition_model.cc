@@ -75,6 +75,20 @@ TransitionModel::Runs TransitionModel::ComputeColumn(const LocationMemory& memor
   return result;
 }
 
+// Calls call(first slot, count, their values) for each stretch of a column.
+template <typename Call>
+void TransitionModel::ForEachRun(const Runs& column, const Call& call) const {
+  if (column.inner_first >= 0) {
+    call(column.inner_first, kInner, inner_.data());
+    return;
+  }
+  const double* values = column.values.data();
+  for (const auto& [first, count] : column.runs) {
+    call(first, count, values);
+    values += count;
+  }
+}
+
 Belief TransitionModel::Predict(const Belief& posterior, const std::vector<int>& working_memory) const {
   Belief predicted;
   predicted.places.assign(posterior.places.size(), 0.0);
@@ -83,18 +97,10 @@ Belief TransitionModel::Predict(const Belief& posterior, const std::vector<int>&
     const double p = posterior.places[static_cast<std::size_t>(j)];
     if (p <= 0.0) continue;
     real += p;
-    const Runs& column = columns_[static_cast<std::size_t>(j)];
-    if (column.inner_first >= 0) {
-      double* const to = predicted.places.data() + column.inner_first;
-      for (int i = 0; i < kInner; ++i) to[i] += inner_[static_cast<std::size_t>(i)] * p;
-      continue;
-    }
-    const double* value = column.values.data();
-    for (const auto& [first, count] : column.runs) {
+    ForEachRun(columns_[static_cast<std::size_t>(j)], [&](int first, int count, const double* values) {
       double* const to = predicted.places.data() + first;
-      for (int i = 0; i < count; ++i) to[i] += value[i] * p;
-      value += count;
-    }
+      for (int i = 0; i < count; ++i) to[i] += values[i] * p;
+    });
   }
   if (working_memory.empty()) {
     predicted.new_place = 1.0;
@@ -109,15 +115,9 @@ Belief TransitionModel::Predict(const Belief& posterior, const std::vector<int>&
 
 std::vector<std::pair<int, double>> TransitionModel::Column(int slot) const {
   std::vector<std::pair<int, double>> column;
-  const Runs& stored = columns_[static_cast<std::size_t>(slot)];
-  if (stored.inner_first >= 0) {
-    for (int i = 0; i < kInner; ++i) {
-      column.emplace_back(stored.inner_first + i, inner_[static_cast<std::size_t>(i)]);
-    }
-  }
-  for (const auto& [first, count] : stored.runs) {
-    for (int i = 0; i < count; ++i) column.emplace_back(first + i, stored.values[column.size()]);
-  }
+  ForEachRun(columns_[static_cast<std::size_t>(slot)], [&](int first, int count, const double* values) {
+    for (int i = 0; i < count; ++i) column.emplace_back(first + i, values[i]);
+  });
   return column;
 }
 

@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "byte_stream.h"
 #include "chunked_vector.h"
 #include "tutti/loopclosure/word_map.h"
 
@@ -38,6 +39,15 @@ class WordStorage {
     row_of_word_.Erase(WordOf(row));
     words_[static_cast<std::size_t>(row)] = -1;
     free_.push_back(row);
+  }
+
+  /// The id of a word that is not in it yet, from a saved index. Throws InputError if it is damaged.
+  int ReadNewWord(ByteReader& in) const {
+    const int word = in.Get<std::int32_t>();
+    if (word < 0 || word >= kMostWords || RowOf(word) >= 0) {
+      in.Damaged("an impossible word, or one that is there twice");
+    }
+    return word;
   }
 
   /// Row number of a word, -1 if there is none.

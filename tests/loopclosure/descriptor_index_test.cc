@@ -6,26 +6,13 @@
 #include <numeric>
 #include <random>
 
+#include "random_descriptors.h"
+
 namespace tutti {
 namespace {
 
-cv::Mat RandomFloats(int rows, int columns, std::uint32_t seed) {
-  std::mt19937 generator(seed);
-  cv::Mat m(rows, columns, CV_32F);
-  for (int i = 0; i < rows; ++i) {
-    for (int j = 0; j < columns; ++j) m.at<float>(i, j) = static_cast<float>(generator() % 10000u) / 10000.0f;
-  }
-  return m;
-}
-
-cv::Mat RandomBytes(int rows, std::uint32_t seed) {
-  std::mt19937 generator(seed);
-  cv::Mat m(rows, 32, CV_8U);
-  for (int i = 0; i < rows; ++i) {
-    for (int j = 0; j < 32; ++j) m.at<std::uint8_t>(i, j) = static_cast<std::uint8_t>(generator() % 256u);
-  }
-  return m;
-}
+using testing::RandomBytes;
+using testing::RandomFloats;
 
 std::vector<int> Ids(int begin, int end) {
   std::vector<int> ids(static_cast<std::size_t>(end - begin));

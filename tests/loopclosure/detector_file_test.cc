@@ -44,6 +44,16 @@ void WriteContent(const fs::path& file, const std::string& bytes) {
 
 class SavedDetector : public ::testing::Test {
  protected:
+  // Saved after 20 images, and loaded: both see the same from then on.
+  void ExpectToGoOnExactly(const LoopDetectorOptions& options) {
+    LoopDetector saved(options);
+    Walk(saved, 0, 20, kPlaces);
+    saved.Save(file_);
+    LoopDetector loaded(options);
+    loaded.Load(file_);
+    testing::ExpectEqual(Walk(saved, 20, 28, kPlaces), Walk(loaded, 20, 28, kPlaces));
+  }
+
   fs::path folder_ = testing::FreshFolder();
   fs::path file_ = folder_ / "places.tutti";
 };
@@ -71,24 +81,14 @@ TEST_F(SavedDetector, ALoadedOneGoesOnExactlyAsTheSavedOne) {
 TEST_F(SavedDetector, FlannsTreesGoOnExactlyToo) {
   LoopDetectorOptions options = BoundedOptions();
   options.vocabulary.float_index = FloatIndex::kFlann;
-  LoopDetector saved(options);
-  Walk(saved, 0, 20, kPlaces);
-  saved.Save(file_);
-  LoopDetector loaded(options);
-  loaded.Load(file_);
-  testing::ExpectEqual(Walk(saved, 20, 28, kPlaces), Walk(loaded, 20, 28, kPlaces));
+  ExpectToGoOnExactly(options);
 }
 
 TEST_F(SavedDetector, WhatTheMembersWereRightAboutIsSavedToo) {
   LoopDetectorOptions options = BoundedOptions();
   options.weights = MemberWeights::kAgreement;
   options.consistent_images = 1;
-  LoopDetector saved(options);
-  Walk(saved, 0, 20, kPlaces);
-  saved.Save(file_);
-  LoopDetector loaded(options);
-  loaded.Load(file_);
-  testing::ExpectEqual(Walk(saved, 20, 28, kPlaces), Walk(loaded, 20, 28, kPlaces));
+  ExpectToGoOnExactly(options);
 }
 
 TEST_F(SavedDetector, SavingChangesNothingAndTwiceGivesTheSameFile) {

@@ -5,21 +5,15 @@
 #include <cmath>
 #include <random>
 
+#include "plain_camera.h"
+
 namespace tutti {
 namespace {
 
 constexpr int kPoints = 200;
 constexpr std::uint32_t kSeed = 7;
 
-PinholeCamera Camera() {
-  PinholeCamera camera;
-  camera.width = 640;
-  camera.height = 480;
-  camera.fx = camera.fy = 500;
-  camera.cx = 320;
-  camera.cy = 240;
-  return camera;
-}
+PinholeCamera Camera() { return testing::PlainCamera(500); }
 
 // A cloud in front of the camera of the query, 4 to 12 m away.
 std::vector<Eigen::Vector3d> Cloud() {

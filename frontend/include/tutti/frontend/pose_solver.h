@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <vector>
 
 #include "tutti/core/camera.h"
@@ -27,6 +28,8 @@ bool ReprojectionResidual(const PinholeCamera& camera, const Pose& T_camera_worl
 
 /// 95 % quantiles of chi2 for 2 and 3 degrees of freedom: the bound between inlier and outlier.
 inline double ChiSquareBound(const PointObservation& o) { return o.inverse_depth_sigma > 0 ? 7.815 : 5.991; }
+/// Residuals beyond it count by the Huber loss: 95 % of good ones are below.
+inline double HuberBound(const PointObservation& o) { return std::sqrt(ChiSquareBound(o)); }
 
 /// Minimises the Huber-robust reprojection error over the pose by Gauss-Newton in four rounds, each on the
 /// inliers of the round before. Returns the number of inliers; `inlier` has one flag per observation.

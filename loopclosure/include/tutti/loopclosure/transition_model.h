@@ -51,6 +51,8 @@ class TransitionModel {
   };
   static Runs ComputeColumn(const LocationMemory& memory, int slot);
   void ShareInner(Runs& column);
+  template <typename Call>
+  void ForEachRun(const Runs& column, const Call& call) const;
 
   double virtual_place_prior_;
   std::vector<Runs> columns_;  // by slot; empty: not in WM

@@ -128,6 +128,9 @@ void AddOptions(CLI::App& c, GenerateArguments& a) {
   c.add_option("--repeat", w.repeat_fraction,
                "aliasing [0..1]: part of the houses (corridor: plates, posters) that look alike")
       ->capture_default_str();
+  c.add_option("--facades", w.facades,
+               "town: number of facades that differ (of cars a quarter); few are aliasing, too")
+      ->capture_default_str();
   c.add_option("--signs", w.sign_fraction, "town: part of the signs that are there [0..1]; no two look alike")
       ->capture_default_str();
   c.add_option("--roads", w.road_surfaces, "town: number of road surfaces that differ; few are aliasing, too")

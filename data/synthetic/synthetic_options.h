@@ -40,6 +40,8 @@ struct SyntheticOptions {
   /// Perceptual aliasing [0..1]: part of the houses that have one of four facades; in the corridor, of the
   /// name plates and posters that are no landmarks.
   double repeat_fraction = 0.3;
+  int facades = 24;  ///< different ones, at least 5: houses that don't repeat share them by chance; and a
+                     ///< quarter as many looks of cars
   double sign_fraction =
       1;  ///< of the town's posters and shop signs that are there [0..1]; no two look alike
   int road_surfaces =

@@ -30,6 +30,7 @@ std::string SyntheticOptions::Validate() const {
   if (!(street_m >= 9 && street_m <= 30)) return "street_m must be 9 to 30 m";
   if (!(repeat_fraction >= 0 && repeat_fraction <= 1)) return "repeat_fraction must be 0 to 1";
   if (!(sign_fraction >= 0 && sign_fraction <= 1)) return "sign_fraction must be 0 to 1";
+  if (facades < 5 || facades > 1000) return "facades must be 5 to 1000";
   if (road_surfaces < 1 || road_surfaces > 1000) return "road_surfaces must be 1 to 1000";
   if (!(corridor_m >= 12 && corridor_m <= 500)) return "corridor_m must be 12 to 500 m";
   if (!(sides_deg > 0 && sides_deg <= 120)) return "sides_deg must be above 0 and at most 120 degrees";
@@ -116,6 +117,12 @@ struct SyntheticWorld::Impl {
     return faces;
   }
 
+  // What a camera sees at a time from a pose (in the scene), shifted by `right_m` along its x axis.
+  synthetic::Rendering ViewFrom(Pose pose, double t, double right_m) const {
+    pose.translation += pose.rotation * Eigen::Vector3d(right_m, 0, 0);
+    return synthetic::Render(FacesAt(t), scene.textures, camera, pose, LightAt(t), options.supersample);
+  }
+
   // Mean of what is seen over the exposure around t by a camera that is turned to the left [rad] and shifted
   // by `right_m` along its x axis.
   synthetic::Rendering View(double t, double right_m, bool blur, double turned_left = 0) const {
@@ -123,10 +130,7 @@ struct SyntheticWorld::Impl {
     synthetic::Rendering sum;
     for (int k = 0; k < steps; ++k) {
       const double at = t + (steps == 1 ? 0.0 : options.motion_blur_s * (k - 2) / 5.0);
-      Pose pose = CameraAt(std::max(at, 0.0), turned_left);
-      pose.translation += pose.rotation * Eigen::Vector3d(right_m, 0, 0);
-      synthetic::Rendering one =
-          synthetic::Render(FacesAt(at), scene.textures, camera, pose, LightAt(at), options.supersample);
+      synthetic::Rendering one = ViewFrom(CameraAt(std::max(at, 0.0), turned_left), at, right_m);
       if (k == 0) {
         sum = std::move(one);
       } else {
@@ -151,6 +155,23 @@ struct SyntheticWorld::Impl {
       }
     }
     return out;
+  }
+
+  SyntheticFrame Frame(std::size_t i, const Pose& T_world_camera, const synthetic::Rendering& left,
+                       const cv::Mat& right) const {
+    SyntheticFrame frame;
+    frame.stamp_s = StampOf(i);
+    frame.T_world_camera = T_world_camera;
+    frame.image = Sense(left.image, 2 * i);
+    if (!right.empty()) frame.right = Sense(right, 2 * i + 1);
+    if (options.sensor == SyntheticSensor::kRgbd) {
+      frame.depth_m = left.depth_m;
+      if (options.kinect_noise) DepthNoise(frame.depth_m, i);
+      const float limit =
+          static_cast<float>(std::min(options.max_depth_m, 65535.0 / options.depth_units_per_m));
+      frame.depth_m.setTo(0, frame.depth_m > limit);
+    }
+    return frame;
   }
 
   // Noise of a structured-light sensor: sigma_z = 0.0012 + 0.0019 (z - 0.4)^2 (Nguyen, Izadi, Lovell:
@@ -221,25 +242,23 @@ Trajectory SyntheticWorld::GroundTruth() const {
 
 SyntheticFrame SyntheticWorld::Render(std::size_t i) const {
   const SyntheticOptions& o = impl_->options;
-  SyntheticFrame frame;
-  frame.stamp_s = Stamp(i);
-  frame.T_world_camera = PoseOf(i);
+  const double t = Stamp(i);
   const double side = o.sensor == SyntheticSensor::kSides ? o.sides_deg * M_PI / 180 : 0.0;
-  const synthetic::Rendering left = impl_->View(frame.stamp_s, 0, true, side);
-  frame.image = impl_->Sense(left.image, 2 * i);
-  if (o.sensor == SyntheticSensor::kStereo) {
-    frame.right = impl_->Sense(impl_->View(frame.stamp_s, o.baseline_m, true).image, 2 * i + 1);
+  const synthetic::Rendering left = impl_->View(t, 0, true, side);
+  cv::Mat right;
+  if (o.sensor == SyntheticSensor::kStereo) right = impl_->View(t, o.baseline_m, true).image;
+  if (o.sensor == SyntheticSensor::kSides) right = impl_->View(t, 0, true, -side).image;
+  return impl_->Frame(i, PoseOf(i), left, right);
+}
+
+SyntheticFrame SyntheticWorld::RenderFrom(std::size_t i, const Pose& T_world_camera) const {
+  const Pose pose = impl_->T_scene_first * T_world_camera;
+  const synthetic::Rendering left = impl_->ViewFrom(pose, Stamp(i), 0);
+  cv::Mat right;
+  if (impl_->options.sensor == SyntheticSensor::kStereo) {
+    right = impl_->ViewFrom(pose, Stamp(i), impl_->options.baseline_m).image;
   }
-  if (o.sensor == SyntheticSensor::kSides) {
-    frame.right = impl_->Sense(impl_->View(frame.stamp_s, 0, true, -side).image, 2 * i + 1);
-  }
-  if (o.sensor == SyntheticSensor::kRgbd) {
-    frame.depth_m = left.depth_m;
-    if (o.kinect_noise) impl_->DepthNoise(frame.depth_m, i);
-    const float limit = static_cast<float>(std::min(o.max_depth_m, 65535.0 / o.depth_units_per_m));
-    frame.depth_m.setTo(0, frame.depth_m > limit);
-  }
-  return frame;
+  return impl_->Frame(i, T_world_camera, left, right);
 }
 
 cv::Mat SyntheticWorld::ExactDepth(std::size_t i) const { return impl_->View(Stamp(i), 0, false).depth_m; }

@@ -42,6 +42,8 @@ class SyntheticWorld {
 
   /// Renders frame i < Size().
   SyntheticFrame Render(std::size_t i) const;
+  /// Frame i as another pose sees it, sharp: to hold the camera still, to turn it, to carry it elsewhere.
+  SyntheticFrame RenderFrom(std::size_t i, const Pose& T_world_camera) const;
   /// Exact z depth of frame i without noise, limits or moving blur (CV_32FC1 [m], 0 = nothing), for tests.
   cv::Mat ExactDepth(std::size_t i) const;
 

@@ -12,8 +12,7 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr int kFacades = 24;         // different ones
-constexpr int kAlike = 4;            // those that repeat
+constexpr int kAlike = 4;            // facades of the houses that repeat
 constexpr double kLane = 1.6;        // right of the middle of the street [m]
 constexpr double kPavement = 0.125;  // of the street's width, on each side
 
@@ -41,16 +40,16 @@ class TownBuilder {
   std::uint64_t Seed() { return random_.Bits(); }
 
   void MakeTextures() {
-    for (int i = 0; i < kFacades; ++i) facades_.push_back(scene_.Add(FacadeTexture(Seed())));
+    for (int i = 0; i < options_.facades; ++i) facades_.push_back(scene_.Add(FacadeTexture(Seed())));
     for (int i = 0; i < 8; ++i) walls_.push_back(scene_.Add(WallTexture(Seed())));
     for (int i = 0; i < options_.road_surfaces; ++i) roads_.push_back(scene_.Add(RoadTexture(Seed(), false)));
     for (int i = 0; i < 3; ++i) crossings_.push_back(scene_.Add(RoadTexture(Seed(), true)));
-    for (int i = 0; i < 6; ++i) {
+    for (int i = 0; i < std::max(1, options_.facades / 4); ++i) {
       BoxTextures car;
       car.front = scene_.Add(CarTexture(Seed(), false));
       const std::uint64_t paint = Seed();
       car.side = scene_.Add(CarTexture(paint, true));
-      car.top = walls_[static_cast<std::size_t>(i)];
+      car.top = walls_[static_cast<std::size_t>(i) % walls_.size()];
       cars_.push_back(car);
     }
     scene_.movers = cars_;
@@ -127,7 +126,7 @@ class TownBuilder {
     const double own_height = alike ? 9 : random_.In(6.5, 12.5), depth = 5;
     const double height = first || last ? corner_height_ : own_height;  // two fronts make one house
     const double setback = first || last ? 0.0 : alike ? 0.3 : random_.In(0, 0.9);
-    const int which = alike ? random_.Int(0, kAlike - 1) : random_.Int(kAlike, kFacades - 1);
+    const int which = alike ? random_.Int(0, kAlike - 1) : random_.Int(kAlike, options_.facades - 1);
     const int wall = alike ? walls_[0] : Pick(walls_);
     const Vector3d base = Lift(left - setback * outward, 0), r = Lift(right, 0), n = Lift(outward, 0);
     const Vector3d up(0, 0, height);

@@ -80,6 +80,8 @@ std::shared_ptr<const Features> Odometry::Extract(const InputFrame& frame) const
 
 TrackResult Odometry::Track(const InputFrame& frame) { return impl_->Track(frame); }
 
+TrackResult Odometry::RelocalizeAt(int keyframe) { return impl_->RelocalizeAt(keyframe); }
+
 std::vector<int> Odometry::KeyframeIds() const {
   std::vector<int> ids;
   for (const tutti::Keyframe& k : impl_->map.keyframes()) ids.push_back(k.id);
@@ -167,25 +169,17 @@ void Odometry::ApplyCorrection(const std::map<int, Similarity>& S_world_keyframe
   }
 }
 
-namespace {
-int LargestPiece(const std::map<int, int>& frames) {
-  int best = 0, most = -1;
-  for (const auto& [piece, count] : frames) {
-    if (count > most) {
-      most = count;
-      best = piece;
-    }
-  }
-  return best;
+std::vector<int> Odometry::Pieces() const {
+  std::map<int, int> frames;
+  for (const Impl::FrameRecord& r : impl_->records) ++frames[KeyframePiece(r.reference)];
+  std::vector<int> pieces;
+  for (const auto& [piece, count] : frames) pieces.push_back(piece);
+  std::stable_sort(pieces.begin(), pieces.end(), [&](int a, int b) { return frames[a] > frames[b]; });
+  return pieces;
 }
-}  // namespace
 
 Trajectory Odometry::FrameTrajectory(int map_piece) const {
-  if (map_piece < 0) {
-    std::map<int, int> frames;
-    for (const Impl::FrameRecord& r : impl_->records) ++frames[KeyframePiece(r.reference)];
-    map_piece = LargestPiece(frames);
-  }
+  if (map_piece < 0 && !impl_->records.empty()) map_piece = Pieces().front();
   Trajectory out;
   for (const Impl::FrameRecord& r : impl_->records) {
     if (KeyframePiece(r.reference) != map_piece) continue;
@@ -195,11 +189,7 @@ Trajectory Odometry::FrameTrajectory(int map_piece) const {
 }
 
 std::vector<std::int64_t> Odometry::FrameIndices(int map_piece) const {
-  if (map_piece < 0) {
-    std::map<int, int> frames;
-    for (const Impl::FrameRecord& r : impl_->records) ++frames[KeyframePiece(r.reference)];
-    map_piece = LargestPiece(frames);
-  }
+  if (map_piece < 0 && !impl_->records.empty()) map_piece = Pieces().front();
   std::vector<std::int64_t> out;
   for (const Impl::FrameRecord& r : impl_->records) {
     if (KeyframePiece(r.reference) == map_piece) out.push_back(r.index);

@@ -1,7 +1,9 @@
 // State and steps of Odometry.
 #pragma once
 
+#include <algorithm>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,6 +20,7 @@ class Odometry::Impl {
   Impl(const OdometryOptions& options, const CameraRig& rig);
 
   TrackResult Track(const InputFrame& frame);
+  TrackResult RelocalizeAt(int keyframe);
 
   OdometryOptions options;
   CameraRig rig;
@@ -40,22 +43,51 @@ class Odometry::Impl {
   std::map<int, int> piece_joined;  // piece -> the piece it joined
 
  private:
+  /// A pose that a frame may have, and what speaks for it.
+  struct Fix {
+    explicit Fix(const TrackedFrame& f) : extracted(f.features), frame(f) { Clear(); }
+    void Clear() {
+      frame.features = extracted;
+      matches = {extracted.get(), std::vector<int>(extracted->size(), -1)};
+      visible.clear();
+      found.clear();
+      inliers = 0;
+    }
+    // Inliers among the landmarks in view, of which there can't be more than features.
+    double Share() const {
+      return inliers / std::max(1.0, static_cast<double>(std::min(visible.size(), extracted->size())));
+    }
+    std::shared_ptr<const Features> extracted;
+    TrackedFrame frame;  // with features that are aligned with their landmarks
+    FrameMatches matches;
+    Pose T_camera_world;
+    int reference = -1;               // keyframe that shares most landmarks
+    std::vector<int> visible, found;  // landmarks that should be in view; those that are, -1 between them
+    int inliers = 0;
+  };
+
   TrackResult Initialize(const TrackedFrame& frame);
-  TrackResult TrackMap(TrackedFrame frame);
+  TrackResult TrackMap(const TrackedFrame& frame);
   void PoseBackwards(const std::vector<TrackedFrame>& frames, int first_keyframe);
-  bool TrackFromLastFrame(FrameMatches* matches, Pose* T_camera_world, const Pose& prediction);
-  bool TrackFromKeyframe(int keyframe, FrameMatches* matches, Pose* T_camera_world);
-  int TrackLocalMap(FrameMatches* matches, Pose* T_camera_world);
+  bool FindPose(Fix* fix) const;
+  std::vector<Pose> Predictions(double stamp_s) const;
+  bool GuessFromLastFrame(const Pose& prediction, float radius_px, Fix* fix) const;
+  bool GuessFromKeyframe(int keyframe, Fix* fix) const;
+  bool Settle(Fix* fix) const;
+  bool Offer(int least_inliers, Fix* guess, Fix* best) const;
+  std::vector<int> LocalLandmarks(const Fix& fix, const std::map<int, int>& votes) const;
+  TrackResult Accept(Fix fix);
   /// Refines the pose on the matches, drops those that do not fit; returns the number of inliers.
   int Refine(FrameMatches* matches, Pose* T_camera_world) const;
   bool NeedKeyframe(const TrackedFrame& frame, const FrameMatches& matches, int inliers) const;
   int InsertKeyframe(const TrackedFrame& frame, const FrameMatches& matches, const Pose& T_camera_world);
   void Record(const TrackedFrame& frame, const Pose& T_camera_world, int reference);
   void Lose(const TrackedFrame& frame);
-  Pose Predict(double stamp_s) const;
 
   LocalMapper mapper_;
   MonoInitializer initializer_;
+  std::optional<TrackedFrame> lost_;  // the last frame, if it has no pose
+  TrackResult lost_result_;           // of the last frame
   TrackingState state_ = TrackingState::kInitializing;
   int piece_ = 0;
   int reference_ = -1;      // keyframe that shares most landmarks with the last frame

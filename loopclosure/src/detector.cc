@@ -142,6 +142,11 @@ void LoopDetector::Impl::CheckQuery(const LoopQuery& query) const {
   if (memory().size() > 0 && query.id <= last_id_) {
     throw InputError(which + "ids must grow, but the one before was " + std::to_string(last_id_));
   }
+  CheckContent(query);
+}
+
+void LoopDetector::Impl::CheckContent(const LoopQuery& query) const {
+  const std::string which = "location " + std::to_string(query.id) + ": ";
   CheckCallersFeatures(query, which);
   CheckMemberFeatures(query, which);
   if (!query.depth_m.empty() &&
@@ -209,9 +214,10 @@ std::vector<Features> LoopDetector::Impl::Extract(const LoopQuery& query) const 
   return features;
 }
 
-// Step 2 of section 1. The searches of all members are shared out among the threads in pieces; what they find
-// does not depend on who searched.
-std::vector<Signature> LoopDetector::Impl::Quantise(const std::vector<Features>& features) {
+// The searches of all members are shared out among the threads in pieces; what they find does not depend on
+// who searched.
+std::vector<std::vector<TwoNearest>> LoopDetector::Impl::SearchWords(const std::vector<Features>& features,
+                                                                     const std::vector<char>& usable) const {
   constexpr int kBlock = 25;
   struct Piece {
     std::size_t member;
@@ -219,9 +225,7 @@ std::vector<Signature> LoopDetector::Impl::Quantise(const std::vector<Features>&
   };
   std::vector<Piece> pieces;
   std::vector<std::vector<TwoNearest>> nearest(members_.size());
-  std::vector<char> usable(members_.size());
   for (std::size_t k = 0; k < members_.size(); ++k) {
-    usable[k] = members_[k].Judge(features[k]) ? 1 : 0;
     if (usable[k] == 0) continue;
     nearest[k].resize(Index(features[k].descriptors.rows));
     for (int i = 0; i < features[k].descriptors.rows; i += kBlock) pieces.push_back({k, i});
@@ -231,6 +235,14 @@ std::vector<Signature> LoopDetector::Impl::Quantise(const std::vector<Features>&
     const cv::Mat& rows = features[k].descriptors;
     members_[k].vocabulary().Search(rows, begin, std::min(rows.rows, begin + kBlock), nearest[k]);
   });
+  return nearest;
+}
+
+// Step 2 of section 1.
+std::vector<Signature> LoopDetector::Impl::Quantise(const std::vector<Features>& features) {
+  std::vector<char> usable(members_.size());
+  for (std::size_t k = 0; k < members_.size(); ++k) usable[k] = members_[k].Judge(features[k]) ? 1 : 0;
+  const std::vector<std::vector<TwoNearest>> nearest = SearchWords(features, usable);
   std::vector<Signature> signatures(members_.size());
   RunParallel(static_cast<int>(members_.size()), options_.threads, [&](int i) {
     const std::size_t k = Index(i);
@@ -379,10 +391,52 @@ void LoopDetector::Impl::Decide(int slot, const CombinedBelief& combined, LoopRe
     result.verification.accepted = true;
     return;
   }
-  const View& query = memory().id(slot) == result.query ? views_[Index(slot)] : dropped_view_;
+  Verify(memory().id(slot) == result.query ? views_[Index(slot)] : dropped_view_, combined.belief, result);
+}
+
+void LoopDetector::Impl::Verify(const View& query, const Belief& belief, LoopResult& result) const {
   const internal::HypothesisSearch search(options_, memory(), verifier_,
                                           [this](int s) -> const View& { return views_[Index(s)]; });
-  search.Verify(query, combined.belief, result);
+  search.Verify(query, belief, result);
+}
+
+// One image by itself, without the images before it: no filter, all places are as likely.
+LoopResult LoopDetector::Impl::Locate(const LoopQuery& query) const {
+  CheckContent(query);
+  LoopResult result;
+  result.query = query.id;
+  Stopwatch watch;
+  const std::vector<Features> features = Extract(query);
+  result.extract_ms = watch.LapMs();
+  const std::vector<std::vector<TwoNearest>> nearest =
+      SearchWords(features, std::vector<char>(members_.size(), 1));
+  std::vector<Signature> signatures;
+  for (std::size_t k = 0; k < members_.size(); ++k) {
+    signatures.emplace_back(members_[k].vocabulary().Recognise(nearest[k]));
+  }
+  result.quantise_ms = watch.LapMs();
+  std::vector<Belief> opinions;
+  for (const auto& system : systems_) {
+    for (std::size_t u = 0; u < system->units().size(); ++u) {
+      Belief opinion = system->Opinion(u, signatures);
+      if (!opinion.places.empty()) opinions.push_back(std::move(opinion));
+    }
+  }
+  std::vector<const Belief*> beliefs;
+  for (const Belief& opinion : opinions) beliefs.push_back(&opinion);
+  const CombinedBelief combined = Combine(options_.rule, beliefs, 0, memory());
+  result.likelihood_ms = watch.LapMs();
+  if (combined.best < 0) {
+    result.reason = "none of its words is known";
+    return result;
+  }
+  result.hypothesis = combined.hypothesis;
+  result.candidate = memory().id(combined.best);
+  result.posterior = PosteriorAt(combined.belief, combined.best);
+  result.proposed = true;
+  Verify(MakeView(query, features, options_.verification), combined.belief, result);
+  result.verify_ms = watch.LapMs();
+  return result;
 }
 
 // Counts the images in a row whose candidates lie near that of the image before.
@@ -417,6 +471,8 @@ LoopResult LoopDetector::Detect(const cv::Mat& image, std::int64_t id) {
   query.image = image;
   return impl_->Detect(query);
 }
+
+LoopResult LoopDetector::Locate(const LoopQuery& query) const { return impl_->Locate(query); }
 
 void LoopDetector::AddLink(std::int64_t a, std::int64_t b) { impl_->AddLink(a, b); }
 void LoopDetector::Save(const std::filesystem::path& file) const { impl_->Save(file); }

@@ -25,6 +25,7 @@ class LoopDetector::Impl {
   explicit Impl(const LoopDetectorOptions& options, std::unique_ptr<internal::LocationStore> store = nullptr);
 
   LoopResult Detect(const LoopQuery& query);
+  LoopResult Locate(const LoopQuery& query) const;
   void AddLink(std::int64_t a, std::int64_t b);
   void Save(const std::filesystem::path& file) const;
   /// A new Impl with what the file holds, long-term memory in a temporary store.
@@ -47,9 +48,12 @@ class LoopDetector::Impl {
 
   // What happens to an image.
   void CheckQuery(const LoopQuery& query) const;
+  void CheckContent(const LoopQuery& query) const;
   void CheckCallersFeatures(const LoopQuery& query, const std::string& which) const;
   void CheckMemberFeatures(const LoopQuery& query, const std::string& which) const;
   std::vector<Features> Extract(const LoopQuery& query) const;
+  std::vector<std::vector<TwoNearest>> SearchWords(const std::vector<Features>& features,
+                                                   const std::vector<char>& usable) const;
   std::vector<Signature> Quantise(const std::vector<Features>& features);
   int Remember(const LoopQuery& query, const std::vector<Features>& features,
                const std::vector<Signature>& signatures);
@@ -62,6 +66,7 @@ class LoopDetector::Impl {
   void FollowCandidate(int best);
   void Decide(int slot, const CombinedBelief& combined, LoopResult& result);
   void CloseLoop(std::int64_t newer, std::int64_t older);
+  void Verify(const View& query, const Belief& belief, LoopResult& result) const;
 
   // Long-term memory.
   internal::LocationStore& store();

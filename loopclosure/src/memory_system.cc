@@ -8,6 +8,13 @@ namespace {
 constexpr int kRetrievalLevels = 10;  // LTM is searched this far from the hypothesis
 constexpr int kImmuneLevels = 2;      // what is so near to the hypothesis stays in WM
 
+// Of all members that a filter sees.
+Signature SignatureFor(const FilterUnit& unit, const std::vector<Signature>& signatures) {
+  std::vector<const Signature*> parts;
+  for (const std::size_t k : unit.members) parts.push_back(&signatures[k]);
+  return Signature::Concatenate(parts);
+}
+
 }  // namespace
 
 void StoreNodes(const LocationMemory& memory, int number, const std::set<int>& slots, LocationStore& store) {
@@ -51,9 +58,7 @@ int MemorySystem::Remember(std::int64_t id, const std::vector<Signature>& signat
   int slot = memory_.Add(id);
   bool any_took_part = false;
   for (FilterUnit& unit : units_) {
-    std::vector<const Signature*> parts;
-    for (const std::size_t k : unit.members) parts.push_back(&signatures[k]);
-    unit.signature = Signature::Concatenate(parts);
+    unit.signature = SignatureFor(unit, signatures);
     any_took_part = any_took_part || unit.took_part();
     unit.likelihood.Add(unit.signature);
     Reference(unit, unit.signature);
@@ -95,6 +100,14 @@ void MemorySystem::UpdateLikelihood(std::size_t u) {
 void MemorySystem::StepFilter(std::size_t u) {
   FilterUnit& unit = units_[u];
   if (unit.took_part()) unit.filter.Step(transition_, memory_.working_memory(), unit.image_likelihood);
+}
+
+Belief MemorySystem::Opinion(std::size_t u, const std::vector<Signature>& signatures) const {
+  const Signature signature = SignatureFor(units_[u], signatures);
+  if (signature.empty()) return {};
+  Belief belief = AdjustLikelihood(units_[u].likelihood.Scores(signature), memory_.working_memory());
+  belief.Normalise();
+  return belief;
 }
 
 void MemorySystem::Agree(int location) {

@@ -56,6 +56,10 @@ class MemorySystem {
   void UpdateLikelihood(std::size_t unit);
   void StepFilter(std::size_t unit);
 
+  /// What a unit believes of an image with these signatures that is no location: its likelihood, normalised.
+  /// Of a unit without words of it, no places.
+  Belief Opinion(std::size_t unit, const std::vector<Signature>& signatures) const;
+
   /// A loop with this location was verified: which filters had it?
   void Agree(int location);
   /// The newer location closes a loop with the older one.

@@ -87,6 +87,14 @@ void Vocabulary::Search(const cv::Mat& descriptors, int begin, int end,
   std::copy(found.begin(), found.end(), nearest.begin() + begin);
 }
 
+std::vector<int> Vocabulary::Recognise(const std::vector<TwoNearest>& nearest) const {
+  std::vector<int> words;
+  for (const TwoNearest& best : nearest) {
+    if (!IsNew(best)) words.push_back(best.first);
+  }
+  return words;
+}
+
 std::vector<int> Vocabulary::Assign(const cv::Mat& descriptors, const std::vector<TwoNearest>& nearest) {
   std::vector<int> words;
   if (descriptors.rows == 0) return words;
@@ -99,8 +107,7 @@ std::vector<int> Vocabulary::Assign(const cv::Mat& descriptors, const std::vecto
   for (int i = 0; i < descriptors.rows; ++i) {
     TwoNearest best = nearest[static_cast<std::size_t>(i)];
     OfferCreated(descriptors, i, created, num_created, old_words, distances, best);
-    const bool is_new = best.second < 0 || best.first_distance > options_.nndr * best.second_distance;
-    if (is_new) {
+    if (IsNew(best)) {
       descriptors.row(i).copyTo(created.row(num_created));
       words.push_back(old_words + num_created++);
     } else {

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "synthetic_world.h"
+#include "recording.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -11,45 +11,22 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// Frames and rig of a small synthetic world.
-struct Recording {
-  CameraRig rig;
-  std::vector<InputFrame> frames;
-  Trajectory truth;
-};
+using testing::Black;
+using testing::Recording;
 
-Recording Record(SyntheticScene scene, SyntheticSensor kind, Sensor sensor, std::size_t count) {
+Recording Record(SyntheticScene scene, SyntheticSensor sensor, std::size_t count) {
   SyntheticOptions options;
   options.scene = scene;
-  options.sensor = kind;
+  options.sensor = sensor;
   options.width = 400;
   options.height = scene == SyntheticScene::kTown ? 200 : 300;
   options.blocks_x = 1;
   options.supersample = 1;
-  const SyntheticWorld world(options);
-  Recording out;
-  out.rig.sensor = sensor;
-  out.rig.camera = world.Camera();
-  out.rig.baseline_m = sensor == Sensor::kStereo ? world.Options().baseline_m : 0;
-  out.rig.rate_hz = world.Options().rate_hz;
-  const Trajectory truth = world.GroundTruth();
-  for (std::size_t i = 0; i < count; ++i) {
-    const SyntheticFrame rendered = world.Render(i);
-    InputFrame frame;
-    frame.index = static_cast<std::int64_t>(i);
-    frame.stamp_s = rendered.stamp_s;
-    frame.image = rendered.image;
-    frame.right = rendered.right;
-    frame.depth_m = rendered.depth_m;
-    out.frames.push_back(frame);
-    out.truth.push_back(truth[i]);
-  }
-  return out;
+  return testing::Record(SyntheticWorld(options), count);
 }
 
 const Recording& Stereo() {
-  static const Recording recording =
-      Record(SyntheticScene::kTown, SyntheticSensor::kStereo, Sensor::kStereo, 40);
+  static const Recording recording = Record(SyntheticScene::kTown, SyntheticSensor::kStereo, 40);
   return recording;
 }
 
@@ -81,13 +58,6 @@ void ExpectSameBits(const Trajectory& a, const Trajectory& b) {
   for (std::size_t i = 0; i < a.size(); ++i) EXPECT_EQ(a[i].pose.Matrix(), b[i].pose.Matrix()) << i;
 }
 
-InputFrame Black(InputFrame frame) {
-  for (cv::Mat* image : {&frame.image, &frame.right, &frame.depth_m}) {
-    if (!image->empty()) *image = cv::Mat(image->size(), image->type(), cv::Scalar(0));
-  }
-  return frame;
-}
-
 TEST(Odometry, StereoFollowsTheTruthInMetres) {
   Odometry odometry(OdometryOptions(), Stereo().rig);
   TrackAll(Stereo(), odometry);
@@ -99,7 +69,7 @@ TEST(Odometry, StereoFollowsTheTruthInMetres) {
 }
 
 TEST(Odometry, RgbdFollowsTheTruthInMetres) {
-  const Recording room = Record(SyntheticScene::kRoom, SyntheticSensor::kRgbd, Sensor::kRgbd, 40);
+  const Recording room = Record(SyntheticScene::kRoom, SyntheticSensor::kRgbd, 40);
   Odometry odometry(OdometryOptions(), room.rig);
   TrackAll(room, odometry);
   const Trajectory estimate = odometry.FrameTrajectory();
@@ -192,6 +162,23 @@ TEST(Odometry, LongDarknessStartsANewPieceOfMap) {
   EXPECT_EQ(odometry.FrameTrajectory(1).size(), Stereo().frames.size() - 20);
   EXPECT_EQ(odometry.FrameIndices(1).front(), 20);
   EXPECT_EQ(odometry.FrameTrajectory().size(), Stereo().frames.size() - 20) << "the larger piece";
+}
+
+TEST(Odometry, RelocalizesTheLostFrameAtAKeyframeThatShowsItsPlace) {
+  Odometry odometry(OdometryOptions(), Stereo().rig);
+  TrackAll(Stereo(), odometry);
+  const int first = odometry.KeyframeIds().front();
+  const TrackResult kept = odometry.RelocalizeAt(first);
+  EXPECT_EQ(kept.state, TrackingState::kTracking) << "nothing is lost, nothing changes";
+  InputFrame carried = Stereo().frames[1];
+  carried.index = static_cast<std::int64_t>(Stereo().frames.size());
+  carried.stamp_s = Stereo().frames.back().stamp_s + 0.1;
+  ASSERT_EQ(odometry.Track(carried).state, TrackingState::kLost);
+  EXPECT_EQ(odometry.RelocalizeAt(odometry.KeyframeIds().back()).state, TrackingState::kLost) << "not there";
+  const TrackResult found = odometry.RelocalizeAt(first);
+  ASSERT_EQ(found.state, TrackingState::kTracking) << found.reason;
+  EXPECT_LT((found.T_world_camera.translation - Stereo().truth[1].pose.translation).norm(), 0.05);
+  EXPECT_EQ(odometry.FrameTrajectory().size(), Stereo().frames.size() + 1);
 }
 
 TEST(Odometry, BlankImagesNeverStartAMap) {

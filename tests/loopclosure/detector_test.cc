@@ -185,6 +185,39 @@ TEST(LoopDetector, ConsistentImagesMustComeBeforeALoop) {
   EXPECT_TRUE(std::any_of(later.begin(), later.end(), said_why));
 }
 
+TEST_P(EveryRule, LocatesAKnownPlaceByOneImageAndChangesNothing) {
+  constexpr int kPlaces = 16;
+  LoopDetectorOptions options = testing::SmallOptions();
+  SetRule(GetParam(), options);
+  LoopDetector asked(options), not_asked(options);
+  testing::Walk(asked, 0, kPlaces, kPlaces);
+  testing::Walk(not_asked, 0, kPlaces, kPlaces);
+  for (const int place : {2, 9}) {
+    LoopQuery query;
+    query.image = testing::WalkImage(kPlaces + place, kPlaces);
+    const LoopResult result = asked.Locate(query);
+    EXPECT_TRUE(result.accepted) << result.reason;
+    EXPECT_EQ(result.verification.candidate, place);
+  }
+  LoopQuery elsewhere;
+  elsewhere.image = testing::TexturedImage(1000, 240, 180);
+  const LoopResult unknown = asked.Locate(elsewhere);
+  EXPECT_FALSE(unknown.accepted);
+  EXPECT_FALSE(unknown.reason.empty());
+  EXPECT_EQ(asked.NumLocations(), not_asked.NumLocations());
+  testing::ExpectEqual(testing::Walk(asked, kPlaces, kPlaces + 4, kPlaces),
+                       testing::Walk(not_asked, kPlaces, kPlaces + 4, kPlaces));
+}
+
+TEST(LoopDetector, LocatesNothingBeforeThereIsAnything) {
+  const LoopDetector detector(testing::SmallOptions());
+  LoopQuery query;
+  query.image = testing::WalkImage(0, 16);
+  const LoopResult result = detector.Locate(query);
+  EXPECT_FALSE(result.accepted);
+  EXPECT_FALSE(result.reason.empty());
+}
+
 TEST(LoopDetector, EveryWeightAndIslandsFindTheSecondLap) {
   constexpr int kPlaces = 16;
   for (const MemberWeights weights : {MemberWeights::kEntropy, MemberWeights::kAgreement}) {

@@ -43,9 +43,11 @@ void LoopWorker::Work() {
     if (stop_) return;
     const LoopQuery query = std::move(queries_.front());
     queries_.pop_front();
+    busy_ = true;
     lock.unlock();
     Outcome outcome = Detect(query);
     lock.lock();
+    busy_ = false;
     outcomes_.push_back(std::move(outcome));
     changed_.notify_all();
   }
@@ -59,6 +61,12 @@ void LoopWorker::Submit(LoopQuery query) {
   const std::lock_guard<std::mutex> lock(mutex_);
   queries_.push_back(std::move(query));
   changed_.notify_all();
+}
+
+LoopResult LoopWorker::Locate(const LoopQuery& query) {
+  std::unique_lock<std::mutex> lock(mutex_);
+  changed_.wait(lock, [this] { return queries_.empty() && !busy_; });
+  return detector_.Locate(query);
 }
 
 LoopResult LoopWorker::Take() {

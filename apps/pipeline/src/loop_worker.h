@@ -23,6 +23,8 @@ class LoopWorker {
   void Submit(LoopQuery query);
   /// The result of the oldest query that was not taken yet; waits for it. Rethrows what the detector threw.
   LoopResult Take();
+  /// Where an image was taken (LoopDetector::Locate), once the queries that are on their way are done.
+  LoopResult Locate(const LoopQuery& query);
   /// Milliseconds that Take() has waited so far.
   double WaitedMs() const { return waited_ms_; }
 
@@ -39,6 +41,7 @@ class LoopWorker {
   std::condition_variable changed_;
   std::deque<LoopQuery> queries_;  // guarded by mutex_
   std::deque<Outcome> outcomes_;   // guarded by mutex_
+  bool busy_ = false;              // guarded by mutex_: the detector is in use
   bool stop_ = false;              // guarded by mutex_
   double waited_ms_ = 0;           // of the caller's thread only
   std::thread thread_;             // last: starts when everything else is there

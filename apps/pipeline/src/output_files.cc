@@ -19,6 +19,9 @@ constexpr std::array<const char*, 8> kFiles = {
     "summary.json",   "trajectory.svg",          "trajectory.png"};
 constexpr std::uintmax_t kRoomBytes = 32u << 20;  // a long run writes a few MB
 
+// Of the i-th of the pieces that are not joined to the trajectory, from 1.
+std::string PieceFile(int i) { return "trajectory_piece_" + std::to_string(i) + ".txt"; }
+
 void WriteText(const fs::path& file, const std::string& text) {
   std::ofstream out(file, std::ios::binary);
   if (!out)
@@ -100,12 +103,18 @@ void PrepareOutputFolder(const fs::path& out) {
                      ": less than 32 MB are free there; free some space or choose another --out");
   }
   for (const char* name : kFiles) fs::remove(out / name, error);
+  for (int i = 1; fs::remove(out / PieceFile(i), error); ++i) {
+  }
 }
 
 void WriteOutputs(const fs::path& out, const RunResult& result) {
   WriteText(out / "loops.csv", LoopsCsv(result));
   if (!result.appearance_only) {
     WriteTrajectory(out / "trajectory.txt", result.trajectory, TrajectoryFormat::kTum);
+    for (std::size_t i = 0; i < result.other_pieces.size(); ++i) {
+      WriteTrajectory(out / PieceFile(static_cast<int>(i) + 1), result.other_pieces[i],
+                      TrajectoryFormat::kTum);
+    }
     WriteTrajectory(out / "trajectory_odometry.txt", result.trajectory_odometry, TrajectoryFormat::kTum);
     WriteTrajectory(out / "keyframes.txt", result.keyframe_trajectory, TrajectoryFormat::kTum);
     WriteG2o(out / "graph.g2o", result.graph);

@@ -70,11 +70,9 @@ Json LoopsJson(const RunResult& r) {
 }
 
 Json FramesJson(const RunResult& r) {
-  Json frames = {{"total", r.frames_total},
-                 {"tracked", r.frames_tracked},
-                 {"bad", r.bad.size()},
-                 {"lost", r.frames_lost},
-                 {"in_dataset", r.frames_listed}};
+  Json frames = {
+      {"total", r.frames_total}, {"tracked", r.frames_tracked},         {"bad", r.bad.size()},
+      {"lost", r.frames_lost},   {"relocalized", r.frames_relocalized}, {"in_dataset", r.frames_listed}};
   frames["bad_frames"] = Json::array();
   for (const BadFrame& bad : r.bad)
     frames["bad_frames"].push_back({{"index", bad.index}, {"error", bad.error}});
@@ -82,6 +80,12 @@ Json FramesJson(const RunResult& r) {
   for (const LostStretch& lost : r.lost) {
     frames["lost_stretches"].push_back(
         {{"first", lost.first}, {"last", lost.last}, {"state", lost.state}, {"reason", lost.reason}});
+  }
+  frames["other_pieces"] = Json::array();
+  for (const Trajectory& piece : r.other_pieces) {
+    frames["other_pieces"].push_back({{"frames", piece.size()},
+                                      {"first_stamp_s", piece.front().stamp_s},
+                                      {"last_stamp_s", piece.back().stamp_s}});
   }
   return frames;
 }

@@ -136,12 +136,17 @@ class Run {
   void Collect() {
     result_.loops = slam_.loops();
     result_.corrections = slam_.Corrections();
+    result_.frames_relocalized = slam_.Relocalized();
     result_.appearance_only = slam_.AppearanceOnly();
     result_.peak_memory_mb = PeakMemoryMb();
     if (!slam_.AppearanceOnly()) {
       const Odometry& odometry = *slam_.odometry();
       result_.trajectory = BodyTrajectory(odometry.FrameTrajectory(), result_.rig);
       result_.frames_tracked = result_.trajectory.size();
+      const std::vector<int> pieces = odometry.Pieces();
+      for (std::size_t i = 1; i < pieces.size(); ++i) {
+        result_.other_pieces.push_back(BodyTrajectory(odometry.FrameTrajectory(pieces[i]), result_.rig));
+      }
       result_.trajectory_odometry = slam_.untouched() != nullptr
                                         ? BodyTrajectory(slam_.untouched()->FrameTrajectory(), result_.rig)
                                         : result_.trajectory;

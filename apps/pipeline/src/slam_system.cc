@@ -44,6 +44,7 @@ class SlamSystem::Impl {
     TrackResult result;
     if (odometry_) {
       result = odometry_->Track(frame);
+      if (worker_ && result.state != TrackingState::kTracking) result = Relocalize(frame, result);
       if (result.keyframe >= 0)
         graph_.AddKeyframe(result.keyframe, odometry_->KeyframePiece(result.keyframe));
     } else {
@@ -69,6 +70,7 @@ class SlamSystem::Impl {
   std::int64_t untouched_next_ = 0;
   std::vector<LoopRecord> records_;
   int corrections_ = 0;
+  std::size_t relocalized_ = 0;  // frames that were lost, and found by the detector
 
   PoseGraph Graph() const { return odometry_ ? graph_.Build(*odometry_, gate_.accepted()) : PoseGraph(); }
 
@@ -86,6 +88,27 @@ class SlamSystem::Impl {
     std::int64_t due = 0;  // number of frames after which its result enters
     std::int64_t frame = 0;
   };
+
+  // A frame without a pose is looked up among the keyframes that the detector knows.
+  TrackResult Relocalize(const InputFrame& frame, const TrackResult& lost) {
+    constexpr int kFewFeatures = 100;  // nothing can be recognised by so few
+    if (keyframe_of_frame_.empty() || lost.features < kFewFeatures) return lost;
+    const auto begin = std::chrono::steady_clock::now();
+    LoopQuery query;
+    query.id = frame.index;
+    query.image = frame.image;
+    query.depth_m = frame.depth_m;
+    query.camera = rig_.camera;
+    const LoopResult found = worker_->Locate(query);
+    const auto keyframe = keyframe_of_frame_.find(found.verification.candidate);
+    TrackResult result = lost;
+    if (found.accepted && keyframe != keyframe_of_frame_.end()) {
+      result = odometry_->RelocalizeAt(keyframe->second);
+    }
+    if (result.state == TrackingState::kTracking) ++relocalized_;
+    stages_["relocalize"] += MillisecondsSince(begin);
+    return result;
+  }
 
   void Submit(const InputFrame& frame, int keyframe) {
     if (keyframes_seen_++ % options_.loop_every_keyframes != 0) return;
@@ -304,6 +327,7 @@ Odometry* SlamSystem::untouched() { return impl_->untouched_ ? &*impl_->untouche
 std::int64_t SlamSystem::UntouchedNext() const { return impl_->untouched_next_; }
 std::vector<std::string> SlamSystem::TakeWarnings() { return std::exchange(impl_->warnings_, {}); }
 const std::vector<LoopRecord>& SlamSystem::loops() const { return impl_->records_; }
+std::size_t SlamSystem::Relocalized() const { return impl_->relocalized_; }
 int SlamSystem::Corrections() const { return impl_->corrections_; }
 PoseGraph SlamSystem::Graph() const { return impl_->Graph(); }
 std::map<std::string, double> SlamSystem::StageMilliseconds() const { return impl_->StageMilliseconds(); }

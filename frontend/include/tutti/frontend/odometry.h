@@ -23,6 +23,7 @@ struct TrackResult {
   TrackingState state = TrackingState::kInitializing;
   std::string reason;   ///< why the frame has no pose (empty when it has one)
   Pose T_world_camera;  ///< valid if state == kTracking
+  int features = 0;     ///< in the image
   int inliers = 0;      ///< landmarks that agree with the pose
   int keyframe = -1;    ///< id of the keyframe that this frame became, or -1
 };
@@ -59,6 +60,11 @@ class Odometry {
   /// Tracks the next frame; frames come in order of time. Never throws for hard images.
   TrackResult Track(const InputFrame& frame);
 
+  /// Tries the frame that Track has just lost (or could not start a map with) again, from a keyframe that
+  /// shows the same place: tracking goes on from there if the map agrees. To be called before the next Track.
+  /// Returns what Track did if that fails, or if there is no such frame.
+  TrackResult RelocalizeAt(int keyframe);
+
   /// Ids of all keyframes that are alive, ascending.
   std::vector<int> KeyframeIds() const;
   /// Everything about one keyframe, with the current map's points.
@@ -77,6 +83,10 @@ class Odometry {
   /// pieces whose keyframes are now in one frame of reference: piece -> the piece that it joined.
   void ApplyCorrection(const std::map<int, Similarity>& S_world_keyframe,
                        const std::map<int, int>& merges = {});
+
+  /// Map pieces that have frames, by number of frames, most first (ties: the older one). Joined pieces are
+  /// one.
+  std::vector<int> Pieces() const;
 
   /// All posed frames so far, T_world_camera, in order of time, through their reference keyframes (so
   /// corrections and local bundle adjustment reach every frame). Only frames of `map_piece`; -1: of the piece

@@ -131,6 +131,12 @@ class LoopDetector {
   /// The same for an image alone: CV_8UC1, CV_8UC3 (BGR) or CV_16UC1.
   LoopResult Detect(const cv::Mat& image, std::int64_t id);
 
+  /// Says at which location in working memory an image was taken, for a camera that has lost its way: by
+  /// this image alone (no filter) and always verified, unless verification is off for this detector (then
+  /// nothing is accepted). Adds nothing, changes nothing; `id` only names the query. Throws InputError for
+  /// misuse, as Detect does.
+  LoopResult Locate(const LoopQuery& query) const;
+
   /// Adds a neighbour link between two locations (a caller's own odometry link); consecutive ids are linked
   /// by themselves.
   void AddLink(std::int64_t a, std::int64_t b);

@@ -43,6 +43,8 @@ class Vocabulary {
   /// is safe to call from several threads at once.
   void Search(const cv::Mat& descriptors, int begin, int end, std::vector<TwoNearest>& nearest) const;
   std::vector<int> Assign(const cv::Mat& descriptors, const std::vector<TwoNearest>& nearest);
+  /// Of what Search found, the words that Assign would not make new: nothing is added.
+  std::vector<int> Recognise(const std::vector<TwoNearest>& nearest) const;
 
   /// One more location that has these words.
   void AddReferences(const Signature& signature);
@@ -77,6 +79,9 @@ class Vocabulary {
  private:
   void CheckType(const cv::Mat& descriptors);
   void MakeIndex();
+  bool IsNew(const TwoNearest& nearest) const {
+    return nearest.second < 0 || nearest.first_distance > options_.nndr * nearest.second_distance;
+  }
 
   VocabularyOptions options_;
   std::uint64_t seed_;

@@ -58,10 +58,11 @@ struct RunResult {
   CameraRig rig;
 
   // Frames.
-  std::size_t frames_total = 0;    ///< that the run went through, bad ones included
-  std::size_t frames_listed = 0;   ///< that the data set has
-  std::size_t frames_tracked = 0;  ///< with a pose in trajectory.txt
-  std::size_t frames_lost = 0;     ///< read, but without a pose when they came
+  std::size_t frames_total = 0;        ///< that the run went through, bad ones included
+  std::size_t frames_listed = 0;       ///< that the data set has
+  std::size_t frames_tracked = 0;      ///< with a pose in trajectory.txt
+  std::size_t frames_lost = 0;         ///< read, but without a pose when they came
+  std::size_t frames_relocalized = 0;  ///< lost, but the loop detector knew the place
   std::vector<BadFrame> bad;
   std::vector<LostStretch> lost;
   std::size_t keyframes = 0;
@@ -74,6 +75,7 @@ struct RunResult {
 
   // Trajectories: T_world_body, the world is the first camera's place.
   Trajectory trajectory, trajectory_odometry, keyframe_trajectory, reference;
+  std::vector<Trajectory> other_pieces;  ///< of the map, after losses; no loop joined them to `trajectory`
   bool odometry_complete =
       true;  ///< false: it ends at the first correction (interrupted, or run.odometry_pass: false)
   PoseGraph graph;

@@ -53,6 +53,8 @@ class SlamSystem {
   /// Every proposed loop in the order of the queries.
   const std::vector<LoopRecord>& loops() const;
   std::size_t LoopsAccepted() const;
+  /// Lost frames that got a pose because the detector knew their place.
+  std::size_t Relocalized() const;
   /// How often the map was moved.
   int Corrections() const;
   /// Keyframes, odometry edges and accepted loops at the present poses.

@@ -4,10 +4,12 @@
 #include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "commands.h"
+#include "tutti/backend/certificate.h"
 #include "tutti/backend/g2o_io.h"
 #include "tutti/backend/pose_graph_optimizer.h"
 #include "tutti/core/error.h"
@@ -18,6 +20,7 @@ namespace {
 struct OptimizeArguments {
   std::string in, out, json;
   std::string init = "auto", objective = "chi2", robust = "none";
+  bool certify = false;
   PoseGraphOptions options;
 };
 
@@ -37,7 +40,7 @@ std::vector<std::size_t> DownWeighted(const PoseGraphReport& report) {
 }
 
 nlohmann::ordered_json ToJson(const OptimizeArguments& arguments, const G2oFile& file,
-                              const PoseGraphReport& report) {
+                              const PoseGraphReport& report, const std::optional<Certificate>& certificate) {
   nlohmann::ordered_json json;
   json["input"] = arguments.in;
   json["kind"] = ToString(file.graph.kind());
@@ -66,6 +69,16 @@ nlohmann::ordered_json ToJson(const OptimizeArguments& arguments, const G2oFile&
                                      {"to", edge.to},
                                      {"chi2", report.edges[e].chi2},
                                      {"weight", report.edges[e].weight}});
+  }
+  if (certificate) {
+    json["certificate"] = {{"available", certificate->available},
+                           {"certified", certificate->certified},
+                           {"reason", certificate->reason},
+                           {"chordal", certificate->chordal},
+                           {"lower_bound", certificate->lower_bound},
+                           {"relative_gap", certificate->relative_gap},
+                           {"min_eigenvalue_bound", certificate->min_eigenvalue_bound},
+                           {"time_s", certificate->time_s}};
   }
   json["warnings"] = file.warnings;
   return json;
@@ -101,10 +114,25 @@ void Print(const G2oFile& file, const PoseGraphReport& report) {
   }
 }
 
-void WriteJson(const OptimizeArguments& arguments, const G2oFile& file, const PoseGraphReport& report) {
+void Print(const Certificate& certificate) {
+  if (!certificate.available) {
+    std::printf("  no certificate: %s\n", certificate.reason.c_str());
+    return;
+  }
+  std::printf("  chordal objective: local optimum %.9g, nothing is below %.9g (gap %.2g, %.3f s)\n",
+              certificate.chordal, certificate.lower_bound, certificate.relative_gap, certificate.time_s);
+  if (certificate.certified) {
+    std::printf("  certified global optimum of the chordal objective\n");
+  } else {
+    std::printf("  not certified: %s\n", certificate.reason.c_str());
+  }
+}
+
+void WriteJson(const OptimizeArguments& arguments, const G2oFile& file, const PoseGraphReport& report,
+               const std::optional<Certificate>& certificate) {
   if (arguments.json.empty()) return;
   std::ofstream out(arguments.json);
-  out << ToJson(arguments, file, report).dump(2) << '\n';
+  out << ToJson(arguments, file, report, certificate).dump(2) << '\n';
   out.flush();
   if (!out)
     throw InputError(arguments.json + ": can't be written; check that the folder exists and is writable");
@@ -124,10 +152,13 @@ void RunOptimize(OptimizeArguments arguments) {
                      "auto, odometry or chordal");
   }
   const PoseGraphReport report = optimizer.Optimize(file.graph);
-  WriteJson(arguments, file, report);
+  std::optional<Certificate> certificate;
+  if (arguments.certify && report.success) certificate = CertifyOptimum(file.graph);
+  WriteJson(arguments, file, report, certificate);
   if (!report.success) throw InputError(arguments.in + ": could not be optimised: " + report.reason);
   WriteG2o(arguments.out, file.graph);
   Print(file, report);
+  if (certificate) Print(*certificate);
 }
 
 }  // namespace
@@ -164,6 +195,10 @@ void AddOptimizeCommand(CLI::App& app, int&) {
   command->add_option("--max-iterations", arguments->options.max_iterations, "Levenberg-Marquardt iterations")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
+  command->add_flag(
+      "--certify", arguments->certify,
+      "Prove that the chordal objective has no lower value (as SE-Sync does), or say how far the "
+      "proof falls short");
   command->add_option("--json", arguments->json,
                       "Write costs, time and what became of the loops to this file");
   command->footer(

@@ -82,12 +82,13 @@ class Odometry::Impl {
   bool NeedKeyframe(const TrackedFrame& frame, const FrameMatches& matches, int inliers) const;
   int InsertKeyframe(const TrackedFrame& frame, const FrameMatches& matches, const Pose& T_camera_world);
   void Record(const TrackedFrame& frame, const Pose& T_camera_world, int reference);
-  void Lose(const TrackedFrame& frame);
+  void Lose();
 
   LocalMapper mapper_;
   MonoInitializer initializer_;
-  std::optional<TrackedFrame> lost_;  // the last frame, if it has no pose
-  TrackResult lost_result_;           // of the last frame
+  std::optional<TrackedFrame> lost_;    // the last frame, if it has no pose
+  TrackResult lost_result_;             // of the last frame
+  std::optional<double> lost_since_s_;  // first frame with something to see that was lost [s]
   TrackingState state_ = TrackingState::kInitializing;
   int piece_ = 0;
   int reference_ = -1;      // keyframe that shares most landmarks with the last frame

@@ -13,6 +13,7 @@ namespace {
 
 constexpr int kMinProjected = 20;           // matches by projection below which the search is widened
 constexpr int kMinGuess = 10;               // inliers of a guess
+constexpr int kRecentKeyframes = 10;        // that a lost frame is compared with
 constexpr double kSurePrediction = 0.5;     // a velocity holds for so long [s]
 constexpr double kLongestPrediction = 1.5;  // [s]
 constexpr double kLeastShare = 0.14;        // of the landmarks in view that must be found again;
@@ -180,6 +181,9 @@ bool Odometry::Impl::FindPose(Fix* fix) const {
   }
   std::vector<int> tries{reference_, last_keyframe_};
   for (int near : map.BestCovisible(reference_, 3, 15)) tries.push_back(near);
+  // What the loop detector does not know yet.
+  for (int k = last_keyframe_ - 1; k >= std::max(0, last_keyframe_ - kRecentKeyframes); --k)
+    tries.push_back(k);
   for (std::size_t i = 0; i < tries.size(); ++i) {
     const auto here = tries.begin() + static_cast<std::ptrdiff_t>(i);
     if (std::find(tries.begin(), here, tries[i]) != here) continue;

@@ -64,7 +64,10 @@ TrackResult Odometry::Impl::TrackMap(const TrackedFrame& frame) {
                       : "lost: only " + std::to_string(fix.inliers) + " landmarks agree with a pose";
   state_ = TrackingState::kLost;
   result.state = state_;
-  if (frame.stamp_s - last_stamp_ > options.relocalize_s) Lose(frame);
+  // A covered lens says nothing about the place.
+  if (frame.features->size() < static_cast<std::size_t>(options.min_inliers)) return result;
+  if (!lost_since_s_) lost_since_s_ = frame.stamp_s;
+  if (frame.stamp_s - *lost_since_s_ > options.relocalize_s) Lose();
   return result;
 }
 
@@ -82,6 +85,7 @@ TrackResult Odometry::Impl::Accept(Fix fix) {
   has_velocity_ = state_ == TrackingState::kTracking && dt > 0 && dt < 1.0;
   if (has_velocity_) velocity_ = LogSE3(T * last_T_camera_world_.Inverse()) / dt;
   state_ = TrackingState::kTracking;
+  lost_since_s_.reset();
   ++frames_since_keyframe_;
   result.state = state_;
   result.inliers = fix.inliers;
@@ -100,10 +104,11 @@ TrackResult Odometry::Impl::Accept(Fix fix) {
   return result;
 }
 
-void Odometry::Impl::Lose(const TrackedFrame&) {
+void Odometry::Impl::Lose() {
   // Nothing found for too long: a new piece of map starts; a loop closure may join the two later.
   ++piece_;
   state_ = TrackingState::kInitializing;
+  lost_since_s_.reset();
   initializer_.Reset();
   has_velocity_ = false;
 }

@@ -99,7 +99,8 @@ void ConfigTable::AddOdometry(OdometryOptions& o) {
       "standard deviation of a keypoint aligned with its landmark's patch, relative to a corner's, above 0 "
       "to 1");
   Add("min_inliers", o.min_inliers, "fewer landmarks that agree with the pose: the frame is lost");
-  Add("relocalize_s", o.relocalize_s, "lost for longer than this [s]: start a new piece of map");
+  Add("relocalize_s", o.relocalize_s,
+      "lost for longer than this [s], with something to see: start a new piece of map");
   Add("local_keyframes", o.local_keyframes, "keyframes whose landmarks are searched in a frame");
   Add("keyframe_inlier_ratio", o.keyframe_inlier_ratio,
       "new keyframe when fewer than this share of the reference's landmarks is seen, 0..1");

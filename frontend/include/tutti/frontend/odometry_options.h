@@ -32,7 +32,8 @@ struct OdometryOptions {
   double aligned_sigma = 0.5;  ///< standard deviation of a keypoint whose position was aligned with its
                                ///< landmark's patch, relative to a corner's, above 0 to 1
   int min_inliers = 20;        ///< fewer landmarks that agree with the pose: the frame is lost
-  double relocalize_s = 1.0;   ///< lost for longer than this [s]: start a new piece of map
+  double relocalize_s = 0.5;   ///< lost for longer than this [s], with something to see: start a new piece of
+                               ///< map
   int local_keyframes = 40;    ///< keyframes whose landmarks are searched in a frame
 
   // Keyframes.

@@ -15,6 +15,7 @@ int main(int argc, char** argv) {
   tutti::cli::AddRunCommand(app, exit_code);
   tutti::cli::AddEvaluateCommand(app, exit_code);
   tutti::cli::AddConvertCommand(app, exit_code);
+  tutti::cli::AddPlotCommand(app, exit_code);
   tutti::cli::AddLoopsCommand(app, exit_code);
   tutti::cli::AddCompareLoopsCommand(app, exit_code);
   tutti::cli::AddOptimizeCommand(app, exit_code);

@@ -141,22 +141,28 @@ TextTable Table(const std::vector<Variant>& variants) {
   return table;
 }
 
-/// Where the ensemble did not help, in words.
+/// Where the ensemble helped, where that can't be told, and where it did not, in words.
 std::string Verdict(const std::vector<Variant>& variants) {
   double ensemble = RunFigures::kNone;
   for (const Variant& variant : variants) {
     if (variant.name == kEnsemble) ensemble = Over(variant, &RunFigures::ate_m).mean;
   }
   if (!std::isfinite(ensemble)) return "";
-  std::string not_beaten;
+  std::string beaten, unclear, not_beaten;
   for (const Variant& variant : variants) {
     const double mean = Over(variant, &RunFigures::ate_m).mean;
-    if (variant.name == kEnsemble || !std::isfinite(mean) || mean > ensemble) continue;
-    not_beaten += (not_beaten.empty() ? "" : ", ") + variant.name + " (" + Fixed(mean, 4) + " m)";
+    if (variant.name == kEnsemble || !std::isfinite(mean)) continue;
+    const bool sure = AgainstEnsemble(variant, variants).p < 0.05;
+    std::string& list = mean <= ensemble ? not_beaten : sure ? beaten : unclear;
+    list += (list.empty() ? "" : ", ") + variant.name + " (" + Fixed(mean, 4) + " m)";
   }
-  if (not_beaten.empty()) return "The ensemble has the lowest mean ATE, " + Fixed(ensemble, 4) + " m.\n";
-  return "The ensemble did not help: with " + Fixed(ensemble, 4) + " m its mean ATE is not below that of " +
-         not_beaten + ".\n";
+  std::string text = "Mean ATE of the ensemble: " + Fixed(ensemble, 4) + " m.\n";
+  if (!beaten.empty()) text += "* Lower than that of " + beaten + ", p < 0.05.\n";
+  if (!unclear.empty())
+    text += "* Lower than that of " + unclear +
+            ", but the test can't tell them apart (p >= 0.05, or one seed).\n";
+  if (!not_beaten.empty()) text += "* The ensemble did not help against " + not_beaten + ".\n";
+  return text + "\n";
 }
 
 Json IntervalJson(const MeanInterval& value) {

@@ -43,7 +43,7 @@ struct Comparison {
 };
 
 /// One table per data set, with the paired t-test of each variant's ATE against the ensemble's over common
-/// seeds, and below it which variants the ensemble did not beat.
+/// seeds, and below it which variants the ensemble beats, and which it does not.
 std::string DescribeComparison(const Comparison& comparison, TableFormat format);
 nlohmann::ordered_json ComparisonJson(const Comparison& comparison);
 

@@ -47,8 +47,7 @@ RunConfig VariantConfig(RunConfig config, const std::string& variant, bool odome
     throw InputError("--variants: '" + variant + "': " + error.what());
   }
   config.run.loops = true;
-  // Every variant tracks the same until its first correction, so the odometry alone is the same for all: it
-  // is computed once, as the variant of that name.
+  // What the odometry does without loops is computed once, as the variant of that name.
   if (odometry_too) config.run.odometry_pass = false;
   return config;
 }
@@ -171,9 +170,9 @@ void AddCompareCommand(CLI::App& app, int& exit_code) {
   command->footer(
       "Each run has its folder OUT/variant/seed_N with everything that `tutti run` writes. All variants of a "
       "seed track\n"
-      "the same, byte for byte, until their first loop is closed. A run that fails is reported, and the rest "
-      "go "
-      "on.\n"
+      "the same, byte for byte, until their first loop is closed or a lost frame is looked up in the loop "
+      "detector. A\n"
+      "run that fails is reported, and the rest go on.\n"
       "Example: tutti compare --config data/configs/7scenes.yaml --dataset redkitchen --out cmp --variants "
       "odometry,orb,ensemble");
   command->callback([command, arguments, &exit_code] { exit_code = RunCompare(*command, *arguments); });

@@ -89,19 +89,6 @@ std::string Csv(const LoopRun& run) {
 
 }  // namespace
 
-void MakeFolder(const std::filesystem::path& folder) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error) throw InputError(folder.string() + ": can't be made (" + error.message() + ")");
-}
-
-void WriteText(const std::filesystem::path& file, const std::string& text) {
-  std::ofstream out(file, std::ios::binary);
-  out << text;
-  out.close();
-  if (!out) throw InputError(file.string() + ": can't be written; is there space, and may you write there?");
-}
-
 LoopReport EvaluateRun(const LoopRun& run) {
   std::vector<LoopObservation> observations;
   for (const LoopRow& row : run.rows) observations.push_back(Observe(row.result));

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "files.h"
 #include "tutti/loopclosure/detector.h"
 #include "tutti/loopclosure/evaluation.h"
 #include "tutti/loopclosure/ground_truth.h"
@@ -52,8 +53,5 @@ void WriteLoopRun(const LoopRun& run, const LoopReport& report, const std::files
 
 /// Prints the figures of one run.
 void PrintLoopRun(const LoopRun& run, const LoopReport& report, const std::filesystem::path& folder);
-
-void MakeFolder(const std::filesystem::path& folder);
-void WriteText(const std::filesystem::path& file, const std::string& text);
 
 }  // namespace tutti::cli

@@ -8,6 +8,10 @@ namespace tutti::cli {
 
 void AddRunCommand(CLI::App& app, int& exit_code);
 void AddEvaluateCommand(CLI::App& app, int& exit_code);
+void AddConvertCommand(CLI::App& app, int& exit_code);
+void AddPlotCommand(CLI::App& app, int& exit_code);
+void AddCompareCommand(CLI::App& app, int& exit_code);
+void AddCollectCommand(CLI::App& app, int& exit_code);
 void AddLoopsCommand(CLI::App& app, int& exit_code);
 void AddCompareLoopsCommand(CLI::App& app, int& exit_code);
 void AddOptimizeCommand(CLI::App& app, int& exit_code);

@@ -14,6 +14,10 @@ int main(int argc, char** argv) {
   int exit_code = 0;
   tutti::cli::AddRunCommand(app, exit_code);
   tutti::cli::AddEvaluateCommand(app, exit_code);
+  tutti::cli::AddConvertCommand(app, exit_code);
+  tutti::cli::AddPlotCommand(app, exit_code);
+  tutti::cli::AddCompareCommand(app, exit_code);
+  tutti::cli::AddCollectCommand(app, exit_code);
   tutti::cli::AddLoopsCommand(app, exit_code);
   tutti::cli::AddCompareLoopsCommand(app, exit_code);
   tutti::cli::AddOptimizeCommand(app, exit_code);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "evaluation_path.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -10,69 +11,62 @@ namespace {
 
 constexpr double kDegrees = 180.0 / M_PI;
 
-/// Distance along the path from the first pose to each.
-std::vector<double> AccumulatedDistances(const std::vector<Pose>& poses) {
-  std::vector<double> out;
-  for (std::size_t k = 0; k < poses.size(); ++k) {
-    out.push_back(k == 0 ? 0.0 : out.back() + (poses[k].translation - poses[k - 1].translation).norm());
+/// a^-1 b, with the transpose for the inverse of a rotation (as evo does, also where it is not quite one).
+PoseMatrix Between(const PoseMatrix& a, const PoseMatrix& b) {
+  return {a.rotation.transpose() * b.rotation, a.rotation.transpose() * (b.translation - a.translation)};
+}
+
+void Add(const PoseMatrix& error, PoseErrors& out) {
+  const double off = (error.rotation - Eigen::Matrix3d::Identity()).squaredNorm();
+  out.translation.push_back(error.translation.norm());
+  out.rotation_deg.push_back(kDegrees * LogSO3(Eigen::Quaterniond(error.rotation).normalized()).norm());
+  out.full.push_back(std::sqrt(off + error.translation.squaredNorm()));
+}
+
+/// The poses with their rotations as written, turned by `rotation`, where there are such.
+std::vector<PoseMatrix> Matrices(const AssociatedPoses& poses, bool of_reference,
+                                 const std::vector<Eigen::Matrix3d>& written,
+                                 const Eigen::Quaterniond& rotation) {
+  const std::vector<Pose>& list = of_reference ? poses.reference : poses.estimate;
+  std::vector<PoseMatrix> out(list.size());
+  for (std::size_t k = 0; k < list.size(); ++k) {
+    const std::size_t index = of_reference ? poses.indices[k].first : poses.indices[k].second;
+    out[k].translation = list[k].translation;
+    out[k].rotation =
+        written.empty() ? list[k].rotation.toRotationMatrix() : Eigen::Matrix3d(rotation * written[index]);
   }
   return out;
 }
 
-/// Error of the relative pose from i to j: (T_i^-1 T_j of the reference)^-1 (that of the estimate).
-Pose RelativeError(const std::vector<Pose>& reference, const std::vector<Pose>& estimate, std::size_t i,
-                   std::size_t j) {
-  return (reference[i].Inverse() * reference[j]).Inverse() * (estimate[i].Inverse() * estimate[j]);
+AssociatedPoses Associate(const Trajectory& reference, const Trajectory& estimate,
+                          const EvaluationOptions& options) {
+  if (options.by_index) return AssociateByIndex(reference, estimate);
+  if (options.interpolate)
+    return AssociateByInterpolation(reference, estimate, options.max_interpolation_s, options.time_offset_s);
+  return AssociateByTime(reference, estimate, options.max_time_difference_s, options.time_offset_s);
 }
 
-std::vector<std::pair<std::size_t, std::size_t>> PairsByFrames(std::size_t n, std::size_t delta,
-                                                               bool all_pairs) {
-  std::vector<std::pair<std::size_t, std::size_t>> out;
-  for (std::size_t i = 0; i + delta < n; i += all_pairs ? 1 : delta) out.emplace_back(i, i + delta);
-  return out;
-}
-
-std::vector<std::pair<std::size_t, std::size_t>> AllPairsByPath(const std::vector<double>& distance,
-                                                                double delta, double tolerance) {
-  std::vector<std::pair<std::size_t, std::size_t>> out;
-  for (std::size_t i = 0; i + 1 < distance.size(); ++i) {
-    std::size_t best = i + 1;
-    for (std::size_t j = i + 1; j < distance.size(); ++j) {
-      if (std::abs(distance[j] - distance[i] - delta) < std::abs(distance[best] - distance[i] - delta))
-        best = j;
-      if (distance[j] - distance[i] > 2 * delta) break;  // distances only grow
-    }
-    if (std::abs(distance[best] - distance[i] - delta) <= tolerance) out.emplace_back(i, best);
-  }
-  return out;
-}
-
-/// Consecutive pieces: a cut wherever the path since the last cut has reached delta; the piece before the
-/// first cut is not used (as in evo).
-std::vector<std::pair<std::size_t, std::size_t>> ConsecutiveByPath(const std::vector<Pose>& poses,
-                                                                   double delta) {
-  std::vector<std::size_t> cuts;
-  double path = 0;
-  for (std::size_t k = 1; k < poses.size(); ++k) {
-    path += (poses[k].translation - poses[k - 1].translation).norm();
-    if (path >= delta) {
-      cuts.push_back(k);
-      path = 0;
-    }
-  }
-  std::vector<std::pair<std::size_t, std::size_t>> out;
-  for (std::size_t k = 1; k < cuts.size(); ++k) out.emplace_back(cuts[k - 1], cuts[k]);
-  return out;
+void RequireOnePerPose(const std::vector<Eigen::Matrix3d>& written, const Trajectory& trajectory) {
+  if (!written.empty() && written.size() != trajectory.size())
+    throw InputError("evaluation: rotations as written and poses differ in number");
 }
 
 }  // namespace
 
 std::string EvaluationOptions::Validate() const {
   if (!(max_time_difference_s >= 0)) return "evaluation: max_time_difference_s must not be negative";
+  if (!std::isfinite(time_offset_s)) return "evaluation: time_offset_s must be finite";
+  if (!(max_interpolation_s > 0)) return "evaluation: max_interpolation_s must be positive";
+  if (interpolate && by_index) return "evaluation: poses without time stamps can't be interpolated";
+  if (!vertical.allFinite() || !(vertical.norm() > 0)) return "evaluation: vertical must not be zero";
   if (!(rpe_delta > 0) || !std::isfinite(rpe_delta)) return "evaluation: rpe_delta must be positive";
   if (rpe_unit == DeltaUnit::kFrames && rpe_delta != std::floor(rpe_delta)) {
     return "evaluation: rpe_delta must be a whole number of frames";
   }
+  if (rpe_unit == DeltaUnit::kDegrees && rpe_delta > 180 && rpe_all_pairs)
+    return "evaluation: no two poses are more than 180 degrees apart; rpe_delta is too large";
+  if (rpe_unit == DeltaUnit::kSeconds && by_index)
+    return "evaluation: rpe_unit seconds needs time stamps (KITTI: give its times.txt)";
   if (!(rpe_tolerance >= 0)) return "evaluation: rpe_tolerance must not be negative";
   return {};
 }
@@ -100,83 +94,59 @@ ErrorStatistics Summarize(std::vector<double> errors) {
   return out;
 }
 
-std::vector<double> AbsoluteTranslationErrors(const AssociatedPoses& poses) {
-  std::vector<double> out;
-  for (std::size_t k = 0; k < poses.reference.size(); ++k) {
-    out.push_back((poses.reference[k].translation - poses.estimate[k].translation).norm());
+PoseErrors AbsoluteErrors(const std::vector<PoseMatrix>& reference, const std::vector<PoseMatrix>& estimate) {
+  PoseErrors out;
+  for (std::size_t k = 0; k < reference.size(); ++k) {
+    Add(Between(estimate[k], reference[k]), out);
+    // Not through the rotation: it need not be quite one.
+    out.translation.back() = (reference[k].translation - estimate[k].translation).norm();
   }
   return out;
 }
 
-std::vector<double> AbsoluteRotationErrors(const AssociatedPoses& poses) {
-  std::vector<double> out;
-  for (std::size_t k = 0; k < poses.reference.size(); ++k) {
-    out.push_back(kDegrees *
-                  LogSO3(poses.reference[k].rotation.conjugate() * poses.estimate[k].rotation).norm());
-  }
-  return out;
-}
-
-std::vector<std::pair<std::size_t, std::size_t>> RelativePairs(const std::vector<Pose>& estimate,
-                                                               const EvaluationOptions& options) {
-  if (options.rpe_unit == DeltaUnit::kFrames) {
-    return PairsByFrames(estimate.size(), static_cast<std::size_t>(options.rpe_delta), options.rpe_all_pairs);
-  }
-  if (!options.rpe_all_pairs) return ConsecutiveByPath(estimate, options.rpe_delta);
-  return AllPairsByPath(AccumulatedDistances(estimate), options.rpe_delta,
-                        options.rpe_tolerance * options.rpe_delta);
-}
-
-KittiErrors EvaluateKitti(const std::vector<Pose>& reference, const std::vector<Pose>& estimate) {
-  constexpr std::size_t kStep = 10;
-  const std::vector<double> distance = AccumulatedDistances(reference);
-  KittiErrors out;
-  double translation = 0, rotation = 0;
-  for (std::size_t first = 0; first < reference.size(); first += kStep) {
-    for (double length = 100; length <= 800; length += 100) {
-      const auto last = std::upper_bound(distance.begin(), distance.end(), distance[first] + length);
-      if (last == distance.end()) break;
-      const Pose error =
-          RelativeError(reference, estimate, first, static_cast<std::size_t>(last - distance.begin()));
-      translation += error.translation.norm() / length;
-      rotation += error.Angle() / length;
-      ++out.segments;
-    }
-  }
-  if (out.segments == 0) return out;
-  out.translation_percent = 100.0 * translation / static_cast<double>(out.segments);
-  out.rotation_deg_per_m = kDegrees * rotation / static_cast<double>(out.segments);
+PoseErrors RelativeErrors(const std::vector<PoseMatrix>& reference, const std::vector<PoseMatrix>& estimate,
+                          const std::vector<std::pair<std::size_t, std::size_t>>& pairs) {
+  PoseErrors out;
+  for (const auto& [i, j] : pairs)
+    Add(Between(Between(reference[i], reference[j]), Between(estimate[i], estimate[j])), out);
   return out;
 }
 
 EvaluationReport EvaluateTrajectory(const Trajectory& reference, const Trajectory& estimate,
-                                    const EvaluationOptions& options) {
+                                    const EvaluationOptions& options, const RotationsAsWritten& written) {
   const std::string wrong = options.Validate();
   if (!wrong.empty()) throw InputError(wrong);
-  AssociatedPoses poses = options.by_index
-                              ? AssociateByIndex(reference, estimate)
-                              : AssociateByTime(reference, estimate, options.max_time_difference_s);
+  RequireOnePerPose(written.reference, reference);
+  RequireOnePerPose(written.estimate, estimate);
   EvaluationReport out;
-  out.pairs = poses.indices.size();
+  out.poses = Associate(reference, estimate, options);
+  out.pairs = out.poses.indices.size();
   out.reference_poses = reference.size();
   out.estimate_poses = estimate.size();
   out.alignment = options.alignment;
-  out.S_reference_estimate = AlignPoses(poses, options.alignment);
+  out.S_reference_estimate = AlignPoses(out.poses, options);
   if (options.alignment != TrajectoryAlignment::kNone) {
-    for (Pose& pose : poses.estimate) pose = ApplyAlignment(out.S_reference_estimate, pose);
+    for (Pose& pose : out.poses.estimate) pose = ApplyAlignment(out.S_reference_estimate, pose);
   }
-  out.path_length_m = AccumulatedDistances(poses.reference).back();
-  out.ate = Summarize(AbsoluteTranslationErrors(poses));
-  out.ate_rotation = Summarize(AbsoluteRotationErrors(poses));
-  std::vector<double> translation, rotation;
-  for (const auto& [i, j] : RelativePairs(poses.estimate, options)) {
-    const Pose error = RelativeError(poses.reference, poses.estimate, i, j);
-    translation.push_back(error.translation.norm());
-    rotation.push_back(kDegrees * error.Angle());
+  const std::vector<PoseMatrix> a =
+      Matrices(out.poses, true, options.interpolate ? std::vector<Eigen::Matrix3d>() : written.reference,
+               Eigen::Quaterniond::Identity());
+  const std::vector<PoseMatrix> b =
+      Matrices(out.poses, false, written.estimate, out.S_reference_estimate.rotation);
+  out.path_length_m = PathLengths(a).back();
+  out.absolute = AbsoluteErrors(a, b);
+  out.ate = Summarize(out.absolute.translation);
+  out.ate_rotation = Summarize(out.absolute.rotation_deg);
+  out.ate_full = Summarize(out.absolute.full);
+  out.relative_pairs = RelativePairs(out.poses.estimate, out.poses.stamps_s, options);
+  out.relative = RelativeErrors(a, b, out.relative_pairs);
+  out.rpe = Summarize(out.relative.translation);
+  out.rpe_rotation = Summarize(out.relative.rotation_deg);
+  out.rpe_full = Summarize(out.relative.full);
+  if (options.kitti) {
+    out.kitti = EvaluateKitti(a, b);
+    out.drift = EvaluateDrift(a, b);
   }
-  out.rpe = Summarize(std::move(translation));
-  out.rpe_rotation = Summarize(std::move(rotation));
-  if (options.kitti) out.kitti = EvaluateKitti(poses.reference, poses.estimate);
   return out;
 }
 

@@ -1,31 +1,28 @@
 #include <Eigen/SVD>
+#include <cmath>
 
 #include "tutti/backend/evaluation.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
 
-TrajectoryAlignment ParseTrajectoryAlignment(const std::string& name) {
-  for (TrajectoryAlignment alignment : {TrajectoryAlignment::kNone, TrajectoryAlignment::kOrigin,
-                                        TrajectoryAlignment::kSE3, TrajectoryAlignment::kSim3}) {
-    if (name == ToString(alignment)) return alignment;
-  }
-  throw InputError("unknown alignment '" + name + "'; use none, origin, se3 or sim3");
+namespace {
+
+/// The positions that the alignment is computed from.
+std::vector<Eigen::Vector3d> Positions(const std::vector<Pose>& poses, std::size_t first) {
+  std::vector<Eigen::Vector3d> out;
+  for (std::size_t k = 0; k < poses.size() && (first == 0 || k < first); ++k)
+    out.push_back(poses[k].translation);
+  return out;
 }
 
-const char* ToString(TrajectoryAlignment alignment) {
-  switch (alignment) {
-    case TrajectoryAlignment::kNone:
-      return "none";
-    case TrajectoryAlignment::kOrigin:
-      return "origin";
-    case TrajectoryAlignment::kSE3:
-      return "se3";
-    case TrajectoryAlignment::kSim3:
-      return "sim3";
-  }
-  return "?";
+Eigen::Vector3d Mean(const std::vector<Eigen::Vector3d>& points) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& p : points) mean += p / static_cast<double>(points.size());
+  return mean;
 }
+
+}  // namespace
 
 Similarity AlignPoints(const std::vector<Eigen::Vector3d>& reference,
                        const std::vector<Eigen::Vector3d>& estimate, bool with_scale) {
@@ -36,11 +33,7 @@ Similarity AlignPoints(const std::vector<Eigen::Vector3d>& reference,
                      (n == 1 ? " pair of poses is" : " pairs of poses are") +
                      " too few, at least 3 are needed; use the alignment 'origin' or 'none'");
   }
-  Eigen::Vector3d mean_r = Eigen::Vector3d::Zero(), mean_e = Eigen::Vector3d::Zero();
-  for (std::size_t k = 0; k < n; ++k) {
-    mean_r += reference[k] / static_cast<double>(n);
-    mean_e += estimate[k] / static_cast<double>(n);
-  }
+  const Eigen::Vector3d mean_r = Mean(reference), mean_e = Mean(estimate);
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   double variance_r = 0, variance_e = 0;
   for (std::size_t k = 0; k < n; ++k) {
@@ -67,15 +60,57 @@ Similarity AlignPoints(const std::vector<Eigen::Vector3d>& reference,
   return out;
 }
 
-Similarity AlignPoses(const AssociatedPoses& poses, TrajectoryAlignment alignment) {
-  if (alignment == TrajectoryAlignment::kNone) return Similarity();
-  if (alignment == TrajectoryAlignment::kOrigin) {
-    return Similarity(poses.reference.front() * poses.estimate.front().Inverse());
+Similarity AlignAboutAxis(const std::vector<Eigen::Vector3d>& reference,
+                          const std::vector<Eigen::Vector3d>& estimate, const Eigen::Vector3d& axis) {
+  if (reference.size() != estimate.size())
+    throw InputError("alignment: the two lists of points differ in length");
+  if (reference.size() < 2)
+    throw InputError("alignment: 1 pair of poses is too few, at least 2 are needed; use 'origin' or 'none'");
+  const Eigen::Vector3d mean_r = Mean(reference), mean_e = Mean(estimate);
+  // sum r . (R e) over the parts across the axis is largest at the angle atan2(sine, cosine).
+  double cosine = 0, sine = 0, spread = 0;
+  for (std::size_t k = 0; k < reference.size(); ++k) {
+    const Eigen::Vector3d r = reference[k] - mean_r, e = estimate[k] - mean_e;
+    const Eigen::Vector3d across = e - axis.dot(e) * axis;
+    cosine += r.dot(across);
+    sine += r.dot(axis.cross(e));
+    spread += r.squaredNorm() + e.squaredNorm();
   }
-  std::vector<Eigen::Vector3d> reference, estimate;
-  for (const Pose& pose : poses.reference) reference.push_back(pose.translation);
-  for (const Pose& pose : poses.estimate) estimate.push_back(pose.translation);
-  return AlignPoints(reference, estimate, alignment == TrajectoryAlignment::kSim3);
+  if (!(std::hypot(cosine, sine) > 1e-14 * spread)) {
+    throw InputError(
+        "alignment: the positions do not move across the vertical, so the heading is not determined; use "
+        "the alignment 'origin' or 'none', or another axis");
+  }
+  Similarity out;
+  out.rotation = Eigen::Quaterniond(Eigen::AngleAxisd(std::atan2(sine, cosine), axis));
+  out.translation = mean_r - out.rotation * mean_e;
+  return out;
+}
+
+Similarity AlignPoses(const AssociatedPoses& poses, const EvaluationOptions& options) {
+  const auto fit = [&](bool with_scale) {
+    return AlignPoints(Positions(poses.reference, options.align_first),
+                       Positions(poses.estimate, options.align_first), with_scale);
+  };
+  switch (options.alignment) {
+    case TrajectoryAlignment::kNone:
+      return Similarity();
+    case TrajectoryAlignment::kOrigin:
+      return Similarity(poses.reference.front() * poses.estimate.front().Inverse());
+    case TrajectoryAlignment::kSE3:
+      return fit(false);
+    case TrajectoryAlignment::kSim3:
+      return fit(true);
+    case TrajectoryAlignment::kScale: {
+      Similarity out;
+      out.scale = fit(true).scale;
+      return out;
+    }
+    case TrajectoryAlignment::kYaw:
+      return AlignAboutAxis(Positions(poses.reference, options.align_first),
+                            Positions(poses.estimate, options.align_first), options.vertical.normalized());
+  }
+  return Similarity();
 }
 
 Pose ApplyAlignment(const Similarity& S, const Pose& pose) {

@@ -1,5 +1,7 @@
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <iterator>
 
 #include "tutti/backend/evaluation.h"
 #include "tutti/core/error.h"
@@ -11,6 +13,18 @@ std::string Range(const Trajectory& trajectory) {
   char text[96];
   std::snprintf(text, sizeof text, "%.3f .. %.3f s", trajectory.front().stamp_s, trajectory.back().stamp_s);
   return text;
+}
+
+std::string Short(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%g", value);
+  return text;
+}
+
+std::string Ranges(const Trajectory& reference, const Trajectory& estimate, double offset_s) {
+  std::string text = "the reference spans " + Range(reference) + ", the estimate " + Range(estimate);
+  if (offset_s != 0) text += " (before the offset of " + Short(offset_s) + " s)";
+  return text + "; check that the files belong together and use the same clock";
 }
 
 /// Position of the nearest time stamp; the first of two that are equally near.
@@ -41,27 +55,63 @@ void Add(AssociatedPoses& out, const Trajectory& reference, const Trajectory& es
 }  // namespace
 
 AssociatedPoses AssociateByTime(const Trajectory& reference, const Trajectory& estimate,
-                                double max_difference_s) {
+                                double max_difference_s, double offset_s) {
   RequirePoses(reference, estimate);
   const bool estimate_is_longer = estimate.size() > reference.size();
   // Loop over the shorter (the estimate, if they are equally long: evo loops over its second trajectory
   // then).
   const Trajectory& shorter = estimate_is_longer ? reference : estimate;
   const Trajectory& longer = estimate_is_longer ? estimate : reference;
+  const double offset_of_shorter = estimate_is_longer ? -offset_s : offset_s;
   AssociatedPoses out;
   for (std::size_t s = 0; s < shorter.size(); ++s) {
-    const std::size_t l = Nearest(longer, shorter[s].stamp_s);
-    if (std::abs(longer[l].stamp_s - shorter[s].stamp_s) > max_difference_s) continue;
+    const double stamp = shorter[s].stamp_s + offset_of_shorter;
+    const std::size_t l = Nearest(longer, stamp);
+    if (std::abs(longer[l].stamp_s - stamp) > max_difference_s) continue;
     estimate_is_longer ? Add(out, reference, estimate, s, l) : Add(out, reference, estimate, l, s);
   }
   if (out.indices.empty()) {
-    char limit[32];
-    std::snprintf(limit, sizeof limit, "%g", max_difference_s);
-    throw InputError("evaluation: no two poses are within " + std::string(limit) +
-                     " s of each other: the reference spans " + Range(reference) + ", the estimate " +
-                     Range(estimate) + "; check that the files belong together and use the same clock");
+    throw InputError("evaluation: no two poses are within " + Short(max_difference_s) +
+                     " s of each other: " + Ranges(reference, estimate, offset_s));
   }
   return out;
+}
+
+AssociatedPoses AssociateByInterpolation(const Trajectory& reference, const Trajectory& estimate,
+                                         double max_gap_s, double offset_s) {
+  RequirePoses(reference, estimate);
+  AssociatedPoses out;
+  for (std::size_t e = 0; e < estimate.size(); ++e) {
+    const double stamp = estimate[e].stamp_s + offset_s;
+    const std::optional<Pose> pose = InterpolatePose(reference, stamp, max_gap_s);
+    if (!pose) continue;
+    std::size_t before = Nearest(reference, stamp);
+    if (before > 0 && reference[before].stamp_s > stamp) --before;
+    Add(out, reference, estimate, before, e);
+    out.reference.back() = *pose;
+  }
+  if (out.indices.empty()) {
+    throw InputError(
+        "evaluation: no pose of the estimate lies between two of the reference that are at most " +
+        Short(max_gap_s) + " s apart: " + Ranges(reference, estimate, offset_s));
+  }
+  return out;
+}
+
+std::optional<Pose> InterpolatePose(const Trajectory& trajectory, double stamp_s, double max_gap_s) {
+  constexpr double kSame = 1e-6;  // [s]
+  const auto after = std::lower_bound(trajectory.begin(), trajectory.end(), stamp_s,
+                                      [](const StampedPose& a, double stamp) { return a.stamp_s < stamp; });
+  if (after != trajectory.end() && std::abs(after->stamp_s - stamp_s) < kSame) return after->pose;
+  if (after != trajectory.begin() && std::abs(std::prev(after)->stamp_s - stamp_s) < kSame)
+    return std::prev(after)->pose;
+  if (after == trajectory.begin() || after == trajectory.end()) return std::nullopt;
+  const StampedPose &a = *std::prev(after), &b = *after;
+  const double gap = b.stamp_s - a.stamp_s;
+  if (gap > max_gap_s) return std::nullopt;
+  const double share = (stamp_s - a.stamp_s) / gap;
+  return Pose(a.pose.rotation.slerp(share, b.pose.rotation),
+              (1 - share) * a.pose.translation + share * b.pose.translation);
 }
 
 AssociatedPoses AssociateByIndex(const Trajectory& reference, const Trajectory& estimate) {

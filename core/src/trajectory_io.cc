@@ -40,11 +40,25 @@ double Number(const std::filesystem::path& file, std::size_t line, const std::st
   return *value;
 }
 
+// Things that are put up with where the caller wants to know of them instead of an error.
+struct Tolerated {
+  std::size_t count = 0, first_line = 0;
+  void Note(std::size_t line) {
+    if (count++ == 0) first_line = line;
+  }
+};
+struct Oddities {
+  bool tolerated = false;
+  Tolerated repeats;  // poses that repeat a time stamp, left out
+  Tolerated lengths;  // quaternions that are not of length 1, normalised
+};
+
 Pose QuaternionPose(const std::filesystem::path& file, std::size_t line, const Eigen::Vector3d& t, double x,
-                    double y, double z, double w) {
+                    double y, double z, double w, Oddities& odd) {
   const Eigen::Quaterniond q(w, x, y, z);
   if (q.norm() < 1e-6) Fail(file, line, "the quaternion is zero; a unit quaternion is needed");
   if (q.norm() > 1e6) Fail(file, line, "the quaternion is far from length 1; a unit quaternion is needed");
+  if (std::abs(q.norm() - 1) > 1e-3) odd.lengths.Note(line);
   return Pose(q.normalized(), t);
 }
 
@@ -55,25 +69,18 @@ void RequireColumns(const std::filesystem::path& file, std::size_t line, std::si
   }
 }
 
-// Poses that repeat a time stamp, left out where the caller wants to know of them instead of an error.
-struct Repeats {
-  bool tolerated = false;
-  std::size_t count = 0, first_line = 0;
-};
-
 // True if the pose is to be left out. Throws if time does not grow.
 bool LeaveOut(const std::filesystem::path& file, std::size_t line, const Trajectory& before, double stamp_s,
-              Repeats& repeats) {
+              Oddities& odd) {
   if (before.empty() || stamp_s > before.back().stamp_s) return false;
   if (stamp_s < before.back().stamp_s)
     Fail(file, line, "goes back in time; sort the file by its first column");
-  if (!repeats.tolerated)
-    Fail(file, line, "repeats the time stamp of the pose before it; remove one of the two");
-  if (repeats.count++ == 0) repeats.first_line = line;
+  if (!odd.tolerated) Fail(file, line, "repeats the time stamp of the pose before it; remove one of the two");
+  odd.repeats.Note(line);
   return true;
 }
 
-Trajectory ReadTum(const std::filesystem::path& file, Repeats& repeats) {
+Trajectory ReadTum(const std::filesystem::path& file, Oddities& odd) {
   Trajectory out;
   ForEachLine(file, [&](std::size_t line, const std::vector<std::string>& w) {
     if (w.size() != 8) {
@@ -82,13 +89,13 @@ Trajectory ReadTum(const std::filesystem::path& file, Repeats& repeats) {
     }
     double v[8];
     for (int i = 0; i < 8; ++i) v[i] = Number(file, line, w[static_cast<std::size_t>(i)]);
-    if (LeaveOut(file, line, out, v[0], repeats)) return;
-    out.push_back({v[0], QuaternionPose(file, line, {v[1], v[2], v[3]}, v[4], v[5], v[6], v[7])});
+    if (LeaveOut(file, line, out, v[0], odd)) return;
+    out.push_back({v[0], QuaternionPose(file, line, {v[1], v[2], v[3]}, v[4], v[5], v[6], v[7], odd)});
   });
   return out;
 }
 
-Trajectory ReadKitti(const std::filesystem::path& file) {
+Trajectory ReadKitti(const std::filesystem::path& file, std::vector<Eigen::Matrix3d>* rotations) {
   Trajectory out;
   ForEachLine(file, [&](std::size_t line, const std::vector<std::string>& w) {
     if (w.size() != 12) {
@@ -103,11 +110,12 @@ Trajectory ReadKitti(const std::filesystem::path& file) {
     if (!(std::abs(rotation.determinant() - 1.0) <= 0.1 && rotation.cwiseAbs().maxCoeff() <= 2))
       Fail(file, line, "its 3x3 part is not a rotation matrix");
     out.push_back({static_cast<double>(out.size()), Pose::FromMatrix(m)});
+    if (rotations != nullptr) rotations->push_back(rotation);
   });
   return out;
 }
 
-Trajectory ReadEuroc(const std::filesystem::path& file, Repeats& repeats) {
+Trajectory ReadEuroc(const std::filesystem::path& file, Oddities& odd) {
   Trajectory out;
   ForEachLine(file, [&](std::size_t line, const std::vector<std::string>& w) {
     RequireColumns(file, line, w.size(), 8,
@@ -115,8 +123,8 @@ Trajectory ReadEuroc(const std::filesystem::path& file, Repeats& repeats) {
     double v[8];
     for (int i = 0; i < 8; ++i) v[i] = Number(file, line, w[static_cast<std::size_t>(i)]);
     const double stamp = v[0] * 1e-9;
-    if (LeaveOut(file, line, out, stamp, repeats)) return;
-    out.push_back({stamp, QuaternionPose(file, line, {v[1], v[2], v[3]}, v[5], v[6], v[7], v[4])});
+    if (LeaveOut(file, line, out, stamp, odd)) return;
+    out.push_back({stamp, QuaternionPose(file, line, {v[1], v[2], v[3]}, v[5], v[6], v[7], v[4], odd)});
   });
   return out;
 }
@@ -144,27 +152,30 @@ TrajectoryFormat GuessTrajectoryFormat(const std::filesystem::path& file) {
 }
 
 Trajectory ReadTrajectory(const std::filesystem::path& file, TrajectoryFormat format,
-                          std::vector<std::string>* warnings) {
+                          std::vector<std::string>* warnings, std::vector<Eigen::Matrix3d>* rotations) {
   Trajectory out;
-  Repeats repeats;
-  repeats.tolerated = warnings != nullptr;
+  Oddities odd;
+  odd.tolerated = warnings != nullptr;
+  if (rotations != nullptr) rotations->clear();
   switch (format) {
     case TrajectoryFormat::kTum:
-      out = ReadTum(file, repeats);
+      out = ReadTum(file, odd);
       break;
     case TrajectoryFormat::kKitti:
-      out = ReadKitti(file);
+      out = ReadKitti(file, rotations);
       break;
     case TrajectoryFormat::kEuroc:
-      out = ReadEuroc(file, repeats);
+      out = ReadEuroc(file, odd);
       break;
   }
   if (out.empty()) throw InputError(file.string() + ": holds no pose");
-  if (repeats.count > 0) {
-    warnings->push_back(file.string() + ":" + std::to_string(repeats.first_line) +
-                        ": repeats the time stamp of the pose before it; left out, with all such poses: " +
-                        std::to_string(repeats.count));
-  }
+  const auto warn = [&](const Tolerated& what, const char* text) {
+    if (warnings == nullptr || what.count == 0) return;
+    warnings->push_back(file.string() + ":" + std::to_string(what.first_line) + ": " + text +
+                        ", with all such poses: " + std::to_string(what.count));
+  };
+  warn(odd.repeats, "repeats the time stamp of the pose before it; left out");
+  warn(odd.lengths, "the quaternion is not of length 1; normalised");
   return out;
 }
 

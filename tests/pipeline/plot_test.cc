@@ -116,6 +116,26 @@ TEST(Plot, CurvesThatAreEmptyOrNotFiniteAreDrawable) {
   EXPECT_EQ(ReadAll(folder / "nan.svg").find("nan"), std::string::npos);
 }
 
+TEST(Plot, FittedAxesReachWhatTheCurvesReach) {
+  const auto folder = testing::FreshFolder();
+  CurvePlot plot = Curves();
+  plot.fit = true;
+  plot.curves[0].points = {{0, 0}, {250, 4}, {500, 3}};
+  plot.curves[0].marks.clear();
+  WriteSvg(folder / "p.svg", plot);
+  const std::string svg = ReadAll(folder / "p.svg");
+  for (const char* text : {">500<", ">4<", ">verified<"})
+    EXPECT_NE(svg.find(text), std::string::npos) << text;
+  for (const PlotShape& shape : LayOut(plot)) {
+    for (const Eigen::Vector2d& p : shape.points) {
+      EXPECT_TRUE(p.x() >= 0 && p.x() <= kPlotWidth && p.y() >= 0 && p.y() <= kPlotHeight);
+    }
+  }
+  plot.curves[0].points = {{0, 0}, {0, 0}};  // no extent
+  WriteSvg(folder / "flat.svg", plot);
+  EXPECT_EQ(ReadAll(folder / "flat.svg").find("nan"), std::string::npos);
+}
+
 TEST(Plot, AxesThatRunBackPutTheirLowValueAtTheTop) {
   PlotAxes axes;
   axes.low = {0, 10};

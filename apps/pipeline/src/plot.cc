@@ -1,7 +1,5 @@
 #include "tutti/pipeline/plot.h"
 
-#include "plot_layout.h"
-
 namespace tutti {
 namespace {
 
@@ -13,6 +11,12 @@ void WritePlotPng(const std::filesystem::path& file, const Plot& plot) {
 }
 
 }  // namespace
+
+const char* PlotPalette(std::size_t k) {
+  static constexpr const char* kColors[kPlotPaletteSize] = {"#0072b2", "#d55e00", "#009e73",
+                                                            "#cc79a7", "#e69f00", "#56b4e9"};
+  return kColors[k % kPlotPaletteSize];
+}
 
 void WriteSvg(const std::filesystem::path& file, const TrajectoryPlot& plot) {
   WriteSvg(file, LayOut(plot), kPlotWidth, kPlotHeight);

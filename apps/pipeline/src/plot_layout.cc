@@ -1,9 +1,9 @@
-#include "plot_layout.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
+
+#include "tutti/pipeline/plot.h"
 
 namespace tutti {
 namespace {
@@ -76,15 +76,16 @@ void AddLegend(const TrajectoryPlot& plot, const PlotAxes& axes, std::vector<Plo
   if (!plot.edges.empty()) entry(plot.edges_name, plot.edges_color, 2, false);
 }
 
-// At the lower left, where precision-recall curves rarely pass; on white, as they may.
+// Precision-recall curves: at the lower left, where they rarely pass; on white, as they may. Fitted axes: at
+// the top, where FittedAxes leaves room.
 void AddLegend(const CurvePlot& plot, const PlotAxes& axes, std::vector<PlotShape>& shapes) {
   const double lines = static_cast<double>(plot.curves.size() + plot.notes.size());
   double width = 0;
   for (const PlotCurve& curve : plot.curves) width = std::max(width, 42 + TextWidth(curve.name, 14));
   for (const std::string& note : plot.notes) width = std::max(width, TextWidth(note, 14));
   const double x = axes.top_left.x() + 20;
-  double y = axes.bottom_right.y() - 20 * lines;
-  shapes.push_back(PlotBox({x - 8, y - 20}, {x + width + 16, axes.bottom_right.y() - 8}, "#ffffff"));
+  double y = plot.fit ? axes.top_left.y() + 28 : axes.bottom_right.y() - 20 * lines;
+  shapes.push_back(PlotBox({x - 8, y - 20}, {x + width + 16, y + 20 * lines - 8}, "#ffffff"));
   for (const PlotCurve& curve : plot.curves) {
     shapes.push_back(LegendLine(x, y, curve.color, curve.width, curve.dashed));
     shapes.push_back(PlotText({x + 42, y}, curve.name, 14));
@@ -94,6 +95,34 @@ void AddLegend(const CurvePlot& plot, const PlotAxes& axes, std::vector<PlotShap
     shapes.push_back(PlotText({x, y}, note, 14));
     y += 20;
   }
+}
+
+// A little room beyond 0 and 1, so that a curve along the frame is seen.
+PlotAxes UnitAxes() {
+  PlotAxes axes;
+  axes.low = {-0.02, -0.02};
+  axes.high = {1.02, 1.02};
+  axes.x_ticks = axes.y_ticks = 11;  // steps of 0.1
+  return axes;
+}
+
+// From 0 to what the curves reach, with room for the legend above.
+PlotAxes FittedAxes(const CurvePlot& plot) {
+  PlotAxes axes;
+  Eigen::Vector2d high(0, 0);
+  for (const PlotCurve& curve : plot.curves) {
+    for (const Eigen::Vector2d& p : curve.points) {
+      if (p.allFinite()) high = high.cwiseMax(p);
+    }
+  }
+  for (int axis = 0; axis < 2; ++axis) {
+    if (!(high[axis] > 0)) high[axis] = 1;
+  }
+  const double page = axes.bottom_right.y() - axes.top_left.y();
+  const double lines = static_cast<double>(plot.curves.size() + plot.notes.size());
+  const double room = std::min(0.5, (20 * lines + 30) / page);
+  axes.high = {high.x(), high.y() / (1 - room)};
+  return axes;
 }
 
 }  // namespace
@@ -127,11 +156,7 @@ std::vector<PlotShape> LayOut(const TrajectoryPlot& plot) {
 }
 
 std::vector<PlotShape> LayOut(const CurvePlot& plot) {
-  // A little room beyond 0 and 1, so that a curve along the frame is seen.
-  PlotAxes axes;
-  axes.low = {-0.02, -0.02};
-  axes.high = {1.02, 1.02};
-  axes.x_ticks = axes.y_ticks = 11;  // steps of 0.1
+  PlotAxes axes = plot.fit ? FittedAxes(plot) : UnitAxes();
   axes.title = plot.title;
   axes.x_name = plot.x_name;
   axes.y_name = plot.y_name;

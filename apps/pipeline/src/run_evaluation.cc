@@ -44,8 +44,8 @@ TrajectoryScore Score(const Trajectory& reference, const Trajectory& estimate, b
 enum class Verdict { kTrue, kFalse, kUnknown };
 
 Verdict Judge(const LoopRecord& loop, const Trajectory& reference, const CameraRig& rig) {
-  const std::optional<Pose> candidate = PoseAt(reference, loop.candidate_stamp_s);
-  const std::optional<Pose> query = PoseAt(reference, loop.query_stamp_s);
+  const std::optional<Pose> candidate = InterpolatePose(reference, loop.candidate_stamp_s, kMaxGap);
+  const std::optional<Pose> query = InterpolatePose(reference, loop.query_stamp_s, kMaxGap);
   if (!candidate || !query) return Verdict::kUnknown;
   if (rig.sensor == Sensor::kMono || !loop.S_candidate_query) {
     const double distance = (candidate->translation - query->translation).norm();
@@ -59,21 +59,6 @@ Verdict Judge(const LoopRecord& loop, const Trajectory& reference, const CameraR
 }
 
 }  // namespace
-
-std::optional<Pose> PoseAt(const Trajectory& reference, double stamp_s) {
-  const auto after = std::lower_bound(reference.begin(), reference.end(), stamp_s,
-                                      [](const StampedPose& a, double stamp) { return a.stamp_s < stamp; });
-  if (after != reference.end() && std::abs(after->stamp_s - stamp_s) < 1e-6) return after->pose;
-  if (after != reference.begin() && std::abs(std::prev(after)->stamp_s - stamp_s) < 1e-6)
-    return std::prev(after)->pose;
-  if (after == reference.begin() || after == reference.end()) return std::nullopt;
-  const StampedPose &a = *std::prev(after), &b = *after;
-  const double gap = b.stamp_s - a.stamp_s;
-  if (gap > kMaxGap) return std::nullopt;
-  const double share = (stamp_s - a.stamp_s) / gap;
-  return Pose(a.pose.rotation.slerp(share, b.pose.rotation),
-              (1 - share) * a.pose.translation + share * b.pose.translation);
-}
 
 void EvaluateRun(const Trajectory& reference, const std::string& file, RunResult& result) {
   RunEvaluation evaluation;

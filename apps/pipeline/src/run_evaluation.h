@@ -14,7 +14,4 @@ namespace tutti {
 /// the run) and result.evaluation.
 void EvaluateRun(const Trajectory& reference, const std::string& file, RunResult& result);
 
-/// "T_world_body at that time", interpolated between reference poses that are at most 0.2 s apart.
-std::optional<Pose> PoseAt(const Trajectory& reference, double stamp_s);
-
 }  // namespace tutti

@@ -32,9 +32,12 @@ TrajectoryFormat GuessTrajectoryFormat(const std::filesystem::path& file);
 /// Reads a trajectory. Quaternions are normalised. Throws InputError that names file and line for: missing
 /// file, wrong number of columns, NaN or infinity, a zero quaternion, time stamps that do not strictly grow.
 /// With `warnings`, a pose that repeats the time stamp before it (published ground truth has such lines) is
-/// left out instead, the first one stays, and one line about it is appended.
+/// left out instead, the first one stays, and one line about it is appended; another one tells of quaternions
+/// whose length is more than 0.1 % off 1. `rotations` gets KITTI's 3x3 matrices as the file has them (6
+/// digits: not quite rotations; the poses hold the nearest ones), one per pose; nothing for other formats.
 Trajectory ReadTrajectory(const std::filesystem::path& file, TrajectoryFormat format,
-                          std::vector<std::string>* warnings = nullptr);
+                          std::vector<std::string>* warnings = nullptr,
+                          std::vector<Eigen::Matrix3d>* rotations = nullptr);
 
 /// Reads KITTI's times.txt: one time stamp [s] a line. Throws InputError with file and line.
 std::vector<double> ReadTimes(const std::filesystem::path& file);

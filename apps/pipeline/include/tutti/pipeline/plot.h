@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "tutti/pipeline/plot_shapes.h"
+
 namespace tutti {
 
 /// One line of the plot.
@@ -38,12 +40,22 @@ struct PlotCurve {
   std::vector<Eigen::Vector2d> marks;  ///< points of the curve that get a disc
 };
 
-/// Curves between 0 and 1 on both axes, such as precision over recall.
+/// Curves over two axes, such as precision over recall.
 struct CurvePlot {
   std::string title, x_name, y_name;
   std::vector<PlotCurve> curves;
   std::vector<std::string> notes;  ///< lines below the legend
+  bool fit = false;  ///< axes from 0 to what the curves reach, legend on top; else from 0 to 1, legend below
 };
+
+/// Colour of the k-th of several series; Okabe and Ito's palette, told apart by colour-blind people too. From
+/// the 7th series on colours repeat; draw those dashed.
+const char* PlotPalette(std::size_t k);
+constexpr std::size_t kPlotPaletteSize = 6;
+
+/// The shapes of a plot on a page of kPlotWidth x kPlotHeight. Points that are not finite are left out.
+std::vector<PlotShape> LayOut(const TrajectoryPlot& plot);
+std::vector<PlotShape> LayOut(const CurvePlot& plot);
 
 /// Writes the plot. Throws InputError if the file can't be written in full. Points that are not finite are
 /// left out.

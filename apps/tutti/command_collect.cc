@@ -1,0 +1,69 @@
+// tutti collect: the summaries of many runs in one table.
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "commands.h"
+#include "comparison.h"
+#include "files.h"
+#include "tutti/core/error.h"
+#include "tutti/core/text.h"
+
+namespace tutti::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct CollectArguments {
+  std::vector<std::string> runs;
+  std::string table_format = "text", json;
+};
+
+/// The summary of a run's folder, or all summaries below a folder, in natural order of their paths.
+std::vector<fs::path> Summaries(const std::string& where) {
+  std::error_code error;
+  if (!fs::is_directory(where, error)) return {fs::path(where)};
+  std::vector<std::string> files;
+  for (fs::recursive_directory_iterator it(where, fs::directory_options::skip_permission_denied, error), end;
+       !error && it != end; it.increment(error)) {
+    if (it->path().filename() == "summary.json") files.push_back(it->path().string());
+  }
+  if (error) throw InputError(where + ": can't be read (" + error.message() + ")");
+  if (files.empty()) throw InputError(where + ": holds no summary.json; give folders of `tutti run --out`");
+  std::sort(files.begin(), files.end(), NaturalLess);
+  return {files.begin(), files.end()};
+}
+
+void RunCollect(const CollectArguments& arguments) {
+  const TableFormat format = ParseTableFormat(arguments.table_format);
+  Comparison comparison;
+  for (const std::string& where : arguments.runs) {
+    for (const fs::path& file : Summaries(where)) comparison.runs.push_back(ReadRunFigures(file));
+  }
+  std::fputs(DescribeComparison(comparison, format).c_str(), stdout);
+  if (!arguments.json.empty()) WriteText(arguments.json, ComparisonJson(comparison).dump(2) + "\n");
+}
+
+}  // namespace
+
+void AddCollectCommand(CLI::App& app, int&) {
+  CLI::App* command = app.add_subcommand("collect", "The summaries of many runs in one table");
+  const auto arguments = std::make_shared<CollectArguments>();
+  command
+      ->add_option("runs", arguments->runs, "Folders of runs, folders of such folders, or summary.json files")
+      ->required();
+  AddTableFormatOption(*command, arguments->table_format);
+  command->add_option("--json", arguments->json, "Write the table to this file");
+  command->footer(
+      "Runs are grouped by data set and by variant: odometry (run.loops: false), ensemble (loops.rule: "
+      "mean), "
+      "else the\n"
+      "rule. Runs of one group should differ in their seed alone: the interval is over them.\n"
+      "Example: tutti collect results/ --table-format markdown > table.md");
+  command->callback([arguments] { RunCollect(*arguments); });
+}
+
+}  // namespace tutti::cli

@@ -1,0 +1,72 @@
+// tutti convert: a trajectory from one format to another.
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "commands.h"
+#include "tutti/backend/trajectory_file.h"
+#include "tutti/core/error.h"
+
+namespace tutti::cli {
+namespace {
+
+struct ConvertArguments {
+  std::string in, out, from = "auto", to, times, times_out;
+};
+
+void RunConvert(const ConvertArguments& arguments) {
+  std::optional<PoseFileFormat> from;
+  if (arguments.from != "auto") from = ParsePoseFileFormat(arguments.from);
+  const PoseFileFormat to = ParsePoseFileFormat(arguments.to);
+  std::vector<double> times;
+  if (!arguments.times.empty()) times = ReadTimes(arguments.times);
+  const PoseFile in = ReadPoseFile(arguments.in, from, times);
+  for (const std::string& warning : in.warnings)
+    std::fprintf(stderr, "tutti: warning: %s\n", warning.c_str());
+  const bool needs_stamps = to == PoseFileFormat::kTum || to == PoseFileFormat::kEuroc;
+  if (!in.has_stamps && (needs_stamps || !arguments.times_out.empty())) {
+    throw InputError(arguments.in + ": the format " + ToString(in.format) +
+                     " has no time stamps; give --times (KITTI: times.txt, one time stamp [s] a line)");
+  }
+  WritePoseFile(arguments.out, in.trajectory, to);
+  if (!arguments.times_out.empty()) WriteTimes(arguments.times_out, in.trajectory);
+  std::printf("%zu poses: %s (%s) -> %s (%s)\n", in.trajectory.size(), arguments.in.c_str(),
+              ToString(in.format), arguments.out.c_str(), ToString(to));
+  if (in.has_stamps && !needs_stamps && arguments.times_out.empty())
+    std::printf("the format %s has no time stamps; --times-out keeps them in a file of their own\n",
+                ToString(to));
+}
+
+}  // namespace
+
+void AddConvertCommand(CLI::App& app, int&) {
+  CLI::App* command = app.add_subcommand("convert", "Trajectories among TUM, KITTI, EuRoC and g2o");
+  const auto arguments = std::make_shared<ConvertArguments>();
+  command->add_option("input", arguments->in, "Trajectory to read")->required();
+  command->add_option("output", arguments->out, "File to write")->required();
+  command->add_option("--to", arguments->to, "Format of the output")
+      ->required()
+      ->check(CLI::IsMember(PoseFileFormatNames()));
+  command->add_option("--from", arguments->from, "Format of the input; auto: by content")
+      ->check(CLI::IsMember({"auto", "tum", "kitti", "euroc", "g2o"}))
+      ->capture_default_str();
+  command->add_option("--times", arguments->times,
+                      "Time stamps of kitti's lines or g2o's ids: one [s] a line, as KITTI's times.txt");
+  command->add_option("--times-out", arguments->times_out, "Write the time stamps to this file");
+  command->footer(
+      "Nothing is turned or moved: KITTI's ground truth stays in its camera frame, EuRoC's in the body's. "
+      "g2o "
+      "gets the\n"
+      "vertices 0, 1, ... and edges between neighbours with identity information, for viewers and tests, not "
+      "to optimise.\n"
+      "EuRoC stamps are rounded to what a double holds of them, about 0.2 microseconds.\n"
+      "Examples:\n"
+      "  tutti convert poses/00.txt 00.tum --to tum --times sequences/00/times.txt\n"
+      "  tutti convert mav0/state_groundtruth_estimate0/data.csv groundtruth.txt --to tum\n"
+      "  tutti convert out/trajectory.txt 00.txt --to kitti --times-out times.txt");
+  command->callback([arguments] { RunConvert(*arguments); });
+}
+
+}  // namespace tutti::cli

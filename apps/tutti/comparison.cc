@@ -1,0 +1,272 @@
+#include "comparison.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+
+#include "tutti/core/error.h"
+#include "tutti/loopclosure/significance.h"
+
+namespace tutti::cli {
+namespace {
+
+using Json = nlohmann::ordered_json;
+constexpr const char* kEnsemble = "ensemble";
+
+/// The number at a path like "evaluation/slam/ate_rmse_m"; NaN if there is none.
+double Number(const Json& json, const std::string& path) {
+  const Json::json_pointer pointer("/" + path);
+  return json.contains(pointer) && json.at(pointer).is_number() ? json.at(pointer).get<double>()
+                                                                : RunFigures::kNone;
+}
+
+/// Seconds of the stages whose name begins so.
+double StageSeconds(const Json& json, const std::string& prefix) {
+  const Json::json_pointer pointer("/timing/stage_ms");
+  if (!json.contains(pointer)) return RunFigures::kNone;
+  double sum = 0;
+  for (const auto& [name, ms] : json.at(pointer).items()) {
+    if (name.rfind(prefix, 0) == 0 && name != "loop_wait" && ms.is_number()) sum += ms.get<double>() / 1e3;
+  }
+  return sum;
+}
+
+std::string VariantOf(const Json& json) {
+  const Json::json_pointer loops("/config/run/loops"), rule("/config/loops/rule");
+  if (json.contains(loops) && json.at(loops) == false) return "odometry";
+  if (!json.contains(rule) || !json.at(rule).is_string()) return "?";
+  const std::string word = json.at(rule).get<std::string>();
+  return word == "mean" ? kEnsemble : word;
+}
+
+/// t such that P(|T| >= t) = p, by bisection.
+double StudentQuantile(double p, double degrees) {
+  double low = 0, high = 1e4;
+  for (int i = 0; i < 200; ++i) {
+    const double middle = 0.5 * (low + high);
+    (StudentTwoSided(middle, degrees) > p ? low : high) = middle;
+  }
+  return 0.5 * (low + high);
+}
+
+template <typename Key>
+std::vector<std::string> InOrder(const std::vector<RunFigures>& runs, const Key& key) {
+  std::vector<std::string> out;
+  for (const RunFigures& run : runs) {
+    if (std::find(out.begin(), out.end(), key(run)) == out.end()) out.push_back(key(run));
+  }
+  return out;
+}
+
+struct Variant {
+  std::string name;
+  std::vector<const RunFigures*> runs;
+};
+
+std::vector<Variant> Variants(const Comparison& comparison, const std::string& dataset) {
+  std::vector<RunFigures> here;
+  for (const RunFigures& run : comparison.runs) {
+    if (run.dataset == dataset) here.push_back(run);
+  }
+  std::vector<Variant> out;
+  for (const std::string& name : InOrder(here, [](const RunFigures& run) { return run.variant; })) {
+    Variant variant{name, {}};
+    for (const RunFigures& run : comparison.runs) {
+      if (run.dataset == dataset && run.variant == name) variant.runs.push_back(&run);
+    }
+    out.push_back(variant);
+  }
+  return out;
+}
+
+MeanInterval Over(const Variant& variant, double RunFigures::*field) {
+  std::vector<double> values;
+  for (const RunFigures* run : variant.runs) values.push_back(run->*field);
+  return MeanWithInterval(values);
+}
+
+std::size_t Failures(const Variant& variant) {
+  return static_cast<std::size_t>(std::count_if(variant.runs.begin(), variant.runs.end(),
+                                                [](const RunFigures* run) { return !run->failure.empty(); }));
+}
+
+/// ATE of the variant minus that of the ensemble, over the seeds that both have.
+PairedTTestResult AgainstEnsemble(const Variant& variant, const std::vector<Variant>& all) {
+  std::vector<double> a, b;
+  for (const Variant& other : all) {
+    if (other.name != kEnsemble) continue;
+    for (const RunFigures* run : variant.runs) {
+      for (const RunFigures* ensemble : other.runs) {
+        if (run->seed != ensemble->seed || !std::isfinite(run->ate_m) || !std::isfinite(ensemble->ate_m))
+          continue;
+        a.push_back(run->ate_m);
+        b.push_back(ensemble->ate_m);
+      }
+    }
+  }
+  return PairedTTest(a, b);
+}
+
+std::string Cell(const MeanInterval& value, int decimals) {
+  if (value.count == 0) return "-";
+  std::string text = Fixed(value.mean, decimals);
+  if (std::isfinite(value.half_width)) text += " +- " + Fixed(value.half_width, decimals);
+  return text;
+}
+
+TextTable Table(const std::vector<Variant>& variants) {
+  TextTable table;
+  table.header = {"variant",   "runs",       "proposed",   "accepted",          "false",    "ATE [m]",
+                  "p",         "RPE [m]",    "t_rel [%]",  "r_rel [deg/100 m]", "time [s]", "odometry [s]",
+                  "loops [s]", "frame [ms]", "memory [MB]"};
+  for (const Variant& variant : variants) {
+    const PairedTTestResult test = AgainstEnsemble(variant, variants);
+    MeanInterval rotation = Over(variant, &RunFigures::r_rel_deg_per_m);
+    rotation.mean *= 100;
+    rotation.half_width *= 100;
+    const std::size_t failed = Failures(variant);
+    table.rows.push_back(
+        {variant.name,
+         std::to_string(variant.runs.size() - failed) +
+             (failed > 0 ? " (" + std::to_string(failed) + " failed)" : ""),
+         Cell(Over(variant, &RunFigures::proposed), 1), Cell(Over(variant, &RunFigures::accepted), 1),
+         Cell(Over(variant, &RunFigures::false_loops), 1), Cell(Over(variant, &RunFigures::ate_m), 4),
+         variant.name == kEnsemble || test.pairs < 2 ? "-" : Fixed(test.p, 4),
+         Cell(Over(variant, &RunFigures::rpe_m), 4), Cell(Over(variant, &RunFigures::t_rel_percent), 3),
+         Cell(rotation, 3), Cell(Over(variant, &RunFigures::wall_s), 1),
+         Cell(Over(variant, &RunFigures::odometry_s), 1), Cell(Over(variant, &RunFigures::loops_s), 1),
+         Cell(Over(variant, &RunFigures::frame_ms), 1), Cell(Over(variant, &RunFigures::memory_mb), 0)});
+  }
+  return table;
+}
+
+/// Where the ensemble helped, where that can't be told, and where it did not, in words.
+std::string Verdict(const std::vector<Variant>& variants) {
+  double ensemble = RunFigures::kNone;
+  for (const Variant& variant : variants) {
+    if (variant.name == kEnsemble) ensemble = Over(variant, &RunFigures::ate_m).mean;
+  }
+  if (!std::isfinite(ensemble)) return "";
+  std::string beaten, unclear, not_beaten;
+  for (const Variant& variant : variants) {
+    const double mean = Over(variant, &RunFigures::ate_m).mean;
+    if (variant.name == kEnsemble || !std::isfinite(mean)) continue;
+    const bool sure = AgainstEnsemble(variant, variants).p < 0.05;
+    std::string& list = mean <= ensemble ? not_beaten : sure ? beaten : unclear;
+    list += (list.empty() ? "" : ", ") + variant.name + " (" + Fixed(mean, 4) + " m)";
+  }
+  std::string text = "Mean ATE of the ensemble: " + Fixed(ensemble, 4) + " m.\n";
+  if (!beaten.empty()) text += "* Lower than that of " + beaten + ", p < 0.05.\n";
+  if (!unclear.empty())
+    text += "* Lower than that of " + unclear +
+            ", but the test can't tell them apart (p >= 0.05, or one seed).\n";
+  if (!not_beaten.empty()) text += "* The ensemble did not help against " + not_beaten + ".\n";
+  return text + "\n";
+}
+
+Json IntervalJson(const MeanInterval& value) {
+  return {{"mean", value.mean}, {"half_width_95", value.half_width}, {"count", value.count}};  // NaN: null
+}
+
+Json VariantJson(const Variant& variant, const std::vector<Variant>& all) {
+  Json json = {{"variant", variant.name}, {"seeds", Json::array()}, {"failures", Json::array()}};
+  for (const RunFigures* run : variant.runs) {
+    if (run->failure.empty()) {
+      json["seeds"].push_back(run->seed);
+    } else {
+      json["failures"].push_back({{"seed", run->seed}, {"reason", run->failure}});
+    }
+  }
+  const std::vector<std::pair<const char*, double RunFigures::*>> fields = {
+      {"loops_proposed", &RunFigures::proposed},
+      {"loops_accepted", &RunFigures::accepted},
+      {"loops_false", &RunFigures::false_loops},
+      {"ate_rmse_m", &RunFigures::ate_m},
+      {"rpe_rmse_m", &RunFigures::rpe_m},
+      {"t_rel_percent", &RunFigures::t_rel_percent},
+      {"r_rel_deg_per_m", &RunFigures::r_rel_deg_per_m},
+      {"wall_s", &RunFigures::wall_s},
+      {"odometry_s", &RunFigures::odometry_s},
+      {"loops_s", &RunFigures::loops_s},
+      {"frame_ms_median", &RunFigures::frame_ms},
+      {"peak_memory_mb", &RunFigures::memory_mb}};
+  for (const auto& [name, field] : fields) json[name] = IntervalJson(Over(variant, field));
+  const PairedTTestResult test = AgainstEnsemble(variant, all);
+  json["ate_minus_ensemble"] = {
+      {"pairs", test.pairs}, {"mean_m", test.mean_difference}, {"t", test.t}, {"p", test.p}};
+  return json;
+}
+
+}  // namespace
+
+RunFigures ReadRunFigures(const std::filesystem::path& summary) {
+  std::ifstream in(summary);
+  if (!in) throw InputError(summary.string() + ": can't be opened; give the summary.json of a run");
+  const Json json = Json::parse(in, nullptr, false);
+  if (!json.is_object() || !json.contains("frames") || !json.contains("loops"))
+    throw InputError(summary.string() + ": is no summary.json of `tutti run`");
+  RunFigures run;
+  run.dataset = json.value("dataset", "?");
+  run.variant = VariantOf(json);
+  run.seed = static_cast<std::uint64_t>(Number(json, "seed") >= 0 ? Number(json, "seed") : 0);
+  run.proposed = Number(json, "loops/proposed");
+  run.accepted = Number(json, "loops/accepted");
+  run.false_loops = Number(json, "loops/false");
+  run.ate_m = Number(json, "evaluation/slam/ate_rmse_m");
+  run.rpe_m = Number(json, "evaluation/slam/rpe_rmse_m");
+  run.t_rel_percent = Number(json, "evaluation/slam/kitti_translation_percent");
+  run.r_rel_deg_per_m = Number(json, "evaluation/slam/kitti_rotation_deg_per_m");
+  run.wall_s = Number(json, "timing/wall_s");
+  run.frame_ms = Number(json, "timing/frame_ms/median");
+  run.memory_mb = Number(json, "memory/peak_mb");
+  run.odometry_s = StageSeconds(json, "odometry_");
+  run.loops_s = StageSeconds(json, "loop_");
+  return run;
+}
+
+MeanInterval MeanWithInterval(const std::vector<double>& values) {
+  MeanInterval out;
+  double sum = 0, squares = 0;
+  for (const double value : values) {
+    if (!std::isfinite(value)) continue;
+    sum += value;
+    ++out.count;
+  }
+  if (out.count == 0) return out;
+  const double n = static_cast<double>(out.count);
+  out.mean = sum / n;
+  if (out.count < 2) return out;
+  for (const double value : values) {
+    if (std::isfinite(value)) squares += (value - out.mean) * (value - out.mean);
+  }
+  out.half_width = StudentQuantile(0.05, n - 1) * std::sqrt(squares / (n - 1) / n);
+  return out;
+}
+
+std::string DescribeComparison(const Comparison& comparison, TableFormat format) {
+  std::string text;
+  for (const std::string& dataset :
+       InOrder(comparison.runs, [](const RunFigures& run) { return run.dataset; })) {
+    const std::vector<Variant> variants = Variants(comparison, dataset);
+    text += (text.empty() ? "" : "\n") + dataset + "\n\n" + Render(Table(variants), format) + "\n" +
+            Verdict(variants);
+  }
+  return text +
+         "Means over seeds, +- half of the 95 % confidence interval; p: paired t-test of the ATE against the "
+         "ensemble's, over seeds.\n";
+}
+
+Json ComparisonJson(const Comparison& comparison) {
+  Json json = {{"datasets", Json::array()}};
+  for (const std::string& dataset :
+       InOrder(comparison.runs, [](const RunFigures& run) { return run.dataset; })) {
+    const std::vector<Variant> variants = Variants(comparison, dataset);
+    Json entry = {{"dataset", dataset}, {"variants", Json::array()}};
+    for (const Variant& variant : variants) entry["variants"].push_back(VariantJson(variant, variants));
+    json["datasets"].push_back(entry);
+  }
+  return json;
+}
+
+}  // namespace tutti::cli

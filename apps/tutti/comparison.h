@@ -1,0 +1,50 @@
+// Runs of several variants and seeds, put into one table: `tutti compare` and `tutti collect`.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "text_table.h"
+
+namespace tutti::cli {
+
+/// The figures of one run, from its summary.json. NaN: there is none (no ground truth, path too short).
+struct RunFigures {
+  static constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  std::string dataset, variant;
+  std::uint64_t seed = 0;
+  std::string failure;  ///< why the run left no figures; then only the three fields above are set
+  double proposed = kNone, accepted = kNone, false_loops = kNone;
+  double ate_m = kNone, rpe_m = kNone;                         ///< rmse after loop closing
+  double t_rel_percent = kNone, r_rel_deg_per_m = kNone;       ///< KITTI
+  double wall_s = kNone, frame_ms = kNone, memory_mb = kNone;  ///< frame_ms: median
+  double odometry_s = kNone, loops_s = kNone;                  ///< summed stages, of all threads
+};
+
+/// What a run wrote. `variant` of a run of `tutti run`: "odometry" without loops, "ensemble" for the rule
+/// mean, else the rule. Throws InputError that names the file if it is no summary.json.
+RunFigures ReadRunFigures(const std::filesystem::path& summary);
+
+/// Mean over seeds with the half-width of its 95 % confidence interval (Student's t; NaN for one value).
+/// Values that are not finite are left out; no value: NaN.
+struct MeanInterval {
+  std::size_t count = 0;
+  double mean = RunFigures::kNone, half_width = RunFigures::kNone;
+};
+MeanInterval MeanWithInterval(const std::vector<double>& values);
+
+/// Runs in groups: by data set, then by variant, both in the order of their first appearance.
+struct Comparison {
+  std::vector<RunFigures> runs;
+};
+
+/// One table per data set, with the paired t-test of each variant's ATE against the ensemble's over common
+/// seeds, and below it which variants the ensemble beats, and which it does not.
+std::string DescribeComparison(const Comparison& comparison, TableFormat format);
+nlohmann::ordered_json ComparisonJson(const Comparison& comparison);
+
+}  // namespace tutti::cli

@@ -1,0 +1,166 @@
+#include "evaluation_output.h"
+
+#include <cstdio>
+
+namespace tutti::cli {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json StatisticsJson(const ErrorStatistics& s) {
+  return {{"rmse", s.rmse}, {"mean", s.mean}, {"median", s.median}, {"std", s.std},
+          {"min", s.min},   {"max", s.max},   {"sse", s.sse},       {"count", s.count}};
+}
+
+Json SegmentsJson(const SegmentErrors& errors) {
+  Json json = {{"segments", errors.segments}};
+  if (errors.segments == 0) return json;
+  json["t_rel_percent"] = errors.translation_percent;
+  json["r_rel_deg_per_m"] = errors.rotation_deg_per_m;
+  return json;
+}
+
+Json ReportJson(const std::string& reference, const EvaluatedEstimate& estimate) {
+  const EvaluationReport& r = estimate.report;
+  const EvaluationOptions& o = estimate.options;
+  const Similarity& S = r.S_reference_estimate;
+  const Eigen::Quaterniond& q = S.rotation;
+  const auto relative = [&](const ErrorStatistics& s) {
+    return r.rpe.count > 0 ? StatisticsJson(s) : Json();
+  };
+  Json json;
+  json["reference"] = reference;
+  json["estimate"] = estimate.file;
+  json["name"] = estimate.name;
+  json["pairs"] = r.pairs;
+  json["reference_poses"] = r.reference_poses;
+  json["estimate_poses"] = r.estimate_poses;
+  json["path_length_m"] = r.path_length_m;
+  json["association"] = {{"by", o.by_index      ? "line"
+                                : o.interpolate ? "interpolation"
+                                                : "time"},
+                         {"max_time_difference_s", o.max_time_difference_s},
+                         {"time_offset_s", o.time_offset_s}};
+  json["alignment"] = {{"mode", ToString(r.alignment)},
+                       {"first_poses", o.align_first},
+                       {"scale", S.scale},
+                       {"translation", {S.translation.x(), S.translation.y(), S.translation.z()}},
+                       {"quaternion_xyzw", {q.x(), q.y(), q.z(), q.w()}}};
+  json["ate"] = StatisticsJson(r.ate);
+  json["ate_rotation_deg"] = StatisticsJson(r.ate_rotation);
+  json["ate_full"] = StatisticsJson(r.ate_full);
+  json["rpe"] = {{"delta", o.rpe_delta},
+                 {"unit", ToString(o.rpe_unit)},
+                 {"all_pairs", o.rpe_all_pairs},
+                 {"translation", relative(r.rpe)},
+                 {"rotation_deg", relative(r.rpe_rotation)},
+                 {"full", relative(r.rpe_full)}};
+  json["kitti"] = SegmentsJson(r.kitti);
+  json["drift"] = SegmentsJson(r.drift);
+  return json;
+}
+
+std::string DeltaName(const EvaluationOptions& options) {
+  static constexpr const char* kShort[] = {"frames", "m", "deg", "s"};
+  char text[64];
+  const bool one_frame = options.rpe_unit == DeltaUnit::kFrames && options.rpe_delta == 1;
+  std::snprintf(text, sizeof text, "%g %s", options.rpe_delta,
+                one_frame ? "frame" : kShort[static_cast<int>(options.rpe_unit)]);
+  return text;
+}
+
+std::string SegmentsLine(const char* name, const SegmentErrors& errors) {
+  return std::string("  ") + name + ": t_rel " + Fixed(errors.translation_percent, 4) + " %, r_rel " +
+         Fixed(errors.rotation_deg_per_m, 6) + " deg/m (" + std::to_string(errors.segments) + " segments)\n";
+}
+
+std::string Plural(std::size_t count, const char* what) {
+  return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
+}
+
+std::string Title(const EvaluatedEstimate& estimate) {
+  const EvaluationReport& r = estimate.report;
+  std::string text = Plural(r.pairs, "pair") + " of poses (reference " + std::to_string(r.reference_poses) +
+                     ", estimate " + std::to_string(r.estimate_poses) + "), path " +
+                     Fixed(r.path_length_m, 2) + " m, alignment " + ToString(r.alignment);
+  if (estimate.options.align_first > 0)
+    text += " by the first " + std::to_string(estimate.options.align_first);
+  if (r.alignment == TrajectoryAlignment::kSim3 || r.alignment == TrajectoryAlignment::kScale)
+    text += " (scale " + Fixed(r.S_reference_estimate.scale, 6) + ")";
+  return text + "\n";
+}
+
+std::string Rate(const SegmentErrors& errors, double value, int decimals) {
+  return errors.segments > 0 ? Fixed(value, decimals) : "-";
+}
+
+}  // namespace
+
+std::string DescribeEvaluation(const EvaluatedEstimate& estimate, TableFormat format) {
+  const EvaluationReport& r = estimate.report;
+  TextTable table;
+  table.header = {"", "rmse", "mean", "median", "std", "min", "max", "sse"};
+  const auto add = [&](const std::string& name, const ErrorStatistics& s) {
+    table.rows.push_back({name, Fixed(s.rmse, 6), Fixed(s.mean, 6), Fixed(s.median, 6), Fixed(s.std, 6),
+                          Fixed(s.min, 6), Fixed(s.max, 6), Fixed(s.sse, 6)});
+  };
+  add("ATE [m]", r.ate);
+  add("ATE rotation [deg]", r.ate_rotation);
+  add("ATE full", r.ate_full);
+  const std::string rpe = "RPE per " + DeltaName(estimate.options);
+  if (r.rpe.count > 0) {
+    add(rpe + " [m]", r.rpe);
+    add(rpe + " [deg]", r.rpe_rotation);
+    add(rpe + " full", r.rpe_full);
+  }
+  std::string text = Title(estimate) + Render(table, format);
+  if (r.rpe.count == 0) text += "  " + rpe + ": no two poses are that far apart\n";
+  if (r.kitti.segments > 0) text += SegmentsLine("KITTI, 100..800 m", r.kitti);
+  if (r.drift.segments > 0) text += SegmentsLine("drift, 10..50 % of the path", r.drift);
+  return text;
+}
+
+std::string CompareEvaluations(const std::vector<EvaluatedEstimate>& estimates, TableFormat format) {
+  const EvaluationOptions& options = estimates.front().options;
+  const std::string rpe = "RPE per " + DeltaName(options);
+  TextTable table;
+  table.header = {"estimate", "pairs",     "ATE rmse [m]",      "mean",
+                  "median",   "max",       "rotation [deg]",    rpe + " [m]",
+                  "[deg]",    "t_rel [%]", "r_rel [deg/100 m]", "drift [%]"};
+  for (const EvaluatedEstimate& estimate : estimates) {
+    const EvaluationReport& r = estimate.report;
+    const bool relative = r.rpe.count > 0;
+    table.rows.push_back(
+        {estimate.name, std::to_string(r.pairs), Fixed(r.ate.rmse, 6), Fixed(r.ate.mean, 6),
+         Fixed(r.ate.median, 6), Fixed(r.ate.max, 6), Fixed(r.ate_rotation.rmse, 6),
+         relative ? Fixed(r.rpe.rmse, 6) : "-", relative ? Fixed(r.rpe_rotation.rmse, 6) : "-",
+         Rate(r.kitti, r.kitti.translation_percent, 4), Rate(r.kitti, 100 * r.kitti.rotation_deg_per_m, 4),
+         Rate(r.drift, r.drift.translation_percent, 4)});
+  }
+  return std::string("alignment ") + ToString(options.alignment) + "; rotations and relative errors: rmse\n" +
+         Render(table, format);
+}
+
+Json EvaluationJson(const std::string& reference, const std::vector<EvaluatedEstimate>& estimates) {
+  if (estimates.size() == 1) return ReportJson(reference, estimates.front());
+  Json json = {{"reference", reference}, {"estimates", Json::array()}};
+  for (const EvaluatedEstimate& estimate : estimates)
+    json["estimates"].push_back(ReportJson(reference, estimate));
+  return json;
+}
+
+std::string ErrorsCsv(const std::vector<EvaluatedEstimate>& estimates) {
+  std::string text = "estimate,stamp_s,translation_m,rotation_deg,full\n";
+  for (const EvaluatedEstimate& estimate : estimates) {
+    const EvaluationReport& r = estimate.report;
+    for (std::size_t k = 0; k < r.pairs; ++k) {
+      char line[160];
+      std::snprintf(line, sizeof line, ",%.9f,%.9g,%.9g,%.9g\n", r.poses.stamps_s[k],
+                    r.absolute.translation[k], r.absolute.rotation_deg[k], r.absolute.full[k]);
+      text += '"' + estimate.name + '"' + line;
+    }
+  }
+  return text;
+}
+
+}  // namespace tutti::cli

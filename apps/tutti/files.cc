@@ -1,0 +1,23 @@
+#include "files.h"
+
+#include <fstream>
+#include <system_error>
+
+#include "tutti/core/error.h"
+
+namespace tutti::cli {
+
+void MakeFolder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) throw InputError(folder.string() + ": can't be made (" + error.message() + ")");
+}
+
+void WriteText(const std::filesystem::path& file, const std::string& text) {
+  std::ofstream out(file, std::ios::binary);
+  out << text;
+  out.close();
+  if (!out) throw InputError(file.string() + ": can't be written; is there space, and may you write there?");
+}
+
+}  // namespace tutti::cli

@@ -1,0 +1,30 @@
+// Tables for the terminal, for Markdown and for LaTeX.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+#include <vector>
+
+namespace tutti::cli {
+
+enum class TableFormat { kText, kMarkdown, kLatex };
+/// Adds --table-format to a command; `name` holds the word ("text", "markdown", "latex").
+void AddTableFormatOption(CLI::App& command, std::string& name);
+/// Throws InputError for another word.
+TableFormat ParseTableFormat(const std::string& name);
+
+/// A table of texts; every row has as many cells as the header. The first column is flush left, the others
+/// flush right.
+struct TextTable {
+  std::vector<std::string> header;
+  std::vector<std::vector<std::string>> rows;
+};
+
+/// The table, each line ended by a newline. LaTeX: a tabular for the package booktabs, special characters
+/// escaped.
+std::string Render(const TextTable& table, TableFormat format);
+
+/// The value with so many decimals; "-" if it is not finite.
+std::string Fixed(double value, int decimals);
+
+}  // namespace tutti::cli

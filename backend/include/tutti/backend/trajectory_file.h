@@ -1,0 +1,48 @@
+// Trajectories in any file format, told apart by their content, with or without time stamps; conversion.
+#pragma once
+
+#include <Eigen/Core>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tutti/core/trajectory.h"
+
+namespace tutti {
+
+/// The formats of tutti/core/trajectory.h, and the vertices of a g2o graph, in order of their ids.
+enum class PoseFileFormat { kTum, kKitti, kEuroc, kG2o };
+/// "tum", "kitti", "euroc", "g2o".
+const std::vector<std::string>& PoseFileFormatNames();
+/// Throws InputError for another word.
+PoseFileFormat ParsePoseFileFormat(const std::string& name);
+const char* ToString(PoseFileFormat format);
+/// What the content looks like. Throws InputError if it can't be read.
+PoseFileFormat GuessPoseFileFormat(const std::filesystem::path& file);
+
+/// What a file holds.
+struct PoseFile {
+  PoseFileFormat format = PoseFileFormat::kTum;
+  Trajectory trajectory;
+  bool has_stamps = true;  ///< false: the "stamps" are line numbers from 0 (KITTI) or ids (g2o)
+  std::vector<Eigen::Matrix3d> rotations_as_written;  ///< KITTI alone: not quite rotations; see evaluation.h
+  std::vector<std::string> warnings;
+};
+
+/// Reads a file of poses. `format`: nothing guesses it. `times_s` gives KITTI's lines (one each) or g2o's ids
+/// (the id is the line) their stamps; other formats have their own. A planar g2o graph lies in z = 0; of
+/// similarities the scale is dropped. Throws InputError as ReadTrajectory and ReadG2o do, if the times are
+/// too few (KITTI: not as many), and for a graph without poses; the message says which format the file looks
+/// like if it is not the one that was asked for.
+PoseFile ReadPoseFile(const std::filesystem::path& file, std::optional<PoseFileFormat> format = {},
+                      const std::vector<double>& times_s = {});
+
+/// Writes poses. g2o: vertices 0, 1, ..., and between neighbours an edge with identity information, since a
+/// graph needs edges. KITTI and g2o have no room for time stamps. Throws InputError if it can't be written.
+void WritePoseFile(const std::filesystem::path& file, const Trajectory& trajectory, PoseFileFormat format);
+
+/// Writes KITTI's times.txt: one time stamp [s] a line. Throws InputError if it can't be written in full.
+void WriteTimes(const std::filesystem::path& file, const Trajectory& trajectory);
+
+}  // namespace tutti

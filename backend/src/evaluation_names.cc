@@ -1,0 +1,45 @@
+// The words for alignments and units.
+#include <algorithm>
+
+#include "tutti/backend/evaluation.h"
+#include "tutti/core/error.h"
+
+namespace tutti {
+namespace {
+
+/// Position of the word; the lists below are in the order of their enumerations.
+std::size_t Find(const std::vector<std::string>& names, const std::string& name, const char* what) {
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found != names.end()) return static_cast<std::size_t>(found - names.begin());
+  std::string all;
+  for (const std::string& word : names) all += (all.empty() ? "" : ", ") + word;
+  throw InputError(std::string("unknown ") + what + " '" + name + "'; use one of " + all);
+}
+
+}  // namespace
+
+const std::vector<std::string>& TrajectoryAlignmentNames() {
+  static const std::vector<std::string> names = {"none", "origin", "se3", "sim3", "scale", "yaw"};
+  return names;
+}
+
+TrajectoryAlignment ParseTrajectoryAlignment(const std::string& name) {
+  return static_cast<TrajectoryAlignment>(Find(TrajectoryAlignmentNames(), name, "alignment"));
+}
+
+const char* ToString(TrajectoryAlignment alignment) {
+  return TrajectoryAlignmentNames().at(static_cast<std::size_t>(alignment)).c_str();
+}
+
+const std::vector<std::string>& DeltaUnitNames() {
+  static const std::vector<std::string> names = {"frames", "metres", "degrees", "seconds"};
+  return names;
+}
+
+DeltaUnit ParseDeltaUnit(const std::string& name) {
+  return static_cast<DeltaUnit>(Find(DeltaUnitNames(), name, "unit"));
+}
+
+const char* ToString(DeltaUnit unit) { return DeltaUnitNames().at(static_cast<std::size_t>(unit)).c_str(); }
+
+}  // namespace tutti

@@ -1,0 +1,161 @@
+#include "tutti/backend/trajectory_file.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <fstream>
+
+#include "tutti/backend/g2o_io.h"
+#include "tutti/core/error.h"
+#include "tutti/core/text.h"
+
+namespace tutti {
+namespace {
+
+TrajectoryFormat CoreFormat(PoseFileFormat format) {
+  switch (format) {
+    case PoseFileFormat::kKitti:
+      return TrajectoryFormat::kKitti;
+    case PoseFileFormat::kEuroc:
+      return TrajectoryFormat::kEuroc;
+    default:
+      return TrajectoryFormat::kTum;
+  }
+}
+
+/// The first word that carries data; empty if there is none.
+std::string FirstWord(const std::filesystem::path& file) {
+  std::ifstream in(file);
+  std::string text;
+  while (std::getline(in, text)) {
+    const std::vector<std::string> words = SplitText(text);
+    if (!words.empty() && words[0][0] != '#') return words[0];
+  }
+  return {};
+}
+
+Trajectory GraphTrajectory(const std::filesystem::path& file, std::vector<std::string>& warnings) {
+  G2oFile graph = ReadG2o(file);
+  warnings = graph.warnings;
+  if (!graph.has_all_vertices) {
+    throw InputError(file.string() +
+                     ": holds edges without poses for all of their ends; `tutti optimize` finds the poses");
+  }
+  Trajectory out;
+  for (const auto& [id, pose] : graph.graph.Poses())
+    out.push_back({static_cast<double>(id), pose.RigidPart()});
+  return out;
+}
+
+void GiveStamps(const std::filesystem::path& file, const std::vector<double>& times, PoseFile& out) {
+  if (out.format == PoseFileFormat::kKitti && times.size() != out.trajectory.size()) {
+    throw InputError(file.string() + ": has " + std::to_string(out.trajectory.size()) +
+                     " poses, but there are " + std::to_string(times.size()) +
+                     " time stamps; KITTI's times.txt has one line per pose");
+  }
+  for (StampedPose& pose : out.trajectory) {
+    if (!(pose.stamp_s >= 0 && pose.stamp_s < static_cast<double>(times.size()))) {
+      throw InputError(file.string() + ": vertex " + std::to_string(static_cast<long long>(pose.stamp_s)) +
+                       " has no time stamp, there are " + std::to_string(times.size()) +
+                       "; the id of a vertex is its line in the file of times, from 0");
+    }
+    pose.stamp_s = times[static_cast<std::size_t>(pose.stamp_s)];
+  }
+  for (std::size_t k = 1; k < out.trajectory.size(); ++k) {
+    if (!(out.trajectory[k - 1].stamp_s < out.trajectory[k].stamp_s))
+      throw InputError(file.string() + ": the time stamps given for it do not grow at pose " +
+                       std::to_string(k) + ", counted from 0");
+  }
+  out.has_stamps = true;
+}
+
+PoseFile ReadAs(const std::filesystem::path& file, PoseFileFormat format, const std::vector<double>& times) {
+  PoseFile out;
+  out.format = format;
+  out.has_stamps = format == PoseFileFormat::kTum || format == PoseFileFormat::kEuroc;
+  out.trajectory = format == PoseFileFormat::kG2o
+                       ? GraphTrajectory(file, out.warnings)
+                       : ReadTrajectory(file, CoreFormat(format), &out.warnings, &out.rotations_as_written);
+  if (!out.has_stamps && !times.empty()) GiveStamps(file, times, out);
+  return out;
+}
+
+}  // namespace
+
+const std::vector<std::string>& PoseFileFormatNames() {
+  static const std::vector<std::string> names = {"tum", "kitti", "euroc", "g2o"};
+  return names;
+}
+
+PoseFileFormat ParsePoseFileFormat(const std::string& name) {
+  const std::vector<std::string>& names = PoseFileFormatNames();
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found == names.end())
+    throw InputError("unknown trajectory format '" + name + "'; use tum, kitti, euroc or g2o");
+  return static_cast<PoseFileFormat>(found - names.begin());
+}
+
+const char* ToString(PoseFileFormat format) {
+  return PoseFileFormatNames().at(static_cast<std::size_t>(format)).c_str();
+}
+
+PoseFileFormat GuessPoseFileFormat(const std::filesystem::path& file) {
+  // First, as a planar edge has as many words as a line of KITTI.
+  const std::string word = FirstWord(file);
+  if (word == "FIX" || word.rfind("VERTEX", 0) == 0 || word.rfind("EDGE", 0) == 0)
+    return PoseFileFormat::kG2o;
+  switch (GuessTrajectoryFormat(file)) {
+    case TrajectoryFormat::kKitti:
+      return PoseFileFormat::kKitti;
+    case TrajectoryFormat::kEuroc:
+      return PoseFileFormat::kEuroc;
+    case TrajectoryFormat::kTum:
+      break;
+  }
+  return PoseFileFormat::kTum;
+}
+
+PoseFile ReadPoseFile(const std::filesystem::path& file, std::optional<PoseFileFormat> format,
+                      const std::vector<double>& times_s) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(file, ignored))
+    throw InputError(file.string() + ": is a folder; give a file");
+  const PoseFileFormat guess = GuessPoseFileFormat(file);
+  try {
+    return ReadAs(file, format.value_or(guess), times_s);
+  } catch (const InputError& error) {
+    // A file in another format fails in its first line; say so instead of complaining about columns alone.
+    if (!format || *format == guess) throw;
+    throw InputError(std::string(error.what()) + " (it looks like the format " + ToString(guess) + ")");
+  }
+}
+
+void WritePoseFile(const std::filesystem::path& file, const Trajectory& trajectory, PoseFileFormat format) {
+  if (format != PoseFileFormat::kG2o) {
+    WriteTrajectory(file, trajectory, CoreFormat(format));
+    return;
+  }
+  PoseGraph graph(GraphKind::kSE3);
+  for (std::size_t k = 0; k < trajectory.size(); ++k) {
+    const int id = static_cast<int>(k);
+    graph.AddNode(id, trajectory[k].pose);
+    if (k == 0) continue;
+    const Pose relative = trajectory[k - 1].pose.Inverse() * trajectory[k].pose;
+    graph.AddOdometry(id - 1, id, Similarity(relative), Matrix7d::Identity());
+  }
+  WriteG2o(file, graph);
+}
+
+void WriteTimes(const std::filesystem::path& file, const Trajectory& trajectory) {
+  std::ofstream out(file);
+  if (!out)
+    throw InputError(file.string() + ": can't be written; check that the folder exists and is writable");
+  char line[64];
+  for (const StampedPose& pose : trajectory) {
+    std::snprintf(line, sizeof line, "%.9f\n", pose.stamp_s);
+    out << line;
+  }
+  out.flush();
+  if (!out) throw InputError(file.string() + ": could not be written in full; is the disk full?");
+}
+
+}  // namespace tutti

@@ -14,7 +14,8 @@ namespace {
 
 struct RunArguments {
   std::string config, dataset, out, ground_truth;
-  bool no_loops = false, quiet = false, help_config = false;
+  std::string trace;
+  bool no_loops = false, quiet = false, help_config = false, timing = false;
   std::uint64_t seed = 1;
   int threads = 2;
   std::int64_t max_frames = 0;
@@ -60,12 +61,17 @@ int Run(const CLI::App& command, const RunArguments& arguments) {
   request.out = arguments.out;
   request.no_loops = arguments.no_loops;
   request.quiet = arguments.quiet;
+  request.timing = arguments.timing;
+  if (!arguments.trace.empty()) request.trace = arguments.trace;
   if (!arguments.ground_truth.empty()) request.ground_truth = arguments.ground_truth;
   if (command.count("--seed") > 0) request.seed = arguments.seed;
   if (command.count("--threads") > 0) request.threads = arguments.threads;
   if (command.count("--max-frames") > 0) request.max_frames = arguments.max_frames;
   const RunResult result = RunSlam(request);
   std::fputs(ResultTable(result).c_str(), stdout);
+  if (arguments.timing) {
+    std::fputs(TimingTable(result.stages, result.wall_s, result.cpu_s, result.frames_total).c_str(), stdout);
+  }
   std::printf("\n  results are in %s\n", arguments.out.c_str());
   return ExitCode(result, arguments.out);
 }
@@ -86,6 +92,11 @@ void AddRunCommand(CLI::App& app, int& exit_code) {
   command->add_option("--seed", arguments->seed, "of everything that draws random numbers");
   command->add_option("--threads", arguments->threads, "most threads; the result is the same for any number");
   command->add_option("--max-frames", arguments->max_frames, "the first frames only");
+  command->add_flag("--timing", arguments->timing,
+                    "print how long each stage took: calls, median, p99, total, share");
+  command->add_option(
+      "--trace", arguments->trace,
+      "write the times of all stages to this file; open it in ui.perfetto.dev or chrome://tracing");
   command->add_flag("--quiet", arguments->quiet, "no progress and no notes");
   command->add_flag("--help-config", arguments->help_config,
                     "print all keys of the configuration with their defaults");

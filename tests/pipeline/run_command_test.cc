@@ -94,6 +94,26 @@ TEST(RunCommand, MaxFramesAndGroundTruthNone) {
   EXPECT_FALSE(s["loops"].contains("true"));
 }
 
+TEST(RunCommand, TimingTableAndTraceChangeNoResult) {
+  const fs::path folder = testing::FreshFolder(), config = testing::TinyConfig(folder);
+  auto measured = Arguments(config, testing::TinyTown(), folder / "measured");
+  measured.insert(measured.end(),
+                  {"--max-frames", "10", "--timing", "--trace", (folder / "t.json").string()});
+  auto plain = Arguments(config, testing::TinyTown(), folder / "plain");
+  plain.insert(plain.end(), {"--max-frames", "10"});
+  const auto run = RunTutti(measured);
+  ASSERT_EQ(run.status, 0) << run.output;
+  ASSERT_EQ(RunTutti(plain).status, 0);
+  EXPECT_EQ(ReadAll(folder / "measured" / "trajectory.txt"), ReadAll(folder / "plain" / "trajectory.txt"));
+  EXPECT_FALSE(Summary(folder / "plain")["timing"].contains("stages"));
+  EXPECT_THAT(run.output, HasSubstr("tracking      frame"));
+  EXPECT_EQ(Summary(folder / "measured")["timing"]["stages"][0]["lane"], "reading");
+  const auto trace = nlohmann::json::parse(ReadAll(folder / "t.json"));
+  int frames = 0;
+  for (const auto& event : trace["traceEvents"]) frames += event["name"] == "frame" ? 1 : 0;
+  EXPECT_EQ(frames, 10);
+}
+
 TEST(RunCommand, UncalibratedImagesGiveLoopsOnlyAndSaySo) {
   const fs::path folder = testing::FreshFolder(), out = folder / "out";
   testing::WriteAll(folder / "images.yaml", "dataset: {type: images, sensor: mono}\n");

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "tutti/pipeline/outputs.h"
+#include "tutti/pipeline/timing.h"
 #include "tutti/pipeline/version.h"
 
 namespace tutti {
@@ -23,14 +24,6 @@ const char* Name(Sensor sensor) {
       return "rgbd";
   }
   return "?";
-}
-
-// Value below which a share q of the sorted values lies (nearest rank).
-double Quantile(std::vector<double> values, double q) {
-  if (values.empty()) return 0;
-  std::sort(values.begin(), values.end());
-  const auto rank = static_cast<std::size_t>(std::ceil(q * static_cast<double>(values.size())));
-  return values[std::min(values.size() - 1, rank > 0 ? rank - 1 : 0)];
 }
 
 // A value of the configuration as JSON: numbers and booleans as such, the rest as text.
@@ -56,6 +49,22 @@ Json ScoreJson(const TrajectoryScore& score) {
     json["kitti_rotation_deg_per_m"] = score.kitti.rotation_deg_per_m;
   }
   return json;
+}
+
+// Only what --timing or --trace measured.
+Json StagesJson(const RunResult& r) {
+  Json rows = Json::array();
+  for (const StageTiming& stage : r.stages) {
+    rows.push_back({{"lane", ToString(stage.lane)},
+                    {"name", stage.name},
+                    {"calls", stage.calls},
+                    {"median_ms", stage.median_ms},
+                    {"p99_ms", stage.p99_ms},
+                    {"total_ms", stage.total_ms},
+                    {"cpu_ms", stage.cpu_ms >= 0 ? Json(stage.cpu_ms) : Json()},
+                    {"share", stage.share}});
+  }
+  return rows;
 }
 
 Json LoopsJson(const RunResult& r) {
@@ -141,9 +150,11 @@ std::string SummaryJson(const RunResult& r) {
   for (const auto& [name, ms] : r.stage_ms) stages[name] = ms;
   json["timing"] = {
       {"wall_s", r.wall_s},
+      {"cpu_s", r.cpu_s},
       {"odometry_pass_s", r.odometry_pass_s},
       {"frame_ms", {{"median", Quantile(r.frame_ms, 0.5)}, {"p99", Quantile(r.frame_ms, 0.99)}}},
       {"stage_ms", stages}};
+  if (!r.stages.empty()) json["timing"]["stages"] = StagesJson(r);
   json["memory"] = {{"peak_mb", r.peak_memory_mb}};
   if (r.rig.sensor == Sensor::kStereo) {
     json["stereo"] = {{"row_error_px", r.stereo_row_error_px}, {"matches", r.stereo_matches}};

@@ -5,12 +5,11 @@
 #include <utility>
 
 namespace tutti {
-namespace {
-
 // A reader must not throw for one bad frame; if it does all the same, the frame counts as bad.
-ReadResult ReadFrame(const Dataset& dataset, std::size_t index) {
+ReadResult Prefetcher::Read(std::size_t index) const {
+  const ScopedSpan span(recorder_, Lane::kReading, "read");
   try {
-    return dataset.Read(index);
+    return dataset_.Read(index);
   } catch (const std::exception& e) {
     ReadResult result;
     result.error = e.what();
@@ -18,10 +17,9 @@ ReadResult ReadFrame(const Dataset& dataset, std::size_t index) {
   }
 }
 
-}  // namespace
-
-Prefetcher::Prefetcher(const Dataset& dataset, std::size_t begin, std::size_t end, std::size_t ahead)
-    : dataset_(dataset), next_(begin), end_(end), ahead_(ahead), read_(begin) {
+Prefetcher::Prefetcher(const Dataset& dataset, std::size_t begin, std::size_t end, std::size_t ahead,
+                       SpanRecorder* recorder)
+    : dataset_(dataset), recorder_(recorder), next_(begin), end_(end), ahead_(ahead), read_(begin) {
   if (ahead_ > 0) thread_ = std::thread(&Prefetcher::Work, this);
 }
 
@@ -41,7 +39,7 @@ void Prefetcher::Work() {
       changed_.wait(lock, [this] { return stop_ || ready_.size() < ahead_; });
       if (stop_) return;
     }
-    ReadResult result = ReadFrame(dataset_, read_);
+    ReadResult result = Read(read_);
     const std::lock_guard<std::mutex> lock(mutex_);
     ready_.push_back(std::move(result));
     changed_.notify_all();
@@ -53,7 +51,7 @@ std::optional<ReadResult> Prefetcher::Next() {
   const auto begin = std::chrono::steady_clock::now();
   ReadResult result;
   if (ahead_ == 0) {
-    result = ReadFrame(dataset_, next_);
+    result = Read(next_);
   } else {
     std::unique_lock<std::mutex> lock(mutex_);
     changed_.wait(lock, [this] { return !ready_.empty(); });

@@ -7,6 +7,7 @@
 #include <optional>
 #include <thread>
 
+#include "tutti/core/span_recorder.h"
 #include "tutti/frontend/dataset.h"
 
 namespace tutti {
@@ -14,7 +15,9 @@ namespace tutti {
 /// Frames begin..end-1 of a data set, in order. With ahead = 0 each is read when it is asked for.
 class Prefetcher {
  public:
-  Prefetcher(const Dataset& dataset, std::size_t begin, std::size_t end, std::size_t ahead);
+  /// `recorder` may be null.
+  Prefetcher(const Dataset& dataset, std::size_t begin, std::size_t end, std::size_t ahead,
+             SpanRecorder* recorder = nullptr);
   ~Prefetcher();
   Prefetcher(const Prefetcher&) = delete;
   Prefetcher& operator=(const Prefetcher&) = delete;
@@ -26,8 +29,10 @@ class Prefetcher {
 
  private:
   void Work();
+  ReadResult Read(std::size_t index) const;
 
   const Dataset& dataset_;
+  SpanRecorder* recorder_;
   std::size_t next_, end_, ahead_;
   std::mutex mutex_;
   std::condition_variable changed_;

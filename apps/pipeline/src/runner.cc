@@ -11,6 +11,7 @@
 
 #include "prefetcher.h"
 #include "run_evaluation.h"
+#include "text_file.h"
 #include "tutti/core/error.h"
 #include "tutti/pipeline/interrupt.h"
 #include "tutti/pipeline/outputs.h"
@@ -31,6 +32,15 @@ double PeakMemoryMb() {
   rusage usage = {};
   getrusage(RUSAGE_SELF, &usage);
   return static_cast<double>(usage.ru_maxrss) / 1024.0;
+}
+
+double ProcessCpuSeconds() {
+  rusage usage = {};
+  getrusage(RUSAGE_SELF, &usage);
+  const auto seconds = [](const timeval& t) {
+    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+  };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
 }
 
 RunConfig WithOverrides(RunConfig config, const RunRequest& request) {
@@ -72,15 +82,20 @@ Trajectory BodyTrajectory(Trajectory trajectory, const CameraRig& rig) {
 class Run {
  public:
   Run(const RunRequest& request, const RunConfig& config, const Dataset& dataset, RunResult& result)
-      : request_(request), config_(config), dataset_(dataset), result_(result), slam_(config, dataset.Rig()) {
+      : request_(request),
+        config_(config),
+        dataset_(dataset),
+        result_(result),
+        slam_(config, dataset.Rig(), Recorder()) {
     total_ = dataset.Size();
     if (request.max_frames) total_ = std::min(total_, static_cast<std::size_t>(*request.max_frames));
   }
 
   void TrackAll() {
     const Clock::time_point begin = Clock::now();
+    const double cpu_begin = ProcessCpuSeconds();
     Progress progress(config_.run.loops ? "slam" : "odometry", total_, Out());
-    Prefetcher frames(dataset_, 0, total_, Ahead());
+    Prefetcher frames(dataset_, 0, total_, Ahead(), Recorder());
     std::size_t done = 0;
     while (!InterruptGuard::Requested()) {
       const std::optional<ReadResult> read = frames.Next();
@@ -107,6 +122,8 @@ class Run {
     result_.stage_ms = slam_.StageMilliseconds();
     result_.stage_ms["read_wait"] = frames.WaitedMs();
     result_.wall_s = Seconds(begin);
+    result_.cpu_s = ProcessCpuSeconds() - cpu_begin;
+    ReportTimes(begin);
   }
 
   // What the odometry would have done alone: the copy from before the first correction tracks the rest.
@@ -159,13 +176,22 @@ class Run {
 
  private:
   std::FILE* Out() const { return request_.quiet ? nullptr : stderr; }
+  SpanRecorder* Recorder() { return request_.timing || request_.trace ? &recorder_ : nullptr; }
   std::size_t Ahead() const { return config_.run.threads > 1 ? 4 : 0; }
 
   void NoteWarnings(Progress& progress) {
     for (const std::string& warning : slam_.TakeWarnings()) progress.Note("tutti: warning: " + warning);
   }
 
+  void ReportTimes(Clock::time_point begin) {
+    if (Recorder() == nullptr) return;
+    const std::vector<Span> spans = recorder_.Spans();
+    result_.stages = SummarizeStages(spans, result_.wall_s);
+    if (request_.trace) WriteTextFile(*request_.trace, ChromeTrace(spans, begin));
+  }
+
   void TrackOne(const InputFrame& frame) {
+    const ScopedSpan span(Recorder(), Lane::kTracking, "frame");
     const Clock::time_point begin = Clock::now();
     const TrackResult track = slam_.Track(frame);
     result_.frame_ms.push_back(1e3 * Seconds(begin));
@@ -208,6 +234,7 @@ class Run {
   const RunConfig& config_;
   const Dataset& dataset_;
   RunResult& result_;
+  SpanRecorder recorder_;
   SlamSystem slam_;
   std::size_t total_ = 0;
   std::string state_;
@@ -231,6 +258,8 @@ RunResult RunSlam(const RunRequest& request, const RunConfig& given) {
   std::vector<std::string> warnings = dataset->Warnings();
   const auto reference = ReadReference(*dataset, request, &warnings);
   PrepareOutputFolder(request.out);
+  if (request.trace)
+    WriteTextFile(*request.trace, "");  // what can't be written is known before the long work
   if (!request.quiet) {
     for (const std::string& warning : warnings) std::fprintf(stderr, "tutti: %s\n", warning.c_str());
     if (!result.rig.calibrated) {

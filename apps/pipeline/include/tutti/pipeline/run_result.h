@@ -12,6 +12,7 @@
 #include "tutti/core/trajectory.h"
 #include "tutti/pipeline/config.h"
 #include "tutti/pipeline/loop_record.h"
+#include "tutti/pipeline/timing.h"
 
 namespace tutti {
 
@@ -83,9 +84,11 @@ struct RunResult {
 
   // Cost.
   double wall_s = 0;             ///< of the run, without the second odometry pass and the evaluation
+  double cpu_s = 0;              ///< processor time of all threads over the same time
   double odometry_pass_s = 0;    ///< of that second pass
   std::vector<double> frame_ms;  ///< of each frame, from having the image to having the pose
   std::map<std::string, double> stage_ms;  ///< summed over the run
+  std::vector<StageTiming> stages;         ///< with RunRequest::timing or trace only
   double peak_memory_mb = 0;
   double stereo_row_error_px = 0, stereo_matches = 0;
 

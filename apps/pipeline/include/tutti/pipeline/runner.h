@@ -18,8 +18,10 @@ struct RunRequest {
   bool no_loops = false;
   std::optional<std::uint64_t> seed;  ///< of everything that draws numbers
   std::optional<int> threads;
-  std::optional<std::int64_t> max_frames;  ///< the first frames only
-  bool quiet = false;                      ///< no progress, no notes
+  std::optional<std::int64_t> max_frames;      ///< the first frames only
+  bool timing = false;                         ///< measure every stage (RunResult::stages)
+  std::optional<std::filesystem::path> trace;  ///< the same, and write a trace for Chrome or Perfetto there
+  bool quiet = false;                          ///< no progress, no notes
 };
 
 /// Runs and writes everything into request.out. Throws InputError for input that makes the run impossible,

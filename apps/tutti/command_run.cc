@@ -15,10 +15,11 @@ namespace {
 struct RunArguments {
   std::string config, dataset, out, ground_truth;
   std::string trace;
-  bool no_loops = false, quiet = false, help_config = false, timing = false;
+  bool no_loops = false, quiet = false, help_config = false, timing = false, realtime = false;
   std::uint64_t seed = 1;
   int threads = 2;
   std::int64_t max_frames = 0;
+  double follow_s = 10;
 };
 
 void Require(const std::string& value, const char* option, const char* what) {
@@ -53,7 +54,7 @@ int Run(const CLI::App& command, const RunArguments& arguments) {
     return 0;
   }
   Require(arguments.config, "--config", "a YAML file, for example data/configs/tum_fr1_rgbd.yaml");
-  Require(arguments.dataset, "--dataset", "the data set's folder or a video file");
+  Require(arguments.dataset, "--dataset", "the data set's folder, a video file, or camera:0");
   Require(arguments.out, "--out", "the folder for the results");
   RunRequest request;
   request.config = arguments.config;
@@ -61,6 +62,9 @@ int Run(const CLI::App& command, const RunArguments& arguments) {
   request.out = arguments.out;
   request.no_loops = arguments.no_loops;
   request.quiet = arguments.quiet;
+  if (command.count("--follow") > 0) request.follow_s = arguments.follow_s;
+  // A camera does not wait.
+  request.realtime = arguments.realtime || IsCameraDevice(arguments.dataset);
   request.timing = arguments.timing;
   if (!arguments.trace.empty()) request.trace = arguments.trace;
   if (!arguments.ground_truth.empty()) request.ground_truth = arguments.ground_truth;
@@ -83,7 +87,10 @@ void AddRunCommand(CLI::App& app, int& exit_code) {
   const auto arguments = std::make_shared<RunArguments>();
   command->add_option("--config", arguments->config,
                       "YAML file (data/configs has one for each public data set)");
-  command->add_option("--dataset", arguments->dataset, "folder of the data set, or a video file");
+  command->add_option(
+      "--dataset", arguments->dataset,
+      "folder of the data set, a video file, or a camera: camera:0 (the first one), camera:1, ...; "
+      "camera:FILE takes a video file for it");
   command->add_option("--out", arguments->out, "folder for the results");
   command->add_option(
       "--ground-truth", arguments->ground_truth,
@@ -92,6 +99,18 @@ void AddRunCommand(CLI::App& app, int& exit_code) {
   command->add_option("--seed", arguments->seed, "of everything that draws random numbers");
   command->add_option("--threads", arguments->threads, "most threads; the result is the same for any number");
   command->add_option("--max-frames", arguments->max_frames, "the first frames only");
+  command
+      ->add_option(
+          "--follow", arguments->follow_s,
+          "the folder is still being written to: wait for new images, and end when none came for SECONDS "
+          "(default 10), or with Ctrl-C")
+      ->expected(0, 1)
+      ->type_name("SECONDS")
+      ->check(CLI::PositiveNumber);
+  command->add_flag(
+      "--realtime", arguments->realtime,
+      "play by the time stamps and drop the frames that it can't follow; without it every frame is "
+      "processed, and the result does not depend on the machine's speed");
   command->add_flag("--timing", arguments->timing,
                     "print how long each stage took: calls, median, p99, total, share");
   command->add_option(

@@ -7,6 +7,7 @@
 namespace tutti::cli {
 
 void AddRunCommand(CLI::App& app, int& exit_code);
+void AddCalibrateCheckCommand(CLI::App& app, int& exit_code);
 void AddEvaluateCommand(CLI::App& app, int& exit_code);
 void AddLoopsCommand(CLI::App& app, int& exit_code);
 void AddCompareLoopsCommand(CLI::App& app, int& exit_code);

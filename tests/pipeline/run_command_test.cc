@@ -125,6 +125,38 @@ TEST(RunCommand, UncalibratedImagesGiveLoopsOnlyAndSaySo) {
   EXPECT_TRUE(Summary(out)["appearance_only"].get<bool>());
 }
 
+TEST(RunCommand, ACalibrationThatCanNotBeRightIsSaidAndTheRunGoesOn) {
+  const fs::path folder = testing::FreshFolder(), config = testing::TinyConfig(folder);
+  const auto right =
+      RunTutti({"calibrate-check", "--config", config.string(), "--dataset", testing::TinyTown().string()});
+  EXPECT_EQ(right.status, 0) << right.output;
+  EXPECT_THAT(right.output, HasSubstr("nothing speaks against"));
+  const fs::path swapped = testing::CopyOfTinyTown(folder / "swapped");
+  fs::rename(swapped / "image_0", swapped / "image");
+  fs::rename(swapped / "image_1", swapped / "image_0");
+  fs::rename(swapped / "image", swapped / "image_1");
+  const auto wrong =
+      RunTutti({"calibrate-check", "--config", config.string(), "--dataset", swapped.string()});
+  EXPECT_EQ(wrong.status, 1) << wrong.output;
+  EXPECT_THAT(wrong.output, HasSubstr("left and right are swapped"));
+  auto arguments = Arguments(config, swapped, folder / "out");
+  arguments.insert(arguments.end(), {"--max-frames", "3"});
+  EXPECT_THAT(RunTutti(arguments).output, HasSubstr("warning: the calibration can't be right"));
+  EXPECT_EQ(Summary(folder / "out")["calibration_findings"].size(), 1u);
+}
+
+TEST(RunCommand, AFollowedFolderGivesWhatACompleteOneGives) {
+  const fs::path folder = testing::FreshFolder(), config = testing::TinyConfig(folder);
+  auto complete = Arguments(config, testing::TinyTown(), folder / "complete");
+  complete.insert(complete.end(), {"--max-frames", "6", "--no-loops"});
+  auto followed = Arguments(config, testing::TinyTown(), folder / "followed");
+  followed.insert(followed.end(), {"--max-frames", "6", "--no-loops", "--follow", "0.5"});
+  ASSERT_EQ(RunTutti(complete).status, 0);
+  const auto run = RunTutti(followed);
+  ASSERT_EQ(run.status, 0) << run.output;
+  EXPECT_EQ(ReadAll(folder / "complete" / "trajectory.txt"), ReadAll(folder / "followed" / "trajectory.txt"));
+}
+
 TEST(RunCommand, CtrlCWritesWhatThereIsAndSaysSo) {
   const fs::path folder = testing::FreshFolder(), out = folder / "out";
   const auto run = testing::RunTuttiAndSignal(

@@ -80,8 +80,9 @@ Json LoopsJson(const RunResult& r) {
 
 Json FramesJson(const RunResult& r) {
   Json frames = {
-      {"total", r.frames_total}, {"tracked", r.frames_tracked},         {"bad", r.bad.size()},
-      {"lost", r.frames_lost},   {"relocalized", r.frames_relocalized}, {"in_dataset", r.frames_listed}};
+      {"total", r.frames_total},      {"tracked", r.frames_tracked},         {"bad", r.bad.size()},
+      {"lost", r.frames_lost},        {"relocalized", r.frames_relocalized}, {"dropped", r.frames_dropped},
+      {"in_dataset", r.frames_listed}};
   frames["bad_frames"] = Json::array();
   for (const BadFrame& bad : r.bad)
     frames["bad_frames"].push_back({{"index", bad.index}, {"error", bad.error}});
@@ -141,9 +142,13 @@ std::string SummaryJson(const RunResult& r) {
   json["config_file"] = r.config_file;
   json["sensor"] = Name(r.rig.sensor);
   json["seed"] = r.config.odometry.seed;
+  json["realtime"] = r.realtime;
   json["interrupted"] = r.interrupted;
   json["appearance_only"] = r.appearance_only;
   json["frames"] = FramesJson(r);
+  json["calibration_findings"] = Json::array();
+  for (const CalibrationFinding& f : r.calibration_findings)
+    json["calibration_findings"].push_back({{"measured", f.measured}, {"advice", f.advice}});
   json["keyframes"] = r.keyframes;
   json["loops"] = LoopsJson(r);
   Json stages = Json::object();
@@ -215,6 +220,7 @@ std::string ResultTable(const RunResult& r) {
   std::ostringstream out;
   out << "\n  frames " << r.frames_tracked << " of " << r.frames_total << " posed";
   if (!r.bad.empty()) out << ", " << r.bad.size() << " bad";
+  if (r.realtime) out << ", " << r.frames_dropped << " dropped";
   out << "; keyframes " << r.keyframes << "; loops " << r.LoopsAccepted() << " accepted of " << r.loops.size()
       << " proposed";
   if (r.evaluation)

@@ -10,6 +10,7 @@
 #include "tutti/backend/evaluation.h"
 #include "tutti/backend/pose_graph.h"
 #include "tutti/core/trajectory.h"
+#include "tutti/frontend/calibration_check.h"
 #include "tutti/pipeline/config.h"
 #include "tutti/pipeline/loop_record.h"
 #include "tutti/pipeline/timing.h"
@@ -58,12 +59,16 @@ struct RunResult {
   RunConfig config;
   CameraRig rig;
 
+  std::vector<CalibrationFinding> calibration_findings;  ///< what can't be right about it
+
   // Frames.
-  std::size_t frames_total = 0;        ///< that the run went through, bad ones included
+  std::size_t frames_total = 0;        ///< that the run went through, bad and dropped ones included
   std::size_t frames_listed = 0;       ///< that the data set has
   std::size_t frames_tracked = 0;      ///< with a pose in trajectory.txt
   std::size_t frames_lost = 0;         ///< read, but without a pose when they came
   std::size_t frames_relocalized = 0;  ///< lost, but the loop detector knew the place
+  bool realtime = false;               ///< played by the time stamps
+  std::size_t frames_dropped = 0;      ///< not looked at, since newer ones were there already
   std::vector<BadFrame> bad;
   std::vector<LostStretch> lost;
   std::size_t keyframes = 0;

@@ -14,10 +14,12 @@ namespace {
 
 struct RunArguments {
   std::string config, dataset, out, ground_truth;
-  bool no_loops = false, quiet = false, help_config = false;
+  std::string trace;
+  bool no_loops = false, quiet = false, help_config = false, timing = false, realtime = false;
   std::uint64_t seed = 1;
   int threads = 2;
   std::int64_t max_frames = 0;
+  double follow_s = 10;
 };
 
 void Require(const std::string& value, const char* option, const char* what) {
@@ -52,7 +54,7 @@ int Run(const CLI::App& command, const RunArguments& arguments) {
     return 0;
   }
   Require(arguments.config, "--config", "a YAML file, for example data/configs/tum_fr1_rgbd.yaml");
-  Require(arguments.dataset, "--dataset", "the data set's folder or a video file");
+  Require(arguments.dataset, "--dataset", "the data set's folder, a video file, or camera:0");
   Require(arguments.out, "--out", "the folder for the results");
   RunRequest request;
   request.config = arguments.config;
@@ -60,12 +62,20 @@ int Run(const CLI::App& command, const RunArguments& arguments) {
   request.out = arguments.out;
   request.no_loops = arguments.no_loops;
   request.quiet = arguments.quiet;
+  if (command.count("--follow") > 0) request.follow_s = arguments.follow_s;
+  // A camera does not wait.
+  request.realtime = arguments.realtime || IsCameraDevice(arguments.dataset);
+  request.timing = arguments.timing;
+  if (!arguments.trace.empty()) request.trace = arguments.trace;
   if (!arguments.ground_truth.empty()) request.ground_truth = arguments.ground_truth;
   if (command.count("--seed") > 0) request.seed = arguments.seed;
   if (command.count("--threads") > 0) request.threads = arguments.threads;
   if (command.count("--max-frames") > 0) request.max_frames = arguments.max_frames;
   const RunResult result = RunSlam(request);
   std::fputs(ResultTable(result).c_str(), stdout);
+  if (arguments.timing) {
+    std::fputs(TimingTable(result.stages, result.wall_s, result.cpu_s, result.frames_total).c_str(), stdout);
+  }
   std::printf("\n  results are in %s\n", arguments.out.c_str());
   return ExitCode(result, arguments.out);
 }
@@ -77,7 +87,10 @@ void AddRunCommand(CLI::App& app, int& exit_code) {
   const auto arguments = std::make_shared<RunArguments>();
   command->add_option("--config", arguments->config,
                       "YAML file (data/configs has one for each public data set)");
-  command->add_option("--dataset", arguments->dataset, "folder of the data set, or a video file");
+  command->add_option(
+      "--dataset", arguments->dataset,
+      "folder of the data set, a video file, or a camera: camera:0 (the first one), camera:1, ...; "
+      "camera:FILE takes a video file for it");
   command->add_option("--out", arguments->out, "folder for the results");
   command->add_option(
       "--ground-truth", arguments->ground_truth,
@@ -86,6 +99,23 @@ void AddRunCommand(CLI::App& app, int& exit_code) {
   command->add_option("--seed", arguments->seed, "of everything that draws random numbers");
   command->add_option("--threads", arguments->threads, "most threads; the result is the same for any number");
   command->add_option("--max-frames", arguments->max_frames, "the first frames only");
+  command
+      ->add_option(
+          "--follow", arguments->follow_s,
+          "the folder is still being written to: wait for new images, and end when none came for SECONDS "
+          "(default 10), or with Ctrl-C")
+      ->expected(0, 1)
+      ->type_name("SECONDS")
+      ->check(CLI::PositiveNumber);
+  command->add_flag(
+      "--realtime", arguments->realtime,
+      "play by the time stamps and drop the frames that it can't follow; without it every frame is "
+      "processed, and the result does not depend on the machine's speed");
+  command->add_flag("--timing", arguments->timing,
+                    "print how long each stage took: calls, median, p99, total, share");
+  command->add_option(
+      "--trace", arguments->trace,
+      "write the times of all stages to this file; open it in ui.perfetto.dev or chrome://tracing");
   command->add_flag("--quiet", arguments->quiet, "no progress and no notes");
   command->add_flag("--help-config", arguments->help_config,
                     "print all keys of the configuration with their defaults");

@@ -7,6 +7,7 @@
 namespace tutti::cli {
 
 void AddRunCommand(CLI::App& app, int& exit_code);
+void AddCalibrateCheckCommand(CLI::App& app, int& exit_code);
 void AddEvaluateCommand(CLI::App& app, int& exit_code);
 void AddConvertCommand(CLI::App& app, int& exit_code);
 void AddPlotCommand(CLI::App& app, int& exit_code);

@@ -13,6 +13,7 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", std::string("tutti ") + tutti::kVersion);
   int exit_code = 0;
   tutti::cli::AddRunCommand(app, exit_code);
+  tutti::cli::AddCalibrateCheckCommand(app, exit_code);
   tutti::cli::AddEvaluateCommand(app, exit_code);
   tutti::cli::AddConvertCommand(app, exit_code);
   tutti::cli::AddPlotCommand(app, exit_code);

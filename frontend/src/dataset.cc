@@ -10,6 +10,8 @@
 namespace tutti {
 
 std::string DatasetOptions::Validate() const {
+  if (!(follow_s >= 0 && std::isfinite(follow_s)))
+    return "follow_s must not be negative; 0: all images are there";
   if (stride < 1) return "stride must be at least 1";
   if (!(baseline_m >= 0)) return "baseline_m must not be negative";
   if (!(depth_units_per_m > 0)) return "depth_units_per_m must be greater than 0";
@@ -19,6 +21,8 @@ std::string DatasetOptions::Validate() const {
     return "rate_hz must not be negative; 0 means the data's own";
   return {};
 }
+
+bool Dataset::WaitFor(std::size_t i, const std::function<bool()>&) const { return i < Size(); }
 
 namespace {
 
@@ -82,7 +86,7 @@ DatasetType DetectDatasetType(const std::filesystem::path& path) {
   if (!std::filesystem::is_directory(path, code)) {
     if (HasImageExtension(path))
       throw InputError(path.string() + ": is a single image; give the folder that holds it");
-    return DatasetType::kVideo;
+    return path.extension() == ".bag" ? DatasetType::kBag : DatasetType::kVideo;
   }
   const auto folder = [&](const char* name) { return std::filesystem::is_directory(path / name, code); };
   const auto file = [&](const char* name) { return std::filesystem::is_regular_file(path / name, code); };
@@ -98,33 +102,54 @@ DatasetType DetectDatasetType(const std::filesystem::path& path) {
                    "; expected image_0/ (KITTI), rgb.txt (TUM), mav0/cam0/ (EuRoC), or images");
 }
 
+namespace {
+
+DatasetType CheckedType(const std::filesystem::path& path, const DatasetOptions& options) {
+  const DatasetType seen = DetectDatasetType(path);  // missing or empty: the same words for every type
+  const DatasetType type = options.type == DatasetType::kAuto ? seen : options.type;
+  const auto is_file = [](DatasetType t) { return t == DatasetType::kVideo || t == DatasetType::kBag; };
+  if (is_file(type) != is_file(seen)) {
+    throw InputError(path.string() + (is_file(type)
+                                          ? ": is a folder, but the type is video or bag; give the file"
+                                          : ": is a file; give the folder of the data set"));
+  }
+  return type;
+}
+
+FolderContents FindFrames(const std::filesystem::path& path, const DatasetOptions& options) {
+  switch (CheckedType(path, options)) {
+    case DatasetType::kKitti:
+      return FindKitti(path, options);
+    case DatasetType::kTum:
+      return FindTum(path, options);
+    case DatasetType::kEuroc:
+      return FindEuroc(path, options);
+    default:
+      return FindImages(path, options);
+  }
+}
+
+}  // namespace
+
 std::unique_ptr<Dataset> OpenDataset(const std::filesystem::path& path, const DatasetOptions& options) {
   const std::string problem = options.Validate();
   if (!problem.empty()) throw InputError("dataset: " + problem);
-  const DatasetType seen = DetectDatasetType(path);  // missing or empty: the same words for every type
-  const DatasetType type = options.type == DatasetType::kAuto ? seen : options.type;
-  if ((type == DatasetType::kVideo) != (seen == DatasetType::kVideo)) {
-    throw InputError(path.string() + (type == DatasetType::kVideo
-                                          ? ": is a folder, but the type is video; give the video file"
-                                          : ": is a file; give the folder of the data set"));
-  }
   DatasetOptions use = options;
   if (use.camera && use.camera->fy < 0) {  // ICL-NUIM's own calibration: y up
     use.camera->fy = -use.camera->fy;
     use.mirrored_ground_truth = true;
   }
-  switch (type) {
-    case DatasetType::kKitti:
-      return std::make_unique<FolderDataset>(FindKitti(path, use), use);
-    case DatasetType::kTum:
-      return std::make_unique<FolderDataset>(FindTum(path, use), use);
-    case DatasetType::kEuroc:
-      return std::make_unique<FolderDataset>(FindEuroc(path, use), use);
-    case DatasetType::kVideo:
-      return OpenVideo(path, use);
-    default:
-      return std::make_unique<FolderDataset>(FindImages(path, use), use);
+  if (IsCamera(path.string())) return OpenCamera(path.string(), use);
+  std::error_code code;
+  if (use.follow_s > 0) {
+    if (!std::filesystem::is_directory(path, code))
+      throw InputError(path.string() + ": is no folder; only a folder of images can be followed");
+    return FollowFolder([path, use] { return FindFrames(path, use); }, use);
   }
+  const DatasetType type = CheckedType(path, use);
+  if (type == DatasetType::kVideo) return OpenVideo(path, use);
+  if (type == DatasetType::kBag) return OpenBag(path, use);
+  return std::make_unique<FolderDataset>(FindFrames(path, use), use);
 }
 
 }  // namespace tutti

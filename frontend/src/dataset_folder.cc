@@ -79,11 +79,7 @@ FolderDataset::FolderDataset(FolderContents contents, const DatasetOptions& opti
                      ": holds no frame; check the folder and the options of the data set");
   }
   if (options_.stride > 1) {
-    std::vector<FrameFiles> kept;
-    for (std::size_t i = 0; i < contents_.frames.size(); i += static_cast<std::size_t>(options_.stride)) {
-      kept.push_back(contents_.frames[i]);
-    }
-    contents_.frames = std::move(kept);
+    contents_.frames = EveryNth(std::move(contents_.frames), options_.stride);
     contents_.rate_hz /= options_.stride;
   }
   FindImageSize();
@@ -188,16 +184,7 @@ std::string FolderDataset::ReadDepth(const std::filesystem::path& file, cv::Mat&
     return file.string() + ": the depth image has " + SizeText(read.image.size()) +
            " pixels, but the colour images have " + SizeText(size_) + "; depth must be registered to colour";
   }
-  cv::Mat depth;
-  read.image.convertTo(depth, CV_32F, 1.0 / options_.depth_units_per_m);
-  // NaN, negative and infinite values of float depth mean "no measurement", too.
-  const float limit = options_.max_depth_m > 0 ? static_cast<float>(options_.max_depth_m) : 1e6F;
-  for (int v = 0; v < depth.rows; ++v) {
-    float* row = depth.ptr<float>(v);
-    for (int u = 0; u < depth.cols; ++u) {
-      if (!(row[u] > 0.0F && row[u] <= limit)) row[u] = 0.0F;
-    }
-  }
+  const cv::Mat depth = DepthInMetres(read.image, options_.depth_units_per_m, options_.max_depth_m);
   out = left_ ? left_->Apply(depth, Sampling::kNearest) : depth;
   return {};
 }
@@ -209,8 +196,12 @@ ReadResult FolderDataset::Read(std::size_t i) const {
                    std::to_string(Size()) + ")";
     return result;
   }
+  return ReadFiles(contents_.frames[i]);
+}
+
+ReadResult FolderDataset::ReadFiles(const FrameFiles& files) const {
+  ReadResult result;
   try {
-    const FrameFiles& files = contents_.frames[i];
     InputFrame frame;
     frame.index = files.index;
     frame.stamp_s = files.stamp_s;
@@ -224,7 +215,7 @@ ReadResult FolderDataset::Read(std::size_t i) const {
     if (result.error.empty()) result.frame = std::move(frame);
   } catch (const std::exception& e) {  // out of memory for an absurd image size, and the like
     result.frame.reset();
-    result.error = contents_.frames[i].image.string() + ": can't be used: " + e.what();
+    result.error = files.image.string() + ": can't be used: " + e.what();
   }
   return result;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -49,6 +50,8 @@ class FolderDataset : public Dataset {
   std::size_t Size() const override { return contents_.frames.size(); }
   double Stamp(std::size_t i) const override { return contents_.frames.at(i).stamp_s; }
   ReadResult Read(std::size_t i) const override;
+  ReadResult ReadFiles(const FrameFiles& files) const;  ///< the same for a frame that came later
+  const std::vector<FrameFiles>& Frames() const { return contents_.frames; }
   const CameraRig& Rig() const override { return rig_; }
   std::optional<std::filesystem::path> GroundTruthFile() const override;
   Trajectory ReadGroundTruth(const std::filesystem::path& file,
@@ -104,6 +107,14 @@ FolderContents FindKitti(const std::filesystem::path& folder, const DatasetOptio
 FolderContents FindTum(const std::filesystem::path& folder, const DatasetOptions& options);
 FolderContents FindEuroc(const std::filesystem::path& folder, const DatasetOptions& options);
 FolderContents FindImages(const std::filesystem::path& folder, const DatasetOptions& options);
+/// Every stride-th of them.
+std::vector<FrameFiles> EveryNth(std::vector<FrameFiles> frames, int stride);
+/// A folder that grows: `find` lists it as it is now. Waits options.follow_s for the first image.
+std::unique_ptr<Dataset> FollowFolder(std::function<FolderContents()> find, const DatasetOptions& options);
+/// camera:0, or camera:FILE with a video file.
+std::unique_ptr<Dataset> OpenCamera(const std::string& name, const DatasetOptions& options);
+/// A ROS 1 bag; throws InputError where tutti was built without them.
+std::unique_ptr<Dataset> OpenBag(const std::filesystem::path& file, const DatasetOptions& options);
 std::unique_ptr<Dataset> OpenVideo(const std::filesystem::path& file, const DatasetOptions& options);
 
 }  // namespace tutti

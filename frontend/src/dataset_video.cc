@@ -1,25 +1,15 @@
 // A video file. Decoders are sequential, so random access is emulated: frames that a reader thread skips over
 // are kept for a while for its neighbours, and going far back starts from the beginning.
-#include <algorithm>
 #include <cmath>
 #include <map>
 #include <mutex>
-#include <opencv2/imgproc.hpp>
-#include <opencv2/videoio.hpp>
-#include <opencv2/videoio/registry.hpp>
 
 #include "dataset_folder.h"
 #include "tutti/core/error.h"
+#include "video_input.h"
 
 namespace tutti {
 namespace {
-
-// FFmpeg and OpenCV's own motion JPEG; GStreamer only where OpenCV was built without FFmpeg.
-std::vector<int> Backends() {
-  const std::vector<cv::VideoCaptureAPIs> known = cv::videoio_registry::getBackends();
-  const bool ffmpeg = std::find(known.begin(), known.end(), cv::CAP_FFMPEG) != known.end();
-  return {ffmpeg ? cv::CAP_FFMPEG : cv::CAP_GSTREAMER, cv::CAP_OPENCV_MJPEG};
-}
 
 class VideoDataset : public Dataset {
  public:
@@ -40,7 +30,8 @@ class VideoDataset : public Dataset {
       throw InputError(file_.string() + ": no frame can be decoded; is it a complete video file?");
     }
     Keep(0, first);
-    SetUpRig(first.size());
+    size_ = first.size();
+    rig_ = SingleCameraRig(options, size_, rate_hz_ / options.stride, file_.string(), rectifier_, warnings_);
     frames_ =
         (frames_ + static_cast<std::size_t>(options.stride) - 1) / static_cast<std::size_t>(options.stride);
   }
@@ -92,60 +83,14 @@ class VideoDataset : public Dataset {
   }
 
  private:
-  void SetUpRig(cv::Size size) {
-    size_ = size;
-    rig_.rate_hz = rate_hz_ / options_.stride;
-    rig_.calibrated = options_.camera.has_value();
-    if (options_.camera) {
-      PinholeCamera camera = *options_.camera;
-      if (camera.width == 0 && camera.height == 0) {
-        camera.width = size.width;
-        camera.height = size.height;
-      }
-      if (cv::Size(camera.width, camera.height) != size) {
-        throw InputError(file_.string() +
-                         ": the camera is calibrated for another image size than the video's " +
-                         std::to_string(size.width) + "x" + std::to_string(size.height));
-      }
-      const std::string problem = camera.Validate();
-      if (!problem.empty()) throw InputError(file_.string() + ": " + problem);
-      rectifier_.emplace(camera);
-      rig_.camera = rectifier_->Camera();
-    } else {
-      rig_.camera.width = size.width;
-      rig_.camera.height = size.height;
-      warnings_.push_back(file_.string() +
-                          ": no calibration is given (camera: fx, fy, cx, cy); appearance only, no odometry");
-    }
-  }
-
   void Reopen() const {
-    // Not CAP_ANY: it tries every backend, and each reports its failure at length on stderr.
-    bool opened = false;
-    for (const int backend : Backends()) {
-      try {
-        opened = capture_.open(file_.string(), backend);
-      } catch (const cv::Exception&) {
-        opened = false;
-      }
-      if (opened) break;
-    }
-    if (!opened) {
-      throw InputError(file_.string() +
-                       ": can't be opened as a video; is it complete and of a format that OpenCV decodes?");
-    }
+    OpenVideoFile(file_, capture_);
     next_ = 0;
   }
 
   bool Next(cv::Mat& grey) const {
-    cv::Mat image;
-    if (!capture_.read(image) || image.empty()) return false;
+    if (!ReadGreyFrame(capture_, grey)) return false;
     ++next_;
-    if (image.channels() == 1) {
-      grey = image.clone();
-    } else {
-      cv::cvtColor(image, grey, image.channels() == 4 ? cv::COLOR_BGRA2GRAY : cv::COLOR_BGR2GRAY);
-    }
     return true;
   }
 

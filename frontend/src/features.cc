@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <numeric>
 #include <opencv2/features2d.hpp>
@@ -77,10 +78,22 @@ cv::Point2f RefineCorner(const cv::Mat& image, const cv::Point2f& corner) {
   return {corner.x + du, corner.y + dv};
 }
 
-bool Stronger(const cv::KeyPoint& a, const cv::KeyPoint& b) {
-  if (a.response != b.response) return a.response > b.response;
-  if (a.pt.y != b.pt.y) return a.pt.y < b.pt.y;
-  return a.pt.x < b.pt.x;
+// Strongest first; equal ones by row, then by column. FAST's scores and places are whole numbers >= 0, so the
+// order fits into one integer, which sorts several times faster than corners do.
+void SortByStrength(std::vector<cv::KeyPoint>& corners) {
+  std::vector<std::pair<std::uint64_t, std::size_t>> order(corners.size());
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const cv::KeyPoint& k = corners[i];
+    const std::uint64_t weakness = 0xFFFFU - static_cast<std::uint64_t>(k.response);
+    order[i] = {
+        (weakness << 40) | (static_cast<std::uint64_t>(k.pt.y) << 20) | static_cast<std::uint64_t>(k.pt.x),
+        i};
+  }
+  std::sort(order.begin(), order.end());
+  std::vector<cv::KeyPoint> sorted;
+  sorted.reserve(corners.size());
+  for (const auto& [key, i] : order) sorted.push_back(corners[i]);
+  corners = std::move(sorted);
 }
 
 // Keeps `wanted` corners, round by round the strongest left in each grid cell. Corners below the upper
@@ -93,7 +106,7 @@ std::vector<cv::KeyPoint> Spread(std::vector<cv::KeyPoint> corners, const cv::Si
   const double cell = std::max(8.0, std::sqrt(area / std::max(1, wanted)) * 1.2);
   const int columns = std::max(1, static_cast<int>(std::ceil(size.width / cell)));
   const int rows = std::max(1, static_cast<int>(std::ceil(size.height / cell)));
-  std::sort(corners.begin(), corners.end(), Stronger);
+  SortByStrength(corners);
   std::vector<std::vector<int>> cells(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
   for (std::size_t i = 0; i < corners.size(); ++i) {
     const int c = std::min(columns - 1, static_cast<int>(corners[i].pt.x / cell));

@@ -148,6 +148,19 @@ int SignificantBits(const cv::Mat& grey) {
   return bits;
 }
 
+cv::Mat DepthInMetres(const cv::Mat& stored, double units_per_m, double max_depth_m) {
+  cv::Mat depth;
+  stored.convertTo(depth, CV_32F, 1.0 / units_per_m);
+  const float limit = max_depth_m > 0 ? static_cast<float>(max_depth_m) : 1e6F;
+  for (int v = 0; v < depth.rows; ++v) {
+    float* row = depth.ptr<float>(v);
+    for (int u = 0; u < depth.cols; ++u) {
+      if (!(row[u] > 0.0F && row[u] <= limit)) row[u] = 0.0F;
+    }
+  }
+  return depth;
+}
+
 bool HasImageExtension(const std::filesystem::path& file) {
   static constexpr std::array<const char*, 15> kExtensions = {".png", ".jpg", ".jpeg", ".webp", ".bmp",
                                                               ".pgm", ".ppm", ".pnm",  ".tif",  ".tiff",

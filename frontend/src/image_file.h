@@ -25,6 +25,10 @@ cv::Mat ToGrey8(const cv::Mat& grey, int bits);
 /// Bits that the greatest value of an image needs, rounded up to 8, 10, 12, 14 or 16 as sensors have them.
 int SignificantBits(const cv::Mat& grey);
 
+/// A depth image as stored (16 bit or float) to CV_32FC1 [m]; 0: no measurement, which NaN, negative,
+/// infinite values and those beyond max_depth_m (0: no limit) become.
+cv::Mat DepthInMetres(const cv::Mat& stored, double units_per_m, double max_depth_m);
+
 /// True if the name ends like an image file that OpenCV can read.
 bool HasImageExtension(const std::filesystem::path& file);
 /// The images in a folder in natural order (hidden and other files ignored); empty if the folder can't be

@@ -10,7 +10,7 @@ constexpr int kMinDepthFeatures = 50;  // features with depth that a metric map 
 }
 
 TrackResult Odometry::Impl::Initialize(const TrackedFrame& frame) {
-  const ScopedStopwatch watch(&stages["initialize"]);
+  const ScopedStopwatch watch(&stages, Lane::kTracking, "initialize");
   TrackResult result;
   result.state = TrackingState::kInitializing;
   const Pose start = records.empty() ? Pose() : last_T_camera_world_.Inverse();

@@ -164,19 +164,23 @@ void LocalMapper::Align(int id, Map* map) {
   old.features = WithoutImages(*old.features);
 }
 
-void LocalMapper::Process(int id, Map* map, std::map<std::string, double>* stages) {
+void LocalMapper::Process(int id, Map* map, StageTimes* stages) {
   {
-    const ScopedStopwatch watch(&(*stages)["map"]);
+    const ScopedStopwatch watch(stages, Lane::kMapping, "map");
     for (int l : map->keyframe(id).landmarks) {
       if (l >= 0) map->UpdateLandmark(l);
     }
     CullRecent(id, map);
     if (rig_.sensor != Sensor::kMono) AddDepthLandmarks(id, 100, map);
-    Triangulate(id, map);
-    Fuse(id, map);
-    Align(id, map);
+    const auto timed = [&](const char* name, auto&& step) {
+      const ScopedSpan span(stages->recorder, Lane::kMapping, name);
+      step();
+    };
+    timed("triangulate", [&] { Triangulate(id, map); });
+    timed("fuse", [&] { Fuse(id, map); });
+    timed("align", [&] { Align(id, map); });
   }
-  const ScopedStopwatch watch(&(*stages)["local_ba"]);
+  const ScopedStopwatch watch(stages, Lane::kMapping, "local_ba");
   BundleAdjustmentOptions ba;
   ba.keyframes = options_.ba_keyframes;
   ba.fixed_keyframes = options_.ba_fixed_keyframes;

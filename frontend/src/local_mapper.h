@@ -2,13 +2,12 @@
 // adjustment.
 #pragma once
 
-#include <map>
 #include <memory>
-#include <string>
 #include <utility>
 #include <vector>
 
 #include "self_calibration.h"
+#include "stopwatch.h"
 #include "tutti/frontend/bundle_adjustment.h"
 #include "tutti/frontend/frame.h"
 #include "tutti/frontend/map.h"
@@ -31,7 +30,7 @@ class LocalMapper {
 
   /// Full treatment of the newest keyframe; its landmark matches are already in the map. Adds milliseconds to
   /// `stages`.
-  void Process(int keyframe, Map* map, std::map<std::string, double>* stages);
+  void Process(int keyframe, Map* map, StageTimes* stages);
 
  private:
   void CullRecent(int keyframe, Map* map);

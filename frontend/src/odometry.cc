@@ -197,7 +197,8 @@ std::vector<std::int64_t> Odometry::FrameIndices(int map_piece) const {
   return out;
 }
 
-std::map<std::string, double> Odometry::StageMilliseconds() const { return impl_->stages; }
+std::map<std::string, double> Odometry::StageMilliseconds() const { return impl_->stages.milliseconds; }
+void Odometry::SetRecorder(SpanRecorder* recorder) { impl_->stages.recorder = recorder; }
 
 namespace {
 double Median(std::vector<double> values) {

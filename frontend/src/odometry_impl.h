@@ -10,6 +10,7 @@
 #include "local_mapper.h"
 #include "matcher.h"
 #include "mono_initializer.h"
+#include "stopwatch.h"
 #include "tutti/frontend/map.h"
 #include "tutti/frontend/odometry.h"
 
@@ -25,7 +26,7 @@ class Odometry::Impl {
   OdometryOptions options;
   CameraRig rig;
   Map map;
-  std::map<std::string, double> stages;
+  StageTimes stages;
   std::vector<double> row_errors, stereo_matches;
 
   /// Pose of a frame relative to its reference keyframe: corrections of the map reach it.

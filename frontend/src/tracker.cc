@@ -17,7 +17,7 @@ Odometry::Impl::Impl(const OdometryOptions& o, const CameraRig& r)
 TrackResult Odometry::Impl::Track(const InputFrame& input) {
   TrackedFrame frame{input.index, input.stamp_s, input.features};
   if (!frame.features) {
-    const ScopedStopwatch watch(&stages["extract"]);
+    const ScopedStopwatch watch(&stages, Lane::kTracking, "extract");
     frame.features = std::make_shared<const Features>(ExtractFeatures(input, rig, options));
   }
   frame.features = mapper_.lens().Correct(frame.features);
@@ -35,7 +35,7 @@ TrackResult Odometry::Impl::Track(const InputFrame& input) {
 TrackResult Odometry::Impl::RelocalizeAt(int keyframe) {
   if (!lost_) return lost_result_;
   Fix guess(*lost_), fix(*lost_);
-  const ScopedStopwatch watch(&stages["relocalize"]);
+  const ScopedStopwatch watch(&stages, Lane::kTracking, "relocalize");
   if (!GuessFromKeyframe(keyframe, &guess)) return lost_result_;
   Offer(2 * options.min_inliers, &guess, &fix);
   if (fix.inliers == 0) return lost_result_;
@@ -53,7 +53,7 @@ TrackResult Odometry::Impl::TrackMap(const TrackedFrame& frame) {
   Fix fix(frame);
   bool tracked = false;
   {
-    const ScopedStopwatch watch(&stages["track"]);
+    const ScopedStopwatch watch(&stages, Lane::kTracking, "track");
     tracked = FindPose(&fix);
   }
   if (tracked) return Accept(std::move(fix));

@@ -35,14 +35,24 @@ class FakeDataset : public Dataset {
   std::vector<std::string> warnings_;
 };
 
+PrefetchOptions Options(std::size_t begin, std::size_t end, std::size_t ahead) {
+  PrefetchOptions options;
+  options.begin = begin;
+  options.end = end;
+  options.ahead = ahead;
+  return options;
+}
+
 class PrefetcherAhead : public ::testing::TestWithParam<std::size_t> {};
 
 TEST_P(PrefetcherAhead, DeliversAllFramesInOrderAndErrorsInTheirPlace) {
   const FakeDataset dataset;
-  Prefetcher frames(dataset, 1, dataset.Size(), GetParam());
+  Prefetcher frames(dataset, Options(1, dataset.Size(), GetParam()));
   for (std::size_t i = 1; i < dataset.Size(); ++i) {
-    const auto read = frames.Next();
-    ASSERT_TRUE(read.has_value());
+    const auto fetched = frames.Next();
+    ASSERT_TRUE(fetched.has_value());
+    EXPECT_EQ(fetched->position, i);
+    const ReadResult* read = &fetched->read;
     if (i == 3) {
       EXPECT_EQ(read->error, "frame 3 is damaged");
     } else if (i == 5) {
@@ -55,9 +65,43 @@ TEST_P(PrefetcherAhead, DeliversAllFramesInOrderAndErrorsInTheirPlace) {
   EXPECT_FALSE(frames.Next().has_value());
 }
 
+TEST_P(PrefetcherAhead, SkipsForwardsAndNeverBack) {
+  const FakeDataset dataset;
+  Prefetcher frames(dataset, Options(0, dataset.Size(), GetParam()));
+  EXPECT_EQ(frames.Next()->position, 0u);
+  frames.SkipTo(4);
+  EXPECT_EQ(frames.Next()->position, 4u);
+  frames.SkipTo(2);
+  EXPECT_EQ(frames.Next()->position, 5u);
+  frames.SkipTo(100);
+  EXPECT_FALSE(frames.Next().has_value());
+}
+
+TEST_P(PrefetcherAhead, EndsWhereAGrowingDataSetEnds) {
+  const FakeDataset dataset;
+  Prefetcher frames(dataset, Options(8, static_cast<std::size_t>(-1), GetParam()));
+  EXPECT_TRUE(frames.Next().has_value());
+  EXPECT_TRUE(frames.Next().has_value());
+  EXPECT_FALSE(frames.Next().has_value());
+}
+
+TEST(Prefetcher, NewestKeepsTheLastFrameWhenNobodyTakesThem) {
+  const FakeDataset dataset;
+  PrefetchOptions options = Options(0, dataset.Size(), 1);
+  options.newest = true;
+  Prefetcher frames(dataset, options);
+  std::size_t last = 0, taken = 0;
+  while (const auto fetched = frames.Next()) {
+    EXPECT_TRUE(taken == 0 || fetched->position > last);
+    last = fetched->position;
+    ++taken;
+  }
+  EXPECT_EQ(last, dataset.Size() - 1);
+}
+
 TEST_P(PrefetcherAhead, StopsInTheMiddleWithoutHanging) {
   const FakeDataset dataset;
-  Prefetcher frames(dataset, 0, dataset.Size(), GetParam());
+  Prefetcher frames(dataset, Options(0, dataset.Size(), GetParam()));
   EXPECT_TRUE(frames.Next().has_value());
 }
 

@@ -94,6 +94,26 @@ TEST(RunCommand, MaxFramesAndGroundTruthNone) {
   EXPECT_FALSE(s["loops"].contains("true"));
 }
 
+TEST(RunCommand, TimingTableAndTraceChangeNoResult) {
+  const fs::path folder = testing::FreshFolder(), config = testing::TinyConfig(folder);
+  auto measured = Arguments(config, testing::TinyTown(), folder / "measured");
+  measured.insert(measured.end(),
+                  {"--max-frames", "10", "--timing", "--trace", (folder / "t.json").string()});
+  auto plain = Arguments(config, testing::TinyTown(), folder / "plain");
+  plain.insert(plain.end(), {"--max-frames", "10"});
+  const auto run = RunTutti(measured);
+  ASSERT_EQ(run.status, 0) << run.output;
+  ASSERT_EQ(RunTutti(plain).status, 0);
+  EXPECT_EQ(ReadAll(folder / "measured" / "trajectory.txt"), ReadAll(folder / "plain" / "trajectory.txt"));
+  EXPECT_FALSE(Summary(folder / "plain")["timing"].contains("stages"));
+  EXPECT_THAT(run.output, HasSubstr("tracking      frame"));
+  EXPECT_EQ(Summary(folder / "measured")["timing"]["stages"][0]["lane"], "reading");
+  const auto trace = nlohmann::json::parse(ReadAll(folder / "t.json"));
+  int frames = 0;
+  for (const auto& event : trace["traceEvents"]) frames += event["name"] == "frame" ? 1 : 0;
+  EXPECT_EQ(frames, 10);
+}
+
 TEST(RunCommand, UncalibratedImagesGiveLoopsOnlyAndSaySo) {
   const fs::path folder = testing::FreshFolder(), out = folder / "out";
   testing::WriteAll(folder / "images.yaml", "dataset: {type: images, sensor: mono}\n");
@@ -103,6 +123,38 @@ TEST(RunCommand, UncalibratedImagesGiveLoopsOnlyAndSaySo) {
   EXPECT_FALSE(fs::exists(out / "trajectory.txt"));
   EXPECT_TRUE(fs::exists(out / "loops.csv"));
   EXPECT_TRUE(Summary(out)["appearance_only"].get<bool>());
+}
+
+TEST(RunCommand, ACalibrationThatCanNotBeRightIsSaidAndTheRunGoesOn) {
+  const fs::path folder = testing::FreshFolder(), config = testing::TinyConfig(folder);
+  const auto right =
+      RunTutti({"calibrate-check", "--config", config.string(), "--dataset", testing::TinyTown().string()});
+  EXPECT_EQ(right.status, 0) << right.output;
+  EXPECT_THAT(right.output, HasSubstr("nothing speaks against"));
+  const fs::path swapped = testing::CopyOfTinyTown(folder / "swapped");
+  fs::rename(swapped / "image_0", swapped / "image");
+  fs::rename(swapped / "image_1", swapped / "image_0");
+  fs::rename(swapped / "image", swapped / "image_1");
+  const auto wrong =
+      RunTutti({"calibrate-check", "--config", config.string(), "--dataset", swapped.string()});
+  EXPECT_EQ(wrong.status, 1) << wrong.output;
+  EXPECT_THAT(wrong.output, HasSubstr("left and right are swapped"));
+  auto arguments = Arguments(config, swapped, folder / "out");
+  arguments.insert(arguments.end(), {"--max-frames", "3"});
+  EXPECT_THAT(RunTutti(arguments).output, HasSubstr("warning: the calibration can't be right"));
+  EXPECT_EQ(Summary(folder / "out")["calibration_findings"].size(), 1u);
+}
+
+TEST(RunCommand, AFollowedFolderGivesWhatACompleteOneGives) {
+  const fs::path folder = testing::FreshFolder(), config = testing::TinyConfig(folder);
+  auto complete = Arguments(config, testing::TinyTown(), folder / "complete");
+  complete.insert(complete.end(), {"--max-frames", "6", "--no-loops"});
+  auto followed = Arguments(config, testing::TinyTown(), folder / "followed");
+  followed.insert(followed.end(), {"--max-frames", "6", "--no-loops", "--follow", "0.5"});
+  ASSERT_EQ(RunTutti(complete).status, 0);
+  const auto run = RunTutti(followed);
+  ASSERT_EQ(run.status, 0) << run.output;
+  EXPECT_EQ(ReadAll(folder / "complete" / "trajectory.txt"), ReadAll(folder / "followed" / "trajectory.txt"));
 }
 
 TEST(RunCommand, CtrlCWritesWhatThereIsAndSaysSo) {

@@ -48,14 +48,21 @@ void ConfigTable::AddDataset(DatasetOptions& o) {
            {"tum", DatasetType::kTum},
            {"euroc", DatasetType::kEuroc},
            {"images", DatasetType::kImages},
-           {"video", DatasetType::kVideo}},
-          "layout on disk: auto, kitti, tum, euroc, images, video");
+           {"video", DatasetType::kVideo},
+           {"bag", DatasetType::kBag}},
+          "layout on disk: auto, kitti, tum, euroc, images, video, bag (ROS 1)");
   AddEnum("sensor", o.sensor, {{"mono", Sensor::kMono}, {"stereo", Sensor::kStereo}, {"rgbd", Sensor::kRgbd}},
           "mono, stereo or rgbd");
   Add("depth_units_per_m", o.depth_units_per_m, "RGB-D: value in the depth image of one metre");
   Add("max_depth_m", o.max_depth_m, "RGB-D: farther depth is not used [m]; 0: no limit");
   Add("max_association_s", o.max_association_s, "TUM: greatest time difference of colour and depth [s]");
   Add("rate_hz", o.rate_hz, "frame rate where the data has no time stamps [1/s]; 0: 10 Hz or the video's");
+  Add("topic", o.topic, "ROS bag: topic of the left (or only, or colour) images; empty: the bag's only one");
+  Add("right_topic", o.right_topic, "ROS bag, stereo: topic of the right images");
+  Add("depth_topic", o.depth_topic,
+      "ROS bag, RGB-D: topic of the depth images (16UC1: set depth_units_per_m: 1000)");
+  Add("follow_s", o.follow_s,
+      "wait for images that are still being written, end when none came for so long [s]; 0: don't wait");
   Add("stride", o.stride, "use every stride-th frame");
   Add("mirrored_ground_truth", o.mirrored_ground_truth, "the ground truth has its y axis up (ICL-NUIM)");
 }

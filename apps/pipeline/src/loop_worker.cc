@@ -7,7 +7,8 @@
 
 namespace tutti {
 
-LoopWorker::LoopWorker(const LoopDetectorOptions& options, bool own_thread) : detector_(options) {
+LoopWorker::LoopWorker(const LoopDetectorOptions& options, bool own_thread, SpanRecorder* recorder)
+    : detector_(options), recorder_(recorder) {
   // Frames are numbered from 0 in every run: what an earlier run stored has no frame in this one.
   if (detector_.LastId() >= 0) {
     throw InputError(
@@ -26,10 +27,29 @@ LoopWorker::~LoopWorker() {
   if (thread_.joinable()) thread_.join();
 }
 
+namespace {
+// The detector tells how long its stages took, in their order; memory is one before and one after the filters
+// and stands at the end.
+void AddStages(const LoopResult& r, Span::Clock::time_point begin, SpanRecorder& recorder) {
+  const std::pair<const char*, double> stages[] = {
+      {"extract", r.extract_ms}, {"quantise", r.quantise_ms}, {"likelihood", r.likelihood_ms},
+      {"filter", r.filter_ms},   {"verify", r.verify_ms},     {"memory", r.memory_ms}};
+  for (const auto& [name, ms] : stages) {
+    const auto end = begin + std::chrono::duration_cast<Span::Clock::duration>(
+                                 std::chrono::duration<double, std::milli>(ms));
+    recorder.Add({Lane::kLoopClosure, name, begin, end, -1});
+    begin = end;
+  }
+}
+}  // namespace
+
 LoopWorker::Outcome LoopWorker::Detect(const LoopQuery& query) {
+  const ScopedSpan span(recorder_, Lane::kLoopClosure, "detect");
+  const Span::Clock::time_point begin = Span::Clock::now();
   Outcome outcome;
   try {
     outcome.result = detector_.Detect(query);
+    if (recorder_ != nullptr) AddStages(outcome.result, begin, *recorder_);
   } catch (...) {
     outcome.failure = std::current_exception();
   }
@@ -70,6 +90,7 @@ LoopResult LoopWorker::Locate(const LoopQuery& query) {
 }
 
 LoopResult LoopWorker::Take() {
+  const ScopedSpan span(recorder_, Lane::kTracking, "wait_for_loop");
   const auto begin = std::chrono::steady_clock::now();
   std::unique_lock<std::mutex> lock(mutex_);
   changed_.wait(lock, [this] { return !outcomes_.empty(); });

@@ -7,6 +7,7 @@
 #include <mutex>
 #include <thread>
 
+#include "tutti/core/span_recorder.h"
 #include "tutti/loopclosure/detector.h"
 
 namespace tutti {
@@ -15,7 +16,8 @@ namespace tutti {
 /// same.
 class LoopWorker {
  public:
-  LoopWorker(const LoopDetectorOptions& options, bool own_thread);
+  /// `recorder` may be null.
+  LoopWorker(const LoopDetectorOptions& options, bool own_thread, SpanRecorder* recorder = nullptr);
   ~LoopWorker();
   LoopWorker(const LoopWorker&) = delete;
   LoopWorker& operator=(const LoopWorker&) = delete;
@@ -37,6 +39,7 @@ class LoopWorker {
   Outcome Detect(const LoopQuery& query);
 
   LoopDetector detector_;
+  SpanRecorder* recorder_;
   std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<LoopQuery> queries_;  // guarded by mutex_

@@ -4,6 +4,7 @@
 #include <fstream>
 #include <system_error>
 
+#include "text_file.h"
 #include "tutti/backend/g2o_io.h"
 #include "tutti/core/error.h"
 #include "tutti/pipeline/outputs.h"
@@ -21,15 +22,6 @@ constexpr std::uintmax_t kRoomBytes = 32u << 20;  // a long run writes a few MB
 
 // Of the i-th of the pieces that are not joined to the trajectory, from 1.
 std::string PieceFile(int i) { return "trajectory_piece_" + std::to_string(i) + ".txt"; }
-
-void WriteText(const fs::path& file, const std::string& text) {
-  std::ofstream out(file, std::ios::binary);
-  if (!out)
-    throw InputError(file.string() + ": can't be written; check that the folder exists and is writable");
-  out << text;
-  out.flush();
-  if (!out) throw InputError(file.string() + ": could not be written in full; is the disk full?");
-}
 
 std::vector<Eigen::Vector3d> Positions(const Trajectory& trajectory, const Similarity& alignment) {
   std::vector<Eigen::Vector3d> points;
@@ -68,6 +60,15 @@ TrajectoryPlot MakePlot(const RunResult& result) {
 }
 
 }  // namespace
+
+void WriteTextFile(const fs::path& file, const std::string& text) {
+  std::ofstream out(file, std::ios::binary);
+  if (!out)
+    throw InputError(file.string() + ": can't be written; check that the folder exists and is writable");
+  out << text;
+  out.flush();
+  if (!out) throw InputError(file.string() + ": could not be written in full; is the disk full?");
+}
 
 std::size_t RunResult::LoopsAccepted() const {
   std::size_t count = 0;
@@ -108,7 +109,7 @@ void PrepareOutputFolder(const fs::path& out) {
 }
 
 void WriteOutputs(const fs::path& out, const RunResult& result) {
-  WriteText(out / "loops.csv", LoopsCsv(result));
+  WriteTextFile(out / "loops.csv", LoopsCsv(result));
   if (!result.appearance_only) {
     WriteTrajectory(out / "trajectory.txt", result.trajectory, TrajectoryFormat::kTum);
     for (std::size_t i = 0; i < result.other_pieces.size(); ++i) {
@@ -122,7 +123,7 @@ void WriteOutputs(const fs::path& out, const RunResult& result) {
     WriteSvg(out / "trajectory.svg", plot);
     WritePng(out / "trajectory.png", plot);
   }
-  WriteText(out / "summary.json", SummaryJson(result));
+  WriteTextFile(out / "summary.json", SummaryJson(result));
 }
 
 }  // namespace tutti

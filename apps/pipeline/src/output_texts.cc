@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "tutti/pipeline/outputs.h"
+#include "tutti/pipeline/timing.h"
 #include "tutti/pipeline/version.h"
 
 namespace tutti {
@@ -23,14 +24,6 @@ const char* Name(Sensor sensor) {
       return "rgbd";
   }
   return "?";
-}
-
-// Value below which a share q of the sorted values lies (nearest rank).
-double Quantile(std::vector<double> values, double q) {
-  if (values.empty()) return 0;
-  std::sort(values.begin(), values.end());
-  const auto rank = static_cast<std::size_t>(std::ceil(q * static_cast<double>(values.size())));
-  return values[std::min(values.size() - 1, rank > 0 ? rank - 1 : 0)];
 }
 
 // A value of the configuration as JSON: numbers and booleans as such, the rest as text.
@@ -58,6 +51,22 @@ Json ScoreJson(const TrajectoryScore& score) {
   return json;
 }
 
+// Only what --timing or --trace measured.
+Json StagesJson(const RunResult& r) {
+  Json rows = Json::array();
+  for (const StageTiming& stage : r.stages) {
+    rows.push_back({{"lane", ToString(stage.lane)},
+                    {"name", stage.name},
+                    {"calls", stage.calls},
+                    {"median_ms", stage.median_ms},
+                    {"p99_ms", stage.p99_ms},
+                    {"total_ms", stage.total_ms},
+                    {"cpu_ms", stage.cpu_ms >= 0 ? Json(stage.cpu_ms) : Json()},
+                    {"share", stage.share}});
+  }
+  return rows;
+}
+
 Json LoopsJson(const RunResult& r) {
   Json loops = {
       {"proposed", r.loops.size()}, {"accepted", r.LoopsAccepted()}, {"corrections", r.corrections}};
@@ -71,8 +80,9 @@ Json LoopsJson(const RunResult& r) {
 
 Json FramesJson(const RunResult& r) {
   Json frames = {
-      {"total", r.frames_total}, {"tracked", r.frames_tracked},         {"bad", r.bad.size()},
-      {"lost", r.frames_lost},   {"relocalized", r.frames_relocalized}, {"in_dataset", r.frames_listed}};
+      {"total", r.frames_total},      {"tracked", r.frames_tracked},         {"bad", r.bad.size()},
+      {"lost", r.frames_lost},        {"relocalized", r.frames_relocalized}, {"dropped", r.frames_dropped},
+      {"in_dataset", r.frames_listed}};
   frames["bad_frames"] = Json::array();
   for (const BadFrame& bad : r.bad)
     frames["bad_frames"].push_back({{"index", bad.index}, {"error", bad.error}});
@@ -132,18 +142,24 @@ std::string SummaryJson(const RunResult& r) {
   json["config_file"] = r.config_file;
   json["sensor"] = Name(r.rig.sensor);
   json["seed"] = r.config.odometry.seed;
+  json["realtime"] = r.realtime;
   json["interrupted"] = r.interrupted;
   json["appearance_only"] = r.appearance_only;
   json["frames"] = FramesJson(r);
+  json["calibration_findings"] = Json::array();
+  for (const CalibrationFinding& f : r.calibration_findings)
+    json["calibration_findings"].push_back({{"measured", f.measured}, {"advice", f.advice}});
   json["keyframes"] = r.keyframes;
   json["loops"] = LoopsJson(r);
   Json stages = Json::object();
   for (const auto& [name, ms] : r.stage_ms) stages[name] = ms;
   json["timing"] = {
       {"wall_s", r.wall_s},
+      {"cpu_s", r.cpu_s},
       {"odometry_pass_s", r.odometry_pass_s},
       {"frame_ms", {{"median", Quantile(r.frame_ms, 0.5)}, {"p99", Quantile(r.frame_ms, 0.99)}}},
       {"stage_ms", stages}};
+  if (!r.stages.empty()) json["timing"]["stages"] = StagesJson(r);
   json["memory"] = {{"peak_mb", r.peak_memory_mb}};
   if (r.rig.sensor == Sensor::kStereo) {
     json["stereo"] = {{"row_error_px", r.stereo_row_error_px}, {"matches", r.stereo_matches}};
@@ -204,6 +220,7 @@ std::string ResultTable(const RunResult& r) {
   std::ostringstream out;
   out << "\n  frames " << r.frames_tracked << " of " << r.frames_total << " posed";
   if (!r.bad.empty()) out << ", " << r.bad.size() << " bad";
+  if (r.realtime) out << ", " << r.frames_dropped << " dropped";
   out << "; keyframes " << r.keyframes << "; loops " << r.LoopsAccepted() << " accepted of " << r.loops.size()
       << " proposed";
   if (r.evaluation)

@@ -1,28 +1,33 @@
 #include "prefetcher.h"
 
+#include <algorithm>
 #include <chrono>
 #include <exception>
 #include <utility>
 
 namespace tutti {
-namespace {
 
 // A reader must not throw for one bad frame; if it does all the same, the frame counts as bad.
-ReadResult ReadFrame(const Dataset& dataset, std::size_t index) {
+FetchedFrame Prefetcher::Read(std::size_t position) const {
   try {
-    return dataset.Read(index);
+    FetchedFrame frame{position, {}};
+    {
+      const ScopedSpan span(options_.recorder, Lane::kReading, "read");
+      frame.read = dataset_.Read(position);
+    }
+    if (frame.read.frame && options_.prepare) options_.prepare(*frame.read.frame);
+    return frame;
   } catch (const std::exception& e) {
-    ReadResult result;
-    result.error = e.what();
-    return result;
+    FetchedFrame frame;
+    frame.position = position;
+    frame.read.error = e.what();
+    return frame;
   }
 }
 
-}  // namespace
-
-Prefetcher::Prefetcher(const Dataset& dataset, std::size_t begin, std::size_t end, std::size_t ahead)
-    : dataset_(dataset), next_(begin), end_(end), ahead_(ahead), read_(begin) {
-  if (ahead_ > 0) thread_ = std::thread(&Prefetcher::Work, this);
+Prefetcher::Prefetcher(const Dataset& dataset, PrefetchOptions options)
+    : dataset_(dataset), options_(std::move(options)), next_(options_.begin), read_(options_.begin) {
+  if (options_.ahead > 0) thread_ = std::thread(&Prefetcher::Work, this);
 }
 
 Prefetcher::~Prefetcher() {
@@ -34,36 +39,65 @@ Prefetcher::~Prefetcher() {
   if (thread_.joinable()) thread_.join();
 }
 
-void Prefetcher::Work() {
-  for (; read_ < end_; ++read_) {
-    {
-      std::unique_lock<std::mutex> lock(mutex_);
-      changed_.wait(lock, [this] { return stop_ || ready_.size() < ahead_; });
-      if (stop_) return;
-    }
-    ReadResult result = ReadFrame(dataset_, read_);
+bool Prefetcher::Available(std::size_t position) const {
+  if (position >= options_.end) return false;
+  return dataset_.WaitFor(position, [this] {
     const std::lock_guard<std::mutex> lock(mutex_);
-    ready_.push_back(std::move(result));
+    return stop_ || (options_.stop && options_.stop());
+  });
+}
+
+void Prefetcher::Work() {
+  std::unique_lock<std::mutex> lock(mutex_);
+  while (true) {
+    changed_.wait(lock, [this] { return stop_ || options_.newest || ready_.size() < options_.ahead; });
+    if (stop_) return;
+    const std::size_t position = read_;
+    lock.unlock();
+    const bool there = Available(position);
+    FetchedFrame frame;
+    if (there) frame = Read(position);
+    lock.lock();
+    if (!there) {
+      finished_ = true;
+      changed_.notify_all();
+      return;
+    }
+    if (position >= next_) {  // not skipped meanwhile
+      if (ready_.size() >= options_.ahead) ready_.pop_front();
+      ready_.push_back(std::move(frame));
+    }
+    read_ = std::max(read_, position + 1);
     changed_.notify_all();
   }
 }
 
-std::optional<ReadResult> Prefetcher::Next() {
-  if (next_ >= end_) return std::nullopt;
+std::optional<FetchedFrame> Prefetcher::Next() {
   const auto begin = std::chrono::steady_clock::now();
-  ReadResult result;
-  if (ahead_ == 0) {
-    result = ReadFrame(dataset_, next_);
+  std::optional<FetchedFrame> frame;
+  if (options_.ahead == 0) {
+    if (Available(next_)) frame = Read(next_);
+    ++next_;
   } else {
     std::unique_lock<std::mutex> lock(mutex_);
-    changed_.wait(lock, [this] { return !ready_.empty(); });
-    result = std::move(ready_.front());
-    ready_.pop_front();
+    changed_.wait(lock, [this] { return finished_ || !ready_.empty(); });
+    if (!ready_.empty()) {
+      frame = std::move(ready_.front());
+      ready_.pop_front();
+      next_ = frame->position + 1;
+    }
     changed_.notify_all();
   }
-  ++next_;
   waited_ms_ += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
-  return result;
+  return frame;
+}
+
+void Prefetcher::SkipTo(std::size_t position) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  next_ = std::max(next_, position);
+  read_ = std::max(read_, next_);
+  while (!ready_.empty() && ready_.front().position < next_) ready_.pop_front();
+  changed_.notify_all();
 }
 
 }  // namespace tutti

@@ -21,6 +21,11 @@ std::string Progress::Line(std::size_t done, const std::string& status) const {
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
   char text[256];
   const double share = total_ > 0 ? static_cast<double>(done) / static_cast<double>(total_) : 1.0;
+  if (total_ == 0) {
+    std::snprintf(text, sizeof text, " %zu frames  %.1f/s  %s", done,
+                  seconds > 0 ? static_cast<double>(done) / seconds : 0.0, status.c_str());
+    return title_ + text;
+  }
   std::snprintf(text, sizeof text, " %3.0f%%  %zu/%zu frames  %.1f/s  %s", 100 * share, done, total_,
                 seconds > 0 ? static_cast<double>(done) / seconds : 0.0, status.c_str());
   if (!terminal_) return title_ + text;
@@ -33,16 +38,14 @@ void Progress::Update(std::size_t done, const std::string& status) {
   if (out_ == nullptr) return;
   if (terminal_) {
     const auto now = std::chrono::steady_clock::now();
-    if (done < total_ && line_open_ && now - last_ < std::chrono::milliseconds(100)) return;
+    if ((done < total_ || total_ == 0) && line_open_ && now - last_ < std::chrono::milliseconds(100)) return;
     last_ = now;
     std::fprintf(out_, "\r%s\x1b[K", Line(done, status).c_str());
     line_open_ = true;
   } else {
-    if (done * 10 < next_tenth_ * total_) return;
-    while (next_tenth_ * total_ <= done * 10) {
-      ++next_tenth_;
-      if (total_ == 0) break;
-    }
+    const std::size_t step = total_ > 0 ? total_ : 1000;  // unknown: a line for each 100 frames
+    if (done * 10 < next_tenth_ * step) return;
+    while (next_tenth_ * step <= done * 10) ++next_tenth_;
     std::fprintf(out_, "%s\n", Line(done, status).c_str());
   }
   std::fflush(out_);

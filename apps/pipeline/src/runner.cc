@@ -5,12 +5,15 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <map>
+#include <memory>
 #include <opencv2/core.hpp>
 #include <set>
 #include <utility>
 
 #include "prefetcher.h"
 #include "run_evaluation.h"
+#include "text_file.h"
 #include "tutti/core/error.h"
 #include "tutti/pipeline/interrupt.h"
 #include "tutti/pipeline/outputs.h"
@@ -33,8 +36,18 @@ double PeakMemoryMb() {
   return static_cast<double>(usage.ru_maxrss) / 1024.0;
 }
 
+double ProcessCpuSeconds() {
+  rusage usage = {};
+  getrusage(RUSAGE_SELF, &usage);
+  const auto seconds = [](const timeval& t) {
+    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+  };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
 RunConfig WithOverrides(RunConfig config, const RunRequest& request) {
   if (request.no_loops) config.run.loops = false;
+  if (request.follow_s) config.dataset.follow_s = *request.follow_s;
   if (request.threads) config.run.threads = *request.threads;
   if (request.seed) {
     config.odometry.seed = *request.seed;
@@ -72,65 +85,71 @@ Trajectory BodyTrajectory(Trajectory trajectory, const CameraRig& rig) {
 class Run {
  public:
   Run(const RunRequest& request, const RunConfig& config, const Dataset& dataset, RunResult& result)
-      : request_(request), config_(config), dataset_(dataset), result_(result), slam_(config, dataset.Rig()) {
-    total_ = dataset.Size();
+      : request_(request),
+        config_(config),
+        dataset_(dataset),
+        result_(result),
+        slam_(config, dataset.Rig(), Recorder()) {
+    total_ = dataset.FrameSupply() == Supply::kStored ? dataset.Size() : static_cast<std::size_t>(-1);
     if (request.max_frames) total_ = std::min(total_, static_cast<std::size_t>(*request.max_frames));
+    result_.realtime = request.realtime;
+    if (!request.realtime || dataset.FrameSupply() == Supply::kOnce) return;
+    clock_ = request.clock ? request.clock : std::make_shared<SteadyFrameClock>();
+    playback_.emplace(*clock_);
   }
 
   void TrackAll() {
     const Clock::time_point begin = Clock::now();
-    Progress progress(config_.run.loops ? "slam" : "odometry", total_, Out());
-    Prefetcher frames(dataset_, 0, total_, Ahead());
-    std::size_t done = 0;
+    const double cpu_begin = ProcessCpuSeconds();
+    Progress progress(config_.run.loops ? "slam" : "odometry",
+                      total_ == static_cast<std::size_t>(-1) ? 0 : total_, Out());
+    Prefetcher frames(dataset_, Reading());
     while (!InterruptGuard::Requested()) {
-      const std::optional<ReadResult> read = frames.Next();
-      if (!read) break;
-      if (read->frame) {
-        TrackOne(*read->frame);
+      if (playback_) AwaitFrame(frames);
+      const std::optional<FetchedFrame> fetched = frames.Next();
+      if (!fetched) break;
+      for (; next_ < fetched->position; ++next_) dropped_.insert(next_);
+      if (fetched->read.frame) {
+        positions_[fetched->read.frame->index] = next_;
+        TrackOne(*fetched->read.frame);
       } else {
-        result_.bad.push_back({static_cast<std::int64_t>(done), read->error});
-        progress.Note("tutti: frame " + std::to_string(done) + " is skipped: " + read->error);
+        result_.bad.push_back({static_cast<std::int64_t>(next_), fetched->read.error});
+        progress.Note("tutti: frame " + std::to_string(next_) + " is skipped: " + fetched->read.error);
       }
       NoteWarnings(progress);
-      progress.Update(++done, Status());
+      progress.Update(++next_, Status());
     }
     result_.interrupted = InterruptGuard::Requested();
     slam_.Finish();
     NoteWarnings(progress);
     progress.Finish();
     if (result_.interrupted) {
-      progress.Note("tutti: interrupted after " + std::to_string(done) + " of " + std::to_string(total_) +
+      progress.Note("tutti: interrupted after " + std::to_string(next_) + " of " + std::to_string(Listed()) +
                     " frames; writing what is there");
     }
-    result_.frames_total = done;
+    if (result_.realtime) {
+      progress.Note("tutti: real time: " + std::to_string(dropped_.size()) + " of " + std::to_string(next_) +
+                    " frames were dropped");
+    }
+    result_.frames_total = next_;
+    result_.frames_dropped = dropped_.size();
     result_.frames_listed = dataset_.Size();
     result_.stage_ms = slam_.StageMilliseconds();
     result_.stage_ms["read_wait"] = frames.WaitedMs();
     result_.wall_s = Seconds(begin);
+    result_.cpu_s = ProcessCpuSeconds() - cpu_begin;
+    ReportTimes(begin);
   }
 
   // What the odometry would have done alone: the copy from before the first correction tracks the rest.
   void TrackUntouched() {
     Odometry* odometry = slam_.untouched();
     if (odometry == nullptr || slam_.UntouchedNext() < 0) return;
-    const auto next = static_cast<std::size_t>(slam_.UntouchedNext());
-    const Clock::time_point begin = Clock::now();
-    if (config_.run.odometry_pass && next < result_.frames_total) {
-      Progress progress("odometry alone", result_.frames_total - next, Out());
-      Prefetcher frames(dataset_, next, result_.frames_total, Ahead());
-      std::size_t done = 0;
-      // After a Ctrl-C this pass is the price of a complete file; a second Ctrl-C ends the process.
-      while (const std::optional<ReadResult> read = frames.Next()) {
-        if (read->frame) odometry->Track(*read->frame);
-        progress.Update(++done, "for trajectory_odometry.txt");
-        if (result_.interrupted) break;
-        if (InterruptGuard::Requested()) break;
-      }
-      result_.odometry_complete = done == result_.frames_total - next;
-    } else {
-      result_.odometry_complete = next >= result_.frames_total;
-    }
-    result_.odometry_pass_s = Seconds(begin);
+    const std::size_t begin = positions_.at(slam_.UntouchedNext()), end = result_.frames_total;
+    const Clock::time_point start = Clock::now();
+    const bool again = config_.run.odometry_pass && dataset_.FrameSupply() != Supply::kOnce;
+    result_.odometry_complete = again && TrackAgain(*odometry, begin, end);
+    result_.odometry_pass_s = Seconds(start);
   }
 
   void Collect() {
@@ -159,13 +178,75 @@ class Run {
 
  private:
   std::FILE* Out() const { return request_.quiet ? nullptr : stderr; }
-  std::size_t Ahead() const { return config_.run.threads > 1 ? 4 : 0; }
+  SpanRecorder* Recorder() { return request_.timing || request_.trace ? &recorder_ : nullptr; }
+
+  // Frames that are there by now, of those that the run may see.
+  std::size_t Listed() const { return std::min(total_, dataset_.Size()); }
+
+  PrefetchOptions Reading() {
+    PrefetchOptions options;
+    options.end = total_;
+    options.ahead = config_.run.threads > 1 ? 4 : 0;
+    options.stop = &InterruptGuard::Requested;
+    options.recorder = Recorder();
+    options.prepare = [this](InputFrame& frame) { Extract(frame); };
+    if (request_.realtime && !playback_) {  // a camera keeps its own time
+      options.ahead = 1;
+      options.newest = true;
+    }
+    return options;
+  }
+
+  // Features need nothing from before, so they are extracted ahead of the tracking, too.
+  void Extract(InputFrame& frame) {
+    if (slam_.AppearanceOnly()) return;
+    const ScopedSpan span(Recorder(), Lane::kReading, "extract");
+    frame.features = slam_.odometry()->Extract(frame);
+  }
+
+  // In real time: passes over the frames that newer ones have made old, and waits for the one that is due.
+  void AwaitFrame(Prefetcher& frames) {
+    std::size_t next = next_;
+    while (next + 1 < Listed() && playback_->Due(dataset_.Stamp(next + 1))) ++next;
+    frames.SkipTo(next);
+    if (next < Listed()) playback_->Reach(dataset_.Stamp(next));
+  }
+
+  // False if it was interrupted.
+  bool TrackAgain(Odometry& odometry, std::size_t begin, std::size_t end) {
+    Progress progress("odometry alone", end - begin, Out());
+    PrefetchOptions options;
+    options.begin = begin;
+    options.end = end;
+    options.ahead = Reading().ahead;
+    options.prepare = [&odometry](InputFrame& frame) { frame.features = odometry.Extract(frame); };
+    Prefetcher frames(dataset_, options);
+    // After a Ctrl-C this pass is the price of a complete file; a second Ctrl-C ends the process.
+    for (std::size_t i = begin; i < end; ++i) {
+      if (dropped_.count(i) != 0) continue;
+      frames.SkipTo(i);
+      const std::optional<FetchedFrame> fetched = frames.Next();
+      if (!fetched) return false;
+      if (fetched->read.frame) odometry.Track(*fetched->read.frame);
+      progress.Update(i + 1 - begin, "for trajectory_odometry.txt");
+      if ((result_.interrupted || InterruptGuard::Requested()) && i + 1 < end) return false;
+    }
+    return true;
+  }
 
   void NoteWarnings(Progress& progress) {
     for (const std::string& warning : slam_.TakeWarnings()) progress.Note("tutti: warning: " + warning);
   }
 
+  void ReportTimes(Clock::time_point begin) {
+    if (Recorder() == nullptr) return;
+    const std::vector<Span> spans = recorder_.Spans();
+    result_.stages = SummarizeStages(spans, result_.wall_s);
+    if (request_.trace) WriteTextFile(*request_.trace, ChromeTrace(spans, begin));
+  }
+
   void TrackOne(const InputFrame& frame) {
+    const ScopedSpan span(Recorder(), Lane::kTracking, "frame");
     const Clock::time_point begin = Clock::now();
     const TrackResult track = slam_.Track(frame);
     result_.frame_ms.push_back(1e3 * Seconds(begin));
@@ -208,8 +289,14 @@ class Run {
   const RunConfig& config_;
   const Dataset& dataset_;
   RunResult& result_;
+  SpanRecorder recorder_;
   SlamSystem slam_;
-  std::size_t total_ = 0;
+  std::shared_ptr<FrameClock> clock_;              // of playback_
+  std::optional<Playback> playback_;               // in real time, unless the source keeps time itself
+  std::size_t total_ = 0;                          // most frames; endless for a growing data set
+  std::size_t next_ = 0;                           // position that comes next
+  std::set<std::size_t> dropped_;                  // positions
+  std::map<std::int64_t, std::size_t> positions_;  // of the input frames, by their index
   std::string state_;
   bool lost_open_ = false;
 };
@@ -231,10 +318,19 @@ RunResult RunSlam(const RunRequest& request, const RunConfig& given) {
   std::vector<std::string> warnings = dataset->Warnings();
   const auto reference = ReadReference(*dataset, request, &warnings);
   PrepareOutputFolder(request.out);
+  if (request.trace)
+    WriteTextFile(*request.trace, "");  // what can't be written is known before the long work
   if (!request.quiet) {
     for (const std::string& warning : warnings) std::fprintf(stderr, "tutti: %s\n", warning.c_str());
     if (!result.rig.calibrated) {
       std::fprintf(stderr, "tutti: no camera calibration: appearance only, loops but no trajectory\n");
+    }
+  }
+  result.calibration_findings = CheckCalibration(*dataset).findings;
+  if (!request.quiet) {
+    for (const CalibrationFinding& f : result.calibration_findings) {
+      std::fprintf(stderr, "tutti: warning: the calibration can't be right: %s; %s\n", f.measured.c_str(),
+                   f.advice.c_str());
     }
   }
   const InterruptGuard guard;

@@ -27,15 +27,19 @@ LoopDetectorOptions DetectorOptions(const RunConfig& config) {
 
 class SlamSystem::Impl {
  public:
-  Impl(const RunConfig& config, const CameraRig& rig)
-      : options_(config.run),
+  Impl(const RunConfig& config, const CameraRig& rig, SpanRecorder* recorder)
+      : recorder_(recorder),
+        options_(config.run),
         rig_(rig),
         seed_(config.loops.seed),
         gate_(config.run),
         graph_(config.graph, config.run, rig.sensor) {
-    if (rig.calibrated) odometry_.emplace(config.odometry, rig);
+    if (rig.calibrated) {
+      odometry_.emplace(config.odometry, rig);
+      odometry_->SetRecorder(recorder);
+    }
     if (config.run.loops)
-      worker_ = std::make_unique<LoopWorker>(DetectorOptions(config), config.run.threads > 1);
+      worker_ = std::make_unique<LoopWorker>(DetectorOptions(config), config.run.threads > 1, recorder);
   }
 
   TrackResult Track(const InputFrame& frame) {
@@ -245,6 +249,7 @@ class SlamSystem::Impl {
 
   // Optimises with the entering loops; those that the rest contradicts leave again. Then the map moves.
   void Close(std::vector<LoopEdge> entering, std::int64_t next_frame) {
+    const ScopedSpan span(recorder_, Lane::kOptimisation, "close_loop");
     const auto begin = std::chrono::steady_clock::now();
     MapGraph::Correction correction;
     while (!entering.empty()) {
@@ -292,6 +297,7 @@ class SlamSystem::Impl {
     }
     if (!untouched_) {
       untouched_ = *odometry_;
+      untouched_->SetRecorder(nullptr);
       untouched_next_ = next_frame;
     }
     graph_.Keep(*odometry_, correction, gate_.accepted(), gate_.waiting());
@@ -299,6 +305,7 @@ class SlamSystem::Impl {
     ++corrections_;
   }
 
+  SpanRecorder* recorder_;
   SlamOptions options_;
   CameraRig rig_;
   std::uint64_t seed_ = 1;
@@ -315,8 +322,8 @@ class SlamSystem::Impl {
   std::map<std::string, double> stages_;
 };
 
-SlamSystem::SlamSystem(const RunConfig& config, const CameraRig& rig)
-    : impl_(std::make_unique<Impl>(config, rig)) {}
+SlamSystem::SlamSystem(const RunConfig& config, const CameraRig& rig, SpanRecorder* recorder)
+    : impl_(std::make_unique<Impl>(config, rig, recorder)) {}
 SlamSystem::~SlamSystem() = default;
 
 TrackResult SlamSystem::Track(const InputFrame& frame) { return impl_->Track(frame); }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "tutti/core/pose.h"
+#include "tutti/core/span_recorder.h"
 #include "tutti/core/trajectory.h"
 #include "tutti/frontend/frame.h"
 #include "tutti/frontend/odometry_options.h"
@@ -97,6 +98,9 @@ class Odometry {
 
   /// Milliseconds spent so far, by stage ("extract", "track", "map", "local_ba", ...), summed.
   std::map<std::string, double> StageMilliseconds() const;
+  /// Records each stage of each frame from now on; `recorder` must outlive this object and its copies, null
+  /// ends it.
+  void SetRecorder(SpanRecorder* recorder);
   /// Stereo: median row difference over matches [px] and matches of the median frame, so far (0 if not
   /// stereo).
   double StereoRowErrorPx() const;

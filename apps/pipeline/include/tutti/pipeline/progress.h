@@ -11,6 +11,7 @@ namespace tutti {
 /// Writes to `out` (stderr by default; nullptr: silent). Never part of a result.
 class Progress {
  public:
+  /// `total` frames; 0: nobody knows how many.
   Progress(std::string title, std::size_t total, std::FILE* out = stderr);
   ~Progress();
   Progress(const Progress&) = delete;

@@ -10,8 +10,10 @@
 #include "tutti/backend/evaluation.h"
 #include "tutti/backend/pose_graph.h"
 #include "tutti/core/trajectory.h"
+#include "tutti/frontend/calibration_check.h"
 #include "tutti/pipeline/config.h"
 #include "tutti/pipeline/loop_record.h"
+#include "tutti/pipeline/timing.h"
 
 namespace tutti {
 
@@ -57,12 +59,16 @@ struct RunResult {
   RunConfig config;
   CameraRig rig;
 
+  std::vector<CalibrationFinding> calibration_findings;  ///< what can't be right about it
+
   // Frames.
-  std::size_t frames_total = 0;        ///< that the run went through, bad ones included
+  std::size_t frames_total = 0;        ///< that the run went through, bad and dropped ones included
   std::size_t frames_listed = 0;       ///< that the data set has
   std::size_t frames_tracked = 0;      ///< with a pose in trajectory.txt
   std::size_t frames_lost = 0;         ///< read, but without a pose when they came
   std::size_t frames_relocalized = 0;  ///< lost, but the loop detector knew the place
+  bool realtime = false;               ///< played by the time stamps
+  std::size_t frames_dropped = 0;      ///< not looked at, since newer ones were there already
   std::vector<BadFrame> bad;
   std::vector<LostStretch> lost;
   std::size_t keyframes = 0;
@@ -83,9 +89,11 @@ struct RunResult {
 
   // Cost.
   double wall_s = 0;             ///< of the run, without the second odometry pass and the evaluation
+  double cpu_s = 0;              ///< processor time of all threads over the same time
   double odometry_pass_s = 0;    ///< of that second pass
   std::vector<double> frame_ms;  ///< of each frame, from having the image to having the pose
   std::map<std::string, double> stage_ms;  ///< summed over the run
+  std::vector<StageTiming> stages;         ///< with RunRequest::timing or trace only
   double peak_memory_mb = 0;
   double stereo_row_error_px = 0, stereo_matches = 0;
 

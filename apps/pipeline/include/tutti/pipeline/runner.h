@@ -3,8 +3,10 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 
+#include "tutti/pipeline/frame_clock.h"
 #include "tutti/pipeline/run_result.h"
 
 namespace tutti {
@@ -12,14 +14,19 @@ namespace tutti {
 /// What the command line can say.
 struct RunRequest {
   std::filesystem::path config;                       ///< YAML file
-  std::filesystem::path dataset;                      ///< folder or video file
+  std::filesystem::path dataset;                      ///< folder, video file, or camera:0
   std::filesystem::path out;                          ///< folder for the results; made if it is not there
   std::optional<std::filesystem::path> ground_truth;  ///< "none": don't evaluate; default: the data set's own
   bool no_loops = false;
   std::optional<std::uint64_t> seed;  ///< of everything that draws numbers
   std::optional<int> threads;
-  std::optional<std::int64_t> max_frames;  ///< the first frames only
-  bool quiet = false;                      ///< no progress, no notes
+  std::optional<std::int64_t> max_frames;      ///< the first frames only
+  std::optional<double> follow_s;              ///< DatasetOptions::follow_s
+  bool realtime = false;                       ///< play by the time stamps, drop frames that it can't follow
+  std::shared_ptr<FrameClock> clock;           ///< for realtime; null: the machine's
+  bool timing = false;                         ///< measure every stage (RunResult::stages)
+  std::optional<std::filesystem::path> trace;  ///< the same, and write a trace for Chrome or Perfetto there
+  bool quiet = false;                          ///< no progress, no notes
 };
 
 /// Runs and writes everything into request.out. Throws InputError for input that makes the run impossible,

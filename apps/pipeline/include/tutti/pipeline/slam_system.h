@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "tutti/backend/pose_graph.h"
+#include "tutti/core/span_recorder.h"
 #include "tutti/frontend/odometry.h"
 #include "tutti/pipeline/config.h"
 #include "tutti/pipeline/loop_record.h"
@@ -26,8 +27,9 @@ namespace tutti {
 /// (appearance only).
 class SlamSystem {
  public:
-  /// Throws InputError if the configuration does not fit the rig.
-  SlamSystem(const RunConfig& config, const CameraRig& rig);
+  /// Throws InputError if the configuration does not fit the rig. `recorder` gets the time of each stage; it
+  /// must outlive this object; null: nothing is recorded.
+  SlamSystem(const RunConfig& config, const CameraRig& rig, SpanRecorder* recorder = nullptr);
   ~SlamSystem();
   SlamSystem(const SlamSystem&) = delete;
   SlamSystem& operator=(const SlamSystem&) = delete;

@@ -1,0 +1,85 @@
+#!/usr/bin/env python3
+"""Runs `tutti run --timing` on real sequences and writes the tables of docs/performance.md between their markers.
+
+usage: bench/performance.py --tutti build/release/apps/tutti/tutti [--data DIR] [--out DIR] [--reuse] [--remark TEXT]
+                            [--document FILE] [ROW...]
+Rows: kitti redkitchen. --reuse makes the tables of the results that an earlier run left in --out; rows that are not run keep
+what the document says. Needs nothing but Python 3.
+"""
+import argparse
+import json
+import os
+import pathlib
+import platform
+import subprocess
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+DOCUMENT = ROOT / "docs" / "performance.md"
+ROWS = {"kitti": ("`kitti_00_head`, mono", "kitti_00-02_mono.yaml", "kitti_00_head"),
+        "redkitchen": ("`redkitchen`, RGB-D", "7scenes.yaml", "redkitchen")}
+
+
+def summary_of(tutti, name, data, out, reuse):
+    """summary.json of a run, with the load of the machine before it."""
+    _, config, dataset = ROWS[name]
+    folder = out / name
+    if not (reuse and (folder / "summary.json").exists()):
+        if not (data / dataset).exists():
+            print(f"{name}: {data / dataset} is absent; the table is left as it is", file=sys.stderr)
+            return None
+        load = os.getloadavg()[0]
+        subprocess.run([tutti, "run", "--config", ROOT / "data" / "configs" / config, "--dataset", data / dataset,
+                        "--out", folder, "--timing", "--trace", out / f"{name}.json"], check=True)
+        (folder / "load.txt").write_text(f"{load:.1f}")
+    summary = json.loads((folder / "summary.json").read_text())
+    load = folder / "load.txt"
+    summary["load"] = load.read_text() if load.exists() else "unknown"
+    return summary
+
+
+def section(name, s, remark):
+    timing, frames = s["timing"], s["frames"]["total"]
+    lines = [f"### {ROWS[name][0]}", "",
+             f"{frames} frames in {timing['wall_s']:.0f} s; {1e3 * timing['cpu_s'] / frames:.1f} CPU-ms per frame, all threads; "
+             f"tracking median {timing['frame_ms']['median']:.1f} ms, p99 {timing['frame_ms']['p99']:.1f} ms. "
+             f"Load of the machine before the run: {s['load']}; {os.cpu_count()} cores, {platform.machine()}." +
+             (f" {remark}" if remark else ""), "",
+             "| | stage | calls | median, ms | p99, ms | CPU, ms | share of wall time | share of processor time |",
+             "|---|---|---|---|---|---|---|---|"]
+    for stage in timing["stages"]:
+        cpu, share = "-", "-"  # of the detector's stages, which have helpers, it is not known
+        if stage["cpu_ms"] is not None:
+            cpu, share = f"{stage['cpu_ms']:.0f}", f"{stage['cpu_ms'] / (10 * timing['cpu_s']):.1f} %"
+        lines.append(f"| {stage['lane']} | {stage['name']} | {stage['calls']} | {stage['median_ms']:.2f} "
+                     f"| {stage['p99_ms']:.1f} | {cpu} | {100 * stage['share']:.1f} % | {share} |")
+    return "\n".join(lines)
+
+
+def rewrite(document, name, text):
+    begin, end = f"<!-- {name}:begin -->", f"<!-- {name}:end -->"
+    whole = document.read_text()
+    head, tail = whole.index(begin) + len(begin), whole.index(end)
+    document.write_text(whole[:head] + "\n" + text + "\n" + whole[tail:])
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("rows", nargs="*", metavar="ROW", help="kitti, redkitchen (default: both)")
+    parser.add_argument("--tutti", required=True, type=pathlib.Path)
+    parser.add_argument("--data", type=pathlib.Path, default=os.environ.get("TUTTI_DATA", ROOT.parent / "shared" / "data"))
+    parser.add_argument("--out", type=pathlib.Path, default=ROOT / "build" / "performance")
+    parser.add_argument("--document", type=pathlib.Path, default=DOCUMENT)
+    parser.add_argument("--remark", default="", help="a sentence beside the figures")
+    parser.add_argument("--reuse", action="store_true")
+    arguments = parser.parse_args()
+    for name in arguments.rows or ROWS:
+        if name not in ROWS:
+            parser.error(f"unknown row '{name}'; there are {', '.join(ROWS)}")
+        summary = summary_of(arguments.tutti, name, pathlib.Path(arguments.data), arguments.out, arguments.reuse)
+        if summary is not None:
+            rewrite(arguments.document, name, section(name, summary, arguments.remark))
+
+
+if __name__ == "__main__":
+    main()

@@ -171,12 +171,10 @@ bool Odometry::Impl::Offer(int least_inliers, Fix* guess, Fix* best) const {
 bool Odometry::Impl::FindPose(Fix* fix) const {
   const int least = state_ == TrackingState::kLost ? 2 * options.min_inliers : options.min_inliers;
   Fix guess = *fix;
-  if (state_ == TrackingState::kTracking) {
-    const float base = rig.sensor == Sensor::kStereo ? 8.0F : 15.0F;
-    for (const Pose& prediction : Predictions(guess.frame.stamp_s)) {
-      for (const float radius : {base, 2 * base, 4 * base}) {
-        if (GuessFromLastFrame(prediction, radius, &guess) && Offer(least, &guess, fix)) return true;
-      }
+  const float base = rig.sensor == Sensor::kStereo ? 8.0F : 15.0F;
+  for (const Pose& prediction : Predictions(guess.frame.stamp_s)) {
+    for (const float radius : {base, 2 * base, 4 * base}) {
+      if (GuessFromLastFrame(prediction, radius, &guess) && Offer(least, &guess, fix)) return true;
     }
   }
   std::vector<int> tries{reference_, last_keyframe_};

@@ -149,23 +149,48 @@ TEST(Odometry, BlackFrameIsLostWithAReasonAndTheNextOnesAreFoundAgain) {
   EXPECT_EQ(odometry.KeyframePiece(odometry.KeyframeIds().back()), 0);
 }
 
-TEST(Odometry, LongDarknessStartsANewPieceOfMap) {
+// Something to see, but nothing of the map and no depth.
+InputFrame Snow(InputFrame frame) {
+  cv::RNG random(static_cast<std::uint64_t>(frame.index) + 1);
+  for (cv::Mat* image : {&frame.image, &frame.right}) {
+    *image = image->clone();
+    random.fill(*image, cv::RNG::UNIFORM, 0, 256);
+  }
+  return frame;
+}
+
+TEST(Odometry, LongWithNothingOfTheMapInViewStartsANewPiece) {
   OdometryOptions options;
   options.relocalize_s = 0.35;
   Odometry odometry(options, Stereo().rig);
   for (std::size_t i = 0; i < Stereo().frames.size(); ++i) {
-    const bool dark = i >= 10 && i < 20;
-    odometry.Track(dark ? Black(Stereo().frames[i]) : Stereo().frames[i]);
+    const bool elsewhere = i >= 10 && i < 20;
+    odometry.Track(elsewhere ? Snow(Stereo().frames[i]) : Stereo().frames[i]);
   }
   EXPECT_EQ(odometry.KeyframePiece(odometry.KeyframeIds().back()), 1);
+  EXPECT_EQ(odometry.Pieces(), (std::vector<int>{1, 0}));
   EXPECT_EQ(odometry.FrameTrajectory(0).size(), 10U);
   EXPECT_EQ(odometry.FrameTrajectory(1).size(), Stereo().frames.size() - 20);
   EXPECT_EQ(odometry.FrameIndices(1).front(), 20);
   EXPECT_EQ(odometry.FrameTrajectory().size(), Stereo().frames.size() - 20) << "the larger piece";
 }
 
+TEST(Odometry, DarknessLosesNoPlace) {
+  OdometryOptions options;
+  options.relocalize_s = 0.35;
+  Odometry odometry(options, Stereo().rig);
+  for (std::size_t i = 0; i < Stereo().frames.size(); ++i) {
+    const bool dark = i >= 10 && i < 15;
+    odometry.Track(dark ? Black(Stereo().frames[i]) : Stereo().frames[i]);
+  }
+  EXPECT_EQ(odometry.Pieces(), std::vector<int>{0});
+  EXPECT_EQ(odometry.FrameTrajectory().size(), Stereo().frames.size() - 5);
+}
+
 TEST(Odometry, RelocalizesTheLostFrameAtAKeyframeThatShowsItsPlace) {
-  Odometry odometry(OdometryOptions(), Stereo().rig);
+  OdometryOptions options;
+  options.keyframe_inlier_ratio = 0.95;  // more keyframes than a lost frame is compared with by itself
+  Odometry odometry(options, Stereo().rig);
   TrackAll(Stereo(), odometry);
   const int first = odometry.KeyframeIds().front();
   const TrackResult kept = odometry.RelocalizeAt(first);

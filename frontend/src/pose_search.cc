@@ -17,7 +17,7 @@ constexpr int kRecentKeyframes = 10;        // that a lost frame is compared wit
 constexpr double kSurePrediction = 0.5;     // a velocity holds for so long [s]
 constexpr double kLongestPrediction = 1.5;  // [s]
 constexpr double kLeastShare = 0.14;        // of the landmarks in view that must be found again;
-constexpr double kSureShare = 0.25;         // with so many nothing else needs to be tried
+constexpr double kSureShare = 0.2;          // with so many nothing else needs to be tried
 
 // Keyframe with most votes by the landmarks seen (ties: the newest); -1 if there is none.
 int MostVoted(const std::map<int, int>& votes) {

@@ -144,8 +144,9 @@ class Run {
   // What the odometry would have done alone: the copy from before the first correction tracks the rest.
   void TrackUntouched() {
     Odometry* odometry = slam_.untouched();
-    if (odometry == nullptr || slam_.UntouchedNext() < 0) return;
-    const std::size_t begin = positions_.at(slam_.UntouchedNext()), end = result_.frames_total;
+    if (odometry == nullptr) return;
+    const std::size_t begin = positions_.at(slam_.UntouchedLast()) + 1, end = result_.frames_total;
+    if (begin >= end) return;
     const Clock::time_point start = Clock::now();
     const bool again = config_.run.odometry_pass && dataset_.FrameSupply() != Supply::kOnce;
     result_.odometry_complete = again && TrackAgain(*odometry, begin, end);

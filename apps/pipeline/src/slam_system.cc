@@ -43,11 +43,12 @@ class SlamSystem::Impl {
   }
 
   TrackResult Track(const InputFrame& frame) {
-    while (!submitted_.empty() && submitted_.front().due <= frames_) Deliver(frame.index);
+    while (!submitted_.empty() && submitted_.front().due <= frames_) Deliver();
     ++frames_;
     TrackResult result;
     if (odometry_) {
       result = odometry_->Track(frame);
+      last_frame_ = frame.index;
       if (worker_ && result.state != TrackingState::kTracking) result = Relocalize(frame, result);
       if (result.keyframe >= 0)
         graph_.AddKeyframe(result.keyframe, odometry_->KeyframePiece(result.keyframe));
@@ -59,8 +60,8 @@ class SlamSystem::Impl {
   }
 
   void Finish() {
-    while (!submitted_.empty()) Deliver(-1);
-    if (!deferred_.empty()) Close(std::exchange(deferred_, {}), -1);
+    while (!submitted_.empty()) Deliver();
+    if (!deferred_.empty()) Close(std::exchange(deferred_, {}));
     for (LoopRecord& record : records_) {
       if (!record.pending) continue;
       record.pending = false;
@@ -71,7 +72,7 @@ class SlamSystem::Impl {
   // ---- what SlamSystem hands out
   std::optional<Odometry> odometry_, untouched_;
   std::vector<std::string> warnings_;  // not taken yet
-  std::int64_t untouched_next_ = 0;
+  std::int64_t untouched_last_ = -1;
   std::vector<LoopRecord> records_;
   int corrections_ = 0;
   std::size_t relocalized_ = 0;  // frames that were lost, and found by the detector
@@ -93,6 +94,13 @@ class SlamSystem::Impl {
     std::int64_t frame = 0;
   };
 
+  // Before the detector changes anything: what the odometry alone would have done starts here.
+  void KeepUntouched() {
+    if (untouched_) return;
+    untouched_ = *odometry_;
+    untouched_last_ = last_frame_;
+  }
+
   // A frame without a pose is looked up among the keyframes that the detector knows.
   TrackResult Relocalize(const InputFrame& frame, const TrackResult& lost) {
     constexpr int kFewFeatures = 100;  // nothing can be recognised by so few
@@ -107,6 +115,7 @@ class SlamSystem::Impl {
     const auto keyframe = keyframe_of_frame_.find(found.verification.candidate);
     TrackResult result = lost;
     if (found.accepted && keyframe != keyframe_of_frame_.end()) {
+      KeepUntouched();
       result = odometry_->RelocalizeAt(keyframe->second);
     }
     if (result.state == TrackingState::kTracking) ++relocalized_;
@@ -158,8 +167,8 @@ class SlamSystem::Impl {
     return record;
   }
 
-  // Takes the oldest result. `next_frame` is the input frame that comes next, -1 after the last one.
-  void Deliver(std::int64_t next_frame) {
+  // Takes the oldest result.
+  void Deliver() {
     submitted_.pop_front();
     const LoopResult result = worker_->Take();
     AddStages(result);
@@ -179,7 +188,7 @@ class SlamSystem::Impl {
     if (!odometry_) {
       records_.back().accepted = true;
     } else {
-      Consider(result, next_frame);
+      Consider(result);
     }
   }
 
@@ -196,7 +205,7 @@ class SlamSystem::Impl {
   }
 
   // A verified loop: measure it against the map, and close it if something else says the same.
-  void Consider(const LoopResult& result, std::int64_t next_frame) {
+  void Consider(const LoopResult& result) {
     LoopRecord& record = records_.back();
     const auto candidate = keyframe_of_frame_.find(record.candidate),
                query = keyframe_of_frame_.find(record.query);
@@ -234,7 +243,7 @@ class SlamSystem::Impl {
     if (std::all_of(entering.begin(), entering.end(), fulfilled)) {
       deferred_ = std::move(entering);
     } else {
-      Close(std::move(entering), next_frame);
+      Close(std::move(entering));
     }
   }
 
@@ -248,7 +257,7 @@ class SlamSystem::Impl {
   }
 
   // Optimises with the entering loops; those that the rest contradicts leave again. Then the map moves.
-  void Close(std::vector<LoopEdge> entering, std::int64_t next_frame) {
+  void Close(std::vector<LoopEdge> entering) {
     const ScopedSpan span(recorder_, Lane::kOptimisation, "close_loop");
     const auto begin = std::chrono::steady_clock::now();
     MapGraph::Correction correction;
@@ -282,12 +291,11 @@ class SlamSystem::Impl {
       if (staying.size() == entering.size()) break;
       entering = std::move(staying);
     }
-    if (!entering.empty()) Apply(correction, entering, next_frame);
+    if (!entering.empty()) Apply(correction, entering);
     stages_["loop_optimize"] += MillisecondsSince(begin);
   }
 
-  void Apply(const MapGraph::Correction& correction, const std::vector<LoopEdge>& entering,
-             std::int64_t next_frame) {
+  void Apply(const MapGraph::Correction& correction, const std::vector<LoopEdge>& entering) {
     for (const LoopEdge& loop : entering) {
       LoopRecord& record = records_[loop.record];
       record.accepted = true;
@@ -295,11 +303,7 @@ class SlamSystem::Impl {
       record.reason.clear();
       gate_.Accepted(loop);
     }
-    if (!untouched_) {
-      untouched_ = *odometry_;
-      untouched_->SetRecorder(nullptr);
-      untouched_next_ = next_frame;
-    }
+    KeepUntouched();
     graph_.Keep(*odometry_, correction, gate_.accepted(), gate_.waiting());
     odometry_->ApplyCorrection(correction.S_world_keyframe, correction.merges);
     ++corrections_;
@@ -318,6 +322,7 @@ class SlamSystem::Impl {
   std::map<std::int64_t, int> keyframe_of_frame_;  // of the frames that the detector knows
   std::map<std::int64_t, double> stamps_;          // the same
   std::int64_t frames_ = 0;
+  std::int64_t last_frame_ = -1;  // index of the last one that the odometry has seen
   std::int64_t keyframes_seen_ = 0;
   std::map<std::string, double> stages_;
 };
@@ -331,7 +336,7 @@ void SlamSystem::Finish() { impl_->Finish(); }
 bool SlamSystem::AppearanceOnly() const { return !impl_->odometry_; }
 const Odometry* SlamSystem::odometry() const { return impl_->odometry_ ? &*impl_->odometry_ : nullptr; }
 Odometry* SlamSystem::untouched() { return impl_->untouched_ ? &*impl_->untouched_ : nullptr; }
-std::int64_t SlamSystem::UntouchedNext() const { return impl_->untouched_next_; }
+std::int64_t SlamSystem::UntouchedLast() const { return impl_->untouched_last_; }
 std::vector<std::string> SlamSystem::TakeWarnings() { return std::exchange(impl_->warnings_, {}); }
 const std::vector<LoopRecord>& SlamSystem::loops() const { return impl_->records_; }
 std::size_t SlamSystem::Relocalized() const { return impl_->relocalized_; }

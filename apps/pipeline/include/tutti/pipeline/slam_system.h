@@ -46,11 +46,12 @@ class SlamSystem {
   bool AppearanceOnly() const;
   /// The odometry with all corrections; nullptr if there are only appearances.
   const Odometry* odometry() const;
-  /// The odometry as it was before the first correction, to be tracked on by whoever wants to know what it
-  /// would have done alone; nullptr if no loop moved the map.
+  /// The odometry as it was before the detector first changed anything (a loop moved the map, or a lost frame
+  /// was found), to be tracked on by whoever wants to know what it would have done alone; nullptr if that
+  /// never happened.
   Odometry* untouched();
-  /// Index of the first input frame that untouched() has not seen.
-  std::int64_t UntouchedNext() const;
+  /// Index of the last input frame that untouched() has seen.
+  std::int64_t UntouchedLast() const;
 
   /// Every proposed loop in the order of the queries.
   const std::vector<LoopRecord>& loops() const;

@@ -182,10 +182,10 @@ void AddOptimizeCommand(CLI::App& app, int&) {
       ->check(CLI::IsMember({"chi2", "chi2log"}))
       ->capture_default_str();
   command
-      ->add_option(
-          "--robust", arguments->robust,
-          "Loss on loop edges (|i - j| != 1): huber tames, dcs switches off smoothly, gnc decides in or out")
-      ->check(CLI::IsMember({"none", "huber", "dcs", "gnc"}))
+      ->add_option("--robust", arguments->robust,
+                   "Loss on loop edges (|i - j| != 1): huber and cauchy tame, dcs switches off smoothly, gnc "
+                   "decides in or out")
+      ->check(CLI::IsMember({"none", "huber", "cauchy", "dcs", "gnc"}))
       ->capture_default_str();
   command
       ->add_option("--robust-chi2", arguments->options.robust_chi2,

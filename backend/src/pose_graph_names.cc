@@ -17,6 +17,7 @@ const Names<GraphObjective> kObjectives = {{"chi2", GraphObjective::kChi2},
                                            {"chi2log", GraphObjective::kChi2Log}};
 const Names<RobustLoss> kRobust = {{"none", RobustLoss::kNone},
                                    {"huber", RobustLoss::kHuber},
+                                   {"cauchy", RobustLoss::kCauchy},
                                    {"dcs", RobustLoss::kDcs},
                                    {"gnc", RobustLoss::kGnc}};
 const Names<GraphInit> kInits = {{"auto", GraphInit::kAuto},

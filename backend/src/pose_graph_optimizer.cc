@@ -186,6 +186,9 @@ class Run {
       case RobustLoss::kHuber:
         problem_.SetLoss(new ceres::HuberLoss(std::sqrt(c2)));
         break;
+      case RobustLoss::kCauchy:
+        problem_.SetLoss(new ceres::CauchyLoss(std::sqrt(c2)));
+        break;
       case RobustLoss::kDcs:
         problem_.SetLoss(new internal::DcsLoss(c2));
         break;

@@ -1,6 +1,7 @@
 // Robust losses rho(s) of s = e^T Omega e, with rho ~ s near zero. Private to the back end.
 //
 //   Huber  rho = s up to c2, then 2 sqrt(c2 s) - c2                             weight sqrt(c2 / s)
+//   Cauchy rho = c2 log(1 + s / c2)                                             weight c2 / (c2 + s)
 //   DCS    rho = s up to c2, then c2 (3 s - c2) / (c2 + s), bounded by 3 c2     weight (2 c2 / (c2 + s))^2
 //          (Agarwal et al., ICRA 2013; as a loss: MacTavish & Barfoot, CRV 2015)
 //   TLS    rho = min(s, c2): what GNC minimises                                 weight 0 or 1
@@ -15,6 +16,7 @@
 namespace tutti::internal {
 
 inline double RobustCost(RobustLoss robust, double s, double c2) {
+  if (robust == RobustLoss::kCauchy) return c2 * std::log1p(s / c2);
   if (robust == RobustLoss::kNone || s <= c2) return s;
   if (robust == RobustLoss::kHuber) return 2.0 * std::sqrt(c2 * s) - c2;
   if (robust == RobustLoss::kDcs) return c2 * (3.0 * s - c2) / (c2 + s);
@@ -23,6 +25,7 @@ inline double RobustCost(RobustLoss robust, double s, double c2) {
 
 /// Derivative of the loss: the weight with which the edge pulls. GNC keeps its own weights.
 inline double RobustWeight(RobustLoss robust, double s, double c2) {
+  if (robust == RobustLoss::kCauchy) return c2 / (c2 + s);
   if (robust == RobustLoss::kNone || s <= c2) return 1.0;
   if (robust == RobustLoss::kHuber) return std::sqrt(c2 / s);
   if (robust == RobustLoss::kDcs) return 4.0 * c2 * c2 / ((c2 + s) * (c2 + s));

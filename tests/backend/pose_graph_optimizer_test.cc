@@ -154,7 +154,7 @@ TEST(PoseGraphOptimizer, RobustLossesRejectPlantedFalseLoops) {
     SyntheticGraph clean = MakeSyntheticGraph(options);
     PoseGraphOptimizer().Optimize(clean.graph);
     options.false_loops = 20;
-    for (RobustLoss robust : {RobustLoss::kDcs, RobustLoss::kGnc}) {
+    for (RobustLoss robust : {RobustLoss::kCauchy, RobustLoss::kDcs, RobustLoss::kGnc}) {
       SyntheticGraph spoiled = MakeSyntheticGraph(options);
       PoseGraphOptions solver;
       solver.robust = robust;

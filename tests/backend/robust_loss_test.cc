@@ -9,7 +9,7 @@ using internal::RobustCost;
 using internal::RobustWeight;
 
 TEST(RobustLoss, WeightIsTheDerivativeOfTheCost) {
-  for (RobustLoss robust : {RobustLoss::kNone, RobustLoss::kHuber, RobustLoss::kDcs}) {
+  for (RobustLoss robust : {RobustLoss::kNone, RobustLoss::kHuber, RobustLoss::kCauchy, RobustLoss::kDcs}) {
     for (double s : {0.1, 3.9, 4.1, 10.0, 1e3, 1e6}) {
       const double h = 1e-5 * s;
       const double numeric = (RobustCost(robust, s + h, 4.0) - RobustCost(robust, s - h, 4.0)) / (2 * h);

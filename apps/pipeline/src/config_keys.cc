@@ -239,9 +239,10 @@ void ConfigTable::AddGraph(PoseGraphOptions& o) {
   AddEnum("robust", o.robust,
           {{"none", RobustLoss::kNone},
            {"huber", RobustLoss::kHuber},
+           {"cauchy", RobustLoss::kCauchy},
            {"dcs", RobustLoss::kDcs},
            {"gnc", RobustLoss::kGnc}},
-          "loss on loop edges: none, huber, dcs, gnc");
+          "loss on loop edges: none, huber, cauchy, dcs, gnc");
   Add("robust_chi2", o.robust_chi2, "chi-square beyond which a loop is doubted; 0: its 99 % quantile");
   AddEnum("init", o.init,
           {{"auto", GraphInit::kAuto},
@@ -255,7 +256,7 @@ void ConfigTable::AddGraph(PoseGraphOptions& o) {
   Add("gnc_step", o.gnc_step, "gnc: growth of the convexity parameter per round, > 1");
   Add("gnc_max_rounds", o.gnc_max_rounds, "gnc: most rounds");
   Add("gnc_start", o.gnc_start,
-      "dcs, gnc: the threshold starts at this many times the largest chi-square of a loop");
+      "cauchy, dcs, gnc: the threshold starts at this many times the largest chi-square of a loop");
   Add("max_time_s", o.max_time_s, "stop after this time [s]; 0: no limit (a limit is not reproducible)");
   Add("seed", o.seed, "nothing is random so far");
 }

@@ -20,10 +20,11 @@ namespace tutti {
 
 enum class GraphObjective { kChi2, kChi2Log };
 
-/// Loss on loop edges. kHuber: down-weights linearly (Huber 1964). kDcs: dynamic covariance scaling (Agarwal
-/// et al., ICRA 2013). kGnc: graduated non-convexity, truncated least squares (Yang et al., RA-L 2020):
-/// decides inlier or outlier for each loop.
-enum class RobustLoss { kNone, kHuber, kDcs, kGnc };
+/// Loss on loop edges. kHuber: down-weights linearly (Huber 1964). kCauchy: the log of a Cauchy distribution,
+/// no bound. kDcs: dynamic covariance scaling (Agarwal et al., ICRA 2013). kGnc: graduated non-convexity with
+/// the Geman-McClure surrogate (Yang et al., RA-L 2020), then truncated least squares decide for each loop
+/// whether it is in or out.
+enum class RobustLoss { kNone, kHuber, kCauchy, kDcs, kGnc };
 
 /// kFile: poses as they are in the graph. kOdometry: spanning tree, odometry edges first. kChordal: linear
 /// relaxation (Carlone et al., ICRA 2015). kAuto: whichever of them has the lowest objective (robust loss
@@ -49,9 +50,9 @@ struct PoseGraphOptions {
   int max_iterations = 200;  ///< of Levenberg-Marquardt, in all rounds together
   double function_tolerance =
       1e-9;  ///< stop when an iteration lowers the cost by less than this fraction [1]
-  /// kDcs and kGnc start with a threshold of gnc_start x the largest chi-square of a loop [1], so that drift
-  /// does not look like a false loop, and divide it by gnc_step [1], > 1, in each of at most gnc_max_rounds
-  /// rounds.
+  /// kCauchy, kDcs and kGnc start with a threshold of gnc_start x the largest chi-square of a loop [1], so
+  /// that drift does not look like a false loop, and divide it by gnc_step [1], > 1, in each of at most
+  /// gnc_max_rounds rounds.
   double gnc_start = 1.0;
   double gnc_step = 4.0;
   int gnc_max_rounds = 60;

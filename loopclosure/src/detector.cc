@@ -45,20 +45,6 @@ std::vector<std::vector<std::size_t>> UnitsOf(const LoopDetectorOptions& options
   return units;
 }
 
-// As many descriptors as keypoints, and those where pixels can be.
-void CheckKeypoints(const std::vector<cv::KeyPoint>& keypoints, const cv::Mat& descriptors,
-                    const std::string& which) {
-  if (static_cast<std::size_t>(descriptors.rows) != keypoints.size()) {
-    throw InputError(which + std::to_string(keypoints.size()) + " keypoints but " +
-                     std::to_string(descriptors.rows) + " descriptor rows");
-  }
-  const auto is_pixel = [](float value) { return std::abs(value) <= View::kFarthestPixel; };  // NaN: false
-  if (!std::all_of(keypoints.begin(), keypoints.end(),
-                   [&](const cv::KeyPoint& k) { return is_pixel(k.pt.x) && is_pixel(k.pt.y); })) {
-    throw InputError(which + "a keypoint is not a finite number, or more than a million pixels away");
-  }
-}
-
 }  // namespace
 
 LoopDetector::Impl::Impl(const LoopDetectorOptions& options, std::unique_ptr<internal::LocationStore> store)
@@ -134,66 +120,6 @@ void LoopDetector::Impl::AddLink(std::int64_t a, std::int64_t b) {
   }
   if (!Shared()) union_.AddLink(union_.Find(a), union_.Find(b), LocationMemory::LinkType::kOdometry);
   for (auto& system : systems_) system->AddLink(system->memory().Find(a), system->memory().Find(b));
-}
-
-void LoopDetector::Impl::CheckQuery(const LoopQuery& query) const {
-  const std::string which = "location " + std::to_string(query.id) + ": ";
-  if (query.id < 0) throw InputError(which + "ids must not be negative");
-  if (memory().size() > 0 && query.id <= last_id_) {
-    throw InputError(which + "ids must grow, but the one before was " + std::to_string(last_id_));
-  }
-  CheckContent(query);
-}
-
-void LoopDetector::Impl::CheckContent(const LoopQuery& query) const {
-  const std::string which = "location " + std::to_string(query.id) + ": ";
-  CheckCallersFeatures(query, which);
-  CheckMemberFeatures(query, which);
-  if (!query.depth_m.empty() &&
-      (query.depth_m.type() != CV_32FC1 || query.depth_m.size() != query.image.size())) {
-    throw InputError(which + "depth_m must be CV_32FC1 in metres and as large as the image");
-  }
-  if (query.camera) {
-    const std::string problem = query.camera->Validate();
-    if (!problem.empty()) throw InputError(which + problem);
-  }
-}
-
-void LoopDetector::Impl::CheckCallersFeatures(const LoopQuery& query, const std::string& which) const {
-  const FeatureSet& f = query.features;
-  const std::size_t n = f.keypoints.size();
-  CheckKeypoints(f.keypoints, f.descriptors, which);
-  if (!f.points.empty() && f.points.size() != n) {
-    throw InputError(which + std::to_string(n) + " keypoints but " + std::to_string(f.points.size()) +
-                     " points; give none or one each (NaN where unknown)");
-  }
-  if (n == 0) return;
-  if (f.descriptors.type() != CV_8U && f.descriptors.type() != CV_32F) {
-    throw InputError(which + "descriptors must be CV_8U (Hamming) or CV_32F (Euclidean)");
-  }
-  if (caller_type_ >= 0 && (f.descriptors.type() != caller_type_ || f.descriptors.cols != caller_width_)) {
-    throw InputError(which +
-                     "descriptors are of another type or width than before; give every image the same kind");
-  }
-}
-
-void LoopDetector::Impl::CheckMemberFeatures(const LoopQuery& query, const std::string& which) const {
-  for (const auto& [name, f] : query.member_features) {
-    const auto member = std::find_if(members_.begin(), members_.end(),
-                                     [&name = name](const Member& m) { return m.name() == name; });
-    if (member == members_.end()) {
-      throw InputError(which + "features of member '" + name + "', which is not in options.members");
-    }
-    CheckKeypoints(f.keypoints, f.descriptors, which + name + ": ");
-    const std::string problem = member->vocabulary().Problem(f.descriptors);
-    if (!problem.empty()) throw InputError(which + name + ": " + problem);
-  }
-  for (const Member& member : members_) {
-    if (member.external() && query.member_features.count(member.name()) == 0) {
-      throw InputError(which + "member '" + member.name() +
-                       "' is external: give its features in member_features (none at all is fine, too)");
-    }
-  }
 }
 
 std::vector<Features> LoopDetector::Impl::Extract(const LoopQuery& query) const {

@@ -1,5 +1,5 @@
-// LoopDetector's inside: detector.cc holds what happens to an image, detector_memory.cc long-term memory,
-// detector_file.cc saving and loading.
+// LoopDetector's inside: detector.cc holds what happens to an image, detector_query.cc what it must be,
+// detector_memory.cc long-term memory, detector_file.cc saving and loading.
 #pragma once
 
 #include <functional>

@@ -6,11 +6,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tutti/core/error.h"
+#include "error_of.h"
 
 namespace tutti {
 namespace {
 
+using testing::ErrorOf;
 using ::testing::HasSubstr;
 
 Trajectory Curve(int n, double first_stamp = 100.0) {
@@ -27,16 +28,6 @@ Trajectory Moved(const Trajectory& in, const Similarity& S) {
   Trajectory out = in;
   for (StampedPose& s : out) s.pose = ApplyAlignment(S, s.pose);
   return out;
-}
-
-template <typename F>
-std::string ErrorOf(F call) {
-  try {
-    call();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "no error";
 }
 
 TEST(Evaluation, AlignmentUndoesASimilarity) {

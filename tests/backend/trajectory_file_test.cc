@@ -6,13 +6,14 @@
 #include <cmath>
 #include <fstream>
 
+#include "error_of.h"
 #include "test_data.h"
-#include "tutti/core/error.h"
 
 namespace tutti {
 namespace {
 
 using ::testing::AllOf;
+using testing::ErrorOf;
 using ::testing::HasSubstr;
 
 Trajectory Curve() {
@@ -34,16 +35,6 @@ std::filesystem::path Write(const std::string& text) {
   const std::filesystem::path file = testing::FreshFolder() / "poses.txt";
   std::ofstream(file) << text;
   return file;
-}
-
-template <typename F>
-std::string ErrorOf(F call) {
-  try {
-    call();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "no error";
 }
 
 TEST(TrajectoryFile, EveryFormatIsRecognisedAndReadBack) {

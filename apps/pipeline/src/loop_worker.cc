@@ -7,6 +7,15 @@
 
 namespace tutti {
 
+std::array<std::pair<const char*, double>, 6> LoopStages(const LoopResult& r) {
+  return {{{"extract", r.extract_ms},
+           {"quantise", r.quantise_ms},
+           {"likelihood", r.likelihood_ms},
+           {"filter", r.filter_ms},
+           {"verify", r.verify_ms},
+           {"memory", r.memory_ms}}};
+}
+
 LoopWorker::LoopWorker(const LoopDetectorOptions& options, bool own_thread, SpanRecorder* recorder)
     : detector_(options), recorder_(recorder) {
   // Frames are numbered from 0 in every run: what an earlier run stored has no frame in this one.
@@ -28,13 +37,8 @@ LoopWorker::~LoopWorker() {
 }
 
 namespace {
-// The detector tells how long its stages took, in their order; memory is one before and one after the filters
-// and stands at the end.
 void AddStages(const LoopResult& r, Span::Clock::time_point begin, SpanRecorder& recorder) {
-  const std::pair<const char*, double> stages[] = {
-      {"extract", r.extract_ms}, {"quantise", r.quantise_ms}, {"likelihood", r.likelihood_ms},
-      {"filter", r.filter_ms},   {"verify", r.verify_ms},     {"memory", r.memory_ms}};
-  for (const auto& [name, ms] : stages) {
+  for (const auto& [name, ms] : LoopStages(r)) {
     const auto end = begin + std::chrono::duration_cast<Span::Clock::duration>(
                                  std::chrono::duration<double, std::milli>(ms));
     recorder.Add({Lane::kLoopClosure, name, begin, end, -1});

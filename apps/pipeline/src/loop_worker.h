@@ -1,16 +1,22 @@
 // Runs the loop-closure detector beside the odometry: queries go in and results come out in the same order.
 #pragma once
 
+#include <array>
 #include <condition_variable>
 #include <deque>
 #include <exception>
 #include <mutex>
 #include <thread>
+#include <utility>
 
 #include "tutti/core/span_recorder.h"
 #include "tutti/loopclosure/detector.h"
 
 namespace tutti {
+
+/// The detector's stages and how long each took [ms], in their order; memory is one before and one after the
+/// filters and stands at the end.
+std::array<std::pair<const char*, double>, 6> LoopStages(const LoopResult& result);
 
 /// With `own_thread` the detector works on a thread of its own, else within Submit(); the results are the
 /// same.

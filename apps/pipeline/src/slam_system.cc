@@ -144,15 +144,6 @@ class SlamSystem::Impl {
     if (options_.threads == 1) stages_["loop_inline"] += MillisecondsSince(begin);
   }
 
-  void AddStages(const LoopResult& r) {
-    stages_["loop_extract"] += r.extract_ms;
-    stages_["loop_quantise"] += r.quantise_ms;
-    stages_["loop_likelihood"] += r.likelihood_ms;
-    stages_["loop_filter"] += r.filter_ms;
-    stages_["loop_verify"] += r.verify_ms;
-    stages_["loop_memory"] += r.memory_ms;
-  }
-
   static LoopRecord Record(const LoopResult& r) {
     LoopRecord record;
     record.query = r.query;
@@ -171,7 +162,7 @@ class SlamSystem::Impl {
   void Deliver() {
     submitted_.pop_front();
     const LoopResult result = worker_->Take();
-    AddStages(result);
+    for (const auto& [name, ms] : LoopStages(result)) stages_[std::string("loop_") + name] += ms;
     if (!result.warning.empty() && result.warning != loop_warning_) {
       loop_warning_ = result.warning;
       warnings_.push_back(result.warning);

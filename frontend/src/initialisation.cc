@@ -13,13 +13,14 @@ TrackResult Odometry::Impl::Initialize(const TrackedFrame& frame) {
   const ScopedStopwatch watch(&stages, Lane::kTracking, "initialize");
   TrackResult result;
   result.state = TrackingState::kInitializing;
+  EnterMapping();
   const Pose start = records.empty() ? Pose() : last_T_camera_world_.Inverse();
   if (rig.sensor == Sensor::kMono) {
-    const double depth = last_keyframe_ >= 0 ? std::max(1e-6, map.MedianDepth(last_keyframe_)) : 1.0;
+    const double depth = last_keyframe_ >= 0 ? std::max(1e-6, map().MedianDepth(last_keyframe_)) : 1.0;
     const std::vector<TrackedFrame> before = initializer_.pending();
-    if (!initializer_.Offer(frame, piece_, start, depth > 1e-6 ? depth : 1.0, &map, &result.reason))
+    if (!initializer_.Offer(frame, piece_, start, depth > 1e-6 ? depth : 1.0, &map_, &result.reason))
       return result;
-    const int second = static_cast<int>(map.keyframes().size()) - 1;
+    const int second = map().KeyframeCount() - 1;
     last_keyframe_ = reference_ = second;
     initializer_.Reset();
     PoseBackwards(before, second - 1);
@@ -36,10 +37,10 @@ TrackResult Odometry::Impl::Initialize(const TrackedFrame& frame) {
     k.piece = piece_;
     k.features = frame.features;
     k.T_world_camera = start;
-    last_keyframe_ = reference_ = map.AddKeyframe(k);
-    mapper_.AddDepthLandmarks(reference_, 100, &map);
+    last_keyframe_ = reference_ = map_.AddKeyframe(k);
+    mapper_.AddDepthLandmarks(reference_, 100, &map_);
   }
-  const tutti::Keyframe& k = map.keyframe(last_keyframe_);
+  const tutti::Keyframe& k = map().keyframe(last_keyframe_);
   reference_landmarks_ =
       static_cast<int>(std::count_if(k.landmarks.begin(), k.landmarks.end(), [](int l) { return l >= 0; }));
   last_T_camera_world_ = k.T_world_camera.Inverse();
@@ -53,6 +54,7 @@ TrackResult Odometry::Impl::Initialize(const TrackedFrame& frame) {
   result.state = state_;
   result.T_world_camera = k.T_world_camera;
   result.keyframe = last_keyframe_;
+  mapped.push_back(last_keyframe_);
   result.inliers = reference_landmarks_;
   return result;
 }
@@ -60,7 +62,7 @@ TrackResult Odometry::Impl::Initialize(const TrackedFrame& frame) {
 // Frames from before the initialisation, from the first keyframe outwards on both sides; each starts from its
 // neighbour.
 void Odometry::Impl::PoseBackwards(const std::vector<TrackedFrame>& frames, int first_keyframe) {
-  const tutti::Keyframe &k0 = map.keyframe(first_keyframe), &k1 = map.keyframe(first_keyframe + 1);
+  const tutti::Keyframe &k0 = map().keyframe(first_keyframe), &k1 = map().keyframe(first_keyframe + 1);
   const double span = std::max(1e-6, k1.stamp_s - k0.stamp_s);
   const Vector6d motion = LogSE3(k1.T_world_camera.Inverse() * k0.T_world_camera);
   std::vector<FrameRecord> posed;
@@ -76,7 +78,7 @@ void Odometry::Impl::PoseBackwards(const std::vector<TrackedFrame>& frames, int 
       if (between) T = ExpSE3(motion * ((frame->stamp_s - k0.stamp_s) / span)) * k0.T_world_camera.Inverse();
       FrameMatches seen{k0.features.get(), k0.landmarks};
       FrameMatches matches{frame->features.get(), std::vector<int>(frame->features->size(), -1)};
-      MatchToLastFrame(map, rig.camera, T, seen, 30.0F, &matches);
+      MatchToLastFrame(map(), rig.camera, T, seen, 30.0F, &matches);
       if (Refine(&matches, &T) < options.min_inliers) {
         if (!between) backwards_alive = false;
         continue;

@@ -171,7 +171,6 @@ void LocalMapper::Process(int id, Map* map, StageTimes* stages) {
       if (l >= 0) map->UpdateLandmark(l);
     }
     CullRecent(id, map);
-    if (rig_.sensor != Sensor::kMono) AddDepthLandmarks(id, 100, map);
     const auto timed = [&](const char* name, auto&& step) {
       const ScopedSpan span(stages->recorder, Lane::kMapping, name);
       step();

@@ -28,8 +28,8 @@ class LocalMapper {
   /// What the camera's calibration turned out to have left over.
   const SelfCalibration& lens() const { return lens_; }
 
-  /// Full treatment of the newest keyframe; its landmark matches are already in the map. Adds milliseconds to
-  /// `stages`.
+  /// Full treatment of the newest keyframe; its landmark matches, and those of its own depth, are already in
+  /// the map. Adds milliseconds to `stages`.
   void Process(int keyframe, Map* map, StageTimes* stages);
 
  private:

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 #include <limits>
+#include <utility>
 
 #include "patch_aligner.h"
 
@@ -12,19 +13,17 @@ int Map::AddKeyframe(Keyframe keyframe) {
   keyframe.id = static_cast<int>(keyframes_.size());
   keyframe.landmarks.assign(keyframe.features->size(), -1);
   keyframe.covisible.clear();
-  keyframes_.push_back(std::move(keyframe));
-  return keyframes_.back().id;
+  return keyframes_.Append(std::move(keyframe)).id;
 }
 
 int Map::AddLandmark(const Eigen::Vector3d& position, int keyframe, int feature) {
   const int id = static_cast<int>(landmarks_.size());
-  landmarks_.emplace_back();
-  Landmark& l = landmarks_.back();
+  Landmark& l = landmarks_.Append({});
   l.alive = true;
   l.position = position;
   l.reference = keyframe;
   l.visible = l.found = 1;
-  if (camera_) l.patch = CutPatch(*camera_, *this->keyframe(keyframe).features, feature);
+  if (camera_) l.patch = CutPatch(*camera_, *std::as_const(*this).keyframe(keyframe).features, feature);
   l.patch_source = {keyframe, feature};
   AddObservation(id, keyframe, feature);
   return id;
@@ -84,9 +83,15 @@ void Map::Merge(int loser, int winner) {
   const std::vector<Observation> seen = landmark(loser).observations;
   const int visible = landmark(loser).visible, found = landmark(loser).found;
   RemoveLandmark(loser);
+  landmark(loser).replaced_by = winner;
   for (const Observation& o : seen) AddObservation(winner, o.keyframe, o.feature);
   landmark(winner).visible += visible;
   landmark(winner).found += found;
+}
+
+int Map::Present(int id) const {
+  while (id >= 0 && !landmark(id).alive) id = landmark(id).replaced_by;
+  return id;
 }
 
 double Map::RelativeSigma(const Features& features, int keyframe, int feature, int id) const {
@@ -99,6 +104,7 @@ double Map::RelativeSigma(const Features& features, int keyframe, int feature, i
 }
 
 void Map::UpdateLandmark(int id) {
+  const auto keyframe = [this](int k) -> const Keyframe& { return std::as_const(*this).keyframe(k); };
   Landmark& l = landmark(id);
   if (!l.alive || l.observations.empty()) return;
   l.normal.setZero();

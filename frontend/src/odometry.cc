@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "odometry_impl.h"
 #include "tutti/core/error.h"
@@ -40,6 +41,7 @@ std::string OdometryOptions::Validate() const {
   if (!(keyframe_inlier_ratio > 0 && keyframe_inlier_ratio < 1))
     return "odometry.keyframe_inlier_ratio must lie between 0 and 1";
   if (!(keyframe_max_interval_s > 0)) return "odometry.keyframe_max_interval_s must be positive";
+  if (mapping_delay_frames < 0) return "odometry.mapping_delay_frames must not be negative";
   if (keyframe_min_frames < 0) return "odometry.keyframe_min_frames must not be negative";
   if (local_keyframes < 1 || triangulation_neighbours < 1)
     return "odometry.local_keyframes and triangulation_neighbours must be at least 1";
@@ -80,16 +82,22 @@ std::shared_ptr<const Features> Odometry::Extract(const InputFrame& frame) const
 
 TrackResult Odometry::Track(const InputFrame& frame) { return impl_->Track(frame); }
 
+void Odometry::FinishMapping() { impl_->EnterMapping(); }
+
+std::vector<int> Odometry::TakeMapped() { return std::exchange(impl_->mapped, {}); }
+
+void Odometry::UseOwnThreads(bool own_threads) { impl_->own_threads = own_threads; }
+
 TrackResult Odometry::RelocalizeAt(int keyframe) { return impl_->RelocalizeAt(keyframe); }
 
 std::vector<int> Odometry::KeyframeIds() const {
   std::vector<int> ids;
-  for (const tutti::Keyframe& k : impl_->map.keyframes()) ids.push_back(k.id);
+  for (int id = 0; id < impl_->map().KeyframeCount(); ++id) ids.push_back(id);
   return ids;
 }
 
 KeyframeView Odometry::Keyframe(int id) const {
-  const tutti::Keyframe& k = impl_->map.keyframe(id);
+  const tutti::Keyframe& k = impl_->map().keyframe(id);
   KeyframeView view;
   view.id = id;
   view.frame_index = k.frame_index;
@@ -105,7 +113,7 @@ KeyframeView Odometry::Keyframe(int id) const {
   for (std::size_t f = 0; f < k.features->size(); ++f) {
     const float inverse = k.features->inverse_depth[f];
     if (k.landmarks[f] >= 0) {
-      const Eigen::Vector3d p = T_camera_world * impl_->map.landmark(k.landmarks[f]).position;
+      const Eigen::Vector3d p = T_camera_world * impl_->map().landmark(k.landmarks[f]).position;
       if (p.z() > 0) view.points[f] = p;
     } else if (inverse > 0 && k.features->inverse_depth_sigma[f] < 0.1F * inverse) {
       const cv::Point2f& p = k.features->keypoints[f].pt;
@@ -115,12 +123,12 @@ KeyframeView Odometry::Keyframe(int id) const {
   return view;
 }
 
-Pose Odometry::KeyframePose(int id) const { return impl_->map.keyframe(id).T_world_camera; }
-std::int64_t Odometry::KeyframeFrameIndex(int id) const { return impl_->map.keyframe(id).frame_index; }
-double Odometry::KeyframeStamp(int id) const { return impl_->map.keyframe(id).stamp_s; }
+Pose Odometry::KeyframePose(int id) const { return impl_->map().keyframe(id).T_world_camera; }
+std::int64_t Odometry::KeyframeFrameIndex(int id) const { return impl_->map().keyframe(id).frame_index; }
+double Odometry::KeyframeStamp(int id) const { return impl_->map().keyframe(id).stamp_s; }
 
 int Odometry::KeyframePiece(int id) const {
-  int piece = impl_->map.keyframe(id).piece;
+  int piece = impl_->map().keyframe(id).piece;
   for (auto joined = impl_->piece_joined.find(piece); joined != impl_->piece_joined.end();
        joined = impl_->piece_joined.find(piece)) {
     piece = joined->second;
@@ -130,9 +138,9 @@ int Odometry::KeyframePiece(int id) const {
 
 std::vector<std::pair<std::pair<int, int>, int>> Odometry::Covisibility(int min_shared) const {
   std::vector<std::pair<std::pair<int, int>, int>> out;
-  for (const tutti::Keyframe& k : impl_->map.keyframes()) {
-    for (const auto& [other, shared] : k.covisible) {
-      if (other > k.id && shared >= min_shared) out.push_back({{k.id, other}, shared});
+  for (int id = 0; id < impl_->map().KeyframeCount(); ++id) {
+    for (const auto& [other, shared] : impl_->map().keyframe(id).covisible) {
+      if (other > id && shared >= min_shared) out.push_back({{id, other}, shared});
     }
   }
   return out;
@@ -140,16 +148,17 @@ std::vector<std::pair<std::pair<int, int>, int>> Odometry::Covisibility(int min_
 
 void Odometry::ApplyCorrection(const std::map<int, Similarity>& S_world_keyframe,
                                const std::map<int, int>& merges) {
-  Map& map = impl_->map;
+  Map& map = impl_->WritableMap();
   std::vector<Pose> old_T_camera_world;
   std::vector<Similarity> corrected;
-  for (const tutti::Keyframe& k : map.keyframes()) {
+  for (int id = 0; id < map.KeyframeCount(); ++id) {
+    const tutti::Keyframe& k = map.keyframe(id);
     old_T_camera_world.push_back(k.T_world_camera.Inverse());
     const auto it = S_world_keyframe.find(k.id);
     corrected.push_back(it != S_world_keyframe.end() ? it->second : Similarity(k.T_world_camera));
   }
-  for (std::size_t i = 0; i < map.landmarks().size(); ++i) {
-    Landmark& l = map.landmark(static_cast<int>(i));
+  for (int i = 0; i < map.LandmarkCount(); ++i) {
+    Landmark& l = map.landmark(i);
     if (!l.alive) continue;
     const std::size_t r = static_cast<std::size_t>(l.reference);
     l.position = corrected[r] * (old_T_camera_world[r] * l.position);
@@ -163,7 +172,7 @@ void Odometry::ApplyCorrection(const std::map<int, Similarity>& S_world_keyframe
   }
   for (std::size_t k = 0; k < corrected.size(); ++k)
     map.keyframe(static_cast<int>(k)).T_world_camera = corrected[k].RigidPart();
-  for (std::size_t i = 0; i < map.landmarks().size(); ++i) map.UpdateLandmark(static_cast<int>(i));
+  for (int i = 0; i < map.LandmarkCount(); ++i) map.UpdateLandmark(i);
   for (const auto& [from, to] : merges) {
     if (from != to) impl_->piece_joined[from] = to;
   }
@@ -183,7 +192,7 @@ Trajectory Odometry::FrameTrajectory(int map_piece) const {
   Trajectory out;
   for (const Impl::FrameRecord& r : impl_->records) {
     if (KeyframePiece(r.reference) != map_piece) continue;
-    out.push_back({r.stamp_s, impl_->map.keyframe(r.reference).T_world_camera * r.T_reference_frame});
+    out.push_back({r.stamp_s, impl_->map().keyframe(r.reference).T_world_camera * r.T_reference_frame});
   }
   return out;
 }

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "background_mapping.h"
 #include "local_mapper.h"
 #include "matcher.h"
 #include "mono_initializer.h"
@@ -25,8 +26,8 @@ class Odometry::Impl {
 
   OdometryOptions options;
   CameraRig rig;
-  Map map;
   StageTimes stages;
+  bool own_threads = true;  // for mapping
   std::vector<double> row_errors, stereo_matches;
 
   /// Pose of a frame relative to its reference keyframe: corrections of the map reach it.
@@ -38,7 +39,17 @@ class Odometry::Impl {
   };
   std::vector<FrameRecord> records;  // ascending by time
 
-  /// Moves everything that hangs on the current pose after keyframes were moved by ApplyCorrection.
+  const Map& map() const { return map_; }
+  /// For writing: brings in first what mapping has made of it meanwhile.
+  Map& WritableMap() {
+    EnterMapping();
+    return map_;
+  }
+  /// Waits for the mapping that is under way, if any, and brings its result in.
+  void EnterMapping();
+  std::vector<int> mapped;  // keyframes whose mapping was brought in, until somebody takes them
+
+  /// Moves everything that hangs on the current pose after its keyframe was moved.
   void MoveCurrent(const Pose& old_reference, const Similarity& S_world_reference);
   int reference() const { return reference_; }
   std::map<int, int> piece_joined;  // piece -> the piece it joined
@@ -75,17 +86,22 @@ class Odometry::Impl {
   bool GuessFromLastFrame(const Pose& prediction, float radius_px, Fix* fix) const;
   bool GuessFromKeyframe(int keyframe, Fix* fix) const;
   bool Settle(Fix* fix) const;
-  bool Offer(int least_inliers, Fix* guess, Fix* best) const;
+  bool Offer(int least_inliers, Fix* guess, std::vector<Pose>* offered, Fix* best) const;
   std::vector<int> LocalLandmarks(const Fix& fix, const std::map<int, int>& votes) const;
   TrackResult Accept(Fix fix);
   /// Refines the pose on the matches, drops those that do not fit; returns the number of inliers.
   int Refine(FrameMatches* matches, Pose* T_camera_world) const;
   bool NeedKeyframe(const TrackedFrame& frame, const FrameMatches& matches, int inliers) const;
-  int InsertKeyframe(const TrackedFrame& frame, const FrameMatches& matches, const Pose& T_camera_world);
+  void CountSeen(const Fix& fix);
+  int InsertKeyframe(const TrackedFrame& frame);
   void Record(const TrackedFrame& frame, const Pose& T_camera_world, int reference);
   void Lose();
 
+  Map map_;  // not written to while mapping_ is busy
   LocalMapper mapper_;
+  BackgroundMapping mapping_;
+  int frames_since_mapping_began_ = 0;
+  std::vector<int> visible_, found_;  // landmarks of frames since then that are still to be counted
   MonoInitializer initializer_;
   std::optional<TrackedFrame> lost_;    // the last frame, if it has no pose
   TrackResult lost_result_;             // of the last frame

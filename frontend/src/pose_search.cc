@@ -14,6 +14,7 @@ namespace {
 constexpr int kMinProjected = 20;           // matches by projection below which the search is widened
 constexpr int kMinGuess = 10;               // inliers of a guess
 constexpr int kRecentKeyframes = 10;        // that a lost frame is compared with
+constexpr double kSameGuess = 1.0;          // guesses that differ by less in the image are one [px]
 constexpr double kSurePrediction = 0.5;     // a velocity holds for so long [s]
 constexpr double kLongestPrediction = 1.5;  // [s]
 constexpr double kLeastShare = 0.14;        // of the landmarks in view that must be found again;
@@ -60,7 +61,7 @@ int Odometry::Impl::Refine(FrameMatches* matches, Pose* T_camera_world) const {
     const int l = matches->landmarks[f];
     if (l < 0) continue;
     observations.push_back(
-        Measured(map, *matches->features, {-1, static_cast<int>(f)}, l, options.pixel_sigma));
+        Measured(map(), *matches->features, {-1, static_cast<int>(f)}, l, options.pixel_sigma));
     feature.push_back(f);
   }
   if (observations.size() < 6) return 0;
@@ -75,7 +76,7 @@ int Odometry::Impl::Refine(FrameMatches* matches, Pose* T_camera_world) const {
 bool Odometry::Impl::GuessFromLastFrame(const Pose& prediction, float radius_px, Fix* fix) const {
   fix->Clear();
   fix->T_camera_world = prediction;
-  return MatchToLastFrame(map, rig.camera, prediction, last_matches_, radius_px, &fix->matches) >=
+  return MatchToLastFrame(map(), rig.camera, prediction, last_matches_, radius_px, &fix->matches) >=
              kMinProjected &&
          Refine(&fix->matches, &fix->T_camera_world) >= kMinGuess;
 }
@@ -83,13 +84,13 @@ bool Odometry::Impl::GuessFromLastFrame(const Pose& prediction, float radius_px,
 bool Odometry::Impl::GuessFromKeyframe(int keyframe, Fix* fix) const {
   fix->Clear();
   FrameMatches* const matches = &fix->matches;
-  if (MatchToKeyframe(map, map.keyframe(keyframe), matches) < 15) return false;
+  if (MatchToKeyframe(map(), map().keyframe(keyframe), matches) < 15) return false;
   std::vector<cv::Point3d> points;
   std::vector<cv::Point2d> pixels;
   for (std::size_t f = 0; f < matches->landmarks.size(); ++f) {
     const int l = matches->landmarks[f];
     if (l < 0) continue;
-    const Eigen::Vector3d& p = map.landmark(l).position;
+    const Eigen::Vector3d& p = map().landmark(l).position;
     points.emplace_back(p.x(), p.y(), p.z());
     pixels.emplace_back(matches->features->keypoints[f].pt.x, matches->features->keypoints[f].pt.y);
   }
@@ -119,13 +120,13 @@ std::vector<int> Odometry::Impl::LocalLandmarks(const Fix& fix, const std::map<i
   for (const auto& [count, id] : order) {
     if (local.size() < limit) local.push_back(-id);
   }
-  for (int near : map.BestCovisible(fix.reference, 10, 15)) {
+  for (int near : map().BestCovisible(fix.reference, 10, 15)) {
     if (local.size() < limit && std::find(local.begin(), local.end(), near) == local.end())
       local.push_back(near);
   }
   std::vector<int> candidates;
   for (int id : local) {
-    for (int l : map.keyframe(id).landmarks) {
+    for (int l : map().keyframe(id).landmarks) {
       if (l >= 0) candidates.push_back(l);
     }
   }
@@ -139,19 +140,19 @@ std::vector<int> Odometry::Impl::LocalLandmarks(const Fix& fix, const std::map<i
 
 // Refines a guess on all that the local map has to show; false if that is nothing.
 bool Odometry::Impl::Settle(Fix* fix) const {
-  const std::map<int, int> votes = Votes(map, fix->matches.landmarks);
+  const std::map<int, int> votes = Votes(map(), fix->matches.landmarks);
   fix->reference = MostVoted(votes);
   if (fix->reference < 0 || !fix->T_camera_world.IsFinite()) return false;
   for (int l : fix->matches.landmarks) {
     if (l >= 0) fix->visible.push_back(l);
   }
   std::sort(fix->visible.begin(), fix->visible.end());
-  MatchToLandmarks(map, rig.camera, fix->T_camera_world, LocalLandmarks(*fix, votes),
+  MatchToLandmarks(map(), rig.camera, fix->T_camera_world, LocalLandmarks(*fix, votes),
                    rig.sensor == Sensor::kRgbd ? 1.5F : 1.0F, &fix->matches, &fix->visible);
   fix->inliers = Refine(&fix->matches, &fix->T_camera_world);
   fix->found = fix->matches.landmarks;
-  if (const auto moved =
-          AlignFeatures(map, rig.camera, fix->T_camera_world, fix->matches.landmarks, *fix->frame.features)) {
+  if (const auto moved = AlignFeatures(map(), rig.camera, fix->T_camera_world, fix->matches.landmarks,
+                                       *fix->frame.features)) {
     fix->frame.features = moved;
     fix->matches.features = moved.get();
     fix->inliers = Refine(&fix->matches, &fix->T_camera_world);
@@ -159,8 +160,16 @@ bool Odometry::Impl::Settle(Fix* fix) const {
   return fix->T_camera_world.IsFinite();
 }
 
-// Settles a guess and keeps it if it is the best so far; true once there is no doubt left.
-bool Odometry::Impl::Offer(int least_inliers, Fix* guess, Fix* best) const {
+// Settles a guess and keeps it if it is the best so far; true once there is no doubt left. `offered`: poses
+// of the guesses so far; what would show the same is not settled again.
+bool Odometry::Impl::Offer(int least_inliers, Fix* guess, std::vector<Pose>* offered, Fix* best) const {
+  const double depth = std::max(1e-6, map().MedianDepth(reference_));
+  const auto same = [&](const Pose& other) {
+    const Vector6d d = LogSE3(guess->T_camera_world * other.Inverse());
+    return rig.camera.fx * (d.tail<3>().norm() + d.head<3>().norm() / depth) < kSameGuess;
+  };
+  if (std::any_of(offered->begin(), offered->end(), same)) return false;
+  offered->push_back(guess->T_camera_world);
   if (Settle(guess) && guess->inliers >= std::max(least_inliers, best->inliers + 1) &&
       guess->Share() >= kLeastShare)
     *best = *guess;
@@ -171,21 +180,22 @@ bool Odometry::Impl::Offer(int least_inliers, Fix* guess, Fix* best) const {
 bool Odometry::Impl::FindPose(Fix* fix) const {
   const int least = state_ == TrackingState::kLost ? 2 * options.min_inliers : options.min_inliers;
   Fix guess = *fix;
+  std::vector<Pose> offered;
   const float base = rig.sensor == Sensor::kStereo ? 8.0F : 15.0F;
   for (const Pose& prediction : Predictions(guess.frame.stamp_s)) {
     for (const float radius : {base, 2 * base, 4 * base}) {
-      if (GuessFromLastFrame(prediction, radius, &guess) && Offer(least, &guess, fix)) return true;
+      if (GuessFromLastFrame(prediction, radius, &guess) && Offer(least, &guess, &offered, fix)) return true;
     }
   }
   std::vector<int> tries{reference_, last_keyframe_};
-  for (int near : map.BestCovisible(reference_, 3, 15)) tries.push_back(near);
+  for (int near : map().BestCovisible(reference_, 3, 15)) tries.push_back(near);
   // What the loop detector does not know yet.
   for (int k = last_keyframe_ - 1; k >= std::max(0, last_keyframe_ - kRecentKeyframes); --k)
     tries.push_back(k);
   for (std::size_t i = 0; i < tries.size(); ++i) {
     const auto here = tries.begin() + static_cast<std::ptrdiff_t>(i);
     if (std::find(tries.begin(), here, tries[i]) != here) continue;
-    if (GuessFromKeyframe(tries[i], &guess) && Offer(least, &guess, fix)) return true;
+    if (GuessFromKeyframe(tries[i], &guess) && Offer(least, &guess, &offered, fix)) return true;
   }
   return fix->inliers > 0;
 }

@@ -35,8 +35,8 @@ void SelfCalibration::Learn(const LensError& found, int keyframes, Map* map) {
   if (LargestMove(lens) < kVisible) return;
   remaining_.value.setZero();
   applied_ += lens;
-  for (std::size_t i = 0; i < map->keyframes().size(); ++i) {
-    Keyframe& k = map->keyframe(static_cast<int>(i));
+  for (int id = 0; id < map->KeyframeCount(); ++id) {
+    Keyframe& k = map->keyframe(id);
     k.features = Moved(*k.features);
   }
 }

@@ -1,6 +1,7 @@
 // Tracking: frame by frame, keyframes, loss and recovery.
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "odometry_impl.h"
 #include "stopwatch.h"
@@ -10,11 +11,12 @@ namespace tutti {
 Odometry::Impl::Impl(const OdometryOptions& o, const CameraRig& r)
     : options(o),
       rig(r),
-      map(PyramidScales(o), r.camera, o.aligned_sigma),
+      map_(PyramidScales(o), r.camera, o.aligned_sigma),
       mapper_(o, r),
       initializer_(o, r) {}
 
 TrackResult Odometry::Impl::Track(const InputFrame& input) {
+  if (mapping_.busy() && ++frames_since_mapping_began_ >= options.mapping_delay_frames) EnterMapping();
   TrackedFrame frame{input.index, input.stamp_s, input.features};
   if (!frame.features) {
     const ScopedStopwatch watch(&stages, Lane::kTracking, "extract");
@@ -37,7 +39,8 @@ TrackResult Odometry::Impl::RelocalizeAt(int keyframe) {
   Fix guess(*lost_), fix(*lost_);
   const ScopedStopwatch watch(&stages, Lane::kTracking, "relocalize");
   if (!GuessFromKeyframe(keyframe, &guess)) return lost_result_;
-  Offer(2 * options.min_inliers, &guess, &fix);
+  std::vector<Pose> offered;
+  Offer(2 * options.min_inliers, &guess, &offered, &fix);
   if (fix.inliers == 0) return lost_result_;
   lost_.reset();
   initializer_.Reset();
@@ -75,11 +78,8 @@ TrackResult Odometry::Impl::TrackMap(const TrackedFrame& frame) {
 TrackResult Odometry::Impl::Accept(Fix fix) {
   TrackResult result;
   const TrackedFrame& frame = fix.frame;
-  Pose& T = fix.T_camera_world;
-  for (int l : fix.visible) ++map.landmark(l).visible;
-  for (int l : fix.found) {
-    if (l >= 0) ++map.landmark(l).found;
-  }
+  const Pose& T = fix.T_camera_world;
+  CountSeen(fix);
   reference_ = fix.reference;
   const double dt = frame.stamp_s - last_stamp_;
   has_velocity_ = state_ == TrackingState::kTracking && dt > 0 && dt < 1.0;
@@ -89,19 +89,56 @@ TrackResult Odometry::Impl::Accept(Fix fix) {
   ++frames_since_keyframe_;
   result.state = state_;
   result.inliers = fix.inliers;
-  if (NeedKeyframe(frame, fix.matches, fix.inliers)) {
-    result.keyframe = InsertKeyframe(frame, fix.matches, T);
-    const tutti::Keyframe& k = map.keyframe(result.keyframe);
-    T = k.T_world_camera.Inverse();
-    fix.matches.landmarks = k.landmarks;
-  }
+  const bool needed = NeedKeyframe(frame, fix.matches, fix.inliers);
   last_T_camera_world_ = T;
   last_stamp_ = frame.stamp_s;
   last_features_ = frame.features;
   last_matches_ = {last_features_.get(), std::move(fix.matches.landmarks)};
-  Record(frame, T, reference_);
-  result.T_world_camera = T.Inverse();
+  if (needed) result.keyframe = InsertKeyframe(frame);
+  Record(frame, last_T_camera_world_, reference_);
+  result.T_world_camera = last_T_camera_world_.Inverse();
   return result;
+}
+
+void Odometry::Impl::CountSeen(const Fix& fix) {
+  if (mapping_.busy()) {
+    visible_.insert(visible_.end(), fix.visible.begin(), fix.visible.end());
+    found_.insert(found_.end(), fix.found.begin(), fix.found.end());
+    return;
+  }
+  for (int l : fix.visible) ++map_.landmark(l).visible;
+  for (int l : fix.found) {
+    if (l >= 0) ++map_.landmark(l).found;
+  }
+}
+
+void Odometry::Impl::EnterMapping() {
+  if (!mapping_.busy()) return;
+  const Pose old_reference = reference_ >= 0 ? map().keyframe(reference_).T_world_camera : Pose();
+  {
+    const ScopedSpan span(stages.recorder, Lane::kTracking, "wait_for_mapping");
+    const std::shared_ptr<const BackgroundMapping::Outcome> outcome = mapping_.Take();
+    map_ = outcome->map;
+    mapper_ = outcome->mapper;
+    for (const auto& [stage, ms] : outcome->stages.milliseconds) stages.milliseconds[stage] += ms;
+  }
+  mapped.push_back(mapping_.keyframe());
+  const auto count = [this](std::vector<int>* landmarks, int Landmark::*counter) {
+    for (int l : *landmarks) {
+      const int present = map().Present(l);
+      if (present >= 0) ++(map_.landmark(present).*counter);
+    }
+    landmarks->clear();
+  };
+  count(&visible_, &Landmark::visible);
+  count(&found_, &Landmark::found);
+  if (reference_ >= 0) MoveCurrent(old_reference, Similarity(map().keyframe(reference_).T_world_camera));
+  std::set<int> taken;  // merged landmarks were two in the last frame
+  for (int& l : last_matches_.landmarks) {
+    l = map().Present(l);
+    if (l >= 0 && !taken.insert(l).second) l = -1;
+  }
+  if (frames_since_keyframe_ == 0) last_matches_.landmarks = map().keyframe(last_keyframe_).landmarks;
 }
 
 void Odometry::Impl::Lose() {
@@ -114,15 +151,15 @@ void Odometry::Impl::Lose() {
 }
 
 bool Odometry::Impl::NeedKeyframe(const TrackedFrame& frame, const FrameMatches& matches, int inliers) const {
-  const tutti::Keyframe& last = map.keyframe(last_keyframe_);
+  const tutti::Keyframe& last = map().keyframe(last_keyframe_);
   const bool early = frames_since_keyframe_ < options.keyframe_min_frames;
   // Landmarks of the reference that are established: what one keyframe alone has seen (most of what depth
   // gives) may never be seen again, and would call for a keyframe all the time.
-  const tutti::Keyframe& reference = map.keyframe(reference_);
-  const std::size_t established = rig.sensor == Sensor::kMono && map.keyframes().size() > 2 ? 3 : 2;
+  const tutti::Keyframe& reference = map().keyframe(reference_);
+  const std::size_t established = rig.sensor == Sensor::kMono && map().KeyframeCount() > 2 ? 3 : 2;
   int reference_count = 0;
   for (int l : reference.landmarks) {
-    if (l >= 0 && map.landmark(l).observations.size() >= established) ++reference_count;
+    if (l >= 0 && map().landmark(l).observations.size() >= established) ++reference_count;
   }
   const bool weak = inliers < options.keyframe_inlier_ratio * reference_count;
   const bool very_weak = inliers < 0.4 * reference_count || inliers < 3 * options.min_inliers;
@@ -138,30 +175,35 @@ bool Odometry::Impl::NeedKeyframe(const TrackedFrame& frame, const FrameMatches&
     few_near = near_tracked < 100 && near_free > 70;
   }
   const double baseline =
-      (map.keyframe(last_keyframe_).T_world_camera.translation - last_T_camera_world_.Inverse().translation)
+      (map().keyframe(last_keyframe_).T_world_camera.translation - last_T_camera_world_.Inverse().translation)
           .norm();
-  const bool moved = baseline > 0.02 * std::max(1e-6, map.MedianDepth(last_keyframe_));
+  const bool moved = baseline > 0.02 * std::max(1e-6, map().MedianDepth(last_keyframe_));
   const bool due = frame.stamp_s - last.stamp_s > options.keyframe_max_interval_s && moved;
   if (early && !(very_weak && frames_since_keyframe_ >= 1)) return false;
   return weak || very_weak || due || few_near;
 }
 
-int Odometry::Impl::InsertKeyframe(const TrackedFrame& frame, const FrameMatches& matches,
-                                   const Pose& T_camera_world) {
+// Makes the last tracked frame a keyframe.
+int Odometry::Impl::InsertKeyframe(const TrackedFrame& frame) {
+  EnterMapping();
   tutti::Keyframe k;
   k.frame_index = frame.index;
   k.stamp_s = frame.stamp_s;
-  k.piece = map.keyframe(reference_).piece;
+  k.piece = map().keyframe(reference_).piece;
   k.features = frame.features;
-  k.T_world_camera = T_camera_world.Inverse();
-  const int id = map.AddKeyframe(k);
-  for (std::size_t f = 0; f < matches.landmarks.size(); ++f) {
-    if (matches.landmarks[f] >= 0 && map.landmark(matches.landmarks[f]).alive)
-      map.AddObservation(matches.landmarks[f], id, static_cast<int>(f));
+  k.T_world_camera = last_T_camera_world_.Inverse();
+  const int id = map_.AddKeyframe(k);
+  for (std::size_t f = 0; f < last_matches_.landmarks.size(); ++f) {
+    const int l = last_matches_.landmarks[f];
+    if (l >= 0 && map().landmark(l).alive) map_.AddObservation(l, id, static_cast<int>(f));
   }
-  mapper_.Process(id, &map, &stages);
+  if (rig.sensor != Sensor::kMono) mapper_.AddDepthLandmarks(id, 100, &map_);
+  last_matches_.landmarks = map().keyframe(id).landmarks;
   last_keyframe_ = reference_ = id;
   frames_since_keyframe_ = 0;
+  mapping_.Start(id, map_, mapper_, stages.recorder, own_threads);
+  frames_since_mapping_began_ = 0;
+  if (options.mapping_delay_frames == 0) EnterMapping();
   return id;
 }
 
@@ -170,7 +212,7 @@ void Odometry::Impl::Record(const TrackedFrame& frame, const Pose& T_camera_worl
   record.index = frame.index;
   record.stamp_s = frame.stamp_s;
   record.reference = reference;
-  record.T_reference_frame = map.keyframe(reference).T_world_camera.Inverse() * T_camera_world.Inverse();
+  record.T_reference_frame = map().keyframe(reference).T_world_camera.Inverse() * T_camera_world.Inverse();
   records.push_back(record);
 }
 

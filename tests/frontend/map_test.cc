@@ -28,19 +28,19 @@ Map ThreeKeyframes() {
 // Landmarks count as many as are shared; recounted from scratch.
 void ExpectConsistent(const Map& map) {
   std::map<std::pair<int, int>, int> shared;
-  for (std::size_t l = 0; l < map.landmarks().size(); ++l) {
-    const Landmark& landmark = map.landmark(static_cast<int>(l));
+  for (int l = 0; l < map.LandmarkCount(); ++l) {
+    const Landmark& landmark = map.landmark(l);
     EXPECT_EQ(landmark.alive, !landmark.observations.empty());
     for (const Observation& a : landmark.observations) {
-      EXPECT_EQ(map.keyframe(a.keyframe).landmarks[static_cast<std::size_t>(a.feature)], static_cast<int>(l));
+      EXPECT_EQ(map.keyframe(a.keyframe).landmarks[static_cast<std::size_t>(a.feature)], l);
       for (const Observation& b : landmark.observations) {
         if (a.keyframe != b.keyframe) ++shared[{a.keyframe, b.keyframe}];
       }
     }
   }
   std::map<std::pair<int, int>, int> kept;
-  for (const Keyframe& k : map.keyframes()) {
-    for (const auto& [other, count] : k.covisible) kept[{k.id, other}] = count;
+  for (int id = 0; id < map.KeyframeCount(); ++id) {
+    for (const auto& [other, count] : map.keyframe(id).covisible) kept[{id, other}] = count;
   }
   EXPECT_EQ(kept, shared);
 }

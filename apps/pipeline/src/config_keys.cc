@@ -115,6 +115,8 @@ void ConfigTable::AddOdometry(OdometryOptions& o) {
       "new keyframe at the latest after this time, if the camera moved [s]");
   Add("keyframe_min_frames", o.keyframe_min_frames,
       "at least this many frames between keyframes (unless tracking gets weak)");
+  Add("mapping_delay_frames", o.mapping_delay_frames,
+      "what mapping makes of a keyframe enters so many frames later, and is waited for then [frames]");
   Add("triangulation_neighbours", o.triangulation_neighbours,
       "mono: keyframes with which new landmarks are triangulated");
   Add("min_parallax_deg", o.min_parallax_deg, "mono initialisation: median parallax [deg]");

@@ -150,6 +150,7 @@ class Run {
     const Clock::time_point start = Clock::now();
     const bool again = config_.run.odometry_pass && dataset_.FrameSupply() != Supply::kOnce;
     result_.odometry_complete = again && TrackAgain(*odometry, begin, end);
+    odometry->FinishMapping();
     result_.odometry_pass_s = Seconds(start);
   }
 

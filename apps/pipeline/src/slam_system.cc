@@ -37,6 +37,7 @@ class SlamSystem::Impl {
     if (rig.calibrated) {
       odometry_.emplace(config.odometry, rig);
       odometry_->SetRecorder(recorder);
+      odometry_->UseOwnThreads(config.run.threads > 1);
     }
     if (config.run.loops)
       worker_ = std::make_unique<LoopWorker>(DetectorOptions(config), config.run.threads > 1, recorder);
@@ -55,11 +56,16 @@ class SlamSystem::Impl {
     } else {
       result.reason = "no calibration";
     }
-    if (worker_ && (result.keyframe >= 0 || !odometry_)) Submit(frame, result.keyframe);
+    if (!worker_) return result;
+    if (result.keyframe >= 0) unmapped_[result.keyframe] = frame;
+    if (!odometry_) Submit(frame, -1);
+    SubmitMapped();
     return result;
   }
 
   void Finish() {
+    if (odometry_) odometry_->FinishMapping();
+    if (worker_) SubmitMapped();
     while (!submitted_.empty()) Deliver();
     if (!deferred_.empty()) Close(std::exchange(deferred_, {}));
     for (LoopRecord& record : records_) {
@@ -121,6 +127,17 @@ class SlamSystem::Impl {
     if (result.state == TrackingState::kTracking) ++relocalized_;
     stages_["relocalize"] += MillisecondsSince(begin);
     return result;
+  }
+
+  // The detector gets a keyframe once all its landmarks are known.
+  void SubmitMapped() {
+    if (!odometry_) return;
+    for (const int keyframe : odometry_->TakeMapped()) {
+      const auto frame = unmapped_.find(keyframe);
+      if (frame == unmapped_.end()) continue;
+      Submit(frame->second, keyframe);
+      unmapped_.erase(frame);
+    }
   }
 
   void Submit(const InputFrame& frame, int keyframe) {
@@ -197,6 +214,7 @@ class SlamSystem::Impl {
 
   // A verified loop: measure it against the map, and close it if something else says the same.
   void Consider(const LoopResult& result) {
+    odometry_->FinishMapping();
     LoopRecord& record = records_.back();
     const auto candidate = keyframe_of_frame_.find(record.candidate),
                query = keyframe_of_frame_.find(record.query);
@@ -312,6 +330,7 @@ class SlamSystem::Impl {
   std::vector<LoopEdge> deferred_;  // agreed, and the map fulfils them: they enter with the next correction
   std::map<std::int64_t, int> keyframe_of_frame_;  // of the frames that the detector knows
   std::map<std::int64_t, double> stamps_;          // the same
+  std::map<int, InputFrame> unmapped_;             // keyframes that the detector waits for
   std::int64_t frames_ = 0;
   std::int64_t last_frame_ = -1;  // index of the last one that the odometry has seen
   std::int64_t keyframes_seen_ = 0;

@@ -1,4 +1,5 @@
-// The odometry's map: keyframes, landmarks and who sees what. A value type: copying it copies the map.
+// The odometry's map: keyframes, landmarks and who sees what. A value type; copies share what is the same in
+// both.
 #pragma once
 
 #include <array>
@@ -11,6 +12,7 @@
 #include "tutti/core/camera.h"
 #include "tutti/core/pose.h"
 #include "tutti/frontend/features.h"
+#include "tutti/frontend/shared_vector.h"
 
 namespace tutti {
 
@@ -42,6 +44,7 @@ struct Landmark {
   std::shared_ptr<const Patch> patch;         ///< null if there was no image
   Observation patch_source;                   ///< what the patch is of
   int visible = 0, found = 0;                 ///< frames that should see it, and that did
+  int replaced_by = -1;                       ///< landmark that it was merged into, if it is not alive
 };
 
 /// A frame that stays in the map.
@@ -81,12 +84,15 @@ class Map {
   /// Keyframes with at least `min_shared` common landmarks, most first (ties: newest first), at most `count`.
   std::vector<int> BestCovisible(int keyframe, int count, int min_shared) const;
 
-  const std::vector<Keyframe>& keyframes() const { return keyframes_; }
-  Keyframe& keyframe(int id) { return keyframes_[static_cast<std::size_t>(id)]; }
+  int KeyframeCount() const { return static_cast<int>(keyframes_.size()); }
+  int LandmarkCount() const { return static_cast<int>(landmarks_.size()); }  ///< dead ones too
+  /// For writing: a keyframe or landmark that a copy of the map shares is copied first.
+  Keyframe& keyframe(int id) { return keyframes_.Mutable(static_cast<std::size_t>(id)); }
+  Landmark& landmark(int id) { return landmarks_.Mutable(static_cast<std::size_t>(id)); }
   const Keyframe& keyframe(int id) const { return keyframes_[static_cast<std::size_t>(id)]; }
-  Landmark& landmark(int id) { return landmarks_[static_cast<std::size_t>(id)]; }
   const Landmark& landmark(int id) const { return landmarks_[static_cast<std::size_t>(id)]; }
-  const std::vector<Landmark>& landmarks() const { return landmarks_; }
+  /// The landmark itself, or the one that it ended in by merging; -1 if that one is gone, and for -1.
+  int Present(int landmark) const;
   const std::vector<float>& scales() const { return scales_; }
 
   /// Median depth of the landmarks that a keyframe sees [m]; 0 if it sees none.
@@ -96,8 +102,8 @@ class Map {
   std::vector<float> scales_;
   std::optional<PinholeCamera> camera_;
   double aligned_sigma_ = 1;
-  std::vector<Keyframe> keyframes_;
-  std::vector<Landmark> landmarks_;
+  SharedVector<Keyframe, 1> keyframes_;
+  SharedVector<Landmark, 64> landmarks_;
 };
 
 }  // namespace tutti

@@ -26,7 +26,7 @@ struct TrackResult {
   Pose T_world_camera;  ///< valid if state == kTracking
   int features = 0;     ///< in the image
   int inliers = 0;      ///< landmarks that agree with the pose
-  int keyframe = -1;    ///< id of the keyframe that this frame became, or -1
+  int keyframe = -1;    ///< id of the keyframe that this frame became, or -1; see TakeMapped
 };
 
 /// A keyframe's features as the loop closure and the pose graph see them. Frames of reference: the camera's.
@@ -65,6 +65,15 @@ class Odometry {
   /// shows the same place: tracking goes on from there if the map agrees. To be called before the next Track.
   /// Returns what Track did if that fails, or if there is no such frame.
   TrackResult RelocalizeAt(int keyframe);
+
+  /// A new keyframe is mapped (landmarks, local bundle adjustment) beside the tracking of the next frames;
+  /// what comes of it enters after OdometryOptions::mapping_delay_frames, whenever it is ready. Waits for
+  /// what is under way and brings it in now; to be called after the last frame.
+  void FinishMapping();
+  /// Keyframes whose mapping has entered since the last call, oldest first: all their landmarks are known.
+  std::vector<int> TakeMapped();
+  /// false: mapping is done on the caller's thread, with the same result.
+  void UseOwnThreads(bool own_threads);
 
   /// Ids of all keyframes that are alive, ascending.
   std::vector<int> KeyframeIds() const;

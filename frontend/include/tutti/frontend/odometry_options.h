@@ -44,6 +44,9 @@ struct OdometryOptions {
   int keyframe_min_frames = 2;  ///< at least this many frames between keyframes (unless tracking gets weak)
 
   // Mapping.
+  int mapping_delay_frames =
+      1;  ///< what mapping makes of a keyframe enters so many frames later, and is waited for then [frames];
+          ///< more suits fast cameras with depth, mono needs its new landmarks at once
   int triangulation_neighbours = 8;  ///< mono: keyframes with which new landmarks are triangulated
   double min_parallax_deg = 1.0;     ///< mono initialisation: median parallax [deg]
   int ba_keyframes = 12;             ///< keyframes that local bundle adjustment moves

@@ -1,0 +1,51 @@
+// A vector whose copies share what neither of them has changed.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <utility>
+#include <vector>
+
+namespace tutti {
+
+/// Elements live in chunks of `kChunk`. A copy costs a pointer per chunk; the first write to a chunk that is
+/// shared copies that chunk. Copies may be used on different threads as long as none is destroyed or assigned
+/// to while another is written.
+template <class T, std::size_t kChunk>
+class SharedVector {
+ public:
+  std::size_t size() const { return size_; }
+  const T& operator[](std::size_t i) const { return (*chunks_[i / kChunk])[i % kChunk]; }
+
+  /// For writing. References that were got for reading show the old value if the chunk was shared.
+  T& Mutable(std::size_t i) { return Own(i / kChunk)[i % kChunk]; }
+
+  T& Append(T value) {
+    if (size_ % kChunk == 0) {
+      chunks_.push_back(std::make_shared<Chunk>());
+      chunks_.back()->reserve(kChunk);
+    }
+    Chunk& last = Own(size_++ / kChunk);
+    last.push_back(std::move(value));
+    return last.back();
+  }
+
+ private:
+  using Chunk = std::vector<T>;
+
+  Chunk& Own(std::size_t c) {
+    std::shared_ptr<Chunk>& chunk = chunks_[c];
+    if (chunk.use_count() != 1) {
+      auto copy = std::make_shared<Chunk>();
+      copy->reserve(kChunk);  // references stay good while it grows
+      copy->insert(copy->end(), chunk->begin(), chunk->end());
+      chunk = std::move(copy);
+    }
+    return *chunk;
+  }
+
+  std::vector<std::shared_ptr<Chunk>> chunks_;
+  std::size_t size_ = 0;
+};
+
+}  // namespace tutti

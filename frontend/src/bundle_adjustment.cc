@@ -9,19 +9,6 @@
 namespace tutti {
 namespace {
 
-// Landmarks that the moving keyframes see, ascending.
-std::vector<int> LandmarksOf(const Map& map, const std::vector<int>& keyframes) {
-  std::vector<int> landmarks;
-  for (int id : keyframes) {
-    for (int l : map.keyframe(id).landmarks) {
-      if (l >= 0) landmarks.push_back(l);
-    }
-  }
-  std::sort(landmarks.begin(), landmarks.end());
-  landmarks.erase(std::unique(landmarks.begin(), landmarks.end()), landmarks.end());
-  return landmarks;
-}
-
 Window MakeWindow(const Map& map, const std::vector<int>& moving, const std::vector<int>& fixed,
                   const std::vector<int>& landmarks, const BundleAdjustmentOptions& options) {
   Window window;
@@ -96,7 +83,7 @@ void Refresh(const std::vector<int>& landmarks, Map* map) {
 BundleAdjustmentReport AdjustWindow(const PinholeCamera& camera, const std::vector<int>& moving,
                                     const std::vector<int>& fixed, const BundleAdjustmentOptions& options,
                                     Map* map) {
-  const std::vector<int> landmarks = LandmarksOf(*map, moving);
+  const std::vector<int> landmarks = map->LandmarksOf(moving);
   BundleAdjustmentReport report;
   report.keyframes = static_cast<int>(moving.size());
   report.fixed = static_cast<int>(fixed.size());
@@ -104,7 +91,7 @@ BundleAdjustmentReport AdjustWindow(const PinholeCamera& camera, const std::vect
   report.lens = options.lens;
   if (landmarks.empty() || moving.empty()) return report;
   Window window = MakeWindow(*map, moving, fixed, landmarks, options);
-  const WindowReport solved = SolveWindow(camera, options.iterations, &window);
+  const WindowReport solved = SolveWindow(camera, options.iterations, &window, options.stop);
   report.observations = static_cast<int>(window.observations.size());
   report.initial_cost = solved.initial_cost;
   report.final_cost = solved.final_cost;

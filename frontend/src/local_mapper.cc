@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "landmark_fusion.h"
 #include "matcher.h"
 #include "measured.h"
 #include "patch_aligner.h"
@@ -12,7 +13,9 @@
 
 namespace tutti {
 namespace {
-constexpr int kImages = 20;            // newest keyframes that keep their images
+constexpr int kImages = 20;  // newest keyframes that keep their images
+constexpr float kFusionError =
+    2.4477F;  // of a landmark that is found again: 95 % [standard deviations of a corner]
 constexpr double kMaxCosine = 0.9996;  // 1.6 deg of parallax at least, for a depth from two views
 }  // namespace
 
@@ -114,38 +117,15 @@ int LocalMapper::Triangulate(int id, Map* map) {
 
 void LocalMapper::Fuse(int id, Map* map) {
   const std::vector<int> neighbours = map->BestCovisible(id, 12, 15);
-  const auto apply = [&](int keyframe, const std::vector<std::pair<int, int>>& pairs) {
-    for (const auto& [landmark, feature] : pairs) {
-      if (!map->landmark(landmark).alive) continue;
-      const int present = map->keyframe(keyframe).landmarks[static_cast<std::size_t>(feature)];
-      if (present < 0) {
-        map->AddObservation(landmark, keyframe, feature);
-      } else if (present != landmark) {
-        const bool keep_present =
-            map->landmark(present).observations.size() >= map->landmark(landmark).observations.size();
-        map->Merge(keep_present ? landmark : present, keep_present ? present : landmark);
-      }
-    }
-  };
-  const auto landmarks_of = [&](int keyframe) {
-    std::vector<int> out;
-    for (int l : map->keyframe(keyframe).landmarks) {
-      if (l >= 0) out.push_back(l);
-    }
-    return out;
-  };
   for (int other : neighbours) {
-    apply(other, MatchForFusion(*map, rig_.camera, map->keyframe(other), landmarks_of(id), 3.0F));
+    const auto found =
+        MatchForFusion(*map, rig_.camera, map->keyframe(other), map->LandmarksOf({id}), kFusionError);
+    FuseInto(other, found, map);
   }
-  std::vector<int> theirs;
-  for (int other : neighbours) {
-    const std::vector<int> l = landmarks_of(other);
-    theirs.insert(theirs.end(), l.begin(), l.end());
-  }
-  std::sort(theirs.begin(), theirs.end());
-  theirs.erase(std::unique(theirs.begin(), theirs.end()), theirs.end());
-  apply(id, MatchForFusion(*map, rig_.camera, map->keyframe(id), theirs, 3.0F));
-  for (int l : landmarks_of(id)) map->UpdateLandmark(l);
+  FuseInto(id,
+           MatchForFusion(*map, rig_.camera, map->keyframe(id), map->LandmarksOf(neighbours), kFusionError),
+           map);
+  for (int l : map->LandmarksOf({id})) map->UpdateLandmark(l);
 }
 
 // What was found by corners alone, in this keyframe or in older ones, gets its precise position.

@@ -103,7 +103,7 @@ double Map::RelativeSigma(const Features& features, int keyframe, int feature, i
   return source || aligned ? aligned_sigma_ * corner : corner;
 }
 
-void Map::UpdateLandmark(int id) {
+void Map::UpdateGeometry(int id) {
   const auto keyframe = [this](int k) -> const Keyframe& { return std::as_const(*this).keyframe(k); };
   Landmark& l = landmark(id);
   if (!l.alive || l.observations.empty()) return;
@@ -120,7 +120,13 @@ void Map::UpdateLandmark(int id) {
   const double distance = (l.position - k.T_world_camera.translation).norm();
   l.max_distance = static_cast<float>(distance * scales_[static_cast<std::size_t>(octave)]);
   l.min_distance = l.max_distance / scales_.back();
+}
 
+void Map::UpdateLandmark(int id) {
+  UpdateGeometry(id);
+  const auto keyframe = [this](int k) -> const Keyframe& { return std::as_const(*this).keyframe(k); };
+  Landmark& l = landmark(id);
+  if (!l.alive || l.observations.empty()) return;
   // The descriptor with the least median distance to the others; more than the newest dozen teach nothing
   // new.
   const std::size_t first = l.observations.size() > 12 ? l.observations.size() - 12 : 0;
@@ -156,6 +162,18 @@ std::vector<int> Map::BestCovisible(int id, int count, int min_shared) const {
     if (static_cast<int>(out.size()) >= count) break;
     out.push_back(-other);
   }
+  return out;
+}
+
+std::vector<int> Map::LandmarksOf(const std::vector<int>& keyframes) const {
+  std::vector<int> out;
+  for (int id : keyframes) {
+    for (int l : keyframe(id).landmarks) {
+      if (l >= 0) out.push_back(l);
+    }
+  }
+  std::sort(out.begin(), out.end());
+  out.erase(std::unique(out.begin(), out.end()), out.end());
   return out;
 }
 

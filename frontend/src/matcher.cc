@@ -304,7 +304,7 @@ std::vector<std::pair<int, int>> MatchEpipolar(const Map& map, const PinholeCame
 
 std::vector<std::pair<int, int>> MatchForFusion(const Map& map, const PinholeCamera& camera,
                                                 const Keyframe& keyframe, const std::vector<int>& landmarks,
-                                                float radius_factor) {
+                                                float largest_error) {
   const Pose T_camera_world = keyframe.T_world_camera.Inverse();
   const Eigen::Vector3d centre = keyframe.T_world_camera.translation;
   std::vector<std::pair<int, int>> out;
@@ -316,14 +316,14 @@ std::vector<std::pair<int, int>> MatchForFusion(const Map& map, const PinholeCam
     const bool known = std::any_of(l.observations.begin(), l.observations.end(),
                                    [&](const Observation& o) { return o.keyframe == keyframe.id; });
     if (known) continue;
-    keyframe.features->InArea(seen.pixel, radius_factor * map.scales()[static_cast<std::size_t>(seen.octave)],
+    keyframe.features->InArea(seen.pixel, largest_error * map.scales()[static_cast<std::size_t>(seen.octave)],
                               seen.octave - 1, seen.octave, &near);
     Best best;
     for (int f : near) {
       const cv::KeyPoint& k = keyframe.features->keypoints[static_cast<std::size_t>(f)];
       const cv::Point2f e = k.pt - seen.pixel;
       const float sigma = map.scales()[static_cast<std::size_t>(k.octave)];
-      if (e.dot(e) > 5.991F * sigma * sigma) continue;
+      if (e.dot(e) > largest_error * largest_error * sigma * sigma) continue;
       best.Offer(HammingDistance(l.descriptor.data(), keyframe.features->Descriptor(f)), f, k.octave);
     }
     if (best.distance <= kStrictDistance) out.emplace_back(id, best.feature);

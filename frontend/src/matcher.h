@@ -46,8 +46,9 @@ std::vector<std::pair<int, int>> MatchEpipolar(const Map& map, const PinholeCame
                                                double median_depth);
 
 /// Finds landmarks again in a keyframe where they have no feature yet: pairs (landmark, feature).
+/// `largest_error` of the feature's position [standard deviations of a corner].
 std::vector<std::pair<int, int>> MatchForFusion(const Map& map, const PinholeCamera& camera,
                                                 const Keyframe& keyframe, const std::vector<int>& landmarks,
-                                                float radius_factor);
+                                                float largest_error);
 
 }  // namespace tutti

@@ -146,38 +146,6 @@ std::vector<std::pair<std::pair<int, int>, int>> Odometry::Covisibility(int min_
   return out;
 }
 
-void Odometry::ApplyCorrection(const std::map<int, Similarity>& S_world_keyframe,
-                               const std::map<int, int>& merges) {
-  Map& map = impl_->WritableMap();
-  std::vector<Pose> old_T_camera_world;
-  std::vector<Similarity> corrected;
-  for (int id = 0; id < map.KeyframeCount(); ++id) {
-    const tutti::Keyframe& k = map.keyframe(id);
-    old_T_camera_world.push_back(k.T_world_camera.Inverse());
-    const auto it = S_world_keyframe.find(k.id);
-    corrected.push_back(it != S_world_keyframe.end() ? it->second : Similarity(k.T_world_camera));
-  }
-  for (int i = 0; i < map.LandmarkCount(); ++i) {
-    Landmark& l = map.landmark(i);
-    if (!l.alive) continue;
-    const std::size_t r = static_cast<std::size_t>(l.reference);
-    l.position = corrected[r] * (old_T_camera_world[r] * l.position);
-  }
-  if (impl_->reference() >= 0) {
-    const std::size_t r = static_cast<std::size_t>(impl_->reference());
-    impl_->MoveCurrent(old_T_camera_world[r].Inverse(), corrected[r]);
-  }
-  for (Impl::FrameRecord& record : impl_->records) {
-    record.T_reference_frame.translation *= corrected[static_cast<std::size_t>(record.reference)].scale;
-  }
-  for (std::size_t k = 0; k < corrected.size(); ++k)
-    map.keyframe(static_cast<int>(k)).T_world_camera = corrected[k].RigidPart();
-  for (int i = 0; i < map.LandmarkCount(); ++i) map.UpdateLandmark(i);
-  for (const auto& [from, to] : merges) {
-    if (from != to) impl_->piece_joined[from] = to;
-  }
-}
-
 std::vector<int> Odometry::Pieces() const {
   std::map<int, int> frames;
   for (const Impl::FrameRecord& r : impl_->records) ++frames[KeyframePiece(r.reference)];

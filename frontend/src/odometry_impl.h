@@ -49,6 +49,11 @@ class Odometry::Impl {
   void EnterMapping();
   std::vector<int> mapped;  // keyframes whose mapping was brought in, until somebody takes them
 
+  /// Moves keyframes, with all that hangs on them; the landmarks' geometry is to be updated then.
+  void MoveMap(const std::map<int, Similarity>& S_world_keyframe);
+  void UpdateGeometry(int landmark);
+  void TakeAdjusted(int landmark, const Landmark& before, const Landmark& after);
+  const LensError& Lens() const { return mapper_.lens().Remaining(); }
   /// Moves everything that hangs on the current pose after its keyframe was moved.
   void MoveCurrent(const Pose& old_reference, const Similarity& S_world_reference);
   int reference() const { return reference_; }

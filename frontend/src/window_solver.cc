@@ -1,9 +1,10 @@
 #include "window_solver.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
+
+#include "reduced_system.h"
 
 namespace tutti {
 namespace {
@@ -30,7 +31,8 @@ struct Estimate {
 
 class WindowSolver {
  public:
-  WindowSolver(const PinholeCamera& camera, Window* window) : camera_(camera), window_(*window) {
+  WindowSolver(const PinholeCamera& camera, Window* window)
+      : camera_(camera), window_(*window), reduced_(window->moving, SharedLandmarks(*window)) {
     now_ = {window_.T_camera_world, window_.points, window_.lens.value};
     const std::size_t cameras = static_cast<std::size_t>(window_.moving);
     pose_hessian_.resize(cameras);
@@ -40,16 +42,14 @@ class WindowSolver {
     point_gradient_.resize(now_.points.size());
     point_lens_.resize(now_.points.size());
     pose_point_.resize(window_.observations.size());
-    const Eigen::Index size = 6 * window_.moving + 2;
-    reduced_.resize(size, size);
-    right_.resize(size);
+    right_.resize(6 * window_.moving + 2);
   }
 
-  WindowReport Solve(int max_iterations) {
+  WindowReport Solve(int max_iterations, const std::atomic<bool>* stop) {
     WindowReport report;
     double cost = report.initial_cost = report.final_cost = Cost(now_), damping = kStartDamping, growth = 2;
     bool fresh = false;
-    while (report.iterations < max_iterations && std::isfinite(cost)) {
+    while (report.iterations < max_iterations && std::isfinite(cost) && !(stop != nullptr && *stop)) {
       ++report.iterations;
       if (!fresh) Linearise();
       fresh = true;
@@ -82,6 +82,30 @@ class WindowSolver {
   }
 
  private:
+  // Pairs of moving cameras (a, b), b < a, that see a common point; of a small window nobody asks.
+  static std::vector<std::pair<int, int>> SharedLandmarks(const Window& window) {
+    std::vector<std::pair<int, int>> pairs;
+    if (!ReducedSystem::IsSparse(window.moving)) return pairs;
+    std::size_t distinct = 1 << 20;
+    const auto tidy = [&pairs] {
+      std::sort(pairs.begin(), pairs.end());
+      pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+    };
+    for (std::size_t i = 0; i + 1 < window.first_observation.size(); ++i) {
+      for (std::size_t a = window.first_observation[i]; a < window.first_observation[i + 1]; ++a) {
+        for (std::size_t b = window.first_observation[i]; b < window.first_observation[i + 1]; ++b) {
+          const int ca = window.observations[a].camera, cb = window.observations[b].camera;
+          if (cb < ca && ca < window.moving) pairs.emplace_back(ca, cb);
+        }
+      }
+      if (pairs.size() < distinct) continue;
+      tidy();
+      distinct = std::max(distinct, 2 * pairs.size());
+    }
+    tidy();
+    return pairs;
+  }
+
   // Residual of an observation, whitened: (du, dv, d(1/z)); the last is 0 without depth. False: behind.
   bool Residual(const Estimate& e, const WindowObservation& o, std::size_t point, Eigen::Vector3d* p,
                 Eigen::Vector3d* r) const {
@@ -172,25 +196,21 @@ class WindowSolver {
   // Solves the damped normal equations; `predicted`: by how much the cost should fall.
   bool Step(double damping, Estimate* trial, double* predicted) {
     const Eigen::Index lens_at = 6 * window_.moving;
-    reduced_.setZero();
+    reduced_.SetZero();
     for (int c = 0; c < window_.moving; ++c) {
       const std::size_t s = static_cast<std::size_t>(c);
-      reduced_.block<6, 6>(6 * c, 6 * c) = pose_hessian_[s];
-      reduced_.block<6, 6>(6 * c, 6 * c).diagonal() += damping * pose_hessian_[s].diagonal();
-      reduced_.block<2, 6>(lens_at, 6 * c) = pose_lens_[s].transpose();
+      Matrix6d damped = pose_hessian_[s];
+      damped.diagonal() += damping * pose_hessian_[s].diagonal();
+      reduced_.SetDiagonal(c, damped);
+      reduced_.AddLens(c, pose_lens_[s].transpose());
       right_.segment<6>(6 * c) = -pose_gradient_[s];
     }
-    reduced_.block<2, 2>(lens_at, lens_at) = lens_hessian_;
+    reduced_.SetLens(lens_hessian_);
     right_.segment<2>(lens_at) = -lens_gradient_;
     inverse_.resize(now_.points.size());
     for (std::size_t i = 0; i < now_.points.size(); ++i) EliminatePoint(i, damping);
-    const Eigen::LLT<Eigen::MatrixXd, Eigen::Lower> factor(reduced_);
-    if (factor.info() != Eigen::Success) return false;
-    const Eigen::VectorXd step = factor.solve(right_);
-    if (!step.allFinite()) return false;
-    const Eigen::Matrix2d corner =
-        factor.matrixLLT().block<2, 2>(lens_at, lens_at).triangularView<Eigen::Lower>();
-    lens_information_ = corner * corner.transpose();
+    Eigen::VectorXd step;
+    if (!reduced_.Solve(right_, &step, &lens_information_)) return false;
     Apply(step, damping, trial, predicted);
     return true;
   }
@@ -204,18 +224,18 @@ class WindowSolver {
     const std::size_t begin = window_.first_observation[i], end = window_.first_observation[i + 1];
     const Eigen::Vector3d shift = inverse_[i] * point_gradient_[i];
     const Matrix32d lens = inverse_[i] * point_lens_[i];
-    reduced_.block<2, 2>(lens_at, lens_at).noalias() -= point_lens_[i].transpose() * lens;
+    reduced_.AddLens(-point_lens_[i].transpose() * lens);
     right_.segment<2>(lens_at).noalias() += point_lens_[i].transpose() * shift;
     for (std::size_t a = begin; a < end; ++a) {
       const int ca = window_.observations[a].camera;
       if (ca >= window_.moving) continue;
       const Matrix63d wa = pose_point_[a] * inverse_[i];
       right_.segment<6>(6 * ca).noalias() += pose_point_[a] * shift;
-      reduced_.block<2, 6>(lens_at, 6 * ca).noalias() -= (pose_point_[a] * lens).transpose();
+      reduced_.AddLens(ca, -(pose_point_[a] * lens).transpose());
       for (std::size_t b = begin; b < end; ++b) {
         const int cb = window_.observations[b].camera;
         if (cb > ca) continue;  // the lower triangle; fixed cameras have the highest numbers
-        reduced_.block<6, 6>(6 * ca, 6 * cb).noalias() -= wa * pose_point_[b].transpose();
+        reduced_.Subtract(ca, cb, wa * pose_point_[b].transpose());
       }
     }
   }
@@ -257,14 +277,15 @@ class WindowSolver {
   std::vector<Matrix63d> pose_point_;  // of each observation
   Eigen::Matrix2d lens_hessian_, lens_information_ = Eigen::Matrix2d::Constant(NAN);
   Eigen::Vector2d lens_gradient_;
-  Eigen::MatrixXd reduced_;  // lower triangle: poses, then the lens
+  ReducedSystem reduced_;
   Eigen::VectorXd right_;
 };
 
 }  // namespace
 
-WindowReport SolveWindow(const PinholeCamera& camera, int max_iterations, Window* window) {
-  return WindowSolver(camera, window).Solve(max_iterations);
+WindowReport SolveWindow(const PinholeCamera& camera, int max_iterations, Window* window,
+                         const std::atomic<bool>* stop) {
+  return WindowSolver(camera, window).Solve(max_iterations, stop);
 }
 
 }  // namespace tutti

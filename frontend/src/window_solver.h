@@ -7,6 +7,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <atomic>
 #include <vector>
 
 #include "tutti/core/camera.h"
@@ -38,7 +39,9 @@ struct WindowReport {
   double initial_cost = 0, final_cost = 0;  ///< half the sum of the Huber-robust squared residuals
 };
 
-/// Minimises the Huber-robust reprojection error over moving poses, points and lens.
-WindowReport SolveWindow(const PinholeCamera& camera, int max_iterations, Window* window);
+/// Minimises the Huber-robust reprojection error over moving poses, points and lens. Ends after the iteration
+/// in which `stop` becomes true; null: never.
+WindowReport SolveWindow(const PinholeCamera& camera, int max_iterations, Window* window,
+                         const std::atomic<bool>* stop = nullptr);
 
 }  // namespace tutti

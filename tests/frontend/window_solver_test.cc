@@ -81,6 +81,57 @@ TEST(WindowSolver, LeavesALensAloneThatIsKnownToHaveNoError) {
   EXPECT_LT(window.lens.value.norm(), 1e-5);
 }
 
+// A long drive: far cameras have no point in common, so the solver is the sparse one.
+Window LongDrive() {
+  const PinholeCamera camera = testing::PlainCamera(450);
+  std::mt19937 generator(7);
+  const auto uniform = [&](double low, double high) {
+    return low + (high - low) * static_cast<double>(generator() % 100000) / 1e5;
+  };
+  Window window;
+  window.moving = 98;
+  for (int c = 2; c < 102; ++c) {
+    const double z = c < 100 ? c : c - 100;  // the first two are fixed, and so come last
+    window.T_camera_world.push_back(Pose(ExpSO3({0, 0.005 * z, 0}), {0, 0, z}).Inverse());
+  }
+  window.first_observation.push_back(0);
+  for (int i = 0; i < 3000; ++i) {
+    const Eigen::Vector3d point(uniform(-30, 60), uniform(-4, 4), uniform(5, 115));
+    std::vector<WindowObservation> seen;
+    for (std::size_t c = 0; c < window.T_camera_world.size(); ++c) {
+      const Eigen::Vector3d p = window.T_camera_world[c] * point;
+      WindowObservation o;
+      o.camera = static_cast<int>(c);
+      o.measured.pixel = camera.Project(p);
+      if (p.z() > 3 && p.z() < 15 && camera.Contains(o.measured.pixel)) seen.push_back(o);
+    }
+    if (seen.size() < 2) continue;
+    window.points.push_back(point);
+    window.observations.insert(window.observations.end(), seen.begin(), seen.end());
+    window.first_observation.push_back(window.observations.size());
+  }
+  return window;
+}
+
+TEST(WindowSolver, FindsManyPosesAndPoints) {
+  const Window truth = LongDrive();
+  Window window = truth;
+  Disturb(&window);
+  const WindowReport report = SolveWindow(testing::PlainCamera(450), 60, &window);
+  EXPECT_TRUE(report.usable);
+  EXPECT_LT(report.final_cost, 1e-6 * report.initial_cost);
+  EXPECT_LT(WorstPose(window, truth), 1e-2);
+}
+
+TEST(WindowSolver, EndsWhenToldTo) {
+  Window window = LongDrive();
+  Disturb(&window);
+  const std::atomic<bool> stop{true};
+  const WindowReport report = SolveWindow(testing::PlainCamera(450), 60, &window, &stop);
+  EXPECT_EQ(report.iterations, 0);
+  EXPECT_EQ(report.final_cost, report.initial_cost);
+}
+
 TEST(WindowSolver, FixedCamerasStay) {
   const Window truth = DriveForward({0, 0});
   Window window = truth;

@@ -296,6 +296,8 @@ void ConfigTable::AddRun(SlamOptions& o) {
   Add("loop_sigma_fraction", o.loop_sigma_fraction,
       "of its translation, as a share of the median scene depth");
   Add("loop_sigma_scale", o.loop_sigma_scale, "mono: of log(scale)");
+  Add("global_adjustment", o.global_adjustment,
+      "after loops: what both ends see becomes one, and the whole map is adjusted beside the tracking");
   Add("odometry_pass", o.odometry_pass,
       "after a correction, track the rest again without it for trajectory_odometry.txt");
 }

@@ -145,6 +145,17 @@ MapGraph::Correction MapGraph::Optimize(const Odometry& odometry, const std::vec
   return correction;
 }
 
+void MapGraph::MeasureAgain(const Odometry& odometry, std::vector<LoopEdge>& accepted) {
+  kept_.clear();
+  for (LoopEdge& loop : accepted) {
+    const Similarity in_map(odometry.KeyframePose(loop.candidate).Inverse() *
+                            odometry.KeyframePose(loop.query));
+    const Disagreement d = Measure(loop.S_candidate_query * in_map.Inverse(), loop.depth);
+    if (d.fraction <= options_.loop_after_fraction && d.angle_deg <= options_.loop_after_deg)
+      loop.S_candidate_query = in_map;
+  }
+}
+
 void MapGraph::Keep(const Odometry& odometry, const Correction& correction, std::vector<LoopEdge>& accepted,
                     std::vector<LoopEdge>& waiting) {
   const std::map<int, Similarity>& poses = correction.S_world_keyframe;

@@ -50,6 +50,10 @@ class MapGraph {
   void Keep(const Odometry& odometry, const Correction& correction, std::vector<LoopEdge>& accepted,
             std::vector<LoopEdge>& waiting);
 
+  /// To be called after the odometry has adjusted its whole map, loops included: from now on the map as it is
+  /// says more than what was measured before. Loops that it contradicts keep their measurement.
+  void MeasureAgain(const Odometry& odometry, std::vector<LoopEdge>& accepted);
+
  private:
   using Edge = std::pair<int, int>;  // older, newer keyframe id
   /// Odometry edges with their measurements, in order.

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <chrono>
 #include <deque>
+#include <iterator>
 #include <utility>
 
+#include "global_adjuster.h"
 #include "loop_constraint.h"
 #include "loop_gate.h"
 #include "loop_worker.h"
@@ -45,6 +47,7 @@ class SlamSystem::Impl {
 
   TrackResult Track(const InputFrame& frame) {
     while (!submitted_.empty() && submitted_.front().due <= frames_) Deliver();
+    if (adjuster_.Due(frames_)) EnterAdjustment();
     ++frames_;
     TrackResult result;
     if (odometry_) {
@@ -68,6 +71,7 @@ class SlamSystem::Impl {
     if (worker_) SubmitMapped();
     while (!submitted_.empty()) Deliver();
     if (!deferred_.empty()) Close(std::exchange(deferred_, {}));
+    if (adjuster_.Running()) EnterAdjustment();
     for (LoopRecord& record : records_) {
       if (!record.pending) continue;
       record.pending = false;
@@ -81,6 +85,7 @@ class SlamSystem::Impl {
   std::int64_t untouched_last_ = -1;
   std::vector<LoopRecord> records_;
   int corrections_ = 0;
+  int adjustments_ = 0;          // of the whole map
   std::size_t relocalized_ = 0;  // frames that were lost, and found by the detector
 
   PoseGraph Graph() const { return odometry_ ? graph_.Build(*odometry_, gate_.accepted()) : PoseGraph(); }
@@ -251,6 +256,7 @@ class SlamSystem::Impl {
     const auto fulfilled = [&](const LoopEdge& loop) { return gate_.Fulfilled(loop, places); };
     if (std::all_of(entering.begin(), entering.end(), fulfilled)) {
       deferred_ = std::move(entering);
+      if (options_.global_adjustment) Fuse(deferred_);
     } else {
       Close(std::move(entering));
     }
@@ -316,6 +322,38 @@ class SlamSystem::Impl {
     graph_.Keep(*odometry_, correction, gate_.accepted(), gate_.waiting());
     odometry_->ApplyCorrection(correction.S_world_keyframe, correction.merges);
     ++corrections_;
+    if (options_.global_adjustment && Fuse(entering))
+      adjuster_.MapMoved(*odometry_, odometry_->KeyframePiece(entering.back().candidate), frames_);
+  }
+
+  // Landmarks that both ends of a loop see become one. False if some loop has too few of them: to adjust the
+  // map without it would open it again.
+  bool Fuse(const std::vector<LoopEdge>& loops) {
+    constexpr int kLeastCommon = 30;
+    for (const LoopEdge& loop : loops) untied_[loop.record] = loop;
+    for (auto untied = untied_.begin(); untied != untied_.end();) {
+      const LoopEdge& loop = untied->second;
+      const int common = odometry_->FuseLoop(loop.candidate, loop.query, loop.S_candidate_query);
+      untied = common >= kLeastCommon ? untied_.erase(untied) : std::next(untied);
+    }
+    return untied_.empty();
+  }
+
+  // Brings in what the adjustment of the whole map has found.
+  void EnterAdjustment() {
+    const ScopedSpan span(recorder_, Lane::kOptimisation, "enter_adjustment");
+    const auto begin = std::chrono::steady_clock::now();
+    odometry_->FinishMapping();
+    const GlobalAdjustment adjustment = adjuster_.Take();
+    MapGraph::Correction correction;
+    if (auto moved = odometry_->CorrectionOf(adjustment)) {
+      correction.S_world_keyframe = std::move(*moved);
+      graph_.Keep(*odometry_, correction, gate_.accepted(), gate_.waiting());
+      odometry_->Enter(adjustment, correction.S_world_keyframe);
+      graph_.MeasureAgain(*odometry_, gate_.accepted());
+      ++adjustments_;
+    }
+    stages_["global_adjustment"] += MillisecondsSince(begin);
   }
 
   SpanRecorder* recorder_;
@@ -326,6 +364,8 @@ class SlamSystem::Impl {
   MapGraph graph_;
   std::unique_ptr<LoopWorker> worker_;
   std::string loop_warning_;  // the last one
+  GlobalAdjuster adjuster_;
+  std::map<std::size_t, LoopEdge> untied_;  // loops that landmarks do not hold together yet, by record
   std::deque<Submission> submitted_;
   std::vector<LoopEdge> deferred_;  // agreed, and the map fulfils them: they enter with the next correction
   std::map<std::int64_t, int> keyframe_of_frame_;  // of the frames that the detector knows

@@ -1,6 +1,7 @@
 // Local bundle adjustment: a window of keyframes and the landmarks that they see.
 #pragma once
 
+#include <atomic>
 #include <vector>
 
 #include "tutti/core/camera.h"
@@ -15,7 +16,8 @@ struct BundleAdjustmentOptions {
   int iterations = 6;        ///< most Levenberg-Marquardt iterations
   double pixel_sigma = 1.0;  ///< standard deviation of a keypoint at pyramid level 0 [px]
   bool metric = false;       ///< depth measurements fix the scale: one fixed keyframe is enough, else two
-  LensError lens;            ///< what is known of the camera's error; as it is: the camera has none
+  const std::atomic<bool>* stop = nullptr;  ///< ends the adjustment early when it becomes true
+  LensError lens;  ///< what is known of the camera's error; as it is: the camera has none
 };
 
 struct BundleAdjustmentReport {

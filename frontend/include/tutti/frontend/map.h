@@ -80,6 +80,8 @@ class Map {
   double RelativeSigma(const Features& features, int keyframe, int feature, int landmark) const;
   /// Recomputes descriptor, viewing direction and distances of a landmark.
   void UpdateLandmark(int landmark);
+  /// Viewing direction and distances alone, after keyframes or the landmark have moved.
+  void UpdateGeometry(int landmark);
 
   /// Keyframes with at least `min_shared` common landmarks, most first (ties: newest first), at most `count`.
   std::vector<int> BestCovisible(int keyframe, int count, int min_shared) const;
@@ -94,6 +96,9 @@ class Map {
   /// The landmark itself, or the one that it ended in by merging; -1 if that one is gone, and for -1.
   int Present(int landmark) const;
   const std::vector<float>& scales() const { return scales_; }
+
+  /// Landmarks that any of these keyframes sees, ascending.
+  std::vector<int> LandmarksOf(const std::vector<int>& keyframes) const;
 
   /// Median depth of the landmarks that a keyframe sees [m]; 0 if it sees none.
   double MedianDepth(int keyframe) const;

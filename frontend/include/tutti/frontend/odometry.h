@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "tutti/core/span_recorder.h"
 #include "tutti/core/trajectory.h"
 #include "tutti/frontend/frame.h"
+#include "tutti/frontend/global_adjustment.h"
 #include "tutti/frontend/odometry_options.h"
 
 namespace tutti {
@@ -93,6 +95,20 @@ class Odometry {
   /// pieces whose keyframes are now in one frame of reference: piece -> the piece that it joined.
   void ApplyCorrection(const std::map<int, Similarity>& S_world_keyframe,
                        const std::map<int, int>& merges = {});
+
+  /// After a loop moved the map: what the keyframes around `older` see is looked for in those around `newer`,
+  /// where the loop says it must be, and landmarks that are the same become one. Returns how many landmarks
+  /// both sides have in common then.
+  int FuseLoop(int older, int newer, const Similarity& S_older_newer);
+
+  /// Begins to adjust all keyframes of a map piece and what they see (bundle adjustment) to each other,
+  /// beside the tracking. The oldest keyframe stays where it is.
+  GlobalAdjustment BeginGlobalAdjustment(int map_piece) const;
+  /// Waits for it. Where it moves the keyframes; those that came since follow. None if it found nothing
+  /// better.
+  std::optional<std::map<int, Similarity>> CorrectionOf(const GlobalAdjustment& adjustment) const;
+  /// Moves keyframes to what CorrectionOf says, and landmarks to what the adjustment found.
+  void Enter(const GlobalAdjustment& adjustment, const std::map<int, Similarity>& S_world_keyframe);
 
   /// Map pieces that have frames, by number of frames, most first (ties: the older one). Joined pieces are
   /// one.

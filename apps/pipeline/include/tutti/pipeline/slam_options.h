@@ -37,6 +37,8 @@ struct SlamOptions {
   double loop_sigma_deg = 0.3;          ///< least standard deviation of a loop's rotation [deg]
   double loop_sigma_fraction = 0.01;    ///< of its translation, as a share of the median scene depth
   double loop_sigma_scale = 0.02;       ///< mono: of log(scale)
+  bool global_adjustment = true;        ///< after loops: what both ends see becomes one, and the whole map is
+                                        ///< adjusted beside the tracking
   bool odometry_pass =
       true;  ///< after loops moved the map: track the rest again without them, for
              ///< trajectory_odometry.txt; outside of the timings. false: it ends at the first correction

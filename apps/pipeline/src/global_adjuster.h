@@ -1,0 +1,34 @@
+// When the whole map is adjusted after loops, and when what comes of it enters.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "tutti/frontend/odometry.h"
+
+namespace tutti {
+
+/// One bundle adjustment of everything at a time, begun when loops have moved the map. Its result enters
+/// after a number of frames that depends on the map's size alone: whether it was ready before makes no
+/// difference.
+class GlobalAdjuster {
+ public:
+  /// Loops have moved the map: what is under way is of no use any more, and a new one begins.
+  void MapMoved(const Odometry& odometry, int piece, std::int64_t frame);
+  /// The map is no longer one that can be adjusted.
+  void Cancel();
+
+  /// True if there is one whose result should enter by this frame.
+  bool Due(std::int64_t frame) const { return running_ && frame >= due_; }
+  bool Running() const { return running_.has_value(); }
+  /// The one under way; nothing is under way then.
+  GlobalAdjustment Take();
+
+ private:
+  std::optional<GlobalAdjustment> running_;
+  std::int64_t due_ = 0;                     // number of frames
+  std::vector<GlobalAdjustment> cancelled_;  // they end by themselves
+};
+
+}  // namespace tutti

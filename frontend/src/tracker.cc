@@ -7,6 +7,11 @@
 #include "stopwatch.h"
 
 namespace tutti {
+namespace {
+// A reference keyframe from an earlier visit: so many keyframes before the newest, and so long ago [s].
+constexpr int kKeyframesApart = 10;
+constexpr double kSecondsApart = 10;
+}  // namespace
 
 Odometry::Impl::Impl(const OdometryOptions& o, const CameraRig& r)
     : options(o),
@@ -180,6 +185,10 @@ bool Odometry::Impl::NeedKeyframe(const TrackedFrame& frame, const FrameMatches&
   const bool moved = baseline > 0.02 * std::max(1e-6, map().MedianDepth(last_keyframe_));
   const bool due = frame.stamp_s - last.stamp_s > options.keyframe_max_interval_s && moved;
   if (early && !(very_weak && frames_since_keyframe_ >= 1)) return false;
+  // In a place seen before, after a loop, the map has the landmarks that come next already.
+  const bool known =
+      last_keyframe_ - reference_ > kKeyframesApart && frame.stamp_s - reference.stamp_s > kSecondsApart;
+  if (known) return very_weak || few_near;
   return weak || very_weak || due || few_near;
 }
 

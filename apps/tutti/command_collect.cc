@@ -9,8 +9,10 @@
 #include "commands.h"
 #include "comparison.h"
 #include "files.h"
+#include "run_with_report.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
+#include "tutti/report/page.h"
 
 namespace tutti::cli {
 namespace {
@@ -19,7 +21,7 @@ namespace fs = std::filesystem;
 
 struct CollectArguments {
   std::vector<std::string> runs;
-  std::string table_format = "text", json;
+  std::string table_format = "text", json, report;
 };
 
 /// The summary of a run's folder, or all summaries below a folder, in natural order of their paths.
@@ -44,6 +46,10 @@ void RunCollect(const CollectArguments& arguments) {
     for (const fs::path& file : Summaries(where)) comparison.runs.push_back(ReadRunFigures(file));
   }
   std::fputs(DescribeComparison(comparison, format).c_str(), stdout);
+  if (!arguments.report.empty()) {
+    if (!ReportsAvailable()) throw InputError("--report: " + ReportsMissing());
+    WriteComparisonReport(arguments.report, "tutti collect", comparison);
+  }
   if (!arguments.json.empty()) WriteText(arguments.json, ComparisonJson(comparison).dump(2) + "\n");
 }
 
@@ -57,6 +63,10 @@ void AddCollectCommand(CLI::App& app, int&) {
       ->required();
   AddTableFormatOption(*command, arguments->table_format);
   command->add_option("--json", arguments->json, "Write the table to this file");
+  command->add_option(
+      "--report", arguments->report,
+      "Write one page over all runs to this file (report.html); charts are of the first run of "
+      "each data set and variant");
   command->footer(
       "Runs are grouped by data set and by variant: odometry (run.loops: false), ensemble (loops.rule: "
       "mean), "

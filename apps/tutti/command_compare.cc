@@ -14,12 +14,14 @@
 #include "commands.h"
 #include "comparison.h"
 #include "files.h"
+#include "run_with_report.h"
 #include "tutti/core/error.h"
 #include "tutti/frontend/dataset.h"
 #include "tutti/pipeline/config.h"
 #include "tutti/pipeline/interrupt.h"
 #include "tutti/pipeline/outputs.h"
 #include "tutti/pipeline/runner.h"
+#include "tutti/report/page.h"
 
 namespace tutti::cli {
 namespace {
@@ -75,7 +77,7 @@ int RunApart(const RunRequest& request, const RunConfig& config) {
   if (child == 0) {
     int status = 2;
     try {
-      const RunResult result = RunSlam(request, config);
+      const RunResult result = RunWithReport(request, config);
       status = result.interrupted ? 130 : result.Void() ? 1 : 0;
     } catch (const std::exception& error) {
       std::fprintf(stderr, "tutti: %s\n", error.what());
@@ -137,7 +139,10 @@ int RunCompare(const CLI::App& command, const CompareArguments& arguments) {
   }
   WriteText(out / "comparison.json", ComparisonJson(comparison).dump(2) + "\n");
   WriteText(out / "comparison.md", DescribeComparison(comparison, TableFormat::kMarkdown));
+  WriteComparisonReport(out / "report.html", "tutti compare: " + arguments.dataset, comparison);
   std::fputs(DescribeComparison(comparison, format).c_str(), stdout);
+  if (ReportsAvailable()) std::printf("\n%s\n", (out / "report.html").c_str());
+  if (!ReportsAvailable()) std::fprintf(stderr, "tutti: %s\n", ReportsMissing().c_str());
   for (const RunFigures& run : comparison.runs) {
     if (!run.failure.empty()) return 1;
   }
@@ -152,7 +157,9 @@ void AddCompareCommand(CLI::App& app, int& exit_code) {
   const auto arguments = std::make_shared<CompareArguments>();
   command->add_option("--config", arguments->config, "YAML file, as for `tutti run`")->required();
   command->add_option("--dataset", arguments->dataset, "folder of the data set, or a video file")->required();
-  command->add_option("--out", arguments->out, "folder for all runs and for comparison.md and .json")
+  command
+      ->add_option("--out", arguments->out,
+                   "folder for all runs and for comparison.md, comparison.json and report.html")
       ->required();
   command
       ->add_option("--variants", arguments->variants,

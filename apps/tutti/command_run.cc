@@ -4,10 +4,12 @@
 #include <string>
 
 #include "commands.h"
+#include "run_with_report.h"
 #include "tutti/core/error.h"
 #include "tutti/pipeline/config.h"
 #include "tutti/pipeline/outputs.h"
 #include "tutti/pipeline/runner.h"
+#include "tutti/report/page.h"
 
 namespace tutti::cli {
 namespace {
@@ -15,7 +17,8 @@ namespace {
 struct RunArguments {
   std::string config, dataset, out, ground_truth;
   std::string trace;
-  bool no_loops = false, quiet = false, help_config = false, timing = false, realtime = false;
+  bool no_loops = false, no_report = false, quiet = false, help_config = false, timing = false,
+       realtime = false;
   std::uint64_t seed = 1;
   int threads = 2;
   std::int64_t max_frames = 0;
@@ -71,12 +74,15 @@ int Run(const CLI::App& command, const RunArguments& arguments) {
   if (command.count("--seed") > 0) request.seed = arguments.seed;
   if (command.count("--threads") > 0) request.threads = arguments.threads;
   if (command.count("--max-frames") > 0) request.max_frames = arguments.max_frames;
-  const RunResult result = RunSlam(request);
+  const RunConfig config = LoadConfig(request.config);
+  const RunResult result = arguments.no_report ? RunSlam(request, config) : RunWithReport(request, config);
   std::fputs(ResultTable(result).c_str(), stdout);
   if (arguments.timing) {
     std::fputs(TimingTable(result.stages, result.wall_s, result.cpu_s, result.frames_total).c_str(), stdout);
   }
   std::printf("\n  results are in %s\n", arguments.out.c_str());
+  if (!arguments.no_report && !arguments.quiet && !ReportsAvailable())
+    std::fprintf(stderr, "tutti: %s\n", ReportsMissing().c_str());
   return ExitCode(result, arguments.out);
 }
 
@@ -116,6 +122,7 @@ void AddRunCommand(CLI::App& app, int& exit_code) {
   command->add_option(
       "--trace", arguments->trace,
       "write the times of all stages to this file; open it in ui.perfetto.dev or chrome://tracing");
+  command->add_flag("--no-report", arguments->no_report, "no report.html and report.json");
   command->add_flag("--quiet", arguments->quiet, "no progress and no notes");
   command->add_flag("--help-config", arguments->help_config,
                     "print all keys of the configuration with their defaults");

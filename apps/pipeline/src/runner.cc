@@ -81,6 +81,13 @@ Trajectory BodyTrajectory(Trajectory trajectory, const CameraRig& rig) {
   return trajectory;
 }
 
+// The detector's posteriors are kept where somebody looks at them; they decide nothing.
+RunConfig Watched(RunConfig config, const RunRequest& request) {
+  for (const auto& observer : request.observers)
+    config.loops.keep_posterior = config.loops.keep_posterior || observer->WantsPosteriors();
+  return config;
+}
+
 /// One run from its first frame to its last.
 class Run {
  public:
@@ -89,7 +96,10 @@ class Run {
         config_(config),
         dataset_(dataset),
         result_(result),
-        slam_(config, dataset.Rig(), Recorder()) {
+        slam_(Watched(config, request), dataset.Rig(), Recorder()) {
+    slam_.SetDetectionListener([this](const LoopResult& detection) {
+      for (const auto& observer : request_.observers) observer->OnDetection(detection);
+    });
     total_ = dataset.FrameSupply() == Supply::kStored ? dataset.Size() : static_cast<std::size_t>(-1);
     if (request.max_frames) total_ = std::min(total_, static_cast<std::size_t>(*request.max_frames));
     result_.realtime = request.realtime;
@@ -121,6 +131,7 @@ class Run {
     }
     result_.interrupted = InterruptGuard::Requested();
     slam_.Finish();
+    for (const auto& observer : request_.observers) observer->OnEnd(slam_);
     NoteWarnings(progress);
     progress.Finish();
     if (result_.interrupted) {
@@ -252,6 +263,7 @@ class Run {
     const Clock::time_point begin = Clock::now();
     const TrackResult track = slam_.Track(frame);
     result_.frame_ms.push_back(1e3 * Seconds(begin));
+    for (const auto& observer : request_.observers) observer->OnFrame(frame, track, slam_);
     state_ = slam_.AppearanceOnly() ? "appearance only" : ToString(track.state);
     if (slam_.AppearanceOnly() || track.state == TrackingState::kTracking) {
       lost_open_ = false;

@@ -79,6 +79,7 @@ class SlamSystem::Impl {
   std::optional<Odometry> odometry_, untouched_;
   std::vector<std::string> warnings_;  // not taken yet
   std::int64_t untouched_last_ = -1;
+  std::function<void(const LoopResult&)> on_detection_;  // may be empty
   std::vector<LoopRecord> records_;
   int corrections_ = 0;
   std::size_t relocalized_ = 0;  // frames that were lost, and found by the detector
@@ -179,6 +180,7 @@ class SlamSystem::Impl {
   void Deliver() {
     submitted_.pop_front();
     const LoopResult result = worker_->Take();
+    if (on_detection_) on_detection_(result);
     for (const auto& [name, ms] : LoopStages(result)) stages_[std::string("loop_") + name] += ms;
     if (!result.warning.empty() && result.warning != loop_warning_) {
       loop_warning_ = result.warning;
@@ -340,6 +342,10 @@ class SlamSystem::Impl {
 SlamSystem::SlamSystem(const RunConfig& config, const CameraRig& rig, SpanRecorder* recorder)
     : impl_(std::make_unique<Impl>(config, rig, recorder)) {}
 SlamSystem::~SlamSystem() = default;
+
+void SlamSystem::SetDetectionListener(std::function<void(const LoopResult&)> listener) {
+  impl_->on_detection_ = std::move(listener);
+}
 
 TrackResult SlamSystem::Track(const InputFrame& frame) { return impl_->Track(frame); }
 void SlamSystem::Finish() { impl_->Finish(); }

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -16,6 +17,7 @@
 #include "tutti/backend/pose_graph.h"
 #include "tutti/core/span_recorder.h"
 #include "tutti/frontend/odometry.h"
+#include "tutti/loopclosure/detector.h"
 #include "tutti/pipeline/config.h"
 #include "tutti/pipeline/loop_record.h"
 
@@ -33,6 +35,9 @@ class SlamSystem {
   ~SlamSystem();
   SlamSystem(const SlamSystem&) = delete;
   SlamSystem& operator=(const SlamSystem&) = delete;
+
+  /// Calls `listener` with each answer of the loop detector, before it enters; from Track() and Finish().
+  void SetDetectionListener(std::function<void(const LoopResult&)> listener);
 
   /// Tracks the next frame and brings in the loops that are due. Never throws for hard images.
   TrackResult Track(const InputFrame& frame);

@@ -1,0 +1,28 @@
+// A window into a run: the report, the live view and the comparison's shared odometry look through it.
+#pragma once
+
+#include "tutti/frontend/frame.h"
+#include "tutti/frontend/odometry.h"
+#include "tutti/loopclosure/detector.h"
+#include "tutti/pipeline/slam_system.h"
+
+namespace tutti {
+
+/// Watches a run and changes nothing. All calls come from the thread that tracks, which waits for them; what
+/// takes long belongs on another thread. What is passed is valid during the call alone; images may be kept
+/// (they are never written to again).
+class RunObserver {
+ public:
+  virtual ~RunObserver() = default;
+  /// True: OnDetection gets posterior_by_location, which costs O(locations) per image.
+  virtual bool WantsPosteriors() const { return false; }
+  /// After each frame that could be read.
+  virtual void OnFrame(const InputFrame& /*frame*/, const TrackResult& /*track*/,
+                       const SlamSystem& /*slam*/) {}
+  /// Each answer of the loop detector, in the order of the queries, before the frame in which it enters.
+  virtual void OnDetection(const LoopResult& /*result*/) {}
+  /// After the last frame, when all loops are in.
+  virtual void OnEnd(const SlamSystem& /*slam*/) {}
+};
+
+}  // namespace tutti

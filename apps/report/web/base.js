@@ -81,6 +81,7 @@ function layoutOf(title, more = {}) {
     font: { color: css('--ink'), family: 'system-ui, sans-serif', size: narrow() ? 11 : 12 },
     margin: { l: narrow() ? 44 : 60, r: 14, t: 40, b: 46 },
     legend: { orientation: 'h', y: -0.18, yanchor: 'top', x: 0, bgcolor: 'rgba(0,0,0,0)' },
+    modebar: { bgcolor: 'rgba(0,0,0,0)', color: css('--faint'), activecolor: css('--accent') },
     hoverlabel: { bgcolor: css('--raised'), bordercolor: css('--line'), font: { color: css('--ink') } },
     ...more,
   };
@@ -90,8 +91,10 @@ function layoutOf(title, more = {}) {
 async function chart(parent, size, traces, layout) {
   const div = el('div', { class: `chart ${size}` });
   parent.append(div);
-  const config = { responsive: true, displaylogo: false, scrollZoom: true,
-    modeBarButtonsToRemove: ['select2d', 'lasso2d', 'autoScale2d'] };
+  const buttons = layout.scene ? ['toImage', 'orbitRotation', 'pan3d', 'resetCameraDefault3d']
+    : ['toImage', 'zoom2d', 'pan2d', 'resetScale2d'];
+  const config = { responsive: true, displaylogo: false, scrollZoom: true, displayModeBar: narrow() ? false : 'hover',
+    modeBarButtons: [buttons] };
   try {
     await Plotly.newPlot(div, traces, layout, config);
     div.dataset.drawn = '1';

@@ -56,13 +56,13 @@ async function drawRecall(panel) {
   panel.append(note(`${pr.rows_with_loop} of ${pr.images} images have a loop (${pr.rule}). Discs: at the default threshold.`));
 }
 
+// Square roots of the posterior, as they are stored: small ones stay visible.
 function unpackMap(map, cells) {
   const bytes = atob(map.q), rows = [];
   for (let r = 0; r < cells; ++r) {
     const row = new Array(cells);
     for (let c = 0; c < cells; ++c) {
-      const v = bytes.charCodeAt(r * cells + c) / 255;
-      row[c] = v * v;
+      row[c] = bytes.charCodeAt(r * cells + c) / 255;
     }
     rows.push(row);
   }
@@ -88,13 +88,18 @@ async function drawPosterior(panel) {
     ...p.hypotheses.map((h) => ({ type: 'scatter', mode: 'lines', x: p.hypothesis_t, y: h.h, name: label(h.name), line: lineOf(h.name) })),
     { type: 'scatter', mode: 'lines', x: [0, p.hypothesis_t.at(-1)], y: [p.threshold, p.threshold], name: `threshold ${p.threshold}`,
       line: { color: css('--faint'), dash: 'dot', width: 1.5 } },
-  ], layoutOf('Hypothesis: 1 - p(new place)', { xaxis: axis('time [s]'), yaxis: axis('H', { range: [0, 1.02] }), hovermode: 'x unified' }));
+  ], layoutOf('Hypothesis: 1 - p(new place)', { xaxis: axis('time [s]'), yaxis: axis('H', { rangemode: 'tozero' }), hovermode: 'x unified' }));
   const grid = el('div', { class: 'pair' });
   panel.append(grid);
   const marks = loopMarks(run, p);
-  for (const map of p.maps) {
-    const heat = { type: 'heatmap', x: p.t, y: p.t, z: unpackMap(map, p.cells), colorscale: 'Cividis', zmin: 0, zmax: 1,
-      colorbar: { thickness: 10, title: { text: 'p', side: 'top' } }, hovertemplate: 'at %{x:.1f} s: place of %{y:.1f} s, p = %{z:.3f}<extra></extra>' };
+  const roots = p.maps.map((map) => unpackMap(map, p.cells));
+  const largest = Math.max(0.05, ...roots.flat().map((row) => Math.max(...row)));
+  const ticks = [0.001, 0.01, 0.03, 0.1, 0.3, 1].filter((v) => Math.sqrt(v) <= largest);
+  for (const [k, map] of p.maps.entries()) {
+    const heat = { type: 'heatmap', x: p.t, y: p.t, z: roots[k], colorscale: 'Cividis', zmin: 0, zmax: largest,
+      customdata: roots[k].map((row) => row.map((v) => v * v)),
+      colorbar: { thickness: 10, title: { text: 'p', side: 'top' }, tickvals: ticks.map(Math.sqrt), ticktext: ticks.map(String) },
+      hovertemplate: 'at %{x:.1f} s: place of %{y:.1f} s, p = %{customdata:.4f}<extra></extra>' };
     await chart(grid, '', [heat, ...(map.name === 'ensemble' ? marks : [])], layoutOf(`Posterior: ${map.name}`,
       { xaxis: axis('time of the image [s]'), yaxis: axis('time of the place [s]'), showlegend: map.name === 'ensemble' && marks.length > 0 }));
   }

@@ -80,7 +80,7 @@ async function drawTop(panel) {
     line: lineOf(line.name, line.width), hovertemplate: '%{x:.2f}, %{y:.2f}' }));
   traces.push(...edgeTraces(run, make));
   // Cameras look along z with y down: from above, x is right and z ahead.
-  const layout = layoutOf(`From above, along ${AXES[up]}`, {
+  const layout = layoutOf(`Top view, along ${AXES[up]}`, {
     xaxis: axis(`${AXES[right]} [${run.unit}]`),
     yaxis: axis(`${AXES[ahead]} [${run.unit}]`, { scaleanchor: 'x', scaleratio: 1 }),
     dragmode: 'pan',
@@ -103,13 +103,14 @@ async function draw3d(panel) {
   if (!run.slam.x.length) return panel.append(note('No trajectory: without a calibration there are loops alone.'));
   const { up } = planeOf(mainPath());
   const make = (points) => ({ type: 'scatter3d', x: points[0], y: points[1], z: points[2] });
-  make.size = 3;
+  make.size = 4;
   const traces = paths().map((line) => ({ ...make(AXES.map((a) => line.path[a])), mode: 'lines', name: label(line.name),
     line: lineOf(line.name, line.width + 2), hovertemplate: '%{x:.2f}, %{y:.2f}, %{z:.2f}' }));
   traces.push(...edgeTraces(run, make));
   const sign = up === 1 ? -1 : 1;  // a camera's y points down
-  const eye = [1.1, 1.1, 1.1];
-  eye[up] = 1.3 * sign;
+  const away = narrow() ? 2 : 1.3;
+  const eye = [away, away, away];
+  eye[up] = (away + 0.2) * sign;
   const vector = (v) => ({ x: v[0], y: v[1], z: v[2] });
   const scene = { aspectmode: 'data', camera: { up: vector([0, 1, 2].map((k) => (k === up ? sign : 0))), eye: vector(eye) } };
   for (const a of AXES) {

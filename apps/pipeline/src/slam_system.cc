@@ -43,8 +43,22 @@ class SlamSystem::Impl {
       worker_ = std::make_unique<LoopWorker>(DetectorOptions(config), config.run.threads > 1, recorder);
   }
 
+  void TakeOver(const Odometry& tracked, const std::map<int, KeyframeView>& views) {
+    odometry_ = tracked;
+    views_ = &views;
+    for (const int id : odometry_->KeyframeIds()) graph_.AddKeyframe(id, odometry_->KeyframePiece(id));
+  }
+
+  void Replay(const InputFrame& frame, int keyframe, std::int64_t frames) {
+    frames_ = frames - 1;
+    DeliverDue();
+    ++frames_;
+    last_frame_ = frame.index;
+    if (worker_) Submit(frame, keyframe);
+  }
+
   TrackResult Track(const InputFrame& frame) {
-    while (!submitted_.empty() && submitted_.front().due <= frames_) Deliver();
+    DeliverDue();
     ++frames_;
     TrackResult result;
     if (odometry_) {
@@ -101,6 +115,15 @@ class SlamSystem::Impl {
     std::int64_t frame = 0;
   };
 
+  void DeliverDue() {
+    while (!submitted_.empty() && submitted_.front().due <= frames_) Deliver();
+  }
+
+  // As the keyframe was when it was new.
+  KeyframeView ViewOf(int keyframe) const {
+    return views_ != nullptr ? views_->at(keyframe) : odometry_->Keyframe(keyframe);
+  }
+
   // Before the detector changes anything: what the odometry alone would have done starts here.
   void KeepUntouched() {
     if (untouched_) return;
@@ -150,7 +173,7 @@ class SlamSystem::Impl {
     query.image = frame.image;
     query.depth_m = frame.depth_m;
     if (odometry_) {
-      KeyframeView view = odometry_->Keyframe(keyframe);
+      KeyframeView view = ViewOf(keyframe);
       query.camera = rig_.camera;
       query.features = {std::move(view.keypoints), std::move(view.descriptors), std::move(view.points)};
       keyframe_of_frame_[frame.index] = keyframe;
@@ -320,6 +343,7 @@ class SlamSystem::Impl {
     ++corrections_;
   }
 
+  const std::map<int, KeyframeView>* views_ = nullptr;  // of a complete odometry
   SpanRecorder* recorder_;
   SlamOptions options_;
   CameraRig rig_;
@@ -341,6 +365,11 @@ class SlamSystem::Impl {
 
 SlamSystem::SlamSystem(const RunConfig& config, const CameraRig& rig, SpanRecorder* recorder)
     : impl_(std::make_unique<Impl>(config, rig, recorder)) {}
+SlamSystem::SlamSystem(const RunConfig& config, const CameraRig& rig, const Odometry& tracked,
+                       const std::map<int, KeyframeView>& views)
+    : impl_(std::make_unique<Impl>(config, rig, nullptr)) {
+  impl_->TakeOver(tracked, views);
+}
 SlamSystem::~SlamSystem() = default;
 
 void SlamSystem::SetDetectionListener(std::function<void(const LoopResult&)> listener) {
@@ -348,6 +377,9 @@ void SlamSystem::SetDetectionListener(std::function<void(const LoopResult&)> lis
 }
 
 TrackResult SlamSystem::Track(const InputFrame& frame) { return impl_->Track(frame); }
+void SlamSystem::Replay(const InputFrame& frame, int keyframe, std::int64_t frames) {
+  impl_->Replay(frame, keyframe, frames);
+}
 void SlamSystem::Finish() { impl_->Finish(); }
 bool SlamSystem::AppearanceOnly() const { return !impl_->odometry_; }
 const Odometry* SlamSystem::odometry() const { return impl_->odometry_ ? &*impl_->odometry_ : nullptr; }

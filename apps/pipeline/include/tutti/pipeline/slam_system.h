@@ -32,6 +32,11 @@ class SlamSystem {
   /// Throws InputError if the configuration does not fit the rig. `recorder` gets the time of each stage; it
   /// must outlive this object; null: nothing is recorded.
   SlamSystem(const RunConfig& config, const CameraRig& rig, SpanRecorder* recorder = nullptr);
+  /// Loop closure on an odometry that is complete (shared_odometry.h): Replay() takes the place of Track(),
+  /// and the loops move `tracked`, but no tracking goes on from there. `views`: the keyframes as the detector
+  /// is to see them, by id; must outlive this object.
+  SlamSystem(const RunConfig& config, const CameraRig& rig, const Odometry& tracked,
+             const std::map<int, KeyframeView>& views);
   ~SlamSystem();
   SlamSystem(const SlamSystem&) = delete;
   SlamSystem& operator=(const SlamSystem&) = delete;
@@ -41,6 +46,9 @@ class SlamSystem {
 
   /// Tracks the next frame and brings in the loops that are due. Never throws for hard images.
   TrackResult Track(const InputFrame& frame);
+  /// The frame that became this keyframe, again; `frames`: read up to and with it. Only after the constructor
+  /// with a complete odometry, in the order of the keyframes.
+  void Replay(const InputFrame& frame, int keyframe, std::int64_t frames);
   /// After the last frame: brings in the loops that are still on their way.
   void Finish();
 

@@ -50,6 +50,7 @@ class Run {
   }
 
   void TrackAll() {
+    for (const auto& observer : request_.observers) observer->OnStart(result_.rig);
     const Clock::time_point begin = Clock::now();
     const double cpu_begin = ProcessCpuSeconds();
     Progress progress(config_.run.loops ? "slam" : "odometry",

@@ -61,6 +61,7 @@ RunResult CloseLoops(const TrackedSequence& tracked, const RunRequest& request, 
   slam.SetDetectionListener([&request](const LoopResult& detection) {
     for (const auto& observer : request.observers) observer->OnDetection(detection);
   });
+  for (const auto& observer : request.observers) observer->OnStart(result.rig);
   Progress progress("loops", tracked.keyframes.size(), request.quiet ? nullptr : stderr);
   for (std::size_t k = 0; k < tracked.keyframes.size() && !InterruptGuard::Requested(); ++k) {
     const TrackedSequence::Keyframe& keyframe = tracked.keyframes[k];

@@ -12,6 +12,7 @@
 
 #include "tutti/loopclosure/ground_truth.h"
 #include "tutti/pipeline/run_result.h"
+#include "tutti/report/base64.h"
 #include "tutti/report/detection_log.h"
 
 namespace tutti::report {
@@ -71,7 +72,5 @@ Json GalleryJson(const RunResult& result, const std::vector<ShownLoop>& loops);
 Json TimingJson(const RunResult& result);
 /// Sections of the configuration, and what the program was built with.
 Json ConfigurationJson(const RunResult& result);
-
-std::string Base64(const void* bytes, std::size_t size);
 
 }  // namespace tutti::report

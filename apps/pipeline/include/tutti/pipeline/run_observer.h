@@ -8,7 +8,7 @@
 
 namespace tutti {
 
-/// Watches a run and changes nothing. All calls come from the thread that tracks, which waits for them; what
+/// Watches a run and changes nothing (it may hold it up, as a pause does). All calls come from the thread that tracks, which waits for them; what
 /// takes long belongs on another thread. What is passed is valid during the call alone; images may be kept
 /// (they are never written to again).
 class RunObserver {
@@ -16,6 +16,8 @@ class RunObserver {
   virtual ~RunObserver() = default;
   /// True: OnDetection gets posterior_by_location, which costs O(locations) per image.
   virtual bool WantsPosteriors() const { return false; }
+  /// Before the first frame.
+  virtual void OnStart(const CameraRig& /*rig*/) {}
   /// After each frame that could be read.
   virtual void OnFrame(const InputFrame& /*frame*/, const TrackResult& /*track*/,
                        const SlamSystem& /*slam*/) {}

@@ -10,6 +10,7 @@
 #include "tutti/pipeline/outputs.h"
 #include "tutti/pipeline/runner.h"
 #include "tutti/report/page.h"
+#include "tutti/view/live_view.h"
 
 namespace tutti::cli {
 namespace {
@@ -23,10 +24,20 @@ struct RunArguments {
   int threads = 2;
   std::int64_t max_frames = 0;
   double follow_s = 10;
+  bool view = false;
+  LiveViewOptions live;
 };
 
 void Require(const std::string& value, const char* option, const char* what) {
   if (value.empty()) throw InputError(std::string("run: ") + option + " is missing; it names " + what);
+}
+
+std::shared_ptr<LiveView> StartView(const LiveViewOptions& options) {
+  const std::string problem = options.Validate();
+  if (!problem.empty()) throw InputError("--view: " + problem);
+  auto view = std::make_shared<LiveView>(options);
+  std::fprintf(stderr, "tutti: look at %s\n", view->Url().c_str());
+  return view;
 }
 
 // 130: ended by Ctrl-C, as shells say it; 1: no frame has a pose.
@@ -75,6 +86,8 @@ int Run(const CLI::App& command, const RunArguments& arguments) {
   if (command.count("--threads") > 0) request.threads = arguments.threads;
   if (command.count("--max-frames") > 0) request.max_frames = arguments.max_frames;
   const RunConfig config = LoadConfig(request.config);
+  const bool view = arguments.view || command.count("--view-address") > 0;
+  if (view) request.observers.push_back(StartView(arguments.live));
   const RunResult result = arguments.no_report ? RunSlam(request, config) : RunWithReport(request, config);
   std::fputs(ResultTable(result).c_str(), stdout);
   if (arguments.timing) {
@@ -117,6 +130,20 @@ void AddRunCommand(CLI::App& app, int& exit_code) {
       "--realtime", arguments->realtime,
       "play by the time stamps and drop the frames that it can't follow; without it every frame is "
       "processed, and the result does not depend on the machine's speed");
+  command->add_flag(
+      "--view", arguments->view,
+      "serve a page to look at the run while it goes on, at 127.0.0.1 (through a tunnel: ssh -L "
+      "8077:127.0.0.1:8077 robot)");
+  command->add_option("--view-port", arguments->live.port, "of that page; 0: any free one")
+      ->capture_default_str();
+  command->add_option(
+      "--view-address", arguments->live.address,
+      "serve it at this address of the machine (0.0.0.0: all); the address that is printed has a "
+      "token, without which nothing is answered");
+  command
+      ->add_option("--view-wait", arguments->live.idle_s,
+                   "wait at most this long for a browser before the first frame [s]")
+      ->capture_default_str();
   command->add_flag("--timing", arguments->timing,
                     "print how long each stage took: calls, median, p99, total, share");
   command->add_option(

@@ -40,8 +40,8 @@ Json TracksJson(const LiveFrame& frame, const CameraRig& rig, double scale) {
 }
 
 Json FrameJson(const LiveFrame& frame, const CameraRig& rig) {
-  Json json = {{"index", frame.index},       {"stamp", frame.stamp_s},     {"state", frame.state},
-               {"reason", frame.reason},     {"features", frame.features}, {"inliers", frame.inliers},
+  Json json = {{"index", frame.index},   {"stamp", frame.stamp_s},     {"state", frame.state},
+               {"reason", frame.reason}, {"features", frame.features}, {"inliers", frame.inliers},
                {"number", frame.number}};
   if (frame.posed) json["position"] = Position(frame.T_world_camera.translation);
   if (frame.image.empty()) return json;
@@ -80,7 +80,8 @@ std::string LiveMessage(const LiveNews& news, const CameraRig& rig) {
     Json e = {{"text", event.text}};
     if (event.query >= 0) {
       e["query"] = event.query;
-      for (const auto& [name, h] : event.opinions) e["h"][name] = std::isfinite(h) ? Json(Short(h, 1e4)) : Json();
+      for (const auto& [name, h] : event.opinions)
+        e["h"][name] = std::isfinite(h) ? Json(Short(h, 1e4)) : Json();
     }
     json["events"].push_back(e);
   }

@@ -17,7 +17,8 @@ double Now() {
 std::vector<LivePlace> PlacesOf(const Odometry& odometry) {
   std::vector<LivePlace> places;
   for (const int id : odometry.KeyframeIds()) {
-    places.push_back({id, odometry.KeyframeFrameIndex(id), odometry.KeyframePiece(id), odometry.KeyframePose(id)});
+    places.push_back(
+        {id, odometry.KeyframeFrameIndex(id), odometry.KeyframePiece(id), odometry.KeyframePose(id)});
   }
   return places;
 }
@@ -100,7 +101,8 @@ void LiveState::SetFrame(const InputFrame& frame, const TrackResult& track, cons
   }
   if (corrected) Log("frame " + std::to_string(frame.index) + ": the loops moved the map");
   if (next.state != state_seen_)
-    Log("frame " + std::to_string(frame.index) + ": " + next.state + (next.reason.empty() ? "" : ": " + next.reason));
+    Log("frame " + std::to_string(frame.index) + ": " + next.state +
+        (next.reason.empty() ? "" : ": " + next.reason));
   loops_seen_ = slam.loops().size();
   accepted_seen_ = accepted;
   corrections_seen_ = slam.Corrections();
@@ -125,14 +127,16 @@ void LiveState::AddDetection(const LoopResult& result) {
     event.opinions.emplace_back(member.name, member.took_part ? member.hypothesis : std::nan(""));
   event.opinions.emplace_back("ensemble", result.hypothesis);
   if (result.proposed) {
-    const std::string place = std::to_string(
-        result.verification.candidate >= 0 ? result.verification.candidate : result.candidate);
+    const std::string place =
+        std::to_string(result.verification.candidate >= 0 ? result.verification.candidate : result.candidate);
     char text[120];
-    std::snprintf(text, sizeof text, "frame %ld: H = %.3f, ", static_cast<long>(result.query), result.hypothesis);
-    event.text = text + (result.accepted ? "verified as the place of frame " + place + ", " +
-                                               std::to_string(result.verification.inliers) + " inliers"
-                                         : "not frame " + place + ": " +
-                                               (result.reason.empty() ? result.verification.reason : result.reason));
+    std::snprintf(text, sizeof text, "frame %ld: H = %.3f, ", static_cast<long>(result.query),
+                  result.hypothesis);
+    event.text =
+        text + (result.accepted ? "verified as the place of frame " + place + ", " +
+                                      std::to_string(result.verification.inliers) + " inliers"
+                                : "not frame " + place + ": " +
+                                      (result.reason.empty() ? result.verification.reason : result.reason));
   }
   const std::lock_guard<std::mutex> lock(mutex_);
   AddEvent(std::move(event));
@@ -207,9 +211,8 @@ void LiveState::Step() {
 
 bool LiveState::WaitForNews(LiveCursor* cursor, double seconds, LiveNews* news) {
   std::unique_lock<std::mutex> lock(mutex_);
-  const bool there =
-      changed_.wait_for(lock, std::chrono::duration<double>(seconds),
-                        [&] { return closed_ || now_.version > cursor->version; });
+  const bool there = changed_.wait_for(lock, std::chrono::duration<double>(seconds),
+                                       [&] { return closed_ || now_.version > cursor->version; });
   if (closed_ || !there) return false;
   *news = now_;
   if (!news->places) news->places = std::make_shared<const std::vector<LivePlace>>();

@@ -87,8 +87,8 @@ class LiveState {
   void AddDetection(const LoopResult& result);
   void Log(const std::string& text);
   void Finish();
-  /// Returns when the run may go on: it is not paused, a step was asked for, nobody has looked for `abandoned_s`
-  /// (then it is no longer paused), or the run is interrupted.
+  /// Returns when the run may go on: it is not paused, a step was asked for, nobody has looked for
+  /// `abandoned_s` (then it is no longer paused), or the run is interrupted.
   void WaitWhilePaused(double abandoned_s);
   /// Waits until somebody looks, at most so long.
   void WaitForViewer(double seconds);

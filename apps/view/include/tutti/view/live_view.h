@@ -25,12 +25,12 @@ bool LiveViewAvailable();
 /// newest state here; images are encoded and sent by the server's threads, and what a browser is too slow for
 /// is left out. Pausing holds the run up as long as somebody looks.
 ///
-/// Loopback: requests must name localhost (no other site's page can be made to ask), and commands need a header
-/// that other sites can't send. Elsewhere: everything needs a random token of 128 bits.
+/// Loopback: requests must name localhost (no other site's page can be made to ask), and commands need a
+/// header that other sites can't send. Elsewhere: everything needs a random token of 128 bits.
 class LiveView : public RunObserver {
  public:
-  /// Listens from now on. Throws InputError if the address or the port can't be used, or tutti was built without
-  /// cpp-httplib.
+  /// Listens from now on. Throws InputError if the address or the port can't be used, or tutti was built
+  /// without cpp-httplib.
   explicit LiveView(const LiveViewOptions& options);
   ~LiveView() override;
   LiveView(const LiveView&) = delete;

@@ -51,7 +51,7 @@ function fit(canvas, places) {
     low = Math.min(low, p[2]); high = Math.max(high, p[2]);
   }
   if (!(right >= left)) return { x: 0, z: 0, scale: 50 };
-  const scale = 0.85 * Math.min(canvas.width / Math.max(right - left, 1e-3), canvas.height / Math.max(high - low, 1e-3), canvas.width / 0.5);
+  const scale = 0.65 * Math.min(canvas.width / Math.max(right - left, 1e-3), canvas.height / Math.max(high - low, 1e-3), canvas.width / 0.5);
   return { x: (left + right) / 2, z: (low + high) / 2, scale };
 }
 

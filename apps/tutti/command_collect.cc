@@ -22,6 +22,7 @@ namespace fs = std::filesystem;
 struct CollectArguments {
   std::vector<std::string> runs;
   std::string table_format = "text", json, report;
+  bool by_folder = false;
 };
 
 /// The summary of a run's folder, or all summaries below a folder, in natural order of their paths.
@@ -39,11 +40,20 @@ std::vector<fs::path> Summaries(const std::string& where) {
   return {files.begin(), files.end()};
 }
 
+// The folder that the run's folder lies in: a sweep has runs/data set/configuration/seed_1/summary.json.
+std::string FolderAbove(const fs::path& summary) {
+  const fs::path run = fs::absolute(summary).parent_path();
+  return run.parent_path().filename().string();
+}
+
 void RunCollect(const CollectArguments& arguments) {
   const TableFormat format = ParseTableFormat(arguments.table_format);
   Comparison comparison;
   for (const std::string& where : arguments.runs) {
-    for (const fs::path& file : Summaries(where)) comparison.runs.push_back(ReadRunFigures(file));
+    for (const fs::path& file : Summaries(where)) {
+      comparison.runs.push_back(ReadRunFigures(file));
+      if (arguments.by_folder) comparison.runs.back().variant = FolderAbove(file);
+    }
   }
   std::fputs(DescribeComparison(comparison, format).c_str(), stdout);
   if (!arguments.report.empty()) {
@@ -61,6 +71,8 @@ void AddCollectCommand(CLI::App& app, int&) {
   command
       ->add_option("runs", arguments->runs, "Folders of runs, folders of such folders, or summary.json files")
       ->required();
+  command->add_flag("--by-folder", arguments->by_folder,
+                    "a run's variant is the name of the folder above its own (CONFIGURATION/seed_1)");
   AddTableFormatOption(*command, arguments->table_format);
   command->add_option("--json", arguments->json, "Write the table to this file");
   command->add_option(

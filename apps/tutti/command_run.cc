@@ -2,6 +2,7 @@
 #include <cstdio>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "commands.h"
 #include "run_with_report.h"
@@ -18,6 +19,7 @@ namespace {
 struct RunArguments {
   std::string config, dataset, out, ground_truth;
   std::string trace;
+  std::vector<std::string> set;  // key=value, keys of the section `loops`
   bool no_loops = false, no_report = false, quiet = false, help_config = false, timing = false,
        realtime = false;
   std::uint64_t seed = 1;
@@ -85,7 +87,8 @@ int Run(const CLI::App& command, const RunArguments& arguments) {
   if (command.count("--seed") > 0) request.seed = arguments.seed;
   if (command.count("--threads") > 0) request.threads = arguments.threads;
   if (command.count("--max-frames") > 0) request.max_frames = arguments.max_frames;
-  const RunConfig config = LoadConfig(request.config);
+  RunConfig config = LoadConfig(request.config);
+  SetLoopOptions(arguments.set, config.loops);
   const bool view = arguments.view || command.count("--view-address") > 0;
   if (view) request.observers.push_back(StartView(arguments.live));
   const RunResult result = arguments.no_report ? RunSlam(request, config) : RunWithReport(request, config);
@@ -114,6 +117,10 @@ void AddRunCommand(CLI::App& app, int& exit_code) {
   command->add_option(
       "--ground-truth", arguments->ground_truth,
       "trajectory to evaluate against (default: the data set's own, if it has one; 'none': don't)");
+  command->add_option(
+      "--set", arguments->set,
+      "key=value: a key of the configuration's section `loops`, on top of the file (rule=orb, "
+      "stm_size=20); may be given several times");
   command->add_flag("--no-loops", arguments->no_loops, "odometry alone");
   command->add_option("--seed", arguments->seed, "of everything that draws random numbers");
   command->add_option("--threads", arguments->threads, "most threads; the result is the same for any number");

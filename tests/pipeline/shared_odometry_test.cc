@@ -67,7 +67,7 @@ class SharedOdometry : public ::testing::Test {
     std::ifstream in(file);
     return {std::istreambuf_iterator<char>(in), {}};
   }
-  // The lines of loops.csv up to the image with which the map first moved, without what the map says of them.
+  // The lines of loops.csv up to the image that was the first to be measured against the map.
   static std::vector<std::string> Proposals(const RunResult& result, std::int64_t before) {
     std::vector<std::string> out;
     for (const LoopRecord& loop : result.loops) {
@@ -99,14 +99,14 @@ TEST_F(SharedOdometry, LoopsMoveTheMapAndLeaveTheOdometryAlone) {
   EXPECT_TRUE(fs::exists(folder_ / "ensemble" / "loops.csv"));
 }
 
-TEST_F(SharedOdometry, UntilTheMapFirstMovesTheDetectorAnswersAsInARunOfItsOwn) {
+TEST_F(SharedOdometry, UntilTheFirstVerifiedLoopTheDetectorAnswersAsInARunOfItsOwn) {
   const TrackedSequence tracked = TrackSequence(Request("odometry"), Config());
   const RunResult closed = CloseLoops(tracked, Request("shared"), Config());
   const RunResult apart = RunSlam(Request("apart"), Config());
   EXPECT_EQ(Text(apart.trajectory_odometry, folder_ / "a"), Text(tracked.result.trajectory, folder_ / "b"));
   std::int64_t first = -1;
   for (const LoopRecord& loop : apart.loops) {
-    if (loop.accepted && first < 0) first = loop.query + 1;
+    if (loop.verified && first < 0) first = loop.query + 1;
   }
   ASSERT_GT(first, 0);
   const std::vector<std::string> proposals = Proposals(apart, first);

@@ -41,6 +41,11 @@ class Run {
     slam_.SetDetectionListener([this](const LoopResult& detection) {
       for (const auto& observer : request_.observers) observer->OnDetection(detection);
     });
+    if (!request.observers.empty()) {
+      slam_.SetKeyframeListener([this](const InputFrame& frame, int keyframe) {
+        for (const auto& observer : request_.observers) observer->OnKeyframe(frame, keyframe, slam_);
+      });
+    }
     total_ = dataset.FrameSupply() == Supply::kStored ? dataset.Size() : static_cast<std::size_t>(-1);
     if (request.max_frames) total_ = std::min(total_, static_cast<std::size_t>(*request.max_frames));
     result_.realtime = request.realtime;

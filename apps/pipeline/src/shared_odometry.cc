@@ -17,11 +17,11 @@ namespace {
 class SequenceRecorder : public RunObserver {
  public:
   explicit SequenceRecorder(TrackedSequence& sequence) : sequence_(sequence) {}
-  void OnFrame(const InputFrame& frame, const TrackResult& track, const SlamSystem& slam) override {
-    ++frames_;
-    if (track.keyframe < 0) return;
-    sequence_.keyframes.push_back({track.keyframe, frame.index, frames_});
-    sequence_.views[track.keyframe] = slam.odometry()->Keyframe(track.keyframe);
+  void OnFrame(const InputFrame&, const TrackResult&, const SlamSystem&) override { ++frames_; }
+  void OnKeyframe(const InputFrame& frame, int keyframe, const SlamSystem& slam) override {
+    // Called before the OnFrame of the frame that is being tracked.
+    sequence_.keyframes.push_back({keyframe, frame.index, frames_ + 1});
+    sequence_.views[keyframe] = slam.odometry()->Keyframe(keyframe);
   }
   void OnEnd(const SlamSystem& slam) override {
     if (slam.odometry() != nullptr) sequence_.odometry = std::make_shared<const Odometry>(*slam.odometry());

@@ -70,16 +70,16 @@ class SlamSystem::Impl {
     } else {
       result.reason = "no calibration";
     }
-    if (!worker_) return result;
+    if (!worker_ && !on_keyframe_) return result;
     if (result.keyframe >= 0) unmapped_[result.keyframe] = frame;
-    if (!odometry_) Submit(frame, -1);
+    if (!odometry_ && worker_) Submit(frame, -1);
     SubmitMapped();
     return result;
   }
 
   void Finish() {
     if (odometry_) odometry_->FinishMapping();
-    if (worker_) SubmitMapped();
+    if (worker_ || on_keyframe_) SubmitMapped();
     while (!submitted_.empty()) Deliver();
     if (!deferred_.empty()) Close(std::exchange(deferred_, {}));
     for (LoopRecord& record : records_) {
@@ -93,7 +93,8 @@ class SlamSystem::Impl {
   std::optional<Odometry> odometry_, untouched_;
   std::vector<std::string> warnings_;  // not taken yet
   std::int64_t untouched_last_ = -1;
-  std::function<void(const LoopResult&)> on_detection_;  // may be empty
+  std::function<void(const LoopResult&)> on_detection_;      // may be empty
+  std::function<void(const InputFrame&, int)> on_keyframe_;  // may be empty
   std::vector<LoopRecord> records_;
   int corrections_ = 0;
   std::size_t relocalized_ = 0;  // frames that were lost, and found by the detector
@@ -159,7 +160,8 @@ class SlamSystem::Impl {
     for (const int keyframe : odometry_->TakeMapped()) {
       const auto frame = unmapped_.find(keyframe);
       if (frame == unmapped_.end()) continue;
-      Submit(frame->second, keyframe);
+      if (on_keyframe_) on_keyframe_(frame->second, keyframe);
+      if (worker_) Submit(frame->second, keyframe);
       unmapped_.erase(frame);
     }
   }
@@ -365,6 +367,10 @@ class SlamSystem::Impl {
 
 SlamSystem::SlamSystem(const RunConfig& config, const CameraRig& rig, SpanRecorder* recorder)
     : impl_(std::make_unique<Impl>(config, rig, recorder)) {}
+void SlamSystem::SetKeyframeListener(std::function<void(const InputFrame&, int)> listener) {
+  impl_->on_keyframe_ = std::move(listener);
+}
+
 SlamSystem::SlamSystem(const RunConfig& config, const CameraRig& rig, const Odometry& tracked,
                        const std::map<int, KeyframeView>& views)
     : impl_(std::make_unique<Impl>(config, rig, nullptr)) {

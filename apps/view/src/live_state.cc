@@ -78,15 +78,9 @@ void LiveState::SetFrame(const InputFrame& frame, const TrackResult& track, cons
   next.T_world_camera = track.T_world_camera;
   std::shared_ptr<const std::vector<LivePlace>> places;
   std::shared_ptr<const std::vector<LiveLoop>> loops;
-  LivePoints points;
   const std::size_t accepted = slam.LoopsAccepted();
   const bool corrected = slam.Corrections() != corrections_seen_;
-  if (track.keyframe >= 0) {
-    keyframe_ = std::make_shared<const KeyframeView>(slam.odometry()->Keyframe(track.keyframe));
-    points.keyframe = track.keyframe;
-    points.points = SomePoints(*keyframe_);
-  }
-  if (slam.odometry() != nullptr && (track.keyframe >= 0 || corrected))
+  if (slam.odometry() != nullptr && (new_keyframe_ || corrected))
     places = std::make_shared<const std::vector<LivePlace>>(PlacesOf(*slam.odometry()));
   if (slam.loops().size() != loops_seen_ || accepted != accepted_seen_)
     loops = std::make_shared<const std::vector<LiveLoop>>(LoopsOf(slam));
@@ -106,18 +100,26 @@ void LiveState::SetFrame(const InputFrame& frame, const TrackResult& track, cons
   loops_seen_ = slam.loops().size();
   accepted_seen_ = accepted;
   corrections_seen_ = slam.Corrections();
+  new_keyframe_ = false;
   state_seen_ = next.state;
   const std::lock_guard<std::mutex> lock(mutex_);
   next.number = now_.frame.number + 1;
   now_.frame = std::move(next);
   if (places) now_.places = places;
   if (loops) now_.loops = loops;
-  if (points.keyframe >= 0) {
-    points.number = next_points_++;
-    points_.push_back(std::move(points));
-    if (points_.size() > kMostPoints) points_.pop_front();
-  }
   Changed();
+}
+
+void LiveState::SetKeyframe(int keyframe, const SlamSystem& slam) {
+  keyframe_ = std::make_shared<const KeyframeView>(slam.odometry()->Keyframe(keyframe));
+  new_keyframe_ = true;
+  LivePoints points;
+  points.keyframe = keyframe;
+  points.points = SomePoints(*keyframe_);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  points.number = next_points_++;
+  points_.push_back(std::move(points));
+  if (points_.size() > kMostPoints) points_.pop_front();
 }
 
 void LiveState::AddDetection(const LoopResult& result) {

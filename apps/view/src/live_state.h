@@ -84,6 +84,7 @@ class LiveState {
   // ---- the run's side
   void SetRig(const CameraRig& rig);
   void SetFrame(const InputFrame& frame, const TrackResult& track, const SlamSystem& slam);
+  void SetKeyframe(int keyframe, const SlamSystem& slam);
   void AddDetection(const LoopResult& result);
   void Log(const std::string& text);
   void Finish();
@@ -126,6 +127,7 @@ class LiveState {
   int corrections_seen_ = 0;
   std::string state_seen_;
   std::shared_ptr<const KeyframeView> keyframe_;
+  bool new_keyframe_ = false;
 };
 
 }  // namespace tutti::view

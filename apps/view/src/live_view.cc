@@ -35,6 +35,9 @@ void LiveView::OnFrame(const InputFrame& frame, const TrackResult& track, const 
   impl_->state_.SetFrame(frame, track, slam);
   impl_->state_.WaitWhilePaused(impl_->options_.abandoned_s);
 }
+void LiveView::OnKeyframe(const InputFrame&, int keyframe, const SlamSystem& slam) {
+  impl_->state_.SetKeyframe(keyframe, slam);
+}
 void LiveView::OnDetection(const LoopResult& result) { impl_->state_.AddDetection(result); }
 void LiveView::OnEnd(const SlamSystem&) { impl_->state_.Finish(); }
 

@@ -16,6 +16,7 @@ LiveView::~LiveView() = default;
 std::string LiveView::Url() const { return {}; }
 void LiveView::OnStart(const CameraRig&) {}
 void LiveView::OnFrame(const InputFrame&, const TrackResult&, const SlamSystem&) {}
+void LiveView::OnKeyframe(const InputFrame&, int, const SlamSystem&) {}
 void LiveView::OnDetection(const LoopResult&) {}
 void LiveView::OnEnd(const SlamSystem&) {}
 

@@ -2,8 +2,8 @@
 //
 // In `tutti run` a closed loop moves the map, and tracking goes on from there: two ways to find loops then
 // have two odometries as well, and lost frames are looked up in the loop detector. Here neither happens. The
-// detector gets the same queries as in a run of its own (images, features and points of the keyframes when
-// they were new), so until the first correction it gives the same answers, byte for byte; its loops are
+// detector gets the same queries as in a run of its own (images, features and points of the keyframes once
+// they were mapped), so until the first verified loop it gives the same answers, byte for byte; its loops are
 // measured against the finished map, and corrections move that map alone.
 #pragma once
 
@@ -24,12 +24,12 @@ struct TrackedSequence {
   struct Keyframe {
     int id = -1;
     std::int64_t frame = 0;   ///< index of the input frame
-    std::int64_t frames = 0;  ///< that were read up to and with it
+    std::int64_t frames = 0;  ///< that were read when all its landmarks were known
   };
   RunResult result;
   std::shared_ptr<const Odometry> odometry;  ///< null if there is no calibration
   std::vector<Keyframe> keyframes;
-  std::map<int, KeyframeView> views;  ///< of the keyframes when they were new, by id
+  std::map<int, KeyframeView> views;  ///< of the keyframes at that moment, by id
 };
 
 /// RunSlam without loops, with its files in request.out; what loop closure needs is kept. Throws as RunSlam.

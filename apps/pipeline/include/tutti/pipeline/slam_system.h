@@ -43,11 +43,14 @@ class SlamSystem {
 
   /// Calls `listener` with each answer of the loop detector, before it enters; from Track() and Finish().
   void SetDetectionListener(std::function<void(const LoopResult&)> listener);
+  /// Calls `listener` with each keyframe and its frame when all its landmarks are known, which is when the
+  /// detector gets it; from Track() and Finish().
+  void SetKeyframeListener(std::function<void(const InputFrame&, int)> listener);
 
   /// Tracks the next frame and brings in the loops that are due. Never throws for hard images.
   TrackResult Track(const InputFrame& frame);
-  /// The frame that became this keyframe, again; `frames`: read up to and with it. Only after the constructor
-  /// with a complete odometry, in the order of the keyframes.
+  /// The frame that became this keyframe, again; `frames`: read when the detector got it. Only after the
+  /// constructor with a complete odometry, in the order of the keyframes.
   void Replay(const InputFrame& frame, int keyframe, std::int64_t frames);
   /// After the last frame: brings in the loops that are still on their way.
   void Finish();

@@ -41,6 +41,7 @@ class LiveView : public RunObserver {
 
   void OnStart(const CameraRig& rig) override;
   void OnFrame(const InputFrame& frame, const TrackResult& track, const SlamSystem& slam) override;
+  void OnKeyframe(const InputFrame& frame, int keyframe, const SlamSystem& slam) override;
   void OnDetection(const LoopResult& result) override;
   void OnEnd(const SlamSystem& slam) override;
 

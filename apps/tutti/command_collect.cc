@@ -9,8 +9,10 @@
 #include "commands.h"
 #include "comparison.h"
 #include "files.h"
+#include "run_with_report.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
+#include "tutti/report/page.h"
 
 namespace tutti::cli {
 namespace {
@@ -19,7 +21,8 @@ namespace fs = std::filesystem;
 
 struct CollectArguments {
   std::vector<std::string> runs;
-  std::string table_format = "text", json;
+  std::string table_format = "text", json, report;
+  bool by_folder = false;
 };
 
 /// The summary of a run's folder, or all summaries below a folder, in natural order of their paths.
@@ -37,13 +40,26 @@ std::vector<fs::path> Summaries(const std::string& where) {
   return {files.begin(), files.end()};
 }
 
+// The folder that the run's folder lies in: a sweep has runs/data set/configuration/seed_1/summary.json.
+std::string FolderAbove(const fs::path& summary) {
+  const fs::path run = fs::absolute(summary).parent_path();
+  return run.parent_path().filename().string();
+}
+
 void RunCollect(const CollectArguments& arguments) {
   const TableFormat format = ParseTableFormat(arguments.table_format);
   Comparison comparison;
   for (const std::string& where : arguments.runs) {
-    for (const fs::path& file : Summaries(where)) comparison.runs.push_back(ReadRunFigures(file));
+    for (const fs::path& file : Summaries(where)) {
+      comparison.runs.push_back(ReadRunFigures(file));
+      if (arguments.by_folder) comparison.runs.back().variant = FolderAbove(file);
+    }
   }
   std::fputs(DescribeComparison(comparison, format).c_str(), stdout);
+  if (!arguments.report.empty()) {
+    if (!ReportsAvailable()) throw InputError("--report: " + ReportsMissing());
+    WriteComparisonReport(arguments.report, "tutti collect", comparison);
+  }
   if (!arguments.json.empty()) WriteText(arguments.json, ComparisonJson(comparison).dump(2) + "\n");
 }
 
@@ -55,8 +71,14 @@ void AddCollectCommand(CLI::App& app, int&) {
   command
       ->add_option("runs", arguments->runs, "Folders of runs, folders of such folders, or summary.json files")
       ->required();
+  command->add_flag("--by-folder", arguments->by_folder,
+                    "a run's variant is the name of the folder above its own (CONFIGURATION/seed_1)");
   AddTableFormatOption(*command, arguments->table_format);
   command->add_option("--json", arguments->json, "Write the table to this file");
+  command->add_option(
+      "--report", arguments->report,
+      "Write one page over all runs to this file (report.html); charts are of the first run of "
+      "each data set and variant");
   command->footer(
       "Runs are grouped by data set and by variant: odometry (run.loops: false), ensemble (loops.rule: "
       "mean), "

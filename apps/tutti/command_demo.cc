@@ -8,12 +8,14 @@
 #include <thread>
 
 #include "commands.h"
+#include "run_with_report.h"
 #include "synthetic_writer.h"
 #include "tutti/core/error.h"
 #include "tutti/pipeline/interrupt.h"
 #include "tutti/pipeline/outputs.h"
 #include "tutti/pipeline/progress.h"
 #include "tutti/pipeline/runner.h"
+#include "tutti/report/page.h"
 
 namespace tutti::cli {
 namespace {
@@ -73,9 +75,10 @@ int Demo(const fs::path& out) {
   request.config = "tutti demo";
   request.dataset = data;
   request.out = out / "run";
-  const RunResult result = RunSlam(request, DemoConfig());
+  const RunResult result = RunWithReport(request, DemoConfig());
   std::fputs(ResultTable(result).c_str(), stdout);
   std::printf("\n  plot:       %s and .svg\n", (request.out / "trajectory.png").c_str());
+  if (ReportsAvailable()) std::printf("  report:     %s\n", (request.out / "report.html").c_str());
   std::printf("  results:    %s\n", (request.out / "summary.json").c_str());
   std::printf("  the images: %s (KITTI layout)\n", data.c_str());
   if (result.interrupted) return 130;

@@ -2,12 +2,16 @@
 #include <cstdio>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "commands.h"
+#include "run_with_report.h"
 #include "tutti/core/error.h"
 #include "tutti/pipeline/config.h"
 #include "tutti/pipeline/outputs.h"
 #include "tutti/pipeline/runner.h"
+#include "tutti/report/page.h"
+#include "tutti/view/live_view.h"
 
 namespace tutti::cli {
 namespace {
@@ -15,15 +19,27 @@ namespace {
 struct RunArguments {
   std::string config, dataset, out, ground_truth;
   std::string trace;
-  bool no_loops = false, quiet = false, help_config = false, timing = false, realtime = false;
+  std::vector<std::string> set;  // key=value, keys of the section `loops`
+  bool no_loops = false, no_report = false, quiet = false, help_config = false, timing = false,
+       realtime = false;
   std::uint64_t seed = 1;
   int threads = 2;
   std::int64_t max_frames = 0;
   double follow_s = 10;
+  bool view = false;
+  LiveViewOptions live;
 };
 
 void Require(const std::string& value, const char* option, const char* what) {
   if (value.empty()) throw InputError(std::string("run: ") + option + " is missing; it names " + what);
+}
+
+std::shared_ptr<LiveView> StartView(const LiveViewOptions& options) {
+  const std::string problem = options.Validate();
+  if (!problem.empty()) throw InputError("--view: " + problem);
+  auto view = std::make_shared<LiveView>(options);
+  std::fprintf(stderr, "tutti: look at %s\n", view->Url().c_str());
+  return view;
 }
 
 // 130: ended by Ctrl-C, as shells say it; 1: no frame has a pose.
@@ -71,12 +87,18 @@ int Run(const CLI::App& command, const RunArguments& arguments) {
   if (command.count("--seed") > 0) request.seed = arguments.seed;
   if (command.count("--threads") > 0) request.threads = arguments.threads;
   if (command.count("--max-frames") > 0) request.max_frames = arguments.max_frames;
-  const RunResult result = RunSlam(request);
+  RunConfig config = LoadConfig(request.config);
+  SetLoopOptions(arguments.set, config.loops);
+  const bool view = arguments.view || command.count("--view-address") > 0;
+  if (view) request.observers.push_back(StartView(arguments.live));
+  const RunResult result = arguments.no_report ? RunSlam(request, config) : RunWithReport(request, config);
   std::fputs(ResultTable(result).c_str(), stdout);
   if (arguments.timing) {
     std::fputs(TimingTable(result.stages, result.wall_s, result.cpu_s, result.frames_total).c_str(), stdout);
   }
   std::printf("\n  results are in %s\n", arguments.out.c_str());
+  if (!arguments.no_report && !arguments.quiet && !ReportsAvailable())
+    std::fprintf(stderr, "tutti: %s\n", ReportsMissing().c_str());
   return ExitCode(result, arguments.out);
 }
 
@@ -95,6 +117,10 @@ void AddRunCommand(CLI::App& app, int& exit_code) {
   command->add_option(
       "--ground-truth", arguments->ground_truth,
       "trajectory to evaluate against (default: the data set's own, if it has one; 'none': don't)");
+  command->add_option(
+      "--set", arguments->set,
+      "key=value: a key of the configuration's section `loops`, on top of the file (rule=orb, "
+      "stm_size=20); may be given several times");
   command->add_flag("--no-loops", arguments->no_loops, "odometry alone");
   command->add_option("--seed", arguments->seed, "of everything that draws random numbers");
   command->add_option("--threads", arguments->threads, "most threads; the result is the same for any number");
@@ -111,11 +137,26 @@ void AddRunCommand(CLI::App& app, int& exit_code) {
       "--realtime", arguments->realtime,
       "play by the time stamps and drop the frames that it can't follow; without it every frame is "
       "processed, and the result does not depend on the machine's speed");
+  command->add_flag(
+      "--view", arguments->view,
+      "serve a page to look at the run while it goes on, at 127.0.0.1 (through a tunnel: ssh -L "
+      "8077:127.0.0.1:8077 robot)");
+  command->add_option("--view-port", arguments->live.port, "of that page; 0: any free one")
+      ->capture_default_str();
+  command->add_option(
+      "--view-address", arguments->live.address,
+      "serve it at this address of the machine (0.0.0.0: all); the address that is printed has a "
+      "token, without which nothing is answered");
+  command
+      ->add_option("--view-wait", arguments->live.idle_s,
+                   "wait at most this long for a browser before the first frame [s]")
+      ->capture_default_str();
   command->add_flag("--timing", arguments->timing,
                     "print how long each stage took: calls, median, p99, total, share");
   command->add_option(
       "--trace", arguments->trace,
       "write the times of all stages to this file; open it in ui.perfetto.dev or chrome://tracing");
+  command->add_flag("--no-report", arguments->no_report, "no report.html and report.json");
   command->add_flag("--quiet", arguments->quiet, "no progress and no notes");
   command->add_flag("--help-config", arguments->help_config,
                     "print all keys of the configuration with their defaults");

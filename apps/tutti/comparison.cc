@@ -142,12 +142,12 @@ TextTable Table(const std::vector<Variant>& variants) {
 }
 
 /// Where the ensemble helped, where that can't be told, and where it did not, in words.
-std::string Verdict(const std::vector<Variant>& variants) {
+std::vector<std::string> Verdict(const std::vector<Variant>& variants) {
   double ensemble = RunFigures::kNone;
   for (const Variant& variant : variants) {
     if (variant.name == kEnsemble) ensemble = Over(variant, &RunFigures::ate_m).mean;
   }
-  if (!std::isfinite(ensemble)) return "";
+  if (!std::isfinite(ensemble)) return {};
   std::string beaten, unclear, not_beaten;
   for (const Variant& variant : variants) {
     const double mean = Over(variant, &RunFigures::ate_m).mean;
@@ -156,13 +156,13 @@ std::string Verdict(const std::vector<Variant>& variants) {
     std::string& list = mean <= ensemble ? not_beaten : sure ? beaten : unclear;
     list += (list.empty() ? "" : ", ") + variant.name + " (" + Fixed(mean, 4) + " m)";
   }
-  std::string text = "Mean ATE of the ensemble: " + Fixed(ensemble, 4) + " m.\n";
-  if (!beaten.empty()) text += "* Lower than that of " + beaten + ", p < 0.05.\n";
+  std::vector<std::string> lines = {"Mean ATE of the ensemble: " + Fixed(ensemble, 4) + " m."};
+  if (!beaten.empty()) lines.push_back("* Lower than that of " + beaten + ", p < 0.05.");
   if (!unclear.empty())
-    text += "* Lower than that of " + unclear +
-            ", but the test can't tell them apart (p >= 0.05, or one seed).\n";
-  if (!not_beaten.empty()) text += "* The ensemble did not help against " + not_beaten + ".\n";
-  return text + "\n";
+    lines.push_back("* Lower than that of " + unclear +
+                    ", but the test can't tell them apart (p >= 0.05, or one seed).");
+  if (!not_beaten.empty()) lines.push_back("* The ensemble did not help against " + not_beaten + ".");
+  return lines;
 }
 
 Json IntervalJson(const MeanInterval& value) {
@@ -207,6 +207,7 @@ RunFigures ReadRunFigures(const std::filesystem::path& summary) {
   if (!json.is_object() || !json.contains("frames") || !json.contains("loops"))
     throw InputError(summary.string() + ": is no summary.json of `tutti run`");
   RunFigures run;
+  run.folder = summary.parent_path();
   run.dataset = json.value("dataset", "?");
   run.variant = VariantOf(json);
   run.seed = static_cast<std::uint64_t>(Number(json, "seed") >= 0 ? Number(json, "seed") : 0);
@@ -244,13 +245,22 @@ MeanInterval MeanWithInterval(const std::vector<double>& values) {
   return out;
 }
 
-std::string DescribeComparison(const Comparison& comparison, TableFormat format) {
-  std::string text;
+std::vector<ComparisonTable> ComparisonTables(const Comparison& comparison) {
+  std::vector<ComparisonTable> tables;
   for (const std::string& dataset :
        InOrder(comparison.runs, [](const RunFigures& run) { return run.dataset; })) {
     const std::vector<Variant> variants = Variants(comparison, dataset);
-    text += (text.empty() ? "" : "\n") + dataset + "\n\n" + Render(Table(variants), format) + "\n" +
-            Verdict(variants);
+    tables.push_back({dataset, Table(variants), Verdict(variants)});
+  }
+  return tables;
+}
+
+std::string DescribeComparison(const Comparison& comparison, TableFormat format) {
+  std::string text;
+  for (const ComparisonTable& table : ComparisonTables(comparison)) {
+    text += (text.empty() ? "" : "\n") + table.dataset + "\n\n" + Render(table.table, format) + "\n";
+    for (const std::string& note : table.notes) text += note + "\n";
+    if (!table.notes.empty()) text += "\n";
   }
   return text +
          "Means over seeds, +- half of the 95 % confidence interval; p: paired t-test of the ATE against the "

@@ -17,7 +17,8 @@ struct RunFigures {
   static constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   std::string dataset, variant;
   std::uint64_t seed = 0;
-  std::string failure;  ///< why the run left no figures; then only the three fields above are set
+  std::filesystem::path folder;  ///< of the run; empty: unknown
+  std::string failure;           ///< why the run left no figures; then only the three fields above are set
   double proposed = kNone, accepted = kNone, false_loops = kNone;
   double ate_m = kNone, rpe_m = kNone;                         ///< rmse after loop closing
   double t_rel_percent = kNone, r_rel_deg_per_m = kNone;       ///< KITTI
@@ -41,6 +42,14 @@ MeanInterval MeanWithInterval(const std::vector<double>& values);
 struct Comparison {
   std::vector<RunFigures> runs;
 };
+
+/// The table of one data set, and what it says below.
+struct ComparisonTable {
+  std::string dataset;
+  TextTable table;
+  std::vector<std::string> notes;
+};
+std::vector<ComparisonTable> ComparisonTables(const Comparison& comparison);
 
 /// One table per data set, with the paired t-test of each variant's ATE against the ensemble's over common
 /// seeds, and below it which variants the ensemble beats, and which it does not.

@@ -15,9 +15,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array<const char*, 8> kFiles = {
-    "trajectory.txt", "trajectory_odometry.txt", "keyframes.txt", "graph.g2o", "loops.csv",
-    "summary.json",   "trajectory.svg",          "trajectory.png"};
+constexpr std::array<const char*, 10> kFiles = {
+    "trajectory.txt", "trajectory_odometry.txt", "keyframes.txt",  "graph.g2o",   "loops.csv",
+    "summary.json",   "trajectory.svg",          "trajectory.png", "report.html", "report.json"};
 constexpr std::uintmax_t kRoomBytes = 32u << 20;  // a long run writes a few MB
 
 // Of the i-th of the pieces that are not joined to the trajectory, from 1.

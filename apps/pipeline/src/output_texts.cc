@@ -145,6 +145,7 @@ std::string SummaryJson(const RunResult& r) {
   json["realtime"] = r.realtime;
   json["interrupted"] = r.interrupted;
   json["appearance_only"] = r.appearance_only;
+  json["shared_odometry"] = r.shared_odometry;
   json["frames"] = FramesJson(r);
   json["calibration_findings"] = Json::array();
   for (const CalibrationFinding& f : r.calibration_findings)

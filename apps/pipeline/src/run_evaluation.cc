@@ -79,14 +79,16 @@ void EvaluateRun(const Trajectory& reference, const std::string& file, RunResult
       result.reference.push_back(pose);
     }
   }
-  for (const LoopRecord& loop : result.loops) {
+  for (LoopRecord& loop : result.loops) {
     if (!loop.accepted) continue;
     switch (Judge(loop, reference, result.rig)) {
       case Verdict::kTrue:
         ++evaluation.loops_true;
+        loop.correct = true;
         break;
       case Verdict::kFalse:
         ++evaluation.loops_false;
+        loop.correct = false;
         break;
       case Verdict::kUnknown:
         ++evaluation.loops_unknown;

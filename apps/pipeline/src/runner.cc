@@ -1,7 +1,5 @@
 #include "tutti/pipeline/runner.h"
 
-#include <sys/resource.h>
-
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -13,6 +11,7 @@
 
 #include "prefetcher.h"
 #include "run_evaluation.h"
+#include "run_parts.h"
 #include "text_file.h"
 #include "tutti/core/error.h"
 #include "tutti/pipeline/interrupt.h"
@@ -30,57 +29,6 @@ double Seconds(Clock::time_point begin) {
   return std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
-double PeakMemoryMb() {
-  rusage usage = {};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<double>(usage.ru_maxrss) / 1024.0;
-}
-
-double ProcessCpuSeconds() {
-  rusage usage = {};
-  getrusage(RUSAGE_SELF, &usage);
-  const auto seconds = [](const timeval& t) {
-    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
-  };
-  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
-}
-
-RunConfig WithOverrides(RunConfig config, const RunRequest& request) {
-  if (request.no_loops) config.run.loops = false;
-  if (request.follow_s) config.dataset.follow_s = *request.follow_s;
-  if (request.threads) config.run.threads = *request.threads;
-  if (request.seed) {
-    config.odometry.seed = *request.seed;
-    config.loops.seed = *request.seed;
-  }
-  const std::string problem = config.run.Validate();
-  if (!problem.empty()) throw InputError("--threads: " + problem);
-  return config;
-}
-
-// The ground truth is read before the long work, so that a damaged file is known at once.
-std::optional<std::pair<Trajectory, std::string>> ReadReference(const Dataset& dataset,
-                                                                const RunRequest& request,
-                                                                std::vector<std::string>* warnings) {
-  if (request.ground_truth && *request.ground_truth == "none") return std::nullopt;
-  const std::optional<fs::path> file =
-      request.ground_truth ? request.ground_truth : dataset.GroundTruthFile();
-  if (!file) return std::nullopt;
-  try {
-    return std::make_pair(dataset.ReadGroundTruth(*file, warnings), file->string());
-  } catch (const InputError& e) {
-    const char* hint = " (ground truth; --ground-truth none runs without it)";
-    throw InputError(e.what() + std::string(hint));
-  }
-}
-
-// T_world_camera -> T_world_body, the frame that ground truth is of.
-Trajectory BodyTrajectory(Trajectory trajectory, const CameraRig& rig) {
-  const Pose T_camera_body = rig.T_body_camera.Inverse();
-  for (StampedPose& pose : trajectory) pose.pose = pose.pose * T_camera_body;
-  return trajectory;
-}
-
 /// One run from its first frame to its last.
 class Run {
  public:
@@ -89,7 +37,15 @@ class Run {
         config_(config),
         dataset_(dataset),
         result_(result),
-        slam_(config, dataset.Rig(), Recorder()) {
+        slam_(Watched(config, request), dataset.Rig(), Recorder()) {
+    slam_.SetDetectionListener([this](const LoopResult& detection) {
+      for (const auto& observer : request_.observers) observer->OnDetection(detection);
+    });
+    if (!request.observers.empty()) {
+      slam_.SetKeyframeListener([this](const InputFrame& frame, int keyframe) {
+        for (const auto& observer : request_.observers) observer->OnKeyframe(frame, keyframe, slam_);
+      });
+    }
     total_ = dataset.FrameSupply() == Supply::kStored ? dataset.Size() : static_cast<std::size_t>(-1);
     if (request.max_frames) total_ = std::min(total_, static_cast<std::size_t>(*request.max_frames));
     result_.realtime = request.realtime;
@@ -99,6 +55,7 @@ class Run {
   }
 
   void TrackAll() {
+    for (const auto& observer : request_.observers) observer->OnStart(result_.rig);
     const Clock::time_point begin = Clock::now();
     const double cpu_begin = ProcessCpuSeconds();
     Progress progress(config_.run.loops ? "slam" : "odometry",
@@ -121,6 +78,7 @@ class Run {
     }
     result_.interrupted = InterruptGuard::Requested();
     slam_.Finish();
+    for (const auto& observer : request_.observers) observer->OnEnd(slam_);
     NoteWarnings(progress);
     progress.Finish();
     if (result_.interrupted) {
@@ -155,27 +113,9 @@ class Run {
   }
 
   void Collect() {
-    result_.loops = slam_.loops();
-    result_.corrections = slam_.Corrections();
-    result_.frames_relocalized = slam_.Relocalized();
-    result_.appearance_only = slam_.AppearanceOnly();
-    result_.peak_memory_mb = PeakMemoryMb();
-    if (!slam_.AppearanceOnly()) {
-      const Odometry& odometry = *slam_.odometry();
-      result_.trajectory = BodyTrajectory(odometry.FrameTrajectory(), result_.rig);
-      result_.frames_tracked = result_.trajectory.size();
-      const std::vector<int> pieces = odometry.Pieces();
-      for (std::size_t i = 1; i < pieces.size(); ++i) {
-        result_.other_pieces.push_back(BodyTrajectory(odometry.FrameTrajectory(pieces[i]), result_.rig));
-      }
-      result_.trajectory_odometry = slam_.untouched() != nullptr
-                                        ? BodyTrajectory(slam_.untouched()->FrameTrajectory(), result_.rig)
-                                        : result_.trajectory;
-      result_.graph = slam_.Graph();
-      result_.stereo_row_error_px = odometry.StereoRowErrorPx();
-      result_.stereo_matches = odometry.StereoMatches();
-      CollectKeyframes(odometry);
-    }
+    const Odometry* alone = slam_.untouched();
+    CollectMap(slam_, result_);
+    if (alone != nullptr) result_.trajectory_odometry = BodyTrajectory(alone->FrameTrajectory(), result_.rig);
   }
 
  private:
@@ -252,6 +192,7 @@ class Run {
     const Clock::time_point begin = Clock::now();
     const TrackResult track = slam_.Track(frame);
     result_.frame_ms.push_back(1e3 * Seconds(begin));
+    for (const auto& observer : request_.observers) observer->OnFrame(frame, track, slam_);
     state_ = slam_.AppearanceOnly() ? "appearance only" : ToString(track.state);
     if (slam_.AppearanceOnly() || track.state == TrackingState::kTracking) {
       lost_open_ = false;
@@ -272,19 +213,6 @@ class Run {
           "  loops " + std::to_string(slam_.LoopsAccepted()) + "/" + std::to_string(slam_.loops().size());
     }
     return status;
-  }
-
-  // Keyframes of the map piece that trajectory.txt is of.
-  void CollectKeyframes(const Odometry& odometry) {
-    const std::vector<std::int64_t> frames = odometry.FrameIndices();
-    const std::set<std::int64_t> posed(frames.begin(), frames.end());
-    Trajectory keyframes;
-    for (const int id : odometry.KeyframeIds()) {
-      if (posed.count(odometry.KeyframeFrameIndex(id)) == 0) continue;
-      keyframes.push_back({odometry.KeyframeStamp(id), odometry.KeyframePose(id)});
-    }
-    result_.keyframes = odometry.KeyframeIds().size();
-    result_.keyframe_trajectory = BodyTrajectory(std::move(keyframes), result_.rig);
   }
 
   const RunRequest& request_;

@@ -45,9 +45,22 @@ class SlamSystem::Impl {
       worker_ = std::make_unique<LoopWorker>(DetectorOptions(config), config.run.threads > 1, recorder);
   }
 
+  void TakeOver(const Odometry& tracked, const std::map<int, KeyframeView>& views) {
+    odometry_ = tracked;
+    views_ = &views;
+    for (const int id : odometry_->KeyframeIds()) graph_.AddKeyframe(id, odometry_->KeyframePiece(id));
+  }
+
+  void Replay(const InputFrame& frame, int keyframe, std::int64_t frames) {
+    frames_ = frames - 1;
+    DeliverDue();
+    ++frames_;
+    last_frame_ = frame.index;
+    if (worker_) Submit(frame, keyframe);
+  }
+
   TrackResult Track(const InputFrame& frame) {
-    while (!submitted_.empty() && submitted_.front().due <= frames_) Deliver();
-    if (adjuster_.Due(frames_)) EnterAdjustment();
+    DeliverDue();
     ++frames_;
     TrackResult result;
     if (odometry_) {
@@ -59,16 +72,16 @@ class SlamSystem::Impl {
     } else {
       result.reason = "no calibration";
     }
-    if (!worker_) return result;
+    if (!worker_ && !on_keyframe_) return result;
     if (result.keyframe >= 0) unmapped_[result.keyframe] = frame;
-    if (!odometry_) Submit(frame, -1);
+    if (!odometry_ && worker_) Submit(frame, -1);
     SubmitMapped();
     return result;
   }
 
   void Finish() {
     if (odometry_) odometry_->FinishMapping();
-    if (worker_) SubmitMapped();
+    if (worker_ || on_keyframe_) SubmitMapped();
     while (!submitted_.empty()) Deliver();
     if (!deferred_.empty()) Close(std::exchange(deferred_, {}));
     if (adjuster_.Running()) EnterAdjustment();
@@ -83,6 +96,8 @@ class SlamSystem::Impl {
   std::optional<Odometry> odometry_, untouched_;
   std::vector<std::string> warnings_;  // not taken yet
   std::int64_t untouched_last_ = -1;
+  std::function<void(const LoopResult&)> on_detection_;      // may be empty
+  std::function<void(const InputFrame&, int)> on_keyframe_;  // may be empty
   std::vector<LoopRecord> records_;
   int corrections_ = 0;
   int adjustments_ = 0;          // of the whole map
@@ -104,6 +119,17 @@ class SlamSystem::Impl {
     std::int64_t due = 0;  // number of frames after which its result enters
     std::int64_t frame = 0;
   };
+
+  // Brings in what is due by now.
+  void DeliverDue() {
+    while (!submitted_.empty() && submitted_.front().due <= frames_) Deliver();
+    if (adjuster_.Due(frames_)) EnterAdjustment();
+  }
+
+  // As the keyframe was when it was new.
+  KeyframeView ViewOf(int keyframe) const {
+    return views_ != nullptr ? views_->at(keyframe) : odometry_->Keyframe(keyframe);
+  }
 
   // Before the detector changes anything: what the odometry alone would have done starts here.
   void KeepUntouched() {
@@ -140,7 +166,8 @@ class SlamSystem::Impl {
     for (const int keyframe : odometry_->TakeMapped()) {
       const auto frame = unmapped_.find(keyframe);
       if (frame == unmapped_.end()) continue;
-      Submit(frame->second, keyframe);
+      if (on_keyframe_) on_keyframe_(frame->second, keyframe);
+      if (worker_) Submit(frame->second, keyframe);
       unmapped_.erase(frame);
     }
   }
@@ -154,7 +181,7 @@ class SlamSystem::Impl {
     query.image = frame.image;
     query.depth_m = frame.depth_m;
     if (odometry_) {
-      KeyframeView view = odometry_->Keyframe(keyframe);
+      KeyframeView view = ViewOf(keyframe);
       query.camera = rig_.camera;
       query.features = {std::move(view.keypoints), std::move(view.descriptors), std::move(view.points)};
       keyframe_of_frame_[frame.index] = keyframe;
@@ -184,6 +211,7 @@ class SlamSystem::Impl {
   void Deliver() {
     submitted_.pop_front();
     const LoopResult result = worker_->Take();
+    if (on_detection_) on_detection_(result);
     for (const auto& [name, ms] : LoopStages(result)) stages_[std::string("loop_") + name] += ms;
     if (!result.warning.empty() && result.warning != loop_warning_) {
       loop_warning_ = result.warning;
@@ -356,6 +384,7 @@ class SlamSystem::Impl {
     stages_["global_adjustment"] += MillisecondsSince(begin);
   }
 
+  const std::map<int, KeyframeView>* views_ = nullptr;  // of a complete odometry
   SpanRecorder* recorder_;
   SlamOptions options_;
   CameraRig rig_;
@@ -379,9 +408,25 @@ class SlamSystem::Impl {
 
 SlamSystem::SlamSystem(const RunConfig& config, const CameraRig& rig, SpanRecorder* recorder)
     : impl_(std::make_unique<Impl>(config, rig, recorder)) {}
+void SlamSystem::SetKeyframeListener(std::function<void(const InputFrame&, int)> listener) {
+  impl_->on_keyframe_ = std::move(listener);
+}
+
+SlamSystem::SlamSystem(const RunConfig& config, const CameraRig& rig, const Odometry& tracked,
+                       const std::map<int, KeyframeView>& views)
+    : impl_(std::make_unique<Impl>(config, rig, nullptr)) {
+  impl_->TakeOver(tracked, views);
+}
 SlamSystem::~SlamSystem() = default;
 
+void SlamSystem::SetDetectionListener(std::function<void(const LoopResult&)> listener) {
+  impl_->on_detection_ = std::move(listener);
+}
+
 TrackResult SlamSystem::Track(const InputFrame& frame) { return impl_->Track(frame); }
+void SlamSystem::Replay(const InputFrame& frame, int keyframe, std::int64_t frames) {
+  impl_->Replay(frame, keyframe, frames);
+}
 void SlamSystem::Finish() { impl_->Finish(); }
 bool SlamSystem::AppearanceOnly() const { return !impl_->odometry_; }
 const Odometry* SlamSystem::odometry() const { return impl_->odometry_ ? &*impl_->odometry_ : nullptr; }

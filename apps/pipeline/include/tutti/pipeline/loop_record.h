@@ -37,6 +37,7 @@ struct LoopRecord {
   bool verified = false;                        ///< passed the detector's geometric verification
   bool accepted = false;                        ///< in the pose graph in the end
   bool pending = false;                         ///< waits for a second loop that agrees
+  std::optional<bool> correct;                  ///< what the ground truth says of an accepted loop, if it can
   std::string reason;                           ///< why it is not accepted, in plain words
   std::optional<Similarity> S_candidate_query;  ///< the constraint, if one could be computed
   bool has_scale = false;                       ///< false: rotation and unit direction only

@@ -74,6 +74,7 @@ struct RunResult {
   std::size_t keyframes = 0;
   bool interrupted = false;
   bool appearance_only = false;
+  bool shared_odometry = false;  ///< tracked once for several runs; loops did not reach the tracking
 
   // Loops.
   std::vector<LoopRecord> loops;

@@ -5,8 +5,10 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "tutti/pipeline/frame_clock.h"
+#include "tutti/pipeline/run_observer.h"
 #include "tutti/pipeline/run_result.h"
 
 namespace tutti {
@@ -27,6 +29,7 @@ struct RunRequest {
   bool timing = false;                         ///< measure every stage (RunResult::stages)
   std::optional<std::filesystem::path> trace;  ///< the same, and write a trace for Chrome or Perfetto there
   bool quiet = false;                          ///< no progress, no notes
+  std::vector<std::shared_ptr<RunObserver>> observers;  ///< none null
 };
 
 /// Runs and writes everything into request.out. Throws InputError for input that makes the run impossible,

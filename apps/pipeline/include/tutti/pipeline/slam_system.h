@@ -7,6 +7,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -16,6 +17,7 @@
 #include "tutti/backend/pose_graph.h"
 #include "tutti/core/span_recorder.h"
 #include "tutti/frontend/odometry.h"
+#include "tutti/loopclosure/detector.h"
 #include "tutti/pipeline/config.h"
 #include "tutti/pipeline/loop_record.h"
 
@@ -30,12 +32,26 @@ class SlamSystem {
   /// Throws InputError if the configuration does not fit the rig. `recorder` gets the time of each stage; it
   /// must outlive this object; null: nothing is recorded.
   SlamSystem(const RunConfig& config, const CameraRig& rig, SpanRecorder* recorder = nullptr);
+  /// Loop closure on an odometry that is complete (shared_odometry.h): Replay() takes the place of Track(),
+  /// and the loops move `tracked`, but no tracking goes on from there. `views`: the keyframes as the detector
+  /// is to see them, by id; must outlive this object.
+  SlamSystem(const RunConfig& config, const CameraRig& rig, const Odometry& tracked,
+             const std::map<int, KeyframeView>& views);
   ~SlamSystem();
   SlamSystem(const SlamSystem&) = delete;
   SlamSystem& operator=(const SlamSystem&) = delete;
 
+  /// Calls `listener` with each answer of the loop detector, before it enters; from Track() and Finish().
+  void SetDetectionListener(std::function<void(const LoopResult&)> listener);
+  /// Calls `listener` with each keyframe and its frame when all its landmarks are known, which is when the
+  /// detector gets it; from Track() and Finish().
+  void SetKeyframeListener(std::function<void(const InputFrame&, int)> listener);
+
   /// Tracks the next frame and brings in the loops that are due. Never throws for hard images.
   TrackResult Track(const InputFrame& frame);
+  /// The frame that became this keyframe, again; `frames`: read when the detector got it. Only after the
+  /// constructor with a complete odometry, in the order of the keyframes.
+  void Replay(const InputFrame& frame, int keyframe, std::int64_t frames);
   /// After the last frame: brings in the loops that are still on their way.
   void Finish();
 

@@ -1,0 +1,55 @@
+// What the loop detector said of every image, small enough to be kept for a whole run.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <opencv2/core.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tutti/pipeline/run_observer.h"
+
+namespace tutti {
+
+/// One opinion: a member's or the ensemble's.
+struct LoggedOpinion {
+  std::string name;        ///< "surf", ..., "ensemble"
+  bool took_part = true;   ///< false: the member sat the image out
+  double hypothesis = 0;   ///< 1 - p(new place)
+  std::int64_t best = -1;  ///< input frame of the best location, -1: none
+  /// (input frame of a location, its posterior), where that is at least DetectionLog::kLeastPosterior
+  std::vector<std::pair<std::int64_t, float>> posterior;
+};
+
+/// One image that the detector was asked about.
+struct LoggedDetection {
+  std::int64_t query = -1;  ///< index of the input frame
+  double stamp_s = 0;
+  bool proposed = false, verified = false;
+  std::int64_t candidate = -1;  ///< the input frame that the verification tried last best, else the best one
+  std::string reason;           ///< why it is no loop; empty if it was verified
+  std::vector<LoggedOpinion> opinions;  ///< the members in their order, then "ensemble"
+  /// pixels of inliers in the query and in the candidate, kMostMatches at most, spread over all
+  std::vector<std::pair<cv::Point2f, cv::Point2f>> matches;
+};
+
+/// Collects them during a run.
+class DetectionLog : public RunObserver {
+ public:
+  static constexpr double kLeastPosterior = 1e-3;  ///< smaller ones are left out: there is one per location
+  static constexpr std::size_t kMostMatches = 60;
+
+  bool WantsPosteriors() const override { return true; }
+  void OnFrame(const InputFrame& frame, const TrackResult& track, const SlamSystem& slam) override;
+  void OnDetection(const LoopResult& result) override;
+
+  /// In the order of the queries.
+  const std::vector<LoggedDetection>& detections() const { return detections_; }
+
+ private:
+  std::map<std::int64_t, double> stamps_;  // of frames whose answer may still come
+  std::vector<LoggedDetection> detections_;
+};
+
+}  // namespace tutti

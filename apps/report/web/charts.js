@@ -1,0 +1,125 @@
+'use strict';
+// Errors, precision and recall, posteriors, times.
+
+async function drawErrors(panel) {
+  const lines = [];
+  const runs = runsHere();
+  const alone = runs.find((run) => run.variant === 'odometry') ?? chosen();
+  if (alone.errors.odometry) lines.push(['odometry', alone.errors.odometry]);
+  for (const run of runs) if (run.variant !== 'odometry' && run.errors.slam) lines.push([run.variant, run.errors.slam]);
+  if (!lines.length) return panel.append(note('No ground truth covers this run, so there is no error to show.'));
+  const traces = (field) => lines.map(([name, error]) => ({ type: 'scatter', mode: 'lines', x: error.distance,
+    y: error[field], name: field === 'error' ? `${label(name)}: rmse ${lengthText(error.rmse)}` : label(name), line: lineOf(name) }));
+  const range = { rangemode: 'tozero' };
+  const x = 'distance along the reference [m]';
+  await chart(panel, '', traces('error'), layoutOf('Absolute translation error',
+    { xaxis: axis(x), yaxis: axis('error [m]', range), hovermode: 'x unified' }));
+  await chart(panel, '', traces('turn_deg'), layoutOf('Absolute rotation error',
+    { xaxis: axis(x), yaxis: axis('error [deg]', range), hovermode: 'x unified' }));
+  const figures = chosen().figures;
+  panel.append(note(`Aligned by ${figures.alignment === 'sim3' ? 'Sim(3)' : 'SE(3)'}, as tutti evaluate.`));
+}
+
+function recallLine(curve, name, style) {
+  const x = [0, ...curve.recall], y = [curve.precision[0] ?? 1, ...curve.precision];
+  return [
+    { type: 'scatter', mode: 'lines', x, y, name: `${label(name)}: ${fixed(100 * curve.recall_at_100, 1)} % recall at 100 % precision`,
+      line: { ...style, shape: 'vh' }, legendgroup: name },
+    { type: 'scatter', mode: 'markers', x: [curve.at_threshold[0]], y: [curve.at_threshold[1]], name: 'at the threshold',
+      showlegend: false, legendgroup: name, marker: { color: style.color, size: 10, line: { color: css('--paper'), width: 1.5 } },
+      hovertemplate: 'at the default threshold: recall %{x:.3f}, precision %{y:.3f}' },
+  ];
+}
+
+async function drawRecall(panel) {
+  const run = chosen();
+  const layout = (title) => layoutOf(title, { xaxis: axis('recall', { range: [-0.02, 1.02] }),
+    yaxis: axis('precision', { range: [-0.02, 1.04] }) });
+  const known = runsHere().filter((r) => r.precision_recall);
+  if (known.length > 1) {
+    for (const [which, title] of [['verified', 'Every variant, after verification'], ['ensemble', 'Every variant, by its posterior alone']]) {
+      const traces = known.flatMap((r) => {
+        const curve = r.precision_recall.curves.find((c) => c.name === which);
+        return curve ? recallLine(curve, r.variant, lineOf(r.variant)) : [];
+      });
+      await chart(panel, '', traces, layout(title));
+    }
+  }
+  if (!run.precision_recall) {
+    return panel.append(note('No curve for this run: it looked for no loops, or nobody knows its loops ' +
+      '(no ground truth covers it, or no image comes back to an earlier place).'));
+  }
+  const traces = run.precision_recall.curves.flatMap((curve) =>
+    recallLine(curve, curve.name === 'verified' ? 'ensemble, verified' : curve.name, lineOf(curve.name)));
+  await chart(panel, '', traces, layout(known.length > 1 ? `Members of ${run.variant}` : 'Members, ensemble, and the ensemble verified'));
+  const pr = run.precision_recall;
+  panel.append(note(`${pr.rows_with_loop} of ${pr.images} images have a loop (${pr.rule}). Discs: at the default threshold.`));
+}
+
+// Square roots of the posterior, as they are stored: small ones stay visible.
+function unpackMap(map, cells) {
+  const bytes = atob(map.q), rows = [];
+  for (let r = 0; r < cells; ++r) {
+    const row = new Array(cells);
+    for (let c = 0; c < cells; ++c) {
+      row[c] = bytes.charCodeAt(r * cells + c) / 255;
+    }
+    rows.push(row);
+  }
+  return rows;
+}
+
+// Loops over a heat map: time of the query and of its place.
+function loopMarks(run, posterior) {
+  return ['accepted', 'false'].flatMap((outcome) => {
+    const loops = run.loops.filter((loop) => loop.outcome === outcome);
+    if (!loops.length) return [];
+    const style = OUTCOMES[outcome];
+    return [{ type: 'scatter', mode: 'markers', name: style.name, hoverinfo: 'skip',
+      x: loops.map((l) => l.qt - posterior.first_stamp_s), y: loops.map((l) => l.ct - posterior.first_stamp_s),
+      marker: { symbol: `${style.symbol}-open`, size: 11, color: '#ffffff', line: { width: 1.5 } } }];
+  });
+}
+
+async function drawPosterior(panel) {
+  const run = chosen(), p = run.posterior;
+  if (!p) return panel.append(note('This run asked no loop detector.'));
+  await chart(panel, 'small', [
+    ...p.hypotheses.map((h) => ({ type: 'scatter', mode: 'lines', x: p.hypothesis_t, y: h.h, name: label(h.name), line: lineOf(h.name) })),
+    { type: 'scatter', mode: 'lines', x: [0, p.hypothesis_t.at(-1)], y: [p.threshold, p.threshold], name: `threshold ${p.threshold}`,
+      line: { color: css('--faint'), dash: 'dot', width: 1.5 } },
+  ], layoutOf('Hypothesis: 1 - p(new place)', { xaxis: axis('time [s]'), yaxis: axis('H', { rangemode: 'tozero' }), hovermode: 'x unified' }));
+  const grid = el('div', { class: 'pair' });
+  panel.append(grid);
+  const marks = loopMarks(run, p);
+  const roots = p.maps.map((map) => unpackMap(map, p.cells));
+  const largest = Math.max(0.05, ...roots.flat().map((row) => Math.max(...row)));
+  const ticks = [0.001, 0.01, 0.03, 0.1, 0.3, 1].filter((v) => Math.sqrt(v) <= largest);
+  for (const [k, map] of p.maps.entries()) {
+    const heat = { type: 'heatmap', x: p.t, y: p.t, z: roots[k], colorscale: 'Cividis', zmin: 0, zmax: largest,
+      customdata: roots[k].map((row) => row.map((v) => v * v)),
+      colorbar: { thickness: 10, title: { text: 'p', side: 'top' }, tickvals: ticks.map(Math.sqrt), ticktext: ticks.map(String) },
+      hovertemplate: 'at %{x:.1f} s: place of %{y:.1f} s, p = %{customdata:.4f}<extra></extra>' };
+    await chart(grid, '', [heat, ...(map.name === 'ensemble' ? marks : [])], layoutOf(`Posterior: ${map.name}`,
+      { xaxis: axis('time of the image [s]'), yaxis: axis('time of the place [s]'), showlegend: map.name === 'ensemble' && marks.length > 0 }));
+  }
+  panel.append(note(`Largest posterior in each cell, ${p.cells} x ${p.cells} cells; the rest of the probability is "a new place". White marks: accepted loops.`));
+}
+
+async function drawTiming(panel) {
+  const runs = runsHere();
+  const names = [...new Set(runs.flatMap((run) => run.timing.stages.map((stage) => stage.name)))];
+  const seconds = (run, name) => (run.timing.stages.find((stage) => stage.name === name)?.ms ?? 0) / 1000;
+  names.sort((a, b) => seconds(chosen(), a) - seconds(chosen(), b));
+  const traces = runs.map((run) => ({ type: 'bar', orientation: 'h', y: names.map(label), x: names.map((name) => seconds(run, name)),
+    name: label(run.variant), marker: { color: lineOf(run.variant).color }, hovertemplate: '%{x:.2f} s' }));
+  await chart(panel, 'tall', traces, layoutOf('Stages, summed over the run', { barmode: 'group', xaxis: axis('time [s]'), yaxis: axis(''), showlegend: runs.length > 1 }));
+  const run = chosen(), times = run.timing.frame_ms;
+  if (times.length) {
+    const step = run.timing.frames / times.length;
+    await chart(panel, 'small', [{ type: 'scatter', mode: 'lines', x: times.map((_, k) => Math.round(k * step)), y: times,
+      name: 'frame', line: { color: lineOf('ensemble').color, width: 1.2 } }],
+    layoutOf('From having a frame to having its pose', { xaxis: axis('frame'), yaxis: axis('time [ms]', { rangemode: 'tozero' }), showlegend: false }));
+  }
+  panel.append(note('Stages named loop_ (but loop_optimize and loop_wait) run beside the tracking. Times are of the machine and its load.'));
+}

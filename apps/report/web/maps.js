@@ -1,0 +1,123 @@
+'use strict';
+// Trajectories from above and in 3D, with the loops.
+
+const AXES = ['x', 'y', 'z'];
+
+function extents(path) {
+  return AXES.map((a) => {
+    let low = Infinity, high = -Infinity;
+    for (const v of path[a]) if (isNumber(v)) { low = Math.min(low, v); high = Math.max(high, v); }
+    return high > low ? high - low : 0;
+  });
+}
+
+// The path that the axes are chosen by.
+const mainPath = () => {
+  const runs = runsHere();
+  return (runs.find((run) => run.reference) ?? {}).reference ?? chosen().slam;
+};
+
+// The two axes of largest extent, in their order, and the third.
+function planeOf(path) {
+  const size = extents(path);
+  const up = size.indexOf(Math.min(...size));
+  const plane = [0, 1, 2].filter((k) => k !== up);
+  return { plane, up };
+}
+
+// Name and path of every line of the map.
+function paths() {
+  const runs = runsHere();
+  const lines = [];
+  const reference = runs.find((run) => run.reference);
+  if (reference) lines.push({ name: 'reference', path: reference.reference, width: 3 });
+  const alone = runs.find((run) => run.variant === 'odometry');
+  const odometry = alone ?? chosen();
+  if (odometry.odometry.x.length) lines.push({ name: 'odometry', path: odometry.odometry, width: 2 });
+  for (const run of runs) {
+    if (run.variant !== 'odometry' && run.slam.x.length) lines.push({ name: run.variant, path: run.slam, width: 2.5 });
+  }
+  return lines;
+}
+
+const edgesOf = (run, outcome) => run.loops.filter((loop) => loop.outcome === outcome && loop.a);
+
+const edgeText = (loop) => label(`frame ${loop.query} to ${loop.candidate}, H = ${fixed(loop.h, 3)}, ` +
+  `${loop.inliers} inliers${loop.reason ? `; ${loop.reason}` : ''}`);
+
+// Lines, broken between edges, and a mark at the newer end of each.
+function edgeTraces(run, make) {
+  const traces = [];
+  for (const [outcome, style] of Object.entries(OUTCOMES)) {
+    const edges = edgesOf(run, outcome);
+    if (!edges.length) continue;
+    const hidden = outcome === 'rejected' || outcome === 'missed' ? 'legendonly' : true;
+    const name = `${style.name} (${edges.length})`;
+    const lines = [[], [], []], marks = [[], [], []];
+    for (const edge of edges) {
+      for (let k = 0; k < 3; ++k) {
+        lines[k].push(edge.a[k], edge.b[k], null);
+        marks[k].push(edge.b[k]);
+      }
+    }
+    traces.push(
+      { ...make(lines), mode: 'lines', name, legendgroup: outcome, showlegend: false, visible: hidden,
+        hoverinfo: 'skip', line: { color: style.color, dash: style.dash, width: 2 } },
+      { ...make(marks), mode: 'markers', name, legendgroup: outcome, visible: hidden,
+        text: edges.map(edgeText), hoverinfo: 'text+name',
+        marker: { color: style.color, symbol: style.symbol, size: make.size, line: { width: 0 } } });
+  }
+  return traces;
+}
+
+async function drawTop(panel) {
+  const run = chosen();
+  if (!run.slam.x.length) return panel.append(note('No trajectory: without a calibration there are loops alone.'));
+  const { plane: [right, ahead], up } = planeOf(mainPath());
+  const make = (points) => ({ type: 'scatter', x: points[right], y: points[ahead] });
+  make.size = 8;
+  const traces = paths().map((line) => ({ ...make(AXES.map((a) => line.path[a])), mode: 'lines', name: label(line.name),
+    line: lineOf(line.name, line.width), hovertemplate: '%{x:.2f}, %{y:.2f}' }));
+  traces.push(...edgeTraces(run, make));
+  // Cameras look along z with y down: from above, x is right and z ahead.
+  const layout = layoutOf(`Top view, along ${AXES[up]}`, {
+    xaxis: axis(`${AXES[right]} [${run.unit}]`),
+    yaxis: axis(`${AXES[ahead]} [${run.unit}]`, { scaleanchor: 'x', scaleratio: 1 }),
+    dragmode: 'pan',
+  });
+  await chart(panel, 'tall', traces, layout);
+  panel.append(note(mapNote(run)));
+}
+
+function mapNote(run) {
+  const loops = run.loops.filter((loop) => loop.outcome !== 'missed');
+  const drawn = loops.filter((loop) => loop.a).length;
+  const aligned = run.reference ? 'Estimates are aligned to the reference.' : 'No reference: estimates in the frame of the first camera.';
+  const shown = data.runs.length > 1 ? ` Loops of ${run.variant}.` : '';
+  const rest = drawn < loops.length ? ` ${loops.length - drawn} loops end at frames without a pose in this piece of map.` : '';
+  return `${aligned}${shown} Rejected and missed loops: tap their name in the legend.${rest}`;
+}
+
+async function draw3d(panel) {
+  const run = chosen();
+  if (!run.slam.x.length) return panel.append(note('No trajectory: without a calibration there are loops alone.'));
+  const { up } = planeOf(mainPath());
+  const make = (points) => ({ type: 'scatter3d', x: points[0], y: points[1], z: points[2] });
+  make.size = 4;
+  const traces = paths().map((line) => ({ ...make(AXES.map((a) => line.path[a])), mode: 'lines', name: label(line.name),
+    line: lineOf(line.name, line.width + 2), hovertemplate: '%{x:.2f}, %{y:.2f}, %{z:.2f}' }));
+  traces.push(...edgeTraces(run, make));
+  const sign = up === 1 ? -1 : 1;  // a camera's y points down
+  const away = narrow() ? 2 : 1.3;
+  const eye = [away, away, away];
+  eye[up] = (away + 0.2) * sign;
+  const vector = (v) => ({ x: v[0], y: v[1], z: v[2] });
+  const scene = { aspectmode: 'data', camera: { up: vector([0, 1, 2].map((k) => (k === up ? sign : 0))), eye: vector(eye) } };
+  for (const a of AXES) {
+    scene[`${a}axis`] = { title: { text: `${a} [${run.unit}]` }, gridcolor: css('--line'), color: css('--ink'),
+      backgroundcolor: css('--raised'), showbackground: true, zerolinecolor: css('--line') };
+  }
+  await chart(panel, 'tall', traces, layoutOf('', { scene, margin: { l: 0, r: 0, t: 10, b: 10 },
+    legend: { orientation: 'h', y: 1, yanchor: 'top', x: 0, bgcolor: 'rgba(0,0,0,0)' } }));
+  panel.append(note('Drag to turn, wheel or pinch to zoom, right button or two fingers to move. ' + mapNote(run)));
+}

@@ -1,0 +1,63 @@
+#include "run_with_report.h"
+
+#include <memory>
+
+#include "files.h"
+#include "tutti/report/comparison_report.h"
+#include "tutti/report/page.h"
+#include "tutti/report/run_report.h"
+
+namespace tutti::cli {
+
+namespace {
+
+void WriteReport(const std::filesystem::path& out, const RunResult& result, const DetectionLog& log) {
+  nlohmann::ordered_json report = RunReport(result, log, VariantName(result.config));
+  WriteText(out / "report.json",
+            report.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
+  WriteReportPage(out / "report.html", SingleRunPage(std::move(report)));
+}
+
+}  // namespace
+
+RunResult RunWithReport(RunRequest request, const RunConfig& config) {
+  const auto log = std::make_shared<DetectionLog>();
+  request.observers.push_back(log);
+  RunResult result = RunSlam(request, config);
+  WriteReport(request.out, result, *log);
+  return result;
+}
+
+TrackedSequence TrackWithReport(RunRequest request, const RunConfig& config) {
+  TrackedSequence sequence = TrackSequence(request, config);
+  WriteReport(request.out, sequence.result, DetectionLog());
+  return sequence;
+}
+
+RunResult CloseLoopsWithReport(const TrackedSequence& tracked, RunRequest request, const RunConfig& config) {
+  const auto log = std::make_shared<DetectionLog>();
+  request.observers.push_back(log);
+  RunResult result = CloseLoops(tracked, request, config);
+  WriteReport(request.out, result, *log);
+  return result;
+}
+
+void WriteComparisonReport(const std::filesystem::path& file, const std::string& title,
+                           const Comparison& comparison) {
+  std::vector<ReportTable> tables;
+  for (const ComparisonTable& table : ComparisonTables(comparison))
+    tables.push_back({table.dataset, table.table.header, table.table.rows, table.notes});
+  std::vector<nlohmann::ordered_json> runs;
+  std::vector<std::string> failures;
+  for (const RunFigures& run : comparison.runs) {
+    if (!run.failure.empty())
+      failures.push_back(run.variant + ", seed " + std::to_string(run.seed) + ": " + run.failure);
+    auto report = ReadRunReport(run.folder);
+    if (!report) continue;
+    (*report)["variant"] = run.variant;
+    runs.push_back(std::move(*report));
+  }
+  WriteReportPage(file, ComparisonPage(title, tables, std::move(runs), failures));
+}
+
+}  // namespace tutti::cli

@@ -1,0 +1,25 @@
+// A run and the report beside it.
+#pragma once
+
+#include <string>
+
+#include "comparison.h"
+#include "tutti/pipeline/runner.h"
+#include "tutti/pipeline/shared_odometry.h"
+
+namespace tutti::cli {
+
+/// RunSlam, and then request.out/report.json and report.html (the page, unless tutti was built without the
+/// chart library). Throws what RunSlam does, and InputError if they can't be written.
+RunResult RunWithReport(RunRequest request, const RunConfig& config);
+
+/// The same for a sequence that is tracked without loops, and for loops that are closed on it.
+TrackedSequence TrackWithReport(RunRequest request, const RunConfig& config);
+RunResult CloseLoopsWithReport(const TrackedSequence& tracked, RunRequest request, const RunConfig& config);
+
+/// The page of a comparison, or removes an older one if pages are left out. `runs` without a report.json are
+/// in the table alone.
+void WriteComparisonReport(const std::filesystem::path& file, const std::string& title,
+                           const Comparison& comparison);
+
+}  // namespace tutti::cli

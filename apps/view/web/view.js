@@ -1,0 +1,236 @@
+'use strict';
+// The live view: newest state over server-sent events, drawn on canvases.
+
+const COLORS = { surf: '#e69f00', sift: '#56b4e9', orb: '#cc79a7', ensemble: '#0072b2', accepted: '#009e73', waiting: '#e69f00', path: '#0072b2', here: '#d55e00' };
+const DASHES = { surf: [8, 3, 2, 3], sift: [10, 5], orb: [2, 3], ensemble: [] };
+const MOST_ANSWERS = 1500, MOST_LINES = 300;
+const by = (id) => document.getElementById(id);
+const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+const token = new URLSearchParams(location.search).get('token');
+const address = (path, query = {}) => `${path}?${new URLSearchParams(token ? { ...query, token } : query)}`;
+
+const state = { news: null, picture: null, answers: [], points: new Map(), view: null, received: 0 };
+
+function sharp(canvas, ratio) {
+  const width = Math.round(canvas.clientWidth * devicePixelRatio), height = Math.round(width * ratio);
+  if (canvas.width !== width || canvas.height !== height) { canvas.width = width; canvas.height = height; }
+  const context = canvas.getContext('2d');
+  context.setTransform(1, 0, 0, 1, 0, 0);
+  context.clearRect(0, 0, width, height);
+  return context;
+}
+
+function drawImage() {
+  const picture = state.picture;
+  if (!picture) return;
+  const canvas = by('image'), context = sharp(canvas, picture.height / picture.width);
+  context.scale(canvas.width / picture.width, canvas.width / picture.width);
+  context.drawImage(picture, 0, 0);
+  context.lineWidth = 1;
+  context.strokeStyle = context.fillStyle = COLORS.accepted;
+  for (const [x0, y0, x, y] of state.news.frame.tracks ?? []) {
+    context.beginPath();
+    context.moveTo(x0, y0);
+    context.lineTo(x, y);
+    context.stroke();
+    context.fillRect(x - 1.5, y - 1.5, 3, 3);
+  }
+}
+
+// Rotates by a unit quaternion (x, y, z, w) and moves.
+function transform([tx, ty, tz, x, y, z, w], [a, b, c]) {
+  const u = 2 * (y * c - z * b), v = 2 * (z * a - x * c), t = 2 * (x * b - y * a);
+  return [a + w * u + y * t - z * v + tx, b + w * v + z * u - x * t + ty, c + w * t + x * v - y * u + tz];
+}
+
+// Top view: x to the right, z ahead (cameras have y down).
+function fit(canvas, places) {
+  let [left, right, low, high] = [Infinity, -Infinity, Infinity, -Infinity];
+  for (const [, , , p] of places) {
+    left = Math.min(left, p[0]); right = Math.max(right, p[0]);
+    low = Math.min(low, p[2]); high = Math.max(high, p[2]);
+  }
+  if (!(right >= left)) return { x: 0, z: 0, scale: 50 };
+  const scale = 0.65 * Math.min(canvas.width / Math.max(right - left, 1e-3), canvas.height / Math.max(high - low, 1e-3), canvas.width / 0.5);
+  return { x: (left + right) / 2, z: (low + high) / 2, scale };
+}
+
+function drawMap() {
+  const canvas = by('map'), context = sharp(canvas, 0.75), places = state.news.places;
+  const view = state.view ?? fit(canvas, places);
+  const at = (p) => [canvas.width / 2 + view.scale * (p[0] - view.x), canvas.height / 2 - view.scale * (p[2] - view.z)];
+  const poses = new Map(places.map(([id, , , pose]) => [id, pose])), frames = new Map(places.map(([, frame, , pose]) => [frame, pose]));
+  context.fillStyle = css('--faint');
+  context.globalAlpha = 0.5;
+  for (const [id, points] of state.points) {
+    if (!poses.has(id)) continue;
+    for (const point of points) {
+      const [x, y] = at(transform(poses.get(id), point));
+      context.fillRect(x, y, 1.5, 1.5);
+    }
+  }
+  context.globalAlpha = 1;
+  context.lineWidth = 2 * devicePixelRatio;
+  context.strokeStyle = COLORS.path;
+  context.beginPath();
+  let piece = null;
+  for (const [, , now, pose] of places) {
+    const [x, y] = at(pose);
+    if (now === piece) context.lineTo(x, y); else context.moveTo(x, y);
+    piece = now;
+  }
+  context.stroke();
+  for (const [query, candidate, accepted] of state.news.loops) {
+    const a = frames.get(query), b = frames.get(candidate);
+    if (!a || !b) continue;
+    context.strokeStyle = accepted ? COLORS.accepted : COLORS.waiting;
+    context.setLineDash(accepted ? [] : [6, 5]);
+    context.beginPath();
+    context.moveTo(...at(a));
+    context.lineTo(...at(b));
+    context.stroke();
+  }
+  context.setLineDash([]);
+  const here = state.news.frame.position;
+  if (!here) return;
+  const [x, y] = at(here);
+  context.fillStyle = COLORS.here;
+  context.beginPath();
+  context.arc(x, y, 5 * devicePixelRatio, 0, 7);
+  context.fill();
+}
+
+function drawPosterior() {
+  const canvas = by('posterior'), context = sharp(canvas, 0.42), answers = state.answers;
+  const size = 11 * devicePixelRatio, left = 4 * size, bottom = canvas.height - 2 * size, top = 2.2 * size;
+  const names = [...new Set(answers.flatMap((answer) => Object.keys(answer.h)))];
+  const most = Math.max(0.1, ...answers.flatMap((answer) => Object.values(answer.h).filter((h) => h !== null)));
+  context.font = `${size}px system-ui, sans-serif`;
+  context.lineWidth = 1;
+  for (const share of [0, 0.5, 1]) {
+    const y = bottom - share * (bottom - top);
+    context.strokeStyle = css('--line');
+    context.beginPath();
+    context.moveTo(left, y);
+    context.lineTo(canvas.width, y);
+    context.stroke();
+    context.fillStyle = css('--faint');
+    context.fillText((share * most).toFixed(2), 4, y + size / 3);
+  }
+  if (answers.length < 2) return;
+  const first = answers[0].query, last = answers.at(-1).query;
+  context.fillText(`frame ${first}`, left, canvas.height - size / 2);
+  context.fillText(`${last}`, canvas.width - 3 * size, canvas.height - size / 2);
+  let legend = left;
+  for (const name of names) {
+    context.strokeStyle = context.fillStyle = COLORS[name] ?? css('--ink');
+    context.lineWidth = (name === 'ensemble' ? 2.5 : 1.5) * devicePixelRatio;
+    context.setLineDash(DASHES[name] ?? [4, 4]);
+    context.beginPath();
+    let open = false;
+    for (const { query, h } of answers) {
+      if (h[name] === null || h[name] === undefined) { open = false; continue; }
+      const x = left + (canvas.width - left) * (query - first) / Math.max(1, last - first), y = bottom - (bottom - top) * h[name] / most;
+      if (open) context.lineTo(x, y); else context.moveTo(x, y);
+      open = true;
+    }
+    context.moveTo(legend, size);
+    context.lineTo(legend + 2 * size, size);
+    context.stroke();
+    context.setLineDash([]);
+    context.fillText(name, legend + 2.4 * size, 1.3 * size);
+    legend += context.measureText(name).width + 4 * size;
+  }
+}
+
+function addLines(events) {
+  const log = by('log');
+  for (const event of events) if (event.text) log.append(Object.assign(document.createElement('div'), { textContent: event.text }));
+  while (log.childElementCount > MOST_LINES) log.firstElementChild.remove();
+  log.scrollTop = log.scrollHeight;
+}
+
+function showStatus() {
+  const { frame, paused, finished } = state.news;
+  by('pause').textContent = paused ? 'Resume' : 'Pause';
+  by('pause').disabled = finished;
+  by('step').disabled = !paused || finished;
+  const accepted = state.news.loops.filter((loop) => loop[2]).length;
+  by('status').textContent = `${finished ? 'done' : paused ? 'paused' : 'running'}, frame ${frame.index}: ${frame.state}` +
+    `${frame.reason ? ` (${frame.reason})` : ''}, ${frame.features} features, ${frame.inliers} inliers, ` +
+    `${state.news.places.length} keyframes, ${accepted} loops`;
+  document.body.dataset.frame = frame.number;
+  document.body.dataset.paused = paused ? '1' : '0';
+  document.body.dataset.finished = finished ? '1' : '0';
+}
+
+let drawing = false;
+function draw() {
+  if (drawing || !state.news) return;
+  drawing = true;
+  requestAnimationFrame(() => {
+    drawing = false;
+    drawImage();
+    drawMap();
+    drawPosterior();
+  });
+}
+
+function take(news) {
+  state.news = news;
+  for (const [id, points] of news.points) state.points.set(id, points);
+  for (const event of news.events) if ('query' in event) state.answers.push(event);
+  state.answers.splice(0, state.answers.length - MOST_ANSWERS);
+  addLines(news.events);
+  showStatus();
+  document.body.dataset.received = ++state.received;
+  if (news.frame.image) {
+    const picture = new Image();
+    picture.onload = () => { state.picture = picture; draw(); };
+    picture.src = news.frame.image;
+  }
+  draw();
+}
+
+async function command(what) {
+  const answer = await fetch(address('control', { do: what }), { method: 'POST', headers: { 'X-Tutti': '1' } });
+  if (!answer.ok) by('status').textContent = `refused: ${await answer.text()}`;
+}
+
+function moveMap() {
+  const canvas = by('map'), fingers = new Map();
+  const hold = () => { state.view ??= fit(canvas, state.news?.places ?? []); };
+  const zoom = (factor) => { hold(); state.view.scale *= factor; draw(); };
+  canvas.addEventListener('wheel', (event) => { event.preventDefault(); zoom(Math.exp(-event.deltaY / 400)); }, { passive: false });
+  canvas.addEventListener('dblclick', () => { state.view = null; draw(); });
+  canvas.addEventListener('pointerdown', (event) => { canvas.setPointerCapture(event.pointerId); fingers.set(event.pointerId, event); });
+  for (const end of ['pointerup', 'pointercancel']) canvas.addEventListener(end, (event) => fingers.delete(event.pointerId));
+  canvas.addEventListener('pointermove', (event) => {
+    const before = fingers.get(event.pointerId);
+    if (!before) return;
+    hold();
+    const others = [...fingers.values()].filter((f) => f.pointerId !== event.pointerId);
+    if (others.length) {
+      const apart = (f) => Math.hypot(f.clientX - others[0].clientX, f.clientY - others[0].clientY);
+      zoom(apart(event) / Math.max(1, apart(before)));
+    } else {
+      state.view.x -= (event.clientX - before.clientX) * devicePixelRatio / state.view.scale;
+      state.view.z += (event.clientY - before.clientY) * devicePixelRatio / state.view.scale;
+    }
+    fingers.set(event.pointerId, event);
+    draw();
+  });
+}
+
+by('pause').addEventListener('click', () => command(state.news?.paused ? 'resume' : 'pause'));
+by('step').addEventListener('click', () => command('step'));
+matchMedia('(prefers-color-scheme: dark)').addEventListener('change', draw);
+window.addEventListener('resize', draw);
+moveMap();
+const source = new EventSource(address('events'));
+source.onmessage = (message) => {
+  const news = JSON.parse(message.data);
+  take(news);
+  if (news.finished) source.close();
+};
+source.onerror = () => { if (!state.news?.finished) by('status').textContent = 'the run has ended, or can\'t be reached'; source.close(); };

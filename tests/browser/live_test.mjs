@@ -1,0 +1,158 @@
+// The live view of a real run in a real browser: pause, step, resume; who may not look; a browser that is gone.
+// usage: node live_test.mjs TUTTI CONFIGS [--shots DIR]
+import { spawn, spawnSync } from 'node:child_process';
+import { existsSync, mkdtempSync, readFileSync, rmSync } from 'node:fs';
+import { request } from 'node:http';
+import { connect } from 'node:net';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { check, DESKTOP, launch, openPage, PHONE, SKIP, sleep } from './browser.mjs';
+
+const [tutti, configs, , shots] = process.argv.slice(2);
+
+function sequence(folder) {
+  const kitchen = join(process.env.TUTTI_DATA ?? '', 'redkitchen');
+  if (process.env.TUTTI_DATA && existsSync(kitchen)) return [join(configs, '7scenes.yaml'), kitchen];
+  console.log('no TUTTI_DATA/redkitchen: a synthetic room takes its place');
+  const room = join(folder, 'room');
+  spawnSync(tutti, ['generate', '--out', room, '--sensor', 'rgbd', '--world', 'room', '--laps', '1.2', '--width', '320', '--height', '240', '--supersample', '1']);
+  return [join(room, 'config.yaml'), room];
+}
+
+// A run in the background, and the address that it prints.
+async function start(folder, name, [config, dataset], more = []) {
+  const run = spawn(tutti, ['run', '--config', config, '--dataset', dataset, '--out', join(folder, name), '--view-port', '0',
+    '--no-report', ...more]);
+  let text = '';
+  const ended = new Promise((done) => run.on('close', done));
+  const url = await new Promise((found, failed) => {
+    run.stderr.on('data', (data) => {
+      text += data;
+      const line = /look at (http\S+)\n/.exec(text);
+      if (line) found(line[1]);
+    });
+    run.stdout.resume();
+    ended.then(() => failed(new Error(text)));
+  });
+  return { run, url, ended };
+}
+
+const status = (url, { method = 'GET', headers = {} } = {}) => new Promise((done) => {
+  const asked = request(url, { method, headers }, (answer) => { done(answer.statusCode); answer.destroy(); });
+  asked.on('error', () => done(0));
+  asked.end();
+});
+
+const frame = (page) => page.evaluate(() => Number(document.body.dataset.frame ?? 0));
+const waitFor = (page, test, argument) => page.waitForFunction(test, { timeout: 60000 }, argument);
+// Pixels of a canvas that are not empty.
+const inked = (page, id) => page.evaluate((name) => {
+  const canvas = document.getElementById(name);
+  const pixels = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
+  let count = 0;
+  for (let i = 3; i < pixels.length; i += 4) if (pixels[i] > 0) ++count;
+  return count;
+}, id);
+
+async function drive(browser, folder, data) {
+  const { url, ended, run } = await start(folder, 'drive', data, ['--view', '--view-wait', '60', '--max-frames', '330']);
+  check(/^http:\/\/127\.0\.0\.1:\d+\/$/.test(url), `loopback by default, not ${url}`);
+  const allow = (target) => target.startsWith(url);
+  const { page, problems } = await openPage(browser, url, { allow });
+  await waitFor(page, () => Number(document.body.dataset.frame) > 30);
+  await page.click('#pause');
+  await waitFor(page, () => document.body.dataset.paused === '1');
+  await sleep(700);
+  const at = await frame(page);
+  await sleep(1500);
+  check(await frame(page) === at, 'a run that is paused stands still');
+  await page.click('#step');
+  await waitFor(page, (before) => Number(document.body.dataset.frame) > before, at);
+  await sleep(700);
+  check(await frame(page) === at + 1, `a step is one frame, not ${await frame(page) - at}`);
+  for (const id of ['image', 'map']) check(await inked(page, id) > 100, `the canvas ${id} is drawn`);
+  await page.click('#pause');
+  await waitFor(page, (before) => Number(document.body.dataset.frame) > before + 20, at);
+  await waitFor(page, () => state.answers.length > 15);
+  check(await inked(page, 'posterior') > 100, 'the posteriors are drawn');
+  const phone = await openPage(browser, url, { allow, viewport: PHONE, scheme: 'dark' });
+  await waitFor(phone.page, () => Number(document.body.dataset.received) > 2);
+  check(await phone.page.evaluate(() => document.documentElement.scrollWidth <= window.innerWidth + 1), 'the page fits a phone');
+  if (shots) await phone.page.screenshot({ path: join(shots, 'live-phone.png') });
+  await phone.page.close();
+  await page.bringToFront();  // a page in the background draws nothing
+  if (shots) {
+    await page.setViewport(DESKTOP);
+    await waitFor(page, () => state.news.loops.filter((loop) => loop[2]).length > 3).catch(() => {});
+    await sleep(500);
+    await page.screenshot({ path: join(shots, 'live.png') });
+  }
+  check(await page.evaluate(() => document.getElementById('log').childElementCount > 0), 'decisions are listed');
+  for (const problem of new Set([...problems, ...phone.problems])) check(false, problem);
+  // Others: another site's name for this machine, its pages, other paths.
+  check(await status(url, { headers: { Host: 'evil.example' } }) === 403, 'a foreign Host is refused');
+  check(await status(url, { headers: { Host: '127.evil.example' } }) === 403, 'a foreign Host with a number is refused');
+  check(await status(`${url}control?do=pause`, { method: 'POST' }) === 403, 'a POST as other sites can send it is refused');
+  check(await status(`${url}etc/passwd`) === 404, 'other paths are not served');
+  check(await status(`${url}../../../../etc/passwd`) === 404, 'no files are served');
+  // A pause whose browser is gone ends by itself.
+  await page.click('#pause');
+  await waitFor(page, () => document.body.dataset.paused === '1');
+  await page.close();
+  const code = await Promise.race([ended, sleep(240000)]);
+  check(code === 0, `the run ends although its viewer went while it was paused (${code})`);
+  run.kill();
+}
+
+// A browser that connects and reads nothing must not hold the run up.
+async function sleepers(folder, data) {
+  const { url, ended, run } = await start(folder, 'sleepers', data, ['--view', '--max-frames', '80']);
+  const { hostname, port } = new URL(url);
+  const sockets = [0, 1, 2].map(() => {
+    const socket = connect(Number(port), hostname);
+    socket.on('error', () => {});
+    socket.write(`GET /events HTTP/1.1\r\nHost: ${hostname}\r\n\r\n`);
+    socket.pause();
+    return socket;
+  });
+  const code = await Promise.race([ended, sleep(120000)]);
+  check(code === 0, `a run with viewers that read nothing ends (${code})`);
+  for (const socket of sockets) socket.destroy();
+  run.kill();
+  const alone = spawnSync(tutti, ['run', '--config', data[0], '--dataset', data[1], '--out', join(folder, 'alone'), '--no-report',
+    '--max-frames', '80', '--quiet']);
+  check(alone.status === 0, 'a run without the view');
+  check(readFileSync(join(folder, 'alone', 'trajectory.txt'), 'utf8') === readFileSync(join(folder, 'sleepers', 'trajectory.txt'), 'utf8'),
+    'looking changes nothing: the same trajectory, byte for byte');
+}
+
+async function strangers(folder, data) {
+  const { url, run, ended } = await start(folder, 'token', data, ['--view-address', '0.0.0.0']);
+  const token = new URL(url).searchParams.get('token');
+  check(/^[0-9a-f]{32}$/.test(token ?? ''), `a token of 128 bits: ${url}`);
+  const here = url.replace('0.0.0.0', '127.0.0.1');
+  check(await status(here) === 200, 'with the token');
+  check(await status(here.replace(/token=.*/, '')) === 403, 'without a token');
+  check(await status(here.replace(/token=./, 'token=x')) === 403, 'with a wrong token');
+  check(await status(here.replace('/?', '/events?').replace(/token=./, 'token=x')) === 403, 'the data with a wrong token');
+  run.kill('SIGINT');
+  await ended;
+}
+
+const help = spawnSync(tutti, ['run', '--config', join(configs, '7scenes.yaml'), '--dataset', '/nowhere', '--out', '/tmp/nowhere', '--view',
+  '--view-port', '0'], { encoding: 'utf8' });
+if (/without cpp-httplib/.test(help.stderr)) {
+  console.log('skipped: this tutti was built without cpp-httplib (libcpp-httplib-dev)');
+  process.exit(SKIP);
+}
+const browser = await launch();
+const folder = mkdtempSync(join(tmpdir(), 'tutti-live-'));
+try {
+  const data = sequence(folder);
+  await drive(browser, folder, data);
+  await sleepers(folder, data);
+  await strangers(folder, data);
+} finally {
+  await browser.close();
+  rmSync(folder, { recursive: true, force: true });
+}

@@ -1,0 +1,82 @@
+// Opens a report in Chromium, clicks every tab and choice, and looks whether each chart has drawn.
+import { mkdirSync } from 'node:fs';
+import { basename, dirname, join, resolve } from 'node:path';
+import { pathToFileURL } from 'node:url';
+import { check, DESKTOP, openPage, PHONE, sleep } from './browser.mjs';
+
+const LOOKS = [['light', DESKTOP, 'light'], ['dark', DESKTOP, 'dark'], ['phone', PHONE, 'light']];
+
+async function openTab(page, id) {
+  await page.evaluate((tab) => document.getElementById(`tab-${tab}`).click(), id);
+  await page.waitForFunction((tab) => document.getElementById(tab).dataset.state === 'drawn', { timeout: 120000 }, id);
+}
+
+// What stands in a tab: its charts (drawn, and with marks in them), its pictures, its width.
+const lookAt = (page, id) => page.evaluate((tab) => {
+  const panel = document.getElementById(tab);
+  const charts = [...panel.querySelectorAll('.chart')].map((div) => ({
+    drawn: div.dataset.drawn,
+    marks: div.querySelectorAll('.trace, .hm image, .gl-container canvas, .bars path').length,
+    width: div.getBoundingClientRect().width,
+  }));
+  const images = [...panel.querySelectorAll('img')].map((img) => img.src.startsWith('data:image/jpeg'));
+  return { charts, images, text: panel.innerText.length, overflow: document.documentElement.scrollWidth - window.innerWidth };
+}, id);
+
+// The 3D chart is pixels: it has drawn if they are not all of one colour.
+const colours3d = (page) => page.evaluate(() => {
+  const source = document.querySelector('#space .gl-container canvas');
+  if (!source) return 0;
+  const plot = document.querySelector('#space .js-plotly-plot')._fullLayout.scene._scene.glplot;
+  plot.redraw();
+  const copy = document.createElement('canvas');
+  copy.width = source.width;
+  copy.height = source.height;
+  const context = copy.getContext('2d');
+  context.drawImage(source, 0, 0);
+  return new Set(new Uint32Array(context.getImageData(0, 0, copy.width, copy.height).data.buffer)).size;
+});
+
+async function lookOnce(browser, file, [look, viewport, scheme], expected, shots) {
+  const { page, problems } = await openPage(browser, pathToFileURL(resolve(file)).href, { viewport, scheme });
+  await page.waitForFunction(() => document.documentElement.dataset.ready === '1', { timeout: 120000 });
+  const tabs = await page.evaluate(() => [...document.querySelectorAll('[role=tab]')].map((tab) => tab.id.slice(4)));
+  check(tabs.length === 9, `${file}: 9 tabs, not ${tabs.length}`);
+  for (const tab of tabs) {
+    await openTab(page, tab);
+    const found = await lookAt(page, tab);
+    const where = `${basename(dirname(file))}, ${look}, ${tab}`;
+    check(found.text > 0, `${where}: is empty`);
+    check(found.overflow <= 1, `${where}: ${found.overflow} px wider than the window`);
+    for (const chart of found.charts) {
+      check(chart.drawn === '1' && chart.marks > 0, `${where}: a chart has not drawn (${JSON.stringify(chart)})`);
+      check(chart.width > 200, `${where}: a chart of ${chart.width} px`);
+    }
+    check(found.images.every((good) => good), `${where}: a picture is missing`);
+    if (expected.includes(tab)) check(found.charts.length + found.images.length > 0, `${where}: nothing drawn`);
+    if (tab === 'space' && found.charts.length) check(await colours3d(page) > 3, `${where}: the 3D view is blank`);
+    if (shots) {
+      await sleep(300);
+      mkdirSync(shots, { recursive: true });
+      await page.screenshot({ path: join(shots, `${look}-${tab}.png`) });
+    }
+  }
+  for (const select of await page.$$('#choices select')) {
+    const values = await select.evaluate((node) => [...node.options].map((o) => o.value));
+    await page.evaluate((id) => document.getElementById(`tab-${id}`).click(), 'map');
+    for (const value of values) {
+      await select.select(value);
+      await page.waitForFunction(() => document.getElementById('map').dataset.state === 'drawn', { timeout: 60000 });
+    }
+  }
+  check(await page.evaluate(() => window.hacked === undefined), `${file}: a text of the report was run as a script`);
+  for (const problem of new Set(problems)) check(false, `${file}, ${look}: ${problem}`);
+  await page.close();
+  console.log(`${look}: ${tabs.length} tabs of ${file}`);
+}
+
+// Light, dark and on a phone. `expected`: tabs that must hold a chart or a picture; `shots`: folder for a PNG of every
+// tab, or nothing.
+export async function lookThrough(browser, file, { expected = [], shots } = {}) {
+  for (const look of LOOKS) await lookOnce(browser, file, look, expected, shots);
+}

@@ -19,6 +19,8 @@ const Names<RobustLoss> kRobust = {{"none", RobustLoss::kNone},
                                    {"huber", RobustLoss::kHuber},
                                    {"cauchy", RobustLoss::kCauchy},
                                    {"dcs", RobustLoss::kDcs},
+                                   {"switchable", RobustLoss::kSwitchable},
+                                   {"gnc-tls", RobustLoss::kGncTls},
                                    {"gnc", RobustLoss::kGnc}};
 const Names<GraphInit> kInits = {{"auto", GraphInit::kAuto},
                                  {"file", GraphInit::kFile},
@@ -54,5 +56,19 @@ GraphInit ParseGraphInit(const std::string& name) { return Parse(kInits, name, "
 const char* ToString(GraphObjective objective) { return Name(kObjectives, objective); }
 const char* ToString(RobustLoss robust) { return Name(kRobust, robust); }
 const char* ToString(GraphInit init) { return Name(kInits, init); }
+
+const char* ToString(LoopDoubt doubt) {
+  switch (doubt) {
+    case LoopDoubt::kNone:
+      return "";
+    case LoopDoubt::kLoss:
+      return "the other constraints contradict it (robust loss)";
+    case LoopDoubt::kPairwise:
+      return "not in the largest set of loops that agree with each other";
+    case LoopDoubt::kSigma:
+      return "off by more than 3 sigma after the optimisation";
+  }
+  return "";
+}
 
 }  // namespace tutti

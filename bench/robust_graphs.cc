@@ -1,9 +1,10 @@
 // How many false loops does each robust method stand? One line of CSV per run:
 //   build/release/bench/robust_graphs GRAPH.g2o METHOD COUNT CLUSTER_SIZE FIRST_SEED LAST_SEED
-// The graph is solved as it is by least squares (the clean solution). Then false loops are planted (COUNT of them, in
-// clusters of CLUSTER_SIZE that agree with each other; false_loops.h) and it is solved again with METHOD, from the best
-// of all starts. Columns: graph, method, count, cluster size, seed, ATE against the clean solution as a share of its
-// bounding box' diagonal [%], precision and recall of the loops that were kept, processor time [s].
+// The graph is solved as it is by least squares (the clean solution). Then false loops are planted (COUNT of
+// them, in clusters of CLUSTER_SIZE that agree with each other; false_loops.h) and it is solved again with
+// METHOD, from the best of all starts. Columns: graph, method, count, cluster size, seed, ATE against the
+// clean solution as a share of its bounding box' diagonal [%], precision and recall of the loops that were
+// kept, processor time [s].
 #include <cstdio>
 #include <cstdlib>
 #include <ctime>
@@ -68,7 +69,8 @@ void Run(const std::filesystem::path& file, const std::string& method, const Fal
   const double share = 100 * AlignedError(clean, start) / BoundingBoxDiagonal(clean);
   std::printf("%s,%s,%d,%d,%llu,%.6g,%.5f,%.5f,%.2f\n", file.stem().c_str(), method.c_str(), loops.count,
               loops.cluster_size, static_cast<unsigned long long>(loops.seed), share,
-              kept_true / std::max(1.0, kept_true + kept_false), kept_true / std::max(1.0, all_true), seconds);
+              kept_true / std::max(1.0, kept_true + kept_false), kept_true / std::max(1.0, all_true),
+              seconds);
   std::fflush(stdout);
 }
 

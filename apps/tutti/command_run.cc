@@ -101,10 +101,11 @@ void AddRunCommand(CLI::App& app, int& exit_code) {
   command->add_option("--seed", arguments->seed, "of everything that draws random numbers");
   command->add_option("--threads", arguments->threads, "most threads; the result is the same for any number");
   command
-      ->add_option("--inject-false-loops", arguments->inject_false_loops,
-                   "test of the back end: plant so many false loops (random relative poses, wrong places, pairs that "
-                   "agree with each other) that look verified; loops.csv says what became of each (injected, reason, "
-                   "weight)")
+      ->add_option(
+          "--inject-false-loops", arguments->inject_false_loops,
+          "test of the back end: plant so many false loops (random relative poses, wrong places, pairs that "
+          "agree with each other) that look verified; loops.csv says what became of each (injected, reason, "
+          "weight)")
       ->check(CLI::NonNegativeNumber);
   command->add_option("--max-frames", arguments->max_frames, "the first frames only");
   command

@@ -74,8 +74,7 @@ class Planter {
         edge.kind = EdgeKind::kLoop;
         edge.from = graph_.nodes()[i + s].id;
         edge.to = graph_.nodes()[j + s].id;
-        edge.measurement =
-            PoseAt(i + s).Inverse() * PoseAt(i) * first * PoseAt(j).Inverse() * PoseAt(j + s);
+        edge.measurement = PoseAt(i + s).Inverse() * PoseAt(i) * first * PoseAt(j).Inverse() * PoseAt(j + s);
         planted.push_back(graph_.edges().size());
         graph_.AddEdge(edge);
       }

@@ -49,8 +49,7 @@ class CovarianceOf final : public GraphCovariance::Impl {
     int count = 0;
     for (const bool constant : structure_.constant) unknown_.push_back(constant ? -1 : N * count++);
     blocks_.resize(graph.nodes().size());
-    for (std::size_t k = 0; k < blocks_.size(); ++k)
-      PoseToBlock<N>(graph.nodes()[k].pose, blocks_[k].data());
+    for (std::size_t k = 0; k < blocks_.size(); ++k) PoseToBlock<N>(graph.nodes()[k].pose, blocks_[k].data());
     std::vector<Eigen::Triplet<double>> triplets;
     for (std::size_t e = 0; e < graph.edges().size(); ++e) AddEdge(e, triplets);
     size_ = N * count;
@@ -142,7 +141,8 @@ class CovarianceOf final : public GraphCovariance::Impl {
     const std::vector<int> order = PublicOrder<N>();
     Eigen::MatrixXd out(N, N);
     for (int r = 0; r < N; ++r) {
-      for (int c = 0; c < N; ++c) out(order[static_cast<std::size_t>(r)], order[static_cast<std::size_t>(c)]) = m(r, c);
+      for (int c = 0; c < N; ++c)
+        out(order[static_cast<std::size_t>(r)], order[static_cast<std::size_t>(c)]) = m(r, c);
     }
     return out;
   }

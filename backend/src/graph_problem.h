@@ -98,7 +98,7 @@ class GraphProblem {
   double Objective() const {
     double sum = 0;
     for (std::size_t e = 0; e < costs_.size(); ++e) {
-      sum += !IsLoop(e)   ? EdgeChi2(e)
+      sum += !IsLoop(e)     ? EdgeChi2(e)
              : excluded_[e] ? 0.0
                             : RobustCost(options_.robust, EdgeChi2(e), threshold_);
     }
@@ -200,9 +200,9 @@ class GraphProblem {
   std::deque<EdgeCost<N>> costs_;  // a deque: cost functions can't be moved
   std::unique_ptr<ManifoldBase> manifold_;
   ceres::LossFunctionWrapper loss_{nullptr, ceres::TAKE_OWNERSHIP};
-  std::vector<bool> excluded_;                  // parallel to edges
-  std::vector<double> switches_;                // parallel to edges; empty: none
-  std::deque<SwitchedEdgeCost<N>> switched_;    // the same
+  std::vector<bool> excluded_;                // parallel to edges
+  std::vector<double> switches_;              // parallel to edges; empty: none
+  std::deque<SwitchedEdgeCost<N>> switched_;  // the same
   SwitchPrior switch_prior_;
   std::optional<ceres::Problem> ceres_;  // last: refers to the others; built when it is needed
 };

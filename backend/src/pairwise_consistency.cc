@@ -58,14 +58,14 @@ bool Agree(const Chain& chain, GraphKind kind, const Loop& a, const Loop& b, dou
   const Pose rest = b.measurement.Inverse() * back;
   const Pose E = a.measurement * (T[a.to].Inverse() * T[b.to]) * rest;
   const auto between = [&](std::size_t i, std::size_t j, const Pose& T_target_world) {
-    const Matrix6d way = i < j ? chain.covariance[j] - chain.covariance[i]
-                               : chain.covariance[i] - chain.covariance[j];
+    const Matrix6d way =
+        i < j ? chain.covariance[j] - chain.covariance[i] : chain.covariance[i] - chain.covariance[j];
     return Transported(way, T_target_world);
   };
-  const Matrix6d covariance =
-      Transported(a.covariance, (T[a.to].Inverse() * T[b.to] * rest).Inverse()) +
-      Transported(b.covariance, rest.Inverse()) + between(a.to, b.to, rest.Inverse() * T[b.to].Inverse()) +
-      between(b.from, a.from, T[a.from].Inverse());
+  const Matrix6d covariance = Transported(a.covariance, (T[a.to].Inverse() * T[b.to] * rest).Inverse()) +
+                              Transported(b.covariance, rest.Inverse()) +
+                              between(a.to, b.to, rest.Inverse() * T[b.to].Inverse()) +
+                              between(b.from, a.from, T[a.from].Inverse());
   return Mahalanobis(LogSE3(E), covariance, kind) <= threshold;
 }
 

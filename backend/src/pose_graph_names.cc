@@ -15,13 +15,10 @@ using Names = std::vector<std::pair<const char*, Enum>>;
 
 const Names<GraphObjective> kObjectives = {{"chi2", GraphObjective::kChi2},
                                            {"chi2log", GraphObjective::kChi2Log}};
-const Names<RobustLoss> kRobust = {{"none", RobustLoss::kNone},
-                                   {"huber", RobustLoss::kHuber},
-                                   {"cauchy", RobustLoss::kCauchy},
-                                   {"dcs", RobustLoss::kDcs},
-                                   {"switchable", RobustLoss::kSwitchable},
-                                   {"gnc-tls", RobustLoss::kGncTls},
-                                   {"gnc", RobustLoss::kGnc}};
+const Names<RobustLoss> kRobust = {
+    {"none", RobustLoss::kNone}, {"huber", RobustLoss::kHuber},           {"cauchy", RobustLoss::kCauchy},
+    {"dcs", RobustLoss::kDcs},   {"switchable", RobustLoss::kSwitchable}, {"gnc-tls", RobustLoss::kGncTls},
+    {"gnc", RobustLoss::kGnc}};
 const Names<GraphInit> kInits = {{"auto", GraphInit::kAuto},
                                  {"file", GraphInit::kFile},
                                  {"odometry", GraphInit::kOdometry},

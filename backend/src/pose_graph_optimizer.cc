@@ -39,7 +39,8 @@ class Run {
         options_(options),
         report_(report),
         problem_(graph, structure, options),
-        robust_(problem_, options, graph.edges().size(), [this](int iterations) { return SolveOnce(iterations); }) {
+        robust_(problem_, options, graph.edges().size(),
+                [this](int iterations) { return SolveOnce(iterations); }) {
     if (!options.pairwise_consistency) return;
     const std::vector<bool> agree =
         internal::PairwiseConsistentEdges(graph, structure, options.objective, problem_.threshold());
@@ -78,8 +79,8 @@ class Run {
     return false;
   }
 
-  /// Solves from the best start. With a robust loss "best" counts it in: a chordal start that false loops have
-  /// bent loses to the odometry.
+  /// Solves from the best start. With a robust loss "best" counts it in: a chordal start that false loops
+  /// have bent loses to the odometry.
   bool Solve() {
     const bool robust = options_.robust != RobustLoss::kNone && robust_.HasLoops() && !LeastSquaresSuffices();
     starts_.resize(1);

@@ -55,7 +55,7 @@ class RobustSolver {
       case RobustLoss::kNone:
         return solve_once_(options_.max_iterations);
       case RobustLoss::kHuber:
-        return SolveWith(new ceres::HuberLoss(std::sqrt(c2)));
+        return SolveWith(new ceres::HuberLoss(std::sqrt(c2)), options_.max_iterations);
       case RobustLoss::kSwitchable:
         problem_.AddSwitches();
         return solve_once_(options_.max_iterations);
@@ -68,15 +68,15 @@ class RobustSolver {
       case RobustLoss::kGnc:
         // Geman-McClure pulls less at true loops near the threshold than they deserve; DCS does not.
         return Graduate<GemanMcClureLoss>(graduated, [](double t) { return t; }) &&
-               SolveWith(new DcsLoss(c2)) && DecideLoops(c2);
+               SolveWith(new DcsLoss(c2), Few()) && DecideLoops(c2);
     }
     return false;
   }
 
   /// Information matrices are often right up to a factor only: where the loops fit so much better than they
-  /// promise that the threshold lies beyond kSafeSigmas of what the graph shows, false loops hide below it. The
-  /// threshold is then brought down to there, step by step, since the graph fits better as they leave. Nothing to
-  /// do where the user gave the threshold.
+  /// promise that the threshold lies beyond kSafeSigmas of what the graph shows, false loops hide below it.
+  /// The threshold is then brought down to there, step by step, since the graph fits better as they leave.
+  /// Nothing to do where the user gave the threshold.
   bool Tighten() {
     for (int round = 0; round < options_.gnc_max_rounds && options_.robust_chi2 == 0; ++round) {
       const double target = ShownThreshold();
@@ -94,15 +94,15 @@ class RobustSolver {
     problem_.SetLoss(nullptr);
     for (int round = 0; round < kRounds; ++round) {
       if (!SetWeights([c2](double s) { return s <= c2 ? 1.0 : 0.0; }) && round > 0) break;
-      if (!solve_once_(options_.max_iterations)) return false;
+      if (!solve_once_(Few())) return false;
     }
-    return true;
+    return solve_once_(options_.max_iterations);
   }
 
  private:
   static constexpr int kIterationsPerRound = 4;  // a round need not converge; the last one does
 
-  static constexpr double kSafeSigmas = 10;      // of the loops' own spread; real ones have heavy tails
+  static constexpr double kSafeSigmas = 10;  // of the loops' own spread; real ones have heavy tails
 
   /// The 99 % quantile for the noise that the loops show (their median chi-square), kSafeSigmas wide.
   double ShownThreshold() const {
@@ -116,9 +116,12 @@ class RobustSolver {
     return kSafeSigmas * kSafeSigmas * *middle / ChiSquareMedian(N) * ChiSquare99(N);
   }
 
-  bool SolveWith(ceres::LossFunction* owned) {
+  /// Iterations of a solution that only decides which loops are in.
+  int Few() const { return std::min(20, options_.max_iterations); }
+
+  bool SolveWith(ceres::LossFunction* owned, int iterations) {
     problem_.SetLoss(owned);
-    return solve_once_(options_.max_iterations);
+    return solve_once_(iterations);
   }
 
   /// Loss with thresholds from loose to tight.
@@ -133,7 +136,8 @@ class RobustSolver {
       // Loops that have come together need no further rounds.
       loose = std::min(loose, options_.gnc_step * std::max(c2, LargestChi2()));
     }
-    return SolveWith(new Loss(parameter(c2)));
+    const bool decided_later = options_.robust == RobustLoss::kGnc;
+    return SolveWith(new Loss(parameter(c2)), decided_later ? Few() : options_.max_iterations);
   }
 
   /// Weighted least squares whose weights go from all equal to 0 or 1. Each round has half the iterations of

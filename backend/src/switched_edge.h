@@ -9,8 +9,9 @@
 
 namespace tutti::internal {
 
-/// A loop edge times its switch s, which is a variable of the problem: residual s S e. Together with the prior
-/// below the optimum over s alone is s = c2 / (c2 + e^T Omega e), the loss then that of Geman and McClure.
+/// A loop edge times its switch s, which is a variable of the problem: residual s S e. Together with the
+/// prior below the optimum over s alone is s = c2 / (c2 + e^T Omega e), the loss then that of Geman and
+/// McClure.
 template <int N>
 class SwitchedEdgeCost final : public ceres::SizedCostFunction<N, BlockSize<N>(), BlockSize<N>(), 1> {
  public:

@@ -19,12 +19,13 @@ TEST(GraphCovariance, GrowsAlongAChainAsTheSumOfItsEdges) {
   PoseGraph graph;
   for (int id = 0; id <= 4; ++id) graph.AddNode(id, Pose(Eigen::Quaterniond::Identity(), {1.0 * id, 0, 0}));
   for (int id = 0; id < 4; ++id)
-    graph.AddOdometry(id, id + 1, Similarity(1, Eigen::Quaterniond::Identity(), {1, 0, 0}), MakeInformation(0.1, 0.02));
+    graph.AddOdometry(id, id + 1, Similarity(1, Eigen::Quaterniond::Identity(), {1, 0, 0}),
+                      MakeInformation(0.1, 0.02));
   const GraphCovariance covariance(graph);
   EXPECT_TRUE(covariance.OfPose(0).isZero());
   const Eigen::MatrixXd end = covariance.OfPose(4);
-  EXPECT_NEAR(end(0, 0), 4 * 0.01, 1e-12);                              // along the way: translations alone
-  EXPECT_NEAR(end(1, 1), 4 * 0.01 + (9 + 4 + 1) * 0.0004, 1e-12);       // across: the headings' levers too
+  EXPECT_NEAR(end(0, 0), 4 * 0.01, 1e-12);                         // along the way: translations alone
+  EXPECT_NEAR(end(1, 1), 4 * 0.01 + (9 + 4 + 1) * 0.0004, 1e-12);  // across: the headings' levers too
   EXPECT_NEAR(end(5, 5), 4 * 0.0004, 1e-12);
   EXPECT_NEAR(covariance.OfRelativePose(1, 3)(0, 0), 2 * 0.01, 1e-12);  // whatever came before
 }

@@ -10,8 +10,8 @@
 namespace tutti {
 namespace {
 
-constexpr int kTries = 100;            // draws before it waits for a larger map
-constexpr std::size_t kMinApart = 20;  // keyframes between the two ends
+constexpr int kTries = 100;           // draws before it waits for a larger map
+constexpr std::size_t kMinApart = 5;  // keyframes between the two ends
 constexpr double kRadians = 0.017453292519943295;
 
 }  // namespace
@@ -61,9 +61,9 @@ std::optional<LoopEdge> FalseLoopSource::Next(const Odometry& odometry,
     if (made_ % 3 == 2) loop = Alike(odometry, ids);
     if (!loop) {
       loop.emplace();
-      const std::size_t q = query >= 0 ? static_cast<std::size_t>(
-                                             std::lower_bound(ids.begin(), ids.end(), query) - ids.begin())
-                                       : kMinApart + random_() % (ids.size() - kMinApart);
+      const std::size_t q =
+          query >= 0 ? static_cast<std::size_t>(std::lower_bound(ids.begin(), ids.end(), query) - ids.begin())
+                     : kMinApart + random_() % (ids.size() - kMinApart);
       if (q < kMinApart || q >= ids.size()) return std::nullopt;
       loop->candidate = ids[random_() % (q - kMinApart + 1)];
       loop->query = ids[q];

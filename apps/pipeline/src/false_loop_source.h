@@ -12,18 +12,20 @@
 
 namespace tutti {
 
-/// Makes loops that look verified and are wrong, in turn: a random relative pose; a wrong place taken for the same
-/// one; and one that agrees with the false loop before it through the odometry, as loops between two corridors
-/// that look alike do. They carry the information of a good loop. Deterministic by seed and keyframes.
+/// Makes loops that look verified and are wrong, in turn: a random relative pose; a wrong place taken for the
+/// same one; and one that agrees with the false loop before it through the odometry, as loops between two
+/// corridors that look alike do. They carry the information of a good loop. Deterministic by seed and
+/// keyframes.
 class FalseLoopSource {
  public:
   FalseLoopSource(const SlamOptions& options, std::uint64_t seed)
       : options_(options), left_(options.inject_false_loops), random_(seed) {}
 
   int left() const { return left_; }
-  /// A false loop to the keyframe `query`, or to any if it is negative; nothing if none are left or the map is
-  /// too small yet. `frames`: input frame of each keyframe.
-  std::optional<LoopEdge> Next(const Odometry& odometry, const std::map<int, std::int64_t>& frames, int query);
+  /// A false loop to the keyframe `query`, or to any if it is negative; nothing if none are left or the map
+  /// is too small yet. `frames`: input frame of each keyframe.
+  std::optional<LoopEdge> Next(const Odometry& odometry, const std::map<int, std::int64_t>& frames,
+                               int query);
 
  private:
   double Symmetric(double limit);

@@ -16,10 +16,11 @@
 namespace tutti {
 
 struct FalseLoopOptions {
-  int count = 100;        ///< false loops to plant
-  int cluster_size = 1;   ///< loops that agree with each other; 1: each stands alone
-  int min_gap = 20;       ///< nodes between the two ends, at least
-  double min_error = 0.05;  ///< off from the graph's poses by at least this share of their bounding box' diagonal
+  int count = 100;       ///< false loops to plant
+  int cluster_size = 1;  ///< loops that agree with each other; 1: each stands alone
+  int min_gap = 20;      ///< nodes between the two ends, at least
+  double min_error =
+      0.05;  ///< off from the graph's poses by at least this share of their bounding box' diagonal
   std::uint64_t seed = 1;
   /// Empty if usable, else what is wrong.
   std::string Validate() const;

@@ -64,7 +64,7 @@ class DcsLoss final : public ceres::LossFunction {
 };
 
 /// Weight of GNC's surrogate of truncated least squares (Yang, Antonante, Tzoumas, Carlone, RA-L 2020, eq.
-/// 14); mu -> 0: all weights 1 (convex), mu -> infinity: truncated least squares.
+/// 14); mu -> 0: convex, mu -> infinity: truncated least squares.
 inline double GncTlsWeight(double s, double c2, double mu) {
   if (s >= (mu + 1) / mu * c2) return 0.0;
   if (s <= mu / (mu + 1) * c2) return 1.0;

@@ -140,7 +140,7 @@ class RobustSolver {
     return SolveWith(new Loss(parameter(c2)), decided_later ? Few() : options_.max_iterations);
   }
 
-  /// Weighted least squares whose weights go from all equal to 0 or 1. Each round has half the iterations of
+  /// Weighted least squares whose weights end as 0 or 1. Each round has half the iterations of
   /// Graduate() and half the step (as a ratio), so that loops leave, and with them their fill-in, early.
   bool GraduateWeights() {
     const double c2 = problem_.threshold();

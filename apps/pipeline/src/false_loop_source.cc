@@ -10,7 +10,7 @@
 namespace tutti {
 namespace {
 
-constexpr int kTries = 100;           // draws before it waits for a larger map
+constexpr int kTries = 100;            // draws before it waits for a larger map
 constexpr std::size_t kMinApart = 20;  // keyframes between the two ends
 constexpr double kRadians = 0.017453292519943295;
 

@@ -68,7 +68,8 @@ nlohmann::ordered_json ToJson(const OptimizeArguments& arguments, const G2oFile&
     json["down_weighted"].push_back({{"from", edge.from},
                                      {"to", edge.to},
                                      {"chi2", report.edges[e].chi2},
-                                     {"weight", report.edges[e].weight}});
+                                     {"weight", report.edges[e].weight},
+                                     {"reason", ToString(report.edges[e].doubt)}});
   }
   if (certificate) {
     json["certificate"] = {{"available", certificate->available},
@@ -109,8 +110,9 @@ void Print(const G2oFile& file, const PoseGraphReport& report) {
   const std::vector<std::size_t> worst = DownWeighted(report);
   for (std::size_t k = 0; k < worst.size() && k < 10; ++k) {
     const PoseGraphEdge& edge = file.graph.edges()[worst[k]];
-    std::printf("    %d -> %d: chi2 %.1f, weight %.3f\n", edge.from, edge.to, report.edges[worst[k]].chi2,
-                report.edges[worst[k]].weight);
+    const EdgeOutcome& outcome = report.edges[worst[k]];
+    std::printf("    %d -> %d: chi2 %.1f, weight %.3f; %s\n", edge.from, edge.to, outcome.chi2,
+                outcome.weight, ToString(outcome.doubt));
   }
 }
 
@@ -182,11 +184,19 @@ void AddOptimizeCommand(CLI::App& app, int&) {
       ->check(CLI::IsMember({"chi2", "chi2log"}))
       ->capture_default_str();
   command
-      ->add_option("--robust", arguments->robust,
-                   "Loss on loop edges (|i - j| != 1): huber and cauchy tame, dcs switches off smoothly, gnc "
-                   "decides in or out")
-      ->check(CLI::IsMember({"none", "huber", "cauchy", "dcs", "gnc"}))
+      ->add_option(
+          "--robust", arguments->robust,
+          "What is done about false loops (|i - j| != 1). gnc: start with all, tighten, decide in or out; "
+          "take this one for SLAM graphs, docs/backend.md has the table. gnc-tls: the same by truncated "
+          "least squares; dcs and switchable switch off smoothly; huber and cauchy only tame; none: trust "
+          "all")
+      ->check(CLI::IsMember({"none", "huber", "cauchy", "dcs", "switchable", "gnc-tls", "gnc"}))
       ->capture_default_str();
+  command->add_flag("--pairwise", arguments->options.pairwise_consistency,
+                    "Before: keep only the largest set of loops that agree pair by pair (PCM). Needs honest "
+                    "information on the odometry; slow beyond some thousand loops");
+  command->add_flag("--sigma-test", arguments->options.sigma_test,
+                    "After: take out loops that are off by more than 3 sigma, bring back those within");
   command
       ->add_option("--robust-chi2", arguments->options.robust_chi2,
                    "Chi-square beyond which a loop is doubted; 0: the 99 % quantile")

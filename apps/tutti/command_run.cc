@@ -24,6 +24,7 @@ struct RunArguments {
        realtime = false;
   std::uint64_t seed = 1;
   int threads = 2;
+  int inject_false_loops = 0;
   std::int64_t max_frames = 0;
   double follow_s = 10;
   bool view = false;
@@ -86,6 +87,7 @@ int Run(const CLI::App& command, const RunArguments& arguments) {
   if (!arguments.ground_truth.empty()) request.ground_truth = arguments.ground_truth;
   if (command.count("--seed") > 0) request.seed = arguments.seed;
   if (command.count("--threads") > 0) request.threads = arguments.threads;
+  if (command.count("--inject-false-loops") > 0) request.inject_false_loops = arguments.inject_false_loops;
   if (command.count("--max-frames") > 0) request.max_frames = arguments.max_frames;
   RunConfig config = LoadConfig(request.config);
   SetLoopOptions(arguments.set, config.loops);
@@ -124,6 +126,13 @@ void AddRunCommand(CLI::App& app, int& exit_code) {
   command->add_flag("--no-loops", arguments->no_loops, "odometry alone");
   command->add_option("--seed", arguments->seed, "of everything that draws random numbers");
   command->add_option("--threads", arguments->threads, "most threads; the result is the same for any number");
+  command
+      ->add_option(
+          "--inject-false-loops", arguments->inject_false_loops,
+          "test of the back end: plant so many false loops (random relative poses, wrong places, pairs that "
+          "agree with each other) that look verified; loops.csv says what became of each (injected, reason, "
+          "weight)")
+      ->check(CLI::NonNegativeNumber);
   command->add_option("--max-frames", arguments->max_frames, "the first frames only");
   command
       ->add_option(

@@ -5,12 +5,14 @@
 
 #include <deque>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "edge_error.h"
 #include "graph_structure.h"
 #include "manifold.h"
 #include "robust_loss.h"
+#include "switched_edge.h"
 
 namespace tutti::internal {
 
@@ -52,16 +54,25 @@ template <int N>
 class GraphProblem {
  public:
   GraphProblem(const PoseGraph& graph, const GraphStructure& structure, const PoseGraphOptions& options)
-      : graph_(graph), structure_(structure), options_(options), ceres_(CeresOptions()) {
+      : graph_(graph),
+        structure_(structure),
+        options_(options),
+        threshold_(options.robust_chi2 > 0 ? options.robust_chi2 : ChiSquare99(N)),
+        switch_prior_(threshold_) {
     blocks_.resize(graph.nodes().size() * kBlock);
     weights_.assign(graph.edges().size(), 1.0);
+    excluded_.assign(graph.edges().size(), false);
     for (const PoseGraphEdge& edge : graph.edges())
       costs_.emplace_back(MakeEdgeConstants<N>(edge, options.objective));
-    threshold_ = options.robust_chi2 > 0 ? options.robust_chi2 : ChiSquare99(N);
-    BuildCeresProblem();
+    if constexpr (N != 3) manifold_ = std::make_unique<NodeManifold<N - 3>>();
   }
 
+  /// Chi-square beyond which a loop is doubted.
   double threshold() const { return threshold_; }
+  void SetThreshold(double threshold) {
+    threshold_ = threshold;
+    switch_prior_.SetThreshold(threshold);
+  }
 
   void SetPoses(const std::vector<Similarity>& poses) {
     for (std::size_t k = 0; k < poses.size(); ++k) PoseToBlock<N>(poses[k], Block(k));
@@ -87,7 +98,9 @@ class GraphProblem {
   double Objective() const {
     double sum = 0;
     for (std::size_t e = 0; e < costs_.size(); ++e) {
-      sum += IsLoop(e) ? RobustCost(options_.robust, EdgeChi2(e), threshold_) : EdgeChi2(e);
+      sum += !IsLoop(e)     ? EdgeChi2(e)
+             : excluded_[e] ? 0.0
+                            : RobustCost(options_.robust, EdgeChi2(e), threshold_);
     }
     return sum;
   }
@@ -97,12 +110,31 @@ class GraphProblem {
 
   double weight(std::size_t e) const { return weights_[e]; }
   const std::vector<double>& weights() const { return weights_; }
+  /// Edges of weight 0 leave the system of equations, and with them their fill-in.
   void SetWeight(std::size_t e, double weight) {
+    if ((weight == 0) != (weights_[e] == 0)) ceres_.reset();
     weights_[e] = weight;
     costs_[e].SetWeight(weight);
   }
+  /// The edge is out for good: weight 0, no part of the objective.
+  void Exclude(std::size_t e) {
+    excluded_[e] = true;
+    SetWeight(e, 0);
+  }
+  bool IsExcluded(std::size_t e) const { return excluded_[e]; }
+  /// A loop that still has a say.
+  bool IsOpen(std::size_t e) const { return IsLoop(e) && !excluded_[e]; }
+
+  /// From now on each open loop has a switch (switchable constraints), which starts at 1.
+  void AddSwitches() {
+    switches_.assign(costs_.size(), 1.0);
+    switched_.clear();
+    for (const EdgeCost<N>& cost : costs_) switched_.emplace_back(cost);
+    ceres_.reset();
+  }
 
   ceres::Solver::Summary Solve(int max_iterations, double max_time_s) {
+    if (!ceres_) BuildCeresProblem();
     ceres::Solver::Options options;
     options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
     if (ceres::IsSparseLinearAlgebraLibraryTypeAvailable(ceres::SUITE_SPARSE)) {
@@ -120,7 +152,7 @@ class GraphProblem {
     options.num_threads = 1;  // more threads change the last bits
     options.logging_type = ceres::SILENT;
     ceres::Solver::Summary summary;
-    ceres::Solve(options, &ceres_, &summary);
+    ceres::Solve(options, &*ceres_, &summary);
     return summary;
   }
 
@@ -142,31 +174,37 @@ class GraphProblem {
   double* Block(std::size_t k) { return &blocks_[k * kBlock]; }
 
   void BuildCeresProblem() {
-    ManifoldBase* manifold = nullptr;
-    if constexpr (N != 3) {
-      manifold_ = std::make_unique<NodeManifold<N - 3>>();
-      manifold = manifold_.get();
-    }
+    ceres_.emplace(CeresOptions());
     for (std::size_t k = 0; k < structure_.constant.size(); ++k) {
-      AddBlock(ceres_, Block(k), BlockSize<N>(), manifold);
-      if (structure_.constant[k]) ceres_.SetParameterBlockConstant(Block(k));
+      AddBlock(*ceres_, Block(k), BlockSize<N>(), manifold_.get());
+      if (structure_.constant[k]) ceres_->SetParameterBlockConstant(Block(k));
     }
     for (std::size_t e = 0; e < costs_.size(); ++e) {
+      if (weights_[e] == 0) continue;
       const EdgeEnds& ends = structure_.ends[e];
-      ceres_.AddResidualBlock(&costs_[e], IsLoop(e) ? &loss_ : nullptr, Block(ends.from), Block(ends.to));
+      if (!switches_.empty() && IsLoop(e)) {
+        ceres_->AddResidualBlock(&switched_[e], nullptr, Block(ends.from), Block(ends.to), &switches_[e]);
+        ceres_->AddResidualBlock(&switch_prior_, nullptr, &switches_[e]);
+      } else {
+        ceres_->AddResidualBlock(&costs_[e], IsLoop(e) ? &loss_ : nullptr, Block(ends.from), Block(ends.to));
+      }
     }
   }
 
   const PoseGraph& graph_;
   const GraphStructure& structure_;
   const PoseGraphOptions& options_;
-  double threshold_ = 0;
+  double threshold_;
   std::vector<double> blocks_;
   std::vector<double> weights_;
   std::deque<EdgeCost<N>> costs_;  // a deque: cost functions can't be moved
   std::unique_ptr<ManifoldBase> manifold_;
   ceres::LossFunctionWrapper loss_{nullptr, ceres::TAKE_OWNERSHIP};
-  ceres::Problem ceres_;
+  std::vector<bool> excluded_;                // parallel to edges
+  std::vector<double> switches_;              // parallel to edges; empty: none
+  std::deque<SwitchedEdgeCost<N>> switched_;  // the same
+  SwitchPrior switch_prior_;
+  std::optional<ceres::Problem> ceres_;  // last: refers to the others; built when it is needed
 };
 
 }  // namespace tutti::internal

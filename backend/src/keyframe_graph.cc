@@ -23,7 +23,7 @@ int GroupOf(const std::map<int, int>& group, int piece) {
 KeyframeGraphOptions::KeyframeGraphOptions() {
   solver.init = GraphInit::kFile;
   solver.objective = GraphObjective::kChi2Log;
-  solver.robust = RobustLoss::kGnc;
+  solver.robust = kDefaultRobustLoss;
   solver.max_iterations = 50;
   solver.function_tolerance = 1e-6;
 }

@@ -15,11 +15,10 @@ using Names = std::vector<std::pair<const char*, Enum>>;
 
 const Names<GraphObjective> kObjectives = {{"chi2", GraphObjective::kChi2},
                                            {"chi2log", GraphObjective::kChi2Log}};
-const Names<RobustLoss> kRobust = {{"none", RobustLoss::kNone},
-                                   {"huber", RobustLoss::kHuber},
-                                   {"cauchy", RobustLoss::kCauchy},
-                                   {"dcs", RobustLoss::kDcs},
-                                   {"gnc", RobustLoss::kGnc}};
+const Names<RobustLoss> kRobust = {
+    {"none", RobustLoss::kNone}, {"huber", RobustLoss::kHuber},           {"cauchy", RobustLoss::kCauchy},
+    {"dcs", RobustLoss::kDcs},   {"switchable", RobustLoss::kSwitchable}, {"gnc-tls", RobustLoss::kGncTls},
+    {"gnc", RobustLoss::kGnc}};
 const Names<GraphInit> kInits = {{"auto", GraphInit::kAuto},
                                  {"file", GraphInit::kFile},
                                  {"odometry", GraphInit::kOdometry},
@@ -54,5 +53,19 @@ GraphInit ParseGraphInit(const std::string& name) { return Parse(kInits, name, "
 const char* ToString(GraphObjective objective) { return Name(kObjectives, objective); }
 const char* ToString(RobustLoss robust) { return Name(kRobust, robust); }
 const char* ToString(GraphInit init) { return Name(kInits, init); }
+
+const char* ToString(LoopDoubt doubt) {
+  switch (doubt) {
+    case LoopDoubt::kNone:
+      return "";
+    case LoopDoubt::kLoss:
+      return "the other constraints contradict it (robust loss)";
+    case LoopDoubt::kPairwise:
+      return "not in the largest set of loops that agree with each other";
+    case LoopDoubt::kSigma:
+      return "off by more than 3 sigma after the optimisation";
+  }
+  return "";
+}
 
 }  // namespace tutti

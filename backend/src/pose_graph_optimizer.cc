@@ -8,6 +8,8 @@
 #include "graph_initialization.h"
 #include "graph_problem.h"
 #include "graph_structure.h"
+#include "pairwise_consistency.h"
+#include "robust_solver.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -36,7 +38,16 @@ class Run {
         structure_(structure),
         options_(options),
         report_(report),
-        problem_(graph, structure, options) {}
+        problem_(graph, structure, options),
+        robust_(problem_, options, graph.edges().size(),
+                [this](int iterations) { return SolveOnce(iterations); }) {
+    if (!options.pairwise_consistency) return;
+    const std::vector<bool> agree =
+        internal::PairwiseConsistentEdges(graph, structure, options.objective, problem_.threshold());
+    for (std::size_t e = 0; e < agree.size(); ++e) {
+      if (!agree[e]) problem_.Exclude(e);
+    }
+  }
 
   /// The places to start from. False, with the reason in the report, if there is none.
   bool CollectStarts() {
@@ -68,26 +79,21 @@ class Run {
     return false;
   }
 
-  /// Solves from the best start; with a robust loss from each, for the lowest cost at the start tells little
-  /// then.
+  /// Solves from the best start. With a robust loss "best" counts it in: a chordal start that false loops
+  /// have bent loses to the odometry.
   bool Solve() {
-    const bool robust = options_.robust != RobustLoss::kNone && HasLoops() && !LeastSquaresSuffices();
-    if (!robust) starts_.resize(1);
+    const bool robust = options_.robust != RobustLoss::kNone && robust_.HasLoops() && !LeastSquaresSuffices();
+    starts_.resize(1);
     bool found = false;
     std::vector<Similarity> best;
     std::vector<double> best_weights;
-    const std::size_t attempts = robust && options_.robust != RobustLoss::kHuber ? 2 : 1;
-    for (std::size_t k = 0; k < attempts * starts_.size(); ++k) {
-      const Start& start = starts_[k / attempts];
-      problem_.SetPoses(start.poses);
-      if (plain_.empty() && !(robust ? SolveRobust(k % attempts == 0) : SolveOnce(options_.max_iterations)))
-        continue;
-      if (!plain_.empty()) problem_.SetPoses(plain_);
+    const Start& start = starts_.front();
+    for (int attempt = 0; attempt < (robust ? robust_.Attempts() : 1); ++attempt) {
+      problem_.SetPoses(plain_.empty() ? start.poses : plain_);
+      if (plain_.empty() && !(robust ? robust_.Solve(attempt) : SolveOnce(options_.max_iterations))) continue;
       const double objective = problem_.Objective();
       if (!std::isfinite(objective) || (found && objective >= report_.objective)) continue;
       found = true;
-      report_.init = start.init;
-      report_.initial_objective = start.objective;
       report_.objective = objective;
       best = problem_.Poses();
       best_weights = problem_.weights();
@@ -96,11 +102,17 @@ class Run {
       if (report_.reason.empty()) report_.reason = "the solver found no usable step";
       return false;
     }
-    for (const Start& start : starts_) {
-      if (start.init == report_.init) report_.initial_costs = CostsAt(start.poses);
-    }
+    report_.init = start.init;
+    report_.initial_objective = start.objective;
+    report_.initial_costs = CostsAt(start.poses);
     problem_.SetPoses(best);
     for (std::size_t e = 0; e < best_weights.size(); ++e) problem_.SetWeight(e, best_weights[e]);
+    if (robust && plain_.empty()) {
+      robust_.Tighten();
+      report_.objective = problem_.Objective();
+    }
+    if (options_.sigma_test && robust_.HasLoops()) robust_.DecideLoops(internal::ChiSquare3Sigma(N));
+    report_.gnc_rounds = robust_.rounds();
     return true;
   }
 
@@ -113,11 +125,13 @@ class Run {
       EdgeOutcome& out = report_.edges[e];
       out.chi2 = problem_.EdgeChi2(e);
       if (!problem_.IsLoop(e)) continue;
-      out.weight = options_.robust == RobustLoss::kGnc
-                       ? problem_.weight(e)
-                       : internal::RobustWeight(options_.robust, out.chi2, problem_.threshold());
+      out.weight = WeightOf(e, out.chi2);
       out.down_weighted = out.weight < 0.5;
-      if (out.down_weighted) ++report_.down_weighted;
+      if (!out.down_weighted) continue;
+      ++report_.down_weighted;
+      out.doubt = problem_.IsExcluded(e) ? LoopDoubt::kPairwise
+                  : options_.sigma_test  ? LoopDoubt::kSigma
+                                         : LoopDoubt::kLoss;
     }
   }
 
@@ -128,6 +142,12 @@ class Run {
     double objective;
   };
 
+  double WeightOf(std::size_t e, double chi2) const {
+    const bool decided = options_.sigma_test || options_.robust == RobustLoss::kGnc ||
+                         options_.robust == RobustLoss::kGncTls || problem_.IsExcluded(e);
+    return decided ? problem_.weight(e) : internal::RobustWeight(options_.robust, chi2, problem_.threshold());
+  }
+
   void AddStart(GraphInit init, std::vector<Similarity> poses) {
     problem_.SetPoses(poses);
     const double objective = problem_.Objective();
@@ -136,11 +156,6 @@ class Run {
         return;  // the file often is the odometry
     }
     if (std::isfinite(objective)) starts_.push_back({init, std::move(poses), objective});
-  }
-
-  bool HasLoops() const {
-    return std::any_of(graph_.edges().begin(), graph_.edges().end(),
-                       [](const PoseGraphEdge& edge) { return edge.kind == EdgeKind::kLoop; });
   }
 
   bool SolveOnce(int max_iterations) {
@@ -160,88 +175,14 @@ class Run {
   }
 
   /// The common case online: least squares brings every loop below the threshold, so no loss has anything to
-  /// do.
+  /// do. False loops show long before the iterations are through.
   bool LeastSquaresSuffices() {
+    constexpr int kFew = 20;
     problem_.SetPoses(starts_.front().poses);
-    if (!SolveOnce(options_.max_iterations)) return false;
-    const std::vector<double> chi2 = LoopChi2();
-    if (!(*std::max_element(chi2.begin(), chi2.end()) <= problem_.threshold())) return false;
+    if (!SolveOnce(std::min(kFew, options_.max_iterations))) return false;
+    if (!(robust_.LargestChi2() <= problem_.threshold())) return false;
+    if (report_.termination != "converged" && !SolveOnce(options_.max_iterations)) return false;
     plain_ = problem_.Poses();
-    return true;
-  }
-
-  std::vector<double> LoopChi2() const {
-    std::vector<double> out;
-    for (std::size_t e = 0; e < graph_.edges().size(); ++e) {
-      if (problem_.IsLoop(e)) out.push_back(problem_.EdgeChi2(e));
-    }
-    return out;
-  }
-
-  void SetLoss(double c2) {
-    switch (options_.robust) {
-      case RobustLoss::kNone:
-        problem_.SetLoss(nullptr);
-        break;
-      case RobustLoss::kHuber:
-        problem_.SetLoss(new ceres::HuberLoss(std::sqrt(c2)));
-        break;
-      case RobustLoss::kCauchy:
-        problem_.SetLoss(new ceres::CauchyLoss(std::sqrt(c2)));
-        break;
-      case RobustLoss::kDcs:
-        problem_.SetLoss(new internal::DcsLoss(c2));
-        break;
-      case RobustLoss::kGnc:
-        problem_.SetLoss(new internal::GemanMcClureLoss(c2));
-        break;
-    }
-  }
-
-  /// Huber is convex enough to be solved directly. The others have many local minima: they start with a
-  /// threshold so large that every loop pulls (the drift of the odometry must not look like a false loop) and
-  /// tighten it round by round (graduated non-convexity, Yang et al., RA-L 2020).
-  bool SolveRobust(bool annealed) {
-    constexpr int kIterationsPerRound = 4;  // a round need not converge; the last one does
-    const double c2 = problem_.threshold();
-    for (std::size_t e = 0; e < graph_.edges().size(); ++e) problem_.SetWeight(e, 1.0);
-    if (annealed && options_.robust != RobustLoss::kHuber) {
-      std::vector<double> chi2 = LoopChi2();
-      double loose = options_.gnc_start * *std::max_element(chi2.begin(), chi2.end());
-      for (int round = 0; loose > c2 && round < options_.gnc_max_rounds;
-           ++round, loose /= options_.gnc_step) {
-        ++report_.gnc_rounds;
-        SetLoss(loose);
-        if (!SolveOnce(kIterationsPerRound)) return false;
-        chi2 = LoopChi2();
-        // Loops that have come together need no further rounds.
-        loose =
-            std::min(loose, options_.gnc_step * std::max(c2, *std::max_element(chi2.begin(), chi2.end())));
-      }
-    }
-    SetLoss(c2);
-    if (!SolveOnce(options_.max_iterations)) return false;
-    if (options_.robust != RobustLoss::kGnc) return true;
-    // Geman-McClure pulls less at true loops near the threshold than they deserve; DCS does not.
-    problem_.SetLoss(new internal::DcsLoss(c2));
-    return SolveOnce(options_.max_iterations) && DecideLoops(c2);
-  }
-
-  /// Truncated least squares: in or out for each loop, until the decision stands.
-  bool DecideLoops(double c2) {
-    constexpr int kRounds = 10;
-    problem_.SetLoss(nullptr);
-    for (int round = 0; round < kRounds; ++round) {
-      bool changed = round == 0;
-      for (std::size_t e = 0; e < graph_.edges().size(); ++e) {
-        if (!problem_.IsLoop(e)) continue;
-        const double weight = problem_.EdgeChi2(e) <= c2 ? 1.0 : 0.0;
-        changed = changed || weight != problem_.weight(e);
-        problem_.SetWeight(e, weight);
-      }
-      if (!changed) break;
-      if (!SolveOnce(options_.max_iterations)) return false;
-    }
     return true;
   }
 
@@ -263,6 +204,7 @@ class Run {
   const PoseGraphOptions& options_;
   PoseGraphReport& report_;
   GraphProblem<N> problem_;
+  internal::RobustSolver<N> robust_;
   std::vector<Start> starts_;
   std::vector<Similarity> plain_;  ///< the least-squares solution, where it suffices
   Stopwatch watch_;

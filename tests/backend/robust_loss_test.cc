@@ -30,6 +30,15 @@ TEST(RobustLoss, DcsIsBoundedAndSmoothAtItsThreshold) {
   EXPECT_NEAR(rho[2], numeric, 1e-7);
 }
 
+TEST(RobustLoss, GncWeightsGoFromSmoothToInOrOut) {
+  // Small mu: smooth, and nothing is out yet.
+  EXPECT_GT(internal::GncTlsWeight(1e3, 4.0, 1e-3), 0.0);
+  EXPECT_LT(internal::GncTlsWeight(1e3, 4.0, 1e-3), internal::GncTlsWeight(10.0, 4.0, 1e-3));
+  EXPECT_EQ(internal::GncTlsWeight(3.9, 4.0, 1e6), 1.0);
+  EXPECT_EQ(internal::GncTlsWeight(4.1, 4.0, 1e6), 0.0);
+  EXPECT_NEAR(internal::GncTlsWeight(4.0, 4.0, 2.0), std::sqrt(6.0) - 2.0, 1e-12);
+}
+
 TEST(RobustLoss, GncTruncates) {
   EXPECT_EQ(RobustCost(RobustLoss::kGnc, 3.0, 4.0), 3.0);
   EXPECT_EQ(RobustCost(RobustLoss::kGnc, 300.0, 4.0), 4.0);

@@ -243,8 +243,13 @@ void ConfigTable::AddGraph(PoseGraphOptions& o) {
            {"huber", RobustLoss::kHuber},
            {"cauchy", RobustLoss::kCauchy},
            {"dcs", RobustLoss::kDcs},
+           {"switchable", RobustLoss::kSwitchable},
+           {"gnc-tls", RobustLoss::kGncTls},
            {"gnc", RobustLoss::kGnc}},
-          "loss on loop edges: none, huber, cauchy, dcs, gnc");
+          "loss on loop edges: none, huber, cauchy, dcs, switchable, gnc-tls, gnc");
+  Add("pairwise_consistency", o.pairwise_consistency,
+      "first keep only the largest set of loops that agree pair by pair (PCM)");
+  Add("sigma_test", o.sigma_test, "last refuse loops that are off by more than 3 sigma");
   Add("robust_chi2", o.robust_chi2, "chi-square beyond which a loop is doubted; 0: its 99 % quantile");
   AddEnum("init", o.init,
           {{"auto", GraphInit::kAuto},
@@ -255,7 +260,7 @@ void ConfigTable::AddGraph(PoseGraphOptions& o) {
   Add("max_iterations", o.max_iterations, "of Levenberg-Marquardt");
   Add("function_tolerance", o.function_tolerance,
       "stop when an iteration lowers the cost by less than this share");
-  Add("gnc_step", o.gnc_step, "gnc: growth of the convexity parameter per round, > 1");
+  Add("gnc_step", o.gnc_step, "cauchy, dcs, gnc: the threshold shrinks by this factor per round, > 1");
   Add("gnc_max_rounds", o.gnc_max_rounds, "gnc: most rounds");
   Add("gnc_start", o.gnc_start,
       "cauchy, dcs, gnc: the threshold starts at this many times the largest chi-square of a loop");
@@ -286,6 +291,10 @@ void ConfigTable::AddRun(SlamOptions& o) {
   Add("loop_defer_fraction", o.loop_defer_fraction,
       "a loop that the map fulfils within this share of the depth waits for the next correction");
   Add("loop_defer_deg", o.loop_defer_deg, "and within this angle [deg]; 0: each loop moves the map");
+  Add("loop_gate_sigmas", o.loop_gate_sigmas,
+      "refuse loops farther than this Mahalanobis distance from what the map knows; 0: no such gate");
+  Add("inject_false_loops", o.inject_false_loops,
+      "test of the back end: so many false loops that look verified enter the pose graph");
   Add("covisibility_min_shared", o.covisibility_min_shared,
       "shared landmarks that make an edge in the pose graph");
   Add("covisibility_edges", o.covisibility_edges, "at most so many of them for each keyframe");

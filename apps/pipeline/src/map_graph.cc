@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tutti/backend/graph_covariance.h"
+
 namespace tutti {
 namespace {
 
@@ -134,7 +136,11 @@ MapGraph::Correction MapGraph::Optimize(const Odometry& odometry, const std::vec
   correction.S_world_keyframe = graph.Poses();
   correction.merges = Merges(odometry, loops);
   for (std::size_t i = 0; i < graph.edges().size(); ++i) {
-    if (graph.edges()[i].kind == EdgeKind::kOdometry) correction.odometry_chi2 += report.edges[i].chi2;
+    if (graph.edges()[i].kind == EdgeKind::kOdometry) {
+      correction.odometry_chi2 += report.edges[i].chi2;
+    } else {
+      correction.weights.push_back(report.edges[i].weight);
+    }
   }
   for (const LoopEdge& loop : loops) {
     const Similarity& c = correction.S_world_keyframe.at(loop.candidate);
@@ -154,6 +160,15 @@ void MapGraph::MeasureAgain(const Odometry& odometry, std::vector<LoopEdge>& acc
     if (d.fraction <= options_.loop_after_fraction && d.angle_deg <= options_.loop_after_deg)
       loop.S_candidate_query = in_map;
   }
+}
+
+std::optional<double> MapGraph::Distance(const Odometry& odometry, const std::vector<LoopEdge>& loops,
+                                         const LoopEdge& loop) const {
+  const GraphCovariance known(Build(odometry, loops));
+  if (!known.Connected(loop.candidate, loop.query)) return std::nullopt;
+  const PoseGraphEdge edge{loop.candidate, loop.query, loop.S_candidate_query, loop.information,
+                           EdgeKind::kLoop};
+  return std::sqrt(known.SquaredDistance(edge));
 }
 
 void MapGraph::Keep(const Odometry& odometry, const Correction& correction, std::vector<LoopEdge>& accepted,

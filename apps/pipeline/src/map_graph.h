@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -39,11 +40,17 @@ class MapGraph {
     std::map<int, Similarity> S_world_keyframe;  ///< of all keyframes
     std::map<int, int> merges;                   ///< map piece -> the piece that it joined
     std::vector<Disagreement> residuals;         ///< of each loop after the optimisation
+    std::vector<double> weights;                 ///< of each loop, from the robust loss
     double odometry_chi2 = 0;                    ///< of all odometry edges after the optimisation
     double time_ms = 0;
   };
   /// Optimises the graph with these loops. The odometry is not touched.
   Correction Optimize(const Odometry& odometry, const std::vector<LoopEdge>& loops) const;
+
+  /// Mahalanobis distance [1] of the loop from what the graph with these loops knows of its relative pose;
+  /// nothing if no edges connect its ends.
+  std::optional<double> Distance(const Odometry& odometry, const std::vector<LoopEdge>& loops,
+                                 const LoopEdge& loop) const;
 
   /// To be called before the correction is applied to the odometry: keeps the measurements, and carries them
   /// and the loops over to the corrected units.

@@ -70,6 +70,20 @@ Json StagesJson(const RunResult& r) {
 Json LoopsJson(const RunResult& r) {
   Json loops = {
       {"proposed", r.loops.size()}, {"accepted", r.LoopsAccepted()}, {"corrections", r.corrections}};
+  int injected = 0, injected_accepted = 0;
+  loops["doubted"] = Json::array();
+  for (const LoopRecord& loop : r.loops) {
+    injected += loop.injected ? 1 : 0;
+    injected_accepted += loop.injected && loop.accepted ? 1 : 0;
+    if (!loop.verified || (loop.accepted && loop.weight >= 0.5)) continue;
+    loops["doubted"].push_back({{"query", loop.query},
+                                {"candidate", loop.candidate},
+                                {"weight", loop.weight},
+                                {"reason", loop.accepted ? "down-weighted by the robust loss" : loop.reason},
+                                {"injected", loop.injected}});
+  }
+  loops["injected"] = injected;
+  loops["injected_accepted"] = injected_accepted;
   if (r.evaluation) {
     loops["true"] = r.evaluation->loops_true;
     loops["false"] = r.evaluation->loops_false;
@@ -193,7 +207,7 @@ std::string LoopsCsv(const RunResult& r) {
   std::ostringstream out;
   out << "query,candidate,query_stamp_s,candidate_stamp_s,surf,sift,orb,ensemble,inliers,matches,accepted,"
          "reason,"
-         "verified,tx,ty,tz,qx,qy,qz,qw,scale";
+         "verified,tx,ty,tz,qx,qy,qz,qw,scale,weight,injected";
   for (std::size_t i = 3; i < names.size(); ++i) out << ',' << names[i];
   out << '\n';
   for (const LoopRecord& loop : r.loops) {
@@ -211,6 +225,7 @@ std::string LoopsCsv(const RunResult& r) {
     } else {
       out << ",,,,,,,,";
     }
+    out << ',' << Cell(loop.weight, 6) << ',' << (loop.injected ? 1 : 0);
     for (std::size_t i = 3; i < names.size(); ++i) out << ',' << Cell(MemberPosterior(loop, names[i]), 6);
     out << '\n';
   }

@@ -12,6 +12,8 @@ std::string SlamOptions::Validate() const {
   if (!(loop_min_age_s >= 0)) return "loop_min_age_s must not be negative";
   if (loop_confirmations < 1) return "loop_confirmations must be at least 1";
   if (loop_confirmation_frames < 1) return "loop_confirmation_frames must be at least 1";
+  if (!(loop_gate_sigmas >= 0)) return "loop_gate_sigmas must not be negative";
+  if (inject_false_loops < 0) return "inject_false_loops must not be negative";
   if (covisibility_min_shared < 10) return "covisibility_min_shared must be at least 10";
   if (covisibility_edges < 0) return "covisibility_edges must not be negative";
   if (!(loop_defer_fraction >= 0)) return "loop_defer_fraction must not be negative";

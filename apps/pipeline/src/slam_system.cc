@@ -6,6 +6,7 @@
 #include <iterator>
 #include <utility>
 
+#include "false_loop_source.h"
 #include "global_adjuster.h"
 #include "loop_constraint.h"
 #include "loop_gate.h"
@@ -35,7 +36,8 @@ class SlamSystem::Impl {
         rig_(rig),
         seed_(config.loops.seed),
         gate_(config.run),
-        graph_(config.graph, config.run, rig.sensor) {
+        graph_(config.graph, config.run, rig.sensor),
+        false_loops_(config.run, config.loops.seed) {
     if (rig.calibrated) {
       odometry_.emplace(config.odometry, rig);
       odometry_->SetRecorder(recorder);
@@ -67,8 +69,13 @@ class SlamSystem::Impl {
       result = odometry_->Track(frame);
       last_frame_ = frame.index;
       if (worker_ && result.state != TrackingState::kTracking) result = Relocalize(frame, result);
-      if (result.keyframe >= 0)
+      if (result.keyframe >= 0) {
         graph_.AddKeyframe(result.keyframe, odometry_->KeyframePiece(result.keyframe));
+        frame_of_keyframe_[result.keyframe] = frame.index;
+        frame_stamps_[frame.index] = frame.stamp_s;
+        constexpr std::size_t kEveryKeyframes = 3;
+        if (frame_of_keyframe_.size() % kEveryKeyframes == 0) Inject(result.keyframe);
+      }
     } else {
       result.reason = "no calibration";
     }
@@ -84,6 +91,8 @@ class SlamSystem::Impl {
     if (worker_ || on_keyframe_) SubmitMapped();
     while (!submitted_.empty()) Deliver();
     if (!deferred_.empty()) Close(std::exchange(deferred_, {}));
+    while (odometry_ && Inject(-1)) {
+    }
     if (adjuster_.Running()) EnterAdjustment();
     for (LoopRecord& record : records_) {
       if (!record.pending) continue;
@@ -290,6 +299,41 @@ class SlamSystem::Impl {
     }
   }
 
+  // A false loop, past detector and gate: what the pose graph makes of it. False if there is none to make.
+  bool Inject(int keyframe) {
+    std::optional<LoopEdge> loop = false_loops_.Next(*odometry_, frame_of_keyframe_, keyframe);
+    if (!loop) return false;
+    LoopRecord record;
+    record.query = loop->query_frame;
+    record.candidate = loop->candidate_frame;
+    record.query_stamp_s = frame_stamps_.at(record.query);
+    record.candidate_stamp_s = frame_stamps_.at(record.candidate);
+    record.verified = record.injected = record.has_scale = true;
+    record.S_candidate_query = loop->S_candidate_query;
+    loop->record = records_.size();
+    records_.push_back(record);
+    Close({*loop});
+    return true;
+  }
+
+  // Loops that the map can't have drifted to by what it knows of its own uncertainty.
+  void Gate(std::vector<LoopEdge>& entering) {
+    if (options_.loop_gate_sigmas == 0) return;
+    std::vector<LoopEdge> passed;
+    for (const LoopEdge& loop : entering) {
+      const std::optional<double> distance = graph_.Distance(*odometry_, gate_.accepted(), loop);
+      if (!distance || *distance <= options_.loop_gate_sigmas) {
+        passed.push_back(loop);
+        continue;
+      }
+      char text[120];
+      std::snprintf(text, sizeof text, "the map can't be that far off: Mahalanobis distance %.1f, limit %.1f",
+                    *distance, options_.loop_gate_sigmas);
+      Reject(loop, text);
+    }
+    entering = std::move(passed);
+  }
+
   bool Contradicts(const Disagreement& d) const {
     return d.fraction > options_.loop_after_fraction || d.angle_deg > options_.loop_after_deg;
   }
@@ -303,7 +347,9 @@ class SlamSystem::Impl {
   void Close(std::vector<LoopEdge> entering) {
     const ScopedSpan span(recorder_, Lane::kOptimisation, "close_loop");
     const auto begin = std::chrono::steady_clock::now();
+    odometry_->FinishMapping();
     MapGraph::Correction correction;
+    Gate(entering);
     while (!entering.empty()) {
       std::vector<LoopEdge> loops = gate_.accepted();
       loops.insert(loops.end(), entering.begin(), entering.end());
@@ -320,6 +366,7 @@ class SlamSystem::Impl {
       std::vector<LoopEdge> staying;
       for (std::size_t i = 0; i < entering.size(); ++i) {
         const Disagreement& d = correction.residuals[old + i];
+        records_[entering[i].record].weight = correction.weights[old + i];
         if (!old_broken && !Contradicts(d)) {
           staying.push_back(entering[i]);
           continue;
@@ -346,6 +393,8 @@ class SlamSystem::Impl {
       record.reason.clear();
       gate_.Accepted(loop);
     }
+    for (std::size_t i = 0; i < gate_.accepted().size(); ++i)
+      records_[gate_.accepted()[i].record].weight = correction.weights[i];
     KeepUntouched();
     graph_.Keep(*odometry_, correction, gate_.accepted(), gate_.waiting());
     odometry_->ApplyCorrection(correction.S_world_keyframe, correction.merges);
@@ -391,6 +440,9 @@ class SlamSystem::Impl {
   std::uint64_t seed_ = 1;
   LoopGate gate_;
   MapGraph graph_;
+  FalseLoopSource false_loops_;
+  std::map<int, std::int64_t> frame_of_keyframe_;
+  std::map<std::int64_t, double> frame_stamps_;  // of the keyframes' frames
   std::unique_ptr<LoopWorker> worker_;
   std::string loop_warning_;  // the last one
   GlobalAdjuster adjuster_;

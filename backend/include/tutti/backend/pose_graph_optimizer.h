@@ -20,11 +20,17 @@ namespace tutti {
 
 enum class GraphObjective { kChi2, kChi2Log };
 
-/// Loss on loop edges. kHuber: down-weights linearly (Huber 1964). kCauchy: the log of a Cauchy distribution,
-/// no bound. kDcs: dynamic covariance scaling (Agarwal et al., ICRA 2013). kGnc: graduated non-convexity with
-/// the Geman-McClure surrogate (Yang et al., RA-L 2020), then truncated least squares decide for each loop
-/// whether it is in or out.
-enum class RobustLoss { kNone, kHuber, kCauchy, kDcs, kGnc };
+/// What is done about false loops; acts on loop edges only. kHuber: down-weights linearly (Huber 1964).
+/// kCauchy: the log of a Cauchy distribution, no bound. kDcs: dynamic covariance scaling (Agarwal et al.,
+/// ICRA 2013). kSwitchable: a switch variable per loop (Suenderhauf and Protzel, IROS 2012). kGncTls:
+/// graduated non-convexity for truncated least squares (Yang et al., RA-L 2020, algorithm 1). kGnc: the same
+/// with the Geman-McClure surrogate, then truncated least squares decide for each loop whether it is in or
+/// out.
+enum class RobustLoss { kNone, kHuber, kCauchy, kDcs, kSwitchable, kGncTls, kGnc };
+
+/// What SLAM graphs should use: docs/backend.md's table says why. PoseGraphOptions itself defaults to least
+/// squares, since a published graph has its loops for true.
+constexpr RobustLoss kDefaultRobustLoss = RobustLoss::kGnc;
 
 /// kFile: poses as they are in the graph. kOdometry: spanning tree, odometry edges first. kChordal: linear
 /// relaxation (Carlone et al., ICRA 2015). kAuto: whichever of them has the lowest objective (robust loss
@@ -46,13 +52,20 @@ struct PoseGraphOptions {
   /// Chi-square beyond which a loop edge is doubted (Huber's delta^2, DCS' Phi, GNC's c^2) [1]. 0: the 99 %
   /// quantile of the chi-square distribution for the edge's degrees of freedom (11.34, 16.81, 18.48).
   double robust_chi2 = 0;
+  /// Before anything else: only the largest set of loops that agree pair by pair through the odometry stays
+  /// (pairwise consistency maximisation, Mangelson et al., ICRA 2018). Needs honest covariances of the
+  /// odometry; time grows with the square of the number of loops.
+  bool pairwise_consistency = false;
+  /// Last of all: loops whose chi-square is beyond 3 sigma (probability 99.73 %) leave, those within come
+  /// back, and least squares decide the poses.
+  bool sigma_test = false;
   GraphInit init = GraphInit::kAuto;
-  int max_iterations = 200;  ///< of Levenberg-Marquardt, in all rounds together
+  int max_iterations = 200;  ///< of Levenberg-Marquardt, in each round that is to converge
   double function_tolerance =
       1e-9;  ///< stop when an iteration lowers the cost by less than this fraction [1]
-  /// kCauchy, kDcs and kGnc start with a threshold of gnc_start x the largest chi-square of a loop [1], so
-  /// that drift does not look like a false loop, and divide it by gnc_step [1], > 1, in each of at most
-  /// gnc_max_rounds rounds.
+  /// kCauchy, kDcs, kGncTls and kGnc start with a threshold of gnc_start x the largest chi-square of a loop
+  /// [1], so that drift does not look like a false loop, and divide it by gnc_step [1], > 1, in each of at
+  /// most gnc_max_rounds rounds.
   double gnc_start = 1.0;
   double gnc_step = 4.0;
   int gnc_max_rounds = 60;
@@ -75,11 +88,18 @@ GraphCosts EvaluateCosts(const PoseGraph& graph);
 /// e^T Omega e of one edge at the present poses.
 double EdgeChi2(const PoseGraph& graph, const PoseGraphEdge& edge, GraphObjective objective);
 
+/// Why a loop is not believed. kLoss: the robust loss gave it a weight below 1/2; kPairwise: not in the
+/// largest set of loops that agree with each other; kSigma: beyond 3 sigma after the optimisation.
+enum class LoopDoubt { kNone, kLoss, kPairwise, kSigma };
+/// In plain words; empty for kNone.
+const char* ToString(LoopDoubt doubt);
+
 /// What became of one edge.
 struct EdgeOutcome {
   double chi2 = 0;             ///< e^T Omega e in the optimiser's objective, weight not applied
-  double weight = 1;           ///< final weight of the robust loss, 0 to 1 (1 on odometry edges)
+  double weight = 1;           ///< final weight, 0 to 1 (1 on odometry edges; kSwitchable: the switch)
   bool down_weighted = false;  ///< weight < 0.5: the optimiser does not believe this loop
+  LoopDoubt doubt = LoopDoubt::kNone;  ///< why, if it is down-weighted
 };
 
 /// One connected part of the graph.

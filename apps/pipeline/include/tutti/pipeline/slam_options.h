@@ -28,6 +28,10 @@ struct SlamOptions {
       0.02;                     ///< a loop that the map fulfils within this share of the median scene depth
                                 ///< enters the graph, but waits for the next correction to move the map
   double loop_defer_deg = 0.3;  ///< and within this angle [deg]; 0: each loop moves the map
+  double loop_gate_sigmas = 0;  ///< a loop farther off than this Mahalanobis distance from what the map knows
+                                ///< of the relative pose is refused [1]; 0: no such gate
+  int inject_false_loops = 0;   ///< test of the back end: so many false loops that look verified, one with
+                                ///< every third keyframe, the rest at the end
   int covisibility_min_shared = 100;  ///< landmarks that two keyframes share to get an edge in the pose graph
   int covisibility_edges = 3;         ///< at most so many of them for each keyframe, the strongest
   double odometry_sigma_deg = 0.1;    ///< standard deviation of an odometry edge's rotation [deg]

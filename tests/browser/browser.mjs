@@ -49,3 +49,10 @@ export function check(condition, what) {
 }
 
 export const sleep = (ms) => new Promise((done) => setTimeout(done, ms));
+
+// What the promise gives, or nothing after so many milliseconds. A timer that is left would keep the process alive.
+export function within(ms, promise) {
+  let timer;
+  const late = new Promise((done) => { timer = setTimeout(done, ms); });
+  return Promise.race([promise, late]).finally(() => clearTimeout(timer));
+}

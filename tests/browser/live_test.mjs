@@ -6,7 +6,7 @@ import { request } from 'node:http';
 import { connect } from 'node:net';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
-import { check, DESKTOP, launch, openPage, PHONE, SKIP, sleep } from './browser.mjs';
+import { check, DESKTOP, launch, openPage, PHONE, SKIP, sleep, within } from './browser.mjs';
 
 const [tutti, configs, , shots] = process.argv.slice(2);
 
@@ -99,7 +99,7 @@ async function drive(browser, folder, data) {
   await page.click('#pause');
   await waitFor(page, () => document.body.dataset.paused === '1');
   await page.close();
-  const code = await Promise.race([ended, sleep(240000)]);
+  const code = await within(240000, ended);
   check(code === 0, `the run ends although its viewer went while it was paused (${code})`);
   run.kill();
 }
@@ -115,7 +115,7 @@ async function sleepers(folder, data) {
     socket.pause();
     return socket;
   });
-  const code = await Promise.race([ended, sleep(120000)]);
+  const code = await within(120000, ended);
   check(code === 0, `a run with viewers that read nothing ends (${code})`);
   for (const socket of sockets) socket.destroy();
   run.kill();

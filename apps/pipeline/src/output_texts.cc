@@ -68,8 +68,10 @@ Json StagesJson(const RunResult& r) {
 }
 
 Json LoopsJson(const RunResult& r) {
-  Json loops = {
-      {"proposed", r.loops.size()}, {"accepted", r.LoopsAccepted()}, {"corrections", r.corrections}};
+  Json loops = {{"proposed", r.loops.size()},
+                {"accepted", r.LoopsAccepted()},
+                {"corrections", r.corrections},
+                {"global_adjustments", r.global_adjustments}};
   int injected = 0, injected_accepted = 0;
   loops["doubted"] = Json::array();
   for (const LoopRecord& loop : r.loops) {

@@ -85,6 +85,7 @@ Trajectory BodyTrajectory(Trajectory trajectory, const CameraRig& rig) {
 void CollectMap(const SlamSystem& slam, RunResult& result) {
   result.loops = slam.loops();
   result.corrections = slam.Corrections();
+  result.global_adjustments = slam.GlobalAdjustments();
   result.frames_relocalized = slam.Relocalized();
   result.appearance_only = slam.AppearanceOnly();
   result.peak_memory_mb = PeakMemoryMb();

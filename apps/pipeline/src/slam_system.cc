@@ -488,6 +488,7 @@ std::vector<std::string> SlamSystem::TakeWarnings() { return std::exchange(impl_
 const std::vector<LoopRecord>& SlamSystem::loops() const { return impl_->records_; }
 std::size_t SlamSystem::Relocalized() const { return impl_->relocalized_; }
 int SlamSystem::Corrections() const { return impl_->corrections_; }
+int SlamSystem::GlobalAdjustments() const { return impl_->adjustments_; }
 PoseGraph SlamSystem::Graph() const { return impl_->Graph(); }
 std::map<std::string, double> SlamSystem::StageMilliseconds() const { return impl_->StageMilliseconds(); }
 

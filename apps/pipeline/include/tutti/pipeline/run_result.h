@@ -79,6 +79,7 @@ struct RunResult {
   // Loops.
   std::vector<LoopRecord> loops;
   int corrections = 0;
+  int global_adjustments = 0;
 
   // Trajectories: T_world_body, the world is the first camera's place.
   Trajectory trajectory, trajectory_odometry, keyframe_trajectory, reference;

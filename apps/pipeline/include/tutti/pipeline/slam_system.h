@@ -76,6 +76,8 @@ class SlamSystem {
   std::size_t Relocalized() const;
   /// How often the map was moved.
   int Corrections() const;
+  /// How often the whole map was adjusted (bundle adjustment) after loops had moved it.
+  int GlobalAdjustments() const;
   /// Keyframes, odometry edges and accepted loops at the present poses.
   PoseGraph Graph() const;
   /// Milliseconds spent, summed, by stage; the detector's run beside the odometry's.

@@ -1,0 +1,91 @@
+// The pipeline as a class: what a closed loop does to the map, and to what comes after it.
+#include "tutti/pipeline/slam_system.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "recording.h"
+#include "tutti/backend/evaluation.h"
+
+namespace tutti {
+namespace {
+
+using testing::Recording;
+
+// Twice round a small block; each test runs in a process of its own.
+const Recording& TwoLaps() {
+  static const Recording recording = [] {
+    SyntheticOptions options;
+    options.sensor = SyntheticSensor::kStereo;
+    options.width = 320;
+    options.height = 160;
+    options.blocks_x = 1;
+    options.block_m = 20;
+    options.supersample = 1;
+    options.laps = 2;
+    const SyntheticWorld world(options);
+    return testing::Record(world, world.Size());
+  }();
+  return recording;
+}
+
+RunConfig Small(bool global_adjustment, int threads) {
+  RunConfig config;
+  config.odometry.features = 800;
+  config.run.global_adjustment = global_adjustment;
+  config.run.threads = threads;
+  return config;
+}
+
+struct Result {
+  int adjustments = 0, corrections = 0;
+  std::vector<double> keyframe_stamps;
+  Trajectory trajectory;
+  double ate_m = 0;
+};
+
+Result Drive(const RunConfig& config) {
+  SlamSystem slam(config, TwoLaps().rig);
+  for (const InputFrame& frame : TwoLaps().frames) slam.Track(frame);
+  slam.Finish();
+  Result result;
+  result.adjustments = slam.GlobalAdjustments();
+  result.corrections = slam.Corrections();
+  const Odometry& odometry = *slam.odometry();
+  for (const int id : odometry.KeyframeIds()) result.keyframe_stamps.push_back(odometry.KeyframeStamp(id));
+  result.trajectory = odometry.FrameTrajectory();
+  EvaluationOptions options;
+  options.alignment = TrajectoryAlignment::kSE3;
+  result.ate_m = EvaluateTrajectory(TwoLaps().truth, result.trajectory, options).ate.rmse;
+  return result;
+}
+
+TEST(SlamSystem, ASecondLapNeedsFewKeyframesAndTheWholeMapIsAdjusted) {
+  const Result with = Drive(Small(true, 2)), without = Drive(Small(false, 2));
+  ASSERT_GT(with.corrections, 0);
+  EXPECT_GT(with.adjustments, 0);
+  EXPECT_EQ(without.adjustments, 0);
+  // The last half of the second lap: the loop is closed long since.
+  const double end = TwoLaps().truth.back().stamp_s;
+  const auto between = [](const Result& r, double from, double to) {
+    return std::count_if(r.keyframe_stamps.begin(), r.keyframe_stamps.end(),
+                         [&](double t) { return t >= from && t < to; });
+  };
+  EXPECT_LT(4 * between(with, 0.75 * end, end), between(with, 0.25 * end, 0.5 * end));
+  EXPECT_EQ(with.trajectory.size(), TwoLaps().frames.size());
+  EXPECT_LT(with.ate_m, 1.2 * without.ate_m + 0.005);
+  std::printf("  ATE %.4f m, %.4f m without fusion and adjustment; %zu and %zu keyframes\n", with.ate_m,
+              without.ate_m, with.keyframe_stamps.size(), without.keyframe_stamps.size());
+}
+
+TEST(SlamSystem, WhatBackgroundWorkFindsDoesNotDependOnTheThreads) {
+  const Result one = Drive(Small(true, 1)), two = Drive(Small(true, 2));
+  EXPECT_EQ(one.adjustments, two.adjustments);
+  ASSERT_EQ(one.trajectory.size(), two.trajectory.size());
+  for (std::size_t i = 0; i < one.trajectory.size(); ++i)
+    EXPECT_EQ(one.trajectory[i].pose.Matrix(), two.trajectory[i].pose.Matrix()) << i;
+}
+
+}  // namespace
+}  // namespace tutti

@@ -58,7 +58,7 @@ def cell(rows):
     ate = max(float(r["ate"]) for r in rows)
     precision, recall = (min(float(r[c]) for r in rows) for c in ("precision", "recall"))
     seconds = statistics.median(float(r["seconds"]) for r in rows)
-    text = f"{ate:.2g} % / {precision:.3f} / {recall:.3f} / {seconds:.1f} s ({len(rows)})"
+    text = f"{ate:.2g} % / {precision:.4f} / {recall:.4f} / {seconds:.1f} s ({len(rows)})"
     return f"**{text}**" if ate > LIMIT else text
 
 

@@ -8,9 +8,8 @@
 namespace tutti {
 namespace {
 
-constexpr int kIterations = 5;      // of a global bundle adjustment
-constexpr int kMinLandmarks = 20;   // a keyframe with fewer follows its neighbours
-constexpr double kSureLens = 1e12;  // information: the lens stays as it is
+constexpr int kIterations = 5;     // of a global bundle adjustment
+constexpr int kMinLandmarks = 20;  // a keyframe with fewer follows its neighbours
 
 }  // namespace
 
@@ -18,14 +17,16 @@ void Odometry::ApplyCorrection(const std::map<int, Similarity>& S_world_keyframe
                                const std::map<int, int>& merges) {
   impl_->EnterMapping();
   impl_->MoveMap(S_world_keyframe);
-  for (int l = 0; l < impl_->map().LandmarkCount(); ++l) impl_->UpdateGeometry(l);
+  impl_->UpdateGeometry();
   for (const auto& [from, to] : merges) {
     if (from != to) impl_->piece_joined[from] = to;
   }
 }
 
-void Odometry::Impl::UpdateGeometry(int landmark) {
-  if (map().landmark(landmark).alive) map_.UpdateGeometry(landmark);
+void Odometry::Impl::UpdateGeometry() {
+  for (int l = 0; l < map().LandmarkCount(); ++l) {
+    if (map().landmark(l).alive) map_.UpdateGeometry(l);
+  }
 }
 
 void Odometry::Impl::MoveMap(const std::map<int, Similarity>& S_world_keyframe) {
@@ -68,8 +69,7 @@ GlobalAdjustment Odometry::BeginGlobalAdjustment(int piece) const {
   options.iterations = kIterations;
   options.pixel_sigma = impl_->options.pixel_sigma;
   options.metric = impl_->rig.sensor != Sensor::kMono;
-  options.lens = impl_->Lens();
-  options.lens.information = Eigen::Matrix2d::Identity() * kSureLens;
+  options.lens.value = impl_->Lens().value;  // and stays that
   return GlobalAdjustment(std::make_unique<GlobalAdjustment::Work>(impl_->rig.camera, impl_->map(), moving,
                                                                    fixed, options, impl_->own_threads));
 }
@@ -106,7 +106,7 @@ void Odometry::Enter(const GlobalAdjustment& adjustment, const std::map<int, Sim
   for (int l = 0; l < outcome.after.LandmarkCount(); ++l) {
     impl_->TakeAdjusted(l, outcome.before.landmark(l), outcome.after.landmark(l));
   }
-  for (int l = 0; l < impl_->map().LandmarkCount(); ++l) impl_->UpdateGeometry(l);
+  impl_->UpdateGeometry();
 }
 
 // A landmark's new place, without the views that do not fit it.
@@ -116,8 +116,7 @@ void Odometry::Impl::TakeAdjusted(int id, const Landmark& before, const Landmark
     map_.RemoveLandmark(id);
     return;
   }
-  const bool moved = after.position != before.position;
-  if (moved) map_.landmark(id).position = after.position;
+  if (after.position != before.position) map_.landmark(id).position = after.position;
   for (const Observation& o : before.observations) {
     const bool stays = std::any_of(after.observations.begin(), after.observations.end(),
                                    [&](const Observation& other) { return other.keyframe == o.keyframe; });

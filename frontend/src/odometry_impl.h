@@ -51,7 +51,7 @@ class Odometry::Impl {
 
   /// Moves keyframes, with all that hangs on them; the landmarks' geometry is to be updated then.
   void MoveMap(const std::map<int, Similarity>& S_world_keyframe);
-  void UpdateGeometry(int landmark);
+  void UpdateGeometry();
   void TakeAdjusted(int landmark, const Landmark& before, const Landmark& after);
   const LensError& Lens() const { return mapper_.lens().Remaining(); }
   /// Moves everything that hangs on the current pose after its keyframe was moved.

@@ -163,7 +163,7 @@ bool Odometry::Impl::Settle(Fix* fix) const {
 // Settles a guess and keeps it if it is the best so far; true once there is no doubt left. `offered`: poses
 // of the guesses so far; what would show the same is not settled again.
 bool Odometry::Impl::Offer(int least_inliers, Fix* guess, std::vector<Pose>* offered, Fix* best) const {
-  const double depth = std::max(1e-6, map().MedianDepth(reference_));
+  const double depth = offered->empty() ? 1.0 : std::max(1e-6, map().MedianDepth(reference_));
   const auto same = [&](const Pose& other) {
     const Vector6d d = LogSE3(guess->T_camera_world * other.Inverse());
     return rig.camera.fx * (d.tail<3>().norm() + d.head<3>().norm() / depth) < kSameGuess;

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "recording.h"
+#include "small_town.h"
 
 namespace tutti {
 namespace {
@@ -9,15 +10,7 @@ namespace {
 using testing::Recording;
 
 const Recording& Drive() {
-  static const Recording recording = [] {
-    SyntheticOptions options;
-    options.sensor = SyntheticSensor::kStereo;
-    options.width = 400;
-    options.height = 200;
-    options.blocks_x = 1;
-    options.supersample = 1;
-    return testing::Record(SyntheticWorld(options), 40);
-  }();
+  static const Recording recording = testing::Record(SyntheticWorld(testing::SmallStereoTown(400, 200)), 40);
   return recording;
 }
 

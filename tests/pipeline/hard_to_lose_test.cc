@@ -9,6 +9,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "recording.h"
+#include "small_town.h"
 #include "test_data.h"
 #include "tutti/backend/evaluation.h"
 #include "tutti/pipeline/config.h"
@@ -23,13 +24,8 @@ using testing::Recording;
 // ---------------------------------------------------------------- recordings
 
 SyntheticOptions TownOptions() {
-  SyntheticOptions options;
-  options.sensor = SyntheticSensor::kStereo;
-  options.width = 400;
-  options.height = 200;
-  options.blocks_x = 1;
+  SyntheticOptions options = testing::SmallStereoTown(400, 200);
   options.block_m = 30;
-  options.supersample = 1;
   options.laps = 1.6;
   return options;
 }

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "executable.h"
+#include "small_town.h"
 #include "synthetic_writer.h"
 #include "test_data.h"
 #include "tutti/core/text.h"
@@ -22,15 +23,10 @@ constexpr int kPlanted = 15;
 
 // A lap around a small block and a bit more: long enough for loops, true ones and planted ones.
 void WriteTown(const fs::path& folder) {
-  SyntheticOptions options;
-  options.sensor = SyntheticSensor::kStereo;
-  options.blocks_x = options.blocks_y = 1;
-  options.width = 320;
-  options.height = 160;
+  SyntheticOptions options = testing::SmallStereoTown(320, 160);
   options.block_m = 26;
   options.laps = 1.15;
   options.rate_hz = 4.5;
-  options.supersample = 1;
   SyntheticWriteOptions write;
   write.threads = 2;
   WriteSyntheticDataset(SyntheticWorld(options), folder, write);

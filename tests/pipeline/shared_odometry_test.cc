@@ -7,6 +7,7 @@
 #include <fstream>
 #include <iterator>
 
+#include "small_town.h"
 #include "synthetic_writer.h"
 #include "test_data.h"
 #include "tutti/core/error.h"
@@ -22,15 +23,10 @@ const fs::path& TownWithALoop() {
   struct Folder {
     fs::path path = fs::temp_directory_path() / ("tutti-loop-town-" + std::to_string(getpid()));
     Folder() {
-      SyntheticOptions options;
-      options.sensor = SyntheticSensor::kStereo;
-      options.blocks_x = options.blocks_y = 1;
-      options.width = 512;
-      options.height = 256;
+      SyntheticOptions options = testing::SmallStereoTown(512, 256);
       options.block_m = 26;
       options.laps = 1.15;
       options.rate_hz = 4.5;
-      options.supersample = 1;
       options.noise_sigma = 4;
       SyntheticWriteOptions write;
       write.threads = 2;

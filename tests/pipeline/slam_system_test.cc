@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "recording.h"
+#include "small_town.h"
 #include "tutti/backend/evaluation.h"
 
 namespace tutti {
@@ -16,13 +17,8 @@ using testing::Recording;
 // Twice round a small block; each test runs in a process of its own.
 const Recording& TwoLaps() {
   static const Recording recording = [] {
-    SyntheticOptions options;
-    options.sensor = SyntheticSensor::kStereo;
-    options.width = 320;
-    options.height = 160;
-    options.blocks_x = 1;
+    SyntheticOptions options = testing::SmallStereoTown(320, 160);
     options.block_m = 20;
-    options.supersample = 1;
     options.laps = 2;
     const SyntheticWorld world(options);
     return testing::Record(world, world.Size());

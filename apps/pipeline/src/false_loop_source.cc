@@ -50,10 +50,10 @@ std::optional<LoopEdge> FalseLoopSource::Alike(const Odometry& odometry, const s
   return loop;
 }
 
-std::optional<LoopEdge> FalseLoopSource::Next(const Odometry& odometry,
-                                              const std::map<int, std::int64_t>& frames, int query) {
+std::optional<LoopEdge> FalseLoopSource::Next(const Odometry& odometry, int query) {
+  if (left_ == 0) return std::nullopt;
   const std::vector<int> ids = odometry.KeyframeIds();
-  if (left_ == 0 || ids.size() < 2 * kMinApart) return std::nullopt;
+  if (ids.size() < 2 * kMinApart) return std::nullopt;
   Eigen::AlignedBox3d box;
   for (const int id : ids) box.extend(odometry.KeyframePose(id).translation);
   for (int k = 0; k < kTries; ++k) {
@@ -77,14 +77,13 @@ std::optional<LoopEdge> FalseLoopSource::Next(const Odometry& odometry,
     const Similarity S_query_candidate(odometry.KeyframePose(loop->query).Inverse() *
                                        odometry.KeyframePose(loop->candidate));
     const bool is_false = Measure(loop->S_candidate_query * S_query_candidate, loop->depth).fraction > 1;
-    const auto c = frames.find(loop->candidate), q = frames.find(loop->query);
     const bool joined = odometry.KeyframePiece(loop->candidate) == odometry.KeyframePiece(loop->query);
-    if (!is_false || !joined || c == frames.end() || q == frames.end()) {
+    if (!is_false || !joined) {
       last_.reset();
       continue;
     }
-    loop->candidate_frame = c->second;
-    loop->query_frame = q->second;
+    loop->candidate_frame = odometry.KeyframeFrameIndex(loop->candidate);
+    loop->query_frame = odometry.KeyframeFrameIndex(loop->query);
     last_ = loop;
     ++made_;
     --left_;

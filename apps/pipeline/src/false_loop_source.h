@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <optional>
 #include <random>
 
@@ -23,9 +22,8 @@ class FalseLoopSource {
 
   int left() const { return left_; }
   /// A false loop to the keyframe `query`, or to any if it is negative; nothing if none are left or the map
-  /// is too small yet. `frames`: input frame of each keyframe.
-  std::optional<LoopEdge> Next(const Odometry& odometry, const std::map<int, std::int64_t>& frames,
-                               int query);
+  /// is too small yet.
+  std::optional<LoopEdge> Next(const Odometry& odometry, int query);
 
  private:
   double Symmetric(double limit);

@@ -17,6 +17,10 @@ Disagreement Measure(const Similarity& E, double depth) {
   return d;
 }
 
+bool Contradicts(const Disagreement& d, const SlamOptions& options) {
+  return d.fraction > options.loop_after_fraction || d.angle_deg > options.loop_after_deg;
+}
+
 bool LoopGate::Within(const Disagreement& d) const {
   return d.fraction <= options_.loop_agree_fraction && d.angle_deg <= options_.loop_agree_deg &&
          d.log_scale <= options_.loop_agree_scale;

@@ -17,6 +17,8 @@ struct Disagreement {
   double log_scale = 0;  ///< |log(scale)|
 };
 Disagreement Measure(const Similarity& E, double depth);
+/// Too much for a loop that belongs to an optimised map (loop_after_fraction, loop_after_deg).
+bool Contradicts(const Disagreement& d, const SlamOptions& options);
 
 /// A false loop ruins a map, a missed one costs little: a loop enters when it closes with another loop nearby
 /// (the cycle candidate A -> query A -> query B -> candidate B -> candidate A; pairwise consistency as in

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <utility>
 
+#include "milliseconds_since.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -100,7 +101,7 @@ LoopResult LoopWorker::Take() {
   changed_.wait(lock, [this] { return !outcomes_.empty(); });
   Outcome outcome = std::move(outcomes_.front());
   outcomes_.pop_front();
-  waited_ms_ += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
+  waited_ms_ += MillisecondsSince(begin);
   if (outcome.failure) std::rethrow_exception(outcome.failure);
   return std::move(outcome.result);
 }

@@ -157,8 +157,7 @@ void MapGraph::MeasureAgain(const Odometry& odometry, std::vector<LoopEdge>& acc
     const Similarity in_map(odometry.KeyframePose(loop.candidate).Inverse() *
                             odometry.KeyframePose(loop.query));
     const Disagreement d = Measure(loop.S_candidate_query * in_map.Inverse(), loop.depth);
-    if (d.fraction <= options_.loop_after_fraction && d.angle_deg <= options_.loop_after_deg)
-      loop.S_candidate_query = in_map;
+    if (!Contradicts(d, options_)) loop.S_candidate_query = in_map;
   }
 }
 

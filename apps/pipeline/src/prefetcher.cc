@@ -5,6 +5,8 @@
 #include <exception>
 #include <utility>
 
+#include "milliseconds_since.h"
+
 namespace tutti {
 
 // A reader must not throw for one bad frame; if it does all the same, the frame counts as bad.
@@ -88,7 +90,7 @@ std::optional<FetchedFrame> Prefetcher::Next() {
     }
     changed_.notify_all();
   }
-  waited_ms_ += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
+  waited_ms_ += MillisecondsSince(begin);
   return frame;
 }
 

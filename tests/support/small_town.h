@@ -1,0 +1,18 @@
+// A synthetic world that is quickly rendered: streets around one block, seen by a stereo camera.
+#pragma once
+
+#include "synthetic_world.h"
+
+namespace tutti::testing {
+
+inline SyntheticOptions SmallStereoTown(int width, int height) {
+  SyntheticOptions options;
+  options.sensor = SyntheticSensor::kStereo;
+  options.blocks_x = options.blocks_y = 1;
+  options.width = width;
+  options.height = height;
+  options.supersample = 1;
+  return options;
+}
+
+}  // namespace tutti::testing

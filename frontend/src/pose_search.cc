@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kMinProjected = 20;           // matches by projection below which the search is widened
 constexpr int kMinGuess = 10;               // inliers of a guess
-constexpr int kRecentKeyframes = 10;        // that a lost frame is compared with
+constexpr int kRecentKeyframes = 10;        // that a frame without a pose is compared with
 constexpr double kSameGuess = 1.0;          // guesses that differ by less in the image are one [px]
 constexpr double kSurePrediction = 0.5;     // a velocity holds for so long [s]
 constexpr double kLongestPrediction = 1.5;  // [s]
@@ -187,15 +187,19 @@ bool Odometry::Impl::FindPose(Fix* fix) const {
       if (GuessFromLastFrame(prediction, radius, &guess) && Offer(least, &guess, &offered, fix)) return true;
     }
   }
-  std::vector<int> tries{reference_, last_keyframe_};
-  for (int near : map().BestCovisible(reference_, 3, 15)) tries.push_back(near);
-  // What the loop detector does not know yet.
-  for (int k = last_keyframe_ - 1; k >= std::max(0, last_keyframe_ - kRecentKeyframes); --k)
-    tries.push_back(k);
-  for (std::size_t i = 0; i < tries.size(); ++i) {
-    const auto here = tries.begin() + static_cast<std::ptrdiff_t>(i);
-    if (std::find(tries.begin(), here, tries[i]) != here) continue;
-    if (GuessFromKeyframe(tries[i], &guess) && Offer(least, &guess, &offered, fix)) return true;
+  std::vector<int> near{reference_, last_keyframe_};
+  for (int covisible : map().BestCovisible(reference_, 3, 15)) near.push_back(covisible);
+  const auto settled = [&](int keyframe) {
+    return GuessFromKeyframe(keyframe, &guess) && Offer(least, &guess, &offered, fix);
+  };
+  for (std::size_t i = 0; i < near.size(); ++i) {
+    const auto here = near.begin() + static_cast<std::ptrdiff_t>(i);
+    if (std::find(near.begin(), here, near[i]) == here && settled(near[i])) return true;
+  }
+  // What the loop detector does not know yet; a doubtful pose from here is as good as one from there.
+  const int oldest = std::max(0, last_keyframe_ - kRecentKeyframes);
+  for (int k = last_keyframe_ - 1; k >= oldest && fix->inliers == 0; --k) {
+    if (std::find(near.begin(), near.end(), k) == near.end() && settled(k)) return true;
   }
   return fix->inliers > 0;
 }

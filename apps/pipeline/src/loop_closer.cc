@@ -7,7 +7,6 @@
 #include <optional>
 #include <utility>
 
-#include "loop_constraint.h"
 #include "milliseconds_since.h"
 
 namespace tutti {
@@ -51,30 +50,40 @@ void LoopCloser::Consider(const Verification& verification, int candidate, int q
     record.reason = "too recent: still in the local map";
     return;
   }
-  LoopConstraint constraint = MakeLoopConstraint(verification, odometry_.Keyframe(candidate),
-                                                 odometry_.Keyframe(query), rig_, options_, seed_);
+  const LoopConstraint constraint = Measure(verification, candidate, query);
   if (!constraint.usable) {
     record.reason = constraint.reason;
     return;
   }
-  constraint.edge.record = records_.size() - 1;
-  record.S_candidate_query = constraint.edge.S_candidate_query;
+  LoopEdge edge = constraint.edge;
+  edge.record = records_.size() - 1;
+  record.S_candidate_query = edge.S_candidate_query;
   record.has_scale = true;
-  std::vector<LoopEdge> entering = gate_.Offer(constraint.edge, places);
+  std::vector<LoopEdge> entering = gate_.Offer(edge, places);
   if (entering.empty()) {
     record.pending = true;
     record.reason = "waits for a second loop that agrees";
     return;
   }
-  entering.insert(entering.begin(), deferred_.begin(), deferred_.end());
-  deferred_.clear();
+  for (const LoopEdge& loop : entering) untied_[loop.record] = loop;
   const auto fulfilled = [&](const LoopEdge& loop) { return gate_.Fulfilled(loop, places); };
-  if (std::all_of(entering.begin(), entering.end(), fulfilled)) {
-    deferred_ = std::move(entering);
-    if (options_.global_adjustment) Fuse(deferred_);
+  const auto all_fulfilled = [&](const std::vector<LoopEdge>& loops) {
+    return std::all_of(loops.begin(), loops.end(), fulfilled);
+  };
+  if (all_fulfilled(deferred_) && all_fulfilled(entering)) {
+    if (options_.global_adjustment) Fuse(entering);
+    deferred_.insert(deferred_.end(), entering.begin(), entering.end());
   } else {
+    entering.insert(entering.begin(), deferred_.begin(), deferred_.end());
+    deferred_.clear();
     Close(std::move(entering), frames);
   }
+}
+
+LoopConstraint LoopCloser::Measure(const Verification& verification, int candidate, int query) const {
+  const ScopedSpan span(recorder_, Lane::kOptimisation, "measure_loop");
+  return MakeLoopConstraint(verification, odometry_.Keyframe(candidate), odometry_.Keyframe(query), rig_,
+                            options_, seed_);
 }
 
 bool LoopCloser::Inject(int query, std::int64_t frames) {
@@ -89,6 +98,7 @@ bool LoopCloser::Inject(int query, std::int64_t frames) {
   record.S_candidate_query = loop->S_candidate_query;
   loop->record = records_.size();
   records_.push_back(record);
+  untied_[loop->record] = *loop;
   Close({*loop}, frames);
   return true;
 }
@@ -114,6 +124,7 @@ void LoopCloser::Gate(std::vector<LoopEdge>& entering) {
 void LoopCloser::Reject(const LoopEdge& loop, const std::string& reason) {
   records_[loop.record].pending = false;
   records_[loop.record].reason = reason;
+  untied_.erase(loop.record);
 }
 
 // Optimises with the entering loops; those that the rest contradicts leave again. Then the map moves.
@@ -173,19 +184,20 @@ void LoopCloser::Apply(const MapGraph::Correction& correction, const std::vector
   graph_.Keep(odometry_, correction, gate_.accepted(), gate_.waiting());
   odometry_.ApplyCorrection(correction.S_world_keyframe, correction.merges);
   ++corrections_;
-  if (options_.global_adjustment && Fuse(entering))
-    adjuster_.MapMoved(odometry_, odometry_.KeyframePiece(entering.back().candidate), frames);
+  if (!options_.global_adjustment) return;
+  std::vector<LoopEdge> untied;
+  for (const auto& [record, loop] : untied_) untied.push_back(loop);
+  if (Fuse(untied)) adjuster_.MapMoved(odometry_, odometry_.KeyframePiece(entering.back().candidate), frames);
 }
 
-// Landmarks that both ends of a loop see become one. False if some loop has too few of them: to adjust the
-// map without it would open it again.
+// Landmarks that both ends of the loops see become one. False if some loop has too few of them yet: to
+// adjust the map without it would open it again. It is tried again with the next correction.
 bool LoopCloser::Fuse(const std::vector<LoopEdge>& loops) {
   constexpr int kLeastCommon = 30;
-  for (const LoopEdge& loop : loops) untied_[loop.record] = loop;
-  for (auto untied = untied_.begin(); untied != untied_.end();) {
-    const LoopEdge& loop = untied->second;
-    const int common = odometry_.FuseLoop(loop.candidate, loop.query, loop.S_candidate_query);
-    untied = common >= kLeastCommon ? untied_.erase(untied) : std::next(untied);
+  const ScopedSpan span(recorder_, Lane::kOptimisation, "fuse_loop");
+  for (const LoopEdge& loop : loops) {
+    if (odometry_.FuseLoop(loop.candidate, loop.query, loop.S_candidate_query) >= kLeastCommon)
+      untied_.erase(loop.record);
   }
   return untied_.empty();
 }

@@ -9,6 +9,7 @@
 
 #include "false_loop_source.h"
 #include "global_adjuster.h"
+#include "loop_constraint.h"
 #include "loop_gate.h"
 #include "map_graph.h"
 #include "tutti/core/span_recorder.h"
@@ -48,6 +49,7 @@ class LoopCloser {
 
  private:
   LoopGate::Map Places() const;
+  LoopConstraint Measure(const Verification& verification, int candidate, int query) const;
   void Gate(std::vector<LoopEdge>& entering);
   void Reject(const LoopEdge& loop, const std::string& reason);
   void Close(std::vector<LoopEdge> entering, std::int64_t frames);

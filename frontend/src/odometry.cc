@@ -40,6 +40,8 @@ std::string OdometryOptions::Validate() const {
   if (!(relocalize_s >= 0)) return "odometry.relocalize_s must not be negative";
   if (!(keyframe_inlier_ratio > 0 && keyframe_inlier_ratio < 1))
     return "odometry.keyframe_inlier_ratio must lie between 0 and 1";
+  if (!(keyframe_uncovered_ratio > 0 && keyframe_uncovered_ratio <= 1))
+    return "odometry.keyframe_uncovered_ratio must be above 0 and at most 1";
   if (!(keyframe_max_interval_s > 0)) return "odometry.keyframe_max_interval_s must be positive";
   if (mapping_delay_frames < 0) return "odometry.mapping_delay_frames must not be negative";
   if (keyframe_min_frames < 0) return "odometry.keyframe_min_frames must not be negative";

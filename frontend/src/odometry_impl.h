@@ -96,6 +96,8 @@ class Odometry::Impl {
   TrackResult Accept(Fix fix);
   /// Refines the pose on the matches, drops those that do not fit; returns the number of inliers.
   int Refine(FrameMatches* matches, Pose* T_camera_world) const;
+  int EstablishedLandmarks(int keyframe) const;
+  bool DepthWouldBringMore(const FrameMatches& matches) const;
   bool NeedKeyframe(const TrackedFrame& frame, const FrameMatches& matches, int inliers) const;
   void CountSeen(const Fix& fix);
   int InsertKeyframe(const TrackedFrame& frame);

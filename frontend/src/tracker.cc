@@ -7,11 +7,6 @@
 #include "stopwatch.h"
 
 namespace tutti {
-namespace {
-// A reference keyframe from an earlier visit: so many keyframes before the newest, and so long ago [s].
-constexpr int kKeyframesApart = 10;
-constexpr double kSecondsApart = 10;
-}  // namespace
 
 Odometry::Impl::Impl(const OdometryOptions& o, const CameraRig& r)
     : options(o),
@@ -153,43 +148,6 @@ void Odometry::Impl::Lose() {
   lost_since_s_.reset();
   initializer_.Reset();
   has_velocity_ = false;
-}
-
-bool Odometry::Impl::NeedKeyframe(const TrackedFrame& frame, const FrameMatches& matches, int inliers) const {
-  const tutti::Keyframe& last = map().keyframe(last_keyframe_);
-  const bool early = frames_since_keyframe_ < options.keyframe_min_frames;
-  // Landmarks of the reference that are established: what one keyframe alone has seen (most of what depth
-  // gives) may never be seen again, and would call for a keyframe all the time.
-  const tutti::Keyframe& reference = map().keyframe(reference_);
-  const std::size_t established = rig.sensor == Sensor::kMono && map().KeyframeCount() > 2 ? 3 : 2;
-  int reference_count = 0;
-  for (int l : reference.landmarks) {
-    if (l >= 0 && map().landmark(l).observations.size() >= established) ++reference_count;
-  }
-  const bool weak = inliers < options.keyframe_inlier_ratio * reference_count;
-  const bool very_weak = inliers < 0.4 * reference_count || inliers < 3 * options.min_inliers;
-  bool few_near = false;
-  if (rig.sensor != Sensor::kMono) {
-    const double far = rig.sensor == Sensor::kStereo ? options.max_depth_baselines * rig.baseline_m : 1e9;
-    int near_tracked = 0, near_free = 0;
-    for (std::size_t f = 0; f < matches.landmarks.size(); ++f) {
-      const float inverse = matches.features->inverse_depth[f];
-      if (inverse <= 0 || 1.0 / inverse > far) continue;
-      ++(matches.landmarks[f] >= 0 ? near_tracked : near_free);
-    }
-    few_near = near_tracked < 100 && near_free > 70;
-  }
-  const double baseline =
-      (map().keyframe(last_keyframe_).T_world_camera.translation - last_T_camera_world_.Inverse().translation)
-          .norm();
-  const bool moved = baseline > 0.02 * std::max(1e-6, map().MedianDepth(last_keyframe_));
-  const bool due = frame.stamp_s - last.stamp_s > options.keyframe_max_interval_s && moved;
-  if (early && !(very_weak && frames_since_keyframe_ >= 1)) return false;
-  // In a place seen before, after a loop, the map has the landmarks that come next already.
-  const bool known =
-      last_keyframe_ - reference_ > kKeyframesApart && frame.stamp_s - reference.stamp_s > kSecondsApart;
-  if (known) return very_weak || few_near;
-  return weak || very_weak || due || few_near;
 }
 
 // Makes the last tracked frame a keyframe.

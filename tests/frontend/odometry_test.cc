@@ -77,6 +77,29 @@ TEST(Odometry, RgbdFollowsTheTruthInMetres) {
   EXPECT_LT(EndError(room.truth, estimate, false), 0.01 * PathLength(room.truth));
 }
 
+TEST(Odometry, FastTurnsGetAKeyframeBeforeMostOfTheViewIsNew) {
+  SyntheticOptions options;
+  options.scene = SyntheticScene::kRoom;
+  options.sensor = SyntheticSensor::kStereo;
+  options.width = 400;
+  options.height = 256;
+  options.supersample = 1;
+  options.rate_hz = 20;
+  options.speed_mps = 1.5;  // and 30 degrees a second and more
+  const Recording room = testing::Record(SyntheticWorld(options), 110);
+  const auto error = [&](double uncovered_ratio) {
+    OdometryOptions odometry_options;
+    odometry_options.keyframe_uncovered_ratio = uncovered_ratio;
+    Odometry odometry(odometry_options, room.rig);
+    TrackAll(room, odometry);
+    EXPECT_EQ(odometry.FrameTrajectory().size(), room.frames.size());
+    return EndError(room.truth, odometry.FrameTrajectory(), false) / PathLength(room.truth);
+  };
+  const double with = error(OdometryOptions().keyframe_uncovered_ratio), without = error(1);
+  EXPECT_LT(with, 0.03);
+  EXPECT_LT(with, 0.5 * without);
+}
+
 TEST(Odometry, MonoFollowsTheTruthUpToScaleAndPosesTheFirstFramesBackwards) {
   Recording mono = Stereo();
   mono.rig.sensor = Sensor::kMono;

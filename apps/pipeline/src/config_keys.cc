@@ -111,6 +111,9 @@ void ConfigTable::AddOdometry(OdometryOptions& o) {
   Add("local_keyframes", o.local_keyframes, "keyframes whose landmarks are searched in a frame");
   Add("keyframe_inlier_ratio", o.keyframe_inlier_ratio,
       "new keyframe when fewer than this share of the reference's landmarks is seen, 0..1");
+  Add("keyframe_uncovered_ratio", o.keyframe_uncovered_ratio,
+      "stereo and depth: new keyframe when landmarks are missing in more than this share of the image's "
+      "cells that have something to see, 0..1");
   Add("keyframe_max_interval_s", o.keyframe_max_interval_s,
       "new keyframe at the latest after this time, if the camera moved [s]");
   Add("keyframe_min_frames", o.keyframe_min_frames,

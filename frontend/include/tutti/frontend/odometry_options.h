@@ -39,6 +39,9 @@ struct OdometryOptions {
   // Keyframes.
   double keyframe_inlier_ratio =
       0.75;  ///< new keyframe when fewer than this share of the reference's landmarks is seen, 0..1
+  double keyframe_uncovered_ratio =
+      0.33;  ///< stereo and depth: new keyframe when landmarks are missing in more than this share of the
+             ///< image's cells that have something to see, 0..1
   double keyframe_max_interval_s =
       1.0;                      ///< new keyframe at the latest after this time, if the camera moved [s]
   int keyframe_min_frames = 2;  ///< at least this many frames between keyframes (unless tracking gets weak)

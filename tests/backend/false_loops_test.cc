@@ -98,6 +98,30 @@ INSTANTIATE_TEST_SUITE_P(Published, HundredFalseLoops, ::testing::Values("intel.
                            return name.substr(0, name.find('.'));
                          });
 
+// Seed 10 has a loop that costs a loose end of the graph almost nothing, and another that a graduation which
+// stalls takes in for good.
+TEST(FalseLoops, ALoopThatBendsALooseEndIsFound) {
+  TUTTI_REQUIRE_DATA(file, "posegraphs/manhattanOlson3500.g2o");
+  PoseGraphOptions options;
+  options.objective = GraphObjective::kChi2;
+  PoseGraph clean = ReadG2o(file).graph;
+  PoseGraphOptimizer(options).Optimize(clean);
+  PoseGraph graph = clean;
+  FalseLoopOptions loops;
+  loops.seed = 10;
+  const std::vector<std::size_t> planted = PlantFalseLoops(graph, loops);
+  PoseGraph start(graph.kind());
+  for (PoseGraphNode node : graph.nodes()) {
+    node.has_estimate = false;
+    start.AddNode(node);
+  }
+  for (const PoseGraphEdge& edge : graph.edges()) start.AddEdge(edge);
+  options.robust = kDefaultRobustLoss;
+  const PoseGraphReport report = PoseGraphOptimizer(options).Optimize(start);
+  for (const std::size_t e : planted) EXPECT_TRUE(report.edges[e].down_weighted) << "loop " << e;
+  EXPECT_LT(LargestShift(clean, start), 0.005 * BoundingBoxDiagonal(clean));
+}
+
 TEST(FalseLoops, LeastSquaresIsRuinedByWhatTheDefaultLossStands) {
   TUTTI_REQUIRE_DATA(file, "posegraphs/intel.g2o");
   PoseGraphOptions options;

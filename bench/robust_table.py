@@ -18,7 +18,7 @@ import sys
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 DOCUMENT = ROOT / "docs" / "backend.md"
 BEGIN, END = "<!-- robust:begin -->", "<!-- robust:end -->"
-GRAPHS = ["intel", "manhattanOlson3500", "ringCity", "sphere2500", "parking-garage"]
+GRAPHS = ["intel", "manhattan", "manhattanOlson3500", "ringCity", "sphere2500", "parking-garage"]
 METHODS = ["none", "huber", "cauchy", "dcs", "switchable", "gnc-tls", "gnc"]
 CASES = ["10x1", "50x1", "100x1", "500x1", "100x10", "500x50"]
 COLUMNS = ["graph", "method", "count", "cluster", "seed", "ate", "precision", "recall", "seconds"]

@@ -9,6 +9,7 @@
 
 #include "edge_error.h"
 #include "graph_structure.h"
+#include "linearized_edge.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -46,13 +47,11 @@ template <int N>
 class CovarianceOf final : public GraphCovariance::Impl {
  public:
   explicit CovarianceOf(const PoseGraph& graph) : graph_(graph), structure_(AnalyseGraph(graph)) {
-    int count = 0;
-    for (const bool constant : structure_.constant) unknown_.push_back(constant ? -1 : N * count++);
+    unknown_ = NumberRows<N>(structure_.constant, size_);
     blocks_.resize(graph.nodes().size());
     for (std::size_t k = 0; k < blocks_.size(); ++k) PoseToBlock<N>(graph.nodes()[k].pose, blocks_[k].data());
     std::vector<Eigen::Triplet<double>> triplets;
     for (std::size_t e = 0; e < graph.edges().size(); ++e) AddEdge(e, triplets);
-    size_ = N * count;
     if (size_ == 0) return;
     Eigen::SparseMatrix<double> H(size_, size_);
     H.setFromTriplets(triplets.begin(), triplets.end());
@@ -90,20 +89,8 @@ class CovarianceOf final : public GraphCovariance::Impl {
   void AddEdge(std::size_t e, std::vector<Eigen::Triplet<double>>& triplets) const {
     const EdgeEnds& ends = structure_.ends[e];
     const auto constants = MakeEdgeConstants<N>(graph_.edges()[e], GraphObjective::kChi2Log);
-    Eigen::Matrix<double, N, 1> error;
-    Square<N> J[2];
-    EdgeError<N>(constants, blocks_[ends.from].data(), blocks_[ends.to].data(), error, &J[0], &J[1]);
-    const int at[2] = {unknown_[ends.from], unknown_[ends.to]};
-    for (Square<N>& jacobian : J) jacobian = (constants.sqrt_information * jacobian).eval();
-    for (int a = 0; a < 2; ++a) {
-      for (int b = 0; b < 2; ++b) {
-        if (at[a] < 0 || at[b] < 0 || at[a] < at[b]) continue;  // the lower triangle
-        const Square<N> H = J[a].transpose() * J[b];
-        for (int r = 0; r < N; ++r) {
-          for (int c = 0; c < N; ++c) triplets.emplace_back(at[a] + r, at[b] + c, H(r, c));
-        }
-      }
-    }
+    AddInformation<N>(Linearize<N>(constants, blocks_[ends.from].data(), blocks_[ends.to].data()),
+                      {unknown_[ends.from], unknown_[ends.to]}, triplets);
   }
 
   /// The columns of H^-1 that belong to node k.

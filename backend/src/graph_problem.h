@@ -3,6 +3,7 @@
 
 #include <ceres/ceres.h>
 
+#include <algorithm>
 #include <deque>
 #include <memory>
 #include <optional>
@@ -10,6 +11,7 @@
 
 #include "edge_error.h"
 #include "graph_structure.h"
+#include "linearized_edge.h"
 #include "manifold.h"
 #include "robust_loss.h"
 #include "switched_edge.h"
@@ -92,6 +94,11 @@ class GraphProblem {
     EdgeError<N>(c, &blocks_[ends.from * kBlock], &blocks_[ends.to * kBlock], error, nullptr, nullptr);
     return (c.sqrt_information * error).squaredNorm();
   }
+  LinearizedEdge<N> Linearized(std::size_t e) const {
+    const EdgeEnds& ends = structure_.ends[e];
+    return Linearize<N>(costs_[e].constants(), &blocks_[ends.from * kBlock], &blocks_[ends.to * kBlock]);
+  }
+  const GraphStructure& structure() const { return structure_; }
   bool IsLoop(std::size_t e) const { return graph_.edges()[e].kind == EdgeKind::kLoop; }
 
   /// What the options ask to minimise (no 1/2), at the present poses.
@@ -133,6 +140,10 @@ class GraphProblem {
     ceres_.reset();
   }
 
+  /// The next solution goes on with the trust region that the last one ended with, instead of a wide one. For
+  /// rounds of few iterations, which would spend them all on narrowing it.
+  void KeepTrustRegion() { trust_region_ = std::min(last_trust_region_, kInitialTrustRegion); }
+
   ceres::Solver::Summary Solve(int max_iterations, double max_time_s) {
     if (!ceres_) BuildCeresProblem();
     ceres::Solver::Options options;
@@ -143,7 +154,7 @@ class GraphProblem {
       options.sparse_linear_algebra_library_type = ceres::EIGEN_SPARSE;
     }
     options.trust_region_strategy_type = ceres::LEVENBERG_MARQUARDT;
-    options.initial_trust_region_radius = kInitialTrustRegion;
+    options.initial_trust_region_radius = trust_region_;
     options.max_num_iterations = max_iterations;
     if (max_time_s > 0) options.max_solver_time_in_seconds = max_time_s;
     options.function_tolerance = options_.function_tolerance;
@@ -153,6 +164,9 @@ class GraphProblem {
     options.logging_type = ceres::SILENT;
     ceres::Solver::Summary summary;
     ceres::Solve(options, &*ceres_, &summary);
+    last_trust_region_ =
+        summary.iterations.empty() ? kInitialTrustRegion : summary.iterations.back().trust_region_radius;
+    trust_region_ = kInitialTrustRegion;
     return summary;
   }
 
@@ -195,6 +209,7 @@ class GraphProblem {
   const GraphStructure& structure_;
   const PoseGraphOptions& options_;
   double threshold_;
+  double trust_region_ = kInitialTrustRegion, last_trust_region_ = kInitialTrustRegion;
   std::vector<double> blocks_;
   std::vector<double> weights_;
   std::deque<EdgeCost<N>> costs_;  // a deque: cost functions can't be moved

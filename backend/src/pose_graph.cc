@@ -60,7 +60,10 @@ Matrix7d MakeInformation(double sigma_translation, double sigma_rotation, double
 std::string CheckInformation(const Matrix7d& information, GraphKind kind) {
   const std::vector<int> used = TangentCoordinates(kind);
   const Eigen::MatrixXd m = information(used, used);
+  constexpr double kLargest = 1e100;  // beyond it costs overflow
   if (!m.allFinite()) return "its information matrix is not finite";
+  if (m.cwiseAbs().maxCoeff() > kLargest)
+    return "its information matrix has entries beyond 1e100; give them in 1/m^2 and 1/rad^2";
   if ((m - m.transpose()).cwiseAbs().maxCoeff() > 1e-9 * m.cwiseAbs().maxCoeff()) {
     return "its information matrix is not symmetric";
   }

@@ -108,7 +108,7 @@ class Run {
     problem_.SetPoses(best);
     for (std::size_t e = 0; e < best_weights.size(); ++e) problem_.SetWeight(e, best_weights[e]);
     if (robust && plain_.empty()) {
-      robust_.Tighten();
+      robust_.Refine();
       report_.objective = problem_.Objective();
     }
     if (options_.sigma_test && robust_.HasLoops()) robust_.DecideLoops(internal::ChiSquare3Sigma(N));

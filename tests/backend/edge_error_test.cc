@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "linearized_edge.h"
 #include "manifold.h"
 #include "synthetic_graph.h"
 
@@ -75,6 +76,8 @@ TEST(EdgeError, JacobiansOfSimilarityEdgesMatchFiniteDifferences) {
 }
 
 TEST(EdgeError, JacobiansHoldFarFromTheOrigin) {
+  CheckJacobians<3>(GraphKind::kSE2, GraphObjective::kChi2, 0.7, 1e6);
+  CheckJacobians<6>(GraphKind::kSE3, GraphObjective::kChi2, 0.7, 1e6);
   CheckJacobians<6>(GraphKind::kSE3, GraphObjective::kChi2Log, 0.7, 1e6);
 }
 
@@ -92,6 +95,50 @@ TEST(EdgeError, JacobiansHoldCloseToHalfATurn) {
     Step<6>(j, d, 1e-6, moved);
     EXPECT_LT(((Error<6>(c, i, moved) - error) / 1e-6 - Jj.col(d)).norm(), 1e-3);
   }
+}
+
+TEST(EdgeError, PlanarHeadingsOnBothSidesOfHalfATurnAreTheSame) {
+  PoseGraphEdge edge;
+  edge.measurement.rotation = ExpSO3({0, 0, M_PI});
+  const auto c = internal::MakeEdgeConstants<3>(edge, GraphObjective::kChi2);
+  const double i[3] = {0, 0, 0};
+  for (const double heading : {M_PI - 1e-9, M_PI, -M_PI, -M_PI + 1e-9, 7 * M_PI}) {
+    const double j[3] = {0, 0, heading};
+    EXPECT_LT(Error<3>(c, i, j).norm(), 2e-9) << heading;
+  }
+}
+
+template <int N>
+void CheckWhitenedJacobians(GraphKind kind) {
+  std::mt19937 random(9);
+  PoseGraphEdge edge;
+  edge.measurement = testing::RandomPose(kind, random, 3.0, 0.7);
+  edge.information = testing::RandomInformation(random);
+  const auto c = internal::MakeEdgeConstants<N>(edge, GraphObjective::kChi2Log);
+  double block[2][8], moved[8];
+  for (double* b : {block[0], block[1]})
+    internal::PoseToBlock<N>(testing::RandomPose(kind, random, 5, 0.7), b);
+  const internal::LinearizedEdge<N> edge_at = internal::Linearize<N>(c, block[0], block[1]);
+  const auto chi2 = [&](int end) {
+    return (c.sqrt_information * (end == 0 ? Error<N>(c, moved, block[1]) : Error<N>(c, block[0], moved)))
+        .squaredNorm();
+  };
+  constexpr double h = 1e-6;
+  for (int end = 0; end < 2; ++end) {
+    const Eigen::Matrix<double, N, 1> gradient = 2 * edge_at.jacobian[end].transpose() * edge_at.error;
+    for (int d = 0; d < N; ++d) {
+      Step<N>(block[end], d, h, moved);
+      const double plus = chi2(end);
+      Step<N>(block[end], d, -h, moved);
+      EXPECT_NEAR(gradient(d), (plus - chi2(end)) / (2 * h), 1e-5 * (1 + gradient.norm())) << ToString(kind);
+    }
+  }
+}
+
+TEST(EdgeError, GradientsWithOffDiagonalInformationMatchFiniteDifferences) {
+  CheckWhitenedJacobians<3>(GraphKind::kSE2);
+  CheckWhitenedJacobians<6>(GraphKind::kSE3);
+  CheckWhitenedJacobians<7>(GraphKind::kSim3);
 }
 
 TEST(EdgeError, IsZeroWhereTheMeasurementHolds) {

@@ -98,6 +98,71 @@ INSTANTIATE_TEST_SUITE_P(Published, HundredFalseLoops, ::testing::Values("intel.
                            return name.substr(0, name.find('.'));
                          });
 
+// Odometry and loops that are ten times better than they promise, and a tail without loops: by the promise a
+// wrong loop at its end is no surprise (it costs less than the threshold), by what the other loops show it
+// is.
+TEST(FalseLoops, AWrongLoopThatThePromisedCovariancesAllowIsFoundByWhatTheOthersShow) {
+  testing::SyntheticGraphOptions options;
+  options.kind = GraphKind::kSE2;
+  options.noise_translation = 0.002;
+  options.noise_rotation = 0.001;
+  const PoseGraph exact = testing::MakeSyntheticGraph(options).graph;
+  PoseGraph graph(GraphKind::kSE2);
+  for (const PoseGraphNode& node : exact.nodes()) graph.AddNode(node);
+  for (PoseGraphEdge edge : exact.edges()) {
+    edge.information = MakeInformation(0.02, 0.01);
+    graph.AddEdge(edge);
+  }
+  const Similarity step(1, Eigen::Quaterniond::Identity(), {2, 0, 0});
+  for (int id = options.nodes; id < options.nodes + 40; ++id) {
+    graph.AddNode(id, graph.Node(id - 1).pose * step);
+    graph.AddOdometry(id - 1, id, step, MakeInformation(0.02, 0.01));
+  }
+  PoseGraph clean = graph;
+  PoseGraphOptions solver;
+  PoseGraphOptimizer(solver).Optimize(clean);
+  const auto plant = [&](int to, const Eigen::Vector3d& off) {
+    Similarity measurement = clean.Node(0).pose.Inverse() * clean.Node(to).pose;
+    measurement.translation += measurement.rotation * off;
+    graph.AddLoop(0, to, measurement, MakeInformation(0.02, 0.01));
+  };
+  plant(options.nodes + 39, {0, 5, 0});
+  plant(60, {100, 0, 0});  // one that least squares can't bear: else no loop would be doubted
+  solver.robust = kDefaultRobustLoss;
+  const PoseGraphReport report = PoseGraphOptimizer(solver).Optimize(graph);
+  EXPECT_EQ(report.down_weighted, 2u);
+  EXPECT_TRUE(report.edges[report.edges.size() - 2].down_weighted);
+  EXPECT_LT(LargestShift(clean, graph), 1e-3);
+  // It would have cost less than the threshold.
+  solver.robust_chi2 = 11.344867;  // the default, but given by the user: second thoughts are off
+  const PoseGraphReport trusting = PoseGraphOptimizer(solver).Optimize(graph);
+  EXPECT_EQ(trusting.down_weighted, 1u);
+}
+
+// Seed 10 has a loop that costs a loose end of the graph almost nothing, and another that a graduation which
+// stalls takes in for good.
+TEST(FalseLoops, ALoopThatBendsALooseEndIsFound) {
+  TUTTI_REQUIRE_DATA(file, "posegraphs/manhattanOlson3500.g2o");
+  PoseGraphOptions options;
+  options.objective = GraphObjective::kChi2;
+  PoseGraph clean = ReadG2o(file).graph;
+  PoseGraphOptimizer(options).Optimize(clean);
+  PoseGraph graph = clean;
+  FalseLoopOptions loops;
+  loops.seed = 10;
+  const std::vector<std::size_t> planted = PlantFalseLoops(graph, loops);
+  PoseGraph start(graph.kind());
+  for (PoseGraphNode node : graph.nodes()) {
+    node.has_estimate = false;
+    start.AddNode(node);
+  }
+  for (const PoseGraphEdge& edge : graph.edges()) start.AddEdge(edge);
+  options.robust = kDefaultRobustLoss;
+  const PoseGraphReport report = PoseGraphOptimizer(options).Optimize(start);
+  for (const std::size_t e : planted) EXPECT_TRUE(report.edges[e].down_weighted) << "loop " << e;
+  EXPECT_LT(LargestShift(clean, start), 0.005 * BoundingBoxDiagonal(clean));
+}
+
 TEST(FalseLoops, LeastSquaresIsRuinedByWhatTheDefaultLossStands) {
   TUTTI_REQUIRE_DATA(file, "posegraphs/intel.g2o");
   PoseGraphOptions options;

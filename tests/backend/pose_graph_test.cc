@@ -70,6 +70,11 @@ TEST(PoseGraph, RefusesASingularInformation) {
   EXPECT_FALSE(CheckInformation(information, GraphKind::kSE3).empty());
 }
 
+TEST(PoseGraph, RefusesAnInformationWithWhichCostsOverflow) {
+  EXPECT_NE(CheckInformation(1e120 * Matrix7d::Identity(), GraphKind::kSE2).find("beyond 1e100"),
+            std::string::npos);
+}
+
 TEST(PoseGraph, JudgesOnlyTheCoordinatesThatItsKindUses) {
   Matrix7d information = Matrix7d::Zero();
   information(0, 0) = information(1, 1) = information(5, 5) = 1;

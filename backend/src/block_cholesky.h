@@ -61,7 +61,7 @@ class BlockCholesky {
       }
       const Eigen::LLT<Block> llt(pivot);
       if (llt.info() != Eigen::Success) return false;
-      diagonal_inverse_[k] = llt.matrixL().solve(Block::Identity());
+      diagonal_inverse_[k] = InverseOfLower(llt.matrixLLT());
       if (!diagonal_inverse_[k].allFinite()) return false;
     }
     return true;
@@ -98,6 +98,21 @@ class BlockCholesky {
   }
   static auto Segment(const Eigen::VectorXd& v, std::size_t k) {
     return v.template segment<N>(static_cast<Eigen::Index>(N * k));
+  }
+
+  /// Inverse of the lower triangle; the upper one is not looked at. (Eigen's own goes the way of large
+  /// matrices.)
+  static Block InverseOfLower(const Block& L) {
+    Block inverse = Block::Zero();
+    for (int c = 0; c < N; ++c) {
+      inverse(c, c) = 1 / L(c, c);
+      for (int r = c + 1; r < N; ++r) {
+        double sum = 0;
+        for (int k = c; k < r; ++k) sum += L(r, k) * inverse(k, c);
+        inverse(r, c) = -sum / L(r, r);
+      }
+    }
+    return inverse;
   }
 
   void Order(int size, const std::vector<std::pair<int, int>>& pairs) {

@@ -41,13 +41,12 @@ class LevenbergMarquardt {
 
   SolveSummary Minimise() {
     const auto begin = std::chrono::steady_clock::now();
-    cost_ = equations_.Linearise(graph_);
-    out_.usable = std::isfinite(cost_);
-    if (!out_.usable) out_.message = "block solver: the cost at the start is not finite";
-    out_.converged = equations_.active().nodes.empty();
+    out_.usable = true;
     while (out_.usable && !out_.converged && out_.iterations < limits_.max_iterations) {
       const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - begin;
       if (limits_.max_time_s > 0 && spent.count() >= limits_.max_time_s) break;
+      if (!linearised_) Linearise();
+      if (!out_.usable || out_.converged) break;
       ++out_.iterations;
       Iterate();
     }
@@ -58,6 +57,15 @@ class LevenbergMarquardt {
   static constexpr double kParameterTolerance = 1e-14;
   static constexpr double kRounding = 1e-15;   // relative error of a cost
   static constexpr double kMinQuality = 1e-3;  // least share of the expected decrease that makes a step
+
+  void Linearise() {
+    linearised_ = true;
+    cost_ = equations_.Linearise(graph_);
+    out_.usable = std::isfinite(cost_);
+    if (!out_.usable) out_.message = "block solver: the cost is not finite";
+    out_.converged = equations_.active().nodes.empty() ||
+                     (limits_.settled_sigmas > 0 && equations_.Settled(limits_.settled_sigmas));
+  }
 
   void Iterate() {
     double expected = 0;
@@ -81,7 +89,7 @@ class LevenbergMarquardt {
     } else if (better) {
       region_.Grow(change / expected);
       last_change_ = change;
-      cost_ = equations_.Linearise(graph_);
+      linearised_ = false;
     } else {
       out_.converged = !region_.Shrink();  // no step is small enough to lower the cost
     }
@@ -100,6 +108,7 @@ class LevenbergMarquardt {
   const SolveLimits& limits_;
   TrustRegion region_;
   SolveSummary out_;
+  bool linearised_ = false;  // where the graph is now
   double cost_ = 0, last_change_ = 0;
 };
 

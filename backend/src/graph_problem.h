@@ -82,7 +82,7 @@ class GraphProblem {
   void AddSwitches() { solver_ = std::make_unique<CeresSolver<N>>(threshold_); }
 
   SolveSummary Solve(int max_iterations, double max_time_s) {
-    return solver_->Solve(weighted_, {max_iterations, max_time_s, options_.function_tolerance});
+    return solver_->Solve(weighted_, {max_iterations, max_time_s, options_.function_tolerance, 0});
   }
 
  private:

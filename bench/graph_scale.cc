@@ -1,4 +1,5 @@
 // Time and memory of a large generated graph: build/release/bench/graph_scale POSES [SEED]
+// [block|ceres] [chordal|odometry]
 // A robot sweeps a square hall row by row: an odometry edge to the pose before and two loops to the row
 // before, so 3 edges per pose. Prints CSV: poses, edges, initialisation [s], all [s], iterations, chi2 per
 // edge, peak memory before and after [MB].
@@ -72,13 +73,15 @@ double PeakMemory() {
 int main(int argc, char** argv) {
   const int poses = argc > 1 ? std::atoi(argv[1]) : 0;
   if (poses < 100) {
-    std::fprintf(stderr, "usage: graph_scale POSES [SEED]   (at least 100 poses)\n");
+    std::fprintf(stderr,
+                 "usage: graph_scale POSES [SEED] [block|ceres] [chordal|odometry]   (at least 100 poses)\n");
     return 1;
   }
   PoseGraph graph = MakeSweep(poses, argc > 2 ? static_cast<unsigned>(std::atoi(argv[2])) : 1u);
   const double before = PeakMemory();
   PoseGraphOptions options;
-  options.init = GraphInit::kChordal;
+  options.solver = ParsePoseGraphSolver(argc > 3 ? argv[3] : "block");
+  options.init = ParseGraphInit(argc > 4 ? argv[4] : "chordal");
   const PoseGraphReport report = PoseGraphOptimizer(options).Optimize(graph);
   if (!report.success) {
     std::fprintf(stderr, "graph_scale: %s\n", report.reason.c_str());

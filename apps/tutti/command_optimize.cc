@@ -19,7 +19,7 @@ namespace {
 
 struct OptimizeArguments {
   std::string in, out, json;
-  std::string init = "auto", objective = "chi2", robust = "none";
+  std::string init = "auto", objective = "chi2", robust = "none", solver = "block";
   bool certify = false;
   PoseGraphOptions options;
 };
@@ -48,6 +48,8 @@ nlohmann::ordered_json ToJson(const OptimizeArguments& arguments, const G2oFile&
   json["edges"] = file.graph.edges().size();
   json["objective"] = arguments.objective;
   json["robust"] = arguments.robust;
+  json["solver"] = ToString(report.solver);
+  json["solver_note"] = report.solver_note;
   json["init"] = ToString(report.init);
   json["success"] = report.success;
   json["reason"] = report.reason;
@@ -90,8 +92,11 @@ void PrintCosts(const char* name, const GraphCosts& costs) {
 }
 
 void Print(const G2oFile& file, const PoseGraphReport& report) {
-  std::printf("%zu poses in %s, %zu edges; initialisation: %s\n", file.graph.nodes().size(),
-              ToString(file.graph.kind()), file.graph.edges().size(), ToString(report.init));
+  std::printf("%zu poses in %s, %zu edges; initialisation: %s; solver: %s\n", file.graph.nodes().size(),
+              ToString(file.graph.kind()), file.graph.edges().size(), ToString(report.init),
+              ToString(report.solver));
+  if (!report.solver_note.empty())
+    std::printf("  (not the one that was asked for: %s)\n", report.solver_note.c_str());
   std::printf("  %-8s %16s %16s %16s\n", "", "chi2", "chi2log", "chordal");
   PrintCosts("start", report.initial_costs);
   PrintCosts("result", report.costs);
@@ -144,6 +149,7 @@ void RunOptimize(OptimizeArguments arguments) {
   arguments.options.init = ParseGraphInit(arguments.init);
   arguments.options.objective = ParseGraphObjective(arguments.objective);
   arguments.options.robust = ParseRobustLoss(arguments.robust);
+  arguments.options.solver = ParsePoseGraphSolver(arguments.solver);
   const PoseGraphOptimizer optimizer(arguments.options);
   G2oFile file = ReadG2o(arguments.in);
   for (const std::string& warning : file.warnings)
@@ -191,6 +197,12 @@ void AddOptimizeCommand(CLI::App& app, int&) {
           "least squares; dcs and switchable switch off smoothly; huber and cauchy only tame; none: trust "
           "all")
       ->check(CLI::IsMember({"none", "huber", "cauchy", "dcs", "switchable", "gnc-tls", "gnc"}))
+      ->capture_default_str();
+  command
+      ->add_option("--solver", arguments->solver,
+                   "block: Levenberg-Marquardt with a Cholesky of the poses' blocks, the faster one; ceres: "
+                   "Ceres Solver, the same optimum; solves --robust switchable in any case")
+      ->check(CLI::IsMember({"block", "ceres"}))
       ->capture_default_str();
   command->add_flag("--pairwise", arguments->options.pairwise_consistency,
                     "Before: keep only the largest set of loops that agree pair by pair (PCM). Needs honest "

@@ -4,7 +4,7 @@
 #include <Eigen/SparseCore>
 #include <vector>
 
-#include "edge_error.h"
+#include "graph_solver.h"
 
 namespace tutti::internal {
 
@@ -18,9 +18,7 @@ struct LinearizedEdge {
 template <int N>
 LinearizedEdge<N> Linearize(const EdgeConstants<N>& constants, const double* from, const double* to) {
   LinearizedEdge<N> out;
-  EdgeError<N>(constants, from, to, out.error, &out.jacobian[0], &out.jacobian[1]);
-  out.error = (constants.sqrt_information * out.error).eval();
-  for (auto& jacobian : out.jacobian) jacobian = (constants.sqrt_information * jacobian).eval();
+  WhitenedError<N>(constants, from, to, out.error, &out.jacobian[0], &out.jacobian[1]);
   return out;
 }
 

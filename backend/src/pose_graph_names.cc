@@ -23,6 +23,8 @@ const Names<GraphInit> kInits = {{"auto", GraphInit::kAuto},
                                  {"file", GraphInit::kFile},
                                  {"odometry", GraphInit::kOdometry},
                                  {"chordal", GraphInit::kChordal}};
+const Names<PoseGraphSolver> kSolvers = {{"ceres", PoseGraphSolver::kCeres},
+                                         {"block", PoseGraphSolver::kBlock}};
 
 template <typename Enum>
 Enum Parse(const Names<Enum>& names, const std::string& name, const char* what) {
@@ -50,9 +52,11 @@ const char* Name(const Names<Enum>& names, Enum value) {
 GraphObjective ParseGraphObjective(const std::string& name) { return Parse(kObjectives, name, "objective"); }
 RobustLoss ParseRobustLoss(const std::string& name) { return Parse(kRobust, name, "robust loss"); }
 GraphInit ParseGraphInit(const std::string& name) { return Parse(kInits, name, "initialisation"); }
+PoseGraphSolver ParsePoseGraphSolver(const std::string& name) { return Parse(kSolvers, name, "solver"); }
 const char* ToString(GraphObjective objective) { return Name(kObjectives, objective); }
 const char* ToString(RobustLoss robust) { return Name(kRobust, robust); }
 const char* ToString(GraphInit init) { return Name(kInits, init); }
+const char* ToString(PoseGraphSolver solver) { return Name(kSolvers, solver); }
 
 const char* ToString(LoopDoubt doubt) {
   switch (doubt) {

@@ -103,6 +103,7 @@ class Run {
       return false;
     }
     report_.init = start.init;
+    if (robust && plain_.empty() && options_.robust == RobustLoss::kSwitchable) SolvedWithSwitches();
     report_.initial_objective = start.objective;
     report_.initial_costs = CostsAt(start.poses);
     problem_.SetPoses(best);
@@ -142,6 +143,12 @@ class Run {
     double objective;
   };
 
+  void SolvedWithSwitches() {
+    report_.solver = PoseGraphSolver::kCeres;
+    if (options_.solver != report_.solver)
+      report_.solver_note = "switchable constraints have variables that the block solver does not know";
+  }
+
   double WeightOf(std::size_t e, double chi2) const {
     const bool decided = options_.sigma_test || options_.robust == RobustLoss::kGnc ||
                          options_.robust == RobustLoss::kGncTls || problem_.IsExcluded(e);
@@ -160,17 +167,15 @@ class Run {
 
   bool SolveOnce(int max_iterations) {
     const double left = options_.max_time_s > 0 ? std::max(1e-3, options_.max_time_s - watch_.Seconds()) : 0;
-    const ceres::Solver::Summary summary = problem_.Solve(max_iterations, left);
-    report_.iterations += summary.num_successful_steps + summary.num_unsuccessful_steps;
-    if (!summary.IsSolutionUsable()) {
+    const internal::SolveSummary summary = problem_.Solve(max_iterations, left);
+    report_.iterations += summary.iterations;
+    if (!summary.usable) {
       report_.termination = "failed";
-      report_.reason = "Ceres: " + summary.message;
+      report_.reason = summary.message;
       return false;
     }
     const bool timed_out = options_.max_time_s > 0 && watch_.Seconds() >= options_.max_time_s;
-    report_.termination = summary.termination_type == ceres::CONVERGENCE ? "converged"
-                          : timed_out                                    ? "time limit"
-                                                                         : "iteration limit";
+    report_.termination = summary.converged ? "converged" : timed_out ? "time limit" : "iteration limit";
     return true;
   }
 
@@ -250,6 +255,7 @@ PoseGraphOptimizer::PoseGraphOptimizer(const PoseGraphOptions& options) : option
 PoseGraphReport PoseGraphOptimizer::Optimize(PoseGraph& graph) const {
   const Stopwatch watch;
   PoseGraphReport report;
+  report.solver = options_.solver;
   const GraphStructure structure = internal::AnalyseGraph(graph);
   report.components = structure.components;
   if (graph.edges().empty()) {

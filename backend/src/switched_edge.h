@@ -39,7 +39,6 @@ class SwitchedEdgeCost final : public ceres::SizedCostFunction<N, BlockSize<N>()
 class SwitchPrior final : public ceres::SizedCostFunction<1, 1> {
  public:
   explicit SwitchPrior(double c2) : root_(std::sqrt(c2)) {}
-  void SetThreshold(double c2) { root_ = std::sqrt(c2); }
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
     residuals[0] = root_ * (1 - parameters[0][0]);
     if (jacobians != nullptr && jacobians[0] != nullptr) jacobians[0][0] = -root_;

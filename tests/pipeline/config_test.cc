@@ -38,7 +38,7 @@ TEST(Config, ReadsEverySection) {
       "camera: {width: 640, height: 480, fx: 520, fy: 521, cx: 318, cy: 236, baseline_m: 0.5}\n"
       "odometry: {seed: 7}\n"
       "loops:\n  members: [sift, orb]\n  verification: {min_inliers: 33}\n"
-      "graph: {robust: gnc}\n"
+      "graph: {robust: gnc, solver: block}\n"
       "run: {threads: 1}\n",
       "my.yaml");
   EXPECT_EQ(config.dataset.sensor, Sensor::kStereo);
@@ -50,6 +50,8 @@ TEST(Config, ReadsEverySection) {
   EXPECT_EQ(config.loops.members, (std::vector<std::string>{"sift", "orb"}));
   EXPECT_EQ(config.loops.verification.min_inliers, 33);
   EXPECT_EQ(config.graph.robust, RobustLoss::kGnc);
+  EXPECT_EQ(config.graph.solver, PoseGraphSolver::kBlock);
+  EXPECT_EQ(ParseConfig("", "my.yaml").graph.solver, PoseGraphSolver::kCeres);
   EXPECT_EQ(config.run.threads, 1);
 }
 

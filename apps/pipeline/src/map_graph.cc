@@ -125,10 +125,10 @@ PoseGraph MapGraph::Build(const Odometry& odometry, const std::vector<LoopEdge>&
   return graph;
 }
 
-MapGraph::Correction MapGraph::Optimize(const Odometry& odometry, const std::vector<LoopEdge>& loops) const {
+MapGraph::Correction MapGraph::Optimize(const Odometry& odometry, const std::vector<LoopEdge>& loops) {
   Correction correction;
   PoseGraph graph = Build(odometry, loops);
-  const PoseGraphReport report = optimizer_.Optimize(graph);
+  const OnlineReport report = optimizer_.Optimize(graph);
   correction.time_ms = report.time_s * 1e3;
   correction.success = report.success;
   correction.reason = report.reason;

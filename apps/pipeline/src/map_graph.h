@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "loop_gate.h"
+#include "tutti/backend/online_optimizer.h"
 #include "tutti/backend/pose_graph.h"
-#include "tutti/backend/pose_graph_optimizer.h"
 #include "tutti/frontend/odometry.h"
 #include "tutti/pipeline/loop_record.h"
 #include "tutti/pipeline/slam_options.h"
@@ -44,8 +44,9 @@ class MapGraph {
     double odometry_chi2 = 0;                    ///< of all odometry edges after the optimisation
     double time_ms = 0;
   };
-  /// Optimises the graph with these loops. The odometry is not touched.
-  Correction Optimize(const Odometry& odometry, const std::vector<LoopEdge>& loops) const;
+  /// Optimises the graph with these loops, as far as they and what else changed since the last call reach
+  /// (OnlineOptimizer; all of it with Ceres). The odometry is not touched.
+  Correction Optimize(const Odometry& odometry, const std::vector<LoopEdge>& loops);
 
   /// Mahalanobis distance [1] of the loop from what the graph with these loops knows of its relative pose;
   /// nothing if no edges connect its ends.
@@ -68,7 +69,7 @@ class MapGraph {
   Matrix7d OdometryInformation(const Similarity& measurement, double depth) const;
   std::map<int, int> Merges(const Odometry& odometry, const std::vector<LoopEdge>& loops) const;
 
-  PoseGraphOptimizer optimizer_;
+  OnlineOptimizer optimizer_;
   SlamOptions options_;
   GraphKind kind_;
   std::map<int, int> birth_piece_;

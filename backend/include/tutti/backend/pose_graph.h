@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <map>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "tutti/core/pose.h"
@@ -83,7 +84,7 @@ class PoseGraph {
   GraphKind kind_;
   std::vector<PoseGraphNode> nodes_;
   std::vector<PoseGraphEdge> edges_;
-  std::map<int, std::size_t> index_;
+  std::unordered_map<int, std::size_t> index_;
 };
 
 /// Empty if the information is symmetric and positive definite in the coordinates of this kind, else what is

@@ -1,4 +1,5 @@
-// Pose-graph optimisation: analytic Jacobians, sparse Cholesky (Ceres), robust losses on loop edges.
+// Pose-graph optimisation: analytic Jacobians, sparse Cholesky (Ceres' or one of its own), robust losses on
+// loop edges.
 //
 // With E = S_from_to^-1 S_world_from^-1 S_world_to the objective is the sum over the edges of rho(e^T Omega
 // e) (no 1/2):
@@ -37,13 +38,20 @@ constexpr RobustLoss kDefaultRobustLoss = RobustLoss::kGnc;
 /// included).
 enum class GraphInit { kAuto, kFile, kOdometry, kChordal };
 
+/// Who solves the least-squares problems. kCeres: Ceres Solver (Agarwal, Mierle et al.) with CHOLMOD. kBlock:
+/// the same Levenberg-Marquardt with a Cholesky factorisation of the nodes' blocks: the same optimum in a
+/// fraction of the time (docs/backend.md). kSwitchable is always solved by Ceres.
+enum class PoseGraphSolver { kCeres, kBlock };
+
 /// Words of the command line ("chi2log", "gnc", "chordal", ...). Throw InputError for another word.
 GraphObjective ParseGraphObjective(const std::string& name);
 RobustLoss ParseRobustLoss(const std::string& name);
 GraphInit ParseGraphInit(const std::string& name);
+PoseGraphSolver ParsePoseGraphSolver(const std::string& name);
 const char* ToString(GraphObjective objective);
 const char* ToString(RobustLoss robust);
 const char* ToString(GraphInit init);
+const char* ToString(PoseGraphSolver solver);
 
 struct PoseGraphOptions {
   GraphObjective objective =
@@ -59,6 +67,7 @@ struct PoseGraphOptions {
   /// Last of all: loops whose chi-square is beyond 3 sigma (probability 99.73 %) leave, those within come
   /// back, and least squares decide the poses.
   bool sigma_test = false;
+  PoseGraphSolver solver = PoseGraphSolver::kCeres;  ///< `tutti optimize` takes kBlock
   GraphInit init = GraphInit::kAuto;
   int max_iterations = 200;  ///< of Levenberg-Marquardt, in each round that is to converge
   double function_tolerance =
@@ -111,11 +120,13 @@ struct GraphComponent {
 struct PoseGraphReport {
   bool success = false;  ///< the poses are usable (converged, or stopped at a limit with a lower cost)
   std::string reason;    ///< why not; empty on success
-  GraphInit init = GraphInit::kFile;  ///< the initialisation that was taken
-  GraphCosts initial_costs;           ///< at the initialisation that was taken
-  GraphCosts costs;                   ///< of the result
-  double initial_objective = 0;       ///< what was minimised (robust loss included), before
-  double objective = 0;               ///< and after
+  GraphInit init = GraphInit::kFile;                 ///< the initialisation that was taken
+  PoseGraphSolver solver = PoseGraphSolver::kCeres;  ///< who solved it
+  std::string solver_note;       ///< why another one than was asked for; empty if it was that one
+  GraphCosts initial_costs;      ///< at the initialisation that was taken
+  GraphCosts costs;              ///< of the result
+  double initial_objective = 0;  ///< what was minimised (robust loss included), before
+  double objective = 0;          ///< and after
   int iterations = 0;
   int gnc_rounds = 0;
   std::string termination;  ///< "converged", "iteration limit", "time limit", "nothing to do", "failed"

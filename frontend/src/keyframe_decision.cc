@@ -53,8 +53,9 @@ int Odometry::Impl::EstablishedLandmarks(int keyframe) const {
 }
 
 // Depth makes landmarks of what is new in the image at once: is it time for that?
-bool Odometry::Impl::DepthWouldBringMore(const FrameMatches& matches) const {
-  if (rig.sensor == Sensor::kMono) return false;
+Odometry::Impl::DepthNeed Odometry::Impl::NeedForDepth(const FrameMatches& matches) const {
+  DepthNeed need;
+  if (rig.sensor == Sensor::kMono) return need;
   const double far = rig.sensor == Sensor::kStereo ? options.max_depth_baselines * rig.baseline_m : 1e9;
   int near_tracked = 0, near_free = 0;
   std::vector<char> near(matches.landmarks.size(), 0);
@@ -64,8 +65,9 @@ bool Odometry::Impl::DepthWouldBringMore(const FrameMatches& matches) const {
     near[f] = 1;
     ++(matches.landmarks[f] >= 0 ? near_tracked : near_free);
   }
-  return (near_tracked < kFewNear && near_free > kManyNearFree) ||
-         UncoveredShare(matches, rig.camera, near) > options.keyframe_uncovered_ratio;
+  need.few_near = near_tracked < kFewNear && near_free > kManyNearFree;
+  need.uncovered = UncoveredShare(matches, rig.camera, near) > options.keyframe_uncovered_ratio;
+  return need;
 }
 
 bool Odometry::Impl::NeedKeyframe(const TrackedFrame& frame, const FrameMatches& matches, int inliers) const {
@@ -75,7 +77,8 @@ bool Odometry::Impl::NeedKeyframe(const TrackedFrame& frame, const FrameMatches&
   const bool very_weak = inliers < 0.4 * established || inliers < 3 * options.min_inliers;
   const bool early = frames_since_keyframe_ < options.keyframe_min_frames;
   if (early && !(very_weak && frames_since_keyframe_ >= 1)) return false;
-  if (very_weak || DepthWouldBringMore(matches)) return true;
+  const DepthNeed need = NeedForDepth(matches);
+  if (very_weak || need.few_near) return true;
   // In a place seen before, after a loop, the map has the landmarks that come next already.
   const bool known = last_keyframe_ - reference_ > kKeyframesApart &&
                      frame.stamp_s - map().keyframe(reference_).stamp_s > kSecondsApart;
@@ -83,7 +86,7 @@ bool Odometry::Impl::NeedKeyframe(const TrackedFrame& frame, const FrameMatches&
   const double baseline =
       (last.T_world_camera.translation - last_T_camera_world_.Inverse().translation).norm();
   const bool moved = baseline > 0.02 * std::max(1e-6, map().MedianDepth(last_keyframe_));
-  return weak || (frame.stamp_s - last.stamp_s > options.keyframe_max_interval_s && moved);
+  return weak || need.uncovered || (frame.stamp_s - last.stamp_s > options.keyframe_max_interval_s && moved);
 }
 
 }  // namespace tutti

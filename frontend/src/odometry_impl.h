@@ -97,7 +97,11 @@ class Odometry::Impl {
   /// Refines the pose on the matches, drops those that do not fit; returns the number of inliers.
   int Refine(FrameMatches* matches, Pose* T_camera_world) const;
   int EstablishedLandmarks(int keyframe) const;
-  bool DepthWouldBringMore(const FrameMatches& matches) const;
+  struct DepthNeed {
+    bool few_near = false;   // few landmarks are near enough to hold the camera's place
+    bool uncovered = false;  // too much of the image has none
+  };
+  DepthNeed NeedForDepth(const FrameMatches& matches) const;
   bool NeedKeyframe(const TrackedFrame& frame, const FrameMatches& matches, int inliers) const;
   void CountSeen(const Fix& fix);
   int InsertKeyframe(const TrackedFrame& frame);

@@ -10,27 +10,14 @@
 #include <random>
 #include <string>
 
+#include "noisy_measurement.h"
 #include "tutti/backend/pose_graph_optimizer.h"
 
 namespace {
 
 using namespace tutti;
 
-double Gauss(std::mt19937& random) {
-  const auto uniform = [&] { return (static_cast<double>(random()) + 0.5) / 4294967296.0; };
-  const double u = uniform(), v = uniform();
-  return std::sqrt(-2.0 * std::log(u)) * std::cos(2.0 * M_PI * v);
-}
-
-constexpr double kSigmaTranslation = 0.05, kSigmaRotation = 0.01;
-
-Similarity Measured(const Similarity& a, const Similarity& b, std::mt19937& random) {
-  Similarity out = a.Inverse() * b;
-  out.translation += kSigmaTranslation * Eigen::Vector3d(Gauss(random), Gauss(random), Gauss(random));
-  out.rotation =
-      out.rotation * ExpSO3(kSigmaRotation * Eigen::Vector3d(Gauss(random), Gauss(random), Gauss(random)));
-  return out;
-}
+constexpr bench::Noise kNoise{0.05, 0.01};
 
 PoseGraph MakeSweep(int poses, unsigned seed) {
   std::mt19937 random(seed);
@@ -44,15 +31,15 @@ PoseGraph MakeSweep(int poses, unsigned seed) {
   }
   PoseGraph graph;
   for (int k = 0; k < poses; ++k) graph.AddNode(PoseGraphNode{k, Similarity(), k == 0, false});
-  const Matrix7d information = MakeInformation(kSigmaTranslation, kSigmaRotation);
+  const Matrix7d information = MakeInformation(kNoise.translation, kNoise.rotation);
   const auto at = [&](int k) { return truth[static_cast<std::size_t>(k)]; };
   for (int k = 1; k < poses; ++k)
-    graph.AddOdometry(k - 1, k, Measured(at(k - 1), at(k), random), information);
+    graph.AddOdometry(k - 1, k, bench::Measured(at(k - 1), at(k), kNoise, random), information);
   for (int k = row; k < poses; ++k) {
     const int below = 2 * row * (k / row) - 1 - k;  // the same place one row before
     for (int other : {below, below - 1}) {
       if (other >= 0 && other + 1 < k)
-        graph.AddLoop(other, k, Measured(at(other), at(k), random), information);
+        graph.AddLoop(other, k, bench::Measured(at(other), at(k), kNoise, random), information);
     }
   }
   return graph;

@@ -17,6 +17,7 @@
 #include <string>
 #include <vector>
 
+#include "noisy_measurement.h"
 #include "tutti/backend/g2o_io.h"
 #include "tutti/backend/online_optimizer.h"
 #include "tutti/core/error.h"
@@ -31,22 +32,8 @@ double ProcessorMilliseconds() {
   return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
 }
 
-double Gauss(std::mt19937& random) {
-  const auto uniform = [&] { return (static_cast<double>(random()) + 0.5) / 4294967296.0; };
-  const double u = uniform(), v = uniform();
-  return std::sqrt(-2.0 * std::log(u)) * std::cos(2.0 * M_PI * v);
-}
-
 constexpr double kStep = 2;  // between keyframes [m]
-constexpr double kSigmaTranslation = 0.02, kSigmaRotation = 0.002;
-
-Similarity Measured(const Similarity& a, const Similarity& b, std::mt19937& random) {
-  Similarity out = a.Inverse() * b;
-  out.translation += kSigmaTranslation * Eigen::Vector3d(Gauss(random), Gauss(random), Gauss(random));
-  out.rotation =
-      out.rotation * ExpSO3(kSigmaRotation * Eigen::Vector3d(Gauss(random), Gauss(random), Gauss(random)));
-  return out;
-}
+constexpr bench::Noise kNoise{0.02, 0.002};
 
 /// A drive on streets 100 m apart in a square of 1.6 km, turning at random at the crossings.
 std::vector<Similarity> DriveThroughTown(int keyframes, std::mt19937& random) {
@@ -80,20 +67,22 @@ PoseGraph MakeTown(int keyframes, unsigned seed) {
   std::mt19937 random(seed);
   const std::vector<Similarity> truth = DriveThroughTown(keyframes, random);
   PoseGraph graph;
-  const Matrix7d information = MakeInformation(kSigmaTranslation, kSigmaRotation);
+  const Matrix7d information = MakeInformation(kNoise.translation, kNoise.rotation);
   std::map<std::pair<long, long>, std::vector<int>> places;
   for (int k = 0; k < keyframes; ++k) {
     const Similarity& here = truth[static_cast<std::size_t>(k)];
     graph.AddNode(k, here, k == 0);
     for (int older = std::max(0, k - 3); older < k; ++older) {
-      graph.AddOdometry(older, k, Measured(truth[static_cast<std::size_t>(older)], here, random),
+      graph.AddOdometry(older, k,
+                        bench::Measured(truth[static_cast<std::size_t>(older)], here, kNoise, random),
                         information);
     }
     std::vector<int>& seen =
         places[{std::lround(here.translation.x() / 3), std::lround(here.translation.y() / 3)}];
     if (k % 5 == 0 && !seen.empty() && seen.front() + 100 <= k) {
       const int older = seen.front();
-      graph.AddLoop(older, k, Measured(truth[static_cast<std::size_t>(older)], here, random), information);
+      graph.AddLoop(older, k, bench::Measured(truth[static_cast<std::size_t>(older)], here, kNoise, random),
+                    information);
     }
     seen.push_back(k);
   }

@@ -20,6 +20,10 @@ PoseGraph Load(const std::string& name) {
   return ReadG2o(folder / "posegraphs" / (name + ".g2o")).graph;
 }
 
+void InProcessorTime(benchmark::internal::Benchmark* row) {
+  row->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
+}
+
 void StockCeres(benchmark::State& state, const std::string& name) {
   const PoseGraph start = Load(name);
   for (auto step : state) {
@@ -30,13 +34,9 @@ void StockCeres(benchmark::State& state, const std::string& name) {
     state.ResumeTiming();
   }
 }
-BENCHMARK_CAPTURE(StockCeres, sphere2500, "sphere2500")
-    ->Unit(benchmark::kMillisecond)
-    ->MeasureProcessCPUTime();
-BENCHMARK_CAPTURE(StockCeres, torus3D, "torus3D")->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
-BENCHMARK_CAPTURE(StockCeres, parking_garage, "parking-garage")
-    ->Unit(benchmark::kMillisecond)
-    ->MeasureProcessCPUTime();
+BENCHMARK_CAPTURE(StockCeres, sphere2500, "sphere2500")->Apply(InProcessorTime);
+BENCHMARK_CAPTURE(StockCeres, torus3D, "torus3D")->Apply(InProcessorTime);
+BENCHMARK_CAPTURE(StockCeres, parking_garage, "parking-garage")->Apply(InProcessorTime);
 
 void Tutti(benchmark::State& state, const std::string& name, GraphInit init,
            PoseGraphSolver solver = PoseGraphSolver::kBlock) {
@@ -54,33 +54,17 @@ void Tutti(benchmark::State& state, const std::string& name, GraphInit init,
     state.counters["iterations"] = report.iterations;
   }
 }
-BENCHMARK_CAPTURE(Tutti, sphere2500, "sphere2500", GraphInit::kChordal)
-    ->Unit(benchmark::kMillisecond)
-    ->MeasureProcessCPUTime();
+BENCHMARK_CAPTURE(Tutti, sphere2500, "sphere2500", GraphInit::kChordal)->Apply(InProcessorTime);
 BENCHMARK_CAPTURE(Tutti, sphere2500_ceres, "sphere2500", GraphInit::kChordal, PoseGraphSolver::kCeres)
-    ->Unit(benchmark::kMillisecond)
-    ->MeasureProcessCPUTime();
-BENCHMARK_CAPTURE(Tutti, sphere2500_auto, "sphere2500", GraphInit::kAuto)
-    ->Unit(benchmark::kMillisecond)
-    ->MeasureProcessCPUTime();
-BENCHMARK_CAPTURE(Tutti, parking_garage, "parking-garage", GraphInit::kChordal)
-    ->Unit(benchmark::kMillisecond)
-    ->MeasureProcessCPUTime();
-BENCHMARK_CAPTURE(Tutti, torus3D, "torus3D", GraphInit::kChordal)
-    ->Unit(benchmark::kMillisecond)
-    ->MeasureProcessCPUTime();
-BENCHMARK_CAPTURE(Tutti, manhattan, "manhattan", GraphInit::kChordal)
-    ->Unit(benchmark::kMillisecond)
-    ->MeasureProcessCPUTime();
+    ->Apply(InProcessorTime);
+BENCHMARK_CAPTURE(Tutti, sphere2500_auto, "sphere2500", GraphInit::kAuto)->Apply(InProcessorTime);
+BENCHMARK_CAPTURE(Tutti, parking_garage, "parking-garage", GraphInit::kChordal)->Apply(InProcessorTime);
+BENCHMARK_CAPTURE(Tutti, torus3D, "torus3D", GraphInit::kChordal)->Apply(InProcessorTime);
+BENCHMARK_CAPTURE(Tutti, manhattan, "manhattan", GraphInit::kChordal)->Apply(InProcessorTime);
 BENCHMARK_CAPTURE(Tutti, manhattanOlson3500, "manhattanOlson3500", GraphInit::kChordal)
-    ->Unit(benchmark::kMillisecond)
-    ->MeasureProcessCPUTime();
-BENCHMARK_CAPTURE(Tutti, intel, "intel", GraphInit::kChordal)
-    ->Unit(benchmark::kMillisecond)
-    ->MeasureProcessCPUTime();
-BENCHMARK_CAPTURE(Tutti, kitti_00, "kitti_00", GraphInit::kChordal)
-    ->Unit(benchmark::kMillisecond)
-    ->MeasureProcessCPUTime();
+    ->Apply(InProcessorTime);
+BENCHMARK_CAPTURE(Tutti, intel, "intel", GraphInit::kChordal)->Apply(InProcessorTime);
+BENCHMARK_CAPTURE(Tutti, kitti_00, "kitti_00", GraphInit::kChordal)->Apply(InProcessorTime);
 
 }  // namespace
 }  // namespace tutti

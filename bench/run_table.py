@@ -199,6 +199,7 @@ def main():
         s = median_of(runs)
         checks = Checks()
         try:
+            s["loops"]["false"] = max(run["loops"]["false"] for run in runs)  # of any seed
             ROWS[name][3](s, checks)
         except KeyError as e:
             checks.that(False, f"summary.json has no {e}")

@@ -6,13 +6,13 @@
 #pragma once
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <utility>
 #include <vector>
 
 #include "block_equations.h"
 #include "graph_solver.h"
+#include "stopwatch.h"
 
 namespace tutti::internal {
 
@@ -40,12 +40,11 @@ class LevenbergMarquardt {
       : graph_(graph), equations_(equations), limits_(limits) {}
 
   SolveSummary Minimise() {
-    const auto begin = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     out_.usable = true;
     region_.radius = limits_.trust_region;
     while (out_.usable && !out_.converged && out_.iterations < limits_.max_iterations) {
-      const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - begin;
-      if (limits_.max_time_s > 0 && spent.count() >= limits_.max_time_s) break;
+      if (limits_.max_time_s > 0 && watch.Seconds() >= limits_.max_time_s) break;
       if (!linearised_) Linearise();
       if (!out_.usable || out_.converged) break;
       ++out_.iterations;

@@ -1,13 +1,13 @@
 #include "tutti/backend/online_optimizer.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <utility>
 
 #include "graph_memory.h"
 #include "local_solver.h"
 #include "robust_loss.h"
+#include "stopwatch.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -24,10 +24,6 @@ class OnlineOptimizer::Impl {
 };
 
 namespace {
-
-double SecondsSince(std::chrono::steady_clock::time_point begin) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-}
 
 /// Everything, each time.
 class EveryTime final : public OnlineOptimizer::Impl {
@@ -63,7 +59,7 @@ class Incremental {
   }
 
   OnlineReport Optimize(PoseGraph& graph) {
-    const auto begin = std::chrono::steady_clock::now();
+    const internal::Stopwatch watch;
     OnlineReport report;
     for (const PoseGraphNode& node : graph.nodes()) {
       if (node.has_estimate) continue;
@@ -91,7 +87,7 @@ class Incremental {
       report.reason = summary.message;
       memory_ = {};  // what was tried is not where the graph is
     }
-    report.time_s = SecondsSince(begin);
+    report.time_s = watch.Seconds();
     return report;
   }
 

@@ -1,7 +1,6 @@
 #include "tutti/backend/pose_graph_optimizer.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <utility>
 
@@ -10,6 +9,7 @@
 #include "graph_structure.h"
 #include "pairwise_consistency.h"
 #include "robust_solver.h"
+#include "stopwatch.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -17,16 +17,7 @@ namespace {
 
 using internal::GraphProblem;
 using internal::GraphStructure;
-
-class Stopwatch {
- public:
-  double Seconds() const {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-  }
-
- private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
+using internal::Stopwatch;
 
 /// One optimisation; the class only keeps what its steps share.
 template <int N>

@@ -48,11 +48,7 @@ void ExpectTheSameOptimum(const PoseGraph& graph, const PoseGraphOptions& option
 }
 
 SyntheticGraphOptions NoisyWithFalseLoops(GraphKind kind) {
-  SyntheticGraphOptions options;
-  options.kind = kind;
-  options.noise_translation = 0.02;
-  options.noise_rotation = 0.01;
-  options.noise_log_scale = kind == GraphKind::kSim3 ? 0.01 : 0.0;
+  SyntheticGraphOptions options = testing::NoisyOptions(kind, 0.02, 0.01);
   options.false_loops = 4;
   return options;
 }
@@ -139,10 +135,7 @@ TEST(GraphSolvers, AgreeOnAPartThatOnlyARefusedLoopTies) {
 }
 
 TEST(GraphSolvers, FailOnTheSameGraphsAndLeaveThemAlone) {
-  PoseGraph graph;
-  graph.AddNode(0, Pose());
-  graph.AddNode(1, Pose(Eigen::Quaterniond::Identity(), {1e300, 0, 0}));
-  graph.AddOdometry(0, 1, Similarity(), Matrix7d::Identity());
+  const PoseGraph graph = testing::OverflowingGraph();
   PoseGraphOptions options;
   options.init = GraphInit::kFile;
   for (PoseGraphSolver solver : {PoseGraphSolver::kCeres, PoseGraphSolver::kBlock}) {

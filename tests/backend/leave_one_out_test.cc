@@ -10,15 +10,8 @@ namespace {
 using internal::GraphProblem;
 using internal::LeaveOneOut;
 
-constexpr GraphKind kKinds[] = {GraphKind::kSE2, GraphKind::kSE3, GraphKind::kSim3};
-
 PoseGraph Solved(GraphKind kind) {
-  testing::SyntheticGraphOptions options;
-  options.kind = kind;
-  options.noise_translation = 0.02;
-  options.noise_rotation = 0.004;
-  options.noise_log_scale = kind == GraphKind::kSim3 ? 0.004 : 0;
-  PoseGraph graph = testing::MakeSyntheticGraph(options).graph;
+  PoseGraph graph = testing::MakeSyntheticGraph(testing::NoisyOptions(kind, 0.02, 0.004)).graph;
   PoseGraphOptimizer().Optimize(graph);
   return graph;
 }
@@ -52,9 +45,9 @@ void ExpectTheFallOfTheCost(const PoseGraph& graph) {
 }
 
 TEST(LeaveOneOut, IsWhatTheCostFallsByWhenTheEdgeLeaves) {
-  ExpectTheFallOfTheCost<3>(Solved(kKinds[0]));
-  ExpectTheFallOfTheCost<6>(Solved(kKinds[1]));
-  ExpectTheFallOfTheCost<7>(Solved(kKinds[2]));
+  ExpectTheFallOfTheCost<3>(Solved(testing::kGraphKinds[0]));
+  ExpectTheFallOfTheCost<6>(Solved(testing::kGraphKinds[1]));
+  ExpectTheFallOfTheCost<7>(Solved(testing::kGraphKinds[2]));
 }
 
 TEST(LeaveOneOut, IsZeroForAnEdgeThatAloneHoldsItsEnds) {

@@ -26,13 +26,9 @@ PoseGraphOptions InParts(RobustLoss robust = RobustLoss::kHuber) {
 
 /// Two rounds of a circle whose second meets the first every few nodes, so that loops are local.
 SyntheticGraph TwoRounds(GraphKind kind) {
-  SyntheticGraphOptions options;
-  options.kind = kind;
+  SyntheticGraphOptions options = testing::NoisyOptions(kind, 0.02, 0.002);
   options.nodes = 400;
   options.loops = 100;
-  options.noise_translation = 0.02;
-  options.noise_rotation = 0.002;
-  options.noise_log_scale = kind == GraphKind::kSim3 ? 0.002 : 0.0;
   return MakeSyntheticGraph(options);
 }
 

@@ -8,15 +8,8 @@
 namespace tutti {
 namespace {
 
-constexpr GraphKind kKinds[] = {GraphKind::kSE2, GraphKind::kSE3, GraphKind::kSim3};
-
 PoseGraph NoisyGraph(GraphKind kind) {
-  testing::SyntheticGraphOptions options;
-  options.kind = kind;
-  options.noise_translation = 0.02;
-  options.noise_rotation = 0.01;
-  options.noise_log_scale = kind == GraphKind::kSim3 ? 0.01 : 0.0;
-  return testing::MakeSyntheticGraph(options).graph;
+  return testing::MakeSyntheticGraph(testing::NoisyOptions(kind, 0.02, 0.01)).graph;
 }
 
 PoseGraph Moved(const PoseGraph& graph, const Similarity& shift) {
@@ -37,7 +30,7 @@ double ShapeDifference(const PoseGraph& a, const PoseGraph& b) {
 }
 
 TEST(PoseGraphNumerics, TheOptimumDoesNotDependOnWhereTheGraphLies) {
-  for (const GraphKind kind : kKinds) {
+  for (const GraphKind kind : testing::kGraphKinds) {
     PoseGraph graph = NoisyGraph(kind);
     const bool planar = kind == GraphKind::kSE2;
     PoseGraph moved =
@@ -51,7 +44,7 @@ TEST(PoseGraphNumerics, TheOptimumDoesNotDependOnWhereTheGraphLies) {
 }
 
 TEST(PoseGraphNumerics, AMillionMetresFromTheOriginTheOptimumIsAsExactAsThere) {
-  for (const GraphKind kind : kKinds) {
+  for (const GraphKind kind : testing::kGraphKinds) {
     for (const GraphInit init : {GraphInit::kFile, GraphInit::kOdometry, GraphInit::kChordal}) {
       PoseGraph graph = NoisyGraph(kind);
       const Similarity shift(1, Eigen::Quaterniond::Identity(),
@@ -69,7 +62,7 @@ TEST(PoseGraphNumerics, AMillionMetresFromTheOriginTheOptimumIsAsExactAsThere) {
 }
 
 TEST(PoseGraphNumerics, AnyNodeMayHoldTheGraph) {
-  for (const GraphKind kind : kKinds) {
+  for (const GraphKind kind : testing::kGraphKinds) {
     if (kind == GraphKind::kSim3) continue;  // there the node that is held sets the unit of length
     PoseGraph first = NoisyGraph(kind), other = first;
     other.SetFixed(77, true);
@@ -99,7 +92,7 @@ PoseGraph HalfTurns(GraphKind kind, const Eigen::Vector3d& axis, double angle, d
 }
 
 TEST(PoseGraphNumerics, RotationsOfHalfATurnAndCloseToItConverge) {
-  for (const GraphKind kind : kKinds) {
+  for (const GraphKind kind : testing::kGraphKinds) {
     for (const Eigen::Vector3d& axis :
          {Eigen::Vector3d(0, 0, 1), Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0.6, 0, 0.8)}) {
       if (kind == GraphKind::kSE2 && axis.z() != 1) continue;
@@ -122,7 +115,7 @@ TEST(PoseGraphNumerics, RotationsOfHalfATurnAndCloseToItConverge) {
 }
 
 TEST(PoseGraphNumerics, PlusAndMinusHalfATurnAreOneMeasurement) {
-  for (const GraphKind kind : kKinds) {
+  for (const GraphKind kind : testing::kGraphKinds) {
     PoseGraph graph(kind);
     graph.AddNode(0, Similarity());
     graph.AddNode(1, Similarity());

@@ -13,14 +13,7 @@ using testing::PositionError;
 using testing::SyntheticGraph;
 using testing::SyntheticGraphOptions;
 
-SyntheticGraphOptions Noisy(GraphKind kind) {
-  SyntheticGraphOptions options;
-  options.kind = kind;
-  options.noise_translation = 0.02;
-  options.noise_rotation = 0.01;
-  options.noise_log_scale = kind == GraphKind::kSim3 ? 0.01 : 0.0;
-  return options;
-}
+SyntheticGraphOptions Noisy(GraphKind kind) { return testing::NoisyOptions(kind, 0.02, 0.01); }
 
 TEST(PoseGraphOptimizer, ReturnsToTheTruthFromPerturbedPosesForEveryKind) {
   for (GraphKind kind : {GraphKind::kSE2, GraphKind::kSE3, GraphKind::kSim3}) {
@@ -287,10 +280,7 @@ TEST(PoseGraphOptimizer, SaysWhyItCanNotStartFromPosesThatAreMissing) {
 }
 
 TEST(PoseGraphOptimizer, CostsThatOverflowAreAFailureAndLeaveTheGraphAlone) {
-  PoseGraph graph;
-  graph.AddNode(0, Pose());
-  graph.AddNode(1, Pose(Eigen::Quaterniond::Identity(), {1e300, 0, 0}));
-  graph.AddOdometry(0, 1, Similarity(), Matrix7d::Identity());
+  PoseGraph graph = testing::OverflowingGraph();
   PoseGraphOptions options;
   options.init = GraphInit::kFile;
   const PoseGraphReport report = PoseGraphOptimizer(options).Optimize(graph);

@@ -48,6 +48,23 @@ Matrix7d RandomInformation(std::mt19937& random) {
   return a * a.transpose() + 0.5 * Matrix7d::Identity();
 }
 
+SyntheticGraphOptions NoisyOptions(GraphKind kind, double translation, double rotation) {
+  SyntheticGraphOptions options;
+  options.kind = kind;
+  options.noise_translation = translation;
+  options.noise_rotation = rotation;
+  options.noise_log_scale = kind == GraphKind::kSim3 ? rotation : 0.0;
+  return options;
+}
+
+PoseGraph OverflowingGraph() {
+  PoseGraph graph;
+  graph.AddNode(0, Pose());
+  graph.AddNode(1, Pose(Eigen::Quaterniond::Identity(), {1e300, 0, 0}));
+  graph.AddOdometry(0, 1, Similarity(), Matrix7d::Identity());
+  return graph;
+}
+
 SyntheticGraph MakeSyntheticGraph(const SyntheticGraphOptions& o) {
   std::mt19937 random(o.seed);
   SyntheticGraph out;

@@ -8,6 +8,8 @@
 
 namespace tutti::testing {
 
+constexpr GraphKind kGraphKinds[] = {GraphKind::kSE2, GraphKind::kSE3, GraphKind::kSim3};
+
 struct SyntheticGraphOptions {
   GraphKind kind = GraphKind::kSE3;
   int nodes = 120;                 ///< along two rounds of a circle, so that the second round meets the first
@@ -24,6 +26,12 @@ struct SyntheticGraph {
   std::vector<Similarity> truth;         ///< by node id
   std::vector<std::size_t> false_edges;  ///< positions in graph.edges()
 };
+
+/// With noise on the edges; `rotation` [rad] is that of the logarithm of the scale as well.
+SyntheticGraphOptions NoisyOptions(GraphKind kind, double translation, double rotation);
+
+/// Its one edge costs more than a double holds.
+PoseGraph OverflowingGraph();
 
 SyntheticGraph MakeSyntheticGraph(const SyntheticGraphOptions& options);
 

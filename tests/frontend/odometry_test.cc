@@ -14,7 +14,7 @@ using ::testing::HasSubstr;
 using testing::Black;
 using testing::Recording;
 
-Recording Record(SyntheticScene scene, SyntheticSensor sensor, std::size_t count) {
+SyntheticOptions SmallWorld(SyntheticScene scene, SyntheticSensor sensor) {
   SyntheticOptions options;
   options.scene = scene;
   options.sensor = sensor;
@@ -22,7 +22,11 @@ Recording Record(SyntheticScene scene, SyntheticSensor sensor, std::size_t count
   options.height = scene == SyntheticScene::kTown ? 200 : 300;
   options.blocks_x = 1;
   options.supersample = 1;
-  return testing::Record(SyntheticWorld(options), count);
+  return options;
+}
+
+Recording Record(SyntheticScene scene, SyntheticSensor sensor, std::size_t count) {
+  return testing::Record(SyntheticWorld(SmallWorld(scene, sensor)), count);
 }
 
 const Recording& Stereo() {
@@ -78,12 +82,8 @@ TEST(Odometry, RgbdFollowsTheTruthInMetres) {
 }
 
 TEST(Odometry, FastTurnsGetAKeyframeBeforeMostOfTheViewIsNew) {
-  SyntheticOptions options;
-  options.scene = SyntheticScene::kRoom;
-  options.sensor = SyntheticSensor::kStereo;
-  options.width = 400;
+  SyntheticOptions options = SmallWorld(SyntheticScene::kRoom, SyntheticSensor::kStereo);
   options.height = 256;
-  options.supersample = 1;
   options.rate_hz = 20;
   options.speed_mps = 1.5;  // and 30 degrees a second and more
   const Recording room = testing::Record(SyntheticWorld(options), 110);

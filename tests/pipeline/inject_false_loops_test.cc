@@ -21,15 +21,11 @@ using testing::ReadAll;
 
 constexpr int kPlanted = 15;
 
-// A lap around a small block and a bit more: long enough for loops, true ones and planted ones.
+// Long enough for loops, true ones and planted ones.
 void WriteTown(const fs::path& folder) {
-  SyntheticOptions options = testing::SmallStereoTown(320, 160);
-  options.block_m = 26;
-  options.laps = 1.15;
-  options.rate_hz = 4.5;
   SyntheticWriteOptions write;
   write.threads = 2;
-  WriteSyntheticDataset(SyntheticWorld(options), folder, write);
+  WriteSyntheticDataset(SyntheticWorld(testing::SmallStereoTownWithALoop(320, 160)), folder, write);
 }
 
 struct LoopLine {

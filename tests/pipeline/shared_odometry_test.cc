@@ -23,10 +23,7 @@ const fs::path& TownWithALoop() {
   struct Folder {
     fs::path path = fs::temp_directory_path() / ("tutti-loop-town-" + std::to_string(getpid()));
     Folder() {
-      SyntheticOptions options = testing::SmallStereoTown(512, 256);
-      options.block_m = 26;
-      options.laps = 1.15;
-      options.rate_hz = 4.5;
+      SyntheticOptions options = testing::SmallStereoTownWithALoop(512, 256);
       options.noise_sigma = 4;
       SyntheticWriteOptions write;
       write.threads = 2;

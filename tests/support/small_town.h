@@ -15,4 +15,13 @@ inline SyntheticOptions SmallStereoTown(int width, int height) {
   return options;
 }
 
+/// A lap around a small block and a bit more: long enough for loops.
+inline SyntheticOptions SmallStereoTownWithALoop(int width, int height) {
+  SyntheticOptions options = SmallStereoTown(width, height);
+  options.block_m = 26;
+  options.laps = 1.15;
+  options.rate_hz = 4.5;
+  return options;
+}
+
 }  // namespace tutti::testing

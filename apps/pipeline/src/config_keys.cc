@@ -254,11 +254,11 @@ void ConfigTable::AddGraph(PoseGraphOptions& o) {
       "first keep only the largest set of loops that agree pair by pair (PCM)");
   Add("sigma_test", o.sigma_test, "last refuse loops that are off by more than 3 sigma");
   Add("robust_chi2", o.robust_chi2, "chi-square beyond which a loop is doubted; 0: its 99 % quantile");
-  AddEnum("solver", o.solver, {{"ceres", PoseGraphSolver::kCeres}, {"block", PoseGraphSolver::kBlock}},
-          "who solves it: ceres, or block (own block Cholesky: the same optimum in less time, and with init: "
-          "file "
-          "and robust: none or huber only what a loop changes is solved for; robust: switchable is left to "
-          "ceres)");
+  AddEnum(
+      "solver", o.solver, {{"ceres", PoseGraphSolver::kCeres}, {"block", PoseGraphSolver::kBlock}},
+      "who solves it: ceres, or block (own block Cholesky: the same optimum in less time, and with init: "
+      "file and robust: none or huber only what a loop changes is solved for; robust: switchable is left to "
+      "ceres)");
   AddEnum("init", o.init,
           {{"auto", GraphInit::kAuto},
            {"file", GraphInit::kFile},

@@ -2,7 +2,9 @@
 //   build/release/bench/robust_graphs GRAPH.g2o METHOD COUNT CLUSTER_SIZE FIRST_SEED LAST_SEED
 // The graph is solved as it is by least squares (the clean solution). Then false loops are planted (COUNT of
 // them, in clusters of CLUSTER_SIZE that agree with each other; false_loops.h) and it is solved again with
-// METHOD, from the best of all starts. Columns: graph, method, count, cluster size, seed, ATE against the
+// METHOD, from the best of all starts. METHOD is a robust loss ("gnc"), with "pcm+" before it for pairwise
+// consistency first, or "+sigma" behind it for the 3-sigma test after. Solved by the block solver
+// (switchable: by Ceres). Columns: graph, method, count, cluster size, seed, ATE against the
 // clean solution as a share of its bounding box' diagonal [%], precision and recall of the loops that were
 // kept, processor time [s].
 #include <cstdio>
@@ -36,9 +38,19 @@ double AlignedError(const PoseGraph& clean, const PoseGraph& graph) {
   return Summarize(errors).rmse;
 }
 
-PoseGraphOptions MethodOptions(const std::string& method) {
+PoseGraphOptions MethodOptions(std::string method) {
+  const std::string before = "pcm+", after = "+sigma";
   PoseGraphOptions options;
   options.objective = GraphObjective::kChi2;
+  options.solver = PoseGraphSolver::kBlock;
+  if (method.rfind(before, 0) == 0) {
+    options.pairwise_consistency = true;
+    method.erase(0, before.size());
+  }
+  if (method.size() > after.size() && method.rfind(after) == method.size() - after.size()) {
+    options.sigma_test = true;
+    method.resize(method.size() - after.size());
+  }
   options.robust = ParseRobustLoss(method);
   return options;
 }

@@ -1,8 +1,9 @@
 // Time per accepted loop while a graph grows:
-//   build/release/bench/online_graph town|FILE.g2o [parts|block|ceres] [SEED]
+//   build/release/bench/online_graph town|FILE.g2o [run|parts|block|ceres] [SEED]
 // Keyframes come one by one, each where its odometry edge from the last corrected pose puts it, with its
 // edges to earlier ones; when one brings loops, the graph is optimised, as `tutti run` does (MapGraph): Huber
-// on loops, from the present poses. parts: OnlineOptimizer, what changed alone; block, ceres: the whole graph
+// on loops, from the present poses. run: OnlineOptimizer as `tutti run` has it by default, small graphs whole
+// by Ceres, large ones in parts; parts: OnlineOptimizer, what changed alone; block, ceres: the whole graph
 // each time. "town": 10,000 keyframes on a drive round the blocks of a town. Prints CSV: graph, how,
 // keyframes, edges, loop events, their processor time [ms] as median, 99 % quantile and maximum, median and
 // largest number of keyframes solved for, and how far the result ends from the optimum of the whole graph: at
@@ -160,9 +161,10 @@ PoseGraphOptions AsInARun() {
 int Run(const std::string& name, const std::string& how, unsigned seed) {
   const PoseGraph file = name == "town" ? MakeTown(10000, seed) : ReadG2o(name).graph;
   PoseGraphOptions options = AsInARun();
-  options.solver = ParsePoseGraphSolver(how == "parts" ? "block" : how);
+  options.solver =
+      how == "run" ? PoseGraphOptions().solver : ParsePoseGraphSolver(how == "parts" ? "block" : how);
   OnlineOptions online;
-  if (how != "parts") online.always_whole = true;
+  if (how != "parts" && how != "run") online.always_whole = true;
   OnlineOptimizer optimizer(options, online);
   const Replay replay = Grow(file, optimizer);
   if (replay.milliseconds.empty()) throw InputError(name + ": has no loops");
@@ -185,8 +187,8 @@ int Run(const std::string& name, const std::string& how, unsigned seed) {
 
 int main(int argc, char** argv) {
   try {
-    if (argc < 2) throw InputError("usage: online_graph town|FILE.g2o [parts|block|ceres] [SEED]");
-    return Run(argv[1], argc > 2 ? argv[2] : "parts",
+    if (argc < 2) throw InputError("usage: online_graph town|FILE.g2o [run|parts|block|ceres] [SEED]");
+    return Run(argv[1], argc > 2 ? argv[2] : "run",
                argc > 3 ? static_cast<unsigned>(std::atoi(argv[3])) : 1u);
   } catch (const InputError& error) {
     std::fprintf(stderr, "online_graph: %s\n", error.what());

@@ -198,8 +198,23 @@ class OfEachKind final : public OnlineOptimizer::Impl {
   Incremental<7> sim3_;
 };
 
-bool SolvedInParts(const PoseGraphOptions& options) {
-  return options.solver == PoseGraphSolver::kBlock && options.init == GraphInit::kFile &&
+/// Everything while the graph is small, then in parts.
+class OnceItIsLarge final : public OnlineOptimizer::Impl {
+ public:
+  OnceItIsLarge(const PoseGraphOptions& options, const OnlineOptions& online)
+      : nodes_(online.parts_from_nodes), small_(options), large_(options, online) {}
+  OnlineReport Optimize(PoseGraph& graph) override {
+    return graph.nodes().size() < nodes_ ? small_.Optimize(graph) : large_.Optimize(graph);
+  }
+
+ private:
+  std::uint64_t nodes_;
+  EveryTime small_;
+  OfEachKind large_;
+};
+
+bool CanBeSolvedInParts(const PoseGraphOptions& options) {
+  return options.init == GraphInit::kFile &&
          (options.robust == RobustLoss::kNone || options.robust == RobustLoss::kHuber) &&
          !options.pairwise_consistency && !options.sigma_test;
 }
@@ -218,10 +233,12 @@ OnlineOptimizer::OnlineOptimizer(const PoseGraphOptions& options, const OnlineOp
   for (const std::string& wrong : {options.Validate(), online.Validate()}) {
     if (!wrong.empty()) throw InputError(wrong);
   }
-  if (SolvedInParts(options) && !online.always_whole) {
+  if (!CanBeSolvedInParts(options) || online.always_whole) {
+    impl_ = std::make_unique<EveryTime>(options);
+  } else if (options.solver == PoseGraphSolver::kBlock) {
     impl_ = std::make_unique<OfEachKind>(options, online);
   } else {
-    impl_ = std::make_unique<EveryTime>(options);
+    impl_ = std::make_unique<OnceItIsLarge>(options, online);
   }
 }
 

@@ -167,6 +167,31 @@ TEST(OnlineOptimizer, WhatPartsCanNotDoIsSolvedAsAWholeAndSaysSo) {
   EXPECT_EQ(online.Optimize(graph).nodes, graph.nodes().size());
 }
 
+TEST(OnlineOptimizer, SmallGraphsAreLeftToCeresAndLargeOnesAreSolvedInParts) {
+  PoseGraphOptions ceres = InParts();
+  ceres.solver = PoseGraphSolver::kCeres;
+  OnlineOptions online;
+  online.parts_from_nodes = 300;
+  online.whole_fraction = 1;
+  OnlineOptimizer optimizer(ceres, online), always_ceres(ceres);
+  std::size_t small = 0, in_parts = 0;
+  Grow(TwoRounds(GraphKind::kSE3).graph, [&](PoseGraph& graph) {
+    PoseGraph same = graph;
+    const OnlineReport report = optimizer.Optimize(graph);
+    ASSERT_TRUE(report.success) << report.reason;
+    if (graph.nodes().size() < online.parts_from_nodes) {
+      ++small;
+      EXPECT_TRUE(report.whole);
+      ASSERT_TRUE(always_ceres.Optimize(same).success);
+      EXPECT_EQ(graph.Node(120).pose.translation, same.Node(120).pose.translation);
+    } else if (!report.whole) {
+      ++in_parts;
+    }
+  });
+  EXPECT_GT(small, 10u);
+  EXPECT_GT(in_parts, 10u);
+}
+
 TEST(OnlineOptimizer, TheSameSequenceGivesTheSameBits) {
   const PoseGraph file = TwoRounds(GraphKind::kSE3).graph;
   OnlineOptimizer a(InParts()), b(InParts());

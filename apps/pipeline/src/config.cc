@@ -127,6 +127,7 @@ RunConfig ParseConfig(const std::string& text, const std::string& name) {
   Check(name, "odometry", marks["odometry"], config.odometry.Validate());
   Check(name, "loops", marks["loops"], config.loops.Validate());
   Check(name, "graph", marks["graph"], config.graph.Validate());
+  Check(name, "graph", marks["graph"], config.online.Validate());
   Check(name, "run", marks["run"], config.run.Validate());
   return config;
 }

@@ -46,7 +46,7 @@ class ConfigTable {
   void AddExtraction(ExtractionOptions& options);
   void AddVocabulary(VocabularyOptions& options);
   void AddVerification(VerificationOptions& options);
-  void AddGraph(PoseGraphOptions& options);
+  void AddGraph(PoseGraphOptions& options, OnlineOptions& online);
   void AddRun(SlamOptions& options);
 
   void Add(const char* name, bool& field, const char* doc);

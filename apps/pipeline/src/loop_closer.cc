@@ -22,7 +22,7 @@ LoopCloser::LoopCloser(const RunConfig& config, const CameraRig& rig, SpanRecord
       records_(*records),
       before_change_(std::move(before_change)),
       gate_(config.run),
-      graph_(config.graph, config.run, rig.sensor),
+      graph_(config.graph, config.online, config.run, rig.sensor),
       false_loops_(config.run, config.loops.seed) {}
 
 LoopGate::Map LoopCloser::Places() const {

@@ -22,8 +22,9 @@ double ScaleOf(const std::map<int, Similarity>& poses, int id) {
 
 }  // namespace
 
-MapGraph::MapGraph(const PoseGraphOptions& solver, const SlamOptions& options, Sensor sensor)
-    : optimizer_(solver),
+MapGraph::MapGraph(const PoseGraphOptions& solver, const OnlineOptions& online, const SlamOptions& options,
+                   Sensor sensor)
+    : optimizer_(solver, online),
       options_(options),
       kind_(sensor == Sensor::kMono ? GraphKind::kSim3 : GraphKind::kSE3) {}
 

@@ -25,7 +25,8 @@ namespace tutti {
 /// (S' = scale(s_a) S scale(1/s_b) for nodes a, b with corrected scales s_a, s_b).
 class MapGraph {
  public:
-  MapGraph(const PoseGraphOptions& solver, const SlamOptions& options, Sensor sensor);
+  MapGraph(const PoseGraphOptions& solver, const OnlineOptions& online, const SlamOptions& options,
+           Sensor sensor);
 
   /// To be called for each new keyframe: remembers which map piece it began in.
   void AddKeyframe(int id, int piece) { birth_piece_[id] = piece; }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
@@ -17,6 +18,9 @@ struct OnlineOptions {
   double settled_sigmas = 0.01;
   /// Beyond this share of the nodes all of them are solved for [1].
   double whole_fraction = 0.5;
+  /// With PoseGraphSolver::kCeres, graphs of this many nodes and more are solved in parts as well, by
+  /// kBlock: the whole of them would take Ceres longer than the time from one image to the next [nodes].
+  std::uint64_t parts_from_nodes = 500;
   /// All of them, each time, by PoseGraphOptimizer.
   bool always_whole = false;
   std::string Validate() const;
@@ -36,9 +40,10 @@ struct OnlineReport {
 /// is where it starts; nodes around are solved for as far as the change reaches, the rest is held. Starts
 /// from the poses in the graph. Deterministic: the same sequence of graphs gives the same bits.
 ///
-/// Works this way with PoseGraphSolver::kBlock, GraphInit::kFile and a loss that is solved directly (kNone,
-/// kHuber) without pairwise consistency and sigma test; with all others each call is one of
-/// PoseGraphOptimizer, and the report says `whole`.
+/// Works this way with PoseGraphSolver::kBlock, and with kCeres from OnlineOptions::parts_from_nodes on, if
+/// the initialisation is GraphInit::kFile and the loss one that is solved directly (kNone, kHuber) without
+/// pairwise consistency and sigma test. In all other cases each call is one of PoseGraphOptimizer, and the
+/// report says `whole`.
 class OnlineOptimizer {
  public:
   /// Throws InputError if the options are not usable.

@@ -38,6 +38,7 @@ struct LoopRecord {
   bool accepted = false;        ///< in the pose graph in the end
   bool injected = false;        ///< planted (run.inject_false_loops), known to be false
   double weight = 0;            ///< that the pose graph last gave it, 0..1; 0: never was in it
+  std::optional<double> gate_sigmas;  ///< Mahalanobis distance from the map (run.loop_gate_sigmas), if asked
   bool pending = false;         ///< waits for a second loop that agrees
   std::optional<bool> correct;  ///< what the ground truth says of an accepted loop, if it can
   std::string reason;           ///< why it is not accepted, in plain words

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""Measures the pose graph's solvers and what planted false loops do to a run, and writes docs/backend.md's tables.
+"""Measures the pose graph's optima, its solvers, and what planted false loops do to a run, and writes docs/backend.md's tables.
 
 usage: bench/graph_table.py [--build DIR] [--data DIR] [--out DIR] [--reuse] [--remark TEXT] [--document FILE] [TABLE...]
-Tables: speed size online planted. --reuse takes the runs of `tutti` that an earlier call left in --out; tables that are not
+Tables: published noisy speed size online planted. --reuse takes the runs of `tutti` that an earlier call left in --out; tables that are not
 made keep what the document says. Exit status 1 if a figure misses its bound. Needs nothing but Python 3.
 """
 import argparse
@@ -51,6 +51,47 @@ class Bench:
             self.program("apps/tutti/tutti", "run", "--config", config(yaml) if config else yaml, "--dataset", dataset,
                          "--out", out, "--quiet", "--no-report", *options)
         return json.loads((out / "summary.json").read_text())
+
+
+def reference_optima(bench):
+    """Best chi2 and certified chordal cost of each graph, as the data's reference_optima.md has them."""
+    out = {}
+    for line in (bench.a.data / "posegraphs" / "reference_optima.md").read_text().splitlines():
+        cells = [c.strip() for c in line.strip("|").split("|")]
+        if line.startswith("|") and "/" in cells[1] and cells[1][0].isdigit():
+            out[cells[0].split()[0]] = (float(cells[4]), float(cells[2]))
+    return out
+
+
+def published(bench):
+    lines = ["| graph | poses / edges | chi2, `--init chordal` | best chi2 seen | chordal objective | certified optimum by SE-Sync "
+             "| certificate: gap | iterations |", "|---|---|---|---|---|---|---|---|"]
+    optima = reference_optima(bench)
+    for file in sorted((bench.a.data / "posegraphs").glob("*.g2o")):
+        if file.stem.endswith("_groundtruth"):
+            continue
+        out = bench.a.out / "published"
+        bench.program("apps/tutti/tutti", "optimize", file, "--init", "chordal", "--certify", "--out", f"{out}.g2o", "--json", f"{out}.json")
+        s = json.loads(pathlib.Path(f"{out}.json").read_text())
+        chi2, proof = s["costs"]["chi2"], s["certificate"]
+        best, certified = optima.get(file.stem, (None, None))
+        word = f"{proof['relative_gap']:.0e}, {'certified' if proof['certified'] else 'not certified'}"
+        lines.append(f"| {file.stem} | {s['nodes']} / {s['edges']} | {chi2:.9g} | {best or '-'} | {proof['chordal']:.8g} | {certified or '-'} | {word} "
+                     f"| {s['iterations']} |")
+        if best:
+            bench.expect(chi2 <= best * (1 + 1e-6), f"{file.stem}: chi2 {chi2}, best seen {best}")
+    return lines
+
+
+def noisy(bench):
+    lines = ["| graph | poses | edges | rotation noise | chi2 | above the solution from the truth | certificate: gap |", "|---|---|---|---|---|---|---|"]
+    for graph, poses, sigmas in (("sphere", 2500, (3, 6)), ("sphere", 900, (10, 15)), ("torus", 2500, (3, 6, 10)), ("torus", 10000, (6,)),
+                                 ("streets", 2500, (3, 10, 20)), ("streets", 20000, (6,))):
+        for sigma in sigmas:
+            row = bench.program("bench/noisy_graphs", graph, poses, sigma).strip().split(",")
+            gap = f"{float(row[7]):.0e}, certified" if row[8] == "1" else "not certified"
+            lines.append(f"| {graph} | {poses:,} | {int(row[2]):,} | {sigma} deg | {row[5]} | {float(row[6]):.1e} | {gap} |")
+    return lines
 
 
 def speed(bench):
@@ -135,7 +176,7 @@ def planted(bench):
     return lines
 
 
-TABLES = {"speed": speed, "size": size, "online": online, "planted": planted}
+TABLES = {"published": published, "noisy": noisy, "speed": speed, "size": size, "online": online, "planted": planted}
 
 
 def main():

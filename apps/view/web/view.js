@@ -1,9 +1,10 @@
 'use strict';
 // The live view: newest state over server-sent events, drawn on canvases.
 
-const COLORS = { surf: '#e69f00', sift: '#56b4e9', orb: '#cc79a7', ensemble: '#0072b2', accepted: '#009e73', waiting: '#e69f00', path: '#0072b2', here: '#d55e00' };
+const COLORS = { surf: '#e69f00', sift: '#56b4e9', orb: '#cc79a7', ensemble: '#0072b2', accepted: '#009e73', waiting: '#e69f00', path: '#0072b2', here: '#d55e00', old: '#56b4e9', young: '#f0e442' };
 const DASHES = { surf: [8, 3, 2, 3], sift: [10, 5], orb: [2, 3], ensemble: [] };
 const MOST_ANSWERS = 1500, MOST_LINES = 300;
+const TRACK_OLD = 5;  // frames before this one that show it (of the last 10)
 const by = (id) => document.getElementById(id);
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 const token = new URLSearchParams(location.search).get('token');
@@ -26,15 +27,27 @@ function drawImage() {
   const canvas = by('image'), context = sharp(canvas, picture.height / picture.width);
   context.scale(canvas.width / picture.width, canvas.width / picture.width);
   context.drawImage(picture, 0, 0);
-  context.lineWidth = 1;
-  context.strokeStyle = context.fillStyle = COLORS.accepted;
-  for (const [x0, y0, x, y] of state.news.frame.tracks ?? []) {
-    context.beginPath();
-    context.moveTo(x0, y0);
-    context.lineTo(x, y);
-    context.stroke();
-    context.fillRect(x - 1.5, y - 1.5, 3, 3);
-  }
+  for (const track of state.news.frame.tracks ?? []) drawTrack(context, track);
+}
+
+// A tail of its places in the last frames, and a disc (followed for long) or a square (new) where it is now. The dark edge
+// keeps the light colours legible on a white wall.
+function drawTrack(context, track) {
+  const old = track.length / 2 > TRACK_OLD, color = old ? COLORS.old : COLORS.young;
+  const tail = new Path2D(), head = new Path2D();
+  tail.moveTo(track[0], track[1]);
+  for (let i = 2; i < track.length; i += 2) tail.lineTo(track[i], track[i + 1]);
+  if (old) head.arc(track[0], track[1], 2.2, 0, 7); else head.rect(track[0] - 2, track[1] - 2, 4, 4);
+  context.lineJoin = 'round';
+  context.strokeStyle = 'rgba(0, 0, 0, 0.75)';
+  context.lineWidth = 3;
+  context.stroke(tail);
+  context.lineWidth = 2;
+  context.stroke(head);
+  context.strokeStyle = context.fillStyle = color;
+  context.lineWidth = 1.4;
+  context.stroke(tail);
+  context.fill(head);
 }
 
 // Rotates by a unit quaternion (x, y, z, w) and moves.

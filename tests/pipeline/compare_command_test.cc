@@ -178,6 +178,13 @@ TEST(CompareCommand, BadInputIsRefusedBeforeTheFirstRun) {
   EXPECT_THAT(unknown.output, AllOf(StartsWith("tutti: --variants: 'bag'"), HasSubstr("Known")));
   EXPECT_THAT(compare(testing::TinyTown(), "orb,orb").output, HasSubstr("named twice"));
   EXPECT_THAT(compare(folder / "nowhere", "orb").output, AllOf(StartsWith("tutti: "), HasSubstr("nowhere")));
+  // Less than nothing is no large number.
+  for (const char* option : {"--seeds", "--max-frames"}) {
+    const auto below = RunTutti({"compare", "--config", config, "--dataset", testing::TinyTown().string(),
+                                 "--out", out, "--variants", "orb", option, "-1"});
+    EXPECT_EQ(below.status, 1);
+    EXPECT_THAT(below.output, AllOf(HasSubstr(option), HasSubstr("'-1'")));
+  }
   EXPECT_FALSE(fs::exists(out));
 }
 

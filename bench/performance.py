@@ -14,6 +14,8 @@ import platform
 import subprocess
 import sys
 
+from document import rewrite
+
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 DOCUMENT = ROOT / "docs" / "performance.md"
 ROWS = {"kitti": ("`kitti_00_head`, mono", "kitti_00-02_mono.yaml", "kitti_00_head"),
@@ -54,13 +56,6 @@ def section(name, s, remark):
         lines.append(f"| {stage['lane']} | {stage['name']} | {stage['calls']} | {stage['median_ms']:.2f} "
                      f"| {stage['p99_ms']:.1f} | {cpu} | {100 * stage['share']:.1f} % | {share} |")
     return "\n".join(lines)
-
-
-def rewrite(document, name, text):
-    begin, end = f"<!-- {name}:begin -->", f"<!-- {name}:end -->"
-    whole = document.read_text()
-    head, tail = whole.index(begin) + len(begin), whole.index(end)
-    document.write_text(whole[:head] + "\n" + text + "\n" + whole[tail:])
 
 
 def main():

@@ -75,12 +75,29 @@ TEST(SlamSystem, ASecondLapNeedsFewKeyframesAndTheWholeMapIsAdjusted) {
               without.ate_m, with.keyframe_stamps.size(), without.keyframe_stamps.size());
 }
 
+void ExpectTheSameBits(const Result& a, const Result& b) {
+  EXPECT_EQ(a.adjustments, b.adjustments);
+  EXPECT_EQ(a.corrections, b.corrections);
+  ASSERT_EQ(a.trajectory.size(), b.trajectory.size());
+  for (std::size_t i = 0; i < a.trajectory.size(); ++i)
+    EXPECT_EQ(a.trajectory[i].pose.Matrix(), b.trajectory[i].pose.Matrix()) << i;
+}
+
 TEST(SlamSystem, WhatBackgroundWorkFindsDoesNotDependOnTheThreads) {
-  const Result one = Drive(Small(true, 1)), two = Drive(Small(true, 2));
-  EXPECT_EQ(one.adjustments, two.adjustments);
-  ASSERT_EQ(one.trajectory.size(), two.trajectory.size());
-  for (std::size_t i = 0; i < one.trajectory.size(); ++i)
-    EXPECT_EQ(one.trajectory[i].pose.Matrix(), two.trajectory[i].pose.Matrix()) << i;
+  ExpectTheSameBits(Drive(Small(true, 1)), Drive(Small(true, 2)));
+}
+
+TEST(SlamSystem, LoopsThatAreGatedAndClosedInPartsDoNotDependOnTheThreads) {
+  const auto in_parts = [](int threads) {
+    RunConfig config = Small(false, threads);
+    config.online.parts_from_nodes = 5;
+    config.run.loop_gate_sigmas = 20;
+    return config;
+  };
+  const Result one = Drive(in_parts(1)), whole = Drive(Small(false, 2));
+  ExpectTheSameBits(one, Drive(in_parts(2)));
+  EXPECT_EQ(one.corrections, whole.corrections) << "the gate refuses no true loop";
+  EXPECT_NEAR(one.ate_m, whole.ate_m, 0.1 * whole.ate_m);
 }
 
 }  // namespace

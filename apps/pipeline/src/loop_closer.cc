@@ -109,9 +109,14 @@ bool LoopCloser::Inject(int query, std::int64_t frames) {
 // Loops that the map can't have drifted to by what it knows of its own uncertainty.
 void LoopCloser::Gate(std::vector<LoopEdge>& entering) {
   if (options_.loop_gate_sigmas == 0) return;
+  const ScopedSpan span(recorder_, Lane::kOptimisation, "gate_loop");
+  const std::vector<std::optional<double>> distances =
+      graph_.Distances(odometry_, gate_.accepted(), entering);
   std::vector<LoopEdge> passed;
-  for (const LoopEdge& loop : entering) {
-    const std::optional<double> distance = graph_.Distance(odometry_, gate_.accepted(), loop);
+  for (std::size_t i = 0; i < entering.size(); ++i) {
+    const LoopEdge& loop = entering[i];
+    const std::optional<double>& distance = distances[i];
+    records_[loop.record].gate_sigmas = distance;
     if (!distance || *distance <= options_.loop_gate_sigmas) {
       passed.push_back(loop);
       continue;

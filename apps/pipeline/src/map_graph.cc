@@ -162,13 +162,19 @@ void MapGraph::MeasureAgain(const Odometry& odometry, std::vector<LoopEdge>& acc
   }
 }
 
-std::optional<double> MapGraph::Distance(const Odometry& odometry, const std::vector<LoopEdge>& loops,
-                                         const LoopEdge& loop) const {
-  const GraphCovariance known(Build(odometry, loops));
-  if (!known.Connected(loop.candidate, loop.query)) return std::nullopt;
-  const PoseGraphEdge edge{loop.candidate, loop.query, loop.S_candidate_query, loop.information,
-                           EdgeKind::kLoop};
-  return std::sqrt(known.SquaredDistance(edge));
+std::vector<std::optional<double>> MapGraph::Distances(const Odometry& odometry,
+                                                       const std::vector<LoopEdge>& accepted,
+                                                       const std::vector<LoopEdge>& entering) const {
+  const GraphCovariance known(Build(odometry, accepted));
+  std::vector<std::optional<double>> out;
+  for (const LoopEdge& loop : entering) {
+    out.emplace_back();
+    if (!known.Connected(loop.candidate, loop.query)) continue;
+    const PoseGraphEdge edge{loop.candidate, loop.query, loop.S_candidate_query, loop.information,
+                             EdgeKind::kLoop};
+    out.back() = std::sqrt(known.SquaredDistance(edge));
+  }
+  return out;
 }
 
 void MapGraph::Keep(const Odometry& odometry, const Correction& correction, std::vector<LoopEdge>& accepted,

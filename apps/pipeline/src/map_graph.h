@@ -49,10 +49,11 @@ class MapGraph {
   /// (OnlineOptimizer; all of it with Ceres). The odometry is not touched.
   Correction Optimize(const Odometry& odometry, const std::vector<LoopEdge>& loops);
 
-  /// Mahalanobis distance [1] of the loop from what the graph with these loops knows of its relative pose;
-  /// nothing if no edges connect its ends.
-  std::optional<double> Distance(const Odometry& odometry, const std::vector<LoopEdge>& loops,
-                                 const LoopEdge& loop) const;
+  /// Mahalanobis distance [1] of each entering loop from what the graph with the accepted ones knows of its
+  /// relative pose; nothing where no edges connect its ends.
+  std::vector<std::optional<double>> Distances(const Odometry& odometry,
+                                               const std::vector<LoopEdge>& accepted,
+                                               const std::vector<LoopEdge>& entering) const;
 
   /// To be called before the correction is applied to the odometry: keeps the measurements, and carries them
   /// and the loops over to the corrected units.

@@ -34,13 +34,14 @@ struct LoopRecord {
   double hypothesis = 0;  ///< of the ensemble: 1 - p(new place)
   double posterior = 0;   ///< of the ensemble at its best location
   int matches = 0, inliers = 0;
-  bool verified = false;        ///< passed the detector's geometric verification
-  bool accepted = false;        ///< in the pose graph in the end
-  bool injected = false;        ///< planted (run.inject_false_loops), known to be false
-  double weight = 0;            ///< that the pose graph last gave it, 0..1; 0: never was in it
-  bool pending = false;         ///< waits for a second loop that agrees
-  std::optional<bool> correct;  ///< what the ground truth says of an accepted loop, if it can
-  std::string reason;           ///< why it is not accepted, in plain words
+  bool verified = false;              ///< passed the detector's geometric verification
+  bool accepted = false;              ///< in the pose graph in the end
+  bool injected = false;              ///< planted (run.inject_false_loops), known to be false
+  double weight = 0;                  ///< that the pose graph last gave it, 0..1; 0: never was in it
+  std::optional<double> gate_sigmas;  ///< Mahalanobis distance from the map (run.loop_gate_sigmas), if asked
+  bool pending = false;               ///< waits for a second loop that agrees
+  std::optional<bool> correct;        ///< what the ground truth says of an accepted loop, if it can
+  std::string reason;                 ///< why it is not accepted, in plain words
   std::optional<Similarity> S_candidate_query;  ///< the constraint, if one could be computed
   bool has_scale = false;                       ///< false: rotation and unit direction only
 };

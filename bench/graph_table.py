@@ -1,0 +1,205 @@
+#!/usr/bin/env python3
+"""Measures the pose graph's optima, its solvers, and what planted false loops do to a run, and writes docs/backend.md's tables.
+
+usage: bench/graph_table.py [--build DIR] [--data DIR] [--out DIR] [--reuse] [--remark TEXT] [--document FILE] [TABLE...]
+Tables: published noisy speed size online planted. --reuse takes the runs of `tutti` that an earlier call left in --out; tables that are not
+made keep what the document says. Exit status 1 if a figure misses its bound. Needs nothing but Python 3.
+"""
+import argparse
+import csv
+import json
+import os
+import pathlib
+import platform
+import subprocess
+import sys
+
+from document import rewrite
+from run_table import ROWS, WORLDS, generate_world
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+STOCK_SHARE = 0.24              # of stock Ceres' time on sphere2500
+ONLINE_MS = (30, 150)           # median and 99 % quantile per accepted loop
+PLANTED, PLANTED_PERCENT = 100, 5  # false loops, and by how much they may change the ATE
+
+
+class Bench:
+    def __init__(self, arguments):
+        self.a, self.missed = arguments, []
+
+    def program(self, *command, env=None):
+        done = subprocess.run([self.a.build / command[0], *map(str, command[1:])], check=True, stdout=subprocess.PIPE,
+                              stderr=subprocess.PIPE, env={**os.environ, **(env or {})})
+        return done.stdout.decode()
+
+    def expect(self, fulfilled, what):
+        if not fulfilled:
+            self.missed.append(what)
+
+    def tutti_run(self, name, folder, *options, config=None):
+        """summary.json of a run of the README's rows, in `folder`."""
+        _, yaml, dataset, _, _ = ROWS[name]
+        if dataset is None:
+            yaml, dataset = generate_world(self.a.build / "apps/tutti/tutti", self.a.out / f"{name}-data", WORLDS[name])
+        else:
+            yaml, dataset = ROOT / "data" / "configs" / yaml, self.a.data / dataset
+        out = self.a.out / folder
+        if not dataset.exists():
+            print(f"{name}: {dataset} is absent", file=sys.stderr)
+            return None
+        if not (self.a.reuse and (out / "summary.json").exists()):
+            self.program("apps/tutti/tutti", "run", "--config", config(yaml) if config else yaml, "--dataset", dataset,
+                         "--out", out, "--quiet", "--no-report", *options)
+        return json.loads((out / "summary.json").read_text())
+
+
+def reference_optima(bench):
+    """Best chi2 and certified chordal cost of each graph, as the data's reference_optima.md has them."""
+    out = {}
+    for line in (bench.a.data / "posegraphs" / "reference_optima.md").read_text().splitlines():
+        cells = [c.strip() for c in line.strip("|").split("|")]
+        if line.startswith("|") and "/" in cells[1] and cells[1][0].isdigit():
+            out[cells[0].split()[0]] = (float(cells[4]), float(cells[2]))
+    return out
+
+
+def published(bench):
+    lines = ["| graph | poses / edges | chi2, `--init chordal` | best chi2 seen | chordal objective | certified optimum by SE-Sync "
+             "| certificate: gap | iterations |", "|---|---|---|---|---|---|---|---|"]
+    optima = reference_optima(bench)
+    for file in sorted((bench.a.data / "posegraphs").glob("*.g2o")):
+        if file.stem.endswith("_groundtruth"):
+            continue
+        out = bench.a.out / "published"
+        bench.program("apps/tutti/tutti", "optimize", file, "--init", "chordal", "--certify", "--out", f"{out}.g2o", "--json", f"{out}.json")
+        s = json.loads(pathlib.Path(f"{out}.json").read_text())
+        chi2, proof = s["costs"]["chi2"], s["certificate"]
+        best, certified = optima.get(file.stem, (None, None))
+        word = f"{proof['relative_gap']:.0e}, {'certified' if proof['certified'] else 'not certified'}"
+        lines.append(f"| {file.stem} | {s['nodes']} / {s['edges']} | {chi2:.9g} | {best or '-'} | {proof['chordal']:.8g} | {certified or '-'} | {word} "
+                     f"| {s['iterations']} |")
+        if best:
+            bench.expect(chi2 <= best * (1 + 1e-6), f"{file.stem}: chi2 {chi2}, best seen {best}")
+    return lines
+
+
+def noisy(bench):
+    lines = ["| graph | poses | edges | rotation noise | chi2 | above the solution from the truth | certificate: gap |", "|---|---|---|---|---|---|---|"]
+    for graph, poses, sigmas in (("sphere", 2500, (3, 6)), ("sphere", 900, (10, 15)), ("torus", 2500, (3, 6, 10)), ("torus", 10000, (6,)),
+                                 ("streets", 2500, (3, 10, 20)), ("streets", 20000, (6,))):
+        for sigma in sigmas:
+            row = bench.program("bench/noisy_graphs", graph, poses, sigma).strip().split(",")
+            gap = f"{float(row[7]):.0e}, certified" if row[8] == "1" else "not certified"
+            lines.append(f"| {graph} | {poses:,} | {int(row[2]):,} | {sigma} deg | {row[5]} | {float(row[6]):.1e} | {gap} |")
+    return lines
+
+
+def speed(bench):
+    rows = [("stock Ceres", "StockCeres/sphere2500"), ("`ceres`", "Tutti/sphere2500_ceres"), ("`block`", "Tutti/sphere2500")]
+    times = {}
+    for threads in ("", "1"):
+        text = bench.program("bench/pose_graph_benchmarks", "--benchmark_filter=sphere2500(_ceres)?/",
+                             "--benchmark_repetitions=3", "--benchmark_format=json",
+                             env={"TUTTI_DATA": str(bench.a.data), **({"OMP_THREAD_LIMIT": "1"} if threads else {})})
+        for run in json.loads(text)["benchmarks"]:
+            if run.get("aggregate_name") == "median":
+                times[threads, run["run_name"].split("/process_time")[0]] = (run["real_time"], run["cpu_time"])
+    lines = ["| sphere2500, medians of 3 | on the clock | share | processor time | share | processor time, `OMP_THREAD_LIMIT=1` | share |",
+             "|---|---|---|---|---|---|---|"]
+    for title, name in rows:
+        cells = []
+        for threads, which in (("", 0), ("", 1), ("1", 1)):
+            ms, stock = times[threads, name][which], times[threads, rows[0][1]][which]
+            cells += [f"{ms:.0f} ms", f"{ms / stock:.2f}"]
+            if name == rows[-1][1]:
+                bench.expect(ms <= STOCK_SHARE * stock, f"block takes {ms / stock:.2f} of stock Ceres, bound {STOCK_SHARE}")
+        lines.append(f"| {title} | " + " | ".join(cells) + " |")
+    return lines
+
+
+def size(bench):
+    lines = ["| poses | edges | time on the clock | peak memory, without the graph | per pose |", "|---|---|---|---|---|"]
+    for poses in (1000, 10000, 100000):
+        row = bench.program("bench/graph_scale", poses).strip().split(",")
+        seconds, memory = float(row[3]), float(row[7]) - float(row[6])
+        lines.append(f"| {poses:,} | {int(row[1]):,} | {seconds:.2f} s | {memory:.0f} MB | {1e3 * memory / poses:.0f} kB |")
+    return lines
+
+
+def with_run(bench, line):
+    """Makes a configuration with one more line in its section `run`, which the shipped ones do not have."""
+    def config(yaml):
+        out = bench.a.out / "changed.yaml"
+        out.write_text(yaml.read_text() + f"\nrun:\n  {line}\n")
+        return out
+    return config
+
+
+def online(bench):
+    graphs = [("town", seed, f"town, seed {seed}") for seed in (1, 2, 3)]
+    if bench.tutti_run("kitti", "kitti-unadjusted", config=with_run(bench, "global_adjustment: false")):
+        graphs.insert(0, (bench.a.out / "kitti-unadjusted" / "graph.g2o", 1, "`kitti_00_head`"))
+    lines = ["| graph | how | keyframes | loops | median | 99 % | largest | keyframes solved for, median | off the optimum at the end |",
+             "|---|---|---|---|---|---|---|---|---|"]
+    for graph, seed, title in graphs:
+        for how in ("run", "block", "ceres") if seed == 1 else ("run",):
+            row = bench.program("bench/online_graph", graph, how, seed).strip().rsplit(",", 11)
+            (keyframes, _, loops), ms, nodes = map(int, row[2:5]), list(map(float, row[5:8])), row[8]
+            what = "as `tutti run`" if how == "run" else f"whole, `{how}`"
+            lines.append(f"| {title} | {what} | {keyframes:,} | {loops} | {ms[0]:.2g} ms | {ms[1]:.3g} ms | {ms[2]:.3g} ms | {nodes} "
+                         f"| {float(row[11]):.2g} sigma, {float(row[10]):.2g} m |")
+            if how == "run":
+                bench.expect(ms[0] <= ONLINE_MS[0] and ms[1] <= ONLINE_MS[1], f"{title}: median {ms[0]} ms, 99 % {ms[1]} ms")
+    return lines
+
+
+def planted(bench):
+    lines = [f"| run | ATE without | with {PLANTED} | change | planted ones kept | refused without a reason "
+             "| accepted loops, largest distance | planted ones, least distance |", "|---|---|---|---|---|---|---|---|"]
+    measured = with_run(bench, "loop_gate_sigmas: 1e9")  # wide open: distances are measured, nothing is refused
+    for name in ("kitti", "redkitchen", "town"):
+        without = bench.tutti_run(name, f"{name}-without")
+        with_them = without and bench.tutti_run(name, f"{name}-planted", "--inject-false-loops", PLANTED, config=measured)
+        if not with_them:
+            continue
+        ate = [s["evaluation"]["slam"]["ate_rmse_m"] for s in (without, with_them)]
+        kept, planted_ones = with_them["loops"]["injected_accepted"], with_them["loops"]["injected"]
+        with open(bench.a.out / f"{name}-planted" / "loops.csv", newline="") as f:
+            loops = list(csv.DictReader(f))
+        mute = sum(r["injected"] == "1" and r["accepted"] == "0" and not r["reason"] for r in loops)
+        taken, refused = ([float(r["sigmas"]) for r in loops if r["sigmas"] and r["injected"] == planted_one and
+                           (planted_one == "1" or r["accepted"] == "1")] for planted_one in "01")
+        change = 100 * (ate[1] / ate[0] - 1)
+        lines.append(f"| {ROWS[name][0]} | {ate[0]:.4f} m | {ate[1]:.4f} m | {change:+.2f} % | {kept} of {planted_ones} "
+                     f"| {mute} | {max(taken):.2g} sigma of {len(taken)} | {min(refused):.3g} sigma of {len(refused)} |")
+        bench.expect(abs(change) <= PLANTED_PERCENT and planted_ones == PLANTED, f"{name}: {change:.1f} %, {planted_ones} planted")
+    return lines
+
+
+TABLES = {"published": published, "noisy": noisy, "speed": speed, "size": size, "online": online, "planted": planted}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("tables", nargs="*", metavar="TABLE", help=" ".join(TABLES))
+    parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build" / "release")
+    parser.add_argument("--data", type=pathlib.Path, default=os.environ.get("TUTTI_DATA", ROOT.parent / "shared" / "data"))
+    parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("/tmp/tutti-bench"), help="folder for runs (kept)")
+    parser.add_argument("--document", type=pathlib.Path, default=ROOT / "docs" / "backend.md")
+    parser.add_argument("--remark", default="", help="a sentence above the table")
+    parser.add_argument("--reuse", action="store_true")
+    bench = Bench(parser.parse_args())
+    bench.a.out.mkdir(parents=True, exist_ok=True)
+    for name in bench.a.tables or TABLES:
+        if name not in TABLES:
+            parser.error(f"unknown table '{name}'; there are {', '.join(TABLES)}")
+        head = f"Written by `bench/graph_table.py {name}`; load of the machine before: {os.getloadavg()[0]:.1f}, " \
+               f"{os.cpu_count()} cores, {platform.machine()}. {bench.a.remark}".rstrip()
+        rewrite(bench.a.document, name, "\n".join([head, "", *TABLES[name](bench)]))
+    for what in bench.missed:
+        print("missed:", what, file=sys.stderr)
+    return 1 if bench.missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -89,7 +89,7 @@ TEST_F(CollectCommand, TimePerStageIsATableOfItsOwnInEveryFormat) {
   EXPECT_LT(stages.find("loop_verify"), stages.find("loop_wait"));
   EXPECT_THAT(text.output.substr(0, text.output.find("Time per stage:")), Not(HasSubstr("loop_verify")));
   EXPECT_THAT(Collect({"--table-format", "markdown"}).output, HasSubstr("| stage [s]"));
-  EXPECT_THAT(Collect({"--table-format", "latex"}).output, HasSubstr("odometry\\_track & 1.00 +- 0.00"));
+  EXPECT_THAT(Collect({"--table-format", "latex"}).output, HasSubstr("odometry\\_track & 1.00 $\\pm$ 0.00"));
   const auto variant = nlohmann::json::parse(ReadAll(file))["datasets"][0]["variants"][0];
   EXPECT_NEAR(variant["stages_s"]["loop_verify"]["mean"].get<double>(), 0.5, 1e-12);
 }

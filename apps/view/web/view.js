@@ -27,27 +27,29 @@ function drawImage() {
   const canvas = by('image'), context = sharp(canvas, picture.height / picture.width);
   context.scale(canvas.width / picture.width, canvas.width / picture.width);
   context.drawImage(picture, 0, 0);
-  for (const track of state.news.frame.tracks ?? []) drawTrack(context, track);
+  drawTracks(context, state.news.frame.tracks ?? []);
 }
 
-// A tail of its places in the last frames, and a disc (followed for long) or a square (new) where it is now. The dark edge
-// keeps the light colours legible on a white wall.
-function drawTrack(context, track) {
-  const old = track.length / 2 > TRACK_OLD, color = old ? COLORS.old : COLORS.young;
-  const tail = new Path2D(), head = new Path2D();
-  tail.moveTo(track[0], track[1]);
-  for (let i = 2; i < track.length; i += 2) tail.lineTo(track[i], track[i + 1]);
-  if (old) head.arc(track[0], track[1], 2.2, 0, 7); else head.rect(track[0] - 2, track[1] - 2, 4, 4);
+// Tails of the places in the last frames, and above them a disc (followed for long) or a square (new) where each is now. The
+// dark edge keeps the light colours legible on a white wall.
+function drawTracks(context, tracks) {
+  const edge = 'rgba(0, 0, 0, 0.75)';
+  const old = (track) => track.length / 2 > TRACK_OLD, colorOf = (track) => (old(track) ? COLORS.old : COLORS.young);
+  const stroke = (path, width, style) => { context.lineWidth = width; context.strokeStyle = style; context.stroke(path); };
   context.lineJoin = 'round';
-  context.strokeStyle = 'rgba(0, 0, 0, 0.75)';
-  context.lineWidth = 3;
-  context.stroke(tail);
-  context.lineWidth = 2;
-  context.stroke(head);
-  context.strokeStyle = context.fillStyle = color;
-  context.lineWidth = 1.4;
-  context.stroke(tail);
-  context.fill(head);
+  for (const track of tracks) {
+    const tail = new Path2D();
+    for (let i = 0; i < track.length; i += 2) tail.lineTo(track[i], track[i + 1]);
+    stroke(tail, 3, edge);
+    stroke(tail, 1.4, colorOf(track));
+  }
+  for (const track of tracks) {
+    const head = new Path2D(), [x, y] = track;
+    if (old(track)) head.arc(x, y, 2.2, 0, 7); else head.rect(x - 2, y - 2, 4, 4);
+    stroke(head, 2, edge);
+    context.fillStyle = colorOf(track);
+    context.fill(head);
+  }
 }
 
 // Rotates by a unit quaternion (x, y, z, w) and moves.

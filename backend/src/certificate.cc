@@ -215,7 +215,8 @@ Certificate CertifyOptimum(const PoseGraph& graph, const CertificateOptions& opt
   PoseGraphOptions polish;
   polish.objective = GraphObjective::kChi2;
   polish.init = GraphInit::kFile;
-  polish.function_tolerance = 1e-13;  // the multipliers are only as good as the gradient is small
+  polish.solver = PoseGraphSolver::kBlock;
+  polish.function_tolerance = 1e-16;  // the multipliers are only as good as the gradient is small
   const PoseGraphReport report = PoseGraphOptimizer(polish).Optimize(solution);
   if (!report.success) {
     out.reason = "the chordal objective could not be minimised: " + report.reason;

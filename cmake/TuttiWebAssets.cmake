@@ -22,8 +22,8 @@ function(tutti_embed out symbol)
   file(CONFIGURE OUTPUT "${out}" CONTENT "@source@" @ONLY)
 endfunction()
 
-# tutti_npm_install(folder_with_lock_file destination ok_variable): the packages of a lock file, by version and hash.
-# Nothing is fetched again while the lock file is the same. No Node, no npm or no network: ok is FALSE.
+# tutti_npm_install(folder_with_lock_file destination ok): the packages of a lock file, by version and hash. Nothing is
+# fetched again while the lock file is the same. No Node, no npm or no network: ok is FALSE, and ok_missing says why.
 function(tutti_npm_install folder destination ok)
   find_program(TUTTI_NODE node)
   find_program(TUTTI_NPM npm)
@@ -31,6 +31,7 @@ function(tutti_npm_install folder destination ok)
   set(${ok} FALSE PARENT_SCOPE)
   set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS "${folder}/package-lock.json")
   if(NOT TUTTI_NODE OR NOT TUTTI_NPM)
+    set(${ok}_missing "no Node or npm; Debian: apt-get install nodejs npm" PARENT_SCOPE)
     return()
   endif()
   file(SHA256 "${folder}/package-lock.json" wanted)
@@ -41,13 +42,20 @@ function(tutti_npm_install folder destination ok)
   if(NOT there STREQUAL wanted)
     file(COPY "${folder}/package.json" "${folder}/package-lock.json" DESTINATION "${destination}")
     execute_process(COMMAND "${TUTTI_NPM}" ci --ignore-scripts --no-audit --no-fund --prefer-offline
+      --fetch-retries=1 --fetch-retry-mintimeout=1000 --fetch-retry-maxtimeout=5000
       WORKING_DIRECTORY "${destination}" RESULT_VARIABLE result OUTPUT_QUIET ERROR_VARIABLE error TIMEOUT 300)
     if(NOT result EQUAL 0)
-      string(REGEX REPLACE "\n.*" "" error "${error}")
-      message(STATUS "npm ci of ${folder} failed (${error}); is there a network?")
+      # npm's warnings come first, and its errors are many lines: the one that says most.
+      string(REGEX MATCH "npm (error|ERR!) [^\n]*(request to|network|E[A-Z]+:)[^\n]*" line "${error}")
+      if(NOT line)
+        string(REGEX MATCH "npm (error|ERR!)[^\n]*|[^\n]+" line "${error}")
+      endif()
+      string(REGEX REPLACE "[\"\\\\;]" "'" line "${line}")  # it becomes C++ text
+      set(${ok}_missing "npm could not fetch it (${result}: ${line}); is there a network?" PARENT_SCOPE)
       return()
     endif()
     file(WRITE "${destination}/installed" "${wanted}")
   endif()
   set(${ok} TRUE PARENT_SCOPE)
+  set(${ok}_missing "" PARENT_SCOPE)
 endfunction()

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "checks.h"
 #include "commands.h"
 #include "comparison.h"
 #include "files.h"
@@ -78,7 +79,6 @@ RunFigures Failed(const CompareArguments& arguments, const std::string& variant,
 }
 
 void CheckArguments(const CompareArguments& arguments) {
-  if (arguments.seeds < 1) throw InputError("--seeds: must be at least 1");
   const std::set<std::string> different(arguments.variants.begin(), arguments.variants.end());
   if (different.size() != arguments.variants.size()) throw InputError("--variants: one is named twice");
 }
@@ -213,11 +213,12 @@ void AddCompareCommand(CLI::App& app, int& exit_code) {
       ->delimiter(',')
       ->capture_default_str();
   command->add_option("--seeds", arguments->seeds, "run each variant with the seeds 1 to this")
+      ->check(Positive())
       ->capture_default_str();
   command->add_option("--ground-truth", arguments->ground_truth,
                       "trajectory to evaluate against (default: the data set's own)");
   command->add_option("--threads", arguments->threads, "most threads; the result is the same for any number");
-  command->add_option("--max-frames", arguments->max_frames, "the first frames only");
+  command->add_option("--max-frames", arguments->max_frames, "the first frames only")->check(Positive());
   command->add_flag("--separate", arguments->separate,
                     "no shared odometry: every variant tracks, too, as `tutti run` does");
   AddTableFormatOption(*command, arguments->table_format);

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "checks.h"
 #include "commands.h"
 #include "tutti/backend/certificate.h"
 #include "tutti/backend/g2o_io.h"
@@ -212,10 +213,10 @@ void AddOptimizeCommand(CLI::App& app, int&) {
   command
       ->add_option("--robust-chi2", arguments->options.robust_chi2,
                    "Chi-square beyond which a loop is doubted; 0: the 99 % quantile")
-      ->check(CLI::NonNegativeNumber)
+      ->check(NotNegative())
       ->capture_default_str();
   command->add_option("--max-iterations", arguments->options.max_iterations, "Levenberg-Marquardt iterations")
-      ->check(CLI::PositiveNumber)
+      ->check(Positive())
       ->capture_default_str();
   command->add_flag(
       "--certify", arguments->certify,

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "checks.h"
 #include "commands.h"
 #include "run_with_report.h"
 #include "tutti/core/error.h"
@@ -132,7 +133,7 @@ void AddRunCommand(CLI::App& app, int& exit_code) {
           "test of the back end: plant so many false loops (random relative poses, wrong places, pairs that "
           "agree with each other) that look verified; loops.csv says what became of each (injected, reason, "
           "weight)")
-      ->check(CLI::NonNegativeNumber);
+      ->check(NotNegative());
   command->add_option("--max-frames", arguments->max_frames, "the first frames only");
   command
       ->add_option(
@@ -141,7 +142,7 @@ void AddRunCommand(CLI::App& app, int& exit_code) {
           "(default 10), or with Ctrl-C")
       ->expected(0, 1)
       ->type_name("SECONDS")
-      ->check(CLI::PositiveNumber);
+      ->check(Positive());
   command->add_flag(
       "--realtime", arguments->realtime,
       "play by the time stamps and drop the frames that it can't follow; without it every frame is "

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <fstream>
 
+#include "stage_times.h"
 #include "tutti/core/error.h"
 #include "tutti/loopclosure/significance.h"
 
@@ -19,17 +20,6 @@ double Number(const Json& json, const std::string& path) {
   const Json::json_pointer pointer("/" + path);
   return json.contains(pointer) && json.at(pointer).is_number() ? json.at(pointer).get<double>()
                                                                 : RunFigures::kNone;
-}
-
-/// Seconds of the stages whose name begins so.
-double StageSeconds(const Json& json, const std::string& prefix) {
-  const Json::json_pointer pointer("/timing/stage_ms");
-  if (!json.contains(pointer)) return RunFigures::kNone;
-  double sum = 0;
-  for (const auto& [name, ms] : json.at(pointer).items()) {
-    if (name.rfind(prefix, 0) == 0 && name != "loop_wait" && ms.is_number()) sum += ms.get<double>() / 1e3;
-  }
-  return sum;
 }
 
 std::string VariantOf(const Json& json) {
@@ -58,11 +48,6 @@ std::vector<std::string> InOrder(const std::vector<RunFigures>& runs, const Key&
   }
   return out;
 }
-
-struct Variant {
-  std::string name;
-  std::vector<const RunFigures*> runs;
-};
 
 std::vector<Variant> Variants(const Comparison& comparison, const std::string& dataset) {
   std::vector<RunFigures> here;
@@ -108,13 +93,6 @@ PairedTTestResult AgainstEnsemble(const Variant& variant, const std::vector<Vari
   return PairedTTest(a, b);
 }
 
-std::string Cell(const MeanInterval& value, int decimals) {
-  if (value.count == 0) return "-";
-  std::string text = Fixed(value.mean, decimals);
-  if (std::isfinite(value.half_width)) text += " +- " + Fixed(value.half_width, decimals);
-  return text;
-}
-
 TextTable Table(const std::vector<Variant>& variants) {
   TextTable table;
   table.header = {"variant",   "runs",       "proposed",   "accepted",          "false",    "ATE [m]",
@@ -126,17 +104,21 @@ TextTable Table(const std::vector<Variant>& variants) {
     rotation.mean *= 100;
     rotation.half_width *= 100;
     const std::size_t failed = Failures(variant);
-    table.rows.push_back(
-        {variant.name,
-         std::to_string(variant.runs.size() - failed) +
-             (failed > 0 ? " (" + std::to_string(failed) + " failed)" : ""),
-         Cell(Over(variant, &RunFigures::proposed), 1), Cell(Over(variant, &RunFigures::accepted), 1),
-         Cell(Over(variant, &RunFigures::false_loops), 1), Cell(Over(variant, &RunFigures::ate_m), 4),
-         variant.name == kEnsemble || test.pairs < 2 ? "-" : Fixed(test.p, 4),
-         Cell(Over(variant, &RunFigures::rpe_m), 4), Cell(Over(variant, &RunFigures::t_rel_percent), 3),
-         Cell(rotation, 3), Cell(Over(variant, &RunFigures::wall_s), 1),
-         Cell(Over(variant, &RunFigures::odometry_s), 1), Cell(Over(variant, &RunFigures::loops_s), 1),
-         Cell(Over(variant, &RunFigures::frame_ms), 1), Cell(Over(variant, &RunFigures::memory_mb), 0)});
+    table.rows.push_back({variant.name,
+                          std::to_string(variant.runs.size() - failed) +
+                              (failed > 0 ? " (" + std::to_string(failed) + " failed)" : ""),
+                          IntervalCell(Over(variant, &RunFigures::proposed), 1),
+                          IntervalCell(Over(variant, &RunFigures::accepted), 1),
+                          IntervalCell(Over(variant, &RunFigures::false_loops), 1),
+                          IntervalCell(Over(variant, &RunFigures::ate_m), 4),
+                          variant.name == kEnsemble || test.pairs < 2 ? "-" : Fixed(test.p, 4),
+                          IntervalCell(Over(variant, &RunFigures::rpe_m), 4),
+                          IntervalCell(Over(variant, &RunFigures::t_rel_percent), 3),
+                          IntervalCell(rotation, 3), IntervalCell(Over(variant, &RunFigures::wall_s), 1),
+                          IntervalCell(Over(variant, &RunFigures::odometry_s), 1),
+                          IntervalCell(Over(variant, &RunFigures::loops_s), 1),
+                          IntervalCell(Over(variant, &RunFigures::frame_ms), 1),
+                          IntervalCell(Over(variant, &RunFigures::memory_mb), 0)});
   }
   return table;
 }
@@ -192,6 +174,9 @@ Json VariantJson(const Variant& variant, const std::vector<Variant>& all) {
       {"frame_ms_median", &RunFigures::frame_ms},
       {"peak_memory_mb", &RunFigures::memory_mb}};
   for (const auto& [name, field] : fields) json[name] = IntervalJson(Over(variant, field));
+  json["stages_s"] = Json::object();
+  for (const std::string& stage : StageOrder({variant}))
+    json["stages_s"][stage] = IntervalJson(StageOver(variant, stage));
   const PairedTTestResult test = AgainstEnsemble(variant, all);
   json["ate_minus_ensemble"] = {
       {"pairs", test.pairs}, {"mean_m", test.mean_difference}, {"t", test.t}, {"p", test.p}};
@@ -221,8 +206,9 @@ RunFigures ReadRunFigures(const std::filesystem::path& summary) {
   run.wall_s = Number(json, "timing/wall_s");
   run.frame_ms = Number(json, "timing/frame_ms/median");
   run.memory_mb = Number(json, "memory/peak_mb");
-  run.odometry_s = StageSeconds(json, "odometry_");
-  run.loops_s = StageSeconds(json, "loop_");
+  run.stages_s = StageSeconds(json);
+  run.odometry_s = WorkSeconds(run.stages_s, "odometry_");
+  run.loops_s = WorkSeconds(run.stages_s, "loop_");
   return run;
 }
 
@@ -245,12 +231,19 @@ MeanInterval MeanWithInterval(const std::vector<double>& values) {
   return out;
 }
 
+std::string IntervalCell(const MeanInterval& value, int decimals) {
+  if (value.count == 0) return "-";
+  std::string text = Fixed(value.mean, decimals);
+  if (std::isfinite(value.half_width)) text += " +- " + Fixed(value.half_width, decimals);
+  return text;
+}
+
 std::vector<ComparisonTable> ComparisonTables(const Comparison& comparison) {
   std::vector<ComparisonTable> tables;
   for (const std::string& dataset :
        InOrder(comparison.runs, [](const RunFigures& run) { return run.dataset; })) {
     const std::vector<Variant> variants = Variants(comparison, dataset);
-    tables.push_back({dataset, Table(variants), Verdict(variants)});
+    tables.push_back({dataset, Table(variants), StageTable(variants), Verdict(variants)});
   }
   return tables;
 }
@@ -261,6 +254,7 @@ std::string DescribeComparison(const Comparison& comparison, TableFormat format)
     text += (text.empty() ? "" : "\n") + table.dataset + "\n\n" + Render(table.table, format) + "\n";
     for (const std::string& note : table.notes) text += note + "\n";
     if (!table.notes.empty()) text += "\n";
+    if (!table.stages.rows.empty()) text += "Time per stage:\n\n" + Render(table.stages, format) + "\n";
   }
   return text +
          "Means over seeds, +- half of the 95 % confidence interval; p: paired t-test of the ATE against the "

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <limits>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -24,6 +25,13 @@ struct RunFigures {
   double t_rel_percent = kNone, r_rel_deg_per_m = kNone;       ///< KITTI
   double wall_s = kNone, frame_ms = kNone, memory_mb = kNone;  ///< frame_ms: median
   double odometry_s = kNone, loops_s = kNone;                  ///< summed stages, of all threads
+  std::map<std::string, double> stages_s;                      ///< summed over the run, waiting as well
+};
+
+/// Runs that differ in their seed alone.
+struct Variant {
+  std::string name;
+  std::vector<const RunFigures*> runs;
 };
 
 /// What a run wrote. `variant` of a run of `tutti run`: "odometry" without loops, "ensemble" for the rule
@@ -37,6 +45,8 @@ struct MeanInterval {
   double mean = RunFigures::kNone, half_width = RunFigures::kNone;
 };
 MeanInterval MeanWithInterval(const std::vector<double>& values);
+/// "mean +- half-width", the mean alone where there is no interval, "-" where there is no value.
+std::string IntervalCell(const MeanInterval& value, int decimals);
 
 /// Runs in groups: by data set, then by variant, both in the order of their first appearance.
 struct Comparison {
@@ -47,12 +57,13 @@ struct Comparison {
 struct ComparisonTable {
   std::string dataset;
   TextTable table;
+  TextTable stages;  ///< StageTable; no rows: the runs say nothing of their stages
   std::vector<std::string> notes;
 };
 std::vector<ComparisonTable> ComparisonTables(const Comparison& comparison);
 
-/// One table per data set, with the paired t-test of each variant's ATE against the ensemble's over common
-/// seeds, and below it which variants the ensemble beats, and which it does not.
+/// One table per data set and one of the time per stage, with the paired t-test of each variant's ATE against
+/// the ensemble's over common seeds, and below it which variants the ensemble beats, and which it does not.
 std::string DescribeComparison(const Comparison& comparison, TableFormat format);
 nlohmann::ordered_json ComparisonJson(const Comparison& comparison);
 

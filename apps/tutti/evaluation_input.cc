@@ -5,6 +5,7 @@
 #include <optional>
 #include <set>
 
+#include "checks.h"
 #include "tutti/backend/trajectory_file.h"
 #include "tutti/core/error.h"
 
@@ -101,13 +102,14 @@ void AddAssociation(CLI::App& command, EvaluationInput& input) {
   command
       .add_option("--align-first", input.options.align_first,
                   "Align by so many associated poses from the start; 0: by all")
+      ->check(NotNegative())
       ->capture_default_str();
   command.add_option("--vertical", input.vertical, "Axis of the reference that yaw turns about")
       ->check(CLI::IsMember({"x", "y", "z"}))
       ->capture_default_str();
   command
       .add_option("--max-diff", input.options.max_time_difference_s, "Largest time difference of a pair [s]")
-      ->check(CLI::NonNegativeNumber)
+      ->check(NotNegative())
       ->capture_default_str();
   command.add_option("--time-offset", input.options.time_offset_s, "Added to the estimate's time stamps [s]")
       ->capture_default_str();
@@ -117,13 +119,13 @@ void AddAssociation(CLI::App& command, EvaluationInput& input) {
   command
       .add_option("--max-gap", input.options.max_interpolation_s,
                   "Don't interpolate between poses further apart [s]")
-      ->check(CLI::PositiveNumber)
+      ->check(Positive())
       ->capture_default_str();
 }
 
 void AddRelative(CLI::App& command, EvaluationInput& input) {
   command.add_option("--rpe-delta", input.options.rpe_delta, "Distance of the relative errors")
-      ->check(CLI::PositiveNumber)
+      ->check(Positive())
       ->capture_default_str();
   command.add_option("--rpe-unit", input.rpe_unit, "Unit of --rpe-delta")
       ->check(CLI::IsMember(DeltaUnitNames()))
@@ -133,7 +135,7 @@ void AddRelative(CLI::App& command, EvaluationInput& input) {
   command
       .add_option("--rpe-tolerance", input.options.rpe_tolerance,
                   "All pairs: allowed deviation from --rpe-delta, as a fraction of it")
-      ->check(CLI::NonNegativeNumber)
+      ->check(NotNegative())
       ->capture_default_str();
 }
 

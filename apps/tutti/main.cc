@@ -27,7 +27,7 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
-    return app.exit(e);
+    return app.exit(e) == 0 ? 0 : 1;  // --help comes this way, too
   } catch (const tutti::InputError& e) {
     std::fprintf(stderr, "tutti: %s\n", e.what());
     return 1;

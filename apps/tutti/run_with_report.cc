@@ -46,7 +46,8 @@ void WriteComparisonReport(const std::filesystem::path& file, const std::string&
                            const Comparison& comparison) {
   std::vector<ReportTable> tables;
   for (const ComparisonTable& table : ComparisonTables(comparison))
-    tables.push_back({table.dataset, table.table.header, table.table.rows, table.notes});
+    tables.push_back({table.dataset, table.table.header, table.table.rows, table.notes, table.stages.header,
+                      table.stages.rows});
   std::vector<nlohmann::ordered_json> runs;
   std::vector<std::string> failures;
   for (const RunFigures& run : comparison.runs) {

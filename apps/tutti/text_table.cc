@@ -40,6 +40,14 @@ std::string EscapedForLatex(const std::string& text) {
   return out;
 }
 
+/// "a +- b" with the sign of mathematics, for LaTeX.
+std::string WithPlusMinus(std::string text) {
+  const std::string plain = " +- ", math = " $\\pm$ ";
+  for (std::size_t at = text.find(plain); at != std::string::npos; at = text.find(plain, at + math.size()))
+    text.replace(at, plain.size(), math);
+  return text;
+}
+
 std::string EscapedForMarkdown(const std::string& text) {
   std::string out;
   for (const char c : text) out += c == '|' ? std::string("\\|") : std::string(1, c);
@@ -95,7 +103,7 @@ std::string Render(const TextTable& table, TableFormat format) {
   std::vector<std::size_t> widths(table.header.size(), 0);
   for (std::vector<std::string>& line : lines) {
     for (std::size_t k = 0; k < line.size(); ++k) {
-      if (format == TableFormat::kLatex) line[k] = EscapedForLatex(line[k]);
+      if (format == TableFormat::kLatex) line[k] = WithPlusMinus(EscapedForLatex(line[k]));
       if (format == TableFormat::kMarkdown) line[k] = EscapedForMarkdown(line[k]);
       widths.at(k) = std::max(widths[k], Width(line[k]));
     }

@@ -96,6 +96,9 @@ Similarity AlignPoses(const AssociatedPoses& poses, const EvaluationOptions& opt
     case TrajectoryAlignment::kNone:
       return Similarity();
     case TrajectoryAlignment::kOrigin:
+      if (poses.reference.size() < 2)
+        throw InputError(
+            "alignment: 1 pair of poses is too few for 'origin', whose first pair has no error; use 'none'");
       return Similarity(poses.reference.front() * poses.estimate.front().Inverse());
     case TrajectoryAlignment::kSE3:
       return fit(false);

@@ -37,6 +37,9 @@ double Number(const std::filesystem::path& file, std::size_t line, const std::st
   if (!value) Fail(file, line, "'" + word + "' is not a number");
   if (!std::isfinite(*value))
     Fail(file, line, "'" + word + "' is not finite; remove this pose or repair the file");
+  constexpr double kLargest = 1e100;  // squares of what is beyond it overflow
+  if (std::abs(*value) > kLargest)
+    Fail(file, line, "'" + word + "' is too large to compute with; remove this pose or repair the file");
   return *value;
 }
 

@@ -90,6 +90,8 @@ std::vector<int> Odometry::TakeMapped() { return std::exchange(impl_->mapped, {}
 
 void Odometry::UseOwnThreads(bool own_threads) { impl_->own_threads = own_threads; }
 
+std::vector<SeenLandmark> Odometry::SeenLandmarks() const { return impl_->SeenLandmarks(); }
+
 TrackResult Odometry::RelocalizeAt(int keyframe) { return impl_->RelocalizeAt(keyframe); }
 
 std::vector<int> Odometry::KeyframeIds() const {

@@ -23,6 +23,7 @@ class Odometry::Impl {
 
   TrackResult Track(const InputFrame& frame);
   TrackResult RelocalizeAt(int keyframe);
+  std::vector<SeenLandmark> SeenLandmarks() const;
 
   OdometryOptions options;
   CameraRig rig;

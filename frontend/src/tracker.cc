@@ -74,6 +74,15 @@ TrackResult Odometry::Impl::TrackMap(const TrackedFrame& frame) {
   return result;
 }
 
+std::vector<SeenLandmark> Odometry::Impl::SeenLandmarks() const {
+  std::vector<SeenLandmark> seen;
+  for (std::size_t f = 0; f < last_matches_.landmarks.size(); ++f) {
+    if (last_matches_.landmarks[f] >= 0)
+      seen.push_back({last_matches_.landmarks[f], last_features_->keypoints[f].pt});
+  }
+  return seen;
+}
+
 // The frame has this pose: it may become a keyframe, and is what the next one starts from.
 TrackResult Odometry::Impl::Accept(Fix fix) {
   TrackResult result;

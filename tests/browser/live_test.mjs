@@ -59,6 +59,20 @@ const inked = (id) => {
   return count > 100;
 };
 
+// The tracks that the page got, and whether each is drawn on the image: at its newest place the canvas has its colour.
+const tracksOnPage = () => {
+  const { tracks } = state.news.frame, canvas = document.getElementById('image'), context = canvas.getContext('2d');
+  const scale = canvas.width / state.picture.width, steps = [];
+  let drawn = 0;
+  for (const track of tracks) {
+    const [r, g, b] = context.getImageData(Math.round(track[0] * scale), Math.round(track[1] * scale), 1, 1).data;
+    if (Math.max(r, g, b) - Math.min(r, g, b) > 60) ++drawn;  // the image is grey
+    for (let i = 2; i < track.length; i += 2) steps.push(Math.hypot(track[i] - track[i - 2], track[i + 1] - track[i - 1]));
+  }
+  steps.sort((a, b) => a - b);
+  return { count: tracks.length, drawn, tails: tracks.filter((track) => track.length > 6).length, step: steps[steps.length >> 1] };
+};
+
 async function drive(browser, folder, data) {
   const { url, ended, run } = await start(folder, 'drive', data, ['--view', '--view-wait', '60', '--max-frames', '900']);
   check(/^http:\/\/127\.0\.0\.1:\d+\/$/.test(url), `loopback by default, not ${url}`);
@@ -74,6 +88,12 @@ async function drive(browser, folder, data) {
   await sleep(700);
   check(await frame(page) === at + 1, `a step is one frame, not ${await frame(page) - at}`);
   for (const id of ['image', 'map']) check(await page.evaluate(inked, id), `the canvas ${id} is drawn`);
+  const { count, drawn, tails, step } = await page.evaluate(tracksOnPage);
+  check(count > 50, `features are tracked (${count})`);
+  check(drawn > 0.8 * count, `tracks are on the image, but for a few under others (${drawn} of ${count})`);
+  check(tails > 0.2 * count, `tracks have tails (${tails} of ${count}; what a keyframe has just made has none yet)`);
+  check(step > 0 && step < 30, `tails go from frame to frame, by some pixels (median ${step})`);
+  check(await page.evaluate(() => /tracks/.test(document.querySelector('#image + figcaption').textContent)), 'the legend says what tracks are');
   await page.click('#pause');
   await waitFor(page, (before) => Number(document.body.dataset.frame) > before + 20, at);
   await pauseWhen(page, () => state.answers.length > 5);

@@ -20,7 +20,7 @@ const lookAt = (page, id) => page.evaluate((tab) => {
     width: div.getBoundingClientRect().width,
   }));
   const images = [...panel.querySelectorAll('img')].map((img) => img.src.startsWith('data:image/jpeg'));
-  return { charts, images, text: panel.innerText.length, overflow: document.documentElement.scrollWidth - window.innerWidth };
+  return { charts, images, text: panel.innerText.length, tables: [...panel.querySelectorAll('table')].map((t) => t.textContent).join(' '), overflow: document.documentElement.scrollWidth - window.innerWidth };
 }, id);
 
 // The 3D chart is pixels: it has drawn if they are not all of one colour.
@@ -37,7 +37,7 @@ const colours3d = (page) => page.evaluate(() => {
   return new Set(new Uint32Array(context.getImageData(0, 0, copy.width, copy.height).data.buffer)).size;
 });
 
-async function lookOnce(browser, file, [look, viewport, scheme], expected, shots) {
+async function lookOnce(browser, file, [look, viewport, scheme], expected, words, shots) {
   const { page, problems } = await openPage(browser, pathToFileURL(resolve(file)).href, { viewport, scheme });
   await page.waitForFunction(() => document.documentElement.dataset.ready === '1', { timeout: 120000 });
   const tabs = await page.evaluate(() => [...document.querySelectorAll('[role=tab]')].map((tab) => tab.id.slice(4)));
@@ -53,6 +53,7 @@ async function lookOnce(browser, file, [look, viewport, scheme], expected, shots
       check(chart.width > 200, `${where}: a chart of ${chart.width} px`);
     }
     check(found.images.every((good) => good), `${where}: a picture is missing`);
+    if (words[tab]) check(found.tables.includes(words[tab]), `${where}: no table with ${words[tab]}`);
     if (expected.includes(tab)) check(found.charts.length + found.images.length > 0, `${where}: nothing drawn`);
     if (tab === 'space' && found.charts.length) check(await colours3d(page) > 3, `${where}: the 3D view is blank`);
     if (shots) {
@@ -75,8 +76,8 @@ async function lookOnce(browser, file, [look, viewport, scheme], expected, shots
   console.log(`${look}: ${tabs.length} tabs of ${file}`);
 }
 
-// Light, dark and on a phone. `expected`: tabs that must hold a chart or a picture; `shots`: folder for a PNG of every
-// tab, or nothing.
-export async function lookThrough(browser, file, { expected = [], shots } = {}) {
-  for (const look of LOOKS) await lookOnce(browser, file, look, expected, shots);
+// Light, dark and on a phone. `expected`: tabs that must hold a chart or a picture; `words`: by tab, what a table there must
+// hold; `shots`: folder for a PNG of every tab, or nothing.
+export async function lookThrough(browser, file, { expected = [], words = {}, shots } = {}) {
+  for (const look of LOOKS) await lookOnce(browser, file, look, expected, words, shots);
 }

@@ -50,7 +50,11 @@ try {
   }
   check(statSync(report).size < 10e6, `${report}: ${statSync(report).size} bytes`);
   await lookThrough(browser, report, { expected: EVERY_CHART, shots });
-  for (const page of attack(folder)) await lookThrough(browser, page, { expected: ['map', 'space', 'error', 'timing'] });
+  const [alone, ...tables] = attack(folder);
+  await lookThrough(browser, alone, { expected: ['map', 'space', 'error', 'timing'] });
+  for (const page of tables) {
+    await lookThrough(browser, page, { expected: ['map', 'space', 'error', 'timing'], words: { overview: 'RPE [m]', timing: 'odometry_track' } });
+  }
 } finally {
   await browser.close();
   rmSync(folder, { recursive: true, force: true });

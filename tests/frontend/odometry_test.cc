@@ -72,6 +72,35 @@ TEST(Odometry, StereoFollowsTheTruthInMetres) {
   EXPECT_GT(odometry.StereoMatches(), 100);
 }
 
+TEST(Odometry, SeenLandmarksGoOnFromFrameToFrame) {
+  Odometry odometry(OdometryOptions(), Stereo().rig);
+  EXPECT_TRUE(odometry.SeenLandmarks().empty());
+  std::map<int, cv::Point2f> before;
+  for (const InputFrame& frame : Stereo().frames) {
+    const TrackResult track = odometry.Track(frame);
+    ASSERT_EQ(track.state, TrackingState::kTracking);
+    std::map<int, cv::Point2f> now;
+    for (const SeenLandmark& seen : odometry.SeenLandmarks()) now[seen.landmark] = seen.pixel;
+    // A keyframe's include those that it made.
+    if (track.keyframe < 0)
+      EXPECT_EQ(now.size(), static_cast<std::size_t>(track.inliers)) << frame.index;
+    else
+      EXPECT_GE(now.size(), static_cast<std::size_t>(track.inliers)) << frame.index;
+    std::size_t again = 0, near = 0;
+    for (const auto& [landmark, pixel] : now) {
+      const auto old = before.find(landmark);
+      if (old == before.end()) continue;
+      ++again;
+      near += cv::norm(pixel - old->second) < 40 ? 1 : 0;
+    }
+    if (!before.empty()) {
+      EXPECT_GT(2 * again, before.size()) << frame.index;
+      EXPECT_GT(near, 0.95 * again) << frame.index;
+    }
+    before = now;
+  }
+}
+
 TEST(Odometry, RgbdFollowsTheTruthInMetres) {
   const Recording room = Record(SyntheticScene::kRoom, SyntheticSensor::kRgbd, 40);
   Odometry odometry(OdometryOptions(), room.rig);

@@ -73,6 +73,39 @@ TEST_F(CollectCommand, MeansIntervalsAndThePairedTestOverSeeds) {
                     HasSubstr("* Lower than that of odometry (2.0000 m), but the test can't tell")));
 }
 
+TEST_F(CollectCommand, TimePerStageIsATableOfItsOwnInEveryFormat) {
+  for (int seed = 1; seed <= 2; ++seed) {
+    Summary("mean", seed, 0.5);
+    Summary("orb", seed, 0.6);
+  }
+  const fs::path file = folder_ / "c.json";
+  const auto text = Collect({"--json", file.string()});
+  ASSERT_EQ(text.status, 0) << text.output;
+  const std::string stages = text.output.substr(text.output.find("Time per stage:"));
+  EXPECT_THAT(stages, ::testing::ContainsRegex("stage \\[s\\] +ensemble +orb"));
+  EXPECT_THAT(stages, ::testing::ContainsRegex("odometry_track +1.00 \\+- 0.00 +1.00 \\+- 0.00"));
+  // In the order of the work; waiting comes last.
+  EXPECT_LT(stages.find("odometry_track"), stages.find("loop_verify"));
+  EXPECT_LT(stages.find("loop_verify"), stages.find("loop_wait"));
+  EXPECT_THAT(text.output.substr(0, text.output.find("Time per stage:")), Not(HasSubstr("loop_verify")));
+  EXPECT_THAT(Collect({"--table-format", "markdown"}).output, HasSubstr("| stage [s]"));
+  EXPECT_THAT(Collect({"--table-format", "latex"}).output, HasSubstr("odometry\\_track & 1.00 $\\pm$ 0.00"));
+  const auto variant = nlohmann::json::parse(ReadAll(file))["datasets"][0]["variants"][0];
+  EXPECT_NEAR(variant["stages_s"]["loop_verify"]["mean"].get<double>(), 0.5, 1e-12);
+}
+
+TEST_F(CollectCommand, WaitingAndWorkOnTheCallersThreadAreNotCountedTwice) {
+  Summary("mean", 1, 0.5);
+  const fs::path summary = folder_ / "runs" / "mean1" / "summary.json";
+  auto json = nlohmann::json::parse(ReadAll(summary));
+  json["timing"]["stage_ms"]["loop_inline"] = 500;  // one thread: what all loop_ stages took
+  WriteAll(summary, json.dump());
+  const fs::path file = folder_ / "c.json";
+  ASSERT_EQ(Collect({"--json", file.string()}).status, 0);
+  const auto variant = nlohmann::json::parse(ReadAll(file))["datasets"][0]["variants"][0];
+  EXPECT_NEAR(variant["loops_s"]["mean"].get<double>(), 0.5, 1e-12);
+}
+
 TEST_F(CollectCommand, SaysWhereTheEnsembleDidNotHelp) {
   for (int seed = 1; seed <= 2; ++seed) {
     Summary("mean", seed, 0.5);
@@ -117,6 +150,9 @@ TEST(CompareCommand, RunsEveryVariantWithEverySeedAndWritesTheTable) {
     EXPECT_GT(variant["ate_rmse_m"]["mean"].get<double>(), 0);
     EXPECT_GT(variant["peak_memory_mb"]["mean"].get<double>(), 10);
     EXPECT_EQ(variant["failures"].size(), 0u);
+    for (const char* stage : {"read", "odometry_extract", "odometry_track", "odometry_map"})
+      EXPECT_GT(variant["stages_s"][stage]["mean"].get<double>(), 0) << stage;
+    EXPECT_EQ(variant["stages_s"].contains("loop_extract"), variant["variant"] != "odometry");
   }
   // Only the loop closure differs, and there is no loop in it.
   const std::string trajectory = ReadAll(out / "odometry" / "seed_2" / "trajectory.txt");
@@ -142,6 +178,13 @@ TEST(CompareCommand, BadInputIsRefusedBeforeTheFirstRun) {
   EXPECT_THAT(unknown.output, AllOf(StartsWith("tutti: --variants: 'bag'"), HasSubstr("Known")));
   EXPECT_THAT(compare(testing::TinyTown(), "orb,orb").output, HasSubstr("named twice"));
   EXPECT_THAT(compare(folder / "nowhere", "orb").output, AllOf(StartsWith("tutti: "), HasSubstr("nowhere")));
+  // Less than nothing is no large number.
+  for (const char* option : {"--seeds", "--max-frames"}) {
+    const auto below = RunTutti({"compare", "--config", config, "--dataset", testing::TinyTown().string(),
+                                 "--out", out, "--variants", "orb", option, "-1"});
+    EXPECT_EQ(below.status, 1);
+    EXPECT_THAT(below.output, AllOf(HasSubstr(option), HasSubstr("'-1'")));
+  }
   EXPECT_FALSE(fs::exists(out));
 }
 

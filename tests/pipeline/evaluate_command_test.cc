@@ -156,11 +156,35 @@ TEST_F(EvaluateCommand, DegenerateInputNamesFileAndLine) {
   ExpectRefused(evaluate(""), {"bad.txt", "no pose"});
   ExpectRefused(evaluate("1000 0 0 0 0 0 0 1\n1000.1 1 0 0 0 0 0 1\n1000.2 2 0 0 0 0 0 1\n"),
                 {"bad.txt", "on a line"});
+  ExpectRefused(evaluate("1000 0 0 0 0 0 0 1\n1000.1 1e308 0 0 0 0 0 1\n"), {"bad.txt:2:", "too large"});
   const auto repeated =
       evaluate("1000 20 0 0 0 0 0 1\n1000 20 0 0 0 0 0 1\n1000.1 20 1 0 0 0 0 2\n1000.2 19 2 1 0 0 0 1\n");
   EXPECT_EQ(repeated.status, 0) << repeated.output;
   EXPECT_THAT(repeated.output, AllOf(HasSubstr("bad.txt:2: repeats the time stamp"),
                                      HasSubstr("bad.txt:3: the quaternion is not of length 1")));
+}
+
+TEST_F(EvaluateCommand, OnePairSaysNothingWhereItIsLaidOnItself) {
+  const std::string reference = Save("r.txt", Curve());
+  WriteAll(folder_ / "one.txt", "1000 0 0 0 0 0 0 1\n");
+  const std::string one = (folder_ / "one.txt").string();
+  for (const char* align : {"origin", "se3", "sim3", "scale", "yaw"})
+    ExpectRefused(RunTutti({"evaluate", "--reference", reference, "--estimate", one, "--align", align}),
+                  {"one.txt", "1 pair of poses is too few"});
+  EXPECT_EQ(Evaluate({"--reference", reference, "--estimate", one, "--align", "none"})["pairs"], 1);
+}
+
+TEST_F(EvaluateCommand, OptionsOutOfRangeAreRefusedInOneShortLine) {
+  const std::string file = Save("r.txt", Curve());
+  const std::vector<std::pair<std::string, std::string>> bad = {
+      {"--align-first", "-3"}, {"--rpe-delta", "0"},      {"--rpe-delta", "nan"},
+      {"--max-diff", "-1"},    {"--rpe-tolerance", "-1"}, {"--max-gap", "x"}};
+  for (const auto& [option, value] : bad) {
+    const auto run = RunTutti({"evaluate", "--reference", file, "--estimate", file, option, value});
+    EXPECT_EQ(run.status, 1) << option;
+    EXPECT_THAT(run.output, HasSubstr(option)) << value;
+    EXPECT_LT(run.output.size(), 120u) << run.output;
+  }
 }
 
 TEST_F(EvaluateCommand, ConvertsThereAndBack) {

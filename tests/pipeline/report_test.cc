@@ -52,7 +52,7 @@ TEST(ReportPage, WithoutTheChartLibraryAnOldPageGoesAndTheReasonIsSaid) {
   if (ReportsAvailable()) {
     EXPECT_THAT(testing::ReadAll(file), HasSubstr("new"));
   }
-  EXPECT_THAT(ReportsMissing(), AllOf(HasSubstr("Node"), HasSubstr("SVG")));
+  EXPECT_THAT(ReportsMissing(), AllOf(HasSubstr("configure and build"), HasSubstr("SVG")));
 }
 
 TEST(ComparisonPage, ShowsTheFirstRunOfEachVariantAndFewPictures) {
@@ -65,12 +65,14 @@ TEST(ComparisonPage, ShowsTheFirstRunOfEachVariantAndFewPictures) {
                 {"gallery", {{"note", ""}, {"entries", entries}}}};
   };
   const Json page =
-      ComparisonPage("t", {{"d", {"variant"}, {{"orb"}}, {"note"}}},
+      ComparisonPage("t", {{"d", {"variant"}, {{"orb"}}, {"note"}, {"stage [s]"}, {{"read"}}}},
                      {run("orb", 1), run("orb", 2), run("ensemble", 1)}, {"orb, seed 3: killed"});
   ASSERT_EQ(page["runs"].size(), 2u);
   EXPECT_EQ(page["runs"][0]["seed"], 1);
   EXPECT_EQ(page["runs"][0]["gallery"]["entries"].size(), 2u);
   EXPECT_EQ(page["tables"][0]["notes"][0], "note");
+  EXPECT_EQ(page["tables"][0]["stage_header"][0], "stage [s]");
+  EXPECT_EQ(page["tables"][0]["stage_rows"][0][0], "read");
   EXPECT_EQ(page["failures"][0], "orb, seed 3: killed");
 }
 

@@ -80,10 +80,13 @@ void LoopCloser::Consider(const Verification& verification, int candidate, int q
   }
 }
 
-LoopConstraint LoopCloser::Measure(const Verification& verification, int candidate, int query) const {
+LoopConstraint LoopCloser::Measure(const Verification& verification, int candidate, int query) {
   const ScopedSpan span(recorder_, Lane::kOptimisation, "measure_loop");
-  return MakeLoopConstraint(verification, odometry_.Keyframe(candidate), odometry_.Keyframe(query), rig_,
-                            options_, seed_);
+  const auto begin = std::chrono::steady_clock::now();
+  LoopConstraint constraint = MakeLoopConstraint(verification, odometry_.Keyframe(candidate),
+                                                 odometry_.Keyframe(query), rig_, options_, seed_);
+  stages_["loop_measure"] += MillisecondsSince(begin);
+  return constraint;
 }
 
 bool LoopCloser::Inject(int query, std::int64_t frames) {
@@ -136,6 +139,7 @@ void LoopCloser::Reject(const LoopEdge& loop, const std::string& reason) {
 void LoopCloser::Close(std::vector<LoopEdge> entering, std::int64_t frames) {
   const ScopedSpan span(recorder_, Lane::kOptimisation, "close_loop");
   const auto begin = std::chrono::steady_clock::now();
+  const double fused_before = stages_["loop_fuse"];  // a stage of its own
   odometry_.FinishMapping();
   MapGraph::Correction correction;
   Gate(entering);
@@ -171,7 +175,7 @@ void LoopCloser::Close(std::vector<LoopEdge> entering, std::int64_t frames) {
     entering = std::move(staying);
   }
   if (!entering.empty()) Apply(correction, entering, frames);
-  stages_["loop_optimize"] += MillisecondsSince(begin);
+  stages_["loop_optimize"] += MillisecondsSince(begin) - (stages_["loop_fuse"] - fused_before);
 }
 
 void LoopCloser::Apply(const MapGraph::Correction& correction, const std::vector<LoopEdge>& entering,
@@ -200,10 +204,12 @@ void LoopCloser::Apply(const MapGraph::Correction& correction, const std::vector
 bool LoopCloser::Fuse(const std::vector<LoopEdge>& loops) {
   constexpr int kLeastCommon = 30;
   const ScopedSpan span(recorder_, Lane::kOptimisation, "fuse_loop");
+  const auto begin = std::chrono::steady_clock::now();
   for (const LoopEdge& loop : loops) {
     if (odometry_.FuseLoop(loop.candidate, loop.query, loop.S_candidate_query) >= kLeastCommon)
       untied_.erase(loop.record);
   }
+  stages_["loop_fuse"] += MillisecondsSince(begin);
   return untied_.empty();
 }
 

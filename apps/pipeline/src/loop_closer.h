@@ -49,7 +49,7 @@ class LoopCloser {
 
  private:
   LoopGate::Map Places() const;
-  LoopConstraint Measure(const Verification& verification, int candidate, int query) const;
+  LoopConstraint Measure(const Verification& verification, int candidate, int query);
   void Gate(std::vector<LoopEdge>& entering);
   void Reject(const LoopEdge& loop, const std::string& reason);
   void Close(std::vector<LoopEdge> entering, std::int64_t frames);

@@ -12,12 +12,16 @@ namespace tutti {
 // A reader must not throw for one bad frame; if it does all the same, the frame counts as bad.
 FetchedFrame Prefetcher::Read(std::size_t position) const {
   try {
-    FetchedFrame frame{position, {}};
+    FetchedFrame frame;
+    frame.position = position;
+    const auto begin = std::chrono::steady_clock::now();
     {
       const ScopedSpan span(options_.recorder, Lane::kReading, "read");
       frame.read = dataset_.Read(position);
     }
+    frame.read_ms = MillisecondsSince(begin);
     if (frame.read.frame && options_.prepare) options_.prepare(*frame.read.frame);
+    frame.prepare_ms = MillisecondsSince(begin) - frame.read_ms;
     return frame;
   } catch (const std::exception& e) {
     FetchedFrame frame;

@@ -27,6 +27,7 @@ struct PrefetchOptions {
 struct FetchedFrame {
   std::size_t position = 0;
   ReadResult read;
+  double read_ms = 0, prepare_ms = 0;  ///< time that reading and PrefetchOptions::prepare took
 };
 
 /// Frames of a data set, in order.

@@ -61,10 +61,13 @@ class Run {
     Progress progress(config_.run.loops ? "slam" : "odometry",
                       total_ == static_cast<std::size_t>(-1) ? 0 : total_, Out());
     Prefetcher frames(dataset_, Reading());
+    double read_ms = 0, extract_ms = 0;  // of the thread that reads ahead
     while (!InterruptGuard::Requested()) {
       if (playback_) AwaitFrame(frames);
       const std::optional<FetchedFrame> fetched = frames.Next();
       if (!fetched) break;
+      read_ms += fetched->read_ms;
+      extract_ms += fetched->prepare_ms;
       for (; next_ < fetched->position; ++next_) dropped_.insert(next_);
       if (fetched->read.frame) {
         positions_[fetched->read.frame->index] = next_;
@@ -93,7 +96,9 @@ class Run {
     result_.frames_dropped = dropped_.size();
     result_.frames_listed = dataset_.Size();
     result_.stage_ms = slam_.StageMilliseconds();
+    result_.stage_ms["read"] = read_ms;
     result_.stage_ms["read_wait"] = frames.WaitedMs();
+    if (!slam_.AppearanceOnly()) result_.stage_ms["odometry_extract"] += extract_ms;
     result_.wall_s = Seconds(begin);
     result_.cpu_s = ProcessCpuSeconds() - cpu_begin;
     ReportTimes(begin);

@@ -57,8 +57,12 @@ Json ComparisonPage(const std::string& title, const std::vector<ReportTable>& ta
       {"failures", failures},
       {"runs", Json::array()}};
   for (const ReportTable& table : tables) {
-    page["tables"].push_back(
-        {{"dataset", table.dataset}, {"header", table.header}, {"rows", table.rows}, {"notes", table.notes}});
+    page["tables"].push_back({{"dataset", table.dataset},
+                              {"header", table.header},
+                              {"rows", table.rows},
+                              {"notes", table.notes},
+                              {"stage_header", table.stage_header},
+                              {"stage_rows", table.stage_rows}});
   }
   std::set<std::pair<std::string, std::string>> shown;
   for (Json& run : runs) {

@@ -5,6 +5,7 @@
 
 #include "assets.h"
 #include "tutti/core/error.h"
+#include "tutti/report/build_info.h"
 
 namespace tutti {
 namespace {
@@ -29,9 +30,8 @@ std::string ForScript(const nlohmann::ordered_json& data) {
 bool ReportsAvailable() { return !assets::ChartLibrary().empty(); }
 
 std::string ReportsMissing() {
-  return "no report.html: this tutti was built without Node and npm (packages.apt, group report); the plots "
-         "are "
-         "there as SVG and PNG";
+  return "no report.html: this tutti was built without the chart library (" + ChartLibraryMissing() +
+         "). Then configure and build it again. The plots are there as SVG and PNG";
 }
 
 std::string ReportPage(const nlohmann::ordered_json& data) {

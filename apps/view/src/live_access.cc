@@ -4,9 +4,17 @@
 #include <random>
 
 namespace tutti::view {
+namespace {
+
+// 127.0.0.0/8. Numbers alone: "127.evil.example" is a name.
+bool IsLoopbackV4(const std::string& host) {
+  return host.rfind("127.", 0) == 0 && host.find_first_not_of("0123456789.") == std::string::npos;
+}
+
+}  // namespace
 
 bool IsLoopback(const std::string& address) {
-  return address == "localhost" || address == "::1" || address.rfind("127.", 0) == 0;
+  return address == "localhost" || address == "::1" || IsLoopbackV4(address);
 }
 
 std::string RandomToken() {
@@ -28,11 +36,10 @@ bool SameToken(const std::string& a, const std::string& b) {
 }
 
 bool NamesLoopback(const std::string& host_header) {
-  if (host_header.rfind("[::1]", 0) == 0) return true;
+  const std::string v6 = "[::1]";
+  if (host_header == v6 || host_header.rfind(v6 + ":", 0) == 0) return true;
   const std::string host = host_header.substr(0, host_header.find(':'));
-  if (host == "localhost") return true;
-  // Numbers alone: "127.evil.example" is a name.
-  return host.rfind("127.", 0) == 0 && host.find_first_not_of("0123456789.") == std::string::npos;
+  return host == "localhost" || IsLoopbackV4(host);
 }
 
 }  // namespace tutti::view

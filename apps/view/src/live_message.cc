@@ -6,6 +6,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "live_tracks.h"
 #include "tutti/report/base64.h"
 
 namespace tutti::view {
@@ -20,26 +21,21 @@ double Short(double value, double unit = 1000) { return std::round(value * unit)
 
 Json Position(const Eigen::Vector3d& p) { return {Short(p.x()), Short(p.y()), Short(p.z())}; }
 
-Json TracksJson(const LiveFrame& frame, const CameraRig& rig, double scale) {
+// Each track: x, y of now, of the frame before that shows it, ...
+Json TracksJson(const LiveFrame& frame, double scale) {
   Json tracks = Json::array();
-  if (!frame.keyframe) return tracks;
-  const KeyframeView& view = *frame.keyframe;
-  const Pose T_camera_keyframe = frame.T_world_camera.Inverse() * frame.T_world_keyframe;
-  const std::size_t step = std::max<std::size_t>(1, view.points.size() / (3 * kMostTracks));
-  for (std::size_t i = 0; i < view.points.size() && tracks.size() < kMostTracks; i += step) {
-    if (!view.points[i].allFinite()) continue;
-    const Eigen::Vector3d point = T_camera_keyframe * view.points[i];
-    if (point.z() <= 0) continue;
-    const Eigen::Vector2d pixel = rig.camera.Project(point);
-    if (!rig.camera.Contains(pixel)) continue;
-    const cv::Point2f& old = view.keypoints[i].pt;
-    tracks.push_back({Short(scale * old.x, 10), Short(scale * old.y, 10), Short(scale * pixel.x(), 10),
-                      Short(scale * pixel.y(), 10)});
+  for (const LiveTrack& track : TracksOf(frame.trail, kMostTracks)) {
+    Json pixels = Json::array();
+    for (const cv::Point2f& p : track) {
+      pixels.push_back(Short(scale * p.x, 10));
+      pixels.push_back(Short(scale * p.y, 10));
+    }
+    tracks.push_back(std::move(pixels));
   }
   return tracks;
 }
 
-Json FrameJson(const LiveFrame& frame, const CameraRig& rig) {
+Json FrameJson(const LiveFrame& frame) {
   Json json = {{"index", frame.index},   {"stamp", frame.stamp_s},     {"state", frame.state},
                {"reason", frame.reason}, {"features", frame.features}, {"inliers", frame.inliers},
                {"number", frame.number}};
@@ -51,14 +47,14 @@ Json FrameJson(const LiveFrame& frame, const CameraRig& rig) {
   std::vector<unsigned char> bytes;
   cv::imencode(".jpg", small, bytes, {cv::IMWRITE_JPEG_QUALITY, kQuality});
   json["image"] = "data:image/jpeg;base64," + Base64(bytes.data(), bytes.size());
-  json["tracks"] = TracksJson(frame, rig, scale);
+  json["tracks"] = TracksJson(frame, scale);
   return json;
 }
 
 }  // namespace
 
-std::string LiveMessage(const LiveNews& news, const CameraRig& rig) {
-  Json json = {{"paused", news.paused}, {"finished", news.finished}, {"frame", FrameJson(news.frame, rig)}};
+std::string LiveMessage(const LiveNews& news) {
+  Json json = {{"paused", news.paused}, {"finished", news.finished}, {"frame", FrameJson(news.frame)}};
   json["places"] = Json::array();
   for (const LivePlace& place : *news.places) {
     const Eigen::Quaterniond& q = place.T_world_camera.rotation;

@@ -7,8 +7,8 @@
 
 namespace tutti::view {
 
-/// JSON of the news, one line. The image is a JPEG of at most 640 px as a data URI; tracks are the landmarks
-/// of the newest keyframe: their pixels there, and where the pose of this frame puts them.
-std::string LiveMessage(const LiveNews& news, const CameraRig& rig);
+/// JSON of the news, one line. The image is a JPEG of at most 640 px as a data URI; tracks are some of the
+/// landmarks that the frame shows: their pixels in that image, newest first (TracksOf).
+std::string LiveMessage(const LiveNews& news);
 
 }  // namespace tutti::view

@@ -43,7 +43,7 @@ class Viewer {
       }
       return Write(sink, ": still here\n\n");
     }
-    const bool sent = Write(sink, "data: " + LiveMessage(news, state_.Rig()) + "\n\n");
+    const bool sent = Write(sink, "data: " + LiveMessage(news) + "\n\n");
     std::this_thread::sleep_for(std::chrono::duration<double>(kNewsEvery_s));
     return sent;
   }

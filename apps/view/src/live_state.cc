@@ -47,16 +47,6 @@ void LiveState::AddEvent(LiveEvent event) {
   if (events_.size() > kMostEvents) events_.pop_front();
 }
 
-void LiveState::SetRig(const CameraRig& rig) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  rig_ = rig;
-}
-
-CameraRig LiveState::Rig() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  return rig_;
-}
-
 std::vector<LiveLoop> LiveState::LoopsOf(const SlamSystem& slam) {
   std::vector<LiveLoop> loops;
   for (const LoopRecord& record : slam.loops()) {
@@ -84,15 +74,12 @@ void LiveState::SetFrame(const InputFrame& frame, const TrackResult& track, cons
     places = std::make_shared<const std::vector<LivePlace>>(PlacesOf(*slam.odometry()));
   if (slam.loops().size() != loops_seen_ || accepted != accepted_seen_)
     loops = std::make_shared<const std::vector<LiveLoop>>(LoopsOf(slam));
-  if (keyframe_ && next.posed) {
-    next.keyframe = keyframe_;
-    const std::vector<int> alive = slam.odometry()->KeyframeIds();
-    if (std::binary_search(alive.begin(), alive.end(), keyframe_->id)) {
-      next.T_world_keyframe = slam.odometry()->KeyframePose(keyframe_->id);
-    } else {
-      next.keyframe.reset();
-    }
+  if (next.posed) {
+    ExtendTrail(slam.odometry()->SeenLandmarks(), &trail_);
+  } else {
+    trail_.clear();
   }
+  next.trail = trail_;
   if (corrected) Log("frame " + std::to_string(frame.index) + ": the loops moved the map");
   if (next.state != state_seen_)
     Log("frame " + std::to_string(frame.index) + ": " + next.state +
@@ -111,11 +98,10 @@ void LiveState::SetFrame(const InputFrame& frame, const TrackResult& track, cons
 }
 
 void LiveState::SetKeyframe(int keyframe, const SlamSystem& slam) {
-  keyframe_ = std::make_shared<const KeyframeView>(slam.odometry()->Keyframe(keyframe));
   new_keyframe_ = true;
   LivePoints points;
   points.keyframe = keyframe;
-  points.points = SomePoints(*keyframe_);
+  points.points = SomePoints(slam.odometry()->Keyframe(keyframe));
   const std::lock_guard<std::mutex> lock(mutex_);
   points.number = next_points_++;
   points_.push_back(std::move(points));

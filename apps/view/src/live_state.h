@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "live_tracks.h"
 #include "tutti/pipeline/run_observer.h"
 
 namespace tutti::view {
@@ -25,8 +26,7 @@ struct LiveFrame {
   int features = 0, inliers = 0;
   bool posed = false;
   Pose T_world_camera;
-  std::shared_ptr<const KeyframeView> keyframe;  ///< the newest one; null: none yet
-  Pose T_world_keyframe;                         ///< where the map has it now
+  LiveTrail trail;  ///< empty without a pose
 };
 
 /// A keyframe as the map has it now.
@@ -82,7 +82,6 @@ class LiveState {
   static constexpr std::size_t kPointsPerKeyframe = 40;
 
   // ---- the run's side
-  void SetRig(const CameraRig& rig);
   void SetFrame(const InputFrame& frame, const TrackResult& track, const SlamSystem& slam);
   void SetKeyframe(int keyframe, const SlamSystem& slam);
   void AddDetection(const LoopResult& result);
@@ -104,7 +103,6 @@ class LiveState {
   /// Wakes all that wait; no news after it.
   void Close();
   bool Closed() const;
-  CameraRig Rig() const;
 
  private:
   void Changed();  // with mutex_ held
@@ -113,7 +111,6 @@ class LiveState {
 
   mutable std::mutex mutex_;
   std::condition_variable changed_;
-  CameraRig rig_;
   LiveNews now_;
   std::deque<LivePoints> points_;
   std::deque<LiveEvent> events_;
@@ -126,7 +123,7 @@ class LiveState {
   std::size_t loops_seen_ = 0, accepted_seen_ = 0;
   int corrections_seen_ = 0;
   std::string state_seen_;
-  std::shared_ptr<const KeyframeView> keyframe_;
+  LiveTrail trail_;
   bool new_keyframe_ = false;
 };
 

@@ -27,10 +27,7 @@ LiveView::~LiveView() = default;
 
 bool LiveViewAvailable() { return true; }
 std::string LiveView::Url() const { return impl_->server_.Url(); }
-void LiveView::OnStart(const CameraRig& rig) {
-  impl_->state_.SetRig(rig);
-  impl_->state_.WaitForViewer(impl_->options_.idle_s);
-}
+void LiveView::OnStart(const CameraRig&) { impl_->state_.WaitForViewer(impl_->options_.idle_s); }
 void LiveView::OnFrame(const InputFrame& frame, const TrackResult& track, const SlamSystem& slam) {
   impl_->state_.SetFrame(frame, track, slam);
   impl_->state_.WaitWhilePaused(impl_->options_.abandoned_s);

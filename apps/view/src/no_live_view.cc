@@ -10,7 +10,8 @@ std::string LiveViewOptions::Validate() const { return {}; }
 bool LiveViewAvailable() { return false; }
 LiveView::LiveView(const LiveViewOptions&) {
   throw InputError(
-      "--view: this tutti was built without cpp-httplib (Debian: libcpp-httplib-dev, pkg-config)");
+      "--view: this tutti was built without cpp-httplib (Debian: apt-get install libcpp-httplib-dev "
+      "pkg-config). Then configure and build it again");
 }
 LiveView::~LiveView() = default;
 std::string LiveView::Url() const { return {}; }

@@ -1,9 +1,10 @@
 'use strict';
 // The live view: newest state over server-sent events, drawn on canvases.
 
-const COLORS = { surf: '#e69f00', sift: '#56b4e9', orb: '#cc79a7', ensemble: '#0072b2', accepted: '#009e73', waiting: '#e69f00', path: '#0072b2', here: '#d55e00' };
+const COLORS = { surf: '#e69f00', sift: '#56b4e9', orb: '#cc79a7', ensemble: '#0072b2', accepted: '#009e73', waiting: '#e69f00', path: '#0072b2', here: '#d55e00', old: '#56b4e9', young: '#f0e442' };
 const DASHES = { surf: [8, 3, 2, 3], sift: [10, 5], orb: [2, 3], ensemble: [] };
 const MOST_ANSWERS = 1500, MOST_LINES = 300;
+const TRACK_OLD = 5;  // frames before this one that show it (of the last 10)
 const by = (id) => document.getElementById(id);
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 const token = new URLSearchParams(location.search).get('token');
@@ -26,14 +27,28 @@ function drawImage() {
   const canvas = by('image'), context = sharp(canvas, picture.height / picture.width);
   context.scale(canvas.width / picture.width, canvas.width / picture.width);
   context.drawImage(picture, 0, 0);
-  context.lineWidth = 1;
-  context.strokeStyle = context.fillStyle = COLORS.accepted;
-  for (const [x0, y0, x, y] of state.news.frame.tracks ?? []) {
-    context.beginPath();
-    context.moveTo(x0, y0);
-    context.lineTo(x, y);
-    context.stroke();
-    context.fillRect(x - 1.5, y - 1.5, 3, 3);
+  drawTracks(context, state.news.frame.tracks ?? []);
+}
+
+// Tails of the places in the last frames, and above them a disc (followed for long) or a square (new) where each is now. The
+// dark edge keeps the light colours legible on a white wall.
+function drawTracks(context, tracks) {
+  const edge = 'rgba(0, 0, 0, 0.75)';
+  const old = (track) => track.length / 2 > TRACK_OLD, colorOf = (track) => (old(track) ? COLORS.old : COLORS.young);
+  const stroke = (path, width, style) => { context.lineWidth = width; context.strokeStyle = style; context.stroke(path); };
+  context.lineJoin = 'round';
+  for (const track of tracks) {
+    const tail = new Path2D();
+    for (let i = 0; i < track.length; i += 2) tail.lineTo(track[i], track[i + 1]);
+    stroke(tail, 3, edge);
+    stroke(tail, 1.4, colorOf(track));
+  }
+  for (const track of tracks) {
+    const head = new Path2D(), [x, y] = track;
+    if (old(track)) head.arc(x, y, 2.2, 0, 7); else head.rect(x - 2, y - 2, 4, 4);
+    stroke(head, 2, edge);
+    context.fillStyle = colorOf(track);
+    context.fill(head);
   }
 }
 

@@ -44,6 +44,12 @@ struct KeyframeView {
   std::vector<int> landmarks;           ///< N landmark ids, -1 where none
 };
 
+/// A landmark as a frame shows it.
+struct SeenLandmark {
+  int landmark = -1;  ///< its id; two landmarks that turn out to be one go on under one id
+  cv::Point2f pixel;  ///< in the rectified image [px]
+};
+
 /// Odometry of one camera rig. A value type: a copy goes on independently (the pipeline uses that to know
 /// what the odometry alone would have done). Deterministic: the same frames give the same bits.
 class Odometry {
@@ -76,6 +82,10 @@ class Odometry {
   std::vector<int> TakeMapped();
   /// false: mapping is done on the caller's thread, with the same result.
   void UseOwnThreads(bool own_threads);
+
+  /// The landmarks that agree with the pose of the last frame that has one (of a keyframe also those that it
+  /// made), in the order of its features. Costs a look at each feature.
+  std::vector<SeenLandmark> SeenLandmarks() const;
 
   /// Ids of all keyframes that are alive, ascending.
   std::vector<int> KeyframeIds() const;

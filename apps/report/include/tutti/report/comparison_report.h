@@ -14,7 +14,9 @@ struct ReportTable {
   std::string dataset;
   std::vector<std::string> header;
   std::vector<std::vector<std::string>> rows;
-  std::vector<std::string> notes;  ///< lines below it
+  std::vector<std::string> notes;                    ///< lines below it
+  std::vector<std::string> stage_header;             ///< time per stage, for the tab Timing; may be empty
+  std::vector<std::vector<std::string>> stage_rows;  ///< one for each stage
 };
 
 /// The report.json of a run's folder; nothing if there is none, or it is of another version of the format.

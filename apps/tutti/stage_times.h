@@ -1,0 +1,30 @@
+// The time per stage of runs: timing.stage_ms of their summary.json (docs/outputs.md).
+#pragma once
+
+#include <map>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "comparison.h"
+#include "text_table.h"
+
+namespace tutti::cli {
+
+/// Seconds by stage; empty if the summary has none.
+std::map<std::string, double> StageSeconds(const nlohmann::ordered_json& summary);
+
+/// Sum of the stages whose name begins so, without those that only wait for others (read_wait, loop_wait,
+/// loop_inline); NaN for no stages at all.
+double WorkSeconds(const std::map<std::string, double>& stages_s, const std::string& prefix);
+
+/// Every stage of these runs, in the order in which a frame goes through them; waiting comes last.
+std::vector<std::string> StageOrder(const std::vector<Variant>& variants);
+
+/// Mean over the runs; one that has stages but not this one spent 0 s on it. No run has it: no value.
+MeanInterval StageOver(const Variant& variant, const std::string& stage);
+
+/// A row for each stage, a column for each variant [s].
+TextTable StageTable(const std::vector<Variant>& variants);
+
+}  // namespace tutti::cli

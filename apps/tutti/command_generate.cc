@@ -9,6 +9,7 @@
 #include <string>
 #include <thread>
 
+#include "checks.h"
 #include "commands.h"
 #include "synthetic_writer.h"
 #include "tutti/core/error.h"
@@ -109,11 +110,14 @@ void AddOptions(CLI::App& c, GenerateArguments& a) {
       ->type_name("NAME")
       ->capture_default_str();
   c.add_option("--seed", w.seed, "of houses, textures and noise; the same seed gives the same bytes")
+      ->check(NotNegative())
       ->capture_default_str();
   c.add_option("--laps", w.laps,
                "rounds of the closed route (fractions too); from the second on, places are seen again")
       ->capture_default_str();
-  c.add_option("--frames", w.frames, "stop after so many frames; 0: all laps")->capture_default_str();
+  c.add_option("--frames", w.frames, "stop after so many frames; 0: all laps")
+      ->check(NotNegative())
+      ->capture_default_str();
   c.add_option("--width", w.width, "image width [px] (with --height; default 640)");
   c.add_option("--height", w.height, "image height [px] (default: town 320, else 480)");
   c.add_option("--focal", w.focal_px, "focal length [px] (default: town 0.58, else 0.82 of the width)");

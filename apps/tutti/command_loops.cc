@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "checks.h"
 #include "command_loops_input.h"
 #include "command_loops_output.h"
 #include "command_loops_pictures.h"
@@ -246,6 +247,7 @@ void AddLoopsCommand(CLI::App& app, int& exit_code) {
                    "most threads; the result is the same for any number")
       ->capture_default_str();
   command->add_option("--seed", arguments->options.seed, "seed of kd-forests and RANSAC")
+      ->check(NotNegative())
       ->capture_default_str();
   command->add_option(
       "--set", arguments->set,

@@ -125,7 +125,8 @@ void AddRunCommand(CLI::App& app, int& exit_code) {
       "key=value: a key of the configuration's section `loops`, on top of the file (rule=orb, "
       "stm_size=20); may be given several times");
   command->add_flag("--no-loops", arguments->no_loops, "odometry alone");
-  command->add_option("--seed", arguments->seed, "of everything that draws random numbers");
+  command->add_option("--seed", arguments->seed, "of everything that draws random numbers")
+      ->check(NotNegative());
   command->add_option("--threads", arguments->threads, "most threads; the result is the same for any number");
   command
       ->add_option(
@@ -134,7 +135,7 @@ void AddRunCommand(CLI::App& app, int& exit_code) {
           "agree with each other) that look verified; loops.csv says what became of each (injected, reason, "
           "weight)")
       ->check(NotNegative());
-  command->add_option("--max-frames", arguments->max_frames, "the first frames only");
+  command->add_option("--max-frames", arguments->max_frames, "the first frames only")->check(Positive());
   command
       ->add_option(
           "--follow", arguments->follow_s,

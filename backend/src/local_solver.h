@@ -18,8 +18,14 @@ template <int N>
 class LocalSolver {
  public:
   /// `limits` say what settled is. Beyond `whole_fraction` of the nodes all are solved for.
-  LocalSolver(WeightedGraph<N>& graph, const SolveLimits& limits, double whole_fraction)
-      : graph_(graph), limits_(limits), around_(*graph.structure), inside_(graph.structure->constant.size()) {
+  /// `equations` are a place to work in, kept from call to call since they are large.
+  LocalSolver(WeightedGraph<N>& graph, BlockEquations<N>& equations, const SolveLimits& limits,
+              double whole_fraction)
+      : graph_(graph),
+        equations_(equations),
+        limits_(limits),
+        around_(*graph.structure),
+        inside_(graph.structure->constant.size()) {
     const auto& constant = graph.structure->constant;
     free_ = static_cast<std::size_t>(std::count(constant.begin(), constant.end(), false));
     largest_part_ = whole_fraction * static_cast<double>(free_);
@@ -36,7 +42,7 @@ class LocalSolver {
     bool converged = false;
     for (int hops = kFirstHops; !seeds.empty() || !converged; seeds = Unsettled(Border())) {
       if (!seeds.empty()) Grow(seeds, hops);
-      hops *= seeds.empty() ? 1 : 2;
+      hops *= seeds.empty() ? 1 : 3;
       const bool rough = !seeds.empty() && !Whole();  // the part may have to grow
       const SolveSummary round = Solve(rough ? kRoughIterations : limits_.max_iterations);
       out.iterations += round.iterations;
@@ -83,7 +89,8 @@ class LocalSolver {
   }
 
   SolveSummary Solve(int max_iterations) {
-    if (equations_.active().nodes.size() != part_.size()) {
+    if (analysed_ != part_.size()) {
+      analysed_ = part_.size();
       std::sort(part_.begin(), part_.end());
       edges_.clear();
       for (const std::size_t node : part_) {
@@ -140,13 +147,14 @@ class LocalSolver {
   }
 
   WeightedGraph<N>& graph_;
+  BlockEquations<N>& equations_;
   const SolveLimits& limits_;
   Neighbourhood around_;
   double largest_part_ = 0;
   std::size_t free_ = 0;      // nodes that may move
   std::vector<bool> inside_;  // of the part, by node
   std::vector<std::size_t> part_, edges_;
-  BlockEquations<N> equations_;
+  std::size_t analysed_ = 0;  // nodes of the part that the equations are for
 };
 
 }  // namespace tutti::internal

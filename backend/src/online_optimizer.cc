@@ -70,7 +70,7 @@ class Incremental {
     const std::vector<bool> is_new = TakeOver(graph, touched);
     const internal::SolveLimits limits{options_.max_iterations, options_.max_time_s,
                                        options_.function_tolerance, online_.settled_sigmas};
-    internal::LocalSolver<N> local(graph_, limits, online_.whole_fraction);
+    internal::LocalSolver<N> local(graph_, equations_, limits, online_.whole_fraction);
     const SolveSummary summary = local.Settle(Marked(touched), is_new);
     report.success = summary.usable;
     report.whole = !local.Part().empty() && local.Whole();
@@ -172,6 +172,7 @@ class Incremental {
   internal::GraphMemory memory_;
   GraphStructure structure_;
   WeightedGraph<N> graph_;
+  internal::BlockEquations<N> equations_;
   std::vector<double> chi2_;  // of the edges, after the last call
   std::vector<int> held_;     // ids of the nodes that did not move in the last call, ascending
 };

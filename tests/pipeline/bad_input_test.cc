@@ -67,6 +67,15 @@ TEST_F(BadInput, MissingConfiguration) {
   ExpectRefused(Run(folder_ / "no.yaml", testing::TinyTown()), "no.yaml");
 }
 
+TEST_F(BadInput, LessThanNothingIsNoLargeNumber) {
+  for (const char* option : {"--seed", "--max-frames"}) {
+    const auto run = Run(testing::TinyConfig(folder_), testing::TinyTown(), {option, "-1"});
+    EXPECT_EQ(run.status, 1) << run.output;
+    EXPECT_THAT(run.output, AllOf(HasSubstr(option), HasSubstr("'-1'")));
+  }
+  EXPECT_FALSE(fs::exists(folder_ / "out"));
+}
+
 TEST_F(BadInput, UnknownKeyNamesTheNearestValidOne) {
   const auto run = Run(testing::TinyConfig(folder_, "run:\n  thread: 2\n"), testing::TinyTown());
   ExpectRefused(run, "'threads'");

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <set>
 
 #include "recording.h"
 #include "small_town.h"
@@ -73,6 +74,21 @@ TEST(SlamSystem, ASecondLapNeedsFewKeyframesAndTheWholeMapIsAdjusted) {
   EXPECT_LT(with.ate_m, 1.2 * without.ate_m + 0.005);
   std::printf("  ATE %.4f m, %.4f m without fusion and adjustment; %zu and %zu keyframes\n", with.ate_m,
               without.ate_m, with.keyframe_stamps.size(), without.keyframe_stamps.size());
+}
+
+// A keyframe without odometry edges would follow any loop, the false ones too.
+TEST(SlamSystem, OdometryEdgesTieEveryKeyframeOfAMonoMapToTheOthers) {
+  SyntheticOptions options = testing::SmallStereoTown(320, 160);
+  options.sensor = SyntheticSensor::kMono;
+  const Recording recording = testing::Record(SyntheticWorld(options), 40);
+  SlamSystem slam(Small(true, 1), recording.rig);
+  for (const InputFrame& frame : recording.frames) slam.Track(frame);
+  slam.Finish();
+  const PoseGraph graph = slam.Graph();
+  ASSERT_GT(graph.nodes().size(), 3u);
+  std::set<int> tied;
+  for (const PoseGraphEdge& edge : graph.edges()) tied.insert({edge.from, edge.to});
+  EXPECT_EQ(tied.size(), graph.nodes().size());
 }
 
 void ExpectTheSameBits(const Result& a, const Result& b) {

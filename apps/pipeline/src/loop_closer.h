@@ -28,8 +28,8 @@ class LoopCloser {
   LoopCloser(const RunConfig& config, const CameraRig& rig, SpanRecorder* recorder, Odometry* odometry,
              std::vector<LoopRecord>* records, std::function<void()> before_change);
 
-  /// To be called for each new keyframe.
-  void AddKeyframe(int id) { graph_.AddKeyframe(id, odometry_.KeyframePiece(id)); }
+  /// To be called for each new keyframe. A mono map begins with two at once; the newer one is enough.
+  void AddKeyframe(int id);
 
   /// A verified loop between two keyframes, the last of the records. `frames`: number of frames so far.
   void Consider(const Verification& verification, int candidate, int query, std::int64_t frames);
@@ -66,6 +66,7 @@ class LoopCloser {
   std::vector<LoopRecord>& records_;
   std::function<void()> before_change_;
   LoopGate gate_;
+  int newest_keyframe_ = -1;  // that the graph knows
   MapGraph graph_;
   FalseLoopSource false_loops_;
   GlobalAdjuster adjuster_;

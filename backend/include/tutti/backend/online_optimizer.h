@@ -15,7 +15,7 @@ namespace tutti {
 struct OnlineOptions {
   /// A node is left alone while the step that its own equations ask for is shorter than this many standard
   /// deviations of it, its neighbours held [1]. Smaller: closer to the optimum of the whole graph, slower.
-  double settled_sigmas = 0.01;
+  double settled_sigmas = 0.02;
   /// Beyond this share of the nodes all of them are solved for [1].
   double whole_fraction = 0.5;
   /// With PoseGraphSolver::kCeres, graphs of this many nodes and more are solved in parts as well, by

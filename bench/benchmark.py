@@ -99,8 +99,8 @@ def verdict(found):
             continue
         best = min(ate, key=ate.get)
         worse = [v for v in ate if v != "ensemble" and ate[v] <= ate["ensemble"]]
-        p = variants["odometry"]["ate_minus_ensemble"]["p"]
-        sure = "" if p is None else f" (p = {p:.3f} against the odometry)"
+        test = variants["odometry"]["ate_minus_ensemble"]
+        sure = " (one seed, no test)" if test["pairs"] < 2 else f" (p = {test['p']:.3f} against the odometry)"
         if ate["ensemble"] >= ate["odometry"]:
             said = "no: not better than the odometry alone"
         elif worse:

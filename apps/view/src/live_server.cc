@@ -110,7 +110,13 @@ class LiveServer::Impl {
           "--view: can't listen at " + options_.address + ", port " + std::to_string(options_.port) +
           "; is it in use, or the address of another machine? --view-port 0 takes any free port");
     }
-    thread_ = std::thread([this] { server_.listen_after_bind(); });
+    thread_ = std::thread([this] {
+      server_.listen_after_bind();
+      over_ = true;
+    });
+    // httplib's stop() does nothing before the loop runs: a run that fails at once would wait for it for
+    // ever.
+    while (!server_.is_running() && !over_) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
 
   bool Allowed(const httplib::Request& request) const {
@@ -167,6 +173,7 @@ class LiveServer::Impl {
   std::atomic<int> viewers_{0};
   httplib::Server server_;
   int port_ = 0;
+  std::atomic<bool> over_{false};  // no longer listens
   std::thread thread_;
 };
 

@@ -6,27 +6,23 @@
 
 namespace tutti::cli {
 
-/// Above 0. CLI11's own check prints the largest double, 309 digits long.
-inline CLI::Validator Positive() {
+/// Numbers that `fits` takes; `name` stands in the help. CLI11's own checks print the largest double, 309
+/// digits long.
+inline CLI::Validator NumberThat(bool (*fits)(double), const std::string& is, const std::string& name) {
   return CLI::Validator(
-      [](std::string& text) {
+      [fits, is](std::string& text) {
         double value = 0;
-        return CLI::detail::lexical_cast(text, value) && value > 0 ? std::string()
-                                                                   : "'" + text + "' is not a number above 0";
+        const bool good = CLI::detail::lexical_cast(text, value) && fits(value);
+        return good ? std::string() : "'" + text + "' is not a number " + is;
       },
-      "POSITIVE");
+      name);
 }
 
-/// 0 or more.
+inline CLI::Validator Positive() {
+  return NumberThat([](double value) { return value > 0; }, "above 0", "POSITIVE");
+}
 inline CLI::Validator NotNegative() {
-  return CLI::Validator(
-      [](std::string& text) {
-        double value = 0;
-        return CLI::detail::lexical_cast(text, value) && value >= 0
-                   ? std::string()
-                   : "'" + text + "' is not a number of 0 or more";
-      },
-      "NOT NEGATIVE");
+  return NumberThat([](double value) { return value >= 0; }, "of 0 or more", "NOT NEGATIVE");
 }
 
 }  // namespace tutti::cli

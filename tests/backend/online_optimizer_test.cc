@@ -203,10 +203,7 @@ TEST(OnlineOptimizer, TheSameSequenceGivesTheSameBits) {
 
 TEST(OnlineOptimizer, FailureLeavesTheGraphAloneAndTheNextCallWorks) {
   OnlineOptimizer online(InParts(RobustLoss::kNone));
-  PoseGraph graph;
-  graph.AddNode(0, Pose());
-  graph.AddNode(1, Pose(Eigen::Quaterniond::Identity(), {1e300, 0, 0}));
-  graph.AddOdometry(0, 1, Similarity(), Matrix7d::Identity());
+  PoseGraph graph = testing::OverflowingGraph();
   const OnlineReport report = online.Optimize(graph);
   EXPECT_FALSE(report.success);
   EXPECT_NE(report.reason, "");

@@ -263,8 +263,7 @@ void ConfigTable::AddGraph(PoseGraphOptions& o, OnlineOptions& online) {
       "maps of so many keyframes and more are solved by block, in parts, even with solver: ceres");
   Add("online_settled_sigmas", online.settled_sigmas,
       "in parts: a keyframe is left alone while the step that its own edges ask for is shorter than this "
-      "many "
-      "standard deviations");
+      "many standard deviations");
   Add("online_whole_fraction", online.whole_fraction,
       "in parts: beyond this share of the keyframes all of them are solved for");
   Add("online_always_whole", online.always_whole, "never in parts");

@@ -25,12 +25,12 @@ LoopCloser::LoopCloser(const RunConfig& config, const CameraRig& rig, SpanRecord
       graph_(config.graph, config.online, config.run, rig.sensor),
       false_loops_(config.run, config.loops.seed) {}
 
-void LoopCloser::AddKeyframe(int id) {
+void LoopCloser::AddKeyframes() {
   const std::vector<int> ids = odometry_.KeyframeIds();
-  for (auto it = std::upper_bound(ids.begin(), ids.end(), newest_keyframe_); it != ids.end() && *it <= id;
-       ++it)
-    graph_.AddKeyframe(*it, odometry_.KeyframePiece(*it));
-  newest_keyframe_ = std::max(newest_keyframe_, id);
+  for (auto id = std::upper_bound(ids.begin(), ids.end(), newest_keyframe_); id != ids.end(); ++id) {
+    graph_.AddKeyframe(*id, odometry_.KeyframePiece(*id));
+    newest_keyframe_ = *id;
+  }
 }
 
 LoopGate::Map LoopCloser::Places() const {

@@ -28,8 +28,8 @@ class LoopCloser {
   LoopCloser(const RunConfig& config, const CameraRig& rig, SpanRecorder* recorder, Odometry* odometry,
              std::vector<LoopRecord>* records, std::function<void()> before_change);
 
-  /// To be called for each new keyframe. A mono map begins with two at once; the newer one is enough.
-  void AddKeyframe(int id);
+  /// To be called when there are new keyframes: a mono map begins with two at once.
+  void AddKeyframes();
 
   /// A verified loop between two keyframes, the last of the records. `frames`: number of frames so far.
   void Consider(const Verification& verification, int candidate, int query, std::int64_t frames);

@@ -37,7 +37,7 @@ class SlamSystem::Impl {
   void TakeOver(const Odometry& tracked, const std::map<int, KeyframeView>& views) {
     odometry_ = tracked;
     views_ = &views;
-    for (const int id : odometry_->KeyframeIds()) closer_->AddKeyframe(id);
+    closer_->AddKeyframes();
   }
 
   void Replay(const InputFrame& frame, int keyframe, std::int64_t frames) {
@@ -57,7 +57,7 @@ class SlamSystem::Impl {
       last_frame_ = frame.index;
       if (worker_ && result.state != TrackingState::kTracking) result = Relocalize(frame, result);
       if (result.keyframe >= 0) {
-        closer_->AddKeyframe(result.keyframe);
+        closer_->AddKeyframes();
         constexpr int kEveryKeyframes = 3;
         if (++keyframes_made_ % kEveryKeyframes == 0) closer_->Inject(result.keyframe, frames_);
       }

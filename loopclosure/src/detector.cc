@@ -100,6 +100,7 @@ LoopResult LoopDetector::Impl::Detect(const LoopQuery& query) {
   result.filter_ms = watch.LapMs();
 
   Decide(slot, combined, result);
+  result.probability = result.hypothesis;
   result.verify_ms = watch.LapMs();
 
   if (result.accepted) CloseLoop(query.id, result.verification.candidate);

@@ -93,6 +93,7 @@ struct LoopResult {
   double hypothesis = 0;               ///< H of the combined posterior, 1 - p(new place)
   std::int64_t candidate = -1;         ///< argmax of the combined posterior, -1 if there is no location yet
   double posterior = 0;                ///< combined posterior at the candidate
+  double probability = 0;              ///< that this is a loop: with the verified place, else the candidate
   bool proposed = false;               ///< H >= loop_threshold: went to verification
   bool accepted = false;               ///< the verification accepted it (or one of its neighbours)
   std::string reason;                  ///< why it is not accepted, in plain words

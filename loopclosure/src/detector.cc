@@ -261,6 +261,15 @@ void LoopDetector::Impl::FillOpinions(const std::vector<Features>& features, con
     }
     return posterior;
   };
+  const auto evidence_of = [this](const FilterUnit& unit) {
+    std::vector<CandidateEvidence> evidence;
+    for (const int slot : memory().working_memory()) {
+      evidence.push_back({memory().id(slot), unit.scores[Index(slot)],
+                          PosteriorAt(unit.image_likelihood, slot),
+                          PosteriorAt(unit.filter.posterior(), slot)});
+    }
+    return evidence;
+  };
   result.hypothesis = combined.hypothesis;
   if (combined.best >= 0) {
     result.candidate = memory().id(combined.best);
@@ -280,10 +289,13 @@ void LoopDetector::Impl::FillOpinions(const std::vector<Features>& features, con
       if (best >= 0) opinion.best = memory().id(best);
       if (combined.best >= 0) opinion.at_candidate = PosteriorAt(posterior, combined.best);
       if (options_.keep_posterior) opinion.posterior_by_location = by_location(posterior);
+      if (options_.keep_evidence) opinion.evidence = evidence_of(unit);
     }
     result.members.push_back(opinion);
   }
-  if (options_.keep_posterior) result.posterior_by_location = by_location(combined.belief);
+  if (options_.keep_posterior || options_.keep_evidence) {
+    result.posterior_by_location = by_location(combined.belief);
+  }
 }
 
 void LoopDetector::Impl::Decide(int slot, const CombinedBelief& combined, LoopResult& result) {

@@ -1,6 +1,7 @@
 #include "memory_system.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace tutti::internal {
 namespace {
@@ -94,7 +95,9 @@ bool MemorySystem::LooksLikePrevious(int slot) const {
 void MemorySystem::UpdateLikelihood(std::size_t u) {
   FilterUnit& unit = units_[u];
   if (!unit.took_part()) return;
-  unit.image_likelihood = AdjustLikelihood(unit.likelihood.Scores(unit.signature), memory_.working_memory());
+  std::vector<double> scores = unit.likelihood.Scores(unit.signature);
+  unit.image_likelihood = AdjustLikelihood(scores, memory_.working_memory());
+  if (options_.keep_evidence) unit.scores = std::move(scores);
 }
 
 void MemorySystem::StepFilter(std::size_t u) {

@@ -34,9 +34,10 @@ struct FilterUnit {
   std::vector<std::size_t> members;
   LikelihoodModel likelihood;
   BayesFilter filter;
-  Signature signature;      ///< of the present image, empty if bad
-  Belief image_likelihood;  ///< of the present image
-  double agreement = 1.0;   ///< running share of the verified loops that it had found, 0..1
+  Signature signature;         ///< of the present image, empty if bad
+  Belief image_likelihood;     ///< of the present image
+  std::vector<double> scores;  ///< raw ones behind it, by slot; only with keep_evidence
+  double agreement = 1.0;      ///< running share of the verified loops that it had found, 0..1
   bool took_part() const { return !signature.empty(); }
 };
 

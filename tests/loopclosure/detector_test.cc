@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
 #include <opencv2/imgcodecs.hpp>
 #include <thread>
@@ -243,6 +244,57 @@ TEST(LoopDetector, KeepsThePosteriorOnlyWhenAsked) {
   double sum = 0;
   for (const auto& [id, p] : result.posterior_by_location) sum += p;
   EXPECT_NEAR(sum, result.hypothesis, 1e-9);
+}
+
+TEST(LoopDetector, KeepsTheEvidenceOfEveryCandidateOnlyWhenAsked) {
+  constexpr int kPlaces = 8;
+  LoopDetectorOptions options = testing::SmallOptions();
+  options.rehearsal = false;
+  for (const char* rule : {"mean", "naive", "orb"}) {
+    for (const MemoryKind memory : {MemoryKind::kShared, MemoryKind::kPerMember}) {
+      SetRule(rule, options);
+      options.memory = memory;
+      options.keep_evidence = false;
+      LoopDetector silent(options);
+      const LoopResult without = testing::Walk(silent, 0, kPlaces + 1, kPlaces).back();
+      EXPECT_TRUE(without.posterior_by_location.empty());
+      options.keep_evidence = true;
+      LoopDetector detector(options);
+      const LoopResult result = testing::Walk(detector, 0, kPlaces + 1, kPlaces).back();
+      EXPECT_EQ(result.hypothesis, without.hypothesis);  // looking on changes nothing
+      ASSERT_EQ(result.posterior_by_location.size(),
+                static_cast<std::size_t>(kPlaces + 1 - options.stm_size));
+      for (std::size_t k = 0; k < result.members.size(); ++k) {
+        const MemberOpinion& member = result.members[k];
+        EXPECT_TRUE(without.members[k].evidence.empty());
+        ASSERT_EQ(member.evidence.size(), result.posterior_by_location.size());
+        double sum = 0;
+        for (std::size_t i = 0; i < member.evidence.size(); ++i) {
+          EXPECT_EQ(member.evidence[i].location, result.posterior_by_location[i].first);
+          if (member.evidence[i].score == 0) {
+            EXPECT_EQ(member.evidence[i].likelihood, 1);
+          }
+          sum += member.evidence[i].posterior;
+        }
+        EXPECT_NEAR(sum, member.hypothesis, 1e-9);
+        // Image kPlaces shows place 0 again: the best raw score, and the one that stands out.
+        const auto best = std::max_element(member.evidence.begin(), member.evidence.end(),
+                                           [](const auto& a, const auto& b) { return a.score < b.score; });
+        EXPECT_EQ(best->location, 0) << rule << " " << member.name;
+        EXPECT_GT(best->likelihood, 1);
+      }
+    }
+  }
+}
+
+TEST(LoopDetector, AMemberThatSitsAnImageOutHasNoEvidence) {
+  LoopDetectorOptions options = testing::SmallOptions();
+  options.keep_evidence = true;
+  LoopDetector detector(options);
+  testing::Walk(detector, 0, 5, 5);
+  const LoopResult result = detector.Detect(cv::Mat(180, 240, CV_8UC1, cv::Scalar(80)), 5);
+  for (const MemberOpinion& member : result.members) EXPECT_TRUE(member.evidence.empty());
+  EXPECT_EQ(result.posterior_by_location.size(), 3u);
 }
 
 TEST(LoopDetector, CorridorReachesThePapersClassWithoutAFalseLoop) {

@@ -41,6 +41,14 @@ struct LoopQuery {
                        ///< scale drifts: essential matrix, then kSimilarity where both have points
 };
 
+/// What one member had to say of one location in working memory (loop-closure.md section 2).
+struct CandidateEvidence {
+  std::int64_t location = -1;  ///< id
+  double score = 0;            ///< raw score s_i of LikelihoodModel::Scores; 0: no word shared
+  double likelihood = 1;       ///< L_i of AdjustLikelihood; 1: does not stand out
+  double posterior = 0;        ///< of its own Bayes filter, 0..1
+};
+
 /// What one member (or the whole ensemble) believes.
 struct MemberOpinion {
   std::string name;         ///< "surf", "sift", "orb", ...
@@ -51,6 +59,9 @@ struct MemberOpinion {
   std::int64_t best = -1;   ///< id of its best location, -1 if none
   double at_candidate = 0;  ///< its posterior at the ensemble's candidate
   std::vector<std::pair<std::int64_t, double>> posterior_by_location;  ///< only with keep_posterior
+  std::vector<CandidateEvidence> evidence;  ///< only with keep_evidence: of every location in working memory,
+                                            ///< in one order for all members; empty if it did not take part.
+                                            ///< Rule naive: of all members' words together
 };
 
 /// A matched feature: pixel in the query and in the candidate, and their indices in the callers' FeatureSets
@@ -100,7 +111,8 @@ struct LoopResult {
   std::vector<MemberOpinion> members;  ///< in the order of options.members
   Verification verification;           ///< the best one tried
   std::vector<Verification> tried;     ///< all that were tried
-  std::vector<std::pair<std::int64_t, double>> posterior_by_location;  ///< only with keep_posterior
+  /// The combined posterior of every location in working memory; only with keep_posterior or keep_evidence.
+  std::vector<std::pair<std::int64_t, double>> posterior_by_location;
   std::vector<std::int64_t> retrieved;    ///< locations that came back from long-term memory
   std::vector<std::int64_t> transferred;  ///< locations that left working memory for it
   std::string warning;  ///< trouble that did not stop Detect: the disk is full, a stored location is damaged

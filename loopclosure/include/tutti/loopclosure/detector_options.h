@@ -132,6 +132,8 @@ struct LoopDetectorOptions {
                          ///< a later detector with the same file goes on from there. Empty: a temporary one
 
   bool keep_posterior = false;  ///< fill LoopResult::posterior_by_location (costs O(locations) per image)
+  bool keep_evidence = false;   ///< fill LoopResult::posterior_by_location and MemberOpinion::evidence (costs
+                                ///< O(locations x members) per image)
 
   ExtractionOptions extraction;      ///< features
   VocabularyOptions vocabulary;      ///< words

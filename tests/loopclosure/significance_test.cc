@@ -95,5 +95,97 @@ TEST(PairedTTest, DegenerateInputHasAPlainAnswer) {
   EXPECT_THROW(PairedTTest({1, std::nan("")}, {1, 2}), InputError);
 }
 
+// Zar, Biostatistical Analysis (1999), example 24.11: the hind leg of 8 of 10 deer is longer than the
+// foreleg, of 2 shorter; two-sided p = 0.109375, one-sided (45 + 10 + 1) / 2^10.
+TEST(SignTest, ZarsDeer) {
+  const std::vector<double> hind = {142, 140, 144, 144, 142, 146, 149, 150, 142, 148};
+  const std::vector<double> fore = {138, 136, 147, 139, 143, 141, 143, 145, 136, 146};
+  const SignTestResult result = SignTest(hind, fore);
+  EXPECT_EQ(result.greater, 8);
+  EXPECT_EQ(result.less, 2);
+  EXPECT_EQ(result.ties, 0);
+  EXPECT_NEAR(result.p, 56.0 / 1024.0, 1e-12);
+  EXPECT_NEAR(SignTest(fore, hind).p, 1013.0 / 1024.0, 1e-12);  // the other side
+}
+
+TEST(SignTest, CountsByHand) {
+  EXPECT_NEAR(SignTest(5, 0).p, 1.0 / 32.0, 1e-14);
+  EXPECT_NEAR(SignTest(0, 5).p, 1.0, 1e-14);
+  EXPECT_NEAR(SignTest(9, 1).p, 11.0 / 1024.0, 1e-14);
+  EXPECT_NEAR(SignTest(2, 2).p, 11.0 / 16.0, 1e-14);
+  EXPECT_NEAR(SignTest(20, 0).p, std::pow(0.5, 20), 1e-18);
+  // Far too many for 2^n: P(X >= 5100) for B(10000, 1/2) is that of a normal beyond 1.99 deviations.
+  EXPECT_NEAR(SignTest(5100, 4900).p, 0.5 * std::erfc(1.99 / std::sqrt(2.0)), 1e-5);
+}
+
+TEST(SignTest, TiesAreLeftOut) {
+  const SignTestResult result = SignTest({1, 2, 3, 4}, {0, 2, 2, 4});
+  EXPECT_EQ(result.ties, 2);
+  EXPECT_NEAR(result.p, 0.25, 1e-14);
+  EXPECT_DOUBLE_EQ(SignTest({1, 2}, {1, 2}).p, 1.0);
+  EXPECT_DOUBLE_EQ(SignTest(std::vector<double>(), std::vector<double>()).p, 1.0);
+  EXPECT_DOUBLE_EQ(SignTest(-1, -1).p, 1.0);
+  EXPECT_THROW(SignTest({1}, {1, 2}), InputError);
+  EXPECT_THROW(SignTest(std::vector<double>{std::nan("")}, std::vector<double>{1}), InputError);
+}
+
+// Of groups that are 0 or 1 the resampled ratio is B(n, p) / n. For B(20, 1/2): P(X <= 5) = 0.0207, P(X <= 6)
+// = 0.0577, so its 2.5 % quantile is 6 and its 97.5 % quantile 14 (P(X <= 3) = 0.0013, P(X <= 4) = 0.0059:
+// 4 and 16 at 99 %).
+TEST(BootstrapRatio, TheQuantilesOfABinomial) {
+  std::vector<RatioPart> groups;
+  for (int i = 0; i < 20; ++i) groups.push_back({i < 10 ? 1.0 : 0.0, 1.0});
+  const BootstrapInterval interval = BootstrapRatio(groups);
+  EXPECT_DOUBLE_EQ(interval.ratio, 0.5);
+  EXPECT_DOUBLE_EQ(interval.low, 0.3);
+  EXPECT_DOUBLE_EQ(interval.high, 0.7);
+  EXPECT_EQ(interval.resamples, 10000);
+  const BootstrapInterval wide = BootstrapRatio(groups, 0.99);
+  EXPECT_DOUBLE_EQ(wide.low, 0.2);
+  EXPECT_DOUBLE_EQ(wide.high, 0.8);
+}
+
+// Two worlds, 9 of 10 and 0 of 90: pooled 0.09. Resamples: 0.9 and 0 with 1/4 each, 0.09 with 1/2.
+TEST(BootstrapRatio, PoolsBeforeItDivides) {
+  const std::vector<RatioPart> groups = {{9, 10}, {0, 90}};
+  EXPECT_DOUBLE_EQ(BootstrapRatio(groups).ratio, 0.09);
+  EXPECT_DOUBLE_EQ(BootstrapRatio(groups).low, 0.0);
+  EXPECT_DOUBLE_EQ(BootstrapRatio(groups).high, 0.9);
+  EXPECT_DOUBLE_EQ(BootstrapRatio(groups, 0.4).low, 0.09);
+  EXPECT_DOUBLE_EQ(BootstrapRatio(groups, 0.4).high, 0.09);
+}
+
+TEST(BootstrapRatio, TheSeedDecidesAll) {
+  std::vector<RatioPart> groups;
+  for (int i = 1; i < 30; ++i) groups.push_back({1.0 / i, 1.0 + i % 7});
+  const BootstrapInterval a = BootstrapRatio(groups, 0.95, 500, 7), b = BootstrapRatio(groups, 0.95, 500, 7);
+  EXPECT_EQ(a.low, b.low);
+  EXPECT_EQ(a.high, b.high);
+  EXPECT_NE(a.low, BootstrapRatio(groups, 0.95, 500, 8).low);
+  EXPECT_LT(a.low, a.ratio);
+  EXPECT_GT(a.high, a.ratio);
+}
+
+TEST(BootstrapRatio, DegenerateGroupsHaveAPlainAnswer) {
+  const BootstrapInterval one = BootstrapRatio({{3, 4}}, 0.95, 10);
+  EXPECT_DOUBLE_EQ(one.low, 0.75);
+  EXPECT_DOUBLE_EQ(one.high, 0.75);
+  const BootstrapInterval none = BootstrapRatio({{0, 0}, {0, 0}}, 0.95, 10);
+  EXPECT_TRUE(std::isnan(none.ratio));
+  EXPECT_TRUE(std::isnan(none.low));
+  EXPECT_TRUE(std::isnan(none.high));
+  EXPECT_EQ(none.resamples, 0);
+  // A quarter of the resamples draws only the world where nothing was said.
+  const BootstrapInterval silent = BootstrapRatio({{1, 2}, {0, 0}}, 0.95, 1000);
+  EXPECT_DOUBLE_EQ(silent.low, 0.5);
+  EXPECT_DOUBLE_EQ(silent.high, 0.5);
+  EXPECT_NEAR(silent.resamples, 750, 60);
+  EXPECT_THROW(BootstrapRatio({}), InputError);
+  EXPECT_THROW(BootstrapRatio({{1, -1}}), InputError);
+  EXPECT_THROW(BootstrapRatio({{std::nan(""), 1}}), InputError);
+  EXPECT_THROW(BootstrapRatio({{1, 1}}, 1.0), InputError);
+  EXPECT_THROW(BootstrapRatio({{1, 1}}, 0.95, 0), InputError);
+}
+
 }  // namespace
 }  // namespace tutti

@@ -28,10 +28,13 @@ std::string ExtractionOptions::Validate() const {
   if (features < 1 || features > 10000) return OutOf("extraction.features", "1 to 10000");
   if (grid_columns < 1 || grid_columns > 64) return OutOf("extraction.grid_columns", "1 to 64");
   if (max_pixels < 1 << 12) return OutOf("extraction.max_pixels", "at least 4096");
+  if (min_pixels < 0) return OutOf("extraction.min_pixels", "0 (never enlarged) or more");
   if (surf_octaves < 1 || surf_octaves > 8) return OutOf("extraction.surf_octaves", "1 to 8");
   if (!(surf_threshold >= 0)) return OutOf("extraction.surf_threshold", "0 or more");
+  if (!(surf_min_threshold >= 0)) return OutOf("extraction.surf_min_threshold", "0 or more");
   if (sift_max_pixels < 1 << 12) return OutOf("extraction.sift_max_pixels", "at least 4096");
   if (!(sift_contrast > 0)) return OutOf("extraction.sift_contrast", "above 0");
+  if (!(sift_min_contrast > 0)) return OutOf("extraction.sift_min_contrast", "above 0");
   if (orb_fast_threshold < 1 || orb_fast_threshold > 255)
     return OutOf("extraction.orb_fast_threshold", "1 to 255");
   if (!(orb_border > 0 && orb_border <= 1)) return OutOf("extraction.orb_border", "above 0, at most 1");

@@ -39,6 +39,14 @@ std::vector<cv::KeyPoint> Picked(const std::vector<cv::KeyPoint>& keypoints,
   return picked;
 }
 
+// Of keypoints in order of strength, those that reach the threshold, or as many as are wanted.
+void DropWeak(double threshold, int wanted, std::vector<cv::KeyPoint>& keypoints) {
+  while (static_cast<int>(keypoints.size()) > wanted &&
+         static_cast<double>(keypoints.back().response) < threshold) {
+    keypoints.pop_back();
+  }
+}
+
 void ScaleKeypoints(double factor, std::vector<cv::KeyPoint>& keypoints) {
   if (factor == 1.0) return;
   const float f = static_cast<float>(factor);
@@ -176,7 +184,10 @@ FeatureExtractor::FeatureExtractor(const std::string& name, const ExtractionOpti
 
 cv::Ptr<cv::Feature2D> FeatureExtractor::Create(cv::Size size) const {
   const int wanted = options_.features * kOversampling;
-  if (name_ == "surf") return CreateDlibSurf(wanted, options_.surf_octaves, options_.surf_threshold);
+  if (name_ == "surf") {
+    return CreateDlibSurf(wanted, options_.surf_octaves,
+                          std::min(options_.surf_threshold, options_.surf_min_threshold));
+  }
   if (name_ == "sift") return cv::SIFT::create(wanted, 3, options_.sift_contrast);
   if (name_ == "orb") return CreateOrb(size, wanted, options_);
   if (name_ == "akaze") return cv::AKAZE::create();
@@ -185,26 +196,31 @@ cv::Ptr<cv::Feature2D> FeatureExtractor::Create(cv::Size size) const {
   return Registered(name_)(size, wanted);
 }
 
+double FeatureExtractor::Shrinking(double pixels) const {
+  double factor = std::max(1.0, std::sqrt(pixels / options_.max_pixels));
+  if (name_ == "sift") {  // which doubles the image by itself, so that it sees it halved
+    while (pixels / (factor * factor) > options_.sift_max_pixels) factor *= 2.0;
+  }
+  const bool small = factor == 1.0 && pixels < options_.min_pixels;
+  return small && (name_ == "surf" || name_ == "sift") ? 0.5 : factor;
+}
+
 Features FeatureExtractor::Extract(const cv::Mat& grey) const {
   Features features;
   if (grey.empty() || grey.type() != CV_8UC1 || std::min(grey.rows, grey.cols) < kMinSide) return features;
-  // Scaled down: by what it takes to respect max_pixels; SIFT doubles the image by itself, so that it sees it
-  // halved.
-  double factor = std::max(1.0, std::sqrt(static_cast<double>(grey.total()) / options_.max_pixels));
-  if (name_ == "sift") {
-    while (static_cast<double>(grey.total()) / (factor * factor) > options_.sift_max_pixels) factor *= 2.0;
-  }
+  const double factor = Shrinking(static_cast<double>(grey.total()));
   cv::Mat image = grey;
-  if (factor > 1.0) {
+  if (factor != 1.0) {
     const cv::Size size(cvRound(grey.cols / factor), cvRound(grey.rows / factor));
     if (std::min(size.width, size.height) < kMinSide) return features;
-    cv::resize(grey, image, size, 0, 0, cv::INTER_AREA);
+    cv::resize(grey, image, size, 0, 0, factor > 1.0 ? cv::INTER_AREA : cv::INTER_LINEAR);
   }
   const cv::Ptr<cv::Feature2D> member = Create(image.size());
   if (name_ == "surf") {
     // Describing costs more than detecting, and what was detected stays valid: describe what is kept.
     std::vector<cv::KeyPoint> detected;
     member->detect(image, detected);
+    DropWeak(options_.surf_threshold, options_.features, detected);
     features.keypoints =
         Picked(detected, SelectSpread(detected, image.size(), options_.features, options_.grid_columns));
     member->compute(image, features.keypoints, features.descriptors);
@@ -212,6 +228,11 @@ Features FeatureExtractor::Extract(const cv::Mat& grey) const {
     std::vector<cv::KeyPoint> keypoints;
     cv::Mat descriptors;
     member->detectAndCompute(image, cv::noArray(), keypoints, descriptors);
+    if (name_ == "sift" && static_cast<int>(keypoints.size()) < options_.features &&
+        options_.sift_min_contrast < options_.sift_contrast) {
+      cv::SIFT::create(options_.features, 3, options_.sift_min_contrast)
+          ->detectAndCompute(image, cv::noArray(), keypoints, descriptors);
+    }
     if (keypoints.empty() || descriptors.rows != static_cast<int>(keypoints.size())) return features;
     const std::vector<int> selected =
         SelectSpread(keypoints, image.size(), options_.features, options_.grid_columns);

@@ -103,6 +103,7 @@ TEST(LoopDetector, AMemberWithoutFeaturesSitsOut) {
   LoopDetectorOptions options;
   options.stm_size = 2;
   options.extraction.surf_threshold = 1e12;
+  options.extraction.surf_min_threshold = 1e12;
   LoopDetector detector(options);
   LoopResult result;
   for (int i = 0; i < 6; ++i)

@@ -95,6 +95,44 @@ TEST(Features, SmallImagesKeepTheUpperPyramidLevelsOfOrb) {
   EXPECT_GE(top, 4);
 }
 
+class QuotaMember : public ::testing::TestWithParam<std::string> {};
+INSTANTIATE_TEST_SUITE_P(Members, QuotaMember, ::testing::Values("surf", "sift"));
+
+TEST_P(QuotaMember, SmallImagesFillTheQuotaWithKeypointsInTheirOwnPixels) {
+  cv::Mat image;  // as much to see as in a large one
+  cv::resize(testing::TexturedImage(1, 640, 512), image, cv::Size(240, 192), 0, 0, cv::INTER_AREA);
+  const Features features = FeatureExtractor(GetParam(), ExtractionOptions()).Extract(image);
+  EXPECT_GE(features.keypoints.size(), 380u);
+  float right = 0;
+  float bottom = 0;
+  for (const cv::Point2f& p : Pixels(features)) {
+    right = std::max(right, p.x);
+    bottom = std::max(bottom, p.y);
+  }
+  EXPECT_GT(right, 180.0f);
+  EXPECT_LT(right, 240.0f);
+  EXPECT_GT(bottom, 140.0f);
+  EXPECT_LT(bottom, 192.0f);
+}
+
+TEST_P(QuotaMember, DarkImagesFillTheQuota) {
+  cv::Mat dark;
+  testing::TexturedImage(1, 640, 480).convertTo(dark, CV_8U, 0.1);
+  const FeatureExtractor extractor(GetParam(), ExtractionOptions());
+  EXPECT_GE(extractor.Extract(dark).keypoints.size(), 380u);
+}
+
+TEST_P(QuotaMember, AnImageWithoutTextureStaysWithoutFeatures) {
+  const FeatureExtractor extractor(GetParam(), ExtractionOptions());
+  cv::Mat ramp(192, 240, CV_8UC1);
+  for (int r = 0; r < ramp.rows; ++r) ramp.row(r).setTo(40 + r / 2);
+  EXPECT_LT(extractor.Extract(ramp).keypoints.size(), 40u);
+  cv::Mat noise(192, 240, CV_8UC1, cv::Scalar(80));
+  cv::RNG random(1);
+  for (int i = 0; i < 2000; ++i) noise.at<std::uint8_t>(random.uniform(0, 192), random.uniform(0, 240)) = 81;
+  EXPECT_LT(extractor.Extract(noise).keypoints.size(), 40u);
+}
+
 TEST(Features, SurfDescriptorsHaveUnitLength) {
   const Features features = FeatureExtractor("surf", ExtractionOptions()).Extract(testing::TexturedImage(1));
   ASSERT_FALSE(features.keypoints.empty());

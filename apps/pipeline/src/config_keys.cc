@@ -190,12 +190,17 @@ void ConfigTable::AddExtraction(ExtractionOptions& o) {
   Add("grid_columns", o.grid_columns,
       "cells over which they are spread, along the longer side; 1: no spreading");
   Add("max_pixels", o.max_pixels, "images with more pixels are scaled down before anything else [px]");
+  Add("min_pixels", o.min_pixels, "SURF and SIFT see an image of fewer pixels at twice its size [px]");
   Add("surf_octaves", o.surf_octaves, "octaves of the Hessian pyramid (the paper's 4)");
   Add("surf_threshold", o.surf_threshold,
       "determinant of Hessian below which a SURF point is dropped (dlib's scale)");
+  Add("surf_min_threshold", o.surf_min_threshold,
+      "where fewer than `features` reach surf_threshold, weaker ones are taken down to this");
   Add("sift_max_pixels", o.sift_max_pixels,
       "SIFT sees the image halved until it has at most this many pixels [px]");
   Add("sift_contrast", o.sift_contrast, "contrast threshold of SIFT (OpenCV's own default is 0.04)");
+  Add("sift_min_contrast", o.sift_min_contrast,
+      "where fewer than `features` reach sift_contrast, weaker ones are taken down to this");
   Add("orb_fast_threshold", o.orb_fast_threshold, "FAST threshold of ORB [grey levels of 255]");
   Add("orb_border", o.orb_border,
       "border without ORB points, share of the shorter side, at most 31 px (1: OpenCV's own)");

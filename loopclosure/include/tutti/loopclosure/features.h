@@ -56,6 +56,7 @@ class FeatureExtractor {
 
  private:
   cv::Ptr<cv::Feature2D> Create(cv::Size size) const;
+  double Shrinking(double pixels) const;  // by which the member sees the image smaller; below 1: larger
 
   std::string name_;
   ExtractionOptions options_;

@@ -1,4 +1,4 @@
-// tutti generate: renders the synthetic world to disk.
+// tutti generate: renders the synthetic world to disk, or changes real images.
 #include <unistd.h>
 
 #include <algorithm>
@@ -6,9 +6,12 @@
 #include <csignal>
 #include <cstdio>
 #include <memory>
+#include <set>
 #include <string>
 #include <thread>
+#include <vector>
 
+#include "changed_images.h"
 #include "checks.h"
 #include "commands.h"
 #include "synthetic_writer.h"
@@ -23,8 +26,14 @@ void OnInterrupt(int) { interrupted = 1; }
 struct GenerateArguments {
   std::string out, sensor, scene = "town";
   SyntheticOptions world;
+  std::string from_images, change;  // the first empty: a synthetic world
+  int stride = 1, change_from = 0;
   int threads = 0;
   bool force = false;
+
+  int Threads() const {
+    return threads > 0 ? threads : static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  }
 };
 
 // One line that is overwritten on a terminal, every tenth part elsewhere.
@@ -49,7 +58,41 @@ class ProgressLine {
   std::size_t last_tenth_ = 0;
 };
 
+int ChangeImages(const GenerateArguments& arguments) {
+  const ImageChange change = ImageChange::Parse(arguments.change);
+  ChangedImagesOptions o;
+  o.from = arguments.from_images;
+  o.out = arguments.out;
+  o.stride = arguments.stride;
+  o.change_from = arguments.change_from;
+  o.seed = arguments.world.seed;
+  o.threads = arguments.Threads();
+  o.force = arguments.force;
+  ProgressLine progress;
+  o.progress = [&progress](std::size_t done, std::size_t total) { return progress(done, total); };
+  interrupted = 0;
+  const auto before = std::signal(SIGINT, OnInterrupt);
+  const ChangedImages result = WriteChangedImages(change, o);
+  std::signal(SIGINT, before);
+  const char* d = arguments.out.c_str();
+  if (result.written < result.taken) {
+    std::fprintf(stderr, "\ninterrupted: %s holds the first %zu of %zu images and can be used\n", d,
+                 result.written, result.taken);
+    return 130;
+  }
+  std::printf("%s: %zu images, changed by %s:%d", d, result.written, change.Name().c_str(),
+              change.Strength());
+  if (o.change_from > 0) std::printf(" from image %d on (counted from 0)", o.change_from);
+  std::printf(
+      ". Next, with the ground truth of the images they are from:\n  tutti loops --images %s --ground-truth "
+      "FILE --out %s_loops\n",
+      d, d);
+  return 0;
+}
+
 int Generate(const GenerateArguments& arguments) {
+  if (!arguments.from_images.empty()) return ChangeImages(arguments);
+  if (arguments.sensor.empty()) throw CLI::RequiredError("--sensor (or --from-images)");
   SyntheticOptions wanted = arguments.world;
   wanted.scene = arguments.scene == "room"       ? SyntheticScene::kRoom
                  : arguments.scene == "corridor" ? SyntheticScene::kCorridor
@@ -64,8 +107,7 @@ int Generate(const GenerateArguments& arguments) {
                o.height, world.LapLength(), world.FramesPerLap(), arguments.out.c_str());
   SyntheticWriteOptions write;
   write.force = arguments.force;
-  write.threads = arguments.threads > 0 ? arguments.threads
-                                        : static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  write.threads = arguments.Threads();
   ProgressLine progress;
   write.progress = [&progress](std::size_t done, std::size_t total) { return progress(done, total); };
   interrupted = 0;
@@ -92,6 +134,36 @@ int Generate(const GenerateArguments& arguments) {
   return 0;
 }
 
+// Real images in the world's stead: what belongs to a world is refused beside them.
+void AddChangeOptions(CLI::App& c, GenerateArguments& a) {
+  const std::vector<CLI::Option*> before = c.get_options([](const CLI::Option* option) {
+    static const std::set<std::string> kShared = {"--help", "--out", "--seed", "--threads", "--force"};
+    return kShared.count("--" + option->get_single_name()) == 0;
+  });
+  CLI::Option* from = c.add_option("--from-images", a.from_images,
+                                   "no world: change the images of this folder, names kept, written as png")
+                          ->type_name("DIR");
+  for (CLI::Option* option : before) from->excludes(option);
+  CLI::Option* change =
+      c.add_option("--change", a.change,
+                   "with --from-images: NAME or NAME:2 (strong); dark, overexposed, blur, "
+                   "jpeg (quality 15, 8), half (size 1/2, 1/3), roll (15, 30 deg), occluded "
+                   "(25, 40 % by lorries), rain")
+          ->type_name("NAME[:1|2]")
+          ->needs(from);
+  from->needs(change);
+  c.add_option("--stride", a.stride, "with --from-images: take one of so many images")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str()
+      ->needs(from);
+  c.add_option(
+       "--change-from", a.change_from,
+       "with --from-images: copy the images before this one as they are; counted from 0, after --stride")
+      ->check(NotNegative())
+      ->capture_default_str()
+      ->needs(from);
+}
+
 void AddOptions(CLI::App& c, GenerateArguments& a) {
   SyntheticOptions& w = a.world;
   c.add_option("--out", a.out, "folder to write; made if missing, must be empty")
@@ -100,7 +172,6 @@ void AddOptions(CLI::App& c, GenerateArguments& a) {
   c.add_option(
        "--sensor", a.sensor,
        "mono, stereo (both in the KITTI layout), rgbd (TUM layout) or sides (pairs that look left and right)")
-      ->required()
       ->check(CLI::IsMember({"mono", "stereo", "rgbd", "sides"}))
       ->type_name("NAME");
   c.add_option(
@@ -159,13 +230,16 @@ void AddOptions(CLI::App& c, GenerateArguments& a) {
       ->capture_default_str();
   c.add_option("--threads", a.threads, "frames rendered at the same time; 0: as many as cores");
   c.add_flag("--force", a.force, "write into a folder that is not empty (its old frames are removed)");
+  AddChangeOptions(c, a);
 }
 
 }  // namespace
 
 void AddGenerateCommand(CLI::App& app, int& exit_code) {
   CLI::App* command = app.add_subcommand(
-      "generate", "Render the synthetic world: images and exact ground truth, the same for the same options");
+      "generate",
+      "Render the synthetic world (images and exact ground truth), or change real images; the same for the "
+      "same options");
   command->footer(
       "Examples:\n"
       "  tutti generate --out town --sensor stereo                         two laps of 315 m\n"
@@ -173,6 +247,7 @@ void AddGenerateCommand(CLI::App& app, int& exit_code) {
       "  tutti generate --out room --sensor rgbd --world room --kinect-noise\n"
       "  tutti generate --out ring --sensor mono --world corridor --rate 1 --width 240 --height 192\n"
       "  tutti generate --out hard --sensor stereo --noise --blur --lighting-change --moving-objects\n"
+      "  tutti generate --out dark --from-images kitchen/rgb --change dark:2 --change-from 250\n"
       "The folder also gets a config.yaml: tutti run --config town/config.yaml --dataset town --out result");
   auto arguments = std::make_shared<GenerateArguments>();
   AddOptions(*command, *arguments);

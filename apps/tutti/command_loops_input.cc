@@ -119,14 +119,20 @@ LoopGroundTruth FromPoses(const GroundTruthArguments& arguments, const std::vect
 std::vector<fs::path> ListImages(const fs::path& folder) {
   std::error_code error;
   if (!fs::is_directory(folder, error)) {
-    throw InputError(folder.string() + ": no such folder; --images takes the folder that holds the images");
+    throw InputError(folder.string() + ": no such folder; give the folder that holds the images");
   }
+  std::vector<fs::path> images = ImagesIn(folder);
+  if (images.empty()) throw InputError(folder.string() + ": holds no image files");
+  return images;
+}
+
+std::vector<fs::path> ImagesIn(const fs::path& folder) {
+  std::error_code error;
   std::vector<fs::path> images;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
     if (entry.is_regular_file() && IsImage(entry.path())) images.push_back(entry.path());
   }
   if (error) throw InputError(folder.string() + ": can't be read (" + error.message() + ")");
-  if (images.empty()) throw InputError(folder.string() + ": holds no image files");
   std::sort(images.begin(), images.end(), [](const fs::path& a, const fs::path& b) {
     return NaturalLess(a.filename().string(), b.filename().string());
   });

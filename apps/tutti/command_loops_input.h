@@ -1,4 +1,5 @@
-// Input of `tutti loops`: the images of a folder and the ground truth that fits them.
+// Input of `tutti loops` (and of `tutti generate --from-images`): the images of a folder and the ground truth
+// that fits them.
 #pragma once
 
 #include <filesystem>
@@ -12,6 +13,9 @@ namespace tutti::cli {
 /// Image files of a folder in natural order; files of other types are ignored. Throws InputError if there are
 /// none.
 std::vector<std::filesystem::path> ListImages(const std::filesystem::path& folder);
+
+/// The same of a folder that may hold none.
+std::vector<std::filesystem::path> ImagesIn(const std::filesystem::path& folder);
 
 struct GroundTruthArguments {
   std::string file;  ///< a loop matrix or a trajectory

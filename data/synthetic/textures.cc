@@ -250,6 +250,39 @@ cv::Mat CarTexture(std::uint64_t seed, bool side) {
   return image;
 }
 
+cv::Mat BusTexture(std::uint64_t seed) {
+  Random random(seed);
+  constexpr int kWidth = 512, kHeight = 256;
+  cv::Mat image = Plain(kWidth, kHeight, random.In(50, 215));
+  AddNoise(image, 128, 9, random.Bits());
+  const bool windows = random.Unit() < 0.6;
+  if (windows) {
+    const int pitch = random.Int(58, 96), top = random.Int(20, 40), height = random.Int(60, 90);
+    for (int x = 10; x + pitch - 8 < kWidth; x += pitch) {
+      Window(image, {x + 4, top, pitch - 14, height}, random.In(20, 50), 1, random);
+    }
+  } else {  // planks of a lorry
+    for (int x = 0; x < kWidth; x += 32) Box(image, x, 12, 2, 190, random.In(40, 120));
+  }
+  const int posters = random.Int(2, 4), low = windows ? 128 : 24;
+  for (int k = 0; k < posters; ++k) {
+    cv::Mat poster;
+    const cv::Rect r(k * kWidth / posters + random.Int(4, 20), low + random.Int(0, 12),
+                     random.Int(70, kWidth / posters - 24), random.Int(50, 80));
+    cv::resize(SignTexture(random.Bits()), poster, r.size(), 0, 0, cv::INTER_AREA);
+    poster.copyTo(image(r));
+  }
+  Box(image, 0, 214, kWidth, 6, random.In(20, 230));
+  Box(image, 0, 236, kWidth, 20, 28);
+  for (const int x : {90, 420}) {
+    cv::circle(image, {x, 226}, 28, cv::Scalar(14), cv::FILLED);
+    cv::circle(image, {x, 226}, 13, cv::Scalar(145), cv::FILLED);
+  }
+  Marks(image, 25, 45, random);
+  AddNoise(image, 16, 4, random.Bits());
+  return image;
+}
+
 cv::Mat FoliageTexture(std::uint64_t seed) {
   Random random(seed);
   cv::Mat image = Plain(128, 128, 70);

@@ -17,11 +17,13 @@ cv::Mat RoadTexture(std::uint64_t seed,
 cv::Mat GroundTexture(std::uint64_t seed);          ///< 256x256: earth and grass
 cv::Mat SignTexture(std::uint64_t seed);            ///< 128x128: a poster or shop sign, no two alike
 cv::Mat CarTexture(std::uint64_t seed, bool side);  ///< 128x64: side or front of a car
-cv::Mat FoliageTexture(std::uint64_t seed);         ///< 128x128
-cv::Mat SkyTexture(std::uint64_t seed);             ///< 512x256: faint clouds
-cv::Mat WoodTexture(std::uint64_t seed);            ///< 256x256: planks or boards of furniture
-cv::Mat ShelfTexture(std::uint64_t seed);           ///< 256x256: rows of books
-cv::Mat PlasterTexture(std::uint64_t seed);         ///< 256x256: a painted wall with almost nothing to see
+/// 512x256: side of a bus or lorry with windows, posters and dirt, or of a plain van, no two alike
+cv::Mat BusTexture(std::uint64_t seed);
+cv::Mat FoliageTexture(std::uint64_t seed);  ///< 128x128
+cv::Mat SkyTexture(std::uint64_t seed);      ///< 512x256: faint clouds
+cv::Mat WoodTexture(std::uint64_t seed);     ///< 256x256: planks or boards of furniture
+cv::Mat ShelfTexture(std::uint64_t seed);    ///< 256x256: rows of books
+cv::Mat PlasterTexture(std::uint64_t seed);  ///< 256x256: a painted wall with almost nothing to see
 /// 256x256: 4x4 panels of a floor or ceiling, with so many stains and scratches
 cv::Mat PanelTexture(std::uint64_t seed, double grey, int marks);
 cv::Mat DoorTexture(std::uint64_t seed);       ///< 128x256

@@ -1,0 +1,140 @@
+#include "changed_images.h"
+
+#include <algorithm>
+#include <exception>
+#include <mutex>
+#include <opencv2/imgcodecs.hpp>
+#include <set>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "command_loops_input.h"
+#include "files.h"
+#include "tutti/core/error.h"
+
+namespace tutti::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+void Prepare(const fs::path& from, const fs::path& out, bool force) {
+  std::error_code error;
+  if (fs::equivalent(from, out, error)) {
+    throw InputError(out.string() + ": holds the images that are read; give another folder");
+  }
+  if (fs::exists(out, error) && !fs::is_directory(out, error)) {
+    throw InputError(out.string() + ": is a file; give a folder");
+  }
+  if (fs::exists(out, error) && !fs::is_empty(out, error)) {
+    if (!force)
+      throw InputError(out.string() + ": is not empty; give another folder, or --force to write into it");
+    for (const fs::path& old : ImagesIn(out)) fs::remove(old, error);
+  }
+  MakeFolder(out);
+}
+
+// An image with three channels that are all the same is grey (webp has no grey of its own).
+cv::Mat GreyIfColourless(const cv::Mat& image) {
+  if (image.channels() != 3) return image;
+  std::vector<cv::Mat> channels;
+  cv::split(image, channels);
+  const bool grey = cv::norm(channels[0], channels[1], cv::NORM_INF) == 0 &&
+                    cv::norm(channels[0], channels[2], cv::NORM_INF) == 0;
+  return grey ? channels[0] : image;
+}
+
+class Writer {
+ public:
+  Writer(const ImageChange& change, const ChangedImagesOptions& options)
+      : change_(change), options_(options) {
+    const std::vector<fs::path> all = ListImages(options.from);
+    for (std::size_t i = 0; i < all.size(); i += static_cast<std::size_t>(options.stride))
+      images_.push_back(all[i]);
+    std::set<std::string> stems;
+    for (const fs::path& image : images_) {
+      if (!stems.insert(image.stem().string()).second) {
+        throw InputError(image.string() +
+                         ": another image of the folder has this name with another ending; "
+                         "all are written as png, so rename one");
+      }
+    }
+  }
+
+  ChangedImages Run() {
+    Prepare(options_.from, options_.out, options_.force);
+    std::vector<std::thread> threads;
+    for (int k = 1; k < options_.threads; ++k) threads.emplace_back([this] { Work(); });
+    Work();
+    for (std::thread& thread : threads) thread.join();
+    if (failure_) std::rethrow_exception(failure_);
+    return {images_.size(), next_};
+  }
+
+ private:
+  // Takes images in order until all are taken or one thread stopped: then those taken so far are complete.
+  void Work() {
+    std::unique_lock<std::mutex> lock(mutex_);
+    while (!stop_ && next_ < images_.size()) {
+      const std::size_t i = next_++;
+      lock.unlock();
+      std::exception_ptr failure;
+      try {
+        WriteOne(i);
+      } catch (...) {
+        failure = std::current_exception();
+      }
+      lock.lock();
+      ++done_;
+      if (failure) {
+        failure_ = failure_ ? failure_ : failure;
+        stop_ = true;
+      } else if (options_.progress && !options_.progress(done_, images_.size())) {
+        stop_ = true;
+      }
+    }
+  }
+
+  void WriteOne(std::size_t i) const {
+    const fs::path& from = images_[i];
+    if (static_cast<int>(i) < options_.change_from) {
+      std::error_code error;
+      fs::copy_file(from, options_.out / from.filename(), error);
+      if (error) throw InputError(from.string() + ": can't be copied (" + error.message() + ")");
+      return;
+    }
+    cv::Mat image;
+    try {
+      image = cv::imread(from.string(), cv::IMREAD_ANYCOLOR);
+    } catch (const cv::Exception&) {
+      image.release();
+    }
+    if (image.empty()) throw InputError(from.string() + ": is no image that can be read, or is damaged");
+    const fs::path to = options_.out / (from.stem().string() + ".png");
+    bool good = false;
+    const cv::Mat changed = change_.Apply(GreyIfColourless(image), options_.seed, static_cast<int>(i));
+    try {
+      good = cv::imwrite(to.string(), changed, {cv::IMWRITE_PNG_COMPRESSION, 1});
+    } catch (const cv::Exception&) {
+      good = false;
+    }
+    if (!good)
+      throw InputError(to.string() + ": can't be written; is the folder writable and the disk not full?");
+  }
+
+  const ImageChange& change_;
+  const ChangedImagesOptions& options_;
+  std::vector<fs::path> images_;
+  std::mutex mutex_;  // of what follows
+  std::size_t next_ = 0, done_ = 0;
+  bool stop_ = false;
+  std::exception_ptr failure_;
+};
+
+}  // namespace
+
+ChangedImages WriteChangedImages(const ImageChange& change, const ChangedImagesOptions& options) {
+  return Writer(change, options).Run();
+}
+
+}  // namespace tutti::cli

@@ -10,6 +10,7 @@
 #include <set>
 
 #include "epipolar.h"
+#include "evidence.h"
 #include "tutti/loopclosure/matching.h"
 #include "tutti/loopclosure/parallel.h"
 #include "tutti/loopclosure/relative_pose.h"
@@ -120,7 +121,26 @@ __attribute__((format(printf, 1, 2))) std::string Format(const char* format, ...
   return text.data();
 }
 
-// Fills counts and matched pixels, and says what the inliers lack; empty if nothing.
+// What the inliers are worth, whatever the bars say of them.
+void FillEvidence(const std::vector<cv::Point2f>& in_query, const std::vector<cv::Point2f>& in_candidate,
+                  const View& query, const View& candidate, const VerificationOptions& options,
+                  Verification& result) {
+  const bool rigid = result.type == ConstraintType::kRigid;
+  const internal::FitModel model = rigid ? internal::FitModel::kPnp
+                                   : result.type == ConstraintType::kEssential
+                                       ? internal::FitModel::kEssential
+                                       : internal::FitModel::kFundamental;
+  const internal::ChanceFit chance =
+      internal::FitByChance(model, result.matches, result.inliers,
+                            rigid ? options.reprojection_px : options.epipolar_px, query.size);
+  result.expected_inliers = chance.expected;
+  result.log_nfa = chance.log_nfa;
+  result.coverage = std::min(internal::OccupiedCells(in_query, query.size),
+                             internal::OccupiedCells(in_candidate, candidate.size));
+  result.motion_spread = internal::MotionSpread(in_query, in_candidate, query.size);
+}
+
+// Fills counts, evidence and matched pixels, and says what the inliers lack; empty if nothing.
 std::string Judge(const std::vector<PooledMatch>& pool, const std::vector<int>& inliers,
                   std::size_t considered, const View& query, const View& candidate,
                   const VerificationOptions& options, Verification& result) {
@@ -135,6 +155,7 @@ std::string Judge(const std::vector<PooledMatch>& pool, const std::vector<int>& 
     in_query.push_back(m.query);
     in_candidate.push_back(m.candidate);
   }
+  FillEvidence(in_query, in_candidate, query, candidate, options, result);
   const bool rigid = result.type == ConstraintType::kRigid;
   const int min_inliers = rigid ? options.min_inliers : options.min_epipolar_inliers;
   const double min_ratio = rigid ? options.min_inlier_ratio : options.min_epipolar_ratio;

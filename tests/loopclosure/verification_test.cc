@@ -104,6 +104,36 @@ TEST(GeometricVerifier, AnotherPlaceIsRefusedWithAReason) {
   EXPECT_FALSE(v.reason.empty());
 }
 
+TEST(GeometricVerifier, EvidencePartsOnePlaceFromChanceWhateverIsDecided) {
+  VerificationOptions strict;
+  strict.min_epipolar_inliers = 1000;  // nothing is accepted
+  View chance = See(Pose(), 1, false, false);
+  std::mt19937 generator(3);
+  for (cv::Point2f& p : chance.members[0].pixels) {
+    p = {static_cast<float>(generator() % 640u), static_cast<float>(generator() % 480u)};
+  }
+  const View query = See(At(0.8, 0.2), 9, false, false);
+  const Verification same = GeometricVerifier(strict, 1).Verify(query, See(Pose(), 1, false, false));
+  const Verification other = GeometricVerifier(strict, 1).Verify(query, chance);
+  ASSERT_FALSE(same.accepted);
+  ASSERT_FALSE(other.accepted);
+  EXPECT_GT(same.coverage, 24);
+  EXPECT_LT(other.coverage, same.coverage);
+  EXPECT_LT(same.log_nfa, -100);
+  EXPECT_GT(other.log_nfa, -5);
+  EXPECT_GT(same.inliers, 10 * same.expected_inliers);
+  EXPECT_GT(same.motion_spread, 0.005);  // parallax: 4 to 12 m away
+}
+
+TEST(GeometricVerifier, WithMetricPointsEvidenceIsByPixels) {
+  const Verification v =
+      GeometricVerifier({}, 1).Verify(See(At(0.4, 0.2, 0.05), 9, true, true), See(Pose(), 1, true, true));
+  ASSERT_EQ(v.type, ConstraintType::kRigid);
+  EXPECT_LT(v.expected_inliers, 3.1);  // the sample of three
+  EXPECT_LT(v.log_nfa, -300);
+  EXPECT_GT(v.coverage, 24);
+}
+
 TEST(GeometricVerifier, MatchesInOneSpotAreRefused) {
   View query = See(At(0.8, 0), 9, false, false), candidate = See(Pose(), 1, false, false);
   for (View* view : {&query, &candidate}) {

@@ -90,11 +90,19 @@ struct Verification {
   Similarity S_candidate_query;  ///< maps points of the query camera into the candidate camera (kRigid:
                                  ///< scale 1; kEssential: rotation and unit direction only)
   Matrix6d information = Matrix6d::Zero();  ///< of (translation [m], rotation [rad]), from the inliers
-  double ahead = 1;    ///< kEssential, kFundamental: share of the translation that is along the candidate's
-                       ///< optical axis, 0..1; without a camera by a guessed focal length
-  int matches = 0;     ///< that were considered (kRigid: those with a 3D point)
-  int inliers = 0;     ///< of these, those that fit one camera motion
-  std::string reason;  ///< why not, in plain words; empty if accepted
+  double ahead = 1;  ///< kEssential, kFundamental: share of the translation that is along the candidate's
+                     ///< optical axis, 0..1; without a camera by a guessed focal length
+  int matches = 0;   ///< that were considered (kRigid: those with a 3D point)
+  int inliers = 0;   ///< of these, those that fit one camera motion
+  int coverage = 0;  ///< cells of a grid of 8x6 that inliers occupy, in the image with fewer, 0..48
+  double expected_inliers = 0;  ///< of so many matches, those that chance lets fit: the sample and the share
+                                ///< of the image that lies within the threshold of where a match has to be
+  double log_nfa = 0;  ///< log10 of the number of false alarms (Moisan & Stival 2004): motions that chance
+                       ///< lets as many matches fit; the further below 0 the surer that one motion moved
+                       ///< them. That says "one scene or one object", not yet "one place"
+  double motion_spread = 0;  ///< standard deviation of the inliers' displacements between the images, as a
+                             ///< share of the diagonal: what moves as one is far, flat, or one object
+  std::string reason;        ///< why not, in plain words; empty if accepted
   std::vector<VerifiedMatch> inlier_matches;  ///< the inliers
 };
 

@@ -1,0 +1,41 @@
+// What the inliers of a camera motion are worth as evidence that two images show one place. Internal.
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <vector>
+
+namespace tutti::internal {
+
+/// What the matches of two images are held to.
+enum class FitModel {
+  kFundamental,  ///< a line in the other image; 7 matches give up to 3 of them
+  kEssential,    ///< the same from 5 matches, up to 10
+  kHomography,   ///< a point in the other image; 4 matches give one
+  kPnp,          ///< the same from 3 matches with points, up to 4
+};
+
+/// How many matches would fit a model by chance.
+struct ChanceFit {
+  double expected = 0;  ///< of these matches, the sample included
+  double log_nfa = 0;   ///< log10 of the number of false alarms: of models that as many or more would fit
+};
+
+/// The a-contrario model of Moisan & Stival (IJCV 57, 2004): the end of a match lies anywhere in the image,
+/// evenly, so that it is within `threshold_px` of a line with probability alpha = 2 d D / A at most (D
+/// diagonal, A area), of a point with pi d^2 / A. Of n matches that are free to fit k do, beyond the sample
+/// of s:
+///     NFA = models (n - s) C(n, k) C(k, s) alpha^(k - s)
+/// Below 1 (log_nfa < 0) chance hardly explains them. 0 for both without a match or image; log_nfa is 0 where
+/// no more than the sample fits.
+ChanceFit FitByChance(FitModel model, int matches, int inliers, double threshold_px, const cv::Size& image);
+
+/// Cells of a grid of 8x6 over the image with at least one of the pixels, 0..48; pixels outside count in the
+/// nearest cell.
+int OccupiedCells(const std::vector<cv::Point2f>& pixels, const cv::Size& image);
+
+/// Root of the mean squared deviation of the displacements first -> second from their mean, as a share of the
+/// diagonal of `image`. 0 if all moved as one.
+double MotionSpread(const std::vector<cv::Point2f>& first, const std::vector<cv::Point2f>& second,
+                    const cv::Size& image);
+
+}  // namespace tutti::internal

@@ -29,7 +29,7 @@ namespace tutti::cli {
 namespace {
 
 struct LoopsArguments {
-  std::string images, out, rule = "mean", preset, camera;
+  std::string images, out, rule, preset, camera;
   GroundTruthArguments truth;
   std::vector<std::string> set;  // key=value, keys of the section `loops` of a configuration
   LoopDetectorOptions options;
@@ -175,7 +175,7 @@ int RunLoops(const LoopsArguments& given) {
   }
   if (arguments.truth.stride < 1) throw InputError("--stride must be at least 1");
   if (!arguments.preset.empty()) ApplyPreset(arguments.preset, arguments.options);
-  SetRule(arguments.rule, arguments.options);
+  if (!arguments.rule.empty()) SetRule(arguments.rule, arguments.options);
   SetLoopOptions(arguments.set, arguments.options);
   const std::string problem = arguments.truth.rule.Validate();
   if (!problem.empty()) throw InputError("ground truth: " + problem);
@@ -220,10 +220,11 @@ void AddLoopsCommand(CLI::App& app, int& exit_code) {
                     "also write posteriors.csv: what each member believed of each location");
   command
       ->add_option("--rule", arguments->rule,
-                   "mean, product, majority, naive, or one member: surf, sift, orb, akaze, brisk, kaze")
-      ->capture_default_str();
+                   "joint (default), mean, log-pool, product, majority, naive, or one member: surf, sift, orb, "
+                   "akaze, brisk, kaze")
+      ->type_name("RULE");
   command->add_option("--preset", arguments->preset,
-                      "published parameters: paper-2013, rtabmap-0.8.3, or default (ours)");
+                      "published parameters: standardised-mean, paper-2013, rtabmap-0.8.3, or default (ours)");
   LoopRule& rule = arguments->truth.rule;
   command->add_option("--gt-distance", rule.distance_m, "trajectory: a loop is nearer than this [m]")
       ->capture_default_str();

@@ -2,58 +2,61 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 namespace tutti {
 
-Belief CombineMean(const std::vector<const Belief*>& members, const std::vector<double>& weights) {
-  Belief mean;
-  if (members.empty()) return mean;
+namespace {
+
+std::size_t SlotsOf(const std::vector<const Belief*>& members) {
   std::size_t slots = 0;
   for (const Belief* member : members) slots = std::max(slots, member->places.size());
-  mean.new_place = 0.0;
-  mean.places.assign(slots, 0.0);
-  const double sum = std::accumulate(weights.begin(), weights.end(), 0.0);
-  for (std::size_t k = 0; k < members.size(); ++k) {
-    const Belief& member = *members[k];
-    const double share = weights.empty() ? 1.0 / static_cast<double>(members.size()) : weights[k] / sum;
-    mean.new_place += share * member.new_place;
-    for (std::size_t i = 0; i < member.places.size(); ++i) mean.places[i] += share * member.places[i];
-  }
-  return mean;
+  return slots;
 }
 
-double Certainty(const Belief& belief, const std::vector<int>& working_memory) {
-  constexpr double kFloor = 0.05;
-  const auto entropy = [](double p) { return p > 0 ? -p * std::log(p) : 0.0; };
-  double sum = entropy(belief.new_place);
-  for (const int slot : working_memory) {
-    const std::size_t i = static_cast<std::size_t>(slot);
-    if (i < belief.places.size()) sum += entropy(belief.places[i]);
-  }
-  const double largest = std::log(1.0 + static_cast<double>(working_memory.size()));
-  return largest > 0 ? std::clamp(1.0 - sum / largest, kFloor, 1.0) : 1.0;
-}
-
-Belief CombineProduct(const std::vector<const Belief*>& members, const std::vector<int>& working_memory) {
+// prod_k max(p_k, 1e-9)^exponent, renormalised.
+Belief PowerProduct(const std::vector<const Belief*>& members, const std::vector<int>& working_memory,
+                    double exponent) {
   constexpr double kFloor = 1e-9;
   Belief product;
   if (members.empty()) return product;
-  std::size_t slots = 0;
-  for (const Belief* member : members) slots = std::max(slots, member->places.size());
-  product.places.assign(slots, 0.0);
+  product.places.assign(SlotsOf(members), 0.0);
+  const auto power = [exponent](double value) { return exponent == 1.0 ? value : std::pow(value, exponent); };
   product.new_place = 1.0;
-  for (const Belief* member : members) product.new_place *= std::max(member->new_place, kFloor);
+  for (const Belief* member : members) product.new_place *= power(std::max(member->new_place, kFloor));
   for (const int slot : working_memory) {
     const std::size_t i = static_cast<std::size_t>(slot);
     double value = 1.0;
     for (const Belief* member : members) {
-      value *= std::max(i < member->places.size() ? member->places[i] : 0.0, kFloor);
+      value *= power(std::max(i < member->places.size() ? member->places[i] : 0.0, kFloor));
     }
     product.places[i] = value;
   }
   product.Normalise();
   return product;
+}
+
+}  // namespace
+
+Belief CombineMean(const std::vector<const Belief*>& members) {
+  Belief mean;
+  if (members.empty()) return mean;
+  mean.new_place = 0.0;
+  mean.places.assign(SlotsOf(members), 0.0);
+  const double share = 1.0 / static_cast<double>(members.size());
+  for (const Belief* member : members) {
+    mean.new_place += share * member->new_place;
+    for (std::size_t i = 0; i < member->places.size(); ++i) mean.places[i] += share * member->places[i];
+  }
+  return mean;
+}
+
+Belief CombineProduct(const std::vector<const Belief*>& members, const std::vector<int>& working_memory) {
+  return PowerProduct(members, working_memory, 1.0);
+}
+
+Belief CombineLogPool(const std::vector<const Belief*>& members, const std::vector<int>& working_memory) {
+  return PowerProduct(members, working_memory,
+                      1.0 / static_cast<double>(std::max<std::size_t>(1, members.size())));
 }
 
 CombinedBelief CombineMajority(const std::vector<const Belief*>& members, double threshold,
@@ -94,12 +97,14 @@ CombinedBelief CombineMajority(const std::vector<const Belief*>& members, double
 }
 
 CombinedBelief Combine(CombinationRule rule, const std::vector<const Belief*>& members, double threshold,
-                       const LocationMemory& memory, const std::vector<double>& weights) {
+                       const LocationMemory& memory) {
   if (rule == CombinationRule::kMajority) return CombineMajority(members, threshold, memory);
   CombinedBelief result;
   if (members.empty()) return result;
-  result.belief = rule == CombinationRule::kProduct ? CombineProduct(members, memory.working_memory())
-                                                    : CombineMean(members, weights);
+  const std::vector<int>& places = memory.working_memory();
+  result.belief = rule == CombinationRule::kProduct   ? CombineProduct(members, places)
+                  : rule == CombinationRule::kLogPool ? CombineLogPool(members, places)
+                                                      : CombineMean(members);
   result.hypothesis = std::clamp(result.belief.Hypothesis(), 0.0, 1.0);
   result.best = result.belief.Best();
   return result;

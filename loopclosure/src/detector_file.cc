@@ -21,7 +21,7 @@ using State = LocationMemory::State;
 namespace {
 
 constexpr char kMagic[8] = {'T', 'U', 'T', 'T', 'I', 'L', 'C', '\n'};
-constexpr std::uint32_t kVersion = 2;
+constexpr std::uint32_t kVersion = 3;
 constexpr std::uint32_t kByteOrder = 0x01020304;  // reads as another number on a machine of the other order
 
 enum class Tag : std::uint32_t { kOptions = 1, kMember, kMemory, kUnion, kView, kRecord, kStatistics, kEnd };
@@ -159,7 +159,7 @@ std::string RecordBytes(Kind kind, std::int64_t a, std::int64_t b, std::string_v
 void LoopDetector::Impl::Save(const std::filesystem::path& file) const {
   SectionWriter out(file);
   ByteWriter options;
-  options.PutString(Fingerprint());
+  options.PutString(reasoner_.Fingerprint());
   options.Put(options_.seed);
   out.Write(Tag::kOptions, options.bytes());
   out.Write(Tag::kStatistics, Statistics());
@@ -168,13 +168,13 @@ void LoopDetector::Impl::Save(const std::filesystem::path& file) const {
     member.vocabulary().Save(bytes);
     out.Write(Tag::kMember, bytes.bytes());
   }
-  for (const auto& system : systems_) {
+  for (const auto& system : systems()) {
     ByteWriter bytes;
     system->Save(bytes);
     out.Write(Tag::kMemory, bytes.bytes());
   }
   ByteWriter graph;
-  union_.Save(graph);
+  union_of_all().Save(graph);
   out.Write(Tag::kUnion, graph.bytes());
   for (int slot = 0; slot < memory().size(); ++slot) {
     if (!InMemory(slot)) continue;
@@ -195,9 +195,9 @@ void LoopDetector::Impl::SaveLongTerm(const std::function<void(const std::string
     if (kind == Kind::kWord) {
       return number < members_.size() && !members_[number].vocabulary().Has(index);
     }
-    if (number >= systems_.size() || index < 0 || index >= memory().size()) return false;
+    if (number >= systems().size() || index < 0 || index >= memory().size()) return false;
     if (kind == Kind::kView) return !InMemory(index);
-    return systems_[number]->memory().state(index) == State::kLongTerm;
+    return systems()[number]->memory().state(index) == State::kLongTerm;
   };
   for (const Kind kind : {Kind::kSignature, Kind::kView, Kind::kWord}) {
     store_->ForEach(kind, [&](std::int64_t a, std::int64_t b, std::string_view bytes) {
@@ -216,9 +216,9 @@ std::unique_ptr<LoopDetector::Impl> LoopDetector::Impl::Load(const std::filesyst
   own.ltm_file.clear();
   own.seed = header.Get<std::uint64_t>();
   auto loaded = std::make_unique<Impl>(own);
-  if (fingerprint != loaded->Fingerprint()) {
+  if (fingerprint != loaded->reasoner_.Fingerprint()) {
     throw InputError(in.name() + ": was saved with another configuration (" + fingerprint +
-                     "; here: " + loaded->Fingerprint() + "); load it with the same members and memory");
+                     "; here: " + loaded->reasoner_.Fingerprint() + "); load it with the same members and memory");
   }
   loaded->options_.ltm_file = options.ltm_file;
   const auto section = [&](Tag tag, const std::function<void(ByteReader&)>& read) {
@@ -231,10 +231,10 @@ std::unique_ptr<LoopDetector::Impl> LoopDetector::Impl::Load(const std::filesyst
   for (Member& member : loaded->members_) {
     section(Tag::kMember, [&](ByteReader& bytes) { member.vocabulary().Load(bytes); });
   }
-  for (auto& system : loaded->systems_) {
+  for (auto& system : loaded->systems()) {
     section(Tag::kMemory, [&](ByteReader& bytes) { system->Load(bytes); });
   }
-  section(Tag::kUnion, [&](ByteReader& bytes) { loaded->union_.Load(bytes); });
+  section(Tag::kUnion, [&](ByteReader& bytes) { loaded->union_of_all().Load(bytes); });
   loaded->LoadViewsAndRecords(
       [&](bool& is_view, std::string& bytes) {
         Tag tag;
@@ -254,7 +254,7 @@ void LoopDetector::Impl::CheckMemories(const std::string& source) const {
   const int size = memory().size();
   const std::int64_t newest = size > 0 ? memory().id(size - 1) : -1;
   if (newest != last_id_) in.Damaged("the last location is missing");
-  for (const auto& system : systems_) {
+  for (const auto& system : systems()) {
     if (system->memory().size() != size) in.Damaged("the memories are of different lengths");
     for (int slot = 0; slot < size; ++slot) {
       if (system->memory().id(slot) != memory().id(slot)) in.Damaged("memories of different locations");

@@ -11,8 +11,7 @@
 
 #include "hypothesis_search.h"
 #include "location_store.h"
-#include "memory_system.h"
-#include "tutti/loopclosure/combination.h"
+#include "place_reasoner.h"
 #include "tutti/loopclosure/detector.h"
 #include "tutti/loopclosure/member.h"
 #include "tutti/loopclosure/verification.h"
@@ -26,7 +25,8 @@ class LoopDetector::Impl {
 
   LoopResult Detect(const LoopQuery& query);
   LoopResult Locate(const LoopQuery& query) const;
-  void AddLink(std::int64_t a, std::int64_t b);
+  void AddLink(std::int64_t a, std::int64_t b) { reasoner_.AddLink(a, b); }
+  void Unlink(std::int64_t a, std::int64_t b) { reasoner_.Unlink(a, b); }
   void Save(const std::filesystem::path& file) const;
   /// A new Impl with what the file holds, long-term memory in a temporary store.
   static std::unique_ptr<Impl> Load(const std::filesystem::path& file, const LoopDetectorOptions& options);
@@ -36,15 +36,19 @@ class LoopDetector::Impl {
   bool has_durable_store() const { return store_ && store_->durable(); }
   std::unique_ptr<internal::LocationStore>& store_pointer() { return store_; }
 
-  const LocationMemory& memory() const { return Shared() ? systems_.front()->memory() : union_; }
+  const LocationMemory& memory() const { return reasoner_.memory(); }
   std::int64_t last_id() const { return last_id_; }
   const LoopDetectorOptions& options() const { return options_; }
 
  private:
   static std::size_t Index(int i) { return static_cast<std::size_t>(i); }
-  bool Shared() const { return systems_.size() == 1; }
-  // Of union_ in the store: the one after those of the systems.
-  int UnionNumber() const { return static_cast<int>(systems_.size()); }
+  bool Shared() const { return reasoner_.Shared(); }
+  std::vector<std::unique_ptr<internal::MemorySystem>>& systems() { return reasoner_.systems(); }
+  const std::vector<std::unique_ptr<internal::MemorySystem>>& systems() const { return reasoner_.systems(); }
+  LocationMemory& union_of_all() { return reasoner_.union_of_all(); }
+  const LocationMemory& union_of_all() const { return reasoner_.union_of_all(); }
+  // Of the union of all memories in the store: the one after those of the systems.
+  int UnionNumber() const { return static_cast<int>(systems().size()); }
 
   // What happens to an image.
   void CheckQuery(const LoopQuery& query) const;
@@ -54,26 +58,19 @@ class LoopDetector::Impl {
   std::vector<Features> Extract(const LoopQuery& query) const;
   std::vector<std::vector<TwoNearest>> SearchWords(const std::vector<Features>& features,
                                                    const std::vector<char>& usable) const;
-  std::vector<Signature> Quantise(const std::vector<Features>& features);
-  int Remember(const LoopQuery& query, const std::vector<Features>& features,
-               const std::vector<Signature>& signatures);
-  void ForEachUnit(const std::function<void(internal::MemorySystem&, std::size_t)>& call);
-  CombinedBelief CombineUnits() const;
-  std::vector<double> Weights() const;
-  const internal::FilterUnit& UnitOf(std::size_t member) const;
-  void FillOpinions(const std::vector<Features>& features, const CombinedBelief& combined,
-                    LoopResult& result) const;
-  void FollowCandidate(int best);
+  std::vector<SeenWords> Quantise(const std::vector<Features>& features, const cv::Size& size);
+  int Remember(const LoopQuery& query, View view, const std::vector<SeenWords>& words);
+  void FillCounts(const std::vector<Features>& features, LoopResult& result) const;
   void Decide(int slot, const CombinedBelief& combined, LoopResult& result);
-  void CloseLoop(std::int64_t newer, std::int64_t older);
   void Verify(const View& query, const Belief& belief, LoopResult& result) const;
+  void Accept(const Belief& belief, LoopResult& result) const;
 
   // Long-term memory.
   internal::LocationStore& store();
   void Retrieve(int best, LoopResult& result);
   void Shrink(int best, double elapsed_ms, LoopResult& result);
   bool Transfer(internal::MemorySystem& system, int slot, LoopResult& result);
-  bool InMemory(int slot) const;
+  bool InMemory(int slot) const { return reasoner_.InMemory(slot); }
   void PutView(int slot);
   void FetchView(int slot);
   void LoadView(int slot, internal::ByteReader& in);
@@ -82,7 +79,6 @@ class LoopDetector::Impl {
   void WriteWords();
   void MarkStored();
   void Reopen();
-  std::string Fingerprint() const;
   std::string Statistics() const;
   void LoadStatistics(internal::ByteReader& in);
 
@@ -93,15 +89,11 @@ class LoopDetector::Impl {
 
   LoopDetectorOptions options_;
   std::vector<Member> members_;
-  std::vector<std::unique_ptr<internal::MemorySystem>> systems_;  // one, or one per filter
-  LocationMemory union_;  // per-member memories: what is in any of them
+  internal::PlaceReasoner reasoner_;
   GeometricVerifier verifier_;
   std::vector<View> views_;  // by slot; empty where the location is in no memory
   View dropped_view_;        // of a query that rehearsal has just merged away
   std::int64_t last_id_ = -1;
-  double last_hypothesis_ = 0.0;
-  std::int64_t last_candidate_ = -1;
-  int candidates_in_a_row_ = 0;
   int caller_type_ = -1;
   int caller_width_ = 0;
 

@@ -28,23 +28,16 @@ LocationStore& LoopDetector::Impl::store() {
   return *store_;
 }
 
-bool LoopDetector::Impl::InMemory(int slot) const {
-  return std::any_of(systems_.begin(), systems_.end(), [slot](const auto& system) {
-    const State state = system->memory().state(slot);
-    return state == State::kShortTerm || state == State::kWorking;
-  });
-}
-
 // Step 7 of section 1.
 void LoopDetector::Impl::Retrieve(int best, LoopResult& result) {
   if (!store_) return;  // nothing has ever left
   std::set<int> retrieved;
-  for (auto& system : systems_) {
+  for (auto& system : systems()) {
     for (const int slot : system->Retrieve(best, store(), result.warning)) retrieved.insert(slot);
   }
   for (const int slot : retrieved) {
     result.retrieved.push_back(memory().id(slot));
-    if (!Shared()) union_.Retrieve(slot);
+    if (!Shared()) union_of_all().Retrieve(slot);
     if (!views_[Index(slot)].members.empty()) continue;  // another member's memory still had it
     try {
       FetchView(slot);
@@ -91,7 +84,7 @@ void LoopDetector::Impl::PutView(int slot) {
 void LoopDetector::Impl::Shrink(int best, double elapsed_ms, LoopResult& result) {
   std::vector<int> retrieved;
   for (const std::int64_t id : result.retrieved) retrieved.push_back(memory().Find(id));
-  for (auto& system : systems_) {
+  for (auto& system : systems()) {
     int surplus = 0;
     if (options_.wm_limit > 0) {
       surplus = static_cast<int>(system->memory().working_memory().size()) - options_.wm_limit;
@@ -126,7 +119,7 @@ bool LoopDetector::Impl::Transfer(MemorySystem& system, int slot, LoopResult& re
   system.Leave(slot);
   if (!InMemory(slot)) {
     views_[Index(slot)] = View();
-    if (!Shared()) union_.Transfer(slot);
+    if (!Shared()) union_of_all().Transfer(slot);
     result.transferred.push_back(memory().id(slot));
   }
   return true;
@@ -134,13 +127,13 @@ bool LoopDetector::Impl::Transfer(MemorySystem& system, int slot, LoopResult& re
 
 // A durable store learns of every image before Detect returns, in one step.
 void LoopDetector::Impl::Journal(int new_slot, LoopResult& result) {
-  const std::vector<int> changed_union = union_.TakeChanged();
+  const std::vector<int> changed_union = union_of_all().TakeChanged();
   std::vector<std::vector<int>> changed;
-  for (auto& system : systems_) changed.push_back(system->memory().TakeChanged());
+  for (auto& system : systems()) changed.push_back(system->memory().TakeChanged());
   if (!store_ || !store_->durable()) return;
 
   unstored_slots_.insert(new_slot);
-  for (std::size_t s = 0; s < systems_.size(); ++s) {
+  for (std::size_t s = 0; s < systems().size(); ++s) {
     unstored_nodes_[s].insert(changed[s].begin(), changed[s].end());
   }
   unstored_nodes_.back().insert(changed_union.begin(), changed_union.end());
@@ -159,14 +152,14 @@ void LoopDetector::Impl::Journal(int new_slot, LoopResult& result) {
 void LoopDetector::Impl::WriteUnstored() {
   for (const int slot : unstored_slots_) {
     if (!InMemory(slot)) continue;  // merged away
-    for (auto& system : systems_) system->StoreSignatures(slot, *store_);
+    for (auto& system : systems()) system->StoreSignatures(slot, *store_);
     PutView(slot);
   }
   WriteWords();
-  for (std::size_t s = 0; s < systems_.size(); ++s) {
-    internal::StoreNodes(systems_[s]->memory(), static_cast<int>(s), unstored_nodes_[s], *store_);
+  for (std::size_t s = 0; s < systems().size(); ++s) {
+    internal::StoreNodes(systems()[s]->memory(), static_cast<int>(s), unstored_nodes_[s], *store_);
   }
-  internal::StoreNodes(union_, UnionNumber(), unstored_nodes_.back(), *store_);
+  internal::StoreNodes(union_of_all(), UnionNumber(), unstored_nodes_.back(), *store_);
   store_->Put(Kind::kMeta, kStatistics, 0, Statistics());
 }
 
@@ -196,7 +189,7 @@ void LoopDetector::Impl::MoveInto(std::unique_ptr<LocationStore>& target) {
   try {
     store_->Begin();
     store_->Clear();
-    store_->Put(Kind::kMeta, kFingerprint, 0, Fingerprint());
+    store_->Put(Kind::kMeta, kFingerprint, 0, reasoner_.Fingerprint());
     for (const Kind kind : {Kind::kSignature, Kind::kView, Kind::kWord}) {
       if (!target) break;
       target->ForEach(kind, [&](std::int64_t a, std::int64_t b, std::string_view bytes) {
@@ -216,65 +209,40 @@ void LoopDetector::Impl::MoveInto(std::unique_ptr<LocationStore>& target) {
 std::string LoopDetector::Impl::Statistics() const {
   ByteWriter out;
   out.Put(last_id_);
-  out.Put(last_hypothesis_);
-  out.Put(last_candidate_);
-  out.Put<std::int32_t>(candidates_in_a_row_);
   out.Put<std::int32_t>(caller_type_);
   out.Put<std::int32_t>(caller_width_);
   for (const Member& member : members_) member.SaveStatistics(out);
-  for (const auto& system : systems_) {
-    for (const internal::FilterUnit& unit : system->units()) out.Put(unit.agreement);
-  }
+  reasoner_.SaveStatistics(out);
   return out.bytes();
 }
 
 void LoopDetector::Impl::LoadStatistics(ByteReader& in) {
   last_id_ = in.Get<std::int64_t>();
-  last_hypothesis_ = in.Get<double>();
-  last_candidate_ = in.Get<std::int64_t>();
-  candidates_in_a_row_ = in.Get<std::int32_t>();
   caller_type_ = in.Get<std::int32_t>();
   caller_width_ = in.Get<std::int32_t>();
   const bool known_type = caller_type_ == -1 || caller_type_ == CV_8U || caller_type_ == CV_32F;
-  if (last_id_ < -1 || !(last_hypothesis_ >= 0.0 && last_hypothesis_ <= 1.0 + 1e-6) || !known_type ||
-      last_candidate_ < -1 || last_candidate_ > last_id_ || candidates_in_a_row_ < 0) {
-    in.Damaged("the detector's statistics");
-  }
+  if (last_id_ < -1 || !known_type) in.Damaged("the detector's statistics");
   for (Member& member : members_) member.LoadStatistics(in);
-  for (auto& system : systems_) {
-    for (internal::FilterUnit& unit : system->units()) {
-      unit.agreement = in.Get<double>();
-      if (!(unit.agreement >= 0.0 && unit.agreement <= 1.0)) in.Damaged("a member's agreement");
-    }
-  }
-}
-
-// What must be the same for stored locations to be of use.
-std::string LoopDetector::Impl::Fingerprint() const {
-  std::string text = "members";
-  for (const std::string& name : options_.members) text += " " + name;
-  text += options_.rule == CombinationRule::kNaive ? ", one naive filter" : ", a filter each";
-  text += options_.memory == MemoryKind::kShared ? ", shared memory" : ", a memory per member";
-  return text;
+  reasoner_.LoadStatistics(last_id_, in);
 }
 
 void LoopDetector::Impl::Reopen() {
   const auto fingerprint = store_->Get(Kind::kMeta, kFingerprint, 0);
   if (!fingerprint) {
-    store_->Put(Kind::kMeta, kFingerprint, 0, Fingerprint());
+    store_->Put(Kind::kMeta, kFingerprint, 0, reasoner_.Fingerprint());
     return;
   }
-  if (*fingerprint != Fingerprint()) {
+  if (*fingerprint != reasoner_.Fingerprint()) {
     throw InputError(store_->name() + ": belongs to another configuration (" + *fingerprint +
-                     "; here: " + Fingerprint() + "); give another file, or the same members and memory");
+                     "; here: " + reasoner_.Fingerprint() + "); give another file, or the same members and memory");
   }
   const auto statistics = store_->Get(Kind::kMeta, kStatistics, 0);
   if (!statistics) return;  // nothing was detected yet
   ByteReader in(*statistics, store_->name());
   LoadStatistics(in);
-  for (auto& system : systems_) system->Reopen(*store_);
-  if (!Shared()) internal::LoadNodes(UnionNumber(), *store_, union_);
-  for (const auto& system : systems_) {
+  for (auto& system : systems()) system->Reopen(*store_);
+  if (!Shared()) internal::LoadNodes(UnionNumber(), *store_, union_of_all());
+  for (const auto& system : systems()) {
     if (system->memory().size() != memory().size()) in.Damaged("the memories are of different lengths");
   }
   views_.resize(Index(memory().size()));

@@ -10,7 +10,8 @@ namespace tutti {
 namespace {
 
 const std::vector<std::string>& RuleWords() {
-  static const std::vector<std::string> words = {"mean", "product", "majority", "naive"};
+  static const std::vector<std::string> words = {"joint", "mean", "log-pool", "product",
+                                                 "majority", "naive"};
   return words;
 }
 
@@ -47,6 +48,14 @@ std::string VocabularyOptions::Validate() const {
   if (trees < 1 || trees > 32) return OutOf("vocabulary.trees", "1 to 32");
   if (checks < 1) return OutOf("vocabulary.checks", "at least 1");
   if (hash_tables < 1 || hash_tables > 64) return OutOf("vocabulary.hash_tables", "1 to 64");
+  return {};
+}
+
+std::string EvidenceOptions::Validate() const {
+  if (!(sharpness > 0 && sharpness <= 10)) return OutOf("evidence.sharpness", "above 0, at most 10");
+  if (!(alias_share > 0 && alias_share <= 3)) return OutOf("evidence.alias_share", "above 0, at most 3");
+  if (!(floor < 0 && floor >= -10)) return OutOf("evidence.floor", "below 0, at least -10");
+  if (!(attraction >= 0 && attraction <= 2)) return OutOf("evidence.attraction", "0 to 2");
   return {};
 }
 
@@ -92,7 +101,15 @@ std::string LoopDetectorOptions::Validate() const {
   if (rule == CombinationRule::kSingle && members.size() != 1) {
     return "the rule 'single' takes exactly one member, not " + std::to_string(members.size());
   }
+  if (rule == CombinationRule::kJoint && memory == MemoryKind::kPerMember) {
+    return "the rule 'joint' needs memory: shared (its one filter works on the locations of all members)";
+  }
+  if (rule == CombinationRule::kJoint && evidence.kind == EvidenceKind::kStandardised) {
+    return "the rule 'joint' needs evidence.kind: counts (standardised scores can't be added up)";
+  }
   if (!(loop_threshold >= 0 && loop_threshold <= 1)) return OutOf("loop_threshold", "0 to 1");
+  if (!(propose_threshold >= 0 && propose_threshold <= 1)) return OutOf("propose_threshold", "0 to 1");
+  if (!(link_threshold >= 0 && link_threshold <= 1)) return OutOf("link_threshold", "0 to 1");
   if (stm_size < 1) return OutOf("stm_size", "at least 1");
   if (threads < 1) return OutOf("threads", "at least 1");
   if (!(bad_signature_ratio >= 0 && bad_signature_ratio <= 1)) return OutOf("bad_signature_ratio", "0 to 1");
@@ -107,7 +124,8 @@ std::string LoopDetectorOptions::Validate() const {
   if (!(recent_share >= 0 && recent_share < 1)) return OutOf("recent_share", "0 or more, below 1");
   if (!(rehearsal_similarity > 0 && rehearsal_similarity <= 1))
     return OutOf("rehearsal_similarity", "above 0, at most 1");
-  for (const std::string& problem : {extraction.Validate(), vocabulary.Validate(), verification.Validate()}) {
+  for (const std::string& problem :
+       {extraction.Validate(), vocabulary.Validate(), evidence.Validate(), verification.Validate()}) {
     if (!problem.empty()) return problem;
   }
   return {};
@@ -123,7 +141,8 @@ std::vector<std::string> KnownMembers() {
 void SetRule(const std::string& word, LoopDetectorOptions& options) {
   const auto rule = std::find(RuleWords().begin(), RuleWords().end(), word);
   if (rule != RuleWords().end()) {
-    constexpr CombinationRule kRules[] = {CombinationRule::kMean, CombinationRule::kProduct,
+    constexpr CombinationRule kRules[] = {CombinationRule::kJoint,    CombinationRule::kMean,
+                                          CombinationRule::kLogPool,  CombinationRule::kProduct,
                                           CombinationRule::kMajority, CombinationRule::kNaive};
     options.rule = kRules[rule - RuleWords().begin()];
     return;
@@ -137,11 +156,13 @@ void SetRule(const std::string& word, LoopDetectorOptions& options) {
   std::vector<std::string> all = RuleWords();
   all.insert(all.end(), known.begin(), known.end());
   throw InputError("unknown rule '" + word + "'; did you mean '" + NearestWord(word, all) +
-                   "'? Known: mean, product, majority, naive, or one member: " + JoinWords(known));
+                   "'? Known: " + JoinWords(RuleWords()) +
+                   ", or one member: " + JoinWords(known));
 }
 
 const std::vector<std::string>& KnownPresets() {
-  static const std::vector<std::string> names = {"default", "paper-2013", "rtabmap-0.8.3"};
+  static const std::vector<std::string> names = {"default", "standardised-mean", "paper-2013",
+                                                 "rtabmap-0.8.3"};
   return names;
 }
 
@@ -151,7 +172,13 @@ namespace {
 LoopDetectorOptions Published(const std::string& name) {
   LoopDetectorOptions preset;
   if (name == "default") return preset;
-  preset.loop_threshold = 0.11;  // swept in the 2013 paper; this is its system's own
+  preset.rule = CombinationRule::kMean;
+  preset.evidence.kind = EvidenceKind::kStandardised;
+  preset.loop_threshold = 0.0;  // what geometry accepts is a loop
+  preset.link_threshold = 0.0;
+  preset.propose_threshold = 0.07;
+  if (name == "standardised-mean") return preset;
+  preset.propose_threshold = 0.11;  // swept in the 2013 paper; this is its system's own
   preset.recent_share = 0.2;
   preset.extraction.features = 400;
   preset.vocabulary.nndr = 0.8;
@@ -183,7 +210,14 @@ LoopDetectorOptions Published(const std::string& name) {
 
 void ApplyPreset(const std::string& name, LoopDetectorOptions& options) {
   const LoopDetectorOptions preset = Published(name);
+  // A rule that was chosen stays: presets are compared with every rule.
+  if (options.rule == CombinationRule::kJoint || options.rule == CombinationRule::kMean) {
+    options.rule = preset.rule;
+  }
+  options.evidence = preset.evidence;
   options.loop_threshold = preset.loop_threshold;
+  options.propose_threshold = preset.propose_threshold;
+  options.link_threshold = preset.link_threshold;
   options.hypothesis_ratio = preset.hypothesis_ratio;
   options.likelihood = preset.likelihood;
   options.stm_size = preset.stm_size;
@@ -199,8 +233,12 @@ void ApplyPreset(const std::string& name, LoopDetectorOptions& options) {
 
 std::string RuleName(const LoopDetectorOptions& options) {
   switch (options.rule) {
+    case CombinationRule::kJoint:
+      return "joint";
     case CombinationRule::kMean:
       return "mean";
+    case CombinationRule::kLogPool:
+      return "log-pool";
     case CombinationRule::kProduct:
       return "product";
     case CombinationRule::kMajority:

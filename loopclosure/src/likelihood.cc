@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
+#include <utility>
 
 #include "byte_stream.h"
 
@@ -67,6 +69,89 @@ std::vector<double> LikelihoodModel::Scores(const Signature& query) const {
     }
   }
   return scores;
+}
+
+int SeenWords::Cell(const cv::Point2f& pixel, const cv::Size& size) {
+  const float side = static_cast<float>(std::max({size.width, size.height, 1})) / kColumns;
+  const auto along = [side](float x, int length) {
+    const int last = std::max(0, static_cast<int>(std::ceil(static_cast<float>(length) / side)) - 1);
+    return std::clamp(static_cast<int>(x / side), 0, last);
+  };
+  return along(pixel.y, size.height) * kColumns + along(pixel.x, size.width);
+}
+
+int SeenWords::size() const {
+  return static_cast<int>(std::count_if(words.begin(), words.end(), [](int word) { return word >= 0; }));
+}
+
+namespace {
+
+// Sums by slot that are few among many slots.
+class SparseSums {
+ public:
+  explicit SparseSums(std::size_t slots) : sums_(slots, 0.0) {}
+  void Add(std::size_t slot, double value) {
+    if (sums_[slot] == 0.0) touched_.push_back(slot);
+    sums_[slot] += value;
+  }
+  // Calls call(slot, sum) for each that is not 0, and forgets them.
+  template <typename Call>
+  void Drain(const Call& call) {
+    for (const std::size_t slot : touched_) call(slot, std::exchange(sums_[slot], 0.0));
+    touched_.clear();
+  }
+
+ private:
+  std::vector<double> sums_;
+  std::vector<std::size_t> touched_;
+};
+
+// A feature's word with its place in the image, in the order in which Counts adds up.
+struct PlacedWord {
+  int strip, cell, word;
+  bool operator<(const PlacedWord& other) const {
+    return std::tie(strip, cell, word) < std::tie(other.strip, other.cell, other.word);
+  }
+};
+
+}  // namespace
+
+std::vector<double> LikelihoodModel::Counts(const SeenWords& query) const {
+  std::vector<double> counts(signatures_.size(), 0.0);
+  if (locations_ < 2) return counts;
+  std::vector<PlacedWord> placed;
+  std::vector<int> sorted;
+  for (std::size_t i = 0; i < query.words.size(); ++i) {
+    if (query.words[i] < 0) continue;
+    placed.push_back({query.cells[i] % SeenWords::kColumns / SeenWords::kStripColumns, query.cells[i],
+                      query.words[i]});
+    sorted.push_back(query.words[i]);
+  }
+  std::sort(placed.begin(), placed.end());
+  std::sort(sorted.begin(), sorted.end());
+  const double all = std::log10(static_cast<double>(locations_));
+  SparseSums in_cell(signatures_.size());
+  SparseSums in_strip(signatures_.size());
+  for (std::size_t i = 0; i < placed.size(); ++i) {
+    const auto& [strip, cell, word] = placed[i];
+    if (const std::vector<Posting>* list = postings_.Find(word)) {
+      const auto same = std::equal_range(sorted.begin(), sorted.end(), word);
+      const double value = std::log10(static_cast<double>(locations_) / static_cast<double>(list->size())) /
+                           (all * static_cast<double>(same.second - same.first));
+      for (const Posting& posting : *list) {
+        if (value > 0.0) in_cell.Add(static_cast<std::size_t>(posting.slot), posting.count * value);
+      }
+    }
+    const bool last = i + 1 == placed.size();
+    if (!last && placed[i + 1].cell == cell) continue;
+    in_cell.Drain([&](std::size_t slot, double sum) { in_strip.Add(slot, std::log1p(sum)); });
+    if (!last && placed[i + 1].strip == strip) continue;
+    in_strip.Drain([&](std::size_t slot, double sum) {
+      const double root = std::sqrt(sum);
+      counts[slot] += root * std::sqrt(root);
+    });
+  }
+  return counts;
 }
 
 void LikelihoodModel::Save(internal::ByteWriter& out) const {

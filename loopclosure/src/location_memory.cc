@@ -36,6 +36,20 @@ bool LocationMemory::AddLink(int a, int b, LinkType type) {
   return true;
 }
 
+bool LocationMemory::RemoveLoop(int a, int b) {
+  bool removed = false;
+  for (const auto& [from, to] : {std::make_pair(a, b), std::make_pair(b, a)}) {
+    std::vector<Link>& links = nodes_[Index(from)].links;
+    const auto gone = std::remove_if(links.begin(), links.end(), [to = to](const Link& link) {
+      return link.slot == to && link.type != LinkType::kOdometry;
+    });
+    removed = removed || gone != links.end();
+    links.erase(gone, links.end());
+  }
+  if (removed) changed_.insert({a, b});
+  return removed;
+}
+
 LocationMemory::LinkType LocationMemory::Bounded(int a, int b, LinkType type) const {
   if (type == LinkType::kOdometry) return type;
   for (const int slot : {a, b}) {

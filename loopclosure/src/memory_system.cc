@@ -9,11 +9,19 @@ namespace {
 constexpr int kRetrievalLevels = 10;  // LTM is searched this far from the hypothesis
 constexpr int kImmuneLevels = 2;      // what is so near to the hypothesis stays in WM
 
-// Of all members that a filter sees.
-Signature SignatureFor(const FilterUnit& unit, const std::vector<Signature>& signatures) {
-  std::vector<const Signature*> parts;
-  for (const std::size_t k : unit.members) parts.push_back(&signatures[k]);
-  return Signature::Concatenate(parts);
+constexpr int kNearLevels = 5;        // what is so near to the most probable place may be it
+constexpr int kRepeats = 3;           // images before this one that show what a member repeats
+
+// Of all members that a filter sees, with ids as Signature::Concatenate has them.
+SeenWords WordsFor(const FilterUnit& unit, const std::vector<SeenWords>& words) {
+  const int parts = static_cast<int>(unit.members.size());
+  SeenWords all;
+  for (int p = 0; p < parts; ++p) {
+    const SeenWords& part = words[unit.members[static_cast<std::size_t>(p)]];
+    for (const int word : part.words) all.words.push_back(word < 0 ? word : word * parts + p);
+    all.cells.insert(all.cells.end(), part.cells.begin(), part.cells.end());
+  }
+  return all;
 }
 
 }  // namespace
@@ -52,14 +60,16 @@ MemorySystem::MemorySystem(int number, const LoopDetectorOptions& options,
       members_(members),
       memory_(options.stm_size),
       transition_(options.virtual_place_prior) {
-  for (const std::vector<std::size_t>& sources : units) units_.emplace_back(sources, options.likelihood);
+  for (const std::vector<std::size_t>& sources : units) units_.emplace_back(sources, options);
+  if (options.rule == CombinationRule::kJoint) joint_.emplace(options.evidence);
 }
 
-int MemorySystem::Remember(std::int64_t id, const std::vector<Signature>& signatures) {
+int MemorySystem::Remember(std::int64_t id, const std::vector<SeenWords>& words) {
   int slot = memory_.Add(id);
   bool any_took_part = false;
   for (FilterUnit& unit : units_) {
-    unit.signature = SignatureFor(unit, signatures);
+    unit.seen = WordsFor(unit, words);
+    unit.signature = Signature(unit.seen.words);
     any_took_part = any_took_part || unit.took_part();
     unit.likelihood.Add(unit.signature);
     Reference(unit, unit.signature);
@@ -95,35 +105,131 @@ bool MemorySystem::LooksLikePrevious(int slot) const {
 void MemorySystem::UpdateLikelihood(std::size_t u) {
   FilterUnit& unit = units_[u];
   if (!unit.took_part()) return;
+  const std::vector<int>& places = memory_.working_memory();
+  if (Counts()) {
+    unit.counts = unit.likelihood.Counts(unit.seen);
+    const std::deque<int>& recent = memory_.short_term_memory();
+    int before = 0;
+    double sum = 0;
+    for (auto slot = recent.rbegin(); slot != recent.rend() && before < kRepeats + 1; ++slot, ++before) {
+      if (slot != recent.rbegin()) sum += unit.counts[static_cast<std::size_t>(*slot)];
+    }
+    if (before > 1) unit.weight.Repeat(sum / (before - 1));
+    if (places.empty()) return;
+    unit.image_likelihood = unit.alias.Likelihood(unit.counts, places, unit.seen.size());
+    if (options_.keep_evidence) unit.scores = unit.counts;
+    return;
+  }
   std::vector<double> scores = unit.likelihood.Scores(unit.signature);
-  unit.image_likelihood = AdjustLikelihood(scores, memory_.working_memory());
+  unit.image_likelihood = AdjustLikelihood(scores, places);
   if (options_.keep_evidence) unit.scores = std::move(scores);
 }
 
 void MemorySystem::StepFilter(std::size_t u) {
   FilterUnit& unit = units_[u];
-  if (unit.took_part()) unit.filter.Step(transition_, memory_.working_memory(), unit.image_likelihood);
+  if (!unit.took_part()) return;
+  if (Counts() && memory_.working_memory().empty()) return;
+  unit.filter.Step(transition_, memory_.working_memory(), unit.image_likelihood);
 }
 
-Belief MemorySystem::Opinion(std::size_t u, const std::vector<Signature>& signatures) const {
-  const Signature signature = SignatureFor(units_[u], signatures);
-  if (signature.empty()) return {};
-  Belief belief = AdjustLikelihood(units_[u].likelihood.Scores(signature), memory_.working_memory());
-  belief.Normalise();
-  return belief;
+bool MemorySystem::JointTookPart() const {
+  return std::any_of(units_.begin(), units_.end(), [](const FilterUnit& unit) { return unit.took_part(); });
 }
 
-void MemorySystem::Agree(int location) {
-  constexpr int kNear = 2;       // graph levels
-  constexpr double kNews = 0.1;  // weight of the newest loop
-  const std::vector<std::pair<int, int>> near = memory_.Neighbours(location, kNear);
+// That makes the mean weight of the units that took part 1, as many as there are: a unit that sits out leaves
+// its share to the others.
+double MemorySystem::WeightScale() const {
+  double sum = 0;
+  for (const FilterUnit& unit : units_) sum += unit.took_part() ? unit.weight.Value() : 0.0;
+  return sum > 0 ? static_cast<double>(units_.size()) / sum : 0.0;
+}
+
+double MemorySystem::WeightOf(std::size_t unit) const {
+  return units_[unit].took_part() ? WeightScale() * units_[unit].weight.Value() : 0.0;
+}
+
+std::vector<double> MemorySystem::JointCounts() const {
+  std::vector<double> sum(static_cast<std::size_t>(memory_.size()), 0.0);
+  const double scale = WeightScale();
+  for (const FilterUnit& unit : units_) {
+    if (!unit.took_part()) continue;
+    const double weight = scale * unit.weight.Value();
+    for (std::size_t i = 0; i < unit.counts.size(); ++i) sum[i] += weight * unit.counts[i];
+  }
+  return sum;
+}
+
+void MemorySystem::StepJoint() {
+  if (!joint_ || !JointTookPart() || memory_.working_memory().empty()) return;
+  joint_->counts = JointCounts();
+  double words = 0;
+  for (const FilterUnit& unit : units_) words += unit.took_part() ? unit.seen.size() : 0;
+  joint_->image_likelihood = joint_->alias.Likelihood(joint_->counts, memory_.working_memory(), words);
+  joint_->filter.Step(transition_, memory_.working_memory(), joint_->image_likelihood);
+}
+
+std::vector<int> MemorySystem::NearBest(const PlaceFilter& place_filter) const {
+  std::vector<int> near;
+  const int best = place_filter.filter.posterior().Best();
+  if (best < 0) return near;
+  for (const auto& [slot, level] : memory_.Neighbours(best, kNearLevels)) near.push_back(slot);
+  std::sort(near.begin(), near.end());
+  return near;
+}
+
+void MemorySystem::Learn() {
+  if (!Counts() || memory_.working_memory().empty() || !JointTookPart()) return;
+  const std::vector<int>& places = memory_.working_memory();
   for (FilterUnit& unit : units_) {
     if (!unit.took_part()) continue;
-    const int best = unit.filter.posterior().Best();
-    const bool right =
-        std::any_of(near.begin(), near.end(), [best](const auto& n) { return n.first == best; });
-    unit.agreement += kNews * ((right ? 1.0 : 0.0) - unit.agreement);
+    unit.alias.Learn(unit.counts, places, NearBest(unit), unit.filter.posterior().new_place);
   }
+  if (!joint_) return;
+  const std::vector<int> near = NearBest(*joint_);
+  joint_->alias.Learn(joint_->counts, places, near, joint_->filter.posterior().new_place);
+  for (FilterUnit& unit : units_) {
+    if (unit.took_part()) unit.weight.Learn(unit.counts, places, near);
+  }
+}
+
+std::vector<const Belief*> MemorySystem::Beliefs() const {
+  std::vector<const Belief*> beliefs;
+  if (joint_) {
+    if (JointTookPart()) beliefs.push_back(&joint_->filter.posterior());
+    return beliefs;
+  }
+  for (const FilterUnit& unit : units_) {
+    if (unit.took_part()) beliefs.push_back(&unit.filter.posterior());
+  }
+  return beliefs;
+}
+
+std::vector<Belief> MemorySystem::Opinions(const std::vector<SeenWords>& words) const {
+  const std::vector<int>& places = memory_.working_memory();
+  std::vector<Belief> opinions;
+  std::vector<double> sum(static_cast<std::size_t>(memory_.size()), 0.0);
+  double sum_of_weights = 0;
+  for (const FilterUnit& unit : units_) {
+    const SeenWords seen = WordsFor(unit, words);
+    if (seen.size() == 0) continue;
+    if (!Counts()) {
+      opinions.push_back(AdjustLikelihood(unit.likelihood.Scores(Signature(seen.words)), places));
+      continue;
+    }
+    const std::vector<double> counts = unit.likelihood.Counts(seen);
+    if (!joint_) {
+      opinions.push_back(unit.alias.Of(counts, places));
+      continue;
+    }
+    sum_of_weights += unit.weight.Value();
+    for (std::size_t i = 0; i < counts.size(); ++i) sum[i] += unit.weight.Value() * counts[i];
+  }
+  if (sum_of_weights > 0) {
+    for (double& value : sum) value *= static_cast<double>(units_.size()) / sum_of_weights;
+    opinions.push_back(joint_->alias.Of(sum, places));
+  }
+  for (Belief& opinion : opinions) opinion.Normalise();
+  return opinions;
 }
 
 void MemorySystem::CloseLoop(int newer, int older) {
@@ -132,10 +238,17 @@ void MemorySystem::CloseLoop(int newer, int older) {
   memory_.TransferWeight(newer, older);
 }
 
+void MemorySystem::Unlink(int a, int b) {
+  if (a >= 0 && b >= 0 && memory_.RemoveLoop(a, b)) Relinked(a, b);
+}
+
 void MemorySystem::AddLink(int a, int b) { Link(a, b, LocationMemory::LinkType::kOdometry); }
 
 void MemorySystem::Link(int a, int b, LocationMemory::LinkType type) {
-  if (!memory_.AddLink(a, b, type)) return;
+  if (memory_.AddLink(a, b, type)) Relinked(a, b);
+}
+
+void MemorySystem::Relinked(int a, int b) {
   // A link to a location outside WM takes effect when that one enters it.
   const auto in_wm = [this](int slot) { return memory_.state(slot) == LocationMemory::State::kWorking; };
   if (in_wm(a) && in_wm(b)) transition_.Update(memory_, {a, b});
@@ -233,6 +346,7 @@ void MemorySystem::Leave(int slot) {
     Release(unit, signature);
     unit.filter.Forget(slot);
   }
+  if (joint_) joint_->filter.Forget(slot);
   memory_.Transfer(slot);
   transition_.Update(memory_, {slot});
 }
@@ -287,7 +401,28 @@ void MemorySystem::Save(ByteWriter& out) const {
   for (const FilterUnit& unit : units_) {
     unit.likelihood.Save(out);
     unit.filter.Save(out);
+    unit.alias.Save(out);
+    unit.weight.Save(out);
   }
+  if (!joint_) return;
+  joint_->filter.Save(out);
+  joint_->alias.Save(out);
+}
+
+void MemorySystem::SaveLevels(ByteWriter& out) const {
+  for (const FilterUnit& unit : units_) {
+    unit.alias.SaveLevel(out);
+    unit.weight.Save(out);
+  }
+  if (joint_) joint_->alias.SaveLevel(out);
+}
+
+void MemorySystem::LoadLevels(ByteReader& in) {
+  for (FilterUnit& unit : units_) {
+    unit.alias.LoadLevel(in);
+    unit.weight.Load(in);
+  }
+  if (joint_) joint_->alias.LoadLevel(in);
 }
 
 void MemorySystem::Load(ByteReader& in) {
@@ -295,6 +430,8 @@ void MemorySystem::Load(ByteReader& in) {
   for (FilterUnit& unit : units_) {
     unit.likelihood.Load(in);
     unit.filter.Load(in);
+    unit.alias.Load(in);
+    unit.weight.Load(in);
     if (unit.likelihood.size() != memory_.size() ||
         static_cast<int>(unit.filter.posterior().places.size()) > memory_.size()) {
       in.Damaged("locations are missing");
@@ -310,6 +447,13 @@ void MemorySystem::Load(ByteReader& in) {
         if (!members_[unit.members[p]].vocabulary().Missing(parts[p]).empty())
           in.Damaged("words are missing");
       }
+    }
+  }
+  if (joint_) {
+    joint_->filter.Load(in);
+    joint_->alias.Load(in);
+    if (static_cast<int>(joint_->filter.posterior().places.size()) > memory_.size()) {
+      in.Damaged("locations are missing");
     }
   }
   transition_.Update(memory_, memory_.working_memory());

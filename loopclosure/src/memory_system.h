@@ -3,12 +3,14 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
 
 #include "byte_stream.h"
 #include "location_store.h"
+#include "tutti/loopclosure/alias_evidence.h"
 #include "tutti/loopclosure/bayes_filter.h"
 #include "tutti/loopclosure/detector_options.h"
 #include "tutti/loopclosure/likelihood.h"
@@ -26,18 +28,26 @@ void LoadNodes(int number, LocationStore& store, LocationMemory& memory);
 /// Record of a word of a member (its number), which must be in the vocabulary.
 void StoreWord(const Vocabulary& vocabulary, std::size_t member, int word, LocationStore& store);
 
-/// One Bayes filter and the members whose signatures it sees: one each for mean, product, majority and
-/// single; all of them, concatenated, for naive (loop-closure.md eq. 3).
-struct FilterUnit {
-  FilterUnit(std::vector<std::size_t> sources, LikelihoodKind kind)
-      : members(std::move(sources)), likelihood(kind) {}
+/// What every image in turn says of the places, and what is believed after it.
+struct PlaceFilter {
+  explicit PlaceFilter(const EvidenceOptions& options) : alias(options) {}
+  std::vector<double> counts;  ///< of the present image, by slot; counts alone
+  AliasEvidence alias;         ///< what they are worth
+  Belief image_likelihood;     ///< of the present image
+  BayesFilter filter;
+};
+
+/// A filter and the members whose signatures it sees: one each for most rules; all of them, concatenated, for
+/// naive (loop-closure.md eq. 3).
+struct FilterUnit : PlaceFilter {
+  FilterUnit(std::vector<std::size_t> sources, const LoopDetectorOptions& options)
+      : PlaceFilter(options.evidence), members(std::move(sources)), likelihood(options.likelihood) {}
   std::vector<std::size_t> members;
   LikelihoodModel likelihood;
-  BayesFilter filter;
+  MemberWeight weight;
   Signature signature;         ///< of the present image, empty if bad
-  Belief image_likelihood;     ///< of the present image
-  std::vector<double> scores;  ///< raw ones behind it, by slot; only with keep_evidence
-  double agreement = 1.0;      ///< running share of the verified loops that it had found, 0..1
+  SeenWords seen;              ///< the same, feature by feature
+  std::vector<double> scores;  ///< raw ones behind the likelihood, by slot; only with keep_evidence
   bool took_part() const { return !signature.empty(); }
 };
 
@@ -49,22 +59,29 @@ class MemorySystem {
   MemorySystem(int number, const LoopDetectorOptions& options,
                const std::vector<std::vector<std::size_t>>& units, std::vector<Member>& members);
 
-  /// Steps 3 and 4: a new location with these signatures (one per member of the detector) enters STM, is
+  /// Steps 3 and 4: a new location with these words (one per member of the detector) enters STM, is
   /// rehearsed, and the oldest of STM go to WM. Returns the slot that now stands for the image.
-  int Remember(std::int64_t id, const std::vector<Signature>& signatures);
+  int Remember(std::int64_t id, const std::vector<SeenWords>& words);
 
-  /// Step 5. Different units may run at the same time.
+  /// Step 5. Different units may run at the same time; then the joint filter, if there is one.
   void UpdateLikelihood(std::size_t unit);
   void StepFilter(std::size_t unit);
+  void StepJoint();
+  /// After the step: the evidence learns from what the filters believe now.
+  void Learn();
+  /// What the filters believe that took part in this image: the joint one's, or those of the units.
+  std::vector<const Belief*> Beliefs() const;
 
-  /// What a unit believes of an image with these signatures that is no location: its likelihood, normalised.
-  /// Of a unit without words of it, no places.
-  Belief Opinion(std::size_t unit, const std::vector<Signature>& signatures) const;
+  /// What is believed of an image with these words that is no location: the likelihoods, normalised; of the
+  /// joint filter or of each unit that has words of it.
+  std::vector<Belief> Opinions(const std::vector<SeenWords>& words) const;
+  /// Weight of a unit in the joint filter, over those that took part; their mean is 1.
+  double WeightOf(std::size_t unit) const;
 
-  /// A loop with this location was verified: which filters had it?
-  void Agree(int location);
   /// The newer location closes a loop with the older one.
   void CloseLoop(int newer, int older);
+  /// They do not: takes the loop back.
+  void Unlink(int a, int b);
   void AddLink(int a, int b);
 
   /// Step 7: brings locations near `best` back from LTM. Returns their slots. One that can't be read stays
@@ -86,6 +103,9 @@ class MemorySystem {
 
   void Save(ByteWriter& out) const;
   void Load(ByteReader& in);
+  /// What the evidence knows of the environment, without single places.
+  void SaveLevels(ByteWriter& out) const;
+  void LoadLevels(ByteReader& in);
 
   LocationMemory& memory() { return memory_; }
   const LocationMemory& memory() const { return memory_; }
@@ -102,11 +122,18 @@ class MemorySystem {
   void Release(const FilterUnit& unit, const Signature& signature);
   bool LooksLikePrevious(int slot) const;
   void Link(int a, int b, LocationMemory::LinkType type);
+  void Relinked(int a, int b);
+  bool Counts() const { return options_.evidence.kind == EvidenceKind::kCounts; }
+  bool JointTookPart() const;
+  double WeightScale() const;
+  std::vector<double> JointCounts() const;
+  std::vector<int> NearBest(const PlaceFilter& place_filter) const;
 
   int number_;
   const LoopDetectorOptions& options_;
   std::vector<Member>& members_;
   std::vector<FilterUnit> units_;
+  std::optional<PlaceFilter> joint_;  // works on the units' counts
   LocationMemory memory_;
   TransitionModel transition_;
 };

@@ -7,7 +7,9 @@
 
 namespace tutti {
 
-Signature::Signature(std::vector<int> words) : size_(static_cast<int>(words.size())) {
+Signature::Signature(std::vector<int> words) {
+  words.erase(std::remove_if(words.begin(), words.end(), [](int word) { return word < 0; }), words.end());
+  size_ = static_cast<int>(words.size());
   std::sort(words.begin(), words.end());
   for (const int word : words) {
     if (!entries_.empty() && entries_.back().word == word) {

@@ -89,9 +89,8 @@ void Vocabulary::Search(const cv::Mat& descriptors, int begin, int end,
 
 std::vector<int> Vocabulary::Recognise(const std::vector<TwoNearest>& nearest) const {
   std::vector<int> words;
-  for (const TwoNearest& best : nearest) {
-    if (!IsNew(best)) words.push_back(best.first);
-  }
+  words.reserve(nearest.size());
+  for (const TwoNearest& best : nearest) words.push_back(IsNew(best) ? -1 : best.first);
   return words;
 }
 

@@ -34,6 +34,7 @@ ConfigTable::ConfigTable(RunConfig& config) {
   AddOdometry(config.odometry);
   AddLoops(config.loops);
   AddExtraction(config.loops.extraction);
+  AddEvidence(config.loops.evidence);
   AddVocabulary(config.loops.vocabulary);
   AddVerification(config.loops.verification);
   AddGraph(config.graph, config.online);
@@ -142,20 +143,18 @@ void ConfigTable::AddLoops(LoopDetectorOptions& o) {
       return "";
     };
   };
-  Push("rule", "mean, product, majority, naive over the members, or one member's name for that member alone",
+  Push("rule", "joint, mean, log-pool, product, majority, naive over the members, or one member's name for that alone",
        word(&SetRule), [&o] { return RuleName(o); });
-  Push("preset", "published parameters that the other keys change: default, paper-2013, rtabmap-0.8.3",
+  Push("preset", "published parameters that the other keys change: default, standardised-mean, paper-2013, rtabmap-0.8.3",
        word(&ApplyPreset), [] { return "default"; });
   Add("members", o.members, "members of the ensemble: surf, sift, orb, akaze, brisk, kaze");
   AddEnum("likelihood", o.likelihood,
           {{"similarity", LikelihoodKind::kSimilarity}, {"tfidf", LikelihoodKind::kTfIdf}},
-          "how signatures are compared: similarity (2013) or tfidf");
-  Add("loop_threshold", o.loop_threshold, "go to verification at H >= this, 0..1");
-  AddEnum("weights", o.weights,
-          {{"equal", MemberWeights::kEqual},
-           {"entropy", MemberWeights::kEntropy},
-           {"agreement", MemberWeights::kAgreement}},
-          "of the members in the mean: equal, entropy of the posterior, agreement with verified loops");
+          "score of standardised evidence: similarity (2013) or tfidf");
+  Add("loop_threshold", o.loop_threshold, "accept a loop of this probability, 0..1");
+  Add("propose_threshold", o.propose_threshold, "go to verification at H >= this, 0..1");
+  Add("link_threshold", o.link_threshold,
+      "a loop of this probability links its two places for the filter, 0..1");
   Add("island_levels", o.island_levels,
       "candidates are ranked by the posterior of all within so many graph levels; 0: by their own");
   Add("consistent_images", o.consistent_images,
@@ -205,6 +204,17 @@ void ConfigTable::AddExtraction(ExtractionOptions& o) {
   Add("orb_border", o.orb_border,
       "border without ORB points, share of the shorter side, at most 31 px (1: OpenCV's own)");
   Add("root_sift", o.root_sift, "SIFT compared by the Hellinger kernel");
+}
+
+void ConfigTable::AddEvidence(EvidenceOptions& o) {
+  section_ = "loops.evidence";
+  AddEnum("kind", o.kind, {{"counts", EvidenceKind::kCounts}, {"standardised", EvidenceKind::kStandardised}},
+          "what a score says of a place: counts against the level of wrong places, or standardised (2013)");
+  Add("sharpness", o.sharpness, "exponent of a count beyond the alias level");
+  Add("alias_share", o.alias_share,
+      "share of the alias level that a place must reach to be more likely than a new one");
+  Add("floor", o.floor, "least logarithm of a likelihood, below 0");
+  Add("attraction", o.attraction, "how much more a place must show that many images resemble, 0 to 2");
 }
 
 void ConfigTable::AddVocabulary(VocabularyOptions& o) {

@@ -44,6 +44,7 @@ class ConfigTable {
   void AddOdometry(OdometryOptions& options);
   void AddLoops(LoopDetectorOptions& options);
   void AddExtraction(ExtractionOptions& options);
+  void AddEvidence(EvidenceOptions& options);
   void AddVocabulary(VocabularyOptions& options);
   void AddVerification(VerificationOptions& options);
   void AddGraph(PoseGraphOptions& options, OnlineOptions& online);

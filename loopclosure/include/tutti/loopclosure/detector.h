@@ -57,6 +57,7 @@ struct MemberOpinion {
   int words = 0;            ///< in its vocabulary by now
   double hypothesis = 0;    ///< H = 1 - p(new place)
   std::int64_t best = -1;   ///< id of its best location, -1 if none
+  double weight = 1;        ///< rule joint: of its counts in the sum of all, 1 in the mean
   double at_candidate = 0;  ///< its posterior at the ensemble's candidate
   std::vector<std::pair<std::int64_t, double>> posterior_by_location;  ///< only with keep_posterior
   std::vector<CandidateEvidence> evidence;  ///< only with keep_evidence: of every location in working memory,
@@ -113,8 +114,9 @@ struct LoopResult {
   std::int64_t candidate = -1;         ///< argmax of the combined posterior, -1 if there is no location yet
   double posterior = 0;                ///< combined posterior at the candidate
   double probability = 0;              ///< that this is a loop: with the verified place, else the candidate
-  bool proposed = false;               ///< H >= loop_threshold: went to verification
-  bool accepted = false;               ///< the verification accepted it (or one of its neighbours)
+  bool proposed = false;               ///< H >= propose_threshold: went to verification
+  bool accepted = false;  ///< the verification accepted it (or one of its neighbours), and the
+                          ///< probability is at least loop_threshold
   std::string reason;                  ///< why it is not accepted, in plain words
   std::vector<MemberOpinion> members;  ///< in the order of options.members
   Verification verification;           ///< the best one tried
@@ -161,6 +163,10 @@ class LoopDetector {
   /// Adds a neighbour link between two locations (a caller's own odometry link); consecutive ids are linked
   /// by themselves.
   void AddLink(std::int64_t a, std::int64_t b);
+  /// Takes back the loop between two locations, that Detect accepted and the caller has found to be false (the
+  /// pose graph contradicts it): the filter no longer takes their places for one. Ids that are unknown, or not
+  /// linked by a loop, are no error.
+  void Unlink(std::int64_t a, std::int64_t b);
 
   /// Saves everything (vocabularies, memory with its long-term part, filters) into one file; a file that is
   /// there is replaced only by a complete one. Throws InputError if it can't be written.

@@ -8,14 +8,22 @@
 
 namespace tutti {
 
-/// How the members' posteriors become one (loop-closure.md section 4).
-enum class CombinationRule { kMean, kProduct, kMajority, kNaive, kSingle };
+/// How the members become one (docs/loop-closure.md section 4).
+enum class CombinationRule {
+  kJoint,     ///< one filter on the members' counts, each by what it is worth
+  kMean,      ///< a filter each, the mean of their posteriors: the paper's
+  kLogPool,   ///< a filter each, the geometric mean of their posteriors (logarithmic opinion pool)
+  kProduct,   ///< a filter each, the product of their posteriors
+  kMajority,  ///< a filter each, two of them must agree
+  kNaive,     ///< one filter on the words of all members as if they were one kind
+  kSingle     ///< one member alone
+};
 
-/// What a member's posterior counts in the mean.
-enum class MemberWeights {
-  kEqual,      ///< the same: the paper's mean
-  kEntropy,    ///< the more, the less spread the posterior is in this image
-  kAgreement,  ///< the more, the more often the member was right when geometry had verified a loop
+/// What a place's score says (docs/loop-closure.md section 2).
+enum class EvidenceKind {
+  kCounts,        ///< counts of matched words against the level that wrong places reach
+  kStandardised,  ///< how far it stands out among the places of this image, in standard deviations: Labbe &
+                  ///< Michaud 2013
 };
 
 /// How a signature is compared with a location (loop-closure.md section 2).
@@ -69,6 +77,20 @@ struct VocabularyOptions {
   std::string Validate() const;
 };
 
+/// Options of the likelihood of places (docs/loop-closure.md section 2).
+struct EvidenceOptions {
+  EvidenceKind kind = EvidenceKind::kCounts;  ///< the next four are of kCounts
+  double sharpness = 2.0;    ///< exponent of a count beyond the alias level: beta, above 0, at most 10
+  double alias_share = 0.85;  ///< share of the alias level that a place must reach to be more likely than a new
+                              ///< one, above 0, at most 3
+  double floor = -1.0;        ///< least logarithm of a likelihood, below 0, at least -10
+  double attraction = 0.5;    ///< how much more a place must show that many images resemble: exponent of its mean
+                              ///< count, 0 (no more) to 2
+
+  /// Empty if usable, else what is wrong and what to do.
+  std::string Validate() const;
+};
+
 /// Options of the geometric verification (loop-closure.md section 5).
 struct VerificationOptions {
   bool enabled = true;         ///< false: every proposal is accepted as it is, without a constraint
@@ -101,18 +123,20 @@ struct VerificationOptions {
 
 /// Options of LoopDetector.
 struct LoopDetectorOptions {
-  CombinationRule rule = CombinationRule::kMean;  ///< how members are combined
+  CombinationRule rule = CombinationRule::kJoint;  ///< how members are combined
   std::vector<std::string> members = {"surf", "sift",
                                       "orb"};  ///< of KnownMembers(), and of external_members; kSingle: one
   std::vector<std::string> external_members;   ///< further names that members may hold: the caller extracts
                                                ///< their features himself and gives them with each LoopQuery
-  double loop_threshold = 0.07;                ///< go to verification at H >= this, 0..1
+  double loop_threshold = 0.95;    ///< accept a loop of this probability, 0..1
+  double propose_threshold = 0.1;  ///< go to verification at H >= this, 0..1
+  double link_threshold = 0.9;     ///< a loop of this probability links its two places for the filter, 0..1
   int stm_size = 10;                           ///< locations in short-term memory, no candidates
   int threads = 2;                             ///< most threads that Detect uses at once
   std::uint64_t seed = 1;                      ///< of kd-forests and RANSAC
 
-  LikelihoodKind likelihood = LikelihoodKind::kTfIdf;  ///< how signatures are compared
-  MemberWeights weights = MemberWeights::kEqual;       ///< of the members in the mean
+  EvidenceOptions evidence;                            ///< what a score says of a place
+  LikelihoodKind likelihood = LikelihoodKind::kTfIdf;  ///< score of standardised evidence
   int island_levels = 0;      ///< candidates are ranked by the posterior of all within so many graph levels,
                               ///< 0: by their own (islands as in iBoW-LCD, Garcia-Fidalgo & Ortiz 2018)
   int consistent_images = 0;  ///< go to verification only if the candidates of so many images before lie on
@@ -149,7 +173,9 @@ struct LoopDetectorOptions {
 };
 
 /// A published set of parameters (loop-closure.md section 9) on top of `options`: "paper-2013" (Labbe &
-/// Michaud 2013), "rtabmap-0.8.3" (the reference system of the ensemble's paper), or "default" (ours).
+/// Michaud 2013), "rtabmap-0.8.3" (the reference system of the ensemble's paper), "standardised-mean" (the
+/// ensemble's paper: standardised evidence, mean of the posteriors, every loop that geometry accepts), or
+/// "default" (ours).
 /// Features (but their number) and verification stay as they are. Throws InputError that names the nearest
 /// word.
 void ApplyPreset(const std::string& name, LoopDetectorOptions& options);
@@ -157,8 +183,8 @@ void ApplyPreset(const std::string& name, LoopDetectorOptions& options);
 /// Names that ApplyPreset takes.
 const std::vector<std::string>& KnownPresets();
 
-/// The one configuration key: "mean", "product", "majority" or "naive" over options.members, or a member's
-/// name ("surf", "sift", "orb", "akaze", "brisk") for that member alone. Throws InputError that names the
+/// The one configuration key: "joint", "mean", "log-pool", "product", "majority" or "naive" over
+/// options.members, or a member's name ("surf", "sift", "orb", "akaze", "brisk") for that member alone. Throws InputError that names the
 /// nearest word.
 void SetRule(const std::string& word, LoopDetectorOptions& options);
 

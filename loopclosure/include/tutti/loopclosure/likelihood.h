@@ -1,6 +1,7 @@
 // p(L_t | S_t): how much an image looks like each location, and how much it looks like none of them.
 #pragma once
 
+#include <opencv2/core.hpp>
 #include <vector>
 
 #include "tutti/loopclosure/belief.h"
@@ -14,6 +15,20 @@ namespace internal {
 class ByteReader;
 class ByteWriter;
 }  // namespace internal
+
+/// The words of an image and where they were seen: the cell of each feature in a grid of kColumns cells along
+/// the longer side of the image.
+struct SeenWords {
+  static constexpr int kColumns = 8;
+  static constexpr int kStripColumns = 2;  ///< that make an upright strip of the image
+  std::vector<int> words;  ///< one for each feature; -1: not known
+  std::vector<int> cells;  ///< likewise
+
+  /// The cell of a pixel, row by row.
+  static int Cell(const cv::Point2f& pixel, const cv::Size& size);
+  /// Number of words that are known.
+  int size() const;
+};
 
 /// Inverted index over the signatures of all locations in STM and WM, and the scores computed by walking it.
 /// Locations are slots: 0, 1, 2, ... in the order of adding.
@@ -36,6 +51,15 @@ class LikelihoodModel {
   /// tf-idf: s_i = sum over unique words w of z_t of (n_wi / n_i) * log10(N / n_w), with N locations in STM
   /// and WM, n_w of them with w, n_wi occurrences of w in i, n_i words in i.
   std::vector<double> Scores(const Signature& query) const;
+
+  /// Counts of matched words of every slot, by inverse frequency, in which each part of the image has a
+  /// limited say:
+  ///   c_i = sum over strips h of [sum over cells g in h of ln(1 + x_gi)]^(3/4),
+  ///   x_gi = sum over words w seen in g of (n_wi / m_w) log10(N / n_w) / log10 N,
+  /// with m_w features of word w in the image, N, n_w and n_wi as above. Words near one another show the same
+  /// thing, and a thing that is there twice (a poster, a kind of window) is not yet the place: a place agrees
+  /// all over the image (docs/loop-closure.md section 2).
+  std::vector<double> Counts(const SeenWords& query) const;
 
   /// True if a slot is in the index, be it with a bad signature.
   bool Has(int slot) const { return present_[static_cast<std::size_t>(slot)]; }

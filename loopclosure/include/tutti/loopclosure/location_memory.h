@@ -60,6 +60,8 @@ class LocationMemory {
   /// Links two locations; links that exist already are left as they are. A loop link beyond kMostLoops of
   /// either becomes kMoreLoop. Returns false if nothing changed.
   bool AddLink(int a, int b, LinkType type);
+  /// Takes a loop link back; odometry links stay. False if there is none.
+  bool RemoveLoop(int a, int b);
   /// Moves the oldest locations of STM to WM while |STM| > stm_size; returns the slots moved.
   std::vector<int> Settle();
   /// Rehearsal (section 6): the newest location is merged into the one before it, weight_old += 1 +

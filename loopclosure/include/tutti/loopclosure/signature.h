@@ -21,7 +21,7 @@ class Signature {
   };
 
   Signature() = default;
-  /// From one word id per feature, any order.
+  /// From one word id per feature, any order; negative ones (words that are not known) are left out.
   explicit Signature(std::vector<int> words);
 
   /// Unique words, ascending.

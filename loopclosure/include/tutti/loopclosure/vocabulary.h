@@ -43,7 +43,7 @@ class Vocabulary {
   /// is safe to call from several threads at once.
   void Search(const cv::Mat& descriptors, int begin, int end, std::vector<TwoNearest>& nearest) const;
   std::vector<int> Assign(const cv::Mat& descriptors, const std::vector<TwoNearest>& nearest);
-  /// Of what Search found, the words that Assign would not make new: nothing is added.
+  /// Of what Search found, the words that Assign would not make new, -1 for the others: nothing is added.
   std::vector<int> Recognise(const std::vector<TwoNearest>& nearest) const;
 
   /// One more location that has these words.

@@ -86,7 +86,8 @@ LoopEvaluation EvaluatePosterior(const std::vector<LoopObservation>& observation
 
 /// What the detector says: the accepted images alone, with the location that they were verified with, ranked
 /// by probability. An image that was not accepted is in no ranking; if it has a loop, it is missed, at any
-/// threshold. At the default decision: the accepted ones, whatever their score. Calibration: probability of those.
+/// threshold. At the default decision: the accepted ones, whatever their score. Calibration: probability of
+/// those.
 LoopEvaluation EvaluateVerified(const std::vector<LoopObservation>& observations,
                                 const LoopGroundTruth& truth);
 

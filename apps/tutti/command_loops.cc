@@ -17,6 +17,7 @@
 #include "command_loops_table.h"
 #include "commands.h"
 #include "joined_pairs.h"
+#include "loops_dump.h"
 #include "posteriors_csv.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
@@ -34,6 +35,7 @@ struct LoopsArguments {
   std::vector<std::string> set;  // key=value, keys of the section `loops` of a configuration
   LoopDetectorOptions options;
   bool table = false;
+  bool dump = false;
 };
 
 // What every rule of a table shares.
@@ -104,15 +106,30 @@ ImageSet LoadImageSet(const LoopsArguments& arguments) {
   return set;
 }
 
-// Up to Ctrl-C: a run that ended early has the ground truth of its images only.
-LoopRun Run(const LoopsArguments& arguments, const LoopDetectorOptions& options, const ImageSet& set) {
+// What was kept for the pictures and the dump alone.
+void DropEvidence(bool with_posterior, LoopResult& result) {
+  if (!with_posterior) result.posterior_by_location = {};
+  for (MemberOpinion& member : result.members) {
+    if (!with_posterior) member.posterior_by_location = {};
+    member.evidence = {};
+  }
+  result.tried = {};
+  result.verification.inlier_matches = {};
+}
+
+// Up to Ctrl-C: a run that ended early has the ground truth of its images only. A dump goes into `folder`.
+LoopRun Run(const LoopsArguments& arguments, const LoopDetectorOptions& options, const ImageSet& set,
+            const std::filesystem::path& folder) {
   LoopRun run;
   run.images = arguments.images;
   run.stride = arguments.truth.stride;
   run.options = options;
   LoopDetectorOptions with_posterior = options;
   with_posterior.keep_posterior = true;  // for confusion.png
+  with_posterior.keep_evidence = arguments.dump || options.keep_evidence;
   LoopDetector detector(with_posterior);
+  std::optional<LoopsDump> dump;
+  if (arguments.dump) dump.emplace(folder, options.members);
   const int total = static_cast<int>(set.images.size());
   int loops = 0;
   Progress progress(arguments.table ? "loops, " + RuleName(options) : "loops", set.images.size());
@@ -125,16 +142,13 @@ LoopRun Run(const LoopsArguments& arguments, const LoopDetectorOptions& options,
       progress.Note("tutti: warning: " + image.string() +
                     ": can't be read; it counts as an image without features");
     AddPosterior(row.result, total, run.posterior);
-    if (!options.keep_posterior) {  // what is written needs them no more
-      row.result.posterior_by_location = {};
-      for (MemberOpinion& member : row.result.members) member.posterior_by_location = {};
-    }
-    row.result.tried = {};
-    row.result.verification.inlier_matches = {};
+    if (dump) dump->Add(row.result, set.truth);
+    DropEvidence(options.keep_posterior, row.result);
     loops += row.result.accepted ? 1 : 0;
     progress.Update(run.rows.size(), std::to_string(loops) + " loops");
   }
   progress.Finish();
+  if (dump) dump->Finish();
   run.truth = set.truth;
   if (run.rows.size() < set.images.size()) {
     const int done = static_cast<int>(run.rows.size());
@@ -152,7 +166,7 @@ int RunTable(const LoopsArguments& arguments, const ImageSet& set) {
   for (const std::string& rule : TableRules(arguments.options)) {
     LoopDetectorOptions options = arguments.options;
     SetRule(rule, options);
-    const LoopRun run = Run(arguments, options, set);
+    const LoopRun run = Run(arguments, options, set, folder / rule);
     if (run.rows.size() < set.images.size()) {
       std::fprintf(stderr,
                    "tutti: interrupted in the rule '%s'; no table is written, only the rules before\n",
@@ -184,7 +198,7 @@ int RunLoops(const LoopsArguments& given) {
   const InterruptGuard interrupt;
   if (arguments.table) return RunTable(arguments, set);
 
-  const LoopRun run = Run(arguments, arguments.options, set);
+  const LoopRun run = Run(arguments, arguments.options, set, arguments.out);
   const LoopReport report = EvaluateRun(run);
   WriteLoopRun(run, report, arguments.out);
   PrintLoopRun(run, report, arguments.out);
@@ -218,6 +232,9 @@ void AddLoopsCommand(CLI::App& app, int& exit_code) {
                     "two images in a row, left and right, make one image (City Centre, New College)");
   command->add_flag("--keep-posterior", arguments->options.keep_posterior,
                     "also write posteriors.csv: what each member believed of each location");
+  command->add_flag("--dump", arguments->dump,
+                    "also write dump_candidates.csv (what each candidate looked like to each member) and "
+                    "dump_verification.csv (each geometric verification)");
   command
       ->add_option("--rule", arguments->rule,
                    "joint (default), mean, log-pool, product, majority, naive, or one member: surf, sift, orb, "

@@ -58,6 +58,7 @@ std::string RunTitle(const LoopRun& run, const LoopReport& report) {
 void WriteCurves(const LoopRun& run, const LoopReport& report, const std::filesystem::path& folder) {
   std::string csv = "curve,threshold,rejected,precision,recall,true_positives,false_positives\n";
   AppendCsv("verified", report.verified, csv);
+  AppendCsv("ranked", report.ranked, csv);
   AppendCsv("posterior", report.posterior, csv);
   WriteText(folder / "precision_recall.csv", csv);
 
@@ -72,13 +73,16 @@ void WriteCurves(const LoopRun& run, const LoopReport& report, const std::filesy
   PlotCurve posterior = Curve("posterior only", report.posterior);
   posterior.color = kMissedColor;
   posterior.dashed = true;
-  plot.curves = {verified, posterior};
+  PlotCurve ranked = Curve("refused images ranked behind", report.ranked);
+  ranked.color = PlotPalette(2);
+  ranked.marks.clear();  // the decision is that of the verified ones
+  plot.curves = {verified, ranked, posterior};
   char note[64];
   std::snprintf(note, sizeof note, "disc: at the default threshold, H >= %g", run.options.loop_threshold);
   plot.notes.push_back(note);
   if (report.verified.rows_with_loop == 0)
     plot.notes.push_back("the ground truth has no loop: recall is 0 by definition");
-  if (report.verified.curve.empty() && report.posterior.curve.empty())
+  if (report.ranked.curve.empty() && report.posterior.curve.empty())
     plot.notes.push_back("no image has a hypothesis: the curves are empty");
   WriteSvg(folder / "precision_recall.svg", plot);
   WritePng(folder / "precision_recall.png", plot);

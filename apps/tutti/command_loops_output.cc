@@ -46,20 +46,37 @@ nlohmann::ordered_json Rates(const PrecisionRecall& rates) {
   return {{"precision", rates.precision}, {"recall", rates.recall}};
 }
 
-const char* LabelName(LoopLabel label) {
-  return label == LoopLabel::kLoop ? "loop" : label == LoopLabel::kIgnore ? "ignored" : "none";
+// null where there is nothing that could be calibrated.
+nlohmann::ordered_json CalibrationError(const LoopEvaluation& evaluation) {
+  if (evaluation.calibration_images == 0) return nullptr;
+  return evaluation.calibration_error;
 }
 
-std::string Quoted(const std::string& text) {
-  std::string result = "\"";
-  for (const char c : text) result += c == '"' ? "\"\"" : std::string(1, c);
-  return result + "\"";
+std::string CalibrationText(const LoopEvaluation& evaluation) {
+  if (evaluation.calibration_images == 0) return "-";
+  char text[32];
+  std::snprintf(text, sizeof text, "%.1f%%", 100 * evaluation.calibration_error);
+  return text;
+}
+
+nlohmann::ordered_json Reliability(const LoopEvaluation& evaluation) {
+  nlohmann::ordered_json bins = nlohmann::ordered_json::array();
+  const double count = LoopEvaluation::kReliabilityBins;
+  for (std::size_t b = 0; b < evaluation.reliability.size(); ++b) {
+    const ReliabilityBin& bin = evaluation.reliability[b];
+    bins.push_back({{"above", static_cast<double>(b) / count},
+                    {"up_to", static_cast<double>(b + 1) / count},
+                    {"images", bin.images},
+                    {"mean_probability", bin.mean_probability},
+                    {"accuracy", bin.accuracy}});
+  }
+  return bins;
 }
 
 std::string Csv(const LoopRun& run) {
   std::string text =
-      "image,file,hypothesis,candidate,posterior,proposed,accepted,verified_candidate,matches,inliers,truth,"
-      "row_has_loop";
+      "image,file,hypothesis,candidate,posterior,probability,proposed,accepted,verified_candidate,matches,"
+      "inliers,truth,row_has_loop";
   for (const std::string& name : run.options.members) {
     text += "," + name + "_hypothesis," + name + "_best," + name + "_at_candidate";
   }
@@ -70,9 +87,9 @@ std::string Csv(const LoopRun& run) {
     const long verified = r.accepted ? static_cast<long>(r.verification.candidate) : -1;
     const long location = r.accepted ? verified : static_cast<long>(r.candidate);
     char numbers[256];
-    std::snprintf(numbers, sizeof numbers, ",%.9g,%ld,%.9g,%d,%d,%ld,%d,%d,%s,%d", r.hypothesis,
-                  static_cast<long>(r.candidate), r.posterior, r.proposed ? 1 : 0, r.accepted ? 1 : 0,
-                  verified, r.verification.matches, r.verification.inliers,
+    std::snprintf(numbers, sizeof numbers, ",%.9g,%ld,%.9g,%.9g,%d,%d,%ld,%d,%d,%s,%d", r.hypothesis,
+                  static_cast<long>(r.candidate), r.posterior, r.probability, r.proposed ? 1 : 0,
+                  r.accepted ? 1 : 0, verified, r.verification.matches, r.verification.inliers,
                   location < 0 ? "-" : LabelName(run.truth.At(image, static_cast<int>(location))),
                   run.truth.HasLoop(image) ? 1 : 0);
     text += std::to_string(image) + "," + Quoted(row.file) + numbers;
@@ -89,11 +106,22 @@ std::string Csv(const LoopRun& run) {
 
 }  // namespace
 
+const char* LabelName(LoopLabel label) {
+  return label == LoopLabel::kLoop ? "loop" : label == LoopLabel::kIgnore ? "ignored" : "none";
+}
+
+std::string Quoted(const std::string& text) {
+  std::string result = "\"";
+  for (const char c : text) result += c == '"' ? "\"\"" : std::string(1, c);
+  return result + "\"";
+}
+
 LoopReport EvaluateRun(const LoopRun& run) {
   std::vector<LoopObservation> observations;
   for (const LoopRow& row : run.rows) observations.push_back(Observe(row.result));
   LoopReport report;
-  report.verified = EvaluateVerified(observations, run.truth, run.options.loop_threshold);
+  report.verified = EvaluateVerified(observations, run.truth);
+  report.ranked = EvaluateRanked(observations, run.truth);
   report.posterior = EvaluatePosterior(observations, run.truth, run.options.loop_threshold);
   const std::vector<double> ms = Collect(run.rows, [](const LoopRow& row) { return row.ms; });
   report.ms_median = Quantile(ms, 0.5);
@@ -105,25 +133,32 @@ LoopReport EvaluateRun(const LoopRun& run) {
 
 nlohmann::ordered_json FiguresJson(const LoopRun& run, const LoopReport& report) {
   const LoopEvaluation &verified = report.verified, &posterior = report.posterior;
+  const std::vector<std::pair<std::string, const LoopEvaluation*>> rankings = {
+      {"", &verified}, {"_ranked", &report.ranked}, {"_posterior", &posterior}};
   nlohmann::ordered_json json;
+  const auto add = [&](const std::string& key, const auto& figure) {
+    for (const auto& [suffix, evaluation] : rankings) json[key + suffix] = figure(*evaluation);
+  };
   json["images"] = verified.images;
   json["images_damaged"] = report.damaged;
   json["rows_with_loop"] = verified.rows_with_loop;
-  json["recall_at_100_precision"] = verified.recall_at_100_precision;
-  json["recall_at_100_precision_posterior"] = posterior.recall_at_100_precision;
-  json["area_under_curve"] = verified.area_under_curve;
-  json["area_under_curve_posterior"] = posterior.area_under_curve;
-  json["best_f1"] = verified.best_f1;
-  json["best_f1_posterior"] = posterior.best_f1;
+  add("recall_at_100_precision", [](const LoopEvaluation& e) { return e.recall_at_100_precision; });
+  add("area_under_curve", [](const LoopEvaluation& e) { return e.area_under_curve; });
+  add("best_f1", [](const LoopEvaluation& e) { return e.best_f1; });
+  // The decision does not depend on how images are ranked.
   json["at_default_threshold"] = Rates(verified.at_default_threshold);
   json["at_default_threshold"]["threshold"] = run.options.loop_threshold;
   json["at_default_threshold_posterior"] = Rates(posterior.at_default_threshold);
+  json["f1_at_default"] = verified.f1_at_default;
+  json["f1_at_default_posterior"] = posterior.f1_at_default;
   json["accepted"] = {
       {"true", verified.true_positives}, {"false", verified.false_positives}, {"ignored", verified.ignored}};
+  add("calibration_error", CalibrationError);
+  add("calibration_images", [](const LoopEvaluation& e) { return e.calibration_images; });
   json["ms_per_image"] = {{"median", report.ms_median}, {"p99", report.ms_p99}};
   json["stage_ms_median"] = Stages(run.rows);
-  json["threshold_at_100_precision"] = verified.threshold_at_100_precision;
-  json["threshold_at_100_precision_posterior"] = posterior.threshold_at_100_precision;
+  add("threshold_at_100_precision", [](const LoopEvaluation& e) { return e.threshold_at_100_precision; });
+  add("reliability", Reliability);
   return json;
 }
 
@@ -152,21 +187,31 @@ void WriteLoopRun(const LoopRun& run, const LoopReport& report, const std::files
 }
 
 void PrintLoopRun(const LoopRun& run, const LoopReport& report, const std::filesystem::path& folder) {
-  const LoopEvaluation &verified = report.verified, &posterior = report.posterior;
+  const LoopEvaluation &verified = report.verified, &ranked = report.ranked, &posterior = report.posterior;
   std::printf("%-34s %s\n", "rule", RuleName(run.options).c_str());
   std::printf("%-34s %d (%d with a loop)\n", "images", verified.images, verified.rows_with_loop);
   std::printf("%-34s %s\n", "ground truth", run.truth.description.c_str());
-  std::printf("%-34s %12s %12s\n", "", "verified", "posterior");
-  const auto line = [](const char* name, double a, double b) {
+  std::printf("%-34s %12s %12s %12s\n", "", "verified", "posterior", "ranked");
+  const auto line = [](const char* name, double a, double b, double c) {
+    std::printf("%-34s %11.1f%% %11.1f%% %11.1f%%\n", name, 100 * a, 100 * b, 100 * c);
+  };
+  line("recall at 100 % precision", verified.recall_at_100_precision, posterior.recall_at_100_precision,
+       ranked.recall_at_100_precision);
+  line("area under the curve", verified.area_under_curve, posterior.area_under_curve,
+       ranked.area_under_curve);
+  line("best F1", verified.best_f1, posterior.best_f1, ranked.best_f1);
+  const auto decision = [](const char* name, double a, double b) {
     std::printf("%-34s %11.1f%% %11.1f%%\n", name, 100 * a, 100 * b);
   };
-  line("recall at 100 % precision", verified.recall_at_100_precision, posterior.recall_at_100_precision);
-  line("area under the curve", verified.area_under_curve, posterior.area_under_curve);
-  line("best F1", verified.best_f1, posterior.best_f1);
-  line("precision at the default threshold", verified.at_default_threshold.precision,
-       posterior.at_default_threshold.precision);
-  line("recall at the default threshold", verified.at_default_threshold.recall,
-       posterior.at_default_threshold.recall);
+  decision("precision at the default threshold", verified.at_default_threshold.precision,
+           posterior.at_default_threshold.precision);
+  decision("recall at the default threshold", verified.at_default_threshold.recall,
+           posterior.at_default_threshold.recall);
+  decision("F1 at the default threshold", verified.f1_at_default, posterior.f1_at_default);
+  std::printf("%-34s %12s %12s %12s\n", "calibration error", CalibrationText(verified).c_str(),
+              CalibrationText(posterior).c_str(), CalibrationText(ranked).c_str());
+  std::printf("%-34s %12d %12d %12d\n", "  over n images", verified.calibration_images,
+              posterior.calibration_images, ranked.calibration_images);
   std::printf("%-34s %d true, %d false, %d on ignored cells\n", "accepted", verified.true_positives,
               verified.false_positives, verified.ignored);
   std::printf("%-34s %.1f median, %.1f p99\n", "ms per image", report.ms_median, report.ms_p99);

@@ -35,12 +35,17 @@ struct LoopRun {
 
 /// What the figures of every table are.
 struct LoopReport {
-  LoopEvaluation verified, posterior;
+  LoopEvaluation verified, ranked, posterior;
   double ms_median = 0, ms_p99 = 0;  ///< of Detect, over the images that could be read [ms]
   int damaged = 0;
 };
 
 LoopReport EvaluateRun(const LoopRun& run);
+
+/// "loop", "ignored" or "none", in every file.
+const char* LabelName(LoopLabel label);
+/// A cell of a CSV file that may hold anything.
+std::string Quoted(const std::string& text);
 
 /// The figures of results.json, without the protocol.
 nlohmann::ordered_json FiguresJson(const LoopRun& run, const LoopReport& report);

@@ -10,7 +10,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// The two rankings of every figure: with and without verification.
+// The two rankings that are tested: with and without verification. Nobody may close a loop with the third.
 struct Ranking {
   const char* name;
   LoopEvaluation LoopReport::*evaluation;
@@ -96,8 +96,15 @@ std::string Both(const Json& figures, const std::string& key, const char* inner 
   return value(key) + " / " + value(key + "_posterior");
 }
 
+// "3.1 (n = 42)"; "-" where there is nothing to calibrate.
+std::string Calibration(const Json& figures, const std::string& suffix) {
+  const Json& error = figures["calibration_error" + suffix];
+  if (error.is_null()) return "-";
+  return Percent(error) + " (n = " + std::to_string(figures["calibration_images" + suffix].get<int>()) + ")";
+}
+
 std::string Line(const std::vector<std::string>& cells) {
-  static constexpr int kWidths[] = {8, 25, 13, 13, 24, 22, 12};
+  static constexpr int kWidths[] = {8, 25, 33, 13, 13, 24, 22, 17, 17, 12};
   std::string line = "|";
   for (std::size_t k = 0; k < cells.size(); ++k) {
     std::string cell = cells[k];
@@ -141,17 +148,23 @@ std::string Markdown(const LoopTable& table, const Json& json) {
           std::to_string(p["tolerance_frames"].get<int>()) + " frames.  \n";
   text += "Exclusion: " + p["exclusion"].get<std::string>() + ".  \n";
   text += "Threshold: " + p["threshold"].get<std::string>() + ".  \n";
-  text += "Figures in %: with verification / posterior only.\n\n";
-  text += Line({"rule", "recall at 100 % precision", "area", "best F1", "precision at the default",
-                "recall at the default", "ms per image"});
-  text += "|---|---|---|---|---|---|---|\n";
+  text +=
+      "Figures in %: with verification / posterior only. Ranked: images that the verification refused stay, "
+      "behind the accepted ones; no loop can be closed with them. Calibration error: of the accepted images' "
+      "probability / of H from the threshold on, over n images.\n\n";
+  text += Line({"rule", "recall at 100 % precision", "recall at 100 % precision, ranked", "area", "best F1",
+                "precision at the default", "recall at the default", "F1 at the default", "calibration error",
+                "ms per image"});
+  text += "|---|---|---|---|---|---|---|---|---|---|\n";
   for (const LoopTableRow& row : table.rows) {
     char ms[32];
     std::snprintf(ms, sizeof ms, "%.1f", row.report.ms_median);
     text +=
-        Line({row.rule, Both(row.figures, "recall_at_100_precision"), Both(row.figures, "area_under_curve"),
+        Line({row.rule, Both(row.figures, "recall_at_100_precision"),
+              Percent(row.figures["recall_at_100_precision_ranked"]), Both(row.figures, "area_under_curve"),
               Both(row.figures, "best_f1"), Both(row.figures, "at_default_threshold", "precision"),
-              Both(row.figures, "at_default_threshold", "recall"), ms});
+              Both(row.figures, "at_default_threshold", "recall"), Both(row.figures, "f1_at_default"),
+              Calibration(row.figures, "") + " / " + Calibration(row.figures, "_posterior"), ms});
   }
   text += "\nOver the images with a loop, found at each rule's own threshold of 100 % precision or not:\n\n";
   return text + SignificanceText(json["significance"]);
@@ -160,13 +173,17 @@ std::string Markdown(const LoopTable& table, const Json& json) {
 std::string Csv(const LoopTable& table) {
   std::string text = "rule";
   const std::vector<std::string> keys = {"recall_at_100_precision", "area_under_curve", "best_f1"};
-  const std::vector<std::string> suffixes = {"", "_posterior"};
+  const std::vector<std::string> suffixes = {"", "_posterior", "_ranked"};
   for (const std::string& suffix : suffixes) {
     for (const std::string& key : keys) text += "," + key + suffix;
-    text += ",precision_at_default_threshold" + suffix + ",recall_at_default_threshold" + suffix;
+    text += ",calibration_error" + suffix + ",calibration_images" + suffix;
+    if (suffix == "_ranked") continue;  // decides as the verified ones
+    text += ",precision_at_default_threshold" + suffix + ",recall_at_default_threshold" + suffix +
+            ",f1_at_default" + suffix;
   }
   text += ",ms_per_image_median,ms_per_image_p99\n";
   const auto number = [](const Json& value) {
+    if (value.is_null()) return std::string(",");
     char cell[32];
     std::snprintf(cell, sizeof cell, ",%.9g", value.get<double>());
     return std::string(cell);
@@ -175,8 +192,12 @@ std::string Csv(const LoopTable& table) {
     text += row.rule;
     for (const std::string& suffix : suffixes) {
       for (const std::string& key : keys) text += number(row.figures[key + suffix]);
+      text += number(row.figures["calibration_error" + suffix]) +
+              number(row.figures["calibration_images" + suffix]);
+      if (suffix == "_ranked") continue;
       const Json& rates = row.figures["at_default_threshold" + suffix];
-      text += number(rates["precision"]) + number(rates["recall"]);
+      text += number(rates["precision"]) + number(rates["recall"]) +
+              number(row.figures["f1_at_default" + suffix]);
     }
     text += number(row.report.ms_median) + number(row.report.ms_p99) + "\n";
   }

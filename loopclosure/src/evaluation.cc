@@ -9,16 +9,15 @@ namespace {
 
 struct Ranked {
   int image = -1;
-  bool says = false;      // there is a location and a finite H; else it is in no ranking
+  bool says = false;      // there is a location and a finite score; else it is in no ranking
   bool rejected = false;  // ranks last
-  double hypothesis = 0;
+  double score = 0;
   LoopLabel label = LoopLabel::kNone;
-  bool taken = false;  // at the default threshold
+  bool taken = false;       // at the default decision
+  bool calibrated = false;  // the score is to be a probability
 };
 
-bool SameRank(const Ranked& a, const Ranked& b) {
-  return a.rejected == b.rejected && a.hypothesis == b.hypothesis;
-}
+bool SameRank(const Ranked& a, const Ranked& b) { return a.rejected == b.rejected && a.score == b.score; }
 
 PrecisionRecall Rates(int true_positives, int false_positives, int rows) {
   PrecisionRecall rates;
@@ -37,7 +36,13 @@ LoopOutcome OutcomeOf(const Ranked& r, bool has_loop) {
   return r.taken ? LoopOutcome::kIgnored : LoopOutcome::kNothing;
 }
 
-// The counts at the default threshold.
+// 2 P R / (P + R) by its counts, which need no case for P + R = 0.
+double F1(int true_positives, int false_positives, int rows) {
+  const int sum = rows + true_positives + false_positives;  // 2 TP + FP + missed
+  return sum > 0 ? 2.0 * true_positives / sum : 1.0;
+}
+
+// The counts at the default decision.
 void Count(const std::vector<Ranked>& ranked, const LoopGroundTruth& truth, LoopEvaluation& result) {
   for (const Ranked& r : ranked) {
     result.outcomes.push_back(OutcomeOf(r, truth.HasLoop(r.image)));
@@ -47,6 +52,27 @@ void Count(const std::vector<Ranked>& ranked, const LoopGroundTruth& truth, Loop
     if (r.label == LoopLabel::kIgnore) ++result.ignored;
   }
   result.at_default_threshold = Rates(result.true_positives, result.false_positives, result.rows_with_loop);
+  result.f1_at_default = F1(result.true_positives, result.false_positives, result.rows_with_loop);
+}
+
+void Calibrate(const std::vector<Ranked>& ranked, LoopEvaluation& result) {
+  constexpr int kBins = LoopEvaluation::kReliabilityBins;
+  for (const Ranked& r : ranked) {
+    if (!r.says || !r.calibrated || r.label == LoopLabel::kIgnore) continue;
+    const double p = std::clamp(r.score, 0.0, 1.0);
+    const int bin = std::max(0, static_cast<int>(std::ceil(p * kBins)) - 1);
+    ReliabilityBin& b = result.reliability[static_cast<std::size_t>(bin)];
+    ++b.images;
+    b.mean_probability += p;
+    b.accuracy += r.label == LoopLabel::kLoop ? 1 : 0;
+    ++result.calibration_images;
+  }
+  for (ReliabilityBin& b : result.reliability) {
+    if (b.images == 0) continue;
+    result.calibration_error += std::abs(b.accuracy - b.mean_probability) / result.calibration_images;
+    b.mean_probability /= b.images;
+    b.accuracy /= b.images;
+  }
 }
 
 // The curve and what is read from it.
@@ -54,7 +80,7 @@ void Sweep(std::vector<Ranked> ranked, LoopEvaluation& result) {
   ranked.erase(std::remove_if(ranked.begin(), ranked.end(), [](const Ranked& r) { return !r.says; }),
                ranked.end());
   std::stable_sort(ranked.begin(), ranked.end(), [](const Ranked& a, const Ranked& b) {
-    return std::make_tuple(a.rejected, -a.hypothesis) < std::make_tuple(b.rejected, -b.hypothesis);
+    return std::make_tuple(a.rejected, -a.score) < std::make_tuple(b.rejected, -b.score);
   });
   int true_positives = 0;
   int false_positives = 0;
@@ -67,7 +93,7 @@ void Sweep(std::vector<Ranked> ranked, LoopEvaluation& result) {
     if (ranked[i].label == LoopLabel::kLoop) found.push_back(ranked[i].image);
     if (i + 1 < ranked.size() && SameRank(ranked[i], ranked[i + 1])) continue;  // ties stay together
     PrecisionRecall point = Rates(true_positives, false_positives, result.rows_with_loop);
-    point.threshold = ranked[i].hypothesis;
+    point.threshold = ranked[i].score;
     point.rejected = ranked[i].rejected;
     if (false_positives == 0) {
       result.recall_at_100_precision = point.recall;
@@ -89,8 +115,22 @@ LoopEvaluation Evaluate(const std::vector<Ranked>& ranked, const LoopGroundTruth
   result.images = static_cast<int>(ranked.size());
   result.rows_with_loop = truth.RowsWithLoop();
   Count(ranked, truth, result);
+  Calibrate(ranked, result);
   Sweep(ranked, result);
   return result;
+}
+
+// Of the accepted images, which rank first, and of the others, if they are ranked at all.
+LoopEvaluation EvaluateDecisions(const std::vector<LoopObservation>& observations,
+                                 const LoopGroundTruth& truth, bool with_rejected) {
+  std::vector<Ranked> ranked;
+  for (const LoopObservation& o : observations) {
+    const int location = o.accepted ? o.verified : o.best;
+    const bool says = (o.accepted || with_rejected) && location >= 0 && std::isfinite(o.probability);
+    ranked.push_back({o.image, says, !o.accepted, o.probability, truth.At(o.image, location),
+                      o.accepted && location >= 0, o.accepted || o.proposed});
+  }
+  return Evaluate(ranked, truth);
 }
 
 }  // namespace
@@ -100,29 +140,29 @@ LoopEvaluation EvaluatePosterior(const std::vector<LoopObservation>& observation
   std::vector<Ranked> ranked;
   for (const LoopObservation& o : observations) {
     const bool says = o.best >= 0 && std::isfinite(o.hypothesis);
-    ranked.push_back(
-        {o.image, says, false, o.hypothesis, truth.At(o.image, o.best), says && o.hypothesis >= threshold});
+    const bool taken = says && o.hypothesis >= threshold;
+    ranked.push_back({o.image, says, false, o.hypothesis, truth.At(o.image, o.best), taken, taken});
   }
   return Evaluate(ranked, truth);
 }
 
 LoopEvaluation EvaluateVerified(const std::vector<LoopObservation>& observations,
-                                const LoopGroundTruth& truth, double threshold) {
-  std::vector<Ranked> ranked;
-  for (const LoopObservation& o : observations) {
-    const int location = o.accepted ? o.verified : o.best;
-    const bool says = location >= 0 && std::isfinite(o.hypothesis);
-    ranked.push_back({o.image, says, !o.accepted, o.hypothesis, truth.At(o.image, location),
-                      says && o.accepted && o.hypothesis >= threshold});
-  }
-  return Evaluate(ranked, truth);
+                                const LoopGroundTruth& truth) {
+  return EvaluateDecisions(observations, truth, false);
+}
+
+LoopEvaluation EvaluateRanked(const std::vector<LoopObservation>& observations,
+                              const LoopGroundTruth& truth) {
+  return EvaluateDecisions(observations, truth, true);
 }
 
 LoopObservation Observe(const LoopResult& result) {
   LoopObservation observation;
   observation.image = static_cast<int>(result.query);
   observation.hypothesis = result.hypothesis;
+  observation.probability = result.probability;
   observation.best = static_cast<int>(result.candidate);
+  observation.proposed = result.proposed;
   observation.accepted = result.accepted;
   observation.verified = result.accepted ? static_cast<int>(result.verification.candidate) : -1;
   return observation;

@@ -309,7 +309,7 @@ TEST(LoopDetector, CorridorReachesThePapersClassWithoutAFalseLoop) {
     observations.push_back(Observe(detector.Detect(Query(i, image))));
   }
   const LoopGroundTruth truth = ReadLoopMatrix(folder / "ground_truth.bmp", 84);
-  const LoopEvaluation result = EvaluateVerified(observations, truth, detector.options().loop_threshold);
+  const LoopEvaluation result = EvaluateVerified(observations, truth);
   EXPECT_EQ(result.rows_with_loop, 44);
   EXPECT_GE(result.recall_at_100_precision, 0.97);
   EXPECT_GE(result.at_default_threshold.recall, 0.90);

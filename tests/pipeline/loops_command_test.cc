@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <csignal>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
@@ -81,17 +82,47 @@ TEST_F(LoopsCommand, WritesEverythingThatScriptsRelyOn) {
   EXPECT_EQ(r["rows_with_loop"], 5);
   EXPECT_EQ(r["accepted"]["false"], 0);
   EXPECT_GT(r["recall_at_100_precision"].get<double>(), 0.5);
-  for (const char* key :
-       {"images_damaged", "recall_at_100_precision_posterior", "area_under_curve",
-        "area_under_curve_posterior", "best_f1", "best_f1_posterior", "at_default_threshold",
-        "at_default_threshold_posterior", "ms_per_image", "stage_ms_median", "protocol"})
+  for (const char* key : {"images_damaged",
+                          "recall_at_100_precision_posterior",
+                          "area_under_curve",
+                          "area_under_curve_posterior",
+                          "best_f1",
+                          "best_f1_posterior",
+                          "at_default_threshold",
+                          "at_default_threshold_posterior",
+                          "ms_per_image",
+                          "stage_ms_median",
+                          "protocol",
+                          "recall_at_100_precision_ranked",
+                          "area_under_curve_ranked",
+                          "best_f1_ranked",
+                          "f1_at_default",
+                          "f1_at_default_posterior",
+                          "calibration_error",
+                          "calibration_error_ranked",
+                          "calibration_error_posterior",
+                          "calibration_images"})
     EXPECT_TRUE(r.contains(key)) << key;
   EXPECT_EQ(r["protocol"]["rule"], "mean");
   EXPECT_EQ(r["protocol"]["tolerance_frames"], 0);
+  // Nothing that was refused counts: what is verified was accepted.
+  EXPECT_LE(r["recall_at_100_precision"], r["at_default_threshold"]["recall"]);
+  EXPECT_GE(r["recall_at_100_precision_ranked"], r["recall_at_100_precision"]);
+  for (const char* suffix : {"", "_ranked", "_posterior"}) {
+    int images = 0;
+    for (const nlohmann::json& bin : r[std::string("reliability") + suffix])
+      images += bin["images"].get<int>();
+    EXPECT_EQ(images, r[std::string("calibration_images") + suffix]);
+    EXPECT_EQ(r[std::string("reliability") + suffix].size(), 10u);
+  }
+  EXPECT_THAT(run.output,
+              AllOf(HasSubstr("ranked"), HasSubstr("calibration error"), HasSubstr("over n images")));
+  EXPECT_FALSE(fs::exists(out_ / "dump_candidates.csv"));
   EXPECT_THAT(ReadAll(out_ / "hypotheses.csv"),
-              StartsWith("image,file,hypothesis,candidate,posterior,proposed,"));
+              StartsWith("image,file,hypothesis,candidate,posterior,probability,proposed,"));
   EXPECT_THAT(ReadAll(out_ / "precision_recall.svg"),
-              AllOf(HasSubstr("with verification"), HasSubstr("posterior only"), HasSubstr(">recall<")));
+              AllOf(HasSubstr("with verification"), HasSubstr("posterior only"), HasSubstr("ranked behind"),
+                    HasSubstr(">recall<")));
 }
 
 // The area and the recall before the first false positive, from the curve's file again.
@@ -103,11 +134,14 @@ TEST_F(LoopsCommand, TheCurvesFileHoldsWhatTheFiguresAreReadFrom) {
   std::string line;
   std::getline(csv, line);
   EXPECT_EQ(line, "curve,threshold,rejected,precision,recall,true_positives,false_positives");
-  double area[2] = {0, 0}, recall[2] = {0, 0}, recall_before[2] = {0, 0};
+  double area[3] = {0, 0, 0}, recall[3] = {0, 0, 0}, recall_before[3] = {0, 0, 0};
   while (std::getline(csv, line)) {
     const std::vector<std::string> cells = SplitText(line, ",");
     ASSERT_EQ(cells.size(), 7u) << line;
-    const int k = cells[0] == "verified" ? 0 : 1;
+    const int k = cells[0] == "verified" ? 0 : cells[0] == "posterior" ? 1 : 2;
+    if (k != 2) {
+      EXPECT_EQ(cells[2], "0") << line;
+    }
     const double precision = *ParseDouble(cells[3]), r_here = *ParseDouble(cells[4]);
     area[k] += precision * (r_here - recall_before[k]);
     recall_before[k] = r_here;
@@ -115,7 +149,9 @@ TEST_F(LoopsCommand, TheCurvesFileHoldsWhatTheFiguresAreReadFrom) {
   }
   EXPECT_NEAR(area[0], r["area_under_curve"].get<double>(), 1e-6);
   EXPECT_NEAR(area[1], r["area_under_curve_posterior"].get<double>(), 1e-6);
+  EXPECT_NEAR(area[2], r["area_under_curve_ranked"].get<double>(), 1e-6);
   EXPECT_NEAR(recall[0], r["recall_at_100_precision"].get<double>(), 1e-6);
+  EXPECT_NEAR(recall[2], r["recall_at_100_precision_ranked"].get<double>(), 1e-6);
   EXPECT_NEAR(recall[1], r["recall_at_100_precision_posterior"].get<double>(), 1e-6);
 }
 
@@ -139,7 +175,12 @@ TEST_F(LoopsCommand, TheTableHoldsEveryRuleWithItsOwnFolder) {
       ReadAll(out_ / "table.md"),
       AllOf(HasSubstr("20 of " + images_.string()), HasSubstr("5 with a loop"), HasSubstr(truth.string()),
             HasSubstr("tolerance 0 frames"), HasSubstr("the newest 10 images"),
-            HasSubstr("chosen after the fact"), HasSubstr("McNemar (exact binomial)")));
+            HasSubstr("chosen after the fact"), HasSubstr("McNemar (exact binomial)"),
+            HasSubstr("| recall at 100 % precision, ranked |"), HasSubstr("| F1 at the default "),
+            HasSubstr("| calibration error "), HasSubstr("(n = ")));
+  EXPECT_THAT(ReadAll(out_ / "table.csv"),
+              AllOf(HasSubstr(",recall_at_100_precision_ranked,"), HasSubstr(",f1_at_default,"),
+                    HasSubstr(",calibration_error_posterior,")));
   ASSERT_EQ(table["significance"].size(), 6u);
   for (const nlohmann::json& test : table["significance"]) {
     EXPECT_EQ(test["images"], 5);
@@ -150,6 +191,65 @@ TEST_F(LoopsCommand, TheTableHoldsEveryRuleWithItsOwnFolder) {
   // The same bytes as a run of that rule alone.
   ASSERT_EQ(Run(truth, folder_ / "naive", {"--rule", "naive"}).status, 0);
   EXPECT_EQ(ReadAll(folder_ / "naive" / "hypotheses.csv"), ReadAll(out_ / "naive" / "hypotheses.csv"));
+}
+
+TEST_F(LoopsCommand, TheDumpSaysWhatEachCandidateLookedLike) {
+  WriteImages();
+  const fs::path truth = Truth(TruePairs());
+  ASSERT_EQ(Run(truth, out_, {"--dump"}).status, 0);
+  std::istringstream candidates(ReadAll(out_ / "dump_candidates.csv"));
+  std::string line;
+  std::getline(candidates, line);
+  EXPECT_EQ(line,
+            "image,location,truth,combined_posterior,surf_score,surf_likelihood,surf_posterior,sift_score,"
+            "sift_likelihood,sift_posterior,orb_score,orb_likelihood,orb_posterior");
+  int loops = 0;
+  while (std::getline(candidates, line)) {
+    const std::vector<std::string> cells = SplitText(line, ",");
+    ASSERT_EQ(cells.size(), 13u) << line;
+    const int image = std::stoi(cells[0]), location = std::stoi(cells[1]);
+    EXPECT_LT(location, image - 9);  // short-term memory is no candidate
+    EXPECT_EQ(cells[2], image == location + kPlaces ? "loop" : "none");
+    loops += cells[2] == "loop" ? 1 : 0;
+    EXPECT_GT(*ParseDouble(cells[4]) + *ParseDouble(cells[7]) + *ParseDouble(cells[10]), 0) << line;
+    for (const std::size_t likelihood : {5u, 8u, 11u}) EXPECT_GE(*ParseDouble(cells[likelihood]), 1) << line;
+  }
+  EXPECT_EQ(loops, 5);
+
+  std::istringstream verification(ReadAll(out_ / "dump_verification.csv"));
+  std::getline(verification, line);
+  EXPECT_EQ(line, "image,candidate,truth,order,accepted,chosen,type,matches,inliers,reason");
+  int chosen = 0;
+  while (std::getline(verification, line)) {
+    const std::vector<std::string> cells = SplitText(line, ",");
+    ASSERT_GE(cells.size(), 10u) << line;
+    if (cells[5] == "1") {
+      EXPECT_EQ(cells[4], "1") << line;
+      EXPECT_EQ(cells[6], "fundamental");
+      EXPECT_EQ(cells[9], "\"\"") << line;
+      ++chosen;
+    }
+  }
+  const nlohmann::json accepted = Json(out_ / "results.json")["accepted"];
+  EXPECT_EQ(chosen, accepted["true"].get<int>() + accepted["false"].get<int>());
+  // Looking on changes nothing.
+  ASSERT_EQ(Run(truth, folder_ / "silent").status, 0);
+  EXPECT_EQ(ReadAll(folder_ / "silent" / "hypotheses.csv"), ReadAll(out_ / "hypotheses.csv"));
+}
+
+TEST_F(LoopsCommand, ADumpOfImagesWithoutFeaturesHasNoCandidates) {
+  fs::create_directories(images_);
+  for (int i = 0; i < 15; ++i)
+    cv::imwrite((images_ / (std::to_string(i) + ".png")).string(), cv::Mat(120, 160, CV_8U, cv::Scalar(90)));
+  const auto run = Run(Truth({}, 15), out_, {"--dump"});
+  ASSERT_EQ(run.status, 0) << run.output;
+  for (const char* name : {"dump_candidates.csv", "dump_verification.csv"}) {
+    const std::string text = ReadAll(out_ / name);
+    EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1) << name;
+  }
+  const nlohmann::json r = Json(out_ / "results.json");
+  EXPECT_TRUE(r["calibration_error"].is_null());
+  EXPECT_EQ(r["f1_at_default"], 1);  // nothing to find, nothing said
 }
 
 TEST_F(LoopsCommand, ATableOfOneRuleIsAContradiction) {

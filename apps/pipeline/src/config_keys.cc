@@ -181,6 +181,8 @@ void ConfigTable::AddLoops(LoopDetectorOptions& o) {
   Add("ltm_file", o.ltm_file,
       "SQLite file of the long-term memory, gone on with if it is there; empty: a temporary one");
   Add("keep_posterior", o.keep_posterior, "keep every posterior (costs time with many locations)");
+  Add("keep_evidence", o.keep_evidence,
+      "keep every raw score, likelihood and posterior (costs time with many locations)");
 }
 
 void ConfigTable::AddExtraction(ExtractionOptions& o) {

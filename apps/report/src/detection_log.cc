@@ -38,6 +38,7 @@ void DetectionLog::OnDetection(const LoopResult& result) {
   stamps_.erase(stamps_.begin(), stamps_.upper_bound(result.query));
   detection.proposed = result.proposed;
   detection.verified = result.accepted;
+  detection.probability = result.probability;
   detection.candidate = result.verification.candidate >= 0 ? result.verification.candidate : result.candidate;
   detection.reason = result.reason.empty() && !result.accepted ? result.verification.reason : result.reason;
   for (const MemberOpinion& member : result.members) {

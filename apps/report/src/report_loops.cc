@@ -122,6 +122,8 @@ Json PrecisionRecallJson(const RunResult& result, const DetectionLog& log, const
       observation.best = RowOf(known, opinion.best);
       observation.accepted = detection.verified;
       observation.verified = detection.verified ? RowOf(known, detection.candidate) : -1;
+      observation.probability = detection.probability;
+      observation.proposed = detection.proposed;
       by_name[opinion.name].push_back(observation);
     }
   }
@@ -136,8 +138,7 @@ Json PrecisionRecallJson(const RunResult& result, const DetectionLog& log, const
     if (alone && name != "ensemble") continue;
     json["curves"].push_back(CurveJson(name, EvaluatePosterior(by_name[name], known.truth, threshold)));
   }
-  json["curves"].push_back(
-      CurveJson("verified", EvaluateVerified(by_name["ensemble"], known.truth, threshold)));
+  json["curves"].push_back(CurveJson("verified", EvaluateVerified(by_name["ensemble"], known.truth)));
   return json;
 }
 

@@ -27,6 +27,7 @@ struct LoggedDetection {
   std::int64_t query = -1;  ///< index of the input frame
   double stamp_s = 0;
   bool proposed = false, verified = false;
+  double probability = 0;       ///< LoopResult::probability
   std::int64_t candidate = -1;  ///< the input frame that the verification tried last best, else the best one
   std::string reason;           ///< why it is no loop; empty if it was verified
   std::vector<LoggedOpinion> opinions;  ///< the members in their order, then "ensemble"

@@ -72,6 +72,7 @@ View MakeView(const LoopQuery& query, const std::vector<Features>& members,
   view.size = SizeOf(query, members);
   view.camera = query.camera;
   view.metric = query.metric;
+  view.cameras = query.cameras;
   for (const Features& features : members) {
     view.members.push_back(MakeSet(features.keypoints, features.descriptors));
     if (query.metric) LookUpDepth(query, options, view.members.back());

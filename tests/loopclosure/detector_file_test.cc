@@ -235,6 +235,28 @@ TEST_F(SavedDetector, FeaturesThatNoImageCouldHaveAreRefusedThoughTheChecksumsAr
   EXPECT_THROW(load([](View& view) { view.members[1].pixels[0].y = -1e30f; }), InputError);
 }
 
+TEST(SavedView, KeepsItsCameras) {
+  View view;
+  view.id = 3;
+  view.size = {640, 240};
+  view.cameras = {{0, 0, 320, 240}, {320, 0, 320, 240}};
+  view.members.resize(1);
+  view.caller.pixels = {{1, 2}, {3, 4}};
+  view.caller.descriptors = cv::Mat::eye(2, 8, CV_8U);
+  const auto again = [](const View& saved) {
+    internal::ByteWriter out;
+    internal::SaveView(saved, out);
+    internal::ByteReader in(out.bytes(), "test");
+    View loaded = internal::LoadView(in);
+    EXPECT_TRUE(in.AtEnd());
+    return loaded;
+  };
+  const View loaded = again(view);
+  EXPECT_EQ(loaded.cameras, view.cameras);
+  view.cameras = {{0, 0, 0, 240}, {320, 0, 320, 240}};
+  EXPECT_THROW(again(view), InputError);
+}
+
 TEST_F(SavedDetector, MemoriesOfOtherLocationsThanTheStatisticsSayAreRefused) {
   constexpr std::uint32_t kStatistics = 7;
   LoopDetector saved(BoundedOptions());

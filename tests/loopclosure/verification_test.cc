@@ -144,6 +144,38 @@ TEST(GeometricVerifier, MatchesInOneSpotAreRefused) {
   EXPECT_FALSE(spot.accepted);
 }
 
+// Two cameras, the right one's image beside the left one's; each moves in its own image.
+View SeeTwo(const Pose& left, const Pose& right, std::int64_t id, bool swapped) {
+  View view = See(left, id, false, false);
+  View second = See(right, id, false, false);
+  for (cv::Point2f& p : (swapped ? view : second).members[0].pixels) p.x += 640;
+  for (int i = 0; i < second.members[0].descriptors.rows; ++i) {
+    cv::bitwise_not(second.members[0].descriptors.row(i), second.members[0].descriptors.row(i));
+  }
+  view.members[0].descriptors.push_back(second.members[0].descriptors);
+  view.members[0].pixels.insert(view.members[0].pixels.end(), second.members[0].pixels.begin(),
+                                second.members[0].pixels.end());
+  view.size = {1280, 480};
+  view.cameras = {{0, 0, 640, 480}, {640, 0, 640, 480}};
+  return view;
+}
+
+class OfTwoCameras : public ::testing::TestWithParam<bool> {};
+INSTANTIATE_TEST_SUITE_P(OtherWay, OfTwoCameras, ::testing::Bool());
+
+TEST_P(OfTwoCameras, ImagesHaveAGeometryEachAndTheirEvidenceAddsUp) {
+  View query = SeeTwo(At(0.8, 0.1), Pose(ExpSO3({0, 0, 0.3}), {0, 0.8, -0.3}), 9, GetParam());
+  View candidate = SeeTwo(Pose(), Pose(), 1, false);
+  const Verification each = GeometricVerifier({}, 1).Verify(query, candidate);
+  query.cameras.clear();
+  const Verification one = GeometricVerifier({}, 1).Verify(query, candidate);
+  ASSERT_TRUE(each.accepted) << each.reason;
+  EXPECT_GT(each.inliers, 0.85 * each.matches);
+  EXPECT_GT(each.inliers, 1.2 * one.inliers);
+  EXPECT_LT(each.log_nfa, one.log_nfa);
+  EXPECT_EQ(each.ahead, 0);
+}
+
 TEST(GeometricVerifier, IsDeterministicForASeedAndAnyNumberOfThreads) {
   const GeometricVerifier verifier({}, 5);
   const View query = See(At(0.5, 0.3), 9, false, false), candidate = See(Pose(), 1, false, false);

@@ -26,6 +26,7 @@ struct View {
   std::int64_t id = -1;                 ///< of the query that it was made of
   cv::Size size;                        ///< of the image [px]
   std::optional<PinholeCamera> camera;  ///< of the image; none: fundamental matrix
+  std::vector<cv::Rect> cameras;        ///< LoopQuery::cameras
   std::vector<Set> members;             ///< one per member
   Set caller;                           ///< the caller's own; may be empty
   bool metric = true;                   ///< 3D points are in metres

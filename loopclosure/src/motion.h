@@ -1,0 +1,32 @@
+// The motion of the camera between two views by pixels alone. Internal.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "evidence.h"
+#include "match_pool.h"
+#include "tutti/core/pose.h"
+#include "tutti/loopclosure/verification.h"
+
+namespace tutti::internal {
+
+/// What explains the most of the matches.
+struct Motion {
+  ConstraintType type = ConstraintType::kFundamental;  ///< or kEssential
+  std::vector<int> inliers;                            ///< of the pool, ascending
+  int considered = 0;                                  ///< matches that could have been inliers
+  ChanceFit chance;                                    ///< how many would be by chance
+  double ahead = 1;        ///< share of the translation along the candidate's optical axis; 0
+                           ///< where its direction is not known (several cameras)
+  Pose T_candidate_query;  ///< kEssential: unit translation
+};
+
+/// Essential matrix where both views have a camera, else fundamental matrix.
+/// Views of the same number of cameras (View::cameras): each with its like, or
+/// each with its opposite (left with right, for a drive the other way) if that
+/// explains more; inliers and evidence are summed.
+Motion FitMotion(const std::vector<PooledMatch>& pool, const View& query, const View& candidate,
+                 const VerificationOptions& options, std::uint64_t seed);
+
+}  // namespace tutti::internal

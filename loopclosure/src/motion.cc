@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numeric>
 
 #include "epipolar.h"
@@ -42,9 +43,29 @@ Motion FitOne(const std::vector<PooledMatch>& pool, const std::vector<int>& of, 
     motion.T_candidate_query = lines.T_second_first.Inverse();
     motion.ahead = std::abs(motion.T_candidate_query.translation.normalized().z());
   }
-  for (const int i : lines.inliers) motion.inliers.push_back(of[static_cast<std::size_t>(i)]);
-  motion.chance = FitByChance(calibrated ? FitModel::kEssential : FitModel::kFundamental, motion.considered,
-                              static_cast<int>(lines.inliers.size()), options.epipolar_px, size);
+  std::vector<int> inliers = lines.inliers;
+  if (options.homography_px > 0) {
+    EpipolarSettings own = settings;
+    own.threshold_px = options.homography_px;
+    const HomographyResult points = FitHomography(pixels_c, candidate.camera, pixels_q, query.camera, own);
+    std::vector<int> common;
+    std::set_intersection(inliers.begin(), inliers.end(), points.inliers.begin(), points.inliers.end(),
+                          std::back_inserter(common));
+    motion.homography =
+        !points.inliers.empty() && (static_cast<double>(common.size()) >=
+                                    options.homography_share * static_cast<double>(inliers.size()));
+    if (motion.homography) {
+      inliers = points.inliers;
+      motion.ahead = 0;
+      if (points.turned) motion.T_candidate_query = Pose(points.R_second_first.conjugate(), {0, 0, 0});
+    }
+  }
+  for (const int i : inliers) motion.inliers.push_back(of[static_cast<std::size_t>(i)]);
+  const FitModel model = motion.homography ? FitModel::kHomography
+                         : calibrated      ? FitModel::kEssential
+                                           : FitModel::kFundamental;
+  motion.chance = FitByChance(model, motion.considered, static_cast<int>(inliers.size()),
+                              motion.homography ? options.homography_px : options.epipolar_px, size);
   return motion;
 }
 
@@ -68,12 +89,14 @@ Motion FitEach(const std::vector<PooledMatch>& pool, const std::vector<std::vect
                const View& query, const View& candidate, const VerificationOptions& options,
                std::uint64_t seed) {
   Motion sum;
+  sum.homography = true;
   for (std::size_t i = 0; i < by_camera.size(); ++i) {
     const Motion one =
         FitOne(pool, by_camera[i], query, candidate, query.cameras[i].size(), options, seed + i);
     sum.inliers.insert(sum.inliers.end(), one.inliers.begin(), one.inliers.end());
     sum.chance.expected += one.chance.expected;
     sum.chance.log_nfa += one.chance.log_nfa;
+    sum.homography = sum.homography && one.homography;
   }
   std::sort(sum.inliers.begin(), sum.inliers.end());
   sum.considered = static_cast<int>(pool.size());

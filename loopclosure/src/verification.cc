@@ -65,7 +65,7 @@ struct Bars {
 Bars BarsFor(const Verification& result, const VerificationOptions& options) {
   const bool rigid = result.type == ConstraintType::kRigid;
   Bars bars;
-  bars.inliers = rigid ? options.min_inliers : options.min_epipolar_inliers;
+  bars.inliers = rigid || result.homography ? options.min_inliers : options.min_epipolar_inliers;
   bars.ratio = rigid ? options.min_inlier_ratio : options.min_epipolar_ratio;
   return bars;
 }
@@ -188,6 +188,7 @@ void VerifyByPixels(const std::vector<PooledMatch>& pool, const View& query, con
                     const VerificationOptions& options, std::uint64_t seed, Verification& result) {
   const internal::Motion motion = internal::FitMotion(pool, query, candidate, options, seed);
   result.type = motion.type;
+  result.homography = motion.homography;
   result.reason =
       Judge(pool, motion.inliers, motion.chance, motion.considered, query, candidate, options, result);
   result.accepted = result.reason.empty();

@@ -144,6 +144,85 @@ TEST(GeometricVerifier, MatchesInOneSpotAreRefused) {
   EXPECT_FALSE(spot.accepted);
 }
 
+// Descriptors of their own for features that belong to something else than the cloud.
+cv::Mat Descriptor(std::uint32_t of) {
+  std::mt19937 own(of);
+  cv::Mat row(1, 32, CV_8U);
+  for (int c = 0; c < 32; ++c) row.at<std::uint8_t>(0, c) = static_cast<std::uint8_t>(own());
+  return row;
+}
+
+void AddFeature(View& view, const cv::Point2f& pixel, std::uint32_t descriptor) {
+  view.members[0].pixels.push_back(pixel);
+  view.members[0].descriptors.push_back(Descriptor(descriptor));
+}
+
+class Turned : public ::testing::TestWithParam<bool> {};
+INSTANTIATE_TEST_SUITE_P(Calibrated, Turned, ::testing::Bool());
+
+TEST_P(Turned, OnTheSpotIsAcceptedByItsHomography) {
+  const Pose query = At(0, 0, 0.2);
+  const Verification v =
+      GeometricVerifier({}, 1).Verify(See(query, 9, GetParam(), false), See(Pose(), 1, GetParam(), false));
+  ASSERT_TRUE(v.accepted) << v.reason;
+  EXPECT_TRUE(v.homography);
+  EXPECT_GT(v.inliers, 0.9 * v.matches);
+  EXPECT_EQ(v.ahead, 0);
+  EXPECT_EQ(v.type, GetParam() ? ConstraintType::kEssential : ConstraintType::kFundamental);
+  if (GetParam()) {
+    EXPECT_EQ(v.S_candidate_query.translation.norm(), 0);
+    EXPECT_LT(v.S_candidate_query.rotation.angularDistance(query.rotation), 0.005);
+  }
+}
+
+// As if all points were on a plane that the camera looks at askance.
+View SeeFlat(const Pose& T_world_camera, std::int64_t id, bool calibrated) {
+  View view = See(Pose(), id, calibrated, false);
+  View::Set& set = view.members[0];
+  std::mt19937 generator(static_cast<std::uint32_t>(100 + id));
+  std::normal_distribution<double> noise(0, 0.5);
+  View::Set flat;
+  for (std::size_t i = 0; i < set.pixels.size(); ++i) {
+    const Eigen::Vector3d ray(std::cos(0.5 * static_cast<double>(i * i)),
+                              std::sin(1.7 * static_cast<double>(i * i)) * 0.7, 1);
+    const Eigen::Vector3d point(3 * ray.x(), 3 * ray.y(), 6 + ray.x());
+    const Eigen::Vector2d pixel = Camera().Project(T_world_camera.Inverse() * point);
+    if (!Camera().Contains(pixel)) continue;
+    flat.pixels.emplace_back(static_cast<float>(pixel.x() + noise(generator)),
+                             static_cast<float>(pixel.y() + noise(generator)));
+    flat.descriptors.push_back(Descriptor(static_cast<std::uint32_t>(900000 + i)));
+  }
+  set = flat;
+  return view;
+}
+
+TEST_P(Turned, AFlatSceneIsAcceptedByItsHomography) {
+  const Verification v = GeometricVerifier({}, 1).Verify(SeeFlat(At(0.8, 0.2, 0.1), 9, GetParam()),
+                                                         SeeFlat(Pose(), 1, GetParam()));
+  ASSERT_TRUE(v.accepted) << v.reason;
+  EXPECT_TRUE(v.homography);
+  if (GetParam()) {
+    EXPECT_GT(v.S_candidate_query.translation.norm(), 0.9);  // it moved
+  }
+}
+
+TEST_P(Turned, ChanceIsNoHomography) {
+  View chance = See(Pose(), 1, GetParam(), false);
+  std::mt19937 generator(3);
+  for (cv::Point2f& p : chance.members[0].pixels)
+    p = {static_cast<float>(generator() % 640u), static_cast<float>(generator() % 480u)};
+  const Verification v = GeometricVerifier({}, 1).Verify(See(Pose(), 9, GetParam(), false), chance);
+  EXPECT_FALSE(v.accepted);
+  EXPECT_LT(v.inliers, 20);
+}
+
+TEST(GeometricVerifier, AMotionWithParallaxIsNoHomography) {
+  const Verification v =
+      GeometricVerifier({}, 1).Verify(See(At(0.8, 0.2), 9, false, false), See(Pose(), 1, false, false));
+  ASSERT_TRUE(v.accepted) << v.reason;
+  EXPECT_FALSE(v.homography);
+}
+
 // Two cameras, the right one's image beside the left one's; each moves in its own image.
 View SeeTwo(const Pose& left, const Pose& right, std::int64_t id, bool swapped) {
   View view = See(left, id, false, false);

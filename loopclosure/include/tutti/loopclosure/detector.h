@@ -80,11 +80,16 @@ struct Verification {
   bool accepted = false;                        ///< it is a loop
   ConstraintType type = ConstraintType::kNone;  ///< which geometry decided
   Similarity S_candidate_query;  ///< maps points of the query camera into the candidate camera (kRigid:
-                                 ///< scale 1; kEssential: rotation and unit direction only)
+                                 ///< scale 1; kEssential: rotation and unit direction only; where the camera
+                                 ///< only turned, the rotation and no translation)
   Matrix6d information = Matrix6d::Zero();  ///< of (translation [m], rotation [rad]), from the inliers
+  bool homography = false;                  ///< kEssential, kFundamental: a homography explains nearly all,
+                                            ///< and decided: the scene is flat or the camera turned on the
+                                            ///< spot. The direction of the translation is then that of the
+                                            ///< essential matrix, one of two for a plane
   double ahead = 1;  ///< kEssential, kFundamental: share of the translation that is along the candidate's
-                     ///< optical axis, 0..1; without a camera by a guessed focal length; 0 where
-                     ///< several cameras decided: the direction is not known
+                     ///< optical axis, 0..1; without a camera by a guessed focal length; 0 where a homography
+                     ///< or several cameras decided: the direction is not known
   int matches = 0;   ///< that were considered (kRigid: those with a 3D point)
   int inliers = 0;   ///< of these, those that fit one camera motion
   int coverage = 0;  ///< cells of a grid of 8x6 that inliers occupy, in the image with fewer, 0..48

@@ -8,8 +8,13 @@
 namespace tutti {
 namespace {
 
-// Rectangles of this image.
+// A mask and rectangles that belong to this image.
 void CheckRegions(const LoopQuery& query, const std::string& which) {
+  if (!query.mask.empty() &&
+      (query.mask.type() != CV_8UC1 || (!query.image.empty() && query.mask.size() != query.image.size()))) {
+    throw InputError(which +
+                     "mask must be CV_8UC1, 0 where nothing is to be seen, and as large as the image");
+  }
   if (query.cameras.empty()) return;
   if (query.camera) {
     throw InputError(which + "an image of several cameras has no common camera; leave one of the two out");

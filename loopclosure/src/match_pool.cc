@@ -18,6 +18,10 @@ Eigen::Vector3f PointOf(const View::Set& set, int index) {
   return set.points.empty() ? kUnknown : set.points[static_cast<std::size_t>(index)];
 }
 
+int NumberOf(const View::Set& set, int index) {
+  return set.numbers.empty() ? index : set.numbers[static_cast<std::size_t>(index)];
+}
+
 void AppendMatches(const View::Set& query, const View::Set& candidate, const std::vector<Match>& matches,
                    bool is_caller, std::vector<PooledMatch>& pool) {
   for (const Match& m : matches) {
@@ -27,8 +31,8 @@ void AppendMatches(const View::Set& query, const View::Set& candidate, const std
     match.query_point = PointOf(query, m.query);
     match.candidate_point = PointOf(candidate, m.candidate);
     if (is_caller) {
-      match.query_feature = m.query;
-      match.candidate_feature = m.candidate;
+      match.query_feature = NumberOf(query, m.query);
+      match.candidate_feature = NumberOf(candidate, m.candidate);
     }
     match.ratio = m.ratio;
     pool.push_back(match);

@@ -59,7 +59,7 @@ PinholeCamera LoadCamera(ByteReader& in) {
 }
 
 // What a view has beside the least.
-constexpr char kHasCamera = 1, kHasRegions = 2;
+constexpr char kHasCamera = 1, kHasRegions = 2, kHasNumbers = 4;
 
 void LoadRegions(View& view, ByteReader& in) {
   const std::vector<std::int32_t> sides = in.GetVector<std::int32_t>();
@@ -74,6 +74,15 @@ void LoadRegions(View& view, ByteReader& in) {
   }
 }
 
+void LoadNumbers(View::Set& set, ByteReader& in) {
+  set.numbers = in.GetVector<int>();
+  const auto is_number = [](int number) { return number >= 0; };
+  if (set.numbers.size() != set.pixels.size() ||
+      !std::all_of(set.numbers.begin(), set.numbers.end(), is_number)) {
+    in.Damaged("features without numbers");
+  }
+}
+
 }  // namespace
 
 void SaveView(const View& view, ByteWriter& out) {
@@ -81,7 +90,8 @@ void SaveView(const View& view, ByteWriter& out) {
   out.Put<std::int32_t>(view.size.width);
   out.Put<std::int32_t>(view.size.height);
   out.Put<char>(view.metric ? 1 : 0);
-  out.Put(static_cast<char>((view.camera ? kHasCamera : 0) | (view.cameras.empty() ? 0 : kHasRegions)));
+  out.Put(static_cast<char>((view.camera ? kHasCamera : 0) | (view.cameras.empty() ? 0 : kHasRegions) |
+                            (view.caller.numbers.empty() ? 0 : kHasNumbers)));
   if (view.camera) SaveCamera(*view.camera, out);
   if (!view.cameras.empty()) {
     std::vector<std::int32_t> sides;
@@ -91,6 +101,7 @@ void SaveView(const View& view, ByteWriter& out) {
   out.Put<std::uint64_t>(view.members.size());
   for (const View::Set& set : view.members) SaveSet(set, out);
   SaveSet(view.caller, out);
+  if (!view.caller.numbers.empty()) out.PutVector(view.caller.numbers);
 }
 
 View LoadView(ByteReader& in) {
@@ -101,12 +112,13 @@ View LoadView(ByteReader& in) {
   if (view.size.width < 1 || view.size.height < 1) in.Damaged("an image of an impossible size");
   view.metric = in.Get<char>() != 0;
   const char has = in.Get<char>();
-  if ((has & ~(kHasCamera | kHasRegions)) != 0) in.Damaged("a view of an unknown kind");
+  if ((has & ~(kHasCamera | kHasRegions | kHasNumbers)) != 0) in.Damaged("a view of an unknown kind");
   if ((has & kHasCamera) != 0) view.camera = LoadCamera(in);
   if ((has & kHasRegions) != 0) LoadRegions(view, in);
   const std::size_t sets = in.GetCount(2 * sizeof(std::uint64_t) + 1);
   for (std::size_t i = 0; i < sets; ++i) view.members.push_back(LoadSet(in));
   view.caller = LoadSet(in);
+  if ((has & kHasNumbers) != 0) LoadNumbers(view.caller, in);
   return view;
 }
 

@@ -235,7 +235,7 @@ TEST_F(SavedDetector, FeaturesThatNoImageCouldHaveAreRefusedThoughTheChecksumsAr
   EXPECT_THROW(load([](View& view) { view.members[1].pixels[0].y = -1e30f; }), InputError);
 }
 
-TEST(SavedView, KeepsItsCameras) {
+TEST(SavedView, KeepsItsCamerasAndTheCallersNumbers) {
   View view;
   view.id = 3;
   view.size = {640, 240};
@@ -243,6 +243,7 @@ TEST(SavedView, KeepsItsCameras) {
   view.members.resize(1);
   view.caller.pixels = {{1, 2}, {3, 4}};
   view.caller.descriptors = cv::Mat::eye(2, 8, CV_8U);
+  view.caller.numbers = {4, 7};
   const auto again = [](const View& saved) {
     internal::ByteWriter out;
     internal::SaveView(saved, out);
@@ -253,6 +254,12 @@ TEST(SavedView, KeepsItsCameras) {
   };
   const View loaded = again(view);
   EXPECT_EQ(loaded.cameras, view.cameras);
+  EXPECT_EQ(loaded.caller.numbers, view.caller.numbers);
+  view.caller.numbers = {4};
+  EXPECT_THROW(again(view), InputError);
+  view.caller.numbers = {4, -1};
+  EXPECT_THROW(again(view), InputError);
+  view.caller.numbers.clear();
   view.cameras = {{0, 0, 0, 240}, {320, 0, 320, 240}};
   EXPECT_THROW(again(view), InputError);
 }

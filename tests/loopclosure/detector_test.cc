@@ -138,7 +138,7 @@ TEST(LoopDetector, MisuseIsAnError) {
   EXPECT_EQ(detector.NumLocations(), 2u);
 }
 
-TEST(LoopDetector, CamerasThatAreNotOfTheImageAreRefused) {
+TEST(LoopDetector, AMaskOrCamerasThatAreNotOfTheImageAreRefused) {
   LoopDetector detector{LoopDetectorOptions()};
   const cv::Mat image = testing::TexturedImage(1);
   const auto refused = [&](const std::function<void(LoopQuery&)>& spoil, const char* word) {
@@ -151,6 +151,8 @@ TEST(LoopDetector, CamerasThatAreNotOfTheImageAreRefused) {
       EXPECT_NE(std::string(error.what()).find(word), std::string::npos) << error.what();
     }
   };
+  refused([](LoopQuery& q) { q.mask = cv::Mat::ones(5, 5, CV_8U); }, "as large as the image");
+  refused([&](LoopQuery& q) { q.mask = cv::Mat::ones(image.size(), CV_32F); }, "CV_8UC1");
   refused([](LoopQuery& q) { q.cameras = {{0, 0, 0, 9}}; }, "empty");
   refused([](LoopQuery& q) { q.cameras = {{0, 0, 9, 9}, {300, 0, 100, 240}}; }, "inside of the image");
   refused([](LoopQuery& q) { q.cameras = {{0, 0, 160, 240}, {159, 0, 160, 240}}; }, "overlap");
@@ -164,6 +166,38 @@ TEST(LoopDetector, CamerasThatAreNotOfTheImageAreRefused) {
       },
       "no common camera");
   EXPECT_EQ(detector.NumLocations(), 0u);
+}
+
+TEST(LoopDetector, FeaturesUnderTheMaskDoNotExist) {
+  LoopDetectorOptions options;
+  options.stm_size = 1;
+  LoopDetector detector(options);
+  const cv::Mat image = testing::TexturedImage(1);
+  LoopQuery query = Query(0, image);
+  query.features.keypoints = {
+      {cv::Point2f(40, 100), 8}, {cv::Point2f(200, 100), 8}, {cv::Point2f(210, 90), 8}};
+  query.features.descriptors = (cv::Mat_<std::uint8_t>(3, 2) << 0, 0, 255, 255, 15, 240);
+  const LoopResult all = detector.Detect(query);
+  query.mask = cv::Mat::zeros(image.size(), CV_8U);
+  query.mask(cv::Rect(160, 0, 160, 240)) = 255;  // the right half is to be seen
+  LoopResult masked;
+  for (query.id = 1; query.id < 4; ++query.id) masked = detector.Detect(query);
+  for (std::size_t k = 0; k < masked.members.size(); ++k) {
+    EXPECT_GT(masked.members[k].features, 0);
+    EXPECT_LT(masked.members[k].features, all.members[k].features);
+  }
+  ASSERT_TRUE(masked.accepted) << masked.reason;
+  int of_the_caller = 0;
+  for (const VerifiedMatch& match : masked.verification.inlier_matches) {
+    EXPECT_GE(match.query.x, 159);
+    EXPECT_GE(match.candidate.x, masked.verification.candidate == 0 ? 0 : 159);
+    of_the_caller += match.query_feature >= 0 ? 1 : 0;
+    EXPECT_NE(match.query_feature, 0);
+    if (match.query_feature >= 0) {
+      EXPECT_EQ(match.query, query.features.keypoints[static_cast<std::size_t>(match.query_feature)].pt);
+    }
+  }
+  EXPECT_EQ(of_the_caller, 2);
 }
 
 TEST(LoopDetector, UnusableOptionsAreRefusedWithTheFieldsName) {

@@ -34,6 +34,8 @@ struct LoopQuery {
                   ///< member_features has all members
   cv::Mat depth_m;                      ///< optional: CV_32FC1 [m], registered to image, 0 = unknown
   std::optional<PinholeCamera> camera;  ///< optional: without it verification uses the fundamental matrix
+  cv::Mat mask;                         ///< optional: CV_8UC1, as large as image; features where it is
+                                        ///< 0 do not exist (robot's own parts, rim, burnt-in text)
   std::vector<cv::Rect> cameras;        ///< optional: image is of several cameras, each in a rectangle
                                         ///< of its own, left to right: each has a geometry of its own.
                                         ///< Not with `camera`. Empty: one camera

@@ -22,6 +22,7 @@ struct View {
     std::vector<cv::Point2f> pixels;      ///< N [px]
     cv::Mat descriptors;                  ///< N rows
     std::vector<Eigen::Vector3f> points;  ///< empty, or N points in the camera frame; NaN where unknown
+    std::vector<int> numbers;             ///< the caller's number of each, growing; empty: 0 to N - 1
   };
   std::int64_t id = -1;                 ///< of the query that it was made of
   cv::Size size;                        ///< of the image [px]

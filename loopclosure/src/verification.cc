@@ -10,6 +10,7 @@
 #include "evidence.h"
 #include "match_pool.h"
 #include "motion.h"
+#include "static_features.h"
 #include "tutti/loopclosure/relative_pose.h"
 
 namespace tutti {
@@ -200,7 +201,7 @@ void VerifyByPixels(const std::vector<PooledMatch>& pool, const View& query, con
   }
 }
 
-// By the geometry that is known.
+// By the geometry that is known, all bars but those on what does not move.
 Verification Decide(const std::vector<PooledMatch>& pool, const View& query, const View& candidate,
                     const VerificationOptions& options, std::uint64_t seed) {
   Verification result;
@@ -219,6 +220,29 @@ Verification Decide(const std::vector<PooledMatch>& pool, const View& query, con
   return result;
 }
 
+// Where most inliers are at the same pixel in both images, either the camera stands where it stood and sees
+// the same everywhere, or it carries them along: then the others must do without them.
+void DoWithoutStatic(const std::vector<PooledMatch>& pool, const View& query, const View& candidate,
+                     const VerificationOptions& options, std::uint64_t seed, Verification& result) {
+  constexpr double kMostApart = 0.15;
+  std::vector<VerifiedMatch> still;
+  for (const VerifiedMatch& match : result.inlier_matches) {
+    if (internal::StaysAtItsPixel(match, options.static_px)) still.push_back(match);
+  }
+  if (2 * still.size() <= result.inlier_matches.size()) return;
+  if (internal::ShareApart(still, query, candidate) <= kMostApart) return;
+  std::vector<PooledMatch> moving;
+  for (const PooledMatch& m : pool) {
+    if (!internal::StaysAtItsPixel({m.query, m.candidate, -1, -1}, options.static_px)) moving.push_back(m);
+  }
+  const int all = result.inliers;
+  result = Decide(moving, query, candidate, options, seed);  // and its evidence, whatever comes of it
+  if (result.accepted) return;
+  result.reason =
+      Format("only features that do not move with the camera agree (%d of %d are at the same pixel)",
+             static_cast<int>(still.size()), all);
+}
+
 }  // namespace
 
 Verification GeometricVerifier::Verify(const View& query, const View& candidate, int threads) const {
@@ -226,7 +250,11 @@ Verification GeometricVerifier::Verify(const View& query, const View& candidate,
       internal::PoolMatches(query, candidate, options_.match_ratio, threads);
   const std::uint64_t seed = seed_ + 0x9e3779b97f4a7c15ull * static_cast<std::uint64_t>(query.id) +
                              static_cast<std::uint64_t>(candidate.id);
-  return Decide(pool, query, candidate, options_, seed);
+  Verification result = Decide(pool, query, candidate, options_, seed);
+  if (result.accepted && options_.static_px > 0) {
+    DoWithoutStatic(pool, query, candidate, options_, seed, result);
+  }
+  return result;
 }
 
 }  // namespace tutti

@@ -157,6 +157,78 @@ void AddFeature(View& view, const cv::Point2f& pixel, std::uint32_t descriptor) 
   view.members[0].descriptors.push_back(Descriptor(descriptor));
 }
 
+// Features all over the image that no other view has.
+View SomewhereElse(std::uint32_t seed) {
+  View view;
+  view.id = seed;
+  view.size = {640, 480};
+  view.members.emplace_back();
+  std::mt19937 generator(seed);
+  for (std::uint32_t i = 0; i < kPoints; ++i) {
+    const cv::Point2f pixel(static_cast<float>(generator() % 640u), static_cast<float>(generator() % 480u));
+    AddFeature(view, pixel, 100000 * seed + i);
+  }
+  return view;
+}
+
+enum class Overlay { kRim, kTexts, kBonnet };
+
+// 40 corners that are in every image at the same pixel, to a fifth of a pixel.
+void Add(Overlay overlay, View& view) {
+  std::mt19937 generator(static_cast<std::uint32_t>(50 + view.id));
+  std::normal_distribution<float> noise(0, 0.2f);
+  for (std::uint32_t i = 0; i < 40; ++i) {
+    const float along = static_cast<float>(i % 10) / 10;
+    cv::Point2f p;
+    if (overlay == Overlay::kRim) {
+      p = i < 10   ? cv::Point2f(20 + 600 * along, 12)
+          : i < 20 ? cv::Point2f(20 + 600 * along, 468)
+          : i < 30 ? cv::Point2f(12, 20 + 440 * along)
+                   : cv::Point2f(628, 20 + 440 * along);
+    } else if (overlay == Overlay::kTexts) {  // one above, one below
+      p = {100 + 300 * along, (i < 20 ? 20.f : 440.f) + 12 * static_cast<float>(i / 10 % 2)};
+    } else {
+      p = {60 + 520 * along, 330 + 40 * static_cast<float>(i / 10)};
+    }
+    AddFeature(view, p + cv::Point2f(noise(generator), noise(generator)), 7000000 + i);
+  }
+}
+
+class WithOverlay : public ::testing::TestWithParam<Overlay> {};
+INSTANTIATE_TEST_SUITE_P(All, WithOverlay,
+                         ::testing::Values(Overlay::kRim, Overlay::kTexts, Overlay::kBonnet));
+
+TEST_P(WithOverlay, TwoPlacesAreNotOneByWhatTheCameraCarriesAlong) {
+  View query = SomewhereElse(9), candidate = SomewhereElse(1);
+  Add(GetParam(), query);
+  Add(GetParam(), candidate);
+  const Verification v = GeometricVerifier({}, 1).Verify(query, candidate);
+  EXPECT_FALSE(v.accepted);
+  EXPECT_NE(v.reason.find("do not move with the camera"), std::string::npos) << v.reason;
+  VerificationOptions off;
+  off.static_px = 0;
+  EXPECT_TRUE(GeometricVerifier(off, 1).Verify(query, candidate).accepted);
+}
+
+TEST_P(WithOverlay, APlaceSeenAgainIsOneByWhatMoves) {
+  View query = See(At(0.5, 0.3), 9, false, false), candidate = See(Pose(), 1, false, false);
+  Add(GetParam(), query);
+  Add(GetParam(), candidate);
+  const Verification v = GeometricVerifier({}, 1).Verify(query, candidate);
+  ASSERT_TRUE(v.accepted) << v.reason;
+  EXPECT_GT(v.motion_spread, 0.005);
+}
+
+TEST_P(WithOverlay, ACameraThatStandsWhereItStoodClosesALoop) {
+  View query = See(Pose(), 9, false, false), candidate = See(Pose(), 1, false, false);
+  Add(GetParam(), query);
+  Add(GetParam(), candidate);
+  const Verification v = GeometricVerifier({}, 1).Verify(query, candidate);
+  EXPECT_TRUE(v.accepted) << v.reason;
+  const Verification same = GeometricVerifier({}, 1).Verify(query, query);
+  EXPECT_TRUE(same.accepted) << same.reason;
+}
+
 class Turned : public ::testing::TestWithParam<bool> {};
 INSTANTIATE_TEST_SUITE_P(Calibrated, Turned, ::testing::Bool());
 

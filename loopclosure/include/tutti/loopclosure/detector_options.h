@@ -89,6 +89,9 @@ struct VerificationOptions {
                                   ///< fundamental matrix does decides in its place (by min_inliers and
                                   ///< min_epipolar_ratio): flat scene, or turn on the spot; above 0,
                                   ///< at most 1
+  double static_px = 1.5;         ///< matches nearer than this to their own pixel did not move: if
+                                  ///< they are most of the inliers and in a part of the image only,
+                                  ///< the others must do [px], 0: off
   double confidence = 0.9999;     ///< of RANSAC
   int max_iterations = 1000;      ///< of RANSAC
   double pixel_sigma = 1.5;       ///< standard deviation of a matched pixel, sets the information matrix [px]

@@ -57,16 +57,27 @@ void FillEvidence(const std::vector<cv::Point2f>& in_query, const std::vector<cv
   result.motion_spread = internal::MotionSpread(in_query, in_candidate, query.size);
 }
 
+// A member's pool is a third of what three members pool: with scale_bar it needs a third of the inliers.
+int Scaled(int bar, const View& query, const View& candidate, const VerificationOptions& options) {
+  constexpr double kMembers = 3;  // that the bars are meant for
+  constexpr double kLeast = 8;    // no motion is known by fewer
+  const std::size_t members = std::min(query.members.size(), candidate.members.size());
+  if (!options.scale_bar || members == 0) return bar;
+  return static_cast<int>(std::max(kLeast, std::ceil(bar * static_cast<double>(members) / kMembers)));
+}
+
 // The least number of inliers and the least share of the matches.
 struct Bars {
   int inliers = 0;
   double ratio = 0;
 };
 
-Bars BarsFor(const Verification& result, const VerificationOptions& options) {
+Bars BarsFor(const Verification& result, const View& query, const View& candidate,
+             const VerificationOptions& options) {
   const bool rigid = result.type == ConstraintType::kRigid;
   Bars bars;
-  bars.inliers = rigid || result.homography ? options.min_inliers : options.min_epipolar_inliers;
+  const int least = rigid || result.homography ? options.min_inliers : options.min_epipolar_inliers;
+  bars.inliers = Scaled(least, query, candidate, options);
   bars.ratio = rigid ? options.min_inlier_ratio : options.min_epipolar_ratio;
   return bars;
 }
@@ -87,7 +98,7 @@ std::string Judge(const std::vector<PooledMatch>& pool, const std::vector<int>& 
     in_candidate.push_back(m.candidate);
   }
   FillEvidence(in_query, in_candidate, chance, query, candidate, result);
-  const Bars bars = BarsFor(result, options);
+  const Bars bars = BarsFor(result, query, candidate, options);
   if (result.inliers < bars.inliers) {
     return Format("only %d matches fit one camera motion, %d are needed", result.inliers, bars.inliers);
   }
@@ -133,7 +144,7 @@ bool VerifyRigid(const std::vector<PooledMatch>& pool, const View& query, const 
     pixels.push_back(Pixel(pool[i].query));
     index.push_back(static_cast<int>(i));
   }
-  if (static_cast<int>(points.size()) < options.min_inliers) return false;
+  if (static_cast<int>(points.size()) < Scaled(options.min_inliers, query, candidate, options)) return false;
   const PnpResult pnp = SolvePnp(points, pixels, *query.camera, PoseOptions(options, seed));
   std::vector<int> inliers;
   for (const int i : pnp.inliers) inliers.push_back(index[static_cast<std::size_t>(i)]);
@@ -207,7 +218,7 @@ Verification Decide(const std::vector<PooledMatch>& pool, const View& query, con
   Verification result;
   result.candidate = candidate.id;
   result.matches = static_cast<int>(pool.size());
-  const int needed = options.min_inliers;
+  const int needed = Scaled(options.min_inliers, query, candidate, options);
   if (result.matches < needed) {
     result.reason = Format("only %d features match, %d are needed", result.matches, needed);
     return result;

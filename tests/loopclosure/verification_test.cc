@@ -327,6 +327,20 @@ TEST_P(OfTwoCameras, ImagesHaveAGeometryEachAndTheirEvidenceAddsUp) {
   EXPECT_EQ(each.ahead, 0);
 }
 
+TEST(GeometricVerifier, TheBarIsScaledToTheMembersThatPool) {
+  VerificationOptions options;
+  View query = See(At(0.5, 0.3), 9, false, false), candidate = See(Pose(), 1, false, false);
+  query.members[0].pixels.resize(28);
+  query.members[0].descriptors = query.members[0].descriptors.rowRange(0, 28).clone();
+  EXPECT_FALSE(GeometricVerifier(options, 1).Verify(query, candidate).accepted);
+  options.scale_bar = true;  // 10 for one member
+  const Verification scaled = GeometricVerifier(options, 1).Verify(query, candidate);
+  EXPECT_TRUE(scaled.accepted) << scaled.reason;
+  query.members.resize(3);
+  candidate.members.resize(3);
+  EXPECT_FALSE(GeometricVerifier(options, 1).Verify(query, candidate).accepted);  // 30 again
+}
+
 TEST(GeometricVerifier, IsDeterministicForASeedAndAnyNumberOfThreads) {
   const GeometricVerifier verifier({}, 5);
   const View query = See(At(0.5, 0.3), 9, false, false), candidate = See(Pose(), 1, false, false);

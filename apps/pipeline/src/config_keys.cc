@@ -234,6 +234,8 @@ void ConfigTable::AddVerification(VerificationOptions& o) {
       "a homography that explains this share of what the lines do decides in their place");
   Add("static_px", o.static_px,
       "matches nearer than this to their own pixel did not move: others must do without them [px], 0: off");
+  Add("scale_bar", o.scale_bar,
+      "least numbers of inliers times members / 3: one member is judged as strictly as three");
   Add("confidence", o.confidence, "of RANSAC");
   Add("max_iterations", o.max_iterations, "of RANSAC");
   Add("pixel_sigma", o.pixel_sigma,

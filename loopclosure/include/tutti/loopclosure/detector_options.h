@@ -92,6 +92,9 @@ struct VerificationOptions {
   double static_px = 1.5;         ///< matches nearer than this to their own pixel did not move: if
                                   ///< they are most of the inliers and in a part of the image only,
                                   ///< the others must do [px], 0: off
+  bool scale_bar = false;         ///< the least numbers of inliers are for features of
+                                  ///< three members; true: times members / 3, at least
+                                  ///< 8, so that one member alone is judged as strictly
   double confidence = 0.9999;     ///< of RANSAC
   int max_iterations = 1000;      ///< of RANSAC
   double pixel_sigma = 1.5;       ///< standard deviation of a matched pixel, sets the information matrix [px]

@@ -72,7 +72,8 @@ LoopRow Process(const std::filesystem::path& file, const std::filesystem::path& 
   LoopQuery query;
   query.id = number;
   query.stamp_s = number;
-  query.image = right.empty() ? cv::imread(file.string(), cv::IMREAD_UNCHANGED) : ReadJoined(file, right);
+  query.image = right.empty() ? cv::imread(file.string(), cv::IMREAD_UNCHANGED)
+                              : ReadJoined(file, right, &query.cameras);
   row.read = !query.image.empty();
   if (row.read && camera) {
     query.camera = camera;

@@ -23,13 +23,16 @@ std::vector<std::filesystem::path> TakeRightImages(const std::string& folder,
   return right;
 }
 
-cv::Mat ReadJoined(const std::filesystem::path& left, const std::filesystem::path& right) {
+cv::Mat ReadJoined(const std::filesystem::path& left, const std::filesystem::path& right,
+                   std::vector<cv::Rect>* cameras) {
   const cv::Mat a = cv::imread(left.string(), cv::IMREAD_UNCHANGED);
   const cv::Mat b = cv::imread(right.string(), cv::IMREAD_UNCHANGED);
   if (a.empty() || b.empty() || a.type() != b.type()) return {};
   cv::Mat joined = cv::Mat::zeros(std::max(a.rows, b.rows), a.cols + b.cols, a.type());
-  a.copyTo(joined(cv::Rect(0, 0, a.cols, a.rows)));
-  b.copyTo(joined(cv::Rect(a.cols, 0, b.cols, b.rows)));
+  const cv::Rect in_left(0, 0, a.cols, a.rows), in_right(a.cols, 0, b.cols, b.rows);
+  a.copyTo(joined(in_left));
+  b.copyTo(joined(in_right));
+  if (cameras != nullptr) *cameras = {in_left, in_right};
   return joined;
 }
 

@@ -14,7 +14,8 @@ std::vector<std::filesystem::path> TakeRightImages(const std::string& folder,
                                                    std::vector<std::filesystem::path>& images);
 
 /// Both images as they are in their files, left beside right; the lower one gets a black border below. Empty
-/// if one of them can't be read or their types differ.
-cv::Mat ReadJoined(const std::filesystem::path& left, const std::filesystem::path& right);
+/// if one of them can't be read or their types differ. `cameras`: where left and right are in it.
+cv::Mat ReadJoined(const std::filesystem::path& left, const std::filesystem::path& right,
+                   std::vector<cv::Rect>* cameras = nullptr);
 
 }  // namespace tutti::cli

@@ -99,6 +99,7 @@ std::vector<Features> LoopDetector::Impl::Extract(const LoopQuery& query) const 
       // The caller owns the matrix and may write into it later: keep a copy.
       features[Index(k)] = {given->second.keypoints, given->second.descriptors.clone()};
     }
+    DropMasked(query.mask, features[Index(k)]);
   });
   return features;
 }

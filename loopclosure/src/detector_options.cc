@@ -75,6 +75,10 @@ std::string VerificationOptions::Validate() const {
   if (!(min_spread >= 0 && min_spread < 1)) return OutOf("verification.min_spread", "0 to 1");
   if (!(reprojection_px > 0)) return OutOf("verification.reprojection_px", "above 0");
   if (!(epipolar_px > 0)) return OutOf("verification.epipolar_px", "above 0");
+  if (!(homography_px >= 0)) return OutOf("verification.homography_px", "0 (off) or more");
+  if (!(homography_share > 0 && homography_share <= 1))
+    return OutOf("verification.homography_share", "above 0, at most 1");
+  if (!(static_px >= 0)) return OutOf("verification.static_px", "0 (off) or more");
   if (!(confidence > 0 && confidence < 1)) return OutOf("verification.confidence", "between 0 and 1");
   if (max_iterations < 1) return OutOf("verification.max_iterations", "at least 1");
   if (!(pixel_sigma > 0)) return OutOf("verification.pixel_sigma", "above 0");

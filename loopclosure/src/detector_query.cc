@@ -8,6 +8,32 @@
 namespace tutti {
 namespace {
 
+// A mask and rectangles that belong to this image.
+void CheckRegions(const LoopQuery& query, const std::string& which) {
+  if (!query.mask.empty() &&
+      (query.mask.type() != CV_8UC1 || (!query.image.empty() && query.mask.size() != query.image.size()))) {
+    throw InputError(which +
+                     "mask must be CV_8UC1, 0 where nothing is to be seen, and as large as the image");
+  }
+  if (query.cameras.empty()) return;
+  if (query.camera) {
+    throw InputError(which + "an image of several cameras has no common camera; leave one of the two out");
+  }
+  const cv::Size whole = query.image.size();
+  for (std::size_t i = 0; i < query.cameras.size(); ++i) {
+    const cv::Rect& region = query.cameras[i];
+    const bool outside = region.x < 0 || region.y < 0 || region.width > whole.width - region.x ||
+                         region.height > whole.height - region.y;
+    if (region.empty() || (!query.image.empty() && outside)) {
+      throw InputError(which + "cameras: a rectangle is empty or not inside of the image");
+    }
+    for (std::size_t j = 0; j < i; ++j) {
+      if (!(region & query.cameras[j]).empty())
+        throw InputError(which + "cameras: two rectangles overlap; each pixel is of one camera");
+    }
+  }
+}
+
 // As many descriptors as keypoints, and those where pixels can be.
 void CheckKeypoints(const std::vector<cv::KeyPoint>& keypoints, const cv::Mat& descriptors,
                     const std::string& which) {
@@ -41,6 +67,7 @@ void LoopDetector::Impl::CheckContent(const LoopQuery& query) const {
       (query.depth_m.type() != CV_32FC1 || query.depth_m.size() != query.image.size())) {
     throw InputError(which + "depth_m must be CV_32FC1 in metres and as large as the image");
   }
+  CheckRegions(query, which);
   if (query.camera) {
     const std::string problem = query.camera->Validate();
     if (!problem.empty()) throw InputError(which + problem);

@@ -1,5 +1,7 @@
 #include "epipolar.h"
 
+#include <Eigen/SVD>
+#include <cmath>
 #include <opencv2/calib3d.hpp>
 
 namespace tutti::internal {
@@ -39,6 +41,30 @@ std::vector<cv::Point2d> Undistorted(const std::vector<cv::Point2f>& pixels, con
     rays.emplace_back(ray.x(), ray.y());
   }
   return rays;
+}
+
+// The rotation that is nearest to a homography between rays.
+Eigen::Matrix3d NearestRotation(const Eigen::Matrix3d& homography) {
+  const Eigen::Matrix3d sign = homography.determinant() < 0 ? -homography : homography;
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sign, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::Matrix3d R = svd.matrixU() * svd.matrixV().transpose();
+  return R.determinant() < 0 ? Eigen::Matrix3d::Identity() : R;
+}
+
+// Inliers whose pixels the rotation takes to within the threshold [px].
+int FittedByRotation(const Eigen::Matrix3d& R, double focal, const std::vector<cv::Point2d>& first,
+                     const std::vector<cv::Point2d>& second, const std::vector<int>& inliers,
+                     double threshold) {
+  int fitted = 0;
+  for (const int i : inliers) {
+    const std::size_t k = static_cast<std::size_t>(i);
+    const Eigen::Vector3d turned = R * Eigen::Vector3d(first[k].x, first[k].y, focal);
+    if (turned.z() <= 0) continue;
+    const double error = std::hypot(focal * turned.x() / turned.z() - second[k].x,
+                                    focal * turned.y() / turned.z() - second[k].y);
+    if (error < threshold) ++fitted;
+  }
+  return fitted;
 }
 
 }  // namespace
@@ -89,6 +115,49 @@ EpipolarResult FitEssential(const std::vector<cv::Point2f>& first, const Pinhole
     result.T_second_first = Pose::FromMatrix(matrix);
   } catch (const cv::Exception&) {
     result = EpipolarResult();  // a degenerate set of points is no model, not an error
+  }
+  return result;
+}
+
+HomographyResult FitHomography(const std::vector<cv::Point2f>& first,
+                               const std::optional<PinholeCamera>& first_camera,
+                               const std::vector<cv::Point2f>& second,
+                               const std::optional<PinholeCamera>& second_camera,
+                               const EpipolarSettings& settings) {
+  constexpr double kNearlyAll = 0.9;
+  HomographyResult result;
+  if (first.size() < kMinMatches || first.size() != second.size()) return result;
+  const bool calibrated = first_camera && second_camera;
+  std::vector<cv::Point2d> a(first.begin(), first.end());
+  std::vector<cv::Point2d> b(second.begin(), second.end());
+  double focal = 1.0;  // of the common, undistorted camera
+  if (calibrated) {
+    focal = 0.25 * (first_camera->fx + first_camera->fy + second_camera->fx + second_camera->fy);
+    a = Undistorted(first, *first_camera);
+    b = Undistorted(second, *second_camera);
+    for (cv::Point2d& p : a) p *= focal;
+    for (cv::Point2d& p : b) p *= focal;
+  }
+  cv::Mat mask;
+  try {
+    const cv::Mat h = cv::findHomography(a, b, mask, Usac(settings, settings.threshold_px));
+    if (h.rows != 3 || h.cols != 3) return result;
+    result.inliers = Selected(mask);
+    if (calibrated) {
+      Eigen::Matrix3d matrix;
+      for (int r = 0; r < 3; ++r) {
+        for (int c = 0; c < 3; ++c) matrix(r, c) = h.at<double>(r, c);
+      }
+      const Eigen::Vector3d camera(focal, focal, 1);
+      const Eigen::Matrix3d R =
+          NearestRotation(camera.cwiseInverse().asDiagonal() * matrix * camera.asDiagonal());
+      const int fitted = FittedByRotation(R, focal, a, b, result.inliers, settings.threshold_px);
+      result.turned =
+          !result.inliers.empty() && fitted >= kNearlyAll * static_cast<double>(result.inliers.size());
+      if (result.turned) result.R_second_first = Eigen::Quaterniond(R);
+    }
+  } catch (const cv::Exception&) {
+    result = HomographyResult();  // a degenerate set of points is no model, not an error
   }
   return result;
 }

@@ -52,18 +52,18 @@ ChanceFit FitByChance(FitModel model, int matches, int inliers, double threshold
   return chance;
 }
 
-int OccupiedCells(const std::vector<cv::Point2f>& pixels, const cv::Size& image) {
-  constexpr int kColumns = 8, kRows = 6;
-  if (image.empty()) return 0;
-  std::array<bool, kColumns * kRows> occupied{};
-  const auto cell = [](float x, int size, int cells) {
+int GridCell(const cv::Point2f& pixel, const cv::Size& image) {
+  const auto along = [](float x, int size, int cells) {
     return std::clamp(static_cast<int>(std::floor(x * static_cast<float>(cells) / static_cast<float>(size))),
                       0, cells - 1);
   };
-  for (const cv::Point2f& p : pixels) {
-    const int index = cell(p.y, image.height, kRows) * kColumns + cell(p.x, image.width, kColumns);
-    occupied[static_cast<std::size_t>(index)] = true;
-  }
+  return along(pixel.y, image.height, kGridRows) * kGridColumns + along(pixel.x, image.width, kGridColumns);
+}
+
+int OccupiedCells(const std::vector<cv::Point2f>& pixels, const cv::Size& image) {
+  if (image.empty()) return 0;
+  std::array<bool, kGridColumns * kGridRows> occupied{};
+  for (const cv::Point2f& p : pixels) occupied[static_cast<std::size_t>(GridCell(p, image))] = true;
   return static_cast<int>(std::count(occupied.begin(), occupied.end(), true));
 }
 

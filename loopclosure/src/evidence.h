@@ -29,7 +29,12 @@ struct ChanceFit {
 /// no more than the sample fits.
 ChanceFit FitByChance(FitModel model, int matches, int inliers, double threshold_px, const cv::Size& image);
 
-/// Cells of a grid of 8x6 over the image with at least one of the pixels, 0..48; pixels outside count in the
+constexpr int kGridColumns = 8, kGridRows = 6;
+
+/// The cell of a grid of 8x6 over the image, row by row; of the nearest for a pixel outside.
+int GridCell(const cv::Point2f& pixel, const cv::Size& image);
+
+/// Cells of that grid with at least one of the pixels, 0..48; pixels outside count in the
 /// nearest cell.
 int OccupiedCells(const std::vector<cv::Point2f>& pixels, const cv::Size& image);
 

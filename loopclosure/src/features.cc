@@ -133,6 +133,23 @@ cv::Mat ToGrey8(const cv::Mat& image) {
   return result;
 }
 
+bool IsMasked(const cv::Mat& mask, const cv::Point2f& pixel) {
+  if (mask.empty()) return false;
+  const int x = std::clamp(static_cast<int>(std::lround(pixel.x)), 0, mask.cols - 1);
+  const int y = std::clamp(static_cast<int>(std::lround(pixel.y)), 0, mask.rows - 1);
+  return mask.at<std::uint8_t>(y, x) == 0;
+}
+
+void DropMasked(const cv::Mat& mask, Features& features) {
+  Features kept;
+  for (std::size_t i = 0; i < features.keypoints.size(); ++i) {
+    if (IsMasked(mask, features.keypoints[i].pt)) continue;
+    kept.keypoints.push_back(features.keypoints[i]);
+    kept.descriptors.push_back(features.descriptors.row(static_cast<int>(i)));
+  }
+  if (kept.keypoints.size() < features.keypoints.size()) features = std::move(kept);
+}
+
 std::vector<int> SelectSpread(const std::vector<cv::KeyPoint>& keypoints, cv::Size image_size, int count,
                               int columns) {
   std::vector<int> order(keypoints.size());

@@ -6,94 +6,19 @@
 #include <cmath>
 #include <cstdarg>
 #include <cstdio>
-#include <limits>
-#include <set>
 
-#include "epipolar.h"
 #include "evidence.h"
-#include "tutti/loopclosure/matching.h"
-#include "tutti/loopclosure/parallel.h"
+#include "match_pool.h"
+#include "motion.h"
+#include "static_features.h"
 #include "tutti/loopclosure/relative_pose.h"
 
 namespace tutti {
 namespace {
 
-// A match of the pool, with what is known about its ends.
-struct PooledMatch {
-  cv::Point2f query, candidate;
-  Eigen::Vector3f query_point, candidate_point;  // NaN where unknown
-  int query_feature = -1, candidate_feature = -1;
-  float ratio = 1;
-};
+using internal::PooledMatch;
 
 constexpr double kLeastSpreadShare = 0.6;  // of min_spread, however many the inliers
-
-const Eigen::Vector3f kUnknown = Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN());
-
-Eigen::Vector3f PointOf(const View::Set& set, int index) {
-  return set.points.empty() ? kUnknown : set.points[static_cast<std::size_t>(index)];
-}
-
-void AppendMatches(const View::Set& query, const View::Set& candidate, const std::vector<Match>& matches,
-                   bool is_caller, std::vector<PooledMatch>& pool) {
-  for (const Match& m : matches) {
-    PooledMatch match;
-    match.query = query.pixels[static_cast<std::size_t>(m.query)];
-    match.candidate = candidate.pixels[static_cast<std::size_t>(m.candidate)];
-    match.query_point = PointOf(query, m.query);
-    match.candidate_point = PointOf(candidate, m.candidate);
-    if (is_caller) {
-      match.query_feature = m.query;
-      match.candidate_feature = m.candidate;
-    }
-    match.ratio = m.ratio;
-    pool.push_back(match);
-  }
-}
-
-// All members find the same corners: one match per place in either image, so that inliers count independent
-// evidence. The caller's come first (the SLAM map hangs on them), then the most certain.
-std::vector<PooledMatch> OnePerPlace(std::vector<PooledMatch> pool) {
-  constexpr float kCell = 4.0f;  // [px]
-  std::stable_sort(pool.begin(), pool.end(), [](const PooledMatch& a, const PooledMatch& b) {
-    const bool caller_a = a.query_feature >= 0;
-    const bool caller_b = b.query_feature >= 0;
-    return caller_a != caller_b ? caller_a : a.ratio < b.ratio;
-  });
-  const auto cell = [](const cv::Point2f& p) {
-    return std::make_pair(static_cast<int>(std::floor(p.x / kCell)),
-                          static_cast<int>(std::floor(p.y / kCell)));
-  };
-  std::set<std::pair<int, int>> used_query;
-  std::set<std::pair<int, int>> used_candidate;
-  std::vector<PooledMatch> kept;
-  for (const PooledMatch& match : pool) {
-    const auto q = cell(match.query);
-    const auto c = cell(match.candidate);
-    if (used_query.count(q) > 0 || used_candidate.count(c) > 0) continue;
-    used_query.insert(q);
-    used_candidate.insert(c);
-    kept.push_back(match);
-  }
-  return kept;
-}
-
-std::vector<PooledMatch> Pool(const View& query, const View& candidate, double max_ratio, int threads) {
-  const std::size_t members = std::min(query.members.size(), candidate.members.size());
-  std::vector<std::vector<Match>> matches(members + 1);
-  RunParallel(static_cast<int>(members) + 1, threads, [&](int task) {
-    const std::size_t k = static_cast<std::size_t>(task);
-    const View::Set& q = k < members ? query.members[k] : query.caller;
-    const View::Set& c = k < members ? candidate.members[k] : candidate.caller;
-    matches[k] = MatchDescriptors(q.descriptors, c.descriptors, c.pixels, max_ratio);
-  });
-  std::vector<PooledMatch> pool;
-  AppendMatches(query.caller, candidate.caller, matches[members], true, pool);
-  for (std::size_t k = 0; k < members; ++k) {
-    AppendMatches(query.members[k], candidate.members[k], matches[k], false, pool);
-  }
-  return OnePerPlace(std::move(pool));
-}
 
 // Standard deviation of the pixels along their narrowest direction, x as a share of the width and y of the
 // height: matches on one line or in one spot fit many camera motions.
@@ -123,16 +48,8 @@ __attribute__((format(printf, 1, 2))) std::string Format(const char* format, ...
 
 // What the inliers are worth, whatever the bars say of them.
 void FillEvidence(const std::vector<cv::Point2f>& in_query, const std::vector<cv::Point2f>& in_candidate,
-                  const View& query, const View& candidate, const VerificationOptions& options,
+                  const internal::ChanceFit& chance, const View& query, const View& candidate,
                   Verification& result) {
-  const bool rigid = result.type == ConstraintType::kRigid;
-  const internal::FitModel model = rigid ? internal::FitModel::kPnp
-                                   : result.type == ConstraintType::kEssential
-                                       ? internal::FitModel::kEssential
-                                       : internal::FitModel::kFundamental;
-  const internal::ChanceFit chance =
-      internal::FitByChance(model, result.matches, result.inliers,
-                            rigid ? options.reprojection_px : options.epipolar_px, query.size);
   result.expected_inliers = chance.expected;
   result.log_nfa = chance.log_nfa;
   result.coverage = std::min(internal::OccupiedCells(in_query, query.size),
@@ -140,11 +57,36 @@ void FillEvidence(const std::vector<cv::Point2f>& in_query, const std::vector<cv
   result.motion_spread = internal::MotionSpread(in_query, in_candidate, query.size);
 }
 
+// A member's pool is a third of what three members pool: with scale_bar it needs a third of the inliers.
+int Scaled(int bar, const View& query, const View& candidate, const VerificationOptions& options) {
+  constexpr double kMembers = 3;  // that the bars are meant for
+  constexpr double kLeast = 8;    // no motion is known by fewer
+  const std::size_t members = std::min(query.members.size(), candidate.members.size());
+  if (!options.scale_bar || members == 0) return bar;
+  return static_cast<int>(std::max(kLeast, std::ceil(bar * static_cast<double>(members) / kMembers)));
+}
+
+// The least number of inliers and the least share of the matches.
+struct Bars {
+  int inliers = 0;
+  double ratio = 0;
+};
+
+Bars BarsFor(const Verification& result, const View& query, const View& candidate,
+             const VerificationOptions& options) {
+  const bool rigid = result.type == ConstraintType::kRigid;
+  Bars bars;
+  const int least = rigid || result.homography ? options.min_inliers : options.min_epipolar_inliers;
+  bars.inliers = Scaled(least, query, candidate, options);
+  bars.ratio = rigid ? options.min_inlier_ratio : options.min_epipolar_ratio;
+  return bars;
+}
+
 // Fills counts, evidence and matched pixels, and says what the inliers lack; empty if nothing.
 std::string Judge(const std::vector<PooledMatch>& pool, const std::vector<int>& inliers,
-                  std::size_t considered, const View& query, const View& candidate,
+                  const internal::ChanceFit& chance, int considered, const View& query, const View& candidate,
                   const VerificationOptions& options, Verification& result) {
-  result.matches = static_cast<int>(considered);
+  result.matches = considered;
   result.inliers = static_cast<int>(inliers.size());
   result.inlier_matches.clear();
   std::vector<cv::Point2f> in_query;
@@ -155,20 +97,18 @@ std::string Judge(const std::vector<PooledMatch>& pool, const std::vector<int>& 
     in_query.push_back(m.query);
     in_candidate.push_back(m.candidate);
   }
-  FillEvidence(in_query, in_candidate, query, candidate, options, result);
-  const bool rigid = result.type == ConstraintType::kRigid;
-  const int min_inliers = rigid ? options.min_inliers : options.min_epipolar_inliers;
-  const double min_ratio = rigid ? options.min_inlier_ratio : options.min_epipolar_ratio;
-  if (result.inliers < min_inliers) {
-    return Format("only %d matches fit one camera motion, %d are needed", result.inliers, min_inliers);
+  FillEvidence(in_query, in_candidate, chance, query, candidate, result);
+  const Bars bars = BarsFor(result, query, candidate, options);
+  if (result.inliers < bars.inliers) {
+    return Format("only %d matches fit one camera motion, %d are needed", result.inliers, bars.inliers);
   }
   const double ratio = static_cast<double>(inliers.size()) / static_cast<double>(considered);
-  if (ratio < min_ratio) {
+  if (ratio < bars.ratio) {
     return Format("only %.0f %% of the matches fit one camera motion, %.0f %% are needed", 100 * ratio,
-                  100 * min_ratio);
+                  100 * bars.ratio);
   }
   // What a motion is known by grows with number times spread squared: many inliers may lie closer together.
-  const double abundance = std::sqrt(1.5 * min_inliers / static_cast<double>(result.inliers));
+  const double abundance = std::sqrt(1.5 * bars.inliers / static_cast<double>(result.inliers));
   const double needed = options.min_spread * std::clamp(abundance, kLeastSpreadShare, 1.0);
   const double spread = std::min(Spread(in_query, query.size), Spread(in_candidate, candidate.size));
   if (spread < needed) {
@@ -204,27 +144,31 @@ bool VerifyRigid(const std::vector<PooledMatch>& pool, const View& query, const 
     pixels.push_back(Pixel(pool[i].query));
     index.push_back(static_cast<int>(i));
   }
-  if (static_cast<int>(points.size()) < options.min_inliers) return false;
+  if (static_cast<int>(points.size()) < Scaled(options.min_inliers, query, candidate, options)) return false;
   const PnpResult pnp = SolvePnp(points, pixels, *query.camera, PoseOptions(options, seed));
   std::vector<int> inliers;
   for (const int i : pnp.inliers) inliers.push_back(index[static_cast<std::size_t>(i)]);
   result.type = ConstraintType::kRigid;
-  result.reason = Judge(pool, inliers, points.size(), query, candidate, options, result);
+  const int considered = static_cast<int>(points.size());
+  const internal::ChanceFit chance =
+      internal::FitByChance(internal::FitModel::kPnp, considered, static_cast<int>(inliers.size()),
+                            options.reprojection_px, query.size);
+  result.reason = Judge(pool, inliers, chance, considered, query, candidate, options, result);
   result.accepted = result.reason.empty();
   result.S_candidate_query = Similarity(pnp.T_camera_points.Inverse());
   result.information = pnp.information;
   return true;
 }
 
-// Mono: 3D-3D where both images have points. Called after the essential matrix has accepted.
-void AddSimilarity(const std::vector<PooledMatch>& pool, const std::vector<int>& epipolar_inliers,
-                   const View& query, const View& candidate, const VerificationOptions& options,
-                   std::uint64_t seed, Verification& result) {
+// Mono: 3D-3D where both images have points. Called after the pixels have accepted.
+void AddSimilarity(const std::vector<PooledMatch>& pool, const std::vector<int>& inliers, const View& query,
+                   const View& candidate, const VerificationOptions& options, std::uint64_t seed,
+                   Verification& result) {
   constexpr int kEnoughPoints = 20;  // on so many, a similarity must be found
   constexpr int kMinInliers = 12;
   std::vector<Eigen::Vector3d> points_c, points_q;
   std::vector<Eigen::Vector2d> pixels_c, pixels_q;
-  for (const int i : epipolar_inliers) {
+  for (const int i : inliers) {
     const PooledMatch& m = pool[static_cast<std::size_t>(i)];
     if (!m.candidate_point.allFinite() || !m.query_point.allFinite()) continue;
     points_c.push_back(m.candidate_point.cast<double>());
@@ -252,60 +196,75 @@ void AddSimilarity(const std::vector<PooledMatch>& pool, const std::vector<int>&
   if (fit.information(6, 6) > 0) result.information -= cross * cross.transpose() / fit.information(6, 6);
 }
 
-// Share of the translation along the candidate's optical axis, from the pixel of the query's centre in it.
-// The focal length is a guess that most cameras are within a factor of two of.
-double AheadFromEpipole(const Eigen::Vector3d& epipole, const cv::Size& size) {
-  const double focal = 0.8 * std::max(size.width, size.height);
-  const Eigen::Vector3d direction(epipole.x() - 0.5 * size.width * epipole.z(),
-                                  epipole.y() - 0.5 * size.height * epipole.z(), focal * epipole.z());
-  return direction.norm() > 0 ? std::abs(direction.z()) / direction.norm() : 1.0;
+void VerifyByPixels(const std::vector<PooledMatch>& pool, const View& query, const View& candidate,
+                    const VerificationOptions& options, std::uint64_t seed, Verification& result) {
+  const internal::Motion motion = internal::FitMotion(pool, query, candidate, options, seed);
+  result.type = motion.type;
+  result.homography = motion.homography;
+  result.reason =
+      Judge(pool, motion.inliers, motion.chance, motion.considered, query, candidate, options, result);
+  result.accepted = result.reason.empty();
+  result.ahead = motion.ahead;
+  const bool calibrated = motion.type == ConstraintType::kEssential;
+  if (calibrated) result.S_candidate_query = Similarity(motion.T_candidate_query);
+  if (calibrated && result.accepted && !(query.metric && candidate.metric)) {
+    AddSimilarity(pool, motion.inliers, query, candidate, options, seed, result);
+  }
 }
 
-void VerifyEpipolar(const std::vector<PooledMatch>& pool, const View& query, const View& candidate,
-                    const VerificationOptions& options, std::uint64_t seed, Verification& result) {
-  std::vector<cv::Point2f> pixels_q;
-  std::vector<cv::Point2f> pixels_c;
+// By the geometry that is known, all bars but those on what does not move.
+Verification Decide(const std::vector<PooledMatch>& pool, const View& query, const View& candidate,
+                    const VerificationOptions& options, std::uint64_t seed) {
+  Verification result;
+  result.candidate = candidate.id;
+  result.matches = static_cast<int>(pool.size());
+  const int needed = Scaled(options.min_inliers, query, candidate, options);
+  if (result.matches < needed) {
+    result.reason = Format("only %d features match, %d are needed", result.matches, needed);
+    return result;
+  }
+  if (query.camera && candidate.metric && query.metric &&
+      VerifyRigid(pool, query, candidate, options, seed, result)) {
+    return result;
+  }
+  VerifyByPixels(pool, query, candidate, options, seed, result);
+  return result;
+}
+
+// Where most inliers are at the same pixel in both images, either the camera stands where it stood and sees
+// the same everywhere, or it carries them along: then the others must do without them.
+void DoWithoutStatic(const std::vector<PooledMatch>& pool, const View& query, const View& candidate,
+                     const VerificationOptions& options, std::uint64_t seed, Verification& result) {
+  constexpr double kMostApart = 0.15;
+  std::vector<VerifiedMatch> still;
+  for (const VerifiedMatch& match : result.inlier_matches) {
+    if (internal::StaysAtItsPixel(match, options.static_px)) still.push_back(match);
+  }
+  if (2 * still.size() <= result.inlier_matches.size()) return;
+  if (internal::ShareApart(still, query, candidate) <= kMostApart) return;
+  std::vector<PooledMatch> moving;
   for (const PooledMatch& m : pool) {
-    pixels_q.push_back(m.query);
-    pixels_c.push_back(m.candidate);
+    if (!internal::StaysAtItsPixel({m.query, m.candidate, -1, -1}, options.static_px)) moving.push_back(m);
   }
-  const internal::EpipolarSettings settings{options.epipolar_px, options.confidence, options.max_iterations,
-                                            seed};
-  const bool calibrated = query.camera && candidate.camera;
-  const internal::EpipolarResult fit =
-      calibrated ? internal::FitEssential(pixels_c, *candidate.camera, pixels_q, *query.camera, settings)
-                 : internal::FitFundamental(pixels_c, pixels_q, settings);
-  result.type = calibrated ? ConstraintType::kEssential : ConstraintType::kFundamental;
-  result.reason = Judge(pool, fit.inliers, pool.size(), query, candidate, options, result);
-  result.accepted = result.reason.empty();
-  result.ahead = AheadFromEpipole(fit.epipole, candidate.size);
-  if (calibrated) {
-    result.S_candidate_query = Similarity(fit.T_second_first.Inverse());
-    result.ahead = std::abs(result.S_candidate_query.translation.normalized().z());
-  }
-  if (calibrated && result.accepted && !(query.metric && candidate.metric)) {
-    AddSimilarity(pool, fit.inliers, query, candidate, options, seed, result);
-  }
+  const int all = result.inliers;
+  result = Decide(moving, query, candidate, options, seed);  // and its evidence, whatever comes of it
+  if (result.accepted) return;
+  result.reason =
+      Format("only features that do not move with the camera agree (%d of %d are at the same pixel)",
+             static_cast<int>(still.size()), all);
 }
 
 }  // namespace
 
 Verification GeometricVerifier::Verify(const View& query, const View& candidate, int threads) const {
-  Verification result;
-  result.candidate = candidate.id;
-  const std::vector<PooledMatch> pool = Pool(query, candidate, options_.match_ratio, threads);
-  result.matches = static_cast<int>(pool.size());
-  if (result.matches < options_.min_inliers) {
-    result.reason = Format("only %d features match, %d are needed", result.matches, options_.min_inliers);
-    return result;
-  }
+  const std::vector<PooledMatch> pool =
+      internal::PoolMatches(query, candidate, options_.match_ratio, threads);
   const std::uint64_t seed = seed_ + 0x9e3779b97f4a7c15ull * static_cast<std::uint64_t>(query.id) +
                              static_cast<std::uint64_t>(candidate.id);
-  if (query.camera && candidate.metric && query.metric &&
-      VerifyRigid(pool, query, candidate, options_, seed, result)) {
-    return result;
+  Verification result = Decide(pool, query, candidate, options_, seed);
+  if (result.accepted && options_.static_px > 0) {
+    DoWithoutStatic(pool, query, candidate, options_, seed, result);
   }
-  VerifyEpipolar(pool, query, candidate, options_, seed, result);
   return result;
 }
 

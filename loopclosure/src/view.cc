@@ -48,6 +48,20 @@ void LookUpDepth(const LoopQuery& query, const VerificationOptions& options, Vie
   }
 }
 
+// The caller counts his features whatever is dropped: their numbers stay with them.
+void DropMasked(const cv::Mat& mask, View::Set& set) {
+  if (mask.empty()) return;
+  View::Set kept;
+  for (std::size_t i = 0; i < set.pixels.size(); ++i) {
+    if (IsMasked(mask, set.pixels[i])) continue;
+    kept.pixels.push_back(set.pixels[i]);
+    kept.descriptors.push_back(set.descriptors.row(static_cast<int>(i)));
+    if (!set.points.empty()) kept.points.push_back(set.points[i]);
+    kept.numbers.push_back(static_cast<int>(i));
+  }
+  if (kept.pixels.size() < set.pixels.size()) set = std::move(kept);
+}
+
 // Of the image; without one (the caller extracts all features) of the camera, or what the features reach
 // over.
 cv::Size SizeOf(const LoopQuery& query, const std::vector<Features>& members) {
@@ -72,6 +86,7 @@ View MakeView(const LoopQuery& query, const std::vector<Features>& members,
   view.size = SizeOf(query, members);
   view.camera = query.camera;
   view.metric = query.metric;
+  view.cameras = query.cameras;
   for (const Features& features : members) {
     view.members.push_back(MakeSet(features.keypoints, features.descriptors));
     if (query.metric) LookUpDepth(query, options, view.members.back());
@@ -80,6 +95,7 @@ View MakeView(const LoopQuery& query, const std::vector<Features>& members,
   view.caller = MakeSet(query.features.keypoints, query.features.descriptors.clone());
   for (const Eigen::Vector3d& point : query.features.points)
     view.caller.points.push_back(point.cast<float>());
+  DropMasked(query.mask, view.caller);
   if (query.metric) LookUpDepth(query, options, view.caller);
   return view;
 }

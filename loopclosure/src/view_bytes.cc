@@ -58,6 +58,31 @@ PinholeCamera LoadCamera(ByteReader& in) {
   return camera;
 }
 
+// What a view has beside the least.
+constexpr char kHasCamera = 1, kHasRegions = 2, kHasNumbers = 4;
+
+void LoadRegions(View& view, ByteReader& in) {
+  const std::vector<std::int32_t> sides = in.GetVector<std::int32_t>();
+  if (sides.size() % 4 != 0) in.Damaged("a camera's part of an image without a side");
+  for (std::size_t i = 0; i < sides.size(); i += 4) {
+    const std::int32_t x = sides[i], y = sides[i + 1], width = sides[i + 2], height = sides[i + 3];
+    if (x < 0 || y < 0 || width < 1 || height < 1 || width > View::kFarthestPixel ||
+        height > View::kFarthestPixel || x > View::kFarthestPixel || y > View::kFarthestPixel) {
+      in.Damaged("a camera's part of an image at an impossible place");
+    }
+    view.cameras.emplace_back(x, y, width, height);
+  }
+}
+
+void LoadNumbers(View::Set& set, ByteReader& in) {
+  set.numbers = in.GetVector<int>();
+  const auto is_number = [](int number) { return number >= 0; };
+  if (set.numbers.size() != set.pixels.size() ||
+      !std::all_of(set.numbers.begin(), set.numbers.end(), is_number)) {
+    in.Damaged("features without numbers");
+  }
+}
+
 }  // namespace
 
 void SaveView(const View& view, ByteWriter& out) {
@@ -65,11 +90,18 @@ void SaveView(const View& view, ByteWriter& out) {
   out.Put<std::int32_t>(view.size.width);
   out.Put<std::int32_t>(view.size.height);
   out.Put<char>(view.metric ? 1 : 0);
-  out.Put<char>(view.camera ? 1 : 0);
+  out.Put(static_cast<char>((view.camera ? kHasCamera : 0) | (view.cameras.empty() ? 0 : kHasRegions) |
+                            (view.caller.numbers.empty() ? 0 : kHasNumbers)));
   if (view.camera) SaveCamera(*view.camera, out);
+  if (!view.cameras.empty()) {
+    std::vector<std::int32_t> sides;
+    for (const cv::Rect& r : view.cameras) sides.insert(sides.end(), {r.x, r.y, r.width, r.height});
+    out.PutVector(sides);
+  }
   out.Put<std::uint64_t>(view.members.size());
   for (const View::Set& set : view.members) SaveSet(set, out);
   SaveSet(view.caller, out);
+  if (!view.caller.numbers.empty()) out.PutVector(view.caller.numbers);
 }
 
 View LoadView(ByteReader& in) {
@@ -79,10 +111,14 @@ View LoadView(ByteReader& in) {
   view.size.height = in.Get<std::int32_t>();
   if (view.size.width < 1 || view.size.height < 1) in.Damaged("an image of an impossible size");
   view.metric = in.Get<char>() != 0;
-  if (in.Get<char>() != 0) view.camera = LoadCamera(in);
+  const char has = in.Get<char>();
+  if ((has & ~(kHasCamera | kHasRegions | kHasNumbers)) != 0) in.Damaged("a view of an unknown kind");
+  if ((has & kHasCamera) != 0) view.camera = LoadCamera(in);
+  if ((has & kHasRegions) != 0) LoadRegions(view, in);
   const std::size_t sets = in.GetCount(2 * sizeof(std::uint64_t) + 1);
   for (std::size_t i = 0; i < sets; ++i) view.members.push_back(LoadSet(in));
   view.caller = LoadSet(in);
+  if ((has & kHasNumbers) != 0) LoadNumbers(view.caller, in);
   return view;
 }
 

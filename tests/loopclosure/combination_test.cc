@@ -29,25 +29,6 @@ TEST(Combination, MeanAveragesEveryLocationAndTheNewPlace) {
   EXPECT_NEAR(mean.Hypothesis(), 0.5, 1e-12);
 }
 
-TEST(Combination, MeanByWeights) {
-  const Belief a = Make(0.8, {0.2, 0.0});
-  const Belief b = Make(0.2, {0.4, 0.4});
-  const Belief mean = CombineMean({&a, &b}, {3.0, 1.0});
-  EXPECT_NEAR(mean.new_place, 0.65, 1e-12);
-  EXPECT_NEAR(mean.places[0], 0.25, 1e-12);
-  EXPECT_NEAR(mean.places[1], 0.1, 1e-12);
-}
-
-TEST(Combination, ABeliefIsTheLessCertainTheMoreItIsSpread) {
-  const Belief sure = Make(0.0, {0.0, 1.0, 0.0});
-  const Belief between = Make(0.5, {0.0, 0.5, 0.0});
-  const Belief spread = Make(0.25, {0.25, 0.25, 0.25});
-  EXPECT_NEAR(Certainty(sure, {0, 1, 2}), 1.0, 1e-12);
-  EXPECT_NEAR(Certainty(between, {0, 1, 2}), 0.5, 1e-12);
-  EXPECT_NEAR(Certainty(spread, {0, 1, 2}), 0.05, 1e-12);  // never nothing
-  EXPECT_EQ(Certainty(Make(1.0, {}), {}), 1.0);
-}
-
 TEST(Combination, MeanTakesTheUnionOfLocations) {
   const Belief a = Make(0.5, {0.5});
   const Belief b = Make(0.5, {0.1, 0.4});

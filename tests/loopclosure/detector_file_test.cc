@@ -86,7 +86,6 @@ TEST_F(SavedDetector, FlannsTreesGoOnExactlyToo) {
 
 TEST_F(SavedDetector, WhatTheMembersWereRightAboutIsSavedToo) {
   LoopDetectorOptions options = BoundedOptions();
-  options.weights = MemberWeights::kAgreement;
   options.consistent_images = 1;
   ExpectToGoOnExactly(options);
 }
@@ -233,6 +232,35 @@ TEST_F(SavedDetector, FeaturesThatNoImageCouldHaveAreRefusedThoughTheChecksumsAr
   EXPECT_THROW(load([](View& view) { view.members.pop_back(); }), InputError);
   EXPECT_THROW(load([](View& view) { view.members[0].pixels[0].x = std::nanf(""); }), InputError);
   EXPECT_THROW(load([](View& view) { view.members[1].pixels[0].y = -1e30f; }), InputError);
+}
+
+TEST(SavedView, KeepsItsCamerasAndTheCallersNumbers) {
+  View view;
+  view.id = 3;
+  view.size = {640, 240};
+  view.cameras = {{0, 0, 320, 240}, {320, 0, 320, 240}};
+  view.members.resize(1);
+  view.caller.pixels = {{1, 2}, {3, 4}};
+  view.caller.descriptors = cv::Mat::eye(2, 8, CV_8U);
+  view.caller.numbers = {4, 7};
+  const auto again = [](const View& saved) {
+    internal::ByteWriter out;
+    internal::SaveView(saved, out);
+    internal::ByteReader in(out.bytes(), "test");
+    View loaded = internal::LoadView(in);
+    EXPECT_TRUE(in.AtEnd());
+    return loaded;
+  };
+  const View loaded = again(view);
+  EXPECT_EQ(loaded.cameras, view.cameras);
+  EXPECT_EQ(loaded.caller.numbers, view.caller.numbers);
+  view.caller.numbers = {4};
+  EXPECT_THROW(again(view), InputError);
+  view.caller.numbers = {4, -1};
+  EXPECT_THROW(again(view), InputError);
+  view.caller.numbers.clear();
+  view.cameras = {{0, 0, 0, 240}, {320, 0, 320, 240}};
+  EXPECT_THROW(again(view), InputError);
 }
 
 TEST_F(SavedDetector, MemoriesOfOtherLocationsThanTheStatisticsSayAreRefused) {

@@ -40,6 +40,20 @@ TEST(LoopDetectorOptions, PresetsHoldThePublishedFigures) {
   EXPECT_EQ(options.rehearsal, defaults.rehearsal);
 }
 
+TEST(LoopDetectorOptions, OptionsOfVerificationOutOfRangeAreRefusedByName) {
+  const auto problem = [](double VerificationOptions::*field, double value) {
+    LoopDetectorOptions options;
+    options.verification.*field = value;
+    return options.Validate();
+  };
+  EXPECT_EQ(problem(&VerificationOptions::homography_px, 0), "");
+  EXPECT_NE(problem(&VerificationOptions::homography_px, -1).find("homography_px"), std::string::npos);
+  EXPECT_NE(problem(&VerificationOptions::homography_share, 0).find("homography_share"), std::string::npos);
+  EXPECT_NE(problem(&VerificationOptions::homography_share, 1.1).find("homography_share"), std::string::npos);
+  EXPECT_EQ(problem(&VerificationOptions::static_px, 0), "");
+  EXPECT_NE(problem(&VerificationOptions::static_px, -1).find("static_px"), std::string::npos);
+}
+
 TEST(LoopDetectorOptions, AnUnknownPresetIsRefusedWithTheNearest) {
   LoopDetectorOptions options;
   try {

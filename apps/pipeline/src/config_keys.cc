@@ -246,6 +246,13 @@ void ConfigTable::AddVerification(VerificationOptions& o) {
   Add("min_spread", o.min_spread, "rms extent of the inliers over the image, as share of its diagonal");
   Add("reprojection_px", o.reprojection_px, "RANSAC threshold of PnP, Sim(3) [px]");
   Add("epipolar_px", o.epipolar_px, "RANSAC threshold of the essential and fundamental matrix [px]");
+  Add("homography_px", o.homography_px, "RANSAC threshold of the homography [px], 0: none is sought");
+  Add("homography_share", o.homography_share,
+      "a homography that explains this share of what the lines do decides in their place");
+  Add("static_px", o.static_px,
+      "matches nearer than this to their own pixel did not move: others must do without them [px], 0: off");
+  Add("scale_bar", o.scale_bar,
+      "least numbers of inliers times members / 3: one member is judged as strictly as three");
   Add("confidence", o.confidence, "of RANSAC");
   Add("max_iterations", o.max_iterations, "of RANSAC");
   Add("pixel_sigma", o.pixel_sigma,

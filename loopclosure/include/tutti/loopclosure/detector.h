@@ -34,6 +34,11 @@ struct LoopQuery {
                   ///< member_features has all members
   cv::Mat depth_m;                      ///< optional: CV_32FC1 [m], registered to image, 0 = unknown
   std::optional<PinholeCamera> camera;  ///< optional: without it verification uses the fundamental matrix
+  cv::Mat mask;                         ///< optional: CV_8UC1, as large as image; features where it is
+                                        ///< 0 do not exist (robot's own parts, rim, burnt-in text)
+  std::vector<cv::Rect> cameras;        ///< optional: image is of several cameras, each in a rectangle
+                                        ///< of its own, left to right: each has a geometry of its own.
+                                        ///< Not with `camera`. Empty: one camera
   FeatureSet features;                  ///< optional: the caller's own features
   std::map<std::string, Features> member_features;  ///< optional: members that need not extract, by
                                                     ///< name; one of options.external_members: required
@@ -89,10 +94,16 @@ struct Verification {
   bool accepted = false;                        ///< it is a loop
   ConstraintType type = ConstraintType::kNone;  ///< which geometry decided
   Similarity S_candidate_query;  ///< maps points of the query camera into the candidate camera (kRigid:
-                                 ///< scale 1; kEssential: rotation and unit direction only)
+                                 ///< scale 1; kEssential: rotation and unit direction only; where the camera
+                                 ///< only turned, the rotation and no translation)
   Matrix6d information = Matrix6d::Zero();  ///< of (translation [m], rotation [rad]), from the inliers
+  bool homography = false;                  ///< kEssential, kFundamental: a homography explains nearly all,
+                                            ///< and decided: the scene is flat or the camera turned on the
+                                            ///< spot. The direction of the translation is then that of the
+                                            ///< essential matrix, one of two for a plane
   double ahead = 1;  ///< kEssential, kFundamental: share of the translation that is along the candidate's
-                     ///< optical axis, 0..1; without a camera by a guessed focal length
+                     ///< optical axis, 0..1; without a camera by a guessed focal length; 0 where a homography
+                     ///< or several cameras decided: the direction is not known
   int matches = 0;   ///< that were considered (kRigid: those with a 3D point)
   int inliers = 0;   ///< of these, those that fit one camera motion
   int coverage = 0;  ///< cells of a grid of 8x6 that inliers occupy, in the image with fewer, 0..48

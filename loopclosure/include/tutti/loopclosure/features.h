@@ -22,6 +22,13 @@ struct Features {
 /// stays empty.
 cv::Mat ToGrey8(const cv::Mat& image);
 
+/// Whether a mask (CV_8UC1) is 0 at the pixel; outside of it the nearest of its pixels counts. Nothing is
+/// masked by an empty one.
+bool IsMasked(const cv::Mat& mask, const cv::Point2f& pixel);
+
+/// Drops the features at which the mask is 0.
+void DropMasked(const cv::Mat& mask, Features& features);
+
 /// Indices of the strongest `count` keypoints spread over a grid of `columns` cells along the longer side:
 /// each cell's best first, up to an equal share, the rest by response. In order of strength; ties by
 /// position. Deterministic.

@@ -22,10 +22,12 @@ struct View {
     std::vector<cv::Point2f> pixels;      ///< N [px]
     cv::Mat descriptors;                  ///< N rows
     std::vector<Eigen::Vector3f> points;  ///< empty, or N points in the camera frame; NaN where unknown
+    std::vector<int> numbers;             ///< the caller's number of each, growing; empty: 0 to N - 1
   };
   std::int64_t id = -1;                 ///< of the query that it was made of
   cv::Size size;                        ///< of the image [px]
   std::optional<PinholeCamera> camera;  ///< of the image; none: fundamental matrix
+  std::vector<cv::Rect> cameras;        ///< LoopQuery::cameras
   std::vector<Set> members;             ///< one per member
   Set caller;                           ///< the caller's own; may be empty
   bool metric = true;                   ///< 3D points are in metres

@@ -19,8 +19,6 @@ ModelTraits TraitsOf(FitModel model) {
       return {7, 3, true};
     case FitModel::kEssential:
       return {5, 10, true};
-    case FitModel::kHomography:
-      return {4, 1, false};
     case FitModel::kPnp:
       break;
   }

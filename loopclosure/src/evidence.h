@@ -10,8 +10,7 @@ namespace tutti::internal {
 enum class FitModel {
   kFundamental,  ///< a line in the other image; 7 matches give up to 3 of them
   kEssential,    ///< the same from 5 matches, up to 10
-  kHomography,   ///< a point in the other image; 4 matches give one
-  kPnp,          ///< the same from 3 matches with points, up to 4
+  kPnp,          ///< a point in the other image; 3 matches with points give up to 4
 };
 
 /// How many matches would fit a model by chance.

@@ -61,11 +61,9 @@ Motion FitOne(const std::vector<PooledMatch>& pool, const std::vector<int>& of, 
     }
   }
   for (const int i : inliers) motion.inliers.push_back(of[static_cast<std::size_t>(i)]);
-  const FitModel model = motion.homography ? FitModel::kHomography
-                         : calibrated      ? FitModel::kEssential
-                                           : FitModel::kFundamental;
-  motion.chance = FitByChance(model, motion.considered, static_cast<int>(inliers.size()),
-                              motion.homography ? options.homography_px : options.epipolar_px, size);
+  // What a homography explains fits lines as well: by lines, the figures of flat and of deep scenes compare.
+  motion.chance = FitByChance(calibrated ? FitModel::kEssential : FitModel::kFundamental, motion.considered,
+                              static_cast<int>(inliers.size()), options.epipolar_px, size);
   return motion;
 }
 

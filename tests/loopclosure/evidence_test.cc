@@ -17,7 +17,6 @@ TEST(FitByChance, ExpectsTheShareOfTheImageAroundTheLineBeyondTheSample) {
 TEST(FitByChance, ExpectsTheShareOfTheImageAroundThePointBeyondTheSample) {
   const double alpha = M_PI * 2.5 * 2.5 / (640.0 * 480.0);
   EXPECT_NEAR(FitByChance(FitModel::kPnp, 103, 50, 2.5, kImage).expected, 3 + 100 * alpha, 1e-9);
-  EXPECT_NEAR(FitByChance(FitModel::kHomography, 104, 50, 2.5, kImage).expected, 4 + 100 * alpha, 1e-9);
 }
 
 TEST(FitByChance, FalseAlarmsFollowTheFormula) {

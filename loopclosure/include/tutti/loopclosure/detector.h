@@ -113,7 +113,8 @@ struct Verification {
                        ///< lets as many matches fit; the further below 0 the surer that one motion moved
                        ///< them. That says "one scene or one object", not yet "one place"
   double motion_spread = 0;  ///< standard deviation of the inliers' displacements between the images, as a
-                             ///< share of the diagonal: what moves as one is far, flat, or one object
+                             ///< share of the diagonal; 0: all moved as one. Small where a place is
+                             ///< seen from where it was seen, mostly large where another looks alike
   std::string reason;        ///< why not, in plain words; empty if accepted
   std::vector<VerifiedMatch> inlier_matches;  ///< the inliers
 };

@@ -2,7 +2,7 @@
 """What did the ensemble buy? Runs `tutti compare` on every row and rewrites BENCHMARK.md.
 
 usage: bench/benchmark.py --tutti build/release/apps/tutti/tutti [--data DIR] [--out DIR] [--seeds N] [ROW...]
-Rows: redkitchen kitti_00_head town town_alike room. Rows that are not run, or whose data is absent, keep what
+Rows: redkitchen kitti_00_head town town_alike town_dusk town_changed room. Rows that are not run, or whose data is absent, keep what
 BENCHMARK.md says. A row whose runs are all there already in --out is not run again with --reuse. Needs Python 3 alone.
 """
 import argparse
@@ -17,6 +17,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 VARIANTS = ["odometry", "surf", "sift", "orb", "naive", "product", "majority", "ensemble"]
 SMALL_TOWN = ["--sensor", "stereo", "--world", "town", "--laps", "1.25", "--rate", "5", "--width", "512", "--height", "256",
               "--supersample", "1", "--noise"]
+HARD_TOWN = ["1.5" if word == "1.25" else word for word in SMALL_TOWN]
 
 # title, configuration and data set, or what to generate; seeds.
 ROWS = {
@@ -26,6 +27,10 @@ ROWS = {
     "town": {"title": "Synthetic town, stereo, 1.25 laps", "generate": SMALL_TOWN, "seeds": 3},
     "town_alike": {"title": "Synthetic town whose houses look alike (`--repeat 1 --facades 5 --signs 0`), stereo, 1.25 laps",
                    "generate": SMALL_TOWN + ["--repeat", "1", "--facades", "5", "--signs", "0"], "seeds": 3},
+    "town_dusk": {"title": "Synthetic town, the second lap at dusk (dark, noisy, lamps are lit), stereo, 1.5 laps",
+                  "generate": HARD_TOWN + ["--dusk"], "seeds": 3},
+    "town_changed": {"title": "Synthetic town, the second lap with other parked cars and behind lorries (30 % of the image), stereo, "
+                              "1.5 laps", "generate": HARD_TOWN + ["--other-cars", "--occlusion", "0.3"], "seeds": 3},
     "room": {"title": "Synthetic room, RGB-D with the noise of a Kinect, 1.5 laps",
              "generate": ["--sensor", "rgbd", "--world", "room", "--laps", "1.5", "--rate", "8", "--width", "480", "--height", "360",
                           "--supersample", "1", "--kinect-noise"], "seeds": 3},

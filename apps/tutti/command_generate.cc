@@ -221,6 +221,14 @@ void AddOptions(CLI::App& c, GenerateArguments& a) {
       ->expected(0, 1)
       ->default_str("0.02");
   c.add_flag("--lighting-change", w.lighting_change, "another sun, darker, from the second lap on");
+  c.add_flag("--dusk", w.dusk,
+             "from the second lap on: dark, noisy, sun from elsewhere; town: lamps are lit");
+  c.add_flag("--other-cars", w.other_cars, "town: other parked cars when places are seen again");
+  c.add_option(
+       "--occlusion", w.occlusion,
+       "town: from the second lap on, lorries cover so much of the image [0..0.3]; without a number 0.3")
+      ->expected(0, 1)
+      ->default_str("0.3");
   c.add_option("--moving-objects", w.moving_objects,
                "number of oncoming cars (indoors: people); without a number 6")
       ->expected(0, 1)

@@ -29,11 +29,21 @@ class Route {
   double step_ = 0, length_ = 0;
 };
 
+/// A place beside the road where another car is parked when the camera comes again.
+struct ParkingPlace {
+  Eigen::Vector2d at = Eigen::Vector2d::Zero();
+  std::size_t first_face = 0, faces = 0;  ///< of Scene::faces: the first lap's car; 0 faces: none
+  std::vector<Face> later;                ///< the next one; empty: none
+};
+
 /// Everything that can be seen, and the camera's way. Frame of reference: x, y on the ground, z up [m].
 struct Scene {
   std::vector<Texture> textures;
   std::vector<Face> faces;
-  std::vector<BoxTextures> movers;  ///< looks of the moving objects
+  std::vector<BoxTextures> movers;     ///< looks of the moving objects
+  std::vector<BoxTextures> lorries;    ///< looks of what drives near the camera (occlusion)
+  std::vector<ParkingPlace> parking;   ///< those that change (other_cars)
+  std::vector<Eigen::Vector3d> lamps;  ///< street lamps, lit at dusk
   Eigen::Vector3d mover_size = Eigen::Vector3d(4.2, 1.75, 1.4);
   double mover_left = 3.2;    ///< they keep this far to the left of the camera's way [m]
   double mover_speed = -6;    ///< along the way; negative: oncoming [m/s]

@@ -54,8 +54,12 @@ struct SyntheticOptions {
   double noise_sigma = 0;    ///< pixel noise [grey levels]
   double motion_blur_s = 0;  ///< exposure time [s]; 0: sharp. Poses are those of the middle of the exposure
   bool lighting_change = false;  ///< from the second lap on: sun from elsewhere, darker, another contrast
-  int moving_objects = 0;        ///< number of cars (town) or walking people (room)
-  bool kinect_noise = false;     ///< RGB-D: noise that grows with depth, holes at edges and far away
+  bool dusk = false;             ///< from the second lap on: dusk, noisy; in the town, street lamps are lit
+  bool other_cars = false;       ///< town: other parked cars when places are seen again
+  double occlusion =
+      0;  ///< town: from the second lap on, lorries cover about this part of the image [0..0.3]
+  int moving_objects = 0;     ///< number of cars (town) or walking people (room)
+  bool kinect_noise = false;  ///< RGB-D: noise that grows with depth, holes at edges and far away
 
   int supersample =
       2;  ///< samples per pixel and axis, 1 to 4; 1 is four times faster than 2, with jagged edges

@@ -36,6 +36,9 @@ std::string SyntheticOptions::Validate() const {
   if (!(sides_deg > 0 && sides_deg <= 120)) return "sides_deg must be above 0 and at most 120 degrees";
   if (!(noise_sigma >= 0 && noise_sigma <= 100)) return "noise_sigma must be 0 to 100 grey levels";
   if (!(motion_blur_s >= 0 && motion_blur_s <= 0.1)) return "motion_blur_s must be 0 to 0.1 s";
+  if (!(occlusion >= 0 && occlusion <= 0.3)) return "occlusion must be 0 to 0.3 of the image";
+  if ((occlusion > 0 || other_cars) && scene != SyntheticScene::kTown)
+    return "occlusion and other_cars are the town's alone";
   if (moving_objects < 0 || moving_objects > 100) return "moving_objects must be 0 to 100";
   if (supersample < 1 || supersample > 4) return "supersample must be 1 to 4";
   return {};
@@ -63,6 +66,9 @@ struct SyntheticWorld::Impl {
   PinholeCamera camera;
   std::size_t frames = 0;
   Pose T_scene_first;
+  std::vector<double> parked_until;  // of each of scene.parking: way gone by the camera [m]
+
+  static constexpr double kDuskGain = 0.3;
 
   const synthetic::Route& Way() const { return scene.routes[0]; }
 
@@ -90,11 +96,19 @@ struct SyntheticWorld::Impl {
 
   double StampOf(std::size_t i) const { return static_cast<double>(i) / options.rate_hz; }
 
+  // A cloud or the dusk comes within three seconds as the second lap begins: 0 before, 1 after.
+  double ChangeAt(double t) const { return std::clamp((t - Way().LapTime()) / 3.0, 0.0, 1.0); }
+
   Light LightAt(double t) const {
     Light light;
+    const double change = ChangeAt(t);
+    if (options.dusk) {
+      light.towards_sun =
+          ((1 - change) * light.towards_sun + change * Eigen::Vector3d(-0.9, 0.3, 0.3)).normalized();
+      light.gain += (kDuskGain - light.gain) * change;
+      return light;
+    }
     if (!options.lighting_change) return light;
-    // A cloud comes within three seconds as the second lap begins.
-    const double change = std::clamp((t - Way().LapTime()) / 3.0, 0.0, 1.0);
     light.towards_sun =
         ((1 - change) * light.towards_sun + change * Eigen::Vector3d(-0.6, 0.5, 0.62)).normalized();
     light.ambient -= 0.15 * change;
@@ -103,8 +117,102 @@ struct SyntheticWorld::Impl {
     return light;
   }
 
+  // The lamps' light on what is seen, which is as bright as its surface in daylight times light.gain.
+  void LightLamps(synthetic::Rendering& view, const Pose& T_scene_camera, double gain, double change) const {
+    constexpr double kPower = 9;        // light of one at 1 m, of a daylight of 1
+    constexpr double kReach = 14;       // [m]
+    constexpr double kSight = 120;      // [m]
+    std::vector<Eigen::Vector3f> near;  // in the camera frame
+    const Pose T_camera_scene = T_scene_camera.Inverse();
+    for (const Eigen::Vector3d& lamp : scene.lamps) {
+      const Eigen::Vector3d seen = T_camera_scene * lamp;
+      if (seen.z() > -kReach && seen.norm() < kSight) near.push_back(seen.cast<float>());
+    }
+    const float fx = static_cast<float>(camera.fx), fy = static_cast<float>(camera.fy);
+    const float cx = static_cast<float>(camera.cx), cy = static_cast<float>(camera.cy);
+    constexpr float kReach2 = static_cast<float>(kReach * kReach);
+    for (int y = 0; y < view.image.rows; ++y) {
+      for (int x = 0; x < view.image.cols; ++x) {
+        const float z = view.depth_m.at<float>(y, x);
+        if (z <= 0 || z > static_cast<float>(kSight)) continue;
+        const Eigen::Vector3f p(z * (static_cast<float>(x) - cx) / fx, z * (static_cast<float>(y) - cy) / fy,
+                                z);
+        float sum = 0;
+        for (const Eigen::Vector3f& lamp : near) {
+          const float d2 = (lamp - p).squaredNorm();
+          if (d2 < kReach2) sum += (1 - d2 / kReach2) / (0.15F + d2);
+        }
+        float& grey = view.image.at<float>(y, x);
+        grey = std::min(255.0F, grey * (1 + static_cast<float>(kPower * change / gain) * sum));
+      }
+    }
+  }
+
+  void AddLorry(std::vector<Face>& faces, double s, double left, const Eigen::Vector3d& size,
+                int look) const {
+    const double heading = Way().HeadingAt(s);
+    const Eigen::Vector2d at =
+        Way().PointAt(s) + left * Eigen::Vector2d(-std::sin(heading), std::cos(heading));
+    AppendBox(faces, {at.x(), at.y(), 0.01}, size, heading,
+              scene.lorries[static_cast<std::size_t>(look) % scene.lorries.size()]);
+  }
+
+  // From the second lap on: a column of lorries comes the other way, and one drives ahead.
+  void AddOcclusion(std::vector<Face>& faces, double t) const {
+    const double begin = Way().LapTime(), length = Way().Length();
+    if (options.occlusion <= 0 || t < begin) return;
+    // Measured: a column without gaps covers kColumn of the image, the one ahead kAhead.
+    constexpr double kColumn = 0.26, kAhead = 0.06, kSpeed = 4;
+    const bool ahead = options.occlusion >= 0.1;
+    const double dense = std::clamp((options.occlusion - (ahead ? kAhead : 0)) / kColumn, 0.02, 0.95);
+    const double first = Way().DistanceAt(begin);
+    Random random(options.seed * 0x2545F491ULL + 17);
+    int look = 0;
+    for (double s = 40; s < length - 12; ++look) {  // none pops up in view: the nearest comes from 40 m ahead
+      const Eigen::Vector3d size(random.In(5.5, 7.5), random.In(1.9, 2.2), random.In(2.7, 3.4));
+      AddLorry(faces, first + s - kSpeed * (t - begin), scene.mover_left + random.In(-0.1, 0.1), size, look);
+      s += size.x() / dense * random.In(0.9, 1.1);
+    }
+    if (!ahead) return;
+    const double gap = 9 + 50 * std::exp(-(t - begin) / 3) + 1.5 * std::sin(2 * M_PI * 0.09 * (t - begin));
+    AddLorry(faces, Way().DistanceAt(t) + gap + 3, 0, {6, 2.2, 2.9}, look);
+  }
+
+  // Half a lap after the camera passed a place, when it is out of sight, another car is parked there.
+  std::vector<Face> ParkedAt(double t) const {
+    if (scene.parking.empty()) return scene.faces;
+    const double gone = Way().DistanceAt(t);
+    std::vector<Face> faces;
+    std::size_t next = 0;
+    for (std::size_t k = 0; k < scene.parking.size(); ++k) {
+      const synthetic::ParkingPlace& place = scene.parking[k];
+      if (gone < parked_until[k]) continue;
+      const auto at = [this](std::size_t i) { return scene.faces.begin() + static_cast<std::ptrdiff_t>(i); };
+      faces.insert(faces.end(), at(next), at(place.first_face));
+      faces.insert(faces.end(), place.later.begin(), place.later.end());
+      next = place.first_face + place.faces;
+    }
+    faces.insert(faces.end(), scene.faces.begin() + static_cast<std::ptrdiff_t>(next), scene.faces.end());
+    return faces;
+  }
+
+  // Way gone by the camera [m] when each parking place changes.
+  void PlanParking() {
+    for (const synthetic::ParkingPlace& place : scene.parking) {
+      double nearest = 0, least = 1e300;
+      for (double s = 0; s < Way().Length(); s += 1) {
+        const double distance = (Way().PointAt(s) - place.at).norm();
+        if (distance >= least) continue;
+        least = distance;
+        nearest = s;
+      }
+      parked_until.push_back(nearest + 0.5 * Way().Length());
+    }
+  }
+
   std::vector<Face> FacesAt(double t) const {
-    std::vector<Face> faces = scene.faces;
+    std::vector<Face> faces = ParkedAt(t);
+    AddOcclusion(faces, t);
     for (int k = 0; k < options.moving_objects; ++k) {
       const double spread = Way().Length() * (k + 0.4) / options.moving_objects;
       const double s = spread + scene.mover_speed * t;
@@ -120,7 +228,11 @@ struct SyntheticWorld::Impl {
   // What a camera sees at a time from a pose (in the scene), shifted by `right_m` along its x axis.
   synthetic::Rendering ViewFrom(Pose pose, double t, double right_m) const {
     pose.translation += pose.rotation * Eigen::Vector3d(right_m, 0, 0);
-    return synthetic::Render(FacesAt(t), scene.textures, camera, pose, LightAt(t), options.supersample);
+    const Light light = LightAt(t);
+    synthetic::Rendering view =
+        synthetic::Render(FacesAt(t), scene.textures, camera, pose, light, options.supersample);
+    if (options.dusk && ChangeAt(t) > 0) LightLamps(view, pose, light.gain, ChangeAt(t));
+    return view;
   }
 
   // Mean of what is seen over the exposure around t by a camera that is turned to the left [rad] and shifted
@@ -142,7 +254,8 @@ struct SyntheticWorld::Impl {
     return sum;
   }
 
-  cv::Mat Sense(const cv::Mat& grey, std::uint64_t stream) const {
+  // `dusk`: 0 by day, 1 at dusk, when the noise also grows with the light (shot noise of a short exposure).
+  cv::Mat Sense(const cv::Mat& grey, std::uint64_t stream, double dusk) const {
     cv::Mat out(grey.size(), CV_8UC1);
     Random random(options.seed * 0x9E3779B1ULL + stream * 0xD1B54A32D192ED03ULL + 11);
     const float sigma = static_cast<float>(options.noise_sigma);
@@ -150,7 +263,8 @@ struct SyntheticWorld::Impl {
       const float* in = grey.ptr<float>(y);
       std::uint8_t* row = out.ptr(y);
       for (int x = 0; x < grey.cols; ++x) {
-        const float value = sigma > 0 ? in[x] + sigma * random.Normal() : in[x];
+        float value = sigma > 0 ? in[x] + sigma * random.Normal() : in[x];
+        if (dusk > 0) value += std::sqrt(static_cast<float>(dusk) * (6 + 0.25F * in[x])) * random.Normal();
         row[x] = static_cast<std::uint8_t>(std::clamp(value + 0.5F, 0.0F, 255.0F));
       }
     }
@@ -162,8 +276,9 @@ struct SyntheticWorld::Impl {
     SyntheticFrame frame;
     frame.stamp_s = StampOf(i);
     frame.T_world_camera = T_world_camera;
-    frame.image = Sense(left.image, 2 * i);
-    if (!right.empty()) frame.right = Sense(right, 2 * i + 1);
+    const double dusk = options.dusk ? ChangeAt(frame.stamp_s) : 0;
+    frame.image = Sense(left.image, 2 * i, dusk);
+    if (!right.empty()) frame.right = Sense(right, 2 * i + 1, dusk);
     if (options.sensor == SyntheticSensor::kRgbd) {
       frame.depth_m = left.depth_m;
       if (options.kinect_noise) DepthNoise(frame.depth_m, i);
@@ -205,6 +320,7 @@ SyntheticWorld::SyntheticWorld(const SyntheticOptions& options) : impl_(std::mak
   impl_->scene = o.scene == SyntheticScene::kTown   ? synthetic::BuildTown(o)
                  : o.scene == SyntheticScene::kRoom ? synthetic::BuildRoom(o)
                                                     : synthetic::BuildCorridor(o);
+  impl_->PlanParking();
   PinholeCamera& c = impl_->camera;
   c.width = o.width;
   c.height = o.height;

@@ -21,7 +21,10 @@ Vector3d Lift(const Vector2d& p, double z) { return {p.x(), p.y(), z}; }
 class TownBuilder {
  public:
   explicit TownBuilder(const SyntheticOptions& o)
-      : options_(o), random_(o.seed * 0x51ED2701ULL + 7), pitch_(o.block_m + o.street_m) {}
+      : options_(o),
+        random_(o.seed * 0x51ED2701ULL + 7),
+        later_(o.seed * 0x6C8E9CF5ULL + 13),
+        pitch_(o.block_m + o.street_m) {}
 
   Scene Build() {
     MakeTextures();
@@ -33,6 +36,7 @@ class TownBuilder {
     for (int i = 0; i <= options_.blocks_x; ++i) AddStreet({i * pitch_, 0}, {0, 1}, options_.blocks_y);
     for (int j = 0; j <= options_.blocks_y; ++j) AddStreet({0, j * pitch_}, {1, 0}, options_.blocks_x);
     AddRoute();
+    AddLorries();
     return std::move(scene_);
   }
 
@@ -188,19 +192,56 @@ class TownBuilder {
       const Vector3d size(random_.In(3.7, 4.6), 1.7, random_.In(1.35, 1.9));
       const BoxTextures look =
           cars_[static_cast<std::size_t>(random_.Int(0, static_cast<int>(cars_.size()) - 1))];
-      if (curb > 3.3) AppendBox(scene_.faces, Lift(middle + (curb - 1.0) * side, 0), size, yaw, look);
+      const std::size_t first = scene_.faces.size();
+      const Vector2d at = middle + (curb - 1.0) * side;
+      if (curb > 3.3) AppendBox(scene_.faces, Lift(at, 0), size, yaw, look);
+      if (curb > 3.3 && options_.other_cars) AddLaterCar(first, at, along, 0.65);
       return;
     }
+    if (curb > 3.3 && options_.other_cars)
+      AddLaterCar(scene_.faces.size(), middle + (curb - 1.0) * side, along, 0.4);
     const Vector2d foot = middle + (curb + 0.45) * side;
     const int bark = Pick(walls_);
     if (kind < 0.8) {
       AppendBox(scene_.faces, Lift(foot, 0), {0.16, 0.16, 5}, yaw, {bark, bark, bark});
       AppendBox(scene_.faces, Lift(foot - 0.5 * side, 5), {0.3, 1.1, 0.2}, yaw, {bark, bark, bark});
+      scene_.lamps.push_back(Lift(foot - 0.85 * side, 4.9));
     } else {
       const double crown = random_.In(1.3, 2.0);
       AppendBox(scene_.faces, Lift(foot, 0), {0.25, 0.25, 2.4}, yaw, {bark, bark, bark});
       AppendBox(scene_.faces, Lift(foot, 2.4), {crown, crown, crown}, yaw + 0.4,
                 {foliage_, foliage_, foliage_});
+    }
+  }
+
+  // What is parked later where scene_.faces has a car from face `first` on (or none): with so much
+  // probability one of another look, size and place. Its random numbers are no others' business: a world
+  // keeps its bytes.
+  void AddLaterCar(std::size_t first, const Vector2d& at, const Vector2d& along, double probability) {
+    ParkingPlace place;
+    place.at = at;
+    place.first_face = first;
+    place.faces = scene_.faces.size() - first;
+    if (later_.Unit() < probability) {
+      BoxTextures look;
+      look.front = scene_.Add(CarTexture(later_.Bits(), false));
+      look.side = scene_.Add(CarTexture(later_.Bits(), true));
+      look.top = walls_[static_cast<std::size_t>(later_.Int(0, static_cast<int>(walls_.size()) - 1))];
+      const Vector3d size(later_.In(3.6, 5.0), later_.In(1.6, 1.8), later_.In(1.3, 2.1));
+      AppendBox(place.later, Lift(at + later_.In(-0.6, 0.6) * along, 0), size,
+                std::atan2(along.y(), along.x()), look);
+    }
+    if (place.faces > 0 || !place.later.empty()) scene_.parking.push_back(std::move(place));
+  }
+
+  void AddLorries() {
+    if (options_.occlusion <= 0) return;
+    for (int i = 0; i < 12; ++i) {
+      BoxTextures look;
+      look.front = scene_.Add(CarTexture(later_.Bits(), false));
+      look.side = scene_.Add(BusTexture(later_.Bits()));
+      look.top = walls_[0];
+      scene_.lorries.push_back(look);
     }
   }
 
@@ -227,7 +268,7 @@ class TownBuilder {
   }
 
   const SyntheticOptions options_;
-  Random random_;
+  Random random_, later_;  // later_: of what the second lap alone has
   double pitch_;
   double corner_height_ = 9;  // of the block that is built [m]
   Scene scene_;

@@ -165,6 +165,90 @@ TEST(SyntheticWorldTest, NoiseBlurLightAndMovingObjectsChangeTheImages) {
   EXPECT_GT(moved, 0.2);
 }
 
+// Mean grey level of each of 4x2 parts of an image.
+std::vector<double> Tones(const cv::Mat& image) {
+  cv::Mat grid;
+  cv::resize(image, grid, {4, 2}, 0, 0, cv::INTER_AREA);
+  return {grid.begin<unsigned char>(), grid.end<unsigned char>()};
+}
+
+SyntheticOptions SmallTwoLaps() {
+  SyntheticOptions o = Small(SyntheticScene::kTown, SyntheticSensor::kStereo);
+  o.laps = 2;
+  o.supersample = 1;
+  o.noise_sigma = 2;
+  return o;
+}
+
+bool SameImages(const SyntheticFrame& a, const SyntheticFrame& b) {
+  return cv::norm(a.image, b.image, cv::NORM_INF) == 0 && cv::norm(a.right, b.right, cv::NORM_INF) == 0;
+}
+
+TEST(SyntheticWorldTest, WorldsLookAsTheyAlwaysDid) {
+  const auto frame = [](SyntheticScene scene, std::size_t i) {
+    return SyntheticWorld(Small(scene, SyntheticSensor::kMono)).Render(i).image;
+  };
+  using ::testing::DoubleNear;
+  using ::testing::Pointwise;
+  EXPECT_THAT(Tones(frame(SyntheticScene::kTown, 7)),
+              Pointwise(DoubleNear(1.01), {131, 173, 132, 82, 92, 101, 96, 102}));
+  EXPECT_THAT(Tones(frame(SyntheticScene::kRoom, 7)),
+              Pointwise(DoubleNear(1.01), {169, 152, 129, 136, 145, 129, 126, 126}));
+  EXPECT_THAT(Tones(frame(SyntheticScene::kCorridor, 7)),
+              Pointwise(DoubleNear(1.01), {164, 169, 163, 134, 156, 137, 129, 124}));
+}
+
+TEST(SyntheticWorldTest, OnlyTheSecondLapIsAtDuskOrOccludedAndThePosesStay) {
+  const SyntheticWorld plain(SmallTwoLaps());
+  const std::size_t lap = plain.FramesPerLap(), late = lap + 60;
+  SyntheticOptions dusk = SmallTwoLaps(), occluded = SmallTwoLaps();
+  dusk.dusk = true;
+  occluded.occlusion = 0.3;
+  for (const SyntheticOptions& options : {dusk, occluded}) {
+    const SyntheticWorld world(options);
+    ASSERT_EQ(world.Size(), plain.Size());
+    for (const std::size_t i : {std::size_t{0}, std::size_t{30}, lap - 1}) {
+      EXPECT_TRUE(SameImages(world.Render(i), plain.Render(i))) << i;
+    }
+    EXPECT_FALSE(SameImages(world.Render(late), plain.Render(late)));
+    EXPECT_TRUE(SameImages(world.Render(late), SyntheticWorld(options).Render(late)));
+    EXPECT_EQ(world.PoseOf(late).translation, plain.PoseOf(late).translation);
+  }
+  const cv::Mat at_dusk = SyntheticWorld(dusk).Render(late).image, by_day = plain.Render(late).image;
+  EXPECT_LT(cv::mean(at_dusk)[0], 0.45 * cv::mean(by_day)[0]);
+}
+
+TEST(SyntheticWorldTest, LorriesCoverAboutThePartOfTheImageThatWasAskedFor) {
+  const SyntheticWorld plain(SmallTwoLaps());
+  for (const double part : {0.1, 0.2, 0.3}) {
+    SyntheticOptions options = SmallTwoLaps();
+    options.occlusion = part;
+    const SyntheticWorld world(options);
+    double covered = 0;
+    int frames = 0;
+    for (std::size_t i = plain.FramesPerLap() + 60; i < plain.Size(); i += 7, ++frames) {
+      const cv::Mat with = world.ExactDepth(i), without = plain.ExactDepth(i);
+      covered +=
+          static_cast<double>(cv::countNonZero(with < 0.98 * without)) / static_cast<double>(with.total());
+    }
+    EXPECT_NEAR(covered / frames, part, 0.05) << part;
+  }
+}
+
+TEST(SyntheticWorldTest, OtherCarsAreParkedWhenAPlaceIsSeenAgain) {
+  const SyntheticWorld plain(SmallTwoLaps());
+  SyntheticOptions options = SmallTwoLaps();
+  options.other_cars = true;
+  const SyntheticWorld world(options);
+  const std::size_t lap = plain.FramesPerLap();
+  for (std::size_t i = 0; i < lap / 3; i += 10)
+    EXPECT_TRUE(SameImages(world.Render(i), plain.Render(i))) << i;
+  int changed = 0, frames = 0;
+  for (std::size_t i = lap; i < plain.Size(); i += 10, ++frames)
+    changed += SameImages(world.Render(i), plain.Render(i)) ? 0 : 1;
+  EXPECT_GT(changed, 0.8 * frames);
+}
+
 TEST(SyntheticWorldTest, KinectNoiseGrowsWithDepthAndLeavesHoles) {
   SyntheticOptions options = Small(SyntheticScene::kRoom, SyntheticSensor::kRgbd);
   options.kinect_noise = true;
@@ -297,6 +381,12 @@ TEST(SyntheticWorldTest, BadOptionsAreNamed) {
   options.laps = 1;
   options.width = 640;  // without a height
   EXPECT_THAT(options.Validate(), ::testing::HasSubstr("height"));
+  options = {};
+  options.occlusion = 0.7;
+  EXPECT_THAT(options.Validate(), ::testing::HasSubstr("occlusion"));
+  options.occlusion = 0.3;
+  options.scene = SyntheticScene::kRoom;
+  EXPECT_THAT(options.Validate(), ::testing::HasSubstr("town"));
 }
 
 }  // namespace

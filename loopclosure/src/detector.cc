@@ -183,10 +183,10 @@ void LoopDetector::Impl::Decide(int slot, const CombinedBelief& combined, LoopRe
 // The last word: geometry and belief together.
 void LoopDetector::Impl::Accept(const Belief& belief, LoopResult& result) const {
   if (!result.accepted) return;
-  const double mass = reasoner_.MassAround(belief, memory().Find(result.verification.candidate));
-  result.probability = options_.verification.enabled
-                           ? internal::LoopProbability(mass, result.verification)
-                           : mass;
+  result.probability =
+      options_.verification.enabled
+          ? internal::LoopProbability(result.verification)
+          : reasoner_.MassAround(belief, memory().Find(result.verification.candidate));
   result.accepted = result.probability >= options_.loop_threshold;
   if (result.accepted) return;
   char text[128];
@@ -199,6 +199,10 @@ void LoopDetector::Impl::Verify(const View& query, const Belief& belief, LoopRes
   const internal::HypothesisSearch search(options_, memory(), verifier_,
                                           [this](int s) -> const View& { return views_[Index(s)]; });
   search.Verify(query, belief, result);
+  for (Verification& tried : result.tried) tried.mass = reasoner_.MassAround(belief, memory().Find(tried.candidate));
+  if (!result.tried.empty()) {
+    result.verification.mass = reasoner_.MassAround(belief, memory().Find(result.verification.candidate));
+  }
 }
 
 // One image by itself, without the images before it: no filter, all places are as likely.
@@ -229,9 +233,7 @@ LoopResult LoopDetector::Impl::Locate(const LoopQuery& query) const {
   result.proposed = true;
   Verify(view, combined.belief, result);
   if (result.accepted) {
-    result.probability = internal::LoopProbability(
-        reasoner_.MassAround(combined.belief, memory().Find(result.verification.candidate)),
-        result.verification);
+    result.probability = internal::LoopProbability(result.verification);
   }
   result.verify_ms = watch.LapMs();
   return result;

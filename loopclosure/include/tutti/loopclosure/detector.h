@@ -115,6 +115,7 @@ struct Verification {
   double motion_spread = 0;  ///< standard deviation of the inliers' displacements between the images, as a
                              ///< share of the diagonal; 0: all moved as one. Small where a place is
                              ///< seen from where it was seen, mostly large where another looks alike
+  double mass = 0;           ///< posterior of all places within 4 graph levels of the candidate, 0..1
   std::string reason;        ///< why not, in plain words; empty if accepted
   std::vector<VerifiedMatch> inlier_matches;  ///< the inliers
 };

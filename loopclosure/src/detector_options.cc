@@ -78,6 +78,7 @@ std::string VerificationOptions::Validate() const {
   if (!(homography_px >= 0)) return OutOf("verification.homography_px", "0 (off) or more");
   if (!(homography_share > 0 && homography_share <= 1))
     return OutOf("verification.homography_share", "above 0, at most 1");
+  if (!(camera_share >= 0 && camera_share <= 1)) return OutOf("verification.camera_share", "0 to 1");
   if (!(static_px >= 0)) return OutOf("verification.static_px", "0 (off) or more");
   if (!(confidence > 0 && confidence < 1)) return OutOf("verification.confidence", "between 0 and 1");
   if (max_iterations < 1) return OutOf("verification.max_iterations", "at least 1");

@@ -67,6 +67,18 @@ Motion FitOne(const std::vector<PooledMatch>& pool, const std::vector<int>& of, 
   return motion;
 }
 
+// Features in a part of the image, of all members and the caller.
+int FeaturesIn(const cv::Rect& part, const View& view) {
+  std::ptrdiff_t count = 0;
+  const auto add = [&](const View::Set& set) {
+    count += std::count_if(set.pixels.begin(), set.pixels.end(),
+                           [&](const cv::Point2f& p) { return part.contains(cv::Point(p)); });
+  };
+  for (const View::Set& set : view.members) add(set);
+  add(view.caller);
+  return static_cast<int>(count);
+}
+
 // The matches by the query's camera i and the candidate's i, or the last but i.
 std::vector<std::vector<int>> ByCamera(const std::vector<PooledMatch>& pool, const View& query,
                                        const View& candidate, bool opposite) {
@@ -84,14 +96,21 @@ std::vector<std::vector<int>> ByCamera(const std::vector<PooledMatch>& pool, con
 }
 
 Motion FitEach(const std::vector<PooledMatch>& pool, const std::vector<std::vector<int>>& by_camera,
-               const View& query, const View& candidate, const VerificationOptions& options,
+               bool opposite, const View& query, const View& candidate, const VerificationOptions& options,
                std::uint64_t seed) {
+  constexpr int kSeesMuch = 60;  // features: of fewer, none need be found again
   Motion sum;
   sum.homography = true;
   for (std::size_t i = 0; i < by_camera.size(); ++i) {
     const Motion one =
         FitOne(pool, by_camera[i], query, candidate, query.cameras[i].size(), options, seed + i);
     sum.inliers.insert(sum.inliers.end(), one.inliers.begin(), one.inliers.end());
+    const std::size_t other = opposite ? by_camera.size() - 1 - i : i;
+    if (std::min(FeaturesIn(query.cameras[i], query), FeaturesIn(candidate.cameras[other], candidate)) >=
+        kSeesMuch) {
+      const int inliers = static_cast<int>(one.inliers.size());
+      sum.fewest = sum.fewest < 0 ? inliers : std::min(sum.fewest, inliers);
+    }
     sum.chance.expected += one.chance.expected;
     sum.chance.log_nfa += one.chance.log_nfa;
     sum.homography = sum.homography && one.homography;
@@ -108,12 +127,12 @@ Motion FitMotion(const std::vector<PooledMatch>& pool, const View& query, const 
                  const VerificationOptions& options, std::uint64_t seed) {
   if (query.cameras.size() > 1 && query.cameras.size() == candidate.cameras.size()) {
     const Motion same =
-        FitEach(pool, ByCamera(pool, query, candidate, false), query, candidate, options, seed);
+        FitEach(pool, ByCamera(pool, query, candidate, false), false, query, candidate, options, seed);
     const std::vector<std::vector<int>> crosswise = ByCamera(pool, query, candidate, true);
     std::size_t most = 0;  // inliers that there can be
     for (const std::vector<int>& matches : crosswise) most += matches.size();
     if (most <= same.inliers.size()) return same;
-    const Motion opposite = FitEach(pool, crosswise, query, candidate, options, seed);
+    const Motion opposite = FitEach(pool, crosswise, true, query, candidate, options, seed);
     return opposite.inliers.size() > same.inliers.size() ? opposite : same;
   }
   std::vector<int> all(pool.size());

@@ -203,6 +203,15 @@ void VerifyByPixels(const std::vector<PooledMatch>& pool, const View& query, con
   result.homography = motion.homography;
   result.reason =
       Judge(pool, motion.inliers, motion.chance, motion.considered, query, candidate, options, result);
+  if (result.reason.empty() && motion.fewest >= 0) {
+    const double even =
+        BarsFor(result, query, candidate, options).inliers / static_cast<double>(query.cameras.size());
+    const int needed = static_cast<int>(std::ceil(options.camera_share * even));
+    if (motion.fewest < needed) {
+      result.reason = Format("one of the cameras knows nothing of it (%d of its matches fit, %d are needed)",
+                             motion.fewest, needed);
+    }
+  }
   result.accepted = result.reason.empty();
   result.ahead = motion.ahead;
   const bool calibrated = motion.type == ConstraintType::kEssential;

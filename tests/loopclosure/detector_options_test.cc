@@ -50,6 +50,8 @@ TEST(LoopDetectorOptions, OptionsOfVerificationOutOfRangeAreRefusedByName) {
   EXPECT_NE(problem(&VerificationOptions::homography_px, -1).find("homography_px"), std::string::npos);
   EXPECT_NE(problem(&VerificationOptions::homography_share, 0).find("homography_share"), std::string::npos);
   EXPECT_NE(problem(&VerificationOptions::homography_share, 1.1).find("homography_share"), std::string::npos);
+  EXPECT_EQ(problem(&VerificationOptions::camera_share, 0), "");
+  EXPECT_NE(problem(&VerificationOptions::camera_share, 1.1).find("camera_share"), std::string::npos);
   EXPECT_EQ(problem(&VerificationOptions::static_px, 0), "");
   EXPECT_NE(problem(&VerificationOptions::static_px, -1).find("static_px"), std::string::npos);
 }

@@ -327,6 +327,32 @@ TEST_P(OfTwoCameras, ImagesHaveAGeometryEachAndTheirEvidenceAddsUp) {
   EXPECT_EQ(each.ahead, 0);
 }
 
+TEST(GeometricVerifier, OneCameraDoesNotSpeakForTheOtherUnlessThatSeesNothing) {
+  const View query = SeeTwo(At(0.8, 0.1), Pose(ExpSO3({0, 0, 0.3}), {0, 0.8, -0.3}), 9, false);
+  View candidate = SeeTwo(Pose(), Pose(), 1, false);
+  View::Set& set = candidate.members[0];
+  std::mt19937 generator(3);
+  View blind = candidate;
+  blind.members[0] = View::Set();
+  for (std::size_t i = 0; i < set.pixels.size(); ++i) {
+    if (set.pixels[i].x < 640) {
+      blind.members[0].pixels.push_back(set.pixels[i]);
+      blind.members[0].descriptors.push_back(set.descriptors.row(static_cast<int>(i)));
+    } else {  // the right one stands before another house
+      cv::Mat row = set.descriptors.row(static_cast<int>(i));
+      Descriptor(static_cast<std::uint32_t>(500000 + i)).copyTo(row);
+    }
+  }
+  const Verification v = GeometricVerifier({}, 1).Verify(query, candidate);
+  EXPECT_FALSE(v.accepted);
+  EXPECT_NE(v.reason.find("one of the cameras"), std::string::npos) << v.reason;
+  VerificationOptions any;
+  any.camera_share = 0;
+  EXPECT_TRUE(GeometricVerifier(any, 1).Verify(query, candidate).accepted);
+  const Verification seen = GeometricVerifier({}, 1).Verify(query, blind);
+  EXPECT_TRUE(seen.accepted) << seen.reason;
+}
+
 TEST(GeometricVerifier, TheBarIsScaledToTheMembersThatPool) {
   VerificationOptions options;
   View query = See(At(0.5, 0.3), 9, false, false), candidate = See(Pose(), 1, false, false);

@@ -249,6 +249,8 @@ void ConfigTable::AddVerification(VerificationOptions& o) {
   Add("homography_px", o.homography_px, "RANSAC threshold of the homography [px], 0: none is sought");
   Add("homography_share", o.homography_share,
       "a homography that explains this share of what the lines do decides in their place");
+  Add("camera_share", o.camera_share,
+      "of several cameras in an image each must find this share of the least inliers / cameras; 0..1");
   Add("static_px", o.static_px,
       "matches nearer than this to their own pixel did not move: others must do without them [px], 0: off");
   Add("scale_bar", o.scale_bar,

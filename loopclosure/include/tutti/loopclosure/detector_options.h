@@ -117,17 +117,19 @@ struct VerificationOptions {
                                   ///< fundamental matrix does decides in its place (by min_inliers and
                                   ///< min_epipolar_ratio): flat scene, or turn on the spot; above 0,
                                   ///< at most 1
-  double static_px = 1.5;         ///< matches nearer than this to their own pixel did not move: if
-                                  ///< they are most of the inliers and in a part of the image only,
-                                  ///< the others must do [px], 0: off
-  bool scale_bar = false;         ///< the least numbers of inliers are for features of
-                                  ///< three members; true: times members / 3, at least
-                                  ///< 8, so that one member alone is judged as strictly
-  double confidence = 0.9999;     ///< of RANSAC
-  int max_iterations = 1000;      ///< of RANSAC
-  double pixel_sigma = 1.5;       ///< standard deviation of a matched pixel, sets the information matrix [px]
-  double min_depth_m = 0.1;       ///< depths outside of the range count as unknown [m]
-  double max_depth_m = 80.0;      ///< [m]
+  double camera_share = 1.0;   ///< of several cameras in an image each that sees much must find this share of
+                               ///< the least number of inliers / cameras; 0: one may speak for all, 0..1
+  double static_px = 1.5;      ///< matches nearer than this to their own pixel did not move: if
+                               ///< they are most of the inliers and in a part of the image only,
+                               ///< the others must do [px], 0: off
+  bool scale_bar = false;      ///< the least numbers of inliers are for features of
+                               ///< three members; true: times members / 3, at least
+                               ///< 8, so that one member alone is judged as strictly
+  double confidence = 0.9999;  ///< of RANSAC
+  int max_iterations = 1000;   ///< of RANSAC
+  double pixel_sigma = 1.5;    ///< standard deviation of a matched pixel, sets the information matrix [px]
+  double min_depth_m = 0.1;    ///< depths outside of the range count as unknown [m]
+  double max_depth_m = 80.0;   ///< [m]
 
   /// Empty if usable, else what is wrong and what to do.
   std::string Validate() const;

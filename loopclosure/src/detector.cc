@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "detector_impl.h"
-#include "loop_probability.h"
 #include "stopwatch.h"
 #include "tutti/core/error.h"
 #include "tutti/loopclosure/parallel.h"
@@ -73,9 +71,6 @@ LoopResult LoopDetector::Impl::Detect(const LoopQuery& query) {
   Decide(slot, combined, result);
   result.verify_ms = watch.LapMs();
 
-  if (result.accepted && result.probability >= options_.link_threshold) {
-    reasoner_.CloseLoop(query.id, result.verification.candidate);
-  }
   reasoner_.Finish(result);
   const int hypothesis = result.hypothesis > 0.0 ? combined.best : -1;  // 0: the members do not agree on one
   Retrieve(hypothesis, result);
@@ -171,38 +166,14 @@ void LoopDetector::Impl::FillCounts(const std::vector<Features>& features, LoopR
 void LoopDetector::Impl::Decide(int slot, const CombinedBelief& combined, LoopResult& result) {
   result.proposed = reasoner_.Proposes(combined, result);
   if (!result.proposed) return;
-  if (!options_.verification.enabled) {
-    result.verification.candidate = result.candidate;
-    result.verification.accepted = result.accepted = true;
-  } else {
-    Verify(memory().id(slot) == result.query ? views_[Index(slot)] : dropped_view_, combined.belief, result);
-  }
-  Accept(combined.belief, result);
-}
-
-// The last word: geometry and belief together.
-void LoopDetector::Impl::Accept(const Belief& belief, LoopResult& result) const {
-  if (!result.accepted) return;
-  result.probability =
-      options_.verification.enabled
-          ? internal::LoopProbability(result.verification)
-          : reasoner_.MassAround(belief, memory().Find(result.verification.candidate));
-  result.accepted = result.probability >= options_.loop_threshold;
-  if (result.accepted) return;
-  char text[128];
-  std::snprintf(text, sizeof text, "probably not this place (probability %.3f, %.3f is needed)",
-                result.probability, options_.loop_threshold);
-  result.reason = text;
+  Verify(memory().id(slot) == result.query ? views_[Index(slot)] : dropped_view_, combined.belief, result);
 }
 
 void LoopDetector::Impl::Verify(const View& query, const Belief& belief, LoopResult& result) const {
-  const internal::HypothesisSearch search(options_, memory(), verifier_,
-                                          [this](int s) -> const View& { return views_[Index(s)]; });
-  search.Verify(query, belief, result);
-  for (Verification& tried : result.tried) tried.mass = reasoner_.MassAround(belief, memory().Find(tried.candidate));
-  if (!result.tried.empty()) {
-    result.verification.mass = reasoner_.MassAround(belief, memory().Find(result.verification.candidate));
-  }
+  reasoner_.Verify(
+      query, belief,
+      [this](const View& a, const View& b, int threads) { return verifier_.Verify(a, b, threads); },
+      [this](int s) -> const View& { return views_[Index(s)]; }, result);
 }
 
 // One image by itself, without the images before it: no filter, all places are as likely.
@@ -232,9 +203,6 @@ LoopResult LoopDetector::Impl::Locate(const LoopQuery& query) const {
   result.posterior = internal::PosteriorAt(combined.belief, combined.best);
   result.proposed = true;
   Verify(view, combined.belief, result);
-  if (result.accepted) {
-    result.probability = internal::LoopProbability(result.verification);
-  }
   result.verify_ms = watch.LapMs();
   return result;
 }

@@ -63,7 +63,6 @@ class LoopDetector::Impl {
   void FillCounts(const std::vector<Features>& features, LoopResult& result) const;
   void Decide(int slot, const CombinedBelief& combined, LoopResult& result);
   void Verify(const View& query, const Belief& belief, LoopResult& result) const;
-  void Accept(const Belief& belief, LoopResult& result) const;
 
   // Long-term memory.
   internal::LocationStore& store();

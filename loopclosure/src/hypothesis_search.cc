@@ -89,7 +89,7 @@ const Verification* HypothesisSearch::Tried(int slot, const LoopResult& result) 
 // Tries a candidate unless it was tried before; keeps it as the best if it is.
 const Verification& HypothesisSearch::Try(const View& query, int candidate, LoopResult& result) const {
   if (Tried(candidate, result) == nullptr) {
-    Take(verifier_.Verify(query, view_of_(candidate), options_.threads), result);
+    Take(verify_(query, view_of_(candidate), options_.threads), result);
   }
   return *Tried(candidate, result);
 }
@@ -106,7 +106,7 @@ void HypothesisSearch::TryAll(const View& query, const std::vector<int>& candida
   const int threads_each = std::max(1, options_.threads / count);
   std::vector<Verification> verifications(untried.size());
   RunParallel(count, options_.threads, [&](int i) {
-    verifications[Index(i)] = verifier_.Verify(query, view_of_(untried[Index(i)]), threads_each);
+    verifications[Index(i)] = verify_(query, view_of_(untried[Index(i)]), threads_each);
   });
   for (Verification& verification : verifications) Take(std::move(verification), result);
 }
@@ -211,7 +211,7 @@ void HypothesisSearch::TakeNearest(const View& query, LoopResult& result) const 
   std::vector<int> nearer;
   for (const int neighbour : OnThePath(best)) {
     // Of a camera that is held by hand and moves anywhere, the direction says little about the distance.
-    if (!IsAhead(verifier_.Verify(view_of_(neighbour), view_of_(best), options_.threads))) continue;
+    if (!IsAhead(verify_(view_of_(neighbour), view_of_(best), options_.threads))) continue;
     const int nearest = Nearest(query, {best, neighbour, 0}, result);
     if (nearest != best) nearer.push_back(nearest);
   }

@@ -14,9 +14,12 @@ namespace tutti::internal {
 /// Step 6 of loop-closure.md section 1: the top few hypotheses and their neighbours, not only the best.
 class HypothesisSearch {
  public:
-  HypothesisSearch(const LoopDetectorOptions& options, const LocationMemory& memory,
-                   const GeometricVerifier& verifier, std::function<const View&(int)> view_of)
-      : options_(options), memory_(memory), verifier_(verifier), view_of_(std::move(view_of)) {}
+  /// Verifies a pair of views, query and candidate, on so many threads.
+  using VerifyPair = std::function<Verification(const View&, const View&, int)>;
+
+  HypothesisSearch(const LoopDetectorOptions& options, const LocationMemory& memory, VerifyPair verify,
+                   std::function<const View&(int)> view_of)
+      : options_(options), memory_(memory), verify_(std::move(verify)), view_of_(std::move(view_of)) {}
 
   /// Fills verification, tried, accepted and reason of `result`.
   void Verify(const View& query, const Belief& belief, LoopResult& result) const;
@@ -43,7 +46,7 @@ class HypothesisSearch {
 
   const LoopDetectorOptions& options_;
   const LocationMemory& memory_;
-  const GeometricVerifier& verifier_;
+  VerifyPair verify_;
   std::function<const View&(int)> view_of_;
 };
 

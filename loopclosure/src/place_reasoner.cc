@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "hypothesis_search.h"
+#include "loop_probability.h"
 #include "stopwatch.h"
 #include "tutti/core/error.h"
 #include "tutti/loopclosure/parallel.h"
@@ -69,9 +69,13 @@ void PlaceReasoner::ForEachUnit(const std::function<void(MemorySystem&, std::siz
               [&](int i) { call(*units[Index(i)].first, units[Index(i)].second); });
 }
 
-CombinedBelief PlaceReasoner::Step(LoopResult& result) {
+CombinedBelief PlaceReasoner::Step(LoopResult& result,
+                                   const std::function<void(std::size_t, FilterUnit&)>& disturb) {
   Stopwatch watch;
-  ForEachUnit([](MemorySystem& system, std::size_t u) { system.UpdateLikelihood(u); });
+  ForEachUnit([&](MemorySystem& system, std::size_t u) {
+    system.UpdateLikelihood(u);
+    if (disturb) disturb(u, system.units()[u]);
+  });
   result.likelihood_ms = watch.LapMs();
   ForEachUnit([](MemorySystem& system, std::size_t u) { system.StepFilter(u); });
   std::vector<const Belief*> beliefs;
@@ -188,6 +192,37 @@ double PlaceReasoner::MassAround(const Belief& belief, int slot) const {
   double mass = 0;
   for (const auto& [near, level] : memory().Neighbours(slot, kAboutHere)) mass += PosteriorAt(belief, near);
   return std::min(1.0, mass);
+}
+
+void PlaceReasoner::Verify(const View& query, const Belief& belief,
+                           const HypothesisSearch::VerifyPair& verify,
+                           const std::function<const View&(int)>& view_of, LoopResult& result) const {
+  if (!options_.verification.enabled) {
+    result.verification.candidate = result.candidate;
+    result.verification.accepted = true;
+    result.probability = MassAround(belief, memory().Find(result.candidate));
+  } else {
+    HypothesisSearch(options_, memory(), verify, view_of).Verify(query, belief, result);
+    for (Verification& tried : result.tried) {
+      tried.mass = MassAround(belief, memory().Find(tried.candidate));
+      if (tried.candidate == result.verification.candidate) result.verification.mass = tried.mass;
+    }
+    if (!result.verification.accepted) return;
+    result.probability = LoopProbability(result.verification);
+  }
+  result.accepted = result.probability >= options_.loop_threshold;
+  if (result.accepted) return;
+  char text[128];
+  std::snprintf(text, sizeof text, "probably not this place (probability %.3f, %.3f is needed)",
+                result.probability, options_.loop_threshold);
+  result.reason = text;
+}
+
+void PlaceReasoner::Finish(const LoopResult& result) {
+  last_hypothesis_ = result.hypothesis;
+  if (result.accepted && result.probability >= options_.link_threshold) {
+    CloseLoop(result.query, result.verification.candidate);
+  }
 }
 
 void PlaceReasoner::CloseLoop(std::int64_t newer, std::int64_t older) {

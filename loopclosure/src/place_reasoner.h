@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "hypothesis_search.h"
 #include "memory_system.h"
 #include "tutti/loopclosure/combination.h"
 #include "tutti/loopclosure/detector.h"
@@ -23,8 +24,9 @@ class PlaceReasoner {
   /// Steps 3 and 4: the words of each member enter memory as a new location. Returns the slot that now stands
   /// for the image: the newest, or an older one that it was merged into.
   int Remember(std::int64_t id, const std::vector<SeenWords>& words);
-  /// Step 5, and the times of its parts into `result`.
-  CombinedBelief Step(LoopResult& result);
+  /// Step 5, and the times of its parts into `result`. `disturb`, if given, may change what each filter unit
+  /// has counted: for tests of what a broken member does.
+  CombinedBelief Step(LoopResult& result, const std::function<void(std::size_t, FilterUnit&)>& disturb = {});
   /// What is believed of an image with these words that is no location, without the images before it.
   CombinedBelief Locate(const std::vector<SeenWords>& words) const;
 
@@ -33,16 +35,18 @@ class PlaceReasoner {
   void Explain(const CombinedBelief& combined, LoopResult& result) const;
   /// True if the belief is strong enough for geometry to look at it; else `result` says why not.
   bool Proposes(const CombinedBelief& combined, LoopResult& result);
-  /// Posterior of all places within a few graph levels of a slot: of "about here".
-  double MassAround(const Belief& belief, int slot) const;
+  /// Step 6: geometry looks at the most probable places; fills verification, tried, accepted, probability and
+  /// reason of `result`. Without verification the candidate is taken by its posterior alone.
+  void Verify(const View& query, const Belief& belief, const HypothesisSearch::VerifyPair& verify,
+              const std::function<const View&(int)>& view_of, LoopResult& result) const;
+  /// Links the places of a loop that is nearly certain.
+  void Finish(const LoopResult& result);
 
   /// The newer location closes a loop with the older one: their places are one, for the filter.
   void CloseLoop(std::int64_t newer, std::int64_t older);
   /// They do not.
   void Unlink(std::int64_t a, std::int64_t b);
   void AddLink(std::int64_t a, std::int64_t b);
-  /// The image is done.
-  void Finish(const LoopResult& result) { last_hypothesis_ = result.hypothesis; }
 
   /// All locations: those of the shared memory, or what is in any member's.
   const LocationMemory& memory() const { return Shared() ? systems_.front()->memory() : union_; }
@@ -65,6 +69,7 @@ class PlaceReasoner {
   void ForEachUnit(const std::function<void(MemorySystem&, std::size_t)>& call);
   void FillOpinion(std::size_t member, const CombinedBelief& combined, MemberOpinion& opinion) const;
   void FollowCandidate(int best);
+  double MassAround(const Belief& belief, int slot) const;
 
   const LoopDetectorOptions& options_;
   std::vector<Member>& members_;

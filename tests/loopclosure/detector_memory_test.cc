@@ -80,6 +80,7 @@ TEST(LoopDetectorMemory, LocationsAndTheirWordsComeBackFromLongTermMemory) {
 
 TEST(LoopDetectorMemory, MembersOwnMemoriesAgreeWithTheSharedOneWhileNothingLeaves) {
   LoopDetectorOptions options = SmallOptions();
+  options.rule = CombinationRule::kMean;  // joint needs a shared memory
   LoopDetector shared(options);
   options.memory = MemoryKind::kPerMember;
   LoopDetector own(options);
@@ -143,6 +144,7 @@ TEST_F(DurableMemory, ALaterDetectorGoesOnWhereTheFirstOneStopped) {
   for (const MemoryKind memory : {MemoryKind::kShared, MemoryKind::kPerMember}) {
     LoopDetectorOptions options = Options();
     options.memory = memory;
+    if (memory == MemoryKind::kPerMember) options.rule = CombinationRule::kMean;
     std::filesystem::remove(options.ltm_file);
     std::size_t locations = 0;
     std::size_t long_term = 0;

@@ -28,7 +28,9 @@ TEST(LoopDetectorOptions, PresetsHoldThePublishedFigures) {
   ApplyPreset("rtabmap-0.8.3", options);
   EXPECT_EQ(options.likelihood, LikelihoodKind::kTfIdf);
   EXPECT_EQ(options.stm_size, 10);
-  EXPECT_EQ(options.loop_threshold, 0.11);
+  EXPECT_EQ(options.propose_threshold, 0.11);
+  EXPECT_EQ(options.evidence.kind, EvidenceKind::kStandardised);
+  EXPECT_EQ(options.rule, CombinationRule::kMean);
   EXPECT_EQ(options.wm_limit, 0);
   EXPECT_EQ(options.hypothesis_ratio, 0.0);
   // Back to ours, whatever was set before.
@@ -38,6 +40,8 @@ TEST(LoopDetectorOptions, PresetsHoldThePublishedFigures) {
   EXPECT_EQ(options.loop_threshold, defaults.loop_threshold);
   EXPECT_EQ(options.wm_limit, defaults.wm_limit);
   EXPECT_EQ(options.rehearsal, defaults.rehearsal);
+  EXPECT_EQ(options.rule, CombinationRule::kJoint);
+  EXPECT_EQ(options.evidence.kind, EvidenceKind::kCounts);
 }
 
 TEST(LoopDetectorOptions, OptionsOfVerificationOutOfRangeAreRefusedByName) {

@@ -114,7 +114,7 @@ std::string LoopDetectorOptions::Validate() const {
 }
 
 std::vector<std::string> KnownMembers() {
-  std::vector<std::string> names = {"surf", "sift", "orb", "akaze", "brisk", "kaze"};
+  std::vector<std::string> names = {"surf", "sift", "orb", "akaze", "brisk", "kaze", "gftt"};
   const std::vector<std::string> registered = RegisteredFeatureTypes();
   names.insert(names.end(), registered.begin(), registered.end());
   return names;

@@ -81,20 +81,21 @@ double DominantAngle(const Integral& image, const dlib::vector<double, 2>& centr
 }
 
 // As dlib::compute_surf_descriptor, sum for sum; but its 4 x 4 cells overlap, and each of the 20 x 20 samples
-// is taken from the image once.
+// is taken from the image and turned once.
 void SurfDescriptor(const Integral& image, const dlib::vector<double, 2>& centre, double scale, double angle,
                     float* descriptor) {
   constexpr int kSide = 20;
   constexpr int kCell = 5;
+  constexpr std::array<double, 7> kWeights = {1.0 / 4, 1.0 / 5, 1.0 / 6, 1.0 / 7, 1.0 / 8, 1.0 / 9, 1.0 / 10};
   const dlib::point_rotator rotate(angle);
   const dlib::point_rotator rotate_back(-angle);
   const long sc = static_cast<long>(scale + 0.5);
-  std::array<std::pair<int, int>, kSide * kSide> samples;
+  std::array<dlib::vector<double, 2>, kSide * kSide> samples;
   for (int y = 0; y < kSide; ++y) {
     for (int x = 0; x < kSide; ++x) {
       const dlib::vector<double, 2> offset(scale * (x - kSide / 2), scale * (y - kSide / 2));
-      samples[static_cast<std::size_t>(y * kSide + x)] =
-          image.Haar(dlib::point(rotate(offset) + centre), 2 * sc);
+      const auto [dx, dy] = image.Haar(dlib::point(rotate(offset) + centre), 2 * sc);
+      samples[static_cast<std::size_t>(y * kSide + x)] = rotate_back(dlib::vector<double, 2>(dx, dy));
     }
   }
   std::array<double, kDescriptorSize> values{};
@@ -103,13 +104,14 @@ void SurfDescriptor(const Integral& image, const dlib::vector<double, 2>& centre
     for (int c = 0; c < kSide; c += kCell) {
       for (int y = std::max(0, r - 1); y < std::min(kSide, r + kCell + 1); ++y) {
         for (int x = std::max(0, c - 1); x < std::min(kSide, c + kCell + 1); ++x) {
-          const double weight = 1.0 / (4 + std::abs(r + 2 - y) + std::abs(c + 2 - x));
-          const auto [dx, dy] = samples[static_cast<std::size_t>(y * kSide + x)];
-          const dlib::vector<double, 2> d = rotate_back(dlib::vector<double, 2>(weight * dx, weight * dy));
-          value[0] += d.x();
-          value[1] += d.y();
-          value[2] += std::abs(d.x());
-          value[3] += std::abs(d.y());
+          const double weight = kWeights[static_cast<std::size_t>(std::abs(r + 2 - y) + std::abs(c + 2 - x))];
+          const dlib::vector<double, 2>& sample = samples[static_cast<std::size_t>(y * kSide + x)];
+          const double dx = weight * sample.x();
+          const double dy = weight * sample.y();
+          value[0] += dx;
+          value[1] += dy;
+          value[2] += std::abs(dx);
+          value[3] += std::abs(dy);
         }
       }
       value += 4;
@@ -120,6 +122,133 @@ void SurfDescriptor(const Integral& image, const dlib::vector<double, 2>& centre
   const double length = std::sqrt(squares) + 1e-7;
   for (std::size_t i = 0; i < values.size(); ++i) descriptor[i] = static_cast<float>(values[i] / length);
 }
+
+// Determinants of the Hessian as dlib::hessian_pyramid computes them, sum for sum; but each line of sums is
+// looked up once for its row, not once for each of its boxes.
+class HessianPyramid {
+ public:
+  HessianPyramid(const Integral& image, int octaves) : octaves_(octaves) {
+    layers_.resize(static_cast<std::size_t>(octaves * kIntervals));
+    for (int o = 0; o < octaves; ++o) {
+      for (int i = 0; i < kIntervals; ++i) Fill(image, o, i);
+    }
+  }
+
+  // As dlib::get_interest_points.
+  std::vector<dlib::interest_point> Points(double threshold) const {
+    std::vector<dlib::interest_point> points;
+    for (int o = 0; o < octaves_; ++o) {
+      for (int i = 1; i < kIntervals - 1; ++i) {
+        const cv::Mat& layer = Layer(o, i);
+        const int margin = Border(i + 1) + 1;
+        for (int r = margin; r < layer.rows - margin; ++r) {
+          const double* line = layer.ptr<double>(r);
+          for (int c = margin; c < layer.cols - margin; ++c) {
+            dlib::interest_point point;
+            if (std::abs(line[c]) >= threshold && IsMaximum(o, i, r, c) && Interpolate(o, i, r, c, point)) {
+              points.push_back(point);
+            }
+          }
+        }
+      }
+    }
+    return points;
+  }
+
+ private:
+  static constexpr int kIntervals = 4;
+  static constexpr int kFirstStep = 2;
+
+  static int Border(int interval) { return (3 * (2 * (interval + 1) + 1) + 1) / 2; }
+  static int Step(int octave) { return kFirstStep << octave; }
+
+  const cv::Mat& Layer(int octave, int interval) const {
+    return layers_[static_cast<std::size_t>(octave * kIntervals + interval)];
+  }
+  double Value(int octave, int interval, int r, int c) const {
+    return std::abs(Layer(octave, interval).at<double>(r, c));
+  }
+
+  void Fill(const Integral& image, int octave, int interval) {
+    const int step = Step(octave);
+    const int border = Border(interval) * step;
+    const int lobe = (2 << octave) * (interval + 1) + 1;
+    const int half = lobe / 2;
+    const int wide = 3 * lobe / 2;
+    const double area = 1.0 / ((3.0 * lobe) * (3.0 * lobe));
+    const int rows = static_cast<int>(image.nr());
+    const int cols = static_cast<int>(image.nc());
+    cv::Mat& layer = layers_[static_cast<std::size_t>(octave * kIntervals + interval)];
+    layer.create(rows / step, cols / step, CV_64F);
+    for (int y = border; y < rows - border && y / step < layer.rows; y += step) {
+      double* out = layer.ptr<double>(y / step);
+      // Lines of sums above and below: of the box of xx, the outer and inner box of yy, the four of xy.
+      const int* xx0 = image.Row(y - lobe + 1);
+      const int* xx1 = image.Row(y + lobe);
+      const int* yy0 = image.Row(y - wide);
+      const int* yy1 = image.Row(y - half);
+      const int* yy2 = image.Row(y + half + 1);
+      const int* yy3 = image.Row(y + wide + 1);
+      const int* xy0 = image.Row(y - lobe);
+      const int* xy1 = image.Row(y);
+      const int* xy2 = image.Row(y + 1);
+      const int* xy3 = image.Row(y + lobe + 1);
+      for (int x = border; x < cols - border && x / step < layer.cols; x += step) {
+        const auto between = [x](const int* above, const int* below, int left, int right) {
+          return below[x + right] - below[x + left] - above[x + right] + above[x + left];
+        };
+        const int xx = between(xx0, xx1, -wide, wide + 1) - 3 * between(xx0, xx1, -half, half + 1);
+        const int yy = between(yy0, yy3, 1 - lobe, lobe) - 3 * between(yy1, yy2, 1 - lobe, lobe);
+        const int xy = between(xy2, xy3, -lobe, 0) + between(xy0, xy1, 1, lobe + 1) -
+                       between(xy0, xy1, -lobe, 0) - between(xy2, xy3, 1, lobe + 1);
+        const double dxx = xx * area;
+        const double dyy = yy * area;
+        const double dxy = xy * area;
+        const double determinant = std::max(0.0, dxx * dyy - 0.81 * dxy * dxy);
+        out[x / step] = dxx + dyy < 0 ? -determinant : determinant;
+      }
+    }
+  }
+
+  bool IsMaximum(int octave, int interval, int row, int col) const {
+    const double value = Value(octave, interval, row, col);
+    for (int i = interval - 1; i <= interval + 1; ++i) {
+      for (int r = row - 1; r <= row + 1; ++r) {
+        const double* line = Layer(octave, i).ptr<double>(r) + col;
+        if (std::abs(line[-1]) > value || std::abs(line[0]) > value || std::abs(line[1]) > value)
+          return false;
+      }
+    }
+    return true;
+  }
+
+  // False if the maximum of the parabola through its neighbours is nearer to one of them.
+  bool Interpolate(int o, int i, int r, int c, dlib::interest_point& point) const {
+    const auto at = [&](int di, int dr, int dc) { return Value(o, i + di, r + dr, c + dc); };
+    const double value = at(0, 0, 0);
+    const cv::Vec3d slope((at(0, 0, 1) - at(0, 0, -1)) / 2, (at(0, 1, 0) - at(0, -1, 0)) / 2,
+                          (at(1, 0, 0) - at(-1, 0, 0)) / 2);
+    const double xx = at(0, 0, 1) + at(0, 0, -1) - 2 * value;
+    const double yy = at(0, 1, 0) + at(0, -1, 0) - 2 * value;
+    const double ss = at(1, 0, 0) + at(-1, 0, 0) - 2 * value;
+    const double xy = (at(0, 1, 1) + at(0, -1, -1) - at(0, -1, 1) - at(0, 1, -1)) / 4;
+    const double xs = (at(1, 0, 1) + at(-1, 0, -1) - at(-1, 0, 1) - at(1, 0, -1)) / 4;
+    const double ys = (at(1, 1, 0) + at(-1, -1, 0) - at(-1, 1, 0) - at(1, -1, 0)) / 4;
+    const cv::Matx33d curvature(xx, xy, xs, xy, yy, ys, xs, ys, ss);
+    if (cv::determinant(curvature) == 0) return false;
+    const cv::Vec3d offset = -(curvature.inv() * slope);
+    if (!(std::abs(offset[0]) < 0.5 && std::abs(offset[1]) < 0.5 && std::abs(offset[2]) < 0.5)) return false;
+    const double lobe = static_cast<double>(2 << o) * (i + offset[2] + 1) + 1;
+    point.center = dlib::vector<double, 2>(c + offset[0], r + offset[1]) * static_cast<double>(Step(o));
+    point.scale = 1.2 / 9.0 * 3 * lobe;
+    point.score = value;
+    point.laplacian = Layer(o, i).at<double>(r, c) > 0 ? 1 : -1;
+    return true;
+  }
+
+  int octaves_;
+  std::vector<cv::Mat> layers_;
+};
 
 class DlibSurf : public cv::Feature2D {
  public:
@@ -148,10 +277,7 @@ class DlibSurf : public cv::Feature2D {
   }
 
   void Detect(const Integral& integral, const cv::Mat& mask, std::vector<cv::KeyPoint>& keypoints) const {
-    dlib::hessian_pyramid pyramid;
-    pyramid.build_pyramid(integral, octaves_, 4, 2);
-    std::vector<dlib::interest_point> points;
-    dlib::get_interest_points(pyramid, threshold_, points);
+    std::vector<dlib::interest_point> points = HessianPyramid(integral, octaves_).Points(threshold_);
     std::stable_sort(points.begin(), points.end(),
                      [](const auto& a, const auto& b) { return a.score > b.score; });
     keypoints.clear();

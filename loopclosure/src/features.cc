@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 #include <tuple>
 
+#include "sift.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 
@@ -15,7 +16,8 @@ namespace {
 
 // A detector gives more than are kept, so that there is something to choose from when spreading.
 constexpr int kOversampling = 2;
-constexpr int kMinSide = 16;  // smaller images hold no feature of any member [px]
+constexpr double kImageBlur = 0.5;  // what an image is taken to be smoothed by [px]
+constexpr int kMinSide = 16;        // smaller images hold no feature of any member [px]
 
 // ORB drops points near the border; its default of 31 px leaves small images without upper pyramid levels
 // (loop-closure.md section 6). A twentieth of the shorter side keeps them; ORB reflects the image at its
@@ -175,7 +177,7 @@ std::vector<int> SelectSpread(const std::vector<cv::KeyPoint>& keypoints, cv::Si
 }
 
 FeatureExtractor::FeatureExtractor(const std::string& name, const ExtractionOptions& options)
-    : name_(name), options_(options) {
+    : name_(name), options_(options), scratches_(std::make_shared<internal::SiftScratchPool>()) {
   const std::vector<std::string> known = KnownMembers();
   if (std::find(known.begin(), known.end(), name) == known.end()) {
     throw InputError("unknown member '" + name + "'; did you mean '" + NearestWord(name, known) + "'?");
@@ -188,8 +190,8 @@ cv::Ptr<cv::Feature2D> FeatureExtractor::Create(cv::Size size) const {
     return CreateDlibSurf(wanted, options_.surf_octaves,
                           std::min(options_.surf_threshold, options_.surf_min_threshold));
   }
-  if (name_ == "sift") return cv::SIFT::create(wanted, 3, options_.sift_contrast);
   if (name_ == "orb") return CreateOrb(size, wanted, options_);
+  if (name_ == "gftt") return CreateGfttBrief(wanted);
   if (name_ == "akaze") return cv::AKAZE::create();
   if (name_ == "brisk") return cv::BRISK::create();
   if (name_ == "kaze") return cv::KAZE::create();
@@ -198,9 +200,7 @@ cv::Ptr<cv::Feature2D> FeatureExtractor::Create(cv::Size size) const {
 
 double FeatureExtractor::Shrinking(double pixels) const {
   double factor = std::max(1.0, std::sqrt(pixels / options_.max_pixels));
-  if (name_ == "sift") {  // which doubles the image by itself, so that it sees it halved
-    while (pixels / (factor * factor) > options_.sift_max_pixels) factor *= 2.0;
-  }
+  if (name_ == "sift") factor = std::max(factor, std::sqrt(pixels / options_.sift_max_pixels));
   const bool small = factor == 1.0 && pixels < options_.min_pixels;
   return small && (name_ == "surf" || name_ == "sift") ? 0.5 : factor;
 }
@@ -215,8 +215,12 @@ Features FeatureExtractor::Extract(const cv::Mat& grey) const {
     if (std::min(size.width, size.height) < kMinSide) return features;
     cv::resize(grey, image, size, 0, 0, factor > 1.0 ? cv::INTER_AREA : cv::INTER_LINEAR);
   }
-  const cv::Ptr<cv::Feature2D> member = Create(image.size());
-  if (name_ == "surf") {
+  if (name_ == "sift") {
+    std::unique_ptr<internal::SiftScratch> scratch = scratches_->Take();
+    features = internal::ExtractSift(image, kImageBlur * std::max(1.0, 1.0 / factor), options_, *scratch);
+    scratches_->Give(std::move(scratch));
+  } else if (name_ == "surf") {
+    const cv::Ptr<cv::Feature2D> member = Create(image.size());
     // Describing costs more than detecting, and what was detected stays valid: describe what is kept.
     std::vector<cv::KeyPoint> detected;
     member->detect(image, detected);
@@ -227,12 +231,7 @@ Features FeatureExtractor::Extract(const cv::Mat& grey) const {
   } else {
     std::vector<cv::KeyPoint> keypoints;
     cv::Mat descriptors;
-    member->detectAndCompute(image, cv::noArray(), keypoints, descriptors);
-    if (name_ == "sift" && static_cast<int>(keypoints.size()) < options_.features &&
-        options_.sift_min_contrast < options_.sift_contrast) {
-      cv::SIFT::create(options_.features, 3, options_.sift_min_contrast)
-          ->detectAndCompute(image, cv::noArray(), keypoints, descriptors);
-    }
+    Create(image.size())->detectAndCompute(image, cv::noArray(), keypoints, descriptors);
     if (keypoints.empty() || descriptors.rows != static_cast<int>(keypoints.size())) return features;
     const std::vector<int> selected =
         SelectSpread(keypoints, image.size(), options_.features, options_.grid_columns);

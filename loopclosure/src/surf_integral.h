@@ -21,6 +21,9 @@ class SurfIntegral {
   long nr() const { return sums_.rows - 1; }
   long nc() const { return sums_.cols - 1; }
 
+  /// Sums over all that lies above and left of the pixels of a row.
+  const int* Row(long r) const { return sums_.ptr<int>(static_cast<int>(r)); }
+
   /// Sum over a rectangle inside of the image, its last row and column included.
   int get_sum_of_area(const dlib::rectangle& area) const {
     return Sum(area.left(), area.top(), area.right() + 1, area.bottom() + 1);
@@ -41,8 +44,6 @@ class SurfIntegral {
   }
 
  private:
-  const int* Row(long r) const { return sums_.ptr<int>(static_cast<int>(r)); }
-
   int Sum(long left, long top, long right, long bottom) const {
     const int* above = Row(top);
     const int* below = Row(bottom);

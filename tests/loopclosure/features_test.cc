@@ -8,6 +8,7 @@
 #include "textured_image.h"
 #include "tutti/core/error.h"
 #include "tutti/loopclosure/matching.h"
+#include "tutti/loopclosure/parallel.h"
 
 namespace tutti {
 namespace {
@@ -45,6 +46,64 @@ TEST(FeatureExtractor, RootSiftIsTheRootOfTheSharesOfSift) {
     const double share = plain.descriptors.at<float>(r, 7) / cv::norm(plain.descriptors.row(r), cv::NORM_L1);
     EXPECT_NEAR(rooted.descriptors.at<float>(r, 7), 512.0 * std::sqrt(share), 0.01);
   }
+}
+
+// Not all: OpenCV starts from an enlarged image, which moves weak points.
+TEST(FeatureExtractor, MostSiftPointsAndDescriptorsAreThoseOfOpenCv) {
+  const cv::Mat image = testing::TexturedImage(5, 640, 480);
+  ExtractionOptions options;
+  options.features = 300;
+  const Features ours = FeatureExtractor("sift", options).Extract(image);
+  ASSERT_EQ(ours.descriptors.rows, 300);
+  std::vector<cv::KeyPoint> keypoints;
+  cv::Mat descriptors;
+  cv::SIFT::create(0, 3, 0.01)->detectAndCompute(image, cv::noArray(), keypoints, descriptors);
+  int same = 0;
+  for (int i = 0; i < ours.descriptors.rows; ++i) {
+    const cv::KeyPoint& a = ours.keypoints[static_cast<std::size_t>(i)];
+    double nearest = 1e9;
+    for (int k = 0; k < descriptors.rows; ++k) {
+      const cv::KeyPoint& b = keypoints[static_cast<std::size_t>(k)];
+      if (cv::norm(a.pt - b.pt) > 1.0 || std::abs(std::remainder(a.angle - b.angle, 360.0f)) > 10.0f)
+        continue;
+      if (std::abs(std::log2(a.size / b.size)) > 0.3f) continue;
+      nearest = std::min(nearest, cv::norm(ours.descriptors.row(i), descriptors.row(k)));
+    }
+    if (nearest < 150.0) ++same;  // of a length of 512
+  }
+  EXPECT_GT(same, 160);
+}
+
+TEST_P(EveryMember, ExtractsTheSameFromSeveralThreadsAtOnce) {
+  const FeatureExtractor extractor(GetParam(), ExtractionOptions());
+  std::vector<Features> results(6);
+  RunParallel(6, 3, [&](int i) {
+    results[static_cast<std::size_t>(i)] =
+        extractor.Extract(testing::TexturedImage(static_cast<std::uint32_t>(i % 2), 320, 240));
+  });
+  for (std::size_t i = 2; i < results.size(); ++i) {
+    ASSERT_EQ(results[i].keypoints.size(), results[i - 2].keypoints.size());
+    EXPECT_EQ(cv::norm(results[i].descriptors, results[i - 2].descriptors, cv::NORM_INF), 0.0);
+  }
+}
+
+TEST(FeatureExtractor, GfttFindsThePlaceInAShiftedImage) {
+  const FeatureExtractor extractor("gftt", ExtractionOptions());
+  const cv::Mat image = testing::TexturedImage(6, 480, 360);
+  const Features a = extractor.Extract(image);
+  const Features b = extractor.Extract(image(cv::Rect(20, 10, 440, 340)));
+  EXPECT_EQ(a.descriptors.type(), CV_8U);
+  EXPECT_EQ(a.descriptors.cols, 32);
+  for (const cv::KeyPoint& keypoint : a.keypoints) EXPECT_EQ(keypoint.angle, -1.0f);
+  int right = 0;
+  const auto matches = MatchDescriptors(b.descriptors, a.descriptors, Pixels(a), 0.8);
+  for (const Match& match : matches) {
+    const cv::Point2f apart = a.keypoints[static_cast<std::size_t>(match.candidate)].pt -
+                              b.keypoints[static_cast<std::size_t>(match.query)].pt;
+    if (cv::norm(apart - cv::Point2f(20, 10)) < 1.0) ++right;
+  }
+  EXPECT_GT(right, 150);
+  EXPECT_GT(right, static_cast<int>(matches.size()) * 9 / 10);
 }
 
 TEST(FeatureExtractor, OrbsBorderGrowsWithTheImageUpToOpenCvsOwn) {

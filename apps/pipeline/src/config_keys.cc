@@ -197,7 +197,7 @@ void ConfigTable::AddExtraction(ExtractionOptions& o) {
   Add("surf_min_threshold", o.surf_min_threshold,
       "where fewer than `features` reach surf_threshold, weaker ones are taken down to this");
   Add("sift_max_pixels", o.sift_max_pixels,
-      "SIFT sees the image halved until it has at most this many pixels [px]");
+      "of SIFT's first octave: a larger image is scaled down to it [px]");
   Add("sift_contrast", o.sift_contrast, "contrast threshold of SIFT (OpenCV's own default is 0.04)");
   Add("sift_min_contrast", o.sift_min_contrast,
       "where fewer than `features` reach sift_contrast, weaker ones are taken down to this");

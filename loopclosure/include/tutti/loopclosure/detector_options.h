@@ -37,15 +37,16 @@ enum class FloatIndex {
 struct ExtractionOptions {
   int features = 400;           ///< strongest features kept per member and image, spread over the image
   int grid_columns = 8;         ///< cells over which they are spread, along the longer side; 1: no spreading
-  int max_pixels = 1 << 21;     ///< images with more pixels are scaled down before anything else [px]
+  int max_pixels = 1 << 19;     ///< images with more pixels are scaled down before anything else, so that
+                                ///< no camera costs more than this [px]
   int min_pixels = 100000;      ///< SURF and SIFT see an image of fewer pixels at twice its size [px]
   int surf_octaves = 4;         ///< octaves of the Hessian pyramid (the paper's 4)
   double surf_threshold = 1.0;  ///< determinant of Hessian below which a SURF point is dropped (dlib's scale)
   double surf_min_threshold = 0.05;  ///< where fewer than `features` reach surf_threshold, weaker ones are
                                      ///< taken in order of strength, down to this determinant of Hessian
-  int sift_max_pixels = 1 << 17;  ///< SIFT sees the image halved until it has at most this many pixels [px]
-  double sift_contrast = 0.02;    ///< contrast threshold of SIFT (OpenCV's own default is 0.04)
-  double sift_min_contrast = 0.005;  ///< where fewer than `features` reach sift_contrast, weaker ones are
+  int sift_max_pixels = 1 << 19;     ///< of SIFT's first octave: a larger image is scaled down to it [px]
+  double sift_contrast = 0.02;       ///< contrast threshold of SIFT (OpenCV's own default is 0.04)
+  double sift_min_contrast = 0.003;  ///< where fewer than `features` reach sift_contrast, weaker ones are
                                      ///< taken in order of strength, down to this contrast
   int orb_fast_threshold = 10;       ///< FAST threshold of ORB [grey levels of 255]
   double orb_border =
@@ -163,8 +164,8 @@ void SetRule(const std::string& word, LoopDetectorOptions& options);
 /// The word that SetRule takes for these options.
 std::string RuleName(const LoopDetectorOptions& options);
 
-/// Names that options.members may hold without further ado: surf, sift, orb, akaze, brisk, kaze, and what
-/// RegisterFeatureType added.
+/// Names that options.members may hold without further ado: surf, sift, orb, akaze, brisk, kaze, gftt
+/// (corners with upright BRIEF), and what RegisterFeatureType added.
 std::vector<std::string> KnownMembers();
 
 }  // namespace tutti

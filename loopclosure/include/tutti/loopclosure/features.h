@@ -12,6 +12,10 @@
 
 namespace tutti {
 
+namespace internal {
+class SiftScratchPool;
+}  // namespace internal
+
 /// Keypoints and their descriptors, row by row.
 struct Features {
   std::vector<cv::KeyPoint> keypoints;  ///< N, in pixels of the full image
@@ -31,6 +35,12 @@ std::vector<int> SelectSpread(const std::vector<cv::KeyPoint>& keypoints, cv::Si
 /// SURF of dlib (its Hessian pyramid and 64 values per point) as a cv::Feature2D: CV_32F descriptors of unit
 /// length.
 cv::Ptr<cv::Feature2D> CreateDlibSurf(int max_features, int octaves, double threshold);
+
+/// Corners (cv::GFTTDetector, at least 5 px apart) with upright BRIEF descriptors (Calonder, Lepetit,
+/// Strecha, Fua, ECCV 2010): 256 comparisons of pixel pairs, a pattern drawn once with a fixed seed, on the
+/// image smoothed with a Gaussian of 2 px. CV_8U, 32 bytes. Knows no rotation and no scale: for cameras that
+/// stay upright.
+cv::Ptr<cv::Feature2D> CreateGfttBrief(int max_features);
 
 /// Makes a detector and descriptor for images of this size that finds at least `features` features where
 /// there are so many. Called for each image, from several threads at once.
@@ -60,6 +70,7 @@ class FeatureExtractor {
 
   std::string name_;
   ExtractionOptions options_;
+  std::shared_ptr<internal::SiftScratchPool> scratches_;  // copies share them
 };
 
 }  // namespace tutti

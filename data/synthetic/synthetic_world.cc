@@ -162,20 +162,20 @@ struct SyntheticWorld::Impl {
     const double begin = Way().LapTime(), length = Way().Length();
     if (options.occlusion <= 0 || t < begin) return;
     // Measured: a column without gaps covers kColumn of the image, the one ahead kAhead.
-    constexpr double kColumn = 0.26, kAhead = 0.06, kSpeed = 4;
+    constexpr double kColumn = 0.26, kAhead = 0.085, kSpeed = 4;
     const bool ahead = options.occlusion >= 0.1;
     const double dense = std::clamp((options.occlusion - (ahead ? kAhead : 0)) / kColumn, 0.02, 0.95);
     const double first = Way().DistanceAt(begin);
     Random random(options.seed * 0x2545F491ULL + 17);
     int look = 0;
     for (double s = 40; s < length - 12; ++look) {  // none pops up in view: the nearest comes from 40 m ahead
-      const Eigen::Vector3d size(random.In(5.5, 7.5), random.In(1.9, 2.2), random.In(2.7, 3.4));
+      const Eigen::Vector3d size(random.In(5.5, 7.5), random.In(1.9, 2.2), random.In(3.3, 4.0));
       AddLorry(faces, first + s - kSpeed * (t - begin), scene.mover_left + random.In(-0.1, 0.1), size, look);
       s += size.x() / dense * random.In(0.9, 1.1);
     }
     if (!ahead) return;
-    const double gap = 9 + 50 * std::exp(-(t - begin) / 3) + 1.5 * std::sin(2 * M_PI * 0.09 * (t - begin));
-    AddLorry(faces, Way().DistanceAt(t) + gap + 3, 0, {6, 2.2, 2.9}, look);
+    const double gap = 8 + 50 * std::exp(-(t - begin) / 3) + 1.5 * std::sin(2 * M_PI * 0.09 * (t - begin));
+    AddLorry(faces, Way().DistanceAt(t) + gap + 3, 0, {6, 2.3, 3.4}, look);
   }
 
   // Half a lap after the camera passed a place, when it is out of sight, another car is parked there.

@@ -199,7 +199,7 @@ class TownBuilder {
       return;
     }
     if (curb > 3.3 && options_.other_cars)
-      AddLaterCar(scene_.faces.size(), middle + (curb - 1.0) * side, along, 0.4);
+      AddLaterCar(scene_.faces.size(), middle + (curb - 1.0) * side, along, 0.2);
     const Vector2d foot = middle + (curb + 0.45) * side;
     const int bark = Pick(walls_);
     if (kind < 0.8) {
@@ -227,7 +227,7 @@ class TownBuilder {
       look.front = scene_.Add(CarTexture(later_.Bits(), false));
       look.side = scene_.Add(CarTexture(later_.Bits(), true));
       look.top = walls_[static_cast<std::size_t>(later_.Int(0, static_cast<int>(walls_.size()) - 1))];
-      const Vector3d size(later_.In(3.6, 5.0), later_.In(1.6, 1.8), later_.In(1.3, 2.1));
+      const Vector3d size(later_.In(3.6, 5.0), later_.In(1.6, 1.8), later_.In(1.3, 1.7));
       AppendBox(place.later, Lift(at + later_.In(-0.6, 0.6) * along, 0), size,
                 std::atan2(along.y(), along.x()), look);
     }

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 #include <random>
 
 #include "command_loops_input.h"
@@ -28,6 +29,7 @@ struct Arguments {
   std::string images, change, shuffle, twice;
   cli::GroundTruthArguments truth;
   std::uint64_t change_seed = 1;
+  bool overlay = false;
   int sift_features = 0;  // 0: as many as the others
   int false_links = 0;
   std::vector<std::string> rows;
@@ -235,6 +237,20 @@ class Row {
   std::vector<double> ms_;
 };
 
+// A black rim, and at the bottom a part of the robot itself: the same in every image.
+void Overlay(cv::Mat& image) {
+  const int rim = std::max(2, image.rows / 25);
+  const int part = image.rows / 6;
+  cv::RNG random(7);
+  for (int i = 0; i < 60; ++i) {
+    const cv::Rect box(random.uniform(0, image.cols), image.rows - random.uniform(rim, part + rim),
+                       random.uniform(4, 30), random.uniform(4, 20));
+    const int tone = random.uniform(0, 256);
+    image(box & cv::Rect(0, image.rows - part, image.cols, part)) = cv::Scalar(tone, tone, tone, 255);
+  }
+  cv::rectangle(image, cv::Rect(0, 0, image.cols, image.rows), cv::Scalar::all(0), 2 * rim);
+}
+
 LoopQuery Read(const std::filesystem::path& left, const std::filesystem::path& right, int number, int change_from,
                const Arguments& arguments) {
   LoopQuery query;
@@ -245,6 +261,7 @@ LoopQuery Read(const std::filesystem::path& left, const std::filesystem::path& r
   if (!arguments.change.empty() && number >= change_from) {
     query.image = ImageChange::Parse(arguments.change).Apply(query.image, arguments.change_seed, number);
   }
+  if (arguments.overlay) Overlay(query.image);
   return query;
 }
 
@@ -282,7 +299,6 @@ int Run(const Arguments& arguments) {
     const LoopQuery query =
         Read(images[i], rights[i], static_cast<int>(i / stride), change_from, arguments);
     percepts.push_back(perception.See(query));
-    RunParallel(1, 1, [](int) {});
     for (Row& row : rows) {
       row.Take(query, percepts, pooled, alone.try_emplace(row.name(), scaled).first->second);
     }
@@ -314,6 +330,7 @@ int main(int argc, char** argv) {
   app.add_option("--gt-exclude-s", a.truth.rule.exclude_s, "[s]");
   app.add_option("--change", a.change, "changes every image from the first one whose row has a loop on");
   app.add_option("--change-seed", a.change_seed, "of the change");
+  app.add_flag("--overlay", a.overlay, "a black rim and a part of the robot in every image");
   app.add_option("--shuffle", a.shuffle, "this member's counts are shuffled in every image");
   app.add_option("--twice", a.twice, "this member is there twice");
   app.add_option("--sift-features", a.sift_features, "SIFT finds no more");

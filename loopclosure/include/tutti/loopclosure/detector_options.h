@@ -105,7 +105,8 @@ struct VerificationOptions {
   double min_inlier_ratio = 0.3;  ///< PnP: inliers / matches with a 3D point, 0..1
   int min_epipolar_inliers =
       30;  ///< essential, fundamental matrix: a match is held to a line only, so more are needed
-  double min_epipolar_ratio = 0.55;  ///< and a larger share of all matches, 0..1
+  double min_epipolar_ratio = 0.3;  ///< and this share of all matches, 0..1: the probability
+                                    ///< weighs it once more
   double min_spread = 0.045;  ///< standard deviation of the inliers' pixels, as a share of width and height,
                               ///< along their narrowest direction; evenly spread: 0.29, on one line: 0.
                               ///< Inliers in abundance (beyond 1.5 times the least) may lie closer, down
@@ -190,7 +191,7 @@ struct LoopDetectorOptions {
 /// Michaud 2013), "rtabmap-0.8.3" (the reference system of the ensemble's paper), "standardised-mean" (the
 /// ensemble's paper: standardised evidence, mean of the posteriors, every loop that geometry accepts), or
 /// "default" (ours).
-/// Features (but their number) and verification stay as they are. Throws InputError that names the nearest
+/// Features (but their number) and verification (but min_epipolar_ratio) stay as they are. Throws InputError that names the nearest
 /// word.
 void ApplyPreset(const std::string& name, LoopDetectorOptions& options);
 

@@ -7,16 +7,17 @@
 #include <cstdio>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <numeric>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <random>
+#include <sstream>
 
 #include "command_loops_input.h"
 #include "image_change.h"
 #include "joined_pairs.h"
 #include "place_reasoner.h"
 #include "tutti/core/error.h"
+#include "tutti/loopclosure/dense.h"
 #include "tutti/loopclosure/evaluation.h"
 #include "tutti/loopclosure/parallel.h"
 
@@ -33,6 +34,8 @@ struct Arguments {
   int sift_features = 0;  // 0: as many as the others
   int false_links = 0;
   std::vector<std::string> rows;
+  std::vector<std::string> members = {"surf", "sift", "orb"};
+  bool posterior_only = false;
   int threads = 2;
 };
 
@@ -68,8 +71,12 @@ class Perception {
     RunParallel(static_cast<int>(members_.size()), options_.threads, [&](int i) {
       const std::size_t k = static_cast<std::size_t>(i);
       Member& member = members_[k];
-      features[k] = member.Extract(grey);
+      features[k] = member.Extract(query.image, grey, query.mask);
       if (!member.Judge(features[k])) return;
+      if (member.dense()) {
+        percept.words[k].descriptor = NormalisedDescriptor(features[k].descriptors);
+        return;
+      }
       percept.words[k].words = member.vocabulary().Quantise(features[k].descriptors);
       for (const cv::KeyPoint& keypoint : features[k].keypoints) {
         percept.words[k].cells.push_back(SeenWords::Cell(keypoint.pt, query.image.size()));
@@ -123,20 +130,25 @@ class Row {
       ApplyPreset("standardised-mean", options_);
       rule = "mean";
     }
+    std::vector<std::string> chosen = names;
+    if (const std::size_t colon = rule.find(':'); colon != std::string::npos) {
+      chosen.clear();
+      std::istringstream list(rule.substr(colon + 1));
+      for (std::string member; std::getline(list, member, '+');) chosen.push_back(member);
+      rule.resize(colon);
+    }
     own_ = rule.size() > 4 && rule.compare(rule.size() - 4, 4, "/own") == 0;
     if (own_) rule.resize(rule.size() - 4);
     SetRule(rule, options_);
     options_.threads = 1;
     options_.wm_limit = 0;
-    if (options_.rule == CombinationRule::kSingle) {
-      members_.push_back(static_cast<std::size_t>(std::find(names.begin(), names.end(), rule) - names.begin()));
-    } else {
-      members_.resize(names.size());
-      std::iota(members_.begin(), members_.end(), 0u);
+    if (options_.rule == CombinationRule::kSingle) chosen = {rule};
+    for (const std::string& member : chosen) {
+      const auto found = std::find(names.begin(), names.end(), member);
+      if (found == names.end()) throw InputError("row " + name + ": no member '" + member + "' in --members");
+      members_.push_back(static_cast<std::size_t>(found - names.begin()));
+      shells_.emplace_back(BaseName(member), options_, 1);
     }
-    for (const std::size_t k : members_) shells_.emplace_back(BaseName(names[k]), options_, 1);
-    std::vector<std::string> chosen;
-    for (const std::size_t k : members_) chosen.push_back(names[k]);
     options_.members = chosen;
     reasoner_ = std::make_unique<internal::PlaceReasoner>(options_, shells_);
   }
@@ -155,7 +167,7 @@ class Row {
     double verify_ms = 0;
     result.proposed = reasoner_->Proposes(combined, result);
     double own_ms = Perception::Milliseconds(begin);
-    if (result.proposed) {
+    if (result.proposed && !arguments_.posterior_only) {
       PairCache& cache = own_ ? alone : pooled;
       const auto view = [&](const Percept& p) -> const View& { return own_ ? p.own[members_.front()] : p.view; };
       reasoner_->Verify(
@@ -279,7 +291,7 @@ int Run(const Arguments& arguments) {
   int change_from = 0;
   while (change_from < truth.size() && !truth.HasLoop(change_from)) ++change_from;
 
-  std::vector<std::string> names = {"surf", "sift", "orb"};
+  std::vector<std::string> names = arguments.members;
   if (!arguments.twice.empty()) names.push_back(arguments.twice + "'");
   Perception perception(names, arguments);
   std::vector<Row> rows;
@@ -335,7 +347,9 @@ int main(int argc, char** argv) {
   app.add_option("--twice", a.twice, "this member is there twice");
   app.add_option("--sift-features", a.sift_features, "SIFT finds no more");
   app.add_option("--false-links", a.false_links, "so many false links are planted");
-  app.add_option("--rows", a.rows, "which")->delimiter(',');
+  app.add_option("--rows", a.rows, "which; joint:surf+orb: the rule over these members alone")->delimiter(',');
+  app.add_option("--members", a.members, "of the ensemble")->delimiter(',');
+  app.add_flag("--posterior-only", a.posterior_only, "no geometry, and no links that come of it");
   app.add_option("--threads", a.threads, "for extraction");
   CLI11_PARSE(app, argc, argv);
   try {

@@ -6,6 +6,7 @@
 #include "detector_impl.h"
 #include "stopwatch.h"
 #include "tutti/core/error.h"
+#include "tutti/loopclosure/dense.h"
 #include "tutti/loopclosure/parallel.h"
 
 namespace tutti {
@@ -22,6 +23,13 @@ std::vector<Member> MembersOf(const LoopDetectorOptions& options) {
     members.emplace_back(options.members[k], options, options.seed * 1000003u + k);
   }
   return members;
+}
+
+// Of a dense member.
+SeenWords Described(const Features& features) {
+  SeenWords seen;
+  seen.descriptor = NormalisedDescriptor(features.descriptors);
+  return seen;
 }
 
 SeenWords Placed(std::vector<int> words, const std::vector<cv::KeyPoint>& keypoints, const cv::Size& size) {
@@ -89,7 +97,7 @@ std::vector<Features> LoopDetector::Impl::Extract(const LoopQuery& query) const 
   RunParallel(static_cast<int>(members_.size()), options_.threads, [&](int k) {
     const auto given = query.member_features.find(members_[Index(k)].name());
     if (given == query.member_features.end()) {
-      features[Index(k)] = members_[Index(k)].Extract(grey);
+      features[Index(k)] = members_[Index(k)].Extract(query.image, grey, query.mask);
     } else {
       // The caller owns the matrix and may write into it later: keep a copy.
       features[Index(k)] = {given->second.keypoints, given->second.descriptors.clone()};
@@ -111,7 +119,7 @@ std::vector<std::vector<TwoNearest>> LoopDetector::Impl::SearchWords(const std::
   std::vector<Piece> pieces;
   std::vector<std::vector<TwoNearest>> nearest(members_.size());
   for (std::size_t k = 0; k < members_.size(); ++k) {
-    if (usable[k] == 0) continue;
+    if (usable[k] == 0 || members_[k].dense()) continue;
     nearest[k].resize(Index(features[k].descriptors.rows));
     for (int i = 0; i < features[k].descriptors.rows; i += kBlock) pieces.push_back({k, i});
   }
@@ -133,6 +141,10 @@ std::vector<SeenWords> LoopDetector::Impl::Quantise(const std::vector<Features>&
   RunParallel(static_cast<int>(members_.size()), options_.threads, [&](int i) {
     const std::size_t k = Index(i);
     if (usable[k] == 0) return;
+    if (members_[k].dense()) {
+      words[k] = Described(features[k]);
+      return;
+    }
     words[k] = Placed(members_[k].vocabulary().Assign(features[k].descriptors, nearest[k]),
                       features[k].keypoints, size);
   });
@@ -158,7 +170,7 @@ int LoopDetector::Impl::Remember(const LoopQuery& query, View view, const std::v
 
 void LoopDetector::Impl::FillCounts(const std::vector<Features>& features, LoopResult& result) const {
   for (std::size_t k = 0; k < members_.size(); ++k) {
-    result.members[k].features = static_cast<int>(features[k].keypoints.size());
+    result.members[k].features = features[k].descriptors.rows;
     result.members[k].words = members_[k].num_words();
   }
 }
@@ -170,6 +182,15 @@ void LoopDetector::Impl::Decide(int slot, const CombinedBelief& combined, LoopRe
 }
 
 void LoopDetector::Impl::Verify(const View& query, const Belief& belief, LoopResult& result) const {
+  const bool has_features = std::any_of(query.members.begin(), query.members.end(),
+                                        [](const View::Set& set) { return !set.pixels.empty(); });
+  const bool all_dense =
+      std::all_of(members_.begin(), members_.end(), [](const Member& member) { return member.dense(); });
+  if (options_.verification.enabled && all_dense && !has_features && query.caller.pixels.empty()) {
+    result.reason = "there are no features for the geometry: dense members have none; add another member, give "
+                    "features with the query, or set verification.enabled: false";
+    return;
+  }
   reasoner_.Verify(
       query, belief,
       [this](const View& a, const View& b, int threads) { return verifier_.Verify(a, b, threads); },
@@ -189,7 +210,9 @@ LoopResult LoopDetector::Impl::Locate(const LoopQuery& query) const {
       SearchWords(features, std::vector<char>(members_.size(), 1));
   std::vector<SeenWords> words;
   for (std::size_t k = 0; k < members_.size(); ++k) {
-    words.push_back(Placed(members_[k].vocabulary().Recognise(nearest[k]), features[k].keypoints, view.size));
+    words.push_back(members_[k].dense() ? Described(features[k])
+                                        : Placed(members_[k].vocabulary().Recognise(nearest[k]),
+                                                 features[k].keypoints, view.size));
   }
   result.quantise_ms = watch.LapMs();
   const CombinedBelief combined = reasoner_.Locate(words);

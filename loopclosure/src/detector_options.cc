@@ -103,6 +103,20 @@ std::string LoopDetectorOptions::Validate() const {
       return "members holds '" + members[i] + "' twice; name each member once";
     }
   }
+  const std::vector<std::string> known_dense = KnownDenseMembers();
+  for (const std::string& name : dense_members) {
+    if (std::find(external_members.begin(), external_members.end(), name) == external_members.end()) {
+      return "dense_members holds '" + name + "', which is not in external_members; name it there, too";
+    }
+  }
+  for (const std::string& name : members) {
+    const bool dense = std::find(known_dense.begin(), known_dense.end(), name) != known_dense.end() ||
+                       std::find(dense_members.begin(), dense_members.end(), name) != dense_members.end();
+    if (dense && rule == CombinationRule::kNaive) {
+      return "the rule 'naive' puts the words of all members together, and '" + name +
+             "' has none; leave it out or choose another rule";
+    }
+  }
   if (rule == CombinationRule::kSingle && members.size() != 1) {
     return "the rule 'single' takes exactly one member, not " + std::to_string(members.size());
   }
@@ -136,7 +150,16 @@ std::string LoopDetectorOptions::Validate() const {
   return {};
 }
 
+std::vector<std::string> KnownDenseMembers() { return {"hog"}; }
+
 std::vector<std::string> KnownMembers() {
+  std::vector<std::string> names = KnownFeatureTypes();
+  const std::vector<std::string> dense = KnownDenseMembers();
+  names.insert(names.end(), dense.begin(), dense.end());
+  return names;
+}
+
+std::vector<std::string> KnownFeatureTypes() {
   std::vector<std::string> names = {"surf", "sift", "orb", "akaze", "brisk", "kaze", "gftt"};
   const std::vector<std::string> registered = RegisteredFeatureTypes();
   names.insert(names.end(), registered.begin(), registered.end());

@@ -48,6 +48,23 @@ void CheckKeypoints(const std::vector<cv::KeyPoint>& keypoints, const cv::Mat& d
   }
 }
 
+// What a dense member has of an image: one row, or nothing.
+void CheckDense(const Features& features, int width, const std::string& which) {
+  if (!features.keypoints.empty()) {
+    throw InputError(which + "a dense member describes the image as a whole: give no keypoints");
+  }
+  const cv::Mat& row = features.descriptors;
+  if (row.empty()) return;
+  if (row.rows != 1 || row.type() != CV_32F) {
+    throw InputError(which + "a dense member has one row of CV_32F (or none, and sits the image out)");
+  }
+  if (!cv::checkRange(row)) throw InputError(which + "a value of the descriptor is not a finite number");
+  if (width > 0 && row.cols != width) {
+    throw InputError(which + "the descriptor has " + std::to_string(row.cols) + " values, but those before had " +
+                     std::to_string(width) + "; give every image the same kind");
+  }
+}
+
 }  // namespace
 
 void LoopDetector::Impl::CheckQuery(const LoopQuery& query) const {
@@ -98,6 +115,10 @@ void LoopDetector::Impl::CheckMemberFeatures(const LoopQuery& query, const std::
                                      [&name = name](const Member& m) { return m.name() == name; });
     if (member == members_.end()) {
       throw InputError(which + "features of member '" + name + "', which is not in options.members");
+    }
+    if (member->dense()) {
+      CheckDense(f, member->width(), which + name + ": ");
+      continue;
     }
     CheckKeypoints(f.keypoints, f.descriptors, which + name + ": ");
     const std::string problem = member->vocabulary().Problem(f.descriptors);

@@ -195,7 +195,7 @@ std::vector<int> SelectSpread(const std::vector<cv::KeyPoint>& keypoints, cv::Si
 
 FeatureExtractor::FeatureExtractor(const std::string& name, const ExtractionOptions& options)
     : name_(name), options_(options), scratches_(std::make_shared<internal::SiftScratchPool>()) {
-  const std::vector<std::string> known = KnownMembers();
+  const std::vector<std::string> known = KnownFeatureTypes();
   if (std::find(known.begin(), known.end(), name) == known.end()) {
     throw InputError("unknown member '" + name + "'; did you mean '" + NearestWord(name, known) + "'?");
   }

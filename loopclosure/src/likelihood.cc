@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "byte_stream.h"
+#include "tutti/loopclosure/dense.h"
 
 namespace tutti {
 
@@ -83,6 +84,8 @@ int SeenWords::Cell(const cv::Point2f& pixel, const cv::Size& size) {
 int SeenWords::size() const {
   return static_cast<int>(std::count_if(words.begin(), words.end(), [](int word) { return word >= 0; }));
 }
+
+double SeenWords::Amount() const { return descriptor.empty() ? size() : DenseModel::kWords; }
 
 namespace {
 

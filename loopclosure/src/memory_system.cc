@@ -20,6 +20,7 @@ SeenWords WordsFor(const FilterUnit& unit, const std::vector<SeenWords>& words) 
     const SeenWords& part = words[unit.members[static_cast<std::size_t>(p)]];
     for (const int word : part.words) all.words.push_back(word < 0 ? word : word * parts + p);
     all.cells.insert(all.cells.end(), part.cells.begin(), part.cells.end());
+    if (unit.is_dense) all.descriptor = part.descriptor;
   }
   return all;
 }
@@ -60,7 +61,9 @@ MemorySystem::MemorySystem(int number, const LoopDetectorOptions& options,
       members_(members),
       memory_(options.stm_size),
       transition_(options.virtual_place_prior) {
-  for (const std::vector<std::size_t>& sources : units) units_.emplace_back(sources, options);
+  for (const std::vector<std::size_t>& sources : units) {
+    units_.emplace_back(sources, sources.size() == 1 && members_[sources.front()].dense(), options);
+  }
   if (options.rule == CombinationRule::kJoint) joint_.emplace(options.evidence);
 }
 
@@ -72,6 +75,7 @@ int MemorySystem::Remember(std::int64_t id, const std::vector<SeenWords>& words)
     unit.signature = Signature(unit.seen.words);
     any_took_part = any_took_part || unit.took_part();
     unit.likelihood.Add(unit.signature);
+    if (unit.is_dense) unit.dense.Add(unit.seen.descriptor);
     Reference(unit, unit.signature);
   }
   int stands_for = -1;
@@ -83,6 +87,7 @@ int MemorySystem::Remember(std::int64_t id, const std::vector<SeenWords>& words)
   if (stands_for >= 0) {
     for (FilterUnit& unit : units_) {
       unit.likelihood.Remove(slot);
+      if (unit.is_dense) unit.dense.Drop(slot);
       Release(unit, unit.signature);
     }
     slot = stands_for;
@@ -96,10 +101,20 @@ bool MemorySystem::LooksLikePrevious(int slot) const {
   if (recent.size() < 2) return false;
   const int previous = recent[recent.size() - 2];
   double sum = 0.0;
+  int units = 0;
   for (const FilterUnit& unit : units_) {
+    if (unit.is_dense) continue;
     sum += Signature::Similarity(unit.likelihood.signature(slot), unit.likelihood.signature(previous));
+    ++units;
   }
-  return sum / static_cast<double>(units_.size()) >= options_.rehearsal_similarity;
+  if (units > 0) return sum / units >= options_.rehearsal_similarity;
+  // Dense members alone: they must be as good as equal, for all images have much in common for them.
+  constexpr double kEqual = 0.98;
+  return std::all_of(units_.begin(), units_.end(), [&](const FilterUnit& unit) {
+    const cv::Mat& now = unit.dense.descriptor(slot);
+    const cv::Mat& before = unit.dense.descriptor(previous);
+    return !now.empty() && !before.empty() && now.dot(before) >= kEqual;
+  });
 }
 
 void MemorySystem::UpdateLikelihood(std::size_t u) {
@@ -107,7 +122,7 @@ void MemorySystem::UpdateLikelihood(std::size_t u) {
   if (!unit.took_part()) return;
   const std::vector<int>& places = memory_.working_memory();
   if (Counts()) {
-    unit.counts = unit.likelihood.Counts(unit.seen);
+    unit.counts = unit.is_dense ? unit.dense.Counts(places) : unit.likelihood.Counts(unit.seen);
     const std::deque<int>& recent = memory_.short_term_memory();
     int before = 0;
     double sum = 0;
@@ -116,11 +131,11 @@ void MemorySystem::UpdateLikelihood(std::size_t u) {
     }
     if (before > 1) unit.weight.Repeat(sum / (before - 1));
     if (places.empty()) return;
-    unit.image_likelihood = unit.alias.Likelihood(unit.counts, places, unit.seen.size());
+    unit.image_likelihood = unit.alias.Likelihood(unit.counts, places, unit.seen.Amount());
     if (options_.keep_evidence) unit.scores = unit.counts;
     return;
   }
-  std::vector<double> scores = unit.likelihood.Scores(unit.signature);
+  std::vector<double> scores = unit.is_dense ? unit.dense.Scores() : unit.likelihood.Scores(unit.signature);
   unit.image_likelihood = AdjustLikelihood(scores, places);
   if (options_.keep_evidence) unit.scores = std::move(scores);
 }
@@ -163,7 +178,7 @@ void MemorySystem::StepJoint() {
   if (!joint_ || !JointTookPart() || memory_.working_memory().empty()) return;
   joint_->counts = JointCounts();
   double words = 0;
-  for (const FilterUnit& unit : units_) words += unit.took_part() ? unit.seen.size() : 0;
+  for (const FilterUnit& unit : units_) words += unit.took_part() ? unit.seen.Amount() : 0;
   joint_->image_likelihood = joint_->alias.Likelihood(joint_->counts, memory_.working_memory(), words);
   joint_->filter.Step(transition_, memory_.working_memory(), joint_->image_likelihood);
 }
@@ -211,12 +226,15 @@ std::vector<Belief> MemorySystem::Opinions(const std::vector<SeenWords>& words) 
   double sum_of_weights = 0;
   for (const FilterUnit& unit : units_) {
     const SeenWords seen = WordsFor(unit, words);
-    if (seen.size() == 0) continue;
+    if (seen.Amount() == 0) continue;
     if (!Counts()) {
-      opinions.push_back(AdjustLikelihood(unit.likelihood.Scores(Signature(seen.words)), places));
+      opinions.push_back(AdjustLikelihood(unit.is_dense ? unit.dense.ScoresOf(seen.descriptor)
+                                                        : unit.likelihood.Scores(Signature(seen.words)),
+                                          places));
       continue;
     }
-    const std::vector<double> counts = unit.likelihood.Counts(seen);
+    const std::vector<double> counts =
+        unit.is_dense ? unit.dense.CountsOf(seen.descriptor, places) : unit.likelihood.Counts(seen);
     if (!joint_) {
       opinions.push_back(unit.alias.Of(counts, places));
       continue;
@@ -277,12 +295,13 @@ void MemorySystem::Restore(int slot, LocationStore& store) {
     throw InputError(store.name() + ": is damaged (location " + std::to_string(memory_.id(slot)) +
                      " is missing); give another file, or an older copy");
   }
-  const std::vector<Signature> unit_signatures = ReadRecord(*stored, store.name());
+  const std::vector<UnitRecord> records = ReadRecord(*stored, store.name());
   // First everything that may fail, then the changes.
   std::vector<std::vector<int>> words(members_.size());
   std::vector<cv::Mat> descriptors(members_.size());
   for (std::size_t u = 0; u < units_.size(); ++u) {
-    const std::vector<Signature> parts = unit_signatures[u].Split(static_cast<int>(units_[u].members.size()));
+    const std::vector<Signature> parts =
+        records[u].signature.Split(static_cast<int>(units_[u].members.size()));
     for (std::size_t p = 0; p < parts.size(); ++p) {
       const std::size_t k = units_[u].members[p];
       words[k] = members_[k].vocabulary().Missing(parts[p]);
@@ -299,8 +318,9 @@ void MemorySystem::Restore(int slot, LocationStore& store) {
     members_[k].vocabulary().Restore(words[k], descriptors[k]);
   }
   for (std::size_t u = 0; u < units_.size(); ++u) {
-    units_[u].likelihood.Restore(slot, unit_signatures[u]);
-    Reference(units_[u], unit_signatures[u]);
+    units_[u].likelihood.Restore(slot, records[u].signature);
+    if (units_[u].is_dense) units_[u].dense.Restore(slot, records[u].descriptor);
+    Reference(units_[u], records[u].signature);
   }
 }
 
@@ -343,6 +363,7 @@ void MemorySystem::Leave(int slot) {
   for (FilterUnit& unit : units_) {
     const Signature signature = unit.likelihood.signature(slot);
     unit.likelihood.Remove(slot);
+    if (unit.is_dense) unit.dense.Remove(slot);
     Release(unit, signature);
     unit.filter.Forget(slot);
   }
@@ -358,28 +379,45 @@ void MemorySystem::StoreSignatures(int slot, LocationStore& store) const {
 void MemorySystem::Reopen(LocationStore& store) {
   LoadNodes(number_, store, memory_);
   for (int slot = 0; slot < memory_.size(); ++slot) {
+    const LocationMemory::State state = memory_.state(slot);
     for (FilterUnit& unit : units_) {
       unit.likelihood.Add(Signature());
       unit.likelihood.Remove(slot);
+      if (unit.is_dense) unit.dense.AddAbsent(state == LocationMemory::State::kMerged);
     }
-    const LocationMemory::State state = memory_.state(slot);
     if (state != LocationMemory::State::kShortTerm && state != LocationMemory::State::kWorking) continue;
     Restore(slot, store);
+  }
+  for (FilterUnit& unit : units_) {
+    if (unit.is_dense) unit.dense.FinishLoading();
   }
   transition_.Update(memory_, memory_.working_memory());
 }
 
 std::string MemorySystem::Record(int slot) const {
   ByteWriter out;
-  for (const FilterUnit& unit : units_) unit.likelihood.signature(slot).Save(out);
+  for (const FilterUnit& unit : units_) {
+    if (unit.is_dense) {
+      SaveDescriptor(unit.dense.descriptor(slot), out);
+    } else {
+      unit.likelihood.signature(slot).Save(out);
+    }
+  }
   return out.bytes();
 }
 
-std::vector<Signature> MemorySystem::ReadRecord(std::string_view record, const std::string& source) const {
+std::vector<UnitRecord> MemorySystem::ReadRecord(std::string_view record, const std::string& source) const {
   ByteReader in(record, source);
-  std::vector<Signature> signatures;
-  for (std::size_t u = 0; u < units_.size(); ++u) signatures.push_back(Signature::Load(in));
-  return signatures;
+  std::vector<UnitRecord> records(units_.size());
+  for (std::size_t u = 0; u < units_.size(); ++u) {
+    if (!units_[u].is_dense) {
+      records[u].signature = Signature::Load(in);
+      continue;
+    }
+    records[u].descriptor = LoadDescriptor(in);
+    if (!units_[u].dense.Problem(records[u].descriptor).empty()) in.Damaged("descriptors of several widths");
+  }
+  return records;
 }
 
 void MemorySystem::Reference(const FilterUnit& unit, const Signature& signature) {
@@ -400,6 +438,7 @@ void MemorySystem::Save(ByteWriter& out) const {
   memory_.Save(out);
   for (const FilterUnit& unit : units_) {
     unit.likelihood.Save(out);
+    if (unit.is_dense) unit.dense.Save(out);
     unit.filter.Save(out);
     unit.alias.Save(out);
     unit.weight.Save(out);
@@ -429,10 +468,12 @@ void MemorySystem::Load(ByteReader& in) {
   memory_.Load(in);
   for (FilterUnit& unit : units_) {
     unit.likelihood.Load(in);
+    if (unit.is_dense) unit.dense.Load(in);
     unit.filter.Load(in);
     unit.alias.Load(in);
     unit.weight.Load(in);
     if (unit.likelihood.size() != memory_.size() ||
+        (unit.is_dense && unit.dense.size() != memory_.size()) ||
         static_cast<int>(unit.filter.posterior().places.size()) > memory_.size()) {
       in.Damaged("locations are missing");
     }
@@ -440,7 +481,8 @@ void MemorySystem::Load(ByteReader& in) {
       const LocationMemory::State state = memory_.state(slot);
       const bool in_memory =
           state == LocationMemory::State::kShortTerm || state == LocationMemory::State::kWorking;
-      if (unit.likelihood.Has(slot) != in_memory) in.Damaged("locations in memory without their words");
+      if (unit.likelihood.Has(slot) != in_memory || (unit.is_dense && unit.dense.Has(slot) != in_memory))
+        in.Damaged("locations in memory without their words");
       const std::vector<Signature> parts =
           unit.likelihood.signature(slot).Split(static_cast<int>(unit.members.size()));
       for (std::size_t p = 0; p < parts.size(); ++p) {

@@ -12,6 +12,7 @@
 #include "location_store.h"
 #include "tutti/loopclosure/alias_evidence.h"
 #include "tutti/loopclosure/bayes_filter.h"
+#include "tutti/loopclosure/dense.h"
 #include "tutti/loopclosure/detector_options.h"
 #include "tutti/loopclosure/likelihood.h"
 #include "tutti/loopclosure/location_memory.h"
@@ -37,18 +38,32 @@ struct PlaceFilter {
   BayesFilter filter;
 };
 
+/// What a unit keeps of a location: its words, or the descriptor of a dense member.
+struct UnitRecord {
+  Signature signature;
+  cv::Mat descriptor;
+};
+
 /// A filter and the members whose signatures it sees: one each for most rules; all of them, concatenated, for
-/// naive (loop-closure.md eq. 3).
+/// naive (loop-closure.md eq. 3). Or one dense member: then `dense` has what it knows, and its signatures are
+/// all empty.
 struct FilterUnit : PlaceFilter {
-  FilterUnit(std::vector<std::size_t> sources, const LoopDetectorOptions& options)
-      : PlaceFilter(options.evidence), members(std::move(sources)), likelihood(options.likelihood) {}
+  FilterUnit(std::vector<std::size_t> sources, bool of_dense_member, const LoopDetectorOptions& options)
+      : PlaceFilter(options.evidence),
+        members(std::move(sources)),
+        is_dense(of_dense_member),
+        likelihood(options.likelihood) {}
+  FilterUnit(FilterUnit&&) = default;
+  FilterUnit(const FilterUnit&) = delete;
   std::vector<std::size_t> members;
+  bool is_dense;
   LikelihoodModel likelihood;
+  DenseModel dense;  ///< of a dense member
   MemberWeight weight;
   Signature signature;         ///< of the present image, empty if bad
-  SeenWords seen;              ///< the same, feature by feature
+  SeenWords seen;              ///< the same, feature by feature; or the descriptor
   std::vector<double> scores;  ///< raw ones behind the likelihood, by slot; only with keep_evidence
-  bool took_part() const { return !signature.empty(); }
+  bool took_part() const { return !signature.empty() || !seen.descriptor.empty(); }
 };
 
 /// Steps 3 to 5, 7 and 8 of loop-closure.md section 1. Slots are the same in every memory of one detector.
@@ -113,9 +128,9 @@ class MemorySystem {
   const std::vector<FilterUnit>& units() const { return units_; }
 
  private:
-  // One record holds the signatures of every unit.
+  // One record holds what every unit keeps.
   std::string Record(int slot) const;
-  std::vector<Signature> ReadRecord(std::string_view record, const std::string& source) const;
+  std::vector<UnitRecord> ReadRecord(std::string_view record, const std::string& source) const;
   void Restore(int slot, LocationStore& store);
   void ReadWord(std::size_t member, int word, LocationStore& store, cv::Mat& descriptors) const;
   void Reference(const FilterUnit& unit, const Signature& signature);

@@ -257,7 +257,9 @@ bool PlaceReasoner::InMemory(int slot) const {
 
 std::string PlaceReasoner::Fingerprint() const {
   std::string text = "members";
-  for (const std::string& name : options_.members) text += " " + name;
+  for (const Member& member : members_) {
+    text += " " + member.name() + (member.external() && member.dense() ? " (dense)" : "");
+  }
   text += options_.rule == CombinationRule::kNaive   ? ", one naive filter"
           : options_.rule == CombinationRule::kJoint ? ", a joint filter"
                                                      : ", a filter each";

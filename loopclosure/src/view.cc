@@ -29,6 +29,7 @@ float DepthAt(const cv::Mat& depth_m, const cv::Point2f& pixel, const Verificati
 
 View::Set MakeSet(const std::vector<cv::KeyPoint>& keypoints, const cv::Mat& descriptors) {
   View::Set set;
+  if (keypoints.empty()) return set;  // a dense member's descriptor is of no pixel
   set.pixels.reserve(keypoints.size());
   for (const cv::KeyPoint& keypoint : keypoints) set.pixels.push_back(keypoint.pt);
   set.descriptors = descriptors;

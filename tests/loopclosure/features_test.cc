@@ -20,7 +20,7 @@ std::vector<cv::Point2f> Pixels(const Features& features) {
 }
 
 class EveryMember : public ::testing::TestWithParam<std::string> {};
-INSTANTIATE_TEST_SUITE_P(Members, EveryMember, ::testing::ValuesIn(KnownMembers()));
+INSTANTIATE_TEST_SUITE_P(Members, EveryMember, ::testing::ValuesIn(KnownFeatureTypes()));
 
 TEST_P(EveryMember, FindsFeaturesAndMatchesThemWhenSeenAgain) {
   const FeatureExtractor extractor(GetParam(), ExtractionOptions());

@@ -141,6 +141,8 @@ struct LoopDetectorOptions {
   CombinationRule rule = CombinationRule::kJoint;  ///< how members are combined
   std::vector<std::string> members = {"surf", "sift",
                                       "orb"};  ///< of KnownMembers(), and of external_members; kSingle: one
+  std::vector<std::string> dense_members;      ///< of external_members, those that describe an image as a whole:
+                                               ///< no keypoints, and one row of CV_32F
   std::vector<std::string> external_members;   ///< further names that members may hold: the caller extracts
                                                ///< their features himself and gives them with each LoopQuery
   double loop_threshold = 0.95;    ///< accept a loop of this probability, 0..1
@@ -206,8 +208,15 @@ void SetRule(const std::string& word, LoopDetectorOptions& options);
 /// The word that SetRule takes for these options.
 std::string RuleName(const LoopDetectorOptions& options);
 
-/// Names that options.members may hold without further ado: surf, sift, orb, akaze, brisk, kaze, gftt
-/// (corners with upright BRIEF), and what RegisterFeatureType added.
+/// Names that options.members may hold without further ado: those of KnownFeatureTypes() and of
+/// KnownDenseMembers().
 std::vector<std::string> KnownMembers();
+
+/// Members with keypoints: surf, sift, orb, akaze, brisk, kaze, gftt (corners with upright BRIEF), and what
+/// RegisterFeatureType added.
+std::vector<std::string> KnownFeatureTypes();
+
+/// Members that describe an image as a whole (dense.h): hog.
+std::vector<std::string> KnownDenseMembers();
 
 }  // namespace tutti

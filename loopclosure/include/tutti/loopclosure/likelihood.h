@@ -16,18 +16,21 @@ class ByteReader;
 class ByteWriter;
 }  // namespace internal
 
-/// The words of an image and where they were seen: the cell of each feature in a grid of kColumns cells along
-/// the longer side of the image.
+/// What a member sees in an image: its words and where they were seen, the cell of each feature in a grid of
+/// kColumns cells along the longer side of the image; or, a dense member, its descriptor.
 struct SeenWords {
   static constexpr int kColumns = 8;
   static constexpr int kStripColumns = 2;  ///< that make an upright strip of the image
   std::vector<int> words;  ///< one for each feature; -1: not known
   std::vector<int> cells;  ///< likewise
+  cv::Mat descriptor;      ///< of a dense member, in place of words: 1 x D of length 1, or empty
 
   /// The cell of a pixel, row by row.
   static int Cell(const cv::Point2f& pixel, const cv::Size& size);
   /// Number of words that are known.
   int size() const;
+  /// The same, with a number that stands for a descriptor.
+  double Amount() const;
 };
 
 /// Inverted index over the signatures of all locations in STM and WM, and the scores computed by walking it.

@@ -10,23 +10,28 @@
 
 namespace tutti {
 
-/// Extracts and quantises for one kind of features (loop-closure.md section 1, steps 1 and 2).
+/// Extracts, and quantises or (a dense member) compares as a whole, for one kind of features (loop-closure.md section 1, steps 1 and 2).
 class Member {
  public:
-  /// `name`: surf, sift, orb, akaze or brisk; `seed`: of its vocabulary's index. Throws InputError for
+  /// `name`: of options.members; `seed`: of its vocabulary's index. Throws InputError for
   /// another name.
   Member(const std::string& name, const LoopDetectorOptions& options, std::uint64_t seed);
 
   /// As given.
   const std::string& name() const { return name_; }
 
-  /// Step 1: features of an 8-bit grey image. Safe to call for several members at once. None for an external
-  /// member.
-  Features Extract(const cv::Mat& grey) const { return extractor_ ? extractor_->Extract(grey) : Features(); }
+  /// Step 1: features of an image: `grey` is what ToGrey8 makes of it. Where `mask` (CV_8UC1, or empty) is 0
+  /// nothing counts for a dense member; the features of others are for the caller to drop. Safe to call for
+  /// several members at once. None for an external member.
+  Features Extract(const cv::Mat& image, const cv::Mat& grey, const cv::Mat& mask) const;
   /// True if the caller extracts this member's features.
-  bool external() const { return !extractor_; }
+  bool external() const { return external_; }
+  /// True if it describes an image as a whole (dense.h): no keypoints, one row of descriptors, no words.
+  bool dense() const { return dense_; }
+  /// Width of a dense member's descriptors [values], 0: not known yet.
+  int width() const { return width_; }
 
-  /// Step 2: false for a bad signature (fewer features than bad_signature_ratio x their running mean, or
+  /// Step 2: false for a bad signature (of a dense member: no descriptor; of others: fewer features than bad_signature_ratio x their running mean, or
   /// fewer than two), which gets no words: the member sits this image out. Once per image: keeps the mean.
   bool Judge(const Features& features);
   int num_words() const { return vocabulary_.size(); }
@@ -43,6 +48,9 @@ class Member {
  private:
   std::string name_;
   double bad_signature_ratio_;
+  bool external_ = false;
+  bool dense_ = false;
+  int width_ = 0;
   std::optional<FeatureExtractor> extractor_;
   Vocabulary vocabulary_;
   double feature_sum_ = 0.0;

@@ -1,0 +1,105 @@
+// Members that describe an image as a whole: one vector each, compared along the way (loop-closure.md
+// section 3).
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+namespace tutti {
+
+namespace internal {
+class ByteReader;
+class ByteWriter;
+}  // namespace internal
+
+/// Histograms of gradients (Dalal & Triggs, CVPR 2005) of a thumbnail of 64x48 pixels: 8x6 cells of 9
+/// directions without sign, each cell relative to the gradients of the 3x3 cells around it, so that neither
+/// light nor contrast matter, not even where they differ within the image. 1 x 432, CV_32F, of length 1; empty
+/// if there is nothing to see (a plain image, or a side below 16 px). `grey`: CV_8UC1; where `mask` (CV_8UC1
+/// of the same size, or empty) is 0 nothing counts.
+cv::Mat DescribeByGradients(const cv::Mat& grey, const cv::Mat& mask = cv::Mat());
+
+/// A descriptor (1 x D, CV_32F) at length 1, in a matrix of its own; empty for one of no length or of none.
+cv::Mat NormalisedDescriptor(const cv::Mat& descriptor);
+
+/// Descriptors of all locations in STM and WM, one each, and what an image's descriptor says of them. Locations
+/// are slots: 0, 1, 2, ... in the order of adding; the newest is the present image.
+///
+/// One descriptor of the whole image says little when light or season change; ten in a row say much (SeqSLAM:
+/// Milford & Wyeth, ICRA 2012). With the cosine d_t . d_i of two descriptors, the score of a place i is
+///   s_i = (1/10) sum over j = 0..9 of (d_{t-j} . d_{i-j} - mu_{t-j}),
+/// with t-j and i-j the locations before along the path, mu the mean over the places in WM, and 0 for a pair of
+/// which one is missing (before the beginning, in LTM, or without a descriptor). The path is followed in the
+/// same direction only. The state depends on nothing but which locations are there: a saved and loaded model
+/// gives the same scores.
+class DenseModel {
+ public:
+  /// Images in a row that are compared.
+  static constexpr int kSequence = 10;
+  /// What a descriptor counts as many words as, where an image's words are counted.
+  static constexpr double kWords = 100;
+
+  /// Adds the descriptor of the next slot (of length 1, 1 x D, CV_32F; empty: none). Throws InputError for
+  /// another width than before.
+  void Add(const cv::Mat& descriptor);
+  /// The newest slot was merged into an older one: it counts for the present image, and is gone after it.
+  void Drop(int slot);
+  /// Takes a slot's descriptor out (transferred out of working memory).
+  void Remove(int slot);
+  /// Puts a slot's descriptor in again (retrieved from long-term memory).
+  void Restore(int slot, const cv::Mat& descriptor);
+  /// The next slot, which is not in memory: merged away, or in long-term memory.
+  void AddAbsent(bool merged);
+  /// Finishes a series of AddAbsent and Restore.
+  void FinishLoading();
+
+  /// Descriptor of a slot; empty if it has none, or is not in memory.
+  const cv::Mat& descriptor(int slot) const { return descriptors_[static_cast<std::size_t>(slot)]; }
+  /// True if a slot is in memory, be it without a descriptor.
+  bool Has(int slot) const { return state_[static_cast<std::size_t>(slot)] == State::kPresent; }
+  /// Slots ever added.
+  int size() const { return static_cast<int>(descriptors_.size()); }
+  /// Empty if a descriptor may be added, else what is wrong.
+  std::string Problem(const cv::Mat& descriptor) const;
+
+  /// Counts of every slot for the present image, to be added to those of words: with the median m and the
+  /// median deviation of the scores of `places`,
+  ///   z_i = (s_i - m) / (1.4826 MAD),   c_i = 3 max(0, z_i - 2),   at most 30.
+  /// 0 with fewer than 12 places, where nothing can stand out.
+  std::vector<double> Counts(const std::vector<int>& places) const;
+  /// The same for an image that is no location, by its descriptor alone: s_i = d . d_i.
+  std::vector<double> CountsOf(const cv::Mat& descriptor, const std::vector<int>& places) const;
+  /// For standardised evidence: means of the cosines, 0 where below 0, of every slot for the present image;
+  std::vector<double> Scores() const;
+  /// and for an image that is no location.
+  std::vector<double> ScoresOf(const cv::Mat& descriptor) const;
+
+  /// Appends the whole state.
+  void Save(internal::ByteWriter& out) const;
+  /// Takes up what Save wrote, into a new object. Throws InputError if it is damaged.
+  void Load(internal::ByteReader& in);
+
+ private:
+  enum class State : char { kAbsent, kPresent, kMerged };
+  // Cosines of one of the last images with the descriptors of all slots; 0 where there is none.
+  struct Row {
+    int slot = -1;
+    std::vector<float> cosines;  // empty if the image has none itself
+  };
+  Row MakeRow(int slot) const;
+  void MakeRecent();
+  std::vector<int> Path() const;
+  static std::vector<double> Contrast(std::vector<double> scores, const std::vector<int>& places);
+
+  std::vector<cv::Mat> descriptors_;  // by slot
+  std::vector<State> state_;          // by slot
+  std::vector<Row> recent_;           // the last slots of the path, newest last
+  int width_ = 0;
+};
+
+/// Appends and reads one descriptor, empty or 1 x D, CV_32F, of length 1. The latter throws InputError.
+void SaveDescriptor(const cv::Mat& descriptor, internal::ByteWriter& out);
+cv::Mat LoadDescriptor(internal::ByteReader& in);
+
+}  // namespace tutti

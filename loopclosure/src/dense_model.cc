@@ -1,0 +1,255 @@
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+
+#include "byte_stream.h"
+#include "tutti/core/error.h"
+#include "tutti/loopclosure/dense.h"
+
+namespace tutti {
+namespace {
+
+constexpr std::size_t kTooFewPlaces = 12;  // in so few, nothing can stand out
+constexpr double kDeviation = 1.4826;      // standard deviations of a normal law in a median deviation
+constexpr double kLeastDeviation = 0.002;  // of scores: cosines differ by so much without a reason
+constexpr double kPlain = 2.0;             // standard deviations that say nothing
+constexpr double kScale = 3.0;             // counts of a standard deviation beyond them
+constexpr double kMost = 30.0;             // counts of one place
+
+std::size_t Index(int slot) { return static_cast<std::size_t>(slot); }
+
+float Cosine(const cv::Mat& a, const cv::Mat& b) {
+  if (a.empty() || b.empty()) return 0.0f;
+  using Vector = Eigen::Map<const Eigen::VectorXf>;
+  return Vector(a.ptr<float>(), a.cols).dot(Vector(b.ptr<float>(), b.cols));
+}
+
+double MedianOf(std::vector<double>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+}  // namespace
+
+std::string DenseModel::Problem(const cv::Mat& descriptor) const {
+  if (descriptor.empty()) return {};
+  if (descriptor.rows != 1 || descriptor.type() != CV_32F) {
+    return "the descriptor of a dense member must be one row of CV_32F";
+  }
+  if (!cv::checkRange(descriptor)) return "a value of the descriptor is not a finite number";
+  if (width_ > 0 && descriptor.cols != width_) {
+    return "the descriptor has " + std::to_string(descriptor.cols) + " values, but those before had " +
+           std::to_string(width_) + "; give every image the same kind";
+  }
+  return {};
+}
+
+void DenseModel::Add(const cv::Mat& descriptor) {
+  const std::string problem = Problem(descriptor);
+  if (!problem.empty()) throw InputError(problem);
+  // What was merged away counted for its own image alone.
+  if (!recent_.empty() && state_[Index(recent_.back().slot)] == State::kMerged) recent_.pop_back();
+  descriptors_.push_back(descriptor);
+  state_.push_back(State::kPresent);
+  if (!descriptor.empty()) width_ = descriptor.cols;
+  if (static_cast<int>(recent_.size()) < kSequence - 1) {
+    MakeRecent();
+  } else {
+    recent_.push_back(MakeRow(size() - 1));
+  }
+  if (static_cast<int>(recent_.size()) > kSequence) recent_.erase(recent_.begin());
+  // The older rows have the new one's cosines from the new row.
+  const Row& now = recent_.back();
+  for (Row& row : recent_) {
+    if (row.cosines.empty()) continue;
+    row.cosines.resize(descriptors_.size(), 0.0f);
+    row.cosines.back() = now.cosines.empty() ? 0.0f : now.cosines[Index(row.slot)];
+  }
+}
+
+DenseModel::Row DenseModel::MakeRow(int slot) const {
+  Row row;
+  row.slot = slot;
+  const cv::Mat& own = descriptors_[Index(slot)];
+  if (own.empty()) return row;
+  row.cosines.reserve(descriptors_.size() + 1);
+  for (const cv::Mat& other : descriptors_) row.cosines.push_back(Cosine(own, other));
+  return row;
+}
+
+void DenseModel::MakeRecent() {
+  recent_.clear();
+  for (int slot = size() - 1; slot >= 0 && static_cast<int>(recent_.size()) < kSequence; --slot) {
+    if (state_[Index(slot)] != State::kMerged) recent_.push_back(MakeRow(slot));
+  }
+  std::reverse(recent_.begin(), recent_.end());
+}
+
+void DenseModel::Drop(int slot) {
+  state_[Index(slot)] = State::kMerged;
+  // Its row stays for the present image.
+  descriptors_[Index(slot)] = cv::Mat();
+}
+
+void DenseModel::Remove(int slot) {
+  if (state_[Index(slot)] != State::kPresent) return;
+  state_[Index(slot)] = State::kAbsent;
+  descriptors_[Index(slot)] = cv::Mat();
+  for (Row& row : recent_) {
+    if (row.slot == slot) row.cosines.clear();
+    if (!row.cosines.empty()) row.cosines[Index(slot)] = 0.0f;
+  }
+}
+
+void DenseModel::Restore(int slot, const cv::Mat& descriptor) {
+  if (state_[Index(slot)] == State::kPresent) return;
+  state_[Index(slot)] = State::kPresent;
+  descriptors_[Index(slot)] = descriptor;
+  if (!descriptor.empty()) width_ = descriptor.cols;
+  for (Row& row : recent_) {
+    if (row.slot == slot) {
+      row = MakeRow(slot);
+    } else if (!row.cosines.empty()) {
+      row.cosines[Index(slot)] = Cosine(descriptors_[Index(row.slot)], descriptor);
+    }
+  }
+}
+
+void DenseModel::AddAbsent(bool merged) {
+  descriptors_.emplace_back();
+  state_.push_back(merged ? State::kMerged : State::kAbsent);
+}
+
+void DenseModel::FinishLoading() { MakeRecent(); }
+
+std::vector<int> DenseModel::Path() const {
+  std::vector<int> path;
+  path.reserve(descriptors_.size());
+  const int newest = recent_.empty() ? -1 : recent_.back().slot;
+  for (int slot = 0; slot < size(); ++slot) {
+    if (state_[Index(slot)] != State::kMerged || slot == newest) path.push_back(slot);
+  }
+  return path;
+}
+
+std::vector<double> DenseModel::Counts(const std::vector<int>& places) const {
+  std::vector<double> sums(descriptors_.size(), 0.0);
+  if (recent_.empty() || places.size() < kTooFewPlaces) return sums;
+  const std::vector<int> path = Path();
+  int back = 0;
+  for (auto row = recent_.rbegin(); row != recent_.rend(); ++row, ++back) {
+    if (row->cosines.empty()) continue;
+    double mean = 0;
+    int known = 0;
+    for (const int slot : places) {
+      if (descriptors_[Index(slot)].empty()) continue;
+      mean += static_cast<double>(row->cosines[Index(slot)]);
+      ++known;
+    }
+    if (known > 0) mean /= known;
+    for (std::size_t p = static_cast<std::size_t>(back); p < path.size(); ++p) {
+      const int before = path[p - static_cast<std::size_t>(back)];
+      if (descriptors_[Index(before)].empty()) continue;
+      sums[Index(path[p])] += (static_cast<double>(row->cosines[Index(before)]) - mean) / kSequence;
+    }
+  }
+  return Contrast(std::move(sums), places);
+}
+
+std::vector<double> DenseModel::Contrast(std::vector<double> scores, const std::vector<int>& places) {
+  std::vector<double> counts(scores.size(), 0.0);
+  if (places.size() < kTooFewPlaces) return counts;
+  std::vector<double> values;
+  values.reserve(places.size());
+  for (const int slot : places) values.push_back(scores[Index(slot)]);
+  const double median = MedianOf(values);
+  for (double& value : values) value = std::abs(value - median);
+  const double deviation = std::max(kLeastDeviation, kDeviation * MedianOf(values));
+  for (std::size_t i = 0; i < scores.size(); ++i) {
+    counts[i] = std::min(kMost, kScale * std::max(0.0, (scores[i] - median) / deviation - kPlain));
+  }
+  return counts;
+}
+
+std::vector<double> DenseModel::CountsOf(const cv::Mat& descriptor, const std::vector<int>& places) const {
+  std::vector<double> scores;
+  scores.reserve(descriptors_.size());
+  for (const cv::Mat& other : descriptors_) scores.push_back(static_cast<double>(Cosine(descriptor, other)));
+  return Contrast(std::move(scores), places);
+}
+
+std::vector<double> DenseModel::Scores() const {
+  std::vector<double> sums(descriptors_.size(), 0.0);
+  if (recent_.empty()) return sums;
+  const std::vector<int> path = Path();
+  std::vector<int> terms(path.size(), 0);
+  int back = 0;
+  for (auto row = recent_.rbegin(); row != recent_.rend(); ++row, ++back) {
+    if (row->cosines.empty()) continue;
+    for (std::size_t p = static_cast<std::size_t>(back); p < path.size(); ++p) {
+      const int before = path[p - static_cast<std::size_t>(back)];
+      if (descriptors_[Index(before)].empty()) continue;
+      sums[Index(path[p])] += static_cast<double>(row->cosines[Index(before)]);
+      ++terms[p];
+    }
+  }
+  for (std::size_t p = 0; p < path.size(); ++p) {
+    double& sum = sums[Index(path[p])];
+    sum = descriptors_[Index(path[p])].empty() ? 0.0 : std::max(0.0, sum / std::max(1, terms[p]));
+  }
+  return sums;
+}
+
+std::vector<double> DenseModel::ScoresOf(const cv::Mat& descriptor) const {
+  std::vector<double> scores;
+  scores.reserve(descriptors_.size());
+  for (const cv::Mat& other : descriptors_) {
+    scores.push_back(std::max(0.0, static_cast<double>(Cosine(descriptor, other))));
+  }
+  return scores;
+}
+
+void SaveDescriptor(const cv::Mat& descriptor, internal::ByteWriter& out) {
+  std::vector<float> values;
+  if (!descriptor.empty()) values.assign(descriptor.ptr<float>(), descriptor.ptr<float>() + descriptor.cols);
+  out.PutVector(values);
+}
+
+cv::Mat LoadDescriptor(internal::ByteReader& in) {
+  const std::vector<float> values = in.GetVector<float>();
+  if (values.empty()) return {};
+  const cv::Mat descriptor = cv::Mat(values, true).reshape(1, 1);
+  if (!cv::checkRange(descriptor) || !(std::abs(cv::norm(descriptor) - 1.0) < 1e-3)) {
+    in.Damaged("a descriptor that is not of length 1");
+  }
+  return descriptor;
+}
+
+void DenseModel::Save(internal::ByteWriter& out) const {
+  out.Put<std::uint64_t>(descriptors_.size());
+  for (std::size_t i = 0; i < descriptors_.size(); ++i) {
+    out.Put(static_cast<char>(state_[i]));
+    SaveDescriptor(descriptors_[i], out);
+  }
+}
+
+void DenseModel::Load(internal::ByteReader& in) {
+  const std::size_t count = in.GetCount(1 + sizeof(std::uint64_t));
+  for (std::size_t i = 0; i < count; ++i) {
+    const char state = in.Get<char>();
+    if (state < static_cast<char>(State::kAbsent) || state > static_cast<char>(State::kMerged)) {
+      in.Damaged("a location of an unknown state");
+    }
+    state_.push_back(static_cast<State>(state));
+    descriptors_.push_back(LoadDescriptor(in));
+    const cv::Mat& read = descriptors_.back();
+    if (read.empty()) continue;
+    if (state_.back() != State::kPresent) in.Damaged("a descriptor of a location that is not in memory");
+    if (width_ > 0 && read.cols != width_) in.Damaged("descriptors of several widths");
+    width_ = read.cols;
+  }
+  MakeRecent();
+}
+
+}  // namespace tutti

@@ -4,7 +4,9 @@
 //
 //   02_own_descriptors DIR
 //
-// What it takes: the name in options.external_members, and keypoints with descriptors in each query.
+// What it takes: the name in options.external_members, and keypoints with descriptors in each query. A member
+// may also describe an image as a whole, by one vector: "whole" does, a stand-in for a place-recognition
+// network. Its name is in options.dense_members, too, and it has no keypoints.
 // (A detector that is a cv::Feature2D can also be registered once by name, and is then called by tutti: see
 // RegisterFeatureType in tutti/loopclosure/features.h.)
 #include <cstdio>
@@ -43,10 +45,23 @@ tutti::Features MyFeatures(const cv::Mat& grey) {
   return features;  // none at all is fine: the member sits this image out
 }
 
+// One row of CV_32F, as wide in every image. Its length does not matter.
+tutti::Features WholeImage(const cv::Mat& grey) {
+  tutti::Features features;
+  if (grey.empty()) return features;
+  cv::Mat small;
+  cv::resize(grey, small, cv::Size(24, 18), 0, 0, cv::INTER_AREA);
+  small.convertTo(small, CV_32F);
+  small -= cv::mean(small);
+  features.descriptors = small.reshape(1, 1);
+  return features;
+}
+
 int Run(const std::string& folder) {
   tutti::LoopDetectorOptions options;
-  options.members = {"orb", "mine"};
-  options.external_members = {"mine"};
+  options.members = {"orb", "mine", "whole"};
+  options.external_members = {"mine", "whole"};
+  options.dense_members = {"whole"};
   tutti::LoopDetector detector(options);
 
   const std::vector<std::string> files = examples::FilesInOrder(folder);
@@ -56,6 +71,7 @@ int Run(const std::string& folder) {
     query.id = static_cast<std::int64_t>(i);
     query.image = cv::imread(files[i], cv::IMREAD_GRAYSCALE);  // for ORB
     query.member_features["mine"] = MyFeatures(query.image);
+    query.member_features["whole"] = WholeImage(query.image);
 
     const tutti::LoopResult result = detector.Detect(query);
     if (!result.accepted) continue;

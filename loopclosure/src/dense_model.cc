@@ -13,8 +13,8 @@ constexpr std::size_t kTooFewPlaces = 12;  // in so few, nothing can stand out
 constexpr double kDeviation = 1.4826;      // standard deviations of a normal law in a median deviation
 constexpr double kLeastDeviation = 0.002;  // of scores: cosines differ by so much without a reason
 constexpr double kPlain = 2.0;             // standard deviations that say nothing
-constexpr double kScale = 3.0;             // counts of a standard deviation beyond them
-constexpr double kMost = 30.0;             // counts of one place
+constexpr double kMost = 20.0;             // counts of one place
+constexpr double kHalfWay = 4.0;           // standard deviations beyond kPlain that make half of them
 
 std::size_t Index(int slot) { return static_cast<std::size_t>(slot); }
 
@@ -167,7 +167,8 @@ std::vector<double> DenseModel::Contrast(std::vector<double> scores, const std::
   for (double& value : values) value = std::abs(value - median);
   const double deviation = std::max(kLeastDeviation, kDeviation * MedianOf(values));
   for (std::size_t i = 0; i < scores.size(); ++i) {
-    counts[i] = std::min(kMost, kScale * std::max(0.0, (scores[i] - median) / deviation - kPlain));
+    const double beyond = std::max(0.0, (scores[i] - median) / deviation - kPlain);
+    counts[i] = kMost * beyond / (beyond + kHalfWay);
   }
   return counts;
 }

@@ -129,6 +129,7 @@ void MemorySystem::UpdateLikelihood(std::size_t u) {
     for (auto slot = recent.rbegin(); slot != recent.rend() && before < kRepeats + 1; ++slot, ++before) {
       if (slot != recent.rbegin()) sum += unit.counts[static_cast<std::size_t>(*slot)];
     }
+    if (unit.is_dense) sum *= DenseModel::kRepeatShare;
     if (before > 1) unit.weight.Repeat(sum / (before - 1));
     if (places.empty()) return;
     unit.image_likelihood = unit.alias.Likelihood(unit.counts, places, unit.seen.Amount());

@@ -147,7 +147,7 @@ void ConfigTable::AddLoops(LoopDetectorOptions& o) {
        word(&SetRule), [&o] { return RuleName(o); });
   Push("preset", "published parameters that the other keys change: default, standardised-mean, paper-2013, rtabmap-0.8.3",
        word(&ApplyPreset), [] { return "default"; });
-  Add("members", o.members, "members of the ensemble: surf, sift, orb, akaze, brisk, kaze");
+  Add("members", o.members, "members of the ensemble: surf, sift, orb, akaze, brisk, kaze, gftt, hog");
   AddEnum("likelihood", o.likelihood,
           {{"similarity", LikelihoodKind::kSimilarity}, {"tfidf", LikelihoodKind::kTfIdf}},
           "score of standardised evidence: similarity (2013) or tfidf");

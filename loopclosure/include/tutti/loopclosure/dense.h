@@ -39,6 +39,9 @@ class DenseModel {
   static constexpr int kSequence = 10;
   /// What a descriptor counts as many words as, where an image's words are counted.
   static constexpr double kWords = 100;
+  /// Share of the counts for the images just before that is taken for what a return would show: they have all
+  /// but one to three pairs of the sequence in common, and were taken from nearly the same spot.
+  static constexpr double kRepeatShare = 0.5;
 
   /// Adds the descriptor of the next slot (of length 1, 1 x D, CV_32F; empty: none). Throws InputError for
   /// another width than before.
@@ -65,7 +68,7 @@ class DenseModel {
 
   /// Counts of every slot for the present image, to be added to those of words: with the median m and the
   /// median deviation of the scores of `places`,
-  ///   z_i = (s_i - m) / (1.4826 MAD),   c_i = 3 max(0, z_i - 2),   at most 30.
+  ///   z_i = max(0, (s_i - m) / (1.4826 MAD) - 2),   c_i = 20 z_i / (z_i + 4).
   /// 0 with fewer than 12 places, where nothing can stand out.
   std::vector<double> Counts(const std::vector<int>& places) const;
   /// The same for an image that is no location, by its descriptor alone: s_i = d . d_i.

@@ -58,7 +58,7 @@ struct CandidateEvidence {
 struct MemberOpinion {
   std::string name;         ///< "surf", "sift", "orb", ...
   bool took_part = false;   ///< false: bad signature, the member sat this image out
-  int features = 0;         ///< found in this image
+  int features = 0;         ///< found in this image; a dense member has one, or none
   int words = 0;            ///< in its vocabulary by now
   double hypothesis = 0;    ///< H = 1 - p(new place)
   std::int64_t best = -1;   ///< id of its best location, -1 if none

@@ -7,12 +7,12 @@
 namespace tutti {
 namespace {
 
-constexpr int kMinSide = 16;                    // as for the members with features [px]
-constexpr int kWidth = 64, kHeight = 48;        // of the thumbnail [px]
-constexpr int kCell = 8;                        // side of a cell [px]
+constexpr int kMinSide = 16;              // as for the members with features [px]
+constexpr int kWidth = 64, kHeight = 48;  // of the thumbnail [px]
+constexpr int kCell = 8;                  // side of a cell [px]
 constexpr int kColumns = kWidth / kCell, kRows = kHeight / kCell;
-constexpr int kBins = 9;                        // directions over half a turn
-constexpr float kLeastContrast = 0.5f;          // deviation of a thumbnail with something to see [grey levels]
+constexpr int kBins = 9;                // directions over half a turn
+constexpr float kLeastContrast = 0.5f;  // deviation of a thumbnail with something to see [grey levels]
 constexpr float kPi = 3.14159265f;
 
 using Histograms = std::vector<float>;  // by cell, then by direction

@@ -78,8 +78,7 @@ TEST(DenseMember, FindsTheSecondLapAtNightWhereCornersFail) {
 }
 
 TEST(DenseMember, SaysNothingOfPlacesThatItHasNotSeen) {
-  const std::vector<LoopResult> results =
-      TwoWalks(Options({"hog"}), 30, [](int i) { return Along(i, 78); });
+  const std::vector<LoopResult> results = TwoWalks(Options({"hog"}), 30, [](int i) { return Along(i, 78); });
   for (const LoopResult& result : results) EXPECT_FALSE(result.accepted) << result.query;
 }
 

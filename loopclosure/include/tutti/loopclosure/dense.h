@@ -15,24 +15,24 @@ class ByteWriter;
 
 /// Histograms of gradients (Dalal & Triggs, CVPR 2005) of a thumbnail of 64x48 pixels: 8x6 cells of 9
 /// directions without sign, each cell relative to the gradients of the 3x3 cells around it, so that neither
-/// light nor contrast matter, not even where they differ within the image. 1 x 432, CV_32F, of length 1; empty
-/// if there is nothing to see (a plain image, or a side below 16 px). `grey`: CV_8UC1; where `mask` (CV_8UC1
-/// of the same size, or empty) is 0 nothing counts.
+/// light nor contrast matter, not even where they differ within the image. 1 x 432, CV_32F, of length 1;
+/// empty if there is nothing to see (a plain image, or a side below 16 px). `grey`: CV_8UC1; where `mask`
+/// (CV_8UC1 of the same size, or empty) is 0 nothing counts.
 cv::Mat DescribeByGradients(const cv::Mat& grey, const cv::Mat& mask = cv::Mat());
 
 /// A descriptor (1 x D, CV_32F) at length 1, in a matrix of its own; empty for one of no length or of none.
 cv::Mat NormalisedDescriptor(const cv::Mat& descriptor);
 
-/// Descriptors of all locations in STM and WM, one each, and what an image's descriptor says of them. Locations
-/// are slots: 0, 1, 2, ... in the order of adding; the newest is the present image.
+/// Descriptors of all locations in STM and WM, one each, and what an image's descriptor says of them.
+/// Locations are slots: 0, 1, 2, ... in the order of adding; the newest is the present image.
 ///
 /// One descriptor of the whole image says little when light or season change; ten in a row say much (SeqSLAM:
 /// Milford & Wyeth, ICRA 2012). With the cosine d_t . d_i of two descriptors, the score of a place i is
 ///   s_i = (1/10) sum over j = 0..9 of (d_{t-j} . d_{i-j} - mu_{t-j}),
-/// with t-j and i-j the locations before along the path, mu the mean over the places in WM, and 0 for a pair of
-/// which one is missing (before the beginning, in LTM, or without a descriptor). The path is followed in the
-/// same direction only. The state depends on nothing but which locations are there: a saved and loaded model
-/// gives the same scores.
+/// with t-j and i-j the locations before along the path, mu the mean over the places in WM, and 0 for a pair
+/// of which one is missing (before the beginning, in LTM, or without a descriptor). The path is followed in
+/// the same direction only. The state depends on nothing but which locations are there: a saved and loaded
+/// model gives the same scores.
 class DenseModel {
  public:
   /// Images in a row that are compared.

@@ -8,13 +8,13 @@
 namespace tutti {
 namespace {
 
-constexpr double kFirstShare = 0.02;        // of the words: the level before anything is known
-constexpr double kLongestMean = 80;         // images that the running mean stands for at most
-constexpr std::size_t kTooFewPlaces = 20;   // in so few, the best wrong one says nothing yet
-constexpr double kPlacePrior = 20;          // images that a place's own mean is held back by
-constexpr double kLeastMean = 0.02;         // of a place's counts
-constexpr double kMostAttraction = 3;       // a place's level lies within so many times the common one
-constexpr double kLeastRepeated = 0.1;      // a member that repeats nothing may come to
+constexpr double kFirstShare = 0.02;       // of the words: the level before anything is known
+constexpr double kLongestMean = 80;        // images that the running mean stands for at most
+constexpr std::size_t kTooFewPlaces = 20;  // in so few, the best wrong one says nothing yet
+constexpr double kPlacePrior = 20;         // images that a place's own mean is held back by
+constexpr double kLeastMean = 0.02;        // of a place's counts
+constexpr double kMostAttraction = 3;      // a place's level lies within so many times the common one
+constexpr double kLeastRepeated = 0.1;     // a member that repeats nothing may come to
 
 std::size_t Index(int slot) { return static_cast<std::size_t>(slot); }
 
@@ -49,7 +49,8 @@ double AliasEvidence::LevelOf(int slot) const {
   const double seen = known ? seen_[Index(slot)] : 0.0;
   const double own = (sum + kPlacePrior * mean) / (seen + kPlacePrior);
   const double attraction = (own + kLeastMean) / (mean + kLeastMean);
-  return common * std::clamp(std::pow(attraction, options_.attraction), 1.0 / kMostAttraction, kMostAttraction);
+  return common *
+         std::clamp(std::pow(attraction, options_.attraction), 1.0 / kMostAttraction, kMostAttraction);
 }
 
 Belief AliasEvidence::Likelihood(const std::vector<double>& counts, const std::vector<int>& working_memory,
@@ -112,7 +113,8 @@ void AliasEvidence::LoadLevel(internal::ByteReader& in) {
   first_images_ = in.Get<std::int32_t>();
   images_ = in.Get<double>();
   const bool good = log_level_ >= 0 && log_level_ < 50 && words_sum_ >= 0 && std::isfinite(words_sum_) &&
-                    first_images_ >= 0 && first_images_ <= kFirstImages && images_ >= 1 && images_ <= kLongestMean;
+                    first_images_ >= 0 && first_images_ <= kFirstImages && images_ >= 1 &&
+                    images_ <= kLongestMean;
   if (!good) in.Damaged("an alias level");
 }
 

@@ -10,7 +10,6 @@
 
 namespace tutti {
 
-
 namespace {
 
 std::vector<Member> MembersOf(const LoopDetectorOptions& options) {
@@ -28,7 +27,8 @@ SeenWords Placed(std::vector<int> words, const std::vector<cv::KeyPoint>& keypoi
   SeenWords seen;
   seen.words = std::move(words);
   seen.cells.reserve(seen.words.size());
-  for (std::size_t i = 0; i < seen.words.size(); ++i) seen.cells.push_back(SeenWords::Cell(keypoints[i].pt, size));
+  for (std::size_t i = 0; i < seen.words.size(); ++i)
+    seen.cells.push_back(SeenWords::Cell(keypoints[i].pt, size));
   return seen;
 }
 

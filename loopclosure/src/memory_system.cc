@@ -9,8 +9,8 @@ namespace {
 constexpr int kRetrievalLevels = 10;  // LTM is searched this far from the hypothesis
 constexpr int kImmuneLevels = 2;      // what is so near to the hypothesis stays in WM
 
-constexpr int kNearLevels = 5;        // what is so near to the most probable place may be it
-constexpr int kRepeats = 3;           // images before this one that show what a member repeats
+constexpr int kNearLevels = 5;  // what is so near to the most probable place may be it
+constexpr int kRepeats = 3;     // images before this one that show what a member repeats
 
 // Of all members that a filter sees, with ids as Signature::Concatenate has them.
 SeenWords WordsFor(const FilterUnit& unit, const std::vector<SeenWords>& words) {

@@ -38,8 +38,8 @@ PlaceReasoner::PlaceReasoner(const LoopDetectorOptions& options, std::vector<Mem
   }
   for (const std::vector<std::size_t>& unit : units) {
     const int number = static_cast<int>(systems_.size());
-    systems_.push_back(std::make_unique<MemorySystem>(
-        number, options_, std::vector<std::vector<std::size_t>>{unit}, members_));
+    systems_.push_back(std::make_unique<MemorySystem>(number, options_,
+                                                      std::vector<std::vector<std::size_t>>{unit}, members_));
   }
 }
 
@@ -144,7 +144,8 @@ void PlaceReasoner::FillOpinion(std::size_t member, const CombinedBelief& combin
       opinion.posterior_by_location.emplace_back(memory().id(slot), PosteriorAt(posterior, slot));
     }
     if (options_.keep_evidence) {
-      opinion.evidence.push_back({memory().id(slot), Index(slot) < unit.scores.size() ? unit.scores[Index(slot)] : 0.0,
+      opinion.evidence.push_back({memory().id(slot),
+                                  Index(slot) < unit.scores.size() ? unit.scores[Index(slot)] : 0.0,
                                   PosteriorAt(unit.image_likelihood, slot), PosteriorAt(posterior, slot)});
     }
   }

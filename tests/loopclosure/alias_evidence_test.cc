@@ -52,7 +52,8 @@ TEST(AliasEvidence, NoWordInCommonSaysNewPlaceHoweverManyPlacesThereAre) {
     BayesFilter filter;
     const std::vector<double> nothing(static_cast<std::size_t>(memory.size()), 0.0);
     for (int image = 0; image < 30; ++image) {
-      filter.Step(transition, memory.working_memory(), evidence.Likelihood(nothing, memory.working_memory(), 0));
+      filter.Step(transition, memory.working_memory(),
+                  evidence.Likelihood(nothing, memory.working_memory(), 0));
     }
     EXPECT_LT(filter.posterior().Hypothesis(), LoopDetectorOptions().propose_threshold) << n << " places";
   }
@@ -90,8 +91,7 @@ TEST(AliasEvidence, CountsBeyondTheLevelSpeakForAPlaceAndFewSpeakAgainstIt) {
   const Belief likelihood = evidence.Of(counts, Places(100));
   EXPECT_EQ(likelihood.new_place, 1.0);
   const EvidenceOptions options;
-  EXPECT_NEAR(likelihood.places[7],
-              std::pow(41.0 / (evidence.LevelOf(7) + 1.0), options.sharpness), 1e-9);
+  EXPECT_NEAR(likelihood.places[7], std::pow(41.0 / (evidence.LevelOf(7) + 1.0), options.sharpness), 1e-9);
   EXPECT_GT(likelihood.places[7], 30.0);
   EXPECT_NEAR(likelihood.places[8], std::exp(options.floor), 1e-12);
 }
@@ -139,9 +139,9 @@ double WeightOf(double repeated, double wrong) {
 }
 
 TEST(MemberWeight, IsLargeForWhatRepeatsAndIsNotWrong) {
-  EXPECT_GT(WeightOf(20, 2), 5 * WeightOf(20, 10));    // matches everything everywhere
-  EXPECT_GT(WeightOf(20, 2), 20 * WeightOf(0, 2));     // sees nothing again
-  EXPECT_GT(WeightOf(0, 0), 0.0);                      // but may come to
+  EXPECT_GT(WeightOf(20, 2), 5 * WeightOf(20, 10));  // matches everything everywhere
+  EXPECT_GT(WeightOf(20, 2), 20 * WeightOf(0, 2));   // sees nothing again
+  EXPECT_GT(WeightOf(0, 0), 0.0);                    // but may come to
 }
 
 TEST(MemberWeight, LearnsNothingFromWhereTheImageWasTaken) {

@@ -49,7 +49,8 @@ TEST(Likelihood, CountsFollowTheEquation) {
   model.Add(Signature({8, 9}));
   // Word 1 twice, in cells 0 and 6; word 2 in cell 1, of the same strip as 0; 77 and -1 nobody knows.
   const std::vector<double> counts = model.Counts(Seen({1, 1, 2, 77, -1}, {0, 6, 1, 2, 3}));
-  const double one = std::log10(3.0 / 2.0) / std::log10(3.0) / 2;  // an occurrence of 1, at each of its two cells
+  const double one =
+      std::log10(3.0 / 2.0) / std::log10(3.0) / 2;  // an occurrence of 1, at each of its two cells
   const double first_strip = std::log1p(2 * one) + std::log1p(1.0);
   const double last_strip = std::log1p(2 * one);
   EXPECT_NEAR(counts[0], std::pow(first_strip, 0.75) + std::pow(last_strip, 0.75), 1e-12);

@@ -143,9 +143,13 @@ void ConfigTable::AddLoops(LoopDetectorOptions& o) {
       return "";
     };
   };
-  Push("rule", "joint, mean, log-pool, product, majority, naive over the members, or one member's name for that alone",
-       word(&SetRule), [&o] { return RuleName(o); });
-  Push("preset", "published parameters that the other keys change: default, standardised-mean, paper-2013, rtabmap-0.8.3",
+  Push(
+      "rule",
+      "joint, mean, log-pool, product, majority, naive over the members, or one member's name for that alone",
+      word(&SetRule), [&o] { return RuleName(o); });
+  Push("preset",
+       "published parameters that the other keys change: default, standardised-mean, paper-2013, "
+       "rtabmap-0.8.3",
        word(&ApplyPreset), [] { return "default"; });
   Add("members", o.members, "members of the ensemble: surf, sift, orb, akaze, brisk, kaze");
   AddEnum("likelihood", o.likelihood,

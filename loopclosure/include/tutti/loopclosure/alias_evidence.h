@@ -17,9 +17,9 @@ class ByteWriter;
 /// Likelihood of the places by their counts of matched words (docs/loop-closure.md section 2).
 ///
 /// The *alias level* Lambda is what the best of the wrong places reaches in this environment. It is learnt
-/// without labels: an image that shows a new place (by the filter's own posterior) tells it by its best place,
-/// any other by its best place far from the one where it was taken. A place that attracts every image (its
-/// mean count is high) has a higher level of its own. With the count C_i of a place,
+/// without labels: an image that shows a new place (by the filter's own posterior) tells it by its best
+/// place, any other by its best place far from the one where it was taken. A place that attracts every image
+/// (its mean count is high) has a higher level of its own. With the count C_i of a place,
 ///
 ///   log L_i = max(floor, beta ln[(C_i + 1) / (Lambda_i + 1)]),   L_new = 1.
 ///
@@ -60,19 +60,19 @@ class AliasEvidence {
 
  private:
   EvidenceOptions options_;
-  double log_level_ = 0;     // ln(Lambda + 1)
-  double words_sum_ = 0;     // of the first images
-  int first_images_ = 0;     // that were seen, up to kFirstImages
-  double images_ = 15;       // that the running mean stands for
-  std::vector<double> sum_;  // by slot: counts of images that were taken elsewhere,
+  double log_level_ = 0;      // ln(Lambda + 1)
+  double words_sum_ = 0;      // of the first images
+  int first_images_ = 0;      // that were seen, up to kFirstImages
+  double images_ = 15;        // that the running mean stands for
+  std::vector<double> sum_;   // by slot: counts of images that were taken elsewhere,
   std::vector<double> seen_;  // and how many they were
   double all_sum_ = 0;
   double all_seen_ = 0;
 };
 
 /// How much a member counts in the sum of all: by what it shows of the same place against what it shows of
-/// wrong ones, w ~ R / (E[f^2] + 1), with f its largest count far from where the image was taken and R its mean
-/// count for the few images before. A member that matches everything everywhere has a large f, one that
+/// wrong ones, w ~ R / (E[f^2] + 1), with f its largest count far from where the image was taken and R its
+/// mean count for the few images before. A member that matches everything everywhere has a large f, one that
 /// matches nothing has R = 0: neither has a say.
 class MemberWeight {
  public:

@@ -128,8 +128,8 @@ struct LoopResult {
   double posterior = 0;                ///< combined posterior at the candidate
   double probability = 0;              ///< that this is a loop: with the verified place, else the candidate
   bool proposed = false;               ///< H >= propose_threshold: went to verification
-  bool accepted = false;  ///< the verification accepted it (or one of its neighbours), and the
-                          ///< probability is at least loop_threshold
+  bool accepted = false;               ///< the verification accepted it (or one of its neighbours), and the
+                                       ///< probability is at least loop_threshold
   std::string reason;                  ///< why it is not accepted, in plain words
   std::vector<MemberOpinion> members;  ///< in the order of options.members
   Verification verification;           ///< the best one tried
@@ -176,9 +176,9 @@ class LoopDetector {
   /// Adds a neighbour link between two locations (a caller's own odometry link); consecutive ids are linked
   /// by themselves.
   void AddLink(std::int64_t a, std::int64_t b);
-  /// Takes back the loop between two locations, that Detect accepted and the caller has found to be false (the
-  /// pose graph contradicts it): the filter no longer takes their places for one. Ids that are unknown, or not
-  /// linked by a loop, are no error.
+  /// Takes back the loop between two locations, that Detect accepted and the caller has found to be false
+  /// (the pose graph contradicts it): the filter no longer takes their places for one. Ids that are unknown,
+  /// or not linked by a loop, are no error.
   void Unlink(std::int64_t a, std::int64_t b);
 
   /// Saves everything (vocabularies, memory with its long-term part, filters) into one file; a file that is

@@ -21,8 +21,8 @@ class ByteWriter;
 struct SeenWords {
   static constexpr int kColumns = 8;
   static constexpr int kStripColumns = 2;  ///< that make an upright strip of the image
-  std::vector<int> words;  ///< one for each feature; -1: not known
-  std::vector<int> cells;  ///< likewise
+  std::vector<int> words;                  ///< one for each feature; -1: not known
+  std::vector<int> cells;                  ///< likewise
 
   /// The cell of a pixel, row by row.
   static int Cell(const cv::Point2f& pixel, const cv::Size& size);

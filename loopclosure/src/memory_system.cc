@@ -12,7 +12,7 @@ constexpr int kImmuneLevels = 2;      // what is so near to the hypothesis stays
 constexpr int kNearLevels = 5;  // what is so near to the most probable place may be it
 constexpr int kRepeats = 3;     // images before this one that show what a member repeats
 
-// Of all members that a filter sees, with ids as Signature::Concatenate has them.
+// Of all members that a filter sees, with ids as Signature::Split takes them apart.
 SeenWords WordsFor(const FilterUnit& unit, const std::vector<SeenWords>& words) {
   const int parts = static_cast<int>(unit.members.size());
   SeenWords all;

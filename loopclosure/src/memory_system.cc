@@ -102,21 +102,28 @@ bool MemorySystem::LooksLikePrevious(int slot) const {
   return sum / static_cast<double>(units_.size()) >= options_.rehearsal_similarity;
 }
 
+// What the unit shares with the few images before, which show nearly the same.
+void MemorySystem::Repeat(FilterUnit& unit) const {
+  const std::deque<int>& recent = memory_.short_term_memory();
+  double sum = 0;
+  int images = 0;
+  for (auto slot = recent.rbegin(); slot != recent.rend() && images <= kRepeats; ++slot, ++images) {
+    if (slot != recent.rbegin()) sum += unit.counts[static_cast<std::size_t>(*slot)];
+  }
+  if (images < 2) return;
+  unit.repeated = sum / (images - 1);
+  unit.weight.Repeat(unit.repeated);
+}
+
 void MemorySystem::UpdateLikelihood(std::size_t u) {
   FilterUnit& unit = units_[u];
   if (!unit.took_part()) return;
   const std::vector<int>& places = memory_.working_memory();
   if (Counts()) {
     unit.counts = unit.likelihood.Counts(unit.seen);
-    const std::deque<int>& recent = memory_.short_term_memory();
-    int before = 0;
-    double sum = 0;
-    for (auto slot = recent.rbegin(); slot != recent.rend() && before < kRepeats + 1; ++slot, ++before) {
-      if (slot != recent.rbegin()) sum += unit.counts[static_cast<std::size_t>(*slot)];
-    }
-    if (before > 1) unit.weight.Repeat(sum / (before - 1));
+    Repeat(unit);
     if (places.empty()) return;
-    unit.image_likelihood = unit.alias.Likelihood(unit.counts, places, unit.seen.size());
+    unit.image_likelihood = unit.alias.Likelihood(unit.counts, places, unit.seen.size(), unit.repeated);
     if (options_.keep_evidence) unit.scores = unit.counts;
     return;
   }
@@ -163,8 +170,13 @@ void MemorySystem::StepJoint() {
   if (!joint_ || !JointTookPart() || memory_.working_memory().empty()) return;
   joint_->counts = JointCounts();
   double words = 0;
-  for (const FilterUnit& unit : units_) words += unit.took_part() ? unit.seen.size() : 0;
-  joint_->image_likelihood = joint_->alias.Likelihood(joint_->counts, memory_.working_memory(), words);
+  double repeated = 0;
+  for (std::size_t u = 0; u < units_.size(); ++u) {
+    words += units_[u].took_part() ? units_[u].seen.size() : 0;
+    repeated += WeightOf(u) * units_[u].repeated;
+  }
+  joint_->image_likelihood =
+      joint_->alias.Likelihood(joint_->counts, memory_.working_memory(), words, repeated);
   joint_->filter.Step(transition_, memory_.working_memory(), joint_->image_likelihood);
 }
 

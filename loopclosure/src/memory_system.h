@@ -47,6 +47,7 @@ struct FilterUnit : PlaceFilter {
   MemberWeight weight;
   Signature signature;         ///< of the present image, empty if bad
   SeenWords seen;              ///< the same, feature by feature
+  double repeated = 0;         ///< its mean count for the few images before
   std::vector<double> scores;  ///< raw ones behind the likelihood, by slot; only with keep_evidence
   bool took_part() const { return !signature.empty(); }
 };
@@ -124,6 +125,7 @@ class MemorySystem {
   void Link(int a, int b, LocationMemory::LinkType type);
   void Relinked(int a, int b);
   bool Counts() const { return options_.evidence.kind == EvidenceKind::kCounts; }
+  void Repeat(FilterUnit& unit) const;
   bool JointTookPart() const;
   double WeightScale() const;
   std::vector<double> JointCounts() const;

@@ -36,7 +36,7 @@ AliasEvidence Experienced(int n, double most) {
   std::mt19937 random(1);
   for (int i = 0; i < 300; ++i) {
     const std::vector<double> counts = Resemblances(n, most, random);
-    evidence.Likelihood(counts, Places(n), 1200);
+    evidence.Likelihood(counts, Places(n), 1200, 20);
     evidence.Learn(counts, Places(n), {}, 1.0);
   }
   return evidence;
@@ -53,7 +53,7 @@ TEST(AliasEvidence, NoWordInCommonSaysNewPlaceHoweverManyPlacesThereAre) {
     const std::vector<double> nothing(static_cast<std::size_t>(memory.size()), 0.0);
     for (int image = 0; image < 30; ++image) {
       filter.Step(transition, memory.working_memory(),
-                  evidence.Likelihood(nothing, memory.working_memory(), 0));
+                  evidence.Likelihood(nothing, memory.working_memory(), 0, 0));
     }
     EXPECT_LT(filter.posterior().Hypothesis(), LoopDetectorOptions().propose_threshold) << n << " places";
   }
@@ -67,7 +67,7 @@ TEST(AliasEvidence, TheLevelIsWhatTheBestWrongPlaceReaches) {
 
 TEST(AliasEvidence, BeforeAnythingIsKnownTheLevelIsHighAndFallsWithExperience) {
   AliasEvidence evidence{EvidenceOptions()};
-  evidence.Likelihood(std::vector<double>(50, 0.0), Places(50), 1200);
+  evidence.Likelihood(std::vector<double>(50, 0.0), Places(50), 1200, 20);
   EXPECT_NEAR(evidence.Level(), 0.02 * 1200, 1e-9);
   EXPECT_LT(Experienced(50, 3.0).Level(), 4.0);
 }
@@ -96,13 +96,26 @@ TEST(AliasEvidence, CountsBeyondTheLevelSpeakForAPlaceAndFewSpeakAgainstIt) {
   EXPECT_NEAR(likelihood.places[8], std::exp(options.floor), 1e-12);
 }
 
+TEST(AliasEvidence, AnImageThatRepeatsLittleNeedsLess) {
+  AliasEvidence evidence = Experienced(100, 5.0);  // images that share 20 with those before
+  std::vector<double> counts(100, 0.5);
+  counts[7] = 5.0;
+  AliasEvidence same = evidence;
+  const double as_usual = same.Likelihood(counts, Places(100), 1200, 20).places[7];
+  const double in_the_dark = evidence.Likelihood(counts, Places(100), 1200, 4).places[7];
+  EXPECT_LT(as_usual, 2.0);
+  EXPECT_GT(in_the_dark, 5.0);
+  AliasEvidence bright = Experienced(100, 5.0);
+  EXPECT_EQ(bright.Likelihood(counts, Places(100), 1200, 80).places[7], as_usual);  // never more than usual
+}
+
 TEST(AliasEvidence, APlaceThatEveryImageResemblesNeedsMore) {
   AliasEvidence evidence{EvidenceOptions()};
   std::mt19937 random(3);
   for (int i = 0; i < 200; ++i) {
     std::vector<double> counts = Resemblances(100, 4.0, random);
     counts[11] = 12.0;  // a blank wall
-    evidence.Likelihood(counts, Places(100), 1200);
+    evidence.Likelihood(counts, Places(100), 1200, 20);
     evidence.Learn(counts, Places(100), {}, 1.0);
   }
   EXPECT_GT(evidence.LevelOf(11), 1.5 * evidence.LevelOf(12));

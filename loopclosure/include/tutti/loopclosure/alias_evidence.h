@@ -23,6 +23,10 @@ class ByteWriter;
 ///
 ///   log L_i = max(floor, beta ln[(C_i + 1) / (Lambda_i + 1)]),   L_new = 1.
 ///
+/// An image that shares little with anything (dark, blurred, in the rain) shares less with wrong places, too:
+/// its levels are lower by what it shares with the few images just before, compared with what images of new
+/// places usually do.
+///
 /// So shared words speak for a place only beyond what resemblance alone brings about, few of them speak
 /// against all places, and an image without any says "new place", however many places there are.
 class AliasEvidence {
@@ -33,11 +37,13 @@ class AliasEvidence {
   explicit AliasEvidence(const EvidenceOptions& options) : options_(options) {}
 
   /// The likelihood of an image with these counts (by slot) over the places of `working_memory`. `words`:
-  /// that the image has.
-  Belief Likelihood(const std::vector<double>& counts, const std::vector<int>& working_memory, double words);
+  /// that the image has; `repeated`: its mean count for the few images before.
+  Belief Likelihood(const std::vector<double>& counts, const std::vector<int>& working_memory, double words,
+                    double repeated);
 
-  /// The same for an image that is no location: nothing is learnt.
-  Belief Of(const std::vector<double>& counts, const std::vector<int>& working_memory) const;
+  /// The same for an image that is no location, with the levels times `share`: nothing is learnt.
+  Belief Of(const std::vector<double>& counts, const std::vector<int>& working_memory,
+            double share = 1) const;
 
   /// Learns from the same image, after the filter's step: `near` are the slots of the most probable place and
   /// its neighbours, ascending; `new_place` is the posterior of the new place.
@@ -68,6 +74,9 @@ class AliasEvidence {
   std::vector<double> seen_;  // and how many they were
   double all_sum_ = 0;
   double all_seen_ = 0;
+  double log_repeated_ = 0;     // running mean of ln(repeated) over images of new places
+  double repeated_images_ = 0;  // that it stands for
+  double log_repeated_now_ = 0;
 };
 
 /// How much a member counts in the sum of all: by what it shows of the same place against what it shows of

@@ -85,7 +85,7 @@ struct EvidenceOptions {
   double alias_share = 0.85;  ///< share of the alias level that a place must reach to be more likely than a
                               ///< new one, above 0, at most 3
   double floor = -1.0;      ///< least logarithm of a likelihood, below 0, at least -10
-  double attraction = 0.5;  ///< how much more a place must show that many images resemble: exponent of its
+  double attraction = 0.75;  ///< how much more a place must show that many images resemble: exponent of its
                             ///< mean count, 0 (no more) to 2
 
   /// Empty if usable, else what is wrong and what to do.

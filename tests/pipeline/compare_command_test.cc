@@ -127,7 +127,8 @@ TEST_F(CollectCommand, TheMeanOfStandardisedEvidenceIsAVariantOfItsOwn) {
   const fs::path file = folder_ / "c.json";
   ASSERT_EQ(Collect({"--json", file.string()}).status, 0);
   std::map<std::string, std::size_t> runs;
-  for (const auto& variant : nlohmann::json::parse(ReadAll(file))["datasets"][0]["variants"])
+  const auto json = nlohmann::json::parse(ReadAll(file));
+  for (const auto& variant : json["datasets"][0]["variants"])
     runs[variant["variant"]] = variant["seeds"].size();
   EXPECT_EQ(runs, (std::map<std::string, std::size_t>{{"ensemble", 1}, {"mean", 1}, {"seed", 2}}));
 }

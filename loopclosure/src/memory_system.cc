@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "pose_track.h"
+
 namespace tutti::internal {
 namespace {
 
@@ -117,11 +119,13 @@ void MemorySystem::UpdateLikelihood(std::size_t u) {
     if (before > 1) unit.weight.Repeat(sum / (before - 1));
     if (places.empty()) return;
     unit.image_likelihood = unit.alias.Likelihood(unit.counts, places, unit.seen.size());
+    ApplyGains(gains_, places, unit.image_likelihood);
     if (options_.keep_evidence) unit.scores = unit.counts;
     return;
   }
   std::vector<double> scores = unit.likelihood.Scores(unit.signature);
   unit.image_likelihood = AdjustLikelihood(scores, places);
+  ApplyGains(gains_, places, unit.image_likelihood);
   if (options_.keep_evidence) unit.scores = std::move(scores);
 }
 
@@ -165,6 +169,7 @@ void MemorySystem::StepJoint() {
   double words = 0;
   for (const FilterUnit& unit : units_) words += unit.took_part() ? unit.seen.size() : 0;
   joint_->image_likelihood = joint_->alias.Likelihood(joint_->counts, memory_.working_memory(), words);
+  ApplyGains(gains_, memory_.working_memory(), joint_->image_likelihood);
   joint_->filter.Step(transition_, memory_.working_memory(), joint_->image_likelihood);
 }
 

@@ -148,7 +148,7 @@ int LoopDetector::Impl::Remember(const LoopQuery& query, View view, const std::v
   }
   views_.push_back(std::move(view));
   const int newest = static_cast<int>(views_.size()) - 1;
-  const int stands_for = reasoner_.Remember(query.id, words);
+  const int stands_for = reasoner_.Remember(query.id, words, query.pose_prior);
   if (stands_for != newest) {
     dropped_view_ = std::move(views_.back());
     views_.back() = View();

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "pose_track.h"
+
 namespace tutti::internal {
 namespace {
 
@@ -123,12 +125,18 @@ void MemorySystem::UpdateLikelihood(std::size_t u) {
     unit.counts = unit.likelihood.Counts(unit.seen);
     Repeat(unit);
     if (places.empty()) return;
+<<<<<<< HEAD
     unit.image_likelihood = unit.alias.Likelihood(unit.counts, places, unit.seen.size(), unit.repeated);
+=======
+    unit.image_likelihood = unit.alias.Likelihood(unit.counts, places, unit.seen.size());
+    ApplyGains(gains_, places, unit.image_likelihood);
+>>>>>>> slam
     if (options_.keep_evidence) unit.scores = unit.counts;
     return;
   }
   std::vector<double> scores = unit.likelihood.Scores(unit.signature);
   unit.image_likelihood = AdjustLikelihood(scores, places);
+  ApplyGains(gains_, places, unit.image_likelihood);
   if (options_.keep_evidence) unit.scores = std::move(scores);
 }
 
@@ -170,6 +178,7 @@ void MemorySystem::StepJoint() {
   if (!joint_ || !JointTookPart() || memory_.working_memory().empty()) return;
   joint_->counts = JointCounts();
   double words = 0;
+<<<<<<< HEAD
   double repeated = 0;
   for (std::size_t u = 0; u < units_.size(); ++u) {
     words += units_[u].took_part() ? units_[u].seen.size() : 0;
@@ -177,6 +186,11 @@ void MemorySystem::StepJoint() {
   }
   joint_->image_likelihood =
       joint_->alias.Likelihood(joint_->counts, memory_.working_memory(), words, repeated);
+=======
+  for (const FilterUnit& unit : units_) words += unit.took_part() ? unit.seen.size() : 0;
+  joint_->image_likelihood = joint_->alias.Likelihood(joint_->counts, memory_.working_memory(), words);
+  ApplyGains(gains_, memory_.working_memory(), joint_->image_likelihood);
+>>>>>>> slam
   joint_->filter.Step(transition_, memory_.working_memory(), joint_->image_likelihood);
 }
 

@@ -64,6 +64,8 @@ class MemorySystem {
   /// rehearsed, and the oldest of STM go to WM. Returns the slot that now stands for the image.
   int Remember(std::int64_t id, const std::vector<SeenWords>& words);
 
+  /// Factors of the places for the present image (PoseTrack::Gains), empty: none.
+  void SetGains(std::vector<double> gains) { gains_ = std::move(gains); }
   /// Step 5. Different units may run at the same time; then the joint filter, if there is one.
   void UpdateLikelihood(std::size_t unit);
   void StepFilter(std::size_t unit);
@@ -136,6 +138,7 @@ class MemorySystem {
   std::vector<Member>& members_;
   std::vector<FilterUnit> units_;
   std::optional<PlaceFilter> joint_;  // works on the units' counts
+  std::vector<double> gains_;           // of the places, for the present image
   LocationMemory memory_;
   TransitionModel transition_;
 };

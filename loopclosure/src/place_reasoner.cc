@@ -43,8 +43,10 @@ PlaceReasoner::PlaceReasoner(const LoopDetectorOptions& options, std::vector<Mem
   }
 }
 
-int PlaceReasoner::Remember(std::int64_t id, const std::vector<SeenWords>& words) {
+int PlaceReasoner::Remember(std::int64_t id, const std::vector<SeenWords>& words,
+                            const std::optional<PosePrior>& prior) {
   const int newest = memory().size();
+  track_.Add(newest, prior);
   if (!Shared()) union_.Add(id);
   bool dropped_by_all = true;
   int stands_for = newest;
@@ -72,6 +74,7 @@ void PlaceReasoner::ForEachUnit(const std::function<void(MemorySystem&, std::siz
 CombinedBelief PlaceReasoner::Step(LoopResult& result,
                                    const std::function<void(std::size_t, FilterUnit&)>& disturb) {
   Stopwatch watch;
+  for (auto& system : systems_) system->SetGains(track_.Gains(system->memory().working_memory()));
   ForEachUnit([&](MemorySystem& system, std::size_t u) {
     system.UpdateLikelihood(u);
     if (disturb) disturb(u, system.units()[u]);

@@ -47,15 +47,16 @@ LoopGate::Map LoopCloser::Places() const {
 
 // Measures it against the map, and closes it if something else says the same.
 void LoopCloser::Consider(const Verification& verification, int candidate, int query, std::int64_t frames) {
-  odometry_.FinishMapping();
   LoopRecord& record = records_.back();
+  if (record.query_stamp_s - record.candidate_stamp_s < options_.loop_min_age_s) {
+    record.reason = "too recent: still in the local map";
+    return;
+  }
+  before_change_();  // what mapping has found enters earlier than without the loop
+  odometry_.FinishMapping();
   const LoopGate::Map places = Places();
   if (!places(candidate).alive || !places(query).alive) {
     record.reason = "one of its keyframes is no longer in the map";
-    return;
-  }
-  if (record.query_stamp_s - record.candidate_stamp_s < options_.loop_min_age_s) {
-    record.reason = "too recent: still in the local map";
     return;
   }
   const LoopConstraint constraint = Measure(verification, candidate, query);

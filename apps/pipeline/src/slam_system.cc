@@ -175,6 +175,11 @@ class SlamSystem::Impl {
     if (odometry_) {
       KeyframeView view = ViewOf(keyframe);
       query.camera = rig_.camera;
+      if (options_.loop_pose_prior && rig_.sensor != Sensor::kMono) {  // mono: its scale drifts
+        query.pose_prior.emplace();
+        query.pose_prior->position_m = view.T_world_camera.translation;
+        query.pose_prior->frame = view.map_piece;
+      }
       query.features = {std::move(view.keypoints), std::move(view.descriptors), std::move(view.points)};
       keyframe_of_frame_[frame.index] = keyframe;
     }

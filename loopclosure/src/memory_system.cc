@@ -125,12 +125,8 @@ void MemorySystem::UpdateLikelihood(std::size_t u) {
     unit.counts = unit.likelihood.Counts(unit.seen);
     Repeat(unit);
     if (places.empty()) return;
-<<<<<<< HEAD
     unit.image_likelihood = unit.alias.Likelihood(unit.counts, places, unit.seen.size(), unit.repeated);
-=======
-    unit.image_likelihood = unit.alias.Likelihood(unit.counts, places, unit.seen.size());
     ApplyGains(gains_, places, unit.image_likelihood);
->>>>>>> slam
     if (options_.keep_evidence) unit.scores = unit.counts;
     return;
   }
@@ -178,7 +174,6 @@ void MemorySystem::StepJoint() {
   if (!joint_ || !JointTookPart() || memory_.working_memory().empty()) return;
   joint_->counts = JointCounts();
   double words = 0;
-<<<<<<< HEAD
   double repeated = 0;
   for (std::size_t u = 0; u < units_.size(); ++u) {
     words += units_[u].took_part() ? units_[u].seen.size() : 0;
@@ -186,11 +181,7 @@ void MemorySystem::StepJoint() {
   }
   joint_->image_likelihood =
       joint_->alias.Likelihood(joint_->counts, memory_.working_memory(), words, repeated);
-=======
-  for (const FilterUnit& unit : units_) words += unit.took_part() ? unit.seen.size() : 0;
-  joint_->image_likelihood = joint_->alias.Likelihood(joint_->counts, memory_.working_memory(), words);
   ApplyGains(gains_, memory_.working_memory(), joint_->image_likelihood);
->>>>>>> slam
   joint_->filter.Step(transition_, memory_.working_memory(), joint_->image_likelihood);
 }
 

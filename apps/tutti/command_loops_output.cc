@@ -169,8 +169,9 @@ nlohmann::ordered_json ProtocolJson(const LoopRun& run) {
           {"ground_truth", run.truth.description},
           {"tolerance_frames", 0},
           {"exclusion", "the newest " + std::to_string(run.options.stm_size) + " images (short-term memory)"},
-          {"threshold", "recall_at_100_precision: chosen after the fact; at_default_threshold: fixed, of the probability; "
-                        "posterior: of H"}};
+          {"threshold",
+           "recall_at_100_precision: chosen after the fact; at_default_threshold: fixed, of the probability; "
+           "posterior: of H"}};
 }
 
 void WriteLoopRun(const LoopRun& run, const LoopReport& report, const std::filesystem::path& folder) {

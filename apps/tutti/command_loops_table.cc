@@ -72,11 +72,12 @@ Json Compare(const LoopTable& table, const Ranking& ranking, const LoopTableRow&
 Json Significance(const LoopTable& table) {
   Json tests = Json::array();
   for (const Ranking& ranking : kRankings) {
-    const LoopTableRow *joint = Find(table, "joint"), *mean = Find(table, "mean"), *naive = Find(table, "naive");
+    const LoopTableRow *joint = Find(table, "joint"), *mean = Find(table, "mean"),
+                       *naive = Find(table, "naive");
     const LoopTableRow* single = BestSingle(table, ranking);
-    for (const auto& [a, b] : {std::make_pair(joint, mean), std::make_pair(joint, naive),
-                               std::make_pair(joint, single), std::make_pair(mean, naive),
-                               std::make_pair(mean, single), std::make_pair(naive, single)}) {
+    for (const auto& [a, b] :
+         {std::make_pair(joint, mean), std::make_pair(joint, naive), std::make_pair(joint, single),
+          std::make_pair(mean, naive), std::make_pair(mean, single), std::make_pair(naive, single)}) {
       if (a != nullptr && b != nullptr) tests.push_back(Compare(table, ranking, *a, *b));
     }
   }

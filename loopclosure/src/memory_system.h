@@ -138,7 +138,7 @@ class MemorySystem {
   std::vector<Member>& members_;
   std::vector<FilterUnit> units_;
   std::optional<PlaceFilter> joint_;  // works on the units' counts
-  std::vector<double> gains_;           // of the places, for the present image
+  std::vector<double> gains_;         // of the places, for the present image
   LocationMemory memory_;
   TransitionModel transition_;
 };

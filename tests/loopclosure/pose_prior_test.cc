@@ -40,8 +40,8 @@ LoopResult SeeTheDoorAgain(const std::function<std::optional<PosePrior>(double x
     const bool back = i >= kDoors;
     LoopQuery query;
     query.id = i;
-    query.image = testing::TexturedImage(
-        static_cast<std::uint32_t>(back || i == kOtherTwin ? kTwin : i), 240, 180);
+    query.image =
+        testing::TexturedImage(static_cast<std::uint32_t>(back || i == kOtherTwin ? kTwin : i), 240, 180);
     query.pose_prior = prior(back ? x : i);
     result = detector.Detect(query);
   }
@@ -91,8 +91,8 @@ TEST(PosePrior, OfNumbersThatAreNoneIsRefused) {
   LoopDetector detector(testing::SmallOptions());
   LoopQuery query;
   query.image = testing::TexturedImage(1, 240, 180);
-  for (const PosePrior& prior : {At(std::nan("")), At(0, 0), At(0, 1, -1),
-                                 At(0, std::numeric_limits<double>::infinity())}) {
+  for (const PosePrior& prior :
+       {At(std::nan("")), At(0, 0), At(0, 1, -1), At(0, std::numeric_limits<double>::infinity())}) {
     query.pose_prior = prior;
     EXPECT_THROW(detector.Detect(query), InputError);
   }

@@ -200,7 +200,8 @@ TEST(Config, EveryOptionFieldHasItsKey) {
     for (const std::string& field : fields) {
       // A section, in section camera, or only for callers of the library (their own features).
       const bool elsewhere = field == "camera" || field == "baseline_m" || field == "extraction" ||
-                             field == "external_members" || field == "vocabulary" || field == "evidence" || field == "verification";
+                             field == "external_members" || field == "vocabulary" || field == "evidence" ||
+                             field == "verification";
       EXPECT_TRUE(elsewhere || keys[s.section].count(field) == 1)
           << s.section << ": no key for " << s.name << "::" << field;
     }

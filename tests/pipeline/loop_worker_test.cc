@@ -36,8 +36,8 @@ LoopQuery QueryOf(const InputFrame& frame) {
 }
 
 struct Told {
-  std::optional<Pair> first_loop;   // that was accepted
-  std::vector<double> hypotheses;   // of the images from the second after it on
+  std::optional<Pair> first_loop;  // that was accepted
+  std::vector<double> hypotheses;  // of the images from the second after it on
   std::vector<double> probabilities;
 };
 
@@ -79,7 +79,8 @@ Told DriveDetector() {
       told.hypotheses.push_back(result.hypothesis);
       told.probabilities.push_back(result.probability);
     }
-    if (result.accepted && !told.first_loop) told.first_loop = Pair(result.query, result.verification.candidate);
+    if (result.accepted && !told.first_loop)
+      told.first_loop = Pair(result.query, result.verification.candidate);
   }
   return told;
 }

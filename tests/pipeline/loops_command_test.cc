@@ -160,8 +160,8 @@ TEST_F(LoopsCommand, TheTableHoldsEveryRuleWithItsOwnFolder) {
   const fs::path truth = Truth(TruePairs());
   const auto run = Run(truth, out_, {"--table"});
   ASSERT_EQ(run.status, 0) << run.output;
-  const std::vector<std::string> rules = {"joint",    "mean",  "log-pool", "product", "majority",
-                                          "naive", "surf",  "sift",     "orb"};
+  const std::vector<std::string> rules = {"joint", "mean", "log-pool", "product", "majority",
+                                          "naive", "surf", "sift",     "orb"};
   const nlohmann::json table = Json(out_ / "table.json");
   EXPECT_EQ(table["rules"].size(), rules.size());
   for (const std::string& rule : rules) {
@@ -220,7 +220,8 @@ TEST_F(LoopsCommand, TheDumpSaysWhatEachCandidateLookedLike) {
 
   std::istringstream verification(ReadAll(out_ / "dump_verification.csv"));
   std::getline(verification, line);
-  EXPECT_EQ(line, "image,candidate,truth,order,accepted,chosen,type,matches,inliers,mass,coverage,expected_inliers,"
+  EXPECT_EQ(line,
+            "image,candidate,truth,order,accepted,chosen,type,matches,inliers,mass,coverage,expected_inliers,"
             "log_nfa,motion_spread,reason");
   int chosen = 0;
   while (std::getline(verification, line)) {
@@ -355,16 +356,16 @@ TEST_F(LoopsCommand, CtrlCWritesTheImagesSoFar) {
 std::string SmallTable(double joint, double naive, double surf) {
   nlohmann::json table;
   table["best_single"] = {{"verified", "surf"}, {"posterior", "surf"}};
-  for (const auto& [rule, recall] :
-       std::vector<std::pair<std::string, double>>{{"joint", joint}, {"mean", surf}, {"naive", naive}, {"surf", surf}})
+  for (const auto& [rule, recall] : std::vector<std::pair<std::string, double>>{
+           {"joint", joint}, {"mean", surf}, {"naive", naive}, {"surf", surf}})
     table["rules"][rule] = {{"recall_at_100_precision", recall},
                             {"recall_at_100_precision_posterior", recall}};
   return table.dump();
 }
 
 TEST_F(LoopsCommand, CompareLoopsIsThePairedTTestOverTheSets) {
-  // joint - naive: 0.3, 0.2, 0.1: their mean 0.2, deviation 0.1, t = 0.2 / (0.1 / sqrt 3) = 3.4641. With two degrees
-  // of freedom p = 1 - t / sqrt(2 + t^2) = 0.0742.
+  // joint - naive: 0.3, 0.2, 0.1: their mean 0.2, deviation 0.1, t = 0.2 / (0.1 / sqrt 3) = 3.4641. With two
+  // degrees of freedom p = 1 - t / sqrt(2 + t^2) = 0.0742.
   WriteAll(folder_ / "1.json", SmallTable(0.8, 0.5, 0.8));
   WriteAll(folder_ / "2.json", SmallTable(0.9, 0.7, 0.9));
   WriteAll(folder_ / "3.json", SmallTable(0.7, 0.6, 0.7));

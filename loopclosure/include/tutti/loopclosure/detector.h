@@ -26,10 +26,11 @@ struct FeatureSet {
   std::vector<Eigen::Vector3d> points;  ///< empty, or N points in the camera frame [m]; NaN where unknown
 };
 
-/// Where the caller's odometry believes an image to be taken: places that it can't have come back to lose, and
-/// among those that look alike the nearer one gains. The odometry drifts: its position relative to a place has
-/// a standard deviation of sigma_m + drift s, with s the way since then, summed over the positions given.
-/// Positions are not saved: after Load, and with a store of an earlier run, places of before have none.
+/// Where the caller's odometry believes an image to be taken: places that it can't have come back to lose,
+/// and among those that look alike the nearer one gains. The odometry drifts: its position relative to a
+/// place has a standard deviation of sigma_m + drift s, with s the way since then, summed over the positions
+/// given. Positions are not saved: after Load, and with a store of an earlier run, places of before have
+/// none.
 struct PosePrior {
   Eigen::Vector3d position_m = Eigen::Vector3d::Zero();  ///< of the camera [m], in the odometry's world
   std::int64_t frame = 0;  ///< number of that world: positions in different ones are not compared

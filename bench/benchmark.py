@@ -14,7 +14,7 @@ import subprocess
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-VARIANTS = ["odometry", "surf", "sift", "orb", "naive", "product", "majority", "ensemble"]
+VARIANTS = ["odometry", "surf", "sift", "orb", "naive", "product", "majority", "mean", "log-pool", "seed", "ensemble"]
 SMALL_TOWN = ["--sensor", "stereo", "--world", "town", "--laps", "1.25", "--rate", "5", "--width", "512", "--height", "256",
               "--supersample", "1", "--noise"]
 HARD_TOWN = ["1.5" if word == "1.25" else word for word in SMALL_TOWN]

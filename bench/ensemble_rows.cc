@@ -57,7 +57,8 @@ class Perception {
     options_.threads = arguments.threads;
     for (std::size_t k = 0; k < names.size(); ++k) {
       LoopDetectorOptions options = options_;
-      if (names[k] == "sift" && arguments.sift_features > 0) options.extraction.features = arguments.sift_features;
+      if (names[k] == "sift" && arguments.sift_features > 0)
+        options.extraction.features = arguments.sift_features;
       members_.emplace_back(BaseName(names[k]), options, options.seed * 1000003u + k);
     }
   }
@@ -153,7 +154,8 @@ class Row {
     reasoner_ = std::make_unique<internal::PlaceReasoner>(options_, shells_);
   }
 
-  void Take(const LoopQuery& query, const std::vector<Percept>& percepts, PairCache& pooled, PairCache& alone) {
+  void Take(const LoopQuery& query, const std::vector<Percept>& percepts, PairCache& pooled,
+            PairCache& alone) {
     const auto begin = std::chrono::steady_clock::now();
     const Percept& now = percepts.back();
     std::vector<SeenWords> words;
@@ -169,7 +171,9 @@ class Row {
     double own_ms = Perception::Milliseconds(begin);
     if (result.proposed && !arguments_.posterior_only) {
       PairCache& cache = own_ ? alone : pooled;
-      const auto view = [&](const Percept& p) -> const View& { return own_ ? p.own[members_.front()] : p.view; };
+      const auto view = [&](const Percept& p) -> const View& {
+        return own_ ? p.own[members_.front()] : p.view;
+      };
       reasoner_->Verify(
           view(now), combined.belief,
           [&](const View& a, const View& b, int) { return cache.Verify(a, b, verify_ms); },
@@ -208,7 +212,9 @@ class Row {
       if (!o.accepted) continue;
       const LoopLabel label = truth.At(o.image, o.verified);
       said.push_back({o.image, o.verified, o.probability,
-                      label == LoopLabel::kLoop ? 1 : label == LoopLabel::kNone ? 0 : -1});
+                      label == LoopLabel::kLoop   ? 1
+                      : label == LoopLabel::kNone ? 0
+                                                  : -1});
     }
     json["said"] = said;
     return json;
@@ -263,8 +269,8 @@ void Overlay(cv::Mat& image) {
   cv::rectangle(image, cv::Rect(0, 0, image.cols, image.rows), cv::Scalar::all(0), 2 * rim);
 }
 
-LoopQuery Read(const std::filesystem::path& left, const std::filesystem::path& right, int number, int change_from,
-               const Arguments& arguments) {
+LoopQuery Read(const std::filesystem::path& left, const std::filesystem::path& right, int number,
+               int change_from, const Arguments& arguments) {
   LoopQuery query;
   query.id = number;
   query.image = right.empty() ? cv::imread(left.string(), cv::IMREAD_UNCHANGED)
@@ -308,8 +314,7 @@ int Run(const Arguments& arguments) {
   std::vector<Percept> percepts;
   const std::size_t stride = static_cast<std::size_t>(arguments.truth.stride);
   for (std::size_t i = 0; i < images.size(); i += stride) {
-    const LoopQuery query =
-        Read(images[i], rights[i], static_cast<int>(i / stride), change_from, arguments);
+    const LoopQuery query = Read(images[i], rights[i], static_cast<int>(i / stride), change_from, arguments);
     percepts.push_back(perception.See(query));
     for (Row& row : rows) {
       row.Take(query, percepts, pooled, alone.try_emplace(row.name(), scaled).first->second);
@@ -330,8 +335,8 @@ int Run(const Arguments& arguments) {
 int main(int argc, char** argv) {
   CLI::App app("Every row of the ensemble's protocol on one set of images, as JSON");
   tutti::Arguments a;
-  a.rows = {"joint", "mean", "log-pool", "product", "majority", "naive", "surf", "sift", "orb",
-            "surf/own", "sift/own", "orb/own", "seed"};
+  a.rows = {"joint", "mean", "log-pool", "product",  "majority", "naive", "surf",
+            "sift",  "orb",  "surf/own", "sift/own", "orb/own",  "seed"};
   app.add_option("--images", a.images, "folder")->required();
   app.add_option("--ground-truth", a.truth.file, "loop matrix or trajectory")->required();
   app.add_option("--stride", a.truth.stride, "every n-th image");
@@ -347,7 +352,8 @@ int main(int argc, char** argv) {
   app.add_option("--twice", a.twice, "this member is there twice");
   app.add_option("--sift-features", a.sift_features, "SIFT finds no more");
   app.add_option("--false-links", a.false_links, "so many false links are planted");
-  app.add_option("--rows", a.rows, "which; joint:surf+orb: the rule over these members alone")->delimiter(',');
+  app.add_option("--rows", a.rows, "which; joint:surf+orb: the rule over these members alone")
+      ->delimiter(',');
   app.add_option("--members", a.members, "of the ensemble")->delimiter(',');
   app.add_flag("--posterior-only", a.posterior_only, "no geometry, and no links that come of it");
   app.add_option("--threads", a.threads, "for extraction");

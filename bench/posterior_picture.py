@@ -1,15 +1,13 @@
 #!/usr/bin/env python3
-"""Draws the members' posteriors and their mean over a revisit, as docs/loop-closure.md shows them.
+"""Draws the members' posteriors and the ensemble's over a revisit, as docs/loop-closure.md shows them.
 
-usage: bench/posterior_picture.py --tutti build/release/apps/tutti/tutti [--images DIR --ground-truth FILE] [--first N]
-                                  [--last N] [--svg FILE]
-Runs `tutti loops --keep-posterior` on the images (default: RTAB-Map's corridor in $TUTTI_DATA). Needs nothing but
-Python 3.
+usage: bench/posterior_picture.py --tutti build/release/apps/tutti/tutti [--first N] [--last N] [--svg FILE]
+Generates a corridor with doors and posters that repeat (240x192, walked three times) and runs `tutti loops
+--keep-posterior` on it. Needs nothing but Python 3.
 """
 import argparse
 import collections
 import csv
-import os
 import pathlib
 import subprocess
 import sys
@@ -42,7 +40,7 @@ def read_hypotheses(file):
 
 
 class Picture:
-    """One panel for each member and the mean, a curve of H below each."""
+    """One panel for each member and the ensemble, a curve of H below each."""
 
     def __init__(self, first, last, locations):
         self.first, self.last, self.locations = first, last, locations
@@ -114,24 +112,29 @@ class Picture:
                 "\n</svg>\n")
 
 
-def run(tutti, images, truth, out):
-    subprocess.run([tutti, "loops", "--images", images, "--ground-truth", truth, "--rule", "mean", "--keep-posterior",
-                    "--out", out], check=True, stdout=subprocess.DEVNULL)
+WORLD = ["--seed", "101", "--frames", "388", "--sensor", "mono", "--world", "corridor", "--width", "240", "--height", "192",
+         "--corridor", "42", "--speed", "0.65", "--rate", "1", "--laps", "3", "--repeat", "0.3", "--noise", "2",
+         "--moving-objects", "2"]
+
+
+def run(tutti, out):
+    world = pathlib.Path(out) / "world"
+    subprocess.run([tutti, "generate", "--out", world, *WORLD], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    subprocess.run([tutti, "loops", "--images", world / "image_0", "--ground-truth", world / "poses.txt", "--gt-distance", "1.5",
+                    "--gt-angle", "30", "--gt-ignore", "4", "--gt-exclude-s", "30", "--keep-posterior", "--out", out], check=True,
+                   stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 
 def main():
-    data = pathlib.Path(os.environ.get("TUTTI_DATA", ROOT.parent / "shared" / "data")) / "corridor"
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--tutti", required=True, help="the executable")
-    parser.add_argument("--images", default=data)
-    parser.add_argument("--ground-truth", default=data / "ground_truth.bmp")
-    parser.add_argument("--first", type=int, default=30, help="first image drawn (from 0)")
-    parser.add_argument("--last", type=int, default=83, help="last image drawn")
-    parser.add_argument("--locations", type=int, default=60, help="places drawn, from 0")
+    parser.add_argument("--first", type=int, default=192, help="first image drawn (from 0)")
+    parser.add_argument("--last", type=int, default=262, help="last image drawn")
+    parser.add_argument("--locations", type=int, default=100, help="places drawn, from 0")
     parser.add_argument("--svg", default=ROOT / "docs" / "images" / "posteriors.svg")
     a = parser.parse_args()
     with tempfile.TemporaryDirectory() as out:
-        run(pathlib.Path(a.tutti).resolve(), a.images, a.ground_truth, out)
+        run(pathlib.Path(a.tutti).resolve(), out)
         posteriors, columns, pairs = read_posteriors(pathlib.Path(out) / "posteriors.csv")
         hypotheses = read_hypotheses(pathlib.Path(out) / "hypotheses.csv")
     members = [c for c in columns if c != "combined"]
@@ -140,7 +143,7 @@ def main():
     for k, name in enumerate(members + ["combined"]):
         column = "hypothesis" if name == "combined" else f"{name}_hypothesis"
         h = {i: float(row[column]) for i, row in hypotheses.items()}
-        title = "mean of the members" if name == "combined" else name.upper()
+        title = "all together" if name == "combined" else name.upper()
         picture.panel(k, title, posteriors[name], pairs, h, COLOURS.get(name, "#7a3b9c"))
     pathlib.Path(a.svg).write_text(picture.svg(len(members) + 1))
     print(f"written: {a.svg}")

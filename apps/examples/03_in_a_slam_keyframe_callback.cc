@@ -48,11 +48,25 @@ class LoopCloser {
     const tutti::LoopResult result = detector_.Detect(query);
     for (const std::int64_t neighbour : keyframe.neighbours) detector_.AddLink(neighbour, keyframe.id);
     if (!result.warning.empty()) std::fprintf(stderr, "warning: %s\n", result.warning.c_str());
-    if (result.accepted) OnLoop(keyframe.id, result.verification);
+    if (!result.accepted) return;
+    if (MapContradicts(result.verification)) {
+      OnLoopRefused(keyframe.id, result.verification.candidate);
+    } else {
+      OnLoop(keyframe.id, result.verification);
+    }
   }
+  // To be called when the pose graph refuses a loop, or leaves it no weight, at once or many keyframes later:
+  // the filter then no longer takes the two places for one.
+  void OnLoopRefused(std::int64_t id, std::int64_t candidate) { detector_.Unlink(id, candidate); }
   int loops() const { return loops_; }
 
  private:
+  // Stands for the pose graph's judgement: these images were taken on one way, so that a loop which stands on
+  // its head can't be one.
+  static bool MapContradicts(const tutti::Verification& v) {
+    return tutti::LogSO3(v.S_candidate_query.rotation).norm() > 0.5 * M_PI;
+  }
+
   // Here the SLAM would add a constraint to its pose graph: S_candidate_query, weighted with v.information.
   void OnLoop(std::int64_t id, const tutti::Verification& v) {
     ++loops_;

@@ -81,9 +81,10 @@ void AddCollectCommand(CLI::App& app, int&) {
       "each data set and variant");
   command->footer(
       "Runs are grouped by data set and by variant: odometry (run.loops: false), ensemble (loops.rule: "
-      "mean), "
-      "else the\n"
-      "rule. Runs of one group should differ in their seed alone: the interval is over them.\n"
+      "joint),\n"
+      "seed (the preset standardised-mean), else the rule. Runs of one group should differ in their seed "
+      "alone:\n"
+      "the interval is over them.\n"
       "Example: tutti collect results/ --table-format markdown > table.md");
   command->callback([arguments] { RunCollect(*arguments); });
 }

@@ -29,8 +29,8 @@ namespace fs = std::filesystem;
 
 struct CompareArguments {
   std::string config, dataset, out, ground_truth, table_format = "text";
-  std::vector<std::string> variants = {"odometry", "surf",    "sift",     "orb",
-                                       "naive",    "product", "majority", "ensemble"};
+  std::vector<std::string> variants = {"odometry", "surf", "sift",     "orb",  "naive",   "product",
+                                       "majority", "mean", "log-pool", "seed", "ensemble"};
   std::uint64_t seeds = 3;
   int threads = 2;
   std::int64_t max_frames = 0;
@@ -44,7 +44,14 @@ RunConfig VariantConfig(RunConfig config, const std::string& variant, bool odome
     return config;
   }
   try {
-    SetRule(variant == "ensemble" ? "mean" : variant, config.loops);
+    if (variant == "seed") {
+      SetRule("mean", config.loops);
+      ApplyPreset("standardised-mean", config.loops);
+    } else {
+      SetRule(variant == "ensemble" ? "joint" : variant, config.loops);
+    }
+    const std::string problem = config.loops.Validate();
+    if (!problem.empty()) throw InputError(problem);
   } catch (const InputError& error) {
     throw InputError("--variants: '" + variant + "': " + error.what());
   }
@@ -208,8 +215,8 @@ void AddCompareCommand(CLI::App& app, int& exit_code) {
       ->required();
   command
       ->add_option("--variants", arguments->variants,
-                   "odometry: no loops; surf, sift, orb, ...: that member alone; naive, product, majority: "
-                   "that rule; ensemble: the mean of the members")
+                   "odometry: no loops; surf, sift, orb, ...: that member alone; naive, product, majority, "
+                   "mean, log-pool: that rule; seed: the preset standardised-mean; ensemble: the rule joint")
       ->delimiter(',')
       ->capture_default_str();
   command->add_option("--seeds", arguments->seeds, "run each variant with the seeds 1 to this")

@@ -54,7 +54,7 @@ int CompareLoops(const CompareArguments& arguments) {
   for (const std::string& file : arguments.tables) tables.push_back(ReadTable(file));
   Json tests = Json::array();
   const std::vector<std::pair<const char*, const char*>> pairs = {
-      {"mean", "naive"}, {"mean", "best single"}, {"naive", "best single"}};
+      {"joint", "mean"}, {"joint", "naive"}, {"joint", "best single"}, {"naive", "best single"}};
   std::printf("%-10s %-12s %-12s %5s %16s %9s %9s\n", "ranking", "a", "b", "sets", "mean difference", "t",
               "p");
   for (const char* ranking : {"verified", "posterior"}) {

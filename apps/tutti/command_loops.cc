@@ -237,12 +237,14 @@ void AddLoopsCommand(CLI::App& app, int& exit_code) {
                     "also write dump_candidates.csv (what each candidate looked like to each member) and "
                     "dump_verification.csv (each geometric verification)");
   command
-      ->add_option("--rule", arguments->rule,
-                   "joint (default), mean, log-pool, product, majority, naive, or one member: surf, sift, orb, "
-                   "akaze, brisk, kaze")
+      ->add_option(
+          "--rule", arguments->rule,
+          "joint (default), mean, log-pool, product, majority, naive, or one member: surf, sift, orb, "
+          "akaze, brisk, kaze")
       ->type_name("RULE");
-  command->add_option("--preset", arguments->preset,
-                      "published parameters: standardised-mean, paper-2013, rtabmap-0.8.3, or default (ours)");
+  command->add_option(
+      "--preset", arguments->preset,
+      "published parameters: standardised-mean, paper-2013, rtabmap-0.8.3, or default (ours)");
   LoopRule& rule = arguments->truth.rule;
   command->add_option("--gt-distance", rule.distance_m, "trajectory: a loop is nearer than this [m]")
       ->capture_default_str();

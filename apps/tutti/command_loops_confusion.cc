@@ -257,7 +257,7 @@ void WriteConfusion(const LoopRun& run, const LoopReport& report, const std::fil
   }
 
   char title[64];
-  std::snprintf(title, sizeof title, "what was said, at H >= %g and verified", run.options.loop_threshold);
+  std::snprintf(title, sizeof title, "what was said, at probability >= %g", run.options.loop_threshold);
   const PlotAxes axes = PanelAxes(number, images, title);
   PaintTruth(run.truth, "#bfdcee", "#e4e4e4", panel(axes));
   AddAxes(axes, shapes);

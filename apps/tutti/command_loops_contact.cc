@@ -44,7 +44,7 @@ std::vector<std::size_t> Spread(const std::vector<std::size_t>& rows, std::size_
 std::vector<Entry> Choose(std::vector<std::size_t> wrong, const std::vector<std::size_t>& missed,
                           const LoopRun& run) {
   std::stable_sort(wrong.begin(), wrong.end(), [&](std::size_t a, std::size_t b) {
-    return run.rows[a].result.hypothesis > run.rows[b].result.hypothesis;
+    return run.rows[a].result.probability > run.rows[b].result.probability;
   });
   const std::size_t half = kMostRows / 2;
   const std::size_t wrong_count =
@@ -121,7 +121,8 @@ std::string TruthText(const LoopRun& run, const TruthOfRow& truth) {
 
 std::string Numbers(const LoopResult& r) {
   char text[200];
-  std::snprintf(text, sizeof text, "H = %.3f, posterior of the best %.3f", r.hypothesis, r.posterior);
+  std::snprintf(text, sizeof text, "H = %.3f, posterior of the best %.3f, probability %.3f", r.hypothesis,
+                r.posterior, r.probability);
   const std::string line = text;
   if (r.verification.candidate < 0) return line + ", nothing was verified";
   std::snprintf(text, sizeof text, "; %d inliers of %d matches with image %ld", r.verification.inliers,
@@ -191,13 +192,13 @@ void WriteContactSheet(const LoopRun& run, const LoopReport& report, const std::
   cv::Mat picture(height, kWidth, CV_8UC3, cv::Scalar::all(255));
 
   char text[200];
-  std::snprintf(text, sizeof text, "false positives: %zu, missed loops: %zu, at H >= %g and verified",
+  std::snprintf(text, sizeof text, "false positives: %zu, missed loops: %zu, at probability >= %g",
                 wrong.size(), missed.size(), run.options.loop_threshold);
   std::string summary = text;
   if (entries.size() < wrong.size() + missed.size())
     summary +=
         "; " + std::to_string(entries.size()) +
-        " are shown: the false ones of the highest H, the missed ones evenly; all are in hypotheses.csv";
+        " are shown: the most probable of the false ones, the missed ones evenly; all are in hypotheses.csv";
   std::vector<PlotShape> shapes = {PlotText({kMargin, 34}, RunTitle(run, report), 20),
                                    PlotText({kMargin, 64}, summary, 16)};
   if (entries.empty())

@@ -77,8 +77,9 @@ void WriteCurves(const LoopRun& run, const LoopReport& report, const std::filesy
   ranked.color = PlotPalette(2);
   ranked.marks.clear();  // the decision is that of the verified ones
   plot.curves = {verified, ranked, posterior};
-  char note[64];
-  std::snprintf(note, sizeof note, "disc: at the default threshold, H >= %g", run.options.loop_threshold);
+  char note[120];
+  std::snprintf(note, sizeof note, "disc: at the default, probability >= %g (posterior only: H >= %g)",
+                run.options.loop_threshold, run.options.propose_threshold);
   plot.notes.push_back(note);
   if (report.verified.rows_with_loop == 0)
     plot.notes.push_back("the ground truth has no loop: recall is 0 by definition");

@@ -122,7 +122,7 @@ LoopReport EvaluateRun(const LoopRun& run) {
   LoopReport report;
   report.verified = EvaluateVerified(observations, run.truth);
   report.ranked = EvaluateRanked(observations, run.truth);
-  report.posterior = EvaluatePosterior(observations, run.truth, run.options.loop_threshold);
+  report.posterior = EvaluatePosterior(observations, run.truth, run.options.propose_threshold);
   const std::vector<double> ms = Collect(run.rows, [](const LoopRow& row) { return row.ms; });
   report.ms_median = Quantile(ms, 0.5);
   report.ms_p99 = Quantile(ms, 0.99);
@@ -149,6 +149,7 @@ nlohmann::ordered_json FiguresJson(const LoopRun& run, const LoopReport& report)
   json["at_default_threshold"] = Rates(verified.at_default_threshold);
   json["at_default_threshold"]["threshold"] = run.options.loop_threshold;
   json["at_default_threshold_posterior"] = Rates(posterior.at_default_threshold);
+  json["at_default_threshold_posterior"]["threshold"] = run.options.propose_threshold;
   json["f1_at_default"] = verified.f1_at_default;
   json["f1_at_default_posterior"] = posterior.f1_at_default;
   json["accepted"] = {
@@ -168,7 +169,9 @@ nlohmann::ordered_json ProtocolJson(const LoopRun& run) {
           {"ground_truth", run.truth.description},
           {"tolerance_frames", 0},
           {"exclusion", "the newest " + std::to_string(run.options.stm_size) + " images (short-term memory)"},
-          {"threshold", "recall_at_100_precision: chosen after the fact; at_default_threshold: fixed"}};
+          {"threshold",
+           "recall_at_100_precision: chosen after the fact; at_default_threshold: fixed, of the probability; "
+           "posterior: of H"}};
 }
 
 void WriteLoopRun(const LoopRun& run, const LoopReport& report, const std::filesystem::path& folder) {

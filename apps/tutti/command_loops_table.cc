@@ -72,10 +72,12 @@ Json Compare(const LoopTable& table, const Ranking& ranking, const LoopTableRow&
 Json Significance(const LoopTable& table) {
   Json tests = Json::array();
   for (const Ranking& ranking : kRankings) {
-    const LoopTableRow *mean = Find(table, "mean"), *naive = Find(table, "naive");
+    const LoopTableRow *joint = Find(table, "joint"), *mean = Find(table, "mean"),
+                       *naive = Find(table, "naive");
     const LoopTableRow* single = BestSingle(table, ranking);
     for (const auto& [a, b] :
-         {std::make_pair(mean, naive), std::make_pair(mean, single), std::make_pair(naive, single)}) {
+         {std::make_pair(joint, mean), std::make_pair(joint, naive), std::make_pair(joint, single),
+          std::make_pair(mean, naive), std::make_pair(mean, single), std::make_pair(naive, single)}) {
       if (a != nullptr && b != nullptr) tests.push_back(Compare(table, ranking, *a, *b));
     }
   }
@@ -207,7 +209,14 @@ std::string Csv(const LoopTable& table) {
 }  // namespace
 
 std::vector<std::string> TableRules(const LoopDetectorOptions& options) {
-  std::vector<std::string> rules = {"mean", "product", "majority", "naive"};
+  std::vector<std::string> rules;
+  for (const char* word : {"joint", "mean", "log-pool", "product", "majority", "naive"}) {
+    LoopDetectorOptions tried = options;
+    SetRule(word, tried);
+    // Its one filter works on counts in one memory: other options leave it out.
+    if (tried.rule == CombinationRule::kJoint && !tried.Validate().empty()) continue;
+    rules.emplace_back(word);
+  }
   rules.insert(rules.end(), options.members.begin(), options.members.end());
   return rules;
 }

@@ -27,7 +27,10 @@ std::string VariantOf(const Json& json) {
   if (json.contains(loops) && json.at(loops) == false) return "odometry";
   if (!json.contains(rule) || !json.at(rule).is_string()) return "?";
   const std::string word = json.at(rule).get<std::string>();
-  return word == "mean" ? kEnsemble : word;
+  // A summary without the key is of the time when there was no other evidence.
+  const Json::json_pointer kind("/config/loops/evidence/kind");
+  const bool standardised = !json.contains(kind) || json.at(kind) == "standardised";
+  return word == "joint" ? kEnsemble : word == "mean" && standardised ? "seed" : word;
 }
 
 /// t such that P(|T| >= t) = p, by bisection.

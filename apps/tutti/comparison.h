@@ -35,7 +35,8 @@ struct Variant {
 };
 
 /// What a run wrote. `variant` of a run of `tutti run`: "odometry" without loops, "ensemble" for the rule
-/// mean, else the rule. Throws InputError that names the file if it is no summary.json.
+/// joint, "seed" for the mean of standardised evidence, else the rule. Throws InputError that names the file
+/// if it is no summary.json.
 RunFigures ReadRunFigures(const std::filesystem::path& summary);
 
 /// Mean over seeds with the half-width of its 95 % confidence interval (Student's t; NaN for one value).

@@ -56,8 +56,9 @@ std::string VerificationLines(const LoopResult& result, const LoopGroundTruth& t
   for (const Verification& tried : result.tried) {
     const LoopLabel label = truth.At(static_cast<int>(result.query), static_cast<int>(tried.candidate));
     char cells[320];
-    std::snprintf(cells, sizeof cells, "%ld,%ld,%s,%d,%d,%d,%s,%d,%d,%.9g,%d,%.9g,%.9g,%.9g,", static_cast<long>(result.query),
-                  static_cast<long>(tried.candidate), LabelName(label), order++, tried.accepted ? 1 : 0,
+    std::snprintf(cells, sizeof cells, "%ld,%ld,%s,%d,%d,%d,%s,%d,%d,%.9g,%d,%.9g,%.9g,%.9g,",
+                  static_cast<long>(result.query), static_cast<long>(tried.candidate), LabelName(label),
+                  order++, tried.accepted ? 1 : 0,
                   result.accepted && tried.candidate == result.verification.candidate ? 1 : 0,
                   TypeName(tried.type), tried.matches, tried.inliers, tried.mass, tried.coverage,
                   tried.expected_inliers, tried.log_nfa, tried.motion_spread);
@@ -82,8 +83,9 @@ LoopsDump::LoopsDump(const std::filesystem::path& folder, const std::vector<std:
     candidates_ << "," << name << "_score," << name << "_likelihood," << name << "_posterior";
   }
   candidates_ << "\n";
-  verification_ << "image,candidate,truth,order,accepted,chosen,type,matches,inliers,mass,coverage,expected_inliers,"
-                   "log_nfa,motion_spread,reason\n";
+  verification_
+      << "image,candidate,truth,order,accepted,chosen,type,matches,inliers,mass,coverage,expected_inliers,"
+         "log_nfa,motion_spread,reason\n";
   CheckWritten(candidates_, candidates_file_);
   CheckWritten(verification_, verification_file_);
 }

@@ -8,13 +8,14 @@
 namespace tutti {
 namespace {
 
-constexpr double kFirstShare = 0.02;        // of the words: the level before anything is known
-constexpr double kLongestMean = 80;         // images that the running mean stands for at most
-constexpr std::size_t kTooFewPlaces = 20;   // in so few, the best wrong one says nothing yet
-constexpr double kPlacePrior = 20;          // images that a place's own mean is held back by
-constexpr double kLeastMean = 0.02;         // of a place's counts
-constexpr double kMostAttraction = 3;       // a place's level lies within so many times the common one
-constexpr double kLeastRepeated = 0.1;      // a member that repeats nothing may come to
+constexpr double kFirstShare = 0.02;       // of the words: the level before anything is known
+constexpr double kLongestMean = 80;        // images that the running mean stands for at most
+constexpr std::size_t kTooFewPlaces = 20;  // in so few, the best wrong one says nothing yet
+constexpr double kPlacePrior = 20;         // images that a place's own mean is held back by
+constexpr double kLeastMean = 0.02;        // of a place's counts
+constexpr double kMostAttraction = 3;      // a place's level lies within so many times the common one
+constexpr double kLeastShare = 0.15;       // of the levels, however little an image repeats
+constexpr double kLeastRepeated = 0.1;     // a member that repeats nothing may come to
 
 std::size_t Index(int slot) { return static_cast<std::size_t>(slot); }
 
@@ -49,32 +50,36 @@ double AliasEvidence::LevelOf(int slot) const {
   const double seen = known ? seen_[Index(slot)] : 0.0;
   const double own = (sum + kPlacePrior * mean) / (seen + kPlacePrior);
   const double attraction = (own + kLeastMean) / (mean + kLeastMean);
-  return common * std::clamp(std::pow(attraction, options_.attraction), 1.0 / kMostAttraction, kMostAttraction);
+  return common *
+         std::clamp(std::pow(attraction, options_.attraction), 1.0 / kMostAttraction, kMostAttraction);
 }
 
 Belief AliasEvidence::Likelihood(const std::vector<double>& counts, const std::vector<int>& working_memory,
-                                 double words) {
+                                 double words, double repeated) {
   if (first_images_ < kFirstImages) {
     words_sum_ += words;
     ++first_images_;
     log_level_ = std::log1p(kFirstShare * words_sum_ / first_images_);
   }
-  return Of(counts, working_memory);
+  log_repeated_now_ = std::log(repeated + kLeastRepeated);
+  const double share = repeated_images_ > 0 ? std::exp(log_repeated_now_ - log_repeated_) : 1.0;
+  return Of(counts, working_memory, std::clamp(share, kLeastShare, 1.0));
 }
 
-Belief AliasEvidence::Of(const std::vector<double>& counts, const std::vector<int>& working_memory) const {
+Belief AliasEvidence::Of(const std::vector<double>& counts, const std::vector<int>& working_memory,
+                         double share) const {
   Belief likelihood;
   likelihood.places.assign(counts.size(), 0.0);
   const double least = std::exp(options_.floor);
   // Most places share too little to reach the least, whatever their own level: they need no more arithmetic.
-  const double lowest_level = options_.alias_share * Level() / kMostAttraction;
+  const double lowest_level = share * options_.alias_share * Level() / kMostAttraction;
   const double enough = std::exp(options_.floor / options_.sharpness) * (lowest_level + 1.0) - 1.0;
   for (const int slot : working_memory) {
     const double count = counts[Index(slot)];
     double& value = likelihood.places[Index(slot)];
     value = least;
     if (count <= 0.0 || count < enough) continue;
-    value = std::max(least, std::pow((count + 1.0) / (LevelOf(slot) + 1.0), options_.sharpness));
+    value = std::max(least, std::pow((count + 1.0) / (share * LevelOf(slot) + 1.0), options_.sharpness));
   }
   return likelihood;
 }
@@ -86,6 +91,10 @@ void AliasEvidence::Learn(const std::vector<double>& counts, const std::vector<i
   images_ = std::min(kLongestMean, images_ + 1.0);
   log_level_ += new_place * (std::log1p(largest.of_all) - log_level_) / images_;
   log_level_ += (1.0 - new_place) * (std::log1p(largest.of_far) - log_level_) / images_;
+  if (new_place > 0.5) {
+    repeated_images_ = std::min(kLongestMean, repeated_images_ + 1.0);
+    log_repeated_ += (log_repeated_now_ - log_repeated_) / repeated_images_;
+  }
   sum_.resize(counts.size(), 0.0);
   seen_.resize(counts.size(), 0.0);
   auto next_near = near.begin();
@@ -104,6 +113,8 @@ void AliasEvidence::SaveLevel(internal::ByteWriter& out) const {
   out.Put(words_sum_);
   out.Put<std::int32_t>(first_images_);
   out.Put(images_);
+  out.Put(log_repeated_);
+  out.Put(repeated_images_);
 }
 
 void AliasEvidence::LoadLevel(internal::ByteReader& in) {
@@ -111,8 +122,11 @@ void AliasEvidence::LoadLevel(internal::ByteReader& in) {
   words_sum_ = in.Get<double>();
   first_images_ = in.Get<std::int32_t>();
   images_ = in.Get<double>();
+  log_repeated_ = in.Get<double>();
+  repeated_images_ = in.Get<double>();
   const bool good = log_level_ >= 0 && log_level_ < 50 && words_sum_ >= 0 && std::isfinite(words_sum_) &&
-                    first_images_ >= 0 && first_images_ <= kFirstImages && images_ >= 1 && images_ <= kLongestMean;
+                    first_images_ >= 0 && first_images_ <= kFirstImages && images_ >= 1 &&
+                    images_ <= kLongestMean;
   if (!good) in.Damaged("an alias level");
 }
 

@@ -11,7 +11,6 @@
 
 namespace tutti {
 
-
 namespace {
 
 std::vector<Member> MembersOf(const LoopDetectorOptions& options) {
@@ -36,7 +35,8 @@ SeenWords Placed(std::vector<int> words, const std::vector<cv::KeyPoint>& keypoi
   SeenWords seen;
   seen.words = std::move(words);
   seen.cells.reserve(seen.words.size());
-  for (std::size_t i = 0; i < seen.words.size(); ++i) seen.cells.push_back(SeenWords::Cell(keypoints[i].pt, size));
+  for (std::size_t i = 0; i < seen.words.size(); ++i)
+    seen.cells.push_back(SeenWords::Cell(keypoints[i].pt, size));
   return seen;
 }
 
@@ -160,7 +160,7 @@ int LoopDetector::Impl::Remember(const LoopQuery& query, View view, const std::v
   }
   views_.push_back(std::move(view));
   const int newest = static_cast<int>(views_.size()) - 1;
-  const int stands_for = reasoner_.Remember(query.id, words);
+  const int stands_for = reasoner_.Remember(query.id, words, query.pose_prior);
   if (stands_for != newest) {
     dropped_view_ = std::move(views_.back());
     views_.back() = View();

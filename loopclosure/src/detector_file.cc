@@ -217,8 +217,8 @@ std::unique_ptr<LoopDetector::Impl> LoopDetector::Impl::Load(const std::filesyst
   own.seed = header.Get<std::uint64_t>();
   auto loaded = std::make_unique<Impl>(own);
   if (fingerprint != loaded->reasoner_.Fingerprint()) {
-    throw InputError(in.name() + ": was saved with another configuration (" + fingerprint +
-                     "; here: " + loaded->reasoner_.Fingerprint() + "); load it with the same members and memory");
+    throw InputError(in.name() + ": was saved with another configuration (" + fingerprint + "; here: " +
+                     loaded->reasoner_.Fingerprint() + "); load it with the same members and memory");
   }
   loaded->options_.ltm_file = options.ltm_file;
   const auto section = [&](Tag tag, const std::function<void(ByteReader&)>& read) {

@@ -233,8 +233,8 @@ void LoopDetector::Impl::Reopen() {
     return;
   }
   if (*fingerprint != reasoner_.Fingerprint()) {
-    throw InputError(store_->name() + ": belongs to another configuration (" + *fingerprint +
-                     "; here: " + reasoner_.Fingerprint() + "); give another file, or the same members and memory");
+    throw InputError(store_->name() + ": belongs to another configuration (" + *fingerprint + "; here: " +
+                     reasoner_.Fingerprint() + "); give another file, or the same members and memory");
   }
   const auto statistics = store_->Get(Kind::kMeta, kStatistics, 0);
   if (!statistics) return;  // nothing was detected yet

@@ -10,8 +10,7 @@ namespace tutti {
 namespace {
 
 const std::vector<std::string>& RuleWords() {
-  static const std::vector<std::string> words = {"joint", "mean", "log-pool", "product",
-                                                 "majority", "naive"};
+  static const std::vector<std::string> words = {"joint", "mean", "log-pool", "product", "majority", "naive"};
   return words;
 }
 
@@ -184,8 +183,7 @@ void SetRule(const std::string& word, LoopDetectorOptions& options) {
   std::vector<std::string> all = RuleWords();
   all.insert(all.end(), known.begin(), known.end());
   throw InputError("unknown rule '" + word + "'; did you mean '" + NearestWord(word, all) +
-                   "'? Known: " + JoinWords(RuleWords()) +
-                   ", or one member: " + JoinWords(known));
+                   "'? Known: " + JoinWords(RuleWords()) + ", or one member: " + JoinWords(known));
 }
 
 const std::vector<std::string>& KnownPresets() {

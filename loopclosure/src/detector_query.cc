@@ -85,6 +85,13 @@ void LoopDetector::Impl::CheckContent(const LoopQuery& query) const {
     throw InputError(which + "depth_m must be CV_32FC1 in metres and as large as the image");
   }
   CheckRegions(query, which);
+  if (query.pose_prior) {
+    const PosePrior& p = *query.pose_prior;
+    if (!p.position_m.allFinite() || !(p.sigma_m > 0) || !(p.drift >= 0) || !std::isfinite(p.sigma_m) ||
+        !std::isfinite(p.drift)) {
+      throw InputError(which + "pose_prior needs a finite position, sigma_m above 0 and drift 0 or more");
+    }
+  }
   if (query.camera) {
     const std::string problem = query.camera->Validate();
     if (!problem.empty()) throw InputError(which + problem);

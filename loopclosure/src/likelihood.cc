@@ -126,8 +126,8 @@ std::vector<double> LikelihoodModel::Counts(const SeenWords& query) const {
   std::vector<int> sorted;
   for (std::size_t i = 0; i < query.words.size(); ++i) {
     if (query.words[i] < 0) continue;
-    placed.push_back({query.cells[i] % SeenWords::kColumns / SeenWords::kStripColumns, query.cells[i],
-                      query.words[i]});
+    placed.push_back(
+        {query.cells[i] % SeenWords::kColumns / SeenWords::kStripColumns, query.cells[i], query.words[i]});
     sorted.push_back(query.words[i]);
   }
   std::sort(placed.begin(), placed.end());

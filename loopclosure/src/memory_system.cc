@@ -3,16 +3,18 @@
 #include <algorithm>
 #include <utility>
 
+#include "pose_track.h"
+
 namespace tutti::internal {
 namespace {
 
 constexpr int kRetrievalLevels = 10;  // LTM is searched this far from the hypothesis
 constexpr int kImmuneLevels = 2;      // what is so near to the hypothesis stays in WM
 
-constexpr int kNearLevels = 5;        // what is so near to the most probable place may be it
-constexpr int kRepeats = 3;           // images before this one that show what a member repeats
+constexpr int kNearLevels = 5;  // what is so near to the most probable place may be it
+constexpr int kRepeats = 3;     // images before this one that show what a member repeats
 
-// Of all members that a filter sees, with ids as Signature::Concatenate has them.
+// Of all members that a filter sees, with ids as Signature::Split takes them apart.
 SeenWords WordsFor(const FilterUnit& unit, const std::vector<SeenWords>& words) {
   const int parts = static_cast<int>(unit.members.size());
   SeenWords all;
@@ -117,27 +119,35 @@ bool MemorySystem::LooksLikePrevious(int slot) const {
   });
 }
 
+// What the unit shares with the few images before, which show nearly the same.
+void MemorySystem::Repeat(FilterUnit& unit) const {
+  const std::deque<int>& recent = memory_.short_term_memory();
+  double sum = 0;
+  int images = 0;
+  for (auto slot = recent.rbegin(); slot != recent.rend() && images <= kRepeats; ++slot, ++images) {
+    if (slot != recent.rbegin()) sum += unit.counts[static_cast<std::size_t>(*slot)];
+  }
+  if (images < 2) return;
+  unit.repeated = sum / (images - 1) * (unit.is_dense ? DenseModel::kRepeatShare : 1.0);
+  unit.weight.Repeat(unit.repeated);
+}
+
 void MemorySystem::UpdateLikelihood(std::size_t u) {
   FilterUnit& unit = units_[u];
   if (!unit.took_part()) return;
   const std::vector<int>& places = memory_.working_memory();
   if (Counts()) {
     unit.counts = unit.is_dense ? unit.dense.Counts(places) : unit.likelihood.Counts(unit.seen);
-    const std::deque<int>& recent = memory_.short_term_memory();
-    int before = 0;
-    double sum = 0;
-    for (auto slot = recent.rbegin(); slot != recent.rend() && before < kRepeats + 1; ++slot, ++before) {
-      if (slot != recent.rbegin()) sum += unit.counts[static_cast<std::size_t>(*slot)];
-    }
-    if (unit.is_dense) sum *= DenseModel::kRepeatShare;
-    if (before > 1) unit.weight.Repeat(sum / (before - 1));
+    Repeat(unit);
     if (places.empty()) return;
-    unit.image_likelihood = unit.alias.Likelihood(unit.counts, places, unit.seen.Amount());
+    unit.image_likelihood = unit.alias.Likelihood(unit.counts, places, unit.seen.Amount(), unit.repeated);
+    ApplyGains(gains_, places, unit.image_likelihood);
     if (options_.keep_evidence) unit.scores = unit.counts;
     return;
   }
   std::vector<double> scores = unit.is_dense ? unit.dense.Scores() : unit.likelihood.Scores(unit.signature);
   unit.image_likelihood = AdjustLikelihood(scores, places);
+  ApplyGains(gains_, places, unit.image_likelihood);
   if (options_.keep_evidence) unit.scores = std::move(scores);
 }
 
@@ -179,8 +189,14 @@ void MemorySystem::StepJoint() {
   if (!joint_ || !JointTookPart() || memory_.working_memory().empty()) return;
   joint_->counts = JointCounts();
   double words = 0;
-  for (const FilterUnit& unit : units_) words += unit.took_part() ? unit.seen.Amount() : 0;
-  joint_->image_likelihood = joint_->alias.Likelihood(joint_->counts, memory_.working_memory(), words);
+  double repeated = 0;
+  for (std::size_t u = 0; u < units_.size(); ++u) {
+    words += units_[u].took_part() ? units_[u].seen.Amount() : 0;
+    repeated += WeightOf(u) * units_[u].repeated;
+  }
+  joint_->image_likelihood =
+      joint_->alias.Likelihood(joint_->counts, memory_.working_memory(), words, repeated);
+  ApplyGains(gains_, memory_.working_memory(), joint_->image_likelihood);
   joint_->filter.Step(transition_, memory_.working_memory(), joint_->image_likelihood);
 }
 
@@ -473,8 +489,7 @@ void MemorySystem::Load(ByteReader& in) {
     unit.filter.Load(in);
     unit.alias.Load(in);
     unit.weight.Load(in);
-    if (unit.likelihood.size() != memory_.size() ||
-        (unit.is_dense && unit.dense.size() != memory_.size()) ||
+    if (unit.likelihood.size() != memory_.size() || (unit.is_dense && unit.dense.size() != memory_.size()) ||
         static_cast<int>(unit.filter.posterior().places.size()) > memory_.size()) {
       in.Damaged("locations are missing");
     }

@@ -62,6 +62,7 @@ struct FilterUnit : PlaceFilter {
   MemberWeight weight;
   Signature signature;         ///< of the present image, empty if bad
   SeenWords seen;              ///< the same, feature by feature; or the descriptor
+  double repeated = 0;         ///< its mean count for the few images before
   std::vector<double> scores;  ///< raw ones behind the likelihood, by slot; only with keep_evidence
   bool took_part() const { return !signature.empty() || !seen.descriptor.empty(); }
 };
@@ -78,6 +79,8 @@ class MemorySystem {
   /// rehearsed, and the oldest of STM go to WM. Returns the slot that now stands for the image.
   int Remember(std::int64_t id, const std::vector<SeenWords>& words);
 
+  /// Factors of the places for the present image (PoseTrack::Gains), empty: none.
+  void SetGains(std::vector<double> gains) { gains_ = std::move(gains); }
   /// Step 5. Different units may run at the same time; then the joint filter, if there is one.
   void UpdateLikelihood(std::size_t unit);
   void StepFilter(std::size_t unit);
@@ -139,6 +142,7 @@ class MemorySystem {
   void Link(int a, int b, LocationMemory::LinkType type);
   void Relinked(int a, int b);
   bool Counts() const { return options_.evidence.kind == EvidenceKind::kCounts; }
+  void Repeat(FilterUnit& unit) const;
   bool JointTookPart() const;
   double WeightScale() const;
   std::vector<double> JointCounts() const;
@@ -149,6 +153,7 @@ class MemorySystem {
   std::vector<Member>& members_;
   std::vector<FilterUnit> units_;
   std::optional<PlaceFilter> joint_;  // works on the units' counts
+  std::vector<double> gains_;         // of the places, for the present image
   LocationMemory memory_;
   TransitionModel transition_;
 };

@@ -38,13 +38,15 @@ PlaceReasoner::PlaceReasoner(const LoopDetectorOptions& options, std::vector<Mem
   }
   for (const std::vector<std::size_t>& unit : units) {
     const int number = static_cast<int>(systems_.size());
-    systems_.push_back(std::make_unique<MemorySystem>(
-        number, options_, std::vector<std::vector<std::size_t>>{unit}, members_));
+    systems_.push_back(std::make_unique<MemorySystem>(number, options_,
+                                                      std::vector<std::vector<std::size_t>>{unit}, members_));
   }
 }
 
-int PlaceReasoner::Remember(std::int64_t id, const std::vector<SeenWords>& words) {
+int PlaceReasoner::Remember(std::int64_t id, const std::vector<SeenWords>& words,
+                            const std::optional<PosePrior>& prior) {
   const int newest = memory().size();
+  track_.Add(newest, prior);
   if (!Shared()) union_.Add(id);
   bool dropped_by_all = true;
   int stands_for = newest;
@@ -72,6 +74,7 @@ void PlaceReasoner::ForEachUnit(const std::function<void(MemorySystem&, std::siz
 CombinedBelief PlaceReasoner::Step(LoopResult& result,
                                    const std::function<void(std::size_t, FilterUnit&)>& disturb) {
   Stopwatch watch;
+  for (auto& system : systems_) system->SetGains(track_.Gains(system->memory().working_memory()));
   ForEachUnit([&](MemorySystem& system, std::size_t u) {
     system.UpdateLikelihood(u);
     if (disturb) disturb(u, system.units()[u]);
@@ -144,7 +147,8 @@ void PlaceReasoner::FillOpinion(std::size_t member, const CombinedBelief& combin
       opinion.posterior_by_location.emplace_back(memory().id(slot), PosteriorAt(posterior, slot));
     }
     if (options_.keep_evidence) {
-      opinion.evidence.push_back({memory().id(slot), Index(slot) < unit.scores.size() ? unit.scores[Index(slot)] : 0.0,
+      opinion.evidence.push_back({memory().id(slot),
+                                  Index(slot) < unit.scores.size() ? unit.scores[Index(slot)] : 0.0,
                                   PosteriorAt(unit.image_likelihood, slot), PosteriorAt(posterior, slot)});
     }
   }

@@ -4,11 +4,13 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "hypothesis_search.h"
 #include "memory_system.h"
+#include "pose_track.h"
 #include "tutti/loopclosure/combination.h"
 #include "tutti/loopclosure/detector.h"
 #include "tutti/loopclosure/member.h"
@@ -22,8 +24,9 @@ class PlaceReasoner {
   PlaceReasoner(const LoopDetectorOptions& options, std::vector<Member>& members);
 
   /// Steps 3 and 4: the words of each member enter memory as a new location. Returns the slot that now stands
-  /// for the image: the newest, or an older one that it was merged into.
-  int Remember(std::int64_t id, const std::vector<SeenWords>& words);
+  /// for the image: the newest, or an older one that it was merged into. `prior`: where it was taken.
+  int Remember(std::int64_t id, const std::vector<SeenWords>& words,
+               const std::optional<PosePrior>& prior = {});
   /// Step 5, and the times of its parts into `result`. `disturb`, if given, may change what each filter unit
   /// has counted: for tests of what a broken member does.
   CombinedBelief Step(LoopResult& result, const std::function<void(std::size_t, FilterUnit&)>& disturb = {});
@@ -75,6 +78,7 @@ class PlaceReasoner {
   std::vector<Member>& members_;
   std::vector<std::unique_ptr<MemorySystem>> systems_;  // one, or one per filter
   LocationMemory union_;                                // per-member memories: what is in any of them
+  PoseTrack track_;
   double last_hypothesis_ = 0.0;
   std::int64_t last_candidate_ = -1;
   int candidates_in_a_row_ = 0;

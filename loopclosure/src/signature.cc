@@ -39,21 +39,6 @@ double Signature::Similarity(const Signature& a, const Signature& b) {
   return static_cast<double>(shared) / std::max(a.size_, b.size_);
 }
 
-Signature Signature::Concatenate(const std::vector<const Signature*>& parts) {
-  if (parts.size() == 1) return *parts.front();
-  Signature all;
-  for (std::size_t k = 0; k < parts.size(); ++k) {
-    for (const Entry& entry : parts[k]->entries_) {
-      all.entries_.push_back(
-          {entry.word * static_cast<int>(parts.size()) + static_cast<int>(k), entry.count});
-    }
-    all.size_ += parts[k]->size_;
-  }
-  std::sort(all.entries_.begin(), all.entries_.end(),
-            [](const Entry& a, const Entry& b) { return a.word < b.word; });
-  return all;
-}
-
 std::vector<Signature> Signature::Split(int parts) const {
   std::vector<Signature> split(static_cast<std::size_t>(parts));
   for (const Entry& entry : entries_) {

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 namespace tutti {
 namespace {
 
@@ -33,6 +35,17 @@ TEST(Combination, MeanTakesTheUnionOfLocations) {
   const Belief a = Make(0.5, {0.5});
   const Belief b = Make(0.5, {0.1, 0.4});
   EXPECT_NEAR(CombineMean({&a, &b}).places[1], 0.2, 1e-12);
+}
+
+TEST(Combination, TheLogPoolIsTheGeometricMeanAndOfTwoAlikeTheSameAsOfOne) {
+  const Belief a = Make(0.5, {0.4, 0.1});
+  const Belief b = Make(0.2, {0.1, 0.7});
+  const Belief pool = CombineLogPool({&a, &b}, {0, 1});
+  const double sum = std::sqrt(0.5 * 0.2) + std::sqrt(0.4 * 0.1) + std::sqrt(0.1 * 0.7);
+  EXPECT_NEAR(pool.new_place, std::sqrt(0.5 * 0.2) / sum, 1e-12);
+  EXPECT_NEAR(pool.places[1], std::sqrt(0.1 * 0.7) / sum, 1e-12);
+  const Belief twice = CombineLogPool({&a, &a}, {0, 1});
+  EXPECT_NEAR(twice.places[0], 0.4, 1e-12);
 }
 
 TEST(Combination, ProductIsRenormalisedAndFlooredSoThatNoMemberCanVeto) {

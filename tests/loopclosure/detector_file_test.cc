@@ -277,7 +277,8 @@ TEST_F(SavedDetector, MemoriesOfOtherLocationsThanTheStatisticsSayAreRefused) {
     LoopDetector(BoundedOptions()).Load(file_);
   };
   constexpr std::size_t kLastId = 0, kCallerType = 8;
-  const std::size_t kLastHypothesis = 16 + 16 * BoundedOptions().members.size();  // after those of the members
+  const std::size_t kLastHypothesis =
+      16 + 16 * BoundedOptions().members.size();  // after those of the members
   EXPECT_NO_THROW(load(kLastId, std::int64_t{4}));
   EXPECT_THROW(load(kLastId, std::int64_t{3}), InputError);
   EXPECT_THROW(load(kLastHypothesis, std::numeric_limits<double>::quiet_NaN()), InputError);

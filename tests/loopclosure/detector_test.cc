@@ -283,6 +283,52 @@ TEST(LoopDetector, LocatesNothingBeforeThereIsAnything) {
   EXPECT_FALSE(result.reason.empty());
 }
 
+TEST(LoopDetector, ALoopThatIsTakenBackLeavesNoTraceInTheFilter) {
+  constexpr int kPlaces = 16;
+  LoopDetectorOptions never = testing::SmallOptions();
+  never.link_threshold = 1.0;  // no probability reaches it
+  LoopDetector linked(testing::SmallOptions());
+  LoopDetector unlinked(testing::SmallOptions());
+  LoopDetector not_linked(never);
+  for (LoopDetector* detector : {&linked, &unlinked, &not_linked}) {
+    testing::Walk(*detector, 0, kPlaces + 4, kPlaces);
+  }
+  int loops = 0;
+  for (int i = kPlaces + 4; i < 2 * kPlaces; ++i) {
+    const cv::Mat image = testing::WalkImage(i, kPlaces);
+    const LoopResult result = unlinked.Detect(image, i);
+    linked.Detect(image, i);
+    not_linked.Detect(image, i);
+    if (!result.accepted) continue;
+    ++loops;
+    unlinked.Unlink(result.query, result.verification.candidate);
+  }
+  ASSERT_GT(loops, 3);
+  // Locations of the first lap, and their twins of the second, are places of their own again.
+  const cv::Mat next = testing::WalkImage(2 * kPlaces, kPlaces);
+  const double with_links = linked.Detect(next, 2 * kPlaces).posterior;
+  EXPECT_NE(with_links, not_linked.Detect(next, 2 * kPlaces).posterior);
+  EXPECT_NE(with_links, unlinked.Detect(next, 2 * kPlaces).posterior);
+  EXPECT_NO_THROW(unlinked.Unlink(3, 1 << 20));
+  EXPECT_NO_THROW(unlinked.Unlink(3, 4));
+}
+
+TEST(LoopDetector, TheProbabilityDecidesAndIsGivenForRefusedLoopsToo) {
+  constexpr int kPlaces = 16;
+  LoopDetectorOptions strict = testing::SmallOptions();
+  strict.loop_threshold = 1.0;
+  LoopDetector detector(strict);
+  int verified = 0;
+  for (const LoopResult& result : testing::Walk(detector, 0, 2 * kPlaces, kPlaces)) {
+    EXPECT_FALSE(result.accepted);
+    if (!result.verification.accepted) continue;
+    ++verified;
+    EXPECT_GT(result.probability, 0.5);
+    EXPECT_NE(result.reason.find("probability"), std::string::npos) << result.reason;
+  }
+  EXPECT_GT(verified, 5);
+}
+
 TEST(LoopDetector, IslandsFindTheSecondLap) {
   constexpr int kPlaces = 16;
   LoopDetectorOptions options = testing::SmallOptions();

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <utility>
 
 #include "byte_stream.h"
 #include "tutti/core/error.h"
@@ -32,6 +33,53 @@ TEST(Likelihood, TfIdfAddsTermFrequencyTimesInverseDocumentFrequency) {
   EXPECT_NEAR(scores[0], 2.0 / 4.0 * std::log10(3.0 / 2.0) + 1.0 / 4.0 * std::log10(3.0 / 1.0), 1e-12);
   EXPECT_NEAR(scores[1], 1.0 / 2.0 * std::log10(3.0 / 2.0), 1e-12);
   EXPECT_EQ(scores[2], 0.0);
+}
+
+SeenWords Seen(std::vector<int> words, std::vector<int> cells) {
+  SeenWords seen;
+  seen.words = std::move(words);
+  seen.cells = std::move(cells);
+  return seen;
+}
+
+TEST(Likelihood, CountsFollowTheEquation) {
+  LikelihoodModel model(LikelihoodKind::kTfIdf);
+  model.Add(Signature({1, 1, 2, 3}));
+  model.Add(Signature({1, 5}));
+  model.Add(Signature({8, 9}));
+  // Word 1 twice, in cells 0 and 6; word 2 in cell 1, of the same strip as 0; 77 and -1 nobody knows.
+  const std::vector<double> counts = model.Counts(Seen({1, 1, 2, 77, -1}, {0, 6, 1, 2, 3}));
+  const double one =
+      std::log10(3.0 / 2.0) / std::log10(3.0) / 2;  // an occurrence of 1, at each of its two cells
+  const double first_strip = std::log1p(2 * one) + std::log1p(1.0);
+  const double last_strip = std::log1p(2 * one);
+  EXPECT_NEAR(counts[0], std::pow(first_strip, 0.75) + std::pow(last_strip, 0.75), 1e-12);
+  EXPECT_NEAR(counts[1], 2 * std::pow(std::log1p(one), 0.75), 1e-12);
+  EXPECT_EQ(counts[2], 0.0);
+}
+
+TEST(Likelihood, WhatAgreesInOneSpotCountsLessThanWhatAgreesAllOver) {
+  LikelihoodModel model(LikelihoodKind::kTfIdf);
+  for (int i = 0; i < 10; ++i) {
+    std::vector<int> words(20);
+    for (int w = 0; w < 20; ++w) words[static_cast<std::size_t>(w)] = 100 * i + w;
+    model.Add(Signature(words));
+  }
+  std::vector<int> words, one_spot, all_over;
+  for (int w = 0; w < 20; ++w) {
+    words.push_back(300 + w);
+    one_spot.push_back(9);
+    all_over.push_back(w * 2);
+  }
+  EXPECT_GT(model.Counts(Seen(words, all_over))[3], 3 * model.Counts(Seen(words, one_spot))[3]);
+}
+
+TEST(Likelihood, CellsCoverTheImageAndWhatLiesOutsideIsInTheNearest) {
+  const cv::Size wide(640, 240);
+  EXPECT_EQ(SeenWords::Cell({0, 0}, wide), 0);
+  EXPECT_EQ(SeenWords::Cell({639, 239}, wide), 2 * 8 + 7);
+  EXPECT_EQ(SeenWords::Cell({-5, 1e5f}, wide), 2 * 8);
+  EXPECT_EQ(SeenWords::Cell({5, 5}, cv::Size()), 0);
 }
 
 TEST(Likelihood, ARemovedLocationCountsNoMore) {

@@ -96,6 +96,20 @@ LocationMemory Chain() {
   return memory;
 }
 
+TEST(LocationMemory, ALoopIsTakenBackAndOdometryStays) {
+  LocationMemory memory(1);
+  for (int i = 0; i < 12; ++i) memory.Add(i);
+  memory.Settle();
+  const auto before = memory.Neighbours(2, 1);
+  ASSERT_TRUE(memory.AddLink(2, 8, LinkType::kLoop));
+  EXPECT_GT(memory.Neighbours(2, 1).size(), before.size());
+  EXPECT_TRUE(memory.RemoveLoop(8, 2));
+  EXPECT_EQ(memory.Neighbours(2, 1), before);
+  EXPECT_FALSE(memory.RemoveLoop(8, 2));  // there is none any more
+  EXPECT_FALSE(memory.RemoveLoop(2, 3));  // neighbours in time
+  EXPECT_EQ(memory.Neighbours(2, 1), before);
+}
+
 TEST(LocationMemory, TheLightestThenTheOldestIsTransferredFirst) {
   LocationMemory memory = Chain();
   EXPECT_EQ(memory.NextToTransfer(0.0, {}), 0);

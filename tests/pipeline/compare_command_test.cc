@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "executable.h"
@@ -24,7 +25,7 @@ using testing::WriteAll;
 class CollectCommand : public ::testing::Test {
  protected:
   // A summary with the figures that matter.
-  void Summary(const std::string& rule, int seed, double ate) const {
+  void Summary(const std::string& rule, int seed, double ate, const std::string& evidence = "counts") const {
     nlohmann::json json;
     json["dataset"] = "town";
     json["seed"] = seed;
@@ -36,8 +37,9 @@ class CollectCommand : public ::testing::Test {
                       {"stage_ms", {{"odometry_track", 1000}, {"loop_verify", 500}, {"loop_wait", 9000}}}};
     json["memory"]["peak_mb"] = 100;
     json["config"]["run"]["loops"] = rule != "odometry";
-    json["config"]["loops"]["rule"] = rule == "odometry" ? "mean" : rule;
-    const fs::path folder = folder_ / "runs" / (rule + std::to_string(seed));
+    json["config"]["loops"]["rule"] = rule == "odometry" ? "joint" : rule;
+    if (!evidence.empty()) json["config"]["loops"]["evidence"]["kind"] = evidence;
+    const fs::path folder = folder_ / "runs" / (rule + evidence + std::to_string(seed));
     fs::create_directories(folder);
     WriteAll(folder / "summary.json", json.dump());
   }
@@ -52,7 +54,7 @@ class CollectCommand : public ::testing::Test {
 TEST_F(CollectCommand, MeansIntervalsAndThePairedTestOverSeeds) {
   for (int seed = 1; seed <= 3; ++seed) {
     Summary("odometry", seed, seed);                        // 1, 2, 3
-    Summary("mean", seed, 0.5 * seed - 0.1 * (seed == 2));  // 0.5, 0.9, 1.5
+    Summary("joint", seed, 0.5 * seed - 0.1 * (seed == 2));  // 0.5, 0.9, 1.5
   }
   const fs::path file = folder_ / "c.json";
   const auto run = Collect({"--json", file.string()});
@@ -75,7 +77,7 @@ TEST_F(CollectCommand, MeansIntervalsAndThePairedTestOverSeeds) {
 
 TEST_F(CollectCommand, TimePerStageIsATableOfItsOwnInEveryFormat) {
   for (int seed = 1; seed <= 2; ++seed) {
-    Summary("mean", seed, 0.5);
+    Summary("joint", seed, 0.5);
     Summary("orb", seed, 0.6);
   }
   const fs::path file = folder_ / "c.json";
@@ -95,8 +97,8 @@ TEST_F(CollectCommand, TimePerStageIsATableOfItsOwnInEveryFormat) {
 }
 
 TEST_F(CollectCommand, WaitingAndWorkOnTheCallersThreadAreNotCountedTwice) {
-  Summary("mean", 1, 0.5);
-  const fs::path summary = folder_ / "runs" / "mean1" / "summary.json";
+  Summary("joint", 1, 0.5);
+  const fs::path summary = folder_ / "runs" / "jointcounts1" / "summary.json";
   auto json = nlohmann::json::parse(ReadAll(summary));
   json["timing"]["stage_ms"]["loop_inline"] = 500;  // one thread: what all loop_ stages took
   WriteAll(summary, json.dump());
@@ -108,7 +110,7 @@ TEST_F(CollectCommand, WaitingAndWorkOnTheCallersThreadAreNotCountedTwice) {
 
 TEST_F(CollectCommand, SaysWhereTheEnsembleDidNotHelp) {
   for (int seed = 1; seed <= 2; ++seed) {
-    Summary("mean", seed, 0.5);
+    Summary("joint", seed, 0.5);
     Summary("orb", seed, 0.4);
     Summary("naive", seed, 0.6);
   }
@@ -117,8 +119,22 @@ TEST_F(CollectCommand, SaysWhereTheEnsembleDidNotHelp) {
                                 HasSubstr("* The ensemble did not help against orb (0.4000 m).")));
 }
 
+TEST_F(CollectCommand, TheMeanOfStandardisedEvidenceIsAVariantOfItsOwn) {
+  Summary("joint", 1, 0.5);
+  Summary("mean", 1, 0.6);
+  Summary("mean", 2, 0.7, "standardised");
+  Summary("mean", 3, 0.8, "");  // before there was a choice
+  const fs::path file = folder_ / "c.json";
+  ASSERT_EQ(Collect({"--json", file.string()}).status, 0);
+  std::map<std::string, std::size_t> runs;
+  const auto json = nlohmann::json::parse(ReadAll(file));
+  for (const auto& variant : json["datasets"][0]["variants"])
+    runs[variant["variant"]] = variant["seeds"].size();
+  EXPECT_EQ(runs, (std::map<std::string, std::size_t>{{"ensemble", 1}, {"mean", 1}, {"seed", 2}}));
+}
+
 TEST_F(CollectCommand, OneSeedHasNoIntervalAndNoTest) {
-  Summary("mean", 1, 0.5);
+  Summary("joint", 1, 0.5);
   Summary("orb", 1, 0.6);
   const auto run = Collect({"--table-format", "markdown"});
   EXPECT_EQ(run.status, 0) << run.output;

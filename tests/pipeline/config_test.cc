@@ -187,6 +187,7 @@ TEST(Config, EveryOptionFieldHasItsKey) {
       {"camera", "core/include/tutti/core/camera.h", "PinholeCamera"},
       {"odometry", "frontend/include/tutti/frontend/odometry_options.h", "OdometryOptions"},
       {"loops", detector, "LoopDetectorOptions"},
+      {"loops.evidence", detector, "EvidenceOptions"},
       {"loops.extraction", detector, "ExtractionOptions"},
       {"loops.vocabulary", detector, "VocabularyOptions"},
       {"loops.verification", detector, "VerificationOptions"},
@@ -200,7 +201,7 @@ TEST(Config, EveryOptionFieldHasItsKey) {
       // A section, in section camera, or only for callers of the library (their own features).
       const bool elsewhere = field == "camera" || field == "baseline_m" || field == "extraction" ||
                              field == "external_members" || field == "dense_members" ||
-                             field == "vocabulary" || field == "verification";
+                             field == "vocabulary" || field == "evidence" || field == "verification";
       EXPECT_TRUE(elsewhere || keys[s.section].count(field) == 1)
           << s.section << ": no key for " << s.name << "::" << field;
     }

@@ -34,12 +34,13 @@ struct LoopLine {
   double weight = -1;
 };
 
-// The reason is the only quoted cell, `accepted` stands before it, `weight` and `injected` are the last two.
+// The reason is the only quoted cell, `accepted` stands before it, `weight`, `injected` and
+// `probability` are the last three.
 std::vector<LoopLine> ReadLoops(const fs::path& file) {
   std::istringstream in(ReadAll(file));
   std::string line;
   std::getline(in, line);
-  EXPECT_THAT(line, EndsWith(",weight,injected"));
+  EXPECT_THAT(line, EndsWith(",weight,injected,probability"));
   std::vector<LoopLine> loops;
   while (std::getline(in, line)) {
     LoopLine loop;
@@ -47,8 +48,8 @@ std::vector<LoopLine> ReadLoops(const fs::path& file) {
     const std::vector<std::string> after = SplitText(line.substr(end), ",");
     loop.reason = line.substr(begin, end - begin);
     loop.accepted = line.at(begin - 3) == '1';
-    loop.injected = after.back() == "1";
-    loop.weight = ParseDouble(after.at(after.size() - 2)).value_or(-1);
+    loop.injected = after.at(after.size() - 2) == "1";
+    loop.weight = ParseDouble(after.at(after.size() - 3)).value_or(-1);
     loops.push_back(loop);
   }
   return loops;

@@ -39,6 +39,7 @@ struct Result {
   int adjustments = 0, corrections = 0;
   std::vector<double> keyframe_stamps;
   Trajectory trajectory;
+  std::vector<LoopRecord> loops;
   double ate_m = 0;
 };
 
@@ -52,6 +53,7 @@ Result Drive(const RunConfig& config) {
   const Odometry& odometry = *slam.odometry();
   for (const int id : odometry.KeyframeIds()) result.keyframe_stamps.push_back(odometry.KeyframeStamp(id));
   result.trajectory = odometry.FrameTrajectory();
+  result.loops = slam.loops();
   EvaluationOptions options;
   options.alignment = TrajectoryAlignment::kSE3;
   result.ate_m = EvaluateTrajectory(TwoLaps().truth, result.trajectory, options).ate.rmse;
@@ -114,6 +116,35 @@ TEST(SlamSystem, LoopsThatAreGatedAndClosedInPartsDoNotDependOnTheThreads) {
   ExpectTheSameBits(one, Drive(in_parts(2)));
   EXPECT_EQ(one.corrections, whole.corrections) << "the gate refuses no true loop";
   EXPECT_NEAR(one.ate_m, whole.ate_m, 0.1 * whole.ate_m);
+}
+
+// The gate's limit is so low that it refuses all: the detector hears of it, at the same image for any number
+// of threads.
+TEST(SlamSystem, TheDetectorIsToldOfLoopsThatTheMapContradicts) {
+  const auto strict = [](int threads) {
+    RunConfig config = Small(false, threads);
+    config.run.loop_gate_sigmas = 0.001;
+    return config;
+  };
+  const Result one = Drive(strict(1)), two = Drive(strict(2));
+  const auto revoked = [](const LoopRecord& loop) { return loop.revoked; };
+  ASSERT_GT(std::count_if(one.loops.begin(), one.loops.end(), revoked), 0);
+  for (const LoopRecord& loop : one.loops) {
+    EXPECT_FALSE(loop.revoked && loop.accepted) << loop.query;
+    EXPECT_EQ(loop.revoked, loop.gate_sigmas.has_value()) << loop.query << ": " << loop.reason;
+  }
+  EXPECT_EQ(one.corrections, 0);
+  ExpectTheSameBits(one, two);
+  ASSERT_EQ(one.loops.size(), two.loops.size());
+  for (std::size_t i = 0; i < one.loops.size(); ++i) {
+    EXPECT_EQ(one.loops[i].revoked, two.loops[i].revoked);
+    EXPECT_EQ(one.loops[i].hypothesis, two.loops[i].hypothesis);
+    EXPECT_EQ(one.loops[i].probability, two.loops[i].probability);
+  }
+}
+
+TEST(SlamSystem, NothingIsRevokedWhereTheMapAgrees) {
+  for (const LoopRecord& loop : Drive(Small(true, 2)).loops) EXPECT_FALSE(loop.revoked) << loop.query;
 }
 
 }  // namespace

@@ -143,9 +143,13 @@ void ConfigTable::AddLoops(LoopDetectorOptions& o) {
       return "";
     };
   };
-  Push("rule", "joint, mean, log-pool, product, majority, naive over the members, or one member's name for that alone",
-       word(&SetRule), [&o] { return RuleName(o); });
-  Push("preset", "published parameters that the other keys change: default, standardised-mean, paper-2013, rtabmap-0.8.3",
+  Push(
+      "rule",
+      "joint, mean, log-pool, product, majority, naive over the members, or one member's name for that alone",
+      word(&SetRule), [&o] { return RuleName(o); });
+  Push("preset",
+       "published parameters that the other keys change: default, standardised-mean, paper-2013, "
+       "rtabmap-0.8.3",
        word(&ApplyPreset), [] { return "default"; });
   Add("members", o.members, "members of the ensemble: surf, sift, orb, akaze, brisk, kaze, gftt, hog");
   AddEnum("likelihood", o.likelihood,
@@ -321,6 +325,8 @@ void ConfigTable::AddRun(SlamOptions& o) {
       "a candidate that is not this much older than the query is no loop [s]");
   Add("loop_apart_fraction", o.loop_apart_fraction,
       "mono: the two cameras stand at most this share of the median scene depth apart");
+  Add("loop_pose_prior", o.loop_pose_prior,
+      "stereo, RGB-D: the detector knows the odometry's position, and places out of reach lose");
   Add("loop_confirmations", o.loop_confirmations,
       "loops that must agree before the map moves; 1: trust each alone");
   Add("loop_confirmation_frames", o.loop_confirmation_frames, "and lie at most this many input frames apart");

@@ -47,15 +47,16 @@ LoopGate::Map LoopCloser::Places() const {
 
 // Measures it against the map, and closes it if something else says the same.
 void LoopCloser::Consider(const Verification& verification, int candidate, int query, std::int64_t frames) {
-  odometry_.FinishMapping();
   LoopRecord& record = records_.back();
+  if (record.query_stamp_s - record.candidate_stamp_s < options_.loop_min_age_s) {
+    record.reason = "too recent: still in the local map";
+    return;
+  }
+  before_change_();  // what mapping has found enters earlier than without the loop
+  odometry_.FinishMapping();
   const LoopGate::Map places = Places();
   if (!places(candidate).alive || !places(query).alive) {
     record.reason = "one of its keyframes is no longer in the map";
-    return;
-  }
-  if (record.query_stamp_s - record.candidate_stamp_s < options_.loop_min_age_s) {
-    record.reason = "too recent: still in the local map";
     return;
   }
   const LoopConstraint constraint = Measure(verification, candidate, query);
@@ -133,6 +134,7 @@ void LoopCloser::Gate(std::vector<LoopEdge>& entering) {
     std::snprintf(text, sizeof text, "the map can't be that far off: Mahalanobis distance %.1f, limit %.1f",
                   *distance, options_.loop_gate_sigmas);
     Reject(loop, text);
+    Revoke(loop);
   }
   entering = std::move(passed);
 }
@@ -141,6 +143,13 @@ void LoopCloser::Reject(const LoopEdge& loop, const std::string& reason) {
   records_[loop.record].pending = false;
   records_[loop.record].reason = reason;
   untied_.erase(loop.record);
+}
+
+void LoopCloser::Revoke(const LoopEdge& loop) {
+  LoopRecord& record = records_[loop.record];
+  if (record.injected || record.revoked) return;
+  record.revoked = true;
+  revoked_.emplace_back(record.query, record.candidate);
 }
 
 // Optimises with the entering loops; those that the rest contradicts leave again. Then the map moves.
@@ -178,6 +187,7 @@ void LoopCloser::Close(std::vector<LoopEdge> entering, std::int64_t frames) {
                     "contradicts the map: off by %.0f %% of the scene depth and %.1f deg after optimisation",
                     100 * d.fraction, d.angle_deg);
       Reject(entering[i], old_broken ? "contradicts loops that were accepted before" : text);
+      Revoke(entering[i]);
     }
     if (staying.size() == entering.size()) break;
     entering = std::move(staying);
@@ -195,8 +205,12 @@ void LoopCloser::Apply(const MapGraph::Correction& correction, const std::vector
     record.reason.clear();
     gate_.Accepted(loop);
   }
-  for (std::size_t i = 0; i < gate_.accepted().size(); ++i)
-    records_[gate_.accepted()[i].record].weight = correction.weights[i];
+  constexpr double kNoWeight = 0.01;
+  for (std::size_t i = 0; i < gate_.accepted().size(); ++i) {
+    const LoopEdge& loop = gate_.accepted()[i];
+    records_[loop.record].weight = correction.weights[i];
+    if (correction.weights[i] < kNoWeight) Revoke(loop);
+  }
   before_change_();
   graph_.Keep(odometry_, correction, gate_.accepted(), gate_.waiting());
   odometry_.ApplyCorrection(correction.S_world_keyframe, correction.merges);

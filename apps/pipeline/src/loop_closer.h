@@ -5,6 +5,7 @@
 #include <functional>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "false_loop_source.h"
@@ -41,6 +42,10 @@ class LoopCloser {
   /// After the last frame and the last loop.
   void Finish(std::int64_t frames);
 
+  /// Loops of the detector that the map has contradicted since the last call, as input frames (query,
+  /// candidate): gate or pose graph refused them, or its robust loss leaves them no weight. Each comes once.
+  std::vector<std::pair<std::int64_t, std::int64_t>> TakeRevoked() { return std::exchange(revoked_, {}); }
+
   PoseGraph Graph() const { return graph_.Build(odometry_, gate_.accepted()); }
   int Corrections() const { return corrections_; }
   int Adjustments() const { return adjustments_; }
@@ -52,6 +57,7 @@ class LoopCloser {
   LoopConstraint Measure(const Verification& verification, int candidate, int query);
   void Gate(std::vector<LoopEdge>& entering);
   void Reject(const LoopEdge& loop, const std::string& reason);
+  void Revoke(const LoopEdge& loop);
   void Close(std::vector<LoopEdge> entering, std::int64_t frames);
   void Apply(const MapGraph::Correction& correction, const std::vector<LoopEdge>& entering,
              std::int64_t frames);
@@ -72,6 +78,7 @@ class LoopCloser {
   GlobalAdjuster adjuster_;
   std::map<std::size_t, LoopEdge> untied_;  // loops that landmarks do not hold together yet, by record
   std::vector<LoopEdge> deferred_;  // agreed, and the map fulfils them: they enter with the next correction
+  std::vector<std::pair<std::int64_t, std::int64_t>> revoked_;  // not taken yet
   int corrections_ = 0;
   int adjustments_ = 0;  // of the whole map
   std::map<std::string, double> stages_;

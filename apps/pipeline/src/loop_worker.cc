@@ -48,12 +48,13 @@ void AddStages(const LoopResult& r, Span::Clock::time_point begin, SpanRecorder&
 }
 }  // namespace
 
-LoopWorker::Outcome LoopWorker::Detect(const LoopQuery& query) {
+LoopWorker::Outcome LoopWorker::Do(const Task& task) {
   const ScopedSpan span(recorder_, Lane::kLoopClosure, "detect");
   const Span::Clock::time_point begin = Span::Clock::now();
   Outcome outcome;
   try {
-    outcome.result = detector_.Detect(query);
+    for (const auto& [query, candidate] : task.unlinked) detector_.Unlink(query, candidate);
+    outcome.result = detector_.Detect(task.query);
     if (recorder_ != nullptr) AddStages(outcome.result, begin, *recorder_);
   } catch (...) {
     outcome.failure = std::current_exception();
@@ -64,13 +65,13 @@ LoopWorker::Outcome LoopWorker::Detect(const LoopQuery& query) {
 void LoopWorker::Work() {
   std::unique_lock<std::mutex> lock(mutex_);
   while (true) {
-    changed_.wait(lock, [this] { return stop_ || !queries_.empty(); });
+    changed_.wait(lock, [this] { return stop_ || !tasks_.empty(); });
     if (stop_) return;
-    const LoopQuery query = std::move(queries_.front());
-    queries_.pop_front();
+    const Task task = std::move(tasks_.front());
+    tasks_.pop_front();
     busy_ = true;
     lock.unlock();
-    Outcome outcome = Detect(query);
+    Outcome outcome = Do(task);
     lock.lock();
     busy_ = false;
     outcomes_.push_back(std::move(outcome));
@@ -79,18 +80,24 @@ void LoopWorker::Work() {
 }
 
 void LoopWorker::Submit(LoopQuery query) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  Task task{std::exchange(unlinked_, {}), std::move(query)};
   if (!thread_.joinable()) {
-    outcomes_.push_back(Detect(query));
+    outcomes_.push_back(Do(task));
     return;
   }
-  const std::lock_guard<std::mutex> lock(mutex_);
-  queries_.push_back(std::move(query));
+  tasks_.push_back(std::move(task));
   changed_.notify_all();
+}
+
+void LoopWorker::Unlink(std::int64_t query, std::int64_t candidate) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  unlinked_.emplace_back(query, candidate);
 }
 
 LoopResult LoopWorker::Locate(const LoopQuery& query) {
   std::unique_lock<std::mutex> lock(mutex_);
-  changed_.wait(lock, [this] { return queries_.empty() && !busy_; });
+  changed_.wait(lock, [this] { return tasks_.empty() && !busy_; });
   return detector_.Locate(query);
 }
 

@@ -8,6 +8,7 @@
 #include <mutex>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "tutti/core/span_recorder.h"
 #include "tutti/loopclosure/detector.h"
@@ -29,6 +30,9 @@ class LoopWorker {
   LoopWorker& operator=(const LoopWorker&) = delete;
 
   void Submit(LoopQuery query);
+  /// Takes the loop between two images back (LoopDetector::Unlink), before the next query that is submitted
+  /// and after all that were: the same for any number of threads.
+  void Unlink(std::int64_t query, std::int64_t candidate);
   /// The result of the oldest query that was not taken yet; waits for it. Rethrows what the detector threw.
   LoopResult Take();
   /// Where an image was taken (LoopDetector::Locate), once the queries that are on their way are done.
@@ -41,15 +45,20 @@ class LoopWorker {
     LoopResult result;
     std::exception_ptr failure;
   };
+  struct Task {
+    std::vector<std::pair<std::int64_t, std::int64_t>> unlinked;  // before the query
+    LoopQuery query;
+  };
   void Work();
-  Outcome Detect(const LoopQuery& query);
+  Outcome Do(const Task& task);
 
   LoopDetector detector_;
   SpanRecorder* recorder_;
   std::mutex mutex_;
   std::condition_variable changed_;
-  std::deque<LoopQuery> queries_;  // guarded by mutex_
-  std::deque<Outcome> outcomes_;   // guarded by mutex_
+  std::vector<std::pair<std::int64_t, std::int64_t>> unlinked_;  // guarded by mutex_: for the next task
+  std::deque<Task> tasks_;                                       // guarded by mutex_
+  std::deque<Outcome> outcomes_;                                 // guarded by mutex_
   bool busy_ = false;              // guarded by mutex_: the detector is in use
   bool stop_ = false;              // guarded by mutex_
   double waited_ms_ = 0;           // of the caller's thread only

@@ -209,7 +209,7 @@ std::string LoopsCsv(const RunResult& r) {
   std::ostringstream out;
   out << "query,candidate,query_stamp_s,candidate_stamp_s,surf,sift,orb,ensemble,inliers,matches,accepted,"
          "reason,"
-         "verified,tx,ty,tz,qx,qy,qz,qw,scale,sigmas,weight,injected";
+         "verified,tx,ty,tz,qx,qy,qz,qw,scale,sigmas,weight,injected,probability";
   for (std::size_t i = 3; i < names.size(); ++i) out << ',' << names[i];
   out << '\n';
   for (const LoopRecord& loop : r.loops) {
@@ -229,6 +229,7 @@ std::string LoopsCsv(const RunResult& r) {
     }
     out << ',' << (loop.gate_sigmas ? Cell(*loop.gate_sigmas, 6) : "");
     out << ',' << Cell(loop.weight, 6) << ',' << (loop.injected ? 1 : 0);
+    out << ',' << Cell(loop.probability, 6);
     for (std::size_t i = 3; i < names.size(); ++i) out << ',' << Cell(MemberPosterior(loop, names[i]), 6);
     out << '\n';
   }

@@ -60,6 +60,7 @@ class SlamSystem::Impl {
         closer_->AddKeyframes();
         constexpr int kEveryKeyframes = 3;
         if (++keyframes_made_ % kEveryKeyframes == 0) closer_->Inject(result.keyframe, frames_);
+        TellRevoked();
       }
     } else {
       result.reason = "no calibration";
@@ -174,6 +175,11 @@ class SlamSystem::Impl {
     if (odometry_) {
       KeyframeView view = ViewOf(keyframe);
       query.camera = rig_.camera;
+      if (options_.loop_pose_prior && rig_.sensor != Sensor::kMono) {  // mono: its scale drifts
+        query.pose_prior.emplace();
+        query.pose_prior->position_m = view.T_world_camera.translation;
+        query.pose_prior->frame = view.map_piece;
+      }
       query.features = {std::move(view.keypoints), std::move(view.descriptors), std::move(view.points)};
       keyframe_of_frame_[frame.index] = keyframe;
     }
@@ -191,6 +197,7 @@ class SlamSystem::Impl {
     record.members = r.members;
     record.hypothesis = r.hypothesis;
     record.posterior = r.posterior;
+    record.probability = r.probability;
     record.matches = r.verification.matches;
     record.inliers = r.verification.inliers;
     record.verified = r.accepted;
@@ -221,6 +228,14 @@ class SlamSystem::Impl {
       records_.back().accepted = true;
     } else {
       closer_->Consider(result.verification, KeyframeOf(record.candidate), KeyframeOf(record.query), frames_);
+      TellRevoked();
+    }
+  }
+
+  // What the map contradicts is no loop for the detector's filter either.
+  void TellRevoked() {
+    for (const auto& [query, candidate] : closer_->TakeRevoked()) {
+      if (worker_) worker_->Unlink(query, candidate);
     }
   }
 

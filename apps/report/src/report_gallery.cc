@@ -98,7 +98,7 @@ cv::Mat ReadGrey(const Dataset& dataset, std::int64_t frame) {
 
 std::string Describe(const ShownLoop& loop, std::size_t drawn, bool for_the_picture) {
   char text[200];
-  std::snprintf(text, sizeof text, "H = %.3f", loop.hypothesis);
+  std::snprintf(text, sizeof text, "H = %.3f, probability %.3f", loop.hypothesis, loop.probability);
   std::string out = text;
   if (loop.matches > 0)
     out += ", " + std::to_string(loop.inliers) + " inliers of " + std::to_string(loop.matches) + " matches";

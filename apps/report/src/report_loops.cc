@@ -127,7 +127,7 @@ Json PrecisionRecallJson(const RunResult& result, const DetectionLog& log, const
       by_name[opinion.name].push_back(observation);
     }
   }
-  const double threshold = result.config.loops.loop_threshold;
+  const double threshold = result.config.loops.propose_threshold;
   Json json = {{"rule", known.rule},
                {"images", known.images.size()},
                {"rows_with_loop", known.truth.RowsWithLoop()},
@@ -157,6 +157,7 @@ std::vector<ShownLoop> ShownLoops(const RunResult& result, const DetectionLog& l
     loop.query_stamp_s = record.query_stamp_s;
     loop.candidate_stamp_s = record.candidate_stamp_s;
     loop.hypothesis = record.hypothesis;
+    loop.probability = record.probability;
     loop.inliers = record.inliers;
     loop.matches = record.matches;
     loop.reason = record.reason;
@@ -178,6 +179,7 @@ std::vector<ShownLoop> ShownLoops(const RunResult& result, const DetectionLog& l
     loop.query_stamp_s = detection.stamp_s;
     loop.candidate_stamp_s = past.stamp_s;
     loop.hypothesis = detection.opinions.empty() ? 0 : detection.opinions.back().hypothesis;
+    loop.probability = detection.probability;
     loop.reason = detection.reason.empty() ? "verified, but not taken into the pose graph" : detection.reason;
     loop.detection = &detection;
     missed.push_back(loop);

@@ -56,7 +56,7 @@ struct ShownLoop {
   Outcome outcome = Outcome::kAccepted;
   std::int64_t query = -1, candidate = -1;  ///< input frames
   double query_stamp_s = 0, candidate_stamp_s = 0;
-  double hypothesis = 0;
+  double hypothesis = 0, probability = 0;  ///< H; that it is a loop
   int inliers = 0, matches = 0;
   std::string reason;
   const LoggedDetection* detection = nullptr;  ///< null: the detector was not asked

@@ -41,7 +41,7 @@ Json PosteriorJson(const RunResult& result, const DetectionLog& log) {
     place[detections[k].query] = k;
     cell_t[CellOf(k, detections.size(), cells)] = detections[k].stamp_s - detections.front().stamp_s;
   }
-  Json json = {{"cells", cells}, {"threshold", result.config.loops.loop_threshold}, {"t", Json::array()}};
+  Json json = {{"cells", cells}, {"threshold", result.config.loops.propose_threshold}, {"t", Json::array()}};
   for (const double t : cell_t) json["t"].push_back(Rounded(t, 2));
   json["first_stamp_s"] = Rounded(detections.front().stamp_s, 6);
   json["maps"] = Json::array();

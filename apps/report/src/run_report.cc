@@ -66,6 +66,7 @@ Json EdgesJson(const RunResult& result, const std::vector<ShownLoop>& loops, con
                  {"query", loop.query},
                  {"candidate", loop.candidate},
                  {"h", Rounded(loop.hypothesis, 4)},
+                 {"p", Rounded(loop.probability, 4)},
                  {"inliers", loop.inliers},
                  {"reason", loop.reason},
                  {"qt", Rounded(loop.query_stamp_s, 3)},
@@ -152,8 +153,9 @@ Json ConfigurationJson(const RunResult& result) {
 
 std::string VariantName(const RunConfig& config) {
   if (!config.run.loops) return "odometry";
-  const std::string rule = RuleName(config.loops);
-  return rule == "mean" ? "ensemble" : rule;
+  if (config.loops.rule == CombinationRule::kJoint) return "ensemble";
+  const bool standardised = config.loops.evidence.kind == EvidenceKind::kStandardised;
+  return config.loops.rule == CombinationRule::kMean && standardised ? "seed" : RuleName(config.loops);
 }
 
 nlohmann::ordered_json RunReport(const RunResult& result, const DetectionLog& log,

@@ -86,7 +86,7 @@ async function drawPosterior(panel) {
   if (!p) return panel.append(note('This run asked no loop detector.'));
   await chart(panel, 'small', [
     ...p.hypotheses.map((h) => ({ type: 'scatter', mode: 'lines', x: p.hypothesis_t, y: h.h, name: label(h.name), line: lineOf(h.name) })),
-    { type: 'scatter', mode: 'lines', x: [0, p.hypothesis_t.at(-1)], y: [p.threshold, p.threshold], name: `threshold ${p.threshold}`,
+    { type: 'scatter', mode: 'lines', x: [0, p.hypothesis_t.at(-1)], y: [p.threshold, p.threshold], name: `looked at from ${p.threshold}`,
       line: { color: css('--faint'), dash: 'dot', width: 1.5 } },
   ], layoutOf('Hypothesis: 1 - p(new place)', { xaxis: axis('time [s]'), yaxis: axis('H', { rangemode: 'tozero' }), hovermode: 'x unified' }));
   const grid = el('div', { class: 'pair' });

@@ -42,7 +42,7 @@ function paths() {
 
 const edgesOf = (run, outcome) => run.loops.filter((loop) => loop.outcome === outcome && loop.a);
 
-const edgeText = (loop) => label(`frame ${loop.query} to ${loop.candidate}, H = ${fixed(loop.h, 3)}, ` +
+const edgeText = (loop) => label(`frame ${loop.query} to ${loop.candidate}, H = ${fixed(loop.h, 3)}, probability ${fixed(loop.p, 3)}, ` +
   `${loop.inliers} inliers${loop.reason ? `; ${loop.reason}` : ''}`);
 
 // Lines, broken between edges, and a mark at the newer end of each.

@@ -39,9 +39,9 @@ async function drawOverview(panel) {
   for (const failure of data.failures ?? []) panel.append(note(`Failed: ${failure}`));
   const loops = run.loops.filter((loop) => loop.outcome !== 'missed');
   if (loops.length) {
-    const rows = loops.map((l) => [`${OUTCOMES[l.outcome].sign} ${OUTCOMES[l.outcome].name}`, l.query, l.candidate, fixed(l.h, 3), l.inliers, l.reason]);
+    const rows = loops.map((l) => [`${OUTCOMES[l.outcome].sign} ${OUTCOMES[l.outcome].name}`, l.query, l.candidate, fixed(l.h, 3), fixed(l.p, 3), l.inliers, l.reason]);
     panel.append(el('details', {}, el('summary', {}, `All ${loops.length} proposed loops`),
-      table(['outcome', 'frame', 'place of frame', 'H', 'inliers', 'reason'], rows, [5])));
+      table(['outcome', 'frame', 'place of frame', 'H', 'probability', 'inliers', 'reason'], rows, [6])));
   }
 }
 

@@ -118,8 +118,8 @@ void LiveState::AddDetection(const LoopResult& result) {
     const std::string place =
         std::to_string(result.verification.candidate >= 0 ? result.verification.candidate : result.candidate);
     char text[120];
-    std::snprintf(text, sizeof text, "frame %ld: H = %.3f, ", static_cast<long>(result.query),
-                  result.hypothesis);
+    std::snprintf(text, sizeof text, "frame %ld: H = %.3f, probability %.3f, ",
+                  static_cast<long>(result.query), result.hypothesis, result.probability);
     event.text =
         text + (result.accepted ? "verified as the place of frame " + place + ", " +
                                       std::to_string(result.verification.inliers) + " inliers"

@@ -17,11 +17,15 @@ class ByteWriter;
 /// Likelihood of the places by their counts of matched words (docs/loop-closure.md section 2).
 ///
 /// The *alias level* Lambda is what the best of the wrong places reaches in this environment. It is learnt
-/// without labels: an image that shows a new place (by the filter's own posterior) tells it by its best place,
-/// any other by its best place far from the one where it was taken. A place that attracts every image (its
-/// mean count is high) has a higher level of its own. With the count C_i of a place,
+/// without labels: an image that shows a new place (by the filter's own posterior) tells it by its best
+/// place, any other by its best place far from the one where it was taken. A place that attracts every image
+/// (its mean count is high) has a higher level of its own. With the count C_i of a place,
 ///
 ///   log L_i = max(floor, beta ln[(C_i + 1) / (Lambda_i + 1)]),   L_new = 1.
+///
+/// An image that shares little with anything (dark, blurred, in the rain) shares less with wrong places, too:
+/// its levels are lower by what it shares with the few images just before, compared with what images of new
+/// places usually do.
 ///
 /// So shared words speak for a place only beyond what resemblance alone brings about, few of them speak
 /// against all places, and an image without any says "new place", however many places there are.
@@ -33,11 +37,13 @@ class AliasEvidence {
   explicit AliasEvidence(const EvidenceOptions& options) : options_(options) {}
 
   /// The likelihood of an image with these counts (by slot) over the places of `working_memory`. `words`:
-  /// that the image has.
-  Belief Likelihood(const std::vector<double>& counts, const std::vector<int>& working_memory, double words);
+  /// that the image has; `repeated`: its mean count for the few images before.
+  Belief Likelihood(const std::vector<double>& counts, const std::vector<int>& working_memory, double words,
+                    double repeated);
 
-  /// The same for an image that is no location: nothing is learnt.
-  Belief Of(const std::vector<double>& counts, const std::vector<int>& working_memory) const;
+  /// The same for an image that is no location, with the levels times `share`: nothing is learnt.
+  Belief Of(const std::vector<double>& counts, const std::vector<int>& working_memory,
+            double share = 1) const;
 
   /// Learns from the same image, after the filter's step: `near` are the slots of the most probable place and
   /// its neighbours, ascending; `new_place` is the posterior of the new place.
@@ -60,19 +66,22 @@ class AliasEvidence {
 
  private:
   EvidenceOptions options_;
-  double log_level_ = 0;     // ln(Lambda + 1)
-  double words_sum_ = 0;     // of the first images
-  int first_images_ = 0;     // that were seen, up to kFirstImages
-  double images_ = 15;       // that the running mean stands for
-  std::vector<double> sum_;  // by slot: counts of images that were taken elsewhere,
+  double log_level_ = 0;      // ln(Lambda + 1)
+  double words_sum_ = 0;      // of the first images
+  int first_images_ = 0;      // that were seen, up to kFirstImages
+  double images_ = 15;        // that the running mean stands for
+  std::vector<double> sum_;   // by slot: counts of images that were taken elsewhere,
   std::vector<double> seen_;  // and how many they were
   double all_sum_ = 0;
   double all_seen_ = 0;
+  double log_repeated_ = 0;     // running mean of ln(repeated) over images of new places
+  double repeated_images_ = 0;  // that it stands for
+  double log_repeated_now_ = 0;
 };
 
 /// How much a member counts in the sum of all: by what it shows of the same place against what it shows of
-/// wrong ones, w ~ R / (E[f^2] + 1), with f its largest count far from where the image was taken and R its mean
-/// count for the few images before. A member that matches everything everywhere has a large f, one that
+/// wrong ones, w ~ R / (E[f^2] + 1), with f its largest count far from where the image was taken and R its
+/// mean count for the few images before. A member that matches everything everywhere has a large f, one that
 /// matches nothing has R = 0: neither has a say.
 class MemberWeight {
  public:

@@ -26,6 +26,18 @@ struct FeatureSet {
   std::vector<Eigen::Vector3d> points;  ///< empty, or N points in the camera frame [m]; NaN where unknown
 };
 
+/// Where the caller's odometry believes an image to be taken: places that it can't have come back to lose,
+/// and among those that look alike the nearer one gains. The odometry drifts: its position relative to a
+/// place has a standard deviation of sigma_m + drift s, with s the way since then, summed over the positions
+/// given. Positions are not saved: after Load, and with a store of an earlier run, places of before have
+/// none.
+struct PosePrior {
+  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();  ///< of the camera [m], in the odometry's world
+  std::int64_t frame = 0;  ///< number of that world: positions in different ones are not compared
+  double sigma_m = 5.0;    ///< how far apart one place is seen from, without any drift [m], above 0
+  double drift = 0.05;     ///< growth of the standard deviation with the way [m/m], 0 or more
+};
+
 /// One image with what is known about it.
 struct LoopQuery {
   std::int64_t id = 0;  ///< strictly greater than every id before
@@ -42,6 +54,7 @@ struct LoopQuery {
   FeatureSet features;                  ///< optional: the caller's own features
   std::map<std::string, Features> member_features;  ///< optional: members that need not extract, by
                                                     ///< name; one of options.external_members: required
+  std::optional<PosePrior> pose_prior;  ///< optional: only what drifts slowly and has a fixed scale
   bool metric = true;  ///< features.points are in metres (stereo, RGB-D): PnP, kRigid. false: mono, their
                        ///< scale drifts: essential matrix, then kSimilarity where both have points
 };
@@ -128,8 +141,8 @@ struct LoopResult {
   double posterior = 0;                ///< combined posterior at the candidate
   double probability = 0;              ///< that this is a loop: with the verified place, else the candidate
   bool proposed = false;               ///< H >= propose_threshold: went to verification
-  bool accepted = false;  ///< the verification accepted it (or one of its neighbours), and the
-                          ///< probability is at least loop_threshold
+  bool accepted = false;               ///< the verification accepted it (or one of its neighbours), and the
+                                       ///< probability is at least loop_threshold
   std::string reason;                  ///< why it is not accepted, in plain words
   std::vector<MemberOpinion> members;  ///< in the order of options.members
   Verification verification;           ///< the best one tried
@@ -176,9 +189,9 @@ class LoopDetector {
   /// Adds a neighbour link between two locations (a caller's own odometry link); consecutive ids are linked
   /// by themselves.
   void AddLink(std::int64_t a, std::int64_t b);
-  /// Takes back the loop between two locations, that Detect accepted and the caller has found to be false (the
-  /// pose graph contradicts it): the filter no longer takes their places for one. Ids that are unknown, or not
-  /// linked by a loop, are no error.
+  /// Takes back the loop between two locations, that Detect accepted and the caller has found to be false
+  /// (the pose graph contradicts it): the filter no longer takes their places for one. Ids that are unknown,
+  /// or not linked by a loop, are no error.
   void Unlink(std::int64_t a, std::int64_t b);
 
   /// Saves everything (vocabularies, memory with its long-term part, filters) into one file; a file that is

@@ -81,12 +81,12 @@ struct VocabularyOptions {
 /// Options of the likelihood of places (docs/loop-closure.md section 2).
 struct EvidenceOptions {
   EvidenceKind kind = EvidenceKind::kCounts;  ///< the next four are of kCounts
-  double sharpness = 2.0;    ///< exponent of a count beyond the alias level: beta, above 0, at most 10
-  double alias_share = 0.85;  ///< share of the alias level that a place must reach to be more likely than a new
-                              ///< one, above 0, at most 3
-  double floor = -1.0;        ///< least logarithm of a likelihood, below 0, at least -10
-  double attraction = 0.5;    ///< how much more a place must show that many images resemble: exponent of its mean
-                              ///< count, 0 (no more) to 2
+  double sharpness = 2.0;     ///< exponent of a count beyond the alias level: beta, above 0, at most 10
+  double alias_share = 0.85;  ///< share of the alias level that a place must reach to be more likely than a
+                              ///< new one, above 0, at most 3
+  double floor = -1.0;      ///< least logarithm of a likelihood, below 0, at least -10
+  double attraction = 0.75;  ///< how much more a place must show that many images resemble: exponent of its
+                            ///< mean count, 0 (no more) to 2
 
   /// Empty if usable, else what is wrong and what to do.
   std::string Validate() const;
@@ -145,12 +145,12 @@ struct LoopDetectorOptions {
                                                ///< no keypoints, and one row of CV_32F
   std::vector<std::string> external_members;   ///< further names that members may hold: the caller extracts
                                                ///< their features himself and gives them with each LoopQuery
-  double loop_threshold = 0.95;    ///< accept a loop of this probability, 0..1
-  double propose_threshold = 0.1;  ///< go to verification at H >= this, 0..1
-  double link_threshold = 0.9;     ///< a loop of this probability links its two places for the filter, 0..1
-  int stm_size = 10;                           ///< locations in short-term memory, no candidates
-  int threads = 2;                             ///< most threads that Detect uses at once
-  std::uint64_t seed = 1;                      ///< of kd-forests and RANSAC
+  double loop_threshold = 0.95;                ///< accept a loop of this probability, 0..1
+  double propose_threshold = 0.1;              ///< go to verification at H >= this, 0..1
+  double link_threshold = 0.9;  ///< a loop of this probability links its two places for the filter, 0..1
+  int stm_size = 10;            ///< locations in short-term memory, no candidates
+  int threads = 2;              ///< most threads that Detect uses at once
+  std::uint64_t seed = 1;       ///< of kd-forests and RANSAC
 
   EvidenceOptions evidence;                            ///< what a score says of a place
   LikelihoodKind likelihood = LikelihoodKind::kTfIdf;  ///< score of standardised evidence
@@ -193,16 +193,16 @@ struct LoopDetectorOptions {
 /// Michaud 2013), "rtabmap-0.8.3" (the reference system of the ensemble's paper), "standardised-mean" (the
 /// ensemble's paper: standardised evidence, mean of the posteriors, every loop that geometry accepts), or
 /// "default" (ours).
-/// Features (but their number) and verification (but min_epipolar_ratio) stay as they are. Throws InputError that names the nearest
-/// word.
+/// Features (but their number) and verification (but min_epipolar_ratio) stay as they are. Throws InputError
+/// that names the nearest word.
 void ApplyPreset(const std::string& name, LoopDetectorOptions& options);
 
 /// Names that ApplyPreset takes.
 const std::vector<std::string>& KnownPresets();
 
 /// The one configuration key: "joint", "mean", "log-pool", "product", "majority" or "naive" over
-/// options.members, or a member's name ("surf", "sift", "orb", "akaze", "brisk") for that member alone. Throws InputError that names the
-/// nearest word.
+/// options.members, or a member's name ("surf", "sift", "orb", "akaze", "brisk") for that member alone.
+/// Throws InputError that names the nearest word.
 void SetRule(const std::string& word, LoopDetectorOptions& options);
 
 /// The word that SetRule takes for these options.

@@ -35,10 +35,8 @@ class Signature {
   /// sum over shared words of min(multiplicity), divided by max(|a|, |b|). In [0, 1]; 0 if one is empty.
   static double Similarity(const Signature& a, const Signature& b);
 
-  /// Signatures of several members as one: d_1 + d_2 + ... (loop-closure.md eq. 3). Their words stay apart by
-  /// interleaving the ids: word w of part k becomes w * parts + k.
-  static Signature Concatenate(const std::vector<const Signature*>& parts);
-  /// What Concatenate made one of: `parts` signatures, in their order.
+  /// The parts of a signature that is of several members at once: d_1 + d_2 + ... (loop-closure.md eq. 3).
+  /// Its words stay apart by interleaving the ids: word w of part k is word w * parts + k.
   std::vector<Signature> Split(int parts) const;
 
   /// Appends the entries.

@@ -24,7 +24,7 @@ struct LoopEdge {
   std::size_t record = 0;  ///< index of its LoopRecord
 };
 
-/// One line of loops.csv. Only proposed loops (hypothesis above the detector's threshold) get one.
+/// One line of loops.csv. Only proposed loops (hypothesis from loops.propose_threshold on) get one.
 struct LoopRecord {
   std::int64_t query = -1;      ///< 0-based index of the input frame
   std::int64_t candidate = -1;  ///< the same
@@ -33,12 +33,14 @@ struct LoopRecord {
   std::vector<MemberOpinion> members;
   double hypothesis = 0;  ///< of the ensemble: 1 - p(new place)
   double posterior = 0;   ///< of the ensemble at its best location
+  double probability = 0;  ///< that it is a loop (LoopResult::probability), 0..1
   int matches = 0, inliers = 0;
   bool verified = false;              ///< passed the detector's geometric verification
   bool accepted = false;              ///< in the pose graph in the end
   bool injected = false;              ///< planted (run.inject_false_loops), known to be false
   double weight = 0;                  ///< that the pose graph last gave it, 0..1; 0: never was in it
   std::optional<double> gate_sigmas;  ///< Mahalanobis distance from the map (run.loop_gate_sigmas), if asked
+  bool revoked = false;               ///< the map contradicted it, and the detector was told
   bool pending = false;               ///< waits for a second loop that agrees
   std::optional<bool> correct;        ///< what the ground truth says of an accepted loop, if it can
   std::string reason;                 ///< why it is not accepted, in plain words

@@ -15,6 +15,8 @@ struct SlamOptions {
   double loop_min_age_s = 5.0;  ///< a candidate that is not this much older than the query is no loop [s]
   double loop_apart_fraction = 0.5;  ///< mono: cameras farther apart than this share of the median scene
                                      ///< depth see too little in common to fix a scale
+  bool loop_pose_prior = true;       ///< stereo, RGB-D: the detector gets the odometry's position with each
+                                     ///< keyframe (PosePrior): places out of reach lose
   int loop_confirmations = 2;  ///< verified loops that must agree before the map moves; 1 trusts each alone
   int loop_confirmation_frames = 60;  ///< and lie at most this many input frames apart, at both ends
   double loop_agree_fraction =

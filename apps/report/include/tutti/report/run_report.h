@@ -19,7 +19,7 @@ constexpr int kReportFormat = 1;
 nlohmann::ordered_json RunReport(const RunResult& result, const DetectionLog& log,
                                  const std::string& variant);
 
-/// "odometry" without loops, "ensemble" for the rule mean, else the rule.
+/// "odometry" without loops, "ensemble" for the rule joint, "seed" for standardised-mean, else the rule.
 std::string VariantName(const RunConfig& config);
 
 }  // namespace tutti

@@ -1,0 +1,127 @@
+// What bench/evidence_study works on: for every image, member and earlier location the matched words (by
+// inverse frequency) in each cell of the image, with the ground truth, as one binary file.
+//
+// int32 images, rows of cells (8 columns); then images x images labels (uint8, row by row: 255 loop, 128
+// ignore, 0 none); then for each image t and member: float32 features, float32 words, and (t + 1) x cells
+// values (uint8, sixteenths), that of location 0 first.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <opencv2/imgcodecs.hpp>
+#include <unordered_map>
+
+#include "command_loops_input.h"
+#include "joined_pairs.h"
+#include "tutti/core/error.h"
+#include "tutti/loopclosure/likelihood.h"
+#include "tutti/loopclosure/member.h"
+
+namespace tutti {
+namespace {
+
+using Postings = std::unordered_map<int, std::vector<std::pair<int, int>>>;  // word: location, occurrences
+
+template <typename T>
+void Put(std::ofstream& out, const T& value) {
+  out.write(reinterpret_cast<const char*>(&value), sizeof value);
+}
+
+void PutImage(const Features& features, const cv::Size& size, int image, int cells, Member& member,
+              Postings& postings, std::ofstream& out) {
+  const bool usable = member.Judge(features);
+  std::unordered_map<int, std::vector<int>> cells_of_word;
+  if (usable) {
+    const std::vector<int> words = member.vocabulary().Quantise(features.descriptors);
+    member.vocabulary().AddReferences(Signature(words));
+    for (std::size_t i = 0; i < words.size(); ++i) {
+      const int cell = SeenWords::Cell(features.keypoints[i].pt, size);
+      cells_of_word[words[i]].push_back(std::min(cell, cells - 1));
+    }
+  }
+  for (const auto& [word, in_cells] : cells_of_word) {
+    postings[word].emplace_back(image, static_cast<int>(in_cells.size()));
+  }
+  std::vector<double> sums(static_cast<std::size_t>((image + 1) * cells), 0.0);
+  const double all = std::log10(image + 1.0);
+  for (const auto& [word, in_cells] : cells_of_word) {
+    const auto& list = postings[word];
+    if (all <= 0) break;
+    const double value = std::log10((image + 1.0) / static_cast<double>(list.size())) / all /
+                         static_cast<double>(in_cells.size());
+    for (const auto& [location, occurrences] : list) {
+      for (const int cell : in_cells) sums[static_cast<std::size_t>(location * cells + cell)] += occurrences * value;
+    }
+  }
+  Put(out, static_cast<float>(features.keypoints.size()));
+  Put(out, static_cast<float>(usable ? features.keypoints.size() : 0));
+  for (const double sum : sums) Put(out, static_cast<std::uint8_t>(std::min(255.0, std::round(16 * sum))));
+}
+
+int Run(const std::string& folder, const cli::GroundTruthArguments& truth_arguments, const std::string& file) {
+  std::vector<std::filesystem::path> images = cli::ListImages(folder);
+  std::error_code error;
+  images.erase(std::remove_if(images.begin(), images.end(),
+                              [&](const auto& p) {
+                                return std::filesystem::equivalent(p, truth_arguments.file, error);
+                              }),
+               images.end());
+  std::vector<std::filesystem::path> rights(images.size());
+  if (truth_arguments.join_pairs) rights = cli::TakeRightImages(folder, images);
+  const LoopGroundTruth truth = cli::LoadGroundTruth(truth_arguments, images);
+  const LoopDetectorOptions options;
+  std::vector<Member> members;
+  members.reserve(options.members.size());
+  for (const std::string& name : options.members) members.emplace_back(name, options, 1000003u + members.size());
+  std::vector<Postings> postings(members.size());
+  std::ofstream out(file, std::ios::binary);
+  int cells = 0;
+  for (int t = 0; t < truth.size(); ++t) {
+    const std::size_t i = static_cast<std::size_t>(t * truth_arguments.stride);
+    const cv::Mat image = rights[i].empty() ? cv::imread(images[i].string(), cv::IMREAD_UNCHANGED)
+                                            : cli::ReadJoined(images[i], rights[i]);
+    if (image.empty()) throw InputError(images[i].string() + ": can't be read");
+    if (t == 0) {
+      cells = SeenWords::Cell(cv::Point2f(1e6f, 1e6f), image.size()) + 1;
+      cells = (cells + SeenWords::kColumns - 1) / SeenWords::kColumns * SeenWords::kColumns;
+      Put(out, truth.size());
+      Put(out, cells / SeenWords::kColumns);
+      for (int row = 0; row < truth.size(); ++row) {
+        for (int column = 0; column < truth.size(); ++column) Put(out, static_cast<std::uint8_t>(truth.At(row, column)));
+      }
+    }
+    const cv::Mat grey = ToGrey8(image);
+    for (std::size_t k = 0; k < members.size(); ++k) {
+      PutImage(members[k].Extract(grey), image.size(), t, cells, members[k], postings[k], out);
+    }
+  }
+  out.close();
+  if (!out) throw InputError(file + ": can't be written; is there space?");
+  return 0;
+}
+
+}  // namespace
+}  // namespace tutti
+
+int main(int argc, char** argv) {
+  CLI::App app("Matched words by cell, for bench/evidence_study");
+  std::string images, out;
+  tutti::cli::GroundTruthArguments truth;
+  app.add_option("--images", images, "folder")->required();
+  app.add_option("--ground-truth", truth.file, "loop matrix or trajectory")->required();
+  app.add_option("--out", out, "file")->required();
+  app.add_option("--stride", truth.stride, "every n-th image");
+  app.add_flag("--join-pairs", truth.join_pairs, "left and right images make one");
+  app.add_option("--gt-distance", truth.rule.distance_m, "[m]");
+  app.add_option("--gt-angle", truth.rule.angle_deg, "[deg]");
+  app.add_option("--gt-ignore", truth.rule.ignore_m, "[m]");
+  app.add_option("--gt-exclude-s", truth.rule.exclude_s, "[s]");
+  CLI11_PARSE(app, argc, argv);
+  try {
+    return tutti::Run(images, truth, out);
+  } catch (const std::exception& e) {
+    std::fprintf(stderr, "cell_counts: %s\n", e.what());
+    return 2;
+  }
+}

@@ -1,0 +1,170 @@
+#include "tutti/loopclosure/alias_evidence.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <numeric>
+#include <random>
+
+#include "byte_stream.h"
+#include "tutti/core/error.h"
+#include "tutti/loopclosure/bayes_filter.h"
+
+namespace tutti {
+namespace {
+
+std::vector<int> Places(int n) {
+  std::vector<int> places(static_cast<std::size_t>(n));
+  std::iota(places.begin(), places.end(), 0);
+  return places;
+}
+
+// Counts of images that show nothing known: at most `most`.
+std::vector<double> Resemblances(int n, double most, std::mt19937& random) {
+  std::uniform_real_distribution<double> uniform(0.0, most);
+  std::vector<double> counts(static_cast<std::size_t>(n));
+  for (double& count : counts) count = uniform(random);
+  return counts;
+}
+
+// After many images of a new place.
+AliasEvidence Experienced(int n, double most) {
+  AliasEvidence evidence{EvidenceOptions()};
+  std::mt19937 random(1);
+  for (int i = 0; i < 300; ++i) {
+    const std::vector<double> counts = Resemblances(n, most, random);
+    evidence.Likelihood(counts, Places(n), 1200, 20);
+    evidence.Learn(counts, Places(n), {}, 1.0);
+  }
+  return evidence;
+}
+
+TEST(AliasEvidence, NoWordInCommonSaysNewPlaceHoweverManyPlacesThereAre) {
+  for (const int n : {1, 10, 100, 2000}) {
+    LocationMemory memory(1);
+    TransitionModel transition(0.9);
+    for (int i = 0; i <= n; ++i) memory.Add(i);
+    transition.Update(memory, memory.Settle());
+    AliasEvidence evidence{EvidenceOptions()};
+    BayesFilter filter;
+    const std::vector<double> nothing(static_cast<std::size_t>(memory.size()), 0.0);
+    for (int image = 0; image < 30; ++image) {
+      filter.Step(transition, memory.working_memory(),
+                  evidence.Likelihood(nothing, memory.working_memory(), 0, 0));
+    }
+    EXPECT_LT(filter.posterior().Hypothesis(), LoopDetectorOptions().propose_threshold) << n << " places";
+  }
+}
+
+TEST(AliasEvidence, TheLevelIsWhatTheBestWrongPlaceReaches) {
+  const AliasEvidence evidence = Experienced(100, 7.0);
+  EXPECT_GT(evidence.Level(), 6.5);
+  EXPECT_LT(evidence.Level(), 7.2);
+}
+
+TEST(AliasEvidence, BeforeAnythingIsKnownTheLevelIsHighAndFallsWithExperience) {
+  AliasEvidence evidence{EvidenceOptions()};
+  evidence.Likelihood(std::vector<double>(50, 0.0), Places(50), 1200, 20);
+  EXPECT_NEAR(evidence.Level(), 0.02 * 1200, 1e-9);
+  EXPECT_LT(Experienced(50, 3.0).Level(), 4.0);
+}
+
+TEST(AliasEvidence, ARevisitDoesNotRaiseTheLevel) {
+  AliasEvidence evidence = Experienced(100, 5.0);
+  const double before = evidence.Level();
+  std::mt19937 random(2);
+  for (int i = 0; i < 100; ++i) {
+    std::vector<double> counts = Resemblances(100, 5.0, random);
+    counts[40] = 60.0;
+    evidence.Learn(counts, Places(100), {38, 39, 40, 41, 42}, 0.02);
+  }
+  EXPECT_NEAR(evidence.Level(), before, 0.5);
+}
+
+TEST(AliasEvidence, CountsBeyondTheLevelSpeakForAPlaceAndFewSpeakAgainstIt) {
+  AliasEvidence evidence = Experienced(100, 5.0);
+  std::vector<double> counts(100, 1.0);
+  counts[7] = 40.0;
+  const Belief likelihood = evidence.Of(counts, Places(100));
+  EXPECT_EQ(likelihood.new_place, 1.0);
+  const EvidenceOptions options;
+  EXPECT_NEAR(likelihood.places[7], std::pow(41.0 / (evidence.LevelOf(7) + 1.0), options.sharpness), 1e-9);
+  EXPECT_GT(likelihood.places[7], 30.0);
+  EXPECT_NEAR(likelihood.places[8], std::exp(options.floor), 1e-12);
+}
+
+TEST(AliasEvidence, AnImageThatRepeatsLittleNeedsLess) {
+  AliasEvidence evidence = Experienced(100, 5.0);  // images that share 20 with those before
+  std::vector<double> counts(100, 0.5);
+  counts[7] = 5.0;
+  AliasEvidence same = evidence;
+  const double as_usual = same.Likelihood(counts, Places(100), 1200, 20).places[7];
+  const double in_the_dark = evidence.Likelihood(counts, Places(100), 1200, 4).places[7];
+  EXPECT_LT(as_usual, 2.0);
+  EXPECT_GT(in_the_dark, 5.0);
+  AliasEvidence bright = Experienced(100, 5.0);
+  EXPECT_EQ(bright.Likelihood(counts, Places(100), 1200, 80).places[7], as_usual);  // never more than usual
+}
+
+TEST(AliasEvidence, APlaceThatEveryImageResemblesNeedsMore) {
+  AliasEvidence evidence{EvidenceOptions()};
+  std::mt19937 random(3);
+  for (int i = 0; i < 200; ++i) {
+    std::vector<double> counts = Resemblances(100, 4.0, random);
+    counts[11] = 12.0;  // a blank wall
+    evidence.Likelihood(counts, Places(100), 1200, 20);
+    evidence.Learn(counts, Places(100), {}, 1.0);
+  }
+  EXPECT_GT(evidence.LevelOf(11), 1.5 * evidence.LevelOf(12));
+  EXPECT_LE(evidence.LevelOf(11), 3.0 * EvidenceOptions().alias_share * evidence.Level() + 1e-9);
+}
+
+TEST(AliasEvidence, GoesOnWhereItWasSavedAndRefusesDamage) {
+  AliasEvidence evidence = Experienced(50, 5.0);
+  internal::ByteWriter out;
+  evidence.Save(out);
+  AliasEvidence loaded{EvidenceOptions()};
+  internal::ByteReader in(out.bytes(), "memory");
+  loaded.Load(in);
+  EXPECT_EQ(loaded.Level(), evidence.Level());
+  for (int slot = 0; slot < 50; ++slot) EXPECT_EQ(loaded.LevelOf(slot), evidence.LevelOf(slot));
+  std::string damaged = out.bytes();
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  std::memcpy(damaged.data(), &nan, sizeof nan);
+  AliasEvidence refuses{EvidenceOptions()};
+  internal::ByteReader bad(damaged, "memory");
+  EXPECT_THROW(refuses.Load(bad), InputError);
+}
+
+// A member's weight after images in which it repeats so much and is wrong so much.
+double WeightOf(double repeated, double wrong) {
+  MemberWeight weight;
+  std::vector<double> counts(40, 0.0);
+  counts[30] = wrong;
+  for (int i = 0; i < 50; ++i) {
+    weight.Repeat(repeated);
+    weight.Learn(counts, Places(40), {3, 4, 5});
+  }
+  return weight.Value();
+}
+
+TEST(MemberWeight, IsLargeForWhatRepeatsAndIsNotWrong) {
+  EXPECT_GT(WeightOf(20, 2), 5 * WeightOf(20, 10));  // matches everything everywhere
+  EXPECT_GT(WeightOf(20, 2), 20 * WeightOf(0, 2));   // sees nothing again
+  EXPECT_GT(WeightOf(0, 0), 0.0);                    // but may come to
+}
+
+TEST(MemberWeight, LearnsNothingFromWhereTheImageWasTaken) {
+  MemberWeight weight;
+  std::vector<double> counts(40, 0.0);
+  counts[4] = 100;
+  weight.Repeat(20);
+  weight.Learn(counts, Places(40), {3, 4, 5});
+  EXPECT_NEAR(weight.Value(), 20.1, 1e-9);
+}
+
+}  // namespace
+}  // namespace tutti

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Ablation of the loop-closure detector: runs `tutti loops` once per variant and data set and writes a table.
 
-  bench/ablation.py --binary build/release/apps/tutti/tutti --data ../shared/data --out docs/loop-closure-ablation.md
+  bench/ablation.py --binary build/release/apps/tutti/tutti --data ../shared/data --out docs/results/ablation.md
 
 A variant is a list of `tutti loops` arguments (--rule, --set key=value). Every figure of the table comes from
 the results.json of its run; variants whose results.json exists in --work are not run again (unless an older
@@ -115,7 +115,7 @@ def main():
     parser.add_argument("--binary", type=pathlib.Path, default="build/release/apps/tutti/tutti")
     parser.add_argument("--data", type=pathlib.Path, default="../shared/data")
     parser.add_argument("--work", type=pathlib.Path, default="build/ablation", help="folder for the runs")
-    parser.add_argument("--out", type=pathlib.Path, default="docs/loop-closure-ablation.md")
+    parser.add_argument("--out", type=pathlib.Path, default="docs/results/ablation.md")
     parser.add_argument("--sets", nargs="+", choices=list(SETS), default=list(SETS))
     parser.add_argument("--variants", nargs="+", choices=list(VARIANTS), default=list(VARIANTS))
     arguments = parser.parse_args()

@@ -170,7 +170,7 @@ def main():
                         default=os.environ.get("TUTTI_PAPER_DATA"))
     parser.add_argument("--stand-ins", action="store_true", help="synthetic sets for those whose images are absent")
     parser.add_argument("--out", default="/tmp/tutti-paper", help="folder for the runs (kept)")
-    parser.add_argument("--document", help="write the tables there, too (docs/loop-closure-stand-ins.md)")
+    parser.add_argument("--document", help="write the tables there, too (docs/results/stand-ins.md)")
     parser.add_argument("--only", action="append", choices=list(SETS), help="this set (may be repeated)")
     a = parser.parse_args()
     out = pathlib.Path(a.out).resolve()

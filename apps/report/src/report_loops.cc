@@ -15,7 +15,7 @@ constexpr std::size_t kMostCurvePoints = 400;
 constexpr std::size_t kMostMissed = 400;  // of the map; more are drawn on each other
 
 // A room is not a street: with depth from the sensor, the views of one place lie closer together (the rule of
-// docs/loop-closure-results.md).
+// bench/ensemble_protocol).
 LoopRule RuleFor(Sensor sensor) {
   LoopRule rule;
   if (sensor != Sensor::kRgbd) return rule;

@@ -51,7 +51,8 @@ void PutImage(const Features& features, const cv::Size& size, int image, int cel
     const double value = std::log10((image + 1.0) / static_cast<double>(list.size())) / all /
                          static_cast<double>(in_cells.size());
     for (const auto& [location, occurrences] : list) {
-      for (const int cell : in_cells) sums[static_cast<std::size_t>(location * cells + cell)] += occurrences * value;
+      for (const int cell : in_cells)
+        sums[static_cast<std::size_t>(location * cells + cell)] += occurrences * value;
     }
   }
   Put(out, static_cast<float>(features.keypoints.size()));
@@ -59,7 +60,8 @@ void PutImage(const Features& features, const cv::Size& size, int image, int cel
   for (const double sum : sums) Put(out, static_cast<std::uint8_t>(std::min(255.0, std::round(16 * sum))));
 }
 
-int Run(const std::string& folder, const cli::GroundTruthArguments& truth_arguments, const std::string& file) {
+int Run(const std::string& folder, const cli::GroundTruthArguments& truth_arguments,
+        const std::string& file) {
   std::vector<std::filesystem::path> images = cli::ListImages(folder);
   std::error_code error;
   images.erase(std::remove_if(images.begin(), images.end(),
@@ -73,7 +75,8 @@ int Run(const std::string& folder, const cli::GroundTruthArguments& truth_argume
   const LoopDetectorOptions options;
   std::vector<Member> members;
   members.reserve(options.members.size());
-  for (const std::string& name : options.members) members.emplace_back(name, options, 1000003u + members.size());
+  for (const std::string& name : options.members)
+    members.emplace_back(name, options, 1000003u + members.size());
   std::vector<Postings> postings(members.size());
   std::ofstream out(file, std::ios::binary);
   int cells = 0;
@@ -88,12 +91,14 @@ int Run(const std::string& folder, const cli::GroundTruthArguments& truth_argume
       Put(out, truth.size());
       Put(out, cells / SeenWords::kColumns);
       for (int row = 0; row < truth.size(); ++row) {
-        for (int column = 0; column < truth.size(); ++column) Put(out, static_cast<std::uint8_t>(truth.At(row, column)));
+        for (int column = 0; column < truth.size(); ++column)
+          Put(out, static_cast<std::uint8_t>(truth.At(row, column)));
       }
     }
     const cv::Mat grey = ToGrey8(image);
     for (std::size_t k = 0; k < members.size(); ++k) {
-      PutImage(members[k].Extract(grey), image.size(), t, cells, members[k], postings[k], out);
+      PutImage(members[k].Extract(image, grey, cv::Mat()), image.size(), t, cells, members[k], postings[k],
+               out);
     }
   }
   out.close();

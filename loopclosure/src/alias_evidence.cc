@@ -126,7 +126,8 @@ void AliasEvidence::LoadLevel(internal::ByteReader& in) {
   repeated_images_ = in.Get<double>();
   const bool good = log_level_ >= 0 && log_level_ < 50 && words_sum_ >= 0 && std::isfinite(words_sum_) &&
                     first_images_ >= 0 && first_images_ <= kFirstImages && images_ >= 1 &&
-                    images_ <= kLongestMean;
+                    images_ <= kLongestMean && std::abs(log_repeated_) < 50 && repeated_images_ >= 0 &&
+                    repeated_images_ <= kLongestMean;
   if (!good) in.Damaged("an alias level");
 }
 

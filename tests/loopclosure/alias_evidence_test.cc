@@ -131,12 +131,15 @@ TEST(AliasEvidence, GoesOnWhereItWasSavedAndRefusesDamage) {
   loaded.Load(in);
   EXPECT_EQ(loaded.Level(), evidence.Level());
   for (int slot = 0; slot < 50; ++slot) EXPECT_EQ(loaded.LevelOf(slot), evidence.LevelOf(slot));
-  std::string damaged = out.bytes();
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  std::memcpy(damaged.data(), &nan, sizeof nan);
-  AliasEvidence refuses{EvidenceOptions()};
-  internal::ByteReader bad(damaged, "memory");
-  EXPECT_THROW(refuses.Load(bad), InputError);
+  // Level, sum of words, first images (4 bytes), images, what images repeat, and of how many.
+  for (const std::size_t at : {0, 8, 20, 28, 36}) {
+    std::string damaged = out.bytes();
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    std::memcpy(damaged.data() + at, &nan, sizeof nan);
+    AliasEvidence refuses{EvidenceOptions()};
+    internal::ByteReader bad(damaged, "memory");
+    EXPECT_THROW(refuses.Load(bad), InputError) << "at byte " << at;
+  }
 }
 
 // A member's weight after images in which it repeats so much and is wrong so much.

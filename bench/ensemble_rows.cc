@@ -17,7 +17,7 @@
 #include "joined_pairs.h"
 #include "place_reasoner.h"
 #include "tutti/core/error.h"
-#include "tutti/loopclosure/dense.h"
+#include "dense.h"
 #include "tutti/loopclosure/evaluation.h"
 #include "tutti/loopclosure/parallel.h"
 

@@ -1,4 +1,4 @@
-#include "tutti/loopclosure/alias_evidence.h"
+#include "alias_evidence.h"
 
 #include <algorithm>
 #include <cmath>

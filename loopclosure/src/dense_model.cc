@@ -3,8 +3,8 @@
 #include <cmath>
 
 #include "byte_stream.h"
+#include "dense.h"
 #include "tutti/core/error.h"
-#include "tutti/loopclosure/dense.h"
 
 namespace tutti {
 namespace {

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dense.h"
 #include "detector_impl.h"
 #include "stopwatch.h"
 #include "tutti/core/error.h"
-#include "tutti/loopclosure/dense.h"
 #include "tutti/loopclosure/parallel.h"
 
 namespace tutti {
@@ -187,8 +187,9 @@ void LoopDetector::Impl::Verify(const View& query, const Belief& belief, LoopRes
   const bool all_dense =
       std::all_of(members_.begin(), members_.end(), [](const Member& member) { return member.dense(); });
   if (options_.verification.enabled && all_dense && !has_features && query.caller.pixels.empty()) {
-    result.reason = "there are no features for the geometry: dense members have none; add another member, give "
-                    "features with the query, or set verification.enabled: false";
+    result.reason =
+        "there are no features for the geometry: dense members have none; add another member, give "
+        "features with the query, or set verification.enabled: false";
     return;
   }
   reasoner_.Verify(

@@ -60,8 +60,9 @@ void CheckDense(const Features& features, int width, const std::string& which) {
   }
   if (!cv::checkRange(row)) throw InputError(which + "a value of the descriptor is not a finite number");
   if (width > 0 && row.cols != width) {
-    throw InputError(which + "the descriptor has " + std::to_string(row.cols) + " values, but those before had " +
-                     std::to_string(width) + "; give every image the same kind");
+    throw InputError(which + "the descriptor has " + std::to_string(row.cols) +
+                     " values, but those before had " + std::to_string(width) +
+                     "; give every image the same kind");
   }
 }
 

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "tutti/loopclosure/dense.h"
+#include "dense.h"
 
 namespace tutti {
 namespace {

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "byte_stream.h"
-#include "tutti/loopclosure/dense.h"
+#include "dense.h"
 
 namespace tutti {
 

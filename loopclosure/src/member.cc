@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "byte_stream.h"
-#include "tutti/loopclosure/dense.h"
+#include "dense.h"
 
 namespace tutti {
 
@@ -51,8 +51,8 @@ void Member::LoadStatistics(internal::ByteReader& in) {
   if (dense_) width_ = in.Get<std::int32_t>();
   const int created = in.Get<std::int32_t>();
   constexpr int kMostImages = 1 << 30;
-  if (width_ < 0 || !(feature_sum_ >= 0) || !std::isfinite(feature_sum_) || images_ < 0 || images_ > kMostImages ||
-      created < 0 || created > Vocabulary::kMostWords) {
+  if (width_ < 0 || !(feature_sum_ >= 0) || !std::isfinite(feature_sum_) || images_ < 0 ||
+      images_ > kMostImages || created < 0 || created > Vocabulary::kMostWords) {
     in.Damaged("a member's statistics");
   }
   vocabulary_.SkipIds(created);

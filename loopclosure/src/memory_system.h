@@ -8,11 +8,11 @@
 #include <string>
 #include <vector>
 
+#include "alias_evidence.h"
 #include "byte_stream.h"
+#include "dense.h"
 #include "location_store.h"
-#include "tutti/loopclosure/alias_evidence.h"
 #include "tutti/loopclosure/bayes_filter.h"
-#include "tutti/loopclosure/dense.h"
 #include "tutti/loopclosure/detector_options.h"
 #include "tutti/loopclosure/likelihood.h"
 #include "tutti/loopclosure/location_memory.h"

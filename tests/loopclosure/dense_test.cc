@@ -1,5 +1,5 @@
 // Members that describe an image as a whole.
-#include "tutti/loopclosure/dense.h"
+#include "dense.h"
 
 #include <gtest/gtest.h>
 

@@ -62,16 +62,7 @@ void PutImage(const Features& features, const cv::Size& size, int image, int cel
 
 int Run(const std::string& folder, const cli::GroundTruthArguments& truth_arguments,
         const std::string& file) {
-  std::vector<std::filesystem::path> images = cli::ListImages(folder);
-  std::error_code error;
-  images.erase(std::remove_if(images.begin(), images.end(),
-                              [&](const auto& p) {
-                                return std::filesystem::equivalent(p, truth_arguments.file, error);
-                              }),
-               images.end());
-  std::vector<std::filesystem::path> rights(images.size());
-  if (truth_arguments.join_pairs) rights = cli::TakeRightImages(folder, images);
-  const LoopGroundTruth truth = cli::LoadGroundTruth(truth_arguments, images);
+  const auto [images, rights, truth] = cli::LoadImageSet(folder, truth_arguments);
   const LoopDetectorOptions options;
   std::vector<Member> members;
   members.reserve(options.members.size());
@@ -81,7 +72,7 @@ int Run(const std::string& folder, const cli::GroundTruthArguments& truth_argume
   std::ofstream out(file, std::ios::binary);
   int cells = 0;
   for (int t = 0; t < truth.size(); ++t) {
-    const std::size_t i = static_cast<std::size_t>(t * truth_arguments.stride);
+    const std::size_t i = static_cast<std::size_t>(t);
     const cv::Mat image = rights[i].empty() ? cv::imread(images[i].string(), cv::IMREAD_UNCHANGED)
                                             : cli::ReadJoined(images[i], rights[i]);
     if (image.empty()) throw InputError(images[i].string() + ": can't be read");

@@ -13,11 +13,11 @@
 #include <sstream>
 
 #include "command_loops_input.h"
+#include "dense.h"
 #include "image_change.h"
 #include "joined_pairs.h"
 #include "place_reasoner.h"
 #include "tutti/core/error.h"
-#include "dense.h"
 #include "tutti/loopclosure/evaluation.h"
 #include "tutti/loopclosure/parallel.h"
 
@@ -284,16 +284,7 @@ LoopQuery Read(const std::filesystem::path& left, const std::filesystem::path& r
 }
 
 int Run(const Arguments& arguments) {
-  std::vector<std::filesystem::path> images = cli::ListImages(arguments.images);
-  std::error_code error;
-  images.erase(std::remove_if(images.begin(), images.end(),
-                              [&](const auto& p) {
-                                return std::filesystem::equivalent(p, arguments.truth.file, error);
-                              }),
-               images.end());
-  std::vector<std::filesystem::path> rights(images.size());
-  if (arguments.truth.join_pairs) rights = cli::TakeRightImages(arguments.images, images);
-  const LoopGroundTruth truth = cli::LoadGroundTruth(arguments.truth, images);
+  const auto [images, rights, truth] = cli::LoadImageSet(arguments.images, arguments.truth);
   int change_from = 0;
   while (change_from < truth.size() && !truth.HasLoop(change_from)) ++change_from;
 
@@ -312,9 +303,8 @@ int Run(const Arguments& arguments) {
   scaled.scale_bar = true;
   std::map<std::string, PairCache> alone;
   std::vector<Percept> percepts;
-  const std::size_t stride = static_cast<std::size_t>(arguments.truth.stride);
-  for (std::size_t i = 0; i < images.size(); i += stride) {
-    const LoopQuery query = Read(images[i], rights[i], static_cast<int>(i / stride), change_from, arguments);
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    const LoopQuery query = Read(images[i], rights[i], static_cast<int>(i), change_from, arguments);
     percepts.push_back(perception.See(query));
     for (Row& row : rows) {
       row.Take(query, percepts, pooled, alone.try_emplace(row.name(), scaled).first->second);

@@ -39,10 +39,7 @@ struct LoopsArguments {
 };
 
 // What every rule of a table shares.
-struct ImageSet {
-  std::vector<std::filesystem::path> images;  // strided
-  std::vector<std::filesystem::path> rights;  // beside each of them; empty: none
-  LoopGroundTruth truth;
+struct Input : ImageSet {
   std::optional<PinholeCamera> camera;
 };
 
@@ -86,27 +83,6 @@ LoopRow Process(const std::filesystem::path& file, const std::filesystem::path& 
   return row;
 }
 
-ImageSet LoadImageSet(const LoopsArguments& arguments) {
-  std::vector<std::filesystem::path> images = ListImages(arguments.images);
-  // The matrix may lie among the images (corridor/ground_truth.bmp).
-  std::error_code error;
-  images.erase(std::remove_if(images.begin(), images.end(),
-                              [&](const auto& p) {
-                                return std::filesystem::equivalent(p, arguments.truth.file, error);
-                              }),
-               images.end());
-  std::vector<std::filesystem::path> rights(images.size());
-  if (arguments.truth.join_pairs) rights = TakeRightImages(arguments.images, images);
-  ImageSet set;
-  set.truth = LoadGroundTruth(arguments.truth, images);
-  for (std::size_t i = 0; i < images.size(); i += static_cast<std::size_t>(arguments.truth.stride)) {
-    set.images.push_back(images[i]);
-    set.rights.push_back(rights[i]);
-  }
-  set.camera = ParseCamera(arguments.camera);
-  return set;
-}
-
 // What was kept for the pictures and the dump alone.
 void DropEvidence(bool with_posterior, LoopResult& result) {
   if (!with_posterior) result.posterior_by_location = {};
@@ -119,7 +95,7 @@ void DropEvidence(bool with_posterior, LoopResult& result) {
 }
 
 // Up to Ctrl-C: a run that ended early has the ground truth of its images only. A dump goes into `folder`.
-LoopRun Run(const LoopsArguments& arguments, const LoopDetectorOptions& options, const ImageSet& set,
+LoopRun Run(const LoopsArguments& arguments, const LoopDetectorOptions& options, const Input& set,
             const std::filesystem::path& folder) {
   LoopRun run;
   run.images = arguments.images;
@@ -161,7 +137,7 @@ LoopRun Run(const LoopsArguments& arguments, const LoopDetectorOptions& options,
 }
 
 // All rules, each with the files of a run of its own in its folder.
-int RunTable(const LoopsArguments& arguments, const ImageSet& set) {
+int RunTable(const LoopsArguments& arguments, const Input& set) {
   const std::filesystem::path folder = arguments.out;
   LoopTable table;
   for (const std::string& rule : TableRules(arguments.options)) {
@@ -195,7 +171,7 @@ int RunLoops(const LoopsArguments& given) {
   const std::string problem = arguments.truth.rule.Validate();
   if (!problem.empty()) throw InputError("ground truth: " + problem);
   cv::setNumThreads(arguments.options.threads);
-  const ImageSet set = LoadImageSet(arguments);
+  const Input set = {LoadImageSet(arguments.images, arguments.truth), ParseCamera(arguments.camera)};
   const InterruptGuard interrupt;
   if (arguments.table) return RunTable(arguments, set);
 

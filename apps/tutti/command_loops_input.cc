@@ -7,6 +7,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "joined_pairs.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 #include "tutti/core/trajectory.h"
@@ -158,6 +159,23 @@ LoopGroundTruth LoadGroundTruth(const GroundTruthArguments& arguments, const std
   throw InputError(arguments.file + ": the ground truth is " + std::to_string(truth.size()) + " x " +
                    std::to_string(truth.size()) + ", but there are " + images_text +
                    "; give the one that belongs to them");
+}
+
+ImageSet LoadImageSet(const std::string& folder, const GroundTruthArguments& arguments) {
+  std::vector<fs::path> images = ListImages(folder);
+  std::error_code error;
+  images.erase(std::remove_if(images.begin(), images.end(),
+                              [&](const auto& p) { return fs::equivalent(p, arguments.file, error); }),
+               images.end());
+  std::vector<fs::path> rights(images.size());
+  if (arguments.join_pairs) rights = TakeRightImages(folder, images);
+  ImageSet set;
+  set.truth = LoadGroundTruth(arguments, images);
+  for (std::size_t i = 0; i < images.size(); i += static_cast<std::size_t>(arguments.stride)) {
+    set.images.push_back(images[i]);
+    set.rights.push_back(rights[i]);
+  }
+  return set;
 }
 
 }  // namespace tutti::cli

@@ -31,4 +31,14 @@ struct GroundTruthArguments {
 LoopGroundTruth LoadGroundTruth(const GroundTruthArguments& arguments,
                                 const std::vector<std::filesystem::path>& images);
 
+/// The images of a folder with their ground truth.
+struct ImageSet {
+  std::vector<std::filesystem::path> images;  ///< every stride-th
+  std::vector<std::filesystem::path> rights;  ///< beside each of them; empty without join_pairs
+  LoopGroundTruth truth;
+};
+
+/// A loop matrix that lies among the images is none of them. Throws InputError.
+ImageSet LoadImageSet(const std::string& folder, const GroundTruthArguments& arguments);
+
 }  // namespace tutti::cli

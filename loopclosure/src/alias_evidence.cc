@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <numeric>
 
 #include "byte_stream.h"
 
@@ -180,6 +182,68 @@ void MemberWeight::Load(internal::ByteReader& in) {
     *value = in.Get<double>();
     if (!(*value >= 0) || !std::isfinite(*value)) in.Damaged("a member's weight");
   }
+}
+
+void MemberOverlap::Learn(const std::vector<const std::vector<double>*>& counts,
+                          const std::vector<int>& working_memory, const std::vector<int>& near) {
+  if (working_memory.size() <= kTooFewPlaces + near.size()) return;
+  if (covariance_.empty()) {
+    members_ = counts.size();
+    covariance_.assign(members_ * members_, 0.0);
+  }
+  std::vector<int> far;
+  std::set_difference(working_memory.begin(), working_memory.end(), near.begin(), near.end(),
+                      std::back_inserter(far));
+  const double places = static_cast<double>(far.size());
+  std::vector<std::vector<double>> apart(members_);  // from the mean of the places
+  for (std::size_t k = 0; k < members_; ++k) {
+    if (counts[k] == nullptr) continue;
+    double mean = 0;
+    for (const int slot : far) mean += (*counts[k])[Index(slot)] / places;
+    for (const int slot : far) apart[k].push_back((*counts[k])[Index(slot)] - mean);
+  }
+  for (std::size_t a = 0; a < members_; ++a) {
+    for (std::size_t b = 0; b <= a; ++b) {
+      if (apart[a].empty() || apart[b].empty()) continue;
+      covariance_[a * members_ + b] +=
+          std::inner_product(apart[a].begin(), apart[a].end(), apart[b].begin(), 0.0) / places;
+      covariance_[b * members_ + a] = covariance_[a * members_ + b];
+    }
+  }
+}
+
+double MemberOverlap::Correlation(std::size_t a, std::size_t b) const {
+  if (a == b) return 1.0;
+  if (covariance_.empty()) return 0.0;
+  const double scale = covariance_[a * members_ + a] * covariance_[b * members_ + b];
+  return scale > 0 ? covariance_[a * members_ + b] / std::sqrt(scale) : 0.0;
+}
+
+double MemberOverlap::Copies(std::size_t member) const {
+  constexpr double kPower = 8;
+  double copies = 0;
+  for (std::size_t k = 0; k < std::max(members_, member + 1); ++k) {
+    if (k != member && k >= members_) continue;
+    copies += std::pow(std::clamp(Correlation(member, k), 0.0, 1.0), kPower);
+  }
+  return copies;
+}
+
+void MemberOverlap::Save(internal::ByteWriter& out) const {
+  out.Put<std::int32_t>(static_cast<std::int32_t>(members_));
+  out.PutVector(covariance_);
+}
+
+void MemberOverlap::Load(internal::ByteReader& in) {
+  const std::int32_t members = in.Get<std::int32_t>();
+  covariance_ = in.GetVector<double>();
+  const auto good = [](double value) { return std::isfinite(value); };
+  if (members < 0 || members > 1000 ||
+      covariance_.size() != static_cast<std::size_t>(members) * static_cast<std::size_t>(members) ||
+      !std::all_of(covariance_.begin(), covariance_.end(), good)) {
+    in.Damaged("what members have in common");
+  }
+  members_ = static_cast<std::size_t>(members);
 }
 
 }  // namespace tutti

@@ -106,4 +106,33 @@ class MemberWeight {
   double false_images_ = 0;
 };
 
+/// Which members say the same: two that see the same things (one member twice, SIFT and RootSIFT) must not
+/// have twice the say. By the correlation rho of their counts over places where the image was not taken:
+///     copies(k) = sum over the members j of max(0, rho_jk)^8
+/// is 1 for a member of its own kind, 2 where another one always says the same. The power leaves those alone
+/// that resemble each other because they look at the same image.
+class MemberOverlap {
+ public:
+  /// Takes note of the members' counts (by slot; nullptr for one that sat out) for an image; `near`,
+  /// ascending: slots of the most probable place and its neighbours.
+  void Learn(const std::vector<const std::vector<double>*>& counts, const std::vector<int>& working_memory,
+             const std::vector<int>& near);
+  /// How many members say what this one says, itself included: 1 up to their number. 1 before anything is
+  /// known.
+  double Copies(std::size_t member) const;
+  /// That were seen, 0 before anything is known.
+  std::size_t members() const { return members_; }
+
+  /// Appends the whole state.
+  void Save(internal::ByteWriter& out) const;
+  /// Takes up what Save wrote. Throws InputError if it is damaged.
+  void Load(internal::ByteReader& in);
+
+ private:
+  double Correlation(std::size_t a, std::size_t b) const;
+
+  std::size_t members_ = 0;
+  std::vector<double> covariance_;  // members x members, summed over images
+};
+
 }  // namespace tutti

@@ -86,10 +86,28 @@ const Verification* HypothesisSearch::Tried(int slot, const LoopResult& result) 
   return nullptr;
 }
 
+// Geometry's word on a candidate. Who returns was away in between: where the image halfway shows the same as
+// the candidate does, the camera stands still, or what is seen moves along (a lorry ahead, people beside).
+Verification HypothesisSearch::Look(const View& query, int candidate, int threads) const {
+  constexpr int kRecent = 4;        // short-term memories: nothing stays in sight for longer
+  constexpr double kTheSame = 0.5;  // of the inliers
+  Verification verification = verify_(query, view_of_(candidate), threads);
+  const int now = memory_.Find(query.id);  // < 0: an image by itself, which no other one leads to
+  const int age = now - candidate;
+  if (!verification.accepted || age < 2 || age > kRecent * options_.stm_size) return verification;
+  const int halfway = candidate + age / 2;
+  const Verification between = verify_(query, view_of_(halfway), threads);
+  if (!between.accepted || between.inliers < kTheSame * verification.inliers) return verification;
+  verification.accepted = false;
+  verification.reason = "what matches was in sight all the time since (image " +
+                        std::to_string(memory_.id(halfway)) + " shows it, too): no return";
+  return verification;
+}
+
 // Tries a candidate unless it was tried before; keeps it as the best if it is.
 const Verification& HypothesisSearch::Try(const View& query, int candidate, LoopResult& result) const {
   if (Tried(candidate, result) == nullptr) {
-    Take(verify_(query, view_of_(candidate), options_.threads), result);
+    Take(Look(query, candidate, options_.threads), result);
   }
   return *Tried(candidate, result);
 }
@@ -105,9 +123,8 @@ void HypothesisSearch::TryAll(const View& query, const std::vector<int>& candida
   const int count = static_cast<int>(untried.size());
   const int threads_each = std::max(1, options_.threads / count);
   std::vector<Verification> verifications(untried.size());
-  RunParallel(count, options_.threads, [&](int i) {
-    verifications[Index(i)] = verify_(query, view_of_(untried[Index(i)]), threads_each);
-  });
+  RunParallel(count, options_.threads,
+              [&](int i) { verifications[Index(i)] = Look(query, untried[Index(i)], threads_each); });
   for (Verification& verification : verifications) Take(std::move(verification), result);
 }
 

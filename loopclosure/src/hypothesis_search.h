@@ -35,6 +35,7 @@ class HypothesisSearch {
   void RankByIsland(const Belief& belief, std::vector<int>& places) const;
   std::vector<int> ViewsOf(int place, const Belief& belief) const;
   const Verification* Tried(int slot, const LoopResult& result) const;
+  Verification Look(const View& query, int candidate, int threads) const;
   const Verification& Try(const View& query, int candidate, LoopResult& result) const;
   void TryAll(const View& query, const std::vector<int>& candidates, LoopResult& result) const;
   static void Take(Verification verification, LoopResult& result);

@@ -162,25 +162,33 @@ bool MemorySystem::JointTookPart() const {
   return std::any_of(units_.begin(), units_.end(), [](const FilterUnit& unit) { return unit.took_part(); });
 }
 
-// That makes the mean weight of the units that took part 1, as many as there are: a unit that sits out leaves
-// its share to the others.
+// A unit's weight before scaling: what others say, too, is said once.
+double MemorySystem::OwnWeight(std::size_t unit) const {
+  return units_[unit].weight.Value() / overlap_.Copies(unit);
+}
+
+// Scales the weights of the units that took part so that their sum is the number of units that say something
+// of their own: a unit that sits out leaves its share to the others.
 double MemorySystem::WeightScale() const {
   double sum = 0;
-  for (const FilterUnit& unit : units_) sum += unit.took_part() ? unit.weight.Value() : 0.0;
-  return sum > 0 ? static_cast<double>(units_.size()) / sum : 0.0;
+  double all = 0;
+  for (std::size_t u = 0; u < units_.size(); ++u) {
+    all += 1.0 / overlap_.Copies(u);
+    sum += units_[u].took_part() ? OwnWeight(u) : 0.0;
+  }
+  return sum > 0 ? all / sum : 0.0;
 }
 
 double MemorySystem::WeightOf(std::size_t unit) const {
-  return units_[unit].took_part() ? WeightScale() * units_[unit].weight.Value() : 0.0;
+  return units_[unit].took_part() ? WeightScale() * OwnWeight(unit) : 0.0;
 }
 
 std::vector<double> MemorySystem::JointCounts() const {
   std::vector<double> sum(static_cast<std::size_t>(memory_.size()), 0.0);
-  const double scale = WeightScale();
-  for (const FilterUnit& unit : units_) {
-    if (!unit.took_part()) continue;
-    const double weight = scale * unit.weight.Value();
-    for (std::size_t i = 0; i < unit.counts.size(); ++i) sum[i] += weight * unit.counts[i];
+  for (std::size_t u = 0; u < units_.size(); ++u) {
+    if (!units_[u].took_part()) continue;
+    const double weight = WeightOf(u);
+    for (std::size_t i = 0; i < units_[u].counts.size(); ++i) sum[i] += weight * units_[u].counts[i];
   }
   return sum;
 }
@@ -219,9 +227,12 @@ void MemorySystem::Learn() {
   if (!joint_) return;
   const std::vector<int> near = NearBest(*joint_);
   joint_->alias.Learn(joint_->counts, places, near, joint_->filter.posterior().new_place);
+  std::vector<const std::vector<double>*> counts;
   for (FilterUnit& unit : units_) {
     if (unit.took_part()) unit.weight.Learn(unit.counts, places, near);
+    counts.push_back(unit.took_part() ? &unit.counts : nullptr);
   }
+  overlap_.Learn(counts, places, near);
 }
 
 std::vector<const Belief*> MemorySystem::Beliefs() const {
@@ -241,7 +252,10 @@ std::vector<Belief> MemorySystem::Opinions(const std::vector<SeenWords>& words) 
   std::vector<Belief> opinions;
   std::vector<double> sum(static_cast<std::size_t>(memory_.size()), 0.0);
   double sum_of_weights = 0;
-  for (const FilterUnit& unit : units_) {
+  double all = 0;
+  for (std::size_t u = 0; u < units_.size(); ++u) {
+    const FilterUnit& unit = units_[u];
+    all += 1.0 / overlap_.Copies(u);
     const SeenWords seen = WordsFor(unit, words);
     if (seen.Amount() == 0) continue;
     if (!Counts()) {
@@ -256,11 +270,11 @@ std::vector<Belief> MemorySystem::Opinions(const std::vector<SeenWords>& words) 
       opinions.push_back(unit.alias.Of(counts, places));
       continue;
     }
-    sum_of_weights += unit.weight.Value();
-    for (std::size_t i = 0; i < counts.size(); ++i) sum[i] += unit.weight.Value() * counts[i];
+    sum_of_weights += OwnWeight(u);
+    for (std::size_t i = 0; i < counts.size(); ++i) sum[i] += OwnWeight(u) * counts[i];
   }
   if (sum_of_weights > 0) {
-    for (double& value : sum) value *= static_cast<double>(units_.size()) / sum_of_weights;
+    for (double& value : sum) value *= all / sum_of_weights;
     opinions.push_back(joint_->alias.Of(sum, places));
   }
   for (Belief& opinion : opinions) opinion.Normalise();
@@ -463,6 +477,13 @@ void MemorySystem::Save(ByteWriter& out) const {
   if (!joint_) return;
   joint_->filter.Save(out);
   joint_->alias.Save(out);
+  overlap_.Save(out);
+}
+
+void MemorySystem::LoadOverlap(ByteReader& in) {
+  overlap_.Load(in);
+  if (overlap_.members() != 0 && overlap_.members() != units_.size())
+    in.Damaged("what members have in common");
 }
 
 void MemorySystem::SaveLevels(ByteWriter& out) const {
@@ -470,7 +491,9 @@ void MemorySystem::SaveLevels(ByteWriter& out) const {
     unit.alias.SaveLevel(out);
     unit.weight.Save(out);
   }
-  if (joint_) joint_->alias.SaveLevel(out);
+  if (!joint_) return;
+  joint_->alias.SaveLevel(out);
+  overlap_.Save(out);
 }
 
 void MemorySystem::LoadLevels(ByteReader& in) {
@@ -478,7 +501,9 @@ void MemorySystem::LoadLevels(ByteReader& in) {
     unit.alias.LoadLevel(in);
     unit.weight.Load(in);
   }
-  if (joint_) joint_->alias.LoadLevel(in);
+  if (!joint_) return;
+  joint_->alias.LoadLevel(in);
+  LoadOverlap(in);
 }
 
 void MemorySystem::Load(ByteReader& in) {
@@ -510,6 +535,7 @@ void MemorySystem::Load(ByteReader& in) {
   if (joint_) {
     joint_->filter.Load(in);
     joint_->alias.Load(in);
+    LoadOverlap(in);
     if (static_cast<int>(joint_->filter.posterior().places.size()) > memory_.size()) {
       in.Damaged("locations are missing");
     }

@@ -144,7 +144,9 @@ class MemorySystem {
   bool Counts() const { return options_.evidence.kind == EvidenceKind::kCounts; }
   void Repeat(FilterUnit& unit) const;
   bool JointTookPart() const;
+  double OwnWeight(std::size_t unit) const;
   double WeightScale() const;
+  void LoadOverlap(ByteReader& in);
   std::vector<double> JointCounts() const;
   std::vector<int> NearBest(const PlaceFilter& place_filter) const;
 
@@ -153,6 +155,7 @@ class MemorySystem {
   std::vector<Member>& members_;
   std::vector<FilterUnit> units_;
   std::optional<PlaceFilter> joint_;  // works on the units' counts
+  MemberOverlap overlap_;             // of the units, for joint_
   std::vector<double> gains_;         // of the places, for the present image
   LocationMemory memory_;
   TransitionModel transition_;

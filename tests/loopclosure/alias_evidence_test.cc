@@ -169,5 +169,64 @@ TEST(MemberWeight, LearnsNothingFromWhereTheImageWasTaken) {
   EXPECT_NEAR(weight.Value(), 20.1, 1e-9);
 }
 
+// Counts of a member that looks at the same images as another: partly alike, or the same but for chance.
+std::vector<double> Alike(const std::vector<double>& counts, double noise, std::mt19937& random) {
+  std::normal_distribution<double> normal(0.0, noise);
+  std::vector<double> alike;
+  for (const double count : counts) alike.push_back(std::max(0.0, count + normal(random)));
+  return alike;
+}
+
+TEST(MemberOverlap, CountsAMemberThatSaysTheSameOnceAndLeavesOthersAlone) {
+  MemberOverlap overlap;
+  EXPECT_EQ(overlap.Copies(0), 1.0);
+  EXPECT_EQ(overlap.Copies(7), 1.0);
+  std::mt19937 random(1);
+  for (int i = 0; i < 50; ++i) {
+    const std::vector<double> first = Resemblances(100, 10, random);
+    const std::vector<double> copy = Alike(first, 0.3, random);   // correlation 0.995
+    const std::vector<double> other = Alike(first, 4.0, random);  // 0.58
+    overlap.Learn({&first, &copy, &other}, Places(100), {});
+  }
+  EXPECT_NEAR(overlap.Copies(0), 2.0, 0.1);
+  EXPECT_NEAR(overlap.Copies(1), 2.0, 0.1);
+  EXPECT_NEAR(overlap.Copies(2), 1.0, 0.05);
+}
+
+TEST(MemberOverlap, LearnsNothingFromWhereTheImageWasTakenNorFromWhoSatOut) {
+  MemberOverlap overlap;
+  std::mt19937 random(2);
+  for (int i = 0; i < 50; ++i) {
+    std::vector<double> first = Resemblances(100, 10, random);
+    std::vector<double> second = Resemblances(100, 10, random);
+    for (std::size_t slot = 40; slot < 45; ++slot) first[slot] = second[slot] = 500;  // both know the place
+    overlap.Learn({&first, &second, nullptr}, Places(100), {40, 41, 42, 43, 44});
+  }
+  EXPECT_LT(overlap.Copies(0), 1.05);
+  EXPECT_EQ(overlap.Copies(2), 1.0);
+}
+
+TEST(MemberOverlap, GoesOnWhereItWasSavedAndRefusesDamage) {
+  MemberOverlap overlap;
+  std::mt19937 random(3);
+  const std::vector<double> first = Resemblances(100, 10, random);
+  overlap.Learn({&first, &first}, Places(100), {});
+  internal::ByteWriter out;
+  overlap.Save(out);
+  MemberOverlap again;
+  internal::ByteReader in(out.bytes(), "memory");
+  again.Load(in);
+  EXPECT_EQ(again.Copies(1), overlap.Copies(1));
+  std::string damaged(out.bytes());
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  std::memcpy(damaged.data() + damaged.size() - sizeof nan, &nan, sizeof nan);
+  internal::ByteReader bad(damaged, "memory");
+  EXPECT_THROW(again.Load(bad), InputError);
+  damaged.assign(out.bytes());
+  damaged[0] = 3;  // members: as many as there are not
+  internal::ByteReader wrong(damaged, "memory");
+  EXPECT_THROW(again.Load(wrong), InputError);
+}
+
 }  // namespace
 }  // namespace tutti

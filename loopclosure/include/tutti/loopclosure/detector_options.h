@@ -145,7 +145,7 @@ struct LoopDetectorOptions {
                                                ///< no keypoints, and one row of CV_32F
   std::vector<std::string> external_members;   ///< further names that members may hold: the caller extracts
                                                ///< their features himself and gives them with each LoopQuery
-  double loop_threshold = 0.95;                ///< accept a loop of this probability, 0..1
+  double loop_threshold = 0.97;                ///< accept a loop of this probability, 0..1
   double propose_threshold = 0.1;              ///< go to verification at H >= this, 0..1
   double link_threshold = 0.9;  ///< a loop of this probability links its two places for the filter, 0..1
   int stm_size = 10;            ///< locations in short-term memory, no candidates

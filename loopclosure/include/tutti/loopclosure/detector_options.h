@@ -84,9 +84,9 @@ struct EvidenceOptions {
   double sharpness = 2.0;     ///< exponent of a count beyond the alias level: beta, above 0, at most 10
   double alias_share = 0.85;  ///< share of the alias level that a place must reach to be more likely than a
                               ///< new one, above 0, at most 3
-  double floor = -1.0;      ///< least logarithm of a likelihood, below 0, at least -10
-  double attraction = 0.75;  ///< how much more a place must show that many images resemble: exponent of its
-                            ///< mean count, 0 (no more) to 2
+  double floor = -1.0;        ///< least logarithm of a likelihood, below 0, at least -10
+  double attraction = 0.75;   ///< how much more a place must show that many images resemble: exponent of its
+                              ///< mean count, 0 (no more) to 2
 
   /// Empty if usable, else what is wrong and what to do.
   std::string Validate() const;
@@ -141,12 +141,12 @@ struct LoopDetectorOptions {
   CombinationRule rule = CombinationRule::kJoint;  ///< how members are combined
   std::vector<std::string> members = {"surf", "sift",
                                       "orb"};  ///< of KnownMembers(), and of external_members; kSingle: one
-  std::vector<std::string> dense_members;      ///< of external_members, those that describe an image as a whole:
-                                               ///< no keypoints, and one row of CV_32F
-  std::vector<std::string> external_members;   ///< further names that members may hold: the caller extracts
-                                               ///< their features himself and gives them with each LoopQuery
-  double loop_threshold = 0.95;                ///< accept a loop of this probability, 0..1
-  double propose_threshold = 0.1;              ///< go to verification at H >= this, 0..1
+  std::vector<std::string> dense_members;  ///< of external_members, those that describe an image as a whole:
+                                           ///< no keypoints, and one row of CV_32F
+  std::vector<std::string> external_members;  ///< further names that members may hold: the caller extracts
+                                              ///< their features himself and gives them with each LoopQuery
+  double loop_threshold = 0.95;               ///< accept a loop of this probability, 0..1
+  double propose_threshold = 0.1;             ///< go to verification at H >= this, 0..1
   double link_threshold = 0.9;  ///< a loop of this probability links its two places for the filter, 0..1
   int stm_size = 10;            ///< locations in short-term memory, no candidates
   int threads = 2;              ///< most threads that Detect uses at once

@@ -10,7 +10,8 @@
 
 namespace tutti {
 
-/// Extracts, and quantises or (a dense member) compares as a whole, for one kind of features (loop-closure.md section 1, steps 1 and 2).
+/// Extracts, and quantises or (a dense member) compares as a whole, for one kind of features (loop-closure.md
+/// section 1, steps 1 and 2).
 class Member {
  public:
   /// `name`: of options.members; `seed`: of its vocabulary's index. Throws InputError for
@@ -31,8 +32,9 @@ class Member {
   /// Width of a dense member's descriptors [values], 0: not known yet.
   int width() const { return width_; }
 
-  /// Step 2: false for a bad signature (of a dense member: no descriptor; of others: fewer features than bad_signature_ratio x their running mean, or
-  /// fewer than two), which gets no words: the member sits this image out. Once per image: keeps the mean.
+  /// Step 2: false for a bad signature (of a dense member: no descriptor; of others: fewer features than
+  /// bad_signature_ratio x their running mean, or fewer than two), which gets no words: the member sits this
+  /// image out. Once per image: keeps the mean.
   bool Judge(const Features& features);
   int num_words() const { return vocabulary_.size(); }
   /// Its vocabulary, for the memory: words leave and return with locations.

@@ -2,6 +2,7 @@
 // with.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -136,6 +137,24 @@ struct VerificationOptions {
   std::string Validate() const;
 };
 
+/// Options of the member `dnn`: a network of the caller's that describes an image as a whole (loop-closure.md
+/// section 3). It gets one image of 3 channels, its first output is the descriptor. The names are those of
+/// cv::dnn::blobFromImage; the defaults what nearly every network expects that was trained on ImageNet.
+struct DnnOptions {
+  std::string model;  ///< ONNX file; required where members holds `dnn`
+  int width = 320;    ///< of the image that the network gets [px], 16 to 4096; ours are scaled to it
+  int height = 240;   ///< [px], 16 to 4096
+  std::array<double, 3> mean = {123.675, 116.28, 103.53};  ///< subtracted from each channel, in the order
+                                                           ///< that the network has them [grey levels of 255]
+  double scale = 1.0 / 255.0;  ///< and then multiplied by this, above 0, at most 1000
+  std::array<double, 3> stddev = {0.229, 0.224, 0.225};  ///< and divided by this, above 0, at most 1000
+  bool swap_rb = true;  ///< the network takes red, green, blue; false: blue, green, red, as OpenCV has them
+  std::string layer;    ///< whose output is the descriptor, as the ONNX file names it; empty: the only output
+
+  /// Empty if usable, else what is wrong and what to do.
+  std::string Validate() const;
+};
+
 /// Options of LoopDetector.
 struct LoopDetectorOptions {
   CombinationRule rule = CombinationRule::kJoint;  ///< how members are combined
@@ -184,6 +203,7 @@ struct LoopDetectorOptions {
   ExtractionOptions extraction;      ///< features
   VocabularyOptions vocabulary;      ///< words
   VerificationOptions verification;  ///< geometry
+  DnnOptions dnn;                    ///< of the member `dnn`, off by default
 
   /// Empty if usable, else what is wrong and what to do.
   std::string Validate() const;
@@ -216,7 +236,7 @@ std::vector<std::string> KnownMembers();
 /// RegisterFeatureType added.
 std::vector<std::string> KnownFeatureTypes();
 
-/// Members that describe an image as a whole (dense.h): hog.
+/// Members that describe an image as a whole (dense.h): hog, dnn.
 std::vector<std::string> KnownDenseMembers();
 
 }  // namespace tutti

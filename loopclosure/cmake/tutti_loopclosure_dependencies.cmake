@@ -1,3 +1,3 @@
-find_dependency(OpenCV 4.5.4 COMPONENTS core imgproc imgcodecs features2d calib3d)
+find_dependency(OpenCV 4.5.4 COMPONENTS core imgproc imgcodecs features2d calib3d dnn)
 find_dependency(ZLIB)
 find_dependency(SQLite3)

@@ -43,6 +43,9 @@ class DenseModel {
   /// but one to three pairs of the sequence in common, and were taken from nearly the same spot.
   static constexpr double kRepeatShare = 0.5;
 
+  /// `width`: of the descriptors [values], where it is known before the first one; 0: the first one says it.
+  explicit DenseModel(int width = 0) : width_(width) {}
+
   /// Adds the descriptor of the next slot (of length 1, 1 x D, CV_32F; empty: none). Throws InputError for
   /// another width than before.
   void Add(const cv::Mat& descriptor);
@@ -98,7 +101,7 @@ class DenseModel {
   std::vector<cv::Mat> descriptors_;  // by slot
   std::vector<State> state_;          // by slot
   std::vector<Row> recent_;           // the last slots of the path, newest last
-  int width_ = 0;
+  int width_;                         // of a descriptor; 0: not known yet
 };
 
 /// Appends and reads one descriptor, empty or 1 x D, CV_32F, of length 1. The latter throws InputError.

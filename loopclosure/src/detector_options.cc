@@ -1,6 +1,7 @@
 #include "tutti/loopclosure/detector_options.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
@@ -88,6 +89,20 @@ std::string VerificationOptions::Validate() const {
   return {};
 }
 
+std::string DnnOptions::Validate() const {
+  constexpr int kLeastSide = 16, kMostSide = 4096;  // [px]
+  constexpr double kMost = 1000;
+  const auto usable = [](double factor) { return factor > 0 && factor <= kMost; };
+  if (width < kLeastSide || width > kMostSide) return OutOf("dnn.width", "16 to 4096");
+  if (height < kLeastSide || height > kMostSide) return OutOf("dnn.height", "16 to 4096");
+  if (!std::all_of(mean.begin(), mean.end(), [](double level) { return std::abs(level) <= kMost; }))
+    return OutOf("dnn.mean", "-1000 to 1000 for each channel");
+  if (!usable(scale)) return OutOf("dnn.scale", "above 0, at most 1000");
+  if (!std::all_of(stddev.begin(), stddev.end(), usable))
+    return OutOf("dnn.stddev", "above 0, at most 1000 for each channel");
+  return {};
+}
+
 std::string LoopDetectorOptions::Validate() const {
   std::vector<std::string> known = KnownMembers();
   known.insert(known.end(), external_members.begin(), external_members.end());
@@ -107,6 +122,13 @@ std::string LoopDetectorOptions::Validate() const {
     if (std::find(external_members.begin(), external_members.end(), name) == external_members.end()) {
       return "dense_members holds '" + name + "', which is not in external_members; name it there, too";
     }
+  }
+  const auto holds = [](const std::vector<std::string>& names, const std::string& name) {
+    return std::find(names.begin(), names.end(), name) != names.end();
+  };
+  if (holds(members, "dnn") && !holds(external_members, "dnn") && dnn.model.empty()) {
+    return "members holds 'dnn', but dnn.model is empty; give the ONNX file of a network "
+           "(docs/loop-closure.md section 3 says which fit), or leave 'dnn' out";
   }
   for (const std::string& name : members) {
     const bool dense = std::find(known_dense.begin(), known_dense.end(), name) != known_dense.end() ||
@@ -142,14 +164,14 @@ std::string LoopDetectorOptions::Validate() const {
   if (!(recent_share >= 0 && recent_share < 1)) return OutOf("recent_share", "0 or more, below 1");
   if (!(rehearsal_similarity > 0 && rehearsal_similarity <= 1))
     return OutOf("rehearsal_similarity", "above 0, at most 1");
-  for (const std::string& problem :
-       {extraction.Validate(), vocabulary.Validate(), evidence.Validate(), verification.Validate()}) {
+  for (const std::string& problem : {extraction.Validate(), vocabulary.Validate(), evidence.Validate(),
+                                     verification.Validate(), dnn.Validate()}) {
     if (!problem.empty()) return problem;
   }
   return {};
 }
 
-std::vector<std::string> KnownDenseMembers() { return {"hog"}; }
+std::vector<std::string> KnownDenseMembers() { return {"hog", "dnn"}; }
 
 std::vector<std::string> KnownMembers() {
   std::vector<std::string> names = KnownFeatureTypes();

@@ -5,6 +5,7 @@
 
 #include "byte_stream.h"
 #include "dense.h"
+#include "dnn_descriptor.h"
 
 namespace tutti {
 
@@ -16,13 +17,22 @@ Member::Member(const std::string& name, const LoopDetectorOptions& options, std:
   external_ = holds(options.external_members);
   dense_ = external_ ? holds(options.dense_members) : holds(KnownDenseMembers());
   if (!external_ && !dense_) extractor_.emplace(name, options.extraction);
+  if (!external_ && name == "dnn") {
+    network_ = std::make_shared<const DnnDescriptor>(options.dnn);
+    width_ = network_->width();
+  }
 }
 
 Features Member::Extract(const cv::Mat& image, const cv::Mat& grey, const cv::Mat& mask) const {
-  (void)image;
   if (external_) return {};
   if (extractor_) return extractor_->Extract(grey);
+  if (network_) return {{}, network_->Describe(image, grey, mask)};
   return {{}, DescribeByGradients(grey, mask)};
+}
+
+std::string Member::Fingerprint() const {
+  if (network_) return network_->Fingerprint();
+  return external_ && dense_ ? "dense" : "";
 }
 
 bool Member::Judge(const Features& features) {
@@ -49,6 +59,7 @@ void Member::LoadStatistics(internal::ByteReader& in) {
   feature_sum_ = in.Get<double>();
   images_ = in.Get<std::int32_t>();
   if (dense_) width_ = in.Get<std::int32_t>();
+  if (network_ && width_ != network_->width()) in.Damaged("descriptors of another length than the network's");
   const int created = in.Get<std::int32_t>();
   constexpr int kMostImages = 1 << 30;
   if (width_ < 0 || !(feature_sum_ >= 0) || !std::isfinite(feature_sum_) || images_ < 0 ||

@@ -65,6 +65,7 @@ MemorySystem::MemorySystem(int number, const LoopDetectorOptions& options,
       transition_(options.virtual_place_prior) {
   for (const std::vector<std::size_t>& sources : units) {
     units_.emplace_back(sources, sources.size() == 1 && members_[sources.front()].dense(), options);
+    if (units_.back().is_dense) units_.back().dense = DenseModel(members_[sources.front()].width());
   }
   if (options.rule == CombinationRule::kJoint) joint_.emplace(options.evidence);
 }

@@ -262,7 +262,8 @@ bool PlaceReasoner::InMemory(int slot) const {
 std::string PlaceReasoner::Fingerprint() const {
   std::string text = "members";
   for (const Member& member : members_) {
-    text += " " + member.name() + (member.external() && member.dense() ? " (dense)" : "");
+    const std::string details = member.Fingerprint();
+    text += " " + member.name() + (details.empty() ? "" : " (" + details + ")");
   }
   text += options_.rule == CombinationRule::kNaive   ? ", one naive filter"
           : options_.rule == CombinationRule::kJoint ? ", a joint filter"

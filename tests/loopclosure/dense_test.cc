@@ -11,18 +11,14 @@
 #include "tutti/core/error.h"
 #include "tutti/loopclosure/detector.h"
 #include "two_laps.h"
+#include "wall_walk.h"
 
 namespace tutti {
 namespace {
 
-constexpr int kPlaces = 40;
+constexpr int kPlaces = testing::kWallPlaces;
 
-// A walk along a wall, a quarter of the width further in each image, so that neighbours overlap.
-cv::Mat Along(int place, std::uint32_t wall = 77) {
-  static const cv::Mat whole = testing::TexturedImage(77, 160 + 40 * kPlaces, 120);
-  static const cv::Mat another = testing::TexturedImage(78, 160 + 40 * kPlaces, 120);
-  return (wall == 77 ? whole : another)(cv::Rect(40 * place, 0, 160, 120)).clone();
-}
+cv::Mat Along(int place, std::uint32_t wall = 77) { return testing::AlongWall(place, wall); }
 
 // A twenty-fifth of the light, and the noise of the sensor: next to nothing is left for corners.
 cv::Mat AtNight(const cv::Mat& image, std::uint64_t seed) {

@@ -55,6 +55,34 @@ TEST(Config, ReadsEverySection) {
   EXPECT_EQ(config.run.threads, 1);
 }
 
+TEST(Config, ReadsTheNetworkOfTheMemberDnn) {
+  const LoopDetectorOptions loops = ParseConfig(
+                                        "loops:\n  members: [orb, dnn]\n  dnn: {model: net.onnx, width: 224, "
+                                        "height: 200, mean: [1, 2.5, 3],\n"
+                                        "    scale: 0.5, stddev: [4, 5, 6], swap_rb: false, layer: pool}\n",
+                                        "my.yaml")
+                                        .loops;
+  EXPECT_EQ(loops.members, (std::vector<std::string>{"orb", "dnn"}));
+  EXPECT_EQ(loops.dnn.model, "net.onnx");
+  EXPECT_EQ(loops.dnn.width, 224);
+  EXPECT_EQ(loops.dnn.height, 200);
+  EXPECT_EQ(loops.dnn.mean, (std::array<double, 3>{1, 2.5, 3}));
+  EXPECT_EQ(loops.dnn.scale, 0.5);
+  EXPECT_EQ(loops.dnn.stddev, (std::array<double, 3>{4, 5, 6}));
+  EXPECT_FALSE(loops.dnn.swap_rb);
+  EXPECT_EQ(loops.dnn.layer, "pool");
+  EXPECT_THAT(Message("loops:\n  dnn:\n    mean: [1, 2]\n"),
+              AllOf(HasSubstr("my.yaml:3:"), HasSubstr("3 numbers")));
+  EXPECT_THAT(Message("loops:\n  dnn:\n    stddev: [1, 2, x]\n"), HasSubstr("'x' is not a finite number"));
+  EXPECT_THAT(Message("loops:\n  dnn: {width: 9}\n"),
+              AllOf(HasSubstr("my.yaml:2:"), HasSubstr("16 to 4096")));
+  EXPECT_THAT(Message("loops:\n  stm_size: 5\n  members: [dnn]\n"),
+              AllOf(HasSubstr("my.yaml:3:"), HasSubstr("dnn.model is empty")));
+  LoopDetectorOptions set;
+  SetLoopOptions({"members=[dnn]", "dnn.model=a.onnx", "dnn.mean=[7, 8, 9]"}, set);
+  EXPECT_EQ(set.dnn.mean, (std::array<double, 3>{7, 8, 9}));
+}
+
 TEST(Config, UnknownKeyNamesLineAndNearestKey) {
   EXPECT_THAT(Message("odometry:\n  seed: 1\nloops:\n  loop_treshold: 0.2\n"),
               AllOf(HasSubstr("my.yaml:4:"), HasSubstr("loop_treshold"), HasSubstr("'loop_threshold'")));
@@ -191,6 +219,7 @@ TEST(Config, EveryOptionFieldHasItsKey) {
       {"loops.extraction", detector, "ExtractionOptions"},
       {"loops.vocabulary", detector, "VocabularyOptions"},
       {"loops.verification", detector, "VerificationOptions"},
+      {"loops.dnn", detector, "DnnOptions"},
       {"graph", "backend/include/tutti/backend/pose_graph_optimizer.h", "PoseGraphOptions"},
       {"run", "apps/pipeline/include/tutti/pipeline/slam_options.h", "SlamOptions"},
   };
@@ -201,7 +230,8 @@ TEST(Config, EveryOptionFieldHasItsKey) {
       // A section, in section camera, or only for callers of the library (their own features).
       const bool elsewhere = field == "camera" || field == "baseline_m" || field == "extraction" ||
                              field == "external_members" || field == "dense_members" ||
-                             field == "vocabulary" || field == "evidence" || field == "verification";
+                             field == "vocabulary" || field == "evidence" || field == "verification" ||
+                             field == "dnn";
       EXPECT_TRUE(elsewhere || keys[s.section].count(field) == 1)
           << s.section << ": no key for " << s.name << "::" << field;
     }

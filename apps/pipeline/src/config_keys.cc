@@ -37,6 +37,7 @@ ConfigTable::ConfigTable(RunConfig& config) {
   AddEvidence(config.loops.evidence);
   AddVocabulary(config.loops.vocabulary);
   AddVerification(config.loops.verification);
+  AddDnn(config.loops.dnn);
   AddGraph(config.graph, config.online);
   AddRun(config.run);
 }
@@ -151,7 +152,7 @@ void ConfigTable::AddLoops(LoopDetectorOptions& o) {
        "published parameters that the other keys change: default, standardised-mean, paper-2013, "
        "rtabmap-0.8.3",
        word(&ApplyPreset), [] { return "default"; });
-  Add("members", o.members, "members of the ensemble: surf, sift, orb, akaze, brisk, kaze, gftt, hog");
+  Add("members", o.members, "members of the ensemble: surf, sift, orb, akaze, brisk, kaze, gftt, hog, dnn");
   AddEnum("likelihood", o.likelihood,
           {{"similarity", LikelihoodKind::kSimilarity}, {"tfidf", LikelihoodKind::kTfIdf}},
           "score of standardised evidence: similarity (2013) or tfidf");
@@ -265,6 +266,18 @@ void ConfigTable::AddVerification(VerificationOptions& o) {
       "standard deviation of a matched pixel, sets the information matrix [px]");
   Add("min_depth_m", o.min_depth_m, "depths outside of the range count as unknown [m]");
   Add("max_depth_m", o.max_depth_m, "[m]");
+}
+
+void ConfigTable::AddDnn(DnnOptions& o) {
+  section_ = "loops.dnn";
+  Add("model", o.model, "member dnn: ONNX file of a network that describes a whole image");
+  Add("width", o.width, "of the image that it gets, 16 to 4096 [px]");
+  Add("height", o.height, "16 to 4096 [px]");
+  Add("mean", o.mean, "subtracted from each channel, in the network's order [grey levels of 255]");
+  Add("scale", o.scale, "and then multiplied by this, above 0");
+  Add("stddev", o.stddev, "and each channel divided by this, above 0");
+  Add("swap_rb", o.swap_rb, "the network takes red, green, blue; false: blue, green, red");
+  Add("layer", o.layer, "whose output is the descriptor; empty: the network's only output");
 }
 
 void ConfigTable::AddGraph(PoseGraphOptions& o, OnlineOptions& online) {

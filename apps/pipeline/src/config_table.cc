@@ -26,6 +26,27 @@ std::string ShowDouble(double value) {
   return text;
 }
 
+// A list of at most N numbers; the rest is 0. Empty, or what is wrong.
+template <std::size_t N>
+std::string ReadNumbers(const YAML::Node& list, std::array<double, N>& field) {
+  std::array<double, N> values{};
+  std::size_t i = 0;
+  for (const YAML::Node& item : list) {
+    const auto value = ParseDouble(Text(item));
+    if (!value || !std::isfinite(*value)) return Wrong(item, "a finite number");
+    values[i++] = *value;
+  }
+  field = values;
+  return "";
+}
+
+template <std::size_t N>
+std::string ShowNumbers(const std::array<double, N>& field) {
+  std::string text = "[";
+  for (const double value : field) text += (text.size() > 1 ? ", " : "") + ShowDouble(value);
+  return text + "]";
+}
+
 }  // namespace
 
 const ConfigKey* ConfigTable::Find(const std::string& section, const std::string& name) const {
@@ -148,21 +169,19 @@ void ConfigTable::Add(const char* name, std::array<double, 5>& field, const char
       name, doc,
       [&field](const YAML::Node& node) -> std::string {
         if (!node.IsSequence() || node.size() > 5) return "needs a list of up to 5 numbers";
-        std::array<double, 5> values{};
-        std::size_t i = 0;
-        for (const YAML::Node& item : node) {
-          const auto value = ParseDouble(Text(item));
-          if (!value || !std::isfinite(*value)) return Wrong(item, "a finite number");
-          values[i++] = *value;
-        }
-        field = values;
-        return "";
+        return ReadNumbers(node, field);
       },
-      [&field] {
-        std::string text = "[";
-        for (const double value : field) text += (text.size() > 1 ? ", " : "") + ShowDouble(value);
-        return text + "]";
-      });
+      [&field] { return ShowNumbers(field); });
+}
+
+void ConfigTable::Add(const char* name, std::array<double, 3>& field, const char* doc) {
+  Push(
+      name, doc,
+      [&field](const YAML::Node& node) -> std::string {
+        if (!node.IsSequence() || node.size() != 3) return "needs a list of 3 numbers, as in [1, 2, 3]";
+        return ReadNumbers(node, field);
+      },
+      [&field] { return ShowNumbers(field); });
 }
 
 }  // namespace tutti

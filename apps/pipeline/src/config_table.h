@@ -47,6 +47,7 @@ class ConfigTable {
   void AddEvidence(EvidenceOptions& options);
   void AddVocabulary(VocabularyOptions& options);
   void AddVerification(VerificationOptions& options);
+  void AddDnn(DnnOptions& options);
   void AddGraph(PoseGraphOptions& options, OnlineOptions& online);
   void AddRun(SlamOptions& options);
 
@@ -56,7 +57,8 @@ class ConfigTable {
   void Add(const char* name, double& field, const char* doc);
   void Add(const char* name, std::string& field, const char* doc);
   void Add(const char* name, std::vector<std::string>& field, const char* doc);
-  void Add(const char* name, std::array<double, 5>& field, const char* doc);
+  void Add(const char* name, std::array<double, 5>& field, const char* doc);  // fewer: the rest is 0
+  void Add(const char* name, std::array<double, 3>& field, const char* doc);
   template <typename Enum>
   void AddEnum(const char* name, Enum& field, EnumNames<Enum> names, const char* doc);
   void Push(const char* name, const char* doc, std::function<std::string(const YAML::Node&)> read,

@@ -2,6 +2,7 @@
 // with.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -84,9 +85,9 @@ struct EvidenceOptions {
   double sharpness = 2.0;     ///< exponent of a count beyond the alias level: beta, above 0, at most 10
   double alias_share = 0.85;  ///< share of the alias level that a place must reach to be more likely than a
                               ///< new one, above 0, at most 3
-  double floor = -1.0;      ///< least logarithm of a likelihood, below 0, at least -10
-  double attraction = 0.75;  ///< how much more a place must show that many images resemble: exponent of its
-                            ///< mean count, 0 (no more) to 2
+  double floor = -1.0;        ///< least logarithm of a likelihood, below 0, at least -10
+  double attraction = 0.75;   ///< how much more a place must show that many images resemble: exponent of its
+                              ///< mean count, 0 (no more) to 2
 
   /// Empty if usable, else what is wrong and what to do.
   std::string Validate() const;
@@ -136,17 +137,35 @@ struct VerificationOptions {
   std::string Validate() const;
 };
 
+/// Options of the member `dnn`: a network of the caller's that describes an image as a whole (loop-closure.md
+/// section 3). It gets one image of 3 channels, its first output is the descriptor. The names are those of
+/// cv::dnn::blobFromImage; the defaults what nearly every network expects that was trained on ImageNet.
+struct DnnOptions {
+  std::string model;  ///< ONNX file; required where members holds `dnn`
+  int width = 320;    ///< of the image that the network gets [px], 16 to 4096; ours are scaled to it
+  int height = 240;   ///< [px], 16 to 4096
+  std::array<double, 3> mean = {123.675, 116.28, 103.53};  ///< subtracted from each channel, in the order
+                                                           ///< that the network has them [grey levels of 255]
+  double scale = 1.0 / 255.0;  ///< and then multiplied by this, above 0, at most 1000
+  std::array<double, 3> stddev = {0.229, 0.224, 0.225};  ///< and divided by this, above 0, at most 1000
+  bool swap_rb = true;  ///< the network takes red, green, blue; false: blue, green, red, as OpenCV has them
+  std::string layer;    ///< whose output is the descriptor, as the ONNX file names it; empty: the only output
+
+  /// Empty if usable, else what is wrong and what to do.
+  std::string Validate() const;
+};
+
 /// Options of LoopDetector.
 struct LoopDetectorOptions {
   CombinationRule rule = CombinationRule::kJoint;  ///< how members are combined
   std::vector<std::string> members = {"surf", "sift",
                                       "orb"};  ///< of KnownMembers(), and of external_members; kSingle: one
-  std::vector<std::string> dense_members;      ///< of external_members, those that describe an image as a whole:
-                                               ///< no keypoints, and one row of CV_32F
-  std::vector<std::string> external_members;   ///< further names that members may hold: the caller extracts
-                                               ///< their features himself and gives them with each LoopQuery
-  double loop_threshold = 0.97;                ///< accept a loop of this probability, 0..1
-  double propose_threshold = 0.1;              ///< go to verification at H >= this, 0..1
+  std::vector<std::string> dense_members;  ///< of external_members, those that describe an image as a whole:
+                                           ///< no keypoints, and one row of CV_32F
+  std::vector<std::string> external_members;  ///< further names that members may hold: the caller extracts
+                                              ///< their features himself and gives them with each LoopQuery
+  double loop_threshold = 0.97;               ///< accept a loop of this probability, 0..1
+  double propose_threshold = 0.1;             ///< go to verification at H >= this, 0..1
   double link_threshold = 0.9;  ///< a loop of this probability links its two places for the filter, 0..1
   int stm_size = 10;            ///< locations in short-term memory, no candidates
   int threads = 2;              ///< most threads that Detect uses at once
@@ -184,6 +203,7 @@ struct LoopDetectorOptions {
   ExtractionOptions extraction;      ///< features
   VocabularyOptions vocabulary;      ///< words
   VerificationOptions verification;  ///< geometry
+  DnnOptions dnn;                    ///< of the member `dnn`, off by default
 
   /// Empty if usable, else what is wrong and what to do.
   std::string Validate() const;
@@ -216,7 +236,7 @@ std::vector<std::string> KnownMembers();
 /// RegisterFeatureType added.
 std::vector<std::string> KnownFeatureTypes();
 
-/// Members that describe an image as a whole (dense.h): hog.
+/// Members that describe an image as a whole (dense.h): hog, dnn.
 std::vector<std::string> KnownDenseMembers();
 
 }  // namespace tutti

@@ -87,7 +87,7 @@ void DetectionLog::OnDetection(const LoopResult& result) {
                                 Noteworthy(result.posterior_by_location),
                                 0,
                                 result.posterior,
-                                {}});
+                                Grouped(result.evidence, detection.group)});
   numbers_[result.query] = detections_.size();
   if (result.proposed) detection.matches = SpreadMatches(result.verification.inlier_matches);
   detections_.push_back(std::move(detection));

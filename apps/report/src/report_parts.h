@@ -67,8 +67,8 @@ std::vector<ShownLoop> ShownLoops(const RunResult& result, const DetectionLog& l
 ///   "t": of the columns; "place_t": of the rows
 ///   "maps": [{"name", "q"}]: the posterior of members and ensemble, one byte round(255 sqrt(p)) for a cell,
 ///     row by row, base64
-///   "evidence": {"zero", "step", "maps": [{"name", "q"}]}: ln of the members' likelihoods in the same cells,
-///     (byte - zero) step; byte 0: no place there yet, or the member sat the image out
+///   "evidence": {"zero", "step", "maps": [{"name", "q"}]}: ln of the likelihoods of the members and (rule
+///     joint) the ensemble in the same cells, (byte - zero) step; byte 0: no place there yet, or the member sat the image out
 ///   "images": for each column what was decided: "query", "new" (p of a new place), "candidate", its
 ///     "row" (-1: none) and "posterior", "outcome" ("accepted", "false", "rejected", or "none": not proposed), "missed" (the ground
 ///     truth has a loop there), "probability" (null: not proposed), "reason" (empty: accepted), "geometry"

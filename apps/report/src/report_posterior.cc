@@ -191,7 +191,8 @@ Json PosteriorJson(const RunResult& result, const DetectionLog& log, const std::
     json["maps"].push_back(PosteriorMap(names[o].name, detections, grid, o));
   json["evidence"] = {
       {"zero", EvidenceByte::kZero}, {"step", EvidenceByte::kStep}, {"maps", Json::array()}};
-  for (std::size_t o = 0; o + 1 < names.size(); ++o)
+  const bool joint = result.config.loops.rule == CombinationRule::kJoint;
+  for (std::size_t o = 0; o + (joint ? 0 : 1) < names.size(); ++o)
     json["evidence"]["maps"].push_back(EvidenceMap(names[o].name, detections, grid, o));
   json["images"] = Json::array();
   const Outcomes outcomes = OutcomesOf(loops);

@@ -106,7 +106,7 @@ function membersTable(p, image, logs) {
     if (!m) return [member.name, '-', '-', '-', '-', 'sat out'];
     return [member.name, fixed(m[0], 3), fixed(m[1], 4), fixed(logAt(k), 1), fixed(m[3], 4), m[2] < 0 ? '-' : `frame ${m[2]}`];
   });
-  rows.push(['ensemble', '', fixed(1 - image.new, 4), '', fixed(image.posterior, 4), image.candidate < 0 ? '-' : `frame ${image.candidate}`]);
+  rows.push(['ensemble', '', fixed(1 - image.new, 4), logs[p.weights.length] ? fixed(logAt(p.weights.length), 1) : '', fixed(image.posterior, 4), image.candidate < 0 ? '-' : `frame ${image.candidate}`]);
   return table(['member', 'weight', 'H', 'ln L there', 'p there', 'its best place'], rows);
 }
 
@@ -177,7 +177,7 @@ async function drawMaps(panel, run, logs, roots) {
   const axes = { xaxis: axis('time of the image [s]'), yaxis: axis('time of the place [s]') };
   const hover = 'at %{x:.1f} s: place of %{y:.1f} s, ';
   const evidence = (k) => chart(pair, '', [{ type: 'heatmap', x: p.t, y: p.place_t, z: logs[k], zmin: -reach, zmax: reach, hoverongaps: false,
-    colorscale: [[0, '#d55e00'], [0.5, css('--raised')], [1, '#0072b2']], colorbar: { thickness: 10, title: { text: 'ln L', side: 'top' } },
+    colorscale: [[0, '#d55e00'], [0.5, css('--raised')], [1, css('--accent')]], colorbar: { thickness: 10, title: { text: 'ln L', side: 'top' } },
     hovertemplate: `${hover}ln L = %{z:.1f}<extra></extra>` }], layoutOf(`Evidence: ${p.evidence.maps[k].name}`, axes));
   const posterior = (k) => {
     const top = p.maps[k].name === 'ensemble' ? marks : [];
@@ -185,12 +185,12 @@ async function drawMaps(panel, run, logs, roots) {
       customdata: roots[k].map((row) => row.map((v) => v * v)),
       colorbar: { thickness: 10, title: { text: 'p', side: 'top' }, tickvals: ticks.map(Math.sqrt), ticktext: ticks.map(String) },
       hovertemplate: `${hover}p = %{customdata:.4f}<extra></extra>` }, ...top],
-    layoutOf(`Posterior: ${p.maps[k].name}`, { ...axes, showlegend: top.length > 0 }));
+    layoutOf(`Posterior: ${p.maps[k].name}`, { ...axes, showlegend: false }));
   };
   for (const [k, map] of p.maps.entries()) {
     const of = p.evidence.maps.findIndex((e) => e.name === map.name);
     if (of >= 0) await evidence(of);
-    else if (p.maps.length === 1 && p.evidence.maps.length) await evidence(0);  // a member alone is the ensemble
+    else if (p.maps.length === 1) await evidence(0);  // a member alone is the ensemble
     await posterior(k);
   }
 }
@@ -209,5 +209,5 @@ async function drawPosterior(panel) {
   await drawMaps(panel, run, logs, roots);
   for (const div of [...times, ...[...panel.querySelectorAll('.chart')].slice(before)]) await watch(div);
   panel.append(note(`${p.cells} x ${p.cells} cells: a column is the one of its images that says most, a cell the largest value of its places. The rest of a posterior is "a new place". ` +
-    'Evidence is each image\'s own: above 0 it speaks for the place, below 0 against it. White marks: accepted loops.'));
+    'Evidence is of the image alone, before the filter: above 0 it speaks for the place, below 0 against it. White marks: accepted loops (crosses: false ones).'));
 }

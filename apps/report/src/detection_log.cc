@@ -80,13 +80,8 @@ void DetectionLog::OnDetection(const LoopResult& result) {
                                   Noteworthy(member.posterior_by_location), weight, member.at_candidate,
                                   Grouped(member.evidence, detection.group)});
   }
-  detection.opinions.push_back({"ensemble",
-                                true,
-                                result.hypothesis,
-                                result.candidate,
-                                Noteworthy(result.posterior_by_location),
-                                0,
-                                result.posterior,
+  detection.opinions.push_back({"ensemble", true, result.hypothesis, result.candidate,
+                                Noteworthy(result.posterior_by_location), 0, result.posterior,
                                 Grouped(result.evidence, detection.group)});
   numbers_[result.query] = detections_.size();
   if (result.proposed) detection.matches = SpreadMatches(result.verification.inlier_matches);

@@ -68,14 +68,16 @@ std::vector<ShownLoop> ShownLoops(const RunResult& result, const DetectionLog& l
 ///   "maps": [{"name", "q"}]: the posterior of members and ensemble, one byte round(255 sqrt(p)) for a cell,
 ///     row by row, base64
 ///   "evidence": {"zero", "step", "maps": [{"name", "q"}]}: ln of the likelihoods of the members and (rule
-///     joint) the ensemble in the same cells, (byte - zero) step; byte 0: no place there yet, or the member sat the image out
+///     joint) the ensemble in the same cells, (byte - zero) step; byte 0: no place there yet, or the member
+///     sat the image out
 ///   "images": for each column what was decided: "query", "new" (p of a new place), "candidate", its
-///     "row" (-1: none) and "posterior", "outcome" ("accepted", "false", "rejected", or "none": not proposed), "missed" (the ground
-///     truth has a loop there), "probability" (null: not proposed), "reason" (empty: accepted), "geometry"
-///     (null: it was not asked) with "place", "row", "mass", "matches", "inliers", "coverage", "log_nfa", "spread"
-///     as in Verification, and "members": for each null (it sat out) or [weight, H, best, posterior at
-///     the candidate]; places are input frames
-///   "hypothesis_t", "hypotheses": [{"name", "h"}], "weights": [{"name", "w"}] (of the members, with the sum 1)
+///     "row" (-1: none) and "posterior", "outcome" ("accepted", "false", "rejected", or "none": not
+///     proposed), "missed" (the ground truth has a loop there), "probability" (null: not proposed), "reason"
+///     (empty: accepted), "geometry" (null: it was not asked) with "place", "row", "mass", "matches",
+///     "inliers", "coverage", "log_nfa", "spread" as in Verification, and "members": for each null (it sat
+///     out) or [weight, H, best, posterior at the candidate]; places are input frames
+///   "hypothesis_t", "hypotheses": [{"name", "h"}], "weights": [{"name", "w"}] (of the members, with the sum
+///   1)
 Json PosteriorJson(const RunResult& result, const DetectionLog& log, const std::vector<ShownLoop>& loops);
 
 /// Pictures of some of each outcome: {"note", "entries": [{"outcome", "title", "text", "picture"}]}.

@@ -162,8 +162,7 @@ void AddCurves(const std::vector<LoggedDetection>& detections, std::size_t first
     }
     if (o >= first_hypothesis)
       json["hypotheses"].push_back({{"name", names[o].name}, {"h", std::move(hypotheses)}});
-    if (o + 1 < names.size())
-      json["weights"].push_back({{"name", names[o].name}, {"w", std::move(weights)}});
+    if (o + 1 < names.size()) json["weights"].push_back({{"name", names[o].name}, {"w", std::move(weights)}});
   }
 }
 
@@ -189,8 +188,7 @@ Json PosteriorJson(const RunResult& result, const DetectionLog& log, const std::
   json["maps"] = Json::array();
   for (std::size_t o = first; o < names.size(); ++o)
     json["maps"].push_back(PosteriorMap(names[o].name, detections, grid, o));
-  json["evidence"] = {
-      {"zero", EvidenceByte::kZero}, {"step", EvidenceByte::kStep}, {"maps", Json::array()}};
+  json["evidence"] = {{"zero", EvidenceByte::kZero}, {"step", EvidenceByte::kStep}, {"maps", Json::array()}};
   const bool joint = result.config.loops.rule == CombinationRule::kJoint;
   for (std::size_t o = 0; o + (joint ? 0 : 1) < names.size(); ++o)
     json["evidence"]["maps"].push_back(EvidenceMap(names[o].name, detections, grid, o));

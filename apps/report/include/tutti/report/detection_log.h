@@ -14,9 +14,9 @@ namespace tutti {
 
 /// The logarithm of a likelihood in one byte, in steps of 0.1 from -10 to 15.4; 0: there is none.
 struct EvidenceByte {
-  static constexpr int kZero = 101;      ///< stands for ln L = 0: as likely as a new place
-  static constexpr double kStep = 0.1;   ///< in ln L
-  /// Of a likelihood; 0 is as little as there is, what is beyond the range its end.
+  static constexpr int kZero = 101;     ///< stands for ln L = 0: as likely as a new place
+  static constexpr double kStep = 0.1;  ///< in ln L
+  /// Of a likelihood; values beyond the range take its nearest end.
   static std::uint8_t Of(double likelihood);
 };
 
@@ -30,8 +30,9 @@ struct LoggedOpinion {
   std::vector<std::pair<std::int64_t, float>> posterior;
   double weight = 0;        ///< of a member: share of the sum of all that took part, 0..1; 0: it did not
   double at_candidate = 0;  ///< its posterior at the ensemble's candidate, 0..1
-  /// Of a member, or of the joint filter, by group of LoggedDetection::group images in the order of the queries: the EvidenceByte of
-  /// its largest likelihood; images at the end that are no places yet are left out
+  /// Of a member, or of the joint filter, by group of LoggedDetection::group images in the order of the
+  /// queries: the EvidenceByte of its largest likelihood; images at the end that are no places yet are left
+  /// out
   std::vector<std::uint8_t> evidence;
 };
 

@@ -129,6 +129,8 @@ class MemorySystem {
   const LocationMemory& memory() const { return memory_; }
   std::vector<FilterUnit>& units() { return units_; }
   const std::vector<FilterUnit>& units() const { return units_; }
+  /// Null if there is none, or no unit took part in this image.
+  const PlaceFilter* joint() const { return joint_ && JointTookPart() ? &*joint_ : nullptr; }
 
  private:
   // One record holds what every unit keeps.

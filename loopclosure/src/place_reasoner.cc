@@ -118,6 +118,13 @@ void PlaceReasoner::Explain(const CombinedBelief& combined, LoopResult& result) 
   for (const int slot : memory().working_memory()) {
     result.posterior_by_location.emplace_back(memory().id(slot), PosteriorAt(combined.belief, slot));
   }
+  const PlaceFilter* joint = options_.keep_evidence && Shared() ? systems_.front()->joint() : nullptr;
+  if (joint == nullptr) return;
+  for (const int slot : memory().working_memory()) {
+    result.evidence.push_back(
+        {memory().id(slot), Index(slot) < joint->counts.size() ? joint->counts[Index(slot)] : 0.0,
+         PosteriorAt(joint->image_likelihood, slot), PosteriorAt(joint->filter.posterior(), slot)});
+  }
 }
 
 void PlaceReasoner::FillOpinion(std::size_t member, const CombinedBelief& combined,

@@ -37,6 +37,28 @@ const colours3d = (page) => page.evaluate(() => {
   return new Set(new Uint32Array(context.getImageData(0, 0, copy.width, copy.height).data.buffer)).size;
 });
 
+// The posterior tab shows one image at a time: the slider, a button and a click into a chart choose it.
+async function chooseImages(page, where) {
+  const shown = () => page.evaluate(() => ({
+    name: document.getElementById('image-name').textContent,
+    words: document.getElementById('image-words').textContent,
+    proposed: /accepted|rejected/.test(document.querySelector('#image-words .verdict b').textContent),
+  }));
+  const start = await shown();
+  for (const word of ['p(new place)', 'weight', 'ln L there', 'ensemble']) check(start.words.includes(word), `${where}: no '${word}' for the image`);
+  await page.evaluate(() => {
+    const slider = document.getElementById('image');
+    slider.value = slider.value === '0' ? '1' : '0';
+    slider.dispatchEvent(new Event('input'));
+  });
+  const moved = await shown();
+  check(moved.name !== start.name && moved.words !== start.words, `${where}: the slider chooses no other image`);
+  await page.evaluate(() => document.querySelectorAll('.chooser button')[1].click());
+  if (start.proposed) check((await shown()).proposed, `${where}: the button does not go to a proposed image`);
+  await page.evaluate(() => document.querySelector('#posterior .chart').emit('plotly_click', { points: [{ x: 0 }] }));
+  check(/, 0\.0 s/.test((await shown()).name), `${where}: a click into a chart does not choose its image`);
+}
+
 async function lookOnce(browser, file, [look, viewport, scheme], expected, words, shots) {
   const { page, problems } = await openPage(browser, pathToFileURL(resolve(file)).href, { viewport, scheme });
   await page.waitForFunction(() => document.documentElement.dataset.ready === '1', { timeout: 120000 });
@@ -56,6 +78,8 @@ async function lookOnce(browser, file, [look, viewport, scheme], expected, words
     if (words[tab]) check(found.tables.includes(words[tab]), `${where}: no table with ${words[tab]}`);
     if (expected.includes(tab)) check(found.charts.length + found.images.length > 0, `${where}: nothing drawn`);
     if (tab === 'space' && found.charts.length) check(await colours3d(page) > 3, `${where}: the 3D view is blank`);
+    const chooser = tab === 'posterior' && await page.$('#image');
+    if (chooser && !shots) await chooseImages(page, where);
     if (shots) {
       await sleep(300);
       mkdirSync(shots, { recursive: true });

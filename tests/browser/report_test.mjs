@@ -49,7 +49,7 @@ try {
     process.exit(SKIP);
   }
   check(statSync(report).size < 10e6, `${report}: ${statSync(report).size} bytes`);
-  await lookThrough(browser, report, { expected: EVERY_CHART, shots });
+  await lookThrough(browser, report, { expected: EVERY_CHART, words: { posterior: 'log10 NFA' }, shots });
   const [alone, ...tables] = attack(folder);
   await lookThrough(browser, alone, { expected: ['map', 'space', 'error', 'timing'] });
   for (const page of tables) {

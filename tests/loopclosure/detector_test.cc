@@ -394,6 +394,36 @@ TEST(LoopDetector, KeepsTheEvidenceOfEveryCandidateOnlyWhenAsked) {
   }
 }
 
+TEST(LoopDetector, TheJointFiltersEvidenceIsTheWeightedSumOfTheMembers) {
+  constexpr int kPlaces = 8;
+  LoopDetectorOptions options = testing::SmallOptions();
+  SetRule("joint", options);
+  options.rehearsal = false;
+  LoopDetector silent(options);
+  const LoopResult without = testing::Walk(silent, 0, kPlaces + 1, kPlaces).back();
+  EXPECT_TRUE(without.evidence.empty());
+  options.keep_evidence = true;
+  LoopDetector detector(options);
+  const LoopResult result = testing::Walk(detector, 0, kPlaces + 1, kPlaces).back();
+  EXPECT_EQ(result.hypothesis, without.hypothesis);
+  ASSERT_EQ(result.evidence.size(), result.posterior_by_location.size());
+  ASSERT_FALSE(result.evidence.empty());
+  for (std::size_t i = 0; i < result.evidence.size(); ++i) {
+    EXPECT_EQ(result.evidence[i].location, result.posterior_by_location[i].first);
+    EXPECT_EQ(result.evidence[i].posterior, result.posterior_by_location[i].second);
+    EXPECT_GT(result.evidence[i].likelihood, 0);
+    EXPECT_GE(result.evidence[i].score, 0);
+  }
+  // Image kPlaces shows place 0 again.
+  const auto best = std::max_element(result.evidence.begin(), result.evidence.end(),
+                                     [](const auto& a, const auto& b) { return a.score < b.score; });
+  EXPECT_EQ(best->location, 0);
+  EXPECT_GT(best->likelihood, 1);
+  SetRule("mean", options);
+  LoopDetector apart(options);
+  EXPECT_TRUE(testing::Walk(apart, 0, kPlaces + 1, kPlaces).back().evidence.empty());
+}
+
 TEST(LoopDetector, AMemberThatSitsAnImageOutHasNoEvidence) {
   LoopDetectorOptions options = testing::SmallOptions();
   options.keep_evidence = true;
@@ -401,6 +431,7 @@ TEST(LoopDetector, AMemberThatSitsAnImageOutHasNoEvidence) {
   testing::Walk(detector, 0, 5, 5);
   const LoopResult result = detector.Detect(cv::Mat(180, 240, CV_8UC1, cv::Scalar(80)), 5);
   for (const MemberOpinion& member : result.members) EXPECT_TRUE(member.evidence.empty());
+  EXPECT_TRUE(result.evidence.empty());
   EXPECT_EQ(result.posterior_by_location.size(), 3u);
 }
 

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "executable.h"
@@ -10,6 +11,7 @@
 #include "tutti/report/comparison_report.h"
 #include "tutti/report/detection_log.h"
 #include "tutti/report/page.h"
+#include "tutti/report/run_report.h"
 
 namespace tutti {
 namespace {
@@ -84,8 +86,11 @@ TEST(DetectionLog, KeepsWhatIsWorthALook) {
   result.hypothesis = 0.5;
   result.proposed = true;
   result.posterior_by_location = {{1, 1e-6}, {3, 0.4}};
+  result.posterior = 0.4;
   result.members.push_back({});
   result.members.back().name = "orb";
+  result.verification.candidate = 3;
+  result.verification.mass = 0.45;
   for (int i = 0; i < 500; ++i) result.verification.inlier_matches.push_back({});
   result.verification.reason = "too few inliers";
   log.OnDetection(result);
@@ -99,6 +104,121 @@ TEST(DetectionLog, KeepsWhatIsWorthALook) {
   ASSERT_EQ(logged.opinions[1].posterior.size(), 1u);
   EXPECT_EQ(logged.opinions[1].posterior[0].first, 3);
   EXPECT_EQ(logged.matches.size(), DetectionLog::kMostMatches);
+  EXPECT_EQ(logged.posterior, 0.4);
+  EXPECT_EQ(logged.geometry.mass, 0.45);
+  EXPECT_TRUE(logged.geometry.inlier_matches.empty());
+}
+
+TEST(DetectionLog, WeightsAreSharesOfThoseThatTookPart) {
+  LoopResult result;
+  result.query = 0;
+  for (const double weight : {1.5, 0.5, 7.0}) {
+    result.members.push_back({});
+    result.members.back().weight = weight;
+    result.members.back().took_part = weight < 7;  // the third sits the image out
+  }
+  DetectionLog log;
+  log.OnDetection(result);
+  const std::vector<LoggedOpinion>& opinions = log.detections().front().opinions;
+  EXPECT_DOUBLE_EQ(opinions[0].weight, 0.75);
+  EXPECT_DOUBLE_EQ(opinions[1].weight, 0.25);
+  EXPECT_EQ(opinions[2].weight, 0);
+}
+
+TEST(DetectionLog, EvidenceIsAByteForAFewImagesHoweverLongTheRun) {
+  EXPECT_EQ(EvidenceByte::Of(1), EvidenceByte::kZero);
+  EXPECT_EQ(EvidenceByte::Of(std::exp(2.0)), EvidenceByte::kZero + 20);
+  EXPECT_EQ(EvidenceByte::Of(0), 1);
+  EXPECT_EQ(EvidenceByte::Of(1e30), 255);
+  constexpr int kImages = 1200;
+  DetectionLog log;
+  for (int i = 0; i < kImages; ++i) {
+    LoopResult result;
+    result.query = 10 * i;
+    result.members.push_back({});
+    result.members.back().took_part = true;
+    for (int k = 0; k + 10 < i; ++k) {
+      CandidateEvidence place;
+      place.location = 10 * k;
+      place.likelihood = k == 700 ? std::exp(3.0) : std::exp(-1.0);
+      result.members.back().evidence.push_back(place);
+    }
+    log.OnDetection(result);
+  }
+  const LoggedDetection& early = log.detections()[400];
+  EXPECT_EQ(early.group, 1u);
+  EXPECT_EQ(early.opinions[0].evidence.size(), 390u);
+  const LoggedDetection& last = log.detections().back();
+  EXPECT_EQ(last.group, 4u);
+  const std::vector<std::uint8_t>& evidence = last.opinions[0].evidence;
+  ASSERT_EQ(evidence.size(), 298u);
+  for (std::size_t g = 0; g < evidence.size(); ++g)
+    EXPECT_EQ(evidence[g], EvidenceByte::kZero + (g == 175 ? 30 : -10)) << g;
+}
+
+// A few images, most of them new, the last of which comes back to the first.
+DetectionLog ReturnLog(int images) {
+  DetectionLog log;
+  for (int i = 0; i < images; ++i) {
+    LoopResult result;
+    result.query = i;
+    result.members.resize(2);
+    result.members[0].name = "orb";
+    result.members[0].took_part = true;
+    result.members[1].name = "sift";
+    for (int k = 0; k + 2 < i; ++k) result.members[0].evidence.push_back({k, 0, std::exp(-1.0), 0});
+    result.reason = "the hypothesis is too weak";
+    if (i + 1 == images) {
+      result.members[0].evidence[0].likelihood = std::exp(4.0);
+      result.hypothesis = 0.9;
+      result.candidate = 0;
+      result.posterior = 0.8;
+      result.posterior_by_location = {{0, 0.8}};
+      result.proposed = true;
+      result.probability = 0.5;
+      result.reason = "probably not this place";
+      result.verification.candidate = 0;
+      result.verification.inliers = 33;
+      result.verification.mass = 0.85;
+    }
+    log.OnDetection(result);
+  }
+  return log;
+}
+
+TEST(ReportOfARun, SaysWhatEachImageWasDecidedBy) {
+  constexpr int kImages = 500;
+  const DetectionLog log = ReturnLog(kImages);
+  RunResult run;
+  run.config.loops.rule = CombinationRule::kMean;
+  const Json posterior = RunReport(run, log, "ensemble")["posterior"];
+  const std::size_t cells = posterior["cells"];
+  EXPECT_EQ(cells, 220u);
+  for (const char* list : {"t", "place_t", "images"}) EXPECT_EQ(posterior[list].size(), cells) << list;
+  EXPECT_EQ(posterior["loop_threshold"], run.config.loops.loop_threshold);
+  const Json& evidence = posterior["evidence"];
+  ASSERT_EQ(evidence["maps"].size(), 2u);  // there is no joint filter
+  EXPECT_EQ(evidence["maps"][0]["name"], "orb");
+  EXPECT_EQ(evidence["maps"][0]["q"].get<std::string>().size(), 4 * ((cells * cells + 2) / 3));
+  EXPECT_EQ(posterior["weights"].size(), 2u);
+  EXPECT_EQ(posterior["weights"][0]["w"].back(), 1);
+  EXPECT_EQ(posterior["weights"][1]["w"].back(), 0);
+  const Json& image = posterior["images"].back();
+  EXPECT_EQ(image["query"], kImages - 1);  // of the last column the one that says most
+  EXPECT_EQ(image["new"], 0.1);
+  EXPECT_EQ(image["candidate"], 0);
+  EXPECT_EQ(image["row"], 0);
+  EXPECT_EQ(image["probability"], 0.5);
+  EXPECT_EQ(image["reason"], "probably not this place");
+  EXPECT_EQ(image["geometry"]["mass"], 0.85);
+  EXPECT_EQ(image["geometry"]["inliers"], 33);
+  EXPECT_EQ(image["members"][0][0], 1);
+  EXPECT_TRUE(image["members"][1].is_null());  // it sat out
+  const Json& before = posterior["images"].front();
+  EXPECT_TRUE(before["probability"].is_null());
+  EXPECT_TRUE(before["geometry"].is_null());
+  EXPECT_EQ(before["outcome"], "none");
+  EXPECT_EQ(before["reason"], "the hypothesis is too weak");
 }
 
 TEST(ReportOfARun, HoldsWhatTheRunFound) {
@@ -126,6 +246,9 @@ TEST(ReportOfARun, HoldsWhatTheRunFound) {
   EXPECT_EQ((*report)["reference"]["x"].size(), static_cast<std::size_t>(testing::kTinyFrames));
   EXPECT_EQ((*report)["errors"]["slam"]["error"].size(), static_cast<std::size_t>(testing::kTinyFrames));
   EXPECT_EQ((*report)["posterior"]["maps"].size(), 4u);  // three members and the ensemble
+  EXPECT_EQ((*report)["posterior"]["evidence"]["maps"].size(), 4u);
+  EXPECT_EQ((*report)["posterior"]["weights"].size(), 3u);
+  EXPECT_EQ((*report)["posterior"]["images"].size(), (*report)["posterior"]["cells"]);
   EXPECT_EQ((*report)["configuration"]["seed"], 1);
   EXPECT_FALSE((*report)["configuration"]["versions"]["OpenCV"].get<std::string>().empty());
   EXPECT_EQ(fs::exists(folder / "a" / "report.html"), ReportsAvailable());

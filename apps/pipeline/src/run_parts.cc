@@ -56,8 +56,10 @@ RunConfig WithOverrides(RunConfig config, const RunRequest& request) {
 }
 
 RunConfig Watched(RunConfig config, const RunRequest& request) {
-  for (const auto& observer : request.observers)
+  for (const auto& observer : request.observers) {
     config.loops.keep_posterior = config.loops.keep_posterior || observer->WantsPosteriors();
+    config.loops.keep_evidence = config.loops.keep_evidence || observer->WantsPosteriors();
+  }
   return config;
 }
 

@@ -19,7 +19,7 @@ double ProcessCpuSeconds();
 
 /// The configuration with what the command line says. Throws InputError.
 RunConfig WithOverrides(RunConfig config, const RunRequest& request);
-/// With the posteriors kept if an observer looks at them; they decide nothing.
+/// With the posteriors and the evidence kept if an observer looks at them; they decide nothing.
 RunConfig Watched(RunConfig config, const RunRequest& request);
 
 /// The ground truth and its file; nothing if there is none, or none is wanted. Throws InputError.

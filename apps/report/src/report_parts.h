@@ -42,11 +42,6 @@ KnownLoops FindKnownLoops(const RunResult& result, const DetectionLog& log);
 /// without known loops.
 Json PrecisionRecallJson(const RunResult& result, const DetectionLog& log, const KnownLoops& known);
 
-/// {"t", "place_t", "threshold", "maps": [{"name", "columns", "rows", "q"}], "hypotheses"}: the largest
-/// posterior in each cell as one byte round(255 sqrt(p)), base64, row by row (row: place); null if the
-/// detector was never asked.
-Json PosteriorJson(const RunResult& result, const DetectionLog& log);
-
 /// What became of a loop, for colours.
 enum class Outcome { kAccepted, kFalse, kRejected, kMissed };
 const char* ToString(Outcome outcome);
@@ -64,6 +59,26 @@ struct ShownLoop {
 
 /// All proposed loops, and (with known loops) the images that have a loop but no accepted one.
 std::vector<ShownLoop> ShownLoops(const RunResult& result, const DetectionLog& log, const KnownLoops& known);
+
+/// What the detector believed, and why; null if it was asked less than twice. Thinned out to at most 220
+/// columns, each the one of its images that says most (verified, else proposed, else the largest hypothesis),
+/// and as many rows of places, each with the largest value of its images:
+///   "cells", "threshold", "loop_threshold", "first_stamp_s"; times are relative to it [s]
+///   "t": of the columns; "place_t": of the rows
+///   "maps": [{"name", "q"}]: the posterior of members and ensemble, one byte round(255 sqrt(p)) for a cell,
+///     row by row, base64
+///   "evidence": {"zero", "step", "maps": [{"name", "q"}]}: ln of the likelihoods of the members and (rule
+///     joint) the ensemble in the same cells, (byte - zero) step; byte 0: no place there yet, or the member
+///     sat the image out
+///   "images": for each column what was decided: "query", "new" (p of a new place), "candidate", its
+///     "row" (-1: none) and "posterior", "outcome" ("accepted", "false", "rejected", or "none": not
+///     proposed), "missed" (the ground truth has a loop there), "probability" (null: not proposed), "reason"
+///     (empty: accepted), "geometry" (null: it was not asked) with "place", "row", "mass", "matches",
+///     "inliers", "coverage", "log_nfa", "spread" as in Verification, and "members": for each null (it sat
+///     out) or [weight, H, best, posterior at the candidate]; places are input frames
+///   "hypothesis_t", "hypotheses": [{"name", "h"}], "weights": [{"name", "w"}] (of the members, with the sum
+///   1)
+Json PosteriorJson(const RunResult& result, const DetectionLog& log, const std::vector<ShownLoop>& loops);
 
 /// Pictures of some of each outcome: {"note", "entries": [{"outcome", "title", "text", "picture"}]}.
 Json GalleryJson(const RunResult& result, const std::vector<ShownLoop>& loops);

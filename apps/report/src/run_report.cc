@@ -185,7 +185,7 @@ nlohmann::ordered_json RunReport(const RunResult& result, const DetectionLog& lo
   json["errors"] = {{"odometry", scored ? ErrorJson(result, result.trajectory_odometry) : Json()},
                     {"slam", scored ? ErrorJson(result, result.trajectory) : Json()}};
   json["precision_recall"] = PrecisionRecallJson(result, log, known);
-  json["posterior"] = PosteriorJson(result, log);
+  json["posterior"] = PosteriorJson(result, log, loops);
   json["gallery"] = GalleryJson(result, loops);
   json["timing"] = TimingJson(result);
   json["configuration"] = ConfigurationJson(result);

@@ -1,5 +1,5 @@
 'use strict';
-// Errors, precision and recall, posteriors, times.
+// Errors, precision and recall, times.
 
 async function drawErrors(panel) {
   const lines = [];
@@ -54,56 +54,6 @@ async function drawRecall(panel) {
   await chart(panel, '', traces, layout(known.length > 1 ? `Members of ${run.variant}` : 'Members, ensemble, and the ensemble verified'));
   const pr = run.precision_recall;
   panel.append(note(`${pr.rows_with_loop} of ${pr.images} images have a loop (${pr.rule}). Discs: at the default threshold.`));
-}
-
-// Square roots of the posterior, as they are stored: small ones stay visible.
-function unpackMap(map, cells) {
-  const bytes = atob(map.q), rows = [];
-  for (let r = 0; r < cells; ++r) {
-    const row = new Array(cells);
-    for (let c = 0; c < cells; ++c) {
-      row[c] = bytes.charCodeAt(r * cells + c) / 255;
-    }
-    rows.push(row);
-  }
-  return rows;
-}
-
-// Loops over a heat map: time of the query and of its place.
-function loopMarks(run, posterior) {
-  return ['accepted', 'false'].flatMap((outcome) => {
-    const loops = run.loops.filter((loop) => loop.outcome === outcome);
-    if (!loops.length) return [];
-    const style = OUTCOMES[outcome];
-    return [{ type: 'scatter', mode: 'markers', name: style.name, hoverinfo: 'skip',
-      x: loops.map((l) => l.qt - posterior.first_stamp_s), y: loops.map((l) => l.ct - posterior.first_stamp_s),
-      marker: { symbol: `${style.symbol}-open`, size: 11, color: '#ffffff', line: { width: 1.5 } } }];
-  });
-}
-
-async function drawPosterior(panel) {
-  const run = chosen(), p = run.posterior;
-  if (!p) return panel.append(note('This run asked no loop detector.'));
-  await chart(panel, 'small', [
-    ...p.hypotheses.map((h) => ({ type: 'scatter', mode: 'lines', x: p.hypothesis_t, y: h.h, name: label(h.name), line: lineOf(h.name) })),
-    { type: 'scatter', mode: 'lines', x: [0, p.hypothesis_t.at(-1)], y: [p.threshold, p.threshold], name: `looked at from ${p.threshold}`,
-      line: { color: css('--faint'), dash: 'dot', width: 1.5 } },
-  ], layoutOf('Hypothesis: 1 - p(new place)', { xaxis: axis('time [s]'), yaxis: axis('H', { rangemode: 'tozero' }), hovermode: 'x unified' }));
-  const grid = el('div', { class: 'pair' });
-  panel.append(grid);
-  const marks = loopMarks(run, p);
-  const roots = p.maps.map((map) => unpackMap(map, p.cells));
-  const largest = Math.max(0.05, ...roots.flat().map((row) => Math.max(...row)));
-  const ticks = [0.001, 0.01, 0.03, 0.1, 0.3, 1].filter((v) => Math.sqrt(v) <= largest);
-  for (const [k, map] of p.maps.entries()) {
-    const heat = { type: 'heatmap', x: p.t, y: p.t, z: roots[k], colorscale: 'Cividis', zmin: 0, zmax: largest,
-      customdata: roots[k].map((row) => row.map((v) => v * v)),
-      colorbar: { thickness: 10, title: { text: 'p', side: 'top' }, tickvals: ticks.map(Math.sqrt), ticktext: ticks.map(String) },
-      hovertemplate: 'at %{x:.1f} s: place of %{y:.1f} s, p = %{customdata:.4f}<extra></extra>' };
-    await chart(grid, '', [heat, ...(map.name === 'ensemble' ? marks : [])], layoutOf(`Posterior: ${map.name}`,
-      { xaxis: axis('time of the image [s]'), yaxis: axis('time of the place [s]'), showlegend: map.name === 'ensemble' && marks.length > 0 }));
-  }
-  panel.append(note(`Largest posterior in each cell, ${p.cells} x ${p.cells} cells; the rest of the probability is "a new place". White marks: accepted loops.`));
 }
 
 async function drawTiming(panel) {

@@ -149,6 +149,9 @@ struct LoopResult {
   std::vector<Verification> tried;     ///< all that were tried
   /// The combined posterior of every location in working memory; only with keep_posterior or keep_evidence.
   std::vector<std::pair<std::int64_t, double>> posterior_by_location;
+  /// What the joint filter got: its score is the sum of the members' counts, each times its weight. Only with
+  /// keep_evidence and rule joint, in the order of posterior_by_location; empty if no member took part.
+  std::vector<CandidateEvidence> evidence;
   std::vector<std::int64_t> retrieved;    ///< locations that came back from long-term memory
   std::vector<std::int64_t> transferred;  ///< locations that left working memory for it
   std::string warning;  ///< trouble that did not stop Detect: the disk is full, a stored location is damaged

@@ -14,7 +14,8 @@ namespace tutti {
 class RunObserver {
  public:
   virtual ~RunObserver() = default;
-  /// True: OnDetection gets posterior_by_location, which costs O(locations) per image.
+  /// True: OnDetection gets posterior_by_location and the members' evidence, which costs O(locations x
+  /// members) per image.
   virtual bool WantsPosteriors() const { return false; }
   /// Before the first frame.
   virtual void OnStart(const CameraRig& /*rig*/) {}

@@ -63,7 +63,7 @@ struct StereoMatches {
   std::vector<cv::Point2f> left, right;
 };
 
-Features Corners(const cv::Mat& image) {
+FrameFeatures Corners(const cv::Mat& image) {
   OdometryOptions options;
   options.features = 1000;
   return ExtractOrb(BuildPyramid(image, options), options);
@@ -71,7 +71,7 @@ Features Corners(const cv::Mat& image) {
 
 // Mutual nearest neighbours, clearly nearer than the second, anywhere in the image.
 void AddMatches(const InputFrame& frame, StereoMatches& matches) {
-  const Features left = Corners(frame.image), right = Corners(frame.right);
+  const FrameFeatures left = Corners(frame.image), right = Corners(frame.right);
   if (left.size() < 2 || right.size() < 2) return;
   const cv::BFMatcher matcher(cv::NORM_HAMMING);
   std::vector<std::vector<cv::DMatch>> forward;

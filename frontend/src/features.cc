@@ -170,7 +170,7 @@ int HammingDistance(const std::uint8_t* a, const std::uint8_t* b) {
   return distance;
 }
 
-void Features::BuildGrid(int width, int height) {
+void FrameFeatures::BuildGrid(int width, int height) {
   columns_ = width / kCell + 1;
   rows_ = height / kCell + 1;
   std::vector<std::size_t> cell_of(keypoints.size());
@@ -190,8 +190,8 @@ void Features::BuildGrid(int width, int height) {
   }
 }
 
-void Features::InArea(const cv::Point2f& centre, float radius, int first_octave, int last_octave,
-                      std::vector<int>* out) const {
+void FrameFeatures::InArea(const cv::Point2f& centre, float radius, int first_octave, int last_octave,
+                           std::vector<int>* out) const {
   out->clear();
   if (entries_.empty()) return;
   const int c0 = std::max(0, static_cast<int>(std::floor((centre.x - radius) / kCell)));
@@ -212,8 +212,8 @@ void Features::InArea(const cv::Point2f& centre, float radius, int first_octave,
   }
 }
 
-std::shared_ptr<const Features> WithoutImages(const Features& features) {
-  auto out = std::make_shared<Features>(features);
+std::shared_ptr<const FrameFeatures> WithoutImages(const FrameFeatures& features) {
+  auto out = std::make_shared<FrameFeatures>(features);
   out->pyramid.reset();
   return out;
 }
@@ -240,8 +240,8 @@ std::vector<cv::Mat> BuildPyramid(const cv::Mat& image, const OdometryOptions& o
   return pyramid;
 }
 
-Features ExtractOrb(const std::vector<cv::Mat>& pyramid, const OdometryOptions& options) {
-  Features out;
+FrameFeatures ExtractOrb(const std::vector<cv::Mat>& pyramid, const OdometryOptions& options) {
+  FrameFeatures out;
   if (pyramid.empty() || pyramid[0].empty()) return out;
   const std::vector<float> scales = PyramidScales(options);
   const std::vector<int> wanted = FeaturesPerLevel(options);
@@ -292,7 +292,7 @@ Features ExtractOrb(const std::vector<cv::Mat>& pyramid, const OdometryOptions& 
 namespace {
 
 void AddDepthFromImage(const cv::Mat& depth_m, const CameraRig& rig, const OdometryOptions& options,
-                       Features* features) {
+                       FrameFeatures* features) {
   for (std::size_t i = 0; i < features->size(); ++i) {
     const cv::Point2f& p = features->keypoints[i].pt;
     const int x = static_cast<int>(std::lround(p.x)), y = static_cast<int>(std::lround(p.y));
@@ -313,15 +313,15 @@ void AddDepthFromImage(const cv::Mat& depth_m, const CameraRig& rig, const Odome
 
 }  // namespace
 
-Features ExtractFeatures(const InputFrame& frame, const CameraRig& rig, const OdometryOptions& options) {
+FrameFeatures ExtractFeatures(const InputFrame& frame, const CameraRig& rig, const OdometryOptions& options) {
   const auto shared = std::make_shared<const std::vector<cv::Mat>>(BuildPyramid(frame.image, options));
   const std::vector<cv::Mat>& pyramid = *shared;
-  Features features = ExtractOrb(pyramid, options);
+  FrameFeatures features = ExtractOrb(pyramid, options);
   features.pyramid = shared;
   if (!frame.depth_m.empty()) AddDepthFromImage(frame.depth_m, rig, options, &features);
   if (!frame.right.empty()) {
     const std::vector<cv::Mat> right_pyramid = BuildPyramid(frame.right, options);
-    const Features right = ExtractOrb(right_pyramid, options);
+    const FrameFeatures right = ExtractOrb(right_pyramid, options);
     MatchStereo(pyramid, right_pyramid, right, rig, options, &features);
   }
   return features;

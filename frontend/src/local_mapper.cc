@@ -21,7 +21,7 @@ constexpr double kMaxCosine = 0.9996;  // 1.6 deg of parallax at least, for a de
 
 int LocalMapper::AddDepthLandmarks(int id, int at_least, Map* map) {
   const Keyframe& k = map->keyframe(id);
-  const Features& features = *k.features;
+  const FrameFeatures& features = *k.features;
   std::vector<std::pair<float, int>> order;  // depth, feature
   for (std::size_t i = 0; i < features.size(); ++i) {
     if (features.inverse_depth[i] > 0)

@@ -94,7 +94,7 @@ int Map::Present(int id) const {
   return id;
 }
 
-double Map::RelativeSigma(const Features& features, int keyframe, int feature, int id) const {
+double Map::RelativeSigma(const FrameFeatures& features, int keyframe, int feature, int id) const {
   const std::size_t f = static_cast<std::size_t>(feature);
   const double corner = scales_[static_cast<std::size_t>(features.keypoints[f].octave)];
   const Landmark& l = landmark(id);

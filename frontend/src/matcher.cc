@@ -181,8 +181,8 @@ int MatchToKeyframe(const Map& map, const Keyframe& keyframe, FrameMatches* curr
       [&](std::size_t m) { current->landmarks[matched[m]] = -1; });
 }
 
-std::vector<std::pair<int, int>> MatchTwoViews(const Features& first, const Features& second, float radius_px,
-                                               std::vector<cv::Point2f>* centres) {
+std::vector<std::pair<int, int>> MatchTwoViews(const FrameFeatures& first, const FrameFeatures& second,
+                                               float radius_px, std::vector<cv::Point2f>* centres) {
   std::vector<int> source(second.size(), -1), taken(second.size(), std::numeric_limits<int>::max());
   std::vector<int> near;
   for (std::size_t i = 0; i < first.size(); ++i) {

@@ -17,7 +17,7 @@ constexpr int kLooseDistance = 100;
 
 /// Features of a frame that is being tracked.
 struct FrameMatches {
-  const Features* features = nullptr;
+  const FrameFeatures* features = nullptr;
   std::vector<int> landmarks;  ///< per feature: landmark id or -1
 };
 
@@ -37,8 +37,8 @@ int MatchToKeyframe(const Map& map, const Keyframe& keyframe, FrameMatches* curr
 
 /// Mono initialisation: pairs (feature of first, feature of second) near `centres` (one per feature of first;
 /// updated).
-std::vector<std::pair<int, int>> MatchTwoViews(const Features& first, const Features& second, float radius_px,
-                                               std::vector<cv::Point2f>* centres);
+std::vector<std::pair<int, int>> MatchTwoViews(const FrameFeatures& first, const FrameFeatures& second,
+                                               float radius_px, std::vector<cv::Point2f>* centres);
 
 /// Pairs of features without landmark that agree with the epipolar geometry of two keyframes.
 std::vector<std::pair<int, int>> MatchEpipolar(const Map& map, const PinholeCamera& camera,

@@ -7,7 +7,7 @@
 namespace tutti {
 
 /// A point as a feature sees it. `pixel_sigma`: of the feature [px].
-inline PointObservation Measured(const Features& features, int feature, const Eigen::Vector3d& point,
+inline PointObservation Measured(const FrameFeatures& features, int feature, const Eigen::Vector3d& point,
                                  double pixel_sigma) {
   const std::size_t f = static_cast<std::size_t>(feature);
   PointObservation o;
@@ -21,7 +21,7 @@ inline PointObservation Measured(const Features& features, int feature, const Ei
 
 /// A landmark as a feature sees it. `view`: which feature, keyframe -1 for a frame that is none.
 /// `pixel_sigma`: of a corner at level 0 (OdometryOptions).
-inline PointObservation Measured(const Map& map, const Features& features, const Observation& view,
+inline PointObservation Measured(const Map& map, const FrameFeatures& features, const Observation& view,
                                  int landmark, double pixel_sigma) {
   return Measured(features, view.feature, map.landmark(landmark).position,
                   pixel_sigma * map.RelativeSigma(features, view.keyframe, view.feature, landmark));

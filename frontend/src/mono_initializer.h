@@ -15,7 +15,7 @@ namespace tutti {
 struct TrackedFrame {
   std::int64_t index = 0;
   double stamp_s = 0;
-  std::shared_ptr<const Features> features;
+  std::shared_ptr<const FrameFeatures> features;
 };
 
 /// Value type.

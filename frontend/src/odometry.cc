@@ -78,8 +78,8 @@ Odometry::Odometry(Odometry&&) noexcept = default;
 Odometry& Odometry::operator=(Odometry&&) noexcept = default;
 Odometry::~Odometry() = default;
 
-std::shared_ptr<const Features> Odometry::Extract(const InputFrame& frame) const {
-  return std::make_shared<const Features>(ExtractFeatures(frame, impl_->rig, impl_->options));
+std::shared_ptr<const FrameFeatures> Odometry::Extract(const InputFrame& frame) const {
+  return std::make_shared<const FrameFeatures>(ExtractFeatures(frame, impl_->rig, impl_->options));
 }
 
 TrackResult Odometry::Track(const InputFrame& frame) { return impl_->Track(frame); }

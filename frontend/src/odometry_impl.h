@@ -75,7 +75,7 @@ class Odometry::Impl {
     double Share() const {
       return inliers / std::max(1.0, static_cast<double>(std::min(visible.size(), extracted->size())));
     }
-    std::shared_ptr<const Features> extracted;
+    std::shared_ptr<const FrameFeatures> extracted;
     TrackedFrame frame;  // with features that are aligned with their landmarks
     FrameMatches matches;
     Pose T_camera_world;
@@ -125,7 +125,7 @@ class Odometry::Impl {
   std::int64_t frames_since_keyframe_ = 0;
   // The last tracked frame.
   FrameMatches last_matches_;
-  std::shared_ptr<const Features> last_features_;
+  std::shared_ptr<const FrameFeatures> last_features_;
   Pose last_T_camera_world_;
   double last_stamp_ = 0;
   Vector6d velocity_ = Vector6d::Zero();  // of T_camera_world, per second: T_now = Exp(v dt) T_last

@@ -113,7 +113,8 @@ bool Fit(const Template& t, const cv::Mat& image, float* x, float* y) {
 
 }  // namespace
 
-std::shared_ptr<const Patch> CutPatch(const PinholeCamera& camera, const Features& features, int feature) {
+std::shared_ptr<const Patch> CutPatch(const PinholeCamera& camera, const FrameFeatures& features,
+                                      int feature) {
   const cv::KeyPoint& k = features.keypoints[static_cast<std::size_t>(feature)];
   const std::size_t level = static_cast<std::size_t>(k.octave);
   if (!features.pyramid || level >= features.pyramid->size()) return nullptr;
@@ -136,7 +137,7 @@ std::shared_ptr<const Patch> CutPatch(const PinholeCamera& camera, const Feature
   return patch;
 }
 
-std::optional<Eigen::Vector2d> AlignPatch(const Patch& patch, const Features& frame,
+std::optional<Eigen::Vector2d> AlignPatch(const Patch& patch, const FrameFeatures& frame,
                                           const Eigen::Matrix2d& A_frame_patch,
                                           const Eigen::Vector2d& start) {
   if (!frame.pyramid || frame.pyramid->empty()) return std::nullopt;
@@ -182,10 +183,11 @@ std::optional<Eigen::Matrix2d> PatchToFrame(const Map& map, const PinholeCamera&
 
 }  // namespace
 
-std::shared_ptr<const Features> AlignFeatures(const Map& map, const PinholeCamera& camera,
-                                              const Pose& T_camera_world, const std::vector<int>& landmarks,
-                                              const Features& features) {
-  std::shared_ptr<Features> moved;
+std::shared_ptr<const FrameFeatures> AlignFeatures(const Map& map, const PinholeCamera& camera,
+                                                   const Pose& T_camera_world,
+                                                   const std::vector<int>& landmarks,
+                                                   const FrameFeatures& features) {
+  std::shared_ptr<FrameFeatures> moved;
   if (!features.pyramid) return moved;
   for (std::size_t f = 0; f < landmarks.size(); ++f) {
     if (landmarks[f] < 0) continue;
@@ -197,7 +199,7 @@ std::shared_ptr<const Features> AlignFeatures(const Map& map, const PinholeCamer
     const std::optional<Eigen::Vector2d> found =
         AlignPatch(*l.patch, features, *A, LensError::Uncorrect(camera, features.lens, {at.x, at.y}));
     if (!found) continue;
-    if (!moved) moved = std::make_shared<Features>(features);
+    if (!moved) moved = std::make_shared<FrameFeatures>(features);
     moved->aligned[f] = landmarks[f];
     const Eigen::Vector2d to = LensError::Correct(camera, features.lens, *found);
     moved->keypoints[f].pt = cv::Point2f(static_cast<float>(to.x()), static_cast<float>(to.y()));

@@ -18,19 +18,21 @@ namespace tutti {
 
 /// Cuts the patch around a feature out of its frame's pyramid; null where it would reach beyond the image or
 /// the frame has no pyramid.
-std::shared_ptr<const Patch> CutPatch(const PinholeCamera& camera, const Features& features, int feature);
+std::shared_ptr<const Patch> CutPatch(const PinholeCamera& camera, const FrameFeatures& features,
+                                      int feature);
 
 /// Position [px, level 0] of `patch` in a frame. `A_frame_patch`: how offsets in the patch's keyframe map to
 /// offsets in the frame, in pixels of level 0. `start`: where the frame has the feature [px, level 0]. None
 /// if the patch does not look alike there, or is found elsewhere.
-std::optional<Eigen::Vector2d> AlignPatch(const Patch& patch, const Features& frame,
+std::optional<Eigen::Vector2d> AlignPatch(const Patch& patch, const FrameFeatures& frame,
                                           const Eigen::Matrix2d& A_frame_patch, const Eigen::Vector2d& start);
 
 /// Finds landmarks precisely in a frame whose pose is about known: for each feature with a landmark (-1:
 /// none) moves the keypoint. `T_camera_world`: of the frame. Returns the moved features, or null where
 /// nothing moved.
-std::shared_ptr<const Features> AlignFeatures(const Map& map, const PinholeCamera& camera,
-                                              const Pose& T_camera_world, const std::vector<int>& landmarks,
-                                              const Features& features);
+std::shared_ptr<const FrameFeatures> AlignFeatures(const Map& map, const PinholeCamera& camera,
+                                                   const Pose& T_camera_world,
+                                                   const std::vector<int>& landmarks,
+                                                   const FrameFeatures& features);
 
 }  // namespace tutti

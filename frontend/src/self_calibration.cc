@@ -15,8 +15,8 @@ SelfCalibration::SelfCalibration(const OdometryOptions& options, const CameraRig
   remaining_.information = first_;
 }
 
-std::shared_ptr<const Features> SelfCalibration::Correct(
-    const std::shared_ptr<const Features>& features) const {
+std::shared_ptr<const FrameFeatures> SelfCalibration::Correct(
+    const std::shared_ptr<const FrameFeatures>& features) const {
   if (applied_.isZero()) return features;
   return Moved(*features);
 }
@@ -54,8 +54,8 @@ double SelfCalibration::LargestMove(const Eigen::Vector2d& lens) const {
   return largest;
 }
 
-std::shared_ptr<const Features> SelfCalibration::Moved(const Features& features) const {
-  auto moved = std::make_shared<Features>(features);
+std::shared_ptr<const FrameFeatures> SelfCalibration::Moved(const FrameFeatures& features) const {
+  auto moved = std::make_shared<FrameFeatures>(features);
   for (cv::KeyPoint& k : moved->keypoints) {
     const Eigen::Vector2d raw = LensError::Uncorrect(camera_, features.lens, {k.pt.x, k.pt.y});
     const Eigen::Vector2d to = LensError::Correct(camera_, applied_, raw);

@@ -23,7 +23,7 @@ class SelfCalibration {
 
   bool Enabled() const { return enabled_; }
   /// The features as a lens without error would have seen them, by what is known so far.
-  std::shared_ptr<const Features> Correct(const std::shared_ptr<const Features>& features) const;
+  std::shared_ptr<const FrameFeatures> Correct(const std::shared_ptr<const FrameFeatures>& features) const;
   /// What is not taken out of the features yet: the prior of the next bundle adjustment.
   const LensError& Remaining() const { return remaining_; }
   /// Takes over what a bundle adjustment found that moved so many `keyframes`. Where that moves features by a
@@ -34,7 +34,7 @@ class SelfCalibration {
 
  private:
   double LargestMove(const Eigen::Vector2d& lens) const;
-  std::shared_ptr<const Features> Moved(const Features& features) const;
+  std::shared_ptr<const FrameFeatures> Moved(const FrameFeatures& features) const;
 
   PinholeCamera camera_;
   bool enabled_ = false;

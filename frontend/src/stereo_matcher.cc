@@ -154,8 +154,8 @@ bool Refine(const cv::Mat& left, const cv::Mat& right, const cv::Point2f& scale,
 }  // namespace
 
 void MatchStereo(const std::vector<cv::Mat>& left_pyramid, const std::vector<cv::Mat>& right_pyramid,
-                 const Features& right, const CameraRig& rig, const OdometryOptions& options,
-                 Features* left) {
+                 const FrameFeatures& right, const CameraRig& rig, const OdometryOptions& options,
+                 FrameFeatures* left) {
   const std::vector<float> scales = PyramidScales(options);
   const int rows = left_pyramid[0].rows;
   const double fb = rig.camera.fx * rig.baseline_m;

@@ -11,6 +11,7 @@ namespace tutti {
 /// keypoint by a least-squares fit of a slanted surface on the feature's pyramid level. Fills inverse_depth,
 /// its sigma, row_error_px and stereo_matches.
 void MatchStereo(const std::vector<cv::Mat>& left_pyramid, const std::vector<cv::Mat>& right_pyramid,
-                 const Features& right, const CameraRig& rig, const OdometryOptions& options, Features* left);
+                 const FrameFeatures& right, const CameraRig& rig, const OdometryOptions& options,
+                 FrameFeatures* left);
 
 }  // namespace tutti

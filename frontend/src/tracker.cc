@@ -20,7 +20,7 @@ TrackResult Odometry::Impl::Track(const InputFrame& input) {
   TrackedFrame frame{input.index, input.stamp_s, input.features};
   if (!frame.features) {
     const ScopedStopwatch watch(&stages, Lane::kTracking, "extract");
-    frame.features = std::make_shared<const Features>(ExtractFeatures(input, rig, options));
+    frame.features = std::make_shared<const FrameFeatures>(ExtractFeatures(input, rig, options));
   }
   frame.features = mapper_.lens().Correct(frame.features);
   if (rig.sensor == Sensor::kStereo) {

@@ -30,7 +30,7 @@ struct World {
     for (int k = 0; k < kKeyframes; ++k) {
       const Pose T_world_camera(ExpSO3({0, 0.02 * k, 0.01 * k}), {0.5 * k, 0.05 * k, 0.1 * k});
       truth.push_back(T_world_camera);
-      auto features = std::make_shared<Features>();
+      auto features = std::make_shared<FrameFeatures>();
       features->descriptors = cv::Mat::zeros(kPoints, 32, CV_8U);
       for (const Eigen::Vector3d& point : points) {
         const Eigen::Vector3d p = T_world_camera.Inverse() * point;
@@ -110,7 +110,7 @@ TEST(BundleAdjustment, FixedKeyframesStayWhereTheyAre) {
 
 TEST(BundleAdjustment, WrongMatchesAreRemoved) {
   World world(false);
-  auto features = std::make_shared<Features>(*world.map.keyframe(4).features);
+  auto features = std::make_shared<FrameFeatures>(*world.map.keyframe(4).features);
   for (int i = 0; i < 5; ++i) features->keypoints[static_cast<std::size_t>(i)].pt += cv::Point2f(40, -30);
   world.map.keyframe(4).features = features;
   world.Disturb({2, 3, 4});
@@ -138,7 +138,7 @@ TEST(BundleAdjustment, NothingToAdjustIsNoCrash) {
   EXPECT_FALSE(AdjustWindow(Camera(), {}, {0, 1}, Options(false), &world.map).usable);
   Map empty({1.0F});
   Keyframe lonely;
-  lonely.features = std::make_shared<Features>();
+  lonely.features = std::make_shared<FrameFeatures>();
   empty.AddKeyframe(lonely);
   EXPECT_FALSE(AdjustLocally(Camera(), 0, Options(true), &empty).usable);
 }

@@ -19,7 +19,7 @@ cv::Mat Town() {
   return SyntheticWorld(options).Render(3).image;
 }
 
-Features Detect(const cv::Mat& image, const OdometryOptions& options = {}) {
+FrameFeatures Detect(const cv::Mat& image, const OdometryOptions& options = {}) {
   return ExtractOrb(BuildPyramid(image, options), options);
 }
 
@@ -42,16 +42,16 @@ TEST(HammingDistance, CountsDifferingBits) {
   EXPECT_EQ(HammingDistance(a.data(), b.data()), 4);
 }
 
-TEST(Features, ScalesAreAGeometricSeries) {
+TEST(FrameFeatures, ScalesAreAGeometricSeries) {
   const std::vector<float> scales = PyramidScales(OdometryOptions());
   ASSERT_EQ(scales.size(), 8U);
   EXPECT_FLOAT_EQ(scales[0], 1.0F);
   EXPECT_FLOAT_EQ(scales[7], std::pow(1.2F, 7.0F));
 }
 
-TEST(Features, BlankImagesHaveNone) {
+TEST(FrameFeatures, BlankImagesHaveNone) {
   for (const int grey : {0, 128, 255}) {
-    const Features features = Detect(cv::Mat(240, 320, CV_8UC1, cv::Scalar(grey)));
+    const FrameFeatures features = Detect(cv::Mat(240, 320, CV_8UC1, cv::Scalar(grey)));
     EXPECT_EQ(features.size(), 0U);
     std::vector<int> found{1};
     features.InArea({100, 100}, 1000, 0, 7, &found);
@@ -59,24 +59,24 @@ TEST(Features, BlankImagesHaveNone) {
   }
 }
 
-TEST(Features, ImagesTooSmallForADescriptorHaveNone) {
+TEST(FrameFeatures, ImagesTooSmallForADescriptorHaveNone) {
   cv::RNG rng(3);
   for (const cv::Size size :
        {cv::Size(1, 1), cv::Size(5, 200), cv::Size(200, 5), cv::Size(38, 38), cv::Size(41, 39)}) {
     cv::Mat noise(size, CV_8UC1);
     rng.fill(noise, cv::RNG::UNIFORM, 0, 256);
-    const Features features = Detect(noise);
+    const FrameFeatures features = Detect(noise);
     EXPECT_LT(features.size(), 10U) << size;
     EXPECT_EQ(features.descriptors.rows, static_cast<int>(features.size()));
   }
   EXPECT_EQ(Detect(cv::Mat()).size(), 0U);
 }
 
-TEST(Features, NumberIsWhatWasAskedForAndEveryPartOfTheImageHasSome) {
+TEST(FrameFeatures, NumberIsWhatWasAskedForAndEveryPartOfTheImageHasSome) {
   const cv::Mat image = Town();
   OdometryOptions options;
   options.features = 800;
-  const Features features = Detect(image, options);
+  const FrameFeatures features = Detect(image, options);
   EXPECT_LE(features.size(), 800U);
   EXPECT_GT(features.size(), 600U);
   ASSERT_EQ(features.descriptors.rows, static_cast<int>(features.size()));
@@ -94,9 +94,9 @@ TEST(Features, NumberIsWhatWasAskedForAndEveryPartOfTheImageHasSome) {
   for (const int count : parts) EXPECT_GT(count, 20);
 }
 
-TEST(Features, SameImageGivesTheSameBits) {
+TEST(FrameFeatures, SameImageGivesTheSameBits) {
   const cv::Mat image = Town();
-  const Features a = Detect(image), b = Detect(image.clone());
+  const FrameFeatures a = Detect(image), b = Detect(image.clone());
   ASSERT_EQ(a.size(), b.size());
   for (std::size_t i = 0; i < a.size(); ++i) {
     EXPECT_EQ(a.keypoints[i].pt, b.keypoints[i].pt);
@@ -105,8 +105,8 @@ TEST(Features, SameImageGivesTheSameBits) {
   EXPECT_EQ(cv::norm(a.descriptors, b.descriptors, cv::NORM_INF), 0);
 }
 
-TEST(Features, ACornerHasOnePlaceOnAllPyramidLevels) {
-  const Features features = Detect(Square());
+TEST(FrameFeatures, ACornerHasOnePlaceOnAllPyramidLevels) {
+  const FrameFeatures features = Detect(Square());
   const std::vector<float> scales = PyramidScales(OdometryOptions());
   std::array<int, 8> seen{};
   for (const cv::KeyPoint& k : features.keypoints) {
@@ -122,8 +122,8 @@ TEST(Features, ACornerHasOnePlaceOnAllPyramidLevels) {
 }
 
 // The mean over the four corners of the square is its centre, whatever a corner detector does at a corner.
-TEST(Features, PyramidLevelsHaveNoOffset) {
-  const Features features = Detect(Square());
+TEST(FrameFeatures, PyramidLevelsHaveNoOffset) {
+  const FrameFeatures features = Detect(Square());
   for (int octave = 0; octave < 8; ++octave) {
     cv::Point2d sum(0, 0);
     int n = 0;
@@ -138,8 +138,8 @@ TEST(Features, PyramidLevelsHaveNoOffset) {
   }
 }
 
-TEST(Features, AreaSearchFindsWhatLooksAtEveryFeatureFind) {
-  const Features features = Detect(Town());
+TEST(FrameFeatures, AreaSearchFindsWhatLooksAtEveryFeatureFind) {
+  const FrameFeatures features = Detect(Town());
   cv::RNG rng(5);
   std::vector<int> found;
   for (int trial = 0; trial < 200; ++trial) {
@@ -161,20 +161,20 @@ TEST(Features, AreaSearchFindsWhatLooksAtEveryFeatureFind) {
 
 class DepthImageTest : public ::testing::Test {
  protected:
-  Features WithDepth(const cv::Mat& depth) const {
+  FrameFeatures WithDepth(const cv::Mat& depth) const {
     InputFrame frame;
     frame.image = Square();
     frame.depth_m = depth;
     return ExtractFeatures(frame, rig_, OdometryOptions());
   }
-  static std::ptrdiff_t Known(const Features& f) {
+  static std::ptrdiff_t Known(const FrameFeatures& f) {
     return std::count_if(f.inverse_depth.begin(), f.inverse_depth.end(), [](float d) { return d != 0; });
   }
   CameraRig rig_;
 };
 
 TEST_F(DepthImageTest, FlatDepthIsTakenOverWithItsDeviation) {
-  const Features features = WithDepth(cv::Mat(240, 240, CV_32FC1, cv::Scalar(4.0)));
+  const FrameFeatures features = WithDepth(cv::Mat(240, 240, CV_32FC1, cv::Scalar(4.0)));
   ASSERT_GT(features.size(), 4U);
   for (std::size_t i = 0; i < features.size(); ++i) {
     EXPECT_FLOAT_EQ(features.inverse_depth[i], 0.25F);
@@ -185,7 +185,7 @@ TEST_F(DepthImageTest, FlatDepthIsTakenOverWithItsDeviation) {
 TEST_F(DepthImageTest, NonsenseIsNoDepth) {
   for (const float z : {0.0F, -3.0F, 0.01F, std::numeric_limits<float>::quiet_NaN(),
                         std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity()}) {
-    const Features features = WithDepth(cv::Mat(240, 240, CV_32FC1, cv::Scalar(double(z))));
+    const FrameFeatures features = WithDepth(cv::Mat(240, 240, CV_32FC1, cv::Scalar(double(z))));
     EXPECT_EQ(Known(features), 0) << z;
     for (const float d : features.inverse_depth) EXPECT_TRUE(std::isfinite(d)) << z;
   }

@@ -7,7 +7,7 @@ namespace {
 
 // A keyframe with `count` features in octave 0, each with a descriptor full of `fill`.
 Keyframe MakeKeyframe(double x, int count = 20, std::uint8_t fill = 0) {
-  auto features = std::make_shared<Features>();
+  auto features = std::make_shared<FrameFeatures>();
   features->keypoints.assign(static_cast<std::size_t>(count), cv::KeyPoint(10.0F, 10.0F, 31.0F));
   for (cv::KeyPoint& keypoint : features->keypoints) keypoint.octave = 0;
   features->descriptors = cv::Mat(count, 32, CV_8U, cv::Scalar(fill));

@@ -24,7 +24,7 @@ class MatcherTest : public ::testing::Test, protected testing::PointScene {
     return count;
   }
 
-  static FrameMatches Unmatched(const Features& features) {
+  static FrameMatches Unmatched(const FrameFeatures& features) {
     return {&features, std::vector<int>(features.size(), -1)};
   }
 
@@ -165,7 +165,7 @@ TEST_F(MatcherTest, FusionFindsLandmarksWhereTheyHaveNoFeatureYet) {
 }
 
 TEST_F(MatcherTest, EmptyFramesAndMapsMatchNothing) {
-  const auto empty = std::make_shared<Features>();
+  const auto empty = std::make_shared<FrameFeatures>();
   empty->BuildGrid(camera_.width, camera_.height);
   FrameMatches none{empty.get(), {}};
   std::vector<int> visible, order;

@@ -22,8 +22,8 @@ cv::Mat Texture() {
 }
 
 // One feature at `at`.
-Features Frame(const cv::Mat& image, const Eigen::Vector2d& at) {
-  Features features;
+FrameFeatures Frame(const cv::Mat& image, const Eigen::Vector2d& at) {
+  FrameFeatures features;
   features.keypoints.emplace_back(static_cast<float>(at.x()), static_cast<float>(at.y()), 31.0F);
   features.keypoints[0].octave = 0;
   features.descriptors = cv::Mat::zeros(1, 32, CV_8U);
@@ -45,7 +45,7 @@ TEST(PatchAligner, FindsAShiftToATenthOfAPixel) {
   const auto patch = CutPatch(kCamera, Frame(Texture(), kPoint), 0);
   ASSERT_NE(patch, nullptr);
   const Eigen::Vector2d shift(3.4, -1.7), truth = kPoint + shift;
-  const Features frame = Frame(Moved(Texture(), 1, shift), truth);
+  const FrameFeatures frame = Frame(Moved(Texture(), 1, shift), truth);
   const auto found =
       AlignPatch(*patch, frame, Eigen::Matrix2d::Identity(), truth + Eigen::Vector2d(1.0, -0.8));
   ASSERT_TRUE(found.has_value());
@@ -84,12 +84,12 @@ TEST(PatchAligner, MovesTheKeypointsOfLandmarksAndTrustsThemMore) {
   Map map(PyramidScales(OdometryOptions()), kCamera, 0.5);
   const Pose T_world_second(Eigen::Quaterniond::Identity(), {0.1, 0, 0});
   Keyframe keyframe;
-  keyframe.features = std::make_shared<const Features>(Frame(Texture(), kPoint));
+  keyframe.features = std::make_shared<const FrameFeatures>(Frame(Texture(), kPoint));
   map.AddKeyframe(keyframe);
   const Eigen::Vector3d position = 5.0 * kCamera.Unproject(kPoint);
   const int landmark = map.AddLandmark(position, 0, 0);
   const Eigen::Vector2d truth = kCamera.Project(T_world_second.Inverse() * position);
-  const Features frame = Frame(Moved(Texture(), 1, truth - kPoint), truth + Eigen::Vector2d(1.1, 0.6));
+  const FrameFeatures frame = Frame(Moved(Texture(), 1, truth - kPoint), truth + Eigen::Vector2d(1.1, 0.6));
   const auto moved = AlignFeatures(map, kCamera, T_world_second.Inverse(), {landmark}, frame);
   ASSERT_NE(moved, nullptr);
   const cv::Point2f& at = moved->keypoints[0].pt;

@@ -26,8 +26,8 @@ class PointScene {
   }
 
   // What a camera sees: feature i is point order[i]; points outside the image are left out.
-  std::shared_ptr<Features> See(const Pose& T_world_camera, std::vector<int>* order) const {
-    auto features = std::make_shared<Features>();
+  std::shared_ptr<FrameFeatures> See(const Pose& T_world_camera, std::vector<int>* order) const {
+    auto features = std::make_shared<FrameFeatures>();
     const Pose T_camera_world = T_world_camera.Inverse();
     order->clear();
     for (int i = kPoints - 1; i >= 0; --i) {

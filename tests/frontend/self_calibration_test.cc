@@ -14,8 +14,8 @@ CameraRig Rig(Sensor sensor) {
   return rig;
 }
 
-std::shared_ptr<const Features> OneFeature(float x, float y) {
-  auto features = std::make_shared<Features>();
+std::shared_ptr<const FrameFeatures> OneFeature(float x, float y) {
+  auto features = std::make_shared<FrameFeatures>();
   features->keypoints.emplace_back(x, y, 31.0F);
   features->BuildGrid(640, 480);
   return features;

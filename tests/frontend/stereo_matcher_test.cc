@@ -23,7 +23,7 @@ CameraRig Rig(int width, int height) {
   return rig;
 }
 
-Features Extract(const CameraRig& rig, const cv::Mat& left, const cv::Mat& right) {
+FrameFeatures Extract(const CameraRig& rig, const cv::Mat& left, const cv::Mat& right) {
   InputFrame frame;
   frame.image = left;
   frame.right = right;
@@ -83,7 +83,7 @@ double Spread(std::vector<double> v) {
   return std::sqrt(squares / n - sum * sum / n / n);
 }
 
-std::vector<double> DisparityErrors(const Features& features, const CameraRig& rig, double d0, double dx,
+std::vector<double> DisparityErrors(const FrameFeatures& features, const CameraRig& rig, double d0, double dx,
                                     double dy) {
   std::vector<double> errors;
   for (std::size_t i = 0; i < features.size(); ++i) {
@@ -148,7 +148,7 @@ TEST(StereoMatcher, DisparityIsUnbiasedOnEveryPyramidLevelOfTheTown) {
   for (std::size_t i = 0; i < 12; ++i) {
     const SyntheticFrame frame = world.Render(i * 17);
     const cv::Mat depth = world.ExactDepth(i * 17);
-    const Features features = Extract(rig, frame.image, frame.right);
+    const FrameFeatures features = Extract(rig, frame.image, frame.right);
     EXPECT_LT(features.row_error_px, 0.1) << i;
     EXPECT_GT(features.stereo_matches, 500) << i;
     for (std::size_t f = 0; f < features.size(); ++f) {
@@ -200,7 +200,7 @@ TEST(StereoMatcher, ViewsOfDifferentPlacesHaveHardlyAMatch) {
   const cv::Mat left = LeftView(480, 240);
   cv::Mat other;
   cv::rotate(left, other, cv::ROTATE_180);
-  const Features features = Extract(rig, left, other);
+  const FrameFeatures features = Extract(rig, left, other);
   ASSERT_GT(features.size(), 400U);
   EXPECT_LT(features.stereo_matches, static_cast<int>(features.size() / 20));
 }
@@ -209,7 +209,7 @@ TEST(StereoMatcher, BlankOrTinyRightImageGivesFeaturesWithoutDepth) {
   const CameraRig rig = Rig(480, 240);
   const cv::Mat left = LeftView(480, 240);
   for (const int grey : {0, 128, 255}) {
-    const Features features = Extract(rig, left, cv::Mat(left.size(), CV_8UC1, cv::Scalar(grey)));
+    const FrameFeatures features = Extract(rig, left, cv::Mat(left.size(), CV_8UC1, cv::Scalar(grey)));
     EXPECT_GT(features.size(), 400U);
     EXPECT_EQ(features.stereo_matches, 0);
     EXPECT_EQ(std::count(features.inverse_depth.begin(), features.inverse_depth.end(), 0.0F),

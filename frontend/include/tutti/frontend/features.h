@@ -21,7 +21,7 @@ namespace tutti {
 int HammingDistance(const std::uint8_t* a, const std::uint8_t* b);
 
 /// Features of one rectified frame. N features.
-struct Features {
+struct FrameFeatures {
   std::vector<cv::KeyPoint> keypoints;             ///< N, level-0 pixels, with octave and angle [deg]
   cv::Mat descriptors;                             ///< N x 32, CV_8U
   std::vector<float> inverse_depth;                ///< N [1/m]; 0 where unknown
@@ -54,7 +54,7 @@ struct Features {
 };
 
 /// A copy that holds no images.
-std::shared_ptr<const Features> WithoutImages(const Features& features);
+std::shared_ptr<const FrameFeatures> WithoutImages(const FrameFeatures& features);
 
 /// Scale of each pyramid level: level 0 has 1, level l scale_factor^l.
 std::vector<float> PyramidScales(const OdometryOptions& options);
@@ -63,10 +63,10 @@ std::vector<float> PyramidScales(const OdometryOptions& options);
 std::vector<cv::Mat> BuildPyramid(const cv::Mat& image, const OdometryOptions& options);
 
 /// Detects and describes features of one 8-bit grey image; no depth. Blank or tiny images give none.
-Features ExtractOrb(const std::vector<cv::Mat>& pyramid, const OdometryOptions& options);
+FrameFeatures ExtractOrb(const std::vector<cv::Mat>& pyramid, const OdometryOptions& options);
 
 /// Everything for one frame of the rig: features of the (left) image, and depth from the depth image or from
 /// the right image (descriptor search along the row, then a least-squares fit). Pure: may run on any thread.
-Features ExtractFeatures(const InputFrame& frame, const CameraRig& rig, const OdometryOptions& options);
+FrameFeatures ExtractFeatures(const InputFrame& frame, const CameraRig& rig, const OdometryOptions& options);
 
 }  // namespace tutti

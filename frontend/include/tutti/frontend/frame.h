@@ -12,7 +12,7 @@
 
 namespace tutti {
 
-struct Features;
+struct FrameFeatures;
 
 enum class Sensor { kMono, kStereo, kRgbd };
 
@@ -34,7 +34,8 @@ struct InputFrame {
   cv::Mat image;           ///< CV_8UC1, left (or only) camera
   cv::Mat right;           ///< stereo: CV_8UC1, same size as image; else empty
   cv::Mat depth_m;         ///< RGB-D: CV_32FC1 [m], registered to image, 0 = no measurement; else empty
-  std::shared_ptr<const Features> features;  ///< optional: Odometry::Extract's result, made on another thread
+  std::shared_ptr<const FrameFeatures>
+      features;  ///< optional: Odometry::Extract's result, made on another thread
 };
 
 }  // namespace tutti

@@ -54,7 +54,7 @@ struct Keyframe {
   double stamp_s = 0;
   int piece = 0;  ///< map piece
   Pose T_world_camera;
-  std::shared_ptr<const Features> features;
+  std::shared_ptr<const FrameFeatures> features;
   std::vector<int> landmarks;    ///< per feature: landmark id or -1
   std::map<int, int> covisible;  ///< other keyframe -> number of common landmarks
 };
@@ -77,7 +77,7 @@ class Map {
   void Merge(int loser, int winner);
   /// Standard deviation of a feature as a view of a landmark, where a corner's at level 0 is 1; `keyframe`:
   /// -1 for a frame that is none.
-  double RelativeSigma(const Features& features, int keyframe, int feature, int landmark) const;
+  double RelativeSigma(const FrameFeatures& features, int keyframe, int feature, int landmark) const;
   /// Recomputes descriptor, viewing direction and distances of a landmark.
   void UpdateLandmark(int landmark);
   /// Viewing direction and distances alone, after keyframes or the landmark have moved.

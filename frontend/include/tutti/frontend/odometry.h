@@ -64,7 +64,7 @@ class Odometry {
 
   /// Features of a frame, the part of Track that needs nothing from before: pure, safe on any thread. Put the
   /// result into InputFrame::features to take the work off Track's thread.
-  std::shared_ptr<const Features> Extract(const InputFrame& frame) const;
+  std::shared_ptr<const FrameFeatures> Extract(const InputFrame& frame) const;
 
   /// Tracks the next frame; frames come in order of time. Never throws for hard images.
   TrackResult Track(const InputFrame& frame);

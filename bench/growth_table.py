@@ -67,7 +67,8 @@ def document(free, limited, saving, limit, remark):
     lines += ["", f"At {last['locations']:,.0f} locations filter and vocabulary take "
               f"{last['quantise_ms'] + last['likelihood_ms'] + last['filter_ms']:.1f} ms "
               f"({last['cpu_ms']:.1f} ms of processor time with all else). One location in working memory takes "
-              f"{kb_per_location(free):.0f} KB, features for verification included.", "",
+              f"{kb_per_location(free):.0f} KB, features for verification included. Nearly all of the time goes into the "
+              "search for words: [results/index.md](results/index.md) has other indices beside it.", "",
               f"## Working memory of {limit:,}, every image stored in a file", ""]
     lines += table(limited)
     lines += ["", f"The last 1,000 images against the 1,000 after the limit was reached: "

@@ -39,7 +39,7 @@ enum class MemoryKind {
 /// Who searches the words of float descriptors (descriptor_index.h).
 enum class FloatIndex {
   kForest,  ///< kd-trees of our own, by FLANN's rules
-  kFlann,   ///< FLANN's: much the same answers, slower from a few thousand words on
+  kFlann,   ///< FLANN's: much the same answers, several times slower (docs/results/index.md)
 };
 
 /// Options of the features that each member takes from an image.

@@ -200,6 +200,9 @@ async function drawPosterior(panel) {
   if (!p) return panel.append(note('This run asked no loop detector.'));
   const roots = p.maps.map((map) => unpackMap(map, p.cells, rootOf));
   const logs = p.evidence.maps.map((map) => unpackMap(map, p.cells, logOf(p.evidence)));
+  if (!roots.some((rows) => rows.some((row) => row.some((v) => v > 0)))) {
+    return panel.append(note('No image had a place to compare with: the run is so short that all its keyframes were still in short-term memory (`loops.stm_size`).'));
+  }
   await drawOverTime(panel, run);
   const times = [...panel.querySelectorAll('.chart')];
   const watch = await drawOneImage(panel, run, logs, roots);

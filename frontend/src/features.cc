@@ -111,7 +111,8 @@ std::vector<cv::KeyPoint> Spread(std::vector<cv::KeyPoint> corners, const cv::Si
   for (std::size_t i = 0; i < corners.size(); ++i) {
     const int c = std::min(columns - 1, static_cast<int>(corners[i].pt.x / cell));
     const int r = std::min(rows - 1, static_cast<int>(corners[i].pt.y / cell));
-    auto& list = cells[static_cast<std::size_t>(r * columns + c)];
+    const int at = r * columns + c;
+    auto& list = cells[static_cast<std::size_t>(at)];
     if (!list.empty() && corners[i].response < static_cast<float>(threshold)) continue;
     list.push_back(static_cast<int>(i));
   }
@@ -178,7 +179,8 @@ void FrameFeatures::BuildGrid(int width, int height) {
   for (std::size_t i = 0; i < keypoints.size(); ++i) {
     const int c = std::clamp(static_cast<int>(keypoints[i].pt.x) / kCell, 0, columns_ - 1);
     const int r = std::clamp(static_cast<int>(keypoints[i].pt.y) / kCell, 0, rows_ - 1);
-    cell_of[i] = static_cast<std::size_t>(r * columns_ + c);
+    const int cell = r * columns_ + c;
+    cell_of[i] = static_cast<std::size_t>(cell);
     ++first_entry_[cell_of[i] + 1];
   }
   std::partial_sum(first_entry_.begin(), first_entry_.end(), first_entry_.begin());
@@ -201,8 +203,9 @@ void FrameFeatures::InArea(const cv::Point2f& centre, float radius, int first_oc
   if (c0 > c1) return;
   for (int r = r0; r <= r1; ++r) {
     // The cells of a row lie one after the other.
-    const int begin = first_entry_[static_cast<std::size_t>(r * columns_ + c0)],
-              end = first_entry_[static_cast<std::size_t>(r * columns_ + c1 + 1)];
+    const int row = r * columns_, past = row + c1 + 1, first = row + c0;
+    const int begin = first_entry_[static_cast<std::size_t>(first)],
+              end = first_entry_[static_cast<std::size_t>(past)];
     for (int e = begin; e < end; ++e) {
       const Entry& entry = entries_[static_cast<std::size_t>(e)];
       if (entry.octave < first_octave || entry.octave > last_octave) continue;
@@ -220,6 +223,7 @@ std::shared_ptr<const FrameFeatures> WithoutImages(const FrameFeatures& features
 
 std::vector<float> PyramidScales(const OdometryOptions& options) {
   std::vector<float> scales;
+  scales.reserve(static_cast<std::size_t>(std::max(0, options.pyramid_levels)));
   for (int l = 0; l < options.pyramid_levels; ++l) {
     scales.push_back(static_cast<float>(std::pow(options.scale_factor, l)));
   }

@@ -96,6 +96,7 @@ TrackResult Odometry::RelocalizeAt(int keyframe) { return impl_->RelocalizeAt(ke
 
 std::vector<int> Odometry::KeyframeIds() const {
   std::vector<int> ids;
+  ids.reserve(static_cast<std::size_t>(impl_->map().KeyframeCount()));
   for (int id = 0; id < impl_->map().KeyframeCount(); ++id) ids.push_back(id);
   return ids;
 }
@@ -154,6 +155,7 @@ std::vector<int> Odometry::Pieces() const {
   std::map<int, int> frames;
   for (const Impl::FrameRecord& r : impl_->records) ++frames[KeyframePiece(r.reference)];
   std::vector<int> pieces;
+  pieces.reserve(frames.size());
   for (const auto& [piece, count] : frames) pieces.push_back(piece);
   std::stable_sort(pieces.begin(), pieces.end(), [&](int a, int b) { return frames[a] > frames[b]; });
   return pieces;

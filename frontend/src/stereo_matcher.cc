@@ -209,6 +209,7 @@ void MatchStereo(const std::vector<cv::Mat>& left_pyramid, const std::vector<cv:
   // Matches whose windows differ far more than the median's are wrong (Mur-Artal & Tardos, T-RO 2017, section
   // III-A).
   std::vector<float> residuals;
+  residuals.reserve(found.size());
   for (const Found& f : found) residuals.push_back(f.residual);
   std::nth_element(residuals.begin(), residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2),
                    residuals.end());

@@ -14,7 +14,6 @@ namespace tutti {
 
 using internal::ByteReader;
 using internal::ByteWriter;
-using internal::LocationStore;
 using Kind = internal::LocationStore::Kind;
 using State = LocationMemory::State;
 

@@ -186,6 +186,7 @@ void HypothesisSearch::Climb(const View& query, LoopResult& result) const {
   for (const int neighbour : OnThePath(start)) walks.push_back({start, neighbour, 0});
   for (int step = 0; step < kReach && !walks.empty(); ++step) {
     std::vector<int> next;
+    next.reserve(walks.size());
     for (const PathWalk& walk : walks) next.push_back(walk.next);
     TryAll(query, next, result);
     std::vector<PathWalk> going_on;

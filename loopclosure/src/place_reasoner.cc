@@ -86,7 +86,7 @@ CombinedBelief PlaceReasoner::Step(LoopResult& result,
     system->StepJoint();
     for (const Belief* belief : system->Beliefs()) beliefs.push_back(belief);
   }
-  const CombinedBelief combined = Combine(options_.rule, beliefs, options_.propose_threshold, memory());
+  CombinedBelief combined = Combine(options_.rule, beliefs, options_.propose_threshold, memory());
   Explain(combined, result);
   for (auto& system : systems_) system->Learn();
   result.filter_ms = watch.LapMs();
@@ -99,6 +99,7 @@ CombinedBelief PlaceReasoner::Locate(const std::vector<SeenWords>& words) const 
     for (Belief& opinion : system->Opinions(words)) opinions.push_back(std::move(opinion));
   }
   std::vector<const Belief*> beliefs;
+  beliefs.reserve(opinions.size());
   for (const Belief& opinion : opinions) beliefs.push_back(&opinion);
   return Combine(options_.rule, beliefs, 0, memory());
 }

@@ -160,7 +160,20 @@ std::string VariantName(const RunConfig& config) {
 
 nlohmann::ordered_json RunReport(const RunResult& result, const DetectionLog& log,
                                  const std::string& variant) {
-  using namespace report;
+  using report::ConfigurationJson;
+  using report::EdgesJson;
+  using report::ErrorJson;
+  using report::FiguresJson;
+  using report::FindKnownLoops;
+  using report::GalleryJson;
+  using report::Json;
+  using report::KnownLoops;
+  using report::PathJson;
+  using report::PosteriorJson;
+  using report::PrecisionRecallJson;
+  using report::ShownLoop;
+  using report::ShownLoops;
+  using report::TimingJson;
   Similarity align_slam, align_odometry;
   const bool scored = result.evaluation && result.evaluation->slam.valid;
   if (scored) align_slam = align_odometry = result.evaluation->slam.alignment;

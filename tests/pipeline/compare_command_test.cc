@@ -53,7 +53,7 @@ class CollectCommand : public ::testing::Test {
 
 TEST_F(CollectCommand, MeansIntervalsAndThePairedTestOverSeeds) {
   for (int seed = 1; seed <= 3; ++seed) {
-    Summary("odometry", seed, seed);                        // 1, 2, 3
+    Summary("odometry", seed, seed);                         // 1, 2, 3
     Summary("joint", seed, 0.5 * seed - 0.1 * (seed == 2));  // 0.5, 0.9, 1.5
   }
   const fs::path file = folder_ / "c.json";

@@ -59,10 +59,10 @@ class LoopWorker {
   std::vector<std::pair<std::int64_t, std::int64_t>> unlinked_;  // guarded by mutex_: for the next task
   std::deque<Task> tasks_;                                       // guarded by mutex_
   std::deque<Outcome> outcomes_;                                 // guarded by mutex_
-  bool busy_ = false;              // guarded by mutex_: the detector is in use
-  bool stop_ = false;              // guarded by mutex_
-  double waited_ms_ = 0;           // of the caller's thread only
-  std::thread thread_;             // last: starts when everything else is there
+  bool busy_ = false;                                            // guarded by mutex_: the detector is in use
+  bool stop_ = false;                                            // guarded by mutex_
+  double waited_ms_ = 0;                                         // of the caller's thread only
+  std::thread thread_;                                           // last: starts when everything else is there
 };
 
 }  // namespace tutti

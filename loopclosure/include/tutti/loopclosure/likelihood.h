@@ -19,11 +19,11 @@ class ByteWriter;
 /// What a member sees in an image: its words and where they were seen, the cell of each feature in a grid of
 /// kColumns cells along the longer side of the image; or, a dense member, its descriptor.
 struct SeenWords {
-  static constexpr int kColumns = 8;
+  static constexpr int kColumns = 8;       ///< cells along the longer side
   static constexpr int kStripColumns = 2;  ///< that make an upright strip of the image
-  std::vector<int> words;  ///< one for each feature; -1: not known
-  std::vector<int> cells;  ///< likewise
-  cv::Mat descriptor;      ///< of a dense member, in place of words: 1 x D of length 1, or empty
+  std::vector<int> words;                  ///< one for each feature; -1: not known
+  std::vector<int> cells;                  ///< likewise
+  cv::Mat descriptor;  ///< of a dense member, in place of words: 1 x D of length 1, or empty
 
   /// The cell of a pixel, row by row.
   static int Cell(const cv::Point2f& pixel, const cv::Size& size);

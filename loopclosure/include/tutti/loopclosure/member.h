@@ -43,6 +43,7 @@ class Member {
   /// bad_signature_ratio x their running mean, or fewer than two), which gets no words: the member sits this
   /// image out. Once per image: keeps the mean.
   bool Judge(const Features& features);
+  /// Of its vocabulary; 0 for a dense member.
   int num_words() const { return vocabulary_.size(); }
   /// Its vocabulary, for the memory: words leave and return with locations.
   Vocabulary& vocabulary() { return vocabulary_; }

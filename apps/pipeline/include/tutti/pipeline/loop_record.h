@@ -31,8 +31,8 @@ struct LoopRecord {
   double query_stamp_s = 0;
   double candidate_stamp_s = 0;
   std::vector<MemberOpinion> members;
-  double hypothesis = 0;  ///< of the ensemble: 1 - p(new place)
-  double posterior = 0;   ///< of the ensemble at its best location
+  double hypothesis = 0;   ///< of the ensemble: 1 - p(new place)
+  double posterior = 0;    ///< of the ensemble at its best location
   double probability = 0;  ///< that it is a loop (LoopResult::probability), 0..1
   int matches = 0, inliers = 0;
   bool verified = false;              ///< passed the detector's geometric verification

@@ -163,45 +163,55 @@ bool MemorySystem::JointTookPart() const {
   return std::any_of(units_.begin(), units_.end(), [](const FilterUnit& unit) { return unit.took_part(); });
 }
 
-// A unit's weight before scaling: what others say, too, is said once.
-double MemorySystem::OwnWeight(std::size_t unit) const {
-  return units_[unit].weight.Value() / overlap_.Copies(unit);
+UnitCounts MemorySystem::PresentCounts() const {
+  UnitCounts counts;
+  counts.reserve(units_.size());
+  for (const FilterUnit& unit : units_) counts.push_back(unit.took_part() ? &unit.counts : nullptr);
+  return counts;
 }
 
-// Scales the weights of the units that took part so that their sum is the number of units that say something
-// of their own: a unit that sits out leaves its share to the others.
-double MemorySystem::WeightScale() const {
+// Scaled so that their sum is the number of units that say something of their own: a unit that sits out
+// leaves its share to the others.
+std::vector<double> MemorySystem::Weights(const UnitCounts& counts) const {
+  std::vector<double> weights(units_.size(), 0.0);
   double sum = 0;
   double all = 0;
   for (std::size_t u = 0; u < units_.size(); ++u) {
-    all += 1.0 / overlap_.Copies(u);
-    sum += units_[u].took_part() ? OwnWeight(u) : 0.0;
+    const double copies = overlap_.Copies(u);  // what others say, too, is said once
+    all += 1.0 / copies;
+    if (counts[u] == nullptr) continue;
+    weights[u] = units_[u].weight.Value() / copies;
+    sum += weights[u];
   }
-  return sum > 0 ? all / sum : 0.0;
+  const double scale = sum > 0 ? all / sum : 0.0;
+  for (double& weight : weights) weight *= scale;
+  return weights;
 }
 
-double MemorySystem::WeightOf(std::size_t unit) const {
-  return units_[unit].took_part() ? WeightScale() * OwnWeight(unit) : 0.0;
-}
+double MemorySystem::WeightOf(std::size_t unit) const { return Weights(PresentCounts())[unit]; }
 
-std::vector<double> MemorySystem::JointCounts() const {
+std::vector<double> MemorySystem::JointCounts(const UnitCounts& counts,
+                                              const std::vector<double>& weights) const {
   std::vector<double> sum(static_cast<std::size_t>(memory_.size()), 0.0);
   for (std::size_t u = 0; u < units_.size(); ++u) {
-    if (!units_[u].took_part()) continue;
-    const double weight = WeightOf(u);
-    for (std::size_t i = 0; i < units_[u].counts.size(); ++i) sum[i] += weight * units_[u].counts[i];
+    if (counts[u] == nullptr) continue;
+    const std::vector<double>& own = *counts[u];
+    const double weight = weights[u];
+    for (std::size_t i = 0; i < own.size(); ++i) sum[i] += weight * own[i];
   }
   return sum;
 }
 
 void MemorySystem::StepJoint() {
   if (!joint_ || !JointTookPart() || memory_.working_memory().empty()) return;
-  joint_->counts = JointCounts();
+  const UnitCounts counts = PresentCounts();
+  const std::vector<double> weights = Weights(counts);
+  joint_->counts = JointCounts(counts, weights);
   double words = 0;
   double repeated = 0;
   for (std::size_t u = 0; u < units_.size(); ++u) {
     words += units_[u].took_part() ? units_[u].seen.Amount() : 0;
-    repeated += WeightOf(u) * units_[u].repeated;
+    repeated += weights[u] * units_[u].repeated;
   }
   joint_->image_likelihood =
       joint_->alias.Likelihood(joint_->counts, memory_.working_memory(), words, repeated);
@@ -228,12 +238,10 @@ void MemorySystem::Learn() {
   if (!joint_) return;
   const std::vector<int> near = NearBest(*joint_);
   joint_->alias.Learn(joint_->counts, places, near, joint_->filter.posterior().new_place);
-  std::vector<const std::vector<double>*> counts;
   for (FilterUnit& unit : units_) {
     if (unit.took_part()) unit.weight.Learn(unit.counts, places, near);
-    counts.push_back(unit.took_part() ? &unit.counts : nullptr);
   }
-  overlap_.Learn(counts, places, near);
+  overlap_.Learn(PresentCounts(), places, near);
 }
 
 std::vector<const Belief*> MemorySystem::Beliefs() const {
@@ -251,12 +259,10 @@ std::vector<const Belief*> MemorySystem::Beliefs() const {
 std::vector<Belief> MemorySystem::Opinions(const std::vector<SeenWords>& words) const {
   const std::vector<int>& places = memory_.working_memory();
   std::vector<Belief> opinions;
-  std::vector<double> sum(static_cast<std::size_t>(memory_.size()), 0.0);
-  double sum_of_weights = 0;
-  double all = 0;
+  std::vector<std::vector<double>> counts(units_.size());
+  UnitCounts taking_part(units_.size(), nullptr);
   for (std::size_t u = 0; u < units_.size(); ++u) {
     const FilterUnit& unit = units_[u];
-    all += 1.0 / overlap_.Copies(u);
     const SeenWords seen = WordsFor(unit, words);
     if (seen.Amount() == 0) continue;
     if (!Counts()) {
@@ -265,18 +271,14 @@ std::vector<Belief> MemorySystem::Opinions(const std::vector<SeenWords>& words) 
                                           places));
       continue;
     }
-    const std::vector<double> counts =
-        unit.is_dense ? unit.dense.CountsOf(seen.descriptor, places) : unit.likelihood.Counts(seen);
-    if (!joint_) {
-      opinions.push_back(unit.alias.Of(counts, places));
-      continue;
-    }
-    sum_of_weights += OwnWeight(u);
-    for (std::size_t i = 0; i < counts.size(); ++i) sum[i] += OwnWeight(u) * counts[i];
+    counts[u] = unit.is_dense ? unit.dense.CountsOf(seen.descriptor, places) : unit.likelihood.Counts(seen);
+    taking_part[u] = &counts[u];
+    if (!joint_) opinions.push_back(unit.alias.Of(counts[u], places));
   }
-  if (sum_of_weights > 0) {
-    for (double& value : sum) value *= all / sum_of_weights;
-    opinions.push_back(joint_->alias.Of(sum, places));
+  const bool any =
+      std::any_of(taking_part.begin(), taking_part.end(), [](auto unit) { return unit != nullptr; });
+  if (joint_ && any) {
+    opinions.push_back(joint_->alias.Of(JointCounts(taking_part, Weights(taking_part)), places));
   }
   for (Belief& opinion : opinions) opinion.Normalise();
   return opinions;

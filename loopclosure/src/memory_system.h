@@ -67,6 +67,9 @@ struct FilterUnit : PlaceFilter {
   bool took_part() const { return !signature.empty() || !seen.descriptor.empty(); }
 };
 
+/// Counts (by slot) of every unit for an image; nullptr for one that sits it out.
+using UnitCounts = std::vector<const std::vector<double>*>;
+
 /// Steps 3 to 5, 7 and 8 of loop-closure.md section 1. Slots are the same in every memory of one detector.
 class MemorySystem {
  public:
@@ -146,10 +149,10 @@ class MemorySystem {
   bool Counts() const { return options_.evidence.kind == EvidenceKind::kCounts; }
   void Repeat(FilterUnit& unit) const;
   bool JointTookPart() const;
-  double OwnWeight(std::size_t unit) const;
-  double WeightScale() const;
+  UnitCounts PresentCounts() const;
+  std::vector<double> Weights(const UnitCounts& counts) const;
+  std::vector<double> JointCounts(const UnitCounts& counts, const std::vector<double>& weights) const;
   void LoadOverlap(ByteReader& in);
-  std::vector<double> JointCounts() const;
   std::vector<int> NearBest(const PlaceFilter& place_filter) const;
 
   int number_;

@@ -214,16 +214,15 @@ void MemberOverlap::Learn(const std::vector<const std::vector<double>*>& counts,
 
 double MemberOverlap::Correlation(std::size_t a, std::size_t b) const {
   if (a == b) return 1.0;
-  if (covariance_.empty()) return 0.0;
   const double scale = covariance_[a * members_ + a] * covariance_[b * members_ + b];
   return scale > 0 ? covariance_[a * members_ + b] / std::sqrt(scale) : 0.0;
 }
 
 double MemberOverlap::Copies(std::size_t member) const {
   constexpr double kPower = 8;
+  if (members_ == 0) return 1.0;
   double copies = 0;
-  for (std::size_t k = 0; k < std::max(members_, member + 1); ++k) {
-    if (k != member && k >= members_) continue;
+  for (std::size_t k = 0; k < members_; ++k) {
     copies += std::pow(std::clamp(Correlation(member, k), 0.0, 1.0), kPower);
   }
   return copies;

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <functional>
-#include <limits>
 #include <opencv2/imgcodecs.hpp>
 #include <thread>
 
@@ -12,30 +11,10 @@
 #include "textured_image.h"
 #include "tutti/core/error.h"
 #include "tutti/loopclosure/evaluation.h"
-#include "tutti/loopclosure/features.h"
 #include "two_laps.h"
 
 namespace tutti {
 namespace {
-
-LoopQuery Query(std::int64_t id, const cv::Mat& image) {
-  LoopQuery query;
-  query.id = id;
-  query.stamp_s = static_cast<double>(id);
-  query.image = image;
-  return query;
-}
-
-// Twenty places, then the first ones again.
-std::vector<LoopResult> TwoLaps(const LoopDetectorOptions& options, int places = 18, int again = 8) {
-  LoopDetector detector(options);
-  std::vector<LoopResult> results;
-  for (int i = 0; i < places + again; ++i) {
-    const cv::Mat place = testing::TexturedImage(static_cast<std::uint32_t>(i % places));
-    results.push_back(detector.Detect(Query(i, i < places ? place : testing::SeenAgain(place))));
-  }
-  return results;
-}
 
 class EveryRule : public ::testing::TestWithParam<std::string> {};
 INSTANTIATE_TEST_SUITE_P(Rules, EveryRule,
@@ -45,7 +24,7 @@ TEST_P(EveryRule, FindsTheSecondLapAndNothingBefore) {
   LoopDetectorOptions options;
   SetRule(GetParam(), options);
   EXPECT_EQ(RuleName(options), GetParam());
-  const std::vector<LoopResult> results = TwoLaps(options);
+  const std::vector<LoopResult> results = testing::TwoLaps(options);
   int found = 0;
   for (std::size_t i = 0; i < results.size(); ++i) {
     if (i < 18) {
@@ -67,8 +46,8 @@ TEST(LoopDetector, TheSameForAnyNumberOfThreadsAndBesideAnotherDetector) {
   LoopDetectorOptions two;
   two.threads = 2;
   std::vector<LoopResult> beside;
-  std::thread other([&] { beside = TwoLaps(two, 14, 3); });
-  const std::vector<LoopResult> a = TwoLaps(one, 14, 3);
+  std::thread other([&] { beside = testing::TwoLaps(two, 14, 3); });
+  const std::vector<LoopResult> a = testing::TwoLaps(one, 14, 3);
   other.join();
   testing::ExpectEqual(a, beside);
 }
@@ -93,7 +72,7 @@ TEST(LoopDetector, HardImagesNeverThrow) {
   std::int64_t id = 0;
   for (const cv::Mat& image : images) {
     LoopResult result;
-    EXPECT_NO_THROW(result = detector.Detect(Query(id++, image)));
+    EXPECT_NO_THROW(result = detector.Detect(testing::Query(id++, image)));
     EXPECT_TRUE(result.hypothesis >= 0 && result.hypothesis <= 1);
     EXPECT_TRUE(result.accepted || !result.reason.empty());
   }
@@ -108,7 +87,7 @@ TEST(LoopDetector, AMemberWithoutFeaturesSitsOut) {
   LoopDetector detector(options);
   LoopResult result;
   for (int i = 0; i < 6; ++i)
-    result = detector.Detect(Query(i, testing::TexturedImage(static_cast<std::uint32_t>(i))));
+    result = detector.Detect(testing::Query(i, testing::TexturedImage(static_cast<std::uint32_t>(i))));
   EXPECT_FALSE(result.members[0].took_part);
   EXPECT_TRUE(result.members[1].took_part);
   EXPECT_TRUE(result.members[2].took_part);
@@ -118,12 +97,12 @@ TEST(LoopDetector, AMemberWithoutFeaturesSitsOut) {
 TEST(LoopDetector, MisuseIsAnError) {
   LoopDetector detector{LoopDetectorOptions()};
   const cv::Mat image = testing::TexturedImage(1);
-  detector.Detect(Query(5, image));
-  EXPECT_THROW(detector.Detect(Query(5, image)), InputError);
-  EXPECT_THROW(detector.Detect(Query(4, image)), InputError);
+  detector.Detect(testing::Query(5, image));
+  EXPECT_THROW(detector.Detect(testing::Query(5, image)), InputError);
+  EXPECT_THROW(detector.Detect(testing::Query(4, image)), InputError);
   EXPECT_THROW(detector.AddLink(5, 77), InputError);
 
-  LoopQuery query = Query(6, image);
+  LoopQuery query = testing::Query(6, image);
   query.features.keypoints.resize(3);
   EXPECT_THROW(detector.Detect(query), InputError);
   query.features.descriptors = cv::Mat::zeros(3, 32, CV_8U);
@@ -134,7 +113,7 @@ TEST(LoopDetector, MisuseIsAnError) {
   query.id = 7;
   query.features.descriptors = cv::Mat::zeros(3, 64, CV_32F);
   EXPECT_THROW(detector.Detect(query), InputError);
-  LoopQuery depth = Query(8, image);
+  LoopQuery depth = testing::Query(8, image);
   depth.depth_m = cv::Mat::zeros(5, 5, CV_32F);
   EXPECT_THROW(detector.Detect(depth), InputError);
   EXPECT_EQ(detector.NumLocations(), 2u);
@@ -144,7 +123,7 @@ TEST(LoopDetector, AMaskOrCamerasThatAreNotOfTheImageAreRefused) {
   LoopDetector detector{LoopDetectorOptions()};
   const cv::Mat image = testing::TexturedImage(1);
   const auto refused = [&](const std::function<void(LoopQuery&)>& spoil, const char* word) {
-    LoopQuery query = Query(1, image);
+    LoopQuery query = testing::Query(1, image);
     spoil(query);
     try {
       detector.Detect(query);
@@ -175,7 +154,7 @@ TEST(LoopDetector, FeaturesUnderTheMaskDoNotExist) {
   options.stm_size = 1;
   LoopDetector detector(options);
   const cv::Mat image = testing::TexturedImage(1);
-  LoopQuery query = Query(0, image);
+  LoopQuery query = testing::Query(0, image);
   query.features.keypoints = {
       {cv::Point2f(40, 100), 8}, {cv::Point2f(200, 100), 8}, {cv::Point2f(210, 90), 8}};
   query.features.descriptors = (cv::Mat_<std::uint8_t>(3, 2) << 0, 0, 255, 255, 15, 240);
@@ -224,9 +203,9 @@ TEST(LoopDetector, RehearsalMergesAStandingCamera) {
   LoopDetectorOptions options;
   options.rehearsal = true;
   LoopDetector detector(options);
-  for (int i = 0; i < 6; ++i) detector.Detect(Query(i, testing::TexturedImage(1)));
+  for (int i = 0; i < 6; ++i) detector.Detect(testing::Query(i, testing::TexturedImage(1)));
   EXPECT_EQ(detector.NumLocations(), 1u);
-  detector.Detect(Query(6, testing::TexturedImage(2)));
+  detector.Detect(testing::Query(6, testing::TexturedImage(2)));
   EXPECT_EQ(detector.NumLocations(), 2u);
   EXPECT_NO_THROW(detector.AddLink(3, 6));
 }
@@ -346,7 +325,7 @@ TEST(LoopDetector, KeepsThePosteriorOnlyWhenAsked) {
   LoopDetector detector(options);
   LoopResult result;
   for (int i = 0; i < 6; ++i)
-    result = detector.Detect(Query(i, testing::TexturedImage(static_cast<std::uint32_t>(i))));
+    result = detector.Detect(testing::Query(i, testing::TexturedImage(static_cast<std::uint32_t>(i))));
   ASSERT_EQ(result.posterior_by_location.size(), 4u);
   double sum = 0;
   for (const auto& [id, p] : result.posterior_by_location) sum += p;
@@ -443,7 +422,7 @@ TEST(LoopDetector, CorridorReachesThePapersClassWithoutAFalseLoop) {
     const cv::Mat image =
         cv::imread((folder / (std::to_string(i + 1) + ".jpg")).string(), cv::IMREAD_GRAYSCALE);
     ASSERT_FALSE(image.empty());
-    observations.push_back(Observe(detector.Detect(Query(i, image))));
+    observations.push_back(Observe(detector.Detect(testing::Query(i, image))));
   }
   const LoopGroundTruth truth = ReadLoopMatrix(folder / "ground_truth.bmp", 84);
   const LoopEvaluation result = EvaluateVerified(observations, truth);
@@ -465,88 +444,12 @@ TEST(LoopDetector, KittiLoopIsFoundAndNothingElse) {
     std::snprintf(name, sizeof name, "image_0/%06d.webp", i * 5);
     const cv::Mat image = cv::imread((folder / name).string(), cv::IMREAD_GRAYSCALE);
     ASSERT_FALSE(image.empty()) << name;
-    const LoopResult result = detector.Detect(Query(i, image));
+    const LoopResult result = detector.Detect(testing::Query(i, image));
     if (!result.accepted) continue;
     EXPECT_NE(truth.At(i, static_cast<int>(result.verification.candidate)), LoopLabel::kNone) << i;
     found += truth.HasLoop(i) ? 1 : 0;
   }
   EXPECT_GE(found, 13);
-}
-
-// A caller's own features: ORB's on the image, under another name.
-Features OwnFeatures(const cv::Mat& image) {
-  Features features;
-  cv::ORB::create(200)->detectAndCompute(image, cv::noArray(), features.keypoints, features.descriptors);
-  return features;
-}
-
-TEST(LoopDetector, ACallersOwnFeaturesAreAMember) {
-  LoopDetectorOptions options;
-  options.members = {"mine"};
-  options.external_members = {"mine"};
-  options.rule = CombinationRule::kSingle;
-  options.stm_size = 3;
-  LoopDetector detector(options);
-  int found = 0;
-  for (int i = 0; i < 20; ++i) {
-    const cv::Mat place = testing::TexturedImage(static_cast<std::uint32_t>(i % 12));
-    LoopQuery query = Query(i, i < 12 ? place : testing::SeenAgain(place));
-    query.member_features["mine"] = OwnFeatures(query.image);
-    query.image = cv::Mat();  // not needed
-    const LoopResult result = detector.Detect(query);
-    if (result.accepted) {
-      EXPECT_EQ(result.verification.candidate, i - 12);
-      ++found;
-    }
-  }
-  EXPECT_GE(found, 4);
-}
-
-TEST(LoopDetector, MisuseOfMemberFeaturesIsRefusedAndChangesNothing) {
-  LoopDetectorOptions options;
-  options.members = {"mine", "orb"};
-  options.external_members = {"mine"};
-  LoopDetector detector(options);
-  const cv::Mat image = testing::TexturedImage(1);
-  EXPECT_THROW(detector.Detect(image, 0), InputError);  // "mine" is missing
-  LoopQuery query = Query(0, image);
-  query.member_features["mine"] = OwnFeatures(image);
-  query.member_features["yours"] = {};
-  EXPECT_THROW(detector.Detect(query), InputError);
-  query.member_features.erase("yours");
-  query.member_features["mine"].keypoints.pop_back();
-  EXPECT_THROW(detector.Detect(query), InputError);
-  query.member_features["mine"] = OwnFeatures(image);
-  query.member_features["mine"].keypoints[0].pt.x = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_THROW(detector.Detect(query), InputError);
-  EXPECT_EQ(detector.NumLocations(), 0u);
-  query.member_features["mine"] = OwnFeatures(image);
-  EXPECT_NO_THROW(detector.Detect(query));
-  query.id = 1;
-  query.member_features["mine"].descriptors.convertTo(query.member_features["mine"].descriptors, CV_32F);
-  EXPECT_THROW(detector.Detect(query), InputError);  // another type than before
-  query.member_features["mine"] = {};
-  EXPECT_NO_THROW(detector.Detect(query));  // none at all: sits this image out
-  EXPECT_EQ(detector.NumLocations(), 2u);
-}
-
-TEST(LoopDetector, AnEnsembleOfFiveWithARegisteredFeature2D) {
-  RegisterFeatureType("small_orb", [](cv::Size, int features) {
-    return cv::ORB::create(features, 1.4f, 4, 15, 0, 2, cv::ORB::FAST_SCORE, 21);
-  });
-  EXPECT_THROW(RegisterFeatureType("small_orb", [](cv::Size, int) { return cv::Ptr<cv::Feature2D>(); }),
-               InputError);
-  EXPECT_THROW(RegisterFeatureType("surf", [](cv::Size, int) { return cv::Ptr<cv::Feature2D>(); }),
-               InputError);
-  LoopDetectorOptions options;
-  options.members = {"surf", "sift", "orb", "akaze", "small_orb"};
-  const std::vector<LoopResult> results = TwoLaps(options, 14, 5);
-  int found = 0;
-  for (const LoopResult& result : results) found += result.accepted ? 1 : 0;
-  EXPECT_GE(found, 3);
-  ASSERT_EQ(results.back().members.size(), 5u);
-  EXPECT_EQ(results.back().members[4].name, "small_orb");
-  EXPECT_GT(results.back().members[4].features, 50);
 }
 
 }  // namespace

@@ -24,6 +24,26 @@ inline cv::Mat WalkImage(int i, int places) {
   return i < places ? place : SeenAgain(place);
 }
 
+/// An image whose number is its time stamp, too.
+inline LoopQuery Query(std::int64_t id, const cv::Mat& image) {
+  LoopQuery query;
+  query.id = id;
+  query.stamp_s = static_cast<double>(id);
+  query.image = image;
+  return query;
+}
+
+/// What the detector says of so many places, in larger images, and of the first ones again.
+inline std::vector<LoopResult> TwoLaps(const LoopDetectorOptions& options, int places = 18, int again = 8) {
+  LoopDetector detector(options);
+  std::vector<LoopResult> results;
+  for (int i = 0; i < places + again; ++i) {
+    const cv::Mat place = TexturedImage(static_cast<std::uint32_t>(i % places));
+    results.push_back(detector.Detect(Query(i, i < places ? place : SeenAgain(place))));
+  }
+  return results;
+}
+
 /// Shows the images begin .. end - 1 of the walk.
 inline std::vector<LoopResult> Walk(LoopDetector& detector, int begin, int end, int places) {
   std::vector<LoopResult> results;

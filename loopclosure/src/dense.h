@@ -23,6 +23,10 @@ cv::Mat DescribeByGradients(const cv::Mat& grey, const cv::Mat& mask = cv::Mat()
 /// A descriptor (1 x D, CV_32F) at length 1, in a matrix of its own; empty for one of no length or of none.
 cv::Mat NormalisedDescriptor(const cv::Mat& descriptor);
 
+/// Empty if a dense member may have this descriptor of an image (or none), else what is wrong. `width`: of
+/// those before [values], 0: any.
+std::string DescriptorProblem(const cv::Mat& descriptor, int width);
+
 /// Descriptors of all locations in STM and WM, one each, and what an image's descriptor says of them.
 /// Locations are slots: 0, 1, 2, ... in the order of adding; the newest is the present image.
 ///
@@ -67,7 +71,7 @@ class DenseModel {
   /// Slots ever added.
   int size() const { return static_cast<int>(descriptors_.size()); }
   /// Empty if a descriptor may be added, else what is wrong.
-  std::string Problem(const cv::Mat& descriptor) const;
+  std::string Problem(const cv::Mat& descriptor) const { return DescriptorProblem(descriptor, width_); }
 
   /// Counts of every slot for the present image, to be added to those of words: with the median m and the
   /// median deviation of the scores of `places`,

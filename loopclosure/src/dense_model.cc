@@ -32,15 +32,15 @@ double MedianOf(std::vector<double>& values) {
 
 }  // namespace
 
-std::string DenseModel::Problem(const cv::Mat& descriptor) const {
+std::string DescriptorProblem(const cv::Mat& descriptor, int width) {
   if (descriptor.empty()) return {};
   if (descriptor.rows != 1 || descriptor.type() != CV_32F) {
-    return "the descriptor of a dense member must be one row of CV_32F";
+    return "a dense member has one row of CV_32F (or none, and sits the image out)";
   }
   if (!cv::checkRange(descriptor)) return "a value of the descriptor is not a finite number";
-  if (width_ > 0 && descriptor.cols != width_) {
+  if (width > 0 && descriptor.cols != width) {
     return "the descriptor has " + std::to_string(descriptor.cols) + " values, but those before had " +
-           std::to_string(width_) + "; give every image the same kind";
+           std::to_string(width) + "; give every image the same kind";
   }
   return {};
 }

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dense.h"
 #include "detector_impl.h"
 #include "tutti/core/error.h"
 
@@ -53,17 +54,8 @@ void CheckDense(const Features& features, int width, const std::string& which) {
   if (!features.keypoints.empty()) {
     throw InputError(which + "a dense member describes the image as a whole: give no keypoints");
   }
-  const cv::Mat& row = features.descriptors;
-  if (row.empty()) return;
-  if (row.rows != 1 || row.type() != CV_32F) {
-    throw InputError(which + "a dense member has one row of CV_32F (or none, and sits the image out)");
-  }
-  if (!cv::checkRange(row)) throw InputError(which + "a value of the descriptor is not a finite number");
-  if (width > 0 && row.cols != width) {
-    throw InputError(which + "the descriptor has " + std::to_string(row.cols) +
-                     " values, but those before had " + std::to_string(width) +
-                     "; give every image the same kind");
-  }
+  const std::string problem = DescriptorProblem(features.descriptors, width);
+  if (!problem.empty()) throw InputError(which + problem);
 }
 
 }  // namespace

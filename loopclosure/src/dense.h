@@ -98,8 +98,12 @@ class DenseModel {
     std::vector<float> cosines;  // empty if the image has none itself
   };
   Row MakeRow(int slot) const;
+  std::vector<float> Cosines(const cv::Mat& descriptor) const;
   void MakeRecent();
   std::vector<int> Path() const;
+  double MeanOver(const std::vector<int>& places, const Row& row) const;
+  template <typename LevelOf, typename Call>
+  void ForEachPair(LevelOf level_of, Call call) const;
   static std::vector<double> Contrast(std::vector<double> scores, const std::vector<int>& places);
 
   std::vector<cv::Mat> descriptors_;  // by slot

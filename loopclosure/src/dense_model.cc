@@ -73,9 +73,15 @@ DenseModel::Row DenseModel::MakeRow(int slot) const {
   row.slot = slot;
   const cv::Mat& own = descriptors_[Index(slot)];
   if (own.empty()) return row;
-  row.cosines.reserve(descriptors_.size() + 1);
-  for (const cv::Mat& other : descriptors_) row.cosines.push_back(Cosine(own, other));
+  row.cosines = Cosines(own);
   return row;
+}
+
+std::vector<float> DenseModel::Cosines(const cv::Mat& descriptor) const {
+  std::vector<float> cosines;
+  cosines.reserve(descriptors_.size() + 1);  // a row gets one more with the next image
+  for (const cv::Mat& other : descriptors_) cosines.push_back(Cosine(descriptor, other));
+  return cosines;
 }
 
 void DenseModel::MakeRecent() {
@@ -133,27 +139,39 @@ std::vector<int> DenseModel::Path() const {
   return path;
 }
 
+double DenseModel::MeanOver(const std::vector<int>& places, const Row& row) const {
+  double mean = 0;
+  int known = 0;
+  for (const int slot : places) {
+    if (descriptors_[Index(slot)].empty()) continue;
+    mean += static_cast<double>(row.cosines[Index(slot)]);
+    ++known;
+  }
+  return known > 0 ? mean / known : mean;
+}
+
+// Pairs each of the last images with what lies as far before each place of the path:
+// call(place, cosine - level_of(row of the image)).
+template <typename LevelOf, typename Call>
+void DenseModel::ForEachPair(LevelOf level_of, Call call) const {
+  const std::vector<int> path = Path();
+  std::size_t back = 0;
+  for (auto row = recent_.rbegin(); row != recent_.rend(); ++row, ++back) {
+    if (row->cosines.empty()) continue;
+    const double level = level_of(*row);
+    for (std::size_t p = back; p < path.size(); ++p) {
+      const int before = path[p - back];
+      if (descriptors_[Index(before)].empty()) continue;
+      call(Index(path[p]), static_cast<double>(row->cosines[Index(before)]) - level);
+    }
+  }
+}
+
 std::vector<double> DenseModel::Counts(const std::vector<int>& places) const {
   std::vector<double> sums(descriptors_.size(), 0.0);
   if (recent_.empty() || places.size() < kTooFewPlaces) return sums;
-  const std::vector<int> path = Path();
-  int back = 0;
-  for (auto row = recent_.rbegin(); row != recent_.rend(); ++row, ++back) {
-    if (row->cosines.empty()) continue;
-    double mean = 0;
-    int known = 0;
-    for (const int slot : places) {
-      if (descriptors_[Index(slot)].empty()) continue;
-      mean += static_cast<double>(row->cosines[Index(slot)]);
-      ++known;
-    }
-    if (known > 0) mean /= known;
-    for (std::size_t p = static_cast<std::size_t>(back); p < path.size(); ++p) {
-      const int before = path[p - static_cast<std::size_t>(back)];
-      if (descriptors_[Index(before)].empty()) continue;
-      sums[Index(path[p])] += (static_cast<double>(row->cosines[Index(before)]) - mean) / kSequence;
-    }
-  }
+  ForEachPair([&](const Row& row) { return MeanOver(places, row); },
+              [&](std::size_t place, double above_mean) { sums[place] += above_mean / kSequence; });
   return Contrast(std::move(sums), places);
 }
 
@@ -174,40 +192,29 @@ std::vector<double> DenseModel::Contrast(std::vector<double> scores, const std::
 }
 
 std::vector<double> DenseModel::CountsOf(const cv::Mat& descriptor, const std::vector<int>& places) const {
-  std::vector<double> scores;
-  scores.reserve(descriptors_.size());
-  for (const cv::Mat& other : descriptors_) scores.push_back(static_cast<double>(Cosine(descriptor, other)));
-  return Contrast(std::move(scores), places);
+  const std::vector<float> cosines = Cosines(descriptor);
+  return Contrast({cosines.begin(), cosines.end()}, places);
 }
 
 std::vector<double> DenseModel::Scores() const {
   std::vector<double> sums(descriptors_.size(), 0.0);
   if (recent_.empty()) return sums;
-  const std::vector<int> path = Path();
-  std::vector<int> terms(path.size(), 0);
-  int back = 0;
-  for (auto row = recent_.rbegin(); row != recent_.rend(); ++row, ++back) {
-    if (row->cosines.empty()) continue;
-    for (std::size_t p = static_cast<std::size_t>(back); p < path.size(); ++p) {
-      const int before = path[p - static_cast<std::size_t>(back)];
-      if (descriptors_[Index(before)].empty()) continue;
-      sums[Index(path[p])] += static_cast<double>(row->cosines[Index(before)]);
-      ++terms[p];
-    }
-  }
-  for (std::size_t p = 0; p < path.size(); ++p) {
-    double& sum = sums[Index(path[p])];
-    sum = descriptors_[Index(path[p])].empty() ? 0.0 : std::max(0.0, sum / std::max(1, terms[p]));
+  std::vector<int> terms(descriptors_.size(), 0);
+  ForEachPair([](const Row&) { return 0.0; },
+              [&](std::size_t place, double cosine) {
+                sums[place] += cosine;
+                ++terms[place];
+              });
+  for (std::size_t i = 0; i < sums.size(); ++i) {
+    sums[i] = descriptors_[i].empty() ? 0.0 : std::max(0.0, sums[i] / std::max(1, terms[i]));
   }
   return sums;
 }
 
 std::vector<double> DenseModel::ScoresOf(const cv::Mat& descriptor) const {
-  std::vector<double> scores;
-  scores.reserve(descriptors_.size());
-  for (const cv::Mat& other : descriptors_) {
-    scores.push_back(std::max(0.0, static_cast<double>(Cosine(descriptor, other))));
-  }
+  const std::vector<float> cosines = Cosines(descriptor);
+  std::vector<double> scores(cosines.begin(), cosines.end());
+  for (double& score : scores) score = std::max(0.0, score);
   return scores;
 }
 

@@ -21,6 +21,10 @@ std::string JoinWords(const std::vector<std::string>& words) {
   return text;
 }
 
+bool Holds(const std::vector<std::string>& names, const std::string& name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
 std::string OutOf(const char* name, const char* range) { return std::string(name) + " must be " + range; }
 
 }  // namespace
@@ -108,31 +112,25 @@ std::string LoopDetectorOptions::Validate() const {
   known.insert(known.end(), external_members.begin(), external_members.end());
   if (members.empty()) return "members must name at least one of " + JoinWords(KnownMembers());
   for (std::size_t i = 0; i < members.size(); ++i) {
-    if (std::find(known.begin(), known.end(), members[i]) == known.end()) {
+    if (!Holds(known, members[i])) {
       return "members holds '" + members[i] + "', which is not known; did you mean '" +
              NearestWord(members[i], known) + "'?";
     }
-    if (std::find(members.begin(), members.begin() + static_cast<std::ptrdiff_t>(i), members[i]) !=
-        members.begin() + static_cast<std::ptrdiff_t>(i)) {
+    if (Holds({members.begin(), members.begin() + static_cast<std::ptrdiff_t>(i)}, members[i])) {
       return "members holds '" + members[i] + "' twice; name each member once";
     }
   }
-  const std::vector<std::string> known_dense = KnownDenseMembers();
   for (const std::string& name : dense_members) {
-    if (std::find(external_members.begin(), external_members.end(), name) == external_members.end()) {
+    if (!Holds(external_members, name)) {
       return "dense_members holds '" + name + "', which is not in external_members; name it there, too";
     }
   }
-  const auto holds = [](const std::vector<std::string>& names, const std::string& name) {
-    return std::find(names.begin(), names.end(), name) != names.end();
-  };
-  if (holds(members, "dnn") && !holds(external_members, "dnn") && dnn.model.empty()) {
+  if (Holds(members, "dnn") && !Holds(external_members, "dnn") && dnn.model.empty()) {
     return "members holds 'dnn', but dnn.model is empty; give the ONNX file of a network "
            "(docs/loop-closure.md section 3 says which fit), or leave 'dnn' out";
   }
   for (const std::string& name : members) {
-    const bool dense = std::find(known_dense.begin(), known_dense.end(), name) != known_dense.end() ||
-                       std::find(dense_members.begin(), dense_members.end(), name) != dense_members.end();
+    const bool dense = Holds(KnownDenseMembers(), name) || Holds(dense_members, name);
     if (dense && rule == CombinationRule::kNaive) {
       return "the rule 'naive' puts the words of all members together, and '" + name +
              "' has none; leave it out or choose another rule";
@@ -197,7 +195,7 @@ void SetRule(const std::string& word, LoopDetectorOptions& options) {
     return;
   }
   const std::vector<std::string> known = KnownMembers();
-  if (std::find(known.begin(), known.end(), word) != known.end()) {
+  if (Holds(known, word)) {
     options.rule = CombinationRule::kSingle;
     options.members = {word};
     return;

@@ -122,10 +122,14 @@ void PlaceReasoner::Explain(const CombinedBelief& combined, LoopResult& result) 
   const PlaceFilter* joint = options_.keep_evidence && Shared() ? systems_.front()->joint() : nullptr;
   if (joint == nullptr) return;
   for (const int slot : memory().working_memory()) {
-    result.evidence.push_back(
-        {memory().id(slot), Index(slot) < joint->counts.size() ? joint->counts[Index(slot)] : 0.0,
-         PosteriorAt(joint->image_likelihood, slot), PosteriorAt(joint->filter.posterior(), slot)});
+    result.evidence.push_back(EvidenceAt(slot, joint->counts, *joint));
   }
+}
+
+CandidateEvidence PlaceReasoner::EvidenceAt(int slot, const std::vector<double>& scores,
+                                            const PlaceFilter& filter) const {
+  return {memory().id(slot), Index(slot) < scores.size() ? scores[Index(slot)] : 0.0,
+          PosteriorAt(filter.image_likelihood, slot), PosteriorAt(filter.filter.posterior(), slot)};
 }
 
 void PlaceReasoner::FillOpinion(std::size_t member, const CombinedBelief& combined,
@@ -154,11 +158,7 @@ void PlaceReasoner::FillOpinion(std::size_t member, const CombinedBelief& combin
     if (options_.keep_posterior) {
       opinion.posterior_by_location.emplace_back(memory().id(slot), PosteriorAt(posterior, slot));
     }
-    if (options_.keep_evidence) {
-      opinion.evidence.push_back({memory().id(slot),
-                                  Index(slot) < unit.scores.size() ? unit.scores[Index(slot)] : 0.0,
-                                  PosteriorAt(unit.image_likelihood, slot), PosteriorAt(posterior, slot)});
-    }
+    if (options_.keep_evidence) opinion.evidence.push_back(EvidenceAt(slot, unit.scores, unit));
   }
 }
 

@@ -70,6 +70,7 @@ class PlaceReasoner {
  private:
   static std::size_t Index(int i) { return static_cast<std::size_t>(i); }
   void ForEachUnit(const std::function<void(MemorySystem&, std::size_t)>& call);
+  CandidateEvidence EvidenceAt(int slot, const std::vector<double>& scores, const PlaceFilter& filter) const;
   void FillOpinion(std::size_t member, const CombinedBelief& combined, MemberOpinion& opinion) const;
   void FollowCandidate(int best);
   double MassAround(const Belief& belief, int slot) const;

@@ -18,9 +18,15 @@ std::size_t CellOf(std::size_t k, std::size_t size, std::size_t cells) { return 
 // The images of a run as columns, and its places as rows.
 struct Grid {
   std::size_t cells = 0;
-  std::vector<std::size_t> shown;             // by column: index of the one image in it that is shown
-  std::map<std::int64_t, std::size_t> place;  // by query: its index, for the rows
+  std::vector<std::size_t> shown;   // by column: index of the one image in it that is shown
+  std::map<std::int64_t, int> row;  // by query: where it is as a place
 };
+
+// The row that holds a place, -1 if it is not of this run.
+int RowOf(const Grid& grid, std::int64_t location) {
+  const auto at = grid.row.find(location);
+  return at == grid.row.end() ? -1 : at->second;
+}
 
 // The image of a column that says most has the largest.
 auto HowTelling(const LoggedDetection& detection) {
@@ -32,8 +38,9 @@ Grid MakeGrid(const std::vector<LoggedDetection>& detections) {
   Grid grid;
   grid.cells = std::min(kMostCells, detections.size());
   for (std::size_t k = 0; k < detections.size(); ++k) {
-    grid.place[detections[k].query] = k;
-    if (CellOf(k, detections.size(), grid.cells) == grid.shown.size()) {
+    const std::size_t cell = CellOf(k, detections.size(), grid.cells);
+    grid.row[detections[k].query] = static_cast<int>(cell);
+    if (cell == grid.shown.size()) {
       grid.shown.push_back(k);
     } else if (HowTelling(detections[k]) > HowTelling(detections[grid.shown.back()])) {
       grid.shown.back() = k;
@@ -53,9 +60,9 @@ Json PosteriorMap(const std::string& name, const std::vector<LoggedDetection>& d
     const LoggedDetection& detection = detections[grid.shown[column]];
     if (opinion >= detection.opinions.size()) continue;
     for (const auto& [location, p] : detection.opinions[opinion].posterior) {
-      const auto at = grid.place.find(location);
-      if (at == grid.place.end()) continue;
-      unsigned char& cell = bytes[CellOf(at->second, detections.size(), grid.cells) * grid.cells + column];
+      const int row = RowOf(grid, location);
+      if (row < 0) continue;
+      unsigned char& cell = bytes[static_cast<std::size_t>(row) * grid.cells + column];
       const double root = std::sqrt(std::clamp(static_cast<double>(p), 0.0, 1.0));
       cell = std::max(cell, static_cast<unsigned char>(std::lround(255 * root)));
     }
@@ -81,12 +88,6 @@ Json EvidenceMap(const std::string& name, const std::vector<LoggedDetection>& de
     }
   }
   return Packed(name, bytes);
-}
-
-// The row that holds a place, -1 if it is not of this run.
-int RowOf(const Grid& grid, std::int64_t location) {
-  const auto at = grid.place.find(location);
-  return at == grid.place.end() ? -1 : static_cast<int>(CellOf(at->second, grid.place.size(), grid.cells));
 }
 
 Json GeometryJson(const RunResult& result, const Verification& geometry, const Grid& grid) {

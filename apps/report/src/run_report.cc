@@ -149,31 +149,9 @@ Json ConfigurationJson(const RunResult& result) {
           {"versions", BuildInfo()}};
 }
 
-}  // namespace report
+namespace {
 
-std::string VariantName(const RunConfig& config) {
-  if (!config.run.loops) return "odometry";
-  if (config.loops.rule == CombinationRule::kJoint) return "ensemble";
-  const bool standardised = config.loops.evidence.kind == EvidenceKind::kStandardised;
-  return config.loops.rule == CombinationRule::kMean && standardised ? "seed" : RuleName(config.loops);
-}
-
-nlohmann::ordered_json RunReport(const RunResult& result, const DetectionLog& log,
-                                 const std::string& variant) {
-  using report::ConfigurationJson;
-  using report::EdgesJson;
-  using report::ErrorJson;
-  using report::FiguresJson;
-  using report::FindKnownLoops;
-  using report::GalleryJson;
-  using report::Json;
-  using report::KnownLoops;
-  using report::PathJson;
-  using report::PosteriorJson;
-  using report::PrecisionRecallJson;
-  using report::ShownLoop;
-  using report::ShownLoops;
-  using report::TimingJson;
+Json ReportJson(const RunResult& result, const DetectionLog& log, const std::string& variant) {
   Similarity align_slam, align_odometry;
   const bool scored = result.evaluation && result.evaluation->slam.valid;
   if (scored) align_slam = align_odometry = result.evaluation->slam.alignment;
@@ -203,6 +181,21 @@ nlohmann::ordered_json RunReport(const RunResult& result, const DetectionLog& lo
   json["timing"] = TimingJson(result);
   json["configuration"] = ConfigurationJson(result);
   return json;
+}
+
+}  // namespace
+}  // namespace report
+
+std::string VariantName(const RunConfig& config) {
+  if (!config.run.loops) return "odometry";
+  if (config.loops.rule == CombinationRule::kJoint) return "ensemble";
+  const bool standardised = config.loops.evidence.kind == EvidenceKind::kStandardised;
+  return config.loops.rule == CombinationRule::kMean && standardised ? "seed" : RuleName(config.loops);
+}
+
+nlohmann::ordered_json RunReport(const RunResult& result, const DetectionLog& log,
+                                 const std::string& variant) {
+  return report::ReportJson(result, log, variant);
 }
 
 }  // namespace tutti

@@ -12,7 +12,6 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <ctime>
 #include <numeric>
 #include <opencv2/imgcodecs.hpp>
 #include <random>
@@ -20,7 +19,9 @@
 
 #include "distances.h"
 #include "index_ways.h"
+#include "synthetic_random.h"
 #include "tutti/core/error.h"
+#include "tutti/core/span_recorder.h"
 #include "tutti/loopclosure/detector_options.h"
 #include "tutti/loopclosure/features.h"
 
@@ -71,22 +72,9 @@ std::unique_ptr<IndexWay> MakeWay(const std::string& text, const cv::Mat& sample
   return way;
 }
 
-double ThreadMs() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
-}
-
 double HeapMb() {
   const struct mallinfo2 info = mallinfo2();
   return static_cast<double>(info.uordblks + info.hblkhd) / 1048576.0;
-}
-
-std::uint64_t Mixed(std::uint64_t x) {  // splitmix64
-  x += 0x9e3779b97f4a7c15ull;
-  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ull;
-  x = (x ^ (x >> 27)) * 0x94d049bb133111ebull;
-  return x ^ (x >> 31);
 }
 
 // Landmarks whose descriptors are blends of two real ones, and sights of them.
@@ -95,7 +83,7 @@ class Landmarks {
   explicit Landmarks(cv::Mat real) : real_(std::move(real)) {}
 
   void Write(std::uint64_t landmark, void* row) const {
-    std::minstd_rand random(static_cast<std::uint32_t>(Mixed(landmark)));
+    std::minstd_rand random(static_cast<std::uint32_t>(synthetic::Random(landmark).Bits()));
     const int a = Pick(random);
     const int b = Pick(random);
     if (real_.type() == CV_32F) {
@@ -110,7 +98,7 @@ class Landmarks {
 
   void WriteSight(std::uint64_t landmark, std::uint64_t sight, void* row) const {
     Write(landmark, row);
-    std::minstd_rand random(static_cast<std::uint32_t>(Mixed(sight)));
+    std::minstd_rand random(static_cast<std::uint32_t>(synthetic::Random(sight).Bits()));
     if (real_.type() == CV_32F) {
       const float* other = real_.ptr<float>(Pick(random));
       float* out = static_cast<float*>(row);
@@ -127,7 +115,7 @@ class Landmarks {
  private:
   static float Unit(std::minstd_rand& random) { return static_cast<float>(random()) / 2147483648.0f; }
   int Pick(std::minstd_rand& random) const {
-    return static_cast<int>(Mixed(random()) % static_cast<std::uint64_t>(real_.rows));
+    return static_cast<int>(synthetic::Random(random()).Bits() % static_cast<std::uint64_t>(real_.rows));
   }
   // SIFT's values are whole numbers, SURF's are below 1.
   float Rounded(float value) const { return real_.cols == 128 ? std::round(value) : value; }
@@ -229,7 +217,7 @@ class Study {
     const int words = places_ * kWordsPerPlace;
     cv::Mat queries(images_ * kFeatures, words_.cols, words_.type());
     for (int i = 0; i < queries.rows; ++i) {
-      const std::uint64_t chance = Mixed(static_cast<std::uint64_t>(i) + 7919);
+      const std::uint64_t chance = synthetic::Random(static_cast<std::uint64_t>(i) + 7919).Bits();
       const bool seen = i % kFeatures < kSeen;
       const std::uint64_t landmark =
           seen ? chance % static_cast<std::uint64_t>(words) : (1ull << 40) + chance % (1ull << 30);
@@ -238,10 +226,10 @@ class Study {
     for (Cost& cost : costs_) cost.search_ms = 0, cost.found.clear();
     for (int image = 0; image < images_; ++image) {
       for (Cost& cost : costs_) {
-        const double start = ThreadMs();
+        const double start = ThreadCpuMilliseconds();
         std::vector<TwoNearest> found =
             cost.way->Search(queries.rowRange(image * kFeatures, (image + 1) * kFeatures));
-        cost.search_ms += ThreadMs() - start;
+        cost.search_ms += ThreadCpuMilliseconds() - start;
         cost.found.insert(cost.found.end(), found.begin(), found.end());
       }
     }
@@ -255,9 +243,9 @@ class Study {
     const double memory = HeapMb();
     for (int place = places_; place < end; ++place) {
       const int first = place * kWordsPerPlace;
-      const double start = ThreadMs();
+      const double start = ThreadCpuMilliseconds();
       cost.way->Add(first, words_.rowRange(first, first + kWordsPerPlace));
-      const double ms = ThreadMs() - start;
+      const double ms = ThreadCpuMilliseconds() - start;
       cost.worst_ms = std::max(cost.worst_ms, ms);
       if (place >= counted_from_) cost.add_ms += ms;
     }

@@ -21,6 +21,7 @@
 #include <string>
 #include <vector>
 
+#include "synthetic_random.h"
 #include "tutti/loopclosure/detector.h"
 
 namespace {
@@ -28,14 +29,6 @@ namespace {
 constexpr int kStretch = 1000;  // locations between returns
 constexpr int kReturn = 200;    // locations of a return
 constexpr int kReturnTo = 800;  // places back, where it starts
-
-// Spreads the bits of a number (splitmix64): neighbouring landmarks have nothing in common.
-std::uint64_t Mixed(std::uint64_t x) {
-  x += 0x9e3779b97f4a7c15ull;
-  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ull;
-  x = (x ^ (x >> 27)) * 0x94d049bb133111ebull;
-  return x ^ (x >> 31);
-}
 
 // Descriptor of a landmark for a member, with noise of its own at each sight.
 class Landmarks {
@@ -49,8 +42,9 @@ class Landmarks {
     result.descriptors.create(features_, width, member == 2 ? CV_8U : CV_32F);
     for (int i = 0; i < features_; ++i) {
       const std::uint64_t landmark = static_cast<std::uint64_t>(place * (features_ / 2) + i);
-      std::minstd_rand generator(
-          static_cast<std::uint32_t>(Mixed(3 * landmark + static_cast<unsigned>(member))));
+      // Mixed first: neighbouring landmarks have nothing in common.
+      std::minstd_rand generator(static_cast<std::uint32_t>(
+          tutti::synthetic::Random(3 * landmark + static_cast<unsigned>(member)).Bits()));
       std::minstd_rand noise(static_cast<std::uint32_t>(sight * 977 + static_cast<std::uint64_t>(i) + 1));
       const int line = i / 20;
       result.keypoints.emplace_back(static_cast<float>(i % 20) * 30.0f, static_cast<float>(line) * 20.0f,

@@ -18,13 +18,17 @@ constexpr double kLeastMean = 0.02;        // of a place's counts
 constexpr double kMostAttraction = 3;      // a place's level lies within so many times the common one
 constexpr double kLeastShare = 0.15;       // of the levels, however little an image repeats
 constexpr double kLeastRepeated = 0.1;     // a member that repeats nothing may come to
+constexpr double kLongestLasting = 40;     // images that the share of lasting aliases stands for at most
+constexpr int kFollows = 2;                // slots from the image before's to the next one's alias
 
 std::size_t Index(int slot) { return static_cast<std::size_t>(slot); }
 
-// Largest count of the places, and of those that are not near.
+// Largest count of the places, and of those that are not near, each with its slot (-1: no place has any).
 struct Largest {
   double of_all = 0;
   double of_far = 0;
+  int all_slot = -1;
+  int far_slot = -1;
 };
 
 Largest LargestOf(const std::vector<double>& counts, const std::vector<int>& working_memory,
@@ -33,9 +37,16 @@ Largest LargestOf(const std::vector<double>& counts, const std::vector<int>& wor
   auto next_near = near.begin();
   for (const int slot : working_memory) {
     const double count = counts[Index(slot)];
-    largest.of_all = std::max(largest.of_all, count);
+    if (count > largest.of_all) {
+      largest.of_all = count;
+      largest.all_slot = slot;
+    }
     while (next_near != near.end() && *next_near < slot) ++next_near;
-    if (next_near == near.end() || *next_near != slot) largest.of_far = std::max(largest.of_far, count);
+    const bool far = next_near == near.end() || *next_near != slot;
+    if (far && count > largest.of_far) {
+      largest.of_far = count;
+      largest.far_slot = slot;
+    }
   }
   return largest;
 }
@@ -57,7 +68,7 @@ double AliasEvidence::LevelOf(int slot) const {
 }
 
 Belief AliasEvidence::Likelihood(const std::vector<double>& counts, const std::vector<int>& working_memory,
-                                 double words, double repeated) {
+                                 double words, double repeated, double overlap) {
   if (first_images_ < kFirstImages) {
     words_sum_ += words;
     ++first_images_;
@@ -65,23 +76,29 @@ Belief AliasEvidence::Likelihood(const std::vector<double>& counts, const std::v
   }
   log_repeated_now_ = std::log(repeated + kLeastRepeated);
   const double share = repeated_images_ > 0 ? std::exp(log_repeated_now_ - log_repeated_) : 1.0;
-  return Of(counts, working_memory, std::clamp(share, kLeastShare, 1.0));
+  const double said_before = std::min(1.0, options_.persistence * lasting_) * std::clamp(overlap, 0.0, 1.0);
+  return Weighed(counts, working_memory, std::clamp(share, kLeastShare, 1.0), 1.0 - said_before);
 }
 
-Belief AliasEvidence::Of(const std::vector<double>& counts, const std::vector<int>& working_memory,
-                         double share) const {
+Belief AliasEvidence::Of(const std::vector<double>& counts, const std::vector<int>& working_memory) const {
+  return Weighed(counts, working_memory, 1.0, 1.0);
+}
+
+Belief AliasEvidence::Weighed(const std::vector<double>& counts, const std::vector<int>& working_memory,
+                              double share, double say) const {
   Belief likelihood;
   likelihood.places.assign(counts.size(), 0.0);
+  const double sharpness = say * options_.sharpness;
   const double least = std::exp(options_.floor);
   // Most places share too little to reach the least, whatever their own level: they need no more arithmetic.
   const double lowest_level = share * options_.alias_share * Level() / kMostAttraction;
-  const double enough = std::exp(options_.floor / options_.sharpness) * (lowest_level + 1.0) - 1.0;
+  const double enough = std::exp(options_.floor / sharpness) * (lowest_level + 1.0) - 1.0;
   for (const int slot : working_memory) {
     const double count = counts[Index(slot)];
     double& value = likelihood.places[Index(slot)];
     value = least;
     if (count <= 0.0 || count < enough) continue;
-    value = std::max(least, std::pow((count + 1.0) / (share * LevelOf(slot) + 1.0), options_.sharpness));
+    value = std::max(least, std::pow((count + 1.0) / (share * LevelOf(slot) + 1.0), sharpness));
   }
   return likelihood;
 }
@@ -93,6 +110,7 @@ void AliasEvidence::Learn(const std::vector<double>& counts, const std::vector<i
   images_ = std::min(kLongestMean, images_ + 1.0);
   log_level_ += new_place * (std::log1p(largest.of_all) - log_level_) / images_;
   log_level_ += (1.0 - new_place) * (std::log1p(largest.of_far) - log_level_) / images_;
+  LearnLasting(new_place > 0.5 ? largest.all_slot : largest.far_slot);
   if (new_place > 0.5) {
     repeated_images_ = std::min(kLongestMean, repeated_images_ + 1.0);
     log_repeated_ += (log_repeated_now_ - log_repeated_) / repeated_images_;
@@ -110,6 +128,12 @@ void AliasEvidence::Learn(const std::vector<double>& counts, const std::vector<i
   }
 }
 
+void AliasEvidence::LearnLasting(int alias) {
+  const bool follows = alias >= 0 && last_alias_ >= 0 && std::abs(alias - last_alias_) <= kFollows;
+  lasting_ += ((follows ? 1.0 : 0.0) - lasting_) / std::min(kLongestLasting, images_);
+  last_alias_ = alias;
+}
+
 void AliasEvidence::SaveLevel(internal::ByteWriter& out) const {
   out.Put(log_level_);
   out.Put(words_sum_);
@@ -117,6 +141,8 @@ void AliasEvidence::SaveLevel(internal::ByteWriter& out) const {
   out.Put(images_);
   out.Put(log_repeated_);
   out.Put(repeated_images_);
+  out.Put(lasting_);
+  out.Put<std::int32_t>(last_alias_);
 }
 
 void AliasEvidence::LoadLevel(internal::ByteReader& in) {
@@ -126,10 +152,12 @@ void AliasEvidence::LoadLevel(internal::ByteReader& in) {
   images_ = in.Get<double>();
   log_repeated_ = in.Get<double>();
   repeated_images_ = in.Get<double>();
+  lasting_ = in.Get<double>();
+  last_alias_ = in.Get<std::int32_t>();
   const bool good = log_level_ >= 0 && log_level_ < 50 && words_sum_ >= 0 && std::isfinite(words_sum_) &&
                     first_images_ >= 0 && first_images_ <= kFirstImages && images_ >= 1 &&
                     images_ <= kLongestMean && std::abs(log_repeated_) < 50 && repeated_images_ >= 0 &&
-                    repeated_images_ <= kLongestMean;
+                    repeated_images_ <= kLongestMean && lasting_ >= 0 && lasting_ <= 1 && last_alias_ >= -1;
   if (!good) in.Damaged("an alias level");
 }
 

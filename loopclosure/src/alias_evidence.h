@@ -27,6 +27,13 @@ class ByteWriter;
 /// its levels are lower by what it shares with the few images just before, compared with what images of new
 /// places usually do.
 ///
+/// A house that stands twice stays in sight for several images, and each of them says the same again. How
+/// often aliases last here, s, is learnt as well: the share of images whose best wrong place follows that of
+/// the image before. Evidence is then no more than what is new in the image, with v the share of it that the
+/// image before has, too:
+///
+///   log L_i = max(floor, (1 - v min(1, persistence s)) beta ln[(C_i + 1) / (Lambda_i + 1)]).
+///
 /// So shared words speak for a place only beyond what resemblance alone brings about, few of them speak
 /// against all places, and an image without any says "new place", however many places there are.
 class AliasEvidence {
@@ -37,13 +44,13 @@ class AliasEvidence {
   explicit AliasEvidence(const EvidenceOptions& options) : options_(options) {}
 
   /// The likelihood of an image with these counts (by slot) over the places of `working_memory`. `words`:
-  /// that the image has; `repeated`: its mean count for the few images before.
+  /// that the image has; `repeated`: its mean count for the few images before; `overlap`, 0 to 1: what the
+  /// image before has of its own count.
   Belief Likelihood(const std::vector<double>& counts, const std::vector<int>& working_memory, double words,
-                    double repeated);
+                    double repeated, double overlap);
 
-  /// The same for an image that is no location, with the levels times `share`: nothing is learnt.
-  Belief Of(const std::vector<double>& counts, const std::vector<int>& working_memory,
-            double share = 1) const;
+  /// The same for an image by itself, which is no location: nothing is learnt.
+  Belief Of(const std::vector<double>& counts, const std::vector<int>& working_memory) const;
 
   /// Learns from the same image, after the filter's step: `near` are the slots of the most probable place and
   /// its neighbours, ascending; `new_place` is the posterior of the new place.
@@ -54,6 +61,8 @@ class AliasEvidence {
   double Level() const;
   /// Lambda_i of one slot.
   double LevelOf(int slot) const;
+  /// s, 0 to 1: how often the best wrong place follows that of the image before.
+  double Lasting() const { return lasting_; }
 
   /// Appends the whole state.
   void Save(internal::ByteWriter& out) const;
@@ -65,6 +74,11 @@ class AliasEvidence {
   void LoadLevel(internal::ByteReader& in);
 
  private:
+  // With the levels times `share` and the sharpness times `say`.
+  Belief Weighed(const std::vector<double>& counts, const std::vector<int>& working_memory, double share,
+                 double say) const;
+  void LearnLasting(int alias);
+
   EvidenceOptions options_;
   double log_level_ = 0;      // ln(Lambda + 1)
   double words_sum_ = 0;      // of the first images
@@ -77,6 +91,8 @@ class AliasEvidence {
   double log_repeated_ = 0;     // running mean of ln(repeated) over images of new places
   double repeated_images_ = 0;  // that it stands for
   double log_repeated_now_ = 0;
+  double lasting_ = 0;   // s
+  int last_alias_ = -1;  // slot of the best wrong place of the image before, -1: none
 };
 
 /// How much a member counts in the sum of all: by what it shows of the same place against what it shows of

@@ -20,7 +20,7 @@ using State = LocationMemory::State;
 namespace {
 
 constexpr char kMagic[8] = {'T', 'U', 'T', 'T', 'I', 'L', 'C', '\n'};
-constexpr std::uint32_t kVersion = 4;
+constexpr std::uint32_t kVersion = 5;
 constexpr std::uint32_t kByteOrder = 0x01020304;  // reads as another number on a machine of the other order
 
 enum class Tag : std::uint32_t { kOptions = 1, kMember, kMemory, kUnion, kView, kRecord, kStatistics, kEnd };

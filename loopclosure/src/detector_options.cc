@@ -60,6 +60,7 @@ std::string EvidenceOptions::Validate() const {
   if (!(alias_share > 0 && alias_share <= 3)) return OutOf("evidence.alias_share", "above 0, at most 3");
   if (!(floor < 0 && floor >= -10)) return OutOf("evidence.floor", "below 0, at least -10");
   if (!(attraction >= 0 && attraction <= 2)) return OutOf("evidence.attraction", "0 to 2");
+  if (!(persistence >= 0 && persistence <= 10)) return OutOf("evidence.persistence", "0 to 10");
   return {};
 }
 

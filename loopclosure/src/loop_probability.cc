@@ -7,8 +7,8 @@ namespace tutti::internal {
 
 double LoopProbability(const Verification& verification) {
   const double mass = std::clamp(verification.mass, 1e-4, 1.0 - 1e-4);
-  const double sure = std::clamp(-verification.log_nfa, 0.0, 200.0) / 100.0;
-  const double logit = 1.719 + 0.967 * std::log(mass / (1.0 - mass)) + 2.887 * sure;
+  const double sure = std::clamp(-verification.log_nfa, 0.0, 300.0) / 100.0;
+  const double logit = 3.189 + 1.162 * std::log(mass / (1.0 - mass)) + 1.352 * sure;
   return 1.0 / (1.0 + std::exp(-logit));
 }
 

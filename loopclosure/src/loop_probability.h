@@ -7,7 +7,7 @@ namespace tutti::internal {
 
 /// Probability that the image shows the place that geometry has looked at, by logistic regression on
 ///   logit of the posterior mass around the place (4 graph levels),
-///   -log_nfa, 0 to 200: how little chance explains the inliers; beyond that nothing wrong was ever seen.
+///   -log_nfa, 0 to 300: how little chance explains the inliers; beyond that nothing wrong was ever seen.
 /// Spread of the motion and coverage of the image were in the regression, too, and add nothing to these two.
 /// Its three numbers come from bench/fit_loop_probability, from loops of real, changed and synthetic images
 /// that no table is measured on (docs/loop-closure.md section 5).

@@ -103,6 +103,15 @@ void MemorySystem::Repeat(FilterUnit& unit) const {
   unit.weight.Repeat(unit.repeated);
 }
 
+// Share of what the image counts for itself that the one before has, too.
+double MemorySystem::Overlap(const std::vector<double>& counts) const {
+  const std::deque<int>& recent = memory_.short_term_memory();
+  if (recent.size() < 2) return 0.0;
+  const double own = counts[static_cast<std::size_t>(recent.back())];
+  const double before = counts[static_cast<std::size_t>(recent[recent.size() - 2])];
+  return std::min(1.0, before / std::max(1.0, own));
+}
+
 void MemorySystem::UpdateLikelihood(std::size_t u) {
   FilterUnit& unit = units_[u];
   if (!unit.took_part()) return;
@@ -111,7 +120,8 @@ void MemorySystem::UpdateLikelihood(std::size_t u) {
     unit.counts = unit.is_dense ? unit.dense.Counts(places) : unit.likelihood.Counts(unit.seen);
     Repeat(unit);
     if (places.empty()) return;
-    unit.image_likelihood = unit.alias.Likelihood(unit.counts, places, unit.seen.Amount(), unit.repeated);
+    unit.image_likelihood =
+        unit.alias.Likelihood(unit.counts, places, unit.seen.Amount(), unit.repeated, Overlap(unit.counts));
     ApplyGains(gains_, places, unit.image_likelihood);
     if (options_.keep_evidence) unit.scores = unit.counts;
     return;
@@ -183,8 +193,8 @@ void MemorySystem::StepJoint() {
     words += units_[u].took_part() ? units_[u].seen.Amount() : 0;
     repeated += weights[u] * units_[u].repeated;
   }
-  joint_->image_likelihood =
-      joint_->alias.Likelihood(joint_->counts, memory_.working_memory(), words, repeated);
+  joint_->image_likelihood = joint_->alias.Likelihood(joint_->counts, memory_.working_memory(), words,
+                                                      repeated, Overlap(joint_->counts));
   ApplyGains(gains_, memory_.working_memory(), joint_->image_likelihood);
   joint_->filter.Step(transition_, memory_.working_memory(), joint_->image_likelihood);
 }

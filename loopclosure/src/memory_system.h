@@ -148,6 +148,7 @@ class MemorySystem {
   void Relinked(int a, int b);
   bool Counts() const { return options_.evidence.kind == EvidenceKind::kCounts; }
   void Repeat(FilterUnit& unit) const;
+  double Overlap(const std::vector<double>& counts) const;
   bool JointTookPart() const;
   UnitCounts PresentCounts() const;
   std::vector<double> Weights(const UnitCounts& counts) const;

@@ -36,7 +36,7 @@ AliasEvidence Experienced(int n, double most) {
   std::mt19937 random(1);
   for (int i = 0; i < 300; ++i) {
     const std::vector<double> counts = Resemblances(n, most, random);
-    evidence.Likelihood(counts, Places(n), 1200, 20);
+    evidence.Likelihood(counts, Places(n), 1200, 20, 0);
     evidence.Learn(counts, Places(n), {}, 1.0);
   }
   return evidence;
@@ -53,7 +53,7 @@ TEST(AliasEvidence, NoWordInCommonSaysNewPlaceHoweverManyPlacesThereAre) {
     const std::vector<double> nothing(static_cast<std::size_t>(memory.size()), 0.0);
     for (int image = 0; image < 30; ++image) {
       filter.Step(transition, memory.working_memory(),
-                  evidence.Likelihood(nothing, memory.working_memory(), 0, 0));
+                  evidence.Likelihood(nothing, memory.working_memory(), 0, 0, 0));
     }
     EXPECT_LT(filter.posterior().Hypothesis(), LoopDetectorOptions().propose_threshold) << n << " places";
   }
@@ -67,7 +67,7 @@ TEST(AliasEvidence, TheLevelIsWhatTheBestWrongPlaceReaches) {
 
 TEST(AliasEvidence, BeforeAnythingIsKnownTheLevelIsHighAndFallsWithExperience) {
   AliasEvidence evidence{EvidenceOptions()};
-  evidence.Likelihood(std::vector<double>(50, 0.0), Places(50), 1200, 20);
+  evidence.Likelihood(std::vector<double>(50, 0.0), Places(50), 1200, 20, 0);
   EXPECT_NEAR(evidence.Level(), 0.02 * 1200, 1e-9);
   EXPECT_LT(Experienced(50, 3.0).Level(), 4.0);
 }
@@ -101,12 +101,13 @@ TEST(AliasEvidence, AnImageThatRepeatsLittleNeedsLess) {
   std::vector<double> counts(100, 0.5);
   counts[7] = 5.0;
   AliasEvidence same = evidence;
-  const double as_usual = same.Likelihood(counts, Places(100), 1200, 20).places[7];
-  const double in_the_dark = evidence.Likelihood(counts, Places(100), 1200, 4).places[7];
+  const double as_usual = same.Likelihood(counts, Places(100), 1200, 20, 0).places[7];
+  const double in_the_dark = evidence.Likelihood(counts, Places(100), 1200, 4, 0).places[7];
   EXPECT_LT(as_usual, 2.0);
   EXPECT_GT(in_the_dark, 5.0);
   AliasEvidence bright = Experienced(100, 5.0);
-  EXPECT_EQ(bright.Likelihood(counts, Places(100), 1200, 80).places[7], as_usual);  // never more than usual
+  EXPECT_EQ(bright.Likelihood(counts, Places(100), 1200, 80, 0).places[7],
+            as_usual);  // never more than usual
 }
 
 TEST(AliasEvidence, APlaceThatEveryImageResemblesNeedsMore) {
@@ -115,11 +116,51 @@ TEST(AliasEvidence, APlaceThatEveryImageResemblesNeedsMore) {
   for (int i = 0; i < 200; ++i) {
     std::vector<double> counts = Resemblances(100, 4.0, random);
     counts[11] = 12.0;  // a blank wall
-    evidence.Likelihood(counts, Places(100), 1200, 20);
+    evidence.Likelihood(counts, Places(100), 1200, 20, 0);
     evidence.Learn(counts, Places(100), {}, 1.0);
   }
   EXPECT_GT(evidence.LevelOf(11), 1.5 * evidence.LevelOf(12));
   EXPECT_LE(evidence.LevelOf(11), 3.0 * EvidenceOptions().alias_share * evidence.Level() + 1e-9);
+}
+
+// After many images of a new place in which the best wrong place lasts for so many images in a row.
+AliasEvidence AfterAliasesThatLast(int images) {
+  AliasEvidence evidence{EvidenceOptions()};
+  std::mt19937 random(4);
+  std::uniform_int_distribution<int> anywhere(0, 80);
+  int alias = 0;
+  for (int i = 0; i < 300; ++i) {
+    alias = i % images == 0 ? anywhere(random) : alias + 1;
+    std::vector<double> counts = Resemblances(100, 4.0, random);
+    counts[static_cast<std::size_t>(alias)] = 6.0;
+    evidence.Likelihood(counts, Places(100), 1200, 20, 0.7);
+    evidence.Learn(counts, Places(100), {}, 1.0);
+  }
+  return evidence;
+}
+
+TEST(AliasEvidence, LearnsHowLongWrongPlacesLast) {
+  EXPECT_LT(AfterAliasesThatLast(1).Lasting(), 0.2);
+  EXPECT_NEAR(AfterAliasesThatLast(2).Lasting(), 0.5, 0.15);
+  EXPECT_GT(AfterAliasesThatLast(10).Lasting(), 0.8);
+}
+
+TEST(AliasEvidence, WhereWrongPlacesLastSuccessiveImagesSayOnlyWhatIsNewInThem) {
+  std::vector<double> counts(100, 0.0);
+  counts[7] = 40.0;
+  AliasEvidence lasting = AfterAliasesThatLast(10);
+  const Belief by_itself = lasting.Likelihood(counts, Places(100), 1200, 20, 0.0);
+  const Belief half_new = lasting.Likelihood(counts, Places(100), 1200, 20, 0.5);
+  EXPECT_NEAR(std::log(half_new.places[7]), 0.5 * std::log(by_itself.places[7]), 1e-9);
+  EXPECT_EQ(lasting.Likelihood(counts, Places(100), 1200, 20, 1.0).places[7], 1.0);
+  // What speaks against a place is not weakened: it would be taken for a revisit.
+  EXPECT_EQ(half_new.places[8], by_itself.places[8]);
+  EXPECT_LT(half_new.places[8], 1.0);
+  // Where no wrong place lasts, successive images are believed nearly as any.
+  AliasEvidence passing = AfterAliasesThatLast(1);
+  const double apart = passing.Likelihood(counts, Places(100), 1200, 20, 0.0).places[7];
+  EXPECT_GT(std::log(passing.Likelihood(counts, Places(100), 1200, 20, 0.5).places[7]),
+            0.75 * std::log(apart));
 }
 
 TEST(AliasEvidence, GoesOnWhereItWasSavedAndRefusesDamage) {
@@ -131,8 +172,9 @@ TEST(AliasEvidence, GoesOnWhereItWasSavedAndRefusesDamage) {
   loaded.Load(in);
   EXPECT_EQ(loaded.Level(), evidence.Level());
   for (int slot = 0; slot < 50; ++slot) EXPECT_EQ(loaded.LevelOf(slot), evidence.LevelOf(slot));
-  // Level, sum of words, first images (4 bytes), images, what images repeat, and of how many.
-  for (const std::size_t at : {0, 8, 20, 28, 36}) {
+  EXPECT_EQ(loaded.Lasting(), evidence.Lasting());
+  // Level, sum of words, first images (4 bytes), images, what images repeat, of how many, what lasts.
+  for (const std::size_t at : {0, 8, 20, 28, 36, 44}) {
     std::string damaged = out.bytes();
     const double nan = std::numeric_limits<double>::quiet_NaN();
     std::memcpy(damaged.data() + at, &nan, sizeof nan);

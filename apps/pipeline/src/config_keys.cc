@@ -222,6 +222,8 @@ void ConfigTable::AddEvidence(EvidenceOptions& o) {
       "share of the alias level that a place must reach to be more likely than a new one");
   Add("floor", o.floor, "least logarithm of a likelihood, below 0");
   Add("attraction", o.attraction, "how much more a place must show that many images resemble, 0 to 2");
+  Add("persistence", o.persistence,
+      "how much less successive images say where wrong places stay alike for several of them, 0 to 10");
 }
 
 void ConfigTable::AddVocabulary(VocabularyOptions& o) {

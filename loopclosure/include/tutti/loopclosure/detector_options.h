@@ -81,13 +81,15 @@ struct VocabularyOptions {
 
 /// Options of the likelihood of places (docs/loop-closure.md section 2).
 struct EvidenceOptions {
-  EvidenceKind kind = EvidenceKind::kCounts;  ///< the next four are of kCounts
-  double sharpness = 2.0;     ///< exponent of a count beyond the alias level: beta, above 0, at most 10
-  double alias_share = 0.85;  ///< share of the alias level that a place must reach to be more likely than a
-                              ///< new one, above 0, at most 3
-  double floor = -1.0;        ///< least logarithm of a likelihood, below 0, at least -10
-  double attraction = 0.75;   ///< how much more a place must show that many images resemble: exponent of its
-                              ///< mean count, 0 (no more) to 2
+  EvidenceKind kind = EvidenceKind::kCounts;  ///< the next five are of kCounts
+  double sharpness = 2.0;    ///< exponent of a count beyond the alias level: beta, above 0, at most 10
+  double alias_share = 0.7;  ///< share of the alias level that a place must reach to be more likely than a
+                             ///< new one, above 0, at most 3
+  double floor = -1.0;       ///< least logarithm of a likelihood, below 0, at least -10
+  double attraction = 0.9;   ///< how much more a place must show that many images resemble: exponent of its
+                             ///< mean count, 0 (no more) to 2
+  double persistence = 2.5;  ///< how much less successive images say, which show the same, where wrong places
+                             ///< stay alike for several images: 0 (each says all that it shows) to 10
 
   /// Empty if usable, else what is wrong and what to do.
   std::string Validate() const;

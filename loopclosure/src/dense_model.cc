@@ -227,7 +227,7 @@ void SaveDescriptor(const cv::Mat& descriptor, internal::ByteWriter& out) {
 cv::Mat LoadDescriptor(internal::ByteReader& in) {
   const std::vector<float> values = in.GetVector<float>();
   if (values.empty()) return {};
-  const cv::Mat descriptor = cv::Mat(values, true).reshape(1, 1);
+  cv::Mat descriptor = cv::Mat(values, true).reshape(1, 1);
   if (!cv::checkRange(descriptor) || !(std::abs(cv::norm(descriptor) - 1.0) < 1e-3)) {
     in.Damaged("a descriptor that is not of length 1");
   }

@@ -54,6 +54,7 @@ class LoopDetector::Impl {
   void CheckQuery(const LoopQuery& query) const;
   void CheckContent(const LoopQuery& query) const;
   void CheckCallersFeatures(const LoopQuery& query, const std::string& which) const;
+  void CheckFeaturesOf(const std::string& name, const Features& features, const std::string& which) const;
   void CheckMemberFeatures(const LoopQuery& query, const std::string& which) const;
   std::vector<Features> Extract(const LoopQuery& query) const;
   std::vector<std::vector<TwoNearest>> SearchWords(const std::vector<Features>& features,

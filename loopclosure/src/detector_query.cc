@@ -109,21 +109,24 @@ void LoopDetector::Impl::CheckCallersFeatures(const LoopQuery& query, const std:
   }
 }
 
-void LoopDetector::Impl::CheckMemberFeatures(const LoopQuery& query, const std::string& which) const {
-  for (const auto& [name, f] : query.member_features) {
-    const auto member = std::find_if(members_.begin(), members_.end(),
-                                     [&name = name](const Member& m) { return m.name() == name; });
-    if (member == members_.end()) {
-      throw InputError(which + "features of member '" + name + "', which is not in options.members");
-    }
-    if (member->dense()) {
-      CheckDense(f, member->width(), which + name + ": ");
-      continue;
-    }
-    CheckKeypoints(f.keypoints, f.descriptors, which + name + ": ");
-    const std::string problem = member->vocabulary().Problem(f.descriptors);
-    if (!problem.empty()) throw InputError(which + name + ": " + problem);
+void LoopDetector::Impl::CheckFeaturesOf(const std::string& name, const Features& features,
+                                         const std::string& which) const {
+  const auto member =
+      std::find_if(members_.begin(), members_.end(), [&](const Member& m) { return m.name() == name; });
+  if (member == members_.end()) {
+    throw InputError(which + "features of member '" + name + "', which is not in options.members");
   }
+  if (member->dense()) {
+    CheckDense(features, member->width(), which + name + ": ");
+    return;
+  }
+  CheckKeypoints(features.keypoints, features.descriptors, which + name + ": ");
+  const std::string problem = member->vocabulary().Problem(features.descriptors);
+  if (!problem.empty()) throw InputError(which + name + ": " + problem);
+}
+
+void LoopDetector::Impl::CheckMemberFeatures(const LoopQuery& query, const std::string& which) const {
+  for (const auto& [name, features] : query.member_features) CheckFeaturesOf(name, features, which);
   for (const Member& member : members_) {
     if (member.external() && query.member_features.count(member.name()) == 0) {
       throw InputError(which + "member '" + member.name() +

@@ -215,6 +215,7 @@ TEST(MemberWeight, LearnsNothingFromWhereTheImageWasTaken) {
 std::vector<double> Alike(const std::vector<double>& counts, double noise, std::mt19937& random) {
   std::normal_distribution<double> normal(0.0, noise);
   std::vector<double> alike;
+  alike.reserve(counts.size());
   for (const double count : counts) alike.push_back(std::max(0.0, count + normal(random)));
   return alike;
 }

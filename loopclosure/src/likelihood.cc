@@ -27,7 +27,10 @@ void LikelihoodModel::Restore(int slot, const Signature& signature) {
 
 void LikelihoodModel::Insert(int slot) {
   for (const Signature::Entry& entry : signature(slot).entries()) {
-    postings_[entry.word].push_back({slot, entry.count});
+    std::vector<Posting>& list = postings_[entry.word];
+    const auto later = std::upper_bound(list.begin(), list.end(), slot,
+                                        [](int own, const Posting& other) { return own < other.slot; });
+    list.insert(later, {slot, entry.count});
   }
 }
 
@@ -119,7 +122,18 @@ struct PlacedWord {
 
 }  // namespace
 
-std::vector<double> LikelihoodModel::Counts(const SeenWords& query) const {
+template <typename Call>
+void LikelihoodModel::ForEachReturn(const std::vector<Posting>& list, int settled, const Call& call) const {
+  int next = size() - 1;
+  bool in_sight = true;
+  for (auto posting = list.rbegin(); posting != list.rend(); ++posting) {
+    in_sight = in_sight && next - posting->slot <= kStillInSight;
+    next = posting->slot;
+    if (!in_sight || posting->slot >= settled) call(*posting);
+  }
+}
+
+std::vector<double> LikelihoodModel::Counts(const SeenWords& query, int settled) const {
   std::vector<double> counts(signatures_.size(), 0.0);
   if (locations_ < 2) return counts;
   std::vector<PlacedWord> placed;
@@ -141,8 +155,10 @@ std::vector<double> LikelihoodModel::Counts(const SeenWords& query) const {
       const auto same = std::equal_range(sorted.begin(), sorted.end(), word);
       const double value = std::log10(static_cast<double>(locations_) / static_cast<double>(list->size())) /
                            (all * static_cast<double>(same.second - same.first));
-      for (const Posting& posting : *list) {
-        if (value > 0.0) in_cell.Add(static_cast<std::size_t>(posting.slot), posting.count * value);
+      if (value > 0.0) {
+        ForEachReturn(*list, settled, [&](const Posting& posting) {
+          in_cell.Add(static_cast<std::size_t>(posting.slot), posting.count * value);
+        });
       }
     }
     const bool last = i + 1 == placed.size();

@@ -117,7 +117,8 @@ void MemorySystem::UpdateLikelihood(std::size_t u) {
   if (!unit.took_part()) return;
   const std::vector<int>& places = memory_.working_memory();
   if (Counts()) {
-    unit.counts = unit.is_dense ? unit.dense.Counts(places) : unit.likelihood.Counts(unit.seen);
+    const int settled = memory_.short_term_memory().front();
+    unit.counts = unit.is_dense ? unit.dense.Counts(places) : unit.likelihood.Counts(unit.seen, settled);
     Repeat(unit);
     if (places.empty()) return;
     unit.image_likelihood =

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -72,6 +73,39 @@ TEST(Likelihood, WhatAgreesInOneSpotCountsLessThanWhatAgreesAllOver) {
     all_over.push_back(w * 2);
   }
   EXPECT_GT(model.Counts(Seen(words, all_over))[3], 3 * model.Counts(Seen(words, one_spot))[3]);
+}
+
+TEST(Likelihood, WhatHasBeenInSightEverSinceIsNoSignOfAReturn) {
+  // Word 1 moves along from slot 6 on, seen again after five slots; word 2 is back in the newest.
+  LikelihoodModel model(LikelihoodKind::kTfIdf);
+  const std::vector<int> with_one = {0, 6, 7, 12, 13};
+  for (int slot = 0; slot < 14; ++slot) {
+    std::vector<int> words = {100 + slot};
+    if (std::count(with_one.begin(), with_one.end(), slot) > 0) words.push_back(1);
+    if (slot == 0 || slot == 13) words.push_back(2);
+    model.Add(Signature(words));
+  }
+  const SeenWords newest = Seen({1, 2}, {0, 7});
+  const std::vector<double> all = model.Counts(newest);
+  const std::vector<double> returns = model.Counts(newest, 12);
+  for (const int slot : {6, 7}) {
+    EXPECT_GT(all[static_cast<std::size_t>(slot)], 0.0);
+    EXPECT_EQ(returns[static_cast<std::size_t>(slot)], 0.0) << slot;
+  }
+  // It was out of sight after slot 0; what is not settled counts in full.
+  for (const int slot : {0, 12, 13}) {
+    EXPECT_EQ(returns[static_cast<std::size_t>(slot)], all[static_cast<std::size_t>(slot)]) << slot;
+  }
+}
+
+TEST(Likelihood, ASlotThatComesBackCountsAsIfItHadNeverBeenAway) {
+  LikelihoodModel model(LikelihoodKind::kTfIdf);
+  for (int slot = 0; slot < 8; ++slot) model.Add(Signature({1, 10 + slot, 20 + slot % 2}));
+  const SeenWords query = Seen({1, 20, 21, 13}, {0, 2, 4, 6});
+  const std::vector<double> before = model.Counts(query, 6);
+  model.Remove(3);
+  model.Restore(3, Signature({1, 13, 21}));
+  EXPECT_EQ(model.Counts(query, 6), before);
 }
 
 TEST(Likelihood, CellsCoverTheImageAndWhatLiesOutsideIsInTheNearest) {

@@ -1,5 +1,7 @@
 // What bench/evidence_study works on: for every image, member and earlier location the matched words (by
-// inverse frequency) in each cell of the image, with the ground truth, as one binary file.
+// inverse frequency) in each cell of the image, with the ground truth, as one binary file OUT-N for each
+// --still-in-sight N: without the words that have been in sight since a location older than short-term
+// memory, seen again within N images each time, as LikelihoodModel::Counts has it; 0: with all words.
 //
 // int32 images, rows of cells (8 columns); then images x images labels (uint8, row by row: 255 loop, 128
 // ignore, 0 none); then for each image t and member: float32 features, float32 words, and (t + 1) x cells
@@ -9,6 +11,7 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <map>
 #include <opencv2/imgcodecs.hpp>
 #include <unordered_map>
 
@@ -28,40 +31,75 @@ void Put(std::ofstream& out, const T& value) {
   out.write(reinterpret_cast<const char*>(&value), sizeof value);
 }
 
-void PutImage(const Features& features, const cv::Size& size, int image, int cells, Member& member,
-              Postings& postings, std::ofstream& out) {
-  const bool usable = member.Judge(features);
-  std::unordered_map<int, std::vector<int>> cells_of_word;
-  if (usable) {
-    const std::vector<int> words = member.vocabulary().Quantise(features.descriptors);
-    member.vocabulary().AddReferences(Signature(words));
-    for (std::size_t i = 0; i < words.size(); ++i) {
-      const int cell = SeenWords::Cell(features.keypoints[i].pt, size);
-      cells_of_word[words[i]].push_back(std::min(cell, cells - 1));
-    }
+using CellsOfWord = std::map<int, std::vector<int>>;
+
+CellsOfWord Words(const Features& features, const cv::Size& size, int cells, Member& member) {
+  CellsOfWord cells_of_word;
+  const std::vector<int> words = member.vocabulary().Quantise(features.descriptors);
+  member.vocabulary().AddReferences(Signature(words));
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    const int cell = SeenWords::Cell(features.keypoints[i].pt, size);
+    cells_of_word[words[i]].push_back(std::min(cell, cells - 1));
   }
-  for (const auto& [word, in_cells] : cells_of_word) {
-    postings[word].emplace_back(image, static_cast<int>(in_cells.size()));
-  }
+  return cells_of_word;
+}
+
+// Matched words of an image by location and cell.
+std::vector<double> Sums(const CellsOfWord& cells_of_word, const Postings& postings, int image, int cells,
+                         int still_in_sight) {
+  const int settled = image - LoopDetectorOptions().stm_size + 1;
   std::vector<double> sums(static_cast<std::size_t>((image + 1) * cells), 0.0);
   const double all = std::log10(image + 1.0);
   for (const auto& [word, in_cells] : cells_of_word) {
-    const auto& list = postings[word];
+    const auto& list = postings.at(word);
     if (all <= 0) break;
     const double value = std::log10((image + 1.0) / static_cast<double>(list.size())) / all /
                          static_cast<double>(in_cells.size());
-    for (const auto& [location, occurrences] : list) {
+    int next = image;
+    bool in_sight = true;
+    for (auto posting = list.rbegin(); posting != list.rend(); ++posting) {
+      const auto [location, occurrences] = *posting;
+      in_sight = in_sight && next - location <= still_in_sight;
+      next = location;
+      if (in_sight && location < settled && still_in_sight > 0) continue;
       for (const int cell : in_cells)
         sums[static_cast<std::size_t>(location * cells + cell)] += occurrences * value;
     }
   }
-  Put(out, static_cast<float>(features.keypoints.size()));
-  Put(out, static_cast<float>(usable ? features.keypoints.size() : 0));
-  for (const double sum : sums) Put(out, static_cast<std::uint8_t>(std::min(255.0, std::round(16 * sum))));
+  return sums;
 }
 
-int Run(const std::string& folder, const cli::GroundTruthArguments& truth_arguments,
-        const std::string& file) {
+struct Output {
+  int still_in_sight;
+  std::ofstream stream;
+};
+
+void PutImage(const Features& features, const cv::Size& size, int image, int cells, Member& member,
+              Postings& postings, std::vector<Output>& outputs) {
+  const bool usable = member.Judge(features);
+  const CellsOfWord cells_of_word = usable ? Words(features, size, cells, member) : CellsOfWord();
+  for (const auto& [word, in_cells] : cells_of_word) {
+    postings[word].emplace_back(image, static_cast<int>(in_cells.size()));
+  }
+  for (auto& [still_in_sight, out] : outputs) {
+    Put(out, static_cast<float>(features.keypoints.size()));
+    Put(out, static_cast<float>(usable ? features.keypoints.size() : 0));
+    for (const double sum : Sums(cells_of_word, postings, image, cells, still_in_sight))
+      Put(out, static_cast<std::uint8_t>(std::min(255.0, std::round(16 * sum))));
+  }
+}
+
+void PutTruth(int cells, const LoopGroundTruth& truth, std::ofstream& out) {
+  Put(out, truth.size());
+  Put(out, cells / SeenWords::kColumns);
+  for (int row = 0; row < truth.size(); ++row) {
+    for (int column = 0; column < truth.size(); ++column)
+      Put(out, static_cast<std::uint8_t>(truth.At(row, column)));
+  }
+}
+
+int Run(const std::string& folder, const cli::GroundTruthArguments& truth_arguments, const std::string& file,
+        const std::vector<int>& still_in_sight) {
   const auto [images, rights, truth] = cli::LoadImageSet(folder, truth_arguments);
   const LoopDetectorOptions options;
   std::vector<Member> members;
@@ -69,7 +107,10 @@ int Run(const std::string& folder, const cli::GroundTruthArguments& truth_argume
   for (const std::string& name : options.members)
     members.emplace_back(name, options, 1000003u + members.size());
   std::vector<Postings> postings(members.size());
-  std::ofstream out(file, std::ios::binary);
+  std::vector<Output> outputs;
+  for (const int images_apart : still_in_sight)
+    outputs.push_back(
+        {images_apart, std::ofstream(file + "-" + std::to_string(images_apart), std::ios::binary)});
   int cells = 0;
   for (int t = 0; t < truth.size(); ++t) {
     const std::size_t i = static_cast<std::size_t>(t);
@@ -79,21 +120,18 @@ int Run(const std::string& folder, const cli::GroundTruthArguments& truth_argume
     if (t == 0) {
       cells = SeenWords::Cell(cv::Point2f(1e6f, 1e6f), image.size()) + 1;
       cells = (cells + SeenWords::kColumns - 1) / SeenWords::kColumns * SeenWords::kColumns;
-      Put(out, truth.size());
-      Put(out, cells / SeenWords::kColumns);
-      for (int row = 0; row < truth.size(); ++row) {
-        for (int column = 0; column < truth.size(); ++column)
-          Put(out, static_cast<std::uint8_t>(truth.At(row, column)));
-      }
+      for (Output& output : outputs) PutTruth(cells, truth, output.stream);
     }
     const cv::Mat grey = ToGrey8(image);
     for (std::size_t k = 0; k < members.size(); ++k) {
       PutImage(members[k].Extract(image, grey, cv::Mat()), image.size(), t, cells, members[k], postings[k],
-               out);
+               outputs);
     }
   }
-  out.close();
-  if (!out) throw InputError(file + ": can't be written; is there space?");
+  for (Output& output : outputs) {
+    output.stream.close();
+    if (!output.stream) throw InputError(file + ": can't be written; is there space?");
+  }
   return 0;
 }
 
@@ -103,10 +141,12 @@ int Run(const std::string& folder, const cli::GroundTruthArguments& truth_argume
 int main(int argc, char** argv) {
   CLI::App app("Matched words by cell, for bench/evidence_study");
   std::string images, out;
+  std::vector<int> still_in_sight;
   tutti::cli::GroundTruthArguments truth;
   app.add_option("--images", images, "folder")->required();
   app.add_option("--ground-truth", truth.file, "loop matrix or trajectory")->required();
-  app.add_option("--out", out, "file")->required();
+  app.add_option("--out", out, "files' names without -N")->required();
+  app.add_option("--still-in-sight", still_in_sight, "N, may be repeated")->required();
   app.add_option("--stride", truth.stride, "every n-th image");
   app.add_flag("--join-pairs", truth.join_pairs, "left and right images make one");
   app.add_option("--gt-distance", truth.rule.distance_m, "[m]");
@@ -115,7 +155,7 @@ int main(int argc, char** argv) {
   app.add_option("--gt-exclude-s", truth.rule.exclude_s, "[s]");
   CLI11_PARSE(app, argc, argv);
   try {
-    return tutti::Run(images, truth, out);
+    return tutti::Run(images, truth, out, still_in_sight);
   } catch (const std::exception& e) {
     std::fprintf(stderr, "cell_counts: %s\n", e.what());
     return 2;

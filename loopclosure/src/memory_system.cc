@@ -10,6 +10,7 @@ namespace {
 
 constexpr int kNearLevels = 5;  // what is so near to the most probable place may be it
 constexpr int kRepeats = 3;     // images before this one that show what a member repeats
+constexpr int kSightPart = 2;   // seen again within this part of STM: it was in sight all the time
 
 // Of all members that a filter sees, with ids as Signature::Split takes them apart.
 SeenWords WordsFor(const FilterUnit& unit, const std::vector<SeenWords>& words) {
@@ -117,8 +118,8 @@ void MemorySystem::UpdateLikelihood(std::size_t u) {
   if (!unit.took_part()) return;
   const std::vector<int>& places = memory_.working_memory();
   if (Counts()) {
-    const int settled = memory_.short_term_memory().front();
-    unit.counts = unit.is_dense ? unit.dense.Counts(places) : unit.likelihood.Counts(unit.seen, settled);
+    const Sight sight{memory_.short_term_memory().front(), options_.stm_size / kSightPart};
+    unit.counts = unit.is_dense ? unit.dense.Counts(places) : unit.likelihood.Counts(unit.seen, sight);
     Repeat(unit);
     if (places.empty()) return;
     unit.image_likelihood =

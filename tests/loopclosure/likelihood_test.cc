@@ -87,7 +87,7 @@ TEST(Likelihood, WhatHasBeenInSightEverSinceIsNoSignOfAReturn) {
   }
   const SeenWords newest = Seen({1, 2}, {0, 7});
   const std::vector<double> all = model.Counts(newest);
-  const std::vector<double> returns = model.Counts(newest, 12);
+  const std::vector<double> returns = model.Counts(newest, {12, 5});
   for (const int slot : {6, 7}) {
     EXPECT_GT(all[static_cast<std::size_t>(slot)], 0.0);
     EXPECT_EQ(returns[static_cast<std::size_t>(slot)], 0.0) << slot;
@@ -102,10 +102,10 @@ TEST(Likelihood, ASlotThatComesBackCountsAsIfItHadNeverBeenAway) {
   LikelihoodModel model(LikelihoodKind::kTfIdf);
   for (int slot = 0; slot < 8; ++slot) model.Add(Signature({1, 10 + slot, 20 + slot % 2}));
   const SeenWords query = Seen({1, 20, 21, 13}, {0, 2, 4, 6});
-  const std::vector<double> before = model.Counts(query, 6);
+  const std::vector<double> before = model.Counts(query, {6, 5});
   model.Remove(3);
   model.Restore(3, Signature({1, 13, 21}));
-  EXPECT_EQ(model.Counts(query, 6), before);
+  EXPECT_EQ(model.Counts(query, {6, 5}), before);
 }
 
 TEST(Likelihood, CellsCoverTheImageAndWhatLiesOutsideIsInTheNearest) {

@@ -88,7 +88,7 @@ struct EvidenceOptions {
   double floor = -1.0;       ///< least logarithm of a likelihood, below 0, at least -10
   double attraction = 0.9;   ///< how much more a place must show that many images resemble: exponent of its
                              ///< mean count, 0 (no more) to 2
-  double persistence = 2.5;  ///< how much less successive images say, which show the same, where wrong places
+  double persistence = 4.0;  ///< how much less successive images say, which show the same, where wrong places
                              ///< stay alike for several images: 0 (each says all that it shows) to 10
 
   /// Empty if usable, else what is wrong and what to do.
@@ -166,7 +166,7 @@ struct LoopDetectorOptions {
                                            ///< no keypoints, and one row of CV_32F
   std::vector<std::string> external_members;  ///< further names that members may hold: the caller extracts
                                               ///< their features himself and gives them with each LoopQuery
-  double loop_threshold = 0.97;               ///< accept a loop of this probability, 0..1
+  double loop_threshold = 0.975;              ///< accept a loop of this probability, 0..1
   double propose_threshold = 0.1;             ///< go to verification at H >= this, 0..1
   double link_threshold = 0.9;  ///< a loop of this probability links its two places for the filter, 0..1
   int stm_size = 10;            ///< locations in short-term memory, no candidates

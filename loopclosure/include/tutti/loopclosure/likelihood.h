@@ -33,12 +33,18 @@ struct SeenWords {
   double Amount() const;
 };
 
+/// Which words have been in sight ever since a slot: those seen in it and again within `within` slots each
+/// time, up to the newest one. What moves along (another vehicle, dirt on the lens, the horizon) would
+/// otherwise know the places just left in every image. As it stands: none.
+struct Sight {
+  int settled = 0;  ///< holds for slots before this, the oldest one in STM
+  int within = 0;
+};
+
 /// Inverted index over the signatures of all locations in STM and WM, and the scores computed by walking it.
 /// Locations are slots: 0, 1, 2, ... in the order of adding.
 class LikelihoodModel {
  public:
-  static constexpr int kStillInSight = 5;  ///< slots within which a word is seen again that stayed in sight
-
   /// Empty. `kind`: which of the two scores.
   explicit LikelihoodModel(LikelihoodKind kind) : kind_(kind) {}
 
@@ -64,11 +70,8 @@ class LikelihoodModel {
   /// with m_w features of word w in the image, N, n_w and n_wi as above. Words near one another show the same
   /// thing, and a thing that is there twice (a poster, a kind of window) is not yet the place: a place agrees
   /// all over the image (docs/loop-closure.md section 2).
-  /// A word that has been in sight ever since a place, up to the newest slot and seen again within
-  /// kStillInSight slots each time, is no sign of a return to it and not counted there: what moves along
-  /// (another vehicle, dirt on the lens, the horizon) would always know the places just left. That holds for
-  /// slots before `settled`, the oldest one in STM; 0: for none, where the query is not the newest slot.
-  std::vector<double> Counts(const SeenWords& query, int settled = 0) const;
+  /// Without words that have been in sight ever since a place (`sight`): they are no sign of a return to it.
+  std::vector<double> Counts(const SeenWords& query, const Sight& sight = {}) const;
 
   /// True if a slot is in the index, be it with a bad signature.
   bool Has(int slot) const { return present_[static_cast<std::size_t>(slot)]; }
@@ -88,9 +91,9 @@ class LikelihoodModel {
     int count = 0;
   };
   void Insert(int slot);
-  // Calls call(posting) for each but those of slots before `settled` since which the word has been in sight.
+  // Calls call(posting) for each but those of slots since which the word has been in sight.
   template <typename Call>
-  void ForEachReturn(const std::vector<Posting>& list, int settled, const Call& call) const;
+  void ForEachReturn(const std::vector<Posting>& list, const Sight& sight, const Call& call) const;
 
   LikelihoodKind kind_;
   WordMap<std::vector<Posting>> postings_;  // of words that a location has, by slot

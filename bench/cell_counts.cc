@@ -48,7 +48,7 @@ CellsOfWord Words(const Features& features, const cv::Size& size, int cells, Mem
 std::vector<double> Sums(const CellsOfWord& cells_of_word, const Postings& postings, int image, int cells,
                          int still_in_sight) {
   const int settled = image - LoopDetectorOptions().stm_size + 1;
-  std::vector<double> sums(static_cast<std::size_t>((image + 1) * cells), 0.0);
+  std::vector<double> sums(static_cast<std::size_t>(image + 1) * static_cast<std::size_t>(cells), 0.0);
   const double all = std::log10(image + 1.0);
   for (const auto& [word, in_cells] : cells_of_word) {
     const auto& list = postings.at(word);
@@ -63,7 +63,8 @@ std::vector<double> Sums(const CellsOfWord& cells_of_word, const Postings& posti
       next = location;
       if (in_sight && location < settled && still_in_sight > 0) continue;
       for (const int cell : in_cells)
-        sums[static_cast<std::size_t>(location * cells + cell)] += occurrences * value;
+        sums[static_cast<std::size_t>(location) * static_cast<std::size_t>(cells) +
+             static_cast<std::size_t>(cell)] += occurrences * value;
     }
   }
   return sums;
@@ -108,6 +109,7 @@ int Run(const std::string& folder, const cli::GroundTruthArguments& truth_argume
     members.emplace_back(name, options, 1000003u + members.size());
   std::vector<Postings> postings(members.size());
   std::vector<Output> outputs;
+  outputs.reserve(still_in_sight.size());
   for (const int images_apart : still_in_sight)
     outputs.push_back(
         {images_apart, std::ofstream(file + "-" + std::to_string(images_apart), std::ios::binary)});

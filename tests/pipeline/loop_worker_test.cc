@@ -19,8 +19,7 @@ using Pair = std::pair<std::int64_t, std::int64_t>;
 // Round a small block and on: a second time past what was seen.
 const Recording& LapAndMore() {
   static const Recording recording = [] {
-    SyntheticOptions options = testing::SmallStereoTown(320, 160);
-    options.block_m = 20;
+    SyntheticOptions options = testing::SmallStereoTownWithALoop(320, 160);
     options.laps = 1.4;
     const SyntheticWorld world(options);
     return testing::Record(world, world.Size());

@@ -24,7 +24,7 @@
 namespace tutti {
 namespace {
 
-using Postings = std::unordered_map<int, std::vector<std::pair<int, int>>>;  // word: location, occurrences
+using Postings = std::unordered_map<int, std::vector<Posting>>;  // by word, of locations
 
 template <typename T>
 void Put(std::ofstream& out, const T& value) {
@@ -47,7 +47,7 @@ CellsOfWord Words(const Features& features, const cv::Size& size, int cells, Mem
 // Matched words of an image by location and cell.
 std::vector<double> Sums(const CellsOfWord& cells_of_word, const Postings& postings, int image, int cells,
                          int still_in_sight) {
-  const int settled = image - LoopDetectorOptions().stm_size + 1;
+  const Sight sight{image - LoopDetectorOptions().stm_size + 1, still_in_sight};
   std::vector<double> sums(static_cast<std::size_t>(image + 1) * static_cast<std::size_t>(cells), 0.0);
   const double all = std::log10(image + 1.0);
   for (const auto& [word, in_cells] : cells_of_word) {
@@ -55,17 +55,12 @@ std::vector<double> Sums(const CellsOfWord& cells_of_word, const Postings& posti
     if (all <= 0) break;
     const double value = std::log10((image + 1.0) / static_cast<double>(list.size())) / all /
                          static_cast<double>(in_cells.size());
-    int next = image;
-    bool in_sight = true;
-    for (auto posting = list.rbegin(); posting != list.rend(); ++posting) {
-      const auto [location, occurrences] = *posting;
-      in_sight = in_sight && next - location <= still_in_sight;
-      next = location;
-      if (in_sight && location < settled && still_in_sight > 0) continue;
-      for (const int cell : in_cells)
-        sums[static_cast<std::size_t>(location) * static_cast<std::size_t>(cells) +
-             static_cast<std::size_t>(cell)] += occurrences * value;
-    }
+    sight.ForEachReturn(list, image, [&](const Posting& posting) {
+      for (const int cell : in_cells) {
+        sums[static_cast<std::size_t>(posting.slot) * static_cast<std::size_t>(cells) +
+             static_cast<std::size_t>(cell)] += posting.count * value;
+      }
+    });
   }
   return sums;
 }
@@ -80,7 +75,7 @@ void PutImage(const Features& features, const cv::Size& size, int image, int cel
   const bool usable = member.Judge(features);
   const CellsOfWord cells_of_word = usable ? Words(features, size, cells, member) : CellsOfWord();
   for (const auto& [word, in_cells] : cells_of_word) {
-    postings[word].emplace_back(image, static_cast<int>(in_cells.size()));
+    postings[word].push_back({image, static_cast<int>(in_cells.size())});
   }
   for (auto& [still_in_sight, out] : outputs) {
     Put(out, static_cast<float>(features.keypoints.size()));

@@ -122,18 +122,6 @@ struct PlacedWord {
 
 }  // namespace
 
-template <typename Call>
-void LikelihoodModel::ForEachReturn(const std::vector<Posting>& list, const Sight& sight,
-                                    const Call& call) const {
-  int next = size() - 1;
-  bool in_sight = true;
-  for (auto posting = list.rbegin(); posting != list.rend(); ++posting) {
-    in_sight = in_sight && next - posting->slot <= sight.within;
-    next = posting->slot;
-    if (!in_sight || posting->slot >= sight.settled) call(*posting);
-  }
-}
-
 std::vector<double> LikelihoodModel::Counts(const SeenWords& query, const Sight& sight) const {
   std::vector<double> counts(signatures_.size(), 0.0);
   if (locations_ < 2) return counts;
@@ -157,7 +145,7 @@ std::vector<double> LikelihoodModel::Counts(const SeenWords& query, const Sight&
       const double value = std::log10(static_cast<double>(locations_) / static_cast<double>(list->size())) /
                            (all * static_cast<double>(same.second - same.first));
       if (value > 0.0) {
-        ForEachReturn(*list, sight, [&](const Posting& posting) {
+        sight.ForEachReturn(*list, size() - 1, [&](const Posting& posting) {
           in_cell.Add(static_cast<std::size_t>(posting.slot), posting.count * value);
         });
       }

@@ -33,12 +33,31 @@ struct SeenWords {
   double Amount() const;
 };
 
+/// That a slot has a word, and how often.
+struct Posting {
+  int slot = 0;
+  int count = 0;
+};
+
 /// Which words have been in sight ever since a slot: those seen in it and again within `within` slots each
 /// time, up to the newest one. What moves along (another vehicle, dirt on the lens, the horizon) would
 /// otherwise know the places just left in every image. As it stands: none.
 struct Sight {
   int settled = 0;  ///< holds for slots before this, the oldest one in STM
   int within = 0;
+
+  /// Calls call(posting) for each of a word's postings (ascending by slot, none after `newest`) but those of
+  /// slots since which it has been in sight.
+  template <typename Call>
+  void ForEachReturn(const std::vector<Posting>& postings, int newest, const Call& call) const {
+    int next = newest;
+    bool in_sight = true;
+    for (auto posting = postings.rbegin(); posting != postings.rend(); ++posting) {
+      in_sight = in_sight && next - posting->slot <= within;
+      next = posting->slot;
+      if (!in_sight || posting->slot >= settled) call(*posting);
+    }
+  }
 };
 
 /// Inverted index over the signatures of all locations in STM and WM, and the scores computed by walking it.
@@ -86,14 +105,7 @@ class LikelihoodModel {
   void Load(internal::ByteReader& in);
 
  private:
-  struct Posting {
-    int slot = 0;
-    int count = 0;
-  };
   void Insert(int slot);
-  // Calls call(posting) for each but those of slots since which the word has been in sight.
-  template <typename Call>
-  void ForEachReturn(const std::vector<Posting>& list, const Sight& sight, const Call& call) const;
 
   LikelihoodKind kind_;
   WordMap<std::vector<Posting>> postings_;  // of words that a location has, by slot

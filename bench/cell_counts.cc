@@ -15,11 +15,11 @@
 #include <opencv2/imgcodecs.hpp>
 #include <unordered_map>
 
-#include "command_loops_input.h"
-#include "joined_pairs.h"
+#include "apps/tutti/loops/joined_pairs.h"
+#include "apps/tutti/loops/loops_input.h"
+#include "loopclosure/features/member.h"
+#include "loopclosure/memory/likelihood.h"
 #include "tutti/core/error.h"
-#include "tutti/loopclosure/likelihood.h"
-#include "tutti/loopclosure/member.h"
 
 namespace tutti {
 namespace {

@@ -12,14 +12,14 @@
 #include <random>
 #include <sstream>
 
-#include "command_loops_input.h"
-#include "dense.h"
-#include "image_change.h"
-#include "joined_pairs.h"
-#include "place_reasoner.h"
+#include "apps/tutti/loops/joined_pairs.h"
+#include "apps/tutti/loops/loops_input.h"
+#include "data/synthetic/image_change.h"
+#include "loopclosure/detector/parallel.h"
+#include "loopclosure/filter/place_reasoner.h"
+#include "loopclosure/memory/dense.h"
 #include "tutti/core/error.h"
 #include "tutti/loopclosure/evaluation.h"
-#include "tutti/loopclosure/parallel.h"
 
 namespace tutti {
 namespace {

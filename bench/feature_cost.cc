@@ -16,9 +16,9 @@
 #include <string>
 #include <vector>
 
+#include "loopclosure/detector/parallel.h"
 #include "tutti/loopclosure/detector.h"
 #include "tutti/loopclosure/features.h"
-#include "tutti/loopclosure/parallel.h"
 
 namespace {
 

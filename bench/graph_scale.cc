@@ -10,7 +10,7 @@
 #include <random>
 #include <string>
 
-#include "noisy_measurement.h"
+#include "bench/noisy_measurement.h"
 #include "tutti/backend/pose_graph_optimizer.h"
 
 namespace {

@@ -17,9 +17,9 @@
 #include <random>
 #include <sstream>
 
-#include "distances.h"
-#include "index_ways.h"
-#include "synthetic_random.h"
+#include "bench/index_ways.h"
+#include "data/synthetic/synthetic_random.h"
+#include "loopclosure/vocabulary/distances.h"
 #include "tutti/core/error.h"
 #include "tutti/core/span_recorder.h"
 #include "tutti/loopclosure/detector_options.h"

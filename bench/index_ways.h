@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "tutti/loopclosure/descriptor_index.h"
+#include "loopclosure/vocabulary/descriptor_index.h"
 
 namespace tutti {
 

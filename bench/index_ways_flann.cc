@@ -10,8 +10,8 @@
 #include <flann/algorithms/lsh_index.h>
 // clang-format on
 
-#include "distances.h"
-#include "index_ways.h"
+#include "bench/index_ways.h"
+#include "loopclosure/vocabulary/distances.h"
 
 namespace tutti {
 namespace {

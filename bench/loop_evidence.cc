@@ -13,8 +13,8 @@
 #include <limits>
 #include <vector>
 
-#include "leave_one_out.h"
-#include "tutti/backend/false_loops.h"
+#include "backend/graph/false_loops.h"
+#include "backend/robust/leave_one_out.h"
 #include "tutti/backend/g2o_io.h"
 #include "tutti/backend/graph_covariance.h"
 #include "tutti/core/error.h"

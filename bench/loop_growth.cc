@@ -21,7 +21,7 @@
 #include <string>
 #include <vector>
 
-#include "synthetic_random.h"
+#include "data/synthetic/synthetic_random.h"
 #include "tutti/loopclosure/detector.h"
 
 namespace {

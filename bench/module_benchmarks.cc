@@ -4,7 +4,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "synthetic_world.h"
+#include "data/synthetic/synthetic_world.h"
 #include "tutti/backend/pose_graph_optimizer.h"
 #include "tutti/loopclosure/detector.h"
 

@@ -16,7 +16,7 @@
 #include <utility>
 #include <vector>
 
-#include "noisy_measurement.h"
+#include "bench/noisy_measurement.h"
 #include "tutti/backend/certificate.h"
 #include "tutti/backend/pose_graph_optimizer.h"
 #include "tutti/core/error.h"

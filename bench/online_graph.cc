@@ -18,7 +18,7 @@
 #include <string>
 #include <vector>
 
-#include "noisy_measurement.h"
+#include "bench/noisy_measurement.h"
 #include "tutti/backend/g2o_io.h"
 #include "tutti/backend/online_optimizer.h"
 #include "tutti/core/error.h"

@@ -7,7 +7,7 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "stock_ceres.h"
+#include "bench/stock_ceres.h"
 #include "tutti/backend/g2o_io.h"
 #include "tutti/backend/pose_graph_optimizer.h"
 

@@ -16,8 +16,8 @@
 #include <string>
 #include <vector>
 
+#include "backend/graph/false_loops.h"
 #include "tutti/backend/evaluation.h"
-#include "tutti/backend/false_loops.h"
 #include "tutti/backend/g2o_io.h"
 #include "tutti/backend/pose_graph_optimizer.h"
 

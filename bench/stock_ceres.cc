@@ -1,11 +1,11 @@
-#include "stock_ceres.h"
+#include "bench/stock_ceres.h"
 
 #include <ceres/ceres.h>
 
 #include <Eigen/Cholesky>
 #include <vector>
 
-#include "manifold.h"
+#include "backend/graph/manifold.h"
 
 namespace tutti {
 namespace {

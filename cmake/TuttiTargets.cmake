@@ -25,6 +25,11 @@ function(tutti_compile_options target)
   endif()
 endfunction()
 
+# tutti_see_private_headers(target): headers that no package installs are included by their path from the project's root.
+function(tutti_see_private_headers target)
+  target_include_directories(${target} PRIVATE "${PROJECT_SOURCE_DIR}")
+endfunction()
+
 # tutti_add_library(name SOURCES ... [PUBLIC libs...] [PRIVATE libs...])
 # Makes tutti_<name>, its alias tutti::<name>, its include folder, and installs and exports it.
 function(tutti_add_library name)
@@ -36,7 +41,7 @@ function(tutti_add_library name)
   target_include_directories(${target} PUBLIC
     "$<BUILD_INTERFACE:${CMAKE_CURRENT_SOURCE_DIR}/include>"
     "$<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>")
-  target_include_directories(${target} PRIVATE "${CMAKE_CURRENT_SOURCE_DIR}/src")
+  tutti_see_private_headers(${target})
   target_link_libraries(${target} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
   set_target_properties(${target} PROPERTIES EXPORT_NAME ${name})
   install(TARGETS ${target} EXPORT tutti_${name}_targets
@@ -52,6 +57,7 @@ function(tutti_add_test name)
   set(target tutti_${name}_tests)
   add_executable(${target} ${ARG_SOURCES})
   tutti_compile_options(${target})
+  tutti_see_private_headers(${target})
   target_link_libraries(${target} PRIVATE ${ARG_LIBS} tutti_test_support GTest::gtest GTest::gmock GTest::gtest_main)
   gtest_discover_tests(${target} TEST_PREFIX "${name}." DISCOVERY_MODE PRE_TEST
     PROPERTIES TIMEOUT 600 ENVIRONMENT "TUTTI_DATA=$ENV{TUTTI_DATA}")

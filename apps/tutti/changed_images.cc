@@ -1,4 +1,4 @@
-#include "changed_images.h"
+#include "apps/tutti/changed_images.h"
 
 #include <algorithm>
 #include <exception>
@@ -9,8 +9,8 @@
 #include <thread>
 #include <vector>
 
-#include "command_loops_input.h"
-#include "files.h"
+#include "apps/tutti/files.h"
+#include "apps/tutti/loops/loops_input.h"
 #include "tutti/core/error.h"
 
 namespace tutti::cli {

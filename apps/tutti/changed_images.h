@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <functional>
 
-#include "image_change.h"
+#include "data/synthetic/image_change.h"
 
 namespace tutti::cli {
 

@@ -3,10 +3,10 @@
 #include <memory>
 #include <string>
 
-#include "commands.h"
+#include "apps/tutti/commands.h"
 #include "tutti/core/error.h"
 #include "tutti/frontend/calibration_check.h"
-#include "tutti/pipeline/config.h"
+#include "tutti/slam/config.h"
 
 namespace tutti::cli {
 namespace {

@@ -6,13 +6,13 @@
 #include <string>
 #include <vector>
 
-#include "commands.h"
-#include "comparison.h"
-#include "files.h"
-#include "run_with_report.h"
+#include "apps/report/page.h"
+#include "apps/tutti/commands.h"
+#include "apps/tutti/comparison.h"
+#include "apps/tutti/files.h"
+#include "apps/tutti/run_with_report.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
-#include "tutti/report/page.h"
 
 namespace tutti::cli {
 namespace {

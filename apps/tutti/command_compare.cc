@@ -8,19 +8,19 @@
 #include <string>
 #include <vector>
 
-#include "checks.h"
-#include "commands.h"
-#include "comparison.h"
-#include "files.h"
-#include "run_apart.h"
-#include "run_with_report.h"
+#include "apps/report/page.h"
+#include "apps/run/interrupt.h"
+#include "apps/run/outputs.h"
+#include "apps/run/runner.h"
+#include "apps/tutti/checks.h"
+#include "apps/tutti/commands.h"
+#include "apps/tutti/comparison.h"
+#include "apps/tutti/files.h"
+#include "apps/tutti/run_apart.h"
+#include "apps/tutti/run_with_report.h"
 #include "tutti/core/error.h"
 #include "tutti/frontend/dataset.h"
-#include "tutti/pipeline/config.h"
-#include "tutti/pipeline/interrupt.h"
-#include "tutti/pipeline/outputs.h"
-#include "tutti/pipeline/runner.h"
-#include "tutti/report/page.h"
+#include "tutti/slam/config.h"
 
 namespace tutti::cli {
 namespace {

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "command_loops_output.h"
-#include "commands.h"
+#include "apps/tutti/commands.h"
+#include "apps/tutti/loops/loops_output.h"
 #include "tutti/core/error.h"
 #include "tutti/loopclosure/significance.h"
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "commands.h"
+#include "apps/tutti/commands.h"
 #include "tutti/backend/trajectory_file.h"
 #include "tutti/core/error.h"
 

@@ -7,15 +7,15 @@
 #include <string>
 #include <thread>
 
-#include "commands.h"
-#include "run_with_report.h"
-#include "synthetic_writer.h"
+#include "apps/report/page.h"
+#include "apps/run/interrupt.h"
+#include "apps/run/outputs.h"
+#include "apps/run/progress.h"
+#include "apps/run/runner.h"
+#include "apps/tutti/commands.h"
+#include "apps/tutti/run_with_report.h"
+#include "data/synthetic/synthetic_writer.h"
 #include "tutti/core/error.h"
-#include "tutti/pipeline/interrupt.h"
-#include "tutti/pipeline/outputs.h"
-#include "tutti/pipeline/progress.h"
-#include "tutti/pipeline/runner.h"
-#include "tutti/report/page.h"
 
 namespace tutti::cli {
 namespace {

@@ -4,10 +4,10 @@
 #include <string>
 #include <vector>
 
-#include "commands.h"
-#include "evaluation_input.h"
-#include "evaluation_output.h"
-#include "files.h"
+#include "apps/tutti/commands.h"
+#include "apps/tutti/evaluation_input.h"
+#include "apps/tutti/evaluation_output.h"
+#include "apps/tutti/files.h"
 
 namespace tutti::cli {
 namespace {

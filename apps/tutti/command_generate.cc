@@ -11,10 +11,10 @@
 #include <thread>
 #include <vector>
 
-#include "changed_images.h"
-#include "checks.h"
-#include "commands.h"
-#include "synthetic_writer.h"
+#include "apps/tutti/changed_images.h"
+#include "apps/tutti/checks.h"
+#include "apps/tutti/commands.h"
+#include "data/synthetic/synthetic_writer.h"
 #include "tutti/core/error.h"
 
 namespace tutti::cli {

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "checks.h"
-#include "commands.h"
+#include "apps/tutti/checks.h"
+#include "apps/tutti/commands.h"
 #include "tutti/backend/certificate.h"
 #include "tutti/backend/g2o_io.h"
 #include "tutti/backend/pose_graph_optimizer.h"

@@ -4,12 +4,12 @@
 #include <string>
 #include <vector>
 
-#include "commands.h"
-#include "evaluation_input.h"
-#include "plot_file.h"
-#include "text_table.h"
+#include "apps/run/plot.h"
+#include "apps/tutti/commands.h"
+#include "apps/tutti/evaluation_input.h"
+#include "apps/tutti/plot_file.h"
+#include "apps/tutti/text_table.h"
 #include "tutti/core/error.h"
-#include "tutti/pipeline/plot.h"
 
 namespace tutti::cli {
 namespace {

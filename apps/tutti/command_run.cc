@@ -4,15 +4,15 @@
 #include <string>
 #include <vector>
 
-#include "checks.h"
-#include "commands.h"
-#include "run_with_report.h"
+#include "apps/report/page.h"
+#include "apps/run/outputs.h"
+#include "apps/run/runner.h"
+#include "apps/tutti/checks.h"
+#include "apps/tutti/commands.h"
+#include "apps/tutti/run_with_report.h"
+#include "apps/view/live_view.h"
 #include "tutti/core/error.h"
-#include "tutti/pipeline/config.h"
-#include "tutti/pipeline/outputs.h"
-#include "tutti/pipeline/runner.h"
-#include "tutti/report/page.h"
-#include "tutti/view/live_view.h"
+#include "tutti/slam/config.h"
 
 namespace tutti::cli {
 namespace {

@@ -1,11 +1,11 @@
-#include "comparison.h"
+#include "apps/tutti/comparison.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
 
-#include "stage_times.h"
+#include "apps/tutti/stage_times.h"
 #include "tutti/core/error.h"
 #include "tutti/loopclosure/significance.h"
 

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "text_table.h"
+#include "apps/tutti/text_table.h"
 
 namespace tutti::cli {
 

@@ -1,11 +1,11 @@
-#include "evaluation_input.h"
+#include "apps/tutti/evaluation_input.h"
 
 #include <cstdio>
 #include <filesystem>
 #include <optional>
 #include <set>
 
-#include "checks.h"
+#include "apps/tutti/checks.h"
 #include "tutti/backend/trajectory_file.h"
 #include "tutti/core/error.h"
 

@@ -1,4 +1,4 @@
-#include "evaluation_output.h"
+#include "apps/tutti/evaluation_output.h"
 
 #include <cstdio>
 

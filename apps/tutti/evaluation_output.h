@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "evaluation_input.h"
-#include "text_table.h"
+#include "apps/tutti/evaluation_input.h"
+#include "apps/tutti/text_table.h"
 
 namespace tutti::cli {
 

@@ -1,4 +1,4 @@
-#include "files.h"
+#include "apps/tutti/files.h"
 
 #include <fstream>
 #include <system_error>

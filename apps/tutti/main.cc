@@ -3,9 +3,9 @@
 #include <exception>
 #include <string>
 
-#include "commands.h"
+#include "apps/tutti/commands.h"
 #include "tutti/core/error.h"
-#include "tutti/pipeline/version.h"
+#include "tutti/slam/version.h"
 
 int main(int argc, char** argv) {
   CLI::App app{"tutti: visual SLAM with an ensemble of Bayesian loop-closure filters", "tutti"};

@@ -1,4 +1,4 @@
-#include "plot_file.h"
+#include "apps/tutti/plot_file.h"
 
 #ifdef TUTTI_WITH_CAIRO
 #include <cairo-pdf.h>

@@ -1,4 +1,4 @@
-#include "posteriors_csv.h"
+#include "apps/tutti/posteriors_csv.h"
 
 #include <algorithm>
 #include <cstdio>

@@ -3,7 +3,7 @@
 
 #include <filesystem>
 
-#include "command_loops_output.h"
+#include "apps/tutti/loops/loops_output.h"
 
 namespace tutti::cli {
 

@@ -1,4 +1,4 @@
-#include "run_apart.h"
+#include "apps/tutti/run_apart.h"
 
 #include <sys/mman.h>
 #include <sys/wait.h>

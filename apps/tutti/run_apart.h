@@ -5,7 +5,7 @@
 #include <functional>
 #include <vector>
 
-#include "tutti/pipeline/run_result.h"
+#include "apps/run/run_result.h"
 
 namespace tutti::cli {
 

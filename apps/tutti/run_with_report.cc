@@ -1,11 +1,11 @@
-#include "run_with_report.h"
+#include "apps/tutti/run_with_report.h"
 
 #include <memory>
 
-#include "files.h"
-#include "tutti/report/comparison_report.h"
-#include "tutti/report/page.h"
-#include "tutti/report/run_report.h"
+#include "apps/report/comparison_report.h"
+#include "apps/report/page.h"
+#include "apps/report/run_report.h"
+#include "apps/tutti/files.h"
 
 namespace tutti::cli {
 

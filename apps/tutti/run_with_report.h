@@ -3,9 +3,9 @@
 
 #include <string>
 
-#include "comparison.h"
-#include "tutti/pipeline/runner.h"
-#include "tutti/pipeline/shared_odometry.h"
+#include "apps/run/runner.h"
+#include "apps/run/shared_odometry.h"
+#include "apps/tutti/comparison.h"
 
 namespace tutti::cli {
 

@@ -1,4 +1,4 @@
-#include "stage_times.h"
+#include "apps/tutti/stage_times.h"
 
 #include <algorithm>
 #include <array>

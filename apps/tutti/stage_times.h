@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "comparison.h"
-#include "text_table.h"
+#include "apps/tutti/comparison.h"
+#include "apps/tutti/text_table.h"
 
 namespace tutti::cli {
 

@@ -1,4 +1,4 @@
-#include "text_table.h"
+#include "apps/tutti/text_table.h"
 
 #include <algorithm>
 #include <cmath>

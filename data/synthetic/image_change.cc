@@ -1,4 +1,4 @@
-#include "image_change.h"
+#include "data/synthetic/image_change.h"
 
 #include <algorithm>
 #include <array>
@@ -8,8 +8,8 @@
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
-#include "synthetic_random.h"
-#include "textures.h"
+#include "data/synthetic/synthetic_random.h"
+#include "data/synthetic/textures.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 

@@ -1,4 +1,4 @@
-#include "rasterizer.h"
+#include "data/synthetic/rasterizer.h"
 
 #include <algorithm>
 #include <array>

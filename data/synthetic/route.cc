@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "scene.h"
+#include "data/synthetic/scene.h"
 
 namespace tutti::synthetic {
 

@@ -4,8 +4,8 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "rasterizer.h"
-#include "synthetic_options.h"
+#include "data/synthetic/rasterizer.h"
+#include "data/synthetic/synthetic_options.h"
 
 namespace tutti::synthetic {
 

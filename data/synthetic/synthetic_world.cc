@@ -1,10 +1,10 @@
-#include "synthetic_world.h"
+#include "data/synthetic/synthetic_world.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "scene.h"
-#include "synthetic_random.h"
+#include "data/synthetic/scene.h"
+#include "data/synthetic/synthetic_random.h"
 #include "tutti/core/error.h"
 
 namespace tutti {

@@ -6,7 +6,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "synthetic_options.h"
+#include "data/synthetic/synthetic_options.h"
 #include "tutti/core/camera.h"
 #include "tutti/core/trajectory.h"
 

@@ -1,4 +1,4 @@
-#include "synthetic_writer.h"
+#include "data/synthetic/synthetic_writer.h"
 
 #include <algorithm>
 #include <atomic>

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <functional>
 
-#include "synthetic_world.h"
+#include "data/synthetic/synthetic_world.h"
 
 namespace tutti {
 

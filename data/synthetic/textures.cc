@@ -1,10 +1,10 @@
-#include "textures.h"
+#include "data/synthetic/textures.h"
 
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 #include <string>
 
-#include "synthetic_random.h"
+#include "data/synthetic/synthetic_random.h"
 
 namespace tutti::synthetic {
 namespace {

@@ -2,9 +2,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "scene.h"
-#include "synthetic_random.h"
-#include "textures.h"
+#include "data/synthetic/scene.h"
+#include "data/synthetic/synthetic_random.h"
+#include "data/synthetic/textures.h"
 
 namespace tutti::synthetic {
 namespace {

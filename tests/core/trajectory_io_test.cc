@@ -4,7 +4,7 @@
 #include <cmath>
 #include <fstream>
 
-#include "test_data.h"
+#include "tests/support/test_data.h"
 #include "tutti/core/error.h"
 #include "tutti/core/trajectory.h"
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <string_view>
 
-#include "byte_stream.h"
+#include "loopclosure/store/byte_stream.h"
 #include "tutti/loopclosure/detector.h"
 
 namespace tutti::fuzz {

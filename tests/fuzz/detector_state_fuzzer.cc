@@ -8,8 +8,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "detector_state.h"
-#include "memory_file.h"
+#include "tests/fuzz/detector_state.h"
+#include "tests/fuzz/memory_file.h"
 #include "tutti/core/error.h"
 
 namespace {

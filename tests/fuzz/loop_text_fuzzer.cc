@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cstdlib>
 
-#include "memory_file.h"
+#include "tests/fuzz/memory_file.h"
 #include "tutti/core/error.h"
 #include "tutti/loopclosure/ground_truth.h"
 

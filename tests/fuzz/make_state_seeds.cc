@@ -4,7 +4,7 @@
 #include <fstream>
 #include <stdexcept>
 
-#include "detector_state.h"
+#include "tests/fuzz/detector_state.h"
 
 namespace {
 

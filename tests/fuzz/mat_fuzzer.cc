@@ -1,7 +1,7 @@
 // MATLAB v5 loop matrices: any bytes give a matrix or an InputError.
 #include <cstdlib>
 
-#include "memory_file.h"
+#include "tests/fuzz/memory_file.h"
 #include "tutti/core/error.h"
 #include "tutti/loopclosure/ground_truth.h"
 

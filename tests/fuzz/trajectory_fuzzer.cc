@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "memory_file.h"
+#include "tests/fuzz/memory_file.h"
 #include "tutti/core/error.h"
 #include "tutti/core/trajectory.h"
 

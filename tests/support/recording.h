@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "synthetic_world.h"
+#include "data/synthetic/synthetic_world.h"
 #include "tutti/frontend/odometry.h"
 
 namespace tutti::testing {

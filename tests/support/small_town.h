@@ -1,7 +1,7 @@
 // A synthetic world that is quickly rendered: streets around one block, seen by a stereo camera.
 #pragma once
 
-#include "synthetic_world.h"
+#include "data/synthetic/synthetic_world.h"
 
 namespace tutti::testing {
 

@@ -1,0 +1,201 @@
+#include "apps/report/run_report.h"
+
+#include <algorithm>
+#include <cstdio>
+
+#include "apps/report/build_info.h"
+#include "apps/report/report_parts.h"
+#include "apps/run/timing.h"
+#include "tutti/backend/evaluation.h"
+#include "tutti/core/error.h"
+#include "tutti/slam/version.h"
+
+namespace tutti {
+namespace report {
+namespace {
+
+constexpr std::size_t kMostPoses = 2000;  // of a trajectory
+constexpr std::size_t kMostErrors = 1500;
+constexpr std::size_t kMostFrameTimes = 1000;
+constexpr double kMaxDifference = 0.01;  // of time stamps [s], as the run's own evaluation
+
+Json PathJson(const Trajectory& trajectory, const Similarity& alignment) {
+  Json t = Json::array(), x = t, y = t, z = t;
+  const double origin = trajectory.empty() ? 0 : trajectory.front().stamp_s;
+  for (const std::size_t k : Thinned(trajectory.size(), kMostPoses)) {
+    const Eigen::Vector3d p = alignment * trajectory[k].pose.translation;
+    t.push_back(Rounded(trajectory[k].stamp_s - origin, 3));
+    x.push_back(Rounded(p.x(), 4));
+    y.push_back(Rounded(p.y(), 4));
+    z.push_back(Rounded(p.z(), 4));
+  }
+  return {{"t", t}, {"x", x}, {"y", y}, {"z", z}};
+}
+
+Json ErrorJson(const RunResult& result, const Trajectory& estimate) {
+  EvaluationOptions options;
+  options.alignment =
+      result.rig.sensor == Sensor::kMono ? TrajectoryAlignment::kSim3 : TrajectoryAlignment::kSE3;
+  options.max_time_difference_s = kMaxDifference;
+  try {
+    const EvaluationReport evaluation = EvaluateTrajectory(result.reference, estimate, options);
+    std::vector<double> path;
+    const std::vector<Pose>& reference = evaluation.poses.reference;
+    for (std::size_t k = 0; k < evaluation.pairs; ++k)
+      path.push_back(k == 0 ? 0
+                            : path.back() + (reference[k].translation - reference[k - 1].translation).norm());
+    Json distance = Json::array(), error = Json::array(), turn = Json::array();
+    for (const std::size_t k : Thinned(evaluation.pairs, kMostErrors)) {
+      distance.push_back(Rounded(path[k], 3));
+      error.push_back(Rounded(evaluation.absolute.translation[k], 5));
+      turn.push_back(Rounded(evaluation.absolute.rotation_deg[k], 4));
+    }
+    return {{"distance", distance}, {"error", error}, {"turn_deg", turn}, {"rmse", evaluation.ate.rmse}};
+  } catch (const InputError&) {
+    return Json();  // the summary says why
+  }
+}
+
+Json EdgesJson(const RunResult& result, const std::vector<ShownLoop>& loops, const Similarity& alignment) {
+  std::map<double, Eigen::Vector3d> at;
+  for (const StampedPose& pose : result.trajectory) at[pose.stamp_s] = alignment * pose.pose.translation;
+  Json edges = Json::array();
+  for (const ShownLoop& loop : loops) {
+    const auto a = at.find(loop.candidate_stamp_s), b = at.find(loop.query_stamp_s);
+    Json edge = {{"outcome", ToString(loop.outcome)},
+                 {"query", loop.query},
+                 {"candidate", loop.candidate},
+                 {"h", Rounded(loop.hypothesis, 4)},
+                 {"p", Rounded(loop.probability, 4)},
+                 {"inliers", loop.inliers},
+                 {"reason", loop.reason},
+                 {"qt", Rounded(loop.query_stamp_s, 3)},
+                 {"ct", Rounded(loop.candidate_stamp_s, 3)}};
+    if (a != at.end() && b != at.end()) {
+      for (const auto& [name, p] : {std::pair("a", a->second), std::pair("b", b->second)})
+        edge[name] = {Rounded(p.x(), 4), Rounded(p.y(), 4), Rounded(p.z(), 4)};
+    }
+    edges.push_back(std::move(edge));
+  }
+  return edges;
+}
+
+Json ScoreJson(const TrajectoryScore& score) {
+  if (!score.valid) return {{"error", score.reason}};
+  Json json = {{"ate_rmse_m", score.ate.rmse},
+               {"ate_max_m", score.ate.max},
+               {"rotation_deg", score.ate_rotation.rmse},
+               {"rpe_rmse_m", score.rpe.rmse}};
+  if (score.kitti.segments > 0) {
+    json["t_rel_percent"] = score.kitti.translation_percent;
+    json["r_rel_deg_per_100m"] = 100 * score.kitti.rotation_deg_per_m;
+  }
+  return json;
+}
+
+Json FiguresJson(const RunResult& r) {
+  Json json = {{"frames", r.frames_total},
+               {"tracked", r.frames_tracked},
+               {"lost", r.frames_lost},
+               {"bad", r.bad.size()},
+               {"keyframes", r.keyframes},
+               {"proposed", r.loops.size()},
+               {"accepted", r.LoopsAccepted()},
+               {"corrections", r.corrections},
+               {"wall_s", Rounded(r.wall_s, 2)},
+               {"cpu_s", Rounded(r.cpu_s, 2)},
+               {"frame_ms", Rounded(Quantile(r.frame_ms, 0.5), 2)},
+               {"frame_p99_ms", Rounded(Quantile(r.frame_ms, 0.99), 2)},
+               {"memory_mb", Rounded(r.peak_memory_mb, 1)}};
+  if (r.evaluation) {
+    json["true"] = r.evaluation->loops_true;
+    json["false"] = r.evaluation->loops_false;
+    json["path_m"] = Rounded(r.evaluation->path_m, 3);
+    json["alignment"] = r.evaluation->alignment;
+    json["odometry"] = ScoreJson(r.evaluation->odometry);
+    json["slam"] = ScoreJson(r.evaluation->slam);
+  }
+  return json;
+}
+
+}  // namespace
+
+Json TimingJson(const RunResult& result) {
+  Json stages = Json::array();
+  for (const auto& [name, ms] : result.stage_ms) stages.push_back({{"name", name}, {"ms", Rounded(ms, 2)}});
+  Json frames = Json::array();
+  const std::size_t bins = std::min(kMostFrameTimes, result.frame_ms.size());
+  std::vector<double> longest(bins, 0);
+  for (std::size_t k = 0; k < result.frame_ms.size(); ++k) {
+    double& bin = longest[k * bins / result.frame_ms.size()];
+    bin = std::max(bin, result.frame_ms[k]);
+  }
+  for (const double ms : longest) frames.push_back(Rounded(ms, 2));
+  return {{"stages", stages}, {"frame_ms", frames}, {"frames", result.frame_ms.size()}};
+}
+
+Json ConfigurationJson(const RunResult& result) {
+  Json sections = Json::array();
+  for (const ConfigEntry& entry : DescribeConfig(result.config)) {
+    if (sections.empty() || sections.back()["name"] != entry.section)
+      sections.push_back({{"name", entry.section}, {"rows", Json::array()}});
+    sections.back()["rows"].push_back({entry.name, entry.value, entry.doc});
+  }
+  return {{"file", result.config_file},
+          {"dataset", result.dataset},
+          {"seed", result.config.odometry.seed},
+          {"ground_truth", result.evaluation ? result.evaluation->file : ""},
+          {"sections", sections},
+          {"versions", BuildInfo()}};
+}
+
+namespace {
+
+Json ReportJson(const RunResult& result, const DetectionLog& log, const std::string& variant) {
+  Similarity align_slam, align_odometry;
+  const bool scored = result.evaluation && result.evaluation->slam.valid;
+  if (scored) align_slam = align_odometry = result.evaluation->slam.alignment;
+  if (scored && result.evaluation->odometry.valid) align_odometry = result.evaluation->odometry.alignment;
+  const KnownLoops known = FindKnownLoops(result, log);
+  const std::vector<ShownLoop> loops = ShownLoops(result, log, known);
+  Json json;
+  json["format"] = kReportFormat;
+  json["variant"] = variant;
+  json["dataset"] = result.dataset;
+  json["seed"] = result.config.odometry.seed;
+  json["unit"] = result.rig.sensor == Sensor::kMono && !scored ? "map units" : "m";
+  json["figures"] = FiguresJson(result);
+  json["findings"] = Json::array();
+  for (const CalibrationFinding& finding : result.calibration_findings)
+    json["findings"].push_back(finding.measured + "; " + finding.advice);
+  json["reference"] = scored ? PathJson(result.reference, {}) : Json();
+  json["odometry"] = PathJson(result.trajectory_odometry, align_odometry);
+  json["odometry_complete"] = result.odometry_complete;
+  json["slam"] = PathJson(result.trajectory, align_slam);
+  json["loops"] = EdgesJson(result, loops, align_slam);
+  json["errors"] = {{"odometry", scored ? ErrorJson(result, result.trajectory_odometry) : Json()},
+                    {"slam", scored ? ErrorJson(result, result.trajectory) : Json()}};
+  json["precision_recall"] = PrecisionRecallJson(result, log, known);
+  json["posterior"] = PosteriorJson(result, log, loops);
+  json["gallery"] = GalleryJson(result, loops);
+  json["timing"] = TimingJson(result);
+  json["configuration"] = ConfigurationJson(result);
+  return json;
+}
+
+}  // namespace
+}  // namespace report
+
+std::string VariantName(const RunConfig& config) {
+  if (!config.run.loops) return "odometry";
+  if (config.loops.rule == CombinationRule::kJoint) return "ensemble";
+  const bool standardised = config.loops.evidence.kind == EvidenceKind::kStandardised;
+  return config.loops.rule == CombinationRule::kMean && standardised ? "seed" : RuleName(config.loops);
+}
+
+nlohmann::ordered_json RunReport(const RunResult& result, const DetectionLog& log,
+                                 const std::string& variant) {
+  return report::ReportJson(result, log, variant);
+}
+
+}  // namespace tutti

@@ -1,0 +1,274 @@
+// summary.json, loops.csv and the table on the terminal.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "apps/run/outputs.h"
+#include "apps/run/timing.h"
+#include "tutti/slam/version.h"
+
+namespace tutti {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+const char* Name(Sensor sensor) {
+  switch (sensor) {
+    case Sensor::kMono:
+      return "mono";
+    case Sensor::kStereo:
+      return "stereo";
+    case Sensor::kRgbd:
+      return "rgbd";
+  }
+  return "?";
+}
+
+// A value of the configuration as JSON: numbers and booleans as such, the rest as text.
+Json ConfigValue(const std::string& text) {
+  const Json parsed = Json::parse(text, nullptr, false);
+  return parsed.is_discarded() ? Json(text) : parsed;
+}
+
+Json ScoreJson(const TrajectoryScore& score) {
+  if (!score.valid) return Json{{"error", score.reason}};
+  Json json = {{"ate_rmse_m", score.ate.rmse},
+               {"ate_mean_m", score.ate.mean},
+               {"ate_median_m", score.ate.median},
+               {"ate_std_m", score.ate.std},
+               {"ate_min_m", score.ate.min},
+               {"ate_max_m", score.ate.max},
+               {"ate_rotation_rmse_deg", score.ate_rotation.rmse},
+               {"rpe_rmse_m", score.rpe.rmse},
+               {"poses", score.poses},
+               {"scale", score.scale}};
+  if (score.kitti.segments > 0) {
+    json["kitti_translation_percent"] = score.kitti.translation_percent;
+    json["kitti_rotation_deg_per_m"] = score.kitti.rotation_deg_per_m;
+  }
+  return json;
+}
+
+// Only what --timing or --trace measured.
+Json StagesJson(const RunResult& r) {
+  Json rows = Json::array();
+  for (const StageTiming& stage : r.stages) {
+    rows.push_back({{"lane", ToString(stage.lane)},
+                    {"name", stage.name},
+                    {"calls", stage.calls},
+                    {"median_ms", stage.median_ms},
+                    {"p99_ms", stage.p99_ms},
+                    {"total_ms", stage.total_ms},
+                    {"cpu_ms", stage.cpu_ms >= 0 ? Json(stage.cpu_ms) : Json()},
+                    {"share", stage.share}});
+  }
+  return rows;
+}
+
+Json LoopsJson(const RunResult& r) {
+  Json loops = {{"proposed", r.loops.size()},
+                {"accepted", r.LoopsAccepted()},
+                {"corrections", r.corrections},
+                {"global_adjustments", r.global_adjustments}};
+  int injected = 0, injected_accepted = 0;
+  loops["doubted"] = Json::array();
+  for (const LoopRecord& loop : r.loops) {
+    injected += loop.injected ? 1 : 0;
+    injected_accepted += loop.injected && loop.accepted ? 1 : 0;
+    if (!loop.verified || (loop.accepted && loop.weight >= 0.5)) continue;
+    loops["doubted"].push_back({{"query", loop.query},
+                                {"candidate", loop.candidate},
+                                {"weight", loop.weight},
+                                {"reason", loop.accepted ? "down-weighted by the robust loss" : loop.reason},
+                                {"injected", loop.injected}});
+  }
+  loops["injected"] = injected;
+  loops["injected_accepted"] = injected_accepted;
+  if (r.evaluation) {
+    loops["true"] = r.evaluation->loops_true;
+    loops["false"] = r.evaluation->loops_false;
+    loops["without_ground_truth"] = r.evaluation->loops_unknown;
+  }
+  return loops;
+}
+
+Json FramesJson(const RunResult& r) {
+  Json frames = {
+      {"total", r.frames_total},      {"tracked", r.frames_tracked},         {"bad", r.bad.size()},
+      {"lost", r.frames_lost},        {"relocalized", r.frames_relocalized}, {"dropped", r.frames_dropped},
+      {"in_dataset", r.frames_listed}};
+  frames["bad_frames"] = Json::array();
+  for (const BadFrame& bad : r.bad)
+    frames["bad_frames"].push_back({{"index", bad.index}, {"error", bad.error}});
+  frames["lost_stretches"] = Json::array();
+  for (const LostStretch& lost : r.lost) {
+    frames["lost_stretches"].push_back(
+        {{"first", lost.first}, {"last", lost.last}, {"state", lost.state}, {"reason", lost.reason}});
+  }
+  frames["other_pieces"] = Json::array();
+  for (const Trajectory& piece : r.other_pieces) {
+    frames["other_pieces"].push_back({{"frames", piece.size()},
+                                      {"first_stamp_s", piece.front().stamp_s},
+                                      {"last_stamp_s", piece.back().stamp_s}});
+  }
+  return frames;
+}
+
+std::string Quoted(const std::string& text) {
+  std::string out = "\"";
+  for (const char c : text) out += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return out + "\"";
+}
+
+double MemberPosterior(const LoopRecord& loop, const std::string& name) {
+  for (const MemberOpinion& member : loop.members) {
+    if (member.name == name) return member.took_part ? member.hypothesis : std::nan("");
+  }
+  return std::nan("");
+}
+
+// Empty for what is not finite.
+std::string Cell(double value, int decimals, const char* suffix = "") {
+  if (!std::isfinite(value)) return "";
+  char text[80];
+  std::snprintf(text, sizeof text, "%.*f%s", decimals, value, suffix);
+  return text;
+}
+
+// One row of the terminal's table.
+std::string Row(const std::string& name, const std::string& a, const std::string& b, const std::string& c) {
+  char text[200];
+  std::snprintf(text, sizeof text, "  %-22s %14s %14s %14s\n", name.c_str(), a.c_str(), b.c_str(), c.c_str());
+  return text;
+}
+
+std::string Improvement(double before, double after) {
+  if (!(before > 0) || !(after > 0)) return "";
+  return Cell(before / after, 2, "x");
+}
+
+}  // namespace
+
+std::string SummaryJson(const RunResult& r) {
+  Json json;
+  json["version"] = kVersion;
+  json["dataset"] = r.dataset;
+  json["config_file"] = r.config_file;
+  json["sensor"] = Name(r.rig.sensor);
+  json["seed"] = r.config.odometry.seed;
+  json["realtime"] = r.realtime;
+  json["interrupted"] = r.interrupted;
+  json["appearance_only"] = r.appearance_only;
+  json["shared_odometry"] = r.shared_odometry;
+  json["frames"] = FramesJson(r);
+  json["calibration_findings"] = Json::array();
+  for (const CalibrationFinding& f : r.calibration_findings)
+    json["calibration_findings"].push_back({{"measured", f.measured}, {"advice", f.advice}});
+  json["keyframes"] = r.keyframes;
+  json["loops"] = LoopsJson(r);
+  Json stages = Json::object();
+  for (const auto& [name, ms] : r.stage_ms) stages[name] = ms;
+  json["timing"] = {
+      {"wall_s", r.wall_s},
+      {"cpu_s", r.cpu_s},
+      {"odometry_pass_s", r.odometry_pass_s},
+      {"frame_ms", {{"median", Quantile(r.frame_ms, 0.5)}, {"p99", Quantile(r.frame_ms, 0.99)}}},
+      {"stage_ms", stages}};
+  if (!r.stages.empty()) json["timing"]["stages"] = StagesJson(r);
+  json["memory"] = {{"peak_mb", r.peak_memory_mb}};
+  if (r.rig.sensor == Sensor::kStereo) {
+    json["stereo"] = {{"row_error_px", r.stereo_row_error_px}, {"matches", r.stereo_matches}};
+  }
+  if (r.evaluation) {
+    json["evaluation"] = {
+        {"alignment", r.evaluation->alignment},  {"ground_truth", r.evaluation->file},
+        {"path_m", r.evaluation->path_m},        {"odometry", ScoreJson(r.evaluation->odometry)},
+        {"slam", ScoreJson(r.evaluation->slam)}, {"odometry_complete", r.odometry_complete}};
+  }
+  Json config = Json::object();
+  for (const ConfigEntry& entry : DescribeConfig(r.config)) {
+    const std::size_t dot = entry.section.find('.');
+    Json& section = config[entry.section.substr(0, dot)];
+    Json& place = dot == std::string::npos ? section : section[entry.section.substr(dot + 1)];
+    place[entry.name] = ConfigValue(entry.value);
+  }
+  json["config"] = config;
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+std::string LoopsCsv(const RunResult& r) {
+  // surf, sift, orb are always there, since scripts rely on them; further members follow.
+  std::vector<std::string> names = {"surf", "sift", "orb"};
+  for (const LoopRecord& loop : r.loops) {
+    for (const MemberOpinion& member : loop.members) {
+      if (std::find(names.begin(), names.end(), member.name) == names.end()) names.push_back(member.name);
+    }
+  }
+  std::ostringstream out;
+  out << "query,candidate,query_stamp_s,candidate_stamp_s,surf,sift,orb,ensemble,inliers,matches,accepted,"
+         "reason,"
+         "verified,tx,ty,tz,qx,qy,qz,qw,scale,sigmas,weight,injected,probability";
+  for (std::size_t i = 3; i < names.size(); ++i) out << ',' << names[i];
+  out << '\n';
+  for (const LoopRecord& loop : r.loops) {
+    out << loop.query << ',' << loop.candidate << ',' << Cell(loop.query_stamp_s, 9) << ','
+        << Cell(loop.candidate_stamp_s, 9);
+    for (std::size_t i = 0; i < 3; ++i) out << ',' << Cell(MemberPosterior(loop, names[i]), 6);
+    out << ',' << Cell(loop.hypothesis, 6) << ',' << loop.inliers << ',' << loop.matches << ','
+        << (loop.accepted ? 1 : 0) << ',' << Quoted(loop.reason) << ',' << (loop.verified ? 1 : 0);
+    if (loop.S_candidate_query) {
+      const Similarity& s = *loop.S_candidate_query;
+      for (const double v : {s.translation.x(), s.translation.y(), s.translation.z(), s.rotation.x(),
+                             s.rotation.y(), s.rotation.z(), s.rotation.w(), s.scale}) {
+        out << ',' << Cell(v, 9);
+      }
+    } else {
+      out << ",,,,,,,,";
+    }
+    out << ',' << (loop.gate_sigmas ? Cell(*loop.gate_sigmas, 6) : "");
+    out << ',' << Cell(loop.weight, 6) << ',' << (loop.injected ? 1 : 0);
+    out << ',' << Cell(loop.probability, 6);
+    for (std::size_t i = 3; i < names.size(); ++i) out << ',' << Cell(MemberPosterior(loop, names[i]), 6);
+    out << '\n';
+  }
+  return out.str();
+}
+
+std::string ResultTable(const RunResult& r) {
+  std::ostringstream out;
+  out << "\n  frames " << r.frames_tracked << " of " << r.frames_total << " posed";
+  if (!r.bad.empty()) out << ", " << r.bad.size() << " bad";
+  if (r.realtime) out << ", " << r.frames_dropped << " dropped";
+  out << "; keyframes " << r.keyframes << "; loops " << r.LoopsAccepted() << " accepted of " << r.loops.size()
+      << " proposed";
+  if (r.evaluation)
+    out << " (" << r.evaluation->loops_true << " true, " << r.evaluation->loops_false << " false)";
+  out << "\n  time " << Cell(r.wall_s, 1, " s") << " (" << Cell(Quantile(r.frame_ms, 0.5), 1)
+      << " ms per frame, p99 " << Cell(Quantile(r.frame_ms, 0.99), 1) << " ms); memory "
+      << Cell(r.peak_memory_mb, 0, " MB") << "\n";
+  if (!r.evaluation) return out.str();
+  const TrajectoryScore &a = r.evaluation->odometry, &b = r.evaluation->slam;
+  if (!a.valid && !b.valid) {
+    out << "  no evaluation: " << b.reason << "\n";
+    return out.str();
+  }
+  out << "\n" << Row("ATE, " + r.evaluation->alignment, "odometry alone", "with ensemble", "improvement");
+  const auto line = [&](const char* name, double ErrorStatistics::*field) {
+    out << Row(name, a.valid ? Cell(a.ate.*field, 4, " m") : "-", b.valid ? Cell(b.ate.*field, 4, " m") : "-",
+               a.valid && b.valid ? Improvement(a.ate.*field, b.ate.*field) : "");
+  };
+  line("rmse", &ErrorStatistics::rmse);
+  line("median", &ErrorStatistics::median);
+  line("max", &ErrorStatistics::max);
+  if (r.evaluation->path_m > 0) {
+    const auto share = [&](const TrajectoryScore& s) {
+      return s.valid ? Cell(100 * s.ate.rmse / r.evaluation->path_m, 3, " %") : "-";
+    };
+    out << Row("rmse / path of " + Cell(r.evaluation->path_m, 1, " m"), share(a), share(b), "");
+  }
+  return out.str();
+}
+
+}  // namespace tutti

@@ -1,0 +1,182 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "apps/run/plot.h"
+
+namespace tutti {
+namespace {
+
+// Which part of the world is seen, and where it lies on the page; both axes have the same scale.
+struct View {
+  int axis_x = 0, axis_y = 1;
+  Eigen::Vector2d center = Eigen::Vector2d::Zero();
+  double scale = 1;  // [px/m]
+
+  Eigen::Vector2d World(const Eigen::Vector3d& p) const { return {p[axis_x], p[axis_y]}; }
+  // The box of the axes, at the same scale along both.
+  PlotAxes Axes() const {
+    PlotAxes axes;
+    const Eigen::Vector2d half = 0.5 * (axes.bottom_right - axes.top_left) / scale;
+    axes.low = center - half;
+    axes.high = center + half;
+    return axes;
+  }
+};
+
+struct Extent {
+  Eigen::Vector3d low = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity());
+  Eigen::Vector3d high = Eigen::Vector3d::Constant(-std::numeric_limits<double>::infinity());
+  void Add(const Eigen::Vector3d& p) {
+    if (!p.allFinite()) return;
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  }
+  bool Empty() const { return !(low.x() <= high.x()); }
+};
+
+View ChooseView(const TrajectoryPlot& plot) {
+  Extent all, first;
+  for (const PlotSeries& series : plot.series) {
+    for (const Eigen::Vector3d& p : series.points) {
+      all.Add(p);
+      if (&series == &plot.series.front()) first.Add(p);
+    }
+  }
+  View view;
+  if (all.Empty()) return view;
+  const Eigen::Vector3d size = first.Empty() ? all.high - all.low : first.high - first.low;
+  std::array<int, 3> order = {0, 1, 2};
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return size[a] > size[b]; });
+  view.axis_x = std::min(order[0], order[1]);
+  view.axis_y = std::max(order[0], order[1]);
+  view.center = 0.5 * (view.World(all.low) + view.World(all.high));
+  const Eigen::Vector2d extent = (view.World(all.high) - view.World(all.low)).cwiseMax(1e-9);
+  const PlotAxes page;
+  view.scale = 0.94 * ((page.bottom_right - page.top_left).array() / extent.array()).minCoeff();
+  return view;
+}
+
+PlotShape LegendLine(double x, double y, const std::string& color, double width, bool dashed) {
+  PlotShape line = PlotLine({x, y - 5}, {x + 34, y - 5}, color, std::max(2.0, width));
+  line.dashed = dashed;
+  return line;
+}
+
+void AddLegend(const TrajectoryPlot& plot, const PlotAxes& axes, std::vector<PlotShape>& shapes) {
+  double y = axes.top_left.y() + 22;
+  const double x = axes.top_left.x() + 14;
+  const auto entry = [&](const std::string& name, const std::string& color, double width, bool dashed) {
+    shapes.push_back(LegendLine(x, y, color, width, dashed));
+    shapes.push_back(PlotText({x + 42, y}, name, 14));
+    y += 20;
+  };
+  for (const PlotSeries& series : plot.series) entry(series.name, series.color, series.width, series.dashed);
+  if (!plot.edges.empty()) entry(plot.edges_name, plot.edges_color, 2, false);
+}
+
+// Precision-recall curves: at the lower left, where they rarely pass; on white, as they may. Fitted axes: at
+// the top, where FittedAxes leaves room.
+void AddLegend(const CurvePlot& plot, const PlotAxes& axes, std::vector<PlotShape>& shapes) {
+  const double lines = static_cast<double>(plot.curves.size() + plot.notes.size());
+  double width = 0;
+  for (const PlotCurve& curve : plot.curves) width = std::max(width, 42 + TextWidth(curve.name, 14));
+  for (const std::string& note : plot.notes) width = std::max(width, TextWidth(note, 14));
+  const double x = axes.top_left.x() + 20;
+  double y = plot.fit ? axes.top_left.y() + 28 : axes.bottom_right.y() - 20 * lines;
+  shapes.push_back(PlotBox({x - 8, y - 20}, {x + width + 16, y + 20 * lines - 8}, "#ffffff"));
+  for (const PlotCurve& curve : plot.curves) {
+    shapes.push_back(LegendLine(x, y, curve.color, curve.width, curve.dashed));
+    shapes.push_back(PlotText({x + 42, y}, curve.name, 14));
+    y += 20;
+  }
+  for (const std::string& note : plot.notes) {
+    shapes.push_back(PlotText({x, y}, note, 14));
+    y += 20;
+  }
+}
+
+// A little room beyond 0 and 1, so that a curve along the frame is seen.
+PlotAxes UnitAxes() {
+  PlotAxes axes;
+  axes.low = {-0.02, -0.02};
+  axes.high = {1.02, 1.02};
+  axes.x_ticks = axes.y_ticks = 11;  // steps of 0.1
+  return axes;
+}
+
+// From 0 to what the curves reach, with room for the legend above.
+PlotAxes FittedAxes(const CurvePlot& plot) {
+  PlotAxes axes;
+  Eigen::Vector2d high(0, 0);
+  for (const PlotCurve& curve : plot.curves) {
+    for (const Eigen::Vector2d& p : curve.points) {
+      if (p.allFinite()) high = high.cwiseMax(p);
+    }
+  }
+  for (int axis = 0; axis < 2; ++axis) {
+    if (!(high[axis] > 0)) high[axis] = 1;
+  }
+  const double page = axes.bottom_right.y() - axes.top_left.y();
+  const double lines = static_cast<double>(plot.curves.size() + plot.notes.size());
+  const double room = std::min(0.5, (20 * lines + 30) / page);
+  axes.high = {high.x(), high.y() / (1 - room)};
+  return axes;
+}
+
+}  // namespace
+
+std::vector<PlotShape> LayOut(const TrajectoryPlot& plot) {
+  const View view = ChooseView(plot);
+  PlotAxes axes = view.Axes();
+  const char* names = "xyz";
+  axes.title = plot.title;
+  axes.x_name = names[view.axis_x] + (" [" + plot.unit + "]");
+  axes.y_name = names[view.axis_y] + (" [" + plot.unit + "]");
+  std::vector<PlotShape> shapes;
+  AddAxes(axes, shapes);
+  for (const PlotSeries& series : plot.series) {
+    PlotShape line;
+    line.color = series.color;
+    line.size = series.width;
+    line.dashed = series.dashed;
+    for (const Eigen::Vector3d& p : series.points) {
+      if (p.allFinite()) line.points.push_back(axes.Page(view.World(p)));
+    }
+    if (!line.points.empty()) shapes.push_back(std::move(line));
+  }
+  for (const auto& [a, b] : plot.edges) {
+    const Eigen::Vector2d from = axes.Page(view.World(a)), to = axes.Page(view.World(b));
+    shapes.push_back(PlotLine(from, to, plot.edges_color, 1.5));
+    for (const Eigen::Vector2d& end : {from, to}) shapes.push_back(PlotDisc(end, 3, plot.edges_color));
+  }
+  AddLegend(plot, axes, shapes);
+  return shapes;
+}
+
+std::vector<PlotShape> LayOut(const CurvePlot& plot) {
+  PlotAxes axes = plot.fit ? FittedAxes(plot) : UnitAxes();
+  axes.title = plot.title;
+  axes.x_name = plot.x_name;
+  axes.y_name = plot.y_name;
+  std::vector<PlotShape> shapes;
+  AddAxes(axes, shapes);
+  AddLegend(plot, axes, shapes);
+  for (const PlotCurve& curve : plot.curves) {
+    PlotShape line;
+    line.color = curve.color;
+    line.size = curve.width;
+    line.dashed = curve.dashed;
+    for (const Eigen::Vector2d& p : curve.points) {
+      if (p.allFinite()) line.points.push_back(axes.Page(p));
+    }
+    if (!line.points.empty()) shapes.push_back(std::move(line));
+    for (const Eigen::Vector2d& p : curve.marks) {
+      if (p.allFinite()) shapes.push_back(PlotDisc(axes.Page(p), 6, curve.color));
+    }
+  }
+  return shapes;
+}
+
+}  // namespace tutti

@@ -1,0 +1,109 @@
+#include "apps/run/run_parts.h"
+
+#include <sys/resource.h>
+
+#include <set>
+
+#include "tutti/core/error.h"
+
+namespace tutti {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Keyframes of the map piece that trajectory.txt is of.
+void CollectKeyframes(const Odometry& odometry, RunResult& result) {
+  const std::vector<std::int64_t> frames = odometry.FrameIndices();
+  const std::set<std::int64_t> posed(frames.begin(), frames.end());
+  Trajectory keyframes;
+  for (const int id : odometry.KeyframeIds()) {
+    if (posed.count(odometry.KeyframeFrameIndex(id)) == 0) continue;
+    keyframes.push_back({odometry.KeyframeStamp(id), odometry.KeyframePose(id)});
+  }
+  result.keyframes = odometry.KeyframeIds().size();
+  result.keyframe_trajectory = BodyTrajectory(std::move(keyframes), result.rig);
+}
+
+}  // namespace
+
+double PeakMemoryMb() {
+  rusage usage = {};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024.0;
+}
+
+double ProcessCpuSeconds() {
+  rusage usage = {};
+  getrusage(RUSAGE_SELF, &usage);
+  const auto seconds = [](const timeval& t) {
+    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+  };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+RunConfig WithOverrides(RunConfig config, const RunRequest& request) {
+  if (request.no_loops) config.run.loops = false;
+  if (request.follow_s) config.dataset.follow_s = *request.follow_s;
+  if (request.threads) config.run.threads = *request.threads;
+  if (request.inject_false_loops) config.run.inject_false_loops = *request.inject_false_loops;
+  if (request.seed) {
+    config.odometry.seed = *request.seed;
+    config.loops.seed = *request.seed;
+  }
+  const std::string problem = config.run.Validate();
+  if (!problem.empty()) throw InputError("--threads: " + problem);
+  return config;
+}
+
+RunConfig Watched(RunConfig config, const RunRequest& request) {
+  for (const auto& observer : request.observers) {
+    config.loops.keep_posterior = config.loops.keep_posterior || observer->WantsPosteriors();
+    config.loops.keep_evidence = config.loops.keep_evidence || observer->WantsPosteriors();
+  }
+  return config;
+}
+
+std::optional<std::pair<Trajectory, std::string>> ReadReference(const Dataset& dataset,
+                                                                const RunRequest& request,
+                                                                std::vector<std::string>* warnings) {
+  if (request.ground_truth && *request.ground_truth == "none") return std::nullopt;
+  const std::optional<fs::path> file =
+      request.ground_truth ? request.ground_truth : dataset.GroundTruthFile();
+  if (!file) return std::nullopt;
+  try {
+    return std::make_pair(dataset.ReadGroundTruth(*file, warnings), file->string());
+  } catch (const InputError& e) {
+    const char* hint = " (ground truth; --ground-truth none runs without it)";
+    throw InputError(e.what() + std::string(hint));
+  }
+}
+
+Trajectory BodyTrajectory(Trajectory trajectory, const CameraRig& rig) {
+  const Pose T_camera_body = rig.T_body_camera.Inverse();
+  for (StampedPose& pose : trajectory) pose.pose = pose.pose * T_camera_body;
+  return trajectory;
+}
+
+void CollectMap(const SlamSystem& slam, RunResult& result) {
+  result.loops = slam.loops();
+  result.corrections = slam.Corrections();
+  result.global_adjustments = slam.GlobalAdjustments();
+  result.frames_relocalized = slam.Relocalized();
+  result.appearance_only = slam.AppearanceOnly();
+  result.peak_memory_mb = PeakMemoryMb();
+  if (slam.AppearanceOnly()) return;
+  const Odometry& odometry = *slam.odometry();
+  result.trajectory = BodyTrajectory(odometry.FrameTrajectory(), result.rig);
+  result.frames_tracked = result.trajectory.size();
+  const std::vector<int> pieces = odometry.Pieces();
+  result.other_pieces.clear();
+  for (std::size_t i = 1; i < pieces.size(); ++i)
+    result.other_pieces.push_back(BodyTrajectory(odometry.FrameTrajectory(pieces[i]), result.rig));
+  result.trajectory_odometry = result.trajectory;
+  result.graph = slam.Graph();
+  result.stereo_row_error_px = odometry.StereoRowErrorPx();
+  result.stereo_matches = odometry.StereoMatches();
+  CollectKeyframes(odometry, result);
+}
+
+}  // namespace tutti

@@ -1,0 +1,37 @@
+// What a run and the loop closure on a shared odometry have in common.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "apps/run/runner.h"
+#include "tutti/frontend/dataset.h"
+#include "tutti/slam/slam_system.h"
+
+namespace tutti {
+
+/// Peak of the process so far, resident [MB].
+double PeakMemoryMb();
+/// Processor time of all threads so far [s].
+double ProcessCpuSeconds();
+
+/// The configuration with what the command line says. Throws InputError.
+RunConfig WithOverrides(RunConfig config, const RunRequest& request);
+/// With the posteriors and the evidence kept if an observer looks at them; they decide nothing.
+RunConfig Watched(RunConfig config, const RunRequest& request);
+
+/// The ground truth and its file; nothing if there is none, or none is wanted. Throws InputError.
+std::optional<std::pair<Trajectory, std::string>> ReadReference(const Dataset& dataset,
+                                                                const RunRequest& request,
+                                                                std::vector<std::string>* warnings);
+
+/// T_world_camera -> T_world_body, the frame that ground truth is of.
+Trajectory BodyTrajectory(Trajectory trajectory, const CameraRig& rig);
+
+/// Loops, trajectories, keyframes, graph and memory of a finished system. trajectory_odometry is the
+/// trajectory.
+void CollectMap(const SlamSystem& slam, RunResult& result);
+
+}  // namespace tutti

@@ -1,0 +1,107 @@
+// Everything that a run found out; what summary.json, the tables and the plots are made from.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/run/timing.h"
+#include "tutti/backend/evaluation.h"
+#include "tutti/backend/pose_graph.h"
+#include "tutti/core/trajectory.h"
+#include "tutti/frontend/calibration_check.h"
+#include "tutti/slam/config.h"
+#include "tutti/slam/loop_record.h"
+
+namespace tutti {
+
+/// Frames in a row without a pose, and why.
+struct LostStretch {
+  std::int64_t first = 0, last = 0;  ///< 0-based indices of input frames
+  std::string state;                 ///< "initializing" or "lost"
+  std::string reason;                ///< of its first frame
+};
+
+/// A frame that could not be read.
+struct BadFrame {
+  std::int64_t index = 0;
+  std::string error;
+};
+
+/// One trajectory against the reference.
+struct TrajectoryScore {
+  bool valid = false;
+  std::string reason;            ///< why there is no score
+  std::size_t poses = 0;         ///< pairs that were compared
+  ErrorStatistics ate;           ///< [m]
+  ErrorStatistics ate_rotation;  ///< [deg]
+  ErrorStatistics rpe;           ///< from frame to frame [m]
+  KittiErrors kitti;             ///< no segments if the path is shorter than 100 m
+  double scale = 1;              ///< of the alignment (1 for SE(3))
+  Similarity alignment;          ///< S_reference_estimate
+};
+
+/// Ground truth and what it says.
+struct RunEvaluation {
+  std::string file;       ///< of the ground truth
+  std::string alignment;  ///< "se3" or "sim3"
+  double path_m = 0;      ///< length of the reference over the run
+  TrajectoryScore odometry, slam;
+  int loops_true = 0, loops_false = 0, loops_unknown = 0;  ///< of the accepted ones
+};
+
+/// Frames, loops, times, trajectories of one run.
+struct RunResult {
+  // What was run.
+  std::string dataset, config_file;
+  RunConfig config;
+  CameraRig rig;
+
+  std::vector<CalibrationFinding> calibration_findings;  ///< what can't be right about it
+
+  // Frames.
+  std::size_t frames_total = 0;        ///< that the run went through, bad and dropped ones included
+  std::size_t frames_listed = 0;       ///< that the data set has
+  std::size_t frames_tracked = 0;      ///< with a pose in trajectory.txt
+  std::size_t frames_lost = 0;         ///< read, but without a pose when they came
+  std::size_t frames_relocalized = 0;  ///< lost, but the loop detector knew the place
+  bool realtime = false;               ///< played by the time stamps
+  std::size_t frames_dropped = 0;      ///< not looked at, since newer ones were there already
+  std::vector<BadFrame> bad;
+  std::vector<LostStretch> lost;
+  std::size_t keyframes = 0;
+  bool interrupted = false;
+  bool appearance_only = false;
+  bool shared_odometry = false;  ///< tracked once for several runs; loops did not reach the tracking
+
+  // Loops.
+  std::vector<LoopRecord> loops;
+  int corrections = 0;
+  int global_adjustments = 0;
+
+  // Trajectories: T_world_body, the world is the first camera's place.
+  Trajectory trajectory, trajectory_odometry, keyframe_trajectory, reference;
+  std::vector<Trajectory> other_pieces;  ///< of the map, after losses; no loop joined them to `trajectory`
+  bool odometry_complete =
+      true;  ///< false: it ends at the first correction (interrupted, or run.odometry_pass: false)
+  PoseGraph graph;
+  std::optional<RunEvaluation> evaluation;
+
+  // Cost.
+  double wall_s = 0;             ///< of the run, without the second odometry pass and the evaluation
+  double cpu_s = 0;              ///< processor time of all threads over the same time
+  double odometry_pass_s = 0;    ///< of that second pass
+  std::vector<double> frame_ms;  ///< of each frame, from having the image to having the pose
+  std::map<std::string, double> stage_ms;  ///< summed over the run
+  std::vector<StageTiming> stages;         ///< with RunRequest::timing or trace only
+  double peak_memory_mb = 0;
+  double stereo_row_error_px = 0, stereo_matches = 0;
+
+  std::size_t LoopsAccepted() const;
+  /// True if the run is void: frames were there, calibration was there, and not one got a pose.
+  bool Void() const { return !appearance_only && frames_tracked == 0; }
+};
+
+}  // namespace tutti

@@ -1,0 +1,281 @@
+#include "apps/run/runner.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <map>
+#include <memory>
+#include <opencv2/core.hpp>
+#include <set>
+#include <utility>
+
+#include "apps/run/interrupt.h"
+#include "apps/run/outputs.h"
+#include "apps/run/prefetcher.h"
+#include "apps/run/progress.h"
+#include "apps/run/run_evaluation.h"
+#include "apps/run/run_parts.h"
+#include "apps/run/text_file.h"
+#include "tutti/core/error.h"
+#include "tutti/slam/slam_system.h"
+
+namespace tutti {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+double Seconds(Clock::time_point begin) {
+  return std::chrono::duration<double>(Clock::now() - begin).count();
+}
+
+/// One run from its first frame to its last.
+class Run {
+ public:
+  Run(const RunRequest& request, const RunConfig& config, const Dataset& dataset, RunResult& result)
+      : request_(request),
+        config_(config),
+        dataset_(dataset),
+        result_(result),
+        slam_(Watched(config, request), dataset.Rig(), Recorder()) {
+    slam_.SetDetectionListener([this](const LoopResult& detection) {
+      for (const auto& observer : request_.observers) observer->OnDetection(detection);
+    });
+    if (!request.observers.empty()) {
+      slam_.SetKeyframeListener([this](const InputFrame& frame, int keyframe) {
+        for (const auto& observer : request_.observers) observer->OnKeyframe(frame, keyframe, slam_);
+      });
+    }
+    total_ = dataset.FrameSupply() == Supply::kStored ? dataset.Size() : static_cast<std::size_t>(-1);
+    if (request.max_frames) total_ = std::min(total_, static_cast<std::size_t>(*request.max_frames));
+    result_.realtime = request.realtime;
+    if (!request.realtime || dataset.FrameSupply() == Supply::kOnce) return;
+    clock_ = request.clock ? request.clock : std::make_shared<SteadyFrameClock>();
+    playback_.emplace(*clock_);
+  }
+
+  void TrackAll() {
+    for (const auto& observer : request_.observers) observer->OnStart(result_.rig);
+    const Clock::time_point begin = Clock::now();
+    const double cpu_begin = ProcessCpuSeconds();
+    Progress progress(config_.run.loops ? "slam" : "odometry",
+                      total_ == static_cast<std::size_t>(-1) ? 0 : total_, Out());
+    Prefetcher frames(dataset_, Reading());
+    double read_ms = 0, extract_ms = 0;  // of the thread that reads ahead
+    while (!InterruptGuard::Requested()) {
+      if (playback_) AwaitFrame(frames);
+      const std::optional<FetchedFrame> fetched = frames.Next();
+      if (!fetched) break;
+      read_ms += fetched->read_ms;
+      extract_ms += fetched->prepare_ms;
+      for (; next_ < fetched->position; ++next_) dropped_.insert(next_);
+      if (fetched->read.frame) {
+        positions_[fetched->read.frame->index] = next_;
+        TrackOne(*fetched->read.frame);
+      } else {
+        result_.bad.push_back({static_cast<std::int64_t>(next_), fetched->read.error});
+        progress.Note("tutti: frame " + std::to_string(next_) + " is skipped: " + fetched->read.error);
+      }
+      NoteWarnings(progress);
+      progress.Update(++next_, Status());
+    }
+    result_.interrupted = InterruptGuard::Requested();
+    slam_.Finish();
+    for (const auto& observer : request_.observers) observer->OnEnd(slam_);
+    NoteWarnings(progress);
+    progress.Finish();
+    if (result_.interrupted) {
+      progress.Note("tutti: interrupted after " + std::to_string(next_) + " of " + std::to_string(Listed()) +
+                    " frames; writing what is there");
+    }
+    if (result_.realtime) {
+      progress.Note("tutti: real time: " + std::to_string(dropped_.size()) + " of " + std::to_string(next_) +
+                    " frames were dropped");
+    }
+    result_.frames_total = next_;
+    result_.frames_dropped = dropped_.size();
+    result_.frames_listed = dataset_.Size();
+    result_.stage_ms = slam_.StageMilliseconds();
+    result_.stage_ms["read"] = read_ms;
+    result_.stage_ms["read_wait"] = frames.WaitedMs();
+    if (!slam_.AppearanceOnly()) result_.stage_ms["odometry_extract"] += extract_ms;
+    result_.wall_s = Seconds(begin);
+    result_.cpu_s = ProcessCpuSeconds() - cpu_begin;
+    ReportTimes(begin);
+  }
+
+  // What the odometry would have done alone: the copy from before the first correction tracks the rest.
+  void TrackUntouched() {
+    Odometry* odometry = slam_.untouched();
+    if (odometry == nullptr) return;
+    const std::size_t begin = positions_.at(slam_.UntouchedLast()) + 1, end = result_.frames_total;
+    if (begin >= end) return;
+    const Clock::time_point start = Clock::now();
+    const bool again = config_.run.odometry_pass && dataset_.FrameSupply() != Supply::kOnce;
+    result_.odometry_complete = again && TrackAgain(*odometry, begin, end);
+    odometry->FinishMapping();
+    result_.odometry_pass_s = Seconds(start);
+  }
+
+  void Collect() {
+    const Odometry* alone = slam_.untouched();
+    CollectMap(slam_, result_);
+    if (alone != nullptr) result_.trajectory_odometry = BodyTrajectory(alone->FrameTrajectory(), result_.rig);
+  }
+
+ private:
+  std::FILE* Out() const { return request_.quiet ? nullptr : stderr; }
+  SpanRecorder* Recorder() { return request_.timing || request_.trace ? &recorder_ : nullptr; }
+
+  // Frames that are there by now, of those that the run may see.
+  std::size_t Listed() const { return std::min(total_, dataset_.Size()); }
+
+  PrefetchOptions Reading() {
+    PrefetchOptions options;
+    options.end = total_;
+    options.ahead = config_.run.threads > 1 ? 4 : 0;
+    options.stop = &InterruptGuard::Requested;
+    options.recorder = Recorder();
+    options.prepare = [this](InputFrame& frame) { Extract(frame); };
+    if (request_.realtime && !playback_) {  // a camera keeps its own time
+      options.ahead = 1;
+      options.newest = true;
+    }
+    return options;
+  }
+
+  // Features need nothing from before, so they are extracted ahead of the tracking, too.
+  void Extract(InputFrame& frame) {
+    if (slam_.AppearanceOnly()) return;
+    const ScopedSpan span(Recorder(), Lane::kReading, "extract");
+    frame.features = slam_.odometry()->Extract(frame);
+  }
+
+  // In real time: passes over the frames that newer ones have made old, and waits for the one that is due.
+  void AwaitFrame(Prefetcher& frames) {
+    std::size_t next = next_;
+    while (next + 1 < Listed() && playback_->Due(dataset_.Stamp(next + 1))) ++next;
+    frames.SkipTo(next);
+    if (next < Listed()) playback_->Reach(dataset_.Stamp(next));
+  }
+
+  // False if it was interrupted.
+  bool TrackAgain(Odometry& odometry, std::size_t begin, std::size_t end) {
+    Progress progress("odometry alone", end - begin, Out());
+    PrefetchOptions options;
+    options.begin = begin;
+    options.end = end;
+    options.ahead = Reading().ahead;
+    options.prepare = [&odometry](InputFrame& frame) { frame.features = odometry.Extract(frame); };
+    Prefetcher frames(dataset_, options);
+    // After a Ctrl-C this pass is the price of a complete file; a second Ctrl-C ends the process.
+    for (std::size_t i = begin; i < end; ++i) {
+      if (dropped_.count(i) != 0) continue;
+      frames.SkipTo(i);
+      const std::optional<FetchedFrame> fetched = frames.Next();
+      if (!fetched) return false;
+      if (fetched->read.frame) odometry.Track(*fetched->read.frame);
+      progress.Update(i + 1 - begin, "for trajectory_odometry.txt");
+      if ((result_.interrupted || InterruptGuard::Requested()) && i + 1 < end) return false;
+    }
+    return true;
+  }
+
+  void NoteWarnings(Progress& progress) {
+    for (const std::string& warning : slam_.TakeWarnings()) progress.Note("tutti: warning: " + warning);
+  }
+
+  void ReportTimes(Clock::time_point begin) {
+    if (Recorder() == nullptr) return;
+    const std::vector<Span> spans = recorder_.Spans();
+    result_.stages = SummarizeStages(spans, result_.wall_s);
+    if (request_.trace) WriteTextFile(*request_.trace, ChromeTrace(spans, begin));
+  }
+
+  void TrackOne(const InputFrame& frame) {
+    const ScopedSpan span(Recorder(), Lane::kTracking, "frame");
+    const Clock::time_point begin = Clock::now();
+    const TrackResult track = slam_.Track(frame);
+    result_.frame_ms.push_back(1e3 * Seconds(begin));
+    for (const auto& observer : request_.observers) observer->OnFrame(frame, track, slam_);
+    state_ = slam_.AppearanceOnly() ? "appearance only" : ToString(track.state);
+    if (slam_.AppearanceOnly() || track.state == TrackingState::kTracking) {
+      lost_open_ = false;
+      return;
+    }
+    ++result_.frames_lost;
+    if (!lost_open_ || result_.lost.back().state != state_) {
+      result_.lost.push_back({frame.index, frame.index, state_, track.reason});
+      lost_open_ = true;
+    }
+    result_.lost.back().last = frame.index;
+  }
+
+  std::string Status() const {
+    std::string status = state_;
+    if (config_.run.loops) {
+      status +=
+          "  loops " + std::to_string(slam_.LoopsAccepted()) + "/" + std::to_string(slam_.loops().size());
+    }
+    return status;
+  }
+
+  const RunRequest& request_;
+  const RunConfig& config_;
+  const Dataset& dataset_;
+  RunResult& result_;
+  SpanRecorder recorder_;
+  SlamSystem slam_;
+  std::shared_ptr<FrameClock> clock_;              // of playback_
+  std::optional<Playback> playback_;               // in real time, unless the source keeps time itself
+  std::size_t total_ = 0;                          // most frames; endless for a growing data set
+  std::size_t next_ = 0;                           // position that comes next
+  std::set<std::size_t> dropped_;                  // positions
+  std::map<std::int64_t, std::size_t> positions_;  // of the input frames, by their index
+  std::string state_;
+  bool lost_open_ = false;
+};
+
+}  // namespace
+
+RunResult RunSlam(const RunRequest& request) { return RunSlam(request, LoadConfig(request.config)); }
+
+RunResult RunSlam(const RunRequest& request, const RunConfig& given) {
+  RunResult result;
+  result.config = WithOverrides(given, request);
+  result.config_file = request.config.string();
+  result.dataset = request.dataset.string();
+  if (request.max_frames && *request.max_frames < 1) throw InputError("--max-frames: must be at least 1");
+  // The modules use threads of their own where that can't change a result; OpenCV's would reorder keypoints.
+  cv::setNumThreads(1);
+  const std::unique_ptr<Dataset> dataset = OpenDataset(request.dataset, result.config.dataset);
+  result.rig = dataset->Rig();
+  std::vector<std::string> warnings = dataset->Warnings();
+  const auto reference = ReadReference(*dataset, request, &warnings);
+  PrepareOutputFolder(request.out);
+  if (request.trace)
+    WriteTextFile(*request.trace, "");  // what can't be written is known before the long work
+  if (!request.quiet) {
+    for (const std::string& warning : warnings) std::fprintf(stderr, "tutti: %s\n", warning.c_str());
+    if (!result.rig.calibrated) {
+      std::fprintf(stderr, "tutti: no camera calibration: appearance only, loops but no trajectory\n");
+    }
+  }
+  result.calibration_findings = CheckCalibration(*dataset).findings;
+  if (!request.quiet) {
+    for (const CalibrationFinding& f : result.calibration_findings) {
+      std::fprintf(stderr, "tutti: warning: the calibration can't be right: %s; %s\n", f.measured.c_str(),
+                   f.advice.c_str());
+    }
+  }
+  const InterruptGuard guard;
+  Run run(request, result.config, *dataset, result);
+  run.TrackAll();
+  run.TrackUntouched();
+  run.Collect();
+  if (reference) EvaluateRun(reference->first, reference->second, result);
+  WriteOutputs(request.out, result);
+  return result;
+}
+
+}  // namespace tutti

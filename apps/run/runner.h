@@ -1,0 +1,45 @@
+// `tutti run`: a data set in, trajectories, loops and a summary out.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "apps/run/frame_clock.h"
+#include "apps/run/run_observer.h"
+#include "apps/run/run_result.h"
+
+namespace tutti {
+
+/// What the command line can say.
+struct RunRequest {
+  std::filesystem::path config;                       ///< YAML file
+  std::filesystem::path dataset;                      ///< folder, video file, or camera:0
+  std::filesystem::path out;                          ///< folder for the results; made if it is not there
+  std::optional<std::filesystem::path> ground_truth;  ///< "none": don't evaluate; default: the data set's own
+  bool no_loops = false;
+  std::optional<std::uint64_t> seed;  ///< of everything that draws numbers
+  std::optional<int> threads;
+  std::optional<int> inject_false_loops;       ///< instead of run.inject_false_loops
+  std::optional<std::int64_t> max_frames;      ///< the first frames only
+  std::optional<double> follow_s;              ///< DatasetOptions::follow_s
+  bool realtime = false;                       ///< play by the time stamps, drop frames that it can't follow
+  std::shared_ptr<FrameClock> clock;           ///< for realtime; null: the machine's
+  bool timing = false;                         ///< measure every stage (RunResult::stages)
+  std::optional<std::filesystem::path> trace;  ///< the same, and write a trace for Chrome or Perfetto there
+  bool quiet = false;                          ///< no progress, no notes
+  std::vector<std::shared_ptr<RunObserver>> observers;  ///< none null
+};
+
+/// Runs and writes everything into request.out. Throws InputError for input that makes the run impossible,
+/// and before the long work where it can be known: no configuration, no data, damaged ground truth, an output
+/// folder that can't be written. Bad frames are skipped and counted. SIGINT and SIGTERM end it early, with
+/// everything written.
+RunResult RunSlam(const RunRequest& request);
+
+/// The same from a configuration in memory; `request.config` is only a name then.
+RunResult RunSlam(const RunRequest& request, const RunConfig& config);
+
+}  // namespace tutti

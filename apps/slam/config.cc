@@ -1,0 +1,216 @@
+#include "tutti/slam/config.h"
+
+#include <algorithm>
+#include <fstream>
+#include <map>
+#include <set>
+#include <sstream>
+
+#include "apps/slam/config_table.h"
+#include "tutti/core/error.h"
+#include "tutti/core/text.h"
+
+namespace tutti {
+namespace {
+
+[[noreturn]] void Fail(const std::string& file, const YAML::Mark& mark, const std::string& what) {
+  throw InputError(file + ":" + std::to_string(mark.line + 1) + ": " + what);
+}
+
+std::string NearestHint(const std::string& word, const std::vector<std::string>& valid) {
+  const std::string nearest = NearestWord(word, valid);
+  return nearest.empty() ? "" : "; did you mean '" + nearest + "'?";
+}
+
+// Where each key was set, so that a value that is found to be out of range later can be traced to its line.
+struct KeyMarks {
+  std::vector<std::pair<std::string, YAML::Mark>> keys;
+  YAML::Mark section;
+};
+
+void ReadSection(const std::string& file, const std::string& section, const YAML::Node& content,
+                 const ConfigTable& table, KeyMarks& marks) {
+  if (content.IsNull()) return;
+  if (!content.IsMap()) Fail(file, content.Mark(), "section '" + section + "' needs lines of 'key: value'");
+  const std::vector<std::string> sections = table.Sections();
+  std::set<std::string> seen;
+  // A preset changes many values: it comes first, wherever it stands, and the file's other keys on top of it.
+  std::vector<std::pair<YAML::Node, YAML::Node>> items;
+  for (const auto& item : content) {
+    const bool preset = item.first.IsScalar() && item.first.Scalar() == "preset";
+    items.emplace(preset ? items.begin() : items.end(), item.first, item.second);
+  }
+  for (const auto& item : items) {
+    if (!item.first.IsScalar()) Fail(file, item.first.Mark(), "a key must be a word");
+    const std::string name = item.first.Scalar();
+    const YAML::Mark mark = item.first.Mark();
+    if (!seen.insert(name).second)
+      Fail(file, mark, "key '" + name + "' is given twice; remove one of the two");
+    const std::string nested = section + "." + name;
+    if (std::find(sections.begin(), sections.end(), nested) != sections.end()) {
+      ReadSection(file, nested, item.second, table, marks);
+      continue;
+    }
+    const ConfigKey* key = table.Find(section, name);
+    if (key == nullptr) {
+      Fail(file, mark,
+           "unknown key '" + name + "' in section '" + section + "'" +
+               NearestHint(name, table.Names(section)));
+    }
+    const std::string wrong = key->read(item.second);
+    if (!wrong.empty()) Fail(file, mark, section + "." + name + ": " + wrong);
+    marks.keys.emplace_back(name, mark);
+  }
+}
+
+// Points to the line of the key that the message of Validate() speaks of, else to the section.
+void Check(const std::string& file, const std::string& section, const KeyMarks& marks,
+           const std::string& problem) {
+  if (problem.empty()) return;
+  YAML::Mark where = marks.section;
+  std::size_t longest = 0;  // "threshold" must not win over "loop_threshold"
+  for (const auto& [name, mark] : marks.keys) {
+    if (name.size() > longest && problem.find(name) != std::string::npos) {
+      longest = name.size();
+      where = mark;
+    }
+  }
+  Fail(file, where, section + ": " + problem);
+}
+
+}  // namespace
+
+RunConfig::RunConfig() {
+  graph.init = GraphInit::kFile;  // the odometry is a good start
+  // A loop's error before the optimisation is the drift since then: a redescending loss (DCS) would switch
+  // the loop off. False loops are refused before (LoopGate) and after (SlamSystem) instead.
+  graph.robust = RobustLoss::kHuber;
+  graph.max_iterations = 100;
+  graph.function_tolerance = 1e-6;
+}
+
+RunConfig ParseConfig(const std::string& text, const std::string& name) {
+  RunConfig config;
+  config.dataset.camera = PinholeCamera();  // the table binds to it; dropped again if the file has no camera
+  const ConfigTable table(config);
+  YAML::Node root;
+  try {
+    root = YAML::Load(text);
+  } catch (const YAML::Exception& e) {
+    Fail(name, e.mark, "not valid YAML: " + e.msg);
+  }
+  std::map<std::string, KeyMarks> marks;
+  if (root.IsDefined() && !root.IsNull()) {
+    if (!root.IsMap()) throw InputError(name + ":1: needs sections such as 'dataset:' with indented keys");
+    for (const auto& item : root) {
+      const std::string section = item.first.IsScalar() ? item.first.Scalar() : "";
+      const std::vector<std::string> sections = table.TopSections();
+      if (std::find(sections.begin(), sections.end(), section) == sections.end()) {
+        Fail(name, item.first.Mark(), "unknown section '" + section + "'" + NearestHint(section, sections));
+      }
+      if (marks.count(section) != 0)
+        Fail(name, item.first.Mark(), "section '" + section + "' is given twice");
+      marks[section].section = item.first.Mark();
+      ReadSection(name, section, item.second, table, marks[section]);
+    }
+  }
+  if (marks["camera"].keys.empty()) {
+    config.dataset.camera.reset();
+  } else if (config.dataset.camera->fx == 0 && config.dataset.camera->fy == 0) {
+    // Only the keys that a data set without calibration of its own needs beside its images: baseline, depth
+    // scale.
+    config.dataset.camera.reset();
+  } else {
+    Check(name, "camera", marks["camera"], config.dataset.camera->Validate());
+  }
+  Check(name, "dataset", marks["dataset"], config.dataset.Validate());
+  Check(name, "odometry", marks["odometry"], config.odometry.Validate());
+  Check(name, "loops", marks["loops"], config.loops.Validate());
+  Check(name, "graph", marks["graph"], config.graph.Validate());
+  Check(name, "graph", marks["graph"], config.online.Validate());
+  Check(name, "run", marks["run"], config.run.Validate());
+  return config;
+}
+
+RunConfig LoadConfig(const std::filesystem::path& file) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(file, ignored)) {
+    throw InputError(file.string() +
+                     ": is a folder; --config needs a YAML file such as data/configs/images.yaml");
+  }
+  std::ifstream in(file);
+  if (!in) {
+    throw InputError(file.string() +
+                     ": can't be opened; --config needs a YAML file such as data/configs/images.yaml");
+  }
+  std::ostringstream text;
+  text << in.rdbuf();
+  return ParseConfig(text.str(), file.string());
+}
+
+void SetLoopOptions(const std::vector<std::string>& assignments, LoopDetectorOptions& options) {
+  RunConfig config;
+  config.dataset.camera = PinholeCamera();  // the table binds to it
+  config.loops = options;
+  const ConfigTable table(config);
+  for (const std::string& assignment : assignments) {
+    const std::size_t equals = assignment.find('=');
+    if (equals == std::string::npos) throw InputError("'" + assignment + "': write it as key=value");
+    const std::string path = "loops." + assignment.substr(0, equals);
+    const std::size_t dot = path.rfind('.');
+    const ConfigKey* key = table.Find(path.substr(0, dot), path.substr(dot + 1));
+    if (key == nullptr) {
+      std::vector<std::string> valid;
+      for (const ConfigKey& known : table.keys()) {
+        const std::string name = known.section + "." + known.name;
+        if (name.rfind("loops.", 0) == 0) valid.push_back(name.substr(6));
+      }
+      const std::string given = path.substr(6);
+      throw InputError("'" + assignment + "': unknown key '" + given + "'" + NearestHint(given, valid));
+    }
+    std::string wrong;
+    try {
+      wrong = key->read(YAML::Load(assignment.substr(equals + 1)));
+    } catch (const YAML::Exception& e) {
+      wrong = "not valid YAML: " + e.msg;
+    }
+    if (!wrong.empty()) throw InputError("'" + assignment + "': " + wrong);
+  }
+  const std::string problem = config.loops.Validate();
+  if (!problem.empty()) throw InputError("loops: " + problem);
+  options = config.loops;
+}
+
+std::vector<ConfigEntry> DescribeConfig(const RunConfig& config) {
+  RunConfig copy = config;
+  if (!copy.dataset.camera) copy.dataset.camera = PinholeCamera();
+  const ConfigTable table(copy);
+  std::vector<ConfigEntry> entries;
+  for (const ConfigKey& key : table.keys()) {
+    if (key.section == "camera" && !config.dataset.camera && key.name != "baseline_m") continue;
+    entries.push_back({key.section, key.name, key.show(), key.doc});
+  }
+  return entries;
+}
+
+std::string HelpConfig() {
+  RunConfig defaults;
+  defaults.dataset.camera = PinholeCamera();
+  std::ostringstream out;
+  out << "# All keys of the configuration with their defaults. A file needs only what it changes.\n";
+  std::string section;
+  for (const ConfigEntry& entry : DescribeConfig(defaults)) {
+    const std::size_t dot = entry.section.find('.');
+    const std::string indent(dot == std::string::npos ? 2 : 4, ' ');
+    if (entry.section != section && dot == std::string::npos)
+      out << (section.empty() ? "" : "\n") << entry.section << ":\n";
+    if (entry.section != section && dot != std::string::npos)
+      out << "  " << entry.section.substr(dot + 1) << ":\n";
+    section = entry.section;
+    const std::string line = indent + entry.name + ": " + entry.value;
+    out << line << std::string(line.size() < 44 ? 44 - line.size() : 1, ' ') << "# " << entry.doc << "\n";
+  }
+  return out.str();
+}
+
+}  // namespace tutti

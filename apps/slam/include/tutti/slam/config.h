@@ -1,0 +1,53 @@
+// The YAML configuration of a run: one file, sections dataset, camera, odometry, loops, graph, run.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tutti/backend/online_optimizer.h"
+#include "tutti/backend/pose_graph_optimizer.h"
+#include "tutti/frontend/dataset.h"
+#include "tutti/frontend/odometry_options.h"
+#include "tutti/loopclosure/detector_options.h"
+#include "tutti/slam/slam_options.h"
+
+namespace tutti {
+
+/// Everything that a run can be told.
+struct RunConfig {
+  RunConfig();
+  DatasetOptions dataset;     ///< sections `dataset:` and `camera:`
+  OdometryOptions odometry;   ///< section `odometry:`
+  LoopDetectorOptions loops;  ///< section `loops:`
+  PoseGraphOptions graph;     ///< section `graph:`
+  OnlineOptions online;       ///< section `graph:`, keys that begin with `online_`
+  SlamOptions run;            ///< section `run:`
+};
+
+/// Reads a configuration; keys that the file leaves out keep their defaults. Throws InputError that names
+/// file and line for: missing file, YAML errors, unknown or repeated keys (with the nearest valid one), a
+/// value of the wrong type, a value out of range.
+RunConfig LoadConfig(const std::filesystem::path& file);
+
+/// The same from a text; `name` stands for the file in messages.
+RunConfig ParseConfig(const std::string& text, const std::string& name);
+
+/// Sets options of section `loops:` from texts `key=value` with the keys and values of the YAML file:
+/// "stm_size=20", "extraction.features=300", "rule=product". Later ones win. Throws InputError for an unknown
+/// key (with the nearest valid one) and for a value of the wrong type or out of range.
+void SetLoopOptions(const std::vector<std::string>& assignments, LoopDetectorOptions& options);
+
+/// One key with its present value, for the echo in summary.json and for --help-config.
+struct ConfigEntry {
+  std::string section, name, value, doc;
+};
+
+/// All keys in the order of the sections.
+std::vector<ConfigEntry> DescribeConfig(const RunConfig& config);
+
+/// All keys with units and defaults, as a commented YAML file.
+std::string HelpConfig();
+
+}  // namespace tutti

@@ -1,0 +1,81 @@
+#include "apps/slam/loop_gate.h"
+
+#include <cmath>
+#include <cstdlib>
+#include <utility>
+
+namespace tutti {
+namespace {
+constexpr double kDegrees = 57.29577951308232;
+}
+
+Disagreement Measure(const Similarity& E, double depth) {
+  Disagreement d;
+  d.fraction = E.translation.norm() / depth;
+  d.angle_deg = LogSO3(E.rotation).norm() * kDegrees;
+  d.log_scale = std::abs(std::log(E.scale));
+  return d;
+}
+
+bool Contradicts(const Disagreement& d, const SlamOptions& options) {
+  return d.fraction > options.loop_after_fraction || d.angle_deg > options.loop_after_deg;
+}
+
+bool LoopGate::Within(const Disagreement& d) const {
+  return d.fraction <= options_.loop_agree_fraction && d.angle_deg <= options_.loop_agree_deg &&
+         d.log_scale <= options_.loop_agree_scale;
+}
+
+bool LoopGate::Near(const LoopEdge& a, const LoopEdge& b) const {
+  const auto within = [&](std::int64_t x, std::int64_t y) {
+    return std::llabs(x - y) <= options_.loop_confirmation_frames;
+  };
+  return within(a.query_frame, b.query_frame) && within(a.candidate_frame, b.candidate_frame);
+}
+
+bool LoopGate::Agree(const LoopEdge& a, const LoopEdge& b, const Map& map) const {
+  const Place qa = map(a.query), qb = map(b.query), ca = map(a.candidate), cb = map(b.candidate);
+  if (!qa.alive || !qb.alive || !ca.alive || !cb.alive) return false;
+  if (qa.piece != qb.piece || ca.piece != cb.piece) return false;  // no odometry between them
+  const Similarity between_queries(qa.T_world_camera.Inverse() * qb.T_world_camera);
+  const Similarity between_candidates(cb.T_world_camera.Inverse() * ca.T_world_camera);
+  const Similarity E =
+      a.S_candidate_query * between_queries * b.S_candidate_query.Inverse() * between_candidates;
+  return Within(Measure(E, a.depth));
+}
+
+std::optional<Disagreement> LoopGate::WithMap(const LoopEdge& loop, const Map& map) const {
+  const Place q = map(loop.query), c = map(loop.candidate);
+  if (!q.alive || !c.alive || q.piece != c.piece) return std::nullopt;
+  const Similarity T_query_candidate(q.T_world_camera.Inverse() * c.T_world_camera);
+  return Measure(loop.S_candidate_query * T_query_candidate, loop.depth);
+}
+
+bool LoopGate::Fulfilled(const LoopEdge& loop, const Map& map) const {
+  const std::optional<Disagreement> d = WithMap(loop, map);
+  return d && d->fraction < options_.loop_defer_fraction && d->angle_deg < options_.loop_defer_deg &&
+         d->log_scale < options_.loop_defer_fraction;
+}
+
+std::vector<LoopEdge> LoopGate::Offer(const LoopEdge& loop, const Map& map) {
+  std::vector<LoopEdge> entering;
+  std::vector<LoopEdge> still_waiting;
+  int agreeing = 1;
+  for (const LoopEdge& other : waiting_) {
+    const bool agrees = Near(loop, other) && Agree(loop, other, map);
+    agreeing += agrees ? 1 : 0;
+    (agrees ? entering : still_waiting).push_back(other);
+  }
+  for (const LoopEdge& other : accepted_) {
+    if (Near(loop, other) && Agree(loop, other, map)) ++agreeing;
+  }
+  if (agreeing < options_.loop_confirmations && !Fulfilled(loop, map)) {
+    waiting_.push_back(loop);
+    return {};
+  }
+  waiting_ = std::move(still_waiting);
+  entering.push_back(loop);
+  return entering;
+}
+
+}  // namespace tutti

@@ -1,0 +1,116 @@
+#include "apps/slam/loop_worker.h"
+
+#include <chrono>
+#include <utility>
+
+#include "apps/slam/milliseconds_since.h"
+#include "tutti/core/error.h"
+
+namespace tutti {
+
+std::array<std::pair<const char*, double>, 6> LoopStages(const LoopResult& r) {
+  return {{{"extract", r.extract_ms},
+           {"quantise", r.quantise_ms},
+           {"likelihood", r.likelihood_ms},
+           {"filter", r.filter_ms},
+           {"verify", r.verify_ms},
+           {"memory", r.memory_ms}}};
+}
+
+LoopWorker::LoopWorker(const LoopDetectorOptions& options, bool own_thread, SpanRecorder* recorder)
+    : detector_(options), recorder_(recorder) {
+  // Frames are numbered from 0 in every run: what an earlier run stored has no frame in this one.
+  if (detector_.LastId() >= 0) {
+    throw InputError(
+        options.ltm_file +
+        ": holds the locations of an earlier run; remove it, or give another file in loops.ltm_file");
+  }
+  if (own_thread) thread_ = std::thread(&LoopWorker::Work, this);
+}
+
+LoopWorker::~LoopWorker() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    stop_ = true;
+  }
+  changed_.notify_all();
+  if (thread_.joinable()) thread_.join();
+}
+
+namespace {
+void AddStages(const LoopResult& r, Span::Clock::time_point begin, SpanRecorder& recorder) {
+  for (const auto& [name, ms] : LoopStages(r)) {
+    const auto end = begin + std::chrono::duration_cast<Span::Clock::duration>(
+                                 std::chrono::duration<double, std::milli>(ms));
+    recorder.Add({Lane::kLoopClosure, name, begin, end, -1});
+    begin = end;
+  }
+}
+}  // namespace
+
+LoopWorker::Outcome LoopWorker::Do(const Task& task) {
+  const ScopedSpan span(recorder_, Lane::kLoopClosure, "detect");
+  const Span::Clock::time_point begin = Span::Clock::now();
+  Outcome outcome;
+  try {
+    for (const auto& [query, candidate] : task.unlinked) detector_.Unlink(query, candidate);
+    outcome.result = detector_.Detect(task.query);
+    if (recorder_ != nullptr) AddStages(outcome.result, begin, *recorder_);
+  } catch (...) {
+    outcome.failure = std::current_exception();
+  }
+  return outcome;
+}
+
+void LoopWorker::Work() {
+  std::unique_lock<std::mutex> lock(mutex_);
+  while (true) {
+    changed_.wait(lock, [this] { return stop_ || !tasks_.empty(); });
+    if (stop_) return;
+    const Task task = std::move(tasks_.front());
+    tasks_.pop_front();
+    busy_ = true;
+    lock.unlock();
+    Outcome outcome = Do(task);
+    lock.lock();
+    busy_ = false;
+    outcomes_.push_back(std::move(outcome));
+    changed_.notify_all();
+  }
+}
+
+void LoopWorker::Submit(LoopQuery query) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  Task task{std::exchange(unlinked_, {}), std::move(query)};
+  if (!thread_.joinable()) {
+    outcomes_.push_back(Do(task));
+    return;
+  }
+  tasks_.push_back(std::move(task));
+  changed_.notify_all();
+}
+
+void LoopWorker::Unlink(std::int64_t query, std::int64_t candidate) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  unlinked_.emplace_back(query, candidate);
+}
+
+LoopResult LoopWorker::Locate(const LoopQuery& query) {
+  std::unique_lock<std::mutex> lock(mutex_);
+  changed_.wait(lock, [this] { return tasks_.empty() && !busy_; });
+  return detector_.Locate(query);
+}
+
+LoopResult LoopWorker::Take() {
+  const ScopedSpan span(recorder_, Lane::kTracking, "wait_for_loop");
+  const auto begin = std::chrono::steady_clock::now();
+  std::unique_lock<std::mutex> lock(mutex_);
+  changed_.wait(lock, [this] { return !outcomes_.empty(); });
+  Outcome outcome = std::move(outcomes_.front());
+  outcomes_.pop_front();
+  waited_ms_ += MillisecondsSince(begin);
+  if (outcome.failure) std::rethrow_exception(outcome.failure);
+  return std::move(outcome.result);
+}
+
+}  // namespace tutti

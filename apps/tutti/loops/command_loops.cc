@@ -1,0 +1,256 @@
+// tutti loops: loop closure alone on a folder of images, measured against a ground truth.
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <opencv2/core/utility.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/run/interrupt.h"
+#include "apps/run/progress.h"
+#include "apps/tutti/checks.h"
+#include "apps/tutti/commands.h"
+#include "apps/tutti/loops/joined_pairs.h"
+#include "apps/tutti/loops/loops_dump.h"
+#include "apps/tutti/loops/loops_input.h"
+#include "apps/tutti/loops/loops_output.h"
+#include "apps/tutti/loops/loops_pictures.h"
+#include "apps/tutti/loops/loops_table.h"
+#include "apps/tutti/posteriors_csv.h"
+#include "tutti/core/error.h"
+#include "tutti/core/text.h"
+#include "tutti/loopclosure/detector.h"
+#include "tutti/slam/config.h"
+
+namespace tutti::cli {
+namespace {
+
+struct LoopsArguments {
+  std::string images, out, rule, preset, camera;
+  GroundTruthArguments truth;
+  std::vector<std::string> set;  // key=value, keys of the section `loops` of a configuration
+  LoopDetectorOptions options;
+  bool table = false;
+  bool dump = false;
+};
+
+// What every rule of a table shares.
+struct Input : ImageSet {
+  std::optional<PinholeCamera> camera;
+};
+
+std::optional<PinholeCamera> ParseCamera(const std::string& text) {
+  if (text.empty()) return std::nullopt;
+  const std::vector<std::string> words = SplitText(text, ", ");
+  std::vector<double> values;
+  for (const std::string& word : words) {
+    const auto value = ParseDouble(word);
+    if (value) values.push_back(*value);
+  }
+  if (words.size() != 4 || values.size() != 4 || !(values[0] > 0) || !(values[1] > 0)) {
+    throw InputError("--camera " + text + ": give four numbers, fx,fy,cx,cy in pixels");
+  }
+  PinholeCamera camera;
+  camera.fx = values[0];
+  camera.fy = values[1];
+  camera.cx = values[2];
+  camera.cy = values[3];
+  return camera;
+}
+
+LoopRow Process(const std::filesystem::path& file, const std::filesystem::path& right, int number,
+                const std::optional<PinholeCamera>& camera, LoopDetector& detector) {
+  LoopRow row;
+  row.file = file.filename().string();
+  LoopQuery query;
+  query.id = number;
+  query.stamp_s = number;
+  query.image = right.empty() ? cv::imread(file.string(), cv::IMREAD_UNCHANGED)
+                              : ReadJoined(file, right, &query.cameras);
+  row.read = !query.image.empty();
+  if (row.read && camera) {
+    query.camera = camera;
+    query.camera->width = query.image.cols;
+    query.camera->height = query.image.rows;
+  }
+  const auto begin = std::chrono::steady_clock::now();
+  row.result = detector.Detect(query);
+  row.ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
+  return row;
+}
+
+// What was kept for the pictures and the dump alone.
+void DropEvidence(bool with_posterior, LoopResult& result) {
+  if (!with_posterior) result.posterior_by_location = {};
+  for (MemberOpinion& member : result.members) {
+    if (!with_posterior) member.posterior_by_location = {};
+    member.evidence = {};
+  }
+  result.tried = {};
+  result.verification.inlier_matches = {};
+}
+
+// Up to Ctrl-C: a run that ended early has the ground truth of its images only. A dump goes into `folder`.
+LoopRun Run(const LoopsArguments& arguments, const LoopDetectorOptions& options, const Input& set,
+            const std::filesystem::path& folder) {
+  LoopRun run;
+  run.images = arguments.images;
+  run.stride = arguments.truth.stride;
+  run.options = options;
+  LoopDetectorOptions with_posterior = options;
+  with_posterior.keep_posterior = true;  // for confusion.png
+  with_posterior.keep_evidence = arguments.dump || options.keep_evidence;
+  LoopDetector detector(with_posterior);
+  std::optional<LoopsDump> dump;
+  if (arguments.dump) dump.emplace(folder, options.members);
+  const int total = static_cast<int>(set.images.size());
+  int loops = 0;
+  Progress progress(arguments.table ? "loops, " + RuleName(options) : "loops", set.images.size());
+  for (std::size_t i = 0; i < set.images.size(); ++i) {
+    if (InterruptGuard::Requested()) break;
+    const std::filesystem::path& image = set.images[i];
+    run.rows.push_back(Process(image, set.rights[i], static_cast<int>(i), set.camera, detector));
+    LoopRow& row = run.rows.back();
+    if (!row.read)
+      progress.Note("tutti: warning: " + image.string() +
+                    ": can't be read; it counts as an image without features");
+    AddPosterior(row.result, total, run.posterior);
+    if (dump) dump->Add(row.result, set.truth);
+    DropEvidence(options.keep_posterior, row.result);
+    loops += row.result.accepted ? 1 : 0;
+    progress.Update(run.rows.size(), std::to_string(loops) + " loops");
+  }
+  progress.Finish();
+  if (dump) dump->Finish();
+  run.truth = set.truth;
+  if (run.rows.size() < set.images.size()) {
+    const int done = static_cast<int>(run.rows.size());
+    run.truth = set.truth.First(done);
+    const int side = (done * run.posterior.rows + total - 1) / total;
+    run.posterior = run.posterior(cv::Rect(0, 0, side, side)).clone();
+  }
+  return run;
+}
+
+// All rules, each with the files of a run of its own in its folder.
+int RunTable(const LoopsArguments& arguments, const Input& set) {
+  const std::filesystem::path folder = arguments.out;
+  LoopTable table;
+  for (const std::string& rule : TableRules(arguments.options)) {
+    LoopDetectorOptions options = arguments.options;
+    SetRule(rule, options);
+    const LoopRun run = Run(arguments, options, set, folder / rule);
+    if (run.rows.size() < set.images.size()) {
+      std::fprintf(stderr,
+                   "tutti: interrupted in the rule '%s'; no table is written, only the rules before\n",
+                   rule.c_str());
+      return 130;
+    }
+    const LoopReport report = EvaluateRun(run);
+    WriteLoopRun(run, report, folder / rule);
+    AddToTable(run, report, table);
+  }
+  WriteLoopTable(table, folder);
+  return 0;
+}
+
+int RunLoops(const LoopsArguments& given) {
+  LoopsArguments arguments = given;
+  if (arguments.truth.join_pairs && !arguments.camera.empty()) {
+    throw InputError(
+        "--camera: images that --join-pairs joins have no common camera; leave one of the two out");
+  }
+  if (arguments.truth.stride < 1) throw InputError("--stride must be at least 1");
+  if (!arguments.preset.empty()) ApplyPreset(arguments.preset, arguments.options);
+  if (!arguments.rule.empty()) SetRule(arguments.rule, arguments.options);
+  SetLoopOptions(arguments.set, arguments.options);
+  const std::string problem = arguments.truth.rule.Validate();
+  if (!problem.empty()) throw InputError("ground truth: " + problem);
+  cv::setNumThreads(arguments.options.threads);
+  const Input set = {LoadImageSet(arguments.images, arguments.truth), ParseCamera(arguments.camera)};
+  const InterruptGuard interrupt;
+  if (arguments.table) return RunTable(arguments, set);
+
+  const LoopRun run = Run(arguments, arguments.options, set, arguments.out);
+  const LoopReport report = EvaluateRun(run);
+  WriteLoopRun(run, report, arguments.out);
+  PrintLoopRun(run, report, arguments.out);
+  if (run.options.keep_posterior) {
+    WritePosteriors(run, std::filesystem::path(arguments.out) / "posteriors.csv");
+  }
+  if (run.rows.size() < set.images.size()) {
+    std::fprintf(stderr, "tutti: interrupted after %zu of %zu images; the results are of those\n",
+                 run.rows.size(), set.images.size());
+    return 130;
+  }
+  return 0;
+}
+
+}  // namespace
+
+void AddLoopsCommand(CLI::App& app, int& exit_code) {
+  auto arguments = std::make_shared<LoopsArguments>();
+  CLI::App* command = app.add_subcommand(
+      "loops", "loop closure alone on a folder of images, measured against a ground truth");
+  command->add_option("--images", arguments->images, "folder of images, taken in natural order")->required();
+  command
+      ->add_option("--ground-truth", arguments->truth.file,
+                   "loop matrix (PNG, BMP, text, MATLAB v5 .mat; row = current image) or trajectory (TUM, "
+                   "KITTI, EuRoC)")
+      ->required();
+  command->add_option("--out", arguments->out, "folder for results.json, hypotheses.csv, curves and pictures")
+      ->required();
+  command->add_option("--stride", arguments->truth.stride, "every n-th image")->capture_default_str();
+  command->add_flag("--join-pairs", arguments->truth.join_pairs,
+                    "two images in a row, left and right, make one image (City Centre, New College)");
+  command->add_flag("--keep-posterior", arguments->options.keep_posterior,
+                    "also write posteriors.csv: what each member believed of each location");
+  command->add_flag("--dump", arguments->dump,
+                    "also write dump_candidates.csv (what each candidate looked like to each member) and "
+                    "dump_verification.csv (each geometric verification)");
+  command
+      ->add_option(
+          "--rule", arguments->rule,
+          "joint (default), mean, log-pool, product, majority, naive, or one member: surf, sift, orb, "
+          "akaze, brisk, kaze")
+      ->type_name("RULE");
+  command->add_option(
+      "--preset", arguments->preset,
+      "published parameters: standardised-mean, paper-2013, rtabmap-0.8.3, or default (ours)");
+  LoopRule& rule = arguments->truth.rule;
+  command->add_option("--gt-distance", rule.distance_m, "trajectory: a loop is nearer than this [m]")
+      ->capture_default_str();
+  command->add_option("--gt-angle", rule.angle_deg, "trajectory: and turned by less than this [deg]")
+      ->capture_default_str();
+  command
+      ->add_option("--gt-ignore", rule.ignore_m,
+                   "trajectory: what is nearer than this but no loop is ignored [m]")
+      ->capture_default_str();
+  command->add_option("--gt-exclude-s", rule.exclude_s, "trajectory: a loop is at least this much older [s]")
+      ->capture_default_str();
+  command
+      ->add_flag("--table", arguments->table,
+                 "every rule and each member alone, one after the other; table.json, .md, .csv, and a folder "
+                 "for each")
+      ->excludes(command->get_option("--rule"));
+  command->add_option("--camera", arguments->camera,
+                      "fx,fy,cx,cy [px]: verify with the essential matrix (default: fundamental matrix)");
+  command
+      ->add_option("--threads", arguments->options.threads,
+                   "most threads; the result is the same for any number")
+      ->capture_default_str();
+  command->add_option("--seed", arguments->options.seed, "seed of kd-forests and RANSAC")
+      ->check(NotNegative())
+      ->capture_default_str();
+  command->add_option(
+      "--set", arguments->set,
+      "key=value: an option of the detector, with the keys of section 'loops' in --help-config "
+      "(extraction.features=300); may be given again");
+  command->callback([arguments, &exit_code] { exit_code = RunLoops(*arguments); });
+}
+
+}  // namespace tutti::cli

@@ -1,0 +1,215 @@
+// The contact sheet of `tutti loops`: what went wrong, to look at.
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <vector>
+
+#include "apps/run/plot_shapes.h"
+#include "apps/tutti/loops/loops_pictures.h"
+#include "tutti/loopclosure/features.h"
+
+namespace tutti::cli {
+namespace {
+
+constexpr std::size_t kMostRows = 24;  // half of them for either kind where both have more
+constexpr int kThumbWidth = 400, kThumbHeight = 240, kMargin = 16;  // [px]
+constexpr int kWidth = 3 * kThumbWidth + 4 * kMargin;
+constexpr int kCaption = 84, kHeader = 84;
+constexpr double kTextHeight = 15;
+
+struct Entry {
+  std::size_t row = 0;  // of LoopRun::rows
+  bool missed = false;
+};
+
+std::vector<std::size_t> RowsOf(const LoopReport& report, LoopOutcome outcome) {
+  std::vector<std::size_t> rows;
+  for (std::size_t i = 0; i < report.verified.outcomes.size(); ++i) {
+    if (report.verified.outcomes[i] == outcome) rows.push_back(i);
+  }
+  return rows;
+}
+
+// At most `count`, evenly over the list: neighbours fail for the same reason.
+std::vector<std::size_t> Spread(const std::vector<std::size_t>& rows, std::size_t count) {
+  if (rows.size() <= count) return rows;
+  std::vector<std::size_t> chosen;
+  for (std::size_t k = 0; k < count; ++k) chosen.push_back(rows[k * rows.size() / count]);
+  return chosen;
+}
+
+std::vector<Entry> Choose(std::vector<std::size_t> wrong, const std::vector<std::size_t>& missed,
+                          const LoopRun& run) {
+  std::stable_sort(wrong.begin(), wrong.end(), [&](std::size_t a, std::size_t b) {
+    return run.rows[a].result.probability > run.rows[b].result.probability;
+  });
+  const std::size_t half = kMostRows / 2;
+  const std::size_t wrong_count =
+      std::min(wrong.size(), std::max(half, kMostRows - std::min(kMostRows, missed.size())));
+  wrong.resize(wrong_count);
+  std::vector<Entry> entries;
+  for (const std::size_t row : wrong) entries.push_back({row, false});
+  for (const std::size_t row : Spread(missed, kMostRows - wrong_count)) entries.push_back({row, true});
+  return entries;
+}
+
+// Colour, 8 bits, in the middle of a thumb; a line of text where there is none.
+cv::Mat Thumb(const LoopRun& run, long image, const char* absent) {
+  cv::Mat thumb(kThumbHeight, kThumbWidth, CV_8UC3, cv::Scalar::all(236));
+  cv::Mat read;
+  if (image >= 0 && image < static_cast<long>(run.rows.size())) {
+    const std::string& name = run.rows[static_cast<std::size_t>(image)].file;
+    read = cv::imread((std::filesystem::path(run.images) / name).string(), cv::IMREAD_UNCHANGED);
+    absent = "the image can't be read";
+  }
+  if (read.empty()) {
+    DrawShapes(
+        {PlotText({0.5 * kThumbWidth, 0.5 * kThumbHeight}, absent, kTextHeight, PlotShape::Anchor::kMiddle)},
+        thumb);
+    return thumb;
+  }
+  if (read.depth() != CV_8U) read = ToGrey8(read);
+  if (read.channels() == 1) cv::cvtColor(read, read, cv::COLOR_GRAY2BGR);
+  if (read.channels() == 4) cv::cvtColor(read, read, cv::COLOR_BGRA2BGR);
+  const double scale =
+      std::min(static_cast<double>(kThumbWidth) / read.cols, static_cast<double>(kThumbHeight) / read.rows);
+  const cv::Size size(std::max(1, static_cast<int>(read.cols * scale)),
+                      std::max(1, static_cast<int>(read.rows * scale)));
+  cv::resize(read, read, size, 0, 0, scale < 1 ? cv::INTER_AREA : cv::INTER_LINEAR);
+  read.copyTo(thumb(
+      cv::Rect((kThumbWidth - size.width) / 2, (kThumbHeight - size.height) / 2, size.width, size.height)));
+  return thumb;
+}
+
+std::string Name(const LoopRun& run, long image) {
+  if (image < 0) return "none";
+  std::string text = std::to_string(image);
+  if (image < static_cast<long>(run.rows.size()))
+    text += " (" + run.rows[static_cast<std::size_t>(image)].file + ")";
+  return text;
+}
+
+// The loops of a row, and the one nearest to what was said; the middle one if nothing was.
+struct TruthOfRow {
+  std::vector<long> loops;
+  long shown = -1;
+};
+
+TruthOfRow LookUp(const LoopGroundTruth& truth, int row, long said) {
+  TruthOfRow result;
+  for (int c = 0; c < row; ++c) {
+    if (truth.At(row, c) == LoopLabel::kLoop) result.loops.push_back(c);
+  }
+  if (result.loops.empty()) return result;
+  const auto nearer = [said](long a, long b) { return std::labs(a - said) < std::labs(b - said); };
+  result.shown = said < 0 ? result.loops[result.loops.size() / 2]
+                          : *std::min_element(result.loops.begin(), result.loops.end(), nearer);
+  return result;
+}
+
+std::string TruthText(const LoopRun& run, const TruthOfRow& truth) {
+  if (truth.loops.empty()) return "truth: no loop";
+  std::string text = "truth: " + Name(run, truth.shown);
+  if (truth.loops.size() > 1)
+    text += ", of " + std::to_string(truth.loops.size()) + " from " + std::to_string(truth.loops.front()) +
+            " to " + std::to_string(truth.loops.back());
+  return text;
+}
+
+std::string Numbers(const LoopResult& r) {
+  char text[200];
+  std::snprintf(text, sizeof text, "H = %.3f, posterior of the best %.3f, probability %.3f", r.hypothesis,
+                r.posterior, r.probability);
+  const std::string line = text;
+  if (r.verification.candidate < 0) return line + ", nothing was verified";
+  std::snprintf(text, sizeof text, "; %d inliers of %d matches with image %ld", r.verification.inliers,
+                r.verification.matches, static_cast<long>(r.verification.candidate));
+  return line + text;
+}
+
+// As much of a text as fits.
+std::string Fitted(std::string text, double width) {
+  if (TextWidth(text, kTextHeight) <= width) return text;
+  while (!text.empty() && TextWidth(text + "...", kTextHeight) > width) text.pop_back();
+  return text + "...";
+}
+
+// One or two lines, broken between words.
+std::vector<std::string> Wrapped(const std::string& text, double width) {
+  std::size_t end = text.size();
+  while (TextWidth(text.substr(0, end), kTextHeight) > width) {
+    const std::size_t space = end == 0 ? std::string::npos : text.rfind(' ', end - 1);
+    if (space == std::string::npos) return {Fitted(text, width)};
+    end = space;
+  }
+  if (end == text.size()) return {text};
+  return {text.substr(0, end), Fitted(text.substr(end + 1), width)};
+}
+
+void DrawEntry(const LoopRun& run, const Entry& entry, cv::Mat strip) {
+  const LoopRow& row = run.rows[entry.row];
+  const LoopResult& r = row.result;
+  const int image = static_cast<int>(r.query);
+  const long said = static_cast<long>(r.accepted ? r.verification.candidate : r.candidate);
+  const TruthOfRow truth = LookUp(run.truth, image, said);
+  const long shown[] = {image, said, truth.shown};
+  const char* absent[] = {"", "nothing was proposed", "no loop in the ground truth"};
+  const std::string heads[] = {"image " + Name(run, image),
+                               (r.accepted ? "accepted: " : "best: ") + Name(run, said),
+                               TruthText(run, truth)};
+  const std::string color = entry.missed ? kMissedColor : kFalseColor;
+  std::string reason = !row.read ? "the image can't be read" : r.reason;
+  if (entry.missed && r.accepted) reason = "accepted on a pair that the ground truth ignores";
+  if (!entry.missed) reason = "accepted";
+  std::vector<PlotShape> shapes = {PlotBox({kMargin, 4}, {kWidth - kMargin, 8}, color)};
+  for (int k = 0; k < 3; ++k) {
+    const int left = kMargin + k * (kThumbWidth + kMargin);
+    Thumb(run, shown[k], absent[k]).copyTo(strip(cv::Rect(left, kCaption, kThumbWidth, kThumbHeight)));
+    shapes.push_back(
+        PlotText({static_cast<double>(left), kCaption - 8.0}, Fitted(heads[k], kThumbWidth), kTextHeight));
+  }
+  const std::string line =
+      std::string(entry.missed ? "missed: " : "false positive: ") + Numbers(r) + "; " + reason;
+  double y = 28;
+  for (const std::string& part : Wrapped(line, kWidth - 2 * kMargin)) {
+    shapes.push_back(PlotText({kMargin, y}, part, kTextHeight));
+    y += 21;
+  }
+  DrawShapes(shapes, strip);
+}
+
+}  // namespace
+
+void WriteContactSheet(const LoopRun& run, const LoopReport& report, const std::filesystem::path& file) {
+  const std::vector<std::size_t> wrong = RowsOf(report, LoopOutcome::kFalsePositive);
+  const std::vector<std::size_t> missed = RowsOf(report, LoopOutcome::kMissed);
+  const std::vector<Entry> entries = Choose(wrong, missed, run);
+  const int strip = kCaption + kThumbHeight + kMargin;
+  const int height = kHeader + std::max(1, static_cast<int>(entries.size())) * strip;
+  cv::Mat picture(height, kWidth, CV_8UC3, cv::Scalar::all(255));
+
+  char text[200];
+  std::snprintf(text, sizeof text, "false positives: %zu, missed loops: %zu, at probability >= %g",
+                wrong.size(), missed.size(), run.options.loop_threshold);
+  std::string summary = text;
+  if (entries.size() < wrong.size() + missed.size())
+    summary +=
+        "; " + std::to_string(entries.size()) +
+        " are shown: the most probable of the false ones, the missed ones evenly; all are in hypotheses.csv";
+  std::vector<PlotShape> shapes = {PlotText({kMargin, 34}, RunTitle(run, report), 20),
+                                   PlotText({kMargin, 64}, summary, 16)};
+  if (entries.empty())
+    shapes.push_back(PlotText({0.5 * kWidth, kHeader + 0.5 * strip},
+                              "none: no false positive, no missed loop", 22, PlotShape::Anchor::kMiddle));
+  DrawShapes(shapes, picture);
+  for (std::size_t k = 0; k < entries.size(); ++k) {
+    const int top = kHeader + static_cast<int>(k) * strip;
+    DrawEntry(run, entries[k], picture(cv::Rect(0, top, kWidth, strip)));
+  }
+  WritePicture(file, picture);
+}
+
+}  // namespace tutti::cli

@@ -1,0 +1,105 @@
+#include "apps/tutti/loops/loops_dump.h"
+
+#include <algorithm>
+#include <cstdio>
+
+#include "tutti/core/error.h"
+
+namespace tutti::cli {
+namespace {
+
+const char* TypeName(ConstraintType type) {
+  switch (type) {
+    case ConstraintType::kNone:
+      return "none";
+    case ConstraintType::kFundamental:
+      return "fundamental";
+    case ConstraintType::kEssential:
+      return "essential";
+    case ConstraintType::kRigid:
+      return "rigid";
+    case ConstraintType::kSimilarity:
+      return "similarity";
+  }
+  return "?";
+}
+
+std::string CandidateLines(const LoopResult& result, const LoopGroundTruth& truth) {
+  std::string text;
+  for (std::size_t i = 0; i < result.posterior_by_location.size(); ++i) {
+    const auto& [location, combined] = result.posterior_by_location[i];
+    const LoopLabel label = truth.At(static_cast<int>(result.query), static_cast<int>(location));
+    char cells[128];
+    std::snprintf(cells, sizeof cells, "%ld,%ld,%s,%.9g", static_cast<long>(result.query),
+                  static_cast<long>(location), LabelName(label), combined);
+    std::string line = cells;
+    bool any_score = false;
+    for (const MemberOpinion& member : result.members) {
+      if (i >= member.evidence.size()) {  // it sat this image out
+        line += ",,,";
+        continue;
+      }
+      const CandidateEvidence& evidence = member.evidence[i];
+      any_score = any_score || evidence.score > 0;
+      std::snprintf(cells, sizeof cells, ",%.9g,%.9g,%.9g", evidence.score, evidence.likelihood,
+                    evidence.posterior);
+      line += cells;
+    }
+    if (any_score) text += line + "\n";
+  }
+  return text;
+}
+
+std::string VerificationLines(const LoopResult& result, const LoopGroundTruth& truth) {
+  std::string text;
+  int order = 0;
+  for (const Verification& tried : result.tried) {
+    const LoopLabel label = truth.At(static_cast<int>(result.query), static_cast<int>(tried.candidate));
+    char cells[320];
+    std::snprintf(cells, sizeof cells, "%ld,%ld,%s,%d,%d,%d,%s,%d,%d,%.9g,%d,%.9g,%.9g,%.9g,",
+                  static_cast<long>(result.query), static_cast<long>(tried.candidate), LabelName(label),
+                  order++, tried.accepted ? 1 : 0,
+                  result.accepted && tried.candidate == result.verification.candidate ? 1 : 0,
+                  TypeName(tried.type), tried.matches, tried.inliers, tried.mass, tried.coverage,
+                  tried.expected_inliers, tried.log_nfa, tried.motion_spread);
+    text += cells + Quoted(tried.reason) + "\n";
+  }
+  return text;
+}
+
+void CheckWritten(const std::ofstream& out, const std::filesystem::path& file) {
+  if (!out) throw InputError(file.string() + ": can't be written; is there space, and may you write there?");
+}
+
+}  // namespace
+
+LoopsDump::LoopsDump(const std::filesystem::path& folder, const std::vector<std::string>& members)
+    : candidates_file_(folder / "dump_candidates.csv"), verification_file_(folder / "dump_verification.csv") {
+  MakeFolder(folder);
+  candidates_.open(candidates_file_, std::ios::binary);
+  verification_.open(verification_file_, std::ios::binary);
+  candidates_ << "image,location,truth,combined_posterior";
+  for (const std::string& name : members) {
+    candidates_ << "," << name << "_score," << name << "_likelihood," << name << "_posterior";
+  }
+  candidates_ << "\n";
+  verification_
+      << "image,candidate,truth,order,accepted,chosen,type,matches,inliers,mass,coverage,expected_inliers,"
+         "log_nfa,motion_spread,reason\n";
+  CheckWritten(candidates_, candidates_file_);
+  CheckWritten(verification_, verification_file_);
+}
+
+void LoopsDump::Add(const LoopResult& result, const LoopGroundTruth& truth) {
+  candidates_ << CandidateLines(result, truth);
+  verification_ << VerificationLines(result, truth);
+}
+
+void LoopsDump::Finish() {
+  candidates_.close();
+  verification_.close();
+  CheckWritten(candidates_, candidates_file_);
+  CheckWritten(verification_, verification_file_);
+}
+
+}  // namespace tutti::cli

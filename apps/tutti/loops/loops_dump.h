@@ -1,0 +1,29 @@
+// What each candidate looked like to the detector, as files: for those who want to learn from it.
+#pragma once
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "apps/tutti/loops/loops_output.h"
+
+namespace tutti::cli {
+
+/// Writes dump_candidates.csv and dump_verification.csv (docs/outputs.md), image by image: all of a long walk
+/// would not fit into memory. Needs results of a detector with LoopDetectorOptions::keep_evidence.
+class LoopsDump {
+ public:
+  /// Opens both files in `folder` (made if missing) and writes their headers. Throws InputError if it can't.
+  LoopsDump(const std::filesystem::path& folder, const std::vector<std::string>& members);
+  /// Appends the lines of one image; `truth` is for all images.
+  void Add(const LoopResult& result, const LoopGroundTruth& truth);
+  /// To be called at the end. Throws InputError if the files could not be written in full.
+  void Finish();
+
+ private:
+  std::filesystem::path candidates_file_, verification_file_;
+  std::ofstream candidates_, verification_;
+};
+
+}  // namespace tutti::cli

@@ -1,0 +1,181 @@
+#include "apps/tutti/loops/loops_input.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <fstream>
+#include <sstream>
+
+#include "apps/tutti/loops/joined_pairs.h"
+#include "tutti/core/error.h"
+#include "tutti/core/text.h"
+#include "tutti/core/trajectory.h"
+
+namespace tutti::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kMaxStampDifference = 0.05;  // between an image's name and a pose [s]
+
+bool IsImage(const fs::path& path) {
+  static const std::array<const char*, 12> kTypes = {".png",  ".jpg", ".jpeg", ".bmp", ".webp", ".tif",
+                                                     ".tiff", ".pgm", ".ppm",  ".jp2", ".pnm",  ".exr"};
+  std::string type = path.extension().string();
+  std::transform(type.begin(), type.end(), type.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return std::find(kTypes.begin(), kTypes.end(), type) != kTypes.end();
+}
+
+// A trajectory has lines of 8 numbers (TUM) or 12 (KITTI), or commas and a header (EuRoC). A text matrix that
+// has just as many columns has as many rows, too.
+bool LooksLikeTrajectory(const fs::path& file) {
+  std::ifstream in(file);
+  std::string line;
+  std::size_t columns = 0;
+  std::size_t rows = 0;
+  bool euroc = false;
+  while (std::getline(in, line) && rows < 20) {
+    if (line.rfind("#timestamp", 0) == 0 || line.rfind("#time", 0) == 0)
+      euroc = line.find(',') != std::string::npos;
+    if (line.empty() || line[0] == '#') continue;
+    const std::vector<std::string> words = SplitText(line);
+    if (words.empty() || !ParseDouble(words.front())) return false;
+    if (rows > 0 && words.size() != columns) return false;
+    columns = words.size();
+    ++rows;
+  }
+  if (euroc) return rows > 0;
+  return (columns == 8 || columns == 12) && rows != columns;
+}
+
+Trajectory ReadPoses(const fs::path& file) {
+  const TrajectoryFormat format = GuessTrajectoryFormat(file);
+  Trajectory trajectory = ReadTrajectory(file, format);
+  const fs::path times_file = file.parent_path() / "times.txt";
+  if (format != TrajectoryFormat::kKitti || !fs::exists(times_file)) return trajectory;
+  const std::vector<double> times = ReadTimes(times_file);
+  if (times.size() != trajectory.size()) {
+    throw InputError(times_file.string() + ": has " + std::to_string(times.size()) + " times, but " +
+                     file.string() + " has " + std::to_string(trajectory.size()) + " poses");
+  }
+  for (std::size_t i = 0; i < times.size(); ++i) trajectory[i].stamp_s = times[i];
+  return trajectory;
+}
+
+// The pose nearest in time to each image that is named by its time stamp; empty if the names are no stamps of
+// this trajectory.
+Trajectory PosesByName(const Trajectory& trajectory, const std::vector<fs::path>& images) {
+  Trajectory result;
+  for (const fs::path& image : images) {
+    const auto stamp = ParseDouble(image.stem().string());
+    if (!stamp) return {};
+    const auto later = std::lower_bound(trajectory.begin(), trajectory.end(), *stamp,
+                                        [](const StampedPose& pose, double t) { return pose.stamp_s < t; });
+    const StampedPose* nearest = nullptr;
+    for (const auto& it : {later, later == trajectory.begin() ? later : later - 1}) {
+      if (it == trajectory.end()) continue;
+      if (nearest == nullptr || std::abs(it->stamp_s - *stamp) < std::abs(nearest->stamp_s - *stamp))
+        nearest = &*it;
+    }
+    if (nearest == nullptr || std::abs(nearest->stamp_s - *stamp) > kMaxStampDifference) return {};
+    result.push_back(*nearest);
+  }
+  return result;
+}
+
+std::string RuleText(const LoopRule& rule) {
+  std::ostringstream text;
+  text << "loop: < " << rule.distance_m << " m and < " << rule.angle_deg << " deg, >= " << rule.exclude_s
+       << " s older; ignored: younger, or < " << rule.ignore_m << " m";
+  return text.str();
+}
+
+LoopGroundTruth FromPoses(const GroundTruthArguments& arguments, const std::vector<fs::path>& images) {
+  Trajectory poses = ReadPoses(arguments.file);
+  if (arguments.join_pairs && poses.size() == 2 * images.size()) {  // the left images' poses
+    for (std::size_t i = 0; i < images.size(); ++i) poses[i] = poses[2 * i];
+    poses.resize(images.size());
+  }
+  if (poses.size() != images.size()) {
+    const Trajectory by_name = PosesByName(poses, images);
+    if (by_name.empty()) {
+      throw InputError(arguments.file + ": has " + std::to_string(poses.size()) + " poses, but there are " +
+                       std::to_string(images.size()) +
+                       " images, and their names are no time stamps of it; give one pose per image");
+    }
+    poses = by_name;
+  }
+  Trajectory strided;
+  for (std::size_t i = 0; i < poses.size(); i += static_cast<std::size_t>(arguments.stride))
+    strided.push_back(poses[i]);
+  LoopGroundTruth truth = LoopsFromTrajectory(strided, arguments.rule);
+  truth.description = arguments.file + " (" + RuleText(arguments.rule) + ")";
+  return truth;
+}
+
+}  // namespace
+
+std::vector<fs::path> ListImages(const fs::path& folder) {
+  std::error_code error;
+  if (!fs::is_directory(folder, error)) {
+    throw InputError(folder.string() + ": no such folder; give the folder that holds the images");
+  }
+  std::vector<fs::path> images = ImagesIn(folder);
+  if (images.empty()) throw InputError(folder.string() + ": holds no image files");
+  return images;
+}
+
+std::vector<fs::path> ImagesIn(const fs::path& folder) {
+  std::error_code error;
+  std::vector<fs::path> images;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
+    if (entry.is_regular_file() && IsImage(entry.path())) images.push_back(entry.path());
+  }
+  if (error) throw InputError(folder.string() + ": can't be read (" + error.message() + ")");
+  std::sort(images.begin(), images.end(), [](const fs::path& a, const fs::path& b) {
+    return NaturalLess(a.filename().string(), b.filename().string());
+  });
+  return images;
+}
+
+LoopGroundTruth LoadGroundTruth(const GroundTruthArguments& arguments, const std::vector<fs::path>& images) {
+  std::error_code error;
+  if (!fs::is_regular_file(arguments.file, error)) {
+    throw InputError(arguments.file + ": no such file; --ground-truth takes a loop matrix or a trajectory");
+  }
+  if (LooksLikeTrajectory(arguments.file)) return FromPoses(arguments, images);
+  const int all = static_cast<int>(images.size());
+  const int used = (all + arguments.stride - 1) / arguments.stride;
+  LoopGroundTruth truth = ReadLoopMatrix(arguments.file, all);
+  if (arguments.join_pairs && truth.size() == 2 * all) truth = truth.PairsJoined();
+  if (truth.size() == used) return truth;
+  if (truth.size() == all) return truth.Strided(arguments.stride);
+  std::string images_text = std::to_string(all) + " images";
+  if (arguments.stride > 1) {
+    images_text += " (" + std::to_string(used) + " with --stride " + std::to_string(arguments.stride) + ")";
+  }
+  throw InputError(arguments.file + ": the ground truth is " + std::to_string(truth.size()) + " x " +
+                   std::to_string(truth.size()) + ", but there are " + images_text +
+                   "; give the one that belongs to them");
+}
+
+ImageSet LoadImageSet(const std::string& folder, const GroundTruthArguments& arguments) {
+  std::vector<fs::path> images = ListImages(folder);
+  std::error_code error;
+  images.erase(std::remove_if(images.begin(), images.end(),
+                              [&](const auto& p) { return fs::equivalent(p, arguments.file, error); }),
+               images.end());
+  std::vector<fs::path> rights(images.size());
+  if (arguments.join_pairs) rights = TakeRightImages(folder, images);
+  ImageSet set;
+  set.truth = LoadGroundTruth(arguments, images);
+  for (std::size_t i = 0; i < images.size(); i += static_cast<std::size_t>(arguments.stride)) {
+    set.images.push_back(images[i]);
+    set.rights.push_back(rights[i]);
+  }
+  return set;
+}
+
+}  // namespace tutti::cli

@@ -1,0 +1,226 @@
+#include "apps/tutti/loops/loops_output.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <fstream>
+#include <functional>
+#include <utility>
+
+#include "apps/tutti/loops/loops_pictures.h"
+#include "tutti/core/error.h"
+
+namespace tutti::cli {
+namespace {
+
+// Of a copy, sorted; q in [0, 1]; 0 for none.
+double Quantile(std::vector<double> values, double q) {
+  if (values.empty()) return 0.0;
+  std::sort(values.begin(), values.end());
+  const double position = q * static_cast<double>(values.size() - 1);
+  return values[static_cast<std::size_t>(position + 0.5)];
+}
+
+std::vector<double> Collect(const std::vector<LoopRow>& rows,
+                            const std::function<double(const LoopRow&)>& value) {
+  std::vector<double> values;
+  for (const LoopRow& row : rows) {
+    if (row.read) values.push_back(value(row));
+  }
+  return values;
+}
+
+nlohmann::ordered_json Stages(const std::vector<LoopRow>& rows) {
+  const std::vector<std::pair<const char*, double LoopResult::*>> stages = {
+      {"extract", &LoopResult::extract_ms}, {"quantise", &LoopResult::quantise_ms},
+      {"memory", &LoopResult::memory_ms},   {"likelihood", &LoopResult::likelihood_ms},
+      {"filter", &LoopResult::filter_ms},   {"verify", &LoopResult::verify_ms}};
+  nlohmann::ordered_json json;
+  for (const auto& [name, field] : stages) {
+    const auto member = field;
+    json[name] = Quantile(Collect(rows, [member](const LoopRow& row) { return row.result.*member; }), 0.5);
+  }
+  return json;
+}
+
+nlohmann::ordered_json Rates(const PrecisionRecall& rates) {
+  return {{"precision", rates.precision}, {"recall", rates.recall}};
+}
+
+// null where there is nothing that could be calibrated.
+nlohmann::ordered_json CalibrationError(const LoopEvaluation& evaluation) {
+  if (evaluation.calibration_images == 0) return nullptr;
+  return evaluation.calibration_error;
+}
+
+std::string CalibrationText(const LoopEvaluation& evaluation) {
+  if (evaluation.calibration_images == 0) return "-";
+  char text[32];
+  std::snprintf(text, sizeof text, "%.1f%%", 100 * evaluation.calibration_error);
+  return text;
+}
+
+nlohmann::ordered_json Reliability(const LoopEvaluation& evaluation) {
+  nlohmann::ordered_json bins = nlohmann::ordered_json::array();
+  const double count = LoopEvaluation::kReliabilityBins;
+  for (std::size_t b = 0; b < evaluation.reliability.size(); ++b) {
+    const ReliabilityBin& bin = evaluation.reliability[b];
+    bins.push_back({{"above", static_cast<double>(b) / count},
+                    {"up_to", static_cast<double>(b + 1) / count},
+                    {"images", bin.images},
+                    {"mean_probability", bin.mean_probability},
+                    {"accuracy", bin.accuracy}});
+  }
+  return bins;
+}
+
+std::string Csv(const LoopRun& run) {
+  std::string text =
+      "image,file,hypothesis,candidate,posterior,probability,proposed,accepted,verified_candidate,matches,"
+      "inliers,truth,row_has_loop";
+  for (const std::string& name : run.options.members) {
+    text += "," + name + "_hypothesis," + name + "_best," + name + "_at_candidate";
+  }
+  text += ",reason\n";
+  for (const LoopRow& row : run.rows) {
+    const LoopResult& r = row.result;
+    const int image = static_cast<int>(r.query);
+    const long verified = r.accepted ? static_cast<long>(r.verification.candidate) : -1;
+    const long location = r.accepted ? verified : static_cast<long>(r.candidate);
+    char numbers[256];
+    std::snprintf(numbers, sizeof numbers, ",%.9g,%ld,%.9g,%.9g,%d,%d,%ld,%d,%d,%s,%d", r.hypothesis,
+                  static_cast<long>(r.candidate), r.posterior, r.probability, r.proposed ? 1 : 0,
+                  r.accepted ? 1 : 0, verified, r.verification.matches, r.verification.inliers,
+                  location < 0 ? "-" : LabelName(run.truth.At(image, static_cast<int>(location))),
+                  run.truth.HasLoop(image) ? 1 : 0);
+    text += std::to_string(image) + "," + Quoted(row.file) + numbers;
+    for (std::size_t k = 0; k < run.options.members.size(); ++k) {
+      const MemberOpinion opinion = k < r.members.size() ? r.members[k] : MemberOpinion();
+      std::snprintf(numbers, sizeof numbers, ",%.9g,%ld,%.9g", opinion.hypothesis,
+                    static_cast<long>(opinion.best), opinion.at_candidate);
+      text += numbers;
+    }
+    text += "," + Quoted(row.read ? r.reason : "the image can't be read") + "\n";
+  }
+  return text;
+}
+
+}  // namespace
+
+const char* LabelName(LoopLabel label) {
+  return label == LoopLabel::kLoop ? "loop" : label == LoopLabel::kIgnore ? "ignored" : "none";
+}
+
+std::string Quoted(const std::string& text) {
+  std::string result = "\"";
+  for (const char c : text) result += c == '"' ? "\"\"" : std::string(1, c);
+  return result + "\"";
+}
+
+LoopReport EvaluateRun(const LoopRun& run) {
+  std::vector<LoopObservation> observations;
+  for (const LoopRow& row : run.rows) observations.push_back(Observe(row.result));
+  LoopReport report;
+  report.verified = EvaluateVerified(observations, run.truth);
+  report.ranked = EvaluateRanked(observations, run.truth);
+  report.posterior = EvaluatePosterior(observations, run.truth, run.options.propose_threshold);
+  const std::vector<double> ms = Collect(run.rows, [](const LoopRow& row) { return row.ms; });
+  report.ms_median = Quantile(ms, 0.5);
+  report.ms_p99 = Quantile(ms, 0.99);
+  report.damaged = static_cast<int>(
+      std::count_if(run.rows.begin(), run.rows.end(), [](const LoopRow& row) { return !row.read; }));
+  return report;
+}
+
+nlohmann::ordered_json FiguresJson(const LoopRun& run, const LoopReport& report) {
+  const LoopEvaluation &verified = report.verified, &posterior = report.posterior;
+  const std::vector<std::pair<std::string, const LoopEvaluation*>> rankings = {
+      {"", &verified}, {"_ranked", &report.ranked}, {"_posterior", &posterior}};
+  nlohmann::ordered_json json;
+  const auto add = [&](const std::string& key, const auto& figure) {
+    for (const auto& [suffix, evaluation] : rankings) json[key + suffix] = figure(*evaluation);
+  };
+  json["images"] = verified.images;
+  json["images_damaged"] = report.damaged;
+  json["rows_with_loop"] = verified.rows_with_loop;
+  add("recall_at_100_precision", [](const LoopEvaluation& e) { return e.recall_at_100_precision; });
+  add("area_under_curve", [](const LoopEvaluation& e) { return e.area_under_curve; });
+  add("best_f1", [](const LoopEvaluation& e) { return e.best_f1; });
+  // The decision does not depend on how images are ranked.
+  json["at_default_threshold"] = Rates(verified.at_default_threshold);
+  json["at_default_threshold"]["threshold"] = run.options.loop_threshold;
+  json["at_default_threshold_posterior"] = Rates(posterior.at_default_threshold);
+  json["at_default_threshold_posterior"]["threshold"] = run.options.propose_threshold;
+  json["f1_at_default"] = verified.f1_at_default;
+  json["f1_at_default_posterior"] = posterior.f1_at_default;
+  json["accepted"] = {
+      {"true", verified.true_positives}, {"false", verified.false_positives}, {"ignored", verified.ignored}};
+  add("calibration_error", CalibrationError);
+  add("calibration_images", [](const LoopEvaluation& e) { return e.calibration_images; });
+  json["ms_per_image"] = {{"median", report.ms_median}, {"p99", report.ms_p99}};
+  json["stage_ms_median"] = Stages(run.rows);
+  add("threshold_at_100_precision", [](const LoopEvaluation& e) { return e.threshold_at_100_precision; });
+  add("reliability", Reliability);
+  return json;
+}
+
+nlohmann::ordered_json ProtocolJson(const LoopRun& run) {
+  return {{"image_folder", run.images},
+          {"stride", run.stride},
+          {"ground_truth", run.truth.description},
+          {"tolerance_frames", 0},
+          {"exclusion", "the newest " + std::to_string(run.options.stm_size) + " images (short-term memory)"},
+          {"threshold",
+           "recall_at_100_precision: chosen after the fact; at_default_threshold: fixed, of the probability; "
+           "posterior: of H"}};
+}
+
+void WriteLoopRun(const LoopRun& run, const LoopReport& report, const std::filesystem::path& folder) {
+  MakeFolder(folder);
+  nlohmann::ordered_json json = FiguresJson(run, report);
+  json["protocol"] = ProtocolJson(run);
+  json["protocol"]["rule"] = RuleName(run.options);
+  json["protocol"]["members"] = run.options.members;
+  json["protocol"]["seed"] = run.options.seed;
+  json["protocol"]["threads"] = run.options.threads;
+  WriteText(folder / "results.json", json.dump(2) + "\n");
+  WriteText(folder / "hypotheses.csv", Csv(run));
+  WriteCurves(run, report, folder);
+  WriteConfusion(run, report, folder / "confusion.png");
+  WriteContactSheet(run, report, folder / "contact_sheet.png");
+}
+
+void PrintLoopRun(const LoopRun& run, const LoopReport& report, const std::filesystem::path& folder) {
+  const LoopEvaluation &verified = report.verified, &ranked = report.ranked, &posterior = report.posterior;
+  std::printf("%-34s %s\n", "rule", RuleName(run.options).c_str());
+  std::printf("%-34s %d (%d with a loop)\n", "images", verified.images, verified.rows_with_loop);
+  std::printf("%-34s %s\n", "ground truth", run.truth.description.c_str());
+  std::printf("%-34s %12s %12s %12s\n", "", "verified", "posterior", "ranked");
+  const auto line = [](const char* name, double a, double b, double c) {
+    std::printf("%-34s %11.1f%% %11.1f%% %11.1f%%\n", name, 100 * a, 100 * b, 100 * c);
+  };
+  line("recall at 100 % precision", verified.recall_at_100_precision, posterior.recall_at_100_precision,
+       ranked.recall_at_100_precision);
+  line("area under the curve", verified.area_under_curve, posterior.area_under_curve,
+       ranked.area_under_curve);
+  line("best F1", verified.best_f1, posterior.best_f1, ranked.best_f1);
+  const auto decision = [](const char* name, double a, double b) {
+    std::printf("%-34s %11.1f%% %11.1f%%\n", name, 100 * a, 100 * b);
+  };
+  decision("precision at the default threshold", verified.at_default_threshold.precision,
+           posterior.at_default_threshold.precision);
+  decision("recall at the default threshold", verified.at_default_threshold.recall,
+           posterior.at_default_threshold.recall);
+  decision("F1 at the default threshold", verified.f1_at_default, posterior.f1_at_default);
+  std::printf("%-34s %12s %12s %12s\n", "calibration error", CalibrationText(verified).c_str(),
+              CalibrationText(posterior).c_str(), CalibrationText(ranked).c_str());
+  std::printf("%-34s %12d %12d %12d\n", "  over n images", verified.calibration_images,
+              posterior.calibration_images, ranked.calibration_images);
+  std::printf("%-34s %d true, %d false, %d on ignored cells\n", "accepted", verified.true_positives,
+              verified.false_positives, verified.ignored);
+  std::printf("%-34s %.1f median, %.1f p99\n", "ms per image", report.ms_median, report.ms_p99);
+  std::printf(
+      "written: %s, hypotheses.csv, precision_recall.{csv,svg,png}, confusion.png, contact_sheet.png\n",
+      (folder / "results.json").string().c_str());
+}
+
+}  // namespace tutti::cli

@@ -1,0 +1,62 @@
+// Output of `tutti loops`: results.json, hypotheses.csv, the pictures and the table on the terminal.
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+#include "apps/tutti/files.h"
+#include "tutti/loopclosure/detector.h"
+#include "tutti/loopclosure/evaluation.h"
+#include "tutti/loopclosure/ground_truth.h"
+
+namespace tutti::cli {
+
+/// One image's outcome.
+struct LoopRow {
+  std::string file;  ///< name of the image
+  bool read = true;  ///< false: the file is damaged; the row stays in the denominator
+  LoopResult result;
+  double ms = 0;  ///< time of Detect [ms]
+};
+
+/// Everything about one run.
+struct LoopRun {
+  LoopDetectorOptions options;
+  std::string images;
+  int stride = 1;
+  LoopGroundTruth truth;
+  std::vector<LoopRow> rows;
+  cv::Mat posterior;  ///< CV_32FC1, square: the posterior of past images (columns), by AddPosterior; may be
+                      ///< empty
+};
+
+/// What the figures of every table are.
+struct LoopReport {
+  LoopEvaluation verified, ranked, posterior;
+  double ms_median = 0, ms_p99 = 0;  ///< of Detect, over the images that could be read [ms]
+  int damaged = 0;
+};
+
+LoopReport EvaluateRun(const LoopRun& run);
+
+/// "loop", "ignored" or "none", in every file.
+const char* LabelName(LoopLabel label);
+/// A cell of a CSV file that may hold anything.
+std::string Quoted(const std::string& text);
+
+/// The figures of results.json, without the protocol.
+nlohmann::ordered_json FiguresJson(const LoopRun& run, const LoopReport& report);
+
+/// How they were measured, but for rule and members.
+nlohmann::ordered_json ProtocolJson(const LoopRun& run);
+
+/// Writes all files into `folder` (made if missing). Throws InputError if it can't be written.
+void WriteLoopRun(const LoopRun& run, const LoopReport& report, const std::filesystem::path& folder);
+
+/// Prints the figures of one run.
+void PrintLoopRun(const LoopRun& run, const LoopReport& report, const std::filesystem::path& folder);
+
+}  // namespace tutti::cli

@@ -1,0 +1,231 @@
+#include "apps/view/live_state.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+
+#include "apps/run/interrupt.h"
+
+namespace tutti::view {
+namespace {
+
+double Now() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+std::vector<LivePlace> PlacesOf(const Odometry& odometry) {
+  std::vector<LivePlace> places;
+  for (const int id : odometry.KeyframeIds()) {
+    places.push_back(
+        {id, odometry.KeyframeFrameIndex(id), odometry.KeyframePiece(id), odometry.KeyframePose(id)});
+  }
+  return places;
+}
+
+std::vector<Eigen::Vector3f> SomePoints(const KeyframeView& view) {
+  std::vector<Eigen::Vector3f> all;
+  for (const Eigen::Vector3d& point : view.points) {
+    if (point.allFinite()) all.push_back(point.cast<float>());
+  }
+  std::vector<Eigen::Vector3f> some;
+  const std::size_t count = std::min(all.size(), LiveState::kPointsPerKeyframe);
+  for (std::size_t k = 0; k < count; ++k) some.push_back(all[k * all.size() / count]);
+  return some;
+}
+
+}  // namespace
+
+void LiveState::Changed() {
+  ++now_.version;
+  changed_.notify_all();
+}
+
+void LiveState::AddEvent(LiveEvent event) {
+  event.number = next_event_++;
+  events_.push_back(std::move(event));
+  if (events_.size() > kMostEvents) events_.pop_front();
+}
+
+std::vector<LiveLoop> LiveState::LoopsOf(const SlamSystem& slam) {
+  std::vector<LiveLoop> loops;
+  for (const LoopRecord& record : slam.loops()) {
+    if (record.verified) loops.push_back({record.query, record.candidate, record.accepted});
+  }
+  return loops;
+}
+
+void LiveState::SetFrame(const InputFrame& frame, const TrackResult& track, const SlamSystem& slam) {
+  LiveFrame next;
+  next.index = frame.index;
+  next.stamp_s = frame.stamp_s;
+  next.image = frame.image;
+  next.state = slam.AppearanceOnly() ? "appearance only" : ToString(track.state);
+  next.reason = track.reason;
+  next.features = track.features;
+  next.inliers = track.inliers;
+  next.posed = !slam.AppearanceOnly() && track.state == TrackingState::kTracking;
+  next.T_world_camera = track.T_world_camera;
+  std::shared_ptr<const std::vector<LivePlace>> places;
+  std::shared_ptr<const std::vector<LiveLoop>> loops;
+  const std::size_t accepted = slam.LoopsAccepted();
+  const bool corrected = slam.Corrections() != corrections_seen_;
+  if (slam.odometry() != nullptr && (new_keyframe_ || corrected))
+    places = std::make_shared<const std::vector<LivePlace>>(PlacesOf(*slam.odometry()));
+  if (slam.loops().size() != loops_seen_ || accepted != accepted_seen_)
+    loops = std::make_shared<const std::vector<LiveLoop>>(LoopsOf(slam));
+  if (next.posed) {
+    ExtendTrail(slam.odometry()->SeenLandmarks(), &trail_);
+  } else {
+    trail_.clear();
+  }
+  next.trail = trail_;
+  if (corrected) Log("frame " + std::to_string(frame.index) + ": the loops moved the map");
+  if (next.state != state_seen_)
+    Log("frame " + std::to_string(frame.index) + ": " + next.state +
+        (next.reason.empty() ? "" : ": " + next.reason));
+  loops_seen_ = slam.loops().size();
+  accepted_seen_ = accepted;
+  corrections_seen_ = slam.Corrections();
+  new_keyframe_ = false;
+  state_seen_ = next.state;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  next.number = now_.frame.number + 1;
+  now_.frame = std::move(next);
+  if (places) now_.places = places;
+  if (loops) now_.loops = loops;
+  Changed();
+}
+
+void LiveState::SetKeyframe(int keyframe, const SlamSystem& slam) {
+  new_keyframe_ = true;
+  LivePoints points;
+  points.keyframe = keyframe;
+  points.points = SomePoints(slam.odometry()->Keyframe(keyframe));
+  const std::lock_guard<std::mutex> lock(mutex_);
+  points.number = next_points_++;
+  points_.push_back(std::move(points));
+  if (points_.size() > kMostPoints) points_.pop_front();
+}
+
+void LiveState::AddDetection(const LoopResult& result) {
+  LiveEvent event;
+  event.query = result.query;
+  for (const MemberOpinion& member : result.members)
+    event.opinions.emplace_back(member.name, member.took_part ? member.hypothesis : std::nan(""));
+  event.opinions.emplace_back("ensemble", result.hypothesis);
+  if (result.proposed) {
+    const std::string place =
+        std::to_string(result.verification.candidate >= 0 ? result.verification.candidate : result.candidate);
+    char text[120];
+    std::snprintf(text, sizeof text, "frame %ld: H = %.3f, probability %.3f, ",
+                  static_cast<long>(result.query), result.hypothesis, result.probability);
+    event.text =
+        text + (result.accepted ? "verified as the place of frame " + place + ", " +
+                                      std::to_string(result.verification.inliers) + " inliers"
+                                : "not frame " + place + ": " +
+                                      (result.reason.empty() ? result.verification.reason : result.reason));
+  }
+  const std::lock_guard<std::mutex> lock(mutex_);
+  AddEvent(std::move(event));
+  Changed();
+}
+
+void LiveState::Log(const std::string& text) {
+  LiveEvent event;
+  event.text = text;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  AddEvent(std::move(event));
+  Changed();
+}
+
+void LiveState::Finish() {
+  Log("the run is done");
+  const std::lock_guard<std::mutex> lock(mutex_);
+  now_.finished = true;
+  now_.paused = false;
+  Changed();
+}
+
+void LiveState::WaitWhilePaused(double abandoned_s) {
+  std::unique_lock<std::mutex> lock(mutex_);
+  while (now_.paused && steps_ == 0 && !closed_ && !InterruptGuard::Requested()) {
+    if (viewers_ == 0 && Now() - last_viewer_s_ > abandoned_s) {
+      now_.paused = false;
+      LiveEvent event;
+      event.text = "nobody looks any more: the run goes on";
+      AddEvent(std::move(event));
+      Changed();
+      break;
+    }
+    changed_.wait_for(lock, std::chrono::milliseconds(50));
+  }
+  if (steps_ > 0) --steps_;
+}
+
+void LiveState::WaitForViewer(double seconds) {
+  const double end = Now() + seconds;
+  std::unique_lock<std::mutex> lock(mutex_);
+  while (viewers_ == 0 && Now() < end && !InterruptGuard::Requested())
+    changed_.wait_for(lock, std::chrono::milliseconds(50));
+}
+
+void LiveState::AddViewer(int change) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  viewers_ += change;
+  last_viewer_s_ = Now();
+  changed_.notify_all();
+}
+
+int LiveState::Viewers() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return viewers_;
+}
+
+void LiveState::Pause(bool paused) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  now_.paused = paused && !now_.finished;
+  steps_ = 0;
+  last_viewer_s_ = Now();
+  Changed();
+}
+
+void LiveState::Step() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (now_.paused) ++steps_;
+  last_viewer_s_ = Now();
+  changed_.notify_all();
+}
+
+bool LiveState::WaitForNews(LiveCursor* cursor, double seconds, LiveNews* news) {
+  std::unique_lock<std::mutex> lock(mutex_);
+  const bool there = changed_.wait_for(lock, std::chrono::duration<double>(seconds),
+                                       [&] { return closed_ || now_.version > cursor->version; });
+  if (closed_ || !there) return false;
+  *news = now_;
+  if (!news->places) news->places = std::make_shared<const std::vector<LivePlace>>();
+  if (!news->loops) news->loops = std::make_shared<const std::vector<LiveLoop>>();
+  for (const LivePoints& points : points_) {
+    if (points.number > cursor->points) news->points.push_back(points);
+  }
+  for (const LiveEvent& event : events_) {
+    if (event.number > cursor->events) news->events.push_back(event);
+  }
+  cursor->version = now_.version;
+  cursor->points = next_points_ - 1;
+  cursor->events = next_event_ - 1;
+  return true;
+}
+
+void LiveState::Close() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  closed_ = true;
+  changed_.notify_all();
+}
+
+bool LiveState::Closed() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return closed_;
+}
+
+}  // namespace tutti::view

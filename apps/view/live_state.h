@@ -1,0 +1,130 @@
+// The newest state of a run, between the thread that tracks and those that serve it.
+#pragma once
+
+#include <Eigen/Core>
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+#include "apps/run/run_observer.h"
+#include "apps/view/live_tracks.h"
+
+namespace tutti::view {
+
+/// The last frame.
+struct LiveFrame {
+  std::uint64_t number = 0;  ///< grows with each; 0: none yet
+  std::int64_t index = 0;
+  double stamp_s = 0;
+  cv::Mat image;
+  std::string state, reason;
+  int features = 0, inliers = 0;
+  bool posed = false;
+  Pose T_world_camera;
+  LiveTrail trail;  ///< empty without a pose
+};
+
+/// A keyframe as the map has it now.
+struct LivePlace {
+  int id = -1;
+  std::int64_t frame = 0;
+  int piece = 0;
+  Pose T_world_camera;
+};
+
+/// An edge of the map, by input frames.
+struct LiveLoop {
+  std::int64_t query = 0, candidate = 0;
+  bool accepted = false;
+};
+
+/// Some landmarks of a keyframe, in its camera's frame [m].
+struct LivePoints {
+  std::uint64_t number = 0;
+  int keyframe = -1;
+  std::vector<Eigen::Vector3f> points;
+};
+
+/// One answer of the detector, or a line of the log.
+struct LiveEvent {
+  std::uint64_t number = 0;
+  std::string text;                                      ///< a line; empty: none
+  std::int64_t query = -1;                               ///< -1: no answer
+  std::vector<std::pair<std::string, double>> opinions;  ///< member (then "ensemble") and its hypothesis
+};
+
+/// A copy of everything that is newer than a viewer's last one.
+struct LiveNews {
+  LiveFrame frame;
+  std::shared_ptr<const std::vector<LivePlace>> places;  ///< never null
+  std::shared_ptr<const std::vector<LiveLoop>> loops;    ///< never null
+  std::vector<LivePoints> points;
+  std::vector<LiveEvent> events;
+  std::uint64_t version = 0;
+  bool paused = false, finished = false;
+};
+
+/// What a viewer has by now.
+struct LiveCursor {
+  std::uint64_t version = 0, points = 0, events = 0;
+};
+
+/// Thread-safe. Bounded: old events and points fall out. Locks are held for copies of pointers alone.
+class LiveState {
+ public:
+  static constexpr std::size_t kMostEvents = 400;
+  static constexpr std::size_t kMostPoints = 1500;  ///< keyframes with points
+  static constexpr std::size_t kPointsPerKeyframe = 40;
+
+  // ---- the run's side
+  void SetFrame(const InputFrame& frame, const TrackResult& track, const SlamSystem& slam);
+  void SetKeyframe(int keyframe, const SlamSystem& slam);
+  void AddDetection(const LoopResult& result);
+  void Log(const std::string& text);
+  void Finish();
+  /// Returns when the run may go on: it is not paused, a step was asked for, nobody has looked for
+  /// `abandoned_s` (then it is no longer paused), or the run is interrupted.
+  void WaitWhilePaused(double abandoned_s);
+  /// Waits until somebody looks, at most so long.
+  void WaitForViewer(double seconds);
+
+  // ---- the server's side
+  void AddViewer(int change);
+  int Viewers() const;
+  void Pause(bool paused);
+  void Step();
+  /// News after `cursor`, which moves on; false if there is none within the time, or the state was closed.
+  bool WaitForNews(LiveCursor* cursor, double seconds, LiveNews* news);
+  /// Wakes all that wait; no news after it.
+  void Close();
+  bool Closed() const;
+
+ private:
+  void Changed();  // with mutex_ held
+  std::vector<LiveLoop> LoopsOf(const SlamSystem& slam);
+  void AddEvent(LiveEvent event);  // with mutex_ held
+
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  LiveNews now_;
+  std::deque<LivePoints> points_;
+  std::deque<LiveEvent> events_;
+  std::uint64_t next_points_ = 1, next_event_ = 1;
+  int viewers_ = 0;
+  int steps_ = 0;
+  bool closed_ = false;
+  double last_viewer_s_ = 0;
+  // Of the tracking thread alone.
+  std::size_t loops_seen_ = 0, accepted_seen_ = 0;
+  int corrections_seen_ = 0;
+  std::string state_seen_;
+  LiveTrail trail_;
+  bool new_keyframe_ = false;
+};
+
+}  // namespace tutti::view

@@ -1,0 +1,53 @@
+// `tutti run --view`: a run to look at in a browser while it goes on.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "apps/run/run_observer.h"
+
+namespace tutti {
+
+struct LiveViewOptions {
+  std::string address = "127.0.0.1";  ///< to listen at; another one than loopback needs the token of Url()
+  int port = 8077;                    ///< 0: any free one
+  double abandoned_s = 3;  ///< a run that is paused goes on when nobody has looked at it for this long [s]
+  double idle_s = 0;       ///< wait at most this long for the first viewer before the first frame [s]
+
+  /// Empty if usable, else what is wrong.
+  std::string Validate() const;
+};
+
+/// False if tutti was built without cpp-httplib.
+bool LiveViewAvailable();
+
+/// Serves one page and its data (server-sent events), and nothing else. The tracking thread only leaves the
+/// newest state here; images are encoded and sent by the server's threads, and what a browser is too slow for
+/// is left out. Pausing holds the run up as long as somebody looks.
+///
+/// Loopback: requests must name localhost (no other site's page can be made to ask), and commands need a
+/// header that other sites can't send. Elsewhere: everything needs a random token of 128 bits.
+class LiveView : public RunObserver {
+ public:
+  /// Listens from now on. Throws InputError if the address or the port can't be used, or tutti was built
+  /// without cpp-httplib.
+  explicit LiveView(const LiveViewOptions& options);
+  ~LiveView() override;
+  LiveView(const LiveView&) = delete;
+  LiveView& operator=(const LiveView&) = delete;
+
+  /// What to open in a browser, with the token if there is one.
+  std::string Url() const;
+
+  void OnStart(const CameraRig& rig) override;
+  void OnFrame(const InputFrame& frame, const TrackResult& track, const SlamSystem& slam) override;
+  void OnKeyframe(const InputFrame& frame, int keyframe, const SlamSystem& slam) override;
+  void OnDetection(const LoopResult& result) override;
+  void OnEnd(const SlamSystem& slam) override;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace tutti

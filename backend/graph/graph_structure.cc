@@ -1,0 +1,57 @@
+#include "backend/graph/graph_structure.h"
+
+#include <limits>
+#include <numeric>
+
+namespace tutti::internal {
+namespace {
+
+std::size_t Root(std::vector<std::size_t>& parent, std::size_t i) {
+  while (parent[i] != i) {
+    parent[i] = parent[parent[i]];
+    i = parent[i];
+  }
+  return i;
+}
+
+}  // namespace
+
+GraphStructure AnalyseGraph(const PoseGraph& graph) {
+  const auto& nodes = graph.nodes();
+  constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
+  GraphStructure out;
+  std::vector<std::size_t> parent(nodes.size());
+  std::iota(parent.begin(), parent.end(), std::size_t{0});
+  out.ends.reserve(graph.edges().size());
+  for (const PoseGraphEdge& edge : graph.edges()) {
+    out.ends.push_back({graph.IndexOf(edge.from), graph.IndexOf(edge.to)});
+    parent[Root(parent, out.ends.back().from)] = Root(parent, out.ends.back().to);
+  }
+
+  std::vector<std::size_t> component_of_root(nodes.size(), kNone);
+  out.constant.assign(nodes.size(), false);
+  out.component_of.resize(nodes.size());
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    std::size_t& component = component_of_root[Root(parent, i)];
+    if (component == kNone) {
+      component = out.components.size();
+      out.components.push_back({nodes[i].id, 0});
+      out.anchor.push_back(i);
+    }
+    out.component_of[i] = component;
+    ++out.components[component].nodes;
+    if (nodes[i].fixed) out.constant[i] = true;
+    // The anchor: the first fixed node, else the node of the smallest id.
+    std::size_t& anchor = out.anchor[component];
+    const bool better =
+        nodes[i].fixed ? !nodes[anchor].fixed : (!nodes[anchor].fixed && nodes[i].id < nodes[anchor].id);
+    if (better) anchor = i;
+  }
+  for (std::size_t c = 0; c < out.components.size(); ++c) {
+    out.constant[out.anchor[c]] = true;
+    out.components[c].anchor = nodes[out.anchor[c]].id;
+  }
+  return out;
+}
+
+}  // namespace tutti::internal

@@ -1,0 +1,20 @@
+// Pairwise consistency maximisation. Private to the back end.
+#pragma once
+
+#include <vector>
+
+#include "backend/graph/graph_structure.h"
+#include "tutti/backend/pose_graph.h"
+#include "tutti/backend/pose_graph_optimizer.h"
+
+namespace tutti::internal {
+
+/// The largest set of loops that agree pair by pair (Mangelson, Dominic, Eustice, Vasudevan, ICRA 2018): the
+/// cycle loop a, odometry, loop b backwards, odometry closes within `threshold` [chi-square], the odometry's
+/// and the loops' covariances propagated to first order. Greedy clique; true: in it. Parallel to edges(),
+/// true for odometry edges. Pairs without a chain of odometry edges between their ends are taken to agree;
+/// the scale of Sim(3) is left out. Time and memory grow with the square of the number of loops.
+std::vector<bool> PairwiseConsistentEdges(const PoseGraph& graph, const GraphStructure& structure,
+                                          GraphObjective objective, double threshold);
+
+}  // namespace tutti::internal

@@ -1,0 +1,113 @@
+// What is to be minimised for a pose graph, with weights that GNC changes. Private to the back end.
+#pragma once
+
+#include <algorithm>
+#include <memory>
+#include <vector>
+
+#include "backend/robust/robust_loss.h"
+#include "backend/solver/block_solver.h"
+#include "backend/solver/ceres_solver.h"
+#include "backend/solver/graph_solver.h"
+#include "backend/solver/linearized_edge.h"
+
+namespace tutti::internal {
+
+template <int N>
+class GraphProblem {
+ public:
+  GraphProblem(const PoseGraph& graph, const GraphStructure& structure, const PoseGraphOptions& options)
+      : graph_(graph),
+        options_(options),
+        threshold_(options.robust_chi2 > 0 ? options.robust_chi2 : ChiSquare99(N)) {
+    weighted_.structure = &structure;
+    weighted_.blocks.resize(graph.nodes().size() * WeightedGraph<N>::kBlock);
+    weighted_.weights.assign(graph.edges().size(), 1.0);
+    excluded_.assign(graph.edges().size(), false);
+    for (const PoseGraphEdge& edge : graph.edges()) {
+      weighted_.constants.push_back(MakeEdgeConstants<N>(edge, options.objective));
+      weighted_.is_loop.push_back(edge.kind == EdgeKind::kLoop);
+    }
+    if (options.solver == PoseGraphSolver::kBlock) {
+      solver_ = std::make_unique<BlockSolver<N>>();
+    } else {
+      solver_ = std::make_unique<CeresSolver<N>>();
+    }
+  }
+
+  /// Chi-square beyond which a loop is doubted.
+  double threshold() const { return threshold_; }
+  void SetThreshold(double threshold) { threshold_ = threshold; }
+
+  void SetPoses(const std::vector<Similarity>& poses) {
+    for (std::size_t k = 0; k < poses.size(); ++k) PoseToBlock<N>(poses[k], weighted_.Block(k));
+  }
+  std::vector<Similarity> Poses() const {
+    std::vector<Similarity> poses;
+    for (std::size_t k = 0; k < graph_.nodes().size(); ++k)
+      poses.push_back(BlockToPose<N>(weighted_.Block(k)));
+    return poses;
+  }
+
+  /// e^T Omega e of one edge, weight not applied.
+  double EdgeChi2(std::size_t e) const { return weighted_.Chi2(e); }
+  bool IsLoop(std::size_t e) const { return weighted_.is_loop[e]; }
+  LinearizedEdge<N> Linearized(std::size_t e) const {
+    const EdgeEnds& ends = structure().ends[e];
+    return Linearize<N>(weighted_.constants[e], weighted_.Block(ends.from), weighted_.Block(ends.to));
+  }
+  const GraphStructure& structure() const { return *weighted_.structure; }
+
+  /// What the options ask to minimise (no 1/2), at the present poses.
+  double Objective() const {
+    double sum = 0;
+    for (std::size_t e = 0; e < excluded_.size(); ++e) {
+      sum += !IsLoop(e)     ? EdgeChi2(e)
+             : excluded_[e] ? 0.0
+                            : RobustCost(options_.robust, EdgeChi2(e), threshold_);
+    }
+    return sum;
+  }
+
+  /// The loss on loop edges from now on; nullptr: least squares.
+  void SetLoss(ceres::LossFunction* owned) { weighted_.loss.reset(owned); }
+
+  double weight(std::size_t e) const { return weighted_.weights[e]; }
+  const std::vector<double>& weights() const { return weighted_.weights; }
+  void SetWeight(std::size_t e, double weight) { weighted_.weights[e] = weight; }
+  /// The edge is out for good: weight 0, no part of the objective.
+  void Exclude(std::size_t e) {
+    excluded_[e] = true;
+    SetWeight(e, 0);
+  }
+  bool IsExcluded(std::size_t e) const { return excluded_[e]; }
+  /// A loop that still has a say.
+  bool IsOpen(std::size_t e) const { return IsLoop(e) && !excluded_[e]; }
+
+  /// From now on each open loop has a switch (switchable constraints), which starts at 1. Ceres solves this,
+  /// whatever was chosen: a switch is a variable that is no node.
+  void AddSwitches() { solver_ = std::make_unique<CeresSolver<N>>(threshold_); }
+
+  /// The next solution goes on with the trust region that the last one ended with, instead of a wide one. For
+  /// rounds of few iterations, which would spend them all on narrowing it.
+  void KeepTrustRegion() { trust_region_ = std::min(last_trust_region_, kInitialTrustRegion); }
+
+  SolveSummary Solve(int max_iterations, double max_time_s) {
+    const SolveSummary summary = solver_->Solve(
+        weighted_, {max_iterations, max_time_s, options_.function_tolerance, 0, trust_region_});
+    last_trust_region_ = summary.trust_region;
+    trust_region_ = kInitialTrustRegion;
+    return summary;
+  }
+
+ private:
+  const PoseGraph& graph_;
+  const PoseGraphOptions& options_;
+  double threshold_;
+  std::vector<bool> excluded_;  // parallel to edges
+  double trust_region_ = kInitialTrustRegion, last_trust_region_ = kInitialTrustRegion;
+  WeightedGraph<N> weighted_;
+  std::unique_ptr<GraphSolver<N>> solver_;  // last: refers to the graph
+};
+
+}  // namespace tutti::internal

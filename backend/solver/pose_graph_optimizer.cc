@@ -1,0 +1,272 @@
+#include "tutti/backend/pose_graph_optimizer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "backend/graph/graph_structure.h"
+#include "backend/robust/pairwise_consistency.h"
+#include "backend/robust/robust_solver.h"
+#include "backend/solver/graph_initialization.h"
+#include "backend/solver/graph_problem.h"
+#include "backend/solver/stopwatch.h"
+#include "tutti/core/error.h"
+
+namespace tutti {
+namespace {
+
+using internal::GraphProblem;
+using internal::GraphStructure;
+using internal::Stopwatch;
+
+/// One optimisation; the class only keeps what its steps share.
+template <int N>
+class Run {
+ public:
+  Run(PoseGraph& graph, const GraphStructure& structure, const PoseGraphOptions& options,
+      PoseGraphReport& report)
+      : graph_(graph),
+        structure_(structure),
+        options_(options),
+        report_(report),
+        problem_(graph, structure, options),
+        robust_(problem_, options, graph.edges().size(),
+                [this](int iterations) { return SolveOnce(iterations); }) {
+    if (!options.pairwise_consistency) return;
+    const std::vector<bool> agree =
+        internal::PairwiseConsistentEdges(graph, structure, options.objective, problem_.threshold());
+    for (std::size_t e = 0; e < agree.size(); ++e) {
+      if (!agree[e]) problem_.Exclude(e);
+    }
+  }
+
+  /// The places to start from. False, with the reason in the report, if there is none.
+  bool CollectStarts() {
+    const bool every = options_.init == GraphInit::kAuto;
+    std::string missing, reason;
+    if (every || options_.init == GraphInit::kFile) {
+      std::vector<Similarity> poses;
+      for (const PoseGraphNode& node : graph_.nodes()) {
+        if (!node.has_estimate && missing.empty()) missing = std::to_string(node.id);
+        poses.push_back(node.pose);
+      }
+      if (missing.empty()) AddStart(GraphInit::kFile, std::move(poses));
+    }
+    if (every || options_.init == GraphInit::kOdometry) {
+      AddStart(GraphInit::kOdometry, internal::OdometryInitialization(graph_, structure_));
+    }
+    if (every || options_.init == GraphInit::kChordal) {
+      std::vector<Similarity> poses = internal::ChordalInitialization(graph_, structure_, reason);
+      if (!poses.empty()) AddStart(GraphInit::kChordal, std::move(poses));
+    }
+    std::stable_sort(starts_.begin(), starts_.end(),
+                     [](const Start& a, const Start& b) { return a.objective < b.objective; });
+    if (!starts_.empty()) return true;
+    report_.reason =
+        !reason.empty() ? "the chordal initialisation failed: " + reason
+        : !missing.empty()
+            ? "node " + missing + " has no pose; initialise from the edges (auto, odometry or chordal)"
+            : "the cost at the start is not finite; the poses or measurements are too large";
+    return false;
+  }
+
+  /// Solves from the best start. With a robust loss "best" counts it in: a chordal start that false loops
+  /// have bent loses to the odometry.
+  bool Solve() {
+    const bool robust = options_.robust != RobustLoss::kNone && robust_.HasLoops() && !LeastSquaresSuffices();
+    starts_.resize(1);
+    bool found = false;
+    std::vector<Similarity> best;
+    std::vector<double> best_weights;
+    const Start& start = starts_.front();
+    for (int attempt = 0; attempt < (robust ? robust_.Attempts() : 1); ++attempt) {
+      problem_.SetPoses(plain_.empty() ? start.poses : plain_);
+      if (plain_.empty() && !(robust ? robust_.Solve(attempt) : SolveOnce(options_.max_iterations))) continue;
+      const double objective = problem_.Objective();
+      if (!std::isfinite(objective) || (found && objective >= report_.objective)) continue;
+      found = true;
+      report_.objective = objective;
+      best = problem_.Poses();
+      best_weights = problem_.weights();
+    }
+    if (!found) {
+      if (report_.reason.empty()) report_.reason = "the solver found no usable step";
+      return false;
+    }
+    report_.init = start.init;
+    if (robust && plain_.empty() && options_.robust == RobustLoss::kSwitchable) SolvedWithSwitches();
+    report_.initial_objective = start.objective;
+    report_.initial_costs = CostsAt(start.poses);
+    problem_.SetPoses(best);
+    for (std::size_t e = 0; e < best_weights.size(); ++e) problem_.SetWeight(e, best_weights[e]);
+    if (robust && plain_.empty()) {
+      robust_.Refine();
+      report_.objective = problem_.Objective();
+    }
+    if (options_.sigma_test && robust_.HasLoops()) robust_.DecideLoops(internal::ChiSquare3Sigma(N));
+    report_.gnc_rounds = robust_.rounds();
+    return true;
+  }
+
+  /// Poses into the graph, edge outcomes and costs into the report.
+  void Finish() {
+    WritePoses(graph_);
+    report_.costs = EvaluateCosts(graph_);
+    report_.edges.resize(graph_.edges().size());
+    for (std::size_t e = 0; e < report_.edges.size(); ++e) {
+      EdgeOutcome& out = report_.edges[e];
+      out.chi2 = problem_.EdgeChi2(e);
+      if (!problem_.IsLoop(e)) continue;
+      out.weight = WeightOf(e, out.chi2);
+      out.down_weighted = out.weight < 0.5;
+      if (!out.down_weighted) continue;
+      ++report_.down_weighted;
+      out.doubt = problem_.IsExcluded(e) ? LoopDoubt::kPairwise
+                  : options_.sigma_test  ? LoopDoubt::kSigma
+                                         : LoopDoubt::kLoss;
+    }
+  }
+
+ private:
+  struct Start {
+    GraphInit init;
+    std::vector<Similarity> poses;
+    double objective;
+  };
+
+  void SolvedWithSwitches() {
+    report_.solver = PoseGraphSolver::kCeres;
+    if (options_.solver != report_.solver)
+      report_.solver_note = "switchable constraints have variables that the block solver does not know";
+  }
+
+  double WeightOf(std::size_t e, double chi2) const {
+    const bool decided = options_.sigma_test || options_.robust == RobustLoss::kGnc ||
+                         options_.robust == RobustLoss::kGncTls || problem_.IsExcluded(e);
+    return decided ? problem_.weight(e) : internal::RobustWeight(options_.robust, chi2, problem_.threshold());
+  }
+
+  void AddStart(GraphInit init, std::vector<Similarity> poses) {
+    problem_.SetPoses(poses);
+    const double objective = problem_.Objective();
+    for (const Start& other : starts_) {
+      if (std::abs(objective - other.objective) <= 1e-9 * objective)
+        return;  // the file often is the odometry
+    }
+    if (std::isfinite(objective)) starts_.push_back({init, std::move(poses), objective});
+  }
+
+  bool SolveOnce(int max_iterations) {
+    const double left = options_.max_time_s > 0 ? std::max(1e-3, options_.max_time_s - watch_.Seconds()) : 0;
+    const internal::SolveSummary summary = problem_.Solve(max_iterations, left);
+    report_.iterations += summary.iterations;
+    if (!summary.usable) {
+      report_.termination = "failed";
+      report_.reason = summary.message;
+      return false;
+    }
+    const bool timed_out = options_.max_time_s > 0 && watch_.Seconds() >= options_.max_time_s;
+    report_.termination = summary.converged ? "converged" : timed_out ? "time limit" : "iteration limit";
+    return true;
+  }
+
+  /// The common case online: least squares brings every loop below the threshold, so no loss has anything to
+  /// do. False loops show long before the iterations are through.
+  bool LeastSquaresSuffices() {
+    constexpr int kFew = 20;
+    problem_.SetPoses(starts_.front().poses);
+    if (!SolveOnce(std::min(kFew, options_.max_iterations))) return false;
+    if (!(robust_.LargestChi2() <= problem_.threshold())) return false;
+    if (report_.termination != "converged" && !SolveOnce(options_.max_iterations)) return false;
+    plain_ = problem_.Poses();
+    return true;
+  }
+
+  void WritePoses(PoseGraph& graph) const {
+    const std::vector<Similarity> poses = problem_.Poses();
+    for (std::size_t k = 0; k < poses.size(); ++k) {
+      if (!structure_.constant[k] || !graph.nodes()[k].has_estimate)
+        graph.SetPose(graph.nodes()[k].id, poses[k]);
+    }
+  }
+  GraphCosts CostsAt(const std::vector<Similarity>& poses) const {
+    PoseGraph copy = graph_;
+    for (std::size_t k = 0; k < poses.size(); ++k) copy.SetPose(graph_.nodes()[k].id, poses[k]);
+    return EvaluateCosts(copy);
+  }
+
+  PoseGraph& graph_;
+  const GraphStructure& structure_;
+  const PoseGraphOptions& options_;
+  PoseGraphReport& report_;
+  GraphProblem<N> problem_;
+  internal::RobustSolver<N> robust_;
+  std::vector<Start> starts_;
+  std::vector<Similarity> plain_;  ///< the least-squares solution, where it suffices
+  Stopwatch watch_;
+};
+
+template <int N>
+void OptimizeAs(PoseGraph& graph, const GraphStructure& structure, const PoseGraphOptions& options,
+                PoseGraphReport& report) {
+  const Stopwatch watch;
+  Run<N> run(graph, structure, options, report);
+  const bool initialized = run.CollectStarts();
+  report.init_time_s = watch.Seconds();
+  if (initialized && run.Solve()) {
+    run.Finish();
+    report.success = true;
+  } else {
+    report.termination = "failed";
+    report.costs = EvaluateCosts(graph);
+  }
+}
+
+}  // namespace
+
+std::string PoseGraphOptions::Validate() const {
+  if (!(robust_chi2 >= 0) || !std::isfinite(robust_chi2))
+    return "pose graph: robust_chi2 must be 0 (automatic) or positive";
+  if (max_iterations < 1) return "pose graph: max_iterations must be at least 1";
+  if (!(function_tolerance > 0 && function_tolerance < 1))
+    return "pose graph: function_tolerance must be in (0, 1)";
+  if (!(gnc_step > 1) || !std::isfinite(gnc_step)) return "pose graph: gnc_step must be greater than 1";
+  if (!(gnc_start > 0) || !std::isfinite(gnc_start)) return "pose graph: gnc_start must be positive";
+  if (gnc_max_rounds < 1) return "pose graph: gnc_max_rounds must be at least 1";
+  if (!(max_time_s >= 0) || !std::isfinite(max_time_s))
+    return "pose graph: max_time_s must be 0 (no limit) or positive";
+  return {};
+}
+
+PoseGraphOptimizer::PoseGraphOptimizer(const PoseGraphOptions& options) : options_(options) {
+  const std::string wrong = options.Validate();
+  if (!wrong.empty()) throw InputError(wrong);
+}
+
+PoseGraphReport PoseGraphOptimizer::Optimize(PoseGraph& graph) const {
+  const Stopwatch watch;
+  PoseGraphReport report;
+  report.solver = options_.solver;
+  const GraphStructure structure = internal::AnalyseGraph(graph);
+  report.components = structure.components;
+  if (graph.edges().empty()) {
+    report.success = true;
+    report.termination = "nothing to do";
+  } else {
+    switch (graph.kind()) {
+      case GraphKind::kSE2:
+        OptimizeAs<3>(graph, structure, options_, report);
+        break;
+      case GraphKind::kSE3:
+        OptimizeAs<6>(graph, structure, options_, report);
+        break;
+      case GraphKind::kSim3:
+        OptimizeAs<7>(graph, structure, options_, report);
+        break;
+    }
+  }
+  report.time_s = watch.Seconds();
+  return report;
+}
+
+}  // namespace tutti

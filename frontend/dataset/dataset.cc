@@ -1,0 +1,155 @@
+#include "tutti/frontend/dataset.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "frontend/dataset/dataset_folder.h"
+#include "tutti/core/error.h"
+
+namespace tutti {
+
+std::string DatasetOptions::Validate() const {
+  if (!(follow_s >= 0 && std::isfinite(follow_s)))
+    return "follow_s must not be negative; 0: all images are there";
+  if (stride < 1) return "stride must be at least 1";
+  if (!(baseline_m >= 0)) return "baseline_m must not be negative";
+  if (!(depth_units_per_m > 0)) return "depth_units_per_m must be greater than 0";
+  if (!(max_depth_m >= 0)) return "max_depth_m must not be negative; 0 means no limit";
+  if (!(max_association_s >= 0)) return "max_association_s must not be negative";
+  if (!(rate_hz >= 0 && std::isfinite(rate_hz)))
+    return "rate_hz must not be negative; 0 means the data's own";
+  return {};
+}
+
+bool Dataset::WaitFor(std::size_t i, const std::function<bool()>&) const { return i < Size(); }
+
+namespace {
+
+// A picture of the ground truth or of a map among hundreds of frames is not a frame: types that make up less
+// than a tenth of the images are left out.
+void DropStrayTypes(const std::filesystem::path& folder, std::vector<std::filesystem::path>& files,
+                    std::vector<std::string>& warnings) {
+  std::map<std::string, std::size_t> counts;
+  for (const std::filesystem::path& file : files) ++counts[file.extension().string()];
+  const std::size_t all = files.size();
+  for (const auto& [extension, count] : counts) {
+    if (10 * count >= all) continue;
+    const std::string& type = extension;
+    files.erase(
+        std::remove_if(files.begin(), files.end(),
+                       [&](const std::filesystem::path& f) { return f.extension().string() == type; }),
+        files.end());
+    warnings.push_back(folder.string() + ": " + std::to_string(count) + " " + type + " image(s) among " +
+                       std::to_string(all) + " images of other types are left out");
+  }
+}
+
+}  // namespace
+
+FolderContents FindImages(const std::filesystem::path& folder, const DatasetOptions& options) {
+  if (options.sensor != Sensor::kMono) {
+    throw InputError(folder.string() +
+                     ": a plain folder of images is mono; for stereo use the KITTI or EuRoC layout, for "
+                     "RGB-D the TUM layout (data/README.md shows them)");
+  }
+  FolderContents out;
+  out.folder = folder;
+  out.left = options.camera;
+  out.rate_hz = options.rate_hz > 0 ? options.rate_hz : 10.0;
+  std::vector<std::filesystem::path> files = ListImages(folder);
+  if (files.empty()) throw InputError(folder.string() + ": holds no images (png, jpg, webp, ...)");
+  DropStrayTypes(folder, files, out.warnings);
+  for (const std::filesystem::path& file : files) {
+    FrameFiles frame;
+    frame.index = static_cast<std::int64_t>(out.frames.size());
+    frame.stamp_s = static_cast<double>(frame.index) / out.rate_hz;
+    frame.image = file;
+    out.pose_stamps.emplace_back(frame.index, frame.stamp_s);
+    out.frames.push_back(std::move(frame));
+  }
+  out.pose_count = files.size();
+  if (!out.left) {
+    out.warnings.push_back(
+        folder.string() + ": no calibration is given (camera: fx, fy, cx, cy); appearance only, no odometry");
+  }
+  out.truth_places = {folder / "groundtruth.txt", folder / "poses.txt"};
+  return out;
+}
+
+DatasetType DetectDatasetType(const std::filesystem::path& path) {
+  std::error_code code;
+  if (!std::filesystem::exists(path, code)) {
+    throw InputError(path.string() +
+                     ": does not exist; give the folder of a data set, a folder of images, or a video file");
+  }
+  if (!std::filesystem::is_directory(path, code)) {
+    if (HasImageExtension(path))
+      throw InputError(path.string() + ": is a single image; give the folder that holds it");
+    return path.extension() == ".bag" ? DatasetType::kBag : DatasetType::kVideo;
+  }
+  const auto folder = [&](const char* name) { return std::filesystem::is_directory(path / name, code); };
+  const auto file = [&](const char* name) { return std::filesystem::is_regular_file(path / name, code); };
+  if (folder("mav0/cam0") || file("cam0/sensor.yaml")) return DatasetType::kEuroc;
+  if (folder("image_0") || folder("image_2")) return DatasetType::kKitti;
+  if (file("rgb.txt") || file("associations.txt")) return DatasetType::kTum;
+  if (!ListImages(path).empty()) return DatasetType::kImages;
+  const std::filesystem::directory_iterator entries(path, code);
+  if (code)
+    throw InputError(path.string() + ": can't be listed (" + code.message() + "); check its permissions");
+  throw InputError(path.string() +
+                   (entries == std::filesystem::directory_iterator() ? ": is empty" : ": holds no data set") +
+                   "; expected image_0/ (KITTI), rgb.txt (TUM), mav0/cam0/ (EuRoC), or images");
+}
+
+namespace {
+
+DatasetType CheckedType(const std::filesystem::path& path, const DatasetOptions& options) {
+  const DatasetType seen = DetectDatasetType(path);  // missing or empty: the same words for every type
+  const DatasetType type = options.type == DatasetType::kAuto ? seen : options.type;
+  const auto is_file = [](DatasetType t) { return t == DatasetType::kVideo || t == DatasetType::kBag; };
+  if (is_file(type) != is_file(seen)) {
+    throw InputError(path.string() + (is_file(type)
+                                          ? ": is a folder, but the type is video or bag; give the file"
+                                          : ": is a file; give the folder of the data set"));
+  }
+  return type;
+}
+
+FolderContents FindFrames(const std::filesystem::path& path, const DatasetOptions& options) {
+  switch (CheckedType(path, options)) {
+    case DatasetType::kKitti:
+      return FindKitti(path, options);
+    case DatasetType::kTum:
+      return FindTum(path, options);
+    case DatasetType::kEuroc:
+      return FindEuroc(path, options);
+    default:
+      return FindImages(path, options);
+  }
+}
+
+}  // namespace
+
+std::unique_ptr<Dataset> OpenDataset(const std::filesystem::path& path, const DatasetOptions& options) {
+  const std::string problem = options.Validate();
+  if (!problem.empty()) throw InputError("dataset: " + problem);
+  DatasetOptions use = options;
+  if (use.camera && use.camera->fy < 0) {  // ICL-NUIM's own calibration: y up
+    use.camera->fy = -use.camera->fy;
+    use.mirrored_ground_truth = true;
+  }
+  if (IsCamera(path.string())) return OpenCamera(path.string(), use);
+  std::error_code code;
+  if (use.follow_s > 0) {
+    if (!std::filesystem::is_directory(path, code))
+      throw InputError(path.string() + ": is no folder; only a folder of images can be followed");
+    return FollowFolder([path, use] { return FindFrames(path, use); }, use);
+  }
+  const DatasetType type = CheckedType(path, use);
+  if (type == DatasetType::kVideo) return OpenVideo(path, use);
+  if (type == DatasetType::kBag) return OpenBag(path, use);
+  return std::make_unique<FolderDataset>(FindFrames(path, use), use);
+}
+
+}  // namespace tutti

@@ -1,0 +1,98 @@
+// EuRoC ASL: mav0/cam0, mav0/cam1 with sensor.yaml and data.csv.
+#include <algorithm>
+
+#include "frontend/dataset/dataset_folder.h"
+#include "frontend/dataset/sensor_yaml.h"
+#include "tutti/core/error.h"
+#include "tutti/core/text.h"
+
+namespace tutti {
+namespace {
+
+struct StampedImage {
+  std::int64_t stamp_ns = 0;
+  std::filesystem::path file;
+};
+
+std::vector<StampedImage> ReadCsv(const std::filesystem::path& camera, std::vector<std::string>& warnings) {
+  const std::filesystem::path csv = camera / "data.csv";
+  std::vector<StampedImage> images;
+  StampOrder order(csv, warnings);
+  for (const TextLine& line : ReadTextLines(csv)) {
+    if (line.words.size() != 2) {
+      throw InputError(At(csv, line.number) + "has " + std::to_string(line.words.size()) +
+                       " columns; 2 are needed: time stamp [ns], file name");
+    }
+    const std::optional<long long> stamp = ParseInteger(line.words[0]);
+    if (!stamp || *stamp < 0) {
+      throw InputError(At(csv, line.number) + "'" + line.words[0] +
+                       "' is not a time stamp in whole nanoseconds");
+    }
+    if (!order.Accept(line.number, static_cast<double>(*stamp) * 1e-9)) continue;
+    images.push_back({*stamp, camera / "data" / line.words[1]});
+  }
+  if (images.empty()) throw InputError(csv.string() + ": lists no images");
+  return images;
+}
+
+// Cameras that one clock triggers have equal stamps; other rigs differ by less than a millisecond or two.
+constexpr std::int64_t kSamePairNs = 2'500'000;
+
+}  // namespace
+
+FolderContents FindEuroc(const std::filesystem::path& folder, const DatasetOptions& options) {
+  if (options.sensor == Sensor::kRgbd) {
+    throw InputError(folder.string() +
+                     ": the EuRoC layout has no depth images; set sensor to stereo or mono");
+  }
+  std::error_code code;
+  const bool inside = std::filesystem::is_directory(folder / "cam0", code);
+  const std::filesystem::path mav = inside ? folder : folder / "mav0";
+  FolderContents out;
+  out.folder = folder;
+  const SensorYaml left = ReadSensorYaml(mav / "cam0" / "sensor.yaml");
+  out.left = options.camera ? *options.camera : left.camera;
+  out.T_body_left = left.T_body_sensor;
+  out.rate_hz = left.rate_hz;
+  const std::vector<StampedImage> images = ReadCsv(mav / "cam0", out.warnings);
+  std::vector<StampedImage> right_images;
+  if (options.sensor == Sensor::kStereo) {
+    const SensorYaml right = ReadSensorYaml(mav / "cam1" / "sensor.yaml");
+    out.right = right.camera;
+    out.T_right_left = right.T_body_sensor.Inverse() * left.T_body_sensor;
+    right_images = ReadCsv(mav / "cam1", out.warnings);
+  }
+  std::size_t alone = 0;
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    FrameFiles frame;
+    frame.index = static_cast<std::int64_t>(i);
+    frame.stamp_s = static_cast<double>(images[i].stamp_ns) * 1e-9;
+    frame.image = images[i].file;
+    if (options.sensor == Sensor::kStereo) {
+      const auto at =
+          std::lower_bound(right_images.begin(), right_images.end(), images[i].stamp_ns - kSamePairNs,
+                           [](const StampedImage& r, std::int64_t ns) { return r.stamp_ns < ns; });
+      if (at == right_images.end() || at->stamp_ns > images[i].stamp_ns + kSamePairNs) {
+        ++alone;
+        continue;
+      }
+      frame.right = at->file;
+    }
+    out.frames.push_back(std::move(frame));
+  }
+  if (alone > 0) {
+    out.warnings.push_back((mav / "cam1" / "data.csv").string() + ": " + std::to_string(alone) + " of " +
+                           std::to_string(images.size()) +
+                           " left images have no right image and are left out");
+  }
+  if (out.frames.empty()) {
+    throw InputError((mav / "cam1" / "data.csv").string() +
+                     ": no image has the time stamp of an image of cam0");
+  }
+  out.truth_places = {folder / "groundtruth_tum.txt", folder / "groundtruth.txt",
+                      mav / "state_groundtruth_estimate0" / "data.csv",
+                      mav.parent_path() / "groundtruth_tum.txt"};
+  return out;
+}
+
+}  // namespace tutti

@@ -1,0 +1,261 @@
+#include "frontend/dataset/dataset_folder.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <opencv2/imgproc.hpp>
+
+#include "tutti/core/error.h"
+#include "tutti/core/text.h"
+
+namespace tutti {
+namespace {
+
+std::string SizeText(cv::Size size) { return std::to_string(size.width) + "x" + std::to_string(size.height); }
+
+}  // namespace
+
+std::string At(const std::filesystem::path& file, std::size_t line) {
+  return file.string() + ":" + std::to_string(line) + ": ";
+}
+
+std::vector<TextLine> ReadTextLines(const std::filesystem::path& file) {
+  std::error_code code;
+  std::ifstream in(file);
+  if (!in || std::filesystem::is_directory(file, code)) {
+    throw InputError(file.string() + ": can't be opened; check that it is a readable file");
+  }
+  std::vector<TextLine> lines;
+  std::string text;
+  for (std::size_t number = 1; std::getline(in, text); ++number) {
+    const std::size_t comment = text.find('#');
+    if (comment != std::string::npos) text.resize(comment);
+    std::vector<std::string> words = SplitText(text);
+    if (!words.empty()) lines.push_back({number, std::move(words)});
+  }
+  return lines;
+}
+
+double NumberAt(const std::filesystem::path& file, const TextLine& line, std::size_t word) {
+  if (word >= line.words.size()) {
+    throw InputError(At(file, line.number) + "has " + std::to_string(line.words.size()) +
+                     " columns; at least " + std::to_string(word + 1) + " are needed");
+  }
+  const std::optional<double> value = ParseDouble(line.words[word]);
+  if (!value || !std::isfinite(*value)) {
+    throw InputError(At(file, line.number) + "'" + line.words[word] +
+                     "' is not a finite number; repair or remove the line");
+  }
+  return *value;
+}
+
+bool StampOrder::Accept(std::size_t line, double stamp_s) {
+  if (last_ && stamp_s < *last_) {
+    throw InputError(At(file_, line) + "time stamp " + std::to_string(stamp_s) +
+                     " s goes back in time (the one before is " + std::to_string(*last_) +
+                     " s); sort the file by time");
+  }
+  if (last_ && stamp_s == *last_) {
+    warnings_.push_back(At(file_, line) + "repeats the time stamp before it; the frame is skipped");
+    return false;
+  }
+  last_ = stamp_s;
+  return true;
+}
+
+void MirrorY(Trajectory& trajectory) {
+  // S R S with S = diag(1, -1, 1) turns the same angle about the mirrored axis, the other way round.
+  for (StampedPose& p : trajectory) {
+    p.pose.translation.y() *= -1;
+    const Eigen::Quaterniond q = p.pose.rotation;
+    p.pose.rotation = Eigen::Quaterniond(q.w(), -q.x(), q.y(), -q.z());
+  }
+}
+
+FolderDataset::FolderDataset(FolderContents contents, const DatasetOptions& options)
+    : contents_(std::move(contents)), options_(options) {
+  if (contents_.frames.empty()) {
+    throw InputError(contents_.folder.string() +
+                     ": holds no frame; check the folder and the options of the data set");
+  }
+  if (options_.stride > 1) {
+    contents_.frames = EveryNth(std::move(contents_.frames), options_.stride);
+    contents_.rate_hz /= options_.stride;
+  }
+  FindImageSize();
+  SetUpRig();
+}
+
+void FolderDataset::FindImageSize() {
+  // The first image may be a damaged one; a folder without any good image among its first ones is not worth a
+  // run.
+  constexpr std::size_t kTries = 50;
+  std::string first_error;
+  for (std::size_t i = 0; i < std::min(kTries, Size()); ++i) {
+    const ImageFile file = ReadGreyFile(contents_.frames[i].image);
+    if (file.error.empty()) {
+      size_ = file.image.size();
+      bits_ = SignificantBits(file.image);
+      if (bits_ > 8) {
+        contents_.warnings.push_back(contents_.frames[i].image.string() + ": 16-bit images, taken as " +
+                                     std::to_string(bits_) + "-bit and scaled to 8 bit");
+      }
+      return;
+    }
+    if (first_error.empty()) first_error = file.error;
+  }
+  throw InputError(first_error + "; none of the first " + std::to_string(std::min(kTries, Size())) +
+                   " images can be read");
+}
+
+PinholeCamera FolderDataset::WithSize(PinholeCamera camera, const char* which) const {
+  if (camera.width == 0 && camera.height == 0) {
+    camera.width = size_.width;
+    camera.height = size_.height;
+  }
+  const cv::Size calibrated(camera.width, camera.height);
+  if (calibrated != size_) {
+    throw InputError(contents_.folder.string() + ": the " + which + " camera is calibrated for images of " +
+                     SizeText(calibrated) + ", but the images have " + SizeText(size_) +
+                     "; use the calibration of this data set");
+  }
+  const std::string problem = camera.Validate();
+  if (!problem.empty()) throw InputError(contents_.folder.string() + ": " + which + " " + problem);
+  return camera;
+}
+
+void FolderDataset::SetUpRig() {
+  rig_.sensor = options_.sensor;
+  rig_.rate_hz = contents_.rate_hz;
+  rig_.max_depth_m = options_.max_depth_m;
+  rig_.T_body_camera = contents_.T_body_left;
+  if (!contents_.left) {
+    rig_.calibrated = false;
+    rig_.camera = PinholeCamera();
+    rig_.camera.width = size_.width;
+    rig_.camera.height = size_.height;
+    return;
+  }
+  const PinholeCamera left = WithSize(*contents_.left, "left");
+  if (options_.sensor == Sensor::kStereo && contents_.T_right_left && contents_.right) {
+    const PinholeCamera right = WithSize(*contents_.right, "right");
+    StereoRectification stereo = RectifyStereo(left, right, *contents_.T_right_left);
+    left_ = std::move(stereo.left);
+    right_ = std::move(stereo.right);
+    rig_.baseline_m = stereo.baseline_m;
+    rig_.T_body_camera = contents_.T_body_left * stereo.T_left_rectified;
+  } else {
+    if (options_.sensor == Sensor::kStereo && left.distortion != Distortion::kNone) {
+      throw InputError(
+          contents_.folder.string() +
+          ": stereo pairs of this layout must be rectified, but the camera has distortion; set it to none, "
+          "or use the EuRoC layout with a sensor.yaml for each camera");
+    }
+    left_.emplace(left);
+    if (options_.sensor == Sensor::kStereo) {
+      rig_.baseline_m = contents_.baseline_m;
+      if (!(rig_.baseline_m > 0)) {
+        throw InputError(contents_.folder.string() +
+                         ": the distance of the two cameras is not known; set camera.baseline_m [m], or add "
+                         "calib.txt with P1");
+      }
+    }
+  }
+  rig_.camera = left_->Camera();
+}
+
+std::string FolderDataset::ReadGrey(const std::filesystem::path& file, const Rectifier* rectifier,
+                                    cv::Mat& out) const {
+  ImageFile read = ReadGreyFile(file);
+  if (!read.error.empty()) return read.error;
+  if (read.image.size() != size_) {
+    return file.string() + ": has " + SizeText(read.image.size()) +
+           " pixels, but the data set's images have " + SizeText(size_);
+  }
+  out = ToGrey8(read.image, bits_);
+  if (rectifier != nullptr) out = rectifier->Apply(out);
+  return {};
+}
+
+std::string FolderDataset::ReadDepth(const std::filesystem::path& file, cv::Mat& out) const {
+  ImageFile read = ReadDepthFile(file);
+  if (!read.error.empty()) return read.error;
+  if (read.image.size() != size_) {
+    return file.string() + ": the depth image has " + SizeText(read.image.size()) +
+           " pixels, but the colour images have " + SizeText(size_) + "; depth must be registered to colour";
+  }
+  const cv::Mat depth = DepthInMetres(read.image, options_.depth_units_per_m, options_.max_depth_m);
+  out = left_ ? left_->Apply(depth, Sampling::kNearest) : depth;
+  return {};
+}
+
+ReadResult FolderDataset::Read(std::size_t i) const {
+  ReadResult result;
+  if (i >= Size()) {
+    result.error = contents_.folder.string() + ": has no frame " + std::to_string(i) + " (it has " +
+                   std::to_string(Size()) + ")";
+    return result;
+  }
+  return ReadFiles(contents_.frames[i]);
+}
+
+ReadResult FolderDataset::ReadFiles(const FrameFiles& files) const {
+  ReadResult result;
+  try {
+    InputFrame frame;
+    frame.index = files.index;
+    frame.stamp_s = files.stamp_s;
+    result.error = ReadGrey(files.image, left_ ? &*left_ : nullptr, frame.image);
+    if (result.error.empty() && options_.sensor == Sensor::kStereo) {
+      result.error = ReadGrey(files.right, right_ ? &*right_ : nullptr, frame.right);
+    }
+    if (result.error.empty() && options_.sensor == Sensor::kRgbd) {
+      result.error = ReadDepth(files.depth, frame.depth_m);
+    }
+    if (result.error.empty()) result.frame = std::move(frame);
+  } catch (const std::exception& e) {  // out of memory for an absurd image size, and the like
+    result.frame.reset();
+    result.error = files.image.string() + ": can't be used: " + e.what();
+  }
+  return result;
+}
+
+std::optional<std::filesystem::path> FolderDataset::GroundTruthFile() const {
+  std::error_code code;
+  for (const std::filesystem::path& file : contents_.truth_places) {
+    if (std::filesystem::is_regular_file(file, code)) return file;
+  }
+  return std::nullopt;
+}
+
+Trajectory FolderDataset::ReadGroundTruth(const std::filesystem::path& file,
+                                          std::vector<std::string>* warnings) const {
+  const TrajectoryFormat format = GuessTrajectoryFormat(file);
+  Trajectory poses = ReadTrajectory(file, format, warnings);
+  if (format == TrajectoryFormat::kKitti) {
+    if (contents_.pose_count == 0 && poses.size() != Size()) {
+      throw InputError(file.string() + ": has " + std::to_string(poses.size()) +
+                       " poses, but the data set has " + std::to_string(Size()) +
+                       " frames; KITTI poses need one line for each frame");
+    }
+    if (contents_.pose_count != 0 && poses.size() != contents_.pose_count) {
+      throw InputError(file.string() + ": has " + std::to_string(poses.size()) +
+                       " poses, but the sequence has " + std::to_string(contents_.pose_count) +
+                       " frames; they must be as many");
+    }
+    Trajectory stamped;
+    if (contents_.pose_count == 0) {
+      for (std::size_t i = 0; i < Size(); ++i) stamped.push_back({Stamp(i), poses[i].pose});
+    }
+    for (const auto& [line, stamp] : contents_.pose_stamps) {
+      stamped.push_back({stamp, poses[static_cast<std::size_t>(line)].pose});
+    }
+    poses = std::move(stamped);
+  } else {
+    for (StampedPose& p : poses) p.stamp_s *= contents_.stamp_scale;
+  }
+  if (options_.mirrored_ground_truth) MirrorY(poses);
+  return poses;
+}
+
+}  // namespace tutti

@@ -1,0 +1,120 @@
+// What the readers of image folders share: a list of frames, rectifiers, ground truth.
+#pragma once
+
+#include <array>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "frontend/dataset/image_file.h"
+#include "frontend/features/rectifier.h"
+#include "tutti/frontend/dataset.h"
+
+namespace tutti {
+
+/// Files of one frame; empty paths where the sensor has none.
+struct FrameFiles {
+  std::int64_t index = 0;
+  double stamp_s = 0;
+  std::filesystem::path image, right, depth;
+};
+
+/// What a reader finds out about its folder.
+struct FolderContents {
+  std::filesystem::path folder;
+  std::vector<FrameFiles> frames;  ///< stamps grow strictly
+  std::optional<PinholeCamera> left,
+      right;                         ///< as calibrated, width and height 0: the images'; right: EuRoC's
+  std::optional<Pose> T_right_left;  ///< set: pairs need rectification
+  double baseline_m = 0;             ///< of pairs that are rectified already
+  Pose T_body_left;                  ///< left camera as calibrated -> frame of the ground truth
+  double rate_hz = 10;
+  std::vector<std::filesystem::path> truth_places;  ///< the first that exists is the ground truth
+  std::vector<std::pair<std::int64_t, double>>
+      pose_stamps;             ///< KITTI: (line of the pose, stamp) of each frame
+  std::size_t pose_count = 0;  ///< KITTI: poses that the file must have
+  double stamp_scale = 1;      ///< factor on the stamps of the ground truth
+  std::vector<std::string> warnings;
+};
+
+/// A data set of image files. Immutable after construction.
+class FolderDataset : public Dataset {
+ public:
+  /// Reads the first readable image for the size, and computes the rectification tables. Throws InputError.
+  FolderDataset(FolderContents contents, const DatasetOptions& options);
+
+  std::size_t Size() const override { return contents_.frames.size(); }
+  double Stamp(std::size_t i) const override { return contents_.frames.at(i).stamp_s; }
+  ReadResult Read(std::size_t i) const override;
+  ReadResult ReadFiles(const FrameFiles& files) const;  ///< the same for a frame that came later
+  const std::vector<FrameFiles>& Frames() const { return contents_.frames; }
+  const CameraRig& Rig() const override { return rig_; }
+  std::optional<std::filesystem::path> GroundTruthFile() const override;
+  Trajectory ReadGroundTruth(const std::filesystem::path& file,
+                             std::vector<std::string>* warnings) const override;
+  const std::vector<std::string>& Warnings() const override { return contents_.warnings; }
+
+ private:
+  void FindImageSize();
+  void SetUpRig();
+  PinholeCamera WithSize(PinholeCamera camera, const char* which) const;
+  std::string ReadGrey(const std::filesystem::path& file, const Rectifier* rectifier, cv::Mat& out) const;
+  std::string ReadDepth(const std::filesystem::path& file, cv::Mat& out) const;
+
+  FolderContents contents_;
+  DatasetOptions options_;
+  CameraRig rig_;
+  cv::Size size_;
+  int bits_ = 8;
+  std::optional<Rectifier> left_, right_;
+};
+
+/// One line of a text file: its number and its words, comments removed.
+struct TextLine {
+  std::size_t number = 0;
+  std::vector<std::string> words;
+};
+/// All lines that carry data. Throws InputError if the file can't be opened.
+std::vector<TextLine> ReadTextLines(const std::filesystem::path& file);
+/// "file:line: ".
+std::string At(const std::filesystem::path& file, std::size_t line);
+/// The word as a finite number. Throws InputError that names file and line.
+double NumberAt(const std::filesystem::path& file, const TextLine& line, std::size_t word);
+
+/// Watches that the stamps of a file grow: duplicates are to be skipped (with a warning), unsorted stamps
+/// throw InputError.
+class StampOrder {
+ public:
+  StampOrder(std::filesystem::path file, std::vector<std::string>& warnings)
+      : file_(std::move(file)), warnings_(warnings) {}
+  /// True if the line is to be used.
+  bool Accept(std::size_t line, double stamp_s);
+
+ private:
+  std::filesystem::path file_;
+  std::vector<std::string>& warnings_;
+  std::optional<double> last_;
+};
+
+/// Mirrors a trajectory that is given in a left-handed frame with y up into the right-handed one with y down.
+void MirrorY(Trajectory& trajectory);
+
+FolderContents FindKitti(const std::filesystem::path& folder, const DatasetOptions& options);
+FolderContents FindTum(const std::filesystem::path& folder, const DatasetOptions& options);
+FolderContents FindEuroc(const std::filesystem::path& folder, const DatasetOptions& options);
+FolderContents FindImages(const std::filesystem::path& folder, const DatasetOptions& options);
+/// Every stride-th of them.
+std::vector<FrameFiles> EveryNth(std::vector<FrameFiles> frames, int stride);
+/// A folder that grows: `find` lists it as it is now. Waits options.follow_s for the first image.
+std::unique_ptr<Dataset> FollowFolder(std::function<FolderContents()> find, const DatasetOptions& options);
+/// camera:0, or camera:FILE with a video file.
+std::unique_ptr<Dataset> OpenCamera(const std::string& name, const DatasetOptions& options);
+/// A ROS 1 bag; throws InputError where tutti was built without them.
+std::unique_ptr<Dataset> OpenBag(const std::filesystem::path& file, const DatasetOptions& options);
+std::unique_ptr<Dataset> OpenVideo(const std::filesystem::path& file, const DatasetOptions& options);
+
+}  // namespace tutti

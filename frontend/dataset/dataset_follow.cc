@@ -1,0 +1,142 @@
+// A folder that is still being written to.
+#include <algorithm>
+#include <chrono>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include "frontend/dataset/dataset_folder.h"
+#include "tutti/core/error.h"
+
+namespace tutti {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+constexpr auto kPoll = std::chrono::milliseconds(50);
+constexpr double kGiveUpAfter =
+    1.0;  // a file that is still incomplete when newer ones are there is damaged [s]
+
+double SecondsSince(Clock::time_point begin) {
+  return std::chrono::duration<double>(Clock::now() - begin).count();
+}
+
+/// Lists the folder again and again; a frame is there when its files can be decoded in full.
+class FollowedDataset : public Dataset {
+ public:
+  FollowedDataset(std::function<FolderContents()> find, const DatasetOptions& options)
+      : find_(std::move(find)), options_(options) {
+    const Clock::time_point begin = Clock::now();
+    while (true) {
+      try {
+        FolderContents contents = find_();
+        base_ = std::make_unique<FolderDataset>(contents, options_);
+        break;
+      } catch (const InputError&) {  // nothing there yet, or half written
+        if (SecondsSince(begin) > options_.follow_s) throw;
+      }
+      std::this_thread::sleep_for(kPoll);
+    }
+    frames_ = base_->Frames();
+    grown_ = Clock::now();
+  }
+
+  Supply FrameSupply() const override { return Supply::kGrowing; }
+  std::size_t Size() const override {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return frames_.size();
+  }
+  double Stamp(std::size_t i) const override {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return frames_.at(i).stamp_s;
+  }
+  const CameraRig& Rig() const override { return base_->Rig(); }
+  const std::vector<std::string>& Warnings() const override { return base_->Warnings(); }
+  // What grows has no complete ground truth.
+  std::optional<std::filesystem::path> GroundTruthFile() const override { return std::nullopt; }
+  Trajectory ReadGroundTruth(const std::filesystem::path& file,
+                             std::vector<std::string>* warnings) const override {
+    return base_->ReadGroundTruth(file, warnings);
+  }
+
+  bool WaitFor(std::size_t i, const std::function<bool()>& stop) const override {
+    while (true) {
+      {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        if (frames_.size() <= i + 1) Poll();
+        const bool idle = SecondsSince(grown_) > options_.follow_s;
+        if (i < frames_.size() && Complete(i, idle)) return true;
+        if (idle) return i == frames_.size() && !std::exchange(told_, true) && !failure_.empty();
+      }
+      if (stop()) return false;
+      std::this_thread::sleep_for(kPoll);
+    }
+  }
+
+  ReadResult Read(std::size_t i) const override {
+    FrameFiles files;
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      if (i >= frames_.size()) return {std::nullopt, failure_};
+      if (checked_ && checked_->first == i) return std::exchange(checked_, std::nullopt)->second;
+      files = frames_[i];
+    }
+    return base_->ReadFiles(files);
+  }
+
+ private:
+  // Takes the frames that are new. mutex_ is held.
+  void Poll() const {
+    std::vector<FrameFiles> now;
+    try {
+      FolderContents contents = find_();
+      now = EveryNth(std::move(contents.frames), options_.stride);
+      failure_.clear();
+    } catch (const InputError& e) {  // a list that is half written; told at the end if it stays so
+      failure_ = e.what();
+      return;
+    }
+    for (std::size_t i = 0; i < std::min(frames_.size(), now.size()); ++i) {
+      if (now[i].image == frames_[i].image) continue;
+      failure_ = now[i].image.string() +
+                 ": is new, but sorts before images that were there already; use names that grow";
+      return;
+    }
+    if (now.size() <= frames_.size()) return;
+    frames_.insert(frames_.end(), now.begin() + static_cast<std::ptrdiff_t>(frames_.size()), now.end());
+    grown_ = Clock::now();
+  }
+
+  // Frame i can be decoded, or never will be. mutex_ is held.
+  bool Complete(std::size_t i, bool idle) const {
+    ReadResult read = base_->ReadFiles(frames_[i]);
+    if (!read.frame && !idle && (i + 1 == frames_.size() || SecondsSince(grown_) < kGiveUpAfter))
+      return false;
+    checked_ = {i, std::move(read)};
+    return true;
+  }
+
+  std::function<FolderContents()> find_;
+  DatasetOptions options_;
+  std::unique_ptr<FolderDataset> base_;  // what was there at first
+  mutable std::mutex mutex_;
+  mutable std::vector<FrameFiles> frames_;                             // guarded by mutex_, as all below
+  mutable std::optional<std::pair<std::size_t, ReadResult>> checked_;  // the frame that was waited for
+  mutable Clock::time_point grown_;
+  mutable std::string failure_;  // of the last listing
+  mutable bool told_ = false;
+};
+
+}  // namespace
+
+std::vector<FrameFiles> EveryNth(std::vector<FrameFiles> frames, int stride) {
+  if (stride <= 1) return frames;
+  std::vector<FrameFiles> kept;
+  for (std::size_t i = 0; i < frames.size(); i += static_cast<std::size_t>(stride)) kept.push_back(frames[i]);
+  return kept;
+}
+
+std::unique_ptr<Dataset> FollowFolder(std::function<FolderContents()> find, const DatasetOptions& options) {
+  return std::make_unique<FollowedDataset>(std::move(find), options);
+}
+
+}  // namespace tutti

@@ -1,0 +1,164 @@
+// TUM RGB-D: rgb.txt, depth.txt, groundtruth.txt; or associations.txt (TUM's and ICL-NUIM's).
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+#include "frontend/dataset/dataset_folder.h"
+#include "tutti/core/error.h"
+
+namespace tutti {
+namespace {
+
+struct StampedFile {
+  double stamp_s = 0;
+  std::filesystem::path file;
+};
+
+std::vector<StampedFile> ReadList(const std::filesystem::path& folder, const char* name,
+                                  std::vector<std::string>& warnings) {
+  const std::filesystem::path list = folder / name;
+  std::vector<StampedFile> files;
+  StampOrder order(list, warnings);
+  for (const TextLine& line : ReadTextLines(list)) {
+    if (line.words.size() != 2) {
+      throw InputError(At(list, line.number) + "has " + std::to_string(line.words.size()) +
+                       " columns; 2 are needed: time stamp [s] and file name");
+    }
+    const double stamp = NumberAt(list, line, 0);
+    if (order.Accept(line.number, stamp)) files.push_back({stamp, folder / line.words[1]});
+  }
+  if (files.empty())
+    throw InputError(list.string() + ": lists no images; each line needs a time stamp and a file name");
+  return files;
+}
+
+// Index of the depth image of each colour image, or -1: pairs with the smallest difference first, each image
+// once (as the data set's own associate.py).
+std::vector<int> Associate(const std::vector<StampedFile>& colour, const std::vector<StampedFile>& depth,
+                           double limit_s) {
+  std::vector<std::tuple<double, std::size_t, std::size_t>> pairs;
+  for (std::size_t i = 0; i < colour.size(); ++i) {
+    const auto first = std::lower_bound(depth.begin(), depth.end(), colour[i].stamp_s - limit_s,
+                                        [](const StampedFile& f, double stamp) { return f.stamp_s < stamp; });
+    for (auto it = first; it != depth.end() && it->stamp_s <= colour[i].stamp_s + limit_s; ++it) {
+      pairs.emplace_back(std::abs(it->stamp_s - colour[i].stamp_s), i,
+                         static_cast<std::size_t>(it - depth.begin()));
+    }
+  }
+  std::sort(pairs.begin(), pairs.end());
+  std::vector<int> match(colour.size(), -1);
+  std::vector<bool> used(depth.size(), false);
+  for (const auto& [difference, i, j] : pairs) {
+    if (match[i] >= 0 || used[j]) continue;
+    match[i] = static_cast<int>(j);
+    used[j] = true;
+  }
+  return match;
+}
+
+void FromLists(const std::filesystem::path& folder, const DatasetOptions& options, FolderContents& out) {
+  const std::vector<StampedFile> colour = ReadList(folder, "rgb.txt", out.warnings);
+  std::vector<int> match(colour.size(), -1);
+  std::vector<StampedFile> depth;
+  if (options.sensor == Sensor::kRgbd) {
+    depth = ReadList(folder, "depth.txt", out.warnings);
+    match = Associate(colour, depth, options.max_association_s);
+  }
+  std::size_t alone = 0;
+  for (std::size_t i = 0; i < colour.size(); ++i) {
+    if (options.sensor == Sensor::kRgbd && match[i] < 0) {
+      ++alone;
+      continue;
+    }
+    FrameFiles frame;
+    frame.index = static_cast<std::int64_t>(i);
+    frame.stamp_s = colour[i].stamp_s;
+    frame.image = colour[i].file;
+    if (match[i] >= 0) frame.depth = depth[static_cast<std::size_t>(match[i])].file;
+    out.frames.push_back(std::move(frame));
+  }
+  if (out.frames.empty()) {
+    throw InputError((folder / "depth.txt").string() + ": no depth image is within " +
+                     std::to_string(options.max_association_s) +
+                     " s of a colour image of rgb.txt; check the time stamps or raise max_association_s");
+  }
+  if (alone > 0) {
+    out.warnings.push_back((folder / "depth.txt").string() + ": " + std::to_string(alone) + " of " +
+                           std::to_string(colour.size()) + " colour images have no depth image within " +
+                           std::to_string(options.max_association_s) + " s and are left out");
+  }
+}
+
+// "stamp file stamp file". TUM puts colour first, ICL-NUIM depth: the folder's name tells.
+void FromAssociations(const std::filesystem::path& folder, const DatasetOptions& options,
+                      FolderContents& out) {
+  const std::filesystem::path list = folder / "associations.txt";
+  const std::vector<TextLine> lines = ReadTextLines(list);
+  StampOrder order(list, out.warnings);
+  bool counts = true;  // stamps are frame numbers that name the files (ICL-NUIM), not seconds
+  std::int64_t index = 0;
+  for (const TextLine& line : lines) {
+    if (line.words.size() != 4) {
+      throw InputError(At(list, line.number) + "has " + std::to_string(line.words.size()) +
+                       " columns; 4 are needed: stamp, colour file, stamp, depth file");
+    }
+    const bool depth_first = line.words[1].rfind("depth", 0) == 0 || line.words[3].rfind("rgb", 0) == 0;
+    FrameFiles frame;
+    frame.stamp_s = NumberAt(list, line, depth_first ? 2 : 0);
+    NumberAt(list, line, depth_first ? 0 : 2);
+    frame.index = index++;
+    frame.image = folder / line.words[depth_first ? 3 : 1];
+    if (options.sensor == Sensor::kRgbd) frame.depth = folder / line.words[depth_first ? 1 : 3];
+    counts = counts && line.words[depth_first ? 2 : 0] == frame.image.stem().string() &&
+             line.words[depth_first ? 2 : 0].find('.') == std::string::npos;
+    if (order.Accept(line.number, frame.stamp_s)) out.frames.push_back(std::move(frame));
+  }
+  if (counts && out.frames.size() > 1) {
+    out.stamp_scale = 1.0 / (options.rate_hz > 0 ? options.rate_hz : 30.0);
+    for (FrameFiles& frame : out.frames) frame.stamp_s *= out.stamp_scale;
+    out.warnings.push_back(list.string() + ": its time stamps are frame numbers; " +
+                           std::to_string(1.0 / out.stamp_scale) + " frames a second are assumed (rate_hz)");
+  }
+}
+
+}  // namespace
+
+FolderContents FindTum(const std::filesystem::path& folder, const DatasetOptions& options) {
+  if (options.sensor == Sensor::kStereo) {
+    throw InputError(folder.string() + ": the TUM layout has no stereo pairs; set sensor to rgbd or mono");
+  }
+  FolderContents out;
+  out.folder = folder;
+  std::error_code code;
+  const bool lists = std::filesystem::exists(folder / "rgb.txt", code);
+  const bool depth_list = std::filesystem::exists(folder / "depth.txt", code);
+  const bool associations = std::filesystem::exists(folder / "associations.txt", code);
+  if (options.sensor == Sensor::kRgbd ? associations : !lists) {
+    FromAssociations(folder, options, out);
+  } else if (options.sensor == Sensor::kRgbd && !(lists && depth_list)) {
+    throw InputError(
+        (folder / (lists ? "depth.txt" : "rgb.txt")).string() +
+        ": is missing; RGB-D needs rgb.txt and depth.txt (stamp and file name a line), or associations.txt");
+  } else {
+    FromLists(folder, options, out);
+  }
+  if (!options.camera) {
+    throw InputError(folder.string() +
+                     ": the TUM layout holds no calibration; set fx, fy, cx, cy under 'camera:' in the "
+                     "configuration (data/configs/tum_fr1_rgbd.yaml and its like have them)");
+  }
+  out.left = options.camera;
+  out.rate_hz = 30.0;
+  if (out.frames.size() > 1) {
+    out.rate_hz =
+        static_cast<double>(out.frames.size() - 1) / (out.frames.back().stamp_s - out.frames.front().stamp_s);
+  }
+  out.truth_places = {folder / "groundtruth.txt", folder / "poses.txt"};
+  for (int i = 0; i < 4; ++i) {  // ICL-NUIM's names
+    out.truth_places.push_back(folder / ("livingRoom" + std::to_string(i) + ".gt.freiburg"));
+    out.truth_places.push_back(folder / ("traj" + std::to_string(i) + ".gt.freiburg"));
+  }
+  return out;
+}
+
+}  // namespace tutti

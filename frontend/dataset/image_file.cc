@@ -1,0 +1,188 @@
+#include "frontend/dataset/image_file.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cstdint>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "tutti/core/text.h"
+
+namespace tutti {
+namespace {
+
+using Bytes = std::vector<unsigned char>;
+
+std::uint32_t BigEndian(const Bytes& b, std::size_t at) {
+  return (std::uint32_t{b[at]} << 24) | (std::uint32_t{b[at + 1]} << 16) | (std::uint32_t{b[at + 2]} << 8) |
+         b[at + 3];
+}
+
+std::uint32_t LittleEndian(const Bytes& b, std::size_t at) {
+  return (std::uint32_t{b[at + 3]} << 24) | (std::uint32_t{b[at + 2]} << 16) |
+         (std::uint32_t{b[at + 1]} << 8) | b[at];
+}
+
+// PNG: chunks of (length, type, data, checksum) up to IEND.
+bool PngIsComplete(const Bytes& b) {
+  std::size_t at = 8;
+  while (at + 12 <= b.size()) {
+    const std::size_t length = BigEndian(b, at);
+    if (std::memcmp(&b[at + 4], "IEND", 4) == 0) return true;
+    at += 12 + length;
+  }
+  return false;
+}
+
+// JPEG: segments up to the first scan (SOS), then coded data in which a true FF D9 can only be the end of the
+// image. An embedded thumbnail's own end lies before the first scan.
+bool JpegIsComplete(const Bytes& b) {
+  std::size_t at = 2;
+  while (at + 4 <= b.size()) {
+    if (b[at] != 0xFF) return false;
+    const unsigned char marker = b[at + 1];
+    if (marker == 0xFF) {
+      ++at;
+      continue;
+    }
+    if (marker == 0xDA) break;
+    at += 2 + ((std::size_t{b[at + 2]} << 8) | b[at + 3]);
+  }
+  for (std::size_t i = b.size(); i-- > at + 1;) {
+    if (b[i] == 0xD9 && b[i - 1] == 0xFF) return true;
+  }
+  return false;
+}
+
+// What is wrong with the bytes of an image file; empty if nothing is seen from outside.
+std::string Damage(const Bytes& b) {
+  if (b.empty()) return "is empty (0 bytes)";
+  const auto starts = [&](const char* magic, std::size_t size, std::size_t at = 0) {
+    return b.size() >= at + size && std::memcmp(b.data() + at, magic, size) == 0;
+  };
+  bool complete = true;
+  if (starts("\x89PNG\r\n\x1a\n", 8)) {
+    complete = PngIsComplete(b);
+  } else if (starts("\xFF\xD8", 2)) {
+    complete = JpegIsComplete(b);
+  } else if (starts("RIFF", 4) && starts("WEBP", 4, 8)) {
+    complete = b.size() >= std::size_t{LittleEndian(b, 4)} + 8;
+  } else if (starts("BM", 2) && b.size() >= 6) {
+    complete = b.size() >= LittleEndian(b, 2);
+  }
+  return complete ? std::string() : "is truncated (it ends after " + std::to_string(b.size()) + " bytes)";
+}
+
+ImageFile Decode(const std::filesystem::path& file, int flags) {
+  ImageFile out;
+  std::error_code code;
+  if (!std::filesystem::exists(file, code)) {
+    out.error = file.string() + ": is missing";
+    return out;
+  }
+  std::ifstream in(file, std::ios::binary | std::ios::ate);
+  const std::streamoff size = in ? std::streamoff(in.tellg()) : -1;
+  if (size < 0 || std::filesystem::is_directory(file, code)) {
+    out.error = file.string() + ": can't be read; check that it is a readable file";
+    return out;
+  }
+  Bytes bytes(static_cast<std::size_t>(size));
+  in.seekg(0);
+  if (size > 0 && !in.read(reinterpret_cast<char*>(bytes.data()), size)) {
+    out.error = file.string() + ": can't be read in full";
+    return out;
+  }
+  out.error = Damage(bytes);
+  if (!out.error.empty()) {
+    out.error = file.string() + ": " + out.error;
+    return out;
+  }
+  try {
+    out.image = cv::imdecode(bytes, flags);
+  } catch (const cv::Exception&) {
+    out.image.release();
+  }
+  if (out.image.empty()) out.error = file.string() + ": is damaged or not an image that OpenCV can decode";
+  return out;
+}
+
+}  // namespace
+
+ImageFile ReadGreyFile(const std::filesystem::path& file) {
+  ImageFile out = Decode(file, cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
+  if (!out.error.empty()) return out;
+  if (out.image.depth() != CV_8U && out.image.depth() != CV_16U) {
+    out.error = file.string() + ": has pixels that are neither 8 nor 16 bit; convert it";
+    out.image.release();
+  }
+  return out;
+}
+
+ImageFile ReadDepthFile(const std::filesystem::path& file) {
+  ImageFile out = Decode(file, cv::IMREAD_UNCHANGED);
+  if (!out.error.empty()) return out;
+  if (out.image.type() != CV_16UC1 && out.image.type() != CV_32FC1) {
+    out.error = file.string() + ": is no depth image; one channel of 16 bit (or float) is needed";
+    out.image.release();
+  }
+  return out;
+}
+
+cv::Mat ToGrey8(const cv::Mat& grey, int bits) {
+  if (grey.depth() == CV_8U) return grey;
+  cv::Mat out;
+  grey.convertTo(out, CV_8U, 1.0 / (1 << (std::clamp(bits, 8, 16) - 8)));
+  return out;
+}
+
+int SignificantBits(const cv::Mat& grey) {
+  if (grey.depth() == CV_8U) return 8;
+  double greatest = 0;
+  cv::minMaxLoc(grey, nullptr, &greatest);
+  int bits = 8;
+  while (bits < 16 && greatest >= (1 << bits)) bits += 2;
+  return bits;
+}
+
+cv::Mat DepthInMetres(const cv::Mat& stored, double units_per_m, double max_depth_m) {
+  cv::Mat depth;
+  stored.convertTo(depth, CV_32F, 1.0 / units_per_m);
+  const float limit = max_depth_m > 0 ? static_cast<float>(max_depth_m) : 1e6F;
+  for (int v = 0; v < depth.rows; ++v) {
+    float* row = depth.ptr<float>(v);
+    for (int u = 0; u < depth.cols; ++u) {
+      if (!(row[u] > 0.0F && row[u] <= limit)) row[u] = 0.0F;
+    }
+  }
+  return depth;
+}
+
+bool HasImageExtension(const std::filesystem::path& file) {
+  static constexpr std::array<const char*, 15> kExtensions = {".png", ".jpg", ".jpeg", ".webp", ".bmp",
+                                                              ".pgm", ".ppm", ".pnm",  ".tif",  ".tiff",
+                                                              ".jp2", ".dib", ".jpe",  ".pbm",  ".exr"};
+  std::string extension = file.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return std::find(kExtensions.begin(), kExtensions.end(), extension) != kExtensions.end();
+}
+
+std::vector<std::filesystem::path> ListImages(const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> files;
+  std::error_code code;
+  for (std::filesystem::directory_iterator it(folder, code), end; !code && it != end; it.increment(code)) {
+    const std::filesystem::path& file = it->path();
+    if (file.filename().string().front() == '.' || !HasImageExtension(file)) continue;
+    if (!it->is_directory(code)) files.push_back(file);
+  }
+  std::sort(files.begin(), files.end(), [](const std::filesystem::path& a, const std::filesystem::path& b) {
+    return NaturalLess(a.filename().string(), b.filename().string());
+  });
+  return files;
+}
+
+}  // namespace tutti

@@ -1,0 +1,108 @@
+#include "frontend/dataset/sensor_yaml.h"
+
+#include <algorithm>
+#include <map>
+#include <string>
+
+#include "frontend/dataset/dataset_folder.h"
+#include "tutti/core/error.h"
+
+namespace tutti {
+namespace {
+
+struct Value {
+  TextLine text;  // line of the key; words of the value, brackets dropped
+};
+using Values = std::map<std::string, Value>;
+
+// "key: word" and "key: [a, b, ...]" over any number of lines. Nested keys (T_BS: data:) count by their own
+// name: no two of those that are used are equal.
+Values ReadValues(const std::filesystem::path& file) {
+  Values values;
+  Value* open = nullptr;  // a list whose bracket is not closed yet
+  for (TextLine line : ReadTextLines(file)) {
+    std::size_t first = 0;
+    if (open == nullptr) {
+      std::string key = line.words[0];
+      if (key.size() < 2 || key.back() != ':') continue;  // %YAML:1.0, ---
+      key.pop_back();
+      open = &values[key];
+      open->text.number = line.number;
+      first = 1;
+    }
+    bool more = false;
+    for (std::size_t i = first; i < line.words.size(); ++i) {
+      std::string word = line.words[i];
+      if (word.find('[') != std::string::npos) more = true;
+      if (word.find(']') != std::string::npos) more = false;
+      word.erase(std::remove_if(word.begin(), word.end(), [](char c) { return c == '[' || c == ']'; }),
+                 word.end());
+      if (!word.empty()) open->text.words.push_back(word);
+    }
+    const bool closed = line.words.back().find(']') != std::string::npos;
+    if (!more && (first == 1 || closed)) open = nullptr;
+  }
+  return values;
+}
+
+const TextLine& Get(const std::filesystem::path& file, const Values& values, const std::string& key,
+                    std::size_t size) {
+  const auto found = values.find(key);
+  if (found == values.end()) throw InputError(file.string() + ": has no key '" + key + "'");
+  const TextLine& text = found->second.text;
+  if (text.words.size() != size) {
+    throw InputError(At(file, text.number) + "'" + key + "' has " + std::to_string(text.words.size()) +
+                     " values; " + std::to_string(size) + " are needed");
+  }
+  return text;
+}
+
+}  // namespace
+
+SensorYaml ReadSensorYaml(const std::filesystem::path& file) {
+  const Values values = ReadValues(file);
+  SensorYaml out;
+  const TextLine& transform = Get(file, values, "data", 16);
+  Eigen::Matrix<double, 3, 4> matrix;
+  for (std::size_t i = 0; i < 12; ++i) {
+    matrix(static_cast<int>(i) / 4, static_cast<int>(i) % 4) = NumberAt(file, transform, i);
+  }
+  if (std::abs(matrix.leftCols<3>().determinant() - 1.0) > 0.01) {
+    throw InputError(At(file, transform.number) +
+                     "T_BS is not a rigid transform (its rotation has a determinant other than 1)");
+  }
+  out.T_body_sensor = Pose::FromMatrix(matrix);
+
+  const TextLine& intrinsics = Get(file, values, "intrinsics", 4);
+  PinholeCamera& c = out.camera;
+  c.fx = NumberAt(file, intrinsics, 0);
+  c.fy = NumberAt(file, intrinsics, 1);
+  c.cx = NumberAt(file, intrinsics, 2);
+  c.cy = NumberAt(file, intrinsics, 3);
+  const TextLine& size = Get(file, values, "resolution", 2);
+  c.width = static_cast<int>(NumberAt(file, size, 0));
+  c.height = static_cast<int>(NumberAt(file, size, 1));
+
+  const TextLine& model = Get(file, values, "distortion_model", 1);
+  const std::string& name = model.words[0];
+  if (name == "radial-tangential" || name == "radtan" || name == "plumb_bob") {
+    c.distortion = Distortion::kRadTan;
+  } else if (name == "equidistant") {
+    c.distortion = Distortion::kEquidistant;
+  } else if (name != "none") {
+    throw InputError(At(file, model.number) + "unknown distortion_model '" + name +
+                     "'; use radial-tangential, equidistant or none");
+  }
+  if (c.distortion != Distortion::kNone) {
+    const auto found = values.find("distortion_coefficients");
+    const std::size_t given = found == values.end() ? 0 : found->second.text.words.size();
+    const TextLine& k = Get(file, values, "distortion_coefficients", given == 5 ? 5 : 4);
+    for (std::size_t i = 0; i < k.words.size(); ++i) c.coefficients[i] = NumberAt(file, k, i);
+  }
+  if (values.count("rate_hz") != 0) out.rate_hz = NumberAt(file, Get(file, values, "rate_hz", 1), 0);
+  const std::string problem = c.Validate();
+  if (!problem.empty()) throw InputError(file.string() + ": " + problem);
+  return out;
+}
+
+}  // namespace tutti

@@ -1,0 +1,74 @@
+#include "frontend/dataset/video_input.h"
+
+#include <algorithm>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio/registry.hpp>
+
+#include "tutti/core/error.h"
+
+namespace tutti {
+namespace {
+
+// FFmpeg and OpenCV's own motion JPEG; GStreamer only where OpenCV was built without FFmpeg.
+std::vector<int> Backends() {
+  const std::vector<cv::VideoCaptureAPIs> known = cv::videoio_registry::getBackends();
+  const bool ffmpeg = std::find(known.begin(), known.end(), cv::CAP_FFMPEG) != known.end();
+  return {ffmpeg ? cv::CAP_FFMPEG : cv::CAP_GSTREAMER, cv::CAP_OPENCV_MJPEG};
+}
+
+}  // namespace
+
+void OpenVideoFile(const std::filesystem::path& file, cv::VideoCapture& capture) {
+  // Not CAP_ANY: it tries every backend, and each reports its failure at length on stderr.
+  for (const int backend : Backends()) {
+    try {
+      if (capture.open(file.string(), backend)) return;
+    } catch (const cv::Exception&) {  // the next one may do
+    }
+  }
+  throw InputError(file.string() +
+                   ": can't be opened as a video; is it complete and of a format that OpenCV decodes?");
+}
+
+bool ReadGreyFrame(cv::VideoCapture& capture, cv::Mat& grey) {
+  cv::Mat image;
+  if (!capture.read(image) || image.empty()) return false;
+  if (image.channels() == 1) {
+    grey = image.clone();
+  } else {
+    cv::cvtColor(image, grey, image.channels() == 4 ? cv::COLOR_BGRA2GRAY : cv::COLOR_BGR2GRAY);
+  }
+  return true;
+}
+
+CameraRig SingleCameraRig(const DatasetOptions& options, cv::Size size, double rate_hz,
+                          const std::string& name, std::optional<Rectifier>& rectifier,
+                          std::vector<std::string>& warnings) {
+  CameraRig rig;
+  rig.rate_hz = rate_hz;
+  rig.calibrated = options.camera.has_value();
+  if (!options.camera) {
+    rig.camera.width = size.width;
+    rig.camera.height = size.height;
+    warnings.push_back(name +
+                       ": no calibration is given (camera: fx, fy, cx, cy); appearance only, no odometry");
+    return rig;
+  }
+  PinholeCamera camera = *options.camera;
+  if (camera.width == 0 && camera.height == 0) {
+    camera.width = size.width;
+    camera.height = size.height;
+  }
+  if (cv::Size(camera.width, camera.height) != size) {
+    throw InputError(name + ": the camera is calibrated for images of " + std::to_string(camera.width) + "x" +
+                     std::to_string(camera.height) + ", but these have " + std::to_string(size.width) + "x" +
+                     std::to_string(size.height) + "; use the calibration of this camera");
+  }
+  const std::string problem = camera.Validate();
+  if (!problem.empty()) throw InputError(name + ": " + problem);
+  rectifier.emplace(camera);
+  rig.camera = rectifier->Camera();
+  return rig;
+}
+
+}  // namespace tutti

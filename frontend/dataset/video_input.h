@@ -1,0 +1,26 @@
+// What video files and live cameras share: opening, grey frames, the rig of one camera.
+#pragma once
+
+#include <opencv2/videoio.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "frontend/features/rectifier.h"
+#include "tutti/frontend/dataset.h"
+
+namespace tutti {
+
+/// Opens a video file with FFmpeg or OpenCV's own decoder. Throws InputError.
+void OpenVideoFile(const std::filesystem::path& file, cv::VideoCapture& capture);
+
+/// The next frame in grey (8 bit); false at the end, and where it can't be decoded.
+bool ReadGreyFrame(cv::VideoCapture& capture, cv::Mat& grey);
+
+/// Rig and rectifier of one camera whose images have this size; without calibration a warning, and no
+/// rectifier. `name` is what messages call the source. Throws InputError if the calibration does not fit.
+CameraRig SingleCameraRig(const DatasetOptions& options, cv::Size size, double rate_hz,
+                          const std::string& name, std::optional<Rectifier>& rectifier,
+                          std::vector<std::string>& warnings);
+
+}  // namespace tutti

@@ -1,0 +1,334 @@
+#include "frontend/features/features.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <numeric>
+#include <opencv2/features2d.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "frontend/features/stereo_matcher.h"
+
+namespace tutti {
+namespace {
+
+constexpr int kBorder = 19;     // [px] a descriptor's patch (rotated, 31 px) stays inside the image
+constexpr int kHalfPatch = 15;  // [px] radius of the orientation patch
+
+// Half width of the orientation patch at each row distance from its centre.
+const std::array<int, kHalfPatch + 1>& PatchWidths() {
+  static const std::array<int, kHalfPatch + 1> widths = [] {
+    std::array<int, kHalfPatch + 1> w{};
+    for (int v = 0; v <= kHalfPatch; ++v) {
+      w[static_cast<std::size_t>(v)] =
+          static_cast<int>(std::lround(std::sqrt(double(kHalfPatch * kHalfPatch - v * v))));
+    }
+    return w;
+  }();
+  return widths;
+}
+
+// Orientation by the intensity centroid (Rublee 2011, section 3.2) [deg].
+float Orientation(const cv::Mat& image, int x, int y) {
+  const auto& widths = PatchWidths();
+  int m01 = 0, m10 = 0;
+  const std::uint8_t* centre = image.ptr<std::uint8_t>(y) + x;
+  for (int u = -kHalfPatch; u <= kHalfPatch; ++u) m10 += u * centre[u];
+  for (int v = 1; v <= kHalfPatch; ++v) {
+    const std::uint8_t* below = image.ptr<std::uint8_t>(y + v) + x;
+    const std::uint8_t* above = image.ptr<std::uint8_t>(y - v) + x;
+    int row = 0;
+    const int w = widths[static_cast<std::size_t>(v)];
+    for (int u = -w; u <= w; ++u) {
+      row += below[u] - above[u];
+      m10 += u * (below[u] + above[u]);
+    }
+    m01 += v * row;
+  }
+  return cv::fastAtan2(static_cast<float>(m01), static_cast<float>(m10));
+}
+
+// Sub-pixel corner: the point that is nearest to all the lines through the window's pixels along their edges
+// (Foerstner & Guelch 1987); the integer position where that is not well defined or more than a pixel away.
+cv::Point2f RefineCorner(const cv::Mat& image, const cv::Point2f& corner) {
+  constexpr int kWindow = 3;
+  const int x = static_cast<int>(corner.x), y = static_cast<int>(corner.y);
+  float a = 0, b = 0, c = 0, p = 0, q = 0;
+  for (int v = -kWindow; v <= kWindow; ++v) {
+    const std::uint8_t* row = image.ptr<std::uint8_t>(y + v) + x;
+    const std::uint8_t* above = image.ptr<std::uint8_t>(y + v - 1) + x;
+    const std::uint8_t* below = image.ptr<std::uint8_t>(y + v + 1) + x;
+    for (int u = -kWindow; u <= kWindow; ++u) {
+      const float gx = static_cast<float>(row[u + 1] - row[u - 1]),
+                  gy = static_cast<float>(below[u] - above[u]);
+      const float xx = gx * gx, xy = gx * gy, yy = gy * gy;
+      const float fu = static_cast<float>(u), fv = static_cast<float>(v);
+      a += xx;
+      b += xy;
+      c += yy;
+      p += xx * fu + xy * fv;
+      q += xy * fu + yy * fv;
+    }
+  }
+  const float determinant = a * c - b * b, trace = a + c;
+  if (determinant < 0.02F * trace * trace) return corner;  // an edge: free along its direction
+  const float du = (c * p - b * q) / determinant, dv = (a * q - b * p) / determinant;
+  if (std::abs(du) > 1 || std::abs(dv) > 1) return corner;
+  return {corner.x + du, corner.y + dv};
+}
+
+// Strongest first; equal ones by row, then by column. FAST's scores and places are whole numbers >= 0, so the
+// order fits into one integer, which sorts several times faster than corners do.
+void SortByStrength(std::vector<cv::KeyPoint>& corners) {
+  std::vector<std::pair<std::uint64_t, std::size_t>> order(corners.size());
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const cv::KeyPoint& k = corners[i];
+    const std::uint64_t weakness = 0xFFFFU - static_cast<std::uint64_t>(k.response);
+    order[i] = {
+        (weakness << 40) | (static_cast<std::uint64_t>(k.pt.y) << 20) | static_cast<std::uint64_t>(k.pt.x),
+        i};
+  }
+  std::sort(order.begin(), order.end());
+  std::vector<cv::KeyPoint> sorted;
+  sorted.reserve(corners.size());
+  for (const auto& [key, i] : order) sorted.push_back(corners[i]);
+  corners = std::move(sorted);
+}
+
+// Keeps `wanted` corners, round by round the strongest left in each grid cell. Corners below the upper
+// threshold count only where a cell has nothing better, so that weak texture is covered without crowding out
+// strong corners.
+std::vector<cv::KeyPoint> Spread(std::vector<cv::KeyPoint> corners, const cv::Size& size, int wanted,
+                                 int threshold) {
+  if (static_cast<int>(corners.size()) <= wanted) return corners;
+  const double area = double(size.width) * size.height;
+  const double cell = std::max(8.0, std::sqrt(area / std::max(1, wanted)) * 1.2);
+  const int columns = std::max(1, static_cast<int>(std::ceil(size.width / cell)));
+  const int rows = std::max(1, static_cast<int>(std::ceil(size.height / cell)));
+  SortByStrength(corners);
+  std::vector<std::vector<int>> cells(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const int c = std::min(columns - 1, static_cast<int>(corners[i].pt.x / cell));
+    const int r = std::min(rows - 1, static_cast<int>(corners[i].pt.y / cell));
+    const int at = r * columns + c;
+    auto& list = cells[static_cast<std::size_t>(at)];
+    if (!list.empty() && corners[i].response < static_cast<float>(threshold)) continue;
+    list.push_back(static_cast<int>(i));
+  }
+  std::vector<int> chosen;
+  for (std::size_t round = 0; static_cast<int>(chosen.size()) < wanted; ++round) {
+    std::vector<int> layer;
+    for (const auto& list : cells) {
+      if (round < list.size()) layer.push_back(list[round]);
+    }
+    if (layer.empty()) break;
+    std::sort(layer.begin(), layer.end());  // by strength
+    const std::size_t room = static_cast<std::size_t>(wanted) - chosen.size();
+    if (layer.size() > room) layer.resize(room);
+    chosen.insert(chosen.end(), layer.begin(), layer.end());
+  }
+  std::sort(chosen.begin(), chosen.end());
+  std::vector<cv::KeyPoint> out;
+  out.reserve(chosen.size());
+  for (int i : chosen) out.push_back(corners[static_cast<std::size_t>(i)]);
+  return out;
+}
+
+std::vector<int> FeaturesPerLevel(const OdometryOptions& options) {
+  // A geometric series: each level gets features in proportion to its side length.
+  const double factor = 1.0 / options.scale_factor;
+  const int levels = options.pyramid_levels;
+  double share = options.features * (1 - factor) / (1 - std::pow(factor, levels));
+  std::vector<int> out;
+  int sum = 0;
+  for (int l = 0; l + 1 < levels; ++l) {
+    out.push_back(static_cast<int>(std::lround(share)));
+    sum += out.back();
+    share *= factor;
+  }
+  out.push_back(std::max(0, options.features - sum));
+  return out;
+}
+
+inline int PopCount(std::uint64_t x) {
+  x = x - ((x >> 1) & 0x5555555555555555ULL);
+  x = (x & 0x3333333333333333ULL) + ((x >> 2) & 0x3333333333333333ULL);
+  x = (x + (x >> 4)) & 0x0f0f0f0f0f0f0f0fULL;
+  return static_cast<int>((x * 0x0101010101010101ULL) >> 56);
+}
+
+}  // namespace
+
+int HammingDistance(const std::uint8_t* a, const std::uint8_t* b) {
+  int distance = 0;
+  for (int i = 0; i < 32; i += 8) {
+    std::uint64_t x, y;
+    std::memcpy(&x, a + i, 8);
+    std::memcpy(&y, b + i, 8);
+    distance += PopCount(x ^ y);
+  }
+  return distance;
+}
+
+void FrameFeatures::BuildGrid(int width, int height) {
+  columns_ = width / kCell + 1;
+  rows_ = height / kCell + 1;
+  std::vector<std::size_t> cell_of(keypoints.size());
+  first_entry_.assign(static_cast<std::size_t>(columns_ * rows_) + 1, 0);
+  for (std::size_t i = 0; i < keypoints.size(); ++i) {
+    const int c = std::clamp(static_cast<int>(keypoints[i].pt.x) / kCell, 0, columns_ - 1);
+    const int r = std::clamp(static_cast<int>(keypoints[i].pt.y) / kCell, 0, rows_ - 1);
+    const int cell = r * columns_ + c;
+    cell_of[i] = static_cast<std::size_t>(cell);
+    ++first_entry_[cell_of[i] + 1];
+  }
+  std::partial_sum(first_entry_.begin(), first_entry_.end(), first_entry_.begin());
+  entries_.resize(keypoints.size());
+  std::vector<int> next(first_entry_.begin(), first_entry_.end() - 1);
+  for (std::size_t i = 0; i < keypoints.size(); ++i) {
+    entries_[static_cast<std::size_t>(next[cell_of[i]]++)] = {keypoints[i].pt, keypoints[i].octave,
+                                                              static_cast<int>(i)};
+  }
+}
+
+void FrameFeatures::InArea(const cv::Point2f& centre, float radius, int first_octave, int last_octave,
+                           std::vector<int>* out) const {
+  out->clear();
+  if (entries_.empty()) return;
+  const int c0 = std::max(0, static_cast<int>(std::floor((centre.x - radius) / kCell)));
+  const int c1 = std::min(columns_ - 1, static_cast<int>(std::floor((centre.x + radius) / kCell)));
+  const int r0 = std::max(0, static_cast<int>(std::floor((centre.y - radius) / kCell)));
+  const int r1 = std::min(rows_ - 1, static_cast<int>(std::floor((centre.y + radius) / kCell)));
+  if (c0 > c1) return;
+  for (int r = r0; r <= r1; ++r) {
+    // The cells of a row lie one after the other.
+    const int row = r * columns_, past = row + c1 + 1, first = row + c0;
+    const int begin = first_entry_[static_cast<std::size_t>(first)],
+              end = first_entry_[static_cast<std::size_t>(past)];
+    for (int e = begin; e < end; ++e) {
+      const Entry& entry = entries_[static_cast<std::size_t>(e)];
+      if (entry.octave < first_octave || entry.octave > last_octave) continue;
+      if (std::abs(entry.pixel.x - centre.x) <= radius && std::abs(entry.pixel.y - centre.y) <= radius)
+        out->push_back(entry.feature);
+    }
+  }
+}
+
+std::shared_ptr<const FrameFeatures> WithoutImages(const FrameFeatures& features) {
+  auto out = std::make_shared<FrameFeatures>(features);
+  out->pyramid.reset();
+  return out;
+}
+
+std::vector<float> PyramidScales(const OdometryOptions& options) {
+  std::vector<float> scales;
+  scales.reserve(static_cast<std::size_t>(std::max(0, options.pyramid_levels)));
+  for (int l = 0; l < options.pyramid_levels; ++l) {
+    scales.push_back(static_cast<float>(std::pow(options.scale_factor, l)));
+  }
+  return scales;
+}
+
+std::vector<cv::Mat> BuildPyramid(const cv::Mat& image, const OdometryOptions& options) {
+  std::vector<cv::Mat> pyramid{image};
+  for (int l = 1; l < options.pyramid_levels; ++l) {
+    const double scale = std::pow(options.scale_factor, -l);
+    const cv::Size size(static_cast<int>(std::lround(image.cols * scale)),
+                        static_cast<int>(std::lround(image.rows * scale)));
+    if (size.width < 2 * kBorder + 2 || size.height < 2 * kBorder + 2) break;
+    cv::Mat level;
+    cv::resize(pyramid.back(), level, size, 0, 0, cv::INTER_LINEAR);
+    pyramid.push_back(level);
+  }
+  return pyramid;
+}
+
+FrameFeatures ExtractOrb(const std::vector<cv::Mat>& pyramid, const OdometryOptions& options) {
+  FrameFeatures out;
+  if (pyramid.empty() || pyramid[0].empty()) return out;
+  const std::vector<float> scales = PyramidScales(options);
+  const std::vector<int> wanted = FeaturesPerLevel(options);
+  const cv::Ptr<cv::ORB> orb =
+      cv::ORB::create(1, 1.2F, 1, kBorder - 1, 0, 2, cv::ORB::FAST_SCORE, 2 * kHalfPatch + 1);
+  std::vector<cv::Mat> descriptors;
+  for (std::size_t l = 0; l < pyramid.size(); ++l) {
+    const cv::Mat& image = pyramid[l];
+    const int width = image.cols - 2 * kBorder, height = image.rows - 2 * kBorder;
+    if (width < 1 || height < 1) break;
+    std::vector<cv::KeyPoint> corners;
+    // The detector needs 3 px around the part in which corners may lie.
+    const cv::Rect part(kBorder - 3, kBorder - 3, width + 6, height + 6);
+    cv::FAST(image(part), corners, options.fast_threshold_min, true);
+    for (cv::KeyPoint& k : corners) k.pt += cv::Point2f(-3, -3);
+    corners = Spread(std::move(corners), cv::Size(width, height), wanted[l], options.fast_threshold);
+    for (cv::KeyPoint& k : corners) {
+      k.pt += cv::Point2f(kBorder, kBorder);
+      k.angle = Orientation(image, static_cast<int>(k.pt.x), static_cast<int>(k.pt.y));
+      k.octave = 0;
+      k.size = 2 * kHalfPatch + 1;
+    }
+    cv::Mat level_descriptors;
+    if (!corners.empty()) orb->compute(image, corners, level_descriptors);
+    if (corners.empty()) continue;
+    descriptors.push_back(level_descriptors);
+    // Pixel centres have integer coordinates on every level, so the levels' corners are half a pixel apart;
+    // and their sizes are rounded. Ignoring either biases coarse features by more than a pixel, and mono
+    // scale drifts with them.
+    const float sx = static_cast<float>(pyramid[0].cols) / static_cast<float>(image.cols);
+    const float sy = static_cast<float>(pyramid[0].rows) / static_cast<float>(image.rows);
+    for (cv::KeyPoint k : corners) {
+      const cv::Point2f p = RefineCorner(image, k.pt);
+      k.octave = static_cast<int>(l);
+      k.pt = cv::Point2f((p.x + 0.5F) * sx - 0.5F, (p.y + 0.5F) * sy - 0.5F);
+      k.size *= scales[l];
+      out.keypoints.push_back(k);
+    }
+  }
+  if (!descriptors.empty()) cv::vconcat(descriptors, out.descriptors);
+  out.inverse_depth.assign(out.keypoints.size(), 0.0F);
+  out.inverse_depth_sigma.assign(out.keypoints.size(), 0.0F);
+  out.aligned.assign(out.keypoints.size(), -1);
+  out.BuildGrid(pyramid[0].cols, pyramid[0].rows);
+  return out;
+}
+
+namespace {
+
+void AddDepthFromImage(const cv::Mat& depth_m, const CameraRig& rig, const OdometryOptions& options,
+                       FrameFeatures* features) {
+  for (std::size_t i = 0; i < features->size(); ++i) {
+    const cv::Point2f& p = features->keypoints[i].pt;
+    const int x = static_cast<int>(std::lround(p.x)), y = static_cast<int>(std::lround(p.y));
+    if (x < 1 || y < 1 || x + 1 >= depth_m.cols || y + 1 >= depth_m.rows) continue;
+    const float z = depth_m.at<float>(y, x);
+    if (!(z > 0.05F) || (rig.max_depth_m > 0 && z > rig.max_depth_m)) continue;
+    // At a depth edge the corner may belong to either side: trust it only where its neighbours agree.
+    bool edge = false;
+    for (const auto& [dx, dy] : {std::pair{-1, 0}, {1, 0}, {0, -1}, {0, 1}}) {
+      const float n = depth_m.at<float>(y + dy, x + dx);
+      edge |= n > 0 && std::abs(1 / n - 1 / z) > 6 * static_cast<float>(options.rgbd_inverse_sigma);
+    }
+    if (edge) continue;
+    features->inverse_depth[i] = 1.0F / z;
+    features->inverse_depth_sigma[i] = static_cast<float>(options.rgbd_inverse_sigma);
+  }
+}
+
+}  // namespace
+
+FrameFeatures ExtractFeatures(const InputFrame& frame, const CameraRig& rig, const OdometryOptions& options) {
+  const auto shared = std::make_shared<const std::vector<cv::Mat>>(BuildPyramid(frame.image, options));
+  const std::vector<cv::Mat>& pyramid = *shared;
+  FrameFeatures features = ExtractOrb(pyramid, options);
+  features.pyramid = shared;
+  if (!frame.depth_m.empty()) AddDepthFromImage(frame.depth_m, rig, options, &features);
+  if (!frame.right.empty()) {
+    const std::vector<cv::Mat> right_pyramid = BuildPyramid(frame.right, options);
+    const FrameFeatures right = ExtractOrb(right_pyramid, options);
+    MatchStereo(pyramid, right_pyramid, right, rig, options, &features);
+  }
+  return features;
+}
+
+}  // namespace tutti

@@ -1,0 +1,232 @@
+#include "frontend/features/stereo_matcher.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "frontend/features/grey_window.h"
+
+namespace tutti {
+namespace {
+
+constexpr int kMaxDistance = 75;  // bits; a wrong match has about 128
+constexpr int kHalf = 5;          // half of the window [px]
+constexpr int kSide = 2 * kHalf + 1;
+constexpr int kPixels = kSide * kSide;
+constexpr int kSearch = 5;              // half of the SAD search range [px]
+constexpr float kGreySigma = 4;         // differences that interpolation and noise make [grey levels]
+constexpr float kMaxStretch = 0.3F;     // of a wall along the way: baseline / distance from it
+constexpr float kMaxShear = 0.8F;       // of the ground: baseline / height
+constexpr float kMaxResidual = 0.3F;    // of the window's variance
+constexpr float kResidualRatio = 6.0F;  // to the median of all matches
+
+// Sum of absolute differences of two windows, each relative to its own centre (so that brightness may
+// differ).
+int Sad(const cv::Mat& a, int ax, int ay, const cv::Mat& b, int bx, int by) {
+  const int ca = a.at<std::uint8_t>(ay, ax), cb = b.at<std::uint8_t>(by, bx);
+  int sum = 0;
+  for (int dy = -kHalf; dy <= kHalf; ++dy) {
+    const std::uint8_t* ra = a.ptr<std::uint8_t>(ay + dy) + ax;
+    const std::uint8_t* rb = b.ptr<std::uint8_t>(by + dy) + bx;
+    for (int dx = -kHalf; dx <= kHalf; ++dx) sum += std::abs((ra[dx] - ca) - (rb[dx] - cb));
+  }
+  return sum;
+}
+
+using Window = GreyWindow<kHalf>;
+using Vector5f = Eigen::Matrix<float, 5, 1>;
+
+// How a window of the left image appears in the right one, in pixels of the level:
+// right(x + i + shift + stretch i + shear j, y + j + row) = left(x + i, y + j) + brightness.
+struct Warp {
+  float shift = 0, stretch = 0, shear = 0, row = 0, brightness = 0;
+  float residual = 0;  // weighted mean square difference [grey levels^2]
+  float contrast = 0;  // weighted variance of the left window [grey levels^2]
+};
+
+// Grey values of the left window, shifted and warped, in the right image; false if it reaches beyond the
+// image.
+bool SampleWarped(const cv::Mat& right, int x, int y, const Warp& w, Window* grey) {
+  const float h = kHalf, fx = static_cast<float>(x), fy = static_cast<float>(y);
+  const float reach = h * (1 + std::abs(w.stretch) + std::abs(w.shear));
+  if (!(fx + w.shift - reach >= 0 && fx + w.shift + reach < static_cast<float>(right.cols - 1) &&
+        fy + w.row - h >= 0 && fy + w.row + h < static_cast<float>(right.rows - 1)))
+    return false;
+  for (int j = -kHalf, n = 0; j <= kHalf; ++j) {
+    const float start = fx + w.shift + w.shear * static_cast<float>(j);
+    for (int i = -kHalf; i <= kHalf; ++i, ++n)
+      (*grey)(n) = Bilinear(right.data, right.step, start + (1 + w.stretch) * static_cast<float>(i),
+                            fy + static_cast<float>(j) + w.row);
+  }
+  return true;
+}
+
+// Least squares with the left image's gradients (Lucas & Kanade, IJCAI 1981), from warp->shift on. A window
+// on the ground or on a wall along the way is sheared or stretched by pixels: a mere shift has errors of half
+// a pixel there.
+bool FitWarp(const cv::Mat& left, const cv::Mat& right, int x, int y, Warp* warp) {
+  const Window& weights = WindowWeights<kHalf>();
+  Eigen::Matrix<float, kPixels, 5> jacobian;
+  Window grey;
+  for (int j = -kHalf, n = 0; j <= kHalf; ++j) {
+    const std::uint8_t* row = left.ptr<std::uint8_t>(y + j) + x;
+    const std::uint8_t* above = left.ptr<std::uint8_t>(y + j - 1) + x;
+    const std::uint8_t* below = left.ptr<std::uint8_t>(y + j + 1) + x;
+    for (int i = -kHalf; i <= kHalf; ++i, ++n) {
+      const float gx = 0.5F * static_cast<float>(row[i + 1] - row[i - 1]);
+      const float gy = 0.5F * static_cast<float>(below[i] - above[i]);
+      jacobian(n, 0) = gx;
+      jacobian(n, 1) = gx * static_cast<float>(i);
+      jacobian(n, 2) = gx * static_cast<float>(j);
+      jacobian(n, 3) = gy;
+      jacobian(n, 4) = -1.0F;
+      grey(n) = row[i];
+    }
+  }
+  warp->contrast = weights.dot((grey.array() - weights.dot(grey)).square().matrix());
+  Eigen::Matrix<float, kPixels, 5> weighted;
+  for (int c = 0; c < 5; ++c) weighted.col(c) = weights.cwiseProduct(jacobian.col(c));
+  Eigen::Matrix<float, 5, 5> h = weighted.transpose() * jacobian;
+  // What is usual, for windows that say little about it; as if one pixel of sixty had told.
+  const auto usual = [](float sigma) { return 0.018F * kGreySigma * kGreySigma / (sigma * sigma); };
+  const Vector5f prior(0.0F, usual(0.2F), usual(0.3F), usual(0.5F), 0.0F);
+  h.diagonal() += prior;
+  const Eigen::LDLT<Eigen::Matrix<float, 5, 5>> solver(h);
+  if (solver.info() != Eigen::Success || !(solver.vectorD().minCoeff() > 1e-4F)) return false;
+  const float start = warp->shift;
+  for (int iteration = 0; iteration < 10; ++iteration) {
+    Window r;
+    if (!SampleWarped(right, x, y, *warp, &r)) return false;
+    r.array() -= grey.array() + warp->brightness;
+    warp->residual = weights.dot(r.cwiseAbs2());
+    const Vector5f now(0, warp->stretch, warp->shear, warp->row, 0);
+    const Vector5f step = -solver.solve(weighted.transpose() * r + prior.cwiseProduct(now));
+    warp->shift += step(0);
+    warp->stretch += step(1);
+    warp->shear += step(2);
+    warp->row += step(3);
+    warp->brightness += step(4);
+    if (!(std::abs(warp->shift - start) < 3 && std::abs(warp->stretch) < kMaxStretch &&
+          std::abs(warp->shear) < kMaxShear && std::abs(warp->row) < 2))
+      return false;
+    if (std::abs(step(0)) < 0.01F) return true;  // what is left is less than half of it
+  }
+  return false;
+}
+
+struct Refined {
+  double disparity = 0, row_error = 0;  // level-0 pixels
+  float residual = 0;                   // [grey levels^2]
+};
+
+// Sub-pixel disparity of a match at the left keypoint; false if there is no clear minimum near the right one.
+bool Refine(const cv::Mat& left, const cv::Mat& right, const cv::Point2f& scale,
+            const cv::Point2f& left_point, float right_u, Refined* out) {
+  const float u = (left_point.x + 0.5F) / scale.x - 0.5F, v = (left_point.y + 0.5F) / scale.y - 0.5F;
+  const int x = static_cast<int>(std::lround(u)), y = static_cast<int>(std::lround(v));
+  const int x0 = static_cast<int>(std::lround((right_u + 0.5F) / scale.x - 0.5F));
+  const int margin = kHalf + 1;
+  if (x < margin || y < margin || x + margin >= left.cols || y + margin >= left.rows) return false;
+  if (x0 - kSearch < margin || x0 + kSearch + margin >= right.cols || y + margin >= right.rows) return false;
+  int best = 0, least = std::numeric_limits<int>::max();
+  for (int d = -kSearch; d <= kSearch; ++d) {
+    const int sad = Sad(left, x, y, right, x0 + d, y);
+    if (sad < least) {
+      least = sad;
+      best = d;
+    }
+  }
+  if (std::abs(best) == kSearch) return false;
+  Warp warp;
+  warp.shift = static_cast<float>(x0 + best - x);
+  if (!FitWarp(left, right, x, y, &warp)) return false;
+  if (warp.residual > kMaxResidual * warp.contrast) return false;
+  // The window's centre is the rounded keypoint.
+  out->disparity = -double(scale.x) * double(warp.shift + warp.stretch * (u - static_cast<float>(x)) +
+                                             warp.shear * (v - static_cast<float>(y)));
+  out->row_error = std::abs(warp.row) * scale.y;
+  out->residual = warp.residual;
+  return true;
+}
+
+}  // namespace
+
+void MatchStereo(const std::vector<cv::Mat>& left_pyramid, const std::vector<cv::Mat>& right_pyramid,
+                 const FrameFeatures& right, const CameraRig& rig, const OdometryOptions& options,
+                 FrameFeatures* left) {
+  const std::vector<float> scales = PyramidScales(options);
+  const int rows = left_pyramid[0].rows;
+  const double fb = rig.camera.fx * rig.baseline_m;
+  // Right features by row; each stands in all the rows in which a left feature may match it.
+  std::vector<std::vector<int>> by_row(static_cast<std::size_t>(rows));
+  for (std::size_t j = 0; j < right.size(); ++j) {
+    const cv::KeyPoint& k = right.keypoints[j];
+    const float band = 2.0F * scales[static_cast<std::size_t>(k.octave)];
+    const int first = std::max(0, static_cast<int>(std::floor(k.pt.y - band)));
+    const int last = std::min(rows - 1, static_cast<int>(std::ceil(k.pt.y + band)));
+    for (int r = first; r <= last; ++r) by_row[static_cast<std::size_t>(r)].push_back(static_cast<int>(j));
+  }
+  struct Found {
+    std::size_t feature;
+    double disparity, row_error;
+    float residual;
+  };
+  std::vector<Found> found;
+  // The nearest point that is looked for: half a baseline away would leave no overlap.
+  const float max_disparity = static_cast<float>(rig.camera.fx / 1.5);
+  for (std::size_t i = 0; i < left->size(); ++i) {
+    const cv::KeyPoint& k = left->keypoints[i];
+    int best = kMaxDistance, best_j = -1;
+    for (int j :
+         by_row[static_cast<std::size_t>(std::clamp(static_cast<int>(std::lround(k.pt.y)), 0, rows - 1))]) {
+      const cv::KeyPoint& r = right.keypoints[static_cast<std::size_t>(j)];
+      if (std::abs(r.octave - k.octave) > 1 || r.pt.x > k.pt.x + 2 || r.pt.x < k.pt.x - max_disparity)
+        continue;
+      const int distance = HammingDistance(left->Descriptor(static_cast<int>(i)), right.Descriptor(j));
+      if (distance < best) {
+        best = distance;
+        best_j = j;
+      }
+    }
+    if (best_j < 0) continue;
+    const std::size_t level = static_cast<std::size_t>(k.octave);
+    if (level >= right_pyramid.size()) continue;
+    Refined refined;
+    // The sizes of the levels are rounded, so their scales are not quite those of the options.
+    const cv::Mat &whole = left_pyramid[0], &reduced = left_pyramid[level];
+    const cv::Point2f scale(static_cast<float>(whole.cols) / static_cast<float>(reduced.cols),
+                            static_cast<float>(whole.rows) / static_cast<float>(reduced.rows));
+    if (!Refine(left_pyramid[level], right_pyramid[level], scale, k.pt,
+                right.keypoints[static_cast<std::size_t>(best_j)].pt.x, &refined)) {
+      continue;
+    }
+    if (refined.disparity < -1.0 || refined.disparity > max_disparity) continue;
+    found.push_back({i, std::max(refined.disparity, 0.01), refined.row_error, refined.residual});
+  }
+  if (found.empty()) return;
+  // Matches whose windows differ far more than the median's are wrong (Mur-Artal & Tardos, T-RO 2017, section
+  // III-A).
+  std::vector<float> residuals;
+  residuals.reserve(found.size());
+  for (const Found& f : found) residuals.push_back(f.residual);
+  std::nth_element(residuals.begin(), residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2),
+                   residuals.end());
+  const float limit = kResidualRatio * residuals[residuals.size() / 2];
+  std::vector<double> errors;
+  for (const Found& f : found) {
+    if (f.residual > limit) continue;
+    const float scale = scales[static_cast<std::size_t>(left->keypoints[f.feature].octave)];
+    left->inverse_depth[f.feature] = static_cast<float>(f.disparity / fb);
+    left->inverse_depth_sigma[f.feature] = static_cast<float>(options.stereo_sigma_px * scale / fb);
+    errors.push_back(f.row_error);
+  }
+  left->stereo_matches = static_cast<int>(errors.size());
+  if (errors.empty()) return;
+  std::nth_element(errors.begin(), errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2),
+                   errors.end());
+  left->row_error_px = errors[errors.size() / 2];
+}
+
+}  // namespace tutti

@@ -1,0 +1,76 @@
+#include "frontend/geometry/pose_solver.h"
+
+#include <Eigen/Cholesky>
+#include <cmath>
+
+namespace tutti {
+
+bool ReprojectionResidual(const PinholeCamera& camera, const Pose& T_camera_world, const PointObservation& o,
+                          Eigen::Vector3d* residual, Eigen::Matrix<double, 3, 6>* jacobian) {
+  const Eigen::Vector3d p = T_camera_world * o.point;
+  if (!(p.z() > 1e-3)) return false;
+  const double iz = 1.0 / p.z();
+  const double wp = 1.0 / o.pixel_sigma;
+  const bool depth = o.inverse_depth_sigma > 0;
+  const double wd = depth ? 1.0 / o.inverse_depth_sigma : 0.0;
+  const double x = p.x() * iz, y = p.y() * iz;
+  *residual << wp * (camera.fx * x + camera.cx - o.pixel.x()), wp * (camera.fy * y + camera.cy - o.pixel.y()),
+      depth ? wd * (iz - o.inverse_depth) : 0.0;
+  if (jacobian != nullptr) {
+    Eigen::Matrix3d d;  // d residual / d p
+    d << wp * camera.fx * iz, 0, -wp * camera.fx * x * iz, 0, wp * camera.fy * iz, -wp * camera.fy * y * iz,
+        0, 0, -wd * iz * iz;
+    jacobian->leftCols<3>() = d;
+    jacobian->rightCols<3>() = -d * Skew(p);
+  }
+  return true;
+}
+
+int RefinePose(const PinholeCamera& camera, const std::vector<PointObservation>& observations,
+               Pose* T_camera_world, std::vector<char>* inlier) {
+  inlier->assign(observations.size(), 1);
+  int inliers = 0;
+  for (int round = 0; round < 4; ++round) {
+    const bool robust = round < 3;
+    double last_cost = 0;
+    for (int iteration = 0; iteration < 10; ++iteration) {
+      Matrix6d h = Matrix6d::Zero();
+      Vector6d g = Vector6d::Zero();
+      double cost = 0;
+      for (std::size_t i = 0; i < observations.size(); ++i) {
+        if (!(*inlier)[i]) continue;
+        Eigen::Vector3d r;
+        Eigen::Matrix<double, 3, 6> j;
+        if (!ReprojectionResidual(camera, *T_camera_world, observations[i], &r, &j)) continue;
+        const double n = r.norm();
+        const double k = HuberBound(observations[i]);
+        const double w = robust && n > k ? k / n : 1.0;
+        cost += robust && n > k ? k * (2 * n - k) : n * n;
+        h.noalias() += w * j.transpose() * j;
+        g.noalias() += w * j.transpose() * r;
+      }
+      const Vector6d step = (h + 1e-9 * h.trace() * Matrix6d::Identity()).ldlt().solve(-g);
+      if (!step.allFinite()) break;
+      // Left perturbation: translation and rotation act on the point in the camera frame.
+      *T_camera_world = Pose(ExpSO3(step.tail<3>()), step.head<3>()) * *T_camera_world;
+      if (step.norm() < 1e-7 || (iteration > 0 && std::abs(last_cost - cost) < 1e-5 * cost)) break;
+      last_cost = cost;
+    }
+    inliers = 0;
+    for (std::size_t i = 0; i < observations.size(); ++i) {
+      Eigen::Vector3d r;
+      (*inlier)[i] = ReprojectionResidual(camera, *T_camera_world, observations[i], &r, nullptr) &&
+                     r.squaredNorm() <= ChiSquareBound(observations[i]);
+      inliers += (*inlier)[i];
+    }
+    if (inliers < 4) break;
+  }
+  if (!T_camera_world->IsFinite()) {
+    *T_camera_world = Pose();
+    inlier->assign(observations.size(), 0);
+    return 0;
+  }
+  return inliers;
+}
+
+}  // namespace tutti

@@ -1,0 +1,196 @@
+#include "frontend/geometry/two_view.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <opencv2/calib3d.hpp>
+
+namespace tutti {
+namespace {
+
+Pose ToPose(const cv::Mat& rotation, const cv::Mat& translation) {
+  Eigen::Matrix<double, 3, 4> m;
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) m(r, c) = rotation.at<double>(r, c);
+    m(r, 3) = translation.at<double>(r);
+  }
+  Pose pose = Pose::FromMatrix(m);
+  const double n = pose.translation.norm();
+  if (n > 1e-12) pose.translation /= n;
+  return pose;
+}
+
+// Points in front of both cameras that reproject within the bound.
+struct Trial {
+  int good = 0;
+  double parallax_deg = 0;
+  std::vector<Eigen::Vector3d> points;
+  std::vector<char> valid;
+};
+
+Trial Test(const PinholeCamera& camera, const Pose& T, const std::vector<cv::Point2f>& first,
+           const std::vector<cv::Point2f>& second, const std::vector<char>& use, double sigma) {
+  Trial trial;
+  trial.points.assign(first.size(), Eigen::Vector3d::Zero());
+  trial.valid.assign(first.size(), 0);
+  std::vector<double> parallaxes;
+  const Eigen::Vector3d centre = T.Inverse().translation;
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    if (!use[i]) continue;
+    const Eigen::Vector2d a(first[i].x, first[i].y), b(second[i].x, second[i].y);
+    const Eigen::Vector3d p = Triangulate(camera.Unproject(a), camera.Unproject(b), T);
+    if (!p.allFinite() || p.z() <= 0) continue;
+    const Eigen::Vector3d q = T * p;
+    if (q.z() <= 0) continue;
+    if ((camera.Project(p) - a).squaredNorm() > 5.991 * sigma * sigma ||
+        (camera.Project(q) - b).squaredNorm() > 5.991 * sigma * sigma)
+      continue;
+    const double cosine = std::clamp(p.normalized().dot((p - centre).normalized()), -1.0, 1.0);
+    const double parallax = std::acos(cosine) * 180 / M_PI;
+    ++trial.good;
+    parallaxes.push_back(parallax);
+    if (parallax < 0.3) continue;  // too far to have a depth
+    trial.points[i] = p;
+    trial.valid[i] = 1;
+  }
+  if (!parallaxes.empty()) {
+    // The median of the better half: far points say nothing about whether near ones can be triangulated.
+    const std::size_t k = parallaxes.size() * 3 / 4;
+    std::nth_element(parallaxes.begin(), parallaxes.begin() + static_cast<std::ptrdiff_t>(k),
+                     parallaxes.end());
+    trial.parallax_deg = parallaxes[k];
+  }
+  return trial;
+}
+
+// Robust score of a model: sum of (bound - squared error) over inliers.
+double HomographyScore(const Eigen::Matrix3d& h, const std::vector<cv::Point2f>& first,
+                       const std::vector<cv::Point2f>& second, double sigma) {
+  const Eigen::Matrix3d inverse = h.inverse();
+  double score = 0;
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    const Eigen::Vector3d a(first[i].x, first[i].y, 1), b(second[i].x, second[i].y, 1);
+    for (const double e : {((h * a).hnormalized() - b.head<2>()).squaredNorm(),
+                           ((inverse * b).hnormalized() - a.head<2>()).squaredNorm()}) {
+      const double chi2 = e / (sigma * sigma);
+      if (chi2 < 5.991) score += 5.991 - chi2;
+    }
+  }
+  return score;
+}
+
+double EpipolarScore(const Eigen::Matrix3d& f, const std::vector<cv::Point2f>& first,
+                     const std::vector<cv::Point2f>& second, double sigma, std::vector<char>* inliers) {
+  inliers->assign(first.size(), 0);
+  double score = 0;
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    const Eigen::Vector3d a(first[i].x, first[i].y, 1), b(second[i].x, second[i].y, 1);
+    const Eigen::Vector3d lb = f * a, la = f.transpose() * b;
+    const double e = b.dot(lb);
+    const double eb = e * e / lb.head<2>().squaredNorm() / (sigma * sigma),
+                 ea = e * e / la.head<2>().squaredNorm() / (sigma * sigma);
+    if (ea < 3.841 && eb < 3.841) {
+      (*inliers)[i] = 1;
+      score += 2 * 5.991 - ea - eb;
+    }
+  }
+  return score;
+}
+
+}  // namespace
+
+Eigen::Vector3d Triangulate(const Eigen::Vector3d& first_ray, const Eigen::Vector3d& second_ray,
+                            const Pose& T_second_first) {
+  const Eigen::Matrix<double, 3, 4> p = T_second_first.Matrix().topRows<3>();
+  Eigen::Matrix4d a;
+  a.row(0) = Eigen::RowVector4d(-1, 0, first_ray.x(), 0);
+  a.row(1) = Eigen::RowVector4d(0, -1, first_ray.y(), 0);
+  a.row(2) = second_ray.x() * p.row(2) - p.row(0);
+  a.row(3) = second_ray.y() * p.row(2) - p.row(1);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> solver(a.transpose() * a);
+  const Eigen::Vector4d x = solver.eigenvectors().col(0);
+  return x.head<3>() / x(3);
+}
+
+TwoViewResult EstimateTwoView(const PinholeCamera& camera, const std::vector<cv::Point2f>& first,
+                              const std::vector<cv::Point2f>& second, const TwoViewOptions& options) {
+  TwoViewResult result;
+  if (static_cast<int>(first.size()) < std::max(8, options.min_points)) {
+    result.reason = "only " + std::to_string(first.size()) + " matches between the two views";
+    return result;
+  }
+  const double sigma = options.pixel_sigma;
+  const cv::Matx33d k(camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1);
+  // OpenCV's RANSAC seeds its own generator with a constant: deterministic.
+  cv::Mat mask;
+  const cv::Mat essential =
+      cv::findEssentialMat(first, second, cv::Mat(k), cv::RANSAC, 0.9999, 1.5 * sigma, mask);
+  if (essential.rows != 3) {
+    result.reason = "no essential matrix fits the matches";
+    return result;
+  }
+  const Eigen::Matrix3d k_inverse = camera.Matrix().inverse();
+  Eigen::Matrix3d e;
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) e(r, c) = essential.at<double>(r, c);
+  }
+  std::vector<char> inliers;
+  const double score_e = EpipolarScore(k_inverse.transpose() * e * k_inverse, first, second, sigma, &inliers);
+  const cv::Mat homography =
+      cv::findHomography(first, second, cv::RANSAC, 2.5 * sigma, cv::noArray(), 2000, 0.999);
+  double score_h = 0;
+  if (!homography.empty()) {
+    Eigen::Matrix3d h;
+    for (int r = 0; r < 3; ++r) {
+      for (int c = 0; c < 3; ++c) h(r, c) = homography.at<double>(r, c);
+    }
+    if (std::abs(h.determinant()) > 1e-12) score_h = HomographyScore(h, first, second, sigma);
+  }
+  std::vector<Pose> motions;
+  result.homography = score_h > 0.45 * (score_h + score_e) && !homography.empty();
+  if (result.homography) {
+    std::vector<cv::Mat> rotations, translations, normals;
+    cv::decomposeHomographyMat(homography, cv::Mat(k), rotations, translations, normals);
+    for (std::size_t i = 0; i < rotations.size(); ++i)
+      motions.push_back(ToPose(rotations[i], translations[i]));
+    inliers.assign(first.size(), 1);
+  } else {
+    cv::Mat r1, r2, t;
+    cv::decomposeEssentialMat(essential, r1, r2, t);
+    const cv::Mat minus = -t;
+    motions = {ToPose(r1, t), ToPose(r1, minus), ToPose(r2, t), ToPose(r2, minus)};
+  }
+  const int candidates = static_cast<int>(std::count(inliers.begin(), inliers.end(), 1));
+  int best = 0, second_best = 0;
+  for (const Pose& motion : motions) {
+    Trial trial = Test(camera, motion, first, second, inliers, 2.0 * sigma);
+    if (trial.good > best) {
+      second_best = best;
+      best = trial.good;
+      result.T_second_first = motion;
+      result.points = std::move(trial.points);
+      result.valid = std::move(trial.valid);
+      result.parallax_deg = trial.parallax_deg;
+    } else {
+      second_best = std::max(second_best, trial.good);
+    }
+  }
+  const int valid = static_cast<int>(std::count(result.valid.begin(), result.valid.end(), 1));
+  if (best < std::max(options.min_points, candidates / 2)) {
+    result.reason = "only " + std::to_string(best) + " of " + std::to_string(candidates) +
+                    " points lie in front of both cameras";
+  } else if (second_best > 0.75 * best) {
+    result.reason = "two motions explain the matches equally well";
+  } else if (result.parallax_deg < options.min_parallax_deg) {
+    result.reason =
+        "the camera has hardly moved sideways (parallax " + std::to_string(result.parallax_deg) + " deg)";
+  } else if (valid < options.min_points) {
+    result.reason = "only " + std::to_string(valid) + " points have a depth";
+  } else {
+    result.success = true;
+  }
+  return result;
+}
+
+}  // namespace tutti

@@ -1,0 +1,21 @@
+// Landmarks that are one: found again in keyframes that have another landmark there, or none.
+#pragma once
+
+#include <utility>
+#include <vector>
+
+#include "frontend/map/map.h"
+#include "tutti/core/camera.h"
+
+namespace tutti {
+
+/// Lets `keyframe` see the landmarks at the features of `found` (landmark, feature). Where it sees another
+/// one there, the two are merged into the one with more views.
+void FuseInto(int keyframe, const std::vector<std::pair<int, int>>& found, Map* map);
+
+/// After a loop: what the keyframes around `older` see is looked for in those around `newer`, and fused.
+/// `T_older_newer`: as the loop says, which is more precise than the map. Returns how many landmarks the two
+/// sides have in common then.
+int FuseLoop(const PinholeCamera& camera, int older, int newer, const Pose& T_older_newer, Map* map);
+
+}  // namespace tutti

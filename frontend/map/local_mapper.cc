@@ -1,0 +1,174 @@
+#include "frontend/map/local_mapper.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "frontend/features/matcher.h"
+#include "frontend/features/patch_aligner.h"
+#include "frontend/geometry/measured.h"
+#include "frontend/geometry/pose_solver.h"
+#include "frontend/geometry/two_view.h"
+#include "frontend/map/landmark_fusion.h"
+#include "frontend/odometry/stopwatch.h"
+
+namespace tutti {
+namespace {
+constexpr int kImages = 20;  // newest keyframes that keep their images
+constexpr float kFusionError =
+    2.4477F;  // of a landmark that is found again: 95 % [standard deviations of a corner]
+constexpr double kMaxCosine = 0.9996;  // 1.6 deg of parallax at least, for a depth from two views
+}  // namespace
+
+int LocalMapper::AddDepthLandmarks(int id, int at_least, Map* map) {
+  const Keyframe& k = map->keyframe(id);
+  const FrameFeatures& features = *k.features;
+  std::vector<std::pair<float, int>> order;  // depth, feature
+  for (std::size_t i = 0; i < features.size(); ++i) {
+    if (features.inverse_depth[i] > 0)
+      order.emplace_back(1.0F / features.inverse_depth[i], static_cast<int>(i));
+  }
+  std::sort(order.begin(), order.end());
+  const double far = rig_.sensor == Sensor::kStereo ? options_.max_depth_baselines * rig_.baseline_m : 1e9;
+  int count = 0, made = 0;
+  for (const auto& [depth, feature] : order) {
+    if (depth > far && count >= at_least) break;
+    // A depth that is uncertain by half its value is none.
+    const std::size_t f = static_cast<std::size_t>(feature);
+    if (features.inverse_depth_sigma[f] > 0.3F * features.inverse_depth[f]) continue;
+    ++count;
+    if (k.landmarks[f] >= 0) continue;
+    const cv::KeyPoint& p = features.keypoints[f];
+    const Eigen::Vector3d point = rig_.camera.Unproject({p.pt.x, p.pt.y}) * double(depth);
+    const int landmark = map->AddLandmark(k.T_world_camera * point, id, feature);
+    map->UpdateLandmark(landmark);
+    recent_.emplace_back(landmark, id);
+    ++made;
+  }
+  return made;
+}
+
+void LocalMapper::CullRecent(int id, Map* map) {
+  // Two views with little parallax give depths that are too large on average, and scale drifts with them:
+  // mono landmarks must prove themselves in a third keyframe.
+  const std::size_t too_few = rig_.sensor == Sensor::kMono ? 2 : 1;
+  std::vector<std::pair<int, int>> keep;
+  for (const auto& [landmark_id, born] : recent_) {
+    const Landmark& l = map->landmark(landmark_id);
+    if (!l.alive) continue;
+    if (4 * l.found < l.visible || (id - born >= 2 && l.observations.size() <= too_few)) {
+      map->RemoveLandmark(landmark_id);
+    } else if (id - born < 3) {
+      keep.emplace_back(landmark_id, born);
+    }
+  }
+  recent_ = std::move(keep);
+}
+
+int LocalMapper::Triangulate(int id, Map* map) {
+  const int neighbours = rig_.sensor == Sensor::kMono ? options_.triangulation_neighbours
+                                                      : std::min(4, options_.triangulation_neighbours);
+  int made = 0;
+  for (int other : map->BestCovisible(id, neighbours, 15)) {
+    const Pose T_world_a = map->keyframe(id).T_world_camera, T_world_b = map->keyframe(other).T_world_camera;
+    const double baseline = (T_world_a.translation - T_world_b.translation).norm();
+    const double median_depth = map->MedianDepth(other);
+    if (median_depth <= 0) continue;
+    if (rig_.sensor == Sensor::kMono ? baseline < 0.01 * median_depth : baseline < rig_.baseline_m) continue;
+    const auto pairs =
+        MatchEpipolar(*map, rig_.camera, map->keyframe(id), map->keyframe(other), median_depth);
+    const Pose T_a = T_world_a.Inverse(), T_b = T_world_b.Inverse(), T_b_a = T_b * T_world_a;
+    for (const auto& [fa, fb] : pairs) {
+      const Keyframe &a = map->keyframe(id), &b = map->keyframe(other);
+      const cv::KeyPoint &ka = a.features->keypoints[static_cast<std::size_t>(fa)],
+                         &kb = b.features->keypoints[static_cast<std::size_t>(fb)];
+      const Eigen::Vector3d ra = rig_.camera.Unproject({ka.pt.x, ka.pt.y}),
+                            rb = rig_.camera.Unproject({kb.pt.x, kb.pt.y});
+      const double cosine = ra.normalized().dot((T_b_a.rotation.conjugate() * rb).normalized());
+      if (cosine > kMaxCosine || cosine < 0) continue;
+      const Eigen::Vector3d in_a = tutti::Triangulate(ra, rb, T_b_a);
+      if (!in_a.allFinite()) continue;
+      const Eigen::Vector3d point = T_world_a * in_a;
+      bool good = true;
+      for (const auto& [pose, frame, feature] : {std::tuple{&T_a, &a, fa}, std::tuple{&T_b, &b, fb}}) {
+        const int octave = frame->features->keypoints[static_cast<std::size_t>(feature)].octave;
+        const PointObservation o =
+            Measured(*frame->features, feature, point,
+                     options_.pixel_sigma * map->scales()[static_cast<std::size_t>(octave)]);
+        Eigen::Vector3d r;
+        good = good && ReprojectionResidual(rig_.camera, *pose, o, &r, nullptr) &&
+               r.squaredNorm() <= ChiSquareBound(o);
+      }
+      if (!good) continue;
+      // The corner's scale in both images must agree with its distances.
+      const double ratio = (point - T_world_b.translation).norm() / (point - T_world_a.translation).norm();
+      const double octaves = double(map->scales()[static_cast<std::size_t>(ka.octave)]) /
+                             map->scales()[static_cast<std::size_t>(kb.octave)];
+      const double factor = 1.5 * options_.scale_factor;
+      if (ratio * factor < octaves || ratio > octaves * factor) continue;
+      const int landmark = map->AddLandmark(point, id, fa);
+      map->AddObservation(landmark, other, fb);
+      map->UpdateLandmark(landmark);
+      recent_.emplace_back(landmark, id);
+      ++made;
+    }
+  }
+  return made;
+}
+
+void LocalMapper::Fuse(int id, Map* map) {
+  const std::vector<int> neighbours = map->BestCovisible(id, 12, 15);
+  for (int other : neighbours) {
+    const auto found =
+        MatchForFusion(*map, rig_.camera, map->keyframe(other), map->LandmarksOf({id}), kFusionError);
+    FuseInto(other, found, map);
+  }
+  FuseInto(id,
+           MatchForFusion(*map, rig_.camera, map->keyframe(id), map->LandmarksOf(neighbours), kFusionError),
+           map);
+  for (int l : map->LandmarksOf({id})) map->UpdateLandmark(l);
+}
+
+// What was found by corners alone, in this keyframe or in older ones, gets its precise position.
+void LocalMapper::Align(int id, Map* map) {
+  std::vector<int> window = map->BestCovisible(id, kImages, 15);
+  window.push_back(id);
+  for (int k : window) {
+    const Keyframe& frame = map->keyframe(k);
+    if (!frame.features->pyramid) continue;
+    auto moved =
+        AlignFeatures(*map, rig_.camera, frame.T_world_camera.Inverse(), frame.landmarks, *frame.features);
+    if (moved) map->keyframe(k).features = moved;
+  }
+  if (id < kImages) return;
+  Keyframe& old = map->keyframe(id - kImages);
+  old.features = WithoutImages(*old.features);
+}
+
+void LocalMapper::Process(int id, Map* map, StageTimes* stages) {
+  {
+    const ScopedStopwatch watch(stages, Lane::kMapping, "map");
+    for (int l : map->keyframe(id).landmarks) {
+      if (l >= 0) map->UpdateLandmark(l);
+    }
+    CullRecent(id, map);
+    const auto timed = [&](const char* name, auto&& step) {
+      const ScopedSpan span(stages->recorder, Lane::kMapping, name);
+      step();
+    };
+    timed("triangulate", [&] { Triangulate(id, map); });
+    timed("fuse", [&] { Fuse(id, map); });
+    timed("align", [&] { Align(id, map); });
+  }
+  const ScopedStopwatch watch(stages, Lane::kMapping, "local_ba");
+  BundleAdjustmentOptions ba;
+  ba.keyframes = options_.ba_keyframes;
+  ba.fixed_keyframes = options_.ba_fixed_keyframes;
+  ba.iterations = options_.ba_iterations;
+  ba.pixel_sigma = options_.pixel_sigma;
+  ba.metric = rig_.sensor != Sensor::kMono;
+  ba.lens = lens_.Remaining();
+  const BundleAdjustmentReport report = AdjustLocally(rig_.camera, id, ba, map);
+  if (report.usable) lens_.Learn(report.lens, report.keyframes, map);
+}
+
+}  // namespace tutti

@@ -1,0 +1,47 @@
+// What happens when a frame becomes a keyframe: new landmarks, fusion of duplicates, culling, local bundle
+// adjustment.
+#pragma once
+
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "frontend/map/bundle_adjustment.h"
+#include "frontend/map/map.h"
+#include "frontend/map/self_calibration.h"
+#include "frontend/odometry/stopwatch.h"
+#include "tutti/frontend/frame.h"
+#include "tutti/frontend/odometry_options.h"
+
+namespace tutti {
+
+/// Value type: copies with the odometry.
+class LocalMapper {
+ public:
+  LocalMapper(const OdometryOptions& options, const CameraRig& rig)
+      : options_(options), rig_(rig), lens_(options, rig) {}
+
+  /// Landmarks from the keyframe's own depth, for features that have none yet: the near ones, and at least
+  /// `at_least`.
+  int AddDepthLandmarks(int keyframe, int at_least, Map* map);
+
+  /// What the camera's calibration turned out to have left over.
+  const SelfCalibration& lens() const { return lens_; }
+
+  /// Full treatment of the newest keyframe; its landmark matches, and those of its own depth, are already in
+  /// the map. Adds milliseconds to `stages`.
+  void Process(int keyframe, Map* map, StageTimes* stages);
+
+ private:
+  void CullRecent(int keyframe, Map* map);
+  int Triangulate(int keyframe, Map* map);
+  void Fuse(int keyframe, Map* map);
+  void Align(int keyframe, Map* map);
+
+  OdometryOptions options_;
+  CameraRig rig_;
+  SelfCalibration lens_;
+  std::vector<std::pair<int, int>> recent_;  // landmark, keyframe in which it was made
+};
+
+}  // namespace tutti

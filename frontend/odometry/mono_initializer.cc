@@ -1,0 +1,100 @@
+#include "frontend/odometry/mono_initializer.h"
+
+#include <algorithm>
+
+#include "frontend/features/matcher.h"
+#include "frontend/geometry/two_view.h"
+#include "frontend/map/bundle_adjustment.h"
+
+namespace tutti {
+namespace {
+constexpr std::size_t kMaxPending = 100;  // frames kept to be posed backwards
+constexpr int kMinMatches = 80;
+}  // namespace
+
+void MonoInitializer::Reset() {
+  reference_ = {};
+  centres_.clear();
+  pending_.clear();
+}
+
+void MonoInitializer::Restart(const TrackedFrame& frame) {
+  reference_ = frame;
+  centres_.clear();
+  for (const cv::KeyPoint& k : frame.features->keypoints) centres_.push_back(k.pt);
+}
+
+bool MonoInitializer::Offer(const TrackedFrame& frame, int piece, const Pose& T_world_camera,
+                            double median_depth, Map* map, std::string* reason) {
+  const auto wait = [&](const std::string& why) {
+    *reason = why;
+    pending_.push_back(frame);
+    pending_.back().features = WithoutImages(*frame.features);
+    if (pending_.size() > kMaxPending) pending_.erase(pending_.begin());
+    return false;
+  };
+  if (frame.features->size() < static_cast<std::size_t>(kMinMatches)) {
+    return wait("initialising: only " + std::to_string(frame.features->size()) + " features in the image");
+  }
+  if (!reference_.features) {
+    Restart(frame);
+    return wait("initialising: waiting for a second view");
+  }
+  const float radius = static_cast<float>(std::max(100, rig_.camera.width / 10));
+  const auto matches = MatchTwoViews(*reference_.features, *frame.features, radius, &centres_);
+  if (static_cast<int>(matches.size()) < kMinMatches) {
+    Restart(frame);
+    return wait("initialising: only " + std::to_string(matches.size()) +
+                " matches with the first view; started again");
+  }
+  std::vector<cv::Point2f> first, second;
+  for (const auto& [a, b] : matches) {
+    first.push_back(reference_.features->keypoints[static_cast<std::size_t>(a)].pt);
+    second.push_back(frame.features->keypoints[static_cast<std::size_t>(b)].pt);
+  }
+  TwoViewOptions options;
+  options.pixel_sigma = options_.pixel_sigma;
+  options.min_parallax_deg = options_.min_parallax_deg;
+  const TwoViewResult view = EstimateTwoView(rig_.camera, first, second, options);
+  if (!view.success) {
+    // Views that have drifted far apart only get worse.
+    if (frame.stamp_s - reference_.stamp_s > 3.0) Restart(frame);
+    return wait("initialising: " + view.reason);
+  }
+
+  std::vector<double> depths;
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    if (view.valid[i]) depths.push_back(view.points[i].z());
+  }
+  std::nth_element(depths.begin(), depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2),
+                   depths.end());
+  const double scale = median_depth / depths[depths.size() / 2];
+  Pose T_second_first = view.T_second_first;
+  T_second_first.translation *= scale;
+
+  Keyframe k0, k1;
+  k0.frame_index = reference_.index;
+  k0.stamp_s = reference_.stamp_s;
+  k0.features = reference_.features;
+  k0.T_world_camera = T_world_camera;
+  k1.frame_index = frame.index;
+  k1.stamp_s = frame.stamp_s;
+  k1.features = frame.features;
+  k1.T_world_camera = T_world_camera * T_second_first.Inverse();
+  k0.piece = k1.piece = piece;
+  const int a = map->AddKeyframe(k0), b = map->AddKeyframe(k1);
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    if (!view.valid[i]) continue;
+    const int landmark =
+        map->AddLandmark(T_world_camera * Eigen::Vector3d(view.points[i] * scale), a, matches[i].first);
+    map->AddObservation(landmark, b, matches[i].second);
+    map->UpdateLandmark(landmark);
+  }
+  BundleAdjustmentOptions ba;
+  ba.iterations = 20;
+  ba.pixel_sigma = options_.pixel_sigma;
+  AdjustWindow(rig_.camera, {b}, {a}, ba, map);
+  return true;
+}
+
+}  // namespace tutti

@@ -1,0 +1,47 @@
+// Waits for two views with enough parallax, and starts a mono map from them.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "frontend/map/map.h"
+#include "tutti/frontend/frame.h"
+#include "tutti/frontend/odometry_options.h"
+
+namespace tutti {
+
+/// A frame without pixels.
+struct TrackedFrame {
+  std::int64_t index = 0;
+  double stamp_s = 0;
+  std::shared_ptr<const FrameFeatures> features;
+};
+
+/// Value type.
+class MonoInitializer {
+ public:
+  MonoInitializer(const OdometryOptions& options, const CameraRig& rig) : options_(options), rig_(rig) {}
+
+  /// Offers the next frame. True: `map` has two new keyframes of `piece` (ids first, first + 1) with
+  /// landmarks; the first stands at T_world_camera and its median depth is `median_depth`. False: `reason`
+  /// says what is missing.
+  bool Offer(const TrackedFrame& frame, int piece, const Pose& T_world_camera, double median_depth, Map* map,
+             std::string* reason);
+
+  /// Frames since (and before) the reference that were offered without success, oldest first; at most about
+  /// 100.
+  const std::vector<TrackedFrame>& pending() const { return pending_; }
+  void Reset();
+
+ private:
+  void Restart(const TrackedFrame& frame);
+
+  OdometryOptions options_;
+  CameraRig rig_;
+  TrackedFrame reference_;
+  std::vector<cv::Point2f> centres_;
+  std::vector<TrackedFrame> pending_;
+};
+
+}  // namespace tutti

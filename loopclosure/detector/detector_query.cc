@@ -1,0 +1,138 @@
+// What a query must be: misuse is refused with a message before anything changes.
+#include <algorithm>
+#include <cmath>
+
+#include "loopclosure/detector/detector_impl.h"
+#include "loopclosure/memory/dense.h"
+#include "tutti/core/error.h"
+
+namespace tutti {
+namespace {
+
+// A mask and rectangles that belong to this image.
+void CheckRegions(const LoopQuery& query, const std::string& which) {
+  if (!query.mask.empty() &&
+      (query.mask.type() != CV_8UC1 || (!query.image.empty() && query.mask.size() != query.image.size()))) {
+    throw InputError(which +
+                     "mask must be CV_8UC1, 0 where nothing is to be seen, and as large as the image");
+  }
+  if (query.cameras.empty()) return;
+  if (query.camera) {
+    throw InputError(which + "an image of several cameras has no common camera; leave one of the two out");
+  }
+  const cv::Size whole = query.image.size();
+  for (std::size_t i = 0; i < query.cameras.size(); ++i) {
+    const cv::Rect& region = query.cameras[i];
+    const bool outside = region.x < 0 || region.y < 0 || region.width > whole.width - region.x ||
+                         region.height > whole.height - region.y;
+    if (region.empty() || (!query.image.empty() && outside)) {
+      throw InputError(which + "cameras: a rectangle is empty or not inside of the image");
+    }
+    for (std::size_t j = 0; j < i; ++j) {
+      if (!(region & query.cameras[j]).empty())
+        throw InputError(which + "cameras: two rectangles overlap; each pixel is of one camera");
+    }
+  }
+}
+
+// As many descriptors as keypoints, and those where pixels can be.
+void CheckKeypoints(const std::vector<cv::KeyPoint>& keypoints, const cv::Mat& descriptors,
+                    const std::string& which) {
+  if (static_cast<std::size_t>(descriptors.rows) != keypoints.size()) {
+    throw InputError(which + std::to_string(keypoints.size()) + " keypoints but " +
+                     std::to_string(descriptors.rows) + " descriptor rows");
+  }
+  const auto is_pixel = [](float value) { return std::abs(value) <= View::kFarthestPixel; };  // NaN: false
+  if (!std::all_of(keypoints.begin(), keypoints.end(),
+                   [&](const cv::KeyPoint& k) { return is_pixel(k.pt.x) && is_pixel(k.pt.y); })) {
+    throw InputError(which + "a keypoint is not a finite number, or more than a million pixels away");
+  }
+}
+
+// What a dense member has of an image: one row, or nothing.
+void CheckDense(const Features& features, int width, const std::string& which) {
+  if (!features.keypoints.empty()) {
+    throw InputError(which + "a dense member describes the image as a whole: give no keypoints");
+  }
+  const std::string problem = DescriptorProblem(features.descriptors, width);
+  if (!problem.empty()) throw InputError(which + problem);
+}
+
+}  // namespace
+
+void LoopDetector::Impl::CheckQuery(const LoopQuery& query) const {
+  const std::string which = "location " + std::to_string(query.id) + ": ";
+  if (query.id < 0) throw InputError(which + "ids must not be negative");
+  if (memory().size() > 0 && query.id <= last_id_) {
+    throw InputError(which + "ids must grow, but the one before was " + std::to_string(last_id_));
+  }
+  CheckContent(query);
+}
+
+void LoopDetector::Impl::CheckContent(const LoopQuery& query) const {
+  const std::string which = "location " + std::to_string(query.id) + ": ";
+  CheckCallersFeatures(query, which);
+  CheckMemberFeatures(query, which);
+  if (!query.depth_m.empty() &&
+      (query.depth_m.type() != CV_32FC1 || query.depth_m.size() != query.image.size())) {
+    throw InputError(which + "depth_m must be CV_32FC1 in metres and as large as the image");
+  }
+  CheckRegions(query, which);
+  if (query.pose_prior) {
+    const PosePrior& p = *query.pose_prior;
+    if (!p.position_m.allFinite() || !(p.sigma_m > 0) || !(p.drift >= 0) || !std::isfinite(p.sigma_m) ||
+        !std::isfinite(p.drift)) {
+      throw InputError(which + "pose_prior needs a finite position, sigma_m above 0 and drift 0 or more");
+    }
+  }
+  if (query.camera) {
+    const std::string problem = query.camera->Validate();
+    if (!problem.empty()) throw InputError(which + problem);
+  }
+}
+
+void LoopDetector::Impl::CheckCallersFeatures(const LoopQuery& query, const std::string& which) const {
+  const FeatureSet& f = query.features;
+  const std::size_t n = f.keypoints.size();
+  CheckKeypoints(f.keypoints, f.descriptors, which);
+  if (!f.points.empty() && f.points.size() != n) {
+    throw InputError(which + std::to_string(n) + " keypoints but " + std::to_string(f.points.size()) +
+                     " points; give none or one each (NaN where unknown)");
+  }
+  if (n == 0) return;
+  if (f.descriptors.type() != CV_8U && f.descriptors.type() != CV_32F) {
+    throw InputError(which + "descriptors must be CV_8U (Hamming) or CV_32F (Euclidean)");
+  }
+  if (caller_type_ >= 0 && (f.descriptors.type() != caller_type_ || f.descriptors.cols != caller_width_)) {
+    throw InputError(which +
+                     "descriptors are of another type or width than before; give every image the same kind");
+  }
+}
+
+void LoopDetector::Impl::CheckFeaturesOf(const std::string& name, const Features& features,
+                                         const std::string& which) const {
+  const auto member =
+      std::find_if(members_.begin(), members_.end(), [&](const Member& m) { return m.name() == name; });
+  if (member == members_.end()) {
+    throw InputError(which + "features of member '" + name + "', which is not in options.members");
+  }
+  if (member->dense()) {
+    CheckDense(features, member->width(), which + name + ": ");
+    return;
+  }
+  CheckKeypoints(features.keypoints, features.descriptors, which + name + ": ");
+  const std::string problem = member->vocabulary().Problem(features.descriptors);
+  if (!problem.empty()) throw InputError(which + name + ": " + problem);
+}
+
+void LoopDetector::Impl::CheckMemberFeatures(const LoopQuery& query, const std::string& which) const {
+  for (const auto& [name, features] : query.member_features) CheckFeaturesOf(name, features, which);
+  for (const Member& member : members_) {
+    if (member.external() && query.member_features.count(member.name()) == 0) {
+      throw InputError(which + "member '" + member.name() +
+                       "' is external: give its features in member_features (none at all is fine, too)");
+    }
+  }
+}
+
+}  // namespace tutti

@@ -1,0 +1,325 @@
+// dlib's matrices scale through BLAS where dlib was configured with it. Here that is one vector of 64
+// numbers: our own function takes its place, so that tutti needs neither BLAS nor libdlib at link time.
+#define cblas_dscal tutti_cblas_dscal
+#include <dlib/image_keypoint/surf.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "loopclosure/features/surf_integral.h"
+#include "tutti/loopclosure/features.h"
+
+extern "C" void tutti_cblas_dscal(const CBLAS_INT_TYPE n, const double alpha, double* x,
+                                  const CBLAS_INT_TYPE step);
+extern "C" void tutti_cblas_dscal(const CBLAS_INT_TYPE n, const double alpha, double* x,
+                                  const CBLAS_INT_TYPE step) {
+  for (CBLAS_INT_TYPE i = 0; i < n; ++i) x[i * step] *= alpha;
+}
+
+namespace tutti {
+namespace {
+
+constexpr int kDescriptorSize = 64;
+constexpr double kBorder = 32.0;  // dlib describes a point from a window of this many scales
+constexpr float kSizePerScale =
+    20.0f;  // SURF describes a patch of 20 scales: the diameter that cv::KeyPoint wants
+
+using Integral = internal::SurfIntegral;
+
+// Gaussian of dlib::compute_dominant_angle by squared distance from the centre [samples].
+const std::array<double, 36>& AngleWeights() {
+  static const std::array<double, 36> weights = [] {
+    std::array<double, 36> values{};
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      values[i] = dlib::gaussian(std::sqrt(static_cast<double>(i)), 0.0, 2.5);
+    }
+    return values;
+  }();
+  return weights;
+}
+
+// As dlib::compute_dominant_angle, sum for sum; but a sample is offered only to those of the overlapping
+// slices of the circle that it can lie in, a fifth of them.
+double DominantAngle(const Integral& image, const dlib::vector<double, 2>& centre, double scale) {
+  constexpr int kSlices = 45;
+  constexpr int kRadius = 6;
+  constexpr double kPi = CV_PI;
+  constexpr double kStep = 2 * kPi / kSlices;
+  constexpr double kWidth = kPi / 3;
+  constexpr int kReach = 9;  // slices back from the newest that can hold an angle: kWidth / kStep, rounded up
+  std::array<dlib::vector<double, 2>, kSlices> sums;
+  const long sc = static_cast<long>(scale + 0.5);
+  for (long r = -kRadius; r <= kRadius; ++r) {
+    for (long c = -kRadius; c <= kRadius; ++c) {
+      if (r * r + c * c >= kRadius * kRadius) continue;
+      const double weight = AngleWeights()[static_cast<std::size_t>(r * r + c * c)];
+      const auto [x, y] = image.Haar(sc * dlib::point(c, r) + centre, 4 * sc);
+      const dlib::vector<double, 2> sample(weight * x, weight * y);
+      const double angle = std::atan2(sample.y(), sample.x());
+      const int newest = static_cast<int>((angle + kPi) / kStep) + 1;
+      for (int s = newest - kReach; s <= newest; ++s) {
+        const int slice = (s + kSlices) % kSlices;
+        const double begin = kStep * slice - kPi;
+        const double end = begin + kWidth;
+        const bool inside = begin <= angle && angle <= end;
+        if (inside || (end > kPi && (angle >= begin || angle <= -2 * kPi + end))) {
+          sums[static_cast<std::size_t>(slice)] += sample;
+        }
+      }
+    }
+  }
+  double longest = 0.0;
+  dlib::vector<double, 2> best(1.0, 0.0);
+  for (const dlib::vector<double, 2>& sum : sums) {
+    if (sum.length_squared() <= longest) continue;
+    longest = sum.length_squared();
+    best = sum;
+  }
+  return std::atan2(best.y(), best.x());
+}
+
+// As dlib::compute_surf_descriptor, sum for sum; but its 4 x 4 cells overlap, and each of the 20 x 20 samples
+// is taken from the image and turned once.
+void SurfDescriptor(const Integral& image, const dlib::vector<double, 2>& centre, double scale, double angle,
+                    float* descriptor) {
+  constexpr int kSide = 20;
+  constexpr int kCell = 5;
+  constexpr std::array<double, 7> kWeights = {1.0 / 4, 1.0 / 5, 1.0 / 6, 1.0 / 7, 1.0 / 8, 1.0 / 9, 1.0 / 10};
+  const dlib::point_rotator rotate(angle);
+  const dlib::point_rotator rotate_back(-angle);
+  const long sc = static_cast<long>(scale + 0.5);
+  std::array<dlib::vector<double, 2>, kSide * kSide> samples;
+  for (int y = 0; y < kSide; ++y) {
+    for (int x = 0; x < kSide; ++x) {
+      const dlib::vector<double, 2> offset(scale * (x - kSide / 2), scale * (y - kSide / 2));
+      const auto [dx, dy] = image.Haar(dlib::point(rotate(offset) + centre), 2 * sc);
+      samples[static_cast<std::size_t>(y * kSide + x)] = rotate_back(dlib::vector<double, 2>(dx, dy));
+    }
+  }
+  std::array<double, kDescriptorSize> values{};
+  double* value = values.data();
+  for (int r = 0; r < kSide; r += kCell) {
+    for (int c = 0; c < kSide; c += kCell) {
+      for (int y = std::max(0, r - 1); y < std::min(kSide, r + kCell + 1); ++y) {
+        for (int x = std::max(0, c - 1); x < std::min(kSide, c + kCell + 1); ++x) {
+          const double weight = kWeights[static_cast<std::size_t>(std::abs(r + 2 - y) + std::abs(c + 2 - x))];
+          const dlib::vector<double, 2>& sample = samples[static_cast<std::size_t>(y * kSide + x)];
+          const double dx = weight * sample.x();
+          const double dy = weight * sample.y();
+          value[0] += dx;
+          value[1] += dy;
+          value[2] += std::abs(dx);
+          value[3] += std::abs(dy);
+        }
+      }
+      value += 4;
+    }
+  }
+  double squares = 0.0;
+  for (const double v : values) squares += v * v;
+  const double length = std::sqrt(squares) + 1e-7;
+  for (std::size_t i = 0; i < values.size(); ++i) descriptor[i] = static_cast<float>(values[i] / length);
+}
+
+// Determinants of the Hessian as dlib::hessian_pyramid computes them, sum for sum; but each line of sums is
+// looked up once for its row, not once for each of its boxes.
+class HessianPyramid {
+ public:
+  HessianPyramid(const Integral& image, int octaves) : octaves_(octaves) {
+    layers_.resize(static_cast<std::size_t>(octaves * kIntervals));
+    for (int o = 0; o < octaves; ++o) {
+      for (int i = 0; i < kIntervals; ++i) Fill(image, o, i);
+    }
+  }
+
+  // As dlib::get_interest_points.
+  std::vector<dlib::interest_point> Points(double threshold) const {
+    std::vector<dlib::interest_point> points;
+    for (int o = 0; o < octaves_; ++o) {
+      for (int i = 1; i < kIntervals - 1; ++i) {
+        const cv::Mat& layer = Layer(o, i);
+        const int margin = Border(i + 1) + 1;
+        for (int r = margin; r < layer.rows - margin; ++r) {
+          const double* line = layer.ptr<double>(r);
+          for (int c = margin; c < layer.cols - margin; ++c) {
+            dlib::interest_point point;
+            if (std::abs(line[c]) >= threshold && IsMaximum(o, i, r, c) && Interpolate(o, i, r, c, point)) {
+              points.push_back(point);
+            }
+          }
+        }
+      }
+    }
+    return points;
+  }
+
+ private:
+  static constexpr int kIntervals = 4;
+  static constexpr int kFirstStep = 2;
+
+  static int Border(int interval) { return (3 * (2 * (interval + 1) + 1) + 1) / 2; }
+  static int Step(int octave) { return kFirstStep << octave; }
+
+  const cv::Mat& Layer(int octave, int interval) const {
+    return layers_[static_cast<std::size_t>(octave * kIntervals + interval)];
+  }
+  double Value(int octave, int interval, int r, int c) const {
+    return std::abs(Layer(octave, interval).at<double>(r, c));
+  }
+
+  void Fill(const Integral& image, int octave, int interval) {
+    const int step = Step(octave);
+    const int border = Border(interval) * step;
+    const int lobe = (2 << octave) * (interval + 1) + 1;
+    const int half = lobe / 2;
+    const int wide = 3 * lobe / 2;
+    const double area = 1.0 / ((3.0 * lobe) * (3.0 * lobe));
+    const int rows = static_cast<int>(image.nr());
+    const int cols = static_cast<int>(image.nc());
+    cv::Mat& layer = layers_[static_cast<std::size_t>(octave * kIntervals + interval)];
+    layer.create(rows / step, cols / step, CV_64F);
+    for (int y = border; y < rows - border && y / step < layer.rows; y += step) {
+      double* out = layer.ptr<double>(y / step);
+      // Lines of sums above and below: of the box of xx, the outer and inner box of yy, the four of xy.
+      const int* xx0 = image.Row(y - lobe + 1);
+      const int* xx1 = image.Row(y + lobe);
+      const int* yy0 = image.Row(y - wide);
+      const int* yy1 = image.Row(y - half);
+      const int* yy2 = image.Row(y + half + 1);
+      const int* yy3 = image.Row(y + wide + 1);
+      const int* xy0 = image.Row(y - lobe);
+      const int* xy1 = image.Row(y);
+      const int* xy2 = image.Row(y + 1);
+      const int* xy3 = image.Row(y + lobe + 1);
+      for (int x = border; x < cols - border && x / step < layer.cols; x += step) {
+        const auto between = [x](const int* above, const int* below, int left, int right) {
+          return below[x + right] - below[x + left] - above[x + right] + above[x + left];
+        };
+        const int xx = between(xx0, xx1, -wide, wide + 1) - 3 * between(xx0, xx1, -half, half + 1);
+        const int yy = between(yy0, yy3, 1 - lobe, lobe) - 3 * between(yy1, yy2, 1 - lobe, lobe);
+        const int xy = between(xy2, xy3, -lobe, 0) + between(xy0, xy1, 1, lobe + 1) -
+                       between(xy0, xy1, -lobe, 0) - between(xy2, xy3, 1, lobe + 1);
+        const double dxx = xx * area;
+        const double dyy = yy * area;
+        const double dxy = xy * area;
+        const double determinant = std::max(0.0, dxx * dyy - 0.81 * dxy * dxy);
+        out[x / step] = dxx + dyy < 0 ? -determinant : determinant;
+      }
+    }
+  }
+
+  bool IsMaximum(int octave, int interval, int row, int col) const {
+    const double value = Value(octave, interval, row, col);
+    for (int i = interval - 1; i <= interval + 1; ++i) {
+      for (int r = row - 1; r <= row + 1; ++r) {
+        const double* line = Layer(octave, i).ptr<double>(r) + col;
+        if (std::abs(line[-1]) > value || std::abs(line[0]) > value || std::abs(line[1]) > value)
+          return false;
+      }
+    }
+    return true;
+  }
+
+  // False if the maximum of the parabola through its neighbours is nearer to one of them.
+  bool Interpolate(int o, int i, int r, int c, dlib::interest_point& point) const {
+    const auto at = [&](int di, int dr, int dc) { return Value(o, i + di, r + dr, c + dc); };
+    const double value = at(0, 0, 0);
+    const cv::Vec3d slope((at(0, 0, 1) - at(0, 0, -1)) / 2, (at(0, 1, 0) - at(0, -1, 0)) / 2,
+                          (at(1, 0, 0) - at(-1, 0, 0)) / 2);
+    const double xx = at(0, 0, 1) + at(0, 0, -1) - 2 * value;
+    const double yy = at(0, 1, 0) + at(0, -1, 0) - 2 * value;
+    const double ss = at(1, 0, 0) + at(-1, 0, 0) - 2 * value;
+    const double xy = (at(0, 1, 1) + at(0, -1, -1) - at(0, -1, 1) - at(0, 1, -1)) / 4;
+    const double xs = (at(1, 0, 1) + at(-1, 0, -1) - at(-1, 0, 1) - at(1, 0, -1)) / 4;
+    const double ys = (at(1, 1, 0) + at(-1, -1, 0) - at(-1, 1, 0) - at(1, -1, 0)) / 4;
+    const cv::Matx33d curvature(xx, xy, xs, xy, yy, ys, xs, ys, ss);
+    if (cv::determinant(curvature) == 0) return false;
+    const cv::Vec3d offset = -(curvature.inv() * slope);
+    if (!(std::abs(offset[0]) < 0.5 && std::abs(offset[1]) < 0.5 && std::abs(offset[2]) < 0.5)) return false;
+    const double lobe = static_cast<double>(2 << o) * (i + offset[2] + 1) + 1;
+    point.center = dlib::vector<double, 2>(c + offset[0], r + offset[1]) * static_cast<double>(Step(o));
+    point.scale = 1.2 / 9.0 * 3 * lobe;
+    point.score = value;
+    point.laplacian = Layer(o, i).at<double>(r, c) > 0 ? 1 : -1;
+    return true;
+  }
+
+  int octaves_;
+  std::vector<cv::Mat> layers_;
+};
+
+class DlibSurf : public cv::Feature2D {
+ public:
+  DlibSurf(int max_features, int octaves, double threshold)
+      : max_features_(max_features), octaves_(octaves), threshold_(threshold) {}
+
+  void detectAndCompute(cv::InputArray image, cv::InputArray mask, std::vector<cv::KeyPoint>& keypoints,
+                        cv::OutputArray descriptors, bool use_provided) override {
+    const cv::Mat grey = image.getMat();
+    CV_Assert(grey.type() == CV_8UC1);
+    const Integral integral(grey);
+    if (!use_provided) Detect(integral, mask.getMat(), keypoints);
+    if (descriptors.needed()) Describe(integral, keypoints, descriptors);
+  }
+
+  int descriptorSize() const override { return kDescriptorSize; }
+  int descriptorType() const override { return CV_32F; }
+  int defaultNorm() const override { return cv::NORM_L2; }
+  cv::String getDefaultName() const override { return "tutti.DlibSurf"; }
+
+ private:
+  static bool Describable(const Integral& integral, const dlib::vector<double, 2>& centre, double scale) {
+    const unsigned long border = static_cast<unsigned long>(kBorder * scale);
+    const dlib::rectangle image(0, 0, integral.nc() - 1, integral.nr() - 1);
+    return image.contains(dlib::centered_rect(dlib::point(centre), border, border));
+  }
+
+  void Detect(const Integral& integral, const cv::Mat& mask, std::vector<cv::KeyPoint>& keypoints) const {
+    std::vector<dlib::interest_point> points = HessianPyramid(integral, octaves_).Points(threshold_);
+    std::stable_sort(points.begin(), points.end(),
+                     [](const auto& a, const auto& b) { return a.score > b.score; });
+    keypoints.clear();
+    for (const dlib::interest_point& point : points) {
+      if (static_cast<int>(keypoints.size()) >= max_features_) break;
+      if (!Describable(integral, point.center, point.scale)) continue;
+      const float x = static_cast<float>(point.center.x());
+      const float y = static_cast<float>(point.center.y());
+      if (!mask.empty() && mask.at<std::uint8_t>(cvRound(y), cvRound(x)) == 0) continue;
+      keypoints.emplace_back(x, y, static_cast<float>(point.scale) * kSizePerScale, -1.0f,
+                             static_cast<float>(point.score), 0, point.laplacian > 0 ? 1 : -1);
+    }
+  }
+
+  // Describes the keypoints that lie far enough inside; drops the others, as cv::Feature2D::compute may.
+  static void Describe(const Integral& integral, std::vector<cv::KeyPoint>& keypoints,
+                       cv::OutputArray descriptors) {
+    std::vector<cv::KeyPoint> kept;
+    cv::Mat rows(static_cast<int>(keypoints.size()), kDescriptorSize, CV_32F);
+    for (cv::KeyPoint keypoint : keypoints) {
+      const dlib::vector<double, 2> centre(keypoint.pt.x, keypoint.pt.y);
+      const double scale = static_cast<double>(keypoint.size / kSizePerScale);
+      if (scale <= 0 || !Describable(integral, centre, scale)) continue;
+      const double angle = DominantAngle(integral, centre, scale);
+      SurfDescriptor(integral, centre, scale, angle, rows.ptr<float>(static_cast<int>(kept.size())));
+      keypoint.angle = static_cast<float>(angle * 180.0 / CV_PI);
+      if (keypoint.angle < 0) keypoint.angle += 360.0f;
+      kept.push_back(keypoint);
+    }
+    keypoints.swap(kept);
+    rows.rowRange(0, static_cast<int>(keypoints.size())).copyTo(descriptors);
+  }
+
+  int max_features_;
+  int octaves_;
+  double threshold_;
+};
+
+}  // namespace
+
+cv::Ptr<cv::Feature2D> CreateDlibSurf(int max_features, int octaves, double threshold) {
+  return cv::makePtr<DlibSurf>(max_features, octaves, threshold);
+}
+
+}  // namespace tutti

@@ -1,0 +1,266 @@
+#include "tutti/loopclosure/features.h"
+
+#include <algorithm>
+#include <cmath>
+#include <mutex>
+#include <numeric>
+#include <opencv2/imgproc.hpp>
+#include <tuple>
+
+#include "loopclosure/features/sift.h"
+#include "tutti/core/error.h"
+#include "tutti/core/text.h"
+
+namespace tutti {
+namespace {
+
+// A detector gives more than are kept, so that there is something to choose from when spreading.
+constexpr int kOversampling = 2;
+constexpr double kImageBlur = 0.5;  // what an image is taken to be smoothed by [px]
+constexpr int kMinSide = 16;        // smaller images hold no feature of any member [px]
+
+// ORB drops points near the border; its default of 31 px leaves small images without upper pyramid levels
+// (loop-closure.md section 6). A twentieth of the shorter side keeps them; ORB reflects the image at its
+// border.
+cv::Ptr<cv::Feature2D> CreateOrb(cv::Size size, int features, const ExtractionOptions& options) {
+  constexpr float kScale = 1.2f;
+  constexpr int kPatch = 31;
+  const int side = std::min(size.width, size.height);
+  const int edge = std::clamp(static_cast<int>(options.orb_border * side), 3, 31);
+  int levels = 1;
+  for (double s = side / kScale; levels < 8 && s > 2 * edge + kPatch; s /= kScale) ++levels;
+  return cv::ORB::create(features, kScale, levels, edge, 0, 2, cv::ORB::HARRIS_SCORE, kPatch,
+                         options.orb_fast_threshold);
+}
+
+std::vector<cv::KeyPoint> Picked(const std::vector<cv::KeyPoint>& keypoints,
+                                 const std::vector<int>& selected) {
+  std::vector<cv::KeyPoint> picked;
+  picked.reserve(selected.size());
+  for (const int i : selected) picked.push_back(keypoints[static_cast<std::size_t>(i)]);
+  return picked;
+}
+
+// Of keypoints in order of strength, those that reach the threshold, or as many as are wanted.
+void DropWeak(double threshold, int wanted, std::vector<cv::KeyPoint>& keypoints) {
+  while (static_cast<int>(keypoints.size()) > wanted &&
+         static_cast<double>(keypoints.back().response) < threshold) {
+    keypoints.pop_back();
+  }
+}
+
+void ScaleKeypoints(double factor, std::vector<cv::KeyPoint>& keypoints) {
+  if (factor == 1.0) return;
+  const float f = static_cast<float>(factor);
+  for (cv::KeyPoint& keypoint : keypoints) {
+    // Pixel centres: 0.5 of the small image's pixel is 0.5 * factor of the large one's.
+    keypoint.pt = (keypoint.pt + cv::Point2f(0.5f, 0.5f)) * f - cv::Point2f(0.5f, 0.5f);
+    keypoint.size *= f;
+  }
+}
+
+// Square roots of the shares of the sum, at SIFT's own length of 512: their Euclidean distance is the
+// Hellinger distance of the histograms.
+void TakeRoots(cv::Mat& descriptors) {
+  constexpr float kLength = 512.0f;
+  for (int r = 0; r < descriptors.rows; ++r) {
+    cv::Mat row = descriptors.row(r);
+    const double sum = cv::norm(row, cv::NORM_L1);
+    if (sum <= 0) continue;
+    cv::sqrt(row / sum, row);
+    row *= kLength;
+  }
+}
+
+struct Registry {
+  std::mutex mutex;
+  std::vector<std::pair<std::string, FeatureFactory>> types;
+};
+
+Registry& TheRegistry() {
+  static Registry registry;
+  return registry;
+}
+
+FeatureFactory Registered(const std::string& name) {
+  Registry& registry = TheRegistry();
+  const std::lock_guard<std::mutex> lock(registry.mutex);
+  for (const auto& [known, factory] : registry.types) {
+    if (known == name) return factory;
+  }
+  throw InputError("unknown member '" + name + "'");
+}
+
+}  // namespace
+
+void RegisterFeatureType(const std::string& name, FeatureFactory factory) {
+  const std::vector<std::string> known = KnownMembers();
+  if (name.empty() || !factory || std::find(known.begin(), known.end(), name) != known.end()) {
+    throw InputError("feature type '" + name +
+                     "' can't be registered: the name is empty or taken, or there is no factory");
+  }
+  Registry& registry = TheRegistry();
+  const std::lock_guard<std::mutex> lock(registry.mutex);
+  registry.types.emplace_back(name, std::move(factory));
+}
+
+std::vector<std::string> RegisteredFeatureTypes() {
+  Registry& registry = TheRegistry();
+  const std::lock_guard<std::mutex> lock(registry.mutex);
+  std::vector<std::string> names;
+  for (const auto& type : registry.types) names.push_back(type.first);
+  return names;
+}
+
+cv::Mat ToGrey8(const cv::Mat& image) {
+  if (image.empty() || image.dims != 2) return {};
+  cv::Mat grey = image;
+  if (image.channels() == 3) {
+    cv::cvtColor(image.depth() == CV_64F ? cv::Mat_<cv::Vec3f>(image) : image, grey, cv::COLOR_BGR2GRAY);
+  } else if (image.channels() == 4) {
+    cv::cvtColor(image.depth() == CV_64F ? cv::Mat_<cv::Vec4f>(image) : image, grey, cv::COLOR_BGRA2GRAY);
+  } else if (image.channels() != 1) {
+    cv::extractChannel(image, grey, 0);
+  }
+  if (grey.depth() == CV_8U) return grey;
+  cv::Mat values;
+  grey.convertTo(values, CV_32F);
+  cv::patchNaNs(values, 0.0);
+  double low = 0.0;
+  double high = 0.0;
+  cv::minMaxLoc(values, &low, &high);
+  if (!std::isfinite(low) || !std::isfinite(high) || high <= low) return cv::Mat::zeros(grey.size(), CV_8U);
+  cv::Mat result;
+  values.convertTo(result, CV_8U, 255.0 / (high - low), -low * 255.0 / (high - low));
+  return result;
+}
+
+bool IsMasked(const cv::Mat& mask, const cv::Point2f& pixel) {
+  if (mask.empty()) return false;
+  const int x = std::clamp(static_cast<int>(std::lround(pixel.x)), 0, mask.cols - 1);
+  const int y = std::clamp(static_cast<int>(std::lround(pixel.y)), 0, mask.rows - 1);
+  return mask.at<std::uint8_t>(y, x) == 0;
+}
+
+void DropMasked(const cv::Mat& mask, Features& features) {
+  Features kept;
+  for (std::size_t i = 0; i < features.keypoints.size(); ++i) {
+    if (IsMasked(mask, features.keypoints[i].pt)) continue;
+    kept.keypoints.push_back(features.keypoints[i]);
+    kept.descriptors.push_back(features.descriptors.row(static_cast<int>(i)));
+  }
+  if (kept.keypoints.size() < features.keypoints.size()) features = std::move(kept);
+}
+
+std::vector<int> SelectSpread(const std::vector<cv::KeyPoint>& keypoints, cv::Size image_size, int count,
+                              int columns) {
+  std::vector<int> order(keypoints.size());
+  std::iota(order.begin(), order.end(), 0);
+  const auto key = [&](int i) {
+    const cv::KeyPoint& k = keypoints[static_cast<std::size_t>(i)];
+    return std::make_tuple(-k.response, k.pt.y, k.pt.x, k.size, k.angle, i);
+  };
+  std::sort(order.begin(), order.end(), [&](int a, int b) { return key(a) < key(b); });
+  if (static_cast<int>(order.size()) <= count) return order;
+
+  const double cell =
+      std::max(1.0, static_cast<double>(std::max(image_size.width, image_size.height)) / columns);
+  const int cells_x = std::max(1, static_cast<int>(std::ceil(image_size.width / cell)));
+  const int cells_y = std::max(1, static_cast<int>(std::ceil(image_size.height / cell)));
+  const int share = std::max(1, count / (cells_x * cells_y));
+  std::vector<int> taken(static_cast<std::size_t>(cells_x * cells_y), 0);
+  std::vector<bool> chosen(order.size(), false);
+  int num_chosen = 0;
+  for (std::size_t i = 0; i < order.size() && num_chosen < count; ++i) {
+    const cv::Point2f& p = keypoints[static_cast<std::size_t>(order[i])].pt;
+    const int x = std::clamp(static_cast<int>(p.x / cell), 0, cells_x - 1);
+    const int y = std::clamp(static_cast<int>(p.y / cell), 0, cells_y - 1);
+    int& used = taken[static_cast<std::size_t>(y * cells_x + x)];
+    if (used >= share) continue;
+    ++used;
+    chosen[i] = true;
+    ++num_chosen;
+  }
+  for (std::size_t i = 0; i < order.size() && num_chosen < count; ++i) {
+    if (chosen[i]) continue;
+    chosen[i] = true;
+    ++num_chosen;
+  }
+  std::vector<int> selected;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    if (chosen[i]) selected.push_back(order[i]);
+  }
+  return selected;
+}
+
+FeatureExtractor::FeatureExtractor(const std::string& name, const ExtractionOptions& options)
+    : name_(name), options_(options), scratches_(std::make_shared<internal::SiftScratchPool>()) {
+  const std::vector<std::string> known = KnownFeatureTypes();
+  if (std::find(known.begin(), known.end(), name) == known.end()) {
+    throw InputError("unknown member '" + name + "'; did you mean '" + NearestWord(name, known) + "'?");
+  }
+}
+
+cv::Ptr<cv::Feature2D> FeatureExtractor::Create(cv::Size size) const {
+  const int wanted = options_.features * kOversampling;
+  if (name_ == "surf") {
+    return CreateDlibSurf(wanted, options_.surf_octaves,
+                          std::min(options_.surf_threshold, options_.surf_min_threshold));
+  }
+  if (name_ == "orb") return CreateOrb(size, wanted, options_);
+  if (name_ == "gftt") return CreateGfttBrief(wanted);
+  if (name_ == "akaze") return cv::AKAZE::create();
+  if (name_ == "brisk") return cv::BRISK::create();
+  if (name_ == "kaze") return cv::KAZE::create();
+  return Registered(name_)(size, wanted);
+}
+
+double FeatureExtractor::Shrinking(double pixels) const {
+  double factor = std::max(1.0, std::sqrt(pixels / options_.max_pixels));
+  if (name_ == "sift") factor = std::max(factor, std::sqrt(pixels / options_.sift_max_pixels));
+  const bool small = factor == 1.0 && pixels < options_.min_pixels;
+  return small && (name_ == "surf" || name_ == "sift") ? 0.5 : factor;
+}
+
+Features FeatureExtractor::Extract(const cv::Mat& grey) const {
+  Features features;
+  if (grey.empty() || grey.type() != CV_8UC1 || std::min(grey.rows, grey.cols) < kMinSide) return features;
+  const double factor = Shrinking(static_cast<double>(grey.total()));
+  cv::Mat image = grey;
+  if (factor != 1.0) {
+    const cv::Size size(cvRound(grey.cols / factor), cvRound(grey.rows / factor));
+    if (std::min(size.width, size.height) < kMinSide) return features;
+    cv::resize(grey, image, size, 0, 0, factor > 1.0 ? cv::INTER_AREA : cv::INTER_LINEAR);
+  }
+  if (name_ == "sift") {
+    std::unique_ptr<internal::SiftScratch> scratch = scratches_->Take();
+    features = internal::ExtractSift(image, kImageBlur * std::max(1.0, 1.0 / factor), options_, *scratch);
+    scratches_->Give(std::move(scratch));
+  } else if (name_ == "surf") {
+    const cv::Ptr<cv::Feature2D> member = Create(image.size());
+    // Describing costs more than detecting, and what was detected stays valid: describe what is kept.
+    std::vector<cv::KeyPoint> detected;
+    member->detect(image, detected);
+    DropWeak(options_.surf_threshold, options_.features, detected);
+    features.keypoints =
+        Picked(detected, SelectSpread(detected, image.size(), options_.features, options_.grid_columns));
+    member->compute(image, features.keypoints, features.descriptors);
+  } else {
+    std::vector<cv::KeyPoint> keypoints;
+    cv::Mat descriptors;
+    Create(image.size())->detectAndCompute(image, cv::noArray(), keypoints, descriptors);
+    if (keypoints.empty() || descriptors.rows != static_cast<int>(keypoints.size())) return features;
+    const std::vector<int> selected =
+        SelectSpread(keypoints, image.size(), options_.features, options_.grid_columns);
+    features.keypoints = Picked(keypoints, selected);
+    features.descriptors.create(static_cast<int>(selected.size()), descriptors.cols, descriptors.type());
+    for (std::size_t i = 0; i < selected.size(); ++i) {
+      descriptors.row(selected[i]).copyTo(features.descriptors.row(static_cast<int>(i)));
+    }
+  }
+  if (name_ == "sift" && options_.root_sift) TakeRoots(features.descriptors);
+  ScaleKeypoints(factor, features.keypoints);
+  return features;
+}
+
+}  // namespace tutti

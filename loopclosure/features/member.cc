@@ -1,0 +1,72 @@
+#include "loopclosure/features/member.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "loopclosure/features/dnn_descriptor.h"
+#include "loopclosure/memory/dense.h"
+#include "loopclosure/store/byte_stream.h"
+
+namespace tutti {
+
+Member::Member(const std::string& name, const LoopDetectorOptions& options, std::uint64_t seed)
+    : name_(name), bad_signature_ratio_(options.bad_signature_ratio), vocabulary_(options.vocabulary, seed) {
+  const auto holds = [&name](const std::vector<std::string>& names) {
+    return std::find(names.begin(), names.end(), name) != names.end();
+  };
+  external_ = holds(options.external_members);
+  dense_ = external_ ? holds(options.dense_members) : holds(KnownDenseMembers());
+  if (!external_ && !dense_) extractor_.emplace(name, options.extraction);
+  if (!external_ && name == "dnn") {
+    network_ = std::make_shared<const DnnDescriptor>(options.dnn);
+    width_ = network_->width();
+  }
+}
+
+Features Member::Extract(const cv::Mat& image, const cv::Mat& grey, const cv::Mat& mask) const {
+  if (external_) return {};
+  if (extractor_) return extractor_->Extract(grey);
+  if (network_) return {{}, network_->Describe(image, grey, mask)};
+  return {{}, DescribeByGradients(grey, mask)};
+}
+
+std::string Member::Fingerprint() const {
+  if (network_) return network_->Fingerprint();
+  return external_ && dense_ ? "dense" : "";
+}
+
+bool Member::Judge(const Features& features) {
+  if (dense_) {
+    if (features.descriptors.empty()) return false;
+    width_ = features.descriptors.cols;
+    return !NormalisedDescriptor(features.descriptors).empty();
+  }
+  const double count = static_cast<double>(features.keypoints.size());
+  feature_sum_ += count;
+  ++images_;
+  const double mean = feature_sum_ / images_;
+  return count >= 2 && count >= bad_signature_ratio_ * mean;
+}
+
+void Member::SaveStatistics(internal::ByteWriter& out) const {
+  out.Put(feature_sum_);
+  out.Put<std::int32_t>(images_);
+  if (dense_) out.Put<std::int32_t>(width_);
+  out.Put<std::int32_t>(vocabulary_.created());
+}
+
+void Member::LoadStatistics(internal::ByteReader& in) {
+  feature_sum_ = in.Get<double>();
+  images_ = in.Get<std::int32_t>();
+  if (dense_) width_ = in.Get<std::int32_t>();
+  if (network_ && width_ != network_->width()) in.Damaged("descriptors of another length than the network's");
+  const int created = in.Get<std::int32_t>();
+  constexpr int kMostImages = 1 << 30;
+  if (width_ < 0 || !(feature_sum_ >= 0) || !std::isfinite(feature_sum_) || images_ < 0 ||
+      images_ > kMostImages || created < 0 || created > Vocabulary::kMostWords) {
+    in.Damaged("a member's statistics");
+  }
+  vocabulary_.SkipIds(created);
+}
+
+}  // namespace tutti

@@ -1,0 +1,46 @@
+#include "loopclosure/filter/bayes_filter.h"
+
+#include "loopclosure/store/byte_stream.h"
+
+namespace tutti {
+
+void BayesFilter::Step(const TransitionModel& transition, const std::vector<int>& working_memory,
+                       const Belief& likelihood) {
+  posterior_.places.resize(likelihood.places.size(), 0.0);
+  if (!started_) {
+    const double uniform = 1.0 / (static_cast<double>(working_memory.size()) + 1.0);
+    posterior_.new_place = uniform;
+    for (const int slot : working_memory) posterior_.places[static_cast<std::size_t>(slot)] = uniform;
+    started_ = true;
+  }
+  posterior_ = transition.Predict(posterior_, working_memory);
+  posterior_.new_place *= likelihood.new_place;
+  for (const int slot : working_memory) {
+    const std::size_t i = static_cast<std::size_t>(slot);
+    posterior_.places[i] *= likelihood.places[i];
+  }
+  posterior_.Normalise();
+}
+
+void BayesFilter::Forget(int slot) {
+  const std::size_t i = static_cast<std::size_t>(slot);
+  if (i < posterior_.places.size()) posterior_.places[i] = 0.0;
+}
+
+void BayesFilter::Save(internal::ByteWriter& out) const {
+  out.Put<char>(started_ ? 1 : 0);
+  out.Put(posterior_.new_place);
+  out.PutVector(posterior_.places);
+}
+
+void BayesFilter::Load(internal::ByteReader& in) {
+  started_ = in.Get<char>() != 0;
+  posterior_.new_place = in.Get<double>();
+  posterior_.places = in.GetVector<double>();
+  const auto is_probability = [](double p) { return p >= 0.0 && p <= 1.0 + 1e-9; };
+  bool good = is_probability(posterior_.new_place);
+  for (const double p : posterior_.places) good = good && is_probability(p);
+  if (!good) in.Damaged("a posterior that is no probability");
+}
+
+}  // namespace tutti

@@ -1,0 +1,43 @@
+// The recursive Bayes filter of one member.
+#pragma once
+
+#include <vector>
+
+#include "loopclosure/filter/belief.h"
+#include "loopclosure/filter/transition_model.h"
+
+namespace tutti {
+
+namespace internal {
+class ByteReader;
+class ByteWriter;
+}  // namespace internal
+
+/// p(S_t | L^t) = eta p(L_t | S_t) sum_i p(S_t | S_{t-1} = i) p(S_{t-1} = i | L^{t-1})    (loop-closure.md
+/// eq. 1)
+///
+/// The first step starts from a uniform belief; a location that is new in working memory enters with 0. An
+/// image with a bad signature does not call Step at all.
+class BayesFilter {
+ public:
+  /// One step: prediction over `working_memory`, times `likelihood`, normalised.
+  void Step(const TransitionModel& transition, const std::vector<int>& working_memory,
+            const Belief& likelihood);
+
+  /// A location has left working memory: should it come back, it starts with 0.
+  void Forget(int slot);
+
+  /// p(S_t | L^t) after the last step; all mass on "new place" before the first.
+  const Belief& posterior() const { return posterior_; }
+
+  /// Appends the whole state.
+  void Save(internal::ByteWriter& out) const;
+  /// Takes up what Save wrote, into a new object. Throws InputError if it is damaged.
+  void Load(internal::ByteReader& in);
+
+ private:
+  Belief posterior_;
+  bool started_ = false;
+};
+
+}  // namespace tutti

@@ -1,0 +1,82 @@
+#include "loopclosure/filter/evidence.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace tutti::internal {
+namespace {
+
+struct ModelTraits {
+  int sample;
+  double models;  // per sample, at most
+  bool line;      // a match is held to a line, not to a point
+};
+
+ModelTraits TraitsOf(FitModel model) {
+  switch (model) {
+    case FitModel::kFundamental:
+      return {7, 3, true};
+    case FitModel::kEssential:
+      return {5, 10, true};
+    case FitModel::kPnp:
+      break;
+  }
+  return {3, 4, false};
+}
+
+// log10 of the number of ways to choose k of n.
+double LogChoose(int n, int k) {
+  double sum = 0;
+  for (int i = 1; i <= std::min(k, n - k); ++i) sum += std::log10(static_cast<double>(n - i + 1) / i);
+  return sum;
+}
+
+}  // namespace
+
+ChanceFit FitByChance(FitModel model, int matches, int inliers, double threshold_px, const cv::Size& image) {
+  const ModelTraits traits = TraitsOf(model);
+  ChanceFit chance;
+  if (matches < 1 || image.empty()) return chance;
+  const double area = static_cast<double>(image.width) * image.height;
+  const double diagonal = std::hypot(image.width, image.height);
+  const double alpha = std::min(
+      1.0, traits.line ? 2 * threshold_px * diagonal / area : M_PI * threshold_px * threshold_px / area);
+  const int free = std::max(0, matches - traits.sample);
+  chance.expected = std::min(matches, traits.sample) + alpha * free;
+  if (inliers <= traits.sample || free == 0) return chance;
+  chance.log_nfa = std::log10(traits.models * free) + LogChoose(matches, inliers) +
+                   LogChoose(inliers, traits.sample) + (inliers - traits.sample) * std::log10(alpha);
+  return chance;
+}
+
+int GridCell(const cv::Point2f& pixel, const cv::Size& image) {
+  const auto along = [](float x, int size, int cells) {
+    return std::clamp(static_cast<int>(std::floor(x * static_cast<float>(cells) / static_cast<float>(size))),
+                      0, cells - 1);
+  };
+  return along(pixel.y, image.height, kGridRows) * kGridColumns + along(pixel.x, image.width, kGridColumns);
+}
+
+int OccupiedCells(const std::vector<cv::Point2f>& pixels, const cv::Size& image) {
+  if (image.empty()) return 0;
+  std::array<bool, kGridColumns * kGridRows> occupied{};
+  for (const cv::Point2f& p : pixels) occupied[static_cast<std::size_t>(GridCell(p, image))] = true;
+  return static_cast<int>(std::count(occupied.begin(), occupied.end(), true));
+}
+
+double MotionSpread(const std::vector<cv::Point2f>& first, const std::vector<cv::Point2f>& second,
+                    const cv::Size& image) {
+  if (first.empty() || first.size() != second.size() || image.empty()) return 0;
+  const double n = static_cast<double>(first.size());
+  double x = 0, y = 0, squares = 0;
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    const cv::Point2d moved = cv::Point2d(second[i]) - cv::Point2d(first[i]);
+    x += moved.x / n;
+    y += moved.y / n;
+    squares += moved.dot(moved) / n;
+  }
+  return std::sqrt(std::max(0.0, squares - x * x - y * y)) / std::hypot(image.width, image.height);
+}
+
+}  // namespace tutti::internal

@@ -1,0 +1,60 @@
+// From a belief to a verified loop: which places to verify, in which order.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "loopclosure/filter/belief.h"
+#include "loopclosure/geometry/verification.h"
+#include "loopclosure/memory/location_memory.h"
+#include "tutti/loopclosure/detector.h"
+
+namespace tutti::internal {
+
+/// Step 6 of loop-closure.md section 1: the top few hypotheses and their neighbours, not only the best.
+class HypothesisSearch {
+ public:
+  /// Verifies a pair of views, query and candidate, on so many threads.
+  using VerifyPair = std::function<Verification(const View&, const View&, int)>;
+
+  HypothesisSearch(const LoopDetectorOptions& options, const LocationMemory& memory, VerifyPair verify,
+                   std::function<const View&(int)> view_of)
+      : options_(options), memory_(memory), verify_(std::move(verify)), view_of_(std::move(view_of)) {}
+
+  /// Fills verification, tried, accepted and reason of `result`.
+  void Verify(const View& query, const Belief& belief, LoopResult& result) const;
+
+ private:
+  // A way along the odometry links.
+  struct PathWalk {
+    int last, next;  // slots
+    int in_vain;     // steps since the last one that was better
+  };
+
+  std::vector<int> TopPlaces(const Belief& belief) const;
+  void RankByIsland(const Belief& belief, std::vector<int>& places) const;
+  std::vector<int> ViewsOf(int place, const Belief& belief) const;
+  const Verification* Tried(int slot, const LoopResult& result) const;
+  Verification Look(const View& query, int candidate, int threads) const;
+  const Verification& Try(const View& query, int candidate, LoopResult& result) const;
+  void TryAll(const View& query, const std::vector<int>& candidates, LoopResult& result) const;
+  static void Take(Verification verification, LoopResult& result);
+  void Climb(const View& query, LoopResult& result) const;
+  std::vector<int> OnThePath(int slot) const;
+  void TakeNearest(const View& query, LoopResult& result) const;
+  int Nearest(const View& query, PathWalk walk, LoopResult& result) const;
+  void Advance(PathWalk& walk) const;
+
+  const LoopDetectorOptions& options_;
+  const LocationMemory& memory_;
+  VerifyPair verify_;
+  std::function<const View&(int)> view_of_;
+};
+
+/// 0 for a place that the belief does not reach.
+inline double PosteriorAt(const Belief& belief, int slot) {
+  const std::size_t i = static_cast<std::size_t>(slot);
+  return i < belief.places.size() ? belief.places[i] : 0.0;
+}
+
+}  // namespace tutti::internal

@@ -1,0 +1,88 @@
+// Which place an image shows, by the words of the members: memories, filters, and the rule that makes one
+// belief of them.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "loopclosure/features/member.h"
+#include "loopclosure/filter/combination.h"
+#include "loopclosure/filter/hypothesis_search.h"
+#include "loopclosure/filter/pose_track.h"
+#include "loopclosure/memory/memory_system.h"
+#include "tutti/loopclosure/detector.h"
+
+namespace tutti::internal {
+
+/// Steps 3 to 5 of loop-closure.md section 1, and the links that later steps make. Knows nothing of images.
+class PlaceReasoner {
+ public:
+  /// `options` and `members` must outlive this object and stay where they are.
+  PlaceReasoner(const LoopDetectorOptions& options, std::vector<Member>& members);
+
+  /// Steps 3 and 4: the words of each member enter memory as a new location. Returns the slot that now stands
+  /// for the image: the newest, or an older one that it was merged into. `prior`: where it was taken.
+  int Remember(std::int64_t id, const std::vector<SeenWords>& words,
+               const std::optional<PosePrior>& prior = {});
+  /// Step 5, and the times of its parts into `result`. `disturb`, if given, may change what each filter unit
+  /// has counted: for tests of what a broken member does.
+  CombinedBelief Step(LoopResult& result, const std::function<void(std::size_t, FilterUnit&)>& disturb = {});
+  /// What is believed of an image with these words that is no location, without the images before it.
+  CombinedBelief Locate(const std::vector<SeenWords>& words) const;
+
+  /// Fills hypothesis, candidate and posterior of `result`, and what each member believes; features and words
+  /// of the members are left to the caller.
+  void Explain(const CombinedBelief& combined, LoopResult& result) const;
+  /// True if the belief is strong enough for geometry to look at it; else `result` says why not.
+  bool Proposes(const CombinedBelief& combined, LoopResult& result);
+  /// Step 6: geometry looks at the most probable places; fills verification, tried, accepted, probability and
+  /// reason of `result`. Without verification the candidate is taken by its posterior alone.
+  void Verify(const View& query, const Belief& belief, const HypothesisSearch::VerifyPair& verify,
+              const std::function<const View&(int)>& view_of, LoopResult& result) const;
+  /// Links the places of a loop that is nearly certain.
+  void Finish(const LoopResult& result);
+
+  /// The newer location closes a loop with the older one: their places are one, for the filter.
+  void CloseLoop(std::int64_t newer, std::int64_t older);
+  /// They do not.
+  void Unlink(std::int64_t a, std::int64_t b);
+  void AddLink(std::int64_t a, std::int64_t b);
+
+  /// All locations: those of the shared memory, or what is in any member's.
+  const LocationMemory& memory() const { return Shared() ? systems_.front()->memory() : union_; }
+  bool Shared() const { return systems_.size() == 1; }
+  std::vector<std::unique_ptr<MemorySystem>>& systems() { return systems_; }
+  const std::vector<std::unique_ptr<MemorySystem>>& systems() const { return systems_; }
+  LocationMemory& union_of_all() { return union_; }
+  const LocationMemory& union_of_all() const { return union_; }
+  /// True if some memory has the slot in STM or WM.
+  bool InMemory(int slot) const;
+  /// What must be the same for stored locations to be of use.
+  std::string Fingerprint() const;
+
+  /// Running figures: the state but memories and filters.
+  void SaveStatistics(ByteWriter& out) const;
+  void LoadStatistics(std::int64_t last_id, ByteReader& in);
+
+ private:
+  static std::size_t Index(int i) { return static_cast<std::size_t>(i); }
+  void ForEachUnit(const std::function<void(MemorySystem&, std::size_t)>& call);
+  CandidateEvidence EvidenceAt(int slot, const std::vector<double>& scores, const PlaceFilter& filter) const;
+  void FillOpinion(std::size_t member, const CombinedBelief& combined, MemberOpinion& opinion) const;
+  void FollowCandidate(int best);
+  double MassAround(const Belief& belief, int slot) const;
+
+  const LoopDetectorOptions& options_;
+  std::vector<Member>& members_;
+  std::vector<std::unique_ptr<MemorySystem>> systems_;  // one, or one per filter
+  LocationMemory union_;                                // per-member memories: what is in any of them
+  PoseTrack track_;
+  double last_hypothesis_ = 0.0;
+  std::int64_t last_candidate_ = -1;
+  int candidates_in_a_row_ = 0;
+};
+
+}  // namespace tutti::internal

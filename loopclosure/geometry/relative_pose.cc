@@ -1,0 +1,393 @@
+#include "tutti/loopclosure/relative_pose.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/SVD>
+#include <cmath>
+#include <limits>
+#include <opencv2/calib3d.hpp>
+
+#include "loopclosure/geometry/ransac.h"
+
+namespace tutti {
+namespace {
+
+constexpr double kMinDepth = 1e-6;  // in front of the camera
+using Matrix2x3 = Eigen::Matrix<double, 2, 3>;
+
+// A camera without distortion, and pixels as it would see them: RANSAC and refinement then need no lens
+// model.
+Eigen::Vector2d UndistortedPixel(const PinholeCamera& camera, const Eigen::Vector2d& pixel) {
+  const Eigen::Vector3d ray = camera.Unproject(pixel);
+  return {camera.fx * ray.x() + camera.cx, camera.fy * ray.y() + camera.cy};
+}
+
+Eigen::Vector2d Residual(const PinholeCamera& camera, const Eigen::Vector3d& point,
+                         const Eigen::Vector2d& pixel) {
+  return {camera.fx * point.x() / point.z() + camera.cx - pixel.x(),
+          camera.fy * point.y() / point.z() + camera.cy - pixel.y()};
+}
+
+Matrix2x3 ProjectionJacobian(const PinholeCamera& camera, const Eigen::Vector3d& p) {
+  const double iz = 1.0 / p.z();
+  Matrix2x3 j;
+  j << camera.fx * iz, 0, -camera.fx * p.x() * iz * iz, 0, camera.fy * iz, -camera.fy * p.y() * iz * iz;
+  return j;
+}
+
+double SquaredError(const PinholeCamera& camera, const Eigen::Vector3d& point, const Eigen::Vector2d& pixel) {
+  if (!(point.z() > kMinDepth)) return std::numeric_limits<double>::infinity();
+  return Residual(camera, point, pixel).squaredNorm();
+}
+
+// Huber weight of a residual of `norm` pixels.
+double HuberWeight(double norm, double threshold) { return norm <= threshold ? 1.0 : threshold / norm; }
+
+std::string TooFew(const char* what, std::size_t have, int need) {
+  return "only " + std::to_string(have) + " " + what + ", " + std::to_string(need) + " are needed";
+}
+
+// ---------------------------------------------------------------- PnP
+
+struct PnpProblem {
+  std::vector<Eigen::Vector3d> points;
+  std::vector<Eigen::Vector2d> pixels;  // undistorted
+  std::vector<double> sigma_m;          // empty or one each
+  PinholeCamera camera;
+};
+
+std::vector<Pose> FitP3p(const PnpProblem& problem, const std::vector<int>& sample) {
+  std::vector<cv::Point3d> object;
+  std::vector<cv::Point2d> image;
+  for (const int i : sample) {
+    const Eigen::Vector3d& p = problem.points[static_cast<std::size_t>(i)];
+    const Eigen::Vector2d& u = problem.pixels[static_cast<std::size_t>(i)];
+    object.emplace_back(p.x(), p.y(), p.z());
+    image.emplace_back((u.x() - problem.camera.cx) / problem.camera.fx,
+                       (u.y() - problem.camera.cy) / problem.camera.fy);
+  }
+  std::vector<cv::Mat> rotations;
+  std::vector<cv::Mat> translations;
+  cv::solveP3P(object, image, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), rotations, translations,
+               cv::SOLVEPNP_AP3P);
+  std::vector<Pose> poses;
+  for (std::size_t k = 0; k < rotations.size(); ++k) {
+    const Eigen::Vector3d w(rotations[k].at<double>(0), rotations[k].at<double>(1),
+                            rotations[k].at<double>(2));
+    const Eigen::Vector3d t(translations[k].at<double>(0), translations[k].at<double>(1),
+                            translations[k].at<double>(2));
+    const Pose pose(ExpSO3(w), t);
+    if (pose.IsFinite()) poses.push_back(pose);
+  }
+  return poses;
+}
+
+// Jacobian of the residual under T_points_camera * Exp(tangent), so that the camera's point becomes
+// Exp(-tangent) * p: dp = [-I, [p]x] (translation, rotation).
+Eigen::Matrix<double, 2, 6> PnpJacobian(const PinholeCamera& camera, const Eigen::Vector3d& p) {
+  Eigen::Matrix<double, 3, 6> dp;
+  dp << -Eigen::Matrix3d::Identity(), Skew(p);
+  return ProjectionJacobian(camera, p) * dp;
+}
+
+// One Gauss-Newton step over the inliers; false if it can't be solved.
+bool PnpStep(const PnpProblem& problem, const std::vector<int>& inliers, double huber_px,
+             Pose& T_camera_points) {
+  Matrix6d hessian = Matrix6d::Zero();
+  Vector6d gradient = Vector6d::Zero();
+  for (const int i : inliers) {
+    const Eigen::Vector3d p = T_camera_points * problem.points[static_cast<std::size_t>(i)];
+    if (!(p.z() > kMinDepth)) continue;
+    const Eigen::Vector2d r = Residual(problem.camera, p, problem.pixels[static_cast<std::size_t>(i)]);
+    const Eigen::Matrix<double, 2, 6> j = PnpJacobian(problem.camera, p);
+    const double w = HuberWeight(r.norm(), huber_px);
+    hessian += w * j.transpose() * j;
+    gradient += w * j.transpose() * r;
+  }
+  const Vector6d step = hessian.ldlt().solve(-gradient);
+  if (!step.allFinite()) return false;
+  T_camera_points = ExpSE3(-step) * T_camera_points;
+  return T_camera_points.IsFinite();
+}
+
+std::vector<int> PnpInliers(const PnpProblem& problem, const Pose& T_camera_points, double threshold_px) {
+  std::vector<int> inliers;
+  for (std::size_t i = 0; i < problem.points.size(); ++i) {
+    if (SquaredError(problem.camera, T_camera_points * problem.points[i], problem.pixels[i]) <
+        threshold_px * threshold_px) {
+      inliers.push_back(static_cast<int>(i));
+    }
+  }
+  return inliers;
+}
+
+void FinishPnp(const PnpProblem& problem, const RelativePoseOptions& options, PnpResult& result) {
+  double squares = 0.0;
+  for (const int i : result.inliers) {
+    const std::size_t k = static_cast<std::size_t>(i);
+    const Eigen::Vector3d p = result.T_camera_points * problem.points[k];
+    squares += Residual(problem.camera, p, problem.pixels[k]).squaredNorm();
+    double variance = options.pixel_sigma * options.pixel_sigma;
+    if (!problem.sigma_m.empty()) {
+      const double pixels = problem.camera.fx * problem.sigma_m[k] / p.z();
+      variance += pixels * pixels;
+    }
+    const Eigen::Matrix<double, 2, 6> j = PnpJacobian(problem.camera, p);
+    result.information += j.transpose() * j / variance;
+  }
+  result.rmse_px = std::sqrt(squares / static_cast<double>(std::max<std::size_t>(1, result.inliers.size())));
+}
+
+// ---------------------------------------------------------------- Sim(3)
+
+struct SimilarityProblem {
+  std::vector<Eigen::Vector3d> points_a, points_b;
+  std::vector<Eigen::Vector2d> pixels_a, pixels_b;  // undistorted
+  PinholeCamera camera_a, camera_b;
+};
+
+// The larger of the squared errors in the two images.
+double SimilarityError(const SimilarityProblem& problem, const Similarity& S_a_b, const Similarity& S_b_a,
+                       std::size_t i) {
+  const double in_a = SquaredError(problem.camera_a, S_a_b * problem.points_b[i], problem.pixels_a[i]);
+  const double in_b = SquaredError(problem.camera_b, S_b_a * problem.points_a[i], problem.pixels_b[i]);
+  return std::max(in_a, in_b);
+}
+
+struct ScoredSimilarity {
+  Similarity S_a_b, S_b_a;
+};
+
+std::vector<ScoredSimilarity> FitSimilarity(const SimilarityProblem& problem,
+                                            const std::vector<int>& sample) {
+  std::vector<Eigen::Vector3d> a;
+  std::vector<Eigen::Vector3d> b;
+  for (const int i : sample) {
+    a.push_back(problem.points_a[static_cast<std::size_t>(i)]);
+    b.push_back(problem.points_b[static_cast<std::size_t>(i)]);
+  }
+  const Similarity S = AlignPointPairs(a, b);
+  if (!(S.scale > 0.0)) return {};
+  return {{S, S.Inverse()}};
+}
+
+using Jacobian2x7 = Eigen::Matrix<double, 2, 7>;
+
+// Residuals and Jacobians in both images under S_a_b * X, X = (Exp(rotation) e^scale, translation), tangent
+// (t, w, s):
+//   q = X p_b:          dq = [I, -[p_b]x, p_b],   p_a' = S_a_b q
+//   r = S_b_a p_a:      d(X^-1 r) = [-I, [r]x, -r]
+void SimilarityTerms(const SimilarityProblem& problem, const Similarity& S_a_b, const Similarity& S_b_a,
+                     std::size_t i, Eigen::Vector2d residuals[2], Jacobian2x7 jacobians[2]) {
+  Eigen::Matrix<double, 3, 7> dq;
+  dq << Eigen::Matrix3d::Identity(), -Skew(problem.points_b[i]), problem.points_b[i];
+  const Eigen::Vector3d in_a = S_a_b * problem.points_b[i];
+  residuals[0] = Residual(problem.camera_a, in_a, problem.pixels_a[i]);
+  jacobians[0] =
+      ProjectionJacobian(problem.camera_a, in_a) * S_a_b.scale * S_a_b.rotation.toRotationMatrix() * dq;
+  const Eigen::Vector3d in_b = S_b_a * problem.points_a[i];
+  Eigen::Matrix<double, 3, 7> dr;
+  dr << -Eigen::Matrix3d::Identity(), Skew(in_b), -in_b;
+  residuals[1] = Residual(problem.camera_b, in_b, problem.pixels_b[i]);
+  jacobians[1] = ProjectionJacobian(problem.camera_b, in_b) * dr;
+}
+
+bool SimilarityStep(const SimilarityProblem& problem, const std::vector<int>& inliers, double huber_px,
+                    Similarity& S_a_b) {
+  const Similarity S_b_a = S_a_b.Inverse();
+  Matrix7d hessian = Matrix7d::Zero();
+  Vector7d gradient = Vector7d::Zero();
+  for (const int i : inliers) {
+    const std::size_t k = static_cast<std::size_t>(i);
+    if (!std::isfinite(SimilarityError(problem, S_a_b, S_b_a, k))) continue;
+    Eigen::Vector2d r[2];
+    Jacobian2x7 j[2];
+    SimilarityTerms(problem, S_a_b, S_b_a, k, r, j);
+    for (int side = 0; side < 2; ++side) {
+      const double w = HuberWeight(r[side].norm(), huber_px);
+      hessian += w * j[side].transpose() * j[side];
+      gradient += w * j[side].transpose() * r[side];
+    }
+  }
+  const Vector7d step = hessian.ldlt().solve(-gradient);
+  if (!step.allFinite() || std::abs(step[6]) > 1.0) return false;
+  S_a_b = S_a_b * Similarity(std::exp(step[6]), ExpSO3(step.segment<3>(3)), step.head<3>());
+  return S_a_b.translation.allFinite() && std::isfinite(S_a_b.scale) && S_a_b.scale > 0.0;
+}
+
+std::vector<int> SimilarityInliers(const SimilarityProblem& problem, const Similarity& S_a_b,
+                                   double threshold_px) {
+  const Similarity S_b_a = S_a_b.Inverse();
+  std::vector<int> inliers;
+  for (std::size_t i = 0; i < problem.points_a.size(); ++i) {
+    if (SimilarityError(problem, S_a_b, S_b_a, i) < threshold_px * threshold_px)
+      inliers.push_back(static_cast<int>(i));
+  }
+  return inliers;
+}
+
+void FinishSimilarity(const SimilarityProblem& problem, const RelativePoseOptions& options,
+                      SimilarityResult& result) {
+  const Similarity S_b_a = result.S_a_b.Inverse();
+  const double variance = options.pixel_sigma * options.pixel_sigma;
+  double squares = 0.0;
+  for (const int i : result.inliers) {
+    Eigen::Vector2d r[2];
+    Jacobian2x7 j[2];
+    SimilarityTerms(problem, result.S_a_b, S_b_a, static_cast<std::size_t>(i), r, j);
+    for (int side = 0; side < 2; ++side) {
+      squares += 0.5 * r[side].squaredNorm();
+      result.information += j[side].transpose() * j[side] / variance;
+    }
+  }
+  result.rmse_px = std::sqrt(squares / static_cast<double>(std::max<std::size_t>(1, result.inliers.size())));
+}
+
+// Refines the model on its inliers and chooses the inliers anew, a few times; keeps the last state that did
+// not lose any support.
+template <typename Model, typename Step, typename Select>
+void Refine(int rounds, const Step& step, const Select& select, Model& model, std::vector<int>& inliers) {
+  for (int round = 0; round < rounds; ++round) {
+    Model refined = model;
+    constexpr int kSteps = 4;
+    bool usable = true;
+    for (int s = 0; s < kSteps && usable; ++s) usable = step(inliers, refined);
+    if (!usable) return;
+    std::vector<int> selected = select(refined);
+    if (selected.size() < inliers.size()) return;
+    const bool same = selected == inliers;
+    model = refined;
+    inliers.swap(selected);
+    if (same) return;
+  }
+}
+
+}  // namespace
+
+std::string RelativePoseOptions::Validate() const {
+  if (!(threshold_px > 0)) return "threshold_px must be above 0";
+  if (!(pixel_sigma > 0)) return "pixel_sigma must be above 0";
+  if (min_inliers < 4) return "min_inliers must be at least 4";
+  if (!(confidence > 0 && confidence < 1)) return "confidence must be between 0 and 1";
+  if (max_iterations < 1) return "max_iterations must be at least 1";
+  if (refine_rounds < 1) return "refine_rounds must be at least 1";
+  return {};
+}
+
+PnpResult SolvePnp(const std::vector<Eigen::Vector3d>& points, const std::vector<Eigen::Vector2d>& pixels,
+                   const PinholeCamera& camera, const RelativePoseOptions& options,
+                   const std::vector<double>& point_sigma_m) {
+  PnpResult result;
+  if (points.size() != pixels.size() || (!point_sigma_m.empty() && point_sigma_m.size() != points.size())) {
+    result.reason = "points, pixels and standard deviations differ in number";
+    return result;
+  }
+  if (static_cast<int>(points.size()) < std::max(4, options.min_inliers)) {
+    result.reason = TooFew("matches with a 3D point", points.size(), std::max(4, options.min_inliers));
+    return result;
+  }
+  PnpProblem problem{points, {}, point_sigma_m, camera};
+  for (const Eigen::Vector2d& pixel : pixels) problem.pixels.push_back(UndistortedPixel(camera, pixel));
+
+  const double squared = options.threshold_px * options.threshold_px;
+  const internal::RansacSettings settings{3, options.max_iterations, options.confidence, options.seed};
+  result.inliers = internal::Ransac<Pose>(
+      static_cast<int>(points.size()), settings,
+      [&](const std::vector<int>& sample) { return FitP3p(problem, sample); },
+      [&](const Pose& pose, int i) {
+        const std::size_t k = static_cast<std::size_t>(i);
+        return SquaredError(camera, pose * problem.points[k], problem.pixels[k]) / squared;
+      },
+      result.T_camera_points);
+  if (result.inliers.size() >= 4) {
+    Refine(
+        options.refine_rounds,
+        [&](const std::vector<int>& inliers, Pose& pose) {
+          return PnpStep(problem, inliers, 0.5 * options.threshold_px, pose);
+        },
+        [&](const Pose& pose) { return PnpInliers(problem, pose, options.threshold_px); },
+        result.T_camera_points, result.inliers);
+    FinishPnp(problem, options, result);
+  }
+  result.success = static_cast<int>(result.inliers.size()) >= options.min_inliers;
+  if (!result.success)
+    result.reason = TooFew("inliers of the pose", result.inliers.size(), options.min_inliers);
+  return result;
+}
+
+Similarity AlignPointPairs(const std::vector<Eigen::Vector3d>& a, const std::vector<Eigen::Vector3d>& b,
+                           bool fix_scale) {
+  Similarity result;
+  result.scale = 0.0;
+  if (a.size() != b.size() || a.size() < 3) return result;
+  const double n = static_cast<double>(a.size());
+  Eigen::Vector3d mean_a = Eigen::Vector3d::Zero();
+  Eigen::Vector3d mean_b = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    mean_a += a[i] / n;
+    mean_b += b[i] / n;
+  }
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  double variance_b = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    covariance += (a[i] - mean_a) * (b[i] - mean_b).transpose() / n;
+    variance_b += (b[i] - mean_b).squaredNorm() / n;
+  }
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::Vector3d singular = svd.singularValues();
+  if (!(singular[1] > 1e-9 * singular[0]) || !(variance_b > 0.0)) return result;  // on a line, or one point
+  Eigen::Vector3d sign(1, 1, 1);
+  if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0) sign[2] = -1;
+  const Eigen::Matrix3d rotation = svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
+  result.rotation = Eigen::Quaterniond(rotation).normalized();
+  result.scale = fix_scale ? 1.0 : singular.dot(sign) / variance_b;
+  result.translation = mean_a - result.scale * (result.rotation * mean_b);
+  return result;
+}
+
+SimilarityResult SolveSimilarity(const std::vector<Eigen::Vector3d>& points_a,
+                                 const std::vector<Eigen::Vector2d>& pixels_a, const PinholeCamera& camera_a,
+                                 const std::vector<Eigen::Vector3d>& points_b,
+                                 const std::vector<Eigen::Vector2d>& pixels_b, const PinholeCamera& camera_b,
+                                 const RelativePoseOptions& options) {
+  SimilarityResult result;
+  const std::size_t n = points_a.size();
+  if (points_b.size() != n || pixels_a.size() != n || pixels_b.size() != n) {
+    result.reason = "points and pixels of the two images differ in number";
+    return result;
+  }
+  if (static_cast<int>(n) < std::max(4, options.min_inliers)) {
+    result.reason = TooFew("matches with 3D points in both images", n, std::max(4, options.min_inliers));
+    return result;
+  }
+  SimilarityProblem problem{points_a, points_b, {}, {}, camera_a, camera_b};
+  for (const Eigen::Vector2d& pixel : pixels_a) problem.pixels_a.push_back(UndistortedPixel(camera_a, pixel));
+  for (const Eigen::Vector2d& pixel : pixels_b) problem.pixels_b.push_back(UndistortedPixel(camera_b, pixel));
+
+  const double squared = options.threshold_px * options.threshold_px;
+  const internal::RansacSettings settings{3, options.max_iterations, options.confidence, options.seed};
+  ScoredSimilarity best;
+  result.inliers = internal::Ransac<ScoredSimilarity>(
+      static_cast<int>(n), settings,
+      [&](const std::vector<int>& sample) { return FitSimilarity(problem, sample); },
+      [&](const ScoredSimilarity& model, int i) {
+        return SimilarityError(problem, model.S_a_b, model.S_b_a, static_cast<std::size_t>(i)) / squared;
+      },
+      best);
+  result.S_a_b = best.S_a_b;
+  if (result.inliers.size() >= 4) {
+    Refine(
+        options.refine_rounds,
+        [&](const std::vector<int>& inliers, Similarity& S) {
+          return SimilarityStep(problem, inliers, 0.5 * options.threshold_px, S);
+        },
+        [&](const Similarity& S) { return SimilarityInliers(problem, S, options.threshold_px); },
+        result.S_a_b, result.inliers);
+    FinishSimilarity(problem, options, result);
+  }
+  result.success = static_cast<int>(result.inliers.size()) >= options.min_inliers;
+  if (!result.success)
+    result.reason = TooFew("inliers of the similarity", result.inliers.size(), options.min_inliers);
+  return result;
+}
+
+}  // namespace tutti

@@ -1,0 +1,280 @@
+#include "loopclosure/geometry/verification.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdarg>
+#include <cstdio>
+
+#include "loopclosure/features/static_features.h"
+#include "loopclosure/filter/evidence.h"
+#include "loopclosure/geometry/match_pool.h"
+#include "loopclosure/geometry/motion.h"
+#include "tutti/loopclosure/relative_pose.h"
+
+namespace tutti {
+namespace {
+
+using internal::PooledMatch;
+
+constexpr double kLeastSpreadShare = 0.6;  // of min_spread, however many the inliers
+
+// Standard deviation of the pixels along their narrowest direction, x as a share of the width and y of the
+// height: matches on one line or in one spot fit many camera motions.
+double Spread(const std::vector<cv::Point2f>& pixels, const cv::Size& size) {
+  if (pixels.empty() || size.empty()) return 0.0;
+  const double n = static_cast<double>(pixels.size());
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  std::vector<Eigen::Vector2d> scaled;
+  for (const cv::Point2f& p : pixels) {
+    scaled.emplace_back(p.x / size.width, p.y / size.height);
+    mean += scaled.back() / n;
+  }
+  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
+  for (const Eigen::Vector2d& p : scaled) covariance += (p - mean) * (p - mean).transpose() / n;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(covariance, Eigen::EigenvaluesOnly);
+  return std::sqrt(std::max(0.0, solver.eigenvalues()[0]));
+}
+
+__attribute__((format(printf, 1, 2))) std::string Format(const char* format, ...) {
+  std::array<char, 200> text{};
+  va_list arguments;
+  va_start(arguments, format);
+  std::vsnprintf(text.data(), text.size(), format, arguments);
+  va_end(arguments);
+  return text.data();
+}
+
+// What the inliers are worth, whatever the bars say of them.
+void FillEvidence(const std::vector<cv::Point2f>& in_query, const std::vector<cv::Point2f>& in_candidate,
+                  const internal::ChanceFit& chance, const View& query, const View& candidate,
+                  Verification& result) {
+  result.expected_inliers = chance.expected;
+  result.log_nfa = chance.log_nfa;
+  result.coverage = std::min(internal::OccupiedCells(in_query, query.size),
+                             internal::OccupiedCells(in_candidate, candidate.size));
+  result.motion_spread = internal::MotionSpread(in_query, in_candidate, query.size);
+}
+
+// A member's pool is a third of what three members pool: with scale_bar it needs a third of the inliers.
+int Scaled(int bar, const View& query, const View& candidate, const VerificationOptions& options) {
+  constexpr double kMembers = 3;  // that the bars are meant for
+  constexpr double kLeast = 8;    // no motion is known by fewer
+  const std::size_t members = std::min(query.members.size(), candidate.members.size());
+  if (!options.scale_bar || members == 0) return bar;
+  return static_cast<int>(std::max(kLeast, std::ceil(bar * static_cast<double>(members) / kMembers)));
+}
+
+// The least number of inliers and the least share of the matches.
+struct Bars {
+  int inliers = 0;
+  double ratio = 0;
+};
+
+Bars BarsFor(const Verification& result, const View& query, const View& candidate,
+             const VerificationOptions& options) {
+  const bool rigid = result.type == ConstraintType::kRigid;
+  Bars bars;
+  const int least = rigid || result.homography ? options.min_inliers : options.min_epipolar_inliers;
+  bars.inliers = Scaled(least, query, candidate, options);
+  bars.ratio = rigid ? options.min_inlier_ratio : options.min_epipolar_ratio;
+  return bars;
+}
+
+// Fills counts, evidence and matched pixels, and says what the inliers lack; empty if nothing.
+std::string Judge(const std::vector<PooledMatch>& pool, const std::vector<int>& inliers,
+                  const internal::ChanceFit& chance, int considered, const View& query, const View& candidate,
+                  const VerificationOptions& options, Verification& result) {
+  result.matches = considered;
+  result.inliers = static_cast<int>(inliers.size());
+  result.inlier_matches.clear();
+  std::vector<cv::Point2f> in_query;
+  std::vector<cv::Point2f> in_candidate;
+  for (const int i : inliers) {
+    const PooledMatch& m = pool[static_cast<std::size_t>(i)];
+    result.inlier_matches.push_back({m.query, m.candidate, m.query_feature, m.candidate_feature});
+    in_query.push_back(m.query);
+    in_candidate.push_back(m.candidate);
+  }
+  FillEvidence(in_query, in_candidate, chance, query, candidate, result);
+  const Bars bars = BarsFor(result, query, candidate, options);
+  if (result.inliers < bars.inliers) {
+    return Format("only %d matches fit one camera motion, %d are needed", result.inliers, bars.inliers);
+  }
+  const double ratio = static_cast<double>(inliers.size()) / static_cast<double>(considered);
+  if (ratio < bars.ratio) {
+    return Format("only %.0f %% of the matches fit one camera motion, %.0f %% are needed", 100 * ratio,
+                  100 * bars.ratio);
+  }
+  // What a motion is known by grows with number times spread squared: many inliers may lie closer together.
+  const double abundance = std::sqrt(1.5 * bars.inliers / static_cast<double>(result.inliers));
+  const double needed = options.min_spread * std::clamp(abundance, kLeastSpreadShare, 1.0);
+  const double spread = std::min(Spread(in_query, query.size), Spread(in_candidate, candidate.size));
+  if (spread < needed) {
+    return Format("the matches cover too narrow a part of the image (%.3f of its size, %.3f is needed)",
+                  spread, needed);
+  }
+  return {};
+}
+
+RelativePoseOptions PoseOptions(const VerificationOptions& options, std::uint64_t seed) {
+  RelativePoseOptions pose;
+  pose.threshold_px = options.reprojection_px;
+  pose.pixel_sigma = options.pixel_sigma;
+  pose.min_inliers = 6;  // the verifier judges the number itself, with its own words
+  pose.confidence = options.confidence;
+  pose.max_iterations = options.max_iterations;
+  pose.seed = seed;
+  return pose;
+}
+
+Eigen::Vector2d Pixel(const cv::Point2f& p) { return {p.x, p.y}; }
+
+// PnP on the candidate's points in metres. False if too few matches have one, so that something else must
+// decide.
+bool VerifyRigid(const std::vector<PooledMatch>& pool, const View& query, const View& candidate,
+                 const VerificationOptions& options, std::uint64_t seed, Verification& result) {
+  std::vector<Eigen::Vector3d> points;
+  std::vector<Eigen::Vector2d> pixels;
+  std::vector<int> index;
+  for (std::size_t i = 0; i < pool.size(); ++i) {
+    if (!pool[i].candidate_point.allFinite()) continue;
+    points.push_back(pool[i].candidate_point.cast<double>());
+    pixels.push_back(Pixel(pool[i].query));
+    index.push_back(static_cast<int>(i));
+  }
+  if (static_cast<int>(points.size()) < Scaled(options.min_inliers, query, candidate, options)) return false;
+  const PnpResult pnp = SolvePnp(points, pixels, *query.camera, PoseOptions(options, seed));
+  std::vector<int> inliers;
+  for (const int i : pnp.inliers) inliers.push_back(index[static_cast<std::size_t>(i)]);
+  result.type = ConstraintType::kRigid;
+  const int considered = static_cast<int>(points.size());
+  const internal::ChanceFit chance =
+      internal::FitByChance(internal::FitModel::kPnp, considered, static_cast<int>(inliers.size()),
+                            options.reprojection_px, query.size);
+  result.reason = Judge(pool, inliers, chance, considered, query, candidate, options, result);
+  result.accepted = result.reason.empty();
+  result.S_candidate_query = Similarity(pnp.T_camera_points.Inverse());
+  result.information = pnp.information;
+  return true;
+}
+
+// Mono: 3D-3D where both images have points. Called after the pixels have accepted.
+void AddSimilarity(const std::vector<PooledMatch>& pool, const std::vector<int>& inliers, const View& query,
+                   const View& candidate, const VerificationOptions& options, std::uint64_t seed,
+                   Verification& result) {
+  constexpr int kEnoughPoints = 20;  // on so many, a similarity must be found
+  constexpr int kMinInliers = 12;
+  std::vector<Eigen::Vector3d> points_c, points_q;
+  std::vector<Eigen::Vector2d> pixels_c, pixels_q;
+  for (const int i : inliers) {
+    const PooledMatch& m = pool[static_cast<std::size_t>(i)];
+    if (!m.candidate_point.allFinite() || !m.query_point.allFinite()) continue;
+    points_c.push_back(m.candidate_point.cast<double>());
+    points_q.push_back(m.query_point.cast<double>());
+    pixels_c.push_back(Pixel(m.candidate));
+    pixels_q.push_back(Pixel(m.query));
+  }
+  if (static_cast<int>(points_c.size()) < kMinInliers) return;
+  RelativePoseOptions pose = PoseOptions(options, seed);
+  pose.threshold_px = 2.0 * options.reprojection_px;  // both ends are triangulated
+  pose.min_inliers = kMinInliers;
+  const SimilarityResult fit =
+      SolveSimilarity(points_c, pixels_c, *candidate.camera, points_q, pixels_q, *query.camera, pose);
+  if (!fit.success) {
+    if (static_cast<int>(points_c.size()) < kEnoughPoints) return;
+    result.accepted = false;
+    result.reason = "the landmarks of the two images don't fit together: " + fit.reason;
+    return;
+  }
+  result.type = ConstraintType::kSimilarity;
+  result.S_candidate_query = fit.S_a_b;
+  // The scale is estimated with the pose: what is known of the pose alone is the Schur complement over it.
+  const Vector6d cross = fit.information.topRightCorner<6, 1>();
+  result.information = fit.information.topLeftCorner<6, 6>();
+  if (fit.information(6, 6) > 0) result.information -= cross * cross.transpose() / fit.information(6, 6);
+}
+
+void VerifyByPixels(const std::vector<PooledMatch>& pool, const View& query, const View& candidate,
+                    const VerificationOptions& options, std::uint64_t seed, Verification& result) {
+  const internal::Motion motion = internal::FitMotion(pool, query, candidate, options, seed);
+  result.type = motion.type;
+  result.homography = motion.homography;
+  result.reason =
+      Judge(pool, motion.inliers, motion.chance, motion.considered, query, candidate, options, result);
+  if (result.reason.empty() && motion.fewest >= 0) {
+    const double even =
+        BarsFor(result, query, candidate, options).inliers / static_cast<double>(query.cameras.size());
+    const int needed = static_cast<int>(std::ceil(options.camera_share * even));
+    if (motion.fewest < needed) {
+      result.reason = Format("one of the cameras knows nothing of it (%d of its matches fit, %d are needed)",
+                             motion.fewest, needed);
+    }
+  }
+  result.accepted = result.reason.empty();
+  result.ahead = motion.ahead;
+  const bool calibrated = motion.type == ConstraintType::kEssential;
+  if (calibrated) result.S_candidate_query = Similarity(motion.T_candidate_query);
+  if (calibrated && result.accepted && !(query.metric && candidate.metric)) {
+    AddSimilarity(pool, motion.inliers, query, candidate, options, seed, result);
+  }
+}
+
+// By the geometry that is known, all bars but those on what does not move.
+Verification Decide(const std::vector<PooledMatch>& pool, const View& query, const View& candidate,
+                    const VerificationOptions& options, std::uint64_t seed) {
+  Verification result;
+  result.candidate = candidate.id;
+  result.matches = static_cast<int>(pool.size());
+  const int needed = Scaled(options.min_inliers, query, candidate, options);
+  if (result.matches < needed) {
+    result.reason = Format("only %d features match, %d are needed", result.matches, needed);
+    return result;
+  }
+  if (query.camera && candidate.metric && query.metric &&
+      VerifyRigid(pool, query, candidate, options, seed, result)) {
+    return result;
+  }
+  VerifyByPixels(pool, query, candidate, options, seed, result);
+  return result;
+}
+
+// Where most inliers are at the same pixel in both images, either the camera stands where it stood and sees
+// the same everywhere, or it carries them along: then the others must do without them.
+void DoWithoutStatic(const std::vector<PooledMatch>& pool, const View& query, const View& candidate,
+                     const VerificationOptions& options, std::uint64_t seed, Verification& result) {
+  constexpr double kMostApart = 0.15;
+  std::vector<VerifiedMatch> still;
+  for (const VerifiedMatch& match : result.inlier_matches) {
+    if (internal::StaysAtItsPixel(match, options.static_px)) still.push_back(match);
+  }
+  if (2 * still.size() <= result.inlier_matches.size()) return;
+  if (internal::ShareApart(still, query, candidate) <= kMostApart) return;
+  std::vector<PooledMatch> moving;
+  for (const PooledMatch& m : pool) {
+    if (!internal::StaysAtItsPixel({m.query, m.candidate, -1, -1}, options.static_px)) moving.push_back(m);
+  }
+  const int all = result.inliers;
+  result = Decide(moving, query, candidate, options, seed);  // and its evidence, whatever comes of it
+  if (result.accepted) return;
+  result.reason =
+      Format("only features that do not move with the camera agree (%d of %d are at the same pixel)",
+             static_cast<int>(still.size()), all);
+}
+
+}  // namespace
+
+Verification GeometricVerifier::Verify(const View& query, const View& candidate, int threads) const {
+  const std::vector<PooledMatch> pool =
+      internal::PoolMatches(query, candidate, options_.match_ratio, threads);
+  const std::uint64_t seed = seed_ + 0x9e3779b97f4a7c15ull * static_cast<std::uint64_t>(query.id) +
+                             static_cast<std::uint64_t>(candidate.id);
+  Verification result = Decide(pool, query, candidate, options_, seed);
+  if (result.accepted && options_.static_px > 0) {
+    DoWithoutStatic(pool, query, candidate, options_, seed, result);
+  }
+  return result;
+}
+
+}  // namespace tutti

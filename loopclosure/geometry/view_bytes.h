@@ -1,0 +1,13 @@
+// A View as bytes, for saved detectors and the long-term memory's file.
+#pragma once
+
+#include "loopclosure/geometry/verification.h"
+#include "loopclosure/store/byte_stream.h"
+
+namespace tutti::internal {
+
+void SaveView(const View& view, ByteWriter& out);
+/// Throws InputError.
+View LoadView(ByteReader& in);
+
+}  // namespace tutti::internal

@@ -1,0 +1,301 @@
+#include "loopclosure/memory/location_memory.h"
+
+#include <algorithm>
+#include <array>
+#include <tuple>
+#include <unordered_map>
+
+#include "loopclosure/store/byte_stream.h"
+
+namespace tutti {
+
+int LocationMemory::Add(std::int64_t id) {
+  const int slot = size();
+  nodes_.push_back({id, State::kShortTerm, 0, 0, {}});
+  changed_.insert(slot);
+  slot_of_id_.emplace(id, slot);
+  if (!short_term_.empty()) {
+    AddLink(short_term_.back(), slot, LinkType::kOdometry);
+  } else if (!working_.empty()) {
+    AddLink(working_.back(), slot, LinkType::kOdometry);
+  }
+  short_term_.push_back(slot);
+  return slot;
+}
+
+bool LocationMemory::AddLink(int a, int b, LinkType type) {
+  if (a == b) return false;
+  std::vector<Link>& links = nodes_[Index(a)].links;
+  const bool known =
+      std::any_of(links.begin(), links.end(), [b](const Link& link) { return link.slot == b; });
+  if (known) return false;
+  const LinkType bounded = Bounded(a, b, type);
+  links.push_back({b, bounded});
+  nodes_[Index(b)].links.push_back({a, bounded});
+  changed_.insert({a, b});
+  return true;
+}
+
+bool LocationMemory::RemoveLoop(int a, int b) {
+  bool removed = false;
+  for (const auto& [from, to] : {std::make_pair(a, b), std::make_pair(b, a)}) {
+    std::vector<Link>& links = nodes_[Index(from)].links;
+    const auto gone = std::remove_if(links.begin(), links.end(), [to = to](const Link& link) {
+      return link.slot == to && link.type != LinkType::kOdometry;
+    });
+    removed = removed || gone != links.end();
+    links.erase(gone, links.end());
+  }
+  if (removed) changed_.insert({a, b});
+  return removed;
+}
+
+LocationMemory::LinkType LocationMemory::Bounded(int a, int b, LinkType type) const {
+  if (type == LinkType::kOdometry) return type;
+  for (const int slot : {a, b}) {
+    const std::vector<Link>& near = links(slot);
+    const auto loops = std::count_if(near.begin(), near.end(),
+                                     [](const Link& link) { return link.type == LinkType::kLoop; });
+    if (loops >= kMostLoops) return LinkType::kMoreLoop;
+  }
+  return LinkType::kLoop;
+}
+
+std::vector<int> LocationMemory::Settle() {
+  std::vector<int> moved;
+  while (static_cast<int>(short_term_.size()) > stm_size_) {
+    const int slot = short_term_.front();
+    short_term_.pop_front();
+    Enter(slot);
+    moved.push_back(slot);
+  }
+  return moved;
+}
+
+void LocationMemory::Enter(int slot) {
+  nodes_[Index(slot)].state = State::kWorking;
+  nodes_[Index(slot)].entered = entries_++;
+  working_.insert(std::lower_bound(working_.begin(), working_.end(), slot), slot);
+  changed_.insert(slot);
+}
+
+int LocationMemory::DropNewest() {
+  return short_term_.size() < 2 ? -1 : Drop(1 + nodes_[Index(short_term_.back())].weight);
+}
+
+int LocationMemory::IgnoreNewest() { return short_term_.size() < 2 ? -1 : Drop(0); }
+
+int LocationMemory::Drop(int weight) {
+  const int newest = short_term_.back();
+  short_term_.pop_back();
+  const int old = short_term_.back();
+  nodes_[Index(old)].weight += weight;
+  const std::vector<Link> passed_on = nodes_[Index(newest)].links;
+  nodes_[Index(newest)].links.clear();
+  nodes_[Index(newest)].state = State::kMerged;
+  changed_.insert({newest, old});
+  for (const Link& link : passed_on) {
+    std::vector<Link>& back = nodes_[Index(link.slot)].links;
+    back.erase(std::remove_if(back.begin(), back.end(), [newest](const Link& l) { return l.slot == newest; }),
+               back.end());
+    changed_.insert(link.slot);
+    AddLink(link.slot, old, link.type);
+  }
+  slot_of_id_[id(newest)] = old;
+  return old;
+}
+
+int LocationMemory::NextToTransfer(double recent_share, const std::set<int>& immune) const {
+  const auto recent = static_cast<std::size_t>(recent_share * static_cast<double>(working_.size()));
+  std::vector<std::int64_t> entered;
+  for (const int slot : working_) entered.push_back(nodes_[Index(slot)].entered);
+  std::int64_t newest_allowed = entries_;  // entered before this
+  if (recent > 0 && recent < entered.size()) {
+    const auto bound = entered.end() - static_cast<std::ptrdiff_t>(recent);
+    std::nth_element(entered.begin(), bound, entered.end());
+    newest_allowed = *bound;
+  }
+  int next = -1;
+  const auto key = [this](int slot) {
+    const Node& node = nodes_[Index(slot)];
+    return std::make_tuple(node.weight, node.entered, slot);
+  };
+  for (const int slot : working_) {
+    if (nodes_[Index(slot)].entered >= newest_allowed || immune.count(slot) > 0) continue;
+    if (next >= 0 && key(next) < key(slot)) continue;
+    const std::vector<Link>& near = links(slot);
+    const bool in_use = std::any_of(
+        near.begin(), near.end(), [this](const Link& link) { return state(link.slot) == State::kShortTerm; });
+    if (!in_use) next = slot;
+  }
+  return next;
+}
+
+bool LocationMemory::Transfer(int slot) {
+  if (state(slot) != State::kWorking) return false;
+  nodes_[Index(slot)].state = State::kLongTerm;
+  working_.erase(std::lower_bound(working_.begin(), working_.end(), slot));
+  ++num_long_term_;
+  changed_.insert(slot);
+  return true;
+}
+
+bool LocationMemory::Retrieve(int slot) {
+  if (state(slot) != State::kLongTerm) return false;
+  --num_long_term_;
+  Enter(slot);
+  return true;
+}
+
+std::vector<int> LocationMemory::LongTermNeighbours(int slot, int levels, int count) const {
+  std::vector<int> found;
+  for (const auto& [near, level] : Walk(slot, levels, [](State) { return true; })) {
+    if (static_cast<int>(found.size()) == count) break;
+    if (state(near) == State::kLongTerm) found.push_back(near);
+  }
+  return found;
+}
+
+std::vector<int> LocationMemory::TakeChanged() {
+  std::vector<int> slots(changed_.begin(), changed_.end());
+  changed_.clear();
+  return slots;
+}
+
+void LocationMemory::TransferWeight(int newer, int older) {
+  nodes_[Index(newer)].weight += nodes_[Index(older)].weight;
+  nodes_[Index(older)].weight = 0;
+  changed_.insert({newer, older});
+}
+
+int LocationMemory::Find(std::int64_t id) const {
+  const auto found = slot_of_id_.find(id);
+  return found == slot_of_id_.end() ? -1 : found->second;
+}
+
+std::vector<std::pair<int, int>> LocationMemory::Neighbours(int slot, int levels) const {
+  return Walk(slot, levels, [](State state) { return state == State::kWorking; });
+}
+
+template <typename Walkable>
+std::vector<std::pair<int, int>> LocationMemory::Walk(int slot, int levels, const Walkable& walkable) const {
+  std::vector<std::pair<int, int>> found;
+  if (!walkable(state(slot))) return found;
+  // Level by level; the places of a ring by how many loop links their paths have taken.
+  using Ring = std::array<std::vector<int>, kMostLoopsOfAWalk + 1>;
+  std::unordered_map<int, std::size_t> fewest_loops;
+  Ring ring;
+  ring[0] = {slot};
+  for (int level = 0; level <= levels; ++level) {
+    Ring next;
+    std::vector<int> reached;
+    for (std::size_t loops = 0; loops < ring.size(); ++loops) {
+      for (const int node : ring[loops]) {
+        const auto [known, is_new] = fewest_loops.emplace(node, loops);
+        if (is_new) {
+          reached.push_back(node);
+        } else if (known->second <= loops) {
+          continue;
+        }
+        known->second = loops;
+        for (const Link& link : links(node)) {
+          if (!walkable(state(link.slot))) continue;
+          if (link.type == LinkType::kOdometry) next[loops].push_back(link.slot);
+          if (link.type == LinkType::kLoop && loops + 1 < ring.size()) ring[loops + 1].push_back(link.slot);
+        }
+      }
+    }
+    std::sort(reached.begin(), reached.end());
+    for (const int node : reached) found.emplace_back(node, level);
+    ring.swap(next);
+  }
+  return found;
+}
+
+void LocationMemory::SaveSlot(int slot, internal::ByteWriter& out) const {
+  const Node& node = nodes_[Index(slot)];
+  out.Put(node.id);
+  out.Put(node.state);
+  out.Put<std::int32_t>(node.weight);
+  out.Put(node.entered);
+  out.Put<std::int32_t>(Find(node.id));  // of a merged location: which one it was merged into
+  out.Put<std::uint64_t>(node.links.size());
+  for (const Link& link : node.links) {
+    out.Put<std::int32_t>(link.slot);
+    out.Put(static_cast<std::uint8_t>(link.type));
+  }
+}
+
+void LocationMemory::LoadSlot(internal::ByteReader& in) {
+  Node node;
+  node.id = in.Get<std::int64_t>();
+  const auto state = in.Get<std::uint8_t>();
+  if (state > static_cast<std::uint8_t>(State::kLongTerm)) in.Damaged("a location in an unknown state");
+  node.state = static_cast<State>(state);
+  node.weight = in.Get<std::int32_t>();
+  node.entered = in.Get<std::int64_t>();
+  const int names = in.Get<std::int32_t>();
+  const std::size_t count = in.GetCount(sizeof(std::int32_t) + 1);
+  for (std::size_t i = 0; i < count; ++i) {
+    const int to = in.Get<std::int32_t>();
+    const auto type = in.Get<std::uint8_t>();
+    if (type > static_cast<std::uint8_t>(LinkType::kMoreLoop)) in.Damaged("a link of an unknown type");
+    node.links.push_back({to, static_cast<LinkType>(type)});
+  }
+  // One that was merged names the location that it was merged into, any other itself.
+  const bool merged = node.state == State::kMerged;
+  if (names < 0 || names > size() || merged != (names < size()) ||
+      (merged && nodes_[Index(names)].state == State::kMerged)) {
+    in.Damaged("a location merged into one that is not there");
+  }
+  if (node.id < 0 || (!nodes_.empty() && node.id <= nodes_.back().id)) in.Damaged("locations out of order");
+  constexpr std::int64_t kMostEntries = std::int64_t{1} << 62;
+  if (node.weight < 0 || node.entered < 0 || node.entered > kMostEntries) {
+    in.Damaged("a location with an impossible weight or age");
+  }
+  slot_of_id_.emplace(node.id, names);
+  nodes_.push_back(std::move(node));
+}
+
+void LocationMemory::FinishLoading() {
+  short_term_.clear();
+  working_.clear();
+  num_long_term_ = 0;
+  entries_ = 0;
+  for (int slot = 0; slot < size(); ++slot) {
+    Node& node = nodes_[Index(slot)];
+    // A link to a location that is not there: the process died before that one was stored.
+    node.links.erase(std::remove_if(node.links.begin(), node.links.end(),
+                                    [&](const Link& link) {
+                                      return link.slot < 0 || link.slot >= size() || link.slot == slot;
+                                    }),
+                     node.links.end());
+    entries_ = std::max(entries_, node.entered + 1);
+    if (node.state == State::kShortTerm) short_term_.push_back(slot);
+    if (node.state == State::kWorking) working_.push_back(slot);
+    if (node.state == State::kLongTerm) ++num_long_term_;
+  }
+  changed_.clear();
+}
+
+void LocationMemory::Save(internal::ByteWriter& out) const {
+  out.Put<std::int32_t>(size());
+  for (int slot = 0; slot < size(); ++slot) SaveSlot(slot, out);
+}
+
+void LocationMemory::Load(internal::ByteReader& in) {
+  const int count = in.Get<std::int32_t>();
+  for (int slot = 0; slot < count; ++slot) LoadSlot(in);
+  FinishLoading();
+  // A weight counts the locations that were merged into one, so all together are no more than there are.
+  std::int64_t weights = 0;
+  for (const Node& node : nodes_) weights += node.weight;
+  if (weights > size()) in.Damaged("locations with impossible weights");
+  int newest = size() - 1;
+  while (newest >= 0 && state(newest) == State::kMerged) --newest;
+  if (newest >= 0 && state(newest) != State::kShortTerm) {
+    in.Damaged("the newest location is not in short-term memory");
+  }
+}
+
+}  // namespace tutti

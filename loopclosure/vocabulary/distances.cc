@@ -1,0 +1,63 @@
+#include "loopclosure/vocabulary/distances.h"
+
+#include <limits>
+
+namespace tutti::internal {
+
+TUTTI_CLONES("avx2")
+void SquaredDistances(const float* query, const float* rows, int count, int dimensions, std::size_t step,
+                      float* distances) {
+  for (int j = 0; j < count; ++j) {
+    const float* row = rows + static_cast<std::size_t>(j) * step;
+    float sums[16] = {};
+    int k = 0;
+    for (; k + 16 <= dimensions; k += 16) {
+      for (int l = 0; l < 16; ++l) {
+        const float d = query[k + l] - row[k + l];
+        sums[l] += d * d;
+      }
+    }
+    float sum = 0.0f;
+    for (; k < dimensions; ++k) sum += (query[k] - row[k]) * (query[k] - row[k]);
+    for (int l = 0; l < 8; ++l) sums[l] += sums[l + 8];
+    for (int l = 0; l < 4; ++l) sums[l] += sums[l + 4];
+    distances[j] = ((sums[0] + sums[2]) + (sums[1] + sums[3])) + sum;
+  }
+}
+
+TUTTI_CLONES("popcnt")
+void HammingDistances(const std::uint8_t* query, const std::uint8_t* rows, int count, int bytes,
+                      std::size_t step, float* distances) {
+  if (bytes == 32) {  // ORB: a fixed length unrolls
+    for (int j = 0; j < count; ++j) {
+      distances[j] =
+          static_cast<float>(HammingDistance(query, rows + static_cast<std::size_t>(j) * step, 32));
+    }
+    return;
+  }
+  for (int j = 0; j < count; ++j) {
+    distances[j] =
+        static_cast<float>(HammingDistance(query, rows + static_cast<std::size_t>(j) * step, bytes));
+  }
+}
+
+TUTTI_CLONES("avx2")
+float UpdateNearest(const float* distances, int count, int row, float* nearest, std::int32_t* nearest_row) {
+  // Floats that are not negative are ordered as their bits are, and integers need no order of evaluation.
+  std::int32_t least = std::numeric_limits<std::int32_t>::max();
+  for (int j = 0; j < count; ++j) {
+    std::int32_t bits = 0;
+    std::memcpy(&bits, distances + j, sizeof bits);
+    least = bits < least ? bits : least;
+  }
+  for (int j = 0; j < count; ++j) {
+    const bool nearer = distances[j] < nearest[j];
+    nearest[j] = nearer ? distances[j] : nearest[j];
+    nearest_row[j] = nearer ? row : nearest_row[j];
+  }
+  float result = 0;
+  std::memcpy(&result, &least, sizeof result);
+  return result;
+}
+
+}  // namespace tutti::internal

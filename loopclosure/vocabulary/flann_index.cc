@@ -1,0 +1,196 @@
+#include <flann/algorithms/dist.h>
+#include <flann/algorithms/kdtree_index.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "loopclosure/geometry/shuffle.h"
+#include "loopclosure/store/byte_stream.h"
+#include "loopclosure/vocabulary/descriptor_index.h"
+#include "loopclosure/vocabulary/word_storage.h"
+
+namespace tutti {
+namespace {
+
+using Tree = flann::KDTreeIndex<flann::L2<float>>;
+
+constexpr int kSpareDeadWords = 1024;  // the trees are not grown anew for fewer
+
+std::size_t Index(int i) { return static_cast<std::size_t>(i); }
+
+struct GrownTree {
+  std::unique_ptr<Tree> index;
+  std::vector<int> rows;  // row number in the storage, by the tree's own point number
+  internal::Shuffler shuffler;
+};
+
+// Collects the two nearest living words over all trees, by squared distance and word id.
+class TopTwo : public flann::ResultSet<float> {
+ public:
+  TopTwo(const internal::WordStorage& storage, const std::vector<char>& alive)
+      : storage_(storage), alive_(alive) {}
+  void SetTree(const std::vector<int>* rows) { rows_ = rows; }
+  bool full() const override { return nearest_.second >= 0; }
+  void addPoint(float distance, std::size_t index) override {
+    if (distance > nearest_.second_distance) return;  // most of them: before memory is touched
+    const int row = (*rows_)[index];
+    if (alive_[Index(row)] != 0) nearest_.Offer(storage_.WordOf(row), distance);
+  }
+  float worstDist() const override { return nearest_.second_distance; }
+  const TwoNearest& nearest() const { return nearest_; }
+
+ private:
+  const internal::WordStorage& storage_;
+  const std::vector<char>& alive_;
+  const std::vector<int>* rows_ = nullptr;
+  TwoNearest nearest_;
+};
+
+class FlannIndex : public DescriptorIndex {
+ public:
+  FlannIndex(int dimensions, int trees, int checks, std::uint64_t seed)
+      : dimensions_(Index(dimensions)),
+        checks_per_tree_(std::max(1, checks / trees)),
+        storage_(Index(dimensions) * sizeof(float)) {
+    for (int t = 0; t < trees; ++t) trees_.push_back({nullptr, {}, internal::Shuffler(seed, t)});
+  }
+
+  void Add(const std::vector<int>& words, const cv::Mat& rows) override {
+    CV_Assert(rows.type() == CV_32F && Index(rows.cols) == dimensions_ && Index(rows.rows) == words.size());
+    std::vector<int> added;
+    for (std::size_t i = 0; i < words.size(); ++i) {
+      int row = storage_.RowOf(words[i]);
+      if (row < 0) {
+        row = storage_.Add(words[i], rows.ptr(static_cast<int>(i)));
+        alive_.resize(std::max(alive_.size(), Index(row) + 1), 0);
+        added.push_back(row);
+      }
+      size_ += alive_[Index(row)] != 0 ? 0 : 1;
+      alive_[Index(row)] = 1;  // one that came back is in the trees still
+    }
+    for (GrownTree& tree : trees_) Insert(added, tree);
+  }
+
+  void Remove(int word) override {
+    const int row = storage_.RowOf(word);
+    if (row < 0 || alive_[Index(row)] == 0) return;
+    alive_[Index(row)] = 0;
+    --size_;
+    if (storage_.size() > 2 * size_ + kSpareDeadWords) GrowAnew();
+  }
+
+  std::vector<TwoNearest> Search(const cv::Mat& descriptors) const override {
+    const flann::SearchParams parameters(checks_per_tree_);
+    std::vector<TwoNearest> found;
+    for (int i = 0; i < descriptors.rows; ++i) {
+      TopTwo result(storage_, alive_);
+      for (const GrownTree& tree : trees_) {
+        if (!tree.index) continue;
+        result.SetTree(&tree.rows);
+        tree.index->findNeighbors(result, descriptors.ptr<float>(i), parameters);
+      }
+      found.push_back(result.nearest());
+      // FLANN's L2 is squared; the vocabulary decides on true distance.
+      found.back().first_distance = std::sqrt(found.back().first_distance);
+      found.back().second_distance = std::sqrt(found.back().second_distance);
+    }
+    return found;
+  }
+
+  const std::uint8_t* Find(int word) const override {
+    const int row = storage_.RowOf(word);
+    return row < 0 || alive_[Index(row)] == 0 ? nullptr : storage_.At(row);
+  }
+
+  int size() const override { return size_; }
+
+  // Which row a word lies in changes no answer: rows are numbered anew, by word id.
+  void Save(internal::ByteWriter& out) const override {
+    std::vector<int> rank(Index(storage_.end()), -1);
+    int next = 0;
+    out.Put<std::uint64_t>(Index(storage_.size()));
+    storage_.ForEach([&](int word, int row) {
+      out.Put<std::int32_t>(word);
+      out.Put<char>(alive_[Index(row)]);
+      out.PutRaw(storage_.At(row), storage_.row_bytes());
+      rank[Index(row)] = next++;
+    });
+    for (const GrownTree& tree : trees_) {
+      tree.shuffler.Save(out);
+      std::vector<int> rows;
+      for (const int row : tree.rows) rows.push_back(rank[Index(row)]);
+      out.PutVector(rows);
+    }
+  }
+
+  void Load(internal::ByteReader& in) override {
+    const std::size_t count = in.GetCount(sizeof(std::int32_t) + 1 + storage_.row_bytes());
+    std::vector<std::uint8_t> descriptor(storage_.row_bytes());
+    for (std::size_t i = 0; i < count; ++i) {
+      const int word = storage_.ReadNewWord(in);
+      alive_.push_back(in.Get<char>() != 0 ? 1 : 0);
+      size_ += alive_.back();
+      in.GetRaw(descriptor.data(), descriptor.size());
+      storage_.Add(word, descriptor.data());
+    }
+    for (GrownTree& tree : trees_) {
+      tree.shuffler.Load(in);
+      const std::vector<int> rows = in.GetVector<int>();
+      std::vector<char> seen(count, 0);
+      for (const int row : rows) {
+        if (row < 0 || Index(row) >= count || seen[Index(row)] != 0) in.Damaged("an impossible kd-tree");
+        seen[Index(row)] = 1;
+        InsertOne(row, tree);
+      }
+      if (rows.size() != count) in.Damaged("a kd-tree without some of the words");
+    }
+  }
+
+ private:
+  // Each tree takes new words in an order of its own.
+  void Insert(std::vector<int> rows, GrownTree& tree) {
+    tree.shuffler.Shuffle(rows);
+    for (const int row : rows) InsertOne(row, tree);
+  }
+
+  // A tree is what the order of its insertions made of it.
+  void InsertOne(int row, GrownTree& tree) {
+    // FLANN's matrices are not const; it only reads.
+    const flann::Matrix<float> one(reinterpret_cast<float*>(storage_.At(row)), 1, dimensions_);
+    if (!tree.index) {
+      tree.index = std::make_unique<Tree>(one, flann::KDTreeIndexParams(1));
+      tree.index->buildIndex();  // of a single point: nothing to choose at random
+    } else {
+      tree.index->addPoints(one, 0.0f);  // 0: never rebuild
+    }
+    tree.rows.push_back(row);
+  }
+
+  // FLANN's trees can't let go of a word: without the dead ones all are grown anew.
+  void GrowAnew() {
+    std::vector<int> living;
+    std::vector<int> dead;
+    storage_.ForEach([&](int, int row) { (alive_[Index(row)] != 0 ? living : dead).push_back(row); });
+    for (GrownTree& tree : trees_) {
+      tree.index.reset();
+      tree.rows.clear();
+      Insert(living, tree);
+    }
+    for (const int row : dead) storage_.Free(row);
+  }
+
+  std::size_t dimensions_;
+  int checks_per_tree_;
+  int size_ = 0;  // living words
+  internal::WordStorage storage_;
+  std::vector<char> alive_;  // by row number: found by searches; the dead ones stay in the trees
+  std::vector<GrownTree> trees_;
+};
+
+}  // namespace
+
+std::unique_ptr<DescriptorIndex> MakeFlannIndex(int dimensions, int trees, int checks, std::uint64_t seed) {
+  return std::make_unique<FlannIndex>(dimensions, trees, checks, seed);
+}
+
+}  // namespace tutti

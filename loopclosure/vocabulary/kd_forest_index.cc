@@ -1,0 +1,140 @@
+#include <algorithm>
+#include <cmath>
+
+#include "loopclosure/geometry/shuffle.h"
+#include "loopclosure/store/byte_stream.h"
+#include "loopclosure/vocabulary/descriptor_index.h"
+#include "loopclosure/vocabulary/kd_tree.h"
+#include "loopclosure/vocabulary/word_storage.h"
+
+namespace tutti {
+
+void TwoNearest::Offer(int word, float distance) {
+  if (word == first || word == second) return;
+  if (distance < first_distance || (distance == first_distance && word < first)) {
+    second = first;
+    second_distance = first_distance;
+    first = word;
+    first_distance = distance;
+  } else if (distance < second_distance || (distance == second_distance && word < second)) {
+    second = word;
+    second_distance = distance;
+  }
+}
+
+namespace {
+
+constexpr int kTogether = 12;  // searches that take turns: enough to hide memory, few enough for the cache
+
+class KdForestIndex : public DescriptorIndex {
+ public:
+  KdForestIndex(int dimensions, int trees, int checks, std::uint64_t seed)
+      : dimensions_(dimensions),
+        checks_per_tree_(std::max(1, checks / trees)),
+        storage_(static_cast<std::size_t>(dimensions) * sizeof(float)) {
+    for (int t = 0; t < trees; ++t) {
+      trees_.push_back({internal::KdTree(dimensions), internal::Shuffler(seed, t)});
+    }
+  }
+
+  void Add(const std::vector<int>& words, const cv::Mat& rows) override {
+    CV_Assert(rows.type() == CV_32F && rows.cols == dimensions_ &&
+              static_cast<std::size_t>(rows.rows) == words.size());
+    std::vector<int> added;
+    for (std::size_t i = 0; i < words.size(); ++i) {
+      if (storage_.RowOf(words[i]) >= 0) continue;
+      added.push_back(storage_.Add(words[i], rows.ptr(static_cast<int>(i))));
+    }
+    for (GrownTree& tree : trees_) {
+      std::vector<int> order = added;
+      tree.shuffler.Shuffle(order);
+      for (const int row : order) tree.tree.Insert(row, storage_);
+    }
+  }
+
+  void Remove(int word) override {
+    const int row = storage_.RowOf(word);
+    if (row < 0) return;
+    for (GrownTree& tree : trees_) tree.tree.Remove(row);
+    storage_.Free(row);
+  }
+
+  std::vector<TwoNearest> Search(const cv::Mat& descriptors) const override {
+    std::vector<TwoNearest> found;
+    for (int begin = 0; begin < descriptors.rows; begin += kTogether) {
+      std::vector<const float*> queries;
+      for (int i = begin; i < std::min(descriptors.rows, begin + kTogether); ++i) {
+        queries.push_back(descriptors.ptr<float>(i));
+      }
+      std::vector<TwoNearest> nearest(queries.size());
+      for (const GrownTree& tree : trees_) tree.tree.Search(queries, checks_per_tree_, storage_, nearest);
+      found.insert(found.end(), nearest.begin(), nearest.end());
+    }
+    // The trees compare squares; the vocabulary decides on true distance.
+    for (TwoNearest& nearest : found) {
+      nearest.first_distance = std::sqrt(nearest.first_distance);
+      nearest.second_distance = std::sqrt(nearest.second_distance);
+    }
+    return found;
+  }
+
+  const std::uint8_t* Find(int word) const override {
+    const int row = storage_.RowOf(word);
+    return row < 0 ? nullptr : storage_.At(row);
+  }
+
+  int size() const override { return storage_.size(); }
+
+  // Which row a word lies in changes no answer: rows are numbered anew, by word id.
+  void Save(internal::ByteWriter& out) const override {
+    std::vector<int> rank(static_cast<std::size_t>(storage_.end()), -1);
+    int next = 0;
+    out.Put<std::uint64_t>(static_cast<std::uint64_t>(size()));
+    storage_.ForEach([&](int word, int row) {
+      out.Put<std::int32_t>(word);
+      out.PutRaw(storage_.At(row), storage_.row_bytes());
+      rank[static_cast<std::size_t>(row)] = next++;
+    });
+    out.Put<std::uint64_t>(trees_.size());
+    for (const GrownTree& tree : trees_) {
+      tree.shuffler.Save(out);
+      tree.tree.Save(rank, out);
+    }
+  }
+
+  void Load(internal::ByteReader& in) override {
+    const std::size_t count = in.GetCount(sizeof(std::int32_t) + storage_.row_bytes());
+    std::vector<std::uint8_t> descriptor(storage_.row_bytes());
+    for (std::size_t i = 0; i < count; ++i) {
+      const int word = storage_.ReadNewWord(in);
+      in.GetRaw(descriptor.data(), descriptor.size());
+      storage_.Add(word, descriptor.data());
+    }
+    if (in.Get<std::uint64_t>() != trees_.size()) in.Damaged("another number of kd-trees");
+    for (GrownTree& tree : trees_) {
+      tree.shuffler.Load(in);
+      tree.tree.Load(size(), in);
+    }
+  }
+
+ private:
+  // Each tree takes new words in an order of its own.
+  struct GrownTree {
+    internal::KdTree tree;
+    internal::Shuffler shuffler;
+  };
+
+  int dimensions_;
+  int checks_per_tree_;
+  internal::WordStorage storage_;
+  std::vector<GrownTree> trees_;
+};
+
+}  // namespace
+
+std::unique_ptr<DescriptorIndex> MakeKdForestIndex(int dimensions, int trees, int checks,
+                                                   std::uint64_t seed) {
+  return std::make_unique<KdForestIndex>(dimensions, trees, checks, seed);
+}
+
+}  // namespace tutti

@@ -1,0 +1,273 @@
+// One kd-tree over the words of a vocabulary.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "loopclosure/store/byte_stream.h"
+#include "loopclosure/vocabulary/chunked_vector.h"
+#include "loopclosure/vocabulary/descriptor_index.h"
+#include "loopclosure/vocabulary/distances.h"
+#include "loopclosure/vocabulary/word_storage.h"
+
+namespace tutti::internal {
+
+/// A kd-tree with one row of a WordStorage in each leaf, grown and searched by the rules of FLANN's
+/// KDTreeIndex (Muja & Lowe 2009): a leaf that a new row falls into is split half-way along the dimension in
+/// which the two differ most; a search goes down to the nearest leaf and then from the branch not taken that
+/// is nearest, best bin first.
+///
+/// What FLANN's has not: a removed row leaves nothing behind (its sibling takes their parent's place), and a
+/// search costs what it looks at, not a bitset and a heap of the size of the index.
+class KdTree {
+ public:
+  explicit KdTree(int dimensions) : dimensions_(dimensions) {}
+
+  /// The row must not be in the tree, and keep its descriptor while it is.
+  void Insert(int row, const WordStorage& storage) {
+    while (leaf_of_row_.size() <= Index(row)) leaf_of_row_.Extend();
+    if (size_++ == 0) {
+      if (nodes_.size() == 0) NewPair(-1);
+      SetLeaf(kRoot, row);
+      return;
+    }
+    const float* point = Point(row, storage);
+    int node = kRoot;
+    while (!IsLeaf(At(node))) node = NextTo(At(node), point);
+    Split(node, row, storage);
+  }
+
+  /// The row must be in the tree.
+  void Remove(int row) {
+    const int leaf = leaf_of_row_[Index(row)];
+    if (--size_ == 0) return;
+    const int pair = leaf / 2;
+    Place(parent_[Index(pair)], At(leaf ^ 1));
+    free_pairs_.push_back(pair);
+  }
+
+  /// Offers the words of up to `checks` leaves to each query's `nearest`, by squared distance; of more until
+  /// it is full. The queries take turns: while one waits for memory, others go on. What each finds does not
+  /// depend on the others.
+  void Search(const std::vector<const float*>& queries, int checks, const WordStorage& storage,
+              std::vector<TwoNearest>& nearest) const {
+    if (size_ == 0) return;
+    std::vector<Walk> walks(queries.size());
+    std::vector<Walk*> active;
+    for (std::size_t i = 0; i < queries.size(); ++i) {
+      walks[i].query = queries[i];
+      walks[i].nearest = &nearest[i];
+      walks[i].branches.reserve(Index(MostBranches(checks)) + 1);
+      active.push_back(&walks[i]);
+    }
+    while (!active.empty()) {
+      for (std::size_t i = 0; i < active.size();) {
+        if (Step(checks, storage, *active[i])) {
+          ++i;
+        } else {
+          active[i] = active.back();
+          active.pop_back();
+        }
+      }
+    }
+  }
+
+  /// Appends the shape, with each row by its number in `rank` (by row).
+  void Save(const std::vector<int>& rank, ByteWriter& out) const {
+    std::vector<int> ahead;
+    if (size_ > 0) ahead.push_back(kRoot);
+    while (!ahead.empty()) {
+      const Node& node = At(ahead.back());
+      ahead.pop_back();
+      if (IsLeaf(node)) {
+        out.Put<std::int32_t>(-1 - rank[Index(node.link)]);
+        continue;
+      }
+      out.Put<std::int32_t>(node.dimension);
+      out.Put(node.value);
+      ahead.insert(ahead.end(), {node.link + 1, node.link});
+    }
+  }
+
+  /// Takes up what Save wrote, into an empty tree: it must have all rows 0 .. rows - 1, each once.
+  void Load(int rows, ByteReader& in) {
+    for (int row = 0; row < rows; ++row) {
+      leaf_of_row_.Extend();
+      leaf_of_row_[Index(row)] = -1;
+    }
+    std::vector<int> ahead;
+    if (rows > 0) ahead.push_back(NewPair(-1));
+    while (!ahead.empty()) {
+      const int node = ahead.back();
+      ahead.pop_back();
+      const int what = in.Get<std::int32_t>();
+      if (what < 0) {
+        const int row = -1 - what;
+        if (row >= rows || leaf_of_row_[Index(row)] >= 0) in.Damaged("a kd-tree with an impossible word");
+        SetLeaf(node, row);
+        ++size_;
+        continue;
+      }
+      const float value = in.Get<float>();
+      if (what >= dimensions_) in.Damaged("a kd-tree with an impossible dimension");
+      const int child = NewPair(node);
+      At(node) = {child, what, value};
+      ahead.insert(ahead.end(), {child + 1, child});
+    }
+    if (size_ != rows) in.Damaged("a kd-tree without some of the words");
+  }
+
+ private:
+  // Two children lie side by side, at an even number: their pair is half of it.
+  struct Node {
+    int link = 0;        // its first child; of a leaf: its row
+    int dimension = -1;  // -1: a leaf
+    float value = 0.0f;  // below it: the first child
+  };
+  struct Branch {
+    float distance;
+    int node;
+  };
+  static constexpr int kRoot = 0;
+  // A search on its way.
+  struct Walk {
+    const float* query = nullptr;
+    TwoNearest* nearest = nullptr;
+    int node = kRoot;
+    float distance = 0.0f;  // least that a leaf below the node can have
+    bool at_leaf = false;   // its descriptor was asked for
+    int checked = 0;
+    std::vector<Branch> branches;  // not taken; the nearest last, and no more than may still be taken
+  };
+
+  static std::size_t Index(int i) { return static_cast<std::size_t>(i); }
+  static bool IsLeaf(const Node& node) { return node.dimension < 0; }
+  Node& At(int node) { return nodes_[Index(node)]; }
+  const Node& At(int node) const { return nodes_[Index(node)]; }
+  static int NextTo(const Node& node, const float* point) {
+    return node.link + (point[node.dimension] < node.value ? 0 : 1);
+  }
+  static const float* Point(int row, const WordStorage& storage) {
+    return reinterpret_cast<const float*>(storage.At(row));
+  }
+
+  // Returns its first node.
+  int NewPair(int parent) {
+    int pair = static_cast<int>(parent_.size());
+    if (free_pairs_.empty()) {
+      parent_.Extend();
+      nodes_.Extend();
+      nodes_.Extend();
+    } else {
+      pair = free_pairs_.back();
+      free_pairs_.pop_back();
+    }
+    parent_[Index(pair)] = parent;
+    return 2 * pair;
+  }
+
+  void SetLeaf(int node, int row) {
+    At(node) = {row, -1, 0.0f};
+    leaf_of_row_[Index(row)] = node;
+  }
+
+  // What was elsewhere is here now.
+  void Place(int node, const Node& content) {
+    At(node) = content;
+    if (IsLeaf(content)) {
+      leaf_of_row_[Index(content.link)] = node;
+    } else {
+      parent_[Index(content.link / 2)] = node;
+    }
+  }
+
+  void Split(int node, int row, const WordStorage& storage) {
+    const int old_row = At(node).link;
+    const float* point = Point(row, storage);
+    const float* old_point = Point(old_row, storage);
+    int dimension = 0;
+    float widest = 0.0f;
+    for (int d = 0; d < dimensions_; ++d) {
+      const float span = std::abs(point[d] - old_point[d]);
+      if (span > widest) {
+        widest = span;
+        dimension = d;
+      }
+    }
+    const int child = NewPair(node);
+    const int side = point[dimension] < old_point[dimension] ? 0 : 1;
+    SetLeaf(child + side, row);
+    SetLeaf(child + 1 - side, old_row);
+    At(node) = {child, dimension, (point[dimension] + old_point[dimension]) / 2};
+  }
+
+  // One node further; false when there is nothing left to do.
+  bool Step(int checks, const WordStorage& storage, Walk& walk) const {
+    const Node& node = At(walk.node);
+    if (!IsLeaf(node)) {
+      Descend(node, checks, walk);
+      return true;
+    }
+    if (!walk.at_leaf) {
+      walk.at_leaf = true;
+      const char* descriptor = reinterpret_cast<const char*>(storage.At(node.link));
+      for (std::size_t byte = 0; byte < storage.row_bytes(); byte += 64)
+        __builtin_prefetch(descriptor + byte);
+      return true;
+    }
+    Check(node.link, storage, walk);
+    return walk.checked < checks || walk.nearest->second < 0 ? TakeNearestBranch(walk) : false;
+  }
+
+  static int MostBranches(int checks) { return std::max(1, checks - 1); }
+
+  void Descend(const Node& node, int checks, Walk& walk) const {
+    const float difference = walk.query[node.dimension] - node.value;
+    const int side = difference < 0 ? 0 : 1;
+    const float distance = walk.distance + difference * difference;
+    if (distance < walk.nearest->second_distance) {
+      KeepBranch({distance, node.link + 1 - side}, MostBranches(checks), walk.branches);
+    }
+    walk.node = node.link + side;
+    __builtin_prefetch(&At(walk.node));
+  }
+
+  static void KeepBranch(const Branch& branch, int most, std::vector<Branch>& branches) {
+    if (static_cast<int>(branches.size()) == most) {
+      if (branch.distance >= branches.front().distance) return;
+      branches.erase(branches.begin());
+    }
+    auto at = branches.end();
+    while (at != branches.begin() && (at - 1)->distance <= branch.distance) --at;
+    branches.insert(at, branch);
+  }
+
+  bool TakeNearestBranch(Walk& walk) const {
+    if (walk.branches.empty()) return false;
+    walk.node = walk.branches.back().node;
+    walk.distance = walk.branches.back().distance;
+    walk.branches.pop_back();
+    walk.at_leaf = false;
+    __builtin_prefetch(&At(walk.node));
+    return walk.distance <= walk.nearest->second_distance;  // else the others are no nearer
+  }
+
+  void Check(int row, const WordStorage& storage, Walk& walk) const {
+    float distance = 0.0f;
+    SquaredDistances(walk.query, Point(row, storage), 1, dimensions_, 0, &distance);
+    if (distance <= walk.nearest->second_distance) walk.nearest->Offer(storage.WordOf(row), distance);
+    ++walk.checked;
+  }
+
+  int dimensions_;
+  int size_ = 0;  // rows
+  ChunkedVector<Node> nodes_;
+  ChunkedVector<int> parent_;       // by pair: the node whose children they are
+  ChunkedVector<int> leaf_of_row_;  // by row in the tree
+  std::vector<int> free_pairs_;
+};
+
+}  // namespace tutti::internal

@@ -1,0 +1,87 @@
+// Descriptors of words in blocks that never move: kd-trees and tries refer to them.
+#pragma once
+
+#include <cstdint>
+#include <cstring>
+#include <memory>
+#include <vector>
+
+#include "loopclosure/store/byte_stream.h"
+#include "loopclosure/vocabulary/chunked_vector.h"
+#include "loopclosure/vocabulary/word_map.h"
+
+namespace tutti::internal {
+
+/// Rows of equal size, each with the id of its word. A row keeps its place ("row number") until it is freed.
+class WordStorage {
+ public:
+  explicit WordStorage(std::size_t row_bytes) : row_bytes_(row_bytes) {}
+
+  /// Copies a descriptor in; returns its row number. Freed rows are used again, the latest first.
+  int Add(int word, const std::uint8_t* descriptor) {
+    int row = end();
+    if (!free_.empty()) {
+      row = free_.back();
+      free_.pop_back();
+    } else {
+      words_.Extend();
+      if (words_.size() > blocks_.size() * kRowsPerBlock) {
+        blocks_.push_back(std::make_unique<std::uint8_t[]>(kRowsPerBlock * row_bytes_));
+      }
+    }
+    words_[static_cast<std::size_t>(row)] = word;
+    std::memcpy(At(row), descriptor, row_bytes_);
+    row_of_word_[word] = row;
+    return row;
+  }
+
+  void Free(int row) {
+    row_of_word_.Erase(WordOf(row));
+    words_[static_cast<std::size_t>(row)] = -1;
+    free_.push_back(row);
+  }
+
+  /// The id of a word that is not in it yet, from a saved index. Throws InputError if it is damaged.
+  int ReadNewWord(ByteReader& in) const {
+    const int word = in.Get<std::int32_t>();
+    if (word < 0 || word >= kMostWords || RowOf(word) >= 0) {
+      in.Damaged("an impossible word, or one that is there twice");
+    }
+    return word;
+  }
+
+  /// Row number of a word, -1 if there is none.
+  int RowOf(int word) const {
+    const int* row = row_of_word_.Find(word);
+    return row == nullptr ? -1 : *row;
+  }
+  /// Word of a row number, -1 if the row is free.
+  int WordOf(int row) const { return words_[static_cast<std::size_t>(row)]; }
+  std::uint8_t* At(int row) const {
+    const std::size_t index = static_cast<std::size_t>(row);
+    return blocks_[index / kRowsPerBlock].get() + index % kRowsPerBlock * row_bytes_;
+  }
+  /// Calls call(word, row) for every word, ascending.
+  template <typename Call>
+  void ForEach(const Call& call) const {
+    row_of_word_.ForEach(call);
+  }
+
+  /// Words in it.
+  int size() const { return static_cast<int>(row_of_word_.size()); }
+  /// Row numbers are below this.
+  int end() const { return static_cast<int>(words_.size()); }
+  std::size_t row_bytes() const { return row_bytes_; }
+
+  static constexpr std::size_t kRowsPerBlock = 1024;
+  static constexpr int kMostWords = 1 << 28;  ///< word ids are below this
+
+ private:
+  std::size_t row_bytes_;
+  std::vector<std::unique_ptr<std::uint8_t[]>> blocks_;
+  ChunkedVector<int> words_;  // by row number, -1: free
+  std::vector<int> free_;
+  WordMap<int> row_of_word_;
+};
+
+}  // namespace tutti::internal

@@ -1,0 +1,158 @@
+#include "apps/run/plot.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <opencv2/imgcodecs.hpp>
+#include <sstream>
+
+#include "apps/run/plot_shapes.h"
+#include "tests/support/test_data.h"
+#include "tutti/core/error.h"
+
+namespace tutti {
+namespace {
+
+std::string ReadAll(const std::filesystem::path& file) {
+  std::ifstream in(file);
+  std::stringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+TrajectoryPlot Circle() {
+  TrajectoryPlot plot;
+  plot.title = "a < b & c";
+  PlotSeries series;
+  series.name = "reference";
+  series.color = "#0072b2";
+  for (int i = 0; i <= 100; ++i)
+    series.points.emplace_back(10 * std::cos(0.0628 * i), 0.01 * i, 10 * std::sin(0.0628 * i));
+  plot.series.push_back(series);
+  plot.edges.emplace_back(series.points[0], series.points[50]);
+  return plot;
+}
+
+TEST(Plot, SvgHasAxesUnitsLegendAndEscapedTitle) {
+  const auto file = testing::FreshFolder() / "p.svg";
+  WriteSvg(file, Circle());
+  const std::string svg = ReadAll(file);
+  EXPECT_NE(svg.find("a &lt; b &amp; c"), std::string::npos);
+  EXPECT_NE(svg.find("x [m]"), std::string::npos);  // the flat axis y is not drawn
+  EXPECT_NE(svg.find("z [m]"), std::string::npos);
+  EXPECT_NE(svg.find(">reference<"), std::string::npos);
+  EXPECT_NE(svg.find(">loops<"), std::string::npos);
+  EXPECT_NE(svg.find("</svg>"), std::string::npos);
+  EXPECT_EQ(svg.find("nan"), std::string::npos);
+}
+
+TEST(Plot, PngIsNotBlank) {
+  const auto file = testing::FreshFolder() / "p.png";
+  WritePng(file, Circle());
+  const cv::Mat image = cv::imread(file.string(), cv::IMREAD_COLOR);
+  ASSERT_FALSE(image.empty());
+  int blue = 0;
+  for (int y = 0; y < image.rows; ++y) {
+    for (int x = 0; x < image.cols; ++x)
+      blue += image.at<cv::Vec3b>(y, x) == cv::Vec3b(0xb2, 0x72, 0x00) ? 1 : 0;
+  }
+  EXPECT_GT(blue, 500);
+}
+
+TEST(Plot, EmptySinglePointAndNonFiniteAreDrawable) {
+  const auto folder = testing::FreshFolder();
+  TrajectoryPlot plot;
+  WriteSvg(folder / "empty.svg", plot);
+  plot.series.push_back({"one", {Eigen::Vector3d(1, 2, 3)}, "#000000", 1, false});
+  WriteSvg(folder / "one.svg", plot);
+  plot.series[0].points.push_back(Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()));
+  plot.series[0].dashed = true;
+  WritePng(folder / "nan.png", plot);
+  EXPECT_EQ(ReadAll(folder / "one.svg").find("nan"), std::string::npos);
+  EXPECT_TRUE(std::filesystem::exists(folder / "nan.png"));
+}
+
+CurvePlot Curves() {
+  CurvePlot plot;
+  plot.title = "mean & others";
+  plot.x_name = "recall";
+  plot.y_name = "precision";
+  PlotCurve curve;
+  curve.name = "verified";
+  curve.color = "#d55e00";
+  curve.points = {{0, 1}, {0.5, 1}, {0.5, 0.8}, {1, 0.8}};
+  curve.marks = {{0.5, 0.8}};
+  plot.curves.push_back(curve);
+  plot.notes.push_back("a note");
+  return plot;
+}
+
+TEST(Plot, CurvesHaveAxesLegendNotesAndMarks) {
+  const auto folder = testing::FreshFolder();
+  WriteSvg(folder / "p.svg", Curves());
+  const std::string svg = ReadAll(folder / "p.svg");
+  for (const char* text : {">recall<", ">precision<", ">verified<", ">a note<", ">0.5<", "mean &amp; others",
+                           "<circle", "</svg>"})
+    EXPECT_NE(svg.find(text), std::string::npos) << text;
+  WritePng(folder / "p.png", Curves());
+  const cv::Mat image = cv::imread((folder / "p.png").string(), cv::IMREAD_COLOR);
+  ASSERT_FALSE(image.empty());
+  cv::Mat of_the_curve;
+  cv::inRange(image, cv::Scalar(0x00, 0x5e, 0xd5), cv::Scalar(0x00, 0x5e, 0xd5), of_the_curve);
+  EXPECT_GT(cv::countNonZero(of_the_curve), 500);
+}
+
+TEST(Plot, CurvesThatAreEmptyOrNotFiniteAreDrawable) {
+  const auto folder = testing::FreshFolder();
+  WriteSvg(folder / "empty.svg", CurvePlot());
+  CurvePlot plot = Curves();
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  plot.curves[0].points = {{nan, 1}, {0.5, nan}};
+  plot.curves[0].marks = {{nan, nan}};
+  WriteSvg(folder / "nan.svg", plot);
+  WritePng(folder / "nan.png", plot);
+  EXPECT_EQ(ReadAll(folder / "nan.svg").find("nan"), std::string::npos);
+}
+
+TEST(Plot, FittedAxesReachWhatTheCurvesReach) {
+  const auto folder = testing::FreshFolder();
+  CurvePlot plot = Curves();
+  plot.fit = true;
+  plot.curves[0].points = {{0, 0}, {250, 4}, {500, 3}};
+  plot.curves[0].marks.clear();
+  WriteSvg(folder / "p.svg", plot);
+  const std::string svg = ReadAll(folder / "p.svg");
+  for (const char* text : {">500<", ">4<", ">verified<"})
+    EXPECT_NE(svg.find(text), std::string::npos) << text;
+  for (const PlotShape& shape : LayOut(plot)) {
+    for (const Eigen::Vector2d& p : shape.points) {
+      EXPECT_TRUE(p.x() >= 0 && p.x() <= kPlotWidth && p.y() >= 0 && p.y() <= kPlotHeight);
+    }
+  }
+  plot.curves[0].points = {{0, 0}, {0, 0}};  // no extent
+  WriteSvg(folder / "flat.svg", plot);
+  EXPECT_EQ(ReadAll(folder / "flat.svg").find("nan"), std::string::npos);
+}
+
+TEST(Plot, AxesThatRunBackPutTheirLowValueAtTheTop) {
+  PlotAxes axes;
+  axes.low = {0, 10};
+  axes.high = {10, 0};
+  EXPECT_EQ(axes.Page({0, 0}), axes.top_left);
+  EXPECT_EQ(axes.Page({10, 10}), axes.bottom_right);
+  std::vector<PlotShape> shapes;
+  AddAxes(axes, shapes);
+  EXPECT_GT(shapes.size(), 10u);
+}
+
+TEST(Plot, UnwritableFileIsAnInputError) {
+  EXPECT_THROW(WriteSvg("/proc/no/plot.svg", Circle()), InputError);
+  EXPECT_THROW(WritePng("/proc/no/plot.png", Circle()), InputError);
+  EXPECT_THROW(WriteSvg("/proc/no/plot.svg", Curves()), InputError);
+  EXPECT_THROW(WritePng("/proc/no/plot.png", Curves()), InputError);
+}
+
+}  // namespace
+}  // namespace tutti

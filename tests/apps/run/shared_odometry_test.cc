@@ -1,0 +1,126 @@
+// Loop closure on an odometry that was tracked once.
+#include "apps/run/shared_odometry.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <iterator>
+
+#include "apps/run/outputs.h"
+#include "data/synthetic/synthetic_writer.h"
+#include "tests/support/small_town.h"
+#include "tests/support/test_data.h"
+#include "tutti/core/error.h"
+
+namespace tutti {
+namespace {
+
+namespace fs = std::filesystem;
+
+// A lap around a block and a bit more, with loops. Made once per program.
+const fs::path& TownWithALoop() {
+  struct Folder {
+    fs::path path = fs::temp_directory_path() / ("tutti-loop-town-" + std::to_string(getpid()));
+    Folder() {
+      SyntheticOptions options = testing::SmallStereoTownWithALoop(512, 256);
+      options.noise_sigma = 4;
+      SyntheticWriteOptions write;
+      write.threads = 2;
+      WriteSyntheticDataset(SyntheticWorld(options), path, write);
+    }
+    ~Folder() {
+      std::error_code ignored;
+      fs::remove_all(path, ignored);
+    }
+  };
+  static const Folder folder;
+  return folder.path;
+}
+
+class SharedOdometry : public ::testing::Test {
+ protected:
+  static RunConfig Config() {
+    RunConfig config;
+    config.dataset.type = DatasetType::kKitti;
+    config.dataset.sensor = Sensor::kStereo;
+    config.odometry.features = 1000;
+    return config;
+  }
+  RunRequest Request(const std::string& out) const {
+    RunRequest request;
+    request.config = "test";
+    request.dataset = TownWithALoop();
+    request.out = folder_ / out;
+    request.quiet = true;
+    return request;
+  }
+  static std::string Text(const Trajectory& trajectory, const fs::path& file) {
+    WriteTrajectory(file, trajectory, TrajectoryFormat::kTum);
+    std::ifstream in(file);
+    return {std::istreambuf_iterator<char>(in), {}};
+  }
+  // The lines of loops.csv up to the image that was the first to be measured against the map.
+  static std::vector<std::string> Proposals(const RunResult& result, std::int64_t before) {
+    std::vector<std::string> out;
+    for (const LoopRecord& loop : result.loops) {
+      if (loop.query >= before) break;
+      std::string line = std::to_string(loop.query) + " " + std::to_string(loop.candidate) + " " +
+                         std::to_string(loop.inliers) + "/" + std::to_string(loop.matches);
+      for (const MemberOpinion& member : loop.members) line += " " + std::to_string(member.hypothesis);
+      out.push_back(line);
+    }
+    return out;
+  }
+  const fs::path folder_ = testing::FreshFolder();
+};
+
+TEST_F(SharedOdometry, LoopsMoveTheMapAndLeaveTheOdometryAlone) {
+  const TrackedSequence tracked = TrackSequence(Request("odometry"), Config());
+  ASSERT_TRUE(tracked.odometry);
+  EXPECT_EQ(tracked.result.loops.size(), 0u);
+  const RunResult closed = CloseLoops(tracked, Request("ensemble"), Config());
+  EXPECT_TRUE(closed.shared_odometry);
+  ASSERT_GT(closed.LoopsAccepted(), 0u);
+  ASSERT_GT(closed.corrections, 0);
+  const std::string alone = Text(tracked.result.trajectory, folder_ / "a");
+  EXPECT_EQ(Text(closed.trajectory_odometry, folder_ / "b"), alone);
+  EXPECT_NE(Text(closed.trajectory, folder_ / "c"), alone);
+  ASSERT_TRUE(closed.evaluation && tracked.result.evaluation);
+  EXPECT_LT(closed.evaluation->slam.ate.rmse, tracked.result.evaluation->slam.ate.rmse);
+  EXPECT_EQ(closed.reference.size(), tracked.result.reference.size());
+  EXPECT_TRUE(fs::exists(folder_ / "ensemble" / "loops.csv"));
+}
+
+TEST_F(SharedOdometry, UntilTheFirstVerifiedLoopTheDetectorAnswersAsInARunOfItsOwn) {
+  const TrackedSequence tracked = TrackSequence(Request("odometry"), Config());
+  const RunResult closed = CloseLoops(tracked, Request("shared"), Config());
+  const RunResult apart = RunSlam(Request("apart"), Config());
+  EXPECT_EQ(Text(apart.trajectory_odometry, folder_ / "a"), Text(tracked.result.trajectory, folder_ / "b"));
+  std::int64_t first = -1;
+  for (const LoopRecord& loop : apart.loops) {
+    if (loop.verified && first < 0) first = loop.query + 1;
+  }
+  ASSERT_GT(first, 0);
+  const std::vector<std::string> proposals = Proposals(apart, first);
+  ASSERT_FALSE(proposals.empty());
+  EXPECT_EQ(Proposals(closed, first), proposals);
+}
+
+TEST_F(SharedOdometry, TheSameForAnyNumberOfThreads) {
+  RunRequest one = Request("one"), two = Request("two");
+  one.threads = 1;
+  two.threads = 2;
+  const RunResult a = CloseLoops(TrackSequence(one, Config()), one, Config());
+  const RunResult b = CloseLoops(TrackSequence(two, Config()), two, Config());
+  EXPECT_EQ(LoopsCsv(a), LoopsCsv(b));
+  EXPECT_EQ(Text(a.trajectory, folder_ / "a"), Text(b.trajectory, folder_ / "b"));
+}
+
+TEST_F(SharedOdometry, WithoutACalibrationThereIsNone) {
+  TrackedSequence tracked;
+  EXPECT_THROW(CloseLoops(tracked, Request("none"), Config()), InputError);
+}
+
+}  // namespace
+}  // namespace tutti

@@ -1,0 +1,242 @@
+#include "tutti/slam/config.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <regex>
+#include <set>
+#include <sstream>
+
+#include "tests/support/test_data.h"
+#include "tutti/core/error.h"
+
+namespace tutti {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+std::string Message(const std::string& text) {
+  try {
+    ParseConfig(text, "my.yaml");
+  } catch (const InputError& e) {
+    return e.what();
+  }
+  return "";
+}
+
+TEST(Config, EmptyFileKeepsAllDefaults) {
+  const RunConfig config = ParseConfig("", "my.yaml");
+  EXPECT_EQ(config.run.loop_delay_frames, SlamOptions().loop_delay_frames);
+  EXPECT_FALSE(config.dataset.camera.has_value());
+}
+
+TEST(Config, ReadsEverySection) {
+  const RunConfig config = ParseConfig(
+      "dataset: {sensor: stereo, type: kitti, stride: 2}\n"
+      "camera: {width: 640, height: 480, fx: 520, fy: 521, cx: 318, cy: 236, baseline_m: 0.5}\n"
+      "odometry: {seed: 7}\n"
+      "loops:\n  members: [sift, orb]\n  verification: {min_inliers: 33}\n"
+      "graph: {robust: gnc, solver: block}\n"
+      "run: {threads: 1}\n",
+      "my.yaml");
+  EXPECT_EQ(config.dataset.sensor, Sensor::kStereo);
+  EXPECT_EQ(config.dataset.stride, 2);
+  ASSERT_TRUE(config.dataset.camera.has_value());
+  EXPECT_EQ(config.dataset.camera->fy, 521);
+  EXPECT_EQ(config.dataset.baseline_m, 0.5);
+  EXPECT_EQ(config.odometry.seed, 7u);
+  EXPECT_EQ(config.loops.members, (std::vector<std::string>{"sift", "orb"}));
+  EXPECT_EQ(config.loops.verification.min_inliers, 33);
+  EXPECT_EQ(config.graph.robust, RobustLoss::kGnc);
+  EXPECT_EQ(config.graph.solver, PoseGraphSolver::kBlock);
+  EXPECT_EQ(ParseConfig("", "my.yaml").graph.solver, PoseGraphSolver::kCeres);
+  EXPECT_EQ(config.run.threads, 1);
+}
+
+TEST(Config, ReadsTheNetworkOfTheMemberDnn) {
+  const LoopDetectorOptions loops = ParseConfig(
+                                        "loops:\n  members: [orb, dnn]\n  dnn: {model: net.onnx, width: 224, "
+                                        "height: 200, mean: [1, 2.5, 3],\n"
+                                        "    scale: 0.5, stddev: [4, 5, 6], swap_rb: false, layer: pool}\n",
+                                        "my.yaml")
+                                        .loops;
+  EXPECT_EQ(loops.members, (std::vector<std::string>{"orb", "dnn"}));
+  EXPECT_EQ(loops.dnn.model, "net.onnx");
+  EXPECT_EQ(loops.dnn.width, 224);
+  EXPECT_EQ(loops.dnn.height, 200);
+  EXPECT_EQ(loops.dnn.mean, (std::array<double, 3>{1, 2.5, 3}));
+  EXPECT_EQ(loops.dnn.scale, 0.5);
+  EXPECT_EQ(loops.dnn.stddev, (std::array<double, 3>{4, 5, 6}));
+  EXPECT_FALSE(loops.dnn.swap_rb);
+  EXPECT_EQ(loops.dnn.layer, "pool");
+  EXPECT_THAT(Message("loops:\n  dnn:\n    mean: [1, 2]\n"),
+              AllOf(HasSubstr("my.yaml:3:"), HasSubstr("3 numbers")));
+  EXPECT_THAT(Message("loops:\n  dnn:\n    stddev: [1, 2, x]\n"), HasSubstr("'x' is not a finite number"));
+  EXPECT_THAT(Message("loops:\n  dnn: {width: 9}\n"),
+              AllOf(HasSubstr("my.yaml:2:"), HasSubstr("16 to 4096")));
+  EXPECT_THAT(Message("loops:\n  stm_size: 5\n  members: [dnn]\n"),
+              AllOf(HasSubstr("my.yaml:3:"), HasSubstr("dnn.model is empty")));
+  LoopDetectorOptions set;
+  SetLoopOptions({"members=[dnn]", "dnn.model=a.onnx", "dnn.mean=[7, 8, 9]"}, set);
+  EXPECT_EQ(set.dnn.mean, (std::array<double, 3>{7, 8, 9}));
+}
+
+TEST(Config, UnknownKeyNamesLineAndNearestKey) {
+  EXPECT_THAT(Message("odometry:\n  seed: 1\nloops:\n  loop_treshold: 0.2\n"),
+              AllOf(HasSubstr("my.yaml:4:"), HasSubstr("loop_treshold"), HasSubstr("'loop_threshold'")));
+  EXPECT_THAT(Message("loops:\n  verification:\n    min_inlier: 3\n"),
+              AllOf(HasSubstr("my.yaml:3:"), HasSubstr("'min_inliers'")));
+}
+
+TEST(Config, UnknownSectionNamesNearestSection) {
+  EXPECT_THAT(Message("\nodometri:\n  seed: 1\n"), AllOf(HasSubstr("my.yaml:2:"), HasSubstr("'odometry'")));
+}
+
+TEST(Config, RepeatedKeyIsRefused) {
+  EXPECT_THAT(Message("run:\n  threads: 1\n  threads: 2\n"),
+              AllOf(HasSubstr("my.yaml:3:"), HasSubstr("twice")));
+}
+
+TEST(Config, WrongTypesAreRefusedWithTheirLine) {
+  EXPECT_THAT(Message("run:\n  threads: two\n"), AllOf(HasSubstr("my.yaml:2:"), HasSubstr("whole number")));
+  EXPECT_THAT(Message("run:\n  threads: 1.5\n"), HasSubstr("my.yaml:2:"));
+  EXPECT_THAT(Message("run:\n  loops: maybe\n"), HasSubstr("true or false"));
+  EXPECT_THAT(Message("run:\n  loop_agree_deg: .nan\n"), HasSubstr("finite number"));
+  EXPECT_THAT(Message("odometry:\n  seed: -3\n"), HasSubstr("not negative"));
+  EXPECT_THAT(Message("dataset:\n  sensor: sonar\n"), HasSubstr("mono, stereo, rgbd"));
+  EXPECT_THAT(Message("loops:\n  members: surf\n"), HasSubstr("list"));
+  EXPECT_THAT(Message("run: 5\n"), HasSubstr("my.yaml:1:"));
+  EXPECT_THAT(Message("run:\n  threads: [1]\n"), HasSubstr("my.yaml:2:"));
+}
+
+TEST(Config, ValuesOutOfRangePointToTheirLine) {
+  EXPECT_THAT(Message("run:\n  loops: true\n  loop_delay_frames: 0\n"),
+              AllOf(HasSubstr("my.yaml:3:"), HasSubstr("loop_delay_frames")));
+  EXPECT_THAT(Message("loops:\n  stm_size: 10\n  loop_threshold: 7\n"), HasSubstr("my.yaml:3:"));
+  EXPECT_THAT(Message("camera:\n  width: 640\n  height: 480\n  fx: -5\n  fy: 500\n  cx: 300\n  cy: 200\n"),
+              HasSubstr("my.yaml:"));
+}
+
+TEST(Config, BrokenYamlNamesTheLine) { EXPECT_THAT(Message("run:\n  threads: [1\n"), HasSubstr("my.yaml:")); }
+
+TEST(Config, MissingFileSaysWhatIsNeeded) {
+  try {
+    LoadConfig("/nowhere/x.yaml");
+    FAIL() << "no error";
+  } catch (const InputError& e) {
+    EXPECT_THAT(e.what(), AllOf(HasSubstr("/nowhere/x.yaml"), HasSubstr("--config")));
+  }
+}
+
+TEST(SetLoopOptions, TakesTheKeysOfTheLoopsSection) {
+  LoopDetectorOptions options;
+  options.seed = 7;
+  SetLoopOptions({"stm_size=20", "extraction.features=300", "rule=product", "stm_size=25"}, options);
+  EXPECT_EQ(options.stm_size, 25);
+  EXPECT_EQ(options.extraction.features, 300);
+  EXPECT_EQ(options.rule, CombinationRule::kProduct);
+  EXPECT_EQ(options.seed, 7u);
+}
+
+TEST(SetLoopOptions, SaysWhatIsWrongAndChangesNothing) {
+  const auto message = [](const std::string& assignment) {
+    LoopDetectorOptions options;
+    try {
+      SetLoopOptions({"stm_size=20", assignment}, options);
+    } catch (const InputError& error) {
+      EXPECT_EQ(options.stm_size, LoopDetectorOptions().stm_size);
+      return std::string(error.what());
+    }
+    return std::string("no error");
+  };
+  EXPECT_THAT(message("stm_size"), HasSubstr("key=value"));
+  EXPECT_THAT(message("extraction.feature=3"), HasSubstr("did you mean 'extraction.features'?"));
+  EXPECT_THAT(message("extraction.features=many"), HasSubstr("'many' is not a whole number"));
+  EXPECT_THAT(message("extraction.features=0"), HasSubstr("extraction.features must be"));
+  EXPECT_THAT(message("stm_size=[1"), HasSubstr("not valid YAML"));
+}
+
+TEST(Config, HelpIsAValidFileWithTheDefaults) {
+  const RunConfig defaults;
+  std::string text = HelpConfig();
+  // The camera's defaults are zeros, "no camera": as a file that is not a usable camera.
+  const std::size_t camera = text.find("camera:"), odometry = text.find("odometry:");
+  text.erase(camera, odometry - camera);
+  const RunConfig config = ParseConfig(text, "help");
+  const auto a = DescribeConfig(config), b = DescribeConfig(defaults);
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i)
+    EXPECT_EQ(a[i].value, b[i].value) << a[i].section << "." << a[i].name;
+}
+
+TEST(Config, EveryConfigurationThatComesWithTheProjectLoads) {
+  int files = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(testing::SourceDir() / "data" / "configs")) {
+    if (entry.path().extension() != ".yaml") continue;
+    EXPECT_NO_THROW(LoadConfig(entry.path())) << entry.path();
+    ++files;
+  }
+  EXPECT_GE(files, 15);
+}
+
+// Names of the fields of a struct, read from its header.
+std::set<std::string> FieldsOf(const std::filesystem::path& header, const std::string& name) {
+  std::ifstream in(testing::SourceDir() / header);
+  std::stringstream buffer;
+  buffer << in.rdbuf();
+  const std::string text = buffer.str();
+  const std::size_t begin = text.find("struct " + name + " {"), end = text.find("\n};", begin);
+  EXPECT_NE(begin, std::string::npos) << name;
+  std::string body = text.substr(begin, end - begin);
+  body = std::regex_replace(body, std::regex("//[^\n]*"), "");
+  body = std::regex_replace(body, std::regex("\\([^)]*\\)"), "()");  // parameters of functions are no fields
+  std::set<std::string> fields;
+  const std::regex field("\\s[\\w:<>, ]+\\s+(\\w+)\\s*(=[^;]*|\\{[^;]*)?;");
+  for (std::sregex_iterator it(body.begin(), body.end(), field), last; it != last; ++it)
+    fields.insert((*it)[1]);
+  return fields;
+}
+
+TEST(Config, EveryOptionFieldHasItsKey) {
+  std::map<std::string, std::set<std::string>> keys;
+  RunConfig config;
+  config.dataset.camera = PinholeCamera();
+  for (const ConfigEntry& entry : DescribeConfig(config)) {
+    keys[entry.section].insert(entry.name);
+    EXPECT_FALSE(entry.doc.empty()) << entry.section << "." << entry.name;
+  }
+  const std::string detector = "loopclosure/include/tutti/loopclosure/detector_options.h";
+  const struct {
+    std::string section, header, name;
+  } structs[] = {
+      {"dataset", "frontend/include/tutti/frontend/dataset.h", "DatasetOptions"},
+      {"camera", "core/include/tutti/core/camera.h", "PinholeCamera"},
+      {"odometry", "frontend/include/tutti/frontend/odometry_options.h", "OdometryOptions"},
+      {"loops", detector, "LoopDetectorOptions"},
+      {"loops.evidence", detector, "EvidenceOptions"},
+      {"loops.extraction", detector, "ExtractionOptions"},
+      {"loops.vocabulary", detector, "VocabularyOptions"},
+      {"loops.verification", detector, "VerificationOptions"},
+      {"loops.dnn", detector, "DnnOptions"},
+      {"graph", "backend/include/tutti/backend/pose_graph_optimizer.h", "PoseGraphOptions"},
+      {"run", "apps/slam/include/tutti/slam/slam_options.h", "SlamOptions"},
+  };
+  for (const auto& s : structs) {
+    const std::set<std::string> fields = FieldsOf(s.header, s.name);
+    EXPECT_GE(fields.size(), 4u) << s.name;
+    for (const std::string& field : fields) {
+      // A section, in section camera, or only for callers of the library (their own features).
+      const bool elsewhere = field == "camera" || field == "baseline_m" || field == "extraction" ||
+                             field == "external_members" || field == "dense_members" ||
+                             field == "vocabulary" || field == "evidence" || field == "verification" ||
+                             field == "dnn";
+      EXPECT_TRUE(elsewhere || keys[s.section].count(field) == 1)
+          << s.section << ": no key for " << s.name << "::" << field;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tutti

@@ -1,0 +1,151 @@
+// The pipeline as a class: what a closed loop does to the map, and to what comes after it.
+#include "tutti/slam/slam_system.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <set>
+
+#include "tests/support/recording.h"
+#include "tests/support/small_town.h"
+#include "tutti/backend/evaluation.h"
+
+namespace tutti {
+namespace {
+
+using testing::Recording;
+
+// Twice round a small block; each test runs in a process of its own.
+const Recording& TwoLaps() {
+  static const Recording recording = [] {
+    SyntheticOptions options = testing::SmallStereoTown(320, 160);
+    options.block_m = 20;
+    options.laps = 2;
+    const SyntheticWorld world(options);
+    return testing::Record(world, world.Size());
+  }();
+  return recording;
+}
+
+RunConfig Small(bool global_adjustment, int threads) {
+  RunConfig config;
+  config.odometry.features = 800;
+  config.run.global_adjustment = global_adjustment;
+  config.run.threads = threads;
+  return config;
+}
+
+struct Result {
+  int adjustments = 0, corrections = 0;
+  std::vector<double> keyframe_stamps;
+  Trajectory trajectory;
+  std::vector<LoopRecord> loops;
+  double ate_m = 0;
+};
+
+Result Drive(const RunConfig& config) {
+  SlamSystem slam(config, TwoLaps().rig);
+  for (const InputFrame& frame : TwoLaps().frames) slam.Track(frame);
+  slam.Finish();
+  Result result;
+  result.adjustments = slam.GlobalAdjustments();
+  result.corrections = slam.Corrections();
+  const Odometry& odometry = *slam.odometry();
+  for (const int id : odometry.KeyframeIds()) result.keyframe_stamps.push_back(odometry.KeyframeStamp(id));
+  result.trajectory = odometry.FrameTrajectory();
+  result.loops = slam.loops();
+  EvaluationOptions options;
+  options.alignment = TrajectoryAlignment::kSE3;
+  result.ate_m = EvaluateTrajectory(TwoLaps().truth, result.trajectory, options).ate.rmse;
+  return result;
+}
+
+TEST(SlamSystem, ASecondLapNeedsFewKeyframesAndTheWholeMapIsAdjusted) {
+  const Result with = Drive(Small(true, 2)), without = Drive(Small(false, 2));
+  ASSERT_GT(with.corrections, 0);
+  EXPECT_GT(with.adjustments, 0);
+  EXPECT_EQ(without.adjustments, 0);
+  // The last half of the second lap: the loop is closed long since.
+  const double end = TwoLaps().truth.back().stamp_s;
+  const auto between = [](const Result& r, double from, double to) {
+    return std::count_if(r.keyframe_stamps.begin(), r.keyframe_stamps.end(),
+                         [&](double t) { return t >= from && t < to; });
+  };
+  EXPECT_LT(4 * between(with, 0.75 * end, end), between(with, 0.25 * end, 0.5 * end));
+  EXPECT_EQ(with.trajectory.size(), TwoLaps().frames.size());
+  EXPECT_LT(with.ate_m, 1.2 * without.ate_m + 0.005);
+  std::printf("  ATE %.4f m, %.4f m without fusion and adjustment; %zu and %zu keyframes\n", with.ate_m,
+              without.ate_m, with.keyframe_stamps.size(), without.keyframe_stamps.size());
+}
+
+// A keyframe without odometry edges would follow any loop, the false ones too.
+TEST(SlamSystem, OdometryEdgesTieEveryKeyframeOfAMonoMapToTheOthers) {
+  SyntheticOptions options = testing::SmallStereoTown(320, 160);
+  options.sensor = SyntheticSensor::kMono;
+  const Recording recording = testing::Record(SyntheticWorld(options), 40);
+  SlamSystem slam(Small(true, 1), recording.rig);
+  for (const InputFrame& frame : recording.frames) slam.Track(frame);
+  slam.Finish();
+  const PoseGraph graph = slam.Graph();
+  ASSERT_GT(graph.nodes().size(), 3u);
+  std::set<int> tied;
+  for (const PoseGraphEdge& edge : graph.edges()) tied.insert({edge.from, edge.to});
+  EXPECT_EQ(tied.size(), graph.nodes().size());
+}
+
+void ExpectTheSameBits(const Result& a, const Result& b) {
+  EXPECT_EQ(a.adjustments, b.adjustments);
+  EXPECT_EQ(a.corrections, b.corrections);
+  ASSERT_EQ(a.trajectory.size(), b.trajectory.size());
+  for (std::size_t i = 0; i < a.trajectory.size(); ++i)
+    EXPECT_EQ(a.trajectory[i].pose.Matrix(), b.trajectory[i].pose.Matrix()) << i;
+}
+
+TEST(SlamSystem, WhatBackgroundWorkFindsDoesNotDependOnTheThreads) {
+  ExpectTheSameBits(Drive(Small(true, 1)), Drive(Small(true, 2)));
+}
+
+TEST(SlamSystem, LoopsThatAreGatedAndClosedInPartsDoNotDependOnTheThreads) {
+  const auto in_parts = [](int threads) {
+    RunConfig config = Small(false, threads);
+    config.online.parts_from_nodes = 5;
+    config.run.loop_gate_sigmas = 20;
+    return config;
+  };
+  const Result one = Drive(in_parts(1)), whole = Drive(Small(false, 2));
+  ExpectTheSameBits(one, Drive(in_parts(2)));
+  EXPECT_EQ(one.corrections, whole.corrections) << "the gate refuses no true loop";
+  EXPECT_NEAR(one.ate_m, whole.ate_m, 0.1 * whole.ate_m);
+}
+
+// The gate's limit is so low that it refuses all: the detector hears of it, at the same image for any number
+// of threads.
+TEST(SlamSystem, TheDetectorIsToldOfLoopsThatTheMapContradicts) {
+  const auto strict = [](int threads) {
+    RunConfig config = Small(false, threads);
+    config.run.loop_gate_sigmas = 0.001;
+    return config;
+  };
+  const Result one = Drive(strict(1)), two = Drive(strict(2));
+  const auto revoked = [](const LoopRecord& loop) { return loop.revoked; };
+  ASSERT_GT(std::count_if(one.loops.begin(), one.loops.end(), revoked), 0);
+  for (const LoopRecord& loop : one.loops) {
+    EXPECT_FALSE(loop.revoked && loop.accepted) << loop.query;
+    EXPECT_EQ(loop.revoked, loop.gate_sigmas.has_value()) << loop.query << ": " << loop.reason;
+  }
+  EXPECT_EQ(one.corrections, 0);
+  ExpectTheSameBits(one, two);
+  ASSERT_EQ(one.loops.size(), two.loops.size());
+  for (std::size_t i = 0; i < one.loops.size(); ++i) {
+    EXPECT_EQ(one.loops[i].revoked, two.loops[i].revoked);
+    EXPECT_EQ(one.loops[i].hypothesis, two.loops[i].hypothesis);
+    EXPECT_EQ(one.loops[i].probability, two.loops[i].probability);
+  }
+}
+
+TEST(SlamSystem, NothingIsRevokedWhereTheMapAgrees) {
+  for (const LoopRecord& loop : Drive(Small(true, 2)).loops) EXPECT_FALSE(loop.revoked) << loop.query;
+}
+
+}  // namespace
+}  // namespace tutti

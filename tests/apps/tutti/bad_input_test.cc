@@ -1,0 +1,190 @@
+// What `tutti run` does with input that is damaged: one clear line, never a crash.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "tests/apps/tiny_town.h"
+#include "tests/apps/tutti/executable.h"
+#include "tests/support/test_data.h"
+
+namespace tutti {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::AnyOf;
+using ::testing::HasSubstr;
+using testing::ReadAll;
+using testing::RunTutti;
+using ::testing::StartsWith;
+
+class BadInput : public ::testing::Test {
+ protected:
+  testing::ProcessResult Run(const fs::path& config, const fs::path& dataset,
+                             std::vector<std::string> more = {}) {
+    std::vector<std::string> arguments = {"run",
+                                          "--config",
+                                          config.string(),
+                                          "--dataset",
+                                          dataset.string(),
+                                          "--out",
+                                          (folder_ / "out").string()};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return RunTutti(arguments);
+  }
+  nlohmann::json Summary() const { return nlohmann::json::parse(ReadAll(folder_ / "out" / "summary.json")); }
+  // Refused before any work: status 1 and one line.
+  static void ExpectRefused(const testing::ProcessResult& run, const std::string& what) {
+    EXPECT_EQ(run.status, 1) << run.output;
+    EXPECT_THAT(run.output, AllOf(StartsWith("tutti: "), HasSubstr(what)));
+    EXPECT_EQ(std::count(run.output.begin(), run.output.end(), '\n'), 1) << run.output;
+  }
+
+  const fs::path folder_ = testing::FreshFolder();
+};
+
+TEST_F(BadInput, MissingFolder) {
+  ExpectRefused(Run(testing::TinyConfig(folder_), folder_ / "nowhere"), (folder_ / "nowhere").string());
+}
+
+TEST_F(BadInput, EmptyFolder) {
+  fs::create_directories(folder_ / "empty");
+  ExpectRefused(Run(testing::TinyConfig(folder_), folder_ / "empty"), (folder_ / "empty").string());
+}
+
+TEST_F(BadInput, MissingCalibration) {
+  const fs::path data = testing::CopyOfTinyTown(folder_ / "data");
+  fs::remove(data / "calib.txt");
+  ExpectRefused(Run(testing::TinyConfig(folder_), data), "calib");
+}
+
+TEST_F(BadInput, MissingConfiguration) {
+  ExpectRefused(Run(folder_ / "no.yaml", testing::TinyTown()), "no.yaml");
+}
+
+TEST_F(BadInput, LessThanNothingIsNoLargeNumber) {
+  for (const char* option : {"--seed", "--max-frames"}) {
+    const auto run = Run(testing::TinyConfig(folder_), testing::TinyTown(), {option, "-1"});
+    EXPECT_EQ(run.status, 1) << run.output;
+    EXPECT_THAT(run.output, AllOf(HasSubstr(option), HasSubstr("'-1'")));
+  }
+  EXPECT_FALSE(fs::exists(folder_ / "out"));
+}
+
+TEST_F(BadInput, UnknownKeyNamesTheNearestValidOne) {
+  const auto run = Run(testing::TinyConfig(folder_, "run:\n  thread: 2\n"), testing::TinyTown());
+  ExpectRefused(run, "'threads'");
+  EXPECT_THAT(run.output, HasSubstr("tiny.yaml:3:"));
+}
+
+TEST_F(BadInput, MissingOptionSaysWhich) {
+  const auto run = RunTutti({"run", "--dataset", "x", "--out", "y"});
+  ExpectRefused(run, "--config");
+}
+
+TEST_F(BadInput, OutputFolderThatCantBeWritten) {
+  testing::WriteAll(folder_ / "file", "x");
+  const fs::path config = testing::TinyConfig(folder_);
+  for (const fs::path& out : {folder_ / "file", folder_ / "file" / "out", fs::path("/proc/tutti-out")}) {
+    const auto run = RunTutti({"run", "--config", config.string(), "--dataset", testing::TinyTown().string(),
+                               "--out", out.string()});
+    ExpectRefused(run, out.string());
+  }
+}
+
+TEST_F(BadInput, DamagedImagesInTheMiddleAreSkippedAndCounted) {
+  const fs::path data = testing::CopyOfTinyTown(folder_ / "data");
+  fs::resize_file(data / "image_0" / "000012.png", 3000);              // truncated
+  testing::WriteAll(data / "image_1" / "000015.png", "not an image");  // unreadable
+  const cv::Mat small(100, 100, CV_8UC1, cv::Scalar(128));
+  cv::imwrite((data / "image_0" / "000018.png").string(), small);  // of another size
+  const auto run = Run(testing::TinyConfig(folder_), data);
+  EXPECT_EQ(run.status, 0) << run.output;
+  EXPECT_THAT(run.output, AllOf(HasSubstr("000012.png"), HasSubstr("000015.png"), HasSubstr("000018.png")));
+  EXPECT_EQ(Summary()["frames"]["bad"], 3);
+  EXPECT_EQ(Summary()["frames"]["total"], testing::kTinyFrames);
+  EXPECT_EQ(Summary()["frames"]["tracked"], testing::kTinyFrames - 3);
+}
+
+TEST_F(BadInput, AllImagesDamagedIsAVoidRun) {
+  const fs::path data = testing::CopyOfTinyTown(folder_ / "data");
+  for (const auto& entry : fs::directory_iterator(data / "image_0")) testing::WriteAll(entry.path(), "x");
+  const auto run = Run(testing::TinyConfig(folder_), data);
+  EXPECT_NE(run.status, 0) << run.output;
+  EXPECT_LT(run.status, 128) << run.output;
+}
+
+TEST_F(BadInput, BlankImagesAreAVoidRunThatStillWritesItsSummary) {
+  const fs::path data = testing::CopyOfTinyTown(folder_ / "data");
+  for (const char* side : {"image_0", "image_1"}) {
+    for (const auto& entry : fs::directory_iterator(data / side)) {
+      cv::imwrite(entry.path().string(), cv::Mat(240, 480, CV_8UC1, cv::Scalar(90)));
+    }
+  }
+  const auto run = Run(testing::TinyConfig(folder_), data);
+  EXPECT_EQ(run.status, 1) << run.output;
+  EXPECT_THAT(run.output, HasSubstr("void"));
+  EXPECT_EQ(Summary()["frames"]["tracked"], 0);
+  EXPECT_TRUE(fs::exists(folder_ / "out" / "trajectory.txt"));
+}
+
+TEST_F(BadInput, NotANumberInGroundTruthNamesFileAndLine) {
+  const fs::path data = testing::CopyOfTinyTown(folder_ / "data");
+  std::string text = ReadAll(data / "poses.txt");
+  const std::size_t line = text.find('\n') + 1;
+  text.replace(line, text.find(' ', line) - line, "nan");
+  testing::WriteAll(data / "poses.txt", text);
+  ExpectRefused(Run(testing::TinyConfig(folder_), data), "poses.txt:2:");
+}
+
+TEST_F(BadInput, WrongNumberOfPosesNamesBothCounts) {
+  const fs::path data = testing::CopyOfTinyTown(folder_ / "data");
+  const std::string text = ReadAll(data / "poses.txt");
+  testing::WriteAll(data / "poses.txt", text.substr(text.find('\n') + 1));
+  const auto run = Run(testing::TinyConfig(folder_), data);
+  ExpectRefused(run, "poses.txt");
+  EXPECT_THAT(run.output, AllOf(HasSubstr(std::to_string(testing::kTinyFrames)),
+                                HasSubstr(std::to_string(testing::kTinyFrames - 1))));
+}
+
+TEST_F(BadInput, GroundTruthOfAnotherTimeKeepsTheRun) {
+  testing::WriteAll(folder_ / "other.txt", "1000 0 0 0 0 0 0 1\n1001 1 0 0 0 0 0 1\n1002 1 1 0 0 0 0 1\n");
+  const auto run = Run(testing::TinyConfig(folder_), testing::TinyTown(),
+                       {"--ground-truth", (folder_ / "other.txt").string()});
+  EXPECT_EQ(run.status, 0) << run.output;
+  EXPECT_THAT(run.output, HasSubstr("no evaluation"));
+  EXPECT_TRUE(fs::exists(folder_ / "out" / "trajectory.txt"));
+}
+
+TEST_F(BadInput, GroundTruthThatRepeatsATimeStampIsUsedAndNoted) {
+  const fs::path data = testing::CopyOfTinyTown(folder_ / "data");
+  std::string text;
+  for (int i = 0; i < 40; ++i) {
+    const std::string line = std::to_string(0.1 * i) + " " + std::to_string(0.8 * i) + " 0 " +
+                             std::to_string(0.02 * i * i) + " 0 0 0 1\n";
+    text += line;
+    if (i == 3) text += line;
+  }
+  testing::WriteAll(folder_ / "truth.txt", text);
+  const auto run =
+      Run(testing::TinyConfig(folder_), data, {"--ground-truth", (folder_ / "truth.txt").string()});
+  EXPECT_EQ(run.status, 0) << run.output;
+  EXPECT_THAT(run.output, AllOf(HasSubstr("truth.txt:5: repeats the time stamp"), HasSubstr("ATE")));
+}
+
+TEST_F(BadInput, UnsortedTimeStampsAreRefusedWithTheirLine) {
+  const fs::path data = testing::CopyOfTinyTown(folder_ / "data");
+  std::string text = ReadAll(data / "times.txt");
+  const std::size_t second = text.find('\n') + 1;
+  text.replace(second, text.find('\n', second) - second, "99.0");
+  testing::WriteAll(data / "times.txt", text);
+  ExpectRefused(Run(testing::TinyConfig(folder_), data), "times.txt:");
+}
+
+}  // namespace
+}  // namespace tutti

@@ -1,0 +1,398 @@
+// `tutti loops` and `tutti compare-loops`, end to end, through the real executable.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <csignal>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "tests/apps/tutti/executable.h"
+#include "tests/loopclosure/features/textured_image.h"
+#include "tests/support/test_data.h"
+#include "tutti/core/text.h"
+
+namespace tutti {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using testing::ReadAll;
+using testing::RunTutti;
+using ::testing::StartsWith;
+using testing::WriteAll;
+
+constexpr int kPlaces = 15, kImages = 20;
+constexpr int kEmptySheet = 84 + 340;  // height of a contact sheet with one strip [px]
+
+class LoopsCommand : public ::testing::Test {
+ protected:
+  // Images 15 to 19 show the places of 0 to 4 again.
+  void WriteImages(int count = kImages) const {
+    fs::create_directories(images_);
+    for (int i = 0; i < count; ++i) {
+      const cv::Mat place = testing::TexturedImage(static_cast<std::uint32_t>(i % kPlaces));
+      cv::imwrite((images_ / (std::to_string(i) + ".png")).string(),
+                  i < kPlaces ? place : testing::SeenAgain(place));
+    }
+  }
+  // A matrix of `count` images with these (row, column) pairs as loops.
+  fs::path Truth(const std::vector<std::pair<int, int>>& pairs, int count = kImages) const {
+    cv::Mat matrix = cv::Mat::zeros(count, count, CV_8U);
+    for (const auto& [row, column] : pairs) matrix.at<std::uint8_t>(row, column) = 255;
+    const fs::path file = folder_ / "truth.png";
+    cv::imwrite(file.string(), matrix);
+    return file;
+  }
+  static std::vector<std::pair<int, int>> TruePairs() {
+    std::vector<std::pair<int, int>> pairs;
+    for (int i = kPlaces; i < kImages; ++i) pairs.emplace_back(i, i - kPlaces);
+    return pairs;
+  }
+  testing::ProcessResult Run(const fs::path& truth, const fs::path& out,
+                             const std::vector<std::string>& more = {}) const {
+    std::vector<std::string> arguments = {"loops",        "--images", images_.string(), "--ground-truth",
+                                          truth.string(), "--out",    out.string()};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return RunTutti(arguments);
+  }
+  static nlohmann::json Json(const fs::path& file) { return nlohmann::json::parse(ReadAll(file)); }
+  static cv::Size PictureSize(const fs::path& file) { return cv::imread(file.string()).size(); }
+  static void ExpectAllFiles(const fs::path& out) {
+    for (const char* name :
+         {"results.json", "hypotheses.csv", "precision_recall.csv", "precision_recall.svg"})
+      EXPECT_GT(ReadAll(out / name).size(), 50u) << name;
+    for (const char* name : {"precision_recall.png", "confusion.png", "contact_sheet.png"})
+      EXPECT_GT(PictureSize(out / name).area(), 100000) << name;
+  }
+
+  const fs::path folder_ = testing::FreshFolder();
+  const fs::path images_ = folder_ / "images", out_ = folder_ / "out";
+};
+
+TEST_F(LoopsCommand, WritesEverythingThatScriptsRelyOn) {
+  WriteImages();
+  const auto run = Run(Truth(TruePairs()), out_);
+  ASSERT_EQ(run.status, 0) << run.output;
+  ExpectAllFiles(out_);
+  const nlohmann::json r = Json(out_ / "results.json");
+  EXPECT_EQ(r["images"], kImages);
+  EXPECT_EQ(r["rows_with_loop"], 5);
+  EXPECT_EQ(r["accepted"]["false"], 0);
+  EXPECT_GT(r["recall_at_100_precision"].get<double>(), 0.5);
+  for (const char* key : {"images_damaged",
+                          "recall_at_100_precision_posterior",
+                          "area_under_curve",
+                          "area_under_curve_posterior",
+                          "best_f1",
+                          "best_f1_posterior",
+                          "at_default_threshold",
+                          "at_default_threshold_posterior",
+                          "ms_per_image",
+                          "stage_ms_median",
+                          "protocol",
+                          "recall_at_100_precision_ranked",
+                          "area_under_curve_ranked",
+                          "best_f1_ranked",
+                          "f1_at_default",
+                          "f1_at_default_posterior",
+                          "calibration_error",
+                          "calibration_error_ranked",
+                          "calibration_error_posterior",
+                          "calibration_images"})
+    EXPECT_TRUE(r.contains(key)) << key;
+  EXPECT_EQ(r["protocol"]["rule"], "joint");
+  EXPECT_EQ(r["protocol"]["tolerance_frames"], 0);
+  // Nothing that was refused counts: what is verified was accepted.
+  EXPECT_LE(r["recall_at_100_precision"], r["at_default_threshold"]["recall"]);
+  EXPECT_GE(r["recall_at_100_precision_ranked"], r["recall_at_100_precision"]);
+  for (const char* suffix : {"", "_ranked", "_posterior"}) {
+    int images = 0;
+    for (const nlohmann::json& bin : r[std::string("reliability") + suffix])
+      images += bin["images"].get<int>();
+    EXPECT_EQ(images, r[std::string("calibration_images") + suffix]);
+    EXPECT_EQ(r[std::string("reliability") + suffix].size(), 10u);
+  }
+  EXPECT_THAT(run.output,
+              AllOf(HasSubstr("ranked"), HasSubstr("calibration error"), HasSubstr("over n images")));
+  EXPECT_FALSE(fs::exists(out_ / "dump_candidates.csv"));
+  EXPECT_THAT(ReadAll(out_ / "hypotheses.csv"),
+              StartsWith("image,file,hypothesis,candidate,posterior,probability,proposed,"));
+  EXPECT_THAT(ReadAll(out_ / "precision_recall.svg"),
+              AllOf(HasSubstr("with verification"), HasSubstr("posterior only"), HasSubstr("ranked behind"),
+                    HasSubstr(">recall<")));
+}
+
+// The area and the recall before the first false positive, from the curve's file again.
+TEST_F(LoopsCommand, TheCurvesFileHoldsWhatTheFiguresAreReadFrom) {
+  WriteImages();
+  ASSERT_EQ(Run(Truth({{15, 0}, {16, 1}, {18, 3}}), out_).status, 0);
+  const nlohmann::json r = Json(out_ / "results.json");
+  std::istringstream csv(ReadAll(out_ / "precision_recall.csv"));
+  std::string line;
+  std::getline(csv, line);
+  EXPECT_EQ(line, "curve,threshold,rejected,precision,recall,true_positives,false_positives");
+  double area[3] = {0, 0, 0}, recall[3] = {0, 0, 0}, recall_before[3] = {0, 0, 0};
+  while (std::getline(csv, line)) {
+    const std::vector<std::string> cells = SplitText(line, ",");
+    ASSERT_EQ(cells.size(), 7u) << line;
+    const int k = cells[0] == "verified" ? 0 : cells[0] == "posterior" ? 1 : 2;
+    if (k != 2) {
+      EXPECT_EQ(cells[2], "0") << line;
+    }
+    const double precision = *ParseDouble(cells[3]), r_here = *ParseDouble(cells[4]);
+    area[k] += precision * (r_here - recall_before[k]);
+    recall_before[k] = r_here;
+    if (cells[6] == "0") recall[k] = r_here;
+  }
+  EXPECT_NEAR(area[0], r["area_under_curve"].get<double>(), 1e-6);
+  EXPECT_NEAR(area[1], r["area_under_curve_posterior"].get<double>(), 1e-6);
+  EXPECT_NEAR(area[2], r["area_under_curve_ranked"].get<double>(), 1e-6);
+  EXPECT_NEAR(recall[0], r["recall_at_100_precision"].get<double>(), 1e-6);
+  EXPECT_NEAR(recall[2], r["recall_at_100_precision_ranked"].get<double>(), 1e-6);
+  EXPECT_NEAR(recall[1], r["recall_at_100_precision_posterior"].get<double>(), 1e-6);
+}
+
+TEST_F(LoopsCommand, TheTableHoldsEveryRuleWithItsOwnFolder) {
+  WriteImages();
+  const fs::path truth = Truth(TruePairs());
+  const auto run = Run(truth, out_, {"--table"});
+  ASSERT_EQ(run.status, 0) << run.output;
+  const std::vector<std::string> rules = {"joint", "mean", "log-pool", "product", "majority",
+                                          "naive", "surf", "sift",     "orb"};
+  const nlohmann::json table = Json(out_ / "table.json");
+  EXPECT_EQ(table["rules"].size(), rules.size());
+  for (const std::string& rule : rules) {
+    ExpectAllFiles(out_ / rule);
+    const nlohmann::json alone = Json(out_ / rule / "results.json");
+    EXPECT_EQ(alone["protocol"]["rule"], rule);
+    for (const auto& [key, value] : table["rules"][rule].items()) EXPECT_EQ(value, alone[key]) << key;
+    EXPECT_THAT(ReadAll(out_ / "table.csv"), HasSubstr("\n" + rule + ","));
+    EXPECT_THAT(run.output, HasSubstr("| " + rule + " "));
+  }
+  EXPECT_THAT(
+      ReadAll(out_ / "table.md"),
+      AllOf(HasSubstr("20 of " + images_.string()), HasSubstr("5 with a loop"), HasSubstr(truth.string()),
+            HasSubstr("tolerance 0 frames"), HasSubstr("the newest 10 images"),
+            HasSubstr("chosen after the fact"), HasSubstr("McNemar (exact binomial)"),
+            HasSubstr("| recall at 100 % precision, ranked |"), HasSubstr("| F1 at the default "),
+            HasSubstr("| calibration error "), HasSubstr("(n = ")));
+  EXPECT_THAT(ReadAll(out_ / "table.csv"),
+              AllOf(HasSubstr(",recall_at_100_precision_ranked,"), HasSubstr(",f1_at_default,"),
+                    HasSubstr(",calibration_error_posterior,")));
+  ASSERT_EQ(table["significance"].size(), 12u);
+  for (const nlohmann::json& test : table["significance"]) {
+    EXPECT_EQ(test["images"], 5);
+    EXPECT_GE(test["mcnemar"]["p"].get<double>(), 0);
+    EXPECT_LE(test["mcnemar"]["p"].get<double>(), 1);
+    EXPECT_LE(test["t_test"]["p"].get<double>(), 1);
+  }
+  // The same bytes as a run of that rule alone.
+  ASSERT_EQ(Run(truth, folder_ / "naive", {"--rule", "naive"}).status, 0);
+  EXPECT_EQ(ReadAll(folder_ / "naive" / "hypotheses.csv"), ReadAll(out_ / "naive" / "hypotheses.csv"));
+}
+
+TEST_F(LoopsCommand, TheDumpSaysWhatEachCandidateLookedLike) {
+  WriteImages();
+  const fs::path truth = Truth(TruePairs());
+  ASSERT_EQ(Run(truth, out_, {"--dump"}).status, 0);
+  std::istringstream candidates(ReadAll(out_ / "dump_candidates.csv"));
+  std::string line;
+  std::getline(candidates, line);
+  EXPECT_EQ(line,
+            "image,location,truth,combined_posterior,surf_score,surf_likelihood,surf_posterior,sift_score,"
+            "sift_likelihood,sift_posterior,orb_score,orb_likelihood,orb_posterior");
+  int loops = 0;
+  while (std::getline(candidates, line)) {
+    const std::vector<std::string> cells = SplitText(line, ",");
+    ASSERT_EQ(cells.size(), 13u) << line;
+    const int image = std::stoi(cells[0]), location = std::stoi(cells[1]);
+    EXPECT_LT(location, image - 9);  // short-term memory is no candidate
+    EXPECT_EQ(cells[2], image == location + kPlaces ? "loop" : "none");
+    loops += cells[2] == "loop" ? 1 : 0;
+    EXPECT_GT(*ParseDouble(cells[4]) + *ParseDouble(cells[7]) + *ParseDouble(cells[10]), 0) << line;
+    for (const std::size_t likelihood : {5u, 8u, 11u})  // few words speak against a place, down to 1 / e
+      EXPECT_GE(*ParseDouble(cells[likelihood]), 0.36) << line;
+  }
+  EXPECT_EQ(loops, 5);
+
+  std::istringstream verification(ReadAll(out_ / "dump_verification.csv"));
+  std::getline(verification, line);
+  EXPECT_EQ(line,
+            "image,candidate,truth,order,accepted,chosen,type,matches,inliers,mass,coverage,expected_inliers,"
+            "log_nfa,motion_spread,reason");
+  int chosen = 0;
+  while (std::getline(verification, line)) {
+    const std::vector<std::string> cells = SplitText(line, ",");
+    ASSERT_GE(cells.size(), 15u) << line;
+    if (cells[5] == "1") {
+      EXPECT_EQ(cells[4], "1") << line;
+      EXPECT_EQ(cells[6], "fundamental");
+      EXPECT_EQ(cells[14], "\"\"") << line;
+      ++chosen;
+    }
+  }
+  const nlohmann::json accepted = Json(out_ / "results.json")["accepted"];
+  EXPECT_EQ(chosen, accepted["true"].get<int>() + accepted["false"].get<int>());
+  // Looking on changes nothing.
+  ASSERT_EQ(Run(truth, folder_ / "silent").status, 0);
+  EXPECT_EQ(ReadAll(folder_ / "silent" / "hypotheses.csv"), ReadAll(out_ / "hypotheses.csv"));
+}
+
+TEST_F(LoopsCommand, ADumpOfImagesWithoutFeaturesHasNoCandidates) {
+  fs::create_directories(images_);
+  for (int i = 0; i < 15; ++i)
+    cv::imwrite((images_ / (std::to_string(i) + ".png")).string(), cv::Mat(120, 160, CV_8U, cv::Scalar(90)));
+  const auto run = Run(Truth({}, 15), out_, {"--dump"});
+  ASSERT_EQ(run.status, 0) << run.output;
+  for (const char* name : {"dump_candidates.csv", "dump_verification.csv"}) {
+    const std::string text = ReadAll(out_ / name);
+    EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1) << name;
+  }
+  const nlohmann::json r = Json(out_ / "results.json");
+  EXPECT_TRUE(r["calibration_error"].is_null());
+  EXPECT_EQ(r["f1_at_default"], 1);  // nothing to find, nothing said
+}
+
+TEST_F(LoopsCommand, ATableOfOneRuleIsAContradiction) {
+  WriteImages(2);
+  const auto run = Run(Truth({}, 2), out_, {"--table", "--rule", "mean"});
+  EXPECT_NE(run.status, 0);
+  EXPECT_THAT(run.output, AllOf(HasSubstr("--table"), HasSubstr("--rule")));
+}
+
+TEST_F(LoopsCommand, GroundTruthOfAnotherSizeNamesBothSizes) {
+  WriteImages(4);
+  for (const char* flag : {"--table", "--rule=mean"}) {
+    const auto run = Run(Truth({}, 7), out_, {flag});
+    EXPECT_EQ(run.status, 1);
+    EXPECT_THAT(run.output, AllOf(HasSubstr("7 x 7"), HasSubstr("4 images")));
+  }
+}
+
+TEST_F(LoopsCommand, TransposedGroundTruthIsTheSameGroundTruth) {
+  WriteImages();
+  ASSERT_EQ(Run(Truth(TruePairs()), out_).status, 0);
+  std::vector<std::pair<int, int>> transposed;
+  for (const auto& [row, column] : TruePairs()) transposed.emplace_back(column, row);
+  ASSERT_EQ(Run(Truth(transposed), folder_ / "transposed").status, 0);
+  EXPECT_EQ(ReadAll(out_ / "hypotheses.csv"), ReadAll(folder_ / "transposed" / "hypotheses.csv"));
+  EXPECT_EQ(ReadAll(out_ / "precision_recall.csv"), ReadAll(folder_ / "transposed" / "precision_recall.csv"));
+}
+
+TEST_F(LoopsCommand, NoLoopInTheGroundTruthMakesEveryAcceptedOneFalse) {
+  WriteImages();
+  const auto run = Run(Truth({}), out_);
+  ASSERT_EQ(run.status, 0) << run.output;
+  ExpectAllFiles(out_);
+  const nlohmann::json r = Json(out_ / "results.json");
+  EXPECT_EQ(r["rows_with_loop"], 0);
+  EXPECT_EQ(r["recall_at_100_precision"], 0);
+  EXPECT_GT(r["accepted"]["false"].get<int>(), 1);
+  EXPECT_THAT(ReadAll(out_ / "precision_recall.svg"), HasSubstr("the ground truth has no loop"));
+  EXPECT_GT(PictureSize(out_ / "contact_sheet.png").height, kEmptySheet);
+}
+
+TEST_F(LoopsCommand, NothingWrongGivesAContactSheetThatSaysNone) {
+  WriteImages(13);  // all of different places
+  ASSERT_EQ(Run(Truth({}, 13), out_).status, 0);
+  EXPECT_EQ(PictureSize(out_ / "contact_sheet.png").height, kEmptySheet);
+}
+
+TEST_F(LoopsCommand, OneImageAloneIsARunAndATable) {
+  WriteImages(1);
+  const fs::path truth = folder_ / "pairs.txt";
+  WriteAll(truth, "0\n");
+  const auto run = Run(truth, out_);
+  ASSERT_EQ(run.status, 0) << run.output;
+  ExpectAllFiles(out_);
+  EXPECT_THAT(ReadAll(out_ / "precision_recall.svg"),
+              AllOf(HasSubstr("the curves are empty"), Not(HasSubstr("nan"))));
+  const auto table = Run(truth, out_, {"--table"});
+  ASSERT_EQ(table.status, 0) << table.output;
+  EXPECT_EQ(Json(out_ / "table.json")["significance"][0]["mcnemar"]["p"], 1.0);
+}
+
+TEST_F(LoopsCommand, BlankAndDamagedImagesMissEveryLoopButStayInTheDenominator) {
+  fs::create_directories(images_);
+  for (int i = 0; i < kImages; ++i) {
+    const fs::path file = images_ / (std::to_string(i) + ".png");
+    if (i % 4 == 3) {
+      WriteAll(file, "not an image");
+    } else {
+      cv::imwrite(file.string(), cv::Mat(120, 160, CV_16UC1, cv::Scalar(900)));
+    }
+  }
+  const auto run = Run(Truth(TruePairs()), out_);
+  ASSERT_EQ(run.status, 0) << run.output;
+  ExpectAllFiles(out_);
+  const nlohmann::json r = Json(out_ / "results.json");
+  EXPECT_EQ(r["images_damaged"], 5);
+  EXPECT_EQ(r["rows_with_loop"], 5);
+  EXPECT_EQ(r["at_default_threshold"]["recall"], 0);
+  EXPECT_EQ(PictureSize(out_ / "contact_sheet.png").height, 84 + 5 * 340);
+}
+
+TEST_F(LoopsCommand, AnOutputFolderThatCantBeMadeIsOneLine) {
+  WriteImages(1);
+  WriteAll(folder_ / "pairs.txt", "0\n");
+  const auto run = Run(folder_ / "pairs.txt", "/proc/tutti-out");
+  EXPECT_EQ(run.status, 1);
+  EXPECT_THAT(run.output, HasSubstr("/proc/tutti-out"));
+}
+
+TEST_F(LoopsCommand, CtrlCWritesTheImagesSoFar) {
+  WriteImages();
+  const auto run = testing::RunTuttiAndSignal({"loops", "--images", images_.string(), "--ground-truth",
+                                               Truth(TruePairs()).string(), "--out", out_.string()},
+                                              " 20%", SIGINT);
+  EXPECT_EQ(run.status, 130) << run.output;
+  EXPECT_LT(Json(out_ / "results.json")["images"].get<int>(), kImages);
+  ExpectAllFiles(out_);
+}
+
+std::string SmallTable(double joint, double naive, double surf) {
+  nlohmann::json table;
+  table["best_single"] = {{"verified", "surf"}, {"posterior", "surf"}};
+  for (const auto& [rule, recall] : std::vector<std::pair<std::string, double>>{
+           {"joint", joint}, {"mean", surf}, {"naive", naive}, {"surf", surf}})
+    table["rules"][rule] = {{"recall_at_100_precision", recall},
+                            {"recall_at_100_precision_posterior", recall}};
+  return table.dump();
+}
+
+TEST_F(LoopsCommand, CompareLoopsIsThePairedTTestOverTheSets) {
+  // joint - naive: 0.3, 0.2, 0.1: their mean 0.2, deviation 0.1, t = 0.2 / (0.1 / sqrt 3) = 3.4641. With two
+  // degrees of freedom p = 1 - t / sqrt(2 + t^2) = 0.0742.
+  WriteAll(folder_ / "1.json", SmallTable(0.8, 0.5, 0.8));
+  WriteAll(folder_ / "2.json", SmallTable(0.9, 0.7, 0.9));
+  WriteAll(folder_ / "3.json", SmallTable(0.7, 0.6, 0.7));
+  const std::string out = (folder_ / "t.json").string();
+  const auto run = RunTutti({"compare-loops", (folder_ / "1.json").string(), (folder_ / "2.json").string(),
+                             (folder_ / "3.json").string(), "--out", out});
+  ASSERT_EQ(run.status, 0) << run.output;
+  const nlohmann::json tests = Json(out);
+  ASSERT_EQ(tests.size(), 8u);
+  EXPECT_EQ(tests[1]["a"], "joint");
+  EXPECT_EQ(tests[1]["b"], "naive");
+  EXPECT_EQ(tests[1]["sets"], 3);
+  EXPECT_NEAR(tests[1]["t"].get<double>(), 3.4641, 1e-4);
+  EXPECT_NEAR(tests[1]["p"].get<double>(), 0.0742, 1e-4);
+  EXPECT_EQ(tests[2]["b"], "best single");
+  EXPECT_EQ(tests[2]["p"], 1.0);  // no difference at all
+}
+
+TEST_F(LoopsCommand, CompareLoopsRefusesWhatIsNoTable) {
+  WriteAll(folder_ / "1.json", "[1, 2");
+  WriteAll(folder_ / "2.json", R"({"rules": {}, "best_single": {}})");
+  for (const char* name : {"1.json", "2.json", "none.json"}) {
+    const auto run = RunTutti({"compare-loops", (folder_ / name).string()});
+    EXPECT_EQ(run.status, 1) << run.output;
+    EXPECT_THAT(run.output, HasSubstr(name));
+  }
+}
+
+}  // namespace
+}  // namespace tutti

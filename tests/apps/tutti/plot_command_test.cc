@@ -1,0 +1,99 @@
+// `tutti plot`, end to end, through the real executable.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgcodecs.hpp>
+
+#include "tests/apps/tutti/executable.h"
+#include "tests/support/test_data.h"
+#include "tutti/core/trajectory.h"
+
+namespace tutti {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using testing::ReadAll;
+using testing::RunTutti;
+using ::testing::StartsWith;
+
+class PlotCommand : public ::testing::Test {
+ protected:
+  PlotCommand() {
+    Save("reference.txt", 0);
+    Save("good.txt", 0.1);
+    Save("bad.txt", 0.5);
+  }
+  void Save(const std::string& name, double wave) const {
+    Trajectory out;
+    for (int k = 0; k < 200; ++k) {
+      const double a = 0.03 * k;
+      out.push_back(
+          {0.1 * k, Pose(ExpSO3({0, 0, a}), {20 * std::cos(a), 20 * std::sin(a), wave * std::cos(9 * a)})});
+    }
+    WriteTrajectory(folder_ / name, out, TrajectoryFormat::kTum);
+  }
+  testing::ProcessResult Plot(const std::string& what, const std::vector<std::string>& files,
+                              const std::vector<std::string>& more = {}) const {
+    std::vector<std::string> arguments = {"plot",
+                                          "--reference",
+                                          (folder_ / "reference.txt").string(),
+                                          "--estimate",
+                                          (folder_ / "good.txt").string(),
+                                          (folder_ / "bad.txt").string(),
+                                          "--what",
+                                          what,
+                                          "--out"};
+    for (const std::string& file : files) arguments.push_back((folder_ / file).string());
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return RunTutti(arguments);
+  }
+  const fs::path folder_ = testing::FreshFolder();
+};
+
+TEST_F(PlotCommand, EveryKindIsDrawnAsSvgAndPng) {
+  for (const std::string what : {"trajectory", "error", "rpe"}) {
+    const auto run = Plot(what, {what + ".svg", what + ".png"});
+    ASSERT_EQ(run.status, 0) << run.output;
+    const std::string svg = ReadAll(folder_ / (what + ".svg"));
+    EXPECT_THAT(svg, AllOf(HasSubstr("good.txt"), HasSubstr("bad.txt"), HasSubstr("[m]"), HasSubstr("</svg>"),
+                           HasSubstr("#0072b2"), HasSubstr("#d55e00"), Not(HasSubstr("nan"))));
+    EXPECT_FALSE(cv::imread((folder_ / (what + ".png")).string()).empty());
+  }
+  EXPECT_THAT(ReadAll(folder_ / "trajectory.svg"), HasSubstr(">reference<"));
+  EXPECT_THAT(ReadAll(folder_ / "error.svg"), HasSubstr("distance along the reference [m]"));
+}
+
+TEST_F(PlotCommand, PdfIsWrittenOrTheMissingLibraryIsNamed) {
+  const auto run = Plot("error", {"a.pdf"});
+  if (run.status != 0) {
+    EXPECT_THAT(run.output, AllOf(StartsWith("tutti: "), HasSubstr("libcairo2-dev")));
+    GTEST_SKIP() << "built without Cairo";
+  }
+  EXPECT_THAT(ReadAll(folder_ / "a.pdf"), StartsWith("%PDF"));
+  EXPECT_EQ(Plot("error", {"b.pdf"}).status, 0);
+  EXPECT_EQ(ReadAll(folder_ / "a.pdf"), ReadAll(folder_ / "b.pdf"));
+}
+
+TEST_F(PlotCommand, WhatCanNotBeDrawnIsRefusedInOneLine) {
+  const auto refused = [](const testing::ProcessResult& run, const std::string& text) {
+    EXPECT_EQ(run.status, 1) << run.output;
+    EXPECT_THAT(run.output, AllOf(StartsWith("tutti: "), HasSubstr(text)));
+    EXPECT_EQ(std::count(run.output.begin(), run.output.end(), '\n'), 1) << run.output;
+  };
+  refused(Plot("error", {"a.gif"}), "ends in .svg, .png or .pdf");
+  refused(Plot("error", {"no/a.svg"}), "a.svg");
+  refused(Plot("rpe", {"a.svg"}, {"--rpe-delta", "1000", "--rpe-unit", "metres"}), "--rpe-delta");
+}
+
+TEST_F(PlotCommand, TitleOfOnesOwn) {
+  ASSERT_EQ(Plot("trajectory", {"a.svg"}, {"--title", "Town & country"}).status, 0);
+  EXPECT_THAT(ReadAll(folder_ / "a.svg"), HasSubstr("Town &amp; country"));
+}
+
+}  // namespace
+}  // namespace tutti

@@ -1,0 +1,143 @@
+#include "tutti/backend/g2o_io.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "tests/backend/graph/synthetic_graph.h"
+#include "tests/support/test_data.h"
+#include "tutti/core/error.h"
+
+namespace tutti {
+namespace {
+
+using ::testing::HasSubstr;
+
+std::filesystem::path Write(const std::string& text) {
+  const std::filesystem::path file = testing::FreshFolder() / "graph.g2o";
+  std::ofstream(file) << text;
+  return file;
+}
+
+std::string ErrorOf(const std::string& text) {
+  try {
+    ReadG2o(Write(text));
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+constexpr const char* kVertices = "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0.1\n";
+constexpr const char* kEdge = "EDGE_SE2 0 1 1 0 0.1 1 0 0 1 0 1\n";
+
+TEST(G2o, RoundTripKeepsEveryNumberOfEveryKind) {
+  for (GraphKind kind : {GraphKind::kSE2, GraphKind::kSE3, GraphKind::kSim3}) {
+    testing::SyntheticGraphOptions options;
+    options.kind = kind;
+    options.noise_translation = options.noise_rotation = options.noise_log_scale = 0.01;
+    options.false_loops = 3;
+    PoseGraph graph = testing::MakeSyntheticGraph(options).graph;
+    std::mt19937 random(1);
+    const std::vector<int> used = TangentCoordinates(kind);
+    Matrix7d information = Matrix7d::Zero();
+    information(used, used) = testing::RandomInformation(random)(used, used);
+    graph.AddLoop(2, 40, testing::RandomPose(kind, random, 3, 1), information);
+    graph.SetFixed(5, true);
+    const std::filesystem::path file = testing::FreshFolder() / "round.g2o";
+    WriteG2o(file, graph);
+    const G2oFile back = ReadG2o(file);
+    EXPECT_TRUE(back.has_all_vertices);
+    EXPECT_TRUE(back.warnings.empty());
+    ASSERT_EQ(back.graph.kind(), kind);
+    ASSERT_EQ(back.graph.nodes().size(), graph.nodes().size());
+    ASSERT_EQ(back.graph.edges().size(), graph.edges().size());
+    EXPECT_TRUE(back.graph.Node(5).fixed);
+    for (std::size_t k = 0; k < graph.nodes().size(); ++k) {
+      const Similarity &a = graph.nodes()[k].pose, &b = back.graph.nodes()[k].pose;
+      EXPECT_LT((a.translation - b.translation).norm(), 1e-14);
+      EXPECT_LT(LogSO3(a.rotation.conjugate() * b.rotation).norm(), 1e-14);
+      EXPECT_EQ(a.scale, b.scale);
+    }
+    for (std::size_t e = 0; e < graph.edges().size(); ++e) {
+      const PoseGraphEdge &a = graph.edges()[e], &b = back.graph.edges()[e];
+      EXPECT_EQ(a.from, b.from);
+      EXPECT_EQ(a.to, b.to);
+      EXPECT_EQ(a.kind, b.kind);
+      const Matrix7d difference = a.information - b.information;
+      EXPECT_LT(difference(used, used).norm(), 1e-13 * a.information.norm());
+      EXPECT_EQ(a.measurement.translation, b.measurement.translation);
+    }
+  }
+}
+
+TEST(G2o, ReadsTheUpperTriangleOfTheInformationByRows) {
+  const G2oFile file = ReadG2o(Write(std::string(kVertices) + "EDGE_SE2 0 1 1 0 0.1 10 2 3 20 4 30\n"));
+  const Matrix7d& I = file.graph.edges()[0].information;
+  EXPECT_EQ(I(0, 1), 2);
+  EXPECT_EQ(I(1, 0), 2);
+  EXPECT_EQ(I(0, 5), 3);
+  EXPECT_EQ(I(5, 1), 4);
+  EXPECT_EQ(I(5, 5), 30);
+}
+
+TEST(G2o, VerticesMayBeMissing) {
+  const G2oFile file = ReadG2o(Write("EDGE_SE2 3 1 1 0 0 1 0 0 1 0 1\nEDGE_SE2 1 2 1 0 0 1 0 0 1 0 1\n"));
+  EXPECT_FALSE(file.has_all_vertices);
+  ASSERT_EQ(file.graph.nodes().size(), 3u);
+  EXPECT_FALSE(file.graph.nodes()[0].has_estimate);
+  EXPECT_EQ(file.graph.edges()[0].kind, EdgeKind::kLoop);
+  EXPECT_EQ(file.graph.edges()[1].kind, EdgeKind::kOdometry);
+}
+
+TEST(G2o, UnknownTagsAreReportedOnceAndDoNotStopTheReading) {
+  const G2oFile file =
+      ReadG2o(Write(std::string(kVertices) + "LANDMARK 1 2\n" + kEdge + "LANDMARK 3 4\n# comment\n"));
+  ASSERT_EQ(file.warnings.size(), 1u);
+  EXPECT_THAT(file.warnings[0], HasSubstr("graph.g2o:3: unknown tag 'LANDMARK', 2 lines ignored"));
+  EXPECT_EQ(file.graph.edges().size(), 1u);
+}
+
+TEST(G2o, AcceptsWindowsLineEndsTabsAndComments) {
+  const G2oFile file =
+      ReadG2o(Write("# a graph\r\nVERTEX_SE2 0 0 0 0\r\nVERTEX_SE2\t1 1 0 0.1\r\nEDGE_SE2 0 1 1 0 0.1  1 0 0 "
+                    "1 0 1 # odometry\r\nFIX 1\r\n"));
+  EXPECT_TRUE(file.graph.Node(1).fixed);
+}
+
+TEST(G2o, DamagedFilesNameTheLine) {
+  const std::string good = std::string(kVertices) + kEdge;
+  EXPECT_THAT(ErrorOf(good + "EDGE_SE2 0 1 1 0 0.1 1 0 0 1 0\n"),
+              HasSubstr("graph.g2o:4: EDGE_SE2 has 10 numbers; 11 are needed"));
+  EXPECT_THAT(ErrorOf(good + "EDGE_SE2 0 1 1 0 zero 1 0 0 1 0 1\n"), HasSubstr(":4: 'zero' is not a number"));
+  EXPECT_THAT(ErrorOf(good + "EDGE_SE2 0 1 1 0 nan 1 0 0 1 0 1\n"), HasSubstr(":4: 'nan' is not finite"));
+  EXPECT_THAT(ErrorOf(good + "EDGE_SE2 0 1 1 0 0 1 5 0 1 0 1\n"),
+              HasSubstr(":4: its information matrix is not positive definite"));
+  EXPECT_THAT(ErrorOf(good + "EDGE_SE2 1 1 1 0 0 1 0 0 1 0 1\n"),
+              HasSubstr(":4: the edge leads from node 1 to itself"));
+  EXPECT_THAT(ErrorOf(good + "EDGE_SE2 0 1.5 1 0 0 1 0 0 1 0 1\n"), HasSubstr(":4: '1.5' is not a node id"));
+  EXPECT_THAT(ErrorOf(good + "EDGE_SE2 0 99999999999 1 0 0 1 0 0 1 0 1\n"), HasSubstr("is not a node id"));
+  EXPECT_THAT(ErrorOf(good + "VERTEX_SE2 1 0 0 0\n"), HasSubstr(":4: vertex 1 was given before"));
+  EXPECT_THAT(ErrorOf(good + "FIX 77\n"), HasSubstr(":4: FIX names node 77"));
+  EXPECT_THAT(ErrorOf(good + "VERTEX_SE3:QUAT 5 0 0 0 0 0 0 1\n"),
+              HasSubstr(":4: VERTEX_SE3:QUAT in a graph of SE(2)"));
+  EXPECT_THAT(ErrorOf("VERTEX_SE3:QUAT 5 0 0 0 0 0 0 0\n"), HasSubstr(":1: the quaternion is zero"));
+  EXPECT_THAT(ErrorOf("VERTEX_SIM3:QUAT 5 0 0 0 0 0 0 1 -2\n"), HasSubstr(":1: the scale must be positive"));
+}
+
+TEST(G2o, FilesThatHoldNoGraphSaySo) {
+  EXPECT_THAT(ErrorOf(""), HasSubstr("holds no edge"));
+  EXPECT_THAT(ErrorOf(std::string("\0\xff\x01garbage\n", 11)), HasSubstr("is it a g2o file?"));
+  EXPECT_THAT(ErrorOf(kVertices), HasSubstr("holds no edge"));
+  EXPECT_THROW(ReadG2o("/nonexistent/graph.g2o"), InputError);
+  EXPECT_THROW(ReadG2o(testing::FreshFolder()), InputError);
+}
+
+TEST(G2o, WritingIntoAMissingFolderIsAnInputError) {
+  PoseGraph graph;
+  EXPECT_THROW(WriteG2o("/nonexistent/folder/graph.g2o", graph), InputError);
+}
+
+}  // namespace
+}  // namespace tutti

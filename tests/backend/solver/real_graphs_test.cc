@@ -1,0 +1,67 @@
+// Published graphs against the costs that the best solvers reach (reference_optima.md).
+#include <gtest/gtest.h>
+
+#include "tests/support/test_data.h"
+#include "tutti/backend/g2o_io.h"
+#include "tutti/backend/pose_graph_optimizer.h"
+
+namespace tutti {
+namespace {
+
+struct Reference {
+  const char* name;
+  double chi2;
+};
+
+class RealGraph : public ::testing::TestWithParam<Reference> {};
+
+TEST_P(RealGraph, ReachesTheReferenceFromTheChordalInitialization) {
+  TUTTI_REQUIRE_DATA(folder, "posegraphs");
+  G2oFile file = ReadG2o(folder / (std::string(GetParam().name) + ".g2o"));
+  PoseGraphOptions options;
+  options.objective = GraphObjective::kChi2;
+  options.init = GraphInit::kChordal;
+  const PoseGraphReport report = PoseGraphOptimizer(options).Optimize(file.graph);
+  EXPECT_TRUE(report.success) << report.reason;
+  EXPECT_EQ(report.termination, "converged");
+  EXPECT_LE(report.costs.chi2, GetParam().chi2 * (1 + 1e-6));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Published, RealGraph,
+    ::testing::Values(Reference{"sphere2500", 727.14967}, Reference{"parking-garage", 1.2386906},
+                      Reference{"intel", 45.004696}, Reference{"manhattanOlson3500", 146.07661},
+                      Reference{"kitti_00", 98.322012}, Reference{"manhattan", 3549.0368},
+                      Reference{"torus3D", 14574.746}),
+    [](const auto& test) {
+      std::string name;
+      for (char c : std::string(test.param.name)) name += c == '-' ? '_' : c;
+      return name;
+    });
+
+TEST(RealGraphs, AutoPicksTheChordalStartWhereOdometryIsFarOff) {
+  TUTTI_REQUIRE_DATA(file, "posegraphs/manhattan.g2o");
+  G2oFile graph = ReadG2o(file);
+  EXPECT_FALSE(graph.has_all_vertices);
+  PoseGraphOptions options;
+  options.objective = GraphObjective::kChi2;
+  const PoseGraphReport report = PoseGraphOptimizer(options).Optimize(graph.graph);
+  EXPECT_EQ(report.init, GraphInit::kChordal);
+  EXPECT_LE(report.costs.chi2, 3549.0368 * (1 + 1e-6));
+}
+
+TEST(RealGraphs, TrueLoopsSurviveTheRobustLosses) {
+  TUTTI_REQUIRE_DATA(file, "posegraphs/intel.g2o");
+  for (RobustLoss robust : {RobustLoss::kHuber, RobustLoss::kDcs, RobustLoss::kGnc}) {
+    G2oFile graph = ReadG2o(file);
+    PoseGraphOptions options;
+    options.objective = GraphObjective::kChi2;
+    options.robust = robust;
+    const PoseGraphReport report = PoseGraphOptimizer(options).Optimize(graph.graph);
+    EXPECT_LE(report.costs.chi2, 45.004696 * (1 + 1e-6)) << ToString(robust);
+    EXPECT_EQ(report.down_weighted, 0u) << ToString(robust);
+  }
+}
+
+}  // namespace
+}  // namespace tutti

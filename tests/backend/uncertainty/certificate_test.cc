@@ -1,0 +1,115 @@
+#include "tutti/backend/certificate.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "tests/backend/graph/synthetic_graph.h"
+#include "tests/support/test_data.h"
+#include "tutti/backend/g2o_io.h"
+#include "tutti/backend/pose_graph_optimizer.h"
+#include "tutti/core/error.h"
+
+namespace tutti {
+namespace {
+
+testing::SyntheticGraph Noisy(GraphKind kind, double noise = 0.02) {
+  testing::SyntheticGraphOptions options;
+  options.kind = kind;
+  options.noise_translation = options.noise_rotation = noise;
+  return testing::MakeSyntheticGraph(options);
+}
+
+TEST(Certificate, ProvesTheOptimumOfAGraphWithModerateNoise) {
+  for (GraphKind kind : {GraphKind::kSE2, GraphKind::kSE3}) {
+    PoseGraph graph = Noisy(kind).graph;
+    PoseGraphOptimizer().Optimize(graph);
+    const Certificate certificate = CertifyOptimum(graph);
+    EXPECT_TRUE(certificate.available) << certificate.reason;
+    EXPECT_TRUE(certificate.certified) << certificate.reason << " gap " << certificate.relative_gap;
+    EXPECT_LE(certificate.chordal, EvaluateCosts(graph).chordal * (1 + 1e-9));
+    EXPECT_LE(certificate.lower_bound, certificate.chordal);
+    EXPECT_LE(certificate.relative_gap, 1e-6);
+  }
+}
+
+// A ring whose rotations wind once too often is a stationary point, and a wrong one.
+TEST(Certificate, RefusesALocalMinimum) {
+  constexpr int kNodes = 20;
+  PoseGraph graph(GraphKind::kSE2);
+  const Matrix7d information = MakeInformation(10.0, 0.1);  // the rotations decide
+  for (int k = 0; k < kNodes; ++k) {
+    const double angle = 2 * M_PI * k / kNodes;
+    graph.AddNode(k, Similarity(1, ExpSO3({0, 0, angle}), {0, 0, 0}));
+  }
+  const Similarity none;
+  for (int k = 0; k + 1 < kNodes; ++k) graph.AddOdometry(k, k + 1, none, information);
+  graph.AddLoop(kNodes - 1, 0, none, information);
+  const Certificate wound = CertifyOptimum(graph);
+  EXPECT_TRUE(wound.available);
+  EXPECT_GT(wound.chordal, 1.0);
+  EXPECT_FALSE(wound.certified);
+  EXPECT_LT(wound.lower_bound, wound.chordal);
+  EXPECT_FALSE(wound.reason.empty());
+}
+
+TEST(Certificate, HoldsForGraphsWithoutNoiseAndForSeveralParts) {
+  testing::SyntheticGraphOptions options;
+  PoseGraph exact = testing::MakeSyntheticGraph(options).graph;
+  EXPECT_TRUE(CertifyOptimum(exact).certified);
+  PoseGraph parts = Noisy(GraphKind::kSE3).graph;
+  for (int id = 500; id < 504; ++id) parts.AddNode(id, Pose());
+  for (int id = 500; id < 503; ++id) {
+    parts.AddOdometry(id, id + 1, Similarity(1, ExpSO3({0.1, 0, 0}), {1, 0, 0}), MakeInformation(0.1, 0.1));
+  }
+  PoseGraphOptimizer().Optimize(parts);
+  EXPECT_TRUE(CertifyOptimum(parts).certified);
+}
+
+TEST(Certificate, SaysWhyThereIsNone) {
+  EXPECT_FALSE(CertifyOptimum(PoseGraph()).available);
+  EXPECT_NE(CertifyOptimum(Noisy(GraphKind::kSim3).graph).reason.find("scale"), std::string::npos);
+  PoseGraph fixed = Noisy(GraphKind::kSE3).graph;
+  fixed.SetFixed(0, true);
+  EXPECT_TRUE(CertifyOptimum(fixed).available);
+  fixed.SetFixed(7, true);
+  EXPECT_NE(CertifyOptimum(fixed).reason.find("fixed"), std::string::npos);
+  CertificateOptions options;
+  options.certified_gap = 0;
+  EXPECT_THROW(CertifyOptimum(fixed, options), InputError);
+}
+
+struct Published {
+  const char* name;
+  double chordal;  // reference_optima.md
+};
+
+class CertificateOfPublishedGraph : public ::testing::TestWithParam<Published> {};
+
+TEST_P(CertificateOfPublishedGraph, FindsAndProvesTheOptimumOfSeSync) {
+  TUTTI_REQUIRE_DATA(folder, "posegraphs");
+  PoseGraph graph = ReadG2o(folder / (std::string(GetParam().name) + ".g2o")).graph;
+  PoseGraphOptions options;
+  options.init = GraphInit::kChordal;
+  ASSERT_TRUE(PoseGraphOptimizer(options).Optimize(graph).success);
+  const Certificate certificate = CertifyOptimum(graph);
+  EXPECT_TRUE(certificate.certified) << certificate.reason << " gap " << certificate.relative_gap;
+  EXPECT_LE(certificate.relative_gap, 2e-7);
+  EXPECT_LE(certificate.chordal, GetParam().chordal * (1 + 2e-7));
+}
+
+INSTANTIATE_TEST_SUITE_P(Published, CertificateOfPublishedGraph,
+                         ::testing::Values(Published{"sphere2500", 1687.0058}, Published{"intel", 52.348228},
+                                           Published{"manhattan", 6431.391},
+                                           Published{"manhattanOlson3500", 204.94298},
+                                           Published{"torus3D", 24227.046},
+                                           Published{"parking-garage", 1.262526},
+                                           Published{"kitti_00", 125.69351}),
+                         [](const auto& test) {
+                           std::string name = test.param.name;
+                           name.erase(std::remove(name.begin(), name.end(), '-'), name.end());
+                           return name;
+                         });
+
+}  // namespace
+}  // namespace tutti

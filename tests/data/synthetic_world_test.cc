@@ -1,0 +1,393 @@
+#include "data/synthetic/synthetic_world.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <opencv2/features2d.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <sstream>
+
+#include "data/synthetic/synthetic_writer.h"
+#include "gmock/gmock.h"
+#include "tests/frontend/dataset/dataset_files.h"
+#include "tests/support/test_data.h"
+
+namespace tutti {
+namespace {
+
+using namespace tutti::testing;
+
+SyntheticOptions Small(SyntheticScene scene, SyntheticSensor sensor) {
+  SyntheticOptions o;
+  o.scene = scene;
+  o.sensor = sensor;
+  o.width = 320;
+  o.height = scene == SyntheticScene::kTown ? 160 : 240;
+  o.blocks_x = 1;
+  return o;
+}
+
+// Fraction of pixels of image a, moved into image b by depth and poses, that show what a shows (within
+// `tolerance` grey levels), among those that are not hidden there.
+double AgreementByWarp(const SyntheticWorld& world, std::size_t a, std::size_t b, int tolerance,
+                       double* compared) {
+  const cv::Mat image_a = world.Render(a).image, image_b = world.Render(b).image;
+  const cv::Mat depth_a = world.ExactDepth(a), depth_b = world.ExactDepth(b);
+  const Pose T_b_a = world.PoseOf(b).Inverse() * world.PoseOf(a);
+  int seen = 0, equal = 0;
+  for (int v = 4; v < image_a.rows - 4; v += 2) {
+    for (int u = 4; u < image_a.cols - 4; u += 2) {
+      const double z = depth_a.at<float>(v, u);
+      if (z <= 0 || z > 60) continue;
+      const Eigen::Vector3d p = T_b_a * (z * world.Camera().Unproject({u, v}));
+      if (p.z() < 0.1) continue;
+      const Eigen::Vector2d q = world.Camera().Project(p);
+      if (!world.Camera().Contains(q, 2)) continue;
+      const int x = static_cast<int>(std::lround(q.x())), y = static_cast<int>(std::lround(q.y()));
+      if (std::abs(depth_b.at<float>(y, x) - p.z()) > 0.05 * p.z()) continue;
+      cv::Mat patch;
+      cv::getRectSubPix(image_b, {1, 1}, cv::Point2f(static_cast<float>(q.x()), static_cast<float>(q.y())),
+                        patch);
+      ++seen;
+      equal += std::abs(patch.at<unsigned char>(0, 0) - image_a.at<unsigned char>(v, u)) <= tolerance ? 1 : 0;
+    }
+  }
+  *compared = seen;
+  return static_cast<double>(equal) / std::max(seen, 1);
+}
+
+TEST(SyntheticWorldTest, GroundTruthAndDepthExplainTheImages) {
+  for (const SyntheticScene scene : {SyntheticScene::kTown, SyntheticScene::kRoom}) {
+    const SyntheticWorld world(Small(scene, SyntheticSensor::kRgbd));
+    double compared = 0;
+    for (const std::size_t i : {3U, 40U}) {
+      EXPECT_GT(AgreementByWarp(world, i, i + 3, 12, &compared), 0.9) << i;
+      EXPECT_GT(compared, 2000);
+    }
+  }
+}
+
+TEST(SyntheticWorldTest, RightImageIsTheLeftOneMovedByItsDisparity) {
+  SyntheticOptions options = Small(SyntheticScene::kTown, SyntheticSensor::kStereo);
+  const SyntheticWorld world(options);
+  const SyntheticFrame frame = world.Render(5);
+  const cv::Mat depth = world.ExactDepth(5);
+  int seen = 0, equal = 0;
+  for (int v = 2; v < frame.image.rows - 2; v += 2) {
+    for (int u = 60; u < frame.image.cols - 2; u += 2) {
+      const double z = depth.at<float>(v, u);
+      if (z <= 0 || z > 40) continue;
+      const double x = u - world.Camera().fx * world.Options().baseline_m / z;
+      if (x < 1) continue;
+      cv::Mat patch;
+      cv::getRectSubPix(frame.right, {1, 1}, cv::Point2f(static_cast<float>(x), static_cast<float>(v)),
+                        patch);
+      ++seen;
+      equal += std::abs(patch.at<unsigned char>(0, 0) - frame.image.at<unsigned char>(v, u)) <= 12 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(seen, 2000);
+  EXPECT_GT(equal, 0.88 * seen);  // the rest is hidden from the right camera
+}
+
+TEST(SyntheticWorldTest, EveryViewHasCornersToTrack) {
+  for (const SyntheticScene scene : {SyntheticScene::kTown, SyntheticScene::kRoom}) {
+    SyntheticOptions options = Small(scene, SyntheticSensor::kMono);
+    options.width = 640;
+    options.height = scene == SyntheticScene::kTown ? 320 : 480;
+    const SyntheticWorld world(options);
+    const std::size_t lap = world.FramesPerLap();
+    for (std::size_t i = 0; i < lap; i += lap / 12) {
+      std::vector<cv::KeyPoint> keypoints;
+      cv::FAST(world.Render(i).image, keypoints, 15);
+      EXPECT_GT(keypoints.size(), 300U) << "scene " << static_cast<int>(scene) << " frame " << i;
+    }
+  }
+}
+
+TEST(SyntheticWorldTest, MotionIsSmoothAndTheSecondLapRevisitsTheFirst) {
+  SyntheticOptions options = Small(SyntheticScene::kTown, SyntheticSensor::kMono);
+  options.laps = 2;
+  const SyntheticWorld world(options);
+  const Trajectory truth = world.GroundTruth();
+  EXPECT_TRUE(truth[0].pose.translation.isZero());
+  for (std::size_t i = 1; i < truth.size(); ++i) {
+    const Pose step = truth[i - 1].pose.Inverse() * truth[i].pose;
+    ASSERT_LT(step.translation.norm(), 0.85);
+    ASSERT_LT(step.Angle() * 57.3, 4.0);
+  }
+  const std::size_t lap = world.FramesPerLap();
+  double nearest = 1e9;
+  for (std::size_t i = lap; i < std::min(lap + 10, truth.size()); ++i) {
+    nearest = std::min(nearest, truth[i].pose.translation.norm());
+  }
+  EXPECT_LT(nearest, 1.5);
+  EXPECT_GT(nearest, 0.02);  // but not in the same tracks
+}
+
+TEST(SyntheticWorldTest, SameSeedSameBytesOtherSeedOtherTown) {
+  SyntheticOptions options = Small(SyntheticScene::kTown, SyntheticSensor::kMono);
+  options.noise_sigma = 4;
+  const cv::Mat one = SyntheticWorld(options).Render(7).image, two = SyntheticWorld(options).Render(7).image;
+  EXPECT_EQ(cv::norm(one, two, cv::NORM_INF), 0);
+  options.seed = 2;
+  EXPECT_GT(
+      cv::norm(one, SyntheticWorld(options).Render(7).image, cv::NORM_L1) / static_cast<double>(one.total()),
+      5);
+}
+
+TEST(SyntheticWorldTest, NoiseBlurLightAndMovingObjectsChangeTheImages) {
+  SyntheticOptions options = Small(SyntheticScene::kTown, SyntheticSensor::kRgbd);
+  options.laps = 1.3;
+  const SyntheticWorld plain(options);
+  const std::size_t late = plain.FramesPerLap() + 45;  // second lap, cloud complete
+  ASSERT_LT(late, plain.Size());
+  const auto difference = [&](const SyntheticOptions& o, std::size_t i) {
+    cv::Mat d;
+    cv::absdiff(SyntheticWorld(o).Render(i).image, plain.Render(i).image, d);
+    return cv::mean(d)[0];
+  };
+  SyntheticOptions other = options;
+  other.noise_sigma = 5;
+  EXPECT_NEAR(difference(other, 3), 5 * 0.8, 0.8);  // mean absolute value of a normal: 0.8 sigma
+  other = options;
+  other.motion_blur_s = 0.04;
+  EXPECT_GT(difference(other, 30), 0.5);
+  other = options;
+  other.lighting_change = true;
+  EXPECT_EQ(difference(other, 3), 0);
+  EXPECT_GT(difference(other, late), 15);
+  other = options;
+  other.moving_objects = 12;
+  double moved = 0;
+  for (const std::size_t i : {3U, 20U, 40U}) moved = std::max(moved, difference(other, i));
+  EXPECT_GT(moved, 0.2);
+}
+
+// Mean grey level of each of 4x2 parts of an image.
+std::vector<double> Tones(const cv::Mat& image) {
+  cv::Mat grid;
+  cv::resize(image, grid, {4, 2}, 0, 0, cv::INTER_AREA);
+  return {grid.begin<unsigned char>(), grid.end<unsigned char>()};
+}
+
+SyntheticOptions SmallTwoLaps() {
+  SyntheticOptions o = Small(SyntheticScene::kTown, SyntheticSensor::kStereo);
+  o.laps = 2;
+  o.supersample = 1;
+  o.noise_sigma = 2;
+  return o;
+}
+
+bool SameImages(const SyntheticFrame& a, const SyntheticFrame& b) {
+  return cv::norm(a.image, b.image, cv::NORM_INF) == 0 && cv::norm(a.right, b.right, cv::NORM_INF) == 0;
+}
+
+TEST(SyntheticWorldTest, WorldsLookAsTheyAlwaysDid) {
+  const auto frame = [](SyntheticScene scene, std::size_t i) {
+    return SyntheticWorld(Small(scene, SyntheticSensor::kMono)).Render(i).image;
+  };
+  using ::testing::DoubleNear;
+  using ::testing::Pointwise;
+  EXPECT_THAT(Tones(frame(SyntheticScene::kTown, 7)),
+              Pointwise(DoubleNear(1.01), {131, 173, 132, 82, 92, 101, 96, 102}));
+  EXPECT_THAT(Tones(frame(SyntheticScene::kRoom, 7)),
+              Pointwise(DoubleNear(1.01), {169, 152, 129, 136, 145, 129, 126, 126}));
+  EXPECT_THAT(Tones(frame(SyntheticScene::kCorridor, 7)),
+              Pointwise(DoubleNear(1.01), {164, 169, 163, 134, 156, 137, 129, 124}));
+}
+
+TEST(SyntheticWorldTest, OnlyTheSecondLapIsAtDuskOrOccludedAndThePosesStay) {
+  const SyntheticWorld plain(SmallTwoLaps());
+  const std::size_t lap = plain.FramesPerLap(), late = lap + 60;
+  SyntheticOptions dusk = SmallTwoLaps(), occluded = SmallTwoLaps();
+  dusk.dusk = true;
+  occluded.occlusion = 0.3;
+  for (const SyntheticOptions& options : {dusk, occluded}) {
+    const SyntheticWorld world(options);
+    ASSERT_EQ(world.Size(), plain.Size());
+    for (const std::size_t i : {std::size_t{0}, std::size_t{30}, lap - 1}) {
+      EXPECT_TRUE(SameImages(world.Render(i), plain.Render(i))) << i;
+    }
+    EXPECT_FALSE(SameImages(world.Render(late), plain.Render(late)));
+    EXPECT_TRUE(SameImages(world.Render(late), SyntheticWorld(options).Render(late)));
+    EXPECT_EQ(world.PoseOf(late).translation, plain.PoseOf(late).translation);
+  }
+  const cv::Mat at_dusk = SyntheticWorld(dusk).Render(late).image, by_day = plain.Render(late).image;
+  EXPECT_LT(cv::mean(at_dusk)[0], 0.45 * cv::mean(by_day)[0]);
+}
+
+TEST(SyntheticWorldTest, LorriesCoverAboutThePartOfTheImageThatWasAskedFor) {
+  const SyntheticWorld plain(SmallTwoLaps());
+  for (const double part : {0.1, 0.2, 0.3}) {
+    SyntheticOptions options = SmallTwoLaps();
+    options.occlusion = part;
+    const SyntheticWorld world(options);
+    double covered = 0;
+    int frames = 0;
+    for (std::size_t i = plain.FramesPerLap() + 60; i < plain.Size(); i += 7, ++frames) {
+      const cv::Mat with = world.ExactDepth(i), without = plain.ExactDepth(i);
+      covered +=
+          static_cast<double>(cv::countNonZero(with < 0.98 * without)) / static_cast<double>(with.total());
+    }
+    EXPECT_NEAR(covered / frames, part, 0.05) << part;
+  }
+}
+
+TEST(SyntheticWorldTest, OtherCarsAreParkedWhenAPlaceIsSeenAgain) {
+  const SyntheticWorld plain(SmallTwoLaps());
+  SyntheticOptions options = SmallTwoLaps();
+  options.other_cars = true;
+  const SyntheticWorld world(options);
+  const std::size_t lap = plain.FramesPerLap();
+  for (std::size_t i = 0; i < lap / 3; i += 10)
+    EXPECT_TRUE(SameImages(world.Render(i), plain.Render(i))) << i;
+  int changed = 0, frames = 0;
+  for (std::size_t i = lap; i < plain.Size(); i += 10, ++frames)
+    changed += SameImages(world.Render(i), plain.Render(i)) ? 0 : 1;
+  EXPECT_GT(changed, 0.8 * frames);
+}
+
+TEST(SyntheticWorldTest, KinectNoiseGrowsWithDepthAndLeavesHoles) {
+  SyntheticOptions options = Small(SyntheticScene::kRoom, SyntheticSensor::kRgbd);
+  options.kinect_noise = true;
+  const SyntheticWorld world(options);
+  const cv::Mat noisy = world.Render(3).depth_m, exact = world.ExactDepth(3);
+  const double holes = static_cast<double>(cv::countNonZero(noisy == 0)) / static_cast<double>(noisy.total());
+  EXPECT_GT(holes, 0.003);
+  EXPECT_LT(holes, 0.3);
+  cv::Mat error;
+  cv::absdiff(noisy, exact, error);
+  EXPECT_NEAR(cv::mean(error, noisy > 0)[0], 0.007, 0.006);
+}
+
+TEST(SyntheticWorldTest, WrittenStereoTownIsReadBackByTheKittiReader) {
+  SyntheticOptions options = Small(SyntheticScene::kTown, SyntheticSensor::kStereo);
+  options.frames = 5;
+  const SyntheticWorld world(options);
+  const auto folder = FreshFolder() / "town";
+  SyntheticWriteOptions write;
+  write.threads = 2;
+  EXPECT_EQ(WriteSyntheticDataset(world, folder, write), 5U);
+  const auto data = OpenDataset(folder, With(Sensor::kStereo));
+  ASSERT_EQ(data->Size(), 5U);
+  EXPECT_NEAR(data->Rig().baseline_m, 0.54, 1e-9);
+  EXPECT_NEAR(data->Rig().camera.fx, world.Camera().fx, 1e-9);
+  const SyntheticFrame frame = world.Render(3);
+  EXPECT_EQ(cv::norm(data->Read(3).frame->image, frame.image, cv::NORM_INF), 0);
+  EXPECT_EQ(cv::norm(data->Read(3).frame->right, frame.right, cv::NORM_INF), 0);
+  const Trajectory truth = data->ReadGroundTruth(*data->GroundTruthFile(), nullptr);
+  EXPECT_LT((truth[4].pose.translation - world.PoseOf(4).translation).norm(), 1e-9);
+}
+
+TEST(SyntheticWorldTest, WrittenRoomIsReadBackByTheTumReader) {
+  SyntheticOptions options = Small(SyntheticScene::kRoom, SyntheticSensor::kRgbd);
+  options.frames = 4;
+  const SyntheticWorld world(options);
+  const auto folder = FreshFolder();
+  WriteSyntheticDataset(world, folder);
+  DatasetOptions read = With(Sensor::kRgbd);
+  read.camera = world.Camera();
+  const auto data = OpenDataset(folder, read);
+  ASSERT_EQ(data->Size(), 4U);
+  EXPECT_LT(cv::norm(data->Read(2).frame->depth_m, world.Render(2).depth_m, cv::NORM_INF), 2e-4);
+  const Trajectory truth = data->ReadGroundTruth(*data->GroundTruthFile(), nullptr);
+  ASSERT_EQ(truth.size(), 4U);
+  EXPECT_LT((truth[3].pose.translation - world.PoseOf(3).translation).norm(), 1e-8);
+  EXPECT_NEAR(truth[3].stamp_s, data->Stamp(3), 1e-6);
+}
+
+TEST(SyntheticWorldTest, TheCorridorHasLittleToSeeAndIsWalkedAgain) {
+  SyntheticOptions options;
+  options.scene = SyntheticScene::kCorridor;
+  options.width = 240;
+  options.height = 192;
+  options.rate_hz = 1;
+  options.laps = 2;
+  const SyntheticWorld world(options);
+  EXPECT_NEAR(world.LapLength(), 3 * options.corridor_m, 0.05 * 3 * options.corridor_m);
+  const std::size_t lap = world.FramesPerLap();
+  int corners = 0;
+  for (std::size_t i = 0; i < lap; i += lap / 10) {
+    const SyntheticFrame frame = world.Render(i);
+    double darkest = 0, brightest = 0;
+    cv::minMaxLoc(frame.image, &darkest, &brightest);
+    EXPECT_GT(brightest - darkest, 25) << i;  // even a corner is not blank
+    std::vector<cv::KeyPoint> keypoints;
+    cv::FAST(frame.image, keypoints, 15);
+    corners += static_cast<int>(keypoints.size());
+  }
+  EXPECT_LT(corners / 10, 300);  // what every view of town and room has more of
+  double nearest = 1e9;
+  for (std::size_t i = lap; i < lap + 3; ++i)
+    nearest = std::min(nearest, (world.PoseOf(i).translation - world.PoseOf(0).translation).norm());
+  EXPECT_LT(nearest, 1.0);
+}
+
+TEST(SyntheticWorldTest, SidesLookLeftAndRightAndAreNumberedInPairs) {
+  SyntheticOptions options = Small(SyntheticScene::kTown, SyntheticSensor::kSides);
+  options.frames = 3;
+  options.sides_deg = 40;
+  const SyntheticWorld world(options);
+  // A camera that looks 40 degrees to the left of the way sees at its right edge what lies ahead; the one to
+  // the right sees it at its left edge. So the two images are different and both are full.
+  const SyntheticFrame frame = world.Render(1);
+  ASSERT_EQ(frame.right.size(), frame.image.size());
+  EXPECT_GT(cv::norm(frame.image, frame.right, cv::NORM_L1) / static_cast<double>(frame.image.total()), 5);
+  const auto folder = FreshFolder();
+  EXPECT_EQ(WriteSyntheticDataset(world, folder), 3U);
+  const cv::Mat left = cv::imread((folder / "images/000003.png").string(), cv::IMREAD_UNCHANGED);
+  const cv::Mat right = cv::imread((folder / "images/000004.png").string(), cv::IMREAD_UNCHANGED);
+  EXPECT_EQ(cv::norm(left, frame.image, cv::NORM_INF), 0);
+  EXPECT_EQ(cv::norm(right, frame.right, cv::NORM_INF), 0);
+  EXPECT_EQ(ReadTrajectory(folder / "poses.txt", TrajectoryFormat::kKitti).size(), 3U);
+}
+
+TEST(SyntheticWorldTest, AFullFolderIsRefusedUnlessForced) {
+  SyntheticOptions options = Small(SyntheticScene::kRoom, SyntheticSensor::kMono);
+  options.frames = 4;
+  const auto folder = FreshFolder();
+  WriteSyntheticDataset(SyntheticWorld(options), folder);
+  options.frames = 2;
+  const SyntheticWorld shorter(options);
+  EXPECT_THROW(WriteSyntheticDataset(shorter, folder), InputError);
+  SyntheticWriteOptions force;
+  force.force = true;
+  EXPECT_EQ(WriteSyntheticDataset(shorter, folder, force), 2U);
+  EXPECT_EQ(OpenDataset(folder, With(Sensor::kMono))->Size(), 2U);  // no old frames left
+}
+
+TEST(SyntheticWorldTest, StoppingKeepsACompleteBeginning) {
+  SyntheticOptions options = Small(SyntheticScene::kRoom, SyntheticSensor::kMono);
+  options.frames = 20;
+  const auto folder = FreshFolder();
+  SyntheticWriteOptions write;
+  write.threads = 2;
+  write.progress = [](std::size_t done, std::size_t) { return done < 3; };
+  const std::size_t written = WriteSyntheticDataset(SyntheticWorld(options), folder, write);
+  EXPECT_GE(written, 3U);
+  EXPECT_LT(written, 20U);
+  const auto data = OpenDataset(folder, With(Sensor::kMono));
+  EXPECT_EQ(data->Size(), written);
+  EXPECT_TRUE(data->Read(written - 1).frame);
+  EXPECT_EQ(data->ReadGroundTruth(folder / "poses.txt", nullptr).size(), written);
+}
+
+TEST(SyntheticWorldTest, BadOptionsAreNamed) {
+  SyntheticOptions options;
+  options.laps = -1;
+  EXPECT_THROW(SyntheticWorld{options}, InputError);
+  options.laps = 1;
+  options.width = 640;  // without a height
+  EXPECT_THAT(options.Validate(), ::testing::HasSubstr("height"));
+  options = {};
+  options.occlusion = 0.7;
+  EXPECT_THAT(options.Validate(), ::testing::HasSubstr("occlusion"));
+  options.occlusion = 0.3;
+  options.scene = SyntheticScene::kRoom;
+  EXPECT_THAT(options.Validate(), ::testing::HasSubstr("town"));
+}
+
+}  // namespace
+}  // namespace tutti

@@ -1,0 +1,254 @@
+// Bad data sets: each gives one clear message that names the file and what to do, or one skipped frame; never
+// a crash.
+#include <gtest/gtest.h>
+
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
+
+#include "gmock/gmock.h"
+#include "tests/frontend/dataset/dataset_files.h"
+#include "tests/support/test_data.h"
+
+namespace tutti {
+namespace {
+
+using namespace tutti::testing;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+const std::string kNone = "";
+
+TEST(DatasetBadInputTest, MissingAndEmptyFoldersAreNamed) {
+  const auto folder = FreshFolder();
+  EXPECT_THAT(OpenError(folder / "nowhere", With(Sensor::kMono)),
+              AllOf(HasSubstr("nowhere"), HasSubstr("does not exist")));
+  EXPECT_THAT(OpenError(folder, With(Sensor::kMono)), HasSubstr("is empty"));
+  WriteText(folder / "notes.txt", "x");
+  EXPECT_THAT(OpenError(folder, With(Sensor::kMono)), HasSubstr("expected image_0/"));
+  std::filesystem::create_directories(folder / "image_0");
+  EXPECT_NE(OpenError(folder, With(Sensor::kMono)), kNone);
+  EXPECT_THAT(OpenError(folder / "notes.txt", With(Sensor::kMono)), HasSubstr("video"));
+  WriteText(folder / "zero.mp4", "");
+  EXPECT_THAT(OpenError(folder / "zero.mp4", With(Sensor::kMono)), HasSubstr("empty"));
+}
+
+TEST(DatasetBadInputTest, TruncatedImagesOfEachFormatAreErrorsOfTheirFrame) {
+  for (const char* extension : {".png", ".jpg", ".webp", ".bmp"}) {
+    for (const double part : {0.0, 0.02, 0.5, 0.97}) {
+      const auto folder = FreshFolder();
+      MakeKitti(folder, 3, false, extension);
+      const auto broken = folder / "image_0" / ("000001" + std::string(extension));
+      Truncate(broken, part);
+      const auto data = OpenDataset(folder, With(Sensor::kMono));
+      EXPECT_EQ(data->Size(), 3U);
+      const ReadResult result = data->Read(1);
+      EXPECT_FALSE(result.frame) << extension << " " << part;
+      EXPECT_THAT(result.error, HasSubstr(broken.string()));
+      EXPECT_TRUE(data->Read(0).frame);
+      EXPECT_TRUE(data->Read(2).frame);
+    }
+  }
+}
+
+TEST(DatasetBadInputTest, DamagedBytesInsideAPngAreAnErrorOfTheirFrame) {
+  const auto folder = FreshFolder();
+  MakeKitti(folder, 3, false);
+  const auto file = folder / "image_0" / "000001.png";
+  std::fstream bytes(file, std::ios::in | std::ios::out | std::ios::binary);
+  bytes.seekp(static_cast<std::streamoff>(std::filesystem::file_size(file) / 2));
+  bytes << "damaged damaged";
+  bytes.close();
+  EXPECT_THAT(OpenDataset(folder, With(Sensor::kMono))->Read(1).error, HasSubstr("000001.png"));
+}
+
+TEST(DatasetBadInputTest, TruncatedVideoGivesItsFramesAndThenErrors) {
+  const auto file = FreshFolder() / "clip.avi";
+  {
+    cv::VideoWriter writer(file.string(), cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 25, cv::Size(64, 48));
+    if (!writer.isOpened()) GTEST_SKIP() << "this OpenCV can't write a video";
+    for (int i = 0; i < 30; ++i) {
+      cv::Mat frame;
+      cv::cvtColor(Picture(64, 48, i), frame, cv::COLOR_GRAY2BGR);
+      writer.write(frame);
+    }
+  }
+  Truncate(file, 0.6);
+  std::unique_ptr<Dataset> data;
+  try {
+    data = OpenDataset(file, With(Sensor::kMono));
+  } catch (const InputError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("clip.avi"));
+    return;
+  }
+  for (std::size_t i = 0; i < data->Size(); ++i) {
+    const ReadResult r = data->Read(i);
+    EXPECT_TRUE(r.frame || r.error.find("clip.avi") != std::string::npos) << r.error;
+  }
+  EXPECT_FALSE(data->Read(29).frame);
+}
+
+TEST(DatasetBadInputTest, TheFirstImageMayBeBrokenButNotAll) {
+  const auto folder = FreshFolder();
+  MakeKitti(folder, 3, false);
+  Truncate(folder / "image_0" / "000000.png", 0.3);
+  EXPECT_TRUE(OpenDataset(folder, With(Sensor::kMono))->Read(1).frame);
+  for (const char* name : {"000001.png", "000002.png"}) WriteText(folder / "image_0" / name, "not an image");
+  EXPECT_THAT(OpenError(folder, With(Sensor::kMono)),
+              AllOf(HasSubstr("000000.png"), HasSubstr("none of the first 3")));
+}
+
+TEST(DatasetBadInputTest, MissingRightOrMiddleImageIsAnErrorOfItsFrame) {
+  const auto folder = FreshFolder();
+  MakeKitti(folder, 5, true);
+  std::filesystem::remove(folder / "image_1" / "000001.png");
+  std::filesystem::remove(folder / "image_0" / "000003.png");
+  const auto data = OpenDataset(folder, With(Sensor::kStereo));
+  ASSERT_EQ(data->Size(), 5U);
+  EXPECT_THAT(data->Read(1).error,
+              AllOf(HasSubstr("image_1"), HasSubstr("000001.png"), HasSubstr("missing")));
+  EXPECT_THAT(data->Read(3).error, HasSubstr("000003.png"));
+  EXPECT_TRUE(data->Read(4).frame);
+  EXPECT_THAT(data->Read(5).error, HasSubstr("no frame 5"));
+}
+
+TEST(DatasetBadInputTest, ImagesOfChangingSizeAreErrorsOfTheirFrame) {
+  const auto folder = FreshFolder();
+  MakeKitti(folder, 3, false);
+  WriteImage(folder / "image_0" / "000001.png", Picture(32, 48, 1));
+  EXPECT_THAT(OpenDataset(folder, With(Sensor::kMono))->Read(1).error,
+              AllOf(HasSubstr("32x48"), HasSubstr("64x48")));
+}
+
+TEST(DatasetBadInputTest, MissingOrWrongCalibration) {
+  const auto folder = FreshFolder();
+  MakeKitti(folder, 2, true);
+  std::filesystem::remove(folder / "calib.txt");
+  EXPECT_THAT(OpenError(folder, With(Sensor::kMono)), AllOf(HasSubstr("calib.txt"), HasSubstr("camera:")));
+  EXPECT_EQ(OpenError(folder, With(Sensor::kMono, true)), kNone);
+  EXPECT_THAT(OpenError(folder, With(Sensor::kStereo, true)), HasSubstr("baseline_m"));
+  WriteText(folder / "calib.txt", "P0: 1 2 3\n");
+  EXPECT_THAT(OpenError(folder, With(Sensor::kMono)), HasSubstr("calib.txt:1: "));
+  WriteText(folder / "calib.txt", "P0: 100 0 32 0 0 nan 24 0 0 0 1 0\n");
+  EXPECT_THAT(OpenError(folder, With(Sensor::kMono)), AllOf(HasSubstr("calib.txt:1: "), HasSubstr("nan")));
+  WriteText(folder / "calib.txt", "P7: 100 0 32 0 0 100 24 0 0 0 1 0\n");
+  EXPECT_THAT(OpenError(folder, With(Sensor::kMono)), HasSubstr("P0"));
+  DatasetOptions other = With(Sensor::kMono, true);
+  other.camera->width = 640;
+  EXPECT_THAT(OpenError(folder, other), AllOf(HasSubstr("640x48"), HasSubstr("64x48")));
+}
+
+TEST(DatasetBadInputTest, WrongNumberOfPosesAndNaN) {
+  const auto folder = FreshFolder();
+  MakeKitti(folder, 3, false);
+  const auto data = OpenDataset(folder, With(Sensor::kMono));
+  const auto error = [&] {
+    try {
+      data->ReadGroundTruth(folder / "poses.txt", nullptr);
+    } catch (const InputError& e) {
+      return std::string(e.what());
+    }
+    return kNone;
+  };
+  EXPECT_EQ(error(), kNone);
+  const std::string pose = "1 0 0 0 0 1 0 0 0 0 1 0\n";
+  WriteText(folder / "poses.txt", pose + pose);
+  EXPECT_THAT(error(), AllOf(HasSubstr("poses.txt"), HasSubstr("2 poses"), HasSubstr("3 frames")));
+  WriteText(folder / "poses.txt", pose + pose + pose + pose);
+  EXPECT_THAT(error(), HasSubstr("4 poses"));
+  WriteText(folder / "poses.txt", pose + "1 0 0 nan 0 1 0 0 0 0 1 0\n" + pose);
+  EXPECT_THAT(error(), AllOf(HasSubstr("poses.txt:2: "), HasSubstr("nan")));
+  WriteText(folder / "poses.txt", "");
+  EXPECT_THAT(error(), HasSubstr("no pose"));
+}
+
+TEST(DatasetBadInputTest, TimeStampsMustGrow) {
+  const auto folder = FreshFolder();
+  MakeKitti(folder, 4, false);
+  WriteText(folder / "times.txt", "0\n0.1\n0.1\n0.2\n");
+  const auto data = OpenDataset(folder, With(Sensor::kMono));
+  ASSERT_EQ(data->Size(), 3U);
+  EXPECT_THAT(data->Warnings()[0], AllOf(HasSubstr("times.txt:3: "), HasSubstr("skipped")));
+  EXPECT_EQ(data->Read(2).frame->index, 3);
+  EXPECT_EQ(data->ReadGroundTruth(folder / "poses.txt", nullptr).size(), 3U);
+  WriteText(folder / "times.txt", "0\n0.2\n0.1\n0.3\n");
+  EXPECT_THAT(OpenError(folder, With(Sensor::kMono)), AllOf(HasSubstr("times.txt:3: "), HasSubstr("sort")));
+  WriteText(folder / "times.txt", "0\n0.1\nnan\n0.3\n");
+  EXPECT_THAT(OpenError(folder, With(Sensor::kMono)), HasSubstr("times.txt:3: "));
+  WriteText(folder / "times.txt", "0\n0.1\n");
+  EXPECT_THAT(OpenError(folder, With(Sensor::kMono)),
+              AllOf(HasSubstr("2 time stamps"), HasSubstr("number 3")));
+}
+
+TEST(DatasetBadInputTest, TumListsAreChecked) {
+  const auto folder = FreshFolder();
+  WriteImage(folder / "rgb/a.png", Picture(64, 48, 1));
+  WriteImage(folder / "rgb/b.png", Picture(64, 48, 2));
+  WriteImage(folder / "depth/a.png", cv::Mat(48, 64, CV_8UC3, cv::Scalar::all(9)));
+  WriteImage(folder / "depth/b.png", cv::Mat(24, 32, CV_16UC1, cv::Scalar::all(9)));
+  WriteText(folder / "rgb.txt", "1.0 rgb/a.png\n2.0 rgb/b.png\n");
+  EXPECT_THAT(OpenError(folder, With(Sensor::kRgbd, true)), HasSubstr("depth.txt"));
+  WriteText(folder / "depth.txt", "1.5 depth/a.png\n2.5 depth/b.png\n");
+  EXPECT_THAT(OpenError(folder, With(Sensor::kRgbd, true)), HasSubstr("max_association_s"));
+  WriteText(folder / "depth.txt", "1.0 depth/a.png\n2.0 depth/b.png\n");
+  EXPECT_THAT(OpenError(folder, With(Sensor::kRgbd)), HasSubstr("no calibration"));
+  EXPECT_THAT(OpenError(folder, With(Sensor::kStereo, true)), HasSubstr("no stereo"));
+  const auto data = OpenDataset(folder, With(Sensor::kRgbd, true));
+  EXPECT_THAT(data->Read(0).error, HasSubstr("no depth image"));
+  EXPECT_THAT(data->Read(1).error, AllOf(HasSubstr("32x24"), HasSubstr("registered")));
+  WriteText(folder / "rgb.txt", "2.0 rgb/a.png\n1.0 rgb/b.png\n");
+  EXPECT_THAT(OpenError(folder, With(Sensor::kMono, true)), HasSubstr("rgb.txt:2: "));
+  WriteText(folder / "rgb.txt", "1.0 rgb/a.png\n1.0 rgb/b.png\n");
+  EXPECT_THAT(OpenDataset(folder, With(Sensor::kMono, true))->Warnings()[0], HasSubstr("rgb.txt:2: "));
+  WriteText(folder / "rgb.txt", "1.0\n");
+  EXPECT_THAT(OpenError(folder, With(Sensor::kMono, true)), HasSubstr("rgb.txt:1: "));
+  WriteText(folder / "rgb.txt", "");
+  EXPECT_THAT(OpenError(folder, With(Sensor::kMono, true)), HasSubstr("lists no images"));
+}
+
+TEST(DatasetBadInputTest, EurocSensorYamlIsChecked) {
+  const auto folder = FreshFolder();
+  const auto camera = folder / "mav0/cam0";
+  WriteImage(camera / "data/1000000000.png", Picture(64, 48, 1));
+  WriteText(camera / "data.csv", "#timestamp [ns],filename\n1000000000,1000000000.png\n");
+  EXPECT_THAT(OpenError(folder, With(Sensor::kMono)), HasSubstr("sensor.yaml"));
+  const std::string good =
+      "%YAML:1.0\nT_BS:\n  cols: 4\n  rows: 4\n  data: [1.0, 0.0, 0.0, 0.5,\n         0.0, 1.0, 0.0, 0.0,\n  "
+      "       0.0, 0.0, 1.0, 0.0,\n"
+      "         0.0, 0.0, 0.0, 1.0]\nrate_hz: 20\nresolution: [64, 48]\nintrinsics: [60, 60, 32, 24] #fu\n"
+      "distortion_model: equidistant\ndistortion_coefficients: [0.01, 0, 0, 0]\n";
+  const auto replaced = [&](const std::string& from, const std::string& to) {
+    std::string text = good;
+    return text.replace(text.find(from), from.size(), to);
+  };
+  WriteText(camera / "sensor.yaml", good);
+  const auto data = OpenDataset(folder, With(Sensor::kMono));
+  EXPECT_DOUBLE_EQ(data->Rig().T_body_camera.translation.x(), 0.5);
+  EXPECT_DOUBLE_EQ(data->Stamp(0), 1.0);
+  EXPECT_TRUE(data->Read(0).frame);
+  EXPECT_THAT(OpenError(folder, With(Sensor::kStereo)), AllOf(HasSubstr("cam1"), HasSubstr("sensor.yaml")));
+  WriteText(camera / "sensor.yaml", replaced("[60, 60, 32, 24]", "[60, 60]"));
+  EXPECT_THAT(OpenError(folder, With(Sensor::kMono)), HasSubstr("sensor.yaml:11: "));
+  WriteText(camera / "sensor.yaml", replaced("equidistant", "omni"));
+  EXPECT_THAT(OpenError(folder, With(Sensor::kMono)), HasSubstr("omni"));
+  WriteText(camera / "sensor.yaml", replaced("[1.0, 0.0", "[0.0, 0.0"));
+  EXPECT_THAT(OpenError(folder, With(Sensor::kMono)), HasSubstr("T_BS"));
+  WriteText(camera / "sensor.yaml", good);
+  WriteText(camera / "data.csv", "12x,a.png\n");
+  EXPECT_THAT(OpenError(folder, With(Sensor::kMono)), HasSubstr("data.csv:1: "));
+}
+
+TEST(DatasetBadInputTest, OptionsAreChecked) {
+  const auto folder = FreshFolder();
+  MakeKitti(folder, 2, false);
+  DatasetOptions options = With(Sensor::kMono);
+  options.stride = 0;
+  EXPECT_THAT(OpenError(folder, options), HasSubstr("stride"));
+  EXPECT_THAT(OpenError(folder, With(Sensor::kRgbd)), HasSubstr("no depth"));
+  options = With(Sensor::kMono);
+  options.type = DatasetType::kVideo;
+  EXPECT_THAT(OpenError(folder, options), HasSubstr("is a folder"));
+}
+
+}  // namespace
+}  // namespace tutti

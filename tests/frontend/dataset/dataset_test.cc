@@ -1,0 +1,235 @@
+// The readers on good data, made up and real.
+#include "tutti/frontend/dataset.h"
+
+#include <opencv2/features2d.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
+#include <thread>
+
+#include "gmock/gmock.h"
+#include "tests/frontend/dataset/dataset_files.h"
+#include "tests/support/test_data.h"
+
+namespace tutti {
+namespace {
+
+using namespace tutti::testing;
+using ::testing::HasSubstr;
+
+TEST(DatasetTest, KittiStereoHasCalibrationBaselineStampsAndPoses) {
+  const auto folder = FreshFolder();
+  MakeKitti(folder, 4, true);
+  const auto data = OpenDataset(folder, With(Sensor::kStereo));
+  ASSERT_EQ(data->Size(), 4U);
+  EXPECT_DOUBLE_EQ(data->Rig().camera.fx, 100);
+  EXPECT_EQ(data->Rig().camera.width, 64);
+  EXPECT_DOUBLE_EQ(data->Rig().baseline_m, 0.5);
+  EXPECT_NEAR(data->Rig().rate_hz, 10, 1e-9);
+  EXPECT_DOUBLE_EQ(data->Stamp(3), 0.3);
+  const ReadResult frame = data->Read(2);
+  ASSERT_TRUE(frame.frame) << frame.error;
+  EXPECT_EQ(cv::norm(frame.frame->image, Picture(64, 48, 2), cv::NORM_INF), 0);
+  EXPECT_EQ(cv::norm(frame.frame->right, Picture(64, 48, 102), cv::NORM_INF), 0);
+  ASSERT_TRUE(data->GroundTruthFile());
+  const Trajectory truth = data->ReadGroundTruth(*data->GroundTruthFile(), nullptr);
+  ASSERT_EQ(truth.size(), 4U);
+  EXPECT_DOUBLE_EQ(truth[3].stamp_s, 0.3);
+  EXPECT_DOUBLE_EQ(truth[3].pose.translation.x(), 3);
+}
+
+TEST(DatasetTest, StrideKeepsIndicesAndStampsOfTheData) {
+  const auto folder = FreshFolder();
+  MakeKitti(folder, 7, false);
+  DatasetOptions options = With(Sensor::kMono);
+  options.stride = 3;
+  const auto data = OpenDataset(folder, options);
+  ASSERT_EQ(data->Size(), 3U);
+  EXPECT_EQ(data->Read(2).frame->index, 6);
+  EXPECT_DOUBLE_EQ(data->Stamp(2), 0.6);
+  EXPECT_EQ(data->ReadGroundTruth(folder / "poses.txt", nullptr).size(), 7U);
+}
+
+TEST(DatasetTest, ReadsAnyImageFormat) {
+  for (const char* extension : {".jpg", ".webp", ".bmp", ".pgm", ".tif"}) {
+    const auto folder = FreshFolder();
+    MakeKitti(folder, 2, false, extension);
+    EXPECT_TRUE(OpenDataset(folder, With(Sensor::kMono))->Read(1).frame) << extension;
+  }
+}
+
+TEST(DatasetTest, ColourBecomesGreyAndSixteenBitIsScaled) {
+  const auto folder = FreshFolder();
+  cv::Mat colour;
+  cv::cvtColor(Picture(64, 48, 0), colour, cv::COLOR_GRAY2BGR);
+  WriteImage(folder / "1.png", colour);
+  const auto data = OpenDataset(folder, With(Sensor::kMono));
+  EXPECT_EQ(data->Read(0).frame->image.type(), CV_8UC1);
+  EXPECT_LE(cv::norm(data->Read(0).frame->image, Picture(64, 48, 0), cv::NORM_INF), 1);
+
+  const auto deep_folder = folder / "deep";
+  WriteImage(deep_folder / "1.png", Picture(64, 48, 0, CV_16UC1));  // 12 bit
+  const auto deep = OpenDataset(deep_folder, With(Sensor::kMono));
+  EXPECT_LE(cv::norm(deep->Read(0).frame->image, Picture(64, 48, 0), cv::NORM_INF), 1);
+  EXPECT_THAT(deep->Warnings(), ::testing::Contains(HasSubstr("12-bit")));
+}
+
+TEST(DatasetTest, TumAssociatesEachDepthImageOnceByTime) {
+  const auto folder = FreshFolder();
+  std::string rgb = "# timestamp filename\n", depth = "# timestamp filename\n";
+  const double colour_at[] = {1.00, 1.03, 1.06, 1.09};
+  const double depth_at[] = {1.01, 1.035, 1.20};
+  for (int i = 0; i < 4; ++i) {
+    const std::string name = "rgb/" + std::to_string(i) + ".png";
+    WriteImage(folder / name, Picture(64, 48, i));
+    rgb += std::to_string(colour_at[i]) + " " + name + "\n";
+  }
+  for (int i = 0; i < 3; ++i) {
+    const std::string name = "depth/" + std::to_string(i) + ".png";
+    WriteImage(folder / name, cv::Mat(48, 64, CV_16UC1, cv::Scalar(5000 * (i + 1))));
+    depth += std::to_string(depth_at[i]) + " " + name + "\n";
+  }
+  WriteText(folder / "rgb.txt", rgb);
+  WriteText(folder / "depth.txt", depth);
+  DatasetOptions options = With(Sensor::kRgbd, true);
+  const auto data = OpenDataset(folder, options);
+  ASSERT_EQ(data->Size(), 2U);  // the others have no depth
+  EXPECT_THAT(data->Warnings()[0], HasSubstr("2 of 4"));
+  EXPECT_EQ(data->Read(1).frame->depth_m.type(), CV_32FC1);
+  EXPECT_FLOAT_EQ(data->Read(0).frame->depth_m.at<float>(5, 5), 1.0F);
+  EXPECT_FLOAT_EQ(data->Read(1).frame->depth_m.at<float>(5, 5), 2.0F);
+  options.max_depth_m = 1.5;
+  EXPECT_FLOAT_EQ(OpenDataset(folder, options)->Read(1).frame->depth_m.at<float>(5, 5), 0.0F);
+  EXPECT_EQ(OpenDataset(folder, With(Sensor::kMono, true))->Size(), 4U);
+}
+
+TEST(DatasetTest, IclNuimHasDepthFirstFrameNumbersForStampsAndMirroredTruth) {
+  const auto folder = FreshFolder();
+  std::string list;
+  for (int i = 1; i < 4; ++i) {
+    const std::string n = std::to_string(i);
+    WriteImage(folder / "rgb" / (n + ".png"), Picture(64, 48, i));
+    WriteImage(folder / "depth" / (n + ".png"), cv::Mat(48, 64, CV_16UC1, cv::Scalar(5000)));
+    list += n + " depth/" + n + ".png " + n + " rgb/" + n + ".png\n";
+  }
+  WriteText(folder / "associations.txt", list);
+  WriteText(folder / "livingRoom0.gt.freiburg",
+            "1 0 1 0 0 0 0 1\n2 0 2 0 0.1 0 0 0.99\n3 0 3 0 0 0.1 0 0.99\n");
+  DatasetOptions options = With(Sensor::kRgbd, true);
+  options.camera->fy = -60;  // as published
+  const auto data = OpenDataset(folder, options);
+  EXPECT_NEAR(data->Stamp(1), 2.0 / 30, 1e-9);
+  EXPECT_EQ(cv::norm(data->Read(1).frame->image, Picture(64, 48, 2), cv::NORM_INF), 0);
+  EXPECT_GT(data->Rig().camera.fy, 0);
+  const Trajectory truth = data->ReadGroundTruth(*data->GroundTruthFile(), nullptr);
+  EXPECT_NEAR(truth[1].stamp_s, data->Stamp(1), 1e-9);
+  EXPECT_DOUBLE_EQ(truth[1].pose.translation.y(), -2);
+  EXPECT_LT(truth[1].pose.rotation.x(), 0);
+  EXPECT_GT(truth[2].pose.rotation.y(), 0);
+}
+
+TEST(DatasetTest, FolderOfImagesComesInNaturalOrderWithoutStrayPictures) {
+  const auto folder = FreshFolder();
+  for (int i = 1; i <= 12; ++i) WriteImage(folder / (std::to_string(i) + ".png"), Picture(64, 48, i));
+  WriteImage(folder / "ground_truth.bmp", Picture(12, 12, 0));
+  const auto data = OpenDataset(folder, With(Sensor::kMono));
+  ASSERT_EQ(data->Size(), 12U);
+  EXPECT_EQ(cv::norm(data->Read(9).frame->image, Picture(64, 48, 10), cv::NORM_INF), 0);
+  EXPECT_FALSE(data->Rig().calibrated);
+  EXPECT_TRUE(OpenDataset(folder, With(Sensor::kMono, true))->Rig().calibrated);
+}
+
+TEST(DatasetTest, VideoGivesTheSameFramesInAnyOrder) {
+  const auto file = FreshFolder() / "clip.avi";
+  {
+    cv::VideoWriter writer(file.string(), cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 25, cv::Size(64, 48));
+    if (!writer.isOpened()) GTEST_SKIP() << "this OpenCV can't write a video";
+    for (int i = 0; i < 20; ++i) writer.write(cv::Mat(48, 64, CV_8UC3, cv::Scalar::all(10 * i)));
+  }
+  const auto data = OpenDataset(file, With(Sensor::kMono));
+  ASSERT_EQ(data->Size(), 20U);
+  EXPECT_NEAR(data->Stamp(5), 0.2, 1e-9);
+  for (const std::size_t i : {0U, 7U, 3U, 19U, 1U}) {
+    const ReadResult frame = data->Read(i);
+    ASSERT_TRUE(frame.frame) << frame.error;
+    EXPECT_NEAR(frame.frame->image.at<unsigned char>(20, 20), 10.0 * static_cast<double>(i), 3);
+  }
+}
+
+TEST(DatasetTest, ReadsTheSameFromSeveralThreads) {
+  const auto folder = FreshFolder();
+  MakeKitti(folder, 8, true);
+  const auto data = OpenDataset(folder, With(Sensor::kStereo));
+  std::vector<int> bad(2, 0);
+  std::vector<std::thread> threads;
+  for (int t = 0; t < 2; ++t) {
+    threads.emplace_back([&, t] {
+      for (int k = 0; k < 40; ++k) {
+        const int i = (k * (t + 1)) % 8;
+        const ReadResult r = data->Read(static_cast<std::size_t>(i));
+        if (!r.frame || cv::norm(r.frame->image, Picture(64, 48, i), cv::NORM_INF) != 0)
+          ++bad[static_cast<std::size_t>(t)];
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(bad[0] + bad[1], 0);
+}
+
+TEST(DatasetTest, RealKittiHead) {
+  TUTTI_REQUIRE_DATA(path, "kitti_00_head");
+  const auto data = OpenDataset(path, With(Sensor::kMono));
+  EXPECT_EQ(data->Size(), 1700U);
+  EXPECT_NEAR(data->Rig().camera.fx, 718.856, 1e-6);
+  EXPECT_EQ(data->Read(1699).frame->image.size(), cv::Size(1241, 376));
+  EXPECT_EQ(data->ReadGroundTruth(*data->GroundTruthFile(), nullptr).size(), 1700U);
+  EXPECT_THAT(OpenError(path, With(Sensor::kStereo)), HasSubstr("image_1"));
+}
+
+TEST(DatasetTest, RealRedkitchen) {
+  TUTTI_REQUIRE_DATA(path, "redkitchen");
+  DatasetOptions options = With(Sensor::kRgbd, true);
+  options.camera->width = 640;
+  options.camera->height = 480;
+  const auto data = OpenDataset(path, options);
+  EXPECT_EQ(data->Size(), 500U);
+  const ReadResult frame = data->Read(100);
+  ASSERT_TRUE(frame.frame) << frame.error;
+  double most = 0;
+  cv::minMaxLoc(frame.frame->depth_m, nullptr, &most);
+  EXPECT_GT(most, 1);
+  EXPECT_LT(most, 14);
+}
+
+TEST(DatasetTest, RealCorridorHas84Images) {
+  TUTTI_REQUIRE_DATA(path, "corridor");
+  EXPECT_EQ(OpenDataset(path, With(Sensor::kMono))->Size(), 84U);
+}
+
+// After rectification a point has the same row in both images.
+TEST(DatasetTest, RealEurocPairsAreRectified) {
+  TUTTI_REQUIRE_DATA(path, "euroc_v101_head");
+  const auto data = OpenDataset(path, With(Sensor::kStereo));
+  ASSERT_EQ(data->Size(), 95U);
+  EXPECT_NEAR(data->Rig().baseline_m, 0.11, 0.001);
+  const ReadResult read = data->Read(50);
+  ASSERT_TRUE(read.frame) << read.error;
+  const auto orb = cv::ORB::create(1500);
+  std::vector<cv::KeyPoint> left, right;
+  cv::Mat left_descriptors, right_descriptors;
+  orb->detectAndCompute(read.frame->image, cv::noArray(), left, left_descriptors);
+  orb->detectAndCompute(read.frame->right, cv::noArray(), right, right_descriptors);
+  std::vector<cv::DMatch> matches;
+  cv::BFMatcher(cv::NORM_HAMMING, true).match(left_descriptors, right_descriptors, matches);
+  std::vector<double> rows;
+  for (const cv::DMatch& m : matches) {
+    const cv::Point2f d =
+        left[static_cast<std::size_t>(m.queryIdx)].pt - right[static_cast<std::size_t>(m.trainIdx)].pt;
+    if (m.distance < 40 && d.x > 0) rows.push_back(std::abs(d.y));
+  }
+  ASSERT_GT(rows.size(), 100U);
+  std::nth_element(rows.begin(), rows.begin() + static_cast<long>(rows.size() / 2), rows.end());
+  EXPECT_LE(rows[rows.size() / 2], 0.6);
+}
+
+}  // namespace
+}  // namespace tutti

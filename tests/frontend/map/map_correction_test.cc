@@ -1,0 +1,120 @@
+// What loops do to the odometry's map: fusion, and bundle adjustment of everything.
+#include <gtest/gtest.h>
+
+#include "tests/support/recording.h"
+#include "tests/support/small_town.h"
+
+namespace tutti {
+namespace {
+
+using testing::Recording;
+
+const Recording& Drive() {
+  static const Recording recording = testing::Record(SyntheticWorld(testing::SmallStereoTown(400, 200)), 40);
+  return recording;
+}
+
+Odometry Tracked(std::size_t frames, bool own_threads = true) {
+  Odometry odometry(OdometryOptions(), Drive().rig);
+  odometry.UseOwnThreads(own_threads);
+  for (std::size_t i = 0; i < frames; ++i) odometry.Track(Drive().frames[i]);
+  odometry.FinishMapping();
+  return odometry;
+}
+
+// Bends the map, more and more to its end, as a wrong loop would.
+void Bend(Odometry& odometry) {
+  std::map<int, Similarity> bent;
+  for (const int id : odometry.KeyframeIds()) {
+    const double way = 0.05 * id;
+    bent[id] = Similarity(Pose(ExpSO3({0, 0.1 * way, 0}), {way, 0.3 * way, 0}) * odometry.KeyframePose(id));
+  }
+  odometry.ApplyCorrection(bent);
+}
+
+double WorstError(const Odometry& odometry) {
+  double worst = 0;
+  const Trajectory estimate = odometry.FrameTrajectory();
+  const Pose to_estimate = estimate.front().pose * Drive().truth.front().pose.Inverse();
+  for (std::size_t i = 0; i < estimate.size(); ++i) {
+    const Pose truth = to_estimate * Drive().truth[i].pose;
+    worst = std::max(worst, (estimate[i].pose.translation - truth.translation).norm());
+  }
+  return worst;
+}
+
+bool Adjust(Odometry& odometry, const GlobalAdjustment& adjustment) {
+  const auto moved = odometry.CorrectionOf(adjustment);
+  if (moved) odometry.Enter(adjustment, *moved);
+  return moved.has_value();
+}
+
+TEST(MapCorrection, GlobalAdjustmentTakesABentMapBackToWhatTheImagesSay) {
+  Odometry odometry = Tracked(40);
+  const double before = WorstError(odometry);
+  Bend(odometry);
+  const double bent = WorstError(odometry);
+  ASSERT_GT(bent, 3 * before);
+  ASSERT_TRUE(Adjust(odometry, odometry.BeginGlobalAdjustment(0)));
+  EXPECT_LT(WorstError(odometry), 0.3 * bent);
+  EXPECT_LT(WorstError(odometry), 2 * before + 0.01);
+}
+
+TEST(MapCorrection, KeyframesThatCameSinceFollow) {
+  Odometry odometry = Tracked(25);
+  Bend(odometry);
+  const GlobalAdjustment adjustment = odometry.BeginGlobalAdjustment(0);
+  for (std::size_t i = 25; i < 40; ++i) odometry.Track(Drive().frames[i]);
+  odometry.FinishMapping();
+  const double bent = WorstError(odometry);
+  ASSERT_LT(adjustment.Keyframes() + 1, static_cast<int>(odometry.KeyframeIds().size()));
+  ASSERT_TRUE(Adjust(odometry, adjustment));
+  EXPECT_LT(WorstError(odometry), 0.6 * bent);
+  EXPECT_EQ(odometry.FrameTrajectory().size(), 40U);
+}
+
+TEST(MapCorrection, TheResultIsTheSameWithAndWithoutThreads) {
+  std::vector<Trajectory> results;
+  for (const bool own_threads : {true, false}) {
+    Odometry odometry = Tracked(25, own_threads);
+    Bend(odometry);
+    const GlobalAdjustment adjustment = odometry.BeginGlobalAdjustment(0);
+    for (std::size_t i = 25; i < 32; ++i) odometry.Track(Drive().frames[i]);
+    ASSERT_TRUE(Adjust(odometry, adjustment));
+    for (std::size_t i = 32; i < 40; ++i) odometry.Track(Drive().frames[i]);
+    odometry.FinishMapping();
+    results.push_back(odometry.FrameTrajectory());
+  }
+  ASSERT_EQ(results[0].size(), results[1].size());
+  for (std::size_t i = 0; i < results[0].size(); ++i)
+    EXPECT_EQ(results[0][i].pose.Matrix(), results[1][i].pose.Matrix()) << i;
+}
+
+TEST(MapCorrection, ACancelledAdjustmentChangesNothing) {
+  Odometry odometry = Tracked(25);
+  Bend(odometry);
+  const Trajectory before = odometry.FrameTrajectory();
+  {
+    GlobalAdjustment adjustment = odometry.BeginGlobalAdjustment(0);
+    adjustment.Cancel();
+  }
+  const Trajectory after = odometry.FrameTrajectory();
+  for (std::size_t i = 0; i < before.size(); ++i) EXPECT_EQ(before[i].pose.Matrix(), after[i].pose.Matrix());
+}
+
+TEST(MapCorrection, AMapOfOneKeyframeHasNothingToAdjust) {
+  Odometry odometry = Tracked(1);
+  EXPECT_FALSE(Adjust(odometry, odometry.BeginGlobalAdjustment(0)));
+  EXPECT_FALSE(Adjust(odometry, odometry.BeginGlobalAdjustment(7))) << "no such piece";
+}
+
+TEST(MapCorrection, NeighboursShareWhatTheySee) {
+  Odometry odometry = Tracked(40);
+  const std::vector<int> ids = odometry.KeyframeIds();
+  const int a = ids[ids.size() - 2], b = ids.back();
+  const Similarity S(odometry.KeyframePose(a).Inverse() * odometry.KeyframePose(b));
+  EXPECT_GT(odometry.FuseLoop(a, b, S), 100);
+}
+
+}  // namespace
+}  // namespace tutti

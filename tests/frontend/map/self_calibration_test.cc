@@ -1,0 +1,76 @@
+#include "frontend/map/self_calibration.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/plain_camera.h"
+
+namespace tutti {
+namespace {
+
+CameraRig Rig(Sensor sensor) {
+  CameraRig rig;
+  rig.sensor = sensor;
+  rig.camera = testing::PlainCamera(450);
+  return rig;
+}
+
+std::shared_ptr<const FrameFeatures> OneFeature(float x, float y) {
+  auto features = std::make_shared<FrameFeatures>();
+  features->keypoints.emplace_back(x, y, 31.0F);
+  features->BuildGrid(640, 480);
+  return features;
+}
+
+// What a window says that knows k1 to `sigma`.
+LensError Found(const SelfCalibration& calibration, double k1, double sigma) {
+  LensError found = calibration.Remaining();
+  found.value = {k1 - calibration.Applied().x(), -calibration.Applied().y()};
+  found.information.diagonal().array() += 1 / (sigma * sigma);
+  return found;
+}
+
+class SelfCalibrationTest : public ::testing::Test {
+ protected:
+  SelfCalibrationTest() {
+    Keyframe keyframe;
+    keyframe.features = OneFeature(600, 400);
+    map_.AddKeyframe(keyframe);
+  }
+  Map map_{{1.0F}};
+};
+
+TEST_F(SelfCalibrationTest, ComesToWhatTheWindowsSay) {
+  SelfCalibration calibration(OdometryOptions(), Rig(Sensor::kMono));
+  for (int i = 0; i < 200; ++i) calibration.Learn(Found(calibration, -0.02, 0.001), 10, &map_);
+  EXPECT_NEAR(calibration.Applied().x(), -0.02, 0.001);
+}
+
+TEST_F(SelfCalibrationTest, CorrectsNewFeaturesAndThoseOfTheMapAlike) {
+  SelfCalibration calibration(OdometryOptions(), Rig(Sensor::kMono));
+  for (int i = 0; i < 50; ++i) calibration.Learn(Found(calibration, -0.02, 0.001), 10, &map_);
+  const cv::Point2f fresh = calibration.Correct(OneFeature(600, 400))->keypoints[0].pt;
+  const cv::Point2f old = map_.keyframe(0).features->keypoints[0].pt;
+  EXPECT_LT(fresh.x, 598);  // towards the principal point
+  EXPECT_NEAR(fresh.x, old.x, 1e-3);
+  EXPECT_NEAR(fresh.y, old.y, 1e-3);
+}
+
+TEST_F(SelfCalibrationTest, WindowsThatHardlyKnowAreNotBelieved) {
+  SelfCalibration calibration(OdometryOptions(), Rig(Sensor::kMono));
+  for (int i = 0; i < 500; ++i) calibration.Learn(Found(calibration, -0.3, 0.08), 10, &map_);
+  EXPECT_TRUE(calibration.Applied().isZero());
+}
+
+TEST_F(SelfCalibrationTest, IsOffWithDepthAndWhereToldSo) {
+  EXPECT_FALSE(SelfCalibration(OdometryOptions(), Rig(Sensor::kRgbd)).Enabled());
+  EXPECT_FALSE(SelfCalibration(OdometryOptions(), Rig(Sensor::kStereo)).Enabled());
+  OdometryOptions options;
+  options.lens_sigma = 0;
+  SelfCalibration off(options, Rig(Sensor::kMono));
+  EXPECT_FALSE(off.Enabled());
+  const auto features = OneFeature(600, 400);
+  EXPECT_EQ(off.Correct(features), features);
+}
+
+}  // namespace
+}  // namespace tutti

@@ -1,0 +1,285 @@
+#include "tutti/frontend/odometry.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/support/recording.h"
+#include "tutti/core/error.h"
+
+namespace tutti {
+namespace {
+
+using ::testing::HasSubstr;
+
+using testing::Black;
+using testing::Recording;
+
+SyntheticOptions SmallWorld(SyntheticScene scene, SyntheticSensor sensor) {
+  SyntheticOptions options;
+  options.scene = scene;
+  options.sensor = sensor;
+  options.width = 400;
+  options.height = scene == SyntheticScene::kTown ? 200 : 300;
+  options.blocks_x = 1;
+  options.supersample = 1;
+  return options;
+}
+
+Recording Record(SyntheticScene scene, SyntheticSensor sensor, std::size_t count) {
+  return testing::Record(SyntheticWorld(SmallWorld(scene, sensor)), count);
+}
+
+const Recording& Stereo() {
+  static const Recording recording = Record(SyntheticScene::kTown, SyntheticSensor::kStereo, 40);
+  return recording;
+}
+
+std::vector<TrackResult> TrackAll(const Recording& recording, Odometry& odometry, std::size_t first = 0) {
+  std::vector<TrackResult> results;
+  for (std::size_t i = first; i < recording.frames.size(); ++i) {
+    results.push_back(odometry.Track(recording.frames[i]));
+  }
+  return results;
+}
+
+double PathLength(const Trajectory& t) {
+  double length = 0;
+  for (std::size_t i = 1; i < t.size(); ++i)
+    length += (t[i].pose.translation - t[i - 1].pose.translation).norm();
+  return length;
+}
+
+// Error of the last pose relative to the first [m]; with `any_scale`, after scaling to the true path length.
+double EndError(const Trajectory& truth, const Trajectory& estimate, bool any_scale) {
+  Pose true_end = truth.front().pose.Inverse() * truth.back().pose;
+  Pose end = estimate.front().pose.Inverse() * estimate.back().pose;
+  if (any_scale) end.translation *= PathLength(truth) / PathLength(estimate);
+  return (end.translation - true_end.translation).norm();
+}
+
+void ExpectSameBits(const Trajectory& a, const Trajectory& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) EXPECT_EQ(a[i].pose.Matrix(), b[i].pose.Matrix()) << i;
+}
+
+TEST(Odometry, StereoFollowsTheTruthInMetres) {
+  Odometry odometry(OdometryOptions(), Stereo().rig);
+  TrackAll(Stereo(), odometry);
+  const Trajectory estimate = odometry.FrameTrajectory();
+  ASSERT_EQ(estimate.size(), Stereo().frames.size());
+  EXPECT_LT(EndError(Stereo().truth, estimate, false), 0.015 * PathLength(Stereo().truth));
+  EXPECT_LT(odometry.StereoRowErrorPx(), 0.5);
+  EXPECT_GT(odometry.StereoMatches(), 100);
+}
+
+TEST(Odometry, SeenLandmarksGoOnFromFrameToFrame) {
+  Odometry odometry(OdometryOptions(), Stereo().rig);
+  EXPECT_TRUE(odometry.SeenLandmarks().empty());
+  std::map<int, cv::Point2f> before;
+  for (const InputFrame& frame : Stereo().frames) {
+    const TrackResult track = odometry.Track(frame);
+    ASSERT_EQ(track.state, TrackingState::kTracking);
+    std::map<int, cv::Point2f> now;
+    for (const SeenLandmark& seen : odometry.SeenLandmarks()) now[seen.landmark] = seen.pixel;
+    // A keyframe's include those that it made.
+    if (track.keyframe < 0)
+      EXPECT_EQ(now.size(), static_cast<std::size_t>(track.inliers)) << frame.index;
+    else
+      EXPECT_GE(now.size(), static_cast<std::size_t>(track.inliers)) << frame.index;
+    std::size_t again = 0, near = 0;
+    for (const auto& [landmark, pixel] : now) {
+      const auto old = before.find(landmark);
+      if (old == before.end()) continue;
+      ++again;
+      near += cv::norm(pixel - old->second) < 40 ? 1 : 0;
+    }
+    if (!before.empty()) {
+      EXPECT_GT(2 * again, before.size()) << frame.index;
+      EXPECT_GT(near, 0.95 * again) << frame.index;
+    }
+    before = now;
+  }
+}
+
+TEST(Odometry, RgbdFollowsTheTruthInMetres) {
+  const Recording room = Record(SyntheticScene::kRoom, SyntheticSensor::kRgbd, 40);
+  Odometry odometry(OdometryOptions(), room.rig);
+  TrackAll(room, odometry);
+  const Trajectory estimate = odometry.FrameTrajectory();
+  ASSERT_EQ(estimate.size(), room.frames.size());
+  EXPECT_LT(EndError(room.truth, estimate, false), 0.01 * PathLength(room.truth));
+}
+
+TEST(Odometry, FastTurnsGetAKeyframeBeforeMostOfTheViewIsNew) {
+  SyntheticOptions options = SmallWorld(SyntheticScene::kRoom, SyntheticSensor::kStereo);
+  options.height = 256;
+  options.rate_hz = 20;
+  options.speed_mps = 1.5;  // and 30 degrees a second and more
+  const Recording room = testing::Record(SyntheticWorld(options), 110);
+  const auto error = [&](double uncovered_ratio) {
+    OdometryOptions odometry_options;
+    odometry_options.keyframe_uncovered_ratio = uncovered_ratio;
+    Odometry odometry(odometry_options, room.rig);
+    TrackAll(room, odometry);
+    EXPECT_EQ(odometry.FrameTrajectory().size(), room.frames.size());
+    return EndError(room.truth, odometry.FrameTrajectory(), false) / PathLength(room.truth);
+  };
+  const double with = error(OdometryOptions().keyframe_uncovered_ratio), without = error(1);
+  EXPECT_LT(with, 0.03);
+  EXPECT_LT(with, 0.5 * without);
+}
+
+TEST(Odometry, MonoFollowsTheTruthUpToScaleAndPosesTheFirstFramesBackwards) {
+  Recording mono = Stereo();
+  mono.rig.sensor = Sensor::kMono;
+  mono.rig.baseline_m = 0;
+  for (InputFrame& frame : mono.frames) frame.right.release();
+  Odometry odometry(OdometryOptions(), mono.rig);
+  const std::vector<TrackResult> results = TrackAll(mono, odometry);
+  EXPECT_EQ(results.front().state, TrackingState::kInitializing);
+  EXPECT_FALSE(results.front().reason.empty());
+  EXPECT_EQ(results.back().state, TrackingState::kTracking);
+  const Trajectory estimate = odometry.FrameTrajectory();
+  ASSERT_EQ(estimate.size(), mono.frames.size());
+  EXPECT_LT(EndError(mono.truth, estimate, true), 0.03 * PathLength(mono.truth));
+}
+
+TEST(Odometry, SameFramesGiveTheSameBitsAndSoDoFeaturesExtractedBefore) {
+  Odometry a(OdometryOptions(), Stereo().rig), b(OdometryOptions(), Stereo().rig);
+  for (const InputFrame& frame : Stereo().frames) {
+    a.Track(frame);
+    InputFrame prepared = frame;
+    prepared.features = b.Extract(frame);
+    b.Track(prepared);
+  }
+  ExpectSameBits(a.FrameTrajectory(), b.FrameTrajectory());
+}
+
+TEST(Odometry, CopyGoesOnAsTheOriginalWould) {
+  Odometry odometry(OdometryOptions(), Stereo().rig);
+  for (std::size_t i = 0; i < 20; ++i) odometry.Track(Stereo().frames[i]);
+  Odometry copy(odometry);
+  TrackAll(Stereo(), odometry, 20);
+  TrackAll(Stereo(), copy, 20);
+  ExpectSameBits(odometry.FrameTrajectory(), copy.FrameTrajectory());
+}
+
+TEST(Odometry, CorrectionMovesTheMapAndTrackingGoesOnFromThere) {
+  Odometry odometry(OdometryOptions(), Stereo().rig), plain(OdometryOptions(), Stereo().rig);
+  for (std::size_t i = 0; i < 20; ++i) {
+    odometry.Track(Stereo().frames[i]);
+    plain.Track(Stereo().frames[i]);
+  }
+  const Pose shift(ExpSO3({0, 0.3, 0}), {5, -1, 2});
+  std::map<int, Similarity> corrected;
+  for (const int id : odometry.KeyframeIds()) corrected[id] = Similarity(shift * odometry.KeyframePose(id));
+  odometry.ApplyCorrection(corrected);
+  TrackAll(Stereo(), odometry, 20);
+  TrackAll(Stereo(), plain, 20);
+  const Trajectory moved = odometry.FrameTrajectory(), expected = plain.FrameTrajectory();
+  ASSERT_EQ(moved.size(), expected.size());
+  for (std::size_t i = 0; i < moved.size(); ++i) {
+    EXPECT_LT(LogSE3((shift * expected[i].pose).Inverse() * moved[i].pose).norm(), 0.02) << i;
+  }
+}
+
+TEST(Odometry, BlackFrameIsLostWithAReasonAndTheNextOnesAreFoundAgain) {
+  Odometry odometry(OdometryOptions(), Stereo().rig);
+  for (std::size_t i = 0; i < Stereo().frames.size(); ++i) {
+    const bool black = i == 20;
+    const TrackResult result = odometry.Track(black ? Black(Stereo().frames[i]) : Stereo().frames[i]);
+    if (black) {
+      EXPECT_EQ(result.state, TrackingState::kLost);
+      EXPECT_THAT(result.reason, HasSubstr("only 0 features"));
+    } else {
+      EXPECT_EQ(result.state, TrackingState::kTracking) << "frame " << i << ": " << result.reason;
+    }
+  }
+  const Trajectory estimate = odometry.FrameTrajectory();
+  EXPECT_EQ(estimate.size(), Stereo().frames.size() - 1);
+  EXPECT_LT(EndError(Stereo().truth, estimate, false), 0.02 * PathLength(Stereo().truth));
+  EXPECT_EQ(odometry.KeyframePiece(odometry.KeyframeIds().back()), 0);
+}
+
+// Something to see, but nothing of the map and no depth.
+InputFrame Snow(InputFrame frame) {
+  cv::RNG random(static_cast<std::uint64_t>(frame.index) + 1);
+  for (cv::Mat* image : {&frame.image, &frame.right}) {
+    *image = image->clone();
+    random.fill(*image, cv::RNG::UNIFORM, 0, 256);
+  }
+  return frame;
+}
+
+TEST(Odometry, LongWithNothingOfTheMapInViewStartsANewPiece) {
+  OdometryOptions options;
+  options.relocalize_s = 0.35;
+  Odometry odometry(options, Stereo().rig);
+  for (std::size_t i = 0; i < Stereo().frames.size(); ++i) {
+    const bool elsewhere = i >= 10 && i < 20;
+    odometry.Track(elsewhere ? Snow(Stereo().frames[i]) : Stereo().frames[i]);
+  }
+  EXPECT_EQ(odometry.KeyframePiece(odometry.KeyframeIds().back()), 1);
+  EXPECT_EQ(odometry.Pieces(), (std::vector<int>{1, 0}));
+  EXPECT_EQ(odometry.FrameTrajectory(0).size(), 10U);
+  EXPECT_EQ(odometry.FrameTrajectory(1).size(), Stereo().frames.size() - 20);
+  EXPECT_EQ(odometry.FrameIndices(1).front(), 20);
+  EXPECT_EQ(odometry.FrameTrajectory().size(), Stereo().frames.size() - 20) << "the larger piece";
+}
+
+TEST(Odometry, DarknessLosesNoPlace) {
+  OdometryOptions options;
+  options.relocalize_s = 0.35;
+  Odometry odometry(options, Stereo().rig);
+  for (std::size_t i = 0; i < Stereo().frames.size(); ++i) {
+    const bool dark = i >= 10 && i < 15;
+    odometry.Track(dark ? Black(Stereo().frames[i]) : Stereo().frames[i]);
+  }
+  EXPECT_EQ(odometry.Pieces(), std::vector<int>{0});
+  EXPECT_EQ(odometry.FrameTrajectory().size(), Stereo().frames.size() - 5);
+}
+
+TEST(Odometry, RelocalizesTheLostFrameAtAKeyframeThatShowsItsPlace) {
+  OdometryOptions options;
+  options.keyframe_inlier_ratio = 0.95;  // more keyframes than a lost frame is compared with by itself
+  Odometry odometry(options, Stereo().rig);
+  TrackAll(Stereo(), odometry);
+  const int first = odometry.KeyframeIds().front();
+  const TrackResult kept = odometry.RelocalizeAt(first);
+  EXPECT_EQ(kept.state, TrackingState::kTracking) << "nothing is lost, nothing changes";
+  InputFrame carried = Stereo().frames[1];
+  carried.index = static_cast<std::int64_t>(Stereo().frames.size());
+  carried.stamp_s = Stereo().frames.back().stamp_s + 0.1;
+  ASSERT_EQ(odometry.Track(carried).state, TrackingState::kLost);
+  EXPECT_EQ(odometry.RelocalizeAt(odometry.KeyframeIds().back()).state, TrackingState::kLost) << "not there";
+  const TrackResult found = odometry.RelocalizeAt(first);
+  ASSERT_EQ(found.state, TrackingState::kTracking) << found.reason;
+  EXPECT_LT((found.T_world_camera.translation - Stereo().truth[1].pose.translation).norm(), 0.05);
+  EXPECT_EQ(odometry.FrameTrajectory().size(), Stereo().frames.size() + 1);
+}
+
+TEST(Odometry, BlankImagesNeverStartAMap) {
+  Odometry odometry(OdometryOptions(), Stereo().rig);
+  for (std::size_t i = 0; i < 5; ++i) {
+    const TrackResult result = odometry.Track(Black(Stereo().frames[i]));
+    EXPECT_EQ(result.state, TrackingState::kInitializing);
+    EXPECT_FALSE(result.reason.empty());
+  }
+  EXPECT_TRUE(odometry.KeyframeIds().empty());
+  EXPECT_TRUE(odometry.FrameTrajectory().empty());
+}
+
+TEST(Odometry, UnusableRigsAndOptionsAreRefused) {
+  CameraRig rig = Stereo().rig;
+  rig.baseline_m = 0;
+  EXPECT_THROW(Odometry(OdometryOptions(), rig), InputError);
+  rig = Stereo().rig;
+  rig.calibrated = false;
+  EXPECT_THROW(Odometry(OdometryOptions(), rig), InputError);
+  OdometryOptions options;
+  options.scale_factor = 0.5;
+  EXPECT_THROW(Odometry(options, Stereo().rig), InputError);
+}
+
+}  // namespace
+}  // namespace tutti

@@ -1,0 +1,307 @@
+// LoopDetector::Save and Load.
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <cmath>
+#include <csignal>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <limits>
+
+#include "loopclosure/geometry/verification.h"
+#include "loopclosure/geometry/view_bytes.h"
+#include "loopclosure/store/byte_stream.h"
+#include "tests/loopclosure/detector/two_laps.h"
+#include "tests/support/test_data.h"
+#include "tutti/core/error.h"
+#include "tutti/loopclosure/detector.h"
+
+namespace tutti {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::Walk;
+
+constexpr int kPlaces = 14;
+
+LoopDetectorOptions BoundedOptions() {
+  LoopDetectorOptions options = testing::SmallOptions();
+  options.wm_limit = 7;
+  options.threads = 1;
+  return options;
+}
+
+std::string Content(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return std::string((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+}
+
+void WriteContent(const fs::path& file, const std::string& bytes) {
+  std::ofstream(file, std::ios::binary) << bytes;
+}
+
+class SavedDetector : public ::testing::Test {
+ protected:
+  // Saved after 20 images, and loaded: both see the same from then on.
+  void ExpectToGoOnExactly(const LoopDetectorOptions& options) {
+    LoopDetector saved(options);
+    Walk(saved, 0, 20, kPlaces);
+    saved.Save(file_);
+    LoopDetector loaded(options);
+    loaded.Load(file_);
+    testing::ExpectEqual(Walk(saved, 20, 28, kPlaces), Walk(loaded, 20, 28, kPlaces));
+  }
+
+  fs::path folder_ = testing::FreshFolder();
+  fs::path file_ = folder_ / "places.tutti";
+};
+
+TEST_F(SavedDetector, ALoadedOneGoesOnExactlyAsTheSavedOne) {
+  for (const char* rule : {"mean", "naive"}) {
+    for (const MemoryKind memory : {MemoryKind::kShared, MemoryKind::kPerMember}) {
+      LoopDetectorOptions options = BoundedOptions();
+      SetRule(rule, options);
+      options.memory = memory;
+      LoopDetector saved(options);
+      Walk(saved, 0, 18, kPlaces);
+      EXPECT_GT(saved.NumLongTerm(), 0u);
+      saved.Save(file_);
+      LoopDetector loaded(options);
+      Walk(loaded, 0, 3, kPlaces);  // what it knew before is replaced
+      loaded.Load(file_);
+      EXPECT_EQ(loaded.NumLocations(), saved.NumLocations());
+      EXPECT_EQ(loaded.NumLongTerm(), saved.NumLongTerm());
+      testing::ExpectEqual(Walk(saved, 18, 28, kPlaces), Walk(loaded, 18, 28, kPlaces));
+    }
+  }
+}
+
+TEST_F(SavedDetector, FlannsTreesGoOnExactlyToo) {
+  LoopDetectorOptions options = BoundedOptions();
+  options.vocabulary.float_index = FloatIndex::kFlann;
+  ExpectToGoOnExactly(options);
+}
+
+TEST_F(SavedDetector, WhatTheMembersWereRightAboutIsSavedToo) {
+  LoopDetectorOptions options = BoundedOptions();
+  options.consistent_images = 1;
+  ExpectToGoOnExactly(options);
+}
+
+TEST_F(SavedDetector, SavingChangesNothingAndTwiceGivesTheSameFile) {
+  LoopDetector saved(BoundedOptions());
+  LoopDetector other(BoundedOptions());
+  Walk(saved, 0, 16, kPlaces);
+  Walk(other, 0, 16, kPlaces);
+  saved.Save(file_);
+  saved.Save(folder_ / "again.tutti");
+  EXPECT_TRUE(Content(file_) == Content(folder_ / "again.tutti"));
+  testing::ExpectEqual(Walk(saved, 16, 22, kPlaces), Walk(other, 16, 22, kPlaces));
+}
+
+TEST_F(SavedDetector, AnEmptyOneCanBeSavedAndLoaded) {
+  LoopDetector(BoundedOptions()).Save(file_);
+  LoopDetector loaded(BoundedOptions());
+  Walk(loaded, 0, 5, kPlaces);
+  loaded.Load(file_);
+  EXPECT_EQ(loaded.NumLocations(), 0u);
+  EXPECT_EQ(loaded.LastId(), -1);
+  EXPECT_NO_THROW(Walk(loaded, 0, 2, kPlaces));
+}
+
+TEST_F(SavedDetector, LoadingIntoAFileOfItsOwnFillsThatFile) {
+  LoopDetector saved(BoundedOptions());
+  Walk(saved, 0, 16, kPlaces);
+  saved.Save(file_);
+  LoopDetectorOptions options = BoundedOptions();
+  options.ltm_file = (folder_ / "places.ltm").string();
+  {
+    LoopDetector durable(options);
+    Walk(durable, 0, 4, kPlaces);
+    durable.Load(file_);
+    testing::ExpectEqual(Walk(saved, 16, 20, kPlaces), Walk(durable, 16, 20, kPlaces));
+  }
+  LoopDetector reopened(options);
+  EXPECT_EQ(reopened.LastId(), 19);
+  EXPECT_EQ(reopened.NumLocations() + reopened.NumLongTerm(), 20u);
+}
+
+// The message that loading fails with, after which the object must be as it was.
+std::string Refusal(const fs::path& file) {
+  LoopDetector detector(BoundedOptions());
+  Walk(detector, 0, 6, kPlaces);
+  std::string message;
+  try {
+    detector.Load(file);
+  } catch (const InputError& error) {
+    message = error.what();
+  }
+  EXPECT_EQ(detector.NumLocations(), 6u);
+  EXPECT_EQ(detector.LastId(), 5);
+  return message;
+}
+
+TEST_F(SavedDetector, OtherFilesVersionsAndMembersAreRefused) {
+  LoopDetector saved(BoundedOptions());
+  Walk(saved, 0, 5, kPlaces);
+  saved.Save(file_);
+  const std::string bytes = Content(file_);
+
+  EXPECT_NE(Refusal(folder_ / "absent").find("no such file"), std::string::npos);
+  WriteContent(folder_ / "text", "this is no detector at all");
+  EXPECT_NE(Refusal(folder_ / "text").find("is no saved loop detector"), std::string::npos);
+  std::string newer = bytes;
+  newer[8] = 9;
+  WriteContent(folder_ / "newer", newer);
+  EXPECT_NE(Refusal(folder_ / "newer").find("version 9"), std::string::npos);
+
+  LoopDetectorOptions options = BoundedOptions();
+  options.members = {"orb"};
+  LoopDetector other(options);
+  try {
+    other.Load(file_);
+    FAIL() << "loaded with other members";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("surf sift orb"), std::string::npos) << error.what();
+  }
+}
+
+TEST_F(SavedDetector, ADamagedFileIsRefusedWhereverItIsDamaged) {
+  LoopDetector saved(BoundedOptions());
+  Walk(saved, 0, 12, kPlaces);
+  saved.Save(file_);
+  const std::string bytes = Content(file_);
+  const fs::path damaged = folder_ / "damaged";
+  LoopDetector detector(BoundedOptions());
+  Walk(detector, 0, 4, kPlaces);
+  for (std::size_t i = 0; i < 60; ++i) {
+    const std::size_t at = i * bytes.size() / 60;
+    WriteContent(damaged, bytes.substr(0, at));
+    EXPECT_THROW(detector.Load(damaged), InputError) << "cut off at " << at;
+    std::string flipped = bytes;
+    flipped[at] = static_cast<char>(flipped[at] ^ 0x10);
+    WriteContent(damaged, flipped);
+    EXPECT_THROW(detector.Load(damaged), InputError) << "another byte at " << at;
+  }
+  EXPECT_EQ(detector.NumLocations(), 4u);
+  EXPECT_NO_THROW(Walk(detector, 4, 6, kPlaces));
+}
+
+// A saved detector's bytes with the content of all sections of one kind changed, under right checksums.
+std::string Changed(const std::string& bytes, std::uint32_t kind,
+                    const std::function<std::string(const std::string&)>& change) {
+  constexpr std::size_t kHeader = 16;
+  internal::ByteWriter out;
+  out.PutRaw(bytes.data(), kHeader);
+  internal::ByteReader in(std::string_view(bytes).substr(kHeader), "test");
+  while (!in.AtEnd()) {
+    const auto tag = in.Get<std::uint32_t>();
+    in.Get<std::uint32_t>();  // checksum
+    std::string content = in.GetString();
+    if (tag == kind) content = change(content);
+    out.Put(tag);
+    out.Put(internal::Crc32(content));
+    out.PutString(content);
+  }
+  return out.bytes();
+}
+
+TEST_F(SavedDetector, FeaturesThatNoImageCouldHaveAreRefusedThoughTheChecksumsAreRight) {
+  constexpr std::uint32_t kView = 5;
+  LoopDetector saved(BoundedOptions());
+  Walk(saved, 0, 5, kPlaces);
+  saved.Save(file_);
+  const std::string bytes = Content(file_);
+  const auto load = [&](const std::function<void(View&)>& change) {
+    WriteContent(file_, Changed(bytes, kView, [&](const std::string& section) {
+                   internal::ByteReader in(section, "test");
+                   internal::ByteWriter out;
+                   out.Put(in.Get<std::int32_t>());
+                   View view = internal::LoadView(in);
+                   change(view);
+                   internal::SaveView(view, out);
+                   return out.bytes();
+                 }));
+    LoopDetector(BoundedOptions()).Load(file_);
+  };
+  EXPECT_NO_THROW(load([](View&) {}));
+  EXPECT_THROW(load([](View& view) { view.id += 1000; }), InputError);
+  EXPECT_THROW(load([](View& view) { view.size = {0, 0}; }), InputError);
+  EXPECT_THROW(load([](View& view) { view.members.pop_back(); }), InputError);
+  EXPECT_THROW(load([](View& view) { view.members[0].pixels[0].x = std::nanf(""); }), InputError);
+  EXPECT_THROW(load([](View& view) { view.members[1].pixels[0].y = -1e30f; }), InputError);
+}
+
+TEST(SavedView, KeepsItsCamerasAndTheCallersNumbers) {
+  View view;
+  view.id = 3;
+  view.size = {640, 240};
+  view.cameras = {{0, 0, 320, 240}, {320, 0, 320, 240}};
+  view.members.resize(1);
+  view.caller.pixels = {{1, 2}, {3, 4}};
+  view.caller.descriptors = cv::Mat::eye(2, 8, CV_8U);
+  view.caller.numbers = {4, 7};
+  const auto again = [](const View& saved) {
+    internal::ByteWriter out;
+    internal::SaveView(saved, out);
+    internal::ByteReader in(out.bytes(), "test");
+    View loaded = internal::LoadView(in);
+    EXPECT_TRUE(in.AtEnd());
+    return loaded;
+  };
+  const View loaded = again(view);
+  EXPECT_EQ(loaded.cameras, view.cameras);
+  EXPECT_EQ(loaded.caller.numbers, view.caller.numbers);
+  view.caller.numbers = {4};
+  EXPECT_THROW(again(view), InputError);
+  view.caller.numbers = {4, -1};
+  EXPECT_THROW(again(view), InputError);
+  view.caller.numbers.clear();
+  view.cameras = {{0, 0, 0, 240}, {320, 0, 320, 240}};
+  EXPECT_THROW(again(view), InputError);
+}
+
+TEST_F(SavedDetector, MemoriesOfOtherLocationsThanTheStatisticsSayAreRefused) {
+  constexpr std::uint32_t kStatistics = 7;
+  LoopDetector saved(BoundedOptions());
+  Walk(saved, 0, 5, kPlaces);
+  saved.Save(file_);
+  const std::string bytes = Content(file_);
+  const auto load = [&](std::size_t at, const auto& value) {
+    WriteContent(file_, Changed(bytes, kStatistics, [&](std::string section) {
+                   std::memcpy(section.data() + at, &value, sizeof value);
+                   return section;
+                 }));
+    LoopDetector(BoundedOptions()).Load(file_);
+  };
+  constexpr std::size_t kLastId = 0, kCallerType = 8;
+  const std::size_t kLastHypothesis =
+      16 + 16 * BoundedOptions().members.size();  // after those of the members
+  EXPECT_NO_THROW(load(kLastId, std::int64_t{4}));
+  EXPECT_THROW(load(kLastId, std::int64_t{3}), InputError);
+  EXPECT_THROW(load(kLastHypothesis, std::numeric_limits<double>::quiet_NaN()), InputError);
+  EXPECT_THROW(load(kCallerType, std::int32_t{77}), InputError);
+}
+
+TEST_F(SavedDetector, AFullDiskOrNoFolderIsSaidAndTheOldFileStays) {
+  LoopDetector saved(BoundedOptions());
+  Walk(saved, 0, 8, kPlaces);
+  EXPECT_THROW(saved.Save(folder_ / "no" / "such" / "folder"), InputError);
+  saved.Save(file_);
+  const std::string before = Content(file_);
+  Walk(saved, 8, 9, kPlaces);
+  std::signal(SIGXFSZ, SIG_IGN);
+  rlimit limit{};
+  getrlimit(RLIMIT_FSIZE, &limit);
+  const rlimit little = {64 << 10, limit.rlim_max};
+  setrlimit(RLIMIT_FSIZE, &little);
+  EXPECT_THROW(saved.Save(file_), InputError);
+  setrlimit(RLIMIT_FSIZE, &limit);
+  EXPECT_TRUE(Content(file_) == before);
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()), 1);
+}
+
+}  // namespace
+}  // namespace tutti

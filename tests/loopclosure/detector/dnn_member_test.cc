@@ -1,0 +1,159 @@
+// The member dnn within the ensemble.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/loopclosure/detector/two_laps.h"
+#include "tests/loopclosure/detector/wall_walk.h"
+#include "tests/loopclosure/features/small_networks.h"
+#include "tests/support/error_of.h"
+#include "tutti/core/error.h"
+#include "tutti/loopclosure/detector.h"
+
+namespace tutti {
+namespace {
+
+using ::testing::AllOf;
+using testing::AlongWall;
+using testing::ErrorOf;
+using ::testing::HasSubstr;
+using testing::kWallPlaces;
+
+LoopDetectorOptions Options(const std::vector<std::string>& members, const std::filesystem::path& model) {
+  LoopDetectorOptions options = testing::SmallOptions();
+  options.members = members;
+  options.rule = members.size() == 1 ? CombinationRule::kSingle : CombinationRule::kJoint;
+  options.verification.enabled = false;
+  options.dnn.model = model.string();
+  options.dnn.width = 64;
+  options.dnn.height = 48;
+  return options;
+}
+
+std::vector<LoopResult> TwoWalks(const LoopDetectorOptions& options, int images_again) {
+  LoopDetector detector(options);
+  std::vector<LoopResult> results;
+  for (int i = 0; i < kWallPlaces + images_again; ++i) {
+    const cv::Mat image = i < kWallPlaces ? AlongWall(i) : testing::SeenAgain(AlongWall(i - kWallPlaces));
+    results.push_back(detector.Detect(image, i));
+  }
+  return results;
+}
+
+int Found(const std::vector<LoopResult>& results) {
+  int found = 0;
+  for (std::size_t i = kWallPlaces; i < results.size(); ++i) {
+    const bool near = std::abs(results[i].candidate - (results[i].query - kWallPlaces)) <= 1;
+    if (near && results[i].hypothesis >= 0.5) ++found;
+  }
+  return found;
+}
+
+class DnnMember : public testing::SmallNetworks {};
+
+TEST_F(DnnMember, FindsTheSecondLapAloneAndAmongOthers) {
+  const std::vector<LoopResult> alone = TwoWalks(Options({"dnn"}, Network("edges")), 30);
+  EXPECT_GE(Found(alone), 15);
+  EXPECT_EQ(alone.back().members.front().name, "dnn");
+  EXPECT_TRUE(alone.back().members.front().took_part);
+  EXPECT_EQ(alone.back().members.front().features, 1);
+  const int corners = Found(TwoWalks(Options({"orb"}, ""), 30));
+  EXPECT_GE(Found(TwoWalks(Options({"orb", "dnn"}, Network("edges")), 30)), corners - 1);
+}
+
+TEST_F(DnnMember, SameResultsForAnyNumberOfThreads) {
+  LoopDetectorOptions options = Options({"orb", "dnn", "hog"}, Network("edges"));
+  options.threads = 1;
+  const std::vector<LoopResult> one = TwoWalks(options, 12);
+  options.threads = 2;
+  testing::ExpectEqual(one, TwoWalks(options, 12));
+}
+
+TEST_F(DnnMember, LocatesOneImageByItself) {
+  LoopDetector detector(Options({"dnn"}, Network("edges")));
+  for (int i = 0; i < kWallPlaces; ++i) detector.Detect(AlongWall(i), i);
+  LoopQuery query;
+  query.image = testing::SeenAgain(AlongWall(12));
+  EXPECT_EQ(detector.Locate(query).candidate, 12);
+}
+
+TEST_F(DnnMember, SavedMemoriesAreForTheSameNetwork) {
+  const LoopDetectorOptions options = Options({"orb", "dnn"}, Network("means"));
+  LoopDetector detector(options);
+  for (int i = 0; i < 20; ++i) detector.Detect(AlongWall(i), i);
+  const std::filesystem::path file = folder() / "memory";
+  detector.Save(file);
+
+  LoopDetector same(options);
+  same.Load(file);
+  for (int i = 20; i < 30; ++i) {
+    testing::ExpectEqual({detector.Detect(AlongWall(i), i)}, {same.Detect(AlongWall(i), i)});
+  }
+  LoopDetectorOptions resized = options;
+  resized.dnn.width = 80;
+  for (const LoopDetectorOptions& other :
+       {Options({"orb", "dnn"}, Network("three")), Options({"orb", "dnn"}, Network("other")), resized}) {
+    LoopDetector another(other);
+    EXPECT_THAT(ErrorOf([&] { another.Load(file); }),
+                AllOf(HasSubstr("another configuration"), HasSubstr("dnn (4 values of network")));
+    EXPECT_EQ(another.LastId(), -1);  // as it was
+  }
+}
+
+TEST_F(DnnMember, LongTermMemoriesAreForTheSameNetwork) {
+  LoopDetectorOptions options = Options({"dnn"}, Network("edges"));
+  options.ltm_file = (folder() / "ltm.sqlite").string();
+  options.wm_limit = 15;
+  {
+    LoopDetector detector(options);
+    for (int i = 0; i < kWallPlaces; ++i) detector.Detect(AlongWall(i), i);
+    EXPECT_GT(detector.NumLongTerm(), 5u);
+  }
+  LoopDetectorOptions other = options;
+  other.dnn.model = Network("means").string();
+  EXPECT_THAT(ErrorOf([&] { LoopDetector detector(other); }), HasSubstr("another configuration"));
+  LoopDetector again(options);
+  EXPECT_EQ(again.LastId(), kWallPlaces - 1);
+  again.Detect(AlongWall(3), kWallPlaces);
+}
+
+TEST_F(DnnMember, WhatTheNetworkCantDoLeavesTheDetectorAsItWas) {
+  EXPECT_THAT(ErrorOf([&] { LoopDetector detector(Options({"dnn"}, Network("map"))); }),
+              HasSubstr("is a vector"));
+  LoopDetector detector(Options({"orb", "dnn"}, Network("huge")));
+  EXPECT_THAT(ErrorOf([&] { detector.Detect(AlongWall(0), 0); }), HasSubstr("not a finite number"));
+  EXPECT_EQ(detector.LastId(), -1);
+  EXPECT_EQ(detector.NumLocations(), 0u);
+}
+
+TEST_F(DnnMember, DescriptorsOfTheCallersOwnAreAsLong) {
+  LoopDetector detector(Options({"dnn"}, Network("means")));
+  LoopQuery query;
+  query.member_features["dnn"].descriptors = cv::Mat::ones(1, 5, CV_32F);
+  EXPECT_THAT(ErrorOf([&] { detector.Detect(query); }), HasSubstr("5 values"));
+  query.member_features["dnn"].descriptors = cv::Mat::ones(1, 4, CV_32F);
+  EXPECT_NO_THROW(detector.Detect(query));
+}
+
+TEST(DnnOptions, SayWhatIsWrong) {
+  LoopDetectorOptions options;
+  EXPECT_EQ(options.Validate(), "");
+  options.members = {"orb", "dnn"};
+  EXPECT_THAT(options.Validate(), AllOf(HasSubstr("dnn.model is empty"), HasSubstr("ONNX file")));
+  options.external_members = options.dense_members = {"dnn"};  // the caller's own, under the same name
+  EXPECT_EQ(options.Validate(), "");
+  const auto problem = [](void (*change)(DnnOptions&)) {
+    LoopDetectorOptions changed;
+    change(changed.dnn);
+    return changed.Validate();
+  };
+  EXPECT_EQ(problem([](DnnOptions& o) { o.width = 15; }), "dnn.width must be 16 to 4096");
+  EXPECT_EQ(problem([](DnnOptions& o) { o.height = 4097; }), "dnn.height must be 16 to 4096");
+  EXPECT_THAT(problem([](DnnOptions& o) { o.mean[2] = NAN; }), HasSubstr("dnn.mean"));
+  EXPECT_THAT(problem([](DnnOptions& o) { o.scale = 0; }), HasSubstr("dnn.scale"));
+  EXPECT_THAT(problem([](DnnOptions& o) { o.stddev[0] = -1; }), HasSubstr("dnn.stddev"));
+}
+
+}  // namespace
+}  // namespace tutti

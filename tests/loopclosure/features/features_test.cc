@@ -1,0 +1,246 @@
+#include "tutti/loopclosure/features.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "loopclosure/detector/parallel.h"
+#include "loopclosure/geometry/matching.h"
+#include "tests/loopclosure/features/textured_image.h"
+#include "tutti/core/error.h"
+
+namespace tutti {
+namespace {
+
+std::vector<cv::Point2f> Pixels(const Features& features) {
+  std::vector<cv::Point2f> pixels;
+  for (const cv::KeyPoint& keypoint : features.keypoints) pixels.push_back(keypoint.pt);
+  return pixels;
+}
+
+class EveryMember : public ::testing::TestWithParam<std::string> {};
+INSTANTIATE_TEST_SUITE_P(Members, EveryMember, ::testing::ValuesIn(KnownFeatureTypes()));
+
+TEST_P(EveryMember, FindsFeaturesAndMatchesThemWhenSeenAgain) {
+  const FeatureExtractor extractor(GetParam(), ExtractionOptions());
+  const cv::Mat image = testing::TexturedImage(1, 480, 360);
+  const Features a = extractor.Extract(image);
+  const Features b = extractor.Extract(testing::SeenAgain(image));
+  ASSERT_GT(a.keypoints.size(), 100u);
+  EXPECT_LE(a.keypoints.size(), 400u);
+  EXPECT_EQ(a.descriptors.rows, static_cast<int>(a.keypoints.size()));
+  EXPECT_GT(MatchDescriptors(b.descriptors, a.descriptors, Pixels(a), 0.8).size(), 40u);
+}
+
+TEST(FeatureExtractor, RootSiftIsTheRootOfTheSharesOfSift) {
+  ExtractionOptions options;
+  const cv::Mat image = testing::TexturedImage(3, 320, 240);
+  const Features plain = FeatureExtractor("sift", options).Extract(image);
+  options.root_sift = true;
+  const Features rooted = FeatureExtractor("sift", options).Extract(image);
+  ASSERT_EQ(rooted.descriptors.rows, plain.descriptors.rows);
+  ASSERT_GT(plain.descriptors.rows, 10);
+  for (int r = 0; r < plain.descriptors.rows; ++r) {
+    EXPECT_NEAR(cv::norm(rooted.descriptors.row(r)), 512.0, 0.1);
+    const double share = plain.descriptors.at<float>(r, 7) / cv::norm(plain.descriptors.row(r), cv::NORM_L1);
+    EXPECT_NEAR(rooted.descriptors.at<float>(r, 7), 512.0 * std::sqrt(share), 0.01);
+  }
+}
+
+// Not all: OpenCV starts from an enlarged image, which moves weak points.
+TEST(FeatureExtractor, MostSiftPointsAndDescriptorsAreThoseOfOpenCv) {
+  const cv::Mat image = testing::TexturedImage(5, 640, 480);
+  ExtractionOptions options;
+  options.features = 300;
+  const Features ours = FeatureExtractor("sift", options).Extract(image);
+  ASSERT_EQ(ours.descriptors.rows, 300);
+  std::vector<cv::KeyPoint> keypoints;
+  cv::Mat descriptors;
+  cv::SIFT::create(0, 3, 0.01)->detectAndCompute(image, cv::noArray(), keypoints, descriptors);
+  int same = 0;
+  for (int i = 0; i < ours.descriptors.rows; ++i) {
+    const cv::KeyPoint& a = ours.keypoints[static_cast<std::size_t>(i)];
+    double nearest = 1e9;
+    for (int k = 0; k < descriptors.rows; ++k) {
+      const cv::KeyPoint& b = keypoints[static_cast<std::size_t>(k)];
+      if (cv::norm(a.pt - b.pt) > 1.0 || std::abs(std::remainder(a.angle - b.angle, 360.0f)) > 10.0f)
+        continue;
+      if (std::abs(std::log2(a.size / b.size)) > 0.3f) continue;
+      nearest = std::min(nearest, cv::norm(ours.descriptors.row(i), descriptors.row(k)));
+    }
+    if (nearest < 150.0) ++same;  // of a length of 512
+  }
+  EXPECT_GT(same, 160);
+}
+
+TEST_P(EveryMember, ExtractsTheSameFromSeveralThreadsAtOnce) {
+  const FeatureExtractor extractor(GetParam(), ExtractionOptions());
+  std::vector<Features> results(6);
+  RunParallel(6, 3, [&](int i) {
+    results[static_cast<std::size_t>(i)] =
+        extractor.Extract(testing::TexturedImage(static_cast<std::uint32_t>(i % 2), 320, 240));
+  });
+  for (std::size_t i = 2; i < results.size(); ++i) {
+    ASSERT_EQ(results[i].keypoints.size(), results[i - 2].keypoints.size());
+    EXPECT_EQ(cv::norm(results[i].descriptors, results[i - 2].descriptors, cv::NORM_INF), 0.0);
+  }
+}
+
+TEST(FeatureExtractor, GfttFindsThePlaceInAShiftedImage) {
+  const FeatureExtractor extractor("gftt", ExtractionOptions());
+  const cv::Mat image = testing::TexturedImage(6, 480, 360);
+  const Features a = extractor.Extract(image);
+  const Features b = extractor.Extract(image(cv::Rect(20, 10, 440, 340)));
+  EXPECT_EQ(a.descriptors.type(), CV_8U);
+  EXPECT_EQ(a.descriptors.cols, 32);
+  for (const cv::KeyPoint& keypoint : a.keypoints) EXPECT_EQ(keypoint.angle, -1.0f);
+  int right = 0;
+  const auto matches = MatchDescriptors(b.descriptors, a.descriptors, Pixels(a), 0.8);
+  for (const Match& match : matches) {
+    const cv::Point2f apart = a.keypoints[static_cast<std::size_t>(match.candidate)].pt -
+                              b.keypoints[static_cast<std::size_t>(match.query)].pt;
+    if (cv::norm(apart - cv::Point2f(20, 10)) < 1.0) ++right;
+  }
+  EXPECT_GT(right, 150);
+  EXPECT_GT(right, static_cast<int>(matches.size()) * 9 / 10);
+}
+
+TEST(FeatureExtractor, OrbsBorderGrowsWithTheImageUpToOpenCvsOwn) {
+  ExtractionOptions options;
+  const auto nearest_to_border = [&](int width, int height) {
+    float nearest = 1e9f;
+    const Features features =
+        FeatureExtractor("orb", options).Extract(testing::TexturedImage(4, width, height));
+    for (const cv::Point2f& p : Pixels(features)) {
+      nearest =
+          std::min({nearest, p.x, p.y, static_cast<float>(width) - p.x, static_cast<float>(height) - p.y});
+    }
+    return nearest;
+  };
+  EXPECT_LT(nearest_to_border(320, 240), 20.0f);
+  options.orb_border = 1.0;
+  EXPECT_GE(nearest_to_border(320, 240), 30.0f);
+}
+
+TEST_P(EveryMember, HardImagesGiveNoFeaturesAndNoCrash) {
+  const FeatureExtractor extractor(GetParam(), ExtractionOptions());
+  for (const cv::Size size : {cv::Size(1, 1), cv::Size(5, 200), cv::Size(17, 17), cv::Size(33, 20),
+                              cv::Size(64, 48), cv::Size(3000, 20)}) {
+    EXPECT_NO_THROW(extractor.Extract(testing::TexturedImage(2, size.width, size.height))) << size;
+    EXPECT_TRUE(extractor.Extract(cv::Mat(size, CV_8UC1, cv::Scalar(128))).keypoints.empty()) << size;
+  }
+  EXPECT_TRUE(extractor.Extract(cv::Mat()).keypoints.empty());
+}
+
+TEST_P(EveryMember, HugeImagesAreScaledAndKeypointsScaledBack) {
+  ExtractionOptions options;
+  options.max_pixels = 320 * 240;
+  cv::Mat image;
+  cv::resize(testing::TexturedImage(4, 320, 240), image, cv::Size(), 4, 4, cv::INTER_NEAREST);
+  const Features features = FeatureExtractor(GetParam(), options).Extract(image);
+  ASSERT_GT(features.keypoints.size(), 50u);
+  float right = 0;
+  for (const cv::KeyPoint& keypoint : features.keypoints) right = std::max(right, keypoint.pt.x);
+  EXPECT_GT(right, 900.0f);
+  EXPECT_LT(right, 1280.0f);
+}
+
+TEST(Features, SmallImagesKeepTheUpperPyramidLevelsOfOrb) {
+  const Features features =
+      FeatureExtractor("orb", ExtractionOptions()).Extract(testing::TexturedImage(1, 240, 192));
+  int top = 0;
+  for (const cv::KeyPoint& keypoint : features.keypoints) top = std::max(top, keypoint.octave);
+  EXPECT_GE(top, 4);
+}
+
+class QuotaMember : public ::testing::TestWithParam<std::string> {};
+INSTANTIATE_TEST_SUITE_P(Members, QuotaMember, ::testing::Values("surf", "sift"));
+
+TEST_P(QuotaMember, SmallImagesFillTheQuotaWithKeypointsInTheirOwnPixels) {
+  cv::Mat image;  // as much to see as in a large one
+  cv::resize(testing::TexturedImage(1, 640, 512), image, cv::Size(240, 192), 0, 0, cv::INTER_AREA);
+  const Features features = FeatureExtractor(GetParam(), ExtractionOptions()).Extract(image);
+  EXPECT_GE(features.keypoints.size(), 380u);
+  float right = 0;
+  float bottom = 0;
+  for (const cv::Point2f& p : Pixels(features)) {
+    right = std::max(right, p.x);
+    bottom = std::max(bottom, p.y);
+  }
+  EXPECT_GT(right, 180.0f);
+  EXPECT_LT(right, 240.0f);
+  EXPECT_GT(bottom, 140.0f);
+  EXPECT_LT(bottom, 192.0f);
+}
+
+TEST_P(QuotaMember, DarkImagesFillTheQuota) {
+  cv::Mat dark;
+  testing::TexturedImage(1, 640, 480).convertTo(dark, CV_8U, 0.1);
+  const FeatureExtractor extractor(GetParam(), ExtractionOptions());
+  EXPECT_GE(extractor.Extract(dark).keypoints.size(), 380u);
+}
+
+TEST_P(QuotaMember, AnImageWithoutTextureStaysWithoutFeatures) {
+  const FeatureExtractor extractor(GetParam(), ExtractionOptions());
+  cv::Mat ramp(192, 240, CV_8UC1);
+  for (int r = 0; r < ramp.rows; ++r) ramp.row(r).setTo(40 + r / 2);
+  EXPECT_LT(extractor.Extract(ramp).keypoints.size(), 40u);
+  cv::Mat noise(192, 240, CV_8UC1, cv::Scalar(80));
+  cv::RNG random(1);
+  for (int i = 0; i < 2000; ++i) noise.at<std::uint8_t>(random.uniform(0, 192), random.uniform(0, 240)) = 81;
+  EXPECT_LT(extractor.Extract(noise).keypoints.size(), 40u);
+}
+
+TEST(Features, SurfDescriptorsHaveUnitLength) {
+  const Features features = FeatureExtractor("surf", ExtractionOptions()).Extract(testing::TexturedImage(1));
+  ASSERT_FALSE(features.keypoints.empty());
+  EXPECT_EQ(features.descriptors.cols, 64);
+  for (int i = 0; i < features.descriptors.rows; ++i)
+    EXPECT_NEAR(cv::norm(features.descriptors.row(i)), 1.0, 1e-4);
+}
+
+TEST(Features, UnknownMemberNamesTheNearest) {
+  try {
+    FeatureExtractor("surg", ExtractionOptions());
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("did you mean 'surf'"), std::string::npos) << error.what();
+  }
+}
+
+TEST(ToGrey8, TakesAnyKindOfImage) {
+  const cv::Mat grey = testing::TexturedImage(1);
+  cv::Mat colour;
+  cv::cvtColor(grey, colour, cv::COLOR_GRAY2BGR);
+  EXPECT_EQ(cv::norm(ToGrey8(colour), grey, cv::NORM_INF), 0.0);
+  cv::Mat deep;
+  grey.convertTo(deep, CV_16U, 200.0, 1000.0);
+  EXPECT_EQ(ToGrey8(deep).type(), CV_8UC1);
+  double low = 0;
+  double high = 0;
+  cv::minMaxLoc(ToGrey8(deep), &low, &high);
+  EXPECT_EQ(low, 0.0);
+  EXPECT_EQ(high, 255.0);
+  cv::Mat real = cv::Mat::ones(20, 20, CV_32F);
+  real.at<float>(0, 0) = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_EQ(ToGrey8(real).type(), CV_8UC1);
+  EXPECT_EQ(ToGrey8(cv::Mat(20, 20, CV_8UC2, cv::Scalar(1, 2))).type(), CV_8UC1);
+  EXPECT_TRUE(ToGrey8(cv::Mat()).empty());
+}
+
+TEST(SelectSpread, GivesEveryCellItsShareBeforeTheStrongestTakeTheRest) {
+  std::vector<cv::KeyPoint> keypoints;
+  for (int i = 0; i < 100; ++i)
+    keypoints.emplace_back(static_cast<float>(i % 10), 1.0f, 5.0f, 0.0f, 100.0f - i);
+  keypoints.emplace_back(95.0f, 95.0f, 5.0f, 0.0f, 0.001f);  // weak and alone
+  const std::vector<int> chosen = SelectSpread(keypoints, cv::Size(100, 100), 32, 4);
+  EXPECT_EQ(chosen.size(), 32u);
+  EXPECT_EQ(chosen.front(), 0);
+  EXPECT_EQ(chosen.back(), 100);
+  EXPECT_EQ(SelectSpread(keypoints, cv::Size(100, 100), 200, 4).size(), 101u);
+  EXPECT_TRUE(SelectSpread({}, cv::Size(100, 100), 10, 4).empty());
+}
+
+}  // namespace
+}  // namespace tutti

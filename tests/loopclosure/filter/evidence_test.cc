@@ -1,0 +1,55 @@
+#include "loopclosure/filter/evidence.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace tutti::internal {
+namespace {
+
+const cv::Size kImage(640, 480);  // diagonal 800
+
+TEST(FitByChance, ExpectsTheShareOfTheImageAroundTheLineBeyondTheSample) {
+  const double alpha = 2 * 1.5 * 800 / (640.0 * 480.0);
+  EXPECT_NEAR(FitByChance(FitModel::kFundamental, 107, 50, 1.5, kImage).expected, 7 + 100 * alpha, 1e-9);
+}
+
+TEST(FitByChance, ExpectsTheShareOfTheImageAroundThePointBeyondTheSample) {
+  const double alpha = M_PI * 2.5 * 2.5 / (640.0 * 480.0);
+  EXPECT_NEAR(FitByChance(FitModel::kPnp, 103, 50, 2.5, kImage).expected, 3 + 100 * alpha, 1e-9);
+}
+
+TEST(FitByChance, FalseAlarmsFollowTheFormula) {
+  // 4 of 5 matches to a P3P model: 4 (5 - 3) C(5, 4) C(4, 3) alpha.
+  const double alpha = M_PI / (640.0 * 480.0);
+  EXPECT_NEAR(FitByChance(FitModel::kPnp, 5, 4, 1.0, kImage).log_nfa, std::log10(160 * alpha), 1e-9);
+}
+
+TEST(FitByChance, AsManyAsExpectedAreNoSurpriseAndMoreAreASurerOne) {
+  EXPECT_GT(FitByChance(FitModel::kFundamental, 100, 8, 1.5, kImage).log_nfa, 0);
+  EXPECT_LT(FitByChance(FitModel::kFundamental, 100, 30, 1.5, kImage).log_nfa, -5);
+  EXPECT_LT(FitByChance(FitModel::kFundamental, 100, 60, 1.5, kImage).log_nfa,
+            FitByChance(FitModel::kFundamental, 100, 30, 1.5, kImage).log_nfa);
+}
+
+TEST(FitByChance, WithoutMatchesOrImageThereIsNothing) {
+  EXPECT_EQ(FitByChance(FitModel::kEssential, 0, 0, 1.5, kImage).expected, 0);
+  EXPECT_EQ(FitByChance(FitModel::kEssential, 50, 20, 1.5, {}).log_nfa, 0);
+  EXPECT_EQ(FitByChance(FitModel::kEssential, 5, 5, 1.5, kImage).log_nfa, 0);
+}
+
+TEST(OccupiedCells, CountsEachCellOnceAndPixelsOutsideInTheNearest) {
+  EXPECT_EQ(OccupiedCells({}, kImage), 0);
+  EXPECT_EQ(OccupiedCells({{10, 10}, {70, 70}}, kImage), 1);
+  EXPECT_EQ(OccupiedCells({{10, 10}, {90, 10}, {10, 90}}, kImage), 3);
+  EXPECT_EQ(OccupiedCells({{10, 10}, {-5, -5}, {639.9f, 479.9f}, {700, 500}}, kImage), 2);
+}
+
+TEST(MotionSpread, IsZeroForWhatMovesAsOneAndTheDeviationElsewhere) {
+  const std::vector<cv::Point2f> first = {{10, 10}, {100, 10}, {10, 100}, {50, 50}};
+  EXPECT_NEAR(MotionSpread(first, {{15, 17}, {105, 17}, {15, 107}, {55, 57}}, kImage), 0, 1e-6);
+  EXPECT_NEAR(MotionSpread(first, {{18, 10}, {92, 10}, {18, 100}, {42, 50}}, kImage), 0.01, 1e-6);
+}
+
+}  // namespace
+}  // namespace tutti::internal

@@ -1,0 +1,136 @@
+// LoopQuery::pose_prior: what the odometry knows of where the camera can be.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <optional>
+
+#include "loopclosure/filter/pose_track.h"
+#include "tests/loopclosure/detector/two_laps.h"
+#include "tutti/core/error.h"
+
+namespace tutti {
+namespace {
+
+using internal::ApplyGains;
+using internal::PoseTrack;
+
+PosePrior At(double x, double sigma_m = 2.0, double drift = 0.01) {
+  PosePrior prior;
+  prior.position_m = {x, 0, 0};
+  prior.sigma_m = sigma_m;
+  prior.drift = drift;
+  return prior;
+}
+
+// A corridor of 30 different doors, 1 m apart, but for two that are the same one: 5 and 22. Then the camera
+// is brought back and sees that door three times.
+constexpr int kDoors = 30, kTwin = 5, kOtherTwin = 22;
+
+LoopResult SeeTheDoorAgain(const std::function<std::optional<PosePrior>(double x)>& prior, double x) {
+  LoopDetectorOptions options = testing::SmallOptions();
+  options.verification.enabled = false;
+  options.link_threshold = 1.0;
+  options.keep_posterior = true;
+  LoopDetector detector(options);
+  LoopResult result;
+  for (int i = 0; i < kDoors + 3; ++i) {
+    const bool back = i >= kDoors;
+    LoopQuery query;
+    query.id = i;
+    query.image =
+        testing::TexturedImage(static_cast<std::uint32_t>(back || i == kOtherTwin ? kTwin : i), 240, 180);
+    query.pose_prior = prior(back ? x : i);
+    result = detector.Detect(query);
+  }
+  return result;
+}
+
+double PosteriorAt(const LoopResult& result, std::int64_t id) {
+  for (const auto& [location, p] : result.posterior_by_location) {
+    if (location == id) return p;
+  }
+  return 0;
+}
+
+TEST(PosePrior, OfTwoPlacesThatLookAlikeTheNearerOneWins) {
+  const auto prior = [](double x) { return At(x); };
+  EXPECT_EQ(SeeTheDoorAgain(prior, kTwin + 0.5).candidate, kTwin);
+  EXPECT_EQ(SeeTheDoorAgain(prior, kOtherTwin - 0.5).candidate, kOtherTwin);
+}
+
+TEST(PosePrior, WithAHugeUncertaintyNothingChanges) {
+  const LoopResult without = SeeTheDoorAgain([](double) { return std::nullopt; }, 0);
+  const LoopResult with = SeeTheDoorAgain([](double x) { return At(x, 1e6); }, kTwin);
+  EXPECT_EQ(with.candidate, without.candidate);
+  EXPECT_NEAR(with.hypothesis, without.hypothesis, 1e-6);
+  for (const std::int64_t door : {kTwin, kOtherTwin})
+    EXPECT_NEAR(PosteriorAt(with, door), PosteriorAt(without, door), 1e-6);
+}
+
+TEST(PosePrior, PositionsOfAnotherWorldSayNothing) {
+  int images = 0;
+  const auto lost = [&images](double x) {
+    PosePrior prior = At(x);
+    prior.frame = images++ < kDoors ? 0 : 1;
+    return prior;
+  };
+  int others = 0;
+  const auto silent = [&others](double x) {
+    return others++ < kDoors ? std::optional<PosePrior>(At(x)) : std::nullopt;
+  };
+  const LoopResult without = SeeTheDoorAgain(silent, 0);
+  const LoopResult with = SeeTheDoorAgain(lost, kTwin);
+  EXPECT_EQ(with.hypothesis, without.hypothesis);
+  EXPECT_EQ(with.posterior_by_location, without.posterior_by_location);
+}
+
+TEST(PosePrior, OfNumbersThatAreNoneIsRefused) {
+  LoopDetector detector(testing::SmallOptions());
+  LoopQuery query;
+  query.image = testing::TexturedImage(1, 240, 180);
+  for (const PosePrior& prior :
+       {At(std::nan("")), At(0, 0), At(0, 1, -1), At(0, std::numeric_limits<double>::infinity())}) {
+    query.pose_prior = prior;
+    EXPECT_THROW(detector.Detect(query), InputError);
+  }
+}
+
+TEST(PoseTrack, GainsAreOneInTheMeanAndBounded) {
+  PoseTrack track;
+  std::vector<int> places;
+  for (int i = 0; i < 200; ++i) {
+    track.Add(i, At(i, 1.0, 0.0));
+    places.push_back(i);
+  }
+  track.Add(200, At(3, 1.0, 0.0));
+  const std::vector<double> gains = track.Gains(places);
+  const auto [least, most] = std::minmax_element(gains.begin(), gains.begin() + 200);
+  EXPECT_EQ(*most, PoseTrack::kMostGain);
+  EXPECT_EQ(most - gains.begin(), 3);
+  EXPECT_GT(*least, 0.3);  // the far ones are nearly all there are: they lose little in the mean
+  EXPECT_LT(*least, 1.0);
+}
+
+TEST(PoseTrack, TheLongerTheWayTheLessItKnows) {
+  PoseTrack track;
+  track.Add(0, At(0, 1.0, 0.1));
+  track.Add(1, At(4, 1.0, 0.1));
+  const std::vector<double> early = (track.Add(2, At(0, 1.0, 0.1)), track.Gains({0, 1}));
+  track.Add(3, At(100, 1.0, 0.1));
+  const std::vector<double> late = (track.Add(4, At(0, 1.0, 0.1)), track.Gains({0, 1}));
+  EXPECT_GT(early[0] / early[1], 2 * late[0] / late[1]);
+  EXPECT_GT(late[0], late[1]);
+}
+
+TEST(PoseTrack, APlaceNearByGainsNothingByThatAlone) {
+  Belief likelihood;
+  likelihood.places = {0.4, 1.0, 3.0, 3.0, 0.4};
+  ApplyGains({5, 5, 5, 0.5, 0.5}, {0, 1, 2, 3, 4}, likelihood);
+  EXPECT_EQ(likelihood.places, (std::vector<double>{0.4, 1.0, 11.0, 1.5, 0.2}));
+}
+
+}  // namespace
+}  // namespace tutti

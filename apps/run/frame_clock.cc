@@ -4,11 +4,11 @@
 #include <chrono>
 #include <thread>
 
+#include "core/stopwatch.h"
+
 namespace tutti {
 
-double SteadyFrameClock::Now() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
+double SteadyFrameClock::Now() { return internal::SteadySeconds(); }
 
 void SteadyFrameClock::WaitUntil(double now) {
   for (double left = now - Now(); left > 0; left = now - Now()) {

@@ -1,11 +1,10 @@
 #include "apps/run/prefetcher.h"
 
 #include <algorithm>
-#include <chrono>
 #include <exception>
 #include <utility>
 
-#include "apps/slam/milliseconds_since.h"
+#include "core/stopwatch.h"
 
 namespace tutti {
 
@@ -14,14 +13,14 @@ FetchedFrame Prefetcher::Read(std::size_t position) const {
   try {
     FetchedFrame frame;
     frame.position = position;
-    const auto begin = std::chrono::steady_clock::now();
+    const internal::Stopwatch watch;
     {
       const ScopedSpan span(options_.recorder, Lane::kReading, "read");
       frame.read = dataset_.Read(position);
     }
-    frame.read_ms = MillisecondsSince(begin);
+    frame.read_ms = watch.Milliseconds();
     if (frame.read.frame && options_.prepare) options_.prepare(*frame.read.frame);
-    frame.prepare_ms = MillisecondsSince(begin) - frame.read_ms;
+    frame.prepare_ms = watch.Milliseconds() - frame.read_ms;
     return frame;
   } catch (const std::exception& e) {
     FetchedFrame frame;
@@ -79,7 +78,7 @@ void Prefetcher::Work() {
 }
 
 std::optional<FetchedFrame> Prefetcher::Next() {
-  const auto begin = std::chrono::steady_clock::now();
+  const internal::Stopwatch watch;
   std::optional<FetchedFrame> frame;
   if (options_.ahead == 0) {
     if (Available(next_)) frame = Read(next_);
@@ -94,7 +93,7 @@ std::optional<FetchedFrame> Prefetcher::Next() {
     }
     changed_.notify_all();
   }
-  waited_ms_ += MillisecondsSince(begin);
+  waited_ms_ += watch.Milliseconds();
   return frame;
 }
 

@@ -16,6 +16,7 @@
 #include "apps/run/run_evaluation.h"
 #include "apps/run/run_parts.h"
 #include "apps/run/text_file.h"
+#include "core/stopwatch.h"
 #include "tutti/core/error.h"
 #include "tutti/slam/slam_system.h"
 
@@ -23,11 +24,6 @@ namespace tutti {
 namespace {
 
 namespace fs = std::filesystem;
-using Clock = std::chrono::steady_clock;
-
-double Seconds(Clock::time_point begin) {
-  return std::chrono::duration<double>(Clock::now() - begin).count();
-}
 
 /// One run from its first frame to its last.
 class Run {
@@ -56,7 +52,8 @@ class Run {
 
   void TrackAll() {
     for (const auto& observer : request_.observers) observer->OnStart(result_.rig);
-    const Clock::time_point begin = Clock::now();
+    const Span::Clock::time_point begin = Span::Clock::now();
+    const internal::Stopwatch watch;
     const double cpu_begin = ProcessCpuSeconds();
     Progress progress(config_.run.loops ? "slam" : "odometry",
                       total_ == static_cast<std::size_t>(-1) ? 0 : total_, Out());
@@ -99,7 +96,7 @@ class Run {
     result_.stage_ms["read"] = read_ms;
     result_.stage_ms["read_wait"] = frames.WaitedMs();
     if (!slam_.AppearanceOnly()) result_.stage_ms["odometry_extract"] += extract_ms;
-    result_.wall_s = Seconds(begin);
+    result_.wall_s = watch.Seconds();
     result_.cpu_s = ProcessCpuSeconds() - cpu_begin;
     ReportTimes(begin);
   }
@@ -110,11 +107,11 @@ class Run {
     if (odometry == nullptr) return;
     const std::size_t begin = positions_.at(slam_.UntouchedLast()) + 1, end = result_.frames_total;
     if (begin >= end) return;
-    const Clock::time_point start = Clock::now();
+    const internal::Stopwatch watch;
     const bool again = config_.run.odometry_pass && dataset_.FrameSupply() != Supply::kOnce;
     result_.odometry_complete = again && TrackAgain(*odometry, begin, end);
     odometry->FinishMapping();
-    result_.odometry_pass_s = Seconds(start);
+    result_.odometry_pass_s = watch.Seconds();
   }
 
   void Collect() {
@@ -185,7 +182,7 @@ class Run {
     for (const std::string& warning : slam_.TakeWarnings()) progress.Note("tutti: warning: " + warning);
   }
 
-  void ReportTimes(Clock::time_point begin) {
+  void ReportTimes(Span::Clock::time_point begin) {
     if (Recorder() == nullptr) return;
     const std::vector<Span> spans = recorder_.Spans();
     result_.stages = SummarizeStages(spans, result_.wall_s);
@@ -194,9 +191,9 @@ class Run {
 
   void TrackOne(const InputFrame& frame) {
     const ScopedSpan span(Recorder(), Lane::kTracking, "frame");
-    const Clock::time_point begin = Clock::now();
+    const internal::Stopwatch watch;
     const TrackResult track = slam_.Track(frame);
-    result_.frame_ms.push_back(1e3 * Seconds(begin));
+    result_.frame_ms.push_back(watch.Milliseconds());
     for (const auto& observer : request_.observers) observer->OnFrame(frame, track, slam_);
     state_ = slam_.AppearanceOnly() ? "appearance only" : ToString(track.state);
     if (slam_.AppearanceOnly() || track.state == TrackingState::kTracking) {

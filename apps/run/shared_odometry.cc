@@ -1,9 +1,9 @@
 #include "apps/run/shared_odometry.h"
 
-#include <chrono>
 #include <opencv2/core.hpp>
 #include <utility>
 
+#include "core/stopwatch.h"
 #include "apps/run/interrupt.h"
 #include "apps/run/outputs.h"
 #include "apps/run/progress.h"
@@ -44,7 +44,7 @@ TrackedSequence TrackSequence(RunRequest request, RunConfig config) {
 
 RunResult CloseLoops(const TrackedSequence& tracked, const RunRequest& request, const RunConfig& given) {
   if (!tracked.odometry) throw InputError("a sequence without calibration has no odometry to share");
-  const auto begin = std::chrono::steady_clock::now();
+  const internal::Stopwatch watch;
   const double cpu_begin = ProcessCpuSeconds();
   RunResult result = tracked.result;
   result.config = WithOverrides(given, request);
@@ -79,7 +79,7 @@ RunResult CloseLoops(const TrackedSequence& tracked, const RunRequest& request, 
   for (const auto& observer : request.observers) observer->OnEnd(slam);
   progress.Finish();
   for (const auto& [name, ms] : slam.StageMilliseconds()) result.stage_ms[name] = ms;
-  result.wall_s += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  result.wall_s += watch.Seconds();
   result.cpu_s += ProcessCpuSeconds() - cpu_begin;
   CollectMap(slam, result);
   result.trajectory_odometry = tracked.result.trajectory;

@@ -1,13 +1,12 @@
 #include "apps/slam/loop_closer.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <iterator>
 #include <optional>
 #include <utility>
 
-#include "apps/slam/milliseconds_since.h"
+#include "core/stopwatch.h"
 
 namespace tutti {
 
@@ -91,10 +90,10 @@ void LoopCloser::Consider(const Verification& verification, int candidate, int q
 
 LoopConstraint LoopCloser::Measure(const Verification& verification, int candidate, int query) {
   const ScopedSpan span(recorder_, Lane::kOptimisation, "measure_loop");
-  const auto begin = std::chrono::steady_clock::now();
+  const internal::Stopwatch watch;
   LoopConstraint constraint = MakeLoopConstraint(verification, odometry_.Keyframe(candidate),
                                                  odometry_.Keyframe(query), rig_, options_, seed_);
-  stages_["loop_measure"] += MillisecondsSince(begin);
+  stages_["loop_measure"] += watch.Milliseconds();
   return constraint;
 }
 
@@ -155,7 +154,7 @@ void LoopCloser::Revoke(const LoopEdge& loop) {
 // Optimises with the entering loops; those that the rest contradicts leave again. Then the map moves.
 void LoopCloser::Close(std::vector<LoopEdge> entering, std::int64_t frames) {
   const ScopedSpan span(recorder_, Lane::kOptimisation, "close_loop");
-  const auto begin = std::chrono::steady_clock::now();
+  const internal::Stopwatch watch;
   const double fused_before = stages_["loop_fuse"];  // a stage of its own
   odometry_.FinishMapping();
   MapGraph::Correction correction;
@@ -193,7 +192,7 @@ void LoopCloser::Close(std::vector<LoopEdge> entering, std::int64_t frames) {
     entering = std::move(staying);
   }
   if (!entering.empty()) Apply(correction, entering, frames);
-  stages_["loop_optimize"] += MillisecondsSince(begin) - (stages_["loop_fuse"] - fused_before);
+  stages_["loop_optimize"] += watch.Milliseconds() - (stages_["loop_fuse"] - fused_before);
 }
 
 void LoopCloser::Apply(const MapGraph::Correction& correction, const std::vector<LoopEdge>& entering,
@@ -226,19 +225,19 @@ void LoopCloser::Apply(const MapGraph::Correction& correction, const std::vector
 bool LoopCloser::Fuse(const std::vector<LoopEdge>& loops) {
   constexpr int kLeastCommon = 30;
   const ScopedSpan span(recorder_, Lane::kOptimisation, "fuse_loop");
-  const auto begin = std::chrono::steady_clock::now();
+  const internal::Stopwatch watch;
   for (const LoopEdge& loop : loops) {
     if (odometry_.FuseLoop(loop.candidate, loop.query, loop.S_candidate_query) >= kLeastCommon)
       untied_.erase(loop.record);
   }
-  stages_["loop_fuse"] += MillisecondsSince(begin);
+  stages_["loop_fuse"] += watch.Milliseconds();
   return untied_.empty();
 }
 
 // Brings in what the adjustment of the whole map has found.
 void LoopCloser::EnterAdjustment() {
   const ScopedSpan span(recorder_, Lane::kOptimisation, "enter_adjustment");
-  const auto begin = std::chrono::steady_clock::now();
+  const internal::Stopwatch watch;
   odometry_.FinishMapping();
   const GlobalAdjustment adjustment = adjuster_.Take();
   MapGraph::Correction correction;
@@ -249,7 +248,7 @@ void LoopCloser::EnterAdjustment() {
     graph_.MeasureAgain(odometry_, gate_.accepted());
     ++adjustments_;
   }
-  stages_["global_adjustment"] += MillisecondsSince(begin);
+  stages_["global_adjustment"] += watch.Milliseconds();
 }
 
 void LoopCloser::EnterDue(std::int64_t frames) {

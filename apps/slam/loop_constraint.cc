@@ -7,6 +7,7 @@
 #include <set>
 #include <utility>
 
+#include "core/median.h"
 #include "tutti/loopclosure/relative_pose.h"
 
 namespace tutti {
@@ -111,10 +112,7 @@ double MedianDepth(const KeyframeView& view) {
   for (const Eigen::Vector3d& point : view.points) {
     if (point.allFinite() && point.z() > 0) depths.push_back(point.z());
   }
-  if (depths.empty()) return 0;
-  const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
-  std::nth_element(depths.begin(), middle, depths.end());
-  return *middle;
+  return internal::Median(std::move(depths));
 }
 
 LoopConstraint MakeLoopConstraint(const Verification& verification, const KeyframeView& candidate,

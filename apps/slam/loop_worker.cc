@@ -3,7 +3,7 @@
 #include <chrono>
 #include <utility>
 
-#include "apps/slam/milliseconds_since.h"
+#include "core/stopwatch.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -103,12 +103,12 @@ LoopResult LoopWorker::Locate(const LoopQuery& query) {
 
 LoopResult LoopWorker::Take() {
   const ScopedSpan span(recorder_, Lane::kTracking, "wait_for_loop");
-  const auto begin = std::chrono::steady_clock::now();
+  const internal::Stopwatch watch;
   std::unique_lock<std::mutex> lock(mutex_);
   changed_.wait(lock, [this] { return !outcomes_.empty(); });
   Outcome outcome = std::move(outcomes_.front());
   outcomes_.pop_front();
-  waited_ms_ += MillisecondsSince(begin);
+  waited_ms_ += watch.Milliseconds();
   if (outcome.failure) std::rethrow_exception(outcome.failure);
   return std::move(outcome.result);
 }

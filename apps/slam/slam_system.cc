@@ -1,13 +1,12 @@
 #include "tutti/slam/slam_system.h"
 
 #include <algorithm>
-#include <chrono>
 #include <deque>
 #include <utility>
 
+#include "core/stopwatch.h"
 #include "apps/slam/loop_closer.h"
 #include "apps/slam/loop_worker.h"
-#include "apps/slam/milliseconds_since.h"
 
 namespace tutti {
 namespace {
@@ -134,7 +133,7 @@ class SlamSystem::Impl {
   TrackResult Relocalize(const InputFrame& frame, const TrackResult& lost) {
     constexpr int kFewFeatures = 100;  // nothing can be recognised by so few
     if (keyframe_of_frame_.empty() || lost.features < kFewFeatures) return lost;
-    const auto begin = std::chrono::steady_clock::now();
+    const internal::Stopwatch watch;
     LoopQuery query;
     query.id = frame.index;
     query.image = frame.image;
@@ -148,7 +147,7 @@ class SlamSystem::Impl {
       result = odometry_->RelocalizeAt(keyframe);
     }
     if (result.state == TrackingState::kTracking) ++relocalized_;
-    stages_["relocalize"] += MillisecondsSince(begin);
+    stages_["relocalize"] += watch.Milliseconds();
     return result;
   }
 
@@ -185,9 +184,9 @@ class SlamSystem::Impl {
     }
     stamps_[frame.index] = frame.stamp_s;
     submitted_.push_back({frames_ + options_.loop_delay_frames, frame.index});
-    const auto begin = std::chrono::steady_clock::now();
+    const internal::Stopwatch watch;
     worker_->Submit(std::move(query));
-    if (options_.threads == 1) stages_["loop_inline"] += MillisecondsSince(begin);
+    if (options_.threads == 1) stages_["loop_inline"] += watch.Milliseconds();
   }
 
   static LoopRecord Record(const LoopResult& r) {

@@ -2,7 +2,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <memory>
@@ -12,6 +11,7 @@
 #include <vector>
 
 #include "apps/tutti/changed_images.h"
+#include "core/stopwatch.h"
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
 #include "data/synthetic/synthetic_writer.h"
@@ -40,7 +40,7 @@ struct GenerateArguments {
 class ProgressLine {
  public:
   bool operator()(std::size_t done, std::size_t total) {
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+    const double seconds = watch_.Seconds();
     const bool terminal = ::isatty(STDERR_FILENO) != 0;
     const std::size_t tenth = 10 * done / total;
     if (terminal ? (done % 5 == 0 || done == total) : tenth != last_tenth_) {
@@ -54,7 +54,7 @@ class ProgressLine {
   }
 
  private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  internal::Stopwatch watch_;
   std::size_t last_tenth_ = 0;
 };
 

@@ -6,13 +6,10 @@
 #include <cstdio>
 
 #include "apps/run/interrupt.h"
+#include "core/stopwatch.h"
 
 namespace tutti::view {
 namespace {
-
-double Now() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
 
 std::vector<LivePlace> PlacesOf(const Odometry& odometry) {
   std::vector<LivePlace> places;
@@ -150,7 +147,7 @@ void LiveState::Finish() {
 void LiveState::WaitWhilePaused(double abandoned_s) {
   std::unique_lock<std::mutex> lock(mutex_);
   while (now_.paused && steps_ == 0 && !closed_ && !InterruptGuard::Requested()) {
-    if (viewers_ == 0 && Now() - last_viewer_s_ > abandoned_s) {
+    if (viewers_ == 0 && internal::SteadySeconds() - last_viewer_s_ > abandoned_s) {
       now_.paused = false;
       LiveEvent event;
       event.text = "nobody looks any more: the run goes on";
@@ -164,16 +161,16 @@ void LiveState::WaitWhilePaused(double abandoned_s) {
 }
 
 void LiveState::WaitForViewer(double seconds) {
-  const double end = Now() + seconds;
+  const double end = internal::SteadySeconds() + seconds;
   std::unique_lock<std::mutex> lock(mutex_);
-  while (viewers_ == 0 && Now() < end && !InterruptGuard::Requested())
+  while (viewers_ == 0 && internal::SteadySeconds() < end && !InterruptGuard::Requested())
     changed_.wait_for(lock, std::chrono::milliseconds(50));
 }
 
 void LiveState::AddViewer(int change) {
   const std::lock_guard<std::mutex> lock(mutex_);
   viewers_ += change;
-  last_viewer_s_ = Now();
+  last_viewer_s_ = internal::SteadySeconds();
   changed_.notify_all();
 }
 
@@ -186,14 +183,14 @@ void LiveState::Pause(bool paused) {
   const std::lock_guard<std::mutex> lock(mutex_);
   now_.paused = paused && !now_.finished;
   steps_ = 0;
-  last_viewer_s_ = Now();
+  last_viewer_s_ = internal::SteadySeconds();
   Changed();
 }
 
 void LiveState::Step() {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (now_.paused) ++steps_;
-  last_viewer_s_ = Now();
+  last_viewer_s_ = internal::SteadySeconds();
   changed_.notify_all();
 }
 

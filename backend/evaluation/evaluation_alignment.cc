@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "tutti/backend/evaluation.h"
+#include "core/umeyama.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -33,31 +34,14 @@ Similarity AlignPoints(const std::vector<Eigen::Vector3d>& reference,
                      (n == 1 ? " pair of poses is" : " pairs of poses are") +
                      " too few, at least 3 are needed; use the alignment 'origin' or 'none'");
   }
-  const Eigen::Vector3d mean_r = Mean(reference), mean_e = Mean(estimate);
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-  double variance_r = 0, variance_e = 0;
-  for (std::size_t k = 0; k < n; ++k) {
-    covariance += (reference[k] - mean_r) * (estimate[k] - mean_e).transpose() / static_cast<double>(n);
-    variance_r += (reference[k] - mean_r).squaredNorm() / static_cast<double>(n);
-    variance_e += (estimate[k] - mean_e).squaredNorm() / static_cast<double>(n);
-  }
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  // The second singular value vanishes where one of the two lies on a line (all vanish where one stands
-  // still). The bound is against the spread of the points, with room for the rounding of coordinates.
-  if (!(svd.singularValues()(1) > 1e-14 * std::max(variance_r, variance_e)) || !(variance_e > 0)) {
+  const std::optional<Similarity> S = internal::Umeyama(reference, estimate, with_scale);
+  if (!S) {
     throw InputError(
         "alignment: the positions lie on a line or in one place, so the rotation is not determined; use the "
         "alignment "
         "'origin' or 'none'");
   }
-  Eigen::Vector3d sign(1, 1, 1);  // Umeyama eq. (43): no reflection
-  if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0) sign.z() = -1;
-  const Eigen::Matrix3d R = svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
-  Similarity out;
-  out.rotation = Eigen::Quaterniond(R).normalized();
-  out.scale = with_scale ? svd.singularValues().dot(sign) / variance_e : 1.0;
-  out.translation = mean_r - out.scale * (out.rotation * mean_e);
-  return out;
+  return *S;
 }
 
 Similarity AlignAboutAxis(const std::vector<Eigen::Vector3d>& reference,

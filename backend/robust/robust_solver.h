@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/median.h"
 #include "backend/robust/leave_one_out.h"
 #include "backend/robust/robust_loss.h"
 #include "backend/solver/graph_problem.h"
@@ -156,12 +157,6 @@ class RobustSolver {
       if (chi2[k] > std::max(limit, worst / 2)) problem_.SetWeight(kept[k], 0);
     }
     return limit;
-  }
-
-  static double Median(std::vector<double> values) {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
   }
 
   /// DecideLoops without the convergence at the end.

@@ -12,7 +12,7 @@
 
 #include "backend/solver/block_equations.h"
 #include "backend/solver/graph_solver.h"
-#include "backend/solver/stopwatch.h"
+#include "core/stopwatch.h"
 
 namespace tutti::internal {
 

@@ -7,7 +7,7 @@
 #include "backend/graph/graph_memory.h"
 #include "backend/robust/robust_loss.h"
 #include "backend/solver/local_solver.h"
-#include "backend/solver/stopwatch.h"
+#include "core/stopwatch.h"
 #include "tutti/core/error.h"
 
 namespace tutti {

@@ -9,7 +9,7 @@
 #include "backend/robust/robust_solver.h"
 #include "backend/solver/graph_initialization.h"
 #include "backend/solver/graph_problem.h"
-#include "backend/solver/stopwatch.h"
+#include "core/stopwatch.h"
 #include "tutti/core/error.h"
 
 namespace tutti {

@@ -2,11 +2,11 @@
 
 #include <Eigen/SparseCholesky>
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <vector>
 
+#include "core/stopwatch.h"
 #include "backend/graph/edge_weights.h"
 #include "backend/graph/graph_structure.h"
 #include "tutti/backend/pose_graph_optimizer.h"
@@ -200,7 +200,7 @@ std::string CertificateOptions::Validate() const {
 Certificate CertifyOptimum(const PoseGraph& graph, const CertificateOptions& options) {
   const std::string wrong = options.Validate();
   if (!wrong.empty()) throw InputError(wrong);
-  const auto begin = std::chrono::steady_clock::now();
+  const internal::Stopwatch watch;
   Certificate out;
   const GraphStructure structure = internal::AnalyseGraph(graph);
   if (graph.kind() == GraphKind::kSim3) {
@@ -229,7 +229,7 @@ Certificate CertifyOptimum(const PoseGraph& graph, const CertificateOptions& opt
   } else {
     Bound<3>(graph, solution, structure, options, out);
   }
-  out.time_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  out.time_s = watch.Seconds();
   return out;
 }
 

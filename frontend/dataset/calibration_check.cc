@@ -7,6 +7,7 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/features2d.hpp>
 
+#include "core/median.h"
 #include "frontend/features/features.h"
 #include "tutti/core/error.h"
 
@@ -26,13 +27,6 @@ Text(const char* format, ...) {
   std::vsnprintf(text, sizeof text, format, values);
   va_end(values);
   return text;
-}
-
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 void CheckLens(const PinholeCamera& c, const CalibrationCheckOptions& options, CalibrationReport& report) {
@@ -122,7 +116,7 @@ void CheckStereo(const std::vector<InputFrame>& frames, const CalibrationCheckOp
     if (disparity > 1) ++ahead;
     if (disparity < -1) ++behind;
   }
-  report.row_error_px = Median(rows);
+  report.row_error_px = internal::Median(rows);
   report.same_row = static_cast<double>(same) / static_cast<double>(rows.size());
   if (ahead + behind > 0) report.swapped = static_cast<double>(behind) / (ahead + behind);
   if (report.same_row < options.min_same_row) {
@@ -154,7 +148,7 @@ void CheckDepth(const std::vector<InputFrame>& frames, const CalibrationCheckOpt
   }
   if (pixels == 0) return;
   report.depth_share = static_cast<double>(depths.size()) / static_cast<double>(pixels);
-  report.depth_median_m = Median(depths);
+  report.depth_median_m = internal::Median(depths);
   if (report.depth_share < options.min_depth_share) {
     report.findings.push_back(
         {Text("only %.1f %% of the pixels have a depth that is used", 100 * report.depth_share),

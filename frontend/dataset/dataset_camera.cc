@@ -6,6 +6,7 @@
 #include <mutex>
 
 #include "frontend/dataset/dataset_folder.h"
+#include "core/stopwatch.h"
 #include "frontend/dataset/video_input.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
@@ -105,8 +106,7 @@ class CameraDataset : public Dataset {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (!good) return false;
     // A device's stamps are seconds since 1970, by a clock that can't go back.
-    const auto elapsed = std::chrono::steady_clock::now() - begin_;
-    frame.stamp_s = device_ ? begin_s_ + std::chrono::duration<double>(elapsed).count()
+    frame.stamp_s = device_ ? begin_s_ + since_begin_.Seconds()
                             : static_cast<double>(stamps_.size()) / rate_hz_;
     if (!stamps_.empty() && frame.stamp_s <= stamps_.back()) frame.stamp_s = stamps_.back() + 1e-6;
     frame.index = static_cast<std::int64_t>(stamps_.size());
@@ -122,7 +122,7 @@ class CameraDataset : public Dataset {
   std::vector<std::string> warnings_;
   std::optional<Rectifier> rectifier_;
   double rate_hz_ = 30;
-  const std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+  const internal::Stopwatch since_begin_;
   const double begin_s_ =
       std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
   mutable cv::VideoCapture capture_;

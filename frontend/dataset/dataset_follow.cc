@@ -5,39 +5,35 @@
 #include <thread>
 #include <utility>
 
+#include "core/stopwatch.h"
 #include "frontend/dataset/dataset_folder.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
 namespace {
 
-using Clock = std::chrono::steady_clock;
 constexpr auto kPoll = std::chrono::milliseconds(50);
 constexpr double kGiveUpAfter =
     1.0;  // a file that is still incomplete when newer ones are there is damaged [s]
-
-double SecondsSince(Clock::time_point begin) {
-  return std::chrono::duration<double>(Clock::now() - begin).count();
-}
 
 /// Lists the folder again and again; a frame is there when its files can be decoded in full.
 class FollowedDataset : public Dataset {
  public:
   FollowedDataset(std::function<FolderContents()> find, const DatasetOptions& options)
       : find_(std::move(find)), options_(options) {
-    const Clock::time_point begin = Clock::now();
+    const internal::Stopwatch waited;
     while (true) {
       try {
         FolderContents contents = find_();
         base_ = std::make_unique<FolderDataset>(contents, options_);
         break;
       } catch (const InputError&) {  // nothing there yet, or half written
-        if (SecondsSince(begin) > options_.follow_s) throw;
+        if (waited.Seconds() > options_.follow_s) throw;
       }
       std::this_thread::sleep_for(kPoll);
     }
     frames_ = base_->Frames();
-    grown_ = Clock::now();
+    since_growth_ = {};
   }
 
   Supply FrameSupply() const override { return Supply::kGrowing; }
@@ -63,7 +59,7 @@ class FollowedDataset : public Dataset {
       {
         const std::lock_guard<std::mutex> lock(mutex_);
         if (frames_.size() <= i + 1) Poll();
-        const bool idle = SecondsSince(grown_) > options_.follow_s;
+        const bool idle = since_growth_.Seconds() > options_.follow_s;
         if (i < frames_.size() && Complete(i, idle)) return true;
         if (idle) return i == frames_.size() && !std::exchange(told_, true) && !failure_.empty();
       }
@@ -103,13 +99,13 @@ class FollowedDataset : public Dataset {
     }
     if (now.size() <= frames_.size()) return;
     frames_.insert(frames_.end(), now.begin() + static_cast<std::ptrdiff_t>(frames_.size()), now.end());
-    grown_ = Clock::now();
+    since_growth_ = {};
   }
 
   // Frame i can be decoded, or never will be. mutex_ is held.
   bool Complete(std::size_t i, bool idle) const {
     ReadResult read = base_->ReadFiles(frames_[i]);
-    if (!read.frame && !idle && (i + 1 == frames_.size() || SecondsSince(grown_) < kGiveUpAfter))
+    if (!read.frame && !idle && (i + 1 == frames_.size() || since_growth_.Seconds() < kGiveUpAfter))
       return false;
     checked_ = {i, std::move(read)};
     return true;
@@ -121,7 +117,7 @@ class FollowedDataset : public Dataset {
   mutable std::mutex mutex_;
   mutable std::vector<FrameFiles> frames_;                             // guarded by mutex_, as all below
   mutable std::optional<std::pair<std::size_t, ReadResult>> checked_;  // the frame that was waited for
-  mutable Clock::time_point grown_;
+  mutable internal::Stopwatch since_growth_;
   mutable std::string failure_;  // of the last listing
   mutable bool told_ = false;
 };

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/median.h"
 #include "frontend/features/grey_window.h"
 
 namespace tutti {
@@ -211,9 +212,7 @@ void MatchStereo(const std::vector<cv::Mat>& left_pyramid, const std::vector<cv:
   std::vector<float> residuals;
   residuals.reserve(found.size());
   for (const Found& f : found) residuals.push_back(f.residual);
-  std::nth_element(residuals.begin(), residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2),
-                   residuals.end());
-  const float limit = kResidualRatio * residuals[residuals.size() / 2];
+  const float limit = kResidualRatio * internal::Median(std::move(residuals));
   std::vector<double> errors;
   for (const Found& f : found) {
     if (f.residual > limit) continue;
@@ -223,10 +222,7 @@ void MatchStereo(const std::vector<cv::Mat>& left_pyramid, const std::vector<cv:
     errors.push_back(f.row_error);
   }
   left->stereo_matches = static_cast<int>(errors.size());
-  if (errors.empty()) return;
-  std::nth_element(errors.begin(), errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2),
-                   errors.end());
-  left->row_error_px = errors[errors.size() / 2];
+  if (!errors.empty()) left->row_error_px = internal::Median(std::move(errors));
 }
 
 }  // namespace tutti

@@ -9,7 +9,7 @@
 #include "frontend/geometry/pose_solver.h"
 #include "frontend/geometry/two_view.h"
 #include "frontend/map/landmark_fusion.h"
-#include "frontend/odometry/stopwatch.h"
+#include "frontend/odometry/stage_times.h"
 
 namespace tutti {
 namespace {

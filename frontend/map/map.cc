@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "core/median.h"
 #include "frontend/features/patch_aligner.h"
 
 namespace tutti {
@@ -184,10 +185,7 @@ double Map::MedianDepth(int id) const {
   for (int l : k.landmarks) {
     if (l >= 0) depths.push_back((T_camera_world * landmark(l).position).z());
   }
-  if (depths.empty()) return 0;
-  std::nth_element(depths.begin(), depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2),
-                   depths.end());
-  return depths[depths.size() / 2];
+  return internal::Median(std::move(depths));
 }
 
 }  // namespace tutti

@@ -6,7 +6,7 @@
 
 #include "frontend/map/local_mapper.h"
 #include "frontend/map/map.h"
-#include "frontend/odometry/stopwatch.h"
+#include "frontend/odometry/stage_times.h"
 
 namespace tutti {
 

@@ -2,7 +2,7 @@
 #include <algorithm>
 
 #include "frontend/odometry/odometry_impl.h"
-#include "frontend/odometry/stopwatch.h"
+#include "frontend/odometry/stage_times.h"
 
 namespace tutti {
 namespace {

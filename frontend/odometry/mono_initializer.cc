@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/median.h"
 #include "frontend/features/matcher.h"
 #include "frontend/geometry/two_view.h"
 #include "frontend/map/bundle_adjustment.h"
@@ -66,9 +67,7 @@ bool MonoInitializer::Offer(const TrackedFrame& frame, int piece, const Pose& T_
   for (std::size_t i = 0; i < matches.size(); ++i) {
     if (view.valid[i]) depths.push_back(view.points[i].z());
   }
-  std::nth_element(depths.begin(), depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2),
-                   depths.end());
-  const double scale = median_depth / depths[depths.size() / 2];
+  const double scale = median_depth / internal::Median(std::move(depths));
   Pose T_second_first = view.T_second_first;
   T_second_first.translation *= scale;
 

@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "core/median.h"
 #include "frontend/odometry/odometry_impl.h"
 #include "tutti/core/error.h"
 
@@ -183,16 +184,7 @@ std::vector<std::int64_t> Odometry::FrameIndices(int map_piece) const {
 std::map<std::string, double> Odometry::StageMilliseconds() const { return impl_->stages.milliseconds; }
 void Odometry::SetRecorder(SpanRecorder* recorder) { impl_->stages.recorder = recorder; }
 
-namespace {
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2),
-                   values.end());
-  return values[values.size() / 2];
-}
-}  // namespace
-
-double Odometry::StereoRowErrorPx() const { return Median(impl_->row_errors); }
-double Odometry::StereoMatches() const { return Median(impl_->stereo_matches); }
+double Odometry::StereoRowErrorPx() const { return internal::Median(impl_->row_errors); }
+double Odometry::StereoMatches() const { return internal::Median(impl_->stereo_matches); }
 
 }  // namespace tutti

@@ -12,7 +12,7 @@
 #include "frontend/map/map.h"
 #include "frontend/odometry/background_mapping.h"
 #include "frontend/odometry/mono_initializer.h"
-#include "frontend/odometry/stopwatch.h"
+#include "frontend/odometry/stage_times.h"
 #include "tutti/frontend/odometry.h"
 
 namespace tutti {

@@ -4,7 +4,7 @@
 #include <set>
 
 #include "frontend/odometry/odometry_impl.h"
-#include "frontend/odometry/stopwatch.h"
+#include "frontend/odometry/stage_times.h"
 
 namespace tutti {
 

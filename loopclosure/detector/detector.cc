@@ -5,7 +5,7 @@
 
 #include "loopclosure/detector/detector_impl.h"
 #include "loopclosure/detector/parallel.h"
-#include "loopclosure/detector/stopwatch.h"
+#include "core/stopwatch.h"
 #include "loopclosure/memory/dense.h"
 #include "tutti/core/error.h"
 
@@ -82,7 +82,7 @@ LoopResult LoopDetector::Impl::Detect(const LoopQuery& query) {
   reasoner_.Finish(result);
   const int hypothesis = result.hypothesis > 0.0 ? combined.best : -1;  // 0: the members do not agree on one
   Retrieve(hypothesis, result);
-  Shrink(hypothesis, watch.TotalMs(), result);
+  Shrink(hypothesis, watch.Milliseconds(), result);
   Journal(static_cast<int>(views_.size()) - 1, result);
   result.memory_ms += watch.LapMs();
   return result;

@@ -4,7 +4,7 @@
 #include <cstdio>
 
 #include "loopclosure/detector/parallel.h"
-#include "loopclosure/detector/stopwatch.h"
+#include "core/stopwatch.h"
 #include "loopclosure/filter/loop_probability.h"
 #include "tutti/core/error.h"
 

@@ -6,6 +6,7 @@
 #include <limits>
 #include <opencv2/calib3d.hpp>
 
+#include "core/umeyama.h"
 #include "loopclosure/geometry/ransac.h"
 
 namespace tutti {
@@ -165,9 +166,9 @@ std::vector<ScoredSimilarity> FitSimilarity(const SimilarityProblem& problem,
     a.push_back(problem.points_a[static_cast<std::size_t>(i)]);
     b.push_back(problem.points_b[static_cast<std::size_t>(i)]);
   }
-  const Similarity S = AlignPointPairs(a, b);
-  if (!(S.scale > 0.0)) return {};
-  return {{S, S.Inverse()}};
+  const std::optional<Similarity> S = internal::Umeyama(a, b, true);
+  if (!S || !(S->scale > 0.0)) return {};
+  return {{*S, S->Inverse()}};
 }
 
 using Jacobian2x7 = Eigen::Matrix<double, 2, 7>;
@@ -311,36 +312,6 @@ PnpResult SolvePnp(const std::vector<Eigen::Vector3d>& points, const std::vector
   result.success = static_cast<int>(result.inliers.size()) >= options.min_inliers;
   if (!result.success)
     result.reason = TooFew("inliers of the pose", result.inliers.size(), options.min_inliers);
-  return result;
-}
-
-Similarity AlignPointPairs(const std::vector<Eigen::Vector3d>& a, const std::vector<Eigen::Vector3d>& b,
-                           bool fix_scale) {
-  Similarity result;
-  result.scale = 0.0;
-  if (a.size() != b.size() || a.size() < 3) return result;
-  const double n = static_cast<double>(a.size());
-  Eigen::Vector3d mean_a = Eigen::Vector3d::Zero();
-  Eigen::Vector3d mean_b = Eigen::Vector3d::Zero();
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    mean_a += a[i] / n;
-    mean_b += b[i] / n;
-  }
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-  double variance_b = 0.0;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    covariance += (a[i] - mean_a) * (b[i] - mean_b).transpose() / n;
-    variance_b += (b[i] - mean_b).squaredNorm() / n;
-  }
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Vector3d singular = svd.singularValues();
-  if (!(singular[1] > 1e-9 * singular[0]) || !(variance_b > 0.0)) return result;  // on a line, or one point
-  Eigen::Vector3d sign(1, 1, 1);
-  if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0) sign[2] = -1;
-  const Eigen::Matrix3d rotation = svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
-  result.rotation = Eigen::Quaterniond(rotation).normalized();
-  result.scale = fix_scale ? 1.0 : singular.dot(sign) / variance_b;
-  result.translation = mean_a - result.scale * (result.rotation * mean_b);
   return result;
 }
 

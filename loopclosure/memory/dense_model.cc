@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "loopclosure/memory/dense.h"
+#include "core/median.h"
 #include "loopclosure/store/byte_stream.h"
 #include "tutti/core/error.h"
 
@@ -22,12 +23,6 @@ float Cosine(const cv::Mat& a, const cv::Mat& b) {
   if (a.empty() || b.empty()) return 0.0f;
   using Vector = Eigen::Map<const Eigen::VectorXf>;
   return Vector(a.ptr<float>(), a.cols).dot(Vector(b.ptr<float>(), b.cols));
-}
-
-double MedianOf(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 }  // namespace
@@ -181,9 +176,9 @@ std::vector<double> DenseModel::Contrast(std::vector<double> scores, const std::
   std::vector<double> values;
   values.reserve(places.size());
   for (const int slot : places) values.push_back(scores[Index(slot)]);
-  const double median = MedianOf(values);
+  const double median = internal::Median(values);
   for (double& value : values) value = std::abs(value - median);
-  const double deviation = std::max(kLeastDeviation, kDeviation * MedianOf(values));
+  const double deviation = std::max(kLeastDeviation, kDeviation * internal::Median(values));
   for (std::size_t i = 0; i < scores.size(); ++i) {
     const double beyond = std::max(0.0, (scores[i] - median) / deviation - kPlain);
     counts[i] = kMost * beyond / (beyond + kHalfWay);

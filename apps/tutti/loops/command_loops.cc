@@ -1,6 +1,5 @@
 // tutti loops: loop closure alone on a folder of images, measured against a ground truth.
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -11,6 +10,7 @@
 #include <vector>
 
 #include "apps/run/interrupt.h"
+#include "core/stopwatch.h"
 #include "apps/run/progress.h"
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
@@ -77,9 +77,9 @@ LoopRow Process(const std::filesystem::path& file, const std::filesystem::path& 
     query.camera->width = query.image.cols;
     query.camera->height = query.image.rows;
   }
-  const auto begin = std::chrono::steady_clock::now();
+  const internal::Stopwatch watch;
   row.result = detector.Detect(query);
-  row.ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
+  row.ms = watch.Milliseconds();
   return row;
 }
 

@@ -124,28 +124,6 @@ TEST(SolvePnp, PointNoiseLowersTheInformation) {
   EXPECT_LT(soft.information(0, 0), 0.5 * sharp.information(0, 0));
 }
 
-TEST(AlignPointPairs, RecoversASimilarity) {
-  Scene scene(9);
-  const Similarity truth(1.7, ExpSO3({0.3, 0.2, -0.5}), {1, -2, 0.5});
-  std::vector<Eigen::Vector3d> a;
-  std::vector<Eigen::Vector3d> b;
-  for (int i = 0; i < 10; ++i) {
-    b.push_back(scene.Point());
-    a.push_back(truth * b.back());
-  }
-  const Similarity found = AlignPointPairs(a, b);
-  EXPECT_NEAR(found.scale, 1.7, 1e-9);
-  EXPECT_LT((found.translation - truth.translation).norm(), 1e-9);
-  EXPECT_LT(LogSO3(found.rotation.conjugate() * truth.rotation).norm(), 1e-9);
-  EXPECT_EQ(AlignPointPairs(a, b, true).scale, 1.0);
-}
-
-TEST(AlignPointPairs, PointsOnALineHaveNoAnswer) {
-  const std::vector<Eigen::Vector3d> line = {{0, 0, 1}, {0, 0, 2}, {0, 0, 3}};
-  EXPECT_EQ(AlignPointPairs(line, line).scale, 0.0);
-  EXPECT_EQ(AlignPointPairs({}, {}).scale, 0.0);
-}
-
 struct SimilarityData {
   std::vector<Eigen::Vector3d> points_a, points_b;
   std::vector<Eigen::Vector2d> pixels_a, pixels_b;

@@ -60,11 +60,6 @@ struct SimilarityResult {
   double rmse_px = 0;        ///< over both images, inliers only
 };
 
-/// Least-squares similarity with b -> a (Umeyama 1991, eq. 40-42; Horn 1987). At least three points that are
-/// not on a line; a scale of 0 means that they were. With `fix_scale` the scale is 1.
-Similarity AlignPointPairs(const std::vector<Eigen::Vector3d>& a, const std::vector<Eigen::Vector3d>& b,
-                           bool fix_scale = false);
-
 /// Sim(3) by RANSAC on three 3D-3D matches, inliers judged by the reprojection error in both images, refined
 /// on the inliers by Gauss-Newton on the same errors (as ORB-SLAM's loop correction does; Strasdat et al.
 /// 2010 for the group).

@@ -1,10 +1,10 @@
 // Where the time of the odometry goes: sums by stage, and spans if somebody asked for them.
 #pragma once
 
-#include <chrono>
 #include <map>
 #include <string>
 
+#include "core/stopwatch.h"
 #include "tutti/core/span_recorder.h"
 
 namespace tutti {
@@ -19,18 +19,15 @@ class ScopedStopwatch {
  public:
   ScopedStopwatch(StageTimes* times, Lane lane, const char* stage)
       : sum_(&times->milliseconds[stage]),
-        span_(times->recorder, lane, stage),
-        start_(std::chrono::steady_clock::now()) {}
-  ~ScopedStopwatch() {
-    *sum_ += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start_).count();
-  }
+        span_(times->recorder, lane, stage) {}
+  ~ScopedStopwatch() { *sum_ += watch_.Milliseconds(); }
   ScopedStopwatch(const ScopedStopwatch&) = delete;
   ScopedStopwatch& operator=(const ScopedStopwatch&) = delete;
 
  private:
   double* sum_;
   ScopedSpan span_;
-  std::chrono::steady_clock::time_point start_;
+  internal::Stopwatch watch_;
 };
 
 }  // namespace tutti

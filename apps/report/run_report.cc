@@ -143,7 +143,7 @@ Json ConfigurationJson(const RunResult& result) {
   }
   return {{"file", result.config_file},
           {"dataset", result.dataset},
-          {"seed", result.config.odometry.seed},
+          {"seed", result.config.loops.seed},
           {"ground_truth", result.evaluation ? result.evaluation->file : ""},
           {"sections", sections},
           {"versions", BuildInfo()}};
@@ -162,7 +162,7 @@ Json ReportJson(const RunResult& result, const DetectionLog& log, const std::str
   json["format"] = kReportFormat;
   json["variant"] = variant;
   json["dataset"] = result.dataset;
-  json["seed"] = result.config.odometry.seed;
+  json["seed"] = result.config.loops.seed;
   json["unit"] = result.rig.sensor == Sensor::kMono && !scored ? "map units" : "m";
   json["figures"] = FiguresJson(result);
   json["findings"] = Json::array();

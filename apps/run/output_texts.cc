@@ -157,7 +157,7 @@ std::string SummaryJson(const RunResult& r) {
   json["dataset"] = r.dataset;
   json["config_file"] = r.config_file;
   json["sensor"] = Name(r.rig.sensor);
-  json["seed"] = r.config.odometry.seed;
+  json["seed"] = r.config.loops.seed;
   json["realtime"] = r.realtime;
   json["interrupted"] = r.interrupted;
   json["appearance_only"] = r.appearance_only;

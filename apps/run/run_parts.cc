@@ -46,10 +46,7 @@ RunConfig WithOverrides(RunConfig config, const RunRequest& request) {
   if (request.follow_s) config.dataset.follow_s = *request.follow_s;
   if (request.threads) config.run.threads = *request.threads;
   if (request.inject_false_loops) config.run.inject_false_loops = *request.inject_false_loops;
-  if (request.seed) {
-    config.odometry.seed = *request.seed;
-    config.loops.seed = *request.seed;
-  }
+  if (request.seed) config.loops.seed = *request.seed;
   const std::string problem = config.run.Validate();
   if (!problem.empty()) throw InputError("--threads: " + problem);
   return config;

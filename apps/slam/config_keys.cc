@@ -128,7 +128,6 @@ void ConfigTable::AddOdometry(OdometryOptions& o) {
   Add("ba_keyframes", o.ba_keyframes, "keyframes that local bundle adjustment moves");
   Add("ba_fixed_keyframes", o.ba_fixed_keyframes, "keyframes that hold the window in place");
   Add("ba_iterations", o.ba_iterations, "most iterations of a local bundle adjustment");
-  Add("seed", o.seed, "of RANSAC");
 }
 
 void ConfigTable::AddLoops(LoopDetectorOptions& o) {
@@ -326,7 +325,6 @@ void ConfigTable::AddGraph(PoseGraphOptions& o, OnlineOptions& online) {
   Add("gnc_start", o.gnc_start,
       "cauchy, dcs, gnc: the threshold starts at this many times the largest chi-square of a loop");
   Add("max_time_s", o.max_time_s, "stop after this time [s]; 0: no limit (a limit is not reproducible)");
-  Add("seed", o.seed, "nothing is random so far");
 }
 
 void ConfigTable::AddRun(SlamOptions& o) {

@@ -36,9 +36,7 @@ std::optional<LoopEdge> FalseLoopSource::Alike(const Odometry& odometry, const s
   if (!last_) return std::nullopt;
   const auto c = std::upper_bound(ids.begin(), ids.end(), last_->candidate);
   const auto q = std::lower_bound(ids.begin(), ids.end(), last_->query);
-  const auto alive = [&](int id) { return std::binary_search(ids.begin(), ids.end(), id); };
-  if (c == ids.end() || q == ids.begin() || !alive(last_->candidate) || !alive(last_->query))
-    return std::nullopt;
+  if (c == ids.end() || q == ids.begin()) return std::nullopt;
   LoopEdge loop = *last_;
   loop.candidate = *c;
   loop.query = *(q - 1);

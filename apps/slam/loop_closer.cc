@@ -33,15 +33,7 @@ void LoopCloser::AddKeyframes() {
 }
 
 LoopGate::Map LoopCloser::Places() const {
-  const std::vector<int> ids = odometry_.KeyframeIds();
-  return [this, ids](int id) {
-    LoopGate::Place place;
-    place.alive = std::binary_search(ids.begin(), ids.end(), id);
-    if (!place.alive) return place;
-    place.piece = odometry_.KeyframePiece(id);
-    place.T_world_camera = odometry_.KeyframePose(id);
-    return place;
-  };
+  return [this](int id) { return LoopGate::Place{odometry_.KeyframePiece(id), odometry_.KeyframePose(id)}; };
 }
 
 // Measures it against the map, and closes it if something else says the same.
@@ -54,10 +46,6 @@ void LoopCloser::Consider(const Verification& verification, int candidate, int q
   before_change_();  // what mapping has found enters earlier than without the loop
   odometry_.FinishMapping();
   const LoopGate::Map places = Places();
-  if (!places(candidate).alive || !places(query).alive) {
-    record.reason = "one of its keyframes is no longer in the map";
-    return;
-  }
   const LoopConstraint constraint = Measure(verification, candidate, query);
   if (!constraint.usable) {
     record.reason = constraint.reason;
@@ -66,7 +54,6 @@ void LoopCloser::Consider(const Verification& verification, int candidate, int q
   LoopEdge edge = constraint.edge;
   edge.record = records_.size() - 1;
   record.S_candidate_query = edge.S_candidate_query;
-  record.has_scale = true;
   std::vector<LoopEdge> entering = gate_.Offer(edge, places);
   if (entering.empty()) {
     record.pending = true;
@@ -105,7 +92,7 @@ bool LoopCloser::Inject(int query, std::int64_t frames) {
   record.candidate = loop->candidate_frame;
   record.query_stamp_s = odometry_.KeyframeStamp(loop->query);
   record.candidate_stamp_s = odometry_.KeyframeStamp(loop->candidate);
-  record.verified = record.injected = record.has_scale = true;
+  record.verified = record.injected = true;
   record.S_candidate_query = loop->S_candidate_query;
   loop->record = records_.size();
   records_.push_back(record);

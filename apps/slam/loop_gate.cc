@@ -35,7 +35,6 @@ bool LoopGate::Near(const LoopEdge& a, const LoopEdge& b) const {
 
 bool LoopGate::Agree(const LoopEdge& a, const LoopEdge& b, const Map& map) const {
   const Place qa = map(a.query), qb = map(b.query), ca = map(a.candidate), cb = map(b.candidate);
-  if (!qa.alive || !qb.alive || !ca.alive || !cb.alive) return false;
   if (qa.piece != qb.piece || ca.piece != cb.piece) return false;  // no odometry between them
   const Similarity between_queries(qa.T_world_camera.Inverse() * qb.T_world_camera);
   const Similarity between_candidates(cb.T_world_camera.Inverse() * ca.T_world_camera);
@@ -46,7 +45,7 @@ bool LoopGate::Agree(const LoopEdge& a, const LoopEdge& b, const Map& map) const
 
 std::optional<Disagreement> LoopGate::WithMap(const LoopEdge& loop, const Map& map) const {
   const Place q = map(loop.query), c = map(loop.candidate);
-  if (!q.alive || !c.alive || q.piece != c.piece) return std::nullopt;
+  if (q.piece != c.piece) return std::nullopt;
   const Similarity T_query_candidate(q.T_world_camera.Inverse() * c.T_world_camera);
   return Measure(loop.S_candidate_query * T_query_candidate, loop.depth);
 }

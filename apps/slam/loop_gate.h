@@ -27,7 +27,6 @@ class LoopGate {
  public:
   /// Pose of a keyframe in the present map, and the map piece that it belongs to.
   struct Place {
-    bool alive = false;
     int piece = 0;
     Pose T_world_camera;
   };

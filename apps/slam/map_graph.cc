@@ -130,18 +130,13 @@ MapGraph::Correction MapGraph::Optimize(const Odometry& odometry, const std::vec
   Correction correction;
   PoseGraph graph = Build(odometry, loops);
   const OnlineReport report = optimizer_.Optimize(graph);
-  correction.time_ms = report.time_s * 1e3;
   correction.success = report.success;
   correction.reason = report.reason;
   if (!report.success) return correction;
   correction.S_world_keyframe = graph.Poses();
   correction.merges = Merges(odometry, loops);
   for (std::size_t i = 0; i < graph.edges().size(); ++i) {
-    if (graph.edges()[i].kind == EdgeKind::kOdometry) {
-      correction.odometry_chi2 += report.edges[i].chi2;
-    } else {
-      correction.weights.push_back(report.edges[i].weight);
-    }
+    if (graph.edges()[i].kind == EdgeKind::kLoop) correction.weights.push_back(report.edges[i].weight);
   }
   for (const LoopEdge& loop : loops) {
     const Similarity& c = correction.S_world_keyframe.at(loop.candidate);

@@ -42,8 +42,6 @@ class MapGraph {
     std::map<int, int> merges;                   ///< map piece -> the piece that it joined
     std::vector<Disagreement> residuals;         ///< of each loop after the optimisation
     std::vector<double> weights;                 ///< of each loop, from the robust loss
-    double odometry_chi2 = 0;                    ///< of all odometry edges after the optimisation
-    double time_ms = 0;
   };
   /// Optimises the graph with these loops, as far as they and what else changed since the last call reach
   /// (OnlineOptimizer; all of it with Ceres). The odometry is not touched.

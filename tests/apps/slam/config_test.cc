@@ -36,7 +36,7 @@ TEST(Config, ReadsEverySection) {
   const RunConfig config = ParseConfig(
       "dataset: {sensor: stereo, type: kitti, stride: 2}\n"
       "camera: {width: 640, height: 480, fx: 520, fy: 521, cx: 318, cy: 236, baseline_m: 0.5}\n"
-      "odometry: {seed: 7}\n"
+      "odometry: {features: 700}\n"
       "loops:\n  members: [sift, orb]\n  verification: {min_inliers: 33}\n"
       "graph: {robust: gnc, solver: block}\n"
       "run: {threads: 1}\n",
@@ -46,7 +46,7 @@ TEST(Config, ReadsEverySection) {
   ASSERT_TRUE(config.dataset.camera.has_value());
   EXPECT_EQ(config.dataset.camera->fy, 521);
   EXPECT_EQ(config.dataset.baseline_m, 0.5);
-  EXPECT_EQ(config.odometry.seed, 7u);
+  EXPECT_EQ(config.odometry.features, 700);
   EXPECT_EQ(config.loops.members, (std::vector<std::string>{"sift", "orb"}));
   EXPECT_EQ(config.loops.verification.min_inliers, 33);
   EXPECT_EQ(config.graph.robust, RobustLoss::kGnc);
@@ -84,14 +84,15 @@ TEST(Config, ReadsTheNetworkOfTheMemberDnn) {
 }
 
 TEST(Config, UnknownKeyNamesLineAndNearestKey) {
-  EXPECT_THAT(Message("odometry:\n  seed: 1\nloops:\n  loop_treshold: 0.2\n"),
+  EXPECT_THAT(Message("odometry:\n  features: 900\nloops:\n  loop_treshold: 0.2\n"),
               AllOf(HasSubstr("my.yaml:4:"), HasSubstr("loop_treshold"), HasSubstr("'loop_threshold'")));
   EXPECT_THAT(Message("loops:\n  verification:\n    min_inlier: 3\n"),
               AllOf(HasSubstr("my.yaml:3:"), HasSubstr("'min_inliers'")));
 }
 
 TEST(Config, UnknownSectionNamesNearestSection) {
-  EXPECT_THAT(Message("\nodometri:\n  seed: 1\n"), AllOf(HasSubstr("my.yaml:2:"), HasSubstr("'odometry'")));
+  EXPECT_THAT(Message("\nodometri:\n  features: 900\n"),
+              AllOf(HasSubstr("my.yaml:2:"), HasSubstr("'odometry'")));
 }
 
 TEST(Config, RepeatedKeyIsRefused) {
@@ -104,7 +105,7 @@ TEST(Config, WrongTypesAreRefusedWithTheirLine) {
   EXPECT_THAT(Message("run:\n  threads: 1.5\n"), HasSubstr("my.yaml:2:"));
   EXPECT_THAT(Message("run:\n  loops: maybe\n"), HasSubstr("true or false"));
   EXPECT_THAT(Message("run:\n  loop_agree_deg: .nan\n"), HasSubstr("finite number"));
-  EXPECT_THAT(Message("odometry:\n  seed: -3\n"), HasSubstr("not negative"));
+  EXPECT_THAT(Message("loops:\n  seed: -3\n"), HasSubstr("not negative"));
   EXPECT_THAT(Message("dataset:\n  sensor: sonar\n"), HasSubstr("mono, stereo, rgbd"));
   EXPECT_THAT(Message("loops:\n  members: surf\n"), HasSubstr("list"));
   EXPECT_THAT(Message("run: 5\n"), HasSubstr("my.yaml:1:"));

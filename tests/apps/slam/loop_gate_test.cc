@@ -8,7 +8,6 @@ namespace {
 // Keyframe k stands at x = k in piece 0, and the map drifts: from keyframe 100 on everything is 5 m off.
 LoopGate::Place PlaceOf(int id) {
   LoopGate::Place place;
-  place.alive = id < 200;
   place.T_world_camera.translation = {static_cast<double>(id % 100) + (id >= 100 ? 5.0 : 0.0), 0, 0};
   return place;
 }
@@ -77,12 +76,6 @@ TEST(LoopGate, OneConfirmationTrustsEachLoopAlone) {
   options.loop_confirmations = 1;
   LoopGate gate{options};
   EXPECT_EQ(gate.Offer(Loop(10), PlaceOf).size(), 1u);
-}
-
-TEST(LoopGate, KeyframesThatAreGoneVouchForNothing) {
-  LoopGate gate{SlamOptions()};
-  EXPECT_TRUE(gate.Offer(Loop(150), PlaceOf).empty());
-  EXPECT_TRUE(gate.Offer(Loop(152), PlaceOf).empty());
 }
 
 }  // namespace

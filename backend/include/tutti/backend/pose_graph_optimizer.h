@@ -79,8 +79,7 @@ struct PoseGraphOptions {
   double gnc_step = 4.0;
   int gnc_max_rounds = 60;
   double max_time_s =
-      0;         ///< stop after this time [s]; 0: no limit (a limit makes the result depend on the machine)
-  int seed = 0;  ///< nothing is random so far; kept so that callers set it in one place
+      0;  ///< stop after this time [s]; 0: no limit (a limit makes the result depend on the machine)
 
   /// Empty if usable, else what is wrong.
   std::string Validate() const;

@@ -87,7 +87,7 @@ class Odometry {
   /// made), in the order of its features. Costs a look at each feature.
   std::vector<SeenLandmark> SeenLandmarks() const;
 
-  /// Ids of all keyframes that are alive, ascending.
+  /// Ids of all keyframes, ascending.
   std::vector<int> KeyframeIds() const;
   /// Everything about one keyframe, with the current map's points.
   KeyframeView Keyframe(int id) const;

@@ -1,7 +1,6 @@
 // Options of the visual odometry.
 #pragma once
 
-#include <cstdint>
 #include <string>
 
 namespace tutti {
@@ -55,8 +54,6 @@ struct OdometryOptions {
   int ba_keyframes = 12;             ///< keyframes that local bundle adjustment moves
   int ba_fixed_keyframes = 20;       ///< keyframes that hold the window in place
   int ba_iterations = 6;             ///< most iterations of a local bundle adjustment
-
-  std::uint64_t seed = 1;  ///< of RANSAC
 
   /// Empty if usable, else what is wrong and with which key.
   std::string Validate() const;

@@ -38,14 +38,14 @@ struct LoopRecord {
   bool verified = false;              ///< passed the detector's geometric verification
   bool accepted = false;              ///< in the pose graph in the end
   bool injected = false;              ///< planted (run.inject_false_loops), known to be false
-  double weight = 0;                  ///< that the pose graph last gave it, 0..1; 0: never was in it
+  double weight = 0;                  ///< that the pose graph last gave it, 0..1; 0: never was in it,
+                                      ///< or there is none (appearance only)
   std::optional<double> gate_sigmas;  ///< Mahalanobis distance from the map (run.loop_gate_sigmas), if asked
   bool revoked = false;               ///< the map contradicted it, and the detector was told
   bool pending = false;               ///< waits for a second loop that agrees
   std::optional<bool> correct;        ///< what the ground truth says of an accepted loop, if it can
   std::string reason;                 ///< why it is not accepted, in plain words
   std::optional<Similarity> S_candidate_query;  ///< the constraint, if one could be computed
-  bool has_scale = false;                       ///< false: rotation and unit direction only
 };
 
 }  // namespace tutti

@@ -50,7 +50,7 @@ class LoopCloser {
     if (!result.warning.empty()) std::fprintf(stderr, "warning: %s\n", result.warning.c_str());
     if (!result.accepted) return;
     if (MapContradicts(result.verification)) {
-      OnLoopRefused(keyframe.id, result.verification.candidate);
+      OnLoopRefused(keyframe.id, result.candidate);
     } else {
       OnLoop(keyframe.id, result.verification);
     }

@@ -66,7 +66,7 @@ void DetectionLog::OnDetection(const LoopResult& result) {
   detection.proposed = result.proposed;
   detection.verified = result.accepted;
   detection.probability = result.probability;
-  detection.candidate = result.verification.candidate >= 0 ? result.verification.candidate : result.candidate;
+  detection.candidate = result.candidate;
   detection.reason = result.reason.empty() && !result.accepted ? result.verification.reason : result.reason;
   detection.posterior = result.posterior;
   detection.geometry = result.verification;
@@ -80,7 +80,7 @@ void DetectionLog::OnDetection(const LoopResult& result) {
                                   Noteworthy(member.posterior_by_location), weight, member.at_candidate,
                                   Grouped(member.evidence, detection.group)});
   }
-  detection.opinions.push_back({"ensemble", true, result.hypothesis, result.candidate,
+  detection.opinions.push_back({"ensemble", true, result.hypothesis, result.best,
                                 Noteworthy(result.posterior_by_location), 0, result.posterior,
                                 Grouped(result.evidence, detection.group)});
   numbers_[result.query] = detections_.size();

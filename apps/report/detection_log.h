@@ -29,7 +29,7 @@ struct LoggedOpinion {
   /// (input frame of a location, its posterior), where that is at least DetectionLog::kLeastPosterior
   std::vector<std::pair<std::int64_t, float>> posterior;
   double weight = 0;        ///< of a member: share of the sum of all that took part, 0..1; 0: it did not
-  double at_candidate = 0;  ///< its posterior at the ensemble's candidate, 0..1
+  double at_candidate = 0;  ///< its posterior at the ensemble's best place, 0..1
   /// Of a member, or of the joint filter, by group of LoggedDetection::group images in the order of the
   /// queries: the EvidenceByte of its largest likelihood; images at the end that are no places yet are left
   /// out

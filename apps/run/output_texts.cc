@@ -77,7 +77,8 @@ Json LoopsJson(const RunResult& r) {
   for (const LoopRecord& loop : r.loops) {
     injected += loop.injected ? 1 : 0;
     injected_accepted += loop.injected && loop.accepted ? 1 : 0;
-    if (!loop.verified || (loop.accepted && loop.weight >= 0.5)) continue;
+    const bool believed = r.appearance_only || loop.weight >= 0.5;  // without poses there is no graph
+    if (!loop.verified || (loop.accepted && believed)) continue;
     loops["doubted"].push_back({{"query", loop.query},
                                 {"candidate", loop.candidate},
                                 {"weight", loop.weight},

@@ -4,9 +4,9 @@
 #include <deque>
 #include <utility>
 
-#include "core/stopwatch.h"
 #include "apps/slam/loop_closer.h"
 #include "apps/slam/loop_worker.h"
+#include "core/stopwatch.h"
 
 namespace tutti {
 namespace {
@@ -140,7 +140,7 @@ class SlamSystem::Impl {
     query.depth_m = frame.depth_m;
     query.camera = rig_.camera;
     const LoopResult found = worker_->Locate(query);
-    const int keyframe = KeyframeOf(found.verification.candidate);
+    const int keyframe = KeyframeOf(found.candidate);
     TrackResult result = lost;
     if (found.accepted && keyframe >= 0) {
       KeepUntouched();
@@ -192,7 +192,7 @@ class SlamSystem::Impl {
   static LoopRecord Record(const LoopResult& r) {
     LoopRecord record;
     record.query = r.query;
-    record.candidate = r.verification.candidate >= 0 ? r.verification.candidate : r.candidate;
+    record.candidate = r.candidate;
     record.members = r.members;
     record.hypothesis = r.hypothesis;
     record.posterior = r.posterior;

@@ -112,8 +112,7 @@ void LiveState::AddDetection(const LoopResult& result) {
     event.opinions.emplace_back(member.name, member.took_part ? member.hypothesis : std::nan(""));
   event.opinions.emplace_back("ensemble", result.hypothesis);
   if (result.proposed) {
-    const std::string place =
-        std::to_string(result.verification.candidate >= 0 ? result.verification.candidate : result.candidate);
+    const std::string place = std::to_string(result.candidate);
     char text[120];
     std::snprintf(text, sizeof text, "frame %ld: H = %.3f, probability %.3f, ",
                   static_cast<long>(result.query), result.hypothesis, result.probability);

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/stopwatch.h"
 #include "loopclosure/detector/detector_impl.h"
 #include "loopclosure/detector/parallel.h"
-#include "core/stopwatch.h"
 #include "loopclosure/memory/dense.h"
 #include "tutti/core/error.h"
 
@@ -223,7 +223,7 @@ LoopResult LoopDetector::Impl::Locate(const LoopQuery& query) const {
     return result;
   }
   result.hypothesis = combined.hypothesis;
-  result.candidate = memory().id(combined.best);
+  result.candidate = result.best = memory().id(combined.best);
   result.posterior = internal::PosteriorAt(combined.belief, combined.best);
   result.proposed = true;
   Verify(view, combined.belief, result);

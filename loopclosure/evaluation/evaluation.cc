@@ -161,10 +161,10 @@ LoopObservation Observe(const LoopResult& result) {
   observation.image = static_cast<int>(result.query);
   observation.hypothesis = result.hypothesis;
   observation.probability = result.probability;
-  observation.best = static_cast<int>(result.candidate);
+  observation.best = static_cast<int>(result.best);
   observation.proposed = result.proposed;
   observation.accepted = result.accepted;
-  observation.verified = result.accepted ? static_cast<int>(result.verification.candidate) : -1;
+  observation.verified = result.accepted ? static_cast<int>(result.candidate) : -1;
   return observation;
 }
 

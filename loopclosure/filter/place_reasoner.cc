@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "loopclosure/detector/parallel.h"
 #include "core/stopwatch.h"
+#include "loopclosure/detector/parallel.h"
 #include "loopclosure/filter/loop_probability.h"
 #include "tutti/core/error.h"
 
@@ -107,7 +107,7 @@ CombinedBelief PlaceReasoner::Locate(const std::vector<SeenWords>& words) const 
 void PlaceReasoner::Explain(const CombinedBelief& combined, LoopResult& result) const {
   result.hypothesis = combined.hypothesis;
   if (combined.best >= 0) {
-    result.candidate = memory().id(combined.best);
+    result.candidate = result.best = memory().id(combined.best);
     result.posterior = PosteriorAt(combined.belief, combined.best);
   }
   result.members.resize(members_.size());
@@ -210,11 +210,12 @@ void PlaceReasoner::Verify(const View& query, const Belief& belief,
                            const HypothesisSearch::VerifyPair& verify,
                            const std::function<const View&(int)>& view_of, LoopResult& result) const {
   if (!options_.verification.enabled) {
-    result.verification.candidate = result.candidate;
+    result.verification.candidate = result.best;
     result.verification.accepted = true;
-    result.probability = MassAround(belief, memory().Find(result.candidate));
+    result.probability = MassAround(belief, memory().Find(result.best));
   } else {
     HypothesisSearch(options_, memory(), verify, view_of).Verify(query, belief, result);
+    if (result.verification.candidate >= 0) result.candidate = result.verification.candidate;
     for (Verification& tried : result.tried) {
       tried.mass = MassAround(belief, memory().Find(tried.candidate));
       if (tried.candidate == result.verification.candidate) result.verification.mass = tried.mass;

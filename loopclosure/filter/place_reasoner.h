@@ -33,8 +33,8 @@ class PlaceReasoner {
   /// What is believed of an image with these words that is no location, without the images before it.
   CombinedBelief Locate(const std::vector<SeenWords>& words) const;
 
-  /// Fills hypothesis, candidate and posterior of `result`, and what each member believes; features and words
-  /// of the members are left to the caller.
+  /// Fills hypothesis, best, candidate and posterior of `result`, and what each member believes; features and
+  /// words of the members are left to the caller.
   void Explain(const CombinedBelief& combined, LoopResult& result) const;
   /// True if the belief is strong enough for geometry to look at it; else `result` says why not.
   bool Proposes(const CombinedBelief& combined, LoopResult& result);

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "apps/run/interrupt.h"
-#include "core/stopwatch.h"
 #include "apps/run/progress.h"
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
@@ -21,6 +20,7 @@
 #include "apps/tutti/loops/loops_pictures.h"
 #include "apps/tutti/loops/loops_table.h"
 #include "apps/tutti/posteriors_csv.h"
+#include "core/stopwatch.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 #include "tutti/loopclosure/detector.h"

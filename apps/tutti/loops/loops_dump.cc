@@ -59,9 +59,9 @@ std::string VerificationLines(const LoopResult& result, const LoopGroundTruth& t
     std::snprintf(cells, sizeof cells, "%ld,%ld,%s,%d,%d,%d,%s,%d,%d,%.9g,%d,%.9g,%.9g,%.9g,",
                   static_cast<long>(result.query), static_cast<long>(tried.candidate), LabelName(label),
                   order++, tried.accepted ? 1 : 0,
-                  result.accepted && tried.candidate == result.verification.candidate ? 1 : 0,
-                  TypeName(tried.type), tried.matches, tried.inliers, tried.mass, tried.coverage,
-                  tried.expected_inliers, tried.log_nfa, tried.motion_spread);
+                  result.accepted && tried.candidate == result.candidate ? 1 : 0, TypeName(tried.type),
+                  tried.matches, tried.inliers, tried.mass, tried.coverage, tried.expected_inliers,
+                  tried.log_nfa, tried.motion_spread);
     text += cells + Quoted(tried.reason) + "\n";
   }
   return text;

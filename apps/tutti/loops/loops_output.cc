@@ -84,11 +84,11 @@ std::string Csv(const LoopRun& run) {
   for (const LoopRow& row : run.rows) {
     const LoopResult& r = row.result;
     const int image = static_cast<int>(r.query);
-    const long verified = r.accepted ? static_cast<long>(r.verification.candidate) : -1;
-    const long location = r.accepted ? verified : static_cast<long>(r.candidate);
+    const long verified = r.accepted ? static_cast<long>(r.candidate) : -1;
+    const long location = r.accepted ? verified : static_cast<long>(r.best);
     char numbers[256];
     std::snprintf(numbers, sizeof numbers, ",%.9g,%ld,%.9g,%.9g,%d,%d,%ld,%d,%d,%s,%d", r.hypothesis,
-                  static_cast<long>(r.candidate), r.posterior, r.probability, r.proposed ? 1 : 0,
+                  static_cast<long>(r.best), r.posterior, r.probability, r.proposed ? 1 : 0,
                   r.accepted ? 1 : 0, verified, r.verification.matches, r.verification.inliers,
                   location < 0 ? "-" : LabelName(run.truth.At(image, static_cast<int>(location))),
                   run.truth.HasLoop(image) ? 1 : 0);

@@ -82,7 +82,7 @@ TEST(DetectionLog, KeepsWhatIsWorthALook) {
   DetectionLog log;
   LoopResult result;
   result.query = 7;
-  result.candidate = 3;
+  result.candidate = result.best = 3;
   result.hypothesis = 0.5;
   result.proposed = true;
   result.posterior_by_location = {{1, 1e-6}, {3, 0.4}};
@@ -171,7 +171,7 @@ DetectionLog ReturnLog(int images) {
     if (i + 1 == images) {
       result.members[0].evidence[0].likelihood = std::exp(4.0);
       result.hypothesis = 0.9;
-      result.candidate = 0;
+      result.candidate = result.best = 0;
       result.posterior = 0.8;
       result.posterior_by_location = {{0, 0.8}};
       result.proposed = true;

@@ -44,7 +44,7 @@ int main() {
   int loops = 0;
   for (int i = 0; i < 4; ++i) {
     const tutti::LoopResult loop = second.Detect(Place(static_cast<unsigned>(i)), kPlaces + i);
-    if (loop.accepted && loop.verification.candidate == i) ++loops;
+    if (loop.accepted && loop.candidate == i) ++loops;
   }
   std::printf("locations: %zu, loops with saved places: %d of 4\n", second.NumLocations(), loops);
   return loops > 0 ? 0 : Fail("no loop with what was loaded");

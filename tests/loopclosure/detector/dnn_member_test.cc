@@ -44,7 +44,7 @@ std::vector<LoopResult> TwoWalks(const LoopDetectorOptions& options, int images_
 int Found(const std::vector<LoopResult>& results) {
   int found = 0;
   for (std::size_t i = kWallPlaces; i < results.size(); ++i) {
-    const bool near = std::abs(results[i].candidate - (results[i].query - kWallPlaces)) <= 1;
+    const bool near = std::abs(results[i].best - (results[i].query - kWallPlaces)) <= 1;
     if (near && results[i].hypothesis >= 0.5) ++found;
   }
   return found;

@@ -55,7 +55,7 @@ inline std::vector<LoopResult> Walk(LoopDetector& detector, int begin, int end, 
 inline int CountTrue(const std::vector<LoopResult>& results, int places) {
   int found = 0;
   for (const LoopResult& result : results) {
-    if (result.accepted && result.verification.candidate % places == result.query % places) ++found;
+    if (result.accepted && result.candidate % places == result.query % places) ++found;
   }
   return found;
 }
@@ -63,7 +63,7 @@ inline int CountTrue(const std::vector<LoopResult>& results, int places) {
 inline int CountFalse(const std::vector<LoopResult>& results, int places) {
   int wrong = 0;
   for (const LoopResult& result : results) {
-    if (result.accepted && result.verification.candidate % places != result.query % places) ++wrong;
+    if (result.accepted && result.candidate % places != result.query % places) ++wrong;
   }
   return wrong;
 }
@@ -75,6 +75,7 @@ inline void ExpectEqual(const std::vector<LoopResult>& a, const std::vector<Loop
     EXPECT_EQ(a[i].query, b[i].query) << i;
     EXPECT_EQ(a[i].hypothesis, b[i].hypothesis) << i;
     EXPECT_EQ(a[i].candidate, b[i].candidate) << i;
+    EXPECT_EQ(a[i].best, b[i].best) << i;
     EXPECT_EQ(a[i].posterior, b[i].posterior) << i;
     EXPECT_EQ(a[i].verification.candidate, b[i].verification.candidate) << i;
     EXPECT_EQ(a[i].verification.inliers, b[i].verification.inliers) << i;

@@ -175,7 +175,7 @@ TEST(Evaluation, ObserveTakesTheProbabilityFromTheDetector) {
   result.query = 7;
   result.hypothesis = 0.4;
   result.probability = 0.8;
-  result.candidate = 2;
+  result.best = 2;
   result.proposed = true;
   const LoopObservation refused = Observe(result);
   EXPECT_DOUBLE_EQ(refused.hypothesis, 0.4);
@@ -183,7 +183,7 @@ TEST(Evaluation, ObserveTakesTheProbabilityFromTheDetector) {
   EXPECT_TRUE(refused.proposed);
   EXPECT_EQ(refused.verified, -1);
   result.accepted = true;
-  result.verification.candidate = 3;
+  result.candidate = 3;
   EXPECT_EQ(Observe(result).verified, 3);
 }
 

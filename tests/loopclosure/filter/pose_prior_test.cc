@@ -64,7 +64,7 @@ TEST(PosePrior, OfTwoPlacesThatLookAlikeTheNearerOneWins) {
 TEST(PosePrior, WithAHugeUncertaintyNothingChanges) {
   const LoopResult without = SeeTheDoorAgain([](double) { return std::nullopt; }, 0);
   const LoopResult with = SeeTheDoorAgain([](double x) { return At(x, 1e6); }, kTwin);
-  EXPECT_EQ(with.candidate, without.candidate);
+  EXPECT_EQ(with.best, without.best);
   EXPECT_NEAR(with.hypothesis, without.hypothesis, 1e-6);
   for (const std::int64_t door : {kTwin, kOtherTwin})
     EXPECT_NEAR(PosteriorAt(with, door), PosteriorAt(without, door), 1e-6);

@@ -76,7 +76,7 @@ struct MemberOpinion {
   double hypothesis = 0;    ///< H = 1 - p(new place)
   std::int64_t best = -1;   ///< id of its best location, -1 if none
   double weight = 1;        ///< rule joint: of its counts in the sum of all, 1 in the mean
-  double at_candidate = 0;  ///< its posterior at the ensemble's candidate
+  double at_candidate = 0;  ///< its posterior at the ensemble's best location
   std::vector<std::pair<std::int64_t, double>> posterior_by_location;  ///< only with keep_posterior
   std::vector<CandidateEvidence> evidence;  ///< only with keep_evidence: of every location in working memory,
                                             ///< in one order for all members; empty if it did not take part.
@@ -137,8 +137,10 @@ struct Verification {
 struct LoopResult {
   std::int64_t query = -1;             ///< id of the image
   double hypothesis = 0;               ///< H of the combined posterior, 1 - p(new place)
-  std::int64_t candidate = -1;         ///< argmax of the combined posterior, -1 if there is no location yet
-  double posterior = 0;                ///< combined posterior at the candidate
+  std::int64_t candidate = -1;         ///< the place that this is about: the loop if accepted, else the one
+                                       ///< that geometry came closest to, or where it looked at none `best`
+  std::int64_t best = -1;              ///< argmax of the combined posterior, -1 if there is no location yet
+  double posterior = 0;                ///< combined posterior at `best`
   double probability = 0;              ///< that this is a loop: with the verified place, else the candidate
   bool proposed = false;               ///< H >= propose_threshold: went to verification
   bool accepted = false;               ///< the verification accepted it (or one of its neighbours), and the

@@ -1,0 +1,42 @@
+// summary.json: what it says of the loops.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "apps/run/outputs.h"
+
+namespace tutti {
+namespace {
+
+RunResult WithOneLoopOfWeight(double weight) {
+  RunResult result;
+  LoopRecord loop;
+  loop.query = 9;
+  loop.candidate = 2;
+  loop.verified = loop.accepted = true;
+  loop.weight = weight;
+  result.loops.push_back(loop);
+  return result;
+}
+
+nlohmann::json Doubted(const RunResult& result) {
+  return nlohmann::json::parse(SummaryJson(result))["loops"]["doubted"];
+}
+
+TEST(Summary, ALoopThatTheRobustLossHardlyBelievesIsDoubted) {
+  EXPECT_TRUE(Doubted(WithOneLoopOfWeight(0.9)).empty());
+  const nlohmann::json doubted = Doubted(WithOneLoopOfWeight(0.1));
+  ASSERT_EQ(doubted.size(), 1u);
+  EXPECT_EQ(doubted[0]["query"], 9);
+  EXPECT_EQ(doubted[0]["reason"], "down-weighted by the robust loss");
+}
+
+TEST(Summary, WithoutPosesThereIsNoGraphThatCouldDoubtALoop) {
+  RunResult result = WithOneLoopOfWeight(0);
+  result.appearance_only = true;
+  EXPECT_TRUE(Doubted(result).empty());
+  EXPECT_EQ(nlohmann::json::parse(SummaryJson(result))["loops"]["accepted"], 1);
+}
+
+}  // namespace
+}  // namespace tutti

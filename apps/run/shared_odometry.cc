@@ -3,12 +3,12 @@
 #include <opencv2/core.hpp>
 #include <utility>
 
-#include "core/stopwatch.h"
 #include "apps/run/interrupt.h"
 #include "apps/run/outputs.h"
 #include "apps/run/progress.h"
 #include "apps/run/run_evaluation.h"
 #include "apps/run/run_parts.h"
+#include "core/stopwatch.h"
 #include "tutti/core/error.h"
 
 namespace tutti {

@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "apps/tutti/changed_images.h"
-#include "core/stopwatch.h"
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
+#include "core/stopwatch.h"
 #include "data/synthetic/synthetic_writer.h"
 #include "tutti/core/error.h"
 

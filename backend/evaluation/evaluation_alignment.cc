@@ -1,8 +1,8 @@
 #include <Eigen/SVD>
 #include <cmath>
 
-#include "tutti/backend/evaluation.h"
 #include "core/umeyama.h"
+#include "tutti/backend/evaluation.h"
 #include "tutti/core/error.h"
 
 namespace tutti {

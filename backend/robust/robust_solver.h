@@ -7,10 +7,10 @@
 #include <utility>
 #include <vector>
 
-#include "core/median.h"
 #include "backend/robust/leave_one_out.h"
 #include "backend/robust/robust_loss.h"
 #include "backend/solver/graph_problem.h"
+#include "core/median.h"
 
 namespace tutti::internal {
 

@@ -6,9 +6,9 @@
 #include <limits>
 #include <vector>
 
-#include "core/stopwatch.h"
 #include "backend/graph/edge_weights.h"
 #include "backend/graph/graph_structure.h"
+#include "core/stopwatch.h"
 #include "tutti/backend/pose_graph_optimizer.h"
 #include "tutti/core/error.h"
 

@@ -5,8 +5,8 @@
 #include <map>
 #include <mutex>
 
-#include "frontend/dataset/dataset_folder.h"
 #include "core/stopwatch.h"
+#include "frontend/dataset/dataset_folder.h"
 #include "frontend/dataset/video_input.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
@@ -106,8 +106,8 @@ class CameraDataset : public Dataset {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (!good) return false;
     // A device's stamps are seconds since 1970, by a clock that can't go back.
-    frame.stamp_s = device_ ? begin_s_ + since_begin_.Seconds()
-                            : static_cast<double>(stamps_.size()) / rate_hz_;
+    frame.stamp_s =
+        device_ ? begin_s_ + since_begin_.Seconds() : static_cast<double>(stamps_.size()) / rate_hz_;
     if (!stamps_.empty() && frame.stamp_s <= stamps_.back()) frame.stamp_s = stamps_.back() + 1e-6;
     frame.index = static_cast<std::int64_t>(stamps_.size());
     frames_[stamps_.size()] = std::move(frame);

@@ -18,8 +18,7 @@ struct StageTimes {
 class ScopedStopwatch {
  public:
   ScopedStopwatch(StageTimes* times, Lane lane, const char* stage)
-      : sum_(&times->milliseconds[stage]),
-        span_(times->recorder, lane, stage) {}
+      : sum_(&times->milliseconds[stage]), span_(times->recorder, lane, stage) {}
   ~ScopedStopwatch() { *sum_ += watch_.Milliseconds(); }
   ScopedStopwatch(const ScopedStopwatch&) = delete;
   ScopedStopwatch& operator=(const ScopedStopwatch&) = delete;

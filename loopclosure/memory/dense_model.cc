@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "loopclosure/memory/dense.h"
 #include "core/median.h"
+#include "loopclosure/memory/dense.h"
 #include "loopclosure/store/byte_stream.h"
 #include "tutti/core/error.h"
 

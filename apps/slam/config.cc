@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <fstream>
 #include <map>
+#include <optional>
 #include <set>
 #include <sstream>
+#include <utility>
 
 #include "apps/slam/config_table.h"
 #include "tutti/core/error.h"
@@ -78,6 +80,59 @@ void Check(const std::string& file, const std::string& section, const KeyMarks& 
   Fail(file, where, section + ": " + problem);
 }
 
+// Only the keys that a data set without calibration of its own needs beside its images: baseline, depth
+// scale.
+void DropUnsetCamera(DatasetOptions& options) {
+  if (options.camera->fx == 0 && options.camera->fy == 0) options.camera.reset();
+}
+
+/// Section and what is out of range in it.
+std::optional<std::pair<std::string, std::string>> FirstProblem(const RunConfig& config) {
+  const std::pair<std::string, std::string> problems[] = {
+      {"camera", config.dataset.camera ? config.dataset.camera->Validate() : ""},
+      {"dataset", config.dataset.Validate()},
+      {"odometry", config.odometry.Validate()},
+      {"loops", config.loops.Validate()},
+      {"graph", config.graph.Validate()},
+      {"graph", config.online.Validate()},
+      {"run", config.run.Validate()}};
+  for (const auto& problem : problems) {
+    if (!problem.second.empty()) return problem;
+  }
+  return std::nullopt;
+}
+
+// Sets one key from `key=value`, the key without `prefix`.
+void Assign(const std::string& assignment, const std::string& prefix, RunConfig& config) {
+  const ConfigTable table(config);
+  const std::size_t equals = assignment.find('=');
+  const std::string form = prefix.empty() ? "section.key=value" : "key=value";
+  if (equals == std::string::npos) throw InputError("'" + assignment + "': write it as " + form);
+  const std::string given = assignment.substr(0, equals), path = prefix + given;
+  const std::size_t dot = path.rfind('.');
+  const ConfigKey* key =
+      dot == std::string::npos ? nullptr : table.Find(path.substr(0, dot), path.substr(dot + 1));
+  if (key == nullptr) {
+    std::vector<std::string> valid;
+    std::string elsewhere;  // a key of this name, where the section was left out
+    for (const ConfigKey& known : table.keys()) {
+      const std::string name = known.section + "." + known.name;
+      if (name.rfind(prefix, 0) != 0) continue;
+      valid.push_back(name.substr(prefix.size()));
+      if (elsewhere.empty() && known.name == given) elsewhere = "; did you mean '" + valid.back() + "'?";
+    }
+    throw InputError("'" + assignment + "': unknown key '" + given + "'" +
+                     (elsewhere.empty() ? NearestHint(given, valid) : elsewhere));
+  }
+  std::string wrong;
+  try {
+    wrong = key->read(YAML::Load(assignment.substr(equals + 1)));
+  } catch (const YAML::Exception& e) {
+    wrong = "not valid YAML: " + e.msg;
+  }
+  if (!wrong.empty()) throw InputError("'" + assignment + "': " + wrong);
+}
+
 }  // namespace
 
 RunConfig::RunConfig() {
@@ -114,21 +169,9 @@ RunConfig ParseConfig(const std::string& text, const std::string& name) {
       ReadSection(name, section, item.second, table, marks[section]);
     }
   }
-  if (marks["camera"].keys.empty()) {
-    config.dataset.camera.reset();
-  } else if (config.dataset.camera->fx == 0 && config.dataset.camera->fy == 0) {
-    // Only the keys that a data set without calibration of its own needs beside its images: baseline, depth
-    // scale.
-    config.dataset.camera.reset();
-  } else {
-    Check(name, "camera", marks["camera"], config.dataset.camera->Validate());
-  }
-  Check(name, "dataset", marks["dataset"], config.dataset.Validate());
-  Check(name, "odometry", marks["odometry"], config.odometry.Validate());
-  Check(name, "loops", marks["loops"], config.loops.Validate());
-  Check(name, "graph", marks["graph"], config.graph.Validate());
-  Check(name, "graph", marks["graph"], config.online.Validate());
-  Check(name, "run", marks["run"], config.run.Validate());
+  DropUnsetCamera(config.dataset);
+  if (const auto problem = FirstProblem(config))
+    Check(name, problem->first, marks[problem->first], problem->second);
   return config;
 }
 
@@ -148,34 +191,21 @@ RunConfig LoadConfig(const std::filesystem::path& file) {
   return ParseConfig(text.str(), file.string());
 }
 
+void SetOptions(const std::vector<std::string>& assignments, RunConfig& config) {
+  RunConfig changed = config;
+  if (!changed.dataset.camera) changed.dataset.camera = PinholeCamera();  // the table binds to it
+  for (const std::string& assignment : assignments) Assign(assignment, "", changed);
+  DropUnsetCamera(changed.dataset);
+  const auto problem = FirstProblem(changed);
+  if (problem) throw InputError("--set: " + problem->first + ": " + problem->second);
+  config = changed;
+}
+
 void SetLoopOptions(const std::vector<std::string>& assignments, LoopDetectorOptions& options) {
   RunConfig config;
-  config.dataset.camera = PinholeCamera();  // the table binds to it
+  config.dataset.camera = PinholeCamera();
   config.loops = options;
-  const ConfigTable table(config);
-  for (const std::string& assignment : assignments) {
-    const std::size_t equals = assignment.find('=');
-    if (equals == std::string::npos) throw InputError("'" + assignment + "': write it as key=value");
-    const std::string path = "loops." + assignment.substr(0, equals);
-    const std::size_t dot = path.rfind('.');
-    const ConfigKey* key = table.Find(path.substr(0, dot), path.substr(dot + 1));
-    if (key == nullptr) {
-      std::vector<std::string> valid;
-      for (const ConfigKey& known : table.keys()) {
-        const std::string name = known.section + "." + known.name;
-        if (name.rfind("loops.", 0) == 0) valid.push_back(name.substr(6));
-      }
-      const std::string given = path.substr(6);
-      throw InputError("'" + assignment + "': unknown key '" + given + "'" + NearestHint(given, valid));
-    }
-    std::string wrong;
-    try {
-      wrong = key->read(YAML::Load(assignment.substr(equals + 1)));
-    } catch (const YAML::Exception& e) {
-      wrong = "not valid YAML: " + e.msg;
-    }
-    if (!wrong.empty()) throw InputError("'" + assignment + "': " + wrong);
-  }
+  for (const std::string& assignment : assignments) Assign(assignment, "loops.", config);
   const std::string problem = config.loops.Validate();
   if (!problem.empty()) throw InputError("loops: " + problem);
   options = config.loops;

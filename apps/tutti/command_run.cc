@@ -91,7 +91,7 @@ int Run(const CLI::App& command, const RunArguments& arguments) {
   if (command.count("--inject-false-loops") > 0) request.inject_false_loops = arguments.inject_false_loops;
   if (command.count("--max-frames") > 0) request.max_frames = arguments.max_frames;
   RunConfig config = LoadConfig(request.config);
-  SetLoopOptions(arguments.set, config.loops);
+  SetOptions(arguments.set, config);
   const bool view = arguments.view || command.count("--view-address") > 0;
   if (view) request.observers.push_back(StartView(arguments.live));
   const RunResult result = arguments.no_report ? RunSlam(request, config) : RunWithReport(request, config);
@@ -120,10 +120,9 @@ void AddRunCommand(CLI::App& app, int& exit_code) {
   command->add_option(
       "--ground-truth", arguments->ground_truth,
       "trajectory to evaluate against (default: the data set's own, if it has one; 'none': don't)");
-  command->add_option(
-      "--set", arguments->set,
-      "key=value: a key of the configuration's section `loops`, on top of the file (rule=orb, "
-      "stm_size=20); may be given several times");
+  command->add_option("--set", arguments->set,
+                      "SECTION.KEY=VALUE: any key of --help-config, on top of the file (loops.rule=orb, "
+                      "odometry.features=900, loops.extraction.features=300); may be given several times");
   command->add_flag("--no-loops", arguments->no_loops, "odometry alone");
   command->add_option("--seed", arguments->seed, "of everything that draws random numbers")
       ->check(NotNegative());

@@ -131,6 +131,52 @@ TEST(Config, MissingFileSaysWhatIsNeeded) {
   }
 }
 
+TEST(SetOptions, TakesTheKeysOfEverySection) {
+  RunConfig config;
+  SetOptions({"run.threads=1", "odometry.features=900", "loops.extraction.features=300", "loops.rule=orb",
+              "graph.solver=block", "dataset.stride=2", "run.threads=3"},
+             config);
+  EXPECT_EQ(config.run.threads, 3);
+  EXPECT_EQ(config.odometry.features, 900);
+  EXPECT_EQ(config.loops.extraction.features, 300);
+  EXPECT_EQ(config.loops.rule, CombinationRule::kSingle);
+  EXPECT_EQ(config.graph.solver, PoseGraphSolver::kBlock);
+  EXPECT_EQ(config.dataset.stride, 2);
+  EXPECT_FALSE(config.dataset.camera);
+  SetOptions({"camera.fx=500", "camera.fy=500", "camera.width=640", "camera.height=480", "camera.cx=320",
+              "camera.cy=240"},
+             config);
+  ASSERT_TRUE(config.dataset.camera);
+  EXPECT_EQ(config.dataset.camera->fx, 500);
+}
+
+TEST(SetOptions, SaysWhatIsWrongAndChangesNothing) {
+  const auto message = [](const std::string& assignment) {
+    RunConfig config;
+    try {
+      SetOptions({"dataset.stride=2", assignment}, config);
+    } catch (const InputError& error) {
+      EXPECT_EQ(config.dataset.stride, 1);
+      return std::string(error.what());
+    }
+    return std::string("no error");
+  };
+  EXPECT_THAT(message("run.threads"), HasSubstr("section.key=value"));
+  EXPECT_THAT(message("odometry.feature=3"), HasSubstr("did you mean 'odometry.features'?"));
+  EXPECT_THAT(message("rule=orb"), HasSubstr("did you mean 'loops.rule'?"));
+  EXPECT_THAT(message("run.threads=0"), HasSubstr("run: threads"));
+  EXPECT_THAT(message("graph.solver=quick"), HasSubstr("graph.solver=quick"));
+}
+
+TEST(Config, EveryFileInDataConfigsIsRead) {
+  int files = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(testing::SourceDir() / "data/configs")) {
+    EXPECT_NO_THROW(LoadConfig(entry.path())) << entry.path();
+    ++files;
+  }
+  EXPECT_GE(files, 10);
+}
+
 TEST(SetLoopOptions, TakesTheKeysOfTheLoopsSection) {
   LoopDetectorOptions options;
   options.seed = 7;

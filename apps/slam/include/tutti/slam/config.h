@@ -34,9 +34,12 @@ RunConfig LoadConfig(const std::filesystem::path& file);
 /// The same from a text; `name` stands for the file in messages.
 RunConfig ParseConfig(const std::string& text, const std::string& name);
 
-/// Sets options of section `loops:` from texts `key=value` with the keys and values of the YAML file:
-/// "stm_size=20", "extraction.features=300", "rule=product". Later ones win. Throws InputError for an unknown
-/// key (with the nearest valid one) and for a value of the wrong type or out of range.
+/// Sets options from texts `section.key=value` with the keys and values of the YAML file: "run.threads=1",
+/// "loops.extraction.features=300". Later ones win. Throws InputError for an unknown key (with the nearest
+/// valid one) and for a value of the wrong type or out of range; nothing is set then.
+void SetOptions(const std::vector<std::string>& assignments, RunConfig& config);
+
+/// The same for section `loops:` alone, whose name is left out: "stm_size=20", "rule=product".
 void SetLoopOptions(const std::vector<std::string>& assignments, LoopDetectorOptions& options);
 
 /// One key with its present value, for the echo in summary.json and for --help-config.

@@ -143,6 +143,7 @@ void LoopCloser::Close(std::vector<LoopEdge> entering, std::int64_t frames) {
   const ScopedSpan span(recorder_, Lane::kOptimisation, "close_loop");
   const internal::Stopwatch watch;
   const double fused_before = stages_["loop_fuse"];  // a stage of its own
+  before_change_();  // a planted loop comes here at once, and mapping enters earlier than without it
   odometry_.FinishMapping();
   MapGraph::Correction correction;
   Gate(entering);
@@ -197,7 +198,6 @@ void LoopCloser::Apply(const MapGraph::Correction& correction, const std::vector
     records_[loop.record].weight = correction.weights[i];
     if (correction.weights[i] < kNoWeight) Revoke(loop);
   }
-  before_change_();
   graph_.Keep(odometry_, correction, gate_.accepted(), gate_.waiting());
   odometry_.ApplyCorrection(correction.S_world_keyframe, correction.merges);
   ++corrections_;

@@ -218,18 +218,22 @@ std::vector<ConfigEntry> DescribeConfig(const RunConfig& config) {
   std::vector<ConfigEntry> entries;
   for (const ConfigKey& key : table.keys()) {
     if (key.section == "camera" && !config.dataset.camera && key.name != "baseline_m") continue;
-    entries.push_back({key.section, key.name, key.show(), key.doc});
+    entries.push_back({key.section, key.name, key.show(), key.doc, key.advanced});
   }
   return entries;
 }
 
-std::string HelpConfig() {
+std::string HelpConfig(bool advanced) {
   RunConfig defaults;
   defaults.dataset.camera = PinholeCamera();
   std::ostringstream out;
-  out << "# All keys of the configuration with their defaults. A file needs only what it changes.\n";
+  out << (advanced
+              ? "# All keys of the configuration with their defaults. A file needs only what it changes.\n"
+              : "# What users set, with its defaults; --help-config --advanced shows all keys. A file needs "
+                "only what it\n# changes.\n");
   std::string section;
   for (const ConfigEntry& entry : DescribeConfig(defaults)) {
+    if (entry.advanced && !advanced) continue;
     const std::size_t dot = entry.section.find('.');
     const std::string indent(dot == std::string::npos ? 2 : 4, ' ');
     if (entry.section != section && dot == std::string::npos)

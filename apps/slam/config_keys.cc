@@ -44,75 +44,81 @@ ConfigTable::ConfigTable(RunConfig& config) {
 
 void ConfigTable::AddDataset(DatasetOptions& o) {
   section_ = "dataset";
-  AddEnum("type", o.type,
-          {{"auto", DatasetType::kAuto},
-           {"kitti", DatasetType::kKitti},
-           {"tum", DatasetType::kTum},
-           {"euroc", DatasetType::kEuroc},
-           {"images", DatasetType::kImages},
-           {"video", DatasetType::kVideo},
-           {"bag", DatasetType::kBag}},
-          "layout on disk: auto, kitti, tum, euroc, images, video, bag (ROS 1)");
-  AddEnum("sensor", o.sensor, {{"mono", Sensor::kMono}, {"stereo", Sensor::kStereo}, {"rgbd", Sensor::kRgbd}},
-          "mono, stereo or rgbd");
-  Add("depth_units_per_m", o.depth_units_per_m, "RGB-D: value in the depth image of one metre");
-  Add("max_depth_m", o.max_depth_m, "RGB-D: farther depth is not used [m]; 0: no limit");
+  Basic().AddEnum("type", o.type,
+                  {{"auto", DatasetType::kAuto},
+                   {"kitti", DatasetType::kKitti},
+                   {"tum", DatasetType::kTum},
+                   {"euroc", DatasetType::kEuroc},
+                   {"images", DatasetType::kImages},
+                   {"video", DatasetType::kVideo},
+                   {"bag", DatasetType::kBag}},
+                  "layout on disk: auto, kitti, tum, euroc, images, video, bag (ROS 1)");
+  Basic().AddEnum("sensor", o.sensor,
+                  {{"mono", Sensor::kMono}, {"stereo", Sensor::kStereo}, {"rgbd", Sensor::kRgbd}},
+                  "mono, stereo or rgbd");
+  Basic().Add("depth_units_per_m", o.depth_units_per_m, "RGB-D: value in the depth image of one metre");
+  Basic().Add("max_depth_m", o.max_depth_m, "RGB-D: farther depth is not used [m]; 0: no limit");
   Add("max_association_s", o.max_association_s, "TUM: greatest time difference of colour and depth [s]");
-  Add("rate_hz", o.rate_hz, "frame rate where the data has no time stamps [1/s]; 0: 10 Hz or the video's");
-  Add("topic", o.topic, "ROS bag: topic of the left (or only, or colour) images; empty: the bag's only one");
-  Add("right_topic", o.right_topic, "ROS bag, stereo: topic of the right images");
-  Add("depth_topic", o.depth_topic,
-      "ROS bag, RGB-D: topic of the depth images (16UC1: set depth_units_per_m: 1000)");
+  Basic().Add("rate_hz", o.rate_hz,
+              "frame rate where the data has no time stamps [1/s]; 0: 10 Hz or the video's");
+  Basic().Add("topic", o.topic,
+              "ROS bag: topic of the left (or only, or colour) images; empty: the bag's only one");
+  Basic().Add("right_topic", o.right_topic, "ROS bag, stereo: topic of the right images");
+  Basic().Add("depth_topic", o.depth_topic,
+              "ROS bag, RGB-D: topic of the depth images (16UC1: set depth_units_per_m: 1000)");
   Add("follow_s", o.follow_s,
       "wait for images that are still being written, end when none came for so long [s]; 0: don't wait");
-  Add("stride", o.stride, "use every stride-th frame");
+  Basic().Add("stride", o.stride, "use every stride-th frame");
   Add("mirrored_ground_truth", o.mirrored_ground_truth, "the ground truth has its y axis up (ICL-NUIM)");
 }
 
 void ConfigTable::AddCamera(DatasetOptions& o) {
   section_ = "camera";
   PinholeCamera& c = *o.camera;
-  Add("width", c.width, "image width [px]");
-  Add("height", c.height, "image height [px]");
-  Add("fx", c.fx, "focal length [px]");
-  Add("fy", c.fy, "focal length [px]");
-  Add("cx", c.cx, "principal point [px]; the centre of the top-left pixel is (0, 0)");
-  Add("cy", c.cy, "principal point [px]");
-  AddEnum("distortion", c.distortion,
-          {{"none", Distortion::kNone},
-           {"radtan", Distortion::kRadTan},
-           {"equidistant", Distortion::kEquidistant}},
-          "lens model: none, radtan, equidistant");
-  Add("coefficients", c.coefficients, "radtan: k1 k2 p1 p2 k3; equidistant: k1 k2 k3 k4");
-  Add("baseline_m", o.baseline_m, "stereo: distance of the cameras where the data does not say it [m]");
+  Basic().Add("width", c.width, "image width [px]");
+  Basic().Add("height", c.height, "image height [px]");
+  Basic().Add("fx", c.fx, "focal length [px]");
+  Basic().Add("fy", c.fy, "focal length [px]");
+  Basic().Add("cx", c.cx, "principal point [px]; the centre of the top-left pixel is (0, 0)");
+  Basic().Add("cy", c.cy, "principal point [px]");
+  Basic().AddEnum("distortion", c.distortion,
+                  {{"none", Distortion::kNone},
+                   {"radtan", Distortion::kRadTan},
+                   {"equidistant", Distortion::kEquidistant}},
+                  "lens model: none, radtan, equidistant");
+  Basic().Add("coefficients", c.coefficients, "radtan: k1 k2 p1 p2 k3; equidistant: k1 k2 k3 k4");
+  Basic().Add("baseline_m", o.baseline_m,
+              "stereo: distance of the cameras where the data does not say it [m]");
 }
 
 void ConfigTable::AddOdometry(OdometryOptions& o) {
   section_ = "odometry";
-  Add("features", o.features, "ORB features per image");
+  Basic().Add("features", o.features, "ORB features per image");
   Add("pyramid_levels", o.pyramid_levels, "levels of the image pyramid");
   Add("scale_factor", o.scale_factor, "size ratio between two levels, > 1");
   Add("fast_threshold", o.fast_threshold,
       "FAST corner threshold [grey levels], where the image has enough corners");
   Add("fast_threshold_min", o.fast_threshold_min,
       "FAST threshold in parts of the image where there are too few [grey levels]");
-  Add("stereo_sigma_px", o.stereo_sigma_px, "standard deviation of a disparity at pyramid level 0 [px]");
-  Add("rgbd_inverse_sigma", o.rgbd_inverse_sigma,
-      "RGB-D: standard deviation of inverse depth [1/m]; Kinect: about 0.0015 to 0.005");
+  Basic().Add("stereo_sigma_px", o.stereo_sigma_px,
+              "standard deviation of a disparity at pyramid level 0 [px]");
+  Basic().Add("rgbd_inverse_sigma", o.rgbd_inverse_sigma,
+              "RGB-D: standard deviation of inverse depth [1/m]; Kinect: about 0.0015 to 0.005");
   Add("max_depth_baselines", o.max_depth_baselines,
       "stereo: farther points are not trusted when they are new [baselines]");
   Add("lens_sigma", o.lens_sigma,
       "mono: radial distortion that the calibration may have left over, standard deviation [1]; 0: none");
-  Add("pixel_sigma", o.pixel_sigma, "standard deviation of a keypoint at pyramid level 0 [px]");
-  Add("aligned_sigma", o.aligned_sigma,
+  Basic().Add("pixel_sigma", o.pixel_sigma, "standard deviation of a keypoint at pyramid level 0 [px]");
+  Basic().Add(
+      "aligned_sigma", o.aligned_sigma,
       "standard deviation of a keypoint aligned with its landmark's patch, relative to a corner's, above 0 "
       "to 1");
-  Add("min_inliers", o.min_inliers, "fewer landmarks that agree with the pose: the frame is lost");
-  Add("relocalize_s", o.relocalize_s,
-      "lost for longer than this [s], with something to see: start a new piece of map");
+  Basic().Add("min_inliers", o.min_inliers, "fewer landmarks that agree with the pose: the frame is lost");
+  Basic().Add("relocalize_s", o.relocalize_s,
+              "lost for longer than this [s], with something to see: start a new piece of map");
   Add("local_keyframes", o.local_keyframes, "keyframes whose landmarks are searched in a frame");
-  Add("keyframe_inlier_ratio", o.keyframe_inlier_ratio,
-      "new keyframe when fewer than this share of the reference's landmarks is seen, 0..1");
+  Basic().Add("keyframe_inlier_ratio", o.keyframe_inlier_ratio,
+              "new keyframe when fewer than this share of the reference's landmarks is seen, 0..1");
   Add("keyframe_uncovered_ratio", o.keyframe_uncovered_ratio,
       "stereo and depth: new keyframe when landmarks are missing in more than this share of the image's "
       "cells that have something to see, 0..1");
@@ -143,19 +149,20 @@ void ConfigTable::AddLoops(LoopDetectorOptions& o) {
       return "";
     };
   };
-  Push(
+  Basic().Push(
       "rule",
       "joint, mean, log-pool, product, majority, naive over the members, or one member's name for that alone",
       word(&SetRule), [&o] { return RuleName(o); });
-  Push("preset",
-       "published parameters that the other keys change: default, standardised-mean, paper-2013, "
-       "rtabmap-0.8.3",
-       word(&ApplyPreset), [] { return "default"; });
-  Add("members", o.members, "members of the ensemble: surf, sift, orb, akaze, brisk, kaze, gftt, hog, dnn");
+  Basic().Push("preset",
+               "published parameters that the other keys change: default, standardised-mean, paper-2013, "
+               "rtabmap-0.8.3",
+               word(&ApplyPreset), [] { return "default"; });
+  Basic().Add("members", o.members,
+              "members of the ensemble: surf, sift, orb, akaze, brisk, kaze, gftt, hog, dnn");
   AddEnum("likelihood", o.likelihood,
           {{"similarity", LikelihoodKind::kSimilarity}, {"tfidf", LikelihoodKind::kTfIdf}},
           "score of standardised evidence: similarity (2013) or tfidf");
-  Add("loop_threshold", o.loop_threshold, "accept a loop of this probability, 0..1");
+  Basic().Add("loop_threshold", o.loop_threshold, "accept a loop of this probability, 0..1");
   Add("propose_threshold", o.propose_threshold, "go to verification at H >= this, 0..1");
   Add("link_threshold", o.link_threshold,
       "a loop of this probability links its two places for the filter, 0..1");
@@ -165,9 +172,9 @@ void ConfigTable::AddLoops(LoopDetectorOptions& o) {
       "candidates of so many images before must lie on one path with this one; 0: no need");
   Add("hypothesis_ratio", o.hypothesis_ratio,
       "and at H >= this x the H of the image before; 0: whatever it was, 0..1");
-  Add("stm_size", o.stm_size, "locations in short-term memory, no candidates");
+  Basic().Add("stm_size", o.stm_size, "locations in short-term memory, no candidates");
   Add("threads", o.threads, "most threads that the detector uses at once");
-  Add("seed", o.seed, "of kd-forests and RANSAC");
+  Basic().Add("seed", o.seed, "of kd-forests and RANSAC");
   Add("bad_signature_ratio", o.bad_signature_ratio,
       "a member sits out below this share of its mean number of features, 0..1");
   Add("ignore_bad_signatures", o.ignore_bad_signatures,
@@ -177,13 +184,14 @@ void ConfigTable::AddLoops(LoopDetectorOptions& o) {
   Add("rehearsal_similarity", o.rehearsal_similarity, "similarity from which on they do, 0..1");
   AddEnum("memory", o.memory, {{"shared", MemoryKind::kShared}, {"per_member", MemoryKind::kPerMember}},
           "shared: one memory for all members; per_member: one each, as in the paper");
-  Add("wm_limit", o.wm_limit, "most locations in working memory, others go to long-term memory; 0: no limit");
-  Add("time_budget_ms", o.time_budget_ms,
-      "transfer while an image takes longer than this; not reproducible; 0: off [ms]");
+  Basic().Add("wm_limit", o.wm_limit,
+              "most locations in working memory, others go to long-term memory; 0: no limit");
+  Basic().Add("time_budget_ms", o.time_budget_ms,
+              "transfer while an image takes longer than this; not reproducible; 0: off [ms]");
   Add("retrieval", o.retrieval, "locations brought back from long-term memory per image");
   Add("recent_share", o.recent_share, "newest share of working memory that is never transferred, 0..1");
-  Add("ltm_file", o.ltm_file,
-      "SQLite file of the long-term memory, gone on with if it is there; empty: a temporary one");
+  Basic().Add("ltm_file", o.ltm_file,
+              "SQLite file of the long-term memory, gone on with if it is there; empty: a temporary one");
   Add("keep_posterior", o.keep_posterior, "keep every posterior (costs time with many locations)");
   Add("keep_evidence", o.keep_evidence,
       "keep every raw score, likelihood and posterior (costs time with many locations)");
@@ -191,10 +199,11 @@ void ConfigTable::AddLoops(LoopDetectorOptions& o) {
 
 void ConfigTable::AddExtraction(ExtractionOptions& o) {
   section_ = "loops.extraction";
-  Add("features", o.features, "strongest features kept per member and image, spread over the image");
+  Basic().Add("features", o.features, "strongest features kept per member and image, spread over the image");
   Add("grid_columns", o.grid_columns,
       "cells over which they are spread, along the longer side; 1: no spreading");
-  Add("max_pixels", o.max_pixels, "images with more pixels are scaled down before anything else [px]");
+  Basic().Add("max_pixels", o.max_pixels,
+              "images with more pixels are scaled down before anything else [px]");
   Add("min_pixels", o.min_pixels, "SURF and SIFT see an image of fewer pixels at twice its size [px]");
   Add("surf_octaves", o.surf_octaves, "octaves of the Hessian pyramid (the paper's 4)");
   Add("surf_threshold", o.surf_threshold,
@@ -237,14 +246,14 @@ void ConfigTable::AddVocabulary(VocabularyOptions& o) {
 
 void ConfigTable::AddVerification(VerificationOptions& o) {
   section_ = "loops.verification";
-  Add("enabled", o.enabled, "false: every proposal is accepted as it is, without a constraint");
+  Basic().Add("enabled", o.enabled, "false: every proposal is accepted as it is, without a constraint");
   Add("max_hypotheses", o.max_hypotheses, "separate places tried, best posterior first");
   Add("neighbours", o.neighbours, "graph levels around each place that are tried as well; 0: none");
   Add("nearer_share", o.nearer_share,
       "without metric points: a nearer neighbour with this share of the best view's inliers is taken; 1: "
       "never");
   Add("match_ratio", o.match_ratio, "Lowe's ratio test, on true distance");
-  Add("min_inliers", o.min_inliers, "fewer inliers than this are no loop");
+  Basic().Add("min_inliers", o.min_inliers, "fewer inliers than this are no loop");
   Add("min_inlier_ratio", o.min_inlier_ratio, "inliers / matches, 0..1");
   Add("min_epipolar_inliers", o.min_epipolar_inliers,
       "essential, fundamental matrix: a match is held to a line only, so more are needed");
@@ -266,39 +275,39 @@ void ConfigTable::AddVerification(VerificationOptions& o) {
   Add("pixel_sigma", o.pixel_sigma,
       "standard deviation of a matched pixel, sets the information matrix [px]");
   Add("min_depth_m", o.min_depth_m, "depths outside of the range count as unknown [m]");
-  Add("max_depth_m", o.max_depth_m, "[m]");
+  Basic().Add("max_depth_m", o.max_depth_m, "[m]");
 }
 
 void ConfigTable::AddDnn(DnnOptions& o) {
   section_ = "loops.dnn";
-  Add("model", o.model, "member dnn: ONNX file of a network that describes a whole image");
-  Add("width", o.width, "of the image that it gets, 16 to 4096 [px]");
-  Add("height", o.height, "16 to 4096 [px]");
-  Add("mean", o.mean, "subtracted from each channel, in the network's order [grey levels of 255]");
-  Add("scale", o.scale, "and then multiplied by this, above 0");
-  Add("stddev", o.stddev, "and each channel divided by this, above 0");
-  Add("swap_rb", o.swap_rb, "the network takes red, green, blue; false: blue, green, red");
-  Add("layer", o.layer, "whose output is the descriptor; empty: the network's only output");
+  Basic().Add("model", o.model, "member dnn: ONNX file of a network that describes a whole image");
+  Basic().Add("width", o.width, "of the image that it gets, 16 to 4096 [px]");
+  Basic().Add("height", o.height, "16 to 4096 [px]");
+  Basic().Add("mean", o.mean, "subtracted from each channel, in the network's order [grey levels of 255]");
+  Basic().Add("scale", o.scale, "and then multiplied by this, above 0");
+  Basic().Add("stddev", o.stddev, "and each channel divided by this, above 0");
+  Basic().Add("swap_rb", o.swap_rb, "the network takes red, green, blue; false: blue, green, red");
+  Basic().Add("layer", o.layer, "whose output is the descriptor; empty: the network's only output");
 }
 
 void ConfigTable::AddGraph(PoseGraphOptions& o, OnlineOptions& online) {
   section_ = "graph";
   AddEnum("objective", o.objective, {{"chi2", GraphObjective::kChi2}, {"chi2log", GraphObjective::kChi2Log}},
           "rotation error as vector part of the quaternion (chi2) or as rotation vector (chi2log)");
-  AddEnum("robust", o.robust,
-          {{"none", RobustLoss::kNone},
-           {"huber", RobustLoss::kHuber},
-           {"cauchy", RobustLoss::kCauchy},
-           {"dcs", RobustLoss::kDcs},
-           {"switchable", RobustLoss::kSwitchable},
-           {"gnc-tls", RobustLoss::kGncTls},
-           {"gnc", RobustLoss::kGnc}},
-          "loss on loop edges: none, huber, cauchy, dcs, switchable, gnc-tls, gnc");
+  Basic().AddEnum("robust", o.robust,
+                  {{"none", RobustLoss::kNone},
+                   {"huber", RobustLoss::kHuber},
+                   {"cauchy", RobustLoss::kCauchy},
+                   {"dcs", RobustLoss::kDcs},
+                   {"switchable", RobustLoss::kSwitchable},
+                   {"gnc-tls", RobustLoss::kGncTls},
+                   {"gnc", RobustLoss::kGnc}},
+                  "loss on loop edges: none, huber, cauchy, dcs, switchable, gnc-tls, gnc");
   Add("pairwise_consistency", o.pairwise_consistency,
       "first keep only the largest set of loops that agree pair by pair (PCM)");
   Add("sigma_test", o.sigma_test, "last refuse loops that are off by more than 3 sigma");
   Add("robust_chi2", o.robust_chi2, "chi-square beyond which a loop is doubted; 0: its 99 % quantile");
-  AddEnum(
+  Basic().AddEnum(
       "solver", o.solver, {{"ceres", PoseGraphSolver::kCeres}, {"block", PoseGraphSolver::kBlock}},
       "who solves it: ceres (all of it at each loop, while the map is small), or block (own block Cholesky: "
       "the same optimum in less time, and with init: file and robust: none or huber only what a loop changes "
@@ -329,19 +338,20 @@ void ConfigTable::AddGraph(PoseGraphOptions& o, OnlineOptions& online) {
 
 void ConfigTable::AddRun(SlamOptions& o) {
   section_ = "run";
-  Add("loops", o.loops, "search for loops and close them");
-  Add("threads", o.threads, "most threads; the result is the same for any number");
-  Add("loop_delay_frames", o.loop_delay_frames, "a detection enters this many frames after its keyframe");
+  Basic().Add("loops", o.loops, "search for loops and close them");
+  Basic().Add("threads", o.threads, "most threads; the result is the same for any number");
+  Basic().Add("loop_delay_frames", o.loop_delay_frames,
+              "a detection enters this many frames after its keyframe");
   Add("loop_every_keyframes", o.loop_every_keyframes, "every n-th keyframe is searched");
-  Add("loop_min_interval_s", o.loop_min_interval_s, "and no more often than this [s]");
+  Basic().Add("loop_min_interval_s", o.loop_min_interval_s, "and no more often than this [s]");
   Add("loop_min_age_s", o.loop_min_age_s,
       "a candidate that is not this much older than the query is no loop [s]");
   Add("loop_apart_fraction", o.loop_apart_fraction,
       "mono: the two cameras stand at most this share of the median scene depth apart");
   Add("loop_pose_prior", o.loop_pose_prior,
       "stereo, RGB-D: the detector knows the odometry's position, and places out of reach lose");
-  Add("loop_confirmations", o.loop_confirmations,
-      "loops that must agree before the map moves; 1: trust each alone");
+  Basic().Add("loop_confirmations", o.loop_confirmations,
+              "loops that must agree before the map moves; 1: trust each alone");
   Add("loop_confirmation_frames", o.loop_confirmation_frames, "and lie at most this many input frames apart");
   Add("loop_agree_fraction", o.loop_agree_fraction, "they agree within this share of the median scene depth");
   Add("loop_agree_deg", o.loop_agree_deg, "and within this angle [deg]");
@@ -366,10 +376,11 @@ void ConfigTable::AddRun(SlamOptions& o) {
   Add("loop_sigma_fraction", o.loop_sigma_fraction,
       "of its translation, as a share of the median scene depth");
   Add("loop_sigma_scale", o.loop_sigma_scale, "mono: of log(scale)");
-  Add("global_adjustment", o.global_adjustment,
+  Basic().Add(
+      "global_adjustment", o.global_adjustment,
       "after loops: what both ends see becomes one, and the whole map is adjusted beside the tracking");
-  Add("odometry_pass", o.odometry_pass,
-      "after a correction, track the rest again without it for trajectory_odometry.txt");
+  Basic().Add("odometry_pass", o.odometry_pass,
+              "after a correction, track the rest again without it for trajectory_odometry.txt");
 }
 
 }  // namespace tutti

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstdio>
+#include <utility>
 
 #include "tutti/core/text.h"
 
@@ -82,7 +83,7 @@ std::vector<std::string> ConfigTable::Names(const std::string& section) const {
 
 void ConfigTable::Push(const char* name, const char* doc, std::function<std::string(const YAML::Node&)> read,
                        std::function<std::string()> show) {
-  keys_.push_back({section_, name, doc, std::move(read), std::move(show)});
+  keys_.push_back({section_, name, doc, std::move(read), std::move(show), !std::exchange(basic_, false)});
 }
 
 void ConfigTable::Add(const char* name, bool& field, const char* doc) {

@@ -20,6 +20,7 @@ struct ConfigKey {
   std::string section, name, doc;                      ///< a section within another: "loops.extraction"
   std::function<std::string(const YAML::Node&)> read;  ///< empty, or what is wrong with the value
   std::function<std::string()> show;                   ///< the present value as YAML
+  bool advanced = true;                                ///< few users ever set it
 };
 
 /// Names of an enumeration's values.
@@ -51,6 +52,11 @@ class ConfigTable {
   void AddGraph(PoseGraphOptions& options, OnlineOptions& online);
   void AddRun(SlamOptions& options);
 
+  /// The key that is added next is one that users set.
+  ConfigTable& Basic() {
+    basic_ = true;
+    return *this;
+  }
   void Add(const char* name, bool& field, const char* doc);
   void Add(const char* name, int& field, const char* doc);
   void Add(const char* name, std::uint64_t& field, const char* doc);
@@ -65,6 +71,7 @@ class ConfigTable {
             std::function<std::string()> show);
 
   std::string section_;  // of the keys that are being added
+  bool basic_ = false;   // the next one
   std::vector<ConfigKey> keys_;
 };
 

@@ -20,9 +20,9 @@ namespace {
 struct RunArguments {
   std::string config, dataset, out, ground_truth;
   std::string trace;
-  std::vector<std::string> set;  // key=value, keys of the section `loops`
-  bool no_loops = false, no_report = false, quiet = false, help_config = false, timing = false,
-       realtime = false;
+  std::vector<std::string> set;  // SECTION.KEY=VALUE
+  bool no_loops = false, no_report = false, quiet = false, help_config = false, advanced = false,
+       timing = false, realtime = false;
   std::uint64_t seed = 1;
   int threads = 2;
   int inject_false_loops = 0;
@@ -68,7 +68,7 @@ int ExitCode(const RunResult& result, const std::string& out) {
 
 int Run(const CLI::App& command, const RunArguments& arguments) {
   if (arguments.help_config) {
-    std::fputs(HelpConfig().c_str(), stdout);
+    std::fputs(HelpConfig(arguments.advanced).c_str(), stdout);
     return 0;
   }
   Require(arguments.config, "--config", "a YAML file, for example data/configs/tum_fr1_rgbd.yaml");
@@ -120,9 +120,10 @@ void AddRunCommand(CLI::App& app, int& exit_code) {
   command->add_option(
       "--ground-truth", arguments->ground_truth,
       "trajectory to evaluate against (default: the data set's own, if it has one; 'none': don't)");
-  command->add_option("--set", arguments->set,
-                      "SECTION.KEY=VALUE: any key of --help-config, on top of the file (loops.rule=orb, "
-                      "odometry.features=900, loops.extraction.features=300); may be given several times");
+  command->add_option(
+      "--set", arguments->set,
+      "SECTION.KEY=VALUE: any key of --help-config --advanced, on top of the file (loops.rule=orb, "
+      "odometry.features=900, loops.extraction.features=300); may be given several times");
   command->add_flag("--no-loops", arguments->no_loops, "odometry alone");
   command->add_option("--seed", arguments->seed, "of everything that draws random numbers")
       ->check(NotNegative());
@@ -169,7 +170,8 @@ void AddRunCommand(CLI::App& app, int& exit_code) {
   command->add_flag("--no-report", arguments->no_report, "no report.html and report.json");
   command->add_flag("--quiet", arguments->quiet, "no progress and no notes");
   command->add_flag("--help-config", arguments->help_config,
-                    "print all keys of the configuration with their defaults");
+                    "print the keys of the configuration that users set, with their defaults");
+  command->add_flag("--advanced", arguments->advanced, "with --help-config: all keys");
   command->callback([command, arguments, &exit_code] { exit_code = Run(*command, *arguments); });
 }
 

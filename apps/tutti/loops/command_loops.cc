@@ -246,10 +246,9 @@ void AddLoopsCommand(CLI::App& app, int& exit_code) {
   command->add_option("--seed", arguments->options.seed, "seed of kd-forests and RANSAC")
       ->check(NotNegative())
       ->capture_default_str();
-  command->add_option(
-      "--set", arguments->set,
-      "key=value: an option of the detector, with the keys of section 'loops' in --help-config "
-      "(extraction.features=300); may be given again");
+  command->add_option("--set", arguments->set,
+                      "key=value: an option of the detector, with the keys of section 'loops' in tutti run "
+                      "--help-config --advanced (extraction.features=300); may be given again");
   command->callback([arguments, &exit_code] { exit_code = RunLoops(*arguments); });
 }
 

@@ -45,12 +45,13 @@ void SetLoopOptions(const std::vector<std::string>& assignments, LoopDetectorOpt
 /// One key with its present value, for the echo in summary.json and for --help-config.
 struct ConfigEntry {
   std::string section, name, value, doc;
+  bool advanced = false;  ///< few users ever set it
 };
 
 /// All keys in the order of the sections.
 std::vector<ConfigEntry> DescribeConfig(const RunConfig& config);
 
-/// All keys with units and defaults, as a commented YAML file.
-std::string HelpConfig();
+/// The keys that users set, or all of them, with units and defaults, as a commented YAML file.
+std::string HelpConfig(bool advanced);
 
 }  // namespace tutti

@@ -59,6 +59,10 @@ function(tutti_add_test name)
   tutti_compile_options(${target})
   tutti_see_private_headers(${target})
   target_link_libraries(${target} PRIVATE ${ARG_LIBS} tutti_test_support GTest::gtest GTest::gmock GTest::gtest_main)
+  set(timeout 600)
+  if(TUTTI_SANITIZE) # a test takes ten to twenty times as long
+    set(timeout 1800)
+  endif()
   gtest_discover_tests(${target} TEST_PREFIX "${name}." DISCOVERY_MODE PRE_TEST
-    PROPERTIES TIMEOUT 600 ENVIRONMENT "TUTTI_DATA=$ENV{TUTTI_DATA}")
+    PROPERTIES TIMEOUT ${timeout} ENVIRONMENT "TUTTI_DATA=$ENV{TUTTI_DATA}")
 endfunction()

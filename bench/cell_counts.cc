@@ -50,8 +50,9 @@ std::vector<double> Sums(const CellsOfWord& cells_of_word, const Postings& posti
   const Sight sight{image - LoopDetectorOptions().stm_size + 1, still_in_sight};
   std::vector<double> sums(static_cast<std::size_t>(image + 1) * static_cast<std::size_t>(cells), 0.0);
   const double all = std::log10(image + 1.0);
-  for (const auto& [word, in_cells] : cells_of_word) {
-    const auto& list = postings.at(word);
+  for (const auto& entry : cells_of_word) {
+    const auto& in_cells = entry.second;
+    const auto& list = postings.at(entry.first);
     if (all <= 0) break;
     const double value = std::log10((image + 1.0) / static_cast<double>(list.size())) / all /
                          static_cast<double>(in_cells.size());

@@ -31,10 +31,36 @@ struct KeyMarks {
 };
 
 void ReadSection(const std::string& file, const std::string& section, const YAML::Node& content,
+                 const ConfigTable& table, KeyMarks& marks);
+
+// One line of a section; `seen`: keys before it.
+void ReadItem(const std::string& file, const std::string& section,
+              const std::pair<YAML::Node, YAML::Node>& item, const ConfigTable& table,
+              std::set<std::string>& seen, KeyMarks& marks) {
+  if (!item.first.IsScalar()) Fail(file, item.first.Mark(), "a key must be a word");
+  const std::string name = item.first.Scalar();
+  const YAML::Mark mark = item.first.Mark();
+  if (!seen.insert(name).second) Fail(file, mark, "key '" + name + "' is given twice; remove one of the two");
+  const std::string nested = section + "." + name;
+  const std::vector<std::string> sections = table.Sections();
+  if (std::find(sections.begin(), sections.end(), nested) != sections.end()) {
+    ReadSection(file, nested, item.second, table, marks);
+    return;
+  }
+  const ConfigKey* key = table.Find(section, name);
+  if (key == nullptr) {
+    Fail(file, mark,
+         "unknown key '" + name + "' in section '" + section + "'" + NearestHint(name, table.Names(section)));
+  }
+  const std::string wrong = key->read(item.second);
+  if (!wrong.empty()) Fail(file, mark, section + "." + name + ": " + wrong);
+  marks.keys.emplace_back(name, mark);
+}
+
+void ReadSection(const std::string& file, const std::string& section, const YAML::Node& content,
                  const ConfigTable& table, KeyMarks& marks) {
   if (content.IsNull()) return;
   if (!content.IsMap()) Fail(file, content.Mark(), "section '" + section + "' needs lines of 'key: value'");
-  const std::vector<std::string> sections = table.Sections();
   std::set<std::string> seen;
   // A preset changes many values: it comes first, wherever it stands, and the file's other keys on top of it.
   std::vector<std::pair<YAML::Node, YAML::Node>> items;
@@ -42,27 +68,7 @@ void ReadSection(const std::string& file, const std::string& section, const YAML
     const bool preset = item.first.IsScalar() && item.first.Scalar() == "preset";
     items.emplace(preset ? items.begin() : items.end(), item.first, item.second);
   }
-  for (const auto& item : items) {
-    if (!item.first.IsScalar()) Fail(file, item.first.Mark(), "a key must be a word");
-    const std::string name = item.first.Scalar();
-    const YAML::Mark mark = item.first.Mark();
-    if (!seen.insert(name).second)
-      Fail(file, mark, "key '" + name + "' is given twice; remove one of the two");
-    const std::string nested = section + "." + name;
-    if (std::find(sections.begin(), sections.end(), nested) != sections.end()) {
-      ReadSection(file, nested, item.second, table, marks);
-      continue;
-    }
-    const ConfigKey* key = table.Find(section, name);
-    if (key == nullptr) {
-      Fail(file, mark,
-           "unknown key '" + name + "' in section '" + section + "'" +
-               NearestHint(name, table.Names(section)));
-    }
-    const std::string wrong = key->read(item.second);
-    if (!wrong.empty()) Fail(file, mark, section + "." + name + ": " + wrong);
-    marks.keys.emplace_back(name, mark);
-  }
+  for (const auto& item : items) ReadItem(file, section, item, table, seen, marks);
 }
 
 // Points to the line of the key that the message of Validate() speaks of, else to the section.

@@ -18,8 +18,8 @@ std::vector<Eigen::Vector3d> SomePoints() {
 TEST(Umeyama, RecoversASimilarity) {
   const Similarity truth(1.7, ExpSO3({0.3, 0.2, -0.5}), {1, -2, 0.5});
   const std::vector<Eigen::Vector3d> b = SomePoints();
-  std::vector<Eigen::Vector3d> a;
-  for (const Eigen::Vector3d& point : b) a.push_back(truth * point);
+  std::vector<Eigen::Vector3d> a = b;
+  for (Eigen::Vector3d& point : a) point = truth * point;
   const std::optional<Similarity> found = Umeyama(a, b, true);
   ASSERT_TRUE(found);
   EXPECT_NEAR(found->scale, 1.7, 1e-9);

@@ -117,6 +117,7 @@ class BlockCholesky {
 
   void Order(int size, const std::vector<std::pair<int, int>>& pairs) {
     std::vector<Eigen::Triplet<double>> triplets;
+    triplets.reserve(static_cast<std::size_t>(size) + 2 * pairs.size());
     for (int k = 0; k < size; ++k) triplets.emplace_back(k, k, 1.0);
     for (const auto& [row, column] : pairs) {
       triplets.emplace_back(row, column, 1.0);

@@ -132,6 +132,7 @@ bool SolveRotations(const PoseGraph& graph, const GraphStructure& structure, std
 bool SolveScales(const PoseGraph& graph, const GraphStructure& structure, std::vector<Similarity>& poses) {
   using Scalar = Eigen::Matrix<double, 1, 1>;
   std::vector<Scalar> logs;
+  logs.reserve(poses.size());
   for (const Similarity& pose : poses) logs.push_back(Scalar(std::log(pose.scale)));
   LinearGraphProblem<1, 1> problem(structure, std::move(logs));
   for (std::size_t e = 0; e < graph.edges().size(); ++e) {
@@ -149,6 +150,7 @@ bool SolveTranslations(const PoseGraph& graph, const GraphStructure& structure,
                        std::vector<Similarity>& poses) {
   using Row = Eigen::Matrix<double, 1, 3>;
   std::vector<Row> rows;
+  rows.reserve(poses.size());
   for (const Similarity& pose : poses) rows.push_back(pose.translation.transpose());
   LinearGraphProblem<1, 3> problem(structure, std::move(rows));
   for (std::size_t e = 0; e < graph.edges().size(); ++e) {

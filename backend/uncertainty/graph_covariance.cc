@@ -14,9 +14,6 @@
 
 namespace tutti {
 
-using internal::EdgeEnds;
-using internal::GraphStructure;
-
 class GraphCovariance::Impl {
  public:
   virtual ~Impl() = default;
@@ -87,7 +84,7 @@ class CovarianceOf final : public GraphCovariance::Impl {
 
  private:
   void AddEdge(std::size_t e, std::vector<Eigen::Triplet<double>>& triplets) const {
-    const EdgeEnds& ends = structure_.ends[e];
+    const internal::EdgeEnds& ends = structure_.ends[e];
     const auto constants = MakeEdgeConstants<N>(graph_.edges()[e], GraphObjective::kChi2Log);
     AddInformation<N>(Linearize<N>(constants, blocks_[ends.from].data(), blocks_[ends.to].data()),
                       {unknown_[ends.from], unknown_[ends.to]}, triplets);
@@ -135,7 +132,7 @@ class CovarianceOf final : public GraphCovariance::Impl {
   }
 
   PoseGraph graph_;
-  GraphStructure structure_;
+  internal::GraphStructure structure_;
   std::vector<int> unknown_;  // first row of each node; -1: held in place
   std::vector<std::array<double, BlockSize<N>()>> blocks_;
   int size_ = 0;

@@ -121,6 +121,7 @@ BundleAdjustmentReport AdjustLocally(const PinholeCamera& camera, int keyframe,
     }
   }
   std::vector<std::pair<int, int>> order;
+  order.reserve(votes.size());
   for (const auto& [id, count] : votes) order.emplace_back(-count, id);
   std::sort(order.begin(), order.end());
   std::vector<int> fixed;

@@ -27,7 +27,7 @@ double UncoveredShare(const FrameMatches& matches, const PinholeCamera& camera,
                                   kCellColumns - 1);
     const int row =
         std::clamp(static_cast<int>(pt.y * kCellRows / static_cast<float>(camera.height)), 0, kCellRows - 1);
-    const auto cell = static_cast<std::size_t>(row * kCellColumns + column);
+    const auto cell = static_cast<std::size_t>(row) * kCellColumns + static_cast<std::size_t>(column);
     if (matches.landmarks[f] >= 0) ++landmarks[cell];
     if (counts[f]) ++features[cell];
   }

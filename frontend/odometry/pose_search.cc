@@ -114,6 +114,7 @@ bool Odometry::Impl::GuessFromKeyframe(int keyframe, Fix* fix) const {
 std::vector<int> Odometry::Impl::LocalLandmarks(const Fix& fix, const std::map<int, int>& votes) const {
   std::vector<int> local;
   std::vector<std::pair<int, int>> order;
+  order.reserve(votes.size());
   for (const auto& [id, count] : votes) order.emplace_back(-count, -id);
   std::sort(order.begin(), order.end());
   const std::size_t limit = static_cast<std::size_t>(options.local_keyframes);

@@ -42,8 +42,7 @@ void ReadItem(const std::string& file, const std::string& section,
   const YAML::Mark mark = item.first.Mark();
   if (!seen.insert(name).second) Fail(file, mark, "key '" + name + "' is given twice; remove one of the two");
   const std::string nested = section + "." + name;
-  const std::vector<std::string> sections = table.Sections();
-  if (std::find(sections.begin(), sections.end(), nested) != sections.end()) {
+  if (table.HasSection(nested)) {
     ReadSection(file, nested, item.second, table, marks);
     return;
   }
@@ -109,8 +108,7 @@ std::optional<std::pair<std::string, std::string>> FirstProblem(const RunConfig&
 }
 
 // Sets one key from `key=value`, the key without `prefix`.
-void Assign(const std::string& assignment, const std::string& prefix, RunConfig& config) {
-  const ConfigTable table(config);
+void Assign(const std::string& assignment, const std::string& prefix, const ConfigTable& table) {
   const std::size_t equals = assignment.find('=');
   const std::string form = prefix.empty() ? "section.key=value" : "key=value";
   if (equals == std::string::npos) throw InputError("'" + assignment + "': write it as " + form);
@@ -152,7 +150,6 @@ RunConfig::RunConfig() {
 
 RunConfig ParseConfig(const std::string& text, const std::string& name) {
   RunConfig config;
-  config.dataset.camera = PinholeCamera();  // the table binds to it; dropped again if the file has no camera
   const ConfigTable table(config);
   YAML::Node root;
   try {
@@ -199,8 +196,8 @@ RunConfig LoadConfig(const std::filesystem::path& file) {
 
 void SetOptions(const std::vector<std::string>& assignments, RunConfig& config) {
   RunConfig changed = config;
-  if (!changed.dataset.camera) changed.dataset.camera = PinholeCamera();  // the table binds to it
-  for (const std::string& assignment : assignments) Assign(assignment, "", changed);
+  const ConfigTable table(changed);
+  for (const std::string& assignment : assignments) Assign(assignment, "", table);
   DropUnsetCamera(changed.dataset);
   const auto problem = FirstProblem(changed);
   if (problem) throw InputError("--set: " + problem->first + ": " + problem->second);
@@ -209,9 +206,9 @@ void SetOptions(const std::vector<std::string>& assignments, RunConfig& config) 
 
 void SetLoopOptions(const std::vector<std::string>& assignments, LoopDetectorOptions& options) {
   RunConfig config;
-  config.dataset.camera = PinholeCamera();
   config.loops = options;
-  for (const std::string& assignment : assignments) Assign(assignment, "loops.", config);
+  const ConfigTable table(config);
+  for (const std::string& assignment : assignments) Assign(assignment, "loops.", table);
   const std::string problem = config.loops.Validate();
   if (!problem.empty()) throw InputError("loops: " + problem);
   options = config.loops;
@@ -219,7 +216,6 @@ void SetLoopOptions(const std::vector<std::string>& assignments, LoopDetectorOpt
 
 std::vector<ConfigEntry> DescribeConfig(const RunConfig& config) {
   RunConfig copy = config;
-  if (!copy.dataset.camera) copy.dataset.camera = PinholeCamera();
   const ConfigTable table(copy);
   std::vector<ConfigEntry> entries;
   for (const ConfigKey& key : table.keys()) {

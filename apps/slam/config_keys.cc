@@ -29,6 +29,7 @@ void ConfigTable::AddEnum(const char* name, Enum& field, EnumNames<Enum> names, 
 }
 
 ConfigTable::ConfigTable(RunConfig& config) {
+  if (!config.dataset.camera) config.dataset.camera = PinholeCamera();
   AddDataset(config.dataset);
   AddCamera(config.dataset);
   AddOdometry(config.odometry);

@@ -1,6 +1,7 @@
 // How each type of value is read, strictly, and shown.
 #include "apps/slam/config_table.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <utility>
@@ -55,6 +56,11 @@ const ConfigKey* ConfigTable::Find(const std::string& section, const std::string
     if (key.section == section && key.name == name) return &key;
   }
   return nullptr;
+}
+
+bool ConfigTable::HasSection(const std::string& section) const {
+  return std::any_of(keys_.begin(), keys_.end(),
+                     [&](const ConfigKey& key) { return key.section == section; });
 }
 
 std::vector<std::string> ConfigTable::Sections() const {

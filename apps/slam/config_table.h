@@ -27,7 +27,8 @@ struct ConfigKey {
 template <typename Enum>
 using EnumNames = std::vector<std::pair<std::string, Enum>>;
 
-/// Keys of all sections, bound to one RunConfig that must outlive the table.
+/// Keys of all sections, bound to one RunConfig that must outlive the table. A camera is put in where it has
+/// none, to bind to.
 class ConfigTable {
  public:
   explicit ConfigTable(RunConfig& config);
@@ -35,6 +36,7 @@ class ConfigTable {
   const std::vector<ConfigKey>& keys() const { return keys_; }
   /// The key, or nullptr.
   const ConfigKey* Find(const std::string& section, const std::string& name) const;
+  bool HasSection(const std::string& section) const;
   std::vector<std::string> Sections() const;
   std::vector<std::string> TopSections() const;  ///< without those within another
   std::vector<std::string> Names(const std::string& section) const;

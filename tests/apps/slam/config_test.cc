@@ -196,13 +196,15 @@ TEST(SetLoopOptions, SaysWhatIsWrongAndChangesNothing) {
   EXPECT_THAT(message("stm_size=[1"), HasSubstr("not valid YAML"));
 }
 
+// The camera's defaults are zeros, "no camera": as a file that is not a usable camera.
+std::string WithoutCamera(const std::string& help) {
+  const std::size_t camera = help.find("camera:"), odometry = help.find("odometry:");
+  return help.substr(0, camera) + help.substr(odometry);
+}
+
 TEST(Config, HelpIsAValidFileWithTheDefaults) {
   const RunConfig defaults;
-  std::string text = HelpConfig(true);
-  // The camera's defaults are zeros, "no camera": as a file that is not a usable camera.
-  const std::size_t camera = text.find("camera:"), odometry = text.find("odometry:");
-  text.erase(camera, odometry - camera);
-  const RunConfig config = ParseConfig(text, "help");
+  const RunConfig config = ParseConfig(WithoutCamera(HelpConfig(true)), "help");
   const auto a = DescribeConfig(config), b = DescribeConfig(defaults);
   ASSERT_EQ(a.size(), b.size());
   for (std::size_t i = 0; i < a.size(); ++i)
@@ -217,9 +219,7 @@ TEST(Config, HelpShowsWhatUsersSetAndAllWhenAsked) {
               AllOf(HasSubstr("  fx: "), HasSubstr("  members: "), HasSubstr("--advanced")));
   EXPECT_THAT(HelpConfig(false), Not(HasSubstr("hypothesis_ratio")));
   EXPECT_THAT(HelpConfig(true), HasSubstr("hypothesis_ratio"));
-  const std::string text = HelpConfig(false);
-  const std::size_t camera = text.find("camera:"), odometry = text.find("odometry:");
-  EXPECT_NO_THROW(ParseConfig(text.substr(0, camera) + text.substr(odometry), "help"));
+  EXPECT_NO_THROW(ParseConfig(WithoutCamera(HelpConfig(false)), "help"));
 }
 
 TEST(Config, EveryConfigurationThatComesWithTheProjectLoads) {

@@ -36,6 +36,12 @@ LoopGate::Map LoopCloser::Places() const {
   return [this](int id) { return LoopGate::Place{odometry_.KeyframePiece(id), odometry_.KeyframePose(id)}; };
 }
 
+// What mapping has found enters earlier than without the loop.
+void LoopCloser::BeginChange() {
+  before_change_();
+  odometry_.FinishMapping();
+}
+
 // Measures it against the map, and closes it if something else says the same.
 void LoopCloser::Consider(const Verification& verification, int candidate, int query, std::int64_t frames) {
   LoopRecord& record = records_.back();
@@ -43,8 +49,7 @@ void LoopCloser::Consider(const Verification& verification, int candidate, int q
     record.reason = "too recent: still in the local map";
     return;
   }
-  before_change_();  // what mapping has found enters earlier than without the loop
-  odometry_.FinishMapping();
+  BeginChange();
   const LoopGate::Map places = Places();
   const LoopConstraint constraint = Measure(verification, candidate, query);
   if (!constraint.usable) {
@@ -143,8 +148,7 @@ void LoopCloser::Close(std::vector<LoopEdge> entering, std::int64_t frames) {
   const ScopedSpan span(recorder_, Lane::kOptimisation, "close_loop");
   const internal::Stopwatch watch;
   const double fused_before = stages_["loop_fuse"];  // a stage of its own
-  before_change_();  // a planted loop comes here at once, and mapping enters earlier than without it
-  odometry_.FinishMapping();
+  BeginChange();
   MapGraph::Correction correction;
   Gate(entering);
   while (!entering.empty()) {

@@ -54,6 +54,7 @@ class LoopCloser {
 
  private:
   LoopGate::Map Places() const;
+  void BeginChange();
   LoopConstraint Measure(const Verification& verification, int candidate, int query);
   void Gate(std::vector<LoopEdge>& entering);
   void Reject(const LoopEdge& loop, const std::string& reason);

@@ -136,7 +136,7 @@ void AddMarks(const LoopRun& run, const LoopReport& report, const PlotAxes& axes
       if (column < 0) return;
       AddMark(mark, axes.Page({static_cast<double>(column) + 0.5, row + 0.5}), radius, shapes);
     };
-    const long said = static_cast<long>(r.accepted ? r.candidate : r.best);
+    const long said = run.rows[i].Said();
     switch (report.verified.outcomes[i]) {
       case LoopOutcome::kTruePositive:
         put(Mark::kTrue, said);

@@ -153,7 +153,7 @@ void DrawEntry(const LoopRun& run, const Entry& entry, cv::Mat strip) {
   const LoopRow& row = run.rows[entry.row];
   const LoopResult& r = row.result;
   const int image = static_cast<int>(r.query);
-  const long said = static_cast<long>(r.accepted ? r.candidate : r.best);
+  const long said = row.Said();
   const TruthOfRow truth = LookUp(run.truth, image, said);
   const long shown[] = {image, said, truth.shown};
   const char* absent[] = {"", "nothing was proposed", "no loop in the ground truth"};

@@ -85,7 +85,7 @@ std::string Csv(const LoopRun& run) {
     const LoopResult& r = row.result;
     const int image = static_cast<int>(r.query);
     const long verified = r.accepted ? static_cast<long>(r.candidate) : -1;
-    const long location = r.accepted ? verified : static_cast<long>(r.best);
+    const long location = row.Said();
     char numbers[256];
     std::snprintf(numbers, sizeof numbers, ",%.9g,%ld,%.9g,%.9g,%d,%d,%ld,%d,%d,%s,%d", r.hypothesis,
                   static_cast<long>(r.best), r.posterior, r.probability, r.proposed ? 1 : 0,

@@ -20,6 +20,9 @@ struct LoopRow {
   bool read = true;  ///< false: the file is damaged; the row stays in the denominator
   LoopResult result;
   double ms = 0;  ///< time of Detect [ms]
+
+  /// The place that figures and pictures judge: the loop, or where there is none the filter's best; -1: none.
+  long Said() const { return static_cast<long>(result.accepted ? result.candidate : result.best); }
 };
 
 /// Everything about one run.

@@ -11,14 +11,12 @@ Progress::Progress(std::string title, std::size_t total, std::FILE* out)
     : title_(std::move(title)),
       total_(total),
       out_(out),
-      terminal_(out != nullptr && isatty(fileno(out)) != 0),
-      begin_(std::chrono::steady_clock::now()),
-      last_(begin_) {}
+      terminal_(out != nullptr && isatty(fileno(out)) != 0) {}
 
 Progress::~Progress() { Finish(); }
 
 std::string Progress::Line(std::size_t done, const std::string& status) const {
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
+  const double seconds = since_begin_.Seconds();
   char text[256];
   const double share = total_ > 0 ? static_cast<double>(done) / static_cast<double>(total_) : 1.0;
   if (total_ == 0) {
@@ -37,9 +35,8 @@ std::string Progress::Line(std::size_t done, const std::string& status) const {
 void Progress::Update(std::size_t done, const std::string& status) {
   if (out_ == nullptr) return;
   if (terminal_) {
-    const auto now = std::chrono::steady_clock::now();
-    if ((done < total_ || total_ == 0) && line_open_ && now - last_ < std::chrono::milliseconds(100)) return;
-    last_ = now;
+    if ((done < total_ || total_ == 0) && line_open_ && since_line_.Milliseconds() < 100) return;
+    since_line_ = {};
     std::fprintf(out_, "\r%s\x1b[K", Line(done, status).c_str());
     line_open_ = true;
   } else {

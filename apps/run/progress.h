@@ -1,10 +1,11 @@
 // The progress line of a long run: on a terminal one line that updates, else a line about every tenth.
 #pragma once
 
-#include <chrono>
 #include <cstddef>
 #include <cstdio>
 #include <string>
+
+#include "core/stopwatch.h"
 
 namespace tutti {
 
@@ -32,7 +33,7 @@ class Progress {
   bool terminal_ = false;
   bool line_open_ = false;
   std::size_t next_tenth_ = 1;
-  std::chrono::steady_clock::time_point begin_, last_;
+  internal::Stopwatch since_begin_, since_line_;
 };
 
 }  // namespace tutti

@@ -1,7 +1,6 @@
 #include "apps/run/runner.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <map>
 #include <memory>

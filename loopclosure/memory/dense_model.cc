@@ -178,7 +178,7 @@ std::vector<double> DenseModel::Contrast(std::vector<double> scores, const std::
   for (const int slot : places) values.push_back(scores[Index(slot)]);
   const double median = internal::Median(values);
   for (double& value : values) value = std::abs(value - median);
-  const double deviation = std::max(kLeastDeviation, kDeviation * internal::Median(values));
+  const double deviation = std::max(kLeastDeviation, kDeviation * internal::Median(std::move(values)));
   for (std::size_t i = 0; i < scores.size(); ++i) {
     const double beyond = std::max(0.0, (scores[i] - median) / deviation - kPlain);
     counts[i] = kMost * beyond / (beyond + kHalfWay);

@@ -3,9 +3,9 @@
 bench/ensemble_protocol draws seeds of its own for worlds and changes. The seeds here belong to development sets, on which
 constants were chosen: no table of the protocol shows them.
 """
-import pathlib
 import shutil
 import subprocess
+import sys
 
 KITCHEN_TRUTH = ["--gt-distance", "0.3", "--gt-angle", "25", "--gt-ignore", "0.6", "--gt-exclude-s", "10"]
 REAL = {  # images, ground truth, further arguments; the first three are changed, too
@@ -59,6 +59,7 @@ def generate(tutti, folder, options):
     if (folder / ".done").exists():
         return
     shutil.rmtree(folder, ignore_errors=True)
+    print(f"generating {folder.name}", file=sys.stderr, flush=True)
     quiet([tutti, "generate", "--out", folder, *options])
     (folder / ".done").write_text("")
 

@@ -53,8 +53,8 @@ std::vector<std::uint8_t> DetectionLog::Grouped(const std::vector<CandidateEvide
   return out;
 }
 
-void DetectionLog::OnFrame(const InputFrame& frame, const TrackResult& track, const SlamSystem& slam) {
-  if (track.keyframe >= 0 || slam.AppearanceOnly()) stamps_[frame.index] = frame.stamp_s;
+void DetectionLog::OnFrame(const InputFrame& frame, const TrackResult& track, const RunState& state) {
+  if (track.keyframe >= 0 || state.odometry == nullptr) stamps_[frame.index] = frame.stamp_s;
 }
 
 void DetectionLog::OnDetection(const LoopResult& result) {

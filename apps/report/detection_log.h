@@ -60,7 +60,7 @@ class DetectionLog : public RunObserver {
   static constexpr std::size_t kMostGroups = 512;  ///< of places in LoggedOpinion::evidence
 
   bool WantsPosteriors() const override { return true; }
-  void OnFrame(const InputFrame& frame, const TrackResult& track, const SlamSystem& slam) override;
+  void OnFrame(const InputFrame& frame, const TrackResult& track, const RunState& state) override;
   void OnDetection(const LoopResult& result) override;
 
   /// In the order of the queries.

@@ -1,12 +1,21 @@
 // A window into a run: the report, the live view and the comparison's shared odometry look through it.
 #pragma once
 
+#include <vector>
+
 #include "tutti/frontend/frame.h"
 #include "tutti/frontend/odometry.h"
 #include "tutti/loopclosure/detector.h"
-#include "tutti/slam/slam_system.h"
+#include "tutti/slam/loop_record.h"
 
 namespace tutti {
+
+/// The map and its loops at one moment of a run.
+struct RunState {
+  const Odometry* odometry = nullptr;  ///< null: appearance only
+  const std::vector<LoopRecord>& loops;
+  int corrections = 0;  ///< how often loops have moved the map
+};
 
 /// Watches a run and changes nothing (it may hold it up, as a pause does). All calls come from the thread
 /// that tracks, which waits for them; what takes long belongs on another thread. What is passed is valid
@@ -20,15 +29,15 @@ class RunObserver {
   /// Before the first frame.
   virtual void OnStart(const CameraRig& /*rig*/) {}
   /// After each frame that could be read.
-  virtual void OnFrame(const InputFrame& /*frame*/, const TrackResult& /*track*/,
-                       const SlamSystem& /*slam*/) {}
+  virtual void OnFrame(const InputFrame& /*frame*/, const TrackResult& /*track*/, const RunState& /*state*/) {
+  }
   /// A keyframe whose landmarks are all known now; its frame came a few frames before. Before OnFrame of the
   /// frame in which that happens.
-  virtual void OnKeyframe(const InputFrame& /*frame*/, int /*keyframe*/, const SlamSystem& /*slam*/) {}
+  virtual void OnKeyframe(const InputFrame& /*frame*/, int /*keyframe*/, const RunState& /*state*/) {}
   /// Each answer of the loop detector, in the order of the queries, before the frame in which it enters.
   virtual void OnDetection(const LoopResult& /*result*/) {}
   /// After the last frame, when all loops are in.
-  virtual void OnEnd(const SlamSystem& /*slam*/) {}
+  virtual void OnEnd(const RunState& /*state*/) {}
 };
 
 }  // namespace tutti

@@ -81,15 +81,13 @@ Trajectory BodyTrajectory(Trajectory trajectory, const CameraRig& rig) {
   return trajectory;
 }
 
-void CollectMap(const SlamSystem& slam, RunResult& result) {
-  result.loops = slam.loops();
-  result.corrections = slam.Corrections();
-  result.global_adjustments = slam.GlobalAdjustments();
-  result.frames_relocalized = slam.Relocalized();
-  result.appearance_only = slam.AppearanceOnly();
+void CollectMap(const RunState& state, RunResult& result) {
+  result.loops = state.loops;
+  result.corrections = state.corrections;
+  result.appearance_only = state.odometry == nullptr;
   result.peak_memory_mb = PeakMemoryMb();
-  if (slam.AppearanceOnly()) return;
-  const Odometry& odometry = *slam.odometry();
+  if (result.appearance_only) return;
+  const Odometry& odometry = *state.odometry;
   result.trajectory = BodyTrajectory(odometry.FrameTrajectory(), result.rig);
   result.frames_tracked = result.trajectory.size();
   const std::vector<int> pieces = odometry.Pieces();
@@ -97,7 +95,6 @@ void CollectMap(const SlamSystem& slam, RunResult& result) {
   for (std::size_t i = 1; i < pieces.size(); ++i)
     result.other_pieces.push_back(BodyTrajectory(odometry.FrameTrajectory(pieces[i]), result.rig));
   result.trajectory_odometry = result.trajectory;
-  result.graph = slam.Graph();
   result.stereo_row_error_px = odometry.StereoRowErrorPx();
   result.stereo_matches = odometry.StereoMatches();
   CollectKeyframes(odometry, result);

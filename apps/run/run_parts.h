@@ -6,9 +6,9 @@
 #include <utility>
 #include <vector>
 
+#include "apps/run/run_observer.h"
 #include "apps/run/runner.h"
 #include "tutti/frontend/dataset.h"
-#include "tutti/slam/slam_system.h"
 
 namespace tutti {
 
@@ -30,8 +30,7 @@ std::optional<std::pair<Trajectory, std::string>> ReadReference(const Dataset& d
 /// T_world_camera -> T_world_body, the frame that ground truth is of.
 Trajectory BodyTrajectory(Trajectory trajectory, const CameraRig& rig);
 
-/// Loops, trajectories, keyframes, graph and memory of a finished system. trajectory_odometry is the
-/// trajectory.
-void CollectMap(const SlamSystem& slam, RunResult& result);
+/// Loops, trajectories, keyframes and memory of a finished run. trajectory_odometry is the trajectory.
+void CollectMap(const RunState& state, RunResult& result);
 
 }  // namespace tutti

@@ -10,6 +10,7 @@
 
 #include "apps/run/interrupt.h"
 #include "apps/run/outputs.h"
+#include "apps/run/planted_loops.h"
 #include "apps/run/prefetcher.h"
 #include "apps/run/progress.h"
 #include "apps/run/run_evaluation.h"
@@ -32,15 +33,21 @@ class Run {
         config_(config),
         dataset_(dataset),
         result_(result),
-        slam_(Watched(config, request), dataset.Rig(), Recorder()) {
+        slam_(Watched(config, request), dataset.Rig(), Recorder()),
+        planted_(config.run.inject_false_loops, config.loops.seed) {
     slam_.SetDetectionListener([this](const LoopResult& detection) {
       for (const auto& observer : request_.observers) observer->OnDetection(detection);
     });
     if (!request.observers.empty()) {
       slam_.SetKeyframeListener([this](const InputFrame& frame, int keyframe) {
-        for (const auto& observer : request_.observers) observer->OnKeyframe(frame, keyframe, slam_);
+        for (const auto& observer : request_.observers) observer->OnKeyframe(frame, keyframe, State());
       });
     }
+    slam_.SetChangeListener([this](const Odometry& odometry, std::int64_t last) {
+      if (alone_) return;
+      alone_ = odometry;
+      alone_last_ = last;
+    });
     total_ = dataset.FrameSupply() == Supply::kStored ? dataset.Size() : static_cast<std::size_t>(-1);
     if (request.max_frames) total_ = std::min(total_, static_cast<std::size_t>(*request.max_frames));
     result_.realtime = request.realtime;
@@ -77,7 +84,8 @@ class Run {
     }
     result_.interrupted = InterruptGuard::Requested();
     slam_.Finish();
-    for (const auto& observer : request_.observers) observer->OnEnd(slam_);
+    planted_.PlantRest(&slam_);
+    for (const auto& observer : request_.observers) observer->OnEnd(State());
     NoteWarnings(progress);
     progress.Finish();
     if (result_.interrupted) {
@@ -100,26 +108,28 @@ class Run {
     ReportTimes(begin);
   }
 
-  // What the odometry would have done alone: the copy from before the first correction tracks the rest.
+  // What the odometry would have done alone: the copy from before the first change tracks the rest.
   void TrackUntouched() {
-    Odometry* odometry = slam_.untouched();
-    if (odometry == nullptr) return;
-    const std::size_t begin = positions_.at(slam_.UntouchedLast()) + 1, end = result_.frames_total;
+    if (!alone_) return;
+    const std::size_t begin = positions_.at(alone_last_) + 1, end = result_.frames_total;
     if (begin >= end) return;
     const internal::Stopwatch watch;
     const bool again = config_.run.odometry_pass && dataset_.FrameSupply() != Supply::kOnce;
-    result_.odometry_complete = again && TrackAgain(*odometry, begin, end);
-    odometry->FinishMapping();
+    result_.odometry_complete = again && TrackAgain(*alone_, begin, end);
+    alone_->FinishMapping();
     result_.odometry_pass_s = watch.Seconds();
   }
 
   void Collect() {
-    const Odometry* alone = slam_.untouched();
-    CollectMap(slam_, result_);
-    if (alone != nullptr) result_.trajectory_odometry = BodyTrajectory(alone->FrameTrajectory(), result_.rig);
+    CollectMap(State(), result_);
+    result_.global_adjustments = slam_.GlobalAdjustments();
+    result_.frames_relocalized = slam_.Relocalized();
+    result_.graph = slam_.Graph();
+    if (alone_) result_.trajectory_odometry = BodyTrajectory(alone_->FrameTrajectory(), result_.rig);
   }
 
  private:
+  RunState State() const { return {slam_.odometry(), slam_.loops(), slam_.Corrections()}; }
   std::FILE* Out() const { return request_.quiet ? nullptr : stderr; }
   SpanRecorder* Recorder() { return request_.timing || request_.trace ? &recorder_ : nullptr; }
 
@@ -193,7 +203,8 @@ class Run {
     const internal::Stopwatch watch;
     const TrackResult track = slam_.Track(frame);
     result_.frame_ms.push_back(watch.Milliseconds());
-    for (const auto& observer : request_.observers) observer->OnFrame(frame, track, slam_);
+    if (track.keyframe >= 0) planted_.OnKeyframe(track.keyframe, &slam_);
+    for (const auto& observer : request_.observers) observer->OnFrame(frame, track, State());
     state_ = slam_.AppearanceOnly() ? "appearance only" : ToString(track.state);
     if (slam_.AppearanceOnly() || track.state == TrackingState::kTracking) {
       lost_open_ = false;
@@ -210,8 +221,8 @@ class Run {
   std::string Status() const {
     std::string status = state_;
     if (config_.run.loops) {
-      status +=
-          "  loops " + std::to_string(slam_.LoopsAccepted()) + "/" + std::to_string(slam_.loops().size());
+      status += "  loops " + std::to_string(CountAccepted(slam_.loops())) + "/" +
+                std::to_string(slam_.loops().size());
     }
     return status;
   }
@@ -222,6 +233,9 @@ class Run {
   RunResult& result_;
   SpanRecorder recorder_;
   SlamSystem slam_;
+  PlantedLoops planted_;
+  std::optional<Odometry> alone_;                  // as it was before the detector first changed anything
+  std::int64_t alone_last_ = -1;                   // index of the last input frame that it has seen
   std::shared_ptr<FrameClock> clock_;              // of playback_
   std::optional<Playback> playback_;               // in real time, unless the source keeps time itself
   std::size_t total_ = 0;                          // most frames; endless for a growing data set

@@ -8,6 +8,7 @@
 #include "apps/run/progress.h"
 #include "apps/run/run_evaluation.h"
 #include "apps/run/run_parts.h"
+#include "apps/slam/loop_closing.h"
 #include "core/stopwatch.h"
 #include "tutti/core/error.h"
 
@@ -17,18 +18,46 @@ namespace {
 class SequenceRecorder : public RunObserver {
  public:
   explicit SequenceRecorder(TrackedSequence& sequence) : sequence_(sequence) {}
-  void OnFrame(const InputFrame&, const TrackResult&, const SlamSystem&) override { ++frames_; }
-  void OnKeyframe(const InputFrame& frame, int keyframe, const SlamSystem& slam) override {
+  void OnFrame(const InputFrame&, const TrackResult&, const RunState&) override { ++frames_; }
+  void OnKeyframe(const InputFrame& frame, int keyframe, const RunState& state) override {
     // Called before the OnFrame of the frame that is being tracked.
     sequence_.keyframes.push_back({keyframe, frame.index, frames_ + 1});
-    sequence_.views[keyframe] = slam.odometry()->Keyframe(keyframe);
+    sequence_.views[keyframe] = state.odometry->Keyframe(keyframe);
   }
-  void OnEnd(const SlamSystem& slam) override {
-    if (slam.odometry() != nullptr) sequence_.odometry = std::make_shared<const Odometry>(*slam.odometry());
+  void OnEnd(const RunState& state) override {
+    if (state.odometry != nullptr) sequence_.odometry = std::make_shared<const Odometry>(*state.odometry);
   }
 
  private:
   TrackedSequence& sequence_;
+  std::int64_t frames_ = 0;
+};
+
+/// Loops on an odometry that is complete: they move it, but no tracking goes on from there.
+class Replay {
+ public:
+  Replay(const RunConfig& config, const CameraRig& rig, const Odometry& tracked)
+      : loops_(config, rig, nullptr), odometry_(tracked) {}
+
+  LoopClosing& loops() { return loops_; }
+  RunState State() const { return {&odometry_, loops_.closer().records(), loops_.closer().Corrections()}; }
+
+  void Keyframe(const InputFrame& frame, const KeyframeView& view, std::int64_t frames) {
+    frames_ = frames;
+    while (const auto update = loops_.Due(&odometry_, frames - 1)) Take(*update, frames - 1);
+    if (loops_.Searching()) loops_.Submit(frame, &view, frames);
+  }
+  void Finish() {
+    while (const auto update = loops_.Rest(&odometry_, frames_)) Take(*update, frames_);
+  }
+
+ private:
+  void Take(const LoopUpdate& update, std::int64_t frames) {
+    if (update.correction) loops_.Applied(update, Apply(*update.correction, &odometry_), odometry_, frames);
+  }
+
+  LoopClosing loops_;
+  Odometry odometry_;
   std::int64_t frames_ = 0;
 };
 
@@ -57,8 +86,8 @@ RunResult CloseLoops(const TrackedSequence& tracked, const RunRequest& request, 
   const auto reference = ReadReference(*dataset, request, &warnings);
   PrepareOutputFolder(request.out);
   const InterruptGuard guard;
-  SlamSystem slam(Watched(result.config, request), result.rig, *tracked.odometry, tracked.views);
-  slam.SetDetectionListener([&request](const LoopResult& detection) {
+  Replay replay(Watched(result.config, request), result.rig, *tracked.odometry);
+  replay.loops().SetDetectionListener([&request](const LoopResult& detection) {
     for (const auto& observer : request.observers) observer->OnDetection(detection);
   });
   for (const auto& observer : request.observers) observer->OnStart(result.rig);
@@ -70,18 +99,20 @@ RunResult CloseLoops(const TrackedSequence& tracked, const RunRequest& request, 
     TrackResult track;
     track.state = TrackingState::kTracking;
     track.keyframe = keyframe.id;
-    slam.Replay(*read.frame, keyframe.id, keyframe.frames);
-    for (const auto& observer : request.observers) observer->OnFrame(*read.frame, track, slam);
-    progress.Update(k + 1, std::to_string(slam.LoopsAccepted()) + " loops");
+    replay.Keyframe(*read.frame, tracked.views.at(keyframe.id), keyframe.frames);
+    for (const auto& observer : request.observers) observer->OnFrame(*read.frame, track, replay.State());
+    progress.Update(k + 1, std::to_string(CountAccepted(replay.State().loops)) + " loops");
   }
   result.interrupted = InterruptGuard::Requested();
-  slam.Finish();
-  for (const auto& observer : request.observers) observer->OnEnd(slam);
+  replay.Finish();
+  for (const auto& observer : request.observers) observer->OnEnd(replay.State());
   progress.Finish();
-  for (const auto& [name, ms] : slam.StageMilliseconds()) result.stage_ms[name] = ms;
+  for (const auto& [name, ms] : replay.loops().StageMilliseconds()) result.stage_ms[name] = ms;
   result.wall_s += watch.Seconds();
   result.cpu_s += ProcessCpuSeconds() - cpu_begin;
-  CollectMap(slam, result);
+  CollectMap(replay.State(), result);
+  result.global_adjustments = replay.loops().closer().Adjustments();
+  result.graph = replay.loops().closer().Graph(*replay.State().odometry);
   result.trajectory_odometry = tracked.result.trajectory;
   if (reference) EvaluateRun(reference->first, reference->second, result);
   WriteOutputs(request.out, result);

@@ -1,256 +1,298 @@
 #include "apps/slam/loop_closer.h"
 
 #include <algorithm>
-#include <cstdio>
-#include <iterator>
-#include <optional>
 #include <utility>
 
 #include "core/stopwatch.h"
 
 namespace tutti {
+namespace {
 
-LoopCloser::LoopCloser(const RunConfig& config, const CameraRig& rig, SpanRecorder* recorder,
-                       Odometry* odometry, std::vector<LoopRecord>* records,
-                       std::function<void()> before_change)
+constexpr double kRadians = 0.017453292519943295;
+constexpr double kNoWeight = 0.01;  // of the robust loss: the map contradicts the loop
+constexpr int kLeastCommon = 30;    // landmarks that tie the two ends of a loop
+
+KeyframeGraphOptions GraphOptions(const RunConfig& config, Sensor sensor) {
+  KeyframeGraphOptions options;
+  options.kind = sensor == Sensor::kMono ? GraphKind::kSim3 : GraphKind::kSE3;
+  options.solver = config.graph;
+  options.sigma_translation_ratio = config.run.odometry_sigma_fraction;
+  options.sigma_rotation_rad = config.run.odometry_sigma_deg * kRadians;
+  options.sigma_log_scale = config.run.odometry_sigma_scale;
+  options.max_covisible = config.run.covisibility_edges;
+  return options;
+}
+
+void UpdateGraph(const Odometry& odometry, int min_shared, KeyframeGraph* graph) {
+  std::vector<MapKeyframe> keyframes;
+  for (const int id : odometry.KeyframeIds())
+    keyframes.push_back({id, odometry.KeyframePiece(id), odometry.KeyframePose(id)});
+  std::vector<CovisiblePair> covisible;
+  for (const auto& [pair, shared] : odometry.Covisibility(min_shared))
+    covisible.push_back({pair.first, pair.second, shared});
+  graph->Update(std::move(keyframes), covisible);
+}
+
+LoopGate::Map Places(const Odometry& odometry) {
+  return [&odometry](int id) {
+    return LoopGate::Place{odometry.KeyframePiece(id), odometry.KeyframePose(id)};
+  };
+}
+
+}  // namespace
+
+LoopCloser::LoopCloser(const RunConfig& config, const CameraRig& rig, SpanRecorder* recorder)
     : recorder_(recorder),
       options_(config.run),
       rig_(rig),
       seed_(config.loops.seed),
-      odometry_(*odometry),
-      records_(*records),
-      before_change_(std::move(before_change)),
       gate_(config.run),
-      graph_(config.graph, config.online, config.run, rig.sensor),
-      false_loops_(config.run, config.loops.seed) {}
+      graph_(GraphOptions(config, rig.sensor)) {}
 
-void LoopCloser::AddKeyframes() {
-  const std::vector<int> ids = odometry_.KeyframeIds();
-  for (auto id = std::upper_bound(ids.begin(), ids.end(), newest_keyframe_); id != ids.end(); ++id) {
-    graph_.AddKeyframe(*id, odometry_.KeyframePiece(*id));
-    newest_keyframe_ = *id;
-  }
+PoseGraph LoopCloser::Graph(const Odometry& odometry) const {
+  KeyframeGraph graph = graph_;
+  UpdateGraph(odometry, options_.covisibility_min_shared, &graph);
+  return graph.Graph(accepted_);
 }
 
-LoopGate::Map LoopCloser::Places() const {
-  return [this](int id) { return LoopGate::Place{odometry_.KeyframePiece(id), odometry_.KeyframePose(id)}; };
-}
-
-// What mapping has found enters earlier than without the loop.
-void LoopCloser::BeginChange() {
-  before_change_();
-  odometry_.FinishMapping();
-}
-
-// Measures it against the map, and closes it if something else says the same.
-void LoopCloser::Consider(const Verification& verification, int candidate, int query, std::int64_t frames) {
-  LoopRecord& record = records_.back();
-  if (record.query_stamp_s - record.candidate_stamp_s < options_.loop_min_age_s) {
-    record.reason = "too recent: still in the local map";
-    return;
-  }
-  BeginChange();
-  const LoopGate::Map places = Places();
-  const LoopConstraint constraint = Measure(verification, candidate, query);
-  if (!constraint.usable) {
-    record.reason = constraint.reason;
-    return;
-  }
-  LoopEdge edge = constraint.edge;
-  edge.record = records_.size() - 1;
-  record.S_candidate_query = edge.S_candidate_query;
-  std::vector<LoopEdge> entering = gate_.Offer(edge, places);
-  if (entering.empty()) {
-    record.pending = true;
-    record.reason = "waits for a second loop that agrees";
-    return;
-  }
-  for (const LoopEdge& loop : entering) untied_[loop.record] = loop;
-  const auto fulfilled = [&](const LoopEdge& loop) { return gate_.Fulfilled(loop, places); };
-  const auto all_fulfilled = [&](const std::vector<LoopEdge>& loops) {
-    return std::all_of(loops.begin(), loops.end(), fulfilled);
-  };
-  if (all_fulfilled(deferred_) && all_fulfilled(entering)) {
-    if (options_.global_adjustment) Fuse(entering);
-    deferred_.insert(deferred_.end(), entering.begin(), entering.end());
-  } else {
-    entering.insert(entering.begin(), deferred_.begin(), deferred_.end());
-    deferred_.clear();
-    Close(std::move(entering), frames);
-  }
-}
-
-LoopConstraint LoopCloser::Measure(const Verification& verification, int candidate, int query) {
+LoopConstraint LoopCloser::Measure(const Verification& verification, int candidate, int query,
+                                   const Odometry& odometry) {
   const ScopedSpan span(recorder_, Lane::kOptimisation, "measure_loop");
   const internal::Stopwatch watch;
-  LoopConstraint constraint = MakeLoopConstraint(verification, odometry_.Keyframe(candidate),
-                                                 odometry_.Keyframe(query), rig_, options_, seed_);
+  LoopConstraint constraint = MakeLoopConstraint(verification, odometry.Keyframe(candidate),
+                                                 odometry.Keyframe(query), rig_, options_, seed_);
   stages_["loop_measure"] += watch.Milliseconds();
   return constraint;
 }
 
-bool LoopCloser::Inject(int query, std::int64_t frames) {
-  std::optional<LoopEdge> loop = false_loops_.Next(odometry_, query);
-  if (!loop) return false;
-  LoopRecord record;
-  record.query = loop->query_frame;
-  record.candidate = loop->candidate_frame;
-  record.query_stamp_s = odometry_.KeyframeStamp(loop->query);
-  record.candidate_stamp_s = odometry_.KeyframeStamp(loop->candidate);
-  record.verified = record.injected = true;
-  record.S_candidate_query = loop->S_candidate_query;
-  loop->record = records_.size();
-  records_.push_back(record);
-  untied_[loop->record] = *loop;
-  Close({*loop}, frames);
-  return true;
+// Measures it against the map, and lets it in if something else says the same.
+LoopUpdate LoopCloser::Consider(const LoopRecord& proposed, const Verification& verification, int candidate,
+                                int query, const Odometry& odometry, std::int64_t frames) {
+  records_.push_back(proposed);
+  LoopRecord& record = records_.back();
+  if (!record.verified) return {};
+  if (record.query_stamp_s - record.candidate_stamp_s < options_.loop_min_age_s) {
+    record.reason = "too recent: still in the local map";
+    return {};
+  }
+  const LoopConstraint constraint = Measure(verification, candidate, query, odometry);
+  if (!constraint.usable) {
+    record.reason = constraint.reason;
+    return {};
+  }
+  LoopEdge edge = constraint.edge;
+  edge.record = records_.size() - 1;
+  record.S_candidate_query = edge.S_candidate_query;
+  std::vector<LoopEdge> entering = gate_.Offer(edge, accepted_, Places(odometry));
+  if (entering.empty()) {
+    record.pending = true;
+    record.reason = "waits for a second loop that agrees";
+    return {};
+  }
+  for (const LoopEdge& loop : entering) untied_.insert(loop.record);
+  return Enter(std::move(entering), odometry, frames);
 }
 
-// Loops that the map can't have drifted to by what it knows of its own uncertainty.
-void LoopCloser::Gate(std::vector<LoopEdge>& entering) {
-  if (options_.loop_gate_sigmas == 0) return;
-  const ScopedSpan span(recorder_, Lane::kOptimisation, "gate_loop");
-  const std::vector<std::optional<double>> distances =
-      graph_.Distances(odometry_, gate_.accepted(), entering);
-  std::vector<LoopEdge> passed;
-  for (std::size_t i = 0; i < entering.size(); ++i) {
-    const LoopEdge& loop = entering[i];
-    const std::optional<double>& distance = distances[i];
-    records_[loop.record].gate_sigmas = distance;
-    if (!distance || *distance <= options_.loop_gate_sigmas) {
-      passed.push_back(loop);
+void LoopCloser::Add(int candidate, int query, const Similarity& S_candidate_query,
+                     const Matrix7d& information, const Odometry& odometry, std::int64_t frames) {
+  LoopEdge edge;
+  edge.candidate = candidate;
+  edge.query = query;
+  edge.candidate_frame = odometry.KeyframeFrameIndex(candidate);
+  edge.query_frame = odometry.KeyframeFrameIndex(query);
+  edge.S_candidate_query = S_candidate_query;
+  edge.information = information;
+  edge.depth = MedianDepth(odometry.Keyframe(candidate));
+  edge.record = records_.size();
+  LoopRecord record;
+  record.query = edge.query_frame;
+  record.candidate = edge.candidate_frame;
+  record.query_stamp_s = odometry.KeyframeStamp(query);
+  record.candidate_stamp_s = odometry.KeyframeStamp(candidate);
+  record.verified = record.injected = true;
+  record.S_candidate_query = S_candidate_query;
+  if (!(edge.depth > 0)) record.reason = "the candidate's keyframe has no landmarks";
+  records_.push_back(record);
+  if (!(edge.depth > 0)) return;
+  untied_.insert(edge.record);
+  Start({edge}, odometry, frames);
+}
+
+// What the map fulfils already waits, so that not every loop moves it.
+LoopUpdate LoopCloser::Enter(std::vector<LoopEdge> entering, const Odometry& odometry, std::int64_t frames) {
+  const LoopGate::Map places = Places(odometry);
+  const auto fulfilled = [&](const LoopEdge& loop) { return gate_.Fulfilled(loop, places); };
+  LoopUpdate update;
+  if (!solver_.Running() && std::all_of(deferred_.begin(), deferred_.end(), fulfilled) &&
+      std::all_of(entering.begin(), entering.end(), fulfilled)) {
+    deferred_.insert(deferred_.end(), entering.begin(), entering.end());
+    if (options_.global_adjustment) {
+      update.correction.emplace();
+      update.correction->fused = std::move(entering);
+    }
+    return update;
+  }
+  entering.insert(entering.begin(), deferred_.begin(), deferred_.end());
+  deferred_.clear();
+  Start(std::move(entering), odometry, frames);
+  return update;
+}
+
+// Solves the graph with them beside the tracking; those that come meanwhile wait for their turn.
+void LoopCloser::Start(std::vector<LoopEdge> entering, const Odometry& odometry, std::int64_t frames) {
+  if (solver_.Running()) {
+    queued_.insert(queued_.end(), entering.begin(), entering.end());
+    return;
+  }
+  const ScopedSpan span(recorder_, Lane::kOptimisation, "begin_closing");
+  const internal::Stopwatch watch;
+  UpdateGraph(odometry, options_.covisibility_min_shared, &graph_);
+  solver_.Start(graph_, accepted_, entering, options_, recorder_);
+  T_world_solved_.clear();
+  for (const int id : odometry.KeyframeIds()) T_world_solved_[id] = odometry.KeyframePose(id);
+  solved_due_ = frames;
+  stages_["loop_optimize"] += watch.Milliseconds();
+}
+
+std::optional<LoopUpdate> LoopCloser::Solved(const Odometry& odometry, std::int64_t frames) {
+  if (!solver_.Running() && !queued_.empty()) return Enter(std::exchange(queued_, {}), odometry, frames);
+  if (!solver_.Running() || frames < solved_due_) return std::nullopt;
+  const ScopedSpan span(recorder_, Lane::kOptimisation, "enter_correction");
+  const internal::Stopwatch watch;
+  const LoopSolution solution = solver_.Take();
+  stages_["loop_solve"] += solution.time_ms;
+  LoopUpdate update;
+  for (const LoopVerdict& verdict : solution.verdicts) Settle(verdict, &update);
+  if (solution.moves) {
+    for (std::size_t i = 0; i < accepted_.size(); ++i) {
+      records_[accepted_[i].record].weight = solution.correction.loops[i].weight;
+      if (solution.correction.loops[i].weight < kNoWeight) Revoke(accepted_[i].record, &update);
+    }
+    update.correction = MoveBy(solution.correction, odometry);
+  }
+  stages_["loop_optimize"] += watch.Milliseconds();
+  return update;
+}
+
+// Into the map, or out.
+void LoopCloser::Settle(const LoopVerdict& verdict, LoopUpdate* update) {
+  LoopRecord& record = records_[verdict.loop.record];
+  record.pending = false;
+  record.reason = verdict.reason;
+  record.weight = verdict.weight;
+  record.gate_sigmas = verdict.gate_sigmas;
+  record.accepted = verdict.reason.empty();
+  if (record.accepted) {
+    accepted_.push_back(verdict.loop);
+  } else {
+    untied_.erase(verdict.loop.record);
+    if (verdict.contradicted) Revoke(verdict.loop.record, update);
+  }
+}
+
+void LoopCloser::Revoke(std::size_t record, LoopUpdate* update) {
+  if (records_[record].injected || records_[record].revoked) return;
+  records_[record].revoked = true;
+  update->revoked.push_back(record);
+}
+
+// The keyframes as they are now, moved as the solution moves those that it knew.
+MapCorrection LoopCloser::MoveBy(const KeyframeCorrection& solved, const Odometry& odometry) {
+  MapCorrection correction;
+  std::map<int, Similarity> last;  // motion of the newest keyframe of each map piece
+  for (const int id : odometry.KeyframeIds()) {
+    const Pose now = odometry.KeyframePose(id);
+    const int piece = odometry.KeyframePiece(id);
+    const auto known = solved.S_world_keyframe.find(id);
+    Similarity& S = correction.S_world_keyframe[id];
+    if (known == solved.S_world_keyframe.end()) {
+      S = last[piece] * Similarity(now);
       continue;
     }
-    char text[120];
-    std::snprintf(text, sizeof text, "the map can't be that far off: Mahalanobis distance %.1f, limit %.1f",
-                  *distance, options_.loop_gate_sigmas);
-    Reject(loop, text);
-    Revoke(loop);
+    const Pose& before = T_world_solved_.at(id);
+    last[piece] = known->second * Similarity(before).Inverse();
+    const bool stayed =
+        now.rotation.coeffs() == before.rotation.coeffs() && now.translation == before.translation;
+    S = stayed ? known->second : last[piece] * Similarity(now);
   }
-  entering = std::move(passed);
-}
-
-void LoopCloser::Reject(const LoopEdge& loop, const std::string& reason) {
-  records_[loop.record].pending = false;
-  records_[loop.record].reason = reason;
-  untied_.erase(loop.record);
-}
-
-void LoopCloser::Revoke(const LoopEdge& loop) {
-  LoopRecord& record = records_[loop.record];
-  if (record.injected || record.revoked) return;
-  record.revoked = true;
-  revoked_.emplace_back(record.query, record.candidate);
-}
-
-// Optimises with the entering loops; those that the rest contradicts leave again. Then the map moves.
-void LoopCloser::Close(std::vector<LoopEdge> entering, std::int64_t frames) {
-  const ScopedSpan span(recorder_, Lane::kOptimisation, "close_loop");
-  const internal::Stopwatch watch;
-  const double fused_before = stages_["loop_fuse"];  // a stage of its own
-  BeginChange();
-  MapGraph::Correction correction;
-  Gate(entering);
-  while (!entering.empty()) {
-    std::vector<LoopEdge> loops = gate_.accepted();
-    loops.insert(loops.end(), entering.begin(), entering.end());
-    correction = graph_.Optimize(odometry_, loops);
-    if (!correction.success) {
-      for (const LoopEdge& loop : entering)
-        Reject(loop, "the pose graph could not be solved: " + correction.reason);
-      entering.clear();
-      break;
-    }
-    const std::size_t old = gate_.accepted().size();
-    bool old_broken = false;
-    for (std::size_t i = 0; i < old; ++i)
-      old_broken = old_broken || Contradicts(correction.residuals[i], options_);
-    std::vector<LoopEdge> staying;
-    for (std::size_t i = 0; i < entering.size(); ++i) {
-      const Disagreement& d = correction.residuals[old + i];
-      records_[entering[i].record].weight = correction.weights[old + i];
-      if (!old_broken && !Contradicts(d, options_)) {
-        staying.push_back(entering[i]);
-        continue;
-      }
-      char text[160];
-      std::snprintf(text, sizeof text,
-                    "contradicts the map: off by %.0f %% of the scene depth and %.1f deg after optimisation",
-                    100 * d.fraction, d.angle_deg);
-      Reject(entering[i], old_broken ? "contradicts loops that were accepted before" : text);
-      Revoke(entering[i]);
-    }
-    if (staying.size() == entering.size()) break;
-    entering = std::move(staying);
-  }
-  if (!entering.empty()) Apply(correction, entering, frames);
-  stages_["loop_optimize"] += watch.Milliseconds() - (stages_["loop_fuse"] - fused_before);
-}
-
-void LoopCloser::Apply(const MapGraph::Correction& correction, const std::vector<LoopEdge>& entering,
-                       std::int64_t frames) {
-  for (const LoopEdge& loop : entering) {
-    LoopRecord& record = records_[loop.record];
-    record.accepted = true;
-    record.pending = false;
-    record.reason.clear();
-    gate_.Accepted(loop);
-  }
-  constexpr double kNoWeight = 0.01;
-  for (std::size_t i = 0; i < gate_.accepted().size(); ++i) {
-    const LoopEdge& loop = gate_.accepted()[i];
-    records_[loop.record].weight = correction.weights[i];
-    if (correction.weights[i] < kNoWeight) Revoke(loop);
-  }
-  graph_.Keep(odometry_, correction, gate_.accepted(), gate_.waiting());
-  odometry_.ApplyCorrection(correction.S_world_keyframe, correction.merges);
+  correction.merges = solved.merges;
   ++corrections_;
-  if (!options_.global_adjustment) return;
-  std::vector<LoopEdge> untied;
-  for (const auto& [record, loop] : untied_) untied.push_back(loop);
-  if (Fuse(untied)) adjuster_.MapMoved(odometry_, odometry_.KeyframePiece(entering.back().candidate), frames);
-}
-
-// Landmarks that both ends of the loops see become one. False if some loop has too few of them yet: to
-// adjust the map without it would open it again. It is tried again with the next correction.
-bool LoopCloser::Fuse(const std::vector<LoopEdge>& loops) {
-  constexpr int kLeastCommon = 30;
-  const ScopedSpan span(recorder_, Lane::kOptimisation, "fuse_loop");
-  const internal::Stopwatch watch;
-  for (const LoopEdge& loop : loops) {
-    if (odometry_.FuseLoop(loop.candidate, loop.query, loop.S_candidate_query) >= kLeastCommon)
-      untied_.erase(loop.record);
+  UpdateGraph(odometry, options_.covisibility_min_shared, &graph_);
+  graph_.Move(correction.S_world_keyframe, correction.merges);
+  Rescale(correction.S_world_keyframe);
+  if (options_.global_adjustment) {
+    correction.fused = Untied();
+    adjust_piece_ = odometry.KeyframePiece(accepted_.back().candidate);
   }
-  stages_["loop_fuse"] += watch.Milliseconds();
-  return untied_.empty();
+  return correction;
 }
 
-// Brings in what the adjustment of the whole map has found.
-void LoopCloser::EnterAdjustment() {
+void LoopCloser::Rescale(const std::map<int, Similarity>& S_world_keyframe) {
+  for (std::vector<LoopEdge>* loops : {&accepted_, &gate_.waiting(), &deferred_, &queued_}) {
+    for (LoopEdge& loop : *loops) tutti::Rescale(S_world_keyframe, &loop);
+  }
+}
+
+std::vector<LoopEdge> LoopCloser::Untied() const {
+  std::vector<LoopEdge> untied;
+  for (const LoopEdge& loop : accepted_) {
+    if (untied_.count(loop.record) != 0) untied.push_back(loop);
+  }
+  std::sort(untied.begin(), untied.end(),
+            [](const LoopEdge& a, const LoopEdge& b) { return a.record < b.record; });
+  return untied;
+}
+
+std::optional<LoopUpdate> LoopCloser::Adjusted(const Odometry& odometry, std::int64_t frames) {
+  if (solver_.Running() || !adjuster_.Due(frames)) return std::nullopt;
   const ScopedSpan span(recorder_, Lane::kOptimisation, "enter_adjustment");
   const internal::Stopwatch watch;
-  odometry_.FinishMapping();
-  const GlobalAdjustment adjustment = adjuster_.Take();
-  MapGraph::Correction correction;
-  if (auto moved = odometry_.CorrectionOf(adjustment)) {
-    correction.S_world_keyframe = std::move(*moved);
-    graph_.Keep(odometry_, correction, gate_.accepted(), gate_.waiting());
-    odometry_.Enter(adjustment, correction.S_world_keyframe);
-    graph_.MeasureAgain(odometry_, gate_.accepted());
+  LoopUpdate update;
+  auto adjustment = std::make_shared<GlobalAdjustment>(adjuster_.Take());
+  if (auto moved = odometry.CorrectionOf(*adjustment)) {
+    Rescale(*moved);
+    update.correction.emplace();
+    update.correction->S_world_keyframe = std::move(*moved);
+    update.correction->adjustment = std::move(adjustment);
     ++adjustments_;
   }
   stages_["global_adjustment"] += watch.Milliseconds();
+  return update;
 }
 
-void LoopCloser::EnterDue(std::int64_t frames) {
-  if (adjuster_.Due(frames)) EnterAdjustment();
-}
-
-void LoopCloser::Finish(std::int64_t frames) {
-  if (!deferred_.empty()) Close(std::exchange(deferred_, {}), frames);
-  while (Inject(-1, frames)) {
+void LoopCloser::Applied(const LoopUpdate& update, const std::vector<int>& common, const Odometry& odometry,
+                         std::int64_t frames) {
+  const MapCorrection& correction = *update.correction;
+  for (std::size_t i = 0; i < common.size(); ++i) {
+    if (common[i] >= kLeastCommon) untied_.erase(correction.fused[i].record);
   }
-  if (adjuster_.Running()) EnterAdjustment();
+  if (correction.adjustment) {
+    // The map as it is says more than what was measured before; a loop that it contradicts keeps its own.
+    graph_.MeasureAgain();
+    for (LoopEdge& loop : accepted_) {
+      const Similarity in_map(odometry.KeyframePose(loop.candidate).Inverse() *
+                              odometry.KeyframePose(loop.query));
+      const Disagreement d = tutti::Measure(loop.S_candidate_query * in_map.Inverse(), loop.depth);
+      if (!Contradicts(d, options_)) loop.S_candidate_query = in_map;
+    }
+  }
+  // To adjust the map without a loop that landmarks do not tie would open that loop again.
+  if (adjust_piece_ && untied_.empty()) adjuster_.MapMoved(odometry, *adjust_piece_, frames);
+  adjust_piece_.reset();
+}
+
+bool LoopCloser::CloseDeferred(const Odometry& odometry, std::int64_t frames) {
+  if (deferred_.empty()) return false;
+  Start(std::exchange(deferred_, {}), odometry, frames);
+  return true;
+}
+
+void LoopCloser::Finish() {
+  for (LoopRecord& record : records_) {
+    if (!record.pending) continue;
+    record.pending = false;
+    record.reason = "no second loop nearby agreed with it";
+  }
 }
 
 }  // namespace tutti

@@ -1,18 +1,21 @@
 // From a verified loop to a corrected map.
+//
+//   LoopUpdate update = closer.Consider(...);                         // or *closer.Due(...)
+//   closer.Applied(update, Apply(*update.correction, &odometry), odometry, frames);
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <map>
+#include <optional>
+#include <set>
 #include <string>
-#include <utility>
 #include <vector>
 
-#include "apps/slam/false_loop_source.h"
 #include "apps/slam/global_adjuster.h"
 #include "apps/slam/loop_constraint.h"
 #include "apps/slam/loop_gate.h"
-#include "apps/slam/map_graph.h"
+#include "apps/slam/loop_solver.h"
+#include "apps/slam/loop_update.h"
 #include "tutti/core/span_recorder.h"
 #include "tutti/loopclosure/detector.h"
 #include "tutti/slam/config.h"
@@ -20,66 +23,79 @@
 
 namespace tutti {
 
-/// Measures verified loops against the odometry's map, lets those in that agree, optimises, and moves the
-/// map. What becomes of a loop is written into its record.
+/// Measures verified loops against the odometry's map, lets those in that agree, and works out how the map
+/// is to move; it never touches the map itself. The pose graph is solved beside the tracking, and its answer
+/// is due a number of frames later that depends on the size of the map alone; so it is with the adjustment
+/// of the whole map after that. What becomes of a loop is written into its record.
+///
+/// `frames` is the number of frames so far, `odometry` always the same.
 class LoopCloser {
  public:
-  /// `odometry` and `records` must outlive this object and stay where they are. `before_change` is called
-  /// before the odometry's map is first changed, and each time after that.
-  LoopCloser(const RunConfig& config, const CameraRig& rig, SpanRecorder* recorder, Odometry* odometry,
-             std::vector<LoopRecord>* records, std::function<void()> before_change);
+  LoopCloser(const RunConfig& config, const CameraRig& rig, SpanRecorder* recorder);
 
-  /// To be called when there are new keyframes: a mono map begins with two at once.
-  void AddKeyframes();
+  /// A proposed loop, in the order of the queries. `candidate`, `query`: its keyframes; they have a place in
+  /// the map. The update is to be applied at once.
+  LoopUpdate Consider(const LoopRecord& proposed, const Verification& verification, int candidate, int query,
+                      const Odometry& odometry, std::int64_t frames);
+  /// A proposed loop between images without poses.
+  void List(const LoopRecord& proposed) { records_.push_back(proposed); }
+  /// A loop that is not the detector's: past the gate into the pose graph, which may refuse it.
+  void Add(int candidate, int query, const Similarity& S_candidate_query, const Matrix7d& information,
+           const Odometry& odometry, std::int64_t frames);
 
-  /// A verified loop between two keyframes, the last of the records. `frames`: number of frames so far.
-  void Consider(const Verification& verification, int candidate, int query, std::int64_t frames);
-  /// A false loop to the keyframe `query` (any if negative), past detector and gate: what the pose graph
-  /// makes of it. False if there is none to make.
-  bool Inject(int query, std::int64_t frames);
-  /// Brings in what the adjustment of the whole map has found, if it is due.
-  void EnterDue(std::int64_t frames);
-  /// After the last frame and the last loop.
-  void Finish(std::int64_t frames);
+  /// True if Solved or Adjusted may move the map now: mapping that is under way should be brought in first.
+  bool MayMove(std::int64_t frames) const {
+    return solver_.Running() ? frames >= solved_due_ : adjuster_.Due(frames);
+  }
+  /// What the pose graph has found, if it is due by now; waits for it.
+  std::optional<LoopUpdate> Solved(const Odometry& odometry, std::int64_t frames);
+  /// What the adjustment of the whole map has found, if it is due by now; waits for it.
+  std::optional<LoopUpdate> Adjusted(const Odometry& odometry, std::int64_t frames);
+  /// After the last loop: lets in what the map fulfils and what therefore waited for a correction. True if
+  /// there is any; it is due as usual.
+  bool CloseDeferred(const Odometry& odometry, std::int64_t frames);
+  /// After the last loop, when nothing is due any more.
+  void Finish();
 
-  /// Loops of the detector that the map has contradicted since the last call, as input frames (query,
-  /// candidate): gate or pose graph refused them, or its robust loss leaves them no weight. Each comes once.
-  std::vector<std::pair<std::int64_t, std::int64_t>> TakeRevoked() { return std::exchange(revoked_, {}); }
+  /// To be called when an update with a correction has been applied. `common`: what Apply() returned.
+  void Applied(const LoopUpdate& update, const std::vector<int>& common, const Odometry& odometry,
+               std::int64_t frames);
 
-  PoseGraph Graph() const { return graph_.Build(odometry_, gate_.accepted()); }
+  const std::vector<LoopRecord>& records() const { return records_; }
+  /// Keyframes, odometry edges and accepted loops at the present poses.
+  PoseGraph Graph(const Odometry& odometry) const;
   int Corrections() const { return corrections_; }
   int Adjustments() const { return adjustments_; }
   /// Milliseconds spent, summed, by stage.
   const std::map<std::string, double>& StageMilliseconds() const { return stages_; }
 
  private:
-  LoopGate::Map Places() const;
-  void BeginChange();
-  LoopConstraint Measure(const Verification& verification, int candidate, int query);
-  void Gate(std::vector<LoopEdge>& entering);
-  void Reject(const LoopEdge& loop, const std::string& reason);
-  void Revoke(const LoopEdge& loop);
-  void Close(std::vector<LoopEdge> entering, std::int64_t frames);
-  void Apply(const MapGraph::Correction& correction, const std::vector<LoopEdge>& entering,
-             std::int64_t frames);
-  bool Fuse(const std::vector<LoopEdge>& loops);
-  void EnterAdjustment();
+  LoopConstraint Measure(const Verification& verification, int candidate, int query,
+                         const Odometry& odometry);
+  LoopUpdate Enter(std::vector<LoopEdge> entering, const Odometry& odometry, std::int64_t frames);
+  void Start(std::vector<LoopEdge> entering, const Odometry& odometry, std::int64_t frames);
+  void Settle(const LoopVerdict& verdict, LoopUpdate* update);
+  void Revoke(std::size_t record, LoopUpdate* update);
+  MapCorrection MoveBy(const KeyframeCorrection& solved, const Odometry& odometry);
+  void Rescale(const std::map<int, Similarity>& S_world_keyframe);
+  std::vector<LoopEdge> Untied() const;
 
   SpanRecorder* recorder_;
   SlamOptions options_;
   CameraRig rig_;
   std::uint64_t seed_;
-  Odometry& odometry_;
-  std::vector<LoopRecord>& records_;
-  std::function<void()> before_change_;
+  std::vector<LoopRecord> records_;
   LoopGate gate_;
-  int newest_keyframe_ = -1;  // that the graph knows
-  MapGraph graph_;
-  FalseLoopSource false_loops_;
-  GlobalAdjuster adjuster_;
-  std::map<std::size_t, LoopEdge> untied_;  // loops that landmarks do not hold together yet, by record
+  KeyframeGraph graph_;
+  std::vector<LoopEdge> accepted_;  // in the map
   std::vector<LoopEdge> deferred_;  // agreed, and the map fulfils them: they enter with the next correction
-  std::vector<std::pair<std::int64_t, std::int64_t>> revoked_;  // not taken yet
+  std::vector<LoopEdge> queued_;    // agreed while the pose graph was being solved
+  std::set<std::size_t> untied_;    // records of loops that landmarks do not hold together yet
+  BackgroundLoopSolver solver_;
+  std::int64_t solved_due_ = 0;         // number of frames
+  std::map<int, Pose> T_world_solved_;  // keyframes as they were when solving began
+  std::optional<int> adjust_piece_;     // map piece to be adjusted once the correction was applied
+  GlobalAdjuster adjuster_;
   int corrections_ = 0;
   int adjustments_ = 0;  // of the whole map
   std::map<std::string, double> stages_;

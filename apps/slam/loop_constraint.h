@@ -3,9 +3,9 @@
 
 #include <string>
 
+#include "tutti/backend/keyframe_graph.h"
 #include "tutti/frontend/odometry.h"
 #include "tutti/loopclosure/detector.h"
-#include "tutti/slam/loop_record.h"
 #include "tutti/slam/slam_options.h"
 
 namespace tutti {

@@ -1,26 +1,11 @@
 #include "apps/slam/loop_gate.h"
 
-#include <cmath>
 #include <cstdlib>
 #include <utility>
 
+#include "backend/robust/pairwise_consistency.h"
+
 namespace tutti {
-namespace {
-constexpr double kDegrees = 57.29577951308232;
-}
-
-Disagreement Measure(const Similarity& E, double depth) {
-  Disagreement d;
-  d.fraction = E.translation.norm() / depth;
-  d.angle_deg = LogSO3(E.rotation).norm() * kDegrees;
-  d.log_scale = std::abs(std::log(E.scale));
-  return d;
-}
-
-bool Contradicts(const Disagreement& d, const SlamOptions& options) {
-  return d.fraction > options.loop_after_fraction || d.angle_deg > options.loop_after_deg;
-}
-
 bool LoopGate::Within(const Disagreement& d) const {
   return d.fraction <= options_.loop_agree_fraction && d.angle_deg <= options_.loop_agree_deg &&
          d.log_scale <= options_.loop_agree_scale;
@@ -38,9 +23,9 @@ bool LoopGate::Agree(const LoopEdge& a, const LoopEdge& b, const Map& map) const
   if (qa.piece != qb.piece || ca.piece != cb.piece) return false;  // no odometry between them
   const Similarity between_queries(qa.T_world_camera.Inverse() * qb.T_world_camera);
   const Similarity between_candidates(cb.T_world_camera.Inverse() * ca.T_world_camera);
-  const Similarity E =
-      a.S_candidate_query * between_queries * b.S_candidate_query.Inverse() * between_candidates;
-  return Within(Measure(E, a.depth));
+  return Within(Measure(
+      internal::LoopCycle(a.S_candidate_query, between_queries, b.S_candidate_query, between_candidates),
+      a.depth));
 }
 
 std::optional<Disagreement> LoopGate::WithMap(const LoopEdge& loop, const Map& map) const {
@@ -56,7 +41,8 @@ bool LoopGate::Fulfilled(const LoopEdge& loop, const Map& map) const {
          d->log_scale < options_.loop_defer_fraction;
 }
 
-std::vector<LoopEdge> LoopGate::Offer(const LoopEdge& loop, const Map& map) {
+std::vector<LoopEdge> LoopGate::Offer(const LoopEdge& loop, const std::vector<LoopEdge>& accepted,
+                                      const Map& map) {
   std::vector<LoopEdge> entering;
   std::vector<LoopEdge> still_waiting;
   int agreeing = 1;
@@ -65,7 +51,7 @@ std::vector<LoopEdge> LoopGate::Offer(const LoopEdge& loop, const Map& map) {
     agreeing += agrees ? 1 : 0;
     (agrees ? entering : still_waiting).push_back(other);
   }
-  for (const LoopEdge& other : accepted_) {
+  for (const LoopEdge& other : accepted) {
     if (Near(loop, other) && Agree(loop, other, map)) ++agreeing;
   }
   if (agreeing < options_.loop_confirmations && !Fulfilled(loop, map)) {

@@ -44,35 +44,35 @@ void LiveState::AddEvent(LiveEvent event) {
   if (events_.size() > kMostEvents) events_.pop_front();
 }
 
-std::vector<LiveLoop> LiveState::LoopsOf(const SlamSystem& slam) {
+std::vector<LiveLoop> LiveState::LoopsOf(const RunState& state) {
   std::vector<LiveLoop> loops;
-  for (const LoopRecord& record : slam.loops()) {
+  for (const LoopRecord& record : state.loops) {
     if (record.verified) loops.push_back({record.query, record.candidate, record.accepted});
   }
   return loops;
 }
 
-void LiveState::SetFrame(const InputFrame& frame, const TrackResult& track, const SlamSystem& slam) {
+void LiveState::SetFrame(const InputFrame& frame, const TrackResult& track, const RunState& state) {
   LiveFrame next;
   next.index = frame.index;
   next.stamp_s = frame.stamp_s;
   next.image = frame.image;
-  next.state = slam.AppearanceOnly() ? "appearance only" : ToString(track.state);
+  next.state = state.odometry == nullptr ? "appearance only" : ToString(track.state);
   next.reason = track.reason;
   next.features = track.features;
   next.inliers = track.inliers;
-  next.posed = !slam.AppearanceOnly() && track.state == TrackingState::kTracking;
+  next.posed = state.odometry != nullptr && track.state == TrackingState::kTracking;
   next.T_world_camera = track.T_world_camera;
   std::shared_ptr<const std::vector<LivePlace>> places;
   std::shared_ptr<const std::vector<LiveLoop>> loops;
-  const std::size_t accepted = slam.LoopsAccepted();
-  const bool corrected = slam.Corrections() != corrections_seen_;
-  if (slam.odometry() != nullptr && (new_keyframe_ || corrected))
-    places = std::make_shared<const std::vector<LivePlace>>(PlacesOf(*slam.odometry()));
-  if (slam.loops().size() != loops_seen_ || accepted != accepted_seen_)
-    loops = std::make_shared<const std::vector<LiveLoop>>(LoopsOf(slam));
+  const std::size_t accepted = CountAccepted(state.loops);
+  const bool corrected = state.corrections != corrections_seen_;
+  if (state.odometry != nullptr && (new_keyframe_ || corrected))
+    places = std::make_shared<const std::vector<LivePlace>>(PlacesOf(*state.odometry));
+  if (state.loops.size() != loops_seen_ || accepted != accepted_seen_)
+    loops = std::make_shared<const std::vector<LiveLoop>>(LoopsOf(state));
   if (next.posed) {
-    ExtendTrail(slam.odometry()->SeenLandmarks(), &trail_);
+    ExtendTrail(state.odometry->SeenLandmarks(), &trail_);
   } else {
     trail_.clear();
   }
@@ -81,9 +81,9 @@ void LiveState::SetFrame(const InputFrame& frame, const TrackResult& track, cons
   if (next.state != state_seen_)
     Log("frame " + std::to_string(frame.index) + ": " + next.state +
         (next.reason.empty() ? "" : ": " + next.reason));
-  loops_seen_ = slam.loops().size();
+  loops_seen_ = state.loops.size();
   accepted_seen_ = accepted;
-  corrections_seen_ = slam.Corrections();
+  corrections_seen_ = state.corrections;
   new_keyframe_ = false;
   state_seen_ = next.state;
   const std::lock_guard<std::mutex> lock(mutex_);
@@ -94,11 +94,11 @@ void LiveState::SetFrame(const InputFrame& frame, const TrackResult& track, cons
   Changed();
 }
 
-void LiveState::SetKeyframe(int keyframe, const SlamSystem& slam) {
+void LiveState::SetKeyframe(int keyframe, const RunState& state) {
   new_keyframe_ = true;
   LivePoints points;
   points.keyframe = keyframe;
-  points.points = SomePoints(slam.odometry()->Keyframe(keyframe));
+  points.points = SomePoints(state.odometry->Keyframe(keyframe));
   const std::lock_guard<std::mutex> lock(mutex_);
   points.number = next_points_++;
   points_.push_back(std::move(points));

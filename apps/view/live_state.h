@@ -82,8 +82,8 @@ class LiveState {
   static constexpr std::size_t kPointsPerKeyframe = 40;
 
   // ---- the run's side
-  void SetFrame(const InputFrame& frame, const TrackResult& track, const SlamSystem& slam);
-  void SetKeyframe(int keyframe, const SlamSystem& slam);
+  void SetFrame(const InputFrame& frame, const TrackResult& track, const RunState& state);
+  void SetKeyframe(int keyframe, const RunState& state);
   void AddDetection(const LoopResult& result);
   void Log(const std::string& text);
   void Finish();
@@ -106,7 +106,7 @@ class LiveState {
 
  private:
   void Changed();  // with mutex_ held
-  std::vector<LiveLoop> LoopsOf(const SlamSystem& slam);
+  std::vector<LiveLoop> LoopsOf(const RunState& state);
   void AddEvent(LiveEvent event);  // with mutex_ held
 
   mutable std::mutex mutex_;

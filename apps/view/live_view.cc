@@ -28,14 +28,14 @@ LiveView::~LiveView() = default;
 bool LiveViewAvailable() { return true; }
 std::string LiveView::Url() const { return impl_->server_.Url(); }
 void LiveView::OnStart(const CameraRig&) { impl_->state_.WaitForViewer(impl_->options_.idle_s); }
-void LiveView::OnFrame(const InputFrame& frame, const TrackResult& track, const SlamSystem& slam) {
-  impl_->state_.SetFrame(frame, track, slam);
+void LiveView::OnFrame(const InputFrame& frame, const TrackResult& track, const RunState& state) {
+  impl_->state_.SetFrame(frame, track, state);
   impl_->state_.WaitWhilePaused(impl_->options_.abandoned_s);
 }
-void LiveView::OnKeyframe(const InputFrame&, int keyframe, const SlamSystem& slam) {
-  impl_->state_.SetKeyframe(keyframe, slam);
+void LiveView::OnKeyframe(const InputFrame&, int keyframe, const RunState& state) {
+  impl_->state_.SetKeyframe(keyframe, state);
 }
 void LiveView::OnDetection(const LoopResult& result) { impl_->state_.AddDetection(result); }
-void LiveView::OnEnd(const SlamSystem&) { impl_->state_.Finish(); }
+void LiveView::OnEnd(const RunState&) { impl_->state_.Finish(); }
 
 }  // namespace tutti

@@ -40,10 +40,10 @@ class LiveView : public RunObserver {
   std::string Url() const;
 
   void OnStart(const CameraRig& rig) override;
-  void OnFrame(const InputFrame& frame, const TrackResult& track, const SlamSystem& slam) override;
-  void OnKeyframe(const InputFrame& frame, int keyframe, const SlamSystem& slam) override;
+  void OnFrame(const InputFrame& frame, const TrackResult& track, const RunState& state) override;
+  void OnKeyframe(const InputFrame& frame, int keyframe, const RunState& state) override;
   void OnDetection(const LoopResult& result) override;
-  void OnEnd(const SlamSystem& slam) override;
+  void OnEnd(const RunState& state) override;
 
  private:
   class Impl;

@@ -16,9 +16,9 @@ LiveView::LiveView(const LiveViewOptions&) {
 LiveView::~LiveView() = default;
 std::string LiveView::Url() const { return {}; }
 void LiveView::OnStart(const CameraRig&) {}
-void LiveView::OnFrame(const InputFrame&, const TrackResult&, const SlamSystem&) {}
-void LiveView::OnKeyframe(const InputFrame&, int, const SlamSystem&) {}
+void LiveView::OnFrame(const InputFrame&, const TrackResult&, const RunState&) {}
+void LiveView::OnKeyframe(const InputFrame&, int, const RunState&) {}
 void LiveView::OnDetection(const LoopResult&) {}
-void LiveView::OnEnd(const SlamSystem&) {}
+void LiveView::OnEnd(const RunState&) {}
 
 }  // namespace tutti

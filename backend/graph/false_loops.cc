@@ -5,6 +5,7 @@
 #include <random>
 #include <string>
 
+#include "backend/graph/graph_structure.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -14,7 +15,11 @@ namespace {
 class Planter {
  public:
   Planter(PoseGraph& graph, const FalseLoopOptions& options)
-      : graph_(graph), options_(options), random_(options.seed), diagonal_(BoundingBoxDiagonal(graph)) {
+      : graph_(graph),
+        options_(options),
+        random_(options.seed),
+        diagonal_(BoundingBoxDiagonal(graph)),
+        component_of_(internal::AnalyseGraph(graph).component_of) {
     for (std::size_t e = 0; e < graph.edges().size(); ++e) {
       if (graph.edges()[e].kind == EdgeKind::kLoop) templates_.push_back(e);
     }
@@ -53,8 +58,11 @@ class Planter {
   }
 
   Similarity DrawMeasurement(std::size_t number, const PoseGraphEdge& like) {
-    if (number % 3 == 0) return Draw(0.3 * diagonal_, M_PI / std::sqrt(3.0));
-    if (number % 3 == 1) return like.measurement;
+    constexpr FalseLoopKind kTurns[] = {FalseLoopKind::kAnywhere, FalseLoopKind::kTrueMeasurement,
+                                        FalseLoopKind::kSamePlace};
+    const FalseLoopKind kind = options_.kind == FalseLoopKind::kInTurn ? kTurns[number % 3] : options_.kind;
+    if (kind == FalseLoopKind::kAnywhere) return Draw(0.3 * diagonal_, M_PI / std::sqrt(3.0));
+    if (kind == FalseLoopKind::kTrueMeasurement) return like.measurement;
     return Draw(0.3, 0.2);
   }
 
@@ -62,11 +70,14 @@ class Planter {
   bool PlantCluster(std::size_t size, std::vector<std::size_t>& planted) {
     constexpr int kTries = 10000;
     const std::size_t nodes = graph_.nodes().size(), gap = static_cast<std::size_t>(options_.min_gap);
+    if (options_.newest >= 0 && graph_.IndexOf(options_.newest) + 1 < size) return false;
     for (int k = 0; k < kTries; ++k) {
-      const std::size_t i = Index(nodes), j = Index(nodes);
+      const std::size_t i = Index(nodes), drawn = Index(nodes);
+      const std::size_t j = options_.newest < 0 ? drawn : graph_.IndexOf(options_.newest) + 1 - size;
       const PoseGraphEdge like = graph_.edges()[templates_[Index(templates_.size())]];
       const Similarity first = DrawMeasurement(planted.size() / size, like);
       if ((i > j ? i - j : j - i) < gap + size || i + size > nodes || j + size > nodes) continue;
+      if (component_of_[i] != component_of_[j]) continue;
       const Similarity error = first.Inverse() * PoseAt(i).Inverse() * PoseAt(j);
       if (error.translation.norm() < options_.min_error * diagonal_) continue;
       for (std::size_t s = 0; s < size; ++s) {
@@ -87,6 +98,7 @@ class Planter {
   const FalseLoopOptions& options_;
   std::mt19937_64 random_;
   double diagonal_;
+  std::vector<std::size_t> component_of_;
   std::vector<std::size_t> templates_;  // edges whose information the planted ones take
 };
 

@@ -15,20 +15,25 @@
 
 namespace tutti {
 
+enum class FalseLoopKind { kInTurn, kAnywhere, kTrueMeasurement, kSamePlace };
+
 struct FalseLoopOptions {
   int count = 100;       ///< false loops to plant
   int cluster_size = 1;  ///< loops that agree with each other; 1: each stands alone
   int min_gap = 20;      ///< nodes between the two ends, at least
   double min_error =
       0.05;  ///< off from the graph's poses by at least this share of their bounding box' diagonal
+  FalseLoopKind kind = FalseLoopKind::kInTurn;
+  int newest = -1;  ///< id of the node at which the later end lies; -1: anywhere
   std::uint64_t seed = 1;
   /// Empty if usable, else what is wrong.
   std::string Validate() const;
 };
 
-/// Adds loop edges that contradict the graph's poses, which should be its optimum; returns their positions in
-/// edges(). They get the information of a true loop (the first edge's where the graph has none). Throws
-/// InputError if the options are not usable or the graph is too small. The same seed gives the same loops.
+/// Adds loop edges that contradict the graph's poses, which should be its optimum, each within one of its
+/// connected parts; returns their positions in edges(). They get the information of a true loop (the first
+/// edge's where the graph has none). Throws InputError if the options are not usable or the graph is too
+/// small. The same seed gives the same loops.
 std::vector<std::size_t> PlantFalseLoops(PoseGraph& graph, const FalseLoopOptions& options);
 
 /// Diagonal of the bounding box of the nodes' positions [m].

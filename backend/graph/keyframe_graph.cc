@@ -3,22 +3,34 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tutti/backend/graph_covariance.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
 namespace {
 
-/// Groups of map pieces that loops tie together: piece -> smallest piece of its group.
-int GroupOf(const std::map<int, int>& group, int piece) {
-  auto it = group.find(piece);
-  while (it != group.end() && it->second != piece) {
-    piece = it->second;
-    it = group.find(piece);
-  }
-  return piece;
+constexpr int kRecentKeyframes = 20;  // ids apart: common landmarks are the odometry's own
+
+Similarity Rescaled(const Similarity& s, double scale_a, double scale_b) {
+  return Similarity(scale_a * s.scale / scale_b, s.rotation, scale_a * s.translation);
+}
+
+double ScaleOf(const std::map<int, Similarity>& poses, int id) {
+  const auto found = poses.find(id);
+  return found == poses.end() ? 1.0 : found->second.scale;
 }
 
 }  // namespace
+
+void Rescale(const std::map<int, Similarity>& S_world_keyframe, LoopEdge* loop) {
+  const double scale_c = ScaleOf(S_world_keyframe, loop->candidate);
+  const double scale_q = ScaleOf(S_world_keyframe, loop->query);
+  loop->S_candidate_query = Rescaled(loop->S_candidate_query, scale_c, scale_q);
+  loop->depth *= scale_c;
+  // The residual lives in the query's frame, and so does the information.
+  loop->information.topLeftCorner<3, 7>() /= scale_q;
+  loop->information.topLeftCorner<7, 3>() /= scale_q;
+}
 
 KeyframeGraphOptions::KeyframeGraphOptions() {
   solver.init = GraphInit::kFile;
@@ -35,89 +47,181 @@ std::string KeyframeGraphOptions::Validate() const {
   }
   if (!(sigma_rotation_rad > 0)) return "keyframe graph: sigma_rotation_rad must be positive";
   if (!(sigma_log_scale > 0)) return "keyframe graph: sigma_log_scale must be positive";
+  if (max_covisible < 0) return "keyframe graph: max_covisible must not be negative";
   return solver.Validate();
 }
 
-KeyframeGraph::KeyframeGraph(const KeyframeGraphOptions& options) : options_(options), graph_(options.kind) {
+KeyframeGraph::KeyframeGraph(const KeyframeGraphOptions& options) : options_(options) {
   const std::string wrong = options.Validate();
   if (!wrong.empty()) throw InputError(wrong);
 }
 
-Matrix7d KeyframeGraph::OdometryInformation(const Similarity& S_from_to) const {
-  const double sigma = std::max(options_.sigma_translation_floor,
-                                options_.sigma_translation_ratio * S_from_to.translation.norm());
-  return MakeInformation(sigma, options_.sigma_rotation_rad, options_.sigma_log_scale);
+const MapKeyframe& KeyframeGraph::At(int id) const {
+  const auto at = std::lower_bound(keyframes_.begin(), keyframes_.end(), id,
+                                   [](const MapKeyframe& k, int value) { return k.id < value; });
+  if (at == keyframes_.end() || at->id != id)
+    throw InputError("keyframe graph: there is no keyframe " + std::to_string(id));
+  return *at;
 }
 
-void KeyframeGraph::AddKeyframe(int id, const Similarity& S_world_keyframe, int map_piece) {
-  const bool first = graph_.nodes().empty();
-  graph_.AddNode(id, S_world_keyframe, first);
-  piece_[id] = map_piece;
-  if (!first && piece_.at(last_id_) == map_piece) {
-    const Similarity S_from_to = graph_.Node(last_id_).pose.Inverse() * S_world_keyframe;
-    graph_.AddOdometry(last_id_, id, S_from_to, OdometryInformation(S_from_to));
+// The piece that `keyframe` was of when `newer` was new.
+int KeyframeGraph::PieceWhenNew(int keyframe, int newer) const {
+  int piece = birth_piece_.at(keyframe);
+  for (const Merge& merge : merged_) {
+    if (merge.newest >= keyframe && merge.newest < newer && merge.from == piece) piece = merge.to;
   }
-  last_id_ = id;
+  return piece;
 }
 
-void KeyframeGraph::AddCovisibility(int older, int newer, double confidence) {
-  const Similarity S_from_to = graph_.Node(older).pose.Inverse() * graph_.Node(newer).pose;
-  graph_.AddOdometry(older, newer, S_from_to, confidence * OdometryInformation(S_from_to));
+bool KeyframeGraph::OfOnePiece(int older, int newer) const {
+  return PieceWhenNew(older, newer) == birth_piece_.at(newer);
 }
 
-void KeyframeGraph::AddOdometry(int from, int to, const Similarity& S_from_to, const Matrix7d& information) {
-  graph_.AddOdometry(from, to, S_from_to, information);
+// Kept from before a correction, or as the map is.
+Similarity KeyframeGraph::Measured(const Pair& pair) const {
+  const auto kept = kept_.find(pair);
+  return kept != kept_.end()
+             ? kept->second
+             : Similarity(At(pair.first).T_world_keyframe.Inverse() * At(pair.second).T_world_keyframe);
 }
 
-void KeyframeGraph::AddLoop(int from, int to, const Similarity& S_from_to, const Matrix6d& information,
-                            double sigma_log_scale) {
-  graph_.AddLoop(from, to, S_from_to,
-                 MakeInformation(information, 1.0 / (sigma_log_scale * sigma_log_scale)));
+void KeyframeGraph::Update(std::vector<MapKeyframe> keyframes, const std::vector<CovisiblePair>& covisible) {
+  const auto ascending = [](const MapKeyframe& a, const MapKeyframe& b) { return a.id >= b.id; };
+  if (std::adjacent_find(keyframes.begin(), keyframes.end(), ascending) != keyframes.end())
+    throw InputError("keyframe graph: keyframes must come in ascending order of their ids");
+  keyframes_ = std::move(keyframes);
+  edges_.clear();
+  for (std::size_t i = 0; i < keyframes_.size(); ++i) {
+    birth_piece_.emplace(keyframes_[i].id, keyframes_[i].piece);
+    if (i == 0 || !OfOnePiece(keyframes_[i - 1].id, keyframes_[i].id)) continue;
+    const Pair pair(keyframes_[i - 1].id, keyframes_[i].id);
+    edges_[pair] = Measured(pair);
+  }
+  AddCovisible(covisible);
 }
 
-KeyframeCorrection KeyframeGraph::Optimize() const {
-  KeyframeCorrection out;
-  PoseGraph graph = graph_;
-  // A loop between two map pieces is all that is known of their relative place: put the newer piece there
-  // first, for it may start anywhere.
-  std::map<int, int> group;
-  for (const auto& [id, piece] : piece_) group[piece] = piece;
-  for (const PoseGraphEdge& edge : graph_.edges()) {
-    if (edge.kind != EdgeKind::kLoop) continue;
-    const int a = GroupOf(group, piece_.at(edge.from)), b = GroupOf(group, piece_.at(edge.to));
-    if (a == b) continue;
-    const bool move_to = a < b;  // the smaller piece stays
-    const Similarity target = move_to ? graph.Node(edge.from).pose * edge.measurement
-                                      : graph.Node(edge.to).pose * edge.measurement.Inverse();
-    const int moved_id = move_to ? edge.to : edge.from;
-    Similarity shift = target * graph.Node(moved_id).pose.Inverse();
-    if (options_.kind == GraphKind::kSE3) shift.scale = 1.0;
-    const int moved = std::max(a, b);
-    for (const auto& [id, piece] : piece_) {
-      if (GroupOf(group, piece) == moved) graph.SetPose(id, shift * graph.Node(id).pose);
+// The strongest few of each keyframe: more would count the same landmarks again and again.
+void KeyframeGraph::AddCovisible(const std::vector<CovisiblePair>& covisible) {
+  std::map<int, std::vector<std::pair<int, int>>> older_of;  // newer id -> (-shared, older id)
+  for (const CovisiblePair& c : covisible) {
+    const Pair pair(c.older, c.newer);
+    // Keyframes that a loop brought together see common landmarks too; that is the loop's edge, not the
+    // odometry's.
+    const bool recent = kept_.count(pair) != 0 || kept_.empty() || c.newer - c.older < kRecentKeyframes;
+    if (recent && OfOnePiece(c.older, c.newer) && edges_.count(pair) == 0)
+      older_of[c.newer].emplace_back(-c.shared, c.older);
+  }
+  for (auto& [newer, candidates] : older_of) {
+    std::sort(candidates.begin(), candidates.end());
+    const std::size_t count = std::min(candidates.size(), static_cast<std::size_t>(options_.max_covisible));
+    for (std::size_t i = 0; i < count; ++i) {
+      const Pair pair(candidates[i].second, newer);
+      edges_[pair] = Measured(pair);
     }
-    group[moved] = std::min(a, b);
   }
-  for (const auto& [piece, unused] : group) {
-    (void)unused;
-    const int joined = GroupOf(group, piece);
-    if (joined != piece) out.merges[piece] = joined;
-  }
+}
 
-  std::vector<double> before;
-  for (const PoseGraphEdge& edge : graph.edges())
-    before.push_back(EdgeChi2(graph, edge, options_.solver.objective));
-  out.report = PoseGraphOptimizer(options_.solver).Optimize(graph);
-  out.success = out.report.success;
-  out.reason = out.report.reason;
-  out.S_world_keyframe = graph.Poses();
-  for (std::size_t e = 0; e < graph.edges().size() && e < out.report.edges.size(); ++e) {
-    const PoseGraphEdge& edge = graph.edges()[e];
-    if (edge.kind != EdgeKind::kLoop) continue;
-    const EdgeOutcome& outcome = out.report.edges[e];
-    out.loops.push_back({edge.from, edge.to, before[e], outcome.chi2, outcome.weight, outcome.down_weighted});
+std::map<int, int> KeyframeGraph::Merges(const std::vector<LoopEdge>& loops) const {
+  std::map<int, int> root;  // piece -> smallest piece of its group
+  const auto find = [&](int piece) {
+    while (root.count(piece) != 0) piece = root[piece];
+    return piece;
+  };
+  for (const LoopEdge& loop : loops) {
+    const int a = find(At(loop.candidate).piece), b = find(At(loop.query).piece);
+    if (a != b) root[std::max(a, b)] = std::min(a, b);
+  }
+  std::map<int, int> merges;
+  for (const auto& [piece, ignored] : root) merges[piece] = find(piece);
+  return merges;
+}
+
+// A joined piece starts where its first loop puts it: all that is known of its place, for it may begin
+// anywhere.
+std::map<int, Similarity> KeyframeGraph::JoinedPieces(const std::vector<LoopEdge>& loops) const {
+  std::map<int, Similarity> S_root_piece;
+  for (bool grown = true; grown;) {
+    grown = false;
+    for (const LoopEdge& loop : loops) {
+      const MapKeyframe &c = At(loop.candidate), &q = At(loop.query);
+      if (c.piece == q.piece) continue;
+      const bool query_moves = c.piece < q.piece;
+      const int from = query_moves ? c.piece : q.piece, moved = query_moves ? q.piece : c.piece;
+      if (S_root_piece.count(moved) != 0) continue;
+      const Similarity S_c(c.T_world_keyframe), S_q(q.T_world_keyframe);
+      const Similarity S_from_moved = query_moves ? S_c * loop.S_candidate_query * S_q.Inverse()
+                                                  : S_q * loop.S_candidate_query.Inverse() * S_c.Inverse();
+      const auto base = S_root_piece.find(from);
+      S_root_piece[moved] = (base == S_root_piece.end() ? Similarity() : base->second) * S_from_moved;
+      grown = true;
+    }
+  }
+  return S_root_piece;
+}
+
+PoseGraph KeyframeGraph::Graph(const std::vector<LoopEdge>& loops) const {
+  const std::map<int, Similarity> S_root_piece = JoinedPieces(loops);
+  PoseGraph graph(options_.kind);
+  for (const MapKeyframe& keyframe : keyframes_) {
+    Similarity pose(keyframe.T_world_keyframe);
+    const auto moved = S_root_piece.find(keyframe.piece);
+    if (moved != S_root_piece.end()) pose = moved->second * pose;
+    if (options_.kind == GraphKind::kSE3) pose.scale = 1;
+    graph.AddNode(keyframe.id, pose);
+  }
+  double mean_length = 0;
+  for (const auto& [pair, measurement] : edges_) mean_length += measurement.translation.norm();
+  mean_length /= std::max<double>(1, static_cast<double>(edges_.size()));
+  const double floor = options_.sigma_translation_floor * mean_length + 1e-6;
+  for (const auto& [pair, measurement] : edges_) {
+    const double sigma = options_.sigma_translation_ratio * measurement.translation.norm() + floor;
+    graph.AddOdometry(pair.first, pair.second, measurement,
+                      MakeInformation(sigma, options_.sigma_rotation_rad, options_.sigma_log_scale));
+  }
+  for (const LoopEdge& loop : loops)
+    graph.AddLoop(loop.candidate, loop.query, loop.S_candidate_query, loop.information);
+  return graph;
+}
+
+KeyframeCorrection KeyframeGraph::Optimize(const std::vector<LoopEdge>& loops) const {
+  KeyframeCorrection correction;
+  PoseGraph graph = Graph(loops);
+  const PoseGraphReport report = PoseGraphOptimizer(options_.solver).Optimize(graph);
+  correction.success = report.success;
+  correction.reason = report.reason;
+  if (!report.success) return correction;
+  correction.S_world_keyframe = graph.Poses();
+  correction.merges = Merges(loops);
+  for (std::size_t e = 0; e < graph.edges().size(); ++e) {
+    if (graph.edges()[e].kind == EdgeKind::kLoop) correction.loops.push_back(report.edges[e]);
+  }
+  return correction;
+}
+
+std::vector<std::optional<double>> KeyframeGraph::Distances(const std::vector<LoopEdge>& accepted,
+                                                            const std::vector<LoopEdge>& entering) const {
+  const GraphCovariance known(Graph(accepted));
+  std::vector<std::optional<double>> out;
+  for (const LoopEdge& loop : entering) {
+    out.emplace_back();
+    if (!known.Connected(loop.candidate, loop.query)) continue;
+    const PoseGraphEdge edge{loop.candidate, loop.query, loop.S_candidate_query, loop.information,
+                             EdgeKind::kLoop};
+    out.back() = std::sqrt(known.SquaredDistance(edge));
   }
   return out;
+}
+
+void KeyframeGraph::Move(const std::map<int, Similarity>& S_world_keyframe,
+                         const std::map<int, int>& merges) {
+  for (auto& [pair, measurement] : edges_) {
+    measurement =
+        Rescaled(measurement, ScaleOf(S_world_keyframe, pair.first), ScaleOf(S_world_keyframe, pair.second));
+  }
+  kept_ = edges_;
+  for (const auto& [from, to] : merges) {
+    if (from != to) merged_.push_back({from, to, keyframes_.empty() ? -1 : keyframes_.back().id});
+  }
 }
 
 }  // namespace tutti

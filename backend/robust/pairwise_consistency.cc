@@ -56,7 +56,7 @@ bool Agree(const Chain& chain, GraphKind kind, const Loop& a, const Loop& b, dou
   const auto& T = chain.T_world_node;
   const Pose back = T[b.from].Inverse() * T[a.from];
   const Pose rest = b.measurement.Inverse() * back;
-  const Pose E = a.measurement * (T[a.to].Inverse() * T[b.to]) * rest;
+  const Pose E = LoopCycle(a.measurement, T[a.to].Inverse() * T[b.to], b.measurement, back);
   const auto between = [&](std::size_t i, std::size_t j, const Pose& T_target_world) {
     const Matrix6d way =
         i < j ? chain.covariance[j] - chain.covariance[i] : chain.covariance[i] - chain.covariance[j];

@@ -9,6 +9,15 @@
 
 namespace tutti::internal {
 
+/// The cycle of two loops a, b and the odometry between their ends: query a -> query b, candidate b ->
+/// candidate a. Maps the camera of candidate a onto itself; the identity where all agree (Mangelson et al.,
+/// eq. 3). Each loop maps points of its query into its candidate.
+template <typename Transform>
+Transform LoopCycle(const Transform& a, const Transform& T_qa_qb, const Transform& b,
+                    const Transform& T_cb_ca) {
+  return a * T_qa_qb * (b.Inverse() * T_cb_ca);
+}
+
 /// The largest set of loops that agree pair by pair (Mangelson, Dominic, Eustice, Vasudevan, ICRA 2018): the
 /// cycle loop a, odometry, loop b backwards, odometry closes within `threshold` [chi-square], the odometry's
 /// and the loops' covariances propagated to first order. Greedy clique; true: in it. Parallel to edges(),

@@ -4,11 +4,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "tests/support/recording.h"
 #include "tests/support/small_town.h"
 #include "tutti/backend/evaluation.h"
+#include "tutti/core/error.h"
 
 namespace tutti {
 namespace {
@@ -141,6 +143,19 @@ TEST(SlamSystem, TheDetectorIsToldOfLoopsThatTheMapContradicts) {
     EXPECT_EQ(one.loops[i].hypothesis, two.loops[i].hypothesis);
     EXPECT_EQ(one.loops[i].probability, two.loops[i].probability);
   }
+}
+
+TEST(SlamSystem, LoopsFromElsewhereNeedKeyframesThatAreThereAndFiniteNumbers) {
+  SlamSystem slam(Small(true, 1), TwoLaps().rig);
+  for (std::size_t i = 0; i < 20; ++i) slam.Track(TwoLaps().frames[i]);
+  const Matrix7d information = MakeInformation(0.1, 0.1);
+  Similarity nowhere;
+  nowhere.translation.x() = std::nan("");
+  EXPECT_THROW(slam.AddLoop(0, 1000, Similarity(), information), InputError);
+  EXPECT_THROW(slam.AddLoop(-1, 1, Similarity(), information), InputError);
+  EXPECT_THROW(slam.AddLoop(1, 0, Similarity(), information), InputError);
+  EXPECT_THROW(slam.AddLoop(0, 1, nowhere, information), InputError);
+  EXPECT_TRUE(slam.loops().empty());
 }
 
 TEST(SlamSystem, NothingIsRevokedWhereTheMapAgrees) {

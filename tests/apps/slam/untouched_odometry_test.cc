@@ -2,8 +2,10 @@
 // the odometry that never saw a loop.
 #include <gtest/gtest.h>
 
+#include <optional>
 #include <string>
 #include <tuple>
+#include <vector>
 
 #include "tests/support/recording.h"
 #include "tests/support/small_town.h"
@@ -12,32 +14,73 @@
 namespace tutti {
 namespace {
 
-class UntouchedOdometry : public ::testing::TestWithParam<std::tuple<SyntheticSensor, int>> {};
+enum class Change { kLoopsMoveTheMap, kTheMapFulfilsTheLoops, kFalseLoopsAreRefused, kALostFrameIsFound };
 
-TEST_P(UntouchedOdometry, TrackedOnHasTheBitsOfTheOdometryAlone) {
-  const auto [sensor, planted] = GetParam();
-  SyntheticOptions options = testing::SmallStereoTownWithALoop(320, 160);
+class UntouchedOdometry : public ::testing::TestWithParam<std::tuple<SyntheticSensor, Change>> {};
+
+// A lap and a bit; or 120 frames, and then some of them once more.
+testing::Recording Drive(SyntheticSensor sensor, Change change) {
+  SyntheticOptions options = change == Change::kALostFrameIsFound
+                                 ? testing::SmallStereoTown(320, 160)
+                                 : testing::SmallStereoTownWithALoop(320, 160);
   options.sensor = sensor;
   const SyntheticWorld world(options);
-  const testing::Recording recording = testing::Record(world, world.Size());
+  if (change != Change::kALostFrameIsFound) return testing::Record(world, world.Size());
+  testing::Recording recording = testing::Record(world, 120);
+  for (std::size_t i = 10; i < 60; ++i) {
+    InputFrame again = recording.frames[i];
+    again.index = static_cast<std::int64_t>(recording.frames.size());
+    again.stamp_s = recording.frames.back().stamp_s + 1 / options.rate_hz;
+    recording.frames.push_back(again);
+  }
+  return recording;
+}
+
+RunConfig Configured(Change change) {
   RunConfig config;
   config.odometry.features = 800;
   config.run.threads = 2;
-  config.run.inject_false_loops = planted;
-  config.run.loops = planted == 0;  // else the first change is a planted loop
+  config.run.loops = change != Change::kFalseLoopsAreRefused;
+  if (change == Change::kTheMapFulfilsTheLoops) {
+    config.run.loop_defer_fraction = 100;
+    config.run.loop_defer_deg = 180;
+  }
+  return config;
+}
 
+TEST_P(UntouchedOdometry, TrackedOnHasTheBitsOfTheOdometryAlone) {
+  const auto [sensor, change] = GetParam();
+  const testing::Recording recording = Drive(sensor, change);
+  const RunConfig config = Configured(change);
   SlamSystem slam(config, recording.rig);
+  std::optional<Odometry> untouched;
+  std::int64_t seen = -1;
+  slam.SetChangeListener([&](const Odometry& odometry, std::int64_t last) {
+    if (untouched) return;
+    untouched = odometry;
+    seen = last;
+  });
   Odometry alone(config.odometry, recording.rig);
+  bool planted = false;
   for (const InputFrame& frame : recording.frames) {
     slam.Track(frame);
     alone.Track(frame);
+    const std::vector<int> ids = slam.odometry()->KeyframeIds();
+    if (planted || change != Change::kFalseLoopsAreRefused || ids.size() < 12) continue;
+    slam.AddLoop(ids[1], ids[9], Similarity(1, ExpSO3({0, 1, 0}), {3, 4, 5}), MakeInformation(0.01, 0.01));
+    planted = true;
   }
   slam.Finish();
   alone.FinishMapping();
-  Odometry* untouched = slam.untouched();
-  ASSERT_NE(untouched, nullptr) << "no loop changed anything";
+  if (change == Change::kALostFrameIsFound && sensor != SyntheticSensor::kMono) {
+    ASSERT_GT(slam.Relocalized(), 0u);
+  }
+  if (change == Change::kFalseLoopsAreRefused) {
+    ASSERT_EQ(CountAccepted(slam.loops()), 0u);
+  }
+  ASSERT_TRUE(untouched) << "nothing changed the odometry";
   for (const InputFrame& frame : recording.frames) {
-    if (frame.index > slam.UntouchedLast()) untouched->Track(frame);
+    if (frame.index > seen) untouched->Track(frame);
   }
   untouched->FinishMapping();
   const Trajectory a = alone.FrameTrajectory(), b = untouched->FrameTrajectory();
@@ -47,19 +90,22 @@ TEST_P(UntouchedOdometry, TrackedOnHasTheBitsOfTheOdometryAlone) {
 }
 
 std::string NameOf(const ::testing::TestParamInfo<UntouchedOdometry::ParamType>& tested) {
-  const auto [sensor, planted] = tested.param;
+  const auto [sensor, change] = tested.param;
+  const char* changes[] = {"LoopsMoveTheMap", "TheMapFulfilsTheLoops", "FalseLoopsAreRefused",
+                           "ALostFrameIsFound"};
   const std::string name = sensor == SyntheticSensor::kMono     ? "Mono"
                            : sensor == SyntheticSensor::kStereo ? "Stereo"
                                                                 : "RgbD";
-  return name + (planted > 0 ? "WithPlantedLoops" : "");
+  return name + changes[static_cast<int>(change)];
 }
 
-INSTANTIATE_TEST_SUITE_P(EverySensor, UntouchedOdometry,
-                         ::testing::Combine(::testing::Values(SyntheticSensor::kMono,
-                                                              SyntheticSensor::kStereo,
-                                                              SyntheticSensor::kRgbd),
-                                            ::testing::Values(0, 2)),
-                         NameOf);
+INSTANTIATE_TEST_SUITE_P(
+    EverySensor, UntouchedOdometry,
+    ::testing::Combine(::testing::Values(SyntheticSensor::kMono, SyntheticSensor::kStereo,
+                                         SyntheticSensor::kRgbd),
+                       ::testing::Values(Change::kLoopsMoveTheMap, Change::kTheMapFulfilsTheLoops,
+                                         Change::kFalseLoopsAreRefused, Change::kALostFrameIsFound)),
+    NameOf);
 
 }  // namespace
 }  // namespace tutti

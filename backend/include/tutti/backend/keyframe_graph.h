@@ -1,16 +1,18 @@
-// A pose graph of keyframes, made easy: what a SLAM pipeline needs after each accepted loop.
+// The pose graph of a map's keyframes: what a SLAM pipeline needs for each accepted loop.
 //
-//   KeyframeGraphOptions options;  options.kind = GraphKind::kSim3;                      // mono
+//   KeyframeGraphOptions options;  options.kind = GraphKind::kSim3;  // mono
 //   KeyframeGraph graph(options);
-//   for (each keyframe) graph.AddKeyframe(id, Similarity(T_world_keyframe), map_piece);  // in order of time
-//   graph.AddCovisibility(a, b);                                                         // optional
-//   graph.AddLoop(older, newer, S_older_newer, information);
-//   const KeyframeCorrection correction = graph.Optimize();
-//   odometry.ApplyCorrection(correction.S_world_keyframe);
+//   graph.Update(keyframes, covisible);                              // the map as it is now
+//   const KeyframeCorrection correction = graph.Optimize(loops);
+//   graph.Move(correction.S_world_keyframe, correction.merges);      // and so does the map
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tutti/backend/pose_graph.h"
@@ -18,67 +20,112 @@
 
 namespace tutti {
 
+/// A keyframe as the map has it now.
+struct MapKeyframe {
+  int id = -1;
+  int piece = 0;  ///< keyframes of different map pieces have no common frame of reference
+  Pose T_world_keyframe;
+};
+
+/// Two keyframes that see the same landmarks.
+struct CovisiblePair {
+  int older = -1, newer = -1;
+  int shared = 0;  ///< how many
+};
+
+/// A loop as an edge between two keyframes.
+struct LoopEdge {
+  int candidate = -1;                ///< keyframe id, the older one
+  int query = -1;                    ///< keyframe id, the newer one
+  std::int64_t candidate_frame = 0;  ///< their input frames
+  std::int64_t query_frame = 0;
+  Similarity S_candidate_query;                 ///< maps points of the query camera into the candidate camera
+  Matrix7d information = Matrix7d::Identity();  ///< of (translation, rotation, log scale)
+  double depth = 1;        ///< median scene depth in the candidate's keyframe [m, mono: map units]
+  std::size_t record = 0;  ///< the caller's number of it, e.g. of its line in a list
+};
+
 struct KeyframeGraphOptions {
   GraphKind kind = GraphKind::kSE3;        ///< kSE3: stereo, RGB-D; kSim3: mono
   PoseGraphOptions solver;                 ///< init should stay kFile: the odometry is the start
   double sigma_translation_ratio = 0.02;   ///< odometry error as a fraction of the distance moved [1]
-  double sigma_translation_floor = 0.005;  ///< and at least this [m]
+  double sigma_translation_floor = 0.002;  ///< plus this fraction of the mean distance of an edge [1]
   double sigma_rotation_rad = 0.005;       ///< odometry's rotation error per edge [rad]
   double sigma_log_scale = 0.01;           ///< mono: drift of log scale per edge [1]
+  int max_covisible = 3;                   ///< most covisibility edges of a keyframe to older ones
   KeyframeGraphOptions();
   std::string Validate() const;
-};
-
-/// What became of one loop.
-struct LoopOutcome {
-  int from = 0, to = 0;
-  double chi2_before = 0;      ///< at the odometry's poses
-  double chi2 = 0;             ///< after optimisation
-  double weight = 1;           ///< the robust loss' final weight
-  bool down_weighted = false;  ///< weight < 0.5: not believed
 };
 
 struct KeyframeCorrection {
   bool success = false;
   std::string reason;                          ///< why not
-  std::map<int, Similarity> S_world_keyframe;  ///< corrected poses of every keyframe (scale 1 unless kSim3)
-  std::vector<LoopOutcome> loops;              ///< in the order in which the loops were added
-  std::map<int, int> merges;  ///< map pieces that loops joined: piece -> smallest piece of its group
-  PoseGraphReport report;
+  std::map<int, Similarity> S_world_keyframe;  ///< of every keyframe (scale 1 unless kSim3)
+  std::map<int, int> merges;       ///< map pieces that loops joined: piece -> smallest piece of its group
+  std::vector<EdgeOutcome> loops;  ///< in their order
 };
 
+/// Nodes are keyframes; edges are consecutive keyframes, pairs that share many landmarks, and loops.
+///
+/// An odometry edge is measured from the map as it is, until a correction moves its two keyframes: from then
+/// on the old measurement stays, since the corrected poses no longer say what the odometry saw. Mono: a
+/// correction also rescales each keyframe's surroundings, so measurements are carried over to the new units
+/// (S' = scale(s_a) S scale(1/s_b) for nodes a, b with corrected scales s_a, s_b).
+///
+/// A value: a copy can be optimised on another thread while the map grows.
 class KeyframeGraph {
  public:
   /// Throws InputError if the options are not usable.
   explicit KeyframeGraph(const KeyframeGraphOptions& options = {});
 
-  /// Adds a keyframe at its present pose. A keyframe of the same map piece as the one before gets an odometry
-  /// edge from it, measured from the two present poses (S_prev_world * S_world_this). The first keyframe is
-  /// the anchor.
-  void AddKeyframe(int id, const Similarity& S_world_keyframe, int map_piece = 0);
-  /// Adds an odometry edge between two keyframes that see the same landmarks, measured from their present
-  /// poses. `confidence` scales its information (1: like an odometry edge).
-  void AddCovisibility(int older, int newer, double confidence = 1.0);
-  /// Odometry measured at an earlier time, e.g. kept from before a correction.
-  void AddOdometry(int from, int to, const Similarity& S_from_to, const Matrix7d& information);
-  /// Adds a verified loop: S_from_to maps points of keyframe `to` into keyframe `from`; 6x6 of (translation,
-  /// rotation).
-  void AddLoop(int from, int to, const Similarity& S_from_to, const Matrix6d& information,
-               double sigma_log_scale = 0.05);
+  /// The map as it is now: all keyframes, ascending by id, and which of them see the same landmarks. Two of
+  /// them get an odometry edge if they are consecutive, or of the strongest covisible pairs, and were of one
+  /// piece when the newer one was new.
+  void Update(std::vector<MapKeyframe> keyframes, const std::vector<CovisiblePair>& covisible = {});
 
-  /// Optimises a copy of the graph; the graph itself keeps its poses, so that loops can be added and the call
-  /// repeated.
-  KeyframeCorrection Optimize() const;
+  /// The graph with these loops; poses as they are in the map. Pieces that loops join are moved into the
+  /// frame of the older one.
+  PoseGraph Graph(const std::vector<LoopEdge>& loops) const;
 
-  const PoseGraph& graph() const { return graph_; }
-  /// The default odometry information for a relative pose.
-  Matrix7d OdometryInformation(const Similarity& S_from_to) const;
+  /// Optimises it. The map's poses stay, so that the call can be repeated with other loops.
+  KeyframeCorrection Optimize(const std::vector<LoopEdge>& loops) const;
+
+  /// Mahalanobis distance [1] of each entering loop from what the graph with the accepted ones knows of its
+  /// relative pose; nothing where no edges connect its ends.
+  std::vector<std::optional<double>> Distances(const std::vector<LoopEdge>& accepted,
+                                               const std::vector<LoopEdge>& entering) const;
+
+  /// To be called after Update and before the map takes these poses: keeps the measurements, in the new
+  /// units.
+  void Move(const std::map<int, Similarity>& S_world_keyframe, const std::map<int, int>& merges);
+
+  /// The map as it is says more than what was kept (a bundle adjustment of all of it): edges are measured
+  /// from it again.
+  void MeasureAgain() { kept_.clear(); }
 
  private:
+  using Pair = std::pair<int, int>;  // older, newer keyframe id
+  struct Merge {
+    int from = 0, to = 0;  // pieces
+    int newest = -1;       // keyframe when it happened
+  };
+  int PieceWhenNew(int keyframe, int newer) const;
+  bool OfOnePiece(int older, int newer) const;
+  void AddCovisible(const std::vector<CovisiblePair>& covisible);
+  std::map<int, int> Merges(const std::vector<LoopEdge>& loops) const;
+  std::map<int, Similarity> JoinedPieces(const std::vector<LoopEdge>& loops) const;
+  Similarity Measured(const Pair& pair) const;
+  const MapKeyframe& At(int id) const;
+
   KeyframeGraphOptions options_;
-  PoseGraph graph_;
-  std::map<int, int> piece_;
-  int last_id_ = -1;
+  std::vector<MapKeyframe> keyframes_;  // ascending by id
+  std::map<int, int> birth_piece_;      // by keyframe
+  std::vector<Merge> merged_;           // in order of time
+  std::map<Pair, Similarity> edges_;    // odometry's, with their measurements
+  std::map<Pair, Similarity> kept_;     // measurements from before the last correction, in present units
 };
+
+/// Carries a loop over to the units of a corrected map (mono): S' = scale(s_c) S scale(1/s_q).
+void Rescale(const std::map<int, Similarity>& S_world_keyframe, LoopEdge* loop);
 
 }  // namespace tutti

@@ -1,28 +1,17 @@
 // What became of one proposed loop, from the detector's first suspicion to its edge in the pose graph.
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
-#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "tutti/backend/pose_graph.h"
+#include "tutti/core/pose.h"
 #include "tutti/loopclosure/detector.h"
 
 namespace tutti {
-
-/// A loop as an edge between two keyframes of the odometry.
-struct LoopEdge {
-  int candidate = -1;                ///< keyframe id, the older one
-  int query = -1;                    ///< keyframe id, the newer one
-  std::int64_t candidate_frame = 0;  ///< their input frames
-  std::int64_t query_frame = 0;
-  Similarity S_candidate_query;                 ///< maps points of the query camera into the candidate camera
-  Matrix7d information = Matrix7d::Identity();  ///< of (translation, rotation, log scale)
-  double depth = 1;        ///< median scene depth in the candidate's keyframe [m, mono: map units]
-  std::size_t record = 0;  ///< index of its LoopRecord
-};
 
 /// One line of loops.csv. Only proposed loops (hypothesis from loops.propose_threshold on) get one.
 struct LoopRecord {
@@ -37,7 +26,7 @@ struct LoopRecord {
   int matches = 0, inliers = 0;
   bool verified = false;              ///< passed the detector's geometric verification
   bool accepted = false;              ///< in the pose graph in the end
-  bool injected = false;              ///< planted (run.inject_false_loops), known to be false
+  bool injected = false;              ///< not the detector's (SlamSystem::AddLoop), e.g. planted as a test
   double weight = 0;                  ///< that the pose graph last gave it, 0..1; 0: never was in it,
                                       ///< or there is none (appearance only)
   std::optional<double> gate_sigmas;  ///< Mahalanobis distance from the map (run.loop_gate_sigmas), if asked
@@ -47,5 +36,11 @@ struct LoopRecord {
   std::string reason;                 ///< why it is not accepted, in plain words
   std::optional<Similarity> S_candidate_query;  ///< the constraint, if one could be computed
 };
+
+/// How many of them are in the map.
+inline std::size_t CountAccepted(const std::vector<LoopRecord>& loops) {
+  return static_cast<std::size_t>(
+      std::count_if(loops.begin(), loops.end(), [](const LoopRecord& loop) { return loop.accepted; }));
+}
 
 }  // namespace tutti

@@ -10,7 +10,6 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,20 +22,15 @@
 
 namespace tutti {
 
-/// The pipeline. The odometry runs on the caller's thread, the loop detector on one of its own; what it finds
-/// enters the map a fixed number of frames after its keyframe (run.loop_delay_frames), so the result does not
-/// depend on the number of threads or on the machine's load. Without calibration only the detector runs
-/// (appearance only).
+/// The pipeline. The odometry runs on the caller's thread, the loop detector and the pose graph beside it;
+/// what they find enters the map a fixed number of frames after it was asked for (run.loop_delay_frames; the
+/// pose graph: by the size of the map), so the result does not depend on the number of threads or on the
+/// machine's load. Without calibration only the detector runs (appearance only).
 class SlamSystem {
  public:
   /// Throws InputError if the configuration does not fit the rig. `recorder` gets the time of each stage; it
   /// must outlive this object; null: nothing is recorded.
   SlamSystem(const RunConfig& config, const CameraRig& rig, SpanRecorder* recorder = nullptr);
-  /// Loop closure on an odometry that is complete (shared_odometry.h): Replay() takes the place of Track(),
-  /// and the loops move `tracked`, but no tracking goes on from there. `views`: the keyframes as the detector
-  /// is to see them, by id; must outlive this object.
-  SlamSystem(const RunConfig& config, const CameraRig& rig, const Odometry& tracked,
-             const std::map<int, KeyframeView>& views);
   ~SlamSystem();
   SlamSystem(const SlamSystem&) = delete;
   SlamSystem& operator=(const SlamSystem&) = delete;
@@ -46,35 +40,33 @@ class SlamSystem {
   /// Calls `listener` with each keyframe and its frame when all its landmarks are known, which is when the
   /// detector gets it; from Track() and Finish().
   void SetKeyframeListener(std::function<void(const InputFrame&, int)> listener);
+  /// Calls `listener` before loops, or a lost frame whose place the detector knew, change the odometry: what
+  /// it would do alone goes on from here (a copy of it). `last`: index of the last frame that it has seen, -1
+  /// for none. From Track() and Finish().
+  void SetChangeListener(std::function<void(const Odometry&, std::int64_t last)> listener);
 
-  /// Tracks the next frame and brings in the loops that are due. Never throws for hard images.
+  /// Tracks the next frame and brings in what is due. Never throws for hard images.
   TrackResult Track(const InputFrame& frame);
-  /// The frame that became this keyframe, again; `frames`: read when the detector got it. Only after the
-  /// constructor with a complete odometry, in the order of the keyframes.
-  void Replay(const InputFrame& frame, int keyframe, std::int64_t frames);
-  /// After the last frame: brings in the loops that are still on their way.
+  /// A loop that somebody else knows (a marker, a survey, a test) between two keyframes, the older one first:
+  /// S_candidate_query maps points of the query camera into the candidate's, `information` is of
+  /// (translation, rotation, log scale). It goes past detector and gate into the pose graph, which may refuse
+  /// it. Throws InputError without an odometry and for keyframes that are not there.
+  void AddLoop(int candidate, int query, const Similarity& S_candidate_query, const Matrix7d& information);
+  /// After the last frame: brings in all that is on its way. May be called again after AddLoop.
   void Finish();
 
   /// What went wrong without stopping it (the long-term memory's disk is full) since the last call.
   std::vector<std::string> TakeWarnings();
 
   /// True if the rig has no calibration: there are loops but no poses.
-  bool AppearanceOnly() const;
+  bool AppearanceOnly() const { return odometry() == nullptr; }
   /// The odometry with all corrections; nullptr if there are only appearances.
   const Odometry* odometry() const;
-  /// The odometry as it was before the detector first changed anything (a loop moved the map, or a lost frame
-  /// was found), to be tracked on by whoever wants to know what it would have done alone; nullptr if that
-  /// never happened.
-  Odometry* untouched();
-  /// Index of the last input frame that untouched() has seen.
-  std::int64_t UntouchedLast() const;
-
   /// Every proposed loop in the order of the queries.
   const std::vector<LoopRecord>& loops() const;
-  std::size_t LoopsAccepted() const;
   /// Lost frames that got a pose because the detector knew their place.
   std::size_t Relocalized() const;
-  /// How often the map was moved.
+  /// How often loops moved the map.
   int Corrections() const;
   /// How often the whole map was adjusted (bundle adjustment) after loops had moved it.
   int GlobalAdjustments() const;

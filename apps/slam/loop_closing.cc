@@ -1,0 +1,153 @@
+#include "apps/slam/loop_closing.h"
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include "core/stopwatch.h"
+
+namespace tutti {
+namespace {
+
+LoopDetectorOptions DetectorOptions(const RunConfig& config) {
+  LoopDetectorOptions options = config.loops;
+  options.threads = std::min(options.threads, config.run.threads);
+  return options;
+}
+
+LoopQuery Query(const InputFrame& frame) {
+  LoopQuery query;
+  query.id = frame.index;
+  query.stamp_s = frame.stamp_s;
+  query.image = frame.image;
+  query.depth_m = frame.depth_m;
+  return query;
+}
+
+}  // namespace
+
+LoopClosing::LoopClosing(const RunConfig& config, const CameraRig& rig, SpanRecorder* recorder)
+    : options_(config.run), rig_(rig), closer_(config, rig, recorder) {
+  if (config.run.loops)
+    worker_ = std::make_unique<LoopWorker>(DetectorOptions(config), config.run.threads > 1, recorder);
+}
+
+void LoopClosing::SetDetectionListener(std::function<void(const LoopResult&)> listener) {
+  on_detection_ = std::move(listener);
+}
+
+void LoopClosing::Submit(const InputFrame& frame, const KeyframeView* view, std::int64_t frames) {
+  if (keyframes_seen_++ % options_.loop_every_keyframes != 0) return;
+  if (!stamps_.empty() && frame.stamp_s - stamps_.rbegin()->second < options_.loop_min_interval_s) return;
+  LoopQuery query = Query(frame);
+  if (view != nullptr) {
+    query.camera = rig_.camera;
+    if (options_.loop_pose_prior && rig_.sensor != Sensor::kMono) {  // mono: its scale drifts
+      query.pose_prior.emplace();
+      query.pose_prior->position_m = view->T_world_camera.translation;
+      query.pose_prior->frame = view->map_piece;
+    }
+    query.features = {view->keypoints, view->descriptors, view->points};
+    keyframe_of_frame_[frame.index] = view->id;
+  }
+  stamps_[frame.index] = frame.stamp_s;
+  submitted_.push_back({frames + options_.loop_delay_frames, frame.index});
+  const internal::Stopwatch watch;
+  worker_->Submit(std::move(query));
+  if (options_.threads == 1) stages_["loop_inline"] += watch.Milliseconds();
+}
+
+int LoopClosing::Locate(const InputFrame& frame) {
+  if (!worker_ || keyframe_of_frame_.empty()) return -1;
+  LoopQuery query = Query(frame);
+  query.camera = rig_.camera;
+  const LoopResult found = worker_->Locate(query);
+  return found.accepted ? KeyframeOf(found.candidate) : -1;
+}
+
+std::optional<LoopUpdate> LoopClosing::Due(const Odometry* odometry, std::int64_t frames) {
+  std::optional<LoopUpdate> update;
+  if (odometry != nullptr) update = closer_.Solved(*odometry, frames);
+  if (!update && !submitted_.empty() && submitted_.front().due <= frames) update = Deliver(odometry, frames);
+  if (!update && odometry != nullptr) update = closer_.Adjusted(*odometry, frames);
+  if (update) TellRevoked(*update);
+  return update;
+}
+
+std::optional<LoopUpdate> LoopClosing::Rest(const Odometry* odometry, std::int64_t frames) {
+  constexpr std::int64_t kAll = std::numeric_limits<std::int64_t>::max();
+  std::optional<LoopUpdate> update;
+  if (odometry != nullptr) update = closer_.Solved(*odometry, kAll);
+  if (!update && !submitted_.empty()) update = Deliver(odometry, frames);
+  if (!update && odometry != nullptr && closer_.CloseDeferred(*odometry, frames)) update.emplace();
+  if (!update && odometry != nullptr) update = closer_.Adjusted(*odometry, kAll);
+  if (update) TellRevoked(*update);
+  if (!update) closer_.Finish();
+  return update;
+}
+
+// What the map contradicts is no loop for the detector's filter either.
+void LoopClosing::TellRevoked(const LoopUpdate& update) {
+  for (const std::size_t record : update.revoked) {
+    const LoopRecord& loop = closer_.records()[record];
+    if (worker_) worker_->Unlink(loop.query, loop.candidate);
+  }
+}
+
+LoopRecord LoopClosing::Record(const LoopResult& r) const {
+  const auto stamp = [&](std::int64_t frame) { return stamps_.count(frame) != 0 ? stamps_.at(frame) : 0.0; };
+  LoopRecord record;
+  record.query = r.query;
+  record.candidate = r.candidate;
+  record.query_stamp_s = stamp(record.query);
+  record.candidate_stamp_s = stamp(record.candidate);
+  record.members = r.members;
+  record.hypothesis = r.hypothesis;
+  record.posterior = r.posterior;
+  record.probability = r.probability;
+  record.matches = r.verification.matches;
+  record.inliers = r.verification.inliers;
+  record.verified = r.accepted;
+  record.reason = r.reason.empty() && !r.accepted ? r.verification.reason : r.reason;
+  return record;
+}
+
+// Takes the oldest answer.
+LoopUpdate LoopClosing::Deliver(const Odometry* odometry, std::int64_t frames) {
+  submitted_.pop_front();
+  const LoopResult result = worker_->Take();
+  if (on_detection_) on_detection_(result);
+  for (const auto& [name, ms] : LoopStages(result)) stages_[std::string("loop_") + name] += ms;
+  if (!result.warning.empty() && result.warning != last_warning_) {
+    last_warning_ = result.warning;
+    warnings_.push_back(result.warning);
+  }
+  if (!result.proposed) return {};
+  LoopRecord record = Record(result);
+  if (odometry != nullptr) {
+    const bool old_enough = record.query_stamp_s - record.candidate_stamp_s >= options_.loop_min_age_s;
+    if (on_measure_ && record.verified && old_enough) on_measure_();
+    return closer_.Consider(record, result.verification, KeyframeOf(record.candidate),
+                            KeyframeOf(record.query), *odometry, frames);
+  }
+  record.accepted = record.verified;
+  closer_.List(record);
+  return {};
+}
+
+// -1 if the detector does not know the frame.
+int LoopClosing::KeyframeOf(std::int64_t frame) const {
+  const auto keyframe = keyframe_of_frame_.find(frame);
+  return keyframe != keyframe_of_frame_.end() ? keyframe->second : -1;
+}
+
+std::vector<std::string> LoopClosing::TakeWarnings() { return std::exchange(warnings_, {}); }
+
+std::map<std::string, double> LoopClosing::StageMilliseconds() const {
+  std::map<std::string, double> stages = stages_;
+  for (const auto& [name, ms] : closer_.StageMilliseconds()) stages[name] = ms;
+  if (worker_) stages["loop_wait"] = worker_->WaitedMs();
+  return stages;
+}
+
+}  // namespace tutti

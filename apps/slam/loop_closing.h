@@ -1,0 +1,95 @@
+// The half of SLAM that finds loops and closes them, for an odometry that somebody else runs.
+//
+//   while (auto update = loops.Due(odometry, frames)) {    // before each frame
+//     if (update->correction) loops.Applied(*update, Apply(*update->correction, &odometry), odometry,
+//     frames);
+//   }
+//   loops.Submit(frame, &view, frames);                    // after it, for each keyframe
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "apps/slam/loop_closer.h"
+#include "apps/slam/loop_worker.h"
+
+namespace tutti {
+
+/// Detector and LoopCloser: keyframes go in, and what they do to the map comes out a fixed number of frames
+/// later. `odometry`: null without calibration (loops between appearances alone), else always the same.
+/// `frames`: number of frames so far.
+class LoopClosing {
+ public:
+  /// `recorder` may be null.
+  LoopClosing(const RunConfig& config, const CameraRig& rig, SpanRecorder* recorder);
+
+  /// Calls `listener` with each answer of the detector before it is considered.
+  void SetDetectionListener(std::function<void(const LoopResult&)> listener);
+
+  /// Calls `listener` before a verified loop is measured against the map.
+  void SetMeasureListener(std::function<void()> listener) { on_measure_ = std::move(listener); }
+
+  /// True if loops are searched for (run.loops).
+  bool Searching() const { return worker_ != nullptr; }
+  /// A new keyframe as the map has it, null: an image without a pose. Those that come too soon after the one
+  /// before (loop_every_keyframes, loop_min_interval_s) are not searched.
+  void Submit(const InputFrame& frame, const KeyframeView* view, std::int64_t frames);
+  /// The keyframe that shows the place of a lost frame; -1 if none is known.
+  int Locate(const InputFrame& frame);
+  /// A loop from elsewhere (LoopCloser::Add).
+  void Add(int candidate, int query, const Similarity& S_candidate_query, const Matrix7d& information,
+           const Odometry& odometry, std::int64_t frames) {
+    closer_.Add(candidate, query, S_candidate_query, information, odometry, frames);
+  }
+
+  /// True if Due may move the map: mapping that is under way should be brought in first.
+  bool MayMove(std::int64_t frames) const { return closer_.MayMove(frames); }
+  /// The next thing that is due; nothing if all is in. A correction is to be applied before the next call.
+  std::optional<LoopUpdate> Due(const Odometry* odometry, std::int64_t frames);
+  /// The same after the last frame, for all that is on its way.
+  std::optional<LoopUpdate> Rest(const Odometry* odometry, std::int64_t frames);
+  /// To be called when a correction has been applied. `common`: what Apply() returned.
+  void Applied(const LoopUpdate& update, const std::vector<int>& common, const Odometry& odometry,
+               std::int64_t frames) {
+    closer_.Applied(update, common, odometry, frames);
+  }
+
+  const LoopCloser& closer() const { return closer_; }
+  /// What went wrong without stopping it since the last call.
+  std::vector<std::string> TakeWarnings();
+  /// Milliseconds spent, summed, by stage.
+  std::map<std::string, double> StageMilliseconds() const;
+
+ private:
+  struct Submission {
+    std::int64_t due = 0;  // number of frames after which its answer enters
+    std::int64_t frame = 0;
+  };
+  LoopUpdate Deliver(const Odometry* odometry, std::int64_t frames);
+  void TellRevoked(const LoopUpdate& update);
+  LoopRecord Record(const LoopResult& result) const;
+  int KeyframeOf(std::int64_t frame) const;
+
+  SlamOptions options_;
+  CameraRig rig_;
+  LoopCloser closer_;
+  std::unique_ptr<LoopWorker> worker_;                   // null: no loops
+  std::function<void(const LoopResult&)> on_detection_;  // may be empty
+  std::function<void()> on_measure_;                     // may be empty
+  std::deque<Submission> submitted_;
+  std::map<std::int64_t, int> keyframe_of_frame_;  // of the frames that the detector knows
+  std::map<std::int64_t, double> stamps_;          // the same
+  std::int64_t keyframes_seen_ = 0;
+  std::vector<std::string> warnings_;  // not taken yet
+  std::string last_warning_;
+  std::map<std::string, double> stages_;
+};
+
+}  // namespace tutti

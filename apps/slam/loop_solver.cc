@@ -1,0 +1,120 @@
+#include "apps/slam/loop_solver.h"
+
+#include <cmath>
+#include <cstdio>
+
+#include "core/stopwatch.h"
+
+namespace tutti {
+namespace {
+
+constexpr double kDegrees = 57.29577951308232;
+
+std::string BeyondGate(double sigmas, double limit) {
+  char text[120];
+  std::snprintf(text, sizeof text, "the map can't be that far off: Mahalanobis distance %.1f, limit %.1f",
+                sigmas, limit);
+  return text;
+}
+
+std::string Contradiction(const Disagreement& d) {
+  char text[160];
+  std::snprintf(text, sizeof text,
+                "contradicts the map: off by %.0f %% of the scene depth and %.1f deg after optimisation",
+                100 * d.fraction, d.angle_deg);
+  return text;
+}
+
+// Loops that the map can't have drifted to by what it knows of its own uncertainty.
+void Gate(const KeyframeGraph& graph, const std::vector<LoopEdge>& accepted,
+          const std::vector<LoopEdge>& entering, double limit, std::vector<LoopVerdict>* verdicts) {
+  const std::vector<std::optional<double>> distances = graph.Distances(accepted, entering);
+  for (std::size_t i = 0; i < entering.size(); ++i) {
+    LoopVerdict& verdict = (*verdicts)[i];
+    verdict.gate_sigmas = distances[i];
+    if (!distances[i] || *distances[i] <= limit) continue;
+    verdict.reason = BeyondGate(*distances[i], limit);
+    verdict.contradicted = true;
+  }
+}
+
+// Of a loop after the optimisation.
+Disagreement Residual(const LoopEdge& loop, const std::map<int, Similarity>& poses) {
+  const Similarity &c = poses.at(loop.candidate), &q = poses.at(loop.query);
+  const Similarity E = loop.S_candidate_query * q.Inverse() * c;  // in the candidate's units, as depth is
+  return Measure(E, loop.depth);
+}
+
+// Judges the loops that are in by the optimised graph; true if all may stay.
+bool Judge(const KeyframeCorrection& correction, const std::vector<LoopEdge>& accepted,
+           const SlamOptions& options, std::vector<LoopVerdict>* verdicts) {
+  bool old_broken = false;
+  for (const LoopEdge& loop : accepted)
+    old_broken = old_broken || Contradicts(Residual(loop, correction.S_world_keyframe), options);
+  bool all_stay = true;
+  std::size_t e = accepted.size();
+  for (LoopVerdict& verdict : *verdicts) {
+    if (!verdict.reason.empty()) continue;
+    verdict.weight = correction.loops[e++].weight;
+    const Disagreement d = Residual(verdict.loop, correction.S_world_keyframe);
+    if (!old_broken && !Contradicts(d, options)) continue;
+    verdict.reason = old_broken ? "contradicts loops that were accepted before" : Contradiction(d);
+    verdict.contradicted = true;
+    all_stay = false;
+  }
+  return all_stay;
+}
+
+}  // namespace
+
+Disagreement Measure(const Similarity& E, double depth) {
+  Disagreement d;
+  d.fraction = E.translation.norm() / depth;
+  d.angle_deg = LogSO3(E.rotation).norm() * kDegrees;
+  d.log_scale = std::abs(std::log(E.scale));
+  return d;
+}
+
+bool Contradicts(const Disagreement& d, const SlamOptions& options) {
+  return d.fraction > options.loop_after_fraction || d.angle_deg > options.loop_after_deg;
+}
+
+LoopSolution SolveLoops(const KeyframeGraph& graph, const std::vector<LoopEdge>& accepted,
+                        const std::vector<LoopEdge>& entering, const SlamOptions& options) {
+  const internal::Stopwatch watch;
+  LoopSolution out;
+  for (const LoopEdge& loop : entering) out.verdicts.push_back({loop, "", false, 0, std::nullopt});
+  if (options.loop_gate_sigmas > 0) Gate(graph, accepted, entering, options.loop_gate_sigmas, &out.verdicts);
+  while (!out.moves) {
+    std::vector<LoopEdge> loops = accepted;
+    for (const LoopVerdict& verdict : out.verdicts) {
+      if (verdict.reason.empty()) loops.push_back(verdict.loop);
+    }
+    if (loops.size() == accepted.size()) break;
+    out.correction = graph.Optimize(loops);
+    if (out.correction.success) {
+      out.moves = Judge(out.correction, accepted, options, &out.verdicts);
+      continue;
+    }
+    for (LoopVerdict& verdict : out.verdicts) {
+      if (verdict.reason.empty())
+        verdict.reason = "the pose graph could not be solved: " + out.correction.reason;
+    }
+  }
+  out.time_ms = watch.Milliseconds();
+  return out;
+}
+
+void BackgroundLoopSolver::Start(const KeyframeGraph& graph, const std::vector<LoopEdge>& accepted,
+                                 const std::vector<LoopEdge>& entering, const SlamOptions& options,
+                                 SpanRecorder* recorder) {
+  const auto work = [recorder](const KeyframeGraph& g, const std::vector<LoopEdge>& old,
+                               const std::vector<LoopEdge>& fresh, const SlamOptions& o) {
+    const ScopedSpan span(recorder, Lane::kOptimisation, "close_loop");
+    return SolveLoops(g, old, fresh, o);
+  };
+  const auto launch = options.threads > 1 ? std::launch::async : std::launch::deferred;
+  solution_ = std::async(launch, work, graph, accepted, entering, options);
+}
+
+}  // namespace tutti

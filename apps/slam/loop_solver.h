@@ -1,0 +1,60 @@
+// Which loops the pose graph believes, and where it puts the keyframes then.
+#pragma once
+
+#include <future>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tutti/backend/keyframe_graph.h"
+#include "tutti/core/span_recorder.h"
+#include "tutti/slam/slam_options.h"
+
+namespace tutti {
+
+/// How far two transforms disagree: E maps a keyframe's camera onto itself and should be the identity.
+struct Disagreement {
+  double fraction = 0;   ///< translation as a share of the median scene depth
+  double angle_deg = 0;  ///< rotation [deg]
+  double log_scale = 0;  ///< |log(scale)|
+};
+Disagreement Measure(const Similarity& E, double depth);
+/// Too much for a loop that belongs to an optimised map (loop_after_fraction, loop_after_deg).
+bool Contradicts(const Disagreement& d, const SlamOptions& options);
+
+/// What became of an entering loop.
+struct LoopVerdict {
+  LoopEdge loop;
+  std::string reason;                 ///< why it stays out; empty: it is in
+  bool contradicted = false;          ///< by the map or the other loops, not for want of a solution
+  double weight = 0;                  ///< that the robust loss last gave it
+  std::optional<double> gate_sigmas;  ///< Mahalanobis distance from the map, if asked for
+};
+
+struct LoopSolution {
+  std::vector<LoopVerdict> verdicts;  ///< of the entering loops
+  bool moves = false;                 ///< some of them are in, and the map is to move
+  KeyframeCorrection correction;      ///< if it moves; loops: the accepted ones, then those that are in
+  double time_ms = 0;
+};
+
+/// Optimises with the entering loops; those that the map can't have drifted to (loop_gate_sigmas) or that the
+/// rest contradicts leave again, and it is done again without them. `graph`: of the map as it is.
+LoopSolution SolveLoops(const KeyframeGraph& graph, const std::vector<LoopEdge>& accepted,
+                        const std::vector<LoopEdge>& entering, const SlamOptions& options);
+
+/// The same beside the tracking, one at a time.
+class BackgroundLoopSolver {
+ public:
+  bool Running() const { return solution_.valid(); }
+  /// On a thread of its own, or put off until Take(); with the same result. `recorder` may be null.
+  void Start(const KeyframeGraph& graph, const std::vector<LoopEdge>& accepted,
+             const std::vector<LoopEdge>& entering, const SlamOptions& options, SpanRecorder* recorder);
+  /// Waits for it. Nothing is running then.
+  LoopSolution Take() { return solution_.get(); }
+
+ private:
+  std::future<LoopSolution> solution_;
+};
+
+}  // namespace tutti

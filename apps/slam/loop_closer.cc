@@ -23,14 +23,18 @@ KeyframeGraphOptions GraphOptions(const RunConfig& config, Sensor sensor) {
   return options;
 }
 
-void UpdateGraph(const Odometry& odometry, int min_shared, KeyframeGraph* graph) {
+std::vector<MapKeyframe> KeyframesOf(const Odometry& odometry) {
   std::vector<MapKeyframe> keyframes;
   for (const int id : odometry.KeyframeIds())
     keyframes.push_back({id, odometry.KeyframePiece(id), odometry.KeyframePose(id)});
+  return keyframes;
+}
+
+std::vector<CovisiblePair> CovisibleOf(const Odometry& odometry, int min_shared) {
   std::vector<CovisiblePair> covisible;
   for (const auto& [pair, shared] : odometry.Covisibility(min_shared))
     covisible.push_back({pair.first, pair.second, shared});
-  graph->Update(std::move(keyframes), covisible);
+  return covisible;
 }
 
 LoopGate::Map Places(const Odometry& odometry) {
@@ -51,7 +55,7 @@ LoopCloser::LoopCloser(const RunConfig& config, const CameraRig& rig, SpanRecord
 
 PoseGraph LoopCloser::Graph(const Odometry& odometry) const {
   KeyframeGraph graph = graph_;
-  UpdateGraph(odometry, options_.covisibility_min_shared, &graph);
+  graph.Update(KeyframesOf(odometry), CovisibleOf(odometry, options_.covisibility_min_shared));
   return graph.Graph(accepted_);
 }
 
@@ -146,11 +150,10 @@ void LoopCloser::Start(std::vector<LoopEdge> entering, const Odometry& odometry,
   }
   const ScopedSpan span(recorder_, Lane::kOptimisation, "begin_closing");
   const internal::Stopwatch watch;
-  UpdateGraph(odometry, options_.covisibility_min_shared, &graph_);
+  solved_keyframes_ = KeyframesOf(odometry);
+  graph_.Update(solved_keyframes_, CovisibleOf(odometry, options_.covisibility_min_shared));
   solver_.Start(graph_, accepted_, entering, options_, recorder_);
-  T_world_solved_.clear();
-  for (const int id : odometry.KeyframeIds()) T_world_solved_[id] = odometry.KeyframePose(id);
-  solved_due_ = frames;
+  solved_due_ = frames + SolutionFrames(solved_keyframes_.size());
   stages_["loop_optimize"] += watch.Milliseconds();
 }
 
@@ -196,28 +199,13 @@ void LoopCloser::Revoke(std::size_t record, LoopUpdate* update) {
   update->revoked.push_back(record);
 }
 
-// The keyframes as they are now, moved as the solution moves those that it knew.
 MapCorrection LoopCloser::MoveBy(const KeyframeCorrection& solved, const Odometry& odometry) {
   MapCorrection correction;
-  std::map<int, Similarity> last;  // motion of the newest keyframe of each map piece
-  for (const int id : odometry.KeyframeIds()) {
-    const Pose now = odometry.KeyframePose(id);
-    const int piece = odometry.KeyframePiece(id);
-    const auto known = solved.S_world_keyframe.find(id);
-    Similarity& S = correction.S_world_keyframe[id];
-    if (known == solved.S_world_keyframe.end()) {
-      S = last[piece] * Similarity(now);
-      continue;
-    }
-    const Pose& before = T_world_solved_.at(id);
-    last[piece] = known->second * Similarity(before).Inverse();
-    const bool stayed =
-        now.rotation.coeffs() == before.rotation.coeffs() && now.translation == before.translation;
-    S = stayed ? known->second : last[piece] * Similarity(now);
-  }
+  const std::vector<MapKeyframe> now = KeyframesOf(odometry);
+  correction.S_world_keyframe = Follow(solved, solved_keyframes_, now);
   correction.merges = solved.merges;
   ++corrections_;
-  UpdateGraph(odometry, options_.covisibility_min_shared, &graph_);
+  graph_.Update(now, CovisibleOf(odometry, options_.covisibility_min_shared));
   graph_.Move(correction.S_world_keyframe, correction.merges);
   Rescale(correction.S_world_keyframe);
   if (options_.global_adjustment) {

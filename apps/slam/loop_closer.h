@@ -92,9 +92,9 @@ class LoopCloser {
   std::vector<LoopEdge> queued_;    // agreed while the pose graph was being solved
   std::set<std::size_t> untied_;    // records of loops that landmarks do not hold together yet
   BackgroundLoopSolver solver_;
-  std::int64_t solved_due_ = 0;         // number of frames
-  std::map<int, Pose> T_world_solved_;  // keyframes as they were when solving began
-  std::optional<int> adjust_piece_;     // map piece to be adjusted once the correction was applied
+  std::int64_t solved_due_ = 0;                // number of frames
+  std::vector<MapKeyframe> solved_keyframes_;  // the map as it was when solving began
+  std::optional<int> adjust_piece_;            // map piece to be adjusted once the correction was applied
   GlobalAdjuster adjuster_;
   int corrections_ = 0;
   int adjustments_ = 0;  // of the whole map

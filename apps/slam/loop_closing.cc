@@ -125,8 +125,6 @@ LoopUpdate LoopClosing::Deliver(const Odometry* odometry, std::int64_t frames) {
   if (!result.proposed) return {};
   LoopRecord record = Record(result);
   if (odometry != nullptr) {
-    const bool old_enough = record.query_stamp_s - record.candidate_stamp_s >= options_.loop_min_age_s;
-    if (on_measure_ && record.verified && old_enough) on_measure_();
     return closer_.Consider(record, result.verification, KeyframeOf(record.candidate),
                             KeyframeOf(record.query), *odometry, frames);
   }

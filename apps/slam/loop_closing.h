@@ -14,7 +14,6 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "apps/slam/loop_closer.h"
@@ -32,9 +31,6 @@ class LoopClosing {
 
   /// Calls `listener` with each answer of the detector before it is considered.
   void SetDetectionListener(std::function<void(const LoopResult&)> listener);
-
-  /// Calls `listener` before a verified loop is measured against the map.
-  void SetMeasureListener(std::function<void()> listener) { on_measure_ = std::move(listener); }
 
   /// True if loops are searched for (run.loops).
   bool Searching() const { return worker_ != nullptr; }
@@ -82,7 +78,6 @@ class LoopClosing {
   LoopCloser closer_;
   std::unique_ptr<LoopWorker> worker_;                   // null: no loops
   std::function<void(const LoopResult&)> on_detection_;  // may be empty
-  std::function<void()> on_measure_;                     // may be empty
   std::deque<Submission> submitted_;
   std::map<std::int64_t, int> keyframe_of_frame_;  // of the frames that the detector knows
   std::map<std::int64_t, double> stamps_;          // the same

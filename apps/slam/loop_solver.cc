@@ -105,6 +105,33 @@ LoopSolution SolveLoops(const KeyframeGraph& graph, const std::vector<LoopEdge>&
   return out;
 }
 
+std::map<int, Similarity> Follow(const KeyframeCorrection& solved, const std::vector<MapKeyframe>& then,
+                                 const std::vector<MapKeyframe>& now) {
+  std::map<int, Similarity> out;
+  std::map<int, Similarity> newest;  // motion of the newest known keyframe, by map piece
+  auto before = then.begin();
+  for (const MapKeyframe& keyframe : now) {
+    const Similarity S_now(keyframe.T_world_keyframe);
+    while (before != then.end() && before->id < keyframe.id) ++before;
+    if (before == then.end() || before->id != keyframe.id) {
+      out[keyframe.id] = newest[keyframe.piece] * S_now;
+      continue;
+    }
+    const Pose& old = before->T_world_keyframe;
+    const Similarity& found = solved.S_world_keyframe.at(keyframe.id);
+    newest[keyframe.piece] = found * Similarity(old).Inverse();
+    const bool stayed = old.translation == keyframe.T_world_keyframe.translation &&
+                        old.rotation.coeffs() == keyframe.T_world_keyframe.rotation.coeffs();
+    out[keyframe.id] = stayed ? found : newest[keyframe.piece] * S_now;
+  }
+  return out;
+}
+
+std::int64_t SolutionFrames(std::size_t keyframes) {
+  constexpr std::int64_t kLeast = 5, kKeyframesPerFrame = 100;
+  return kLeast + static_cast<std::int64_t>(keyframes) / kKeyframesPerFrame;
+}
+
 void BackgroundLoopSolver::Start(const KeyframeGraph& graph, const std::vector<LoopEdge>& accepted,
                                  const std::vector<LoopEdge>& entering, const SlamOptions& options,
                                  SpanRecorder* recorder) {

@@ -1,7 +1,9 @@
 // Which loops the pose graph believes, and where it puts the keyframes then.
 #pragma once
 
+#include <cstdint>
 #include <future>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -42,6 +44,15 @@ struct LoopSolution {
 /// rest contradicts leave again, and it is done again without them. `graph`: of the map as it is.
 LoopSolution SolveLoops(const KeyframeGraph& graph, const std::vector<LoopEdge>& accepted,
                         const std::vector<LoopEdge>& entering, const SlamOptions& options);
+
+/// The map as it is now (`now`), moved as the solution moves the map that it was made from (`then`): what
+/// mapping has found since stays, and keyframes that came since follow the newest one of their map piece.
+std::map<int, Similarity> Follow(const KeyframeCorrection& solved, const std::vector<MapKeyframe>& then,
+                                 const std::vector<MapKeyframe>& now);
+
+/// Frames from the begin of a solution until it enters: far more than Ceres takes for so many keyframes
+/// (docs/backend.md), so that nobody waits for it.
+std::int64_t SolutionFrames(std::size_t keyframes);
 
 /// The same beside the tracking, one at a time.
 class BackgroundLoopSolver {

@@ -16,10 +16,6 @@ class SlamSystem::Impl {
   Impl(const RunConfig& config, const CameraRig& rig, SpanRecorder* recorder)
       : loops_(config, rig, recorder) {
     if (!rig.calibrated) return;
-    loops_.SetMeasureListener([this] {
-      Announce();
-      odometry_->FinishMapping();
-    });
     odometry_.emplace(config.odometry, rig);
     odometry_->SetRecorder(recorder);
     odometry_->UseOwnThreads(config.run.threads > 1);

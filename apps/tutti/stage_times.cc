@@ -11,7 +11,7 @@ constexpr std::array kOrder = {"read",         "odometry_extract",  "odometry_in
                                "odometry_map", "odometry_local_ba", "odometry_relocalize", "relocalize",
                                "loop_extract", "loop_quantise",     "loop_likelihood",     "loop_filter",
                                "loop_verify",  "loop_memory",       "loop_measure",        "loop_optimize",
-                               "loop_fuse",    "global_adjustment"};
+                               "loop_solve",   "loop_fuse",         "global_adjustment"};
 // What a thread spends in these, others work in: it is no work of its own.
 constexpr std::array kWaiting = {"read_wait", "loop_wait", "loop_inline"};
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
+#include <utility>
 
 #include "tutti/backend/graph_covariance.h"
 #include "tutti/core/error.h"
@@ -18,6 +20,22 @@ Similarity Rescaled(const Similarity& s, double scale_a, double scale_b) {
 double ScaleOf(const std::map<int, Similarity>& poses, int id) {
   const auto found = poses.find(id);
   return found == poses.end() ? 1.0 : found->second.scale;
+}
+
+// The element with this id of a vector that ascends by id; nearly always ids have no gaps.
+template <typename T>
+const T* Find(const std::vector<T>& sorted, int id) {
+  if (sorted.empty() || id < sorted.front().id) return nullptr;
+  const auto guess = static_cast<std::size_t>(id - sorted.front().id);
+  if (guess < sorted.size() && sorted[guess].id == id) return &sorted[guess];
+  const auto at =
+      std::lower_bound(sorted.begin(), sorted.end(), id, [](const T& a, int value) { return a.id < value; });
+  return at != sorted.end() && at->id == id ? &*at : nullptr;
+}
+
+template <typename E>
+bool Before(const E& a, const E& b) {
+  return std::pair(a.older, a.newer) < std::pair(b.older, b.newer);
 }
 
 }  // namespace
@@ -57,32 +75,33 @@ KeyframeGraph::KeyframeGraph(const KeyframeGraphOptions& options) : options_(opt
 }
 
 const MapKeyframe& KeyframeGraph::At(int id) const {
-  const auto at = std::lower_bound(keyframes_.begin(), keyframes_.end(), id,
-                                   [](const MapKeyframe& k, int value) { return k.id < value; });
-  if (at == keyframes_.end() || at->id != id)
-    throw InputError("keyframe graph: there is no keyframe " + std::to_string(id));
-  return *at;
+  const MapKeyframe* keyframe = Find(keyframes_, id);
+  if (keyframe == nullptr) throw InputError("keyframe graph: there is no keyframe " + std::to_string(id));
+  return *keyframe;
 }
 
-// The piece that `keyframe` was of when `newer` was new.
-int KeyframeGraph::PieceWhenNew(int keyframe, int newer) const {
-  int piece = birth_piece_.at(keyframe);
-  for (const Merge& merge : merged_) {
-    if (merge.newest >= keyframe && merge.newest < newer && merge.from == piece) piece = merge.to;
-  }
-  return piece;
-}
-
+// When the newer one was new; pieces may have been joined since.
 bool KeyframeGraph::OfOnePiece(int older, int newer) const {
-  return PieceWhenNew(older, newer) == birth_piece_.at(newer);
+  const Birth *a = Find(births_, older), *b = Find(births_, newer);
+  if (a == nullptr || b == nullptr) return false;
+  int piece = a->piece;
+  for (const Merge& merge : merged_) {
+    if (merge.newest >= older && merge.newest < newer && merge.from == piece) piece = merge.to;
+  }
+  return piece == b->piece;
+}
+
+const KeyframeGraph::Edge* KeyframeGraph::Kept(int older, int newer) const {
+  const Edge wanted{older, newer, {}};
+  const auto at = std::lower_bound(kept_.begin(), kept_.end(), wanted, Before<Edge>);
+  return at != kept_.end() && at->older == older && at->newer == newer ? &*at : nullptr;
 }
 
 // Kept from before a correction, or as the map is.
-Similarity KeyframeGraph::Measured(const Pair& pair) const {
-  const auto kept = kept_.find(pair);
-  return kept != kept_.end()
-             ? kept->second
-             : Similarity(At(pair.first).T_world_keyframe.Inverse() * At(pair.second).T_world_keyframe);
+Similarity KeyframeGraph::Measured(int older, int newer) const {
+  const Edge* kept = Kept(older, newer);
+  return kept != nullptr ? kept->S_older_newer
+                         : Similarity(At(older).T_world_keyframe.Inverse() * At(newer).T_world_keyframe);
 }
 
 void KeyframeGraph::Update(std::vector<MapKeyframe> keyframes, const std::vector<CovisiblePair>& covisible) {
@@ -90,35 +109,42 @@ void KeyframeGraph::Update(std::vector<MapKeyframe> keyframes, const std::vector
   if (std::adjacent_find(keyframes.begin(), keyframes.end(), ascending) != keyframes.end())
     throw InputError("keyframe graph: keyframes must come in ascending order of their ids");
   keyframes_ = std::move(keyframes);
-  edges_.clear();
-  for (std::size_t i = 0; i < keyframes_.size(); ++i) {
-    birth_piece_.emplace(keyframes_[i].id, keyframes_[i].piece);
-    if (i == 0 || !OfOnePiece(keyframes_[i - 1].id, keyframes_[i].id)) continue;
-    const Pair pair(keyframes_[i - 1].id, keyframes_[i].id);
-    edges_[pair] = Measured(pair);
+  for (const MapKeyframe& keyframe : keyframes_) {
+    if (births_.empty() || births_.back().id < keyframe.id) births_.push_back({keyframe.id, keyframe.piece});
   }
-  AddCovisible(covisible);
+  edges_.clear();
+  for (std::size_t i = 1; i < keyframes_.size(); ++i) {
+    const int older = keyframes_[i - 1].id, newer = keyframes_[i].id;
+    if (OfOnePiece(older, newer)) edges_.push_back({older, newer, {}});
+  }
+  for (const CovisiblePair& c : Strongest(covisible)) edges_.push_back({c.older, c.newer, {}});
+  std::sort(edges_.begin(), edges_.end(), Before<Edge>);
+  for (Edge& edge : edges_) edge.S_older_newer = Measured(edge.older, edge.newer);
 }
 
-// The strongest few of each keyframe: more would count the same landmarks again and again.
-void KeyframeGraph::AddCovisible(const std::vector<CovisiblePair>& covisible) {
-  std::map<int, std::vector<std::pair<int, int>>> older_of;  // newer id -> (-shared, older id)
+// The strongest few of each keyframe, without those that are consecutive: more would count the same landmarks
+// again and again.
+std::vector<CovisiblePair> KeyframeGraph::Strongest(const std::vector<CovisiblePair>& covisible) const {
+  std::vector<CovisiblePair> candidates;
   for (const CovisiblePair& c : covisible) {
-    const Pair pair(c.older, c.newer);
     // Keyframes that a loop brought together see common landmarks too; that is the loop's edge, not the
     // odometry's.
-    const bool recent = kept_.count(pair) != 0 || kept_.empty() || c.newer - c.older < kRecentKeyframes;
-    if (recent && OfOnePiece(c.older, c.newer) && edges_.count(pair) == 0)
-      older_of[c.newer].emplace_back(-c.shared, c.older);
+    const bool recent =
+        kept_.empty() || c.newer - c.older < kRecentKeyframes || Kept(c.older, c.newer) != nullptr;
+    const MapKeyframe* older = Find(keyframes_, c.older);
+    const bool next = older != nullptr && older != &keyframes_.back() && (older + 1)->id == c.newer;
+    if (recent && !next && OfOnePiece(c.older, c.newer)) candidates.push_back(c);
   }
-  for (auto& [newer, candidates] : older_of) {
-    std::sort(candidates.begin(), candidates.end());
-    const std::size_t count = std::min(candidates.size(), static_cast<std::size_t>(options_.max_covisible));
-    for (std::size_t i = 0; i < count; ++i) {
-      const Pair pair(candidates[i].second, newer);
-      edges_[pair] = Measured(pair);
-    }
+  std::sort(candidates.begin(), candidates.end(), [](const CovisiblePair& a, const CovisiblePair& b) {
+    return std::tuple(a.newer, -a.shared, a.older) < std::tuple(b.newer, -b.shared, b.older);
+  });
+  std::vector<CovisiblePair> strongest;
+  int of_this = 0;
+  for (const CovisiblePair& c : candidates) {
+    of_this = strongest.empty() || strongest.back().newer != c.newer ? 0 : of_this;
+    if (of_this++ < options_.max_covisible) strongest.push_back(c);
   }
+  return strongest;
 }
 
 std::map<int, int> KeyframeGraph::Merges(const std::vector<LoopEdge>& loops) const {
@@ -170,12 +196,12 @@ PoseGraph KeyframeGraph::Graph(const std::vector<LoopEdge>& loops) const {
     graph.AddNode(keyframe.id, pose);
   }
   double mean_length = 0;
-  for (const auto& [pair, measurement] : edges_) mean_length += measurement.translation.norm();
+  for (const Edge& edge : edges_) mean_length += edge.S_older_newer.translation.norm();
   mean_length /= std::max<double>(1, static_cast<double>(edges_.size()));
   const double floor = options_.sigma_translation_floor * mean_length + 1e-6;
-  for (const auto& [pair, measurement] : edges_) {
-    const double sigma = options_.sigma_translation_ratio * measurement.translation.norm() + floor;
-    graph.AddOdometry(pair.first, pair.second, measurement,
+  for (const Edge& edge : edges_) {
+    const double sigma = options_.sigma_translation_ratio * edge.S_older_newer.translation.norm() + floor;
+    graph.AddOdometry(edge.older, edge.newer, edge.S_older_newer,
                       MakeInformation(sigma, options_.sigma_rotation_rad, options_.sigma_log_scale));
   }
   for (const LoopEdge& loop : loops)
@@ -214,9 +240,9 @@ std::vector<std::optional<double>> KeyframeGraph::Distances(const std::vector<Lo
 
 void KeyframeGraph::Move(const std::map<int, Similarity>& S_world_keyframe,
                          const std::map<int, int>& merges) {
-  for (auto& [pair, measurement] : edges_) {
-    measurement =
-        Rescaled(measurement, ScaleOf(S_world_keyframe, pair.first), ScaleOf(S_world_keyframe, pair.second));
+  for (Edge& edge : edges_) {
+    edge.S_older_newer = Rescaled(edge.S_older_newer, ScaleOf(S_world_keyframe, edge.older),
+                                  ScaleOf(S_world_keyframe, edge.newer));
   }
   kept_ = edges_;
   for (const auto& [from, to] : merges) {

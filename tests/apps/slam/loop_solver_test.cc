@@ -84,6 +84,22 @@ TEST(LoopSolver, BesideTheTrackingItFindsTheSame) {
   }
 }
 
+TEST(Follow, KeepsWhatMappingFoundAndTakesNewKeyframesAlong) {
+  const Pose identity;
+  const std::vector<MapKeyframe> then = {{0, 0, identity}, {1, 0, Pose(identity.rotation, {1, 0, 0})}};
+  std::vector<MapKeyframe> now = then;
+  now[1].T_world_keyframe.translation.y() = 0.25;             // mapping moved it
+  now.push_back({2, 0, Pose(identity.rotation, {2, 0, 0})});  // came since
+  now.push_back({3, 1, Pose(identity.rotation, {7, 7, 7})});  // in another piece
+  KeyframeCorrection solved;
+  solved.S_world_keyframe = {{0, Similarity(identity)}, {1, Similarity(1, identity.rotation, {1, 10, 0})}};
+  const std::map<int, Similarity> moved = Follow(solved, then, now);
+  EXPECT_EQ(moved.at(0).translation, Eigen::Vector3d(0, 0, 0));
+  EXPECT_LT((moved.at(1).translation - Eigen::Vector3d(1, 10.25, 0)).norm(), 1e-12);
+  EXPECT_LT((moved.at(2).translation - Eigen::Vector3d(2, 10, 0)).norm(), 1e-12);
+  EXPECT_EQ(moved.at(3).translation, Eigen::Vector3d(7, 7, 7));
+}
+
 TEST(Disagreement, IsMeasuredInTheUnitsOfTheScene) {
   const Disagreement d = Measure(Similarity(std::exp(0.1), ExpSO3({0, 0, 0.01}), {3, 4, 0}), 10);
   EXPECT_NEAR(d.fraction, 0.5, 1e-12);

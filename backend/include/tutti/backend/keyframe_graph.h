@@ -12,7 +12,6 @@
 #include <map>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "tutti/backend/pose_graph.h"
@@ -104,25 +103,33 @@ class KeyframeGraph {
   void MeasureAgain() { kept_.clear(); }
 
  private:
-  using Pair = std::pair<int, int>;  // older, newer keyframe id
+  struct Edge {
+    int older = -1, newer = -1;
+    Similarity S_older_newer;
+  };
+  struct Birth {
+    int id = -1;
+    int piece = 0;  // when it was new
+  };
   struct Merge {
     int from = 0, to = 0;  // pieces
     int newest = -1;       // keyframe when it happened
   };
-  int PieceWhenNew(int keyframe, int newer) const;
   bool OfOnePiece(int older, int newer) const;
-  void AddCovisible(const std::vector<CovisiblePair>& covisible);
+  std::vector<CovisiblePair> Strongest(const std::vector<CovisiblePair>& covisible) const;
+  const Edge* Kept(int older, int newer) const;
+  Similarity Measured(int older, int newer) const;
   std::map<int, int> Merges(const std::vector<LoopEdge>& loops) const;
   std::map<int, Similarity> JoinedPieces(const std::vector<LoopEdge>& loops) const;
-  Similarity Measured(const Pair& pair) const;
   const MapKeyframe& At(int id) const;
 
+  // All ascending: a map of ten thousand keyframes is taken over between two frames.
   KeyframeGraphOptions options_;
-  std::vector<MapKeyframe> keyframes_;  // ascending by id
-  std::map<int, int> birth_piece_;      // by keyframe
-  std::vector<Merge> merged_;           // in order of time
-  std::map<Pair, Similarity> edges_;    // odometry's, with their measurements
-  std::map<Pair, Similarity> kept_;     // measurements from before the last correction, in present units
+  std::vector<MapKeyframe> keyframes_;
+  std::vector<Birth> births_;
+  std::vector<Merge> merged_;  // in order of time
+  std::vector<Edge> edges_;    // odometry's, with their measurements
+  std::vector<Edge> kept_;     // measurements from before the last correction, in present units
 };
 
 /// Carries a loop over to the units of a corrected map (mono): S' = scale(s_c) S scale(1/s_q).

@@ -99,7 +99,6 @@ std::optional<std::pair<std::string, std::string>> FirstProblem(const RunConfig&
       {"odometry", config.odometry.Validate()},
       {"loops", config.loops.Validate()},
       {"graph", config.graph.Validate()},
-      {"graph", config.online.Validate()},
       {"run", config.run.Validate()}};
   for (const auto& problem : problems) {
     if (!problem.second.empty()) return problem;

@@ -39,7 +39,7 @@ ConfigTable::ConfigTable(RunConfig& config) {
   AddVocabulary(config.loops.vocabulary);
   AddVerification(config.loops.verification);
   AddDnn(config.loops.dnn);
-  AddGraph(config.graph, config.online);
+  AddGraph(config.graph);
   AddRun(config.run);
 }
 
@@ -291,7 +291,7 @@ void ConfigTable::AddDnn(DnnOptions& o) {
   Basic().Add("layer", o.layer, "whose output is the descriptor; empty: the network's only output");
 }
 
-void ConfigTable::AddGraph(PoseGraphOptions& o, OnlineOptions& online) {
+void ConfigTable::AddGraph(PoseGraphOptions& o) {
   section_ = "graph";
   AddEnum("objective", o.objective, {{"chi2", GraphObjective::kChi2}, {"chi2log", GraphObjective::kChi2Log}},
           "rotation error as vector part of the quaternion (chi2) or as rotation vector (chi2log)");
@@ -310,17 +310,8 @@ void ConfigTable::AddGraph(PoseGraphOptions& o, OnlineOptions& online) {
   Add("robust_chi2", o.robust_chi2, "chi-square beyond which a loop is doubted; 0: its 99 % quantile");
   Basic().AddEnum(
       "solver", o.solver, {{"ceres", PoseGraphSolver::kCeres}, {"block", PoseGraphSolver::kBlock}},
-      "who solves it: ceres (all of it at each loop, while the map is small), or block (own block Cholesky: "
-      "the same optimum in less time, and with init: file and robust: none or huber only what a loop changes "
-      "is solved for; robust: switchable is left to ceres)");
-  Add("online_parts_from_keyframes", online.parts_from_nodes,
-      "maps of so many keyframes and more are solved by block, in parts, even with solver: ceres");
-  Add("online_settled_sigmas", online.settled_sigmas,
-      "in parts: a keyframe is left alone while the step that its own edges ask for is shorter than this "
-      "many standard deviations");
-  Add("online_whole_fraction", online.whole_fraction,
-      "in parts: beyond this share of the keyframes all of them are solved for");
-  Add("online_always_whole", online.always_whole, "never in parts");
+      "who solves it: ceres, or block (own block Cholesky: the same optimum in less time; robust: switchable "
+      "is left to ceres)");
   AddEnum("init", o.init,
           {{"auto", GraphInit::kAuto},
            {"file", GraphInit::kFile},

@@ -51,7 +51,7 @@ class ConfigTable {
   void AddVocabulary(VocabularyOptions& options);
   void AddVerification(VerificationOptions& options);
   void AddDnn(DnnOptions& options);
-  void AddGraph(PoseGraphOptions& options, OnlineOptions& online);
+  void AddGraph(PoseGraphOptions& options);
   void AddRun(SlamOptions& options);
 
   /// The key that is added next is one that users set.

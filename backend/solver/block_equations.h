@@ -88,14 +88,6 @@ class BlockEquations {
     expected = 0.5 * (step_.dot(damping.cwiseProduct(step_)) - gradient_.dot(step_));
     return true;
   }
-  /// No node asks for a longer step of its own (StepInSigmas).
-  bool Settled(double sigmas) const {
-    for (std::size_t k = 0; k < diagonal_.size(); ++k) {
-      const Error g = gradient_.template segment<N>(N * static_cast<Eigen::Index>(k));
-      if (StepInSigmas<N>(diagonal_[k], g) > sigmas) return false;
-    }
-    return true;
-  }
 
   const Eigen::VectorXd& step() const { return step_; }
 

@@ -64,8 +64,7 @@ class LevenbergMarquardt {
     cost_ = equations_.Linearise(graph_);
     out_.usable = std::isfinite(cost_);
     if (!out_.usable) out_.message = "block solver: the cost is not finite";
-    out_.converged = equations_.active().nodes.empty() ||
-                     (limits_.settled_sigmas > 0 && equations_.Settled(limits_.settled_sigmas));
+    out_.converged = equations_.active().nodes.empty();
   }
 
   void Iterate() {
@@ -81,22 +80,19 @@ class LevenbergMarquardt {
       return;
     }
     equations_.Move(graph_);
-    // Where the gradient decides when to stop, the equations are needed there anyway.
-    const bool by_gradient = limits_.settled_sigmas > 0 && out_.iterations < limits_.max_iterations;
-    const double after = by_gradient ? equations_.Linearise(graph_) : equations_.Cost(graph_);
+    const double after = equations_.Cost(graph_);
     const double change = cost_ - after;
     const bool better = std::isfinite(change) && change > kMinQuality * expected;
     const bool flat = std::abs(change) <= std::max(limits_.function_tolerance, kRounding) * cost_;
     const bool stays = better || (flat && change > 0);
     if (!stays) equations_.TakeBack(graph_);
-    linearised_ = stays == by_gradient;  // at the new poses, or still at the old ones
+    linearised_ = !stays;  // still, at the old poses
     if (flat || (better && NothingLeft(change))) {
       out_.converged = true;
     } else if (better) {
       region_.Grow(change / expected);
       last_change_ = change;
       cost_ = after;
-      out_.converged = by_gradient && equations_.Settled(limits_.settled_sigmas);
     } else {
       out_.converged = !region_.Shrink();  // no step is small enough to lower the cost
     }

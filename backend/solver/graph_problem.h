@@ -93,8 +93,8 @@ class GraphProblem {
   void KeepTrustRegion() { trust_region_ = std::min(last_trust_region_, kInitialTrustRegion); }
 
   SolveSummary Solve(int max_iterations, double max_time_s) {
-    SolveSummary summary = solver_->Solve(
-        weighted_, {max_iterations, max_time_s, options_.function_tolerance, 0, trust_region_});
+    SolveSummary summary =
+        solver_->Solve(weighted_, {max_iterations, max_time_s, options_.function_tolerance, trust_region_});
     last_trust_region_ = summary.trust_region;
     trust_region_ = kInitialTrustRegion;
     return summary;

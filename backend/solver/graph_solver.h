@@ -84,19 +84,8 @@ struct SolveLimits {
   int max_iterations = 200;
   double max_time_s = 0;  ///< 0: no limit
   double function_tolerance = 1e-9;
-  /// Converged as well when no node's own equations ask for a longer step, in standard deviations of the node
-  /// with its neighbours held [1]; 0: not looked at, and Ceres never does.
-  double settled_sigmas = 0;
   double trust_region = kInitialTrustRegion;  ///< radius to begin with, in Ceres' sense [1]
 };
-
-/// Length of the step that a node's own equations ask for, its neighbours held, in standard deviations under
-/// the same conditions: sqrt(g^T H^-1 g) [1]. 0 where nothing holds the node.
-template <int N>
-double StepInSigmas(const Eigen::Matrix<double, N, N>& H, const Eigen::Matrix<double, N, 1>& g) {
-  const Eigen::LLT<Eigen::Matrix<double, N, N>> llt(H);
-  return llt.info() == Eigen::Success ? llt.matrixL().solve(g).norm() : 0.0;
-}
 
 /// How a solve ended.
 struct SolveSummary {

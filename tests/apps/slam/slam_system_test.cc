@@ -107,15 +107,14 @@ TEST(SlamSystem, WhatBackgroundWorkFindsDoesNotDependOnTheThreads) {
   ExpectTheSameBits(Drive(Small(true, 1)), Drive(Small(true, 2)));
 }
 
-TEST(SlamSystem, LoopsThatAreGatedAndClosedInPartsDoNotDependOnTheThreads) {
-  const auto in_parts = [](int threads) {
+TEST(SlamSystem, LoopsThatAreGatedDoNotDependOnTheThreads) {
+  const auto gated = [](int threads) {
     RunConfig config = Small(false, threads);
-    config.online.parts_from_nodes = 5;
     config.run.loop_gate_sigmas = 20;
     return config;
   };
-  const Result one = Drive(in_parts(1)), whole = Drive(Small(false, 2));
-  ExpectTheSameBits(one, Drive(in_parts(2)));
+  const Result one = Drive(gated(1)), whole = Drive(Small(false, 2));
+  ExpectTheSameBits(one, Drive(gated(2)));
   EXPECT_EQ(one.corrections, whole.corrections) << "the gate refuses no true loop";
   EXPECT_NEAR(one.ate_m, whole.ate_m, 0.1 * whole.ate_m);
 }

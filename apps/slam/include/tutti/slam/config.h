@@ -6,7 +6,6 @@
 #include <utility>
 #include <vector>
 
-#include "tutti/backend/online_optimizer.h"
 #include "tutti/backend/pose_graph_optimizer.h"
 #include "tutti/frontend/dataset.h"
 #include "tutti/frontend/odometry_options.h"
@@ -22,7 +21,6 @@ struct RunConfig {
   OdometryOptions odometry;   ///< section `odometry:`
   LoopDetectorOptions loops;  ///< section `loops:`
   PoseGraphOptions graph;     ///< section `graph:`
-  OnlineOptions online;       ///< section `graph:`, keys that begin with `online_`
   SlamOptions run;            ///< section `run:`
 };
 

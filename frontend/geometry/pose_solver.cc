@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <cmath>
+#include <opencv2/calib3d.hpp>
 
 namespace tutti {
 
@@ -71,6 +72,28 @@ int RefinePose(const PinholeCamera& camera, const std::vector<PointObservation>&
     return 0;
   }
   return inliers;
+}
+
+std::optional<Pose> SolvePnp(const PinholeCamera& camera, const std::vector<Eigen::Vector3d>& points,
+                             const std::vector<cv::Point2f>& pixels, int least_inliers) {
+  std::vector<cv::Point3d> objects;
+  std::vector<cv::Point2d> images;
+  for (const Eigen::Vector3d& p : points) objects.emplace_back(p.x(), p.y(), p.z());
+  for (const cv::Point2f& p : pixels) images.emplace_back(p.x, p.y);
+  const cv::Matx33d k(camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1);
+  cv::Mat rvec, tvec;
+  std::vector<int> inliers;
+  try {
+    if (!cv::solvePnPRansac(objects, images, cv::Mat(k), cv::noArray(), rvec, tvec, false, 200, 5.0F, 0.99,
+                            inliers))
+      return std::nullopt;
+  } catch (const cv::Exception&) {
+    return std::nullopt;  // degenerate points; OpenCV has no other way to say so
+  }
+  if (static_cast<int>(inliers.size()) < least_inliers) return std::nullopt;
+  const Eigen::Vector3d w(rvec.at<double>(0), rvec.at<double>(1), rvec.at<double>(2));
+  const Pose pose(ExpSO3(w), {tvec.at<double>(0), tvec.at<double>(1), tvec.at<double>(2)});
+  return pose.IsFinite() ? std::optional(pose) : std::nullopt;
 }
 
 }  // namespace tutti

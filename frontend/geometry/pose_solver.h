@@ -1,8 +1,10 @@
-// Camera pose from landmarks: robust refinement on all inliers.
+// Camera pose from landmarks: a first one without any guess, and robust refinement on all inliers.
 #pragma once
 
 #include <Eigen/Core>
 #include <cmath>
+#include <opencv2/core.hpp>
+#include <optional>
 #include <vector>
 
 #include "tutti/core/camera.h"
@@ -35,5 +37,11 @@ inline double HuberBound(const PointObservation& o) { return std::sqrt(ChiSquare
 /// inliers of the round before. Returns the number of inliers; `inlier` has one flag per observation.
 int RefinePose(const PinholeCamera& camera, const std::vector<PointObservation>& observations,
                Pose* T_camera_world, std::vector<char>* inlier);
+
+/// T_camera_world from points in the world [m] and their pixels, with outliers among them: PnP in RANSAC
+/// (cv::solvePnPRansac, whose random numbers are the same every time). None if fewer than `least_inliers`
+/// come within 5 px, or if the points are degenerate.
+std::optional<Pose> SolvePnp(const PinholeCamera& camera, const std::vector<Eigen::Vector3d>& points,
+                             const std::vector<cv::Point2f>& pixels, int least_inliers);
 
 }  // namespace tutti

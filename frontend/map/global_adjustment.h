@@ -3,12 +3,16 @@
 
 #include <atomic>
 #include <future>
+#include <map>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "frontend/map/bundle_adjustment.h"
 #include "frontend/map/map.h"
+#include "tutti/frontend/frame.h"
 #include "tutti/frontend/global_adjustment.h"
+#include "tutti/frontend/odometry_options.h"
 
 namespace tutti {
 
@@ -19,17 +23,22 @@ class GlobalAdjustment::Work {
     BundleAdjustmentReport report;
   };
 
-  /// Adjusts the keyframes `moving`, with `fixed` ones as they are.
-  Work(const PinholeCamera& camera, const Map& map, std::vector<int> moving, std::vector<int> fixed,
-       const BundleAdjustmentOptions& options, bool own_thread);
+  /// Adjusts the keyframes of one piece; the oldest one stays where it is. `lens`: the camera's error as it
+  /// is known, and stays.
+  Work(const OdometryOptions& options, const CameraRig& rig, const Map& map, int piece,
+       const Eigen::Vector2d& lens, bool own_thread);
   ~Work();
 
   void Cancel() { stop_ = true; }
   /// Waits for the result.
   const Outcome& Result() const { return *outcome_.get(); }
   const std::vector<int>& moving() const { return moving_; }
+  /// Waits for the result. Where it moves the keyframes; those of `now` that came since follow the one before
+  /// them. None if it found nothing better.
+  std::optional<std::map<int, Similarity>> Correction(const Map& now) const;
 
  private:
+  bool metric_;
   std::vector<int> moving_;
   std::atomic<bool> stop_{false};
   std::shared_future<std::shared_ptr<const Outcome>> outcome_;

@@ -123,6 +123,12 @@ void Map::UpdateGeometry(int id) {
   l.min_distance = l.max_distance / scales_.back();
 }
 
+void Map::UpdateGeometry() {
+  for (int l = 0; l < LandmarkCount(); ++l) {
+    if (std::as_const(*this).landmark(l).alive) UpdateGeometry(l);
+  }
+}
+
 void Map::UpdateLandmark(int id) {
   UpdateGeometry(id);
   const auto keyframe = [this](int k) -> const Keyframe& { return std::as_const(*this).keyframe(k); };

@@ -82,6 +82,8 @@ class Map {
   void UpdateLandmark(int landmark);
   /// Viewing direction and distances alone, after keyframes or the landmark have moved.
   void UpdateGeometry(int landmark);
+  /// The same for all landmarks.
+  void UpdateGeometry();
 
   /// Keyframes with at least `min_shared` common landmarks, most first (ties: newest first), at most `count`.
   std::vector<int> BestCovisible(int keyframe, int count, int min_shared) const;

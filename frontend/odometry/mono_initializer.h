@@ -1,22 +1,15 @@
 // Waits for two views with enough parallax, and starts a mono map from them.
 #pragma once
 
-#include <memory>
 #include <string>
 #include <vector>
 
 #include "frontend/map/map.h"
+#include "frontend/odometry/tracked_frame.h"
 #include "tutti/frontend/frame.h"
 #include "tutti/frontend/odometry_options.h"
 
 namespace tutti {
-
-/// A frame without pixels.
-struct TrackedFrame {
-  std::int64_t index = 0;
-  double stamp_s = 0;
-  std::shared_ptr<const FrameFeatures> features;
-};
 
 /// Value type.
 class MonoInitializer {

@@ -1,11 +1,10 @@
 #include "tutti/frontend/odometry.h"
 
-#include <algorithm>
-#include <cmath>
 #include <limits>
 #include <utility>
 
 #include "core/median.h"
+#include "frontend/map/global_adjustment.h"
 #include "frontend/odometry/odometry_impl.h"
 #include "tutti/core/error.h"
 
@@ -21,39 +20,6 @@ const char* ToString(TrackingState state) {
       return "lost";
   }
   return "?";
-}
-
-std::string OdometryOptions::Validate() const {
-  if (features < 100) return "odometry.features must be at least 100";
-  if (pyramid_levels < 1 || pyramid_levels > 16) return "odometry.pyramid_levels must be 1 to 16";
-  if (!(scale_factor > 1.01 && scale_factor <= 2.0))
-    return "odometry.scale_factor must be above 1.01 and at most 2";
-  if (fast_threshold < 1 || fast_threshold_min < 1 || fast_threshold_min > fast_threshold) {
-    return "odometry.fast_threshold_min must be at least 1 and at most odometry.fast_threshold";
-  }
-  if (!(lens_sigma >= 0)) return "odometry.lens_sigma must not be negative";
-  if (!(aligned_sigma > 0 && aligned_sigma <= 1))
-    return "odometry.aligned_sigma must be above 0 and at most 1";
-  if (!(stereo_sigma_px > 0) || !(rgbd_inverse_sigma > 0) || !(pixel_sigma > 0))
-    return "odometry: every sigma must be positive";
-  if (!(max_depth_baselines > 1)) return "odometry.max_depth_baselines must be above 1";
-  if (min_inliers < 8) return "odometry.min_inliers must be at least 8";
-  if (!(relocalize_s >= 0)) return "odometry.relocalize_s must not be negative";
-  if (!(keyframe_inlier_ratio > 0 && keyframe_inlier_ratio < 1))
-    return "odometry.keyframe_inlier_ratio must lie between 0 and 1";
-  if (!(keyframe_uncovered_ratio > 0 && keyframe_uncovered_ratio <= 1))
-    return "odometry.keyframe_uncovered_ratio must be above 0 and at most 1";
-  if (!(keyframe_max_interval_s > 0)) return "odometry.keyframe_max_interval_s must be positive";
-  if (mapping_delay_frames < 0) return "odometry.mapping_delay_frames must not be negative";
-  if (keyframe_min_frames < 0) return "odometry.keyframe_min_frames must not be negative";
-  if (local_keyframes < 1 || triangulation_neighbours < 1)
-    return "odometry.local_keyframes and triangulation_neighbours must be at least 1";
-  if (!(min_parallax_deg > 0)) return "odometry.min_parallax_deg must be positive";
-  if (ba_keyframes < 2 || ba_fixed_keyframes < 0 || ba_iterations < 1) {
-    return "odometry.ba_keyframes must be at least 2, ba_fixed_keyframes at least 0, ba_iterations at least "
-           "1";
-  }
-  return {};
 }
 
 Odometry::Odometry(const OdometryOptions& options, const CameraRig& rig) {
@@ -80,20 +46,24 @@ Odometry& Odometry::operator=(Odometry&&) noexcept = default;
 Odometry::~Odometry() = default;
 
 std::shared_ptr<const FrameFeatures> Odometry::Extract(const InputFrame& frame) const {
-  return std::make_shared<const FrameFeatures>(ExtractFeatures(frame, impl_->rig, impl_->options));
+  return std::make_shared<const FrameFeatures>(ExtractFeatures(frame, impl_->rig(), impl_->options()));
 }
 
 TrackResult Odometry::Track(const InputFrame& frame) { return impl_->Track(frame); }
-
-void Odometry::FinishMapping() { impl_->EnterMapping(); }
-
-std::vector<int> Odometry::TakeMapped() { return std::exchange(impl_->mapped, {}); }
-
-void Odometry::UseOwnThreads(bool own_threads) { impl_->own_threads = own_threads; }
-
-std::vector<SeenLandmark> Odometry::SeenLandmarks() const { return impl_->SeenLandmarks(); }
-
 TrackResult Odometry::RelocalizeAt(int keyframe) { return impl_->RelocalizeAt(keyframe); }
+void Odometry::FinishMapping() { impl_->EnterMapping(); }
+std::vector<int> Odometry::TakeMapped() { return impl_->TakeMapped(); }
+void Odometry::UseOwnThreads(bool own_threads) { impl_->UseOwnThreads(own_threads); }
+
+std::vector<SeenLandmark> Odometry::SeenLandmarks() const {
+  const LastFrame& last = impl_->last();
+  std::vector<SeenLandmark> seen;
+  for (std::size_t f = 0; f < last.matches.landmarks.size(); ++f) {
+    const int landmark = last.matches.landmarks[f];
+    if (landmark >= 0) seen.push_back({landmark, last.frame.features->keypoints[f].pt});
+  }
+  return seen;
+}
 
 std::vector<int> Odometry::KeyframeIds() const {
   std::vector<int> ids;
@@ -123,7 +93,7 @@ KeyframeView Odometry::Keyframe(int id) const {
       if (p.z() > 0) view.points[f] = p;
     } else if (inverse > 0 && k.features->inverse_depth_sigma[f] < 0.1F * inverse) {
       const cv::Point2f& p = k.features->keypoints[f].pt;
-      view.points[f] = impl_->rig.camera.Unproject({p.x, p.y}) / double(inverse);
+      view.points[f] = impl_->rig().camera.Unproject({p.x, p.y}) / double(inverse);
     }
   }
   return view;
@@ -133,14 +103,7 @@ Pose Odometry::KeyframePose(int id) const { return impl_->map().keyframe(id).T_w
 std::int64_t Odometry::KeyframeFrameIndex(int id) const { return impl_->map().keyframe(id).frame_index; }
 double Odometry::KeyframeStamp(int id) const { return impl_->map().keyframe(id).stamp_s; }
 
-int Odometry::KeyframePiece(int id) const {
-  int piece = impl_->map().keyframe(id).piece;
-  for (auto joined = impl_->piece_joined.find(piece); joined != impl_->piece_joined.end();
-       joined = impl_->piece_joined.find(piece)) {
-    piece = joined->second;
-  }
-  return piece;
-}
+int Odometry::KeyframePiece(int id) const { return impl_->map().keyframe(id).piece; }
 
 std::vector<std::pair<std::pair<int, int>, int>> Odometry::Covisibility(int min_shared) const {
   std::vector<std::pair<std::pair<int, int>, int>> out;
@@ -152,39 +115,44 @@ std::vector<std::pair<std::pair<int, int>, int>> Odometry::Covisibility(int min_
   return out;
 }
 
-std::vector<int> Odometry::Pieces() const {
-  std::map<int, int> frames;
-  for (const Impl::FrameRecord& r : impl_->records) ++frames[KeyframePiece(r.reference)];
-  std::vector<int> pieces;
-  pieces.reserve(frames.size());
-  for (const auto& [piece, count] : frames) pieces.push_back(piece);
-  std::stable_sort(pieces.begin(), pieces.end(), [&](int a, int b) { return frames[a] > frames[b]; });
-  return pieces;
+void Odometry::ApplyCorrection(const std::map<int, Similarity>& S_world_keyframe,
+                               const std::map<int, int>& merges) {
+  impl_->Correct(S_world_keyframe, merges, nullptr);
 }
 
+int Odometry::FuseLoop(int older, int newer, const Similarity& S_older_newer) {
+  return impl_->FuseLoop(older, newer, S_older_newer);
+}
+
+GlobalAdjustment Odometry::BeginGlobalAdjustment(int piece) const {
+  const AsyncMapper& mapper = impl_->mapper();
+  return GlobalAdjustment(
+      std::make_unique<GlobalAdjustment::Work>(impl_->options(), impl_->rig(), mapper.map(), piece,
+                                               mapper.lens().Remaining().value, mapper.own_threads()));
+}
+
+std::optional<std::map<int, Similarity>> Odometry::CorrectionOf(const GlobalAdjustment& adjustment) const {
+  return adjustment.work_->Correction(impl_->map());
+}
+
+void Odometry::Enter(const GlobalAdjustment& adjustment, const std::map<int, Similarity>& S_world_keyframe) {
+  impl_->Correct(S_world_keyframe, {}, adjustment.work_.get());
+}
+
+std::vector<int> Odometry::Pieces() const { return impl_->history().Pieces(impl_->map()); }
+
 Trajectory Odometry::FrameTrajectory(int map_piece) const {
-  if (map_piece < 0 && !impl_->records.empty()) map_piece = Pieces().front();
-  Trajectory out;
-  for (const Impl::FrameRecord& r : impl_->records) {
-    if (KeyframePiece(r.reference) != map_piece) continue;
-    out.push_back({r.stamp_s, impl_->map().keyframe(r.reference).T_world_camera * r.T_reference_frame});
-  }
-  return out;
+  return impl_->history().Poses(impl_->map(), map_piece);
 }
 
 std::vector<std::int64_t> Odometry::FrameIndices(int map_piece) const {
-  if (map_piece < 0 && !impl_->records.empty()) map_piece = Pieces().front();
-  std::vector<std::int64_t> out;
-  for (const Impl::FrameRecord& r : impl_->records) {
-    if (KeyframePiece(r.reference) == map_piece) out.push_back(r.index);
-  }
-  return out;
+  return impl_->history().Indices(impl_->map(), map_piece);
 }
 
-std::map<std::string, double> Odometry::StageMilliseconds() const { return impl_->stages.milliseconds; }
-void Odometry::SetRecorder(SpanRecorder* recorder) { impl_->stages.recorder = recorder; }
+std::map<std::string, double> Odometry::StageMilliseconds() const { return impl_->stages().milliseconds; }
+void Odometry::SetRecorder(SpanRecorder* recorder) { impl_->SetRecorder(recorder); }
 
-double Odometry::StereoRowErrorPx() const { return internal::Median(impl_->row_errors); }
-double Odometry::StereoMatches() const { return internal::Median(impl_->stereo_matches); }
+double Odometry::StereoRowErrorPx() const { return internal::Median(impl_->row_errors()); }
+double Odometry::StereoMatches() const { return internal::Median(impl_->stereo_matches()); }
 
 }  // namespace tutti

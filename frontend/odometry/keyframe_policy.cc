@@ -1,8 +1,7 @@
-// When a tracked frame becomes a keyframe: by what the map still has to show.
+#include "frontend/odometry/keyframe_policy.h"
+
 #include <algorithm>
 #include <array>
-
-#include "frontend/odometry/odometry_impl.h"
 
 namespace tutti {
 namespace {
@@ -40,22 +39,13 @@ double UncoveredShare(const FrameMatches& matches, const PinholeCamera& camera,
   return seen == 0 ? 0 : static_cast<double>(uncovered) / seen;
 }
 
-}  // namespace
-
-// Landmarks of the reference that are established: what one keyframe alone has seen (most of what depth
-// gives) may never be seen again, and would call for a keyframe all the time.
-int Odometry::Impl::EstablishedLandmarks(int keyframe) const {
-  const std::size_t established = rig.sensor == Sensor::kMono && map().KeyframeCount() > 2 ? 3 : 2;
-  const std::vector<int>& landmarks = map().keyframe(keyframe).landmarks;
-  return static_cast<int>(std::count_if(landmarks.begin(), landmarks.end(), [&](int l) {
-    return l >= 0 && map().landmark(l).observations.size() >= established;
-  }));
-}
-
 // Depth makes landmarks of what is new in the image at once: is it time for that?
-Odometry::Impl::DepthNeed Odometry::Impl::NeedForDepth(const FrameMatches& matches) const {
-  DepthNeed need;
-  if (rig.sensor == Sensor::kMono) return need;
+struct DepthNeed {
+  bool few_near = false, uncovered = false;  // as KeyframeNeed says
+};
+
+DepthNeed NeedForDepth(const FrameMatches& matches, const CameraRig& rig, const OdometryOptions& options) {
+  if (rig.sensor == Sensor::kMono) return {};
   const double far = rig.sensor == Sensor::kStereo ? options.max_depth_baselines * rig.baseline_m : 1e9;
   int near_tracked = 0, near_free = 0;
   std::vector<char> near(matches.landmarks.size(), 0);
@@ -65,28 +55,41 @@ Odometry::Impl::DepthNeed Odometry::Impl::NeedForDepth(const FrameMatches& match
     near[f] = 1;
     ++(matches.landmarks[f] >= 0 ? near_tracked : near_free);
   }
-  need.few_near = near_tracked < kFewNear && near_free > kManyNearFree;
-  need.uncovered = UncoveredShare(matches, rig.camera, near) > options.keyframe_uncovered_ratio;
-  return need;
+  return {near_tracked < kFewNear && near_free > kManyNearFree,
+          UncoveredShare(matches, rig.camera, near) > options.keyframe_uncovered_ratio};
 }
 
-bool Odometry::Impl::NeedKeyframe(const TrackedFrame& frame, const FrameMatches& matches, int inliers) const {
-  const tutti::Keyframe& last = map().keyframe(last_keyframe_);
-  const int established = EstablishedLandmarks(reference_);
-  const bool weak = inliers < options.keyframe_inlier_ratio * established;
-  const bool very_weak = inliers < 0.4 * established || inliers < 3 * options.min_inliers;
-  const bool early = frames_since_keyframe_ < options.keyframe_min_frames;
-  if (early && !(very_weak && frames_since_keyframe_ >= 1)) return false;
-  const DepthNeed need = NeedForDepth(matches);
-  if (very_weak || need.few_near) return true;
+}  // namespace
+
+// What one keyframe alone has seen (most of what depth gives) may never be seen again, and would call for a
+// keyframe all the time.
+int KeyframePolicy::Established(const Map& map, int keyframe) const {
+  const std::size_t views = rig_.sensor == Sensor::kMono && map.KeyframeCount() > 2 ? 3 : 2;
+  const std::vector<int>& landmarks = map.keyframe(keyframe).landmarks;
+  return static_cast<int>(std::count_if(landmarks.begin(), landmarks.end(), [&](int l) {
+    return l >= 0 && map.landmark(l).observations.size() >= views;
+  }));
+}
+
+KeyframeNeed KeyframePolicy::Need(const Map& map, const PoseFix& fix, const LastFrame& before) const {
+  const int established = Established(map, fix.reference);
+  const bool very_weak = fix.inliers < 0.4 * established || fix.inliers < 3 * options_.min_inliers;
+  if (very_weak) return KeyframeNeed::kVeryWeak;
+  if (before.frames_since_keyframe + 1 < options_.keyframe_min_frames) return KeyframeNeed::kNone;
+  const DepthNeed need = NeedForDepth(fix.matches, rig_, options_);
+  if (need.few_near) return KeyframeNeed::kFewNear;
   // In a place seen before, after a loop, the map has the landmarks that come next already.
-  const bool known = last_keyframe_ - reference_ > kKeyframesApart &&
-                     frame.stamp_s - map().keyframe(reference_).stamp_s > kSecondsApart;
-  if (known) return false;
-  const double baseline =
-      (last.T_world_camera.translation - last_T_camera_world_.Inverse().translation).norm();
-  const bool moved = baseline > 0.02 * std::max(1e-6, map().MedianDepth(last_keyframe_));
-  return weak || need.uncovered || (frame.stamp_s - last.stamp_s > options.keyframe_max_interval_s && moved);
+  const Keyframe &reference = map.keyframe(fix.reference), &newest = map.keyframe(before.newest_keyframe);
+  const double stamp_s = fix.frame.stamp_s;
+  if (newest.id - reference.id > kKeyframesApart && stamp_s - reference.stamp_s > kSecondsApart)
+    return KeyframeNeed::kNone;
+  if (fix.inliers < options_.keyframe_inlier_ratio * established) return KeyframeNeed::kWeak;
+  if (need.uncovered) return KeyframeNeed::kUncovered;
+  if (!(stamp_s - newest.stamp_s > options_.keyframe_max_interval_s)) return KeyframeNeed::kNone;
+  const Pose T_world_before = before.T_camera_world.Inverse();
+  const double baseline = (newest.T_world_camera.translation - T_world_before.translation).norm();
+  const bool moved = baseline > 0.02 * std::max(1e-6, map.MedianDepth(newest.id));
+  return moved ? KeyframeNeed::kInterval : KeyframeNeed::kNone;
 }
 
 }  // namespace tutti

@@ -1,0 +1,78 @@
+// Mapping of a keyframe beside the tracking of the next frames.
+#pragma once
+
+#include <cassert>
+#include <future>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "frontend/map/local_mapper.h"
+#include "frontend/map/map.h"
+#include "frontend/odometry/stage_times.h"
+#include "frontend/odometry/tracked_frame.h"
+
+namespace tutti {
+
+/// Owns the map, and has LocalMapper treat one keyframe at a time on a copy of it, on a thread of its own if
+/// wanted. The result enters a fixed number of frames later whenever it is ready, so that threads change
+/// nothing but the time. Value type; copies share the work that is under way.
+class AsyncMapper {
+ public:
+  AsyncMapper(const OdometryOptions& options, const CameraRig& rig);
+
+  const Map& map() const { return map_; }
+  /// For writing, while nothing is under way.
+  Map* MutableMap() {
+    assert(!Busy());
+    return &map_;
+  }
+  const SelfCalibration& lens() const { return mapper_.lens(); }
+
+  /// Adds a keyframe with the landmarks that the frame sees, and new ones by its depth, if the sensor has
+  /// that. Nothing may be under way. Returns its id.
+  int AddKeyframe(const TrackedFrame& frame, int piece, const Pose& T_world_camera,
+                  const std::vector<int>& landmarks);
+  /// Begins with the newest keyframe. `stages`: for the recorder. Nothing may be under way.
+  void Start(int keyframe, const StageTimes& stages);
+  /// A keyframe that needs no more treatment.
+  void Skip(int keyframe) { mapped_.push_back(keyframe); }
+
+  bool Busy() const { return outcome_.valid(); }
+  void NextFrame() { ++frames_; }
+  /// True if the result is to enter now.
+  bool Due() const { return Busy() && frames_ >= delay_frames_; }
+  /// Waits for the result and brings it in: keyframes move, landmarks are merged or gone. Adds its times to
+  /// `stages`. Something must be under way.
+  void Enter(StageTimes* stages);
+
+  /// Counts which landmarks a frame should see and does; what is under way is waited for.
+  void CountSeen(const PoseFix& fix);
+  /// Keyframes that were mapped since the last call, oldest first.
+  std::vector<int> TakeMapped() { return std::exchange(mapped_, {}); }
+
+  /// false: mapping is done on the thread that waits for it.
+  void UseOwnThreads(bool own_threads) { own_threads_ = own_threads; }
+  bool own_threads() const { return own_threads_; }
+
+ private:
+  struct Outcome {
+    Map map;
+    LocalMapper mapper;
+    StageTimes stages;  // of this keyframe alone
+  };
+  void Count(std::vector<int>* landmarks, int Landmark::*counter);
+
+  int delay_frames_;
+  bool has_depth_;
+  bool own_threads_ = true;
+  Map map_;  // not written to while Busy()
+  LocalMapper mapper_;
+  std::shared_future<std::shared_ptr<const Outcome>> outcome_;  // valid: under way
+  int keyframe_ = -1;                                           // that is under way
+  int frames_ = 0;                                              // since that began
+  std::vector<int> visible_, found_;                            // landmarks that are still to be counted
+  std::vector<int> mapped_;
+};
+
+}  // namespace tutti

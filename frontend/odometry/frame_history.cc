@@ -1,0 +1,51 @@
+#include "frontend/odometry/frame_history.h"
+
+#include <algorithm>
+
+namespace tutti {
+
+void FrameHistory::Add(const TrackedFrame& frame, const Pose& T_camera_world, const Keyframe& reference) {
+  records_.push_back({frame.index, frame.stamp_s, reference.id,
+                      reference.T_world_camera.Inverse() * T_camera_world.Inverse()});
+}
+
+void FrameHistory::Rescale(const std::map<int, Similarity>& S_world_keyframe) {
+  for (Record& record : records_) {
+    const auto moved = S_world_keyframe.find(record.reference);
+    if (moved != S_world_keyframe.end()) record.T_reference_frame.translation *= moved->second.scale;
+  }
+}
+
+std::vector<int> FrameHistory::Pieces(const Map& map) const {
+  std::map<int, int> frames;
+  for (const Record& r : records_) ++frames[map.keyframe(r.reference).piece];
+  std::vector<int> pieces;
+  pieces.reserve(frames.size());
+  for (const auto& [piece, count] : frames) pieces.push_back(piece);
+  std::stable_sort(pieces.begin(), pieces.end(), [&](int a, int b) { return frames[a] > frames[b]; });
+  return pieces;
+}
+
+std::vector<const FrameHistory::Record*> FrameHistory::Of(const Map& map, int piece) const {
+  if (piece < 0 && !records_.empty()) piece = Pieces(map).front();
+  std::vector<const Record*> out;
+  for (const Record& r : records_) {
+    if (map.keyframe(r.reference).piece == piece) out.push_back(&r);
+  }
+  return out;
+}
+
+Trajectory FrameHistory::Poses(const Map& map, int piece) const {
+  Trajectory out;
+  for (const Record* r : Of(map, piece))
+    out.push_back({r->stamp_s, map.keyframe(r->reference).T_world_camera * r->T_reference_frame});
+  return out;
+}
+
+std::vector<std::int64_t> FrameHistory::Indices(const Map& map, int piece) const {
+  std::vector<std::int64_t> out;
+  for (const Record* r : Of(map, piece)) out.push_back(r->index);
+  return out;
+}
+
+}  // namespace tutti

@@ -1,0 +1,44 @@
+// Where every frame was.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <vector>
+
+#include "frontend/map/map.h"
+#include "frontend/odometry/tracked_frame.h"
+#include "tutti/core/trajectory.h"
+
+namespace tutti {
+
+/// Poses of frames relative to their reference keyframes: corrections of the map reach all frames. The map
+/// that is asked with must have the keyframes of the one that was added with. Value type.
+class FrameHistory {
+ public:
+  void Add(const TrackedFrame& frame, const Pose& T_camera_world, const Keyframe& reference);
+  /// True if no frame was added that is as late as this [s].
+  bool IsLater(double stamp_s) const { return records_.empty() || stamp_s > records_.back().stamp_s; }
+  /// Keyframes were moved: with their scale, so are the distances of their frames.
+  void Rescale(const std::map<int, Similarity>& S_world_keyframe);
+
+  /// Pieces of the map that have frames, by number of frames, most first (ties: the older one).
+  std::vector<int> Pieces(const Map& map) const;
+  /// T_world_camera of the frames of one piece, in the order in which they were added; -1: of the piece with
+  /// most frames.
+  Trajectory Poses(const Map& map, int piece) const;
+  /// Same length as Poses: index of the input frame of each pose.
+  std::vector<std::int64_t> Indices(const Map& map, int piece) const;
+
+ private:
+  struct Record {
+    std::int64_t index = 0;
+    double stamp_s = 0;
+    int reference = -1;
+    Pose T_reference_frame;
+  };
+  std::vector<const Record*> Of(const Map& map, int piece) const;
+
+  std::vector<Record> records_;
+};
+
+}  // namespace tutti

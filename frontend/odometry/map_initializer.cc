@@ -1,0 +1,75 @@
+#include "frontend/odometry/map_initializer.h"
+
+#include <algorithm>
+
+namespace tutti {
+namespace {
+constexpr int kMinDepthFeatures = 50;      // features with depth that a metric map starts from
+constexpr float kBackwardsRadius = 30.0F;  // between neighbouring frames [px]
+}  // namespace
+
+void MapInitializer::NextPiece() {
+  ++piece_;
+  Reset();
+}
+
+MapInitializer::Start MapInitializer::Offer(const TrackedFrame& frame, const LastFrame& last,
+                                            AsyncMapper* mapper) {
+  const Pose T_world_camera = last.reference < 0 ? Pose() : last.T_camera_world.Inverse();
+  if (rig_.sensor == Sensor::kMono) return OfferMono(frame, last, T_world_camera, mapper->MutableMap());
+  const std::vector<float>& depths = frame.features->inverse_depth;
+  const auto with_depth = std::count_if(depths.begin(), depths.end(), [](float d) { return d > 0; });
+  Start start;
+  if (with_depth < kMinDepthFeatures)
+    start.reason = "initialising: only " + std::to_string(with_depth) + " features with depth";
+  else
+    start.keyframe = mapper->AddKeyframe(frame, piece_, T_world_camera, {});
+  return start;
+}
+
+MapInitializer::Start MapInitializer::OfferMono(const TrackedFrame& frame, const LastFrame& last,
+                                                const Pose& T_world_camera, Map* map) {
+  Start start;
+  const double depth = last.reference < 0 ? 0 : map->MedianDepth(last.newest_keyframe);
+  const std::vector<TrackedFrame> before = mono_.pending();
+  if (!mono_.Offer(frame, piece_, T_world_camera, depth > 1e-6 ? depth : 1.0, map, &start.reason))
+    return start;
+  mono_.Reset();
+  start.keyframe = map->KeyframeCount() - 1;
+  start.before_reference = start.keyframe - 1;
+  const Map& made = *map;
+  start.before =
+      PoseBackwards(before, made.keyframe(start.before_reference), made.keyframe(start.keyframe), made);
+  return start;
+}
+
+// From the first keyframe outwards on both sides; each frame starts from its neighbour.
+std::vector<std::pair<TrackedFrame, Pose>> MapInitializer::PoseBackwards(
+    const std::vector<TrackedFrame>& frames, const Keyframe& k0, const Keyframe& k1, const Map& map) const {
+  const double span = std::max(1e-6, k1.stamp_s - k0.stamp_s);
+  const Vector6d motion = LogSE3(k1.T_world_camera.Inverse() * k0.T_world_camera);
+  const Pose T0 = k0.T_world_camera.Inverse();
+  std::vector<std::pair<TrackedFrame, Pose>> posed;
+  Pose neighbour = T0;
+  bool backwards_alive = true;
+  for (auto frame = frames.rbegin(); frame != frames.rend(); ++frame) {
+    const bool between = frame->stamp_s > k0.stamp_s, first = frame->index == k0.frame_index;
+    if (!first && !between && !backwards_alive) continue;
+    Pose T = first ? T0 : neighbour;
+    if (!first && between) T = ExpSE3(motion * ((frame->stamp_s - k0.stamp_s) / span)) * T0;
+    if (!first) {
+      FrameMatches matches{frame->features.get(), std::vector<int>(frame->features->size(), -1)};
+      MatchToLastFrame(map, rig_.camera, T, {k0.features.get(), k0.landmarks}, kBackwardsRadius, &matches);
+      if (search_.Refine(map, &matches, &T) < options_.min_inliers) {
+        if (!between) backwards_alive = false;
+        continue;
+      }
+    }
+    if (!between) neighbour = T;
+    posed.emplace_back(*frame, T);
+  }
+  std::reverse(posed.begin(), posed.end());
+  return posed;
+}
+
+}  // namespace tutti

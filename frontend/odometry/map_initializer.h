@@ -1,0 +1,50 @@
+// The first pose of a map piece, and the frames before it.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "frontend/odometry/async_mapper.h"
+#include "frontend/odometry/mono_initializer.h"
+#include "frontend/odometry/pose_search.h"
+#include "frontend/odometry/tracked_frame.h"
+
+namespace tutti {
+
+/// Starts the pieces of a map: from one frame that has depth, or from two views. Value type.
+class MapInitializer {
+ public:
+  MapInitializer(const OdometryOptions& options, const CameraRig& rig)
+      : options_(options), rig_(rig), mono_(options, rig), search_(options, rig) {}
+
+  /// What became of a frame that a piece was to start with.
+  struct Start {
+    int keyframe = -1;   ///< the one that the frame became, or -1
+    std::string reason;  ///< why it became none
+    /// Mono: frames that were offered before and are posed now, T_camera_world, oldest first.
+    std::vector<std::pair<TrackedFrame, Pose>> before;
+    int before_reference = -1;  ///< the keyframe that they refer to
+  };
+
+  /// Offers the next frame. A piece goes on from where `last` was, if anywhere, and mono at its scale.
+  Start Offer(const TrackedFrame& frame, const LastFrame& last, AsyncMapper* mapper);
+  /// Forgets the frames that were offered.
+  void Reset() { mono_.Reset(); }
+  /// The same, and what starts next is another piece of the map.
+  void NextPiece();
+
+ private:
+  Start OfferMono(const TrackedFrame& frame, const LastFrame& last, const Pose& T_world_camera, Map* map);
+  std::vector<std::pair<TrackedFrame, Pose>> PoseBackwards(const std::vector<TrackedFrame>& frames,
+                                                           const Keyframe& k0, const Keyframe& k1,
+                                                           const Map& map) const;
+
+  OdometryOptions options_;
+  CameraRig rig_;
+  MonoInitializer mono_;
+  PoseSearch search_;
+  int piece_ = 0;
+};
+
+}  // namespace tutti

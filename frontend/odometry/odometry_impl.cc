@@ -1,0 +1,159 @@
+#include "frontend/odometry/odometry_impl.h"
+
+#include <utility>
+
+#include "frontend/map/global_adjustment.h"
+#include "frontend/map/landmark_fusion.h"
+#include "frontend/map/map_correction.h"
+
+namespace tutti {
+
+Odometry::Impl::Impl(const OdometryOptions& options, const CameraRig& rig)
+    : options_(options),
+      rig_(rig),
+      mapper_(options, rig),
+      initializer_(options, rig),
+      tracker_(options, rig),
+      relocalizer_(options, rig) {}
+
+TrackResult Odometry::Impl::Track(const InputFrame& input) {
+  mapper_.NextFrame();
+  if (mapper_.Due()) EnterMapping();
+  const TrackedFrame frame = Prepare(input);
+  result_ = tracker_.state() == TrackingState::kInitializing ? Initialize(frame) : TrackMap(frame);
+  result_.features = static_cast<int>(frame.features->size());
+  return result_;
+}
+
+TrackedFrame Odometry::Impl::Prepare(const InputFrame& input) {
+  TrackedFrame frame{input.index, input.stamp_s, input.features};
+  if (!frame.features) {
+    const ScopedStopwatch watch(&stages_, Lane::kTracking, "extract");
+    frame.features = std::make_shared<const FrameFeatures>(ExtractFeatures(input, rig_, options_));
+  }
+  frame.features = mapper_.lens().Correct(frame.features);
+  if (rig_.sensor == Sensor::kStereo) {
+    row_errors_.push_back(frame.features->row_error_px);
+    stereo_matches_.push_back(frame.features->stereo_matches);
+  }
+  return frame;
+}
+
+TrackResult Odometry::Impl::Initialize(const TrackedFrame& frame) {
+  const ScopedStopwatch watch(&stages_, Lane::kTracking, "initialize");
+  EnterMapping();
+  MapInitializer::Start start = initializer_.Offer(frame, tracker_.last(), &mapper_);
+  TrackResult result;
+  if (start.keyframe < 0) {
+    relocalizer_.Wait(frame);
+    result.reason = std::move(start.reason);
+    return result;
+  }
+  for (const auto& [earlier, T_camera_world] : start.before) {
+    if (history_.IsLater(earlier.stamp_s))
+      history_.Add(earlier, T_camera_world, map().keyframe(start.before_reference));
+  }
+  const tutti::Keyframe& keyframe = map().keyframe(start.keyframe);
+  tracker_.Begin(frame, keyframe);
+  relocalizer_.Found();
+  history_.Add(frame, tracker_.last().T_camera_world, keyframe);
+  mapper_.Skip(start.keyframe);
+  result.state = TrackingState::kTracking;
+  result.T_world_camera = keyframe.T_world_camera;
+  result.keyframe = start.keyframe;
+  for (const int landmark : keyframe.landmarks) result.inliers += landmark >= 0 ? 1 : 0;
+  return result;
+}
+
+TrackResult Odometry::Impl::TrackMap(const TrackedFrame& frame) {
+  Tracker::Tracked tracked;
+  {
+    const ScopedStopwatch watch(&stages_, Lane::kTracking, "track");
+    tracked = tracker_.Track(frame, map());
+  }
+  if (tracked.fix) return Accept(tracked);
+  if (relocalizer_.Lose(frame)) {  // a loop closure may join the two pieces later
+    tracker_.GiveUp();
+    initializer_.NextPiece();
+  }
+  TrackResult result;
+  result.state = TrackingState::kLost;
+  result.reason = frame.features->size() < static_cast<std::size_t>(options_.min_inliers)
+                      ? "lost: only " + std::to_string(frame.features->size()) + " features in the image"
+                      : "lost: no pose that enough landmarks agree with";
+  return result;
+}
+
+TrackResult Odometry::Impl::RelocalizeAt(int keyframe) {
+  if (!relocalizer_.HasFrame()) return result_;
+  const ScopedStopwatch watch(&stages_, Lane::kTracking, "relocalize");
+  std::optional<PoseFix> fix = relocalizer_.FindAt(keyframe, map());
+  if (!fix) return result_;
+  initializer_.Reset();
+  const int features = result_.features;
+  result_ = Accept(tracker_.Relocalize(keyframe, *std::move(fix), map()));
+  result_.features = features;
+  return result_;
+}
+
+TrackResult Odometry::Impl::Accept(const Tracker::Tracked& tracked) {
+  relocalizer_.Found();
+  mapper_.CountSeen(*tracked.fix);
+  TrackResult result;
+  result.state = TrackingState::kTracking;
+  result.inliers = tracked.fix->inliers;
+  if (tracked.need != KeyframeNeed::kNone) result.keyframe = InsertKeyframe();
+  const LastFrame& last = tracker_.last();
+  history_.Add(last.frame, last.T_camera_world, map().keyframe(last.reference));
+  result.T_world_camera = last.T_camera_world.Inverse();
+  return result;
+}
+
+// Makes the last tracked frame a keyframe.
+int Odometry::Impl::InsertKeyframe() {
+  EnterMapping();
+  const LastFrame& last = tracker_.last();
+  const int id = mapper_.AddKeyframe(last.frame, map().keyframe(last.reference).piece,
+                                     last.T_camera_world.Inverse(), last.matches.landmarks);
+  tracker_.BecomeKeyframe(map().keyframe(id));
+  mapper_.Start(id, stages_);
+  if (mapper_.Due()) EnterMapping();
+  return id;
+}
+
+void Odometry::Impl::EnterMapping() {
+  if (!mapper_.Busy()) return;
+  const int reference = tracker_.last().reference;
+  const Pose T_world_old = map().keyframe(reference).T_world_camera;
+  mapper_.Enter(&stages_);
+  tracker_.FollowReference(T_world_old, Similarity(map().keyframe(reference).T_world_camera));
+  tracker_.FollowLandmarks(map());
+}
+
+void Odometry::Impl::Correct(const std::map<int, Similarity>& S_world_keyframe,
+                             const std::map<int, int>& merges, const GlobalAdjustment::Work* adjustment) {
+  EnterMapping();
+  const int reference = tracker_.last().reference;
+  if (reference >= 0) {
+    const Pose& T_world_old = map().keyframe(reference).T_world_camera;
+    const auto moved = S_world_keyframe.find(reference);
+    tracker_.FollowReference(T_world_old.Inverse().Inverse(),
+                             moved != S_world_keyframe.end() ? moved->second : Similarity(T_world_old));
+  }
+  history_.Rescale(S_world_keyframe);
+  Map* const map = mapper_.MutableMap();
+  MoveKeyframes(S_world_keyframe, map);
+  if (adjustment != nullptr) {
+    const GlobalAdjustment::Work::Outcome& outcome = adjustment->Result();
+    TakeAdjustedLandmarks(outcome.before, outcome.after, map);
+  }
+  map->UpdateGeometry();
+  JoinPieces(merges, map);
+}
+
+int Odometry::Impl::FuseLoop(int older, int newer, const Similarity& S_older_newer) {
+  EnterMapping();
+  return tutti::FuseLoop(rig_.camera, older, newer, S_older_newer.RigidPart(), mapper_.MutableMap());
+}
+
+}  // namespace tutti

@@ -1,0 +1,39 @@
+// A second chance for the frame that tracking has lost.
+#pragma once
+
+#include <optional>
+
+#include "frontend/map/map.h"
+#include "frontend/odometry/pose_search.h"
+#include "frontend/odometry/tracked_frame.h"
+
+namespace tutti {
+
+/// Keeps the last frame if it has no pose, so that it can be looked for at a keyframe that somebody else has
+/// recognised, and tells when to give the map up. Value type.
+class Relocalizer {
+ public:
+  Relocalizer(const OdometryOptions& options, const CameraRig& rig)
+      : options_(options), search_(options, rig) {}
+
+  /// The frame has a pose: nothing is lost.
+  void Found();
+  /// The frame has no pose because there is no map yet.
+  void Wait(const TrackedFrame& frame) { lost_ = frame; }
+  /// The map has no pose for the frame. True: since longer than OdometryOptions::relocalize_s, frames with
+  /// something to see were lost. A covered lens says nothing about the place, and does not start that clock.
+  bool Lose(const TrackedFrame& frame);
+
+  /// Whether there is a frame to look for.
+  bool HasFrame() const { return lost_.has_value(); }
+  /// Where that frame is if it shows the same place as a keyframe. None if it does not, or if there is none.
+  std::optional<PoseFix> FindAt(int keyframe, const Map& map) const;
+
+ private:
+  OdometryOptions options_;
+  PoseSearch search_;
+  std::optional<TrackedFrame> lost_;
+  std::optional<double> since_s_;  // first lost frame with something to see [s]
+};
+
+}  // namespace tutti

@@ -1,0 +1,54 @@
+// What the parts of tracking hand to each other.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "frontend/features/features.h"
+#include "frontend/features/matcher.h"
+#include "tutti/core/pose.h"
+
+namespace tutti {
+
+/// A frame without pixels.
+struct TrackedFrame {
+  std::int64_t index = 0;
+  double stamp_s = 0;
+  std::shared_ptr<const FrameFeatures> features;
+};
+
+/// A pose of a frame, and what speaks for it.
+struct PoseFix {
+  explicit PoseFix(const TrackedFrame& f)
+      : frame(f), matches{f.features.get(), std::vector<int>(f.features->size(), -1)} {}
+
+  TrackedFrame frame;    ///< its features are aligned with their landmarks
+  FrameMatches matches;  ///< of frame.features
+  Pose T_camera_world;
+  int reference = -1;        ///< keyframe that shares most landmarks with it
+  std::vector<int> visible;  ///< landmarks that should be in view
+  std::vector<int> found;    ///< those that are, -1 between them
+  int inliers = 0;           ///< landmarks that agree with the pose
+
+  /// Inliers among the landmarks in view, of which there can't be more than features.
+  double Share() const {
+    const std::size_t most = std::min(visible.size(), frame.features->size());
+    return inliers / std::max(1.0, static_cast<double>(most));
+  }
+};
+
+/// The last frame with a pose, and how the camera moved to it: what the next frame is looked for from.
+struct LastFrame {
+  TrackedFrame frame;
+  FrameMatches matches;  ///< of frame.features
+  Pose T_camera_world;
+  std::optional<Vector6d> velocity;        ///< of T_camera_world, per second: T_now = Exp(v dt) T_last
+  int reference = -1;                      ///< keyframe that shares most landmarks with it; -1: no frame yet
+  int newest_keyframe = -1;                ///< or the one where the frame was found again
+  std::int64_t frames_since_keyframe = 0;  ///< 0: it is that keyframe
+};
+
+}  // namespace tutti

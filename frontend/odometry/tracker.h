@@ -1,0 +1,57 @@
+// The state of tracking: from frame to frame, against a map that others make.
+#pragma once
+
+#include <optional>
+
+#include "frontend/map/map.h"
+#include "frontend/odometry/keyframe_policy.h"
+#include "frontend/odometry/pose_search.h"
+#include "frontend/odometry/tracked_frame.h"
+#include "tutti/frontend/odometry.h"
+
+namespace tutti {
+
+/// Value type. Reads the map and never writes it: whoever changes the map tells it by FollowReference and
+/// FollowLandmarks.
+class Tracker {
+ public:
+  Tracker(const OdometryOptions& options, const CameraRig& rig)
+      : search_(options, rig), policy_(options, rig) {}
+
+  /// What became of a frame.
+  struct Tracked {
+    std::optional<PoseFix> fix;  ///< none: the frame is lost
+    KeyframeNeed need = KeyframeNeed::kNone;
+  };
+
+  TrackingState state() const { return state_; }
+  const LastFrame& last() const { return last_; }
+  const PoseSearch& search() const { return search_; }
+
+  /// The next frame, after Begin.
+  Tracked Track(const TrackedFrame& frame, const Map& map);
+  /// Goes on from a fix at a keyframe, where the motion so far says nothing (Relocalizer).
+  Tracked Relocalize(int keyframe, PoseFix fix, const Map& map);
+
+  /// The frame is the keyframe that a piece of the map starts with.
+  void Begin(const TrackedFrame& frame, const Keyframe& keyframe);
+  /// The last frame has become the newest keyframe.
+  void BecomeKeyframe(const Keyframe& keyframe);
+  /// The map is given up: kInitializing until Begin. The last frame stays, to start the next piece from.
+  void GiveUp();
+
+  /// The reference keyframe of the last frame has moved; the frame goes with it.
+  void FollowReference(const Pose& T_world_old, const Similarity& S_world_new);
+  /// Landmarks of the map were merged, removed, or added to the newest keyframe.
+  void FollowLandmarks(const Map& map);
+
+ private:
+  Tracked Accept(PoseFix fix, const Map& map);
+
+  PoseSearch search_;
+  KeyframePolicy policy_;
+  TrackingState state_ = TrackingState::kInitializing;
+  LastFrame last_;
+};
+
+}  // namespace tutti

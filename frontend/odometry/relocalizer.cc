@@ -10,7 +10,7 @@ void Relocalizer::Found() {
 bool Relocalizer::Lose(const TrackedFrame& frame) {
   lost_ = frame;
   if (frame.features->size() < static_cast<std::size_t>(options_.min_inliers)) return false;
-  if (!since_s_) since_s_ = frame.stamp_s;
+  if (!since_s_ || !(*since_s_ <= frame.stamp_s)) since_s_ = frame.stamp_s;  // NaN starts no clock
   const bool given_up = frame.stamp_s - *since_s_ > options_.relocalize_s;
   if (given_up) since_s_.reset();
   return given_up;

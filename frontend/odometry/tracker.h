@@ -26,7 +26,6 @@ class Tracker {
 
   TrackingState state() const { return state_; }
   const LastFrame& last() const { return last_; }
-  const PoseSearch& search() const { return search_; }
 
   /// The next frame, after Begin.
   Tracked Track(const TrackedFrame& frame, const Map& map);

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <random>
 
 namespace tutti {
@@ -126,6 +127,39 @@ TEST(RefinePose, OnePointSeenManyTimesIsDegenerateButFinite) {
   std::vector<char> inlier;
   RefinePose(Camera(), observations, &pose, &inlier);
   EXPECT_TRUE(pose.IsFinite());
+}
+
+struct PointsAndPixels {
+  std::vector<Eigen::Vector3d> points;
+  std::vector<cv::Point2f> pixels;
+};
+
+PointsAndPixels PnpProblem(int count) {
+  PointsAndPixels out;
+  for (const PointObservation& o : Seen(kTruth, count, false)) {
+    out.points.push_back(o.point);
+    out.pixels.emplace_back(static_cast<float>(o.pixel.x()), static_cast<float>(o.pixel.y()));
+  }
+  return out;
+}
+
+TEST(SolvePnp, FindsThePoseAmongOutliersWithoutAGuess) {
+  PointsAndPixels p = PnpProblem(60);
+  for (std::size_t i = 0; i < 60; i += 3) p.pixels[i] += cv::Point2f(90, -70);
+  const std::optional<Pose> pose = SolvePnp(Camera(), p.points, p.pixels, 30);
+  ASSERT_TRUE(pose);
+  EXPECT_LT(Distance(*pose, kTruth), 0.01);
+  EXPECT_FALSE(SolvePnp(Camera(), p.points, p.pixels, 41)) << "40 are inliers";
+}
+
+TEST(SolvePnp, TooFewOrDegeneratePointsHaveNoPose) {
+  for (const int count : {0, 1, 3}) {
+    const PointsAndPixels p = PnpProblem(count);
+    EXPECT_FALSE(SolvePnp(Camera(), p.points, p.pixels, 4)) << count;
+  }
+  const std::vector<Eigen::Vector3d> nowhere(
+      20, Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()));
+  EXPECT_FALSE(SolvePnp(Camera(), nowhere, PnpProblem(20).pixels, 4));
 }
 
 }  // namespace

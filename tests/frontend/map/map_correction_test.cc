@@ -1,4 +1,6 @@
 // What loops do to the odometry's map: fusion, and bundle adjustment of everything.
+#include "frontend/map/map_correction.h"
+
 #include <gtest/gtest.h>
 
 #include "tests/support/recording.h"
@@ -114,6 +116,32 @@ TEST(MapCorrection, NeighboursShareWhatTheySee) {
   const int a = ids[ids.size() - 2], b = ids.back();
   const Similarity S(odometry.KeyframePose(a).Inverse() * odometry.KeyframePose(b));
   EXPECT_GT(odometry.FuseLoop(a, b, S), 100);
+}
+
+std::vector<int> PiecesAfter(const std::map<int, int>& joined) {
+  Map map(PyramidScales(OdometryOptions()));
+  for (int piece = 0; piece < 4; ++piece) {
+    tutti::Keyframe k;
+    k.piece = piece;
+    k.features = std::make_shared<FrameFeatures>();
+    map.AddKeyframe(k);
+  }
+  JoinPieces(joined, &map);
+  std::vector<int> pieces;
+  for (int id = 0; id < 4; ++id) pieces.push_back(std::as_const(map).keyframe(id).piece);
+  return pieces;
+}
+
+TEST(JoinPieces, FollowsAPieceToTheOneThatItEndsIn) {
+  EXPECT_EQ(PiecesAfter({}), (std::vector<int>{0, 1, 2, 3}));
+  EXPECT_EQ(PiecesAfter({{2, 1}, {1, 0}}), (std::vector<int>{0, 0, 0, 3}));
+  EXPECT_EQ(PiecesAfter({{3, 3}, {7, 0}}), (std::vector<int>{0, 1, 2, 3})) << "itself; one that is not there";
+}
+
+TEST(JoinPieces, EndsWherePiecesJoinInACircle) {
+  const std::vector<int> pieces = PiecesAfter({{1, 2}, {2, 1}});
+  EXPECT_EQ(pieces[0], 0);
+  EXPECT_EQ(pieces[3], 3);
 }
 
 }  // namespace

@@ -1,0 +1,100 @@
+#include "frontend/odometry/frame_history.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "frontend/map/map_correction.h"
+#include "tests/frontend/odometry/tracked_scene.h"
+
+namespace tutti {
+namespace {
+
+using testing::Distance;
+using testing::Moved;
+
+// Keyframes 0, 1 (at x = 1) and 2 (at x = 2, of piece 1).
+class FrameHistoryTest : public ::testing::Test, protected testing::TrackedScene {
+ protected:
+  FrameHistoryTest() {
+    std::vector<int> order;
+    AddKeyframe(Moved(1, 0), &order);
+    map_.keyframe(AddKeyframe(Moved(2, 0), &order)).piece = 1;
+  }
+  void Add(double stamp_s, double x, int reference) {
+    history_.Add({static_cast<std::int64_t>(10 * stamp_s), stamp_s, nullptr}, Moved(x, 0.5, 0.1).Inverse(),
+                 std::as_const(map_).keyframe(reference));
+  }
+  FrameHistory history_;
+};
+
+TEST_F(FrameHistoryTest, NoFramesHaveNoPosesAndNoPieces) {
+  EXPECT_TRUE(history_.Pieces(map_).empty());
+  for (const int piece : {-1, 0, 7}) {
+    EXPECT_TRUE(history_.Poses(map_, piece).empty());
+    EXPECT_TRUE(history_.Indices(map_, piece).empty());
+  }
+  history_.Rescale({{0, Similarity(2, ExpSO3({0, 0, 0}), {0, 0, 0})}});
+  EXPECT_TRUE(history_.Poses(Map(PyramidScales(OdometryOptions())), -1).empty()) << "nor in an empty map";
+}
+
+TEST_F(FrameHistoryTest, TellsPosesAndIndicesOfFrames) {
+  Add(0.1, 0.2, 0);
+  Add(0.2, 0.9, 1);
+  const Trajectory poses = history_.Poses(map_, 0);
+  ASSERT_EQ(poses.size(), 2U);
+  EXPECT_DOUBLE_EQ(poses[1].stamp_s, 0.2);
+  EXPECT_LT(Distance(poses[0].pose, Moved(0.2, 0.5, 0.1)), 1e-9);
+  EXPECT_LT(Distance(poses[1].pose, Moved(0.9, 0.5, 0.1)), 1e-9);
+  EXPECT_EQ(history_.Indices(map_, 0), (std::vector<std::int64_t>{1, 2}));
+}
+
+TEST_F(FrameHistoryTest, FramesFollowTheirKeyframesWithTheirScale) {
+  Add(0.1, 0.2, 0);
+  Add(0.2, 1.3, 1);
+  const std::map<int, Similarity> moved{{1, Similarity(2, ExpSO3({0, 0, 0}), {5, 0, 0})}};
+  history_.Rescale(moved);
+  MoveKeyframes(moved, &map_);
+  const Trajectory poses = history_.Poses(map_, 0);
+  EXPECT_LT(Distance(poses[0].pose, Moved(0.2, 0.5, 0.1)), 1e-9) << "its keyframe stays";
+  EXPECT_LT((poses[1].pose.translation - Eigen::Vector3d(5.6, 0, 1)).norm(), 1e-9);
+}
+
+TEST_F(FrameHistoryTest, PiecesComeByTheirNumberOfFrames) {
+  Add(0.1, 0, 0);
+  Add(0.2, 2, 2);
+  EXPECT_EQ(history_.Pieces(map_), (std::vector<int>{0, 1})) << "ties: the older one";
+  Add(0.3, 2, 2);
+  EXPECT_EQ(history_.Pieces(map_), (std::vector<int>{1, 0}));
+  EXPECT_EQ(history_.Indices(map_, -1), (std::vector<std::int64_t>{2, 3})) << "the one with most frames";
+  EXPECT_EQ(history_.Indices(map_, 0), std::vector<std::int64_t>{1});
+  EXPECT_TRUE(history_.Poses(map_, 2).empty()) << "no such piece";
+}
+
+TEST_F(FrameHistoryTest, FramesOfJoinedPiecesAreOfOne) {
+  Add(0.1, 0, 0);
+  Add(0.2, 2, 2);
+  JoinPieces({{1, 0}}, &map_);
+  EXPECT_EQ(history_.Pieces(map_), std::vector<int>{0});
+  EXPECT_EQ(history_.Poses(map_, 0).size(), 2U);
+}
+
+TEST_F(FrameHistoryTest, KnowsWhatIsLaterThanAllItsFrames) {
+  EXPECT_TRUE(history_.IsLater(-7));
+  Add(0.2, 0, 0);
+  EXPECT_FALSE(history_.IsLater(0.1));
+  EXPECT_FALSE(history_.IsLater(0.2));
+  EXPECT_TRUE(history_.IsLater(0.3));
+  EXPECT_FALSE(history_.IsLater(std::numeric_limits<double>::quiet_NaN()));
+}
+
+TEST_F(FrameHistoryTest, ACopyGoesOnAlone) {
+  Add(0.1, 0, 0);
+  const FrameHistory copy = history_;
+  Add(0.2, 0, 0);
+  EXPECT_EQ(copy.Poses(map_, 0).size(), 1U);
+  EXPECT_EQ(history_.Poses(map_, 0).size(), 2U);
+}
+
+}  // namespace
+}  // namespace tutti

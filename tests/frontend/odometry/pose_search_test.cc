@@ -1,0 +1,139 @@
+#include "frontend/odometry/pose_search.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "tests/frontend/odometry/tracked_scene.h"
+
+namespace tutti {
+namespace {
+
+using testing::Distance;
+using testing::Moved;
+
+class PoseSearchTest : public ::testing::Test, protected testing::TrackedScene {
+ protected:
+  std::optional<PoseFix> Find(const TrackedFrame& frame, const LastFrame& last, bool lost = false) const {
+    return PoseSearch(options_, Rig()).Find(map_, frame, last, lost);
+  }
+  OdometryOptions options_;
+};
+
+TEST_F(PoseSearchTest, FindsAFrameNearTheLastOne) {
+  const Pose T_world_camera = Moved(0.1, 0.05, 0.01);
+  const TrackedFrame frame = Frame(T_world_camera, 0.1);
+  const auto fix = Find(frame, AtFirstKeyframe());
+  ASSERT_TRUE(fix);
+  EXPECT_LT(Distance(fix->T_camera_world, T_world_camera.Inverse()), 1e-5);
+  EXPECT_EQ(fix->reference, 0);
+  EXPECT_GT(fix->inliers, 200);
+  EXPECT_EQ(fix->frame.features, frame.features) << "no patch to align with";
+  EXPECT_GE(fix->visible.size(), static_cast<std::size_t>(fix->inliers));
+  EXPECT_LE(fix->Share(), 1);
+}
+
+TEST_F(PoseSearchTest, GoesOnWithTheVelocityWhereTheLastPoseIsTooFarAway) {
+  std::vector<int> order;
+  for (int i = 0; i < 12; ++i) AddKeyframe(Pose(), &order);  // without landmarks: no help
+  LastFrame last = AtFirstKeyframe();
+  last.reference = last.newest_keyframe = 12;
+  const Pose T_world_camera = Moved(0, 0, 0.3);  // 130 px in the image
+  EXPECT_FALSE(Find(Frame(T_world_camera, 0.2), last));
+  last.velocity = LogSE3(T_world_camera.Inverse()) / 0.2;
+  const auto fix = Find(Frame(T_world_camera, 0.2), last);
+  ASSERT_TRUE(fix);
+  EXPECT_LT(Distance(fix->T_camera_world, T_world_camera.Inverse()), 1e-5);
+  EXPECT_TRUE(Find(Frame(Pose(), 0.2), last)) << "or it has stopped";
+}
+
+TEST_F(PoseSearchTest, FindsAFrameFarFromTheMotionByItsKeyframe) {
+  const Pose T_world_camera = Moved(0.3, 0, 0.4);
+  const auto fix = Find(Frame(T_world_camera, 0.1), AtFirstKeyframe());
+  ASSERT_TRUE(fix);
+  EXPECT_LT(Distance(fix->T_camera_world, T_world_camera.Inverse()), 1e-5);
+}
+
+TEST_F(PoseSearchTest, WhatNobodyHasSeenIsNowhere) {
+  EXPECT_FALSE(Find(Elsewhere(0.1), AtFirstKeyframe()));
+  EXPECT_FALSE(PoseSearch(options_, Rig()).FindAt(map_, Elsewhere(0.1), 0));
+}
+
+TEST_F(PoseSearchTest, AFrameWithoutFeaturesIsNowhere) {
+  EXPECT_FALSE(Find(Nothing(0.1), AtFirstKeyframe()));
+  EXPECT_FALSE(PoseSearch(options_, Rig()).FindAt(map_, Nothing(0.1), 0));
+}
+
+TEST_F(PoseSearchTest, AfterAFrameThatHadNothingToSeeTheKeyframeHelps) {
+  LastFrame last = AtFirstKeyframe();
+  last.frame = Nothing(0);
+  last.matches = {last.frame.features.get(), {}};
+  EXPECT_TRUE(Find(Frame(Pose(), 0.1), last));
+}
+
+TEST_F(PoseSearchTest, ALostFrameNeedsTwiceTheLandmarks) {
+  const TrackedFrame frame = Frame(Moved(0.1, 0), 0.1);
+  const auto fix = Find(frame, AtFirstKeyframe());
+  ASSERT_TRUE(fix);
+  options_.min_inliers = 2 * fix->inliers / 3;
+  EXPECT_TRUE(Find(frame, AtFirstKeyframe(), false));
+  EXPECT_FALSE(Find(frame, AtFirstKeyframe(), true));
+  EXPECT_FALSE(PoseSearch(options_, Rig()).FindAt(map_, frame, 0)) << "nor is it believed at a keyframe";
+}
+
+TEST_F(PoseSearchTest, FindsAFrameAtAKeyframeThatExists) {
+  const Pose T_world_camera = Moved(0.3, 0, 0.4);
+  const TrackedFrame frame = Frame(T_world_camera, 0.1);
+  const PoseSearch search(options_, Rig());
+  const auto fix = search.FindAt(map_, frame, 0);
+  ASSERT_TRUE(fix);
+  EXPECT_LT(Distance(fix->T_camera_world, T_world_camera.Inverse()), 1e-5);
+  for (const int no_such : {-1, 1, 1000000}) EXPECT_FALSE(search.FindAt(map_, frame, no_such)) << no_such;
+}
+
+TEST_F(PoseSearchTest, AnEmptyMapHasNoPlace) {
+  const Map empty(PyramidScales(options_));
+  const PoseSearch search(options_, Rig());
+  EXPECT_FALSE(search.Find(empty, Frame(Pose(), 0), LastFrame(), false));
+  EXPECT_FALSE(search.FindAt(empty, Frame(Pose(), 0), 0));
+}
+
+TEST_F(PoseSearchTest, AStampThatIsNoNumberPredictsNothingAndIsFoundAllTheSame) {
+  for (const double stamp_s :
+       {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(),
+        -std::numeric_limits<double>::infinity()}) {
+    LastFrame last = AtFirstKeyframe();
+    last.velocity = Vector6d::Constant(0.3);
+    TrackedFrame frame = Frame(Moved(0.1, 0), 0.1);
+    frame.stamp_s = stamp_s;
+    const auto fix = Find(frame, last);
+    ASSERT_TRUE(fix) << stamp_s;
+    EXPECT_LT(Distance(fix->T_camera_world, Moved(0.1, 0).Inverse()), 1e-5) << stamp_s;
+  }
+}
+
+TEST_F(PoseSearchTest, RefineDropsWhatDoesNotFit) {
+  const Pose T_world_camera = Moved(0.1, 0.05, 0.01);
+  const TrackedFrame frame = Frame(Pose(), 0.1);
+  FrameMatches matches{frame.features.get(), map_.keyframe(0).landmarks};
+  std::swap(matches.landmarks[3], matches.landmarks[90]);
+  Pose pose = T_world_camera.Inverse();
+  const int count = static_cast<int>(matches.landmarks.size());
+  EXPECT_EQ(PoseSearch(options_, Rig()).Refine(map_, &matches, &pose), count - 2);
+  EXPECT_LT(Distance(pose, Pose()), 1e-5);
+  EXPECT_EQ(matches.landmarks[3], -1);
+  EXPECT_EQ(matches.landmarks[90], -1);
+  EXPECT_EQ(matches.landmarks[4], 4);
+}
+
+TEST_F(PoseSearchTest, RefineLeavesAPoseThatTooFewMatchesHold) {
+  const TrackedFrame frame = Frame(Pose(), 0.1);
+  FrameMatches matches{frame.features.get(), std::vector<int>(frame.features->size(), -1)};
+  for (std::size_t f = 0; f < 5; ++f) matches.landmarks[f] = static_cast<int>(f);
+  Pose pose = Moved(1, 2);
+  EXPECT_EQ(PoseSearch(options_, Rig()).Refine(map_, &matches, &pose), 0);
+  EXPECT_EQ(pose.Matrix(), Moved(1, 2).Matrix());
+}
+
+}  // namespace
+}  // namespace tutti

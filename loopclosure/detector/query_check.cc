@@ -1,12 +1,14 @@
-// What a query must be: misuse is refused with a message before anything changes.
+#include "loopclosure/detector/query_check.h"
+
 #include <algorithm>
 #include <cmath>
+#include <string>
 
-#include "loopclosure/detector/detector_impl.h"
+#include "loopclosure/geometry/verification.h"
 #include "loopclosure/memory/dense.h"
 #include "tutti/core/error.h"
 
-namespace tutti {
+namespace tutti::internal {
 namespace {
 
 // A mask and rectangles that belong to this image.
@@ -58,62 +60,12 @@ void CheckDense(const Features& features, int width, const std::string& which) {
   if (!problem.empty()) throw InputError(which + problem);
 }
 
-}  // namespace
-
-void LoopDetector::Impl::CheckQuery(const LoopQuery& query) const {
-  const std::string which = "location " + std::to_string(query.id) + ": ";
-  if (query.id < 0) throw InputError(which + "ids must not be negative");
-  if (memory().size() > 0 && query.id <= last_id_) {
-    throw InputError(which + "ids must grow, but the one before was " + std::to_string(last_id_));
-  }
-  CheckContent(query);
-}
-
-void LoopDetector::Impl::CheckContent(const LoopQuery& query) const {
-  const std::string which = "location " + std::to_string(query.id) + ": ";
-  CheckCallersFeatures(query, which);
-  CheckMemberFeatures(query, which);
-  if (!query.depth_m.empty() &&
-      (query.depth_m.type() != CV_32FC1 || query.depth_m.size() != query.image.size())) {
-    throw InputError(which + "depth_m must be CV_32FC1 in metres and as large as the image");
-  }
-  CheckRegions(query, which);
-  if (query.pose_prior) {
-    const PosePrior& p = *query.pose_prior;
-    if (!p.position_m.allFinite() || !(p.sigma_m > 0) || !(p.drift >= 0) || !std::isfinite(p.sigma_m) ||
-        !std::isfinite(p.drift)) {
-      throw InputError(which + "pose_prior needs a finite position, sigma_m above 0 and drift 0 or more");
-    }
-  }
-  if (query.camera) {
-    const std::string problem = query.camera->Validate();
-    if (!problem.empty()) throw InputError(which + problem);
-  }
-}
-
-void LoopDetector::Impl::CheckCallersFeatures(const LoopQuery& query, const std::string& which) const {
-  const FeatureSet& f = query.features;
-  const std::size_t n = f.keypoints.size();
-  CheckKeypoints(f.keypoints, f.descriptors, which);
-  if (!f.points.empty() && f.points.size() != n) {
-    throw InputError(which + std::to_string(n) + " keypoints but " + std::to_string(f.points.size()) +
-                     " points; give none or one each (NaN where unknown)");
-  }
-  if (n == 0) return;
-  if (f.descriptors.type() != CV_8U && f.descriptors.type() != CV_32F) {
-    throw InputError(which + "descriptors must be CV_8U (Hamming) or CV_32F (Euclidean)");
-  }
-  if (caller_type_ >= 0 && (f.descriptors.type() != caller_type_ || f.descriptors.cols != caller_width_)) {
-    throw InputError(which +
-                     "descriptors are of another type or width than before; give every image the same kind");
-  }
-}
-
-void LoopDetector::Impl::CheckFeaturesOf(const std::string& name, const Features& features,
-                                         const std::string& which) const {
+// Features that the caller has extracted for the member of this name.
+void CheckFeaturesOf(const std::string& name, const Features& features, const std::vector<Member>& members,
+                     const std::string& which) {
   const auto member =
-      std::find_if(members_.begin(), members_.end(), [&](const Member& m) { return m.name() == name; });
-  if (member == members_.end()) {
+      std::find_if(members.begin(), members.end(), [&](const Member& m) { return m.name() == name; });
+  if (member == members.end()) {
     throw InputError(which + "features of member '" + name + "', which is not in options.members");
   }
   if (member->dense()) {
@@ -125,9 +77,10 @@ void LoopDetector::Impl::CheckFeaturesOf(const std::string& name, const Features
   if (!problem.empty()) throw InputError(which + name + ": " + problem);
 }
 
-void LoopDetector::Impl::CheckMemberFeatures(const LoopQuery& query, const std::string& which) const {
-  for (const auto& [name, features] : query.member_features) CheckFeaturesOf(name, features, which);
-  for (const Member& member : members_) {
+void CheckMemberFeatures(const LoopQuery& query, const std::vector<Member>& members,
+                         const std::string& which) {
+  for (const auto& [name, features] : query.member_features) CheckFeaturesOf(name, features, members, which);
+  for (const Member& member : members) {
     if (member.external() && query.member_features.count(member.name()) == 0) {
       throw InputError(which + "member '" + member.name() +
                        "' is external: give its features in member_features (none at all is fine, too)");
@@ -135,4 +88,56 @@ void LoopDetector::Impl::CheckMemberFeatures(const LoopQuery& query, const std::
   }
 }
 
-}  // namespace tutti
+void CheckCallersFeatures(const FeatureSet& f, const CallersDescriptors& before, const std::string& which) {
+  const std::size_t n = f.keypoints.size();
+  CheckKeypoints(f.keypoints, f.descriptors, which);
+  if (!f.points.empty() && f.points.size() != n) {
+    throw InputError(which + std::to_string(n) + " keypoints but " + std::to_string(f.points.size()) +
+                     " points; give none or one each (NaN where unknown)");
+  }
+  if (n == 0) return;
+  if (f.descriptors.type() != CV_8U && f.descriptors.type() != CV_32F) {
+    throw InputError(which + "descriptors must be CV_8U (Hamming) or CV_32F (Euclidean)");
+  }
+  if (before.type >= 0 && (f.descriptors.type() != before.type || f.descriptors.cols != before.width)) {
+    throw InputError(which +
+                     "descriptors are of another type or width than before; give every image the same kind");
+  }
+}
+
+void CheckPrior(const PosePrior& prior, const std::string& which) {
+  if (!prior.position_m.allFinite() || !(prior.sigma_m > 0) || !(prior.drift >= 0) ||
+      !std::isfinite(prior.sigma_m) || !std::isfinite(prior.drift)) {
+    throw InputError(which + "pose_prior needs a finite position, sigma_m above 0 and drift 0 or more");
+  }
+}
+
+std::string Which(std::int64_t id) { return "location " + std::to_string(id) + ": "; }
+
+}  // namespace
+
+void CheckId(std::int64_t id, std::int64_t last_id) {
+  if (id < 0) throw InputError(Which(id) + "ids must not be negative");
+  if (id <= last_id) {
+    throw InputError(Which(id) + "ids must grow, but the one before was " + std::to_string(last_id));
+  }
+}
+
+void CheckQuery(const LoopQuery& query, const std::vector<Member>& members,
+                const CallersDescriptors& before) {
+  const std::string which = Which(query.id);
+  CheckCallersFeatures(query.features, before, which);
+  CheckMemberFeatures(query, members, which);
+  if (!query.depth_m.empty() &&
+      (query.depth_m.type() != CV_32FC1 || query.depth_m.size() != query.image.size())) {
+    throw InputError(which + "depth_m must be CV_32FC1 in metres and as large as the image");
+  }
+  CheckRegions(query, which);
+  if (query.pose_prior) CheckPrior(*query.pose_prior, which);
+  if (query.camera) {
+    const std::string problem = query.camera->Validate();
+    if (!problem.empty()) throw InputError(which + problem);
+  }
+}
+
+}  // namespace tutti::internal

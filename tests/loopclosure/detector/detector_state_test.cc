@@ -1,0 +1,115 @@
+#include "loopclosure/detector/detector_state.h"
+
+#include <gtest/gtest.h>
+
+#include "loopclosure/geometry/view_bytes.h"
+#include "tests/loopclosure/detector/shown_state.h"
+
+namespace tutti::internal {
+namespace {
+
+using tutti::testing::OneMember;
+using tutti::testing::Query;
+using tutti::testing::RefusalOf;
+using tutti::testing::Show;
+
+std::string BytesOf(const View& view) {
+  ByteWriter out;
+  SaveView(view, out);
+  return out.bytes();
+}
+
+void Load(DetectorState& state, int slot, const View& view) {
+  const std::string bytes = BytesOf(view);
+  ByteReader in(bytes, "test");
+  state.LoadView(slot, in);
+}
+
+TEST(DetectorState, EveryLocationHasItsViewUntilItIsDropped) {
+  DetectorState state(OneMember());
+  EXPECT_EQ(state.last_id(), -1);
+  EXPECT_FALSE(state.HasView(0));
+  const View& view = Show(state, Query(7, tutti::testing::WalkImage(0, 9)));
+  EXPECT_EQ(view.id, 7);
+  EXPECT_EQ(state.last_id(), 7);
+  ASSERT_TRUE(state.HasView(0));
+  EXPECT_EQ(state.view(0).id, 7);
+  state.DropView(0);
+  EXPECT_FALSE(state.HasView(0));
+  state.PutViewWithoutFeatures(0);
+  ASSERT_TRUE(state.HasView(0));
+  EXPECT_TRUE(state.view(0).members.front().pixels.empty());
+}
+
+TEST(DetectorState, AQueryThatIsMergedAwayStillHasAViewForGeometry) {
+  LoopDetectorOptions options = OneMember();
+  options.stm_size = 3;
+  options.rehearsal = true;
+  DetectorState state(options);
+  const cv::Mat image = tutti::testing::WalkImage(0, 9);
+  Show(state, Query(0, image));
+  const View& view = Show(state, Query(1, image));
+  EXPECT_EQ(view.id, 1);
+  EXPECT_FALSE(view.members.front().pixels.empty());
+  EXPECT_FALSE(state.HasView(1));
+  EXPECT_EQ(state.memory().Find(1), 0);
+  EXPECT_EQ(Show(state, Query(2, tutti::testing::WalkImage(1, 9))).id, 2);
+  EXPECT_EQ(state.view(2).id, 2);
+}
+
+TEST(DetectorState, AViewOfAnotherLocationOrOtherMembersOrAnotherKindIsRefused) {
+  DetectorState state(OneMember());
+  Show(state, 0, 2);
+  const View good = state.view(1);
+  EXPECT_NO_THROW(Load(state, 1, good));
+  EXPECT_NE(RefusalOf([&] { Load(state, 0, good); }).find("another location"), std::string::npos);
+  View bad = good;
+  bad.members.push_back(bad.members.front());
+  EXPECT_NE(RefusalOf([&] { Load(state, 1, bad); }).find("other members"), std::string::npos);
+  bad = good;
+  bad.caller.pixels = {{1, 2}};
+  bad.caller.descriptors = cv::Mat::zeros(1, 8, CV_8U);
+  EXPECT_NE(RefusalOf([&] { Load(state, 1, bad); }).find("another kind"), std::string::npos);
+  EXPECT_EQ(BytesOf(state.view(1)), BytesOf(good));
+}
+
+TEST(DetectorState, ViewsGoToAStoreAndComeBackTheSame) {
+  DetectorState state(OneMember());
+  Show(state, 0, 2);
+  LocationStore store("");
+  state.StoreView(0, store);
+  const std::string before = BytesOf(state.view(0));
+  state.DropView(0);
+  state.FetchView(0, store);
+  EXPECT_EQ(BytesOf(state.view(0)), before);
+  EXPECT_NE(RefusalOf([&] { state.FetchView(1, store); }).find("location 1 are missing"), std::string::npos);
+  store.Put(LocationStore::Kind::kView, 0, 1, before.substr(0, before.size() / 2));
+  EXPECT_THROW(state.FetchView(1, store), InputError);
+}
+
+TEST(DetectorState, StatisticsComeBackTheSameAndDamagedOnesAreRefused) {
+  DetectorState state(OneMember());
+  LoopQuery query = Query(4, tutti::testing::WalkImage(0, 9));
+  query.features.keypoints = {{cv::Point2f(40, 100), 8}};
+  query.features.descriptors = cv::Mat::zeros(1, 16, CV_32F);
+  Show(state, query);
+  const std::string bytes = state.Statistics();
+  DetectorState other(OneMember());
+  ByteReader in(bytes, "test");
+  other.LoadStatistics(in);
+  EXPECT_TRUE(in.AtEnd());
+  EXPECT_EQ(other.last_id(), 4);
+  EXPECT_EQ(other.callers_descriptors().type, CV_32F);
+  EXPECT_EQ(other.callers_descriptors().width, 16);
+  EXPECT_EQ(other.Statistics(), bytes);
+  // The last location that they speak of is not there.
+  EXPECT_NE(RefusalOf([&] { other.CheckMemories("test"); }).find("last location"), std::string::npos);
+  EXPECT_EQ(RefusalOf([&] { state.CheckMemories("test"); }), "");
+  for (std::size_t length = 0; length < bytes.size(); ++length) {
+    ByteReader cut(std::string_view(bytes).substr(0, length), "test");
+    EXPECT_THROW(DetectorState(OneMember()).LoadStatistics(cut), InputError) << length;
+  }
+}
+
+}  // namespace
+}  // namespace tutti::internal

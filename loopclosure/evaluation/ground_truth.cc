@@ -19,33 +19,11 @@ LoopLabel LabelOf(double value) {
   return value == 1.0 || value >= 250.0 ? LoopLabel::kLoop : LoopLabel::kIgnore;
 }
 
-// Some authors give the upper triangle: row = past image.
-LoopGroundTruth FromValues(const std::vector<double>& values, int size) {
-  bool lower_used = false;
-  bool upper_used = false;
-  const auto at = [&](int r, int c) {
-    return values[static_cast<std::size_t>(r) * static_cast<std::size_t>(size) + static_cast<std::size_t>(c)];
-  };
-  for (int r = 0; r < size; ++r) {
-    for (int c = 0; c < size; ++c) {
-      if (r == c || at(r, c) == 0.0) continue;
-      (c < r ? lower_used : upper_used) = true;
-    }
-  }
-  const bool transpose = upper_used && !lower_used;
-  LoopGroundTruth truth(size);
-  for (int r = 0; r < size; ++r) {
-    for (int c = 0; c < r; ++c) truth.Set(r, c, LabelOf(transpose ? at(c, r) : at(r, c)));
-  }
-  return truth;
-}
-
 LoopGroundTruth ReadImage(const std::filesystem::path& file) {
   const cv::Mat image = cv::imread(file.string(), cv::IMREAD_GRAYSCALE);
   if (image.empty()) {
-    throw InputError(
-        file.string() +
-        ": not an image, text or MATLAB v5 file that can be read; give a loop matrix or a trajectory");
+    throw InputError(file.string() +
+                     ": not an image or a text that can be read; give a loop matrix or a trajectory");
   }
   if (image.rows != image.cols) {
     throw InputError(file.string() + ": a loop matrix must be square, this one is " +
@@ -60,7 +38,7 @@ LoopGroundTruth ReadImage(const std::filesystem::path& file) {
       values.push_back(grey == 1 ? 1.0 : grey < 6 ? 0.0 : grey);
     }
   }
-  return FromValues(values, image.rows);
+  return LoopsFromMatrix(values, image.rows);
 }
 
 bool LooksLikeText(const std::string& head) {
@@ -122,7 +100,7 @@ LoopGroundTruth ReadText(const std::filesystem::path& file, int num_images) {
   }
   std::vector<double> values;
   for (const std::vector<double>& row : rows) values.insert(values.end(), row.begin(), row.end());
-  return FromValues(values, static_cast<int>(columns));
+  return LoopsFromMatrix(values, static_cast<int>(columns));
 }
 
 }  // namespace
@@ -196,6 +174,31 @@ std::string LoopRule::Validate() const {
   return {};
 }
 
+LoopGroundTruth LoopsFromMatrix(const std::vector<double>& values, int size) {
+  if (size < 0 || values.size() != static_cast<std::size_t>(size) * static_cast<std::size_t>(size)) {
+    throw InputError("a loop matrix of " + std::to_string(size) + " images can't have " +
+                     std::to_string(values.size()) + " labels");
+  }
+  bool lower_used = false;
+  bool upper_used = false;
+  const auto at = [&](int r, int c) {
+    return values[static_cast<std::size_t>(r) * static_cast<std::size_t>(size) + static_cast<std::size_t>(c)];
+  };
+  for (int r = 0; r < size; ++r) {
+    for (int c = 0; c < size; ++c) {
+      if (r == c || at(r, c) == 0.0) continue;
+      (c < r ? lower_used : upper_used) = true;
+    }
+  }
+  // Some authors give the upper triangle: row = past image.
+  const bool transpose = upper_used && !lower_used;
+  LoopGroundTruth truth(size);
+  for (int r = 0; r < size; ++r) {
+    for (int c = 0; c < r; ++c) truth.Set(r, c, LabelOf(transpose ? at(c, r) : at(r, c)));
+  }
+  return truth;
+}
+
 LoopGroundTruth ReadLoopMatrix(const std::filesystem::path& file, int num_images) {
   std::ifstream in(file, std::ios::binary);
   if (!in) throw InputError(file.string() + ": can't be opened; check the path of the ground truth");
@@ -205,16 +208,7 @@ LoopGroundTruth ReadLoopMatrix(const std::filesystem::path& file, int num_images
   if (head.empty()) throw InputError(file.string() + ": is empty or a folder");
   in.close();
 
-  LoopGroundTruth truth;
-  if (head.rfind("MATLAB 5.0", 0) == 0) {
-    int size = 0;
-    const std::vector<double> values = ReadMatSquareMatrix(file, size);
-    truth = FromValues(values, size);
-  } else if (LooksLikeText(head)) {
-    truth = ReadText(file, num_images);
-  } else {
-    truth = ReadImage(file);
-  }
+  LoopGroundTruth truth = LooksLikeText(head) ? ReadText(file, num_images) : ReadImage(file);
   truth.description = file.string();
   return truth;
 }

@@ -199,7 +199,7 @@ void AddLoopsCommand(CLI::App& app, int& exit_code) {
   command->add_option("--images", arguments->images, "folder of images, taken in natural order")->required();
   command
       ->add_option("--ground-truth", arguments->truth.file,
-                   "loop matrix (PNG, BMP, text, MATLAB v5 .mat; row = current image) or trajectory (TUM, "
+                   "loop matrix (PNG, BMP, text, MATLAB .mat; row = current image) or trajectory (TUM, "
                    "KITTI, EuRoC)")
       ->required();
   command->add_option("--out", arguments->out, "folder for results.json, hypotheses.csv, curves and pictures")

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "apps/tutti/loops/joined_pairs.h"
+#include "apps/tutti/loops/mat_file.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 #include "tutti/core/trajectory.h"
@@ -148,7 +149,8 @@ LoopGroundTruth LoadGroundTruth(const GroundTruthArguments& arguments, const std
   if (LooksLikeTrajectory(arguments.file)) return FromPoses(arguments, images);
   const int all = static_cast<int>(images.size());
   const int used = (all + arguments.stride - 1) / arguments.stride;
-  LoopGroundTruth truth = ReadLoopMatrix(arguments.file, all);
+  LoopGroundTruth truth =
+      IsMatFile(arguments.file) ? ReadMatLoops(arguments.file) : ReadLoopMatrix(arguments.file, all);
   if (arguments.join_pairs && truth.size() == 2 * all) truth = truth.PairsJoined();
   if (truth.size() == used) return truth;
   if (truth.size() == all) return truth.Strided(arguments.stride);

@@ -8,6 +8,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "tests/apps/tutti/executable.h"
+#include "tests/apps/tutti/mat_bytes.h"
 #include "tests/loopclosure/features/textured_image.h"
 #include "tests/support/test_data.h"
 #include "tutti/core/text.h"
@@ -280,6 +281,23 @@ TEST_F(LoopsCommand, TransposedGroundTruthIsTheSameGroundTruth) {
   ASSERT_EQ(Run(Truth(transposed), folder_ / "transposed").status, 0);
   EXPECT_EQ(ReadAll(out_ / "hypotheses.csv"), ReadAll(folder_ / "transposed" / "hypotheses.csv"));
   EXPECT_EQ(ReadAll(out_ / "precision_recall.csv"), ReadAll(folder_ / "transposed" / "precision_recall.csv"));
+}
+
+TEST_F(LoopsCommand, AMatlabFileIsTheSameGroundTruthAndADamagedOneIsOneLine) {
+  WriteImages(2);
+  const auto write = [this](const std::string& bytes) {
+    WriteAll(folder_ / "truth.mat", bytes);
+    return folder_ / "truth.mat";
+  };
+  const std::string mat = testing::MatHeader() +
+                          testing::MatVariable(testing::kDoubles, 2, 2,
+                                               testing::MatElement<double>(testing::kDouble, {0, 1, 0, 0}));
+  const auto run = Run(write(mat), out_);
+  ASSERT_EQ(run.status, 0) << run.output;
+  EXPECT_EQ(Json(out_ / "results.json")["rows_with_loop"], 1);
+  const auto damaged = Run(write(mat.substr(0, mat.size() - 9)), out_);
+  EXPECT_EQ(damaged.status, 1);
+  EXPECT_NE(damaged.output.find("truth.mat: damaged MATLAB file"), std::string::npos) << damaged.output;
 }
 
 TEST_F(LoopsCommand, NoLoopInTheGroundTruthMakesEveryAcceptedOneFalse) {

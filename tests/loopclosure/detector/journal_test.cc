@@ -24,7 +24,7 @@ class JournalTest : public ::testing::Test {
   std::string Reopened(std::int64_t* last_id = nullptr) {
     DetectorState state(OneMember());
     Journal journal(state);
-    const std::string refusal = RefusalOf([&] { journal.Reopen(store_); });
+    std::string refusal = RefusalOf([&] { journal.Reopen(store_); });
     if (last_id != nullptr) *last_id = state.last_id();
     return refusal;
   }

@@ -59,18 +59,18 @@ struct LoopRule {
   std::string Validate() const;
 };
 
-/// Reads a matrix: PNG, BMP or any image (white = loop, black = none, grey = ignore); MATLAB v5 .mat (the
-/// first square matrix, full or sparse, compressed or not); text with one row a line (1 or 255 = loop, 0 =
-/// none, between = ignore), or with two numbers a line: 0-based "row column" pairs of loops among
-/// `num_images` images. A matrix whose lower triangle is empty is transposed. Throws InputError that names
-/// the file (and line) for a missing, damaged or non-square one.
+/// Labels from the numbers of a square matrix, row by row: 0 is none, 1 or from 250 on a loop, all others are
+/// ignored. A matrix whose lower triangle is empty is transposed. Throws InputError if there are not
+/// size x size of them.
+LoopGroundTruth LoopsFromMatrix(const std::vector<double>& values, int size);
+
+/// Reads a matrix: PNG, BMP or any image (white = loop, black = none, grey = ignore); text with one row a
+/// line (labels as in LoopsFromMatrix), or with two numbers a line: 0-based "row column" pairs of loops among
+/// `num_images` images. Throws InputError that names the file (and line) for a missing, damaged or non-square
+/// one. MATLAB's files are for the caller to read (apps/tutti/loops/mat_file.cc does).
 LoopGroundTruth ReadLoopMatrix(const std::filesystem::path& file, int num_images);
 
 /// Derives the matrix from poses, one per image in the same order.
 LoopGroundTruth LoopsFromTrajectory(const Trajectory& trajectory, const LoopRule& rule);
-
-/// MATLAB v5: the first square numeric matrix with more than one row, row by row. Throws InputError. Used by
-/// ReadLoopMatrix.
-std::vector<double> ReadMatSquareMatrix(const std::filesystem::path& file, int& size);
 
 }  // namespace tutti

@@ -5,25 +5,14 @@
 #include <opencv2/calib3d.hpp>
 
 namespace tutti {
-
 bool ReprojectionResidual(const PinholeCamera& camera, const Pose& T_camera_world, const PointObservation& o,
                           Eigen::Vector3d* residual, Eigen::Matrix<double, 3, 6>* jacobian) {
   const Eigen::Vector3d p = T_camera_world * o.point;
-  if (!(p.z() > 1e-3)) return false;
-  const double iz = 1.0 / p.z();
-  const double wp = 1.0 / o.pixel_sigma;
-  const bool depth = o.inverse_depth_sigma > 0;
-  const double wd = depth ? 1.0 / o.inverse_depth_sigma : 0.0;
-  const double x = p.x() * iz, y = p.y() * iz;
-  *residual << wp * (camera.fx * x + camera.cx - o.pixel.x()), wp * (camera.fy * y + camera.cy - o.pixel.y()),
-      depth ? wd * (iz - o.inverse_depth) : 0.0;
-  if (jacobian != nullptr) {
-    Eigen::Matrix3d d;  // d residual / d p
-    d << wp * camera.fx * iz, 0, -wp * camera.fx * x * iz, 0, wp * camera.fy * iz, -wp * camera.fy * y * iz,
-        0, 0, -wd * iz * iz;
-    jacobian->leftCols<3>() = d;
-    jacobian->rightCols<3>() = -d * Skew(p);
-  }
+  internal::Reprojection<3>::PointJacobian by_point;
+  if (!internal::Reprojection<3>::Residual(camera, p, InSigmas(o), kMinDepth, residual,
+                                           jacobian != nullptr ? &by_point : nullptr))
+    return false;
+  if (jacobian != nullptr) *jacobian = internal::Reprojection<3>::ByPose(by_point, p);
   return true;
 }
 

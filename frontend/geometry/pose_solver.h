@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/reprojection.h"
 #include "tutti/core/camera.h"
 #include "tutti/core/pose.h"
 
@@ -20,6 +21,16 @@ struct PointObservation {
   double inverse_depth = 0;        ///< measured 1/z [1/m]; 0 if unknown
   double inverse_depth_sigma = 0;  ///< [1/m]; <= 0 if unknown
 };
+
+/// Nearer points are not seen [m].
+constexpr double kMinDepth = 1e-3;
+
+/// Pixel and inverse depth in standard deviations; inverse depth has weight 0 where it is unknown.
+inline internal::Reprojection<3>::Measurement InSigmas(const PointObservation& o) {
+  const double pixel = 1.0 / o.pixel_sigma;
+  return {{o.pixel.x(), o.pixel.y(), o.inverse_depth},
+          {pixel, pixel, o.inverse_depth_sigma > 0 ? 1.0 / o.inverse_depth_sigma : 0.0}};
+}
 
 /// Reprojection residual, in standard deviations: (du, dv, d(1/z)); the last is 0 where depth is unknown.
 /// False if the point lies behind the camera. `jacobian`: d residual / d (translation, rotation) of a left

@@ -16,7 +16,6 @@ using Matrix32d = Eigen::Matrix<double, 3, 2>;
 constexpr double kBehindResidual = 1e3;  // of a point behind its camera; the Huber loss bounds its cost
 constexpr double kStartDamping = 1e-4;   // relative to the diagonal
 constexpr double kCostTolerance = 1e-5;  // at 1e-4 the result depends on where the axes of the world point
-constexpr double kMinDepth = 1e-3;       // in front of the camera [m]
 
 double HuberCost(double squared, double k) {
   return squared <= k * k ? 0.5 * squared : k * (std::sqrt(squared) - 0.5 * k);
@@ -106,18 +105,15 @@ class WindowSolver {
     return pairs;
   }
 
-  // Residual of an observation, whitened: (du, dv, d(1/z)); the last is 0 without depth. False: behind.
+  using Reprojection = internal::Reprojection<3>;
+
+  // Residual of an observation, in standard deviations. `p`: the point in the camera frame. False: behind.
   bool Residual(const Estimate& e, const WindowObservation& o, std::size_t point, Eigen::Vector3d* p,
-                Eigen::Vector3d* r) const {
+                Eigen::Vector3d* r, Reprojection::PointJacobian* by_point) const {
     *p = e.poses[static_cast<std::size_t>(o.camera)] * e.points[point];
-    if (!(p->z() > kMinDepth)) return false;
-    const PointObservation& m = o.measured;
-    const Eigen::Vector2d lens = LensError::Jacobian(camera_, m.pixel) * e.lens;
-    const double iz = 1 / p->z(), weight = 1 / m.pixel_sigma;
-    *r << weight * (camera_.fx * p->x() * iz + camera_.cx - m.pixel.x() - lens.x()),
-        weight * (camera_.fy * p->y() * iz + camera_.cy - m.pixel.y() - lens.y()),
-        m.inverse_depth_sigma > 0 ? (iz - m.inverse_depth) / m.inverse_depth_sigma : 0.0;
-    return true;
+    Reprojection::Measurement measured = InSigmas(o.measured);
+    measured.value.head<2>() = LensError::Correct(camera_, e.lens, o.measured.pixel);
+    return Reprojection::Residual(camera_, *p, measured, kMinDepth, r, by_point);
   }
 
   double Cost(const Estimate& e) const {
@@ -128,7 +124,7 @@ class WindowSolver {
         const WindowObservation& o = window_.observations[n];
         Eigen::Vector3d p, r;
         const double squared =
-            Residual(e, o, i, &p, &r) ? r.squaredNorm() : kBehindResidual * kBehindResidual;
+            Residual(e, o, i, &p, &r, nullptr) ? r.squaredNorm() : kBehindResidual * kBehindResidual;
         cost += HuberCost(squared, HuberBound(o.measured));
       }
     }
@@ -161,19 +157,15 @@ class WindowSolver {
   template <int N>
   void AddObservation(std::size_t n, std::size_t i) {
     const WindowObservation& o = window_.observations[n];
-    const PointObservation& m = o.measured;
     Eigen::Vector3d p, full;
+    Reprojection::PointJacobian by_point;
     pose_point_[n].setZero();
-    if (!Residual(now_, o, i, &p, &full)) return;
+    if (!Residual(now_, o, i, &p, &full, &by_point)) return;
+    const PointObservation& m = o.measured;
     const double norm = full.norm(), k = HuberBound(m);
     const double root = norm > k ? std::sqrt(k / norm) : 1.0;  // of the Huber loss's weight
-    const double iz = 1 / p.z(), wx = root * camera_.fx / m.pixel_sigma,
-                 wy = root * camera_.fy / m.pixel_sigma;
     const Eigen::Matrix<double, N, 1> r = root * full.head<N>();
-    Eigen::Matrix<double, N, 3> d;  // d residual / d point in the camera frame
-    d.row(0) << wx * iz, 0, -wx * p.x() * iz * iz;
-    d.row(1) << 0, wy * iz, -wy * p.y() * iz * iz;
-    if constexpr (N == 3) d.row(2) << 0, 0, -root * iz * iz / m.inverse_depth_sigma;
+    const Eigen::Matrix<double, N, 3> d = root * by_point.topRows<N>();
     const std::size_t c = static_cast<std::size_t>(o.camera);
     const Eigen::Matrix<double, N, 3> jp = d * rotations_[c];
     Eigen::Matrix<double, N, 2> jl = Eigen::Matrix<double, N, 2>::Zero();
@@ -184,9 +176,7 @@ class WindowSolver {
     lens_hessian_.noalias() += jl.transpose() * jl;
     lens_gradient_.noalias() += jl.transpose() * r;
     if (o.camera >= window_.moving) return;
-    Eigen::Matrix<double, N, 6> jc;  // left perturbation: translation, rotation
-    jc.template leftCols<3>() = d;
-    jc.template rightCols<3>() = -d * Skew(p);
+    const Eigen::Matrix<double, N, 6> jc = internal::Reprojection<N>::ByPose(d, p);
     pose_hessian_[c].noalias() += jc.transpose() * jc;
     pose_gradient_[c].noalias() += jc.transpose() * r;
     pose_lens_[c].noalias() += jc.transpose() * jl;

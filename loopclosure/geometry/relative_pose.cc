@@ -6,6 +6,7 @@
 #include <limits>
 #include <opencv2/calib3d.hpp>
 
+#include "core/reprojection.h"
 #include "core/umeyama.h"
 #include "loopclosure/geometry/ransac.h"
 
@@ -13,7 +14,7 @@ namespace tutti {
 namespace {
 
 constexpr double kMinDepth = 1e-6;  // in front of the camera
-using Matrix2x3 = Eigen::Matrix<double, 2, 3>;
+using Reprojection = internal::Reprojection<2>;
 
 // A camera without distortion, and pixels as it would see them: RANSAC and refinement then need no lens
 // model.
@@ -22,22 +23,11 @@ Eigen::Vector2d UndistortedPixel(const PinholeCamera& camera, const Eigen::Vecto
   return {camera.fx * ray.x() + camera.cx, camera.fy * ray.y() + camera.cy};
 }
 
-Eigen::Vector2d Residual(const PinholeCamera& camera, const Eigen::Vector3d& point,
-                         const Eigen::Vector2d& pixel) {
-  return {camera.fx * point.x() / point.z() + camera.cx - pixel.x(),
-          camera.fy * point.y() / point.z() + camera.cy - pixel.y()};
-}
-
-Matrix2x3 ProjectionJacobian(const PinholeCamera& camera, const Eigen::Vector3d& p) {
-  const double iz = 1.0 / p.z();
-  Matrix2x3 j;
-  j << camera.fx * iz, 0, -camera.fx * p.x() * iz * iz, 0, camera.fy * iz, -camera.fy * p.y() * iz * iz;
-  return j;
-}
-
 double SquaredError(const PinholeCamera& camera, const Eigen::Vector3d& point, const Eigen::Vector2d& pixel) {
-  if (!(point.z() > kMinDepth)) return std::numeric_limits<double>::infinity();
-  return Residual(camera, point, pixel).squaredNorm();
+  Eigen::Vector2d r;
+  if (!Reprojection::Residual(camera, point, {pixel}, kMinDepth, &r, nullptr))
+    return std::numeric_limits<double>::infinity();
+  return r.squaredNorm();
 }
 
 // Huber weight of a residual of `norm` pixels.
@@ -82,12 +72,15 @@ std::vector<Pose> FitP3p(const PnpProblem& problem, const std::vector<int>& samp
   return poses;
 }
 
-// Jacobian of the residual under T_points_camera * Exp(tangent), so that the camera's point becomes
-// Exp(-tangent) * p: dp = [-I, [p]x] (translation, rotation).
-Eigen::Matrix<double, 2, 6> PnpJacobian(const PinholeCamera& camera, const Eigen::Vector3d& p) {
-  Eigen::Matrix<double, 3, 6> dp;
-  dp << -Eigen::Matrix3d::Identity(), Skew(p);
-  return ProjectionJacobian(camera, p) * dp;
+// Residual of a point and its Jacobian under Exp(tangent) * T_camera_points; false: behind the camera.
+bool PnpTerms(const PnpProblem& problem, const Pose& T_camera_points, std::size_t i,
+              Eigen::Vector2d& residual, Reprojection::PoseJacobian& jacobian) {
+  const Eigen::Vector3d p = T_camera_points * problem.points[i];
+  Reprojection::PointJacobian by_point;
+  if (!Reprojection::Residual(problem.camera, p, {problem.pixels[i]}, kMinDepth, &residual, &by_point))
+    return false;
+  jacobian = Reprojection::ByPose(by_point, p);
+  return true;
 }
 
 // One Gauss-Newton step over the inliers; false if it can't be solved.
@@ -96,17 +89,17 @@ bool PnpStep(const PnpProblem& problem, const std::vector<int>& inliers, double 
   Matrix6d hessian = Matrix6d::Zero();
   Vector6d gradient = Vector6d::Zero();
   for (const int i : inliers) {
-    const Eigen::Vector3d p = T_camera_points * problem.points[static_cast<std::size_t>(i)];
-    if (!(p.z() > kMinDepth)) continue;
-    const Eigen::Vector2d r = Residual(problem.camera, p, problem.pixels[static_cast<std::size_t>(i)]);
-    const Eigen::Matrix<double, 2, 6> j = PnpJacobian(problem.camera, p);
+    const std::size_t k = static_cast<std::size_t>(i);
+    Eigen::Vector2d r;
+    Reprojection::PoseJacobian j;
+    if (!PnpTerms(problem, T_camera_points, k, r, j)) continue;
     const double w = HuberWeight(r.norm(), huber_px);
     hessian += w * j.transpose() * j;
     gradient += w * j.transpose() * r;
   }
   const Vector6d step = hessian.ldlt().solve(-gradient);
   if (!step.allFinite()) return false;
-  T_camera_points = ExpSE3(-step) * T_camera_points;
+  T_camera_points = ExpSE3(step) * T_camera_points;
   return T_camera_points.IsFinite();
 }
 
@@ -125,14 +118,16 @@ void FinishPnp(const PnpProblem& problem, const RelativePoseOptions& options, Pn
   double squares = 0.0;
   for (const int i : result.inliers) {
     const std::size_t k = static_cast<std::size_t>(i);
-    const Eigen::Vector3d p = result.T_camera_points * problem.points[k];
-    squares += Residual(problem.camera, p, problem.pixels[k]).squaredNorm();
+    Eigen::Vector2d r;
+    Reprojection::PoseJacobian j;
+    if (!PnpTerms(problem, result.T_camera_points, k, r, j)) continue;
+    squares += r.squaredNorm();
     double variance = options.pixel_sigma * options.pixel_sigma;
     if (!problem.sigma_m.empty()) {
-      const double pixels = problem.camera.fx * problem.sigma_m[k] / p.z();
+      const double depth = (result.T_camera_points * problem.points[k]).z();
+      const double pixels = problem.camera.fx * problem.sigma_m[k] / depth;
       variance += pixels * pixels;
     }
-    const Eigen::Matrix<double, 2, 6> j = PnpJacobian(problem.camera, p);
     result.information += j.transpose() * j / variance;
   }
   result.rmse_px = std::sqrt(squares / static_cast<double>(std::max<std::size_t>(1, result.inliers.size())));
@@ -177,19 +172,21 @@ using Jacobian2x7 = Eigen::Matrix<double, 2, 7>;
 // (t, w, s):
 //   q = X p_b:          dq = [I, -[p_b]x, p_b],   p_a' = S_a_b q
 //   r = S_b_a p_a:      d(X^-1 r) = [-I, [r]x, -r]
-void SimilarityTerms(const SimilarityProblem& problem, const Similarity& S_a_b, const Similarity& S_b_a,
+// False: behind a camera.
+bool SimilarityTerms(const SimilarityProblem& problem, const Similarity& S_a_b, const Similarity& S_b_a,
                      std::size_t i, Eigen::Vector2d residuals[2], Jacobian2x7 jacobians[2]) {
-  Eigen::Matrix<double, 3, 7> dq;
+  const Eigen::Vector3d in_a = S_a_b * problem.points_b[i], in_b = S_b_a * problem.points_a[i];
+  Reprojection::PointJacobian by_a, by_b;
+  if (!Reprojection::Residual(problem.camera_a, in_a, {problem.pixels_a[i]}, kMinDepth, &residuals[0],
+                              &by_a) ||
+      !Reprojection::Residual(problem.camera_b, in_b, {problem.pixels_b[i]}, kMinDepth, &residuals[1], &by_b))
+    return false;
+  Eigen::Matrix<double, 3, 7> dq, dr;
   dq << Eigen::Matrix3d::Identity(), -Skew(problem.points_b[i]), problem.points_b[i];
-  const Eigen::Vector3d in_a = S_a_b * problem.points_b[i];
-  residuals[0] = Residual(problem.camera_a, in_a, problem.pixels_a[i]);
-  jacobians[0] =
-      ProjectionJacobian(problem.camera_a, in_a) * S_a_b.scale * S_a_b.rotation.toRotationMatrix() * dq;
-  const Eigen::Vector3d in_b = S_b_a * problem.points_a[i];
-  Eigen::Matrix<double, 3, 7> dr;
   dr << -Eigen::Matrix3d::Identity(), Skew(in_b), -in_b;
-  residuals[1] = Residual(problem.camera_b, in_b, problem.pixels_b[i]);
-  jacobians[1] = ProjectionJacobian(problem.camera_b, in_b) * dr;
+  jacobians[0] = by_a * S_a_b.scale * S_a_b.rotation.toRotationMatrix() * dq;
+  jacobians[1] = by_b * dr;
+  return true;
 }
 
 bool SimilarityStep(const SimilarityProblem& problem, const std::vector<int>& inliers, double huber_px,
@@ -199,10 +196,9 @@ bool SimilarityStep(const SimilarityProblem& problem, const std::vector<int>& in
   Vector7d gradient = Vector7d::Zero();
   for (const int i : inliers) {
     const std::size_t k = static_cast<std::size_t>(i);
-    if (!std::isfinite(SimilarityError(problem, S_a_b, S_b_a, k))) continue;
     Eigen::Vector2d r[2];
     Jacobian2x7 j[2];
-    SimilarityTerms(problem, S_a_b, S_b_a, k, r, j);
+    if (!SimilarityTerms(problem, S_a_b, S_b_a, k, r, j)) continue;
     for (int side = 0; side < 2; ++side) {
       const double w = HuberWeight(r[side].norm(), huber_px);
       hessian += w * j[side].transpose() * j[side];
@@ -234,7 +230,7 @@ void FinishSimilarity(const SimilarityProblem& problem, const RelativePoseOption
   for (const int i : result.inliers) {
     Eigen::Vector2d r[2];
     Jacobian2x7 j[2];
-    SimilarityTerms(problem, result.S_a_b, S_b_a, static_cast<std::size_t>(i), r, j);
+    if (!SimilarityTerms(problem, result.S_a_b, S_b_a, static_cast<std::size_t>(i), r, j)) continue;
     for (int side = 0; side < 2; ++side) {
       squares += 0.5 * r[side].squaredNorm();
       result.information += j[side].transpose() * j[side] / variance;

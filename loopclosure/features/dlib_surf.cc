@@ -50,7 +50,7 @@ double DominantAngle(const Integral& image, const dlib::vector<double, 2>& centr
   constexpr double kWidth = kPi / 3;
   constexpr int kReach = 9;  // slices back from the newest that can hold an angle: kWidth / kStep, rounded up
   std::array<dlib::vector<double, 2>, kSlices> sums;
-  const long sc = static_cast<long>(scale + 0.5);
+  const long sc = std::lround(scale);
   for (long r = -kRadius; r <= kRadius; ++r) {
     for (long c = -kRadius; c <= kRadius; ++c) {
       if (r * r + c * c >= kRadius * kRadius) continue;
@@ -84,18 +84,19 @@ double DominantAngle(const Integral& image, const dlib::vector<double, 2>& centr
 // is taken from the image and turned once.
 void SurfDescriptor(const Integral& image, const dlib::vector<double, 2>& centre, double scale, double angle,
                     float* descriptor) {
-  constexpr int kSide = 20;
+  constexpr int kSide = 20, kHalf = kSide / 2;
   constexpr int kCell = 5;
   constexpr std::array<double, 7> kWeights = {1.0 / 4, 1.0 / 5, 1.0 / 6, 1.0 / 7, 1.0 / 8, 1.0 / 9, 1.0 / 10};
   const dlib::point_rotator rotate(angle);
   const dlib::point_rotator rotate_back(-angle);
-  const long sc = static_cast<long>(scale + 0.5);
-  std::array<dlib::vector<double, 2>, kSide * kSide> samples;
-  for (int y = 0; y < kSide; ++y) {
-    for (int x = 0; x < kSide; ++x) {
-      const dlib::vector<double, 2> offset(scale * (x - kSide / 2), scale * (y - kSide / 2));
+  const long sc = std::lround(scale);
+  std::array<std::array<dlib::vector<double, 2>, kSide>, kSide> samples;  // [y][x]
+  for (std::size_t y = 0; y < kSide; ++y) {
+    for (std::size_t x = 0; x < kSide; ++x) {
+      const dlib::vector<double, 2> offset(scale * (static_cast<double>(x) - kHalf),
+                                           scale * (static_cast<double>(y) - kHalf));
       const auto [dx, dy] = image.Haar(dlib::point(rotate(offset) + centre), 2 * sc);
-      samples[static_cast<std::size_t>(y * kSide + x)] = rotate_back(dlib::vector<double, 2>(dx, dy));
+      samples[y][x] = rotate_back(dlib::vector<double, 2>(dx, dy));
     }
   }
   std::array<double, kDescriptorSize> values{};
@@ -104,8 +105,10 @@ void SurfDescriptor(const Integral& image, const dlib::vector<double, 2>& centre
     for (int c = 0; c < kSide; c += kCell) {
       for (int y = std::max(0, r - 1); y < std::min(kSide, r + kCell + 1); ++y) {
         for (int x = std::max(0, c - 1); x < std::min(kSide, c + kCell + 1); ++x) {
-          const double weight = kWeights[static_cast<std::size_t>(std::abs(r + 2 - y) + std::abs(c + 2 - x))];
-          const dlib::vector<double, 2>& sample = samples[static_cast<std::size_t>(y * kSide + x)];
+          const int away = std::abs(r + 2 - y) + std::abs(c + 2 - x);
+          const double weight = kWeights[static_cast<std::size_t>(away)];
+          const dlib::vector<double, 2>& sample =
+              samples[static_cast<std::size_t>(y)][static_cast<std::size_t>(x)];
           const double dx = weight * sample.x();
           const double dy = weight * sample.y();
           value[0] += dx;
@@ -128,7 +131,7 @@ void SurfDescriptor(const Integral& image, const dlib::vector<double, 2>& centre
 class HessianPyramid {
  public:
   HessianPyramid(const Integral& image, int octaves) : octaves_(octaves) {
-    layers_.resize(static_cast<std::size_t>(octaves * kIntervals));
+    layers_.resize(static_cast<std::size_t>(octaves) * kIntervals);
     for (int o = 0; o < octaves; ++o) {
       for (int i = 0; i < kIntervals; ++i) Fill(image, o, i);
     }
@@ -162,9 +165,10 @@ class HessianPyramid {
   static int Border(int interval) { return (3 * (2 * (interval + 1) + 1) + 1) / 2; }
   static int Step(int octave) { return kFirstStep << octave; }
 
-  const cv::Mat& Layer(int octave, int interval) const {
-    return layers_[static_cast<std::size_t>(octave * kIntervals + interval)];
+  static std::size_t At(int octave, int interval) {
+    return static_cast<std::size_t>(octave) * kIntervals + static_cast<std::size_t>(interval);
   }
+  const cv::Mat& Layer(int octave, int interval) const { return layers_[At(octave, interval)]; }
   double Value(int octave, int interval, int r, int c) const {
     return std::abs(Layer(octave, interval).at<double>(r, c));
   }
@@ -178,7 +182,7 @@ class HessianPyramid {
     const double area = 1.0 / ((3.0 * lobe) * (3.0 * lobe));
     const int rows = static_cast<int>(image.nr());
     const int cols = static_cast<int>(image.nc());
-    cv::Mat& layer = layers_[static_cast<std::size_t>(octave * kIntervals + interval)];
+    cv::Mat& layer = layers_[At(octave, interval)];
     layer.create(rows / step, cols / step, CV_64F);
     for (int y = border; y < rows - border && y / step < layer.rows; y += step) {
       double* out = layer.ptr<double>(y / step);

@@ -175,7 +175,8 @@ std::vector<int> SelectSpread(const std::vector<cv::KeyPoint>& keypoints, cv::Si
     const cv::Point2f& p = keypoints[static_cast<std::size_t>(order[i])].pt;
     const int x = std::clamp(static_cast<int>(p.x / cell), 0, cells_x - 1);
     const int y = std::clamp(static_cast<int>(p.y / cell), 0, cells_y - 1);
-    int& used = taken[static_cast<std::size_t>(y * cells_x + x)];
+    const int at = y * cells_x + x;
+    int& used = taken[static_cast<std::size_t>(at)];
     if (used >= share) continue;
     ++used;
     chosen[i] = true;

@@ -18,7 +18,8 @@ constexpr float kPi = 3.14159265f;
 using Histograms = std::vector<float>;  // by cell, then by direction
 
 float& At(Histograms& histograms, int row, int column, int bin) {
-  return histograms[static_cast<std::size_t>((row * kColumns + column) * kBins + bin)];
+  const int at = (row * kColumns + column) * kBins + bin;
+  return histograms[static_cast<std::size_t>(at)];
 }
 
 // A pixel's gradient goes into the two next directions and the four next cells, each by its nearness.

@@ -260,7 +260,8 @@ const std::array<Sample, kSamples>& Samples() {
     const float first = -0.5f * (kCells + 1) + 0.5f * spacing;
     for (int r = 0; r < kGrid; ++r) {
       for (int c = 0; c < kGrid; ++c) {
-        Sample& sample = grid[static_cast<std::size_t>(r * kGrid + c)];
+        const int at = r * kGrid + c;
+        Sample& sample = grid[static_cast<std::size_t>(at)];
         sample.x = first + static_cast<float>(c) * spacing;
         sample.y = first + static_cast<float>(r) * spacing;
         const float cell_x = sample.x + 0.5f * kCells + 0.5f;  // of the padded histogram
@@ -369,6 +370,7 @@ Features ExtractSift(const cv::Mat& image, double blur, const ExtractionOptions&
   points.resize(std::min(points.size(), 2 * most));
 
   std::vector<cv::KeyPoint> places;
+  places.reserve(points.size());
   for (const Point& point : points) places.push_back(InImage(point));
   Features features;
   features.descriptors.create(options.features, static_cast<int>(kDescriptorSize), CV_32F);

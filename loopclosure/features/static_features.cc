@@ -35,7 +35,8 @@ double ShareApart(const std::vector<VerifiedMatch>& matches, const View& query, 
     const int row = cell / kGridColumns, column = cell % kGridColumns;
     for (int r = std::max(0, row - 1); r <= std::min(kGridRows - 1, row + 1); ++r) {
       for (int c = std::max(0, column - 1); c <= std::min(kGridColumns - 1, column + 1); ++c) {
-        near[static_cast<std::size_t>(r * kGridColumns + c)] = true;
+        const int at = r * kGridColumns + c;
+        near[static_cast<std::size_t>(at)] = true;
       }
     }
   }

@@ -126,13 +126,13 @@ Motion FitEach(const std::vector<PooledMatch>& pool, const std::vector<std::vect
 Motion FitMotion(const std::vector<PooledMatch>& pool, const View& query, const View& candidate,
                  const VerificationOptions& options, std::uint64_t seed) {
   if (query.cameras.size() > 1 && query.cameras.size() == candidate.cameras.size()) {
-    const Motion same =
+    Motion same =
         FitEach(pool, ByCamera(pool, query, candidate, false), false, query, candidate, options, seed);
     const std::vector<std::vector<int>> crosswise = ByCamera(pool, query, candidate, true);
     std::size_t most = 0;  // inliers that there can be
     for (const std::vector<int>& matches : crosswise) most += matches.size();
     if (most <= same.inliers.size()) return same;
-    const Motion opposite = FitEach(pool, crosswise, true, query, candidate, options, seed);
+    Motion opposite = FitEach(pool, crosswise, true, query, candidate, options, seed);
     return opposite.inliers.size() > same.inliers.size() ? opposite : same;
   }
   std::vector<int> all(pool.size());

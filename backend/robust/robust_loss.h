@@ -12,6 +12,7 @@
 
 #include <cmath>
 
+#include "core/least_squares.h"
 #include "tutti/backend/pose_graph_optimizer.h"
 
 namespace tutti::internal {
@@ -20,7 +21,7 @@ inline double RobustCost(RobustLoss robust, double s, double c2) {
   if (robust == RobustLoss::kCauchy) return c2 * std::log1p(s / c2);
   if (robust == RobustLoss::kSwitchable) return c2 * s / (c2 + s);
   if (robust == RobustLoss::kNone || s <= c2) return s;
-  if (robust == RobustLoss::kHuber) return 2.0 * std::sqrt(c2 * s) - c2;
+  if (robust == RobustLoss::kHuber) return HuberCost(s, c2);
   if (robust == RobustLoss::kDcs) return c2 * (3.0 * s - c2) / (c2 + s);
   return c2;
 }
@@ -30,7 +31,7 @@ inline double RobustCost(RobustLoss robust, double s, double c2) {
 inline double RobustWeight(RobustLoss robust, double s, double c2) {
   if (robust == RobustLoss::kCauchy || robust == RobustLoss::kSwitchable) return c2 / (c2 + s);
   if (robust == RobustLoss::kNone || s <= c2) return 1.0;
-  if (robust == RobustLoss::kHuber) return std::sqrt(c2 / s);
+  if (robust == RobustLoss::kHuber) return HuberWeight(s, c2);
   if (robust == RobustLoss::kDcs) return 4.0 * c2 * c2 / ((c2 + s) * (c2 + s));
   return 0.0;
 }

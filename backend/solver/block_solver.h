@@ -12,25 +12,10 @@
 
 #include "backend/solver/block_equations.h"
 #include "backend/solver/graph_solver.h"
+#include "core/least_squares.h"
 #include "core/stopwatch.h"
 
 namespace tutti::internal {
-
-/// Ceres' schedule.
-struct TrustRegion {
-  double radius = kInitialTrustRegion, factor = 2;
-  void Grow(double quality) {
-    const double x = 2 * quality - 1;
-    radius = std::min(1e16, radius / std::max(1.0 / 3.0, 1 - x * x * x));
-    factor = 2;
-  }
-  /// False if there is nothing left of it.
-  bool Shrink() {
-    radius /= factor;
-    factor *= 2;
-    return radius > 1e-32;
-  }
-};
 
 /// Levenberg-Marquardt on the active set that the equations were analysed for.
 template <int N>

@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/reprojection.h"
 #include "frontend/features/grey_window.h"
 #include "frontend/geometry/lens_error.h"
+#include "frontend/geometry/pose_solver.h"
 
 namespace tutti {
 namespace {
@@ -171,11 +173,12 @@ std::optional<Eigen::Matrix2d> PatchToFrame(const Map& map, const PinholeCamera&
   const Eigen::Vector3d p = k.T_world_camera.Inverse() * l.position;
   const Pose T_camera_patch = T_camera_world * k.T_world_camera;
   const Eigen::Vector3d q = T_camera_patch * p;
-  if (!(p.z() > 1e-3 && q.z() > 1e-3)) return std::nullopt;
+  Eigen::Vector2d pixel;
+  internal::Reprojection<2>::PointJacobian projection;
+  if (!(p.z() > kMinDepth) || !internal::Reprojection<2>::Residual(camera, q, {Eigen::Vector2d::Zero()},
+                                                                   kMinDepth, &pixel, &projection))
+    return std::nullopt;
   const Eigen::Matrix3d r = T_camera_patch.rotation.toRotationMatrix();
-  Eigen::Matrix<double, 2, 3> projection;
-  projection << camera.fx / q.z(), 0, -camera.fx * q.x() / (q.z() * q.z()), 0, camera.fy / q.z(),
-      -camera.fy * q.y() / (q.z() * q.z());
   Eigen::Matrix<double, 3, 2> lift;
   lift << p.z() / camera.fx, 0, 0, p.z() / camera.fy, 0, 0;
   return Eigen::Matrix2d(projection * r * lift);

@@ -1,10 +1,18 @@
 #include "frontend/geometry/pose_solver.h"
 
-#include <Eigen/Cholesky>
 #include <cmath>
 #include <opencv2/calib3d.hpp>
 
+#include "core/least_squares.h"
+
 namespace tutti {
+namespace {
+
+// The damping holds a pose that the points do not.
+constexpr internal::GaussNewtonLimits kLimits{10, 1e-7, 1e-5, 1e-9};
+
+}  // namespace
+
 bool ReprojectionResidual(const PinholeCamera& camera, const Pose& T_camera_world, const PointObservation& o,
                           Eigen::Vector3d* residual, Eigen::Matrix<double, 3, 6>* jacobian) {
   const Eigen::Vector3d p = T_camera_world * o.point;
@@ -22,30 +30,23 @@ int RefinePose(const PinholeCamera& camera, const std::vector<PointObservation>&
   int inliers = 0;
   for (int round = 0; round < 4; ++round) {
     const bool robust = round < 3;
-    double last_cost = 0;
-    for (int iteration = 0; iteration < 10; ++iteration) {
-      Matrix6d h = Matrix6d::Zero();
-      Vector6d g = Vector6d::Zero();
-      double cost = 0;
+    const auto linearise = [&](internal::NormalEquations<6>& equations) {
       for (std::size_t i = 0; i < observations.size(); ++i) {
         if (!(*inlier)[i]) continue;
         Eigen::Vector3d r;
         Eigen::Matrix<double, 3, 6> j;
         if (!ReprojectionResidual(camera, *T_camera_world, observations[i], &r, &j)) continue;
-        const double n = r.norm();
-        const double k = HuberBound(observations[i]);
-        const double w = robust && n > k ? k / n : 1.0;
-        cost += robust && n > k ? k * (2 * n - k) : n * n;
-        h.noalias() += w * j.transpose() * j;
-        g.noalias() += w * j.transpose() * r;
+        const double s = r.squaredNorm(), bound = robust ? ChiSquareBound(observations[i]) : INFINITY;
+        equations.Add(j, r, internal::HuberWeight(s, bound));
+        equations.cost += internal::HuberCost(s, bound);
       }
-      const Vector6d step = (h + 1e-9 * h.trace() * Matrix6d::Identity()).ldlt().solve(-g);
-      if (!step.allFinite()) break;
-      // Left perturbation: translation and rotation act on the point in the camera frame.
+    };
+    // Left perturbation: translation and rotation act on the point in the camera frame.
+    const auto move = [&](const Vector6d& step) {
       *T_camera_world = Pose(ExpSO3(step.tail<3>()), step.head<3>()) * *T_camera_world;
-      if (step.norm() < 1e-7 || (iteration > 0 && std::abs(last_cost - cost) < 1e-5 * cost)) break;
-      last_cost = cost;
-    }
+      return true;
+    };
+    internal::GaussNewton<6>(kLimits, linearise, move);
     inliers = 0;
     for (std::size_t i = 0; i < observations.size(); ++i) {
       Eigen::Vector3d r;

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cmath>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <vector>
@@ -39,10 +38,9 @@ bool ReprojectionResidual(const PinholeCamera& camera, const Pose& T_camera_worl
                           const PointObservation& observation, Eigen::Vector3d* residual,
                           Eigen::Matrix<double, 3, 6>* jacobian);
 
-/// 95 % quantiles of chi2 for 2 and 3 degrees of freedom: the bound between inlier and outlier.
+/// 95 % quantiles of chi2 for 2 and 3 degrees of freedom: the bound between inlier and outlier, and what
+/// squared residuals count by the Huber loss beyond.
 inline double ChiSquareBound(const PointObservation& o) { return o.inverse_depth_sigma > 0 ? 7.815 : 5.991; }
-/// Residuals beyond it count by the Huber loss: 95 % of good ones are below.
-inline double HuberBound(const PointObservation& o) { return std::sqrt(ChiSquareBound(o)); }
 
 /// Minimises the Huber-robust reprojection error over the pose by Gauss-Newton in four rounds, each on the
 /// inliers of the round before. Returns the number of inliers; `inlier` has one flag per observation.

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "core/least_squares.h"
 #include "frontend/map/reduced_system.h"
 
 namespace tutti {
@@ -14,12 +15,8 @@ using Matrix62d = Eigen::Matrix<double, 6, 2>;
 using Matrix32d = Eigen::Matrix<double, 3, 2>;
 
 constexpr double kBehindResidual = 1e3;  // of a point behind its camera; the Huber loss bounds its cost
-constexpr double kStartDamping = 1e-4;   // relative to the diagonal
+constexpr double kStartRadius = 1e4;     // damping of 1e-4, relative to the diagonal
 constexpr double kCostTolerance = 1e-5;  // at 1e-4 the result depends on where the axes of the world point
-
-double HuberCost(double squared, double k) {
-  return squared <= k * k ? 0.5 * squared : k * (std::sqrt(squared) - 0.5 * k);
-}
 
 // What the unknowns are at one moment.
 struct Estimate {
@@ -46,7 +43,8 @@ class WindowSolver {
 
   WindowReport Solve(int max_iterations, const std::atomic<bool>* stop) {
     WindowReport report;
-    double cost = report.initial_cost = report.final_cost = Cost(now_), damping = kStartDamping, growth = 2;
+    double cost = report.initial_cost = report.final_cost = Cost(now_);
+    internal::TrustRegion region{kStartRadius};
     bool fresh = false;
     while (report.iterations < max_iterations && std::isfinite(cost) && !(stop != nullptr && *stop)) {
       ++report.iterations;
@@ -54,16 +52,13 @@ class WindowSolver {
       fresh = true;
       Estimate trial;
       double predicted = 0;
-      const double next = Step(damping, &trial, &predicted) ? Cost(trial) : INFINITY;
+      const double next = Step(1 / region.radius, &trial, &predicted) ? Cost(trial) : INFINITY;
       if (!(next < cost)) {
         if (predicted >= 0 && predicted < kCostTolerance * cost && std::isfinite(next)) break;
-        damping *= growth;
-        growth *= 2;
+        if (!region.Shrink()) break;
         continue;
       }
-      const double ratio = predicted > 0 ? (cost - next) / predicted : 1.0;
-      damping *= std::max(1.0 / 3, 1 - std::pow(2 * ratio - 1, 3));
-      growth = 2;
+      region.Grow(predicted > 0 ? (cost - next) / predicted : 1.0);
       now_ = std::move(trial);
       fresh = false;
       const double gain = cost - next;
@@ -125,7 +120,7 @@ class WindowSolver {
         Eigen::Vector3d p, r;
         const double squared =
             Residual(e, o, i, &p, &r, nullptr) ? r.squaredNorm() : kBehindResidual * kBehindResidual;
-        cost += HuberCost(squared, HuberBound(o.measured));
+        cost += 0.5 * internal::HuberCost(squared, ChiSquareBound(o.measured));
       }
     }
     return cost;
@@ -162,8 +157,7 @@ class WindowSolver {
     pose_point_[n].setZero();
     if (!Residual(now_, o, i, &p, &full, &by_point)) return;
     const PointObservation& m = o.measured;
-    const double norm = full.norm(), k = HuberBound(m);
-    const double root = norm > k ? std::sqrt(k / norm) : 1.0;  // of the Huber loss's weight
+    const double root = std::sqrt(internal::HuberWeight(full.squaredNorm(), ChiSquareBound(m)));
     const Eigen::Matrix<double, N, 1> r = root * full.head<N>();
     const Eigen::Matrix<double, N, 3> d = root * by_point.topRows<N>();
     const std::size_t c = static_cast<std::size_t>(o.camera);

@@ -1,11 +1,10 @@
 #include "tutti/loopclosure/relative_pose.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/SVD>
 #include <cmath>
 #include <limits>
 #include <opencv2/calib3d.hpp>
 
+#include "core/least_squares.h"
 #include "core/reprojection.h"
 #include "core/umeyama.h"
 #include "loopclosure/geometry/ransac.h"
@@ -14,6 +13,7 @@ namespace tutti {
 namespace {
 
 constexpr double kMinDepth = 1e-6;  // in front of the camera
+constexpr internal::GaussNewtonLimits kLimits{4};
 using Reprojection = internal::Reprojection<2>;
 
 // A camera without distortion, and pixels as it would see them: RANSAC and refinement then need no lens
@@ -29,9 +29,6 @@ double SquaredError(const PinholeCamera& camera, const Eigen::Vector3d& point, c
     return std::numeric_limits<double>::infinity();
   return r.squaredNorm();
 }
-
-// Huber weight of a residual of `norm` pixels.
-double HuberWeight(double norm, double threshold) { return norm <= threshold ? 1.0 : threshold / norm; }
 
 std::string TooFew(const char* what, std::size_t have, int need) {
   return "only " + std::to_string(have) + " " + what + ", " + std::to_string(need) + " are needed";
@@ -83,24 +80,21 @@ bool PnpTerms(const PnpProblem& problem, const Pose& T_camera_points, std::size_
   return true;
 }
 
-// One Gauss-Newton step over the inliers; false if it can't be solved.
-bool PnpStep(const PnpProblem& problem, const std::vector<int>& inliers, double huber_px,
-             Pose& T_camera_points) {
-  Matrix6d hessian = Matrix6d::Zero();
-  Vector6d gradient = Vector6d::Zero();
-  for (const int i : inliers) {
-    const std::size_t k = static_cast<std::size_t>(i);
-    Eigen::Vector2d r;
-    Reprojection::PoseJacobian j;
-    if (!PnpTerms(problem, T_camera_points, k, r, j)) continue;
-    const double w = HuberWeight(r.norm(), huber_px);
-    hessian += w * j.transpose() * j;
-    gradient += w * j.transpose() * r;
-  }
-  const Vector6d step = hessian.ldlt().solve(-gradient);
-  if (!step.allFinite()) return false;
-  T_camera_points = ExpSE3(step) * T_camera_points;
-  return T_camera_points.IsFinite();
+bool RefinePnp(const PnpProblem& problem, const std::vector<int>& inliers, double huber_px,
+               Pose& T_camera_points) {
+  const auto linearise = [&](internal::NormalEquations<6>& equations) {
+    for (const int i : inliers) {
+      Eigen::Vector2d r;
+      Reprojection::PoseJacobian j;
+      if (!PnpTerms(problem, T_camera_points, static_cast<std::size_t>(i), r, j)) continue;
+      equations.Add(j, r, internal::HuberWeight(r.squaredNorm(), huber_px * huber_px));
+    }
+  };
+  const auto move = [&](const Vector6d& step) {
+    T_camera_points = ExpSE3(step) * T_camera_points;
+    return T_camera_points.IsFinite();
+  };
+  return internal::GaussNewton<6>(kLimits, linearise, move);
 }
 
 std::vector<int> PnpInliers(const PnpProblem& problem, const Pose& T_camera_points, double threshold_px) {
@@ -189,26 +183,25 @@ bool SimilarityTerms(const SimilarityProblem& problem, const Similarity& S_a_b, 
   return true;
 }
 
-bool SimilarityStep(const SimilarityProblem& problem, const std::vector<int>& inliers, double huber_px,
-                    Similarity& S_a_b) {
-  const Similarity S_b_a = S_a_b.Inverse();
-  Matrix7d hessian = Matrix7d::Zero();
-  Vector7d gradient = Vector7d::Zero();
-  for (const int i : inliers) {
-    const std::size_t k = static_cast<std::size_t>(i);
-    Eigen::Vector2d r[2];
-    Jacobian2x7 j[2];
-    if (!SimilarityTerms(problem, S_a_b, S_b_a, k, r, j)) continue;
-    for (int side = 0; side < 2; ++side) {
-      const double w = HuberWeight(r[side].norm(), huber_px);
-      hessian += w * j[side].transpose() * j[side];
-      gradient += w * j[side].transpose() * r[side];
+bool RefineSimilarity(const SimilarityProblem& problem, const std::vector<int>& inliers, double huber_px,
+                      Similarity& S_a_b) {
+  const auto linearise = [&](internal::NormalEquations<7>& equations) {
+    const Similarity S_b_a = S_a_b.Inverse();
+    for (const int i : inliers) {
+      Eigen::Vector2d r[2];
+      Jacobian2x7 j[2];
+      if (!SimilarityTerms(problem, S_a_b, S_b_a, static_cast<std::size_t>(i), r, j)) continue;
+      for (int side = 0; side < 2; ++side) {
+        equations.Add(j[side], r[side], internal::HuberWeight(r[side].squaredNorm(), huber_px * huber_px));
+      }
     }
-  }
-  const Vector7d step = hessian.ldlt().solve(-gradient);
-  if (!step.allFinite() || std::abs(step[6]) > 1.0) return false;
-  S_a_b = S_a_b * Similarity(std::exp(step[6]), ExpSO3(step.segment<3>(3)), step.head<3>());
-  return S_a_b.translation.allFinite() && std::isfinite(S_a_b.scale) && S_a_b.scale > 0.0;
+  };
+  const auto move = [&](const Vector7d& step) {
+    if (std::abs(step[6]) > 1.0) return false;
+    S_a_b = S_a_b * Similarity(std::exp(step[6]), ExpSO3(step.segment<3>(3)), step.head<3>());
+    return S_a_b.translation.allFinite() && std::isfinite(S_a_b.scale) && S_a_b.scale > 0.0;
+  };
+  return internal::GaussNewton<7>(kLimits, linearise, move);
 }
 
 std::vector<int> SimilarityInliers(const SimilarityProblem& problem, const Similarity& S_a_b,
@@ -241,14 +234,11 @@ void FinishSimilarity(const SimilarityProblem& problem, const RelativePoseOption
 
 // Refines the model on its inliers and chooses the inliers anew, a few times; keeps the last state that did
 // not lose any support.
-template <typename Model, typename Step, typename Select>
-void Refine(int rounds, const Step& step, const Select& select, Model& model, std::vector<int>& inliers) {
+template <typename Model, typename Fit, typename Select>
+void Refine(int rounds, const Fit& fit, const Select& select, Model& model, std::vector<int>& inliers) {
   for (int round = 0; round < rounds; ++round) {
     Model refined = model;
-    constexpr int kSteps = 4;
-    bool usable = true;
-    for (int s = 0; s < kSteps && usable; ++s) usable = step(inliers, refined);
-    if (!usable) return;
+    if (!fit(inliers, refined)) return;
     std::vector<int> selected = select(refined);
     if (selected.size() < inliers.size()) return;
     const bool same = selected == inliers;
@@ -299,7 +289,7 @@ PnpResult SolvePnp(const std::vector<Eigen::Vector3d>& points, const std::vector
     Refine(
         options.refine_rounds,
         [&](const std::vector<int>& inliers, Pose& pose) {
-          return PnpStep(problem, inliers, 0.5 * options.threshold_px, pose);
+          return RefinePnp(problem, inliers, 0.5 * options.threshold_px, pose);
         },
         [&](const Pose& pose) { return PnpInliers(problem, pose, options.threshold_px); },
         result.T_camera_points, result.inliers);
@@ -345,7 +335,7 @@ SimilarityResult SolveSimilarity(const std::vector<Eigen::Vector3d>& points_a,
     Refine(
         options.refine_rounds,
         [&](const std::vector<int>& inliers, Similarity& S) {
-          return SimilarityStep(problem, inliers, 0.5 * options.threshold_px, S);
+          return RefineSimilarity(problem, inliers, 0.5 * options.threshold_px, S);
         },
         [&](const Similarity& S) { return SimilarityInliers(problem, S, options.threshold_px); },
         result.S_a_b, result.inliers);

@@ -4,12 +4,11 @@
 #include <cmath>
 
 #include "backend/evaluation/evaluation_path.h"
+#include "core/angle.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
 namespace {
-
-constexpr double kDegrees = 180.0 / M_PI;
 
 /// a^-1 b, with the transpose for the inverse of a rotation (as evo does, also where it is not quite one).
 PoseMatrix Between(const PoseMatrix& a, const PoseMatrix& b) {
@@ -19,7 +18,8 @@ PoseMatrix Between(const PoseMatrix& a, const PoseMatrix& b) {
 void Add(const PoseMatrix& error, PoseErrors& out) {
   const double off = (error.rotation - Eigen::Matrix3d::Identity()).squaredNorm();
   out.translation.push_back(error.translation.norm());
-  out.rotation_deg.push_back(kDegrees * LogSO3(Eigen::Quaterniond(error.rotation).normalized()).norm());
+  out.rotation_deg.push_back(internal::kDegrees *
+                             LogSO3(Eigen::Quaterniond(error.rotation).normalized()).norm());
   out.full.push_back(std::sqrt(off + error.translation.squaredNorm()));
 }
 

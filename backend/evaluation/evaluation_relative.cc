@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "backend/evaluation/evaluation_path.h"
+#include "core/angle.h"
 #include "tutti/backend/evaluation.h"
 #include "tutti/core/error.h"
 
@@ -11,7 +12,6 @@ namespace {
 
 using Pairs = std::vector<std::pair<std::size_t, std::size_t>>;
 
-constexpr double kDegrees = 180.0 / M_PI;
 constexpr double kStampEpsilon = 1e-9;  // a second is a second, whatever the last bit says [s]
 
 Pairs PairsByFrames(std::size_t n, std::size_t delta, bool all_pairs) {
@@ -54,7 +54,7 @@ Pairs Pieces(const std::vector<std::size_t>& cuts) {
 }
 
 double AngleDeg(const Pose& a, const Pose& b) {
-  return kDegrees * LogSO3(a.rotation.conjugate() * b.rotation).norm();
+  return internal::kDegrees * LogSO3(a.rotation.conjugate() * b.rotation).norm();
 }
 
 Pairs PairsByAngle(const std::vector<Pose>& poses, double delta, double tolerance, bool all_pairs) {
@@ -139,7 +139,7 @@ SegmentErrors EvaluateSegments(const std::vector<PoseMatrix>& reference,
   }
   if (out.segments == 0) return out;
   out.translation_percent = 100.0 * translation / static_cast<double>(out.segments);
-  out.rotation_deg_per_m = kDegrees * rotation / static_cast<double>(out.segments);
+  out.rotation_deg_per_m = internal::kDegrees * rotation / static_cast<double>(out.segments);
   return out;
 }
 

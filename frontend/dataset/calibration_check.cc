@@ -7,14 +7,13 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/features2d.hpp>
 
+#include "core/angle.h"
 #include "core/median.h"
 #include "frontend/features/features.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
 namespace {
-
-constexpr double kDegrees = 57.29577951308232;
 
 #if defined(__GNUC__)
 __attribute__((format(printf, 1, 2)))
@@ -31,7 +30,7 @@ Text(const char* format, ...) {
 
 void CheckLens(const PinholeCamera& c, const CalibrationCheckOptions& options, CalibrationReport& report) {
   const bool wide = c.width >= c.height;
-  report.view_deg = 2 * kDegrees * std::atan(wide ? 0.5 * c.width / c.fx : 0.5 * c.height / c.fy);
+  report.view_deg = 2 * internal::kDegrees * std::atan(wide ? 0.5 * c.width / c.fx : 0.5 * c.height / c.fy);
   report.centre_offset = std::max(std::abs(c.cx / c.width - 0.5), std::abs(c.cy / c.height - 0.5));
   if (report.view_deg < options.min_view_deg || report.view_deg > options.max_view_deg) {
     report.findings.push_back(

@@ -6,6 +6,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <sstream>
 
+#include "core/angle.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 
@@ -216,7 +217,6 @@ LoopGroundTruth ReadLoopMatrix(const std::filesystem::path& file, int num_images
 LoopGroundTruth LoopsFromTrajectory(const Trajectory& trajectory, const LoopRule& rule) {
   const std::string problem = rule.Validate();
   if (!problem.empty()) throw InputError("ground truth from a trajectory: " + problem);
-  constexpr double kDegrees = 57.29577951308232;
   LoopGroundTruth truth(static_cast<int>(trajectory.size()));
   for (int r = 0; r < truth.size(); ++r) {
     const StampedPose& current = trajectory[static_cast<std::size_t>(r)];
@@ -226,7 +226,7 @@ LoopGroundTruth LoopsFromTrajectory(const Trajectory& trajectory, const LoopRule
       if (current.stamp_s - past.stamp_s < rule.exclude_s - 1e-6) {
         truth.Set(r, c, LoopLabel::kIgnore);
       } else if (distance < rule.ignore_m) {
-        const double angle = (past.pose.Inverse() * current.pose).Angle() * kDegrees;
+        const double angle = (past.pose.Inverse() * current.pose).Angle() * internal::kDegrees;
         const bool loop = distance < rule.distance_m && angle < rule.angle_deg;
         truth.Set(r, c, loop ? LoopLabel::kLoop : LoopLabel::kIgnore);
       }

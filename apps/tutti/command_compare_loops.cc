@@ -24,7 +24,7 @@ struct CompareArguments {
 Json ReadTable(const std::string& file) {
   std::ifstream in(file);
   if (!in) throw InputError(file + ": can't be opened; give a table.json of `tutti loops --table`");
-  const Json table = Json::parse(in, nullptr, false);
+  Json table = Json::parse(in, nullptr, false);
   if (!table.is_object() || !table.contains("rules") || !table.contains("best_single"))
     throw InputError(file + ": is no table.json of `tutti loops --table`");
   return table;
@@ -35,15 +35,17 @@ std::vector<double> Recalls(const CompareArguments& arguments, const std::vector
                             const std::string& rule, const std::string& ranking) {
   const std::string key =
       ranking == "verified" ? "recall_at_100_precision" : "recall_at_100_precision_posterior";
+  const std::string absent =
+      ": has no " + key + " of the rule '" + rule + "'; write it anew with `tutti loops --table`";
   std::vector<double> recalls;
+  recalls.reserve(tables.size());
   for (std::size_t i = 0; i < tables.size(); ++i) {
     try {
       const std::string name =
           rule == "best single" ? tables[i].at("best_single").at(ranking).get<std::string>() : rule;
       recalls.push_back(tables[i].at("rules").at(name).at(key).get<double>());
     } catch (const Json::exception&) {
-      throw InputError(arguments.tables[i] + ": has no " + key + " of the rule '" + rule +
-                       "'; write it anew with `tutti loops --table`");
+      throw InputError(arguments.tables[i] + absent);
     }
   }
   return recalls;

@@ -28,7 +28,7 @@ RunResult RunWithReport(RunRequest request, const RunConfig& config) {
   return result;
 }
 
-TrackedSequence TrackWithReport(RunRequest request, const RunConfig& config) {
+TrackedSequence TrackWithReport(const RunRequest& request, const RunConfig& config) {
   TrackedSequence sequence = TrackSequence(request, config);
   WriteReport(request.out, sequence.result, DetectionLog());
   return sequence;

@@ -14,7 +14,7 @@ namespace tutti::cli {
 RunResult RunWithReport(RunRequest request, const RunConfig& config);
 
 /// The same for a sequence that is tracked without loops, and for loops that are closed on it.
-TrackedSequence TrackWithReport(RunRequest request, const RunConfig& config);
+TrackedSequence TrackWithReport(const RunRequest& request, const RunConfig& config);
 RunResult CloseLoopsWithReport(const TrackedSequence& tracked, RunRequest request, const RunConfig& config);
 
 /// The page of a comparison, or removes an older one if pages are left out. `runs` without a report.json are

@@ -37,6 +37,7 @@ std::vector<std::size_t> RowsOf(const LoopReport& report, LoopOutcome outcome) {
 std::vector<std::size_t> Spread(const std::vector<std::size_t>& rows, std::size_t count) {
   if (rows.size() <= count) return rows;
   std::vector<std::size_t> chosen;
+  chosen.reserve(count);
   for (std::size_t k = 0; k < count; ++k) chosen.push_back(rows[k * rows.size() / count]);
   return chosen;
 }

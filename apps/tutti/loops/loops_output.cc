@@ -1,6 +1,7 @@
 #include "apps/tutti/loops/loops_output.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <functional>
@@ -17,7 +18,7 @@ double Quantile(std::vector<double> values, double q) {
   if (values.empty()) return 0.0;
   std::sort(values.begin(), values.end());
   const double position = q * static_cast<double>(values.size() - 1);
-  return values[static_cast<std::size_t>(position + 0.5)];
+  return values[static_cast<std::size_t>(std::lround(position))];
 }
 
 std::vector<double> Collect(const std::vector<LoopRow>& rows,
@@ -78,7 +79,8 @@ std::string Csv(const LoopRun& run) {
       "image,file,hypothesis,candidate,posterior,probability,proposed,accepted,verified_candidate,matches,"
       "inliers,truth,row_has_loop";
   for (const std::string& name : run.options.members) {
-    text += "," + name + "_hypothesis," + name + "_best," + name + "_at_candidate";
+    for (const char* column : {"_hypothesis", "_best", "_at_candidate"})
+      text.append(",").append(name).append(column);
   }
   text += ",reason\n";
   for (const LoopRow& row : run.rows) {

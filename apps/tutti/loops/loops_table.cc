@@ -177,11 +177,14 @@ std::string Csv(const LoopTable& table) {
   const std::vector<std::string> keys = {"recall_at_100_precision", "area_under_curve", "best_f1"};
   const std::vector<std::string> suffixes = {"", "_posterior", "_ranked"};
   for (const std::string& suffix : suffixes) {
-    for (const std::string& key : keys) text += "," + key + suffix;
-    text += ",calibration_error" + suffix + ",calibration_images" + suffix;
+    const auto add = [&](const std::string& key) { text.append(",").append(key).append(suffix); };
+    for (const std::string& key : keys) add(key);
+    add("calibration_error");
+    add("calibration_images");
     if (suffix == "_ranked") continue;  // decides as the verified ones
-    text += ",precision_at_default_threshold" + suffix + ",recall_at_default_threshold" + suffix +
-            ",f1_at_default" + suffix;
+    add("precision_at_default_threshold");
+    add("recall_at_default_threshold");
+    add("f1_at_default");
   }
   text += ",ms_per_image_median,ms_per_image_p99\n";
   const auto number = [](const Json& value) {

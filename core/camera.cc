@@ -69,20 +69,19 @@ bool PinholeCamera::Contains(const Eigen::Vector2d& pixel, double border) const 
 }
 
 std::string PinholeCamera::Validate() const {
-  if (width <= 0 || height <= 0)
-    return "camera: width and height must be positive; give the image size in pixels";
-  if (!(std::isfinite(fx) && std::isfinite(fy) && std::isfinite(cx) && std::isfinite(cy))) {
-    return "camera: fx, fy, cx, cy must be finite numbers";
+  std::string problem = OutOfRange(*this, "camera.");
+  if (problem.empty() && (cx < 0 || cx > width || cy < 0 || cy > height)) {
+    problem =
+        "camera: the principal point (cx, cy) lies outside the image; is the calibration of another image "
+        "size?";
   }
-  if (fx <= 0 || fy <= 0) return "camera: fx and fy must be positive (focal length in pixels)";
-  if (cx < 0 || cx > width || cy < 0 || cy > height) {
-    return "camera: the principal point (cx, cy) lies outside the image; is the calibration of another image "
-           "size?";
-  }
-  for (double k : coefficients) {
-    if (!std::isfinite(k)) return "camera: distortion coefficients must be finite numbers";
-  }
-  return {};
+  return problem;
+}
+
+EnumWords<Distortion> WordsOf(Distortion /*of*/) {
+  return {{"none", Distortion::kNone},
+          {"radtan", Distortion::kRadTan},
+          {"equidistant", Distortion::kEquidistant}};
 }
 
 }  // namespace tutti

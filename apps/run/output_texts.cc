@@ -14,18 +14,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-const char* Name(Sensor sensor) {
-  switch (sensor) {
-    case Sensor::kMono:
-      return "mono";
-    case Sensor::kStereo:
-      return "stereo";
-    case Sensor::kRgbd:
-      return "rgbd";
-  }
-  return "?";
-}
-
 // A value of the configuration as JSON: numbers and booleans as such, the rest as text.
 Json ConfigValue(const std::string& text) {
   const Json parsed = Json::parse(text, nullptr, false);
@@ -157,7 +145,7 @@ std::string SummaryJson(const RunResult& r) {
   json["version"] = kVersion;
   json["dataset"] = r.dataset;
   json["config_file"] = r.config_file;
-  json["sensor"] = Name(r.rig.sensor);
+  json["sensor"] = WordOf(r.rig.sensor);
   json["seed"] = r.config.loops.seed;
   json["realtime"] = r.realtime;
   json["interrupted"] = r.interrupted;

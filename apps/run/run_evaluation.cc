@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/angle.h"
 #include "tutti/backend/evaluation.h"
 #include "tutti/core/error.h"
 
@@ -14,7 +15,6 @@ constexpr double kMaxGap = 0.2;                // between reference poses to int
 constexpr double kMonoFalseDistance = 10.0;    // [m]
 constexpr double kMetricFalseDistance = 0.20;  // [m]
 constexpr double kMetricFalseAngle = 8.0;      // [deg]
-constexpr double kDegrees = 57.29577951308232;
 
 TrajectoryScore Score(const Trajectory& reference, const Trajectory& estimate, bool with_scale) {
   TrajectoryScore score;
@@ -54,7 +54,7 @@ Verdict Judge(const LoopRecord& loop, const Trajectory& reference, const CameraR
   const Pose T_candidate_query = (*candidate * rig.T_body_camera).Inverse() * (*query * rig.T_body_camera);
   const Pose difference = T_candidate_query.Inverse() * loop.S_candidate_query->RigidPart();
   const bool wrong = difference.translation.norm() > kMetricFalseDistance ||
-                     difference.Angle() * kDegrees > kMetricFalseAngle;
+                     difference.Angle() * internal::kDegrees > kMetricFalseAngle;
   return wrong ? Verdict::kFalse : Verdict::kTrue;
 }
 

@@ -1,11 +1,16 @@
-// How each type of value is read, strictly, and shown.
+// How each type of value is read, strictly, and shown; and the keys, as the option structs describe them.
 #include "apps/slam/config_table.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
+#include <optional>
+#include <type_traits>
 #include <utility>
 
+#include "tutti/core/error.h"
 #include "tutti/core/text.h"
 
 namespace tutti {
@@ -28,28 +33,171 @@ std::string ShowDouble(double value) {
   return text;
 }
 
-// A list of at most N numbers; the rest is 0. Empty, or what is wrong.
+std::string Join(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
+  return text;
+}
+
+// Read: sets the field; empty, or what is wrong with the value.
+std::string Read(const YAML::Node& node, bool& field) {
+  const std::string text = Text(node);
+  if (text != "true" && text != "false") return Wrong(node, "true or false");
+  field = text == "true";
+  return "";
+}
+
+std::string Read(const YAML::Node& node, int& field) {
+  const auto value = ParseInteger(Text(node));
+  if (!value || *value < -2147483647LL || *value > 2147483647LL) return Wrong(node, "a whole number");
+  field = static_cast<int>(*value);
+  return "";
+}
+
+std::string Read(const YAML::Node& node, std::uint64_t& field) {
+  const auto value = ParseInteger(Text(node));
+  if (!value || *value < 0) return Wrong(node, "a whole number that is not negative");
+  field = static_cast<std::uint64_t>(*value);
+  return "";
+}
+
+std::string Read(const YAML::Node& node, double& field) {
+  const auto value = ParseDouble(Text(node));
+  if (!value || !std::isfinite(*value)) return Wrong(node, "a finite number");
+  field = *value;
+  return "";
+}
+
+std::string Read(const YAML::Node& node, std::string& field) {
+  if (!node.IsScalar()) return "needs a text";
+  field = node.Scalar();
+  return "";
+}
+
+std::string Read(const YAML::Node& node, std::vector<std::string>& field) {
+  if (!node.IsSequence()) return "needs a list, as in [a, b]";
+  std::vector<std::string> values;
+  for (const YAML::Node& item : node) {
+    if (!item.IsScalar()) return "needs a list of words";
+    values.push_back(item.Scalar());
+  }
+  field = std::move(values);
+  return "";
+}
+
 template <std::size_t N>
-std::string ReadNumbers(const YAML::Node& list, std::array<double, N>& field) {
+std::string Read(const YAML::Node& node, std::array<double, N>& field) {
+  // The distortion of most cameras has fewer than five numbers.
+  const bool fits = node.IsSequence() && (N == 5 ? node.size() <= N : node.size() == N);
+  if (!fits) return "needs a list of " + std::string(N == 5 ? "up to " : "") + std::to_string(N) + " numbers";
   std::array<double, N> values{};
-  std::size_t i = 0;
-  for (const YAML::Node& item : list) {
-    const auto value = ParseDouble(Text(item));
-    if (!value || !std::isfinite(*value)) return Wrong(item, "a finite number");
-    values[i++] = *value;
+  for (std::size_t i = 0; i < node.size(); ++i) {
+    const std::string wrong = Read(node[i], values[i]);
+    if (!wrong.empty()) return wrong;
   }
   field = values;
   return "";
 }
 
+template <class Enum>
+std::vector<std::string> ValidWords() {
+  std::vector<std::string> words;
+  for (const auto& [word, value] : WordsOf(Enum())) words.emplace_back(word);
+  return words;
+}
+
+template <class Enum, class = std::enable_if_t<std::is_enum_v<Enum>>>
+std::string Read(const YAML::Node& node, Enum& field) {
+  for (const auto& [word, value] : WordsOf(field)) {
+    if (Text(node) != word) continue;
+    field = value;
+    return "";
+  }
+  return Wrong(node, "one of " + Join(ValidWords<Enum>()));
+}
+
+// Show: the value as YAML.
+std::string Show(bool value) { return value ? "true" : "false"; }
+std::string Show(int value) { return std::to_string(value); }
+std::string Show(std::uint64_t value) { return std::to_string(value); }
+std::string Show(double value) { return ShowDouble(value); }
+std::string Show(const std::string& value) { return "\"" + value + "\""; }
+std::string Show(const std::vector<std::string>& value) { return "[" + Join(value) + "]"; }
+
 template <std::size_t N>
-std::string ShowNumbers(const std::array<double, N>& field) {
-  std::string text = "[";
-  for (const double value : field) text += (text.size() > 1 ? ", " : "") + ShowDouble(value);
-  return text + "]";
+std::string Show(const std::array<double, N>& values) {
+  std::vector<std::string> texts;
+  for (const double value : values) texts.push_back(ShowDouble(value));
+  return "[" + Join(texts) + "]";
+}
+
+template <class Enum, class = std::enable_if_t<std::is_enum_v<Enum>>>
+std::string Show(Enum value) {
+  return WordOf(value);
+}
+
+// The sentence, with unit and range or words: "frame rate [1/s; at least 0]".
+template <class Field>
+std::string DocOf(const OptionText& text) {
+  std::string range = text.Range();
+  if constexpr (std::is_enum_v<Field>) range = Join(ValidWords<Field>());
+  const std::string unit = text.unit;
+  if (range.empty() && unit.empty()) return text.sentence;
+  return std::string(text.sentence) + " [" + unit + (range.empty() || unit.empty() ? "" : "; ") + range + "]";
 }
 
 }  // namespace
+
+ConfigTable::ConfigTable(RunConfig& config) {
+  if (!config.dataset.camera) config.dataset.camera = PinholeCamera();
+  AddOptions("dataset", config.dataset);
+  AddOptions("odometry", config.odometry);
+  AddOptions("loops", config.loops);
+  AddRule(config.loops);
+  AddOptions("graph", config.graph);
+  AddOptions("run", config.run);
+}
+
+template <class Options>
+void ConfigTable::AddOptions(const std::string& section, Options& options) {
+  ForEachOption(options, [&](const OptionText& text, auto& field) {
+    using Field = std::decay_t<decltype(field)>;
+    if constexpr (std::is_same_v<Field, std::optional<PinholeCamera>>) {
+      AddOptions(text.section, *field);
+    } else if constexpr (kHasOptions<Field>) {
+      AddOptions(section + "." + text.name, field);
+    } else if (text.in_files) {
+      Add(*text.section == '\0' ? section : text.section, text, field);
+    }
+  });
+}
+
+template <class Field>
+void ConfigTable::Add(const std::string& section, const OptionText& text, Field& field) {
+  keys_.push_back({section, text.name, DocOf<Field>(text),
+                   [&field](const YAML::Node& node) { return Read(node, field); },
+                   [&field] { return Show(field); }, !text.basic});
+}
+
+void ConfigTable::AddRule(LoopDetectorOptions& options) {
+  // A word that `take` understands or refuses with an InputError.
+  const auto word = [&options](void (*take)(const std::string&, LoopDetectorOptions&)) {
+    return [&options, take](const YAML::Node& node) -> std::string {
+      try {
+        take(Text(node), options);
+      } catch (const InputError& e) {
+        return e.what();
+      }
+      return "";
+    };
+  };
+  const auto rule =
+      std::find_if(keys_.begin(), keys_.end(), [](const ConfigKey& key) { return key.name == "rule"; });
+  rule->read = word(&SetRule);
+  rule->show = [&options] { return RuleName(options); };
+  const std::string doc = "published parameters that the other keys change [" + Join(KnownPresets()) + "]";
+  keys_.insert(rule + 1, {"loops", "preset", doc, word(&ApplyPreset), [] { return "default"; }, false});
+}
 
 const ConfigKey* ConfigTable::Find(const std::string& section, const std::string& name) const {
   for (const ConfigKey& key : keys_) {
@@ -85,110 +233,6 @@ std::vector<std::string> ConfigTable::Names(const std::string& section) const {
     if (key.section == section) out.push_back(key.name);
   }
   return out;
-}
-
-void ConfigTable::Push(const char* name, const char* doc, std::function<std::string(const YAML::Node&)> read,
-                       std::function<std::string()> show) {
-  keys_.push_back({section_, name, doc, std::move(read), std::move(show), !std::exchange(basic_, false)});
-}
-
-void ConfigTable::Add(const char* name, bool& field, const char* doc) {
-  Push(
-      name, doc,
-      [&field](const YAML::Node& node) -> std::string {
-        const std::string text = Text(node);
-        if (text != "true" && text != "false") return Wrong(node, "true or false");
-        field = text == "true";
-        return "";
-      },
-      [&field] { return std::string(field ? "true" : "false"); });
-}
-
-void ConfigTable::Add(const char* name, int& field, const char* doc) {
-  Push(
-      name, doc,
-      [&field](const YAML::Node& node) -> std::string {
-        const auto value = ParseInteger(Text(node));
-        if (!value || *value < -2147483647LL || *value > 2147483647LL) return Wrong(node, "a whole number");
-        field = static_cast<int>(*value);
-        return "";
-      },
-      [&field] { return std::to_string(field); });
-}
-
-void ConfigTable::Add(const char* name, std::uint64_t& field, const char* doc) {
-  Push(
-      name, doc,
-      [&field](const YAML::Node& node) -> std::string {
-        const auto value = ParseInteger(Text(node));
-        if (!value || *value < 0) return Wrong(node, "a whole number that is not negative");
-        field = static_cast<std::uint64_t>(*value);
-        return "";
-      },
-      [&field] { return std::to_string(field); });
-}
-
-void ConfigTable::Add(const char* name, double& field, const char* doc) {
-  Push(
-      name, doc,
-      [&field](const YAML::Node& node) -> std::string {
-        const auto value = ParseDouble(Text(node));
-        if (!value || !std::isfinite(*value)) return Wrong(node, "a finite number");
-        field = *value;
-        return "";
-      },
-      [&field] { return ShowDouble(field); });
-}
-
-void ConfigTable::Add(const char* name, std::string& field, const char* doc) {
-  Push(
-      name, doc,
-      [&field](const YAML::Node& node) -> std::string {
-        if (!node.IsScalar()) return "needs a text";
-        field = node.Scalar();
-        return "";
-      },
-      [&field] { return "\"" + field + "\""; });
-}
-
-void ConfigTable::Add(const char* name, std::vector<std::string>& field, const char* doc) {
-  Push(
-      name, doc,
-      [&field](const YAML::Node& node) -> std::string {
-        if (!node.IsSequence()) return "needs a list, as in [a, b]";
-        std::vector<std::string> values;
-        for (const YAML::Node& item : node) {
-          if (!item.IsScalar()) return "needs a list of words";
-          values.push_back(item.Scalar());
-        }
-        field = std::move(values);
-        return "";
-      },
-      [&field] {
-        std::string text = "[";
-        for (const std::string& item : field) text += (text.size() > 1 ? ", " : "") + item;
-        return text + "]";
-      });
-}
-
-void ConfigTable::Add(const char* name, std::array<double, 5>& field, const char* doc) {
-  Push(
-      name, doc,
-      [&field](const YAML::Node& node) -> std::string {
-        if (!node.IsSequence() || node.size() > 5) return "needs a list of up to 5 numbers";
-        return ReadNumbers(node, field);
-      },
-      [&field] { return ShowNumbers(field); });
-}
-
-void ConfigTable::Add(const char* name, std::array<double, 3>& field, const char* doc) {
-  Push(
-      name, doc,
-      [&field](const YAML::Node& node) -> std::string {
-        if (!node.IsSequence() || node.size() != 3) return "needs a list of 3 numbers, as in [1, 2, 3]";
-        return ReadNumbers(node, field);
-      },
-      [&field] { return ShowNumbers(field); });
 }
 
 }  // namespace tutti

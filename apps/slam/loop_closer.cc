@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/angle.h"
 #include "core/stopwatch.h"
 
 namespace tutti {
 namespace {
 
-constexpr double kRadians = 0.017453292519943295;
 constexpr double kNoWeight = 0.01;  // of the robust loss: the map contradicts the loop
 constexpr int kLeastCommon = 30;    // landmarks that tie the two ends of a loop
 
@@ -17,7 +17,7 @@ KeyframeGraphOptions GraphOptions(const RunConfig& config, Sensor sensor) {
   options.kind = sensor == Sensor::kMono ? GraphKind::kSim3 : GraphKind::kSE3;
   options.solver = config.graph;
   options.sigma_translation_ratio = config.run.odometry_sigma_fraction;
-  options.sigma_rotation_rad = config.run.odometry_sigma_deg * kRadians;
+  options.sigma_rotation_rad = config.run.odometry_sigma_deg * internal::kRadians;
   options.sigma_log_scale = config.run.odometry_sigma_scale;
   options.max_covisible = config.run.covisibility_edges;
   return options;

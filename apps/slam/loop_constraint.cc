@@ -7,13 +7,13 @@
 #include <set>
 #include <utility>
 
+#include "core/angle.h"
 #include "core/median.h"
 #include "tutti/loopclosure/relative_pose.h"
 
 namespace tutti {
 namespace {
 
-constexpr double kRadians = 0.017453292519943295;
 constexpr int kMinSimilarityInliers = 12;  // of 3D-3D matches; fewer leave the scale open
 constexpr float kMaxHamming = 60;  // of 256 bits; beyond it two ORB descriptors have nothing in common
 
@@ -156,7 +156,7 @@ LoopConstraint MakeLoopConstraint(const Verification& verification, const Keyfra
   // The residual of an edge lives in the query's frame, the depth in the candidate's.
   const double sigma_translation = options.loop_sigma_fraction * edge.depth / edge.S_candidate_query.scale;
   edge.information =
-      WithFloor(information, sigma_translation, options.loop_sigma_deg * kRadians, options.loop_sigma_scale);
+      WithFloor(information, sigma_translation, options.loop_sigma_deg * internal::kRadians, options.loop_sigma_scale);
   out.usable = edge.information.allFinite();
   if (!out.usable) out.reason = "its information matrix is not finite";
   return out;

@@ -3,12 +3,11 @@
 #include <cmath>
 #include <cstdio>
 
+#include "core/angle.h"
 #include "core/stopwatch.h"
 
 namespace tutti {
 namespace {
-
-constexpr double kDegrees = 57.29577951308232;
 
 std::string BeyondGate(double sigmas, double limit) {
   char text[120];
@@ -70,7 +69,7 @@ bool Judge(const KeyframeCorrection& correction, const std::vector<LoopEdge>& ac
 Disagreement Measure(const Similarity& E, double depth) {
   Disagreement d;
   d.fraction = E.translation.norm() / depth;
-  d.angle_deg = LogSO3(E.rotation).norm() * kDegrees;
+  d.angle_deg = LogSO3(E.rotation).norm() * internal::kDegrees;
   d.log_scale = std::abs(std::log(E.scale));
   return d;
 }

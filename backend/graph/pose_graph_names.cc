@@ -1,6 +1,5 @@
 // Words of the command line for the optimiser's choices.
-#include <array>
-#include <utility>
+#include <string>
 #include <vector>
 
 #include "tutti/backend/pose_graph_optimizer.h"
@@ -11,26 +10,10 @@ namespace tutti {
 namespace {
 
 template <typename Enum>
-using Names = std::vector<std::pair<const char*, Enum>>;
-
-const Names<GraphObjective> kObjectives = {{"chi2", GraphObjective::kChi2},
-                                           {"chi2log", GraphObjective::kChi2Log}};
-const Names<RobustLoss> kRobust = {
-    {"none", RobustLoss::kNone}, {"huber", RobustLoss::kHuber},           {"cauchy", RobustLoss::kCauchy},
-    {"dcs", RobustLoss::kDcs},   {"switchable", RobustLoss::kSwitchable}, {"gnc-tls", RobustLoss::kGncTls},
-    {"gnc", RobustLoss::kGnc}};
-const Names<GraphInit> kInits = {{"auto", GraphInit::kAuto},
-                                 {"file", GraphInit::kFile},
-                                 {"odometry", GraphInit::kOdometry},
-                                 {"chordal", GraphInit::kChordal}};
-const Names<PoseGraphSolver> kSolvers = {{"ceres", PoseGraphSolver::kCeres},
-                                         {"block", PoseGraphSolver::kBlock}};
-
-template <typename Enum>
-Enum Parse(const Names<Enum>& names, const std::string& name, const char* what) {
+Enum Parse(const std::string& name, const char* what) {
   std::string all;
   std::vector<std::string> words;
-  for (const auto& [word, value] : names) {
+  for (const auto& [word, value] : WordsOf(Enum())) {
     if (name == word) return value;
     words.emplace_back(word);
     all += (all.empty() ? "" : ", ") + words.back();
@@ -39,24 +22,39 @@ Enum Parse(const Names<Enum>& names, const std::string& name, const char* what) 
                    NearestWord(name, words) + "'? There are: " + all);
 }
 
-template <typename Enum>
-const char* Name(const Names<Enum>& names, Enum value) {
-  for (const auto& [word, candidate] : names) {
-    if (candidate == value) return word;
-  }
-  return "?";
-}
-
 }  // namespace
 
-GraphObjective ParseGraphObjective(const std::string& name) { return Parse(kObjectives, name, "objective"); }
-RobustLoss ParseRobustLoss(const std::string& name) { return Parse(kRobust, name, "robust loss"); }
-GraphInit ParseGraphInit(const std::string& name) { return Parse(kInits, name, "initialisation"); }
-PoseGraphSolver ParsePoseGraphSolver(const std::string& name) { return Parse(kSolvers, name, "solver"); }
-const char* ToString(GraphObjective objective) { return Name(kObjectives, objective); }
-const char* ToString(RobustLoss robust) { return Name(kRobust, robust); }
-const char* ToString(GraphInit init) { return Name(kInits, init); }
-const char* ToString(PoseGraphSolver solver) { return Name(kSolvers, solver); }
+EnumWords<GraphObjective> WordsOf(GraphObjective /*of*/) {
+  return {{"chi2", GraphObjective::kChi2}, {"chi2log", GraphObjective::kChi2Log}};
+}
+EnumWords<RobustLoss> WordsOf(RobustLoss /*of*/) {
+  return {
+      {"none", RobustLoss::kNone}, {"huber", RobustLoss::kHuber},           {"cauchy", RobustLoss::kCauchy},
+      {"dcs", RobustLoss::kDcs},   {"switchable", RobustLoss::kSwitchable}, {"gnc-tls", RobustLoss::kGncTls},
+      {"gnc", RobustLoss::kGnc}};
+}
+EnumWords<GraphInit> WordsOf(GraphInit /*of*/) {
+  return {{"auto", GraphInit::kAuto},
+          {"file", GraphInit::kFile},
+          {"odometry", GraphInit::kOdometry},
+          {"chordal", GraphInit::kChordal}};
+}
+EnumWords<PoseGraphSolver> WordsOf(PoseGraphSolver /*of*/) {
+  return {{"ceres", PoseGraphSolver::kCeres}, {"block", PoseGraphSolver::kBlock}};
+}
+
+GraphObjective ParseGraphObjective(const std::string& name) {
+  return Parse<GraphObjective>(name, "objective");
+}
+RobustLoss ParseRobustLoss(const std::string& name) { return Parse<RobustLoss>(name, "robust loss"); }
+GraphInit ParseGraphInit(const std::string& name) { return Parse<GraphInit>(name, "initialisation"); }
+PoseGraphSolver ParsePoseGraphSolver(const std::string& name) {
+  return Parse<PoseGraphSolver>(name, "solver");
+}
+const char* ToString(GraphObjective objective) { return WordOf(objective); }
+const char* ToString(RobustLoss robust) { return WordOf(robust); }
+const char* ToString(GraphInit init) { return WordOf(init); }
+const char* ToString(PoseGraphSolver solver) { return WordOf(solver); }
 
 const char* ToString(LoopDoubt doubt) {
   switch (doubt) {

@@ -224,20 +224,6 @@ void OptimizeAs(PoseGraph& graph, const GraphStructure& structure, const PoseGra
 
 }  // namespace
 
-std::string PoseGraphOptions::Validate() const {
-  if (!(robust_chi2 >= 0) || !std::isfinite(robust_chi2))
-    return "pose graph: robust_chi2 must be 0 (automatic) or positive";
-  if (max_iterations < 1) return "pose graph: max_iterations must be at least 1";
-  if (!(function_tolerance > 0 && function_tolerance < 1))
-    return "pose graph: function_tolerance must be in (0, 1)";
-  if (!(gnc_step > 1) || !std::isfinite(gnc_step)) return "pose graph: gnc_step must be greater than 1";
-  if (!(gnc_start > 0) || !std::isfinite(gnc_start)) return "pose graph: gnc_start must be positive";
-  if (gnc_max_rounds < 1) return "pose graph: gnc_max_rounds must be at least 1";
-  if (!(max_time_s >= 0) || !std::isfinite(max_time_s))
-    return "pose graph: max_time_s must be 0 (no limit) or positive";
-  return {};
-}
-
 PoseGraphOptimizer::PoseGraphOptimizer(const PoseGraphOptions& options) : options_(options) {
   const std::string wrong = options.Validate();
   if (!wrong.empty()) throw InputError(wrong);

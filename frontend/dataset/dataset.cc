@@ -9,17 +9,14 @@
 
 namespace tutti {
 
-std::string DatasetOptions::Validate() const {
-  if (!(follow_s >= 0 && std::isfinite(follow_s)))
-    return "follow_s must not be negative; 0: all images are there";
-  if (stride < 1) return "stride must be at least 1";
-  if (!(baseline_m >= 0)) return "baseline_m must not be negative";
-  if (!(depth_units_per_m > 0)) return "depth_units_per_m must be greater than 0";
-  if (!(max_depth_m >= 0)) return "max_depth_m must not be negative; 0 means no limit";
-  if (!(max_association_s >= 0)) return "max_association_s must not be negative";
-  if (!(rate_hz >= 0 && std::isfinite(rate_hz)))
-    return "rate_hz must not be negative; 0 means the data's own";
-  return {};
+EnumWords<DatasetType> WordsOf(DatasetType /*of*/) {
+  return {{"auto", DatasetType::kAuto},   {"kitti", DatasetType::kKitti},   {"tum", DatasetType::kTum},
+          {"euroc", DatasetType::kEuroc}, {"images", DatasetType::kImages}, {"video", DatasetType::kVideo},
+          {"bag", DatasetType::kBag}};
+}
+
+EnumWords<Sensor> WordsOf(Sensor /*of*/) {
+  return {{"mono", Sensor::kMono}, {"stereo", Sensor::kStereo}, {"rgbd", Sensor::kRgbd}};
 }
 
 bool Dataset::WaitFor(std::size_t i, const std::function<bool()>&) const { return i < Size(); }

@@ -10,8 +10,9 @@
 namespace tutti {
 namespace {
 
-const std::vector<std::string>& RuleWords() {
-  static const std::vector<std::string> words = {"joint", "mean", "log-pool", "product", "majority", "naive"};
+std::vector<std::string> RuleWords() {
+  std::vector<std::string> words;
+  for (const auto& [word, rule] : WordsOf(CombinationRule())) words.emplace_back(word);
   return words;
 }
 
@@ -25,117 +26,66 @@ bool Holds(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-std::string OutOf(const char* name, const char* range) { return std::string(name) + " must be " + range; }
-
 }  // namespace
 
-std::string ExtractionOptions::Validate() const {
-  if (features < 1 || features > 10000) return OutOf("extraction.features", "1 to 10000");
-  if (grid_columns < 1 || grid_columns > 64) return OutOf("extraction.grid_columns", "1 to 64");
-  if (max_pixels < 1 << 12) return OutOf("extraction.max_pixels", "at least 4096");
-  if (min_pixels < 0) return OutOf("extraction.min_pixels", "0 (never enlarged) or more");
-  if (surf_octaves < 1 || surf_octaves > 8) return OutOf("extraction.surf_octaves", "1 to 8");
-  if (!(surf_threshold >= 0)) return OutOf("extraction.surf_threshold", "0 or more");
-  if (!(surf_min_threshold >= 0)) return OutOf("extraction.surf_min_threshold", "0 or more");
-  if (sift_max_pixels < 1 << 12) return OutOf("extraction.sift_max_pixels", "at least 4096");
-  if (!(sift_contrast > 0)) return OutOf("extraction.sift_contrast", "above 0");
-  if (!(sift_min_contrast > 0)) return OutOf("extraction.sift_min_contrast", "above 0");
-  if (orb_fast_threshold < 1 || orb_fast_threshold > 255)
-    return OutOf("extraction.orb_fast_threshold", "1 to 255");
-  if (!(orb_border > 0 && orb_border <= 1)) return OutOf("extraction.orb_border", "above 0, at most 1");
-  return {};
+EnumWords<CombinationRule> WordsOf(CombinationRule /*of*/) {
+  return {{"joint", CombinationRule::kJoint},       {"mean", CombinationRule::kMean},
+          {"log-pool", CombinationRule::kLogPool},  {"product", CombinationRule::kProduct},
+          {"majority", CombinationRule::kMajority}, {"naive", CombinationRule::kNaive}};
+}
+EnumWords<EvidenceKind> WordsOf(EvidenceKind /*of*/) {
+  return {{"counts", EvidenceKind::kCounts}, {"standardised", EvidenceKind::kStandardised}};
+}
+EnumWords<LikelihoodKind> WordsOf(LikelihoodKind /*of*/) {
+  return {{"similarity", LikelihoodKind::kSimilarity}, {"tfidf", LikelihoodKind::kTfIdf}};
+}
+EnumWords<MemoryKind> WordsOf(MemoryKind /*of*/) {
+  return {{"shared", MemoryKind::kShared}, {"per_member", MemoryKind::kPerMember}};
+}
+EnumWords<FloatIndex> WordsOf(FloatIndex /*of*/) {
+  return {{"forest", FloatIndex::kForest}, {"flann", FloatIndex::kFlann}};
 }
 
-std::string VocabularyOptions::Validate() const {
-  if (!(nndr > 0 && nndr <= 1))
-    return OutOf("vocabulary.nndr", "above 0 and at most 1 (a ratio of true distances)");
-  if (trees < 1 || trees > 32) return OutOf("vocabulary.trees", "1 to 32");
-  if (checks < 1) return OutOf("vocabulary.checks", "at least 1");
-  if (hash_tables < 1 || hash_tables > 64) return OutOf("vocabulary.hash_tables", "1 to 64");
-  return {};
-}
+namespace {
 
-std::string EvidenceOptions::Validate() const {
-  if (!(sharpness > 0 && sharpness <= 10)) return OutOf("evidence.sharpness", "above 0, at most 10");
-  if (!(alias_share > 0 && alias_share <= 3)) return OutOf("evidence.alias_share", "above 0, at most 3");
-  if (!(floor < 0 && floor >= -10)) return OutOf("evidence.floor", "below 0, at least -10");
-  if (!(attraction >= 0 && attraction <= 2)) return OutOf("evidence.attraction", "0 to 2");
-  if (!(persistence >= 0 && persistence <= 10)) return OutOf("evidence.persistence", "0 to 10");
-  return {};
-}
-
-std::string VerificationOptions::Validate() const {
-  if (max_hypotheses < 1) return OutOf("verification.max_hypotheses", "at least 1");
-  if (neighbours < 0 || neighbours > 16) return OutOf("verification.neighbours", "0 to 16");
-  if (!(nearer_share > 0 && nearer_share <= 1))
-    return OutOf("verification.nearer_share", "above 0, at most 1");
-  if (!(match_ratio > 0 && match_ratio <= 1))
-    return OutOf("verification.match_ratio", "above 0 and at most 1");
-  if (min_inliers < 8) return OutOf("verification.min_inliers", "at least 8");
-  if (!(min_inlier_ratio >= 0 && min_inlier_ratio <= 1))
-    return OutOf("verification.min_inlier_ratio", "0 to 1");
-  if (min_epipolar_inliers < 8) return OutOf("verification.min_epipolar_inliers", "at least 8");
-  if (!(min_epipolar_ratio >= 0 && min_epipolar_ratio <= 1))
-    return OutOf("verification.min_epipolar_ratio", "0 to 1");
-  if (!(min_spread >= 0 && min_spread < 1)) return OutOf("verification.min_spread", "0 to 1");
-  if (!(reprojection_px > 0)) return OutOf("verification.reprojection_px", "above 0");
-  if (!(epipolar_px > 0)) return OutOf("verification.epipolar_px", "above 0");
-  if (!(homography_px >= 0)) return OutOf("verification.homography_px", "0 (off) or more");
-  if (!(homography_share > 0 && homography_share <= 1))
-    return OutOf("verification.homography_share", "above 0, at most 1");
-  if (!(camera_share >= 0 && camera_share <= 1)) return OutOf("verification.camera_share", "0 to 1");
-  if (!(static_px >= 0)) return OutOf("verification.static_px", "0 (off) or more");
-  if (!(confidence > 0 && confidence < 1)) return OutOf("verification.confidence", "between 0 and 1");
-  if (max_iterations < 1) return OutOf("verification.max_iterations", "at least 1");
-  if (!(pixel_sigma > 0)) return OutOf("verification.pixel_sigma", "above 0");
-  if (!(min_depth_m >= 0 && max_depth_m > min_depth_m)) {
-    return "verification.min_depth_m must be at least 0 and below verification.max_depth_m";
-  }
-  return {};
-}
-
-std::string DnnOptions::Validate() const {
-  constexpr int kLeastSide = 16, kMostSide = 4096;  // [px]
-  constexpr double kMost = 1000;
-  const auto usable = [](double factor) { return factor > 0 && factor <= kMost; };
-  if (width < kLeastSide || width > kMostSide) return OutOf("dnn.width", "16 to 4096");
-  if (height < kLeastSide || height > kMostSide) return OutOf("dnn.height", "16 to 4096");
-  if (!std::all_of(mean.begin(), mean.end(), [](double level) { return std::abs(level) <= kMost; }))
-    return OutOf("dnn.mean", "-1000 to 1000 for each channel");
-  if (!usable(scale)) return OutOf("dnn.scale", "above 0, at most 1000");
-  if (!std::all_of(stddev.begin(), stddev.end(), usable))
-    return OutOf("dnn.stddev", "above 0, at most 1000 for each channel");
-  return {};
-}
-
-std::string LoopDetectorOptions::Validate() const {
+// Empty, or what is wrong with the members' names.
+std::string MembersProblem(const LoopDetectorOptions& o) {
   std::vector<std::string> known = KnownMembers();
-  known.insert(known.end(), external_members.begin(), external_members.end());
-  if (members.empty()) return "members must name at least one of " + JoinWords(KnownMembers());
-  for (std::size_t i = 0; i < members.size(); ++i) {
-    if (!Holds(known, members[i])) {
-      return "members holds '" + members[i] + "', which is not known; did you mean '" +
-             NearestWord(members[i], known) + "'?";
+  known.insert(known.end(), o.external_members.begin(), o.external_members.end());
+  if (o.members.empty()) return "members must name at least one of " + JoinWords(KnownMembers());
+  for (std::size_t i = 0; i < o.members.size(); ++i) {
+    if (!Holds(known, o.members[i])) {
+      return "members holds '" + o.members[i] + "', which is not known; did you mean '" +
+             NearestWord(o.members[i], known) + "'?";
     }
-    if (Holds({members.begin(), members.begin() + static_cast<std::ptrdiff_t>(i)}, members[i])) {
-      return "members holds '" + members[i] + "' twice; name each member once";
+    if (Holds({o.members.begin(), o.members.begin() + static_cast<std::ptrdiff_t>(i)}, o.members[i])) {
+      return "members holds '" + o.members[i] + "' twice; name each member once";
     }
   }
-  for (const std::string& name : dense_members) {
-    if (!Holds(external_members, name)) {
+  for (const std::string& name : o.dense_members) {
+    if (!Holds(o.external_members, name)) {
       return "dense_members holds '" + name + "', which is not in external_members; name it there, too";
     }
   }
-  if (Holds(members, "dnn") && !Holds(external_members, "dnn") && dnn.model.empty()) {
+  if (Holds(o.members, "dnn") && !Holds(o.external_members, "dnn") && o.dnn.model.empty()) {
     return "members holds 'dnn', but dnn.model is empty; give the ONNX file of a network "
            "(docs/loop-closure.md section 3 says which fit), or leave 'dnn' out";
   }
-  for (const std::string& name : members) {
-    const bool dense = Holds(KnownDenseMembers(), name) || Holds(dense_members, name);
-    if (dense && rule == CombinationRule::kNaive) {
+  for (const std::string& name : o.members) {
+    const bool dense = Holds(KnownDenseMembers(), name) || Holds(o.dense_members, name);
+    if (dense && o.rule == CombinationRule::kNaive) {
       return "the rule 'naive' puts the words of all members together, and '" + name +
              "' has none; leave it out or choose another rule";
     }
+  }
+  return "";
+}
+
+}  // namespace
+
+std::string LoopDetectorOptions::Validate() const {
+  for (const std::string& problem : {OutOfRange(*this), MembersProblem(*this)}) {
+    if (!problem.empty()) return problem;
   }
   if (rule == CombinationRule::kSingle && members.size() != 1) {
     return "the rule 'single' takes exactly one member, not " + std::to_string(members.size());
@@ -146,28 +96,10 @@ std::string LoopDetectorOptions::Validate() const {
   if (rule == CombinationRule::kJoint && evidence.kind == EvidenceKind::kStandardised) {
     return "the rule 'joint' needs evidence.kind: counts (standardised scores can't be added up)";
   }
-  if (!(loop_threshold >= 0 && loop_threshold <= 1)) return OutOf("loop_threshold", "0 to 1");
-  if (!(propose_threshold >= 0 && propose_threshold <= 1)) return OutOf("propose_threshold", "0 to 1");
-  if (!(link_threshold >= 0 && link_threshold <= 1)) return OutOf("link_threshold", "0 to 1");
-  if (stm_size < 1) return OutOf("stm_size", "at least 1");
-  if (threads < 1) return OutOf("threads", "at least 1");
-  if (!(bad_signature_ratio >= 0 && bad_signature_ratio <= 1)) return OutOf("bad_signature_ratio", "0 to 1");
-  if (!(virtual_place_prior > 0 && virtual_place_prior < 1))
-    return OutOf("virtual_place_prior", "between 0 and 1");
-  if (!(hypothesis_ratio >= 0 && hypothesis_ratio <= 1)) return OutOf("hypothesis_ratio", "0 to 1");
-  if (island_levels < 0 || island_levels > 16) return OutOf("island_levels", "0 to 16");
-  if (consistent_images < 0) return OutOf("consistent_images", "0 or more");
-  if (wm_limit < 0) return OutOf("wm_limit", "0 (no limit) or more");
-  if (!(time_budget_ms >= 0)) return OutOf("time_budget_ms", "0 (off) or more");
-  if (retrieval < 0 || retrieval > 100) return OutOf("retrieval", "0 to 100");
-  if (!(recent_share >= 0 && recent_share < 1)) return OutOf("recent_share", "0 or more, below 1");
-  if (!(rehearsal_similarity > 0 && rehearsal_similarity <= 1))
-    return OutOf("rehearsal_similarity", "above 0, at most 1");
-  for (const std::string& problem : {extraction.Validate(), vocabulary.Validate(), evidence.Validate(),
-                                     verification.Validate(), dnn.Validate()}) {
-    if (!problem.empty()) return problem;
+  if (verification.max_depth_m <= verification.min_depth_m) {
+    return "verification.min_depth_m must be below verification.max_depth_m";
   }
-  return {};
+  return "";
 }
 
 std::vector<std::string> KnownDenseMembers() { return {"hog", "dnn"}; }
@@ -187,12 +119,9 @@ std::vector<std::string> KnownFeatureTypes() {
 }
 
 void SetRule(const std::string& word, LoopDetectorOptions& options) {
-  const auto rule = std::find(RuleWords().begin(), RuleWords().end(), word);
-  if (rule != RuleWords().end()) {
-    constexpr CombinationRule kRules[] = {CombinationRule::kJoint,    CombinationRule::kMean,
-                                          CombinationRule::kLogPool,  CombinationRule::kProduct,
-                                          CombinationRule::kMajority, CombinationRule::kNaive};
-    options.rule = kRules[rule - RuleWords().begin()];
+  for (const auto& [known_word, rule] : WordsOf(CombinationRule())) {
+    if (word != known_word) continue;
+    options.rule = rule;
     return;
   }
   const std::vector<std::string> known = KnownMembers();
@@ -281,22 +210,7 @@ void ApplyPreset(const std::string& name, LoopDetectorOptions& options) {
 }
 
 std::string RuleName(const LoopDetectorOptions& options) {
-  switch (options.rule) {
-    case CombinationRule::kJoint:
-      return "joint";
-    case CombinationRule::kMean:
-      return "mean";
-    case CombinationRule::kLogPool:
-      return "log-pool";
-    case CombinationRule::kProduct:
-      return "product";
-    case CombinationRule::kMajority:
-      return "majority";
-    case CombinationRule::kNaive:
-      return "naive";
-    case CombinationRule::kSingle:
-      break;
-  }
+  if (options.rule != CombinationRule::kSingle) return WordOf(options.rule);
   return options.members.empty() ? "single" : options.members.front();
 }
 

@@ -186,7 +186,7 @@ struct DnnDescriptor::Network {
 };
 
 DnnDescriptor::DnnDescriptor(const DnnOptions& options) : network_(std::make_shared<Network>()) {
-  const std::string problem = options.Validate();
+  const std::string problem = OutOfRange(options, "dnn.");
   if (!problem.empty()) throw InputError(problem);
   Network& network = *network_;
   network.options = options;

@@ -68,13 +68,13 @@ TEST(PinholeCamera, ValidateSaysWhatIsWrong) {
   EXPECT_EQ(Camera(Distortion::kRadTan).Validate(), "");
   PinholeCamera camera = Camera(Distortion::kNone);
   camera.fx = 0;
-  EXPECT_NE(camera.Validate().find("fx and fy"), std::string::npos);
+  EXPECT_EQ(camera.Validate(), "camera.fx must be above 0 [px], not 0");
   camera = Camera(Distortion::kNone);
   camera.cx = 5000;
   EXPECT_NE(camera.Validate().find("principal point"), std::string::npos);
   camera = Camera(Distortion::kRadTan);
   camera.coefficients[0] = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_NE(camera.Validate().find("distortion"), std::string::npos);
+  EXPECT_NE(camera.Validate().find("camera.coefficients"), std::string::npos);
 }
 
 }  // namespace

@@ -3,10 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <fstream>
-#include <regex>
-#include <set>
-#include <sstream>
+#include <algorithm>
+#include <array>
+#include <filesystem>
 
 #include "tests/support/test_data.h"
 #include "tutti/core/error.h"
@@ -113,8 +112,8 @@ TEST(Config, WrongTypesAreRefusedWithTheirLine) {
 }
 
 TEST(Config, ValuesOutOfRangePointToTheirLine) {
-  EXPECT_THAT(Message("run:\n  loops: true\n  loop_delay_frames: 0\n"),
-              AllOf(HasSubstr("my.yaml:3:"), HasSubstr("loop_delay_frames")));
+  EXPECT_EQ(Message("run:\n  loops: true\n  loop_delay_frames: 0\n"),
+            "my.yaml:3: run: loop_delay_frames must be at least 1 [frames], not 0");
   EXPECT_THAT(Message("loops:\n  stm_size: 10\n  loop_threshold: 7\n"), HasSubstr("my.yaml:3:"));
   EXPECT_THAT(Message("camera:\n  width: 640\n  height: 480\n  fx: -5\n  fy: 500\n  cx: 300\n  cy: 200\n"),
               HasSubstr("my.yaml:"));
@@ -230,63 +229,6 @@ TEST(Config, EveryConfigurationThatComesWithTheProjectLoads) {
     ++files;
   }
   EXPECT_GE(files, 15);
-}
-
-// Names of the fields of a struct, read from its header.
-std::set<std::string> FieldsOf(const std::filesystem::path& header, const std::string& name) {
-  std::ifstream in(testing::SourceDir() / header);
-  std::stringstream buffer;
-  buffer << in.rdbuf();
-  const std::string text = buffer.str();
-  const std::size_t begin = text.find("struct " + name + " {"), end = text.find("\n};", begin);
-  EXPECT_NE(begin, std::string::npos) << name;
-  std::string body = text.substr(begin, end - begin);
-  body = std::regex_replace(body, std::regex("//[^\n]*"), "");
-  body = std::regex_replace(body, std::regex("\\([^)]*\\)"), "()");  // parameters of functions are no fields
-  std::set<std::string> fields;
-  const std::regex field("\\s[\\w:<>, ]+\\s+(\\w+)\\s*(=[^;]*|\\{[^;]*)?;");
-  for (std::sregex_iterator it(body.begin(), body.end(), field), last; it != last; ++it)
-    fields.insert((*it)[1]);
-  return fields;
-}
-
-TEST(Config, EveryOptionFieldHasItsKey) {
-  std::map<std::string, std::set<std::string>> keys;
-  RunConfig config;
-  config.dataset.camera = PinholeCamera();
-  for (const ConfigEntry& entry : DescribeConfig(config)) {
-    keys[entry.section].insert(entry.name);
-    EXPECT_FALSE(entry.doc.empty()) << entry.section << "." << entry.name;
-  }
-  const std::string detector = "loopclosure/include/tutti/loopclosure/detector_options.h";
-  const struct {
-    std::string section, header, name;
-  } structs[] = {
-      {"dataset", "frontend/include/tutti/frontend/dataset.h", "DatasetOptions"},
-      {"camera", "core/include/tutti/core/camera.h", "PinholeCamera"},
-      {"odometry", "frontend/include/tutti/frontend/odometry_options.h", "OdometryOptions"},
-      {"loops", detector, "LoopDetectorOptions"},
-      {"loops.evidence", detector, "EvidenceOptions"},
-      {"loops.extraction", detector, "ExtractionOptions"},
-      {"loops.vocabulary", detector, "VocabularyOptions"},
-      {"loops.verification", detector, "VerificationOptions"},
-      {"loops.dnn", detector, "DnnOptions"},
-      {"graph", "backend/include/tutti/backend/pose_graph_optimizer.h", "PoseGraphOptions"},
-      {"run", "apps/slam/include/tutti/slam/slam_options.h", "SlamOptions"},
-  };
-  for (const auto& s : structs) {
-    const std::set<std::string> fields = FieldsOf(s.header, s.name);
-    EXPECT_GE(fields.size(), 4u) << s.name;
-    for (const std::string& field : fields) {
-      // A section, in section camera, or only for callers of the library (their own features).
-      const bool elsewhere = field == "camera" || field == "baseline_m" || field == "extraction" ||
-                             field == "external_members" || field == "dense_members" ||
-                             field == "vocabulary" || field == "evidence" || field == "verification" ||
-                             field == "dnn";
-      EXPECT_TRUE(elsewhere || keys[s.section].count(field) == 1)
-          << s.section << ": no key for " << s.name << "::" << field;
-    }
-  }
 }
 
 }  // namespace

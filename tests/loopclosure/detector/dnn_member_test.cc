@@ -148,8 +148,8 @@ TEST(DnnOptions, SayWhatIsWrong) {
     change(changed.dnn);
     return changed.Validate();
   };
-  EXPECT_EQ(problem([](DnnOptions& o) { o.width = 15; }), "dnn.width must be 16 to 4096");
-  EXPECT_EQ(problem([](DnnOptions& o) { o.height = 4097; }), "dnn.height must be 16 to 4096");
+  EXPECT_EQ(problem([](DnnOptions& o) { o.width = 15; }), "dnn.width must be 16 to 4096 [px], not 15");
+  EXPECT_EQ(problem([](DnnOptions& o) { o.height = 4097; }), "dnn.height must be 16 to 4096 [px], not 4097");
   EXPECT_THAT(problem([](DnnOptions& o) { o.mean[2] = NAN; }), HasSubstr("dnn.mean"));
   EXPECT_THAT(problem([](DnnOptions& o) { o.scale = 0; }), HasSubstr("dnn.scale"));
   EXPECT_THAT(problem([](DnnOptions& o) { o.stddev[0] = -1; }), HasSubstr("dnn.stddev"));

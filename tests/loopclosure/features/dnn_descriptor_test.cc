@@ -168,7 +168,7 @@ TEST_F(DnnDescriptorTest, SaysThatANetworkTakesAnotherSize) {
   EXPECT_THAT(Problem(options), AllOf(HasSubstr("sized.onnx"), HasSubstr("an image of 80 x 48 pixels"),
                                       HasSubstr("set dnn.width and dnn.height"), HasSubstr("OpenCV 4")));
   options.width = 15;
-  EXPECT_EQ(Problem(options), "dnn.width must be 16 to 4096");
+  EXPECT_EQ(Problem(options), "dnn.width must be 16 to 4096 [px], not 15");
 }
 
 TEST_F(DnnDescriptorTest, ReadsTheHeadOfPublicModels) {

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "tutti/backend/pose_graph.h"
+#include "tutti/core/options.h"
 
 namespace tutti {
 
@@ -43,7 +44,12 @@ enum class GraphInit { kAuto, kFile, kOdometry, kChordal };
 /// fraction of the time (docs/backend.md). kSwitchable is always solved by Ceres.
 enum class PoseGraphSolver { kCeres, kBlock };
 
-/// Words of the command line ("chi2log", "gnc", "chordal", ...). Throw InputError for another word.
+/// Words of the command line and the YAML files ("chi2log", "gnc", "chordal", ...).
+EnumWords<GraphObjective> WordsOf(GraphObjective);
+EnumWords<RobustLoss> WordsOf(RobustLoss);
+EnumWords<GraphInit> WordsOf(GraphInit);
+EnumWords<PoseGraphSolver> WordsOf(PoseGraphSolver);
+/// Throw InputError for another word.
 GraphObjective ParseGraphObjective(const std::string& name);
 RobustLoss ParseRobustLoss(const std::string& name);
 GraphInit ParseGraphInit(const std::string& name);
@@ -53,36 +59,50 @@ const char* ToString(RobustLoss robust);
 const char* ToString(GraphInit init);
 const char* ToString(PoseGraphSolver solver);
 
+/// Options of PoseGraphOptimizer: section `graph:` of the YAML files.
 struct PoseGraphOptions {
-  GraphObjective objective =
-      GraphObjective::kChi2Log;           ///< chi2log: rotations in rad; `tutti optimize` takes chi2
-  RobustLoss robust = RobustLoss::kNone;  ///< acts on loop edges only
-  /// Chi-square beyond which a loop edge is doubted (Huber's delta^2, DCS' Phi, GNC's c^2) [1]. 0: the 99 %
-  /// quantile of the chi-square distribution for the edge's degrees of freedom (11.34, 16.81, 18.48).
-  double robust_chi2 = 0;
-  /// Before anything else: only the largest set of loops that agree pair by pair through the odometry stays
-  /// (pairwise consistency maximisation, Mangelson et al., ICRA 2018). Needs honest covariances of the
-  /// odometry; time grows with the square of the number of loops.
-  bool pairwise_consistency = false;
-  /// Last of all: loops whose chi-square is beyond 3 sigma (probability 99.73 %) leave, those within come
-  /// back, and least squares decide the poses.
-  bool sigma_test = false;
-  PoseGraphSolver solver = PoseGraphSolver::kCeres;  ///< `tutti optimize` takes kBlock
-  GraphInit init = GraphInit::kAuto;
-  int max_iterations = 200;  ///< of Levenberg-Marquardt, in each round that is to converge
-  double function_tolerance =
-      1e-9;  ///< stop when an iteration lowers the cost by less than this fraction [1]
-  /// kCauchy, kDcs, kGncTls and kGnc start with a threshold of gnc_start x the largest chi-square of a loop
-  /// [1], so that drift does not look like a false loop, and divide it by gnc_step [1], > 1, in each of at
-  /// most gnc_max_rounds rounds.
-  double gnc_start = 1.0;
-  double gnc_step = 4.0;
-  int gnc_max_rounds = 60;
-  double max_time_s =
-      0;  ///< stop after this time [s]; 0: no limit (a limit makes the result depend on the machine)
+  TUTTI_OPTION(GraphObjective, objective, GraphObjective::kChi2Log,
+               "rotation error as vector part of the quaternion (chi2, as `tutti optimize` takes it) or as "
+               "rotation vector in rad (chi2log)");
+  TUTTI_OPTION(RobustLoss, robust, RobustLoss::kNone, "loss on loop edges", Basic());
+  TUTTI_OPTION(bool, pairwise_consistency, false,
+               "before anything else: only the largest set of loops that agree pair by pair through the "
+               "odometry stays (pairwise consistency maximisation, Mangelson et al., ICRA 2018); needs "
+               "honest covariances of the odometry, and time that grows with the square of the number of "
+               "loops");
+  TUTTI_OPTION(bool, sigma_test, false,
+               "last of all: loops whose chi-square is beyond 3 sigma (probability 99.73 %) leave, those "
+               "within come back, and least squares decide the poses");
+  TUTTI_OPTION(double, robust_chi2, 0,
+               "chi-square beyond which a loop is doubted (Huber's delta^2, DCS' Phi, GNC's c^2); 0: the 99 "
+               "% quantile of the chi-square distribution for the edge's degrees of freedom (11.34, 16.81, "
+               "18.48)",
+               From(0));
+  TUTTI_OPTION(PoseGraphSolver, solver, PoseGraphSolver::kCeres,
+               "who solves it: ceres, or block (own block Cholesky: the same optimum in less time; robust: "
+               "switchable is left to ceres; `tutti optimize` takes it)",
+               Basic());
+  TUTTI_OPTION(GraphInit, init, GraphInit::kAuto,
+               "start from the present poses (file), odometry, chordal relaxation, or the best of them "
+               "(auto)");
+  TUTTI_OPTION(int, max_iterations, 200,
+               "most iterations of Levenberg-Marquardt, in each round that is to converge", From(1));
+  TUTTI_OPTION(double, function_tolerance, 1e-9,
+               "stop when an iteration lowers the cost by less than this share", Above(0), Below(1));
+  TUTTI_OPTION(double, gnc_step, 4.0, "cauchy, dcs, gnc: the threshold shrinks by this factor per round",
+               Above(1));
+  TUTTI_OPTION(int, gnc_max_rounds, 60, "most rounds of it", From(1));
+  TUTTI_OPTION(double, gnc_start, 1.0,
+               "cauchy, dcs, gnc: the threshold starts at this many times the largest chi-square of a loop, "
+               "so that drift does not look like a false loop",
+               Above(0));
+  TUTTI_OPTION(double, max_time_s, 0,
+               "stop after this time; 0: no limit (a limit makes the result depend on the machine)",
+               Unit("s"), From(0));
+  TUTTI_OPTIONS_END;
 
   /// Empty if usable, else what is wrong.
-  std::string Validate() const;
+  std::string Validate() const { return OutOfRange(*this, "pose graph: "); }
 };
 
 /// The three costs of a graph at its present poses, all edges with weight 1, no robust loss.

@@ -5,21 +5,32 @@
 #include <array>
 #include <string>
 
+#include "tutti/core/options.h"
+
 namespace tutti {
 
 /// Lens distortion. radtan: k1 k2 p1 p2 k3 as in OpenCV; equidistant: k1..k4 (Kannala-Brandt, cv::fisheye).
 enum class Distortion { kNone, kRadTan, kEquidistant };
 
-/// Pinhole camera. Pixel (0, 0) is the centre of the top-left pixel; x right, y down.
+/// The words of the YAML files.
+EnumWords<Distortion> WordsOf(Distortion);
+/// radtan: k1 k2 p1 p2 k3; equidistant: k1 k2 k3 k4, and 0.
+using DistortionCoefficients = std::array<double, 5>;
+
+/// Pinhole camera: section `camera:` of the YAML files. Pixel (0, 0) is the centre of the top-left pixel; x
+/// right, y down. Zeros are no camera.
 struct PinholeCamera {
-  int width = 0;    ///< [px]
-  int height = 0;   ///< [px]
-  double fx = 0.0;  ///< focal length [px]
-  double fy = 0.0;  ///< focal length [px]
-  double cx = 0.0;  ///< principal point [px]
-  double cy = 0.0;  ///< principal point [px]
-  Distortion distortion = Distortion::kNone;
-  std::array<double, 5> coefficients{};  ///< radtan: k1 k2 p1 p2 k3; equidistant: k1 k2 k3 k4 -
+  TUTTI_OPTION(int, width, 0, "image width", Basic(), Unit("px"), From(1));
+  TUTTI_OPTION(int, height, 0, "image height", Basic(), Unit("px"), From(1));
+  TUTTI_OPTION(double, fx, 0, "focal length", Basic(), Unit("px"), Above(0));
+  TUTTI_OPTION(double, fy, 0, "focal length", Basic(), Unit("px"), Above(0));
+  TUTTI_OPTION(double, cx, 0, "principal point; the centre of the top-left pixel is (0, 0)", Basic(),
+               Unit("px"));
+  TUTTI_OPTION(double, cy, 0, "principal point", Basic(), Unit("px"));
+  TUTTI_OPTION(Distortion, distortion, Distortion::kNone, "lens model", Basic());
+  TUTTI_OPTION(DistortionCoefficients, coefficients, {}, "radtan: k1 k2 p1 p2 k3; equidistant: k1 k2 k3 k4",
+               Basic());
+  TUTTI_OPTIONS_END;
 
   /// Pixel of a point in the camera frame [m]; the point must have z > 0.
   Eigen::Vector2d Project(const Eigen::Vector3d& point) const;

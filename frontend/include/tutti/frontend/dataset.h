@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "tutti/core/options.h"
 #include "tutti/core/trajectory.h"
 #include "tutti/frontend/frame.h"
 
@@ -22,29 +23,47 @@ struct ReadResult {
 /// The layout of a data set on disk.
 enum class DatasetType { kAuto, kKitti, kTum, kEuroc, kImages, kVideo, kBag };
 
-/// How to read a data set. Every field has a key of the same name under `dataset:` and `camera:` in the YAML
-/// files.
+/// The words of the YAML files.
+EnumWords<DatasetType> WordsOf(DatasetType);
+
+/// How to read a data set: sections `dataset:` and `camera:` of the YAML files.
 struct DatasetOptions {
-  DatasetType type = DatasetType::kAuto;  ///< kAuto: from what the folder holds
-  Sensor sensor = Sensor::kMono;
-  std::optional<PinholeCamera> camera;  ///< as calibrated (with its distortion); EuRoC: from sensor.yaml
-                                        ///< where absent, KITTI: from calib.txt where absent
-  double baseline_m = 0;                ///< stereo without sensor.yaml or calib.txt [m]
-  double depth_units_per_m = 5000;      ///< RGB-D: value in the depth image of one metre
-  double max_depth_m = 0;               ///< RGB-D: farther depth is not used [m]; 0 = no limit
-  double max_association_s = 0.02;      ///< TUM: greatest difference of the stamps of colour and depth [s]
-  double rate_hz = 0;  ///< frames per second where the data has no time stamps; 0: 10 Hz or the video's
-  std::string topic;   ///< ROS bag: images of the left (or only, or colour) camera; empty: the bag's only one
-  std::string right_topic;  ///< ROS bag, stereo: of the right camera, rectified like the left
-  std::string depth_topic;  ///< ROS bag, RGB-D: 16UC1 (depth_units_per_m; ROS itself: 1000) or 32FC1 (metres)
-  double follow_s = 0;  ///< a folder that is still being written to: wait for new images, end when none came
-                        ///< for so long [s]; 0: all images are there
-  int stride = 1;       ///< use every stride-th frame
-  bool mirrored_ground_truth = false;  ///< ground truth has its y axis up (left-handed, as ICL-NUIM with its
-                                       ///< negative fy): it is mirrored when read
+  TUTTI_OPTION(DatasetType, type, DatasetType::kAuto,
+               "layout on disk (bag: ROS 1); auto: from what the folder holds", Basic());
+  TUTTI_OPTION(Sensor, sensor, Sensor::kMono, "what the camera is", Basic());
+  TUTTI_OPTION(double, depth_units_per_m, 5000, "RGB-D: value in the depth image of one metre", Basic(),
+               Above(0));
+  TUTTI_OPTION(double, max_depth_m, 0, "RGB-D: farther depth is not used; 0: no limit", Basic(), Unit("m"),
+               From(0));
+  TUTTI_OPTION(double, max_association_s, 0.02, "TUM: greatest difference of the stamps of colour and depth",
+               Unit("s"), From(0));
+  TUTTI_OPTION(double, rate_hz, 0, "frame rate where the data has no time stamps; 0: 10 Hz or the video's",
+               Basic(), Unit("1/s"), From(0));
+  TUTTI_OPTION(std::string, topic, "",
+               "ROS bag: images of the left (or only, or colour) camera; empty: the bag's only one", Basic());
+  TUTTI_OPTION(std::string, right_topic, "",
+               "ROS bag, stereo: images of the right camera, rectified like the left", Basic());
+  TUTTI_OPTION(std::string, depth_topic, "",
+               "ROS bag, RGB-D: depth images, 16UC1 (depth_units_per_m; ROS itself: 1000) or 32FC1 (metres)",
+               Basic());
+  TUTTI_OPTION(double, follow_s, 0,
+               "a folder that is still being written to: wait for new images, end when none came for so "
+               "long; 0: all images are there",
+               Unit("s"), From(0));
+  TUTTI_OPTION(int, stride, 1, "use every stride-th frame", Basic(), From(1));
+  TUTTI_OPTION(bool, mirrored_ground_truth, false,
+               "the ground truth has its y axis up (left-handed, as ICL-NUIM with its negative fy): it is "
+               "mirrored when read");
+  TUTTI_OPTION(std::optional<PinholeCamera>, camera, std::nullopt,
+               "as calibrated, with its distortion; absent: from sensor.yaml (EuRoC), calib.txt (KITTI)",
+               Section("camera"));
+  TUTTI_OPTION(double, baseline_m, 0,
+               "stereo: distance of the cameras, where sensor.yaml or calib.txt does not say it", Basic(),
+               Section("camera"), Unit("m"), From(0));
+  TUTTI_OPTIONS_END;
 
   /// Empty if usable, else what is wrong.
-  std::string Validate() const;
+  std::string Validate() const { return OutOfRange(*this); }
 };
 
 /// How frames come to be there.

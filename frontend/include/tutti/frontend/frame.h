@@ -8,6 +8,7 @@
 #include <string>
 
 #include "tutti/core/camera.h"
+#include "tutti/core/options.h"
 #include "tutti/core/pose.h"
 
 namespace tutti {
@@ -15,6 +16,8 @@ namespace tutti {
 struct FrameFeatures;
 
 enum class Sensor { kMono, kStereo, kRgbd };
+/// The words of the YAML files.
+EnumWords<Sensor> WordsOf(Sensor);
 
 /// The sensor after rectification.
 struct CameraRig {

@@ -89,10 +89,6 @@ RunConfig ChangedConfig() {
   RunConfig config;
   config.dataset.camera = PinholeCamera();
   ForEach(config, [](const OptionText& text, auto& field) { Change(text, field); });
-  config.online.parts_from_nodes = 300;
-  config.online.settled_sigmas = 0.05;
-  config.online.whole_fraction = 0.25;
-  config.online.always_whole = true;
   return config;
 }
 

@@ -67,9 +67,9 @@ int RefinePose(const PinholeCamera& camera, const std::vector<PointObservation>&
 std::optional<Pose> SolvePnp(const PinholeCamera& camera, const std::vector<Eigen::Vector3d>& points,
                              const std::vector<cv::Point2f>& pixels, int least_inliers) {
   std::vector<cv::Point3d> objects;
-  std::vector<cv::Point2d> images;
+  objects.reserve(points.size());
   for (const Eigen::Vector3d& p : points) objects.emplace_back(p.x(), p.y(), p.z());
-  for (const cv::Point2f& p : pixels) images.emplace_back(p.x, p.y);
+  const std::vector<cv::Point2d> images(pixels.begin(), pixels.end());
   const cv::Matx33d k(camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1);
   cv::Mat rvec, tvec;
   std::vector<int> inliers;

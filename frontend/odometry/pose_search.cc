@@ -1,7 +1,6 @@
 #include "frontend/odometry/pose_search.h"
 
 #include <algorithm>
-#include <cmath>
 #include <iterator>
 #include <utility>
 
@@ -48,9 +47,8 @@ std::vector<Pose> Predictions(const LastFrame& last, double stamp_s) {
   std::vector<Pose> predictions;
   const auto after = [&](double seconds) { return ExpSE3(*last.velocity * seconds) * last.T_camera_world; };
   const double since = stamp_s - last.frame.stamp_s;
-  const bool moves = last.velocity && std::isfinite(since);
-  if (moves) predictions.push_back(after(std::min(since, kLongestPrediction)));
-  if (moves && since > kSurePrediction) predictions.push_back(after(kSurePrediction));
+  if (last.velocity) predictions.push_back(after(std::min(since, kLongestPrediction)));
+  if (last.velocity && since > kSurePrediction) predictions.push_back(after(kSurePrediction));
   predictions.push_back(last.T_camera_world);
   return predictions;
 }

@@ -98,7 +98,7 @@ TEST_F(PoseSearchTest, AnEmptyMapHasNoPlace) {
   EXPECT_FALSE(search.FindAt(empty, Frame(Pose(), 0), 0));
 }
 
-TEST_F(PoseSearchTest, AStampThatIsNoNumberPredictsNothingAndIsFoundAllTheSame) {
+TEST_F(PoseSearchTest, AFrameWhoseStampIsNoNumberIsFoundAllTheSame) {
   for (const double stamp_s :
        {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(),
         -std::numeric_limits<double>::infinity()}) {

@@ -172,6 +172,9 @@ RunConfig ParseConfig(const std::string& text, const std::string& name) {
     }
   }
   DropUnsetCamera(config.dataset);
+  // Keys of the camera stand in DatasetOptions, too.
+  const KeyMarks& camera = marks["camera"];
+  marks["dataset"].keys.insert(marks["dataset"].keys.end(), camera.keys.begin(), camera.keys.end());
   if (const auto problem = FirstProblem(config))
     Check(name, problem->first, marks[problem->first], problem->second);
   return config;

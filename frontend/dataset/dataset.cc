@@ -1,7 +1,6 @@
 #include "tutti/frontend/dataset.h"
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 
 #include "frontend/dataset/dataset_folder.h"

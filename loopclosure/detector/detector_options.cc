@@ -1,7 +1,6 @@
 #include "tutti/loopclosure/detector_options.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"

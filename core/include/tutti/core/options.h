@@ -12,7 +12,7 @@
 #pragma once
 
 #include <array>
-#include <limits>
+#include <cstddef>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -137,10 +137,12 @@ std::string OutOfRange(const Options& options, const std::string& prefix = "") {
   std::string problem;
   ForEachOption(options, [&](const OptionText& text, const auto& field) {
     if (!problem.empty()) return;
+    const std::string key =
+        prefix + (*text.section == '\0' ? "" : std::string(text.section) + ".") + text.name;
     if constexpr (kHasOptions<std::decay_t<decltype(field)>>) {
-      problem = OutOfRange(field, prefix + text.name + ".");
+      problem = OutOfRange(field, key + ".");
     } else {
-      problem = internal::RefusalOf(text, prefix + text.name, field);
+      problem = internal::RefusalOf(text, key, field);
     }
   });
   return problem;

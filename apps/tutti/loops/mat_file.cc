@@ -2,12 +2,16 @@
 
 #include <matio.h>
 
+#include <array>
 #include <cctype>
-#include <cstddef>
+#include <cstdint>
+#include <cstring>
 #include <fstream>
+#include <iterator>
 #include <memory>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "tutti/core/error.h"
@@ -15,7 +19,8 @@
 namespace tutti::cli {
 namespace {
 
-constexpr std::size_t kMaxRows = 20000;  // more is surely a damaged file
+constexpr std::size_t kMaxRows = 20000;    // more is surely a damaged file
+constexpr std::size_t kMostPacked = 1100;  // numbers of a byte each that zlib puts into one
 
 struct CloseFile {
   void operator()(mat_t* file) const { Mat_Close(file); }
@@ -28,16 +33,14 @@ using Variable = std::unique_ptr<matvar_t, FreeVariable>;
 
 template <typename T>
 std::vector<double> Copied(const void* data, std::size_t count) {
-  const T* values = static_cast<const T*>(data);
-  return std::vector<double>(values, values + count);
+  std::vector<T> values(count);
+  if (count > 0) std::memcpy(values.data(), data, count * sizeof(T));
+  return std::vector<double>(values.begin(), values.end());
 }
 
-// The real parts of so many numbers; empty for what are none.
+// So many numbers of a variable that was read; empty for what are none.
 std::vector<double> Numbers(const matvar_t& variable, const void* data, std::size_t count) {
-  if (variable.isComplex != 0 && data != nullptr) data = static_cast<const mat_complex_split_t*>(data)->Re;
-  if (data == nullptr || static_cast<std::size_t>(variable.data_size) != Mat_SizeOf(variable.data_type)) {
-    return {};
-  }
+  if (data == nullptr) return {};
   switch (variable.data_type) {
     case MAT_T_INT8:
       return Copied<mat_int8_t>(data, count);
@@ -64,8 +67,10 @@ std::vector<double> Numbers(const matvar_t& variable, const void* data, std::siz
   }
 }
 
-// Row by row; nothing if its parts do not fit each other. matio gives what the file says, unchecked.
-std::optional<std::vector<double>> FromSparse(const matvar_t& variable, std::size_t n) {
+// Row by row; nothing if it can't be read, or its parts do not fit each other: matio gives what the file
+// says.
+std::optional<std::vector<double>> FromSparse(mat_t* file, matvar_t& variable, std::size_t n) {
+  if (Mat_VarReadDataAll(file, &variable) != 0 || variable.data == nullptr) return {};
   const auto& sparse = *static_cast<const mat_sparse_t*>(variable.data);
   const std::vector<double> numbers = Numbers(variable, sparse.data, sparse.ndata);
   if (sparse.njc < n + 1 || sparse.jc == nullptr || sparse.ir == nullptr) return {};
@@ -79,12 +84,20 @@ std::optional<std::vector<double>> FromSparse(const matvar_t& variable, std::siz
   return values;
 }
 
-// MATLAB keeps a matrix column by column.
-std::optional<std::vector<double>> FromFull(const matvar_t& variable, std::size_t n) {
-  if (variable.nbytes < n * n * Mat_SizeOf(variable.data_type)) return {};
-  const std::vector<double> columns = Numbers(variable, variable.data, n * n);
+// Likewise. Where the file has fewer numbers than the matrix, matio is silent and leaves the rest as it was:
+// what is read over two fillings is the same only if all of it is there.
+std::optional<std::vector<double>> FromFull(mat_t* file, matvar_t& variable, std::size_t n) {
+  std::array<int, 2> start = {0, 0}, stride = {1, 1}, edge = {static_cast<int>(n), static_cast<int>(n)};
+  const std::size_t size = Mat_SizeOfClass(variable.class_type);
+  std::vector<char> bytes(n * n * size, '\0'), again(bytes.size(), '\x7f');
+  for (std::vector<char>* into : {&bytes, &again}) {
+    if (Mat_VarReadData(file, &variable, into->data(), start.data(), stride.data(), edge.data()) != 0)
+      return {};
+  }
+  if (bytes != again || Mat_SizeOf(variable.data_type) != size) return {};
+  const std::vector<double> columns = Numbers(variable, bytes.data(), n * n);
   if (columns.size() != n * n) return {};
-  std::vector<double> values(n * n);
+  std::vector<double> values(n * n);  // MATLAB keeps a matrix column by column
   for (std::size_t c = 0; c < n; ++c) {
     for (std::size_t r = 0; r < n; ++r) values[r * n + c] = columns[c * n + r];
   }
@@ -92,9 +105,29 @@ std::optional<std::vector<double>> FromFull(const matvar_t& variable, std::size_
 }
 
 bool IsSquareMatrix(const matvar_t& variable) {
-  const bool numeric = variable.class_type >= MAT_C_SPARSE && variable.class_type <= MAT_C_UINT64;
-  return numeric && variable.rank == 2 && variable.dims != nullptr && variable.dims[0] == variable.dims[1] &&
+  const bool real =
+      variable.class_type >= MAT_C_SPARSE && variable.class_type <= MAT_C_UINT64 && variable.isComplex == 0;
+  return real && variable.rank == 2 && variable.dims != nullptr && variable.dims[0] == variable.dims[1] &&
          variable.dims[0] > 1;
+}
+
+enum class Container { kWhole, kCutOff, kOther };
+
+// matio takes a file that is cut off for a whole one, crashes on parts of some compressed ones, and has HDF5
+// print what is wrong with version 7.3: only whole files of versions 5 to 7 get that far.
+Container Examine(const std::string& bytes) {
+  constexpr std::size_t kHeader = 128, kTag = 8;
+  constexpr std::uint32_t kCompressed = 15;  // the only element without padding
+  if (bytes.rfind("MATLAB 5.0", 0) != 0) return Container::kOther;
+  if (bytes.size() < kHeader + kTag) return Container::kCutOff;
+  if (bytes.compare(126, 2, "IM") != 0) return Container::kOther;  // of a big-endian machine
+  for (std::size_t at = kHeader; at + kTag <= bytes.size();) {
+    std::array<std::uint32_t, 2> tag = {0, 0};  // type and length
+    std::memcpy(tag.data(), bytes.data() + at, kTag);
+    if (tag[1] > bytes.size() - at - kTag) return Container::kCutOff;
+    at += kTag + tag[1] + (tag[0] == kCompressed ? 0 : (8 - tag[1] % 8) % 8);
+  }
+  return Container::kWhole;
 }
 
 }  // namespace
@@ -108,18 +141,26 @@ bool IsMatFile(const std::filesystem::path& file) {
 }
 
 LoopGroundTruth ReadMatLoops(const std::filesystem::path& path) {
-  Mat_LogInitFunc("tutti", [](int, char*) {});  // what is wrong is said here, once
   const auto fail = [&path](const std::string& what) { throw InputError(path.string() + ": " + what); };
+  std::error_code error;
+  std::ifstream in(path, std::ios::binary);
+  if (!in || !std::filesystem::is_regular_file(path, error))
+    fail("can't be opened; check the path of the ground truth");
+  const std::string bytes((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+  const Container container = Examine(bytes);
+  if (container == Container::kOther) fail("is no file of MATLAB 5 to 7; save it with -v6 or -v7");
+  if (container == Container::kCutOff) fail("damaged MATLAB file (it is cut off); copy it again");
+  Mat_LogInitFunc("tutti", [](int, char*) {});  // what is wrong is said here, once
   const MatFile file(Mat_Open(path.c_str(), MAT_ACC_RDONLY));
-  if (!file) fail("is no MATLAB file, or damaged; copy it again, or save it with -v6, -v7 or -v7.3");
+  if (!file) fail("damaged MATLAB file; copy it again");
   while (const Variable variable{Mat_VarReadNextInfo(file.get())}) {
     if (!IsSquareMatrix(*variable)) continue;
     const std::size_t n = variable->dims[0];
-    if (n > kMaxRows) fail("damaged MATLAB file (a matrix of " + std::to_string(n) + " rows); copy it again");
-    std::optional<std::vector<double>> values;
-    if (Mat_VarReadDataAll(file.get(), variable.get()) == MATIO_E_NO_ERROR && variable->data != nullptr) {
-      values = variable->class_type == MAT_C_SPARSE ? FromSparse(*variable, n) : FromFull(*variable, n);
+    const bool sparse = variable->class_type == MAT_C_SPARSE;
+    if (n > kMaxRows || (!sparse && n * n > kMostPacked * bytes.size())) {
+      fail("damaged MATLAB file (a matrix of " + std::to_string(n) + " rows); copy it again");
     }
+    const auto values = sparse ? FromSparse(file.get(), *variable, n) : FromFull(file.get(), *variable, n);
     if (!values) fail("damaged MATLAB file (its matrix can't be read); copy it again");
     LoopGroundTruth truth = LoopsFromMatrix(*values, static_cast<int>(n));
     truth.description = path.string();

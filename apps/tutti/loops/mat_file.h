@@ -10,7 +10,7 @@ namespace tutti::cli {
 /// True if a file's name ends in .mat, or it begins as MATLAB's files do.
 bool IsMatFile(const std::filesystem::path& file);
 
-/// The first square matrix of numbers with more than one row, full or sparse, of a file of MATLAB 4 to 7.3;
+/// The first square matrix of numbers with more than one row, full or sparse, of a file of MATLAB 5 to 7;
 /// labels as in LoopsFromMatrix. Throws InputError, with the name of the file, if it is damaged or holds
 /// none.
 LoopGroundTruth ReadMatLoops(const std::filesystem::path& file);

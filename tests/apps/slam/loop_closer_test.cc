@@ -1,0 +1,201 @@
+#include "apps/slam/loop_closer.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/support/recording.h"
+#include "tests/support/small_town.h"
+
+namespace tutti {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+// Half a lap, and loops between its keyframes that claim what a test wants.
+class LoopCloserTest : public ::testing::Test {
+ protected:
+  static constexpr int kFirst = 1, kLater = 20;  // keyframes: ends of the loops
+
+  LoopCloserTest()
+      : recording_(testing::Record(SyntheticWorld(World()), 100)),
+        odometry_(OdometryConfig(), recording_.rig) {
+    for (const InputFrame& frame : recording_.frames) odometry_.Track(frame);
+    odometry_.FinishMapping();
+    frames_ = static_cast<std::int64_t>(recording_.frames.size());
+  }
+  void SetUp() override { ASSERT_GT(odometry_.KeyframeIds().size(), 25u); }
+
+  static SyntheticOptions World() {
+    SyntheticOptions options = testing::SmallStereoTown(320, 160);
+    options.sensor = SyntheticSensor::kRgbd;
+    return options;
+  }
+  static OdometryOptions OdometryConfig() {
+    OdometryOptions options;
+    options.features = 800;
+    return options;
+  }
+  LoopCloser Closer(bool global_adjustment = false) const {
+    RunConfig config;
+    config.run.global_adjustment = global_adjustment;
+    return LoopCloser(config, recording_.rig, nullptr);
+  }
+  /// What the map says of the two keyframes, with the later one `off` [m] to the side.
+  Similarity InMap(int candidate, int query, double off = 0) const {
+    Pose T = odometry_.KeyframePose(candidate).Inverse() * odometry_.KeyframePose(query);
+    T.translation.x() += off;
+    return Similarity(T);
+  }
+  LoopRecord Proposed(int candidate, int query, bool verified = true) const {
+    LoopRecord record;
+    record.candidate = odometry_.KeyframeFrameIndex(candidate);
+    record.query = odometry_.KeyframeFrameIndex(query);
+    record.candidate_stamp_s = odometry_.KeyframeStamp(candidate);
+    record.query_stamp_s = odometry_.KeyframeStamp(query);
+    record.verified = verified;
+    if (!verified) record.reason = "refused by geometry";
+    return record;
+  }
+  LoopUpdate Consider(LoopCloser* closer, int candidate, int query, double off) const {
+    Verification verification;
+    verification.type = ConstraintType::kRigid;
+    verification.S_candidate_query = InMap(candidate, query, off);
+    verification.information = 1e4 * Matrix6d::Identity();
+    return closer->Consider(Proposed(candidate, query), verification, candidate, query, odometry_, frames_);
+  }
+  /// Two loops that agree: the later keyframes are `off` [m] beside where the map has them.
+  void ConsiderTwo(LoopCloser* closer, double off) const {
+    EXPECT_FALSE(Consider(closer, kFirst, kLater, off).correction);
+    EXPECT_FALSE(Consider(closer, kFirst, kLater + 1, off).correction);
+  }
+  /// Applies what is found by the time it is due at the latest.
+  LoopUpdate Solve(LoopCloser* closer) {
+    frames_ += SolutionFrames(odometry_.KeyframeIds().size());
+    const std::optional<LoopUpdate> update = closer->Solved(odometry_, frames_);
+    EXPECT_TRUE(update);
+    if (!update) return {};
+    if (update->correction)
+      closer->Applied(*update, Apply(*update->correction, &odometry_), odometry_, frames_);
+    return *update;
+  }
+
+  testing::Recording recording_;
+  Odometry odometry_;
+  std::int64_t frames_ = 0;
+};
+
+TEST_F(LoopCloserTest, WhatGeometryRefusesIsListedAndNothingElse) {
+  LoopCloser closer = Closer();
+  const LoopUpdate update =
+      closer.Consider(Proposed(kFirst, kLater, false), {}, kFirst, kLater, odometry_, frames_);
+  EXPECT_FALSE(update.correction);
+  ASSERT_EQ(closer.records().size(), 1u);
+  EXPECT_EQ(closer.records()[0].reason, "refused by geometry");
+  EXPECT_FALSE(closer.MayMove(frames_ + 1000));
+}
+
+TEST_F(LoopCloserTest, ALoopWithinTheLocalMapIsNone) {
+  LoopCloser closer = Closer();
+  Consider(&closer, kFirst, kFirst + 1, 0);
+  EXPECT_THAT(closer.records()[0].reason, HasSubstr("too recent"));
+  EXPECT_FALSE(closer.records()[0].pending);
+}
+
+TEST_F(LoopCloserTest, ALoopAloneWaitsAndSaysSoInTheEnd) {
+  LoopCloser closer = Closer();
+  Consider(&closer, kFirst, kLater, 1.0);
+  EXPECT_TRUE(closer.records()[0].pending);
+  EXPECT_FALSE(closer.Solved(odometry_, frames_ + 1000));
+  closer.Finish();
+  EXPECT_FALSE(closer.records()[0].pending);
+  EXPECT_FALSE(closer.records()[0].accepted);
+  EXPECT_THAT(closer.records()[0].reason, HasSubstr("no second loop"));
+}
+
+TEST_F(LoopCloserTest, TwoThatAgreeMoveTheMapWhenTheirSolutionIsDueAndNotBefore) {
+  LoopCloser closer = Closer();
+  const Pose before = odometry_.KeyframePose(kFirst).Inverse() * odometry_.KeyframePose(kLater);
+  ConsiderTwo(&closer, 0.5);
+  const std::int64_t due = frames_ + SolutionFrames(odometry_.KeyframeIds().size());
+  EXPECT_FALSE(closer.MayMove(due - 1));
+  EXPECT_FALSE(closer.Solved(odometry_, due - 1));
+  EXPECT_TRUE(closer.MayMove(due));
+  const LoopUpdate update = Solve(&closer);
+  ASSERT_TRUE(update.correction);
+  EXPECT_EQ(closer.Corrections(), 1);
+  EXPECT_EQ(CountAccepted(closer.records()), 2u);
+  EXPECT_GT(closer.records()[0].weight, 0.5);
+  const Pose after = odometry_.KeyframePose(kFirst).Inverse() * odometry_.KeyframePose(kLater);
+  const double moved = (after.translation - before.translation).x();
+  EXPECT_GT(moved, 0.25) << "the loops and the odometry share what is missing";
+  EXPECT_LT(moved, 0.5);
+  EXPECT_EQ(closer.Graph(odometry_).edges().back().to, kLater + 1);
+}
+
+TEST_F(LoopCloserTest, WhatTheMapFulfilsWaitsForACorrectionOrForTheEnd) {
+  LoopCloser closer = Closer();
+  ConsiderTwo(&closer, 0);
+  EXPECT_FALSE(closer.Solved(odometry_, frames_ + 1000));
+  EXPECT_EQ(CountAccepted(closer.records()), 0u);
+  EXPECT_TRUE(closer.CloseDeferred(odometry_, frames_));
+  EXPECT_FALSE(closer.CloseDeferred(odometry_, frames_));
+  Solve(&closer);
+  EXPECT_EQ(CountAccepted(closer.records()), 2u);
+}
+
+TEST_F(LoopCloserTest, FulfilledLoopsBecomeOneMapWhereItIsAdjusted) {
+  LoopCloser closer = Closer(true);
+  const LoopUpdate update = Consider(&closer, kFirst, kLater, 0);  // the map itself vouches for it
+  ASSERT_TRUE(update.correction);
+  EXPECT_TRUE(update.correction->S_world_keyframe.empty());
+  ASSERT_EQ(update.correction->fused.size(), 1u);
+  EXPECT_EQ(update.correction->fused[0].query, kLater);
+}
+
+TEST_F(LoopCloserTest, LoopsThatComeWhileTheGraphIsSolvedEnterAfterIt) {
+  LoopCloser closer = Closer();
+  ConsiderTwo(&closer, 0.5);
+  Consider(&closer, kFirst + 1, kLater + 2, 1.0);
+  Consider(&closer, kFirst + 1, kLater + 3, 1.0);
+  Solve(&closer);
+  EXPECT_EQ(CountAccepted(closer.records()), 2u);
+  EXPECT_TRUE(closer.Solved(odometry_, frames_)) << "the next two begin";
+  EXPECT_FALSE(closer.Solved(odometry_, frames_));
+  Solve(&closer);
+  for (const LoopRecord& record : closer.records()) EXPECT_TRUE(record.accepted || !record.reason.empty());
+  EXPECT_FALSE(closer.Solved(odometry_, frames_ + 1000)) << "nothing is left";
+}
+
+TEST_F(LoopCloserTest, WhatTheMapContradictsIsRevokedOnceAndForTheDetectorToForget) {
+  RunConfig config;
+  config.run.global_adjustment = false;
+  config.run.loop_gate_sigmas = 0.001;
+  LoopCloser closer(config, recording_.rig, nullptr);
+  ConsiderTwo(&closer, 0.5);
+  const LoopUpdate update = Solve(&closer);
+  EXPECT_FALSE(update.correction);
+  EXPECT_THAT(update.revoked, ElementsAre(0u, 1u));
+  EXPECT_TRUE(closer.records()[0].revoked);
+  EXPECT_TRUE(closer.records()[0].gate_sigmas);
+  EXPECT_EQ(CountAccepted(closer.records()), 0u);
+}
+
+TEST_F(LoopCloserTest, ALoopFromElsewherePassesTheGateButNotThePoseGraph) {
+  LoopCloser closer = Closer();
+  closer.Add(kFirst, kLater, InMap(kFirst, kLater, 0.3), MakeInformation(0.01, 0.01), odometry_, frames_);
+  EXPECT_TRUE(Solve(&closer).correction);
+  EXPECT_TRUE(closer.records()[0].injected);
+  EXPECT_TRUE(closer.records()[0].accepted);
+  // What the first two thirds of a lap cannot be bent to.
+  closer.Add(kFirst + 1, kLater + 3, InMap(kFirst + 1, kLater + 3, 20), MakeInformation(0.1, 0.1), odometry_,
+             frames_);
+  const LoopUpdate update = Solve(&closer);
+  EXPECT_FALSE(closer.records()[1].accepted);
+  EXPECT_FALSE(closer.records()[1].reason.empty());
+  EXPECT_THAT(update.revoked, IsEmpty()) << "the detector never knew it";
+}
+
+}  // namespace
+}  // namespace tutti

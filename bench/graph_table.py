@@ -166,8 +166,10 @@ def planted(bench):
         taken, refused = ([float(r["sigmas"]) for r in loops if r["sigmas"] and r["injected"] == planted_one and
                            (planted_one == "1" or r["accepted"] == "1")] for planted_one in "01")
         change = 100 * (ate[1] / ate[0] - 1)
+        far, near = (f"{end:.3g} sigma of {len(of)}" if of else "none" for end, of in
+                     ((max(taken, default=0), taken), (min(refused, default=0), refused)))
         lines.append(f"| {ROWS[name][0]} | {ate[0]:.4f} m | {ate[1]:.4f} m | {change:+.2f} % | {kept} of {planted_ones} "
-                     f"| {mute} | {max(taken):.2g} sigma of {len(taken)} | {min(refused):.3g} sigma of {len(refused)} |")
+                     f"| {mute} | {far} | {near} |")
         bench.expect(abs(change) <= PLANTED_PERCENT and planted_ones == PLANTED, f"{name}: {change:.1f} %, {planted_ones} planted")
     return lines
 

@@ -9,6 +9,10 @@
 namespace tutti {
 namespace {
 
+// Of a loop's weight, after optimisation. A true loop has all of it: what it disagreed by was drift, which
+// the map has taken up. A false one that the map could be bent to keeps the part that Huber's loss leaves it.
+constexpr double kLeastWeight = 0.5;
+
 std::string BeyondGate(double sigmas, double limit) {
   char text[120];
   std::snprintf(text, sizeof text, "the map can't be that far off: Mahalanobis distance %.1f, limit %.1f",
@@ -16,11 +20,12 @@ std::string BeyondGate(double sigmas, double limit) {
   return text;
 }
 
-std::string Contradiction(const Disagreement& d) {
-  char text[160];
+std::string Contradiction(const Disagreement& d, double weight) {
+  char text[200];
   std::snprintf(text, sizeof text,
-                "contradicts the map: off by %.0f %% of the scene depth and %.1f deg after optimisation",
-                100 * d.fraction, d.angle_deg);
+                "contradicts the map: off by %.0f %% of the scene depth and %.1f deg after optimisation, "
+                "which leaves it %.0f %% of its weight",
+                100 * d.fraction, d.angle_deg, 100 * weight);
   return text;
 }
 
@@ -56,8 +61,9 @@ bool Judge(const KeyframeCorrection& correction, const std::vector<LoopEdge>& ac
     if (!verdict.reason.empty()) continue;
     verdict.weight = correction.loops[e++].weight;
     const Disagreement d = Residual(verdict.loop, correction.S_world_keyframe);
-    if (!old_broken && !Contradicts(d, options)) continue;
-    verdict.reason = old_broken ? "contradicts loops that were accepted before" : Contradiction(d);
+    if (!old_broken && verdict.weight >= kLeastWeight && !Contradicts(d, options)) continue;
+    verdict.reason =
+        old_broken ? "contradicts loops that were accepted before" : Contradiction(d, verdict.weight);
     verdict.contradicted = true;
     all_stay = false;
   }

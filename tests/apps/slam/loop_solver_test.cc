@@ -51,6 +51,16 @@ TEST(LoopSolver, ALoopThatContradictsTheOthersLeavesWithItsReason) {
   EXPECT_EQ(solution.correction.loops.size(), accepted.size() + 1);
 }
 
+// As far as Huber's loss lets it, the map bends to it: only its weight tells.
+TEST(LoopSolver, ALoopThatKeepsLessThanHalfOfItsWeightLeaves) {
+  const auto verdict = [](double error) {
+    return SolveLoops(Line(), {}, {Loop(0, 0, 39, error)}, SlamOptions()).verdicts[0];
+  };
+  EXPECT_EQ(verdict(-8).reason, "");
+  EXPECT_NE(verdict(-8.7).reason.find("leaves it 33 % of its weight"), std::string::npos);
+  EXPECT_TRUE(verdict(-8.7).contradicted);
+}
+
 TEST(LoopSolver, NothingMovesWhereNoneMayStay) {
   const LoopSolution solution = SolveLoops(Line(), {Loop(0, 0, 39)}, {Loop(1, 0, 39, -20)}, SlamOptions());
   EXPECT_FALSE(solution.moves);

@@ -146,7 +146,9 @@ class Row {
     if (options_.rule == CombinationRule::kSingle) chosen = {rule};
     for (const std::string& member : chosen) {
       const auto found = std::find(names.begin(), names.end(), member);
-      if (found == names.end()) throw InputError("row " + name + ": no member '" + member + "' in --members");
+      if (found == names.end())
+        throw InputError(
+            std::string("row ").append(name).append(": no member '").append(member).append("' in --members"));
       members_.push_back(static_cast<std::size_t>(found - names.begin()));
       shells_.emplace_back(BaseName(member), options_, 1);
     }

@@ -13,9 +13,8 @@
 #include "bench/noisy_measurement.h"
 #include "tutti/backend/pose_graph_optimizer.h"
 
+namespace tutti {
 namespace {
-
-using namespace tutti;
 
 constexpr bench::Noise kNoise{0.05, 0.01};
 
@@ -55,9 +54,7 @@ double PeakMemory() {
   return 0;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int Run(int argc, char** argv) {
   const int poses = argc > 1 ? std::atoi(argv[1]) : 0;
   if (poses < 100) {
     std::fprintf(stderr,
@@ -79,3 +76,8 @@ int main(int argc, char** argv) {
               report.costs.chi2log / static_cast<double>(graph.edges().size()), before, PeakMemory());
   return 0;
 }
+
+}  // namespace
+}  // namespace tutti
+
+int main(int argc, char** argv) { return tutti::Run(argc, argv); }

@@ -19,9 +19,8 @@
 #include "tutti/backend/graph_covariance.h"
 #include "tutti/core/error.h"
 
+namespace tutti {
 namespace {
-
-using namespace tutti;
 
 template <int N>
 std::vector<double> OfTrueLoops(const PoseGraph& graph) {
@@ -70,9 +69,7 @@ void Run(const std::filesystem::path& file, int first, int last) {
   std::fflush(stdout);
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int Run(int argc, char** argv) {
   if (argc < 4) {
     std::fprintf(stderr, "usage: loop_evidence FIRST_SEED LAST_SEED GRAPH.g2o...\n");
     return 1;
@@ -85,3 +82,8 @@ int main(int argc, char** argv) {
   }
   return 0;
 }
+
+}  // namespace
+}  // namespace tutti
+
+int main(int argc, char** argv) { return tutti::Run(argc, argv); }

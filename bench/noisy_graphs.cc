@@ -21,9 +21,8 @@
 #include "tutti/backend/pose_graph_optimizer.h"
 #include "tutti/core/error.h"
 
+namespace tutti {
 namespace {
-
-using namespace tutti;
 
 constexpr double kTranslationSigma = 0.05;  // [m]
 
@@ -139,9 +138,7 @@ int Run(const std::string& name, int poses, double sigma_deg, unsigned seed) {
   return 0;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int Run(int argc, char** argv) {
   if (argc < 4) {
     std::fprintf(stderr, "usage: noisy_graphs sphere|torus|streets POSES ROTATION_SIGMA_DEG [SEED]\n");
     return 1;
@@ -154,3 +151,8 @@ int main(int argc, char** argv) {
     return 1;
   }
 }
+
+}  // namespace
+}  // namespace tutti
+
+int main(int argc, char** argv) { return tutti::Run(argc, argv); }

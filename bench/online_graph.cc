@@ -26,9 +26,8 @@
 #include "tutti/backend/keyframe_graph.h"
 #include "tutti/core/error.h"
 
+namespace tutti {
 namespace {
-
-using namespace tutti;
 
 double ProcessorMilliseconds() {
   timespec now{};
@@ -253,9 +252,7 @@ void Run(const std::string& name, const std::string& how, unsigned seed) {
               std::sqrt(std::max(0.0, report.initial_objective - report.objective)));
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int Run(int argc, char** argv) {
   try {
     if (argc < 2) throw InputError("usage: online_graph town|FILE.g2o [ceres|block] [SEED]");
     Run(argv[1], argc > 2 ? argv[2] : "ceres", argc > 3 ? static_cast<unsigned>(std::atoi(argv[3])) : 1u);
@@ -265,3 +262,8 @@ int main(int argc, char** argv) {
     return 1;
   }
 }
+
+}  // namespace
+}  // namespace tutti
+
+int main(int argc, char** argv) { return tutti::Run(argc, argv); }

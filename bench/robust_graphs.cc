@@ -21,9 +21,8 @@
 #include "tutti/backend/g2o_io.h"
 #include "tutti/backend/pose_graph_optimizer.h"
 
+namespace tutti {
 namespace {
-
-using namespace tutti;
 
 double AlignedError(const PoseGraph& clean, const PoseGraph& graph) {
   AssociatedPoses poses;
@@ -86,9 +85,7 @@ void Run(const std::filesystem::path& file, const std::string& method, const Fal
   std::fflush(stdout);
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int Run(int argc, char** argv) {
   if (argc != 7) {
     std::fprintf(stderr, "usage: robust_graphs GRAPH.g2o METHOD COUNT CLUSTER_SIZE FIRST_SEED LAST_SEED\n");
     return 1;
@@ -110,3 +107,8 @@ int main(int argc, char** argv) {
   }
   return 0;
 }
+
+}  // namespace
+}  // namespace tutti
+
+int main(int argc, char** argv) { return tutti::Run(argc, argv); }

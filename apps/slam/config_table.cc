@@ -92,7 +92,7 @@ std::string Read(const YAML::Node& node, std::array<double, N>& field) {
   if (!fits) return "needs a list of " + std::string(N == 5 ? "up to " : "") + std::to_string(N) + " numbers";
   std::array<double, N> values{};
   for (std::size_t i = 0; i < node.size(); ++i) {
-    const std::string wrong = Read(node[i], values[i]);
+    std::string wrong = Read(node[i], values[i]);
     if (!wrong.empty()) return wrong;
   }
   field = values;
@@ -126,8 +126,8 @@ std::string Show(const std::vector<std::string>& value) { return "[" + Join(valu
 
 template <std::size_t N>
 std::string Show(const std::array<double, N>& values) {
-  std::vector<std::string> texts;
-  for (const double value : values) texts.push_back(ShowDouble(value));
+  std::vector<std::string> texts(N);
+  std::transform(values.begin(), values.end(), texts.begin(), ShowDouble);
   return "[" + Join(texts) + "]";
 }
 

@@ -155,8 +155,8 @@ LoopConstraint MakeLoopConstraint(const Verification& verification, const Keyfra
   }
   // The residual of an edge lives in the query's frame, the depth in the candidate's.
   const double sigma_translation = options.loop_sigma_fraction * edge.depth / edge.S_candidate_query.scale;
-  edge.information =
-      WithFloor(information, sigma_translation, options.loop_sigma_deg * internal::kRadians, options.loop_sigma_scale);
+  edge.information = WithFloor(information, sigma_translation, options.loop_sigma_deg * internal::kRadians,
+                               options.loop_sigma_scale);
   out.usable = edge.information.allFinite();
   if (!out.usable) out.reason = "its information matrix is not finite";
   return out;

@@ -9,7 +9,7 @@ std::vector<Eigen::Vector2d> SmoothLoop(const std::vector<Eigen::Vector2d>& corn
                                         double rounding_m) {
   std::vector<Eigen::Vector2d> points;
   for (std::size_t i = 0; i < corners.size(); ++i) {
-    const Eigen::Vector2d a = corners[i], b = corners[(i + 1) % corners.size()];
+    const Eigen::Vector2d &a = corners[i], &b = corners[(i + 1) % corners.size()];
     const int steps = std::max(1, static_cast<int>(std::round((b - a).norm() / step_m)));
     for (int k = 0; k < steps; ++k) points.push_back(a + (b - a) * k / steps);
   }

@@ -14,6 +14,9 @@ void Box(cv::Mat& image, double x, double y, double w, double h, double grey) {
                 cv::Scalar(std::clamp(grey, 0.0, 255.0)), cv::FILLED);
 }
 
+// Whole pixels of a length, rounded down.
+int Share(int length, int parts, int of) { return length * parts / of; }
+
 cv::Mat Plain(int width, int height, double grey) {
   return cv::Mat(height, width, CV_8UC1, cv::Scalar(grey));
 }
@@ -77,13 +80,13 @@ void Window(cv::Mat& image, const cv::Rect& r, double frame, int style, Random& 
     Box(image, r.x + random.Int(2, r.width - w), r.y + r.height - 14, w, 14, random.In(90, 220));
   }
   const int bar = 3;
-  if (style % 2 == 0) Box(image, r.x + r.width / 2 - bar / 2, r.y, bar, r.height, frame);
-  if (style % 3 != 1) Box(image, r.x, r.y + r.height * (style == 2 ? 1 : 2) / 4, r.width, bar, frame);
+  if (style % 2 == 0) Box(image, r.x + Share(r.width, 1, 2) - Share(bar, 1, 2), r.y, bar, r.height, frame);
+  if (style % 3 != 1) Box(image, r.x, r.y + Share(r.height, style == 2 ? 1 : 2, 4), r.width, bar, frame);
   if (style >= 3) {  // shutters
     const double tone = random.In(50, 90);
     for (const int x : {r.x - r.width / 2 - 5, r.x + r.width + 5}) {
-      Box(image, x, r.y - 3, r.width / 2, r.height + 6, tone);
-      for (int y = 4; y < r.height; y += 6) Box(image, x + 3, r.y + y, r.width / 2 - 6, 2, tone + 45);
+      Box(image, x, r.y - 3, Share(r.width, 1, 2), r.height + 6, tone);
+      for (int y = 4; y < r.height; y += 6) Box(image, x + 3, r.y + y, Share(r.width, 1, 2) - 6, 2, tone + 45);
     }
   }
 }
@@ -138,8 +141,8 @@ cv::Mat FacadeTexture(std::uint64_t seed) {
         const int door_h = std::min(150, kSide - y + 10);
         Box(image, r.x - 6, kSide - door_h - 6, w + 12, door_h + 6, frame);
         Box(image, r.x, kSide - door_h, w, door_h, random.In(25, 80));
-        Box(image, r.x + 8, kSide - door_h + 10, w - 16, door_h / 3, random.In(90, 160));
-        Box(image, r.x + w - 12, kSide - door_h / 2, 6, 6, 230);
+        Box(image, r.x + 8, kSide - door_h + 10, w - 16, Share(door_h, 1, 3), random.In(90, 160));
+        Box(image, r.x + w - 12, kSide - Share(door_h, 1, 2), 6, 6, 230);
       } else if (!(ground && shop) && random.Unit() < 0.93) {
         Window(image, r, frame, style, random);
       }
@@ -185,7 +188,7 @@ cv::Mat RoadTexture(std::uint64_t seed, bool crossing) {
     }
   }
   if (!crossing) {
-    for (int y = 20; y < kSide; y += 170) Box(image, kSide / 2 - 4, y, 8, 85, random.In(190, 225));
+    for (int y = 20; y < kSide; y += 170) Box(image, Share(kSide, 1, 2) - 4, y, 8, 85, random.In(190, 225));
     for (const int x : {0, kSide - 64}) {  // pavements of slabs, and their curbs
       for (int y = 0; y < kSide; y += 32) {
         for (int k = 0; k < 2; ++k) Box(image, x + k * 32 + 1, y + 1, 30, 30, random.In(125, 165));
@@ -333,7 +336,7 @@ cv::Mat ShelfTexture(std::uint64_t seed) {
       if (random.Unit() < 0.88) {
         const double tone = random.In(40, 235);
         Box(image, x, (row + 1) * pitch - 4 - h, w, h, tone);
-        Box(image, x + 1, (row + 1) * pitch - 4 - h * 3 / 4, w - 2, random.Int(3, 9), 255 - tone);
+        Box(image, x + 1, (row + 1) * pitch - 4 - Share(h, 3, 4), w - 2, random.Int(3, 9), 255 - tone);
       }
       x += w + 1;
     }

@@ -78,7 +78,7 @@ cv::Mat Decode(const rosbag::MessageInstance& message, bool depth, bool* metres,
     return pixels.empty() ? cv::Mat() : depth ? pixels.clone() : Grey(pixels, image->encoding);
   }
   if (const auto image = message.instantiate<sensor_msgs::CompressedImage>()) {
-    const cv::Mat pixels =
+    cv::Mat pixels =
         cv::imdecode(image->data, depth ? cv::IMREAD_UNCHANGED : cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
     if (pixels.empty()) *error = "a compressed image ('" + image->format + "') can't be decoded";
     return pixels;

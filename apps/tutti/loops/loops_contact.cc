@@ -52,6 +52,7 @@ std::vector<Entry> Choose(std::vector<std::size_t> wrong, const std::vector<std:
       std::min(wrong.size(), std::max(half, kMostRows - std::min(kMostRows, missed.size())));
   wrong.resize(wrong_count);
   std::vector<Entry> entries;
+  entries.reserve(kMostRows);
   for (const std::size_t row : wrong) entries.push_back({row, false});
   for (const std::size_t row : Spread(missed, kMostRows - wrong_count)) entries.push_back({row, true});
   return entries;

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <vector>
 
+#include "apps/slam/loop_constraint.h"
 #include "backend/graph/false_loops.h"
+#include "core/angle.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -28,8 +30,13 @@ bool PlantedLoops::Plant(int newest, SlamSystem* slam) {
   for (const std::size_t e : planted) {
     const PoseGraphEdge& edge = graph.edges()[e];
     const bool forward = edge.from < edge.to;
-    slam->AddLoop(forward ? edge.from : edge.to, forward ? edge.to : edge.from,
-                  forward ? edge.measurement : edge.measurement.Inverse(), edge.information);
+    const int candidate = forward ? edge.from : edge.to;
+    const double seen = MedianDepth(slam->odometry()->Keyframe(candidate));
+    const double depth = seen > 0 ? seen : 1;  // without landmarks AddLoop refuses it
+    slam->AddLoop(candidate, forward ? edge.to : edge.from,
+                  forward ? edge.measurement : edge.measurement.Inverse(),
+                  MakeInformation(options_.loop_sigma_fraction * depth,
+                                  options_.loop_sigma_deg * internal::kRadians, options_.loop_sigma_scale));
   }
   left_ -= static_cast<int>(planted.size());
   ++made_;

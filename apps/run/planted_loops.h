@@ -9,11 +9,12 @@ namespace tutti {
 
 /// Plants loops that look verified and are wrong into a run (backend/graph/false_loops.h): one with every
 /// third keyframe, in turn a random relative pose, a wrong place taken for the same one, and two that agree
-/// with each other, as loops between two corridors that look alike do. The same run and seed give the same
-/// loops.
+/// with each other, as loops between two corridors that look alike do; as certain as the detector's are. The
+/// same run and seed give the same loops.
 class PlantedLoops {
  public:
-  PlantedLoops(int count, std::uint64_t seed) : left_(count), seed_(seed) {}
+  PlantedLoops(const SlamOptions& options, std::uint64_t seed)
+      : options_(options), left_(options.inject_false_loops), seed_(seed) {}
 
   /// After each frame that became a keyframe.
   void OnKeyframe(int keyframe, SlamSystem* slam);
@@ -23,6 +24,7 @@ class PlantedLoops {
  private:
   bool Plant(int newest, SlamSystem* slam);
 
+  SlamOptions options_;
   int left_;
   std::uint64_t seed_;
   int made_ = 0;

@@ -34,7 +34,7 @@ class Run {
         dataset_(dataset),
         result_(result),
         slam_(Watched(config, request), dataset.Rig(), Recorder()),
-        planted_(config.run.inject_false_loops, config.loops.seed) {
+        planted_(config.run, config.loops.seed) {
     slam_.SetDetectionListener([this](const LoopResult& detection) {
       for (const auto& observer : request_.observers) observer->OnDetection(detection);
     });

@@ -16,7 +16,8 @@
 namespace tutti {
 namespace {
 
-using namespace tutti::testing;
+using tutti::testing::FreshFolder;
+using tutti::testing::With;
 
 SyntheticOptions Small(SyntheticScene scene, SyntheticSensor sensor) {
   SyntheticOptions o;

@@ -13,9 +13,16 @@
 namespace tutti {
 namespace {
 
-using namespace tutti::testing;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using tutti::testing::FreshFolder;
+using tutti::testing::MakeKitti;
+using tutti::testing::OpenError;
+using tutti::testing::Picture;
+using tutti::testing::Truncate;
+using tutti::testing::With;
+using tutti::testing::WriteImage;
+using tutti::testing::WriteText;
 
 const std::string kNone = "";
 

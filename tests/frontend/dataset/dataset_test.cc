@@ -13,8 +13,14 @@
 namespace tutti {
 namespace {
 
-using namespace tutti::testing;
 using ::testing::HasSubstr;
+using tutti::testing::FreshFolder;
+using tutti::testing::MakeKitti;
+using tutti::testing::OpenError;
+using tutti::testing::Picture;
+using tutti::testing::With;
+using tutti::testing::WriteImage;
+using tutti::testing::WriteText;
 
 TEST(DatasetTest, KittiStereoHasCalibrationBaselineStampsAndPoses) {
   const auto folder = FreshFolder();

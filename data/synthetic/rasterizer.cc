@@ -18,7 +18,8 @@ inline float Texture::Level::Bilinear(float u, float v) const {
   const int mask_x = width - 1, mask_y = height - 1;
   const int x0 = ix & mask_x, x1 = (x0 + 1) & mask_x;
   const std::uint8_t* row0 = &texels[static_cast<std::size_t>(iy & mask_y) * static_cast<std::size_t>(width)];
-  const std::uint8_t* row1 = &texels[static_cast<std::size_t>((iy + 1) & mask_y) * static_cast<std::size_t>(width)];
+  const std::uint8_t* row1 =
+      &texels[static_cast<std::size_t>((iy + 1) & mask_y) * static_cast<std::size_t>(width)];
   const float top = row0[x0] + ax * static_cast<float>(row0[x1] - row0[x0]);
   const float bottom = row1[x0] + ax * static_cast<float>(row1[x1] - row1[x0]);
   return top + ay * (bottom - top);

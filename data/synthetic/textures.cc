@@ -86,7 +86,8 @@ void Window(cv::Mat& image, const cv::Rect& r, double frame, int style, Random& 
     const double tone = random.In(50, 90);
     for (const int x : {r.x - r.width / 2 - 5, r.x + r.width + 5}) {
       Box(image, x, r.y - 3, Share(r.width, 1, 2), r.height + 6, tone);
-      for (int y = 4; y < r.height; y += 6) Box(image, x + 3, r.y + y, Share(r.width, 1, 2) - 6, 2, tone + 45);
+      for (int y = 4; y < r.height; y += 6)
+        Box(image, x + 3, r.y + y, Share(r.width, 1, 2) - 6, 2, tone + 45);
     }
   }
 }

@@ -46,7 +46,7 @@ fs::path CopyOfTinyTown(const fs::path& where) {
 }
 
 fs::path TinyConfig(const fs::path& folder, const std::string& more) {
-  const fs::path file = folder / "tiny.yaml";
+  fs::path file = folder / "tiny.yaml";
   WriteAll(file, "dataset: {type: kitti, sensor: stereo}\n" + more);
   return file;
 }

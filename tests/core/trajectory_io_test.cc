@@ -14,7 +14,7 @@ namespace {
 using ::testing::HasSubstr;
 
 std::filesystem::path Write(const std::string& text) {
-  const std::filesystem::path file = testing::FreshFolder() / "poses.txt";
+  std::filesystem::path file = testing::FreshFolder() / "poses.txt";
   std::ofstream(file) << text;
   return file;
 }

@@ -19,6 +19,7 @@ Span Make(Lane lane, const char* name, int from_ms, int length_ms, double cpu_ms
 
 std::vector<Span> Example() {
   std::vector<Span> spans;
+  spans.reserve(101);
   for (int i = 0; i < 99; ++i) spans.push_back(Make(Lane::kTracking, "frame", 100 * i, 10, 5));
   spans.push_back(Make(Lane::kTracking, "frame", 9900, 90, 50));
   spans.push_back(Make(Lane::kLoopClosure, "verify", 20, 40, -1));

@@ -10,6 +10,7 @@ namespace {
 // Keyframe k of 40 on a straight line, 1 m apart; the map has drifted by a metre at the end of it, evenly.
 KeyframeGraph Line() {
   std::vector<MapKeyframe> keyframes;
+  keyframes.reserve(40);
   for (int k = 0; k < 40; ++k) keyframes.push_back({k, 0, Pose({1, 0, 0, 0}, {k + k / 40.0, 0, 0})});
   KeyframeGraphOptions options;
   options.solver.robust = RobustLoss::kHuber;

@@ -62,7 +62,7 @@ TEST_F(CollectCommand, MeansIntervalsAndThePairedTestOverSeeds) {
   const auto json = nlohmann::json::parse(ReadAll(file));
   const auto variants = json["datasets"][0]["variants"];
   ASSERT_EQ(variants.size(), 2u);
-  const auto odometry = variants[variants[0]["variant"] == "odometry" ? 0 : 1];
+  const auto& odometry = variants[variants[0]["variant"] == "odometry" ? 0 : 1];
   EXPECT_EQ(odometry["ate_rmse_m"]["count"], 3);
   EXPECT_NEAR(odometry["ate_rmse_m"]["mean"].get<double>(), 2, 1e-12);
   EXPECT_NEAR(odometry["ate_rmse_m"]["half_width_95"].get<double>(), 4.302653 / std::sqrt(3.0), 1e-5);

@@ -17,6 +17,7 @@ ProcessResult RunTuttiAndSignal(const std::vector<std::string>& arguments, const
   std::vector<std::string> words = {TUTTI_EXECUTABLE};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;
+  argv.reserve(words.size() + 1);
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
   const pid_t child = fork();

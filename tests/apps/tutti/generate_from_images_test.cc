@@ -19,7 +19,7 @@ using testing::WriteAll;
 
 // Six images with a pattern, grey and colour, named by time stamps of different length.
 fs::path SixImages(const cv::Size& size = {64, 48}) {
-  const fs::path folder = testing::FreshFolder() / "from";
+  fs::path folder = testing::FreshFolder() / "from";
   fs::create_directories(folder);
   for (int i = 0; i < 6; ++i) {
     cv::Mat image(size, i % 2 == 0 ? CV_8UC1 : CV_8UC3);

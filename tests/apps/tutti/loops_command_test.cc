@@ -43,7 +43,7 @@ class LoopsCommand : public ::testing::Test {
   fs::path Truth(const std::vector<std::pair<int, int>>& pairs, int count = kImages) const {
     cv::Mat matrix = cv::Mat::zeros(count, count, CV_8U);
     for (const auto& [row, column] : pairs) matrix.at<std::uint8_t>(row, column) = 255;
-    const fs::path file = folder_ / "truth.png";
+    fs::path file = folder_ / "truth.png";
     cv::imwrite(file.string(), matrix);
     return file;
   }

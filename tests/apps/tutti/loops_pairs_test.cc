@@ -29,7 +29,7 @@ std::filesystem::path SidesOfAStreet() {
   options.rate_hz = 2;
   options.frames = kPairs;
   options.supersample = 1;
-  const std::filesystem::path folder = testing::FreshFolder() / "sides";
+  std::filesystem::path folder = testing::FreshFolder() / "sides";
   WriteSyntheticDataset(SyntheticWorld(options), folder);
   return folder;
 }

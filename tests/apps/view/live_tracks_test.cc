@@ -44,6 +44,7 @@ TEST(LiveTracks, TailsEndAfterAFewFrames) {
 TEST(LiveTracks, TheSameLandmarksAreShownInTheNextFrame) {
   const auto frame = [](int count, float moved) {
     std::vector<SeenLandmark> seen;
+    seen.reserve(static_cast<std::size_t>(count));
     for (int l = 0; l < count; ++l) seen.push_back({3 * l + 1, {float(l) + moved, 0}});
     return seen;
   };

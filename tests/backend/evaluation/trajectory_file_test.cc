@@ -32,7 +32,7 @@ std::vector<double> Stamps(const Trajectory& trajectory) {
 }
 
 std::filesystem::path Write(const std::string& text) {
-  const std::filesystem::path file = testing::FreshFolder() / "poses.txt";
+  std::filesystem::path file = testing::FreshFolder() / "poses.txt";
   std::ofstream(file) << text;
   return file;
 }

@@ -9,7 +9,6 @@
 namespace tutti {
 namespace {
 
-using internal::BlockSize;
 using internal::EdgeConstants;
 
 // Moves a block along one tangent direction as the solver does.

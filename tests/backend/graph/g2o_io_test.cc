@@ -15,7 +15,7 @@ namespace {
 using ::testing::HasSubstr;
 
 std::filesystem::path Write(const std::string& text) {
-  const std::filesystem::path file = testing::FreshFolder() / "graph.g2o";
+  std::filesystem::path file = testing::FreshFolder() / "graph.g2o";
   std::ofstream(file) << text;
   return file;
 }

@@ -115,7 +115,7 @@ TEST(DatasetTest, IclNuimHasDepthFirstFrameNumbersForStampsAndMirroredTruth) {
     const std::string n = std::to_string(i);
     WriteImage(folder / "rgb" / (n + ".png"), Picture(64, 48, i));
     WriteImage(folder / "depth" / (n + ".png"), cv::Mat(48, 64, CV_16UC1, cv::Scalar(5000)));
-    list += n + " depth/" + n + ".png " + n + " rgb/" + n + ".png\n";
+    list.append(n).append(" depth/" + n + ".png ").append(n).append(" rgb/" + n + ".png\n");
   }
   WriteText(folder / "associations.txt", list);
   WriteText(folder / "livingRoom0.gt.freiburg",
@@ -167,6 +167,7 @@ TEST(DatasetTest, ReadsTheSameFromSeveralThreads) {
   const auto data = OpenDataset(folder, With(Sensor::kStereo));
   std::vector<int> bad(2, 0);
   std::vector<std::thread> threads;
+  threads.reserve(2);
   for (int t = 0; t < 2; ++t) {
     threads.emplace_back([&, t] {
       for (int k = 0; k < 40; ++k) {

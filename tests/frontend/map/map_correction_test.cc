@@ -128,6 +128,7 @@ std::vector<int> PiecesAfter(const std::map<int, int>& joined) {
   }
   JoinPieces(joined, &map);
   std::vector<int> pieces;
+  pieces.reserve(4);
   for (int id = 0; id < 4; ++id) pieces.push_back(std::as_const(map).keyframe(id).piece);
   return pieces;
 }

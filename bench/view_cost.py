@@ -1,14 +1,11 @@
 #!/usr/bin/env python3
 """What the live view costs: processor time of a run without it and with a browser's stream being read.
 
-usage: bench/view_cost.py --tutti build/release/apps/tutti/tutti [--data DIR] [--frames N] [--rounds N]
+usage: ./dev bench view [--frames N] [--rounds N]   (or bench/view_cost.py --build build/release)
 Runs take turns, so that the machine's load reaches both. `tracking`: the thread that tracks, per frame; `all`: every
 thread of the process. Needs Python 3 alone.
 """
-import argparse
 import json
-import os
-import pathlib
 import re
 import statistics
 import subprocess
@@ -16,7 +13,7 @@ import tempfile
 import threading
 import urllib.request
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
+import table
 
 
 def read_stream(url, counter):
@@ -27,8 +24,8 @@ def read_stream(url, counter):
 
 def run(a, view):
     with tempfile.TemporaryDirectory() as out:
-        command = [a.tutti, "run", "--config", ROOT / "data/configs/7scenes.yaml", "--dataset", a.data / "redkitchen", "--out", out,
-                   "--max-frames", str(a.frames), "--timing", "--no-report", "--quiet"]
+        command = [a.tutti, "run", "--config", table.ROOT / "data/configs/7scenes.yaml", "--dataset", a.data / "redkitchen", "--out", out,
+                   "--end", str(a.frames), "--timing", "--no-report", "--quiet"]
         if view:
             command += ["--view", "--view-port", "0", "--view-wait", "30"]
         process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
@@ -46,12 +43,10 @@ def run(a, view):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--tutti", required=True, type=pathlib.Path)
-    parser.add_argument("--data", type=pathlib.Path, default=os.environ.get("TUTTI_DATA", ROOT.parent / "shared" / "data"))
+    parser = table.parser(__doc__, "view")
     parser.add_argument("--frames", type=int, default=300)
     parser.add_argument("--rounds", type=int, default=3)
-    a = parser.parse_args()
+    a = table.parse(parser)
     results = {False: [], True: []}
     for _ in range(a.rounds):
         for view in (False, True):

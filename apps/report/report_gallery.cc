@@ -90,9 +90,10 @@ std::string PictureOf(const cv::Mat& query, const cv::Mat& candidate, const std:
   return "data:image/jpeg;base64," + Base64(bytes.data(), bytes.size());
 }
 
-cv::Mat ReadGrey(const Dataset& dataset, std::int64_t frame) {
-  if (frame < 0 || static_cast<std::size_t>(frame) >= dataset.Size()) return {};
-  const ReadResult read = dataset.Read(static_cast<std::size_t>(frame));
+cv::Mat ReadGrey(const Dataset& dataset, double stamp_s) {
+  const std::optional<std::size_t> place = FindStamp(dataset, stamp_s);
+  if (!place) return {};
+  const ReadResult read = dataset.Read(*place);
   return read.frame ? read.frame->image : cv::Mat();
 }
 
@@ -111,7 +112,8 @@ std::string Describe(const ShownLoop& loop, std::size_t drawn, bool for_the_pict
 }
 
 Json Entry(const Dataset& dataset, const ShownLoop& loop) {
-  const cv::Mat query = ReadGrey(dataset, loop.query), candidate = ReadGrey(dataset, loop.candidate);
+  const cv::Mat query = ReadGrey(dataset, loop.query_stamp_s),
+                candidate = ReadGrey(dataset, loop.candidate_stamp_s);
   if (query.empty() || candidate.empty()) return Json();
   const bool tried = loop.detection != nullptr && loop.detection->candidate == loop.candidate &&
                      !loop.detection->matches.empty();

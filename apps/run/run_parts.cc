@@ -44,6 +44,9 @@ double ProcessCpuSeconds() {
 RunConfig WithOverrides(RunConfig config, const RunRequest& request) {
   if (request.no_loops) config.run.loops = false;
   if (request.follow_s) config.dataset.follow_s = *request.follow_s;
+  if (request.start) config.dataset.start = *request.start;
+  if (request.end) config.dataset.end = *request.end;
+  if (request.stride) config.dataset.stride = *request.stride;
   if (request.threads) config.run.threads = *request.threads;
   if (request.inject_false_loops) config.run.inject_false_loops = *request.inject_false_loops;
   if (request.seed) config.loops.seed = *request.seed;

@@ -49,7 +49,6 @@ class Run {
       alone_last_ = last;
     });
     total_ = dataset.FrameSupply() == Supply::kStored ? dataset.Size() : static_cast<std::size_t>(-1);
-    if (request.max_frames) total_ = std::min(total_, static_cast<std::size_t>(*request.max_frames));
     result_.realtime = request.realtime;
     if (!request.realtime || dataset.FrameSupply() == Supply::kOnce) return;
     clock_ = request.clock ? request.clock : std::make_shared<SteadyFrameClock>();
@@ -255,7 +254,6 @@ RunResult RunSlam(const RunRequest& request, const RunConfig& given) {
   result.config = WithOverrides(given, request);
   result.config_file = request.config.string();
   result.dataset = request.dataset.string();
-  if (request.max_frames && *request.max_frames < 1) throw InputError("--max-frames: must be at least 1");
   // The modules use threads of their own where that can't change a result; OpenCV's would reorder keypoints.
   cv::setNumThreads(1);
   const std::unique_ptr<Dataset> dataset = OpenDataset(request.dataset, result.config.dataset);

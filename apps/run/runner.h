@@ -23,7 +23,7 @@ struct RunRequest {
   std::optional<std::uint64_t> seed;  ///< of everything that draws numbers
   std::optional<int> threads;
   std::optional<int> inject_false_loops;       ///< instead of run.inject_false_loops
-  std::optional<std::int64_t> max_frames;      ///< the first frames only
+  std::optional<int> start, end, stride;       ///< instead of those of the section dataset [frames]
   std::optional<double> follow_s;              ///< DatasetOptions::follow_s
   bool realtime = false;                       ///< play by the time stamps, drop frames that it can't follow
   std::shared_ptr<FrameClock> clock;           ///< for realtime; null: the machine's

@@ -21,7 +21,7 @@ class SequenceRecorder : public RunObserver {
   void OnFrame(const InputFrame&, const TrackResult&, const RunState&) override { ++frames_; }
   void OnKeyframe(const InputFrame& frame, int keyframe, const RunState& state) override {
     // Called before the OnFrame of the frame that is being tracked.
-    sequence_.keyframes.push_back({keyframe, frame.index, frames_ + 1});
+    sequence_.keyframes.push_back({keyframe, frame.stamp_s, frames_ + 1});
     sequence_.views[keyframe] = state.odometry->Keyframe(keyframe);
   }
   void OnEnd(const RunState& state) override {
@@ -94,8 +94,12 @@ RunResult CloseLoops(const TrackedSequence& tracked, const RunRequest& request, 
   Progress progress("loops", tracked.keyframes.size(), request.quiet ? nullptr : stderr);
   for (std::size_t k = 0; k < tracked.keyframes.size() && !InterruptGuard::Requested(); ++k) {
     const TrackedSequence::Keyframe& keyframe = tracked.keyframes[k];
-    const ReadResult read = dataset->Read(static_cast<std::size_t>(keyframe.frame));
-    if (!read.frame) throw InputError("frame " + std::to_string(keyframe.frame) + " changed: " + read.error);
+    const std::optional<std::size_t> place = FindStamp(*dataset, keyframe.stamp_s);
+    const ReadResult read = place ? dataset->Read(*place) : ReadResult{std::nullopt, "it is gone"};
+    if (!read.frame) {
+      throw InputError("the frame at " + std::to_string(keyframe.stamp_s) +
+                       " s was read before, and now can't be: " + read.error);
+    }
     TrackResult track;
     track.state = TrackingState::kTracking;
     track.keyframe = keyframe.id;

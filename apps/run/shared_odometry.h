@@ -23,7 +23,7 @@ struct TrackedSequence {
   /// A frame that became a keyframe.
   struct Keyframe {
     int id = -1;
-    std::int64_t frame = 0;   ///< index of the input frame
+    double stamp_s = 0;       ///< of the input frame
     std::int64_t frames = 0;  ///< that were read when all its landmarks were known
   };
   RunResult result;

@@ -26,7 +26,7 @@ struct RunArguments {
   std::uint64_t seed = 1;
   int threads = 2;
   int inject_false_loops = 0;
-  std::int64_t max_frames = 0;
+  int start = 0, end = 0, stride = 1;
   double follow_s = 10;
   bool view = false;
   LiveViewOptions live;
@@ -89,7 +89,9 @@ int Run(const CLI::App& command, const RunArguments& arguments) {
   if (command.count("--seed") > 0) request.seed = arguments.seed;
   if (command.count("--threads") > 0) request.threads = arguments.threads;
   if (command.count("--inject-false-loops") > 0) request.inject_false_loops = arguments.inject_false_loops;
-  if (command.count("--max-frames") > 0) request.max_frames = arguments.max_frames;
+  if (command.count("--start") > 0) request.start = arguments.start;
+  if (command.count("--end") > 0) request.end = arguments.end;
+  if (command.count("--stride") > 0) request.stride = arguments.stride;
   RunConfig config = LoadConfig(request.config);
   SetOptions(arguments.set, config);
   const bool view = arguments.view || command.count("--view-address") > 0;
@@ -135,7 +137,12 @@ void AddRunCommand(CLI::App& app, int& exit_code) {
           "agree with each other) that look verified; loops.csv says what became of each (injected, reason, "
           "weight)")
       ->check(NotNegative());
-  command->add_option("--max-frames", arguments->max_frames, "the first frames only")->check(Positive());
+  command->add_option("--start", arguments->start, "first frame that is used, counted from 0")
+      ->check(NotNegative());
+  command->add_option("--end", arguments->end, "frame before which to stop (--end 600: frames 0 to 599)")
+      ->check(Positive());
+  command->add_option("--stride", arguments->stride, "use every so many frames, from the first on")
+      ->check(Positive());
   command
       ->add_option(
           "--follow", arguments->follow_s,

@@ -4,6 +4,7 @@
 #include <map>
 
 #include "frontend/dataset/dataset_folder.h"
+#include "frontend/dataset/selected_dataset.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -19,6 +20,20 @@ EnumWords<Sensor> WordsOf(Sensor /*of*/) {
 }
 
 bool Dataset::WaitFor(std::size_t i, const std::function<bool()>&) const { return i < Size(); }
+
+std::optional<std::size_t> FindStamp(const Dataset& dataset, double stamp_s) {
+  constexpr double kSame = 1e-6;
+  std::size_t low = 0, high = dataset.Size();  // the first that is not earlier
+  while (low < high) {
+    const std::size_t middle = low + (high - low) / 2;
+    if (dataset.Stamp(middle) < stamp_s - kSame)
+      low = middle + 1;
+    else
+      high = middle;
+  }
+  if (low == dataset.Size() || dataset.Stamp(low) > stamp_s + kSame) return std::nullopt;
+  return low;
+}
 
 namespace {
 
@@ -125,16 +140,7 @@ FolderContents FindFrames(const std::filesystem::path& path, const DatasetOption
   }
 }
 
-}  // namespace
-
-std::unique_ptr<Dataset> OpenDataset(const std::filesystem::path& path, const DatasetOptions& options) {
-  const std::string problem = options.Validate();
-  if (!problem.empty()) throw InputError("dataset: " + problem);
-  DatasetOptions use = options;
-  if (use.camera && use.camera->fy < 0) {  // ICL-NUIM's own calibration: y up
-    use.camera->fy = -use.camera->fy;
-    use.mirrored_ground_truth = true;
-  }
+std::unique_ptr<Dataset> OpenWhole(const std::filesystem::path& path, const DatasetOptions& use) {
   if (IsCamera(path.string())) return OpenCamera(path.string(), use);
   std::error_code code;
   if (use.follow_s > 0) {
@@ -146,6 +152,19 @@ std::unique_ptr<Dataset> OpenDataset(const std::filesystem::path& path, const Da
   if (type == DatasetType::kVideo) return OpenVideo(path, use);
   if (type == DatasetType::kBag) return OpenBag(path, use);
   return std::make_unique<FolderDataset>(FindFrames(path, use), use);
+}
+
+}  // namespace
+
+std::unique_ptr<Dataset> OpenDataset(const std::filesystem::path& path, const DatasetOptions& options) {
+  const std::string problem = options.Validate();
+  if (!problem.empty()) throw InputError("dataset: " + problem);
+  DatasetOptions use = options;
+  if (use.camera && use.camera->fy < 0) {  // ICL-NUIM's own calibration: y up
+    use.camera->fy = -use.camera->fy;
+    use.mirrored_ground_truth = true;
+  }
+  return SelectFrames(OpenWhole(path, use), use, path.string());
 }
 
 }  // namespace tutti

@@ -231,7 +231,7 @@ class BagDataset : public Dataset {
     if (options_.sensor == Sensor::kStereo) right_ = Find(options_.right_topic);
     if (options_.sensor == Sensor::kRgbd) depth_ = Find(options_.depth_topic);
     std::size_t alone = 0;
-    for (std::size_t i = 0; i < images_.size(); i += static_cast<std::size_t>(options_.stride)) {
+    for (std::size_t i = 0; i < images_.size(); ++i) {
       Frame frame;
       frame.index = static_cast<std::int64_t>(i);
       frame.image = &images_[i];

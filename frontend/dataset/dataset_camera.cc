@@ -143,8 +143,6 @@ bool IsCameraDevice(const std::string& name) {
 
 std::unique_ptr<Dataset> OpenCamera(const std::string& name, const DatasetOptions& options) {
   if (options.sensor != Sensor::kMono) throw InputError(name + ": a camera is mono; set sensor to mono");
-  if (options.stride != 1)
-    throw InputError(name + ": stride must be 1; use --realtime to drop what can't be followed");
   return std::make_unique<CameraDataset>(name, options);
 }
 

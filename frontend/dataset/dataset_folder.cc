@@ -78,10 +78,6 @@ FolderDataset::FolderDataset(FolderContents contents, const DatasetOptions& opti
     throw InputError(contents_.folder.string() +
                      ": holds no frame; check the folder and the options of the data set");
   }
-  if (options_.stride > 1) {
-    contents_.frames = EveryNth(std::move(contents_.frames), options_.stride);
-    contents_.rate_hz /= options_.stride;
-  }
   FindImageSize();
   SetUpRig();
 }

@@ -107,8 +107,6 @@ FolderContents FindKitti(const std::filesystem::path& folder, const DatasetOptio
 FolderContents FindTum(const std::filesystem::path& folder, const DatasetOptions& options);
 FolderContents FindEuroc(const std::filesystem::path& folder, const DatasetOptions& options);
 FolderContents FindImages(const std::filesystem::path& folder, const DatasetOptions& options);
-/// Every stride-th of them.
-std::vector<FrameFiles> EveryNth(std::vector<FrameFiles> frames, int stride);
 /// A folder that grows: `find` lists it as it is now. Waits options.follow_s for the first image.
 std::unique_ptr<Dataset> FollowFolder(std::function<FolderContents()> find, const DatasetOptions& options);
 /// camera:0, or camera:FILE with a video file.

@@ -84,8 +84,7 @@ class FollowedDataset : public Dataset {
   void Poll() const {
     std::vector<FrameFiles> now;
     try {
-      FolderContents contents = find_();
-      now = EveryNth(std::move(contents.frames), options_.stride);
+      now = find_().frames;
       failure_.clear();
     } catch (const InputError& e) {  // a list that is half written; told at the end if it stays so
       failure_ = e.what();
@@ -123,13 +122,6 @@ class FollowedDataset : public Dataset {
 };
 
 }  // namespace
-
-std::vector<FrameFiles> EveryNth(std::vector<FrameFiles> frames, int stride) {
-  if (stride <= 1) return frames;
-  std::vector<FrameFiles> kept;
-  for (std::size_t i = 0; i < frames.size(); i += static_cast<std::size_t>(stride)) kept.push_back(frames[i]);
-  return kept;
-}
 
 std::unique_ptr<Dataset> FollowFolder(std::function<FolderContents()> find, const DatasetOptions& options) {
   return std::make_unique<FollowedDataset>(std::move(find), options);

@@ -31,13 +31,11 @@ class VideoDataset : public Dataset {
     }
     Keep(0, first);
     size_ = first.size();
-    rig_ = SingleCameraRig(options, size_, rate_hz_ / options.stride, file_.string(), rectifier_, warnings_);
-    frames_ =
-        (frames_ + static_cast<std::size_t>(options.stride) - 1) / static_cast<std::size_t>(options.stride);
+    rig_ = SingleCameraRig(options, size_, rate_hz_, file_.string(), rectifier_, warnings_);
   }
 
   std::size_t Size() const override { return frames_; }
-  double Stamp(std::size_t i) const override { return static_cast<double>(i) * options_.stride / rate_hz_; }
+  double Stamp(std::size_t i) const override { return static_cast<double>(i) / rate_hz_; }
   const CameraRig& Rig() const override { return rig_; }
   std::optional<std::filesystem::path> GroundTruthFile() const override { return std::nullopt; }
   const std::vector<std::string>& Warnings() const override { return warnings_; }
@@ -59,23 +57,21 @@ class VideoDataset : public Dataset {
 
   ReadResult Read(std::size_t i) const override {
     ReadResult result;
-    const std::size_t wanted = i * static_cast<std::size_t>(options_.stride);
     cv::Mat image;
     if (i < frames_) {
       const std::lock_guard<std::mutex> lock(mutex_);
-      image = Fetch(wanted);
+      image = Fetch(i);
     }
     if (image.empty()) {
-      result.error = file_.string() + ": frame " + std::to_string(wanted) + " can't be decoded";
+      result.error = file_.string() + ": frame " + std::to_string(i) + " can't be decoded";
       return result;
     }
     if (image.size() != size_) {
-      result.error =
-          file_.string() + ": frame " + std::to_string(wanted) + " has another size than the first";
+      result.error = file_.string() + ": frame " + std::to_string(i) + " has another size than the first";
       return result;
     }
     InputFrame frame;
-    frame.index = static_cast<std::int64_t>(wanted);
+    frame.index = static_cast<std::int64_t>(i);
     frame.stamp_s = Stamp(i);
     frame.image = rectifier_ ? rectifier_->Apply(image) : image;
     result.frame = std::move(frame);

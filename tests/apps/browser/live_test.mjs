@@ -74,7 +74,7 @@ const tracksOnPage = () => {
 };
 
 async function drive(browser, folder, data) {
-  const { url, ended, run } = await start(folder, 'drive', data, ['--view', '--view-wait', '60', '--max-frames', '900']);
+  const { url, ended, run } = await start(folder, 'drive', data, ['--view', '--view-wait', '60', '--end', '900']);
   check(/^http:\/\/127\.0\.0\.1:\d+\/$/.test(url), `loopback by default, not ${url}`);
   const allow = (target) => target.startsWith(url);
   const { page, problems } = await openPage(browser, url, { allow });
@@ -132,7 +132,7 @@ async function drive(browser, folder, data) {
 
 // A browser that connects and reads nothing must not hold the run up.
 async function sleepers(folder, data) {
-  const { url, ended, run } = await start(folder, 'sleepers', data, ['--view', '--max-frames', '80']);
+  const { url, ended, run } = await start(folder, 'sleepers', data, ['--view', '--end', '80']);
   const { hostname, port } = new URL(url);
   const sockets = [0, 1, 2].map(() => {
     const socket = connect(Number(port), hostname);
@@ -146,7 +146,7 @@ async function sleepers(folder, data) {
   for (const socket of sockets) socket.destroy();
   run.kill();
   const alone = spawnSync(tutti, ['run', '--config', data[0], '--dataset', data[1], '--out', join(folder, 'alone'), '--no-report',
-    '--max-frames', '80', '--quiet']);
+    '--end', '80', '--quiet']);
   check(alone.status === 0, 'a run without the view');
   check(readFileSync(join(folder, 'alone', 'trajectory.txt'), 'utf8') === readFileSync(join(folder, 'sleepers', 'trajectory.txt'), 'utf8'),
     'looking changes nothing: the same trajectory, byte for byte');

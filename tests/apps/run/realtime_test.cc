@@ -43,7 +43,7 @@ RunRequest Request(const std::filesystem::path& folder, const char* out, double 
   request.out = folder / out;
   request.no_loops = true;
   request.quiet = true;
-  request.max_frames = 12;
+  request.end = 12;
   request.realtime = true;
   request.clock = std::make_shared<SlowMachineClock>(busy_s);
   return request;

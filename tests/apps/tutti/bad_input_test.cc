@@ -67,7 +67,7 @@ TEST_F(BadInput, MissingConfiguration) {
 }
 
 TEST_F(BadInput, LessThanNothingIsNoLargeNumber) {
-  for (const char* option : {"--seed", "--max-frames"}) {
+  for (const char* option : {"--seed", "--end"}) {
     const auto run = Run(testing::TinyConfig(folder_), testing::TinyTown(), {option, "-1"});
     EXPECT_EQ(run.status, 1) << run.output;
     EXPECT_THAT(run.output, AllOf(HasSubstr(option), HasSubstr("'-1'")));

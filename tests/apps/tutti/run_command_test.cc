@@ -85,7 +85,7 @@ TEST(RunCommand, SameBytesForOneAndTwoThreadsAndWithoutLoops) {
 TEST(RunCommand, MaxFramesAndGroundTruthNone) {
   const fs::path folder = testing::FreshFolder(), out = folder / "out";
   auto arguments = Arguments(testing::TinyConfig(folder), testing::TinyTown(), out);
-  arguments.insert(arguments.end(), {"--max-frames", "5", "--ground-truth", "none", "--quiet"});
+  arguments.insert(arguments.end(), {"--end", "5", "--ground-truth", "none", "--quiet"});
   const auto run = RunTutti(arguments);
   ASSERT_EQ(run.status, 0) << run.output;
   const nlohmann::json s = Summary(out);
@@ -97,10 +97,9 @@ TEST(RunCommand, MaxFramesAndGroundTruthNone) {
 TEST(RunCommand, TimingTableAndTraceChangeNoResult) {
   const fs::path folder = testing::FreshFolder(), config = testing::TinyConfig(folder);
   auto measured = Arguments(config, testing::TinyTown(), folder / "measured");
-  measured.insert(measured.end(),
-                  {"--max-frames", "10", "--timing", "--trace", (folder / "t.json").string()});
+  measured.insert(measured.end(), {"--end", "10", "--timing", "--trace", (folder / "t.json").string()});
   auto plain = Arguments(config, testing::TinyTown(), folder / "plain");
-  plain.insert(plain.end(), {"--max-frames", "10"});
+  plain.insert(plain.end(), {"--end", "10"});
   const auto run = RunTutti(measured);
   ASSERT_EQ(run.status, 0) << run.output;
   ASSERT_EQ(RunTutti(plain).status, 0);
@@ -140,7 +139,7 @@ TEST(RunCommand, ACalibrationThatCanNotBeRightIsSaidAndTheRunGoesOn) {
   EXPECT_EQ(wrong.status, 1) << wrong.output;
   EXPECT_THAT(wrong.output, HasSubstr("left and right are swapped"));
   auto arguments = Arguments(config, swapped, folder / "out");
-  arguments.insert(arguments.end(), {"--max-frames", "3"});
+  arguments.insert(arguments.end(), {"--end", "3"});
   EXPECT_THAT(RunTutti(arguments).output, HasSubstr("warning: the calibration can't be right"));
   EXPECT_EQ(Summary(folder / "out")["calibration_findings"].size(), 1u);
 }
@@ -148,9 +147,9 @@ TEST(RunCommand, ACalibrationThatCanNotBeRightIsSaidAndTheRunGoesOn) {
 TEST(RunCommand, AFollowedFolderGivesWhatACompleteOneGives) {
   const fs::path folder = testing::FreshFolder(), config = testing::TinyConfig(folder);
   auto complete = Arguments(config, testing::TinyTown(), folder / "complete");
-  complete.insert(complete.end(), {"--max-frames", "6", "--no-loops"});
+  complete.insert(complete.end(), {"--end", "6", "--no-loops"});
   auto followed = Arguments(config, testing::TinyTown(), folder / "followed");
-  followed.insert(followed.end(), {"--max-frames", "6", "--no-loops", "--follow", "0.5"});
+  followed.insert(followed.end(), {"--end", "6", "--no-loops", "--follow", "0.5"});
   ASSERT_EQ(RunTutti(complete).status, 0);
   const auto run = RunTutti(followed);
   ASSERT_EQ(run.status, 0) << run.output;
@@ -179,7 +178,7 @@ TEST(RunCommand, RedKitchenBeginsWell) {
   TUTTI_REQUIRE_DATA(dataset, "redkitchen");
   const fs::path folder = testing::FreshFolder(), out = folder / "out";
   auto arguments = Arguments(testing::SourceDir() / "data" / "configs" / "7scenes.yaml", dataset, out);
-  arguments.insert(arguments.end(), {"--max-frames", "60"});
+  arguments.insert(arguments.end(), {"--end", "60"});
   const auto run = RunTutti(arguments);
   ASSERT_EQ(run.status, 0) << run.output;
   const nlohmann::json s = Summary(out);

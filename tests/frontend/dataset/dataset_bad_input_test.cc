@@ -253,6 +253,11 @@ TEST(DatasetBadInputTest, OptionsAreChecked) {
   EXPECT_THAT(OpenError(folder, options), HasSubstr("stride"));
   EXPECT_THAT(OpenError(folder, With(Sensor::kRgbd)), HasSubstr("no depth"));
   options = With(Sensor::kMono);
+  options.start = 2;
+  EXPECT_THAT(OpenError(folder, options), HasSubstr("has 2 frames, 0 to 1; it can't start with frame 2"));
+  options.end = 2;
+  EXPECT_THAT(OpenError(folder, options), HasSubstr("end must be greater than start (2); it is 2"));
+  options = With(Sensor::kMono);
   options.type = DatasetType::kVideo;
   EXPECT_THAT(OpenError(folder, options), HasSubstr("is a folder"));
 }

@@ -55,6 +55,55 @@ TEST(DatasetTest, StrideKeepsIndicesAndStampsOfTheData) {
   EXPECT_EQ(data->ReadGroundTruth(folder / "poses.txt", nullptr).size(), 7U);
 }
 
+TEST(DatasetTest, StartEndAndStrideChooseFramesThatKeepTheirNumbers) {
+  const auto folder = FreshFolder();
+  MakeKitti(folder, 10, true);
+  DatasetOptions options = With(Sensor::kStereo);
+  options.start = 1;
+  options.end = 8;
+  options.stride = 3;
+  const auto data = OpenDataset(folder, options);
+  ASSERT_EQ(data->Size(), 3U);  // 1, 4, 7
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::int64_t number = 1 + 3 * static_cast<std::int64_t>(i);
+    const ReadResult read = data->Read(i);
+    ASSERT_TRUE(read.frame) << read.error;
+    EXPECT_EQ(read.frame->index, number);
+    EXPECT_DOUBLE_EQ(data->Stamp(i), 0.1 * static_cast<double>(number));
+    EXPECT_EQ(cv::norm(read.frame->image, Picture(64, 48, static_cast<int>(number)), cv::NORM_INF), 0);
+    EXPECT_EQ(FindStamp(*data, data->Stamp(i)), i);
+  }
+  EXPECT_FALSE(FindStamp(*data, 0.2));
+  EXPECT_FALSE(FindStamp(*data, 0.9));
+  EXPECT_FALSE(data->WaitFor(3, [] { return false; }));
+  EXPECT_NEAR(data->Rig().rate_hz, 10.0 / 3, 1e-9);
+  EXPECT_EQ(data->ReadGroundTruth(folder / "poses.txt", nullptr).size(), 10U);
+  options.end = 100;  // beyond the last: to the last
+  EXPECT_EQ(OpenDataset(folder, options)->Size(), 3U);
+}
+
+TEST(DatasetTest, NoiseIsTheSameForADrawAndAnotherForTheNext) {
+  const auto folder = FreshFolder();
+  MakeKitti(folder, 3, true);
+  DatasetOptions options = With(Sensor::kStereo);
+  options.noise = 4;
+  const auto image = [&](int draw, std::size_t i, bool right) {
+    options.noise_draw = draw;
+    const ReadResult read = OpenDataset(folder, options)->Read(i);
+    return right ? read.frame->right : read.frame->image;
+  };
+  const auto deviation = [](const cv::Mat& a, const cv::Mat& b) {
+    return cv::norm(a, b, cv::NORM_L2) / std::sqrt(static_cast<double>(a.total()));
+  };
+  EXPECT_EQ(deviation(image(0, 1, false), image(0, 1, false)), 0);
+  EXPECT_NEAR(deviation(image(0, 1, false), Picture(64, 48, 1)), 4, 1);  // some are cut off at 0 and 255
+  EXPECT_NEAR(deviation(image(0, 1, false), image(1, 1, false)), 4 * std::sqrt(2), 1.5);
+  // Neither the two cameras nor two frames have the same noise.
+  const cv::Mat left = image(0, 1, false) - Picture(64, 48, 1),
+                right = image(0, 1, true) - Picture(64, 48, 101);
+  EXPECT_GT(deviation(left, right), 1);
+}
+
 TEST(DatasetTest, ReadsAnyImageFormat) {
   for (const char* extension : {".jpg", ".webp", ".bmp", ".pgm", ".tif"}) {
     const auto folder = FreshFolder();

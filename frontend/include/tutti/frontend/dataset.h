@@ -50,7 +50,15 @@ struct DatasetOptions {
                "a folder that is still being written to: wait for new images, end when none came for so "
                "long; 0: all images are there",
                Unit("s"), From(0));
-  TUTTI_OPTION(int, stride, 1, "use every stride-th frame", Basic(), From(1));
+  TUTTI_OPTION(int, start, 0, "first frame that is used, counted from 0", Basic(), From(0));
+  TUTTI_OPTION(int, end, 0, "frame before which to stop (the first that is not used); 0: use all", Basic(),
+               From(0));
+  TUTTI_OPTION(int, stride, 1, "use every stride-th frame, from the first that is used on", Basic(), From(1));
+  TUTTI_OPTION(double, noise, 0,
+               "standard deviation of Gaussian noise that is added to the images, to see how a result holds; "
+               "0: none",
+               Unit("grey levels of 255"), From(0));
+  TUTTI_OPTION(int, noise_draw, 0, "another number, another noise; the same number, the same noise", From(0));
   TUTTI_OPTION(bool, mirrored_ground_truth, false,
                "the ground truth has its y axis up (left-handed, as ICL-NUIM with its negative fy): it is "
                "mirrored when read");
@@ -100,6 +108,10 @@ class Dataset {
   /// Notes for the log about what was found and decided: skipped duplicates, frames without depth, ...
   virtual const std::vector<std::string>& Warnings() const = 0;
 };
+
+/// The place of the frame with this stamp [s], for Read(); nothing if there is none within 1e-6 s. A frame's
+/// number (InputFrame::index) is not its place where frames were left out.
+std::optional<std::size_t> FindStamp(const Dataset& dataset, double stamp_s);
 
 /// What a folder (or file) looks like. Throws InputError for a missing path, an empty folder, or one that
 /// holds no data set.

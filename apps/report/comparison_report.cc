@@ -51,7 +51,7 @@ Json ComparisonPage(const std::string& title, const std::vector<ReportTable>& ta
       {"kind", "comparison"},
       {"title", title},
       {"subtitle",
-       "Tables: means over seeds, +- half of the 95 % confidence interval. Charts: the first run of each "
+       "Tables: means over runs, +- half of the 95 % confidence interval. Charts: the first run of each "
        "variant."},
       {"tables", Json::array()},
       {"failures", failures},

@@ -190,7 +190,8 @@ std::string VariantName(const RunConfig& config) {
   if (!config.run.loops) return "odometry";
   if (config.loops.rule == CombinationRule::kJoint) return "ensemble";
   const bool standardised = config.loops.evidence.kind == EvidenceKind::kStandardised;
-  return config.loops.rule == CombinationRule::kMean && standardised ? "seed" : RuleName(config.loops);
+  return config.loops.rule == CombinationRule::kMean && standardised ? "standardised-mean"
+                                                                     : RuleName(config.loops);
 }
 
 nlohmann::ordered_json RunReport(const RunResult& result, const DetectionLog& log,

@@ -135,7 +135,8 @@ std::string Row(const std::string& name, const std::string& a, const std::string
 
 std::string Improvement(double before, double after) {
   if (!(before > 0) || !(after > 0)) return "";
-  return Cell(before / after, 2, "x");
+  if (after > before) return Cell(after / before, 2, "x, worse");
+  return Cell(before / after, 2, "x better");
 }
 
 }  // namespace
@@ -243,7 +244,7 @@ std::string ResultTable(const RunResult& r) {
     out << "  no evaluation: " << b.reason << "\n";
     return out.str();
   }
-  out << "\n" << Row("ATE, " + r.evaluation->alignment, "odometry alone", "with ensemble", "improvement");
+  out << "\n" << Row("ATE, " + r.evaluation->alignment, "odometry alone", "with ensemble", "change");
   const auto line = [&](const char* name, double ErrorStatistics::*field) {
     out << Row(name, a.valid ? Cell(a.ate.*field, 4, " m") : "-", b.valid ? Cell(b.ate.*field, 4, " m") : "-",
                a.valid && b.valid ? Improvement(a.ate.*field, b.ate.*field) : "");

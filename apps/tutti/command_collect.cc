@@ -40,7 +40,7 @@ std::vector<fs::path> Summaries(const std::string& where) {
   return {files.begin(), files.end()};
 }
 
-// The folder that the run's folder lies in: a sweep has runs/data set/configuration/seed_1/summary.json.
+// The folder that the run's folder lies in: a sweep has runs/data set/configuration/start_0/summary.json.
 std::string FolderAbove(const fs::path& summary) {
   const fs::path run = fs::absolute(summary).parent_path();
   return run.parent_path().filename().string();
@@ -72,7 +72,7 @@ void AddCollectCommand(CLI::App& app, int&) {
       ->add_option("runs", arguments->runs, "Folders of runs, folders of such folders, or summary.json files")
       ->required();
   command->add_flag("--by-folder", arguments->by_folder,
-                    "a run's variant is the name of the folder above its own (CONFIGURATION/seed_1)");
+                    "a run's variant is the name of the folder above its own (CONFIGURATION/start_0)");
   AddTableFormatOption(*command, arguments->table_format);
   command->add_option("--json", arguments->json, "Write the table to this file");
   command->add_option(
@@ -82,9 +82,10 @@ void AddCollectCommand(CLI::App& app, int&) {
   command->footer(
       "Runs are grouped by data set and by variant: odometry (run.loops: false), ensemble (loops.rule: "
       "joint),\n"
-      "seed (the preset standardised-mean), else the rule. Runs of one group should differ in their seed "
-      "alone:\n"
-      "the interval is over them.\n"
+      "standardised-mean (that preset), else the rule. Runs of one group should differ in the first frame, "
+      "the "
+      "noise or\n"
+      "the seed alone: the table says in which, and the interval is over them.\n"
       "Example: tutti collect results/ --table-format markdown > table.md");
   command->callback([arguments] { RunCollect(*arguments); });
 }

@@ -28,12 +28,13 @@ namespace {
 namespace fs = std::filesystem;
 
 struct CompareArguments {
-  std::string config, dataset, out, ground_truth, table_format = "text";
-  std::vector<std::string> variants = {"odometry", "surf", "sift",     "orb",  "naive",   "product",
-                                       "majority", "mean", "log-pool", "seed", "ensemble"};
-  std::uint64_t seeds = 3;
-  int threads = 2;
-  std::int64_t max_frames = 0;
+  std::string config, out, ground_truth, table_format = "text";
+  std::vector<std::string> datasets;
+  std::vector<std::string> variants = {"odometry", "surf",     "sift", "orb",      "naive",
+                                       "product",  "majority", "mean", "log-pool", "standardised-mean",
+                                       "ensemble"};
+  int runs = 5, start = 0, end = 0, stride = 1, threads = 2;
+  double noise = 0;
   bool separate = false;
 };
 
@@ -44,7 +45,7 @@ RunConfig VariantConfig(RunConfig config, const std::string& variant, bool odome
     return config;
   }
   try {
-    if (variant == "seed") {
+    if (variant == "standardised-mean") {
       SetRule("mean", config.loops);
       ApplyPreset("standardised-mean", config.loops);
     } else {
@@ -61,28 +62,29 @@ RunConfig VariantConfig(RunConfig config, const std::string& variant, bool odome
   return config;
 }
 
+/// Every run of a variant: all data sets, from another first frame and with other noise each time.
+std::vector<Sample> Samples(const CompareArguments& arguments) {
+  std::vector<Sample> samples;
+  for (const std::string& dataset : arguments.datasets) {
+    for (int k = 0; k < arguments.runs; ++k)
+      samples.push_back({dataset, arguments.start + k, arguments.noise, k, 1});
+  }
+  return samples;
+}
+
 RunRequest Request(const CLI::App& command, const CompareArguments& arguments, const fs::path& out,
-                   std::uint64_t seed) {
+                   const Sample& sample) {
   RunRequest request;
   request.config = arguments.config;
-  request.dataset = arguments.dataset;
+  request.dataset = sample.dataset;
   request.out = out;
-  request.seed = seed;
+  request.start = sample.start;
   request.quiet = true;
   if (!arguments.ground_truth.empty()) request.ground_truth = arguments.ground_truth;
   if (command.count("--threads") > 0) request.threads = arguments.threads;
-  if (command.count("--max-frames") > 0) request.max_frames = arguments.max_frames;
+  if (command.count("--end") > 0) request.end = arguments.end;
+  if (command.count("--stride") > 0) request.stride = arguments.stride;
   return request;
-}
-
-RunFigures Failed(const CompareArguments& arguments, const std::string& variant, std::uint64_t seed,
-                  int status) {
-  RunFigures run;
-  run.dataset = arguments.dataset;
-  run.variant = variant;
-  run.seed = seed;
-  run.failure = "the run ended with status " + std::to_string(status);
-  return run;
 }
 
 void CheckArguments(const CompareArguments& arguments) {
@@ -94,60 +96,86 @@ void CheckArguments(const CompareArguments& arguments) {
 class Experiment {
  public:
   Experiment(const CLI::App& command, const CompareArguments& arguments, const RunConfig& config)
-      : command_(command), arguments_(arguments), config_(config) {
+      : command_(command), arguments_(arguments), config_(config), samples_(Samples(arguments)) {
     const bool odometry_too =
         std::count(arguments.variants.begin(), arguments.variants.end(), "odometry") > 0;
     for (const std::string& variant : arguments.variants)
       configs_.push_back(VariantConfig(config, variant, odometry_too && arguments.separate));
   }
 
-  /// Exit statuses of the variants, as RunApart gives them.
-  std::vector<int> RunSeed(std::uint64_t seed) const {
-    return arguments_.separate ? RunSeparately(seed) : RunShared(seed);
-  }
+  std::size_t Runs() const { return samples_.size(); }
 
-  fs::path Folder(const std::string& variant, std::uint64_t seed) const {
-    return fs::path(arguments_.out) / variant / ("seed_" + std::to_string(seed));
+  /// Exit statuses of the variants, as RunApart gives them.
+  std::vector<int> Run(std::size_t k) const { return arguments_.separate ? RunSeparately(k) : RunShared(k); }
+
+  /// What variant v's run left.
+  RunFigures Figures(std::size_t v, std::size_t k, int status) const {
+    RunFigures run;
+    if (status == 0) {
+      run = ReadRunFigures(Folder(v, k) / "summary.json");
+    } else {
+      run.sample = samples_[k];
+      run.failure = "the run ended with status " + std::to_string(status);
+    }
+    run.variant = arguments_.variants[v];
+    run.dataset = arguments_.datasets.front();
+    if (arguments_.datasets.size() > 1)
+      run.dataset += " and " + std::to_string(arguments_.datasets.size() - 1) + " more";
+    return run;
   }
 
  private:
-  void Say(const std::string& variant, std::uint64_t seed) const {
-    std::fprintf(stderr, "tutti: %s, seed %llu\n", variant.c_str(), static_cast<unsigned long long>(seed));
+  fs::path Folder(const std::string& variant, std::size_t k) const {
+    return fs::path(arguments_.out) / variant / ("run_" + std::to_string(k + 1));
+  }
+  fs::path Folder(std::size_t v, std::size_t k) const { return Folder(arguments_.variants[v], k); }
+
+  void Say(const std::string& variant, std::size_t k) const {
+    std::fprintf(stderr, "tutti: %s, run %zu of %zu\n", variant.c_str(), k + 1, samples_.size());
   }
 
-  RunRequest RequestFor(const std::string& variant, std::uint64_t seed) const {
-    MakeFolder(Folder(variant, seed).parent_path());
-    return Request(command_, arguments_, Folder(variant, seed), seed);
+  RunRequest RequestFor(const std::string& variant, std::size_t k) const {
+    MakeFolder(Folder(variant, k).parent_path());
+    return Request(command_, arguments_, Folder(variant, k), samples_[k]);
   }
 
-  std::vector<int> RunSeparately(std::uint64_t seed) const {
+  // The noise is no option of `tutti run`, so it comes with the configuration.
+  RunConfig WithNoise(RunConfig config, std::size_t k) const {
+    config.dataset.noise = samples_[k].noise;
+    config.dataset.noise_draw = samples_[k].noise_draw;
+    return config;
+  }
+
+  std::vector<int> RunSeparately(std::size_t k) const {
     std::vector<int> statuses;
     for (std::size_t v = 0; v < configs_.size(); ++v) {
-      Say(arguments_.variants[v], seed);
-      const RunRequest request = RequestFor(arguments_.variants[v], seed);
-      statuses.push_back(RunApart([&] { return StatusOf(RunWithReport(request, configs_[v])); }));
+      Say(arguments_.variants[v], k);
+      const RunRequest request = RequestFor(arguments_.variants[v], k);
+      statuses.push_back(
+          RunApart([&] { return StatusOf(RunWithReport(request, WithNoise(configs_[v], k))); }));
       if (statuses.back() == 130) break;
     }
     return statuses;
   }
 
   // One process tracks; each variant closes its loops in a copy of that process.
-  std::vector<int> RunShared(std::uint64_t seed) const {
+  std::vector<int> RunShared(std::size_t k) const {
     SharedStatuses statuses(configs_.size());
     const int tracking = RunApart([&] {
-      Say("odometry", seed);
-      const TrackedSequence tracked = TrackWithReport(RequestFor("odometry", seed), config_);
+      Say("odometry", k);
+      const TrackedSequence tracked = TrackWithReport(RequestFor("odometry", k), WithNoise(config_, k));
       const int status = StatusOf(tracked.result);
       for (std::size_t v = 0; v < configs_.size() && status == 0; ++v) {
         if (arguments_.variants[v] == "odometry") {
           statuses.Set(v, 0);
           continue;
         }
-        Say(arguments_.variants[v], seed);
-        const RunRequest request = RequestFor(arguments_.variants[v], seed);
+        Say(arguments_.variants[v], k);
+        const RunRequest request = RequestFor(arguments_.variants[v], k);
+        const RunConfig config = WithNoise(configs_[v], k);
         statuses.Set(v, RunApart([&] {
-                       return StatusOf(tracked.odometry ? CloseLoopsWithReport(tracked, request, configs_[v])
-                                                        : RunWithReport(request, configs_[v]));
+                       return StatusOf(tracked.odometry ? CloseLoopsWithReport(tracked, request, config)
+                                                        : RunWithReport(request, config));
                      }));
         if (InterruptGuard::Requested()) return 130;
       }
@@ -159,6 +187,7 @@ class Experiment {
   const CLI::App& command_;
   const CompareArguments& arguments_;
   RunConfig config_;
+  std::vector<Sample> samples_;
   std::vector<RunConfig> configs_;  // of the variants
 };
 
@@ -167,12 +196,13 @@ int RunCompare(const CLI::App& command, const CompareArguments& arguments) {
   CheckArguments(arguments);
   const RunConfig config = LoadConfig(arguments.config);
   const Experiment experiment(command, arguments, config);
-  OpenDataset(arguments.dataset, config.dataset);  // what no variant can read is said once
+  for (const std::string& dataset : arguments.datasets)
+    OpenDataset(dataset, config.dataset);  // what no variant can read is said once
   MakeFolder(arguments.out);
   const InterruptGuard guard;
-  std::vector<std::vector<int>> statuses;  // by seed, then variant
-  for (std::uint64_t seed = 1; seed <= arguments.seeds; ++seed) {
-    statuses.push_back(experiment.RunSeed(seed));
+  std::vector<std::vector<int>> statuses;  // by run, then variant
+  for (std::size_t k = 0; k < experiment.Runs(); ++k) {
+    statuses.push_back(experiment.Run(k));
     const std::vector<int>& now = statuses.back();
     if (InterruptGuard::Requested() || std::count(now.begin(), now.end(), 130) > 0) {
       std::fprintf(stderr, "tutti: interrupted; the runs by then are in %s\n", arguments.out.c_str());
@@ -181,19 +211,13 @@ int RunCompare(const CLI::App& command, const CompareArguments& arguments) {
   }
   Comparison comparison;
   for (std::size_t v = 0; v < arguments.variants.size(); ++v) {
-    for (std::uint64_t seed = 1; seed <= arguments.seeds; ++seed) {
-      const std::string& variant = arguments.variants[v];
-      const int status = statuses[seed - 1][v];
-      comparison.runs.push_back(status == 0
-                                    ? ReadRunFigures(experiment.Folder(variant, seed) / "summary.json")
-                                    : Failed(arguments, variant, seed, status));
-      comparison.runs.back().variant = variant;
-    }
+    for (std::size_t k = 0; k < experiment.Runs(); ++k)
+      comparison.runs.push_back(experiment.Figures(v, k, statuses[k][v]));
   }
   const fs::path out = arguments.out;
   WriteText(out / "comparison.json", ComparisonJson(comparison).dump(2) + "\n");
   WriteText(out / "comparison.md", DescribeComparison(comparison, TableFormat::kMarkdown));
-  WriteComparisonReport(out / "report.html", "tutti compare: " + arguments.dataset, comparison);
+  WriteComparisonReport(out / "report.html", "tutti compare: " + comparison.runs.front().dataset, comparison);
   std::fputs(DescribeComparison(comparison, format).c_str(), stdout);
   if (ReportsAvailable()) std::printf("\n%s\n", (out / "report.html").c_str());
   if (!ReportsAvailable()) std::fprintf(stderr, "tutti: %s\n", ReportsMissing().c_str());
@@ -208,7 +232,10 @@ void AddCompareCommand(CLI::App& app, int& exit_code) {
       app.add_subcommand("compare", "What does the ensemble buy? SLAM with each way to find loops");
   const auto arguments = std::make_shared<CompareArguments>();
   command->add_option("--config", arguments->config, "YAML file, as for `tutti run`")->required();
-  command->add_option("--dataset", arguments->dataset, "folder of the data set, or a video file")->required();
+  command
+      ->add_option("--dataset", arguments->datasets,
+                   "folder of the data set, or a video file; several (worlds of one kind) make one table")
+      ->required();
   command
       ->add_option("--out", arguments->out,
                    "folder for all runs and for comparison.md, comparison.json and report.html")
@@ -216,26 +243,38 @@ void AddCompareCommand(CLI::App& app, int& exit_code) {
   command
       ->add_option("--variants", arguments->variants,
                    "odometry: no loops; surf, sift, orb, ...: that member alone; naive, product, majority, "
-                   "mean, log-pool: that rule; seed: the preset standardised-mean; ensemble: the rule joint")
+                   "mean, log-pool: that rule; standardised-mean: that preset; ensemble: the rule joint")
       ->delimiter(',')
       ->capture_default_str();
-  command->add_option("--seeds", arguments->seeds, "run each variant with the seeds 1 to this")
+  command
+      ->add_option(
+          "--runs", arguments->runs,
+          "runs of each variant on each data set: each starts a frame later than the one before, and gets "
+          "noise of its own (--noise). Below five there is no p")
       ->check(Positive())
+      ->capture_default_str();
+  command
+      ->add_option("--noise", arguments->noise,
+                   "standard deviation of Gaussian noise that is added to the images [grey levels of 255]")
+      ->check(NotNegative())
       ->capture_default_str();
   command->add_option("--ground-truth", arguments->ground_truth,
                       "trajectory to evaluate against (default: the data set's own)");
   command->add_option("--threads", arguments->threads, "most threads; the result is the same for any number");
-  command->add_option("--max-frames", arguments->max_frames, "the first frames only")->check(Positive());
+  command->add_option("--start", arguments->start, "first frame of the first run, counted from 0")
+      ->check(NotNegative());
+  command->add_option("--end", arguments->end, "frame before which to stop")->check(Positive());
+  command->add_option("--stride", arguments->stride, "use every so many frames")->check(Positive());
   command->add_flag("--separate", arguments->separate,
                     "no shared odometry: every variant tracks, too, as `tutti run` does");
   AddTableFormatOption(*command, arguments->table_format);
   command->footer(
-      "Each run has its folder OUT/variant/seed_N with everything that `tutti run` writes. Tracking is done "
+      "Each run has its folder OUT/VARIANT/run_N with everything that `tutti run` writes. Tracking is done "
       "once "
-      "per seed\n"
-      "(OUT/odometry/seed_N), and every variant closes its loops on that odometry; with --separate each is a "
-      "run of "
-      "its own,\n"
+      "for each N\n"
+      "(OUT/odometry/run_N), and every variant closes its loops on that odometry; with --separate each is a "
+      "run "
+      "of its own,\n"
       "whose loops move the map that it tracks on. A run that fails is reported, and the rest go on.\n"
       "Example: tutti compare --config data/configs/7scenes.yaml --dataset redkitchen --out cmp --variants "
       "odometry,orb,ensemble");

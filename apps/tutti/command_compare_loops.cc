@@ -8,6 +8,7 @@
 
 #include "apps/tutti/commands.h"
 #include "apps/tutti/loops/loops_output.h"
+#include "apps/tutti/text_table.h"
 #include "tutti/core/error.h"
 #include "tutti/loopclosure/significance.h"
 
@@ -71,13 +72,16 @@ int CompareLoops(const CompareArguments& arguments) {
                        {"recalls_b", recalls_b},
                        {"sets", t.pairs},
                        {"mean_difference", t.mean_difference},
-                       {"t", t.t},  // infinite: null
-                       {"p", t.p}});
-      std::printf("%-10s %-12s %-12s %5d %15.2f%% %9.3f %9.4f\n", ranking, a, b, t.pairs,
-                  100 * t.mean_difference, t.t, t.p);
+                       {"t", t.t}});  // infinite: null
+      if (t.pairs >= kLeastPairs) tests.back()["p"] = t.p;
+      const std::string p = t.pairs >= kLeastPairs ? Fixed(t.p, 4) : "-";
+      std::printf("%-10s %-12s %-12s %5d %15.2f%% %9.3f %9s\n", ranking, a, b, t.pairs,
+                  100 * t.mean_difference, t.t, p.c_str());
     }
   }
-  if (tables.size() < 2) std::printf("one set alone says nothing: p is 1 by definition\n");
+  if (tables.size() < static_cast<std::size_t>(kLeastPairs)) {
+    std::printf("p is given from %d sets on: with fewer, one lucky set decides\n", kLeastPairs);
+  }
   if (!arguments.out.empty()) WriteText(arguments.out, tests.dump(2) + "\n");
   return 0;
 }

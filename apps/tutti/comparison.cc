@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <set>
+#include <tuple>
 
 #include "apps/tutti/stage_times.h"
 #include "tutti/core/error.h"
@@ -30,7 +32,7 @@ std::string VariantOf(const Json& json) {
   // A summary without the key is of the time when there was no other evidence.
   const Json::json_pointer kind("/config/loops/evidence/kind");
   const bool standardised = !json.contains(kind) || json.at(kind) == "standardised";
-  return word == "joint" ? kEnsemble : word == "mean" && standardised ? "seed" : word;
+  return word == "joint" ? kEnsemble : word == "mean" && standardised ? "standardised-mean" : word;
 }
 
 /// t such that P(|T| >= t) = p, by bisection.
@@ -79,14 +81,43 @@ std::size_t Failures(const Variant& variant) {
                                                 [](const RunFigures* run) { return !run->failure.empty(); }));
 }
 
-/// ATE of the variant minus that of the ensemble, over the seeds that both have.
+/// What the runs of a table differ in, for a reader: "first frame (0 to 4); noise drawn anew, ...".
+std::string WhatVaries(const std::vector<Variant>& variants) {
+  std::set<std::string> datasets;
+  std::set<int> starts, draws;
+  std::set<std::uint64_t> seeds;
+  double noise = 0;
+  for (const Variant& variant : variants) {
+    for (const RunFigures* run : variant.runs) {
+      datasets.insert(run->sample.dataset);
+      starts.insert(run->sample.start);
+      draws.insert(run->sample.noise_draw);
+      seeds.insert(run->sample.seed);
+      noise = std::max(noise, run->sample.noise);
+    }
+  }
+  std::string text;
+  const auto add = [&text](const std::string& what) { text += (text.empty() ? "" : "; ") + what; };
+  if (datasets.size() > 1) add("the data set (" + std::to_string(datasets.size()) + ")");
+  if (starts.size() > 1) {
+    add("the first frame (" + std::to_string(*starts.begin()) + " to " + std::to_string(*starts.rbegin()) +
+        ")");
+  }
+  if (noise > 0 && draws.size() > 1)
+    add("image noise, drawn anew (standard deviation " + Fixed(noise, 1) + " of 255)");
+  if (seeds.size() > 1) add("the seed of the loop detector alone");
+  return text.empty() ? "nothing" : text;
+}
+
+/// ATE of the variant minus that of the ensemble, over the samples that both have.
 PairedTTestResult AgainstEnsemble(const Variant& variant, const std::vector<Variant>& all) {
   std::vector<double> a, b;
   for (const Variant& other : all) {
     if (other.name != kEnsemble) continue;
     for (const RunFigures* run : variant.runs) {
       for (const RunFigures* ensemble : other.runs) {
-        if (run->seed != ensemble->seed || !std::isfinite(run->ate_m) || !std::isfinite(ensemble->ate_m))
+        if (!(run->sample == ensemble->sample) || !std::isfinite(run->ate_m) ||
+            !std::isfinite(ensemble->ate_m))
           continue;
         a.push_back(run->ate_m);
         b.push_back(ensemble->ate_m);
@@ -98,9 +129,10 @@ PairedTTestResult AgainstEnsemble(const Variant& variant, const std::vector<Vari
 
 TextTable Table(const std::vector<Variant>& variants) {
   TextTable table;
-  table.header = {"variant",   "runs",       "proposed",   "accepted",          "false",    "ATE [m]",
-                  "p",         "RPE [m]",    "t_rel [%]",  "r_rel [deg/100 m]", "time [s]", "odometry [s]",
-                  "loops [s]", "frame [ms]", "memory [MB]"};
+  table.header = {"variant",      "runs",      "proposed",          "accepted",
+                  "false",        "ATE [m]",   "worst ATE [m]",     "p",
+                  "RPE [m]",      "t_rel [%]", "r_rel [deg/100 m]", "time [s]",
+                  "odometry [s]", "loops [s]", "frame [ms]",        "memory [MB]"};
   for (const Variant& variant : variants) {
     const PairedTTestResult test = AgainstEnsemble(variant, variants);
     MeanInterval rotation = Over(variant, &RunFigures::r_rel_deg_per_m);
@@ -114,7 +146,8 @@ TextTable Table(const std::vector<Variant>& variants) {
                           IntervalCell(Over(variant, &RunFigures::accepted), 1),
                           IntervalCell(Over(variant, &RunFigures::false_loops), 1),
                           IntervalCell(Over(variant, &RunFigures::ate_m), 4),
-                          variant.name == kEnsemble || test.pairs < 2 ? "-" : Fixed(test.p, 4),
+                          IntervalCell({1, Over(variant, &RunFigures::ate_m).largest}, 4),
+                          variant.name == kEnsemble || test.pairs < kLeastPairs ? "-" : Fixed(test.p, 4),
                           IntervalCell(Over(variant, &RunFigures::rpe_m), 4),
                           IntervalCell(Over(variant, &RunFigures::t_rel_percent), 3),
                           IntervalCell(rotation, 3), IntervalCell(Over(variant, &RunFigures::wall_s), 1),
@@ -137,7 +170,8 @@ std::vector<std::string> Verdict(const std::vector<Variant>& variants) {
   for (const Variant& variant : variants) {
     const double mean = Over(variant, &RunFigures::ate_m).mean;
     if (variant.name == kEnsemble || !std::isfinite(mean)) continue;
-    const bool sure = AgainstEnsemble(variant, variants).p < 0.05;
+    const PairedTTestResult test = AgainstEnsemble(variant, variants);
+    const bool sure = test.pairs >= kLeastPairs && test.p < 0.05;
     std::string& list = mean <= ensemble ? not_beaten : sure ? beaten : unclear;
     list += (list.empty() ? "" : ", ") + variant.name + " (" + Fixed(mean, 4) + " m)";
   }
@@ -145,22 +179,32 @@ std::vector<std::string> Verdict(const std::vector<Variant>& variants) {
   if (!beaten.empty()) lines.push_back("* Lower than that of " + beaten + ", p < 0.05.");
   if (!unclear.empty())
     lines.push_back("* Lower than that of " + unclear +
-                    ", but the test can't tell them apart (p >= 0.05, or one seed).");
+                    ", but these runs can't tell them apart (p >= 0.05, or fewer than " +
+                    std::to_string(kLeastPairs) + " pairs).");
   if (!not_beaten.empty()) lines.push_back("* The ensemble did not help against " + not_beaten + ".");
   return lines;
 }
 
 Json IntervalJson(const MeanInterval& value) {
-  return {{"mean", value.mean}, {"half_width_95", value.half_width}, {"count", value.count}};  // NaN: null
+  return {{"mean", value.mean},  // NaN: null
+          {"half_width_95", value.half_width},
+          {"largest", value.largest},
+          {"count", value.count}};
+}
+
+Json SampleJson(const RunFigures& run) {
+  return {{"dataset", run.sample.dataset},       {"start", run.sample.start}, {"noise", run.sample.noise},
+          {"noise_draw", run.sample.noise_draw}, {"seed", run.sample.seed},   {"ate_rmse_m", run.ate_m}};
 }
 
 Json VariantJson(const Variant& variant, const std::vector<Variant>& all) {
-  Json json = {{"variant", variant.name}, {"seeds", Json::array()}, {"failures", Json::array()}};
+  Json json = {{"variant", variant.name}, {"samples", Json::array()}, {"failures", Json::array()}};
   for (const RunFigures* run : variant.runs) {
     if (run->failure.empty()) {
-      json["seeds"].push_back(run->seed);
+      json["samples"].push_back(SampleJson(*run));
     } else {
-      json["failures"].push_back({{"seed", run->seed}, {"reason", run->failure}});
+      json["failures"].push_back(SampleJson(*run));
+      json["failures"].back()["reason"] = run->failure;
     }
   }
   const std::vector<std::pair<const char*, double RunFigures::*>> fields = {
@@ -181,12 +225,23 @@ Json VariantJson(const Variant& variant, const std::vector<Variant>& all) {
   for (const std::string& stage : StageOrder({variant}))
     json["stages_s"][stage] = IntervalJson(StageOver(variant, stage));
   const PairedTTestResult test = AgainstEnsemble(variant, all);
-  json["ate_minus_ensemble"] = {
-      {"pairs", test.pairs}, {"mean_m", test.mean_difference}, {"t", test.t}, {"p", test.p}};
+  json["ate_minus_ensemble"] = {{"pairs", test.pairs}, {"mean_m", test.mean_difference}, {"t", test.t}};
+  if (test.pairs >= kLeastPairs) json["ate_minus_ensemble"]["p"] = test.p;
   return json;
 }
 
 }  // namespace
+
+bool operator==(const Sample& a, const Sample& b) {
+  return std::tie(a.dataset, a.start, a.noise, a.noise_draw, a.seed) ==
+         std::tie(b.dataset, b.start, b.noise, b.noise_draw, b.seed);
+}
+
+std::string Describe(const Sample& sample) {
+  std::string text = "first frame " + std::to_string(sample.start);
+  if (sample.noise > 0) text += ", noise draw " + std::to_string(sample.noise_draw);
+  return text + ", seed " + std::to_string(sample.seed);
+}
 
 RunFigures ReadRunFigures(const std::filesystem::path& summary) {
   std::ifstream in(summary);
@@ -198,7 +253,14 @@ RunFigures ReadRunFigures(const std::filesystem::path& summary) {
   run.folder = summary.parent_path();
   run.dataset = json.value("dataset", "?");
   run.variant = VariantOf(json);
-  run.seed = static_cast<std::uint64_t>(Number(json, "seed") >= 0 ? Number(json, "seed") : 0);
+  const auto whole = [&json](const std::string& path) {
+    const double number = Number(json, path);
+    return number >= 0 && number <= 1e15 ? static_cast<std::int64_t>(number) : 0;
+  };
+  run.sample = {run.dataset, static_cast<int>(whole("config/dataset/start")), 0,
+                static_cast<int>(whole("config/dataset/noise_draw")),
+                static_cast<std::uint64_t>(whole("seed"))};
+  if (Number(json, "config/dataset/noise") > 0) run.sample.noise = Number(json, "config/dataset/noise");
   run.proposed = Number(json, "loops/proposed");
   run.accepted = Number(json, "loops/accepted");
   run.false_loops = Number(json, "loops/false");
@@ -221,6 +283,7 @@ MeanInterval MeanWithInterval(const std::vector<double>& values) {
   for (const double value : values) {
     if (!std::isfinite(value)) continue;
     sum += value;
+    out.largest = out.count == 0 ? value : std::max(out.largest, value);
     ++out.count;
   }
   if (out.count == 0) return out;
@@ -246,7 +309,9 @@ std::vector<ComparisonTable> ComparisonTables(const Comparison& comparison) {
   for (const std::string& dataset :
        InOrder(comparison.runs, [](const RunFigures& run) { return run.dataset; })) {
     const std::vector<Variant> variants = Variants(comparison, dataset);
-    tables.push_back({dataset, Table(variants), StageTable(variants), Verdict(variants)});
+    std::vector<std::string> notes = Verdict(variants);
+    notes.insert(notes.begin(), "What varies between the runs of a variant: " + WhatVaries(variants) + ".");
+    tables.push_back({dataset, Table(variants), StageTable(variants), std::move(notes)});
   }
   return tables;
 }
@@ -260,8 +325,10 @@ std::string DescribeComparison(const Comparison& comparison, TableFormat format)
     if (!table.stages.rows.empty()) text += "Time per stage:\n\n" + Render(table.stages, format) + "\n";
   }
   return text +
-         "Means over seeds, +- half of the 95 % confidence interval; p: paired t-test of the ATE against the "
-         "ensemble's, over seeds.\n";
+         "Means over the runs, +- half of the 95 % confidence interval; p: paired t-test of the ATE against "
+         "the "
+         "ensemble's, from " +
+         std::to_string(kLeastPairs) + " pairs on.\n";
 }
 
 Json ComparisonJson(const Comparison& comparison) {
@@ -269,7 +336,7 @@ Json ComparisonJson(const Comparison& comparison) {
   for (const std::string& dataset :
        InOrder(comparison.runs, [](const RunFigures& run) { return run.dataset; })) {
     const std::vector<Variant> variants = Variants(comparison, dataset);
-    Json entry = {{"dataset", dataset}, {"variants", Json::array()}};
+    Json entry = {{"dataset", dataset}, {"varies", WhatVaries(variants)}, {"variants", Json::array()}};
     for (const Variant& variant : variants) entry["variants"].push_back(VariantJson(variant, variants));
     json["datasets"].push_back(entry);
   }

@@ -1,4 +1,4 @@
-// Runs of several variants and seeds, put into one table: `tutti compare` and `tutti collect`.
+// Runs of several variants, put into one table: `tutti compare` and `tutti collect`.
 #pragma once
 
 #include <cstdint>
@@ -13,13 +13,26 @@
 
 namespace tutti::cli {
 
+/// What a run was of. Runs of one variant differ in it; two variants are compared where it is the same.
+struct Sample {
+  std::string dataset;
+  int start = 0;           ///< first frame
+  double noise = 0;        ///< standard deviation, grey levels
+  int noise_draw = 0;      ///< which noise
+  std::uint64_t seed = 1;  ///< of the loop detector
+};
+bool operator==(const Sample& a, const Sample& b);
+/// "first frame 2, noise draw 2, seed 1".
+std::string Describe(const Sample& sample);
+
 /// The figures of one run, from its summary.json. NaN: there is none (no ground truth, path too short).
 struct RunFigures {
   static constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-  std::string dataset, variant;
-  std::uint64_t seed = 0;
+  std::string dataset;  ///< table that the run belongs to: its data set, unless several make one table
+  std::string variant;
+  Sample sample;
   std::filesystem::path folder;  ///< of the run; empty: unknown
-  std::string failure;           ///< why the run left no figures; then only the three fields above are set
+  std::string failure;           ///< why the run left no figures; then only the fields above are set
   double proposed = kNone, accepted = kNone, false_loops = kNone;
   double ate_m = kNone, rpe_m = kNone;                         ///< rmse after loop closing
   double t_rel_percent = kNone, r_rel_deg_per_m = kNone;       ///< KITTI
@@ -28,22 +41,22 @@ struct RunFigures {
   std::map<std::string, double> stages_s;                      ///< summed over the run, waiting as well
 };
 
-/// Runs that differ in their seed alone.
+/// Runs that differ in their sample alone.
 struct Variant {
   std::string name;
   std::vector<const RunFigures*> runs;
 };
 
 /// What a run wrote. `variant` of a run of `tutti run`: "odometry" without loops, "ensemble" for the rule
-/// joint, "seed" for the mean of standardised evidence, else the rule. Throws InputError that names the file
-/// if it is no summary.json.
+/// joint, "standardised-mean" for the mean of standardised evidence, else the rule. Throws InputError that
+/// names the file if it is no summary.json.
 RunFigures ReadRunFigures(const std::filesystem::path& summary);
 
-/// Mean over seeds with the half-width of its 95 % confidence interval (Student's t; NaN for one value).
-/// Values that are not finite are left out; no value: NaN.
+/// Mean with the half-width of its 95 % confidence interval (Student's t; NaN for one value), and the
+/// largest. Values that are not finite are left out; no value: NaN.
 struct MeanInterval {
   std::size_t count = 0;
-  double mean = RunFigures::kNone, half_width = RunFigures::kNone;
+  double mean = RunFigures::kNone, half_width = RunFigures::kNone, largest = RunFigures::kNone;
 };
 MeanInterval MeanWithInterval(const std::vector<double>& values);
 /// "mean +- half-width", the mean alone where there is no interval, "-" where there is no value.
@@ -64,7 +77,8 @@ struct ComparisonTable {
 std::vector<ComparisonTable> ComparisonTables(const Comparison& comparison);
 
 /// One table per data set and one of the time per stage, with the paired t-test of each variant's ATE against
-/// the ensemble's over common seeds, and below it which variants the ensemble beats, and which it does not.
+/// the ensemble's over common samples (from kLeastPairs on), and below it what varies between the runs, which
+/// variants the ensemble beats, and which it does not.
 std::string DescribeComparison(const Comparison& comparison, TableFormat format);
 nlohmann::ordered_json ComparisonJson(const Comparison& comparison);
 

@@ -52,7 +52,7 @@ void WriteComparisonReport(const std::filesystem::path& file, const std::string&
   std::vector<std::string> failures;
   for (const RunFigures& run : comparison.runs) {
     if (!run.failure.empty())
-      failures.push_back(run.variant + ", seed " + std::to_string(run.seed) + ": " + run.failure);
+      failures.push_back(run.variant + ", " + Describe(run.sample) + ": " + run.failure);
     auto report = ReadRunReport(run.folder);
     if (!report) continue;
     (*report)["variant"] = run.variant;

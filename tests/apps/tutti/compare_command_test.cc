@@ -25,10 +25,11 @@ using testing::WriteAll;
 class CollectCommand : public ::testing::Test {
  protected:
   // A summary with the figures that matter.
-  void Summary(const std::string& rule, int seed, double ate, const std::string& evidence = "counts") const {
+  void Summary(const std::string& rule, int start, double ate, const std::string& evidence = "counts") const {
     nlohmann::json json;
     json["dataset"] = "town";
-    json["seed"] = seed;
+    json["seed"] = 1;
+    json["config"]["dataset"]["start"] = start;
     json["frames"] = {{"total", 10}};
     json["loops"] = {{"proposed", 4}, {"accepted", 3}, {"false", 1}};
     json["evaluation"]["slam"] = {{"ate_rmse_m", ate}, {"rpe_rmse_m", 0.01}};
@@ -39,7 +40,7 @@ class CollectCommand : public ::testing::Test {
     json["config"]["run"]["loops"] = rule != "odometry";
     json["config"]["loops"]["rule"] = rule == "odometry" ? "joint" : rule;
     if (!evidence.empty()) json["config"]["loops"]["evidence"]["kind"] = evidence;
-    const fs::path folder = folder_ / "runs" / (rule + evidence + std::to_string(seed));
+    const fs::path folder = folder_ / "runs" / (rule + evidence + std::to_string(start));
     fs::create_directories(folder);
     WriteAll(folder / "summary.json", json.dump());
   }
@@ -51,10 +52,10 @@ class CollectCommand : public ::testing::Test {
   const fs::path folder_ = testing::FreshFolder();
 };
 
-TEST_F(CollectCommand, MeansIntervalsAndThePairedTestOverSeeds) {
-  for (int seed = 1; seed <= 3; ++seed) {
-    Summary("odometry", seed, seed);                         // 1, 2, 3
-    Summary("joint", seed, 0.5 * seed - 0.1 * (seed == 2));  // 0.5, 0.9, 1.5
+TEST_F(CollectCommand, MeansIntervalsAndThePairedTestOverFirstFrames) {
+  for (int start = 1; start <= 5; ++start) {
+    Summary("odometry", start, start);                          // 1, 2, 3, 4, 5
+    Summary("joint", start, 0.5 * start - 0.1 * (start == 2));  // 0.5, 0.9, 1.5, 2, 2.5
   }
   const fs::path file = folder_ / "c.json";
   const auto run = Collect({"--json", file.string()});
@@ -63,22 +64,40 @@ TEST_F(CollectCommand, MeansIntervalsAndThePairedTestOverSeeds) {
   const auto variants = json["datasets"][0]["variants"];
   ASSERT_EQ(variants.size(), 2u);
   const auto& odometry = variants[variants[0]["variant"] == "odometry" ? 0 : 1];
-  EXPECT_EQ(odometry["ate_rmse_m"]["count"], 3);
-  EXPECT_NEAR(odometry["ate_rmse_m"]["mean"].get<double>(), 2, 1e-12);
-  EXPECT_NEAR(odometry["ate_rmse_m"]["half_width_95"].get<double>(), 4.302653 / std::sqrt(3.0), 1e-5);
+  EXPECT_EQ(odometry["ate_rmse_m"]["count"], 5);
+  EXPECT_NEAR(odometry["ate_rmse_m"]["mean"].get<double>(), 3, 1e-12);
+  EXPECT_NEAR(odometry["ate_rmse_m"]["half_width_95"].get<double>(), 2.776445 * std::sqrt(2.5 / 5), 1e-5);
+  EXPECT_DOUBLE_EQ(odometry["ate_rmse_m"]["largest"].get<double>(), 5);
   EXPECT_NEAR(odometry["odometry_s"]["mean"].get<double>(), 1.0, 1e-12);
   EXPECT_NEAR(odometry["loops_s"]["mean"].get<double>(), 0.5, 1e-12);  // waiting is no work
-  EXPECT_EQ(odometry["ate_minus_ensemble"]["pairs"], 3);
-  EXPECT_NEAR(odometry["ate_minus_ensemble"]["mean_m"].get<double>(), 3.1 / 3, 1e-12);
+  EXPECT_EQ(odometry["ate_minus_ensemble"]["pairs"], 5);
+  EXPECT_NEAR(odometry["ate_minus_ensemble"]["mean_m"].get<double>(), 7.6 / 5, 1e-12);
+  EXPECT_LT(odometry["ate_minus_ensemble"]["p"].get<double>(), 0.05);
   EXPECT_THAT(run.output,
-              AllOf(HasSubstr("2.0000 +- 2.4841"),
-                    HasSubstr("* Lower than that of odometry (2.0000 m), but the test can't tell")));
+              AllOf(HasSubstr("3.0000 +- 1.9632"),
+                    HasSubstr("What varies between the runs of a variant: the first frame (1 to 5)."),
+                    HasSubstr("* Lower than that of odometry (3.0000 m), p < 0.05.")));
+}
+
+TEST_F(CollectCommand, FewerThanFivePairsHaveNoP) {
+  for (int start = 1; start <= 4; ++start) {
+    Summary("odometry", start, 1 + 0.01 * start);
+    Summary("joint", start, 0.5);
+  }
+  const fs::path file = folder_ / "c.json";
+  const auto run = Collect({"--json", file.string()});
+  ASSERT_EQ(run.status, 0) << run.output;
+  const auto variants = nlohmann::json::parse(ReadAll(file))["datasets"][0]["variants"];
+  for (const auto& variant : variants) EXPECT_FALSE(variant["ate_minus_ensemble"].contains("p"));
+  EXPECT_THAT(run.output,
+              AllOf(HasSubstr("but these runs can't tell them apart (p >= 0.05, or fewer than 5 pairs)"),
+                    Not(HasSubstr("p < 0.05"))));
 }
 
 TEST_F(CollectCommand, TimePerStageIsATableOfItsOwnInEveryFormat) {
-  for (int seed = 1; seed <= 2; ++seed) {
-    Summary("joint", seed, 0.5);
-    Summary("orb", seed, 0.6);
+  for (int start = 0; start < 2; ++start) {
+    Summary("joint", start, 0.5);
+    Summary("orb", start, 0.6);
   }
   const fs::path file = folder_ / "c.json";
   const auto text = Collect({"--json", file.string()});
@@ -109,10 +128,10 @@ TEST_F(CollectCommand, WaitingAndWorkOnTheCallersThreadAreNotCountedTwice) {
 }
 
 TEST_F(CollectCommand, SaysWhereTheEnsembleDidNotHelp) {
-  for (int seed = 1; seed <= 2; ++seed) {
-    Summary("joint", seed, 0.5);
-    Summary("orb", seed, 0.4);
-    Summary("naive", seed, 0.6);
+  for (int start = 0; start < 5; ++start) {
+    Summary("joint", start, 0.5);
+    Summary("orb", start, 0.4);
+    Summary("naive", start, 0.6);
   }
   const auto run = Collect();
   EXPECT_THAT(run.output, AllOf(HasSubstr("* Lower than that of naive (0.6000 m), p < 0.05."),
@@ -129,11 +148,12 @@ TEST_F(CollectCommand, TheMeanOfStandardisedEvidenceIsAVariantOfItsOwn) {
   std::map<std::string, std::size_t> runs;
   const auto json = nlohmann::json::parse(ReadAll(file));
   for (const auto& variant : json["datasets"][0]["variants"])
-    runs[variant["variant"]] = variant["seeds"].size();
-  EXPECT_EQ(runs, (std::map<std::string, std::size_t>{{"ensemble", 1}, {"mean", 1}, {"seed", 2}}));
+    runs[variant["variant"]] = variant["samples"].size();
+  EXPECT_EQ(runs,
+            (std::map<std::string, std::size_t>{{"ensemble", 1}, {"mean", 1}, {"standardised-mean", 2}}));
 }
 
-TEST_F(CollectCommand, OneSeedHasNoIntervalAndNoTest) {
+TEST_F(CollectCommand, OneRunHasNoIntervalAndNoTest) {
   Summary("joint", 1, 0.5);
   Summary("orb", 1, 0.6);
   const auto run = Collect({"--table-format", "markdown"});
@@ -152,17 +172,19 @@ TEST_F(CollectCommand, WhatIsNoRunIsRefused) {
   }
 }
 
-TEST(CompareCommand, RunsEveryVariantWithEverySeedAndWritesTheTable) {
+TEST(CompareCommand, RunsEveryVariantFromEveryFirstFrameAndWritesTheTable) {
   const fs::path folder = testing::FreshFolder(), out = folder / "out";
   const auto run = RunTutti({"compare", "--config", testing::TinyConfig(folder).string(), "--dataset",
                              testing::TinyTown().string(), "--out", out.string(), "--variants",
-                             "odometry,orb,ensemble", "--seeds", "2", "--max-frames", "12"});
+                             "odometry,orb,ensemble", "--runs", "2", "--noise", "1", "--end", "12"});
   ASSERT_EQ(run.status, 0) << run.output;
   const auto json = nlohmann::json::parse(ReadAll(out / "comparison.json"));
   const auto variants = json["datasets"][0]["variants"];
   ASSERT_EQ(variants.size(), 3u);
+  EXPECT_EQ(json["datasets"][0]["varies"],
+            "the first frame (0 to 1); image noise, drawn anew (standard deviation 1.0 of 255)");
   for (const auto& variant : variants) {
-    EXPECT_EQ(variant["seeds"].size(), 2u);
+    EXPECT_EQ(variant["samples"].size(), 2u);
     EXPECT_GT(variant["ate_rmse_m"]["mean"].get<double>(), 0);
     EXPECT_GT(variant["peak_memory_mb"]["mean"].get<double>(), 10);
     EXPECT_EQ(variant["failures"].size(), 0u);
@@ -171,15 +193,30 @@ TEST(CompareCommand, RunsEveryVariantWithEverySeedAndWritesTheTable) {
     EXPECT_EQ(variant["stages_s"].contains("loop_extract"), variant["variant"] != "odometry");
   }
   // Only the loop closure differs, and there is no loop in it.
-  const std::string trajectory = ReadAll(out / "odometry" / "seed_2" / "trajectory.txt");
+  const std::string trajectory = ReadAll(out / "odometry" / "run_2" / "trajectory.txt");
   EXPECT_FALSE(trajectory.empty());
   for (const char* variant : {"orb", "ensemble"})
-    EXPECT_EQ(ReadAll(out / variant / "seed_2" / "trajectory.txt"), trajectory) << variant;
+    EXPECT_EQ(ReadAll(out / variant / "run_2" / "trajectory.txt"), trajectory) << variant;
   EXPECT_THAT(ReadAll(out / "comparison.md"), HasSubstr("| ensemble"));
   // The table again from the folders.
   const auto collected = RunTutti({"collect", out.string()});
   EXPECT_EQ(collected.status, 0) << collected.output;
   EXPECT_THAT(collected.output, HasSubstr("ensemble"));
+}
+
+TEST(CompareCommand, SeveralDataSetsMakeOneTable) {
+  const fs::path folder = testing::FreshFolder(), out = folder / "out";
+  const fs::path other = folder / "other";
+  fs::create_directory_symlink(fs::absolute(testing::TinyTown()), other);
+  const auto run = RunTutti({"compare", "--config", testing::TinyConfig(folder).string(), "--dataset",
+                             testing::TinyTown().string(), other.string(), "--out", out.string(),
+                             "--variants", "odometry,orb", "--runs", "1", "--end", "8"});
+  ASSERT_EQ(run.status, 0) << run.output;
+  const auto json = nlohmann::json::parse(ReadAll(out / "comparison.json"));
+  ASSERT_EQ(json["datasets"].size(), 1u);
+  EXPECT_EQ(json["datasets"][0]["varies"], "the data set (2)");
+  EXPECT_EQ(json["datasets"][0]["variants"][1]["samples"].size(), 2u);
+  EXPECT_THAT(run.output, HasSubstr(" and 1 more"));
 }
 
 TEST(CompareCommand, BadInputIsRefusedBeforeTheFirstRun) {
@@ -195,7 +232,7 @@ TEST(CompareCommand, BadInputIsRefusedBeforeTheFirstRun) {
   EXPECT_THAT(compare(testing::TinyTown(), "orb,orb").output, HasSubstr("named twice"));
   EXPECT_THAT(compare(folder / "nowhere", "orb").output, AllOf(StartsWith("tutti: "), HasSubstr("nowhere")));
   // Less than nothing is no large number.
-  for (const char* option : {"--seeds", "--max-frames"}) {
+  for (const char* option : {"--runs", "--end", "--start", "--noise"}) {
     const auto below = RunTutti({"compare", "--config", config, "--dataset", testing::TinyTown().string(),
                                  "--out", out, "--variants", "orb", option, "-1"});
     EXPECT_EQ(below.status, 1);
@@ -209,7 +246,7 @@ TEST(CompareCommand, ARunThatFailsIsReportedAndTheTableStillWritten) {
   const auto run =
       RunTutti({"compare", "--config", testing::TinyConfig(folder).string(), "--dataset",
                 testing::TinyTown().string(), "--out", (folder / "out").string(), "--variants",
-                "odometry,orb", "--seeds", "1", "--ground-truth", (folder / "none.txt").string()});
+                "odometry,orb", "--runs", "1", "--ground-truth", (folder / "none.txt").string()});
   EXPECT_EQ(run.status, 1) << run.output;
   EXPECT_THAT(run.output, AllOf(HasSubstr("none.txt"), HasSubstr("0 (1 failed)")));
   const auto json = nlohmann::json::parse(ReadAll(folder / "out" / "comparison.json"));

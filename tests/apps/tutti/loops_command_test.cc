@@ -382,24 +382,33 @@ std::string SmallTable(double joint, double naive, double surf) {
 }
 
 TEST_F(LoopsCommand, CompareLoopsIsThePairedTTestOverTheSets) {
-  // joint - naive: 0.3, 0.2, 0.1: their mean 0.2, deviation 0.1, t = 0.2 / (0.1 / sqrt 3) = 3.4641. With two
-  // degrees of freedom p = 1 - t / sqrt(2 + t^2) = 0.0742.
-  WriteAll(folder_ / "1.json", SmallTable(0.8, 0.5, 0.8));
-  WriteAll(folder_ / "2.json", SmallTable(0.9, 0.7, 0.9));
-  WriteAll(folder_ / "3.json", SmallTable(0.7, 0.6, 0.7));
+  // joint - naive: 0.3, 0.2, 0.1, 0.3, 0.1: their mean 0.2, deviation 0.1, t = 0.2 / (0.1 / sqrt 5) = 4.4721.
+  // With four degrees of freedom and x = t / sqrt(4 + t^2), p = 1 - x (3 - x^2) / 2 = 0.0111.
+  const std::vector<std::pair<double, double>> recalls = {
+      {0.8, 0.5}, {0.9, 0.7}, {0.7, 0.6}, {0.7, 0.4}, {0.9, 0.8}};
   const std::string out = (folder_ / "t.json").string();
-  const auto run = RunTutti({"compare-loops", (folder_ / "1.json").string(), (folder_ / "2.json").string(),
-                             (folder_ / "3.json").string(), "--out", out});
+  std::vector<std::string> arguments = {"compare-loops", "--out", out};
+  for (const auto& [joint, naive] : recalls) {
+    arguments.push_back((folder_ / (std::to_string(arguments.size()) + ".json")).string());
+    WriteAll(arguments.back(), SmallTable(joint, naive, joint));
+  }
+  const auto run = RunTutti(arguments);
   ASSERT_EQ(run.status, 0) << run.output;
   const nlohmann::json tests = Json(out);
   ASSERT_EQ(tests.size(), 8u);
   EXPECT_EQ(tests[1]["a"], "joint");
   EXPECT_EQ(tests[1]["b"], "naive");
-  EXPECT_EQ(tests[1]["sets"], 3);
-  EXPECT_NEAR(tests[1]["t"].get<double>(), 3.4641, 1e-4);
-  EXPECT_NEAR(tests[1]["p"].get<double>(), 0.0742, 1e-4);
+  EXPECT_EQ(tests[1]["sets"], 5);
+  EXPECT_NEAR(tests[1]["t"].get<double>(), 4.4721, 1e-4);
+  EXPECT_NEAR(tests[1]["p"].get<double>(), 0.0111, 1e-4);
   EXPECT_EQ(tests[2]["b"], "best single");
   EXPECT_EQ(tests[2]["p"], 1.0);  // no difference at all
+  // Four sets are too few for a p.
+  arguments.pop_back();
+  const auto few = RunTutti(arguments);
+  ASSERT_EQ(few.status, 0) << few.output;
+  EXPECT_FALSE(Json(out)[1].contains("p"));
+  EXPECT_THAT(few.output, HasSubstr("p is given from 5 sets on"));
 }
 
 TEST_F(LoopsCommand, CompareLoopsRefusesWhatIsNoTable) {

@@ -25,6 +25,9 @@ McNemarResult McNemarTest(int only_a, int only_b);
 /// The same from outcomes, one per image (true: found). Throws InputError if the lengths differ.
 McNemarResult McNemarTest(const std::vector<bool>& a, const std::vector<bool>& b);
 
+/// Pairs from which on a p-value is worth reporting: with fewer, one lucky run decides.
+inline constexpr int kLeastPairs = 5;
+
 /// Outcome of the paired t-test.
 struct PairedTTestResult {
   int pairs = 0;               ///< values that were compared

@@ -1,18 +1,18 @@
 #!/usr/bin/env python3
 """Ablation of the loop-closure detector: runs `tutti loops` once per variant and data set and writes a table.
 
-  bench/ablation.py --binary build/release/apps/tutti/tutti --data ../shared/data --out docs/results/ablation.md
+usage: ./dev bench ablation [--sets SET...] [--variants VARIANT...] [--write]   (or bench/ablation.py --build build/release)
 
 A variant is a list of `tutti loops` arguments (--rule, --set key=value). Every figure of the table comes from
-the results.json of its run; variants whose results.json exists in --work are not run again (unless an older
-tutti wrote it).
+the results.json of its run; with --reuse, variants whose results.json exists in --out are not run again (unless an older
+tutti wrote it). --write: docs/results/ablation.md.
 """
 
-import argparse
 import json
-import pathlib
 import resource
 import subprocess
+
+import table
 
 KITTI_RULE = ["--gt-distance", "6", "--gt-angle", "30", "--gt-ignore", "15", "--gt-exclude-s", "10"]
 REDKITCHEN_RULE = ["--gt-distance", "0.3", "--gt-angle", "25", "--gt-ignore", "0.6", "--gt-exclude-s", "10"]
@@ -68,11 +68,11 @@ def slug(text):
 def run(arguments, data_set, variant):
     """The results of one run, with the processor time per image in ms."""
     images, truth, more = SETS[data_set]
-    folder = arguments.work / slug(data_set) / slug(variant)
+    folder = arguments.out / slug(data_set) / slug(variant)
     results = folder / "results.json"
     # Files from before refused images left the verified ranking mean something else by the same keys.
-    if not results.exists() or "recall_at_100_precision_ranked" not in json.loads(results.read_text()):
-        command = [str(arguments.binary), "loops", "--images", str(arguments.data / images), "--ground-truth",
+    if not arguments.reuse or not results.exists() or "recall_at_100_precision_ranked" not in json.loads(results.read_text()):
+        command = [str(arguments.tutti), "loops", "--images", str(arguments.data / images), "--ground-truth",
                    str(arguments.data / truth), "--out", str(folder)] + more + VARIANTS[variant]
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -84,7 +84,7 @@ def run(arguments, data_set, variant):
     return figures
 
 
-def table(arguments, data_set):
+def table_of(arguments, data_set):
     lines = []
     for variant in arguments.variants:
         f = run(arguments, data_set, variant)
@@ -111,20 +111,16 @@ def table(arguments, data_set):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--binary", type=pathlib.Path, default="build/release/apps/tutti/tutti")
-    parser.add_argument("--data", type=pathlib.Path, default="../shared/data")
-    parser.add_argument("--work", type=pathlib.Path, default="build/ablation", help="folder for the runs")
-    parser.add_argument("--out", type=pathlib.Path, default="docs/results/ablation.md")
+    parser = table.parser(__doc__, "ablation")
     parser.add_argument("--sets", nargs="+", choices=list(SETS), default=list(SETS))
     parser.add_argument("--variants", nargs="+", choices=list(VARIANTS), default=list(VARIANTS))
-    arguments = parser.parse_args()
+    arguments = table.parse(parser)
     text = ["# Loop closure: what each choice is worth", "",
-            "Written by `bench/ablation.py`; do not edit. Each row changes the defaults by its arguments to "
+            "Written by `./dev bench ablation --write`; do not edit. Each row changes the defaults by its arguments to "
             "`tutti loops`. CPU time is that of the whole program, image decoding included, over all threads.", ""]
     for data_set in arguments.sets:
-        text += table(arguments, data_set)
-    arguments.out.write_text("\n".join(text))
+        text += table_of(arguments, data_set)
+    table.put(arguments, table.RESULTS / "ablation.md", "\n".join(text))
 
 
 if __name__ == "__main__":

@@ -1,22 +1,21 @@
 #!/usr/bin/env python3
 """Runs the protocol of Salameh et al., Tables 1 and 2, on Lip6 Indoor, Lip6 Outdoor and City Centre.
 
-usage: bench/reproduce_paper.py --tutti build/release/apps/tutti/tutti [--data FOLDER] [--stand-ins] [--out DIR] [--only SET]
+usage: ./dev bench paper [--images FOLDER] [--stand-ins] [--only SET] [--write]   (or bench/reproduce_paper.py)
 The images are not part of tutti; data/README.md says where to get them and where to put them. A set whose images
 are absent is skipped, or with --stand-ins replaced by a synthetic one of as many images. What is measured on a
 stand-in says nothing about the real set: it proves the command, and gives a fixed world to compare rules in.
 Needs nothing but Python 3.
 """
-import argparse
 import dataclasses
 import json
 import os
 import pathlib
-import shutil
 import subprocess
 import sys
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
+import table
+
 RULES = ["surf", "sift", "orb", "naive", "mean", "log-pool", "joint", "seed"]
 COLUMNS = ["SURF", "SIFT", "ORB", "naive", "mean", "log-pool", "joint (ours)", "seed (the paper's method)"]
 SEED = ["--preset", "standardised-mean", "--rule", "mean"]
@@ -28,7 +27,7 @@ TRUTH_TYPES = {".mat", ".txt", ".png", ".bmp"}
 class DataSet:
     title: str
     images: int  # that the detector sees: City Centre's are pairs
-    folders: list  # names of the folder inside of --data; the first is ours, the others as the archives unpack
+    folders: list  # names of the folder inside of --images; the first is ours, the others as the archives unpack
     truths: list  # file names of the ground truth, best first
     table1: list  # recall [%] at 100 % precision: SURF, SIFT, ORB, naive, ensemble (its mean)
     rival: str  # the best of the paper's Table 2
@@ -97,14 +96,7 @@ def pairs_in(images, s):
 
 
 def stand_in(tutti, out, s, name):
-    """Generates the stand-in once; it is deterministic."""
-    folder = out / f"{name}-stand-in"
-    options = ["--seed", "1", "--frames", str(s.images)] + s.generate
-    done = folder / ".done-by-reproduce_paper"
-    if not done.exists() or done.read_text() != " ".join(options):
-        shutil.rmtree(folder, ignore_errors=True)
-        subprocess.run([tutti, "generate", "--out", folder, *options], check=True, stdout=subprocess.DEVNULL)
-        done.write_text(" ".join(options))
+    folder = table.generate(tutti, out / f"{name}-stand-in", ["--seed", "1", "--frames", str(s.images), *s.generate])
     images = folder / ("images" if s.pairs else "image_0")
     return ["--images", images, "--ground-truth", folder / "poses.txt", *s.truth_rule] + \
         (["--join-pairs"] if s.pairs else [])
@@ -113,10 +105,10 @@ def stand_in(tutti, out, s, name):
 def run_rules(tutti, given, out):
     """({rule: its figures}, protocol), by `tutti loops --table`, and the paper's own method beside it."""
     subprocess.run([tutti, "loops", *given, "--table", "--out", out], check=True, stdout=subprocess.DEVNULL)
-    table = json.loads((out / "table.json").read_text())
+    rules = json.loads((out / "table.json").read_text())
     subprocess.run([tutti, "loops", *given, *SEED, "--out", out / "seed"], check=True, stdout=subprocess.DEVNULL)
     seed = json.loads((out / "seed" / "results.json").read_text())
-    return {**table["rules"], "seed": seed}, table["protocol"]
+    return {**rules["rules"], "seed": seed}, rules["protocol"]
 
 
 def percent(value):
@@ -164,19 +156,14 @@ def report(runs):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--tutti", required=True, help="the executable")
-    parser.add_argument("--data", help="folder of the image sets (default: $TUTTI_PAPER_DATA)",
+    parser = table.parser(__doc__, "paper")
+    parser.add_argument("--images", help="folder of the image sets (default: $TUTTI_PAPER_DATA)",
                         default=os.environ.get("TUTTI_PAPER_DATA"))
     parser.add_argument("--stand-ins", action="store_true", help="synthetic sets for those whose images are absent")
-    parser.add_argument("--out", default="/tmp/tutti-paper", help="folder for the runs (kept)")
-    parser.add_argument("--document", help="write the tables there, too (docs/results/stand-ins.md)")
     parser.add_argument("--only", action="append", choices=list(SETS), help="this set (may be repeated)")
-    a = parser.parse_args()
-    out = pathlib.Path(a.out).resolve()
-    out.mkdir(parents=True, exist_ok=True)
-    tutti = pathlib.Path(a.tutti).resolve()
-    data = pathlib.Path(a.data).resolve() if a.data else None
+    a = table.parse(parser)
+    tutti, out = a.tutti, a.out
+    data = pathlib.Path(a.images).resolve() if a.images else None
     runs, failed = [], False
     for name in a.only or SETS:
         s = SETS[name]
@@ -196,15 +183,12 @@ def main():
             failed = True
     if not runs:
         if not failed:
-            print("nothing to run: give --data FOLDER, or --stand-ins", file=sys.stderr)
+            print("nothing to run: give --images FOLDER, or --stand-ins", file=sys.stderr)
         return 1
     text = report(runs)
-    (out / "tables.md").write_text(text)
-    if a.document:
-        sets = " ".join(f"--only {name}" for name in a.only or [])
-        command = f"bench/reproduce_paper.py --tutti build/release/apps/tutti/tutti --stand-ins {sets}".strip()
-        pathlib.Path(a.document).write_text(f"# The paper's tables\n\nWritten by `{command} --document ...`; do not edit.\n\n{text}")
-    print(text + f"written: {out / 'tables.md'}")
+    sets = " ".join(f"--only {name}" for name in a.only or [])
+    command = f"./dev bench paper --stand-ins {sets}".strip()
+    table.put(a, table.RESULTS / "stand-ins.md", f"# The paper's tables\n\nWritten by `{command} --write`; do not edit.\n\n{text}")
     return 1 if failed else 0
 
 

@@ -1,219 +1,168 @@
 #!/usr/bin/env python3
-"""Runs the rows of the README's results table, checks their targets, and rewrites the table between its markers.
+"""The README's results: what `tutti run` reaches on each data set, and whether that is what it must.
 
-usage: bench/run_table.py --tutti build/release/apps/tutti/tutti [--seeds N] [--data DIR] [--out DIR] [--no-readme] [ROW...]
-Rows: redkitchen kitti euroc town room; each figure is the median over the seeds 1 to N. Rows that are not run, or whose data is absent, keep what the README says.
-Exit status 1 if a target is missed. Needs nothing but Python 3.
+usage: ./dev bench readme [ROW...] [--write]     (or bench/run_table.py --build build/release [ROW...] [--write])
+
+Each row is run five times. What varies: on real data the first frame (0 to 4 are skipped), on generated ones the world, its
+route as well. Figures are the median, and the worst in brackets; bounds are on the median, but no run may close a false loop.
+--write puts the table into README.md, its data into docs/results/readme.json, and two plots into docs/images. Rows whose data
+is absent keep what is there. Exit status 1 if a bound is missed. Needs nothing but Python 3.
 """
-import argparse
 import csv
 import json
-import os
-import pathlib
 import shutil
 import statistics
 import subprocess
 import sys
-import time
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
-BEGIN, END = "<!-- results:begin -->", "<!-- results:end -->"
-HEADER = "| run | frames posed | odometry alone, ATE | with the ensemble, ATE | loops true / false | time | must reach |\n|---|---|---|---|---|---|---|"
+import table
 
-
-class Checks:
-    """Collects what a row misses."""
-
-    def __init__(self):
-        self.missed = []
-
-    def that(self, fulfilled, what):
-        if not fulfilled:
-            self.missed.append(what)
+RUNS = 5
+HEADER = ("| run | frames posed | odometry alone, ATE | with the ensemble, ATE | loops true / false | time | must reach |\n"
+          "|---|---|---|---|---|---|---|")
+BIG_TOWN = [("--blocks-x", 4), ("--blocks-x", 3), ("--blocks-x", 3, "--blocks-y", 2), ("--blocks-x", 2, "--blocks-y", 2),
+            ("--blocks-x", 5)]
 
 
-def check_redkitchen(s, c):
-    c.that(s["frames"]["tracked"] >= 495, "at least 495 frames posed")
-    c.that(s["loops"]["true"] >= 1 and s["loops"]["false"] == 0, "a true loop closed, none false")
-    c.that(s["evaluation"]["odometry"]["ate_rmse_m"] <= 0.055, "odometry ATE <= 0.055 m")
-    c.that(s["evaluation"]["slam"]["ate_rmse_m"] <= 0.048, "ATE <= 0.048 m")
-    c.that(s["timing"]["wall_s"] <= 50, "at most 50 s")
+class Row:
+    def __init__(self, title, must, bounds, config=None, data=None, world=None, routes=None, extra=None):
+        self.title, self.must, self.bounds, self.config, self.data = title, must, bounds, config, data
+        self.world, self.routes, self.extra = world, routes, extra or (lambda runs, which: "")
 
 
-def check_kitti(s, c):
-    odometry, slam = s["evaluation"]["odometry"]["ate_rmse_m"], s["evaluation"]["slam"]["ate_rmse_m"]
-    c.that(s["frames"]["tracked"] >= 1695, "at least 1695 frames posed")
-    loops = [r for r in s["loops_csv"] if r["accepted"] == "1"]
-    closed = any(1564 <= int(r["query"]) <= 1660 and int(r["candidate"]) <= 230 for r in loops)
-    c.that(closed and s["loops"]["false"] == 0, "the loop at 1564..1641 closed, none false")
-    c.that(odometry <= 15, "odometry ATE <= 15 m")
-    c.that(slam <= 2, "ATE <= 2 m")
-    c.that(s["timing"]["wall_s"] <= 170, "at most 170 s")
-    c.that(1000 * s["timing"]["cpu_s"] / s["frames"]["total"] <= 70, "at most 70 ms of processor time a frame")
+def middle(runs, key):
+    return statistics.median(r[key] for r in runs)
 
 
-def check_euroc(s, c):
-    c.that(s["frames"]["tracked"] == 95, "all 95 pairs posed")
-    c.that(s["evaluation"]["slam"]["ate_rmse_m"] <= 0.002, "ATE <= 0.002 m")
-    c.that(s["stereo"]["row_error_px"] <= 0.5, "row error <= 0.5 px")
-    c.that(s["stereo"]["matches"] >= 100, "at least 100 stereo matches")
+def kitti_metric(runs, which):
+    path = f" over {middle(runs, 'path_m'):.0f} m" if which == "odometry" else ""
+    return f"; {middle(runs, which + '_t_rel'):.2f} %, {middle(runs, which + '_r_rel'):.4f} deg/m{path}"
 
 
-def check_town(s, c):
-    e = s["evaluation"]
-    c.that(e["path_m"] >= 1000, "a path of 1 km")
-    c.that(e["odometry"]["kitti_translation_percent"] <= 0.5, "odometry: translation within 0.5 %")
-    c.that(e["odometry"]["kitti_rotation_deg_per_m"] <= 0.002, "odometry: rotation within 0.002 deg/m")
-    c.that(e["slam"]["kitti_translation_percent"] <= 0.25, "with the ensemble: translation within 0.25 %")
-    c.that(s["loops"]["false"] == 0, "no false loop")
+def share_of_path(runs, which):
+    return f"; {statistics.median(100 * r[which + '_ate'] / r['path_m'] for r in runs):.2f} % of the path"
 
 
-def check_room(s, c):
-    e = s["evaluation"]
-    c.that(e["odometry"]["ate_rmse_m"] <= 0.01 * e["path_m"], "odometry: ATE within 1 % of the path")
-    c.that(e["slam"]["ate_rmse_m"] <= 0.005 * e["path_m"], "ATE within 0.5 % of the path")
-    c.that(s["loops"]["false"] == 0, "no false loop")
-
-
+# A bound: what it says, and the figure (of the runs) with its limit.
 ROWS = {
-    "redkitchen": ("`redkitchen`, RGB-D", "7scenes.yaml", "redkitchen", check_redkitchen,
-                   ">= 495 of 500 posed, a true loop, odometry <= 0.055 m, ATE <= 0.048 m, 50 s"),
-    "kitti": ("`kitti_00_head`, mono", "kitti_00-02_mono.yaml", "kitti_00_head", check_kitti,
-              ">= 1695 of 1700 posed, odometry <= 15 m, ATE <= 2 m, 170 s, 70 CPU-ms a frame"),
-    "euroc": ("`euroc_v101_head`, stereo, at rest", "euroc_stereo.yaml", "euroc_v101_head", check_euroc,
-              "95 of 95 posed, ATE <= 0.002 m"),
-    "town": ("synthetic stereo town, 2 laps", None, None, check_town,
-             "KITTI metric: odometry <= 0.5 %, <= 0.002 deg/m; with the ensemble <= 0.25 %"),
-    "room": ("synthetic RGB-D room, Kinect noise", None, None, check_room, "odometry <= 1 % of the path, ATE <= 0.5 %"),
+    "redkitchen": Row(
+        "`redkitchen`, RGB-D", "at most 5 frames without a pose, a true loop, odometry <= 0.055 m, ATE <= 0.048 m, 50 s",
+        [("frames without a pose", lambda r: max(x["lost"] for x in r), 5), ("loops", lambda r: -middle(r, "true"), -1),
+         ("odometry", lambda r: middle(r, "odometry_ate"), 0.055), ("ATE", lambda r: middle(r, "slam_ate"), 0.048),
+         ("time", lambda r: middle(r, "wall_s"), 50)], "7scenes.yaml", "redkitchen"),
+    "kitti": Row(
+        "`kitti_00_head`, mono", "at most 5 frames without a pose, the loop at its end, odometry <= 15 m, ATE <= 2 m, 170 s, "
+        "70 CPU-ms a frame",
+        [("frames without a pose", lambda r: max(x["lost"] for x in r), 5), ("the loop", lambda r: -middle(r, "end_closed"), -1),
+         ("odometry", lambda r: middle(r, "odometry_ate"), 15), ("ATE", lambda r: middle(r, "slam_ate"), 2),
+         ("time", lambda r: middle(r, "wall_s"), 170), ("processor time", lambda r: middle(r, "cpu_ms"), 70)],
+        "kitti_00-02_mono.yaml", "kitti_00_head"),
+    "euroc": Row(
+        "`euroc_v101_head`, stereo, at rest", "all pairs posed, ATE <= 0.002 m",
+        [("frames without a pose", lambda r: max(x["lost"] for x in r), 0), ("ATE", lambda r: middle(r, "slam_ate"), 0.002),
+         ("row error", lambda r: middle(r, "row_error_px"), 0.5), ("matches", lambda r: -middle(r, "matches"), -100)],
+        "euroc_stereo.yaml", "euroc_v101_head",
+        extra=lambda r, which: f"; rows {middle(r, 'row_error_px'):.2f} px, {middle(r, 'matches'):.0f} matches" if which == "odometry" else ""),
+    "town": Row(
+        "five synthetic stereo towns, 2 laps", "KITTI metric: odometry <= 0.5 %, <= 0.002 deg/m; with the ensemble <= 0.25 %",
+        [("odometry, translation", lambda r: middle(r, "odometry_t_rel"), 0.5), ("rotation", lambda r: middle(r, "odometry_r_rel"), 0.002),
+         ("with the ensemble, translation", lambda r: middle(r, "slam_t_rel"), 0.25)],
+        world=["--sensor", "stereo", "--laps", "2"], routes=BIG_TOWN, extra=kitti_metric),
+    "room": Row(
+        "five synthetic RGB-D rooms, Kinect noise", "odometry <= 1 % of the path, ATE <= 0.5 %",
+        [("odometry", lambda r: statistics.median(x["odometry_ate"] / x["path_m"] for x in r), 0.01),
+         ("ATE", lambda r: statistics.median(x["slam_ate"] / x["path_m"] for x in r), 0.005)],
+        world=["--sensor", "rgbd", "--world", "room", "--kinect-noise"], routes=[()] * RUNS, extra=share_of_path),
 }
-WORLDS = {
-    "town": ["--sensor", "stereo", "--laps", "2", "--blocks-x", "4", "--seed", "1"],
-    "room": ["--sensor", "rgbd", "--world", "room", "--kinect-noise", "--seed", "1"],
-}
 
 
-def generate_world(tutti, folder, options):
-    """A world is made once; it is deterministic."""
-    done = folder / ".done-by-run_table"
-    if not (done.exists() and done.read_text() == " ".join(options)):
-        shutil.rmtree(folder, ignore_errors=True)
-        subprocess.run([tutti, "generate", "--out", folder, *options], check=True, stdout=subprocess.DEVNULL)
-        done.write_text(" ".join(options))
-    return folder / "config.yaml", folder
-
-
-def median_of(values):
-    """Of numbers the lower median, of dictionaries that of each entry, of all else the first."""
-    first = values[0]
-    if isinstance(first, dict):
-        return {key: median_of([v[key] for v in values if key in v]) for key in first}
-    if isinstance(first, (int, float)) and not isinstance(first, bool):
-        return statistics.median_low([v for v in values if v is not None])
-    return first
-
-
-def run_row(name, tutti, data, out, seed):
-    _, config, dataset, _, _ = ROWS[name]
-    if dataset is None:
-        config, dataset = generate_world(tutti, out / f"{name}-data", WORLDS[name])
-    else:
-        config, dataset = ROOT / "data" / "configs" / config, data / dataset
-        if not dataset.exists():
-            print(f"{name}: {dataset} is absent; the row is left as it is", file=sys.stderr)
-            return None
-    folder = out / name / f"seed-{seed}"
-    begin = time.time()
-    subprocess.run([tutti, "run", "--config", config, "--dataset", dataset, "--out", folder, "--seed", str(seed)], check=True)
-    summary = json.loads((folder / "summary.json").read_text())
+def figures(folder, **what):
+    """Of one run, the numbers that the table needs."""
+    s = json.loads((folder / "summary.json").read_text())
+    e = s["evaluation"]
+    if "error" in e["slam"] or "error" in e["odometry"]:
+        raise ValueError(f"{folder}: no evaluation: {e['slam'].get('error', e['odometry'].get('error'))}")
     with open(folder / "loops.csv", newline="") as f:
-        summary["loops_csv"] = list(csv.DictReader(f))
-    summary["process_s"] = time.time() - begin
-    return summary
+        loops = [r for r in csv.DictReader(f) if r["accepted"] == "1"]
+    out = dict(what, total=s["frames"]["total"], lost=s["frames"]["total"] - s["frames"]["tracked"], true=s["loops"]["true"],
+               false=s["loops"]["false"], path_m=e["path_m"], wall_s=s["timing"]["wall_s"],
+               cpu_ms=1000 * s["timing"]["cpu_s"] / s["frames"]["total"],
+               end_closed=int(any(int(r["query"]) >= 1564 and int(r["candidate"]) <= 230 for r in loops)))
+    for which in ("odometry", "slam"):
+        out[which + "_ate"] = e[which]["ate_rmse_m"]
+        out[which + "_t_rel"] = e[which].get("kitti_translation_percent")
+        out[which + "_r_rel"] = e[which].get("kitti_rotation_deg_per_m")
+    if "stereo" in s:
+        out.update(row_error_px=s["stereo"]["row_error_px"], matches=s["stereo"]["matches"])
+    return out
+
+
+def run_row(a, name):
+    """The figures of its runs; None if the data is absent."""
+    row, runs = ROWS[name], []
+    if row.data and not (a.data / row.data).exists():
+        print(f"{name}: {a.data / row.data} is absent; the row is left as it is", file=sys.stderr)
+        return None
+    for k in range(RUNS):
+        folder = a.out / name / f"run_{k + 1}"
+        if row.data:
+            config, dataset, what = table.ROOT / "data" / "configs" / row.config, a.data / row.data, {"start": k}
+        else:
+            options = [*row.world, "--seed", table.WORLD_SEEDS[k], *row.routes[k]]
+            dataset = table.generate(a.tutti, a.out / f"{name}-world-{k + 1}", options)
+            config, what = dataset / "config.yaml", {"world": " ".join(map(str, options))}
+        if not (a.reuse and (folder / "summary.json").exists()):
+            subprocess.run([a.tutti, "run", "--config", config, "--dataset", dataset, "--out", folder, "--start",
+                            str(what.get("start", 0))], check=True)
+        runs.append(figures(folder, **what))
+    return runs
+
+
+def missed(row, runs):
+    out = [f"{what}: {abs(figure(runs)):.4g} where {abs(limit):.4g} is wanted" for what, figure, limit in row.bounds
+           if not figure(runs) <= limit]
+    return out + ([f"{sum(r['false'] for r in runs)} false loops"] if any(r["false"] for r in runs) else [])
 
 
 def metres(value):
-    return f"{value:.4f} m" if value < 1 else f"{value:.2f} m"
+    return f"{value:.4f}" if value < 1 else f"{value:.2f}"
 
 
-def kitti_metric(score):
-    return f"; {score['kitti_translation_percent']:.2f} %, {score['kitti_rotation_deg_per_m']:.4f} deg/m"
+def spread(runs, key):
+    return f"{metres(middle(runs, key))} m ({metres(max(r[key] for r in runs))} m)"
 
 
-def table_line(name, s, missed):
-    e = s["evaluation"]
-    wanted = ROWS[name][4] + ("" if not missed else " **missed: " + "; ".join(missed) + "**")
-    if "error" in e["slam"]:
-        return f"| {ROWS[name][0]} | {s['frames']['tracked']} / {s['frames']['total']} | - | - | - | - | {wanted} |"
-    extra = more = ""
-    if name == "town":
-        extra, more = kitti_metric(e["odometry"]) + f" over {e['path_m']:.0f} m", kitti_metric(e["slam"])
-    if name == "room":
-        extra, more = (f"; {100 * e[k]['ate_rmse_m'] / e['path_m']:.2f} % of the path" for k in ("odometry", "slam"))
-    if name == "euroc":
-        extra = f"; rows {s['stereo']['row_error_px']:.2f} px, {s['stereo']['matches']:.0f} matches"
-    return (f"| {ROWS[name][0]} | {s['frames']['tracked']} / {s['frames']['total']} "
-            f"| {metres(e['odometry']['ate_rmse_m'])}{extra} | {metres(e['slam']['ate_rmse_m'])}{more} "
-            f"| {s['loops']['true']} / {s['loops']['false']} | {s['timing']['wall_s']:.0f} s, {1000 * s['timing']['cpu_s'] / s['frames']['total']:.0f} CPU-ms "
-            f"a frame | {wanted} |")
-
-
-def rewrite_readme(lines):
-    path = ROOT / "README.md"
-    text = path.read_text()
-    begin, end = text.index(BEGIN) + len(BEGIN), text.index(END)
-    kept = {}
-    for line in text[begin:end].splitlines():
-        for name, row in ROWS.items():
-            if line.startswith(f"| {row[0]} |"):
-                kept[name] = line
-    kept.update(lines)
-    body = "\n".join([HEADER] + [kept[name] for name in ROWS if name in kept])
-    path.write_text(text[:begin] + "\n" + body + "\n" + text[end:])
+def line(name, runs):
+    row, lost = ROWS[name], max(r["lost"] for r in runs)
+    wanted = row.must + "".join(f"; **missed: {m}**" for m in missed(row, runs))
+    return (f"| {row.title} | {'all' if lost == 0 else f'all but {lost} at most'} of {runs[0]['total']} "
+            f"| {spread(runs, 'odometry_ate')}{row.extra(runs, 'odometry')} | {spread(runs, 'slam_ate')}{row.extra(runs, 'slam')} "
+            f"| {middle(runs, 'true'):.0f} / {max(r['false'] for r in runs)} "
+            f"| {middle(runs, 'wall_s'):.0f} s, {middle(runs, 'cpu_ms'):.0f} CPU-ms a frame | {wanted} |")
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--tutti", required=True, help="the executable")
-    parser.add_argument("--data", default=os.environ.get("TUTTI_DATA", ROOT.parent / "shared" / "data"))
-    parser.add_argument("--out", default="/tmp/tutti-bench", help="folder for the runs (kept)")
-    parser.add_argument("--seeds", type=int, default=3, help="number of seeds")
-    parser.add_argument("--no-readme", action="store_true", help="print only")
-    parser.add_argument("rows", nargs="*", metavar="ROW", help=" ".join(ROWS))
-    a = parser.parse_args()
+    a = table.parse(table.parser(__doc__, "readme", ROWS), ROWS)
+    found, failed = {}, False
     for name in a.rows:
-        if name not in ROWS:
-            parser.error(f"unknown row '{name}'; rows are {' '.join(ROWS)}")
-    out = pathlib.Path(a.out).resolve()
-    out.mkdir(parents=True, exist_ok=True)
-    tutti = pathlib.Path(a.tutti).resolve()
-    lines, failed = {}, False
-    for name in a.rows or ROWS:
         try:
-            runs = [run_row(name, tutti, pathlib.Path(a.data), out, seed + 1) for seed in range(a.seeds)]
-        except subprocess.CalledProcessError as e:
-            print(f"{name}: FAILED: {e}", file=sys.stderr)
+            runs = run_row(a, name)
+        except (subprocess.CalledProcessError, ValueError) as error:
+            print(f"{name}: FAILED: {error}", file=sys.stderr)
             failed = True
             continue
-        if None in runs:
+        if runs is None:
             continue
-        s = median_of(runs)
-        checks = Checks()
-        try:
-            s["loops"]["false"] = max(run["loops"]["false"] for run in runs)  # of any seed
-            ROWS[name][3](s, checks)
-        except KeyError as e:
-            checks.that(False, f"summary.json has no {e}")
-        failed = failed or bool(checks.missed)
-        lines[name] = table_line(name, s, checks.missed)
-        print(f"{name}: {'reached' if not checks.missed else 'MISSED: ' + '; '.join(checks.missed)}")
+        found[name] = runs
+        bad = missed(ROWS[name], runs)
+        failed = failed or bool(bad)
+        print(f"{name}: {'reached' if not bad else 'MISSED: ' + '; '.join(bad)}")
         picture = {"kitti": "kitti_00_head.png", "town": "synthetic_town.png"}.get(name)
-        if picture and not a.no_readme:
-            images = ROOT / "docs" / "images"
-            images.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(out / name / "seed-1" / "trajectory.png", images / picture)
-    print("\n" + "\n".join([HEADER] + list(lines.values())))
-    if not a.no_readme and lines:
-        rewrite_readme(lines)
+        if picture and a.write:
+            shutil.copyfile(a.out / name / "run_1" / "trajectory.png", table.ROOT / "docs" / "images" / picture)
+    whole = table.put_json(a, "readme", found)
+    table.put_between(a, table.ROOT / "README.md", "results",
+                      "\n".join([HEADER] + [line(name, whole[name]) for name in ROWS if name in whole]))
     return 1 if failed else 0
 
 

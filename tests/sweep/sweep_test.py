@@ -22,7 +22,7 @@ class Sweep(unittest.TestCase):
         subprocess.run([TUTTI, "generate", "--out", cls.town, "--sensor", "stereo", "--frames", "15", "--width", "480", "--height",
                         "240", "--supersample", "1"], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         cls.out = cls.folder / "out"
-        cls.sweep = {"tutti": TUTTI, "out": str(cls.out), "seeds": [1, 2], "tries": 2, "report": False,
+        cls.sweep = {"tutti": TUTTI, "out": str(cls.out), "starts": [0, 1], "tries": 2, "report": False,
                      "datasets": {"town": {"config": str(cls.town / "config.yaml"), "path": str(cls.town)}},
                      "configurations": {"ensemble": {}, "alone": {"arguments": ["--no-loops"]}, "broken": {"set": ["no_such_key=1"]}}}
         cls.first = cls.snakemake()
@@ -41,28 +41,29 @@ class Sweep(unittest.TestCase):
     def test_1_what_works_is_collected_and_what_fails_is_reported(self):
         self.assertEqual(self.first.returncode, 0, self.first.stdout)
         table = (self.out / "table.md").read_text()
-        for text in ("| ensemble", "| alone", "FAILED: town/broken/seed_1: status 1 after 2 tries", "FAILED: town/broken/seed_2",
+        for text in ("| ensemble", "| alone", "FAILED: town/broken/start_0: status 1 after 2 tries", "FAILED: town/broken/start_1",
                      "no_such_key"):
             self.assertIn(text, table)
         self.assertNotIn("| broken", table)
         collected = json.loads((self.out / "collected.json").read_text())
-        self.assertEqual({v["variant"]: v["seeds"] for v in collected["datasets"][0]["variants"]}, {"ensemble": [1, 2], "alone": [1, 2]})
+        self.assertEqual({v["variant"]: [s["start"] for s in v["samples"]] for v in collected["datasets"][0]["variants"]},
+                         {"ensemble": [0, 1], "alone": [0, 1]})
 
     def test_2_a_run_that_failed_was_tried_again(self):
         self.assertEqual(self.first.stdout.count("Trying to restart job"), 2, self.first.stdout)
 
     def test_3_what_is_finished_is_not_run_again(self):
-        summary = self.out / "runs/town/ensemble/seed_1/summary.json"
+        summary = self.out / "runs/town/ensemble/start_0/summary.json"
         before = summary.stat().st_mtime_ns
         again = self.snakemake()
         self.assertEqual(again.returncode, 0, again.stdout)
         self.assertIn("Nothing to be done", again.stdout)
-        self.sweep["seeds"].append(3)
+        self.sweep["starts"].append(2)
         more = self.snakemake()
         self.assertEqual(more.returncode, 0, more.stdout)
         self.assertEqual(summary.stat().st_mtime_ns, before)
         collected = json.loads((self.out / "collected.json").read_text())
-        self.assertEqual(collected["datasets"][0]["variants"][0]["seeds"], [1, 2, 3])
+        self.assertEqual([s["start"] for s in collected["datasets"][0]["variants"][0]["samples"]], [0, 1, 2])
 
 
 if __name__ == "__main__":

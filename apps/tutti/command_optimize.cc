@@ -194,7 +194,7 @@ void AddOptimizeCommand(CLI::App& app, int&) {
       ->add_option(
           "--robust", arguments->robust,
           "What is done about false loops (|i - j| != 1). gnc: start with all, tighten, decide in or out; "
-          "take this one for SLAM graphs, docs/backend.md has the table. gnc-tls: the same by truncated "
+          "take this one for SLAM graphs, docs/backend.md says why. gnc-tls: the same by truncated "
           "least squares; dcs and switchable switch off smoothly; huber and cauchy only tame; none: trust "
           "all")
       ->check(CLI::IsMember({"none", "huber", "cauchy", "dcs", "switchable", "gnc-tls", "gnc"}))

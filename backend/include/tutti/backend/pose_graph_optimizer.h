@@ -30,7 +30,7 @@ enum class GraphObjective { kChi2, kChi2Log };
 /// out.
 enum class RobustLoss { kNone, kHuber, kCauchy, kDcs, kSwitchable, kGncTls, kGnc };
 
-/// What SLAM graphs should use: docs/backend.md's table says why. PoseGraphOptions itself defaults to least
+/// What SLAM graphs should use: docs/backend.md says why. PoseGraphOptions itself defaults to least
 /// squares, since a published graph has its loops for true.
 constexpr RobustLoss kDefaultRobustLoss = RobustLoss::kGnc;
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Measures the pose graph's optima, its solvers, and what planted false loops do to a run, and writes docs/backend.md's tables.
+"""Measures the pose graph's optima, its solvers, and what injected false loops do to a run; writes docs/results/pose-graph.md.
 
 usage: bench/graph_table.py [--build DIR] [--data DIR] [--out DIR] [--reuse] [--remark TEXT] [--document FILE] [TABLE...]
 Tables: published noisy speed size online planted. --reuse takes the runs of `tutti` that an earlier call left in --out; tables that are not
@@ -183,7 +183,7 @@ def main():
     parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build" / "release")
     parser.add_argument("--data", type=pathlib.Path, default=os.environ.get("TUTTI_DATA", ROOT.parent / "shared" / "data"))
     parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("/tmp/tutti-bench"), help="folder for runs (kept)")
-    parser.add_argument("--document", type=pathlib.Path, default=ROOT / "docs" / "backend.md")
+    parser.add_argument("--document", type=pathlib.Path, default=ROOT / "docs" / "results" / "pose-graph.md")
     parser.add_argument("--remark", default="", help="a sentence above the table")
     parser.add_argument("--reuse", action="store_true")
     bench = Bench(parser.parse_args())

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Measures how time and memory grow with the number of locations, and writes docs/loop-closure-growth.md.
+"""Measures how time and memory grow with the number of locations, and writes docs/results/loop-growth.md.
 
 usage: bench/growth_table.py --program build/release/bench/loop_growth [--locations N] [--limit N] [--saved N] [--out DIR]
                              [--reuse] [--remark TEXT] [--document FILE]
@@ -16,7 +16,7 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-DOCUMENT = ROOT / "docs" / "loop-closure-growth.md"
+DOCUMENT = ROOT / "docs" / "results" / "loop-growth.md"
 COLUMNS = [("locations", "locations", 0), ("in_memory", "in STM and WM", 0), ("words", "words", 0),
            ("quantise_ms", "quantise", 1), ("likelihood_ms", "likelihood", 1), ("filter_ms", "filter", 1),
            ("memory_ms", "memory", 1), ("total_ms", "all", 1), ("total_p99_ms", "all, p99", 1),
@@ -68,7 +68,7 @@ def document(free, limited, saving, limit, remark):
               f"{last['quantise_ms'] + last['likelihood_ms'] + last['filter_ms']:.1f} ms "
               f"({last['cpu_ms']:.1f} ms of processor time with all else). One location in working memory takes "
               f"{kb_per_location(free):.0f} KB, features for verification included. Nearly all of the time goes into the "
-              "search for words: [results/index.md](results/index.md) has other indices beside it.", "",
+              "search for words: [index.md](index.md) has other indices beside it.", "",
               f"## Working memory of {limit:,}, every image stored in a file", ""]
     lines += table(limited)
     lines += ["", f"The last 1,000 images against the 1,000 after the limit was reached: "

@@ -4,7 +4,7 @@
 usage: bench/long_run.py --tutti build/release/apps/tutti/tutti [--frames 20000] [--laps 4] [--out DIR] [--document FILE]
 Renders --laps laps (stereo, 400x200), which are then played one after the other until there are --frames: every --laps-th lap
 shows the same bytes again. `trajectory_odometry.txt` is left out (run.odometry_pass: false): an odometry without loops does
-not know that it is the same block. Writes its table into docs/performance.md. Needs nothing but Python 3 and /proc.
+not know that it is the same block. Writes its table into docs/results/timing.md. Needs nothing but Python 3 and /proc.
 """
 import argparse
 import json

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Runs `tutti run --timing` on real sequences and writes the tables of docs/performance.md between their markers.
+"""Runs `tutti run --timing` on real sequences and writes the tables of docs/results/timing.md between their markers.
 
 usage: bench/performance.py --tutti build/release/apps/tutti/tutti [--data DIR] [--out DIR] [--reuse] [--remark TEXT]
                             [--document FILE] [ROW...]
@@ -17,7 +17,7 @@ import sys
 from document import rewrite
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-DOCUMENT = ROOT / "docs" / "performance.md"
+DOCUMENT = ROOT / "docs" / "results" / "timing.md"
 ROWS = {"kitti": ("`kitti_00_head`, mono", "kitti_00-02_mono.yaml", "kitti_00_head"),
         "redkitchen": ("`redkitchen`, RGB-D", "7scenes.yaml", "redkitchen")}
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Plants false loops in published graphs, solves them with each robust method, and rewrites docs/backend.md's tables.
+"""Adds false loops to published graphs, solves them with each robust method, and rewrites the tables of docs/results/false-loops.md.
 
 usage: bench/robust_table.py --program build/release/bench/robust_graphs [--data DIR] [--csv FILE] [--seeds N]
                              [--methods M,...] [--graphs G,...] [--cases COUNTxCLUSTER,...] [--reuse]
@@ -21,7 +21,7 @@ import sys
 from document import rewrite
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-DOCUMENT = ROOT / "docs" / "backend.md"
+DOCUMENT = ROOT / "docs" / "results" / "false-loops.md"
 GRAPHS = ["intel", "manhattan", "manhattanOlson3500", "ringCity", "sphere2500", "parking-garage"]
 METHODS = ["none", "huber", "cauchy", "dcs", "switchable", "pcm+none", "gnc-tls", "pcm+gnc", "gnc+sigma", "gnc"]
 CASES = ["10x1", "50x1", "100x1", "500x1", "100x10", "500x50"]

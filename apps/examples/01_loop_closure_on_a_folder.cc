@@ -15,7 +15,7 @@
 namespace {
 
 int Run(const std::string& folder) {
-  tutti::LoopDetectorOptions options;  // SURF, SIFT and ORB, one Bayes filter each, the mean of the three
+  tutti::LoopDetectorOptions options;  // SURF, SIFT and ORB, and one Bayes filter on all of them
   tutti::LoopDetector detector(options);
 
   const std::vector<std::string> files = examples::FilesInOrder(folder);

@@ -76,8 +76,7 @@ int Run(const std::string& folder) {
     const tutti::LoopResult result = detector.Detect(query);
     if (!result.accepted) continue;
     ++loops;
-    std::printf("image %zu is where image %lld was; believed by", i,
-                static_cast<long long>(result.candidate));
+    std::printf("image %zu is where image %lld was; hypotheses", i, static_cast<long long>(result.candidate));
     for (const tutti::MemberOpinion& member : result.members)
       std::printf(" %s: %.2f", member.name.c_str(), member.hypothesis);
     std::printf("\n");

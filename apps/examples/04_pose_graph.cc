@@ -51,7 +51,7 @@ int Run(const char* file) {
     const tutti::PoseGraphEdge& edge = graph.edges()[e];
     if (edge.kind != tutti::EdgeKind::kLoop) continue;
     std::printf("loop %d -> %d: chi2 %.1f, weight %.2f%s\n", edge.from, edge.to, report.edges[e].chi2,
-                report.edges[e].weight, report.edges[e].down_weighted ? " (not believed)" : "");
+                report.edges[e].weight, report.edges[e].down_weighted ? " (rejected)" : "");
   }
   if (file != nullptr) tutti::WriteG2o(file, graph);  // for g2o_viewer and others
   return 0;

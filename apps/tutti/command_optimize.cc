@@ -29,7 +29,7 @@ nlohmann::ordered_json ToJson(const GraphCosts& costs) {
   return {{"chi2", costs.chi2}, {"chi2log", costs.chi2log}, {"chordal", costs.chordal}};
 }
 
-/// Loops that the robust loss does not believe, worst first.
+/// Loops that the robust loss rejects, worst first.
 std::vector<std::size_t> DownWeighted(const PoseGraphReport& report) {
   std::vector<std::size_t> out;
   for (std::size_t e = 0; e < report.edges.size(); ++e) {
@@ -112,7 +112,7 @@ void Print(const G2oFile& file, const PoseGraphReport& report) {
     std::printf(report.components.size() > 10 ? " ...\n" : "\n");
   }
   if (report.down_weighted == 0) return;
-  std::printf("  %zu loops are not believed (weight < 0.5); the worst:\n", report.down_weighted);
+  std::printf("  %zu loops are rejected (weight < 0.5); the worst:\n", report.down_weighted);
   const std::vector<std::size_t> worst = DownWeighted(report);
   for (std::size_t k = 0; k < worst.size() && k < 10; ++k) {
     const PoseGraphEdge& edge = file.graph.edges()[worst[k]];
@@ -179,10 +179,9 @@ void AddOptimizeCommand(CLI::App& app, int&) {
   command->add_option("IN", arguments->in, "Graph to read (.g2o)")->required();
   command->add_option("--out", arguments->out, "Where the optimised graph goes (.g2o)")->required();
   command
-      ->add_option(
-          "--init", arguments->init,
-          "Start: file: the vertices; odometry: a spanning tree; chordal: linear relaxation, finds the right "
-          "valley where the others do not; auto: the one with the lowest cost")
+      ->add_option("--init", arguments->init,
+                   "Start: file: the vertices; odometry: a spanning tree; chordal: linear relaxation, often "
+                   "near the global minimum where the others are not; auto: the one with the lowest cost")
       ->check(CLI::IsMember({"auto", "file", "odometry", "chordal"}))
       ->capture_default_str();
   command
@@ -193,10 +192,9 @@ void AddOptimizeCommand(CLI::App& app, int&) {
   command
       ->add_option(
           "--robust", arguments->robust,
-          "What is done about false loops (|i - j| != 1). gnc: start with all, tighten, decide in or out; "
-          "take this one for SLAM graphs, docs/backend.md has the table. gnc-tls: the same by truncated "
-          "least squares; dcs and switchable switch off smoothly; huber and cauchy only tame; none: trust "
-          "all")
+          "Robust loss on loops (|i - j| != 1). gnc: graduated non-convexity, then inlier or outlier; take "
+          "this one for SLAM graphs, docs/backend.md says why. gnc-tls: the same by truncated least squares; "
+          "dcs and switchable: weights down to 0; huber and cauchy: smaller weights; none: least squares")
       ->check(CLI::IsMember({"none", "huber", "cauchy", "dcs", "switchable", "gnc-tls", "gnc"}))
       ->capture_default_str();
   command
@@ -206,13 +204,13 @@ void AddOptimizeCommand(CLI::App& app, int&) {
       ->check(CLI::IsMember({"block", "ceres"}))
       ->capture_default_str();
   command->add_flag("--pairwise", arguments->options.pairwise_consistency,
-                    "Before: keep only the largest set of loops that agree pair by pair (PCM). Needs honest "
-                    "information on the odometry; slow beyond some thousand loops");
+                    "Before: keep only the largest set of loops that agree pair by pair (PCM). Needs "
+                    "realistic covariances of the odometry; slow beyond some thousand loops");
   command->add_flag("--sigma-test", arguments->options.sigma_test,
-                    "After: take out loops that are off by more than 3 sigma, bring back those within");
+                    "After: remove loops that are off by more than 3 sigma, bring back those within");
   command
       ->add_option("--robust-chi2", arguments->options.robust_chi2,
-                   "Chi-square beyond which a loop is doubted; 0: the 99 % quantile")
+                   "Chi-square beyond which a loop is an outlier; 0: the 99 % quantile")
       ->check(NotNegative())
       ->capture_default_str();
   command->add_option("--max-iterations", arguments->options.max_iterations, "Levenberg-Marquardt iterations")
@@ -227,7 +225,7 @@ void AddOptimizeCommand(CLI::App& app, int&) {
   command->footer(
       "Costs are sums over all edges without a robust loss and without the factor 1/2. Compare only costs of "
       "the same\n"
-      "column. A loop that is not believed keeps its place in the output file.\n"
+      "column. A loop that is rejected keeps its place in the output file.\n"
       "Example: tutti optimize graph.g2o --out optimised.g2o --robust gnc --json costs.json");
   command->callback([arguments] { RunOptimize(*arguments); });
 }

@@ -68,7 +68,7 @@ std::string MembersProblem(const LoopDetectorOptions& o) {
   }
   if (Holds(o.members, "dnn") && !Holds(o.external_members, "dnn") && o.dnn.model.empty()) {
     return "members holds 'dnn', but dnn.model is empty; give the ONNX file of a network "
-           "(docs/loop-closure.md section 3 says which fit), or leave 'dnn' out";
+           "(docs/networks.md says which fit), or leave 'dnn' out";
   }
   for (const std::string& name : o.members) {
     const bool dense = Holds(KnownDenseMembers(), name) || Holds(o.dense_members, name);

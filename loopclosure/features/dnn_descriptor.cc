@@ -59,9 +59,8 @@ cv::dnn::Net ReadNetwork(const std::string& file, const std::string& bytes) {
   try {
     net = cv::dnn::readNetFromONNX(bytes.data(), bytes.size());
   } catch (const std::exception& error) {
-    Fail(file,
-         "is no ONNX file that OpenCV reads; export the network as docs/loop-closure.md section 3 says (" +
-             Said(error) + ")");
+    Fail(file, "is no ONNX file that OpenCV reads; export the network as docs/networks.md says (" +
+                   Said(error) + ")");
   }
   if (net.empty()) Fail(file, "holds no network; export it again");
   // Whatever else this OpenCV has: the same answers on every machine's CPU.

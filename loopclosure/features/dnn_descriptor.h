@@ -1,4 +1,4 @@
-// The member `dnn`: a network of the caller's describes an image as a whole (loop-closure.md section 3).
+// The member `dnn`: a network of the caller's describes an image as a whole (docs/networks.md).
 #pragma once
 
 #include <memory>

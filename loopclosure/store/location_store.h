@@ -12,7 +12,7 @@ struct sqlite3;
 
 namespace tutti::internal {
 
-/// Long-term memory's file (loop-closure.md section 1, steps 7 and 8). Records are bytes with a checksum,
+/// Long-term memory's file (loop-closure.md section 1, step 7). Records are bytes with a checksum,
 /// under a kind and two numbers. With a write-ahead log: after a crash the file holds everything up to the
 /// last commit.
 ///

@@ -94,7 +94,7 @@ function mapNote(run) {
   const drawn = loops.filter((loop) => loop.a).length;
   const aligned = run.reference ? 'Estimates are aligned to the reference.' : 'No reference: estimates in the frame of the first camera.';
   const shown = data.runs.length > 1 ? ` Loops of ${run.variant}.` : '';
-  const rest = drawn < loops.length ? ` ${loops.length - drawn} loops end at frames without a pose in this piece of map.` : '';
+  const rest = drawn < loops.length ? ` ${loops.length - drawn} loops end at frames without a pose in this submap.` : '';
   return `${aligned}${shown} Rejected and missed loops: tap their name in the legend.${rest}`;
 }
 

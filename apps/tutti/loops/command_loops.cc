@@ -208,7 +208,7 @@ void AddLoopsCommand(CLI::App& app, int& exit_code) {
   command->add_flag("--join-pairs", arguments->truth.join_pairs,
                     "two images in a row, left and right, make one image (City Centre, New College)");
   command->add_flag("--keep-posterior", arguments->options.keep_posterior,
-                    "also write posteriors.csv: what each member believed of each location");
+                    "also write posteriors.csv: each member's posterior of each location");
   command->add_flag("--dump", arguments->dump,
                     "also write dump_candidates.csv (what each candidate looked like to each member) and "
                     "dump_verification.csv (each geometric verification)");

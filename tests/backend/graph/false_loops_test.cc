@@ -67,7 +67,8 @@ double LargestShift(const PoseGraph& a, const PoseGraph& b) {
   return largest;
 }
 
-// The cheap form of docs/backend.md's table (bench/robust_table.py): the default loss, a graph, two seeds.
+// The cheap form of docs/results/false-loops.md (bench/robust_table.py): the default loss, a graph, two
+// seeds.
 class HundredFalseLoops : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(HundredFalseLoops, DoNotMoveTheSolution) {

@@ -26,11 +26,10 @@ enum class GraphObjective { kChi2, kChi2Log };
 /// kCauchy: the log of a Cauchy distribution, no bound. kDcs: dynamic covariance scaling (Agarwal et al.,
 /// ICRA 2013). kSwitchable: a switch variable per loop (Suenderhauf and Protzel, IROS 2012). kGncTls:
 /// graduated non-convexity for truncated least squares (Yang et al., RA-L 2020, algorithm 1). kGnc: the same
-/// with the Geman-McClure surrogate, then truncated least squares decide for each loop whether it is in or
-/// out.
+/// with the Geman-McClure surrogate, then truncated least squares decide for each loop: inlier or outlier.
 enum class RobustLoss { kNone, kHuber, kCauchy, kDcs, kSwitchable, kGncTls, kGnc };
 
-/// What SLAM graphs should use: docs/backend.md's table says why. PoseGraphOptions itself defaults to least
+/// What SLAM graphs should use: docs/backend.md says why. PoseGraphOptions itself defaults to least
 /// squares, since a published graph has its loops for true.
 constexpr RobustLoss kDefaultRobustLoss = RobustLoss::kGnc;
 
@@ -68,15 +67,15 @@ struct PoseGraphOptions {
   TUTTI_OPTION(bool, pairwise_consistency, false,
                "before anything else: only the largest set of loops that agree pair by pair through the "
                "odometry stays (pairwise consistency maximisation, Mangelson et al., ICRA 2018); needs "
-               "honest covariances of the odometry, and time that grows with the square of the number of "
+               "realistic covariances of the odometry, and time that grows with the square of the number of "
                "loops");
   TUTTI_OPTION(bool, sigma_test, false,
                "last of all: loops whose chi-square is beyond 3 sigma (probability 99.73 %) leave, those "
                "within come back, and least squares decide the poses");
   TUTTI_OPTION(double, robust_chi2, 0,
-               "chi-square beyond which a loop is doubted (Huber's delta^2, DCS' Phi, GNC's c^2); 0: the 99 "
-               "% quantile of the chi-square distribution for the edge's degrees of freedom (11.34, 16.81, "
-               "18.48)",
+               "chi-square beyond which a loop is an outlier (Huber's delta^2, DCS' Phi, GNC's c^2); 0: the "
+               "99 % quantile of the chi-square distribution for the edge's degrees of freedom (11.34, "
+               "16.81, 18.48)",
                From(0));
   TUTTI_OPTION(PoseGraphSolver, solver, PoseGraphSolver::kCeres,
                "who solves it: ceres, or block (own block Cholesky: the same optimum in less time; robust: "

@@ -45,8 +45,7 @@ struct OdometryOptions {
   TUTTI_OPTION(int, min_inliers, 20, "fewer landmarks that agree with the pose: the frame is lost", Basic(),
                From(8));
   TUTTI_OPTION(double, relocalize_s, 0.5,
-               "lost for longer than this, with something to see: start a new piece of map", Unit("s"),
-               From(0));
+               "lost for longer than this, with something to see: start a new submap", Unit("s"), From(0));
   TUTTI_OPTION(int, local_keyframes, 40, "keyframes whose landmarks are searched in a frame", From(1));
 
   // Keyframes.

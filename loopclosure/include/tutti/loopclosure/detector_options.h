@@ -98,9 +98,11 @@ struct ExtractionOptions {
 /// Options of the likelihood of places (docs/loop-closure.md section 2).
 struct EvidenceOptions {
   TUTTI_OPTION(EvidenceKind, kind, EvidenceKind::kCounts,
-               "what a score says of a place: counts against the level of wrong places, or standardised "
-               "(2013); the next five are of counts");
-  TUTTI_OPTION(double, sharpness, 2.0, "exponent of a count beyond the alias level: beta", Above(0), To(10));
+               "likelihood of a place: shared words against what wrong places share (counts), or "
+               "standardised (2013); the next five are of counts");
+  TUTTI_OPTION(double, sharpness, 2.0,
+               "exponent (beta) of a place's count over the alias level, the count that wrong places reach",
+               Above(0), To(10));
   TUTTI_OPTION(double, alias_share, 0.7,
                "share of the alias level that a place must reach to be more likely than a new one", Above(0),
                To(3));
@@ -212,7 +214,7 @@ struct DnnOptions {
 /// Options of LoopDetector: section `loops:` of the YAML files.
 struct LoopDetectorOptions {
   TUTTI_OPTION(CombinationRule, rule, CombinationRule::kJoint,
-               "how the members become one, or one member's name for that alone", Basic());
+               "how the members are combined, or one member's name for that alone", Basic());
   TUTTI_OPTION(MemberNames, members, MemberNames({"surf", "sift", "orb"}),
                "members of the ensemble: surf, sift, orb, akaze, brisk, kaze, gftt, hog, dnn, and "
                "external_members",
@@ -246,7 +248,7 @@ struct LoopDetectorOptions {
   TUTTI_OPTION(int, threads, 2, "most threads that the detector uses at once", From(1));
   TUTTI_OPTION(std::uint64_t, seed, 1, "of kd-forests and RANSAC", Basic());
   TUTTI_OPTION(double, bad_signature_ratio, 0.2,
-               "a member sits out below this share of its mean number of features", From(0), To(1));
+               "a member abstains below this share of its mean number of features", From(0), To(1));
   TUTTI_OPTION(bool, ignore_bad_signatures, false,
                "an image that is bad for every member is no location at all");
   TUTTI_OPTION(double, virtual_place_prior, 0.9, "p(new place | new place)", Above(0), Below(1));
@@ -276,7 +278,7 @@ struct LoopDetectorOptions {
                "keep every score and posterior: LoopResult::posterior_by_location and "
                "MemberOpinion::evidence (costs O(locations x members) per image)");
   TUTTI_OPTION(ExtractionOptions, extraction, {}, "features");
-  TUTTI_OPTION(EvidenceOptions, evidence, {}, "what a score says of a place");
+  TUTTI_OPTION(EvidenceOptions, evidence, {}, "likelihood of a place");
   TUTTI_OPTION(VocabularyOptions, vocabulary, {}, "words");
   TUTTI_OPTION(VerificationOptions, verification, {}, "geometry");
   TUTTI_OPTION(DnnOptions, dnn, {}, "of the member dnn, off by default");

@@ -36,7 +36,7 @@ struct SlamOptions {
   TUTTI_OPTION(double, loop_agree_scale, 0.10, "mono: and within this |log of the scale ratio|", Above(0));
   TUTTI_OPTION(double, loop_after_fraction, 0.08,
                "a loop whose residual after optimisation is beyond this share of the median scene depth "
-               "contradicts the graph and is taken out again",
+               "contradicts the graph and is removed again",
                Above(0));
   TUTTI_OPTION(double, loop_after_deg, 3.0, "the same for its angle", Unit("deg"), Above(0));
   TUTTI_OPTION(double, loop_defer_fraction, 0.02,
@@ -50,7 +50,7 @@ struct SlamOptions {
                "is refused; 0: no such gate",
                From(0));
   TUTTI_OPTION(int, inject_false_loops, 0,
-               "test of the back end: so many false loops that look verified enter the graph, one with "
+               "test of the back end: inject so many false loops that look verified into the graph, one with "
                "every third keyframe, the rest at the end",
                From(0));
   TUTTI_OPTION(int, covisibility_min_shared, 100,
@@ -68,8 +68,8 @@ struct SlamOptions {
                Above(0));
   TUTTI_OPTION(double, loop_sigma_scale, 0.02, "mono: of log(scale)", Above(0));
   TUTTI_OPTION(bool, global_adjustment, true,
-               "after loops: what both ends see becomes one, and the whole map is adjusted beside the "
-               "tracking",
+               "after loops: fusion of the landmarks of both ends, and bundle adjustment of the whole map "
+               "beside the tracking",
                Basic());
   TUTTI_OPTION(bool, odometry_pass, true,
                "after loops moved the map: track the rest again without them for trajectory_odometry.txt, "

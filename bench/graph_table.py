@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """Measures the pose graph's optima, its solvers, and what injected false loops do to a run; writes docs/results/pose-graph.md.
 
-usage: bench/graph_table.py [--build DIR] [--data DIR] [--out DIR] [--reuse] [--remark TEXT] [--document FILE] [TABLE...]
-Tables: published noisy speed size online planted. --reuse takes the runs of `tutti` that an earlier call left in --out; tables that are not
-made keep what the document says. Exit status 1 if a figure misses its bound. Needs nothing but Python 3.
+usage: ./dev bench graphs [TABLE...] [--reuse] [--remark TEXT] [--write]   (or bench/graph_table.py --build build/release)
+
+Tables: published noisy speed size online planted. Tables that are not made keep what the document says. Exit status 1 if a
+figure misses its bound. Needs nothing but Python 3.
 """
-import argparse
 import csv
 import json
 import os
@@ -14,10 +14,10 @@ import platform
 import subprocess
 import sys
 
-from document import rewrite
-from run_table import ROWS, WORLDS, generate_world
+import table
+from run_table import ROWS
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
+DOCUMENT = table.RESULTS / "pose-graph.md"
 STOCK_SHARE = 0.24              # of stock Ceres' time on sphere2500
 ONLINE_MS = 33                  # that closing a loop may hold up the tracking: one frame at 30 Hz
 PLANTED, PLANTED_PERCENT = 100, 5  # false loops, and by how much they may change the ATE
@@ -38,11 +38,12 @@ class Bench:
 
     def tutti_run(self, name, folder, *options, config=None):
         """summary.json of a run of the README's rows, in `folder`."""
-        _, yaml, dataset, _, _ = ROWS[name]
-        if dataset is None:
-            yaml, dataset = generate_world(self.a.build / "apps/tutti/tutti", self.a.out / f"{name}-data", WORLDS[name])
+        row = ROWS[name]
+        if row.data:
+            yaml, dataset = table.ROOT / "data" / "configs" / row.config, self.a.data / row.data
         else:
-            yaml, dataset = ROOT / "data" / "configs" / yaml, self.a.data / dataset
+            dataset = table.generate(self.a.tutti, self.a.out / f"{name}-data", [*row.world, "--seed", 1, *row.routes[0]])
+            yaml = dataset / "config.yaml"
         out = self.a.out / folder
         if not dataset.exists():
             print(f"{name}: {dataset} is absent", file=sys.stderr)
@@ -168,7 +169,7 @@ def planted(bench):
         change = 100 * (ate[1] / ate[0] - 1)
         far, near = (f"{end:.3g} sigma of {len(of)}" if of else "none" for end, of in
                      ((max(taken, default=0), taken), (min(refused, default=0), refused)))
-        lines.append(f"| {ROWS[name][0]} | {ate[0]:.4f} m | {ate[1]:.4f} m | {change:+.2f} % | {kept} of {planted_ones} "
+        lines.append(f"| {ROWS[name].title} | {ate[0]:.4f} m | {ate[1]:.4f} m | {change:+.2f} % | {kept} of {planted_ones} "
                      f"| {mute} | {far} | {near} |")
         bench.expect(abs(change) <= PLANTED_PERCENT and planted_ones == PLANTED, f"{name}: {change:.1f} %, {planted_ones} planted")
     return lines
@@ -178,22 +179,13 @@ TABLES = {"published": published, "noisy": noisy, "speed": speed, "size": size, 
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("tables", nargs="*", metavar="TABLE", help=" ".join(TABLES))
-    parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build" / "release")
-    parser.add_argument("--data", type=pathlib.Path, default=os.environ.get("TUTTI_DATA", ROOT.parent / "shared" / "data"))
-    parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("/tmp/tutti-bench"), help="folder for runs (kept)")
-    parser.add_argument("--document", type=pathlib.Path, default=ROOT / "docs" / "results" / "pose-graph.md")
+    parser = table.parser(__doc__, "graphs", TABLES)
     parser.add_argument("--remark", default="", help="a sentence above the table")
-    parser.add_argument("--reuse", action="store_true")
-    bench = Bench(parser.parse_args())
-    bench.a.out.mkdir(parents=True, exist_ok=True)
-    for name in bench.a.tables or TABLES:
-        if name not in TABLES:
-            parser.error(f"unknown table '{name}'; there are {', '.join(TABLES)}")
-        head = f"Written by `bench/graph_table.py {name}`; load of the machine before: {os.getloadavg()[0]:.1f}, " \
+    bench = Bench(table.parse(parser, TABLES))
+    for name in bench.a.rows:
+        head = f"Written by `./dev bench graphs {name} --write`; load of the machine before: {os.getloadavg()[0]:.1f}, " \
                f"{os.cpu_count()} cores, {platform.machine()}. {bench.a.remark}".rstrip()
-        rewrite(bench.a.document, name, "\n".join([head, "", *TABLES[name](bench)]))
+        table.put_between(bench.a, DOCUMENT, name, "\n".join([head, "", *TABLES[name](bench)]))
     for what in bench.missed:
         print("missed:", what, file=sys.stderr)
     return 1 if bench.missed else 0

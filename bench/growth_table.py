@@ -1,22 +1,20 @@
 #!/usr/bin/env python3
-"""Measures how time and memory grow with the number of locations, and writes docs/results/loop-growth.md.
+"""Measures how time and memory grow with the number of locations, (docs/results/loop-growth.md).
 
-usage: bench/growth_table.py --program build/release/bench/loop_growth [--locations N] [--limit N] [--saved N] [--out DIR]
-                             [--reuse] [--remark TEXT] [--document FILE]
+usage: ./dev bench growth [--locations N] [--limit N] [--saved N] [--reuse] [--remark TEXT] [--write]
+       (or bench/growth_table.py --build build/release)
+
 Runs bench/loop_growth three times: without a limit, with a limit of working memory and long-term memory in a file,
 and with as many locations as are saved and loaded again. --reuse makes the document of the CSV files that an earlier
 run left in --out. Needs nothing but Python 3; 20,000 locations without a limit need about 13 GB of memory.
 """
-import argparse
 import csv
-import pathlib
 import platform
 import subprocess
 import sys
 import tempfile
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
-DOCUMENT = ROOT / "docs" / "results" / "loop-growth.md"
+import table
 COLUMNS = [("locations", "locations", 0), ("in_memory", "in STM and WM", 0), ("words", "words", 0),
            ("quantise_ms", "quantise", 1), ("likelihood_ms", "likelihood", 1), ("filter_ms", "filter", 1),
            ("memory_ms", "memory", 1), ("total_ms", "all", 1), ("total_p99_ms", "all, p99", 1),
@@ -39,7 +37,7 @@ def run(program, file, locations, limit, folder, reuse):
     return rows, {k: float(v) for k, v in zip(pairs[::2], pairs[1::2])}
 
 
-def table(rows):
+def table_of(rows):
     shown = [r for i, r in enumerate(rows) if i < 2 or (i + 1) % 5 == 0 or i == len(rows) - 1]
     lines = ["| " + " | ".join(title for _, title, _ in COLUMNS) + " |", "|---" * len(COLUMNS) + "|"]
     for row in shown:
@@ -58,19 +56,19 @@ def document(free, limited, saving, limit, remark):
     end = limited[-1]
     beyond = end["locations"] - full["locations"]
     lines = ["# How time and memory grow with the number of locations", "",
-             "Written by `bench/growth_table.py --program build/release/bench/loop_growth`; do not edit. Synthetic "
+             "Written by `./dev bench growth --write`; do not edit. Synthetic "
              "signatures, three members of 400 features (`bench/loop_growth.cc` says what the walk is like). "
              "Milliseconds per image without extraction and verification, medians over the last 1,000 locations; "
              "`processor` is processor time of all threads (2 at most), which a busy machine changes less than the "
              f"time on the clock. Machine: {platform.machine()}. {remark}".rstrip(), "", "## Without a limit", ""]
-    lines += table(free)
+    lines += table_of(free)
     lines += ["", f"At {last['locations']:,.0f} locations filter and vocabulary take "
               f"{last['quantise_ms'] + last['likelihood_ms'] + last['filter_ms']:.1f} ms "
               f"({last['cpu_ms']:.1f} ms of processor time with all else). One location in working memory takes "
               f"{kb_per_location(free):.0f} KB, features for verification included. Nearly all of the time goes into the "
               "search for words: [index.md](index.md) has other indices beside it.", "",
               f"## Working memory of {limit:,}, every image stored in a file", ""]
-    lines += table(limited)
+    lines += table_of(limited)
     lines += ["", f"The last 1,000 images against the 1,000 after the limit was reached: "
               f"{end['total_ms'] / full['total_ms']:.2f} of the time on the clock, "
               f"{end['cpu_ms'] / full['cpu_ms']:.2f} of the processor time. A location takes "
@@ -84,27 +82,20 @@ def document(free, limited, saving, limit, remark):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--program", required=True, help="the executable loop_growth")
+    parser = table.parser(__doc__, "growth")
     parser.add_argument("--locations", type=int, default=20000)
     parser.add_argument("--limit", type=int, default=1000)
     parser.add_argument("--saved", type=int, default=5000, help="locations of the detector that is saved and loaded")
-    parser.add_argument("--out", default="/tmp/tutti-growth", help="folder for the CSV files (kept)")
-    parser.add_argument("--reuse", action="store_true", help="take CSV files that are there instead of running")
     parser.add_argument("--remark", default="", help="a sentence about the machine or the runs, for the document")
-    parser.add_argument("--document", default=DOCUMENT, help="file to write")
-    a = parser.parse_args()
-    out = pathlib.Path(a.out)
-    out.mkdir(parents=True, exist_ok=True)
-    program = pathlib.Path(a.program).resolve()
-    free, _ = run(program, out / "free.csv", a.locations, 0, None, a.reuse)
-    with tempfile.TemporaryDirectory(dir=out) as folder:
-        limited, _ = run(program, out / "limited.csv", a.locations, a.limit, folder, a.reuse)
-    with tempfile.TemporaryDirectory(dir=out) as folder:
-        rows, saving = run(program, out / "saved.csv", a.saved, 0, folder, a.reuse)
+    a = table.parse(parser)
+    program = a.build / "bench" / "loop_growth"
+    free, _ = run(program, a.out / "free.csv", a.locations, 0, None, a.reuse)
+    with tempfile.TemporaryDirectory(dir=a.out) as folder:
+        limited, _ = run(program, a.out / "limited.csv", a.locations, a.limit, folder, a.reuse)
+    with tempfile.TemporaryDirectory(dir=a.out) as folder:
+        rows, saving = run(program, a.out / "saved.csv", a.saved, 0, folder, a.reuse)
     saving["locations"] = rows[-1]["locations"]
-    pathlib.Path(a.document).write_text("\n".join(document(free, limited, saving, a.limit, a.remark)))
-    print(f"written: {a.document}")
+    table.put(a, table.RESULTS / "loop-growth.md", "\n".join(document(free, limited, saving, a.limit, a.remark)))
     return 0
 
 

@@ -1,12 +1,11 @@
 #!/usr/bin/env python3
 """Drives round and round one synthetic block and samples the memory: it must follow the map, not the frames.
 
-usage: bench/long_run.py --tutti build/release/apps/tutti/tutti [--frames 20000] [--laps 4] [--out DIR] [--document FILE]
+usage: ./dev bench memory [--frames 20000] [--laps 4] [--write]   (or bench/long_run.py --build build/release)
 Renders --laps laps (stereo, 400x200), which are then played one after the other until there are --frames: every --laps-th lap
 shows the same bytes again. `trajectory_odometry.txt` is left out (run.odometry_pass: false): an odometry without loops does
-not know that it is the same block. Writes its table into docs/results/timing.md. Needs nothing but Python 3 and /proc.
+not know that it is the same block. Its table is in docs/results/timing.md. Needs nothing but Python 3 and /proc.
 """
-import argparse
 import json
 import pathlib
 import re
@@ -14,7 +13,8 @@ import shutil
 import subprocess
 import sys
 
-from performance import DOCUMENT, ROOT, rewrite
+import table
+from performance import DOCUMENT
 
 
 def render(tutti, folder, laps):
@@ -64,24 +64,20 @@ def run(tutti, folder, out):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--tutti", required=True, type=pathlib.Path)
+    parser = table.parser(__doc__, "memory")
     parser.add_argument("--frames", type=int, default=20000)
     parser.add_argument("--laps", type=int, default=4)
-    parser.add_argument("--out", type=pathlib.Path, default=ROOT / "build" / "long_run")
-    parser.add_argument("--document", type=pathlib.Path, default=DOCUMENT)
-    arguments = parser.parse_args()
-    out = arguments.out.resolve()
-    render(arguments.tutti, out / "laps", arguments.laps)
-    repeat(out / "laps", out / "data", arguments.frames)
-    samples, summary = run(arguments.tutti, out / "data", out / "result")
+    a = table.parse(parser)
+    render(a.tutti, a.out / "laps", a.laps)
+    repeat(a.out / "laps", a.out / "data", a.frames)
+    samples, summary = run(a.tutti, a.out / "data", a.out / "result")
     frames, loops = summary["frames"], summary["loops"]
     text = [f"{frames['tracked']} of {frames['total']} frames posed, {summary['keyframes']} keyframes, {loops['accepted']} loops; "
             f"ATE {summary['evaluation']['slam']['ate_rmse_m']:.3f} m; "
             f"{1e3 * summary['timing']['cpu_s'] / frames['total']:.1f} CPU-ms per frame.", "",
             "| frames | " + " | ".join(str(n) for n, _ in samples) + " |", "|---|" + "---|" * len(samples),
             "| resident memory, MB | " + " | ".join(f"{mb:.0f}" for _, mb in samples) + " |"]
-    rewrite(arguments.document, "long", "\n".join(text))
+    table.put_between(a, DOCUMENT, "long", "\n".join(text))
 
 
 if __name__ == "__main__":

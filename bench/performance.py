@@ -1,23 +1,19 @@
 #!/usr/bin/env python3
 """Runs `tutti run --timing` on real sequences and writes the tables of docs/results/timing.md between their markers.
 
-usage: bench/performance.py --tutti build/release/apps/tutti/tutti [--data DIR] [--out DIR] [--reuse] [--remark TEXT]
-                            [--document FILE] [ROW...]
-Rows: kitti redkitchen. --reuse makes the tables of the results that an earlier run left in --out; rows that are not run keep
-what the document says. Needs nothing but Python 3.
+usage: ./dev bench performance [ROW...] [--reuse] [--remark TEXT] [--write]   (or bench/performance.py --build build/release)
+
+Rows: kitti redkitchen. Rows that are not run keep what the document says. Needs nothing but Python 3.
 """
-import argparse
 import json
 import os
-import pathlib
 import platform
 import subprocess
 import sys
 
-from document import rewrite
+import table
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
-DOCUMENT = ROOT / "docs" / "results" / "timing.md"
+DOCUMENT = table.RESULTS / "timing.md"
 ROWS = {"kitti": ("`kitti_00_head`, mono", "kitti_00-02_mono.yaml", "kitti_00_head"),
         "redkitchen": ("`redkitchen`, RGB-D", "7scenes.yaml", "redkitchen")}
 
@@ -31,7 +27,7 @@ def summary_of(tutti, name, data, out, reuse):
             print(f"{name}: {data / dataset} is absent; the table is left as it is", file=sys.stderr)
             return None
         load = os.getloadavg()[0]
-        subprocess.run([tutti, "run", "--config", ROOT / "data" / "configs" / config, "--dataset", data / dataset,
+        subprocess.run([tutti, "run", "--config", table.ROOT / "data" / "configs" / config, "--dataset", data / dataset,
                         "--out", folder, "--timing", "--trace", out / f"{name}.json"], check=True)
         (folder / "load.txt").write_text(f"{load:.1f}")
     summary = json.loads((folder / "summary.json").read_text())
@@ -59,21 +55,13 @@ def section(name, s, remark):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("rows", nargs="*", metavar="ROW", help="kitti, redkitchen (default: both)")
-    parser.add_argument("--tutti", required=True, type=pathlib.Path)
-    parser.add_argument("--data", type=pathlib.Path, default=os.environ.get("TUTTI_DATA", ROOT.parent / "shared" / "data"))
-    parser.add_argument("--out", type=pathlib.Path, default=ROOT / "build" / "performance")
-    parser.add_argument("--document", type=pathlib.Path, default=DOCUMENT)
+    parser = table.parser(__doc__, "performance", ROWS)
     parser.add_argument("--remark", default="", help="a sentence beside the figures")
-    parser.add_argument("--reuse", action="store_true")
-    arguments = parser.parse_args()
-    for name in arguments.rows or ROWS:
-        if name not in ROWS:
-            parser.error(f"unknown row '{name}'; there are {', '.join(ROWS)}")
-        summary = summary_of(arguments.tutti, name, pathlib.Path(arguments.data), arguments.out, arguments.reuse)
+    a = table.parse(parser, ROWS)
+    for name in a.rows:
+        summary = summary_of(a.tutti, name, a.data, a.out, a.reuse)
         if summary is not None:
-            rewrite(arguments.document, name, section(name, summary, arguments.remark))
+            table.put_between(a, DOCUMENT, name, section(name, summary, a.remark))
 
 
 if __name__ == "__main__":

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """Draws the members' posteriors and the ensemble's over a revisit, as docs/loop-closure.md shows them.
 
-usage: bench/posterior_picture.py --tutti build/release/apps/tutti/tutti [--first N] [--last N] [--svg FILE]
+usage: ./dev bench picture [--first N] [--last N] [--write]   (or bench/posterior_picture.py --build build/release)
+
 Generates a corridor with doors and posters that repeat (240x192, walked three times) and runs `tutti loops
 --keep-posterior` on it. Needs nothing but Python 3.
 """
-import argparse
 import collections
 import csv
 import pathlib
@@ -13,7 +13,8 @@ import subprocess
 import sys
 import tempfile
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
+import table
+
 PANEL, GAP, LEFT, TOP, CURVE = 250, 22, 46, 30, 70  # [px]
 FAINTEST, DARKEST = 0.005, 0.3  # posteriors below are white, above of full colour
 COLOURS = {"surf": "#1b6ca8", "sift": "#2a8f4f", "orb": "#c8641b", "combined": "#222222"}
@@ -126,15 +127,13 @@ def run(tutti, out):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--tutti", required=True, help="the executable")
+    parser = table.parser(__doc__, "picture")
     parser.add_argument("--first", type=int, default=192, help="first image drawn (from 0)")
     parser.add_argument("--last", type=int, default=262, help="last image drawn")
     parser.add_argument("--locations", type=int, default=100, help="places drawn, from 0")
-    parser.add_argument("--svg", default=ROOT / "docs" / "images" / "posteriors.svg")
-    a = parser.parse_args()
+    a = table.parse(parser)
     with tempfile.TemporaryDirectory() as out:
-        run(pathlib.Path(a.tutti).resolve(), out)
+        run(a.tutti, out)
         posteriors, columns, pairs = read_posteriors(pathlib.Path(out) / "posteriors.csv")
         hypotheses = read_hypotheses(pathlib.Path(out) / "hypotheses.csv")
     members = [c for c in columns if c != "combined"]
@@ -145,8 +144,9 @@ def main():
         h = {i: float(row[column]) for i, row in hypotheses.items()}
         title = "all together" if name == "combined" else name.upper()
         picture.panel(k, title, posteriors[name], pairs, h, COLOURS.get(name, "#7a3b9c"))
-    pathlib.Path(a.svg).write_text(picture.svg(len(members) + 1))
-    print(f"written: {a.svg}")
+    file = (table.ROOT / "docs" / "images" if a.write else a.out) / "posteriors.svg"
+    file.write_text(picture.svg(len(members) + 1))
+    print(f"written: {table.shown(file)}")
     return 0
 
 

@@ -1,27 +1,24 @@
 #!/usr/bin/env python3
 """Adds false loops to published graphs, solves them with each robust method, and rewrites the tables of docs/results/false-loops.md.
 
-usage: bench/robust_table.py --program build/release/bench/robust_graphs [--data DIR] [--csv FILE] [--seeds N]
-                             [--methods M,...] [--graphs G,...] [--cases COUNTxCLUSTER,...] [--reuse]
-                             [--time-limit S]
-Every run adds a line to --csv (build/robust_graphs.csv); runs that are in it already are not repeated, so that the
+usage: ./dev bench false-loops [--seeds N] [--methods M,...] [--graphs G,...] [--cases COUNTxCLUSTER,...] [--time-limit S]
+                               [--reuse] [--write]   (or bench/robust_table.py --build build/release)
+
+Every run adds a line to robust_graphs.csv in --out; runs that are in it already are not repeated, so that the
 sweep can be stopped and gone on with, and widened. --reuse only makes the tables. Exit status 1 if the default method
 misses its target (ATE against the clean solution <= 0.5 % of the diagonal at 100 random false loops). The whole sweep
 takes hours of processor time, most of it for the methods that fail. Needs nothing but Python 3.
 """
-import argparse
 import csv
-import pathlib
 import resource
 import signal
 import statistics
 import subprocess
 import sys
 
-from document import rewrite
+import table
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
-DOCUMENT = ROOT / "docs" / "results" / "false-loops.md"
+DOCUMENT = table.RESULTS / "false-loops.md"
 GRAPHS = ["intel", "manhattan", "manhattanOlson3500", "ringCity", "sphere2500", "parking-garage"]
 METHODS = ["none", "huber", "cauchy", "dcs", "switchable", "pcm+none", "gnc-tls", "pcm+gnc", "gnc+sigma", "gnc"]
 CASES = ["10x1", "50x1", "100x1", "500x1", "100x10", "500x50"]
@@ -45,7 +42,7 @@ def sweep(a, file):
                 for seed in map(str, range(1, a.seeds + 1)):
                     if (graph, method, count, cluster, seed) in done:
                         continue
-                    command = [a.program, a.data / "posegraphs" / f"{graph}.g2o", method, count, cluster, seed, seed]
+                    command = [a.build / "bench" / "robust_graphs", a.data / "posegraphs" / f"{graph}.g2o", method, count, cluster, seed, seed]
                     run = subprocess.run(command, stdout=subprocess.PIPE,
                                          preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (a.time_limit, a.time_limit)))
                     line = run.stdout.decode()
@@ -72,7 +69,7 @@ def cell(rows):
 
 
 def tables(rows):
-    lines = ["Written by `bench/robust_table.py`; do not edit between the markers. Worst ATE over the seeds / least "
+    lines = ["Written by `./dev bench false-loops --write`; do not edit between the markers. Worst ATE over the seeds / least "
              "precision / least recall / median processor time (number of seeds). Bold: beyond 0.5 % of the diagonal.", ""]
     for case in CASES:
         count, cluster = case.split("x")
@@ -92,21 +89,18 @@ def tables(rows):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--program", default=ROOT / "build" / "release" / "bench" / "robust_graphs", type=pathlib.Path)
-    parser.add_argument("--data", default=ROOT.parent / "shared" / "data", type=pathlib.Path)
-    parser.add_argument("--csv", default=ROOT / "build" / "robust_graphs.csv", type=pathlib.Path)
+    parser = table.parser(__doc__, "false-loops")
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--methods", default=",".join(METHODS))
     parser.add_argument("--graphs", default=",".join(GRAPHS))
     parser.add_argument("--cases", default=",".join(CASES))
     parser.add_argument("--time-limit", type=int, default=900, help="of one run, processor time [s]")
-    parser.add_argument("--reuse", action="store_true")
-    a = parser.parse_args()
+    a = table.parse(parser)
+    file = a.out / "robust_graphs.csv"
     if not a.reuse:
-        sweep(a, a.csv)
-    rows = read(a.csv)
-    rewrite(DOCUMENT, "robust", tables(rows))
+        sweep(a, file)
+    rows = read(file)
+    table.put_between(a, DOCUMENT, "robust", tables(rows))
     missed = [r for r in rows if r["method"] == DEFAULT and (r["count"], r["cluster"]) == ("100", "1")
               and (r["ate"] == LATE or float(r["ate"]) > LIMIT)]
     for r in missed:

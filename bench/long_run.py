@@ -72,7 +72,7 @@ def main():
     repeat(a.out / "laps", a.out / "data", a.frames)
     samples, summary = run(a.tutti, a.out / "data", a.out / "result")
     frames, loops = summary["frames"], summary["loops"]
-    text = [f"{frames['tracked']} of {frames['total']} frames posed, {summary['keyframes']} keyframes, {loops['accepted']} loops; "
+    text = [f"{frames['tracked']} of {frames['total']} frames tracked, {summary['keyframes']} keyframes, {loops['accepted']} loops; "
             f"ATE {summary['evaluation']['slam']['ate_rmse_m']:.3f} m; "
             f"{1e3 * summary['timing']['cpu_s'] / frames['total']:.1f} CPU-ms per frame.", "",
             "| frames | " + " | ".join(str(n) for n, _ in samples) + " |", "|---|" + "---|" * len(samples),

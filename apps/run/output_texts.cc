@@ -228,7 +228,7 @@ std::string LoopsCsv(const RunResult& r) {
 
 std::string ResultTable(const RunResult& r) {
   std::ostringstream out;
-  out << "\n  frames " << r.frames_tracked << " of " << r.frames_total << " posed";
+  out << "\n  frames " << r.frames_tracked << " of " << r.frames_total << " tracked";
   if (!r.bad.empty()) out << ", " << r.bad.size() << " bad";
   if (r.realtime) out << ", " << r.frames_dropped << " dropped";
   out << "; keyframes " << r.keyframes << "; loops " << r.LoopsAccepted() << " accepted of " << r.loops.size()

@@ -133,7 +133,7 @@ void AddRunCommand(CLI::App& app, int& exit_code) {
   command
       ->add_option(
           "--inject-false-loops", arguments->inject_false_loops,
-          "test of the back end: plant so many false loops (random relative poses, wrong places, pairs that "
+          "test of the back end: add so many false loops (random relative poses, wrong places, pairs that "
           "agree with each other) that look verified; loops.csv says what became of each (injected, reason, "
           "weight)")
       ->check(NotNegative());

@@ -45,7 +45,8 @@ INTRO = """# What did the ensemble buy?
 Every figure is over n runs that differ in what a user's runs differ in: the first frame and image noise on real data, the
 world and its route on generated ones. ATE: mean +- half of the 95 % confidence interval, and the worst run. p: paired t-test
 of the ATE against the ensemble's. Mono is aligned by Sim(3), the rest by SE(3). In `redkitchen` colour and depth are not
-synchronised: differences of ATE below about half a centimetre mean nothing there.
+synchronised: differences of ATE below about half a centimetre mean nothing there. Times are in
+[docs/results/timing.md](docs/results/timing.md).
 """
 
 
@@ -79,7 +80,7 @@ def slim(comparison):
             "ate_mean_m": v["ate_rmse_m"]["mean"], "ate_half_width_m": v["ate_rmse_m"]["half_width_95"],
             "ate_worst_m": v["ate_rmse_m"]["largest"], "p": v["ate_minus_ensemble"].get("p"),
             "proposed": v["loops_proposed"]["mean"], "accepted": v["loops_accepted"]["mean"],
-            "false": v["loops_false"]["mean"], "loops_s": v["loops_s"]["mean"]}
+            "false": v["loops_false"]["mean"]}
     return out
 
 
@@ -91,13 +92,13 @@ def section(name, found):
     made = f"`tutti generate {' '.join(ROWS[name]['generate'])}`, five seeds. " if "generate" in ROWS[name] else ""
     n = max(v["n"] for v in found["variants"].values())
     lines = [f"## {ROWS[name]['title']}", "", f"{made}n = {n}; what varies: {found['varies']}.", "",
-             "| variant | proposed | accepted | false | ATE [m] | worst ATE [m] | p | loop closure [s] |",
-             "|---|--:|--:|--:|--:|--:|--:|--:|"]
+             "| variant | proposed | accepted | false | ATE [m] | worst ATE [m] | p |",
+             "|---|--:|--:|--:|--:|--:|--:|"]
     for variant, v in found["variants"].items():
         ate = number(v["ate_mean_m"], 4) + (f" +- {v['ate_half_width_m']:.4f}" if v["ate_half_width_m"] is not None else "")
         failed = f" ({v['failed']} failed)" if v["failed"] else ""
         lines.append(f"| {variant}{failed} | {number(v['proposed'], 1)} | {number(v['accepted'], 1)} | {number(v['false'], 1)} | {ate} "
-                     f"| {number(v['ate_worst_m'], 4)} | {number(v['p'], 3)} | {number(v['loops_s'], 1)} |")
+                     f"| {number(v['ate_worst_m'], 4)} | {number(v['p'], 3)} |")
     return "\n".join(lines) + "\n"
 
 

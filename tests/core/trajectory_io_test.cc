@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <fstream>
 
 #include "tests/support/test_data.h"
 #include "tutti/core/error.h"
@@ -13,11 +12,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-std::filesystem::path Write(const std::string& text) {
-  std::filesystem::path file = testing::FreshFolder() / "poses.txt";
-  std::ofstream(file) << text;
-  return file;
-}
+std::filesystem::path Write(const std::string& text) { return testing::FreshFile("poses.txt", text); }
 
 std::string ErrorOf(const std::string& text, TrajectoryFormat format) {
   try {

@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <cstdlib>
+#include <fstream>
 
 namespace tutti::testing {
 
@@ -25,6 +26,12 @@ std::filesystem::path FreshFolder() {
   std::filesystem::remove_all(folder);
   std::filesystem::create_directories(folder);
   return folder;
+}
+
+std::filesystem::path FreshFile(const std::string& name, const std::string& content) {
+  std::filesystem::path file = FreshFolder() / name;
+  std::ofstream(file, std::ios::binary) << content;
+  return file;
 }
 
 }  // namespace tutti::testing

@@ -15,6 +15,9 @@ std::filesystem::path RealData(const std::string& name);
 std::filesystem::path SourceDir();
 std::filesystem::path FreshFolder();
 
+/// A file with this content in such a folder.
+std::filesystem::path FreshFile(const std::string& name, const std::string& content);
+
 }  // namespace tutti::testing
 
 /// Skips the test with a clear line where the real data is absent.

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <fstream>
 
 #include "tests/support/error_of.h"
 #include "tests/support/test_data.h"
@@ -31,11 +30,7 @@ std::vector<double> Stamps(const Trajectory& trajectory) {
   return out;
 }
 
-std::filesystem::path Write(const std::string& text) {
-  std::filesystem::path file = testing::FreshFolder() / "poses.txt";
-  std::ofstream(file) << text;
-  return file;
-}
+std::filesystem::path Write(const std::string& text) { return testing::FreshFile("poses.txt", text); }
 
 TEST(TrajectoryFile, EveryFormatIsRecognisedAndReadBack) {
   const Trajectory written = Curve();

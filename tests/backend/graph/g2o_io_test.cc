@@ -3,8 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <fstream>
-
 #include "tests/backend/graph/synthetic_graph.h"
 #include "tests/support/test_data.h"
 #include "tutti/core/error.h"
@@ -14,11 +12,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-std::filesystem::path Write(const std::string& text) {
-  std::filesystem::path file = testing::FreshFolder() / "graph.g2o";
-  std::ofstream(file) << text;
-  return file;
-}
+std::filesystem::path Write(const std::string& text) { return testing::FreshFile("graph.g2o", text); }
 
 std::string ErrorOf(const std::string& text) {
   try {

@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <fstream>
 #include <opencv2/imgcodecs.hpp>
 
 #include "tests/support/test_data.h"
@@ -13,11 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-fs::path WriteFile(const std::string& name, const std::string& content) {
-  const fs::path file = testing::FreshFolder() / name;
-  std::ofstream(file, std::ios::binary) << content;
-  return file;
-}
+using testing::FreshFile;
 
 std::string Problem(const fs::path& file) {
   try {
@@ -29,7 +24,7 @@ std::string Problem(const fs::path& file) {
 }
 
 TEST(LoopMatrix, TextOfZerosAndOnes) {
-  const LoopGroundTruth truth = ReadLoopMatrix(WriteFile("t.txt", "# comment\n0 0 0\n0 0 0\n1,0.5,0\n"), 3);
+  const LoopGroundTruth truth = ReadLoopMatrix(FreshFile("t.txt", "# comment\n0 0 0\n0 0 0\n1,0.5,0\n"), 3);
   EXPECT_EQ(truth.size(), 3);
   EXPECT_EQ(truth.At(2, 0), LoopLabel::kLoop);
   EXPECT_EQ(truth.At(2, 1), LoopLabel::kIgnore);
@@ -37,12 +32,12 @@ TEST(LoopMatrix, TextOfZerosAndOnes) {
 }
 
 TEST(LoopMatrix, UpperTriangleIsTransposed) {
-  const LoopGroundTruth truth = ReadLoopMatrix(WriteFile("t.txt", "0 0 255\n0 0 0\n0 0 0\n"), 3);
+  const LoopGroundTruth truth = ReadLoopMatrix(FreshFile("t.txt", "0 0 255\n0 0 0\n0 0 0\n"), 3);
   EXPECT_EQ(truth.At(2, 0), LoopLabel::kLoop);
 }
 
 TEST(LoopMatrix, TextOfPairs) {
-  const LoopGroundTruth truth = ReadLoopMatrix(WriteFile("t.txt", "5 1\n6 2\n7 3\n"), 10);
+  const LoopGroundTruth truth = ReadLoopMatrix(FreshFile("t.txt", "5 1\n6 2\n7 3\n"), 10);
   EXPECT_EQ(truth.size(), 10);
   EXPECT_EQ(truth.At(6, 2), LoopLabel::kLoop);
   EXPECT_EQ(truth.RowsWithLoop(), 3);
@@ -72,21 +67,21 @@ TEST(LoopMatrix, NumbersAreLabelsWhereThereIsOneForEachPair) {
 
 TEST(LoopMatrix, BadFilesSayWhatIsWrongAndWhere) {
   EXPECT_NE(Problem("/nowhere/t.txt").find("can't be opened"), std::string::npos);
-  EXPECT_NE(Problem(WriteFile("a.txt", "0 0\n0 x\n")).find("a.txt:2"), std::string::npos);
-  EXPECT_NE(Problem(WriteFile("a.txt", "0 0 0\n0 0\n")).find("a.txt:2"), std::string::npos);
-  EXPECT_NE(Problem(WriteFile("a.txt", "0 0 0\n0 0 0\n")).find("2 x 3"), std::string::npos);
-  EXPECT_NE(Problem(WriteFile("a.txt", "0 -1\n0 0\n")).find("a.txt:1"), std::string::npos);
-  EXPECT_NE(Problem(WriteFile("a.txt", "50 1\n6 2\n7 3\n")).find("50 1"), std::string::npos);
-  EXPECT_FALSE(Problem(WriteFile("a.txt", "")).empty());
-  EXPECT_FALSE(Problem(WriteFile("a.txt", "# nothing\n")).empty());
-  EXPECT_NE(Problem(WriteFile("a.mat", "MATLAB 5.0 MAT-file" + std::string(200, '\0'))).find("not an image"),
+  EXPECT_NE(Problem(FreshFile("a.txt", "0 0\n0 x\n")).find("a.txt:2"), std::string::npos);
+  EXPECT_NE(Problem(FreshFile("a.txt", "0 0 0\n0 0\n")).find("a.txt:2"), std::string::npos);
+  EXPECT_NE(Problem(FreshFile("a.txt", "0 0 0\n0 0 0\n")).find("2 x 3"), std::string::npos);
+  EXPECT_NE(Problem(FreshFile("a.txt", "0 -1\n0 0\n")).find("a.txt:1"), std::string::npos);
+  EXPECT_NE(Problem(FreshFile("a.txt", "50 1\n6 2\n7 3\n")).find("50 1"), std::string::npos);
+  EXPECT_FALSE(Problem(FreshFile("a.txt", "")).empty());
+  EXPECT_FALSE(Problem(FreshFile("a.txt", "# nothing\n")).empty());
+  EXPECT_NE(Problem(FreshFile("a.mat", "MATLAB 5.0 MAT-file" + std::string(200, '\0'))).find("not an image"),
             std::string::npos);
-  EXPECT_FALSE(Problem(WriteFile("a.png", std::string("\x89PNG\r\n\x1a\n\0\0garbage", 18))).empty());
+  EXPECT_FALSE(Problem(FreshFile("a.png", std::string("\x89PNG\r\n\x1a\n\0\0garbage", 18))).empty());
 }
 
 // Found by fuzzing (tests/fuzz): the message made an integer of it.
 TEST(LoopMatrix, APairBeyondAllIntegersIsAnErrorThatShowsIt) {
-  EXPECT_NE(Problem(WriteFile("t.txt", "444444444444444444444 4\n")).find("4.44444e+20 4"),
+  EXPECT_NE(Problem(FreshFile("t.txt", "444444444444444444444 4\n")).find("4.44444e+20 4"),
             std::string::npos);
 }
 

@@ -1,5 +1,5 @@
 # What is installed beside the libraries: find_package(tutti COMPONENTS core frontend loopclosure backend slam), documents
-# and configurations.
+# and configurations. Components of the installation are those of the Debian packages (TuttiPackages.cmake).
 include(CMakePackageConfigHelpers)
 configure_package_config_file(cmake/tuttiConfig.cmake.in
   "${PROJECT_BINARY_DIR}/tuttiConfig.cmake"

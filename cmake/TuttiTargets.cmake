@@ -1,10 +1,14 @@
 # Helpers that give every target the same language level, warnings and install rules.
 
+include(TuttiDependencies)
+
 # tutti_compile_options(target): C++17, strict warnings, optional sanitizers. -march=native stays off
-# unless asked for, for all targets alike (Eigen's alignment must agree between libraries).
+# unless asked for, for all targets alike (Eigen's alignment must agree between libraries). What a library exports is what
+# stands between "#pragma GCC visibility push(default)" and "pop" in its headers (and is tutti's own: exports.map).
 function(tutti_compile_options target)
   target_compile_features(${target} PUBLIC cxx_std_17)
-  set_target_properties(${target} PROPERTIES CXX_EXTENSIONS OFF)
+  set_target_properties(${target} PROPERTIES CXX_EXTENSIONS OFF POSITION_INDEPENDENT_CODE ON
+    CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON)
   target_compile_options(${target} PRIVATE
     -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Wold-style-cast -Wcast-qual
     -Woverloaded-virtual -Wunused -Wformat=2 -Wimplicit-fallthrough)
@@ -30,25 +34,53 @@ function(tutti_see_private_headers target)
   target_include_directories(${target} PRIVATE "${PROJECT_SOURCE_DIR}")
 endfunction()
 
-# tutti_add_library(name SOURCES ... [PUBLIC libs...] [PRIVATE libs...])
-# Makes tutti_<name>, its alias tutti::<name>, its include folder, and installs and exports it.
+# tutti_share_imported(): what find_package made in this folder is known in all others, too: in those that link our static
+# libraries, a parent project's as well.
+function(tutti_share_imported)
+  get_property(targets DIRECTORY PROPERTY IMPORTED_TARGETS)
+  foreach(target IN LISTS targets)
+    set_target_properties(${target} PROPERTIES IMPORTED_GLOBAL TRUE)
+  endforeach()
+endfunction()
+
+# tutti_add_library(name SOURCES ... [PUBLIC libs...] [PRIVATE libs...] [PACKAGE component])
+# Makes tutti_<name>, its alias tutti::<name>, its include folder, and installs and exports it with a pkg-config file.
+# PACKAGE: the Debian package that it belongs to, where that has another name.
 function(tutti_add_library name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  cmake_parse_arguments(ARG "" "PACKAGE" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
   set(target tutti_${name})
-  add_library(${target} STATIC ${ARG_SOURCES})
+  add_library(${target} ${ARG_SOURCES})
   add_library(tutti::${name} ALIAS ${target})
+  tutti_share_imported()
   tutti_compile_options(${target})
   target_include_directories(${target} PUBLIC
     "$<BUILD_INTERFACE:${CMAKE_CURRENT_SOURCE_DIR}/include>"
     "$<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>")
   tutti_see_private_headers(${target})
   target_link_libraries(${target} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
-  set_target_properties(${target} PROPERTIES EXPORT_NAME ${name})
+  # No definition that only shared libraries are compiled with: objects are the same, and a compiler cache finds them.
+  set_target_properties(${target} PROPERTIES EXPORT_NAME ${name} DEFINE_SYMBOL "" INSTALL_RPATH "$ORIGIN"
+    VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
+  if(BUILD_SHARED_LIBS AND CMAKE_SYSTEM_NAME STREQUAL "Linux")
+    set(exports "${PROJECT_SOURCE_DIR}/cmake/exports.map")
+    target_link_options(${target} PRIVATE "LINKER:--version-script=${exports}")
+    set_target_properties(${target} PROPERTIES LINK_DEPENDS "${exports}")
+  endif()
+  if(NOT TUTTI_INSTALL)
+    return()
+  endif()
+  if(NOT ARG_PACKAGE)
+    set(ARG_PACKAGE ${name})
+  endif()
   install(TARGETS ${target} EXPORT tutti_${name}_targets
-    ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}" LIBRARY DESTINATION "${CMAKE_INSTALL_LIBDIR}")
-  install(DIRECTORY include/ DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
+    ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}" COMPONENT ${ARG_PACKAGE}
+    LIBRARY DESTINATION "${CMAKE_INSTALL_LIBDIR}" COMPONENT ${ARG_PACKAGE})
+  install(DIRECTORY include/ DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}" COMPONENT ${ARG_PACKAGE})
   install(EXPORT tutti_${name}_targets NAMESPACE tutti:: FILE tutti_${name}_targets.cmake
-    DESTINATION "${CMAKE_INSTALL_LIBDIR}/cmake/tutti")
+    DESTINATION "${CMAKE_INSTALL_LIBDIR}/cmake/tutti" COMPONENT ${ARG_PACKAGE})
+  install(FILES cmake/tutti_${name}_dependencies.cmake DESTINATION "${CMAKE_INSTALL_LIBDIR}/cmake/tutti"
+    COMPONENT ${ARG_PACKAGE})
+  tutti_describe_library(${name} PACKAGE ${ARG_PACKAGE} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
 endfunction()
 
 # tutti_add_test(name SOURCES ... LIBS ...): one GTest program per module; ctest sees each test.

@@ -7,6 +7,7 @@
 
 #include "tutti/core/pose.h"
 
+#pragma GCC visibility push(default)  // used across libraries
 namespace tutti::internal {
 
 /// S_a_b that minimises sum ||a - S b||^2 (Umeyama, PAMI 13(4) 1991, eq. 40-43; scale 1 unless `with_scale`).
@@ -16,3 +17,4 @@ std::optional<Similarity> Umeyama(const std::vector<Eigen::Vector3d>& a,
                                   const std::vector<Eigen::Vector3d>& b, bool with_scale);
 
 }  // namespace tutti::internal
+#pragma GCC visibility pop

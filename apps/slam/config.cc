@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "apps/slam/config_table.h"
+#include "core/example_configs.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 
@@ -183,13 +184,13 @@ RunConfig ParseConfig(const std::string& text, const std::string& name) {
 RunConfig LoadConfig(const std::filesystem::path& file) {
   std::error_code ignored;
   if (std::filesystem::is_directory(file, ignored)) {
-    throw InputError(file.string() +
-                     ": is a folder; --config needs a YAML file such as data/configs/images.yaml");
+    throw InputError(file.string() + ": is a folder; --config needs a YAML file such as " +
+                     internal::ExampleConfigs() + "/images.yaml");
   }
   std::ifstream in(file);
   if (!in) {
-    throw InputError(file.string() +
-                     ": can't be opened; --config needs a YAML file such as data/configs/images.yaml");
+    throw InputError(file.string() + ": can't be opened; --config needs a YAML file such as " +
+                     internal::ExampleConfigs() + "/images.yaml");
   }
   std::ostringstream text;
   text << in.rdbuf();

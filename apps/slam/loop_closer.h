@@ -21,6 +21,7 @@
 #include "tutti/slam/config.h"
 #include "tutti/slam/loop_record.h"
 
+#pragma GCC visibility push(default)  // used across libraries
 namespace tutti {
 
 /// Measures verified loops against the odometry's map, lets those in that agree, and works out how the map
@@ -102,3 +103,4 @@ class LoopCloser {
 };
 
 }  // namespace tutti
+#pragma GCC visibility pop

@@ -19,6 +19,7 @@
 #include "apps/slam/loop_closer.h"
 #include "apps/slam/loop_worker.h"
 
+#pragma GCC visibility push(default)  // used across libraries
 namespace tutti {
 
 /// Detector and LoopCloser: keyframes go in, and what they do to the map comes out a fixed number of frames
@@ -88,3 +89,4 @@ class LoopClosing {
 };
 
 }  // namespace tutti
+#pragma GCC visibility pop

@@ -8,6 +8,7 @@
 #include "tutti/loopclosure/detector.h"
 #include "tutti/slam/slam_options.h"
 
+#pragma GCC visibility push(default)  // used across libraries
 namespace tutti {
 
 /// The edge, or why there is none.
@@ -30,3 +31,4 @@ LoopConstraint MakeLoopConstraint(const Verification& verification, const Keyfra
 double MedianDepth(const KeyframeView& view);
 
 }  // namespace tutti
+#pragma GCC visibility pop

@@ -9,6 +9,7 @@
 #include "tutti/backend/keyframe_graph.h"
 #include "tutti/frontend/odometry.h"
 
+#pragma GCC visibility push(default)  // used across libraries
 namespace tutti {
 
 /// How the map changes, in the order of the fields.
@@ -29,3 +30,4 @@ struct LoopUpdate {
 std::vector<int> Apply(const MapCorrection& correction, Odometry* odometry);
 
 }  // namespace tutti
+#pragma GCC visibility pop

@@ -13,6 +13,7 @@
 #include "tutti/core/span_recorder.h"
 #include "tutti/loopclosure/detector.h"
 
+#pragma GCC visibility push(default)  // used across libraries
 namespace tutti {
 
 /// The detector's stages and how long each took [ms], in their order; memory is one before and one after the
@@ -66,3 +67,4 @@ class LoopWorker {
 };
 
 }  // namespace tutti
+#pragma GCC visibility pop

@@ -18,6 +18,7 @@
 #include "apps/tutti/files.h"
 #include "apps/tutti/run_apart.h"
 #include "apps/tutti/run_with_report.h"
+#include "core/example_configs.h"
 #include "tutti/core/error.h"
 #include "tutti/frontend/dataset.h"
 #include "tutti/slam/config.h"
@@ -276,7 +277,9 @@ void AddCompareCommand(CLI::App& app, int& exit_code) {
       "run "
       "of its own,\n"
       "whose loops move the map that it tracks on. A run that fails is reported, and the rest go on.\n"
-      "Example: tutti compare --config data/configs/7scenes.yaml --dataset redkitchen --out cmp --variants "
+      "Example: tutti compare --config " +
+      internal::ExampleConfigs() +
+      "/7scenes.yaml --dataset redkitchen --out cmp --variants "
       "odometry,orb,ensemble");
   command->callback([command, arguments, &exit_code] { exit_code = RunCompare(*command, *arguments); });
 }

@@ -11,6 +11,7 @@
 #include "apps/tutti/commands.h"
 #include "apps/tutti/run_with_report.h"
 #include "apps/view/live_view.h"
+#include "core/example_configs.h"
 #include "tutti/core/error.h"
 #include "tutti/slam/config.h"
 
@@ -32,7 +33,7 @@ struct RunArguments {
   LiveViewOptions live;
 };
 
-void Require(const std::string& value, const char* option, const char* what) {
+void Require(const std::string& value, const char* option, const std::string& what) {
   if (value.empty()) throw InputError(std::string("run: ") + option + " is missing; it names " + what);
 }
 
@@ -71,7 +72,8 @@ int Run(const CLI::App& command, const RunArguments& arguments) {
     std::fputs(HelpConfig(arguments.advanced).c_str(), stdout);
     return 0;
   }
-  Require(arguments.config, "--config", "a YAML file, for example data/configs/tum_fr1_rgbd.yaml");
+  Require(arguments.config, "--config",
+          "a YAML file, for example " + internal::ExampleConfigs() + "/tum_fr1_rgbd.yaml");
   Require(arguments.dataset, "--dataset", "the data set's folder, a video file, or camera:0");
   Require(arguments.out, "--out", "the folder for the results");
   RunRequest request;
@@ -113,7 +115,7 @@ void AddRunCommand(CLI::App& app, int& exit_code) {
   CLI::App* command = app.add_subcommand("run", "visual SLAM on a data set: trajectories, loops, summary");
   const auto arguments = std::make_shared<RunArguments>();
   command->add_option("--config", arguments->config,
-                      "YAML file (data/configs has one for each public data set)");
+                      "YAML file (" + internal::ExampleConfigs() + " has one for each public data set)");
   command->add_option(
       "--dataset", arguments->dataset,
       "folder of the data set, a video file, or a camera: camera:0 (the first one), camera:1, ...; "

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "apps/tutti/commands.h"
+#include "apps/tutti/describe.h"
 #include "tutti/core/error.h"
 #include "tutti/slam/version.h"
 
@@ -24,6 +25,8 @@ int main(int argc, char** argv) {
   tutti::cli::AddOptimizeCommand(app, exit_code);
   tutti::cli::AddGenerateCommand(app, exit_code);
   tutti::cli::AddDemoCommand(app, exit_code);
+  tutti::cli::AddDescribeFlag(app);
+  for (CLI::App* command : app.get_subcommands({})) tutti::cli::AddDescribeFlag(*command);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

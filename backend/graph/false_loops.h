@@ -13,6 +13,7 @@
 
 #include "tutti/backend/pose_graph.h"
 
+#pragma GCC visibility push(default)  // used across libraries
 namespace tutti {
 
 enum class FalseLoopKind { kInTurn, kAnywhere, kTrueMeasurement, kSamePlace };
@@ -40,3 +41,4 @@ std::vector<std::size_t> PlantFalseLoops(PoseGraph& graph, const FalseLoopOption
 double BoundingBoxDiagonal(const PoseGraph& graph);
 
 }  // namespace tutti
+#pragma GCC visibility pop

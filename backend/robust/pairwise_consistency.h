@@ -7,6 +7,7 @@
 #include "tutti/backend/pose_graph.h"
 #include "tutti/backend/pose_graph_optimizer.h"
 
+#pragma GCC visibility push(default)  // used across libraries
 namespace tutti::internal {
 
 /// The cycle of two loops a, b and the odometry between their ends: query a -> query b, candidate b ->
@@ -27,3 +28,4 @@ std::vector<bool> PairwiseConsistentEdges(const PoseGraph& graph, const GraphStr
                                           GraphObjective objective, double threshold);
 
 }  // namespace tutti::internal
+#pragma GCC visibility pop

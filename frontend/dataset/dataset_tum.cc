@@ -3,6 +3,7 @@
 #include <cmath>
 #include <tuple>
 
+#include "core/example_configs.h"
 #include "frontend/dataset/dataset_folder.h"
 #include "tutti/core/error.h"
 
@@ -145,7 +146,8 @@ FolderContents FindTum(const std::filesystem::path& folder, const DatasetOptions
   if (!options.camera) {
     throw InputError(folder.string() +
                      ": the TUM layout holds no calibration; set fx, fy, cx, cy under 'camera:' in the "
-                     "configuration (data/configs/tum_fr1_rgbd.yaml and its like have them)");
+                     "configuration (" +
+                     internal::ExampleConfigs() + "/tum_fr1_rgbd.yaml and its like have them)");
   }
   out.left = options.camera;
   out.rate_hz = 30.0;

@@ -1,3 +1,1 @@
 find_dependency(yaml-cpp)
-find_dependency(nlohmann_json)
-find_dependency(OpenCV COMPONENTS core imgproc imgcodecs)

@@ -15,6 +15,7 @@
 
 #include "tutti/backend/pose_graph.h"
 
+#pragma GCC visibility push(default)
 namespace tutti {
 
 struct CertificateOptions {
@@ -45,3 +46,4 @@ struct Certificate {
 Certificate CertifyOptimum(const PoseGraph& graph, const CertificateOptions& options = {});
 
 }  // namespace tutti
+#pragma GCC visibility pop

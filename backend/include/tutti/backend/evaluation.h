@@ -15,6 +15,7 @@
 #include "tutti/core/pose.h"
 #include "tutti/core/trajectory.h"
 
+#pragma GCC visibility push(default)
 namespace tutti {
 
 /// kOrigin puts the first pose of the estimate on the reference's; kSE3 and kSim3 minimise the squared
@@ -176,3 +177,4 @@ EvaluationReport EvaluateTrajectory(const Trajectory& reference, const Trajector
                                     const RotationsAsWritten& written = {});
 
 }  // namespace tutti
+#pragma GCC visibility pop

@@ -14,6 +14,7 @@
 
 #include "tutti/backend/pose_graph.h"
 
+#pragma GCC visibility push(default)
 namespace tutti {
 
 struct G2oFile {
@@ -35,3 +36,4 @@ G2oFile ReadG2o(const std::filesystem::path& file);
 void WriteG2o(const std::filesystem::path& file, const PoseGraph& graph);
 
 }  // namespace tutti
+#pragma GCC visibility pop

@@ -11,6 +11,7 @@
 
 #include "tutti/backend/pose_graph.h"
 
+#pragma GCC visibility push(default)
 namespace tutti {
 
 class GraphCovariance {
@@ -41,3 +42,4 @@ class GraphCovariance {
 };
 
 }  // namespace tutti
+#pragma GCC visibility pop

@@ -17,6 +17,7 @@
 #include "tutti/backend/pose_graph.h"
 #include "tutti/backend/pose_graph_optimizer.h"
 
+#pragma GCC visibility push(default)
 namespace tutti {
 
 /// A keyframe as the map has it now.
@@ -136,3 +137,4 @@ class KeyframeGraph {
 void Rescale(const std::map<int, Similarity>& S_world_keyframe, LoopEdge* loop);
 
 }  // namespace tutti
+#pragma GCC visibility pop

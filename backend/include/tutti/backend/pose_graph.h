@@ -10,6 +10,7 @@
 
 #include "tutti/core/pose.h"
 
+#pragma GCC visibility push(default)
 namespace tutti {
 
 /// What a node is: planar pose (x, y, heading about z), rigid pose, or similarity (mono: the scale drifts
@@ -92,3 +93,4 @@ class PoseGraph {
 std::string CheckInformation(const Matrix7d& information, GraphKind kind);
 
 }  // namespace tutti
+#pragma GCC visibility pop

@@ -18,6 +18,7 @@
 #include "tutti/backend/pose_graph.h"
 #include "tutti/core/options.h"
 
+#pragma GCC visibility push(default)
 namespace tutti {
 
 enum class GraphObjective { kChi2, kChi2Log };
@@ -172,3 +173,4 @@ class PoseGraphOptimizer {
 };
 
 }  // namespace tutti
+#pragma GCC visibility pop

@@ -9,6 +9,7 @@
 
 #include "tutti/core/trajectory.h"
 
+#pragma GCC visibility push(default)
 namespace tutti {
 
 /// The formats of tutti/core/trajectory.h, and the vertices of a g2o graph, in order of their ids.
@@ -46,3 +47,4 @@ void WritePoseFile(const std::filesystem::path& file, const Trajectory& trajecto
 void WriteTimes(const std::filesystem::path& file, const Trajectory& trajectory);
 
 }  // namespace tutti
+#pragma GCC visibility pop

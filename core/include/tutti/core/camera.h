@@ -7,6 +7,7 @@
 
 #include "tutti/core/options.h"
 
+#pragma GCC visibility push(default)
 namespace tutti {
 
 /// Lens distortion. radtan: k1 k2 p1 p2 k3 as in OpenCV; equidistant: k1..k4 (Kannala-Brandt, cv::fisheye).
@@ -45,3 +46,4 @@ struct PinholeCamera {
 };
 
 }  // namespace tutti
+#pragma GCC visibility pop

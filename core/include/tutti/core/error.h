@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <string>
 
+#pragma GCC visibility push(default)
 namespace tutti {
 
 /// Bad input: a missing file, a damaged line, a wrong setting. The message names the file and line (or the
@@ -15,3 +16,4 @@ class InputError : public std::runtime_error {
 };
 
 }  // namespace tutti
+#pragma GCC visibility pop

@@ -18,6 +18,7 @@
 #include <utility>
 #include <vector>
 
+#pragma GCC visibility push(default)
 namespace tutti {
 
 /// What is said of an option beside its type and default.
@@ -149,6 +150,7 @@ std::string OutOfRange(const Options& options, const std::string& prefix = "") {
 }
 
 }  // namespace tutti
+#pragma GCC visibility pop
 
 /// TUTTI_OPTION(type, name, default, sentence, marks...): the field, and what is said of it. A default with
 /// commas stands in parentheses.

@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#pragma GCC visibility push(default)
 namespace tutti {
 
 using Vector6d = Eigen::Matrix<double, 6, 1>;
@@ -72,3 +73,4 @@ Pose ExpSE3(const Vector6d& tangent);
 Vector6d LogSE3(const Pose& pose);
 
 }  // namespace tutti
+#pragma GCC visibility pop

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#pragma GCC visibility push(default)
 namespace tutti {
 
 /// The lines of a trace: what kind of work a span is, whichever thread does it.
@@ -66,3 +67,4 @@ class ScopedSpan {
 };
 
 }  // namespace tutti
+#pragma GCC visibility pop

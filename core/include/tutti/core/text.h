@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#pragma GCC visibility push(default)
 namespace tutti {
 
 /// Splits at any of the separators, empty pieces dropped.
@@ -23,3 +24,4 @@ bool NaturalLess(const std::string& a, const std::string& b);
 std::string NearestWord(const std::string& word, const std::vector<std::string>& candidates);
 
 }  // namespace tutti
+#pragma GCC visibility pop

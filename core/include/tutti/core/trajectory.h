@@ -7,6 +7,7 @@
 
 #include "tutti/core/pose.h"
 
+#pragma GCC visibility push(default)
 namespace tutti {
 
 /// Pose of a body at a time: T_world_body.
@@ -48,3 +49,4 @@ void WriteTrajectory(const std::filesystem::path& file, const Trajectory& trajec
                      TrajectoryFormat format);
 
 }  // namespace tutti
+#pragma GCC visibility pop

@@ -6,6 +6,7 @@
 
 #include "tutti/frontend/dataset.h"
 
+#pragma GCC visibility push(default)
 namespace tutti {
 
 /// Bounds of what is believed. Generous: a finding is to be taken seriously.
@@ -55,3 +56,4 @@ CalibrationReport CheckCalibration(const CameraRig& rig, const std::vector<Input
 CalibrationReport CheckCalibration(const Dataset& dataset, const CalibrationCheckOptions& options = {});
 
 }  // namespace tutti
+#pragma GCC visibility pop

@@ -12,6 +12,7 @@
 #include "tutti/core/trajectory.h"
 #include "tutti/frontend/frame.h"
 
+#pragma GCC visibility push(default)
 namespace tutti {
 
 /// A frame, or why there is none.
@@ -129,3 +130,4 @@ bool IsCameraDevice(const std::string& name);
 std::unique_ptr<Dataset> OpenDataset(const std::filesystem::path& path, const DatasetOptions& options);
 
 }  // namespace tutti
+#pragma GCC visibility pop

@@ -11,6 +11,7 @@
 #include "tutti/core/options.h"
 #include "tutti/core/pose.h"
 
+#pragma GCC visibility push(default)
 namespace tutti {
 
 struct FrameFeatures;
@@ -42,3 +43,4 @@ struct InputFrame {
 };
 
 }  // namespace tutti
+#pragma GCC visibility pop

@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#pragma GCC visibility push(default)
 namespace tutti {
 
 /// Bundle adjustment over all keyframes of a map as it was at one moment. Made by
@@ -27,3 +28,4 @@ class GlobalAdjustment {
 };
 
 }  // namespace tutti
+#pragma GCC visibility pop

@@ -16,6 +16,7 @@
 #include "tutti/frontend/global_adjustment.h"
 #include "tutti/frontend/odometry_options.h"
 
+#pragma GCC visibility push(default)
 namespace tutti {
 
 enum class TrackingState { kInitializing, kTracking, kLost };
@@ -147,3 +148,4 @@ class Odometry {
 };
 
 }  // namespace tutti
+#pragma GCC visibility pop

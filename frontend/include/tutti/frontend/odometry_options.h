@@ -5,6 +5,7 @@
 
 #include "tutti/core/options.h"
 
+#pragma GCC visibility push(default)
 namespace tutti {
 
 /// Options of Odometry: section `odometry:` of the YAML files.
@@ -80,3 +81,4 @@ struct OdometryOptions {
 };
 
 }  // namespace tutti
+#pragma GCC visibility pop

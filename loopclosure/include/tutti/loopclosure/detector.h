@@ -17,6 +17,7 @@
 #include "tutti/loopclosure/detector_options.h"
 #include "tutti/loopclosure/features.h"
 
+#pragma GCC visibility push(default)
 namespace tutti {
 
 /// Features that the caller already has, used for geometric verification beside the members' own.
@@ -222,3 +223,4 @@ class LoopDetector {
 };
 
 }  // namespace tutti
+#pragma GCC visibility pop

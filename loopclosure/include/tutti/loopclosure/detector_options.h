@@ -9,6 +9,7 @@
 
 #include "tutti/core/options.h"
 
+#pragma GCC visibility push(default)
 namespace tutti {
 
 /// How the members become one (docs/loop-closure.md section 4).
@@ -319,3 +320,4 @@ std::vector<std::string> KnownFeatureTypes();
 std::vector<std::string> KnownDenseMembers();
 
 }  // namespace tutti
+#pragma GCC visibility pop

@@ -8,6 +8,7 @@
 #include "tutti/loopclosure/detector.h"
 #include "tutti/loopclosure/ground_truth.h"
 
+#pragma GCC visibility push(default)
 namespace tutti {
 
 /// What a detector said about one image. Images are rows and columns of the ground truth.
@@ -101,3 +102,4 @@ LoopEvaluation EvaluateRanked(const std::vector<LoopObservation>& observations, 
 LoopObservation Observe(const LoopResult& result);
 
 }  // namespace tutti
+#pragma GCC visibility pop

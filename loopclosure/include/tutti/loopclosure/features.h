@@ -10,6 +10,7 @@
 
 #include "tutti/loopclosure/detector_options.h"
 
+#pragma GCC visibility push(default)
 namespace tutti {
 
 namespace internal {
@@ -81,3 +82,4 @@ class FeatureExtractor {
 };
 
 }  // namespace tutti
+#pragma GCC visibility pop

@@ -8,6 +8,7 @@
 
 #include "tutti/core/trajectory.h"
 
+#pragma GCC visibility push(default)
 namespace tutti {
 
 /// Label of a pair of images.
@@ -74,3 +75,4 @@ LoopGroundTruth ReadLoopMatrix(const std::filesystem::path& file, int num_images
 LoopGroundTruth LoopsFromTrajectory(const Trajectory& trajectory, const LoopRule& rule);
 
 }  // namespace tutti
+#pragma GCC visibility pop

@@ -12,6 +12,7 @@
 #include "tutti/core/camera.h"
 #include "tutti/core/pose.h"
 
+#pragma GCC visibility push(default)
 namespace tutti {
 
 /// Options of SolvePnp and SolveSimilarity.
@@ -73,3 +74,4 @@ SimilarityResult SolveSimilarity(const std::vector<Eigen::Vector3d>& points_a,
                                  const RelativePoseOptions& options);
 
 }  // namespace tutti
+#pragma GCC visibility pop

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#pragma GCC visibility push(default)
 namespace tutti {
 
 /// Outcome of McNemar's test: only the pairs on which the two detectors differ count.
@@ -91,3 +92,4 @@ BootstrapInterval BootstrapRatio(const std::vector<RatioPart>& groups, double co
                                  int resamples = 10000, std::uint64_t seed = 1);
 
 }  // namespace tutti
+#pragma GCC visibility pop

@@ -12,6 +12,7 @@
 #include "tutti/loopclosure/detector_options.h"
 #include "tutti/slam/slam_options.h"
 
+#pragma GCC visibility push(default)
 namespace tutti {
 
 /// Everything that a run can be told.
@@ -53,3 +54,4 @@ std::vector<ConfigEntry> DescribeConfig(const RunConfig& config);
 std::string HelpConfig(bool advanced);
 
 }  // namespace tutti
+#pragma GCC visibility pop

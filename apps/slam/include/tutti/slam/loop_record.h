@@ -11,6 +11,7 @@
 #include "tutti/core/pose.h"
 #include "tutti/loopclosure/detector.h"
 
+#pragma GCC visibility push(default)
 namespace tutti {
 
 /// One line of loops.csv. Only proposed loops (hypothesis from loops.propose_threshold on) get one.
@@ -44,3 +45,4 @@ inline std::size_t CountAccepted(const std::vector<LoopRecord>& loops) {
 }
 
 }  // namespace tutti
+#pragma GCC visibility pop

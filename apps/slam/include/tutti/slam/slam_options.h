@@ -5,6 +5,7 @@
 
 #include "tutti/core/options.h"
 
+#pragma GCC visibility push(default)
 namespace tutti {
 
 /// Options of SlamSystem: section `run:` of the YAML files.
@@ -82,3 +83,4 @@ struct SlamOptions {
 };
 
 }  // namespace tutti
+#pragma GCC visibility pop

@@ -20,6 +20,7 @@
 #include "tutti/slam/config.h"
 #include "tutti/slam/loop_record.h"
 
+#pragma GCC visibility push(default)
 namespace tutti {
 
 /// The pipeline. The odometry runs on the caller's thread, the loop detector and the pose graph beside it;
@@ -81,3 +82,4 @@ class SlamSystem {
 };
 
 }  // namespace tutti
+#pragma GCC visibility pop

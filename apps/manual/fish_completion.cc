@@ -1,0 +1,49 @@
+#include "apps/manual/command_page.h"
+
+namespace tutti::manual {
+namespace {
+
+std::string Quoted(const std::string& text) {
+  return "'" + Replaced(Replaced(text, "\\", "\\\\"), "'", "\\'") + "'";
+}
+
+std::string Line(const std::string& program, const std::string& condition, const Argument& argument) {
+  std::string out = "complete -c " + program + " -n " + Quoted(condition);
+  for (const std::string& name : argument.names)
+    out += name.rfind("--", 0) == 0 ? " -l " + name.substr(2) : " -s " + name.substr(1);
+  if (!argument.value.empty()) {
+    std::string words;
+    for (const std::string& choice : argument.choices) words += (words.empty() ? "" : " ") + choice;
+    if (!words.empty()) {
+      out += " -x -a " + Quoted(words);
+    } else if (argument.IsPath()) {
+      out += argument.value == "DIR" ? " -x -a '(__fish_complete_directories)'" : " -r -F";
+    } else {
+      out += argument.value_optional ? "" : " -x";
+    }
+  }
+  return out + " -d " + Quoted(argument.text) + "\n";
+}
+
+}  // namespace
+
+std::string FishCompletion(const CommandPage& program) {
+  std::string out = "# fish completion of " + program.name + ". Made from its list of options.\n";
+  const std::string none = "__fish_use_subcommand";
+  for (const CommandPage& command : program.commands) {
+    out += "complete -c " + program.name + " -f -n " + Quoted(none) + " -a " + command.name + " -d " +
+           Quoted(command.text) + "\n";
+  }
+  for (const Argument& argument : program.arguments) {
+    if (!argument.positional) out += Line(program.name, none, argument);
+  }
+  for (const CommandPage& command : program.commands) {
+    for (const Argument& argument : command.arguments) {
+      if (!argument.positional)
+        out += Line(program.name, "__fish_seen_subcommand_from " + command.name, argument);
+    }
+  }
+  return out;
+}
+
+}  // namespace tutti::manual

@@ -1,0 +1,79 @@
+// Function of zsh's completion system: _arguments with a specification for each option (zshcompsys(1)).
+#include "apps/manual/command_page.h"
+
+namespace tutti::manual {
+namespace {
+
+// Inside of single quotes and of [explanation] or :message:.
+std::string Quoted(const std::string& text) {
+  std::string out = Replaced(Replaced(text, "\\", "\\\\"), "'", "'\\''");
+  for (const char* sign : {"[", "]", ":"}) out = Replaced(out, sign, std::string("\\") + sign);
+  return out;
+}
+
+// ":message:action" of a value.
+std::string Value(const Argument& argument) {
+  std::string action = " ";
+  if (argument.IsPath()) action = argument.value == "DIR" ? "_files -/" : "_files";
+  if (!argument.choices.empty()) {
+    action = "(";
+    for (const std::string& choice : argument.choices)
+      action += (action.size() == 1 ? "" : " ") + Quoted(choice);
+    action += ")";
+  }
+  return std::string(argument.value_optional ? "::" : ":") + Quoted(argument.value) + ":" + action;
+}
+
+std::string Specifications(const CommandPage& command, const std::string& indent) {
+  std::string out;
+  for (const Argument& argument : command.arguments) {
+    if (argument.positional) {
+      out += " \\\n" + indent + "'" + (argument.several ? "*" : "") + ":" + Quoted(argument.names.front()) +
+             ":_files'";
+      continue;
+    }
+    for (const std::string& name : argument.names) {
+      out += " \\\n" + indent + "'" + (argument.several ? "*" : "") + name + "[" + Quoted(argument.text) +
+             "]" + (argument.value.empty() ? "" : Value(argument)) + "'";
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+std::string ZshCompletion(const CommandPage& program) {
+  std::string commands;
+  std::string cases;
+  for (const CommandPage& command : program.commands) {
+    commands += "    '" + Quoted(command.name) + ":" + Replaced(command.text, "'", "'\\''") + "'\n";
+    cases += "        " + command.name + ")\n          _arguments" + Specifications(command, "            ") +
+             "\n          ;;\n";
+  }
+  std::string out = R"(#compdef @name@
+# zsh completion of @name@. Made from its list of options.
+_@name@() {
+  local -a commands
+  local curcontext=$curcontext state line
+  commands=(
+@commands@  )
+  _arguments -C@options@ \
+    '1:command:->command' \
+    '*::argument:->argument'
+  case $state in
+    command)
+      _describe command commands
+      ;;
+    argument)
+      case $line[1] in
+@cases@      esac
+      ;;
+  esac
+}
+_@name@ "$@"
+)";
+  out = Replaced(Replaced(out, "@commands@", commands), "@options@", Specifications(program, "    "));
+  return Replaced(Replaced(out, "@cases@", cases), "@name@", program.name);
+}
+
+}  // namespace tutti::manual

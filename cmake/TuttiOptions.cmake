@@ -1,0 +1,50 @@
+# What is built. As a part of another project tutti is libraries alone, and leaves every global setting as it is.
+include(CMakeDependentOption)
+
+# tutti_option(name "help" default "condition;..." "what it needs"): an option that is off, with a word about it, where it
+# can't be on.
+macro(tutti_option name help default conditions needs)
+  cmake_dependent_option(${name} "${help}" ${default} "${conditions}" OFF)
+  set(wanted "$CACHE{${name}}")
+  if(wanted STREQUAL "")
+    set(wanted ${default})
+  endif()
+  if(wanted AND NOT ${name})
+    message(STATUS "tutti: ${name} is off: it needs ${needs}")
+  endif()
+endmacro()
+
+if(PROJECT_IS_TOP_LEVEL)
+  include(CTest) # defines BUILD_TESTING, ON by default
+  set(tests_can_be "BUILD_TESTING;NOT BUILD_SHARED_LIBS")
+  set(tests_need "BUILD_TESTING, and static libraries (tests use private classes)")
+else()
+  set(tests_can_be "NOT BUILD_SHARED_LIBS")
+  set(tests_need "static libraries (tests use private classes)")
+endif()
+
+option(TUTTI_BUILD_LOOPCLOSURE "Build the loop-closure library" ON)
+option(TUTTI_BUILD_BACKEND "Build the pose-graph library (needs Ceres)" ON)
+tutti_option(TUTTI_BUILD_SLAM "Build the SLAM library, and the front end for it" ON
+  "TUTTI_BUILD_LOOPCLOSURE;TUTTI_BUILD_BACKEND" "TUTTI_BUILD_LOOPCLOSURE and TUTTI_BUILD_BACKEND")
+tutti_option(TUTTI_BUILD_APPS "Build the tutti executable and the examples" ${PROJECT_IS_TOP_LEVEL}
+  "TUTTI_BUILD_SLAM" "TUTTI_BUILD_SLAM")
+tutti_option(TUTTI_BUILD_TESTS "Build the tests of what is built" ${PROJECT_IS_TOP_LEVEL} "${tests_can_be}" "${tests_need}")
+tutti_option(TUTTI_BUILD_BENCH "Build the programs under bench/ (needs Google Benchmark)" OFF
+  "TUTTI_BUILD_APPS;NOT BUILD_SHARED_LIBS" "TUTTI_BUILD_APPS, and static libraries")
+tutti_option(TUTTI_BUILD_FUZZERS "Build the libFuzzer programs under tests/fuzz (needs clang; see ./dev fuzz)" OFF
+  "TUTTI_BUILD_LOOPCLOSURE;NOT BUILD_SHARED_LIBS" "TUTTI_BUILD_LOOPCLOSURE, and static libraries")
+option(TUTTI_INSTALL "Install and package what is built" ${PROJECT_IS_TOP_LEVEL})
+option(TUTTI_WERROR "Treat warnings as errors (./dev turns it on)" OFF)
+option(TUTTI_NATIVE "Compile for this very machine (-march=native); never for packages" OFF)
+set(TUTTI_SANITIZE "" CACHE STRING "Sanitizers, as -fsanitize= takes them: address,undefined or thread")
+
+if(PROJECT_IS_TOP_LEVEL)
+  find_program(CCACHE_PROGRAM ccache)
+  if(CCACHE_PROGRAM AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
+    set(CMAKE_CXX_COMPILER_LAUNCHER "${CCACHE_PROGRAM}")
+  endif()
+  if(NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
+    set(CMAKE_BUILD_TYPE Release CACHE STRING "Debug, Release, RelWithDebInfo" FORCE)
+  endif()
+endif()

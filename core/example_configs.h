@@ -1,0 +1,18 @@
+// Where the configurations for public data sets are, for messages that name one as an example. Not installed.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#pragma GCC visibility push(default)  // used across libraries
+namespace tutti::internal {
+
+/// Their folder: share/tutti/configs of the installation that the running program belongs to, else
+/// data/configs of the source tree.
+std::string ExampleConfigs();
+/// The same for a program in `folder`: in bin, libexec/tutti or lib/MACHINE/tutti of an installation, or
+/// elsewhere.
+std::string ExampleConfigs(const std::filesystem::path& folder);
+
+}  // namespace tutti::internal
+#pragma GCC visibility pop

@@ -1,0 +1,107 @@
+# The Debian packages: made, unpacked into a folder as dpkg would into /, used from there, and removed.
+# usage: cmake -DCPACK=cpack -DBUILD=folder -DWORK=folder -DSOURCE=tests/install -DVERSION=... -DGENERATOR=... -DCXX=...
+#        -P packages_test.cmake
+find_program(DPKG_DEB dpkg-deb)
+find_program(SHLIBDEPS dpkg-shlibdeps)
+if(NOT DPKG_DEB OR NOT SHLIBDEPS)
+  message(NOTICE "skipped: no dpkg-deb or dpkg-shlibdeps (Debian: apt-get install dpkg-dev)")
+  return()
+endif()
+set(libraries libtutti-core-dev libtutti-loopclosure-dev libtutti-backend-dev libtutti-slam-dev)
+
+file(REMOVE_RECURSE "${WORK}")
+execute_process(COMMAND "${CPACK}" -G DEB --config "${BUILD}/CPackConfig.cmake" -B "${WORK}/packages" OUTPUT_QUIET
+  COMMAND_ERROR_IS_FATAL ANY)
+
+# Made are these and no others; what has one file is one package, and all say what a package must.
+file(GLOB debs "${WORK}/packages/*.deb")
+list(LENGTH debs count)
+set(all_files "")
+foreach(name IN ITEMS tutti ${libraries})
+  file(GLOB deb "${WORK}/packages/${name}_${VERSION}_*.deb")
+  if(NOT deb)
+    message(FATAL_ERROR "no package ${name}: ${debs}")
+  endif()
+  set(${name} "${deb}")
+  execute_process(COMMAND "${DPKG_DEB}" --field "${deb}" OUTPUT_VARIABLE control COMMAND_ERROR_IS_FATAL ANY)
+  foreach(field Package Version Architecture Maintainer Section Depends Description)
+    if(NOT control MATCHES "(^|\n)${field}: [^\n]")
+      message(SEND_ERROR "${name}: no ${field} in\n${control}")
+    endif()
+  endforeach()
+  string(REGEX MATCH "\nDepends: [^\n]*" ${name}_depends "\n${control}")
+  execute_process(COMMAND "${DPKG_DEB}" --fsys-tarfile "${deb}" COMMAND tar -tf - OUTPUT_VARIABLE files
+    COMMAND_ERROR_IS_FATAL ANY)
+  if(NOT files MATCHES "/usr/share/doc/${name}/copyright\n")
+    message(SEND_ERROR "${name}: no copyright")
+  endif()
+  string(REGEX MATCHALL "[^\n]*[^/\n]\n" files "${files}")
+  list(APPEND all_files ${files})
+endforeach()
+if(NOT count EQUAL 5)
+  message(SEND_ERROR "other packages than these: ${debs}")
+endif()
+list(LENGTH all_files count)
+list(REMOVE_DUPLICATES all_files)
+list(LENGTH all_files different)
+if(NOT count EQUAL different)
+  message(SEND_ERROR "a file is in two packages; they could not be installed together")
+endif()
+foreach(wanted "tutti;libopencv-core" "libtutti-core-dev;libeigen3-dev" "libtutti-loopclosure-dev;libopencv-dev"
+    "libtutti-loopclosure-dev;libtutti-core-dev .= ${VERSION}" "libtutti-backend-dev;libceres-dev"
+    "libtutti-slam-dev;libtutti-backend-dev .= ${VERSION}")
+  list(GET wanted 0 name)
+  list(GET wanted 1 package)
+  if(NOT ${name}_depends MATCHES "${package}")
+    message(SEND_ERROR "${name} should depend on ${package}: ${${name}_depends}")
+  endif()
+endforeach()
+
+# unpack(root packages...)
+function(unpack root)
+  foreach(name IN LISTS ARGN)
+    execute_process(COMMAND "${DPKG_DEB}" -x "${${name}}" "${root}" COMMAND_ERROR_IS_FATAL ANY)
+  endforeach()
+endfunction()
+
+# consume(root component): configures consume_<component>, and with WORKS builds and runs it.
+function(consume root component expected)
+  set(folder "${WORK}/consume_${component}")
+  execute_process(COMMAND "${CMAKE_COMMAND}" -S "${SOURCE}/consume_${component}" -B "${folder}" -G "${GENERATOR}"
+    "-DCMAKE_PREFIX_PATH=${root}/usr" "-DCMAKE_CXX_COMPILER=${CXX}" OUTPUT_QUIET ERROR_VARIABLE error
+    RESULT_VARIABLE result)
+  if(expected STREQUAL WORKS)
+    if(result EQUAL 0)
+      execute_process(COMMAND "${CMAKE_COMMAND}" --build "${folder}" OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
+      execute_process(COMMAND "${folder}/consumer" WORKING_DIRECTORY "${folder}" COMMAND_ERROR_IS_FATAL ANY)
+    else()
+      message(SEND_ERROR "${component}: ${error}")
+    endif()
+  elseif(result EQUAL 0 OR NOT error MATCHES "${expected}")
+    message(SEND_ERROR "${component}: wanted '${expected}', was: ${error}")
+  endif()
+endfunction()
+
+# A part of the packages will do for who wants a part of tutti.
+unpack("${WORK}/part" libtutti-core-dev libtutti-loopclosure-dev)
+consume("${WORK}/part" loopclosure WORKS)
+consume("${WORK}/part" backend "tutti has no component 'backend' here")
+
+unpack("${WORK}/root" tutti ${libraries})
+consume("${WORK}/root" slam WORKS)
+execute_process(COMMAND "${WORK}/root/usr/bin/tutti" demo --out "${WORK}/demo" OUTPUT_QUIET ERROR_QUIET
+  COMMAND_ERROR_IS_FATAL ANY)
+if(NOT EXISTS "${WORK}/demo/run/summary.json")
+  message(SEND_ERROR "tutti demo wrote no results")
+endif()
+foreach(file share/man/man1/tutti.1.gz share/bash-completion/completions/tutti share/zsh/vendor-completions/_tutti
+    share/fish/vendor_completions.d/tutti.fish share/tutti/configs/images.yaml share/doc/tutti/README.md)
+  if(NOT EXISTS "${WORK}/root/usr/${file}")
+    message(SEND_ERROR "not in the package: ${file}")
+  endif()
+endforeach()
+execute_process(COMMAND gzip -dc "${WORK}/root/usr/share/man/man1/tutti.1.gz" OUTPUT_VARIABLE page)
+if(NOT page MATCHES "[(]/usr/share/tutti/configs")
+  message(SEND_ERROR "the man page does not name /usr/share/tutti/configs")
+endif()
+file(REMOVE_RECURSE "${WORK}")

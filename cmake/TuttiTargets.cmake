@@ -1,6 +1,6 @@
 # Helpers that give every target the same language level, warnings and install rules.
 
-# tutti_compile_options(target): C++17, strict warnings, optional sanitizers. -march=native stays off
+# tutti_compile_options(target): C++17, strict warnings, optional sanitizers, what a unity build puts together. -march=native stays off
 # unless asked for, for all targets alike (Eigen's alignment must agree between libraries).
 function(tutti_compile_options target)
   target_compile_features(${target} PUBLIC cxx_std_17)
@@ -23,6 +23,23 @@ function(tutti_compile_options target)
     target_compile_options(${target} PUBLIC -fsanitize=${TUTTI_SANITIZE} -fno-omit-frame-pointer)
     target_link_options(${target} PUBLIC -fsanitize=${TUTTI_SANITIZE})
   endif()
+  tutti_unity_groups(${target})
+endfunction()
+
+# tutti_unity_groups(target): with CMAKE_UNITY_BUILD the files of a folder are compiled together, not some eight in a row.
+# Files that can't be, as their neighbours have the same names for other things, are to be given
+# SKIP_UNITY_BUILD_INCLUSION.
+function(tutti_unity_groups target)
+  set_target_properties(${target} PROPERTIES UNITY_BUILD_MODE GROUP)
+  get_target_property(sources ${target} SOURCES)
+  foreach(source IN LISTS sources)
+    get_source_file_property(group "${source}" UNITY_GROUP)
+    if(NOT group)
+      get_filename_component(folder "${source}" DIRECTORY)
+      get_filename_component(folder "${folder}" NAME)
+      set_source_files_properties("${source}" PROPERTIES UNITY_GROUP "${target}_${folder}")
+    endif()
+  endforeach()
 endfunction()
 
 # tutti_see_private_headers(target): headers that no package installs are included by their path from the project's root.

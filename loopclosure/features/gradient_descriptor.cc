@@ -11,7 +11,7 @@ namespace {
 constexpr int kWidth = 64, kHeight = 48;  // of the thumbnail [px]
 constexpr int kCell = 8;                  // side of a cell [px]
 constexpr int kColumns = kWidth / kCell, kRows = kHeight / kCell;
-constexpr int kBins = 9;                // directions over half a turn
+constexpr int kBins = 9;                     // directions over half a turn
 constexpr float kLeastThumbContrast = 0.5f;  // deviation of a thumbnail with something to see [grey levels]
 constexpr float kPi = 3.14159265f;
 

@@ -42,6 +42,7 @@ void WriteManual(const std::string& tutti, const fs::path& folder) {
   const std::string call = "'" + tutti + "' ";
   CommandPage program = tutti::manual::ParsePage(Output(call + "--describe"));
   for (CommandPage& command : program.commands) {
+    if (command.name == "help") continue;   // it has no options of its own
     const std::string text = command.text;  // in the list of commands
     command = tutti::manual::ParsePage(Output(call + command.name + " --describe"));
     command.text = text;

@@ -5,7 +5,7 @@
 #include <set>
 #include <utility>
 
-#include "apps/report/run_report.h"
+#include "apps/report/page.h"
 
 namespace tutti {
 namespace {

@@ -7,6 +7,9 @@
 
 namespace tutti {
 
+/// Version of report.json; a reader refuses others.
+constexpr int kReportFormat = 2;
+
 /// False if tutti was built without the chart library (no Node, or no network then): there are no pages.
 bool ReportsAvailable();
 /// What a build without it says, one line without a newline.

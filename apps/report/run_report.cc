@@ -4,6 +4,7 @@
 #include <cstdio>
 
 #include "apps/report/build_info.h"
+#include "apps/report/page.h"
 #include "apps/report/report_parts.h"
 #include "apps/run/timing.h"
 #include "tutti/backend/evaluation.h"

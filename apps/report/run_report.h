@@ -10,9 +10,6 @@
 
 namespace tutti {
 
-/// Version of the JSON; a reader refuses others.
-constexpr int kReportFormat = 2;
-
 /// Everything that the page shows of a run. `variant`: "ensemble", "odometry", or the rule. Reads images of
 /// the data set again for the gallery, unless each can be read only once. Lengths [m] (mono without a
 /// reference: map units), times [s] or [ms] as the names say. Deterministic but for the timings.

@@ -4,8 +4,8 @@
 #include <fstream>
 #include <system_error>
 
+#include "apps/plot/plot.h"
 #include "apps/run/outputs.h"
-#include "apps/run/plot.h"
 #include "apps/run/text_file.h"
 #include "tutti/backend/g2o_io.h"
 #include "tutti/core/error.h"

@@ -52,15 +52,11 @@ int Check(const CheckArguments& arguments) {
 
 }  // namespace
 
-void AddCalibrateCheckCommand(CLI::App& app, int& exit_code) {
-  CLI::App* command = app.add_subcommand("calibrate-check",
-                                         "can the calibration be right? Measures field of view, principal "
-                                         "point, rows and order of stereo pairs, "
-                                         "depth unit; exit status 1 if something can't be");
+void SetUpCalibrateCheck(CLI::App& command, int& exit_code) {
   const auto arguments = std::make_shared<CheckArguments>();
-  command->add_option("--config", arguments->config, "YAML file, as for run")->required();
-  command->add_option("--dataset", arguments->dataset, "data set, as for run")->required();
-  command->callback([arguments, &exit_code] { exit_code = Check(*arguments); });
+  command.add_option("--config", arguments->config, "YAML file, as for run")->required();
+  command.add_option("--dataset", arguments->dataset, "data set, as for run")->required();
+  command.callback([arguments, &exit_code] { exit_code = Check(*arguments); });
 }
 
 }  // namespace tutti::cli

@@ -9,8 +9,8 @@
 #include "apps/report/page.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/comparison.h"
+#include "apps/tutti/comparison_page.h"
 #include "apps/tutti/files.h"
-#include "apps/tutti/run_with_report.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 
@@ -65,21 +65,20 @@ void RunCollect(const CollectArguments& arguments) {
 
 }  // namespace
 
-void AddCollectCommand(CLI::App& app, int&) {
-  CLI::App* command = app.add_subcommand("collect", "The summaries of many runs in one table");
+void SetUpCollect(CLI::App& command, int&) {
   const auto arguments = std::make_shared<CollectArguments>();
   command
-      ->add_option("runs", arguments->runs, "Folders of runs, folders of such folders, or summary.json files")
+      .add_option("runs", arguments->runs, "Folders of runs, folders of such folders, or summary.json files")
       ->required();
-  command->add_flag("--by-folder", arguments->by_folder,
-                    "a run's variant is the name of the folder above its own (CONFIGURATION/start_0)");
-  AddTableFormatOption(*command, arguments->table_format);
-  command->add_option("--json", arguments->json, "Write the table to this file");
-  command->add_option(
+  command.add_flag("--by-folder", arguments->by_folder,
+                   "a run's variant is the name of the folder above its own (CONFIGURATION/start_0)");
+  AddTableFormatOption(command, arguments->table_format);
+  command.add_option("--json", arguments->json, "Write the table to this file");
+  command.add_option(
       "--report", arguments->report,
       "Write one page over all runs to this file (report.html); charts are of the first run of "
       "each data set and variant");
-  command->footer(
+  command.footer(
       "Runs are grouped by data set and by variant: odometry (run.loops: false), ensemble (loops.rule: "
       "joint),\n"
       "standardised-mean (that preset), else the rule. Runs of one group should differ in the first frame, "
@@ -87,7 +86,7 @@ void AddCollectCommand(CLI::App& app, int&) {
       "noise or\n"
       "the seed alone: the table says in which, and the interval is over them.\n"
       "Example: tutti collect results/ --table-format markdown > table.md");
-  command->callback([arguments] { RunCollect(*arguments); });
+  command.callback([arguments] { RunCollect(*arguments); });
 }
 
 }  // namespace tutti::cli

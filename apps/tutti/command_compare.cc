@@ -15,6 +15,7 @@
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/comparison.h"
+#include "apps/tutti/comparison_page.h"
 #include "apps/tutti/files.h"
 #include "apps/tutti/run_apart.h"
 #include "apps/tutti/run_with_report.h"
@@ -88,7 +89,7 @@ RunRequest Request(const CLI::App& command, const CompareArguments& arguments, c
   return request;
 }
 
-void CheckArguments(const CompareArguments& arguments) {
+void CheckVariants(const CompareArguments& arguments) {
   const std::set<std::string> different(arguments.variants.begin(), arguments.variants.end());
   if (different.size() != arguments.variants.size()) throw InputError("--variants: one is named twice");
 }
@@ -194,7 +195,7 @@ class Experiment {
 
 int RunCompare(const CLI::App& command, const CompareArguments& arguments) {
   const TableFormat format = ParseTableFormat(arguments.table_format);
-  CheckArguments(arguments);
+  CheckVariants(arguments);
   const RunConfig config = LoadConfig(arguments.config);
   const Experiment experiment(command, arguments, config);
   for (const std::string& dataset : arguments.datasets)
@@ -228,48 +229,46 @@ int RunCompare(const CLI::App& command, const CompareArguments& arguments) {
 
 }  // namespace
 
-void AddCompareCommand(CLI::App& app, int& exit_code) {
-  CLI::App* command =
-      app.add_subcommand("compare", "What does the ensemble buy? SLAM with each way to find loops");
+void SetUpCompare(CLI::App& command, int& exit_code) {
   const auto arguments = std::make_shared<CompareArguments>();
-  command->add_option("--config", arguments->config, "YAML file, as for `tutti run`")->required();
+  command.add_option("--config", arguments->config, "YAML file, as for `tutti run`")->required();
   command
-      ->add_option("--dataset", arguments->datasets,
-                   "folder of the data set, or a video file; several (worlds of one kind) make one table")
+      .add_option("--dataset", arguments->datasets,
+                  "folder of the data set, or a video file; several (worlds of one kind) make one table")
       ->required();
   command
-      ->add_option("--out", arguments->out,
-                   "folder for all runs and for comparison.md, comparison.json and report.html")
+      .add_option("--out", arguments->out,
+                  "folder for all runs and for comparison.md, comparison.json and report.html")
       ->required();
   command
-      ->add_option("--variants", arguments->variants,
-                   "odometry: no loops; surf, sift, orb, ...: that member alone; naive, product, majority, "
-                   "mean, log-pool: that rule; standardised-mean: that preset; ensemble: the rule joint")
+      .add_option("--variants", arguments->variants,
+                  "odometry: no loops; surf, sift, orb, ...: that member alone; naive, product, majority, "
+                  "mean, log-pool: that rule; standardised-mean: that preset; ensemble: the rule joint")
       ->delimiter(',')
       ->capture_default_str();
   command
-      ->add_option(
+      .add_option(
           "--runs", arguments->runs,
           "runs of each variant on each data set: each starts a frame later than the one before, and gets "
           "noise of its own (--noise). Below five there is no p")
       ->check(Positive())
       ->capture_default_str();
   command
-      ->add_option("--noise", arguments->noise,
-                   "standard deviation of Gaussian noise that is added to the images [grey levels of 255]")
+      .add_option("--noise", arguments->noise,
+                  "standard deviation of Gaussian noise that is added to the images [grey levels of 255]")
       ->check(NotNegative())
       ->capture_default_str();
-  command->add_option("--ground-truth", arguments->ground_truth,
-                      "trajectory to evaluate against (default: the data set's own)");
-  command->add_option("--threads", arguments->threads, "most threads; the result is the same for any number");
-  command->add_option("--start", arguments->start, "first frame of the first run, counted from 0")
+  command.add_option("--ground-truth", arguments->ground_truth,
+                     "trajectory to evaluate against (default: the data set's own)");
+  command.add_option("--threads", arguments->threads, "most threads; the result is the same for any number");
+  command.add_option("--start", arguments->start, "first frame of the first run, counted from 0")
       ->check(NotNegative());
-  command->add_option("--end", arguments->end, "frame before which to stop")->check(Positive());
-  command->add_option("--stride", arguments->stride, "use every so many frames")->check(Positive());
-  command->add_flag("--separate", arguments->separate,
-                    "no shared odometry: every variant tracks, too, as `tutti run` does");
-  AddTableFormatOption(*command, arguments->table_format);
-  command->footer(
+  command.add_option("--end", arguments->end, "frame before which to stop")->check(Positive());
+  command.add_option("--stride", arguments->stride, "use every so many frames")->check(Positive());
+  command.add_flag("--separate", arguments->separate,
+                   "no shared odometry: every variant tracks, too, as `tutti run` does");
+  AddTableFormatOption(command, arguments->table_format);
+  command.footer(
       "Each run has its folder OUT/VARIANT/run_N with everything that `tutti run` writes. Tracking is done "
       "once "
       "for each N\n"
@@ -281,7 +280,7 @@ void AddCompareCommand(CLI::App& app, int& exit_code) {
       internal::ExampleConfigs() +
       "/7scenes.yaml --dataset redkitchen --out cmp --variants "
       "odometry,orb,ensemble");
-  command->callback([command, arguments, &exit_code] { exit_code = RunCompare(*command, *arguments); });
+  command.callback([&command, arguments, &exit_code] { exit_code = RunCompare(command, *arguments); });
 }
 
 }  // namespace tutti::cli

@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "apps/tutti/commands.h"
-#include "apps/tutti/loops/loops_output.h"
+#include "apps/tutti/files.h"
 #include "apps/tutti/text_table.h"
 #include "tutti/core/error.h"
-#include "tutti/loopclosure/significance.h"
+#include "tutti/core/significance.h"
 
 namespace tutti::cli {
 namespace {
@@ -88,15 +88,12 @@ int CompareLoops(const CompareArguments& arguments) {
 
 }  // namespace
 
-void AddCompareLoopsCommand(CLI::App& app, int& exit_code) {
+void SetUpCompareLoops(CLI::App& command, int& exit_code) {
   auto arguments = std::make_shared<CompareArguments>();
-  CLI::App* command = app.add_subcommand(
-      "compare-loops",
-      "paired t-test between rules over the tables of several image sets (recall at 100 % precision)");
-  command->add_option("tables", arguments->tables, "table.json files of `tutti loops --table`, one per set")
+  command.add_option("tables", arguments->tables, "table.json files of `tutti loops --table`, one per set")
       ->required();
-  command->add_option("--out", arguments->out, "JSON file for the outcome (default: print only)");
-  command->callback([arguments, &exit_code] { exit_code = CompareLoops(*arguments); });
+  command.add_option("--out", arguments->out, "JSON file for the outcome (default: print only)");
+  command.callback([arguments, &exit_code] { exit_code = CompareLoops(*arguments); });
 }
 
 }  // namespace tutti::cli

@@ -41,21 +41,20 @@ void RunConvert(const ConvertArguments& arguments) {
 
 }  // namespace
 
-void AddConvertCommand(CLI::App& app, int&) {
-  CLI::App* command = app.add_subcommand("convert", "Trajectories among TUM, KITTI, EuRoC and g2o");
+void SetUpConvert(CLI::App& command, int&) {
   const auto arguments = std::make_shared<ConvertArguments>();
-  command->add_option("input", arguments->in, "Trajectory to read")->required();
-  command->add_option("output", arguments->out, "File to write")->required();
-  command->add_option("--to", arguments->to, "Format of the output")
+  command.add_option("input", arguments->in, "Trajectory to read")->required();
+  command.add_option("output", arguments->out, "File to write")->required();
+  command.add_option("--to", arguments->to, "Format of the output")
       ->required()
       ->check(CLI::IsMember(PoseFileFormatNames()));
-  command->add_option("--from", arguments->from, "Format of the input; auto: by content")
+  command.add_option("--from", arguments->from, "Format of the input; auto: by content")
       ->check(CLI::IsMember({"auto", "tum", "kitti", "euroc", "g2o"}))
       ->capture_default_str();
-  command->add_option("--times", arguments->times,
-                      "Time stamps of kitti's lines or g2o's ids: one [s] a line, as KITTI's times.txt");
-  command->add_option("--times-out", arguments->times_out, "Write the time stamps to this file");
-  command->footer(
+  command.add_option("--times", arguments->times,
+                     "Time stamps of kitti's lines or g2o's ids: one [s] a line, as KITTI's times.txt");
+  command.add_option("--times-out", arguments->times_out, "Write the time stamps to this file");
+  command.footer(
       "Nothing is turned or moved: KITTI's ground truth stays in its camera frame, EuRoC's in the body's. "
       "g2o "
       "gets the\n"
@@ -66,7 +65,7 @@ void AddConvertCommand(CLI::App& app, int&) {
       "  tutti convert poses/00.txt 00.tum --to tum --times sequences/00/times.txt\n"
       "  tutti convert mav0/state_groundtruth_estimate0/data.csv groundtruth.txt --to tum\n"
       "  tutti convert out/trajectory.txt 00.txt --to kitti --times-out times.txt");
-  command->callback([arguments] { RunConvert(*arguments); });
+  command.callback([arguments] { RunConvert(*arguments); });
 }
 
 }  // namespace tutti::cli

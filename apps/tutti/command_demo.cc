@@ -87,12 +87,10 @@ int Demo(const fs::path& out) {
 
 }  // namespace
 
-void AddDemoCommand(CLI::App& app, int& exit_code) {
-  CLI::App* command =
-      app.add_subcommand("demo", "a short synthetic town: SLAM with and without the ensemble, and a plot");
+void SetUpDemo(CLI::App& command, int& exit_code) {
   const auto out = std::make_shared<std::string>("demo-out");
-  command->add_option("--out", *out, "folder for the images and the results")->capture_default_str();
-  command->callback([out, &exit_code] { exit_code = Demo(*out); });
+  command.add_option("--out", *out, "folder for the images and the results")->capture_default_str();
+  command.callback([out, &exit_code] { exit_code = Demo(*out); });
 }
 
 }  // namespace tutti::cli

@@ -30,15 +30,13 @@ void RunEvaluate(const EvaluateArguments& arguments) {
 
 }  // namespace
 
-void AddEvaluateCommand(CLI::App& app, int&) {
-  CLI::App* command =
-      app.add_subcommand("evaluate", "Errors of trajectories against a reference (ATE, RPE, KITTI, drift)");
+void SetUpEvaluate(CLI::App& command, int&) {
   const auto arguments = std::make_shared<EvaluateArguments>();
-  AddEvaluationOptions(*command, arguments->input);
-  AddTableFormatOption(*command, arguments->table_format);
-  command->add_option("--json", arguments->json, "Write every figure to this file");
-  command->add_option("--errors", arguments->errors, "Write the errors pose by pose to this file (CSV)");
-  command->footer(
+  AddEvaluationOptions(command, arguments->input);
+  AddTableFormatOption(command, arguments->table_format);
+  command.add_option("--json", arguments->json, "Write every figure to this file");
+  command.add_option("--errors", arguments->errors, "Write the errors pose by pose to this file (CSV)");
+  command.footer(
       "ATE is the distance between associated positions after the alignment: is the map where it should be? "
       "RPE compares\n"
       "motions over a short distance: how fast does the odometry drift? 'full' is the norm of E - I, with E "
@@ -53,7 +51,7 @@ void AddEvaluateCommand(CLI::App& app, int&) {
       "  tutti evaluate --reference gt.txt --estimate a.txt b.txt c.txt --table-format latex\n"
       "  tutti evaluate --reference gt.txt --estimate a.txt --rpe-delta 2 --rpe-unit seconds "
       "--rpe-all-pairs");
-  command->callback([arguments] { RunEvaluate(*arguments); });
+  command.callback([arguments] { RunEvaluate(*arguments); });
 }
 
 }  // namespace tutti::cli

@@ -243,12 +243,8 @@ void AddOptions(CLI::App& c, GenerateArguments& a) {
 
 }  // namespace
 
-void AddGenerateCommand(CLI::App& app, int& exit_code) {
-  CLI::App* command = app.add_subcommand(
-      "generate",
-      "Render the synthetic world (images and exact ground truth), or change real images; the same for the "
-      "same options");
-  command->footer(
+void SetUpGenerate(CLI::App& command, int& exit_code) {
+  command.footer(
       "Examples:\n"
       "  tutti generate --out town --sensor stereo                         two laps of 315 m\n"
       "  tutti generate --out block --sensor mono --blocks-x 1 --laps 1.3  a small loop, closed once\n"
@@ -258,8 +254,8 @@ void AddGenerateCommand(CLI::App& app, int& exit_code) {
       "  tutti generate --out dark --from-images kitchen/rgb --change dark:2 --change-from 250\n"
       "The folder also gets a config.yaml: tutti run --config town/config.yaml --dataset town --out result");
   auto arguments = std::make_shared<GenerateArguments>();
-  AddOptions(*command, *arguments);
-  command->callback([arguments, &exit_code] { exit_code = Generate(*arguments); });
+  AddOptions(command, *arguments);
+  command.callback([arguments, &exit_code] { exit_code = Generate(*arguments); });
 }
 
 }  // namespace tutti::cli

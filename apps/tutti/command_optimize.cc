@@ -172,25 +172,23 @@ void RunOptimize(OptimizeArguments arguments) {
 
 }  // namespace
 
-void AddOptimizeCommand(CLI::App& app, int&) {
-  CLI::App* command =
-      app.add_subcommand("optimize", "Optimise a pose graph (g2o file; 2D, 3D or with scale)");
+void SetUpOptimize(CLI::App& command, int&) {
   const auto arguments = std::make_shared<OptimizeArguments>();
-  command->add_option("IN", arguments->in, "Graph to read (.g2o)")->required();
-  command->add_option("--out", arguments->out, "Where the optimised graph goes (.g2o)")->required();
+  command.add_option("IN", arguments->in, "Graph to read (.g2o)")->required();
+  command.add_option("--out", arguments->out, "Where the optimised graph goes (.g2o)")->required();
   command
-      ->add_option("--init", arguments->init,
-                   "Start: file: the vertices; odometry: a spanning tree; chordal: linear relaxation, often "
-                   "near the global minimum where the others are not; auto: the one with the lowest cost")
+      .add_option("--init", arguments->init,
+                  "Start: file: the vertices; odometry: a spanning tree; chordal: linear relaxation, often "
+                  "near the global minimum where the others are not; auto: the one with the lowest cost")
       ->check(CLI::IsMember({"auto", "file", "odometry", "chordal"}))
       ->capture_default_str();
   command
-      ->add_option("--objective", arguments->objective,
-                   "chi2: g2o's error (vector part of the quaternion); chi2log: rotation vectors")
+      .add_option("--objective", arguments->objective,
+                  "chi2: g2o's error (vector part of the quaternion); chi2log: rotation vectors")
       ->check(CLI::IsMember({"chi2", "chi2log"}))
       ->capture_default_str();
   command
-      ->add_option(
+      .add_option(
           "--robust", arguments->robust,
           "Robust loss on loops (|i - j| != 1). gnc: graduated non-convexity, then inlier or outlier; take "
           "this one for SLAM graphs, docs/backend.md says why. gnc-tls: the same by truncated least squares; "
@@ -198,36 +196,36 @@ void AddOptimizeCommand(CLI::App& app, int&) {
       ->check(CLI::IsMember({"none", "huber", "cauchy", "dcs", "switchable", "gnc-tls", "gnc"}))
       ->capture_default_str();
   command
-      ->add_option("--solver", arguments->solver,
-                   "block: Levenberg-Marquardt with a Cholesky of the poses' blocks, the faster one; ceres: "
-                   "Ceres Solver, the same optimum; solves --robust switchable in any case")
+      .add_option("--solver", arguments->solver,
+                  "block: Levenberg-Marquardt with a Cholesky of the poses' blocks, the faster one; ceres: "
+                  "Ceres Solver, the same optimum; solves --robust switchable in any case")
       ->check(CLI::IsMember({"block", "ceres"}))
       ->capture_default_str();
-  command->add_flag("--pairwise", arguments->options.pairwise_consistency,
-                    "Before: keep only the largest set of loops that agree pair by pair (PCM). Needs "
-                    "realistic covariances of the odometry; slow beyond some thousand loops");
-  command->add_flag("--sigma-test", arguments->options.sigma_test,
-                    "After: remove loops that are off by more than 3 sigma, bring back those within");
+  command.add_flag("--pairwise", arguments->options.pairwise_consistency,
+                   "Before: keep only the largest set of loops that agree pair by pair (PCM). Needs "
+                   "realistic covariances of the odometry; slow beyond some thousand loops");
+  command.add_flag("--sigma-test", arguments->options.sigma_test,
+                   "After: remove loops that are off by more than 3 sigma, bring back those within");
   command
-      ->add_option("--robust-chi2", arguments->options.robust_chi2,
-                   "Chi-square beyond which a loop is an outlier; 0: the 99 % quantile")
+      .add_option("--robust-chi2", arguments->options.robust_chi2,
+                  "Chi-square beyond which a loop is an outlier; 0: the 99 % quantile")
       ->check(NotNegative())
       ->capture_default_str();
-  command->add_option("--max-iterations", arguments->options.max_iterations, "Levenberg-Marquardt iterations")
+  command.add_option("--max-iterations", arguments->options.max_iterations, "Levenberg-Marquardt iterations")
       ->check(Positive())
       ->capture_default_str();
-  command->add_flag(
+  command.add_flag(
       "--certify", arguments->certify,
       "Prove that the chordal objective has no lower value (as SE-Sync does), or say how far the "
       "proof falls short");
-  command->add_option("--json", arguments->json,
-                      "Write costs, time and what became of the loops to this file");
-  command->footer(
+  command.add_option("--json", arguments->json,
+                     "Write costs, time and what became of the loops to this file");
+  command.footer(
       "Costs are sums over all edges without a robust loss and without the factor 1/2. Compare only costs of "
       "the same\n"
       "column. A loop that is rejected keeps its place in the output file.\n"
       "Example: tutti optimize graph.g2o --out optimised.g2o --robust gnc --json costs.json");
-  command->callback([arguments] { RunOptimize(*arguments); });
+  command.callback([arguments] { RunOptimize(*arguments); });
 }
 
 }  // namespace tutti::cli

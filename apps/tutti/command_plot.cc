@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/run/plot.h"
+#include "apps/plot/plot.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/evaluation_input.h"
 #include "apps/tutti/plot_file.h"
@@ -129,28 +129,27 @@ void RunPlot(const PlotArguments& arguments) {
 
 }  // namespace
 
-void AddPlotCommand(CLI::App& app, int&) {
-  CLI::App* command = app.add_subcommand("plot", "Trajectories and their errors as pictures (SVG, PNG, PDF)");
+void SetUpPlot(CLI::App& command, int&) {
   const auto arguments = std::make_shared<PlotArguments>();
-  AddEvaluationOptions(*command, arguments->input);
+  AddEvaluationOptions(command, arguments->input);
   command
-      ->add_option(
+      .add_option(
           "--what", arguments->what,
           "trajectory: seen from above, along the two axes of largest extent; error: absolute "
           "translation error along the path; rpe: relative translation error, at the end of each pair")
       ->check(CLI::IsMember({"trajectory", "error", "rpe"}))
       ->capture_default_str();
-  command->add_option("--out", arguments->out, "Files to write; the ending is the format: .svg, .png, .pdf")
+  command.add_option("--out", arguments->out, "Files to write; the ending is the format: .svg, .png, .pdf")
       ->required();
-  command->add_option("--title", arguments->title, "Text above the plot");
-  command->footer(
+  command.add_option("--title", arguments->title, "Text above the plot");
+  command.footer(
       "Reads, associates and aligns as `tutti evaluate` does. PDF needs a build with Cairo (Debian: "
       "libcairo2-dev).\n"
       "Examples:\n"
       "  tutti plot --reference gt.txt --estimate a.txt b.txt --out map.svg map.pdf\n"
       "  tutti plot --reference gt.txt --estimate a.txt --what rpe --rpe-delta 10 --rpe-unit metres --out "
       "rpe.png");
-  command->callback([arguments] { RunPlot(*arguments); });
+  command.callback([arguments] { RunPlot(*arguments); });
 }
 
 }  // namespace tutti::cli

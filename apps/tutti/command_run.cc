@@ -111,77 +111,75 @@ int Run(const CLI::App& command, const RunArguments& arguments) {
 
 }  // namespace
 
-void AddRunCommand(CLI::App& app, int& exit_code) {
-  CLI::App* command = app.add_subcommand("run", "visual SLAM on a data set: trajectories, loops, summary");
+void SetUpRun(CLI::App& command, int& exit_code) {
   const auto arguments = std::make_shared<RunArguments>();
-  command->add_option("--config", arguments->config,
-                      "YAML file (" + internal::ExampleConfigs() + " has one for each public data set)");
-  command->add_option(
+  command.add_option("--config", arguments->config,
+                     "YAML file (" + internal::ExampleConfigs() + " has one for each public data set)");
+  command.add_option(
       "--dataset", arguments->dataset,
       "folder of the data set, a video file, or a camera: camera:0 (the first one), camera:1, ...; "
       "camera:FILE takes a video file for it");
-  command->add_option("--out", arguments->out, "folder for the results");
-  command->add_option(
+  command.add_option("--out", arguments->out, "folder for the results");
+  command.add_option(
       "--ground-truth", arguments->ground_truth,
       "trajectory to evaluate against (default: the data set's own, if it has one; 'none': don't)");
-  command->add_option(
+  command.add_option(
       "--set", arguments->set,
       "SECTION.KEY=VALUE: any key of --help-config --advanced, on top of the file (loops.rule=orb, "
       "odometry.features=900, loops.extraction.features=300); may be given several times");
-  command->add_flag("--no-loops", arguments->no_loops, "odometry alone");
-  command->add_option("--seed", arguments->seed, "of everything that draws random numbers")
+  command.add_flag("--no-loops", arguments->no_loops, "odometry alone");
+  command.add_option("--seed", arguments->seed, "of everything that draws random numbers")
       ->check(NotNegative());
-  command->add_option("--threads", arguments->threads, "most threads; the result is the same for any number");
+  command.add_option("--threads", arguments->threads, "most threads; the result is the same for any number");
   command
-      ->add_option(
+      .add_option(
           "--inject-false-loops", arguments->inject_false_loops,
           "test of the back end: add so many false loops (random relative poses, wrong places, pairs that "
           "agree with each other) that look verified; loops.csv says what became of each (injected, reason, "
           "weight)")
       ->check(NotNegative());
-  command->add_option("--start", arguments->start, "first frame that is used, counted from 0")
+  command.add_option("--start", arguments->start, "first frame that is used, counted from 0")
       ->check(NotNegative());
-  command->add_option("--end", arguments->end, "frame before which to stop (--end 600: frames 0 to 599)")
+  command.add_option("--end", arguments->end, "frame before which to stop (--end 600: frames 0 to 599)")
       ->check(Positive());
-  command->add_option("--stride", arguments->stride, "use every so many frames, from the first on")
+  command.add_option("--stride", arguments->stride, "use every so many frames, from the first on")
       ->check(Positive());
   command
-      ->add_option(
+      .add_option(
           "--follow", arguments->follow_s,
           "the folder is still being written to: wait for new images, and end when none came for SECONDS "
           "(default 10), or with Ctrl-C")
       ->expected(0, 1)
       ->type_name("SECONDS")
       ->check(Positive());
-  command->add_flag(
+  command.add_flag(
       "--realtime", arguments->realtime,
       "play by the time stamps and drop the frames that it can't follow; without it every frame is "
       "processed, and the result does not depend on the machine's speed");
-  command->add_flag(
-      "--view", arguments->view,
-      "serve a page to look at the run while it goes on, at 127.0.0.1 (through a tunnel: ssh -L "
-      "8077:127.0.0.1:8077 robot)");
-  command->add_option("--view-port", arguments->live.port, "of that page; 0: any free one")
+  command.add_flag("--view", arguments->view,
+                   "serve a page to look at the run while it goes on, at 127.0.0.1 (through a tunnel: ssh -L "
+                   "8077:127.0.0.1:8077 robot)");
+  command.add_option("--view-port", arguments->live.port, "of that page; 0: any free one")
       ->capture_default_str();
-  command->add_option(
+  command.add_option(
       "--view-address", arguments->live.address,
       "serve it at this address of the machine (0.0.0.0: all); the address that is printed has a "
       "token, without which nothing is answered");
   command
-      ->add_option("--view-wait", arguments->live.idle_s,
-                   "wait at most this long for a browser before the first frame [s]")
+      .add_option("--view-wait", arguments->live.idle_s,
+                  "wait at most this long for a browser before the first frame [s]")
       ->capture_default_str();
-  command->add_flag("--timing", arguments->timing,
-                    "print how long each stage took: calls, median, p99, total, share");
-  command->add_option(
+  command.add_flag("--timing", arguments->timing,
+                   "print how long each stage took: calls, median, p99, total, share");
+  command.add_option(
       "--trace", arguments->trace,
       "write the times of all stages to this file; open it in ui.perfetto.dev or chrome://tracing");
-  command->add_flag("--no-report", arguments->no_report, "no report.html and report.json");
-  command->add_flag("--quiet", arguments->quiet, "no progress and no notes");
-  command->add_flag("--help-config", arguments->help_config,
-                    "print the keys of the configuration that users set, with their defaults");
-  command->add_flag("--advanced", arguments->advanced, "with --help-config: all keys");
-  command->callback([command, arguments, &exit_code] { exit_code = Run(*command, *arguments); });
+  command.add_flag("--no-report", arguments->no_report, "no report.html and report.json");
+  command.add_flag("--quiet", arguments->quiet, "no progress and no notes");
+  command.add_flag("--help-config", arguments->help_config,
+                   "print the keys of the configuration that users set, with their defaults");
+  command.add_flag("--advanced", arguments->advanced, "with --help-config: all keys");
+  command.callback([&command, arguments, &exit_code] { exit_code = Run(command, *arguments); });
 }
 
 }  // namespace tutti::cli

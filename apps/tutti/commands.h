@@ -1,22 +1,23 @@
-// The sub-commands of `tutti`. Each function adds one to the parser; its callback does the work, sets
-// exit_code, and may throw InputError, which main prints as one line.
+// The commands of `tutti`. Each function adds the options of one to its sub-command; the callback does the
+// work, sets exit_code, and may throw InputError, which RunProgram prints as one line. Names and sentences:
+// program.cc.
 #pragma once
 
 #include <CLI/CLI.hpp>
 
 namespace tutti::cli {
 
-void AddRunCommand(CLI::App& app, int& exit_code);
-void AddCalibrateCheckCommand(CLI::App& app, int& exit_code);
-void AddEvaluateCommand(CLI::App& app, int& exit_code);
-void AddConvertCommand(CLI::App& app, int& exit_code);
-void AddPlotCommand(CLI::App& app, int& exit_code);
-void AddCompareCommand(CLI::App& app, int& exit_code);
-void AddCollectCommand(CLI::App& app, int& exit_code);
-void AddLoopsCommand(CLI::App& app, int& exit_code);
-void AddCompareLoopsCommand(CLI::App& app, int& exit_code);
-void AddOptimizeCommand(CLI::App& app, int& exit_code);
-void AddGenerateCommand(CLI::App& app, int& exit_code);
-void AddDemoCommand(CLI::App& app, int& exit_code);
+void SetUpRun(CLI::App& command, int& exit_code);
+void SetUpCalibrateCheck(CLI::App& command, int& exit_code);
+void SetUpEvaluate(CLI::App& command, int& exit_code);
+void SetUpConvert(CLI::App& command, int& exit_code);
+void SetUpPlot(CLI::App& command, int& exit_code);
+void SetUpCompare(CLI::App& command, int& exit_code);
+void SetUpCollect(CLI::App& command, int& exit_code);
+void SetUpLoops(CLI::App& command, int& exit_code);
+void SetUpCompareLoops(CLI::App& command, int& exit_code);
+void SetUpOptimize(CLI::App& command, int& exit_code);
+void SetUpGenerate(CLI::App& command, int& exit_code);
+void SetUpDemo(CLI::App& command, int& exit_code);
 
 }  // namespace tutti::cli

@@ -9,7 +9,7 @@
 
 #include "apps/tutti/stage_times.h"
 #include "tutti/core/error.h"
-#include "tutti/loopclosure/significance.h"
+#include "tutti/core/significance.h"
 
 namespace tutti::cli {
 namespace {

@@ -7,6 +7,7 @@
 #include <memory>
 #endif
 
+#include "apps/plot/plot_picture.h"
 #include "tutti/core/error.h"
 
 namespace tutti::cli {

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "apps/run/plot_shapes.h"
+#include "apps/plot/plot_shapes.h"
 
 namespace tutti::cli {
 

@@ -5,7 +5,6 @@
 
 #include "apps/run/runner.h"
 #include "apps/run/shared_odometry.h"
-#include "apps/tutti/comparison.h"
 
 namespace tutti::cli {
 
@@ -16,10 +15,5 @@ RunResult RunWithReport(RunRequest request, const RunConfig& config);
 /// The same for a sequence that is tracked without loops, and for loops that are closed on it.
 TrackedSequence TrackWithReport(const RunRequest& request, const RunConfig& config);
 RunResult CloseLoopsWithReport(const TrackedSequence& tracked, RunRequest request, const RunConfig& config);
-
-/// The page of a comparison, or removes an older one if pages are left out. `runs` without a report.json are
-/// in the table alone.
-void WriteComparisonReport(const std::filesystem::path& file, const std::string& title,
-                           const Comparison& comparison);
 
 }  // namespace tutti::cli

@@ -93,7 +93,7 @@ std::vector<double> Steps(const std::vector<Pose>& poses) {
 PoseMatrix MatrixOf(const Pose& pose) { return {pose.rotation.toRotationMatrix(), pose.translation}; }
 
 /// a^-1 b with the inverse of a matrix that need not be a rotation.
-PoseMatrix Between(const PoseMatrix& a, const PoseMatrix& b) {
+PoseMatrix BetweenMatrices(const PoseMatrix& a, const PoseMatrix& b) {
   const Eigen::Matrix3d inverse = a.rotation.inverse();
   return {inverse * b.rotation, inverse * (b.translation - a.translation)};
 }
@@ -129,8 +129,8 @@ SegmentErrors EvaluateSegments(const std::vector<PoseMatrix>& reference,
       const auto end = std::upper_bound(distance.begin(), distance.end(), distance[first] + length);
       if (end == distance.end()) break;
       const auto last = static_cast<std::size_t>(end - distance.begin());
-      const PoseMatrix error =
-          Between(Between(estimate[first], estimate[last]), Between(reference[first], reference[last]));
+      const PoseMatrix error = BetweenMatrices(BetweenMatrices(estimate[first], estimate[last]),
+                                               BetweenMatrices(reference[first], reference[last]));
       const double cosine = 0.5 * (error.rotation.trace() - 1.0);
       translation += error.translation.norm() / length;
       rotation += std::acos(std::clamp(cosine, -1.0, 1.0)) / length;

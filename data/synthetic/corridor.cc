@@ -12,7 +12,7 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double kHalfWidth = 1.1, kHeight = 2.6;  // of the corridor [m]
+constexpr double kHalfWidth = 1.1, kWallHeight = 2.6;  // of the corridor [m]
 constexpr double kBesideDoors = 0.08;  // things on the wall stand out so far, to be drawn over it [m]
 
 // A rectangle about the origin: how far its sides are from it [m].
@@ -72,7 +72,7 @@ class CorridorBuilder {
         if (x > -core_x && x + kPanels < core_x && y > -core_y && y + kPanels < core_y) continue;
         Add({x, y + kPanels, 0}, {kPanels, 0, 0}, {0, -kPanels, 0},
             scene_.Add(PanelTexture(random_.Bits(), 120, 8)));
-        Add({x + kPanels, y + kPanels, kHeight}, {-kPanels, 0, 0}, {0, -kPanels, 0},
+        Add({x + kPanels, y + kPanels, kWallHeight}, {-kPanels, 0, 0}, {0, -kPanels, 0},
             scene_.Add(PanelTexture(random_.Bits(), 215, 3)));
       }
     }
@@ -81,7 +81,7 @@ class CorridorBuilder {
   void AddLamps() {
     constexpr double kPitch = 3.6, kLong = 1.2, kWide = 0.3, kBelow = 0.02;
     const auto lamp = [&](const Vector2d& middle, const Vector2d& size) {
-      Add({middle.x() + 0.5 * size.x(), middle.y() + 0.5 * size.y(), kHeight - kBelow}, {-size.x(), 0, 0},
+      Add({middle.x() + 0.5 * size.x(), middle.y() + 0.5 * size.y(), kWallHeight - kBelow}, {-size.x(), 0, 0},
           {0, -size.y(), 0}, lamp_);
       scene_.faces.back().emits = true;
     };
@@ -97,10 +97,10 @@ class CorridorBuilder {
   void AddWall(const Vector2d& left, const Vector2d& right, double length) {
     const Vector3d start(left.x(), left.y(), 0), along(right.x(), right.y(), 0),
         out(right.y(), -right.x(), 0);
-    const int pieces = static_cast<int>(std::ceil(length / kHeight));
+    const int pieces = static_cast<int>(std::ceil(length / kWallHeight));
     const double piece = length / pieces;
     for (int k = 0; k < pieces; ++k) {  // worn differently everywhere
-      Add(start + k * piece * along + Vector3d(0, 0, kHeight), piece * along, {0, 0, -kHeight},
+      Add(start + k * piece * along + Vector3d(0, 0, kWallHeight), piece * along, {0, 0, -kWallHeight},
           scene_.Add(PlasterTexture(random_.Bits())));
     }
     for (double at = random_.In(1.2, 3); at < length - 2.4;) {

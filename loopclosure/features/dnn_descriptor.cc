@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "loopclosure/features/smallest_image.h"
 #include "loopclosure/memory/dense.h"
 #include "loopclosure/store/byte_stream.h"
 #include "tutti/core/error.h"
@@ -22,7 +23,6 @@
 namespace tutti {
 namespace {
 
-constexpr int kMinSide = 16;               // as for the members with features [px]
 constexpr double kLeastContrast = 0.5;     // deviation of an image with something to see [grey levels]
 constexpr std::size_t kNearNames = 5;      // that a message about an unknown layer lists
 constexpr std::size_t kLongestText = 300;  // of OpenCV's in a message

@@ -8,6 +8,7 @@
 #include <tuple>
 
 #include "loopclosure/features/sift.h"
+#include "loopclosure/features/smallest_image.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 
@@ -17,7 +18,6 @@ namespace {
 // A detector gives more than are kept, so that there is something to choose from when spreading.
 constexpr int kOversampling = 2;
 constexpr double kImageBlur = 0.5;  // what an image is taken to be smoothed by [px]
-constexpr int kMinSide = 16;        // smaller images hold no feature of any member [px]
 
 // ORB drops points near the border; its default of 31 px leaves small images without upper pyramid levels
 // (loop-closure.md section 6). A twentieth of the shorter side keeps them; ORB reflects the image at its

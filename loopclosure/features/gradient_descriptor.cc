@@ -2,17 +2,17 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "loopclosure/features/smallest_image.h"
 #include "loopclosure/memory/dense.h"
 
 namespace tutti {
 namespace {
 
-constexpr int kMinSide = 16;              // as for the members with features [px]
 constexpr int kWidth = 64, kHeight = 48;  // of the thumbnail [px]
 constexpr int kCell = 8;                  // side of a cell [px]
 constexpr int kColumns = kWidth / kCell, kRows = kHeight / kCell;
-constexpr int kBins = 9;                // directions over half a turn
-constexpr float kLeastContrast = 0.5f;  // deviation of a thumbnail with something to see [grey levels]
+constexpr int kBins = 9;                     // directions over half a turn
+constexpr float kLeastThumbContrast = 0.5f;  // deviation of a thumbnail with something to see [grey levels]
 constexpr float kPi = 3.14159265f;
 
 using Histograms = std::vector<float>;  // by cell, then by direction
@@ -85,7 +85,7 @@ cv::Mat DescribeByGradients(const cv::Mat& grey, const cv::Mat& mask) {
   small.convertTo(small, CV_32F);
   cv::Scalar mean, deviation;
   cv::meanStdDev(small, mean, deviation);
-  if (!(deviation[0] >= static_cast<double>(kLeastContrast))) return {};
+  if (!(deviation[0] >= static_cast<double>(kLeastThumbContrast))) return {};
   cv::Mat dx, dy;
   cv::Sobel(small, dx, CV_32F, 1, 0, 1);
   cv::Sobel(small, dy, CV_32F, 0, 1, 1);

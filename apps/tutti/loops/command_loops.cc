@@ -192,64 +192,61 @@ int RunLoops(const LoopsArguments& given) {
 
 }  // namespace
 
-void AddLoopsCommand(CLI::App& app, int& exit_code) {
+void SetUpLoops(CLI::App& command, int& exit_code) {
   auto arguments = std::make_shared<LoopsArguments>();
-  CLI::App* command = app.add_subcommand(
-      "loops", "loop closure alone on a folder of images, measured against a ground truth");
-  command->add_option("--images", arguments->images, "folder of images, taken in natural order")->required();
+  command.add_option("--images", arguments->images, "folder of images, taken in natural order")->required();
   command
-      ->add_option("--ground-truth", arguments->truth.file,
-                   "loop matrix (PNG, BMP, text, MATLAB .mat; row = current image) or trajectory (TUM, "
-                   "KITTI, EuRoC)")
+      .add_option("--ground-truth", arguments->truth.file,
+                  "loop matrix (PNG, BMP, text, MATLAB .mat; row = current image) or trajectory (TUM, "
+                  "KITTI, EuRoC)")
       ->required();
-  command->add_option("--out", arguments->out, "folder for results.json, hypotheses.csv, curves and pictures")
+  command.add_option("--out", arguments->out, "folder for results.json, hypotheses.csv, curves and pictures")
       ->required();
-  command->add_option("--stride", arguments->truth.stride, "every n-th image")->capture_default_str();
-  command->add_flag("--join-pairs", arguments->truth.join_pairs,
-                    "two images in a row, left and right, make one image (City Centre, New College)");
-  command->add_flag("--keep-posterior", arguments->options.keep_posterior,
-                    "also write posteriors.csv: each member's posterior of each location");
-  command->add_flag("--dump", arguments->dump,
-                    "also write dump_candidates.csv (what each candidate looked like to each member) and "
-                    "dump_verification.csv (each geometric verification)");
+  command.add_option("--stride", arguments->truth.stride, "every n-th image")->capture_default_str();
+  command.add_flag("--join-pairs", arguments->truth.join_pairs,
+                   "two images in a row, left and right, make one image (City Centre, New College)");
+  command.add_flag("--keep-posterior", arguments->options.keep_posterior,
+                   "also write posteriors.csv: each member's posterior of each location");
+  command.add_flag("--dump", arguments->dump,
+                   "also write dump_candidates.csv (what each candidate looked like to each member) and "
+                   "dump_verification.csv (each geometric verification)");
   command
-      ->add_option(
+      .add_option(
           "--rule", arguments->rule,
           "joint (default), mean, log-pool, product, majority, naive, or one member: surf, sift, orb, "
           "akaze, brisk, kaze")
       ->type_name("RULE");
-  command->add_option(
-      "--preset", arguments->preset,
-      "published parameters: standardised-mean, paper-2013, rtabmap-0.8.3, or default (ours)");
+  command.add_option("--preset", arguments->preset,
+                     "published parameters: standardised-mean, paper-2013, rtabmap-0.8.3, or default (ours)");
   LoopRule& rule = arguments->truth.rule;
-  command->add_option("--gt-distance", rule.distance_m, "trajectory: a loop is nearer than this [m]")
+  command.add_option("--gt-distance", rule.distance_m, "trajectory: a loop is nearer than this [m]")
       ->capture_default_str();
-  command->add_option("--gt-angle", rule.angle_deg, "trajectory: and turned by less than this [deg]")
-      ->capture_default_str();
-  command
-      ->add_option("--gt-ignore", rule.ignore_m,
-                   "trajectory: what is nearer than this but no loop is ignored [m]")
-      ->capture_default_str();
-  command->add_option("--gt-exclude-s", rule.exclude_s, "trajectory: a loop is at least this much older [s]")
+  command.add_option("--gt-angle", rule.angle_deg, "trajectory: and turned by less than this [deg]")
       ->capture_default_str();
   command
-      ->add_flag("--table", arguments->table,
-                 "every rule and each member alone, one after the other; table.json, .md, .csv, and a folder "
-                 "for each")
-      ->excludes(command->get_option("--rule"));
-  command->add_option("--camera", arguments->camera,
-                      "fx,fy,cx,cy [px]: verify with the essential matrix (default: fundamental matrix)");
-  command
-      ->add_option("--threads", arguments->options.threads,
-                   "most threads; the result is the same for any number")
+      .add_option("--gt-ignore", rule.ignore_m,
+                  "trajectory: what is nearer than this but no loop is ignored [m]")
       ->capture_default_str();
-  command->add_option("--seed", arguments->options.seed, "seed of kd-forests and RANSAC")
+  command.add_option("--gt-exclude-s", rule.exclude_s, "trajectory: a loop is at least this much older [s]")
+      ->capture_default_str();
+  command
+      .add_flag("--table", arguments->table,
+                "every rule and each member alone, one after the other; table.json, .md, .csv, and a folder "
+                "for each")
+      ->excludes(command.get_option("--rule"));
+  command.add_option("--camera", arguments->camera,
+                     "fx,fy,cx,cy [px]: verify with the essential matrix (default: fundamental matrix)");
+  command
+      .add_option("--threads", arguments->options.threads,
+                  "most threads; the result is the same for any number")
+      ->capture_default_str();
+  command.add_option("--seed", arguments->options.seed, "seed of kd-forests and RANSAC")
       ->check(NotNegative())
       ->capture_default_str();
-  command->add_option("--set", arguments->set,
-                      "key=value: an option of the detector, with the keys of section 'loops' in tutti run "
-                      "--help-config --advanced (extraction.features=300); may be given again");
-  command->callback([arguments, &exit_code] { exit_code = RunLoops(*arguments); });
+  command.add_option("--set", arguments->set,
+                     "key=value: an option of the detector, with the keys of section 'loops' in tutti run "
+                     "--help-config --advanced (extraction.features=300); may be given again");
+  command.callback([arguments, &exit_code] { exit_code = RunLoops(*arguments); });
 }
 
 }  // namespace tutti::cli

@@ -5,7 +5,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-#include "apps/run/plot_shapes.h"
+#include "apps/plot/plot_picture.h"
 #include "apps/tutti/loops/loops_pictures.h"
 
 namespace tutti::cli {

@@ -1,7 +1,7 @@
 // Precision-recall curves of `tutti loops`.
 #include <cstdio>
 
-#include "apps/run/plot.h"
+#include "apps/plot/plot.h"
 #include "apps/tutti/loops/loops_pictures.h"
 
 namespace tutti::cli {

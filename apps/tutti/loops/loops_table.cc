@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "tutti/loopclosure/significance.h"
+#include "tutti/core/significance.h"
 
 namespace tutti::cli {
 namespace {

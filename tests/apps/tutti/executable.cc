@@ -10,11 +10,12 @@
 
 namespace tutti::testing {
 
-ProcessResult RunTuttiAndSignal(const std::vector<std::string>& arguments, const std::string& text,
-                                int signal) {
+ProcessResult RunProgramAndSignal(const std::filesystem::path& program,
+                                  const std::vector<std::string>& arguments, const std::string& text,
+                                  int signal) {
   int pipe_ends[2];
   if (pipe(pipe_ends) != 0) throw std::runtime_error("pipe failed");
-  std::vector<std::string> words = {TUTTI_EXECUTABLE};
+  std::vector<std::string> words = {program.string()};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;
   argv.reserve(words.size() + 1);
@@ -45,6 +46,11 @@ ProcessResult RunTuttiAndSignal(const std::vector<std::string>& arguments, const
   waitpid(child, &status, 0);
   result.status = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   return result;
+}
+
+ProcessResult RunTuttiAndSignal(const std::vector<std::string>& arguments, const std::string& text,
+                                int signal) {
+  return RunProgramAndSignal(TUTTI_EXECUTABLE, arguments, text, signal);
 }
 
 ProcessResult RunTutti(const std::vector<std::string>& arguments) {

@@ -15,10 +15,15 @@ struct ProcessResult {
   std::string output;
 };
 
+/// Starts `program`, sends `signal` (0: none) as soon as the output holds `text`, and waits for its end.
+ProcessResult RunProgramAndSignal(const std::filesystem::path& program,
+                                  const std::vector<std::string>& arguments, const std::string& text,
+                                  int signal);
+
 /// Runs tutti with these arguments and waits for it.
 ProcessResult RunTutti(const std::vector<std::string>& arguments);
 
-/// Starts tutti, sends `signal` as soon as the output holds `text`, and waits for its end.
+/// RunProgramAndSignal for tutti.
 ProcessResult RunTuttiAndSignal(const std::vector<std::string>& arguments, const std::string& text,
                                 int signal);
 

@@ -4,7 +4,6 @@
 
 #include <Eigen/Core>
 #include <filesystem>
-#include <opencv2/core.hpp>
 #include <string>
 #include <vector>
 
@@ -53,17 +52,7 @@ struct PlotAxes {
 /// Grid, ticks, numbers, frame, names and title.
 void AddAxes(const PlotAxes& axes, std::vector<PlotShape>& shapes);
 
-/// Draws over a CV_8UC3 (BGR) picture.
-void DrawShapes(const std::vector<PlotShape>& shapes, cv::Mat& picture);
-
-/// Width of a text that DrawShapes draws [px].
-double TextWidth(const std::string& text, double height);
-
-/// #rrggbb as BGR; black if it is none.
-cv::Scalar PlotColor(const std::string& hex);
-
-/// Both throw InputError if the file can't be written in full.
+/// Throws InputError if the file can't be written in full.
 void WriteSvg(const std::filesystem::path& file, const std::vector<PlotShape>& shapes, int width, int height);
-void WritePicture(const std::filesystem::path& file, const cv::Mat& picture);
 
 }  // namespace tutti

@@ -1,4 +1,4 @@
-#include "tutti/loopclosure/significance.h"
+#include "tutti/core/significance.h"
 
 #include <gtest/gtest.h>
 

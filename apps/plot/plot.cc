@@ -1,4 +1,6 @@
-#include "apps/run/plot.h"
+#include "apps/plot/plot.h"
+
+#include "apps/plot/plot_picture.h"
 
 namespace tutti {
 namespace {

@@ -3,7 +3,8 @@
 #include <cmath>
 #include <limits>
 
-#include "apps/run/plot.h"
+#include "apps/plot/plot.h"
+#include "apps/plot/plot_picture.h"
 
 namespace tutti {
 namespace {

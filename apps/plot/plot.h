@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "apps/run/plot_shapes.h"
+#include "apps/plot/plot_shapes.h"
 
 namespace tutti {
 

@@ -1,7 +1,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "apps/run/plot_shapes.h"
+#include "apps/plot/plot_shapes.h"
 
 namespace tutti {
 namespace {

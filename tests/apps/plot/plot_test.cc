@@ -1,4 +1,4 @@
-#include "apps/run/plot.h"
+#include "apps/plot/plot.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <sstream>
 
-#include "apps/run/plot_shapes.h"
+#include "apps/plot/plot_picture.h"
 #include "tests/support/test_data.h"
 #include "tutti/core/error.h"
 
@@ -59,6 +59,18 @@ TEST(Plot, PngIsNotBlank) {
       blue += image.at<cv::Vec3b>(y, x) == cv::Vec3b(0xb2, 0x72, 0x00) ? 1 : 0;
   }
   EXPECT_GT(blue, 500);
+}
+
+TEST(Plot, APictureIsReadAgainPixelByPixel) {
+  const auto file = testing::FreshFolder() / "p.png";
+  cv::Mat picture(37, 53, CV_8UC3);
+  cv::RNG(1).fill(picture, cv::RNG::UNIFORM, 0, 256);
+  const cv::Mat part = picture(cv::Rect(3, 2, 41, 30));  // its rows are not next to each other
+  WritePicture(file, part);
+  const cv::Mat read = cv::imread(file.string(), cv::IMREAD_UNCHANGED);
+  ASSERT_EQ(read.size(), part.size());
+  ASSERT_EQ(read.type(), CV_8UC3);
+  EXPECT_EQ(cv::norm(read, part, cv::NORM_INF), 0);
 }
 
 TEST(Plot, EmptySinglePointAndNonFiniteAreDrawable) {

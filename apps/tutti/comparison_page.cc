@@ -1,0 +1,31 @@
+#include "apps/tutti/comparison_page.h"
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "apps/report/comparison_report.h"
+#include "apps/report/page.h"
+
+namespace tutti::cli {
+
+void WriteComparisonReport(const std::filesystem::path& file, const std::string& title,
+                           const Comparison& comparison) {
+  std::vector<ReportTable> tables;
+  for (const ComparisonTable& table : ComparisonTables(comparison))
+    tables.push_back({table.dataset, table.table.header, table.table.rows, table.notes, table.stages.header,
+                      table.stages.rows});
+  std::vector<nlohmann::ordered_json> runs;
+  std::vector<std::string> failures;
+  for (const RunFigures& run : comparison.runs) {
+    if (!run.failure.empty())
+      failures.push_back(run.variant + ", " + Describe(run.sample) + ": " + run.failure);
+    auto report = ReadRunReport(run.folder);
+    if (!report) continue;
+    (*report)["variant"] = run.variant;
+    runs.push_back(std::move(*report));
+  }
+  WriteReportPage(file, ComparisonPage(title, tables, std::move(runs), failures));
+}
+
+}  // namespace tutti::cli

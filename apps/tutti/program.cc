@@ -1,0 +1,100 @@
+#include "apps/tutti/program.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <exception>
+#include <vector>
+
+#include "apps/tutti/describe.h"
+#include "tutti/core/error.h"
+#include "tutti/core/text.h"
+#include "tutti/slam/version.h"
+
+namespace tutti::cli {
+namespace {
+
+struct Command {
+  const char* name;
+  const char* sentence;
+};
+
+// All commands of tutti, in the order of the help.
+constexpr Command kCommands[] = {
+    {"run", "visual SLAM on a data set: trajectories, loops, summary"},
+    {"calibrate-check",
+     "can the calibration be right? Measures field of view, principal point, rows and order of stereo pairs, "
+     "depth unit; exit status 1 if something can't be"},
+    {"evaluate", "Errors of trajectories against a reference (ATE, RPE, KITTI, drift)"},
+    {"convert", "Trajectories among TUM, KITTI, EuRoC and g2o"},
+    {"plot", "Trajectories and their errors as pictures (SVG, PNG, PDF)"},
+    {"compare", "What does the ensemble buy? SLAM with each way to find loops"},
+    {"collect", "The summaries of many runs in one table"},
+    {"loops", "loop closure alone on a folder of images, measured against a ground truth"},
+    {"compare-loops",
+     "paired t-test between rules over the tables of several image sets (recall at 100 % precision)"},
+    {"optimize", "Optimise a pose graph (g2o file; 2D, 3D or with scale)"},
+    {"generate",
+     "Render the synthetic world (images and exact ground truth), or change real images; the same for the "
+     "same options"},
+    {"demo", "a short synthetic town: SLAM with and without the ensemble, and a plot"},
+    {"help", "this text; help COMMAND: that of a command"},
+};
+
+// `tutti help run` is `tutti run --help`.
+std::vector<char*> WithoutHelpCommand(int argc, char** argv) {
+  static char option[] = "--help";
+  std::vector<char*> words(argv, argv + argc);
+  if (argc > 1 && std::string(argv[1]) == "help") {
+    words.erase(words.begin() + 1);
+    words.push_back(option);
+  }
+  words.push_back(nullptr);
+  return words;
+}
+
+std::string UnknownCommand(const std::string& word, const std::vector<std::string>& known) {
+  return "there is no command '" + word + "'; the nearest is '" + NearestWord(word, known) +
+         "', and `tutti --help` lists all";
+}
+
+}  // namespace
+
+int RunProgram(int argc, char** argv, const std::map<std::string, SetUp>& own, int (*other)(char** argv)) {
+  CLI::App app{"tutti: visual SLAM with an ensemble of Bayesian loop-closure filters", "tutti"};
+  app.require_subcommand(1);
+  app.set_version_flag("--version", std::string("tutti ") + kVersion);
+  AddDescribeFlag(app);
+  int exit_code = 0;
+  std::vector<char*> words = WithoutHelpCommand(argc, argv);
+  std::vector<std::string> known;
+  for (const Command& entry : kCommands) {
+    const auto add = own.find(entry.name);
+    if (add == own.end() && other == nullptr) continue;
+    known.emplace_back(entry.name);
+    CLI::App* command = app.add_subcommand(entry.name, entry.sentence);
+    if (add != own.end()) {
+      add->second(*command, exit_code);
+      AddDescribeFlag(*command);
+      continue;
+    }
+    command->set_help_flag();  // the other program answers --help, too
+    command->prefix_command();
+    command->callback([&exit_code, &words, other] { exit_code = other(words.data()); });
+  }
+  try {
+    if (words[1] != nullptr && words[1][0] != '-' && std::count(known.begin(), known.end(), words[1]) == 0)
+      throw InputError(UnknownCommand(words[1], known));
+    app.parse(static_cast<int>(words.size()) - 1, words.data());
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : 1;  // --help comes this way, too
+  } catch (const InputError& e) {
+    std::fprintf(stderr, "tutti: %s\n", e.what());
+    return 1;
+  } catch (const std::exception& e) {
+    std::fprintf(stderr, "tutti: internal error: %s; please report it with the command line\n", e.what());
+    return 2;
+  }
+  return exit_code;
+}
+
+}  // namespace tutti::cli

@@ -14,22 +14,21 @@ macro(tutti_option name help default conditions needs)
   endif()
 endmacro()
 
-if(PROJECT_IS_TOP_LEVEL)
-  include(CTest) # defines BUILD_TESTING, ON by default
-  set(tests_can_be "BUILD_TESTING;NOT BUILD_SHARED_LIBS")
-  set(tests_need "BUILD_TESTING, and static libraries (tests use private classes)")
-else()
-  set(tests_can_be "NOT BUILD_SHARED_LIBS")
-  set(tests_need "static libraries (tests use private classes)")
-endif()
-
 option(TUTTI_BUILD_LOOPCLOSURE "Build the loop-closure library" ON)
 option(TUTTI_BUILD_BACKEND "Build the pose-graph library (needs Ceres)" ON)
 tutti_option(TUTTI_BUILD_SLAM "Build the SLAM library, and the front end for it" ON
   "TUTTI_BUILD_LOOPCLOSURE;TUTTI_BUILD_BACKEND" "TUTTI_BUILD_LOOPCLOSURE and TUTTI_BUILD_BACKEND")
 tutti_option(TUTTI_BUILD_APPS "Build the tutti executable and the examples" ${PROJECT_IS_TOP_LEVEL}
   "TUTTI_BUILD_SLAM" "TUTTI_BUILD_SLAM")
-tutti_option(TUTTI_BUILD_TESTS "Build the tests of what is built" ${PROJECT_IS_TOP_LEVEL} "${tests_can_be}" "${tests_need}")
+if(PROJECT_IS_TOP_LEVEL)
+  include(CTest) # defines BUILD_TESTING, ON by default
+endif()
+if(PROJECT_IS_TOP_LEVEL AND NOT BUILD_TESTING)
+  set(TUTTI_BUILD_TESTS OFF)
+else()
+  tutti_option(TUTTI_BUILD_TESTS "Build the tests of what is built" ${PROJECT_IS_TOP_LEVEL} "NOT BUILD_SHARED_LIBS"
+    "static libraries, since tests use private classes")
+endif()
 tutti_option(TUTTI_BUILD_BENCH "Build the programs under bench/ (needs Google Benchmark)" OFF
   "TUTTI_BUILD_APPS;NOT BUILD_SHARED_LIBS" "TUTTI_BUILD_APPS, and static libraries")
 tutti_option(TUTTI_BUILD_FUZZERS "Build the libFuzzer programs under tests/fuzz (needs clang; see ./dev fuzz)" OFF

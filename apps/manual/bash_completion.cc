@@ -17,7 +17,7 @@ std::string Values(const CommandPage& command) {
     std::string pattern;
     for (const std::string& name : argument.names) Append(name, "|", pattern);
     if (!words.empty()) {
-      out += "        " + pattern + ") words='" + words + "' ;;\n";
+      out.append("        ").append(pattern).append(") words='").append(words).append("' ;;\n");
     } else {
       Append(pattern, "|", argument.IsPath() ? (argument.value == "DIR" ? folders : files) : nothing);
     }

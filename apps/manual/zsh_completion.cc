@@ -27,15 +27,14 @@ std::string Value(const Argument& argument) {
 std::string Specifications(const CommandPage& command, const std::string& indent) {
   std::string out;
   for (const Argument& argument : command.arguments) {
+    const std::string begin = " \\\n" + indent + "'" + (argument.several ? "*" : "");
     if (argument.positional) {
-      out += " \\\n" + indent + "'" + (argument.several ? "*" : "") + ":" + Quoted(argument.names.front()) +
-             ":_files'";
+      out.append(begin).append(":").append(Quoted(argument.names.front())).append(":_files'");
       continue;
     }
-    for (const std::string& name : argument.names) {
-      out += " \\\n" + indent + "'" + (argument.several ? "*" : "") + name + "[" + Quoted(argument.text) +
-             "]" + (argument.value.empty() ? "" : Value(argument)) + "'";
-    }
+    const std::string end =
+        "[" + Quoted(argument.text) + "]" + (argument.value.empty() ? "" : Value(argument)) + "'";
+    for (const std::string& name : argument.names) out.append(begin).append(name).append(end);
   }
   return out;
 }

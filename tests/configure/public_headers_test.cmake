@@ -1,0 +1,17 @@
+# Every public header exports what it declares: a shared library would hide what stands outside of its visibility pragmas.
+# usage: cmake -DTUTTI=source -P public_headers_test.cmake
+set(headers "")
+foreach(module core frontend loopclosure backend apps/slam)
+  file(GLOB_RECURSE found "${TUTTI}/${module}/include/tutti/*.h")
+  list(APPEND headers ${found})
+endforeach()
+list(LENGTH headers count)
+if(count LESS 10)
+  message(FATAL_ERROR "no public headers in ${TUTTI}")
+endif()
+foreach(header IN LISTS headers)
+  file(READ "${header}" text)
+  if(NOT text MATCHES "\n#pragma GCC visibility push[(]default[)]\nnamespace tutti {.*\n}  // namespace tutti\n#pragma GCC visibility pop\n")
+    message(SEND_ERROR "${header}: namespace tutti must stand between '#pragma GCC visibility push(default)' and 'pop'")
+  endif()
+endforeach()

@@ -78,7 +78,8 @@ def slim(comparison):
         out["variants"][v["variant"]] = {
             "n": v["ate_rmse_m"]["count"], "failed": len(v["failures"]), "ate_m": [s["ate_rmse_m"] for s in v["samples"]],
             "ate_mean_m": v["ate_rmse_m"]["mean"], "ate_half_width_m": v["ate_rmse_m"]["half_width_95"],
-            "ate_worst_m": v["ate_rmse_m"]["largest"], "p": v["ate_minus_ensemble"].get("p"),
+            "ate_worst_m": v["ate_rmse_m"]["largest"],
+            "p": None if v["variant"] == "ensemble" else v["ate_minus_ensemble"].get("p"),
             "proposed": v["loops_proposed"]["mean"], "accepted": v["loops_accepted"]["mean"],
             "false": v["loops_false"]["mean"]}
     return out

@@ -118,6 +118,6 @@ function(tutti_add_test name)
   if(TUTTI_SANITIZE) # a test takes ten to twenty times as long
     set(timeout 1800)
   endif()
-  gtest_discover_tests(${target} TEST_PREFIX "${name}." DISCOVERY_MODE PRE_TEST
+  gtest_discover_tests(${target} TEST_PREFIX "${name}." DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 120
     PROPERTIES TIMEOUT ${timeout} ENVIRONMENT "TUTTI_DATA=$ENV{TUTTI_DATA}")
 endfunction()

@@ -71,7 +71,7 @@ TEST(Start, EveryCommandOfTheHelpExplainsItselfInEitherWay) {
 }
 
 TEST(Start, AnUnknownCommandIsRefusedWithTheNearest) {
-  for (const std::string& word : std::vector<std::string>{"optimise", "rum"}) {
+  for (const std::string word : {"optimise", "rum"}) {
     const auto run = RunTutti({word});
     EXPECT_EQ(run.status, 1);
     EXPECT_THAT(run.output, AllOf(HasSubstr("there is no command '" + word + "'"),

@@ -72,7 +72,7 @@ async function drawTiming(panel) {
     layoutOf('From having a frame to having its pose', { xaxis: axis('frame'), yaxis: axis('time [ms]', { rangemode: 'tozero' }), showlegend: false }));
   }
   for (const part of (data.tables ?? []).filter((t) => t.dataset === state.dataset && t.stage_rows?.length)) {
-    panel.append(el('h2', {}, 'Time per stage, mean over seeds'), table(part.stage_header, part.stage_rows));
+    panel.append(el('h2', {}, 'Time per stage, mean over the runs'), table(part.stage_header, part.stage_rows));
   }
   panel.append(note('Several stages run at once, on threads of their own; what ends in _wait waits for others. Times are of the machine and its load.'));
 }

@@ -35,7 +35,7 @@ function attack(folder) {
   const config = join(dataset, 'config.yaml');
   run('run', '--config', config, '--dataset', dataset, '--out', join(folder, 'attack'), '--quiet');
   run('compare', '--config', config, '--dataset', dataset, '--out', join(folder, 'compared'), '--variants', 'odometry,orb,ensemble',
-    '--seeds', '2');
+    '--runs', '2');
   run('collect', join(folder, 'attack'), join(folder, 'compared'), '--report', join(folder, 'collected.html'));
   return [join(folder, 'attack', 'report.html'), join(folder, 'compared', 'report.html'), join(folder, 'collected.html')];
 }

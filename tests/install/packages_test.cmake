@@ -3,8 +3,9 @@
 #        -P packages_test.cmake
 find_program(DPKG_DEB dpkg-deb)
 find_program(SHLIBDEPS dpkg-shlibdeps)
-if(NOT DPKG_DEB OR NOT SHLIBDEPS)
-  message(NOTICE "skipped: no dpkg-deb or dpkg-shlibdeps (Debian: apt-get install dpkg-dev)")
+find_program(FILE_COMMAND file)
+if(NOT DPKG_DEB OR NOT SHLIBDEPS OR NOT FILE_COMMAND)
+  message(NOTICE "skipped: no dpkg-deb, dpkg-shlibdeps or file (Debian: apt-get install dpkg-dev file)")
   return()
 endif()
 set(libraries libtutti-core-dev libtutti-loopclosure-dev libtutti-backend-dev libtutti-slam-dev)

@@ -22,6 +22,15 @@ std::vector<std::string> SplitText(std::string_view text, std::string_view separ
   return pieces;
 }
 
+std::string JoinText(const std::vector<std::string>& words, std::string_view between) {
+  std::string text;
+  for (const std::string& word : words) {
+    if (!text.empty()) text += between;
+    text += word;
+  }
+  return text;
+}
+
 std::optional<double> ParseDouble(std::string_view text) {
   if (!text.empty() && text.front() == '+') text.remove_prefix(1);
   double value = 0.0;

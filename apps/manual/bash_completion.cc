@@ -1,49 +1,43 @@
 #include "apps/manual/command_page.h"
+#include "tutti/core/text.h"
 
 namespace tutti::manual {
 namespace {
 
-void Append(const std::string& word, const char* between, std::string& list) {
-  list += (list.empty() ? "" : between) + word;
-}
-
 // What follows an option that takes a value: lines of a case.
 std::string Values(const CommandPage& command) {
-  std::string files, folders, nothing, out;  // patterns of case
+  std::vector<std::string> files, folders, nothing;  // patterns of case
+  std::string out;
   for (const Argument& argument : command.arguments) {
     if (argument.positional || argument.value.empty()) continue;
-    std::string words;
-    for (const std::string& choice : argument.choices) Append(choice, " ", words);
-    std::string pattern;
-    for (const std::string& name : argument.names) Append(name, "|", pattern);
-    if (!words.empty()) {
-      out.append("        ").append(pattern).append(") words='").append(words).append("' ;;\n");
+    const std::string pattern = JoinText(argument.names, "|");
+    if (!argument.choices.empty()) {
+      out += "        " + pattern + ") words='" + JoinText(argument.choices, " ") + "' ;;\n";
     } else {
-      Append(pattern, "|", argument.IsPath() ? (argument.value == "DIR" ? folders : files) : nothing);
+      (!argument.IsPath() ? nothing : argument.value == "DIR" ? folders : files).push_back(pattern);
     }
   }
-  if (!files.empty()) out += "        " + files + ") paths=-f ;;\n";
-  if (!folders.empty()) out += "        " + folders + ") paths=-d ;;\n";
-  if (!nothing.empty()) out += "        " + nothing + ") return ;;\n";
+  if (!files.empty()) out += "        " + JoinText(files, "|") + ") paths=-f ;;\n";
+  if (!folders.empty()) out += "        " + JoinText(folders, "|") + ") paths=-d ;;\n";
+  if (!nothing.empty()) out += "        " + JoinText(nothing, "|") + ") return ;;\n";
   return out;
 }
 
 std::string Options(const CommandPage& command) {
-  std::string out;
+  std::vector<std::string> names;
   for (const Argument& argument : command.arguments) {
-    if (argument.positional) continue;
-    for (const std::string& name : argument.names) Append(name, " ", out);
+    if (!argument.positional) names.insert(names.end(), argument.names.begin(), argument.names.end());
   }
-  return out;
+  return JoinText(names, " ");
 }
 
 }  // namespace
 
 std::string BashCompletion(const CommandPage& program) {
-  std::string commands;
+  std::vector<std::string> commands;
   std::string cases;
   for (const CommandPage& command : program.commands) {
-    Append(command.name, " ", commands);
+    commands.push_back(command.name);
     cases += "    " + command.name + ")\n      options='" + Options(command) + "'\n      case $before in\n" +
              Values(command) + "      esac\n      ;;\n";
   }
@@ -67,7 +61,7 @@ _@name@() {
 }
 complete -F _@name@ @name@
 )";
-  out = Replaced(Replaced(out, "@commands@", commands), "@options@", Options(program));
+  out = Replaced(Replaced(out, "@commands@", JoinText(commands, " ")), "@options@", Options(program));
   return Replaced(Replaced(out, "@cases@", cases), "@name@", program.name);
 }
 

@@ -1,4 +1,5 @@
 #include "apps/manual/command_page.h"
+#include "tutti/core/text.h"
 
 namespace tutti::manual {
 namespace {
@@ -12,10 +13,8 @@ std::string Line(const std::string& program, const std::string& condition, const
   for (const std::string& name : argument.names)
     out += name.rfind("--", 0) == 0 ? " -l " + name.substr(2) : " -s " + name.substr(1);
   if (!argument.value.empty()) {
-    std::string words;
-    for (const std::string& choice : argument.choices) words += (words.empty() ? "" : " ") + choice;
-    if (!words.empty()) {
-      out += " -x -a " + Quoted(words);
+    if (!argument.choices.empty()) {
+      out += " -x -a " + Quoted(JoinText(argument.choices, " "));
     } else if (argument.IsPath()) {
       out += argument.value == "DIR" ? " -x -a '(__fish_complete_directories)'" : " -r -F";
     } else {

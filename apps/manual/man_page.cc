@@ -1,5 +1,6 @@
 // man(7): the macros of manual pages.
 #include "apps/manual/command_page.h"
+#include "tutti/core/text.h"
 
 namespace tutti::manual {
 namespace {
@@ -11,19 +12,13 @@ std::string Plain(const std::string& text) {
   return Replaced(Replaced(out, "\n.", "\n\\&."), "\n'", "\n\\&'");
 }
 
-std::string Joined(const std::vector<std::string>& words, const std::string& between) {
-  std::string out;
-  for (const std::string& word : words) out += (out.empty() ? "" : between) + word;
-  return out;
-}
-
 // "--rule NAME", bold and italic.
 std::string Heading(const Argument& argument) {
   std::string out;
   if (argument.positional) {
     out = "\\fI" + Plain(argument.names.front()) + "\\fR";
   } else {
-    out = "\\fB" + Plain(Joined(argument.names, ", ")) + "\\fR";
+    out = "\\fB" + Plain(JoinText(argument.names)) + "\\fR";
     if (!argument.value.empty()) {
       const std::string value = "\\fI" + Plain(argument.value) + "\\fR";
       out += argument.value_optional ? " [" + value + "]" : " " + value;
@@ -34,7 +29,7 @@ std::string Heading(const Argument& argument) {
 
 std::string Paragraph(const Argument& argument) {
   std::string out = ".TP\n" + Heading(argument) + "\n" + Plain(argument.text);
-  if (!argument.choices.empty()) out += "\n.br\nOne of: " + Plain(Joined(argument.choices, ", ")) + ".";
+  if (!argument.choices.empty()) out += "\n.br\nOne of: " + Plain(JoinText(argument.choices)) + ".";
   if (!argument.default_value.empty()) out += "\n.br\nDefault: " + Plain(argument.default_value) + ".";
   if (argument.required && !argument.positional) out += "\n.br\nMust be given.";
   return out + "\n";

@@ -33,12 +33,6 @@ std::string ShowDouble(double value) {
   return text;
 }
 
-std::string Join(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
-  return text;
-}
-
 // Read: sets the field; empty, or what is wrong with the value.
 std::string Read(const YAML::Node& node, bool& field) {
   const std::string text = Text(node);
@@ -113,7 +107,7 @@ std::string Read(const YAML::Node& node, Enum& field) {
     field = value;
     return "";
   }
-  return Wrong(node, "one of " + Join(ValidWords<Enum>()));
+  return Wrong(node, "one of " + JoinText(ValidWords<Enum>()));
 }
 
 // Show: the value as YAML.
@@ -122,13 +116,13 @@ std::string Show(int value) { return std::to_string(value); }
 std::string Show(std::uint64_t value) { return std::to_string(value); }
 std::string Show(double value) { return ShowDouble(value); }
 std::string Show(const std::string& value) { return "\"" + value + "\""; }
-std::string Show(const std::vector<std::string>& value) { return "[" + Join(value) + "]"; }
+std::string Show(const std::vector<std::string>& value) { return "[" + JoinText(value) + "]"; }
 
 template <std::size_t N>
 std::string Show(const std::array<double, N>& values) {
   std::vector<std::string> texts(N);
   std::transform(values.begin(), values.end(), texts.begin(), ShowDouble);
-  return "[" + Join(texts) + "]";
+  return "[" + JoinText(texts) + "]";
 }
 
 template <class Enum, class = std::enable_if_t<std::is_enum_v<Enum>>>
@@ -140,7 +134,7 @@ std::string Show(Enum value) {
 template <class Field>
 std::string DocOf(const OptionText& text) {
   std::string range = text.Range();
-  if constexpr (std::is_enum_v<Field>) range = Join(ValidWords<Field>());
+  if constexpr (std::is_enum_v<Field>) range = JoinText(ValidWords<Field>());
   const std::string unit = text.unit;
   if (range.empty() && unit.empty()) return text.sentence;
   return std::string(text.sentence) + " [" + unit + (range.empty() || unit.empty() ? "" : "; ") + range + "]";
@@ -195,7 +189,8 @@ void ConfigTable::AddRule(LoopDetectorOptions& options) {
       std::find_if(keys_.begin(), keys_.end(), [](const ConfigKey& key) { return key.name == "rule"; });
   rule->read = word(&SetRule);
   rule->show = [&options] { return RuleName(options); };
-  const std::string doc = "published parameters that the other keys change [" + Join(KnownPresets()) + "]";
+  const std::string doc =
+      "published parameters that the other keys change [" + JoinText(KnownPresets()) + "]";
   keys_.insert(rule + 1, {"loops", "preset", doc, word(&ApplyPreset), [] { return "default"; }, false});
 }
 

@@ -3,6 +3,7 @@
 
 #include "tutti/backend/evaluation.h"
 #include "tutti/core/error.h"
+#include "tutti/core/text.h"
 
 namespace tutti {
 namespace {
@@ -11,9 +12,7 @@ namespace {
 std::size_t Find(const std::vector<std::string>& names, const std::string& name, const char* what) {
   const auto found = std::find(names.begin(), names.end(), name);
   if (found != names.end()) return static_cast<std::size_t>(found - names.begin());
-  std::string all;
-  for (const std::string& word : names) all += (all.empty() ? "" : ", ") + word;
-  throw InputError(std::string("unknown ") + what + " '" + name + "'; use one of " + all);
+  throw InputError(std::string("unknown ") + what + " '" + name + "'; use one of " + JoinText(names));
 }
 
 }  // namespace

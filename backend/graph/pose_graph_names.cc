@@ -11,15 +11,13 @@ namespace {
 
 template <typename Enum>
 Enum Parse(const std::string& name, const char* what) {
-  std::string all;
   std::vector<std::string> words;
   for (const auto& [word, value] : WordsOf(Enum())) {
     if (name == word) return value;
     words.emplace_back(word);
-    all += (all.empty() ? "" : ", ") + words.back();
   }
   throw InputError(std::string(what) + " '" + name + "' is unknown; did you mean '" +
-                   NearestWord(name, words) + "'? There are: " + all);
+                   NearestWord(name, words) + "'? There are: " + JoinText(words));
 }
 
 }  // namespace

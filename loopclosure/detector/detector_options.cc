@@ -15,12 +15,6 @@ std::vector<std::string> RuleWords() {
   return words;
 }
 
-std::string JoinWords(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
-  return text;
-}
-
 bool Holds(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
@@ -51,7 +45,7 @@ namespace {
 std::string MembersProblem(const LoopDetectorOptions& o) {
   std::vector<std::string> known = KnownMembers();
   known.insert(known.end(), o.external_members.begin(), o.external_members.end());
-  if (o.members.empty()) return "members must name at least one of " + JoinWords(KnownMembers());
+  if (o.members.empty()) return "members must name at least one of " + JoinText(KnownMembers());
   for (std::size_t i = 0; i < o.members.size(); ++i) {
     if (!Holds(known, o.members[i])) {
       return "members holds '" + o.members[i] + "', which is not known; did you mean '" +
@@ -132,7 +126,7 @@ void SetRule(const std::string& word, LoopDetectorOptions& options) {
   std::vector<std::string> all = RuleWords();
   all.insert(all.end(), known.begin(), known.end());
   throw InputError("unknown rule '" + word + "'; did you mean '" + NearestWord(word, all) +
-                   "'? Known: " + JoinWords(RuleWords()) + ", or one member: " + JoinWords(known));
+                   "'? Known: " + JoinText(RuleWords()) + ", or one member: " + JoinText(known));
 }
 
 const std::vector<std::string>& KnownPresets() {
@@ -177,7 +171,7 @@ LoopDetectorOptions Published(const std::string& name) {
     preset.wm_limit = 0;
   } else {
     throw InputError("unknown preset '" + name + "'; did you mean '" + NearestWord(name, KnownPresets()) +
-                     "'? Known: " + JoinWords(KnownPresets()));
+                     "'? Known: " + JoinText(KnownPresets()));
   }
   return preset;
 }

@@ -13,6 +13,13 @@ TEST(Text, SplitsAndDropsEmptyPieces) {
   EXPECT_TRUE(SplitText(" ,, ").empty());
 }
 
+TEST(Text, JoinsWithNothingBeforeTheFirstAndAfterTheLast) {
+  EXPECT_EQ(JoinText({}), "");
+  EXPECT_EQ(JoinText({"a"}), "a");
+  EXPECT_EQ(JoinText({"a", "b", "c"}), "a, b, c");
+  EXPECT_EQ(JoinText({"-h", "--help"}, "|"), "-h|--help");
+}
+
 TEST(Text, ParsesWholeNumbersOnly) {
   EXPECT_EQ(ParseDouble("1e-3"), 1e-3);
   EXPECT_EQ(ParseDouble("+2.5"), 2.5);

@@ -1,4 +1,5 @@
-// Small text helpers that more than one module needs: strict number parsing, natural order, nearest word.
+// Small text helpers that more than one module needs: lists of words, strict number parsing, natural order,
+// nearest word.
 #pragma once
 
 #include <optional>
@@ -11,6 +12,9 @@ namespace tutti {
 
 /// Splits at any of the separators, empty pieces dropped.
 std::vector<std::string> SplitText(std::string_view text, std::string_view separators = " \t\r,");
+
+/// The words with `between` in between; before the first word that is not empty there is none.
+std::string JoinText(const std::vector<std::string>& words, std::string_view between = ", ");
 
 /// The whole text as a number in the C locale ("1e-3", "nan", "inf" too); nothing if it is not one.
 std::optional<double> ParseDouble(std::string_view text);

@@ -2,9 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <array>
 #include <csignal>
-#include <cstdio>
 #include <filesystem>
 #include <regex>
 
@@ -38,13 +36,9 @@ class HandOver : public ::testing::Test {
 };
 
 TEST(Start, TheProgramLoadsNoImageReaders) {
-  std::string libraries;
-  const std::string command = std::string("ldd '") + TUTTI_EXECUTABLE + "'";
-  FILE* pipe = popen(command.c_str(), "r");
-  ASSERT_NE(pipe, nullptr);
-  std::array<char, 4096> text{};
-  while (std::fgets(text.data(), text.size(), pipe) != nullptr) libraries += text.data();
-  ASSERT_EQ(pclose(pipe), 0);
+  const testing::ProcessResult ldd = RunProgramAndSignal("/usr/bin/ldd", {TUTTI_EXECUTABLE}, "", 0);
+  const std::string& libraries = ldd.output;
+  ASSERT_EQ(ldd.status, 0) << libraries;
   EXPECT_THAT(libraries, HasSubstr("libc.so"));
   for (const char* name :
        {"opencv_imgcodecs", "opencv_videoio", "opencv_dnn", "opencv_features2d", "libgdal", "libmatio"})

@@ -1,11 +1,11 @@
 // Does the chordal start lead to the global optimum of graphs that nobody has tuned for?
-//   build/release/bench/noisy_graphs sphere|torus|streets POSES ROTATION_SIGMA_DEG [SEED]
+//   build/release/bench/noisy_graphs sphere|torus|streets POSES ROTATION_SIGMA_DEG [SEED [FILE.g2o]]
 // sphere, torus: wound round the surface, each pose tied to the one before and to the one of the winding
 // before (SE(3)); streets: a planar walk at random on a grid, tied where it comes back to a crossing (SE(2)).
 // Solved from the chordal start, and from the truth, which a robot does not have: the chordal start is good
 // if it ends no higher. Prints CSV: graph, poses, edges, sigma [deg], seed, chi2 from the chordal start, its
 // excess over the lower of the two [1], relative gap of the certificate [1], certified (0, 1), time of the
-// chordal solution [s].
+// chordal solution [s]. With a file, the graph is written there with the odometry's poses, and not solved.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -18,6 +18,7 @@
 
 #include "bench/noisy_measurement.h"
 #include "tutti/backend/certificate.h"
+#include "tutti/backend/g2o_io.h"
 #include "tutti/backend/pose_graph_optimizer.h"
 #include "tutti/core/error.h"
 
@@ -122,11 +123,24 @@ double Solve(PoseGraph& graph, GraphInit init, double& seconds) {
   return report.costs.chi2;
 }
 
-int Run(const std::string& name, int poses, double sigma_deg, unsigned seed) {
+/// As a robot would write it: poses along the measurements from one node to the next.
+void WriteMeasured(PoseGraph graph, const std::string& file) {
+  for (const PoseGraphEdge& edge : graph.edges()) {
+    if (edge.kind == EdgeKind::kOdometry)
+      graph.SetPose(edge.to, graph.Node(edge.from).pose * edge.measurement);
+  }
+  WriteG2o(file, graph);
+}
+
+int Run(const std::string& name, int poses, double sigma_deg, unsigned seed, const std::string& file) {
   std::mt19937 random(seed);
   if (name != "sphere" && name != "torus" && name != "streets") throw InputError("unknown graph: " + name);
   const World world = name == "streets" ? MakeStreets(poses, random) : MakeWound(name == "torus", poses);
   PoseGraph chordal = Measure(world, {kTranslationSigma, sigma_deg * M_PI / 180}, random);
+  if (!file.empty()) {
+    WriteMeasured(chordal, file);
+    return 0;
+  }
   PoseGraph from_truth = chordal;
   double seconds = 0, unused = 0;
   const double reached = Solve(chordal, GraphInit::kChordal, seconds);
@@ -140,12 +154,13 @@ int Run(const std::string& name, int poses, double sigma_deg, unsigned seed) {
 
 int Run(int argc, char** argv) {
   if (argc < 4) {
-    std::fprintf(stderr, "usage: noisy_graphs sphere|torus|streets POSES ROTATION_SIGMA_DEG [SEED]\n");
+    std::fprintf(stderr,
+                 "usage: noisy_graphs sphere|torus|streets POSES ROTATION_SIGMA_DEG [SEED [FILE.g2o]]\n");
     return 1;
   }
   try {
     return Run(argv[1], std::max(100, std::atoi(argv[2])), std::atof(argv[3]),
-               argc > 4 ? static_cast<unsigned>(std::atoi(argv[4])) : 1u);
+               argc > 4 ? static_cast<unsigned>(std::atoi(argv[4])) : 1u, argc > 5 ? argv[5] : "");
   } catch (const InputError& error) {
     std::fprintf(stderr, "noisy_graphs: %s\n", error.what());
     return 1;

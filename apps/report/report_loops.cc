@@ -10,7 +10,6 @@
 namespace tutti::report {
 namespace {
 
-constexpr double kMaxGap = 0.2;  // between reference poses to interpolate [s]
 constexpr std::size_t kMostCurvePoints = 400;
 constexpr std::size_t kMostMissed = 400;  // of the map; more are drawn on each other
 
@@ -95,7 +94,8 @@ KnownLoops FindKnownLoops(const RunResult& result, const DetectionLog& log) {
   Trajectory poses;
   for (std::size_t i = 0; i < log.detections().size(); ++i) {
     const LoggedDetection& detection = log.detections()[i];
-    const std::optional<Pose> pose = InterpolatePose(result.reference, detection.stamp_s, kMaxGap);
+    const std::optional<Pose> pose =
+        PoseOfFrame(result.reference, detection.stamp_s, result.frame_interval_s);
     if (!pose) continue;
     known.row_of[detection.query] = static_cast<int>(known.images.size());
     known.images.push_back(i);

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "apps/run/outputs.h"
+#include "apps/run/run_parts.h"
 #include "apps/run/timing.h"
 #include "tutti/slam/version.h"
 
@@ -84,13 +85,18 @@ Json LoopsJson(const RunResult& r) {
 }
 
 Json FramesJson(const RunResult& r) {
-  Json frames = {
-      {"total", r.frames_total},      {"tracked", r.frames_tracked},         {"bad", r.bad.size()},
-      {"lost", r.frames_lost},        {"relocalized", r.frames_relocalized}, {"dropped", r.frames_dropped},
-      {"in_dataset", r.frames_listed}};
-  frames["bad_frames"] = Json::array();
-  for (const BadFrame& bad : r.bad)
-    frames["bad_frames"].push_back({{"index", bad.index}, {"error", bad.error}});
+  Json frames = {{"total", r.frames_total},
+                 {"tracked", r.frames_tracked},
+                 {"bad", r.bad.size()},
+                 {"lost", r.frames_lost},
+                 {"relocalized", r.frames_relocalized},
+                 {"dropped", r.frames_dropped},
+                 {"in_dataset", r.frames_listed},
+                 {"without_depth", r.frames_without_depth}};
+  for (const auto& [name, list] : {std::pair("bad_frames", &r.bad), {"bad_depth", &r.bad_depth}}) {
+    frames[name] = Json::array();
+    for (const BadFrame& bad : *list) frames[name].push_back({{"index", bad.index}, {"error", bad.error}});
+  }
   frames["lost_stretches"] = Json::array();
   for (const LostStretch& lost : r.lost) {
     frames["lost_stretches"].push_back(
@@ -103,6 +109,25 @@ Json FramesJson(const RunResult& r) {
                                       {"last_stamp_s", piece.back().stamp_s}});
   }
   return frames;
+}
+
+// What graph.certify has found.
+Json GraphJson(const RunResult& r) {
+  if (!r.graph_proof) return {{"certificate", {{"available", false}, {"reason", "no loop moved the map"}}}};
+  const KeyframeGraphProof& proof = *r.graph_proof;
+  const Certificate& certificate = proof.certificate;
+  Json graph = {{"start", ToString(proof.best)}, {"moved", proof.better}, {"starts", Json::array()}};
+  for (const StartOutcome& start : proof.starts) {
+    graph["starts"].push_back({{"start", ToString(start.start)},
+                               {"initial_objective", start.initial_objective},
+                               {"objective", start.objective},
+                               {"spared", start.spared}});
+  }
+  graph["certificate"] = {
+      {"available", certificate.available},     {"certified", certificate.certified},
+      {"reason", certificate.reason},           {"chordal", certificate.chordal},
+      {"lower_bound", certificate.lower_bound}, {"relative_gap", certificate.relative_gap}};
+  return graph;
 }
 
 std::string Quoted(const std::string& text) {
@@ -158,6 +183,7 @@ std::string SummaryJson(const RunResult& r) {
     json["calibration_findings"].push_back({{"measured", f.measured}, {"advice", f.advice}});
   json["keyframes"] = r.keyframes;
   json["loops"] = LoopsJson(r);
+  if (r.config.run.certify) json["graph"] = GraphJson(r);
   Json stages = Json::object();
   for (const auto& [name, ms] : r.stage_ms) stages[name] = ms;
   json["timing"] = {
@@ -230,6 +256,8 @@ std::string ResultTable(const RunResult& r) {
   std::ostringstream out;
   out << "\n  frames " << r.frames_tracked << " of " << r.frames_total << " tracked";
   if (!r.bad.empty()) out << ", " << r.bad.size() << " bad";
+  if (r.frames_without_depth > 0)
+    out << ", " << r.frames_without_depth << " without " << DepthSource(r.rig.sensor) << " image";
   if (r.realtime) out << ", " << r.frames_dropped << " dropped";
   out << "; keyframes " << r.keyframes << "; loops " << r.LoopsAccepted() << " accepted of " << r.loops.size()
       << " proposed";

@@ -11,7 +11,6 @@ namespace tutti {
 namespace {
 
 constexpr double kMaxDifference = 0.01;        // of time stamps [s], as evo
-constexpr double kMaxGap = 0.2;                // between reference poses to interpolate [s]
 constexpr double kMonoFalseDistance = 10.0;    // [m]
 constexpr double kMetricFalseDistance = 0.20;  // [m]
 constexpr double kMetricFalseAngle = 8.0;      // [deg]
@@ -43,9 +42,11 @@ TrajectoryScore Score(const Trajectory& reference, const Trajectory& estimate, b
 
 enum class Verdict { kTrue, kFalse, kUnknown };
 
-Verdict Judge(const LoopRecord& loop, const Trajectory& reference, const CameraRig& rig) {
-  const std::optional<Pose> candidate = InterpolatePose(reference, loop.candidate_stamp_s, kMaxGap);
-  const std::optional<Pose> query = InterpolatePose(reference, loop.query_stamp_s, kMaxGap);
+Verdict Judge(const LoopRecord& loop, const Trajectory& reference, const RunResult& result) {
+  const double interval_s = result.frame_interval_s;
+  const CameraRig& rig = result.rig;
+  const std::optional<Pose> candidate = PoseOfFrame(reference, loop.candidate_stamp_s, interval_s);
+  const std::optional<Pose> query = PoseOfFrame(reference, loop.query_stamp_s, interval_s);
   if (!candidate || !query) return Verdict::kUnknown;
   if (rig.sensor == Sensor::kMono || !loop.S_candidate_query) {
     const double distance = (candidate->translation - query->translation).norm();
@@ -81,7 +82,7 @@ void EvaluateRun(const Trajectory& reference, const std::string& file, RunResult
   }
   for (LoopRecord& loop : result.loops) {
     if (!loop.accepted) continue;
-    switch (Judge(loop, reference, result.rig)) {
+    switch (Judge(loop, reference, result)) {
       case Verdict::kTrue:
         ++evaluation.loops_true;
         loop.correct = true;

@@ -4,6 +4,7 @@
 
 #include <set>
 
+#include "core/median.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -77,6 +78,16 @@ std::optional<std::pair<Trajectory, std::string>> ReadReference(const Dataset& d
     throw InputError(e.what() + std::string(hint));
   }
 }
+
+double FrameInterval(const Dataset& dataset) {
+  if (dataset.Size() < 2) return 0;
+  std::vector<double> intervals;
+  for (std::size_t i = 1; i < dataset.Size(); ++i)
+    intervals.push_back(dataset.Stamp(i) - dataset.Stamp(i - 1));
+  return internal::Median(std::move(intervals)) / static_cast<double>(dataset.Number(1) - dataset.Number(0));
+}
+
+const char* DepthSource(Sensor sensor) { return sensor == Sensor::kStereo ? "right" : "depth"; }
 
 Trajectory BodyTrajectory(Trajectory trajectory, const CameraRig& rig) {
   const Pose T_camera_body = rig.T_body_camera.Inverse();

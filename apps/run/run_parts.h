@@ -27,6 +27,13 @@ std::optional<std::pair<Trajectory, std::string>> ReadReference(const Dataset& d
                                                                 const RunRequest& request,
                                                                 std::vector<std::string>* warnings);
 
+/// Median time from one image of the data set to the next [s], of those between which none is left out by
+/// DatasetOptions::stride; 0 for fewer than two.
+double FrameInterval(const Dataset& dataset);
+
+/// What distances are measured from beside the image: "right" or "depth".
+const char* DepthSource(Sensor sensor);
+
 /// T_world_camera -> T_world_body, the frame that ground truth is of.
 Trajectory BodyTrajectory(Trajectory trajectory, const CameraRig& rig);
 

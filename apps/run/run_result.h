@@ -9,6 +9,7 @@
 
 #include "apps/run/timing.h"
 #include "tutti/backend/evaluation.h"
+#include "tutti/backend/keyframe_graph.h"
 #include "tutti/backend/pose_graph.h"
 #include "tutti/core/trajectory.h"
 #include "tutti/frontend/calibration_check.h"
@@ -19,14 +20,14 @@ namespace tutti {
 
 /// Frames in a row without a pose, and why.
 struct LostStretch {
-  std::int64_t first = 0, last = 0;  ///< 0-based indices of input frames
+  std::int64_t first = 0, last = 0;  ///< InputFrame::index
   std::string state;                 ///< "initializing" or "lost"
   std::string reason;                ///< of its first frame
 };
 
-/// A frame that could not be read.
+/// A frame that could not be read, or whose depth or right image could not.
 struct BadFrame {
-  std::int64_t index = 0;
+  std::int64_t index = 0;  ///< InputFrame::index
   std::string error;
 };
 
@@ -62,14 +63,17 @@ struct RunResult {
   std::vector<CalibrationFinding> calibration_findings;  ///< what can't be right about it
 
   // Frames.
-  std::size_t frames_total = 0;        ///< that the run went through, bad and dropped ones included
-  std::size_t frames_listed = 0;       ///< that the data set has
-  std::size_t frames_tracked = 0;      ///< with a pose in trajectory.txt
-  std::size_t frames_lost = 0;         ///< read, but without a pose when they came
-  std::size_t frames_relocalized = 0;  ///< lost, but the loop detector knew the place
-  bool realtime = false;               ///< played by the time stamps
-  std::size_t frames_dropped = 0;      ///< not looked at, since newer ones were there already
+  std::size_t frames_total = 0;          ///< that the run went through, bad and dropped ones included
+  std::size_t frames_listed = 0;         ///< that the data set has
+  std::size_t frames_tracked = 0;        ///< with a pose in trajectory.txt
+  std::size_t frames_lost = 0;           ///< read, but without a pose when they came
+  std::size_t frames_relocalized = 0;    ///< lost, but the loop detector knew the place
+  bool realtime = false;                 ///< played by the time stamps
+  std::size_t frames_dropped = 0;        ///< not looked at, since newer ones were there already
+  std::size_t frames_without_depth = 0;  ///< stereo and RGB-D: read, but without a right or depth image
   std::vector<BadFrame> bad;
+  std::vector<BadFrame> bad_depth;  ///< of those without depth the ones that have an image for it
+  double frame_interval_s = 0;      ///< FrameInterval of the data set
   std::vector<LostStretch> lost;
   std::size_t keyframes = 0;
   bool interrupted = false;
@@ -81,12 +85,13 @@ struct RunResult {
   int corrections = 0;
   int global_adjustments = 0;
 
-  // Trajectories: T_world_body, the world is the first camera's place.
+  // Trajectories: T_world_body, the world is the camera of the first keyframe.
   Trajectory trajectory, trajectory_odometry, keyframe_trajectory, reference;
   std::vector<Trajectory> other_pieces;  ///< of the map, after losses; no loop joined them to `trajectory`
   bool odometry_complete =
       true;  ///< false: it ends at the first correction (interrupted, or run.odometry_pass: false)
   PoseGraph graph;
+  std::optional<KeyframeGraphProof> graph_proof;  ///< with graph.certify, if loops moved the map
   std::optional<RunEvaluation> evaluation;
 
   // Cost.

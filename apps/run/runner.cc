@@ -73,10 +73,12 @@ class Run {
       for (; next_ < fetched->position; ++next_) dropped_.insert(next_);
       if (fetched->read.frame) {
         positions_[fetched->read.frame->index] = next_;
+        CountDepth(fetched->read, progress);
         TrackOne(*fetched->read.frame);
       } else {
-        result_.bad.push_back({static_cast<std::int64_t>(next_), fetched->read.error});
-        progress.Note("tutti: frame " + std::to_string(next_) + " is skipped: " + fetched->read.error);
+        result_.bad.push_back({dataset_.Number(next_), fetched->read.error});
+        progress.Note("tutti: frame " + std::to_string(dataset_.Number(next_)) +
+                      " is skipped: " + fetched->read.error);
       }
       NoteWarnings(progress);
       progress.Update(++next_, Status());
@@ -98,6 +100,7 @@ class Run {
     result_.frames_total = next_;
     result_.frames_dropped = dropped_.size();
     result_.frames_listed = dataset_.Size();
+    result_.frame_interval_s = FrameInterval(dataset_);
     result_.stage_ms = slam_.StageMilliseconds();
     result_.stage_ms["read"] = read_ms;
     result_.stage_ms["read_wait"] = frames.WaitedMs();
@@ -124,6 +127,7 @@ class Run {
     result_.global_adjustments = slam_.GlobalAdjustments();
     result_.frames_relocalized = slam_.Relocalized();
     result_.graph = slam_.Graph();
+    result_.graph_proof = slam_.GraphProof();
     if (alone_) result_.trajectory_odometry = BodyTrajectory(alone_->FrameTrajectory(), result_.rig);
   }
 
@@ -184,6 +188,16 @@ class Run {
       if ((result_.interrupted || InterruptGuard::Requested()) && i + 1 < end) return false;
     }
     return true;
+  }
+
+  void CountDepth(const ReadResult& read, Progress& progress) {
+    const InputFrame& frame = *read.frame;
+    if (result_.rig.sensor == Sensor::kMono || !frame.right.empty() || !frame.depth_m.empty()) return;
+    ++result_.frames_without_depth;
+    if (read.depth_error.empty()) return;
+    result_.bad_depth.push_back({frame.index, read.depth_error});
+    progress.Note("tutti: frame " + std::to_string(frame.index) + " is tracked without its " +
+                  DepthSource(result_.rig.sensor) + " image: " + read.depth_error);
   }
 
   void NoteWarnings(Progress& progress) {

@@ -95,7 +95,7 @@ RunResult CloseLoops(const TrackedSequence& tracked, const RunRequest& request, 
   for (std::size_t k = 0; k < tracked.keyframes.size() && !InterruptGuard::Requested(); ++k) {
     const TrackedSequence::Keyframe& keyframe = tracked.keyframes[k];
     const std::optional<std::size_t> place = FindStamp(*dataset, keyframe.stamp_s);
-    const ReadResult read = place ? dataset->Read(*place) : ReadResult{std::nullopt, "it is gone"};
+    const ReadResult read = place ? dataset->Read(*place) : ReadResult{std::nullopt, "it is gone", {}};
     if (!read.frame) {
       throw InputError("the frame at " + std::to_string(keyframe.stamp_s) +
                        " s was read before, and now can't be: " + read.error);
@@ -117,6 +117,7 @@ RunResult CloseLoops(const TrackedSequence& tracked, const RunRequest& request, 
   CollectMap(replay.State(), result);
   result.global_adjustments = replay.loops().closer().Adjustments();
   result.graph = replay.loops().closer().Graph(*replay.State().odometry);
+  result.graph_proof = replay.loops().closer().proof();
   result.trajectory_odometry = tracked.result.trajectory;
   if (reference) EvaluateRun(reference->first, reference->second, result);
   WriteOutputs(request.out, result);

@@ -168,9 +168,13 @@ void ConfigTable::AddOptions(const std::string& section, Options& options) {
 
 template <class Field>
 void ConfigTable::Add(const std::string& section, const OptionText& text, Field& field) {
-  keys_.push_back({section, text.name, DocOf<Field>(text),
-                   [&field](const YAML::Node& node) { return Read(node, field); },
-                   [&field] { return Show(field); }, !text.basic});
+  // After the last one of its section, which another struct may have begun.
+  const auto last = std::find_if(keys_.rbegin(), keys_.rend(),
+                                 [&](const ConfigKey& key) { return key.section == section; });
+  keys_.insert(
+      last == keys_.rend() ? keys_.end() : last.base(),
+      {section, text.name, DocOf<Field>(text), [&field](const YAML::Node& node) { return Read(node, field); },
+       [&field] { return Show(field); }, !text.basic});
 }
 
 void ConfigTable::AddRule(LoopDetectorOptions& options) {

@@ -172,6 +172,7 @@ std::optional<LoopUpdate> LoopCloser::Solved(const Odometry& odometry, std::int6
       if (solution.correction.loops[i].weight < kNoWeight) Revoke(accepted_[i].record, &update);
     }
     update.correction = MoveBy(solution.correction, odometry);
+    proof_ = solution.proof;
   }
   stages_["loop_optimize"] += watch.Milliseconds();
   return update;

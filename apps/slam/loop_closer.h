@@ -65,6 +65,8 @@ class LoopCloser {
   const std::vector<LoopRecord>& records() const { return records_; }
   /// Keyframes, odometry edges and accepted loops at the present poses.
   PoseGraph Graph(const Odometry& odometry) const;
+  /// Of the last solution that moved the map, with graph.certify.
+  const std::optional<KeyframeGraphProof>& proof() const { return proof_; }
   int Corrections() const { return corrections_; }
   int Adjustments() const { return adjustments_; }
   /// Milliseconds spent, summed, by stage.
@@ -97,6 +99,7 @@ class LoopCloser {
   std::vector<MapKeyframe> solved_keyframes_;  // the map as it was when solving began
   std::optional<int> adjust_piece_;            // map piece to be adjusted once the correction was applied
   GlobalAdjuster adjuster_;
+  std::optional<KeyframeGraphProof> proof_;
   int corrections_ = 0;
   int adjustments_ = 0;  // of the whole map
   std::map<std::string, double> stages_;

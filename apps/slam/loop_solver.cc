@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstdio>
+#include <utility>
 
 #include "core/angle.h"
 #include "core/stopwatch.h"
@@ -70,6 +71,22 @@ bool Judge(const KeyframeCorrection& correction, const std::vector<LoopEdge>& ac
   return all_stay;
 }
 
+// From every start; another one than the map counts if it is lower and all loops may stay there, too.
+void Prove(const KeyframeGraph& graph, const std::vector<LoopEdge>& accepted, const SlamOptions& options,
+           LoopSolution* out) {
+  std::vector<LoopEdge> loops = accepted;
+  for (const LoopVerdict& verdict : out->verdicts) {
+    if (verdict.reason.empty()) loops.push_back(verdict.loop);
+  }
+  out->proof = graph.Prove(loops);
+  if (!out->proof->better) return;
+  std::vector<LoopVerdict> verdicts = out->verdicts;
+  out->proof->better = Judge(out->proof->correction, accepted, options, &verdicts);
+  if (!out->proof->better) return;
+  out->verdicts = std::move(verdicts);
+  out->correction = out->proof->correction;
+}
+
 }  // namespace
 
 Disagreement Measure(const Similarity& E, double depth) {
@@ -106,6 +123,7 @@ LoopSolution SolveLoops(const KeyframeGraph& graph, const std::vector<LoopEdge>&
         verdict.reason = "the pose graph could not be solved: " + out.correction.reason;
     }
   }
+  if (out.moves && options.certify) Prove(graph, accepted, options, &out);
   out.time_ms = watch.Milliseconds();
   return out;
 }

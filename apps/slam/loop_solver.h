@@ -34,9 +34,10 @@ struct LoopVerdict {
 };
 
 struct LoopSolution {
-  std::vector<LoopVerdict> verdicts;  ///< of the entering loops
-  bool moves = false;                 ///< some of them are in, and the map is to move
-  KeyframeCorrection correction;      ///< if it moves; loops: the accepted ones, then those that are in
+  std::vector<LoopVerdict> verdicts;        ///< of the entering loops
+  bool moves = false;                       ///< some of them are in, and the map is to move
+  KeyframeCorrection correction;            ///< if it moves; loops: the accepted ones, then those that are in
+  std::optional<KeyframeGraphProof> proof;  ///< of it, with graph.certify
   double time_ms = 0;
 };
 

@@ -164,6 +164,10 @@ PoseGraph SlamSystem::Graph() const {
   return odometry() != nullptr ? impl_->loops_.closer().Graph(*odometry()) : PoseGraph();
 }
 
+const std::optional<KeyframeGraphProof>& SlamSystem::GraphProof() const {
+  return impl_->loops_.closer().proof();
+}
+
 std::map<std::string, double> SlamSystem::StageMilliseconds() const {
   std::map<std::string, double> stages = impl_->loops_.StageMilliseconds();
   for (const auto& [name, ms] : impl_->stages_) stages[name] += ms;

@@ -2,7 +2,12 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <string>
+#include <vector>
+
+#include "tutti/core/options.h"
+#include "tutti/core/text.h"
 
 namespace tutti::cli {
 
@@ -23,6 +28,25 @@ inline CLI::Validator Positive() {
 }
 inline CLI::Validator NotNegative() {
   return NumberThat([](double value) { return value >= 0; }, "of 0 or more", "NOT NEGATIVE");
+}
+
+/// One of these words; another one is answered with the nearest. The help shows {one,two}.
+inline CLI::Validator OneOf(const std::vector<std::string>& words) {
+  return CLI::Validator(
+      [words](std::string& text) {
+        if (std::find(words.begin(), words.end(), text) != words.end()) return std::string();
+        return "'" + text + "' is unknown; did you mean '" + NearestWord(text, words) +
+               "'? There are: " + JoinText(words);
+      },
+      "{" + JoinText(words, ",") + "}");
+}
+
+/// The words of an enumeration's values.
+template <class Enum>
+CLI::Validator OneOf(Enum any) {
+  std::vector<std::string> words;
+  for (const auto& [word, value] : WordsOf(any)) words.emplace_back(word);
+  return OneOf(words);
 }
 
 }  // namespace tutti::cli

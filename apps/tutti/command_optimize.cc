@@ -20,7 +20,8 @@ namespace {
 
 struct OptimizeArguments {
   std::string in, out, json;
-  std::string init = "auto", objective = "chi2", robust = "none", solver = "block";
+  std::string init = "auto", objective = "chi2", robust = "none", solver = "block",
+              bad_information = "refuse";
   bool certify = false;
   PoseGraphOptions options;
 };
@@ -47,11 +48,21 @@ nlohmann::ordered_json ToJson(const OptimizeArguments& arguments, const G2oFile&
   json["kind"] = ToString(file.graph.kind());
   json["nodes"] = file.graph.nodes().size();
   json["edges"] = file.graph.edges().size();
+  json["bad_information"] = {
+      {"treatment", arguments.bad_information}, {"edges", file.bad_information}, {"skipped", file.skipped}};
   json["objective"] = arguments.objective;
   json["robust"] = arguments.robust;
   json["solver"] = ToString(report.solver);
   json["solver_note"] = report.solver_note;
-  json["init"] = ToString(report.init);
+  json["init"] = arguments.init;
+  json["start"] = ToString(report.start);
+  json["starts"] = nlohmann::ordered_json::array();
+  for (const StartOutcome& start : report.starts) {
+    json["starts"].push_back({{"start", ToString(start.start)},
+                              {"initial_objective", start.initial_objective},
+                              {"objective", start.objective},
+                              {"spared", start.spared}});
+  }
   json["success"] = report.success;
   json["reason"] = report.reason;
   json["initial_costs"] = ToJson(report.initial_costs);
@@ -93,11 +104,17 @@ void PrintCosts(const char* name, const GraphCosts& costs) {
 }
 
 void Print(const G2oFile& file, const PoseGraphReport& report) {
-  std::printf("%zu poses in %s, %zu edges; initialisation: %s; solver: %s\n", file.graph.nodes().size(),
-              ToString(file.graph.kind()), file.graph.edges().size(), ToString(report.init),
+  std::printf("%zu poses in %s, %zu edges; start: %s; solver: %s\n", file.graph.nodes().size(),
+              ToString(file.graph.kind()), file.graph.edges().size(), ToString(report.start),
               ToString(report.solver));
   if (!report.solver_note.empty())
     std::printf("  (not the one that was asked for: %s)\n", report.solver_note.c_str());
+  for (const StartOutcome& start : report.starts) {
+    if (report.starts.size() < 2) break;
+    std::printf("  from the %s: %.9g to %.9g%s%s\n", ToString(start.start), start.initial_objective,
+                start.objective, start.spared ? ", downhill all the way" : "",
+                start.start == report.start ? ", taken" : "");
+  }
   std::printf("  %-8s %16s %16s %16s\n", "", "chi2", "chi2log", "chordal");
   PrintCosts("start", report.initial_costs);
   PrintCosts("result", report.costs);
@@ -152,7 +169,7 @@ void RunOptimize(OptimizeArguments arguments) {
   arguments.options.robust = ParseRobustLoss(arguments.robust);
   arguments.options.solver = ParsePoseGraphSolver(arguments.solver);
   const PoseGraphOptimizer optimizer(arguments.options);
-  G2oFile file = ReadG2o(arguments.in);
+  G2oFile file = ReadG2o(arguments.in, ParseBadInformation(arguments.bad_information));
   for (const std::string& warning : file.warnings)
     std::fprintf(stderr, "tutti: warning: %s\n", warning.c_str());
   if (arguments.options.init == GraphInit::kFile && !file.has_all_vertices) {
@@ -162,7 +179,8 @@ void RunOptimize(OptimizeArguments arguments) {
   }
   const PoseGraphReport report = optimizer.Optimize(file.graph);
   std::optional<Certificate> certificate;
-  if (arguments.certify && report.success) certificate = CertifyOptimum(file.graph);
+  if (arguments.certify && report.success)
+    certificate = CertifyOptimum(file.graph, {}, report.chordal_optimum);
   WriteJson(arguments, file, report, certificate);
   if (!report.success) throw InputError(arguments.in + ": could not be optimised: " + report.reason);
   WriteG2o(arguments.out, file.graph);
@@ -179,13 +197,14 @@ void SetUpOptimize(CLI::App& command, int&) {
   command
       .add_option("--init", arguments->init,
                   "Start: file: the vertices; odometry: a spanning tree; chordal: linear relaxation, often "
-                  "near the global minimum where the others are not; auto: the one with the lowest cost")
-      ->check(CLI::IsMember({"auto", "file", "odometry", "chordal"}))
+                  "near the global minimum where the others are not, and without --robust the optimum of the "
+                  "chordal objective, too: the better result counts; auto: the one with the lowest cost")
+      ->check(OneOf(GraphInit()))
       ->capture_default_str();
   command
       .add_option("--objective", arguments->objective,
                   "chi2: g2o's error (vector part of the quaternion); chi2log: rotation vectors")
-      ->check(CLI::IsMember({"chi2", "chi2log"}))
+      ->check(OneOf(GraphObjective()))
       ->capture_default_str();
   command
       .add_option(
@@ -193,13 +212,22 @@ void SetUpOptimize(CLI::App& command, int&) {
           "Robust loss on loops (|i - j| != 1). gnc: graduated non-convexity, then inlier or outlier; take "
           "this one for SLAM graphs, docs/backend.md says why. gnc-tls: the same by truncated least squares; "
           "dcs and switchable: weights down to 0; huber and cauchy: smaller weights; none: least squares")
-      ->check(CLI::IsMember({"none", "huber", "cauchy", "dcs", "switchable", "gnc-tls", "gnc"}))
+      ->check(OneOf(RobustLoss()))
       ->capture_default_str();
   command
       .add_option("--solver", arguments->solver,
                   "block: Levenberg-Marquardt with a Cholesky of the poses' blocks, the faster one; ceres: "
                   "Ceres Solver, the same optimum; solves --robust switchable in any case")
-      ->check(CLI::IsMember({"block", "ceres"}))
+      ->check(OneOf(PoseGraphSolver()))
+      ->capture_default_str();
+  command
+      .add_option(
+          "--bad-information", arguments->bad_information,
+          "Edges whose information matrix is not positive definite. refuse: the file, with their "
+          "number; project: the nearest positive semidefinite matrix (negative eigenvalues become 0); "
+          "diagonal: the positive entries of its diagonal; skip: without these edges, unless the "
+          "graph falls apart then")
+      ->check(OneOf(BadInformation()))
       ->capture_default_str();
   command.add_flag("--pairwise", arguments->options.pairwise_consistency,
                    "Before: keep only the largest set of loops that agree pair by pair (PCM). Needs "

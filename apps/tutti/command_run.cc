@@ -6,6 +6,7 @@
 
 #include "apps/report/page.h"
 #include "apps/run/outputs.h"
+#include "apps/run/run_parts.h"
 #include "apps/run/runner.h"
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
@@ -54,6 +55,14 @@ int ExitCode(const RunResult& result, const std::string& out) {
   if (result.frames_total > 0 && result.bad.size() == result.frames_total) {
     std::fprintf(stderr, "tutti: the run is void: not one frame could be read; the first: %s\n",
                  result.bad.front().error.c_str());
+    return 1;
+  }
+  if (result.Void() && result.frames_without_depth > 0 &&
+      result.frames_without_depth == result.frame_ms.size()) {
+    const char* const which = DepthSource(result.rig.sensor);
+    std::fprintf(stderr, "tutti: the run is void: not one frame has a %s image to start a map from%s%s\n",
+                 which, result.bad_depth.empty() ? "" : "; the first: ",
+                 result.bad_depth.empty() ? "" : result.bad_depth.front().error.c_str());
     return 1;
   }
   if (result.Void()) {

@@ -11,16 +11,16 @@ namespace {
 
 constexpr double kWorthALine = 1e-4;
 
-std::string Lines(const LoopRow& row, const LoopGroundTruth& truth) {
+std::string Lines(const LoopRow& row, const LoopRun& run) {
   const LoopResult& r = row.result;
   std::string text;
   for (std::size_t i = 0; i < r.posterior_by_location.size(); ++i) {
     const auto& [location, combined] = r.posterior_by_location[i];
     double most = combined;
-    const LoopLabel label = truth.At(static_cast<int>(r.query), static_cast<int>(location));
+    const LoopLabel label = run.truth.At(static_cast<int>(r.query), static_cast<int>(location));
     char number[64];
-    std::snprintf(number, sizeof number, "%ld,%ld,%d,%.6g", static_cast<long>(r.query),
-                  static_cast<long>(location), static_cast<int>(label), combined);
+    std::snprintf(number, sizeof number, "%ld,%ld,%d,%.6g", run.Number(r.query), run.Number(location),
+                  static_cast<int>(label), combined);
     std::string line = number;
     for (const MemberOpinion& member : r.members) {
       // A member that sat this image out has no posterior of it.
@@ -42,7 +42,7 @@ void WritePosteriors(const LoopRun& run, const std::filesystem::path& file) {
   out << "image,location,truth,combined";
   for (const std::string& name : run.options.members) out << "," << name;
   out << "\n";
-  for (const LoopRow& row : run.rows) out << Lines(row, run.truth);
+  for (const LoopRow& row : run.rows) out << Lines(row, run);
   out.close();
   if (!out) throw InputError(file.string() + ": can't be written; is there space, and may you write there?");
 }

@@ -114,6 +114,15 @@ std::optional<Pose> InterpolatePose(const Trajectory& trajectory, double stamp_s
               (1 - share) * a.pose.translation + share * b.pose.translation);
 }
 
+std::optional<Pose> PoseOfFrame(const Trajectory& reference, double stamp_s, double frame_interval_s) {
+  constexpr double kMaxGap = 0.2;  // [s]
+  if (reference.empty()) return std::nullopt;
+  if (std::optional<Pose> between = InterpolatePose(reference, stamp_s, kMaxGap)) return between;
+  const StampedPose& nearest = reference[Nearest(reference, stamp_s)];
+  if (!(std::abs(nearest.stamp_s - stamp_s) <= 0.5 * frame_interval_s)) return std::nullopt;
+  return nearest.pose;
+}
+
 AssociatedPoses AssociateByIndex(const Trajectory& reference, const Trajectory& estimate) {
   RequirePoses(reference, estimate);
   if (reference.size() != estimate.size()) {

@@ -5,6 +5,8 @@
 #include <optional>
 #include <set>
 
+#include "backend/graph/bad_information.h"
+#include "backend/graph/graph_structure.h"
 #include "tutti/backend/g2o_io.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
@@ -31,7 +33,7 @@ std::size_t PoseNumbers(GraphKind kind) {
 
 class Reader {
  public:
-  explicit Reader(const std::filesystem::path& file) : file_(file) {}
+  Reader(const std::filesystem::path& file, BadInformation bad) : file_(file), bad_(bad) {}
 
   G2oFile Read() {
     std::error_code ignored;
@@ -53,7 +55,7 @@ class Reader {
  private:
   struct EdgeLine {
     PoseGraphEdge edge;
-    std::size_t line;
+    bool bad = false;  // its information is not positive definite
   };
 
   [[noreturn]] void Fail(std::size_t line, const std::string& what) const {
@@ -132,7 +134,7 @@ class Reader {
   }
 
   void ReadEdge() {
-    EdgeLine e{{Id(1), Id(2), ReadPose(3), Matrix7d::Zero(), EdgeKind::kOdometry}, line_};
+    EdgeLine e{{Id(1), Id(2), ReadPose(3), Matrix7d::Zero(), EdgeKind::kOdometry}};
     if (e.edge.from == e.edge.to) Fail(line_, "the edge leads from node " + words_[1] + " to itself");
     const long long gap = static_cast<long long>(e.edge.from) - e.edge.to;
     if (gap != 1 && gap != -1) e.edge.kind = EdgeKind::kLoop;
@@ -143,9 +145,61 @@ class Reader {
         e.edge.information(used[r], used[c]) = e.edge.information(used[c], used[r]) = Number(word);
       }
     }
-    const std::string wrong = CheckInformation(e.edge.information, *kind_);
-    if (!wrong.empty()) Fail(line_, wrong);
+    const internal::InformationFault fault = internal::FaultOf(e.edge.information, *kind_);
+    e.bad = fault == internal::InformationFault::kNotPositiveDefinite;
+    if (e.bad && bad_lines_++ == 0) first_bad_ = line_;
+    if (!e.bad && fault != internal::InformationFault::kNone)
+      Fail(line_, CheckInformation(e.edge.information, *kind_));
     edges_.push_back(e);
+  }
+
+  static std::size_t Pieces(const PoseGraph& graph) {
+    return internal::AnalyseGraph(graph).components.size();
+  }
+
+  std::string HowManyBad() const {
+    return std::to_string(bad_lines_) + " of " + std::to_string(edges_.size()) + " edges";
+  }
+
+  void RefuseBad() const {
+    if (bad_lines_ == 0 || bad_ != BadInformation::kRefuse) return;
+    Fail(first_bad_, "its information matrix is not positive definite; " +
+                         (bad_lines_ == 1 ? "it is the only one"
+                                          : "it is the first of " + HowManyBad() + " of which that is true") +
+                         ". Repair the file, or let --bad-information of 'tutti optimize' project them, "
+                         "keep their diagonals or skip them");
+  }
+
+  /// Repairs the edges that need it, and leaves out those of which nothing is left.
+  void AddEdges(G2oFile& out) const {
+    std::vector<PoseGraphEdge> gone;
+    for (const EdgeLine& e : edges_) {
+      PoseGraphEdge edge = e.edge;
+      if (e.bad) edge.information = internal::Repaired(edge.information, *kind_, bad_);
+      if (e.bad && edge.information.isZero(0)) {
+        gone.push_back(edge);
+      } else {
+        out.graph.AddEdge(edge);
+      }
+    }
+    out.bad_information = bad_lines_;
+    out.skipped = gone.size();
+    if (gone.empty()) return;
+    PoseGraph whole = out.graph;
+    for (PoseGraphEdge& edge : gone) {
+      edge.information = Matrix7d::Identity();
+      whole.AddEdge(edge);
+    }
+    const std::size_t before = Pieces(whole), after = Pieces(out.graph);
+    if (after == before) return;
+    Fail(first_bad_,
+         "without the " + std::to_string(out.skipped) + " of " + std::to_string(edges_.size()) +
+             " edges whose information matrix has to be left out, of which this is the first, the "
+             "graph falls into " +
+             std::to_string(after) + " pieces (before: " + std::to_string(before) + "); " +
+             (bad_ == BadInformation::kSkip ? "project them instead (--bad-information "
+                                              "project), or repair the file"
+                                            : "repair the file"));
   }
 
   void ReadFix() {
@@ -159,6 +213,7 @@ class Reader {
       if (!unknown_.empty()) hint = " (tutti does not know '" + unknown_.begin()->first + "')";
       throw InputError(file_.string() + ": holds no edge of a pose graph" + hint + "; is it a g2o file?");
     }
+    RefuseBad();
     G2oFile out;
     out.graph = PoseGraph(*kind_);
     for (const PoseGraphNode& node : nodes_) out.graph.AddNode(node);
@@ -170,7 +225,7 @@ class Reader {
       }
     }
     for (int id : missing) out.graph.AddNode(PoseGraphNode{id, Similarity(), false, false});
-    for (const EdgeLine& e : edges_) out.graph.AddEdge(e.edge);
+    AddEdges(out);
     for (const auto& [id, line] : fixed_) {
       if (!out.graph.Has(id))
         Fail(line, "FIX names node " + std::to_string(id) + ", which is not in the graph");
@@ -187,6 +242,7 @@ class Reader {
                              "', " + std::to_string(where.first) + (where.first == 1 ? " line" : " lines") +
                              " ignored");
     }
+    if (bad_lines_ > 0) out.warnings.push_back(WhatWasDone(out.skipped));
     if (missing > 0 && !nodes_.empty()) {
       out.warnings.push_back(file_.string() + ": " + std::to_string(missing) +
                              " nodes of edges have no vertex; their poses come from the edges");
@@ -198,7 +254,21 @@ class Reader {
     }
   }
 
+  std::string WhatWasDone(std::size_t skipped) const {
+    std::string done;
+    if (bad_ == BadInformation::kProject) done = "their negative eigenvalues count as 0";
+    if (bad_ == BadInformation::kDiagonal) done = "only the positive entries of their diagonals count";
+    if (skipped > 0) {
+      done += (done.empty() ? "" : "; ") + std::to_string(skipped) +
+              (bad_ == BadInformation::kSkip ? " are left out" : " have nothing positive and are left out");
+    }
+    return file_.string() + ":" + std::to_string(first_bad_) + ": " + HowManyBad() +
+           ", this one first, have an information matrix that is not positive definite: " + done;
+  }
+
   std::filesystem::path file_;
+  BadInformation bad_;
+  std::size_t bad_lines_ = 0, first_bad_ = 0;
   std::size_t line_ = 0;
   std::vector<std::string> words_;
   std::optional<GraphKind> kind_;
@@ -211,6 +281,6 @@ class Reader {
 
 }  // namespace
 
-G2oFile ReadG2o(const std::filesystem::path& file) { return Reader(file).Read(); }
+G2oFile ReadG2o(const std::filesystem::path& file, BadInformation bad) { return Reader(file, bad).Read(); }
 
 }  // namespace tutti

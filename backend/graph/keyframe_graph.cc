@@ -209,10 +209,9 @@ PoseGraph KeyframeGraph::Graph(const std::vector<LoopEdge>& loops) const {
   return graph;
 }
 
-KeyframeCorrection KeyframeGraph::Optimize(const std::vector<LoopEdge>& loops) const {
+KeyframeCorrection KeyframeGraph::CorrectionOf(const PoseGraph& graph, const PoseGraphReport& report,
+                                               const std::vector<LoopEdge>& loops) const {
   KeyframeCorrection correction;
-  PoseGraph graph = Graph(loops);
-  const PoseGraphReport report = PoseGraphOptimizer(options_.solver).Optimize(graph);
   correction.success = report.success;
   correction.reason = report.reason;
   if (!report.success) return correction;
@@ -222,6 +221,40 @@ KeyframeCorrection KeyframeGraph::Optimize(const std::vector<LoopEdge>& loops) c
     if (graph.edges()[e].kind == EdgeKind::kLoop) correction.loops.push_back(report.edges[e]);
   }
   return correction;
+}
+
+KeyframeCorrection KeyframeGraph::Optimize(const std::vector<LoopEdge>& loops) const {
+  PoseGraph graph = Graph(loops);
+  const PoseGraphReport report = PoseGraphOptimizer(options_.solver).Optimize(graph);
+  return CorrectionOf(graph, report, loops);
+}
+
+KeyframeGraphProof KeyframeGraph::Prove(const std::vector<LoopEdge>& loops) const {
+  // Of the objective, and in its unit: another valley, not another end of the same.
+  constexpr double kLower = 1e-3, kLeast = 1e-3;
+  KeyframeGraphProof out;
+  std::optional<PoseGraph> best;
+  PoseGraphReport taken;
+  for (const GraphInit init : {GraphInit::kFile, GraphInit::kOdometry, GraphInit::kChordal}) {
+    PoseGraphOptions options = options_.solver;
+    options.init = init;
+    PoseGraph graph = Graph(loops);
+    const PoseGraphReport report = PoseGraphOptimizer(options).Optimize(graph);
+    if (!report.success) continue;
+    out.starts.insert(out.starts.end(), report.starts.begin(), report.starts.end());
+    if (best && !(report.objective < (1 - kLower) * taken.objective - kLeast)) continue;
+    out.better = best.has_value();
+    best = std::move(graph);
+    taken = report;
+  }
+  if (!best) {
+    out.certificate.reason = "the pose graph could not be solved";
+    return out;
+  }
+  out.best = taken.start;
+  out.correction = CorrectionOf(*best, taken, loops);
+  out.certificate = CertifyOptimum(*best, {}, taken.chordal_optimum);
+  return out;
 }
 
 std::vector<std::optional<double>> KeyframeGraph::Distances(const std::vector<LoopEdge>& accepted,

@@ -1,8 +1,8 @@
 #include "tutti/backend/pose_graph.h"
 
-#include <Eigen/Cholesky>
 #include <cmath>
 
+#include "backend/graph/bad_information.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -58,21 +58,17 @@ Matrix7d MakeInformation(double sigma_translation, double sigma_rotation, double
 }
 
 std::string CheckInformation(const Matrix7d& information, GraphKind kind) {
-  const std::vector<int> used = TangentCoordinates(kind);
-  const Eigen::MatrixXd m = information(used, used);
-  constexpr double kLargest = 1e100;  // beyond it costs overflow
-  if (!m.allFinite()) return "its information matrix is not finite";
-  if (m.cwiseAbs().maxCoeff() > kLargest)
-    return "its information matrix has entries beyond 1e100; give them in 1/m^2 and 1/rad^2";
-  if ((m - m.transpose()).cwiseAbs().maxCoeff() > 1e-9 * m.cwiseAbs().maxCoeff()) {
-    return "its information matrix is not symmetric";
-  }
-  const Eigen::LLT<Eigen::MatrixXd> llt(m);
-  // A factor whose diagonal collapses against the matrix' own is singular in all but rounding.
-  if (llt.info() != Eigen::Success) return "its information matrix is not positive definite";
-  const Eigen::MatrixXd l = llt.matrixL();
-  for (Eigen::Index i = 0; i < m.rows(); ++i) {
-    if (!(l(i, i) * l(i, i) > 1e-13 * m(i, i))) return "its information matrix is not positive definite";
+  switch (internal::FaultOf(information, kind)) {
+    case internal::InformationFault::kNone:
+      return {};
+    case internal::InformationFault::kNotFinite:
+      return "its information matrix is not finite";
+    case internal::InformationFault::kTooLarge:
+      return "its information matrix has entries beyond 1e100; give them in 1/m^2 and 1/rad^2";
+    case internal::InformationFault::kNotSymmetric:
+      return "its information matrix is not symmetric";
+    case internal::InformationFault::kNotPositiveDefinite:
+      return "its information matrix is not positive definite";
   }
   return {};
 }

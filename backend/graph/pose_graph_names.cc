@@ -2,6 +2,7 @@
 #include <string>
 #include <vector>
 
+#include "tutti/backend/g2o_io.h"
 #include "tutti/backend/pose_graph_optimizer.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
@@ -41,6 +42,13 @@ EnumWords<PoseGraphSolver> WordsOf(PoseGraphSolver /*of*/) {
   return {{"ceres", PoseGraphSolver::kCeres}, {"block", PoseGraphSolver::kBlock}};
 }
 
+EnumWords<BadInformation> WordsOf(BadInformation /*of*/) {
+  return {{"refuse", BadInformation::kRefuse},
+          {"project", BadInformation::kProject},
+          {"diagonal", BadInformation::kDiagonal},
+          {"skip", BadInformation::kSkip}};
+}
+
 GraphObjective ParseGraphObjective(const std::string& name) {
   return Parse<GraphObjective>(name, "objective");
 }
@@ -49,10 +57,28 @@ GraphInit ParseGraphInit(const std::string& name) { return Parse<GraphInit>(name
 PoseGraphSolver ParsePoseGraphSolver(const std::string& name) {
   return Parse<PoseGraphSolver>(name, "solver");
 }
+BadInformation ParseBadInformation(const std::string& name) {
+  return Parse<BadInformation>(name, "treatment of bad information matrices");
+}
+const char* ToString(BadInformation how) { return WordOf(how); }
 const char* ToString(GraphObjective objective) { return WordOf(objective); }
 const char* ToString(RobustLoss robust) { return WordOf(robust); }
 const char* ToString(GraphInit init) { return WordOf(init); }
 const char* ToString(PoseGraphSolver solver) { return WordOf(solver); }
+
+const char* ToString(GraphStart start) {
+  switch (start) {
+    case GraphStart::kFile:
+      return "file";
+    case GraphStart::kOdometry:
+      return "odometry";
+    case GraphStart::kChordalRelaxation:
+      return "chordal relaxation";
+    case GraphStart::kChordalOptimum:
+      return "chordal optimum";
+  }
+  return "?";
+}
 
 const char* ToString(LoopDoubt doubt) {
   switch (doubt) {

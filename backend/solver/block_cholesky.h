@@ -36,6 +36,18 @@ class BlockCholesky {
   /// Blocks below the diagonal of the factor.
   std::size_t FactorBlocks() const { return rows_.size(); }
 
+  /// How many times Solve() could be called while Factorise() runs, by their numbers of products; those of
+  /// the latter run about twice as fast.
+  double SolvesPerFactorisation() const {
+    double blocks = 0, products = 0;
+    for (std::size_t k = 0; k < size(); ++k) {
+      const auto column = static_cast<double>(column_begin_[k + 1] - column_begin_[k]);
+      blocks += column + 1;
+      products += (column + 1) * (column + 1);
+    }
+    return blocks > 0 ? 0.5 * N * products / (4 * blocks) : 0;
+  }
+
   /// `off_diagonal` is parallel to the analysed pairs. False if the matrix is not positive definite.
   bool Factorise(const std::vector<Block>& diagonal, const std::vector<Block>& off_diagonal) {
     std::vector<std::size_t> end(column_begin_.begin(), column_begin_.end() - 1);

@@ -9,7 +9,8 @@
 #include <vector>
 
 #include "backend/graph/manifold.h"
-#include "backend/solver/block_cholesky.h"
+#include "backend/solver/block_pattern.h"
+#include "backend/solver/block_system.h"
 #include "backend/solver/graph_solver.h"
 
 namespace tutti::internal {
@@ -29,26 +30,12 @@ class BlockEquations {
 
   /// Edges with two ends that do not move are allowed, they are a part of the cost.
   void Analyse(const WeightedGraph<N>& graph, ActiveSet active) {
-    for (const std::size_t node : active_.nodes) unknown_[node] = -1;
     active_ = std::move(active);
-    unknown_.resize(graph.structure->constant.size(), -1);
-    for (std::size_t k = 0; k < active_.nodes.size(); ++k) unknown_[active_.nodes[k]] = static_cast<int>(k);
-    std::vector<std::pair<std::pair<int, int>, std::size_t>> sorted;  // larger unknown first; place in edges
-    for (std::size_t p = 0; p < active_.edges.size(); ++p) {
-      const EdgeEnds& ends = graph.structure->ends[active_.edges[p]];
-      const int i = unknown_[ends.from], j = unknown_[ends.to];
-      if (i >= 0 && j >= 0) sorted.push_back({{std::max(i, j), std::min(i, j)}, p});
-    }
-    std::sort(sorted.begin(), sorted.end());
-    std::vector<std::pair<int, int>> pairs;
-    pair_of_edge_.assign(active_.edges.size(), 0);
-    for (const auto& [pair, p] : sorted) {
-      if (pairs.empty() || pairs.back() != pair) pairs.push_back(pair);
-      pair_of_edge_[p] = pairs.size() - 1;
-    }
-    off_diagonal_.resize(pairs.size());
+    const GraphStructure& structure = *graph.structure;
+    pattern_ = BlockPattern(structure.ends, active_.edges, active_.nodes, structure.constant.size());
+    off_diagonal_.resize(pattern_.pairs.size());
     diagonal_.resize(active_.nodes.size());
-    cholesky_.Analyse(Count(), pairs);
+    system_.Analyse(Count(), pattern_.pairs);
   }
 
   const ActiveSet& active() const { return active_; }
@@ -81,10 +68,8 @@ class BlockEquations {
         damping(N * static_cast<Eigen::Index>(k) + r) = d;
       }
     }
-    if (!cholesky_.Factorise(damped_, off_diagonal_)) return false;
     step_ = -gradient_;
-    cholesky_.Solve(step_);
-    if (!step_.allFinite()) return false;
+    if (!system_.Solve(damped_, off_diagonal_, step_)) return false;
     expected = 0.5 * (step_.dot(damping.cwiseProduct(step_)) - gradient_.dot(step_));
     return true;
   }
@@ -133,7 +118,7 @@ class BlockEquations {
     graph.Whitened(e, r, &J[0], &J[1]);
     double pull = 1;
     const double cost = graph.Loss(e, r.squaredNorm(), pull);
-    const int unknown[2] = {unknown_[ends.from], unknown_[ends.to]};
+    const int unknown[2] = {pattern_.unknown[ends.from], pattern_.unknown[ends.to]};
     for (int k = 0; k < 2; ++k) {
       if (unknown[k] < 0) continue;
       const Block weighted = pull * J[k];
@@ -143,17 +128,16 @@ class BlockEquations {
     if (unknown[0] < 0 || unknown[1] < 0) return cost;
     const int row = unknown[0] > unknown[1] ? 0 : 1;  // as the pairs are: the larger one first
     const Block weighted = pull * J[row];
-    off_diagonal_[pair_of_edge_[p]].noalias() += weighted.transpose() * J[1 - row];
+    off_diagonal_[pattern_.pair_of_edge[p]].noalias() += weighted.transpose() * J[1 - row];
     return cost;
   }
 
   ActiveSet active_;
-  std::vector<int> unknown_;               // place of a node among the active ones; -1: does not move
-  std::vector<std::size_t> pair_of_edge_;  // parallel to active edges
+  BlockPattern pattern_;
   std::vector<Block> diagonal_, damped_, off_diagonal_;
   Eigen::VectorXd gradient_, step_;
   std::vector<double> before_;  // blocks of the active nodes before the step
-  BlockCholesky<N> cholesky_;
+  BlockSystem<N> system_;
 };
 
 }  // namespace tutti::internal

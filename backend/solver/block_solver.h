@@ -72,23 +72,14 @@ class LevenbergMarquardt {
     const bool stays = better || (flat && change > 0);
     if (!stays) equations_.TakeBack(graph_);
     linearised_ = !stays;  // still, at the old poses
-    if (flat || (better && NothingLeft(change))) {
+    if (flat) {
       out_.converged = true;
     } else if (better) {
       region_.Grow(change / expected);
-      last_change_ = change;
       cost_ = after;
     } else {
       out_.converged = !region_.Shrink();  // no step is small enough to lower the cost
     }
-  }
-
-  /// The changes of two steps tell how fast it converges; when Newton-like steps have left less than the
-  /// tolerance, another factorisation would only confirm it.
-  bool NothingLeft(double change) const {
-    if (last_change_ <= 0) return false;
-    const double ratio = change / last_change_;
-    return ratio < 0.1 && change * ratio <= limits_.function_tolerance * cost_;
   }
 
   WeightedGraph<N>& graph_;
@@ -97,7 +88,7 @@ class LevenbergMarquardt {
   TrustRegion region_;
   SolveSummary out_;
   bool linearised_ = false;  // where the graph is now
-  double cost_ = 0, last_change_ = 0;
+  double cost_ = 0;
 };
 
 /// The whole graph.

@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "backend/graph/graph_structure.h"
 #include "backend/robust/pairwise_consistency.h"
 #include "backend/robust/robust_solver.h"
+#include "backend/solver/chordal_descent.h"
 #include "backend/solver/graph_initialization.h"
 #include "backend/solver/graph_problem.h"
 #include "core/stopwatch.h"
@@ -50,14 +52,14 @@ class Run {
         if (!node.has_estimate && missing.empty()) missing = std::to_string(node.id);
         poses.push_back(node.pose);
       }
-      if (missing.empty()) AddStart(GraphInit::kFile, std::move(poses));
+      if (missing.empty()) AddStart(GraphStart::kFile, std::move(poses));
     }
     if (every || options_.init == GraphInit::kOdometry) {
-      AddStart(GraphInit::kOdometry, internal::OdometryInitialization(graph_, structure_));
+      AddStart(GraphStart::kOdometry, internal::OdometryInitialization(graph_, structure_));
     }
     if (every || options_.init == GraphInit::kChordal) {
       std::vector<Similarity> poses = internal::ChordalInitialization(graph_, structure_, reason);
-      if (!poses.empty()) AddStart(GraphInit::kChordal, std::move(poses));
+      if (!poses.empty()) AddStart(GraphStart::kChordalRelaxation, std::move(poses));
     }
     std::stable_sort(starts_.begin(), starts_.end(),
                      [](const Start& a, const Start& b) { return a.objective < b.objective; });
@@ -70,38 +72,14 @@ class Run {
     return false;
   }
 
-  /// Solves from the best start. With a robust loss "best" counts it in: a chordal start that false loops
-  /// have bent loses to the odometry.
+  /// Solves from the start of lowest cost. With a robust loss the cost counts it in: a chordal start that
+  /// false loops have bent loses to the odometry.
   bool Solve() {
-    const bool robust = options_.robust != RobustLoss::kNone && robust_.HasLoops() && !LeastSquaresSuffices();
     starts_.resize(1);
-    bool found = false;
-    std::vector<Similarity> best;
-    std::vector<double> best_weights;
-    const Start& start = starts_.front();
-    for (int attempt = 0; attempt < (robust ? robust_.Attempts() : 1); ++attempt) {
-      problem_.SetPoses(plain_.empty() ? start.poses : plain_);
-      if (plain_.empty() && !(robust ? robust_.Solve(attempt) : SolveOnce(options_.max_iterations))) continue;
-      const double objective = problem_.Objective();
-      if (!std::isfinite(objective) || (found && objective >= report_.objective)) continue;
-      found = true;
-      report_.objective = objective;
-      best = problem_.Poses();
-      best_weights = problem_.weights();
-    }
-    if (!found) {
+    const bool robust = options_.robust != RobustLoss::kNone && robust_.HasLoops() && !LeastSquaresSuffices();
+    if (robust || !plain_.empty() ? !SolveRobustly(robust) : !SolveFromEach()) {
       if (report_.reason.empty()) report_.reason = "the solver found no usable step";
       return false;
-    }
-    report_.init = start.init;
-    if (robust && plain_.empty() && options_.robust == RobustLoss::kSwitchable) SolvedWithSwitches();
-    report_.initial_objective = start.objective;
-    report_.initial_costs = CostsAt(start.poses);
-    problem_.SetPoses(best);
-    for (std::size_t e = 0; e < best_weights.size(); ++e) problem_.SetWeight(e, best_weights[e]);
-    if (robust && plain_.empty()) {
-      robust_.Refine();
-      report_.objective = problem_.Objective();
     }
     if (options_.sigma_test && robust_.HasLoops()) robust_.DecideLoops(internal::ChiSquare3Sigma(N));
     report_.gnc_rounds = robust_.rounds();
@@ -129,10 +107,115 @@ class Run {
 
  private:
   struct Start {
-    GraphInit init;
+    GraphStart start;
     std::vector<Similarity> poses;
     double objective;
   };
+
+  /// With a robust loss, or from the least-squares solution that makes it unnecessary.
+  bool SolveRobustly(bool robust) {
+    bool found = false;
+    std::vector<Similarity> best;
+    std::vector<double> best_weights;
+    const Start& start = starts_.front();
+    for (int attempt = 0; attempt < (robust ? robust_.Attempts() : 1); ++attempt) {
+      problem_.SetPoses(plain_.empty() ? start.poses : plain_);
+      if (plain_.empty() && !robust_.Solve(attempt)) continue;
+      const double objective = problem_.Objective();
+      if (!std::isfinite(objective) || (found && objective >= report_.objective)) continue;
+      found = true;
+      report_.objective = objective;
+      best = problem_.Poses();
+      best_weights = problem_.weights();
+    }
+    if (!found) return false;
+    if (robust && options_.robust == RobustLoss::kSwitchable) SolvedWithSwitches();
+    Took(start);
+    problem_.SetPoses(best);
+    for (std::size_t e = 0; e < best_weights.size(); ++e) problem_.SetWeight(e, best_weights[e]);
+    if (robust) {
+      robust_.Refine();
+      report_.objective = problem_.Objective();
+    }
+    report_.starts.push_back({start.start, start.objective, report_.objective, false});
+    return true;
+  }
+
+  /// Least squares. The chordal objective has fewer valleys than the one that is asked for, so its optimum is
+  /// a start, too, and the first one; the relaxation follows where its way does not lead to the same place.
+  bool SolveFromEach() {
+    if (starts_.front().start == GraphStart::kChordalRelaxation) AddChordalOptimum();
+    std::vector<Similarity> best;
+    std::string termination;
+    for (const Start& start : starts_) {
+      if (!best.empty() && LeadsDownhill(start.poses, best)) {
+        report_.starts.push_back({start.start, start.objective, report_.objective, true});
+        continue;
+      }
+      problem_.SetPoses(start.poses);
+      if (!SolveOnce(options_.max_iterations)) continue;
+      const double objective = problem_.Objective();
+      report_.starts.push_back({start.start, start.objective, objective, false});
+      constexpr double kSame = 1e-9;  // of the objective: the same valley
+      if (!std::isfinite(objective) || (!best.empty() && objective >= (1 - kSame) * report_.objective))
+        continue;
+      report_.objective = objective;
+      termination = report_.termination;
+      best = problem_.Poses();
+      Took(start);
+    }
+    if (best.empty()) return false;
+    report_.reason.clear();
+    report_.termination = termination;
+    problem_.SetPoses(best);
+    return true;
+  }
+
+  void Took(const Start& start) {
+    report_.start = start.start;
+    report_.initial_objective = start.objective;
+    report_.initial_costs = CostsAt(start.poses);
+    report_.chordal_optimum.clear();
+    if (start.start == GraphStart::kChordalOptimum) report_.chordal_optimum = start.poses;
+  }
+
+  /// Before the relaxation that it comes from. Graphs with scale have none.
+  void AddChordalOptimum() {
+    if (graph_.kind() == GraphKind::kSim3) return;
+    std::vector<Similarity> poses = starts_.front().poses;
+    const internal::SolveSummary summary =
+        internal::MinimiseChordal(graph_, structure_, options_.max_iterations, TimeLeft(), poses);
+    report_.iterations += summary.iterations;
+    if (!summary.usable) return;
+    problem_.SetPoses(poses);
+    const double objective = problem_.Objective();
+    if (!std::isfinite(objective)) return;
+    starts_.insert(starts_.begin(), {GraphStart::kChordalOptimum, std::move(poses), objective});
+  }
+
+  /// True if the cost falls all along the straight way from `poses` to a solution: no ridge is between them.
+  bool LeadsDownhill(const std::vector<Similarity>& poses, const std::vector<Similarity>& solution) {
+    constexpr int kSteps = 8;
+    std::vector<Similarity> between = poses;
+    double last = std::numeric_limits<double>::infinity();
+    for (int step = 0; step <= kSteps; ++step) {
+      const double share = static_cast<double>(step) / kSteps;
+      for (std::size_t k = 0; k < between.size(); ++k) {
+        between[k].rotation = poses[k].rotation.slerp(share, solution[k].rotation);
+        between[k].translation = (1 - share) * poses[k].translation + share * solution[k].translation;
+        between[k].scale = std::pow(poses[k].scale, 1 - share) * std::pow(solution[k].scale, share);
+      }
+      problem_.SetPoses(between);
+      const double objective = problem_.Objective();
+      if (!(objective <= last)) return false;
+      last = objective;
+    }
+    return true;
+  }
+
+  double TimeLeft() const {
+    return options_.max_time_s > 0 ? std::max(1e-3, options_.max_time_s - watch_.Seconds()) : 0;
+  }
 
   void SolvedWithSwitches() {
     report_.solver = PoseGraphSolver::kCeres;
@@ -146,19 +229,18 @@ class Run {
     return decided ? problem_.weight(e) : internal::RobustWeight(options_.robust, chi2, problem_.threshold());
   }
 
-  void AddStart(GraphInit init, std::vector<Similarity> poses) {
+  void AddStart(GraphStart start, std::vector<Similarity> poses) {
     problem_.SetPoses(poses);
     const double objective = problem_.Objective();
     for (const Start& other : starts_) {
       if (std::abs(objective - other.objective) <= 1e-9 * objective)
         return;  // the file often is the odometry
     }
-    if (std::isfinite(objective)) starts_.push_back({init, std::move(poses), objective});
+    if (std::isfinite(objective)) starts_.push_back({start, std::move(poses), objective});
   }
 
   bool SolveOnce(int max_iterations) {
-    const double left = options_.max_time_s > 0 ? std::max(1e-3, options_.max_time_s - watch_.Seconds()) : 0;
-    const internal::SolveSummary summary = problem_.Solve(max_iterations, left);
+    const internal::SolveSummary summary = problem_.Solve(max_iterations, TimeLeft());
     report_.iterations += summary.iterations;
     if (!summary.usable) {
       report_.termination = "failed";

@@ -1,15 +1,19 @@
 #include "tutti/backend/certificate.h"
 
-#include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "backend/graph/edge_weights.h"
 #include "backend/graph/graph_structure.h"
+#include "backend/solver/block_cholesky.h"
+#include "backend/solver/block_pattern.h"
+#include "backend/solver/chordal_descent.h"
 #include "core/stopwatch.h"
-#include "tutti/backend/pose_graph_optimizer.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -17,22 +21,6 @@ namespace {
 
 using internal::ChordalWeights;
 using internal::GraphStructure;
-
-/// The graph whose chi2 is the chordal cost: ||R(E) - I||_F^2 = 8 |vec(q(E))|^2, in the plane as in space. A
-/// planar graph becomes a spatial one that stays in its plane, for there is no force out of it.
-PoseGraph ChordalGraph(const PoseGraph& graph) {
-  PoseGraph out(GraphKind::kSE3);
-  for (const PoseGraphNode& node : graph.nodes()) out.AddNode(node);
-  for (PoseGraphEdge edge : graph.edges()) {
-    const ChordalWeights weights = internal::MakeChordalWeights(edge, graph.kind());
-    Vector7d diagonal;
-    diagonal << Eigen::Vector3d::Constant(weights.translation),
-        Eigen::Vector3d::Constant(8.0 * weights.rotation), 1.0;
-    edge.information = diagonal.asDiagonal();
-    out.AddEdge(edge);
-  }
-  return out;
-}
 
 /// Two fixed nodes in one part restrict the relative poses: another problem than the certificate's.
 bool HasFreeGauge(const PoseGraph& graph, const GraphStructure& structure) {
@@ -43,128 +31,119 @@ bool HasFreeGauge(const PoseGraph& graph, const GraphStructure& structure) {
   return true;
 }
 
-/// The certificate matrix before the translations are eliminated: one row for each translation (the anchors'
-/// left out), then D rows for each rotation. Its Schur complement in the rotations is Q - L, so that the one
-/// is positive definite where the other is.
+/// The certificate matrix before the translations are eliminated: for each node one row of its translation,
+/// then D of its rotation. Its Schur complement in the rotations is Q - L, so that the one is positive
+/// definite where the other is. The translations of the anchors are left out (a one in their place).
 template <int D>
 class CertificateMatrix {
  public:
-  using Block = Eigen::Matrix<double, D, D>;
+  using Rotation = Eigen::Matrix<double, D, D>;
   using Column = Eigen::Matrix<double, D, 1>;
+  using Block = Eigen::Matrix<double, D + 1, D + 1>;
 
-  /// `solution` has the same nodes in the same order as `graph`.
-  CertificateMatrix(const PoseGraph& graph, const PoseGraph& solution, const GraphStructure& structure)
-      : translation_row_(graph.nodes().size(), -1), diagonal_(graph.nodes().size(), Block::Zero()) {
-    for (std::size_t k = 0; k < translation_row_.size(); ++k) {
-      if (structure.anchor[structure.component_of[k]] != k) translation_row_[k] = translations_++;
+  /// `solution`: poses parallel to the nodes.
+  CertificateMatrix(const PoseGraph& graph, const std::vector<Similarity>& solution,
+                    const GraphStructure& structure)
+      : structure_(structure), diagonal_(graph.nodes().size(), Block::Zero()) {
+    std::vector<std::size_t> edges(graph.edges().size()), nodes(graph.nodes().size());
+    std::iota(edges.begin(), edges.end(), std::size_t{0});
+    std::iota(nodes.begin(), nodes.end(), std::size_t{0});
+    const internal::BlockPattern pattern(structure.ends, edges, nodes, nodes.size());
+    off_diagonal_.assign(pattern.pairs.size(), Block::Zero());
+    for (const std::size_t e : edges) {
+      AddEdge(structure.ends[e], graph.edges()[e],
+              internal::MakeChordalWeights(graph.edges()[e], graph.kind()), solution,
+              off_diagonal_[pattern.pair_of_edge[e]]);
     }
-    for (std::size_t e = 0; e < graph.edges().size(); ++e) {
-      const PoseGraphEdge& edge = graph.edges()[e];
-      const internal::EdgeEnds& ends = structure.ends[e];
-      AddEdge(ends, edge, internal::MakeChordalWeights(edge, graph.kind()), solution.nodes()[ends.from].pose,
-              solution.nodes()[ends.to].pose);
-    }
-    for (std::size_t k = 0; k < diagonal_.size(); ++k)
-      InsertBlock(RotationRow(k), RotationRow(k), diagonal_[k]);
-    matrix_.resize(size(), size());
-    matrix_.setFromTriplets(triplets_.begin(), triplets_.end());
-    triplets_ = {};
-    cholesky_.analyzePattern(matrix_);
+    for (const std::size_t anchor : structure.anchor) diagonal_[anchor](0, 0) = 1;
+    cholesky_.Analyse(pattern.unknowns, pattern.pairs);
   }
 
   /// Sum of the multipliers' traces: the dual value before the eigenvalue's share.
   double DualTrace() const { return dual_trace_; }
-  double LargestRotationEntry() const { return matrix_.diagonal().tail(D * nodes()).cwiseAbs().maxCoeff(); }
+  double LargestRotationEntry() const {
+    double largest = 0;
+    for (const Block& block : diagonal_)
+      largest = std::max(largest, block.diagonal().template tail<D>().cwiseAbs().maxCoeff());
+    return largest;
+  }
 
   /// True if lambda_min(Q - L) > -eta.
   bool IsPositiveDefiniteWith(double eta) {
-    Eigen::SparseMatrix<double> shifted = matrix_;
-    for (int row = translations_; row < size(); ++row) shifted.coeffRef(row, row) += eta;
-    cholesky_.factorize(shifted);
-    return cholesky_.info() == Eigen::Success;
+    std::vector<Block> shifted = diagonal_;
+    for (Block& block : shifted) block.diagonal().template tail<D>().array() += eta;
+    return cholesky_.Factorise(shifted, off_diagonal_);
   }
 
  private:
-  int nodes() const { return static_cast<int>(diagonal_.size()); }
-  int size() const { return translations_ + D * nodes(); }
-  int RotationRow(std::size_t node) const { return translations_ + D * static_cast<int>(node); }
-
-  /// Lower triangle only.
-  void Insert(int row, int column, double value) {
-    if (row >= column) triplets_.emplace_back(row, column, value);
-  }
-  void InsertBlock(int row, int column, const Block& block) {
-    for (int r = 0; r < D; ++r) {
-      for (int c = 0; c < D; ++c) Insert(row + r, column + c, block(r, c));
-    }
-  }
-
+  /// ||X c||^2 for the rows of X that belong to a node; `c`: what the edge multiplies them with.
   void AddEdge(const internal::EdgeEnds& ends, const PoseGraphEdge& edge, const ChordalWeights& weights,
-               const Similarity& pose_i, const Similarity& pose_j) {
+               const std::vector<Similarity>& solution, Block& off_diagonal) {
     const double kappa = weights.rotation, tau = weights.translation;
-    const Block R = edge.measurement.rotation.toRotationMatrix().template topLeftCorner<D, D>();
+    const Rotation R = edge.measurement.rotation.toRotationMatrix().template topLeftCorner<D, D>();
     const Column t = edge.measurement.translation.template head<D>();
-    diagonal_[ends.from] += kappa * Block::Identity() + tau * t * t.transpose();
-    diagonal_[ends.to] += kappa * Block::Identity();
+    Eigen::Matrix<double, D + 1, 1> c_i, c_j;
+    c_i << (IsAnchor(ends.from) ? 0 : -1), -t;
+    c_j << (IsAnchor(ends.to) ? 0 : 1), Column::Zero();
+    Block at_i = tau * c_i * c_i.transpose(), at_j = tau * c_j * c_j.transpose();
+    at_i.template bottomRightCorner<D, D>() += kappa * Rotation::Identity();
+    at_j.template bottomRightCorner<D, D>() += kappa * Rotation::Identity();
+    Block between = tau * c_i * c_j.transpose();
+    between.template bottomRightCorner<D, D>() -= kappa * R;
+    diagonal_[ends.from] += at_i;
+    diagonal_[ends.to] += at_j;
     if (ends.from > ends.to) {
-      InsertBlock(RotationRow(ends.from), RotationRow(ends.to), -kappa * R);
+      off_diagonal += between;
     } else {
-      InsertBlock(RotationRow(ends.to), RotationRow(ends.from), -kappa * R.transpose());
+      off_diagonal += between.transpose();
     }
-    const int i = translation_row_[ends.from], j = translation_row_[ends.to];
-    if (i >= 0) Insert(i, i, tau);
-    if (j >= 0) Insert(j, j, tau);
-    if (i >= 0 && j >= 0) Insert(std::max(i, j), std::min(i, j), -tau);
-    for (int r = 0; r < D; ++r) {
-      if (i >= 0) Insert(RotationRow(ends.from) + r, i, tau * t(r));
-      if (j >= 0) Insert(RotationRow(ends.from) + r, j, -tau * t(r));
-    }
-    SubtractMultipliers(ends, R, t, weights, pose_i, pose_j);
+    SubtractMultipliers(ends, R, t, weights, solution[ends.from], solution[ends.to]);
   }
+
+  bool IsAnchor(std::size_t node) const { return structure_.anchor[structure_.component_of[node]] == node; }
 
   /// L_i = sym(R_i^T (X M)_i): what the constraint R_i^T R_i = I pulls with at a stationary point.
-  void SubtractMultipliers(const internal::EdgeEnds& ends, const Block& R, const Column& t,
+  void SubtractMultipliers(const internal::EdgeEnds& ends, const Rotation& R, const Column& t,
                            const ChordalWeights& weights, const Similarity& pose_i,
                            const Similarity& pose_j) {
-    const Block Ri = pose_i.rotation.toRotationMatrix().template topLeftCorner<D, D>();
-    const Block Rj = pose_j.rotation.toRotationMatrix().template topLeftCorner<D, D>();
+    const Rotation Ri = pose_i.rotation.toRotationMatrix().template topLeftCorner<D, D>();
+    const Rotation Rj = pose_j.rotation.toRotationMatrix().template topLeftCorner<D, D>();
     const Column step = (pose_j.translation - pose_i.translation).template head<D>();
-    const Block rotation = weights.rotation * (Rj - Ri * R);
+    const Rotation rotation = weights.rotation * (Rj - Ri * R);
     const Column translation = weights.translation * (step - Ri * t);
-    const Block at_i = -Ri.transpose() * (rotation * R.transpose() + translation * t.transpose());
-    const Block at_j = Rj.transpose() * rotation;
-    diagonal_[ends.from] -= 0.5 * (at_i + at_i.transpose());
-    diagonal_[ends.to] -= 0.5 * (at_j + at_j.transpose());
+    const Rotation at_i = -Ri.transpose() * (rotation * R.transpose() + translation * t.transpose());
+    const Rotation at_j = Rj.transpose() * rotation;
+    diagonal_[ends.from].template bottomRightCorner<D, D>() -= 0.5 * (at_i + at_i.transpose());
+    diagonal_[ends.to].template bottomRightCorner<D, D>() -= 0.5 * (at_j + at_j.transpose());
     dual_trace_ += at_i.trace() + at_j.trace();
   }
 
-  std::vector<int> translation_row_;  // -1: an anchor
-  std::vector<Block> diagonal_;       // of the rotations' rows
-  int translations_ = 0;
+  const GraphStructure& structure_;
+  std::vector<Block> diagonal_, off_diagonal_;
   double dual_trace_ = 0;
-  std::vector<Eigen::Triplet<double>> triplets_;
-  Eigen::SparseMatrix<double> matrix_;
-  Eigen::SimplicialLLT<Eigen::SparseMatrix<double>> cholesky_;
+  internal::BlockCholesky<D + 1> cholesky_;
 };
 
-/// The smallest eta, within a factor of ten, that makes the matrix positive definite; starts at the largest
-/// one that still certifies. Negative if none up to `largest` does.
+/// The smallest eta, within a factor of ten, that makes the matrix positive definite; it is no less than
+/// `certifying` / 100, since what is below is only more digits. Negative if none up to `largest` does. Each
+/// try is a factorisation: the usual case needs one.
 template <int D>
 double SmallestShift(CertificateMatrix<D>& matrix, double certifying, double largest) {
-  constexpr int kTighter = 3;  // factors of ten beyond what is asked for; each costs a factorisation
-  double eta = certifying;
-  if (matrix.IsPositiveDefiniteWith(eta)) {
-    for (int k = 0; k < kTighter && matrix.IsPositiveDefiniteWith(0.1 * eta); ++k) eta *= 0.1;
-    return eta;
+  for (const double tighter : {0.01, 0.1, 1.0}) {
+    if (matrix.IsPositiveDefiniteWith(tighter * certifying)) return tighter * certifying;
   }
-  for (eta *= 10; eta <= largest; eta *= 10) {
-    if (matrix.IsPositiveDefiniteWith(eta)) return eta;
+  int fails = 0, holds = 0;  // powers of ten
+  while (certifying * std::pow(10, holds + 1) <= largest) ++holds;
+  if (holds == 0 || !matrix.IsPositiveDefiniteWith(certifying * std::pow(10, holds))) return -1;
+  while (holds - fails > 1) {
+    const int middle = (fails + holds) / 2;
+    (matrix.IsPositiveDefiniteWith(certifying * std::pow(10, middle)) ? holds : fails) = middle;
   }
-  return -1;
+  return certifying * std::pow(10, holds);
 }
 
 template <int D>
-void Bound(const PoseGraph& graph, const PoseGraph& solution, const GraphStructure& structure,
+void Bound(const PoseGraph& graph, const std::vector<Similarity>& solution, const GraphStructure& structure,
            const CertificateOptions& options, Certificate& out) {
   CertificateMatrix<D> matrix(graph, solution, structure);
   const double traces = D * static_cast<double>(graph.nodes().size());  // trace(R R^T) of any rotations
@@ -197,7 +176,8 @@ std::string CertificateOptions::Validate() const {
   return {};
 }
 
-Certificate CertifyOptimum(const PoseGraph& graph, const CertificateOptions& options) {
+Certificate CertifyOptimum(const PoseGraph& graph, const CertificateOptions& options,
+                           std::vector<Similarity> chordal_optimum) {
   const std::string wrong = options.Validate();
   if (!wrong.empty()) throw InputError(wrong);
   const internal::Stopwatch watch;
@@ -211,23 +191,25 @@ Certificate CertifyOptimum(const PoseGraph& graph, const CertificateOptions& opt
     out.reason = "several nodes of a connected part are fixed";
   }
   if (!out.reason.empty()) return out;
-  PoseGraph solution = ChordalGraph(graph);
-  PoseGraphOptions polish;
-  polish.objective = GraphObjective::kChi2;
-  polish.init = GraphInit::kFile;
-  polish.solver = PoseGraphSolver::kBlock;
-  polish.function_tolerance = 1e-16;  // the multipliers are only as good as the gradient is small
-  const PoseGraphReport report = PoseGraphOptimizer(polish).Optimize(solution);
-  if (!report.success) {
-    out.reason = "the chordal objective could not be minimised: " + report.reason;
-    return out;
+  if (chordal_optimum.empty()) {
+    for (const PoseGraphNode& node : graph.nodes()) chordal_optimum.push_back(node.pose);
+    constexpr int kIterations = 200;
+    const internal::SolveSummary summary =
+        internal::MinimiseChordal(graph, structure, kIterations, 0, chordal_optimum);
+    if (!summary.usable) {
+      out.reason = "the chordal objective could not be minimised: " + summary.message;
+      return out;
+    }
+  } else if (chordal_optimum.size() != graph.nodes().size()) {
+    throw InputError("certificate: the chordal optimum has " + std::to_string(chordal_optimum.size()) +
+                     " poses, the graph has " + std::to_string(graph.nodes().size()));
   }
   out.available = true;
-  out.chordal = report.costs.chi2;
+  out.chordal = internal::ChordalCost(graph, structure, chordal_optimum);
   if (graph.kind() == GraphKind::kSE2) {
-    Bound<2>(graph, solution, structure, options, out);
+    Bound<2>(graph, chordal_optimum, structure, options, out);
   } else {
-    Bound<3>(graph, solution, structure, options, out);
+    Bound<3>(graph, chordal_optimum, structure, options, out);
   }
   out.time_s = watch.Seconds();
   return out;

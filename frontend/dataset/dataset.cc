@@ -73,10 +73,10 @@ FolderContents FindImages(const std::filesystem::path& folder, const DatasetOpti
   DropStrayTypes(folder, files, out.warnings);
   for (const std::filesystem::path& file : files) {
     FrameFiles frame;
-    frame.index = static_cast<std::int64_t>(out.frames.size());
-    frame.stamp_s = static_cast<double>(frame.index) / out.rate_hz;
+    const auto number = static_cast<std::int64_t>(out.frames.size());
+    frame.stamp_s = static_cast<double>(number) / out.rate_hz;
     frame.image = file;
-    out.pose_stamps.emplace_back(frame.index, frame.stamp_s);
+    out.pose_stamps.emplace_back(number, frame.stamp_s);
     out.frames.push_back(std::move(frame));
   }
   out.pose_count = files.size();

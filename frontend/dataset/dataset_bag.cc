@@ -139,23 +139,34 @@ class BagDataset : public Dataset {
     try {
       const Frame& at = frames_.at(i);
       InputFrame frame;
-      frame.index = at.index;
+      frame.index = Number(i);
       frame.stamp_s = at.image->stamp_s;
       frame.image = ReadGrey(*at.image, options_.topic);
-      if (at.right != nullptr) frame.right = ReadGrey(*at.right, options_.right_topic);
-      if (at.depth != nullptr) frame.depth_m = ReadDepth(*at.depth);
+      result.depth_error = AddDepth(at, i, &frame);
       result.frame = std::move(frame);
     } catch (const std::exception& e) {
-      result.error = file_.string() + ": frame " + std::to_string(i) + ": " + e.what();
+      result.error = About(i) + e.what();
     }
     return result;
   }
 
  private:
   struct Frame {
-    std::int64_t index = 0;
     const StampedMessage *image = nullptr, *right = nullptr, *depth = nullptr;
   };
+
+  std::string About(std::size_t i) const { return file_.string() + ": frame " + std::to_string(i) + ": "; }
+
+  // The depth or right image, if there is one; or what is wrong with it.
+  std::string AddDepth(const Frame& at, std::size_t i, InputFrame* frame) const {
+    try {
+      if (at.right != nullptr) frame->right = ReadGrey(*at.right, options_.right_topic);
+      if (at.depth != nullptr) frame->depth_m = ReadDepth(*at.depth);
+      return {};
+    } catch (const std::exception& e) {
+      return About(i) + (at.depth != nullptr ? options_.depth_topic : options_.right_topic) + ": " + e.what();
+    }
+  }
 
   // Topics that the options leave open, and all that are there for messages.
   void FindTopics() {
@@ -231,26 +242,24 @@ class BagDataset : public Dataset {
     if (options_.sensor == Sensor::kStereo) right_ = Find(options_.right_topic);
     if (options_.sensor == Sensor::kRgbd) depth_ = Find(options_.depth_topic);
     std::size_t alone = 0;
-    for (std::size_t i = 0; i < images_.size(); ++i) {
+    for (const StampedMessage& image : images_) {
       Frame frame;
-      frame.index = static_cast<std::int64_t>(i);
-      frame.image = &images_[i];
-      const double stamp = images_[i].stamp_s;
-      frame.right = Nearest(right_, stamp, 0.0025);
-      frame.depth = Nearest(depth_, stamp, options_.max_association_s);
-      if ((options_.sensor == Sensor::kStereo && frame.right == nullptr) ||
-          (options_.sensor == Sensor::kRgbd && frame.depth == nullptr)) {
-        ++alone;
-        continue;
-      }
+      frame.image = &image;
+      frame.right = Nearest(right_, image.stamp_s, 0.0025);
+      frame.depth = Nearest(depth_, image.stamp_s, options_.max_association_s);
+      if (frame.right == nullptr && frame.depth == nullptr) ++alone;
       frames_.push_back(frame);
     }
-    if (frames_.empty())
-      throw InputError(file_.string() + ": no image of " + options_.topic + " has its " +
-                       (options_.sensor == Sensor::kRgbd ? "depth" : "right") + " image near it in time");
+    if (options_.sensor == Sensor::kMono) return;
+    const std::string what = options_.sensor == Sensor::kRgbd ? "depth" : "right";
+    if (alone == frames_.size()) {
+      throw InputError(file_.string() + ": no image of " + options_.topic + " has its " + what +
+                       " image near it in time");
+    }
     if (alone > 0) {
-      warnings_.push_back(file_.string() + ": " + std::to_string(alone) + " images of " + options_.topic +
-                          " have no partner near them in time and are left out");
+      warnings_.push_back(file_.string() + ": " + std::to_string(alone) + " of " +
+                          std::to_string(frames_.size()) + " images of " + options_.topic + " have no " +
+                          what + " image near them in time and are tracked without");
     }
   }
 

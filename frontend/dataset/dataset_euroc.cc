@@ -63,32 +63,26 @@ FolderContents FindEuroc(const std::filesystem::path& folder, const DatasetOptio
     right_images = ReadCsv(mav / "cam1", out.warnings);
   }
   std::size_t alone = 0;
-  for (std::size_t i = 0; i < images.size(); ++i) {
+  for (const StampedImage& image : images) {
     FrameFiles frame;
-    frame.index = static_cast<std::int64_t>(i);
-    frame.stamp_s = static_cast<double>(images[i].stamp_ns) * 1e-9;
-    frame.image = images[i].file;
+    frame.stamp_s = static_cast<double>(image.stamp_ns) * 1e-9;
+    frame.image = image.file;
     if (options.sensor == Sensor::kStereo) {
       const auto at =
-          std::lower_bound(right_images.begin(), right_images.end(), images[i].stamp_ns - kSamePairNs,
+          std::lower_bound(right_images.begin(), right_images.end(), image.stamp_ns - kSamePairNs,
                            [](const StampedImage& r, std::int64_t ns) { return r.stamp_ns < ns; });
-      if (at == right_images.end() || at->stamp_ns > images[i].stamp_ns + kSamePairNs) {
+      if (at == right_images.end() || at->stamp_ns > image.stamp_ns + kSamePairNs)
         ++alone;
-        continue;
-      }
-      frame.right = at->file;
+      else
+        frame.right = at->file;
     }
     out.frames.push_back(std::move(frame));
   }
-  if (alone > 0) {
-    out.warnings.push_back((mav / "cam1" / "data.csv").string() + ": " + std::to_string(alone) + " of " +
-                           std::to_string(images.size()) +
-                           " left images have no right image and are left out");
-  }
-  if (out.frames.empty()) {
-    throw InputError((mav / "cam1" / "data.csv").string() +
-                     ": no image has the time stamp of an image of cam0");
-  }
+  const std::filesystem::path right_list = mav / "cam1" / "data.csv";
+  if (alone == images.size())
+    throw InputError(right_list.string() + ": no image has the time stamp of an image of cam0");
+  WarnOfFramesWithoutDepth(right_list, alone, "left images have no right image and are tracked without",
+                           options, &out);
   out.truth_places = {folder / "groundtruth_tum.txt", folder / "groundtruth.txt",
                       mav / "state_groundtruth_estimate0" / "data.csv",
                       mav.parent_path() / "groundtruth_tum.txt"};

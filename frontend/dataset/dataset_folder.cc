@@ -63,6 +63,13 @@ bool StampOrder::Accept(std::size_t line, double stamp_s) {
   return true;
 }
 
+void WarnOfFramesWithoutDepth(const std::filesystem::path& list, std::size_t alone, const std::string& which,
+                              const DatasetOptions& options, FolderContents* contents) {
+  if (alone == 0 || options.follow_s > 0) return;
+  contents->warnings.push_back(list.string() + ": " + std::to_string(alone) + " of " +
+                               std::to_string(contents->frames.size()) + " " + which);
+}
+
 void MirrorY(Trajectory& trajectory) {
   // S R S with S = diag(1, -1, 1) turns the same angle about the mirrored axis, the other way round.
   for (StampedPose& p : trajectory) {
@@ -192,23 +199,21 @@ ReadResult FolderDataset::Read(std::size_t i) const {
                    std::to_string(Size()) + ")";
     return result;
   }
-  return ReadFiles(contents_.frames[i]);
+  return ReadFiles(i, contents_.frames[i]);
 }
 
-ReadResult FolderDataset::ReadFiles(const FrameFiles& files) const {
+ReadResult FolderDataset::ReadFiles(std::size_t i, const FrameFiles& files) const {
   ReadResult result;
   try {
     InputFrame frame;
-    frame.index = files.index;
+    frame.index = Number(i);
     frame.stamp_s = files.stamp_s;
     result.error = ReadGrey(files.image, left_ ? &*left_ : nullptr, frame.image);
-    if (result.error.empty() && options_.sensor == Sensor::kStereo) {
-      result.error = ReadGrey(files.right, right_ ? &*right_ : nullptr, frame.right);
-    }
-    if (result.error.empty() && options_.sensor == Sensor::kRgbd) {
-      result.error = ReadDepth(files.depth, frame.depth_m);
-    }
-    if (result.error.empty()) result.frame = std::move(frame);
+    if (!result.error.empty()) return result;
+    if (!files.right.empty())
+      result.depth_error = ReadGrey(files.right, right_ ? &*right_ : nullptr, frame.right);
+    if (!files.depth.empty()) result.depth_error = ReadDepth(files.depth, frame.depth_m);
+    result.frame = std::move(frame);
   } catch (const std::exception& e) {  // out of memory for an absurd image size, and the like
     result.frame.reset();
     result.error = files.image.string() + ": can't be used: " + e.what();

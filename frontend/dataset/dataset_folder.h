@@ -16,9 +16,8 @@
 
 namespace tutti {
 
-/// Files of one frame; empty paths where the sensor has none.
+/// Files of one frame; empty paths where the sensor, or the folder, has none.
 struct FrameFiles {
-  std::int64_t index = 0;
   double stamp_s = 0;
   std::filesystem::path image, right, depth;
 };
@@ -50,7 +49,8 @@ class FolderDataset : public Dataset {
   std::size_t Size() const override { return contents_.frames.size(); }
   double Stamp(std::size_t i) const override { return contents_.frames.at(i).stamp_s; }
   ReadResult Read(std::size_t i) const override;
-  ReadResult ReadFiles(const FrameFiles& files) const;  ///< the same for a frame that came later
+  /// The same for a frame `i` that came later.
+  ReadResult ReadFiles(std::size_t i, const FrameFiles& files) const;
   const std::vector<FrameFiles>& Frames() const { return contents_.frames; }
   const CameraRig& Rig() const override { return rig_; }
   std::optional<std::filesystem::path> GroundTruthFile() const override;
@@ -99,6 +99,11 @@ class StampOrder {
   std::vector<std::string>& warnings_;
   std::optional<double> last_;
 };
+
+/// Warns that `alone` of the frames have no depth or right image: "`list`: 2 of 9 `which`". Not of a folder
+/// that grows, where they may still come.
+void WarnOfFramesWithoutDepth(const std::filesystem::path& list, std::size_t alone, const std::string& which,
+                              const DatasetOptions& options, FolderContents* contents);
 
 /// Mirrors a trajectory that is given in a left-handed frame with y up into the right-handed one with y down.
 void MirrorY(Trajectory& trajectory);

@@ -58,7 +58,7 @@ class FollowedDataset : public Dataset {
     while (true) {
       {
         const std::lock_guard<std::mutex> lock(mutex_);
-        if (frames_.size() <= i + 1) Poll();
+        if (frames_.size() <= i + 1 || Lacks(frames_[i])) Poll();
         const bool idle = since_growth_.Seconds() > options_.follow_s;
         if (i < frames_.size() && Complete(i, idle)) return true;
         if (idle) return i == frames_.size() && !std::exchange(told_, true) && !failure_.empty();
@@ -72,11 +72,11 @@ class FollowedDataset : public Dataset {
     FrameFiles files;
     {
       const std::lock_guard<std::mutex> lock(mutex_);
-      if (i >= frames_.size()) return {std::nullopt, failure_};
+      if (i >= frames_.size()) return {std::nullopt, failure_, {}};
       if (checked_ && checked_->first == i) return std::exchange(checked_, std::nullopt)->second;
       files = frames_[i];
     }
-    return base_->ReadFiles(files);
+    return base_->ReadFiles(i, files);
   }
 
  private:
@@ -96,16 +96,30 @@ class FollowedDataset : public Dataset {
                  ": is new, but sorts before images that were there already; use names that grow";
       return;
     }
-    if (now.size() <= frames_.size()) return;
-    frames_.insert(frames_.end(), now.begin() + static_cast<std::ptrdiff_t>(frames_.size()), now.end());
-    since_growth_ = {};
+    if (now.size() < frames_.size()) return;
+    if (now.size() > frames_.size()) since_growth_ = {};
+    frames_ = std::move(now);
   }
 
-  // Frame i can be decoded, or never will be. mutex_ is held.
+  bool Lacks(const FrameFiles& files) const {
+    return options_.sensor != Sensor::kMono && files.right.empty() && files.depth.empty();
+  }
+
+  // The depth or right image of frame i may still be listed: no later frame has one. mutex_ is held.
+  bool DepthMayCome(std::size_t i) const {
+    if (!Lacks(frames_[i])) return false;
+    if (!awaited_ || awaited_->first != i) awaited_ = {i, {}};
+    if (awaited_->second.Seconds() > kGiveUpAfter) return false;
+    return std::all_of(frames_.begin() + static_cast<std::ptrdiff_t>(i), frames_.end(),
+                       [this](const FrameFiles& files) { return Lacks(files); });
+  }
+
+  // Frame i can be decoded in full, or never will be. mutex_ is held.
   bool Complete(std::size_t i, bool idle) const {
-    ReadResult read = base_->ReadFiles(frames_[i]);
-    if (!read.frame && !idle && (i + 1 == frames_.size() || since_growth_.Seconds() < kGiveUpAfter))
-      return false;
+    if (!idle && DepthMayCome(i)) return false;
+    ReadResult read = base_->ReadFiles(i, frames_[i]);
+    const bool whole = read.frame && read.depth_error.empty();
+    if (!whole && !idle && (i + 1 == frames_.size() || since_growth_.Seconds() < kGiveUpAfter)) return false;
     checked_ = {i, std::move(read)};
     return true;
   }
@@ -117,7 +131,8 @@ class FollowedDataset : public Dataset {
   mutable std::vector<FrameFiles> frames_;                             // guarded by mutex_, as all below
   mutable std::optional<std::pair<std::size_t, ReadResult>> checked_;  // the frame that was waited for
   mutable internal::Stopwatch since_growth_;
-  mutable std::string failure_;  // of the last listing
+  mutable std::optional<std::pair<std::size_t, internal::Stopwatch>> awaited_;  // frame whose depth may come
+  mutable std::string failure_;                                                 // of the last listing
   mutable bool told_ = false;
 };
 

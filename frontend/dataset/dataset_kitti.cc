@@ -89,6 +89,15 @@ std::map<std::int64_t, std::filesystem::path> NumberedImages(const std::filesyst
   return numbered;
 }
 
+// What the image of that number would be called.
+std::string NameLike(const std::map<std::int64_t, std::filesystem::path>& images, std::int64_t number) {
+  const std::filesystem::path& like = images.begin()->second;
+  std::string digits = std::to_string(number);
+  const std::size_t width = like.stem().string().size();
+  if (digits.size() < width) digits.insert(0, width - digits.size(), '0');
+  return digits + like.extension().string();
+}
+
 void FindTruth(const std::filesystem::path& folder, FolderContents& out) {
   out.truth_places.push_back(folder / "poses.txt");
   out.truth_places.push_back(folder / "groundtruth.txt");
@@ -148,29 +157,31 @@ FolderContents FindKitti(const std::filesystem::path& folder, const DatasetOptio
                            " images with numbers up to " + std::to_string(count - 1));
   }
   StampOrder order(times_file, out.warnings);
+  std::size_t alone = 0, pairs = 0;
   for (std::int64_t n = images.begin()->first; n < count; ++n) {
     if (selection && images.count(n) == 0) continue;
     FrameFiles frame;
-    frame.index = n;
     frame.stamp_s = static_cast<double>(n) / rate_hz;
     if (have_times) {
       const TextLine& line = times[static_cast<std::size_t>(n)];
       frame.stamp_s = NumberAt(times_file, line, 0);
       if (!order.Accept(line.number, frame.stamp_s)) continue;
     }
-    const auto path_of = [n](const auto& list, const std::filesystem::path& where) {
-      const auto found = list.find(n);
-      if (found != list.end()) return found->second;
-      const std::string like = list.begin()->second.filename().string();
-      std::string digits = std::to_string(n);
-      const std::size_t width = list.begin()->second.stem().string().size();
-      if (digits.size() < width) digits.insert(0, width - digits.size(), '0');
-      return where / (digits + list.begin()->second.extension().string());
-    };
-    frame.image = path_of(images, left_folder);
-    if (options.sensor == Sensor::kStereo) frame.right = path_of(right_images, right_folder);
+    const auto image = images.find(n);
+    const auto right = right_images.find(n);
+    frame.image = image != images.end() ? image->second : left_folder / NameLike(images, n);
+    if (right != right_images.end()) frame.right = right->second;
+    if (image != images.end()) ++(right != right_images.end() ? pairs : alone);
     out.pose_stamps.emplace_back(n, frame.stamp_s);
     out.frames.push_back(std::move(frame));
+  }
+  if (options.sensor == Sensor::kStereo) {
+    if (pairs == 0) {
+      throw InputError(right_folder.string() + ": no image has the number of an image of " +
+                       left_folder.string());
+    }
+    WarnOfFramesWithoutDepth(right_folder, alone, "left images have no right image and are tracked without",
+                             options, &out);
   }
   out.pose_count = have_times ? times.size() : static_cast<std::size_t>(count);
   out.rate_hz = rate_hz;

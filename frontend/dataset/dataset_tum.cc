@@ -67,27 +67,26 @@ void FromLists(const std::filesystem::path& folder, const DatasetOptions& option
   }
   std::size_t alone = 0;
   for (std::size_t i = 0; i < colour.size(); ++i) {
-    if (options.sensor == Sensor::kRgbd && match[i] < 0) {
-      ++alone;
-      continue;
-    }
     FrameFiles frame;
-    frame.index = static_cast<std::int64_t>(i);
     frame.stamp_s = colour[i].stamp_s;
     frame.image = colour[i].file;
-    if (match[i] >= 0) frame.depth = depth[static_cast<std::size_t>(match[i])].file;
+    if (match[i] >= 0)
+      frame.depth = depth[static_cast<std::size_t>(match[i])].file;
+    else
+      ++alone;
     out.frames.push_back(std::move(frame));
   }
-  if (out.frames.empty()) {
+  if (options.sensor != Sensor::kRgbd) return;
+  if (alone == colour.size()) {
     throw InputError((folder / "depth.txt").string() + ": no depth image is within " +
                      std::to_string(options.max_association_s) +
                      " s of a colour image of rgb.txt; check the time stamps or raise max_association_s");
   }
-  if (alone > 0) {
-    out.warnings.push_back((folder / "depth.txt").string() + ": " + std::to_string(alone) + " of " +
-                           std::to_string(colour.size()) + " colour images have no depth image within " +
-                           std::to_string(options.max_association_s) + " s and are left out");
-  }
+  WarnOfFramesWithoutDepth(folder / "depth.txt", alone,
+                           "colour images have no depth image within " +
+                               std::to_string(options.max_association_s) +
+                               " s and are tracked with colour alone",
+                           options, &out);
 }
 
 // "stamp file stamp file". TUM puts colour first, ICL-NUIM depth: the folder's name tells.
@@ -97,7 +96,6 @@ void FromAssociations(const std::filesystem::path& folder, const DatasetOptions&
   const std::vector<TextLine> lines = ReadTextLines(list);
   StampOrder order(list, out.warnings);
   bool counts = true;  // stamps are frame numbers that name the files (ICL-NUIM), not seconds
-  std::int64_t index = 0;
   for (const TextLine& line : lines) {
     if (line.words.size() != 4) {
       throw InputError(At(list, line.number) + "has " + std::to_string(line.words.size()) +
@@ -107,7 +105,6 @@ void FromAssociations(const std::filesystem::path& folder, const DatasetOptions&
     FrameFiles frame;
     frame.stamp_s = NumberAt(list, line, depth_first ? 2 : 0);
     NumberAt(list, line, depth_first ? 0 : 2);
-    frame.index = index++;
     frame.image = folder / line.words[depth_first ? 3 : 1];
     if (options.sensor == Sensor::kRgbd) frame.depth = folder / line.words[depth_first ? 1 : 3];
     counts = counts && line.words[depth_first ? 2 : 0] == frame.image.stem().string() &&

@@ -43,6 +43,7 @@ class SelectedDataset : public Dataset {
     return end > start_ ? (end - start_ + stride_ - 1) / stride_ : 0;
   }
   double Stamp(std::size_t i) const override { return whole_->Stamp(Place(i)); }
+  std::int64_t Number(std::size_t i) const override { return whole_->Number(Place(i)); }
   ReadResult Read(std::size_t i) const override {
     ReadResult read = whole_->Read(Place(i));
     if (!read.frame || noise_ <= 0) return read;

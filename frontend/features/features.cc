@@ -322,6 +322,7 @@ FrameFeatures ExtractFeatures(const InputFrame& frame, const CameraRig& rig, con
   const std::vector<cv::Mat>& pyramid = *shared;
   FrameFeatures features = ExtractOrb(pyramid, options);
   features.pyramid = shared;
+  features.has_depth = !frame.depth_m.empty() || !frame.right.empty();
   if (!frame.depth_m.empty()) AddDepthFromImage(frame.depth_m, rig, options, &features);
   if (!frame.right.empty()) {
     const std::vector<cv::Mat> right_pyramid = BuildPyramid(frame.right, options);

@@ -30,6 +30,7 @@ struct FrameFeatures {
   std::vector<int> aligned;  ///< N, landmark whose patch the position was aligned with, or -1
   std::shared_ptr<const std::vector<cv::Mat>>
       pyramid;              ///< of the (left) image; null where it is not needed any more
+  bool has_depth = false;   ///< the frame came with a depth or right image
   double row_error_px = 0;  ///< stereo: median absolute row difference of the matches [px]
   int stereo_matches = 0;   ///< stereo: features with a match in the right image
 

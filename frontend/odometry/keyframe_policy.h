@@ -22,7 +22,8 @@ class KeyframePolicy {
  public:
   KeyframePolicy(const OdometryOptions& options, const CameraRig& rig) : options_(options), rig_(rig) {}
 
-  /// `fix`: of the frame in question; `before`: the last frame that had a pose.
+  /// `fix`: of the frame in question; `before`: the last frame that had a pose. Stereo and depth: a frame
+  /// that came without its depth or right image is none, for its landmarks would have no measured distance.
   KeyframeNeed Need(const Map& map, const PoseFix& fix, const LastFrame& before) const;
 
  private:

@@ -1,12 +1,19 @@
 #include "frontend/odometry/map_initializer.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace tutti {
 namespace {
 constexpr int kMinDepthFeatures = 50;      // features with depth that a metric map starts from
 constexpr float kBackwardsRadius = 30.0F;  // between neighbouring frames [px]
+constexpr std::size_t kMaxWaiting = 100;   // frames kept to be posed backwards
 }  // namespace
+
+void MapInitializer::Reset() {
+  mono_.Reset();
+  waiting_.clear();
+}
 
 void MapInitializer::NextPiece() {
   ++piece_;
@@ -16,14 +23,28 @@ void MapInitializer::NextPiece() {
 MapInitializer::Start MapInitializer::Offer(const TrackedFrame& frame, const LastFrame& last,
                                             AsyncMapper* mapper) {
   const Pose T_world_camera = last.reference < 0 ? Pose() : last.T_camera_world.Inverse();
-  if (rig_.sensor == Sensor::kMono) return OfferMono(frame, last, T_world_camera, mapper->MutableMap());
+  return rig_.sensor == Sensor::kMono ? OfferMono(frame, last, T_world_camera, mapper->MutableMap())
+                                      : OfferMetric(frame, T_world_camera, mapper);
+}
+
+MapInitializer::Start MapInitializer::OfferMetric(const TrackedFrame& frame, const Pose& T_world_camera,
+                                                  AsyncMapper* mapper) {
   const std::vector<float>& depths = frame.features->inverse_depth;
   const auto with_depth = std::count_if(depths.begin(), depths.end(), [](float d) { return d > 0; });
   Start start;
-  if (with_depth < kMinDepthFeatures)
-    start.reason = "initialising: only " + std::to_string(with_depth) + " features with depth";
-  else
-    start.keyframe = mapper->AddKeyframe(frame, piece_, T_world_camera, {});
+  if (with_depth < kMinDepthFeatures) {
+    start.reason = frame.features->has_depth
+                       ? "initialising: only " + std::to_string(with_depth) + " features with depth"
+                       : "initialising: waiting for a frame with depth";
+    waiting_.push_back(frame);
+    waiting_.back().features = WithoutImages(*frame.features);
+    if (waiting_.size() > kMaxWaiting) waiting_.erase(waiting_.begin());
+    return start;
+  }
+  start.keyframe = start.before_reference = mapper->AddKeyframe(frame, piece_, T_world_camera, {});
+  const Map& made = mapper->map();
+  const Keyframe& first = made.keyframe(start.keyframe);
+  start.before = PoseBackwards(std::exchange(waiting_, {}), first, first, made);
   return start;
 }
 

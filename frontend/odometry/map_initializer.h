@@ -22,7 +22,7 @@ class MapInitializer {
   struct Start {
     int keyframe = -1;   ///< the one that the frame became, or -1
     std::string reason;  ///< why it became none
-    /// Mono: frames that were offered before and are posed now, T_camera_world, oldest first.
+    /// Frames that were offered before and are posed now, T_camera_world, oldest first.
     std::vector<std::pair<TrackedFrame, Pose>> before;
     int before_reference = -1;  ///< the keyframe that they refer to
   };
@@ -30,11 +30,12 @@ class MapInitializer {
   /// Offers the next frame. A piece goes on from where `last` was, if anywhere, and mono at its scale.
   Start Offer(const TrackedFrame& frame, const LastFrame& last, AsyncMapper* mapper);
   /// Forgets the frames that were offered.
-  void Reset() { mono_.Reset(); }
+  void Reset();
   /// The same, and what starts next is another piece of the map.
   void NextPiece();
 
  private:
+  Start OfferMetric(const TrackedFrame& frame, const Pose& T_world_camera, AsyncMapper* mapper);
   Start OfferMono(const TrackedFrame& frame, const LastFrame& last, const Pose& T_world_camera, Map* map);
   std::vector<std::pair<TrackedFrame, Pose>> PoseBackwards(const std::vector<TrackedFrame>& frames,
                                                            const Keyframe& k0, const Keyframe& k1,
@@ -44,6 +45,7 @@ class MapInitializer {
   CameraRig rig_;
   MonoInitializer mono_;
   PoseSearch search_;
+  std::vector<TrackedFrame> waiting_;  // stereo and depth: offered, without enough depth; no images
   int piece_ = 0;
 };
 

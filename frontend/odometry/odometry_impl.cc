@@ -32,7 +32,7 @@ TrackedFrame Odometry::Impl::Prepare(const InputFrame& input) {
     frame.features = std::make_shared<const FrameFeatures>(ExtractFeatures(input, rig_, options_));
   }
   frame.features = mapper_.lens().Correct(frame.features);
-  if (rig_.sensor == Sensor::kStereo) {
+  if (rig_.sensor == Sensor::kStereo && frame.features->has_depth) {
     row_errors_.push_back(frame.features->row_error_px);
     stereo_matches_.push_back(frame.features->stereo_matches);
   }

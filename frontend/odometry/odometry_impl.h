@@ -57,7 +57,7 @@ class Odometry::Impl {
   Relocalizer relocalizer_;
   FrameHistory history_;
   TrackResult result_;                               // of the last frame
-  std::vector<double> row_errors_, stereo_matches_;  // stereo: of each frame
+  std::vector<double> row_errors_, stereo_matches_;  // stereo: of each pair
 };
 
 }  // namespace tutti

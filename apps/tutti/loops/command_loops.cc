@@ -119,7 +119,7 @@ LoopRun Run(const LoopsArguments& arguments, const LoopDetectorOptions& options,
       progress.Note("tutti: warning: " + image.string() +
                     ": can't be read; it counts as an image without features");
     AddPosterior(row.result, total, run.posterior);
-    if (dump) dump->Add(row.result, set.truth);
+    if (dump) dump->Add(run, row.result, set.truth);
     DropEvidence(options.keep_posterior, row.result);
     loops += row.result.accepted ? 1 : 0;
     progress.Update(run.rows.size(), std::to_string(loops) + " loops");

@@ -88,7 +88,7 @@ cv::Mat Thumb(const LoopRun& run, long image, const char* absent) {
 
 std::string Name(const LoopRun& run, long image) {
   if (image < 0) return "none";
-  std::string text = std::to_string(image);
+  std::string text = std::to_string(run.Number(image));
   if (image < static_cast<long>(run.rows.size()))
     text += " (" + run.rows[static_cast<std::size_t>(image)].file + ")";
   return text;
@@ -116,19 +116,20 @@ std::string TruthText(const LoopRun& run, const TruthOfRow& truth) {
   if (truth.loops.empty()) return "truth: no loop";
   std::string text = "truth: " + Name(run, truth.shown);
   if (truth.loops.size() > 1)
-    text += ", of " + std::to_string(truth.loops.size()) + " from " + std::to_string(truth.loops.front()) +
-            " to " + std::to_string(truth.loops.back());
+    text += ", of " + std::to_string(truth.loops.size()) + " from " +
+            std::to_string(run.Number(truth.loops.front())) + " to " +
+            std::to_string(run.Number(truth.loops.back()));
   return text;
 }
 
-std::string Numbers(const LoopResult& r) {
+std::string Numbers(const LoopRun& run, const LoopResult& r) {
   char text[200];
   std::snprintf(text, sizeof text, "H = %.3f, posterior of the best %.3f, probability %.3f", r.hypothesis,
                 r.posterior, r.probability);
   const std::string line = text;
   if (r.verification.candidate < 0) return line + ", nothing was verified";
   std::snprintf(text, sizeof text, "; %d inliers of %d matches with image %ld", r.verification.inliers,
-                r.verification.matches, static_cast<long>(r.verification.candidate));
+                r.verification.matches, run.Number(r.verification.candidate));
   return line + text;
 }
 
@@ -174,7 +175,7 @@ void DrawEntry(const LoopRun& run, const Entry& entry, cv::Mat strip) {
         PlotText({static_cast<double>(left), kCaption - 8.0}, Fitted(heads[k], kThumbWidth), kTextHeight));
   }
   const std::string line =
-      std::string(entry.missed ? "missed: " : "false positive: ") + Numbers(r) + "; " + reason;
+      std::string(entry.missed ? "missed: " : "false positive: ") + Numbers(run, r) + "; " + reason;
   double y = 28;
   for (const std::string& part : Wrapped(line, kWidth - 2 * kMargin)) {
     shapes.push_back(PlotText({kMargin, y}, part, kTextHeight));

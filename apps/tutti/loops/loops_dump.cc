@@ -24,14 +24,14 @@ const char* TypeName(ConstraintType type) {
   return "?";
 }
 
-std::string CandidateLines(const LoopResult& result, const LoopGroundTruth& truth) {
+std::string CandidateLines(const LoopRun& run, const LoopResult& result, const LoopGroundTruth& truth) {
   std::string text;
   for (std::size_t i = 0; i < result.posterior_by_location.size(); ++i) {
     const auto& [location, combined] = result.posterior_by_location[i];
     const LoopLabel label = truth.At(static_cast<int>(result.query), static_cast<int>(location));
     char cells[128];
-    std::snprintf(cells, sizeof cells, "%ld,%ld,%s,%.9g", static_cast<long>(result.query),
-                  static_cast<long>(location), LabelName(label), combined);
+    std::snprintf(cells, sizeof cells, "%ld,%ld,%s,%.9g", run.Number(result.query), run.Number(location),
+                  LabelName(label), combined);
     std::string line = cells;
     bool any_score = false;
     for (const MemberOpinion& member : result.members) {
@@ -50,18 +50,17 @@ std::string CandidateLines(const LoopResult& result, const LoopGroundTruth& trut
   return text;
 }
 
-std::string VerificationLines(const LoopResult& result, const LoopGroundTruth& truth) {
+std::string VerificationLines(const LoopRun& run, const LoopResult& result, const LoopGroundTruth& truth) {
   std::string text;
   int order = 0;
   for (const Verification& tried : result.tried) {
     const LoopLabel label = truth.At(static_cast<int>(result.query), static_cast<int>(tried.candidate));
     char cells[320];
     std::snprintf(cells, sizeof cells, "%ld,%ld,%s,%d,%d,%d,%s,%d,%d,%.9g,%d,%.9g,%.9g,%.9g,",
-                  static_cast<long>(result.query), static_cast<long>(tried.candidate), LabelName(label),
-                  order++, tried.accepted ? 1 : 0,
-                  result.accepted && tried.candidate == result.candidate ? 1 : 0, TypeName(tried.type),
-                  tried.matches, tried.inliers, tried.mass, tried.coverage, tried.expected_inliers,
-                  tried.log_nfa, tried.motion_spread);
+                  run.Number(result.query), run.Number(tried.candidate), LabelName(label), order++,
+                  tried.accepted ? 1 : 0, result.accepted && tried.candidate == result.candidate ? 1 : 0,
+                  TypeName(tried.type), tried.matches, tried.inliers, tried.mass, tried.coverage,
+                  tried.expected_inliers, tried.log_nfa, tried.motion_spread);
     text += cells + Quoted(tried.reason) + "\n";
   }
   return text;
@@ -90,9 +89,9 @@ LoopsDump::LoopsDump(const std::filesystem::path& folder, const std::vector<std:
   CheckWritten(verification_, verification_file_);
 }
 
-void LoopsDump::Add(const LoopResult& result, const LoopGroundTruth& truth) {
-  candidates_ << CandidateLines(result, truth);
-  verification_ << VerificationLines(result, truth);
+void LoopsDump::Add(const LoopRun& run, const LoopResult& result, const LoopGroundTruth& truth) {
+  candidates_ << CandidateLines(run, result, truth);
+  verification_ << VerificationLines(run, result, truth);
 }
 
 void LoopsDump::Finish() {

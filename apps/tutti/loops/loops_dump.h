@@ -16,8 +16,8 @@ class LoopsDump {
  public:
   /// Opens both files in `folder` (made if missing) and writes their headers. Throws InputError if it can't.
   LoopsDump(const std::filesystem::path& folder, const std::vector<std::string>& members);
-  /// Appends the lines of one image; `truth` is for all images.
-  void Add(const LoopResult& result, const LoopGroundTruth& truth);
+  /// Appends the lines of one image of the run; `truth` is for all its images.
+  void Add(const LoopRun& run, const LoopResult& result, const LoopGroundTruth& truth);
   /// To be called at the end. Throws InputError if the files could not be written in full.
   void Finish();
 

@@ -5,10 +5,14 @@
 #include <cctype>
 #include <cmath>
 #include <fstream>
+#include <optional>
 #include <sstream>
+#include <utility>
 
 #include "apps/tutti/loops/joined_pairs.h"
 #include "apps/tutti/loops/mat_file.h"
+#include "core/median.h"
+#include "tutti/backend/evaluation.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 #include "tutti/core/trajectory.h"
@@ -17,8 +21,6 @@ namespace tutti::cli {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr double kMaxStampDifference = 0.05;  // between an image's name and a pose [s]
 
 bool IsImage(const fs::path& path) {
   static const std::array<const char*, 12> kTypes = {".png",  ".jpg", ".jpeg", ".bmp", ".webp", ".tif",
@@ -65,25 +67,46 @@ Trajectory ReadPoses(const fs::path& file) {
   return trajectory;
 }
 
-// The pose nearest in time to each image that is named by its time stamp; empty if the names are no stamps of
+using PosesOfImages = std::vector<std::optional<StampedPose>>;
+
+// The pose of each image by the time stamp that it is named by; none of any if the names are no stamps of
 // this trajectory.
-Trajectory PosesByName(const Trajectory& trajectory, const std::vector<fs::path>& images) {
-  Trajectory result;
+PosesOfImages PosesByName(const Trajectory& trajectory, const std::vector<fs::path>& images) {
+  std::vector<double> stamps, intervals;
   for (const fs::path& image : images) {
     const auto stamp = ParseDouble(image.stem().string());
     if (!stamp) return {};
-    const auto later = std::lower_bound(trajectory.begin(), trajectory.end(), *stamp,
-                                        [](const StampedPose& pose, double t) { return pose.stamp_s < t; });
-    const StampedPose* nearest = nullptr;
-    for (const auto& it : {later, later == trajectory.begin() ? later : later - 1}) {
-      if (it == trajectory.end()) continue;
-      if (nearest == nullptr || std::abs(it->stamp_s - *stamp) < std::abs(nearest->stamp_s - *stamp))
-        nearest = &*it;
-    }
-    if (nearest == nullptr || std::abs(nearest->stamp_s - *stamp) > kMaxStampDifference) return {};
-    result.push_back(*nearest);
+    if (!stamps.empty()) intervals.push_back(*stamp - stamps.back());
+    stamps.push_back(*stamp);
   }
-  return result;
+  const double interval_s = internal::Median(std::move(intervals));
+  PosesOfImages poses;
+  bool any = false;
+  for (const double stamp : stamps) {
+    const std::optional<Pose> pose = PoseOfFrame(trajectory, stamp, interval_s);
+    poses.push_back(pose ? std::optional<StampedPose>({stamp, *pose}) : std::nullopt);
+    any = any || pose;
+  }
+  return any ? poses : PosesOfImages();
+}
+
+// Nothing is known of a pair with an image that has no pose.
+LoopGroundTruth TruthOf(const PosesOfImages& poses, const LoopRule& rule) {
+  Trajectory known;
+  std::vector<int> row_of;  // in `known`; -1: no pose
+  for (const auto& pose : poses) {
+    row_of.push_back(pose ? static_cast<int>(known.size()) : -1);
+    if (pose) known.push_back(*pose);
+  }
+  const LoopGroundTruth labels = LoopsFromTrajectory(known, rule);
+  LoopGroundTruth truth(static_cast<int>(poses.size()));
+  for (int r = 0; r < truth.size(); ++r) {
+    for (int c = 0; c < r; ++c) {
+      const int row = row_of[static_cast<std::size_t>(r)], column = row_of[static_cast<std::size_t>(c)];
+      truth.Set(r, c, row < 0 || column < 0 ? LoopLabel::kIgnore : labels.At(row, column));
+    }
+  }
+  return truth;
 }
 
 std::string RuleText(const LoopRule& rule) {
@@ -94,25 +117,25 @@ std::string RuleText(const LoopRule& rule) {
 }
 
 LoopGroundTruth FromPoses(const GroundTruthArguments& arguments, const std::vector<fs::path>& images) {
-  Trajectory poses = ReadPoses(arguments.file);
-  if (arguments.join_pairs && poses.size() == 2 * images.size()) {  // the left images' poses
-    for (std::size_t i = 0; i < images.size(); ++i) poses[i] = poses[2 * i];
-    poses.resize(images.size());
+  Trajectory trajectory = ReadPoses(arguments.file);
+  if (arguments.join_pairs && trajectory.size() == 2 * images.size()) {  // the left images' poses
+    for (std::size_t i = 0; i < images.size(); ++i) trajectory[i] = trajectory[2 * i];
+    trajectory.resize(images.size());
   }
-  if (poses.size() != images.size()) {
-    const Trajectory by_name = PosesByName(poses, images);
-    if (by_name.empty()) {
-      throw InputError(arguments.file + ": has " + std::to_string(poses.size()) + " poses, but there are " +
-                       std::to_string(images.size()) +
-                       " images, and their names are no time stamps of it; give one pose per image");
-    }
-    poses = by_name;
+  PosesOfImages poses(trajectory.begin(), trajectory.end());
+  if (trajectory.size() != images.size()) poses = PosesByName(trajectory, images);
+  if (poses.empty()) {
+    throw InputError(arguments.file + ": has " + std::to_string(trajectory.size()) +
+                     " poses, but there are " + std::to_string(images.size()) +
+                     " images, and their names are no time stamps of it; give one pose per image");
   }
-  Trajectory strided;
+  PosesOfImages strided;
   for (std::size_t i = 0; i < poses.size(); i += static_cast<std::size_t>(arguments.stride))
     strided.push_back(poses[i]);
-  LoopGroundTruth truth = LoopsFromTrajectory(strided, arguments.rule);
+  LoopGroundTruth truth = TruthOf(strided, arguments.rule);
   truth.description = arguments.file + " (" + RuleText(arguments.rule) + ")";
+  const auto unknown = std::count(strided.begin(), strided.end(), std::nullopt);
+  if (unknown > 0) truth.description += "; of " + std::to_string(unknown) + " images it says nothing";
   return truth;
 }
 

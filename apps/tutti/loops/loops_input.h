@@ -25,9 +25,9 @@ struct GroundTruthArguments {
 };
 
 /// Ground truth for every stride-th of `images`: from a matrix over those or over all images, or from a
-/// trajectory with a pose for each image (or, where the images are named by their time stamps, a pose near
-/// each). With join_pairs, a matrix or trajectory over the single images is joined, too. Throws InputError
-/// that names both sizes.
+/// trajectory with a pose for each image. Where the images are named by their time stamps, the poses are
+/// found by these (PoseOfFrame), and pairs with an image that has none are ignored. With join_pairs, a matrix
+/// or trajectory over the single images is joined, too. Throws InputError that names both sizes.
 LoopGroundTruth LoadGroundTruth(const GroundTruthArguments& arguments,
                                 const std::vector<std::filesystem::path>& images);
 

@@ -86,19 +86,19 @@ std::string Csv(const LoopRun& run) {
   for (const LoopRow& row : run.rows) {
     const LoopResult& r = row.result;
     const int image = static_cast<int>(r.query);
-    const long verified = r.accepted ? static_cast<long>(r.candidate) : -1;
+    const long verified = r.accepted ? run.Number(r.candidate) : -1;
     const long location = row.Said();
     char numbers[256];
     std::snprintf(numbers, sizeof numbers, ",%.9g,%ld,%.9g,%.9g,%d,%d,%ld,%d,%d,%s,%d", r.hypothesis,
-                  static_cast<long>(r.best), r.posterior, r.probability, r.proposed ? 1 : 0,
-                  r.accepted ? 1 : 0, verified, r.verification.matches, r.verification.inliers,
+                  run.Number(r.best), r.posterior, r.probability, r.proposed ? 1 : 0, r.accepted ? 1 : 0,
+                  verified, r.verification.matches, r.verification.inliers,
                   location < 0 ? "-" : LabelName(run.truth.At(image, static_cast<int>(location))),
                   run.truth.HasLoop(image) ? 1 : 0);
-    text += std::to_string(image) + "," + Quoted(row.file) + numbers;
+    text += std::to_string(run.Number(image)) + "," + Quoted(row.file) + numbers;
     for (std::size_t k = 0; k < run.options.members.size(); ++k) {
       const MemberOpinion opinion = k < r.members.size() ? r.members[k] : MemberOpinion();
-      std::snprintf(numbers, sizeof numbers, ",%.9g,%ld,%.9g", opinion.hypothesis,
-                    static_cast<long>(opinion.best), opinion.at_candidate);
+      std::snprintf(numbers, sizeof numbers, ",%.9g,%ld,%.9g", opinion.hypothesis, run.Number(opinion.best),
+                    opinion.at_candidate);
       text += numbers;
     }
     text += "," + Quoted(row.read ? r.reason : "the image can't be read") + "\n";

@@ -30,10 +30,14 @@ struct LoopRun {
   LoopDetectorOptions options;
   std::string images;
   int stride = 1;
-  LoopGroundTruth truth;
+  LoopGroundTruth truth;  ///< of the rows
   std::vector<LoopRow> rows;
   cv::Mat posterior;  ///< CV_32FC1, square: the posterior of past images (columns), by AddPosterior; may be
                       ///< empty
+
+  /// Number of a row's image (or of a location) in every file: 0-based, among all images of the folder; -1
+  /// stays.
+  long Number(std::int64_t row) const { return row < 0 ? -1 : static_cast<long>(row) * stride; }
 };
 
 /// What the figures of every table are.

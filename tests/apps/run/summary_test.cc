@@ -38,5 +38,24 @@ TEST(Summary, WithoutPosesThereIsNoGraphThatCouldDoubtALoop) {
   EXPECT_EQ(nlohmann::json::parse(SummaryJson(result))["loops"]["accepted"], 1);
 }
 
+TEST(Summary, TheGraphsProofIsThereIfItWasAskedFor) {
+  RunResult result;
+  EXPECT_FALSE(nlohmann::json::parse(SummaryJson(result)).contains("graph"));
+  result.config.run.certify = true;
+  EXPECT_EQ(nlohmann::json::parse(SummaryJson(result))["graph"]["certificate"]["reason"],
+            "no loop moved the map");
+  KeyframeGraphProof proof;
+  proof.best = GraphStart::kChordalOptimum;
+  proof.better = true;
+  proof.starts = {{GraphStart::kFile, 9, 4, false}, {GraphStart::kChordalOptimum, 3, 2, false}};
+  proof.certificate.available = proof.certificate.certified = true;
+  result.graph_proof = proof;
+  const nlohmann::json graph = nlohmann::json::parse(SummaryJson(result))["graph"];
+  EXPECT_EQ(graph["start"], "chordal optimum");
+  EXPECT_EQ(graph["moved"], true);
+  EXPECT_EQ(graph["starts"][1]["objective"], 2);
+  EXPECT_EQ(graph["certificate"]["certified"], true);
+}
+
 }  // namespace
 }  // namespace tutti

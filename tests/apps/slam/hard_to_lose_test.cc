@@ -275,6 +275,18 @@ TEST(HardToLose, KidnappedToAPlaceSeenBefore) {
   EXPECT_LT(out.ate_m, 0.01 * out.path_m);
 }
 
+TEST(HardToLose, KidnappedToAPlaceSeenBeforeWithTheLeftCameraAlone) {
+  std::vector<std::size_t> which = Range(0, 120);
+  for (const std::size_t i : Range(10, 40)) which.push_back(i);
+  Recording kidnapped = Carried(Town(120), which);
+  for (std::size_t i = 120; i < 130; ++i) kidnapped.frames[i].right = cv::Mat();
+  const Outcome out = Follow(kidnapped);
+  EXPECT_EQ(out.relocalized, 1U);
+  EXPECT_EQ(out.pieces, 1);
+  EXPECT_EQ(out.posed, out.frames);
+  EXPECT_LT(out.ate_m, 0.01 * out.path_m);
+}
+
 TEST(HardToLose, KidnappedToANewPlaceThatIsJoinedLater) {
   const Recording town = WholeTown();
   const std::size_t begin = town.frames.size() / 3;

@@ -134,6 +134,25 @@ TEST_F(LoopCloserTest, TwoThatAgreeMoveTheMapWhenTheirSolutionIsDueAndNotBefore)
   EXPECT_EQ(closer.Graph(odometry_).edges().back().to, kLater + 1);
 }
 
+TEST_F(LoopCloserTest, ASolutionIsProvedIfThatIsAskedFor) {
+  for (const bool certify : {false, true}) {
+    RunConfig config;
+    config.run.global_adjustment = false;
+    config.run.certify = certify;
+    LoopCloser closer(config, recording_.rig, nullptr);
+    ConsiderTwo(&closer, 0.5);
+    EXPECT_FALSE(closer.proof());
+    ASSERT_TRUE(Solve(&closer).correction);
+    ASSERT_EQ(closer.proof().has_value(), certify);
+    if (!certify) continue;
+    EXPECT_EQ(closer.proof()->starts.size(), 3u);
+    EXPECT_EQ(closer.proof()->best, GraphStart::kFile);
+    EXPECT_FALSE(closer.proof()->better) << "no other start leads lower than the map";
+    EXPECT_TRUE(closer.proof()->certificate.certified) << closer.proof()->certificate.reason;
+    EXPECT_GT(closer.proof()->certificate.chordal, 0);
+  }
+}
+
 TEST_F(LoopCloserTest, WhatTheMapFulfilsWaitsForACorrectionOrForTheEnd) {
   LoopCloser closer = Closer();
   ConsiderTwo(&closer, 0);

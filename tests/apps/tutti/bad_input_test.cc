@@ -99,13 +99,16 @@ TEST_F(BadInput, OutputFolderThatCantBeWritten) {
 TEST_F(BadInput, DamagedImagesInTheMiddleAreSkippedAndCounted) {
   const fs::path data = testing::CopyOfTinyTown(folder_ / "data");
   fs::resize_file(data / "image_0" / "000012.png", 3000);              // truncated
-  testing::WriteAll(data / "image_1" / "000015.png", "not an image");  // unreadable
+  testing::WriteAll(data / "image_0" / "000015.png", "not an image");  // unreadable
+  testing::WriteAll(data / "image_1" / "000020.png", "not an image");  // of a frame that has its left image
   const cv::Mat small(100, 100, CV_8UC1, cv::Scalar(128));
   cv::imwrite((data / "image_0" / "000018.png").string(), small);  // of another size
   const auto run = Run(testing::TinyConfig(folder_), data);
   EXPECT_EQ(run.status, 0) << run.output;
-  EXPECT_THAT(run.output, AllOf(HasSubstr("000012.png"), HasSubstr("000015.png"), HasSubstr("000018.png")));
+  EXPECT_THAT(run.output, AllOf(HasSubstr("000012.png"), HasSubstr("000015.png"), HasSubstr("000018.png"),
+                                HasSubstr("frame 20 is tracked without its right image: ")));
   EXPECT_EQ(Summary()["frames"]["bad"], 3);
+  EXPECT_EQ(Summary()["frames"]["bad_depth"][0]["index"], 20);
   EXPECT_EQ(Summary()["frames"]["total"], testing::kTinyFrames);
   EXPECT_EQ(Summary()["frames"]["tracked"], testing::kTinyFrames - 3);
 }

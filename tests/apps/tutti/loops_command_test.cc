@@ -257,6 +257,56 @@ TEST_F(LoopsCommand, ADumpOfImagesWithoutFeaturesHasNoCandidates) {
   EXPECT_EQ(r["f1_at_default"], 1);  // nothing to find, nothing said
 }
 
+TEST_F(LoopsCommand, NumbersAreThoseOfAllImagesAlsoWithAStride) {
+  WriteImages();
+  const auto run = Run(Truth(TruePairs()), out_, {"--stride", "5", "--keep-posterior", "--dump"});
+  ASSERT_EQ(run.status, 0) << run.output;
+  std::istringstream lines(ReadAll(out_ / "hypotheses.csv"));
+  std::string line;
+  std::getline(lines, line);
+  int image = 0;
+  for (; std::getline(lines, line); image += 5) {
+    const std::string number = std::to_string(image);
+    EXPECT_THAT(line, StartsWith(number + ",\"" + number + ".png\""));
+  }
+  EXPECT_EQ(image, kImages);
+  for (const char* file : {"posteriors.csv", "dump_candidates.csv", "dump_verification.csv"}) {
+    std::istringstream table(ReadAll(out_ / file));
+    std::getline(table, line);
+    while (std::getline(table, line)) {
+      const std::vector<std::string> cells = SplitText(line, ",");
+      EXPECT_EQ(*ParseInteger(cells[0]) % 5, 0) << file << ": " << line;
+      EXPECT_EQ(*ParseInteger(cells[1]) % 5, 0) << file << ": " << line;
+    }
+  }
+}
+
+TEST_F(LoopsCommand, ImagesWithoutAPoseAreIgnoredWhereNamesAreTimeStamps) {
+  fs::create_directories(images_);
+  std::string truth;
+  for (int i = 0; i < 16; ++i) {  // two laps of 8 places
+    const std::string stamp = std::to_string(100 + i) + ".0";
+    cv::imwrite((images_ / (stamp + ".png")).string(),
+                testing::TexturedImage(static_cast<std::uint32_t>(i % 8)));
+    const std::string x = std::to_string(20 * (i % 8));
+    if (i > 0) truth += stamp + " " + x + " 0 0 0 0 0 1\n";
+  }
+  const auto loops = [&](const std::string& first) {
+    WriteAll(folder_ / "truth.txt", first + truth);
+    const auto run = Run(folder_ / "truth.txt", out_, {"--rule", "orb", "--gt-exclude-s", "5"});
+    EXPECT_EQ(run.status, 0) << run.output;
+    return Json(out_ / "results.json");
+  };
+  const nlohmann::json whole = loops("100.0 0 0 0 0 0 0 1\n");
+  EXPECT_EQ(whole["rows_with_loop"], 8);
+  const nlohmann::json near = loops("100.4 0 0 0 0 0 0 1\n100.45 0 0 0 0 0 0 1\n");
+  EXPECT_EQ(near["rows_with_loop"], 8) << "0.4 s is less than half a frame";
+  const nlohmann::json without = loops("");
+  EXPECT_EQ(without["rows_with_loop"], 7);
+  EXPECT_THAT(without["protocol"]["ground_truth"].get<std::string>(),
+              HasSubstr("of 1 images it says nothing"));
+}
+
 TEST_F(LoopsCommand, ATableOfOneRuleIsAContradiction) {
   WriteImages(2);
   const auto run = Run(Truth({}, 2), out_, {"--table", "--rule", "mean"});

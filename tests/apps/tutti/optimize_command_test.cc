@@ -84,5 +84,38 @@ TEST_F(OptimizeCommand, CountsEdgesThatAreGivenTwiceTwice) {
   EXPECT_NEAR(Json()["costs"]["chi2"].get<double>(), 1 + 1 + 4, 1e-9);  // at x = 2
 }
 
+TEST_F(OptimizeCommand, SaysWhichStartItTook) {
+  const std::string loop = "EDGE_SE2 0 9 2 0.1 0 1 0 0 1 0 1\n";
+  const testing::ProcessResult run = Optimize(
+      kVertices + std::string(kEdge) + "EDGE_SE2 1 9 1 0 0.2 1 0 0 1 0 1\n" + loop, {"--init", "chordal"});
+  EXPECT_EQ(run.status, 0) << run.output;
+  EXPECT_THAT(run.output, HasSubstr("from the chordal optimum: "));
+  EXPECT_THAT(run.output, HasSubstr(", taken"));
+  EXPECT_THAT(run.output, HasSubstr("from the chordal relaxation: "));
+  EXPECT_EQ(Json()["start"], "chordal optimum");
+  EXPECT_EQ(Json()["starts"].size(), 2u);
+}
+
+TEST_F(OptimizeCommand, TreatsBadInformationAsItIsTold) {
+  const std::string bad = "EDGE_SE2 0 1 3 0 0 1 2 0 1 0 1\n", good = kVertices + std::string(kEdge);
+  const testing::ProcessResult refused = Optimize(good + bad + bad);
+  EXPECT_EQ(refused.status, 1);
+  EXPECT_THAT(refused.output, HasSubstr("it is the first of 2 of 3 edges"));
+  for (const char* how : {"project", "diagonal", "skip"}) {
+    const testing::ProcessResult run = Optimize(good + bad + bad, {"--bad-information", how});
+    EXPECT_EQ(run.status, 0) << run.output;
+    EXPECT_THAT(run.output, HasSubstr("in.g2o:4: 2 of 3 edges")) << how;
+    EXPECT_EQ(Json()["bad_information"]["treatment"], how);
+    EXPECT_EQ(Json()["bad_information"]["edges"], 2);
+    EXPECT_EQ(Json()["bad_information"]["skipped"], std::string(how) == "skip" ? 2 : 0);
+  }
+  const testing::ProcessResult unknown = Optimize(good, {"--bad-information", "projekt"});
+  EXPECT_NE(unknown.status, 0);
+  EXPECT_THAT(unknown.output, HasSubstr("did you mean 'project'?"));
+  const testing::ProcessResult apart = Optimize(kVertices + bad, {"--bad-information", "skip"});
+  EXPECT_EQ(apart.status, 1);
+  EXPECT_THAT(apart.output, HasSubstr("falls into 2 pieces"));
+}
+
 }  // namespace
 }  // namespace tutti

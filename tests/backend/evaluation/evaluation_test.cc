@@ -292,6 +292,28 @@ TEST(Evaluation, InterpolationFillsTheReferenceBetweenItsPoses) {
   EXPECT_THAT(ErrorOf([&] { EvaluateTrajectory(reference, estimate, options); }), HasSubstr("0.5 s apart"));
 }
 
+TEST(Evaluation, AFrameHasThePoseAtItsTimeOrTheNearestWithinHalfAFrame) {
+  const double interval_s = 1.0 / 30;
+  Trajectory reference;
+  for (const double t : {1.0, 1.1, 1.2, 2.0})
+    reference.push_back({t, Pose(Eigen::Quaterniond::Identity(), {t, 0, 0})});
+  const auto x = [&](double stamp_s) {
+    const std::optional<Pose> pose = PoseOfFrame(reference, stamp_s, interval_s);
+    return pose ? pose->translation.x() : 0.0;
+  };
+  EXPECT_NEAR(x(1.07), 1.07, 1e-9) << "between two poses";
+  EXPECT_EQ(x(0.99), 1.0) << "just before the first";
+  EXPECT_EQ(x(0.98), 0.0);
+  EXPECT_EQ(x(2.016), 2.0) << "just after the last";
+  EXPECT_EQ(x(2.018), 0.0);
+  EXPECT_EQ(x(1.21), 1.2) << "in a gap";
+  EXPECT_EQ(x(1.6), 0.0);
+  EXPECT_EQ(x(1.99), 2.0);
+  EXPECT_FALSE(PoseOfFrame({}, 1.0, interval_s));
+  EXPECT_FALSE(PoseOfFrame(reference, 0.999, 0)) << "a single frame has no interval";
+  EXPECT_TRUE(PoseOfFrame(reference, 1.0, 0));
+}
+
 TEST(Evaluation, FullErrorIsTheNormOfBothParts) {
   const Trajectory reference = Curve(3);
   Trajectory estimate = reference;

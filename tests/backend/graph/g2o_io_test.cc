@@ -14,9 +14,9 @@ using ::testing::HasSubstr;
 
 std::filesystem::path Write(const std::string& text) { return testing::FreshFile("graph.g2o", text); }
 
-std::string ErrorOf(const std::string& text) {
+std::string ErrorOf(const std::string& text, BadInformation bad = BadInformation::kRefuse) {
   try {
-    ReadG2o(Write(text));
+    ReadG2o(Write(text), bad);
   } catch (const InputError& error) {
     return error.what();
   }
@@ -118,6 +118,57 @@ TEST(G2o, DamagedFilesNameTheLine) {
               HasSubstr(":4: VERTEX_SE3:QUAT in a graph of SE(2)"));
   EXPECT_THAT(ErrorOf("VERTEX_SE3:QUAT 5 0 0 0 0 0 0 0\n"), HasSubstr(":1: the quaternion is zero"));
   EXPECT_THAT(ErrorOf("VERTEX_SIM3:QUAT 5 0 0 0 0 0 0 1 -2\n"), HasSubstr(":1: the scale must be positive"));
+}
+
+/// A chain 0 - 1 - 2 whose second edge has eigenvalues 1, 3 and -1 (x and y are correlated too much), and a
+/// loop 0 - 2 with no positive one.
+const char* const kBadInformation =
+    "EDGE_SE2 0 1 1 0 0  1 0 0 1 0 1\nEDGE_SE2 1 2 1 0 0  1 2 0 1 0 1\nEDGE_SE2 0 2 2 0 0  -1 0 0 0 0 -2\n";
+
+TEST(G2o, InformationThatIsNotPositiveDefiniteIsRefusedWithTheNumberOfEdges) {
+  const std::string error = ErrorOf(kBadInformation);
+  EXPECT_THAT(error,
+              HasSubstr("graph.g2o:2: its information matrix is not positive definite; it is the first "
+                        "of 2 of 3 edges"));
+  EXPECT_THAT(error, HasSubstr("--bad-information"));
+  // What else is wrong with such an edge is not forgiven.
+  const std::string overflow = "EDGE_SE2 0 1 1 0 0 1e300 0 0 1 0 1\n";
+  EXPECT_THROW(ReadG2o(Write(kBadInformation + overflow), BadInformation::kProject), InputError);
+}
+
+TEST(G2o, InformationIsProjectedOnTheNearestPositiveSemidefiniteMatrix) {
+  const G2oFile file = ReadG2o(Write(kBadInformation), BadInformation::kProject);
+  EXPECT_EQ(file.bad_information, 2u);
+  EXPECT_EQ(file.skipped, 1u);  // nothing of the loop is positive
+  ASSERT_EQ(file.graph.edges().size(), 2u);
+  const Matrix7d& I = file.graph.edges()[1].information;  // the eigenvector (1, 1) / sqrt(2) keeps its 3
+  EXPECT_NEAR(I(0, 0), 1.5, 1e-8);
+  EXPECT_NEAR(I(0, 1), 1.5, 1e-8);
+  EXPECT_NEAR(I(1, 1), 1.5, 1e-8);
+  EXPECT_NEAR(I(5, 5), 1, 1e-8);
+  ASSERT_FALSE(file.warnings.empty());
+  EXPECT_THAT(file.warnings[0], HasSubstr("graph.g2o:2: 2 of 3 edges"));
+  EXPECT_THAT(file.warnings[0], HasSubstr("negative eigenvalues count as 0; 1 have nothing positive"));
+}
+
+TEST(G2o, OfBadInformationTheDiagonalMayBeKept) {
+  const G2oFile file = ReadG2o(Write(kBadInformation), BadInformation::kDiagonal);
+  ASSERT_EQ(file.graph.edges().size(), 2u);
+  const Matrix7d& I = file.graph.edges()[1].information;
+  EXPECT_EQ(I(0, 0), 1);
+  EXPECT_EQ(I(0, 1), 0);
+  EXPECT_EQ(I(5, 5), 1);
+}
+
+TEST(G2o, EdgesOfBadInformationMayBeSkippedIfTheGraphHoldsTogether) {
+  const std::string bridge = ErrorOf(kBadInformation, BadInformation::kSkip);
+  EXPECT_THAT(bridge, HasSubstr("graph.g2o:2: without the 2 of 3 edges"));
+  EXPECT_THAT(bridge, HasSubstr("falls into 2 pieces (before: 1)"));
+  const std::string held = "EDGE_SE2 2 1 -1 0 0  1 0 0 1 0 1\n";
+  const G2oFile file = ReadG2o(Write(kBadInformation + held), BadInformation::kSkip);
+  EXPECT_EQ(file.graph.edges().size(), 2u);
+  EXPECT_EQ(file.skipped, 2u);
+  EXPECT_THAT(file.warnings[0], HasSubstr("2 are left out"));
 }
 
 TEST(G2o, FilesThatHoldNoGraphSaySo) {

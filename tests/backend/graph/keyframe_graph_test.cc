@@ -79,6 +79,22 @@ TEST(KeyframeGraph, ATrueLoopPullsTheTrajectoryTogether) {
   }
 }
 
+TEST(KeyframeGraph, ProvesItsSolutionWhereThereIsNoScale) {
+  for (GraphKind kind : {GraphKind::kSE3, GraphKind::kSim3}) {
+    const auto synthetic = Drifting(kind);
+    const KeyframeGraph graph = FromOdometry(synthetic, kind);
+    const std::vector<LoopEdge> loops = {TrueLoop(synthetic, 5, 105), TrueLoop(synthetic, 90, 190)};
+    const KeyframeGraphProof proof = graph.Prove(loops);
+    EXPECT_EQ(proof.best, GraphStart::kFile);
+    EXPECT_FALSE(proof.better);
+    EXPECT_GE(proof.starts.size(), 2u);
+    EXPECT_EQ(proof.correction.S_world_keyframe.at(150).translation,
+              graph.Optimize(loops).S_world_keyframe.at(150).translation);
+    EXPECT_EQ(proof.certificate.available, kind == GraphKind::kSE3);
+    EXPECT_EQ(proof.certificate.certified, kind == GraphKind::kSE3) << proof.certificate.reason;
+  }
+}
+
 TEST(KeyframeGraph, AFalseLoopIsReportedAndDoesLittleHarm) {
   const auto synthetic = Drifting(GraphKind::kSE3);
   const KeyframeGraph graph = FromOdometry(synthetic, GraphKind::kSE3);

@@ -40,7 +40,7 @@ void ExpectTheSameOptimum(const PoseGraph& graph, const PoseGraphOptions& option
   ASSERT_TRUE(ceres.report.success) << what << ": " << ceres.report.reason;
   ASSERT_TRUE(block.report.success) << what << ": " << block.report.reason;
   EXPECT_EQ(ceres.report.termination, block.report.termination) << what;
-  EXPECT_EQ(ceres.report.init, block.report.init) << what;
+  EXPECT_EQ(ceres.report.start, block.report.start) << what;
   EXPECT_NEAR(block.report.objective, ceres.report.objective, 1e-9 * ceres.report.objective) << what;
   EXPECT_EQ(block.report.down_weighted, ceres.report.down_weighted) << what;
   EXPECT_EQ(ceres.report.solver, PoseGraphSolver::kCeres);

@@ -105,18 +105,42 @@ TEST(DatasetBadInputTest, TheFirstImageMayBeBrokenButNotAll) {
               AllOf(HasSubstr("000000.png"), HasSubstr("none of the first 3")));
 }
 
-TEST(DatasetBadInputTest, MissingRightOrMiddleImageIsAnErrorOfItsFrame) {
+TEST(DatasetBadInputTest, AMissingImageIsAnErrorOfItsFrameAndAMissingRightOneIsNot) {
   const auto folder = FreshFolder();
   MakeKitti(folder, 5, true);
   std::filesystem::remove(folder / "image_1" / "000001.png");
   std::filesystem::remove(folder / "image_0" / "000003.png");
   const auto data = OpenDataset(folder, With(Sensor::kStereo));
   ASSERT_EQ(data->Size(), 5U);
-  EXPECT_THAT(data->Read(1).error,
-              AllOf(HasSubstr("image_1"), HasSubstr("000001.png"), HasSubstr("missing")));
+  EXPECT_THAT(data->Warnings().back(), AllOf(HasSubstr("image_1"), HasSubstr("1 of 5 left images")));
+  const ReadResult alone = data->Read(1);
+  ASSERT_TRUE(alone.frame) << alone.error;
+  EXPECT_TRUE(alone.frame->right.empty());
+  EXPECT_TRUE(alone.depth_error.empty());
   EXPECT_THAT(data->Read(3).error, HasSubstr("000003.png"));
   EXPECT_TRUE(data->Read(4).frame);
   EXPECT_THAT(data->Read(5).error, HasSubstr("no frame 5"));
+}
+
+TEST(DatasetBadInputTest, ADamagedRightImageIsNamedAndItsFrameComesWithout) {
+  const auto folder = FreshFolder();
+  MakeKitti(folder, 4, true);
+  Truncate(folder / "image_1" / "000001.png", 0.3);
+  WriteImage(folder / "image_1" / "000002.png", Picture(32, 48, 1));
+  const auto data = OpenDataset(folder, With(Sensor::kStereo));
+  const ReadResult cut = data->Read(1), small = data->Read(2);
+  EXPECT_THAT(cut.depth_error, AllOf(HasSubstr("image_1"), HasSubstr("000001.png"), HasSubstr("truncated")));
+  EXPECT_THAT(small.depth_error, AllOf(HasSubstr("000002.png"), HasSubstr("32x48")));
+  for (const ReadResult* read : {&cut, &small}) {
+    ASSERT_TRUE(read->frame) << read->error;
+    EXPECT_TRUE(read->frame->right.empty());
+  }
+  EXPECT_FALSE(data->Read(3).frame->right.empty());
+  for (int i = 0; i < 4; ++i) {
+    std::filesystem::rename(folder / "image_1" / ("00000" + std::to_string(i) + ".png"),
+                            folder / "image_1" / ("00010" + std::to_string(i) + ".png"));
+  }
+  EXPECT_THAT(OpenError(folder, With(Sensor::kStereo)), HasSubstr("no image has the number"));
 }
 
 TEST(DatasetBadInputTest, ImagesOfChangingSizeAreErrorsOfTheirFrame) {
@@ -176,7 +200,8 @@ TEST(DatasetBadInputTest, TimeStampsMustGrow) {
   const auto data = OpenDataset(folder, With(Sensor::kMono));
   ASSERT_EQ(data->Size(), 3U);
   EXPECT_THAT(data->Warnings()[0], AllOf(HasSubstr("times.txt:3: "), HasSubstr("skipped")));
-  EXPECT_EQ(data->Read(2).frame->index, 3);
+  EXPECT_EQ(data->Read(2).frame->index, 2);  // what is skipped has no number
+  EXPECT_EQ(cv::norm(data->Read(2).frame->image, Picture(64, 48, 3), cv::NORM_INF), 0);
   EXPECT_EQ(data->ReadGroundTruth(folder / "poses.txt", nullptr).size(), 3U);
   WriteText(folder / "times.txt", "0\n0.2\n0.1\n0.3\n");
   EXPECT_THAT(OpenError(folder, With(Sensor::kMono)), AllOf(HasSubstr("times.txt:3: "), HasSubstr("sort")));
@@ -201,8 +226,14 @@ TEST(DatasetBadInputTest, TumListsAreChecked) {
   EXPECT_THAT(OpenError(folder, With(Sensor::kRgbd)), HasSubstr("no calibration"));
   EXPECT_THAT(OpenError(folder, With(Sensor::kStereo, true)), HasSubstr("no stereo"));
   const auto data = OpenDataset(folder, With(Sensor::kRgbd, true));
-  EXPECT_THAT(data->Read(0).error, HasSubstr("no depth image"));
-  EXPECT_THAT(data->Read(1).error, AllOf(HasSubstr("32x24"), HasSubstr("registered")));
+  EXPECT_THAT(data->Read(0).depth_error, AllOf(HasSubstr("depth/a.png"), HasSubstr("no depth image")));
+  EXPECT_THAT(data->Read(1).depth_error, AllOf(HasSubstr("32x24"), HasSubstr("registered")));
+  ASSERT_TRUE(data->Read(1).frame) << data->Read(1).error;
+  EXPECT_TRUE(data->Read(1).frame->depth_m.empty());
+  WriteText(folder / "depth.txt", "# nothing yet\n");
+  EXPECT_THAT(OpenError(folder, With(Sensor::kRgbd, true)),
+              AllOf(HasSubstr("depth.txt"), HasSubstr("lists no images")));
+  WriteText(folder / "depth.txt", "1.0 depth/a.png\n");
   WriteText(folder / "rgb.txt", "2.0 rgb/a.png\n1.0 rgb/b.png\n");
   EXPECT_THAT(OpenError(folder, With(Sensor::kMono, true)), HasSubstr("rgb.txt:2: "));
   WriteText(folder / "rgb.txt", "1.0 rgb/a.png\n1.0 rgb/b.png\n");
@@ -234,6 +265,17 @@ TEST(DatasetBadInputTest, EurocSensorYamlIsChecked) {
   EXPECT_DOUBLE_EQ(data->Stamp(0), 1.0);
   EXPECT_TRUE(data->Read(0).frame);
   EXPECT_THAT(OpenError(folder, With(Sensor::kStereo)), AllOf(HasSubstr("cam1"), HasSubstr("sensor.yaml")));
+  WriteText(folder / "mav0/cam1/sensor.yaml", replaced("0.0, 0.5,", "0.0, 0.7,"));
+  WriteText(folder / "mav0/cam1/data.csv", "9000000000,9000000000.png\n");
+  EXPECT_THAT(OpenError(folder, With(Sensor::kStereo)), HasSubstr("no image has the time stamp"));
+  WriteText(camera / "data.csv", "1000000000,1000000000.png\n2000000000,1000000000.png\n");
+  WriteImage(folder / "mav0/cam1/data/1000000000.png", Picture(64, 48, 2));
+  WriteText(folder / "mav0/cam1/data.csv", "1000000000,1000000000.png\n");
+  const auto pair = OpenDataset(folder, With(Sensor::kStereo));
+  ASSERT_EQ(pair->Size(), 2U);
+  EXPECT_THAT(pair->Warnings().back(), HasSubstr("1 of 2 left images have no right image"));
+  EXPECT_FALSE(pair->Read(0).frame->right.empty());
+  EXPECT_TRUE(pair->Read(1).frame->right.empty());
   WriteText(camera / "sensor.yaml", replaced("[60, 60, 32, 24]", "[60, 60]"));
   EXPECT_THAT(OpenError(folder, With(Sensor::kMono)), HasSubstr("sensor.yaml:11: "));
   WriteText(camera / "sensor.yaml", replaced("equidistant", "omni"));

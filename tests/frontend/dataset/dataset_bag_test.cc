@@ -100,13 +100,16 @@ TEST(BagDataset, SixteenBitIsScaledAndRepeatedStampsAreSkipped) {
   EXPECT_EQ(cv::norm(read.frame->image, Picture(64, 48, 2), cv::NORM_INF), 0);
 }
 
-TEST(BagDataset, DepthInItsUnitAndImagesWithoutAreLeftOut) {
+TEST(BagDataset, DepthInItsUnitAndImagesWithoutComeAlone) {
   DatasetOptions options = Topic("/colour/image_raw", Sensor::kRgbd);
   options.depth_topic = "/depth/image";
   options.depth_units_per_m = 1000;
   const auto dataset = OpenDataset(Bag(), options);
-  ASSERT_EQ(dataset->Size(), 3u);
-  const ReadResult read = dataset->Read(2);
+  ASSERT_EQ(dataset->Size(), 4u);
+  EXPECT_THAT(dataset->Warnings().front(), HasSubstr("1 of 4 images of /colour/image_raw have no depth"));
+  ASSERT_TRUE(dataset->Read(2).frame.has_value());
+  EXPECT_TRUE(dataset->Read(2).frame->depth_m.empty());
+  const ReadResult read = dataset->Read(3);
   ASSERT_TRUE(read.frame.has_value()) << read.error;
   EXPECT_EQ(read.frame->index, 3);
   EXPECT_FLOAT_EQ(read.frame->depth_m.at<float>(5, 5), 1.5F);

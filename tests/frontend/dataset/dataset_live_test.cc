@@ -62,6 +62,34 @@ TEST(FollowedFolder, AHalfWrittenImageIsWaitedFor) {
   EXPECT_TRUE(dataset->Read(1).frame.has_value());
 }
 
+TEST(FollowedFolder, DepthThatIsListedLaterIsWaitedForUnlessANewerFrameHasIt) {
+  const fs::path folder = FreshFolder();
+  for (int i = 0; i < 3; ++i) WriteImage(folder / (std::to_string(i) + ".png"), Picture(64, 48, i));
+  WriteImage(folder / "depth.png", cv::Mat(48, 64, CV_16UC1, cv::Scalar(5000)));
+  testing::WriteText(folder / "rgb.txt", "0.0 0.png\n1.0 1.png\n");
+  testing::WriteText(folder / "depth.txt", "0.0 depth.png\n");
+  DatasetOptions options = Follow(60);
+  options.sensor = Sensor::kRgbd;
+  const auto dataset = OpenDataset(folder, options);
+  EXPECT_TRUE(dataset->Warnings().empty());
+  int asked = 0;
+  EXPECT_TRUE(dataset->WaitFor(1, [&] {
+    if (asked++ == 1) testing::WriteText(folder / "depth.txt", "0.0 depth.png\n1.0 depth.png\n");
+    return false;
+  }));
+  EXPECT_GE(asked, 2);
+  EXPECT_FALSE(dataset->Read(1).frame->depth_m.empty());
+  testing::WriteText(folder / "rgb.txt", "0.0 0.png\n1.0 1.png\n2.0 2.png\n3.0 2.png\n");
+  testing::WriteText(folder / "depth.txt", "0.0 depth.png\n1.0 depth.png\n3.0 depth.png\n");
+  asked = 0;
+  EXPECT_TRUE(dataset->WaitFor(2, [&] { return ++asked > 100; }));
+  EXPECT_EQ(asked, 0);
+  const ReadResult alone = dataset->Read(2);
+  ASSERT_TRUE(alone.frame.has_value()) << alone.error;
+  EXPECT_EQ(alone.frame->index, 2);
+  EXPECT_TRUE(alone.frame->depth_m.empty());
+}
+
 TEST(FollowedFolder, EndsWithoutNewImagesAndWhenAskedTo) {
   const fs::path folder = FreshFolder() / "images";
   WriteImage(folder / "0.png", Picture(64, 48, 0));

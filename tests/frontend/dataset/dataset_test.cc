@@ -55,6 +55,31 @@ TEST(DatasetTest, StrideKeepsIndicesAndStampsOfTheData) {
   EXPECT_EQ(data->ReadGroundTruth(folder / "poses.txt", nullptr).size(), 7U);
 }
 
+TEST(DatasetTest, ANumberIsThePlaceAmongTheImagesWhateverTheirNamesAndRefusedLines) {
+  const auto folder = FreshFolder();
+  MakeKitti(folder / "kitti", 7, false);
+  for (const char* name : {"000000.png", "000001.png"})
+    std::filesystem::remove(folder / "kitti" / "image_0" / name);
+  const auto cut = OpenDataset(folder / "kitti", With(Sensor::kMono));
+  ASSERT_EQ(cut->Size(), 5U);
+  EXPECT_EQ(cut->Read(1).frame->index, 1);
+  EXPECT_DOUBLE_EQ(cut->Stamp(1), 0.3);
+  std::string list;
+  for (int i = 0; i < 4; ++i) {
+    const std::string name = std::to_string(i) + ".png", stamp = i == 1 ? "0" : std::to_string(i);
+    WriteImage(folder / "icl" / name, Picture(64, 48, i));
+    list.append(stamp).append(".0 " + name + " ").append(stamp).append(".0 depth.png\n");
+  }
+  WriteText(folder / "icl" / "associations.txt", list);
+  DatasetOptions options = With(Sensor::kMono, true);
+  options.start = 1;
+  const auto listed = OpenDataset(folder / "icl", options);  // the second line repeats a stamp
+  ASSERT_EQ(listed->Size(), 2U);
+  EXPECT_EQ(listed->Number(0), 1);
+  EXPECT_EQ(listed->Read(0).frame->index, 1);
+  EXPECT_EQ(cv::norm(listed->Read(0).frame->image, Picture(64, 48, 2), cv::NORM_INF), 0);
+}
+
 TEST(DatasetTest, StartEndAndStrideChooseFramesThatKeepTheirNumbers) {
   const auto folder = FreshFolder();
   MakeKitti(folder, 10, true);
@@ -69,6 +94,7 @@ TEST(DatasetTest, StartEndAndStrideChooseFramesThatKeepTheirNumbers) {
     const ReadResult read = data->Read(i);
     ASSERT_TRUE(read.frame) << read.error;
     EXPECT_EQ(read.frame->index, number);
+    EXPECT_EQ(data->Number(i), number);
     EXPECT_DOUBLE_EQ(data->Stamp(i), 0.1 * static_cast<double>(number));
     EXPECT_EQ(cv::norm(read.frame->image, Picture(64, 48, static_cast<int>(number)), cv::NORM_INF), 0);
     EXPECT_EQ(FindStamp(*data, data->Stamp(i)), i);
@@ -147,11 +173,19 @@ TEST(DatasetTest, TumAssociatesEachDepthImageOnceByTime) {
   WriteText(folder / "depth.txt", depth);
   DatasetOptions options = With(Sensor::kRgbd, true);
   const auto data = OpenDataset(folder, options);
-  ASSERT_EQ(data->Size(), 2U);  // the others have no depth
+  ASSERT_EQ(data->Size(), 4U);
   EXPECT_THAT(data->Warnings()[0], HasSubstr("2 of 4"));
   EXPECT_EQ(data->Read(1).frame->depth_m.type(), CV_32FC1);
   EXPECT_FLOAT_EQ(data->Read(0).frame->depth_m.at<float>(5, 5), 1.0F);
   EXPECT_FLOAT_EQ(data->Read(1).frame->depth_m.at<float>(5, 5), 2.0F);
+  for (const std::size_t i : {2U, 3U}) {  // colour alone
+    const ReadResult read = data->Read(i);
+    ASSERT_TRUE(read.frame) << read.error;
+    EXPECT_TRUE(read.frame->depth_m.empty());
+    EXPECT_TRUE(read.depth_error.empty()) << read.depth_error;
+    EXPECT_EQ(read.frame->index, static_cast<std::int64_t>(i));
+    EXPECT_EQ(cv::norm(read.frame->image, Picture(64, 48, static_cast<int>(i)), cv::NORM_INF), 0);
+  }
   options.max_depth_m = 1.5;
   EXPECT_FLOAT_EQ(OpenDataset(folder, options)->Read(1).frame->depth_m.at<float>(5, 5), 0.0F);
   EXPECT_EQ(OpenDataset(folder, With(Sensor::kMono, true))->Size(), 4U);

@@ -82,6 +82,17 @@ TEST_F(KeyframePolicyTest, AFrameThatSeesNothingIsVeryWeak) {
   EXPECT_EQ(Need(fix, Sensor::kStereo), KeyframeNeed::kVeryWeak);
 }
 
+TEST_F(KeyframePolicyTest, NeverWithoutTheDepthThatTheSensorShouldHave) {
+  PoseFix fix = Fix(0.3);
+  ASSERT_EQ(Need(fix, Sensor::kRgbd), KeyframeNeed::kVeryWeak);
+  auto colour_alone = std::make_shared<FrameFeatures>(*fix.frame.features);
+  colour_alone->has_depth = false;
+  fix.frame.features = colour_alone;
+  EXPECT_EQ(Need(fix, Sensor::kRgbd), KeyframeNeed::kNone);
+  EXPECT_EQ(Need(fix, Sensor::kStereo), KeyframeNeed::kNone);
+  EXPECT_EQ(Need(fix, Sensor::kMono), KeyframeNeed::kVeryWeak);
+}
+
 TEST_F(KeyframePolicyTest, WithDepthWhenFewLandmarksAreNear) {
   PoseFix fix = Fix(1, 0.1, true);
   for (std::size_t f = 90; f < fix.matches.landmarks.size(); ++f) fix.matches.landmarks[f] = -1;

@@ -110,6 +110,73 @@ TEST(Odometry, RgbdFollowsTheTruthInMetres) {
   EXPECT_LT(EndError(room.truth, estimate, false), 0.01 * PathLength(room.truth));
 }
 
+// Frames for which `absent` holds come with their image alone.
+template <typename Absent>
+Recording WithoutDepth(Recording recording, const Absent& absent) {
+  for (InputFrame& frame : recording.frames) {
+    if (absent(frame.index)) frame.right = frame.depth_m = cv::Mat();
+  }
+  return recording;
+}
+
+void ExpectKeyframesHaveDepth(const Odometry& odometry, const Recording& recording) {
+  for (const int id : odometry.KeyframeIds()) {
+    const InputFrame& frame = recording.frames.at(static_cast<std::size_t>(odometry.KeyframeFrameIndex(id)));
+    EXPECT_FALSE(frame.right.empty() && frame.depth_m.empty()) << frame.index;
+  }
+}
+
+TEST(Odometry, EveryThirdFrameWithoutDepthIsTrackedWithColourAlone) {
+  const Recording room = Record(SyntheticScene::kRoom, SyntheticSensor::kRgbd, 60);
+  const Recording holes = WithoutDepth(room, [](std::int64_t i) { return i % 3 == 1; });
+  Odometry odometry(OdometryOptions(), holes.rig);
+  for (const TrackResult& track : TrackAll(holes, odometry))
+    EXPECT_EQ(track.state, TrackingState::kTracking) << track.reason;
+  const Trajectory estimate = odometry.FrameTrajectory();
+  ASSERT_EQ(estimate.size(), room.frames.size());
+  EXPECT_LT(EndError(room.truth, estimate, false), 0.01 * PathLength(room.truth));
+  ExpectKeyframesHaveDepth(odometry, holes);
+}
+
+TEST(Odometry, FramesBeforeTheFirstDepthAreGivenTheirPosesOnceItComes) {
+  const Recording room = Record(SyntheticScene::kRoom, SyntheticSensor::kRgbd, 20);
+  const Recording late = WithoutDepth(room, [](std::int64_t i) { return i < 5; });
+  Odometry odometry(OdometryOptions(), late.rig);
+  const std::vector<TrackResult> results = TrackAll(late, odometry);
+  EXPECT_EQ(results[4].state, TrackingState::kInitializing);
+  EXPECT_THAT(results[4].reason, HasSubstr("waiting for a frame with depth"));
+  EXPECT_EQ(results[5].keyframe, 0);
+  const Trajectory estimate = odometry.FrameTrajectory();
+  ASSERT_EQ(estimate.size(), room.frames.size());
+  for (std::size_t i = 0; i < estimate.size(); ++i) {
+    EXPECT_EQ(estimate[i].stamp_s, room.truth[i].stamp_s);
+    const Pose truth = room.truth[5].pose.Inverse() * room.truth[i].pose;  // the map begins there
+    EXPECT_LT((estimate[i].pose.translation - truth.translation).norm(), 0.01) << i;
+    EXPECT_LT((estimate[i].pose.Inverse() * truth).Angle(), 0.01) << i;
+  }
+}
+
+TEST(Odometry, FramesWithoutTheirRightImageAreTrackedWithTheLeftAlone) {
+  const Recording holes = WithoutDepth(Stereo(), [](std::int64_t i) { return i == 0 || i % 2 == 1; });
+  Odometry odometry(OdometryOptions(), holes.rig);
+  TrackAll(holes, odometry);
+  const Trajectory estimate = odometry.FrameTrajectory();
+  ASSERT_EQ(estimate.size(), holes.frames.size());
+  EXPECT_LT(EndError(holes.truth, estimate, false), 0.015 * PathLength(holes.truth));
+  ExpectKeyframesHaveDepth(odometry, holes);
+  EXPECT_GT(odometry.StereoMatches(), 100) << "of the pairs";
+}
+
+TEST(Odometry, NoDepthAtAllStartsNoMap) {
+  const Recording none = WithoutDepth(Stereo(), [](std::int64_t) { return true; });
+  Odometry odometry(OdometryOptions(), none.rig);
+  for (const TrackResult& track : TrackAll(none, odometry)) {
+    EXPECT_EQ(track.state, TrackingState::kInitializing);
+    EXPECT_THAT(track.reason, HasSubstr("waiting for a frame with depth"));
+  }
+  EXPECT_TRUE(odometry.FrameTrajectory().empty());
+}
+
 TEST(Odometry, FastTurnsGetAKeyframeBeforeMostOfTheViewIsNew) {
   SyntheticOptions options = SmallWorld(SyntheticScene::kRoom, SyntheticSensor::kStereo);
   options.height = 256;

@@ -28,10 +28,12 @@ class TrackedScene : protected PointScene {
     return rig;
   }
 
-  /// What a camera at this place sees. With depth: of all features, to 0.1 %.
+  /// What a camera at this place sees. With depth: of all features, to 0.1 %; else the sensor had measured
+  /// none.
   TrackedFrame Frame(const Pose& T_world_camera, double stamp_s, bool depth = false) const {
     std::vector<int> order;
     const auto features = See(T_world_camera, &order);
+    features->has_depth = true;
     for (std::size_t f = 0; depth && f < order.size(); ++f) {
       const Eigen::Vector3d p = T_world_camera.Inverse() * points_[static_cast<std::size_t>(order[f])];
       features->inverse_depth[f] = static_cast<float>(1 / p.z());
@@ -53,6 +55,7 @@ class TrackedScene : protected PointScene {
   /// A covered lens.
   TrackedFrame Nothing(double stamp_s) const {
     auto features = std::make_shared<FrameFeatures>();
+    features->has_depth = true;
     features->BuildGrid(camera_.width, camera_.height);
     return {0, stamp_s, features};
   }

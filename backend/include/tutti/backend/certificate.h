@@ -12,6 +12,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "tutti/backend/pose_graph.h"
 
@@ -40,10 +41,13 @@ struct Certificate {
 };
 
 /// Certifies the graph's poses: polishes a copy of them for the chordal objective (solutions for chi2 and
-/// chordal differ a little), then bounds the objective from below. All edges count with weight 1. SE(2) and
-/// SE(3); not available for Sim(3), or where more than one node of a connected part is fixed. Throws
-/// InputError if the options are not usable. Deterministic.
-Certificate CertifyOptimum(const PoseGraph& graph, const CertificateOptions& options = {});
+/// chordal differ a little), then bounds the objective from below. `chordal_optimum`: what the polishing
+/// would find, parallel to the nodes, if it is known (PoseGraphReport::chordal_optimum); empty: it is looked
+/// for. All edges count with weight 1. SE(2) and SE(3); not available for Sim(3), or where more than one node
+/// of a connected part is fixed. Throws InputError if the options are not usable, or if the chordal optimum
+/// is one of another graph. Deterministic.
+Certificate CertifyOptimum(const PoseGraph& graph, const CertificateOptions& options = {},
+                           std::vector<Similarity> chordal_optimum = {});
 
 }  // namespace tutti
 #pragma GCC visibility pop

@@ -84,6 +84,11 @@ AssociatedPoses AssociateByIndex(const Trajectory& reference, const Trajectory& 
 /// `max_gap_s` apart; nothing outside of the trajectory.
 std::optional<Pose> InterpolatePose(const Trajectory& trajectory, double stamp_s, double max_gap_s);
 
+/// The reference's T_world_body of a frame: interpolated between poses that are at most 0.2 s apart; where
+/// there are none (before the first pose, after the last), the nearest pose if it is at most half a frame
+/// away in time. `frame_interval_s`: median time from frame to frame.
+std::optional<Pose> PoseOfFrame(const Trajectory& reference, double stamp_s, double frame_interval_s);
+
 /// S_reference_estimate that minimises sum ||reference - S * estimate||^2 (scale 1 unless `with_scale`).
 /// Throws InputError with fewer than 3 points or if they lie on a line (or in one place), for then the
 /// rotation is not determined.

@@ -8,14 +8,27 @@
 // scale]).
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <string>
 #include <vector>
 
 #include "tutti/backend/pose_graph.h"
+#include "tutti/core/options.h"
 
 #pragma GCC visibility push(default)
 namespace tutti {
+
+/// What becomes of edges whose information matrix is not positive definite. kRefuse: the file is refused.
+/// kProject: the nearest positive semidefinite matrix (negative eigenvalues become 0). kDiagonal: the
+/// diagonal where it is positive, no correlations. What is 0 then counts as a billionth of the largest, since
+/// a matrix must have a Cholesky factor. kSkip: they are left out.
+enum class BadInformation { kRefuse, kProject, kDiagonal, kSkip };
+/// Words of the command line ("refuse", "project", ...).
+EnumWords<BadInformation> WordsOf(BadInformation);
+/// Throws InputError for another word.
+BadInformation ParseBadInformation(const std::string& name);
+const char* ToString(BadInformation how);
 
 struct G2oFile {
   PoseGraph graph;
@@ -23,13 +36,15 @@ struct G2oFile {
       warnings;  ///< unknown tags (once each, with count and first line), vertices without edges, ...
   bool has_all_vertices =
       false;  ///< false: some or all poses are missing and must be initialised from the edges
+  std::size_t bad_information = 0;  ///< edges with such a matrix
+  std::size_t skipped = 0;          ///< those of them that are left out
 };
 
 /// Reads a graph. Vertices may be missing; edges with |i - j| != 1 count as loops. Throws InputError with
 /// file and line for: a missing file, a line with too few or unreadable numbers, NaN, a vertex given twice, a
-/// zero quaternion, an information matrix that is not positive definite, an edge from a node to itself, kinds
-/// that are mixed, no edge at all.
-G2oFile ReadG2o(const std::filesystem::path& file);
+/// zero quaternion, an edge from a node to itself, kinds that are mixed, no edge at all, information matrices
+/// that are not positive definite (kRefuse, with their number) or without which the graph falls apart.
+G2oFile ReadG2o(const std::filesystem::path& file, BadInformation bad = BadInformation::kRefuse);
 
 /// Writes a graph so that reading gives the same numbers (17 digits). Throws InputError when it can't be
 /// written in full.

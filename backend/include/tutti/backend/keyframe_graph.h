@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "tutti/backend/certificate.h"
 #include "tutti/backend/pose_graph.h"
 #include "tutti/backend/pose_graph_optimizer.h"
 
@@ -65,6 +66,16 @@ struct KeyframeCorrection {
   std::vector<EdgeOutcome> loops;  ///< in their order
 };
 
+/// What there is to say of a graph's solution as a whole.
+struct KeyframeGraphProof {
+  std::vector<StartOutcome> starts;  ///< the map as it is comes first
+  GraphStart best = GraphStart::kFile;
+  /// Another start leads lower than the map does, by more than rounding and convergence explain.
+  bool better = false;
+  KeyframeCorrection correction;  ///< from the best start
+  Certificate certificate;        ///< of that solution
+};
+
 /// Nodes are keyframes; edges are consecutive keyframes, pairs that share many landmarks, and loops.
 ///
 /// An odometry edge is measured from the map as it is, until a correction moves its two keyframes: from then
@@ -89,6 +100,11 @@ class KeyframeGraph {
 
   /// Optimises it. The map's poses stay, so that the call can be repeated with other loops.
   KeyframeCorrection Optimize(const std::vector<LoopEdge>& loops) const;
+
+  /// The same from each start (the map, the odometry along a spanning tree, chordal), and a certificate of
+  /// the best solution, as far as there is one for graphs of this kind. Huber's loss and the like count in
+  /// what is the best, the certificate knows least squares alone.
+  KeyframeGraphProof Prove(const std::vector<LoopEdge>& loops) const;
 
   /// Mahalanobis distance [1] of each entering loop from what the graph with the accepted ones knows of its
   /// relative pose; nothing where no edges connect its ends.
@@ -116,6 +132,8 @@ class KeyframeGraph {
     int from = 0, to = 0;  // pieces
     int newest = -1;       // keyframe when it happened
   };
+  KeyframeCorrection CorrectionOf(const PoseGraph& graph, const PoseGraphReport& report,
+                                  const std::vector<LoopEdge>& loops) const;
   bool OfOnePiece(int older, int newer) const;
   std::vector<CovisiblePair> Strongest(const std::vector<CovisiblePair>& covisible) const;
   const Edge* Kept(int older, int newer) const;

@@ -35,9 +35,15 @@ enum class RobustLoss { kNone, kHuber, kCauchy, kDcs, kSwitchable, kGncTls, kGnc
 constexpr RobustLoss kDefaultRobustLoss = RobustLoss::kGnc;
 
 /// kFile: poses as they are in the graph. kOdometry: spanning tree, odometry edges first. kChordal: linear
-/// relaxation (Carlone et al., ICRA 2015). kAuto: whichever of them has the lowest objective (robust loss
-/// included).
+/// relaxation (Carlone et al., ICRA 2015); with least squares (no robust loss) the optimum of the chordal
+/// objective that follows from it, too, and the better result counts. kAuto: whichever of them has the lowest
+/// objective (robust loss included).
 enum class GraphInit { kAuto, kFile, kOdometry, kChordal };
+
+/// The poses that a solution started from. kChordalRelaxation: of the linear relaxation. kChordalOptimum: of
+/// the lowest chordal objective that Newton's method finds from there.
+enum class GraphStart { kFile, kOdometry, kChordalRelaxation, kChordalOptimum };
+const char* ToString(GraphStart start);
 
 /// Who solves the least-squares problems. kCeres: Ceres Solver (Agarwal, Mierle et al.) with CHOLMOD. kBlock:
 /// the same Levenberg-Marquardt with a Cholesky factorisation of the nodes' blocks: the same optimum in a
@@ -136,17 +142,29 @@ struct GraphComponent {
   std::size_t nodes = 0;
 };
 
+/// What a start came to.
+struct StartOutcome {
+  GraphStart start = GraphStart::kFile;
+  double initial_objective = 0;  ///< there (robust loss included)
+  double objective = 0;          ///< of its solution; where that was spared, of the one that it leads to
+  bool spared = false;           ///< not solved: the objective falls all along the straight way to a solution
+};
+
 struct PoseGraphReport {
   bool success = false;  ///< the poses are usable (converged, or stopped at a limit with a lower cost)
   std::string reason;    ///< why not; empty on success
-  GraphInit init = GraphInit::kFile;                 ///< the initialisation that was taken
+  GraphStart start = GraphStart::kFile;  ///< the one whose solution was taken
+  std::vector<StartOutcome> starts;      ///< all that were tried, in that order
+  /// Where the chordal objective has its minimum near the result, parallel to the nodes; empty if another
+  /// start was taken than that one.
+  std::vector<Similarity> chordal_optimum;
   PoseGraphSolver solver = PoseGraphSolver::kCeres;  ///< who solved it
   std::string solver_note;       ///< why another one than was asked for; empty if it was that one
   GraphCosts initial_costs;      ///< at the initialisation that was taken
   GraphCosts costs;              ///< of the result
   double initial_objective = 0;  ///< what was minimised (robust loss included), before
   double objective = 0;          ///< and after
-  int iterations = 0;
+  int iterations = 0;            ///< of all starts, those on the chordal objective included
   int gnc_rounds = 0;
   std::string termination;  ///< "converged", "iteration limit", "time limit", "nothing to do", "failed"
   double init_time_s = 0;

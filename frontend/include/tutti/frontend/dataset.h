@@ -18,7 +18,8 @@ namespace tutti {
 /// A frame, or why there is none.
 struct ReadResult {
   std::optional<InputFrame> frame;
-  std::string error;  ///< names the file and what is wrong with it; empty if there is a frame
+  std::string error;        ///< names the file and what is wrong with it; empty if there is a frame
+  std::string depth_error;  ///< the same of a depth or right image that the frame comes without
 };
 
 /// The layout of a data set on disk.
@@ -36,7 +37,9 @@ struct DatasetOptions {
                Above(0));
   TUTTI_OPTION(double, max_depth_m, 0, "RGB-D: farther depth is not used; 0: no limit", Basic(), Unit("m"),
                From(0));
-  TUTTI_OPTION(double, max_association_s, 0.02, "TUM: greatest difference of the stamps of colour and depth",
+  TUTTI_OPTION(double, max_association_s, 0.02,
+               "TUM, ROS bag: greatest difference of the stamps of colour and depth; a colour image without "
+               "depth is tracked with colour alone",
                Unit("s"), From(0));
   TUTTI_OPTION(double, rate_hz, 0, "frame rate where the data has no time stamps; 0: 10 Hz or the video's",
                Basic(), Unit("1/s"), From(0));
@@ -82,7 +85,8 @@ enum class Supply {
   kOnce,     ///< more may come, and each can be read once, in order (a camera)
 };
 
-/// A sequence of frames with random access. Read() is safe to call from several threads at once.
+/// A sequence of frames with random access. Read() is safe to call from several threads at once. Each (left,
+/// or colour) image is a frame, also where it can't be read, and where its depth or right image is absent.
 class Dataset {
  public:
   virtual ~Dataset() = default;
@@ -94,8 +98,12 @@ class Dataset {
   virtual std::size_t Size() const = 0;
   /// Time stamp of frame i [s]; strictly growing.
   virtual double Stamp(std::size_t i) const = 0;
+  /// InputFrame::index of frame i: its place, counted from 0, among all images of the data set. That is i
+  /// itself unless DatasetOptions::start or stride leave some out. An image whose line is refused (it repeats
+  /// a time stamp) does not count.
+  virtual std::int64_t Number(std::size_t i) const { return static_cast<std::int64_t>(i); }
   /// Reads and rectifies frame i. Unreadable, truncated, or of another size than the first: error, no
-  /// exception.
+  /// exception. If that is so of the depth or right image alone, the frame comes without it.
   virtual ReadResult Read(std::size_t i) const = 0;
   /// The rig after rectification.
   virtual const CameraRig& Rig() const = 0;
@@ -110,8 +118,7 @@ class Dataset {
   virtual const std::vector<std::string>& Warnings() const = 0;
 };
 
-/// The place of the frame with this stamp [s], for Read(); nothing if there is none within 1e-6 s. A frame's
-/// number (InputFrame::index) is not its place where frames were left out.
+/// The place of the frame with this stamp [s], for Read(); nothing if there is none within 1e-6 s.
 std::optional<std::size_t> FindStamp(const Dataset& dataset, double stamp_s);
 
 /// What a folder (or file) looks like. Throws InputError for a missing path, an empty folder, or one that

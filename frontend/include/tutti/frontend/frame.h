@@ -33,11 +33,12 @@ struct CameraRig {
 
 /// One rectified frame.
 struct InputFrame {
-  std::int64_t index = 0;  ///< 0-based index of the input frame in its data set
+  std::int64_t index = 0;  ///< 0-based index of the (left, colour) image in its data set (Dataset::Number)
   double stamp_s = 0;      ///< time stamp [s]
   cv::Mat image;           ///< CV_8UC1, left (or only) camera
-  cv::Mat right;           ///< stereo: CV_8UC1, same size as image; else empty
-  cv::Mat depth_m;         ///< RGB-D: CV_32FC1 [m], registered to image, 0 = no measurement; else empty
+  cv::Mat right;           ///< stereo: CV_8UC1, same size as image; else, or where it is absent, empty
+  cv::Mat depth_m;  ///< RGB-D: CV_32FC1 [m], registered to image, 0 = no measurement; else, or where it
+                    ///< is absent, empty
   std::shared_ptr<const FrameFeatures>
       features;  ///< optional: Odometry::Extract's result, made on another thread
 };

@@ -72,6 +72,11 @@ struct SlamOptions {
                "after loops: fusion of the landmarks of both ends, and bundle adjustment of the whole map "
                "beside the tracking",
                Basic());
+  TUTTI_OPTION(bool, certify, false,
+               "when loops move the map: solve the pose graph from each start (the map, the odometry, "
+               "chordal), take another one than the map if it leads lower, and prove, if that is possible, "
+               "that nothing better exists (`tutti optimize --certify`); summary.json has the last of them",
+               Section("graph"));
   TUTTI_OPTION(bool, odometry_pass, true,
                "after loops moved the map: track the rest again without them for trajectory_odometry.txt, "
                "outside of the timings; false: it ends at the first correction",

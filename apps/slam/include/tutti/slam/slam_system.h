@@ -10,9 +10,11 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "tutti/backend/keyframe_graph.h"
 #include "tutti/backend/pose_graph.h"
 #include "tutti/core/span_recorder.h"
 #include "tutti/frontend/odometry.h"
@@ -73,6 +75,9 @@ class SlamSystem {
   int GlobalAdjustments() const;
   /// Keyframes, odometry edges and accepted loops at the present poses.
   PoseGraph Graph() const;
+  /// With graph.certify, of the last solution of the pose graph that moved the map: where each start leads,
+  /// and whether the best of them is the global optimum.
+  const std::optional<KeyframeGraphProof>& GraphProof() const;
   /// Milliseconds spent, summed, by stage; the detector's run beside the odometry's.
   std::map<std::string, double> StageMilliseconds() const;
 

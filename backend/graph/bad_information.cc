@@ -1,0 +1,47 @@
+#include "backend/graph/bad_information.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+
+namespace tutti::internal {
+
+InformationFault FaultOf(const Matrix7d& information, GraphKind kind) {
+  const std::vector<int> used = TangentCoordinates(kind);
+  const Eigen::MatrixXd m = information(used, used);
+  constexpr double kLargest = 1e100;  // beyond it costs overflow
+  if (!m.allFinite()) return InformationFault::kNotFinite;
+  if (m.cwiseAbs().maxCoeff() > kLargest) return InformationFault::kTooLarge;
+  if ((m - m.transpose()).cwiseAbs().maxCoeff() > 1e-9 * m.cwiseAbs().maxCoeff())
+    return InformationFault::kNotSymmetric;
+  const Eigen::LLT<Eigen::MatrixXd> llt(m);
+  if (llt.info() != Eigen::Success) return InformationFault::kNotPositiveDefinite;
+  const Eigen::MatrixXd l = llt.matrixL();
+  // A factor whose diagonal collapses against the matrix' own is singular in all but rounding.
+  for (Eigen::Index i = 0; i < m.rows(); ++i) {
+    if (!(l(i, i) * l(i, i) > 1e-13 * m(i, i))) return InformationFault::kNotPositiveDefinite;
+  }
+  return InformationFault::kNone;
+}
+
+Matrix7d Repaired(const Matrix7d& information, GraphKind kind, BadInformation how) {
+  const std::vector<int> used = TangentCoordinates(kind);
+  const Eigen::MatrixXd m = information(used, used);
+  Matrix7d out = Matrix7d::Zero();
+  if (how == BadInformation::kProject) {
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(m);
+    const Eigen::VectorXd& values = eigen.eigenvalues();  // ascending
+    const double largest = values(values.size() - 1);
+    if (largest <= 0) return out;
+    const Eigen::MatrixXd raised = eigen.eigenvectors() *
+                                   values.cwiseMax(kLeastEigenvalue * largest).asDiagonal() *
+                                   eigen.eigenvectors().transpose();
+    out(used, used) = 0.5 * (raised + raised.transpose());
+  } else if (how == BadInformation::kDiagonal) {
+    const Eigen::VectorXd values = m.diagonal();
+    if (values.maxCoeff() <= 0) return out;
+    out(used, used) = values.cwiseMax(kLeastEigenvalue * values.maxCoeff()).asDiagonal();
+  }
+  return out;
+}
+
+}  // namespace tutti::internal

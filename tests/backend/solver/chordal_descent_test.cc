@@ -1,0 +1,89 @@
+#include "backend/solver/chordal_descent.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/backend/graph/synthetic_graph.h"
+#include "tutti/backend/pose_graph_optimizer.h"
+
+namespace tutti {
+namespace {
+
+constexpr GraphKind kKinds[] = {GraphKind::kSE2, GraphKind::kSE3};
+
+std::vector<Similarity> PosesOf(const PoseGraph& graph) {
+  std::vector<Similarity> poses;
+  for (const PoseGraphNode& node : graph.nodes()) poses.push_back(node.pose);
+  return poses;
+}
+
+TEST(ChordalDescent, HasTheCostOfTheEvaluation) {
+  for (GraphKind kind : kKinds) {
+    const PoseGraph graph = testing::MakeSyntheticGraph(testing::NoisyOptions(kind, 0.1, 0.1)).graph;
+    const double expected = EvaluateCosts(graph).chordal;
+    EXPECT_NEAR(internal::ChordalCost(graph, internal::AnalyseGraph(graph), PosesOf(graph)), expected,
+                1e-12 * expected);
+  }
+}
+
+TEST(ChordalDescent, ReturnsToTheTruthWithoutNoise) {
+  for (GraphKind kind : kKinds) {
+    testing::SyntheticGraphOptions options;
+    options.kind = kind;
+    const testing::SyntheticGraph exact = testing::MakeSyntheticGraph(options);
+    std::mt19937 random(3);
+    std::vector<Similarity> poses = exact.truth;
+    for (std::size_t k = 1; k < poses.size(); ++k)
+      poses[k] = poses[k] * testing::RandomPose(kind, random, 0.3, 0.3);
+    const internal::SolveSummary summary =
+        MinimiseChordal(exact.graph, internal::AnalyseGraph(exact.graph), 200, 0, poses);
+    EXPECT_TRUE(summary.converged) << summary.message;
+    for (std::size_t k = 0; k < poses.size(); ++k)
+      EXPECT_LT((poses[k].translation - exact.truth[k].translation).norm(), 1e-6) << k;
+  }
+}
+
+// Steps to both sides of the minimum cost the same to first order, and more.
+TEST(ChordalDescent, EndsWhereNoPoseCanMoveAndLowerTheCost) {
+  for (GraphKind kind : kKinds) {
+    const PoseGraph graph = testing::MakeSyntheticGraph(testing::NoisyOptions(kind, 0.05, 0.03)).graph;
+    const internal::GraphStructure structure = internal::AnalyseGraph(graph);
+    std::vector<Similarity> poses = PosesOf(graph);
+    const internal::SolveSummary summary = MinimiseChordal(graph, structure, 200, 0, poses);
+    EXPECT_TRUE(summary.converged) << summary.message;
+    EXPECT_LE(summary.iterations, 20);  // Newton's method, not a creep
+    const double least = ChordalCost(graph, structure, poses);
+    EXPECT_GT(least, 1);
+    for (std::size_t k = 1; k < poses.size(); k += 17) {
+      for (int axis = 0; axis < 3; ++axis) {
+        const bool planar = kind == GraphKind::kSE2;
+        const Eigen::Vector3d step = 1e-4 * Eigen::Vector3d::Unit(planar ? axis % 2 : axis);
+        const Eigen::Vector3d turn = 1e-4 * Eigen::Vector3d::Unit(planar ? 2 : axis);
+        std::vector<Similarity> moved = poses;
+        double change[2];
+        for (int side : {0, 1}) {
+          const double sign = side == 0 ? 1 : -1;
+          moved[k].translation = poses[k].translation + sign * step;
+          moved[k].rotation = poses[k].rotation * ExpSO3(sign * turn);
+          change[side] = ChordalCost(graph, structure, moved) - least;
+        }
+        EXPECT_GT(change[0], 0);
+        EXPECT_GT(change[1], 0);
+        EXPECT_NEAR(change[0] / change[1], 1, 1e-2);
+      }
+    }
+  }
+}
+
+TEST(ChordalDescent, FixedNodesAndAnchorsStay) {
+  PoseGraph graph = testing::MakeSyntheticGraph(testing::NoisyOptions(GraphKind::kSE3, 0.1, 0.1)).graph;
+  graph.SetFixed(17, true);
+  graph.SetFixed(80, true);
+  std::vector<Similarity> poses = PosesOf(graph);
+  EXPECT_TRUE(MinimiseChordal(graph, internal::AnalyseGraph(graph), 200, 0, poses).usable);
+  for (const std::size_t k : {std::size_t{17}, std::size_t{80}})
+    EXPECT_EQ(poses[k].translation, graph.nodes()[k].pose.translation);
+  EXPECT_NE(poses[40].translation, graph.nodes()[40].pose.translation);
+}
+
+}  // namespace
+}  // namespace tutti

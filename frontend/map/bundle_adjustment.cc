@@ -27,7 +27,7 @@ Window MakeWindow(const Map& map, const std::vector<int>& moving, const std::vec
     window.points.push_back(l.position);
     for (const Observation& o : l.observations) {
       const auto camera = cameras.find(o.keyframe);
-      if (camera == cameras.end()) continue;
+      if (camera == cameras.end() || map.Doubtful(o, id)) continue;
       window.observations.push_back(
           {camera->second, Measured(map, *map.keyframe(o.keyframe).features, o, id, options.pixel_sigma)});
     }
@@ -98,6 +98,7 @@ BundleAdjustmentReport AdjustWindow(const PinholeCamera& camera, const std::vect
   report.usable = solved.usable;
   if (!report.usable) return report;
   report.lens = window.lens;
+  if (options.observe_lens) report.lens_seen = ObserveLens(camera, window);
   for (std::size_t i = 0; i < moving.size(); ++i)
     map->keyframe(moving[i]).T_world_camera = window.T_camera_world[i].Inverse();
   for (std::size_t i = 0; i < landmarks.size(); ++i) map->landmark(landmarks[i]).position = window.points[i];

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <optional>
 #include <vector>
 
 #include "frontend/geometry/lens_error.h"
@@ -17,7 +18,8 @@ struct BundleAdjustmentOptions {
   double pixel_sigma = 1.0;  ///< standard deviation of a keypoint at pyramid level 0 [px]
   bool metric = false;       ///< depth measurements fix the scale: one fixed keyframe is enough, else two
   const std::atomic<bool>* stop = nullptr;  ///< ends the adjustment early when it becomes true
-  LensError lens;  ///< what is known of the camera's error; as it is: the camera has none
+  LensError lens;             ///< what is known of the camera's error; as it is: the camera has none
+  bool observe_lens = false;  ///< say in the report what the window alone says of it
 };
 
 struct BundleAdjustmentReport {
@@ -25,7 +27,8 @@ struct BundleAdjustmentReport {
   int keyframes = 0, fixed = 0, landmarks = 0, observations = 0;
   int removed = 0;  ///< observations that do not fit (95 % chi2) and were removed
   double initial_cost = 0, final_cost = 0;
-  LensError lens;  ///< what is known after the window; the window's own part counts in full
+  LensError lens;                      ///< what is known after the window; its own part counts in full
+  std::optional<LensError> lens_seen;  ///< with observe_lens: what the window alone says (ObserveLens)
 };
 
 /// Adjusts the window around `keyframe`: Huber loss, analytic Jacobians, dense Schur complement, one thread

@@ -17,6 +17,9 @@ constexpr int kImages = 20;  // newest keyframes that keep their images
 constexpr float kFusionError =
     2.4477F;  // of a landmark that is found again: 95 % [standard deviations of a corner]
 constexpr double kMaxCosine = 0.9996;  // 1.6 deg of parallax at least, for a depth from two views
+// Mono: so many standard deviations of parallax. Most landmarks are made as soon as their parallax is large
+// enough, which is when noise makes it too large: too near, so that the scale shrinks.
+constexpr double kMinParallaxSigmas = 8;
 }  // namespace
 
 int LocalMapper::AddDepthLandmarks(int id, int at_least, Map* map) {
@@ -64,6 +67,13 @@ void LocalMapper::CullRecent(int id, Map* map) {
   recent_ = std::move(keep);
 }
 
+// For a depth from two views; `cosine` of the angle between them, scales of the two corners' levels.
+bool LocalMapper::EnoughParallax(double cosine, double scale_a, double scale_b) const {
+  if (rig_.sensor != Sensor::kMono) return cosine <= kMaxCosine;
+  const double sigma_px = options_.pixel_sigma * std::hypot(scale_a, scale_b);
+  return rig_.camera.fx * std::acos(std::min(1.0, cosine)) >= kMinParallaxSigmas * sigma_px;
+}
+
 int LocalMapper::Triangulate(int id, Map* map) {
   const int neighbours = rig_.sensor == Sensor::kMono ? options_.triangulation_neighbours
                                                       : std::min(4, options_.triangulation_neighbours);
@@ -84,7 +94,9 @@ int LocalMapper::Triangulate(int id, Map* map) {
       const Eigen::Vector3d ra = rig_.camera.Unproject({ka.pt.x, ka.pt.y}),
                             rb = rig_.camera.Unproject({kb.pt.x, kb.pt.y});
       const double cosine = ra.normalized().dot((T_b_a.rotation.conjugate() * rb).normalized());
-      if (cosine > kMaxCosine || cosine < 0) continue;
+      if (cosine < 0 || !EnoughParallax(cosine, map->scales()[static_cast<std::size_t>(ka.octave)],
+                                        map->scales()[static_cast<std::size_t>(kb.octave)]))
+        continue;
       const Eigen::Vector3d in_a = tutti::Triangulate(ra, rb, T_b_a);
       if (!in_a.allFinite()) continue;
       const Eigen::Vector3d point = T_world_a * in_a;
@@ -166,9 +178,10 @@ void LocalMapper::Process(int id, Map* map, StageTimes* stages) {
   ba.iterations = options_.ba_iterations;
   ba.pixel_sigma = options_.pixel_sigma;
   ba.metric = rig_.sensor != Sensor::kMono;
-  ba.lens = lens_.Remaining();
+  ba.lens.value = lens_.Remaining().value;  // known and fixed: a lens that each window fits for itself bends
+  ba.observe_lens = lens_.Enabled();        // the map
   const BundleAdjustmentReport report = AdjustLocally(rig_.camera, id, ba, map);
-  if (report.usable) lens_.Learn(report.lens, report.keyframes, map);
+  if (report.lens_seen) lens_.Learn(*report.lens_seen, report.keyframes + report.fixed, map);
 }
 
 }  // namespace tutti

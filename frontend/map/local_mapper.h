@@ -34,6 +34,7 @@ class LocalMapper {
 
  private:
   void CullRecent(int keyframe, Map* map);
+  bool EnoughParallax(double cosine, double scale_a, double scale_b) const;
   int Triangulate(int keyframe, Map* map);
   void Fuse(int keyframe, Map* map);
   void Align(int keyframe, Map* map);

@@ -104,6 +104,15 @@ double Map::RelativeSigma(const FrameFeatures& features, int keyframe, int featu
   return source || aligned ? aligned_sigma_ * corner : corner;
 }
 
+bool Map::Doubtful(const Observation& view, int id) const {
+  const Landmark& l = landmark(id);
+  if (!l.patch || (l.patch_source.keyframe == view.keyframe && l.patch_source.feature == view.feature))
+    return false;
+  const std::vector<int>& aligned = keyframe(view.keyframe).features->aligned;
+  const std::size_t f = static_cast<std::size_t>(view.feature);
+  return f >= aligned.size() || aligned[f] < 0;
+}
+
 void Map::UpdateGeometry(int id) {
   const auto keyframe = [this](int k) -> const Keyframe& { return std::as_const(*this).keyframe(k); };
   Landmark& l = landmark(id);

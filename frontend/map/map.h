@@ -78,6 +78,9 @@ class Map {
   /// Standard deviation of a feature as a view of a landmark, where a corner's at level 0 is 1; `keyframe`:
   /// -1 for a frame that is none.
   double RelativeSigma(const FrameFeatures& features, int keyframe, int feature, int landmark) const;
+  /// Whether a view of a landmark that has a patch never fitted a patch. Its corner is then often one of
+  /// something else: an edge that hides what is behind it, the next of equal windows.
+  bool Doubtful(const Observation& view, int landmark) const;
   /// Recomputes descriptor, viewing direction and distances of a landmark.
   void UpdateLandmark(int landmark);
   /// Viewing direction and distances alone, after keyframes or the landmark have moved.

@@ -21,16 +21,15 @@ std::shared_ptr<const FrameFeatures> SelfCalibration::Correct(
   return Moved(*features);
 }
 
-void SelfCalibration::Learn(const LensError& found, int keyframes, Map* map) {
+void SelfCalibration::Learn(const LensError& seen, int keyframes, Map* map) {
   if (!enabled_) return;
-  const Eigen::Matrix2d before = remaining_.information, own = found.information - before;
   // A window that knows less than was known at the start tells more of its other errors than of the lens.
-  if (!(own(0, 0) > first_(0, 0))) return;
+  if (!(seen.information(0, 0) > first_(0, 0))) return;
   // Each view is in about as many windows as a window has keyframes; counted once, it tells so much less.
   const double share = 1.0 / std::max(1, keyframes);
-  remaining_.information = before + share * own;
+  remaining_.information += share * seen.information;
   remaining_.value +=
-      share * remaining_.information.ldlt().solve(found.information * (found.value - remaining_.value));
+      share * remaining_.information.ldlt().solve(seen.information * (seen.value - remaining_.value));
   const Eigen::Vector2d lens = remaining_.value;
   if (LargestMove(lens) < kVisible) return;
   remaining_.value.setZero();

@@ -24,11 +24,11 @@ class SelfCalibration {
   bool Enabled() const { return enabled_; }
   /// The features as a lens without error would have seen them, by what is known so far.
   std::shared_ptr<const FrameFeatures> Correct(const std::shared_ptr<const FrameFeatures>& features) const;
-  /// What is not taken out of the features yet: the prior of the next bundle adjustment.
+  /// What is known and not taken out of the features yet.
   const LensError& Remaining() const { return remaining_; }
-  /// Takes over what a bundle adjustment found that moved so many `keyframes`. Where that moves features by a
+  /// Takes over what a window of so many `keyframes` says (ObserveLens). Where that moves features by a
   /// visible amount, corrects all of the map's.
-  void Learn(const LensError& found, int keyframes, Map* map);
+  void Learn(const LensError& seen, int keyframes, Map* map);
   /// What is taken out of the features: (k1, k2) of LensError.
   const Eigen::Vector2d& Applied() const { return applied_; }
 

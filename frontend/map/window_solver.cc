@@ -16,6 +16,7 @@ using Matrix32d = Eigen::Matrix<double, 3, 2>;
 
 constexpr double kBehindResidual = 1e3;  // of a point behind its camera; the Huber loss bounds its cost
 constexpr double kStartRadius = 1e4;     // damping of 1e-4, relative to the diagonal
+constexpr double kFreeGauge = 1e-8;      // damping that settles the scale, which one camera does not measure
 constexpr double kCostTolerance = 1e-5;  // at 1e-4 the result depends on where the axes of the world point
 
 // What the unknowns are at one moment.
@@ -73,6 +74,16 @@ class WindowSolver {
     window_.lens.value = now_.lens;
     if (lens_information_.allFinite()) window_.lens.information = lens_information_;
     return report;
+  }
+
+  // The lens after one Gauss-Newton step from where the window is.
+  std::optional<LensError> Observe() {
+    Linearise();
+    Estimate trial;
+    double predicted = 0;
+    if (!Step(kFreeGauge, &trial, &predicted) || !lens_information_.allFinite() || !trial.lens.allFinite())
+      return std::nullopt;
+    return LensError{trial.lens, lens_information_};
   }
 
  private:
@@ -270,6 +281,14 @@ class WindowSolver {
 WindowReport SolveWindow(const PinholeCamera& camera, int max_iterations, Window* window,
                          const std::atomic<bool>* stop) {
   return WindowSolver(camera, window).Solve(max_iterations, stop);
+}
+
+std::optional<LensError> ObserveLens(const PinholeCamera& camera, const Window& window) {
+  Window free = window;
+  free.moving = static_cast<int>(free.T_camera_world.size()) - 1;
+  free.lens.information.setZero();
+  if (free.moving < 1) return std::nullopt;
+  return WindowSolver(camera, &free).Observe();
 }
 
 }  // namespace tutti

@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 #include <atomic>
+#include <optional>
 #include <vector>
 
 #include "frontend/geometry/lens_error.h"
@@ -43,5 +44,11 @@ struct WindowReport {
 /// in which `stop` becomes true; null: never.
 WindowReport SolveWindow(const PinholeCamera& camera, int max_iterations, Window* window,
                          const std::atomic<bool>* stop = nullptr);
+
+/// What a solved window alone says of the lens, without `window.lens.information`. Every pose is free but the
+/// gauge: fixed poses were found with the lens as it was believed to be then, and taken as certain they would
+/// say that it was right. So straight motion at an even pace says little, because a drift of the scale looks
+/// the same. None if the window has fewer than two cameras or leaves the lens open.
+std::optional<LensError> ObserveLens(const PinholeCamera& camera, const Window& window);
 
 }  // namespace tutti

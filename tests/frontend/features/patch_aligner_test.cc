@@ -97,6 +97,14 @@ TEST(PatchAligner, MovesTheKeypointsOfLandmarksAndTrustsThemMore) {
   EXPECT_EQ(map.RelativeSigma(frame, -1, 0, landmark), 1.0);
   EXPECT_EQ(map.RelativeSigma(*moved, -1, 0, landmark), 0.5);
   EXPECT_EQ(map.RelativeSigma(*keyframe.features, 0, 0, landmark), 0.5);  // its patch is from here
+  // A view that the patch is from or fitted counts, one that never fitted does not.
+  keyframe.features = moved;
+  map.AddKeyframe(keyframe);
+  keyframe.features = std::make_shared<const FrameFeatures>(frame);
+  map.AddKeyframe(keyframe);
+  EXPECT_FALSE(map.Doubtful({0, 0}, landmark));
+  EXPECT_FALSE(map.Doubtful({1, 0}, landmark));
+  EXPECT_TRUE(map.Doubtful({2, 0}, landmark));
   // What is aligned already is left alone.
   EXPECT_EQ(AlignFeatures(map, kCamera, T_world_second.Inverse(), {landmark}, *moved), nullptr);
 }

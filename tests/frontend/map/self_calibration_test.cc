@@ -22,11 +22,11 @@ std::shared_ptr<const FrameFeatures> OneFeature(float x, float y) {
 }
 
 // What a window says that knows k1 to `sigma`.
-LensError Found(const SelfCalibration& calibration, double k1, double sigma) {
-  LensError found = calibration.Remaining();
-  found.value = {k1 - calibration.Applied().x(), -calibration.Applied().y()};
-  found.information.diagonal().array() += 1 / (sigma * sigma);
-  return found;
+LensError Seen(const SelfCalibration& calibration, double k1, double sigma) {
+  LensError seen;
+  seen.value = {k1 - calibration.Applied().x(), -calibration.Applied().y()};
+  seen.information = Eigen::Matrix2d::Identity() / (sigma * sigma);
+  return seen;
 }
 
 class SelfCalibrationTest : public ::testing::Test {
@@ -41,13 +41,13 @@ class SelfCalibrationTest : public ::testing::Test {
 
 TEST_F(SelfCalibrationTest, ComesToWhatTheWindowsSay) {
   SelfCalibration calibration(OdometryOptions(), Rig(Sensor::kMono));
-  for (int i = 0; i < 200; ++i) calibration.Learn(Found(calibration, -0.02, 0.001), 10, &map_);
+  for (int i = 0; i < 200; ++i) calibration.Learn(Seen(calibration, -0.02, 0.001), 10, &map_);
   EXPECT_NEAR(calibration.Applied().x(), -0.02, 0.001);
 }
 
 TEST_F(SelfCalibrationTest, CorrectsNewFeaturesAndThoseOfTheMapAlike) {
   SelfCalibration calibration(OdometryOptions(), Rig(Sensor::kMono));
-  for (int i = 0; i < 50; ++i) calibration.Learn(Found(calibration, -0.02, 0.001), 10, &map_);
+  for (int i = 0; i < 50; ++i) calibration.Learn(Seen(calibration, -0.02, 0.001), 10, &map_);
   const cv::Point2f fresh = calibration.Correct(OneFeature(600, 400))->keypoints[0].pt;
   const cv::Point2f old = map_.keyframe(0).features->keypoints[0].pt;
   EXPECT_LT(fresh.x, 598);  // towards the principal point
@@ -57,7 +57,7 @@ TEST_F(SelfCalibrationTest, CorrectsNewFeaturesAndThoseOfTheMapAlike) {
 
 TEST_F(SelfCalibrationTest, WindowsThatHardlyKnowAreNotBelieved) {
   SelfCalibration calibration(OdometryOptions(), Rig(Sensor::kMono));
-  for (int i = 0; i < 500; ++i) calibration.Learn(Found(calibration, -0.3, 0.08), 10, &map_);
+  for (int i = 0; i < 500; ++i) calibration.Learn(Seen(calibration, -0.3, 0.08), 10, &map_);
   EXPECT_TRUE(calibration.Applied().isZero());
 }
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
 #include <random>
 
 #include "tests/support/plain_camera.h"
@@ -9,9 +10,9 @@
 namespace tutti {
 namespace {
 
-// A camera that drives forward between points; the last three of five poses are unknown. Its pixels have the
-// error of a lens.
-Window DriveForward(const Eigen::Vector2d& lens) {
+// A camera that drives forward between points and turns by `turn_rad` a metre; the last three of five poses
+// are unknown. Its pixels have the error of a lens.
+Window DriveForward(const Eigen::Vector2d& lens, double turn_rad = 0.03) {
   const PinholeCamera camera = testing::PlainCamera(450);
   std::mt19937 generator(5);
   const auto uniform = [&](double low, double high) {
@@ -20,7 +21,7 @@ Window DriveForward(const Eigen::Vector2d& lens) {
   Window window;
   window.moving = 3;
   for (const double z : {2.0, 3.0, 4.0, 0.0, 1.0})
-    window.T_camera_world.push_back(Pose(ExpSO3({0, 0.03 * z, 0}), {0, 0, z}).Inverse());
+    window.T_camera_world.push_back(Pose(ExpSO3({0, turn_rad * z, 0}), {0, 0, z}).Inverse());
   window.first_observation.push_back(0);
   for (int i = 0; i < 200; ++i) {
     const Eigen::Vector3d point(uniform(-6, 6), uniform(-4, 4), uniform(8, 20));
@@ -79,6 +80,35 @@ TEST(WindowSolver, LeavesALensAloneThatIsKnownToHaveNoError) {
   Window window = DriveForward({0.02, -0.01});
   EXPECT_TRUE(SolveWindow(testing::PlainCamera(450), 20, &window).usable);
   EXPECT_LT(window.lens.value.norm(), 1e-5);
+}
+
+TEST(ObserveLens, SeesTheErrorThatTheFixedPosesHide) {
+  const Eigen::Vector2d lens(0.004, -0.002);
+  Window window = DriveForward(lens);
+  ASSERT_TRUE(SolveWindow(testing::PlainCamera(450), 20, &window).usable);  // with a lens without error
+  const std::optional<LensError> seen = ObserveLens(testing::PlainCamera(450), window);
+  ASSERT_TRUE(seen.has_value());
+  EXPECT_NEAR(seen->value.x(), lens.x(), 5e-4);
+  EXPECT_NEAR(seen->value.y(), lens.y(), 1e-3);
+}
+
+// With every pose fixed, a straight drive would tell the lens as well as a turning one.
+TEST(ObserveLens, KnowsThatAStraightDriveSaysLittle) {
+  const auto known = [](double turn_rad) {
+    const std::optional<LensError> seen =
+        ObserveLens(testing::PlainCamera(450), DriveForward({0, 0}, turn_rad));
+    return seen ? 1 / seen->information.inverse()(0, 0) : 0;
+  };
+  EXPECT_GT(known(0.03), 0);
+  EXPECT_LT(known(0), 0.5 * known(0.03));
+}
+
+TEST(ObserveLens, NeedsTwoCameras) {
+  Window window = DriveForward({0, 0});
+  window.T_camera_world.resize(1);
+  window.observations.clear();
+  window.first_observation.assign(window.points.size() + 1, 0);
+  EXPECT_FALSE(ObserveLens(testing::PlainCamera(450), window).has_value());
 }
 
 // A long drive: far cameras have no point in common, so the solver is the sparse one.

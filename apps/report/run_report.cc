@@ -99,6 +99,7 @@ Json FiguresJson(const RunResult& r) {
                {"tracked", r.frames_tracked},
                {"lost", r.frames_lost},
                {"bad", r.bad.size()},
+               {"without_depth", r.frames_without_depth},
                {"keyframes", r.keyframes},
                {"proposed", r.loops.size()},
                {"accepted", r.LoopsAccepted()},
@@ -108,6 +109,13 @@ Json FiguresJson(const RunResult& r) {
                {"frame_ms", Rounded(Quantile(r.frame_ms, 0.5), 2)},
                {"frame_p99_ms", Rounded(Quantile(r.frame_ms, 0.99), 2)},
                {"memory_mb", Rounded(r.peak_memory_mb, 1)}};
+  if (r.lens) {
+    json["lens"] = {{"k1", r.lens->k1},
+                    {"k2", r.lens->k2},
+                    {"k1_sigma", r.lens->k1_sigma},
+                    {"k2_sigma", r.lens->k2_sigma},
+                    {"steps", r.lens->steps.size()}};
+  }
   if (r.evaluation) {
     json["true"] = r.evaluation->loops_true;
     json["false"] = r.evaluation->loops_false;

@@ -130,6 +130,23 @@ Json GraphJson(const RunResult& r) {
   return graph;
 }
 
+// What self-calibration says of the lens.
+Json LensJson(const LensFound& lens) {
+  Json json = {{"k1", lens.k1},
+               {"k2", lens.k2},
+               {"k1_sigma", lens.k1_sigma},
+               {"k2_sigma", lens.k2_sigma},
+               {"steps", Json::array()}};
+  for (const LensFound::Step& step : lens.steps) {
+    json["steps"].push_back({{"frame", step.frame_index},
+                             {"k1", step.k1},
+                             {"k2", step.k2},
+                             {"k1_sigma", step.k1_sigma},
+                             {"k2_sigma", step.k2_sigma}});
+  }
+  return json;
+}
+
 std::string Quoted(const std::string& text) {
   std::string out = "\"";
   for (const char c : text) out += c == '"' ? std::string("\"\"") : std::string(1, c);
@@ -197,6 +214,7 @@ std::string SummaryJson(const RunResult& r) {
   if (r.rig.sensor == Sensor::kStereo) {
     json["stereo"] = {{"row_error_px", r.stereo_row_error_px}, {"matches", r.stereo_matches}};
   }
+  if (r.lens) json["lens"] = LensJson(*r.lens);
   if (r.evaluation) {
     json["evaluation"] = {
         {"alignment", r.evaluation->alignment},  {"ground_truth", r.evaluation->file},

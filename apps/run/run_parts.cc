@@ -111,6 +111,7 @@ void CollectMap(const RunState& state, RunResult& result) {
   result.trajectory_odometry = result.trajectory;
   result.stereo_row_error_px = odometry.StereoRowErrorPx();
   result.stereo_matches = odometry.StereoMatches();
+  result.lens = odometry.Lens();
   CollectKeyframes(odometry, result);
 }
 

@@ -13,6 +13,7 @@
 #include "tutti/backend/pose_graph.h"
 #include "tutti/core/trajectory.h"
 #include "tutti/frontend/calibration_check.h"
+#include "tutti/frontend/odometry.h"
 #include "tutti/slam/config.h"
 #include "tutti/slam/loop_record.h"
 
@@ -103,6 +104,7 @@ struct RunResult {
   std::vector<StageTiming> stages;         ///< with RunRequest::timing or trace only
   double peak_memory_mb = 0;
   double stereo_row_error_px = 0, stereo_matches = 0;
+  std::optional<LensFound> lens;  ///< mono, with self-calibration
 
   std::size_t LoopsAccepted() const;
   /// True if the run is void: frames were there, calibration was there, and not one got a pose.

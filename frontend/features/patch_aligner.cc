@@ -165,13 +165,10 @@ std::optional<Eigen::Vector2d> AlignPatch(const Patch& patch, const FrameFeature
 
 namespace {
 
-// How offsets around a landmark in its patch's keyframe map to offsets in a frame, if the surface faces the
-// keyframe.
-std::optional<Eigen::Matrix2d> PatchToFrame(const Map& map, const PinholeCamera& camera,
-                                            const Pose& T_camera_world, const Landmark& l) {
-  const Keyframe& k = map.keyframe(l.patch_source.keyframe);
-  const Eigen::Vector3d p = k.T_world_camera.Inverse() * l.position;
-  const Pose T_camera_patch = T_camera_world * k.T_world_camera;
+// How offsets around a point in its patch's keyframe, where it is at `p`, map to offsets in a frame, if the
+// surface faces the keyframe.
+std::optional<Eigen::Matrix2d> PatchToFrame(const PinholeCamera& camera, const Pose& T_camera_patch,
+                                            const Eigen::Vector3d& p) {
   const Eigen::Vector3d q = T_camera_patch * p;
   Eigen::Vector2d pixel;
   internal::Reprojection<2>::PointJacobian projection;
@@ -186,6 +183,19 @@ std::optional<Eigen::Matrix2d> PatchToFrame(const Map& map, const PinholeCamera&
 
 }  // namespace
 
+std::optional<Eigen::Vector2d> FindPoint(const PinholeCamera& camera, const FrameFeatures& a, int feature_a,
+                                         const FrameFeatures& b, int feature_b, const Pose& T_b_a,
+                                         const Eigen::Vector3d& in_a) {
+  const std::shared_ptr<const Patch> patch = CutPatch(camera, a, feature_a);
+  const std::optional<Eigen::Matrix2d> A = PatchToFrame(camera, T_b_a, in_a);
+  if (!patch || !A) return std::nullopt;
+  const cv::Point2f& at = b.keypoints[static_cast<std::size_t>(feature_b)].pt;
+  const std::optional<Eigen::Vector2d> found =
+      AlignPatch(*patch, b, *A, LensError::Uncorrect(camera, b.lens, {at.x, at.y}));
+  if (!found) return std::nullopt;
+  return LensError::Correct(camera, b.lens, *found);
+}
+
 std::shared_ptr<const FrameFeatures> AlignFeatures(const Map& map, const PinholeCamera& camera,
                                                    const Pose& T_camera_world,
                                                    const std::vector<int>& landmarks,
@@ -196,7 +206,9 @@ std::shared_ptr<const FrameFeatures> AlignFeatures(const Map& map, const Pinhole
     if (landmarks[f] < 0) continue;
     const Landmark& l = map.landmark(landmarks[f]);
     if (!l.patch || features.aligned[f] == landmarks[f]) continue;
-    const std::optional<Eigen::Matrix2d> A = PatchToFrame(map, camera, T_camera_world, l);
+    const Pose& T_world_patch = map.keyframe(l.patch_source.keyframe).T_world_camera;
+    const std::optional<Eigen::Matrix2d> A =
+        PatchToFrame(camera, T_camera_world * T_world_patch, T_world_patch.Inverse() * l.position);
     if (!A) continue;
     const cv::Point2f& at = features.keypoints[f].pt;
     const std::optional<Eigen::Vector2d> found =

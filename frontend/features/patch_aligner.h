@@ -27,6 +27,13 @@ std::shared_ptr<const Patch> CutPatch(const PinholeCamera& camera, const FrameFe
 std::optional<Eigen::Vector2d> AlignPatch(const Patch& patch, const FrameFeatures& frame,
                                           const Eigen::Matrix2d& A_frame_patch, const Eigen::Vector2d& start);
 
+/// Pixel of frame b at which the patch around a feature of frame a is seen, without the lens's error that is
+/// known; near b's feature. `in_a`: about where the point is [a's camera frame]. None if they do not look
+/// alike, or one of the frames has no pyramid any more.
+std::optional<Eigen::Vector2d> FindPoint(const PinholeCamera& camera, const FrameFeatures& a, int feature_a,
+                                         const FrameFeatures& b, int feature_b, const Pose& T_b_a,
+                                         const Eigen::Vector3d& in_a);
+
 /// Finds landmarks precisely in a frame whose pose is about known: for each feature with a landmark (-1:
 /// none) moves the keypoint. `T_camera_world`: of the frame. Returns the moved features, or null where
 /// nothing moved.

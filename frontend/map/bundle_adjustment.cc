@@ -27,7 +27,8 @@ Window MakeWindow(const Map& map, const std::vector<int>& moving, const std::vec
     window.points.push_back(l.position);
     for (const Observation& o : l.observations) {
       const auto camera = cameras.find(o.keyframe);
-      if (camera == cameras.end() || map.Doubtful(o, id)) continue;
+      if (camera == cameras.end()) continue;
+      if (!options.metric && map.Doubtful(o, id)) continue;  // depth tells what one camera can't
       window.observations.push_back(
           {camera->second, Measured(map, *map.keyframe(o.keyframe).features, o, id, options.pixel_sigma)});
     }

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
+#include <utility>
 
 #include "frontend/features/matcher.h"
 #include "frontend/features/patch_aligner.h"
@@ -17,9 +19,10 @@ constexpr int kImages = 20;  // newest keyframes that keep their images
 constexpr float kFusionError =
     2.4477F;  // of a landmark that is found again: 95 % [standard deviations of a corner]
 constexpr double kMaxCosine = 0.9996;  // 1.6 deg of parallax at least, for a depth from two views
-// Mono: so many standard deviations of parallax. Most landmarks are made as soon as their parallax is large
-// enough, which is when noise makes it too large: too near, so that the scale shrinks.
+// Strict: so many standard deviations of parallax. Most landmarks are made as soon as their parallax is large
+// enough, which is when noise makes it too large: too near, so that one camera's scale shrinks.
 constexpr double kMinParallaxSigmas = 8;
+constexpr int kEnough = 3;  // times the fewest inliers: a keyframe with so many landmarks can be strict
 }  // namespace
 
 int LocalMapper::AddDepthLandmarks(int id, int at_least, Map* map) {
@@ -67,57 +70,71 @@ void LocalMapper::CullRecent(int id, Map* map) {
   recent_ = std::move(keep);
 }
 
-// For a depth from two views; `cosine` of the angle between them, scales of the two corners' levels.
-bool LocalMapper::EnoughParallax(double cosine, double scale_a, double scale_b) const {
-  if (rig_.sensor != Sensor::kMono) return cosine <= kMaxCosine;
-  const double sigma_px = options_.pixel_sigma * std::hypot(scale_a, scale_b);
-  return rig_.camera.fx * std::acos(std::min(1.0, cosine)) >= kMinParallaxSigmas * sigma_px;
+// Where two features meet that are of one point, in the world. `strict`: only with their patches aligned, and
+// a parallax far above the noise.
+std::optional<Eigen::Vector3d> LocalMapper::PointOf(const Keyframe& a, int fa, const Keyframe& b, int fb,
+                                                    const Map& map, bool strict) const {
+  const Pose T_b_a = b.T_world_camera.Inverse() * a.T_world_camera;
+  const cv::KeyPoint &ka = a.features->keypoints[static_cast<std::size_t>(fa)],
+                     &kb = b.features->keypoints[static_cast<std::size_t>(fb)];
+  const double scale_a = map.scales()[static_cast<std::size_t>(ka.octave)],
+               scale_b = map.scales()[static_cast<std::size_t>(kb.octave)];
+  const Eigen::Vector3d ra = rig_.camera.Unproject({ka.pt.x, ka.pt.y});
+  Eigen::Vector3d rb = rig_.camera.Unproject({kb.pt.x, kb.pt.y});
+  const auto cosine = [&] { return ra.normalized().dot((T_b_a.rotation.conjugate() * rb).normalized()); };
+  if (!strict && cosine() > kMaxCosine) return std::nullopt;
+  if (strict) {
+    const Eigen::Vector3d about = tutti::Triangulate(ra, rb, T_b_a);
+    if (!about.allFinite()) return std::nullopt;
+    const auto pixel = FindPoint(rig_.camera, *a.features, fa, *b.features, fb, T_b_a, about);
+    if (!pixel) return std::nullopt;
+    rb = rig_.camera.Unproject(*pixel);
+    const double sigma_px = options_.pixel_sigma * std::hypot(scale_a, scale_b);
+    if (rig_.camera.fx * std::acos(std::min(1.0, cosine())) < kMinParallaxSigmas * sigma_px)
+      return std::nullopt;
+  }
+  if (cosine() < 0) return std::nullopt;
+  const Eigen::Vector3d in_a = tutti::Triangulate(ra, rb, T_b_a);
+  if (!in_a.allFinite()) return std::nullopt;
+  const Eigen::Vector3d point = a.T_world_camera * in_a;
+  for (const auto& [frame, feature, scale] : {std::tuple{&a, fa, scale_a}, std::tuple{&b, fb, scale_b}}) {
+    const PointObservation o = Measured(*frame->features, feature, point, options_.pixel_sigma * scale);
+    Eigen::Vector3d r;
+    if (!ReprojectionResidual(rig_.camera, frame->T_world_camera.Inverse(), o, &r, nullptr) ||
+        r.squaredNorm() > ChiSquareBound(o))
+      return std::nullopt;
+  }
+  // The corner's scale in both images must agree with its distances.
+  const double ratio =
+      (point - b.T_world_camera.translation).norm() / (point - a.T_world_camera.translation).norm();
+  const double octaves = scale_a / scale_b;
+  const double factor = 1.5 * options_.scale_factor;
+  if (ratio * factor < octaves || ratio > octaves * factor) return std::nullopt;
+  return point;
 }
 
 int LocalMapper::Triangulate(int id, Map* map) {
-  const int neighbours = rig_.sensor == Sensor::kMono ? options_.triangulation_neighbours
-                                                      : std::min(4, options_.triangulation_neighbours);
+  const bool mono = rig_.sensor == Sensor::kMono;
+  const int neighbours =
+      mono ? options_.triangulation_neighbours : std::min(4, options_.triangulation_neighbours);
+  const std::vector<int>& seen = std::as_const(*map).keyframe(id).landmarks;
+  const auto known = std::count_if(seen.begin(), seen.end(), [](int l) { return l >= 0; });
+  const bool strict = mono && known >= kEnough * options_.min_inliers;
   int made = 0;
   for (int other : map->BestCovisible(id, neighbours, 15)) {
-    const Pose T_world_a = map->keyframe(id).T_world_camera, T_world_b = map->keyframe(other).T_world_camera;
-    const double baseline = (T_world_a.translation - T_world_b.translation).norm();
+    const double baseline =
+        (map->keyframe(id).T_world_camera.translation - map->keyframe(other).T_world_camera.translation)
+            .norm();
     const double median_depth = map->MedianDepth(other);
     if (median_depth <= 0) continue;
-    if (rig_.sensor == Sensor::kMono ? baseline < 0.01 * median_depth : baseline < rig_.baseline_m) continue;
+    if (mono ? baseline < 0.01 * median_depth : baseline < rig_.baseline_m) continue;
     const auto pairs =
         MatchEpipolar(*map, rig_.camera, map->keyframe(id), map->keyframe(other), median_depth);
-    const Pose T_a = T_world_a.Inverse(), T_b = T_world_b.Inverse(), T_b_a = T_b * T_world_a;
     for (const auto& [fa, fb] : pairs) {
-      const Keyframe &a = map->keyframe(id), &b = map->keyframe(other);
-      const cv::KeyPoint &ka = a.features->keypoints[static_cast<std::size_t>(fa)],
-                         &kb = b.features->keypoints[static_cast<std::size_t>(fb)];
-      const Eigen::Vector3d ra = rig_.camera.Unproject({ka.pt.x, ka.pt.y}),
-                            rb = rig_.camera.Unproject({kb.pt.x, kb.pt.y});
-      const double cosine = ra.normalized().dot((T_b_a.rotation.conjugate() * rb).normalized());
-      if (cosine < 0 || !EnoughParallax(cosine, map->scales()[static_cast<std::size_t>(ka.octave)],
-                                        map->scales()[static_cast<std::size_t>(kb.octave)]))
-        continue;
-      const Eigen::Vector3d in_a = tutti::Triangulate(ra, rb, T_b_a);
-      if (!in_a.allFinite()) continue;
-      const Eigen::Vector3d point = T_world_a * in_a;
-      bool good = true;
-      for (const auto& [pose, frame, feature] : {std::tuple{&T_a, &a, fa}, std::tuple{&T_b, &b, fb}}) {
-        const int octave = frame->features->keypoints[static_cast<std::size_t>(feature)].octave;
-        const PointObservation o =
-            Measured(*frame->features, feature, point,
-                     options_.pixel_sigma * map->scales()[static_cast<std::size_t>(octave)]);
-        Eigen::Vector3d r;
-        good = good && ReprojectionResidual(rig_.camera, *pose, o, &r, nullptr) &&
-               r.squaredNorm() <= ChiSquareBound(o);
-      }
-      if (!good) continue;
-      // The corner's scale in both images must agree with its distances.
-      const double ratio = (point - T_world_b.translation).norm() / (point - T_world_a.translation).norm();
-      const double octaves = double(map->scales()[static_cast<std::size_t>(ka.octave)]) /
-                             map->scales()[static_cast<std::size_t>(kb.octave)];
-      const double factor = 1.5 * options_.scale_factor;
-      if (ratio * factor < octaves || ratio > octaves * factor) continue;
-      const int landmark = map->AddLandmark(point, id, fa);
+      const auto point = PointOf(std::as_const(*map).keyframe(id), fa, std::as_const(*map).keyframe(other),
+                                 fb, *map, strict);
+      if (!point) continue;
+      const int landmark = map->AddLandmark(*point, id, fa);
       map->AddObservation(landmark, other, fb);
       map->UpdateLandmark(landmark);
       recent_.emplace_back(landmark, id);

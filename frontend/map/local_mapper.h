@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -34,7 +35,8 @@ class LocalMapper {
 
  private:
   void CullRecent(int keyframe, Map* map);
-  bool EnoughParallax(double cosine, double scale_a, double scale_b) const;
+  std::optional<Eigen::Vector3d> PointOf(const Keyframe& a, int fa, const Keyframe& b, int fb, const Map& map,
+                                         bool strict) const;
   int Triangulate(int keyframe, Map* map);
   void Fuse(int keyframe, Map* map);
   void Align(int keyframe, Map* map);

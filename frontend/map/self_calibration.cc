@@ -1,6 +1,9 @@
 #include "frontend/map/self_calibration.h"
 
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <algorithm>
+#include <utility>
 
 namespace tutti {
 namespace {
@@ -38,6 +41,20 @@ void SelfCalibration::Learn(const LensError& seen, int keyframes, Map* map) {
     Keyframe& k = map->keyframe(id);
     k.features = Moved(*k.features);
   }
+  const Eigen::Vector2d sigma = Sigma();
+  const std::int64_t frame =
+      map->KeyframeCount() > 0 ? std::as_const(*map).keyframe(map->KeyframeCount() - 1).frame_index : 0;
+  steps_.push_back({frame, applied_.x(), applied_.y(), sigma.x(), sigma.y()});
+}
+
+// Standard deviations of k1 and k2.
+Eigen::Vector2d SelfCalibration::Sigma() const {
+  return remaining_.information.inverse().diagonal().cwiseSqrt();
+}
+
+LensFound SelfCalibration::Found() const {
+  const Eigen::Vector2d value = applied_ + remaining_.value, sigma = Sigma();
+  return {value.x(), value.y(), sigma.x(), sigma.y(), steps_};
 }
 
 // Of a pixel, over the way from the principal point to the farthest corner.

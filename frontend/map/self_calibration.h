@@ -8,10 +8,12 @@
 #pragma once
 
 #include <memory>
+#include <vector>
 
 #include "frontend/features/features.h"
 #include "frontend/geometry/lens_error.h"
 #include "frontend/map/map.h"
+#include "tutti/frontend/odometry.h"
 #include "tutti/frontend/odometry_options.h"
 
 namespace tutti {
@@ -31,8 +33,11 @@ class SelfCalibration {
   void Learn(const LensError& seen, int keyframes, Map* map);
   /// What is taken out of the features: (k1, k2) of LensError.
   const Eigen::Vector2d& Applied() const { return applied_; }
+  /// All that is known, and how it came to be.
+  LensFound Found() const;
 
  private:
+  Eigen::Vector2d Sigma() const;
   double LargestMove(const Eigen::Vector2d& lens) const;
   std::shared_ptr<const FrameFeatures> Moved(const FrameFeatures& features) const;
 
@@ -41,6 +46,7 @@ class SelfCalibration {
   Eigen::Matrix2d first_ = Eigen::Matrix2d::Identity() * 1e12;  // information at the start
   Eigen::Vector2d applied_ = Eigen::Vector2d::Zero();
   LensError remaining_;
+  std::vector<LensFound::Step> steps_;
 };
 
 }  // namespace tutti

@@ -38,6 +38,18 @@ TEST(Summary, WithoutPosesThereIsNoGraphThatCouldDoubtALoop) {
   EXPECT_EQ(nlohmann::json::parse(SummaryJson(result))["loops"]["accepted"], 1);
 }
 
+TEST(Summary, TheLensSaysHowItWasFound) {
+  RunResult result;
+  EXPECT_FALSE(nlohmann::json::parse(SummaryJson(result)).contains("lens"));
+  result.lens = LensFound{-0.01, 0.002, 0.001, 0.003, {{40, -0.008, 0.001, 0.002, 0.004}}};
+  const nlohmann::json lens = nlohmann::json::parse(SummaryJson(result))["lens"];
+  EXPECT_EQ(lens["k1"], -0.01);
+  EXPECT_EQ(lens["k1_sigma"], 0.001);
+  ASSERT_EQ(lens["steps"].size(), 1u);
+  EXPECT_EQ(lens["steps"][0]["frame"], 40);
+  EXPECT_EQ(lens["steps"][0]["k2_sigma"], 0.004);
+}
+
 TEST(Summary, TheGraphsProofIsThereIfItWasAskedFor) {
   RunResult result;
   EXPECT_FALSE(nlohmann::json::parse(SummaryJson(result)).contains("graph"));

@@ -80,6 +80,21 @@ TEST(PatchAligner, NoPatchBeyondTheImageOrWithoutOne) {
   EXPECT_EQ(CutPatch(kCamera, *WithoutImages(Frame(Texture(), kPoint)), 0), nullptr);
 }
 
+TEST(PatchAligner, FindsThePointOfTwoFeaturesThatLookAlike) {
+  const Pose T_b_a(Eigen::Quaterniond::Identity(), {-0.1, 0, 0});
+  const Eigen::Vector3d in_a = 5.0 * kCamera.Unproject(kPoint);
+  const Eigen::Vector2d truth = kCamera.Project(T_b_a * in_a);
+  const FrameFeatures a = Frame(Texture(), kPoint);
+  const cv::Mat image = Moved(Texture(), 1, truth - kPoint);
+  const FrameFeatures b = Frame(image, truth + Eigen::Vector2d(1.1, 0.6));
+  const auto found = FindPoint(kCamera, a, 0, b, 0, T_b_a, in_a);
+  ASSERT_TRUE(found.has_value());
+  EXPECT_LT((*found - truth).norm(), 0.1);
+  const FrameFeatures elsewhere = Frame(image, truth + Eigen::Vector2d(40, 25));
+  EXPECT_FALSE(FindPoint(kCamera, a, 0, elsewhere, 0, T_b_a, in_a).has_value());
+  EXPECT_FALSE(FindPoint(kCamera, a, 0, *WithoutImages(b), 0, T_b_a, in_a).has_value());
+}
+
 TEST(PatchAligner, MovesTheKeypointsOfLandmarksAndTrustsThemMore) {
   Map map(PyramidScales(OdometryOptions()), kCamera, 0.5);
   const Pose T_world_second(Eigen::Quaterniond::Identity(), {0.1, 0, 0});

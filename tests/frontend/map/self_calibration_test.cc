@@ -45,6 +45,19 @@ TEST_F(SelfCalibrationTest, ComesToWhatTheWindowsSay) {
   EXPECT_NEAR(calibration.Applied().x(), -0.02, 0.001);
 }
 
+TEST_F(SelfCalibrationTest, SaysWhatItFoundAndHowWellItIsKnown) {
+  SelfCalibration calibration(OdometryOptions(), Rig(Sensor::kMono));
+  const double at_first = calibration.Found().k1_sigma;
+  EXPECT_NEAR(at_first, OdometryOptions().lens_sigma, 1e-9);
+  for (int i = 0; i < 50; ++i) calibration.Learn(Seen(calibration, -0.02, 0.001), 10, &map_);
+  const LensFound found = calibration.Found();
+  EXPECT_NEAR(found.k1, -0.02, 0.002);
+  EXPECT_LT(found.k1_sigma, 0.2 * at_first);
+  ASSERT_FALSE(found.steps.empty());
+  EXPECT_EQ(found.steps.back().k1, calibration.Applied().x());
+  EXPECT_LT(found.steps.back().k1_sigma, at_first);
+}
+
 TEST_F(SelfCalibrationTest, CorrectsNewFeaturesAndThoseOfTheMapAlike) {
   SelfCalibration calibration(OdometryOptions(), Rig(Sensor::kMono));
   for (int i = 0; i < 50; ++i) calibration.Learn(Seen(calibration, -0.02, 0.001), 10, &map_);

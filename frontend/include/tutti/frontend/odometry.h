@@ -51,6 +51,20 @@ struct SeenLandmark {
   cv::Point2f pixel;  ///< in the rectified image [px]
 };
 
+/// What one camera's images told of the radial distortion that its calibration left over: a pixel at offset d
+/// from the principal point belongs at c + d (1 + k1 r^2 + k2 r^4), r^2 = (d_x / fx)^2 + (d_y / fy)^2.
+struct LensFound {
+  double k1 = 0, k2 = 0;              ///< [1]
+  double k1_sigma = 0, k2_sigma = 0;  ///< standard deviations
+  /// How it moved: features are corrected in steps that can be seen in the image.
+  struct Step {
+    std::int64_t frame_index = 0;  ///< InputFrame::index of the keyframe that told it
+    double k1 = 0, k2 = 0;         ///< taken out of the features from then on
+    double k1_sigma = 0, k2_sigma = 0;
+  };
+  std::vector<Step> steps;
+};
+
 /// Odometry of one camera rig. A value type: a copy goes on independently (the pipeline uses that to know
 /// what the odometry alone would have done). Deterministic: the same frames give the same bits.
 class Odometry {
@@ -141,6 +155,8 @@ class Odometry {
   /// stereo).
   double StereoRowErrorPx() const;
   double StereoMatches() const;
+  /// One camera: the lens by self-calibration, so far. None with depth, or with lens_sigma 0.
+  std::optional<LensFound> Lens() const;
 
  private:
   class Impl;

@@ -3,6 +3,7 @@
 #include <fstream>
 #include <functional>
 
+#include "core/tum_line.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 #include "tutti/core/trajectory.h"
@@ -196,16 +197,15 @@ void WriteTrajectory(const std::filesystem::path& file, const Trajectory& trajec
   if (!out)
     throw InputError(file.string() + ": can't be written; check that the folder exists and is writable");
   char line[512];
-  if (format == TrajectoryFormat::kTum) out << "# timestamp tx ty tz qx qy qz qw\n";
+  if (format == TrajectoryFormat::kTum) out << internal::kTumHeader;
   if (format == TrajectoryFormat::kEuroc) out << "#timestamp [ns],p_x [m],p_y [m],p_z [m],q_w,q_x,q_y,q_z\n";
   for (const StampedPose& s : trajectory) {
     const Eigen::Vector3d& t = s.pose.translation;
     const Eigen::Quaterniond& q = s.pose.rotation;
     switch (format) {
       case TrajectoryFormat::kTum:
-        std::snprintf(line, sizeof line, "%.9f %.9f %.9f %.9f %.9f %.9f %.9f %.9f\n", s.stamp_s, t.x(), t.y(),
-                      t.z(), q.x(), q.y(), q.z(), q.w());
-        break;
+        out << internal::TumLine(s);
+        continue;
       case TrajectoryFormat::kKitti: {
         const Eigen::Matrix4d m = s.pose.Matrix();
         std::snprintf(line, sizeof line,

@@ -1,12 +1,15 @@
 // Ctrl-C asks a run to finish its frame and write what it has.
 #pragma once
 
+#include <array>
 #include <csignal>
 
 namespace tutti {
 
-/// While it lives, the first SIGINT or SIGTERM sets a flag; a second one ends the process as usual. One at a
-/// time.
+/// While it lives, the first SIGINT or SIGTERM sets a flag; a second one ends the process as usual. SIGHUP (a
+/// terminal that is gone; it may come twice) and SIGXFSZ (a file grew to the limit; it comes with each write)
+/// set it, too, any number of times. SIGPIPE is ignored: a run outlives the one who reads its messages. One
+/// at a time.
 class InterruptGuard {
  public:
   InterruptGuard();
@@ -17,8 +20,8 @@ class InterruptGuard {
   static bool Requested();
 
  private:
-  struct sigaction old_interrupt_ = {};
-  struct sigaction old_terminate_ = {};
+  static constexpr std::array<int, 5> kSignals = {SIGINT, SIGTERM, SIGHUP, SIGXFSZ, SIGPIPE};
+  std::array<struct sigaction, kSignals.size()> old_ = {};
 };
 
 }  // namespace tutti

@@ -1,10 +1,14 @@
 // Output folder, trajectories, graph and plots.
+#include <algorithm>
 #include <array>
-#include <cstdint>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
 #include <fstream>
 #include <system_error>
 
 #include "apps/plot/plot.h"
+#include "apps/run/live_files.h"
 #include "apps/run/outputs.h"
 #include "apps/run/text_file.h"
 #include "tutti/backend/g2o_io.h"
@@ -15,13 +19,26 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array<const char*, 10> kFiles = {
-    "trajectory.txt", "trajectory_odometry.txt", "keyframes.txt",  "graph.g2o",   "loops.csv",
-    "summary.json",   "trajectory.svg",          "trajectory.png", "report.html", "report.json"};
-constexpr std::uintmax_t kRoomBytes = 32u << 20;  // a long run writes a few MB
+// All that a run may leave, for RunFiles and IsResult to agree; pieces of the map have numbers.
+constexpr std::array<const char*, 11> kFiles = {"trajectory.txt",
+                                                "trajectory_odometry.txt",
+                                                "trajectory_online.txt",
+                                                "keyframes.txt",
+                                                "graph.g2o",
+                                                "loops.csv",
+                                                "summary.json",
+                                                "trajectory.svg",
+                                                "trajectory.png",
+                                                "report.html",
+                                                "report.json"};
+constexpr const char* kPiece = "trajectory_piece_";
 
-// Of the i-th of the pieces that are not joined to the trajectory, from 1.
-std::string PieceFile(int i) { return "trajectory_piece_" + std::to_string(i) + ".txt"; }
+bool IsResult(const fs::path& entry) {
+  std::error_code ignored;
+  const std::string name = entry.filename();
+  return !fs::is_directory(entry, ignored) &&
+         (std::count(kFiles.begin(), kFiles.end(), name) > 0 || name.rfind(kPiece, 0) == 0);
+}
 
 std::vector<Eigen::Vector3d> Positions(const Trajectory& trajectory, const Similarity& alignment) {
   std::vector<Eigen::Vector3d> points;
@@ -66,7 +83,7 @@ void WriteTextFile(const fs::path& file, const std::string& text) {
   if (!out)
     throw InputError(file.string() + ": can't be written; check that the folder exists and is writable");
   out << text;
-  out.flush();
+  out.close();
   if (!out) throw InputError(file.string() + ": could not be written in full; is the disk full?");
 }
 
@@ -76,54 +93,107 @@ std::size_t RunResult::LoopsAccepted() const {
   return count;
 }
 
-void PrepareOutputFolder(const fs::path& out) {
-  std::error_code error;
-  if (fs::exists(out, error) && !fs::is_directory(out, error)) {
-    throw InputError(out.string() + ": is a file; --out needs a folder");
-  }
-  fs::create_directories(out, error);
-  if (error) {
-    throw InputError(out.string() + ": the folder can't be made (" + error.message() +
-                     "); choose another --out");
-  }
-  const fs::path probe = out / ".tutti-write-test";
-  {
-    std::ofstream file(probe, std::ios::binary);
-    if (!file) throw InputError(out.string() + ": no permission to write there; choose another --out");
-    file << std::string(1 << 16, 'x');
-    file.flush();
-    if (!file) {
-      fs::remove(probe, error);
-      throw InputError(out.string() + ": the disk is full; free some space or choose another --out");
-    }
-  }
-  fs::remove(probe, error);
-  const fs::space_info space = fs::space(out, error);
-  if (!error && space.available < kRoomBytes) {
-    throw InputError(out.string() +
-                     ": less than 32 MB are free there; free some space or choose another --out");
-  }
-  for (const char* name : kFiles) fs::remove(out / name, error);
-  for (int i = 1; fs::remove(out / PieceFile(i), error); ++i) {
+void Attempts::Try(const std::function<void()>& step) noexcept {
+  try {
+    step();
+  } catch (...) {
+    if (first_ == nullptr) first_ = std::current_exception();
   }
 }
 
-void WriteOutputs(const fs::path& out, const RunResult& result) {
-  WriteTextFile(out / "loops.csv", LoopsCsv(result));
-  if (!result.appearance_only) {
-    WriteTrajectory(out / "trajectory.txt", result.trajectory, TrajectoryFormat::kTum);
-    for (std::size_t i = 0; i < result.other_pieces.size(); ++i) {
-      WriteTrajectory(out / PieceFile(static_cast<int>(i) + 1), result.other_pieces[i],
-                      TrajectoryFormat::kTum);
-    }
-    WriteTrajectory(out / "trajectory_odometry.txt", result.trajectory_odometry, TrajectoryFormat::kTum);
-    WriteTrajectory(out / "keyframes.txt", result.keyframe_trajectory, TrajectoryFormat::kTum);
-    WriteG2o(out / "graph.g2o", result.graph);
-    const TrajectoryPlot plot = MakePlot(result);
-    WriteSvg(out / "trajectory.svg", plot);
-    WritePng(out / "trajectory.png", plot);
+void Attempts::Rethrow() const {
+  if (first_ != nullptr) std::rethrow_exception(first_);
+}
+
+std::string Attempts::Failure() const {
+  try {
+    Rethrow();
+    return "";
+  } catch (const std::exception& thrown) {
+    return thrown.what();
+  } catch (...) {
+    return "unknown";
   }
-  WriteTextFile(out / "summary.json", SummaryJson(result));
+}
+
+OutputFolder OpenOutputFolder(const RunRequest& request, const fs::path& reference) {
+  if (!reference.empty()) RefuseToReplace(request.out, reference);
+  const OutputLayout layout = {IsResult, "summary.json", "version", {kLiveTrajectory, kLiveLoops}};
+  return OutputFolder(request.out, layout, request.keep, request.trace);
+}
+
+namespace {
+
+// In the order in which they are written: what is worth most comes first.
+std::vector<OutputFile> RunFiles(const RunResult& result) {
+  const auto trajectory = [](const Trajectory& poses) {
+    return [&poses](const fs::path& file) { WriteTrajectory(file, poses, TrajectoryFormat::kTum); };
+  };
+  const auto text = [&result](std::string (*text_of)(const RunResult&)) {
+    return [&result, text_of](const fs::path& file) { WriteTextFile(file, text_of(result)); };
+  };
+  std::vector<OutputFile> files;
+  const bool poses = !result.appearance_only;
+  if (poses) {
+    files.push_back({"trajectory.txt", trajectory(result.trajectory)});
+    for (std::size_t i = 0; i < result.other_pieces.size(); ++i)
+      files.push_back({kPiece + std::to_string(i + 1) + ".txt", trajectory(result.other_pieces[i])});
+    files.push_back({"trajectory_online.txt", trajectory(result.trajectory_online)});
+    files.push_back({"trajectory_odometry.txt", trajectory(result.trajectory_odometry)});
+    files.push_back({"keyframes.txt", trajectory(result.keyframe_trajectory)});
+  }
+  files.push_back({"summary.json", text(SummaryJson)});
+  files.push_back({"loops.csv", text(LoopsCsv)});
+  if (poses) {
+    files.push_back({"graph.g2o", [&result](const fs::path& file) { WriteG2o(file, result.graph); }});
+    files.push_back(
+        {"trajectory.svg", [&result](const fs::path& file) { WriteSvg(file, MakePlot(result)); }});
+    files.push_back(
+        {"trajectory.png", [&result](const fs::path& file) { WritePng(file, MakePlot(result)); }});
+  }
+  return files;
+}
+
+// A device or a pipe gets the text itself, a file is replaced when the new one is complete.
+void WriteTrace(const fs::path& file, const std::string& text) {
+  if (!fs::is_regular_file(fs::symlink_status(file))) return WriteTextFile(file, text);
+  const fs::path fresh = file.parent_path() / (".tutti-new-" + file.filename().string());
+  try {
+    WriteTextFile(fresh, text);
+    fs::rename(fresh, file);
+  } catch (...) {
+    std::error_code ignored;
+    fs::remove(fresh, ignored);
+    throw;
+  }
+}
+
+}  // namespace
+
+void WriteOutputs(OutputFolder& folder, const RunRequest& request, const RunResult& result,
+                  const std::function<std::string()>& trace) {
+  for (const OutputFile& file : RunFiles(result)) folder.Write(file);
+  Attempts more;
+  more.Try([&] {
+    if (!request.more_files) return;
+    for (const OutputFile& file : request.more_files(result)) folder.Write(file);
+  });
+  const fs::path where = folder.Finish(result.failure.empty() && !more.Failed());
+  std::vector<std::string> failures = folder.failures();
+  if (more.Failed()) failures.push_back("the report: " + more.Failure());
+  if (trace) {
+    Attempts writing;
+    errno = 0;
+    writing.Try([&] { WriteTrace(*request.trace, trace()); });
+    const std::string reason = errno != 0 ? std::string(" (") + std::strerror(errno) + ")" : "";
+    if (writing.Failed()) failures.push_back(writing.Failure() + reason);
+  }
+  if (!result.failure.empty())
+    std::fprintf(stderr, "tutti: the run broke off; what there was by then is in %s\n", where.c_str());
+  if (failures.empty()) return;
+  std::string message = "not everything could be written:";
+  for (const std::string& failure : failures) message += "\n  " + failure;
+  throw InputError(message + "\n  the rest is in " + where.string());
 }
 
 }  // namespace tutti

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
@@ -153,6 +154,9 @@ std::string Quoted(const std::string& text) {
   return out + "\"";
 }
 
+// These columns are always there, since scripts rely on them; further members follow.
+constexpr const char* kMembers[] = {"surf", "sift", "orb"};
+
 double MemberPosterior(const LoopRecord& loop, const std::string& name) {
   for (const MemberOpinion& member : loop.members) {
     if (member.name == name) return member.took_part ? member.hypothesis : std::nan("");
@@ -192,6 +196,7 @@ std::string SummaryJson(const RunResult& r) {
   json["seed"] = r.config.loops.seed;
   json["realtime"] = r.realtime;
   json["interrupted"] = r.interrupted;
+  if (!r.failure.empty()) json["failure"] = r.failure;
   json["appearance_only"] = r.appearance_only;
   json["shared_odometry"] = r.shared_odometry;
   json["frames"] = FramesJson(r);
@@ -232,42 +237,56 @@ std::string SummaryJson(const RunResult& r) {
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
-std::string LoopsCsv(const RunResult& r) {
-  // surf, sift, orb are always there, since scripts rely on them; further members follow.
-  std::vector<std::string> names = {"surf", "sift", "orb"};
-  for (const LoopRecord& loop : r.loops) {
-    for (const MemberOpinion& member : loop.members) {
-      if (std::find(names.begin(), names.end(), member.name) == names.end()) names.push_back(member.name);
-    }
+std::vector<std::string> OtherMembers(const std::vector<std::string>& members) {
+  std::vector<std::string> others;
+  for (const std::string& name : members) {
+    if (std::find(std::begin(kMembers), std::end(kMembers), name) != std::end(kMembers)) continue;
+    if (std::find(others.begin(), others.end(), name) == others.end()) others.push_back(name);
   }
+  return others;
+}
+
+std::string LoopsCsvHeader(const std::vector<std::string>& members) {
+  std::string line =
+      "query,candidate,query_stamp_s,candidate_stamp_s,surf,sift,orb,ensemble,inliers,matches,accepted,"
+      "reason,verified,tx,ty,tz,qx,qy,qz,qw,scale,sigmas,weight,injected,probability";
+  for (const std::string& name : members) line += "," + name;
+  return line + "\n";
+}
+
+std::string LoopsCsvLine(const LoopRecord& loop, const std::vector<std::string>& members) {
   std::ostringstream out;
-  out << "query,candidate,query_stamp_s,candidate_stamp_s,surf,sift,orb,ensemble,inliers,matches,accepted,"
-         "reason,"
-         "verified,tx,ty,tz,qx,qy,qz,qw,scale,sigmas,weight,injected,probability";
-  for (std::size_t i = 3; i < names.size(); ++i) out << ',' << names[i];
-  out << '\n';
-  for (const LoopRecord& loop : r.loops) {
-    out << loop.query << ',' << loop.candidate << ',' << Cell(loop.query_stamp_s, 9) << ','
-        << Cell(loop.candidate_stamp_s, 9);
-    for (std::size_t i = 0; i < 3; ++i) out << ',' << Cell(MemberPosterior(loop, names[i]), 6);
-    out << ',' << Cell(loop.hypothesis, 6) << ',' << loop.inliers << ',' << loop.matches << ','
-        << (loop.accepted ? 1 : 0) << ',' << Quoted(loop.reason) << ',' << (loop.verified ? 1 : 0);
-    if (loop.S_candidate_query) {
-      const Similarity& s = *loop.S_candidate_query;
-      for (const double v : {s.translation.x(), s.translation.y(), s.translation.z(), s.rotation.x(),
-                             s.rotation.y(), s.rotation.z(), s.rotation.w(), s.scale}) {
-        out << ',' << Cell(v, 9);
-      }
-    } else {
-      out << ",,,,,,,,";
+  out << loop.query << ',' << loop.candidate << ',' << Cell(loop.query_stamp_s, 9) << ','
+      << Cell(loop.candidate_stamp_s, 9);
+  for (const char* name : kMembers) out << ',' << Cell(MemberPosterior(loop, name), 6);
+  out << ',' << Cell(loop.hypothesis, 6) << ',' << loop.inliers << ',' << loop.matches << ','
+      << (loop.accepted ? 1 : 0) << ',' << Quoted(loop.reason) << ',' << (loop.verified ? 1 : 0);
+  if (loop.S_candidate_query) {
+    const Similarity& s = *loop.S_candidate_query;
+    for (const double v : {s.translation.x(), s.translation.y(), s.translation.z(), s.rotation.x(),
+                           s.rotation.y(), s.rotation.z(), s.rotation.w(), s.scale}) {
+      out << ',' << Cell(v, 9);
     }
-    out << ',' << (loop.gate_sigmas ? Cell(*loop.gate_sigmas, 6) : "");
-    out << ',' << Cell(loop.weight, 6) << ',' << (loop.injected ? 1 : 0);
-    out << ',' << Cell(loop.probability, 6);
-    for (std::size_t i = 3; i < names.size(); ++i) out << ',' << Cell(MemberPosterior(loop, names[i]), 6);
-    out << '\n';
+  } else {
+    out << ",,,,,,,,";
   }
+  out << ',' << (loop.gate_sigmas ? Cell(*loop.gate_sigmas, 6) : "");
+  out << ',' << Cell(loop.weight, 6) << ',' << (loop.injected ? 1 : 0);
+  out << ',' << Cell(loop.probability, 6);
+  for (const std::string& name : members) out << ',' << Cell(MemberPosterior(loop, name), 6);
+  out << '\n';
   return out.str();
+}
+
+std::string LoopsCsv(const RunResult& r) {
+  std::vector<std::string> names;
+  for (const LoopRecord& loop : r.loops) {
+    for (const MemberOpinion& member : loop.members) names.push_back(member.name);
+  }
+  names = OtherMembers(names);
+  std::string text = LoopsCsvHeader(names);
+  for (const LoopRecord& loop : r.loops) text += LoopsCsvLine(loop, names);
+  return text;
 }
 
 std::string ResultTable(const RunResult& r) {

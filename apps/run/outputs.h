@@ -1,27 +1,53 @@
 // The files that a run leaves behind, and the table on the terminal.
 #pragma once
 
+#include <exception>
 #include <filesystem>
+#include <functional>
 #include <string>
+#include <vector>
 
+#include "apps/run/output_folder.h"
 #include "apps/run/run_result.h"
+#include "apps/run/runner.h"
 
 namespace tutti {
 
-/// Makes the folder, proves that it can be written to and has room, and removes a former run's files of the
-/// same names. Throws InputError that says what to do.
-void PrepareOutputFolder(const std::filesystem::path& out);
+/// Opens the folder of a run. Throws InputError that says what to do; also if `reference` (a file; empty for
+/// none) lies inside.
+OutputFolder OpenOutputFolder(const RunRequest& request, const std::filesystem::path& reference);
 
-/// trajectory.txt, trajectory_odometry.txt, keyframes.txt (TUM), graph.g2o, loops.csv, summary.json,
-/// trajectory.svg and trajectory.png; appearance only: loops.csv and summary.json. Throws InputError if one
-/// can't be written in full.
-void WriteOutputs(const std::filesystem::path& out, const RunResult& result);
+/// Writes all files and puts them into place: trajectory.txt first, then trajectory_online.txt,
+/// trajectory_odometry.txt, keyframes.txt (TUM), summary.json, loops.csv, graph.g2o, trajectory.svg and .png;
+/// appearance only: loops.csv and summary.json; then RunRequest::more_files, and the trace into the file that
+/// it is for. What can't be written does not stop the rest. Throws InputError that names it then, and says
+/// where the rest is.
+void WriteOutputs(OutputFolder& folder, const RunRequest& request, const RunResult& result,
+                  const std::function<std::string()>& trace = {});
 
 /// summary.json and loops.csv as texts.
 std::string SummaryJson(const RunResult& result);
 std::string LoopsCsv(const RunResult& result);
+/// loops.csv in parts. `members` have columns beside SURF, SIFT and ORB: those that OtherMembers returns.
+std::vector<std::string> OtherMembers(const std::vector<std::string>& members);
+std::string LoopsCsvHeader(const std::vector<std::string>& members);
+std::string LoopsCsvLine(const LoopRecord& loop, const std::vector<std::string>& members);
 
 /// The comparison with and without the ensemble, for the terminal.
 std::string ResultTable(const RunResult& result);
+
+/// Steps of a run that go on after one has failed, so that what there is gets written.
+class Attempts {
+ public:
+  void Try(const std::function<void()>& step) noexcept;
+  bool Failed() const { return first_ != nullptr; }
+  /// What the first failure was; empty for none.
+  std::string Failure() const;
+  /// Throws it on, if there is one.
+  void Rethrow() const;
+
+ private:
+  std::exception_ptr first_;
+};
 
 }  // namespace tutti

@@ -78,6 +78,7 @@ struct RunResult {
   std::vector<LostStretch> lost;
   std::size_t keyframes = 0;
   bool interrupted = false;
+  std::string failure;  ///< what broke the run off; empty: nothing did
   bool appearance_only = false;
   bool shared_odometry = false;  ///< tracked once for several runs; loops did not reach the tracking
 
@@ -88,6 +89,7 @@ struct RunResult {
 
   // Trajectories: T_world_body, the world is the camera of the first keyframe.
   Trajectory trajectory, trajectory_odometry, keyframe_trajectory, reference;
+  Trajectory trajectory_online;          ///< each pose as it was first given out, no loop had moved it yet
   std::vector<Trajectory> other_pieces;  ///< of the map, after losses; no loop joined them to `trajectory`
   bool odometry_complete =
       true;  ///< false: it ends at the first correction (interrupted, or run.odometry_pass: false)

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <fstream>
+#include <functional>
 #include <map>
 #include <memory>
 #include <opencv2/core.hpp>
@@ -9,13 +11,13 @@
 #include <utility>
 
 #include "apps/run/interrupt.h"
+#include "apps/run/live_files.h"
 #include "apps/run/outputs.h"
 #include "apps/run/planted_loops.h"
 #include "apps/run/prefetcher.h"
 #include "apps/run/progress.h"
 #include "apps/run/run_evaluation.h"
 #include "apps/run/run_parts.h"
-#include "apps/run/text_file.h"
 #include "core/stopwatch.h"
 #include "tutti/core/error.h"
 #include "tutti/slam/slam_system.h"
@@ -28,13 +30,15 @@ namespace fs = std::filesystem;
 /// One run from its first frame to its last.
 class Run {
  public:
-  Run(const RunRequest& request, const RunConfig& config, const Dataset& dataset, RunResult& result)
+  Run(const RunRequest& request, const RunConfig& config, const Dataset& dataset, const fs::path& out,
+      RunResult& result)
       : request_(request),
         config_(config),
         dataset_(dataset),
         result_(result),
         slam_(Watched(config, request), dataset.Rig(), Recorder()),
-        planted_(config.run, config.loops.seed) {
+        planted_(config.run, config.loops.seed),
+        live_(out, dataset.Rig(), config) {
     slam_.SetDetectionListener([this](const LoopResult& detection) {
       for (const auto& observer : request_.observers) observer->OnDetection(detection);
     });
@@ -57,19 +61,19 @@ class Run {
 
   void TrackAll() {
     for (const auto& observer : request_.observers) observer->OnStart(result_.rig);
-    const Span::Clock::time_point begin = Span::Clock::now();
-    const internal::Stopwatch watch;
-    const double cpu_begin = ProcessCpuSeconds();
+    begin_ = Span::Clock::now();
+    watch_ = internal::Stopwatch();
+    cpu_begin_ = ProcessCpuSeconds();
     Progress progress(config_.run.loops ? "slam" : "odometry",
                       total_ == static_cast<std::size_t>(-1) ? 0 : total_, Out());
     Prefetcher frames(dataset_, Reading());
-    double read_ms = 0, extract_ms = 0;  // of the thread that reads ahead
     while (!InterruptGuard::Requested()) {
       if (playback_) AwaitFrame(frames);
       const std::optional<FetchedFrame> fetched = frames.Next();
+      read_wait_ms_ = frames.WaitedMs();
       if (!fetched) break;
-      read_ms += fetched->read_ms;
-      extract_ms += fetched->prepare_ms;
+      read_ms_ += fetched->read_ms;
+      extract_ms_ += fetched->prepare_ms;
       for (; next_ < fetched->position; ++next_) dropped_.insert(next_);
       if (fetched->read.frame) {
         positions_[fetched->read.frame->index] = next_;
@@ -86,6 +90,7 @@ class Run {
     result_.interrupted = InterruptGuard::Requested();
     slam_.Finish();
     planted_.PlantRest(&slam_);
+    live_.AddLoops(slam_.loops());
     for (const auto& observer : request_.observers) observer->OnEnd(State());
     NoteWarnings(progress);
     progress.Finish();
@@ -97,17 +102,22 @@ class Run {
       progress.Note("tutti: real time: " + std::to_string(dropped_.size()) + " of " + std::to_string(next_) +
                     " frames were dropped");
     }
+  }
+
+  // What TrackAll went through, also if something broke it off.
+  void Count() {
     result_.frames_total = next_;
     result_.frames_dropped = dropped_.size();
     result_.frames_listed = dataset_.Size();
     result_.frame_interval_s = FrameInterval(dataset_);
     result_.stage_ms = slam_.StageMilliseconds();
-    result_.stage_ms["read"] = read_ms;
-    result_.stage_ms["read_wait"] = frames.WaitedMs();
-    if (!slam_.AppearanceOnly()) result_.stage_ms["odometry_extract"] += extract_ms;
-    result_.wall_s = watch.Seconds();
-    result_.cpu_s = ProcessCpuSeconds() - cpu_begin;
-    ReportTimes(begin);
+    result_.stage_ms["read"] = read_ms_;
+    result_.stage_ms["read_wait"] = read_wait_ms_;
+    if (!slam_.AppearanceOnly()) result_.stage_ms["odometry_extract"] += extract_ms_;
+    result_.wall_s = watch_.Seconds();
+    result_.cpu_s = ProcessCpuSeconds() - cpu_begin_;
+    if (Recorder() != nullptr) result_.stages = SummarizeStages(recorder_.Spans(), result_.wall_s);
+    result_.trajectory_online = live_.trajectory();
   }
 
   // What the odometry would have done alone: the copy from before the first change tracks the rest.
@@ -130,6 +140,8 @@ class Run {
     result_.graph_proof = slam_.GraphProof();
     if (alone_) result_.trajectory_odometry = BodyTrajectory(alone_->FrameTrajectory(), result_.rig);
   }
+
+  std::string Trace() const { return ChromeTrace(recorder_.Spans(), begin_); }
 
  private:
   RunState State() const { return {slam_.odometry(), slam_.loops(), slam_.Corrections()}; }
@@ -202,13 +214,7 @@ class Run {
 
   void NoteWarnings(Progress& progress) {
     for (const std::string& warning : slam_.TakeWarnings()) progress.Note("tutti: warning: " + warning);
-  }
-
-  void ReportTimes(Span::Clock::time_point begin) {
-    if (Recorder() == nullptr) return;
-    const std::vector<Span> spans = recorder_.Spans();
-    result_.stages = SummarizeStages(spans, result_.wall_s);
-    if (request_.trace) WriteTextFile(*request_.trace, ChromeTrace(spans, begin));
+    for (const std::string& problem : live_.TakeProblems()) progress.Note("tutti: warning: " + problem);
   }
 
   void TrackOne(const InputFrame& frame) {
@@ -217,6 +223,7 @@ class Run {
     const TrackResult track = slam_.Track(frame);
     result_.frame_ms.push_back(watch.Milliseconds());
     if (track.keyframe >= 0) planted_.OnKeyframe(track.keyframe, &slam_);
+    live_.Add(frame.stamp_s, track, State());
     for (const auto& observer : request_.observers) observer->OnFrame(frame, track, State());
     state_ = slam_.AppearanceOnly() ? "appearance only" : ToString(track.state);
     if (slam_.AppearanceOnly() || track.state == TrackingState::kTracking) {
@@ -247,6 +254,12 @@ class Run {
   SpanRecorder recorder_;
   SlamSystem slam_;
   PlantedLoops planted_;
+  LiveFiles live_;
+  Span::Clock::time_point begin_ = Span::Clock::now();
+  internal::Stopwatch watch_;
+  double cpu_begin_ = ProcessCpuSeconds();
+  double read_ms_ = 0, extract_ms_ = 0;            // of the thread that reads ahead
+  double read_wait_ms_ = 0;                        // of this one for that one
   std::optional<Odometry> alone_;                  // as it was before the detector first changed anything
   std::int64_t alone_last_ = -1;                   // index of the last input frame that it has seen
   std::shared_ptr<FrameClock> clock_;              // of playback_
@@ -258,6 +271,12 @@ class Run {
   std::string state_;
   bool lost_open_ = false;
 };
+
+// What can't be written is known before the long work. An earlier trace stays until then.
+void CheckTrace(const fs::path& file) {
+  if (!std::ofstream(file, std::ios::app))
+    throw InputError(file.string() + ": can't be written; check that the folder exists and is writable");
+}
 
 }  // namespace
 
@@ -274,9 +293,8 @@ RunResult RunSlam(const RunRequest& request, const RunConfig& given) {
   result.rig = dataset->Rig();
   std::vector<std::string> warnings = dataset->Warnings();
   const auto reference = ReadReference(*dataset, request, &warnings);
-  PrepareOutputFolder(request.out);
-  if (request.trace)
-    WriteTextFile(*request.trace, "");  // what can't be written is known before the long work
+  OutputFolder folder = OpenOutputFolder(request, reference ? fs::path(reference->second) : fs::path());
+  if (request.trace) CheckTrace(*request.trace);
   if (!request.quiet) {
     for (const std::string& warning : warnings) std::fprintf(stderr, "tutti: %s\n", warning.c_str());
     if (!result.rig.calibrated) {
@@ -291,12 +309,17 @@ RunResult RunSlam(const RunRequest& request, const RunConfig& given) {
     }
   }
   const InterruptGuard guard;
-  Run run(request, result.config, *dataset, result);
-  run.TrackAll();
-  run.TrackUntouched();
-  run.Collect();
-  if (reference) EvaluateRun(reference->first, reference->second, result);
-  WriteOutputs(request.out, result);
+  Run run(request, result.config, *dataset, folder.path(), result);
+  Attempts attempts;
+  attempts.Try([&] { run.TrackAll(); });
+  attempts.Try([&] { run.Count(); });
+  if (!attempts.Failed()) attempts.Try([&] { run.TrackUntouched(); });
+  attempts.Try([&] { run.Collect(); });
+  if (reference) attempts.Try([&] { EvaluateRun(reference->first, reference->second, result); });
+  result.failure = attempts.Failure();
+  const auto trace = [&run] { return run.Trace(); };
+  WriteOutputs(folder, request, result, request.trace ? trace : std::function<std::string()>());
+  attempts.Rethrow();
   return result;
 }
 

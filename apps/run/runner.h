@@ -3,11 +3,13 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
 
 #include "apps/run/frame_clock.h"
+#include "apps/run/output_folder.h"
 #include "apps/run/run_observer.h"
 #include "apps/run/run_result.h"
 
@@ -19,6 +21,7 @@ struct RunRequest {
   std::filesystem::path dataset;                      ///< folder, video file, or camera:0
   std::filesystem::path out;                          ///< folder for the results; made if it is not there
   std::optional<std::filesystem::path> ground_truth;  ///< "none": don't evaluate; default: the data set's own
+  bool keep = false;  ///< number an earlier result in `out` instead of replacing it
   bool no_loops = false;
   std::optional<std::uint64_t> seed;  ///< of everything that draws numbers
   std::optional<int> threads;
@@ -31,12 +34,15 @@ struct RunRequest {
   std::optional<std::filesystem::path> trace;  ///< the same, and write a trace for Chrome or Perfetto there
   bool quiet = false;                          ///< no progress, no notes
   std::vector<std::shared_ptr<RunObserver>> observers;  ///< none null
+  /// Files that go into `out` beside the run's own; names must be of those that a run writes. May be empty.
+  std::function<std::vector<OutputFile>(const RunResult&)> more_files;
 };
 
 /// Runs and writes everything into request.out. Throws InputError for input that makes the run impossible,
 /// and before the long work where it can be known: no configuration, no data, damaged ground truth, an output
-/// folder that can't be written. Bad frames are skipped and counted. SIGINT and SIGTERM end it early, with
-/// everything written.
+/// folder that can't be written, holds what tutti did not write, or is in use. Bad frames are skipped and
+/// counted. SIGINT, SIGTERM, SIGHUP and SIGXFSZ end it early, with everything written. So does an exception
+/// (of an observer, for example), which is thrown on afterwards.
 RunResult RunSlam(const RunRequest& request);
 
 /// The same from a configuration in memory; `request.config` is only a name then.

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "apps/run/interrupt.h"
+#include "apps/run/live_files.h"
 #include "apps/run/outputs.h"
 #include "apps/run/progress.h"
 #include "apps/run/run_evaluation.h"
@@ -61,6 +62,33 @@ class Replay {
   std::int64_t frames_ = 0;
 };
 
+void CloseAll(const TrackedSequence& tracked, const RunRequest& request, const Dataset& dataset,
+              Replay& replay, LiveFiles& live, RunResult& result) {
+  for (const auto& observer : request.observers) observer->OnStart(result.rig);
+  Progress progress("loops", tracked.keyframes.size(), request.quiet ? nullptr : stderr);
+  for (std::size_t k = 0; k < tracked.keyframes.size() && !InterruptGuard::Requested(); ++k) {
+    const TrackedSequence::Keyframe& keyframe = tracked.keyframes[k];
+    const std::optional<std::size_t> place = FindStamp(dataset, keyframe.stamp_s);
+    const ReadResult read = place ? dataset.Read(*place) : ReadResult{std::nullopt, "it is gone", {}};
+    if (!read.frame) {
+      throw InputError("the frame at " + std::to_string(keyframe.stamp_s) +
+                       " s was read before, and now can't be: " + read.error);
+    }
+    TrackResult track;
+    track.state = TrackingState::kTracking;
+    track.keyframe = keyframe.id;
+    replay.Keyframe(*read.frame, tracked.views.at(keyframe.id), keyframe.frames);
+    live.AddLoops(replay.State().loops);
+    for (const auto& observer : request.observers) observer->OnFrame(*read.frame, track, replay.State());
+    progress.Update(k + 1, std::to_string(CountAccepted(replay.State().loops)) + " loops");
+  }
+  result.interrupted = InterruptGuard::Requested();
+  replay.Finish();
+  live.AddLoops(replay.State().loops);
+  for (const auto& observer : request.observers) observer->OnEnd(replay.State());
+  progress.Finish();
+}
+
 }  // namespace
 
 TrackedSequence TrackSequence(RunRequest request, RunConfig config) {
@@ -84,43 +112,29 @@ RunResult CloseLoops(const TrackedSequence& tracked, const RunRequest& request, 
   const std::unique_ptr<Dataset> dataset = OpenDataset(request.dataset, result.config.dataset);
   std::vector<std::string> warnings;
   const auto reference = ReadReference(*dataset, request, &warnings);
-  PrepareOutputFolder(request.out);
+  OutputFolder folder = OpenOutputFolder(request, reference ? reference->second : std::string());
   const InterruptGuard guard;
   Replay replay(Watched(result.config, request), result.rig, *tracked.odometry);
   replay.loops().SetDetectionListener([&request](const LoopResult& detection) {
     for (const auto& observer : request.observers) observer->OnDetection(detection);
   });
-  for (const auto& observer : request.observers) observer->OnStart(result.rig);
-  Progress progress("loops", tracked.keyframes.size(), request.quiet ? nullptr : stderr);
-  for (std::size_t k = 0; k < tracked.keyframes.size() && !InterruptGuard::Requested(); ++k) {
-    const TrackedSequence::Keyframe& keyframe = tracked.keyframes[k];
-    const std::optional<std::size_t> place = FindStamp(*dataset, keyframe.stamp_s);
-    const ReadResult read = place ? dataset->Read(*place) : ReadResult{std::nullopt, "it is gone", {}};
-    if (!read.frame) {
-      throw InputError("the frame at " + std::to_string(keyframe.stamp_s) +
-                       " s was read before, and now can't be: " + read.error);
-    }
-    TrackResult track;
-    track.state = TrackingState::kTracking;
-    track.keyframe = keyframe.id;
-    replay.Keyframe(*read.frame, tracked.views.at(keyframe.id), keyframe.frames);
-    for (const auto& observer : request.observers) observer->OnFrame(*read.frame, track, replay.State());
-    progress.Update(k + 1, std::to_string(CountAccepted(replay.State().loops)) + " loops");
-  }
-  result.interrupted = InterruptGuard::Requested();
-  replay.Finish();
-  for (const auto& observer : request.observers) observer->OnEnd(replay.State());
-  progress.Finish();
-  for (const auto& [name, ms] : replay.loops().StageMilliseconds()) result.stage_ms[name] = ms;
-  result.wall_s += watch.Seconds();
-  result.cpu_s += ProcessCpuSeconds() - cpu_begin;
-  CollectMap(replay.State(), result);
-  result.global_adjustments = replay.loops().closer().Adjustments();
-  result.graph = replay.loops().closer().Graph(*replay.State().odometry);
-  result.graph_proof = replay.loops().closer().proof();
-  result.trajectory_odometry = tracked.result.trajectory;
-  if (reference) EvaluateRun(reference->first, reference->second, result);
-  WriteOutputs(request.out, result);
+  LiveFiles live(folder.path(), result.rig, result.config);
+  Attempts attempts;
+  attempts.Try([&] { CloseAll(tracked, request, *dataset, replay, live, result); });
+  attempts.Try([&] {
+    for (const auto& [name, ms] : replay.loops().StageMilliseconds()) result.stage_ms[name] = ms;
+    result.wall_s += watch.Seconds();
+    result.cpu_s += ProcessCpuSeconds() - cpu_begin;
+    CollectMap(replay.State(), result);
+    result.global_adjustments = replay.loops().closer().Adjustments();
+    result.graph = replay.loops().closer().Graph(*replay.State().odometry);
+    result.graph_proof = replay.loops().closer().proof();
+    result.trajectory_odometry = tracked.result.trajectory;
+  });
+  if (reference) attempts.Try([&] { EvaluateRun(reference->first, reference->second, result); });
+  result.failure = attempts.Failure();
+  WriteOutputs(folder, request, result);
+  attempts.Rethrow();
   return result;
 }
 

@@ -32,7 +32,9 @@ std::vector<fs::path> Summaries(const std::string& where) {
   std::vector<std::string> files;
   for (fs::recursive_directory_iterator it(where, fs::directory_options::skip_permission_denied, error), end;
        !error && it != end; it.increment(error)) {
-    if (it->path().filename() == "summary.json") files.push_back(it->path().string());
+    const std::string name = it->path().filename();
+    if (name[0] == '.') it.disable_recursion_pending();  // what a killed run had not finished
+    if (name == "summary.json") files.push_back(it->path().string());
   }
   if (error) throw InputError(where + ": can't be read (" + error.message() + ")");
   if (files.empty()) throw InputError(where + ": holds no summary.json; give folders of `tutti run --out`");

@@ -23,8 +23,8 @@ struct RunArguments {
   std::string config, dataset, out, ground_truth;
   std::string trace;
   std::vector<std::string> set;  // SECTION.KEY=VALUE
-  bool no_loops = false, no_report = false, quiet = false, help_config = false, advanced = false,
-       timing = false, realtime = false;
+  bool no_loops = false, no_report = false, quiet = false, keep = false, help_config = false,
+       advanced = false, timing = false, realtime = false;
   std::uint64_t seed = 1;
   int threads = 2;
   int inject_false_loops = 0;
@@ -91,6 +91,7 @@ int Run(const CLI::App& command, const RunArguments& arguments) {
   request.out = arguments.out;
   request.no_loops = arguments.no_loops;
   request.quiet = arguments.quiet;
+  request.keep = arguments.keep;
   if (command.count("--follow") > 0) request.follow_s = arguments.follow_s;
   // A camera does not wait.
   request.realtime = arguments.realtime || IsCameraDevice(arguments.dataset);
@@ -128,7 +129,12 @@ void SetUpRun(CLI::App& command, int& exit_code) {
       "--dataset", arguments->dataset,
       "folder of the data set, a video file, or a camera: camera:0 (the first one), camera:1, ...; "
       "camera:FILE takes a video file for it");
-  command.add_option("--out", arguments->out, "folder for the results");
+  command.add_option("--out", arguments->out,
+                     "folder for the results: a new or empty one, or that of an earlier run, whose results "
+                     "are replaced when the new ones are complete");
+  command.add_flag(
+      "--keep", arguments->keep,
+      "don't replace earlier results in --out: move them into OUT/1, the next ones into OUT/2, ...");
   command.add_option(
       "--ground-truth", arguments->ground_truth,
       "trajectory to evaluate against (default: the data set's own, if it has one; 'none': don't)");

@@ -1,6 +1,8 @@
 #include "apps/tutti/run_with_report.h"
 
 #include <memory>
+#include <utility>
+#include <vector>
 
 #include "apps/report/comparison_report.h"
 #include "apps/report/page.h"
@@ -11,11 +13,22 @@ namespace tutti::cli {
 
 namespace {
 
-void WriteReport(const std::filesystem::path& out, const RunResult& result, const DetectionLog& log) {
-  nlohmann::ordered_json report = RunReport(result, log, VariantName(result.config));
-  WriteText(out / "report.json",
-            report.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
-  WriteReportPage(out / "report.html", SingleRunPage(std::move(report)));
+// The report's files, as RunRequest::more_files.
+std::function<std::vector<OutputFile>(const RunResult&)> ReportOf(std::shared_ptr<const DetectionLog> log) {
+  return [log](const RunResult& result) {
+    const auto report =
+        std::make_shared<nlohmann::ordered_json>(RunReport(result, *log, VariantName(result.config)));
+    std::vector<OutputFile> files;
+    files.push_back({"report.json", [report](const std::filesystem::path& file) {
+                       const auto replace = nlohmann::ordered_json::error_handler_t::replace;
+                       WriteText(file, report->dump(-1, ' ', false, replace) + "\n");
+                     }});
+    if (!ReportsAvailable()) return files;
+    files.push_back({"report.html", [report](const std::filesystem::path& file) {
+                       WriteReportPage(file, SingleRunPage(std::move(*report)));
+                     }});
+    return files;
+  };
 }
 
 }  // namespace
@@ -23,23 +36,20 @@ void WriteReport(const std::filesystem::path& out, const RunResult& result, cons
 RunResult RunWithReport(RunRequest request, const RunConfig& config) {
   const auto log = std::make_shared<DetectionLog>();
   request.observers.push_back(log);
-  RunResult result = RunSlam(request, config);
-  WriteReport(request.out, result, *log);
-  return result;
+  request.more_files = ReportOf(log);
+  return RunSlam(request, config);
 }
 
-TrackedSequence TrackWithReport(const RunRequest& request, const RunConfig& config) {
-  TrackedSequence sequence = TrackSequence(request, config);
-  WriteReport(request.out, sequence.result, DetectionLog());
-  return sequence;
+TrackedSequence TrackWithReport(RunRequest request, const RunConfig& config) {
+  request.more_files = ReportOf(std::make_shared<DetectionLog>());
+  return TrackSequence(request, config);
 }
 
 RunResult CloseLoopsWithReport(const TrackedSequence& tracked, RunRequest request, const RunConfig& config) {
   const auto log = std::make_shared<DetectionLog>();
   request.observers.push_back(log);
-  RunResult result = CloseLoops(tracked, request, config);
-  WriteReport(request.out, result, *log);
-  return result;
+  request.more_files = ReportOf(log);
+  return CloseLoops(tracked, request, config);
 }
 
 }  // namespace tutti::cli

@@ -8,12 +8,12 @@
 
 namespace tutti::cli {
 
-/// RunSlam, and then request.out/report.json and report.html (the page, unless tutti was built without the
-/// chart library). Throws what RunSlam does, and InputError if they can't be written.
+/// RunSlam, with report.json and report.html (the page, unless tutti was built without the chart library)
+/// among its files. Throws what RunSlam does, and InputError if they can't be written.
 RunResult RunWithReport(RunRequest request, const RunConfig& config);
 
 /// The same for a sequence that is tracked without loops, and for loops that are closed on it.
-TrackedSequence TrackWithReport(const RunRequest& request, const RunConfig& config);
+TrackedSequence TrackWithReport(RunRequest request, const RunConfig& config);
 RunResult CloseLoopsWithReport(const TrackedSequence& tracked, RunRequest request, const RunConfig& config);
 
 }  // namespace tutti::cli

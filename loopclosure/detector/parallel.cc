@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <exception>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -25,7 +26,10 @@ void RunParallel(int count, int threads, const std::function<void(int)>& task) {
     }
   };
   std::vector<std::thread> helpers;
-  for (int t = 1; t < std::min(threads, count); ++t) helpers.emplace_back(work);
+  try {
+    for (int t = 1; t < std::min(threads, count); ++t) helpers.emplace_back(work);
+  } catch (const std::system_error&) {  // no memory for one more: those that are there do its part
+  }
   work();
   for (std::thread& helper : helpers) helper.join();
   for (const std::exception_ptr& error : errors) {

@@ -1,0 +1,73 @@
+#include "apps/run/live_files.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <utility>
+
+#include "apps/run/outputs.h"
+#include "core/tum_line.h"
+
+namespace tutti {
+
+GrowingFile::GrowingFile(std::filesystem::path file, const std::string& header)
+    : file_(std::move(file)),
+      descriptor_(open(file_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666)) {
+  Append(header);
+}
+
+GrowingFile::~GrowingFile() {
+  if (descriptor_ >= 0) close(descriptor_);
+}
+
+void GrowingFile::Append(const std::string& lines) {
+  if (failed_) return;
+  const off_t begin = lseek(descriptor_, 0, SEEK_CUR);
+  for (std::size_t done = 0; done < lines.size();) {
+    const ssize_t size = write(descriptor_, lines.data() + done, lines.size() - done);
+    if (size < 0 && errno == EINTR) continue;
+    if (size < 0) {
+      failed_ = true;
+      problem_ = file_.string() + " grows no further (" + std::strerror(errno) + "); the run goes on";
+      if (begin >= 0 && ftruncate(descriptor_, begin) != 0) return;  // half a line stays then
+      return;
+    }
+    done += static_cast<std::size_t>(size);
+  }
+}
+
+std::optional<std::string> GrowingFile::TakeProblem() { return std::exchange(problem_, std::nullopt); }
+
+LiveFiles::LiveFiles(const std::filesystem::path& folder, const CameraRig& rig, const RunConfig& config)
+    : T_camera_body_(rig.T_body_camera.Inverse()),
+      members_(OtherMembers(config.loops.members)),
+      loops_(folder / kLiveLoops, LoopsCsvHeader(members_)) {
+  if (rig.calibrated) poses_.emplace(folder / kLiveTrajectory, internal::kTumHeader);
+}
+
+void LiveFiles::Add(double stamp_s, const TrackResult& track, const RunState& state) {
+  AddLoops(state.loops);
+  if (!poses_ || track.state != TrackingState::kTracking) return;
+  trajectory_.push_back({stamp_s, track.T_world_camera * T_camera_body_});
+  poses_->Append(internal::TumLine(trajectory_.back()));
+}
+
+void LiveFiles::AddLoops(const std::vector<LoopRecord>& loops) {
+  std::string lines;
+  for (; loops_written_ < loops.size(); ++loops_written_)
+    lines += LoopsCsvLine(loops[loops_written_], members_);
+  if (!lines.empty()) loops_.Append(lines);
+}
+
+std::vector<std::string> LiveFiles::TakeProblems() {
+  std::vector<std::string> problems;
+  for (GrowingFile* file : {poses_ ? &*poses_ : nullptr, &loops_}) {
+    const auto problem = file != nullptr ? file->TakeProblem() : std::nullopt;
+    if (problem) problems.push_back(*problem);
+  }
+  return problems;
+}
+
+}  // namespace tutti

@@ -1,0 +1,62 @@
+// What a run knows so far, on disk while it goes on: for whoever looks, and in case the run is killed.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/run/run_observer.h"
+#include "tutti/slam/config.h"
+
+namespace tutti {
+
+constexpr const char* kLiveTrajectory = "trajectory_live.txt";
+constexpr const char* kLiveLoops = "loops_live.csv";
+
+/// A file that grows by whole lines, each of which is the system's once Append returns.
+class GrowingFile {
+ public:
+  /// Begins anew.
+  GrowingFile(std::filesystem::path file, const std::string& header);
+  ~GrowingFile();
+  GrowingFile(const GrowingFile&) = delete;
+  GrowingFile& operator=(const GrowingFile&) = delete;
+
+  /// Does nothing any more once a write has failed: what there is stays a beginning of the whole.
+  void Append(const std::string& lines);
+  /// Why it grows no further, once.
+  std::optional<std::string> TakeProblem();
+
+ private:
+  std::filesystem::path file_;
+  int descriptor_;
+  bool failed_ = false;
+  std::optional<std::string> problem_;
+};
+
+/// trajectory_live.txt and loops_live.csv. The same bytes for any number of threads.
+class LiveFiles {
+ public:
+  LiveFiles(const std::filesystem::path& folder, const CameraRig& rig, const RunConfig& config);
+
+  /// After each frame: its pose as it is given out now, and the loops that came with it.
+  void Add(double stamp_s, const TrackResult& track, const RunState& state);
+  /// Loops alone.
+  void AddLoops(const std::vector<LoopRecord>& loops);
+  /// For the terminal: why a file grows no further.
+  std::vector<std::string> TakeProblems();
+
+  /// All poses so far, T_world_body.
+  const Trajectory& trajectory() const { return trajectory_; }
+
+ private:
+  Pose T_camera_body_;
+  std::vector<std::string> members_;  // with columns of their own in loops_live.csv
+  std::optional<GrowingFile> poses_;  // with a calibration
+  GrowingFile loops_;
+  std::size_t loops_written_ = 0;
+  Trajectory trajectory_;
+};
+
+}  // namespace tutti

@@ -1,0 +1,73 @@
+// The folder that results go into. Nothing that tutti did not write is touched, and an earlier result stays
+// until a new one is complete.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace tutti {
+
+/// One file of a result.
+struct OutputFile {
+  std::string name;
+  std::function<void(const std::filesystem::path&)> write;  ///< throws if it can't be written in full
+};
+
+/// What a command leaves in its folder.
+struct OutputLayout {
+  bool (*is_result)(const std::filesystem::path& entry) = nullptr;  ///< of files and folders of a result
+  std::string last;               ///< JSON file that comes last: where it is, the result is complete
+  std::string key;                ///< that this file has, by which it is known as tutti's
+  std::vector<std::string> live;  ///< files that grow while the command runs; gone when it has finished
+};
+
+/// Holds the folder for one process. New files wait in a hidden folder inside and are moved into place
+/// together, so a process that is killed leaves the earlier result as it was; if it is killed between the
+/// first and the last move, the next one on this folder moves the rest.
+class OutputFolder {
+ public:
+  /// Makes the folder, proves that it can be written to and has room, and locks it. `keep`: an earlier result
+  /// is not replaced but moved into a folder inside, 1, 2, ... `own`: one more file that may be there. Throws
+  /// InputError that says what to do, before anything changed: no folder can be made, another process holds
+  /// it, or it has files that tutti did not write.
+  OutputFolder(std::filesystem::path folder, OutputLayout layout, bool keep = false,
+               const std::optional<std::filesystem::path>& own = std::nullopt);
+  ~OutputFolder();
+  OutputFolder(const OutputFolder&) = delete;
+  OutputFolder& operator=(const OutputFolder&) = delete;
+
+  const std::filesystem::path& path() const { return folder_; }
+
+  /// Writes a file of the new result to where it waits. What goes wrong stands in failures().
+  void Write(const OutputFile& file) noexcept;
+  /// One line for each file that could not be written, with the reason.
+  const std::vector<std::string>& failures() const { return failures_; }
+
+  /// Moves the new result into place; to be called once, after the last file. One that is not `whole`, or
+  /// lacks a file, never replaces a complete earlier one: it goes into the folder "unfinished" inside.
+  /// Returns where it is. Throws InputError if that fails.
+  std::filesystem::path Finish(bool whole);
+
+ private:
+  std::vector<std::filesystem::path> Results() const;
+  void RefuseForeign(const std::optional<std::filesystem::path>& own) const;
+  void Lock();
+  void CheckRoom() const;
+  std::filesystem::path NextNumber() const;
+  void KeepLeftovers() const;
+  void Enter() const;
+
+  std::filesystem::path folder_, staging_;
+  OutputLayout layout_;
+  bool keep_;
+  int lock_ = -1;
+  std::vector<std::string> failures_;
+};
+
+/// Throws InputError if `file`, which the command reads, lies in `folder`, which it writes.
+void RefuseToReplace(const std::filesystem::path& folder, const std::filesystem::path& file);
+
+}  // namespace tutti

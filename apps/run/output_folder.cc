@@ -161,11 +161,14 @@ void OutputFolder::CheckRoom() const {
   const fs::path probe = folder_ / ".tutti-write-test";
   std::error_code error;
   std::ofstream file(probe, std::ios::binary);
-  file << std::string(1 << 16, 'x');
+  file << std::string(1 << 10, 'x');
   file.close();
+  const int reason = errno;
   fs::remove(probe, error);
-  if (!file)
-    throw InputError(folder_.string() + ": the disk is full; free some space or choose another --out");
+  if (!file) {
+    throw InputError(folder_.string() + ": can't be written to (" + std::strerror(reason) +
+                     "); free some space or choose another --out");
+  }
   const fs::space_info space = fs::space(folder_, error);
   if (!error && space.available < kRoomBytes) {
     throw InputError(folder_.string() +

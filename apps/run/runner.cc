@@ -293,6 +293,7 @@ RunResult RunSlam(const RunRequest& request, const RunConfig& given) {
   result.rig = dataset->Rig();
   std::vector<std::string> warnings = dataset->Warnings();
   const auto reference = ReadReference(*dataset, request, &warnings);
+  const InterruptGuard guard;
   OutputFolder folder = OpenOutputFolder(request, reference ? fs::path(reference->second) : fs::path());
   if (request.trace) CheckTrace(*request.trace);
   if (!request.quiet) {
@@ -308,7 +309,6 @@ RunResult RunSlam(const RunRequest& request, const RunConfig& given) {
                    f.advice.c_str());
     }
   }
-  const InterruptGuard guard;
   Run run(request, result.config, *dataset, folder.path(), result);
   Attempts attempts;
   attempts.Try([&] { run.TrackAll(); });

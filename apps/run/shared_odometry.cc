@@ -112,8 +112,8 @@ RunResult CloseLoops(const TrackedSequence& tracked, const RunRequest& request, 
   const std::unique_ptr<Dataset> dataset = OpenDataset(request.dataset, result.config.dataset);
   std::vector<std::string> warnings;
   const auto reference = ReadReference(*dataset, request, &warnings);
-  OutputFolder folder = OpenOutputFolder(request, reference ? reference->second : std::string());
   const InterruptGuard guard;
+  OutputFolder folder = OpenOutputFolder(request, reference ? reference->second : std::string());
   Replay replay(Watched(result.config, request), result.rig, *tracked.odometry);
   replay.loops().SetDetectionListener([&request](const LoopResult& detection) {
     for (const auto& observer : request.observers) observer->OnDetection(detection);

@@ -1,0 +1,56 @@
+// trajectory_live.txt and loops_live.csv grow line by line.
+#include "apps/run/live_files.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/apps/tutti/executable.h"
+#include "tests/support/test_data.h"
+
+namespace tutti {
+namespace {
+
+using ::testing::EndsWith;
+using ::testing::HasSubstr;
+using testing::ReadAll;
+
+TEST(LiveFiles, EveryLineIsThereAtOnce) {
+  const auto folder = testing::FreshFolder();
+  CameraRig rig;
+  rig.calibrated = true;
+  LiveFiles live(folder, rig, RunConfig());
+  std::vector<LoopRecord> loops;
+  const RunState state = {nullptr, loops, 0};
+  TrackResult track;
+  live.Add(0.5, track, state);  // it has no pose yet
+  const std::string header = "# timestamp tx ty tz qx qy qz qw\n";
+  EXPECT_EQ(ReadAll(folder / kLiveTrajectory), header);
+  track.state = TrackingState::kTracking;
+  track.T_world_camera.translation.x() = 2;
+  loops.emplace_back();
+  loops.back().query = 7;
+  live.Add(1, track, state);
+  EXPECT_EQ(ReadAll(folder / kLiveTrajectory),
+            header +
+                "1.000000000 2.000000000 0.000000000 0.000000000 0.000000000 0.000000000 0.000000000 "
+                "1.000000000\n");
+  EXPECT_THAT(ReadAll(folder / kLiveLoops), HasSubstr("\n7,-1,"));
+  const std::string before = ReadAll(folder / kLiveLoops);
+  live.Add(2, track, state);
+  EXPECT_EQ(ReadAll(folder / kLiveLoops), before);  // each loop once
+  EXPECT_THAT(ReadAll(folder / kLiveTrajectory), EndsWith("1.000000000\n"));
+  EXPECT_EQ(live.trajectory().size(), 2u);
+  EXPECT_TRUE(live.TakeProblems().empty());
+}
+
+TEST(GrowingFile, AFullDiskIsSaidOnceAndEndsNoRun) {
+  GrowingFile file("/dev/full", "header\n");
+  const auto problem = file.TakeProblem();
+  ASSERT_TRUE(problem);
+  EXPECT_THAT(*problem, HasSubstr("No space left on device"));
+  file.Append("line\n");
+  EXPECT_FALSE(file.TakeProblem());
+}
+
+}  // namespace
+}  // namespace tutti

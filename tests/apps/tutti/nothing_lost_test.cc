@@ -1,0 +1,183 @@
+// `tutti run` that is killed, hung up on, or out of room: what was computed, now or earlier, is there.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <csignal>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "apps/run/output_folder.h"
+#include "tests/apps/tiny_town.h"
+#include "tests/apps/tutti/executable.h"
+#include "tests/support/test_data.h"
+#include "tutti/core/trajectory.h"
+
+namespace tutti {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using testing::ReadAll;
+using ::testing::StartsWith;
+
+class NothingLost : public ::testing::Test {
+ protected:
+  std::vector<std::string> Arguments(std::vector<std::string> more = {}) const {
+    std::vector<std::string> arguments = {"run",
+                                          "--config",
+                                          testing::TinyConfig(folder_).string(),
+                                          "--dataset",
+                                          testing::TinyTown().string(),
+                                          "--out",
+                                          out_.string(),
+                                          "--no-report"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
+  }
+  testing::ProcessResult Run(const std::vector<std::string>& more = {}) const {
+    return testing::RunTutti(Arguments(more));
+  }
+  // Through a shell, which sets something before.
+  testing::ProcessResult RunAfter(const std::string& command, const std::vector<std::string>& more) const {
+    std::vector<std::string> words = {"-c", command + " \"$0\" \"$@\"", TUTTI_EXECUTABLE};
+    const std::vector<std::string> arguments = Arguments(more);
+    words.insert(words.end(), arguments.begin(), arguments.end());
+    return testing::RunProgramAndSignal("/bin/sh", words, "", 0);
+  }
+  // Of the result, without what is hidden or grows.
+  std::map<std::string, std::string> Files() const {
+    std::map<std::string, std::string> files;
+    for (const auto& entry : fs::directory_iterator(out_)) {
+      const std::string name = entry.path().filename();
+      if (name[0] != '.' && name.find("_live") == std::string::npos) files[name] = ReadAll(entry.path());
+    }
+    return files;
+  }
+
+  const fs::path folder_ = testing::FreshFolder(), out_ = folder_ / "out";
+};
+
+TEST_F(NothingLost, KilledARunLeavesTheEarlierResultAndItsPosesSoFar) {
+  ASSERT_EQ(Run().status, 0);
+  const auto earlier = Files();
+  EXPECT_EQ(earlier.count("trajectory_online.txt"), 1u);
+  for (const char* moment : {" 10%", " 50%", " 90%"}) {
+    const auto run = testing::RunTuttiAndSignal(Arguments(), moment, SIGKILL);
+    ASSERT_EQ(run.status, 128 + SIGKILL) << run.output;
+    EXPECT_EQ(Files(), earlier) << moment;
+  }
+  // Both runs saw the same.
+  const std::string live = ReadAll(out_ / "trajectory_live.txt");
+  EXPECT_THAT(earlier.at("trajectory_online.txt"), StartsWith(live));
+  EXPECT_GE(ReadTrajectory(out_ / "trajectory_live.txt", TrajectoryFormat::kTum).size(), 20u);
+  EXPECT_THAT(ReadAll(out_ / "loops_live.csv"), StartsWith("query,candidate,"));
+  const auto run = Run({"--end", "5"});  // what is left over is in nobody's way
+  EXPECT_EQ(run.status, 0) << run.output;
+  EXPECT_FALSE(fs::exists(out_ / "trajectory_live.txt"));
+  EXPECT_EQ(ReadTrajectory(out_ / "trajectory.txt", TrajectoryFormat::kTum).size(), 5u);
+}
+
+TEST_F(NothingLost, KilledAtAnyTimeTheResultIsOneOfTheTwo) {
+  ASSERT_EQ(Run({"--end", "3"}).status, 0);
+  const std::string earlier = Files().at("trajectory.txt");
+  ASSERT_EQ(Run({"--end", "4"}).status, 0);
+  const std::string next = Files().at("trajectory.txt");
+  ASSERT_EQ(Run({"--end", "3"}).status, 0);
+  bool killed = true;
+  for (int ms = 20; ms < 3000 && killed; ms += ms / 3 + 10) {
+    const auto run =
+        RunAfter("exec timeout -s KILL " + std::to_string(ms / 1000.0), {"--end", "4", "--quiet"});
+    killed = run.status != 0;
+    const auto now = Files();
+    const std::string trajectory = now.at("trajectory.txt");
+    EXPECT_TRUE(trajectory == earlier || trajectory == next) << ms << " ms: " << trajectory;
+    const auto summary = nlohmann::json::parse(now.at("summary.json"));
+    EXPECT_EQ(summary["frames"]["tracked"], trajectory == next ? 4 : 3) << ms << " ms";
+    if (trajectory == next) break;
+  }
+}
+
+TEST_F(NothingLost, HungUpOnItWritesWhatThereIs) {
+  const auto run = testing::RunTuttiAndSignal(Arguments(), " 20%", SIGHUP);
+  EXPECT_EQ(run.status, 130) << run.output;
+  EXPECT_THAT(run.output, HasSubstr("interrupted"));
+  const auto poses = ReadTrajectory(out_ / "trajectory.txt", TrajectoryFormat::kTum).size();
+  EXPECT_GT(poses, 3u);
+  EXPECT_LT(poses, static_cast<std::size_t>(testing::kTinyFrames));
+}
+
+TEST_F(NothingLost, WhatHasNoRoomIsNamedAndTheRestIsWritten) {
+  // 10 KB a file: enough for the trajectories, too little for the picture.
+  const auto run = RunAfter("ulimit -f 20; exec", {});
+  EXPECT_EQ(run.status, 1) << run.output;
+  EXPECT_THAT(run.output, AllOf(HasSubstr("trajectory.png: File too large"),
+                                HasSubstr("the rest is in " + out_.string())));
+  EXPECT_EQ(ReadTrajectory(out_ / "trajectory.txt", TrajectoryFormat::kTum).size(),
+            static_cast<std::size_t>(testing::kTinyFrames));
+  EXPECT_TRUE(fs::exists(out_ / "trajectory.svg"));
+  EXPECT_TRUE(fs::exists(out_ / "summary.json"));
+  EXPECT_FALSE(fs::exists(out_ / "trajectory.png"));
+}
+
+TEST_F(NothingLost, AFileAtItsLimitEndsTheRunLikeAHangUp) {
+  const auto run = RunAfter("ulimit -f 5; exec", {});  // 2.5 KB: the poses of some 25 frames
+  EXPECT_EQ(run.status, 1) << run.output;
+  EXPECT_THAT(run.output, AllOf(HasSubstr("trajectory_live.txt grows no further (File too large)"),
+                                HasSubstr("interrupted after")));
+  EXPECT_GE(ReadTrajectory(out_ / "trajectory_live.txt", TrajectoryFormat::kTum).size(), 20u);
+}
+
+TEST_F(NothingLost, ATraceThatCanNotBeWrittenCostsNothingElse) {
+  const auto run = Run({"--end", "4", "--trace", "/dev/full"});
+  EXPECT_EQ(run.status, 1) << run.output;
+  EXPECT_THAT(run.output, AllOf(HasSubstr("/dev/full"), HasSubstr("No space left on device")));
+  EXPECT_EQ(Files().size(), 9u);
+}
+
+TEST_F(NothingLost, ForeignFoldersAreRefusedAndStayAsTheyAre) {
+  const fs::path data = testing::CopyOfTinyTown(folder_ / "data");
+  auto arguments = Arguments();
+  arguments[6] = data.string();
+  const auto run = testing::RunTutti(arguments);
+  EXPECT_EQ(run.status, 1);
+  EXPECT_THAT(run.output, AllOf(StartsWith("tutti: " + data.string()), HasSubstr("choose another --out")));
+  EXPECT_FALSE(fs::exists(data / ".tutti-lock"));
+  EXPECT_EQ(ReadAll(data / "poses.txt"), ReadAll(testing::TinyTown() / "poses.txt"));
+}
+
+TEST_F(NothingLost, TheReferenceIsNotReplaced) {
+  ASSERT_EQ(Run({"--end", "4"}).status, 0);
+  const auto earlier = Files();
+  const auto run = Run({"--ground-truth", (out_ / "trajectory.txt").string()});
+  EXPECT_EQ(run.status, 1);
+  EXPECT_THAT(run.output, HasSubstr("trajectory.txt, which this run reads"));
+  EXPECT_EQ(Files(), earlier);
+}
+
+TEST_F(NothingLost, ASecondRunOnOneFolderIsRefusedWithTheFirstOnesProcess) {
+  const OutputFolder first(out_, {[](const fs::path&) { return false; }, "summary.json", "version", {}});
+  const auto run = Run();
+  EXPECT_EQ(run.status, 1);
+  EXPECT_THAT(run.output, HasSubstr("process " + std::to_string(getpid())));
+}
+
+TEST_F(NothingLost, KeepNumbersEarlierResults) {
+  for (const char* end : {"3", "4", "5"}) ASSERT_EQ(Run({"--end", end, "--keep"}).status, 0);
+  const auto poses = [this](const fs::path& folder) {
+    return ReadTrajectory(out_ / folder / "trajectory.txt", TrajectoryFormat::kTum).size();
+  };
+  EXPECT_EQ(poses("1"), 3u);
+  EXPECT_EQ(poses("2"), 4u);
+  EXPECT_EQ(poses("."), 5u);
+}
+
+TEST_F(NothingLost, LivePosesAreTheSameForAnyNumberOfThreads) {
+  ASSERT_EQ(Run({"--threads", "1"}).status, 0);
+  const std::string one = ReadAll(out_ / "trajectory_online.txt");
+  ASSERT_EQ(Run({"--threads", "2"}).status, 0);
+  EXPECT_EQ(ReadAll(out_ / "trajectory_online.txt"), one);
+}
+
+}  // namespace
+}  // namespace tutti

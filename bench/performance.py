@@ -29,9 +29,9 @@ def summary_of(tutti, name, data, out, reuse):
         load = os.getloadavg()[0]
         subprocess.run([tutti, "run", "--config", table.ROOT / "data" / "configs" / config, "--dataset", data / dataset,
                         "--out", folder, "--timing", "--trace", out / f"{name}.json"], check=True)
-        (folder / "load.txt").write_text(f"{load:.1f}")
+        (out / f"{name}-load.txt").write_text(f"{load:.1f}")
     summary = json.loads((folder / "summary.json").read_text())
-    load = folder / "load.txt"
+    load = out / f"{name}-load.txt"
     summary["load"] = load.read_text() if load.exists() else "unknown"
     return summary
 

@@ -118,7 +118,7 @@ std::string Attempts::Failure() const {
 
 OutputFolder OpenOutputFolder(const RunRequest& request, const fs::path& reference) {
   if (!reference.empty()) RefuseToReplace(request.out, reference);
-  const OutputLayout layout = {IsResult, "summary.json", "version", {kLiveTrajectory, kLiveLoops}};
+  const OutputLayout layout = {IsResult, "summary.json", "version", {kLiveTrajectory, kLiveLoops}, nullptr};
   return OutputFolder(request.out, layout, request.keep, request.trace);
 }
 
@@ -170,7 +170,7 @@ void WriteTrace(const fs::path& file, const std::string& text) {
 
 }  // namespace
 
-void WriteOutputs(OutputFolder& folder, const RunRequest& request, const RunResult& result,
+void WriteOutputs(OutputFolder& folder, const RunRequest& request, RunResult& result,
                   const std::function<std::string()>& trace) {
   for (const OutputFile& file : RunFiles(result)) folder.Write(file);
   Attempts more;
@@ -178,7 +178,7 @@ void WriteOutputs(OutputFolder& folder, const RunRequest& request, const RunResu
     if (!request.more_files) return;
     for (const OutputFile& file : request.more_files(result)) folder.Write(file);
   });
-  const fs::path where = folder.Finish(result.failure.empty() && !more.Failed());
+  result.folder = folder.Finish(result.Finished() && !more.Failed());
   std::vector<std::string> failures = folder.failures();
   if (more.Failed()) failures.push_back("the report: " + more.Failure());
   if (trace) {
@@ -189,11 +189,9 @@ void WriteOutputs(OutputFolder& folder, const RunRequest& request, const RunResu
     if (writing.Failed()) failures.push_back(writing.Failure() + reason);
   }
   if (!result.failure.empty())
-    std::fprintf(stderr, "tutti: the run broke off; what there was by then is in %s\n", where.c_str());
-  if (failures.empty()) return;
-  std::string message = "not everything could be written:";
-  for (const std::string& failure : failures) message += "\n  " + failure;
-  throw InputError(message + "\n  the rest is in " + where.string());
+    std::fprintf(stderr, "tutti: the run broke off; what there was by then is in %s\n",
+                 result.folder.c_str());
+  ThrowFailures(failures, result.folder);
 }
 
 }  // namespace tutti

@@ -55,10 +55,10 @@ std::string Reason(int error, const std::exception& thrown) {
   return thrown.what();
 }
 
-bool HasKey(const fs::path& file, const std::string& key) {
+nlohmann::json ReadJson(const fs::path& file) {
   std::ifstream in(file);
-  const nlohmann::json json = nlohmann::json::parse(in, nullptr, false);
-  return json.is_object() && json.contains(key);
+  nlohmann::json json = nlohmann::json::parse(in, nullptr, false);
+  return json.is_object() ? json : nlohmann::json::object();
 }
 
 bool Within(const fs::path& folder, const fs::path& file) {
@@ -73,6 +73,13 @@ void RefuseToReplace(const fs::path& folder, const fs::path& file) {
   if (!Within(folder, file)) return;
   throw InputError(folder.string() + ": holds " + file.string() +
                    ", which this run reads; choose another --out");
+}
+
+void ThrowFailures(const std::vector<std::string>& failures, const fs::path& rest) {
+  if (failures.empty()) return;
+  std::string message = "not everything could be written:";
+  for (const std::string& failure : failures) message += "\n  " + failure;
+  throw InputError(message + "\n  the rest is in " + rest.string());
 }
 
 OutputFolder::OutputFolder(fs::path folder, OutputLayout layout, bool keep,
@@ -117,17 +124,18 @@ void OutputFolder::RefuseForeign(const std::optional<fs::path>& own) const {
     const std::string name = entry.path().filename();
     if (name[0] == '.') continue;
     if (own && Within(entry.path(), *own)) continue;
+    if (layout_.is_part != nullptr && layout_.is_part(entry.path())) continue;
     empty = false;
     const auto& live = layout_.live;
-    if (layout_.is_result(entry.path()) || std::count(live.begin(), live.end(), name) > 0 ||
-        (entry.is_directory(error) && (name == kUnfinished || IsNumber(name))))
-      continue;
+    if (layout_.is_result(entry.path()) || std::count(live.begin(), live.end(), name) > 0) continue;
+    if (entry.is_directory(error) && (name == kUnfinished || IsNumber(name))) continue;
     throw InputError(folder_.string() + ": holds " + name +
                      ", which is no result of tutti; choose another --out, or move it away");
   }
   if (error)
     throw InputError(folder_.string() + ": can't be read (" + error.message() + "); choose another --out");
-  if (empty || fs::exists(folder_ / kLock, error) || HasKey(folder_ / layout_.last, layout_.key)) return;
+  if (empty || fs::exists(folder_ / kLock, error) || ReadJson(folder_ / layout_.last).contains(layout_.key))
+    return;
   throw InputError(folder_.string() + ": is not empty, and has no " + layout_.last +
                    " by which a result of tutti is known; choose another --out, or empty it");
 }
@@ -220,10 +228,11 @@ void OutputFolder::Write(const OutputFile& file) noexcept {
   }
 }
 
-fs::path OutputFolder::Finish(bool whole) {
+fs::path OutputFolder::Finish(bool finished) {
   try {
-    const bool complete = whole && failures_.empty();
-    const bool earlier = fs::exists(folder_ / layout_.last);
+    const bool complete = finished && failures_.empty();
+    const fs::path last = folder_ / layout_.last;
+    const bool earlier = fs::exists(last) && ReadJson(last).value("finished", true);
     fs::path where = folder_;
     if (!fs::exists(staging_)) return where;
     if (earlier && !complete) {

@@ -19,9 +19,12 @@ struct OutputFile {
 /// What a command leaves in its folder.
 struct OutputLayout {
   bool (*is_result)(const std::filesystem::path& entry) = nullptr;  ///< of files and folders of a result
-  std::string last;               ///< JSON file that comes last: where it is, the result is complete
+  /// JSON file that comes last: where it is, the result is complete, unless it says "finished": false.
+  std::string last;
   std::string key;                ///< that this file has, by which it is known as tutti's
   std::vector<std::string> live;  ///< files that grow while the command runs; gone when it has finished
+  /// Of folders that may be inside and are left alone: results of their own. May be null.
+  bool (*is_part)(const std::filesystem::path& entry) = nullptr;
 };
 
 /// Holds the folder for one process. New files wait in a hidden folder inside and are moved into place
@@ -46,10 +49,10 @@ class OutputFolder {
   /// One line for each file that could not be written, with the reason.
   const std::vector<std::string>& failures() const { return failures_; }
 
-  /// Moves the new result into place; to be called once, after the last file. One that is not `whole`, or
+  /// Moves the new result into place; to be called once, after the last file. One that is not `finished`, or
   /// lacks a file, never replaces a complete earlier one: it goes into the folder "unfinished" inside.
   /// Returns where it is. Throws InputError if that fails.
-  std::filesystem::path Finish(bool whole);
+  std::filesystem::path Finish(bool finished);
 
  private:
   std::vector<std::filesystem::path> Results() const;
@@ -66,6 +69,9 @@ class OutputFolder {
   int lock_ = -1;
   std::vector<std::string> failures_;
 };
+
+/// Throws InputError with these lines, unless there are none; `rest`: where everything else is.
+void ThrowFailures(const std::vector<std::string>& failures, const std::filesystem::path& rest);
 
 /// Throws InputError if `file`, which the command reads, lies in `folder`, which it writes.
 void RefuseToReplace(const std::filesystem::path& folder, const std::filesystem::path& file);

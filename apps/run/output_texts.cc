@@ -196,6 +196,7 @@ std::string SummaryJson(const RunResult& r) {
   json["seed"] = r.config.loops.seed;
   json["realtime"] = r.realtime;
   json["interrupted"] = r.interrupted;
+  json["finished"] = r.Finished();
   if (!r.failure.empty()) json["failure"] = r.failure;
   json["appearance_only"] = r.appearance_only;
   json["shared_odometry"] = r.shared_odometry;

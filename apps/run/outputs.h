@@ -20,9 +20,9 @@ OutputFolder OpenOutputFolder(const RunRequest& request, const std::filesystem::
 /// Writes all files and puts them into place: trajectory.txt first, then trajectory_online.txt,
 /// trajectory_odometry.txt, keyframes.txt (TUM), summary.json, loops.csv, graph.g2o, trajectory.svg and .png;
 /// appearance only: loops.csv and summary.json; then RunRequest::more_files, and the trace into the file that
-/// it is for. What can't be written does not stop the rest. Throws InputError that names it then, and says
-/// where the rest is.
-void WriteOutputs(OutputFolder& folder, const RunRequest& request, const RunResult& result,
+/// it is for. What can't be written does not stop the rest. Sets RunResult::folder. Throws InputError that
+/// names what is missing.
+void WriteOutputs(OutputFolder& folder, const RunRequest& request, RunResult& result,
                   const std::function<std::string()>& trace = {});
 
 /// summary.json and loops.csv as texts.

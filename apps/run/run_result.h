@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <map>
 #include <optional>
 #include <string>
@@ -78,7 +79,8 @@ struct RunResult {
   std::vector<LostStretch> lost;
   std::size_t keyframes = 0;
   bool interrupted = false;
-  std::string failure;  ///< what broke the run off; empty: nothing did
+  bool endless = false;  ///< a camera, or a folder that grows: Ctrl-C is how it ends
+  std::string failure;   ///< what broke the run off; empty: nothing did
   bool appearance_only = false;
   bool shared_odometry = false;  ///< tracked once for several runs; loops did not reach the tracking
 
@@ -108,7 +110,11 @@ struct RunResult {
   double stereo_row_error_px = 0, stereo_matches = 0;
   std::optional<LensFound> lens;  ///< mono, with self-calibration
 
+  std::filesystem::path folder;  ///< where everything was written: RunRequest::out, or "unfinished" inside
+
   std::size_t LoopsAccepted() const;
+  /// False if it ended before its data set did.
+  bool Finished() const { return failure.empty() && (!interrupted || endless); }
   /// True if the run is void: frames were there, calibration was there, and not one got a pose.
   bool Void() const { return !appearance_only && frames_tracked == 0; }
 };

@@ -53,6 +53,7 @@ class Run {
       alone_last_ = last;
     });
     total_ = dataset.FrameSupply() == Supply::kStored ? dataset.Size() : static_cast<std::size_t>(-1);
+    result_.endless = dataset.FrameSupply() != Supply::kStored;
     result_.realtime = request.realtime;
     if (!request.realtime || dataset.FrameSupply() == Supply::kOnce) return;
     clock_ = request.clock ? request.clock : std::make_shared<SteadyFrameClock>();

@@ -33,7 +33,8 @@ std::vector<fs::path> Summaries(const std::string& where) {
   for (fs::recursive_directory_iterator it(where, fs::directory_options::skip_permission_denied, error), end;
        !error && it != end; it.increment(error)) {
     const std::string name = it->path().filename();
-    if (name[0] == '.') it.disable_recursion_pending();  // what a killed run had not finished
+    if (name[0] == '.' || name == "unfinished")
+      it.disable_recursion_pending();  // what broke off is no figure
     if (name == "summary.json") files.push_back(it->path().string());
   }
   if (error) throw InputError(where + ": can't be read (" + error.message() + ")");

@@ -10,7 +10,7 @@
 
 #include "apps/report/page.h"
 #include "apps/run/interrupt.h"
-#include "apps/run/outputs.h"
+#include "apps/run/output_folder.h"
 #include "apps/run/runner.h"
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
@@ -193,6 +193,32 @@ class Experiment {
   std::vector<RunConfig> configs_;  // of the variants
 };
 
+// The runs are results of their own; each replaces an earlier one when it is complete.
+OutputLayout Layout() {
+  const auto is_result = [](const fs::path& entry) {
+    const std::string name = entry.filename();
+    return name == "comparison.json" || name == "comparison.md" || name == "report.html";
+  };
+  const auto is_part = [](const fs::path& entry) { return fs::exists(entry / "run_1"); };
+  return {is_result, "comparison.json", "datasets", {}, is_part};
+}
+
+void WriteComparison(OutputFolder& folder, const Comparison& comparison) {
+  folder.Write({"comparison.md", [&](const fs::path& file) {
+                  WriteText(file, DescribeComparison(comparison, TableFormat::kMarkdown));
+                }});
+  folder.Write({"comparison.json",
+                [&](const fs::path& file) { WriteText(file, ComparisonJson(comparison).dump(2) + "\n"); }});
+  if (ReportsAvailable()) {
+    folder.Write({"report.html", [&](const fs::path& file) {
+                    WriteComparisonReport(file, "tutti compare: " + comparison.runs.front().dataset,
+                                          comparison);
+                  }});
+  }
+  const fs::path where = folder.Finish(true);
+  ThrowFailures(folder.failures(), where);
+}
+
 int RunCompare(const CLI::App& command, const CompareArguments& arguments) {
   const TableFormat format = ParseTableFormat(arguments.table_format);
   CheckVariants(arguments);
@@ -200,8 +226,8 @@ int RunCompare(const CLI::App& command, const CompareArguments& arguments) {
   const Experiment experiment(command, arguments, config);
   for (const std::string& dataset : arguments.datasets)
     OpenDataset(dataset, config.dataset);  // what no variant can read is said once
-  MakeFolder(arguments.out);
   const InterruptGuard guard;
+  OutputFolder folder(arguments.out, Layout());
   std::vector<std::vector<int>> statuses;  // by run, then variant
   for (std::size_t k = 0; k < experiment.Runs(); ++k) {
     statuses.push_back(experiment.Run(k));
@@ -216,12 +242,9 @@ int RunCompare(const CLI::App& command, const CompareArguments& arguments) {
     for (std::size_t k = 0; k < experiment.Runs(); ++k)
       comparison.runs.push_back(experiment.Figures(v, k, statuses[k][v]));
   }
-  const fs::path out = arguments.out;
-  WriteText(out / "comparison.json", ComparisonJson(comparison).dump(2) + "\n");
-  WriteText(out / "comparison.md", DescribeComparison(comparison, TableFormat::kMarkdown));
-  WriteComparisonReport(out / "report.html", "tutti compare: " + comparison.runs.front().dataset, comparison);
   std::fputs(DescribeComparison(comparison, format).c_str(), stdout);
-  if (ReportsAvailable()) std::printf("\n%s\n", (out / "report.html").c_str());
+  WriteComparison(folder, comparison);
+  if (ReportsAvailable()) std::printf("\n%s\n", (folder.path() / "report.html").c_str());
   if (!ReportsAvailable()) std::fprintf(stderr, "tutti: %s\n", ReportsMissing().c_str());
   const auto failed = [](const RunFigures& run) { return !run.failure.empty(); };
   return std::any_of(comparison.runs.begin(), comparison.runs.end(), failed) ? 1 : 0;

@@ -77,9 +77,9 @@ int Demo(const fs::path& out) {
   request.out = out / "run";
   const RunResult result = RunWithReport(request, DemoConfig());
   std::fputs(ResultTable(result).c_str(), stdout);
-  std::printf("\n  plot:       %s and .svg\n", (request.out / "trajectory.png").c_str());
-  if (ReportsAvailable()) std::printf("  report:     %s\n", (request.out / "report.html").c_str());
-  std::printf("  results:    %s\n", (request.out / "summary.json").c_str());
+  std::printf("\n  plot:       %s and .svg\n", (result.folder / "trajectory.png").c_str());
+  if (ReportsAvailable()) std::printf("  report:     %s\n", (result.folder / "report.html").c_str());
+  std::printf("  results:    %s\n", (result.folder / "summary.json").c_str());
   std::printf("  the images: %s (KITTI layout)\n", data.c_str());
   if (result.interrupted) return 130;
   return result.Void() ? 1 : 0;

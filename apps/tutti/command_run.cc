@@ -47,9 +47,9 @@ std::shared_ptr<LiveView> StartView(const LiveViewOptions& options) {
 }
 
 // 130: ended by Ctrl-C, as shells say it; 1: no frame has a pose.
-int ExitCode(const RunResult& result, const std::string& out) {
+int ExitCode(const RunResult& result) {
   if (result.interrupted) {
-    std::fprintf(stderr, "tutti: interrupted; what there was by then is in %s\n", out.c_str());
+    std::fprintf(stderr, "tutti: interrupted; what there was by then is in %s\n", result.folder.c_str());
     return 130;
   }
   if (result.frames_total > 0 && result.bad.size() == result.frames_total) {
@@ -113,10 +113,10 @@ int Run(const CLI::App& command, const RunArguments& arguments) {
   if (arguments.timing) {
     std::fputs(TimingTable(result.stages, result.wall_s, result.cpu_s, result.frames_total).c_str(), stdout);
   }
-  std::printf("\n  results are in %s\n", arguments.out.c_str());
+  std::printf("\n  results are in %s\n", result.folder.c_str());
   if (!arguments.no_report && !arguments.quiet && !ReportsAvailable())
     std::fprintf(stderr, "tutti: %s\n", ReportsMissing().c_str());
-  return ExitCode(result, arguments.out);
+  return ExitCode(result);
 }
 
 }  // namespace

@@ -29,7 +29,7 @@ bool IsResult(const fs::path& entry) {
   return name == "a" || name == "b" || name == "c" || name == "last";
 }
 
-const OutputLayout kLayout = {IsResult, "last", "version", {"live"}};
+const OutputLayout kLayout = {IsResult, "last", "version", {"live"}, nullptr};
 
 OutputFile File(const std::string& name, const std::string& text) {
   return {name, [text](const fs::path& file) { WriteTextFile(file, text); }};
@@ -189,6 +189,19 @@ TEST_F(OutputFolderTest, AForeignFileBesideAnEarlierResultIsRefused) {
   ExpectRefused("groundtruth.txt");
   WriteAll(out_ / ".hidden", "of a file manager");
   const OutputFolder folder(out_, kLayout, false, out_ / "groundtruth.txt");  // it is the command's own
+}
+
+TEST_F(OutputFolderTest, PartsAreResultsOfTheirOwnAndStay) {
+  const OutputLayout layout = {
+      IsResult, "last", "version", {}, [](const fs::path& entry) { return fs::exists(entry / "run_1"); }};
+  fs::create_directories(out_ / "orb" / "run_1");  // left by a process that was killed
+  for (int i = 0; i < 2; ++i) {
+    OutputFolder folder(out_, layout);
+    folder.Write(File("last", "new"));
+    folder.Finish(true);
+  }
+  EXPECT_TRUE(fs::exists(out_ / "orb" / "run_1"));
+  ExpectRefused("orb");  // by a command that has no parts
 }
 
 TEST_F(OutputFolderTest, WhatTheRunReadsIsNotInside) {

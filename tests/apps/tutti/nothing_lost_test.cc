@@ -19,6 +19,7 @@ namespace fs = std::filesystem;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using testing::ReadAll;
+using testing::RunTutti;
 using ::testing::StartsWith;
 
 class NothingLost : public ::testing::Test {
@@ -36,7 +37,7 @@ class NothingLost : public ::testing::Test {
     return arguments;
   }
   testing::ProcessResult Run(const std::vector<std::string>& more = {}) const {
-    return testing::RunTutti(Arguments(more));
+    return RunTutti(Arguments(more));
   }
   // Through a shell, which sets something before.
   testing::ProcessResult RunAfter(const std::string& command, const std::vector<std::string>& more) const {
@@ -107,6 +108,20 @@ TEST_F(NothingLost, HungUpOnItWritesWhatThereIs) {
   EXPECT_LT(poses, static_cast<std::size_t>(testing::kTinyFrames));
 }
 
+TEST_F(NothingLost, WhatWasInterruptedDoesNotReplaceAFinishedResult) {
+  ASSERT_EQ(Run({"--end", "4"}).status, 0);
+  const auto earlier = Files();
+  const auto run = testing::RunTuttiAndSignal(Arguments(), " 20%", SIGTERM);
+  EXPECT_EQ(run.status, 130) << run.output;
+  EXPECT_THAT(run.output, HasSubstr("is in " + (out_ / "unfinished").string()));
+  const auto summary = nlohmann::json::parse(ReadAll(out_ / "unfinished" / "summary.json"));
+  EXPECT_FALSE(summary["finished"].get<bool>());
+  EXPECT_GT(ReadTrajectory(out_ / "unfinished" / "trajectory.txt", TrajectoryFormat::kTum).size(), 4u);
+  EXPECT_EQ(RunTutti({"collect", out_.string()}).status, 0);
+  fs::remove_all(out_ / "unfinished");
+  EXPECT_EQ(Files(), earlier);
+}
+
 TEST_F(NothingLost, WhatHasNoRoomIsNamedAndTheRestIsWritten) {
   // 10 KB a file: enough for the trajectories, too little for the picture.
   const auto run = RunAfter("ulimit -f 20; exec", {});
@@ -139,7 +154,7 @@ TEST_F(NothingLost, ForeignFoldersAreRefusedAndStayAsTheyAre) {
   const fs::path data = testing::CopyOfTinyTown(folder_ / "data");
   auto arguments = Arguments();
   arguments[6] = data.string();
-  const auto run = testing::RunTutti(arguments);
+  const auto run = RunTutti(arguments);
   EXPECT_EQ(run.status, 1);
   EXPECT_THAT(run.output, AllOf(StartsWith("tutti: " + data.string()), HasSubstr("choose another --out")));
   EXPECT_FALSE(fs::exists(data / ".tutti-lock"));
@@ -156,10 +171,20 @@ TEST_F(NothingLost, TheReferenceIsNotReplaced) {
 }
 
 TEST_F(NothingLost, ASecondRunOnOneFolderIsRefusedWithTheFirstOnesProcess) {
-  const OutputFolder first(out_, {[](const fs::path&) { return false; }, "summary.json", "version", {}});
+  const OutputFolder first(out_,
+                           {[](const fs::path&) { return false; }, "summary.json", "version", {}, nullptr});
   const auto run = Run();
   EXPECT_EQ(run.status, 1);
   EXPECT_THAT(run.output, HasSubstr("process " + std::to_string(getpid())));
+}
+
+TEST_F(NothingLost, ComparingIntoAForeignFolderIsRefused) {
+  const fs::path data = testing::CopyOfTinyTown(folder_ / "data");
+  const auto run = RunTutti({"compare", "--config", testing::TinyConfig(folder_).string(), "--dataset",
+                             data.string(), "--out", data.string(), "--runs", "1"});
+  EXPECT_EQ(run.status, 1);
+  EXPECT_THAT(run.output, AllOf(StartsWith("tutti: " + data.string()), HasSubstr("choose another --out")));
+  EXPECT_FALSE(fs::exists(data / "odometry"));
 }
 
 TEST_F(NothingLost, KeepNumbersEarlierResults) {

@@ -78,9 +78,9 @@ def run(arguments, data_set, variant):
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-        (folder / "cpu_s.txt").write_text(f"{seconds}\n")
+        folder.with_suffix(".cpu_s").write_text(f"{seconds}\n")
     figures = json.loads(results.read_text())
-    figures["cpu_ms"] = 1000 * float((folder / "cpu_s.txt").read_text()) / figures["images"]
+    figures["cpu_ms"] = 1000 * float(folder.with_suffix(".cpu_s").read_text()) / figures["images"]
     return figures
 
 

@@ -214,11 +214,18 @@ void OutputFolder::KeepLeftovers() const {
   }
 }
 
+const fs::path& OutputFolder::Staging() {
+  std::error_code error;
+  fs::create_directories(staging_, error);
+  if (error) throw InputError(staging_.string() + ": the folder can't be made (" + error.message() + ")");
+  return staging_;
+}
+
 void OutputFolder::Write(const OutputFile& file) noexcept {
   std::error_code ignored;
   const fs::path waiting = staging_ / file.name;
   try {
-    fs::create_directories(staging_);
+    Staging();
     errno = 0;
     file.write(waiting);
     Sync(waiting);
@@ -232,7 +239,7 @@ fs::path OutputFolder::Finish(bool finished) {
   try {
     const bool complete = finished && failures_.empty();
     const fs::path last = folder_ / layout_.last;
-    const bool earlier = fs::exists(last) && ReadJson(last).value("finished", true);
+    const bool earlier = fs::exists(last) && ReadJson(last).value("finished", nlohmann::json(true)) != false;
     fs::path where = folder_;
     if (!fs::exists(staging_)) return where;
     if (earlier && !complete) {

@@ -44,6 +44,8 @@ class OutputFolder {
 
   const std::filesystem::path& path() const { return folder_; }
 
+  /// Where files of the new result wait, for those that grow while the command runs. Throws InputError.
+  const std::filesystem::path& Staging();
   /// Writes a file of the new result to where it waits. What goes wrong stands in failures().
   void Write(const OutputFile& file) noexcept;
   /// One line for each file that could not be written, with the reason.

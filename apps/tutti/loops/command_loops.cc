@@ -19,7 +19,6 @@
 #include "apps/tutti/loops/loops_output.h"
 #include "apps/tutti/loops/loops_pictures.h"
 #include "apps/tutti/loops/loops_table.h"
-#include "apps/tutti/posteriors_csv.h"
 #include "core/stopwatch.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
@@ -138,12 +137,13 @@ LoopRun Run(const LoopsArguments& arguments, const LoopDetectorOptions& options,
 
 // All rules, each with the files of a run of its own in its folder.
 int RunTable(const LoopsArguments& arguments, const Input& set) {
-  const std::filesystem::path folder = arguments.out;
+  OutputFolder folder = OpenLoopsFolder(arguments.out, true);
   LoopTable table;
   for (const std::string& rule : TableRules(arguments.options)) {
     LoopDetectorOptions options = arguments.options;
     SetRule(rule, options);
-    const LoopRun run = Run(arguments, options, set, folder / rule);
+    OutputFolder part = OpenLoopsFolder(folder.path() / rule);
+    const LoopRun run = Run(arguments, options, set, part.Staging());
     if (run.rows.size() < set.images.size()) {
       std::fprintf(stderr,
                    "tutti: interrupted in the rule '%s'; no table is written, only the rules before\n",
@@ -151,7 +151,7 @@ int RunTable(const LoopsArguments& arguments, const Input& set) {
       return 130;
     }
     const LoopReport report = EvaluateRun(run);
-    WriteLoopRun(run, report, folder / rule);
+    WriteLoopRun(run, report, true, part);
     AddToTable(run, report, table);
   }
   WriteLoopTable(table, folder);
@@ -173,16 +173,15 @@ int RunLoops(const LoopsArguments& given) {
   cv::setNumThreads(arguments.options.threads);
   const Input set = {LoadImageSet(arguments.images, arguments.truth), ParseCamera(arguments.camera)};
   const InterruptGuard interrupt;
+  RefuseToReplace(arguments.out, arguments.truth.file);
   if (arguments.table) return RunTable(arguments, set);
 
-  const LoopRun run = Run(arguments, arguments.options, set, arguments.out);
+  OutputFolder folder = OpenLoopsFolder(arguments.out);
+  const LoopRun run = Run(arguments, arguments.options, set, folder.Staging());
   const LoopReport report = EvaluateRun(run);
-  WriteLoopRun(run, report, arguments.out);
-  PrintLoopRun(run, report, arguments.out);
-  if (run.options.keep_posterior) {
-    WritePosteriors(run, std::filesystem::path(arguments.out) / "posteriors.csv");
-  }
-  if (run.rows.size() < set.images.size()) {
+  const bool finished = run.rows.size() == set.images.size();
+  PrintLoopRun(run, report, WriteLoopRun(run, report, finished, folder));
+  if (!finished) {
     std::fprintf(stderr, "tutti: interrupted after %zu of %zu images; the results are of those\n",
                  run.rows.size(), set.images.size());
     return 130;

@@ -55,13 +55,15 @@ std::string RunTitle(const LoopRun& run, const LoopReport& report) {
   return text + ", " + std::to_string(report.verified.rows_with_loop) + " with a loop";
 }
 
-void WriteCurves(const LoopRun& run, const LoopReport& report, const std::filesystem::path& folder) {
+void WriteCurvesCsv(const LoopReport& report, const std::filesystem::path& file) {
   std::string csv = "curve,threshold,rejected,precision,recall,true_positives,false_positives\n";
   AppendCsv("verified", report.verified, csv);
   AppendCsv("ranked", report.ranked, csv);
   AppendCsv("posterior", report.posterior, csv);
-  WriteText(folder / "precision_recall.csv", csv);
+  WriteText(file, csv);
+}
 
+CurvePlot PlotCurves(const LoopRun& run, const LoopReport& report) {
   CurvePlot plot;
   plot.title = RunTitle(run, report);
   plot.x_name = "recall";
@@ -85,8 +87,7 @@ void WriteCurves(const LoopRun& run, const LoopReport& report, const std::filesy
     plot.notes.push_back("the ground truth has no loop: recall is 0 by definition");
   if (report.ranked.curve.empty() && report.posterior.curve.empty())
     plot.notes.push_back("no image has a hypothesis: the curves are empty");
-  WriteSvg(folder / "precision_recall.svg", plot);
-  WritePng(folder / "precision_recall.png", plot);
+  return plot;
 }
 
 }  // namespace tutti::cli

@@ -5,9 +5,11 @@
 #include <cstdio>
 #include <fstream>
 #include <functional>
+#include <set>
 #include <utility>
 
 #include "apps/tutti/loops/loops_pictures.h"
+#include "apps/tutti/posteriors_csv.h"
 #include "tutti/core/error.h"
 
 namespace tutti::cli {
@@ -176,19 +178,51 @@ nlohmann::ordered_json ProtocolJson(const LoopRun& run) {
            "posterior: of H"}};
 }
 
-void WriteLoopRun(const LoopRun& run, const LoopReport& report, const std::filesystem::path& folder) {
-  MakeFolder(folder);
+OutputFolder OpenLoopsFolder(const std::filesystem::path& folder, bool table) {
+  const auto is_result = [](const std::filesystem::path& entry) {
+    static const std::set<std::string> kFiles = {"results.json",
+                                                 "hypotheses.csv",
+                                                 "precision_recall.csv",
+                                                 "precision_recall.svg",
+                                                 "confusion.png",
+                                                 "contact_sheet.png",
+                                                 "precision_recall.png",
+                                                 "posteriors.csv",
+                                                 "dump_candidates.csv",
+                                                 "dump_verification.csv",
+                                                 "table.json",
+                                                 "table.md",
+                                                 "table.csv"};
+    return kFiles.count(entry.filename().string()) > 0;
+  };
+  const auto is_part = [](const std::filesystem::path& entry) {
+    return std::filesystem::exists(entry / "results.json") || std::filesystem::exists(entry / "table.json");
+  };
+  const OutputLayout layout = {is_result, table ? "table.json" : "results.json", "protocol", {}, is_part};
+  return OutputFolder(folder, layout);
+}
+
+std::filesystem::path WriteLoopRun(const LoopRun& run, const LoopReport& report, bool finished,
+                                   OutputFolder& folder) {
+  using File = const std::filesystem::path&;
   nlohmann::ordered_json json = FiguresJson(run, report);
   json["protocol"] = ProtocolJson(run);
   json["protocol"]["rule"] = RuleName(run.options);
   json["protocol"]["members"] = run.options.members;
   json["protocol"]["seed"] = run.options.seed;
   json["protocol"]["threads"] = run.options.threads;
-  WriteText(folder / "results.json", json.dump(2) + "\n");
-  WriteText(folder / "hypotheses.csv", Csv(run));
-  WriteCurves(run, report, folder);
-  WriteConfusion(run, report, folder / "confusion.png");
-  WriteContactSheet(run, report, folder / "contact_sheet.png");
+  folder.Write({"results.json", [&](File file) { WriteText(file, json.dump(2) + "\n"); }});
+  folder.Write({"hypotheses.csv", [&](File file) { WriteText(file, Csv(run)); }});
+  folder.Write({"precision_recall.csv", [&](File file) { WriteCurvesCsv(report, file); }});
+  folder.Write({"precision_recall.svg", [&](File file) { WriteSvg(file, PlotCurves(run, report)); }});
+  folder.Write({"precision_recall.png", [&](File file) { WritePng(file, PlotCurves(run, report)); }});
+  folder.Write({"confusion.png", [&](File file) { WriteConfusion(run, report, file); }});
+  folder.Write({"contact_sheet.png", [&](File file) { WriteContactSheet(run, report, file); }});
+  if (run.options.keep_posterior)
+    folder.Write({"posteriors.csv", [&](File file) { WritePosteriors(run, file); }});
+  const std::filesystem::path where = folder.Finish(finished);
+  ThrowFailures(folder.failures(), where);
+  return where;
 }
 
 void PrintLoopRun(const LoopRun& run, const LoopReport& report, const std::filesystem::path& folder) {

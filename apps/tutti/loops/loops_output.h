@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/run/output_folder.h"
 #include "apps/tutti/files.h"
 #include "tutti/loopclosure/detector.h"
 #include "tutti/loopclosure/evaluation.h"
@@ -60,8 +61,14 @@ nlohmann::ordered_json FiguresJson(const LoopRun& run, const LoopReport& report)
 /// How they were measured, but for rule and members.
 nlohmann::ordered_json ProtocolJson(const LoopRun& run);
 
-/// Writes all files into `folder` (made if missing). Throws InputError if it can't be written.
-void WriteLoopRun(const LoopRun& run, const LoopReport& report, const std::filesystem::path& folder);
+/// The folder of one run, or of a table of runs, each of which has a folder of its own in it. Throws
+/// InputError as OutputFolder does.
+OutputFolder OpenLoopsFolder(const std::filesystem::path& folder, bool table = false);
+
+/// Writes all files of a run and puts them into place. Returns where. Throws InputError that names those that
+/// can't be written.
+std::filesystem::path WriteLoopRun(const LoopRun& run, const LoopReport& report, bool finished,
+                                   OutputFolder& folder);
 
 /// Prints the figures of one run.
 void PrintLoopRun(const LoopRun& run, const LoopReport& report, const std::filesystem::path& folder);

@@ -6,6 +6,7 @@
 #include <opencv2/core.hpp>
 #include <string>
 
+#include "apps/plot/plot.h"
 #include "apps/tutti/loops/loops_output.h"
 
 namespace tutti::cli {
@@ -17,8 +18,9 @@ constexpr const char* kMissedColor = "#e69f00";  // orange
 /// Adds one result's kept posterior to a picture of `images` x `images`, scaled down where that is too large.
 void AddPosterior(const LoopResult& result, int images, cv::Mat& posterior);
 
-/// precision_recall.csv, .svg and .png into `folder`.
-void WriteCurves(const LoopRun& run, const LoopReport& report, const std::filesystem::path& folder);
+/// The curves of precision over recall: precision_recall.csv, and the picture.
+void WriteCurvesCsv(const LoopReport& report, const std::filesystem::path& file);
+CurvePlot PlotCurves(const LoopRun& run, const LoopReport& report);
 
 /// Ground truth, posterior and what was said, side by side.
 void WriteConfusion(const LoopRun& run, const LoopReport& report, const std::filesystem::path& file);

@@ -239,8 +239,7 @@ void AddToTable(const LoopRun& run, const LoopReport& report, LoopTable& table) 
   table.rows.push_back(std::move(row));
 }
 
-void WriteLoopTable(const LoopTable& table, const std::filesystem::path& folder) {
-  MakeFolder(folder);
+void WriteLoopTable(const LoopTable& table, OutputFolder& folder) {
   Json json;
   json["protocol"] = table.protocol;
   json["images"] = table.rows.empty() ? 0 : table.rows.front().report.verified.images;
@@ -254,11 +253,14 @@ void WriteLoopTable(const LoopTable& table, const std::filesystem::path& folder)
   }
   json["significance"] = Significance(table);
   const std::string markdown = Markdown(table, json);
-  WriteText(folder / "table.json", json.dump(2) + "\n");
-  WriteText(folder / "table.md", markdown);
-  WriteText(folder / "table.csv", Csv(table));
-  std::printf("%s\nwritten: %s, table.md, table.csv, and a folder for each rule\n", markdown.c_str(),
-              (folder / "table.json").string().c_str());
+  std::printf("%s\n", markdown.c_str());
+  using File = const std::filesystem::path&;
+  folder.Write({"table.json", [&](File file) { WriteText(file, json.dump(2) + "\n"); }});
+  folder.Write({"table.md", [&](File file) { WriteText(file, markdown); }});
+  folder.Write({"table.csv", [&](File file) { WriteText(file, Csv(table)); }});
+  ThrowFailures(folder.failures(), folder.Finish(true));
+  std::printf("written: %s, table.md, table.csv, and a folder for each rule\n",
+              (folder.path() / "table.json").string().c_str());
 }
 
 }  // namespace tutti::cli

@@ -30,8 +30,8 @@ std::vector<std::string> TableRules(const LoopDetectorOptions& options);
 /// Adds one rule's outcome, and what is common to all rules.
 void AddToTable(const LoopRun& run, const LoopReport& report, LoopTable& table);
 
-/// Writes table.json, table.md and table.csv into `folder` and prints the table. Throws InputError if they
-/// can't be written.
-void WriteLoopTable(const LoopTable& table, const std::filesystem::path& folder);
+/// Prints the table and puts table.json, table.md and table.csv into place. Throws InputError if they can't
+/// be written.
+void WriteLoopTable(const LoopTable& table, OutputFolder& folder);
 
 }  // namespace tutti::cli

@@ -421,6 +421,18 @@ TEST_F(LoopsCommand, CtrlCWritesTheImagesSoFar) {
   ExpectAllFiles(out_);
 }
 
+TEST_F(LoopsCommand, AForeignFolderIsRefusedAndAnEarlierResultReplaced) {
+  WriteImages();
+  const auto refused = Run(Truth(TruePairs()), images_);
+  EXPECT_EQ(refused.status, 1) << refused.output;
+  EXPECT_THAT(refused.output, HasSubstr("choose another --out"));
+  EXPECT_FALSE(fs::exists(images_ / "results.json"));
+  ASSERT_EQ(Run(Truth(TruePairs()), out_, {"--rule", "orb", "--dump"}).status, 0);
+  EXPECT_EQ(Run(Truth(TruePairs()), out_, {"--rule", "orb"}).status, 0);
+  EXPECT_FALSE(fs::exists(out_ / "dump_candidates.csv"));  // it was the earlier run's
+  ExpectAllFiles(out_);
+}
+
 std::string SmallTable(double joint, double naive, double surf) {
   nlohmann::json table;
   table["best_single"] = {{"verified", "surf"}, {"posterior", "surf"}};

@@ -6,7 +6,8 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "apps/run/output_folder.h"
+#include "apps/run/outputs.h"
+#include "apps/run/runner.h"
 #include "tests/apps/tiny_town.h"
 #include "tests/apps/tutti/executable.h"
 #include "tests/support/test_data.h"
@@ -90,6 +91,9 @@ TEST_F(NothingLost, KilledAtAnyTimeTheResultIsOneOfTheTwo) {
     const auto run =
         RunAfter("exec timeout -s KILL " + std::to_string(ms / 1000.0), {"--end", "4", "--quiet"});
     killed = run.status != 0;
+    RunRequest request;
+    request.out = out_;
+    OpenOutputFolder(request, {});  // moves the rest if the kill came between two moves
     const auto now = Files();
     const std::string trajectory = now.at("trajectory.txt");
     EXPECT_TRUE(trajectory == earlier || trajectory == next) << ms << " ms: " << trajectory;

@@ -220,7 +220,7 @@ std::filesystem::path WriteLoopRun(const LoopRun& run, const LoopReport& report,
   folder.Write({"contact_sheet.png", [&](File file) { WriteContactSheet(run, report, file); }});
   if (run.options.keep_posterior)
     folder.Write({"posteriors.csv", [&](File file) { WritePosteriors(run, file); }});
-  const std::filesystem::path where = folder.Finish(finished);
+  std::filesystem::path where = folder.Finish(finished);
   ThrowFailures(folder.failures(), where);
   return where;
 }

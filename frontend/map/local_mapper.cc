@@ -196,6 +196,7 @@ void LocalMapper::Process(int id, Map* map, StageTimes* stages) {
   ba.iterations = options_.ba_iterations;
   ba.pixel_sigma = options_.pixel_sigma;
   ba.metric = rig_.sensor != Sensor::kMono;
+  ba.only_aligned = !ba.metric;
   ba.lens.value = lens_.Remaining().value;  // known and fixed: a lens that each window fits for itself bends
   ba.observe_lens = lens_.Enabled();        // the map
   const BundleAdjustmentReport report = AdjustLocally(rig_.camera, id, ba, map);

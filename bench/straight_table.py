@@ -20,7 +20,7 @@ import table
 ROWS = ["road", "kitti"]
 STARTS = range(5)
 WORLDS = [1, 2]
-LENSES = {"perfect": [], "k1 0.01 off": ["--set", "camera.distortion=radtan", "--set", "camera.distortion_coefficients=[0.01, 0, 0, 0]"]}
+LENSES = {"perfect": [], "k1 0.01 off": ["--set", "camera.distortion=radtan", "--set", "camera.coefficients=[0.01, 0, 0, 0, 0]"]}
 ROAD_BOUND = 0.12  # % of the path, the worst
 HEADING_DEG, LENGTH_M = 8, 70
 

@@ -28,7 +28,7 @@ Window MakeWindow(const Map& map, const std::vector<int>& moving, const std::vec
     for (const Observation& o : l.observations) {
       const auto camera = cameras.find(o.keyframe);
       if (camera == cameras.end()) continue;
-      if (!options.metric && map.Doubtful(o, id)) continue;  // depth tells what one camera can't
+      if (options.only_aligned && map.Doubtful(o, id)) continue;
       window.observations.push_back(
           {camera->second, Measured(map, *map.keyframe(o.keyframe).features, o, id, options.pixel_sigma)});
     }

@@ -12,11 +12,12 @@
 namespace tutti {
 
 struct BundleAdjustmentOptions {
-  int keyframes = 12;        ///< keyframes that move: the newest and those most covisible with it
-  int fixed_keyframes = 20;  ///< others that see the same landmarks hold the window in place
-  int iterations = 6;        ///< most Levenberg-Marquardt iterations
-  double pixel_sigma = 1.0;  ///< standard deviation of a keypoint at pyramid level 0 [px]
-  bool metric = false;       ///< depth measurements fix the scale: one fixed keyframe is enough, else two
+  int keyframes = 12;         ///< keyframes that move: the newest and those most covisible with it
+  int fixed_keyframes = 20;   ///< others that see the same landmarks hold the window in place
+  int iterations = 6;         ///< most Levenberg-Marquardt iterations
+  double pixel_sigma = 1.0;   ///< standard deviation of a keypoint at pyramid level 0 [px]
+  bool metric = false;        ///< depth measurements fix the scale: one fixed keyframe is enough, else two
+  bool only_aligned = false;  ///< views that never fitted their landmark's patch do not count (Map::Doubtful)
   const std::atomic<bool>* stop = nullptr;  ///< ends the adjustment early when it becomes true
   LensError lens;             ///< what is known of the camera's error; as it is: the camera has none
   bool observe_lens = false;  ///< say in the report what the window alone says of it

@@ -22,7 +22,7 @@ constexpr double kMaxCosine = 0.9996;  // 1.6 deg of parallax at least, for a de
 // Strict: so many standard deviations of parallax. Most landmarks are made as soon as their parallax is large
 // enough, which is when noise makes it too large: too near, so that one camera's scale shrinks.
 constexpr double kMinParallaxSigmas = 8;
-constexpr int kEnough = 3;  // times the fewest inliers: a keyframe with so many landmarks can be strict
+constexpr int kEnough = 3;  // times the fewest inliers: a keyframe with so many landmarks is strict
 }  // namespace
 
 int LocalMapper::AddDepthLandmarks(int id, int at_least, Map* map) {
@@ -118,8 +118,7 @@ int LocalMapper::Triangulate(int id, Map* map) {
   const int neighbours =
       mono ? options_.triangulation_neighbours : std::min(4, options_.triangulation_neighbours);
   const std::vector<int>& seen = std::as_const(*map).keyframe(id).landmarks;
-  const auto known = std::count_if(seen.begin(), seen.end(), [](int l) { return l >= 0; });
-  const bool strict = mono && known >= kEnough * options_.min_inliers;
+  auto known = std::count_if(seen.begin(), seen.end(), [](int l) { return l >= 0; });
   int made = 0;
   for (int other : map->BestCovisible(id, neighbours, 15)) {
     const double baseline =
@@ -131,14 +130,16 @@ int LocalMapper::Triangulate(int id, Map* map) {
     const auto pairs =
         MatchEpipolar(*map, rig_.camera, map->keyframe(id), map->keyframe(other), median_depth);
     for (const auto& [fa, fb] : pairs) {
-      const auto point = PointOf(std::as_const(*map).keyframe(id), fa, std::as_const(*map).keyframe(other),
-                                 fb, *map, strict);
+      const bool strict = mono && known >= kEnough * options_.min_inliers;
+      const Map& now = *map;
+      const auto point = PointOf(now.keyframe(id), fa, now.keyframe(other), fb, now, strict);
       if (!point) continue;
       const int landmark = map->AddLandmark(*point, id, fa);
       map->AddObservation(landmark, other, fb);
       map->UpdateLandmark(landmark);
       recent_.emplace_back(landmark, id);
       ++made;
+      ++known;
     }
   }
   return made;
@@ -195,6 +196,7 @@ void LocalMapper::Process(int id, Map* map, StageTimes* stages) {
   ba.iterations = options_.ba_iterations;
   ba.pixel_sigma = options_.pixel_sigma;
   ba.metric = rig_.sensor != Sensor::kMono;
+  ba.only_aligned = !ba.metric;
   ba.lens.value = lens_.Remaining().value;  // known and fixed: a lens that each window fits for itself bends
   ba.observe_lens = lens_.Enabled();        // the map
   const BundleAdjustmentReport report = AdjustLocally(rig_.camera, id, ba, map);

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -133,8 +134,8 @@ TEST(SignTest, TiesAreLeftOut) {
 // = 0.0577, so its 2.5 % quantile is 6 and its 97.5 % quantile 14 (P(X <= 3) = 0.0013, P(X <= 4) = 0.0059:
 // 4 and 16 at 99 %).
 TEST(BootstrapRatio, TheQuantilesOfABinomial) {
-  std::vector<RatioPart> groups;
-  for (int i = 0; i < 20; ++i) groups.push_back({i < 10 ? 1.0 : 0.0, 1.0});
+  std::vector<RatioPart> groups(20, {0.0, 1.0});
+  std::fill_n(groups.begin(), 10, RatioPart{1.0, 1.0});
   const BootstrapInterval interval = BootstrapRatio(groups);
   EXPECT_DOUBLE_EQ(interval.ratio, 0.5);
   EXPECT_DOUBLE_EQ(interval.low, 0.3);

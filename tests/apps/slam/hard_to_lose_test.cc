@@ -153,7 +153,9 @@ TEST(HardToLose, APlainMovingObjectCoversThirtyPercentOfTheView) {
   // The plain side of a lorry: shades, an edge, a few marks.
   cv::Mat object(size.height, size.width * 3 / 10, CV_8UC1, cv::Scalar(150));
   constexpr int kRowsOfAShade = 8;
-  for (int y = 0; y < object.rows; ++y) object.row(y) += cv::Scalar(y / kRowsOfAShade);
+  for (int shade = 1; shade * kRowsOfAShade < object.rows; ++shade)
+    object.rowRange(shade * kRowsOfAShade, std::min((shade + 1) * kRowsOfAShade, object.rows)) +=
+        cv::Scalar(shade);
   cv::rectangle(object, cv::Rect(0, 0, object.cols, object.rows), cv::Scalar(40), 3);
   for (int k = 0; k < 6; ++k)
     cv::circle(object, {20 + 15 * k, 40 + 20 * (k % 3)}, 4, cv::Scalar(60), cv::FILLED);

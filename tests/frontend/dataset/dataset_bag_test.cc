@@ -19,7 +19,6 @@ namespace fs = std::filesystem;
 using testing::FreshFolder;
 using ::testing::HasSubstr;
 using testing::OpenError;
-using testing::Picture;
 using testing::With;
 
 #ifndef TUTTI_HAVE_ROSBAG
@@ -31,6 +30,8 @@ TEST(BagDataset, WithoutLibrosbagItIsSaidWhatToInstall) {
 }
 
 #else
+
+using testing::Picture;
 
 sensor_msgs::Image Message(const cv::Mat& image, const std::string& encoding, double stamp_s) {
   sensor_msgs::Image message;

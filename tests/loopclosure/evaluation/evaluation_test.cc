@@ -270,6 +270,7 @@ TEST(Evaluation, NoLoopInTheGroundTruthMeansRecallZero) {
 
 TEST(Evaluation, AllMissedIsAllInTheDenominator) {
   std::vector<LoopObservation> observations;
+  observations.reserve(10);
   for (int i = 0; i < 10; ++i) observations.push_back({i, 0, -1, false, -1});
   const LoopEvaluation result = EvaluateVerified(observations, Truth());
   EXPECT_EQ(result.rows_with_loop, 4);

@@ -184,7 +184,10 @@ TEST_P(QuotaMember, DarkImagesFillTheQuota) {
 TEST_P(QuotaMember, AnImageWithoutTextureStaysWithoutFeatures) {
   const FeatureExtractor extractor(GetParam(), ExtractionOptions());
   cv::Mat ramp(192, 240, CV_8UC1);
-  for (int r = 0; r < ramp.rows; ++r) ramp.row(r).setTo(40 + r / 2);
+  for (int r = 0; r < ramp.rows; ++r) {
+    const int grey = 40 + r / 2;
+    ramp.row(r).setTo(grey);
+  }
   EXPECT_LT(extractor.Extract(ramp).keypoints.size(), 40u);
   cv::Mat noise(192, 240, CV_8UC1, cv::Scalar(80));
   cv::RNG random(1);
@@ -202,7 +205,7 @@ TEST(Features, SurfDescriptorsHaveUnitLength) {
 
 TEST(Features, UnknownMemberNamesTheNearest) {
   try {
-    FeatureExtractor("surg", ExtractionOptions());
+    const FeatureExtractor extractor("surg", ExtractionOptions());
     FAIL();
   } catch (const InputError& error) {
     EXPECT_NE(std::string(error.what()).find("did you mean 'surf'"), std::string::npos) << error.what();
@@ -231,6 +234,7 @@ TEST(ToGrey8, TakesAnyKindOfImage) {
 
 TEST(SelectSpread, GivesEveryCellItsShareBeforeTheStrongestTakeTheRest) {
   std::vector<cv::KeyPoint> keypoints;
+  keypoints.reserve(101);
   for (int i = 0; i < 100; ++i)
     keypoints.emplace_back(static_cast<float>(i % 10), 1.0f, 5.0f, 0.0f, 100.0f - i);
   keypoints.emplace_back(95.0f, 95.0f, 5.0f, 0.0f, 0.001f);  // weak and alone

@@ -14,7 +14,8 @@ namespace tutti::cli {
 namespace {
 
 // The report's files, as RunRequest::more_files.
-std::function<std::vector<OutputFile>(const RunResult&)> ReportOf(std::shared_ptr<const DetectionLog> log) {
+std::function<std::vector<OutputFile>(const RunResult&)> ReportOf(
+    const std::shared_ptr<const DetectionLog>& log) {
   return [log](const RunResult& result) {
     const auto report =
         std::make_shared<nlohmann::ordered_json>(RunReport(result, *log, VariantName(result.config)));

@@ -20,9 +20,9 @@ std::filesystem::path RealData(const std::string& name) {
 
 std::filesystem::path FreshFolder() {
   const ::testing::TestInfo* info = ::testing::UnitTest::GetInstance()->current_test_info();
-  const std::filesystem::path folder = std::filesystem::temp_directory_path() /
-                                       ("tutti_test_" + std::to_string(::getpid())) /
-                                       (std::string(info->test_suite_name()) + "." + info->name());
+  std::filesystem::path folder = std::filesystem::temp_directory_path() /
+                                 ("tutti_test_" + std::to_string(::getpid())) /
+                                 (std::string(info->test_suite_name()) + "." + info->name());
   std::filesystem::remove_all(folder);
   std::filesystem::create_directories(folder);
   return folder;

@@ -267,7 +267,9 @@ TEST_F(LoopsCommand, NumbersAreThoseOfAllImagesAlsoWithAStride) {
   int image = 0;
   for (; std::getline(lines, line); image += 5) {
     const std::string number = std::to_string(image);
-    EXPECT_THAT(line, StartsWith(number + ",\"" + number + ".png\""));
+    std::string start = number;
+    start.append(",\"").append(number).append(".png\"");
+    EXPECT_THAT(line, StartsWith(start));
   }
   EXPECT_EQ(image, kImages);
   for (const char* file : {"posteriors.csv", "dump_candidates.csv", "dump_verification.csv"}) {
@@ -289,7 +291,7 @@ TEST_F(LoopsCommand, ImagesWithoutAPoseAreIgnoredWhereNamesAreTimeStamps) {
     cv::imwrite((images_ / (stamp + ".png")).string(),
                 testing::TexturedImage(static_cast<std::uint32_t>(i % 8)));
     const std::string x = std::to_string(20 * (i % 8));
-    if (i > 0) truth += stamp + " " + x + " 0 0 0 0 0 1\n";
+    if (i > 0) truth.append(stamp).append(" ").append(x).append(" 0 0 0 0 0 1\n");
   }
   const auto loops = [&](const std::string& first) {
     WriteAll(folder_ / "truth.txt", first + truth);

@@ -98,11 +98,12 @@ TEST_F(OptimizeCommand, SaysWhichStartItTook) {
 
 TEST_F(OptimizeCommand, TreatsBadInformationAsItIsTold) {
   const std::string bad = "EDGE_SE2 0 1 3 0 0 1 2 0 1 0 1\n", good = kVertices + std::string(kEdge);
-  const testing::ProcessResult refused = Optimize(good + bad + bad);
+  const std::string text = good + bad + bad;
+  const testing::ProcessResult refused = Optimize(text);
   EXPECT_EQ(refused.status, 1);
   EXPECT_THAT(refused.output, HasSubstr("it is the first of 2 of 3 edges"));
   for (const char* how : {"project", "diagonal", "skip"}) {
-    const testing::ProcessResult run = Optimize(good + bad + bad, {"--bad-information", how});
+    const testing::ProcessResult run = Optimize(text, {"--bad-information", how});
     EXPECT_EQ(run.status, 0) << run.output;
     EXPECT_THAT(run.output, HasSubstr("in.g2o:4: 2 of 3 edges")) << how;
     EXPECT_EQ(Json()["bad_information"]["treatment"], how);

@@ -20,6 +20,7 @@ std::vector<Eigen::Vector3d> Cloud() {
   std::mt19937 generator(kSeed);
   std::uniform_real_distribution<double> x(-3, 3), y(-2, 2), z(4, 12);
   std::vector<Eigen::Vector3d> cloud;
+  cloud.reserve(kPoints);
   for (int i = 0; i < kPoints; ++i) cloud.emplace_back(x(generator), y(generator), z(generator));
   return cloud;
 }
@@ -186,9 +187,11 @@ void Add(Overlay overlay, View& view) {
           : i < 30 ? cv::Point2f(12, 20 + 440 * along)
                    : cv::Point2f(628, 20 + 440 * along);
     } else if (overlay == Overlay::kTexts) {  // one above, one below
-      p = {100 + 300 * along, (i < 20 ? 20.f : 440.f) + 12 * static_cast<float>(i / 10 % 2)};
+      const int row = i / 10 % 2;
+      p = {100 + 300 * along, (i < 20 ? 20.f : 440.f) + 12 * static_cast<float>(row)};
     } else {
-      p = {60 + 520 * along, 330 + 40 * static_cast<float>(i / 10)};
+      const int row = i / 10;
+      p = {60 + 520 * along, 330 + 40 * static_cast<float>(row)};
     }
     AddFeature(view, p + cv::Point2f(noise(generator), noise(generator)), 7000000 + i);
   }

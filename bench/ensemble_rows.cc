@@ -263,8 +263,9 @@ void Overlay(cv::Mat& image) {
   const int part = image.rows / 6;
   cv::RNG random(7);
   for (int i = 0; i < 60; ++i) {
-    const cv::Rect box(random.uniform(0, image.cols), image.rows - random.uniform(rim, part + rim),
-                       random.uniform(4, 30), random.uniform(4, 20));
+    const int height = random.uniform(4, 20), width = random.uniform(4, 30);
+    const int y = image.rows - random.uniform(rim, part + rim), x = random.uniform(0, image.cols);
+    const cv::Rect box(x, y, width, height);
     const int tone = random.uniform(0, 256);
     image(box & cv::Rect(0, image.rows - part, image.cols, part)) = cv::Scalar(tone, tone, tone, 255);
   }

@@ -20,13 +20,18 @@ inline double Gauss(std::mt19937& random) {
   return std::sqrt(-2.0 * std::log(u)) * std::cos(2.0 * M_PI * v);
 }
 
+/// z is drawn first: in the arguments of one call, which comes first would be the compiler's choice.
+inline Eigen::Vector3d GaussVector(std::mt19937& random) {
+  const double z = Gauss(random), y = Gauss(random), x = Gauss(random);
+  return {x, y, z};
+}
+
 /// Pose of `b` in the frame of `a`, as it is measured.
 inline Similarity Measured(const Similarity& a, const Similarity& b, const Noise& noise,
                            std::mt19937& random) {
   Similarity out = a.Inverse() * b;
-  out.translation += noise.translation * Eigen::Vector3d(Gauss(random), Gauss(random), Gauss(random));
-  out.rotation =
-      out.rotation * ExpSO3(noise.rotation * Eigen::Vector3d(Gauss(random), Gauss(random), Gauss(random)));
+  out.translation += noise.translation * GaussVector(random);
+  out.rotation = out.rotation * ExpSO3(noise.rotation * GaussVector(random));
   return out;
 }
 

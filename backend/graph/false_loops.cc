@@ -43,13 +43,18 @@ class Planter {
  private:
   double Uniform() { return static_cast<double>(random_() >> 11) * 0x1p-53; }
   double Symmetric(double limit) { return limit * (2 * Uniform() - 1); }
+  // z is drawn first: in the arguments of one call, which comes first would be the compiler's choice.
+  Eigen::Vector3d Vector(double limit) {
+    const double z = Symmetric(limit), y = Symmetric(limit), x = Symmetric(limit);
+    return {x, y, z};
+  }
   std::size_t Index(std::size_t size) { return static_cast<std::size_t>(random_() % size); }
   const Similarity& PoseAt(std::size_t node) const { return graph_.nodes()[node].pose; }
 
   /// A relative pose of at most these lengths and angles; flat in the plane.
   Similarity Draw(double length, double angle) {
-    Eigen::Vector3d t(Symmetric(length), Symmetric(length), Symmetric(length));
-    Eigen::Vector3d r(Symmetric(angle), Symmetric(angle), Symmetric(angle));
+    Eigen::Vector3d t = Vector(length);
+    Eigen::Vector3d r = Vector(angle);
     if (graph_.kind() == GraphKind::kSE2) {
       t.z() = 0;
       r.x() = r.y() = 0;

@@ -104,7 +104,8 @@ class CorridorBuilder {
           scene_.Add(PlasterTexture(random_.Bits())));
     }
     for (double at = random_.In(1.2, 3); at < length - 2.4;) {
-      at += AddThing(start + at * along + kBesideDoors * out, along) + random_.In(0.8, 2.6);
+      const double width = AddThing(start + at * along + kBesideDoors * out, along);
+      at += width + random_.In(0.8, 2.6);
     }
   }
 

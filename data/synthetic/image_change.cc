@@ -154,7 +154,7 @@ std::vector<Occluder> OccludersOf(const Context& context) {
   for (std::uint64_t lane = 0; lane < 3; ++lane) {
     Random of_lane = context.OfSequence(lane + 1);
     constexpr double kReach = 1.5;  // of the image's width, from its middle out of sight to the same again
-    const double speed = of_lane.In(0.03, 0.09) * (of_lane.Unit() < 0.5 ? -1 : 1);
+    const double pace = of_lane.In(0.03, 0.09), speed = of_lane.Unit() < 0.5 ? -pace : pace;
     const double way = kReach * (static_cast<double>(lane) + of_lane.Unit()) / 3 + speed * context.index;
     const double rounds = std::floor(way / kReach);
     Random look = context.OfSequence((lane + 1) * 0x51ED2701ULL +
@@ -207,7 +207,7 @@ cv::Mat Rain(const cv::Mat& image, const Context& context) {
   const double unit = image.rows / 480.0;
   const int count = 1 + static_cast<int>((context.Strong() ? 0.0032 : 0.0013) * area / std::max(unit, 0.25));
   for (int k = 0; k < count; ++k) {
-    const double near = random.Unit() * random.Unit();  // near drops are few, long and thick
+    const double a = random.Unit(), b = random.Unit(), near = a * b;  // near drops are few, long and thick
     const double length = unit * (12 + 55 * near), slant = wind + random.In(-0.05, 0.05);
     const double x = random.In(0, image.cols), y = random.In(-length, image.rows);
     const auto point = [](double px, double py) {  // 1/16 pixel

@@ -28,17 +28,19 @@ void AddWall(Scene& scene, const Vector3d& left, const Vector3d& right, double l
   }
   const double yaw = std::atan2(inward.y(), inward.x());
   for (double at = random.In(0.5, 0.9); at < length - 0.9; at += random.In(1.2, 2.2)) {
-    const Vector3d size(random.In(0.3, 0.5), random.In(0.6, 1.1), random.In(0.5, 1.7));
+    const double height = random.In(0.5, 1.7), breadth = random.In(0.6, 1.1), depth = random.In(0.3, 0.5);
+    const Vector3d size(depth, breadth, height);
     const int front =
         scene.Add(random.Unit() < 0.6 ? ShelfTexture(random.Bits()) : WoodTexture(random.Bits()));
     const int side = scene.Add(WoodTexture(random.Bits()));
     const Vector3d foot = left + at * right + (0.5 * size.x() + 0.02) * inward - Vector3d(0, 0, kHeight);
     AppendBox(scene.faces, foot, size, yaw, {front, side, side});
     if (random.Unit() < 0.7) {  // something on top
-      const Vector3d thing(random.In(0.1, 0.2), random.In(0.1, 0.3), random.In(0.1, 0.3));
+      const double tall = random.In(0.1, 0.3), broad = random.In(0.1, 0.3), deep = random.In(0.1, 0.2);
       const int look = scene.Add(SignTexture(random.Bits()));
-      AppendBox(scene.faces, foot + Vector3d(0, 0, size.z()) + random.In(-0.2, 0.2) * right, thing,
-                yaw + random.In(-0.5, 0.5), {look, look, side});
+      const double turn = random.In(-0.5, 0.5), shift = random.In(-0.2, 0.2);
+      AppendBox(scene.faces, foot + Vector3d(0, 0, size.z()) + shift * right, {deep, broad, tall}, yaw + turn,
+                {look, look, side});
     }
   }
 }

@@ -6,6 +6,8 @@
 namespace tutti::synthetic {
 
 /// splitmix64 (Steele, Lea, Flood: "Fast splittable pseudorandom number generators", 2014).
+/// Two draws never stand in the arguments of one call or on both sides of one operator: which comes first
+/// would be the compiler's choice. Each is a constant of its own, in the order in which they are drawn.
 class Random {
  public:
   explicit Random(std::uint64_t seed) : state_(seed) {}

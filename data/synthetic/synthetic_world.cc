@@ -169,9 +169,11 @@ struct SyntheticWorld::Impl {
     Random random(options.seed * 0x2545F491ULL + 17);
     int look = 0;
     for (double s = 40; s < length - 12; ++look) {  // none pops up in view: the nearest comes from 40 m ahead
-      const Eigen::Vector3d size(random.In(5.5, 7.5), random.In(1.9, 2.2), random.In(3.3, 4.0));
-      AddLorry(faces, first + s - kSpeed * (t - begin), scene.mover_left + random.In(-0.1, 0.1), size, look);
-      s += size.x() / dense * random.In(0.9, 1.1);
+      const double height = random.In(3.3, 4.0), width = random.In(1.9, 2.2),
+                   own_length = random.In(5.5, 7.5);
+      AddLorry(faces, first + s - kSpeed * (t - begin), scene.mover_left + random.In(-0.1, 0.1),
+               {own_length, width, height}, look);
+      s += own_length / dense * random.In(0.9, 1.1);
     }
     if (!ahead) return;
     const double gap = 8 + 50 * std::exp(-(t - begin) / 3) + 1.5 * std::sin(2 * M_PI * 0.09 * (t - begin));

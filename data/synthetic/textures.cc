@@ -41,13 +41,16 @@ void Bricks(cv::Mat& image, int height, double contrast, Random& random) {
 // Faint stains and scratches.
 void Marks(cv::Mat& image, int count, double contrast, Random& random) {
   for (int i = 0; i < count; ++i) {
-    const cv::Point at(random.Int(0, image.cols - 1), random.Int(0, image.rows - 1));
+    const int y = random.Int(0, image.rows - 1), x = random.Int(0, image.cols - 1);
+    const cv::Point at(x, y);
     const cv::Scalar tone(image.at<std::uint8_t>(at) - random.In(0.4, 1) * contrast);
     if (random.Unit() < 0.5) {
-      cv::ellipse(image, at, {random.Int(3, 12), random.Int(2, 7)}, random.In(0, 180), 0, 360, tone,
-                  cv::FILLED);
+      const double angle = random.In(0, 180);
+      const int along = random.Int(3, 12), across = random.Int(2, 7);
+      cv::ellipse(image, at, {along, across}, angle, 0, 360, tone, cv::FILLED);
     } else {
-      cv::line(image, at, {at.x + random.Int(-45, 45), at.y + random.Int(-12, 12)}, tone, random.Int(1, 2));
+      const int thickness = random.Int(1, 2), dx = random.Int(-45, 45), dy = random.Int(-12, 12);
+      cv::line(image, at, {x + dx, y + dy}, tone, thickness);
     }
   }
 }
@@ -77,7 +80,8 @@ void Window(cv::Mat& image, const cv::Rect& r, double frame, int style, Random& 
     for (int y = 0; y < drawn; y += 4) Box(image, r.x, r.y + y, r.width, 2, random.In(110, 190));
   } else if (random.Unit() < 0.5) {  // something on the window sill
     const int w = random.Int(8, 18);
-    Box(image, r.x + random.Int(2, r.width - w), r.y + r.height - 14, w, 14, random.In(90, 220));
+    const double tone = random.In(90, 220);
+    Box(image, r.x + random.Int(2, r.width - w), r.y + r.height - 14, w, 14, tone);
   }
   const int bar = 3;
   if (style % 2 == 0) Box(image, r.x + Share(r.width, 1, 2) - Share(bar, 1, 2), r.y, bar, r.height, frame);
@@ -123,7 +127,8 @@ cv::Mat FacadeTexture(std::uint64_t seed) {
   cv::Mat image = Plain(kSide, kSide, random.In(80, 195));
   if (random.Unit() < 0.5) Bricks(image, random.Int(8, 14), 12, random);
   AddNoise(image, 128, 7, random.Bits());
-  Box(image, 0, 0, kSide, random.Int(10, 26), random.In(40, 110));  // roof edge
+  const double roof = random.In(40, 110);
+  Box(image, 0, 0, kSide, random.Int(10, 26), roof);
   const int floors = random.Int(2, 4), columns = random.Int(2, 5), style = random.Int(0, 4);
   const int pitch_y = (kSide - 40) / floors, pitch_x = kSide / columns;
   const double frame = random.In(0, 1) < 0.5 ? random.In(200, 250) : random.In(30, 80);
@@ -151,7 +156,8 @@ cv::Mat FacadeTexture(std::uint64_t seed) {
   }
   if (shop) {
     const int top = kSide - pitch_y + 10;
-    const cv::Rect board(random.Int(10, 60), top - 34, random.Int(260, 430), 40);
+    const int length = random.Int(260, 430);
+    const cv::Rect board(random.Int(10, 60), top - 34, length, 40);
     Box(image, board.x, board.y, board.width, board.height, random.In(15, 60));
     Writing(image, board, 245, random);
     const int x0 = door * pitch_x + pitch_x / 2;
@@ -160,8 +166,9 @@ cv::Mat FacadeTexture(std::uint64_t seed) {
       Box(image, x, top + 14, 84, kSide - top - 44, frame);
       Box(image, x + 5, top + 19, 74, kSide - top - 54, random.In(20, 70));
       for (int i = 0; i < 6; ++i) {  // goods
-        Box(image, x + random.Int(6, 60), random.Int(top + 24, kSide - 60), random.Int(6, 18),
-            random.Int(8, 26), random.In(80, 240));
+        const double tone = random.In(80, 240);
+        const int high = random.Int(8, 26), wide = random.Int(6, 18), y = random.Int(top + 24, kSide - 60);
+        Box(image, x + random.Int(6, 60), y, wide, high, tone);
       }
     }
   }
@@ -177,13 +184,16 @@ cv::Mat RoadTexture(std::uint64_t seed, bool crossing) {
   const int spots = random.Int(5, 9);
   for (int i = 0; i < spots; ++i) {  // repaired patches and stains
     const double tone = random.In(55, 125);
-    const cv::Rect r(random.Int(80, 380), random.Int(0, 440), random.Int(12, 60), random.Int(12, 70));
-    Box(image, r.x, r.y, r.width, r.height, tone);
+    const int height = random.Int(12, 70), width = random.Int(12, 60);
+    const int y = random.Int(0, 440), x = random.Int(80, 380);
+    Box(image, x, y, width, height, tone);
   }
   for (int i = 0; i < 10; ++i) {  // cracks
-    cv::Point at(random.Int(70, 440), random.Int(0, kSide - 1));
+    const int y = random.Int(0, kSide - 1), x = random.Int(70, 440);
+    cv::Point at(x, y);
     for (int k = 0; k < 8; ++k) {
-      const cv::Point next(at.x + random.Int(-18, 18), at.y + random.Int(4, 22));
+      const int dy = random.Int(4, 22), dx = random.Int(-18, 18);
+      const cv::Point next = at + cv::Point(dx, dy);
       cv::line(image, at, next, cv::Scalar(45), 2);
       at = next;
     }
@@ -197,7 +207,8 @@ cv::Mat RoadTexture(std::uint64_t seed, bool crossing) {
       Box(image, x == 0 ? 60 : x, 0, 5, kSide, 185);
     }
   }
-  const cv::Point cover(random.Int(120, 390), random.Int(40, 470));  // manhole
+  const int cover_y = random.Int(40, 470), cover_x = random.Int(120, 390);
+  const cv::Point cover(cover_x, cover_y);  // manhole
   cv::circle(image, cover, 13, cv::Scalar(48), cv::FILLED);
   cv::circle(image, cover, 9, cv::Scalar(105), 2);
   AddNoise(image, 8, 6, random.Bits());
@@ -217,17 +228,22 @@ cv::Mat SignTexture(std::uint64_t seed) {
   cv::Mat image = Plain(128, 128, back);
   const int shapes = random.Int(4, 9);
   for (int i = 0; i < shapes; ++i) {
-    const cv::Point at(random.Int(10, 118), random.Int(10, 118));
+    const int y = random.Int(10, 118), x = random.Int(10, 118);
+    const cv::Point at(x, y);
     const double tone = random.In(0, 255);
     if (random.Unit() < 0.4) {
-      cv::circle(image, at, random.Int(5, 24), cv::Scalar(tone), random.Unit() < 0.5 ? cv::FILLED : 4);
+      const int thickness = random.Unit() < 0.5 ? cv::FILLED : 4;
+      cv::circle(image, at, random.Int(5, 24), cv::Scalar(tone), thickness);
     } else if (random.Unit() < 0.6) {
-      Box(image, at.x - 10, at.y - 10, random.Int(8, 50), random.Int(5, 30), tone);
+      const int height = random.Int(5, 30), width = random.Int(8, 50);
+      Box(image, x - 10, y - 10, width, height, tone);
     } else {
-      cv::line(image, at, {random.Int(0, 127), random.Int(0, 127)}, cv::Scalar(tone), random.Int(2, 6));
+      const int thickness = random.Int(2, 6), end_x = random.Int(0, 127), end_y = random.Int(0, 127);
+      cv::line(image, at, {end_x, end_y}, cv::Scalar(tone), thickness);
     }
   }
-  Writing(image, {4, random.Int(4, 80), 120, random.Int(26, 42)}, ink, random);
+  const int top = random.Int(4, 80), height = random.Int(26, 42);
+  Writing(image, {4, top, 120, height}, ink, random);
   cv::rectangle(image, cv::Rect(0, 0, 128, 128), cv::Scalar(ink), 4);
   return image;
 }
@@ -271,8 +287,9 @@ cv::Mat BusTexture(std::uint64_t seed) {
   const int posters = random.Int(2, 4), low = windows ? 128 : 24;
   for (int k = 0; k < posters; ++k) {
     cv::Mat poster;
-    const cv::Rect r(k * kWidth / posters + random.Int(4, 20), low + random.Int(0, 12),
-                     random.Int(70, kWidth / posters - 24), random.Int(50, 80));
+    const int height = random.Int(50, 80), width = random.Int(70, kWidth / posters - 24);
+    const int y = low + random.Int(0, 12), x = k * kWidth / posters + random.Int(4, 20);
+    const cv::Rect r(x, y, width, height);
     cv::resize(SignTexture(random.Bits()), poster, r.size(), 0, 0, cv::INTER_AREA);
     poster.copyTo(image(r));
   }
@@ -291,8 +308,9 @@ cv::Mat FoliageTexture(std::uint64_t seed) {
   Random random(seed);
   cv::Mat image = Plain(128, 128, 70);
   for (int i = 0; i < 500; ++i) {
-    cv::circle(image, {random.Int(0, 127), random.Int(0, 127)}, random.Int(2, 5),
-               cv::Scalar(random.In(25, 135)), cv::FILLED);
+    const double tone = random.In(25, 135);
+    const int radius = random.Int(2, 5), x = random.Int(0, 127), y = random.Int(0, 127);
+    cv::circle(image, {x, y}, radius, cv::Scalar(tone), cv::FILLED);
   }
   return image;
 }
@@ -321,9 +339,10 @@ cv::Mat WoodTexture(std::uint64_t seed) {
   cv::add(image, grain, sum, cv::noArray(), CV_32F);
   sum.convertTo(image, CV_8U);
   for (int x = 0; x < 256; x += plank) Box(image, x, 0, 2, 256, base - 45);
-  for (int i = 0; i < 10; ++i)
-    cv::circle(image, {random.Int(0, 255), random.Int(0, 255)}, random.Int(2, 4), cv::Scalar(base - 40),
-               cv::FILLED);
+  for (int i = 0; i < 10; ++i) {
+    const int radius = random.Int(2, 4), x = random.Int(0, 255), y = random.Int(0, 255);
+    cv::circle(image, {x, y}, radius, cv::Scalar(base - 40), cv::FILLED);
+  }
   return image;
 }
 

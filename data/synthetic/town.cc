@@ -84,9 +84,10 @@ class TownBuilder {
       const Vector2d middle(0.5 * options_.blocks_x * pitch_, 0.5 * options_.blocks_y * pitch_);
       const double reach = distance + 0.5 * pitch_ * std::max(options_.blocks_x, options_.blocks_y);
       const int texture = Pick(facades_);
+      const double yaw = random_.In(0, M_PI);
+      const double length = random_.In(12, 24), width = random_.In(12, 24), height = random_.In(20, 48);
       AppendBox(scene_.faces, Lift(middle + reach * Vector2d(std::cos(angle), std::sin(angle)), 0),
-                {random_.In(12, 24), random_.In(12, 24), random_.In(20, 48)}, random_.In(0, M_PI),
-                {texture, texture, walls_[0]});
+                {length, width, height}, yaw, {texture, texture, walls_[0]});
     }
   }
 
@@ -189,12 +190,12 @@ class TownBuilder {
     const double half = 0.5 * options_.street_m, curb = half - kPavement * options_.street_m;
     const double yaw = std::atan2(along.y(), along.x()), kind = random_.Unit();
     if (kind < 0.5) {
-      const Vector3d size(random_.In(3.7, 4.6), 1.7, random_.In(1.35, 1.9));
+      const double height = random_.In(1.35, 1.9), length = random_.In(3.7, 4.6);
       const BoxTextures look =
           cars_[static_cast<std::size_t>(random_.Int(0, static_cast<int>(cars_.size()) - 1))];
       const std::size_t first = scene_.faces.size();
       const Vector2d at = middle + (curb - 1.0) * side;
-      if (curb > 3.3) AppendBox(scene_.faces, Lift(at, 0), size, yaw, look);
+      if (curb > 3.3) AppendBox(scene_.faces, Lift(at, 0), {length, 1.7, height}, yaw, look);
       if (curb > 3.3 && options_.other_cars) AddLaterCar(first, at, along, 0.65);
       return;
     }
@@ -227,8 +228,8 @@ class TownBuilder {
       look.front = scene_.Add(CarTexture(later_.Bits(), false));
       look.side = scene_.Add(CarTexture(later_.Bits(), true));
       look.top = walls_[static_cast<std::size_t>(later_.Int(0, static_cast<int>(walls_.size()) - 1))];
-      const Vector3d size(later_.In(3.6, 5.0), later_.In(1.6, 1.8), later_.In(1.3, 1.7));
-      AppendBox(place.later, Lift(at + later_.In(-0.6, 0.6) * along, 0), size,
+      const double height = later_.In(1.3, 1.7), width = later_.In(1.6, 1.8), length = later_.In(3.6, 5.0);
+      AppendBox(place.later, Lift(at + later_.In(-0.6, 0.6) * along, 0), {length, width, height},
                 std::atan2(along.y(), along.x()), look);
     }
     if (place.faces > 0 || !place.later.empty()) scene_.parking.push_back(std::move(place));

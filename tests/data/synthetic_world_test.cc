@@ -8,6 +8,8 @@
 #include <opencv2/imgproc.hpp>
 #include <sstream>
 
+#include "core/byte_stream.h"
+#include "data/synthetic/image_change.h"
 #include "data/synthetic/synthetic_writer.h"
 #include "gmock/gmock.h"
 #include "tests/frontend/dataset/dataset_files.h"
@@ -197,6 +199,35 @@ TEST(SyntheticWorldTest, WorldsLookAsTheyAlwaysDid) {
               Pointwise(DoubleNear(1.01), {169, 152, 129, 136, 145, 129, 126, 126}));
   EXPECT_THAT(Tones(frame(SyntheticScene::kCorridor, 7)),
               Pointwise(DoubleNear(1.01), {164, 169, 163, 134, 156, 137, 129, 124}));
+}
+
+std::uint32_t Checksum(const cv::Mat& image) {
+  return internal::Crc32({image.ptr<char>(), image.total() * image.elemSize()});
+}
+
+// Whole images, so that nothing is drawn in another order: neither by another compiler nor after a change.
+TEST(SyntheticWorldTest, ImagesAreTheSameBytesWithEveryCompiler) {
+#if CV_VERSION_MAJOR != 4 || CV_VERSION_MINOR != 6
+  GTEST_SKIP() << "the checksums are those of OpenCV 4.6; others draw and scale in other ways";
+#elif !defined(__x86_64__) || defined(__FMA__)
+  GTEST_SKIP() << "the checksums are those of x86-64 without fused multiply-add";
+#endif
+  const auto checksum = [](const SyntheticOptions& o, std::size_t i) {
+    return Checksum(SyntheticWorld(o).Render(i).image);
+  };
+  SyntheticOptions town = Small(SyntheticScene::kTown, SyntheticSensor::kMono);
+  EXPECT_EQ(checksum(town, 7), 1569755144U);
+  EXPECT_EQ(checksum(Small(SyntheticScene::kRoom, SyntheticSensor::kMono), 7), 3208442277U);
+  EXPECT_EQ(checksum(Small(SyntheticScene::kCorridor, SyntheticSensor::kMono), 7), 2192339742U);
+  town.laps = 2;
+  town.dusk = town.other_cars = true;
+  town.occlusion = 0.3;
+  town.noise_sigma = 4;
+  town.moving_objects = 6;
+  EXPECT_EQ(checksum(town, SyntheticWorld(town).FramesPerLap() + 90), 1711598673U);
+  const cv::Mat grey(240, 320, CV_8UC1, cv::Scalar(120));
+  EXPECT_EQ(Checksum(ImageChange::Parse("rain:2").Apply(grey, 1, 3)), 2398972044U);
+  EXPECT_EQ(Checksum(ImageChange::Parse("occluded:2").Apply(grey, 1, 3)), 3507768232U);
 }
 
 TEST(SyntheticWorldTest, OnlyTheSecondLapIsAtDuskOrOccludedAndThePosesStay) {

@@ -38,7 +38,8 @@ struct Views {
     query.id = 50;
     for (KeyframeView* view : {&candidate, &query}) view->descriptors = cv::Mat(kLandmarks, 32, CV_8U);
     for (int i = 0; i < kLandmarks; ++i) {
-      const Eigen::Vector3d point(uniform(-3, 3), uniform(-2, 2), uniform(8, 12));
+      const double z = uniform(8, 12), y = uniform(-2, 2), x = uniform(-3, 3);
+      const Eigen::Vector3d point(x, y, z);
       const Eigen::Vector3d in_query = S.Inverse() * point;
       Add(candidate, camera, point, i);
       Add(query, camera, in_query, i);

@@ -11,12 +11,16 @@ double Gauss(std::mt19937& random) {
   const double u = Uniform(random), v = Uniform(random);
   return std::sqrt(-2.0 * std::log(u)) * std::cos(2.0 * M_PI * v);
 }
+// z is drawn first: in the arguments of one call, which comes first would be the compiler's choice.
+Eigen::Vector3d GaussVector(std::mt19937& random) {
+  const double z = Gauss(random), y = Gauss(random), x = Gauss(random);
+  return {x, y, z};
+}
 
 Similarity Noisy(const Similarity& s, const SyntheticGraphOptions& o, std::mt19937& random,
                  double factor = 1.0) {
   Similarity out = s;
-  Eigen::Vector3d dt(Gauss(random), Gauss(random), Gauss(random)),
-      dr(Gauss(random), Gauss(random), Gauss(random));
+  Eigen::Vector3d dt = GaussVector(random), dr = GaussVector(random);
   if (o.kind == GraphKind::kSE2) {
     dt.z() = 0;
     dr.x() = dr.y() = 0;
@@ -30,8 +34,7 @@ Similarity Noisy(const Similarity& s, const SyntheticGraphOptions& o, std::mt199
 }  // namespace
 
 Similarity RandomPose(GraphKind kind, std::mt19937& random, double translation, double rotation) {
-  Eigen::Vector3d t(Gauss(random), Gauss(random), Gauss(random)),
-      r(Gauss(random), Gauss(random), Gauss(random));
+  Eigen::Vector3d t = GaussVector(random), r = GaussVector(random);
   const double scale = kind == GraphKind::kSim3 ? std::exp(0.3 * Gauss(random)) : 1.0;
   if (kind == GraphKind::kSE2) {
     t.z() = 0;

@@ -143,7 +143,8 @@ TEST(FrameFeatures, AreaSearchFindsWhatLooksAtEveryFeatureFind) {
   cv::RNG rng(5);
   std::vector<int> found;
   for (int trial = 0; trial < 200; ++trial) {
-    const cv::Point2f centre(rng.uniform(-50.0F, 530.0F), rng.uniform(-50.0F, 290.0F));
+    const float y = rng.uniform(-50.0F, 290.0F), x = rng.uniform(-50.0F, 530.0F);
+    const cv::Point2f centre(x, y);
     const float radius = rng.uniform(0.5F, 90.0F);
     const int first = rng.uniform(0, 8), last = rng.uniform(first, 8);
     features.InArea(centre, radius, first, last, &found);

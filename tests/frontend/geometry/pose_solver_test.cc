@@ -28,8 +28,9 @@ std::vector<PointObservation> Seen(const Pose& T_camera_world, int count, bool w
   std::mt19937 generator(7);
   std::vector<PointObservation> out;
   for (int i = 0; i < count; ++i) {
-    const Eigen::Vector3d in_camera(Uniform(generator, -2, 2), Uniform(generator, -1.5, 1.5),
-                                    Uniform(generator, 4, 12));
+    const double z = Uniform(generator, 4, 12), y = Uniform(generator, -1.5, 1.5),
+                 x = Uniform(generator, -2, 2);
+    const Eigen::Vector3d in_camera(x, y, z);
     PointObservation o;
     o.point = T_camera_world.Inverse() * in_camera;
     o.pixel = Camera().Project(in_camera);
@@ -100,7 +101,8 @@ TEST(RefinePose, WrongMatchesAreMarkedAndDoNotMoveThePose) {
   std::vector<PointObservation> observations = Seen(kTruth, 80, false);
   std::mt19937 generator(2);
   for (std::size_t i = 0; i < observations.size(); i += 4) {
-    observations[i].pixel += Eigen::Vector2d(Uniform(generator, 20, 80), Uniform(generator, -80, -20));
+    const double dy = Uniform(generator, -80, -20), dx = Uniform(generator, 20, 80);
+    observations[i].pixel += Eigen::Vector2d(dx, dy);
   }
   Pose pose = kGuess;
   std::vector<char> inlier;

@@ -27,8 +27,8 @@ Matches Scene(const Pose& T_second_first, bool planar, int count, double noise_p
   };
   const auto pixel = [&](const Eigen::Vector3d& p) {
     const Eigen::Vector2d u = Camera().Project(p);
-    return cv::Point2f(static_cast<float>(u.x() + uniform(-noise_px, noise_px)),
-                       static_cast<float>(u.y() + uniform(-noise_px, noise_px)));
+    const double dy = uniform(-noise_px, noise_px), dx = uniform(-noise_px, noise_px);
+    return cv::Point2f(static_cast<float>(u.x() + dx), static_cast<float>(u.y() + dy));
   };
   Matches matches;
   for (int i = 0; i < count; ++i) {

@@ -25,7 +25,8 @@ struct World {
       return low + (high - low) * static_cast<double>(generator() % 100000) / 1e5;
     };
     for (int i = 0; i < kPoints; ++i) {
-      points.emplace_back(uniform(-2, 4), uniform(-2, 2), uniform(6, 12));
+      const double z = uniform(6, 12), y = uniform(-2, 2), x = uniform(-2, 4);
+      points.emplace_back(x, y, z);
     }
     for (int k = 0; k < kKeyframes; ++k) {
       const Pose T_world_camera(ExpSO3({0, 0.02 * k, 0.01 * k}), {0.5 * k, 0.05 * k, 0.1 * k});

@@ -21,7 +21,8 @@ class PointScene {
     rng.fill(descriptors_, cv::RNG::UNIFORM, 0, 256);
     for (int i = 0; i < kPoints; ++i) {
       const double z = rng.uniform(4.0, 12.0);
-      points_.emplace_back(z * rng.uniform(-0.55, 0.55), z * rng.uniform(-0.4, 0.4), z);
+      const double y = z * rng.uniform(-0.4, 0.4), x = z * rng.uniform(-0.55, 0.55);
+      points_.emplace_back(x, y, z);
     }
   }
 

@@ -24,7 +24,8 @@ Window DriveForward(const Eigen::Vector2d& lens, double turn_rad = 0.03) {
     window.T_camera_world.push_back(Pose(ExpSO3({0, turn_rad * z, 0}), {0, 0, z}).Inverse());
   window.first_observation.push_back(0);
   for (int i = 0; i < 200; ++i) {
-    const Eigen::Vector3d point(uniform(-6, 6), uniform(-4, 4), uniform(8, 20));
+    const double z = uniform(8, 20), y = uniform(-4, 4), x = uniform(-6, 6);
+    const Eigen::Vector3d point(x, y, z);
     window.points.push_back(point);
     for (std::size_t c = 0; c < window.T_camera_world.size(); ++c) {
       WindowObservation o;
@@ -126,7 +127,8 @@ Window LongDrive() {
   }
   window.first_observation.push_back(0);
   for (int i = 0; i < 3000; ++i) {
-    const Eigen::Vector3d point(uniform(-30, 60), uniform(-4, 4), uniform(5, 115));
+    const double z = uniform(5, 115), y = uniform(-4, 4), x = uniform(-30, 60);
+    const Eigen::Vector3d point(x, y, z);
     std::vector<WindowObservation> seen;
     for (std::size_t c = 0; c < window.T_camera_world.size(); ++c) {
       const Eigen::Vector3d p = window.T_camera_world[c] * point;

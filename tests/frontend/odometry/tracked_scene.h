@@ -1,6 +1,7 @@
 // A made-up scene as the parts of tracking see it: frames of random points, a map of one keyframe.
 #pragma once
 
+#include <cmath>
 #include <memory>
 #include <vector>
 
@@ -39,7 +40,8 @@ class TrackedScene : protected PointScene {
       features->inverse_depth[f] = static_cast<float>(1 / p.z());
       features->inverse_depth_sigma[f] = 0.001F * features->inverse_depth[f];
     }
-    return {static_cast<std::int64_t>(10 * stamp_s), stamp_s, features};
+    const double index = std::isfinite(stamp_s) ? 10 * stamp_s : 0;  // a stamp may be NaN on purpose
+    return {static_cast<std::int64_t>(index), stamp_s, features};
   }
 
   /// As many features as elsewhere, of things that nobody has seen.

@@ -191,7 +191,10 @@ TEST_P(QuotaMember, AnImageWithoutTextureStaysWithoutFeatures) {
   EXPECT_LT(extractor.Extract(ramp).keypoints.size(), 40u);
   cv::Mat noise(192, 240, CV_8UC1, cv::Scalar(80));
   cv::RNG random(1);
-  for (int i = 0; i < 2000; ++i) noise.at<std::uint8_t>(random.uniform(0, 192), random.uniform(0, 240)) = 81;
+  for (int i = 0; i < 2000; ++i) {
+    const int column = random.uniform(0, 240), row = random.uniform(0, 192);
+    noise.at<std::uint8_t>(row, column) = 81;
+  }
   EXPECT_LT(extractor.Extract(noise).keypoints.size(), 40u);
 }
 

@@ -17,7 +17,8 @@ inline cv::Mat TexturedImage(std::uint32_t seed, int width = 320, int height = 2
   cv::Mat image(height, width, CV_8UC1, cv::Scalar(draw(90, 160)));
   const int shapes = width * height / 400;
   for (int i = 0; i < shapes; ++i) {
-    const cv::Point centre(draw(0, width), draw(0, height));
+    const int y = draw(0, height), x = draw(0, width);
+    const cv::Point centre(x, y);
     const int size = draw(3, 18);
     const cv::Scalar grey(draw(0, 255));
     if (draw(0, 2) == 0) {

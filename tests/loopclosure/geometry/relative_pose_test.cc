@@ -30,7 +30,12 @@ class Scene {
   }
   Eigen::Vector3d Point() { return {Uniform(-1.5, 1.5), Uniform(-1, 1), Uniform(2, 5)}; }
   Eigen::Vector2d Pixel(const Eigen::Vector3d& p, double sigma) {
-    return Camera().Project(p) + Eigen::Vector2d(Noise(sigma), Noise(sigma));
+    const double dy = Noise(sigma), dx = Noise(sigma);
+    return Camera().Project(p) + Eigen::Vector2d(dx, dy);
+  }
+  Eigen::Vector2d AnyPixel() {
+    const double y = Uniform(0, 480), x = Uniform(0, 640);
+    return {x, y};
   }
 
  private:
@@ -50,8 +55,7 @@ PnpData MakePnp(int inliers, int outliers, double sigma, std::uint32_t seed) {
   for (int i = 0; i < inliers + outliers; ++i) {
     const Eigen::Vector3d p = scene.Point();
     data.points.push_back(p);
-    data.pixels.push_back(i < inliers ? scene.Pixel(kTrueQueryCandidate * p, sigma)
-                                      : Eigen::Vector2d(scene.Uniform(0, 640), scene.Uniform(0, 480)));
+    data.pixels.push_back(i < inliers ? scene.Pixel(kTrueQueryCandidate * p, sigma) : scene.AnyPixel());
   }
   return data;
 }

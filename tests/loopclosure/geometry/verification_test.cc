@@ -21,7 +21,10 @@ std::vector<Eigen::Vector3d> Cloud() {
   std::uniform_real_distribution<double> x(-3, 3), y(-2, 2), z(4, 12);
   std::vector<Eigen::Vector3d> cloud;
   cloud.reserve(kPoints);
-  for (int i = 0; i < kPoints; ++i) cloud.emplace_back(x(generator), y(generator), z(generator));
+  for (int i = 0; i < kPoints; ++i) {
+    const double pz = z(generator), py = y(generator), px = x(generator);
+    cloud.emplace_back(px, py, pz);
+  }
   return cloud;
 }
 
@@ -44,8 +47,8 @@ View See(const Pose& T_world_camera, std::int64_t id, bool calibrated, bool with
     cv::Mat row(1, 32, CV_8U);
     for (int c = 0; c < 32; ++c) row.at<std::uint8_t>(0, c) = static_cast<std::uint8_t>(own());
     set.descriptors.push_back(row);
-    set.pixels.emplace_back(static_cast<float>(pixel.x() + noise(generator)),
-                            static_cast<float>(pixel.y() + noise(generator)));
+    const double dy = noise(generator), dx = noise(generator);
+    set.pixels.emplace_back(static_cast<float>(pixel.x() + dx), static_cast<float>(pixel.y() + dy));
     if (with_points) set.points.push_back(p.cast<float>());
   }
   view.members.push_back(set);
@@ -166,8 +169,8 @@ View SomewhereElse(std::uint32_t seed) {
   view.members.emplace_back();
   std::mt19937 generator(seed);
   for (std::uint32_t i = 0; i < kPoints; ++i) {
-    const cv::Point2f pixel(static_cast<float>(generator() % 640u), static_cast<float>(generator() % 480u));
-    AddFeature(view, pixel, 100000 * seed + i);
+    const std::uint32_t y = generator() % 480u, x = generator() % 640u;
+    AddFeature(view, cv::Point2f(static_cast<float>(x), static_cast<float>(y)), 100000 * seed + i);
   }
   return view;
 }
@@ -193,7 +196,8 @@ void Add(Overlay overlay, View& view) {
       const int row = i / 10;
       p = {60 + 520 * along, 330 + 40 * static_cast<float>(row)};
     }
-    AddFeature(view, p + cv::Point2f(noise(generator), noise(generator)), 7000000 + i);
+    const float dy = noise(generator), dx = noise(generator);
+    AddFeature(view, p + cv::Point2f(dx, dy), 7000000 + i);
   }
 }
 
@@ -263,8 +267,8 @@ View SeeFlat(const Pose& T_world_camera, std::int64_t id, bool calibrated) {
     const Eigen::Vector3d point(3 * ray.x(), 3 * ray.y(), 6 + ray.x());
     const Eigen::Vector2d pixel = Camera().Project(T_world_camera.Inverse() * point);
     if (!Camera().Contains(pixel)) continue;
-    flat.pixels.emplace_back(static_cast<float>(pixel.x() + noise(generator)),
-                             static_cast<float>(pixel.y() + noise(generator)));
+    const double dy = noise(generator), dx = noise(generator);
+    flat.pixels.emplace_back(static_cast<float>(pixel.x() + dx), static_cast<float>(pixel.y() + dy));
     flat.descriptors.push_back(Descriptor(static_cast<std::uint32_t>(900000 + i)));
   }
   set = flat;

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "loopclosure/store/byte_stream.h"
+#include "core/byte_stream.h"
 #include "tutti/core/error.h"
 
 namespace tutti {

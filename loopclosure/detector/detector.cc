@@ -141,12 +141,26 @@ void LoopDetector::Save(const std::filesystem::path& file) const {
   internal::SaveDetector(impl_->state(), impl_->long_term(), file);
 }
 
+void LoopDetector::SaveSections(
+    const std::function<void(std::uint32_t tag, std::string_view bytes)>& sink) const {
+  internal::SaveDetector(impl_->state(), impl_->long_term(), internal::Positions::kKeep, sink);
+}
+
 void LoopDetector::Load(const std::filesystem::path& file) {
   internal::SavedDetector saved(file);
+  Take(&saved);
+}
+
+void LoopDetector::LoadSections(internal::SectionReader* file) {
+  internal::SavedDetector saved(file);
+  Take(&saved);
+}
+
+void LoopDetector::Take(internal::SavedDetector* saved) {
   LoopDetectorOptions options = impl_->state().options();
-  options.seed = saved.seed();
+  options.seed = saved->seed();
   auto loaded = std::make_unique<Impl>(options);
-  saved.LoadInto(loaded->state(), loaded->long_term());
+  saved->LoadInto(loaded->state(), loaded->long_term());
   loaded->long_term().TakeFile(impl_->long_term());
   impl_ = std::move(loaded);
 }

@@ -1,9 +1,12 @@
 #include "loopclosure/detector/detector_file.h"
 
+#include <limits>
 #include <string_view>
+#include <utility>
+#include <vector>
 
+#include "core/byte_stream.h"
 #include "loopclosure/geometry/view_bytes.h"
-#include "loopclosure/store/byte_stream.h"
 #include "tutti/core/error.h"
 
 namespace tutti::internal {
@@ -12,6 +15,18 @@ using Kind = LocationStore::Kind;
 using State = LocationMemory::State;
 
 namespace {
+
+enum class Section : std::uint32_t {
+  kOptions = 1,
+  kMember = kMemberSection,
+  kMemory,
+  kUnion,
+  kView = kViewSection,
+  kRecord,
+  kStatistics,
+  kEndOfDetector,
+  kPositions  // in a file that holds more
+};
 
 // True for a record that memory does not hold; those of other locations may be stored as well.
 bool OnlyInStore(const DetectorState& state, Kind kind, std::int64_t a, std::int64_t b) {
@@ -26,7 +41,9 @@ bool OnlyInStore(const DetectorState& state, Kind kind, std::int64_t a, std::int
   return systems[number]->memory().state(index) == State::kLongTerm;
 }
 
-void SaveLongTerm(const DetectorState& state, LocationStore& store, SectionWriter& out) {
+std::uint32_t Tag(Section section) { return static_cast<std::uint32_t>(section); }
+
+void SaveLongTerm(const DetectorState& state, LocationStore& store, const SectionSink& out) {
   for (const Kind kind : {Kind::kSignature, Kind::kView, Kind::kWord}) {
     store.ForEach(kind, [&](std::int64_t a, std::int64_t b, std::string_view bytes) {
       if (!OnlyInStore(state, kind, a, b)) return;
@@ -35,7 +52,7 @@ void SaveLongTerm(const DetectorState& state, LocationStore& store, SectionWrite
       record.Put(a);
       record.Put(b);
       record.PutString(bytes);
-      out.Write(Section::kRecord, record.bytes());
+      out(Tag(Section::kRecord), record.bytes());
     });
   }
 }
@@ -49,42 +66,71 @@ void LoadRecord(ByteReader& in, LocationStore& store) {
   store.Put(static_cast<Kind>(kind), a, b, in.GetString());
 }
 
+// The descriptors of a member's features in views, in their order: most of its words are among them.
+std::vector<cv::Mat> DescriptorsOf(std::size_t member, const std::vector<const View*>& views) {
+  std::vector<cv::Mat> all;
+  for (const View* view : views) {
+    if (member < view->members.size()) all.push_back(view->members[member].descriptors);
+  }
+  return all;
+}
+
 template <typename Save>
-void Write(Section section, SectionWriter& out, const Save& save) {
+void Write(Section section, const SectionSink& out, const Save& save) {
   ByteWriter bytes;
   save(bytes);
-  out.Write(section, bytes.bytes());
+  out(Tag(section), bytes.bytes());
 }
 
 }  // namespace
 
 void SaveDetector(const DetectorState& state, LongTermMemory& long_term, const std::filesystem::path& file) {
-  SectionWriter out(file);
+  SectionWriter out(file, kDetectorFile);
+  SaveDetector(state, long_term, Positions::kForget,
+               [&out](std::uint32_t tag, std::string_view bytes) { out.Write(tag, bytes); });
+  out.Finish();
+}
+
+void SaveDetector(const DetectorState& state, LongTermMemory& long_term, Positions positions,
+                  const SectionSink& out) {
   const PlaceReasoner& reasoner = state.reasoner();
   Write(Section::kOptions, out, [&](ByteWriter& bytes) {
     bytes.PutString(reasoner.Fingerprint());
     bytes.Put(state.options().seed);
   });
-  out.Write(Section::kStatistics, state.Statistics());
-  for (const Member& member : state.members()) {
-    Write(Section::kMember, out, [&](ByteWriter& bytes) { member.vocabulary().Save(bytes); });
-  }
-  for (const auto& system : reasoner.systems()) {
-    Write(Section::kMemory, out, [&](ByteWriter& bytes) { system->Save(bytes); });
-  }
-  Write(Section::kUnion, out, [&](ByteWriter& bytes) { reasoner.union_of_all().Save(bytes); });
+  out(Tag(Section::kStatistics), state.Statistics());
+  std::vector<const View*> views;
   for (int slot = 0; slot < state.memory().size(); ++slot) {
     if (!reasoner.InMemory(slot)) continue;
+    views.push_back(&state.view(slot));
     Write(Section::kView, out, [&](ByteWriter& bytes) {
       bytes.Put<std::int32_t>(slot);
       SaveView(state.view(slot), bytes);
     });
   }
+  for (std::size_t m = 0; m < state.members().size(); ++m) {
+    Write(Section::kMember, out,
+          [&](ByteWriter& bytes) { state.members()[m].vocabulary().Save(DescriptorsOf(m, views), bytes); });
+  }
+  for (const auto& system : reasoner.systems()) {
+    Write(Section::kMemory, out, [&](ByteWriter& bytes) { system->Save(bytes); });
+  }
+  Write(Section::kUnion, out, [&](ByteWriter& bytes) { reasoner.union_of_all().Save(bytes); });
+  if (positions == Positions::kKeep) {
+    Write(Section::kPositions, out, [&](ByteWriter& bytes) { reasoner.track().Save(bytes); });
+  }
   if (long_term.has_store()) SaveLongTerm(state, long_term.store(), out);
-  out.Finish();
+  out(Tag(Section::kEndOfDetector), "");
 }
 
-SavedDetector::SavedDetector(const std::filesystem::path& file) : in_(file) {
+SavedDetector::SavedDetector(const std::filesystem::path& file)
+    : own_(std::make_unique<SectionReader>(file, kDetectorFile)), in_(*own_) {
+  ReadOptions();
+}
+
+SavedDetector::SavedDetector(SectionReader* in) : in_(*in) { ReadOptions(); }
+
+void SavedDetector::ReadOptions() {
   const std::string options = in_.Expect(Section::kOptions);
   ByteReader bytes(options, in_.name());
   fingerprint_ = bytes.GetString();
@@ -92,7 +138,7 @@ SavedDetector::SavedDetector(const std::filesystem::path& file) : in_(file) {
 }
 
 template <typename Read>
-void SavedDetector::Load(Section section, const Read& read) {
+void SavedDetector::Load(std::uint32_t section, const Read& read) {
   const std::string content = in_.Expect(section);
   ByteReader bytes(content, in_.name());
   read(bytes);
@@ -105,38 +151,59 @@ void SavedDetector::LoadInto(DetectorState& state, LongTermMemory& long_term) {
     throw InputError(in_.name() + ": was saved with another configuration (" + fingerprint_ +
                      "; here: " + reasoner.Fingerprint() + "); load it with the same members and memory");
   }
-  Load(Section::kStatistics, [&](ByteReader& bytes) { state.LoadStatistics(bytes); });
-  for (Member& member : state.ensemble().members()) {
-    Load(Section::kMember, [&](ByteReader& bytes) { member.vocabulary().Load(bytes); });
+  Load(Tag(Section::kStatistics), [&](ByteReader& bytes) { state.LoadStatistics(bytes); });
+  std::map<int, View> views = LoadViews();
+  std::vector<const View*> in_order;
+  for (const auto& [slot, view] : views) in_order.push_back(&view);
+  for (std::size_t m = 0; m < state.members().size(); ++m) {
+    Load(Tag(Section::kMember), [&](ByteReader& bytes) {
+      state.ensemble().members()[m].vocabulary().Load(DescriptorsOf(m, in_order), bytes);
+    });
   }
   for (auto& system : reasoner.systems()) {
-    Load(Section::kMemory, [&](ByteReader& bytes) { system->Load(bytes); });
+    Load(Tag(Section::kMemory), [&](ByteReader& bytes) { system->Load(bytes); });
   }
-  Load(Section::kUnion, [&](ByteReader& bytes) { reasoner.union_of_all().Load(bytes); });
+  Load(Tag(Section::kUnion), [&](ByteReader& bytes) { reasoner.union_of_all().Load(bytes); });
   state.CheckMemories(in_.name());
-  LoadViewsAndRecords(state, long_term);
+  for (auto& [slot, view] : views) {
+    if (slot >= state.memory().size()) in_.Damaged("features of no location");
+    state.LoadView(slot, std::move(view), in_.name());
+  }
+  for (int slot = 0; slot < state.memory().size(); ++slot) {
+    if (reasoner.InMemory(slot) && !state.HasView(slot)) in_.Damaged("features of a location are missing");
+  }
+  LoadRest(state, long_term);
 }
 
-void SavedDetector::LoadViewsAndRecords(DetectorState& state, LongTermMemory& long_term) {
+std::map<int, View> SavedDetector::LoadViews() {
+  std::map<int, View> views;
+  while (in_.Peek() == Tag(Section::kView)) {
+    Load(Tag(Section::kView), [&](ByteReader& bytes) {
+      const int slot = bytes.GetIndex(std::numeric_limits<int>::max());
+      if (!views.empty() && slot <= views.rbegin()->first) bytes.Damaged("features out of order");
+      views.emplace_hint(views.end(), slot, LoadView(bytes));
+    });
+  }
+  return views;
+}
+
+void SavedDetector::LoadRest(DetectorState& state, LongTermMemory& long_term) {
   bool writing = false;
-  Section section;
-  for (std::string content = in_.Next(section); section != Section::kEnd; content = in_.Next(section)) {
+  std::string content;
+  for (std::uint32_t tag = in_.Next(&content); tag != Tag(Section::kEndOfDetector);
+       tag = in_.Next(&content)) {
     ByteReader bytes(content, in_.name());
-    if (section == Section::kView) {
-      const int slot = bytes.GetIndex(state.memory().size());
-      state.LoadView(slot, bytes);
+    if (tag == Tag(Section::kPositions)) {
+      state.reasoner().track().Load(bytes);
       continue;
     }
-    if (section != Section::kRecord) in_.Damaged("a section out of place");
+    if (tag != Tag(Section::kRecord)) in_.Damaged("a section out of place");
     if (!writing) long_term.store().Begin();
     writing = true;
     LoadRecord(bytes, long_term.store());
   }
   if (writing) long_term.store().Commit();
-  for (int slot = 0; slot < state.memory().size(); ++slot) {
-    if (state.reasoner().InMemory(slot) && !state.HasView(slot))
-      in_.Damaged("features of a location are missing");
-  }
+  if (own_) own_->Expect(kEndOfSections);
 }
 
 }  // namespace tutti::internal

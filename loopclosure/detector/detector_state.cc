@@ -2,8 +2,8 @@
 
 #include <utility>
 
+#include "core/byte_stream.h"
 #include "loopclosure/geometry/view_bytes.h"
-#include "loopclosure/store/byte_stream.h"
 #include "tutti/core/error.h"
 
 namespace tutti::internal {
@@ -35,8 +35,8 @@ void DetectorState::PutViewWithoutFeatures(int slot) {
   view.members.resize(members().size());
 }
 
-void DetectorState::LoadView(int slot, ByteReader& in) {
-  View view = internal::LoadView(in);
+void DetectorState::LoadView(int slot, View view, const std::string& source) {
+  const ByteReader in("", source);
   if (view.id != memory().id(slot)) in.Damaged("features of another location");
   if (view.members.size() != members().size()) in.Damaged("features of other members");
   const cv::Mat& own = view.caller.descriptors;
@@ -60,7 +60,7 @@ void DetectorState::FetchView(int slot, LocationStore& store) {
                      " are missing); give another file, or an older copy");
   }
   ByteReader in(*record, store.name());
-  LoadView(slot, in);
+  LoadView(slot, internal::LoadView(in), store.name());
 }
 
 std::string DetectorState::Statistics() const {

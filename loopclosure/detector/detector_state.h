@@ -48,8 +48,9 @@ class DetectorState {
   void DropView(int slot) { At(slot) = View(); }
   /// Stands in for a view that is lost: the location is known, but can't be verified.
   void PutViewWithoutFeatures(int slot);
-  /// Takes up what SaveView wrote. Throws InputError if it is not of this location, or of other members.
-  void LoadView(int slot, ByteReader& in);
+  /// Takes up a view that was saved. Throws InputError, with the name of the source, if it is not of this
+  /// location, or of other members.
+  void LoadView(int slot, View view, const std::string& source);
   /// Puts a location's view into the store, and takes it up from there. Throws InputError.
   void StoreView(int slot, LocationStore& store) const;
   void FetchView(int slot, LocationStore& store);

@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-#include "loopclosure/store/byte_stream.h"
+#include "core/byte_stream.h"
 #include "tutti/core/error.h"
 
 namespace tutti::internal {

@@ -14,9 +14,9 @@
 #include <utility>
 #include <vector>
 
+#include "core/byte_stream.h"
 #include "loopclosure/features/smallest_image.h"
 #include "loopclosure/memory/dense.h"
-#include "loopclosure/store/byte_stream.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/byte_stream.h"
 #include "loopclosure/features/dnn_descriptor.h"
 #include "loopclosure/memory/dense.h"
-#include "loopclosure/store/byte_stream.h"
 
 namespace tutti {
 

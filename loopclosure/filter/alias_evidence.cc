@@ -5,7 +5,7 @@
 #include <iterator>
 #include <numeric>
 
-#include "loopclosure/store/byte_stream.h"
+#include "core/byte_stream.h"
 
 namespace tutti {
 namespace {

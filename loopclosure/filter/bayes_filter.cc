@@ -1,6 +1,6 @@
 #include "loopclosure/filter/bayes_filter.h"
 
-#include "loopclosure/store/byte_stream.h"
+#include "core/byte_stream.h"
 
 namespace tutti {
 

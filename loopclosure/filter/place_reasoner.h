@@ -63,7 +63,11 @@ class PlaceReasoner {
   /// What must be the same for stored locations to be of use.
   std::string Fingerprint() const;
 
-  /// Running figures: the state but memories and filters.
+  /// Where the locations were taken.
+  PoseTrack& track() { return track_; }
+  const PoseTrack& track() const { return track_; }
+
+  /// Running figures: the state but memories, filters and track.
   void SaveStatistics(ByteWriter& out) const;
   void LoadStatistics(std::int64_t last_id, ByteReader& in);
 

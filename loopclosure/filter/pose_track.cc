@@ -2,8 +2,33 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace tutti::internal {
+namespace {
+
+void SavePrior(const std::optional<PosePrior>& prior, ByteWriter& out) {
+  out.Put<std::uint8_t>(prior ? 1 : 0);
+  if (!prior) return;
+  for (const double value : prior->position_m) out.Put(value);
+  out.Put(prior->frame);
+  out.Put(prior->sigma_m);
+  out.Put(prior->drift);
+}
+
+std::optional<PosePrior> LoadPrior(ByteReader& in) {
+  if (in.Get<std::uint8_t>() == 0) return std::nullopt;
+  PosePrior prior;
+  for (double& value : prior.position_m) value = in.Get<double>();
+  prior.frame = in.Get<std::int64_t>();
+  prior.sigma_m = in.Get<double>();
+  prior.drift = in.Get<double>();
+  if (!prior.position_m.allFinite() || !(prior.sigma_m > 0) || !(prior.drift >= 0))
+    in.Damaged("a position that is none");
+  return prior;
+}
+
+}  // namespace
 
 void PoseTrack::Add(int slot, const std::optional<PosePrior>& prior) {
   if (prior) {
@@ -34,6 +59,27 @@ std::vector<double> PoseTrack::Gains(const std::vector<int>& working_memory) con
   const double scale = static_cast<double>(known.size()) / sum;
   for (const std::size_t i : known) gains[i] = std::min(kMostGain, gains[i] * scale);
   return gains;
+}
+
+void PoseTrack::Save(ByteWriter& out) const {
+  out.Put<std::uint64_t>(stations_.size());
+  for (const Station& station : stations_) {
+    SavePrior(station.prior, out);
+    out.Put(station.way_m);
+  }
+  out.Put(way_m_);
+  SavePrior(last_, out);
+}
+
+void PoseTrack::Load(ByteReader& in) {
+  stations_.clear();
+  const std::size_t count = in.GetCount(1 + sizeof(double));
+  for (std::size_t i = 0; i < count; ++i) {
+    std::optional<PosePrior> prior = LoadPrior(in);
+    stations_.push_back({std::move(prior), in.Get<double>()});
+  }
+  way_m_ = in.Get<double>();
+  last_ = LoadPrior(in);
 }
 
 void ApplyGains(const std::vector<double>& gains, const std::vector<int>& working_memory,

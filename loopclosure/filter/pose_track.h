@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/byte_stream.h"
 #include "loopclosure/filter/belief.h"
 #include "tutti/loopclosure/detector.h"
 
@@ -25,6 +26,10 @@ class PoseTrack {
   /// their mean is 1, and none is above kMostGain. 1 for a place without one; empty if the newest has none,
   /// or no place has.
   std::vector<double> Gains(const std::vector<int>& working_memory) const;
+
+  void Save(ByteWriter& out) const;
+  /// Takes up what Save wrote, in place of what is known. Throws InputError if that is damaged.
+  void Load(ByteReader& in);
 
  private:
   struct Station {

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "loopclosure/store/byte_stream.h"
+#include "core/byte_stream.h"
 
 namespace tutti::internal {
 

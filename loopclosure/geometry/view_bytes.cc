@@ -2,37 +2,76 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
+#include <limits>
+
+#include "loopclosure/store/mat_bytes.h"
 
 namespace tutti::internal {
 namespace {
 
+// What MakeView gives a feature without a point; all others are saved.
+Eigen::Vector3f Unknown() { return Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN()); }
+bool IsUnknown(const Eigen::Vector3f& point) {
+  const Eigen::Vector3f unknown = Unknown();
+  return std::memcmp(point.data(), unknown.data(), sizeof(float) * 3) == 0;
+}
+
+// Pixels as those of keypoints in a saved odometry (StateOfKeypoints), so that zstd finds the same bytes.
 void SaveSet(const View::Set& set, ByteWriter& out) {
-  std::vector<float> pixels;
-  for (const cv::Point2f& pixel : set.pixels) pixels.insert(pixels.end(), {pixel.x, pixel.y});
-  out.PutVector(pixels);
-  out.PutMat(set.descriptors);
-  std::vector<float> points;
-  for (const Eigen::Vector3f& p : set.points) points.insert(points.end(), {p.x(), p.y(), p.z()});
-  out.PutVector(points);
+  std::vector<float> part(set.pixels.size());
+  const auto put_part = [&](const auto& value) {
+    std::transform(set.pixels.begin(), set.pixels.end(), part.begin(), value);
+    out.PutPlanes(part);
+  };
+  put_part([](const cv::Point2f& p) { return p.x; });
+  put_part([](const cv::Point2f& p) { return p.y; });
+  PutMat(set.descriptors, out);
+  std::vector<float> known;
+  std::vector<std::uint8_t> is_known((set.points.size() + 7) / 8, 0);
+  for (std::size_t i = 0; i < set.points.size(); ++i) {
+    const Eigen::Vector3f& p = set.points[i];
+    if (IsUnknown(p)) continue;
+    is_known[i / 8] = static_cast<std::uint8_t>(is_known[i / 8] | 1U << i % 8);
+    known.insert(known.end(), {p.x(), p.y(), p.z()});
+  }
+  out.Put<std::uint32_t>(static_cast<std::uint32_t>(set.points.size()));
+  out.PutRaw(is_known.data(), is_known.size());
+  out.PutPlanes(known);
+}
+
+void LoadPoints(View::Set& set, ByteReader& in) {
+  const auto count = in.Get<std::uint32_t>();
+  if (count != 0 && count != set.pixels.size()) in.Damaged("features without points");
+  std::vector<std::uint8_t> is_known((count + std::size_t{7}) / 8, 0);
+  in.GetRaw(is_known.data(), is_known.size());
+  const std::vector<float> known = in.GetPlanes();
+  set.points.reserve(count);
+  auto next = known.begin();
+  for (std::size_t i = 0; i < count; ++i) {
+    set.points.push_back(Unknown());
+    if ((is_known[i / 8] & 1U << i % 8) == 0) continue;
+    if (known.end() - next < 3) in.Damaged("features without points");
+    set.points.back() = {next[0], next[1], next[2]};
+    next += 3;
+  }
+  if (next != known.end()) in.Damaged("points without features");
 }
 
 View::Set LoadSet(ByteReader& in) {
   View::Set set;
-  const std::vector<float> pixels = in.GetVector<float>();
+  const std::vector<float> x = in.GetPlanes(), y = in.GetPlanes();
   const auto is_pixel = [](float value) { return std::abs(value) <= View::kFarthestPixel; };  // false for NaN
-  if (pixels.size() % 2 != 0 || !std::all_of(pixels.begin(), pixels.end(), is_pixel)) {
+  if (x.size() != y.size() || !std::all_of(x.begin(), x.end(), is_pixel) ||
+      !std::all_of(y.begin(), y.end(), is_pixel)) {
     in.Damaged("a feature at an impossible pixel");
   }
-  for (std::size_t i = 0; i + 1 < pixels.size(); i += 2) set.pixels.emplace_back(pixels[i], pixels[i + 1]);
-  set.descriptors = in.GetMat();
-  const std::vector<float> points = in.GetVector<float>();
-  for (std::size_t i = 0; i + 2 < points.size(); i += 3) {
-    set.points.emplace_back(points[i], points[i + 1], points[i + 2]);
-  }
-  if (static_cast<std::size_t>(set.descriptors.rows) != set.pixels.size() || points.size() % 3 != 0 ||
-      (!set.points.empty() && set.points.size() != set.pixels.size())) {
+  set.pixels.reserve(x.size());
+  for (std::size_t i = 0; i < x.size(); ++i) set.pixels.emplace_back(x[i], y[i]);
+  set.descriptors = GetMat(in);
+  if (static_cast<std::size_t>(set.descriptors.rows) != set.pixels.size())
     in.Damaged("features without descriptors");
-  }
+  LoadPoints(set, in);
   return set;
 }
 
@@ -98,9 +137,9 @@ void SaveView(const View& view, ByteWriter& out) {
     for (const cv::Rect& r : view.cameras) sides.insert(sides.end(), {r.x, r.y, r.width, r.height});
     out.PutVector(sides);
   }
+  SaveSet(view.caller, out);  // first: next to what it may be like (SectionWriter)
   out.Put<std::uint64_t>(view.members.size());
   for (const View::Set& set : view.members) SaveSet(set, out);
-  SaveSet(view.caller, out);
   if (!view.caller.numbers.empty()) out.PutVector(view.caller.numbers);
 }
 
@@ -115,9 +154,9 @@ View LoadView(ByteReader& in) {
   if ((has & ~(kHasCamera | kHasRegions | kHasNumbers)) != 0) in.Damaged("a view of an unknown kind");
   if ((has & kHasCamera) != 0) view.camera = LoadCamera(in);
   if ((has & kHasRegions) != 0) LoadRegions(view, in);
+  view.caller = LoadSet(in);
   const std::size_t sets = in.GetCount(2 * sizeof(std::uint64_t) + 1);
   for (std::size_t i = 0; i < sets; ++i) view.members.push_back(LoadSet(in));
-  view.caller = LoadSet(in);
   if ((has & kHasNumbers) != 0) LoadNumbers(view.caller, in);
   return view;
 }

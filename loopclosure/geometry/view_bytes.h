@@ -1,8 +1,8 @@
 // A View as bytes, for saved detectors and the long-term memory's file.
 #pragma once
 
+#include "core/byte_stream.h"
 #include "loopclosure/geometry/verification.h"
-#include "loopclosure/store/byte_stream.h"
 
 namespace tutti::internal {
 

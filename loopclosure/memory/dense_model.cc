@@ -2,9 +2,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/byte_stream.h"
 #include "core/median.h"
 #include "loopclosure/memory/dense.h"
-#include "loopclosure/store/byte_stream.h"
 #include "tutti/core/error.h"
 
 namespace tutti {

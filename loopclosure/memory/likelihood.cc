@@ -5,8 +5,8 @@
 #include <tuple>
 #include <utility>
 
+#include "core/byte_stream.h"
 #include "loopclosure/memory/dense.h"
-#include "loopclosure/store/byte_stream.h"
 
 namespace tutti {
 
@@ -171,7 +171,7 @@ void LikelihoodModel::Save(internal::ByteWriter& out) const {
 }
 
 void LikelihoodModel::Load(internal::ByteReader& in) {
-  const std::size_t count = in.GetCount(1 + sizeof(std::uint64_t));
+  const std::size_t count = in.GetCount(2);
   for (std::size_t i = 0; i < count; ++i) {
     const bool present = in.Get<char>() != 0;
     signatures_.push_back(Signature::Load(in));

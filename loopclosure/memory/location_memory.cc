@@ -5,7 +5,7 @@
 #include <tuple>
 #include <unordered_map>
 
-#include "loopclosure/store/byte_stream.h"
+#include "core/byte_stream.h"
 
 namespace tutti {
 

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/byte_stream.h"
 #include "loopclosure/features/member.h"
 #include "loopclosure/filter/alias_evidence.h"
 #include "loopclosure/filter/bayes_filter.h"
@@ -15,7 +16,6 @@
 #include "loopclosure/memory/dense.h"
 #include "loopclosure/memory/likelihood.h"
 #include "loopclosure/memory/location_memory.h"
-#include "loopclosure/store/byte_stream.h"
 #include "loopclosure/store/location_store.h"
 #include "loopclosure/vocabulary/signature.h"
 #include "tutti/loopclosure/detector_options.h"

@@ -2,6 +2,7 @@
 #include <set>
 
 #include "loopclosure/memory/memory_system.h"
+#include "loopclosure/store/mat_bytes.h"
 #include "tutti/core/error.h"
 
 namespace tutti::internal {
@@ -35,7 +36,7 @@ void LoadNodes(int number, LocationStore& store, LocationMemory& memory) {
 
 void StoreWord(const Vocabulary& vocabulary, std::size_t member, int word, LocationStore& store) {
   ByteWriter record;
-  record.PutMat(vocabulary.Descriptor(word));
+  PutMat(vocabulary.Descriptor(word), record);
   store.Put(LocationStore::Kind::kWord, static_cast<std::int64_t>(member), word, record.bytes());
 }
 
@@ -94,7 +95,11 @@ void MemorySystem::Restore(int slot, LocationStore& store) {
 // Appends a stored word's descriptor.
 void MemorySystem::ReadWord(std::size_t member, int word, LocationStore& store, cv::Mat& descriptors) const {
   const auto record = store.Get(LocationStore::Kind::kWord, static_cast<std::int64_t>(member), word);
-  const cv::Mat row = record ? ByteReader(*record, store.name()).GetMat() : cv::Mat();
+  cv::Mat row;
+  if (record) {
+    ByteReader in(*record, store.name());
+    row = GetMat(in);
+  }
   const bool fits = descriptors.empty() || (row.cols == descriptors.cols && row.type() == descriptors.type());
   if (row.rows != 1 || !fits || !members_[member].vocabulary().Problem(row).empty()) {
     throw InputError(store.name() + ": is damaged (word " + std::to_string(word) + " of " +

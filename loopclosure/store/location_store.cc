@@ -2,14 +2,14 @@
 
 #include <sqlite3.h>
 
-#include "loopclosure/store/byte_stream.h"
+#include "core/byte_stream.h"
 #include "tutti/core/error.h"
 
 namespace tutti::internal {
 namespace {
 
 constexpr int kApplicationId = 0x74757474;  // "tutt": what SQLite's header says of whose file it is
-constexpr int kSchemaVersion = 1;
+constexpr int kSchemaVersion = 2;
 
 // Runs one prepared statement and leaves it ready for the next time, whatever happens.
 class Use {

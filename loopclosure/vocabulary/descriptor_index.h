@@ -41,11 +41,12 @@ class DescriptorIndex {
   virtual const std::uint8_t* Find(int word) const = 0;
   /// Words in the index.
   virtual int size() const = 0;
-  /// Appends the whole state, such that a loaded index goes on as the saved one would.
-  virtual void Save(internal::ByteWriter& out) const = 0;
+  /// Appends the whole state, such that a loaded index goes on as the saved one would. `known`: descriptors
+  /// that whoever loads it has, too (SaveWords).
+  virtual void Save(const std::vector<cv::Mat>& known, internal::ByteWriter& out) const = 0;
   /// Takes up what Save wrote, into a new index of the same kind, width and seed. Throws InputError if it is
   /// damaged.
-  virtual void Load(internal::ByteReader& in) = 0;
+  virtual void Load(const std::vector<cv::Mat>& known, internal::ByteReader& in) = 0;
 };
 
 /// kd-forest over CV_32F descriptors (Muja & Lowe 2009): `trees` randomised trees, `checks` leaves per

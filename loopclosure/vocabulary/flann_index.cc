@@ -4,9 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/byte_stream.h"
 #include "loopclosure/geometry/shuffle.h"
-#include "loopclosure/store/byte_stream.h"
 #include "loopclosure/vocabulary/descriptor_index.h"
+#include "loopclosure/vocabulary/word_bytes.h"
 #include "loopclosure/vocabulary/word_storage.h"
 
 namespace tutti {
@@ -105,14 +106,12 @@ class FlannIndex : public DescriptorIndex {
   int size() const override { return size_; }
 
   // Which row a word lies in changes no answer: rows are numbered anew, by word id.
-  void Save(internal::ByteWriter& out) const override {
+  void Save(const std::vector<cv::Mat>& known, internal::ByteWriter& out) const override {
     std::vector<int> rank(Index(storage_.end()), -1);
     int next = 0;
-    out.Put<std::uint64_t>(Index(storage_.size()));
-    storage_.ForEach([&](int word, int row) {
-      out.Put<std::int32_t>(word);
+    internal::SaveWords(storage_, CV_32F, known, out);
+    storage_.ForEach([&](int, int row) {
       out.Put<char>(alive_[Index(row)]);
-      out.PutRaw(storage_.At(row), storage_.row_bytes());
       rank[Index(row)] = next++;
     });
     for (const GrownTree& tree : trees_) {
@@ -123,15 +122,13 @@ class FlannIndex : public DescriptorIndex {
     }
   }
 
-  void Load(internal::ByteReader& in) override {
-    const std::size_t count = in.GetCount(sizeof(std::int32_t) + 1 + storage_.row_bytes());
-    std::vector<std::uint8_t> descriptor(storage_.row_bytes());
+  void Load(const std::vector<cv::Mat>& known, internal::ByteReader& in) override {
+    internal::LoadWords(storage_, CV_32F, known, in,
+                        [this](int word, const std::uint8_t* descriptor) { storage_.Add(word, descriptor); });
+    const std::size_t count = Index(storage_.size());
     for (std::size_t i = 0; i < count; ++i) {
-      const int word = storage_.ReadNewWord(in);
       alive_.push_back(in.Get<char>() != 0 ? 1 : 0);
       size_ += alive_.back();
-      in.GetRaw(descriptor.data(), descriptor.size());
-      storage_.Add(word, descriptor.data());
     }
     for (GrownTree& tree : trees_) {
       tree.shuffler.Load(in);

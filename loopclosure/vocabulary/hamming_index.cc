@@ -1,10 +1,11 @@
 #include <algorithm>
 #include <random>
 
-#include "loopclosure/store/byte_stream.h"
+#include "core/byte_stream.h"
 #include "loopclosure/vocabulary/bit_trie.h"
 #include "loopclosure/vocabulary/descriptor_index.h"
 #include "loopclosure/vocabulary/distances.h"
+#include "loopclosure/vocabulary/word_bytes.h"
 #include "loopclosure/vocabulary/word_storage.h"
 
 namespace tutti {
@@ -58,22 +59,15 @@ class HammingIndex : public DescriptorIndex {
   int size() const override { return storage_.size(); }
 
   // Which row a word lies in, and the order within a leaf, change no answer: words and descriptors are all.
-  void Save(internal::ByteWriter& out) const override {
-    out.Put<std::uint64_t>(static_cast<std::uint64_t>(size()));
-    storage_.ForEach([&](int word, int row) {
-      out.Put<std::int32_t>(word);
-      out.PutRaw(storage_.At(row), storage_.row_bytes());
-    });
+  void Save(const std::vector<cv::Mat>& known, internal::ByteWriter& out) const override {
+    internal::SaveWords(storage_, CV_8U, known, out);
   }
 
-  void Load(internal::ByteReader& in) override {
-    const std::size_t count = in.GetCount(sizeof(std::int32_t) + storage_.row_bytes());
-    cv::Mat descriptor(1, bytes_, CV_8U);
-    for (std::size_t i = 0; i < count; ++i) {
-      const int word = storage_.ReadNewWord(in);
-      in.GetRaw(descriptor.data, storage_.row_bytes());
-      Add({word}, descriptor);
-    }
+  void Load(const std::vector<cv::Mat>& known, internal::ByteReader& in) override {
+    internal::LoadWords(storage_, CV_8U, known, in, [this](int word, const std::uint8_t* descriptor) {
+      const int row = storage_.Add(word, descriptor);
+      for (internal::BitTrie& trie : tries_) trie.Insert(row, storage_);
+    });
   }
 
  private:

@@ -1,10 +1,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/byte_stream.h"
 #include "loopclosure/geometry/shuffle.h"
-#include "loopclosure/store/byte_stream.h"
 #include "loopclosure/vocabulary/descriptor_index.h"
 #include "loopclosure/vocabulary/kd_tree.h"
+#include "loopclosure/vocabulary/word_bytes.h"
 #include "loopclosure/vocabulary/word_storage.h"
 
 namespace tutti {
@@ -86,15 +87,11 @@ class KdForestIndex : public DescriptorIndex {
   int size() const override { return storage_.size(); }
 
   // Which row a word lies in changes no answer: rows are numbered anew, by word id.
-  void Save(internal::ByteWriter& out) const override {
+  void Save(const std::vector<cv::Mat>& known, internal::ByteWriter& out) const override {
     std::vector<int> rank(static_cast<std::size_t>(storage_.end()), -1);
     int next = 0;
-    out.Put<std::uint64_t>(static_cast<std::uint64_t>(size()));
-    storage_.ForEach([&](int word, int row) {
-      out.Put<std::int32_t>(word);
-      out.PutRaw(storage_.At(row), storage_.row_bytes());
-      rank[static_cast<std::size_t>(row)] = next++;
-    });
+    internal::SaveWords(storage_, CV_32F, known, out);
+    storage_.ForEach([&](int, int row) { rank[static_cast<std::size_t>(row)] = next++; });
     out.Put<std::uint64_t>(trees_.size());
     for (const GrownTree& tree : trees_) {
       tree.shuffler.Save(out);
@@ -102,14 +99,9 @@ class KdForestIndex : public DescriptorIndex {
     }
   }
 
-  void Load(internal::ByteReader& in) override {
-    const std::size_t count = in.GetCount(sizeof(std::int32_t) + storage_.row_bytes());
-    std::vector<std::uint8_t> descriptor(storage_.row_bytes());
-    for (std::size_t i = 0; i < count; ++i) {
-      const int word = storage_.ReadNewWord(in);
-      in.GetRaw(descriptor.data(), descriptor.size());
-      storage_.Add(word, descriptor.data());
-    }
+  void Load(const std::vector<cv::Mat>& known, internal::ByteReader& in) override {
+    internal::LoadWords(storage_, CV_32F, known, in,
+                        [this](int word, const std::uint8_t* descriptor) { storage_.Add(word, descriptor); });
     if (in.Get<std::uint64_t>() != trees_.size()) in.Damaged("another number of kd-trees");
     for (GrownTree& tree : trees_) {
       tree.shuffler.Load(in);

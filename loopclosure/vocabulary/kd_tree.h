@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "loopclosure/store/byte_stream.h"
+#include "core/byte_stream.h"
 #include "loopclosure/vocabulary/chunked_vector.h"
 #include "loopclosure/vocabulary/descriptor_index.h"
 #include "loopclosure/vocabulary/distances.h"
@@ -78,18 +78,20 @@ class KdTree {
   /// Appends the shape, with each row by its number in `rank` (by row).
   void Save(const std::vector<int>& rank, ByteWriter& out) const {
     std::vector<int> ahead;
+    std::vector<float> values;
     if (size_ > 0) ahead.push_back(kRoot);
     while (!ahead.empty()) {
       const Node& node = At(ahead.back());
       ahead.pop_back();
       if (IsLeaf(node)) {
-        out.Put<std::int32_t>(-1 - rank[Index(node.link)]);
+        out.PutSignedVarint(-1 - rank[Index(node.link)]);
         continue;
       }
-      out.Put<std::int32_t>(node.dimension);
-      out.Put(node.value);
+      out.PutSignedVarint(node.dimension);
+      values.push_back(node.value);
       ahead.insert(ahead.end(), {node.link + 1, node.link});
     }
+    out.PutPlanes(values);
   }
 
   /// Takes up what Save wrote, into an empty tree: it must have all rows 0 .. rows - 1, each once.
@@ -98,25 +100,28 @@ class KdTree {
       leaf_of_row_.Extend();
       leaf_of_row_[Index(row)] = -1;
     }
-    std::vector<int> ahead;
+    std::vector<int> ahead, splits;
     if (rows > 0) ahead.push_back(NewPair(-1));
     while (!ahead.empty()) {
       const int node = ahead.back();
       ahead.pop_back();
-      const int what = in.Get<std::int32_t>();
+      const std::int64_t what = in.GetSignedVarint();
       if (what < 0) {
-        const int row = -1 - what;
-        if (row >= rows || leaf_of_row_[Index(row)] >= 0) in.Damaged("a kd-tree with an impossible word");
-        SetLeaf(node, row);
+        if (-1 - what >= rows || leaf_of_row_[Index(static_cast<int>(-1 - what))] >= 0)
+          in.Damaged("a kd-tree with an impossible word");
+        SetLeaf(node, static_cast<int>(-1 - what));
         ++size_;
         continue;
       }
-      const float value = in.Get<float>();
       if (what >= dimensions_) in.Damaged("a kd-tree with an impossible dimension");
       const int child = NewPair(node);
-      At(node) = {child, what, value};
+      At(node) = {child, static_cast<int>(what), 0.0f};
+      splits.push_back(node);
       ahead.insert(ahead.end(), {child + 1, child});
     }
+    const std::vector<float> values = in.GetPlanes();
+    if (values.size() != splits.size()) in.Damaged("a kd-tree without its values");
+    for (std::size_t i = 0; i < splits.size(); ++i) At(splits[i]).value = values[i];
     if (size_ != rows) in.Damaged("a kd-tree without some of the words");
   }
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "loopclosure/store/byte_stream.h"
+#include "core/byte_stream.h"
 
 namespace tutti {
 
@@ -49,17 +49,30 @@ std::vector<Signature> Signature::Split(int parts) const {
   return split;
 }
 
-void Signature::Save(internal::ByteWriter& out) const { out.PutVector(entries_); }
+void Signature::Save(internal::ByteWriter& out) const {
+  out.PutVarint(entries_.size());
+  int before = -1;
+  for (const Entry& entry : entries_) {
+    out.PutVarint(static_cast<std::uint64_t>(entry.word - before - 1));
+    out.PutVarint(static_cast<std::uint64_t>(entry.count));
+    before = entry.word;
+  }
+}
 
 Signature Signature::Load(internal::ByteReader& in) {
   Signature signature;
-  signature.entries_ = in.GetVector<Entry>();
+  constexpr int kMost = std::numeric_limits<int>::max();
+  const std::uint64_t count = in.GetVarint();
+  if (count > in.Left() / 2) in.Damaged("more words than bytes");
+  signature.entries_.reserve(static_cast<std::size_t>(count));
   std::int64_t size = 0;
   int before = -1;
-  for (const Entry& entry : signature.entries_) {
-    if (entry.word <= before || entry.count < 1) in.Damaged("a signature out of order");
-    before = entry.word;
-    size += entry.count;
+  for (std::uint64_t i = 0; i < count; ++i) {
+    before += 1 + in.GetVarintIndex(kMost - 1 - before);
+    const int times = in.GetVarintIndex(kMost);
+    if (times < 1) in.Damaged("a signature out of order");
+    signature.entries_.push_back({before, times});
+    size += times;
   }
   if (size > std::numeric_limits<int>::max()) in.Damaged("a signature of an impossible size");
   signature.size_ = static_cast<int>(size);

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "core/byte_stream.h"
 #include "loopclosure/detector/parallel.h"
-#include "loopclosure/store/byte_stream.h"
 #include "loopclosure/vocabulary/distances.h"
 #include "loopclosure/vocabulary/word_storage.h"
 #include "tutti/core/error.h"
@@ -167,19 +167,21 @@ cv::Mat Vocabulary::Descriptor(int word) const {
   return row;
 }
 
-void Vocabulary::Save(internal::ByteWriter& out) const {
+void Vocabulary::Save(const std::vector<cv::Mat>& known, internal::ByteWriter& out) const {
   out.Put<std::int32_t>(type_);
   out.Put<std::int32_t>(width_);
   out.Put<std::int32_t>(created_);
   out.Put<std::uint64_t>(references_.size());
-  references_.ForEach([&out](int word, int count) {
-    out.Put<std::int32_t>(word);
-    out.Put<std::int32_t>(count);
+  int before = -1;
+  references_.ForEach([&](int word, int count) {
+    out.PutVarint(static_cast<std::uint64_t>(word - before - 1));
+    out.PutVarint(static_cast<std::uint64_t>(count));
+    before = word;
   });
-  if (index_) index_->Save(out);
+  if (index_) index_->Save(known, out);
 }
 
-void Vocabulary::Load(internal::ByteReader& in) {
+void Vocabulary::Load(const std::vector<cv::Mat>& known, internal::ByteReader& in) {
   static_assert(kMostWords == internal::WordStorage::kMostWords);
   constexpr int kMostColumns = 1 << 16;
   type_ = in.Get<std::int32_t>();
@@ -188,16 +190,17 @@ void Vocabulary::Load(internal::ByteReader& in) {
   if (type_ != -1 && type_ != CV_32F && type_ != CV_8U) in.Damaged("descriptors of an unknown type");
   if (type_ != -1 && (width_ <= 0 || width_ > kMostColumns)) in.Damaged("descriptors of an impossible width");
   if (created_ < 0 || created_ > kMostWords) in.Damaged("an impossible number of words");
-  const std::size_t count = in.GetCount(2 * sizeof(std::int32_t));
+  const std::size_t count = in.GetCount(2);
+  int word = -1;
   for (std::size_t i = 0; i < count; ++i) {
-    const int word = in.GetIndex(created_);
-    const int references = in.Get<std::int32_t>();
-    if (references < 1 || references > kMostWords) in.Damaged("a word without a location");
+    word += 1 + in.GetVarintIndex(created_ - 1 - word);
+    const int references = in.GetVarintIndex(kMostWords + 1);
+    if (references < 1) in.Damaged("a word without a location");
     references_[word] = references;
   }
   if (type_ == -1) return;
   MakeIndex();
-  index_->Load(in);
+  index_->Load(known, in);
   if (index_->size() > created_) in.Damaged("more words than were ever made");
 }
 

@@ -72,10 +72,11 @@ class Vocabulary {
   /// Ids below this are taken, wherever their words may be.
   void SkipIds(int created) { created_ = std::max(created_, created); }
 
-  /// Appends the whole state.
-  void Save(internal::ByteWriter& out) const;
+  /// Appends the whole state. `known`: descriptors that whoever loads it has, too, and in the same order; a
+  /// word that is among them takes a few bytes.
+  void Save(const std::vector<cv::Mat>& known, internal::ByteWriter& out) const;
   /// Takes up what Save wrote, into a new object of the same options. Throws InputError if it is damaged.
-  void Load(internal::ByteReader& in);
+  void Load(const std::vector<cv::Mat>& known, internal::ByteReader& in);
 
  private:
   void CheckType(const cv::Mat& descriptors);

@@ -6,7 +6,6 @@
 #include <memory>
 #include <vector>
 
-#include "loopclosure/store/byte_stream.h"
 #include "loopclosure/vocabulary/chunked_vector.h"
 #include "loopclosure/vocabulary/word_map.h"
 
@@ -39,15 +38,6 @@ class WordStorage {
     row_of_word_.Erase(WordOf(row));
     words_[static_cast<std::size_t>(row)] = -1;
     free_.push_back(row);
-  }
-
-  /// The id of a word that is not in it yet, from a saved index. Throws InputError if it is damaged.
-  int ReadNewWord(ByteReader& in) const {
-    const int word = in.Get<std::int32_t>();
-    if (word < 0 || word >= kMostWords || RowOf(word) >= 0) {
-      in.Damaged("an impossible word, or one that is there twice");
-    }
-    return word;
   }
 
   /// Row number of a word, -1 if there is none.

@@ -8,13 +8,14 @@
 #include <string>
 #include <string_view>
 
-#include "loopclosure/store/byte_stream.h"
+#include "core/byte_stream.h"
+#include "core/section_file.h"
 #include "tutti/loopclosure/detector.h"
 
 namespace tutti::fuzz {
 
 constexpr int kKinds = 4;
-constexpr std::string_view kHeader("TUTTILC\n\x02\0\0\0\x04\x03\x02\x01", 16);
+constexpr std::string_view kHeader("TUTTILC\n\x07\0\0\0\x04\x03\x02\x01", 16);
 constexpr std::string_view kGeneratorMark = "<RNG>";
 constexpr std::uint32_t kEndTag = 8;
 
@@ -92,9 +93,10 @@ inline std::string WrapState(std::string_view sections) {
   internal::ByteWriter file;
   file.PutRaw(kHeader.data(), kHeader.size());
   const auto put = [&](std::uint32_t tag, const std::string& content) {
-    file.Put(tag);
-    file.Put(internal::Crc32(content));
-    file.PutString(content);
+    internal::SectionHeader header = {tag, 0, content.size(), content.size(), 0};
+    header.checksum = internal::SectionChecksum(header, content);
+    file.Put(header);
+    file.PutRaw(content.data(), content.size());
   };
   while (sections.size() >= 3) {
     const auto byte = [&](std::size_t i) { return static_cast<std::uint8_t>(sections[i]); };
@@ -108,6 +110,7 @@ inline std::string WrapState(std::string_view sections) {
     put(tag, content);
   }
   put(kEndTag, "");
+  put(internal::kEndOfSections, "");
   return file.bytes();
 }
 

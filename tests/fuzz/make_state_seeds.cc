@@ -3,7 +3,9 @@
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>
+#include <utility>
 
+#include "loopclosure/detector/detector_file.h"
 #include "tests/fuzz/detector_state.h"
 
 namespace {
@@ -27,17 +29,17 @@ std::string ShortenGenerators(std::string content) {
   return content;
 }
 
-std::string Unwrap(const std::string& file, int kind) {
-  if (file.substr(0, tutti::fuzz::kHeader.size()) != tutti::fuzz::kHeader) {
+std::string Unwrap(const std::filesystem::path& file, int kind) {
+  std::string start(tutti::fuzz::kHeader.size(), '\0');
+  std::ifstream(file, std::ios::binary).read(start.data(), static_cast<std::streamsize>(start.size()));
+  if (start != tutti::fuzz::kHeader) {
     throw std::logic_error("kHeader is not that of a saved detector: every input would be refused at once");
   }
-  tutti::internal::ByteReader in(std::string_view(file).substr(tutti::fuzz::kHeader.size()), "seed");
+  tutti::internal::SectionReader in(file, tutti::internal::kDetectorFile);
   std::string seed(1, static_cast<char>(kind));
-  while (!in.AtEnd()) {
-    const auto tag = in.Get<std::uint32_t>();
-    in.Get<std::uint32_t>();  // checksum
-    const std::string content = ShortenGenerators(in.GetString());
-    if (tag == tutti::fuzz::kEndTag) break;
+  std::string content;
+  for (std::uint32_t tag = in.Next(&content); tag != tutti::fuzz::kEndTag; tag = in.Next(&content)) {
+    content = ShortenGenerators(std::move(content));
     for (const std::size_t byte : {std::size_t{tag}, content.size() & 255u, content.size() >> 8})
       seed += static_cast<char>(byte);
     seed += content;
@@ -56,11 +58,9 @@ int main(int argc, char** argv) {
     for (int images = 0; images <= 7; ++images) {
       const std::filesystem::path saved = folder / "saved";
       detector.Save(saved);
-      std::ifstream in(saved, std::ios::binary);
-      const std::string file((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
-      std::filesystem::remove(saved);
       std::ofstream(folder / (std::to_string(kind) + "_" + std::to_string(images)), std::ios::binary)
-          << Unwrap(file, kind);
+          << Unwrap(saved, kind);
+      std::filesystem::remove(saved);
       detector.Detect(
           tutti::fuzz::StateQuery(images, static_cast<std::uint32_t>(images % 5), images % 3 != 2));
     }

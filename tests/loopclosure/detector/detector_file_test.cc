@@ -10,9 +10,11 @@
 #include <functional>
 #include <limits>
 
+#include "core/byte_stream.h"
+#include "core/section_file.h"
+#include "loopclosure/detector/detector_file.h"
 #include "loopclosure/geometry/verification.h"
 #include "loopclosure/geometry/view_bytes.h"
-#include "loopclosure/store/byte_stream.h"
 #include "tests/loopclosure/detector/two_laps.h"
 #include "tests/support/test_data.h"
 #include "tutti/core/error.h"
@@ -189,42 +191,33 @@ TEST_F(SavedDetector, ADamagedFileIsRefusedWhereverItIsDamaged) {
   EXPECT_NO_THROW(Walk(detector, 4, 6, kPlaces));
 }
 
-// A saved detector's bytes with the content of all sections of one kind changed, under right checksums.
-std::string Changed(const std::string& bytes, std::uint32_t kind,
-                    const std::function<std::string(const std::string&)>& change) {
-  constexpr std::size_t kHeader = 16;
-  internal::ByteWriter out;
-  out.PutRaw(bytes.data(), kHeader);
-  internal::ByteReader in(std::string_view(bytes).substr(kHeader), "test");
-  while (!in.AtEnd()) {
-    const auto tag = in.Get<std::uint32_t>();
-    in.Get<std::uint32_t>();  // checksum
-    std::string content = in.GetString();
-    if (tag == kind) content = change(content);
-    out.Put(tag);
-    out.Put(internal::Crc32(content));
-    out.PutString(content);
-  }
-  return out.bytes();
+// A saved detector with the content of all sections of one kind changed, under right checksums.
+void Change(const fs::path& from, const fs::path& to, std::uint32_t kind,
+            const std::function<std::string(const std::string&)>& change) {
+  internal::SectionReader in(from, internal::kDetectorFile);
+  internal::SectionWriter out(to, internal::kDetectorFile);
+  std::string content;
+  for (std::uint32_t tag = in.Next(&content); tag != internal::kEndOfSections; tag = in.Next(&content))
+    out.Write(tag, tag == kind ? change(content) : content);
+  out.Finish();
 }
 
 TEST_F(SavedDetector, FeaturesThatNoImageCouldHaveAreRefusedThoughTheChecksumsAreRight) {
-  constexpr std::uint32_t kView = 5;
   LoopDetector saved(BoundedOptions());
   Walk(saved, 0, 5, kPlaces);
   saved.Save(file_);
-  const std::string bytes = Content(file_);
+  const fs::path changed = folder_ / "changed";
   const auto load = [&](const std::function<void(View&)>& change) {
-    WriteContent(file_, Changed(bytes, kView, [&](const std::string& section) {
-                   internal::ByteReader in(section, "test");
-                   internal::ByteWriter out;
-                   out.Put(in.Get<std::int32_t>());
-                   View view = internal::LoadView(in);
-                   change(view);
-                   internal::SaveView(view, out);
-                   return out.bytes();
-                 }));
-    LoopDetector(BoundedOptions()).Load(file_);
+    Change(file_, changed, internal::kViewSection, [&](const std::string& section) {
+      internal::ByteReader in(section, "test");
+      internal::ByteWriter out;
+      out.Put(in.Get<std::int32_t>());
+      View view = internal::LoadView(in);
+      change(view);
+      internal::SaveView(view, out);
+      return out.bytes();
+    });
+    LoopDetector(BoundedOptions()).Load(changed);
   };
   EXPECT_NO_THROW(load([](View&) {}));
   EXPECT_THROW(load([](View& view) { view.id += 1000; }), InputError);
@@ -268,13 +261,13 @@ TEST_F(SavedDetector, MemoriesOfOtherLocationsThanTheStatisticsSayAreRefused) {
   LoopDetector saved(BoundedOptions());
   Walk(saved, 0, 5, kPlaces);
   saved.Save(file_);
-  const std::string bytes = Content(file_);
+  const fs::path changed = folder_ / "changed";
   const auto load = [&](std::size_t at, const auto& value) {
-    WriteContent(file_, Changed(bytes, kStatistics, [&](std::string section) {
-                   std::memcpy(section.data() + at, &value, sizeof value);
-                   return section;
-                 }));
-    LoopDetector(BoundedOptions()).Load(file_);
+    Change(file_, changed, kStatistics, [&](std::string section) {
+      std::memcpy(section.data() + at, &value, sizeof value);
+      return section;
+    });
+    LoopDetector(BoundedOptions()).Load(changed);
   };
   constexpr std::size_t kLastId = 0, kCallerType = 8;
   const std::size_t kLastHypothesis =

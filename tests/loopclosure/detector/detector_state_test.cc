@@ -22,7 +22,7 @@ std::string BytesOf(const View& view) {
 void Load(DetectorState& state, int slot, const View& view) {
   const std::string bytes = BytesOf(view);
   ByteReader in(bytes, "test");
-  state.LoadView(slot, in);
+  state.LoadView(slot, internal::LoadView(in), "test");
 }
 
 TEST(DetectorState, EveryLocationHasItsViewUntilItIsDropped) {

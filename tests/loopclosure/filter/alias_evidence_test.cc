@@ -9,8 +9,8 @@
 #include <numeric>
 #include <random>
 
+#include "core/byte_stream.h"
 #include "loopclosure/filter/bayes_filter.h"
-#include "loopclosure/store/byte_stream.h"
 #include "tutti/core/error.h"
 
 namespace tutti {

@@ -5,7 +5,7 @@
 #include <limits>
 #include <map>
 
-#include "loopclosure/store/byte_stream.h"
+#include "core/byte_stream.h"
 #include "tutti/core/error.h"
 
 namespace tutti {

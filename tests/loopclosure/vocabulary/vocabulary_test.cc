@@ -5,7 +5,7 @@
 #include <numeric>
 #include <random>
 
-#include "loopclosure/store/byte_stream.h"
+#include "core/byte_stream.h"
 #include "tests/loopclosure/vocabulary/random_descriptors.h"
 #include "tutti/core/error.h"
 
@@ -154,10 +154,10 @@ TEST(Vocabulary, ALoadedOneGoesOnAsTheSavedOneWould) {
     Churn churn(binary);
     for (int i = 0; i < 77; ++i) churn.Step();
     internal::ByteWriter out;
-    churn.vocabulary_.Save(out);
+    churn.vocabulary_.Save({}, out);
     Vocabulary loaded(VocabularyOptions(), 3);
     internal::ByteReader in(out.bytes(), "saved");
-    loaded.Load(in);
+    loaded.Load({}, in);
     EXPECT_TRUE(in.AtEnd());
     for (std::uint32_t seed = 60; seed < 130; ++seed) {
       const cv::Mat rows = binary ? RandomBytes(40, seed) : RandomFloats(40, 32, seed);
@@ -169,9 +169,34 @@ TEST(Vocabulary, ALoadedOneGoesOnAsTheSavedOneWould) {
       loaded.RemoveReferences(Signature(words));
     }
     internal::ByteWriter a, b;
-    churn.vocabulary_.Save(a);
-    loaded.Save(b);
+    churn.vocabulary_.Save({}, a);
+    loaded.Save({}, b);
     EXPECT_TRUE(a.bytes() == b.bytes());
+  }
+}
+
+TEST(Vocabulary, WordsThatAreKnownAnywayTakeFewBytes) {
+  for (const bool binary : {false, true}) {
+    Churn churn(binary);
+    for (int i = 0; i < 20; ++i) churn.Step();
+    std::vector<cv::Mat> known;
+    for (const auto& [descriptors, signature] : churn.images_) known.push_back(descriptors.clone());
+    internal::ByteWriter alone, with;
+    churn.vocabulary_.Save({}, alone);
+    churn.vocabulary_.Save(known, with);
+    EXPECT_LT(with.bytes().size() + 20 * static_cast<std::size_t>(churn.vocabulary_.size()),
+              alone.bytes().size());
+    Vocabulary loaded(VocabularyOptions(), 3);
+    internal::ByteReader in(with.bytes(), "saved");
+    loaded.Load(known, in);
+    EXPECT_TRUE(in.AtEnd());
+    internal::ByteWriter again;
+    loaded.Save({}, again);
+    EXPECT_TRUE(again.bytes() == alone.bytes());
+    known.pop_back();
+    Vocabulary other(VocabularyOptions(), 3);
+    internal::ByteReader in_again(with.bytes(), "saved");
+    EXPECT_THROW(other.Load(known, in_again), InputError);
   }
 }
 
@@ -179,12 +204,12 @@ TEST(Vocabulary, DamagedBytesAreRefused) {
   Churn churn(false);
   for (int i = 0; i < 3; ++i) churn.Step();
   internal::ByteWriter out;
-  churn.vocabulary_.Save(out);
+  churn.vocabulary_.Save({}, out);
   const std::string& bytes = out.bytes();
   for (std::size_t length = 0; length < bytes.size(); length += 1 + bytes.size() / 50) {
     Vocabulary loaded(VocabularyOptions(), 3);
     internal::ByteReader in(std::string_view(bytes).substr(0, length), "saved");
-    EXPECT_THROW(loaded.Load(in), InputError) << length;
+    EXPECT_THROW(loaded.Load({}, in), InputError) << length;
   }
 }
 

@@ -4,11 +4,13 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -19,6 +21,11 @@
 
 #pragma GCC visibility push(default)
 namespace tutti {
+
+namespace internal {
+class SavedDetector;
+class SectionReader;
+}  // namespace internal
 
 /// Features that the caller already has, used for geometric verification beside the members' own.
 struct FeatureSet {
@@ -208,6 +215,13 @@ class LoopDetector {
   /// Throws InputError for another version, other members, or a damaged file; the object is then as it was.
   void Load(const std::filesystem::path& file);
 
+  /// For files that hold more than a detector (maps of tutti::slam): gives what Save writes to `sink`,
+  /// section by section, with the positions of the queries (PosePrior).
+  void SaveSections(const std::function<void(std::uint32_t tag, std::string_view bytes)>& sink) const;
+  /// Takes up what SaveSections gave, from the next sections of a file. Throws InputError as Load does; the
+  /// object is then as it was.
+  void LoadSections(internal::SectionReader* file);
+
   /// Locations in short-term and working memory.
   std::size_t NumLocations() const;
   /// Locations in long-term memory.
@@ -219,6 +233,7 @@ class LoopDetector {
 
  private:
   class Impl;
+  void Take(internal::SavedDetector* saved);
   std::unique_ptr<Impl> impl_;
 };
 

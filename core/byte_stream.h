@@ -1,16 +1,17 @@
-// Bytes out and bytes in, for saved detectors and the long-term memory's file.
+// Bytes out and bytes in, for saved maps and detectors and the long-term memory's file. Not installed.
 #pragma once
 
 #include <cstdint>
 #include <cstring>
-#include <opencv2/core.hpp>
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "tutti/core/error.h"
 
+#pragma GCC visibility push(default)  // used across libraries
 namespace tutti::internal {
 
 /// Appends plain values, in the machine's own byte order.
@@ -28,11 +29,23 @@ class ByteWriter {
     if (!values.empty()) PutRaw(values.data(), values.size() * sizeof(T));
   }
   void PutString(std::string_view text);
-  /// CV_32F with whole numbers 0..255 throughout (SIFT) is packed into bytes, without loss.
-  void PutMat(const cv::Mat& matrix);
+  /// A number that is small as a rule: seven bits a byte.
+  void PutVarint(std::uint64_t value) {
+    for (; value >= 0x80; value >>= 7) bytes_.push_back(static_cast<char>(value | 0x80));
+    bytes_.push_back(static_cast<char>(value));
+  }
+  /// The same for one of either sign.
+  void PutSignedVarint(std::int64_t value) {
+    PutVarint(static_cast<std::uint64_t>(value) << 1 ^ static_cast<std::uint64_t>(value >> 63));
+  }
+  /// First bytes of all, then all second ones and so on: those that are much alike lie together
+  /// (SectionPacker).
+  void PutPlanes(const std::vector<float>& values);
   void PutRaw(const void* data, std::size_t size) { bytes_.append(static_cast<const char*>(data), size); }
 
   const std::string& bytes() const { return bytes_; }
+  /// The bytes, which the writer has no more.
+  std::string Take() { return std::move(bytes_); }
 
  private:
   std::string bytes_;
@@ -59,25 +72,35 @@ class ByteReader {
     if (count > 0) std::memcpy(values.data(), Take(count * sizeof(T)), count * sizeof(T));
     return values;
   }
+  std::uint64_t GetVarint();
+  std::int64_t GetSignedVarint() {
+    const std::uint64_t value = GetVarint();
+    return static_cast<std::int64_t>(value >> 1 ^ (~(value & 1) + 1));
+  }
+  /// GetVarint of a number below `end`.
+  int GetVarintIndex(int end);
+  std::vector<float> GetPlanes();
   std::string GetString();
   void GetRaw(void* data, std::size_t size) { std::memcpy(data, Take(size), size); }
-  cv::Mat GetMat();
   /// A number of things that take at least `least_bytes` each.
   std::size_t GetCount(std::size_t least_bytes);
   /// An index in [0, end).
   int GetIndex(int end);
   bool AtEnd() const { return bytes_.empty(); }
+  std::size_t Left() const { return bytes_.size(); }  ///< [bytes]
+  const std::string& source() const { return source_; }
   /// Throws InputError: the source is damaged, for `what`.
   [[noreturn]] void Damaged(const std::string& what) const;
 
  private:
   const char* Take(std::size_t size);
 
-  std::string_view bytes_;
+  std::string_view bytes_;  // that are left
   std::string source_;
 };
 
-/// CRC-32 of zlib.
-std::uint32_t Crc32(std::string_view bytes);
+/// CRC-32 of zlib; `before`: that of the bytes before these.
+std::uint32_t Crc32(std::string_view bytes, std::uint32_t before = 0);
 
 }  // namespace tutti::internal
+#pragma GCC visibility pop

@@ -4,6 +4,7 @@
 #include <map>
 
 #include "frontend/dataset/dataset_folder.h"
+#include "frontend/dataset/image_file.h"
 #include "frontend/dataset/selected_dataset.h"
 #include "tutti/core/error.h"
 
@@ -20,6 +21,12 @@ EnumWords<Sensor> WordsOf(Sensor /*of*/) {
 }
 
 bool Dataset::WaitFor(std::size_t i, const std::function<bool()>&) const { return i < Size(); }
+
+ColourImage Dataset::ReadColour(std::size_t i) const {
+  const ReadResult read = Read(i);
+  if (!read.frame) return {cv::Mat(), read.error};
+  return {ToColour(read.frame->image), {}};
+}
 
 std::optional<std::size_t> FindStamp(const Dataset& dataset, double stamp_s) {
   constexpr double kSame = 1e-6;

@@ -324,7 +324,7 @@ class BagDataset : public Dataset {
     const cv::Mat image = Fetch(message, false, &metres);
     if (image.depth() != CV_8U && image.depth() != CV_16U)
       throw InputError(topic + ": pixels are neither 8 nor 16 bit");
-    const cv::Mat grey = ToGrey8(image, bits_);
+    const cv::Mat grey = To8Bit(image, bits_);
     return rectifier_ ? rectifier_->Apply(grey) : grey;
   }
 

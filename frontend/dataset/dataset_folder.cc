@@ -167,15 +167,15 @@ void FolderDataset::SetUpRig() {
   rig_.camera = left_->Camera();
 }
 
-std::string FolderDataset::ReadGrey(const std::filesystem::path& file, const Rectifier* rectifier,
-                                    cv::Mat& out) const {
-  ImageFile read = ReadGreyFile(file);
+// What is wrong with the image that was read from `file`; else `out` gets it, 8 bit and rectified.
+std::string FolderDataset::Rectify(const ImageFile& read, const std::filesystem::path& file,
+                                   const Rectifier* rectifier, cv::Mat& out) const {
   if (!read.error.empty()) return read.error;
   if (read.image.size() != size_) {
     return file.string() + ": has " + SizeText(read.image.size()) +
            " pixels, but the data set's images have " + SizeText(size_);
   }
-  out = ToGrey8(read.image, bits_);
+  out = To8Bit(read.image, bits_);
   if (rectifier != nullptr) out = rectifier->Apply(out);
   return {};
 }
@@ -195,11 +195,30 @@ std::string FolderDataset::ReadDepth(const std::filesystem::path& file, cv::Mat&
 ReadResult FolderDataset::Read(std::size_t i) const {
   ReadResult result;
   if (i >= Size()) {
-    result.error = contents_.folder.string() + ": has no frame " + std::to_string(i) + " (it has " +
-                   std::to_string(Size()) + ")";
+    result.error = NoFrame(i);
     return result;
   }
   return ReadFiles(i, contents_.frames[i]);
+}
+
+ColourImage FolderDataset::ReadColour(std::size_t i) const {
+  if (i >= Size()) return {cv::Mat(), NoFrame(i)};
+  return ReadColourOf(contents_.frames[i]);
+}
+
+std::string FolderDataset::NoFrame(std::size_t i) const {
+  return contents_.folder.string() + ": has no frame " + std::to_string(i) + " (it has " +
+         std::to_string(Size()) + ")";
+}
+
+ColourImage FolderDataset::ReadColourOf(const FrameFiles& files) const {
+  ColourImage out;
+  try {
+    out.error = Rectify(ReadColourFile(files.image), files.image, left_ ? &*left_ : nullptr, out.image);
+  } catch (const std::exception& e) {
+    out = {cv::Mat(), files.image.string() + ": can't be used: " + e.what()};
+  }
+  return out;
 }
 
 ReadResult FolderDataset::ReadFiles(std::size_t i, const FrameFiles& files) const {
@@ -208,10 +227,11 @@ ReadResult FolderDataset::ReadFiles(std::size_t i, const FrameFiles& files) cons
     InputFrame frame;
     frame.index = Number(i);
     frame.stamp_s = files.stamp_s;
-    result.error = ReadGrey(files.image, left_ ? &*left_ : nullptr, frame.image);
+    result.error = Rectify(ReadGreyFile(files.image), files.image, left_ ? &*left_ : nullptr, frame.image);
     if (!result.error.empty()) return result;
     if (!files.right.empty())
-      result.depth_error = ReadGrey(files.right, right_ ? &*right_ : nullptr, frame.right);
+      result.depth_error =
+          Rectify(ReadGreyFile(files.right), files.right, right_ ? &*right_ : nullptr, frame.right);
     if (!files.depth.empty()) result.depth_error = ReadDepth(files.depth, frame.depth_m);
     result.frame = std::move(frame);
   } catch (const std::exception& e) {  // out of memory for an absurd image size, and the like

@@ -49,8 +49,10 @@ class FolderDataset : public Dataset {
   std::size_t Size() const override { return contents_.frames.size(); }
   double Stamp(std::size_t i) const override { return contents_.frames.at(i).stamp_s; }
   ReadResult Read(std::size_t i) const override;
+  ColourImage ReadColour(std::size_t i) const override;
   /// The same for a frame `i` that came later.
   ReadResult ReadFiles(std::size_t i, const FrameFiles& files) const;
+  ColourImage ReadColourOf(const FrameFiles& files) const;
   const std::vector<FrameFiles>& Frames() const { return contents_.frames; }
   const CameraRig& Rig() const override { return rig_; }
   std::optional<std::filesystem::path> GroundTruthFile() const override;
@@ -62,7 +64,9 @@ class FolderDataset : public Dataset {
   void FindImageSize();
   void SetUpRig();
   PinholeCamera WithSize(PinholeCamera camera, const char* which) const;
-  std::string ReadGrey(const std::filesystem::path& file, const Rectifier* rectifier, cv::Mat& out) const;
+  std::string Rectify(const ImageFile& read, const std::filesystem::path& file, const Rectifier* rectifier,
+                      cv::Mat& out) const;
+  std::string NoFrame(std::size_t i) const;
   std::string ReadDepth(const std::filesystem::path& file, cv::Mat& out) const;
 
   FolderContents contents_;

@@ -68,6 +68,16 @@ class FollowedDataset : public Dataset {
     }
   }
 
+  ColourImage ReadColour(std::size_t i) const override {
+    FrameFiles files;
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      if (i >= frames_.size()) return {cv::Mat(), failure_};
+      files = frames_[i];
+    }
+    return base_->ReadColourOf(files);
+  }
+
   ReadResult Read(std::size_t i) const override {
     FrameFiles files;
     {

@@ -11,25 +11,80 @@
 namespace tutti {
 namespace {
 
+/// The frames of a file by their number. Safe from several threads.
+class VideoFrames {
+ public:
+  /// `decode` reads the next one of a capture; `kept`: so many that were decoded last can be had again at
+  /// once.
+  VideoFrames(std::filesystem::path file, bool (*decode)(cv::VideoCapture&, cv::Mat&), std::size_t kept)
+      : file_(std::move(file)), decode_(decode), most_kept_(kept) {}
+
+  /// Frame number `at` of the file, or an empty image where it can't be decoded.
+  cv::Mat Fetch(std::size_t at) const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const auto found = kept_.find(at);
+    if (found != kept_.end()) return found->second;
+    if (at >= end_) return {};
+    if ((at < next_ || !capture_.isOpened()) && !Reopen()) return {};
+    while (next_ <= at) {
+      const std::size_t number = next_;
+      cv::Mat image;
+      bool good = false;
+      try {
+        good = decode_(capture_, image);
+      } catch (const cv::Exception&) {
+        good = false;
+      }
+      if (!good) {
+        end_ = number;
+        return {};
+      }
+      ++next_;
+      kept_[number] = image;
+      while (kept_.size() > most_kept_) kept_.erase(kept_.begin());
+    }
+    return kept_[at];
+  }
+
+ private:
+  bool Reopen() const {
+    kept_.clear();
+    next_ = 0;
+    try {
+      OpenVideoFile(file_, capture_);
+    } catch (const InputError&) {
+      return false;
+    }
+    return true;
+  }
+
+  const std::filesystem::path file_;
+  bool (*const decode_)(cv::VideoCapture&, cv::Mat&);
+  const std::size_t most_kept_;
+  mutable std::mutex mutex_;  // guards all below
+  mutable cv::VideoCapture capture_;
+  mutable std::size_t next_ = 0;                            // number of the frame that the decoder gives next
+  mutable std::size_t end_ = static_cast<std::size_t>(-1);  // where decoding failed
+  mutable std::map<std::size_t, cv::Mat> kept_;
+};
+
 class VideoDataset : public Dataset {
  public:
-  VideoDataset(std::filesystem::path file, const DatasetOptions& options)
-      : file_(std::move(file)), options_(options) {
-    Reopen();
-    const double rate = options.rate_hz > 0 ? options.rate_hz : capture_.get(cv::CAP_PROP_FPS);
+  VideoDataset(const std::filesystem::path& file, const DatasetOptions& options)
+      : file_(file), grey_(file, ReadGreyFrame, 48), colour_(file, ReadColourFrame, 2) {
+    cv::VideoCapture capture;
+    OpenVideoFile(file_, capture);
+    const double rate = options.rate_hz > 0 ? options.rate_hz : capture.get(cv::CAP_PROP_FPS);
     rate_hz_ = rate > 0 && std::isfinite(rate) ? rate : 30.0;
-    const double count = capture_.get(cv::CAP_PROP_FRAME_COUNT);
+    const double count = capture.get(cv::CAP_PROP_FRAME_COUNT);
     if (count >= 1 && count < 1e9) {
       frames_ = static_cast<std::size_t>(count);
     } else {
-      while (capture_.grab()) ++frames_;
-      Reopen();
+      while (capture.grab()) ++frames_;
     }
-    cv::Mat first;
-    if (frames_ == 0 || !Next(first)) {
+    const cv::Mat first = frames_ > 0 ? grey_.Fetch(0) : cv::Mat();
+    if (first.empty())
       throw InputError(file_.string() + ": no frame can be decoded; is it a complete video file?");
-    }
-    Keep(0, first);
     size_ = first.size();
     rig_ = SingleCameraRig(options, size_, rate_hz_, file_.string(), rectifier_, warnings_);
   }
@@ -57,90 +112,40 @@ class VideoDataset : public Dataset {
 
   ReadResult Read(std::size_t i) const override {
     ReadResult result;
-    cv::Mat image;
-    if (i < frames_) {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      image = Fetch(i);
-    }
-    if (image.empty()) {
-      result.error = file_.string() + ": frame " + std::to_string(i) + " can't be decoded";
-      return result;
-    }
-    if (image.size() != size_) {
-      result.error = file_.string() + ": frame " + std::to_string(i) + " has another size than the first";
-      return result;
-    }
     InputFrame frame;
+    result.error = Rectified(grey_, i, frame.image);
+    if (!result.error.empty()) return result;
     frame.index = static_cast<std::int64_t>(i);
     frame.stamp_s = Stamp(i);
-    frame.image = rectifier_ ? rectifier_->Apply(image) : image;
     result.frame = std::move(frame);
     return result;
   }
 
+  ColourImage ReadColour(std::size_t i) const override {
+    ColourImage result;
+    result.error = Rectified(colour_, i, result.image);
+    return result;
+  }
+
  private:
-  void Reopen() const {
-    OpenVideoFile(file_, capture_);
-    next_ = 0;
-  }
-
-  bool Next(cv::Mat& grey) const {
-    if (!ReadGreyFrame(capture_, grey)) return false;
-    ++next_;
-    return true;
-  }
-
-  void Keep(std::size_t at, const cv::Mat& image) const {
-    constexpr std::size_t kKept = 48;
-    kept_[at] = image;
-    while (kept_.size() > kKept) kept_.erase(kept_.begin());
-  }
-
-  // Frame number `at` of the file, or an empty image. mutex_ is held.
-  cv::Mat Fetch(std::size_t at) const {
-    const auto found = kept_.find(at);
-    if (found != kept_.end()) return found->second;
-    if (at >= end_) return {};
-    if (at < next_) {
-      kept_.clear();
-      try {
-        Reopen();
-      } catch (const InputError&) {
-        return {};
-      }
-    }
-    while (next_ <= at) {
-      const std::size_t number = next_;
-      cv::Mat image;
-      bool good = false;
-      try {
-        good = Next(image);
-      } catch (const cv::Exception&) {
-        good = false;
-      }
-      if (!good) {
-        end_ = number;
-        return {};
-      }
-      Keep(number, image);
-    }
-    return kept_[at];
+  // What is wrong with frame i; else `out` gets it.
+  std::string Rectified(const VideoFrames& frames, std::size_t i, cv::Mat& out) const {
+    const cv::Mat image = i < frames_ ? frames.Fetch(i) : cv::Mat();
+    if (image.empty()) return file_.string() + ": frame " + std::to_string(i) + " can't be decoded";
+    if (image.size() != size_)
+      return file_.string() + ": frame " + std::to_string(i) + " has another size than the first";
+    out = rectifier_ ? rectifier_->Apply(image) : image;
+    return {};
   }
 
   std::filesystem::path file_;
-  DatasetOptions options_;
+  VideoFrames grey_, colour_;
   CameraRig rig_;
   std::vector<std::string> warnings_;
   std::optional<Rectifier> rectifier_;
   double rate_hz_ = 30;
   std::size_t frames_ = 0;
   cv::Size size_;
-
-  mutable std::mutex mutex_;  // guards all below
-  mutable cv::VideoCapture capture_;
-  mutable std::size_t next_ = 0;                            // number of the frame that the decoder gives next
-  mutable std::size_t end_ = static_cast<std::size_t>(-1);  // where decoding failed
-  mutable std::map<std::size_t, cv::Mat> kept_;
 };
 
 }  // namespace

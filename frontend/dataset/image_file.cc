@@ -112,8 +112,10 @@ ImageFile Decode(const std::filesystem::path& file, int flags) {
 
 }  // namespace
 
-ImageFile ReadGreyFile(const std::filesystem::path& file) {
-  ImageFile out = Decode(file, cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
+namespace {
+
+ImageFile ReadPixels(const std::filesystem::path& file, int colour) {
+  ImageFile out = Decode(file, colour | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
   if (!out.error.empty()) return out;
   if (out.image.depth() != CV_8U && out.image.depth() != CV_16U) {
     out.error = file.string() + ": has pixels that are neither 8 nor 16 bit; convert it";
@@ -121,6 +123,11 @@ ImageFile ReadGreyFile(const std::filesystem::path& file) {
   }
   return out;
 }
+
+}  // namespace
+
+ImageFile ReadGreyFile(const std::filesystem::path& file) { return ReadPixels(file, cv::IMREAD_GRAYSCALE); }
+ImageFile ReadColourFile(const std::filesystem::path& file) { return ReadPixels(file, cv::IMREAD_COLOR); }
 
 ImageFile ReadDepthFile(const std::filesystem::path& file) {
   ImageFile out = Decode(file, cv::IMREAD_UNCHANGED);
@@ -132,10 +139,17 @@ ImageFile ReadDepthFile(const std::filesystem::path& file) {
   return out;
 }
 
-cv::Mat ToGrey8(const cv::Mat& grey, int bits) {
-  if (grey.depth() == CV_8U) return grey;
+cv::Mat To8Bit(const cv::Mat& image, int bits) {
+  if (image.depth() == CV_8U) return image;
   cv::Mat out;
-  grey.convertTo(out, CV_8U, 1.0 / (1 << (std::clamp(bits, 8, 16) - 8)));
+  image.convertTo(out, CV_8U, 1.0 / (1 << (std::clamp(bits, 8, 16) - 8)));
+  return out;
+}
+
+cv::Mat ToColour(const cv::Mat& image) {
+  if (image.channels() == 3) return image;
+  cv::Mat out;
+  cv::cvtColor(image, out, cv::COLOR_GRAY2BGR);
   return out;
 }
 

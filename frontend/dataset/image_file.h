@@ -17,11 +17,16 @@ struct ImageFile {
 /// Reads an image in grey, 8 or 16 bit as stored. Decoders fill the missing part of a truncated JPEG, PNG or
 /// WebP with grey without a word, so the ends of these are checked first. Never throws; thread-safe.
 ImageFile ReadGreyFile(const std::filesystem::path& file);
+/// The same in colour, 3 channels, blue first.
+ImageFile ReadColourFile(const std::filesystem::path& file);
 /// Reads a depth image as stored: one channel of 16 bit or float.
 ImageFile ReadDepthFile(const std::filesystem::path& file);
 
-/// To 8 bit. 16-bit images are divided by 2^(bits - 8) and saturated; `bits`: significant bits, 8 to 16.
-cv::Mat ToGrey8(const cv::Mat& grey, int bits);
+/// To 8 bit, any channels. 16-bit images are divided by 2^(bits - 8) and saturated; `bits`: significant bits,
+/// 8 to 16.
+cv::Mat To8Bit(const cv::Mat& image, int bits);
+/// Three equal channels from one; three channels stay.
+cv::Mat ToColour(const cv::Mat& image);
 /// Bits that the greatest value of an image needs, rounded up to 8, 10, 12, 14 or 16 as sensors have them.
 int SignificantBits(const cv::Mat& grey);
 

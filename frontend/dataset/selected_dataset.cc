@@ -52,6 +52,7 @@ class SelectedDataset : public Dataset {
     AddNoise(noise_, seed + 1, read.frame->right);
     return read;
   }
+  ColourImage ReadColour(std::size_t i) const override { return whole_->ReadColour(Place(i)); }
   const CameraRig& Rig() const override { return rig_; }
   std::optional<std::filesystem::path> GroundTruthFile() const override { return whole_->GroundTruthFile(); }
   Trajectory ReadGroundTruth(const std::filesystem::path& file,

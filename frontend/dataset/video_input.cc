@@ -41,6 +41,17 @@ bool ReadGreyFrame(cv::VideoCapture& capture, cv::Mat& grey) {
   return true;
 }
 
+bool ReadColourFrame(cv::VideoCapture& capture, cv::Mat& colour) {
+  cv::Mat image;
+  if (!capture.read(image) || image.empty()) return false;
+  if (image.channels() == 3) {
+    colour = image.clone();
+  } else {
+    cv::cvtColor(image, colour, image.channels() == 4 ? cv::COLOR_BGRA2BGR : cv::COLOR_GRAY2BGR);
+  }
+  return true;
+}
+
 CameraRig SingleCameraRig(const DatasetOptions& options, cv::Size size, double rate_hz,
                           const std::string& name, std::optional<Rectifier>& rectifier,
                           std::vector<std::string>& warnings) {

@@ -16,6 +16,8 @@ void OpenVideoFile(const std::filesystem::path& file, cv::VideoCapture& capture)
 
 /// The next frame in grey (8 bit); false at the end, and where it can't be decoded.
 bool ReadGreyFrame(cv::VideoCapture& capture, cv::Mat& grey);
+/// The same in colour, 3 channels, blue first.
+bool ReadColourFrame(cv::VideoCapture& capture, cv::Mat& colour);
 
 /// Rig and rectifier of one camera whose images have this size; without calibration a warning, and no
 /// rectifier. `name` is what messages call the source. Throws InputError if the calibration does not fit.

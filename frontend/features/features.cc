@@ -174,6 +174,10 @@ int HammingDistance(const std::uint8_t* a, const std::uint8_t* b) {
 void FrameFeatures::BuildGrid(int width, int height) {
   columns_ = width / kCell + 1;
   rows_ = height / kCell + 1;
+  FillGrid();
+}
+
+void FrameFeatures::FillGrid() {
   std::vector<std::size_t> cell_of(keypoints.size());
   first_entry_.assign(static_cast<std::size_t>(columns_ * rows_) + 1, 0);
   for (std::size_t i = 0; i < keypoints.size(); ++i) {
@@ -237,11 +241,15 @@ std::vector<cv::Mat> BuildPyramid(const cv::Mat& image, const OdometryOptions& o
     const cv::Size size(static_cast<int>(std::lround(image.cols * scale)),
                         static_cast<int>(std::lround(image.rows * scale)));
     if (size.width < 2 * kBorder + 2 || size.height < 2 * kBorder + 2) break;
-    cv::Mat level;
-    cv::resize(pyramid.back(), level, size, 0, 0, cv::INTER_LINEAR);
-    pyramid.push_back(level);
+    pyramid.push_back(NextLevel(pyramid.back(), size));
   }
   return pyramid;
+}
+
+cv::Mat NextLevel(const cv::Mat& image, const cv::Size& size) {
+  cv::Mat level;
+  cv::resize(image, level, size, 0, 0, cv::INTER_LINEAR);
+  return level;
 }
 
 FrameFeatures ExtractOrb(const std::vector<cv::Mat>& pyramid, const OdometryOptions& options) {

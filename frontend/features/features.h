@@ -40,12 +40,16 @@ struct FrameFeatures {
               std::vector<int>* out) const;
   /// Fills the grid that InArea uses; call after the keypoints are set.
   void BuildGrid(int width, int height);
+  /// Everything, for saved maps; defined in frontend/store/features_state.h.
+  template <class Archive>
+  void State(Archive& archive);
   std::size_t size() const { return keypoints.size(); }
   const std::uint8_t* Descriptor(int i) const { return descriptors.ptr<std::uint8_t>(i); }
 
  private:
   static constexpr int kCell = 24;  // [px]
-  struct Entry {                    // what InArea asks of a feature, side by side in memory
+  void FillGrid();
+  struct Entry {  // what InArea asks of a feature, side by side in memory
     cv::Point2f pixel;
     int octave = 0, feature = 0;
   };
@@ -62,6 +66,9 @@ std::vector<float> PyramidScales(const OdometryOptions& options);
 
 /// Image pyramid; level l is smaller by scale_factor^l.
 std::vector<cv::Mat> BuildPyramid(const cv::Mat& image, const OdometryOptions& options);
+
+/// The level of a pyramid after `image`.
+cv::Mat NextLevel(const cv::Mat& image, const cv::Size& size);
 
 /// Detects and describes features of one 8-bit grey image; no depth. Blank or tiny images give none.
 FrameFeatures ExtractOrb(const std::vector<cv::Mat>& pyramid, const OdometryOptions& options);

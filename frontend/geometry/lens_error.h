@@ -14,6 +14,10 @@ struct LensError {
   Eigen::Vector2d value = Eigen::Vector2d::Zero();
   Eigen::Matrix2d information = Eigen::Matrix2d::Identity() * 1e12;  ///< as it is: no error at all
 
+  template <class Archive>
+  void State(Archive& archive) {
+    archive(value, information);
+  }
   /// d pixel / d value at a pixel, 2x2.
   static Eigen::Matrix2d Jacobian(const PinholeCamera& camera, const Eigen::Vector2d& pixel);
   /// Where a pixel belongs.

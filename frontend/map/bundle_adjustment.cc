@@ -89,7 +89,6 @@ BundleAdjustmentReport AdjustWindow(const PinholeCamera& camera, const std::vect
   report.keyframes = static_cast<int>(moving.size());
   report.fixed = static_cast<int>(fixed.size());
   report.landmarks = static_cast<int>(landmarks.size());
-  report.lens = options.lens;
   if (landmarks.empty() || moving.empty()) return report;
   Window window = MakeWindow(*map, moving, fixed, landmarks, options);
   const WindowReport solved = SolveWindow(camera, options.iterations, &window, options.stop);
@@ -98,7 +97,6 @@ BundleAdjustmentReport AdjustWindow(const PinholeCamera& camera, const std::vect
   report.final_cost = solved.final_cost;
   report.usable = solved.usable;
   if (!report.usable) return report;
-  report.lens = window.lens;
   if (options.observe_lens) report.lens_seen = ObserveLens(camera, window);
   for (std::size_t i = 0; i < moving.size(); ++i)
     map->keyframe(moving[i]).T_world_camera = window.T_camera_world[i].Inverse();

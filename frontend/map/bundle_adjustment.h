@@ -28,7 +28,6 @@ struct BundleAdjustmentReport {
   int keyframes = 0, fixed = 0, landmarks = 0, observations = 0;
   int removed = 0;  ///< observations that do not fit (95 % chi2) and were removed
   double initial_cost = 0, final_cost = 0;
-  LensError lens;                      ///< what is known after the window; its own part counts in full
   std::optional<LensError> lens_seen;  ///< with observe_lens: what the window alone says (ObserveLens)
 };
 

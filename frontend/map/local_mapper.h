@@ -33,6 +33,13 @@ class LocalMapper {
   /// the map. Adds milliseconds to `stages`.
   void Process(int keyframe, Map* map, StageTimes* stages);
 
+  template <class Archive>
+  void State(Archive& archive) {
+    archive(lens_, recent_);
+  }
+  /// Throws InputError if the state does not fit the map.
+  void Check(const Map& map, const internal::SectionReader& file) const;
+
  private:
   void CullRecent(int keyframe, Map* map);
   std::optional<Eigen::Vector3d> PointOf(const Keyframe& a, int fa, const Keyframe& b, int fb, const Map& map,

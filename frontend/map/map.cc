@@ -95,19 +95,25 @@ int Map::Present(int id) const {
   return id;
 }
 
+namespace {
+// Whether the landmark's patch was cut out of this very view.
+bool HasItsPatchFrom(const Landmark& l, int keyframe, int feature) {
+  return l.patch && l.patch_source.keyframe == keyframe && l.patch_source.feature == feature;
+}
+}  // namespace
+
 double Map::RelativeSigma(const FrameFeatures& features, int keyframe, int feature, int id) const {
   const std::size_t f = static_cast<std::size_t>(feature);
   const double corner = scales_[static_cast<std::size_t>(features.keypoints[f].octave)];
   const Landmark& l = landmark(id);
-  const bool source = l.patch && l.patch_source.keyframe == keyframe && l.patch_source.feature == feature;
+  const bool source = HasItsPatchFrom(l, keyframe, feature);
   const bool aligned = f < features.aligned.size() && features.aligned[f] == id;
   return source || aligned ? aligned_sigma_ * corner : corner;
 }
 
 bool Map::Doubtful(const Observation& view, int id) const {
   const Landmark& l = landmark(id);
-  if (!l.patch || (l.patch_source.keyframe == view.keyframe && l.patch_source.feature == view.feature))
-    return false;
+  if (!l.patch || HasItsPatchFrom(l, view.keyframe, view.feature)) return false;
   const std::vector<int>& aligned = keyframe(view.keyframe).features->aligned;
   const std::size_t f = static_cast<std::size_t>(view.feature);
   return f >= aligned.size() || aligned[f] < 0;

@@ -14,12 +14,21 @@
 #include "tutti/core/camera.h"
 #include "tutti/core/pose.h"
 
+namespace tutti::internal {
+class SectionReader;
+}
+
 namespace tutti {
 
 /// Feature `feature` of keyframe `keyframe` sees a landmark.
 struct Observation {
   int keyframe = -1;
   int feature = -1;
+
+  template <class Archive>
+  void State(Archive& archive) {
+    archive(keyframe, feature);
+  }
 };
 
 /// What a landmark looks like in the keyframe that made it, at the pyramid level of its corner.
@@ -29,6 +38,12 @@ struct Patch {
   std::array<std::uint8_t, kSide * kSide> grey{};
   float offset_x = 0, offset_y = 0;  ///< of the landmark from the patch's centre [px of the level]
   float scale_x = 1, scale_y = 1;    ///< level-0 pixels per pixel of the level
+
+  /// All but `grey`: those of many landmarks are saved as one image.
+  template <class Archive>
+  void State(Archive& archive) {
+    archive(offset_x, offset_y, scale_x, scale_y);
+  }
 };
 
 /// A 3D point.
@@ -45,6 +60,19 @@ struct Landmark {
   Observation patch_source;                   ///< what the patch is of
   int visible = 0, found = 0;                 ///< frames that should see it, and that did
   int replaced_by = -1;                       ///< landmark that it was merged into, if it is not alive
+
+  /// All but `descriptor`, which is a keyframe's as a rule; of a dead one nobody asks for more than what
+  /// replaced it.
+  template <class Archive>
+  void State(Archive& archive) {
+    archive(alive);
+    if (!alive) return archive(replaced_by);
+    std::optional<Patch> own;
+    if (patch) own = *patch;
+    archive(position, normal, min_distance, max_distance, observations, reference, own, patch_source, visible,
+            found);
+    if (Archive::kReading && own) patch = std::make_shared<const Patch>(*own);
+  }
 };
 
 /// A frame that stays in the map.
@@ -57,6 +85,10 @@ struct Keyframe {
   std::shared_ptr<const FrameFeatures> features;
   std::vector<int> landmarks;    ///< per feature: landmark id or -1
   std::map<int, int> covisible;  ///< other keyframe -> number of common landmarks
+
+  /// Defined in frontend/store/features_state.h.
+  template <class Archive>
+  void State(Archive& archive);
 };
 
 /// Map of one odometry. Ids are indices; dead landmarks stay as empty shells.
@@ -107,6 +139,12 @@ class Map {
 
   /// Median depth of the landmarks that a keyframe sees [m]; 0 if it sees none.
   double MedianDepth(int keyframe) const;
+
+  /// For loading: the next keyframe or landmark, as it was saved.
+  void Restore(Keyframe keyframe) { keyframes_.Append(std::move(keyframe)); }
+  void Restore(Landmark landmark) { landmarks_.Append(std::move(landmark)); }
+  /// Throws InputError if what was restored does not fit together.
+  void Check(const internal::SectionReader& file) const;
 
  private:
   std::vector<float> scales_;

@@ -5,23 +5,6 @@
 #include <vector>
 
 namespace tutti {
-namespace {
-
-void TakeAdjusted(int id, const Landmark& before, const Landmark& after, Map* map) {
-  if (!before.alive || !std::as_const(*map).landmark(id).alive) return;
-  if (!after.alive) {
-    map->RemoveLandmark(id);
-    return;
-  }
-  if (after.position != before.position) map->landmark(id).position = after.position;
-  for (const Observation& o : before.observations) {
-    const bool stays = std::any_of(after.observations.begin(), after.observations.end(),
-                                   [&](const Observation& other) { return other.keyframe == o.keyframe; });
-    if (!stays) map->RemoveObservation(id, o.keyframe);
-  }
-}
-
-}  // namespace
 
 void MoveKeyframes(const std::map<int, Similarity>& S_world_keyframe, Map* map) {
   const Map& now = *map;
@@ -43,8 +26,34 @@ void MoveKeyframes(const std::map<int, Similarity>& S_world_keyframe, Map* map) 
     map->keyframe(static_cast<int>(k)).T_world_camera = corrected[k].RigidPart();
 }
 
-void TakeAdjustedLandmarks(const Map& before, const Map& after, Map* map) {
-  for (int l = 0; l < after.LandmarkCount(); ++l) TakeAdjusted(l, before.landmark(l), after.landmark(l), map);
+std::vector<AdjustedLandmark> AdjustedLandmarks(const Map& before, const Map& after) {
+  std::vector<AdjustedLandmark> all;
+  for (int id = 0; id < after.LandmarkCount(); ++id) {
+    const Landmark &old = before.landmark(id), &now = after.landmark(id);
+    if (!old.alive) continue;
+    AdjustedLandmark adjusted;
+    adjusted.id = id;
+    adjusted.removed = !now.alive;
+    if (now.alive && now.position != old.position) adjusted.position = now.position;
+    for (const Observation& o : old.observations) {
+      const bool stays = adjusted.removed ||
+                         std::any_of(now.observations.begin(), now.observations.end(),
+                                     [&](const Observation& other) { return other.keyframe == o.keyframe; });
+      if (!stays) adjusted.without.push_back(o.keyframe);
+    }
+    if (adjusted.removed || adjusted.position || !adjusted.without.empty())
+      all.push_back(std::move(adjusted));
+  }
+  return all;
+}
+
+void TakeAdjustedLandmarks(const std::vector<AdjustedLandmark>& all, Map* map) {
+  for (const AdjustedLandmark& adjusted : all) {
+    if (!std::as_const(*map).landmark(adjusted.id).alive) continue;
+    if (adjusted.removed) map->RemoveLandmark(adjusted.id);
+    if (adjusted.position) map->landmark(adjusted.id).position = *adjusted.position;
+    for (const int keyframe : adjusted.without) map->RemoveObservation(adjusted.id, keyframe);
+  }
 }
 
 void JoinPieces(const std::map<int, int>& joined, Map* map) {

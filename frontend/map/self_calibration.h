@@ -18,6 +18,11 @@
 
 namespace tutti {
 
+template <class Archive>
+void State(Archive& archive, LensFound::Step& step) {
+  archive(step.frame_index, step.k1, step.k2, step.k1_sigma, step.k2_sigma);
+}
+
 /// Value type: copies with the odometry. For mono alone: with depth the scale can't drift.
 class SelfCalibration {
  public:
@@ -35,6 +40,15 @@ class SelfCalibration {
   const Eigen::Vector2d& Applied() const { return applied_; }
   /// All that is known, and how it came to be.
   LensFound Found() const;
+
+  template <class Archive>
+  void State(Archive& archive) {
+    archive(applied_, remaining_, steps_);
+    if constexpr (Archive::kReading) {
+      if (!applied_.allFinite() || !remaining_.value.allFinite() || !remaining_.information.allFinite())
+        archive.Damaged("a lens that is none");
+    }
+  }
 
  private:
   Eigen::Vector2d Sigma() const;

@@ -1,16 +1,24 @@
 // A vector whose copies share what neither of them has changed.
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <memory>
 #include <utility>
 #include <vector>
 
+#if defined(__SANITIZE_THREAD__)
+#define TUTTI_UNDER_TSAN 1
+#elif defined(__has_feature)
+#define TUTTI_UNDER_TSAN __has_feature(thread_sanitizer)
+#else
+#define TUTTI_UNDER_TSAN 0
+#endif
+
 namespace tutti {
 
 /// Elements live in chunks of `kChunk`. A copy costs a pointer per chunk; the first write to a chunk that is
-/// shared copies that chunk. Copies may be used on different threads as long as none is destroyed or assigned
-/// to while another is written.
+/// shared copies that chunk. Copies may be used, and destroyed, on different threads.
 template <class T, std::size_t kChunk>
 class SharedVector {
  public:
@@ -33,9 +41,21 @@ class SharedVector {
  private:
   using Chunk = std::vector<T>;
 
+  // If so, whatever other threads have read before they let go of it has happened.
+  static bool IsAlone(const std::shared_ptr<Chunk>& chunk) {
+#if TUTTI_UNDER_TSAN  // which does not know fences
+    const std::shared_ptr<Chunk> again = chunk;
+    return again.use_count() == 2;
+#else
+    const bool alone = chunk.use_count() == 1;
+    std::atomic_thread_fence(std::memory_order_acquire);
+    return alone;
+#endif
+  }
+
   Chunk& Own(std::size_t c) {
     std::shared_ptr<Chunk>& chunk = chunks_[c];
-    if (chunk.use_count() != 1) {
+    if (!IsAlone(chunk)) {
       auto copy = std::make_shared<Chunk>();
       copy->reserve(kChunk);  // references stay good while it grows
       copy->insert(copy->end(), chunk->begin(), chunk->end());

@@ -55,6 +55,13 @@ void AsyncMapper::Enter(StageTimes* stages) {
   Count(&found_, &Landmark::found);
 }
 
+void AsyncMapper::Resume(const StageTimes& stages) {
+  if (!std::exchange(interrupted_, false)) return;
+  const int frames = frames_;
+  Start(keyframe_, stages);
+  frames_ = frames;
+}
+
 void AsyncMapper::CountSeen(const PoseFix& fix) {
   visible_.insert(visible_.end(), fix.visible.begin(), fix.visible.end());
   found_.insert(found_.end(), fix.found.begin(), fix.found.end());

@@ -55,6 +55,22 @@ class AsyncMapper {
   void UseOwnThreads(bool own_threads) { own_threads_ = own_threads; }
   bool own_threads() const { return own_threads_; }
 
+  /// All but the map, and without what has come of the work that is under way: that follows from the rest.
+  template <class Archive>
+  void State(Archive& archive) {
+    bool busy = Busy();
+    archive(mapper_, busy, keyframe_, frames_, visible_, found_, mapped_);
+    if (Archive::kReading) interrupted_ = busy;
+  }
+  /// For loading: the map to be filled.
+  Map* RestoredMap() { return &map_; }
+  /// Throws InputError if the state does not fit together.
+  void Check(const internal::SectionReader& file) const;
+  /// Whether something was under way when the state was saved, and is not yet begun again.
+  bool interrupted() const { return interrupted_; }
+  /// Begins with that again.
+  void Resume(const StageTimes& stages);
+
  private:
   struct Outcome {
     Map map;
@@ -71,6 +87,7 @@ class AsyncMapper {
   std::shared_future<std::shared_ptr<const Outcome>> outcome_;  // valid: under way
   int keyframe_ = -1;                                           // that is under way
   int frames_ = 0;                                              // since that began
+  bool interrupted_ = false;                                    // loaded, and not begun again yet
   std::vector<int> visible_, found_;                            // landmarks that are still to be counted
   std::vector<int> mapped_;
 };

@@ -29,12 +29,24 @@ class FrameHistory {
   /// Same length as Poses: index of the input frame of each pose.
   std::vector<std::int64_t> Indices(const Map& map, int piece) const;
 
+  template <class Archive>
+  void State(Archive& archive) {
+    archive(records_);
+  }
+  /// Throws InputError if the state does not fit the map.
+  void Check(const Map& map, const internal::SectionReader& file) const;
+
  private:
   struct Record {
     std::int64_t index = 0;
     double stamp_s = 0;
     int reference = -1;
     Pose T_reference_frame;
+
+    template <class Archive>
+    void State(Archive& archive) {
+      archive(index, stamp_s, reference, T_reference_frame);
+    }
   };
   std::vector<const Record*> Of(const Map& map, int piece) const;
 

@@ -34,6 +34,13 @@ class MapInitializer {
   /// The same, and what starts next is another piece of the map.
   void NextPiece();
 
+  template <class Archive>
+  void State(Archive& archive) {
+    archive(mono_, waiting_, piece_);
+  }
+  /// Throws InputError if the state does not fit the map.
+  void Check(const Map& map, const internal::SectionReader& file) const;
+
  private:
   Start OfferMetric(const TrackedFrame& frame, const Pose& T_world_camera, AsyncMapper* mapper);
   Start OfferMono(const TrackedFrame& frame, const LastFrame& last, const Pose& T_world_camera, Map* map);

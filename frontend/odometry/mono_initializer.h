@@ -27,6 +27,13 @@ class MonoInitializer {
   const std::vector<TrackedFrame>& pending() const { return pending_; }
   void Reset();
 
+  template <class Archive>
+  void State(Archive& archive) {
+    archive(reference_, centres_, pending_);
+  }
+  /// Throws InputError if the state does not fit the map.
+  void Check(const Map& map, const internal::SectionReader& file) const;
+
  private:
   void Restart(const TrackedFrame& frame);
 

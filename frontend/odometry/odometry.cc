@@ -51,6 +51,10 @@ std::shared_ptr<const FrameFeatures> Odometry::Extract(const InputFrame& frame) 
 
 TrackResult Odometry::Track(const InputFrame& frame) { return impl_->Track(frame); }
 TrackResult Odometry::RelocalizeAt(int keyframe) { return impl_->RelocalizeAt(keyframe); }
+void Odometry::BeginLocalization() { impl_->BeginLocalization(); }
+bool Odometry::BeyondMap() const { return impl_->BeyondMap(); }
+int Odometry::ReferenceKeyframe() const { return impl_->last().reference; }
+std::optional<Matrix6d> Odometry::PoseCovariance() const { return impl_->PoseCovariance(); }
 void Odometry::FinishMapping() { impl_->EnterMapping(); }
 std::vector<int> Odometry::TakeMapped() { return impl_->TakeMapped(); }
 void Odometry::UseOwnThreads(bool own_threads) { impl_->UseOwnThreads(own_threads); }
@@ -105,6 +109,25 @@ double Odometry::KeyframeStamp(int id) const { return impl_->map().keyframe(id).
 
 int Odometry::KeyframePiece(int id) const { return impl_->map().keyframe(id).piece; }
 
+int Odometry::LandmarkCount() const {
+  int count = 0;
+  for (int id = 0; id < impl_->map().LandmarkCount(); ++id) count += impl_->map().landmark(id).alive ? 1 : 0;
+  return count;
+}
+
+std::vector<LandmarkView> Odometry::Landmarks() const {
+  const Map& map = impl_->map();
+  std::vector<LandmarkView> landmarks;
+  for (int id = 0; id < map.LandmarkCount(); ++id) {
+    const Landmark& landmark = map.landmark(id);
+    if (landmark.alive && !landmark.observations.empty())
+      landmarks.push_back({id, landmark.position, static_cast<int>(landmark.observations.size())});
+  }
+  return landmarks;
+}
+
+const CameraRig& Odometry::Rig() const { return impl_->rig(); }
+
 std::vector<std::pair<std::pair<int, int>, int>> Odometry::Covisibility(int min_shared) const {
   std::vector<std::pair<std::pair<int, int>, int>> out;
   for (int id = 0; id < impl_->map().KeyframeCount(); ++id) {
@@ -127,7 +150,7 @@ int Odometry::FuseLoop(int older, int newer, const Similarity& S_older_newer) {
 GlobalAdjustment Odometry::BeginGlobalAdjustment(int piece) const {
   const AsyncMapper& mapper = impl_->mapper();
   return GlobalAdjustment(
-      std::make_unique<GlobalAdjustment::Work>(impl_->options(), impl_->rig(), mapper.map(), piece,
+      std::make_shared<GlobalAdjustment::Work>(impl_->options(), impl_->rig(), mapper.map(), piece,
                                                mapper.lens().Remaining().value, mapper.own_threads()));
 }
 

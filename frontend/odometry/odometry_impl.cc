@@ -1,7 +1,9 @@
 #include "frontend/odometry/odometry_impl.h"
 
+#include <Eigen/Cholesky>
 #include <utility>
 
+#include "frontend/geometry/measured.h"
 #include "frontend/map/global_adjustment.h"
 #include "frontend/map/landmark_fusion.h"
 #include "frontend/map/map_correction.h"
@@ -72,7 +74,7 @@ TrackResult Odometry::Impl::TrackMap(const TrackedFrame& frame) {
     tracked = tracker_.Track(frame, map());
   }
   if (tracked.fix) return Accept(tracked);
-  if (relocalizer_.Lose(frame)) {  // a loop closure may join the two pieces later
+  if (relocalizer_.Lose(frame) && !map_keyframes_) {  // a loop closure may join the two pieces later
     tracker_.GiveUp();
     initializer_.NextPiece();
   }
@@ -96,17 +98,62 @@ TrackResult Odometry::Impl::RelocalizeAt(int keyframe) {
   return result_;
 }
 
+void Odometry::Impl::BeginLocalization() {
+  EnterMapping();
+  map_keyframes_ = map().KeyframeCount();
+  initializer_.Reset();
+  tracker_.Forget();
+  relocalizer_.Found();
+  history_ = FrameHistory();
+  result_ = TrackResult();
+}
+
+std::optional<Matrix6d> Odometry::Impl::PoseCovariance() const {
+  const LastFrame& last = tracker_.last();
+  if (last.reference < 0) return std::nullopt;
+  Matrix6d information = Matrix6d::Zero();
+  for (std::size_t f = 0; f < last.matches.landmarks.size(); ++f) {
+    const int landmark = last.matches.landmarks[f];
+    if (landmark < 0 || !map().landmark(landmark).alive) continue;
+    const PointObservation seen =
+        Measured(map(), *last.matches.features, {-1, static_cast<int>(f)}, landmark, options_.pixel_sigma);
+    Eigen::Vector3d residual;
+    Eigen::Matrix<double, 3, 6> by_pose;
+    if (!ReprojectionResidual(rig_.camera, last.T_camera_world, seen, &residual, &by_pose)) continue;
+    information += by_pose.transpose() * by_pose;
+  }
+  const Eigen::LDLT<Matrix6d> solver(information);
+  if (solver.info() != Eigen::Success || !(solver.rcond() > 1e-12)) return std::nullopt;
+  const Matrix6d covariance = solver.solve(Matrix6d::Identity());
+  // Exp(d) T_camera_world is T_world_camera Exp(-d): the camera moves by -R_world_camera d in the world.
+  Matrix6d turn = Matrix6d::Identity();
+  turn.topLeftCorner<3, 3>() = last.T_camera_world.rotation.conjugate().toRotationMatrix();
+  return turn * covariance * turn.transpose();
+}
+
 TrackResult Odometry::Impl::Accept(const Tracker::Tracked& tracked) {
   relocalizer_.Found();
   mapper_.CountSeen(*tracked.fix);
   TrackResult result;
   result.state = TrackingState::kTracking;
   result.inliers = tracked.fix->inliers;
-  if (tracked.need != KeyframeNeed::kNone) result.keyframe = InsertKeyframe();
+  if (map_keyframes_ ? MustExtend(tracked) : tracked.need != KeyframeNeed::kNone)
+    result.keyframe = InsertKeyframe();
   const LastFrame& last = tracker_.last();
   history_.Add(last.frame, last.T_camera_world, map().keyframe(last.reference));
   result.T_world_camera = last.T_camera_world.Inverse();
+  if (BeyondMap()) relocalizer_.Wait(last.frame);
   return result;
+}
+
+// The map has too little of what is in view.
+bool Odometry::Impl::MustExtend(const Tracker::Tracked& tracked) const {
+  return tracked.need == KeyframeNeed::kVeryWeak || tracked.need == KeyframeNeed::kFewNear ||
+         (tracked.need == KeyframeNeed::kWeak && tracked.fix->Share() < 0.3);
+}
+
+bool Odometry::Impl::BeyondMap() const {
+  return map_keyframes_ && tracker_.last().reference >= *map_keyframes_;
 }
 
 // Makes the last tracked frame a keyframe.
@@ -143,10 +190,7 @@ void Odometry::Impl::Correct(const std::map<int, Similarity>& S_world_keyframe,
   history_.Rescale(S_world_keyframe);
   Map* const map = mapper_.MutableMap();
   MoveKeyframes(S_world_keyframe, map);
-  if (adjustment != nullptr) {
-    const GlobalAdjustment::Work::Outcome& outcome = adjustment->Result();
-    TakeAdjustedLandmarks(outcome.before, outcome.after, map);
-  }
+  if (adjustment != nullptr) TakeAdjustedLandmarks(adjustment->Result().landmarks, map);
   map->UpdateGeometry();
   JoinPieces(merges, map);
 }

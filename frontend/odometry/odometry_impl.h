@@ -2,8 +2,10 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <vector>
 
+#include "core/section_file.h"
 #include "frontend/odometry/async_mapper.h"
 #include "frontend/odometry/frame_history.h"
 #include "frontend/odometry/map_initializer.h"
@@ -20,6 +22,9 @@ class Odometry::Impl {
 
   TrackResult Track(const InputFrame& frame);
   TrackResult RelocalizeAt(int keyframe);
+  void BeginLocalization();
+  bool BeyondMap() const;
+  std::optional<Matrix6d> PoseCovariance() const;
   /// Waits for the mapping that is under way, if any, and brings its result in.
   void EnterMapping();
   /// Moves keyframes, and what hangs on them, and joins pieces. With an adjustment (else null), landmarks get
@@ -27,6 +32,15 @@ class Odometry::Impl {
   void Correct(const std::map<int, Similarity>& S_world_keyframe, const std::map<int, int>& merges,
                const GlobalAdjustment::Work* adjustment);
   int FuseLoop(int older, int newer, const Similarity& S_older_newer);
+
+  /// Everything but options, rig, recorder and whether to use threads, section by section.
+  void Save(const internal::SectionSink& sink) const;
+  /// Takes up what Save gave, into an object that is new. After an InputError it is of no use.
+  void Load(internal::SectionReader* file);
+  template <class Archive>
+  void State(Archive& archive) {
+    archive(mapper_, initializer_, tracker_, relocalizer_, history_, result_, row_errors_, stereo_matches_);
+  }
 
   const OdometryOptions& options() const { return options_; }
   const CameraRig& rig() const { return rig_; }
@@ -46,10 +60,13 @@ class Odometry::Impl {
   TrackResult Initialize(const TrackedFrame& frame);
   TrackResult TrackMap(const TrackedFrame& frame);
   TrackResult Accept(const Tracker::Tracked& tracked);
+  bool MustExtend(const Tracker::Tracked& tracked) const;
   int InsertKeyframe();
+  void Check(const internal::SectionReader& file) const;
 
   OdometryOptions options_;
   CameraRig rig_;
+  std::optional<int> map_keyframes_;  // localizing: so many are the map's, the others are for the time being
   StageTimes stages_;
   AsyncMapper mapper_;
   MapInitializer initializer_;

@@ -29,6 +29,13 @@ class Relocalizer {
   /// Where that frame is if it shows the same place as a keyframe. None if it does not, or if there is none.
   std::optional<PoseFix> FindAt(int keyframe, const Map& map) const;
 
+  template <class Archive>
+  void State(Archive& archive) {
+    archive(lost_, since_s_);
+  }
+  /// Throws InputError if the state does not fit the map.
+  void Check(const Map& map, const internal::SectionReader& file) const;
+
  private:
   OdometryOptions options_;
   PoseSearch search_;

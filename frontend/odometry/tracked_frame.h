@@ -18,6 +18,11 @@ struct TrackedFrame {
   std::int64_t index = 0;
   double stamp_s = 0;
   std::shared_ptr<const FrameFeatures> features;
+
+  template <class Archive>
+  void State(Archive& archive) {
+    archive(index, stamp_s, features);
+  }
 };
 
 /// A pose of a frame, and what speaks for it.
@@ -49,6 +54,13 @@ struct LastFrame {
   int reference = -1;                      ///< keyframe that shares most landmarks with it; -1: no frame yet
   int newest_keyframe = -1;                ///< or the one where the frame was found again
   std::int64_t frames_since_keyframe = 0;  ///< 0: it is that keyframe
+
+  template <class Archive>
+  void State(Archive& archive) {
+    archive(frame, matches.landmarks, T_camera_world, velocity, reference, newest_keyframe,
+            frames_since_keyframe);
+    if (Archive::kReading) matches.features = frame.features.get();
+  }
 };
 
 }  // namespace tutti

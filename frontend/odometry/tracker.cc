@@ -57,6 +57,11 @@ void Tracker::GiveUp() {
   last_.velocity.reset();
 }
 
+void Tracker::Forget() {
+  last_ = LastFrame();
+  state_ = TrackingState::kLost;
+}
+
 void Tracker::FollowReference(const Pose& T_world_old, const Similarity& S_world_new) {
   Pose T_reference_camera = T_world_old.Inverse() * last_.T_camera_world.Inverse();
   T_reference_camera.translation *= S_world_new.scale;

@@ -39,10 +39,20 @@ class Tracker {
   /// The map is given up: kInitializing until Begin. The last frame stays, to start the next piece from.
   void GiveUp();
 
+  /// The next frame may be anywhere in the map: kLost until Relocalize.
+  void Forget();
+
   /// The reference keyframe of the last frame has moved; the frame goes with it.
   void FollowReference(const Pose& T_world_old, const Similarity& S_world_new);
   /// Landmarks of the map were merged, removed, or added to the newest keyframe.
   void FollowLandmarks(const Map& map);
+
+  template <class Archive>
+  void State(Archive& archive) {
+    archive(state_, last_);
+  }
+  /// Throws InputError if the state does not fit the map.
+  void Check(const Map& map, const internal::SectionReader& file) const;
 
  private:
   Tracked Accept(PoseFix fix, const Map& map);

@@ -101,6 +101,29 @@ TEST(Odometry, SeenLandmarksGoOnFromFrameToFrame) {
   }
 }
 
+TEST(Odometry, LandmarksAreThoseThatKeyframesSeeWithTheirNumberOfViews) {
+  Odometry odometry(OdometryOptions{}, Stereo().rig);
+  TrackAll(Stereo(), odometry);
+  odometry.FinishMapping();
+  std::map<int, int> views;
+  for (const int id : odometry.KeyframeIds()) {
+    for (const int landmark : odometry.Keyframe(id).landmarks) {
+      if (landmark >= 0) ++views[landmark];
+    }
+  }
+  const std::vector<LandmarkView> landmarks = odometry.Landmarks();
+  ASSERT_EQ(landmarks.size(), views.size());
+  auto expected = views.begin();
+  for (const LandmarkView& landmark : landmarks) {
+    EXPECT_EQ(landmark.id, expected->first);
+    EXPECT_EQ(landmark.observations, expected->second);
+    EXPECT_TRUE(landmark.position.allFinite());
+    ++expected;
+  }
+  EXPECT_EQ(odometry.Rig().camera.fx, Stereo().rig.camera.fx);
+  EXPECT_EQ(odometry.Rig().baseline_m, Stereo().rig.baseline_m);
+}
+
 TEST(Odometry, RgbdFollowsTheTruthInMetres) {
   const Recording room = Record(SyntheticScene::kRoom, SyntheticSensor::kRgbd, 40);
   Odometry odometry(OdometryOptions(), room.rig);

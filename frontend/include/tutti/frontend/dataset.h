@@ -22,6 +22,12 @@ struct ReadResult {
   std::string depth_error;  ///< the same of a depth or right image that the frame comes without
 };
 
+/// A colour image, or why there is none.
+struct ColourImage {
+  cv::Mat image;      ///< CV_8UC3, blue first; empty if it can't be read
+  std::string error;  ///< names the file and what is wrong with it; empty if there is an image
+};
+
 /// The layout of a data set on disk.
 enum class DatasetType { kAuto, kKitti, kTum, kEuroc, kImages, kVideo, kBag };
 
@@ -105,6 +111,10 @@ class Dataset {
   /// Reads and rectifies frame i. Unreadable, truncated, or of another size than the first: error, no
   /// exception. If that is so of the depth or right image alone, the frame comes without it.
   virtual ReadResult Read(std::size_t i) const = 0;
+  /// The (left, or only) image of frame i as it is stored, in colour, rectified as Read() does it: the same
+  /// size and pixels, without DatasetOptions::noise. Three times grey where the data is grey. Errors as
+  /// Read().
+  virtual ColourImage ReadColour(std::size_t i) const;
   /// The rig after rectification.
   virtual const CameraRig& Rig() const = 0;
   /// Ground truth in its usual place in the folder (T_world_body, stamps as Stamp()), if there is any.

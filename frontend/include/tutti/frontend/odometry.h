@@ -2,10 +2,12 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -18,6 +20,10 @@
 
 #pragma GCC visibility push(default)
 namespace tutti {
+
+namespace internal {
+class SectionReader;
+}
 
 enum class TrackingState { kInitializing, kTracking, kLost };
 const char* ToString(TrackingState state);
@@ -43,6 +49,13 @@ struct KeyframeView {
   cv::Mat descriptors;                  ///< N x 32, CV_8U (ORB)
   std::vector<Eigen::Vector3d> points;  ///< N points in the camera frame [m]; NaN where unknown
   std::vector<int> landmarks;           ///< N landmark ids, -1 where none
+};
+
+/// A point of the map. Frame of reference: the world of its map piece.
+struct LandmarkView {
+  int id = -1;
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< [m]
+  int observations = 0;                                ///< keyframes that see it, at least 1
 };
 
 /// A landmark as a frame shows it.
@@ -89,6 +102,20 @@ class Odometry {
   /// Returns what Track did if that fails, or if there is no such frame.
   TrackResult RelocalizeAt(int keyframe);
 
+  /// From now on frames are located in the map that is there. The frames so far are forgotten, and the next
+  /// one is lost until RelocalizeAt finds it. Time stamps may begin anew. Where the map shows too little of
+  /// what is in view, keyframes are made for the time being (BeyondMap), and RelocalizeAt may be called at
+  /// any frame to find back from there.
+  void BeginLocalization();
+  /// True if the last frame that has a pose hangs on a keyframe of after BeginLocalization.
+  bool BeyondMap() const;
+  /// Keyframe that shares most landmarks with the last frame that has a pose; -1 if there was none.
+  int ReferenceKeyframe() const;
+  /// Covariance of the pose of that frame given the map: position [m] in the world, then rotation [rad] about
+  /// the camera's axes (T_world_camera Exp(tangent), to the first order). None if there was no such frame, or
+  /// if its landmarks do not determine it.
+  std::optional<Matrix6d> PoseCovariance() const;
+
   /// A new keyframe is mapped (landmarks, local bundle adjustment) beside the tracking of the next frames;
   /// what comes of it enters after OdometryOptions::mapping_delay_frames, whenever it is ready. Waits for
   /// what is under way and brings it in now; to be called after the last frame.
@@ -110,6 +137,14 @@ class Odometry {
   int KeyframePiece(int id) const;
   std::int64_t KeyframeFrameIndex(int id) const;
   double KeyframeStamp(int id) const;
+
+  /// Number of landmarks that are in the map.
+  int LandmarkCount() const;
+  /// The landmarks that are there now, ascending by id. A landmark that was merged into another one is that
+  /// one.
+  std::vector<LandmarkView> Landmarks() const;
+  /// The rig that it was made for.
+  const CameraRig& Rig() const;
 
   /// Pairs of keyframes (older id, newer id) that see at least `min_shared` common landmarks, with that
   /// number.
@@ -157,6 +192,20 @@ class Odometry {
   double StereoMatches() const;
   /// One camera: the lens by self-calibration, so far. None with depth, or with lens_sigma 0.
   std::optional<LensFound> Lens() const;
+
+  /// For files that hold more than an odometry (maps of tutti::slam): gives all that this object knows to
+  /// `sink`, section by section; whether to use threads, and the recorder, belong to the object that loads
+  /// it. Nothing is waited for: mapping that is under way begins again where it is loaded, with the same
+  /// result. A copy can be saved on another thread while this object goes on, and destroyed there. The same
+  /// state gives the same bytes, except those of the times that it took (tag 104).
+  void SaveSections(const std::function<void(std::uint32_t tag, std::string_view bytes)>& sink) const;
+  /// Takes up what SaveSections gave, from the next sections of a file, in place of all that this object
+  /// knows; it then goes on exactly as the saved one would have, if the options are the same. Throws
+  /// InputError for another rig, another image pyramid, or damage; the object is then as it was.
+  void LoadSections(internal::SectionReader* file);
+  /// What GlobalAdjustment::SaveSections gave, from the next section of a file. This must be the odometry
+  /// that was saved with it. Throws InputError for damage.
+  GlobalAdjustment LoadGlobalAdjustment(internal::SectionReader* file) const;
 
  private:
   class Impl;

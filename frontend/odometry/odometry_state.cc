@@ -1,0 +1,258 @@
+// Saving and loading of an odometry.
+#include <algorithm>
+#include <limits>
+#include <sstream>
+#include <utility>
+
+#include "core/section_file.h"
+#include "core/state_archive.h"
+#include "frontend/map/global_adjustment.h"
+#include "frontend/odometry/odometry_impl.h"
+#include "frontend/store/features_state.h"
+#include "frontend/store/grey_bytes.h"
+#include "frontend/store/sections.h"
+#include "frontend/store/state_check.h"
+#include "tutti/core/error.h"
+
+namespace tutti {
+
+template <class Archive>
+void State(Archive& archive, TrackResult& result) {
+  archive(result.state, result.reason, result.T_world_camera, result.features, result.inliers,
+          result.keyframe);
+}
+
+namespace {
+
+constexpr int kLandmarksPerSection = 1024;
+
+// What must be the same where an odometry is loaded: else its numbers mean something else.
+std::string Fingerprint(const CameraRig& rig, const std::vector<float>& scales) {
+  std::ostringstream text;
+  text.precision(std::numeric_limits<double>::max_digits10);
+  const PinholeCamera& camera = rig.camera;
+  text << WordOf(rig.sensor) << ", " << camera.width << "x" << camera.height << " px, fx " << camera.fx
+       << ", fy " << camera.fy << ", cx " << camera.cx << ", cy " << camera.cy;
+  if (rig.sensor == Sensor::kStereo) text << ", baseline " << rig.baseline_m << " m";
+  text << ", " << scales.size() << " pyramid levels to " << scales.back();
+  return text.str();
+}
+
+// The grey values of the landmarks' patches, one below the other.
+cv::Mat PatchesOf(const Map& map, int first, int end) {
+  cv::Mat all(0, Patch::kSide, CV_8UC1);
+  all.reserve(static_cast<std::size_t>(Patch::kSide) * static_cast<std::size_t>(end - first));
+  for (int id = first; id < end; ++id) {
+    const std::shared_ptr<const Patch>& patch = map.landmark(id).patch;
+    if (map.landmark(id).alive && patch) all.push_back(cv::Mat(patch->grey, true).reshape(1, Patch::kSide));
+  }
+  return all;
+}
+
+// The descriptor of what a landmark was seen as; null if that is nowhere.
+const std::uint8_t* SeenAs(const Observation& seen, const Map& map) {
+  if (seen.keyframe < 0 || seen.keyframe >= map.KeyframeCount()) return nullptr;
+  const FrameFeatures& features = *map.keyframe(seen.keyframe).features;
+  if (seen.feature < 0 || seen.feature >= features.descriptors.rows) return nullptr;
+  return features.descriptors.ptr(seen.feature);
+}
+
+// Descriptors of landmarks: by which observation, or as they are.
+struct LandmarkDescriptors {
+  static constexpr std::size_t kOther = 255;
+  std::vector<std::uint8_t> which, others;
+
+  void Add(const Landmark& landmark, const Map& map) {
+    const auto& own = landmark.descriptor;
+    std::size_t o = 0;
+    for (; o < landmark.observations.size() && o < kOther; ++o) {
+      const std::uint8_t* seen = SeenAs(landmark.observations[o], map);
+      if (seen != nullptr && std::equal(own.begin(), own.end(), seen)) break;
+    }
+    const bool found = o < landmark.observations.size() && o < kOther;
+    which.push_back(static_cast<std::uint8_t>(found ? o : kOther));
+    if (!found) others.insert(others.end(), own.begin(), own.end());
+  }
+  // Into the landmarks that live.
+  void Give(std::vector<Landmark>* landmarks, const Map& map, const internal::StateReader& in) const {
+    auto observation = which.begin();
+    auto other = others.begin();
+    for (Landmark& landmark : *landmarks) {
+      if (!landmark.alive) continue;
+      auto& own = landmark.descriptor;
+      if (observation == which.end()) in.Damaged("landmarks without descriptors");
+      const std::size_t o = *observation++;
+      if (o != kOther) {
+        const std::uint8_t* seen =
+            o < landmark.observations.size() ? SeenAs(landmark.observations[o], map) : nullptr;
+        if (seen == nullptr) in.Damaged("a landmark that looks like nothing");
+        std::copy_n(seen, own.size(), own.begin());
+      } else {
+        if (others.end() - other < static_cast<std::ptrdiff_t>(own.size()))
+          in.Damaged("landmarks without descriptors");
+        std::copy_n(other, own.size(), own.begin());
+        other += static_cast<std::ptrdiff_t>(own.size());
+      }
+    }
+    if (observation != which.end() || other != others.end()) in.Damaged("descriptors without landmarks");
+  }
+
+  template <class Archive>
+  void State(Archive& archive) {
+    archive(which, others);
+  }
+};
+
+void ReadLandmarks(int count, internal::StateReader& in, Map* map) {
+  std::vector<Landmark> landmarks;
+  int patches = 0;
+  for (int i = 0; i < count; ++i) {
+    in(landmarks.emplace_back());
+    if (landmarks.back().patch) ++patches;
+  }
+  std::string packed;
+  in(packed);
+  cv::Mat all(patches * Patch::kSide, Patch::kSide, CV_8UC1);
+  if (!internal::UnpackGrey(packed, &all)) in.Damaged("patches that are none");
+  LandmarkDescriptors descriptors;
+  in(descriptors);
+  descriptors.Give(&landmarks, *map, in);
+  const std::uint8_t* next = all.data;
+  for (Landmark& landmark : landmarks) {
+    if (landmark.patch) {
+      auto patch = std::make_shared<Patch>(*landmark.patch);
+      std::copy(next, next + patch->grey.size(), patch->grey.begin());
+      next += patch->grey.size();
+      landmark.patch = std::move(patch);
+    }
+    map->Restore(std::move(landmark));
+  }
+}
+
+// Reads the next section into what `read` is given to an archive.
+template <class Read>
+void ReadSection(Section section, internal::SectionReader* file, internal::SharedObjectsIn* shared,
+                 const Read& read) {
+  const std::string bytes = file->Expect(Tag(section));
+  internal::StateReader in(bytes, file->name(), shared);
+  read(in);
+  in.ExpectEnd();
+}
+
+struct Head {
+  std::string fingerprint;
+  std::int32_t keyframes = 0, landmarks = 0;
+
+  template <class Archive>
+  void State(Archive& archive) {
+    archive(fingerprint, keyframes, landmarks);
+  }
+};
+
+}  // namespace
+
+void Odometry::Impl::Save(const internal::SectionSink& sink) const {
+  internal::SharedObjectsOut shared;
+  const auto write = [&](Section section, const auto& put) {
+    internal::StateWriter out(&shared);
+    put(out);
+    sink(Tag(section), out.Take());
+  };
+  const Head head{Fingerprint(rig_, map().scales()), map().KeyframeCount(), map().LandmarkCount()};
+  write(Section::kHead, [&](auto& out) { out(head); });
+  for (int id = 0; id < head.keyframes; ++id)
+    write(Section::kKeyframe, [&](auto& out) { out(map().keyframe(id)); });
+  for (int first = 0; first < head.landmarks; first += kLandmarksPerSection) {
+    const int end = std::min(first + kLandmarksPerSection, head.landmarks);
+    write(Section::kLandmarks, [&](auto& out) {
+      for (int id = first; id < end; ++id) out(map().landmark(id));
+      out(internal::PackGrey(PatchesOf(map(), first, end)));
+      LandmarkDescriptors descriptors;
+      for (int id = first; id < end; ++id) {
+        if (map().landmark(id).alive) descriptors.Add(map().landmark(id), map());
+      }
+      out(descriptors);
+    });
+  }
+  write(Section::kTracking, [&](auto& out) { out(*this); });
+  write(Section::kTimes, [&](auto& out) { out(stages_.milliseconds); });
+  sink(Tag(Section::kEndOfOdometry), "");
+}
+
+void Odometry::Impl::Load(internal::SectionReader* file) {
+  internal::SharedObjectsIn shared;
+  Head head;
+  ReadSection(Section::kHead, file, &shared, [&](auto& in) { in(head); });
+  const std::string here = Fingerprint(rig_, map().scales());
+  if (head.fingerprint != here) {
+    throw InputError(file->name() + ": was saved with another camera or image pyramid (" + head.fingerprint +
+                     "; here: " + here + "); go on with the data set and the settings that it was made with");
+  }
+  Map* const map = mapper_.RestoredMap();
+  for (int id = 0; id < head.keyframes; ++id) {
+    tutti::Keyframe keyframe;
+    ReadSection(Section::kKeyframe, file, &shared, [&](auto& in) { in(keyframe); });
+    map->Restore(std::move(keyframe));
+  }
+  for (int first = 0; first < head.landmarks; first += kLandmarksPerSection) {
+    ReadSection(Section::kLandmarks, file, &shared, [&](auto& in) {
+      ReadLandmarks(std::min(kLandmarksPerSection, head.landmarks - first), in, map);
+    });
+  }
+  ReadSection(Section::kTracking, file, &shared, [&](auto& in) { in(*this); });
+  ReadSection(Section::kTimes, file, &shared, [&](auto& in) { in(stages_.milliseconds); });
+  file->Expect(Tag(Section::kEndOfOdometry));
+  Check(*file);
+  mapper_.Resume(stages_);
+}
+
+void Odometry::Impl::Check(const internal::SectionReader& file) const {
+  mapper_.Check(file);
+  initializer_.Check(map(), file);
+  tracker_.Check(map(), file);
+  relocalizer_.Check(map(), file);
+  history_.Check(map(), file);
+  if (mapper_.interrupted() && last().reference < 0) file.Damaged("mapping that began from nowhere");
+  internal::CheckIndex(static_cast<int>(result_.state), 0, static_cast<int>(TrackingState::kLost) + 1, file);
+  internal::CheckKeyframe(result_.keyframe, map(), file, true);
+  for (const std::vector<double>* numbers : {&row_errors_, &stereo_matches_}) {
+    if (!std::all_of(numbers->begin(), numbers->end(), [](double v) { return std::isfinite(v); }))
+      file.Damaged("a row error that is none");
+  }
+}
+
+void Odometry::SaveSections(
+    const std::function<void(std::uint32_t tag, std::string_view bytes)>& sink) const {
+  impl_->Save(sink);
+}
+
+void Odometry::LoadSections(internal::SectionReader* file) {
+  auto loaded = std::make_unique<Impl>(impl_->options(), impl_->rig());
+  loaded->UseOwnThreads(impl_->mapper().own_threads());
+  loaded->SetRecorder(impl_->stages().recorder);
+  loaded->Load(file);
+  impl_ = std::move(loaded);
+}
+
+GlobalAdjustment Odometry::LoadGlobalAdjustment(internal::SectionReader* file) const {
+  std::vector<int> moving;
+  GlobalAdjustment::Work::Outcome outcome;
+  internal::SharedObjectsIn shared;
+  ReadSection(Section::kGlobalAdjustment, file, &shared, [&](auto& in) { in(moving, outcome); });
+  const Map& map = impl_->map();
+  for (const int id : moving) internal::CheckKeyframe(id, map, *file);
+  if (outcome.S_world_keyframe.size() != (outcome.better ? moving.size() : 0))
+    file->Damaged("an adjustment without its poses");
+  for (const Similarity& S : outcome.S_world_keyframe) {
+    internal::CheckPose(S.RigidPart(), *file);
+    if (!(S.scale > 0) || !std::isfinite(S.scale)) file->Damaged("a scale that is none");
+  }
+  for (const AdjustedLandmark& landmark : outcome.landmarks) {
+    internal::CheckIndex(landmark.id, 0, map.LandmarkCount(), *file);
+    for (const int id : landmark.without) internal::CheckKeyframe(id, map, *file);
+    if (landmark.position) internal::CheckPlace(*landmark.position, *file);
+  }
+  return GlobalAdjustment(std::make_shared<GlobalAdjustment::Work>(std::move(moving), std::move(outcome)));
+}
+
+}  // namespace tutti

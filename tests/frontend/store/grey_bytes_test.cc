@@ -1,0 +1,51 @@
+#include "frontend/store/grey_bytes.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/small_town.h"
+
+namespace tutti::internal {
+namespace {
+
+void ExpectBack(const cv::Mat& image) {
+  cv::Mat back(image.size(), CV_8UC1, cv::Scalar(7));
+  ASSERT_TRUE(UnpackGrey(PackGrey(image), &back)) << image.size();
+  EXPECT_EQ(cv::norm(image, back, cv::NORM_L1), 0) << image.size();
+}
+
+TEST(GreyBytes, AnyImageComesBackAsItWas) {
+  cv::RNG random(3);
+  for (const cv::Size size : {cv::Size(1, 1), cv::Size(1, 9), cv::Size(9, 1), cv::Size(17, 40)}) {
+    cv::Mat image(size, CV_8UC1);
+    random.fill(image, cv::RNG::UNIFORM, 0, 256);
+    ExpectBack(image);
+    ExpectBack(cv::Mat(size, CV_8UC1, cv::Scalar(255)));
+  }
+  const cv::Mat town = SyntheticWorld(testing::SmallStereoTown(400, 200)).Render(0).image;
+  ExpectBack(town);
+  ExpectBack(town(cv::Rect(10, 20, 50, 30)));  // rows that do not follow each other
+  EXPECT_LT(PackGrey(town).size(), 0.8 * static_cast<double>(town.total()));
+  cv::Mat nothing(0, 17, CV_8UC1);
+  EXPECT_TRUE(UnpackGrey(PackGrey(nothing), &nothing));
+}
+
+TEST(GreyBytes, WhatIsOfAnotherSizeOrDamagedIsRefused) {
+  const cv::Mat image(20, 30, CV_8UC1, cv::Scalar(9));
+  const std::string packed = PackGrey(image);
+  cv::Mat smaller(19, 30, CV_8UC1), larger(21, 30, CV_8UC1), same(20, 30, CV_8UC1);
+  EXPECT_FALSE(UnpackGrey(packed, &smaller));
+  EXPECT_FALSE(UnpackGrey(packed, &larger));
+  EXPECT_FALSE(UnpackGrey(packed.substr(0, packed.size() / 2), &same));
+  EXPECT_FALSE(UnpackGrey("no such thing", &same));
+  EXPECT_FALSE(UnpackGrey("", &same));
+}
+
+TEST(GreyBytes, FewBytesAreNoLargeImage) {
+  EXPECT_TRUE(CanBeGrey(PackGrey(cv::Mat(2000, 2000, CV_8UC1, cv::Scalar(0))), 2000, 2000));
+  EXPECT_FALSE(CanBeGrey(std::string(100, 'x'), 2000, 2000));
+  EXPECT_FALSE(CanBeGrey(std::string(100, 'x'), -1, 5));
+  EXPECT_FALSE(CanBeGrey(std::string(100, 'x'), 1 << 20, 1));
+}
+
+}  // namespace
+}  // namespace tutti::internal

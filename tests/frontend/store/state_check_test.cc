@@ -1,0 +1,116 @@
+#include "frontend/store/state_check.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/frontend/map/point_scene.h"
+#include "tests/support/error_of.h"
+#include "tests/support/test_data.h"
+
+namespace tutti {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr internal::SectionFileKind kFile = {{'T', 'E', 'S', 'T', 'O', 'D', 'O', '\n'}, 1, "test", "a test"};
+
+// Two keyframes that see the same points.
+class MapCheck : public ::testing::Test, protected testing::PointScene {
+ protected:
+  MapCheck() {
+    MakeLandmarks();
+    std::vector<int> order;
+    const int second = AddKeyframe(Pose(Eigen::Quaterniond::Identity(), {0.1, 0, 0}), &order);
+    for (std::size_t f = 0; f < order.size(); ++f) {
+      const auto seen = std::find(order_.begin(), order_.end(), order[f]);
+      if (seen != order_.end())
+        map_.AddObservation(static_cast<int>(seen - order_.begin()), second, static_cast<int>(f));
+    }
+  }
+  std::string Complaint() const {
+    const auto file = testing::FreshFolder() / "map.tutti";
+    internal::SectionWriter(file, kFile).Finish();
+    return testing::ErrorOf([&] { map_.Check(internal::SectionReader(file, kFile)); });
+  }
+  // What is said of the map after a change, which is taken back.
+  template <class Change>
+  std::string With(const Change& change) {
+    const Map before = map_;
+    change();
+    std::string complaint = Complaint();
+    map_ = before;
+    return complaint;
+  }
+};
+
+TEST_F(MapCheck, AMapIsWhatItMustBeAlsoAfterMergers) {
+  EXPECT_EQ(Complaint(), "no error");
+  map_.Merge(4, 3);
+  map_.Merge(3, 9);
+  map_.Merge(9, 2);
+  map_.RemoveLandmark(7);
+  map_.RemoveObservation(8, 0);
+  EXPECT_EQ(Complaint(), "no error");
+}
+
+TEST_F(MapCheck, LandmarksThatReplacedEachOtherAreRefused) {
+  map_.RemoveLandmark(4);
+  map_.RemoveLandmark(5);
+  map_.RemoveLandmark(6);
+  const auto replace = [this](int a, int b) { map_.landmark(a).replaced_by = b; };
+  EXPECT_EQ(With([&] { replace(4, 5), replace(5, 6), replace(6, 7); }), "no error");
+  EXPECT_THAT(With([&] { replace(4, 5), replace(5, 6), replace(6, 4); }), HasSubstr("replaced each other"));
+  EXPECT_THAT(With([&] { replace(5, 5); }), HasSubstr("replaced each other"));
+  EXPECT_THAT(With([&] { replace(5, map_.LandmarkCount()); }), HasSubstr("out of range"));
+}
+
+TEST_F(MapCheck, KeyframesThatDoNotFitAreRefused) {
+  const auto keyframe = [this](const auto& change) { return With([&] { change(map_.keyframe(1)); }); };
+  EXPECT_THAT(keyframe([](Keyframe& k) { k.features = nullptr; }), HasSubstr("without features"));
+  EXPECT_THAT(keyframe([](Keyframe& k) { k.landmarks.pop_back(); }), HasSubstr("landmarks of another"));
+  EXPECT_THAT(keyframe([](Keyframe& k) { k.landmarks[0] = 1 << 20; }), HasSubstr("out of range"));
+  EXPECT_THAT(keyframe([](Keyframe& k) { k.covisible[1] = 3; }), HasSubstr("its own neighbour"));
+  EXPECT_THAT(keyframe([](Keyframe& k) { k.covisible[2] = 3; }), HasSubstr("out of range"));
+  EXPECT_THAT(keyframe([](Keyframe& k) { k.covisible[0] = -3; }), HasSubstr("out of range"));
+  EXPECT_THAT(keyframe([](Keyframe& k) { k.piece = -1; }), HasSubstr("out of range"));
+  EXPECT_THAT(keyframe([](Keyframe& k) { k.T_world_camera.rotation.w() = 7; }), HasSubstr("rotation"));
+  EXPECT_THAT(keyframe([](Keyframe& k) {
+                auto features = std::make_shared<FrameFeatures>(*k.features);
+                features->keypoints[3].octave = 8;
+                k.features = features;
+              }),
+              HasSubstr("out of range"));
+  EXPECT_THAT(With([&] {
+                map_.RemoveLandmark(0);
+                map_.keyframe(0).landmarks[1] = 0;
+              }),
+              HasSubstr("sees what is gone"));
+}
+
+TEST_F(MapCheck, LandmarksThatDoNotFitAreRefused) {
+  const auto landmark = [this](const auto& change) { return With([&] { change(map_.landmark(2)); }); };
+  const float nan = std::nanf("");
+  EXPECT_THAT(landmark([](Landmark& l) { l.observations.clear(); }), HasSubstr("nothing sees"));
+  EXPECT_THAT(landmark([](Landmark& l) { l.observations[0].feature = 1 << 20; }), HasSubstr("out of range"));
+  EXPECT_THAT(landmark([](Landmark& l) { l.observations[1].keyframe = 0; }), HasSubstr("out of range"));
+  EXPECT_THAT(landmark([](Landmark& l) { l.observations[1].keyframe = 2; }), HasSubstr("out of range"));
+  EXPECT_THAT(landmark([](Landmark& l) { l.reference = -1; }), HasSubstr("out of range"));
+  EXPECT_THAT(landmark([](Landmark& l) { l.visible = -1; }), HasSubstr("out of range"));
+  EXPECT_THAT(landmark([&](Landmark& l) { l.position.x() = nan; }), HasSubstr("place"));
+  EXPECT_THAT(landmark([&](Landmark& l) { l.normal.x() = nan; }), HasSubstr("direction"));
+  EXPECT_THAT(landmark([&](Landmark& l) { l.max_distance = nan; }), HasSubstr("distance"));
+  const auto patch = [&](const auto& change) {
+    return landmark([&](Landmark& l) {
+      auto made = std::make_shared<Patch>();
+      change(*made, l);
+      l.patch = made;
+    });
+  };
+  EXPECT_EQ(patch([](Patch&, Landmark&) {}), "no error");
+  EXPECT_THAT(patch([&](Patch& p, Landmark&) { p.offset_x = nan; }), HasSubstr("patch"));
+  EXPECT_THAT(patch([](Patch& p, Landmark&) { p.scale_y = 0; }), HasSubstr("patch"));
+  EXPECT_THAT(patch([](Patch&, Landmark& l) { l.patch_source.keyframe = -1; }), HasSubstr("out of range"));
+}
+
+}  // namespace
+}  // namespace tutti

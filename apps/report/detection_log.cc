@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "apps/slam/map_state.h"
+#include "core/state_archive.h"
+
 namespace tutti {
 namespace {
 
@@ -86,6 +89,31 @@ void DetectionLog::OnDetection(const LoopResult& result) {
   numbers_[result.query] = detections_.size();
   if (result.proposed) detection.matches = SpreadMatches(result.verification.inlier_matches);
   detections_.push_back(std::move(detection));
+}
+
+template <class Archive>
+void State(Archive& archive, LoggedOpinion& o) {
+  archive(o.name, o.took_part, o.hypothesis, o.best, o.posterior, o.weight, o.at_candidate, o.evidence);
+}
+
+template <class Archive>
+void State(Archive& archive, LoggedDetection& d) {
+  archive(d.query, d.stamp_s, d.proposed, d.verified, d.probability, d.candidate, d.reason, d.posterior,
+          d.geometry, d.group, d.opinions, d.matches);
+}
+
+std::string DetectionLog::Save() const {
+  internal::SharedObjectsOut shared;
+  internal::StateWriter out(&shared);
+  out(stamps_, numbers_, detections_);
+  return out.Take();
+}
+
+void DetectionLog::Load(const std::string& bytes, const std::string& source) {
+  internal::SharedObjectsIn shared;
+  internal::StateReader in(bytes, source, &shared);
+  in(stamps_, numbers_, detections_);
+  in.ExpectEnd();
 }
 
 }  // namespace tutti

@@ -62,6 +62,9 @@ class DetectionLog : public RunObserver {
   bool WantsPosteriors() const override { return true; }
   void OnFrame(const InputFrame& frame, const TrackResult& track, const RunState& state) override;
   void OnDetection(const LoopResult& result) override;
+  const char* Name() const override { return "detections"; }
+  std::string Save() const override;
+  void Load(const std::string& bytes, const std::string& source) override;
 
   /// In the order of the queries.
   const std::vector<LoggedDetection>& detections() const { return detections_; }

@@ -61,6 +61,14 @@ void LiveFiles::AddLoops(const std::vector<LoopRecord>& loops) {
   if (!lines.empty()) loops_.Append(lines);
 }
 
+void LiveFiles::Resume(Trajectory trajectory, const std::vector<LoopRecord>& loops) {
+  AddLoops(loops);
+  trajectory_ = std::move(trajectory);
+  std::string lines;
+  for (const StampedPose& pose : trajectory_) lines += internal::TumLine(pose);
+  if (poses_ && !lines.empty()) poses_->Append(lines);
+}
+
 std::vector<std::string> LiveFiles::TakeProblems() {
   std::vector<std::string> problems;
   for (GrowingFile* file : {poses_ ? &*poses_ : nullptr, &loops_}) {

@@ -44,6 +44,8 @@ class LiveFiles {
   void Add(double stamp_s, const TrackResult& track, const RunState& state);
   /// Loops alone.
   void AddLoops(const std::vector<LoopRecord>& loops);
+  /// In place of what the files hold: the poses and loops so far of a run that is gone on with.
+  void Resume(Trajectory trajectory, const std::vector<LoopRecord>& loops);
   /// For the terminal: why a file grows no further.
   std::vector<std::string> TakeProblems();
 

@@ -8,6 +8,8 @@
 #include <system_error>
 
 #include "apps/plot/plot.h"
+#include "apps/run/attempts.h"
+#include "apps/run/checkpoint.h"
 #include "apps/run/live_files.h"
 #include "apps/run/outputs.h"
 #include "apps/run/text_file.h"
@@ -20,7 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 
 // All that a run may leave, for RunFiles and IsResult to agree; pieces of the map have numbers.
-constexpr std::array<const char*, 11> kFiles = {"trajectory.txt",
+constexpr std::array<const char*, 12> kFiles = {"trajectory.txt",
                                                 "trajectory_odometry.txt",
                                                 "trajectory_online.txt",
                                                 "keyframes.txt",
@@ -29,6 +31,7 @@ constexpr std::array<const char*, 11> kFiles = {"trajectory.txt",
                                                 "summary.json",
                                                 "trajectory.svg",
                                                 "trajectory.png",
+                                                kMap,
                                                 "report.html",
                                                 "report.json"};
 constexpr const char* kPiece = "trajectory_piece_";
@@ -93,32 +96,10 @@ std::size_t RunResult::LoopsAccepted() const {
   return count;
 }
 
-void Attempts::Try(const std::function<void()>& step) noexcept {
-  try {
-    step();
-  } catch (...) {
-    if (first_ == nullptr) first_ = std::current_exception();
-  }
-}
-
-void Attempts::Rethrow() const {
-  if (first_ != nullptr) std::rethrow_exception(first_);
-}
-
-std::string Attempts::Failure() const {
-  try {
-    Rethrow();
-    return "";
-  } catch (const std::exception& thrown) {
-    return thrown.what();
-  } catch (...) {
-    return "unknown";
-  }
-}
-
 OutputFolder OpenOutputFolder(const RunRequest& request, const fs::path& reference) {
   if (!reference.empty()) RefuseToReplace(request.out, reference);
-  const OutputLayout layout = {IsResult, "summary.json", "version", {kLiveTrajectory, kLiveLoops}, nullptr};
+  const OutputLayout layout = {IsResult, "summary.json", "version", {kLiveTrajectory, kLiveLoops},
+                               nullptr,  {kCheckpoint}};
   return OutputFolder(request.out, layout, request.keep, request.trace);
 }
 
@@ -171,6 +152,7 @@ void WriteTrace(const fs::path& file, const std::string& text) {
 }  // namespace
 
 void WriteOutputs(OutputFolder& folder, const RunRequest& request, RunResult& result,
+                  const std::function<void(const fs::path&)>& map,
                   const std::function<std::string()>& trace) {
   for (const OutputFile& file : RunFiles(result)) folder.Write(file);
   Attempts more;
@@ -178,6 +160,8 @@ void WriteOutputs(OutputFolder& folder, const RunRequest& request, RunResult& re
     if (!request.more_files) return;
     for (const OutputFile& file : request.more_files(result)) folder.Write(file);
   });
+  const bool into_folder = request.save_map && *request.save_map == kMap;
+  if (map && into_folder) folder.Write({kMap, map});
   result.folder = folder.Finish(result.Finished() && !more.Failed());
   std::vector<std::string> failures = folder.failures();
   if (more.Failed()) failures.push_back("the report: " + more.Failure());
@@ -187,6 +171,11 @@ void WriteOutputs(OutputFolder& folder, const RunRequest& request, RunResult& re
     writing.Try([&] { WriteTrace(*request.trace, trace()); });
     const std::string reason = errno != 0 ? std::string(" (") + std::strerror(errno) + ")" : "";
     if (writing.Failed()) failures.push_back(writing.Failure() + reason);
+  }
+  if (map && request.save_map && !into_folder) {
+    Attempts writing;
+    writing.Try([&] { map(*request.save_map); });
+    if (writing.Failed()) failures.push_back(writing.Failure());
   }
   if (!result.failure.empty())
     std::fprintf(stderr, "tutti: the run broke off; what there was by then is in %s\n",

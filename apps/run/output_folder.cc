@@ -82,17 +82,23 @@ void ThrowFailures(const std::vector<std::string>& failures, const fs::path& res
   throw InputError(message + "\n  the rest is in " + rest.string());
 }
 
+std::vector<std::string> OutputLayout::Passing() const {
+  std::vector<std::string> names = live;
+  names.insert(names.end(), until_finished.begin(), until_finished.end());
+  return names;
+}
+
 OutputFolder::OutputFolder(fs::path folder, OutputLayout layout, bool keep,
                            const std::optional<fs::path>& own)
     : folder_(std::move(folder)), staging_(folder_ / kNew), layout_(std::move(layout)), keep_(keep) {
   std::error_code error;
   if (fs::exists(folder_, error) && !fs::is_directory(folder_, error)) {
-    throw InputError(folder_.string() + ": is a file; --out needs a folder");
+    throw InputError(folder_.string() + ": is a file; " + layout_.option + " needs a folder");
   }
   fs::create_directories(folder_, error);
   if (error) {
     throw InputError(folder_.string() + ": the folder can't be made (" + error.message() +
-                     "); choose another --out");
+                     "); choose another " + layout_.option);
   }
   RefuseForeign(own);
   Lock();
@@ -103,8 +109,8 @@ OutputFolder::OutputFolder(fs::path folder, OutputLayout layout, bool keep,
     if (keep_) KeepLeftovers();
   } catch (const fs::filesystem_error& thrown) {
     close(lock_);
-    throw InputError(folder_.string() + ": can't be written to (" + thrown.what() +
-                     "); choose another --out");
+    throw InputError(folder_.string() + ": can't be written to (" + thrown.what() + "); choose another " +
+                     layout_.option);
   } catch (...) {
     close(lock_);
     throw;
@@ -120,24 +126,26 @@ OutputFolder::~OutputFolder() {
 void OutputFolder::RefuseForeign(const std::optional<fs::path>& own) const {
   std::error_code error;
   bool empty = true;
+  const std::vector<std::string> passing = layout_.Passing();
   for (const fs::directory_entry& entry : fs::directory_iterator(folder_, error)) {
     const std::string name = entry.path().filename();
     if (name[0] == '.') continue;
     if (own && Within(entry.path(), *own)) continue;
     if (layout_.is_part != nullptr && layout_.is_part(entry.path())) continue;
     empty = false;
-    const auto& live = layout_.live;
-    if (layout_.is_result(entry.path()) || std::count(live.begin(), live.end(), name) > 0) continue;
+    if (layout_.is_result(entry.path()) || std::count(passing.begin(), passing.end(), name) > 0) continue;
     if (entry.is_directory(error) && (name == kUnfinished || IsNumber(name))) continue;
-    throw InputError(folder_.string() + ": holds " + name +
-                     ", which is no result of tutti; choose another --out, or move it away");
+    throw InputError(folder_.string() + ": holds " + name + ", which is no result of tutti; choose another " +
+                     layout_.option + ", or move it away");
   }
   if (error)
-    throw InputError(folder_.string() + ": can't be read (" + error.message() + "); choose another --out");
+    throw InputError(folder_.string() + ": can't be read (" + error.message() + "); choose another " +
+                     layout_.option);
   if (empty || fs::exists(folder_ / kLock, error) || ReadJson(folder_ / layout_.last).contains(layout_.key))
     return;
   throw InputError(folder_.string() + ": is not empty, and has no " + layout_.last +
-                   " by which a result of tutti is known; choose another --out, or empty it");
+                   " by which a result of tutti is known; choose another " + layout_.option +
+                   ", or empty it");
 }
 
 void OutputFolder::Lock() {
@@ -145,7 +153,7 @@ void OutputFolder::Lock() {
   lock_ = open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
   if (lock_ < 0) {
     throw InputError(folder_.string() + ": no permission to write there (" + std::strerror(errno) +
-                     "); choose another --out");
+                     "); choose another " + layout_.option);
   }
   // Where a file system has no locks, runs are on their own.
   if (flock(lock_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
@@ -154,14 +162,14 @@ void OutputFolder::Lock() {
     close(lock_);
     const std::string id = size > 0 ? " (process " + std::string(holder) + ")" : "";
     throw InputError(folder_.string() + ": another tutti" + id +
-                     " is writing there; wait for it, or choose another --out");
+                     " is writing there; wait for it, or choose another " + layout_.option);
   }
   const std::string id = std::to_string(getpid());
   if (ftruncate(lock_, 0) != 0 || write(lock_, id.data(), id.size()) < 0) {
     const int error = errno;
     close(lock_);
     throw InputError(folder_.string() + ": can't be written to (" + std::strerror(error) +
-                     "); free some space or choose another --out");
+                     "); free some space or choose another " + layout_.option);
   }
 }
 
@@ -175,12 +183,12 @@ void OutputFolder::CheckRoom() const {
   fs::remove(probe, error);
   if (!file) {
     throw InputError(folder_.string() + ": can't be written to (" + std::strerror(reason) +
-                     "); free some space or choose another --out");
+                     "); free some space or choose another " + layout_.option);
   }
   const fs::space_info space = fs::space(folder_, error);
   if (!error && space.available < kRoomBytes) {
     throw InputError(folder_.string() +
-                     ": less than 32 MB are free there; free some space or choose another --out");
+                     ": less than 32 MB are free there; free some space or choose another " + layout_.option);
   }
 }
 
@@ -207,7 +215,7 @@ fs::path OutputFolder::NextNumber() const {
 void OutputFolder::KeepLeftovers() const {
   if (fs::exists(folder_ / kUnfinished)) fs::rename(folder_ / kUnfinished, NextNumber());
   fs::path number;
-  for (const std::string& name : layout_.live) {
+  for (const std::string& name : layout_.Passing()) {
     if (!fs::exists(folder_ / name)) continue;
     if (number.empty()) fs::create_directories(number = NextNumber());
     fs::rename(folder_ / name, number / name);
@@ -253,10 +261,22 @@ fs::path OutputFolder::Finish(bool finished) {
       if (complete && !keep_) fs::remove_all(folder_ / kUnfinished);
     }
     if (!failures_.empty()) return where;
-    for (const std::string& name : layout_.live) fs::remove(folder_ / name);
+    for (const std::string& name : complete ? layout_.Passing() : layout_.live) fs::remove(folder_ / name);
+    if (complete) RemoveParts();
     return where;
   } catch (const fs::filesystem_error& error) {
     throw InputError(folder_.string() + ": the results can't be moved into place (" + error.what() + ")");
+  }
+}
+
+// What was left of files that were being written when a process was killed.
+void OutputFolder::RemoveParts() const {
+  std::error_code ignored;
+  for (const std::string& name : layout_.until_finished) {
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder_, ignored)) {
+      if (entry.path().filename().string().rfind("." + name + ".part-", 0) == 0)
+        fs::remove(entry.path(), ignored);
+    }
   }
 }
 

@@ -22,9 +22,14 @@ struct OutputLayout {
   /// JSON file that comes last: where it is, the result is complete, unless it says "finished": false.
   std::string last;
   std::string key;                ///< that this file has, by which it is known as tutti's
-  std::vector<std::string> live;  ///< files that grow while the command runs; gone when it has finished
-  /// Of folders that may be inside and are left alone: results of their own. May be null.
+  std::vector<std::string> live;  ///< files that grow while the command runs; gone when it has ended
+  /// Of entries that may be inside and are left alone: results of their own. May be null.
   bool (*is_part)(const std::filesystem::path& entry) = nullptr;
+  std::vector<std::string> until_finished = {};  ///< as live, but they stay where the command ended early
+  const char* option = "--out";                  ///< that the folder was given with, for messages
+
+  /// All files but those of a result.
+  std::vector<std::string> Passing() const;
 };
 
 /// Holds the folder for one process. New files wait in a hidden folder inside and are moved into place
@@ -64,6 +69,7 @@ class OutputFolder {
   std::filesystem::path NextNumber() const;
   void KeepLeftovers() const;
   void Enter() const;
+  void RemoveParts() const;
 
   std::filesystem::path folder_, staging_;
   OutputLayout layout_;

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "apps/run/graph_json.h"
 #include "apps/run/outputs.h"
 #include "apps/run/run_parts.h"
 #include "apps/run/timing.h"
@@ -116,19 +117,10 @@ Json FramesJson(const RunResult& r) {
 Json GraphJson(const RunResult& r) {
   if (!r.graph_proof) return {{"certificate", {{"available", false}, {"reason", "no loop moved the map"}}}};
   const KeyframeGraphProof& proof = *r.graph_proof;
-  const Certificate& certificate = proof.certificate;
-  Json graph = {{"start", ToString(proof.best)}, {"moved", proof.better}, {"starts", Json::array()}};
-  for (const StartOutcome& start : proof.starts) {
-    graph["starts"].push_back({{"start", ToString(start.start)},
-                               {"initial_objective", start.initial_objective},
-                               {"objective", start.objective},
-                               {"spared", start.spared}});
-  }
-  graph["certificate"] = {
-      {"available", certificate.available},     {"certified", certificate.certified},
-      {"reason", certificate.reason},           {"chordal", certificate.chordal},
-      {"lower_bound", certificate.lower_bound}, {"relative_gap", certificate.relative_gap}};
-  return graph;
+  return {{"start", ToString(proof.best)},
+          {"moved", proof.better},
+          {"starts", StartsJson(proof.starts)},
+          {"certificate", CertificateJson(proof.certificate)}};
 }
 
 // What self-calibration says of the lens.
@@ -196,6 +188,7 @@ std::string SummaryJson(const RunResult& r) {
   json["seed"] = r.config.loops.seed;
   json["realtime"] = r.realtime;
   json["interrupted"] = r.interrupted;
+  if (r.resumed_from_frame) json["resumed_from_frame"] = *r.resumed_from_frame;
   json["finished"] = r.Finished();
   if (!r.failure.empty()) json["failure"] = r.failure;
   json["appearance_only"] = r.appearance_only;

@@ -1,7 +1,6 @@
 // The files that a run leaves behind, and the table on the terminal.
 #pragma once
 
-#include <exception>
 #include <filesystem>
 #include <functional>
 #include <string>
@@ -13,6 +12,9 @@
 
 namespace tutti {
 
+/// RunRequest::save_map of a map that lies beside the other results.
+constexpr const char* kMap = "map.tutti";
+
 /// Opens the folder of a run. Throws InputError that says what to do; also if `reference` (a file; empty for
 /// none) lies inside.
 OutputFolder OpenOutputFolder(const RunRequest& request, const std::filesystem::path& reference);
@@ -20,9 +22,10 @@ OutputFolder OpenOutputFolder(const RunRequest& request, const std::filesystem::
 /// Writes all files and puts them into place: trajectory.txt first, then trajectory_online.txt,
 /// trajectory_odometry.txt, keyframes.txt (TUM), summary.json, loops.csv, graph.g2o, trajectory.svg and .png;
 /// appearance only: loops.csv and summary.json; then RunRequest::more_files, and the trace into the file that
-/// it is for. What can't be written does not stop the rest. Sets RunResult::folder. Throws InputError that
-/// names what is missing.
+/// it is for, and the map (RunRequest::save_map). What can't be written does not stop the rest. Sets
+/// RunResult::folder. Throws InputError that names what is missing.
 void WriteOutputs(OutputFolder& folder, const RunRequest& request, RunResult& result,
+                  const std::function<void(const std::filesystem::path&)>& map = {},
                   const std::function<std::string()>& trace = {});
 
 /// summary.json and loops.csv as texts.
@@ -35,19 +38,5 @@ std::string LoopsCsvLine(const LoopRecord& loop, const std::vector<std::string>&
 
 /// The comparison with and without the ensemble, for the terminal.
 std::string ResultTable(const RunResult& result);
-
-/// Steps of a run that go on after one has failed, so that what there is gets written.
-class Attempts {
- public:
-  void Try(const std::function<void()>& step) noexcept;
-  bool Failed() const { return first_ != nullptr; }
-  /// What the first failure was; empty for none.
-  std::string Failure() const;
-  /// Throws it on, if there is one.
-  void Rethrow() const;
-
- private:
-  std::exception_ptr first_;
-};
 
 }  // namespace tutti

@@ -21,6 +21,12 @@ class PlantedLoops {
   /// After SlamSystem::Finish: those that are left, anywhere.
   void PlantRest(SlamSystem* slam);
 
+  /// For checkpoints.
+  template <class Archive>
+  void State(Archive& archive) {
+    archive(left_, made_, keyframes_);
+  }
+
  private:
   bool Plant(int newest, SlamSystem* slam);
 

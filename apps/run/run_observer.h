@@ -1,6 +1,7 @@
 // A window into a run: the report, the live view and the comparison's shared odometry look through it.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "tutti/frontend/frame.h"
@@ -36,6 +37,12 @@ class RunObserver {
   virtual void OnKeyframe(const InputFrame& /*frame*/, int /*keyframe*/, const RunState& /*state*/) {}
   /// Each answer of the loop detector, in the order of the queries, before the frame in which it enters.
   virtual void OnDetection(const LoopResult& /*result*/) {}
+  /// For checkpoints: what it has collected so far goes under this name; "": nothing.
+  virtual const char* Name() const { return ""; }
+  virtual std::string Save() const { return ""; }
+  /// Takes up what Save gave, before OnStart of a run that goes on. `source`: a file, for messages. Throws
+  /// InputError if that is damaged.
+  virtual void Load(const std::string& /*bytes*/, const std::string& /*source*/) {}
   /// After the last frame, when all loops are in.
   virtual void OnEnd(const RunState& /*state*/) {}
 };

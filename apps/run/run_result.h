@@ -79,6 +79,7 @@ struct RunResult {
   std::vector<LostStretch> lost;
   std::size_t keyframes = 0;
   bool interrupted = false;
+  std::optional<std::int64_t> resumed_from_frame;  ///< the checkpoint's next frame, if it went on from one
   bool endless = false;  ///< a camera, or a folder that grows: Ctrl-C is how it ends
   std::string failure;   ///< what broke the run off; empty: nothing did
   bool appearance_only = false;

@@ -10,6 +10,8 @@
 #include <set>
 #include <utility>
 
+#include "apps/run/attempts.h"
+#include "apps/run/checkpoint.h"
 #include "apps/run/interrupt.h"
 #include "apps/run/live_files.h"
 #include "apps/run/outputs.h"
@@ -17,7 +19,10 @@
 #include "apps/run/prefetcher.h"
 #include "apps/run/progress.h"
 #include "apps/run/run_evaluation.h"
+#include "apps/run/run_note.h"
 #include "apps/run/run_parts.h"
+#include "apps/run/run_progress.h"
+#include "apps/slam/map_state.h"
 #include "core/stopwatch.h"
 #include "tutti/core/error.h"
 #include "tutti/slam/slam_system.h"
@@ -26,6 +31,8 @@ namespace tutti {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr std::uint32_t kRunSection = 300;  // of a checkpoint; the odometry without loops may follow
 
 /// One run from its first frame to its last.
 class Run {
@@ -36,18 +43,23 @@ class Run {
         config_(config),
         dataset_(dataset),
         result_(result),
-        slam_(Watched(config, request), dataset.Rig(), Recorder()),
         planted_(config.run, config.loops.seed),
         live_(out, dataset.Rig(), config) {
-    slam_.SetDetectionListener([this](const LoopResult& detection) {
+    if (request.resume) {
+      Resume(*request.resume);
+    } else {
+      slam_ = std::make_unique<SlamSystem>(Watched(config, request), dataset.Rig(), Recorder());
+    }
+    if (request.checkpoint_s) checkpoints_.emplace(out / kCheckpoint, *request.checkpoint_s);
+    slam_->SetDetectionListener([this](const LoopResult& detection) {
       for (const auto& observer : request_.observers) observer->OnDetection(detection);
     });
     if (!request.observers.empty()) {
-      slam_.SetKeyframeListener([this](const InputFrame& frame, int keyframe) {
+      slam_->SetKeyframeListener([this](const InputFrame& frame, int keyframe) {
         for (const auto& observer : request_.observers) observer->OnKeyframe(frame, keyframe, State());
       });
     }
-    slam_.SetChangeListener([this](const Odometry& odometry, std::int64_t last) {
+    slam_->SetChangeListener([this](const Odometry& odometry, std::int64_t last) {
       if (alone_) return;
       alone_ = odometry;
       alone_last_ = last;
@@ -68,55 +80,47 @@ class Run {
     Progress progress(config_.run.loops ? "slam" : "odometry",
                       total_ == static_cast<std::size_t>(-1) ? 0 : total_, Out());
     Prefetcher frames(dataset_, Reading());
+    const double waited_ms = so_far_.read_wait_ms;
     while (!InterruptGuard::Requested()) {
+      if (checkpoints_ && checkpoints_->Due()) WriteCheckpoint();
       if (playback_) AwaitFrame(frames);
       const std::optional<FetchedFrame> fetched = frames.Next();
-      read_wait_ms_ = frames.WaitedMs();
+      so_far_.read_wait_ms = waited_ms + frames.WaitedMs();
       if (!fetched) break;
-      read_ms_ += fetched->read_ms;
-      extract_ms_ += fetched->prepare_ms;
-      for (; next_ < fetched->position; ++next_) dropped_.insert(next_);
-      if (fetched->read.frame) {
-        positions_[fetched->read.frame->index] = next_;
-        CountDepth(fetched->read, progress);
-        TrackOne(*fetched->read.frame);
-      } else {
-        result_.bad.push_back({dataset_.Number(next_), fetched->read.error});
-        progress.Note("tutti: frame " + std::to_string(dataset_.Number(next_)) +
-                      " is skipped: " + fetched->read.error);
-      }
+      TakeFrame(*fetched, progress);
       NoteWarnings(progress);
-      progress.Update(++next_, Status());
+      progress.Update(++so_far_.next, Status());
     }
     result_.interrupted = InterruptGuard::Requested();
-    slam_.Finish();
-    planted_.PlantRest(&slam_);
-    live_.AddLoops(slam_.loops());
+    if (checkpoints_) EndCheckpoints(progress);
+    slam_->Finish();
+    planted_.PlantRest(slam_.get());
+    live_.AddLoops(slam_->loops());
     for (const auto& observer : request_.observers) observer->OnEnd(State());
     NoteWarnings(progress);
     progress.Finish();
     if (result_.interrupted) {
-      progress.Note("tutti: interrupted after " + std::to_string(next_) + " of " + std::to_string(Listed()) +
-                    " frames; writing what is there");
+      progress.Note("tutti: interrupted after " + std::to_string(so_far_.next) + " of " +
+                    std::to_string(Listed()) + " frames; writing what is there");
     }
     if (result_.realtime) {
-      progress.Note("tutti: real time: " + std::to_string(dropped_.size()) + " of " + std::to_string(next_) +
-                    " frames were dropped");
+      progress.Note("tutti: real time: " + std::to_string(so_far_.dropped.size()) + " of " +
+                    std::to_string(so_far_.next) + " frames were dropped");
     }
   }
 
   // What TrackAll went through, also if something broke it off.
   void Count() {
-    result_.frames_total = next_;
-    result_.frames_dropped = dropped_.size();
+    result_.frames_total = so_far_.next;
+    result_.frames_dropped = so_far_.dropped.size();
     result_.frames_listed = dataset_.Size();
     result_.frame_interval_s = FrameInterval(dataset_);
-    result_.stage_ms = slam_.StageMilliseconds();
-    result_.stage_ms["read"] = read_ms_;
-    result_.stage_ms["read_wait"] = read_wait_ms_;
-    if (!slam_.AppearanceOnly()) result_.stage_ms["odometry_extract"] += extract_ms_;
-    result_.wall_s = watch_.Seconds();
-    result_.cpu_s = ProcessCpuSeconds() - cpu_begin_;
+    result_.stage_ms = slam_->StageMilliseconds();
+    result_.stage_ms["read"] = so_far_.read_ms;
+    result_.stage_ms["read_wait"] = so_far_.read_wait_ms;
+    if (!slam_->AppearanceOnly()) result_.stage_ms["odometry_extract"] += so_far_.extract_ms;
+    result_.wall_s = WallSeconds();
+    result_.cpu_s = CpuSeconds();
     if (Recorder() != nullptr) result_.stages = SummarizeStages(recorder_.Spans(), result_.wall_s);
     result_.trajectory_online = live_.trajectory();
   }
@@ -124,7 +128,7 @@ class Run {
   // What the odometry would have done alone: the copy from before the first change tracks the rest.
   void TrackUntouched() {
     if (!alone_) return;
-    const std::size_t begin = positions_.at(alone_last_) + 1, end = result_.frames_total;
+    const std::size_t begin = so_far_.positions.at(alone_last_) + 1, end = result_.frames_total;
     if (begin >= end) return;
     const internal::Stopwatch watch;
     const bool again = config_.run.odometry_pass && dataset_.FrameSupply() != Supply::kOnce;
@@ -135,17 +139,41 @@ class Run {
 
   void Collect() {
     CollectMap(State(), result_);
-    result_.global_adjustments = slam_.GlobalAdjustments();
-    result_.frames_relocalized = slam_.Relocalized();
-    result_.graph = slam_.Graph();
-    result_.graph_proof = slam_.GraphProof();
+    result_.global_adjustments = slam_->GlobalAdjustments();
+    result_.frames_relocalized = slam_->Relocalized();
+    result_.graph = slam_->Graph();
+    result_.graph_proof = slam_->GraphProof();
     if (alone_) result_.trajectory_odometry = BodyTrajectory(alone_->FrameTrajectory(), result_.rig);
   }
 
+  // The sections of a checkpoint that are the run's own.
+  template <class Archive>
+  void State(Archive& archive) {
+    bool has_alone = alone_.has_value();
+    Trajectory live = live_.trajectory();
+    std::map<std::string, std::string> collected;
+    if constexpr (!Archive::kReading) {
+      for (const auto& observer : request_.observers) {
+        if (*observer->Name() != '\0') collected[observer->Name()] = observer->Save();
+      }
+    }
+    archive(so_far_, planted_, live, alone_last_, has_alone, collected);
+    StateOfGrowing(archive, result_);
+    if constexpr (Archive::kReading) {
+      if (has_alone) alone_.emplace(config_.odometry, result_.rig);
+      resumed_live_ = std::move(live);
+      for (const auto& observer : request_.observers) {
+        const auto found = collected.find(observer->Name());
+        if (found != collected.end()) observer->Load(found->second, request_.resume->string());
+      }
+    }
+  }
+
+  MapSnapshot Map() const { return slam_->Snapshot(NoteOf(request_)); }
   std::string Trace() const { return ChromeTrace(recorder_.Spans(), begin_); }
 
  private:
-  RunState State() const { return {slam_.odometry(), slam_.loops(), slam_.Corrections()}; }
+  RunState State() const { return {slam_->odometry(), slam_->loops(), slam_->Corrections()}; }
   std::FILE* Out() const { return request_.quiet ? nullptr : stderr; }
   SpanRecorder* Recorder() { return request_.timing || request_.trace ? &recorder_ : nullptr; }
 
@@ -154,6 +182,7 @@ class Run {
 
   PrefetchOptions Reading() {
     PrefetchOptions options;
+    options.begin = so_far_.next;
     options.end = total_;
     options.ahead = config_.run.threads > 1 ? 4 : 0;
     options.stop = &InterruptGuard::Requested;
@@ -168,14 +197,14 @@ class Run {
 
   // Features need nothing from before, so they are extracted ahead of the tracking, too.
   void Extract(InputFrame& frame) {
-    if (slam_.AppearanceOnly()) return;
+    if (slam_->AppearanceOnly()) return;
     const ScopedSpan span(Recorder(), Lane::kReading, "extract");
-    frame.features = slam_.odometry()->Extract(frame);
+    frame.features = slam_->odometry()->Extract(frame);
   }
 
   // In real time: passes over the frames that newer ones have made old, and waits for the one that is due.
   void AwaitFrame(Prefetcher& frames) {
-    std::size_t next = next_;
+    std::size_t next = so_far_.next;
     while (next + 1 < Listed() && playback_->Due(dataset_.Stamp(next + 1))) ++next;
     frames.SkipTo(next);
     if (next < Listed()) playback_->Reach(dataset_.Stamp(next));
@@ -192,7 +221,7 @@ class Run {
     Prefetcher frames(dataset_, options);
     // After a Ctrl-C this pass is the price of a complete file; a second Ctrl-C ends the process.
     for (std::size_t i = begin; i < end; ++i) {
-      if (dropped_.count(i) != 0) continue;
+      if (so_far_.dropped.count(i) != 0) continue;
       frames.SkipTo(i);
       const std::optional<FetchedFrame> fetched = frames.Next();
       if (!fetched) return false;
@@ -214,36 +243,99 @@ class Run {
   }
 
   void NoteWarnings(Progress& progress) {
-    for (const std::string& warning : slam_.TakeWarnings()) progress.Note("tutti: warning: " + warning);
+    for (const std::string& warning : slam_->TakeWarnings()) progress.Note("tutti: warning: " + warning);
     for (const std::string& problem : live_.TakeProblems()) progress.Note("tutti: warning: " + problem);
+    const auto problem = checkpoints_ ? checkpoints_->TakeProblem() : std::nullopt;
+    if (problem) progress.Note("tutti: warning: " + *problem);
+  }
+
+  void TakeFrame(const FetchedFrame& fetched, Progress& progress) {
+    so_far_.read_ms += fetched.read_ms;
+    so_far_.extract_ms += fetched.prepare_ms;
+    for (; so_far_.next < fetched.position; ++so_far_.next) so_far_.dropped.insert(so_far_.next);
+    if (fetched.read.frame) {
+      so_far_.positions[fetched.read.frame->index] = so_far_.next;
+      CountDepth(fetched.read, progress);
+      TrackOne(*fetched.read.frame);
+      return;
+    }
+    const std::int64_t number = dataset_.Number(so_far_.next);
+    result_.bad.push_back({number, fetched.read.error});
+    progress.Note("tutti: frame " + std::to_string(number) + " is skipped: " + fetched.read.error);
+  }
+
+  double WallSeconds() const { return before_.wall_s + watch_.Seconds(); }
+  double CpuSeconds() const { return before_.cpu_s + ProcessCpuSeconds() - cpu_begin_; }
+
+  void WriteCheckpoint() {
+    so_far_.wall_s = WallSeconds();
+    so_far_.cpu_s = CpuSeconds();
+    const auto write = [run = StateOf(*this), alone = alone_](const MapSink& sink) {
+      sink(kRunSection, run);
+      if (alone) alone->SaveSections(sink);
+    };
+    checkpoints_->Begin(slam_->Snapshot(NoteOf(request_)), write);
+  }
+
+  // A run that ends early leaves one of its last moment.
+  void EndCheckpoints(Progress& progress) {
+    checkpoints_->Wait();
+    if (!result_.interrupted) return;
+    WriteCheckpoint();
+    checkpoints_->Wait();
+    if (const auto problem = checkpoints_->TakeProblem()) {
+      progress.Note("tutti: warning: " + *problem);
+    } else {
+      progress.Note("tutti: go on with: tutti run --resume " + request_.out.string());
+    }
+  }
+
+  void Resume(const fs::path& checkpoint) {
+    MapInfo info = ReadMapInfo(checkpoint);
+    if (StateOf(info.rig) != StateOf(result_.rig))
+      throw InputError(checkpoint.string() + ": is of another camera than the data set has by now");
+    info.config = Watched(config_, request_);
+    slam_ = SlamSystem::Load(checkpoint, info, Recorder(), [this](internal::SectionReader& file) {
+      ReadState(file, kRunSection, this);
+      if (alone_) alone_->LoadSections(&file);
+    });
+    live_.Resume(std::move(resumed_live_), slam_->loops());
+    before_ = so_far_;
+    for (const auto& [index, position] : so_far_.positions) {
+      if (position >= dataset_.Size() || dataset_.Number(position) != index)
+        throw InputError(checkpoint.string() + ": is of another data set than " + result_.dataset +
+                         " holds by now");
+    }
+    const std::size_t next = so_far_.next;
+    result_.resumed_from_frame = next < dataset_.Size() ? dataset_.Number(next) : info.last_frame + 1;
   }
 
   void TrackOne(const InputFrame& frame) {
     const ScopedSpan span(Recorder(), Lane::kTracking, "frame");
     const internal::Stopwatch watch;
-    const TrackResult track = slam_.Track(frame);
+    const TrackResult track = slam_->Track(frame);
     result_.frame_ms.push_back(watch.Milliseconds());
-    if (track.keyframe >= 0) planted_.OnKeyframe(track.keyframe, &slam_);
+    if (track.keyframe >= 0) planted_.OnKeyframe(track.keyframe, slam_.get());
     live_.Add(frame.stamp_s, track, State());
     for (const auto& observer : request_.observers) observer->OnFrame(frame, track, State());
-    state_ = slam_.AppearanceOnly() ? "appearance only" : ToString(track.state);
-    if (slam_.AppearanceOnly() || track.state == TrackingState::kTracking) {
-      lost_open_ = false;
+    so_far_.state = slam_->AppearanceOnly() ? "appearance only" : ToString(track.state);
+    if (slam_->AppearanceOnly() || track.state == TrackingState::kTracking) {
+      so_far_.lost_open = false;
       return;
     }
     ++result_.frames_lost;
-    if (!lost_open_ || result_.lost.back().state != state_) {
-      result_.lost.push_back({frame.index, frame.index, state_, track.reason});
-      lost_open_ = true;
+    if (!so_far_.lost_open || result_.lost.back().state != so_far_.state) {
+      result_.lost.push_back({frame.index, frame.index, so_far_.state, track.reason});
+      so_far_.lost_open = true;
     }
     result_.lost.back().last = frame.index;
   }
 
   std::string Status() const {
-    std::string status = state_;
+    std::string status = so_far_.state;
     if (config_.run.loops) {
-      status += "  loops " + std::to_string(CountAccepted(slam_.loops())) + "/" +
-                std::to_string(slam_.loops().size());
+      status += "  loops " + std::to_string(CountAccepted(slam_->loops())) + "/" +
+                std::to_string(slam_->loops().size());
     }
     return status;
   }
@@ -253,24 +345,20 @@ class Run {
   const Dataset& dataset_;
   RunResult& result_;
   SpanRecorder recorder_;
-  SlamSystem slam_;
+  std::unique_ptr<SlamSystem> slam_;
   PlantedLoops planted_;
   LiveFiles live_;
   Span::Clock::time_point begin_ = Span::Clock::now();
   internal::Stopwatch watch_;
   double cpu_begin_ = ProcessCpuSeconds();
-  double read_ms_ = 0, extract_ms_ = 0;            // of the thread that reads ahead
-  double read_wait_ms_ = 0;                        // of this one for that one
-  std::optional<Odometry> alone_;                  // as it was before the detector first changed anything
-  std::int64_t alone_last_ = -1;                   // index of the last input frame that it has seen
-  std::shared_ptr<FrameClock> clock_;              // of playback_
-  std::optional<Playback> playback_;               // in real time, unless the source keeps time itself
-  std::size_t total_ = 0;                          // most frames; endless for a growing data set
-  std::size_t next_ = 0;                           // position that comes next
-  std::set<std::size_t> dropped_;                  // positions
-  std::map<std::int64_t, std::size_t> positions_;  // of the input frames, by their index
-  std::string state_;
-  bool lost_open_ = false;
+  RunProgress so_far_, before_;        // before_: when this process began
+  Trajectory resumed_live_;            // on its way into live_
+  std::optional<Odometry> alone_;      // as it was before the detector first changed anything
+  std::int64_t alone_last_ = -1;       // index of the last input frame that it has seen
+  std::shared_ptr<FrameClock> clock_;  // of playback_
+  std::optional<Playback> playback_;   // in real time, unless the source keeps time itself
+  std::size_t total_ = 0;              // most frames; endless for a growing data set
+  std::optional<Checkpointer> checkpoints_;
 };
 
 // What can't be written is known before the long work. An earlier trace stays until then.
@@ -282,6 +370,21 @@ void CheckTrace(const fs::path& file) {
 }  // namespace
 
 RunResult RunSlam(const RunRequest& request) { return RunSlam(request, LoadConfig(request.config)); }
+
+std::optional<std::pair<RunRequest, RunConfig>> ResumeRequest(const fs::path& out) {
+  const fs::path checkpoint = out / kCheckpoint;
+  if (!fs::exists(checkpoint)) {
+    if (fs::exists(out / "summary.json")) return std::nullopt;
+    throw InputError(out.string() + ": holds no " + kCheckpoint +
+                     " to go on from (a run with --checkpoint SECONDS writes one) and no result; start it "
+                     "again with --config and --dataset");
+  }
+  const MapInfo info = ReadMapInfo(checkpoint);
+  RunRequest request = RequestOf(info.note, checkpoint);
+  request.out = out;
+  request.resume = checkpoint;
+  return std::make_pair(std::move(request), info.config);
+}
 
 RunResult RunSlam(const RunRequest& request, const RunConfig& given) {
   RunResult result;
@@ -319,7 +422,8 @@ RunResult RunSlam(const RunRequest& request, const RunConfig& given) {
   if (reference) attempts.Try([&] { EvaluateRun(reference->first, reference->second, result); });
   result.failure = attempts.Failure();
   const auto trace = [&run] { return run.Trace(); };
-  WriteOutputs(folder, request, result, request.trace ? trace : std::function<std::string()>());
+  const auto map = [&run](const fs::path& file) { run.Map().Write(file); };
+  WriteOutputs(folder, request, result, map, request.trace ? trace : std::function<std::string()>());
   attempts.Rethrow();
   return result;
 }

@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "apps/run/frame_clock.h"
@@ -25,9 +26,12 @@ struct RunRequest {
   bool no_loops = false;
   std::optional<std::uint64_t> seed;  ///< of everything that draws numbers
   std::optional<int> threads;
-  std::optional<int> inject_false_loops;       ///< instead of run.inject_false_loops
-  std::optional<int> start, end, stride;       ///< instead of those of the section dataset [frames]
-  std::optional<double> follow_s;              ///< DatasetOptions::follow_s
+  std::optional<int> inject_false_loops;  ///< instead of run.inject_false_loops
+  std::optional<int> start, end, stride;  ///< instead of those of the section dataset [frames]
+  std::optional<double> follow_s;         ///< DatasetOptions::follow_s
+  std::optional<double> checkpoint_s;     ///< write OUT/checkpoint.tutti at most this often; none: never
+  std::optional<std::filesystem::path> resume;    ///< checkpoint to go on from
+  std::optional<std::filesystem::path> save_map;  ///< write the map there; kMap: into `out`
   bool realtime = false;                       ///< play by the time stamps, drop frames that it can't follow
   std::shared_ptr<FrameClock> clock;           ///< for realtime; null: the machine's
   bool timing = false;                         ///< measure every stage (RunResult::stages)
@@ -47,5 +51,9 @@ RunResult RunSlam(const RunRequest& request);
 
 /// The same from a configuration in memory; `request.config` is only a name then.
 RunResult RunSlam(const RunRequest& request, const RunConfig& config);
+
+/// A run that was broken off, as its checkpoint in `out` has it: a request that RunSlam goes on with, and its
+/// configuration. None if the run in `out` has finished. Throws InputError if there is neither.
+std::optional<std::pair<RunRequest, RunConfig>> ResumeRequest(const std::filesystem::path& out);
 
 }  // namespace tutti

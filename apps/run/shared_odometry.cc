@@ -3,6 +3,7 @@
 #include <opencv2/core.hpp>
 #include <utility>
 
+#include "apps/run/attempts.h"
 #include "apps/run/interrupt.h"
 #include "apps/run/live_files.h"
 #include "apps/run/outputs.h"

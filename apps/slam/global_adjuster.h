@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "tutti/frontend/odometry.h"
@@ -24,6 +25,17 @@ class GlobalAdjuster {
   bool Running() const { return running_.has_value(); }
   /// The one under way; nothing is under way then.
   GlobalAdjustment Take();
+
+  /// A copy of the one under way, for a saved map.
+  std::optional<GlobalAdjustment> pending() const { return running_; }
+  /// Goes on as if this one were under way.
+  void Resume(std::optional<GlobalAdjustment> adjustment) { running_ = std::move(adjustment); }
+
+  /// All but what is under way.
+  template <class Archive>
+  void State(Archive& archive) {
+    archive(due_);
+  }
 
  private:
   std::optional<GlobalAdjustment> running_;

@@ -237,7 +237,7 @@ std::optional<LoopUpdate> LoopCloser::Adjusted(const Odometry& odometry, std::in
   const ScopedSpan span(recorder_, Lane::kOptimisation, "enter_adjustment");
   const internal::Stopwatch watch;
   LoopUpdate update;
-  auto adjustment = std::make_shared<GlobalAdjustment>(adjuster_.Take());
+  auto adjustment = std::make_shared<const GlobalAdjustment>(adjuster_.Take());
   if (auto moved = odometry.CorrectionOf(*adjustment)) {
     Rescale(*moved);
     update.correction.emplace();
@@ -274,6 +274,11 @@ bool LoopCloser::CloseDeferred(const Odometry& odometry, std::int64_t frames) {
   if (deferred_.empty()) return false;
   Start(std::exchange(deferred_, {}), odometry, frames);
   return true;
+}
+
+void LoopCloser::Resume(std::optional<LoopSolution> solution, std::optional<GlobalAdjustment> adjustment) {
+  if (solution) solver_.Resume(*std::move(solution));
+  adjuster_.Resume(std::move(adjustment));
 }
 
 void LoopCloser::Finish() {

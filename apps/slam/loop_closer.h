@@ -62,6 +62,21 @@ class LoopCloser {
   void Applied(const LoopUpdate& update, const std::vector<int>& common, const Odometry& odometry,
                std::int64_t frames);
 
+  /// What is being worked out beside the tracking, for a saved map; it holds on to that.
+  struct Pending {
+    BackgroundLoopSolver::Pending solution;  ///< not valid: none
+    std::optional<GlobalAdjustment> adjustment;
+  };
+  Pending pending() const { return {solver_.pending(), adjuster_.pending()}; }
+  /// Goes on as if this were what is being worked out.
+  void Resume(std::optional<LoopSolution> solution, std::optional<GlobalAdjustment> adjustment);
+  /// All else that it knows.
+  template <class Archive>
+  void State(Archive& archive) {
+    archive(records_, gate_, graph_, accepted_, deferred_, queued_, untied_, solved_due_, solved_keyframes_,
+            adjust_piece_, adjuster_, proof_, corrections_, adjustments_, stages_);
+  }
+
   const std::vector<LoopRecord>& records() const { return records_; }
   /// Keyframes, odometry edges and accepted loops at the present poses.
   PoseGraph Graph(const Odometry& odometry) const;

@@ -26,10 +26,14 @@ LoopQuery Query(const InputFrame& frame) {
 
 }  // namespace
 
-LoopClosing::LoopClosing(const RunConfig& config, const CameraRig& rig, SpanRecorder* recorder)
+LoopClosing::LoopClosing(const RunConfig& config, const CameraRig& rig, SpanRecorder* recorder, bool resumes)
     : options_(config.run), rig_(rig), closer_(config, rig, recorder) {
-  if (config.run.loops)
-    worker_ = std::make_unique<LoopWorker>(DetectorOptions(config), config.run.threads > 1, recorder);
+  if (!config.run.loops) return;
+  worker_ = std::make_unique<LoopWorker>(DetectorOptions(config), config.run.threads > 1, recorder, resumes);
+}
+
+std::shared_future<std::shared_ptr<const LoopWorker::Saved>> LoopClosing::SaveDetector() const {
+  return worker_ ? worker_->Save() : std::shared_future<std::shared_ptr<const LoopWorker::Saved>>();
 }
 
 void LoopClosing::SetDetectionListener(std::function<void(const LoopResult&)> listener) {

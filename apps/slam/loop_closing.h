@@ -10,10 +10,12 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <future>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "apps/slam/loop_closer.h"
@@ -27,8 +29,8 @@ namespace tutti {
 /// `frames`: number of frames so far.
 class LoopClosing {
  public:
-  /// `recorder` may be null.
-  LoopClosing(const RunConfig& config, const CameraRig& rig, SpanRecorder* recorder);
+  /// `recorder` may be null. `resumes`: State will be read into it.
+  LoopClosing(const RunConfig& config, const CameraRig& rig, SpanRecorder* recorder, bool resumes = false);
 
   /// Calls `listener` with each answer of the detector before it is considered.
   void SetDetectionListener(std::function<void(const LoopResult&)> listener);
@@ -59,6 +61,24 @@ class LoopClosing {
   }
 
   const LoopCloser& closer() const { return closer_; }
+
+  /// The detector, for a saved map; none if no loops are searched for. As LoopWorker::Save.
+  std::shared_future<std::shared_ptr<const LoopWorker::Saved>> SaveDetector() const;
+  /// What the closer is waiting for.
+  LoopCloser::Pending pending() const { return closer_.pending(); }
+  /// All else that it knows.
+  template <class Archive>
+  void State(Archive& archive) {
+    archive(closer_, submitted_, keyframe_of_frame_, stamps_, keyframes_seen_, warnings_, last_warning_,
+            stages_);
+  }
+  void ResumeDetector(internal::SectionReader* detector, LoopWorker::Saved saved) {
+    worker_->Resume(detector, std::move(saved));
+  }
+  void ResumePending(std::optional<LoopSolution> solution, std::optional<GlobalAdjustment> adjustment) {
+    closer_.Resume(std::move(solution), std::move(adjustment));
+  }
+
   /// What went wrong without stopping it since the last call.
   std::vector<std::string> TakeWarnings();
   /// Milliseconds spent, summed, by stage.
@@ -68,6 +88,10 @@ class LoopClosing {
   struct Submission {
     std::int64_t due = 0;  // number of frames after which its answer enters
     std::int64_t frame = 0;
+    template <class Archive>
+    void State(Archive& archive) {
+      archive(due, frame);
+    }
   };
   LoopUpdate Deliver(const Odometry* odometry, std::int64_t frames);
   void TellRevoked(const LoopUpdate& update);

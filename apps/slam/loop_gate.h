@@ -40,6 +40,11 @@ class LoopGate {
   const std::vector<LoopEdge>& waiting() const { return waiting_; }
   std::vector<LoopEdge>& waiting() { return waiting_; }
 
+  template <class Archive>
+  void State(Archive& archive) {
+    archive(waiting_);
+  }
+
  private:
   std::optional<Disagreement> WithMap(const LoopEdge& loop, const Map& map) const;
   bool Within(const Disagreement& d) const;

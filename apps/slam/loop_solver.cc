@@ -161,10 +161,16 @@ void BackgroundLoopSolver::Start(const KeyframeGraph& graph, const std::vector<L
   const auto work = [recorder](const KeyframeGraph& g, const std::vector<LoopEdge>& old,
                                const std::vector<LoopEdge>& fresh, const SlamOptions& o) {
     const ScopedSpan span(recorder, Lane::kOptimisation, "close_loop");
-    return SolveLoops(g, old, fresh, o);
+    return std::make_shared<const LoopSolution>(SolveLoops(g, old, fresh, o));
   };
   const auto launch = options.threads > 1 ? std::launch::async : std::launch::deferred;
-  solution_ = std::async(launch, work, graph, accepted, entering, options);
+  solution_ = Pending(std::async(launch, work, graph, accepted, entering, options));
+}
+
+void BackgroundLoopSolver::Resume(LoopSolution solution) {
+  std::promise<std::shared_ptr<const LoopSolution>> found;
+  found.set_value(std::make_shared<const LoopSolution>(std::move(solution)));
+  solution_ = found.get_future().share();
 }
 
 }  // namespace tutti

@@ -4,8 +4,10 @@
 #include <cstdint>
 #include <future>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tutti/backend/keyframe_graph.h"
@@ -63,10 +65,16 @@ class BackgroundLoopSolver {
   void Start(const KeyframeGraph& graph, const std::vector<LoopEdge>& accepted,
              const std::vector<LoopEdge>& entering, const SlamOptions& options, SpanRecorder* recorder);
   /// Waits for it. Nothing is running then.
-  LoopSolution Take() { return solution_.get(); }
+  LoopSolution Take() { return *std::exchange(solution_, {}).get(); }
+
+  /// What will have been found, for a saved map; not valid if nothing is running.
+  using Pending = std::shared_future<std::shared_ptr<const LoopSolution>>;
+  Pending pending() const { return solution_; }
+  /// Goes on as if it had found this.
+  void Resume(LoopSolution solution);
 
  private:
-  std::future<LoopSolution> solution_;
+  Pending solution_;
 };
 
 }  // namespace tutti

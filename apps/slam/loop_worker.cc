@@ -1,6 +1,7 @@
 #include "apps/slam/loop_worker.h"
 
 #include <chrono>
+#include <string_view>
 #include <utility>
 
 #include "core/stopwatch.h"
@@ -17,10 +18,11 @@ std::array<std::pair<const char*, double>, 6> LoopStages(const LoopResult& r) {
            {"memory", r.memory_ms}}};
 }
 
-LoopWorker::LoopWorker(const LoopDetectorOptions& options, bool own_thread, SpanRecorder* recorder)
+LoopWorker::LoopWorker(const LoopDetectorOptions& options, bool own_thread, SpanRecorder* recorder,
+                       bool resumes)
     : detector_(options), recorder_(recorder) {
   // Frames are numbered from 0 in every run: what an earlier run stored has no frame in this one.
-  if (detector_.LastId() >= 0) {
+  if (detector_.LastId() >= 0 && !resumes) {
     throw InputError(
         options.ltm_file +
         ": holds the locations of an earlier run; remove it, or give another file in loops.ltm_file");
@@ -71,21 +73,80 @@ void LoopWorker::Work() {
     tasks_.pop_front();
     busy_ = true;
     lock.unlock();
-    Outcome outcome = Do(task);
-    lock.lock();
+    if (task.saving) {
+      DoSave(task.saving.get());
+      lock.lock();
+    } else {
+      Outcome outcome = Do(task);
+      lock.lock();
+      Add(std::move(outcome));
+    }
     busy_ = false;
-    outcomes_.push_back(std::move(outcome));
     changed_.notify_all();
   }
 }
 
+// What is being saved has it, too.
+void LoopWorker::Add(Outcome outcome) {
+  for (const auto& saving : saving_) {
+    saving->saved->results.push_back(outcome.result);
+    if (outcome.failure) saving->failure = outcome.failure;
+  }
+  outcomes_.push_back(std::move(outcome));
+}
+
+// The queries before it are done: no result comes to it any more.
+void LoopWorker::DoSave(Saving* saving) {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    saving_.erase(saving_.begin());
+  }
+  try {
+    if (saving->failure) std::rethrow_exception(saving->failure);
+    detector_.SaveSections([saving](std::uint32_t tag, std::string_view bytes) {
+      saving->saved->detector.emplace_back(tag, bytes);
+    });
+    saving->done.set_value(std::move(saving->saved));
+  } catch (...) {
+    saving->done.set_exception(std::current_exception());
+  }
+}
+
+std::shared_future<std::shared_ptr<const LoopWorker::Saved>> LoopWorker::Save() {
+  std::unique_lock<std::mutex> lock(mutex_);
+  auto saving = std::make_shared<Saving>();
+  saving->saved = std::make_shared<Saved>();
+  saving->saved->unlinked = unlinked_;
+  saving->saved->waited_ms = waited_ms_;
+  for (const Outcome& outcome : outcomes_) {
+    saving->saved->results.push_back(outcome.result);
+    if (outcome.failure) saving->failure = outcome.failure;
+  }
+  saving_.push_back(saving);
+  auto saved = saving->done.get_future().share();
+  if (!thread_.joinable()) {
+    lock.unlock();
+    DoSave(saving.get());
+    return saved;
+  }
+  tasks_.push_back({{}, {}, std::move(saving)});
+  changed_.notify_all();
+  return saved;
+}
+
+void LoopWorker::Resume(internal::SectionReader* detector, Saved saved) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  detector_.LoadSections(detector);
+  for (LoopResult& result : saved.results) outcomes_.push_back({std::move(result), nullptr});
+  unlinked_ = std::move(saved.unlinked);
+  waited_ms_ = saved.waited_ms;
+}
+
 void LoopWorker::Submit(LoopQuery query) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  Task task{std::exchange(unlinked_, {}), std::move(query)};
-  if (!thread_.joinable()) {
-    outcomes_.push_back(Do(task));
-    return;
-  }
+  Task task{std::exchange(unlinked_, {}), std::move(query), nullptr};
+  if (!thread_.joinable()) return Add(Do(task));
+
   tasks_.push_back(std::move(task));
   changed_.notify_all();
 }

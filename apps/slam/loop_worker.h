@@ -3,9 +3,13 @@
 
 #include <array>
 #include <condition_variable>
+#include <cstdint>
 #include <deque>
 #include <exception>
+#include <future>
+#include <memory>
 #include <mutex>
+#include <string>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -21,11 +25,12 @@ namespace tutti {
 std::array<std::pair<const char*, double>, 6> LoopStages(const LoopResult& result);
 
 /// With `own_thread` the detector works on a thread of its own, else within Submit(); the results are the
-/// same.
+/// same. `resumes`: Resume() will be called, and takes the place of what a long-term memory's file holds.
 class LoopWorker {
  public:
   /// `recorder` may be null.
-  LoopWorker(const LoopDetectorOptions& options, bool own_thread, SpanRecorder* recorder = nullptr);
+  LoopWorker(const LoopDetectorOptions& options, bool own_thread, SpanRecorder* recorder = nullptr,
+             bool resumes = false);
   ~LoopWorker();
   LoopWorker(const LoopWorker&) = delete;
   LoopWorker& operator=(const LoopWorker&) = delete;
@@ -41,17 +46,38 @@ class LoopWorker {
   /// Milliseconds that Take() has waited so far.
   double WaitedMs() const { return waited_ms_; }
 
+  /// All that it knows.
+  struct Saved {
+    std::vector<std::pair<std::uint32_t, std::string>> detector;  ///< sections (LoopDetector::SaveSections)
+    std::vector<LoopResult> results;                              ///< that were not taken yet
+    std::vector<std::pair<std::int64_t, std::int64_t>> unlinked;  ///< to be before the next query
+    double waited_ms = 0;
+  };
+  /// Comes when the queries that were submitted so far are done; what happens later is not in it. Rethrows
+  /// what the detector threw.
+  std::shared_future<std::shared_ptr<const Saved>> Save();
+  /// Goes on from what was saved. `detector` gives the detector's sections. Nothing was submitted yet.
+  void Resume(internal::SectionReader* detector, Saved saved);
+
  private:
   struct Outcome {
     LoopResult result;
     std::exception_ptr failure;
   };
+  struct Saving {
+    std::shared_ptr<Saved> saved;
+    std::promise<std::shared_ptr<const Saved>> done;
+    std::exception_ptr failure;
+  };
   struct Task {
     std::vector<std::pair<std::int64_t, std::int64_t>> unlinked;  // before the query
     LoopQuery query;
+    std::shared_ptr<Saving> saving;  // not null: to save, instead of a query
   };
   void Work();
   Outcome Do(const Task& task);
+  void Add(Outcome outcome);
+  void DoSave(Saving* saving);
 
   LoopDetector detector_;
   SpanRecorder* recorder_;
@@ -60,6 +86,7 @@ class LoopWorker {
   std::vector<std::pair<std::int64_t, std::int64_t>> unlinked_;  // guarded by mutex_: for the next task
   std::deque<Task> tasks_;                                       // guarded by mutex_
   std::deque<Outcome> outcomes_;                                 // guarded by mutex_
+  std::vector<std::shared_ptr<Saving>> saving_;                  // guarded by mutex_: not done yet
   bool busy_ = false;                                            // guarded by mutex_: the detector is in use
   bool stop_ = false;                                            // guarded by mutex_
   double waited_ms_ = 0;                                         // of the caller's thread only

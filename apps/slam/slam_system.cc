@@ -6,15 +6,19 @@
 #include <utility>
 
 #include "apps/slam/loop_closing.h"
+#include "apps/slam/map_parts.h"
+#include "apps/slam/map_state.h"
+#include "core/section_file.h"
 #include "core/stopwatch.h"
 #include "tutti/core/error.h"
+#include "tutti/slam/version.h"
 
 namespace tutti {
 
 class SlamSystem::Impl {
  public:
-  Impl(const RunConfig& config, const CameraRig& rig, SpanRecorder* recorder)
-      : loops_(config, rig, recorder) {
+  Impl(const RunConfig& config, const CameraRig& rig, SpanRecorder* recorder, bool resumes = false)
+      : loops_(config, rig, recorder, resumes), config_(config), rig_(rig) {
     if (!rig.calibrated) return;
     odometry_.emplace(config.odometry, rig);
     odometry_->SetRecorder(recorder);
@@ -22,7 +26,7 @@ class SlamSystem::Impl {
   }
 
   TrackResult Track(const InputFrame& frame) {
-    BringIn();
+    if (!localizing_) BringIn();
     ++frames_;
     TrackResult result;
     if (!odometry_) {
@@ -33,9 +37,19 @@ class SlamSystem::Impl {
     result = odometry_->Track(frame);
     last_ = frame.index;
     if (result.state != TrackingState::kTracking) result = Relocalize(frame, result);
+    if (localizing_) return FindBack(frame, result);
     if (result.keyframe >= 0 && (loops_.Searching() || on_keyframe_)) unmapped_[result.keyframe] = frame;
     SubmitMapped();
     return result;
+  }
+
+  void BeginLocalization() {
+    if (!odometry_ || odometry_->KeyframeIds().empty()) throw InputError("there is no map to be located in");
+    if (!loops_.Searching())
+      throw InputError(
+          "the map was made without loop closure, so nothing says where in it a frame was taken");
+    localizing_ = true;
+    odometry_->BeginLocalization();
   }
 
   void AddLoop(int candidate, int query, const Similarity& S_candidate_query, const Matrix7d& information) {
@@ -54,11 +68,51 @@ class SlamSystem::Impl {
   }
 
   void Finish() {
+    if (localizing_) return;
     if (odometry_) {
       odometry_->FinishMapping();
       SubmitMapped();
     }
     while (const auto update = loops_.Rest(odometry(), frames_)) Take(*update);
+  }
+
+  MapSnapshot Snapshot(const std::string& note) const {
+    auto parts = std::make_shared<MapSnapshot::Parts>();
+    parts->info = StateOf(Info(note));
+    parts->state = StateOf(*this);
+    parts->odometry = odometry_;
+    parts->pending = loops_.pending();
+    parts->detector = loops_.SaveDetector();
+    return MapSnapshot(std::move(parts));
+  }
+
+  // From what follows MapSection::kInfo.
+  void Load(internal::SectionReader& file, const std::function<void(internal::SectionReader&)>& more) {
+    ReadState(file, MapSection::kState, this);
+    if (odometry_) odometry_->LoadSections(&file);
+    std::optional<LoopSolution> solution;
+    if (Next(file, MapSection::kSolution)) ReadState(file, MapSection::kSolution, &solution.emplace());
+    std::optional<GlobalAdjustment> adjustment;
+    if (Next(file, MapSection::kAdjustment)) {
+      file.Expect(MapSection::kAdjustment);
+      adjustment = odometry_.value().LoadGlobalAdjustment(&file);
+    }
+    loops_.ResumePending(std::move(solution), std::move(adjustment));
+    if (loops_.Searching()) {
+      LoopWorker::Saved saved;
+      ReadState(file, MapSection::kDetector, &saved);
+      loops_.ResumeDetector(&file, std::move(saved));
+    }
+    if (more) more(file);
+    std::string rest;  // of whoever wrote them
+    while (file.Next(&rest) != internal::kEndOfSections) {
+    }
+  }
+
+  // What MapSection::kState holds.
+  template <class Archive>
+  void State(Archive& archive) {
+    archive(loops_, relocalized_, stages_, unmapped_, frames_, last_);
   }
 
   const Odometry* odometry() const { return odometry_ ? &*odometry_ : nullptr; }
@@ -92,6 +146,36 @@ class SlamSystem::Impl {
     stages_["loop_fuse"] += watch.Milliseconds();
   }
 
+  MapInfo Info(const std::string& note) const {
+    MapInfo info;
+    info.note = note;
+    info.program = kVersion;
+    info.config = config_;
+    info.rig = rig_;
+    info.frames = frames_;
+    info.last_frame = last_;
+    info.loops = static_cast<int>(CountAccepted(loops_.closer().records()));
+    if (!odometry_) return info;
+    const std::vector<int> ids = odometry_->KeyframeIds();
+    info.keyframes = static_cast<int>(ids.size());
+    info.landmarks = odometry_->LandmarkCount();
+    info.pieces = static_cast<int>(odometry_->Pieces().size());
+    if (ids.empty()) return info;
+    info.first_stamp_s = odometry_->KeyframeStamp(ids.front());
+    info.last_stamp_s = odometry_->KeyframeStamp(ids.back());
+    info.least = info.most = odometry_->KeyframePose(ids.front()).translation;
+    for (const int id : ids) {
+      const Eigen::Vector3d position = odometry_->KeyframePose(id).translation;
+      info.least = info.least.cwiseMin(position);
+      info.most = info.most.cwiseMax(position);
+    }
+    return info;
+  }
+
+  static bool Next(internal::SectionReader& file, MapSection section) {
+    return file.Peek() == static_cast<std::uint32_t>(section);
+  }
+
   void Announce() {
     if (on_change_) on_change_(*odometry_, last_);
   }
@@ -112,6 +196,14 @@ class SlamSystem::Impl {
     return result;
   }
 
+  // Beyond the map the pose drifts: now and then the detector is asked whether the map shows this place.
+  TrackResult FindBack(const InputFrame& frame, const TrackResult& tracked) {
+    constexpr int kFramesBetween = 10;
+    odometry_->TakeMapped();
+    if (!odometry_->BeyondMap() || ++frames_beyond_ % kFramesBetween != 0) return tracked;
+    return Relocalize(frame, tracked);
+  }
+
   // The detector gets a keyframe once all its landmarks are known.
   void SubmitMapped() {
     for (const int keyframe : odometry_->TakeMapped()) {
@@ -126,15 +218,33 @@ class SlamSystem::Impl {
     }
   }
 
+  RunConfig config_;
+  CameraRig rig_;
   std::optional<Odometry> odometry_;    // with a calibration
   std::map<int, InputFrame> unmapped_;  // keyframes that the detector waits for
+  bool localizing_ = false;
+  int frames_beyond_ = 0;  // of the map, while localizing
   std::int64_t frames_ = 0;
   std::int64_t last_ = -1;  // index of the last frame that the odometry has seen
 };
 
 SlamSystem::SlamSystem(const RunConfig& config, const CameraRig& rig, SpanRecorder* recorder)
     : impl_(std::make_unique<Impl>(config, rig, recorder)) {}
+SlamSystem::SlamSystem(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 SlamSystem::~SlamSystem() = default;
+
+void SlamSystem::BeginLocalization() { impl_->BeginLocalization(); }
+MapSnapshot SlamSystem::Snapshot(const std::string& note) const { return impl_->Snapshot(note); }
+
+std::unique_ptr<SlamSystem> SlamSystem::Load(const std::filesystem::path& file, const MapInfo& info,
+                                             SpanRecorder* recorder,
+                                             const std::function<void(internal::SectionReader&)>& more) {
+  internal::SectionReader in(file, kMapFile);
+  in.Expect(MapSection::kInfo);
+  auto impl = std::make_unique<Impl>(info.config, info.rig, recorder, true);
+  impl->Load(in, more);
+  return std::unique_ptr<SlamSystem>(new SlamSystem(std::move(impl)));
+}
 
 void SlamSystem::SetDetectionListener(std::function<void(const LoopResult&)> listener) {
   impl_->loops_.SetDetectionListener(std::move(listener));

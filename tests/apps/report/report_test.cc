@@ -224,15 +224,8 @@ TEST(ReportOfARun, SaysWhatEachImageWasDecidedBy) {
 TEST(ReportOfARun, HoldsWhatTheRunFound) {
   const fs::path folder = testing::FreshFolder();
   const auto run = [&](const std::string& out, const std::vector<std::string>& more) {
-    std::vector<std::string> words = {"run",
-                                      "--config",
-                                      testing::TinyConfig(folder).string(),
-                                      "--dataset",
-                                      testing::TinyTown().string(),
-                                      "--out",
-                                      (folder / out).string()};
-    words.insert(words.end(), more.begin(), more.end());
-    const auto done = testing::RunTutti(words);
+    const auto done = testing::RunTutti(
+        testing::RunArguments(testing::TinyConfig(folder), testing::TinyTown(), folder / out, more));
     EXPECT_EQ(done.status, 0) << done.output;
     if (!ReportsAvailable()) {
       EXPECT_THAT(done.output, HasSubstr("built without Node"));

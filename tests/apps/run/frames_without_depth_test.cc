@@ -1,13 +1,12 @@
 // Runs on RGB-D data where some colour images have no depth, and the numbers of frames in their files.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
 
-#include "data/synthetic/synthetic_writer.h"
+#include "tests/apps/generated_dataset.h"
 #include "tests/apps/tutti/executable.h"
 #include "tests/support/test_data.h"
 #include "tutti/core/text.h"
@@ -25,27 +24,17 @@ using testing::WriteAll;
 
 // Once around a room and a bit more, with loops. Made once per program.
 const fs::path& Room() {
-  struct Folder {
-    fs::path path = fs::temp_directory_path() / ("tutti-room-" + std::to_string(getpid()));
-    Folder() {
-      SyntheticOptions options;
-      options.scene = SyntheticScene::kRoom;
-      options.sensor = SyntheticSensor::kRgbd;
-      options.width = 400;
-      options.height = 300;
-      options.rate_hz = 8;
-      options.laps = 1.15;
-      SyntheticWriteOptions write;
-      write.threads = 2;
-      WriteSyntheticDataset(SyntheticWorld(options), path, write);
-    }
-    ~Folder() {
-      std::error_code ignored;
-      fs::remove_all(path, ignored);
-    }
-  };
-  static const Folder folder;
-  return folder.path;
+  static const testing::GeneratedDataset room("room", [] {
+    SyntheticOptions options;
+    options.scene = SyntheticScene::kRoom;
+    options.sensor = SyntheticSensor::kRgbd;
+    options.width = 400;
+    options.height = 300;
+    options.rate_hz = 8;
+    options.laps = 1.15;
+    return options;
+  }());
+  return room.path();
 }
 
 // Lines of a list without its comment, each "stamp file".
@@ -87,11 +76,9 @@ class FramesWithoutDepth : public ::testing::Test {
     return room_ / SplitText(Lines(Room() / "depth.txt").at(i)).at(1);
   }
 
-  testing::ProcessResult Run(const std::vector<std::string>& more = {}) const {
-    std::vector<std::string> arguments = {"run",   "--config", room_ / "config.yaml", "--dataset", room_,
-                                          "--out", out_,       "--no-report"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return RunTutti(arguments);
+  testing::ProcessResult Run(std::vector<std::string> more = {}) const {
+    more.insert(more.begin(), "--no-report");
+    return RunTutti(testing::RunArguments(room_ / "config.yaml", room_, out_, more));
   }
   nlohmann::json Summary() const { return nlohmann::json::parse(ReadAll(out_ / "summary.json")); }
   double Ate() const { return Summary()["evaluation"]["slam"]["ate_rmse_m"].get<double>(); }

@@ -2,13 +2,12 @@
 #include "apps/run/shared_odometry.h"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <fstream>
 #include <iterator>
 
 #include "apps/run/outputs.h"
-#include "data/synthetic/synthetic_writer.h"
+#include "tests/apps/generated_dataset.h"
 #include "tests/support/small_town.h"
 #include "tests/support/test_data.h"
 #include "tutti/core/error.h"
@@ -20,22 +19,12 @@ namespace fs = std::filesystem;
 
 // A lap around a block and a bit more, with loops. Made once per program.
 const fs::path& TownWithALoop() {
-  struct Folder {
-    fs::path path = fs::temp_directory_path() / ("tutti-loop-town-" + std::to_string(getpid()));
-    Folder() {
-      SyntheticOptions options = testing::SmallStereoTownWithALoop(512, 256);
-      options.noise_sigma = 4;
-      SyntheticWriteOptions write;
-      write.threads = 2;
-      WriteSyntheticDataset(SyntheticWorld(options), path, write);
-    }
-    ~Folder() {
-      std::error_code ignored;
-      fs::remove_all(path, ignored);
-    }
-  };
-  static const Folder folder;
-  return folder.path;
+  static const testing::GeneratedDataset town("loop-town", [] {
+    SyntheticOptions options = testing::SmallStereoTownWithALoop(512, 256);
+    options.noise_sigma = 4;
+    return options;
+  }());
+  return town.path();
 }
 
 class SharedOdometry : public ::testing::Test {

@@ -26,6 +26,10 @@ struct MapKeyframe {
   int id = -1;
   int piece = 0;  ///< keyframes of different map pieces have no common frame of reference
   Pose T_world_keyframe;
+  template <class Archive>
+  void State(Archive& archive) {
+    archive(id, piece, T_world_keyframe);
+  }
 };
 
 /// Two keyframes that see the same landmarks.
@@ -119,18 +123,36 @@ class KeyframeGraph {
   /// from it again.
   void MeasureAgain() { kept_.clear(); }
 
+  /// All but the options, for saved maps (tutti::slam).
+  template <class Archive>
+  void State(Archive& archive) {
+    archive(keyframes_, births_, merged_, edges_, kept_);
+  }
+
  private:
   struct Edge {
     int older = -1, newer = -1;
     Similarity S_older_newer;
+    template <class Archive>
+    void State(Archive& archive) {
+      archive(older, newer, S_older_newer);
+    }
   };
   struct Birth {
     int id = -1;
     int piece = 0;  // when it was new
+    template <class Archive>
+    void State(Archive& archive) {
+      archive(id, piece);
+    }
   };
   struct Merge {
     int from = 0, to = 0;  // pieces
     int newest = -1;       // keyframe when it happened
+    template <class Archive>
+    void State(Archive& archive) {
+      archive(from, to, newest);
+    }
   };
   KeyframeCorrection CorrectionOf(const PoseGraph& graph, const PoseGraphReport& report,
                                   const std::vector<LoopEdge>& loops) const;

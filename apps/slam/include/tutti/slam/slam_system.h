@@ -7,6 +7,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <map>
 #include <memory>
@@ -21,6 +22,7 @@
 #include "tutti/loopclosure/detector.h"
 #include "tutti/slam/config.h"
 #include "tutti/slam/loop_record.h"
+#include "tutti/slam/map_file.h"
 
 #pragma GCC visibility push(default)
 namespace tutti {
@@ -47,6 +49,12 @@ class SlamSystem {
   /// it would do alone goes on from here (a copy of it). `last`: index of the last frame that it has seen, -1
   /// for none. From Track() and Finish().
   void SetChangeListener(std::function<void(const Odometry&, std::int64_t last)> listener);
+
+  /// From now on frames are only located in the map: no loops, and keyframes only for the time being, where
+  /// the map shows too little of what is in view (Odometry::BeyondMap). Frames so far are forgotten; the
+  /// detector says where the next one was taken, as it does whenever tracking is lost. Throws InputError if
+  /// there is no map, or no detector that knows it.
+  void BeginLocalization();
 
   /// Tracks the next frame and brings in what is due. Never throws for hard images.
   TrackResult Track(const InputFrame& frame);
@@ -78,11 +86,25 @@ class SlamSystem {
   /// With graph.certify, of the last solution of the pose graph that moved the map: where each start leads,
   /// and whether the best of them is the global optimum.
   const std::optional<KeyframeGraphProof>& GraphProof() const;
+  /// As it is now, between two frames. Costs little more than a look at each loop and keyframe: the tracking
+  /// goes on while somebody else writes it. `note`: for MapInfo.
+  MapSnapshot Snapshot(const std::string& note = "") const;
+  /// Writes all that it knows: Snapshot().Write(file). Throws InputError if that fails; what was there before
+  /// is untouched then.
+  void Save(const std::filesystem::path& file) const { Snapshot().Write(file); }
+  /// Goes on from a file that Save wrote exactly as the saved one would have gone on, whose listeners are to
+  /// be set again. `info`: ReadMapInfo(file); its config.run.threads may be another. `more` may read the
+  /// caller's sections. Throws InputError for a file that is not usable.
+  static std::unique_ptr<SlamSystem> Load(const std::filesystem::path& file, const MapInfo& info,
+                                          SpanRecorder* recorder = nullptr,
+                                          const std::function<void(internal::SectionReader&)>& more = {});
+
   /// Milliseconds spent, summed, by stage; the detector's run beside the odometry's.
   std::map<std::string, double> StageMilliseconds() const;
 
  private:
   class Impl;
+  explicit SlamSystem(std::unique_ptr<Impl> impl);
   std::unique_ptr<Impl> impl_;
 };
 

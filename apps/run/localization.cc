@@ -1,0 +1,183 @@
+#include "apps/run/localization.h"
+
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
+#include <utility>
+
+#include "apps/run/interrupt.h"
+#include "apps/run/output_folder.h"
+#include "apps/run/prefetcher.h"
+#include "apps/run/progress.h"
+#include "apps/run/run_parts.h"
+#include "apps/run/text_file.h"
+#include "apps/slam/map_state.h"
+#include "core/angle.h"
+#include "core/stopwatch.h"
+#include "tutti/core/error.h"
+#include "tutti/slam/slam_system.h"
+#include "tutti/slam/version.h"
+
+namespace tutti {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kSummary = "summary.json";
+constexpr const char* kFrames = "localization.csv";
+constexpr const char* kTrajectory = "trajectory.txt";
+
+bool IsLocalization(const fs::path& entry) {
+  const std::string name = entry.filename();
+  return name == kSummary || name == kFrames || name == kTrajectory;
+}
+
+DatasetOptions Reading(const LocalizationRequest& request, const MapInfo& info) {
+  DatasetOptions options = request.options.value_or(info.config.dataset);
+  if (!request.options) {
+    options.start = options.end = 0;
+    options.stride = 1;
+  }
+  if (request.start) options.start = *request.start;
+  if (request.end) options.end = *request.end;
+  if (request.stride) options.stride = *request.stride;
+  return options;
+}
+
+void CheckRig(const LocalizationRequest& request, const CameraRig& map, const CameraRig& data) {
+  if (StateOf(map.camera) == StateOf(data.camera) && map.sensor == data.sensor &&
+      map.baseline_m == data.baseline_m)
+    return;
+  char text[200];
+  std::snprintf(text, sizeof text, "%s, %dx%d px, fx %.2f px in the map, %s, %dx%d px, fx %.2f px",
+                WordOf(map.sensor), map.camera.width, map.camera.height, map.camera.fx, WordOf(data.sensor),
+                data.camera.width, data.camera.height, data.camera.fx);
+  throw InputError(request.dataset.string() + ": has another camera than the map " + request.map.string() +
+                   " (" + text + "); for now both must be the same");
+}
+
+std::string FramesCsv(const Localization& localization) {
+  std::string csv =
+      "frame,stamp_s,state,recognised,keyframe,inliers,position_sigma_m,rotation_sigma_deg,reason\n";
+  for (const LocalizedFrame& frame : localization.frames) {
+    const bool posed = frame.track.state == TrackingState::kTracking;
+    double position = NAN, rotation = NAN;
+    if (frame.covariance) {
+      position = std::sqrt(frame.covariance->topLeftCorner<3, 3>().trace());
+      rotation = std::sqrt(frame.covariance->bottomRightCorner<3, 3>().trace()) / internal::kRadians;
+    }
+    char line[256];
+    std::snprintf(line, sizeof line, "%lld,%.6f,%s,%d,%d,%d,", static_cast<long long>(frame.index),
+                  frame.stamp_s,
+                  !posed         ? "lost"
+                  : frame.beyond ? "beyond"
+                                 : "localized",
+                  frame.recognised ? 1 : 0, frame.keyframe, frame.track.inliers);
+    csv += line;
+    if (frame.covariance) {
+      std::snprintf(line, sizeof line, "%.6g,%.6g", position, rotation);
+      csv += line;
+    } else {
+      csv += ",";
+    }
+    csv += ",\"" + frame.track.reason + "\"\n";
+  }
+  return csv;
+}
+
+std::string Summary(const LocalizationRequest& request, const Localization& l) {
+  nlohmann::ordered_json json;
+  json["version"] = kVersion;
+  json["command"] = "localize";
+  json["map"] = request.map.string();
+  json["dataset"] = request.dataset.string();
+  json["interrupted"] = l.interrupted;
+  json["finished"] = !l.interrupted;
+  json["frames"] = {{"total", l.frames.size() + l.bad},
+                    {"localized", l.Localized()},
+                    {"lost", l.frames.size() - l.Localized()},
+                    {"bad", l.bad}};
+  json["time"] = {{"load_s", l.load_s}, {"wall_s", l.wall_s}, {"cpu_s", l.cpu_s}};
+  if (l.first_pose_s) json["time"]["first_pose_s"] = *l.first_pose_s;
+  return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+}
+
+std::unique_ptr<SlamSystem> OpenMap(const LocalizationRequest& request, MapInfo info) {
+  info.config.run.threads = request.threads;
+  info.config.loops.ltm_file.clear();  // what the map has of it is enough, and nobody's file changes
+  std::unique_ptr<SlamSystem> slam = SlamSystem::Load(request.map, info);
+  slam->BeginLocalization();
+  return slam;
+}
+
+void LocateAll(const LocalizationRequest& request, const Dataset& dataset, const internal::Stopwatch& since,
+               SlamSystem& slam, Localization& result) {
+  PrefetchOptions reading;
+  reading.end = dataset.Size();
+  reading.ahead = request.threads > 1 ? 4 : 0;
+  reading.stop = &InterruptGuard::Requested;
+  reading.prepare = [&slam](InputFrame& frame) { frame.features = slam.odometry()->Extract(frame); };
+  Prefetcher frames(dataset, reading);
+  Progress progress("localize", dataset.Size(), request.quiet ? nullptr : stderr);
+  const Pose T_camera_body = dataset.Rig().T_body_camera.Inverse();
+  for (std::size_t i = 0; !InterruptGuard::Requested(); ++i) {
+    const std::optional<FetchedFrame> fetched = frames.Next();
+    if (!fetched) break;
+    if (!fetched->read.frame) {
+      ++result.bad;
+      progress.Note("tutti: frame " + std::to_string(dataset.Number(fetched->position)) +
+                    " is skipped: " + fetched->read.error);
+      continue;
+    }
+    const InputFrame& frame = *fetched->read.frame;
+    const std::size_t recognised = slam.Relocalized();
+    LocalizedFrame located;
+    located.index = frame.index;
+    located.stamp_s = frame.stamp_s;
+    located.track = slam.Track(frame);
+    if (located.track.state == TrackingState::kTracking) {
+      located.recognised = slam.Relocalized() > recognised;
+      located.beyond = slam.odometry()->BeyondMap();
+      if (!located.beyond) located.keyframe = slam.odometry()->ReferenceKeyframe();
+      located.covariance = slam.odometry()->PoseCovariance();
+      result.trajectory.push_back({frame.stamp_s, located.track.T_world_camera * T_camera_body});
+      if (!result.first_pose_s) result.first_pose_s = since.Seconds();
+    }
+    result.frames.push_back(std::move(located));
+    progress.Update(i + 1, std::to_string(result.Localized()) + " localized");
+  }
+  progress.Finish();
+  result.interrupted = InterruptGuard::Requested();
+}
+
+}  // namespace
+
+Localization Localize(const LocalizationRequest& request) {
+  const internal::Stopwatch since;
+  cv::setNumThreads(1);
+  const MapInfo info = ReadMapInfo(request.map);
+  const std::unique_ptr<Dataset> dataset = OpenDataset(request.dataset, Reading(request, info));
+  CheckRig(request, info.rig, dataset->Rig());
+  const InterruptGuard guard;
+  RefuseToReplace(request.out, request.map);
+  OutputFolder folder(request.out, {IsLocalization, kSummary, "version", {}, nullptr});
+  Localization result;
+  const std::unique_ptr<SlamSystem> slam = OpenMap(request, info);
+  result.load_s = since.Seconds();
+  const internal::Stopwatch watch;
+  const double cpu = ProcessCpuSeconds();
+  LocateAll(request, *dataset, since, *slam, result);
+  result.wall_s = watch.Seconds();
+  result.cpu_s = ProcessCpuSeconds() - cpu;
+  folder.Write({kTrajectory, [&](const fs::path& file) {
+                  WriteTrajectory(file, result.trajectory, TrajectoryFormat::kTum);
+                }});
+  folder.Write({kFrames, [&](const fs::path& file) { WriteTextFile(file, FramesCsv(result)); }});
+  folder.Write({kSummary, [&](const fs::path& file) { WriteTextFile(file, Summary(request, result)); }});
+  ThrowFailures(folder.failures(), folder.Finish(!result.interrupted));
+  return result;
+}
+
+}  // namespace tutti

@@ -1,0 +1,52 @@
+// `tutti localize`: where the frames of a data set are in a map that stays as it is.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tutti/core/trajectory.h"
+#include "tutti/frontend/dataset.h"
+#include "tutti/frontend/odometry.h"
+
+namespace tutti {
+
+struct LocalizationRequest {
+  std::filesystem::path map, dataset, out;
+  std::optional<DatasetOptions> options;  ///< how to read the data set; none: as the map's was read
+  std::optional<int> start, end, stride;  ///< instead of those of the options [frames]
+  int threads = 2;
+  bool quiet = false;  ///< no progress, no notes
+};
+
+/// One frame in the map.
+struct LocalizedFrame {
+  std::int64_t index = 0;  ///< InputFrame::index
+  double stamp_s = 0;
+  TrackResult track;                   ///< kTracking: it has a pose; else kLost
+  bool recognised = false;             ///< the loop detector said where it is, after it was lost
+  bool beyond = false;                 ///< it hangs on what was seen since, where the map shows too little
+  int keyframe = -1;                   ///< of the map, that shares most landmarks with it; -1: beyond it
+  std::optional<Matrix6d> covariance;  ///< Odometry::PoseCovariance
+};
+
+struct Localization {
+  std::vector<LocalizedFrame> frames;  ///< that could be read
+  std::size_t bad = 0;                 ///< that could not
+  Trajectory trajectory;               ///< T_world_body of those with a pose; the world is the map's
+  double wall_s = 0, cpu_s = 0;        ///< without loading the map
+  double load_s = 0;                   ///< of loading the map
+  std::optional<double> first_pose_s;  ///< from the start, loading included, to the first pose
+  bool interrupted = false;
+
+  std::size_t Localized() const { return trajectory.size(); }
+};
+
+/// Locates each frame and writes trajectory.txt (TUM), localization.csv and summary.json into request.out.
+/// The map's file is only read. Throws InputError that names the file: no map, another camera than the map's,
+/// no data, an output folder that can't be written or holds what tutti did not write.
+Localization Localize(const LocalizationRequest& request);
+
+}  // namespace tutti

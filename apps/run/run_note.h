@@ -1,0 +1,16 @@
+// What a run was called with, in the words that its maps and checkpoints carry (MapInfo::note).
+#pragma once
+
+#include <string>
+
+#include "apps/run/runner.h"
+
+namespace tutti {
+
+/// JSON: data set, configuration's name, ground truth, and what else the configuration does not hold.
+std::string NoteOf(const RunRequest& request);
+
+/// What NoteOf made. Throws InputError, with the name of the file, if it is something else.
+RunRequest RequestOf(const std::string& note, const std::filesystem::path& file);
+
+}  // namespace tutti

@@ -1,0 +1,65 @@
+#include "tutti/slam/map_file.h"
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <string_view>
+
+#include "apps/slam/map_parts.h"
+#include "apps/slam/map_state.h"
+#include "core/state_archive.h"
+#include "frontend/store/sections.h"
+#include "loopclosure/detector/detector_file.h"
+#include "tutti/core/error.h"
+
+namespace tutti {
+
+MapInfo ReadMapInfo(const std::filesystem::path& file) {
+  internal::SectionReader in(file, kMapFile);
+  MapInfo info;
+  ReadState(in, MapSection::kInfo, &info);
+  return info;
+}
+
+void CheckMapFile(const std::filesystem::path& file) {
+  internal::SectionReader in(file, kMapFile);
+  std::string bytes;
+  while (in.Next(&bytes) != internal::kEndOfSections) {
+  }
+}
+
+void MapSnapshot::Write(const std::filesystem::path& file,
+                        const std::function<void(const MapSink&)>& more) const {
+  internal::SectionWriter out(file, kMapFile);
+  const MapSink sink = [&out](std::uint32_t tag, std::string_view bytes) { out.Write(tag, bytes); };
+  out.Write(MapSection::kInfo, parts_->info);
+  out.Write(MapSection::kState, parts_->state);
+  std::map<std::int64_t, std::uint64_t> keyframes;  // where their sections are, by frame
+  if (parts_->odometry) {
+    int keyframe = 0;
+    parts_->odometry->SaveSections([&](std::uint32_t tag, std::string_view bytes) {
+      const std::uint64_t place = out.Write(tag, bytes);
+      if (tag == Tag(Section::kKeyframe)) keyframes[parts_->odometry->KeyframeFrameIndex(keyframe++)] = place;
+    });
+  }
+  if (parts_->pending.solution.valid())
+    out.Write(MapSection::kSolution, StateOf(*parts_->pending.solution.get()));
+  if (parts_->pending.adjustment) {
+    out.Write(MapSection::kAdjustment, "");
+    parts_->pending.adjustment->SaveSections(sink);
+  }
+  if (parts_->detector.valid()) {
+    const LoopWorker::Saved& saved = *parts_->detector.get();
+    out.Write(MapSection::kDetector, StateOf(saved));
+    for (const auto& [tag, bytes] : saved.detector) {
+      // The detector's view of a keyframe has the keyframe's features, too.
+      const bool view = tag == internal::kViewSection;
+      const auto keyframe = view ? keyframes.find(internal::LocationOfView(bytes)) : keyframes.end();
+      out.Write(tag, bytes, keyframe != keyframes.end() ? keyframe->second : 0);
+    }
+  }
+  if (more) more(sink);
+  out.Finish();
+}
+
+}  // namespace tutti

@@ -1,0 +1,231 @@
+// A run that was saved and goes on from the file is the run that never stopped.
+#include "tutti/slam/map_file.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <vector>
+
+#include "apps/slam/map_state.h"
+#include "tests/support/error_of.h"
+#include "tests/support/recording.h"
+#include "tests/support/small_town.h"
+#include "tests/support/test_data.h"
+#include "tutti/core/error.h"
+#include "tutti/slam/slam_system.h"
+
+namespace tutti {
+namespace {
+
+namespace fs = std::filesystem;
+
+testing::Recording Drive(SyntheticSensor sensor) {
+  SyntheticOptions options = testing::SmallStereoTownWithALoop(320, 160);
+  options.sensor = sensor;
+  options.laps = 1.4;
+  const SyntheticWorld world(options);
+  return testing::Record(world, world.Size());
+}
+
+RunConfig Configured(int threads) {
+  RunConfig config;
+  config.odometry.features = 800;
+  config.run.threads = threads;
+  return config;
+}
+
+/// All that a run leaves, as bytes.
+struct Outcome {
+  std::string poses, loops, graph;
+  int corrections = 0, adjustments = 0;
+  std::vector<std::int64_t> frames;
+};
+
+Outcome Finished(SlamSystem& slam) {
+  slam.Finish();
+  Outcome outcome;
+  const Odometry& odometry = *slam.odometry();
+  std::vector<std::pair<double, Pose>> poses;
+  for (const StampedPose& pose : odometry.FrameTrajectory()) poses.emplace_back(pose.stamp_s, pose.pose);
+  outcome.poses = StateOf(poses);
+  outcome.loops = StateOf(slam.loops());
+  const PoseGraph graph = slam.Graph();
+  std::vector<std::pair<int, Similarity>> nodes;
+  for (const PoseGraphNode& node : graph.nodes()) nodes.emplace_back(node.id, node.pose);
+  std::vector<Similarity> edges;
+  for (const PoseGraphEdge& edge : graph.edges()) edges.push_back(edge.measurement);
+  outcome.graph = StateOf(nodes) + StateOf(edges);
+  outcome.corrections = slam.Corrections();
+  outcome.adjustments = slam.GlobalAdjustments();
+  outcome.frames = odometry.FrameIndices();
+  return outcome;
+}
+
+void ExpectTheSame(const Outcome& a, const Outcome& b, const std::string& which) {
+  EXPECT_EQ(a.frames, b.frames) << which;
+  EXPECT_EQ(a.poses == b.poses, true) << which << ": other poses";
+  EXPECT_EQ(a.loops == b.loops, true) << which << ": other loops";
+  EXPECT_EQ(a.graph == b.graph, true) << which << ": another graph";
+  EXPECT_EQ(a.corrections, b.corrections) << which;
+  EXPECT_EQ(a.adjustments, b.adjustments) << which;
+}
+
+class MapFile : public ::testing::TestWithParam<SyntheticSensor> {};
+
+TEST_P(MapFile, ARunThatGoesOnFromAnyFrameIsTheOneThatNeverStopped) {
+  const testing::Recording recording = Drive(GetParam());
+  const fs::path folder = testing::FreshFolder();
+  SlamSystem whole(Configured(2), recording.rig);
+  const std::size_t n = recording.frames.size();
+  std::vector<std::size_t> saved;
+  bool moved = false, adjusting = false;  // what was under way when something was saved
+  std::size_t next = 3;                   // frame
+  int corrections = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    const bool just_moved = whole.Corrections() > corrections;
+    if (i == next || just_moved) {
+      whole.Save(folder / std::to_string(i));
+      saved.push_back(i);
+      moved = moved || corrections > 0;
+      adjusting = adjusting || whole.GlobalAdjustments() < whole.Corrections();
+      next = i + (just_moved ? 6 : 37);  // an adjustment takes 20 frames
+    }
+    corrections = whole.Corrections();
+    whole.Track(recording.frames[i]);
+  }
+  const Outcome expected = Finished(whole);
+  ASSERT_GT(expected.corrections, 0);
+  EXPECT_GT(expected.adjustments, 0);
+  EXPECT_TRUE(moved && adjusting) << "not all moments were tried";
+  for (std::size_t s = 0; s < saved.size(); ++s) {
+    const fs::path file = folder / std::to_string(saved[s]);
+    MapInfo info = ReadMapInfo(file);
+    EXPECT_EQ(info.frames, static_cast<std::int64_t>(saved[s]));
+    info.config.run.threads = s % 2 == 0 ? 1 : 2;
+    const auto slam = SlamSystem::Load(file, info);
+    for (std::size_t i = saved[s]; i < n; ++i) slam->Track(recording.frames[i]);
+    ExpectTheSame(Finished(*slam), expected, "from frame " + std::to_string(saved[s]));
+  }
+}
+
+TEST_P(MapFile, SavingDisturbsNothing) {
+  const testing::Recording recording = Drive(GetParam());
+  const fs::path folder = testing::FreshFolder();
+  SlamSystem often(Configured(2), recording.rig), never(Configured(1), recording.rig);
+  for (std::size_t i = 0; i < recording.frames.size(); ++i) {
+    if (i % 9 == 0) often.Save(folder / "often");
+    often.Track(recording.frames[i]);
+    never.Track(recording.frames[i]);
+  }
+  ExpectTheSame(Finished(often), Finished(never), "saved often");
+}
+
+// What the file of the long-term memory holds is then of later than the map.
+TEST(MapFileWithLongTermMemory, GoesOnFromTheMapWhateverTheMemorysFileHasSeenSince) {
+  const testing::Recording recording = Drive(SyntheticSensor::kStereo);
+  const fs::path folder = testing::FreshFolder();
+  const auto configured = [&](const char* file) {
+    RunConfig config = Configured(2);
+    config.loops.wm_limit = 12;
+    config.loops.ltm_file = (folder / file).string();
+    return config;
+  };
+  const std::size_t n = recording.frames.size(), k = n / 2, crash = k + 30;
+  SlamSystem whole(configured("whole.ltm"), recording.rig);
+  {
+    SlamSystem broken_off(configured("broken.ltm"), recording.rig);
+    for (std::size_t i = 0; i < crash; ++i) {
+      if (i == k) broken_off.Save(folder / "map");
+      broken_off.Track(recording.frames[i]);
+    }
+  }
+  for (const InputFrame& frame : recording.frames) whole.Track(frame);
+  const auto slam = SlamSystem::Load(folder / "map", ReadMapInfo(folder / "map"));
+  for (std::size_t i = k; i < n; ++i) slam->Track(recording.frames[i]);
+  ExpectTheSame(Finished(*slam), Finished(whole), "with a long-term memory");
+  EXPECT_TRUE(fs::exists(folder / "broken.ltm"));
+}
+
+INSTANTIATE_TEST_SUITE_P(Sensors, MapFile,
+                         ::testing::Values(SyntheticSensor::kMono, SyntheticSensor::kStereo,
+                                           SyntheticSensor::kRgbd),
+                         [](const auto& test) {
+                           return test.param == SyntheticSensor::kMono     ? "Mono"
+                                  : test.param == SyntheticSensor::kStereo ? "Stereo"
+                                                                           : "Rgbd";
+                         });
+
+class DamagedMap : public ::testing::Test {
+ protected:
+  static std::string Content(const fs::path& file) {
+    std::ifstream in(file, std::ios::binary);
+    return std::string((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+  }
+  // What loading says.
+  std::string Refusal(const std::string& bytes) const {
+    std::ofstream(file_, std::ios::binary | std::ios::trunc) << bytes;
+    return testing::ErrorOf([&] { SlamSystem::Load(file_, ReadMapInfo(file_)); });
+  }
+  void SaveSome() const {
+    const testing::Recording recording =
+        testing::Record(SyntheticWorld(testing::SmallStereoTown(320, 160)), 30);
+    SlamSystem slam(Configured(1), recording.rig);
+    for (const InputFrame& frame : recording.frames) slam.Track(frame);
+    slam.Save(file_);
+  }
+  fs::path file_ = testing::FreshFolder() / "some.tutti";
+};
+
+TEST_F(DamagedMap, IsRefusedByNameWhereverItIsDamaged) {
+  SaveSome();
+  const std::string bytes = Content(file_);
+  ASSERT_EQ(Refusal(bytes), "no error");
+  constexpr std::size_t kVariants = 400;
+  for (std::size_t v = 0; v < kVariants; ++v) {
+    const std::size_t at = v < 20 ? v : v * (bytes.size() - 1) / (kVariants - 1);
+    const std::string cut = Refusal(bytes.substr(0, at));
+    EXPECT_NE(cut.find(file_.string()), std::string::npos) << "cut at " << at << ": " << cut;
+    std::string changed = bytes;
+    changed[at] = static_cast<char>(changed[at] ^ (1 << (v % 8)));
+    const std::string flipped = Refusal(changed);
+    EXPECT_NE(flipped.find(file_.string()), std::string::npos) << "changed at " << at << ": " << flipped;
+  }
+}
+
+TEST_F(DamagedMap, ANewerVersionIsSaidAndSomethingElseIsNoMap) {
+  SaveSome();
+  std::string newer = Content(file_);
+  newer[8] = 77;
+  EXPECT_NE(Refusal(newer).find("version 77"), std::string::npos);
+  EXPECT_NE(Refusal("no map at all, but long enough to be one").find("is no map"), std::string::npos);
+  EXPECT_THROW(ReadMapInfo(file_.parent_path() / "absent"), InputError);
+}
+
+TEST_F(DamagedMap, WhatCantBeWrittenLeavesTheOldOne) {
+  SaveSome();
+  const std::string before = Content(file_);
+  const testing::Recording recording = testing::Record(SyntheticWorld(testing::SmallStereoTown(320, 160)), 3);
+  const SlamSystem slam(Configured(1), recording.rig);
+  EXPECT_THROW(slam.Snapshot().Write(file_, [](const MapSink&) { throw InputError("stop"); }), InputError);
+  EXPECT_EQ(Content(file_) == before, true);
+  EXPECT_THROW(slam.Save(file_ / "no" / "folder"), InputError);
+  EXPECT_EQ(std::distance(fs::directory_iterator(file_.parent_path()), fs::directory_iterator()), 1);
+}
+
+TEST_F(DamagedMap, TheInfoSaysWhatIsInside) {
+  SaveSome();
+  const MapInfo info = ReadMapInfo(file_);
+  EXPECT_EQ(info.frames, 30);
+  EXPECT_GT(info.keyframes, 2);
+  EXPECT_GT(info.landmarks, 100);
+  EXPECT_EQ(info.pieces, 1);
+  EXPECT_EQ(info.rig.sensor, Sensor::kStereo);
+  EXPECT_EQ(info.config.odometry.features, 800);
+  EXPECT_GT((info.most - info.least).norm(), 0.5);
+}
+
+}  // namespace
+}  // namespace tutti

@@ -5,7 +5,7 @@ namespace tutti::manual {
 namespace {
 
 // Inside of single quotes and of [explanation] or :message:.
-std::string Quoted(const std::string& text) {
+std::string ZshQuoted(const std::string& text) {
   std::string out = Replaced(Replaced(text, "\\", "\\\\"), "'", "'\\''");
   for (const char* sign : {"[", "]", ":"}) out = Replaced(out, sign, std::string("\\") + sign);
   return out;
@@ -18,10 +18,10 @@ std::string Value(const Argument& argument) {
   if (!argument.choices.empty()) {
     action = "(";
     for (const std::string& choice : argument.choices)
-      action += (action.size() == 1 ? "" : " ") + Quoted(choice);
+      action += (action.size() == 1 ? "" : " ") + ZshQuoted(choice);
     action += ")";
   }
-  return std::string(argument.value_optional ? "::" : ":") + Quoted(argument.value) + ":" + action;
+  return std::string(argument.value_optional ? "::" : ":") + ZshQuoted(argument.value) + ":" + action;
 }
 
 std::string Specifications(const CommandPage& command, const std::string& indent) {
@@ -29,11 +29,11 @@ std::string Specifications(const CommandPage& command, const std::string& indent
   for (const Argument& argument : command.arguments) {
     const std::string begin = " \\\n" + indent + "'" + (argument.several ? "*" : "");
     if (argument.positional) {
-      out.append(begin).append(":").append(Quoted(argument.names.front())).append(":_files'");
+      out.append(begin).append(":").append(ZshQuoted(argument.names.front())).append(":_files'");
       continue;
     }
     const std::string end =
-        "[" + Quoted(argument.text) + "]" + (argument.value.empty() ? "" : Value(argument)) + "'";
+        "[" + ZshQuoted(argument.text) + "]" + (argument.value.empty() ? "" : Value(argument)) + "'";
     for (const std::string& name : argument.names) out.append(begin).append(name).append(end);
   }
   return out;
@@ -45,7 +45,7 @@ std::string ZshCompletion(const CommandPage& program) {
   std::string commands;
   std::string cases;
   for (const CommandPage& command : program.commands) {
-    commands += "    '" + Quoted(command.name) + ":" + Replaced(command.text, "'", "'\\''") + "'\n";
+    commands += "    '" + ZshQuoted(command.name) + ":" + Replaced(command.text, "'", "'\\''") + "'\n";
     cases += "        " + command.name + ")\n          _arguments" + Specifications(command, "            ") +
              "\n          ;;\n";
   }

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/run/graph_json.h"
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
 #include "tutti/backend/certificate.h"
@@ -56,13 +57,7 @@ nlohmann::ordered_json ToJson(const OptimizeArguments& arguments, const G2oFile&
   json["solver_note"] = report.solver_note;
   json["init"] = arguments.init;
   json["start"] = ToString(report.start);
-  json["starts"] = nlohmann::ordered_json::array();
-  for (const StartOutcome& start : report.starts) {
-    json["starts"].push_back({{"start", ToString(start.start)},
-                              {"initial_objective", start.initial_objective},
-                              {"objective", start.objective},
-                              {"spared", start.spared}});
-  }
+  json["starts"] = StartsJson(report.starts);
   json["success"] = report.success;
   json["reason"] = report.reason;
   json["initial_costs"] = ToJson(report.initial_costs);
@@ -86,14 +81,9 @@ nlohmann::ordered_json ToJson(const OptimizeArguments& arguments, const G2oFile&
                                      {"reason", ToString(report.edges[e].doubt)}});
   }
   if (certificate) {
-    json["certificate"] = {{"available", certificate->available},
-                           {"certified", certificate->certified},
-                           {"reason", certificate->reason},
-                           {"chordal", certificate->chordal},
-                           {"lower_bound", certificate->lower_bound},
-                           {"relative_gap", certificate->relative_gap},
-                           {"min_eigenvalue_bound", certificate->min_eigenvalue_bound},
-                           {"time_s", certificate->time_s}};
+    json["certificate"] = CertificateJson(*certificate);
+    json["certificate"]["min_eigenvalue_bound"] = certificate->min_eigenvalue_bound;
+    json["certificate"]["time_s"] = certificate->time_s;
   }
   json["warnings"] = file.warnings;
   return json;

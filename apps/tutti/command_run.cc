@@ -1,7 +1,9 @@
 // tutti run: SLAM on a data set.
 #include <cstdio>
 #include <memory>
+#include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "apps/report/page.h"
@@ -21,15 +23,15 @@ namespace {
 
 struct RunArguments {
   std::string config, dataset, out, ground_truth;
-  std::string trace;
+  std::string trace, resume, save_map;
   std::vector<std::string> set;  // SECTION.KEY=VALUE
   bool no_loops = false, no_report = false, quiet = false, keep = false, help_config = false,
-       advanced = false, timing = false, realtime = false;
+       advanced = false, timing = false, realtime = false, no_map = false;
   std::uint64_t seed = 1;
   int threads = 2;
   int inject_false_loops = 0;
   int start = 0, end = 0, stride = 1;
-  double follow_s = 10;
+  double follow_s = 10, checkpoint_s = 30;
   bool view = false;
   LiveViewOptions live;
 };
@@ -76,11 +78,59 @@ int ExitCode(const RunResult& result) {
   return 0;
 }
 
+int RunAndShow(const CLI::App& command, const RunArguments& arguments, RunRequest request,
+               const RunConfig& config) {
+  const bool view = arguments.view || command.count("--view-address") > 0;
+  if (view) request.observers.push_back(StartView(arguments.live));
+  const RunResult result = arguments.no_report ? RunSlam(request, config) : RunWithReport(request, config);
+  std::fputs(ResultTable(result).c_str(), stdout);
+  if (arguments.timing) {
+    std::fputs(TimingTable(result.stages, result.wall_s, result.cpu_s, result.frames_total).c_str(), stdout);
+  }
+  std::printf("\n  results are in %s\n", result.folder.c_str());
+  if (!arguments.no_report && !arguments.quiet && !ReportsAvailable())
+    std::fprintf(stderr, "tutti: %s\n", ReportsMissing().c_str());
+  return ExitCode(result);
+}
+// What a run can be told that goes on: the rest is as it was.
+void RefuseOthers(const CLI::App& command) {
+  const std::set<std::string> allowed = {
+      "--resume", "--threads",   "--quiet", "--view",       "--view-port", "--view-wait", "--view-address",
+      "--timing", "--no-report", "--trace", "--checkpoint", "--save-map",  "--no-map"};
+  for (const CLI::Option* option : command.get_options()) {
+    const std::string name = option->get_name();
+    if (option->count() > 0 && allowed.count(name) == 0)
+      throw InputError("run: " + name +
+                       " can't be given with --resume, which takes data set, configuration "
+                       "and frames from the checkpoint");
+  }
+}
+
+int Resume(const CLI::App& command, const RunArguments& arguments) {
+  RefuseOthers(command);
+  auto found = ResumeRequest(arguments.resume);
+  if (!found) {
+    std::printf("tutti: the run in %s has finished; there is nothing to go on with\n",
+                arguments.resume.c_str());
+    return 0;
+  }
+  auto& [request, config] = *found;
+  request.quiet = arguments.quiet;
+  request.timing = arguments.timing;
+  if (!arguments.trace.empty()) request.trace = arguments.trace;
+  if (command.count("--threads") > 0) request.threads = arguments.threads;
+  if (command.count("--checkpoint") > 0) request.checkpoint_s = arguments.checkpoint_s;
+  if (!arguments.save_map.empty()) request.save_map = arguments.save_map;
+  if (arguments.no_map) request.save_map.reset();
+  return RunAndShow(command, arguments, std::move(request), config);
+}
+
 int Run(const CLI::App& command, const RunArguments& arguments) {
   if (arguments.help_config) {
     std::fputs(HelpConfig(arguments.advanced).c_str(), stdout);
     return 0;
   }
+  if (!arguments.resume.empty()) return Resume(command, arguments);
   Require(arguments.config, "--config",
           "a YAML file, for example " + internal::ExampleConfigs() + "/tum_fr1_rgbd.yaml");
   Require(arguments.dataset, "--dataset", "the data set's folder, a video file, or camera:0");
@@ -104,19 +154,14 @@ int Run(const CLI::App& command, const RunArguments& arguments) {
   if (command.count("--start") > 0) request.start = arguments.start;
   if (command.count("--end") > 0) request.end = arguments.end;
   if (command.count("--stride") > 0) request.stride = arguments.stride;
+  if (command.count("--checkpoint") > 0) request.checkpoint_s = arguments.checkpoint_s;
+  if (request.checkpoint_s && request.realtime)
+    throw InputError("run: --checkpoint: in real time, or with a camera, there is no going on later");
+  if (!arguments.save_map.empty()) request.save_map = arguments.save_map;
+  if (arguments.save_map.empty() && !arguments.no_map) request.save_map = kMap;
   RunConfig config = LoadConfig(request.config);
   SetOptions(arguments.set, config);
-  const bool view = arguments.view || command.count("--view-address") > 0;
-  if (view) request.observers.push_back(StartView(arguments.live));
-  const RunResult result = arguments.no_report ? RunSlam(request, config) : RunWithReport(request, config);
-  std::fputs(ResultTable(result).c_str(), stdout);
-  if (arguments.timing) {
-    std::fputs(TimingTable(result.stages, result.wall_s, result.cpu_s, result.frames_total).c_str(), stdout);
-  }
-  std::printf("\n  results are in %s\n", result.folder.c_str());
-  if (!arguments.no_report && !arguments.quiet && !ReportsAvailable())
-    std::fprintf(stderr, "tutti: %s\n", ReportsMissing().c_str());
-  return ExitCode(result);
+  return RunAndShow(command, arguments, std::move(request), config);
 }
 
 }  // namespace
@@ -135,6 +180,19 @@ void SetUpRun(CLI::App& command, int& exit_code) {
   command.add_flag(
       "--keep", arguments->keep,
       "don't replace earlier results in --out: move them into OUT/1, the next ones into OUT/2, ...");
+  command.add_flag("--no-map", arguments->no_map, "don't write the map (OUT/map.tutti)");
+  command.add_option("--save-map", arguments->save_map,
+                     "write the map to this file instead of OUT/map.tutti");
+  command
+      .add_option("--checkpoint", arguments->checkpoint_s,
+                  "while running, write OUT/checkpoint.tutti at most every SECONDS (default 30), from which "
+                  "--resume goes on after a crash")
+      ->expected(0, 1)
+      ->type_name("SECONDS")
+      ->check(NotNegative());
+  command.add_option("--resume", arguments->resume,
+                     "OUT: go on with the run in this folder that was broken off, from its last checkpoint; "
+                     "the results are those of a run that never stopped. Needs no other option");
   command.add_option(
       "--ground-truth", arguments->ground_truth,
       "trajectory to evaluate against (default: the data set's own, if it has one; 'none': don't)");

@@ -8,6 +8,9 @@
 namespace tutti::cli {
 
 void SetUpRun(CLI::App& command, int& exit_code);
+void SetUpLocalize(CLI::App& command, int& exit_code);
+void SetUpExport(CLI::App& command, int& exit_code);
+void SetUpMap(CLI::App& command, int& exit_code);
 void SetUpCalibrateCheck(CLI::App& command, int& exit_code);
 void SetUpEvaluate(CLI::App& command, int& exit_code);
 void SetUpConvert(CLI::App& command, int& exit_code);

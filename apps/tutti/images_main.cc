@@ -8,6 +8,8 @@ int main(int argc, char** argv) {
       {"run", tutti::cli::SetUpRun},           {"calibrate-check", tutti::cli::SetUpCalibrateCheck},
       {"compare", tutti::cli::SetUpCompare},   {"loops", tutti::cli::SetUpLoops},
       {"generate", tutti::cli::SetUpGenerate}, {"demo", tutti::cli::SetUpDemo},
+      {"map", tutti::cli::SetUpMap},           {"localize", tutti::cli::SetUpLocalize},
+      {"export", tutti::cli::SetUpExport},
   };
   return tutti::cli::RunProgram(argc, argv, own, nullptr);
 }

@@ -21,6 +21,9 @@ struct Command {
 // All commands of tutti, in the order of the help.
 constexpr Command kCommands[] = {
     {"run", "visual SLAM on a data set: trajectories, loops, summary"},
+    {"localize", "where the frames of a data set are in the map of an earlier run"},
+    {"map", "what is in a map file: keyframes, landmarks, loops, size, extent"},
+    {"export", "a saved map for other programs: PLY, COLMAP, nerfstudio, g2o, TUM"},
     {"calibrate-check",
      "can the calibration be right? Measures field of view, principal point, rows and order of stereo pairs, "
      "depth unit; exit status 1 if something can't be"},

@@ -211,11 +211,12 @@ std::filesystem::path WriteLoopRun(const LoopRun& run, const LoopReport& report,
   json["protocol"]["members"] = run.options.members;
   json["protocol"]["seed"] = run.options.seed;
   json["protocol"]["threads"] = run.options.threads;
+  const CurvePlot curves = PlotCurves(run, report);
   folder.Write({"results.json", [&](File file) { WriteText(file, json.dump(2) + "\n"); }});
   folder.Write({"hypotheses.csv", [&](File file) { WriteText(file, Csv(run)); }});
   folder.Write({"precision_recall.csv", [&](File file) { WriteCurvesCsv(report, file); }});
-  folder.Write({"precision_recall.svg", [&](File file) { WriteSvg(file, PlotCurves(run, report)); }});
-  folder.Write({"precision_recall.png", [&](File file) { WritePng(file, PlotCurves(run, report)); }});
+  folder.Write({"precision_recall.svg", [&](File file) { WriteSvg(file, curves); }});
+  folder.Write({"precision_recall.png", [&](File file) { WritePng(file, curves); }});
   folder.Write({"confusion.png", [&](File file) { WriteConfusion(run, report, file); }});
   folder.Write({"contact_sheet.png", [&](File file) { WriteContactSheet(run, report, file); }});
   if (run.options.keep_posterior)

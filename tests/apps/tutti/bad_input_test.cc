@@ -25,16 +25,8 @@ using ::testing::StartsWith;
 class BadInput : public ::testing::Test {
  protected:
   testing::ProcessResult Run(const fs::path& config, const fs::path& dataset,
-                             std::vector<std::string> more = {}) {
-    std::vector<std::string> arguments = {"run",
-                                          "--config",
-                                          config.string(),
-                                          "--dataset",
-                                          dataset.string(),
-                                          "--out",
-                                          (folder_ / "out").string()};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return RunTutti(arguments);
+                             const std::vector<std::string>& more = {}) {
+    return RunTutti(testing::RunArguments(config, dataset, folder_ / "out", more));
   }
   nlohmann::json Summary() const { return nlohmann::json::parse(ReadAll(folder_ / "out" / "summary.json")); }
   // Refused before any work: status 1 and one line.

@@ -57,6 +57,14 @@ ProcessResult RunTutti(const std::vector<std::string>& arguments) {
   return RunTuttiAndSignal(arguments, "", 0);
 }
 
+std::vector<std::string> RunArguments(const std::filesystem::path& config,
+                                      const std::filesystem::path& dataset, const std::filesystem::path& out,
+                                      const std::vector<std::string>& more) {
+  std::vector<std::string> arguments = {"run", "--config", config, "--dataset", dataset, "--out", out};
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return arguments;
+}
+
 std::string ReadAll(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   std::stringstream text;

@@ -23,6 +23,11 @@ ProcessResult RunProgramAndSignal(const std::filesystem::path& program,
 /// Runs tutti with these arguments and waits for it.
 ProcessResult RunTutti(const std::vector<std::string>& arguments);
 
+/// `tutti run` with these, and `more` at the end.
+std::vector<std::string> RunArguments(const std::filesystem::path& config,
+                                      const std::filesystem::path& dataset, const std::filesystem::path& out,
+                                      const std::vector<std::string>& more = {});
+
 /// RunProgramAndSignal for tutti.
 ProcessResult RunTuttiAndSignal(const std::vector<std::string>& arguments, const std::string& text,
                                 int signal);

@@ -26,16 +26,8 @@ using ::testing::StartsWith;
 class NothingLost : public ::testing::Test {
  protected:
   std::vector<std::string> Arguments(std::vector<std::string> more = {}) const {
-    std::vector<std::string> arguments = {"run",
-                                          "--config",
-                                          testing::TinyConfig(folder_).string(),
-                                          "--dataset",
-                                          testing::TinyTown().string(),
-                                          "--out",
-                                          out_.string(),
-                                          "--no-report"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return arguments;
+    more.insert(more.begin(), "--no-report");
+    return testing::RunArguments(testing::TinyConfig(folder_), testing::TinyTown(), out_, more);
   }
   testing::ProcessResult Run(const std::vector<std::string>& more = {}) const {
     return RunTutti(Arguments(more));
@@ -151,7 +143,7 @@ TEST_F(NothingLost, ATraceThatCanNotBeWrittenCostsNothingElse) {
   const auto run = Run({"--end", "4", "--trace", "/dev/full"});
   EXPECT_EQ(run.status, 1) << run.output;
   EXPECT_THAT(run.output, AllOf(HasSubstr("/dev/full"), HasSubstr("No space left on device")));
-  EXPECT_EQ(Files().size(), 9u);
+  EXPECT_EQ(Files().size(), 10u);
 }
 
 TEST_F(NothingLost, ForeignFoldersAreRefusedAndStayAsTheyAre) {

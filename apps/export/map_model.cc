@@ -1,0 +1,59 @@
+#include "apps/export/map_model.h"
+
+#include <map>
+
+#include "apps/run/run_parts.h"
+#include "tutti/core/error.h"
+
+namespace tutti {
+namespace {
+
+// Landmarks that can be exported, by id; the number of observations is counted from 0.
+std::map<int, ModelLandmark> FiniteLandmarks(const Odometry& odometry) {
+  std::map<int, ModelLandmark> landmarks;
+  for (const LandmarkView& landmark : odometry.Landmarks()) {
+    if (!landmark.position.allFinite()) continue;
+    ModelLandmark& out = landmarks[landmark.id];
+    out.id = landmark.id;
+    out.position = landmark.position;
+  }
+  return landmarks;
+}
+
+}  // namespace
+
+MapModel ModelOf(const Odometry& odometry, const PoseGraph& graph) {
+  const std::vector<int> pieces = odometry.Pieces();
+  if (pieces.empty()) throw InputError("the map is empty: no frame has a pose; there is nothing to export");
+  MapModel model;
+  model.camera = odometry.Rig().camera;
+  if (const std::optional<LensFound> lens = odometry.Lens(); lens && !lens->steps.empty())
+    model.lens = {lens->steps.back().k1, lens->steps.back().k2};
+  model.graph = graph;
+  model.trajectory = BodyTrajectory(odometry.FrameTrajectory(pieces.front()), odometry.Rig());
+  std::map<int, ModelLandmark> landmarks = FiniteLandmarks(odometry);
+  for (const int id : odometry.KeyframeIds()) {
+    if (odometry.KeyframePiece(id) != pieces.front()) {
+      ++model.other_keyframes;
+      continue;
+    }
+    const KeyframeView view = odometry.Keyframe(id);
+    if (!view.T_world_camera.IsFinite()) continue;
+    const Pose T_camera_world = view.T_world_camera.Inverse();
+    ModelKeyframe keyframe{id, view.frame_index, view.stamp_s, view.T_world_camera, {}};
+    for (std::size_t f = 0; f < view.landmarks.size(); ++f) {
+      const auto landmark = landmarks.find(view.landmarks[f]);
+      if (landmark == landmarks.end()) continue;
+      if (!((T_camera_world * landmark->second.position).z() > 0)) continue;
+      keyframe.views.push_back({view.landmarks[f], view.keypoints[f].pt});
+      ++landmark->second.observations;
+    }
+    model.keyframes.push_back(std::move(keyframe));
+  }
+  for (const auto& [id, landmark] : landmarks) {
+    if (landmark.observations > 0) model.landmarks.push_back(landmark);
+  }
+  return model;
+}
+
+}  // namespace tutti

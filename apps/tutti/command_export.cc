@@ -1,0 +1,116 @@
+// tutti export: a saved map in the formats of other programs.
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+#include "apps/export/map_export.h"
+#include "apps/tutti/checks.h"
+#include "apps/tutti/commands.h"
+#include "tutti/core/error.h"
+#include "tutti/slam/map_file.h"
+#include "tutti/slam/slam_system.h"
+
+namespace tutti::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct ExportArguments {
+  std::string map, dataset;
+  ExportRequest request;
+};
+
+fs::path MapFile(const std::string& run_or_map) {
+  std::error_code ignored;
+  if (!fs::is_directory(run_or_map, ignored)) return run_or_map;
+  fs::path file = fs::path(run_or_map) / "map.tutti";
+  if (!fs::exists(file, ignored))
+    throw InputError(file.string() +
+                     ": is not there; `tutti run` writes it when it has finished, unless it "
+                     "was told --no-map");
+  return file;
+}
+
+// The data set that the run was called with; none where its map does not say so.
+std::string DatasetOf(const MapInfo& info) {
+  const nlohmann::json note = nlohmann::json::parse(info.note, nullptr, false);
+  return note.is_object() ? note.value("dataset", std::string()) : std::string();
+}
+
+void Warn(const std::string& warning) { std::fprintf(stderr, "tutti: warning: %s\n", warning.c_str()); }
+
+// Images are not needed for everything: where they can't be had, ExportMap says what it makes of that.
+std::unique_ptr<Dataset> OpenImages(const ExportArguments& arguments, const MapInfo& info) {
+  const ExportRequest& request = arguments.request;
+  if (!request.landmarks && !request.colmap && !request.transforms) return nullptr;
+  const std::string path = arguments.dataset.empty() ? DatasetOf(info) : arguments.dataset;
+  if (path.empty() || IsCamera(path)) return nullptr;
+  try {
+    return OpenDataset(path, info.config.dataset);
+  } catch (const InputError& error) {
+    if (!arguments.dataset.empty() || request.colmap || request.transforms) throw;
+    Warn(error.what());
+    return nullptr;
+  }
+}
+
+void RunExport(const ExportArguments& arguments) {
+  const fs::path file = MapFile(arguments.map);
+  const MapInfo info = ReadMapInfo(file);
+  const std::unique_ptr<SlamSystem> slam = SlamSystem::Load(file, info);
+  if (slam->AppearanceOnly())
+    throw InputError(file.string() +
+                     ": has no poses, since the camera had no calibration; nothing to export");
+  const std::unique_ptr<Dataset> dataset = OpenImages(arguments, info);
+  const ExportReport report =
+      ExportMap(ModelOf(*slam->odometry(), slam->Graph()), dataset.get(), arguments.request);
+  for (const std::string& warning : report.warnings) Warn(warning);
+  for (const ExportedFile& written : report.files) {
+    std::printf("%s: %s\n  open with: %s\n", written.path.c_str(), written.content.c_str(),
+                written.open_with.c_str());
+  }
+}
+
+}  // namespace
+
+void SetUpExport(CLI::App& command, int&) {
+  const auto arguments = std::make_shared<ExportArguments>();
+  ExportRequest& request = arguments->request;
+  command.add_option("MAP", arguments->map, "folder of `tutti run`, or a map file (map.tutti)")->required();
+  const auto path = [&command](const char* name, std::optional<fs::path>* to, const char* text,
+                               const char* type) {
+    command
+        .add_option_function<std::string>(
+            name, [to](const std::string& value) { *to = value; }, text)
+        ->type_name(type);
+  };
+  path("--landmarks", &request.landmarks,
+       "coloured landmarks with their number of observations, keyframes as pyramids (PLY)", "FILE");
+  path("--colmap", &request.colmap,
+       "COLMAP's sparse model, text and binary, in DIR/sparse/0, undistorted images in DIR/images", "DIR");
+  path("--transforms", &request.transforms,
+       "nerfstudio's DIR/transforms.json, with DIR/images and DIR/sparse_pc.ply beside it", "FILE");
+  path("--g2o", &request.g2o, "pose graph: keyframes, odometry edges, accepted loops", "FILE");
+  path("--tum", &request.tum, "poses of all frames, as in trajectory.txt", "FILE");
+  command
+      .add_option("--images", request.images,
+                  "at most so many images for --colmap and --transforms, of the keyframes: evenly along "
+                  "the way, sharp ones first")
+      ->check(CLI::Range(2, 1000000))
+      ->capture_default_str();
+  command.add_option("--dataset", arguments->dataset, "where the images are now (default: where they were)")
+      ->type_name("DIR");
+  command.footer(
+      "Poses are those after the last correction. Axes, units and programs: docs/formats.md.\n"
+      "A folder must be new, empty, or of an earlier export, which is replaced; files are overwritten.\n"
+      "Examples:\n"
+      "  tutti export result --landmarks map.ply\n"
+      "  tutti export result --colmap kitchen --transforms kitchen/transforms.json --images 200\n"
+      "  tutti export result/map.tutti --g2o graph.g2o --tum trajectory.txt");
+  command.callback([arguments] { RunExport(*arguments); });
+}
+
+}  // namespace tutti::cli

@@ -1,0 +1,70 @@
+// tutti localize: where the frames of a data set are in a map.
+#include <cstdio>
+#include <memory>
+#include <string>
+
+#include "apps/run/localization.h"
+#include "apps/tutti/checks.h"
+#include "apps/tutti/commands.h"
+#include "tutti/slam/config.h"
+
+namespace tutti::cli {
+namespace {
+
+struct LocalizeArguments {
+  std::string map, dataset, out, config;
+  int start = 0, end = 0, stride = 1, threads = 2;
+  bool quiet = false;
+};
+
+// 130: ended by Ctrl-C; 1: no frame was found in the map.
+int RunLocalize(const CLI::App& command, const LocalizeArguments& arguments) {
+  LocalizationRequest request;
+  request.map = arguments.map;
+  request.dataset = arguments.dataset;
+  request.out = arguments.out;
+  request.threads = arguments.threads;
+  request.quiet = arguments.quiet;
+  if (!arguments.config.empty()) request.options = LoadConfig(arguments.config).dataset;
+  if (command.count("--start") > 0) request.start = arguments.start;
+  if (command.count("--end") > 0) request.end = arguments.end;
+  if (command.count("--stride") > 0) request.stride = arguments.stride;
+  const Localization result = Localize(request);
+  const std::size_t total = result.frames.size() + result.bad;
+  std::printf("\n  frames %zu of %zu localized; map loaded in %.2f s, ", result.Localized(), total,
+              result.load_s);
+  if (result.first_pose_s) std::printf("first pose after %.2f s, ", *result.first_pose_s);
+  std::printf("%.1f ms of processor time per frame\n",
+              total > 0 ? 1000 * result.cpu_s / static_cast<double>(total) : 0.0);
+  std::printf("  poses in the map's frame of reference are in %s\n",
+              (request.out / "trajectory.txt").c_str());
+  if (result.interrupted) return 130;
+  if (result.Localized() > 0) return 0;
+  std::fprintf(stderr, "tutti: not one frame was found in the map: it shows other places\n");
+  return 1;
+}
+
+}  // namespace
+
+void SetUpLocalize(CLI::App& command, int& exit_code) {
+  const auto arguments = std::make_shared<LocalizeArguments>();
+  command.add_option("--map", arguments->map, "map.tutti of a run; it is only read")->required();
+  command.add_option("--dataset", arguments->dataset, "data set, as for run, of the same camera")->required();
+  command
+      .add_option("--out", arguments->out, "folder for the results: a new or empty one, or an earlier one's")
+      ->required();
+  command.add_option(
+      "--config", arguments->config,
+      "YAML file that says how to read the data set (sections dataset and camera); without it, as "
+      "the map's was read");
+  command.add_option("--start", arguments->start, "first frame that is used, counted from 0")
+      ->check(NotNegative());
+  command.add_option("--end", arguments->end, "frame before which to stop")->check(Positive());
+  command.add_option("--stride", arguments->stride, "use every so many frames")->check(Positive());
+  command.add_option("--threads", arguments->threads, "most threads; the result is the same for any number")
+      ->check(Positive());
+  command.add_flag("--quiet", arguments->quiet, "no progress and no notes");
+  command.callback([&command, arguments, &exit_code] { exit_code = RunLocalize(command, *arguments); });
+}
+
+}  // namespace tutti::cli

@@ -1,0 +1,95 @@
+// tutti map: what is in a map file.
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "apps/tutti/checks.h"
+#include "apps/tutti/commands.h"
+#include "tutti/core/error.h"
+#include "tutti/slam/map_file.h"
+
+namespace tutti::cli {
+namespace {
+
+struct MapArguments {
+  std::string action, file;
+  bool check = false, json = false;
+};
+
+double Megabytes(const std::string& file) {
+  return static_cast<double>(std::filesystem::file_size(file)) / (1024.0 * 1024.0);
+}
+
+// What the run was called with, where a run wrote the map.
+nlohmann::json NoteOf(const MapInfo& info) {
+  nlohmann::json note = nlohmann::json::parse(info.note, nullptr, false);
+  return note.is_object() ? note : nlohmann::json::object();
+}
+
+void PrintText(const MapInfo& info, const std::string& file) {
+  const PinholeCamera& c = info.rig.camera;
+  const bool mono = info.rig.sensor == Sensor::kMono;
+  const char* const unit = mono ? "(units of the first scale)" : "m";
+  const Eigen::Vector3d size = info.most - info.least;
+  std::printf("  %s: %.1f MB, written by tutti %s\n", file.c_str(), Megabytes(file), info.program.c_str());
+  if (const auto note = NoteOf(info); note.contains("dataset"))
+    std::printf("  of             %s\n", note["dataset"].get<std::string>().c_str());
+  std::printf("  sensor         %s, %dx%d px, fx %.2f, fy %.2f px\n", WordOf(info.rig.sensor), c.width,
+              c.height, c.fx, c.fy);
+  std::printf("  frames         %lld, the last one %lld\n", static_cast<long long>(info.frames),
+              static_cast<long long>(info.last_frame));
+  std::printf("  keyframes      %d, from %.2f s to %.2f s\n", info.keyframes, info.first_stamp_s,
+              info.last_stamp_s);
+  std::printf("  landmarks      %d\n", info.landmarks);
+  std::printf("  loops          %d\n", info.loops);
+  std::printf("  submaps        %d\n", info.pieces);
+  std::printf("  extent         %.2f x %.2f x %.2f %s\n", size.x(), size.y(), size.z(), unit);
+}
+
+void PrintJson(const MapInfo& info, const std::string& file) {
+  nlohmann::ordered_json json;
+  json["file"] = file;
+  json["bytes"] = std::filesystem::file_size(file);
+  json["version"] = info.program;
+  json["run"] = NoteOf(info);
+  json["sensor"] = WordOf(info.rig.sensor);
+  json["frames"] = info.frames;
+  json["last_frame"] = info.last_frame;
+  json["keyframes"] = info.keyframes;
+  json["first_stamp_s"] = info.first_stamp_s;
+  json["last_stamp_s"] = info.last_stamp_s;
+  json["landmarks"] = info.landmarks;
+  json["loops"] = info.loops;
+  json["submaps"] = info.pieces;
+  json["least"] = {info.least.x(), info.least.y(), info.least.z()};
+  json["most"] = {info.most.x(), info.most.y(), info.most.z()};
+  std::printf("%s\n", json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace).c_str());
+}
+
+int Info(const MapArguments& arguments) {
+  const MapInfo info = ReadMapInfo(arguments.file);
+  if (arguments.check) CheckMapFile(arguments.file);
+  if (arguments.json) {
+    PrintJson(info, arguments.file);
+  } else {
+    PrintText(info, arguments.file);
+    if (arguments.check) std::printf("  all checksums are right\n");
+  }
+  return 0;
+}
+
+}  // namespace
+
+void SetUpMap(CLI::App& command, int& exit_code) {
+  const auto arguments = std::make_shared<MapArguments>();
+  command.add_option("action", arguments->action, "info: what is in the map")
+      ->required()
+      ->check(CLI::IsMember({"info"}));
+  command.add_option("file", arguments->file, "a map (map.tutti) or a checkpoint of `tutti run`")->required();
+  command.add_flag("--check", arguments->check, "read all of it, and verify every checksum");
+  command.add_flag("--json", arguments->json, "for other programs");
+  command.callback([arguments, &exit_code] { exit_code = Info(*arguments); });
+}
+
+}  // namespace tutti::cli

@@ -1,0 +1,155 @@
+// `tutti run --checkpoint`, killed, and `tutti run --resume`: the results are those of a run that never
+// stopped.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <csignal>
+#include <nlohmann/json.hpp>
+#include <random>
+
+#include "tests/apps/generated_dataset.h"
+#include "tests/apps/tiny_town.h"
+#include "tests/apps/tutti/executable.h"
+#include "tests/support/small_town.h"
+#include "tests/support/test_data.h"
+
+namespace tutti {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using testing::ReadAll;
+using testing::RunTutti;
+
+// What is the same however often a run was broken off.
+constexpr const char* kResults[] = {
+    "trajectory.txt", "trajectory_odometry.txt", "trajectory_online.txt", "keyframes.txt", "loops.csv",
+    "graph.g2o"};
+
+class Resume : public ::testing::Test {
+ protected:
+  std::vector<std::string> Arguments(const fs::path& out, const std::vector<std::string>& more) const {
+    return testing::RunArguments(testing::TinyConfig(folder_), testing::TinyTown(), out, more);
+  }
+  // Killed after so many seconds, unless it is at its end before.
+  static testing::ProcessResult KilledAfter(double seconds, const std::vector<std::string>& arguments) {
+    std::vector<std::string> words = {
+        "-c", "exec timeout -s KILL " + std::to_string(seconds) + " \"$0\" \"$@\"", TUTTI_EXECUTABLE};
+    words.insert(words.end(), arguments.begin(), arguments.end());
+    return testing::RunProgramAndSignal("/bin/sh", words, "", 0);
+  }
+  static void ExpectTheSame(const fs::path& a, const fs::path& b) {
+    for (const char* name : kResults) EXPECT_EQ(ReadAll(a / name) == ReadAll(b / name), true) << name;
+  }
+  const fs::path folder_ = testing::FreshFolder(), out_ = folder_ / "out", whole_ = folder_ / "whole";
+};
+
+TEST_F(Resume, AfterThirtyKillsAtAnyMomentTheResultsAreTheSame) {
+  SyntheticOptions options = testing::SmallStereoTownWithALoop(320, 160);
+  const testing::GeneratedDataset town("town_with_a_loop", options);
+  const std::vector<std::string> first = {"run",
+                                          "--config",
+                                          (town.path() / "config.yaml").string(),
+                                          "--out",
+                                          out_.string(),
+                                          "--dataset",
+                                          town.path().string(),
+                                          "--checkpoint",
+                                          "0",
+                                          "--no-report"};
+  std::vector<std::string> never = first;
+  never[4] = whole_.string();
+  const auto whole = RunTutti(never);
+  ASSERT_EQ(whole.status, 0) << whole.output;
+  ASSERT_GT(nlohmann::json::parse(ReadAll(whole_ / "summary.json"))["loops"]["accepted"], 0);
+
+  std::mt19937 random(1);
+  auto run = KilledAfter(1.5, first);
+  int kills = 0;
+  for (; run.status != 0 && kills < 30; ++kills) {
+    ASSERT_THAT(run.status, ::testing::AnyOf(137, 128 + SIGKILL)) << run.output;
+    const double seconds = 0.05 + 1e-3 * static_cast<double>(random() % 1200);
+    run = KilledAfter(seconds, {"run", "--resume", out_.string(), "--no-report"});
+  }
+  if (run.status != 0) run = RunTutti({"run", "--resume", out_.string(), "--no-report"});
+  ASSERT_EQ(run.status, 0) << run.output;
+  EXPECT_GT(kills, 3);
+  ExpectTheSame(out_, whole_);
+  EXPECT_FALSE(fs::exists(out_ / "checkpoint.tutti"));
+  EXPECT_TRUE(nlohmann::json::parse(ReadAll(out_ / "summary.json")).contains("resumed_from_frame"));
+  std::printf("  %d kills\n", kills);
+}
+
+TEST_F(Resume, AnInterruptedRunSaysHowToGoOn) {
+  ASSERT_EQ(RunTutti(Arguments(whole_, {})).status, 0);
+  const auto run = testing::RunTuttiAndSignal(Arguments(out_, {"--checkpoint", "3600"}), " 50%", SIGINT);
+  EXPECT_EQ(run.status, 130) << run.output;
+  EXPECT_THAT(run.output, HasSubstr("tutti run --resume " + out_.string()));
+  ASSERT_TRUE(fs::exists(out_ / "checkpoint.tutti"));
+  const auto resumed = RunTutti({"run", "--resume", out_.string()});
+  EXPECT_EQ(resumed.status, 0) << resumed.output;
+  ExpectTheSame(out_, whole_);
+  EXPECT_TRUE(fs::exists(out_ / "report.html") || fs::exists(out_ / "report.json"));
+}
+
+TEST_F(Resume, AFinishedRunIsLeftAloneAndWhereThereIsNoneThatIsSaid) {
+  ASSERT_EQ(RunTutti(Arguments(out_, {"--end", "5"})).status, 0);
+  const std::string before = ReadAll(out_ / "summary.json");
+  const auto finished = RunTutti({"run", "--resume", out_.string()});
+  EXPECT_EQ(finished.status, 0);
+  EXPECT_THAT(finished.output, HasSubstr("has finished"));
+  EXPECT_EQ(ReadAll(out_ / "summary.json"), before);
+  const auto nothing = RunTutti({"run", "--resume", (folder_ / "absent").string()});
+  EXPECT_EQ(nothing.status, 1);
+  EXPECT_THAT(nothing.output, AllOf(HasSubstr("no checkpoint.tutti"), HasSubstr("--config")));
+}
+
+TEST_F(Resume, ADamagedCheckpointAndOptionsThatItHasAreRefused) {
+  testing::RunTuttiAndSignal(Arguments(out_, {"--checkpoint", "0"}), " 50%", SIGKILL);
+  const fs::path checkpoint = out_ / "checkpoint.tutti";
+  ASSERT_TRUE(fs::exists(checkpoint));
+  const auto other = RunTutti({"run", "--resume", out_.string(), "--seed", "3"});
+  EXPECT_EQ(other.status, 1);
+  EXPECT_THAT(other.output, HasSubstr("--seed can't be given with --resume"));
+  std::string bytes = ReadAll(checkpoint);
+  bytes[bytes.size() / 2] ^= 1;
+  testing::WriteAll(checkpoint, bytes);
+  const auto damaged = RunTutti({"run", "--resume", out_.string()});
+  EXPECT_EQ(damaged.status, 1);
+  EXPECT_THAT(damaged.output, AllOf(HasSubstr(checkpoint.string()), HasSubstr("is damaged")));
+}
+
+TEST_F(Resume, EachRunLeavesAMapUnlessToldNotTo) {
+  ASSERT_EQ(RunTutti(Arguments(out_, {"--end", "5"})).status, 0);
+  EXPECT_TRUE(fs::exists(out_ / "map.tutti"));
+  ASSERT_EQ(RunTutti(Arguments(out_, {"--end", "5", "--no-map"})).status, 0);
+  EXPECT_FALSE(fs::exists(out_ / "map.tutti"));
+  const fs::path elsewhere = folder_ / "my.map";
+  ASSERT_EQ(RunTutti(Arguments(out_, {"--end", "5", "--save-map", elsewhere.string()})).status, 0);
+  EXPECT_FALSE(fs::exists(out_ / "map.tutti"));
+  EXPECT_TRUE(fs::exists(elsewhere));
+}
+
+TEST_F(Resume, MapInfoTellsWhatIsInAMapAndChecksIt) {
+  ASSERT_EQ(RunTutti(Arguments(out_, {"--end", "5"})).status, 0);
+  const fs::path map = out_ / "map.tutti";
+  const auto text = RunTutti({"map", "info", map.string(), "--check"});
+  EXPECT_EQ(text.status, 0) << text.output;
+  EXPECT_THAT(text.output,
+              AllOf(HasSubstr("keyframes"), HasSubstr("stereo"), HasSubstr("checksums are right")));
+  const auto json = nlohmann::json::parse(RunTutti({"map", "info", map.string(), "--json"}).output);
+  EXPECT_EQ(json["frames"], 5);
+  EXPECT_GT(json["landmarks"], 50);
+  EXPECT_EQ(json["run"]["dataset"], testing::TinyTown().string());
+  std::string bytes = ReadAll(map);
+  bytes[bytes.size() / 2] ^= 1;
+  testing::WriteAll(map, bytes);
+  EXPECT_EQ(RunTutti({"map", "info", map.string()}).status, 0) << "the first section is as it was";
+  const auto damaged = RunTutti({"map", "info", map.string(), "--check"});
+  EXPECT_EQ(damaged.status, 1);
+  EXPECT_THAT(damaged.output, HasSubstr("a checksum is wrong"));
+}
+
+}  // namespace
+}  // namespace tutti

@@ -1,0 +1,101 @@
+#!/usr/bin/env python3
+"""Runs SLAM on real sequences and a generated town, saves and loads its maps, and writes docs/results/map-file.md.
+
+usage: ./dev bench map [ROW...] [--reuse] [--write]   (or bench/map_table.py --build build/release)
+
+Rows: town redkitchen kitti. Those whose data is absent are left out. Needs nothing but Python 3.
+"""
+import json
+import os
+import platform
+import subprocess
+import sys
+
+import table
+
+DOCUMENT = table.RESULTS / "map-file.md"
+TOWN = ["--sensor", "stereo", "--blocks-x", 1, "--laps", 1.3]
+# name: what it is, configuration, data set; the town is generated.
+ROWS = {"town": ("generated town, stereo", None, None),
+        "redkitchen": ("`redkitchen`, RGB-D", "7scenes.yaml", "redkitchen"),
+        "kitti": ("`kitti_00_head`, mono", "kitti_00-02_mono.yaml", "kitti_00_head")}
+PARTS = ["keyframes", "landmarks", "views", "vocabularies", "detector's rest", "rest"]
+LIMITS = {"kb": 250, "save_ms": 10, "load_ms": 1.5, "searchable_s": 15}
+LONG = 10000  # keyframes
+
+
+def measure(a, name):
+    """Figures of bench/map_file for the map of a run; None without data."""
+    _, config, dataset = ROWS[name]
+    folder = a.out / name
+    if dataset is None:
+        dataset = table.generate(a.tutti, a.out / "world", TOWN)
+        config = dataset / "config.yaml"
+    else:
+        dataset, config = a.data / dataset, table.ROOT / "data" / "configs" / config
+        if not dataset.exists():
+            print(f"{name}: {dataset} is absent; its row is left as it is", file=sys.stderr)
+            return None
+    if not (a.reuse and (folder / "map.tutti").exists()):
+        subprocess.run([a.tutti, "run", "--config", config, "--dataset", dataset, "--out", folder], check=True,
+                       stdout=subprocess.DEVNULL)
+    load = os.getloadavg()[0]
+    out = subprocess.run([a.build / "bench" / "map_file", folder / "map.tutti"], check=True, capture_output=True, text=True)
+    row = json.loads(out.stdout)
+    row["load"] = round(load, 1)
+    row["searchable_s"] = LONG * row["load_ms"] / 1000
+    return row
+
+
+def against(row, figure, digits):
+    mark = "" if row[figure] <= LIMITS[figure] else " (!)"
+    return f"{row[figure]:.{digits}f}{mark}"
+
+
+def document(rows):
+    lines = ["# Map files: size and time", "",
+             "Written by `./dev bench map --write`. What `tutti run` leaves as `map.tutti` is loaded and saved again five times "
+             "(`bench/map_file`; medians). The file is in the page cache when it is loaded; a save waits until the disk has it. "
+             f"Goals: at most {LIMITS['kb']} kB, {LIMITS['save_ms']} ms to save and {LIMITS['load_ms']} ms to load, each per "
+             f"keyframe; {LONG:,} keyframes searchable after {LIMITS['searchable_s']} s. (!): missed.", "",
+             "| | keyframes | kB per keyframe | save, ms per keyframe | load, ms per keyframe | "
+             f"{LONG:,} keyframes loaded, s (extrapolated) | load of the machine |",
+             "|---|---|---|---|---|---|---|"]
+    for name in ROWS:
+        if name not in rows:
+            continue
+        r = rows[name]
+        lines.append(f"| {ROWS[name][0]} | {r['keyframes']} | {against(r, 'kb', 0)} "
+                     f"| {against(r, 'save_ms', 2)}, processor {r['save_cpu_ms']:.2f} "
+                     f"| {against(r, 'load_ms', 2)}, processor {r['load_cpu_ms']:.2f} | {against(r, 'searchable_s', 1)} | {r['load']} |")
+    lines += ["", f"The last but one column is {LONG:,} times the load of one keyframe: no map so long was made. "
+              f"{os.cpu_count()} cores, {platform.machine()}.", "",
+              "## By part, kB per keyframe", "",
+              "In the file, and (in brackets) of content before it is packed.", "",
+              "| | " + " | ".join(PARTS) + " |", "|---|" + "---|" * len(PARTS)]
+    for name in ROWS:
+        if name not in rows:
+            continue
+        cells = []
+        for part in PARTS:
+            p = rows[name]["parts"].get(part, {"kb": 0, "content_kb": 0})
+            cells.append(f"{p['kb']:.1f} ({p['content_kb']:.1f})")
+        lines.append(f"| {ROWS[name][0]} | " + " | ".join(cells) + " |")
+    lines += ["", "A view's descriptors are most of it: those of SURF are floats whose mantissas nothing packs. What views share "
+              "with the odometry's keyframes, and words with views, is stored once."]
+    return "\n".join(lines)
+
+
+def main():
+    a = table.parse(table.parser(__doc__, "map", ROWS), ROWS)
+    measured = {}
+    for name in a.rows:
+        row = measure(a, name)
+        if row is not None:
+            measured[name] = row
+    rows = table.put_json(a, "map-file", measured)
+    table.put(a, DOCUMENT, document(rows))
+
+
+if __name__ == "__main__":
+    main()

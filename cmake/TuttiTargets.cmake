@@ -29,8 +29,8 @@ function(tutti_compile_options target)
   endif()
 endfunction()
 
-# tutti_compile_quickly(target): -O1 for code that reads words and writes texts; CLI11's and the JSON library's templates
-# take half as long again with -O3. Never for code that computes.
+# tutti_compile_quickly(target): -O1 for code that reads words and writes texts, and for tests; the templates of CLI11, of
+# the JSON library and of GTest take half as long again with -O3. Never for code that computes.
 function(tutti_compile_quickly target)
   target_compile_options(${target} PRIVATE "$<$<CONFIG:Release>:-O1>")
 endfunction()
@@ -112,6 +112,7 @@ function(tutti_add_test name)
   set(target tutti_${name}_tests)
   add_executable(${target} ${ARG_SOURCES})
   tutti_compile_options(${target})
+  tutti_compile_quickly(${target})
   tutti_see_private_headers(${target})
   target_link_libraries(${target} PRIVATE ${ARG_LIBS} tutti_test_support GTest::gtest GTest::gmock GTest::gtest_main)
   set(timeout 600)

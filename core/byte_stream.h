@@ -81,7 +81,10 @@ class ByteReader {
   int GetVarintIndex(int end);
   std::vector<float> GetPlanes();
   std::string GetString();
-  void GetRaw(void* data, std::size_t size) { std::memcpy(data, Take(size), size); }
+  /// `data` may be null where `size` is 0.
+  void GetRaw(void* data, std::size_t size) {
+    if (size > 0) std::memcpy(data, Take(size), size);
+  }
   /// A number of things that take at least `least_bytes` each.
   std::size_t GetCount(std::size_t least_bytes);
   /// An index in [0, end).

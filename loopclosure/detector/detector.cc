@@ -35,7 +35,7 @@ class LoopDetector::Impl {
 };
 
 LoopResult LoopDetector::Impl::Detect(const LoopQuery& query) {
-  internal::CheckId(query.id, state_.last_id());
+  internal::CheckId(query.id, state_.last_id(), state_.options().ltm_file);
   internal::CheckQuery(query, state_.members(), state_.callers_descriptors());
   LoopResult result;
   result.query = query.id;

@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
-"""Runs SLAM on real sequences and a generated town, saves and loads its maps, and writes docs/results/map-file.md.
+"""Runs SLAM on real sequences and generated towns, saves, loads and uses their maps, and writes docs/results/map-file.md.
 
 usage: ./dev bench map [ROW...] [--reuse] [--write]   (or bench/map_table.py --build build/release)
 
-Rows: town redkitchen kitti. Those whose data is absent are left out. Needs nothing but Python 3.
+Rows: town redkitchen kitti (size and time); kitchen kitti-places wrong-map start pruned (what a map is good for). Those whose
+data is absent are left out. Needs nothing but Python 3.
 """
 import json
 import os
@@ -11,6 +12,7 @@ import platform
 import subprocess
 import sys
 
+import map_use
 import table
 
 DOCUMENT = table.RESULTS / "map-file.md"
@@ -47,13 +49,34 @@ def measure(a, name):
     return row
 
 
+def use(a, name):
+    """Lines of a row of the second table; None without data."""
+    _, data, measure_use = map_use.ROWS[name]
+    absent = [a.data / dataset for _, dataset in data if not (a.data / dataset).exists()]
+    if absent:
+        print(f"{name}: {absent[0]} is absent; its row is left as it is", file=sys.stderr)
+        return None
+    return measure_use(a)
+
+
 def against(row, figure, digits):
     mark = "" if row[figure] <= LIMITS[figure] else " (!)"
     return f"{row[figure]:.{digits}f}{mark}"
 
 
+def use_table(rows):
+    lines = ["## What a map is good for", "",
+             "One run each; all is deterministic but times. Poses are compared in the map's frame of reference, without any "
+             "alignment but the one that is named. (!): missed.", "",
+             "| | what | bound | measured |", "|---|---|---|---|"]
+    for name, (title, _, _) in map_use.ROWS.items():
+        for i, (what, bound, figure, kept) in enumerate(rows.get(name, [])):
+            lines.append(f"| {title if i == 0 else ''} | {what} | {bound} | {figure}{'' if kept else ' (!)'} |")
+    return lines
+
+
 def document(rows):
-    lines = ["# Map files: size and time", "",
+    lines = ["# Map files: size, time and use", "",
              "Written by `./dev bench map --write`. What `tutti run` leaves as `map.tutti` is loaded and saved again five times "
              "(`bench/map_file`; medians). The file is in the page cache when it is loaded; a save waits until the disk has it. "
              f"Goals: at most {LIMITS['kb']} kB, {LIMITS['save_ms']} ms to save and {LIMITS['load_ms']} ms to load, each per "
@@ -82,18 +105,15 @@ def document(rows):
             cells.append(f"{p['kb']:.1f} ({p['content_kb']:.1f})")
         lines.append(f"| {ROWS[name][0]} | " + " | ".join(cells) + " |")
     lines += ["", "A view's descriptors are most of it: those of SURF are floats whose mantissas nothing packs. What views share "
-              "with the odometry's keyframes, and words with views, is stored once."]
+              "with the odometry's keyframes, and words with views, is stored once.", "", *use_table(rows)]
     return "\n".join(lines)
 
 
 def main():
-    a = table.parse(table.parser(__doc__, "map", ROWS), ROWS)
-    measured = {}
-    for name in a.rows:
-        row = measure(a, name)
-        if row is not None:
-            measured[name] = row
-    rows = table.put_json(a, "map-file", measured)
+    all_rows = [*ROWS, *map_use.ROWS]
+    a = table.parse(table.parser(__doc__, "map", all_rows), all_rows)
+    measured = {name: measure(a, name) if name in ROWS else use(a, name) for name in a.rows}
+    rows = table.put_json(a, "map-file", {name: row for name, row in measured.items() if row is not None})
     table.put(a, DOCUMENT, document(rows))
 
 

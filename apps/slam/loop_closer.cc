@@ -276,6 +276,22 @@ bool LoopCloser::CloseDeferred(const Odometry& odometry, std::int64_t frames) {
   return true;
 }
 
+void LoopCloser::Removed(const std::map<int, int>& into, const Odometry& before) {
+  graph_.Update(KeyframesOf(before), CovisibleOf(before, options_.covisibility_min_shared));
+  for (std::vector<LoopEdge>* loops : {&accepted_, &gate_.waiting(), &deferred_, &queued_}) {
+    std::vector<LoopEdge> stay;
+    for (LoopEdge& loop : *loops) {
+      if (graph_.Rehang(into, &loop)) {
+        stay.push_back(loop);
+      } else {
+        untied_.erase(loop.record);  // its two ends are one keyframe
+      }
+    }
+    *loops = std::move(stay);
+  }
+  graph_.Remove(into);
+}
+
 void LoopCloser::Resume(std::optional<LoopSolution> solution, std::optional<GlobalAdjustment> adjustment) {
   if (solution) solver_.Resume(*std::move(solution));
   adjuster_.Resume(std::move(adjustment));

@@ -62,6 +62,10 @@ class LoopCloser {
   void Applied(const LoopUpdate& update, const std::vector<int>& common, const Odometry& odometry,
                std::int64_t frames);
 
+  /// When keyframes were removed: which one stands for each; `before`: the odometry with all of them. Their
+  /// edges lead to those that stand for them. Nothing may be running.
+  void Removed(const std::map<int, int>& into, const Odometry& before);
+
   /// What is being worked out beside the tracking, for a saved map; it holds on to that.
   struct Pending {
     BackgroundLoopSolver::Pending solution;  ///< not valid: none

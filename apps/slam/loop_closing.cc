@@ -143,6 +143,20 @@ int LoopClosing::KeyframeOf(std::int64_t frame) const {
   return keyframe != keyframe_of_frame_.end() ? keyframe->second : -1;
 }
 
+bool LoopClosing::Forget(int keyframe, int into, const Odometry& odometry) {
+  const std::int64_t frame = odometry.KeyframeFrameIndex(keyframe);
+  if (!worker_ || keyframe_of_frame_.count(frame) == 0) return true;  // it never knew that image
+  return worker_->Merge(frame, odometry.KeyframeFrameIndex(into));
+}
+
+void LoopClosing::Removed(const std::map<int, int>& into, const Odometry& before) {
+  for (auto& [frame, keyframe] : keyframe_of_frame_) {
+    for (auto next = into.find(keyframe); next != into.end(); next = into.find(keyframe))
+      keyframe = next->second;
+  }
+  closer_.Removed(into, before);
+}
+
 std::vector<std::string> LoopClosing::TakeWarnings() { return std::exchange(warnings_, {}); }
 
 std::map<std::string, double> LoopClosing::StageMilliseconds() const {

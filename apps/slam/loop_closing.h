@@ -60,6 +60,13 @@ class LoopClosing {
     closer_.Applied(update, common, odometry, frames);
   }
 
+  /// Before a keyframe is removed: the detector forgets what it looks like, and its place is that of `into`.
+  /// False if it can't do without: the keyframe must stay then.
+  bool Forget(int keyframe, int into, const Odometry& odometry);
+  /// When keyframes were removed: which one stands for each; `before`: the odometry with all of them. Nothing
+  /// may be on its way.
+  void Removed(const std::map<int, int>& into, const Odometry& before);
+
   const LoopCloser& closer() const { return closer_; }
 
   /// The detector, for a saved map; none if no loops are searched for. As LoopWorker::Save.

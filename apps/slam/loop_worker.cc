@@ -162,6 +162,12 @@ LoopResult LoopWorker::Locate(const LoopQuery& query) {
   return detector_.Locate(query);
 }
 
+bool LoopWorker::Merge(std::int64_t id, std::int64_t into) {
+  std::unique_lock<std::mutex> lock(mutex_);
+  changed_.wait(lock, [this] { return tasks_.empty() && !busy_; });
+  return detector_.Merge(id, into);
+}
+
 LoopResult LoopWorker::Take() {
   const ScopedSpan span(recorder_, Lane::kTracking, "wait_for_loop");
   const internal::Stopwatch watch;

@@ -43,6 +43,8 @@ class LoopWorker {
   LoopResult Take();
   /// Where an image was taken (LoopDetector::Locate), once the queries that are on their way are done.
   LoopResult Locate(const LoopQuery& query);
+  /// LoopDetector::Merge, once the queries that are on their way are done.
+  bool Merge(std::int64_t id, std::int64_t into);
   /// Milliseconds that Take() has waited so far.
   double WaitedMs() const { return waited_ms_; }
 

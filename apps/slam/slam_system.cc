@@ -76,6 +76,16 @@ class SlamSystem::Impl {
     while (const auto update = loops_.Rest(odometry(), frames_)) Take(*update);
   }
 
+  std::size_t Prune() {
+    if (!odometry_) throw InputError("the map has no keyframes, since the camera had no calibration");
+    Finish();
+    const Odometry before = *odometry_;
+    const auto may = [&](int keyframe, int into) { return loops_.Forget(keyframe, into, before); };
+    const std::map<int, int> removed = odometry_->RemoveRedundantKeyframes(may);
+    loops_.Removed(removed, before);
+    return removed.size();
+  }
+
   MapSnapshot Snapshot(const std::string& note) const {
     auto parts = std::make_shared<MapSnapshot::Parts>();
     parts->info = StateOf(Info(note));
@@ -262,6 +272,7 @@ void SlamSystem::AddLoop(int candidate, int query, const Similarity& S_candidate
   impl_->AddLoop(candidate, query, S_candidate_query, information);
 }
 void SlamSystem::Finish() { impl_->Finish(); }
+std::size_t SlamSystem::Prune() { return impl_->Prune(); }
 std::vector<std::string> SlamSystem::TakeWarnings() { return impl_->loops_.TakeWarnings(); }
 
 const Odometry* SlamSystem::odometry() const { return impl_->odometry(); }

@@ -1,4 +1,4 @@
-// tutti map: what is in a map file.
+// tutti map: what is in a map file, and one without redundant keyframes.
 #include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -6,6 +6,7 @@
 
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
+#include "apps/tutti/map_prune.h"
 #include "tutti/core/error.h"
 #include "tutti/slam/map_file.h"
 
@@ -13,7 +14,7 @@ namespace tutti::cli {
 namespace {
 
 struct MapArguments {
-  std::string action, file;
+  std::string action, file, out;
   bool check = false, json = false;
 };
 
@@ -83,13 +84,23 @@ int Info(const MapArguments& arguments) {
 
 void SetUpMap(CLI::App& command, int& exit_code) {
   const auto arguments = std::make_shared<MapArguments>();
-  command.add_option("action", arguments->action, "info: what is in the map")
+  command
+      .add_option("action", arguments->action,
+                  "info: what is in the map; prune: remove keyframes whose landmarks others see")
       ->required()
-      ->check(CLI::IsMember({"info"}));
+      ->check(CLI::IsMember({"info", "prune"}));
   command.add_option("file", arguments->file, "a map (map.tutti) or a checkpoint of `tutti run`")->required();
   command.add_flag("--check", arguments->check, "read all of it, and verify every checksum");
   command.add_flag("--json", arguments->json, "for other programs");
-  command.callback([arguments, &exit_code] { exit_code = Info(*arguments); });
+  command.add_option("-o,--out", arguments->out,
+                     "prune: the smaller map's file; without it, FILE is replaced");
+  command.callback([arguments, &exit_code] {
+    if (arguments->action == "prune") {
+      PruneMap(arguments->file, arguments->out);
+    } else {
+      exit_code = Info(*arguments);
+    }
+  });
 }
 
 }  // namespace tutti::cli

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <tuple>
 #include <utility>
 
@@ -80,6 +81,12 @@ const MapKeyframe& KeyframeGraph::At(int id) const {
   return *keyframe;
 }
 
+// Nothing was ever between them, also not what has left.
+bool KeyframeGraph::Consecutive(int older, int newer) const {
+  const Birth* a = Find(births_, older);
+  return a != nullptr && a != &births_.back() && (a + 1)->id == newer;
+}
+
 // When the newer one was new; pieces may have been joined since.
 bool KeyframeGraph::OfOnePiece(int older, int newer) const {
   const Birth *a = Find(births_, older), *b = Find(births_, newer);
@@ -115,10 +122,16 @@ void KeyframeGraph::Update(std::vector<MapKeyframe> keyframes, const std::vector
   edges_.clear();
   for (std::size_t i = 1; i < keyframes_.size(); ++i) {
     const int older = keyframes_[i - 1].id, newer = keyframes_[i].id;
-    if (OfOnePiece(older, newer)) edges_.push_back({older, newer, {}});
+    if (Consecutive(older, newer) && OfOnePiece(older, newer)) edges_.push_back({older, newer, {}});
   }
   for (const CovisiblePair& c : Strongest(covisible)) edges_.push_back({c.older, c.newer, {}});
   std::sort(edges_.begin(), edges_.end(), Before<Edge>);
+  if (!carried_.empty()) {
+    std::vector<Edge> all;
+    std::set_union(edges_.begin(), edges_.end(), carried_.begin(), carried_.end(), std::back_inserter(all),
+                   Before<Edge>);
+    edges_ = std::move(all);
+  }
   for (Edge& edge : edges_) edge.S_older_newer = Measured(edge.older, edge.newer);
 }
 
@@ -131,9 +144,7 @@ std::vector<CovisiblePair> KeyframeGraph::Strongest(const std::vector<CovisibleP
     // odometry's.
     const bool recent =
         kept_.empty() || c.newer - c.older < kRecentKeyframes || Kept(c.older, c.newer) != nullptr;
-    const MapKeyframe* older = Find(keyframes_, c.older);
-    const bool next = older != nullptr && older != &keyframes_.back() && (older + 1)->id == c.newer;
-    if (recent && !next && OfOnePiece(c.older, c.newer)) candidates.push_back(c);
+    if (recent && !Consecutive(c.older, c.newer) && OfOnePiece(c.older, c.newer)) candidates.push_back(c);
   }
   std::sort(candidates.begin(), candidates.end(), [](const CovisiblePair& a, const CovisiblePair& b) {
     return std::tuple(a.newer, -a.shared, a.older) < std::tuple(b.newer, -b.shared, b.older);
@@ -185,6 +196,23 @@ std::map<int, Similarity> KeyframeGraph::JoinedPieces(const std::vector<LoopEdge
   return S_root_piece;
 }
 
+double KeyframeGraph::SigmaFloor() const {
+  double mean_length = 0;
+  for (const Edge& edge : edges_) mean_length += edge.S_older_newer.translation.norm();
+  mean_length /= std::max<double>(1, static_cast<double>(edges_.size()));
+  return options_.sigma_translation_floor * mean_length + 1e-6;
+}
+
+// Of (translation, rotation, log scale). Over several steps errors of length add up as if they were all in
+// one direction: that makes up for what the turns between them do to the end.
+Vector7d KeyframeGraph::Sigmas(const Edge& edge, double floor) const {
+  const double steps = std::sqrt(edge.steps);
+  Vector7d sigmas;
+  sigmas << Eigen::Vector3d::Constant(options_.sigma_translation_ratio * edge.Way() + steps * floor),
+      Eigen::Vector3d::Constant(steps * options_.sigma_rotation_rad), steps * options_.sigma_log_scale;
+  return sigmas;
+}
+
 PoseGraph KeyframeGraph::Graph(const std::vector<LoopEdge>& loops) const {
   const std::map<int, Similarity> S_root_piece = JoinedPieces(loops);
   PoseGraph graph(options_.kind);
@@ -195,14 +223,11 @@ PoseGraph KeyframeGraph::Graph(const std::vector<LoopEdge>& loops) const {
     if (options_.kind == GraphKind::kSE3) pose.scale = 1;
     graph.AddNode(keyframe.id, pose);
   }
-  double mean_length = 0;
-  for (const Edge& edge : edges_) mean_length += edge.S_older_newer.translation.norm();
-  mean_length /= std::max<double>(1, static_cast<double>(edges_.size()));
-  const double floor = options_.sigma_translation_floor * mean_length + 1e-6;
+  const double floor = SigmaFloor();
   for (const Edge& edge : edges_) {
-    const double sigma = options_.sigma_translation_ratio * edge.S_older_newer.translation.norm() + floor;
+    const Vector7d sigma = Sigmas(edge, floor);
     graph.AddOdometry(edge.older, edge.newer, edge.S_older_newer,
-                      MakeInformation(sigma, options_.sigma_rotation_rad, options_.sigma_log_scale));
+                      MakeInformation(sigma[0], sigma[3], sigma[6]));
   }
   for (const LoopEdge& loop : loops)
     graph.AddLoop(loop.candidate, loop.query, loop.S_candidate_query, loop.information);
@@ -278,6 +303,7 @@ void KeyframeGraph::Move(const std::map<int, Similarity>& S_world_keyframe,
                                   ScaleOf(S_world_keyframe, edge.newer));
   }
   kept_ = edges_;
+  for (Edge& edge : carried_) edge.way *= ScaleOf(S_world_keyframe, edge.older);
   for (const auto& [from, to] : merges) {
     if (from != to) merged_.push_back({from, to, keyframes_.empty() ? -1 : keyframes_.back().id});
   }

@@ -7,8 +7,11 @@
 
 namespace tutti {
 namespace {
-constexpr int kAround = 10;         // keyframes with most common landmarks, on both sides of a loop
-constexpr int kMinShared = 15;      // landmarks in common with one of them
+constexpr int kAround = 10;      // keyframes with most common landmarks, on both sides of a loop
+constexpr int kMinShared = 15;   // landmarks in common with one of them
+constexpr int kNeighbours = 12;  // of a keyframe that see the same
+constexpr float kFusionError =
+    2.4477F;  // of a landmark that is found again: 95 % [standard deviations of a corner]
 constexpr float kLoopError = 5.0F;  // of a landmark that a loop projects [standard deviations of a corner]
 }  // namespace
 
@@ -25,6 +28,18 @@ void FuseInto(int keyframe, const std::vector<std::pair<int, int>>& found, Map* 
       map->Merge(keep_present ? landmark : present, keep_present ? present : landmark);
     }
   }
+}
+
+void FuseNeighbours(const PinholeCamera& camera, int id, Map* map) {
+  const std::vector<int> neighbours = map->BestCovisible(id, kNeighbours, kMinShared);
+  for (int other : neighbours) {
+    const auto found =
+        MatchForFusion(*map, camera, map->keyframe(other), map->LandmarksOf({id}), kFusionError);
+    FuseInto(other, found, map);
+  }
+  FuseInto(id, MatchForFusion(*map, camera, map->keyframe(id), map->LandmarksOf(neighbours), kFusionError),
+           map);
+  for (int l : map->LandmarksOf({id})) map->UpdateLandmark(l);
 }
 
 int FuseLoop(const PinholeCamera& camera, int older, int newer, const Pose& T_older_newer, Map* map) {

@@ -13,6 +13,10 @@ namespace tutti {
 /// one there, the two are merged into the one with more views.
 void FuseInto(int keyframe, const std::vector<std::pair<int, int>>& found, Map* map);
 
+/// What a keyframe and those with most landmarks in common with it see is looked for in each other, and
+/// fused.
+void FuseNeighbours(const PinholeCamera& camera, int keyframe, Map* map);
+
 /// After a loop: what the keyframes around `older` see is looked for in those around `newer`, and fused.
 /// `T_older_newer`: as the loop says, which is more precise than the map. Returns how many landmarks the two
 /// sides have in common then.

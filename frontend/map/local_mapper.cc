@@ -15,9 +15,7 @@
 
 namespace tutti {
 namespace {
-constexpr int kImages = 20;  // newest keyframes that keep their images
-constexpr float kFusionError =
-    2.4477F;  // of a landmark that is found again: 95 % [standard deviations of a corner]
+constexpr int kImages = 20;            // newest keyframes that keep their images
 constexpr double kMaxCosine = 0.9996;  // 1.6 deg of parallax at least, for a depth from two views
 // Strict: so many standard deviations of parallax. Most landmarks are made as soon as their parallax is large
 // enough, which is when noise makes it too large: too near, so that one camera's scale shrinks.
@@ -145,19 +143,6 @@ int LocalMapper::Triangulate(int id, Map* map) {
   return made;
 }
 
-void LocalMapper::Fuse(int id, Map* map) {
-  const std::vector<int> neighbours = map->BestCovisible(id, 12, 15);
-  for (int other : neighbours) {
-    const auto found =
-        MatchForFusion(*map, rig_.camera, map->keyframe(other), map->LandmarksOf({id}), kFusionError);
-    FuseInto(other, found, map);
-  }
-  FuseInto(id,
-           MatchForFusion(*map, rig_.camera, map->keyframe(id), map->LandmarksOf(neighbours), kFusionError),
-           map);
-  for (int l : map->LandmarksOf({id})) map->UpdateLandmark(l);
-}
-
 // What was found by corners alone, in this keyframe or in older ones, gets its precise position.
 void LocalMapper::Align(int id, Map* map) {
   std::vector<int> window = map->BestCovisible(id, kImages, 15);
@@ -186,7 +171,7 @@ void LocalMapper::Process(int id, Map* map, StageTimes* stages) {
       step();
     };
     timed("triangulate", [&] { Triangulate(id, map); });
-    timed("fuse", [&] { Fuse(id, map); });
+    timed("fuse", [&] { FuseNeighbours(rig_.camera, id, map); });
     timed("align", [&] { Align(id, map); });
   }
   const ScopedStopwatch watch(stages, Lane::kMapping, "local_ba");

@@ -45,7 +45,6 @@ class LocalMapper {
   std::optional<Eigen::Vector3d> PointOf(const Keyframe& a, int fa, const Keyframe& b, int fb, const Map& map,
                                          bool strict) const;
   int Triangulate(int keyframe, Map* map);
-  void Fuse(int keyframe, Map* map);
   void Align(int keyframe, Map* map);
 
   OdometryOptions options_;

@@ -79,6 +79,25 @@ void Map::RemoveLandmark(int landmark_id) {
   l.patch.reset();
 }
 
+void Map::RemoveKeyframe(int id, int into, std::size_t least_views) {
+  const std::vector<int> seen = std::as_const(*this).keyframe(id).landmarks;
+  for (const int l : seen) {
+    if (l < 0) continue;
+    RemoveObservation(l, id);
+    if (std::as_const(*this).landmark(l).observations.size() < least_views) RemoveLandmark(l);
+  }
+  Keyframe& k = keyframe(id);
+  k.features = std::make_shared<const FrameFeatures>();
+  k.landmarks.clear();
+  k.covisible.clear();
+  k.replaced_by = into;
+}
+
+int Map::PresentKeyframe(int id) const {
+  while (keyframe(id).replaced_by >= 0) id = keyframe(id).replaced_by;
+  return id;
+}
+
 void Map::Merge(int loser, int winner) {
   if (loser == winner) return;
   const std::vector<Observation> seen = landmark(loser).observations;

@@ -78,6 +78,7 @@ struct Landmark {
 /// A frame that stays in the map.
 struct Keyframe {
   int id = -1;
+  int replaced_by = -1;  ///< older keyframe that stands for it since it was removed; -1: it is in the map
   std::int64_t frame_index = 0;
   double stamp_s = 0;
   int piece = 0;  ///< map piece
@@ -91,7 +92,7 @@ struct Keyframe {
   void State(Archive& archive);
 };
 
-/// Map of one odometry. Ids are indices; dead landmarks stay as empty shells.
+/// Map of one odometry. Ids are indices; dead landmarks and removed keyframes stay as empty shells.
 class Map {
  public:
   explicit Map(std::vector<float> scales) : scales_(std::move(scales)) {}
@@ -105,6 +106,9 @@ class Map {
   void AddObservation(int landmark, int keyframe, int feature);
   void RemoveObservation(int landmark, int keyframe);
   void RemoveLandmark(int landmark);
+  /// Takes a keyframe out of the map, for which an older one stands from then on. What it saw keeps its other
+  /// views, or is removed if these are fewer than `least_views`.
+  void RemoveKeyframe(int keyframe, int into, std::size_t least_views);
   /// Lets `winner` take over all that `loser` sees.
   void Merge(int loser, int winner);
   /// Standard deviation of a feature as a view of a landmark, where a corner's at level 0 is 1; `keyframe`:
@@ -123,7 +127,7 @@ class Map {
   /// Keyframes with at least `min_shared` common landmarks, most first (ties: newest first), at most `count`.
   std::vector<int> BestCovisible(int keyframe, int count, int min_shared) const;
 
-  int KeyframeCount() const { return static_cast<int>(keyframes_.size()); }
+  int KeyframeCount() const { return static_cast<int>(keyframes_.size()); }  ///< removed ones too
   int LandmarkCount() const { return static_cast<int>(landmarks_.size()); }  ///< dead ones too
   /// For writing: a keyframe or landmark that a copy of the map shares is copied first.
   Keyframe& keyframe(int id) { return keyframes_.Mutable(static_cast<std::size_t>(id)); }
@@ -132,6 +136,8 @@ class Map {
   const Landmark& landmark(int id) const { return landmarks_[static_cast<std::size_t>(id)]; }
   /// The landmark itself, or the one that it ended in by merging; -1 if that one is gone, and for -1.
   int Present(int landmark) const;
+  /// The keyframe itself, or the one that stands for it since it was removed.
+  int PresentKeyframe(int keyframe) const;
   const std::vector<float>& scales() const { return scales_; }
 
   /// Landmarks that any of these keyframes sees, ascending.

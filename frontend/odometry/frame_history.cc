@@ -16,6 +16,17 @@ void FrameHistory::Rescale(const std::map<int, Similarity>& S_world_keyframe) {
   }
 }
 
+void FrameHistory::Rehang(const std::map<int, int>& into, const Map& map) {
+  for (Record& record : records_) {
+    for (auto next = into.find(record.reference); next != into.end(); next = into.find(record.reference)) {
+      const Pose T_into_removed =
+          map.keyframe(next->second).T_world_camera.Inverse() * map.keyframe(record.reference).T_world_camera;
+      record.T_reference_frame = T_into_removed * record.T_reference_frame;
+      record.reference = next->second;
+    }
+  }
+}
+
 std::vector<int> FrameHistory::Pieces(const Map& map) const {
   std::map<int, int> frames;
   for (const Record& r : records_) ++frames[map.keyframe(r.reference).piece];

@@ -20,6 +20,9 @@ class FrameHistory {
   bool IsLater(double stamp_s) const { return records_.empty() || stamp_s > records_.back().stamp_s; }
   /// Keyframes were moved: with their scale, so are the distances of their frames.
   void Rescale(const std::map<int, Similarity>& S_world_keyframe);
+  /// Keyframes were removed: their frames hang on those that stand for them, and stay where they are. `map`
+  /// has the poses of both.
+  void Rehang(const std::map<int, int>& into, const Map& map);
 
   /// Pieces of the map that have frames, by number of frames, most first (ties: the older one).
   std::vector<int> Pieces(const Map& map) const;

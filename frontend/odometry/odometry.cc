@@ -72,7 +72,9 @@ std::vector<SeenLandmark> Odometry::SeenLandmarks() const {
 std::vector<int> Odometry::KeyframeIds() const {
   std::vector<int> ids;
   ids.reserve(static_cast<std::size_t>(impl_->map().KeyframeCount()));
-  for (int id = 0; id < impl_->map().KeyframeCount(); ++id) ids.push_back(id);
+  for (int id = 0; id < impl_->map().KeyframeCount(); ++id) {
+    if (impl_->map().keyframe(id).replaced_by < 0) ids.push_back(id);
+  }
   return ids;
 }
 
@@ -145,6 +147,10 @@ void Odometry::ApplyCorrection(const std::map<int, Similarity>& S_world_keyframe
 
 int Odometry::FuseLoop(int older, int newer, const Similarity& S_older_newer) {
   return impl_->FuseLoop(older, newer, S_older_newer);
+}
+
+std::map<int, int> Odometry::RemoveRedundantKeyframes(const std::function<bool(int removed, int into)>& may) {
+  return impl_->RemoveRedundantKeyframes(may);
 }
 
 GlobalAdjustment Odometry::BeginGlobalAdjustment(int piece) const {

@@ -1,12 +1,15 @@
 #include "frontend/odometry/odometry_impl.h"
 
 #include <Eigen/Cholesky>
+#include <set>
 #include <utility>
 
 #include "frontend/geometry/measured.h"
 #include "frontend/map/global_adjustment.h"
 #include "frontend/map/landmark_fusion.h"
 #include "frontend/map/map_correction.h"
+#include "frontend/map/redundant_keyframes.h"
+#include "tutti/core/error.h"
 
 namespace tutti {
 
@@ -193,6 +196,20 @@ void Odometry::Impl::Correct(const std::map<int, Similarity>& S_world_keyframe,
   if (adjustment != nullptr) TakeAdjustedLandmarks(adjustment->Result().landmarks, map);
   map->UpdateGeometry();
   JoinPieces(merges, map);
+}
+
+std::map<int, int> Odometry::Impl::RemoveRedundantKeyframes(
+    const std::function<bool(int removed, int into)>& may) {
+  if (map_keyframes_) throw InputError("frames are being located in the map: it must stay as it is");
+  EnterMapping();
+  const std::size_t least_views = rig_.sensor == Sensor::kMono ? 2 : 1;  // that tell where a landmark is
+  const std::set<int> keep = {last().reference, last().newest_keyframe, result_.keyframe};
+  FuseAll(rig_.camera, mapper_.MutableMap());
+  const std::map<int, int> removed =
+      tutti::RemoveRedundantKeyframes(keep, least_views, may, mapper_.MutableMap());
+  history_.Rehang(removed, map());
+  tracker_.FollowLandmarks(map());
+  return removed;
 }
 
 int Odometry::Impl::FuseLoop(int older, int newer, const Similarity& S_older_newer) {

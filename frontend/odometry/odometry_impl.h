@@ -1,6 +1,7 @@
 // The steps of Odometry: each part does one thing, and knows none of the others.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <optional>
 #include <vector>
@@ -32,6 +33,7 @@ class Odometry::Impl {
   void Correct(const std::map<int, Similarity>& S_world_keyframe, const std::map<int, int>& merges,
                const GlobalAdjustment::Work* adjustment);
   int FuseLoop(int older, int newer, const Similarity& S_older_newer);
+  std::map<int, int> RemoveRedundantKeyframes(const std::function<bool(int removed, int into)>& may);
 
   /// Everything but options, rig, recorder and whether to use threads, section by section.
   void Save(const internal::SectionSink& sink) const;

@@ -87,6 +87,7 @@ std::optional<PoseFix> PoseSearch::Find(const Map& map, const TrackedFrame& fram
   // What the loop detector does not know yet; a doubtful pose from here is as good as one from there.
   const int oldest = std::max(0, last.newest_keyframe - kRecentKeyframes);
   for (int k = last.newest_keyframe - 1; k >= oldest && !contest.best; --k) {
+    if (map.keyframe(k).replaced_by >= 0) continue;
     if (std::find(near.begin(), near.end(), k) == near.end() && settled(k)) break;
   }
   return contest.best;
@@ -95,7 +96,7 @@ std::optional<PoseFix> PoseSearch::Find(const Map& map, const TrackedFrame& fram
 std::optional<PoseFix> PoseSearch::FindAt(const Map& map, const TrackedFrame& frame, int keyframe) const {
   if (keyframe < 0 || keyframe >= map.KeyframeCount()) return std::nullopt;
   Contest contest{map, 2 * options_.min_inliers, 1.0, {}, {}};
-  Offer(GuessFromKeyframe(map, frame, keyframe), &contest);
+  Offer(GuessFromKeyframe(map, frame, map.PresentKeyframe(keyframe)), &contest);
   return contest.best;
 }
 

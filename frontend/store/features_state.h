@@ -189,7 +189,7 @@ void FrameFeatures::State(Archive& archive) {
 
 template <class Archive>
 void Keyframe::State(Archive& archive) {
-  archive(id, frame_index, stamp_s, piece, T_world_camera, features);
+  archive(id, replaced_by, frame_index, stamp_s, piece, T_world_camera, features);
   if constexpr (Archive::kReading) {
     if (!features) archive.Damaged("a keyframe without features");
   }

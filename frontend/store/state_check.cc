@@ -26,9 +26,11 @@ constexpr int kMostFrames = 1 << 28;  // counts of frames, and of pieces, stay b
 void CheckKeyframeState(const Map& map, int id, const SectionReader& file) {
   const Keyframe& k = map.keyframe(id);
   CheckIndex(k.id, id, id + 1, file);
+  CheckIndex(k.replaced_by, -1, id, file);  // so PresentKeyframe gets to an end
   CheckIndex(k.piece, 0, kMostFrames, file);
   CheckPose(k.T_world_camera, file);
   CheckFeatures(k.features, map, file);
+  if (k.replaced_by >= 0 && k.features->size() != 0) file.Damaged("a removed keyframe that is still there");
   if (k.landmarks.size() != k.features->size()) file.Damaged("a keyframe with landmarks of another");
   for (const int l : k.landmarks) {
     CheckIndex(l, -1, map.LandmarkCount(), file);

@@ -35,7 +35,7 @@ class LoopDetector::Impl {
 };
 
 LoopResult LoopDetector::Impl::Detect(const LoopQuery& query) {
-  internal::CheckId(query.id, state_.last_id());
+  internal::CheckId(query.id, state_.last_id(), state_.options().ltm_file);
   internal::CheckQuery(query, state_.members(), state_.callers_descriptors());
   LoopResult result;
   result.query = query.id;
@@ -137,6 +137,17 @@ LoopResult LoopDetector::Locate(const LoopQuery& query) const { return impl_->Lo
 
 void LoopDetector::AddLink(std::int64_t a, std::int64_t b) { impl_->state().reasoner().AddLink(a, b); }
 void LoopDetector::Unlink(std::int64_t a, std::int64_t b) { impl_->state().reasoner().Unlink(a, b); }
+
+bool LoopDetector::Merge(std::int64_t id, std::int64_t into) {
+  internal::DetectorState& state = impl_->state();
+  const int slot = state.memory().Find(id);
+  if (slot < 0 || state.memory().Find(into) < 0) return false;
+  if (state.memory().id(slot) != id) return true;  // rehearsal has merged it already
+  if (!state.reasoner().Merge(slot, into)) return false;
+  state.DropView(slot);
+  return true;
+}
+
 void LoopDetector::Save(const std::filesystem::path& file) const {
   internal::SaveDetector(impl_->state(), impl_->long_term(), file);
 }

@@ -37,7 +37,7 @@ bool OnlyInStore(const DetectorState& state, Kind kind, std::int64_t a, std::int
   }
   const auto& systems = state.reasoner().systems();
   if (number >= systems.size() || index < 0 || index >= state.memory().size()) return false;
-  if (kind == Kind::kView) return !state.reasoner().InMemory(index);
+  if (kind == Kind::kView) return state.memory().state(index) == State::kLongTerm;
   return systems[number]->memory().state(index) == State::kLongTerm;
 }
 

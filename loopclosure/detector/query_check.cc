@@ -116,11 +116,12 @@ std::string Which(std::int64_t id) { return "location " + std::to_string(id) + "
 
 }  // namespace
 
-void CheckId(std::int64_t id, std::int64_t last_id) {
+void CheckId(std::int64_t id, std::int64_t last_id, const std::string& file) {
   if (id < 0) throw InputError(Which(id) + "ids must not be negative");
-  if (id <= last_id) {
-    throw InputError(Which(id) + "ids must grow, but the one before was " + std::to_string(last_id));
-  }
+  if (id > last_id) return;
+  std::string problem = Which(id) + "ids must grow, but the one before was " + std::to_string(last_id);
+  if (!file.empty()) problem += "; " + file + " has the locations of an earlier run, go on after LastId()";
+  throw InputError(problem);
 }
 
 void CheckQuery(const LoopQuery& query, const std::vector<Member>& members,

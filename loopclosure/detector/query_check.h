@@ -15,8 +15,9 @@ struct CallersDescriptors {
   int width = 0;  ///< [values]
 };
 
-/// Throws InputError for an id that can't follow `last_id` (-1: it is the first one).
-void CheckId(std::int64_t id, std::int64_t last_id);
+/// Throws InputError for an id that can't follow `last_id` (-1: it is the first one). `file`: the long-term
+/// memory that may have it from an earlier process; empty: none.
+void CheckId(std::int64_t id, std::int64_t last_id, const std::string& file = {});
 
 /// Throws InputError for features, depth, mask, cameras or a prior that make no sense by themselves, or that
 /// are not for these members; or for descriptors of another kind than those `before`.

@@ -261,6 +261,16 @@ void PlaceReasoner::AddLink(std::int64_t a, std::int64_t b) {
   for (auto& system : systems_) system->AddLink(system->memory().Find(a), system->memory().Find(b));
 }
 
+bool PlaceReasoner::Merge(int slot, std::int64_t into) {
+  const auto can = [&](const LocationMemory& m) { return m.CanMerge(slot, m.Find(into)); };
+  const bool all = std::all_of(systems_.begin(), systems_.end(),
+                               [&](const auto& system) { return can(system->memory()); });
+  if (!all || (!Shared() && !can(union_))) return false;
+  for (auto& system : systems_) system->Merge(slot, system->memory().Find(into));
+  if (!Shared()) union_.Merge(slot, union_.Find(into));
+  return true;
+}
+
 bool PlaceReasoner::InMemory(int slot) const {
   return std::any_of(systems_.begin(), systems_.end(), [slot](const auto& system) {
     const State state = system->memory().state(slot);

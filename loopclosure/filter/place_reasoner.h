@@ -50,6 +50,8 @@ class PlaceReasoner {
   /// They do not.
   void Unlink(std::int64_t a, std::int64_t b);
   void AddLink(std::int64_t a, std::int64_t b);
+  /// A location is merged into an older one, in every memory or in none: false, if one of them can't.
+  bool Merge(int slot, std::int64_t into);
 
   /// All locations: those of the shared memory, or what is in any member's.
   const LocationMemory& memory() const { return Shared() ? systems_.front()->memory() : union_; }

@@ -89,20 +89,48 @@ int LocationMemory::Drop(int weight) {
   const int newest = short_term_.back();
   short_term_.pop_back();
   const int old = short_term_.back();
-  nodes_[Index(old)].weight += weight;
-  const std::vector<Link> passed_on = nodes_[Index(newest)].links;
-  nodes_[Index(newest)].links.clear();
-  nodes_[Index(newest)].state = State::kMerged;
-  changed_.insert({newest, old});
+  PassOn(newest, old, weight);
+  return old;
+}
+
+// The slot is gone: another one has its links, its weight counts there, and its id names that one.
+void LocationMemory::PassOn(int slot, int into, int weight) {
+  nodes_[Index(into)].weight += weight;
+  const std::vector<Link> passed_on = nodes_[Index(slot)].links;
+  nodes_[Index(slot)].links.clear();
+  nodes_[Index(slot)].state = State::kMerged;
+  changed_.insert({slot, into});
   for (const Link& link : passed_on) {
     std::vector<Link>& back = nodes_[Index(link.slot)].links;
-    back.erase(std::remove_if(back.begin(), back.end(), [newest](const Link& l) { return l.slot == newest; }),
+    back.erase(std::remove_if(back.begin(), back.end(), [slot](const Link& l) { return l.slot == slot; }),
                back.end());
     changed_.insert(link.slot);
-    AddLink(link.slot, old, link.type);
+    AddLink(link.slot, into, link.type);
   }
-  slot_of_id_[id(newest)] = old;
-  return old;
+  slot_of_id_[id(slot)] = into;
+}
+
+bool LocationMemory::CanMerge(int slot, int into) const {
+  return into >= 0 && into < slot && state(into) != State::kMerged && state(slot) != State::kMerged &&
+         !(state(slot) == State::kShortTerm && slot == short_term_.back());
+}
+
+void LocationMemory::Merge(int slot, int into) {
+  const State was = state(slot);
+  if (was == State::kShortTerm)
+    short_term_.erase(std::lower_bound(short_term_.begin(), short_term_.end(), slot));
+  if (was == State::kWorking) working_.erase(std::lower_bound(working_.begin(), working_.end(), slot));
+  if (was == State::kLongTerm) --num_long_term_;
+  PassOn(slot, into, 1 + nodes_[Index(slot)].weight);
+  nodes_[Index(slot)].weight = 0;
+  // Those that were merged into it before are newer.
+  for (auto named = slot_of_id_.upper_bound(id(slot)); named != slot_of_id_.end(); ++named) {
+    if (named->second != slot) continue;
+    named->second = into;
+    const auto at = std::lower_bound(nodes_.begin(), nodes_.end(), named->first,
+                                     [](const Node& node, std::int64_t id) { return node.id < id; });
+    changed_.insert(static_cast<int>(at - nodes_.begin()));
+  }
 }
 
 int LocationMemory::NextToTransfer(double recent_share, const std::set<int>& immune) const {

@@ -29,7 +29,7 @@ class LocationMemory {
   enum class State : std::uint8_t {
     kShortTerm,  ///< in STM: no candidate yet
     kWorking,    ///< in WM: a candidate
-    kMerged,     ///< nowhere: rehearsal merged it into an older one, which its id names from then on
+    kMerged,     ///< nowhere: it was merged into an older one, which its id names from then on
     kLongTerm,   ///< in LTM: left WM, can be retrieved
   };
   /// How two locations are linked.
@@ -71,6 +71,12 @@ class LocationMemory {
   /// The newest location is dropped without a trace but its id, which names the one before it from now on
   /// (a bad signature under bad_signatures: ignore). Returns the older slot, -1 as DropNewest.
   int IgnoreNewest();
+  /// True for a location that can be merged into `into`: an older one that is there, too, where it is not the
+  /// newest of STM.
+  bool CanMerge(int slot, int into) const;
+  /// A location is merged into an older one, which takes over its links, its weight and its id. Only if
+  /// CanMerge.
+  void Merge(int slot, int into);
   /// On a loop: the newer location takes over the older one's weight.
   void TransferWeight(int newer, int older);
 
@@ -136,6 +142,7 @@ class LocationMemory {
   LinkType Bounded(int a, int b, LinkType type) const;
   static std::size_t Index(int slot) { return static_cast<std::size_t>(slot); }
   int Drop(int weight);
+  void PassOn(int slot, int into, int weight);
   void Enter(int slot);
   // (slot, level) of every location within `levels` that `walkable` admits, `slot` first.
   template <typename Walkable>

@@ -115,6 +115,8 @@ class MemorySystem {
   void Store(int slot, LocationStore& store) const;
   /// It leaves WM.
   void Leave(int slot);
+  /// A location that is no longer needed is merged into an older one, if that can be.
+  void Merge(int slot, int into);
 
   /// For a durable store: signatures of a new location; then all nodes that changed since the last time.
   void StoreSignatures(int slot, LocationStore& store) const;
@@ -144,6 +146,7 @@ class MemorySystem {
   void Reference(const FilterUnit& unit, const Signature& signature);
   void Release(const FilterUnit& unit, const Signature& signature);
   bool LooksLikePrevious(int slot) const;
+  void Forget(int slot);
   void Link(int a, int b, LocationMemory::LinkType type);
   void Relinked(int a, int b);
   bool Counts() const { return options_.evidence.kind == EvidenceKind::kCounts; }

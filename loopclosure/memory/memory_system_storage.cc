@@ -132,6 +132,21 @@ void MemorySystem::Store(int slot, LocationStore& store) const {
 }
 
 void MemorySystem::Leave(int slot) {
+  Forget(slot);
+  memory_.Transfer(slot);
+  transition_.Update(memory_, {slot});
+}
+
+void MemorySystem::Merge(int slot, int into) {
+  std::vector<int> changed = {slot, into};
+  for (const LocationMemory::Link& link : memory_.links(slot)) changed.push_back(link.slot);
+  memory_.Merge(slot, into);
+  Forget(slot);
+  transition_.Update(memory_, changed);
+}
+
+// What the location looked like, and that the camera may be there.
+void MemorySystem::Forget(int slot) {
   for (FilterUnit& unit : units_) {
     const Signature signature = unit.likelihood.signature(slot);
     unit.likelihood.Remove(slot);
@@ -140,8 +155,6 @@ void MemorySystem::Leave(int slot) {
     unit.filter.Forget(slot);
   }
   if (joint_) joint_->filter.Forget(slot);
-  memory_.Transfer(slot);
-  transition_.Update(memory_, {slot});
 }
 
 void MemorySystem::StoreSignatures(int slot, LocationStore& store) const {

@@ -13,6 +13,7 @@
 #include "apps/run/progress.h"
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
+#include "apps/tutti/loops/earlier_images.h"
 #include "apps/tutti/loops/joined_pairs.h"
 #include "apps/tutti/loops/loops_dump.h"
 #include "apps/tutti/loops/loops_input.h"
@@ -29,7 +30,7 @@ namespace tutti::cli {
 namespace {
 
 struct LoopsArguments {
-  std::string images, out, rule, preset, camera;
+  std::string images, out, rule, preset, camera, places;
   GroundTruthArguments truth;
   std::vector<std::string> set;  // key=value, keys of the section `loops` of a configuration
   LoopDetectorOptions options;
@@ -61,13 +62,13 @@ std::optional<PinholeCamera> ParseCamera(const std::string& text) {
   return camera;
 }
 
-LoopRow Process(const std::filesystem::path& file, const std::filesystem::path& right, int number,
+LoopRow Process(const std::filesystem::path& file, const std::filesystem::path& right, std::int64_t number,
                 const std::optional<PinholeCamera>& camera, LoopDetector& detector) {
   LoopRow row;
   row.file = file.filename().string();
   LoopQuery query;
   query.id = number;
-  query.stamp_s = number;
+  query.stamp_s = static_cast<double>(number);
   query.image = right.empty() ? cv::imread(file.string(), cv::IMREAD_UNCHANGED)
                               : ReadJoined(file, right, &query.cameras);
   row.read = !query.image.empty();
@@ -104,6 +105,10 @@ LoopRun Run(const LoopsArguments& arguments, const LoopDetectorOptions& options,
   with_posterior.keep_posterior = true;  // for confusion.png
   with_posterior.keep_evidence = arguments.dump || options.keep_evidence;
   LoopDetector detector(with_posterior);
+  const std::string& places = arguments.places;
+  if (!places.empty() && std::filesystem::exists(places)) detector.Load(places);
+  EarlierImages earlier(detector, places.empty() ? options.ltm_file : places);
+  run.earlier = earlier.first();
   std::optional<LoopsDump> dump;
   if (arguments.dump) dump.emplace(folder, options.members);
   const int total = static_cast<int>(set.images.size());
@@ -112,19 +117,23 @@ LoopRun Run(const LoopsArguments& arguments, const LoopDetectorOptions& options,
   for (std::size_t i = 0; i < set.images.size(); ++i) {
     if (InterruptGuard::Requested()) break;
     const std::filesystem::path& image = set.images[i];
-    run.rows.push_back(Process(image, set.rights[i], static_cast<int>(i), set.camera, detector));
+    const std::int64_t number = earlier.first() + static_cast<std::int64_t>(i);
+    run.rows.push_back(Process(image, set.rights[i], number, set.camera, detector));
     LoopRow& row = run.rows.back();
+    earlier.Add(number, image);
+    earlier.Separate(&row);
     if (!row.read)
       progress.Note("tutti: warning: " + image.string() +
                     ": can't be read; it counts as an image without features");
     AddPosterior(row.result, total, run.posterior);
     if (dump) dump->Add(run, row.result, set.truth);
     DropEvidence(options.keep_posterior, row.result);
-    loops += row.result.accepted ? 1 : 0;
+    loops += row.result.accepted || row.earlier ? 1 : 0;
     progress.Update(run.rows.size(), std::to_string(loops) + " loops");
   }
   progress.Finish();
   if (dump) dump->Finish();
+  if (!places.empty()) detector.Save(places);
   run.truth = set.truth;
   if (run.rows.size() < set.images.size()) {
     const int done = static_cast<int>(run.rows.size());
@@ -168,6 +177,12 @@ int RunLoops(const LoopsArguments& given) {
   if (!arguments.preset.empty()) ApplyPreset(arguments.preset, arguments.options);
   if (!arguments.rule.empty()) SetRule(arguments.rule, arguments.options);
   SetLoopOptions(arguments.set, arguments.options);
+  for (const std::string& memory : {arguments.options.ltm_file, arguments.places}) {
+    if (!arguments.table || memory.empty()) continue;
+    throw InputError(memory +
+                     ": --table runs several detectors, and what one has seen is of no use to another; "
+                     "leave one of the two out");
+  }
   const std::string problem = arguments.truth.rule.Validate();
   if (!problem.empty()) throw InputError("ground truth: " + problem);
   cv::setNumThreads(arguments.options.threads);
@@ -245,6 +260,13 @@ void SetUpLoops(CLI::App& command, int& exit_code) {
   command.add_option("--set", arguments->set,
                      "key=value: an option of the detector, with the keys of section 'loops' in tutti run "
                      "--help-config --advanced (extraction.features=300); may be given again");
+  command
+      .add_option(
+          "--places", arguments->places,
+          "file with what the detector knows: gone on with if it is there, written at the end. Loops "
+          "into images of earlier runs are in earlier_loops.csv (also with --set ltm_file=FILE, where "
+          "the filters start afresh)")
+      ->type_name("FILE");
   command.callback([arguments, &exit_code] { exit_code = RunLoops(*arguments); });
 }
 

@@ -8,6 +8,7 @@
 #include <set>
 #include <utility>
 
+#include "apps/tutti/loops/earlier_images.h"
 #include "apps/tutti/loops/loops_pictures.h"
 #include "apps/tutti/posteriors_csv.h"
 #include "tutti/core/error.h"
@@ -74,6 +75,11 @@ nlohmann::ordered_json Reliability(const LoopEvaluation& evaluation) {
                     {"accuracy", bin.accuracy}});
   }
   return bins;
+}
+
+std::ptrdiff_t EarlierLoops(const LoopRun& run) {
+  return std::count_if(run.rows.begin(), run.rows.end(),
+                       [](const LoopRow& row) { return row.earlier.has_value(); });
 }
 
 std::string Csv(const LoopRun& run) {
@@ -188,6 +194,7 @@ OutputFolder OpenLoopsFolder(const std::filesystem::path& folder, bool table) {
                                                  "contact_sheet.png",
                                                  "precision_recall.png",
                                                  "posteriors.csv",
+                                                 "earlier_loops.csv",
                                                  "dump_candidates.csv",
                                                  "dump_verification.csv",
                                                  "table.json",
@@ -211,6 +218,7 @@ std::filesystem::path WriteLoopRun(const LoopRun& run, const LoopReport& report,
   json["protocol"]["members"] = run.options.members;
   json["protocol"]["seed"] = run.options.seed;
   json["protocol"]["threads"] = run.options.threads;
+  if (run.earlier > 0) json["earlier"] = {{"images", run.earlier}, {"loops", EarlierLoops(run)}};
   const CurvePlot curves = PlotCurves(run, report);
   folder.Write({"results.json", [&](File file) { WriteText(file, json.dump(2) + "\n"); }});
   folder.Write({"hypotheses.csv", [&](File file) { WriteText(file, Csv(run)); }});
@@ -219,6 +227,8 @@ std::filesystem::path WriteLoopRun(const LoopRun& run, const LoopReport& report,
   folder.Write({"precision_recall.png", [&](File file) { WritePng(file, curves); }});
   folder.Write({"confusion.png", [&](File file) { WriteConfusion(run, report, file); }});
   folder.Write({"contact_sheet.png", [&](File file) { WriteContactSheet(run, report, file); }});
+  if (run.earlier > 0)
+    folder.Write({"earlier_loops.csv", [&](File file) { WriteText(file, EarlierLoopsCsv(run)); }});
   if (run.options.keep_posterior)
     folder.Write({"posteriors.csv", [&](File file) { WritePosteriors(run, file); }});
   std::filesystem::path where = folder.Finish(finished);
@@ -254,6 +264,10 @@ void PrintLoopRun(const LoopRun& run, const LoopReport& report, const std::files
               posterior.calibration_images, ranked.calibration_images);
   std::printf("%-34s %d true, %d false, %d on ignored cells\n", "accepted", verified.true_positives,
               verified.false_positives, verified.ignored);
+  if (run.earlier > 0) {
+    std::printf("%-34s %td images, into %lld\n", "loops into earlier runs", EarlierLoops(run),
+                static_cast<long long>(run.earlier));
+  }
   std::printf("%-34s %.1f median, %.1f p99\n", "ms per image", report.ms_median, report.ms_p99);
   std::printf(
       "written: %s, hypotheses.csv, precision_recall.{csv,svg,png}, confusion.png, contact_sheet.png\n",

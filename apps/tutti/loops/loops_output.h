@@ -1,9 +1,11 @@
 // Output of `tutti loops`: results.json, hypotheses.csv, the pictures and the table on the terminal.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,11 +17,19 @@
 
 namespace tutti::cli {
 
+/// A loop into an image of an earlier run with the same memory (ltm_file, --places).
+struct EarlierLoop {
+  std::int64_t image = -1;  ///< its number in the memory
+  std::string file;         ///< its path
+};
+
 /// One image's outcome.
 struct LoopRow {
   std::string file;  ///< name of the image
   bool read = true;  ///< false: the file is damaged; the row stays in the denominator
   LoopResult result;
+  std::optional<EarlierLoop>
+      earlier;    ///< the loop is none of this run's, and `result` has it not as accepted
   double ms = 0;  ///< time of Detect [ms]
 
   /// The place that figures and pictures judge: the loop, or where there is none the filter's best; -1: none.
@@ -33,6 +43,7 @@ struct LoopRun {
   int stride = 1;
   LoopGroundTruth truth;  ///< of the rows
   std::vector<LoopRow> rows;
+  std::int64_t earlier = 0;  ///< images of earlier runs that it went on from
   cv::Mat posterior;  ///< CV_32FC1, square: the posterior of past images (columns), by AddPosterior; may be
                       ///< empty
 

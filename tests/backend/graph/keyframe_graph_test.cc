@@ -229,5 +229,71 @@ TEST(KeyframeGraph, RefusesOptionsThatMakeNoSense) {
   EXPECT_THROW(KeyframeGraph{options}, InputError);
 }
 
+// Two laps around the same loop: keyframe n / 2 + k is where k is.
+TEST(KeyframeGraph, EdgesOfRemovedKeyframesLeadToWhatStandsForThem) {
+  for (GraphKind kind : {GraphKind::kSE3, GraphKind::kSim3}) {
+    const auto synthetic = Drifting(kind);
+    KeyframeGraph graph = FromOdometry(synthetic, kind);
+    std::vector<MapKeyframe> left = KeyframesOf(synthetic);
+    std::map<int, int> into;
+    for (int id = 101; id < 199; id += 2) into[id] = id - 100;
+    into[1] = 0;  // and so is what 101 went into
+    LoopEdge loop = TrueLoop(synthetic, 5, 105), closed = loop;
+    EXPECT_FALSE(graph.Rehang(into, &closed)) << "both ends are one keyframe";
+    loop.query = 107;
+    loop.S_candidate_query = synthetic.truth[5].Inverse() * synthetic.truth[107];
+    const LoopEdge before = loop;
+    EXPECT_TRUE(graph.Rehang(into, &loop));
+    EXPECT_EQ(loop.query, 7);
+    const Similarity link = Similarity(left[107].T_world_keyframe.Inverse() * left[7].T_world_keyframe);
+    EXPECT_LT((loop.S_candidate_query.translation - (before.S_candidate_query * link).translation).norm(),
+              1e-9);
+    const Matrix7d old_covariance = before.information.inverse(), covariance = loop.information.inverse();
+    EXPECT_GT(covariance.block<3, 3>(3, 3).trace(), 1.05 * old_covariance.block<3, 3>(3, 3).trace());
+    graph.Remove(into);
+    left.erase(
+        std::remove_if(left.begin(), left.end(), [&](const MapKeyframe& k) { return into.count(k.id) != 0; }),
+        left.end());
+    graph.Update(left);
+    const PoseGraph small = graph.Graph({loop});
+    EXPECT_EQ(small.nodes().size(), left.size());
+    std::map<std::pair<int, int>, const PoseGraphEdge*> edges;
+    for (const PoseGraphEdge& edge : small.edges()) {
+      const bool is_new = edges.emplace(std::minmax(edge.from, edge.to), &edge).second;
+      EXPECT_TRUE(is_new || edge.kind == EdgeKind::kLoop) << edge.from << ", " << edge.to;
+      if (edge.kind == EdgeKind::kLoop) continue;
+      const Similarity in_map = small.Node(edge.from).pose.Inverse() * small.Node(edge.to).pose;
+      EXPECT_LT((edge.measurement.translation - in_map.translation).norm(), 1e-9);
+    }
+    // 102 was between 101 and 103, which are 1 and 3; 1 is 0.
+    ASSERT_EQ(edges.count({0, 102}), 1u);
+    ASSERT_EQ(edges.count({3, 102}), 1u);
+    EXPECT_EQ(edges.count({100, 102}), 0u) << "nothing was measured between them";
+    const double turned = edges.at({0, 102})->information(3, 3), step = edges.at({3, 4})->information(3, 3);
+    EXPECT_NEAR(step / turned, 3, 0.01) << "three edges in a row have three times the variance";
+    EXPECT_TRUE(graph.Optimize({}).success);
+  }
+}
+
+TEST(KeyframeGraph, RemovedKeyframesLeaveTheMeasurementsOfBeforeACorrection) {
+  const auto synthetic = Drifting(GraphKind::kSE3);
+  KeyframeGraph graph = FromOdometry(synthetic, GraphKind::kSE3);
+  const KeyframeCorrection correction = graph.Optimize({TrueLoop(synthetic, 5, 105)});
+  graph.Move(correction.S_world_keyframe, correction.merges);
+  std::vector<MapKeyframe> moved;
+  for (const auto& [id, S] : correction.S_world_keyframe) moved.push_back({id, 0, S.RigidPart()});
+  graph.Update(moved);
+  graph.Remove({{50, 49}});
+  moved.erase(moved.begin() + 50);
+  graph.Update(moved);
+  const PoseGraph small = graph.Graph({});
+  const auto at = [&](int id) { return synthetic.graph.nodes()[static_cast<std::size_t>(id)].pose; };
+  for (const PoseGraphEdge& edge : small.edges()) {
+    const Similarity odometry = at(edge.from).Inverse() * at(edge.to);
+    EXPECT_LT((edge.measurement.translation - odometry.translation).norm(), 1e-9) << edge.from;
+  }
+  EXPECT_EQ(small.edges().size(), 198u);
+}
+
 }  // namespace
 }  // namespace tutti

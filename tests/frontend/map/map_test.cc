@@ -130,5 +130,26 @@ TEST(Map, MedianDepthOfNothingIsZero) {
   EXPECT_EQ(map.MedianDepth(0), 3);
 }
 
+TEST(Map, ARemovedKeyframeLeavesWhatItSawToTheOthersAndAnEmptyShell) {
+  Map map = ThreeKeyframes();
+  const int all = map.AddLandmark({0, 0, 5}, 2, 0), pair = map.AddLandmark({0, 0, 5}, 2, 1),
+            alone = map.AddLandmark({0, 0, 5}, 2, 2);
+  for (const int keyframe : {0, 1}) map.AddObservation(all, keyframe, 0);
+  map.AddObservation(pair, 1, 1);
+  map.RemoveKeyframe(2, 1, 2);
+  ExpectConsistent(map);
+  EXPECT_EQ(map.landmark(all).observations.size(), 2U);
+  EXPECT_EQ(map.landmark(all).reference, 0) << "the keyframe that made it is gone";
+  EXPECT_FALSE(map.landmark(pair).alive) << "one view is less than two";
+  EXPECT_FALSE(map.landmark(alone).alive);
+  EXPECT_EQ(map.keyframe(2).features->size(), 0U);
+  EXPECT_EQ(map.KeyframeCount(), 3) << "ids stay";
+  map.RemoveKeyframe(1, 0, 1);
+  EXPECT_EQ(map.PresentKeyframe(2), 0);
+  EXPECT_EQ(map.PresentKeyframe(0), 0);
+  EXPECT_TRUE(map.landmark(all).alive) << "one view is enough";
+  ExpectConsistent(map);
+}
+
 }  // namespace
 }  // namespace tutti

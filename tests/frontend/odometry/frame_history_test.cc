@@ -96,5 +96,21 @@ TEST_F(FrameHistoryTest, ACopyGoesOnAlone) {
   EXPECT_EQ(history_.Poses(map_, 0).size(), 2U);
 }
 
+TEST_F(FrameHistoryTest, FramesOfRemovedKeyframesStayWhereTheyAreAndFollowWhatStandsForThem) {
+  std::vector<int> order;
+  const int third = AddKeyframe(Moved(3, 0.2, 0.3), &order);
+  Add(0.1, 0.9, 1);
+  Add(0.2, 3.1, third);
+  history_.Rehang({{1, 0}, {third, 1}}, map_);
+  Trajectory poses = history_.Poses(map_, 0);
+  ASSERT_EQ(poses.size(), 2U);
+  EXPECT_LT(Distance(poses[0].pose, Moved(0.9, 0.5, 0.1)), 1e-9);
+  EXPECT_LT(Distance(poses[1].pose, Moved(3.1, 0.5, 0.1)), 1e-9);
+  MoveKeyframes({{0, Similarity(Moved(10, 0))}}, &map_);
+  poses = history_.Poses(map_, 0);
+  EXPECT_LT(Distance(poses[0].pose, Moved(10, 0) * Moved(0.9, 0.5, 0.1)), 1e-9);
+  EXPECT_LT(Distance(poses[1].pose, Moved(10, 0) * Moved(3.1, 0.5, 0.1)), 1e-9);
+}
+
 }  // namespace
 }  // namespace tutti

@@ -60,6 +60,63 @@ class SavedDetector : public ::testing::Test {
   fs::path file_ = folder_ / "places.tutti";
 };
 
+// Of the second lap, all that can be merged into the first is.
+TEST_F(SavedDetector, MergedLocationsAreForgottenAndTheirPlacesFoundInTheOlderOnes) {
+  for (const MemoryKind memory : {MemoryKind::kShared, MemoryKind::kPerMember}) {
+    LoopDetectorOptions options = testing::SmallOptions();
+    options.memory = memory;
+    LoopDetector whole(options);
+    Walk(whole, 0, 24, kPlaces);
+    whole.Save(file_);
+    const auto size = fs::file_size(file_);
+    LoopDetector merged(options);
+    merged.Load(file_);
+    EXPECT_FALSE(merged.Merge(23, 23 - kPlaces)) << "the newest stays";
+    EXPECT_FALSE(merged.Merge(3, 17)) << "only into an older one";
+    EXPECT_FALSE(merged.Merge(99, 3));
+    EXPECT_FALSE(merged.Merge(22, 99));
+    for (int id = kPlaces; id < 23; ++id) EXPECT_TRUE(merged.Merge(id, id - kPlaces)) << id;
+    EXPECT_TRUE(merged.Merge(20, 3)) << "it is merged already";
+    EXPECT_EQ(merged.NumLocations(), kPlaces + 1u);
+    merged.Save(file_);
+    EXPECT_LT(static_cast<double>(fs::file_size(file_)), 0.8 * static_cast<double>(size));
+    LoopDetector loaded(options);
+    loaded.Load(file_);
+    const std::vector<LoopResult> later = Walk(merged, 24, 42, kPlaces);
+    testing::ExpectEqual(later, Walk(loaded, 24, 42, kPlaces));
+    EXPECT_GE(testing::CountTrue(later, kPlaces), 15);
+    for (const LoopResult& result : later) {
+      const bool gone = result.accepted && result.candidate >= kPlaces && result.candidate < 23;
+      EXPECT_FALSE(gone) << result.query;
+    }
+    EXPECT_EQ(testing::CountFalse(later, kPlaces), 0);
+  }
+}
+
+TEST_F(SavedDetector, MergedLocationsOfLongTermMemoryAreNotSavedAndStayAwayFromItsFile) {
+  LoopDetectorOptions options = BoundedOptions();
+  options.ltm_file = (folder_ / "memory.ltm").string();
+  std::size_t long_term = 0;
+  {
+    LoopDetector detector(options);
+    Walk(detector, 0, 18, kPlaces);
+    long_term = detector.NumLongTerm();
+    ASSERT_GT(long_term, 3u);
+    for (int id = 1; id < 5; ++id) EXPECT_TRUE(detector.Merge(id, 0));
+    EXPECT_LT(detector.NumLongTerm(), long_term);
+    detector.Save(file_);
+    LoopDetectorOptions without = options;
+    without.ltm_file.clear();
+    LoopDetector loaded(without);
+    loaded.Load(file_);
+    EXPECT_EQ(loaded.NumLongTerm(), detector.NumLongTerm());
+    testing::ExpectEqual(Walk(detector, 18, 24, kPlaces), Walk(loaded, 18, 24, kPlaces));
+    long_term = detector.NumLongTerm();
+  }
+  const LoopDetector again(options);
+  EXPECT_EQ(again.NumLongTerm(), long_term);
+}
+
 TEST_F(SavedDetector, ALoadedOneGoesOnExactlyAsTheSavedOne) {
   for (const char* rule : {"mean", "naive"}) {
     for (const MemoryKind memory : {MemoryKind::kShared, MemoryKind::kPerMember}) {

@@ -245,5 +245,37 @@ TEST(LocationMemory, WhatNoMemoryWouldHaveSavedIsRefused) {
   refused(2, {12, State::kWorking, 0, 0, 2});  // nothing in STM
 }
 
+TEST(LocationMemory, AMergedLocationHandsLinksWeightAndNamesToAnOlderOne) {
+  LocationMemory memory(2);
+  for (int i = 0; i < 8; ++i) memory.Add(10 + i);
+  memory.DropNewest();  // 17 names 16
+  memory.Settle();      // 15 and 16 stay
+  memory.AddLink(1, 4, LinkType::kLoop);
+  EXPECT_FALSE(memory.CanMerge(1, 4)) << "only into an older one";
+  EXPECT_FALSE(memory.CanMerge(6, 1)) << "the newest stays";
+  ASSERT_TRUE(memory.CanMerge(4, 1));
+  memory.Merge(4, 1);
+  EXPECT_EQ(memory.state(4), State::kMerged);
+  EXPECT_EQ(memory.Find(14), 1);
+  EXPECT_EQ(memory.weight(1), 1);
+  const std::vector<std::pair<int, int>> near = {{1, 0}, {0, 1}, {2, 1}, {3, 1}};
+  EXPECT_EQ(memory.Neighbours(1, 1), near) << "3 was before it";
+  ASSERT_TRUE(memory.CanMerge(1, 0));
+  memory.Merge(1, 0);
+  EXPECT_EQ(memory.Find(14), 0) << "what it had taken over goes along";
+  EXPECT_EQ(memory.weight(0), 2);
+  EXPECT_FALSE(memory.CanMerge(3, 1)) << "that is no longer there";
+  memory.Merge(5, 0);  // of short-term memory
+  EXPECT_EQ(memory.short_term_memory(), (std::deque<int>{6}));
+  internal::ByteWriter out;
+  memory.Save(out);
+  LocationMemory again(2);
+  internal::ByteReader in(out.bytes(), "it");
+  again.Load(in);
+  EXPECT_EQ(again.Find(14), 0);
+  EXPECT_EQ(again.working_memory(), (std::vector<int>{0, 2, 3}));
+  EXPECT_EQ(again.short_term_memory(), (std::deque<int>{6}));
+}
+
 }  // namespace
 }  // namespace tutti

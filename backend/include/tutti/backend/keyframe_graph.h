@@ -41,8 +41,8 @@ struct CovisiblePair {
 /// A loop as an edge between two keyframes.
 struct LoopEdge {
   int candidate = -1;                ///< keyframe id, the older one
-  int query = -1;                    ///< keyframe id, the newer one
-  std::int64_t candidate_frame = 0;  ///< their input frames
+  int query = -1;                    ///< keyframe id, the newer one (until Rehang)
+  std::int64_t candidate_frame = 0;  ///< input frames that it was found between
   std::int64_t query_frame = 0;
   Similarity S_candidate_query;                 ///< maps points of the query camera into the candidate camera
   Matrix7d information = Matrix7d::Identity();  ///< of (translation, rotation, log scale)
@@ -115,6 +115,14 @@ class KeyframeGraph {
   std::vector<std::optional<double>> Distances(const std::vector<LoopEdge>& accepted,
                                                const std::vector<LoopEdge>& entering) const;
 
+  /// Keyframes leave the map, and for each an older one stands: id -> the one that stands for it, which may
+  /// leave as well. What was measured to a keyframe that leaves is from then on measured to the other one,
+  /// over the edge between the two: uncertainties add up, and what was connected stays so. To be called after
+  /// Update with all of them, and before Update without.
+  void Remove(const std::map<int, int>& into);
+  /// The same for a loop, to be called before Remove. False if both of its ends become one keyframe.
+  bool Rehang(const std::map<int, int>& into, LoopEdge* loop) const;
+
   /// To be called after Update and before the map takes these poses: keeps the measurements, in the new
   /// units.
   void Move(const std::map<int, Similarity>& S_world_keyframe, const std::map<int, int>& merges);
@@ -126,17 +134,20 @@ class KeyframeGraph {
   /// All but the options, for saved maps (tutti::slam).
   template <class Archive>
   void State(Archive& archive) {
-    archive(keyframes_, births_, merged_, edges_, kept_);
+    archive(keyframes_, births_, merged_, edges_, kept_, carried_);
   }
 
  private:
   struct Edge {
     int older = -1, newer = -1;
     Similarity S_older_newer;
+    int steps = 1;   // edges that it was made of, over keyframes that have left
+    double way = 0;  // sum of their lengths, in the older one's units; 0: its own length
     template <class Archive>
     void State(Archive& archive) {
-      archive(older, newer, S_older_newer);
+      archive(older, newer, S_older_newer, steps, way);
     }
+    double Way() const { return steps > 1 ? way : S_older_newer.translation.norm(); }
   };
   struct Birth {
     int id = -1;
@@ -163,6 +174,11 @@ class KeyframeGraph {
   std::map<int, int> Merges(const std::vector<LoopEdge>& loops) const;
   std::map<int, Similarity> JoinedPieces(const std::vector<LoopEdge>& loops) const;
   const MapKeyframe& At(int id) const;
+  bool Consecutive(int older, int newer) const;
+  double SigmaFloor() const;
+  Vector7d Sigmas(const Edge& edge, double floor) const;
+  Edge Between(int older, int newer) const;
+  Matrix7d Adjoint(const Similarity& S) const;
 
   // All ascending: a map of ten thousand keyframes is taken over between two frames.
   KeyframeGraphOptions options_;
@@ -171,6 +187,7 @@ class KeyframeGraph {
   std::vector<Merge> merged_;  // in order of time
   std::vector<Edge> edges_;    // odometry's, with their measurements
   std::vector<Edge> kept_;     // measurements from before the last correction, in present units
+  std::vector<Edge> carried_;  // edges that were moved to what stands for keyframes that have left
 };
 
 /// Carries a loop over to the units of a corrected map (mono): S' = scale(s_c) S scale(1/s_q).

@@ -129,7 +129,7 @@ class Odometry {
   /// made), in the order of its features. Costs a look at each feature.
   std::vector<SeenLandmark> SeenLandmarks() const;
 
-  /// Ids of all keyframes, ascending.
+  /// Ids of all keyframes that are in the map, ascending.
   std::vector<int> KeyframeIds() const;
   /// Everything about one keyframe, with the current map's points.
   KeyframeView Keyframe(int id) const;
@@ -160,6 +160,15 @@ class Odometry {
   /// where the loop says it must be, and landmarks that are the same become one. Returns how many landmarks
   /// both sides have in common then.
   int FuseLoop(int older, int newer, const Similarity& S_older_newer);
+
+  /// Removes keyframes that the map can do without, the newest first: at least 90 % of their landmarks are
+  /// seen by three others, or from an earlier visit. What keyframes see of the same landmarks is found first,
+  /// and fused. The first keyframe of each piece stays, and what the last frame hangs on. Frames
+  /// hang on the keyframe that stands for theirs, and stay where they are. `may(removed, into)`, asked of
+  /// each, can forbid it. Returns which older keyframe stands for each that was removed; that one may be
+  /// removed, too. Ids stay as they are. Throws InputError while frames are being located
+  /// (BeginLocalization).
+  std::map<int, int> RemoveRedundantKeyframes(const std::function<bool(int removed, int into)>& may);
 
   /// Begins to adjust all keyframes of a map piece and what they see (bundle adjustment) to each other,
   /// beside the tracking. The oldest keyframe stays where it is.

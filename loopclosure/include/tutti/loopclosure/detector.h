@@ -206,6 +206,10 @@ class LoopDetector {
   /// (the pose graph contradicts it): the filter no longer takes their places for one. Ids that are unknown,
   /// or not linked by a loop, are no error.
   void Unlink(std::int64_t a, std::int64_t b);
+  /// Forgets what a location looks like, since an older one, `into`, shows the same place: that has its links
+  /// from then on. False, and nothing happens, if one of the two is not there, if `into` is not older, or if
+  /// `id` is the newest of all. With ltm_file, the file learns of it with the next image.
+  bool Merge(std::int64_t id, std::int64_t into);
 
   /// Saves everything (vocabularies, memory with its long-term part, filters) into one file; a file that is
   /// there is replaced only by a complete one. Throws InputError if it can't be written.

@@ -66,6 +66,12 @@ class SlamSystem {
   /// After the last frame: brings in all that is on its way. May be called again after AddLoop.
   void Finish();
 
+  /// Removes keyframes that the map can do without (Odometry::RemoveRedundantKeyframes), after Finish().
+  /// Their frames, the pose graph's edges and the detector's places go over to keyframes that stay; records
+  /// of loops stay as they are. The map is as good for going on and for BeginLocalization(). Returns how many
+  /// went. Throws InputError without an odometry, or after BeginLocalization().
+  std::size_t Prune();
+
   /// What went wrong without stopping it (the long-term memory's disk is full) since the last call.
   std::vector<std::string> TakeWarnings();
 

@@ -1,0 +1,105 @@
+#include "frontend/map/redundant_keyframes.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "frontend/map/landmark_fusion.h"
+
+namespace tutti {
+namespace {
+
+constexpr double kShare = 0.9;      // of a redundant keyframe's landmarks that
+constexpr std::size_t kOthers = 3;  // so many others see
+constexpr int kCoarserLevels = 1;   // that a view of the others may be coarser: a corner's level wavers
+constexpr double kElsewhere = 0.1;  // of its landmarks: who has fewer in common with it saw something else
+constexpr int kLeastInCommon = 15;  // landmarks in common with the keyframe that is to stand for another
+
+int LevelOf(const Map& map, const Observation& view) {
+  return map.keyframe(view.keyframe).features->keypoints[static_cast<std::size_t>(view.feature)].octave;
+}
+
+// The newest keyframe before this one that saw something else, -1: none. What is older is of an earlier
+// visit. `seen`: landmarks that this one sees.
+int LastElsewhere(const Map& map, int id, std::ptrdiff_t seen) {
+  const std::map<int, int>& covisible = map.keyframe(id).covisible;
+  for (int other = id - 1; other >= 0; --other) {
+    if (map.keyframe(other).replaced_by >= 0) continue;
+    const auto shared = covisible.find(other);
+    if (shared == covisible.end() || shared->second < kElsewhere * static_cast<double>(seen)) return other;
+  }
+  return -1;
+}
+
+// Whether others see a landmark as well as this view does: enough of them, or so many of an earlier visit as
+// tell where it is.
+bool IsSeenByOthers(const Map& map, const Landmark& landmark, const Observation& view, int last_elsewhere,
+                    std::size_t least_views) {
+  const int coarsest = LevelOf(map, view) + kCoarserLevels;
+  std::size_t others = 0, earlier = 0;
+  for (const Observation& other : landmark.observations) {
+    if (other.keyframe == view.keyframe || LevelOf(map, other) > coarsest) continue;
+    ++others;
+    if (other.keyframe < last_elsewhere) ++earlier;
+  }
+  return others >= kOthers || earlier >= least_views;
+}
+
+bool IsRedundant(const Map& map, int id, std::size_t least_views) {
+  const std::vector<int>& landmarks = map.keyframe(id).landmarks;
+  const auto seen = std::count_if(landmarks.begin(), landmarks.end(), [](int l) { return l >= 0; });
+  const int last_elsewhere = LastElsewhere(map, id, seen);
+  int redundant = 0;
+  for (std::size_t f = 0; f < landmarks.size(); ++f) {
+    if (landmarks[f] < 0) continue;
+    const Observation view{id, static_cast<int>(f)};
+    if (IsSeenByOthers(map, map.landmark(landmarks[f]), view, last_elsewhere, least_views)) ++redundant;
+  }
+  return seen > 0 && redundant >= kShare * static_cast<double>(seen);
+}
+
+// The older keyframe of the same piece with most common landmarks (ties: the oldest); -1 if there is none.
+int StandIn(const Map& map, int id) {
+  int best = -1, most = kLeastInCommon - 1;
+  for (const auto& [other, shared] : map.keyframe(id).covisible) {
+    if (other >= id || shared <= most || map.keyframe(other).piece != map.keyframe(id).piece) continue;
+    best = other;
+    most = shared;
+  }
+  return best;
+}
+
+// The oldest of each piece: they hold it where it is.
+std::set<int> FirstOfPieces(const Map& map) {
+  std::set<int> first, pieces;
+  for (int id = 0; id < map.KeyframeCount(); ++id) {
+    if (map.keyframe(id).replaced_by < 0 && pieces.insert(map.keyframe(id).piece).second) first.insert(id);
+  }
+  return first;
+}
+
+}  // namespace
+
+void FuseAll(const PinholeCamera& camera, Map* map) {
+  for (int id = 0; id < map->KeyframeCount(); ++id) {
+    if (std::as_const(*map).keyframe(id).replaced_by < 0) FuseNeighbours(camera, id, map);
+  }
+}
+
+std::map<int, int> RemoveRedundantKeyframes(const std::set<int>& keep, std::size_t least_views,
+                                            const std::function<bool(int removed, int into)>& may, Map* map) {
+  const Map& now = *map;
+  const std::set<int> first = FirstOfPieces(now);
+  std::map<int, int> removed;
+  for (int id = now.KeyframeCount() - 1; id > 0; --id) {
+    if (now.keyframe(id).replaced_by >= 0 || keep.count(id) != 0 || first.count(id) != 0) continue;
+    if (!IsRedundant(now, id, least_views)) continue;
+    const int into = StandIn(now, id);
+    if (into < 0 || !may(id, into)) continue;
+    map->RemoveKeyframe(id, into, least_views);
+    removed[id] = into;
+  }
+  if (!removed.empty()) map->UpdateGeometry();
+  return removed;
+}
+
+}  // namespace tutti

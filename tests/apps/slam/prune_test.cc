@@ -1,0 +1,153 @@
+// A map without its redundant keyframes is as good as it was.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "apps/slam/map_state.h"
+#include "tests/support/error_of.h"
+#include "tests/support/recording.h"
+#include "tests/support/small_town.h"
+#include "tests/support/test_data.h"
+#include "tutti/core/error.h"
+#include "tutti/slam/map_file.h"
+#include "tutti/slam/slam_system.h"
+
+namespace tutti {
+namespace {
+
+namespace fs = std::filesystem;
+
+RunConfig WithFewFeatures() {
+  RunConfig config;
+  config.odometry.features = 800;
+  return config;
+}
+
+testing::Recording DriveLaps(SyntheticSensor sensor) {
+  SyntheticOptions options = testing::SmallStereoTownWithALoop(320, 160);
+  options.sensor = sensor;
+  options.laps = 2.3;
+  const SyntheticWorld world(options);
+  return testing::Record(world, world.Size());
+}
+
+double FarthestApart(const Trajectory& a, const Trajectory& b) {
+  if (a.size() != b.size()) return 1e9;
+  double farthest = 0;
+  for (std::size_t i = 0; i < a.size(); ++i)
+    farthest = std::max(farthest, (a[i].pose.translation - b[i].pose.translation).norm());
+  return farthest;
+}
+
+// Nodes that can be reached from the first one.
+std::size_t Connected(const PoseGraph& graph) {
+  std::map<int, std::vector<int>> neighbours;
+  for (const PoseGraphEdge& edge : graph.edges()) {
+    neighbours[edge.from].push_back(edge.to);
+    neighbours[edge.to].push_back(edge.from);
+  }
+  std::set<int> reached = {graph.nodes().front().id};
+  std::vector<int> next(reached.begin(), reached.end());
+  while (!next.empty()) {
+    const int node = next.back();
+    next.pop_back();
+    for (const int other : neighbours[node]) {
+      if (reached.insert(other).second) next.push_back(other);
+    }
+  }
+  return reached.size();
+}
+
+// Frames from `first` on that are located in the map, and how far they are from where `expected` has them.
+std::pair<std::size_t, double> Locate(SlamSystem& slam, const testing::Recording& recording,
+                                      std::size_t first, const Trajectory& expected) {
+  std::size_t found = 0;
+  double worst = 0;
+  slam.BeginLocalization();
+  for (std::size_t i = first; i < recording.frames.size(); ++i) {
+    const TrackResult result = slam.Track(recording.frames[i]);
+    if (result.state != TrackingState::kTracking) continue;
+    ++found;
+    const double stamp = recording.frames[i].stamp_s;
+    const auto same = std::find_if(expected.begin(), expected.end(),
+                                   [stamp](const StampedPose& pose) { return pose.stamp_s == stamp; });
+    if (same == expected.end()) return {found, 1e9};
+    worst = std::max(worst, (result.T_world_camera.translation - same->pose.translation).norm());
+  }
+  return {found, worst};
+}
+
+class Pruned : public ::testing::TestWithParam<SyntheticSensor> {};
+
+// One test, for the sake of its time: two laps are mapped and pruned.
+TEST_P(Pruned, MapIsSmallerAndKeepsPosesLoopsAndGraphAndGoesOnAndTellsWhereFramesAre) {
+  const testing::Recording recording = DriveLaps(GetParam());
+  const std::size_t n = recording.frames.size(), mapped = n - 45;
+  SlamSystem slam(WithFewFeatures(), recording.rig);
+  for (std::size_t i = 0; i < mapped; ++i) slam.Track(recording.frames[i]);
+  slam.Finish();
+  const Trajectory trajectory = slam.odometry()->FrameTrajectory();
+  const std::string loops = StateOf(slam.loops());
+  const std::size_t accepted = CountAccepted(slam.loops());
+  const std::vector<int> before = slam.odometry()->KeyframeIds();
+  ASSERT_GT(accepted, 0u);
+
+  const std::size_t removed = slam.Prune();
+  const std::vector<int> ids = slam.odometry()->KeyframeIds();
+  std::printf("  %zu of %zu keyframes removed\n", removed, before.size());
+  EXPECT_GT(removed, before.size() / 5);
+  EXPECT_EQ(ids.size() + removed, before.size());
+  EXPECT_EQ(ids.front(), before.front());
+  EXPECT_TRUE(std::includes(before.begin(), before.end(), ids.begin(), ids.end())) << "ids stay";
+  EXPECT_LT(FarthestApart(slam.odometry()->FrameTrajectory(), trajectory), 1e-9);
+  EXPECT_EQ(StateOf(slam.loops()) == loops, true) << "records stay";
+  EXPECT_EQ(slam.Graph().nodes().size(), ids.size());
+  EXPECT_EQ(Connected(slam.Graph()), ids.size());
+
+  const fs::path file = testing::FreshFolder() / "map.tutti";
+  slam.Save(file);
+  const MapInfo info = ReadMapInfo(file);
+  EXPECT_EQ(static_cast<std::size_t>(info.keyframes), ids.size());
+  const auto loaded = SlamSystem::Load(file, info), located = SlamSystem::Load(file, info);
+  EXPECT_LT(FarthestApart(loaded->odometry()->FrameTrajectory(), trajectory), 1e-9);
+  for (SlamSystem* each : {&slam, loaded.get()}) {
+    std::size_t lost = 0;
+    for (std::size_t i = mapped; i < n; ++i)
+      lost += each->Track(recording.frames[i]).state != TrackingState::kTracking ? 1 : 0;
+    EXPECT_EQ(lost, 0u);
+    each->Finish();
+  }
+  EXPECT_EQ(StateOf(loaded->loops()) == StateOf(slam.loops()), true) << "goes on as the one that was saved";
+  EXPECT_EQ(loaded->odometry()->KeyframeIds(), slam.odometry()->KeyframeIds());
+  EXPECT_GE(CountAccepted(slam.loops()), accepted);
+
+  const auto [found, worst] = Locate(*located, recording, mapped, slam.odometry()->FrameTrajectory());
+  std::printf("  %zu of 45 frames located, at most %.3f from where they are\n", found, worst);
+  EXPECT_GE(found, 43u);
+  EXPECT_LT(worst, GetParam() == SyntheticSensor::kStereo ? 0.7 : 0.1);  // mono: units of the map
+  EXPECT_NE(testing::ErrorOf([&] { located->Prune(); }).find("must stay as it is"), std::string::npos);
+
+  slam.Prune();
+  EXPECT_EQ(Connected(slam.Graph()), slam.odometry()->KeyframeIds().size()) << "pruned twice";
+}
+
+INSTANTIATE_TEST_SUITE_P(Sensors, Pruned, ::testing::Values(SyntheticSensor::kStereo, SyntheticSensor::kMono),
+                         [](const auto& param) {
+                           return param.param == SyntheticSensor::kStereo ? "Stereo" : "Mono";
+                         });
+
+TEST(Prune, WithoutPosesThereIsNothingToPrune) {
+  CameraRig rig;
+  rig.calibrated = false;
+  RunConfig config;
+  SlamSystem slam(config, rig);
+  EXPECT_NE(testing::ErrorOf([&] { slam.Prune(); }).find("no keyframes"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace tutti

@@ -1,0 +1,104 @@
+#include "frontend/map/redundant_keyframes.h"
+
+#include <gtest/gtest.h>
+
+#include <utility>
+
+namespace tutti {
+namespace {
+
+constexpr int kFeaturesEach = 20;
+
+// Features of octave 1 (of 3), each with a descriptor of its own.
+Keyframe KeyframeAt(double x) {
+  auto features = std::make_shared<FrameFeatures>();
+  features->keypoints.assign(kFeaturesEach, cv::KeyPoint(10.0F, 10.0F, 31.0F));
+  for (cv::KeyPoint& keypoint : features->keypoints) keypoint.octave = 1;
+  features->descriptors = cv::Mat(kFeaturesEach, 32, CV_8U, cv::Scalar(0));
+  features->inverse_depth.assign(kFeaturesEach, 0.0F);
+  features->inverse_depth_sigma.assign(kFeaturesEach, 0.0F);
+  Keyframe keyframe;
+  keyframe.features = features;
+  keyframe.T_world_camera.translation.x() = x;
+  return keyframe;
+}
+
+// Keyframes at nearly one place that all see the same landmarks, by feature.
+class RedundantKeyframes : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    for (int id = 0; id < 6; ++id) map_.AddKeyframe(KeyframeAt(0.01 * id));
+    for (int f = 0; f < kFeaturesEach; ++f) {
+      const int landmark = map_.AddLandmark({0, 0, 5}, 0, f);
+      for (int id = 1; id < 6; ++id) map_.AddObservation(landmark, id, f);
+    }
+  }
+  // A feature of a keyframe no longer sees its landmark, but one of its own.
+  void SeesSomethingElse(int keyframe, int feature) {
+    map_.RemoveObservation(feature, keyframe);
+    map_.AddLandmark({0, 0, 7}, keyframe, feature);
+  }
+  std::map<int, int> Remove(const std::set<int>& keep = {}) {
+    return RemoveRedundantKeyframes(keep, 1, may_, &map_);
+  }
+  bool IsThere(int keyframe) const { return map_.keyframe(keyframe).replaced_by < 0; }
+
+  Map map_{{1.0F, 1.2F, 1.44F, 1.728F}};
+  std::function<bool(int, int)> may_ = [](int, int) { return true; };
+};
+
+TEST_F(RedundantKeyframes, AreRemovedUntilThreeSeeEachLandmarkAndTheOldestStandsForThem) {
+  EXPECT_EQ(Remove(), (std::map<int, int>{{5, 0}, {4, 0}, {3, 0}}))
+      << "with two others left none of the three is redundant";
+  EXPECT_TRUE(Remove().empty());
+  for (int f = 0; f < kFeaturesEach; ++f) EXPECT_EQ(map_.landmark(f).observations.size(), 3U);
+}
+
+TEST_F(RedundantKeyframes, WithSomethingOfItsOwnAKeyframeStays) {
+  for (const int f : {0, 1}) SeesSomethingElse(5, f);  // 90 % remain
+  for (const int f : {2, 3, 4}) SeesSomethingElse(4, f);
+  Remove();
+  EXPECT_FALSE(IsThere(5));
+  EXPECT_TRUE(IsThere(4));
+}
+
+TEST_F(RedundantKeyframes, ViewsFromFartherAwayDoNotReplaceNearerOnes) {
+  const auto with_octave = [this](int keyframe, int octave) {
+    auto features = std::make_shared<FrameFeatures>(*std::as_const(map_).keyframe(keyframe).features);
+    for (cv::KeyPoint& keypoint : features->keypoints) keypoint.octave = octave;
+    map_.keyframe(keyframe).features = features;
+  };
+  for (const int coarser : {0, 1, 2}) with_octave(coarser, 3);
+  Remove();
+  EXPECT_TRUE(IsThere(5)) << "two others see as much";
+}
+
+TEST_F(RedundantKeyframes, AnEarlierVisitThatSawTheSameIsEnough) {
+  const auto removed = [this](int between, std::size_t least_views) {
+    Map map({1.0F, 1.2F, 1.44F, 1.728F});
+    const int first = map.AddKeyframe(KeyframeAt(0));
+    for (int k = 0; k < between; ++k) map.AddKeyframe(KeyframeAt(5));  // sees something else
+    const int again = map.AddKeyframe(KeyframeAt(0.1));
+    for (int f = 0; f < kFeaturesEach; ++f) {
+      const int landmark = map.AddLandmark({0, 0, 5}, first, f);
+      map.AddObservation(landmark, again, f);
+    }
+    return RemoveRedundantKeyframes({}, least_views, may_, &map);
+  };
+  EXPECT_EQ(removed(1, 1), (std::map<int, int>{{2, 0}}));
+  EXPECT_TRUE(removed(1, 2).empty()) << "one camera needs two views to tell where a landmark is";
+  EXPECT_TRUE(removed(0, 1).empty()) << "the same visit";
+}
+
+TEST_F(RedundantKeyframes, TheFirstOfAPieceAndThoseToBeKeptStay) {
+  for (const int id : {3, 4, 5}) map_.keyframe(id).piece = 1;
+  EXPECT_EQ(Remove({4}), (std::map<int, int>{{5, 3}, {2, 0}, {1, 0}})) << "each in its piece";
+}
+
+TEST_F(RedundantKeyframes, WhoeverNeedsOneCanForbidIt) {
+  may_ = [](int removed, int) { return removed != 5; };
+  EXPECT_EQ(Remove(), (std::map<int, int>{{4, 0}, {3, 0}, {2, 0}}));
+}
+
+}  // namespace
+}  // namespace tutti

@@ -162,6 +162,13 @@ LoopResult LoopWorker::Locate(const LoopQuery& query) {
   return detector_.Locate(query);
 }
 
+void LoopWorker::BeginSession() {
+  std::unique_lock<std::mutex> lock(mutex_);
+  changed_.wait(lock, [this] { return tasks_.empty() && !busy_; });
+  detector_.BeginSession();
+  waited_ms_ = 0;
+}
+
 LoopResult LoopWorker::Take() {
   const ScopedSpan span(recorder_, Lane::kTracking, "wait_for_loop");
   const internal::Stopwatch watch;

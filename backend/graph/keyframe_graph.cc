@@ -115,11 +115,37 @@ void KeyframeGraph::Update(std::vector<MapKeyframe> keyframes, const std::vector
   edges_.clear();
   for (std::size_t i = 1; i < keyframes_.size(); ++i) {
     const int older = keyframes_[i - 1].id, newer = keyframes_[i].id;
-    if (OfOnePiece(older, newer)) edges_.push_back({older, newer, {}});
+    if (!Begins(newer) && OfOnePiece(older, newer)) edges_.push_back({older, newer, {}});
   }
   for (const CovisiblePair& c : Strongest(covisible)) edges_.push_back({c.older, c.newer, {}});
+  TieBeginnings();
   std::sort(edges_.begin(), edges_.end(), Before<Edge>);
   for (Edge& edge : edges_) edge.S_older_newer = Measured(edge.older, edge.newer);
+}
+
+void KeyframeGraph::BeginSession(int first_keyframe) {
+  MeasureAgain();
+  sessions_.push_back(first_keyframe);
+}
+
+void KeyframeGraph::Append(const KeyframeGraph& other, int first_keyframe) {
+  for (const int begin : other.sessions_) sessions_.push_back(first_keyframe + begin);
+}
+
+bool KeyframeGraph::Begins(int keyframe) const {
+  return std::binary_search(sessions_.begin(), sessions_.end(), keyframe);
+}
+
+// A recording that began in the map hangs on what its first keyframe saw there; on the keyframe before, if
+// that is not much.
+void KeyframeGraph::TieBeginnings() {
+  for (std::size_t i = 1; i < keyframes_.size(); ++i) {
+    const int older = keyframes_[i - 1].id, newer = keyframes_[i].id;
+    if (!Begins(newer) || !OfOnePiece(older, newer)) continue;
+    const bool tied =
+        std::any_of(edges_.begin(), edges_.end(), [newer](const Edge& edge) { return edge.newer == newer; });
+    if (!tied) edges_.push_back({older, newer, {}});
+  }
 }
 
 // The strongest few of each keyframe, without those that are consecutive: more would count the same landmarks
@@ -132,7 +158,8 @@ std::vector<CovisiblePair> KeyframeGraph::Strongest(const std::vector<CovisibleP
     const bool recent =
         kept_.empty() || c.newer - c.older < kRecentKeyframes || Kept(c.older, c.newer) != nullptr;
     const MapKeyframe* older = Find(keyframes_, c.older);
-    const bool next = older != nullptr && older != &keyframes_.back() && (older + 1)->id == c.newer;
+    const bool next =
+        older != nullptr && older != &keyframes_.back() && (older + 1)->id == c.newer && !Begins(c.newer);
     if (recent && !next && OfOnePiece(c.older, c.newer)) candidates.push_back(c);
   }
   std::sort(candidates.begin(), candidates.end(), [](const CovisiblePair& a, const CovisiblePair& b) {

@@ -61,9 +61,9 @@ LocationMemory::LinkType LocationMemory::Bounded(int a, int b, LinkType type) co
   return LinkType::kLoop;
 }
 
-std::vector<int> LocationMemory::Settle() {
+std::vector<int> LocationMemory::Settle(int most) {
   std::vector<int> moved;
-  while (static_cast<int>(short_term_.size()) > stm_size_) {
+  while (static_cast<int>(short_term_.size()) > most) {
     const int slot = short_term_.front();
     short_term_.pop_front();
     Enter(slot);

@@ -23,6 +23,8 @@ class SessionList {
   /// Those of another map, whose frames and submaps have numbers from these on.
   void Append(const SessionList& other, std::int64_t frame_offset, int first_piece);
 
+  /// Of the present one.
+  std::int64_t frames() const { return sessions_.back().frames; }
   void CountFrame() { ++sessions_.back().frames; }
   void SetLastFrame(std::int64_t index) { sessions_.back().last_frame = index; }
   /// Notes if the session's frames are by now where something older is.

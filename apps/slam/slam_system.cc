@@ -251,8 +251,29 @@ class SlamSystem::Impl {
       Announce();
       result = odometry_->RelocalizeAt(keyframe);
     }
+    if (result.state != TrackingState::kTracking && Begins()) result = RelocalizeAtTheEnd(result);
     if (result.state == TrackingState::kTracking) ++relocalized_;
     stages_["relocalize"] += watch.Milliseconds();
+    return result;
+  }
+
+  // One of the first frames of another recording than the map's first, which has nothing yet.
+  bool Begins() const {
+    constexpr std::int64_t kFirstFrames = 5;
+    const std::vector<int> ids = odometry_->KeyframeIds();
+    return !localizing_ && sessions_.size() > 1 && sessions_.frames() <= kFirstFrames && !ids.empty() &&
+           odometry_->KeyframeFrameIndex(ids.back()) < odometry_->FrameOffset();
+  }
+
+  // A camera that was stopped and started again stands where the recording before ended.
+  TrackResult RelocalizeAtTheEnd(TrackResult result) {
+    constexpr std::size_t kLastKeyframes = 3;
+    const std::vector<int> ids = odometry_->KeyframeIds();
+    Announce();
+    for (std::size_t k = 0; k < std::min(kLastKeyframes, ids.size()); ++k) {
+      result = odometry_->RelocalizeAt(ids[ids.size() - 1 - k]);
+      if (result.state == TrackingState::kTracking) break;
+    }
     return result;
   }
 

@@ -64,7 +64,7 @@ int PlaceReasoner::Remember(std::int64_t id, const std::vector<SeenWords>& words
 
 void PlaceReasoner::BeginSession() {
   for (auto& system : systems_) system->BeginSession();
-  if (!Shared()) union_.Settle(1);
+  if (!Shared()) union_.Settle(0);
   track_.Interrupt();
   last_hypothesis_ = 0;
   last_candidate_ = -1;

@@ -293,7 +293,7 @@ void LocationMemory::Load(internal::ByteReader& in) {
   if (weights > size()) in.Damaged("locations with impossible weights");
   int newest = size() - 1;
   while (newest >= 0 && state(newest) == State::kMerged) --newest;
-  if (newest >= 0 && state(newest) != State::kShortTerm) {
+  if (newest >= 0 && !short_term_.empty() && state(newest) != State::kShortTerm) {
     in.Damaged("the newest location is not in short-term memory");
   }
 }

@@ -71,7 +71,7 @@ int MemorySystem::Remember(std::int64_t id, const std::vector<SeenWords>& words)
 }
 
 void MemorySystem::BeginSession() {
-  transition_.Update(memory_, memory_.Settle(1));
+  transition_.Update(memory_, memory_.Settle(0));
   for (FilterUnit& unit : units_) unit.filter = BayesFilter();
   if (joint_) joint_->filter = BayesFilter();
 }

@@ -20,7 +20,8 @@ bool SameCamera(const PinholeCamera& a, const PinholeCamera& b) {
 
 }  // namespace
 
-KeyframeImages::KeyframeImages(const Dataset& dataset, const MapModel& model) : dataset_(dataset) {
+KeyframeImages::KeyframeImages(const Dataset& dataset, const MapModel& model)
+    : dataset_(dataset), offset_(model.image_offset) {
   if (dataset.FrameSupply() == Supply::kOnce)
     throw InputError(
         "the images of a camera come only once and are gone; landmarks stay grey without them, "
@@ -31,7 +32,7 @@ KeyframeImages::KeyframeImages(const Dataset& dataset, const MapModel& model) : 
         "give the one that the map was made of");
   for (std::size_t i = 0; i < dataset.Size(); ++i) places_[dataset.Number(i)] = i;
   const auto is_there = [this](const ModelKeyframe& keyframe) {
-    const auto place = places_.find(keyframe.frame_index);
+    const auto place = places_.find(keyframe.frame_index - offset_);
     return place != places_.end() && std::abs(dataset_.Stamp(place->second) - keyframe.stamp_s) < 1e-6;
   };
   if (std::none_of(model.keyframes.begin(), model.keyframes.end(), is_there))
@@ -52,7 +53,7 @@ KeyframeImages::KeyframeImages(const Dataset& dataset, const MapModel& model) : 
 }
 
 ColourImage KeyframeImages::Read(const ModelKeyframe& keyframe) const {
-  const auto place = places_.find(keyframe.frame_index);
+  const auto place = places_.find(keyframe.frame_index - offset_);
   if (place == places_.end() || std::abs(dataset_.Stamp(place->second) - keyframe.stamp_s) >= 1e-6)
     return {cv::Mat(), "the data set has no frame " + std::to_string(keyframe.frame_index) +
                            " with the time stamp that the map has for it"};

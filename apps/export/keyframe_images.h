@@ -26,6 +26,7 @@ class KeyframeImages {
 
  private:
   const Dataset& dataset_;
+  std::int64_t offset_;                         // of its frames in the map
   std::map<std::int64_t, std::size_t> places_;  // by InputFrame::index
   cv::Mat from_x_, from_y_;                     // empty: images stay as they are
 };

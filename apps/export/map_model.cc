@@ -1,5 +1,6 @@
 #include "apps/export/map_model.h"
 
+#include <algorithm>
 #include <map>
 
 #include "apps/run/run_parts.h"
@@ -22,7 +23,7 @@ std::map<int, ModelLandmark> FiniteLandmarks(const Odometry& odometry) {
 
 }  // namespace
 
-MapModel ModelOf(const Odometry& odometry, const PoseGraph& graph) {
+MapModel ModelOf(const Odometry& odometry, const PoseGraph& graph, const FrameRange& frames) {
   const std::vector<int> pieces = odometry.Pieces();
   if (pieces.empty()) throw InputError("the map is empty: no frame has a pose; there is nothing to export");
   MapModel model;
@@ -30,7 +31,9 @@ MapModel ModelOf(const Odometry& odometry, const PoseGraph& graph) {
   if (const std::optional<LensFound> lens = odometry.Lens(); lens && !lens->steps.empty())
     model.lens = {lens->steps.back().k1, lens->steps.back().k2};
   model.graph = graph;
-  model.trajectory = BodyTrajectory(odometry.FrameTrajectory(pieces.front()), odometry.Rig());
+  model.trajectory = BodyTrajectory(odometry.FrameTrajectory(pieces.front(), frames), odometry.Rig());
+  std::stable_sort(model.trajectory.begin(), model.trajectory.end(),
+                   [](const StampedPose& a, const StampedPose& b) { return a.stamp_s < b.stamp_s; });
   std::map<int, ModelLandmark> landmarks = FiniteLandmarks(odometry);
   for (const int id : odometry.KeyframeIds()) {
     if (odometry.KeyframePiece(id) != pieces.front()) {

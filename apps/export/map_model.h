@@ -18,7 +18,7 @@ namespace tutti {
 /// A keyframe and what it sees.
 struct ModelKeyframe {
   int id = -1;
-  std::int64_t frame_index = 0;  ///< InputFrame::index
+  std::int64_t frame_index = 0;  ///< number in the map (MapSession::frame_offset)
   double stamp_s = 0;
   Pose T_world_camera;  ///< camera: x right, y down, z forward
   /// Of MapModel::landmarks, in the order of the features; the centre of the top-left pixel is (0, 0).
@@ -40,15 +40,16 @@ struct MapModel {
   /// One camera: k1, k2 of the distortion that self-calibration found in the rectified images and took out of
   /// the pixels of all views (LensFound); 0 where there is none.
   Eigen::Vector2d lens = Eigen::Vector2d::Zero();
-  std::vector<ModelKeyframe> keyframes;  ///< ascending ids, so ascending stamps
+  std::vector<ModelKeyframe> keyframes;  ///< ascending ids
   std::vector<ModelLandmark> landmarks;  ///< ascending ids; each is seen by one keyframe at least
   PoseGraph graph;                       ///< S_world_camera of all keyframes
-  Trajectory trajectory;                 ///< T_world_body of all frames that have a pose
-  std::size_t other_keyframes = 0;       ///< of other pieces, which are left out
+  Trajectory trajectory;                 ///< T_world_body of frames that have a pose, ascending stamps
+  std::int64_t image_offset = 0;  ///< number in the map of the data set's frame 0 (MapSession::frame_offset)
+  std::size_t other_keyframes = 0;  ///< of other pieces, which are left out
 };
 
 /// The model of a map. Landmarks that are gone or not finite are left out, and so are views from behind.
-/// Throws InputError if no frame has a pose.
-MapModel ModelOf(const Odometry& odometry, const PoseGraph& graph);
+/// `frames`: of the trajectory. Throws InputError if no frame has a pose.
+MapModel ModelOf(const Odometry& odometry, const PoseGraph& graph, const FrameRange& frames = {});
 
 }  // namespace tutti

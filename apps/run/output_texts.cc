@@ -140,6 +140,28 @@ Json LensJson(const LensFound& lens) {
   return json;
 }
 
+// The map that the run went on in.
+Json MapJson(const RunResult& r) {
+  const MapSession& own = r.map->sessions.back();
+  Json json = {{"file", r.map->file},
+               {"joined", r.in_map},
+               {"joined_at_frame", own.joined_at ? Json(*own.joined_at) : Json()},
+               {"frame_offset", own.frame_offset},
+               {"sessions", Json::array()}};
+  for (const MapSession& session : r.map->sessions) {
+    const Json note = Json::parse(session.note, nullptr, false);
+    json["sessions"].push_back({{"dataset", &session == &own   ? r.dataset
+                                            : note.is_object() ? note.value("dataset", "")
+                                                               : ""},
+                                {"frame_offset", session.frame_offset},
+                                {"frames", session.frames},
+                                {"keyframes", session.keyframes},
+                                {"first_keyframe", session.first_keyframe},
+                                {"last_keyframe", session.last_keyframe}});
+  }
+  return json;
+}
+
 std::string Quoted(const std::string& text) {
   std::string out = "\"";
   for (const char c : text) out += c == '"' ? std::string("\"\"") : std::string(1, c);
@@ -189,6 +211,7 @@ std::string SummaryJson(const RunResult& r) {
   json["realtime"] = r.realtime;
   json["interrupted"] = r.interrupted;
   if (r.resumed_from_frame) json["resumed_from_frame"] = *r.resumed_from_frame;
+  if (r.map) json["map"] = MapJson(r);
   json["finished"] = r.Finished();
   if (!r.failure.empty()) json["failure"] = r.failure;
   json["appearance_only"] = r.appearance_only;
@@ -297,6 +320,14 @@ std::string ResultTable(const RunResult& r) {
   out << "\n  time " << Cell(r.wall_s, 1, " s") << " (" << Cell(Quantile(r.frame_ms, 0.5), 1)
       << " ms per frame, p99 " << Cell(Quantile(r.frame_ms, 0.99), 1) << " ms); memory "
       << Cell(r.peak_memory_mb, 0, " MB") << "\n";
+  if (r.map && r.in_map) {
+    out << "  in the map " << r.map->file;
+    if (r.map->sessions.back().joined_at) out << " from frame " << *r.map->sessions.back().joined_at << " on";
+    out << ": trajectory.txt is in its frame of reference\n";
+  } else if (r.map) {
+    out << "  not joined with the map " << r.map->file
+        << ": no loop connects the two; trajectory.txt has a frame of reference of its own\n";
+  }
   if (!r.evaluation) return out.str();
   const TrajectoryScore &a = r.evaluation->odometry, &b = r.evaluation->slam;
   if (!a.valid && !b.valid) {

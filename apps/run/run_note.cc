@@ -24,6 +24,7 @@ std::string NoteOf(const RunRequest& request) {
   note["dataset"] = Absolute(request.dataset);
   note["config"] = request.config.string();
   if (request.ground_truth) note["ground_truth"] = Absolute(*request.ground_truth);
+  if (request.map) note["map"] = Absolute(*request.map);
   if (request.save_map) note["save_map"] = request.save_map->string();
   if (request.checkpoint_s) note["checkpoint_s"] = *request.checkpoint_s;
   note["keep"] = request.keep;
@@ -39,6 +40,7 @@ RunRequest RequestOf(const std::string& note, const fs::path& file) {
     request.dataset = json.at("dataset").get<std::string>();
     request.config = json.at("config").get<std::string>();
     if (json.contains("ground_truth")) request.ground_truth = json["ground_truth"].get<std::string>();
+    if (json.contains("map")) request.map = json["map"].get<std::string>();
     if (json.contains("save_map")) request.save_map = json["save_map"].get<std::string>();
     if (json.contains("checkpoint_s")) request.checkpoint_s = json["checkpoint_s"].get<double>();
     request.keep = json.value("keep", false);

@@ -1,6 +1,7 @@
 // A window into a run: the report, the live view and the comparison's shared odometry look through it.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,8 @@ struct RunState {
   const Odometry* odometry = nullptr;  ///< null: appearance only
   const std::vector<LoopRecord>& loops;
   int corrections = 0;  ///< how often loops have moved the map
+  /// What has a smaller frame number is of an earlier recording of the map (MapSession::frame_offset).
+  std::int64_t first_frame = 0;
 };
 
 /// Watches a run and changes nothing (it may hold it up, as a pause does). All calls come from the thread

@@ -2,6 +2,7 @@
 
 #include <sys/resource.h>
 
+#include <limits>
 #include <set>
 
 #include "core/median.h"
@@ -13,16 +14,30 @@ namespace {
 namespace fs = std::filesystem;
 
 // Keyframes of the map piece that trajectory.txt is of.
-void CollectKeyframes(const Odometry& odometry, RunResult& result) {
-  const std::vector<std::int64_t> frames = odometry.FrameIndices();
+void CollectKeyframes(const Odometry& odometry, const FrameRange& session, RunResult& result) {
+  const std::vector<std::int64_t> frames = odometry.FrameIndices(-1, session);
   const std::set<std::int64_t> posed(frames.begin(), frames.end());
   Trajectory keyframes;
+  result.keyframes = 0;
   for (const int id : odometry.KeyframeIds()) {
-    if (posed.count(odometry.KeyframeFrameIndex(id)) == 0) continue;
+    const std::int64_t frame = odometry.KeyframeFrameIndex(id);
+    if (session.Has(frame)) ++result.keyframes;
+    if (posed.count(frame) == 0) continue;
     keyframes.push_back({odometry.KeyframeStamp(id), odometry.KeyframePose(id)});
   }
-  result.keyframes = odometry.KeyframeIds().size();
   result.keyframe_trajectory = BodyTrajectory(std::move(keyframes), result.rig);
+}
+
+// Those of the run's own recording. Time stamps of another recording would mean other frames here.
+void CollectLoops(const RunState& state, RunResult& result) {
+  result.loops.clear();
+  for (const LoopRecord& loop : state.loops) {
+    if (loop.query < state.first_frame) continue;
+    result.loops.push_back(loop);
+    if (loop.candidate < state.first_frame)
+      result.loops.back().candidate_stamp_s =
+          -std::numeric_limits<double>::infinity();  // no frame here has it
+  }
 }
 
 }  // namespace
@@ -96,23 +111,26 @@ Trajectory BodyTrajectory(Trajectory trajectory, const CameraRig& rig) {
 }
 
 void CollectMap(const RunState& state, RunResult& result) {
-  result.loops = state.loops;
+  CollectLoops(state, result);
   result.corrections = state.corrections;
   result.appearance_only = state.odometry == nullptr;
   result.peak_memory_mb = PeakMemoryMb();
   if (result.appearance_only) return;
   const Odometry& odometry = *state.odometry;
-  result.trajectory = BodyTrajectory(odometry.FrameTrajectory(), result.rig);
+  FrameRange session;
+  if (state.first_frame > 0) session.first = state.first_frame;
+  result.trajectory = BodyTrajectory(odometry.FrameTrajectory(-1, session), result.rig);
   result.frames_tracked = result.trajectory.size();
-  const std::vector<int> pieces = odometry.Pieces();
+  const std::vector<int> pieces = odometry.Pieces(session);
   result.other_pieces.clear();
   for (std::size_t i = 1; i < pieces.size(); ++i)
-    result.other_pieces.push_back(BodyTrajectory(odometry.FrameTrajectory(pieces[i]), result.rig));
+    result.other_pieces.push_back(BodyTrajectory(odometry.FrameTrajectory(pieces[i], session), result.rig));
+  result.in_map = !pieces.empty() && pieces.front() < odometry.SessionPiece();
   result.trajectory_odometry = result.trajectory;
   result.stereo_row_error_px = odometry.StereoRowErrorPx();
   result.stereo_matches = odometry.StereoMatches();
   result.lens = odometry.Lens();
-  CollectKeyframes(odometry, result);
+  CollectKeyframes(odometry, session, result);
 }
 
 }  // namespace tutti

@@ -17,6 +17,7 @@
 #include "tutti/frontend/odometry.h"
 #include "tutti/slam/config.h"
 #include "tutti/slam/loop_record.h"
+#include "tutti/slam/map_file.h"
 
 namespace tutti {
 
@@ -55,6 +56,12 @@ struct RunEvaluation {
   int loops_true = 0, loops_false = 0, loops_unknown = 0;  ///< of the accepted ones
 };
 
+/// The map that a run went on in.
+struct MapGoneOn {
+  std::string file;
+  std::vector<MapSession> sessions;  ///< the last one is the run's own
+};
+
 /// Frames, loops, times, trajectories of one run.
 struct RunResult {
   // What was run.
@@ -85,8 +92,11 @@ struct RunResult {
   bool appearance_only = false;
   bool shared_odometry = false;  ///< tracked once for several runs; loops did not reach the tracking
 
+  std::optional<MapGoneOn> map;  ///< with RunRequest::map
+  bool in_map = false;           ///< `trajectory` is in that map's frame of reference: the run has joined it
+
   // Loops.
-  std::vector<LoopRecord> loops;
+  std::vector<LoopRecord> loops;  ///< frames by their numbers in the map (MapSession::frame_offset)
   int corrections = 0;
   int global_adjustments = 0;
 

@@ -47,6 +47,8 @@ class Run {
         live_(out, dataset.Rig(), config) {
     if (request.resume) {
       Resume(*request.resume);
+    } else if (request.map) {
+      GoOnIn(*request.map);
     } else {
       slam_ = std::make_unique<SlamSystem>(Watched(config, request), dataset.Rig(), Recorder());
     }
@@ -139,11 +141,15 @@ class Run {
 
   void Collect() {
     CollectMap(State(), result_);
+    if (request_.map) result_.map = MapGoneOn{request_.map->string(), slam_->Sessions()};
     result_.global_adjustments = slam_->GlobalAdjustments();
     result_.frames_relocalized = slam_->Relocalized();
     result_.graph = slam_->Graph();
     result_.graph_proof = slam_->GraphProof();
-    if (alone_) result_.trajectory_odometry = BodyTrajectory(alone_->FrameTrajectory(), result_.rig);
+    if (!alone_) return;
+    FrameRange session;
+    if (FirstFrame() > 0) session.first = FirstFrame();
+    result_.trajectory_odometry = BodyTrajectory(alone_->FrameTrajectory(-1, session), result_.rig);
   }
 
   // The sections of a checkpoint that are the run's own.
@@ -173,7 +179,9 @@ class Run {
   std::string Trace() const { return ChromeTrace(recorder_.Spans(), begin_); }
 
  private:
-  RunState State() const { return {slam_->odometry(), slam_->loops(), slam_->Corrections()}; }
+  RunState State() const { return {slam_->odometry(), slam_->loops(), slam_->Corrections(), FirstFrame()}; }
+  // In the map's numbers.
+  std::int64_t FirstFrame() const { return slam_->AppearanceOnly() ? 0 : slam_->odometry()->FrameOffset(); }
   std::FILE* Out() const { return request_.quiet ? nullptr : stderr; }
   SpanRecorder* Recorder() { return request_.timing || request_.trace ? &recorder_ : nullptr; }
 
@@ -290,6 +298,34 @@ class Run {
     }
   }
 
+  // The run is another session of a map.
+  void GoOnIn(const fs::path& map) {
+    MapInfo info = ReadMapInfo(map);
+    if (!info.rig.calibrated || !result_.rig.calibrated)
+      throw InputError(map.string() +
+                       ": a recording can only go on in a map with poses, which needs calibrated "
+                       "cameras on both sides");
+    if (!info.config.run.loops || !config_.run.loops)
+      throw InputError(map.string() +
+                       ": without loop closure (run.loops, --no-loops) nothing would connect a "
+                       "recording with the map; both need it");
+    info.config = Watched(config_, request_);
+    slam_ = SlamSystem::Load(map, info, Recorder());
+    try {
+      slam_->BeginSession(result_.rig);
+    } catch (const InputError& error) {
+      throw InputError(map.string() + ": " + result_.dataset + " can't go on in it: " + error.what());
+    }
+    live_.Skip(LoopsBefore());
+  }
+
+  // Loop records of earlier sessions.
+  std::size_t LoopsBefore() const {
+    const std::int64_t first = FirstFrame();
+    return static_cast<std::size_t>(std::count_if(slam_->loops().begin(), slam_->loops().end(),
+                                                  [&](const LoopRecord& l) { return l.query < first; }));
+  }
+
   void Resume(const fs::path& checkpoint) {
     MapInfo info = ReadMapInfo(checkpoint);
     if (StateOf(info.rig) != StateOf(result_.rig))
@@ -299,6 +335,7 @@ class Run {
       ReadState(file, kRunSection, this);
       if (alone_) alone_->LoadSections(&file);
     });
+    live_.Skip(LoopsBefore());
     live_.Resume(std::move(resumed_live_), slam_->loops());
     before_ = so_far_;
     for (const auto& [index, position] : so_far_.positions) {
@@ -317,7 +354,9 @@ class Run {
     result_.frame_ms.push_back(watch.Milliseconds());
     if (track.keyframe >= 0) planted_.OnKeyframe(track.keyframe, slam_.get());
     live_.Add(frame.stamp_s, track, State());
-    for (const auto& observer : request_.observers) observer->OnFrame(frame, track, State());
+    InputFrame numbered = frame;
+    numbered.index += FirstFrame();
+    for (const auto& observer : request_.observers) observer->OnFrame(numbered, track, State());
     so_far_.state = slam_->AppearanceOnly() ? "appearance only" : ToString(track.state);
     if (slam_->AppearanceOnly() || track.state == TrackingState::kTracking) {
       so_far_.lost_open = false;
@@ -334,8 +373,8 @@ class Run {
   std::string Status() const {
     std::string status = so_far_.state;
     if (config_.run.loops) {
-      status += "  loops " + std::to_string(CountAccepted(slam_->loops())) + "/" +
-                std::to_string(slam_->loops().size());
+      const std::vector<LoopRecord>& loops = slam_->loops();
+      status += "  loops " + std::to_string(CountAccepted(loops)) + "/" + std::to_string(loops.size());
     }
     return status;
   }
@@ -398,6 +437,7 @@ RunResult RunSlam(const RunRequest& request, const RunConfig& given) {
   std::vector<std::string> warnings = dataset->Warnings();
   const auto reference = ReadReference(*dataset, request, &warnings);
   const InterruptGuard guard;
+  if (request.map) RefuseToReplace(request.out, *request.map);
   OutputFolder folder = OpenOutputFolder(request, reference ? fs::path(reference->second) : fs::path());
   if (request.trace) CheckTrace(*request.trace);
   if (!request.quiet) {

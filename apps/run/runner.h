@@ -31,6 +31,7 @@ struct RunRequest {
   std::optional<double> follow_s;         ///< DatasetOptions::follow_s
   std::optional<double> checkpoint_s;     ///< write OUT/checkpoint.tutti at most this often; none: never
   std::optional<std::filesystem::path> resume;    ///< checkpoint to go on from
+  std::optional<std::filesystem::path> map;       ///< go on in this map, as another session
   std::optional<std::filesystem::path> save_map;  ///< write the map there; kMap: into `out`
   bool realtime = false;                       ///< play by the time stamps, drop frames that it can't follow
   std::shared_ptr<FrameClock> clock;           ///< for realtime; null: the machine's

@@ -69,13 +69,52 @@ LoopConstraint LoopCloser::Measure(const Verification& verification, int candida
   return constraint;
 }
 
+void LoopCloser::BeginSession(const CameraRig& rig, std::int64_t first_frame, int first_keyframe) {
+  rig_ = rig;
+  sessions_.push_back(first_frame);
+  graph_.BeginSession(first_keyframe);
+  proof_.reset();
+  corrections_ = adjustments_ = 0;
+  stages_.clear();
+}
+
+void LoopCloser::Append(const LoopCloser& other, std::int64_t first_frame, int first_keyframe) {
+  BeginSession(rig_, first_frame, first_keyframe);
+  graph_.Append(other.graph_, first_keyframe);
+  for (const std::int64_t begin : other.sessions_) sessions_.push_back(first_frame + begin);
+  const std::size_t first_record = records_.size();
+  for (LoopRecord record : other.records_) {
+    record.query += first_frame;
+    record.candidate += first_frame;
+    records_.push_back(std::move(record));
+  }
+  for (LoopEdge loop : other.accepted_) {
+    loop.candidate += first_keyframe;
+    loop.query += first_keyframe;
+    loop.candidate_frame += first_frame;
+    loop.query_frame += first_frame;
+    loop.record += first_record;
+    accepted_.push_back(loop);
+  }
+  for (const std::size_t record : other.untied_) untied_.insert(first_record + record);
+}
+
+// Time stamps of different recordings do not compare.
+bool LoopCloser::OfOneSession(std::int64_t frame, std::int64_t other) const {
+  const auto session = [this](std::int64_t f) {
+    return std::upper_bound(sessions_.begin(), sessions_.end(), f) - sessions_.begin();
+  };
+  return session(frame) == session(other);
+}
+
 // Measures it against the map, and lets it in if something else says the same.
 LoopUpdate LoopCloser::Consider(const LoopRecord& proposed, const Verification& verification, int candidate,
                                 int query, const Odometry& odometry, std::int64_t frames) {
   records_.push_back(proposed);
   LoopRecord& record = records_.back();
   if (!record.verified) return {};
-  if (record.query_stamp_s - record.candidate_stamp_s < options_.loop_min_age_s) {
+  if (OfOneSession(record.query, record.candidate) &&
+      record.query_stamp_s - record.candidate_stamp_s < options_.loop_min_age_s) {
     record.reason = "too recent: still in the local map";
     return {};
   }

@@ -34,6 +34,13 @@ class LoopCloser {
  public:
   LoopCloser(const RunConfig& config, const CameraRig& rig, SpanRecorder* recorder);
 
+  /// Another recording begins, of this rig, with this frame number and keyframe. Nothing may be under way.
+  /// Counts and times begin anew.
+  void BeginSession(const CameraRig& rig, std::int64_t first_frame, int first_keyframe);
+
+  /// The loops of another map, whose first frame and first keyframe have these numbers in this one.
+  void Append(const LoopCloser& other, std::int64_t first_frame, int first_keyframe);
+
   /// A proposed loop, in the order of the queries. `candidate`, `query`: its keyframes; they have a place in
   /// the map. The update is to be applied at once.
   LoopUpdate Consider(const LoopRecord& proposed, const Verification& verification, int candidate, int query,
@@ -78,7 +85,7 @@ class LoopCloser {
   template <class Archive>
   void State(Archive& archive) {
     archive(records_, gate_, graph_, accepted_, deferred_, queued_, untied_, solved_due_, solved_keyframes_,
-            adjust_piece_, adjuster_, proof_, corrections_, adjustments_, stages_);
+            adjust_piece_, adjuster_, proof_, corrections_, adjustments_, stages_, sessions_);
   }
 
   const std::vector<LoopRecord>& records() const { return records_; }
@@ -101,6 +108,7 @@ class LoopCloser {
   MapCorrection MoveBy(const KeyframeCorrection& solved, const Odometry& odometry);
   void Rescale(const std::map<int, Similarity>& S_world_keyframe);
   std::vector<LoopEdge> Untied() const;
+  bool OfOneSession(std::int64_t frame, std::int64_t other) const;
 
   SpanRecorder* recorder_;
   SlamOptions options_;
@@ -122,6 +130,7 @@ class LoopCloser {
   int corrections_ = 0;
   int adjustments_ = 0;  // of the whole map
   std::map<std::string, double> stages_;
+  std::vector<std::int64_t> sessions_;  // first frame numbers of recordings but the first, ascending
 };
 
 }  // namespace tutti

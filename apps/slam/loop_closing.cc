@@ -40,10 +40,47 @@ void LoopClosing::SetDetectionListener(std::function<void(const LoopResult&)> li
   on_detection_ = std::move(listener);
 }
 
+void LoopClosing::BeginSession(const CameraRig& rig, std::int64_t first_frame, int first_keyframe) {
+  rig_ = rig;
+  session_ = first_frame;
+  appended_.reset();
+  keyframes_seen_ = 0;
+  stages_.clear();
+  closer_.BeginSession(rig, first_frame, first_keyframe);
+  if (worker_) worker_->BeginSession();
+}
+
 void LoopClosing::Submit(const InputFrame& frame, const KeyframeView* view, std::int64_t frames) {
   if (keyframes_seen_++ % options_.loop_every_keyframes != 0) return;
-  if (!stamps_.empty() && frame.stamp_s - stamps_.rbegin()->second < options_.loop_min_interval_s) return;
-  LoopQuery query = Query(frame);
+  const bool first = stamps_.empty() || stamps_.rbegin()->first < session_;
+  if (!first && frame.stamp_s - stamps_.rbegin()->second < options_.loop_min_interval_s) return;
+  Ask(Query(frame), view, frames);
+}
+
+void LoopClosing::Append(const LoopClosing& other, std::int64_t first_frame, int first_keyframe) {
+  appended_ = session_ = first_frame;
+  closer_.Append(other.closer_, first_frame, first_keyframe);
+  worker_->BeginSession();
+}
+
+void LoopClosing::ShowPlace(LoopPlace place, const KeyframeView& view, std::int64_t frames) {
+  LoopQuery query;
+  query.id = place.id;
+  query.stamp_s = view.stamp_s;
+  query.member_features = std::move(place.member_features);
+  if (place.camera) {  // an earlier session's may be another one than that of the keyframes' pixels
+    const PinholeCamera &from = *place.camera, &to = rig_.camera;
+    for (auto& [name, features] : query.member_features) {
+      for (cv::KeyPoint& k : features.keypoints) {
+        k.pt.x = static_cast<float>((double(k.pt.x) - from.cx) / from.fx * to.fx + to.cx);
+        k.pt.y = static_cast<float>((double(k.pt.y) - from.cy) / from.fy * to.fy + to.cy);
+      }
+    }
+  }
+  Ask(std::move(query), &view, frames);
+}
+
+void LoopClosing::Ask(LoopQuery query, const KeyframeView* view, std::int64_t frames) {
   if (view != nullptr) {
     query.camera = rig_.camera;
     if (options_.loop_pose_prior && rig_.sensor != Sensor::kMono) {  // mono: its scale drifts
@@ -52,10 +89,10 @@ void LoopClosing::Submit(const InputFrame& frame, const KeyframeView* view, std:
       query.pose_prior->frame = view->map_piece;
     }
     query.features = {view->keypoints, view->descriptors, view->points};
-    keyframe_of_frame_[frame.index] = view->id;
+    keyframe_of_frame_[query.id] = view->id;
   }
-  stamps_[frame.index] = frame.stamp_s;
-  submitted_.push_back({frames + options_.loop_delay_frames, frame.index});
+  stamps_[query.id] = query.stamp_s;
+  submitted_.push_back({frames + options_.loop_delay_frames, query.id});
   const internal::Stopwatch watch;
   worker_->Submit(std::move(query));
   if (options_.threads == 1) stages_["loop_inline"] += watch.Milliseconds();
@@ -127,6 +164,7 @@ LoopUpdate LoopClosing::Deliver(const Odometry* odometry, std::int64_t frames) {
     warnings_.push_back(result.warning);
   }
   if (!result.proposed) return {};
+  if (appended_ && result.query >= *appended_ && result.candidate >= *appended_) return {};
   LoopRecord record = Record(result);
   if (odometry != nullptr) {
     return closer_.Consider(record, result.verification, KeyframeOf(record.candidate),

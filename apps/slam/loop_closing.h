@@ -37,6 +37,17 @@ class LoopClosing {
 
   /// True if loops are searched for (run.loops).
   bool Searching() const { return worker_ != nullptr; }
+  /// Another recording begins, of this rig, with this frame number and keyframe. Nothing may be on its way.
+  void BeginSession(const CameraRig& rig, std::int64_t first_frame, int first_keyframe);
+  /// The places and loops of another map whose keyframes have been appended to this one's; its first frame
+  /// and first keyframe have these numbers here. Its places are to be shown by ShowPlace then.
+  void Append(const LoopClosing& other, std::int64_t first_frame, int first_keyframe);
+  /// The places that the detector knows, in their order.
+  std::vector<LoopPlace> Places() const { return worker_->Places(); }
+  /// The keyframe that is a place of this detector; -1: none.
+  int KeyframeOf(std::int64_t frame) const;
+  /// A place of the map that was appended, under its frame number here, and its keyframe.
+  void ShowPlace(LoopPlace place, const KeyframeView& view, std::int64_t frames);
   /// A new keyframe as the map has it, null: an image without a pose. Those that come too soon after the one
   /// before (loop_every_keyframes, loop_min_interval_s) are not searched.
   void Submit(const InputFrame& frame, const KeyframeView* view, std::int64_t frames);
@@ -77,7 +88,7 @@ class LoopClosing {
   template <class Archive>
   void State(Archive& archive) {
     archive(closer_, submitted_, keyframe_of_frame_, stamps_, keyframes_seen_, warnings_, last_warning_,
-            stages_);
+            stages_, session_);
   }
   void ResumeDetector(internal::SectionReader* detector, LoopWorker::Saved saved) {
     worker_->Resume(detector, std::move(saved));
@@ -103,7 +114,7 @@ class LoopClosing {
   LoopUpdate Deliver(const Odometry* odometry, std::int64_t frames);
   void TellRevoked(const LoopUpdate& update);
   LoopRecord Record(const LoopResult& result) const;
-  int KeyframeOf(std::int64_t frame) const;
+  void Ask(LoopQuery query, const KeyframeView* view, std::int64_t frames);
 
   SlamOptions options_;
   CameraRig rig_;
@@ -117,6 +128,9 @@ class LoopClosing {
   std::vector<std::string> warnings_;  // not taken yet
   std::string last_warning_;
   std::map<std::string, double> stages_;
+  std::optional<std::int64_t>
+      appended_;              // frame number that an appended map begins with: its loops are known
+  std::int64_t session_ = 0;  // frame number that the present recording began with
 };
 
 }  // namespace tutti

@@ -168,6 +168,13 @@ bool LoopWorker::Merge(std::int64_t id, std::int64_t into) {
   return detector_.Merge(id, into);
 }
 
+void LoopWorker::BeginSession() {
+  std::unique_lock<std::mutex> lock(mutex_);
+  changed_.wait(lock, [this] { return tasks_.empty() && !busy_; });
+  detector_.BeginSession();
+  waited_ms_ = 0;
+}
+
 LoopResult LoopWorker::Take() {
   const ScopedSpan span(recorder_, Lane::kTracking, "wait_for_loop");
   const internal::Stopwatch watch;

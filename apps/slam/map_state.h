@@ -32,9 +32,15 @@ void State(Archive& archive, RunConfig& config) {
 }
 
 template <class Archive>
+void State(Archive& archive, MapSession& s) {
+  archive(s.note, s.frame_offset, s.frames, s.last_frame, s.first_piece, s.joined_at, s.keyframes,
+          s.first_keyframe, s.last_keyframe, s.first_stamp_s, s.last_stamp_s);
+}
+
+template <class Archive>
 void State(Archive& archive, MapInfo& i) {
   archive(i.program, i.note, i.config, i.rig, i.frames, i.last_frame, i.first_stamp_s, i.last_stamp_s,
-          i.keyframes, i.landmarks, i.pieces, i.loops, i.least, i.most);
+          i.keyframes, i.landmarks, i.pieces, i.loops, i.sessions, i.least, i.most);
 }
 
 /// Without its features, which are those of the keyframe that it became.

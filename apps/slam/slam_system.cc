@@ -8,6 +8,7 @@
 #include "apps/slam/loop_closing.h"
 #include "apps/slam/map_parts.h"
 #include "apps/slam/map_state.h"
+#include "apps/slam/session_list.h"
 #include "core/section_file.h"
 #include "core/stopwatch.h"
 #include "tutti/core/error.h"
@@ -28,6 +29,7 @@ class SlamSystem::Impl {
   TrackResult Track(const InputFrame& frame) {
     if (!localizing_) BringIn();
     ++frames_;
+    sessions_.CountFrame();
     TrackResult result;
     if (!odometry_) {
       result.reason = "no calibration";
@@ -36,18 +38,65 @@ class SlamSystem::Impl {
     }
     result = odometry_->Track(frame);
     last_ = frame.index;
-    if (result.state != TrackingState::kTracking) result = Relocalize(frame, result);
-    if (localizing_) return FindBack(frame, result);
-    if (result.keyframe >= 0 && (loops_.Searching() || on_keyframe_)) unmapped_[result.keyframe] = frame;
+    sessions_.SetLastFrame(last_);
+    InputFrame numbered = frame;
+    numbered.index += odometry_->FrameOffset();
+    if (result.state != TrackingState::kTracking) result = Relocalize(numbered, result);
+    if (localizing_) return FindBack(numbered, result);
+    if (odometry_) sessions_.NoteJoined(*odometry_);
+    if (result.keyframe >= 0 && (loops_.Searching() || on_keyframe_)) unmapped_[result.keyframe] = numbered;
     SubmitMapped();
     return result;
   }
 
+  void BeginSession(const CameraRig& rig) {
+    CheckHasMap("gone on with");
+    if (localizing_) throw InputError("frames are only being located: a recording can't go on in this map");
+    Finish();
+    const std::int64_t offset = sessions_.NextOffset(*odometry_);
+    odometry_->BeginSession(rig, offset);
+    rig_ = rig;
+    loops_.BeginSession(rig, offset, odometry_->NextKeyframeId());
+    unmapped_.clear();
+    relocalized_ = 0;
+    stages_.clear();
+    last_ = -1;
+    sessions_.Begin(offset, odometry_->SessionPiece());
+  }
+
+  bool Merge(Impl* other) {
+    CheckHasMap("merged");
+    other->CheckHasMap("merged");
+    Finish();
+    other->Finish();
+    const std::vector<LoopPlace> places = other->loops_.Places();
+    const std::int64_t offset = sessions_.NextOffset(*odometry_);
+    const int first_keyframe = odometry_->NextKeyframeId();
+    odometry_->Append(*other->odometry_, offset);
+    const int first_piece = odometry_->SessionPiece();
+    loops_.Append(other->loops_, offset, first_keyframe);
+    sessions_.Append(other->sessions_, offset, first_piece);
+    const std::int64_t all_frames = frames_ + other->frames_;
+    last_ = other->last_;
+    for (LoopPlace place : places) {
+      const int keyframe = other->loops_.KeyframeOf(place.id);
+      if (keyframe < 0) continue;
+      BringIn();
+      ++frames_;
+      place.id += offset;
+      loops_.ShowPlace(std::move(place), odometry_->Keyframe(first_keyframe + keyframe), frames_);
+    }
+    Finish();
+    frames_ = std::max(frames_, all_frames);
+    const std::vector<int> ids = odometry_->KeyframeIds();
+    return std::any_of(ids.begin() + first_keyframe, ids.end(),
+                       [&](int id) { return odometry_->KeyframePiece(id) < first_piece; });
+  }
+
+  std::vector<MapSession> Sessions() const { return sessions_.WithKeyframes(odometry()); }
+
   void BeginLocalization() {
-    if (!odometry_ || odometry_->KeyframeIds().empty()) throw InputError("there is no map to be located in");
-    if (!loops_.Searching())
-      throw InputError(
-          "the map was made without loop closure, so nothing says where in it a frame was taken");
+    CheckHasMap("located in");
     localizing_ = true;
     odometry_->BeginLocalization();
   }
@@ -74,6 +123,7 @@ class SlamSystem::Impl {
       SubmitMapped();
     }
     while (const auto update = loops_.Rest(odometry(), frames_)) Take(*update);
+    if (odometry_) sessions_.NoteJoined(*odometry_);
   }
 
   std::size_t Prune() {
@@ -128,6 +178,7 @@ class SlamSystem::Impl {
   const Odometry* odometry() const { return odometry_ ? &*odometry_ : nullptr; }
 
   LoopClosing loops_;
+  SessionList sessions_;
   std::function<void(const InputFrame&, int)> on_keyframe_;            // may be empty
   std::function<void(const Odometry&, std::int64_t last)> on_change_;  // may be empty
   std::size_t relocalized_ = 0;                                        // frames
@@ -156,9 +207,18 @@ class SlamSystem::Impl {
     stages_["loop_fuse"] += watch.Milliseconds();
   }
 
+  void CheckHasMap(const std::string& to_be) const {
+    if (!odometry_ || odometry_->KeyframeIds().empty()) throw InputError("there is no map to be " + to_be);
+    if (!loops_.Searching())
+      throw InputError(
+          "the map was made without loop closure, so nothing says where in it a frame was taken");
+  }
+
   MapInfo Info(const std::string& note) const {
     MapInfo info;
     info.note = note;
+    info.sessions = Sessions();
+    info.sessions.back().note = note;
     info.program = kVersion;
     info.config = config_;
     info.rig = rig_;
@@ -201,8 +261,29 @@ class SlamSystem::Impl {
       Announce();
       result = odometry_->RelocalizeAt(keyframe);
     }
+    if (result.state != TrackingState::kTracking && Begins()) result = RelocalizeAtTheEnd(result);
     if (result.state == TrackingState::kTracking) ++relocalized_;
     stages_["relocalize"] += watch.Milliseconds();
+    return result;
+  }
+
+  // One of the first frames of another recording than the map's first, which has nothing yet.
+  bool Begins() const {
+    constexpr std::int64_t kFirstFrames = 5;
+    const std::vector<int> ids = odometry_->KeyframeIds();
+    return !localizing_ && sessions_.size() > 1 && sessions_.frames() <= kFirstFrames && !ids.empty() &&
+           odometry_->KeyframeFrameIndex(ids.back()) < odometry_->FrameOffset();
+  }
+
+  // A camera that was stopped and started again stands where the recording before ended.
+  TrackResult RelocalizeAtTheEnd(TrackResult result) {
+    constexpr std::size_t kLastKeyframes = 3;
+    const std::vector<int> ids = odometry_->KeyframeIds();
+    Announce();
+    for (std::size_t k = 0; k < std::min(kLastKeyframes, ids.size()); ++k) {
+      result = odometry_->RelocalizeAt(ids[ids.size() - 1 - k]);
+      if (result.state == TrackingState::kTracking) break;
+    }
     return result;
   }
 
@@ -243,6 +324,9 @@ SlamSystem::SlamSystem(const RunConfig& config, const CameraRig& rig, SpanRecord
 SlamSystem::SlamSystem(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 SlamSystem::~SlamSystem() = default;
 
+void SlamSystem::BeginSession(const CameraRig& rig) { impl_->BeginSession(rig); }
+std::vector<MapSession> SlamSystem::Sessions() const { return impl_->Sessions(); }
+bool SlamSystem::Merge(SlamSystem* other) { return impl_->Merge(other->impl_.get()); }
 void SlamSystem::BeginLocalization() { impl_->BeginLocalization(); }
 MapSnapshot SlamSystem::Snapshot(const std::string& note) const { return impl_->Snapshot(note); }
 
@@ -250,9 +334,11 @@ std::unique_ptr<SlamSystem> SlamSystem::Load(const std::filesystem::path& file, 
                                              SpanRecorder* recorder,
                                              const std::function<void(internal::SectionReader&)>& more) {
   internal::SectionReader in(file, kMapFile);
-  in.Expect(MapSection::kInfo);
+  MapInfo saved;
+  ReadState(in, MapSection::kInfo, &saved);
   auto impl = std::make_unique<Impl>(info.config, info.rig, recorder, true);
   impl->Load(in, more);
+  impl->sessions_.Restore(saved.sessions, impl->odometry(), in);
   return std::unique_ptr<SlamSystem>(new SlamSystem(std::move(impl)));
 }
 

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "apps/export/map_export.h"
 #include "apps/tutti/checks.h"
@@ -20,6 +21,7 @@ namespace fs = std::filesystem;
 
 struct ExportArguments {
   std::string map, dataset;
+  int session = 0;  // counted from 1; 0: none was chosen
   ExportRequest request;
 };
 
@@ -35,18 +37,19 @@ fs::path MapFile(const std::string& run_or_map) {
 }
 
 // The data set that the run was called with; none where its map does not say so.
-std::string DatasetOf(const MapInfo& info) {
-  const nlohmann::json note = nlohmann::json::parse(info.note, nullptr, false);
+std::string DatasetOf(const MapSession& session) {
+  const nlohmann::json note = nlohmann::json::parse(session.note, nullptr, false);
   return note.is_object() ? note.value("dataset", std::string()) : std::string();
 }
 
 void Warn(const std::string& warning) { std::fprintf(stderr, "tutti: warning: %s\n", warning.c_str()); }
 
 // Images are not needed for everything: where they can't be had, ExportMap says what it makes of that.
-std::unique_ptr<Dataset> OpenImages(const ExportArguments& arguments, const MapInfo& info) {
+std::unique_ptr<Dataset> OpenImages(const ExportArguments& arguments, const MapInfo& info,
+                                    const MapSession& session) {
   const ExportRequest& request = arguments.request;
   if (!request.landmarks && !request.colmap && !request.transforms) return nullptr;
-  const std::string path = arguments.dataset.empty() ? DatasetOf(info) : arguments.dataset;
+  const std::string path = arguments.dataset.empty() ? DatasetOf(session) : arguments.dataset;
   if (path.empty() || IsCamera(path)) return nullptr;
   try {
     return OpenDataset(path, info.config.dataset);
@@ -64,9 +67,21 @@ void RunExport(const ExportArguments& arguments) {
   if (slam->AppearanceOnly())
     throw InputError(file.string() +
                      ": has no poses, since the camera had no calibration; nothing to export");
-  const std::unique_ptr<Dataset> dataset = OpenImages(arguments, info);
-  const ExportReport report =
-      ExportMap(ModelOf(*slam->odometry(), slam->Graph()), dataset.get(), arguments.request);
+  const std::size_t sessions = info.sessions.size();
+  if (static_cast<std::size_t>(arguments.session) > sessions)
+    throw InputError("--session " + std::to_string(arguments.session) + ": " + file.string() + " has " +
+                     std::to_string(sessions));
+  const std::size_t chosen = arguments.session > 0 ? static_cast<std::size_t>(arguments.session) : sessions;
+  const MapSession& session = info.sessions[chosen - 1];
+  FrameRange frames;
+  if (arguments.session > 0) {
+    frames.first = session.frame_offset;
+    if (chosen < sessions) frames.last = info.sessions[chosen].frame_offset - 1;
+  }
+  MapModel model = ModelOf(*slam->odometry(), slam->Graph(), frames);
+  model.image_offset = session.frame_offset;
+  const std::unique_ptr<Dataset> dataset = OpenImages(arguments, info, session);
+  const ExportReport report = ExportMap(std::move(model), dataset.get(), arguments.request);
   for (const std::string& warning : report.warnings) Warn(warning);
   for (const ExportedFile& written : report.files) {
     std::printf("%s: %s\n  open with: %s\n", written.path.c_str(), written.content.c_str(),
@@ -103,6 +118,13 @@ void SetUpExport(CLI::App& command, int&) {
       ->capture_default_str();
   command.add_option("--dataset", arguments->dataset, "where the images are now (default: where they were)")
       ->type_name("DIR");
+  command
+      .add_option(
+          "--session", arguments->session,
+          "of a map that several recordings made: --tum has the frames of this one alone (counted from "
+          "1; default: all, in the order of their time stamps), and images are its (default: the last "
+          "one's)")
+      ->check(Positive());
   command.footer(
       "Poses are those after the last correction. Axes, units and programs: docs/formats.md.\n"
       "A folder must be new, empty, or of an earlier export, which is replaced; files are overwritten.\n"

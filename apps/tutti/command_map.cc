@@ -28,6 +28,37 @@ nlohmann::json NoteOf(const MapInfo& info) {
   return note.is_object() ? note : nlohmann::json::object();
 }
 
+std::string DatasetOf(const MapSession& session) {
+  const nlohmann::json note = nlohmann::json::parse(session.note, nullptr, false);
+  return note.is_object() ? note.value("dataset", std::string()) : std::string();
+}
+
+void PrintSessions(const MapInfo& info) {
+  std::printf("  sessions       %zu\n", info.sessions.size());
+  for (std::size_t s = 0; s < info.sessions.size(); ++s) {
+    const MapSession& session = info.sessions[s];
+    std::printf("    %zu: keyframes %d to %d, %lld frames, numbers from %lld on  %s\n", s + 1,
+                session.first_keyframe, session.last_keyframe, static_cast<long long>(session.frames),
+                static_cast<long long>(session.frame_offset), DatasetOf(session).c_str());
+  }
+}
+
+nlohmann::ordered_json SessionsJson(const MapInfo& info) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  for (const MapSession& session : info.sessions) {
+    json.push_back({{"dataset", DatasetOf(session)},
+                    {"frames", session.frames},
+                    {"last_frame", session.last_frame},
+                    {"frame_offset", session.frame_offset},
+                    {"keyframes", session.keyframes},
+                    {"first_keyframe", session.first_keyframe},
+                    {"last_keyframe", session.last_keyframe},
+                    {"first_stamp_s", session.first_stamp_s},
+                    {"last_stamp_s", session.last_stamp_s}});
+  }
+  return json;
+}
+
 void PrintText(const MapInfo& info, const std::string& file) {
   const PinholeCamera& c = info.rig.camera;
   const bool mono = info.rig.sensor == Sensor::kMono;
@@ -46,6 +77,7 @@ void PrintText(const MapInfo& info, const std::string& file) {
   std::printf("  loops          %d\n", info.loops);
   std::printf("  submaps        %d\n", info.pieces);
   std::printf("  extent         %.2f x %.2f x %.2f %s\n", size.x(), size.y(), size.z(), unit);
+  PrintSessions(info);
 }
 
 void PrintJson(const MapInfo& info, const std::string& file) {
@@ -63,6 +95,7 @@ void PrintJson(const MapInfo& info, const std::string& file) {
   json["landmarks"] = info.landmarks;
   json["loops"] = info.loops;
   json["submaps"] = info.pieces;
+  json["sessions"] = SessionsJson(info);
   json["least"] = {info.least.x(), info.least.y(), info.least.z()};
   json["most"] = {info.most.x(), info.most.y(), info.most.z()};
   std::printf("%s\n", json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace).c_str());

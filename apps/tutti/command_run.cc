@@ -17,13 +17,14 @@
 #include "core/example_configs.h"
 #include "tutti/core/error.h"
 #include "tutti/slam/config.h"
+#include "tutti/slam/map_file.h"
 
 namespace tutti::cli {
 namespace {
 
 struct RunArguments {
   std::string config, dataset, out, ground_truth;
-  std::string trace, resume, save_map;
+  std::string trace, resume, map, save_map;
   std::vector<std::string> set;  // SECTION.KEY=VALUE
   bool no_loops = false, no_report = false, quiet = false, keep = false, help_config = false,
        advanced = false, timing = false, realtime = false, no_map = false;
@@ -125,14 +126,23 @@ int Resume(const CLI::App& command, const RunArguments& arguments) {
   return RunAndShow(command, arguments, std::move(request), config);
 }
 
+// What the map was made with, for a recording of which all frames are used.
+RunConfig ConfigOf(const std::string& map) {
+  RunConfig config = ReadMapInfo(map).config;
+  config.dataset.start = config.dataset.end = 0;
+  config.dataset.stride = 1;
+  return config;
+}
+
 int Run(const CLI::App& command, const RunArguments& arguments) {
   if (arguments.help_config) {
     std::fputs(HelpConfig(arguments.advanced).c_str(), stdout);
     return 0;
   }
   if (!arguments.resume.empty()) return Resume(command, arguments);
-  Require(arguments.config, "--config",
-          "a YAML file, for example " + internal::ExampleConfigs() + "/tum_fr1_rgbd.yaml");
+  if (arguments.map.empty())
+    Require(arguments.config, "--config",
+            "a YAML file, for example " + internal::ExampleConfigs() + "/tum_fr1_rgbd.yaml");
   Require(arguments.dataset, "--dataset", "the data set's folder, a video file, or camera:0");
   Require(arguments.out, "--out", "the folder for the results");
   RunRequest request;
@@ -159,7 +169,8 @@ int Run(const CLI::App& command, const RunArguments& arguments) {
     throw InputError("run: --checkpoint: in real time, or with a camera, there is no going on later");
   if (!arguments.save_map.empty()) request.save_map = arguments.save_map;
   if (arguments.save_map.empty() && !arguments.no_map) request.save_map = kMap;
-  RunConfig config = LoadConfig(request.config);
+  if (!arguments.map.empty()) request.map = arguments.map;
+  RunConfig config = arguments.config.empty() ? ConfigOf(arguments.map) : LoadConfig(request.config);
   SetOptions(arguments.set, config);
   return RunAndShow(command, arguments, std::move(request), config);
 }
@@ -180,6 +191,9 @@ void SetUpRun(CLI::App& command, int& exit_code) {
   command.add_flag(
       "--keep", arguments->keep,
       "don't replace earlier results in --out: move them into OUT/1, the next ones into OUT/2, ...");
+  command.add_option("--map", arguments->map,
+                     "map.tutti of an earlier run: go on in it, as another session; the map that is written "
+                     "holds both. Without --config, the map's configuration is used");
   command.add_flag("--no-map", arguments->no_map, "don't write the map (OUT/map.tutti)");
   command.add_option("--save-map", arguments->save_map,
                      "write the map to this file instead of OUT/map.tutti");

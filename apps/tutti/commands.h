@@ -9,6 +9,7 @@ namespace tutti::cli {
 
 void SetUpRun(CLI::App& command, int& exit_code);
 void SetUpLocalize(CLI::App& command, int& exit_code);
+void SetUpMerge(CLI::App& command, int& exit_code);
 void SetUpExport(CLI::App& command, int& exit_code);
 void SetUpMap(CLI::App& command, int& exit_code);
 void SetUpCalibrateCheck(CLI::App& command, int& exit_code);

@@ -9,7 +9,7 @@ int main(int argc, char** argv) {
       {"compare", tutti::cli::SetUpCompare},   {"loops", tutti::cli::SetUpLoops},
       {"generate", tutti::cli::SetUpGenerate}, {"demo", tutti::cli::SetUpDemo},
       {"map", tutti::cli::SetUpMap},           {"localize", tutti::cli::SetUpLocalize},
-      {"export", tutti::cli::SetUpExport},
+      {"export", tutti::cli::SetUpExport},     {"merge", tutti::cli::SetUpMerge},
   };
   return tutti::cli::RunProgram(argc, argv, own, nullptr);
 }

@@ -22,6 +22,7 @@ struct Command {
 constexpr Command kCommands[] = {
     {"run", "visual SLAM on a data set: trajectories, loops, summary"},
     {"localize", "where the frames of a data set are in the map of an earlier run"},
+    {"merge", "two maps with common places become one"},
     {"map", "what is in a map file: keyframes, landmarks, loops, size, extent"},
     {"export", "a saved map for other programs: PLY, COLMAP, nerfstudio, g2o, TUM"},
     {"calibrate-check",

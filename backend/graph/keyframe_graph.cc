@@ -122,9 +122,11 @@ void KeyframeGraph::Update(std::vector<MapKeyframe> keyframes, const std::vector
   edges_.clear();
   for (std::size_t i = 1; i < keyframes_.size(); ++i) {
     const int older = keyframes_[i - 1].id, newer = keyframes_[i].id;
-    if (Consecutive(older, newer) && OfOnePiece(older, newer)) edges_.push_back({older, newer, {}});
+    if (Consecutive(older, newer) && !Begins(newer) && OfOnePiece(older, newer))
+      edges_.push_back({older, newer, {}});
   }
   for (const CovisiblePair& c : Strongest(covisible)) edges_.push_back({c.older, c.newer, {}});
+  TieBeginnings();
   std::sort(edges_.begin(), edges_.end(), Before<Edge>);
   if (!carried_.empty()) {
     std::vector<Edge> all;
@@ -133,6 +135,31 @@ void KeyframeGraph::Update(std::vector<MapKeyframe> keyframes, const std::vector
     edges_ = std::move(all);
   }
   for (Edge& edge : edges_) edge.S_older_newer = Measured(edge.older, edge.newer);
+}
+
+void KeyframeGraph::BeginSession(int first_keyframe) {
+  MeasureAgain();
+  sessions_.push_back(first_keyframe);
+}
+
+void KeyframeGraph::Append(const KeyframeGraph& other, int first_keyframe) {
+  for (const int begin : other.sessions_) sessions_.push_back(first_keyframe + begin);
+}
+
+bool KeyframeGraph::Begins(int keyframe) const {
+  return std::binary_search(sessions_.begin(), sessions_.end(), keyframe);
+}
+
+// A recording that began in the map hangs on what its first keyframe saw there; on the keyframe before, if
+// that is not much.
+void KeyframeGraph::TieBeginnings() {
+  for (std::size_t i = 1; i < keyframes_.size(); ++i) {
+    const int older = keyframes_[i - 1].id, newer = keyframes_[i].id;
+    if (!Begins(newer) || !OfOnePiece(older, newer)) continue;
+    const bool tied =
+        std::any_of(edges_.begin(), edges_.end(), [newer](const Edge& edge) { return edge.newer == newer; });
+    if (!tied) edges_.push_back({older, newer, {}});
+  }
 }
 
 // The strongest few of each keyframe, without those that are consecutive: more would count the same landmarks
@@ -144,7 +171,8 @@ std::vector<CovisiblePair> KeyframeGraph::Strongest(const std::vector<CovisibleP
     // odometry's.
     const bool recent =
         kept_.empty() || c.newer - c.older < kRecentKeyframes || Kept(c.older, c.newer) != nullptr;
-    if (recent && !Consecutive(c.older, c.newer) && OfOnePiece(c.older, c.newer)) candidates.push_back(c);
+    const bool next = Consecutive(c.older, c.newer) && !Begins(c.newer);
+    if (recent && !next && OfOnePiece(c.older, c.newer)) candidates.push_back(c);
   }
   std::sort(candidates.begin(), candidates.end(), [](const CovisiblePair& a, const CovisiblePair& b) {
     return std::tuple(a.newer, -a.shared, a.older) < std::tuple(b.newer, -b.shared, b.older);

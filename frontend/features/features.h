@@ -27,7 +27,8 @@ struct FrameFeatures {
   std::vector<float> inverse_depth;                ///< N [1/m]; 0 where unknown
   std::vector<float> inverse_depth_sigma;          ///< N, standard deviation of inverse_depth [1/m]
   Eigen::Vector2d lens = Eigen::Vector2d::Zero();  ///< correction of the lens in the keypoints (LensError)
-  std::vector<int> aligned;  ///< N, landmark whose patch the position was aligned with, or -1
+  bool other_camera = false;  ///< in the pixels of the map's camera, but another one took it (CarryOver)
+  std::vector<int> aligned;   ///< N, landmark whose patch the position was aligned with, or -1
   std::shared_ptr<const std::vector<cv::Mat>>
       pyramid;              ///< of the (left) image; null where it is not needed any more
   bool has_depth = false;   ///< the frame came with a depth or right image

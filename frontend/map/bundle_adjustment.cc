@@ -79,11 +79,22 @@ void Refresh(const std::vector<int>& landmarks, Map* map) {
   }
 }
 
+// Another camera's keyframes do not have this one's error: a window with both says nothing of it.
+bool OfOneCamera(const Map& map, const std::vector<int>& moving, const std::vector<int>& fixed) {
+  const auto other = [&map](int id) { return map.keyframe(id).features->other_camera; };
+  return std::none_of(moving.begin(), moving.end(), other) && std::none_of(fixed.begin(), fixed.end(), other);
+}
+
 }  // namespace
 
 BundleAdjustmentReport AdjustWindow(const PinholeCamera& camera, const std::vector<int>& moving,
-                                    const std::vector<int>& fixed, const BundleAdjustmentOptions& options,
+                                    const std::vector<int>& fixed, const BundleAdjustmentOptions& given,
                                     Map* map) {
+  BundleAdjustmentOptions options = given;
+  if (!OfOneCamera(*map, moving, fixed)) {
+    options.lens = {};
+    options.observe_lens = false;
+  }
   const std::vector<int> landmarks = map->LandmarksOf(moving);
   BundleAdjustmentReport report;
   report.keyframes = static_cast<int>(moving.size());

@@ -29,6 +29,9 @@ class LocalMapper {
   /// What the camera's calibration turned out to have left over.
   const SelfCalibration& lens() const { return lens_; }
 
+  /// Goes on with what is known of the same camera.
+  void KeepLens(const SelfCalibration& lens) { lens_ = lens; }
+
   /// Full treatment of the newest keyframe; its landmark matches, and those of its own depth, are already in
   /// the map. Adds milliseconds to `stages`.
   void Process(int keyframe, Map* map, StageTimes* stages);

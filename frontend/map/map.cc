@@ -109,6 +109,45 @@ void Map::Merge(int loser, int winner) {
   landmark(winner).found += found;
 }
 
+namespace {
+
+// Features whose alignment with landmarks is told by other numbers.
+std::shared_ptr<const FrameFeatures> Renumbered(const std::shared_ptr<const FrameFeatures>& features,
+                                                int landmarks) {
+  const auto is_landmark = [](int id) { return id >= 0; };
+  if (std::none_of(features->aligned.begin(), features->aligned.end(), is_landmark)) return features;
+  auto renumbered = std::make_shared<FrameFeatures>(*features);
+  for (int& id : renumbered->aligned) id += id >= 0 ? landmarks : 0;
+  return renumbered;
+}
+
+}  // namespace
+
+void Map::Append(const Map& other, std::int64_t frame_offset, int first_piece) {
+  const int keyframes = KeyframeCount(), landmarks = LandmarkCount();
+  for (int id = 0; id < other.KeyframeCount(); ++id) {
+    Keyframe k = other.keyframe(id);
+    k.id += keyframes;
+    k.frame_index += frame_offset;
+    k.piece += first_piece;
+    if (k.replaced_by >= 0) k.replaced_by += keyframes;
+    k.features = Renumbered(k.features, landmarks);
+    for (int& l : k.landmarks) l += l >= 0 ? landmarks : 0;
+    std::map<int, int> covisible;
+    for (const auto& [neighbour, shared] : k.covisible) covisible[neighbour + keyframes] = shared;
+    k.covisible = std::move(covisible);
+    keyframes_.Append(std::move(k));
+  }
+  for (int id = 0; id < other.LandmarkCount(); ++id) {
+    Landmark l = other.landmark(id);
+    for (Observation& o : l.observations) o.keyframe += keyframes;
+    if (l.reference >= 0) l.reference += keyframes;
+    if (l.patch_source.keyframe >= 0) l.patch_source.keyframe += keyframes;
+    if (l.replaced_by >= 0) l.replaced_by += landmarks;
+    landmarks_.Append(std::move(l));
+  }
+}
+
 int Map::Present(int id) const {
   while (id >= 0 && !landmark(id).alive) id = landmark(id).replaced_by;
   return id;

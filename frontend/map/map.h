@@ -146,6 +146,10 @@ class Map {
   /// Median depth of the landmarks that a keyframe sees [m]; 0 if it sees none.
   double MedianDepth(int keyframe) const;
 
+  /// Appends another map, which stands apart: its keyframes, pieces and landmarks get numbers after those
+  /// that are there, its frames this offset. `first_piece`: what its piece 0 is called.
+  void Append(const Map& other, std::int64_t frame_offset, int first_piece);
+
   /// For loading: the next keyframe or landmark, as it was saved.
   void Restore(Keyframe keyframe) { keyframes_.Append(std::move(keyframe)); }
   void Restore(Landmark landmark) { landmarks_.Append(std::move(landmark)); }

@@ -38,6 +38,7 @@ void SelfCalibration::Learn(const LensError& seen, int keyframes, Map* map) {
   remaining_.value.setZero();
   applied_ += lens;
   for (int id = 0; id < map->KeyframeCount(); ++id) {
+    if (std::as_const(*map).keyframe(id).features->other_camera) continue;
     Keyframe& k = map->keyframe(id);
     k.features = Moved(*k.features);
   }

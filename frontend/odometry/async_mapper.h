@@ -28,6 +28,7 @@ class AsyncMapper {
     return &map_;
   }
   const SelfCalibration& lens() const { return mapper_.lens(); }
+  void KeepLens(const SelfCalibration& lens) { mapper_.KeepLens(lens); }
 
   /// Adds a keyframe with the landmarks that the frame sees, and new ones by its depth, if the sensor has
   /// that. Nothing may be under way. Returns its id.

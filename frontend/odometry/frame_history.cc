@@ -9,6 +9,14 @@ void FrameHistory::Add(const TrackedFrame& frame, const Pose& T_camera_world, co
                       reference.T_world_camera.Inverse() * T_camera_world.Inverse()});
 }
 
+void FrameHistory::Append(const FrameHistory& other, std::int64_t frame_offset, int first_keyframe) {
+  for (Record record : other.records_) {
+    record.index += frame_offset;
+    record.reference += first_keyframe;
+    records_.push_back(record);
+  }
+}
+
 void FrameHistory::Rescale(const std::map<int, Similarity>& S_world_keyframe) {
   for (Record& record : records_) {
     const auto moved = S_world_keyframe.find(record.reference);
@@ -27,9 +35,11 @@ void FrameHistory::Rehang(const std::map<int, int>& into, const Map& map) {
   }
 }
 
-std::vector<int> FrameHistory::Pieces(const Map& map) const {
+std::vector<int> FrameHistory::Pieces(const Map& map, const FrameRange& range) const {
   std::map<int, int> frames;
-  for (const Record& r : records_) ++frames[map.keyframe(r.reference).piece];
+  for (const Record& r : records_) {
+    if (range.Has(r.index)) ++frames[map.keyframe(r.reference).piece];
+  }
   std::vector<int> pieces;
   pieces.reserve(frames.size());
   for (const auto& [piece, count] : frames) pieces.push_back(piece);
@@ -37,25 +47,29 @@ std::vector<int> FrameHistory::Pieces(const Map& map) const {
   return pieces;
 }
 
-std::vector<const FrameHistory::Record*> FrameHistory::Of(const Map& map, int piece) const {
-  if (piece < 0 && !records_.empty()) piece = Pieces(map).front();
+std::vector<const FrameHistory::Record*> FrameHistory::Of(const Map& map, int piece,
+                                                          const FrameRange& range) const {
+  if (piece < 0) {
+    const std::vector<int> pieces = Pieces(map, range);
+    if (!pieces.empty()) piece = pieces.front();
+  }
   std::vector<const Record*> out;
   for (const Record& r : records_) {
-    if (map.keyframe(r.reference).piece == piece) out.push_back(&r);
+    if (range.Has(r.index) && map.keyframe(r.reference).piece == piece) out.push_back(&r);
   }
   return out;
 }
 
-Trajectory FrameHistory::Poses(const Map& map, int piece) const {
+Trajectory FrameHistory::Poses(const Map& map, int piece, const FrameRange& range) const {
   Trajectory out;
-  for (const Record* r : Of(map, piece))
+  for (const Record* r : Of(map, piece, range))
     out.push_back({r->stamp_s, map.keyframe(r->reference).T_world_camera * r->T_reference_frame});
   return out;
 }
 
-std::vector<std::int64_t> FrameHistory::Indices(const Map& map, int piece) const {
+std::vector<std::int64_t> FrameHistory::Indices(const Map& map, int piece, const FrameRange& range) const {
   std::vector<std::int64_t> out;
-  for (const Record* r : Of(map, piece)) out.push_back(r->index);
+  for (const Record* r : Of(map, piece, range)) out.push_back(r->index);
   return out;
 }
 

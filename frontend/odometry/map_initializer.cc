@@ -8,16 +8,24 @@ namespace {
 constexpr int kMinDepthFeatures = 50;      // features with depth that a metric map starts from
 constexpr float kBackwardsRadius = 30.0F;  // between neighbouring frames [px]
 constexpr std::size_t kMaxWaiting = 100;   // frames kept to be posed backwards
+constexpr int kFramesToRecognise = 5;      // of a session, before it starts a piece of its own
 }  // namespace
 
 void MapInitializer::Reset() {
   mono_.Reset();
   waiting_.clear();
+  hold_ = 0;
 }
 
 void MapInitializer::NextPiece() {
   ++piece_;
   Reset();
+}
+
+void MapInitializer::BeginSession(int piece) {
+  piece_ = piece;
+  Reset();
+  hold_ = kFramesToRecognise;
 }
 
 MapInitializer::Start MapInitializer::Offer(const TrackedFrame& frame, const LastFrame& last,
@@ -32,8 +40,10 @@ MapInitializer::Start MapInitializer::OfferMetric(const TrackedFrame& frame, con
   const std::vector<float>& depths = frame.features->inverse_depth;
   const auto with_depth = std::count_if(depths.begin(), depths.end(), [](float d) { return d > 0; });
   Start start;
-  if (with_depth < kMinDepthFeatures) {
-    start.reason = frame.features->has_depth
+  const bool holds = hold_ > 0 && --hold_ > 0;
+  if (with_depth < kMinDepthFeatures || holds) {
+    start.reason = with_depth >= kMinDepthFeatures ? "initialising: the place is not recognised in the map"
+                   : frame.features->has_depth
                        ? "initialising: only " + std::to_string(with_depth) + " features with depth"
                        : "initialising: waiting for a frame with depth";
     waiting_.push_back(frame);

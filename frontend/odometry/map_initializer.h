@@ -33,10 +33,15 @@ class MapInitializer {
   void Reset();
   /// The same, and what starts next is another piece of the map.
   void NextPiece();
+  /// The same for the first frames of a recording that goes on in a map whose next piece this is. One of them
+  /// may be recognised there: depth starts a piece only after a few that are not, which are posed then, too.
+  void BeginSession(int piece);
+  /// Number of the piece that starts next, or started last.
+  int piece() const { return piece_; }
 
   template <class Archive>
   void State(Archive& archive) {
-    archive(mono_, waiting_, piece_);
+    archive(mono_, waiting_, piece_, hold_);
   }
   /// Throws InputError if the state does not fit the map.
   void Check(const Map& map, const internal::SectionReader& file) const;
@@ -54,6 +59,7 @@ class MapInitializer {
   PoseSearch search_;
   std::vector<TrackedFrame> waiting_;  // stereo and depth: offered, without enough depth; no images
   int piece_ = 0;
+  int hold_ = 0;  // frames with depth that are still to start no piece
 };
 
 }  // namespace tutti

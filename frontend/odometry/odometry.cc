@@ -5,6 +5,7 @@
 
 #include "core/median.h"
 #include "frontend/map/global_adjustment.h"
+#include "frontend/map/other_camera.h"
 #include "frontend/odometry/odometry_impl.h"
 #include "tutti/core/error.h"
 
@@ -51,6 +52,27 @@ std::shared_ptr<const FrameFeatures> Odometry::Extract(const InputFrame& frame) 
 
 TrackResult Odometry::Track(const InputFrame& frame) { return impl_->Track(frame); }
 TrackResult Odometry::RelocalizeAt(int keyframe) { return impl_->RelocalizeAt(keyframe); }
+void Odometry::BeginSession(const CameraRig& rig, std::int64_t frame_offset) {
+  const std::string problem = OtherCameraProblem(impl_->rig(), rig, impl_->map().scales());
+  if (!problem.empty()) throw InputError(problem);
+  Odometry next(impl_->options(), rig);
+  impl_->EnterMapping();
+  next.impl_->GoOn(*impl_, frame_offset);
+  *this = std::move(next);
+}
+void Odometry::Append(const Odometry& other, std::int64_t frame_offset) {
+  const std::string problem = OtherCameraProblem(impl_->rig(), other.impl_->rig(), impl_->map().scales());
+  if (!problem.empty()) throw InputError(problem);
+  if (impl_->map().scales() != other.impl_->map().scales())
+    throw InputError("the two maps have other image pyramids (odometry.levels, odometry.scale_factor)");
+  Odometry joined(impl_->options(), impl_->rig());
+  impl_->EnterMapping();
+  joined.impl_->GoOn(*impl_, frame_offset);
+  joined.impl_->Append(*other.impl_, frame_offset);
+  *this = std::move(joined);
+}
+std::int64_t Odometry::FrameOffset() const { return impl_->frame_offset(); }
+int Odometry::SessionPiece() const { return impl_->session_piece(); }
 void Odometry::BeginLocalization() { impl_->BeginLocalization(); }
 bool Odometry::BeyondMap() const { return impl_->BeyondMap(); }
 int Odometry::ReferenceKeyframe() const { return impl_->last().reference; }
@@ -111,6 +133,8 @@ double Odometry::KeyframeStamp(int id) const { return impl_->map().keyframe(id).
 
 int Odometry::KeyframePiece(int id) const { return impl_->map().keyframe(id).piece; }
 
+int Odometry::NextKeyframeId() const { return impl_->map().KeyframeCount(); }
+
 int Odometry::LandmarkCount() const {
   int count = 0;
   for (int id = 0; id < impl_->map().LandmarkCount(); ++id) count += impl_->map().landmark(id).alive ? 1 : 0;
@@ -168,14 +192,16 @@ void Odometry::Enter(const GlobalAdjustment& adjustment, const std::map<int, Sim
   impl_->Correct(S_world_keyframe, {}, adjustment.work_.get());
 }
 
-std::vector<int> Odometry::Pieces() const { return impl_->history().Pieces(impl_->map()); }
-
-Trajectory Odometry::FrameTrajectory(int map_piece) const {
-  return impl_->history().Poses(impl_->map(), map_piece);
+std::vector<int> Odometry::Pieces(const FrameRange& range) const {
+  return impl_->history().Pieces(impl_->map(), range);
 }
 
-std::vector<std::int64_t> Odometry::FrameIndices(int map_piece) const {
-  return impl_->history().Indices(impl_->map(), map_piece);
+Trajectory Odometry::FrameTrajectory(int map_piece, const FrameRange& range) const {
+  return impl_->history().Poses(impl_->map(), map_piece, range);
+}
+
+std::vector<std::int64_t> Odometry::FrameIndices(int map_piece, const FrameRange& range) const {
+  return impl_->history().Indices(impl_->map(), map_piece, range);
 }
 
 std::map<std::string, double> Odometry::StageMilliseconds() const { return impl_->stages().milliseconds; }

@@ -8,6 +8,7 @@
 #include "frontend/map/global_adjustment.h"
 #include "frontend/map/landmark_fusion.h"
 #include "frontend/map/map_correction.h"
+#include "frontend/map/other_camera.h"
 #include "frontend/map/redundant_keyframes.h"
 #include "tutti/core/error.h"
 
@@ -21,6 +22,32 @@ Odometry::Impl::Impl(const OdometryOptions& options, const CameraRig& rig)
       tracker_(options, rig),
       relocalizer_(options, rig) {}
 
+void Odometry::Impl::GoOn(const Impl& before, std::int64_t frame_offset) {
+  UseOwnThreads(before.mapper_.own_threads());
+  SetRecorder(before.stages_.recorder);
+  if (SameCamera(before.rig_, rig_)) {
+    *mapper_.RestoredMap() = before.map();
+    mapper_.KeepLens(before.mapper_.lens());
+  } else {
+    CarryOver(before.map(), before.rig_.camera, rig_.camera, mapper_.RestoredMap());
+  }
+  history_ = before.history_;
+  history_.BeginSession();
+  session_piece_ = before.initializer_.piece() + 1;
+  initializer_.BeginSession(session_piece_);
+  frame_offset_ = frame_offset;
+}
+
+void Odometry::Impl::Append(const Impl& other, std::int64_t frame_offset) {
+  Map converted(map().scales());
+  const bool same = SameCamera(other.rig_, rig_);
+  if (!same) CarryOver(other.map(), other.rig_.camera, rig_.camera, &converted);
+  history_.Append(other.history_, frame_offset, map().KeyframeCount());
+  mapper_.MutableMap()->Append(same ? other.map() : converted, frame_offset, session_piece_);
+  initializer_.BeginSession(session_piece_ + other.initializer_.piece() + 1);
+  frame_offset_ = frame_offset + other.frame_offset_;
+}
+
 TrackResult Odometry::Impl::Track(const InputFrame& input) {
   mapper_.NextFrame();
   if (mapper_.Due()) EnterMapping();
@@ -31,7 +58,7 @@ TrackResult Odometry::Impl::Track(const InputFrame& input) {
 }
 
 TrackedFrame Odometry::Impl::Prepare(const InputFrame& input) {
-  TrackedFrame frame{input.index, input.stamp_s, input.features};
+  TrackedFrame frame{input.index + frame_offset_, input.stamp_s, input.features};
   if (!frame.features) {
     const ScopedStopwatch watch(&stages_, Lane::kTracking, "extract");
     frame.features = std::make_shared<const FrameFeatures>(ExtractFeatures(input, rig_, options_));

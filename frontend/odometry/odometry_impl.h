@@ -21,6 +21,13 @@ class Odometry::Impl {
  public:
   Impl(const OdometryOptions& options, const CameraRig& rig);
 
+  /// Into an object that is new, for the rig of a recording that begins: the map of `before` and where its
+  /// frames were. Nothing may be under way there.
+  void GoOn(const Impl& before, std::int64_t frame_offset);
+
+  /// The map of another one, and where its frames were, into one that has gone on (GoOn) and tracked nothing.
+  void Append(const Impl& other, std::int64_t frame_offset);
+
   TrackResult Track(const InputFrame& frame);
   TrackResult RelocalizeAt(int keyframe);
   void BeginLocalization();
@@ -41,7 +48,8 @@ class Odometry::Impl {
   void Load(internal::SectionReader* file);
   template <class Archive>
   void State(Archive& archive) {
-    archive(mapper_, initializer_, tracker_, relocalizer_, history_, result_, row_errors_, stereo_matches_);
+    archive(mapper_, initializer_, tracker_, relocalizer_, history_, result_, row_errors_, stereo_matches_,
+            frame_offset_, session_piece_);
   }
 
   const OdometryOptions& options() const { return options_; }
@@ -50,6 +58,8 @@ class Odometry::Impl {
   const AsyncMapper& mapper() const { return mapper_; }
   const FrameHistory& history() const { return history_; }
   const LastFrame& last() const { return tracker_.last(); }
+  std::int64_t frame_offset() const { return frame_offset_; }
+  int session_piece() const { return session_piece_; }
   const StageTimes& stages() const { return stages_; }
   const std::vector<double>& row_errors() const { return row_errors_; }
   const std::vector<double>& stereo_matches() const { return stereo_matches_; }
@@ -77,6 +87,8 @@ class Odometry::Impl {
   FrameHistory history_;
   TrackResult result_;                               // of the last frame
   std::vector<double> row_errors_, stereo_matches_;  // stereo: of each pair
+  std::int64_t frame_offset_ = 0;                    // of the recording, in the map's numbers
+  int session_piece_ = 0;                            // that the recording began with
 };
 
 }  // namespace tutti

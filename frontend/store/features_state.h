@@ -163,7 +163,7 @@ void FrameFeatures::State(Archive& archive) {
   internal::StateOfRepeated(archive, size(), &inverse_depth);
   internal::StateOfRepeated(archive, size(), &inverse_depth_sigma);
   internal::StateOfSparse(archive, size(), &aligned);
-  archive(lens, has_depth, row_error_px, stereo_matches, columns_, rows_);
+  archive(lens, other_camera, has_depth, row_error_px, stereo_matches, columns_, rows_);
   internal::StateOfPyramid(archive, &pyramid);
   if constexpr (Archive::kReading) {
     const bool described =

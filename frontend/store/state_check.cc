@@ -128,6 +128,7 @@ void MapInitializer::Check(const Map& map, const SectionReader& file) const {
   mono_.Check(map, file);
   internal::CheckFrames(waiting_, map, file);
   CheckIndex(piece_, 0, kMostFrames, file);
+  CheckIndex(hold_, 0, kMostFrames, file);
 }
 
 void Relocalizer::Check(const Map& map, const SectionReader& file) const {

@@ -10,6 +10,7 @@
 #include "loopclosure/detector/query_check.h"
 #include "loopclosure/filter/hypothesis_search.h"
 #include "loopclosure/geometry/verification.h"
+#include "tutti/core/error.h"
 
 namespace tutti {
 
@@ -134,6 +135,33 @@ LoopResult LoopDetector::Detect(const cv::Mat& image, std::int64_t id) {
 }
 
 LoopResult LoopDetector::Locate(const LoopQuery& query) const { return impl_->Locate(query); }
+
+void LoopDetector::BeginSession() { impl_->state().reasoner().BeginSession(); }
+
+std::vector<LoopPlace> LoopDetector::Places() const {
+  const internal::DetectorState& state = impl_->state();
+  for (const Member& member : state.members()) {
+    if (member.dense())
+      throw InputError("member '" + member.name() +
+                       "' describes images as a whole: its places can't be shown "
+                       "to another detector");
+  }
+  std::vector<LoopPlace> places;
+  for (int slot = 0; slot < state.memory().size(); ++slot) {
+    if (state.memory().state(slot) == LocationMemory::State::kMerged) continue;
+    const View view = state.HasView(slot) ? state.view(slot) : impl_->long_term().ViewOf(slot);
+    LoopPlace place;
+    place.id = view.id;
+    place.camera = view.camera;
+    for (std::size_t m = 0; m < view.members.size(); ++m) {
+      Features& features = place.member_features[state.members()[m].name()];
+      cv::KeyPoint::convert(view.members[m].pixels, features.keypoints);
+      features.descriptors = view.members[m].descriptors;
+    }
+    places.push_back(std::move(place));
+  }
+  return places;
+}
 
 void LoopDetector::AddLink(std::int64_t a, std::int64_t b) { impl_->state().reasoner().AddLink(a, b); }
 void LoopDetector::Unlink(std::int64_t a, std::int64_t b) { impl_->state().reasoner().Unlink(a, b); }

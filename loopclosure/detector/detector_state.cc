@@ -52,7 +52,7 @@ void DetectorState::StoreView(int slot, LocationStore& store) const {
   store.Put(Kind::kView, 0, slot, record.bytes());
 }
 
-void DetectorState::FetchView(int slot, LocationStore& store) {
+View DetectorState::StoredView(int slot, LocationStore& store) const {
   const auto record = store.Get(Kind::kView, 0, slot);
   if (!record) {
     throw InputError(store.name() + ": is damaged (the features of location " +
@@ -60,7 +60,11 @@ void DetectorState::FetchView(int slot, LocationStore& store) {
                      " are missing); give another file, or an older copy");
   }
   ByteReader in(*record, store.name());
-  LoadView(slot, internal::LoadView(in), store.name());
+  return internal::LoadView(in);
+}
+
+void DetectorState::FetchView(int slot, LocationStore& store) {
+  LoadView(slot, StoredView(slot, store), store.name());
 }
 
 std::string DetectorState::Statistics() const {

@@ -51,6 +51,8 @@ class DetectorState {
   /// Takes up a view that was saved. Throws InputError, with the name of the source, if it is not of this
   /// location, or of other members.
   void LoadView(int slot, View view, const std::string& source);
+  /// The view of a location that is in no memory, as the store has it. Throws InputError.
+  View StoredView(int slot, LocationStore& store) const;
   /// Puts a location's view into the store, and takes it up from there. Throws InputError.
   void StoreView(int slot, LocationStore& store) const;
   void FetchView(int slot, LocationStore& store);

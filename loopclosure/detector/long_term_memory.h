@@ -30,6 +30,9 @@ class LongTermMemory {
   /// The file learns of the newest image and all that it has changed.
   void Record(LoopResult& result);
 
+  /// What geometry needs of a location that has left. Throws InputError.
+  View ViewOf(int slot) { return state_.StoredView(slot, store()); }
+
   /// The store, which is made if there is none.
   LocationStore& store();
   /// True if something may have left: there is a store.

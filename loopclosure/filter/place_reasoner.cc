@@ -62,6 +62,15 @@ int PlaceReasoner::Remember(std::int64_t id, const std::vector<SeenWords>& words
   return stands_for;
 }
 
+void PlaceReasoner::BeginSession() {
+  for (auto& system : systems_) system->BeginSession();
+  if (!Shared()) union_.Settle(0);
+  track_.Interrupt();
+  last_hypothesis_ = 0;
+  last_candidate_ = -1;
+  candidates_in_a_row_ = 0;
+}
+
 void PlaceReasoner::ForEachUnit(const std::function<void(MemorySystem&, std::size_t)>& call) {
   std::vector<std::pair<MemorySystem*, std::size_t>> units;
   for (auto& system : systems_) {

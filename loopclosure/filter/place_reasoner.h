@@ -27,6 +27,8 @@ class PlaceReasoner {
   /// for the image: the newest, or an older one that it was merged into. `prior`: where it was taken.
   int Remember(std::int64_t id, const std::vector<SeenWords>& words,
                const std::optional<PosePrior>& prior = {});
+  /// Another recording begins (MemorySystem::BeginSession).
+  void BeginSession();
   /// Step 5, and the times of its parts into `result`. `disturb`, if given, may change what each filter unit
   /// has counted: for tests of what a broken member does.
   CombinedBelief Step(LoopResult& result, const std::function<void(std::size_t, FilterUnit&)>& disturb = {});

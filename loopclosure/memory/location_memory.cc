@@ -61,9 +61,9 @@ LocationMemory::LinkType LocationMemory::Bounded(int a, int b, LinkType type) co
   return LinkType::kLoop;
 }
 
-std::vector<int> LocationMemory::Settle() {
+std::vector<int> LocationMemory::Settle(int most) {
   std::vector<int> moved;
-  while (static_cast<int>(short_term_.size()) > stm_size_) {
+  while (static_cast<int>(short_term_.size()) > most) {
     const int slot = short_term_.front();
     short_term_.pop_front();
     Enter(slot);
@@ -321,7 +321,7 @@ void LocationMemory::Load(internal::ByteReader& in) {
   if (weights > size()) in.Damaged("locations with impossible weights");
   int newest = size() - 1;
   while (newest >= 0 && state(newest) == State::kMerged) --newest;
-  if (newest >= 0 && state(newest) != State::kShortTerm) {
+  if (newest >= 0 && !short_term_.empty() && state(newest) != State::kShortTerm) {
     in.Damaged("the newest location is not in short-term memory");
   }
 }

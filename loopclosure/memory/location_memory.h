@@ -63,7 +63,9 @@ class LocationMemory {
   /// Takes a loop link back; odometry links stay. False if there is none.
   bool RemoveLoop(int a, int b);
   /// Moves the oldest locations of STM to WM while |STM| > stm_size; returns the slots moved.
-  std::vector<int> Settle();
+  std::vector<int> Settle() { return Settle(stm_size_); }
+  /// The same while |STM| > `most`; 0: another recording begins, and nothing is too recent for it.
+  std::vector<int> Settle(int most);
   /// Rehearsal (section 6): the newest location is merged into the one before it, weight_old += 1 +
   /// weight_new, and dropped; its id names the older one from now on. Returns the older slot, -1 if STM holds
   /// no older one (nothing changes then).

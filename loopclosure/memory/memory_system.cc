@@ -70,6 +70,12 @@ int MemorySystem::Remember(std::int64_t id, const std::vector<SeenWords>& words)
   return slot;
 }
 
+void MemorySystem::BeginSession() {
+  transition_.Update(memory_, memory_.Settle(0));
+  for (FilterUnit& unit : units_) unit.filter = BayesFilter();
+  if (joint_) joint_->filter = BayesFilter();
+}
+
 bool MemorySystem::LooksLikePrevious(int slot) const {
   const std::deque<int>& recent = memory_.short_term_memory();
   if (recent.size() < 2) return false;

@@ -82,6 +82,9 @@ class MemorySystem {
   /// rehearsed, and the oldest of STM go to WM. Returns the slot that now stands for the image.
   int Remember(std::int64_t id, const std::vector<SeenWords>& words);
 
+  /// Another recording begins: what was seen last is a candidate like all else, and the filters start afresh.
+  void BeginSession();
+
   /// Factors of the places for the present image (PoseTrack::Gains), empty: none.
   void SetGains(std::vector<double> gains) { gains_ = std::move(gains); }
   /// Step 5. Different units may run at the same time; then the joint filter, if there is one.

@@ -295,5 +295,31 @@ TEST(KeyframeGraph, RemovedKeyframesLeaveTheMeasurementsOfBeforeACorrection) {
   EXPECT_EQ(small.edges().size(), 198u);
 }
 
+// The first keyframe of a recording that began in the map hangs on what it saw there, not on the end of the
+// recording before.
+TEST(KeyframeGraph, ARecordingThatBeginsIsTiedToWhatItSees) {
+  const auto edges = [](const KeyframeGraph& graph) {
+    std::vector<std::pair<int, int>> out;
+    for (const PoseGraphEdge& edge : graph.Graph({}).edges()) out.emplace_back(edge.from, edge.to);
+    std::sort(out.begin(), out.end());
+    return out;
+  };
+  std::vector<MapKeyframe> keyframes;
+  for (int id = 0; id < 40; ++id)
+    keyframes.push_back({id, 0, Pose(Eigen::Quaterniond::Identity(), {double(id), 0, 0})});
+  KeyframeGraph graph, before;
+  graph.BeginSession(30);
+  graph.Update(keyframes, {{4, 30, 80}});
+  before.Update(keyframes, {{4, 30, 80}});
+  auto expected = edges(before);
+  EXPECT_EQ(std::count(expected.begin(), expected.end(), std::pair(29, 30)), 1);
+  expected.erase(std::find(expected.begin(), expected.end(), std::pair(29, 30)));
+  EXPECT_EQ(edges(graph), expected);
+  // Without anything to see, it is not left alone.
+  graph.Update(keyframes, {});
+  const auto tied = edges(graph);
+  EXPECT_EQ(std::count(tied.begin(), tied.end(), std::pair(29, 30)), 1);
+}
+
 }  // namespace
 }  // namespace tutti

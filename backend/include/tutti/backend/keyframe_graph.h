@@ -98,6 +98,14 @@ class KeyframeGraph {
   /// piece when the newer one was new.
   void Update(std::vector<MapKeyframe> keyframes, const std::vector<CovisiblePair>& covisible = {});
 
+  /// Keyframes from this id on are of another recording, which did not begin where the one before ended: no
+  /// odometry connects the two. What the map has become says more of the older ones than what was kept.
+  void BeginSession(int first_keyframe);
+
+  /// The session that has just begun with this keyframe is another map: further recordings begin in it as
+  /// they do in its graph.
+  void Append(const KeyframeGraph& other, int first_keyframe);
+
   /// The graph with these loops; poses as they are in the map. Pieces that loops join are moved into the
   /// frame of the older one.
   PoseGraph Graph(const std::vector<LoopEdge>& loops) const;
@@ -134,7 +142,7 @@ class KeyframeGraph {
   /// All but the options, for saved maps (tutti::slam).
   template <class Archive>
   void State(Archive& archive) {
-    archive(keyframes_, births_, merged_, edges_, kept_, carried_);
+    archive(keyframes_, births_, merged_, edges_, kept_, carried_, sessions_);
   }
 
  private:
@@ -168,6 +176,8 @@ class KeyframeGraph {
   KeyframeCorrection CorrectionOf(const PoseGraph& graph, const PoseGraphReport& report,
                                   const std::vector<LoopEdge>& loops) const;
   bool OfOnePiece(int older, int newer) const;
+  bool Begins(int keyframe) const;
+  void TieBeginnings();
   std::vector<CovisiblePair> Strongest(const std::vector<CovisiblePair>& covisible) const;
   const Edge* Kept(int older, int newer) const;
   Similarity Measured(int older, int newer) const;
@@ -188,6 +198,7 @@ class KeyframeGraph {
   std::vector<Edge> edges_;    // odometry's, with their measurements
   std::vector<Edge> kept_;     // measurements from before the last correction, in present units
   std::vector<Edge> carried_;  // edges that were moved to what stands for keyframes that have left
+  std::vector<int> sessions_;  // first keyframes of recordings but the first, ascending
 };
 
 /// Carries a loop over to the units of a corrected map (mono): S' = scale(s_c) S scale(1/s_q).

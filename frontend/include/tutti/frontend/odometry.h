@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -58,6 +59,13 @@ struct LandmarkView {
   int observations = 0;                                ///< keyframes that see it, at least 1
 };
 
+/// Frames by their number (InputFrame::index, and the offset of BeginSession): of one recording, for example.
+struct FrameRange {
+  std::int64_t first = std::numeric_limits<std::int64_t>::min();
+  std::int64_t last = std::numeric_limits<std::int64_t>::max();  ///< included
+  bool Has(std::int64_t number) const { return number >= first && number <= last; }
+};
+
 /// A landmark as a frame shows it.
 struct SeenLandmark {
   int landmark = -1;  ///< its id; two landmarks that turn out to be one go on under one id
@@ -102,6 +110,25 @@ class Odometry {
   /// Returns what Track did if that fails, or if there is no such frame.
   TrackResult RelocalizeAt(int keyframe);
 
+  /// From now on frames of another recording come, taken by this rig; sensor and image pyramid must be those
+  /// of the map. They start a piece of the map of their own, unless RelocalizeAt finds one of the first of
+  /// them in the map that is there. `frame_offset` is added to their InputFrame::index in all that this
+  /// object tells: it should lead past every number that the map has. Time stamps may begin anew. Another
+  /// camera than that of the frames so far (size, focal length, baseline) is carried over to: what the
+  /// keyframes saw is in its pixels from then on, and its self-calibration begins anew. Throws InputError for
+  /// another kind of sensor, or a focal length that is too different; this object is then as it was.
+  void BeginSession(const CameraRig& rig, std::int64_t frame_offset);
+  /// That is added to the InputFrame::index of the present recording; 0 without BeginSession.
+  std::int64_t FrameOffset() const;
+  /// Appends the map and the frames of another odometry, which stand apart as pieces of their own: its
+  /// keyframes get ids after those that are there, its frame numbers this offset, its pieces numbers that are
+  /// new. Its camera may be another one, as in BeginSession; throws InputError as that does. No frame may be
+  /// tracked before the next BeginSession.
+  void Append(const Odometry& other, std::int64_t frame_offset);
+  /// Number of the map piece that the present recording started, or starts when it can: all pieces of before
+  /// have smaller ones.
+  int SessionPiece() const;
+
   /// From now on frames are located in the map that is there. The frames so far are forgotten, and the next
   /// one is lost until RelocalizeAt finds it. Time stamps may begin anew. Where the map shows too little of
   /// what is in view, keyframes are made for the time being (BeyondMap), and RelocalizeAt may be called at
@@ -131,6 +158,8 @@ class Odometry {
 
   /// Ids of all keyframes that are in the map, ascending.
   std::vector<int> KeyframeIds() const;
+  /// The id of the next keyframe: greater than those of all that are or were in the map.
+  int NextKeyframeId() const;
   /// Everything about one keyframe, with the current map's points.
   KeyframeView Keyframe(int id) const;
   Pose KeyframePose(int id) const;
@@ -181,14 +210,14 @@ class Odometry {
 
   /// Map pieces that have frames, by number of frames, most first (ties: the older one). Joined pieces are
   /// one.
-  std::vector<int> Pieces() const;
+  std::vector<int> Pieces(const FrameRange& range = {}) const;
 
   /// All posed frames so far, T_world_camera, in order of time, through their reference keyframes (so
   /// corrections and local bundle adjustment reach every frame). Only frames of `map_piece`; -1: of the piece
   /// with most frames.
-  Trajectory FrameTrajectory(int map_piece = -1) const;
-  /// Same length as FrameTrajectory(map_piece): index of the input frame of each pose.
-  std::vector<std::int64_t> FrameIndices(int map_piece = -1) const;
+  Trajectory FrameTrajectory(int map_piece = -1, const FrameRange& range = {}) const;
+  /// Same length as FrameTrajectory(map_piece, range): number of the frame of each pose.
+  std::vector<std::int64_t> FrameIndices(int map_piece = -1, const FrameRange& range = {}) const;
 
   /// Milliseconds spent so far, by stage ("extract", "track", "map", "local_ba", ...), summed.
   std::map<std::string, double> StageMilliseconds() const;

@@ -173,6 +173,13 @@ struct LoopResult {
   double memory_ms = 0;      ///< of memory: rehearsal, retrieval, transfer, storing [ms]
 };
 
+/// What a detector keeps of a location: enough to show the place to another detector.
+struct LoopPlace {
+  std::int64_t id = -1;                             ///< LoopQuery::id
+  std::optional<PinholeCamera> camera;              ///< LoopQuery::camera
+  std::map<std::string, Features> member_features;  ///< for LoopQuery::member_features
+};
+
 /// Ensemble loop-closure detector (loop-closure.md sections 1 to 6). Not thread-safe: one caller at a time.
 /// Deterministic for any number of threads.
 class LoopDetector {
@@ -198,6 +205,10 @@ class LoopDetector {
   /// nothing is accepted). Adds nothing, changes nothing; `id` only names the query. Throws InputError for
   /// misuse, as Detect does.
   LoopResult Locate(const LoopQuery& query) const;
+
+  /// Another recording begins, which may start anywhere: the locations of short-term memory become candidates,
+  /// and the filters start from "all places are as likely". Ids must go on to grow.
+  void BeginSession();
 
   /// Adds a neighbour link between two locations (a caller's own odometry link); consecutive ids are linked
   /// by themselves.
@@ -225,6 +236,11 @@ class LoopDetector {
   /// Takes up what SaveSections gave, from the next sections of a file. Throws InputError as Load does; the
   /// object is then as it was.
   void LoadSections(internal::SectionReader* file);
+
+  /// All locations, long-term memory included, in the order of their ids; not those that rehearsal merged
+  /// into others. Throws InputError for a dense member, which keeps no features, and if the long-term memory
+  /// can't be read.
+  std::vector<LoopPlace> Places() const;
 
   /// Locations in short-term and working memory.
   std::size_t NumLocations() const;

@@ -10,15 +10,34 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "tutti/frontend/frame.h"
 #include "tutti/slam/config.h"
 
 #pragma GCC visibility push(default)
 namespace tutti {
+
+/// One recording that a map was made of.
+struct MapSession {
+  std::string note;  ///< as MapInfo::note
+  /// Frames have a number in the map: InputFrame::index in their recording, and this. Those of later sessions
+  /// are greater.
+  std::int64_t frame_offset = 0;
+  std::int64_t frames = 0;       ///< that were tracked
+  std::int64_t last_frame = -1;  ///< InputFrame::index of the last of them
+  int first_piece = 0;           ///< number of the submap that it began with
+  /// InputFrame::index of the frame at which it had joined what was there before: it was recognised, or a
+  /// loop had moved the map. None: it stands apart, or is the first.
+  std::optional<std::int64_t> joined_at;
+  int keyframes = 0;                            ///< of it
+  int first_keyframe = -1, last_keyframe = -1;  ///< ids; -1: none
+  double first_stamp_s = 0, last_stamp_s = 0;   ///< of these [s]
+};
 
 /// What a map file says of itself, without reading the map.
 struct MapInfo {
@@ -27,10 +46,11 @@ struct MapInfo {
   RunConfig config;     ///< of the run; with the seed
   CameraRig rig;
   std::int64_t frames = 0;                     ///< that were tracked
-  std::int64_t last_frame = 0;                 ///< InputFrame::index of the last of them
+  std::int64_t last_frame = 0;                 ///< InputFrame::index of the last one, of the last session
   double first_stamp_s = 0, last_stamp_s = 0;  ///< of keyframes [s]
   int keyframes = 0, landmarks = 0, pieces = 0;
-  int loops = 0;  ///< that are in the map
+  int loops = 0;                     ///< that are in the map
+  std::vector<MapSession> sessions;  ///< recordings, in their order; the last one is what `note` is about
   /// Corners of the box around the keyframes, in the map's frame [m; mono: in units of the first scale].
   Eigen::Vector3d least = Eigen::Vector3d::Zero(), most = Eigen::Vector3d::Zero();
 };

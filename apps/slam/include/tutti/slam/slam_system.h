@@ -50,6 +50,26 @@ class SlamSystem {
   /// for none. From Track() and Finish().
   void SetChangeListener(std::function<void(const Odometry&, std::int64_t last)> listener);
 
+  /// Another recording begins, in the map that is there: its frames, taken by this rig, come next. They start
+  /// a submap of their own, which joins the map when a loop connects the two; or they go on in the map at
+  /// once, if one of the first of them is recognised. The map's frame of reference stays. InputFrame::index
+  /// and time stamps of the recording may begin anew: in loop records and keyframes, frames have numbers that
+  /// are unique in the map (MapSession::frame_offset). Another camera is allowed if its sensor is of the same
+  /// kind (Odometry::BeginSession). Brings in first all that is on its way (Finish); counts of corrections,
+  /// relocalised frames and milliseconds begin anew. Throws InputError, and changes nothing, if there is no
+  /// map, no detector that knows it, or for a rig that does not fit.
+  void BeginSession(const CameraRig& rig);
+  /// Appends another map and looks for common places: its places are shown to the detector one after the
+  /// other, loops pass the same checks as those of a run, and what shows the same becomes one. The frame of
+  /// reference of this map stays. `other`: its detector must have the same members, its sensor must be of the
+  /// same kind. Both bring in first all that is on its way. True: they are one map now, which can be saved,
+  /// localised in, and gone on with (BeginSession; no frame may be tracked before that). False: no place of
+  /// the other one was found in this one, which is of no use any more. Throws InputError if they can't be
+  /// compared.
+  bool Merge(SlamSystem* other);
+  /// The recordings so far, oldest first; there is always one, and the last one goes on.
+  std::vector<MapSession> Sessions() const;
+
   /// From now on frames are only located in the map: no loops, and keyframes only for the time being, where
   /// the map shows too little of what is in view (Odometry::BeyondMap). Frames so far are forgotten; the
   /// detector says where the next one was taken, as it does whenever tracking is lost. Throws InputError if

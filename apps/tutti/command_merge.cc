@@ -1,0 +1,91 @@
+// tutti merge: two maps with common places become one.
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "apps/tutti/checks.h"
+#include "apps/tutti/commands.h"
+#include "tutti/core/error.h"
+#include "tutti/slam/map_file.h"
+#include "tutti/slam/slam_system.h"
+
+namespace tutti::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct MergeArguments {
+  std::string first, second, out;
+  int threads = 2;
+};
+
+std::unique_ptr<SlamSystem> Open(const std::string& file, int threads) {
+  MapInfo info = ReadMapInfo(file);
+  info.config.run.threads = threads;
+  info.config.loops.ltm_file.clear();  // what the map has of it is enough, and nobody's file changes
+  return SlamSystem::Load(file, info);
+}
+
+// Of what the merged map was made; the data set is that of the last session, as in the map of a run.
+std::string NoteOf(const MergeArguments& arguments, const MapInfo& last) {
+  nlohmann::json note = nlohmann::json::parse(last.note, nullptr, false);
+  if (!note.is_object()) note = nlohmann::json::object();
+  note["command"] = "merge";
+  note["merged"] = {fs::absolute(arguments.first).lexically_normal().string(),
+                    fs::absolute(arguments.second).lexically_normal().string()};
+  return note.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+int Merge(const MergeArguments& arguments) {
+  std::error_code ignored;
+  for (const std::string& map : {arguments.first, arguments.second}) {
+    if (fs::equivalent(map, arguments.out, ignored))
+      throw InputError(arguments.out + ": is one of the maps that are merged; give another file with --out");
+  }
+  const std::unique_ptr<SlamSystem> slam = Open(arguments.first, arguments.threads),
+                                    other = Open(arguments.second, arguments.threads);
+  const std::size_t known = slam->loops().size() + other->loops().size();
+  bool joined = false;
+  try {
+    joined = slam->Merge(other.get());
+  } catch (const InputError& error) {
+    throw InputError(arguments.first + " and " + arguments.second + " can't be merged: " + error.what());
+  }
+  const std::vector<LoopRecord>& loops = slam->loops();
+  const auto begin = loops.begin() + static_cast<std::ptrdiff_t>(known);
+  const auto accepted = std::count_if(begin, loops.end(), [](const LoopRecord& l) { return l.accepted; });
+  if (!joined) {
+    std::fprintf(stderr,
+                 "tutti: %s shows no place of %s that two loops agree on (%td were proposed, none is in the "
+                 "map); nothing is written\n",
+                 arguments.second.c_str(), arguments.first.c_str(), loops.end() - begin);
+    return 1;
+  }
+  slam->Snapshot(NoteOf(arguments, ReadMapInfo(arguments.second))).Write(arguments.out);
+  std::printf("  %s: %zu sessions, %zu keyframes; %td loops between the two maps, of %td proposed\n",
+              arguments.out.c_str(), slam->Sessions().size(), slam->odometry()->KeyframeIds().size(),
+              static_cast<std::ptrdiff_t>(accepted), loops.end() - begin);
+  return 0;
+}
+
+}  // namespace
+
+void SetUpMerge(CLI::App& command, int& exit_code) {
+  const auto arguments = std::make_shared<MergeArguments>();
+  command.add_option("FIRST", arguments->first, "map.tutti of a run, whose frame of reference stays")
+      ->required();
+  command.add_option("SECOND", arguments->second, "the map that joins it")->required();
+  command.add_option("-o,--out", arguments->out, "file for the merged map")->required();
+  command.add_option("--threads", arguments->threads, "most threads; the result is the same for any number")
+      ->check(Positive());
+  command.footer(
+      "Without a place that both maps show, nothing is written and the exit status is 1.\n"
+      "Example: tutti merge monday/map.tutti tuesday/map.tutti -o both.tutti");
+  command.callback([arguments, &exit_code] { exit_code = Merge(*arguments); });
+}
+
+}  // namespace tutti::cli

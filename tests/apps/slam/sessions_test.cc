@@ -1,0 +1,270 @@
+// Several recordings in one map: going on in it, and merging two maps.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "apps/slam/map_state.h"
+#include "tests/support/error_of.h"
+#include "tests/support/recording.h"
+#include "tests/support/small_town.h"
+#include "tests/support/test_data.h"
+#include "tutti/slam/slam_system.h"
+
+namespace tutti {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::Recording;
+
+SyntheticOptions Town(SyntheticSensor sensor, std::uint64_t seed = 1) {
+  SyntheticOptions options = testing::SmallStereoTownWithALoop(320, 160);
+  options.sensor = sensor;
+  options.laps = 1.4;
+  options.seed = seed;
+  return options;
+}
+
+// Frames first..end of a world, as a recording of another day: its numbers and time stamps begin at 0.
+Recording Part(const SyntheticWorld& world, std::size_t first, std::size_t end) {
+  Recording part;
+  part.rig = testing::RigOf(world);
+  for (std::size_t i = first; i < std::min(end, world.Size()); ++i) part.Add(world.Render(i));
+  const double begin_s = part.truth.front().stamp_s;
+  for (InputFrame& frame : part.frames) frame.stamp_s -= begin_s;
+  return part;
+}
+
+RunConfig Configured(int threads = 2) {
+  RunConfig config;
+  config.odometry.features = 800;
+  config.run.threads = threads;
+  return config;
+}
+
+void TrackAll(const Recording& recording, SlamSystem* slam, std::size_t first = 0) {
+  for (std::size_t i = first; i < recording.frames.size(); ++i) slam->Track(recording.frames[i]);
+  slam->Finish();
+}
+
+// Largest distance of a session's frames from the truth, in the frame of reference of `origin`. Mono: after
+// the scale that fits the map's first session best is not asked for; only metric sensors are compared.
+double WorstError(const SlamSystem& slam, const MapSession& session, const Recording& recording,
+                  const Pose& origin) {
+  FrameRange range;
+  range.first = session.frame_offset;
+  range.last = session.frame_offset + session.last_frame;
+  const Trajectory found = slam.odometry()->FrameTrajectory(-1, range);
+  const std::vector<std::int64_t> numbers = slam.odometry()->FrameIndices(-1, range);
+  double worst = 0;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const auto frame = static_cast<std::size_t>(numbers[i] - session.frame_offset);
+    const Eigen::Vector3d expected = origin.Inverse() * recording.truth[frame].pose.translation;
+    worst = std::max(worst, (found[i].pose.translation - expected).norm());
+  }
+  return worst;
+}
+
+std::size_t PosedFrames(const SlamSystem& slam, const MapSession& session) {
+  FrameRange range;
+  range.first = session.frame_offset;
+  range.last = session.frame_offset + session.last_frame;
+  return slam.odometry()->FrameIndices(-1, range).size();
+}
+
+std::string StateOfAll(const SlamSystem& slam) {
+  std::vector<std::pair<double, Pose>> poses;
+  for (const StampedPose& pose : slam.odometry()->FrameTrajectory())
+    poses.emplace_back(pose.stamp_s, pose.pose);
+  return StateOf(poses) + StateOf(slam.loops());
+}
+
+constexpr std::size_t kLap = 175;  // frames
+
+class Sessions : public ::testing::TestWithParam<SyntheticSensor> {
+ protected:
+  // A map of one lap, in a file.
+  fs::path MapOfALap(const Recording& day) const {
+    SlamSystem slam(Configured(), day.rig);
+    TrackAll(day, &slam);
+    const fs::path file = testing::FreshFolder() / "map.tutti";
+    slam.Save(file);
+    return file;
+  }
+};
+
+INSTANTIATE_TEST_SUITE_P(Sensors, Sessions,
+                         ::testing::Values(SyntheticSensor::kMono, SyntheticSensor::kStereo,
+                                           SyntheticSensor::kRgbd),
+                         [](const auto& test) {
+                           return test.param == SyntheticSensor::kMono     ? "Mono"
+                                  : test.param == SyntheticSensor::kStereo ? "Stereo"
+                                                                           : "Rgbd";
+                         });
+
+TEST_P(Sessions, AnotherRecordingJoinsTheMapWhoseFrameOfReferenceStaysWithTheSameBytesForAnyThreads) {
+  const SyntheticWorld world(Town(GetParam()));
+  const Recording day = Part(world, 0, kLap), next = Part(world, kLap, world.Size());
+  const fs::path map = MapOfALap(day);
+  std::string first_bytes;
+  for (const int threads : {1, 2}) {
+    MapInfo info = ReadMapInfo(map);
+    info.config.run.threads = threads;
+    const auto slam = SlamSystem::Load(map, info);
+    const Pose before = slam->odometry()->KeyframePose(0);
+    slam->BeginSession(next.rig);
+    TrackAll(next, slam.get());
+    const std::vector<MapSession> sessions = slam->Sessions();
+    ASSERT_EQ(sessions.size(), 2u);
+    EXPECT_EQ(sessions[0].frames, static_cast<std::int64_t>(day.frames.size()));
+    EXPECT_EQ(sessions[1].frames, static_cast<std::int64_t>(next.frames.size()));
+    EXPECT_GT(sessions[1].frame_offset, sessions[0].last_frame);
+    EXPECT_GT(sessions[1].first_keyframe, sessions[0].last_keyframe);
+    ASSERT_TRUE(sessions[1].joined_at.has_value());
+    EXPECT_EQ(slam->odometry()->Pieces().size(), 1u);
+    EXPECT_GE(PosedFrames(*slam, sessions[1]), next.frames.size() * 9 / 10);
+    const Pose moved = before.Inverse() * slam->odometry()->KeyframePose(0);
+    EXPECT_LT(moved.translation.norm(), 0.05);
+    EXPECT_LT(moved.Angle(), 0.003);
+    if (GetParam() != SyntheticSensor::kMono) {
+      const double worst = WorstError(*slam, sessions[1], next, day.truth.front().pose);
+      EXPECT_LT(worst, 1.5);
+      std::printf("  joined at frame %lld, worst %.2f m\n", static_cast<long long>(*sessions[1].joined_at),
+                  worst);
+    }
+    const std::string bytes = StateOfAll(*slam);
+    if (threads == 1) first_bytes = bytes;
+    EXPECT_EQ(bytes == first_bytes, true) << "another result with more threads";
+  }
+}
+
+TEST(SessionsOfAMap, GoOnFromAFileAndTheMapOfTwoSessionsCanBeLocalizedIn) {
+  const SyntheticWorld world(Town(SyntheticSensor::kStereo));
+  const Recording day = Part(world, 0, 120), next = Part(world, 100, 200);
+  const fs::path folder = testing::FreshFolder();
+  SlamSystem whole(Configured(), day.rig);
+  TrackAll(day, &whole);
+  whole.BeginSession(next.rig);
+  constexpr std::size_t kSaved = 30;
+  for (std::size_t i = 0; i < kSaved; ++i) whole.Track(next.frames[i]);
+  whole.Save(folder / "within");
+  TrackAll(next, &whole, kSaved);
+  whole.Save(folder / "map");
+  const auto again = SlamSystem::Load(folder / "within", ReadMapInfo(folder / "within"));
+  TrackAll(next, again.get(), kSaved);
+  EXPECT_EQ(StateOfAll(*again) == StateOfAll(whole), true) << "saved within the second session";
+  const MapInfo info = ReadMapInfo(folder / "map");
+  ASSERT_EQ(info.sessions.size(), 2u);
+  EXPECT_EQ(info.sessions[0].keyframes + info.sessions[1].keyframes, info.keyframes);
+  EXPECT_TRUE(info.sessions[1].joined_at.has_value());
+  const auto where = SlamSystem::Load(folder / "map", info);
+  where->BeginLocalization();
+  int found = 0;
+  for (std::size_t i = 40; i < 80; ++i)
+    found += where->Track(next.frames[i]).state == TrackingState::kTracking ? 1 : 0;
+  EXPECT_GE(found, 38);
+}
+
+TEST(SessionsOfAMap, AnotherCameraGoesOnInItsOwnPixels) {
+  const SyntheticWorld world(Town(SyntheticSensor::kStereo));
+  SyntheticOptions other_options = Town(SyntheticSensor::kStereo);
+  other_options.width = 400;
+  other_options.height = 180;
+  other_options.focal_px = 210;  // 186 px in the other
+  const SyntheticWorld other(other_options);
+  const Recording day = Part(world, 0, kLap), next = Part(other, kLap, other.Size());
+  SlamSystem slam(Configured(), day.rig);
+  TrackAll(day, &slam);
+  slam.BeginSession(next.rig);
+  EXPECT_EQ(slam.odometry()->Rig().camera.width, 400);
+  TrackAll(next, &slam);
+  const std::vector<MapSession> sessions = slam.Sessions();
+  ASSERT_TRUE(sessions[1].joined_at.has_value());
+  EXPECT_EQ(slam.odometry()->Pieces().size(), 1u);
+  EXPECT_LT(WorstError(slam, sessions[1], next, day.truth.front().pose), 1.5);
+}
+
+TEST(SessionsOfAMap, OtherPlacesStandApartAndOtherSensorsAreRefused) {
+  const SyntheticWorld world(Town(SyntheticSensor::kStereo)), elsewhere(Town(SyntheticSensor::kStereo, 7));
+  const Recording day = Part(world, 0, 60), next = Part(elsewhere, 0, 60);
+  SlamSystem slam(Configured(), day.rig);
+  EXPECT_NE(testing::ErrorOf([&] { slam.BeginSession(next.rig); }).find("there is no map"),
+            std::string::npos);
+  TrackAll(day, &slam);
+  const std::string before = StateOfAll(slam);
+  CameraRig mono = next.rig;
+  mono.sensor = Sensor::kMono;
+  EXPECT_NE(testing::ErrorOf([&] { slam.BeginSession(mono); }).find("another kind of sensor"),
+            std::string::npos);
+  CameraRig tele = next.rig;
+  tele.camera.fx = tele.camera.fy = 4 * tele.camera.fx;
+  EXPECT_NE(testing::ErrorOf([&] { slam.BeginSession(tele); }).find("focal length"), std::string::npos);
+  EXPECT_EQ(slam.Sessions().size(), 1u);
+  slam.BeginSession(next.rig);
+  TrackAll(next, &slam);
+  const std::vector<MapSession> sessions = slam.Sessions();
+  EXPECT_FALSE(sessions[1].joined_at.has_value());
+  EXPECT_EQ(slam.odometry()->Pieces().size(), 2u);
+  FrameRange own;
+  own.first = sessions[1].frame_offset;
+  EXPECT_GE(slam.odometry()->FrameTrajectory(-1, own).size(), 50u);
+  // What was there is as it was.
+  FrameRange old;
+  old.last = sessions[1].frame_offset - 1;
+  std::vector<std::pair<double, Pose>> poses;
+  for (const StampedPose& pose : slam.odometry()->FrameTrajectory(-1, old))
+    poses.emplace_back(pose.stamp_s, pose.pose);
+  EXPECT_EQ(StateOf(poses) == before.substr(0, StateOf(poses).size()), true);
+}
+
+class Merging : public ::testing::Test {
+ protected:
+  static std::unique_ptr<SlamSystem> MapOf(const Recording& recording, int threads = 2) {
+    auto slam = std::make_unique<SlamSystem>(Configured(threads), recording.rig);
+    TrackAll(recording, slam.get());
+    return slam;
+  }
+};
+
+TEST_F(Merging, TwoMapsWithCommonPlacesAreOneInEitherOrderForAnyThreads) {
+  const SyntheticWorld world(Town(SyntheticSensor::kStereo));
+  const Recording a = Part(world, 0, 140), b = Part(world, 90, 240);
+  std::string first_bytes;
+  for (const int threads : {1, 2}) {
+    const auto map = MapOf(a, threads), other = MapOf(b, threads);
+    ASSERT_TRUE(map->Merge(other.get()));
+    EXPECT_EQ(map->odometry()->Pieces().size(), 1u);
+    const std::string bytes = StateOfAll(*map);
+    if (threads == 1) first_bytes = bytes;
+    EXPECT_EQ(bytes == first_bytes, true) << "another result with more threads";
+    const std::vector<MapSession> sessions = map->Sessions();
+    ASSERT_EQ(sessions.size(), 2u);
+    EXPECT_LT(WorstError(*map, sessions[1], b, a.truth.front().pose), 1.5);
+    // Goes on, and is there again from a file.
+    if (threads == 1) continue;
+    const fs::path file = testing::FreshFolder() / "merged.tutti";
+    map->Save(file);
+    const auto again = SlamSystem::Load(file, ReadMapInfo(file));
+    const Recording third = Part(world, 60, 110);
+    again->BeginSession(third.rig);
+    TrackAll(third, again.get());
+    EXPECT_EQ(again->Sessions().size(), 3u);
+    EXPECT_TRUE(again->Sessions()[2].joined_at.has_value());
+  }
+  const auto map = MapOf(b), other = MapOf(a);
+  ASSERT_TRUE(map->Merge(other.get()));
+  EXPECT_LT(WorstError(*map, map->Sessions()[1], a, b.truth.front().pose), 1.5);
+}
+
+TEST_F(Merging, MapsWithoutACommonPlaceAreNotOne) {
+  const SyntheticWorld world(Town(SyntheticSensor::kStereo)), elsewhere(Town(SyntheticSensor::kStereo, 7));
+  const auto map = MapOf(Part(world, 0, 60)), other = MapOf(Part(elsewhere, 0, 60));
+  EXPECT_FALSE(map->Merge(other.get()));
+}
+
+}  // namespace
+}  // namespace tutti

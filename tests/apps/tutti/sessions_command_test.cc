@@ -1,0 +1,131 @@
+// `tutti run --map` and `tutti merge`: several recordings in one map file.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "tests/apps/generated_dataset.h"
+#include "tests/apps/tutti/executable.h"
+#include "tests/support/small_town.h"
+#include "tests/support/test_data.h"
+#include "tutti/core/trajectory.h"
+
+namespace tutti {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+using ::testing::HasSubstr;
+using testing::ReadAll;
+using testing::RunTutti;
+
+SyntheticOptions Town(std::uint64_t seed) {
+  SyntheticOptions options = testing::SmallStereoTownWithALoop(320, 160);
+  options.laps = 1.4;
+  options.seed = seed;
+  return options;
+}
+
+class SessionsCommand : public ::testing::Test {
+ protected:
+  testing::ProcessResult Run(const testing::GeneratedDataset& town, const fs::path& out,
+                             const std::vector<std::string>& more) const {
+    std::vector<std::string> words = {"run",         "--dataset", town.path().string(), "--out", out.string(),
+                                      "--no-report", "--quiet"};
+    words.insert(words.end(), more.begin(), more.end());
+    return RunTutti(words);
+  }
+  static std::string Config(const testing::GeneratedDataset& town) {
+    return (town.path() / "config.yaml").string();
+  }
+  static json Summary(const fs::path& out) { return json::parse(ReadAll(out / "summary.json")); }
+
+  const testing::GeneratedDataset town_{"town_of_sessions", Town(1)};
+  const fs::path folder_ = testing::FreshFolder(), day_ = folder_ / "day", next_ = folder_ / "next";
+};
+
+TEST_F(SessionsCommand, ARunGoesOnInTheMapOfAnotherAndBothAreInTheNewOne) {
+  const auto day = Run(town_, day_, {"--config", Config(town_), "--end", "175"});
+  ASSERT_EQ(day.status, 0) << day.output;
+  const std::string map = (day_ / "map.tutti").string();
+  const std::string before = ReadAll(map);
+  const auto next = Run(town_, next_, {"--map", map, "--start", "175"});  // with the map's configuration
+  ASSERT_EQ(next.status, 0) << next.output;
+  EXPECT_THAT(next.output, HasSubstr("in the map " + map));
+  EXPECT_EQ(ReadAll(map) == before, true);
+  const json summary = Summary(next_);
+  EXPECT_EQ(summary["map"]["joined"], true);
+  EXPECT_GE(static_cast<int>(summary["map"]["joined_at_frame"]), 175);
+  EXPECT_EQ(summary["map"]["sessions"].size(), 2u);
+  EXPECT_EQ(summary["map"]["frame_offset"], 100000);
+  // Its frames, in the frame of reference of the map, which begins where the truth does.
+  const Trajectory found = ReadTrajectory(next_ / "trajectory.txt", TrajectoryFormat::kTum);
+  EXPECT_EQ(found.size(), static_cast<std::size_t>(summary["frames"]["tracked"]));
+  const Trajectory truth = ReadTrajectory(town_.path() / "poses.txt", TrajectoryFormat::kKitti);
+  EXPECT_GE(found.size(), (truth.size() - 175) * 9 / 10);
+  double worst = 0;
+  for (const StampedPose& pose : found) {
+    const auto frame = static_cast<std::size_t>(std::lround(pose.stamp_s * 4.5));
+    const Eigen::Vector3d expected = truth.front().pose.Inverse() * truth.at(frame).pose.translation;
+    worst = std::max(worst, (pose.pose.translation - expected).norm());
+  }
+  EXPECT_LT(worst, 1.5);
+  const json info = json::parse(RunTutti({"map", "info", (next_ / "map.tutti").string(), "--json"}).output);
+  ASSERT_EQ(info["sessions"].size(), 2u);
+  EXPECT_EQ(info["sessions"][0]["first_keyframe"], 0);
+  EXPECT_EQ(info["sessions"][1]["last_keyframe"], static_cast<int>(info["keyframes"]) - 1);
+  EXPECT_EQ(info["submaps"], 1);
+  for (const auto& [session, frames] : {std::pair("1", 175u), std::pair("2", 0u)}) {
+    const fs::path tum = folder_ / (std::string("of") + session + ".tum");
+    const auto written = RunTutti({"export", next_.string(), "--tum", tum.string(), "--session", session});
+    ASSERT_EQ(written.status, 0) << written.output;
+    const std::size_t poses = ReadTrajectory(tum, TrajectoryFormat::kTum).size();
+    EXPECT_EQ(poses, frames > 0 ? frames : found.size());
+  }
+}
+
+TEST_F(SessionsCommand, MapsAreMergedWhereTheyShowTheSameAndRefusedWhereNot) {
+  ASSERT_EQ(Run(town_, day_, {"--config", Config(town_), "--end", "130"}).status, 0);
+  ASSERT_EQ(Run(town_, next_, {"--config", Config(town_), "--start", "90", "--end", "220"}).status, 0);
+  const std::string day = (day_ / "map.tutti").string(), next = (next_ / "map.tutti").string(),
+                    both = (folder_ / "both.tutti").string();
+  const auto merged = RunTutti({"merge", day, next, "-o", both});
+  ASSERT_EQ(merged.status, 0) << merged.output;
+  EXPECT_THAT(merged.output, HasSubstr("2 sessions"));
+  const json info = json::parse(RunTutti({"map", "info", both, "--json", "--check"}).output);
+  EXPECT_EQ(info["sessions"].size(), 2u);
+  EXPECT_EQ(info["submaps"], 1);
+  EXPECT_EQ(info["frames"], 260);
+  const auto localized = RunTutti({"localize", "--map", both, "--dataset", town_.path().string(), "--start",
+                                   "150", "--end", "180", "--out", (folder_ / "where").string()});
+  EXPECT_EQ(localized.status, 0) << localized.output;
+
+  const testing::GeneratedDataset other("another_town_of_sessions", Town(7));
+  const fs::path elsewhere = folder_ / "elsewhere";
+  ASSERT_EQ(Run(other, elsewhere, {"--config", Config(other), "--end", "60"}).status, 0);
+  const std::string none = (folder_ / "none.tutti").string();
+  const auto refused = RunTutti({"merge", day, (elsewhere / "map.tutti").string(), "-o", none});
+  EXPECT_EQ(refused.status, 1);
+  EXPECT_THAT(refused.output, HasSubstr("shows no place of"));
+  EXPECT_FALSE(fs::exists(none));
+  EXPECT_EQ(RunTutti({"merge", day, next, "-o", day}).status, 1);
+  // A run that goes on there says that it stands apart.
+  const auto apart = Run(other, folder_ / "apart", {"--map", day, "--end", "40"});
+  EXPECT_EQ(apart.status, 0) << apart.output;
+  EXPECT_THAT(apart.output, HasSubstr("not joined with the map"));
+  EXPECT_EQ(Summary(folder_ / "apart")["map"]["joined"], false);
+}
+
+TEST_F(SessionsCommand, WhatCantGoOnIsRefused) {
+  ASSERT_EQ(Run(town_, day_, {"--config", Config(town_), "--end", "30", "--no-loops"}).status, 0);
+  const auto without = Run(town_, next_, {"--map", (day_ / "map.tutti").string()});
+  EXPECT_EQ(without.status, 1);
+  EXPECT_THAT(without.output, HasSubstr("without loop closure"));
+  const auto into = Run(town_, day_, {"--map", (day_ / "map.tutti").string(), "--config", Config(town_)});
+  EXPECT_EQ(into.status, 1);
+  EXPECT_THAT(into.output, HasSubstr("choose another --out"));
+}
+
+}  // namespace
+}  // namespace tutti

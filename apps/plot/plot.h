@@ -14,7 +14,7 @@ namespace tutti {
 /// One line of the plot.
 struct PlotSeries {
   std::string name;                     ///< for the legend
-  std::vector<Eigen::Vector3d> points;  ///< [m]
+  std::vector<Eigen::Vector3d> points;  ///< [m]; one that is not finite interrupts the line
   std::string color = "#000000";        ///< #rrggbb
   double width = 1.5;                   ///< [px]
   bool dashed = false;

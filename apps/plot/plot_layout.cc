@@ -142,10 +142,18 @@ std::vector<PlotShape> LayOut(const TrajectoryPlot& plot) {
     line.color = series.color;
     line.size = series.width;
     line.dashed = series.dashed;
+    const auto end_line = [&] {
+      if (!line.points.empty()) shapes.push_back(line);
+      line.points.clear();
+    };
     for (const Eigen::Vector3d& p : series.points) {
-      if (p.allFinite()) line.points.push_back(axes.Page(view.World(p)));
+      if (p.allFinite()) {
+        line.points.push_back(axes.Page(view.World(p)));
+      } else {
+        end_line();
+      }
     }
-    if (!line.points.empty()) shapes.push_back(std::move(line));
+    end_line();
   }
   for (const auto& [a, b] : plot.edges) {
     const Eigen::Vector2d from = axes.Page(view.World(a)), to = axes.Page(view.World(b));

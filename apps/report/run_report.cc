@@ -181,6 +181,9 @@ Json ReportJson(const RunResult& result, const DetectionLog& log, const std::str
   json["odometry"] = PathJson(result.trajectory_odometry, align_odometry);
   json["odometry_complete"] = result.odometry_complete;
   json["slam"] = PathJson(result.trajectory, align_slam);
+  json["earlier"] = Json::array();
+  for (std::size_t k = 0; result.map && k < result.map->earlier.size(); ++k)
+    json["earlier"].push_back(PathJson(result.map->earlier[k], align_slam));
   json["loops"] = EdgesJson(result, loops, align_slam);
   json["errors"] = {{"odometry", scored ? ErrorJson(result, result.trajectory_odometry) : Json()},
                     {"slam", scored ? ErrorJson(result, result.trajectory) : Json()}};

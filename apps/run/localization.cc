@@ -7,6 +7,7 @@
 #include <opencv2/core.hpp>
 #include <utility>
 
+#include "apps/plot/plot.h"
 #include "apps/run/interrupt.h"
 #include "apps/run/output_folder.h"
 #include "apps/run/prefetcher.h"
@@ -28,10 +29,11 @@ namespace fs = std::filesystem;
 constexpr const char* kSummary = "summary.json";
 constexpr const char* kFrames = "localization.csv";
 constexpr const char* kTrajectory = "trajectory.txt";
+constexpr const char* kPicture = "localization.svg";
 
 bool IsLocalization(const fs::path& entry) {
   const std::string name = entry.filename();
-  return name == kSummary || name == kFrames || name == kTrajectory;
+  return name == kSummary || name == kFrames || name == kTrajectory || name == kPicture;
 }
 
 DatasetOptions Reading(const LocalizationRequest& request, const MapInfo& info) {
@@ -104,6 +106,27 @@ std::string Summary(const LocalizationRequest& request, const Localization& l) {
   return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
+// The map's keyframes from above, and where the frames are.
+TrajectoryPlot Picture(const LocalizationRequest& request, const Odometry& odometry, const Localization& l) {
+  TrajectoryPlot plot;
+  plot.title = "Frames of " + request.dataset.filename().string() + " in " + request.map.filename().string();
+  plot.unit = odometry.Rig().sensor == Sensor::kMono ? "initial scale" : "m";
+  PlotSeries map{"map", {}, "#999999", 2.5, false}, located{"localized", {}, "#0072b2", 1.8, false},
+      beyond{"beyond the map", {}, "#d55e00", 1.2, true};
+  for (const int id : odometry.KeyframeIds()) {
+    if (id < l.map_keyframes) map.points.push_back(odometry.KeyframePose(id).translation);
+  }
+  const Eigen::Vector3d gap = Eigen::Vector3d::Constant(NAN);
+  for (const LocalizedFrame& frame : l.frames) {
+    const bool posed = frame.track.state == TrackingState::kTracking;
+    const Eigen::Vector3d at = posed ? frame.track.T_world_camera.translation : gap;
+    located.points.push_back(posed && !frame.beyond ? at : gap);
+    beyond.points.push_back(posed && frame.beyond ? at : gap);
+  }
+  plot.series = {map, located, beyond};
+  return plot;
+}
+
 std::unique_ptr<SlamSystem> OpenMap(const LocalizationRequest& request, MapInfo info) {
   info.config.run.threads = request.threads;
   info.config.loops.ltm_file.clear();  // what the map has of it is enough, and nobody's file changes
@@ -166,6 +189,7 @@ Localization Localize(const LocalizationRequest& request) {
   Localization result;
   const std::unique_ptr<SlamSystem> slam = OpenMap(request, info);
   result.load_s = since.Seconds();
+  result.map_keyframes = slam->odometry()->NextKeyframeId();
   const internal::Stopwatch watch;
   const double cpu = ProcessCpuSeconds();
   LocateAll(request, *dataset, since, *slam, result);
@@ -175,6 +199,8 @@ Localization Localize(const LocalizationRequest& request) {
                   WriteTrajectory(file, result.trajectory, TrajectoryFormat::kTum);
                 }});
   folder.Write({kFrames, [&](const fs::path& file) { WriteTextFile(file, FramesCsv(result)); }});
+  folder.Write(
+      {kPicture, [&](const fs::path& file) { WriteSvg(file, Picture(request, *slam->odometry(), result)); }});
   folder.Write({kSummary, [&](const fs::path& file) { WriteTextFile(file, Summary(request, result)); }});
   ThrowFailures(folder.failures(), folder.Finish(!result.interrupted));
   return result;

@@ -34,6 +34,7 @@ struct LocalizedFrame {
 
 struct Localization {
   std::vector<LocalizedFrame> frames;  ///< that could be read
+  int map_keyframes = 0;               ///< keyframes from this id on are none of the map's
   std::size_t bad = 0;                 ///< that could not
   Trajectory trajectory;               ///< T_world_body of those with a pose; the world is the map's
   double wall_s = 0, cpu_s = 0;        ///< without loading the map
@@ -44,7 +45,8 @@ struct Localization {
   std::size_t Localized() const { return trajectory.size(); }
 };
 
-/// Locates each frame and writes trajectory.txt (TUM), localization.csv and summary.json into request.out.
+/// Locates each frame and writes trajectory.txt (TUM), localization.csv,
+/// localization.svg and summary.json into request.out.
 /// The map's file is only read. Throws InputError that names the file: no map, another camera than the map's,
 /// no data, an output folder that can't be written or holds what tutti did not write.
 Localization Localize(const LocalizationRequest& request);

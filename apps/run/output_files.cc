@@ -69,6 +69,10 @@ TrajectoryPlot MakePlot(const RunResult& result) {
     plot.series.push_back(
         {"with loop closure", Positions(result.trajectory, align_slam), "#0072b2", 1.8, false});
   }
+  for (std::size_t k = 0; result.map && k < result.map->earlier.size(); ++k) {
+    plot.series.push_back({"session " + std::to_string(k + 1), Positions(result.map->earlier[k], align_slam),
+                           PlotPalette(k + 3), 1.2, true});
+  }
   std::map<double, Eigen::Vector3d> at;
   for (const StampedPose& pose : result.trajectory) at[pose.stamp_s] = align_slam * pose.pose.translation;
   for (const LoopRecord& loop : result.loops) {

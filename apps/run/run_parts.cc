@@ -2,6 +2,7 @@
 
 #include <sys/resource.h>
 
+#include <algorithm>
 #include <limits>
 #include <set>
 
@@ -108,6 +109,26 @@ Trajectory BodyTrajectory(Trajectory trajectory, const CameraRig& rig) {
   const Pose T_camera_body = rig.T_body_camera.Inverse();
   for (StampedPose& pose : trajectory) pose.pose = pose.pose * T_camera_body;
   return trajectory;
+}
+
+void CollectEarlierSessions(const RunState& state, RunResult& result) {
+  const std::vector<MapSession>& sessions = result.map.value().sessions;
+  result.map->earlier.assign(sessions.size() - 1, {});
+  const std::vector<int> pieces =
+      state.odometry->Pieces(FrameRange{state.first_frame, std::numeric_limits<std::int64_t>::max()});
+  if (pieces.empty()) return;
+  for (const int id : state.odometry->KeyframeIds()) {
+    const std::int64_t frame = state.odometry->KeyframeFrameIndex(id);
+    if (frame >= state.first_frame || state.odometry->KeyframePiece(id) != pieces.front()) continue;
+    const auto next =
+        std::upper_bound(sessions.begin(), sessions.end(), frame,
+                         [](std::int64_t f, const MapSession& s) { return f < s.frame_offset; });
+    const auto session = static_cast<std::size_t>(next - sessions.begin()) - 1;
+    result.map->earlier[session].push_back(
+        {state.odometry->KeyframeStamp(id), state.odometry->KeyframePose(id)});
+  }
+  for (Trajectory& keyframes : result.map->earlier)
+    keyframes = BodyTrajectory(std::move(keyframes), result.rig);
 }
 
 void CollectMap(const RunState& state, RunResult& result) {

@@ -40,4 +40,7 @@ Trajectory BodyTrajectory(Trajectory trajectory, const CameraRig& rig);
 /// Loops, trajectories, keyframes and memory of a finished run. trajectory_odometry is the trajectory.
 void CollectMap(const RunState& state, RunResult& result);
 
+/// Keyframes of the recordings that the map held before, by result.map->sessions, for pictures.
+void CollectEarlierSessions(const RunState& state, RunResult& result);
+
 }  // namespace tutti

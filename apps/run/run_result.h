@@ -60,6 +60,8 @@ struct RunEvaluation {
 struct MapGoneOn {
   std::string file;
   std::vector<MapSession> sessions;  ///< the last one is the run's own
+  /// T_world_body of the keyframes of each but the last, in the submap that trajectory.txt is of.
+  std::vector<Trajectory> earlier;
 };
 
 /// Frames, loops, times, trajectories of one run.

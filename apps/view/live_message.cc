@@ -60,7 +60,7 @@ std::string LiveMessage(const LiveNews& news) {
     const Eigen::Quaterniond& q = place.T_world_camera.rotation;
     Json p = Position(place.T_world_camera.translation);
     for (const double v : {q.x(), q.y(), q.z(), q.w()}) p.push_back(Short(v, 1e4));
-    json["places"].push_back({place.id, place.frame, place.piece, p});
+    json["places"].push_back({place.id, place.frame, place.piece, p, place.earlier ? 1 : 0});
   }
   json["loops"] = Json::array();
   for (const LiveLoop& loop : *news.loops)

@@ -11,11 +11,11 @@
 namespace tutti::view {
 namespace {
 
-std::vector<LivePlace> PlacesOf(const Odometry& odometry) {
+std::vector<LivePlace> PlacesOf(const Odometry& odometry, std::int64_t first_frame) {
   std::vector<LivePlace> places;
   for (const int id : odometry.KeyframeIds()) {
-    places.push_back(
-        {id, odometry.KeyframeFrameIndex(id), odometry.KeyframePiece(id), odometry.KeyframePose(id)});
+    const std::int64_t frame = odometry.KeyframeFrameIndex(id);
+    places.push_back({id, frame, odometry.KeyframePiece(id), frame < first_frame, odometry.KeyframePose(id)});
   }
   return places;
 }
@@ -68,7 +68,7 @@ void LiveState::SetFrame(const InputFrame& frame, const TrackResult& track, cons
   const std::size_t accepted = CountAccepted(state.loops);
   const bool corrected = state.corrections != corrections_seen_;
   if (state.odometry != nullptr && (new_keyframe_ || corrected))
-    places = std::make_shared<const std::vector<LivePlace>>(PlacesOf(*state.odometry));
+    places = std::make_shared<const std::vector<LivePlace>>(PlacesOf(*state.odometry, state.first_frame));
   if (state.loops.size() != loops_seen_ || accepted != accepted_seen_)
     loops = std::make_shared<const std::vector<LiveLoop>>(LoopsOf(state));
   if (next.posed) {

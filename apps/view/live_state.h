@@ -34,6 +34,7 @@ struct LivePlace {
   int id = -1;
   std::int64_t frame = 0;
   int piece = 0;
+  bool earlier = false;  ///< of another recording, which the map held before this run
   Pose T_world_camera;
 };
 

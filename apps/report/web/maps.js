@@ -34,6 +34,10 @@ function paths() {
   const alone = runs.find((run) => run.variant === 'odometry');
   const odometry = alone ?? chosen();
   if (odometry.odometry.x.length) lines.push({ name: 'odometry', path: odometry.odometry, width: 2 });
+  // Keyframes of the recordings that the map held before.
+  (chosen().earlier ?? []).forEach((path, k) => {
+    if (path.x.length) lines.push({ name: `session ${k + 1}`, path, width: 1.5 });
+  });
   for (const run of runs) {
     if (run.variant !== 'odometry' && run.slam.x.length) lines.push({ name: run.variant, path: run.slam, width: 2.5 });
   }

@@ -1,7 +1,7 @@
 'use strict';
 // The live view: newest state over server-sent events, drawn on canvases.
 
-const COLORS = { surf: '#e69f00', sift: '#56b4e9', orb: '#cc79a7', ensemble: '#0072b2', accepted: '#009e73', waiting: '#e69f00', path: '#0072b2', here: '#d55e00', old: '#56b4e9', young: '#f0e442' };
+const COLORS = { surf: '#e69f00', sift: '#56b4e9', orb: '#cc79a7', ensemble: '#0072b2', accepted: '#009e73', waiting: '#e69f00', path: '#0072b2', earlier: '#999999', here: '#d55e00', old: '#56b4e9', young: '#f0e442' };
 const DASHES = { surf: [8, 3, 2, 3], sift: [10, 5], orb: [2, 3], ensemble: [] };
 const MOST_ANSWERS = 1500, MOST_LINES = 300;
 const TRACK_OLD = 5;  // frames before this one that show it (of the last 10)
@@ -86,15 +86,18 @@ function drawMap() {
   }
   context.globalAlpha = 1;
   context.lineWidth = 2 * devicePixelRatio;
-  context.strokeStyle = COLORS.path;
-  context.beginPath();
-  let piece = null;
-  for (const [, , now, pose] of places) {
-    const [x, y] = at(pose);
-    if (now === piece) context.lineTo(x, y); else context.moveTo(x, y);
-    piece = now;
+  for (const old of [1, 0]) {  // recordings that the map held before, below this one
+    context.strokeStyle = old ? COLORS.earlier : COLORS.path;
+    context.beginPath();
+    let piece = null;
+    for (const [, , now, pose, earlier] of places) {
+      const [x, y] = at(pose);
+      const here = earlier === old ? now : null;
+      if (here !== null && here === piece) context.lineTo(x, y); else context.moveTo(x, y);
+      piece = here;
+    }
+    context.stroke();
   }
-  context.stroke();
   for (const [query, candidate, accepted] of state.news.loops) {
     const a = frames.get(query), b = frames.get(candidate);
     if (!a || !b) continue;

@@ -82,6 +82,11 @@ std::pair<std::size_t, double> Locate(SlamSystem& slam, const testing::Recording
   return {found, worst};
 }
 
+void ExpectOnePiece(const SlamSystem& slam) {
+  EXPECT_EQ(slam.odometry()->Pieces().size(), 1u);
+  EXPECT_EQ(Connected(slam.Graph()), slam.odometry()->KeyframeIds().size());
+}
+
 class Pruned : public ::testing::TestWithParam<SyntheticSensor> {};
 
 // One test, for the sake of its time: two laps are mapped and pruned.
@@ -134,6 +139,19 @@ TEST_P(Pruned, MapIsSmallerAndKeepsPosesLoopsAndGraphAndGoesOnAndTellsWhereFrame
 
   slam.Prune();
   EXPECT_EQ(Connected(slam.Graph()), slam.odometry()->KeyframeIds().size()) << "pruned twice";
+
+  // Another recording goes on in it, and it can be either side of a merge.
+  const auto continued = SlamSystem::Load(file, info), other = SlamSystem::Load(file, info);
+  continued->BeginSession(recording.rig);
+  for (std::size_t i = mapped; i < n; ++i) continued->Track(recording.frames[i]);
+  continued->Finish();
+  EXPECT_GT(continued->Sessions().back().first_keyframe, before.back());
+  ExpectOnePiece(*continued);
+  EXPECT_TRUE(continued->Merge(other.get()));
+  EXPECT_GE(continued->Sessions().back().first_keyframe, continued->Sessions()[1].last_keyframe);
+  ExpectOnePiece(*continued);
+  continued->Save(file);
+  ExpectOnePiece(*SlamSystem::Load(file, ReadMapInfo(file)));
 }
 
 INSTANTIATE_TEST_SUITE_P(Sensors, Pruned, ::testing::Values(SyntheticSensor::kStereo, SyntheticSensor::kMono),

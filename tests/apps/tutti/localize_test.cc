@@ -73,6 +73,7 @@ TEST_F(LocalizeCommand, FramesOfASecondLapAreFoundInTheMapOfTheFirstWhichStaysAs
   const std::string csv = ReadAll(out_ / "localization.csv");
   EXPECT_THAT(csv, ::testing::StartsWith("frame,stamp_s,state,recognised,keyframe,inliers,position_sigma_m"));
   EXPECT_EQ(static_cast<double>(std::count(csv.begin(), csv.end(), '\n')), total + 1);
+  EXPECT_THAT(ReadAll(out_ / "localization.svg"), HasSubstr("beyond the map"));
 }
 
 TEST_F(LocalizeCommand, TheResultDoesNotDependOnTheThreads) {

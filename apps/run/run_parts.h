@@ -40,4 +40,8 @@ Trajectory BodyTrajectory(Trajectory trajectory, const CameraRig& rig);
 /// Loops, trajectories, keyframes and memory of a finished run. trajectory_odometry is the trajectory.
 void CollectMap(const RunState& state, RunResult& result);
 
+/// Of loops to earlier sessions of the same data set (MapSession::note, as NoteOf has written it): the time
+/// stamp of the candidate, which has a frame in it.
+void CollectStamps(const Odometry& odometry, const std::vector<MapSession>& sessions, RunResult& result);
+
 }  // namespace tutti

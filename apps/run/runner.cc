@@ -141,7 +141,10 @@ class Run {
 
   void Collect() {
     CollectMap(State(), result_);
-    if (request_.map) result_.map = MapGoneOn{request_.map->string(), slam_->Sessions()};
+    if (request_.map) {
+      result_.map = MapGoneOn{request_.map->string(), slam_->Sessions()};
+      CollectStamps(*slam_->odometry(), result_.map->sessions, result_);
+    }
     result_.global_adjustments = slam_->GlobalAdjustments();
     result_.frames_relocalized = slam_->Relocalized();
     result_.graph = slam_->Graph();

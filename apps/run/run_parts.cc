@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <limits>
+#include <map>
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include "core/median.h"
@@ -129,6 +131,26 @@ void CollectEarlierSessions(const RunState& state, RunResult& result) {
   }
   for (Trajectory& keyframes : result.map->earlier)
     keyframes = BodyTrajectory(std::move(keyframes), result.rig);
+}
+
+void CollectStamps(const Odometry& odometry, const std::vector<MapSession>& sessions, RunResult& result) {
+  const auto dataset = [](const MapSession& session) {
+    const nlohmann::json note = nlohmann::json::parse(session.note, nullptr, false);
+    return note.is_object() ? note.value("dataset", std::string()) : std::string();
+  };
+  const std::string own = fs::absolute(result.dataset).lexically_normal().string();
+  std::map<std::int64_t, double> stamps;  // of keyframes, by frame
+  for (const int id : odometry.KeyframeIds()) {
+    const std::int64_t frame = odometry.KeyframeFrameIndex(id);
+    const auto later = [](std::int64_t f, const MapSession& s) { return f < s.frame_offset; };
+    const auto session = std::upper_bound(sessions.begin(), sessions.end() - 1, frame, later);
+    if (frame < sessions.back().frame_offset && session != sessions.begin() && dataset(*(session - 1)) == own)
+      stamps[frame] = odometry.KeyframeStamp(id);
+  }
+  for (LoopRecord& loop : result.loops) {
+    const auto stamp = stamps.find(loop.candidate);
+    if (stamp != stamps.end()) loop.candidate_stamp_s = stamp->second;
+  }
 }
 
 void CollectMap(const RunState& state, RunResult& result) {

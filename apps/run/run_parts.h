@@ -43,4 +43,8 @@ void CollectMap(const RunState& state, RunResult& result);
 /// Keyframes of the recordings that the map held before, by result.map->sessions, for pictures.
 void CollectEarlierSessions(const RunState& state, RunResult& result);
 
+/// Of loops to earlier sessions of the same data set (MapSession::note, as NoteOf has written it): the time
+/// stamp of the candidate, which has a frame in it.
+void CollectStamps(const Odometry& odometry, const std::vector<MapSession>& sessions, RunResult& result);
+
 }  // namespace tutti

@@ -144,6 +144,7 @@ class Run {
     if (request_.map) {
       result_.map = MapGoneOn{request_.map->string(), slam_->Sessions(), {}};
       CollectEarlierSessions(State(), result_);
+      CollectStamps(*slam_->odometry(), result_.map->sessions, result_);
     }
     result_.global_adjustments = slam_->GlobalAdjustments();
     result_.frames_relocalized = slam_->Relocalized();

@@ -28,7 +28,7 @@ nlohmann::json NoteOf(const MapInfo& info) {
   return note.is_object() ? note : nlohmann::json::object();
 }
 
-std::string DatasetOf(const MapSession& session) {
+std::string DatasetOfSession(const MapSession& session) {
   const nlohmann::json note = nlohmann::json::parse(session.note, nullptr, false);
   return note.is_object() ? note.value("dataset", std::string()) : std::string();
 }
@@ -39,14 +39,14 @@ void PrintSessions(const MapInfo& info) {
     const MapSession& session = info.sessions[s];
     std::printf("    %zu: keyframes %d to %d, %lld frames, numbers from %lld on  %s\n", s + 1,
                 session.first_keyframe, session.last_keyframe, static_cast<long long>(session.frames),
-                static_cast<long long>(session.frame_offset), DatasetOf(session).c_str());
+                static_cast<long long>(session.frame_offset), DatasetOfSession(session).c_str());
   }
 }
 
 nlohmann::ordered_json SessionsJson(const MapInfo& info) {
   nlohmann::ordered_json json = nlohmann::ordered_json::array();
   for (const MapSession& session : info.sessions) {
-    json.push_back({{"dataset", DatasetOf(session)},
+    json.push_back({{"dataset", DatasetOfSession(session)},
                     {"frames", session.frames},
                     {"last_frame", session.last_frame},
                     {"frame_offset", session.frame_offset},

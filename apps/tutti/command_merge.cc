@@ -23,7 +23,7 @@ struct MergeArguments {
   int threads = 2;
 };
 
-std::unique_ptr<SlamSystem> Open(const std::string& file, int threads) {
+std::unique_ptr<SlamSystem> OpenMap(const std::string& file, int threads) {
   MapInfo info = ReadMapInfo(file);
   info.config.run.threads = threads;
   info.config.loops.ltm_file.clear();  // what the map has of it is enough, and nobody's file changes
@@ -31,7 +31,7 @@ std::unique_ptr<SlamSystem> Open(const std::string& file, int threads) {
 }
 
 // Of what the merged map was made; the data set is that of the last session, as in the map of a run.
-std::string NoteOf(const MergeArguments& arguments, const MapInfo& last) {
+std::string MergedNote(const MergeArguments& arguments, const MapInfo& last) {
   nlohmann::json note = nlohmann::json::parse(last.note, nullptr, false);
   if (!note.is_object()) note = nlohmann::json::object();
   note["command"] = "merge";
@@ -46,8 +46,8 @@ int Merge(const MergeArguments& arguments) {
     if (fs::equivalent(map, arguments.out, ignored))
       throw InputError(arguments.out + ": is one of the maps that are merged; give another file with --out");
   }
-  const std::unique_ptr<SlamSystem> slam = Open(arguments.first, arguments.threads),
-                                    other = Open(arguments.second, arguments.threads);
+  const std::unique_ptr<SlamSystem> slam = OpenMap(arguments.first, arguments.threads),
+                                    other = OpenMap(arguments.second, arguments.threads);
   const std::size_t known = slam->loops().size() + other->loops().size();
   bool joined = false;
   try {
@@ -65,7 +65,7 @@ int Merge(const MergeArguments& arguments) {
                  arguments.second.c_str(), arguments.first.c_str(), loops.end() - begin);
     return 1;
   }
-  slam->Snapshot(NoteOf(arguments, ReadMapInfo(arguments.second))).Write(arguments.out);
+  slam->Snapshot(MergedNote(arguments, ReadMapInfo(arguments.second))).Write(arguments.out);
   std::printf("  %s: %zu sessions, %zu keyframes; %td loops between the two maps, of %td proposed\n",
               arguments.out.c_str(), slam->Sessions().size(), slam->odometry()->KeyframeIds().size(),
               static_cast<std::ptrdiff_t>(accepted), loops.end() - begin);

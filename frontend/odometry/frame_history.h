@@ -32,12 +32,12 @@ class FrameHistory {
   void Rehang(const std::map<int, int>& into, const Map& map);
 
   /// Pieces of the map that have frames, by number of frames, most first (ties: the older one).
-  std::vector<int> Pieces(const Map& map, const FrameRange& range) const;
+  std::vector<int> Pieces(const Map& map, const FrameRange& range = {}) const;
   /// T_world_camera of the frames of one piece, in the order in which they were added; -1: of the piece with
   /// most frames.
-  Trajectory Poses(const Map& map, int piece, const FrameRange& range) const;
+  Trajectory Poses(const Map& map, int piece, const FrameRange& range = {}) const;
   /// Same length as Poses: number of the frame of each pose.
-  std::vector<std::int64_t> Indices(const Map& map, int piece, const FrameRange& range) const;
+  std::vector<std::int64_t> Indices(const Map& map, int piece, const FrameRange& range = {}) const;
 
   template <class Archive>
   void State(Archive& archive) {

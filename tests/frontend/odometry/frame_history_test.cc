@@ -79,6 +79,23 @@ TEST_F(FrameHistoryTest, FramesOfJoinedPiecesAreOfOne) {
   EXPECT_EQ(history_.Poses(map_, 0).size(), 2U);
 }
 
+TEST_F(FrameHistoryTest, ARecordingHasItsOwnTimeStampsAndItsFramesAreARange) {
+  Add(0.5, 0, 0);
+  Add(0.6, 2, 2);
+  history_.BeginSession();
+  EXPECT_TRUE(history_.IsLater(0.1));
+  FrameHistory another;
+  another.Add({3, 0.3, nullptr}, Pose(), std::as_const(map_).keyframe(0));
+  history_.Append(another, 1000, 1);
+  FrameRange range;
+  range.first = 1000;
+  EXPECT_EQ(history_.Pieces(map_, range), std::vector<int>{0});
+  EXPECT_EQ(history_.Indices(map_, -1, range), std::vector<std::int64_t>{1003});
+  range = {5, 5};
+  EXPECT_EQ(history_.Indices(map_, -1, range), std::vector<std::int64_t>{5});
+  EXPECT_TRUE(history_.Poses(map_, 1, range).empty());
+}
+
 TEST_F(FrameHistoryTest, KnowsWhatIsLaterThanAllItsFrames) {
   EXPECT_TRUE(history_.IsLater(-7));
   Add(0.2, 0, 0);

@@ -8,6 +8,7 @@
 
 #include "apps/run/graph_json.h"
 #include "apps/run/outputs.h"
+#include "apps/run/run_doubts.h"
 #include "apps/run/run_parts.h"
 #include "apps/run/timing.h"
 #include "tutti/slam/version.h"
@@ -220,6 +221,7 @@ std::string SummaryJson(const RunResult& r) {
   json["calibration_findings"] = Json::array();
   for (const CalibrationFinding& f : r.calibration_findings)
     json["calibration_findings"].push_back({{"measured", f.measured}, {"advice", f.advice}});
+  json["doubts"] = DoubtsAbout(r);
   json["keyframes"] = r.keyframes;
   json["loops"] = LoopsJson(r);
   if (r.config.run.certify) json["graph"] = GraphJson(r);

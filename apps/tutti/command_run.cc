@@ -8,6 +8,7 @@
 
 #include "apps/report/page.h"
 #include "apps/run/outputs.h"
+#include "apps/run/run_doubts.h"
 #include "apps/run/run_parts.h"
 #include "apps/run/runner.h"
 #include "apps/tutti/checks.h"
@@ -89,6 +90,8 @@ int RunAndShow(const CLI::App& command, const RunArguments& arguments, RunReques
     std::fputs(TimingTable(result.stages, result.wall_s, result.cpu_s, result.frames_total).c_str(), stdout);
   }
   std::printf("\n  results are in %s\n", result.folder.c_str());
+  for (const std::string& doubt : DoubtsAbout(result))
+    std::fprintf(stderr, "tutti: warning: %s\n", doubt.c_str());
   if (!arguments.no_report && !arguments.quiet && !ReportsAvailable())
     std::fprintf(stderr, "tutti: %s\n", ReportsMissing().c_str());
   return ExitCode(result);

@@ -1,10 +1,14 @@
 #include "frontend/geometry/two_view.h"
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <opencv2/calib3d.hpp>
+
+#include "core/reprojection.h"
+#include "frontend/geometry/pose_solver.h"
 
 namespace tutti {
 namespace {
@@ -111,6 +115,47 @@ Eigen::Vector3d Triangulate(const Eigen::Vector3d& first_ray, const Eigen::Vecto
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> solver(a.transpose() * a);
   const Eigen::Vector4d x = solver.eigenvectors().col(0);
   return x.head<3>() / x(3);
+}
+
+// The points are eliminated (Schur complement); the scale is fixed by taking only the two directions across
+// the translation. To the first order a left perturbation of T_second_first turns the baseline in the first
+// camera by its translation alone.
+double DirectionSigma(const PinholeCamera& camera, const Pose& T_second_first,
+                      const std::vector<TwoViewPoint>& points) {
+  using Projection = internal::Reprojection<2>;
+  Matrix6d information = Matrix6d::Zero();
+  const Eigen::Matrix3d rotation = T_second_first.rotation.toRotationMatrix();
+  for (const TwoViewPoint& point : points) {
+    const Eigen::Vector3d& p = point.in_first;
+    const Eigen::Vector3d q = T_second_first * p;
+    Eigen::Vector2d pixel;
+    Projection::PointJacobian by_p, by_q;
+    const auto weight = [](double sigma) { return Eigen::Vector2d::Constant(1 / sigma); };
+    if (!Projection::Residual(camera, p, {Eigen::Vector2d::Zero(), weight(point.first_sigma_px)}, kMinDepth,
+                              &pixel, &by_p) ||
+        !Projection::Residual(camera, q, {Eigen::Vector2d::Zero(), weight(point.second_sigma_px)}, kMinDepth,
+                              &pixel, &by_q))
+      continue;
+    const Projection::PoseJacobian by_pose = Projection::ByPose(by_q, q);
+    const Projection::PointJacobian by_point = by_q * rotation;
+    const Eigen::Matrix3d known = by_p.transpose() * by_p + by_point.transpose() * by_point;
+    const Eigen::Matrix<double, 6, 3> shared = by_pose.transpose() * by_point;
+    information += by_pose.transpose() * by_pose - shared * known.ldlt().solve(shared.transpose());
+  }
+  const double length = T_second_first.translation.norm();
+  if (!(length > 0)) return INFINITY;
+  Eigen::Matrix<double, 6, 5> free = Eigen::Matrix<double, 6, 5>::Zero();
+  free.block<3, 1>(0, 0) = T_second_first.translation.unitOrthogonal();
+  free.block<3, 1>(0, 1) = T_second_first.translation.cross(free.block<3, 1>(0, 0)).normalized();
+  free.block<3, 3>(3, 2).setIdentity();
+  const Eigen::Matrix<double, 5, 5> of_free = free.transpose() * information * free;
+  const Eigen::LDLT<Eigen::Matrix<double, 5, 5>> solver(of_free);
+  if (solver.info() != Eigen::Success || !(solver.rcond() > 1e-12)) return INFINITY;
+  const Eigen::Matrix2d covariance =
+      solver.solve(Eigen::Matrix<double, 5, 5>::Identity()).topLeftCorner<2, 2>();
+  const double variance =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(covariance).eigenvalues()(1) / (length * length);
+  return variance > 0 ? std::sqrt(variance) : INFINITY;
 }
 
 TwoViewResult EstimateTwoView(const PinholeCamera& camera, const std::vector<cv::Point2f>& first,

@@ -32,6 +32,19 @@ struct TwoViewResult {
 TwoViewResult EstimateTwoView(const PinholeCamera& camera, const std::vector<cv::Point2f>& first,
                               const std::vector<cv::Point2f>& second, const TwoViewOptions& options);
 
+/// A point that two views see.
+struct TwoViewPoint {
+  Eigen::Vector3d in_first;  ///< in the first camera, in units of the motion's translation
+  double first_sigma_px = 1, second_sigma_px = 1;  ///< standard deviations of its pixels, each axis
+};
+
+/// How well two views know in which direction the camera moved, whatever its turn and the points are: the
+/// standard deviation in the most uncertain direction [rad]. Infinite if the points leave a motion open.
+/// Where it is large, a turn and a sideways step look the same, and the motion may well be an opposite one
+/// with all depths wrong.
+double DirectionSigma(const PinholeCamera& camera, const Pose& T_second_first,
+                      const std::vector<TwoViewPoint>& points);
+
 /// Linear triangulation of a point from two rays (x/z, y/z, 1) and T_second_first; in the first camera.
 Eigen::Vector3d Triangulate(const Eigen::Vector3d& first_ray, const Eigen::Vector3d& second_ray,
                             const Pose& T_second_first);

@@ -1,10 +1,11 @@
 #include "frontend/odometry/mono_initializer.h"
 
 #include <algorithm>
+#include <cstdio>
 
+#include "core/angle.h"
 #include "core/median.h"
 #include "frontend/features/matcher.h"
-#include "frontend/geometry/two_view.h"
 #include "frontend/map/bundle_adjustment.h"
 
 namespace tutti {
@@ -63,6 +64,24 @@ bool MonoInitializer::Offer(const TrackedFrame& frame, int piece, const Pose& T_
     return wait("initialising: " + view.reason);
   }
 
+  Map trial = *map;
+  AddPair(frame, piece, T_world_camera, median_depth, matches, view, &trial);
+  const double sigma_deg = DirectionSigmaOfPair(trial) / internal::kRadians;
+  if (!(sigma_deg <= options_.max_direction_sigma_deg)) {
+    char text[120];
+    std::snprintf(text, sizeof text,
+                  "initialising: the direction of motion is known to %.1f deg only, %.1f deg are needed",
+                  sigma_deg, options_.max_direction_sigma_deg);
+    return wait(text);
+  }
+  *map = std::move(trial);
+  return true;
+}
+
+// The reference and `frame` as keyframes, with their common landmarks, adjusted.
+void MonoInitializer::AddPair(const TrackedFrame& frame, int piece, const Pose& T_world_camera,
+                              double median_depth, const std::vector<std::pair<int, int>>& matches,
+                              const TwoViewResult& view, Map* map) const {
   std::vector<double> depths;
   for (std::size_t i = 0; i < matches.size(); ++i) {
     if (view.valid[i]) depths.push_back(view.points[i].z());
@@ -93,7 +112,23 @@ bool MonoInitializer::Offer(const TrackedFrame& frame, int piece, const Pose& T_
   ba.iterations = 20;
   ba.pixel_sigma = options_.pixel_sigma;
   AdjustWindow(rig_.camera, {b}, {a}, ba, map);
-  return true;
+}
+
+// Of the two newest keyframes; what the adjustment removed no longer counts.
+double MonoInitializer::DirectionSigmaOfPair(const Map& map) const {
+  const Keyframe &first = map.keyframe(map.KeyframeCount() - 2), &second = map.keyframe(first.id + 1);
+  const Pose T_first_world = first.T_world_camera.Inverse();
+  std::vector<TwoViewPoint> points;
+  for (const int id : map.LandmarksOf({second.id})) {
+    const Landmark& l = map.landmark(id);
+    if (l.observations.size() != 2) continue;
+    const auto sigma = [&](const Keyframe& k, const Observation& o) {
+      return options_.pixel_sigma * map.RelativeSigma(*k.features, k.id, o.feature, id);
+    };
+    points.push_back(
+        {T_first_world * l.position, sigma(first, l.observations[0]), sigma(second, l.observations[1])});
+  }
+  return DirectionSigma(rig_.camera, second.T_world_camera.Inverse() * first.T_world_camera, points);
 }
 
 }  // namespace tutti

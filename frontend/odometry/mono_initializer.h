@@ -1,9 +1,11 @@
-// Waits for two views with enough parallax, and starts a mono map from them.
+// Waits for two views that know well how the camera moved, and starts a mono map from them.
 #pragma once
 
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "frontend/geometry/two_view.h"
 #include "frontend/map/map.h"
 #include "frontend/odometry/tracked_frame.h"
 #include "tutti/frontend/frame.h"
@@ -36,6 +38,9 @@ class MonoInitializer {
 
  private:
   void Restart(const TrackedFrame& frame);
+  void AddPair(const TrackedFrame& frame, int piece, const Pose& T_world_camera, double median_depth,
+               const std::vector<std::pair<int, int>>& matches, const TwoViewResult& view, Map* map) const;
+  double DirectionSigmaOfPair(const Map& map) const;
 
   OdometryOptions options_;
   CameraRig rig_;

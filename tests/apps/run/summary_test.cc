@@ -38,6 +38,42 @@ TEST(Summary, WithoutPosesThereIsNoGraphThatCouldDoubtALoop) {
   EXPECT_EQ(nlohmann::json::parse(SummaryJson(result))["loops"]["accepted"], 1);
 }
 
+LoopRecord Recognised(double candidate_s, double query_s, bool accepted) {
+  LoopRecord loop;
+  loop.candidate_stamp_s = candidate_s;
+  loop.query_stamp_s = query_s;
+  loop.verified = true;
+  loop.accepted = accepted;
+  return loop;
+}
+
+RunResult WhereAllIsWell() {
+  RunResult result;
+  result.frames_total = result.frames_tracked = 100;
+  for (int i = 0; i < 3; ++i) result.loops.push_back(Recognised(i, 60 + i, true));
+  return result;
+}
+
+TEST(Summary, DoubtsARunWhoseMapContradictsMostLoops) {
+  RunResult result = WhereAllIsWell();
+  for (int i = 0; i < 9; ++i) result.loops.push_back(Recognised(i, i + 1, false));  // neighbours: no loops
+  EXPECT_TRUE(nlohmann::json::parse(SummaryJson(result))["doubts"].empty());
+  for (int i = 0; i < 6; ++i) result.loops.push_back(Recognised(i, 70 + i, false));
+  const nlohmann::json doubts = nlohmann::json::parse(SummaryJson(result))["doubts"];
+  ASSERT_EQ(doubts.size(), 1u);
+  EXPECT_NE(doubts[0].get<std::string>().find("contradicts 6 of 9 loops"), std::string::npos) << doubts[0];
+}
+
+TEST(Summary, DoubtsARunThatLostManyFrames) {
+  RunResult result = WhereAllIsWell();
+  result.frames_tracked = 94;
+  const nlohmann::json doubts = nlohmann::json::parse(SummaryJson(result))["doubts"];
+  ASSERT_EQ(doubts.size(), 1u);
+  EXPECT_NE(doubts[0].get<std::string>().find("only 94 of 100 frames"), std::string::npos) << doubts[0];
+  result.bad.resize(3);  // what could not be read is counted elsewhere
+  EXPECT_TRUE(nlohmann::json::parse(SummaryJson(result))["doubts"].empty());
+}
+
 TEST(Summary, TheLensSaysHowItWasFound) {
   RunResult result;
   EXPECT_FALSE(nlohmann::json::parse(SummaryJson(result)).contains("lens"));

@@ -3,8 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <random>
 
+#include "frontend/map/window_solver.h"
 #include "tests/support/plain_camera.h"
 
 namespace tutti {
@@ -109,6 +111,76 @@ TEST(EstimateTwoView, SameInputGivesTheSameBits) {
   ASSERT_TRUE(a.success);
   EXPECT_EQ(a.T_second_first.Matrix(), b.T_second_first.Matrix());
   EXPECT_EQ(a.valid, b.valid);
+}
+
+std::vector<TwoViewPoint> Seen(const std::vector<Eigen::Vector3d>& points, double sigma_px) {
+  std::vector<TwoViewPoint> seen;
+  for (const Eigen::Vector3d& p : points) seen.push_back({p, sigma_px, sigma_px});
+  return seen;
+}
+
+// The direction's error in the best fit to pixels with noise, root mean square of its two components.
+double DirectionError(const std::vector<Eigen::Vector3d>& points, double sigma_px, int trials) {
+  std::mt19937 generator(3);
+  const auto uniform = [&] { return static_cast<double>(generator() % 100000) / 1e5; };
+  const auto noise = [&] {
+    double sum = -6;
+    for (int i = 0; i < 12; ++i) sum += uniform();
+    return Eigen::Vector2d(sigma_px * sum, 0);
+  };
+  double squared = 0;
+  for (int trial = 0; trial < trials; ++trial) {
+    Window window;
+    window.moving = 1;
+    window.T_camera_world = {kMotion, Pose()};
+    window.points = points;
+    window.first_observation.push_back(0);
+    for (const Eigen::Vector3d& p : points) {
+      for (int camera = 0; camera < 2; ++camera) {
+        WindowObservation o;
+        o.camera = camera;
+        o.measured.pixel_sigma = sigma_px;
+        const Eigen::Vector2d across = noise(), down = noise();
+        o.measured.pixel =
+            Camera().Project(camera == 0 ? kMotion * p : p) + Eigen::Vector2d(across.x(), down.x());
+        window.observations.push_back(o);
+      }
+      window.first_observation.push_back(window.observations.size());
+    }
+    EXPECT_TRUE(SolveWindow(Camera(), 20, &window).usable);
+    const Eigen::Vector3d found = window.T_camera_world[0].Inverse().translation.normalized();
+    squared += (found - kMotion.Inverse().translation.normalized()).squaredNorm();
+  }
+  return std::sqrt(squared / trials);
+}
+
+TEST(DirectionSigma, IsWhatNoiseDoesToTheDirection) {
+  const std::vector<Eigen::Vector3d> points = Scene(kMotion, false, 100, 0).points;
+  const double sigma = DirectionSigma(Camera(), kMotion, Seen(points, 0.5));
+  // Of two components the larger one is returned: the error of both is 1 to 1.41 times as much.
+  const double error = DirectionError(points, 0.5, 60);
+  EXPECT_GT(error, 0.8 * sigma);
+  EXPECT_LT(error, 1.6 * sigma);
+}
+
+TEST(DirectionSigma, GrowsWithTheNoiseAndNotWithTheUnitOfLength) {
+  const std::vector<Eigen::Vector3d> points = Scene(kMotion, false, 100, 0).points;
+  const double sigma = DirectionSigma(Camera(), kMotion, Seen(points, 0.5));
+  EXPECT_NEAR(DirectionSigma(Camera(), kMotion, Seen(points, 1)), 2 * sigma, 1e-6 * sigma);
+  std::vector<Eigen::Vector3d> larger;
+  for (const Eigen::Vector3d& p : points) larger.emplace_back(10 * p);
+  const Pose longer(kMotion.rotation, 10 * kMotion.translation);
+  EXPECT_NEAR(DirectionSigma(Camera(), longer, Seen(larger, 0.5)), sigma, 1e-6 * sigma);
+  const Pose shorter(kMotion.rotation, 0.1 * kMotion.translation);
+  EXPECT_GT(DirectionSigma(Camera(), shorter, Seen(points, 0.5)), 5 * sigma);
+}
+
+TEST(DirectionSigma, IsInfiniteWhereTheMotionIsOpen) {
+  const std::vector<Eigen::Vector3d> points = Scene(kMotion, false, 100, 0).points;
+  const Pose turn(kMotion.rotation, Eigen::Vector3d::Zero());
+  EXPECT_EQ(DirectionSigma(Camera(), turn, Seen(points, 0.5)), INFINITY);
+  EXPECT_EQ(DirectionSigma(Camera(), kMotion, Seen({points[0], points[1]}, 0.5)), INFINITY);
+  EXPECT_EQ(DirectionSigma(Camera(), kMotion, {}), INFINITY);
 }
 
 }  // namespace

@@ -71,6 +71,10 @@ struct OdometryOptions {
   TUTTI_OPTION(int, triangulation_neighbours, 8, "mono: keyframes with which new landmarks are triangulated",
                From(1));
   TUTTI_OPTION(double, min_parallax_deg, 1.0, "mono initialisation: median parallax", Unit("deg"), Above(0));
+  TUTTI_OPTION(double, max_direction_sigma_deg, 2.5,
+               "mono initialisation: standard deviation of the direction in which the camera moved between "
+               "the two views; where it is large, a turn and a sideways step look the same",
+               Unit("deg"), Above(0));
   TUTTI_OPTION(int, ba_keyframes, 12, "keyframes that local bundle adjustment moves", From(2));
   TUTTI_OPTION(int, ba_fixed_keyframes, 20, "keyframes that hold the window in place", From(0));
   TUTTI_OPTION(int, ba_iterations, 6, "most iterations of a local bundle adjustment", From(1));

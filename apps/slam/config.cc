@@ -222,7 +222,8 @@ std::vector<ConfigEntry> DescribeConfig(const RunConfig& config) {
   const ConfigTable table(copy);
   std::vector<ConfigEntry> entries;
   for (const ConfigKey& key : table.keys()) {
-    if (key.section == "camera" && !config.dataset.camera && key.name != "baseline_m") continue;
+    const bool of_a_camera = key.section == "camera" && key.name != "baseline_m" && key.name != "readout_s";
+    if (of_a_camera && !config.dataset.camera) continue;
     entries.push_back({key.section, key.name, key.show(), key.doc, key.advanced});
   }
   return entries;

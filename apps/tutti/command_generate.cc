@@ -220,6 +220,16 @@ void AddOptions(CLI::App& c, GenerateArguments& a) {
   c.add_option("--blur", w.motion_blur_s, "motion blur: exposure time [s]; without a number 0.02")
       ->expected(0, 1)
       ->default_str("0.02");
+  c.add_option(
+       "--shake", w.shake_deg_per_s,
+       "hand-held: fastest turning about each axis [deg/s], in bursts, on a lever of 0.2 m; without a "
+       "number 200")
+      ->expected(0, 1)
+      ->default_str("200");
+  c.add_option("--readout", w.readout_s,
+               "rolling shutter: the last row is read so long after the first [s]; without a number 0.03")
+      ->expected(0, 1)
+      ->default_str("0.03");
   c.add_flag("--lighting-change", w.lighting_change, "another sun, darker, from the second lap on");
   c.add_flag("--dusk", w.dusk,
              "from the second lap on: dark, noisy, sun from elsewhere; town: lamps are lit");

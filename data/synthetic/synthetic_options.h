@@ -53,6 +53,12 @@ struct SyntheticOptions {
   // What makes it hard.
   double noise_sigma = 0;    ///< pixel noise [grey levels]
   double motion_blur_s = 0;  ///< exposure time [s]; 0: sharp. Poses are those of the middle of the exposure
+  /// Rolling shutter: the last row is read so long after the first [s]; 0: all at once. Poses are those of
+  /// the middle row
+  double readout_s = 0;
+  /// A hand that shakes: fastest turning about each of the camera's axes [deg/s], in bursts, on a lever of
+  /// 0.2 m; 0: steady
+  double shake_deg_per_s = 0;
   bool lighting_change = false;  ///< from the second lap on: sun from elsewhere, darker, another contrast
   bool dusk = false;             ///< from the second lap on: dusk, noisy; in the town, street lamps are lit
   bool other_cars = false;       ///< town: other parked cars when places are seen again

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "data/synthetic/hand.h"
 #include "data/synthetic/scene.h"
+#include "data/synthetic/shutter.h"
 #include "data/synthetic/synthetic_random.h"
 #include "tutti/core/error.h"
 
@@ -36,6 +38,8 @@ std::string SyntheticOptions::Validate() const {
   if (!(sides_deg > 0 && sides_deg <= 120)) return "sides_deg must be above 0 and at most 120 degrees";
   if (!(noise_sigma >= 0 && noise_sigma <= 100)) return "noise_sigma must be 0 to 100 grey levels";
   if (!(motion_blur_s >= 0 && motion_blur_s <= 0.1)) return "motion_blur_s must be 0 to 0.1 s";
+  if (!(readout_s >= 0 && readout_s <= 0.1)) return "readout_s must be 0 to 0.1 s";
+  if (!(shake_deg_per_s >= 0 && shake_deg_per_s <= 400)) return "shake_deg_per_s must be 0 to 400 deg/s";
   if (!(occlusion >= 0 && occlusion <= 0.3)) return "occlusion must be 0 to 0.3 of the image";
   if ((occlusion > 0 || other_cars) && scene != SyntheticScene::kTown)
     return "occlusion and other_cars are the town's alone";
@@ -61,7 +65,10 @@ SyntheticOptions SyntheticOptions::Resolved() const {
 }
 
 struct SyntheticWorld::Impl {
+  explicit Impl(const SyntheticOptions& o) : options(o), hand(o.seed, o.shake_deg_per_s) {}
+
   SyntheticOptions options;
+  synthetic::Hand hand;
   synthetic::Scene scene;
   PinholeCamera camera;
   std::size_t frames = 0;
@@ -74,6 +81,11 @@ struct SyntheticWorld::Impl {
 
   // Camera in the scene's frame at a time. Smooth in time, so it may be asked between frames.
   Pose CameraAt(double t, double turned_left = 0) const {
+    const Pose steady = SteadyCameraAt(t, turned_left);
+    return options.shake_deg_per_s > 0 ? steady * hand.At(t) : steady;
+  }
+
+  Pose SteadyCameraAt(double t, double turned_left) const {
     const double s = Way().DistanceAt(t);
     // No lap runs in the tracks of the one before.
     const double unit = scene.eye_height / 1.65;  // a walker sways less than a car's lane is wide
@@ -118,7 +130,8 @@ struct SyntheticWorld::Impl {
   }
 
   // The lamps' light on what is seen, which is as bright as its surface in daylight times light.gain.
-  void LightLamps(synthetic::Rendering& view, const Pose& T_scene_camera, double gain, double change) const {
+  void LightLamps(synthetic::Rendering& view, const PinholeCamera& eye, const Pose& T_scene_camera,
+                  double gain, double change) const {
     constexpr double kPower = 9;        // light of one at 1 m, of a daylight of 1
     constexpr double kReach = 14;       // [m]
     constexpr double kSight = 120;      // [m]
@@ -128,8 +141,8 @@ struct SyntheticWorld::Impl {
       const Eigen::Vector3d seen = T_camera_scene * lamp;
       if (seen.z() > -kReach && seen.norm() < kSight) near.push_back(seen.cast<float>());
     }
-    const float fx = static_cast<float>(camera.fx), fy = static_cast<float>(camera.fy);
-    const float cx = static_cast<float>(camera.cx), cy = static_cast<float>(camera.cy);
+    const float fx = static_cast<float>(eye.fx), fy = static_cast<float>(eye.fy);
+    const float cx = static_cast<float>(eye.cx), cy = static_cast<float>(eye.cy);
     constexpr float kReach2 = static_cast<float>(kReach * kReach);
     for (int y = 0; y < view.image.rows; ++y) {
       for (int x = 0; x < view.image.cols; ++x) {
@@ -228,32 +241,41 @@ struct SyntheticWorld::Impl {
   }
 
   // What a camera sees at a time from a pose (in the scene), shifted by `right_m` along its x axis.
-  synthetic::Rendering ViewFrom(Pose pose, double t, double right_m) const {
+  synthetic::Rendering ViewFrom(const PinholeCamera& eye, Pose pose, double t, double right_m) const {
     pose.translation += pose.rotation * Eigen::Vector3d(right_m, 0, 0);
     const Light light = LightAt(t);
     synthetic::Rendering view =
-        synthetic::Render(FacesAt(t), scene.textures, camera, pose, light, options.supersample);
-    if (options.dusk && ChangeAt(t) > 0) LightLamps(view, pose, light.gain, ChangeAt(t));
+        synthetic::Render(FacesAt(t), scene.textures, eye, pose, light, options.supersample);
+    if (options.dusk && ChangeAt(t) > 0) LightLamps(view, eye, pose, light.gain, ChangeAt(t));
     return view;
   }
 
-  // Mean of what is seen over the exposure around t by a camera that is turned to the left [rad] and shifted
-  // by `right_m` along its x axis.
-  synthetic::Rendering View(double t, double right_m, bool blur, double turned_left = 0) const {
-    const int steps = blur && options.motion_blur_s > 0 ? 5 : 1;
-    synthetic::Rendering sum;
-    for (int k = 0; k < steps; ++k) {
-      const double at = t + (steps == 1 ? 0.0 : options.motion_blur_s * (k - 2) / 5.0);
-      synthetic::Rendering one = ViewFrom(CameraAt(std::max(at, 0.0), turned_left), at, right_m);
-      if (k == 0) {
-        sum = std::move(one);
-      } else {
-        sum.image += one.image;
-        if (k == steps / 2) sum.depth_m = one.depth_m;  // the middle one
+  // Samples of the exposure around t, an odd number: five, and of a shaken camera so many that what is seen 1
+  // m away or more moves by at most kBlurStep from one to the next.
+  int BlurSamples(double t) const {
+    constexpr int kLeast = 5, kMost = 199;
+    constexpr double kBlurStep = 2;  // [px]
+    if (!(options.shake_deg_per_s > 0) || !(options.motion_blur_s > 0)) return kLeast;
+    const double half = 0.5 * options.motion_blur_s;
+    const Pose moved = CameraAt(std::max(t + half, 0.0)).Inverse() * CameraAt(std::max(t - half, 0.0));
+    double most = 0;
+    for (const double u : {0.0, camera.width - 1.0}) {
+      for (const double v : {0.0, camera.height - 1.0}) {
+        const Eigen::Vector3d p = moved * camera.Unproject({u, v});
+        if (p.z() < 0.1) return kMost;
+        most = std::max(most, (camera.Project(p) - Eigen::Vector2d(u, v)).norm());
       }
     }
-    if (steps > 1) sum.image *= 1.0 / steps;
-    return sum;
+    return 2 * static_cast<int>(std::clamp(most / kBlurStep, double(kLeast), double(kMost)) / 2) + 1;
+  }
+
+  // What is exposed around t by a camera that is turned to the left [rad] and shifted by `right_m` along its
+  // x axis.
+  synthetic::Rendering View(double t, double right_m, double turned_left = 0) const {
+    const synthetic::Shutter shutter{options.motion_blur_s, options.readout_s, BlurSamples(t)};
+    return synthetic::Expose(camera, shutter, t, [&](const PinholeCamera& rows, double at) {
+      return ViewFrom(rows, CameraAt(std::max(at, 0.0), turned_left), at, right_m);
+    });
   }
 
   // `dusk`: 0 by day, 1 at dusk, when the noise also grows with the light (shot noise of a short exposure).
@@ -314,10 +336,10 @@ struct SyntheticWorld::Impl {
   }
 };
 
-SyntheticWorld::SyntheticWorld(const SyntheticOptions& options) : impl_(std::make_unique<Impl>()) {
+SyntheticWorld::SyntheticWorld(const SyntheticOptions& options) {
   const std::string problem = options.Validate();
   if (!problem.empty()) throw InputError("synthetic world: " + problem);
-  impl_->options = options.Resolved();
+  impl_ = std::make_unique<Impl>(options.Resolved());
   const SyntheticOptions& o = impl_->options;
   impl_->scene = o.scene == SyntheticScene::kTown   ? synthetic::BuildTown(o)
                  : o.scene == SyntheticScene::kRoom ? synthetic::BuildRoom(o)
@@ -347,9 +369,10 @@ std::size_t SyntheticWorld::FramesPerLap() const {
   return static_cast<std::size_t>(impl_->Way().LapTime() * impl_->options.rate_hz);
 }
 
-Pose SyntheticWorld::PoseOf(std::size_t i) const {
-  if (i == 0) return Pose();
-  return impl_->T_scene_first.Inverse() * impl_->CameraAt(Stamp(i));
+Pose SyntheticWorld::PoseOf(std::size_t i) const { return i == 0 ? Pose() : PoseAt(Stamp(i)); }
+
+Pose SyntheticWorld::PoseAt(double time_s) const {
+  return impl_->T_scene_first.Inverse() * impl_->CameraAt(std::max(time_s, 0.0));
 }
 
 Trajectory SyntheticWorld::GroundTruth() const {
@@ -362,23 +385,26 @@ SyntheticFrame SyntheticWorld::Render(std::size_t i) const {
   const SyntheticOptions& o = impl_->options;
   const double t = Stamp(i);
   const double side = o.sensor == SyntheticSensor::kSides ? o.sides_deg * M_PI / 180 : 0.0;
-  const synthetic::Rendering left = impl_->View(t, 0, true, side);
+  const synthetic::Rendering left = impl_->View(t, 0, side);
   cv::Mat right;
-  if (o.sensor == SyntheticSensor::kStereo) right = impl_->View(t, o.baseline_m, true).image;
-  if (o.sensor == SyntheticSensor::kSides) right = impl_->View(t, 0, true, -side).image;
+  if (o.sensor == SyntheticSensor::kStereo) right = impl_->View(t, o.baseline_m).image;
+  if (o.sensor == SyntheticSensor::kSides) right = impl_->View(t, 0, -side).image;
   return impl_->Frame(i, PoseOf(i), left, right);
 }
 
 SyntheticFrame SyntheticWorld::RenderFrom(std::size_t i, const Pose& T_world_camera) const {
   const Pose pose = impl_->T_scene_first * T_world_camera;
-  const synthetic::Rendering left = impl_->ViewFrom(pose, Stamp(i), 0);
+  const synthetic::Rendering left = impl_->ViewFrom(impl_->camera, pose, Stamp(i), 0);
   cv::Mat right;
   if (impl_->options.sensor == SyntheticSensor::kStereo) {
-    right = impl_->ViewFrom(pose, Stamp(i), impl_->options.baseline_m).image;
+    right = impl_->ViewFrom(impl_->camera, pose, Stamp(i), impl_->options.baseline_m).image;
   }
   return impl_->Frame(i, T_world_camera, left, right);
 }
 
-cv::Mat SyntheticWorld::ExactDepth(std::size_t i) const { return impl_->View(Stamp(i), 0, false).depth_m; }
+cv::Mat SyntheticWorld::ExactDepth(std::size_t i) const {
+  const double t = Stamp(i);
+  return impl_->ViewFrom(impl_->camera, impl_->CameraAt(t), t, 0).depth_m;
+}
 
 }  // namespace tutti

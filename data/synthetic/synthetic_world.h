@@ -18,7 +18,8 @@ struct SyntheticFrame {
   cv::Mat image;    ///< CV_8UC1
   cv::Mat right;    ///< stereo and sides: CV_8UC1; else empty
   cv::Mat depth_m;  ///< RGB-D: CV_32FC1, z [m], 0 = not measured; else empty
-  /// Left camera (sides: one between the two) at the middle of the exposure; world = that of frame 0.
+  /// Left camera (sides: one between the two) at the middle of the exposure (rolling shutter: of the middle
+  /// row); world = that of frame 0.
   Pose T_world_camera;
 };
 
@@ -35,16 +36,20 @@ class SyntheticWorld {
   const PinholeCamera& Camera() const;  ///< of the left image; the right camera is baseline_m along its +x
   std::size_t Size() const;
   double Stamp(std::size_t i) const;
-  Pose PoseOf(std::size_t i) const;  ///< T_world_camera
+  Pose PoseOf(std::size_t i) const;  ///< T_world_camera at Stamp(i)
+  /// T_world_camera at any time [s]; before 0 the camera stands still.
+  Pose PoseAt(double time_s) const;
   Trajectory GroundTruth() const;
   double LapLength() const;  ///< [m]
   std::size_t FramesPerLap() const;
 
   /// Renders frame i < Size().
   SyntheticFrame Render(std::size_t i) const;
-  /// Frame i as another pose sees it, sharp: to hold the camera still, to turn it, to carry it elsewhere.
+  /// Frame i as another pose sees it, sharp and all rows at once: to hold the camera still, to turn it, to
+  /// carry it elsewhere.
   SyntheticFrame RenderFrom(std::size_t i, const Pose& T_world_camera) const;
-  /// Exact z depth of frame i without noise, limits or moving blur (CV_32FC1 [m], 0 = nothing), for tests.
+  /// Exact z depth of frame i without noise, limits, moving blur or rolling shutter (CV_32FC1 [m], 0 =
+  /// nothing), for tests.
   cv::Mat ExactDepth(std::size_t i) const;
 
  private:

@@ -118,6 +118,8 @@ std::string ConfigText(const SyntheticWorld& world) {
       << "  # [px]\n  fy: " << c.fy << "\n  cx: " << c.cx << "\n  cy: " << c.cy << "\n  distortion: none\n";
   if (stereo)
     out << "  baseline_m: " << o.baseline_m << "  # the right camera lies so far to the right [m]\n";
+  if (o.readout_s > 0)
+    out << "  readout_s: " << o.readout_s << "  # the last row is read so long after the first [s]\n";
   return out.str();
 }
 

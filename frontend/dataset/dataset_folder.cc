@@ -165,6 +165,7 @@ void FolderDataset::SetUpRig() {
     }
   }
   rig_.camera = left_->Camera();
+  rig_.readout_s = RectifiedReadout(options_.readout_s, left, rig_.camera);
 }
 
 // What is wrong with the image that was read from `file`; else `out` gets it, 8 bit and rectified.

@@ -79,6 +79,7 @@ CameraRig SingleCameraRig(const DatasetOptions& options, cv::Size size, double r
   if (!problem.empty()) throw InputError(name + ": " + problem);
   rectifier.emplace(camera);
   rig.camera = rectifier->Camera();
+  rig.readout_s = RectifiedReadout(options.readout_s, camera, rig.camera);
   return rig;
 }
 

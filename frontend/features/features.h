@@ -28,7 +28,8 @@ struct FrameFeatures {
   std::vector<float> inverse_depth_sigma;          ///< N, standard deviation of inverse_depth [1/m]
   Eigen::Vector2d lens = Eigen::Vector2d::Zero();  ///< correction of the lens in the keypoints (LensError)
   bool other_camera = false;  ///< in the pixels of the map's camera, but another one took it (CarryOver)
-  std::vector<int> aligned;   ///< N, landmark whose patch the position was aligned with, or -1
+  std::vector<cv::Point2f> rolled;  ///< N, what RollingShutter moved the keypoints by [px]; empty: nothing
+  std::vector<int> aligned;         ///< N, landmark whose patch the position was aligned with, or -1
   std::shared_ptr<const std::vector<cv::Mat>>
       pyramid;              ///< of the (left) image; null where it is not needed any more
   bool has_depth = false;   ///< the frame came with a depth or right image
@@ -45,6 +46,10 @@ struct FrameFeatures {
   template <class Archive>
   void State(Archive& archive);
   std::size_t size() const { return keypoints.size(); }
+  /// What was added to a keypoint because its row was read at another time than the middle one [px].
+  Eigen::Vector2d Rolled(std::size_t f) const {
+    return rolled.empty() ? Eigen::Vector2d(0, 0) : Eigen::Vector2d(rolled[f].x, rolled[f].y);
+  }
   const std::uint8_t* Descriptor(int i) const { return descriptors.ptr<std::uint8_t>(i); }
 
  private:

@@ -115,6 +115,24 @@ bool Fit(const Template& t, const cv::Mat& image, float* x, float* y) {
 
 }  // namespace
 
+namespace {
+
+// Where the image has a feature: without what is known of the lens's error and the rolling shutter.
+Eigen::Vector2d InImage(const PinholeCamera& camera, const FrameFeatures& features, int feature) {
+  const std::size_t f = static_cast<std::size_t>(feature);
+  const cv::Point2f& at = features.keypoints[f].pt;
+  return LensError::Uncorrect(camera, features.lens, Eigen::Vector2d(at.x, at.y) - features.Rolled(f));
+}
+
+// The inverse, for a place near the feature.
+Eigen::Vector2d OutOfImage(const PinholeCamera& camera, const FrameFeatures& features, int feature,
+                           const Eigen::Vector2d& pixel) {
+  return LensError::Correct(camera, features.lens, pixel) +
+         features.Rolled(static_cast<std::size_t>(feature));
+}
+
+}  // namespace
+
 std::shared_ptr<const Patch> CutPatch(const PinholeCamera& camera, const FrameFeatures& features,
                                       int feature) {
   const cv::KeyPoint& k = features.keypoints[static_cast<std::size_t>(feature)];
@@ -122,7 +140,7 @@ std::shared_ptr<const Patch> CutPatch(const PinholeCamera& camera, const FrameFe
   if (!features.pyramid || level >= features.pyramid->size()) return nullptr;
   const cv::Mat& image = (*features.pyramid)[level];
   const Eigen::Vector2d scale = LevelScale(*features.pyramid, level);
-  const Eigen::Vector2d p = ToLevel(LensError::Uncorrect(camera, features.lens, {k.pt.x, k.pt.y}), scale);
+  const Eigen::Vector2d p = ToLevel(InImage(camera, features, feature), scale);
   const int x = static_cast<int>(std::lround(p.x())), y = static_cast<int>(std::lround(p.y()));
   if (x < Patch::kHalf || y < Patch::kHalf || x + Patch::kHalf >= image.cols ||
       y + Patch::kHalf >= image.rows)
@@ -189,11 +207,9 @@ std::optional<Eigen::Vector2d> FindPoint(const PinholeCamera& camera, const Fram
   const std::shared_ptr<const Patch> patch = CutPatch(camera, a, feature_a);
   const std::optional<Eigen::Matrix2d> A = PatchToFrame(camera, T_b_a, in_a);
   if (!patch || !A) return std::nullopt;
-  const cv::Point2f& at = b.keypoints[static_cast<std::size_t>(feature_b)].pt;
-  const std::optional<Eigen::Vector2d> found =
-      AlignPatch(*patch, b, *A, LensError::Uncorrect(camera, b.lens, {at.x, at.y}));
+  const std::optional<Eigen::Vector2d> found = AlignPatch(*patch, b, *A, InImage(camera, b, feature_b));
   if (!found) return std::nullopt;
-  return LensError::Correct(camera, b.lens, *found);
+  return OutOfImage(camera, b, feature_b, *found);
 }
 
 std::shared_ptr<const FrameFeatures> AlignFeatures(const Map& map, const PinholeCamera& camera,
@@ -210,13 +226,13 @@ std::shared_ptr<const FrameFeatures> AlignFeatures(const Map& map, const Pinhole
     const std::optional<Eigen::Matrix2d> A =
         PatchToFrame(camera, T_camera_world * T_world_patch, T_world_patch.Inverse() * l.position);
     if (!A) continue;
-    const cv::Point2f& at = features.keypoints[f].pt;
+    const int feature = static_cast<int>(f);
     const std::optional<Eigen::Vector2d> found =
-        AlignPatch(*l.patch, features, *A, LensError::Uncorrect(camera, features.lens, {at.x, at.y}));
+        AlignPatch(*l.patch, features, *A, InImage(camera, features, feature));
     if (!found) continue;
     if (!moved) moved = std::make_shared<FrameFeatures>(features);
     moved->aligned[f] = landmarks[f];
-    const Eigen::Vector2d to = LensError::Correct(camera, features.lens, *found);
+    const Eigen::Vector2d to = OutOfImage(camera, features, feature, *found);
     moved->keypoints[f].pt = cv::Point2f(static_cast<float>(to.x()), static_cast<float>(to.y()));
   }
   if (moved) moved->BuildGrid(camera.width, camera.height);

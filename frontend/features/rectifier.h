@@ -39,6 +39,13 @@ class Rectifier {
   cv::Mat nearest_xy_;
 };
 
+/// Rolling shutter: how long after the first row the last one of a rectified image was read [s], near the
+/// optical axis. `readout_s`: of the image as it was taken.
+inline double RectifiedReadout(double readout_s, const PinholeCamera& distorted,
+                               const PinholeCamera& rectified) {
+  return readout_s * (distorted.fy / rectified.fy) * (rectified.height - 1) / (distorted.height - 1);
+}
+
 /// The two rectifiers of a stereo pair. After them a point has the same row in both images, and the right
 /// camera lies at +x of the left one.
 struct StereoRectification {

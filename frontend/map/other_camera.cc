@@ -67,6 +67,7 @@ void CarryOver(const Map& from, const PinholeCamera& camera, const PinholeCamera
       k.octave = std::clamp(k.octave + levels, 0, top);
     }
     features->lens.setZero();
+    features->rolled.clear();
     features->other_camera = true;
     features->BuildGrid(to_camera.width, to_camera.height);
     keyframe.features = std::move(features);

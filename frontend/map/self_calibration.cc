@@ -73,9 +73,11 @@ double SelfCalibration::LargestMove(const Eigen::Vector2d& lens) const {
 
 std::shared_ptr<const FrameFeatures> SelfCalibration::Moved(const FrameFeatures& features) const {
   auto moved = std::make_shared<FrameFeatures>(features);
-  for (cv::KeyPoint& k : moved->keypoints) {
-    const Eigen::Vector2d raw = LensError::Uncorrect(camera_, features.lens, {k.pt.x, k.pt.y});
-    const Eigen::Vector2d to = LensError::Correct(camera_, applied_, raw);
+  for (std::size_t f = 0; f < moved->size(); ++f) {
+    cv::KeyPoint& k = moved->keypoints[f];
+    const Eigen::Vector2d rolled = features.Rolled(f), seen(k.pt.x - rolled.x(), k.pt.y - rolled.y());
+    const Eigen::Vector2d raw = LensError::Uncorrect(camera_, features.lens, seen);
+    const Eigen::Vector2d to = LensError::Correct(camera_, applied_, raw) + rolled;
     k.pt = cv::Point2f(static_cast<float>(to.x()), static_cast<float>(to.y()));
   }
   moved->lens = applied_;

@@ -17,6 +17,21 @@ void FrameHistory::Append(const FrameHistory& other, std::int64_t frame_offset, 
   }
 }
 
+void FrameHistory::Spread(const Map& map, int count, const Vector6d& drift,
+                          const Eigen::Quaterniond& R_camera_world) {
+  const int first = static_cast<int>(records_.size()) - count;
+  for (int i = std::max(0, first); i < static_cast<int>(records_.size()); ++i) {
+    Record& record = records_[static_cast<std::size_t>(i)];
+    const Pose T_world_frame = map.keyframe(record.reference).T_world_camera * record.T_reference_frame;
+    // The drift as this camera sees it.
+    const Eigen::Quaterniond turn = T_world_frame.rotation.conjugate() * R_camera_world.conjugate();
+    const double part = double(i - first + 1) / (count + 1);
+    Vector6d own;
+    own << turn * Eigen::Vector3d(drift.head<3>()), turn * Eigen::Vector3d(drift.tail<3>());
+    record.T_reference_frame = record.T_reference_frame * ExpSE3(own * -part);
+  }
+}
+
 void FrameHistory::Rescale(const std::map<int, Similarity>& S_world_keyframe) {
   for (Record& record : records_) {
     const auto moved = S_world_keyframe.find(record.reference);

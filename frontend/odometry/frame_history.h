@@ -25,6 +25,9 @@ class FrameHistory {
   bool IsLater(double stamp_s) const {
     return records_.size() == session_ || stamp_s > records_.back().stamp_s;
   }
+  /// The newest `count` frames have drifted, evenly: by Exp(drift) until the frame that comes next, which has
+  /// this rotation (world to camera).
+  void Spread(const Map& map, int count, const Vector6d& drift, const Eigen::Quaterniond& R_camera_world);
   /// Keyframes were moved: with their scale, so are the distances of their frames.
   void Rescale(const std::map<int, Similarity>& S_world_keyframe);
   /// Keyframes were removed: their frames hang on those that stand for them, and stay where they are. `map`

@@ -164,6 +164,8 @@ std::optional<Matrix6d> Odometry::Impl::PoseCovariance() const {
 TrackResult Odometry::Impl::Accept(const Tracker::Tracked& tracked) {
   relocalizer_.Found();
   mapper_.CountSeen(*tracked.fix);
+  if (tracked.by_grey_before > 0 && tracked.fix->drift)
+    history_.Spread(map(), tracked.by_grey_before, *tracked.fix->drift, tracked.fix->T_camera_world.rotation);
   TrackResult result;
   result.state = TrackingState::kTracking;
   result.inliers = tracked.fix->inliers;

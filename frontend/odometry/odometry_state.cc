@@ -34,6 +34,7 @@ std::string Fingerprint(const CameraRig& rig, const std::vector<float>& scales) 
   text << WordOf(rig.sensor) << ", " << camera.width << "x" << camera.height << " px, fx " << camera.fx
        << ", fy " << camera.fy << ", cx " << camera.cx << ", cy " << camera.cy;
   if (rig.sensor == Sensor::kStereo) text << ", baseline " << rig.baseline_m << " m";
+  if (rig.readout_s > 0) text << ", readout " << rig.readout_s << " s";
   text << ", " << scales.size() << " pyramid levels to " << scales.back();
   return text.str();
 }

@@ -193,6 +193,30 @@ bool PoseSearch::Settle(const Map& map, PoseFix* fix) const {
   return fix->T_camera_world.IsFinite();
 }
 
+std::optional<PoseFix> PoseSearch::FindNear(const Map& map, const TrackedFrame& frame, int keyframe,
+                                            const Pose& T_camera_world) const {
+  Contest contest{map, options_.min_inliers, std::max(1e-6, map.MedianDepth(keyframe)), {}, {}};
+  std::vector<int> near = map.BestCovisible(keyframe, 10, 15);
+  near.push_back(keyframe);
+  const std::vector<int> landmarks = map.LandmarksOf(near);
+  for (const float radius : {2.0F, 5.0F}) {
+    PoseFix fix(frame);
+    fix.T_camera_world = T_camera_world;
+    std::vector<int> visible;
+    if (MatchToLandmarks(map, rig_.camera, T_camera_world, landmarks, radius, &fix.matches, &visible) <
+            kMinProjected ||
+        Refine(map, &fix.matches, &fix.T_camera_world) < kMinGuess)
+      continue;
+    if (Offer(std::move(fix), &contest)) break;
+  }
+  return contest.best;
+}
+
+bool PoseSearch::SettleAgain(const Map& map, PoseFix* fix) const {
+  fix->visible.clear();
+  return Settle(map, fix);
+}
+
 // Settles a guess and keeps it if it is the best so far; true once there is no doubt left.
 bool PoseSearch::Offer(std::optional<PoseFix> guess, Contest* contest) const {
   if (!guess) return false;

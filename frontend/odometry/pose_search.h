@@ -25,6 +25,14 @@ class PoseSearch {
   /// not, or if there is no such keyframe.
   std::optional<PoseFix> FindAt(const Map& map, const TrackedFrame& frame, int keyframe) const;
 
+  /// Where `frame` is if it shows what the map has around a keyframe, as seen from about `T_camera_world`.
+  /// None if it does not.
+  std::optional<PoseFix> FindNear(const Map& map, const TrackedFrame& frame, int keyframe,
+                                  const Pose& T_camera_world) const;
+  /// Looks again for all that the local map has to show, from a pose and features that are known better.
+  /// False if that is nothing.
+  bool SettleAgain(const Map& map, PoseFix* fix) const;
+
   /// Refines a pose on the matches and drops those that do not fit. Returns the number of inliers; 0, and
   /// changes nothing, with fewer than 6 matches.
   int Refine(const Map& map, FrameMatches* matches, Pose* T_camera_world) const;

@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "frontend/map/map.h"
-#include "frontend/odometry/pose_search.h"
+#include "frontend/odometry/rolling_search.h"
 #include "frontend/odometry/tracked_frame.h"
 
 namespace tutti {
@@ -38,7 +38,7 @@ class Relocalizer {
 
  private:
   OdometryOptions options_;
-  PoseSearch search_;
+  RollingSearch search_;
   std::optional<TrackedFrame> lost_;
   std::optional<double> since_s_;  // first lost frame with something to see [s]
 };

@@ -33,10 +33,13 @@ struct PoseFix {
   TrackedFrame frame;    ///< its features are aligned with their landmarks
   FrameMatches matches;  ///< of frame.features
   Pose T_camera_world;
-  int reference = -1;        ///< keyframe that shares most landmarks with it
-  std::vector<int> visible;  ///< landmarks that should be in view
-  std::vector<int> found;    ///< those that are, -1 between them
-  int inliers = 0;           ///< landmarks that agree with the pose
+  int reference = -1;              ///< keyframe that shares most landmarks with it
+  std::vector<int> visible;        ///< landmarks that should be in view
+  std::vector<int> found;          ///< those that are, -1 between them
+  int inliers = 0;                 ///< landmarks that agree with the pose
+  bool by_grey = false;            ///< no landmarks: the grey values of the last frame say so
+  std::optional<Vector6d> drift;   ///< of the frames by grey values before it: T = Exp(drift) T_by_grey
+  std::optional<Vector6d> motion;  ///< that the rows of a rolling shutter tell: T_later = Exp(motion dt) T
 
   /// Inliers among the landmarks in view, of which there can't be more than features.
   double Share() const {
@@ -54,11 +57,12 @@ struct LastFrame {
   int reference = -1;                      ///< keyframe that shares most landmarks with it; -1: no frame yet
   int newest_keyframe = -1;                ///< or the one where the frame was found again
   std::int64_t frames_since_keyframe = 0;  ///< 0: it is that keyframe
+  int by_grey = 0;                         ///< so many frames in a row were posed by grey values alone
 
   template <class Archive>
   void State(Archive& archive) {
     archive(frame, matches.landmarks, T_camera_world, velocity, reference, newest_keyframe,
-            frames_since_keyframe);
+            frames_since_keyframe, by_grey);
     if (Archive::kReading) matches.features = frame.features.get();
   }
 };

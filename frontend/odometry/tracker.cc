@@ -23,18 +23,21 @@ Tracker::Tracked Tracker::Relocalize(int keyframe, PoseFix fix, const Map& map) 
 
 // The frame has this pose: it may become a keyframe, and is what the next one starts from.
 Tracker::Tracked Tracker::Accept(PoseFix fix, const Map& map) {
-  const KeyframeNeed need = policy_.Need(map, fix, last_);
+  const KeyframeNeed need = fix.by_grey ? KeyframeNeed::kNone : policy_.Need(map, fix, last_);
   const double dt = fix.frame.stamp_s - last_.frame.stamp_s;
   const bool moves = state_ == TrackingState::kTracking && dt > 0 && dt < kLongestGap;
   const Vector6d motion = LogSE3(fix.T_camera_world * last_.T_camera_world.Inverse());
   last_.velocity = moves ? std::optional<Vector6d>(motion / dt) : std::nullopt;
+  if (fix.motion) last_.velocity = fix.motion;
   last_.frame = fix.frame;
   last_.matches = fix.matches;
   last_.T_camera_world = fix.T_camera_world;
   last_.reference = fix.reference;
   ++last_.frames_since_keyframe;
+  const int by_grey_before = fix.by_grey ? 0 : last_.by_grey;
+  last_.by_grey = fix.by_grey ? last_.by_grey + 1 : 0;
   state_ = TrackingState::kTracking;
-  return {std::move(fix), need};
+  return {std::move(fix), need, by_grey_before};
 }
 
 void Tracker::Begin(const TrackedFrame& frame, const Keyframe& keyframe) {

@@ -5,7 +5,7 @@
 
 #include "frontend/map/map.h"
 #include "frontend/odometry/keyframe_policy.h"
-#include "frontend/odometry/pose_search.h"
+#include "frontend/odometry/rolling_search.h"
 #include "frontend/odometry/tracked_frame.h"
 #include "tutti/frontend/odometry.h"
 
@@ -22,6 +22,7 @@ class Tracker {
   struct Tracked {
     std::optional<PoseFix> fix;  ///< none: the frame is lost
     KeyframeNeed need = KeyframeNeed::kNone;
+    int by_grey_before = 0;  ///< frames that grey values alone posed since the last fix on landmarks
   };
 
   TrackingState state() const { return state_; }
@@ -57,7 +58,7 @@ class Tracker {
  private:
   Tracked Accept(PoseFix fix, const Map& map);
 
-  PoseSearch search_;
+  RollingSearch search_;
   KeyframePolicy policy_;
   TrackingState state_ = TrackingState::kInitializing;
   LastFrame last_;

@@ -163,6 +163,24 @@ void FrameFeatures::State(Archive& archive) {
   internal::StateOfRepeated(archive, size(), &inverse_depth);
   internal::StateOfRepeated(archive, size(), &inverse_depth_sigma);
   internal::StateOfSparse(archive, size(), &aligned);
+  std::vector<float> rolled_x, rolled_y;
+  if constexpr (!Archive::kReading) {
+    for (const cv::Point2f& r : rolled) {
+      rolled_x.push_back(r.x);
+      rolled_y.push_back(r.y);
+    }
+  }
+  archive(rolled_x, rolled_y);
+  if constexpr (Archive::kReading) {
+    if (rolled_x.size() != rolled_y.size() || (!rolled_x.empty() && rolled_x.size() != size()))
+      archive.Damaged("rows of something else");
+    rolled.clear();
+    for (std::size_t f = 0; f < rolled_x.size(); ++f) {
+      if (!(std::abs(rolled_x[f]) < 1e6F) || !(std::abs(rolled_y[f]) < 1e6F))
+        archive.Damaged("a keypoint that is nowhere");
+      rolled.emplace_back(rolled_x[f], rolled_y[f]);
+    }
+  }
   archive(lens, other_camera, has_depth, row_error_px, stereo_matches, columns_, rows_);
   internal::StateOfPyramid(archive, &pyramid);
   if constexpr (Archive::kReading) {

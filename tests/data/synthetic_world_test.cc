@@ -294,6 +294,29 @@ TEST(SyntheticWorldTest, KinectNoiseGrowsWithDepthAndLeavesHoles) {
   EXPECT_NEAR(cv::mean(error, noisy > 0)[0], 0.007, 0.006);
 }
 
+// Every row of a shaken camera with a rolling shutter is that of a still camera at the row's time.
+TEST(SyntheticWorldTest, RowsOfARollingShutterAreSeenFromWhereTheCameraIsThen) {
+  SyntheticOptions options = Small(SyntheticScene::kRoom, SyntheticSensor::kRgbd);
+  options.supersample = 1;
+  options.rate_hz = 30;
+  options.shake_deg_per_s = 200;
+  options.readout_s = 0.03;
+  const SyntheticWorld world(options);
+  const std::size_t i = 60;
+  const SyntheticFrame rolling = world.Render(i), global = world.RenderFrom(i, world.PoseOf(i));
+  EXPECT_GT(cv::norm(rolling.image, global.image, cv::NORM_L1) / static_cast<double>(global.image.total()),
+            5);
+  for (const int first : {0, 60, 120, 236}) {
+    const double late = options.readout_s * ((first + 1.5) / 239 - 0.5);
+    const SyntheticFrame then = world.RenderFrom(i, world.PoseAt(world.Stamp(i) + late));
+    for (const auto& [a, b] : {std::pair{rolling.image, then.image}, {rolling.depth_m, then.depth_m}}) {
+      cv::Mat difference;
+      cv::absdiff(a.rowRange(first, first + 4), b.rowRange(first, first + 4), difference);
+      EXPECT_LT(cv::mean(difference)[0], 0.3) << first;  // edges between pixels fall to either side
+    }
+  }
+}
+
 TEST(SyntheticWorldTest, WrittenStereoTownIsReadBackByTheKittiReader) {
   SyntheticOptions options = Small(SyntheticScene::kTown, SyntheticSensor::kStereo);
   options.frames = 5;
@@ -316,9 +339,14 @@ TEST(SyntheticWorldTest, WrittenStereoTownIsReadBackByTheKittiReader) {
 TEST(SyntheticWorldTest, WrittenRoomIsReadBackByTheTumReader) {
   SyntheticOptions options = Small(SyntheticScene::kRoom, SyntheticSensor::kRgbd);
   options.frames = 4;
+  options.readout_s = 0.03;
   const SyntheticWorld world(options);
   const auto folder = FreshFolder();
   WriteSyntheticDataset(world, folder);
+  std::ifstream config(folder / "config.yaml");
+  std::stringstream text;
+  text << config.rdbuf();
+  EXPECT_NE(text.str().find("readout_s: 0.03 "), std::string::npos) << text.str();
   DatasetOptions read = With(Sensor::kRgbd);
   read.camera = world.Camera();
   const auto data = OpenDataset(folder, read);

@@ -35,6 +35,7 @@ inline CameraRig RigOf(const SyntheticWorld& world) {
   rig.camera = world.Camera();
   rig.baseline_m = rig.sensor == Sensor::kStereo ? world.Options().baseline_m : 0;
   rig.rate_hz = world.Options().rate_hz;
+  rig.readout_s = world.Options().readout_s;
   return rig;
 }
 

@@ -134,6 +134,40 @@ TEST(HardToLose, MotionBlur) {
   EXPECT_LT(out.ate_m, 0.01 * out.path_m);
 }
 
+// A hand that shakes in a room, up to 200 deg/s about each axis, seen by a camera that takes 30 ms for an
+// image.
+SyntheticOptions Shaken() {
+  SyntheticOptions options;
+  options.scene = SyntheticScene::kRoom;
+  options.sensor = SyntheticSensor::kRgbd;
+  options.width = 320;
+  options.height = 240;
+  options.supersample = 1;
+  options.rate_hz = 30;
+  options.kinect_noise = true;
+  options.shake_deg_per_s = 200;
+  return options;
+}
+
+TEST(HardToLose, ARollingShutterInAShakingHand) {
+  SyntheticOptions options = Shaken();
+  options.readout_s = 0.03;
+  Recording rolling = testing::Record(SyntheticWorld(options), 120);
+  const Outcome out = Follow(rolling);
+  EXPECT_EQ(out.posed, out.frames);
+  EXPECT_LT(out.ate_m, 0.01 + 0.005 * out.path_m);
+  rolling.rig.readout_s = 0;
+  EXPECT_GT(Follow(rolling).ate_m, 1.5 * out.ate_m) << "what the readout is known for";
+}
+
+TEST(HardToLose, BlurInAShakingHand) {
+  SyntheticOptions options = Shaken();
+  options.motion_blur_s = 0.03;
+  const Outcome out = Follow(testing::Record(SyntheticWorld(options), 120));
+  EXPECT_EQ(out.posed, out.frames);
+  EXPECT_LT(out.ate_m, 0.01 + 0.005 * out.path_m);
+}
+
 TEST(HardToLose, ExposureJumps) {
   Recording jumps = Town(60);
   for (std::size_t i = 15; i < jumps.frames.size(); ++i) {

@@ -49,6 +49,22 @@ TEST_F(FrameHistoryTest, TellsPosesAndIndicesOfFrames) {
   EXPECT_EQ(history_.Indices(map_, 0), (std::vector<std::int64_t>{1, 2}));
 }
 
+TEST_F(FrameHistoryTest, ADriftIsSpreadOverTheNewestFrames) {
+  Add(0.1, 0.2, 0);
+  Add(0.2, 0.4, 0);
+  Add(0.3, 0.6, 0);
+  // The frame that comes next stands 0.3 m farther along the world's x than it would have by the others.
+  const Pose before = Moved(0.8, 0.5, 0.1);
+  Pose after = before;
+  after.translation.x() += 0.3;
+  const Vector6d drift = LogSE3(after.Inverse() * before);
+  history_.Spread(map_, 2, drift, after.Inverse().rotation);
+  const Trajectory poses = history_.Poses(map_, 0);
+  EXPECT_LT(Distance(poses[0].pose, Moved(0.2, 0.5, 0.1)), 1e-9);
+  EXPECT_LT(Distance(poses[1].pose, Moved(0.5, 0.5, 0.1)), 1e-9);
+  EXPECT_LT(Distance(poses[2].pose, Moved(0.8, 0.5, 0.1)), 1e-9);
+}
+
 TEST_F(FrameHistoryTest, FramesFollowTheirKeyframesWithTheirScale) {
   Add(0.1, 0.2, 0);
   Add(0.2, 1.3, 1);

@@ -78,6 +78,9 @@ struct DatasetOptions {
   TUTTI_OPTION(double, baseline_m, 0,
                "stereo: distance of the cameras, where sensor.yaml or calib.txt does not say it", Basic(),
                Section("camera"), Unit("m"), From(0));
+  TUTTI_OPTION(double, readout_s, 0,
+               "rolling shutter: the last row is read so long after the first; 0: all rows at once", Basic(),
+               Section("camera"), Unit("s"), From(0), To(0.1));
   TUTTI_OPTIONS_END;
 
   /// Empty if usable, else what is wrong.

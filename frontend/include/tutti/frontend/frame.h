@@ -28,6 +28,7 @@ struct CameraRig {
   Pose T_body_camera;      ///< camera -> the frame that ground truth is of (identity for KITTI and TUM)
   double rate_hz = 10;     ///< nominal frame rate [1/s]
   double max_depth_m = 0;  ///< RGB-D: depth beyond this is not used [m]; 0 = no limit
+  double readout_s = 0;    ///< rolling shutter: the last row is read so long after the first [s]
   bool calibrated = true;  ///< false: appearance only (no odometry is possible)
 };
 

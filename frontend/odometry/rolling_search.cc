@@ -1,0 +1,175 @@
+#include "frontend/odometry/rolling_search.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "frontend/geometry/measured.h"
+
+namespace tutti {
+namespace {
+
+// How fast the motion of a camera in a hand changes: about 200 deg/s at 1 Hz.
+constexpr double kTurningChange = 20;   // [rad/s^2]
+constexpr double kMovingChange = 2;     // [1/s^2], in units of the depth of what is in view
+constexpr double kTurningJerk = 140;    // [rad/s^3]
+constexpr double kMovingJerk = 15;      // [1/s^3], in units of that depth
+constexpr double kTurningNoise = 0.02;  // of what rows tell [rad/s]
+constexpr double kMovingNoise = 0.01;   // [1/s], in units of that depth
+constexpr double kMotionHolds = 0.1;    // after so long nothing is known of the motion [s]
+constexpr double kUnknownDepth = 3;     // of a view without landmarks [m]
+constexpr int kMostByGrey = 30;         // frames in a row that grey values alone pose
+constexpr double kFastestTurn = 10;     // [rad/s]
+constexpr double kFastestMove = 2;      // [1/s], in units of the depth of what is in view
+
+Vector6d Sigma(double dt, double depth) {
+  Vector6d sigma;
+  sigma << Eigen::Vector3d::Constant(kMovingChange * depth * dt),
+      Eigen::Vector3d::Constant(kTurningChange * dt);
+  return sigma;
+}
+
+}  // namespace
+
+RollingSearch::Expected RollingSearch::Expect(const Map& map, const TrackedFrame& frame,
+                                              const LastFrame& last) const {
+  const double depth = map.MedianDepth(last.reference), dt = frame.stamp_s - last.frame.stamp_s;
+  Expected expected;
+  expected.depth = depth > 0 ? depth : kUnknownDepth;
+  const bool known = last.velocity && dt > 0 && dt < kMotionHolds;
+  if (known) expected.camera.motion = *last.velocity;
+  expected.camera.T_camera_world = ExpSE3(expected.camera.motion * dt) * last.T_camera_world;
+  expected.prior.motion = expected.camera.motion;
+  expected.prior.sigma = Sigma(known ? dt : kMotionHolds, expected.depth);
+  if (known && shutter_.Rolls()) {
+    expected.prior.since_s = dt;
+    expected.prior.T_camera_world_before = last.T_camera_world;
+    expected.prior.motion_before = *last.velocity;
+    const double curve = dt * dt / 12;  // of the trapezoidal rule
+    expected.prior.mean_sigma << Eigen::Vector3d::Constant(expected.depth *
+                                                           (kMovingJerk * curve + kMovingNoise)),
+        Eigen::Vector3d::Constant(kTurningJerk * curve + kTurningNoise);
+  }
+  return expected;
+}
+
+std::shared_ptr<const FrameFeatures> RollingSearch::Straight(const TrackedFrame& frame,
+                                                             const Expected& expected) const {
+  return shutter_.Rolls() ? shutter_.Straighten(*frame.features, expected.camera.motion, expected.depth)
+                          : frame.features;
+}
+
+std::optional<PoseFix> RollingSearch::Find(const Map& map, const TrackedFrame& frame, const LastFrame& last,
+                                           bool lost) const {
+  if (last.reference < 0) return std::nullopt;
+  const Expected expected = Expect(map, frame, last);
+  std::optional<PoseFix> fix;
+  if (last.by_grey > 0) fix = Near(map, frame, last, expected);
+  if (!fix) {
+    TrackedFrame straight = frame;
+    straight.features = Straight(frame, expected);
+    fix = search_.Find(map, straight, last, lost);
+    if (!fix) return lost ? fix : ByGreyValues(map, frame, last, expected);
+    if (shutter_.Rolls()) fix = Again(map, *frame.features, expected, *std::move(fix));
+  }
+  if (last.by_grey > 0) {
+    if (const auto by_grey = Aligned(map, frame, last, expected))
+      fix->drift = LogSE3(fix->T_camera_world * by_grey->T_camera_world.Inverse());
+  }
+  return fix;
+}
+
+// Landmarks around the place where the camera is expected.
+std::optional<PoseFix> RollingSearch::Near(const Map& map, const TrackedFrame& frame, const LastFrame& last,
+                                           const Expected& expected) const {
+  TrackedFrame straight = frame;
+  straight.features = Straight(frame, expected);
+  std::optional<PoseFix> fix =
+      search_.FindNear(map, straight, last.reference, expected.camera.T_camera_world);
+  return fix && shutter_.Rolls() ? Again(map, *frame.features, expected, *std::move(fix)) : fix;
+}
+
+// Where the grey values of the last frame say that the camera is.
+std::optional<CameraMotion> RollingSearch::Aligned(const Map& map, const TrackedFrame& frame,
+                                                   const LastFrame& last, const Expected& expected) const {
+  const double dt = frame.stamp_s - last.frame.stamp_s;
+  if (!(dt > 0 && dt < kMotionHolds)) return std::nullopt;
+  const FrameFeatures& before = *last.frame.features;
+  ImageAligner::Reference reference{&before, last.T_camera_world, std::vector<double>(before.size(), 0)};
+  for (std::size_t f = 0; f < before.size(); ++f) {
+    const int l = last.matches.landmarks[f];
+    if (l >= 0 && map.landmark(l).alive) {
+      reference.depth[f] = (last.T_camera_world * map.landmark(l).position).z();
+    } else if (before.inverse_depth[f] > 0 &&
+               before.inverse_depth_sigma[f] < 0.2F * before.inverse_depth[f]) {
+      reference.depth[f] = 1 / double(before.inverse_depth[f]);
+    }
+  }
+  std::optional<CameraMotion> found =
+      aligner_.Align(reference, *frame.features, expected.camera, expected.prior);
+  if (!found) return std::nullopt;
+  const Vector6d step = LogSE3(found->T_camera_world * last.T_camera_world.Inverse());
+  const bool possible =
+      step.tail<3>().norm() < kFastestTurn * dt && step.head<3>().norm() < kFastestMove * expected.depth * dt;
+  return possible ? found : std::nullopt;
+}
+
+std::optional<PoseFix> RollingSearch::ByGreyValues(const Map& map, const TrackedFrame& frame,
+                                                   const LastFrame& last, const Expected& expected) const {
+  if (last.by_grey >= kMostByGrey) return std::nullopt;
+  const std::optional<CameraMotion> found = Aligned(map, frame, last, expected);
+  if (!found) return std::nullopt;
+  Expected better = expected;
+  better.camera.T_camera_world = found->T_camera_world;
+  if (shutter_.Rolls()) better.camera.motion = found->motion;
+  if (auto fix = Near(map, frame, last, better)) return fix;
+  TrackedFrame straight = frame;
+  straight.features = Straight(frame, better);
+  PoseFix fix(straight);
+  fix.T_camera_world = found->T_camera_world;
+  fix.reference = last.reference;
+  fix.by_grey = true;
+  if (shutter_.Rolls()) fix.motion = found->motion;
+  return fix;
+}
+
+std::optional<PoseFix> RollingSearch::FindAt(const Map& map, const TrackedFrame& frame, int keyframe) const {
+  std::optional<PoseFix> fix = search_.FindAt(map, frame, keyframe);
+  if (!fix || !shutter_.Rolls() || !frame.features->rolled.empty()) return fix;
+  const double depth = map.MedianDepth(keyframe);
+  Expected expected;
+  expected.depth = depth > 0 ? depth : kUnknownDepth;
+  expected.prior.sigma = Sigma(kMotionHolds, expected.depth);
+  return Again(map, *frame.features, expected, *std::move(fix));
+}
+
+// `seen`: the features as the image has them.
+PoseFix RollingSearch::Again(const Map& map, const FrameFeatures& seen, const Expected& expected,
+                             PoseFix fix) const {
+  // Where the image has them, those that were aligned more precisely.
+  FrameFeatures found = seen;
+  const FrameFeatures& straight = *fix.frame.features;
+  found.pyramid = straight.pyramid;
+  found.aligned = straight.aligned;
+  std::vector<PointObservation> observations;
+  for (std::size_t f = 0; f < seen.size(); ++f) {
+    const Eigen::Vector2d rolled = straight.Rolled(f);
+    found.keypoints[f].pt = straight.keypoints[f].pt -
+                            cv::Point2f(static_cast<float>(rolled.x()), static_cast<float>(rolled.y()));
+    const int l = fix.matches.landmarks[f];
+    if (l >= 0)
+      observations.push_back(Measured(map, found, {-1, static_cast<int>(f)}, l, options_.pixel_sigma));
+  }
+  Pose T_camera_world = fix.T_camera_world;
+  Vector6d motion;
+  std::vector<char> inlier;
+  if (shutter_.Refine(observations, expected.prior, &T_camera_world, &motion, &inlier) < options_.min_inliers)
+    return fix;
+  PoseFix again = fix;
+  again.frame.features = shutter_.Straighten(found, motion, expected.depth);
+  again.matches.features = again.frame.features.get();
+  again.T_camera_world = T_camera_world;
+  again.motion = motion;
+  return search_.SettleAgain(map, &again) && again.inliers >= options_.min_inliers ? again : fix;
+}
+
+}  // namespace tutti

@@ -300,7 +300,8 @@ TEST(KeyframeGraph, RemovedKeyframesLeaveTheMeasurementsOfBeforeACorrection) {
 TEST(KeyframeGraph, ARecordingThatBeginsIsTiedToWhatItSees) {
   const auto edges = [](const KeyframeGraph& graph) {
     std::vector<std::pair<int, int>> out;
-    for (const PoseGraphEdge& edge : graph.Graph({}).edges()) out.emplace_back(edge.from, edge.to);
+    const PoseGraph built = graph.Graph({});
+    for (const PoseGraphEdge& edge : built.edges()) out.emplace_back(edge.from, edge.to);
     std::sort(out.begin(), out.end());
     return out;
   };

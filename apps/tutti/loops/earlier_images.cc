@@ -40,7 +40,7 @@ EarlierImages::EarlierImages(const LoopDetector& detector, const std::string& me
   for (int number = 1; std::getline(in, line); ++number) {
     const std::size_t comma = line.find(',');
     const auto id = ParseInteger(line.substr(0, comma));
-    if (number == 1 && line == kHead) continue;
+    if (line == kHead) continue;
     if (comma == std::string::npos || !id) {
       throw InputError(
           list_.string() + ":" + std::to_string(number) +

@@ -64,6 +64,7 @@ class SavedDetector : public ::testing::Test {
 TEST_F(SavedDetector, MergedLocationsAreForgottenAndTheirPlacesFoundInTheOlderOnes) {
   for (const MemoryKind memory : {MemoryKind::kShared, MemoryKind::kPerMember}) {
     LoopDetectorOptions options = testing::SmallOptions();
+    if (memory == MemoryKind::kPerMember) SetRule("mean", options);
     options.memory = memory;
     LoopDetector whole(options);
     Walk(whole, 0, 24, kPlaces);
@@ -102,7 +103,7 @@ TEST_F(SavedDetector, MergedLocationsOfLongTermMemoryAreNotSavedAndStayAwayFromI
     Walk(detector, 0, 18, kPlaces);
     long_term = detector.NumLongTerm();
     ASSERT_GT(long_term, 3u);
-    for (int id = 1; id < 5; ++id) EXPECT_TRUE(detector.Merge(id, 0));
+    for (int id = 1; id < 12; ++id) EXPECT_TRUE(detector.Merge(id, 0));
     EXPECT_LT(detector.NumLongTerm(), long_term);
     detector.Save(file_);
     LoopDetectorOptions without = options;

@@ -160,14 +160,6 @@ TEST(HardToLose, ARollingShutterInAShakingHand) {
   EXPECT_GT(Follow(rolling).ate_m, 1.5 * out.ate_m) << "what the readout is known for";
 }
 
-TEST(HardToLose, BlurInAShakingHand) {
-  SyntheticOptions options = Shaken();
-  options.motion_blur_s = 0.03;
-  const Outcome out = Follow(testing::Record(SyntheticWorld(options), 120));
-  EXPECT_EQ(out.posed, out.frames);
-  EXPECT_LT(out.ate_m, 0.01 + 0.005 * out.path_m);
-}
-
 TEST(HardToLose, ExposureJumps) {
   Recording jumps = Town(60);
   for (std::size_t i = 15; i < jumps.frames.size(); ++i) {

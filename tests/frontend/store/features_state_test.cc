@@ -70,6 +70,16 @@ FrameFeatures OfATown() {
   return ExtractFeatures(frame, rig, OdometryOptions());
 }
 
+TEST(FeaturesState, WhatARollingShutterMovedIsKept) {
+  FrameFeatures written = OfATown();
+  EXPECT_TRUE(Read<FrameFeatures>(Bytes(written)).rolled.empty());
+  for (std::size_t f = 0; f < written.size(); ++f)
+    written.rolled.emplace_back(0.5F * static_cast<float>(f), -1.25F);
+  EXPECT_EQ(Read<FrameFeatures>(Bytes(written)).rolled, written.rolled);
+  written.rolled.pop_back();
+  EXPECT_THROW(Read<FrameFeatures>(Bytes(written)), InputError);
+}
+
 TEST(FeaturesState, PyramidAndGridAreMadeAgainAsTheyWere) {
   FrameFeatures written = OfATown();
   FrameFeatures read = Read<FrameFeatures>(Bytes(written));

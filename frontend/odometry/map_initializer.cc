@@ -8,7 +8,7 @@ namespace {
 constexpr int kMinDepthFeatures = 50;      // features with depth that a metric map starts from
 constexpr float kBackwardsRadius = 30.0F;  // between neighbouring frames [px]
 constexpr std::size_t kMaxWaiting = 100;   // frames kept to be posed backwards
-constexpr int kFramesToRecognise = 5;      // of a session, before it starts a piece of its own
+constexpr int kFramesToRecognise = 3;      // of a session: with so many it starts a piece of its own
 }  // namespace
 
 void MapInitializer::Reset() {

@@ -46,24 +46,24 @@ class SessionsCommand : public ::testing::Test {
 };
 
 TEST_F(SessionsCommand, ARunGoesOnInTheMapOfAnotherAndBothAreInTheNewOne) {
-  const auto day = Run(town_, day_, {"--config", Config(town_), "--end", "175"});
+  const auto day = Run(town_, day_, {"--config", Config(town_), "--end", "150"});
   ASSERT_EQ(day.status, 0) << day.output;
   const std::string map = (day_ / "map.tutti").string();
   const std::string before = ReadAll(map);
-  const auto next = Run(town_, next_, {"--map", map, "--start", "175"});  // with the map's configuration
+  const auto next = Run(town_, next_, {"--map", map, "--start", "150"});  // with the map's configuration
   ASSERT_EQ(next.status, 0) << next.output;
   EXPECT_THAT(next.output, HasSubstr("in the map " + map));
   EXPECT_EQ(ReadAll(map) == before, true);
   const json summary = Summary(next_);
   EXPECT_EQ(summary["map"]["joined"], true);
-  EXPECT_GE(static_cast<int>(summary["map"]["joined_at_frame"]), 175);
+  EXPECT_GE(static_cast<int>(summary["map"]["joined_at_frame"]), 150);
   EXPECT_EQ(summary["map"]["sessions"].size(), 2u);
   EXPECT_EQ(summary["map"]["frame_offset"], 100000);
   // Its frames, in the frame of reference of the map, which begins where the truth does.
   const Trajectory found = ReadTrajectory(next_ / "trajectory.txt", TrajectoryFormat::kTum);
   EXPECT_EQ(found.size(), static_cast<std::size_t>(summary["frames"]["tracked"]));
   const Trajectory truth = ReadTrajectory(town_.path() / "poses.txt", TrajectoryFormat::kKitti);
-  EXPECT_GE(found.size(), (truth.size() - 175) * 9 / 10);
+  EXPECT_GE(found.size(), (truth.size() - 150) * 9 / 10);
   double worst = 0;
   for (const StampedPose& pose : found) {
     const auto frame = static_cast<std::size_t>(std::lround(pose.stamp_s * 4.5));
@@ -76,7 +76,7 @@ TEST_F(SessionsCommand, ARunGoesOnInTheMapOfAnotherAndBothAreInTheNewOne) {
   EXPECT_EQ(info["sessions"][0]["first_keyframe"], 0);
   EXPECT_EQ(info["sessions"][1]["last_keyframe"], static_cast<int>(info["keyframes"]) - 1);
   EXPECT_EQ(info["submaps"], 1);
-  for (const auto& [session, frames] : {std::pair("1", 175u), std::pair("2", 0u)}) {
+  for (const auto& [session, frames] : {std::pair("1", 150u), std::pair("2", 0u)}) {
     const fs::path tum = folder_ / (std::string("of") + session + ".tum");
     const auto written = RunTutti({"export", next_.string(), "--tum", tum.string(), "--session", session});
     ASSERT_EQ(written.status, 0) << written.output;
@@ -87,7 +87,7 @@ TEST_F(SessionsCommand, ARunGoesOnInTheMapOfAnotherAndBothAreInTheNewOne) {
 
 TEST_F(SessionsCommand, MapsAreMergedWhereTheyShowTheSameAndRefusedWhereNot) {
   ASSERT_EQ(Run(town_, day_, {"--config", Config(town_), "--end", "130"}).status, 0);
-  ASSERT_EQ(Run(town_, next_, {"--config", Config(town_), "--start", "90", "--end", "220"}).status, 0);
+  ASSERT_EQ(Run(town_, next_, {"--config", Config(town_), "--start", "90", "--end", "190"}).status, 0);
   const std::string day = (day_ / "map.tutti").string(), next = (next_ / "map.tutti").string(),
                     both = (folder_ / "both.tutti").string();
   const auto merged = RunTutti({"merge", day, next, "-o", both});
@@ -96,7 +96,7 @@ TEST_F(SessionsCommand, MapsAreMergedWhereTheyShowTheSameAndRefusedWhereNot) {
   const json info = json::parse(RunTutti({"map", "info", both, "--json", "--check"}).output);
   EXPECT_EQ(info["sessions"].size(), 2u);
   EXPECT_EQ(info["submaps"], 1);
-  EXPECT_EQ(info["frames"], 260);
+  EXPECT_EQ(info["frames"], 230);
   const auto localized = RunTutti({"localize", "--map", both, "--dataset", town_.path().string(), "--start",
                                    "150", "--end", "180", "--out", (folder_ / "where").string()});
   EXPECT_EQ(localized.status, 0) << localized.output;

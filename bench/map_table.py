@@ -3,7 +3,7 @@
 
 usage: ./dev bench map [ROW...] [--reuse] [--write]   (or bench/map_table.py --build build/release)
 
-Rows: town redkitchen kitti (size and time); kitchen kitti-places wrong-map start pruned (what a map is good for). Those whose
+Rows: town redkitchen kitti (size and time); kitchen kitti-places wrong-map start driven pruned (what a map is good for). Those whose
 data is absent are left out. Needs nothing but Python 3.
 """
 import json

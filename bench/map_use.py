@@ -15,6 +15,8 @@ import table
 KITCHEN = ("7scenes.yaml", "redkitchen")
 KITTI = ("kitti_00-02_mono.yaml", "kitti_00_head")
 PASSES, MAPPED = 5, 250  # of the kitchen: times that its first frames are seen, and how many these are
+LAPS = 10
+SMALL_TOWN = ["--sensor", "stereo", "--width", 320, "--height", 160, "--block", 26, "--rate", 4.5, "--blocks-x", 1, "--laps", LAPS]
 TOWN = ["--sensor", "stereo", "--blocks-x", 1, "--laps", 1]
 
 
@@ -235,9 +237,25 @@ def pruned(a):
     return rows + [(f"frames {MAPPED} on in the pruned map of those before: " + what, *rest) for what, *rest in located]
 
 
+def driven(a):
+    """A small town driven ten times, pruned, against one lap."""
+    town = table.generate(a.tutti, a.out / "town_driven", SMALL_TOWN)
+    lap = len((town / "poses.txt").read_text().splitlines()) // LAPS
+    once = map_info(a, run(a, "driven_once", town, "--end", lap) / "map.tutti")["keyframes"]
+    often = run(a, "driven_often", town) / "map.tutti"
+    small = a.out / "driven.tutti"
+    tutti(a, "map", "prune", often, "-o", small)
+    before, after = (map_info(a, file)["keyframes"] for file in (often, small))
+    megabytes = [file.stat().st_size / 2**20 for file in (often, small)]
+    return [("keyframes after pruning, of those of one lap", "<= 1.3",
+             f"{after / once:.2f} ({once} after one lap, {before} after {LAPS}, {after} pruned; "
+             f"{megabytes[0]:.1f} MB, {megabytes[1]:.1f} MB pruned)", after <= 1.3 * once)]
+
+
 # name: title, data that it needs, function. (Two sessions and merged maps go here.)
 ROWS = {"kitchen": (f"`redkitchen`, map of frames 0 to {MAPPED - 1}, the rest located in it", [KITCHEN], kitchen),
         "kitti-places": ("`kitti_00_head`, mono, map of 0 to 999, 1560 to 1640 located in it", [KITTI], kitti),
         "wrong-map": ("wrong map", [KITCHEN, KITTI], wrong),
         "start": ("`kitti_00_head`", [KITTI], start),
+        "driven": (f"small generated town, stereo, {LAPS} laps", [], driven),
         "pruned": (f"`redkitchen`, frames 0 to {MAPPED - 1} seen {PASSES} times", [KITCHEN], pruned)}

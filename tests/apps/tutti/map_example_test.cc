@@ -15,13 +15,13 @@ using ::testing::HasSubstr;
 using testing::RunProgramAndSignal;
 
 TEST(MapExample, MapsALapAndLocatesTheNextFramesInIt) {
-  constexpr int kLap = 175;
+  constexpr int kLap = 142;
   const testing::GeneratedDataset town("town_of_the_example", testing::SmallStereoTownWithALoop(320, 160));
   const std::filesystem::path map = testing::FreshFolder() / "map.tutti";
   const auto run = RunProgramAndSignal(
       TUTTI_EXAMPLE_06, {town.path() / "config.yaml", town.path(), std::to_string(kLap), map}, "", 0);
   EXPECT_EQ(run.status, 0) << run.output;
-  EXPECT_THAT(run.output, HasSubstr("map of 175 frames: "));
+  EXPECT_THAT(run.output, HasSubstr("map of 142 frames: "));
   EXPECT_THAT(run.output, HasSubstr(" landmarks, sigma 0.0"));
   EXPECT_THAT(run.output, HasSubstr(" frames are in the map\n"));
   EXPECT_EQ(ReadMapInfo(map).frames, kLap) << "the map has none of the frames that were located in it";

@@ -58,7 +58,7 @@ void ForEach(RunConfig& config, const Visitor& visit) {
 
 // Another value that can be read.
 void Change(const OptionText& text, double& field) {
-  for (const double other : {0.9 * field, 1.1 * field, 0.5}) {
+  for (const double other : {0.9 * field, 1.1 * field, 0.5, 0.05}) {
     if (other == field || !text.Refusal("", other).empty()) continue;
     field = other;
     return;

@@ -116,6 +116,7 @@ TEST_P(Sessions, AnotherRecordingJoinsTheMapWhoseFrameOfReferenceStaysWithTheSam
     info.config.run.threads = threads;
     const auto slam = SlamSystem::Load(map, info);
     const Pose before = slam->odometry()->KeyframePose(0);
+    const std::size_t submaps = slam->odometry()->Pieces().size();
     slam->BeginSession(next.rig);
     TrackAll(next, slam.get());
     const std::vector<MapSession> sessions = slam->Sessions();
@@ -125,7 +126,7 @@ TEST_P(Sessions, AnotherRecordingJoinsTheMapWhoseFrameOfReferenceStaysWithTheSam
     EXPECT_GT(sessions[1].frame_offset, sessions[0].last_frame);
     EXPECT_GT(sessions[1].first_keyframe, sessions[0].last_keyframe);
     ASSERT_TRUE(sessions[1].joined_at.has_value());
-    EXPECT_EQ(slam->odometry()->Pieces().size(), 1u);
+    EXPECT_LE(slam->odometry()->Pieces().size(), submaps) << "the session is in one of the map's";
     EXPECT_GE(PosedFrames(*slam, sessions[1]), next.frames.size() * 9 / 10);
     const Pose moved = before.Inverse() * slam->odometry()->KeyframePose(0);
     EXPECT_LT(moved.translation.norm(), 0.05);

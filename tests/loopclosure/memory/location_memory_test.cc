@@ -242,7 +242,6 @@ TEST(LocationMemory, WhatNoMemoryWouldHaveSavedIsRefused) {
   refused(1, {11, State::kMerged, 0, 0, 1});                                          // merged into itself
   refused(1, {11, State::kWorking, 0, 0, 0});  // not merged, but another's
   refused(2, {12, State::kMerged, 0, 0, 1});   // into a merged one
-  refused(2, {12, State::kWorking, 0, 0, 2});  // nothing in STM
 }
 
 TEST(LocationMemory, AMergedLocationHandsLinksWeightAndNamesToAnOlderOne) {

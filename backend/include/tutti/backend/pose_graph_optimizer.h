@@ -86,8 +86,7 @@ struct PoseGraphOptions {
                From(0));
   TUTTI_OPTION(PoseGraphSolver, solver, PoseGraphSolver::kCeres,
                "who solves it: ceres, or block (own block Cholesky: the same optimum in less time; robust: "
-               "switchable is left to ceres; `tutti optimize` takes it)",
-               Basic());
+               "switchable is left to ceres; `tutti optimize` takes it)");
   TUTTI_OPTION(GraphInit, init, GraphInit::kAuto,
                "start from the present poses (file), odometry, chordal relaxation, or the best of them "
                "(auto)");

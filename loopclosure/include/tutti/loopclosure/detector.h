@@ -206,8 +206,8 @@ class LoopDetector {
   /// misuse, as Detect does.
   LoopResult Locate(const LoopQuery& query) const;
 
-  /// Another recording begins, which may start anywhere: the locations of short-term memory become candidates,
-  /// and the filters start from "all places are as likely". Ids must go on to grow.
+  /// Another recording begins, which may start anywhere: the locations of short-term memory become
+  /// candidates, and the filters start from "all places are as likely". Ids must go on to grow.
   void BeginSession();
 
   /// Adds a neighbour link between two locations (a caller's own odometry link); consecutive ids are linked

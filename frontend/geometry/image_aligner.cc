@@ -18,7 +18,7 @@ constexpr int kLeastPoints = 60;
 constexpr int kIterations = 12;
 constexpr double kGreySigma = 8;         // of what a sample may differ by [grey levels]; beyond, Huber's loss
 constexpr double kLeastExplained = 0.5;  // of the variance of the samples
-constexpr internal::GaussNewtonLimits kLimits{kIterations, 1e-5, 1e-4, 1e-9};
+constexpr internal::GaussNewtonLimits kAlignerLimits{kIterations, 1e-5, 1e-4, 1e-9};
 constexpr int kUnknowns = 13;  // pose, motion, brightness
 
 // The pyramid and two coarser levels, each half as large as the one before.
@@ -98,7 +98,7 @@ class ImageAligner::Level {
       return now->T_camera_world.IsFinite();
     };
     return static_cast<int>(targets_.size()) >= kLeastPoints &&
-           internal::GaussNewton<kUnknowns>(kLimits, linearise, move);
+           internal::GaussNewton<kUnknowns>(kAlignerLimits, linearise, move);
   }
 
  private:

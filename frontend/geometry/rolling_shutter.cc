@@ -5,7 +5,7 @@
 namespace tutti {
 namespace {
 
-constexpr internal::GaussNewtonLimits kLimits{10, 1e-7, 1e-5, 0};
+constexpr internal::GaussNewtonLimits kShutterLimits{10, 1e-7, 1e-5, 0};
 constexpr int kRounds = 4;
 
 }  // namespace
@@ -61,7 +61,7 @@ int RollingShutter::Refine(const std::vector<PointObservation>& observations, co
       *motion += step.tail<6>();
       return true;
     };
-    internal::GaussNewton<12>(kLimits, linearise, move);
+    internal::GaussNewton<12>(kShutterLimits, linearise, move);
     inliers = 0;
     for (std::size_t i = 0; i < observations.size(); ++i) {
       Eigen::Vector3d r;

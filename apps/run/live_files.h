@@ -42,9 +42,9 @@ class LiveFiles {
 
   /// After each frame: its pose as it is given out now, and the loops that came with it.
   void Add(double stamp_s, const TrackResult& track, const RunState& state);
-  /// Loops alone.
   /// So many loops are none of this run's: they were in the map that it goes on in.
   void Skip(std::size_t loops) { loops_written_ = loops; }
+  /// Loops alone.
   void AddLoops(const std::vector<LoopRecord>& loops);
   /// In place of what the files hold: the poses and loops so far of a run that is gone on with.
   void Resume(Trajectory trajectory, const std::vector<LoopRecord>& loops);

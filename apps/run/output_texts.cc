@@ -9,6 +9,7 @@
 #include "apps/run/graph_json.h"
 #include "apps/run/outputs.h"
 #include "apps/run/run_doubts.h"
+#include "apps/run/run_note.h"
 #include "apps/run/run_parts.h"
 #include "apps/run/timing.h"
 #include "tutti/slam/version.h"
@@ -150,10 +151,7 @@ Json MapJson(const RunResult& r) {
                {"frame_offset", own.frame_offset},
                {"sessions", Json::array()}};
   for (const MapSession& session : r.map->sessions) {
-    const Json note = Json::parse(session.note, nullptr, false);
-    json["sessions"].push_back({{"dataset", &session == &own   ? r.dataset
-                                            : note.is_object() ? note.value("dataset", "")
-                                                               : ""},
+    json["sessions"].push_back({{"dataset", &session == &own ? r.dataset : DatasetOfNote(session.note)},
                                 {"frame_offset", session.frame_offset},
                                 {"frames", session.frames},
                                 {"keyframes", session.keyframes},

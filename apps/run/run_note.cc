@@ -50,4 +50,9 @@ RunRequest RequestOf(const std::string& note, const fs::path& file) {
   return request;
 }
 
+std::string DatasetOfNote(const std::string& note) {
+  const nlohmann::json json = nlohmann::json::parse(note, nullptr, false);
+  return json.is_object() ? json.value("dataset", std::string()) : std::string();
+}
+
 }  // namespace tutti

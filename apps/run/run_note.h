@@ -13,4 +13,7 @@ std::string NoteOf(const RunRequest& request);
 /// What NoteOf made. Throws InputError, with the name of the file, if it is something else.
 RunRequest RequestOf(const std::string& note, const std::filesystem::path& file);
 
+/// The data set that NoteOf was given; "" if the note is something else.
+std::string DatasetOfNote(const std::string& note);
+
 }  // namespace tutti

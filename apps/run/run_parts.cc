@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <limits>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <set>
 
+#include "apps/run/run_note.h"
 #include "core/median.h"
 #include "tutti/core/error.h"
 
@@ -134,17 +134,14 @@ void CollectEarlierSessions(const RunState& state, RunResult& result) {
 }
 
 void CollectStamps(const Odometry& odometry, const std::vector<MapSession>& sessions, RunResult& result) {
-  const auto dataset = [](const MapSession& session) {
-    const nlohmann::json note = nlohmann::json::parse(session.note, nullptr, false);
-    return note.is_object() ? note.value("dataset", std::string()) : std::string();
-  };
   const std::string own = fs::absolute(result.dataset).lexically_normal().string();
   std::map<std::int64_t, double> stamps;  // of keyframes, by frame
   for (const int id : odometry.KeyframeIds()) {
     const std::int64_t frame = odometry.KeyframeFrameIndex(id);
     const auto later = [](std::int64_t f, const MapSession& s) { return f < s.frame_offset; };
     const auto session = std::upper_bound(sessions.begin(), sessions.end() - 1, frame, later);
-    if (frame < sessions.back().frame_offset && session != sessions.begin() && dataset(*(session - 1)) == own)
+    if (frame < sessions.back().frame_offset && session != sessions.begin() &&
+        DatasetOfNote((session - 1)->note) == own)
       stamps[frame] = odometry.KeyframeStamp(id);
   }
   for (LoopRecord& loop : result.loops) {

@@ -2,12 +2,12 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <utility>
 
 #include "apps/export/map_export.h"
+#include "apps/run/run_note.h"
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
 #include "tutti/core/error.h"
@@ -36,12 +36,6 @@ fs::path MapFile(const std::string& run_or_map) {
   return file;
 }
 
-// The data set that the run was called with; none where its map does not say so.
-std::string DatasetOf(const MapSession& session) {
-  const nlohmann::json note = nlohmann::json::parse(session.note, nullptr, false);
-  return note.is_object() ? note.value("dataset", std::string()) : std::string();
-}
-
 void Warn(const std::string& warning) { std::fprintf(stderr, "tutti: warning: %s\n", warning.c_str()); }
 
 // Images are not needed for everything: where they can't be had, ExportMap says what it makes of that.
@@ -49,7 +43,7 @@ std::unique_ptr<Dataset> OpenImages(const ExportArguments& arguments, const MapI
                                     const MapSession& session) {
   const ExportRequest& request = arguments.request;
   if (!request.landmarks && !request.colmap && !request.transforms) return nullptr;
-  const std::string path = arguments.dataset.empty() ? DatasetOf(session) : arguments.dataset;
+  const std::string path = arguments.dataset.empty() ? DatasetOfNote(session.note) : arguments.dataset;
   if (path.empty() || IsCamera(path)) return nullptr;
   try {
     return OpenDataset(path, info.config.dataset);

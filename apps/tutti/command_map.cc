@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "apps/run/run_note.h"
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/map_prune.h"
@@ -28,25 +29,20 @@ nlohmann::json NoteOf(const MapInfo& info) {
   return note.is_object() ? note : nlohmann::json::object();
 }
 
-std::string DatasetOfSession(const MapSession& session) {
-  const nlohmann::json note = nlohmann::json::parse(session.note, nullptr, false);
-  return note.is_object() ? note.value("dataset", std::string()) : std::string();
-}
-
 void PrintSessions(const MapInfo& info) {
   std::printf("  sessions       %zu\n", info.sessions.size());
   for (std::size_t s = 0; s < info.sessions.size(); ++s) {
     const MapSession& session = info.sessions[s];
     std::printf("    %zu: keyframes %d to %d, %lld frames, numbers from %lld on  %s\n", s + 1,
                 session.first_keyframe, session.last_keyframe, static_cast<long long>(session.frames),
-                static_cast<long long>(session.frame_offset), DatasetOfSession(session).c_str());
+                static_cast<long long>(session.frame_offset), DatasetOfNote(session.note).c_str());
   }
 }
 
 nlohmann::ordered_json SessionsJson(const MapInfo& info) {
   nlohmann::ordered_json json = nlohmann::ordered_json::array();
   for (const MapSession& session : info.sessions) {
-    json.push_back({{"dataset", DatasetOfSession(session)},
+    json.push_back({{"dataset", DatasetOfNote(session.note)},
                     {"frames", session.frames},
                     {"last_frame", session.last_frame},
                     {"frame_offset", session.frame_offset},

@@ -150,15 +150,22 @@ bool KeyframeGraph::Begins(int keyframe) const {
   return std::binary_search(sessions_.begin(), sessions_.end(), keyframe);
 }
 
-// A recording that began in the map hangs on what its first keyframe saw there; on the keyframe before, if
-// that is not much.
+// A keyframe that does not follow the one before (a recording began in the map, or a lost camera was found
+// again in an earlier piece) hangs on what it saw there; on the last keyframe of that piece, if that is not
+// much.
 void KeyframeGraph::TieBeginnings() {
   for (std::size_t i = 1; i < keyframes_.size(); ++i) {
-    const int older = keyframes_[i - 1].id, newer = keyframes_[i].id;
-    if (!Begins(newer) || !OfOnePiece(older, newer)) continue;
-    const bool tied =
-        std::any_of(edges_.begin(), edges_.end(), [newer](const Edge& edge) { return edge.newer == newer; });
-    if (!tied) edges_.push_back({older, newer, {}});
+    const int newer = keyframes_[i].id, before = keyframes_[i - 1].id;
+    if (Consecutive(before, newer) && !Begins(newer) && OfOnePiece(before, newer)) continue;
+    const auto ends_here = [newer](const Edge& edge) { return edge.newer == newer; };
+    if (std::any_of(edges_.begin(), edges_.end(), ends_here) ||
+        std::any_of(carried_.begin(), carried_.end(), ends_here))
+      continue;
+    for (std::size_t j = i; j-- > 0;) {
+      if (!OfOnePiece(keyframes_[j].id, newer)) continue;
+      edges_.push_back({keyframes_[j].id, newer, {}});
+      break;
+    }
   }
 }
 

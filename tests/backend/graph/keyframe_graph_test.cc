@@ -322,5 +322,27 @@ TEST(KeyframeGraph, ARecordingThatBeginsIsTiedToWhatItSees) {
   EXPECT_EQ(std::count(tied.begin(), tied.end(), std::pair(29, 30)), 1);
 }
 
+// A camera that was lost, and had begun another piece, is found again in the first one.
+TEST(KeyframeGraph, AKeyframeThatWasFoundAgainMovesWithItsPiece) {
+  const auto synthetic = Drifting(GraphKind::kSE3, 100);
+  std::vector<MapKeyframe> keyframes = KeyframesOf(synthetic);
+  for (std::size_t id = 60; id < 70; ++id) keyframes[id].piece = 1;
+  KeyframeGraph graph;
+  graph.Update(keyframes);
+  const std::vector<LoopEdge> loops = {TrueLoop(synthetic, 5, 90)};
+  EXPECT_TRUE(HasEdge(graph.Graph(loops), 59, 70));
+  EXPECT_FALSE(HasEdge(graph.Graph(loops), 69, 70)) << "of two pieces";
+  EXPECT_FALSE(HasEdge(graph.Graph(loops), 59, 60)) << "of two pieces";
+  const KeyframeCorrection correction = graph.Optimize(loops);
+  ASSERT_TRUE(correction.success);
+  EXPECT_TRUE(correction.merges.empty());
+  const Pose& before = keyframes[70].T_world_keyframe;
+  EXPECT_GT((correction.S_world_keyframe.at(70).translation - before.translation).norm(), 1e-4);
+  // What it sees of the old keyframes says more than the last one of them.
+  graph.Update(keyframes, {{20, 70, 150}});
+  EXPECT_TRUE(HasEdge(graph.Graph(loops), 20, 70));
+  EXPECT_FALSE(HasEdge(graph.Graph(loops), 59, 70));
+}
+
 }  // namespace
 }  // namespace tutti

@@ -95,7 +95,8 @@ class KeyframeGraph {
 
   /// The map as it is now: all keyframes, ascending by id, and which of them see the same landmarks. Two of
   /// them get an odometry edge if they are consecutive, or of the strongest covisible pairs, and were of one
-  /// piece when the newer one was new.
+  /// piece when the newer one was new. A piece stays connected: what nothing else ties hangs on its last
+  /// keyframe before.
   void Update(std::vector<MapKeyframe> keyframes, const std::vector<CovisiblePair>& covisible = {});
 
   /// Keyframes from this id on are of another recording, which did not begin where the one before ended: no

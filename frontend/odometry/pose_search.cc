@@ -7,6 +7,7 @@
 #include "frontend/features/patch_aligner.h"
 #include "frontend/geometry/measured.h"
 #include "frontend/geometry/pose_solver.h"
+#include "frontend/odometry/reach.h"
 
 namespace tutti {
 namespace {
@@ -20,6 +21,7 @@ constexpr double kSurePrediction = 0.5;     // a velocity holds for so long [s]
 constexpr double kLongestPrediction = 1.5;  // [s]
 constexpr double kLeastShare = 0.14;        // of the landmarks in view that must be found again;
 constexpr double kSureShare = 0.2;          // with so many nothing else needs to be tried
+constexpr double kShareForAJump = 0.5;      // and with so many the motion so far may be wrong
 
 // Keyframe with most votes by the landmarks seen (ties: the newest); -1 if there is none.
 int MostVoted(const std::map<int, int>& votes) {
@@ -57,9 +59,16 @@ std::vector<Pose> Predictions(const LastFrame& last, double stamp_s) {
 
 // The guesses for one frame so far.
 struct PoseSearch::Contest {
+  bool Convinces(const PoseFix& fix) const {
+    const int enough = std::max(least_inliers, best ? best->inliers + 1 : 1);
+    return fix.inliers >= enough && fix.Share() >= kLeastShare &&
+           (!reach || reach->Has(fix.T_camera_world) || fix.Share() >= kShareForAJump);
+  }
+
   const Map& map;
   int least_inliers;
   double depth;                 // of what is in view [m]
+  std::optional<Reach> reach;   // by a motion that was steady
   std::vector<Pose> offered;    // what would show the same is not settled again
   std::optional<PoseFix> best;  // none: no guess has convinced yet
 };
@@ -67,11 +76,10 @@ struct PoseSearch::Contest {
 std::optional<PoseFix> PoseSearch::Find(const Map& map, const TrackedFrame& frame, const LastFrame& last,
                                         bool lost) const {
   if (last.reference < 0) return std::nullopt;
-  Contest contest{map,
-                  lost ? 2 * options_.min_inliers : options_.min_inliers,
-                  std::max(1e-6, map.MedianDepth(last.reference)),
-                  {},
-                  {}};
+  const double depth = std::max(1e-6, map.MedianDepth(last.reference));
+  Contest contest{map,   lost ? 2 * options_.min_inliers : options_.min_inliers,
+                  depth, last.steady ? ReachOf(last, frame.stamp_s, depth, rig_.sensor) : std::nullopt,
+                  {},    {}};
   const float base = rig_.sensor == Sensor::kStereo ? 8.0F : 15.0F;
   for (const Pose& prediction : Predictions(last, frame.stamp_s)) {
     for (const float radius : {base, 2 * base, 4 * base}) {
@@ -95,7 +103,7 @@ std::optional<PoseFix> PoseSearch::Find(const Map& map, const TrackedFrame& fram
 
 std::optional<PoseFix> PoseSearch::FindAt(const Map& map, const TrackedFrame& frame, int keyframe) const {
   if (keyframe < 0 || keyframe >= map.KeyframeCount()) return std::nullopt;
-  Contest contest{map, 2 * options_.min_inliers, 1.0, {}, {}};
+  Contest contest{map, 2 * options_.min_inliers, 1.0, {}, {}, {}};
   Offer(GuessFromKeyframe(map, frame, map.PresentKeyframe(keyframe)), &contest);
   return contest.best;
 }
@@ -195,7 +203,7 @@ bool PoseSearch::Settle(const Map& map, PoseFix* fix) const {
 
 std::optional<PoseFix> PoseSearch::FindNear(const Map& map, const TrackedFrame& frame, int keyframe,
                                             const Pose& T_camera_world) const {
-  Contest contest{map, options_.min_inliers, std::max(1e-6, map.MedianDepth(keyframe)), {}, {}};
+  Contest contest{map, options_.min_inliers, std::max(1e-6, map.MedianDepth(keyframe)), {}, {}, {}};
   std::vector<int> near = map.BestCovisible(keyframe, 10, 15);
   near.push_back(keyframe);
   const std::vector<int> landmarks = map.LandmarksOf(near);
@@ -226,9 +234,7 @@ bool PoseSearch::Offer(std::optional<PoseFix> guess, Contest* contest) const {
   };
   if (std::any_of(contest->offered.begin(), contest->offered.end(), same)) return false;
   contest->offered.push_back(guess->T_camera_world);
-  const int enough = std::max(contest->least_inliers, contest->best ? contest->best->inliers + 1 : 1);
-  if (Settle(contest->map, &*guess) && guess->inliers >= enough && guess->Share() >= kLeastShare)
-    contest->best = std::move(guess);
+  if (Settle(contest->map, &*guess) && contest->Convinces(*guess)) contest->best = std::move(guess);
   return contest->best && contest->best->Share() >= kSureShare;
 }
 

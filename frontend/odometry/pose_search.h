@@ -18,7 +18,8 @@ class PoseSearch {
   PoseSearch(const OdometryOptions& options, const CameraRig& rig) : options_(options), rig_(rig) {}
 
   /// Where `frame` is by the motion so far, else around the place of `last`. `lost`: the frame before had no
-  /// pose; twice the landmarks must agree then. None if it is nowhere.
+  /// pose; twice the landmarks must agree then. Out of reach of a steady motion, half of the landmarks in
+  /// view must. None if it is nowhere.
   std::optional<PoseFix> Find(const Map& map, const TrackedFrame& frame, const LastFrame& last,
                               bool lost) const;
   /// Where `frame` is if it shows the same place as a keyframe, whatever the motion so far. None if it does

@@ -54,6 +54,7 @@ struct LastFrame {
   FrameMatches matches;  ///< of frame.features
   Pose T_camera_world;
   std::optional<Vector6d> velocity;        ///< of T_camera_world, per second: T_now = Exp(v dt) T_last
+  bool steady = false;                     ///< the velocity before led to where the frame was found
   int reference = -1;                      ///< keyframe that shares most landmarks with it; -1: no frame yet
   int newest_keyframe = -1;                ///< or the one where the frame was found again
   std::int64_t frames_since_keyframe = 0;  ///< 0: it is that keyframe
@@ -61,7 +62,7 @@ struct LastFrame {
 
   template <class Archive>
   void State(Archive& archive) {
-    archive(frame, matches.landmarks, T_camera_world, velocity, reference, newest_keyframe,
+    archive(frame, matches.landmarks, T_camera_world, velocity, steady, reference, newest_keyframe,
             frames_since_keyframe, by_grey);
     if (Archive::kReading) matches.features = frame.features.get();
   }

@@ -3,6 +3,8 @@
 #include <set>
 #include <utility>
 
+#include "frontend/odometry/reach.h"
+
 namespace tutti {
 namespace {
 constexpr double kLongestGap = 1.0;  // two poses that are further apart tell no velocity [s]
@@ -26,6 +28,9 @@ Tracker::Tracked Tracker::Accept(PoseFix fix, const Map& map) {
   const KeyframeNeed need = fix.by_grey ? KeyframeNeed::kNone : policy_.Need(map, fix, last_);
   const double dt = fix.frame.stamp_s - last_.frame.stamp_s;
   const bool moves = state_ == TrackingState::kTracking && dt > 0 && dt < kLongestGap;
+  const std::optional<Reach> reach =
+      moves ? ReachOf(last_, fix.frame.stamp_s, map.MedianDepth(last_.reference), sensor_) : std::nullopt;
+  last_.steady = reach && reach->Has(fix.T_camera_world);
   const Vector6d motion = LogSE3(fix.T_camera_world * last_.T_camera_world.Inverse());
   last_.velocity = moves ? std::optional<Vector6d>(motion / dt) : std::nullopt;
   if (fix.motion) last_.velocity = fix.motion;
@@ -45,6 +50,7 @@ void Tracker::Begin(const TrackedFrame& frame, const Keyframe& keyframe) {
   last_.matches.features = frame.features.get();
   last_.T_camera_world = keyframe.T_world_camera.Inverse();
   last_.velocity.reset();
+  last_.steady = false;
   state_ = TrackingState::kTracking;
   BecomeKeyframe(keyframe);
 }

@@ -16,7 +16,7 @@ namespace tutti {
 class Tracker {
  public:
   Tracker(const OdometryOptions& options, const CameraRig& rig)
-      : search_(options, rig), policy_(options, rig) {}
+      : search_(options, rig), policy_(options, rig), sensor_(rig.sensor) {}
 
   /// What became of a frame.
   struct Tracked {
@@ -60,6 +60,7 @@ class Tracker {
 
   RollingSearch search_;
   KeyframePolicy policy_;
+  Sensor sensor_;
   TrackingState state_ = TrackingState::kInitializing;
   LastFrame last_;
 };

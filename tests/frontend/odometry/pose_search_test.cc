@@ -112,6 +112,34 @@ TEST_F(PoseSearchTest, AFrameWhoseStampIsNoNumberIsFoundAllTheSame) {
   }
 }
 
+// A lorry drives along: it holds a third of the landmarks, and says that the camera has not moved on.
+TEST_F(PoseSearchTest, AFewLandmarksDoNotCarryTheCameraFartherThanItCanMove) {
+  const Pose by_lorry = Moved(0.3, -1.0);
+  const auto seen = std::make_shared<FrameFeatures>(*Frame(by_lorry, 0.1).features);
+  seen->descriptors = seen->descriptors.clone();
+  cv::RNG(77).fill(seen->descriptors.rowRange(seen->descriptors.rows / 3, seen->descriptors.rows),
+                   cv::RNG::UNIFORM, 0, 256);
+  TrackedFrame frame = Frame(by_lorry, 0.1);
+  frame.features = seen;
+  const auto find = [&](Sensor sensor, const LastFrame& last) {
+    return PoseSearch(options_, Rig(sensor)).Find(map_, frame, last, false);
+  };
+  LastFrame last = AtFirstKeyframe();
+  const auto fix = find(Sensor::kStereo, last);
+  ASSERT_TRUE(fix) << "nothing is known of the motion";
+  EXPECT_LT(fix->Share(), 0.5);
+  EXPECT_LT(Distance(fix->T_camera_world, by_lorry.Inverse()), 1e-4);
+  last.velocity = LogSE3(Moved(0, 0.16).Inverse()) / 0.1;
+  EXPECT_TRUE(find(Sensor::kStereo, last)) << "one step may have been a wrong one";
+  last.steady = true;
+  EXPECT_FALSE(find(Sensor::kStereo, last)) << "1.2 m off after 0.1 s";
+  EXPECT_TRUE(find(Sensor::kMono, last)) << "one camera has no metres";
+  frame.stamp_s = 2;
+  EXPECT_TRUE(find(Sensor::kStereo, last)) << "it may be anywhere by now";
+  frame = Frame(by_lorry, 0.1);
+  EXPECT_TRUE(find(Sensor::kStereo, last)) << "all landmarks say so";
+}
+
 TEST_F(PoseSearchTest, RefineDropsWhatDoesNotFit) {
   const Pose T_world_camera = Moved(0.1, 0.05, 0.01);
   const TrackedFrame frame = Frame(Pose(), 0.1);

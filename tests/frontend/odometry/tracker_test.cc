@@ -45,6 +45,23 @@ TEST_F(TrackerTest, FollowsTheCameraAndItsVelocity) {
   }
 }
 
+TEST_F(TrackerTest, AMotionIsSteadyOnceItHasLedToTheNextFrame) {
+  Tracker stereo{OdometryOptions(), Rig(Sensor::kStereo)};
+  stereo.Begin({0, 0, map_.keyframe(0).features}, std::as_const(map_).keyframe(0));
+  const auto goes_to = [&](double z, double stamp_s) {
+    return stereo.Track(Frame(Moved(0, z), stamp_s), map_).fix.has_value();
+  };
+  ASSERT_TRUE(goes_to(0.1, 0.1));
+  EXPECT_FALSE(stereo.last().steady) << "the first step tells how fast it is";
+  ASSERT_TRUE(goes_to(0.2, 0.2));
+  EXPECT_TRUE(stereo.last().steady);
+  ASSERT_TRUE(goes_to(1.2, 0.3)) << "nearly all landmarks say so";
+  EXPECT_FALSE(stereo.last().steady);
+  Track(Frame(Moved(0, 0.1), 0.1));
+  Track(Frame(Moved(0, 0.2), 0.2));
+  EXPECT_FALSE(tracker_.last().steady) << "one camera has no metres";
+}
+
 TEST_F(TrackerTest, ALostFrameKeepsThePlaceAndTheNextIsFoundThere) {
   Track(Frame(Moved(0.1, 0), 0.1));
   const Pose before = tracker_.last().T_camera_world;

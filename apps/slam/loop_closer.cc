@@ -1,6 +1,7 @@
 #include "apps/slam/loop_closer.h"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "core/angle.h"
@@ -192,7 +193,9 @@ void LoopCloser::Start(std::vector<LoopEdge> entering, const Odometry& odometry,
   solved_keyframes_ = KeyframesOf(odometry);
   graph_.Update(solved_keyframes_, CovisibleOf(odometry, options_.covisibility_min_shared));
   solver_.Start(graph_, accepted_, entering, options_, recorder_);
-  solved_due_ = frames + SolutionFrames(solved_keyframes_.size());
+  constexpr std::int64_t kEnd = std::numeric_limits<std::int64_t>::max();  // of the recording: due at once
+  const std::int64_t wait = SolutionFrames(solved_keyframes_.size());
+  solved_due_ = frames > kEnd - wait ? kEnd : frames + wait;
   stages_["loop_optimize"] += watch.Milliseconds();
 }
 

@@ -37,7 +37,8 @@ class Tracker {
   void Begin(const TrackedFrame& frame, const Keyframe& keyframe);
   /// The last frame has become the newest keyframe.
   void BecomeKeyframe(const Keyframe& keyframe);
-  /// The map is given up: kInitializing until Begin. The last frame stays, to start the next piece from.
+  /// The map is given up: kInitializing until Begin. The last frame stays, to start the next piece from, and
+  /// for a short while its velocity, if it is in metres.
   void GiveUp();
 
   /// The next frame may be anywhere in the map: kLost until Relocalize.

@@ -137,12 +137,26 @@ TEST_F(TrackerTest, OfAKeyframeTheLastFrameHasWhatTheMapGivesIt) {
   EXPECT_EQ(tracker_.last().matches.landmarks, std::as_const(map_).keyframe(0).landmarks);
 }
 
-TEST_F(TrackerTest, GivingUpKeepsThePlaceAlone) {
-  Track(Frame(Moved(0.1, 0), 0.1));
-  tracker_.GiveUp();
-  EXPECT_EQ(tracker_.state(), TrackingState::kInitializing);
-  EXPECT_FALSE(tracker_.last().velocity);
-  EXPECT_LT(Distance(tracker_.last().T_camera_world, Moved(0.1, 0).Inverse()), 1e-4);
+TEST_F(TrackerTest, GivingUpKeepsThePlaceAndForAShortWhileTheMotion) {
+  const auto begun_after = [&](Sensor sensor, double seconds) {
+    Tracker tracker(OdometryOptions(), Rig(sensor));
+    tracker.Begin({0, 0, map_.keyframe(0).features}, std::as_const(map_).keyframe(0));
+    tracker.Track(Frame(Moved(0.1, 0), 0.1), map_);
+    tracker.GiveUp();
+    EXPECT_EQ(tracker.state(), TrackingState::kInitializing);
+    EXPECT_LT(Distance(tracker.last().T_camera_world, Moved(0.1, 0).Inverse()), 1e-4);
+    const double stamp_s = 0.1 + seconds;
+    tracker.Begin({9, stamp_s, map_.keyframe(0).features}, std::as_const(map_).keyframe(0));
+    EXPECT_FALSE(tracker.last().steady);
+    return tracker.last().velocity;
+  };
+  const auto velocity = begun_after(Sensor::kStereo, 1);
+  ASSERT_TRUE(velocity);
+  EXPECT_NEAR(velocity->x(), -1, 0.01);
+  EXPECT_FALSE(begun_after(Sensor::kStereo, 2));
+  EXPECT_FALSE(begun_after(Sensor::kStereo, -1)) << "the clock was set back";
+  EXPECT_FALSE(begun_after(Sensor::kStereo, std::numeric_limits<double>::quiet_NaN()));
+  EXPECT_FALSE(begun_after(Sensor::kMono, 1)) << "another piece has another unit";
 }
 
 TEST_F(TrackerTest, RelocalisedItTracksAgainWithoutAVelocity) {

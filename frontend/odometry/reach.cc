@@ -4,6 +4,7 @@ namespace tutti {
 namespace {
 constexpr double kMaxAcceleration = 10;  // [m/s^2]
 constexpr double kPoseError = 0.02;      // of the depth
+constexpr double kSlip = 0.2;            // of a pose in a blurred image [m]
 constexpr double kLongest = 1.5;         // a velocity says nothing for longer [s]
 }  // namespace
 
@@ -15,7 +16,8 @@ std::optional<Reach> ReachOf(const LastFrame& last, double stamp_s, double depth
   const double since = stamp_s - last.frame.stamp_s;
   if (sensor == Sensor::kMono || !last.velocity || !(since > 0 && since <= kLongest)) return std::nullopt;
   const Pose T_camera_world = ExpSE3(*last.velocity * since) * last.T_camera_world;
-  return Reach{T_camera_world.Inverse().translation, kMaxAcceleration * since * since + kPoseError * depth_m};
+  return Reach{T_camera_world.Inverse().translation,
+               kMaxAcceleration * since * since + kPoseError * depth_m + kSlip};
 }
 
 }  // namespace tutti

@@ -306,6 +306,7 @@ TEST(KeyframeGraph, ARecordingThatBeginsIsTiedToWhatItSees) {
     return out;
   };
   std::vector<MapKeyframe> keyframes;
+  keyframes.reserve(40);
   for (int id = 0; id < 40; ++id)
     keyframes.push_back({id, 0, Pose(Eigen::Quaterniond::Identity(), {double(id), 0, 0})});
   KeyframeGraph graph, before;

@@ -122,8 +122,7 @@ void KeyframeGraph::Update(std::vector<MapKeyframe> keyframes, const std::vector
   edges_.clear();
   for (std::size_t i = 1; i < keyframes_.size(); ++i) {
     const int older = keyframes_[i - 1].id, newer = keyframes_[i].id;
-    if (Consecutive(older, newer) && !Begins(newer) && OfOnePiece(older, newer))
-      edges_.push_back({older, newer, {}});
+    if (Follows(older, newer)) edges_.push_back({older, newer, {}});
   }
   for (const CovisiblePair& c : Strongest(covisible)) edges_.push_back({c.older, c.newer, {}});
   TieBeginnings();
@@ -150,22 +149,25 @@ bool KeyframeGraph::Begins(int keyframe) const {
   return std::binary_search(sessions_.begin(), sessions_.end(), keyframe);
 }
 
+// The odometry led from the one to the other.
+bool KeyframeGraph::Follows(int older, int newer) const {
+  return Consecutive(older, newer) && !Begins(newer) && OfOnePiece(older, newer);
+}
+
 // A keyframe that does not follow the one before (a recording began in the map, or a lost camera was found
 // again in an earlier piece) hangs on what it saw there; on the last keyframe of that piece, if that is not
 // much.
 void KeyframeGraph::TieBeginnings() {
-  for (std::size_t i = 1; i < keyframes_.size(); ++i) {
-    const int newer = keyframes_[i].id, before = keyframes_[i - 1].id;
-    if (Consecutive(before, newer) && !Begins(newer) && OfOnePiece(before, newer)) continue;
-    const auto ends_here = [newer](const Edge& edge) { return edge.newer == newer; };
-    if (std::any_of(edges_.begin(), edges_.end(), ends_here) ||
-        std::any_of(carried_.begin(), carried_.end(), ends_here))
-      continue;
-    for (std::size_t j = i; j-- > 0;) {
-      if (!OfOnePiece(keyframes_[j].id, newer)) continue;
-      edges_.push_back({keyframes_[j].id, newer, {}});
-      break;
-    }
+  std::vector<int> tied;
+  for (const std::vector<Edge>* edges : {&edges_, &carried_}) {
+    for (const Edge& edge : *edges) tied.push_back(edge.newer);
+  }
+  std::sort(tied.begin(), tied.end());
+  for (auto newer = keyframes_.begin(); newer != keyframes_.end(); ++newer) {
+    if (std::binary_search(tied.begin(), tied.end(), newer->id)) continue;
+    const auto before = std::find_if(std::make_reverse_iterator(newer), keyframes_.rend(),
+                                     [&](const MapKeyframe& k) { return OfOnePiece(k.id, newer->id); });
+    if (before != keyframes_.rend()) edges_.push_back({before->id, newer->id, {}});
   }
 }
 
@@ -178,8 +180,7 @@ std::vector<CovisiblePair> KeyframeGraph::Strongest(const std::vector<CovisibleP
     // odometry's.
     const bool recent =
         kept_.empty() || c.newer - c.older < kRecentKeyframes || Kept(c.older, c.newer) != nullptr;
-    const bool next = Consecutive(c.older, c.newer) && !Begins(c.newer);
-    if (recent && !next && OfOnePiece(c.older, c.newer)) candidates.push_back(c);
+    if (recent && !Follows(c.older, c.newer) && OfOnePiece(c.older, c.newer)) candidates.push_back(c);
   }
   std::sort(candidates.begin(), candidates.end(), [](const CovisiblePair& a, const CovisiblePair& b) {
     return std::tuple(a.newer, -a.shared, a.older) < std::tuple(b.newer, -b.shared, b.older);

@@ -12,16 +12,15 @@
 namespace tutti {
 namespace {
 
-constexpr int kMinProjected = 20;           // matches by projection below which the search is widened
-constexpr int kMinInKeyframe = 15;          // matches with a keyframe that may show the same place
-constexpr int kMinGuess = 10;               // inliers of a guess
-constexpr int kRecentKeyframes = 10;        // that a frame without a pose is compared with
-constexpr double kSameGuess = 1.0;          // guesses that differ by less in the image are one [px]
-constexpr double kSurePrediction = 0.5;     // a velocity holds for so long [s]
-constexpr double kLongestPrediction = 1.5;  // [s]
-constexpr double kLeastShare = 0.14;        // of the landmarks in view that must be found again;
-constexpr double kSureShare = 0.2;          // with so many nothing else needs to be tried
-constexpr double kShareForAJump = 0.5;      // and with so many the motion so far may be wrong
+constexpr int kMinProjected = 20;        // matches by projection below which the search is widened
+constexpr int kMinInKeyframe = 15;       // matches with a keyframe that may show the same place
+constexpr int kMinGuess = 10;            // inliers of a guess
+constexpr int kRecentKeyframes = 10;     // that a frame without a pose is compared with
+constexpr double kSameGuess = 1.0;       // guesses that differ by less in the image are one [px]
+constexpr double kSurePrediction = 0.5;  // a velocity is likely to hold for so long [s]
+constexpr double kLeastShare = 0.14;     // of the landmarks in view that must be found again;
+constexpr double kSureShare = 0.2;       // with so many nothing else needs to be tried
+constexpr double kShareForAJump = 0.5;   // and with so many the motion so far may be wrong
 
 // Keyframe with most votes by the landmarks seen (ties: the newest); -1 if there is none.
 int MostVoted(const std::map<int, int>& votes) {
@@ -47,10 +46,9 @@ std::map<int, int> Votes(const Map& map, const std::vector<int>& landmarks) {
 // Where the camera may be, likeliest first: it went on as before, or stopped.
 std::vector<Pose> Predictions(const LastFrame& last, double stamp_s) {
   std::vector<Pose> predictions;
-  const auto after = [&](double seconds) { return ExpSE3(*last.velocity * seconds) * last.T_camera_world; };
   const double since = stamp_s - last.frame.stamp_s;
-  if (last.velocity) predictions.push_back(after(std::min(since, kLongestPrediction)));
-  if (last.velocity && since > kSurePrediction) predictions.push_back(after(kSurePrediction));
+  if (last.velocity) predictions.push_back(last.After(std::min(since, kVelocityHolds)));
+  if (last.velocity && since > kSurePrediction) predictions.push_back(last.After(kSurePrediction));
   predictions.push_back(last.T_camera_world);
   return predictions;
 }

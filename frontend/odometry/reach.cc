@@ -5,7 +5,6 @@ namespace {
 constexpr double kMaxAcceleration = 10;  // [m/s^2]
 constexpr double kPoseError = 0.02;      // of the depth
 constexpr double kSlip = 0.2;            // of a pose in a blurred image [m]
-constexpr double kLongest = 1.5;         // a velocity says nothing for longer [s]
 }  // namespace
 
 bool Reach::Has(const Pose& T_camera_world) const {
@@ -14,9 +13,9 @@ bool Reach::Has(const Pose& T_camera_world) const {
 
 std::optional<Reach> ReachOf(const LastFrame& last, double stamp_s, double depth_m, Sensor sensor) {
   const double since = stamp_s - last.frame.stamp_s;
-  if (sensor == Sensor::kMono || !last.velocity || !(since > 0 && since <= kLongest)) return std::nullopt;
-  const Pose T_camera_world = ExpSE3(*last.velocity * since) * last.T_camera_world;
-  return Reach{T_camera_world.Inverse().translation,
+  if (sensor == Sensor::kMono || !last.velocity || !(since > 0 && since <= kVelocityHolds))
+    return std::nullopt;
+  return Reach{last.After(since).Inverse().translation,
                kMaxAcceleration * since * since + kPoseError * depth_m + kSlip};
 }
 

@@ -48,6 +48,8 @@ struct PoseFix {
   }
 };
 
+constexpr double kVelocityHolds = 1.5;  ///< longer after it, a velocity says nothing [s]
+
 /// The last frame with a pose, and how the camera moved to it: what the next frame is looked for from.
 struct LastFrame {
   TrackedFrame frame;
@@ -59,6 +61,9 @@ struct LastFrame {
   int newest_keyframe = -1;                ///< or the one where the frame was found again
   std::int64_t frames_since_keyframe = 0;  ///< 0: it is that keyframe
   int by_grey = 0;                         ///< so many frames in a row were posed by grey values alone
+
+  /// T_camera_world after so many seconds more of its velocity, which it must have.
+  Pose After(double seconds) const { return ExpSE3(*velocity * seconds) * T_camera_world; }
 
   template <class Archive>
   void State(Archive& archive) {

@@ -7,8 +7,7 @@
 
 namespace tutti {
 namespace {
-constexpr double kLongestGap = 1.0;   // two poses that are further apart tell no velocity [s]
-constexpr double kLongestLoss = 1.5;  // after it, nothing is known of how the camera moved before [s]
+constexpr double kLongestGap = 1.0;  // two poses that are further apart tell no velocity [s]
 }  // namespace
 
 Tracker::Tracked Tracker::Track(const TrackedFrame& frame, const Map& map) {
@@ -50,7 +49,7 @@ void Tracker::Begin(const TrackedFrame& frame, const Keyframe& keyframe) {
   // That the camera goes on as it did is likelier than that it has stopped: what stands still before it in
   // the first frame may be a lorry that drives along. Another map of one camera has another unit.
   const double lost_s = frame.stamp_s - last_.frame.stamp_s;
-  if (sensor_ == Sensor::kMono || !(lost_s >= 0 && lost_s <= kLongestLoss)) last_.velocity.reset();
+  if (sensor_ == Sensor::kMono || !(lost_s >= 0 && lost_s <= kVelocityHolds)) last_.velocity.reset();
   last_.frame = frame;
   last_.matches.features = frame.features.get();
   last_.T_camera_world = keyframe.T_world_camera.Inverse();

@@ -178,6 +178,7 @@ class KeyframeGraph {
                                   const std::vector<LoopEdge>& loops) const;
   bool OfOnePiece(int older, int newer) const;
   bool Begins(int keyframe) const;
+  bool Follows(int older, int newer) const;
   void TieBeginnings();
   std::vector<CovisiblePair> Strongest(const std::vector<CovisiblePair>& covisible) const;
   const Edge* Kept(int older, int newer) const;

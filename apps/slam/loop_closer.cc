@@ -1,7 +1,6 @@
 #include "apps/slam/loop_closer.h"
 
 #include <algorithm>
-#include <limits>
 #include <utility>
 
 #include "core/angle.h"
@@ -193,15 +192,15 @@ void LoopCloser::Start(std::vector<LoopEdge> entering, const Odometry& odometry,
   solved_keyframes_ = KeyframesOf(odometry);
   graph_.Update(solved_keyframes_, CovisibleOf(odometry, options_.covisibility_min_shared));
   solver_.Start(graph_, accepted_, entering, options_, recorder_);
-  constexpr std::int64_t kEnd = std::numeric_limits<std::int64_t>::max();  // of the recording: due at once
-  const std::int64_t wait = SolutionFrames(solved_keyframes_.size());
-  solved_due_ = frames > kEnd - wait ? kEnd : frames + wait;
+  solved_due_ = frames + SolutionFrames(solved_keyframes_.size());
   stages_["loop_optimize"] += watch.Milliseconds();
 }
 
-std::optional<LoopUpdate> LoopCloser::Solved(const Odometry& odometry, std::int64_t frames) {
+std::optional<LoopUpdate> LoopCloser::Solved(const Odometry& odometry, std::int64_t frames,
+                                             Entering entering) {
   if (!solver_.Running() && !queued_.empty()) return Enter(std::exchange(queued_, {}), odometry, frames);
-  if (!solver_.Running() || frames < solved_due_) return std::nullopt;
+  if (!solver_.Running()) return std::nullopt;
+  if (entering == Entering::kWhenDue && frames < solved_due_) return std::nullopt;
   const ScopedSpan span(recorder_, Lane::kOptimisation, "enter_correction");
   const internal::Stopwatch watch;
   const LoopSolution solution = solver_.Take();
@@ -274,8 +273,10 @@ std::vector<LoopEdge> LoopCloser::Untied() const {
   return untied;
 }
 
-std::optional<LoopUpdate> LoopCloser::Adjusted(const Odometry& odometry, std::int64_t frames) {
-  if (solver_.Running() || !adjuster_.Due(frames)) return std::nullopt;
+std::optional<LoopUpdate> LoopCloser::Adjusted(const Odometry& odometry, std::int64_t frames,
+                                               Entering entering) {
+  if (solver_.Running() || !adjuster_.Running()) return std::nullopt;
+  if (entering == Entering::kWhenDue && !adjuster_.Due(frames)) return std::nullopt;
   const ScopedSpan span(recorder_, Lane::kOptimisation, "enter_adjustment");
   const internal::Stopwatch watch;
   LoopUpdate update;

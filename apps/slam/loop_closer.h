@@ -24,6 +24,9 @@
 #pragma GCC visibility push(default)  // used across libraries
 namespace tutti {
 
+/// What is worked out beside the tracking enters when it is due; at the end of a recording at once.
+enum class Entering { kWhenDue, kAtOnce };
+
 /// Measures verified loops against the odometry's map, lets those in that agree, and works out how the map
 /// is to move; it never touches the map itself. The pose graph is solved beside the tracking, and its answer
 /// is due a number of frames later that depends on the size of the map alone; so it is with the adjustment
@@ -55,10 +58,12 @@ class LoopCloser {
   bool MayMove(std::int64_t frames) const {
     return solver_.Running() ? frames >= solved_due_ : adjuster_.Due(frames);
   }
-  /// What the pose graph has found, if it is due by now; waits for it.
-  std::optional<LoopUpdate> Solved(const Odometry& odometry, std::int64_t frames);
-  /// What the adjustment of the whole map has found, if it is due by now; waits for it.
-  std::optional<LoopUpdate> Adjusted(const Odometry& odometry, std::int64_t frames);
+  /// What the pose graph has found, if it enters now; waits for it.
+  std::optional<LoopUpdate> Solved(const Odometry& odometry, std::int64_t frames,
+                                   Entering entering = Entering::kWhenDue);
+  /// What the adjustment of the whole map has found, if it enters now; waits for it.
+  std::optional<LoopUpdate> Adjusted(const Odometry& odometry, std::int64_t frames,
+                                     Entering entering = Entering::kWhenDue);
   /// After the last loop: lets in what the map fulfils and what therefore waited for a correction. True if
   /// there is any; it is due as usual.
   bool CloseDeferred(const Odometry& odometry, std::int64_t frames);

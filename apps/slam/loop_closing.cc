@@ -1,7 +1,6 @@
 #include "apps/slam/loop_closing.h"
 
 #include <algorithm>
-#include <limits>
 #include <utility>
 
 #include "core/stopwatch.h"
@@ -116,12 +115,11 @@ std::optional<LoopUpdate> LoopClosing::Due(const Odometry* odometry, std::int64_
 }
 
 std::optional<LoopUpdate> LoopClosing::Rest(const Odometry* odometry, std::int64_t frames) {
-  constexpr std::int64_t kAll = std::numeric_limits<std::int64_t>::max();
   std::optional<LoopUpdate> update;
-  if (odometry != nullptr) update = closer_.Solved(*odometry, kAll);
+  if (odometry != nullptr) update = closer_.Solved(*odometry, frames, Entering::kAtOnce);
   if (!update && !submitted_.empty()) update = Deliver(odometry, frames);
   if (!update && odometry != nullptr && closer_.CloseDeferred(*odometry, frames)) update.emplace();
-  if (!update && odometry != nullptr) update = closer_.Adjusted(*odometry, kAll);
+  if (!update && odometry != nullptr) update = closer_.Adjusted(*odometry, frames, Entering::kAtOnce);
   if (update) TellRevoked(*update);
   if (!update) closer_.Finish();
   return update;

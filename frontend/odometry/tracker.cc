@@ -23,14 +23,19 @@ Tracker::Tracked Tracker::Relocalize(int keyframe, PoseFix fix, const Map& map) 
   return Accept(std::move(fix), map);
 }
 
+// True if it is within reach of the motion so far.
+bool Tracker::GoesOn(const PoseFix& fix, const Map& map) const {
+  if (sensor_ == Sensor::kMono || !last_.velocity) return false;
+  const auto reach = ReachOf(last_, fix.frame.stamp_s, map.MedianDepth(last_.reference), sensor_);
+  return reach && reach->Has(fix.T_camera_world);
+}
+
 // The frame has this pose: it may become a keyframe, and is what the next one starts from.
 Tracker::Tracked Tracker::Accept(PoseFix fix, const Map& map) {
   const KeyframeNeed need = fix.by_grey ? KeyframeNeed::kNone : policy_.Need(map, fix, last_);
   const double dt = fix.frame.stamp_s - last_.frame.stamp_s;
   const bool moves = state_ == TrackingState::kTracking && dt > 0 && dt < kLongestGap;
-  const std::optional<Reach> reach =
-      moves ? ReachOf(last_, fix.frame.stamp_s, map.MedianDepth(last_.reference), sensor_) : std::nullopt;
-  last_.steady = reach && reach->Has(fix.T_camera_world);
+  last_.steady = moves && GoesOn(fix, map);
   const Vector6d motion = LogSE3(fix.T_camera_world * last_.T_camera_world.Inverse());
   last_.velocity = moves ? std::optional<Vector6d>(motion / dt) : std::nullopt;
   if (fix.motion) last_.velocity = fix.motion;

@@ -58,6 +58,7 @@ class Tracker {
 
  private:
   Tracked Accept(PoseFix fix, const Map& map);
+  bool GoesOn(const PoseFix& fix, const Map& map) const;
 
   RollingSearch search_;
   KeyframePolicy policy_;

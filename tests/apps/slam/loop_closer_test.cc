@@ -114,6 +114,15 @@ TEST_F(LoopCloserTest, ALoopAloneWaitsAndSaysSoInTheEnd) {
   EXPECT_THAT(closer.records()[0].reason, HasSubstr("no second loop"));
 }
 
+TEST_F(LoopCloserTest, AtTheEndOfARecordingASolutionEntersAtOnce) {
+  LoopCloser closer = Closer();
+  ConsiderTwo(&closer, 0.5);
+  EXPECT_FALSE(closer.Solved(odometry_, frames_));
+  const std::optional<LoopUpdate> update = closer.Solved(odometry_, frames_, Entering::kAtOnce);
+  ASSERT_TRUE(update);
+  EXPECT_TRUE(update->correction);
+}
+
 TEST_F(LoopCloserTest, TwoThatAgreeMoveTheMapWhenTheirSolutionIsDueAndNotBefore) {
   LoopCloser closer = Closer();
   const Pose before = odometry_.KeyframePose(kFirst).Inverse() * odometry_.KeyframePose(kLater);

@@ -8,6 +8,7 @@
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "frontend/features/corner_detector.h"
 #include "frontend/features/stereo_matcher.h"
 
 namespace tutti {
@@ -76,63 +77,6 @@ cv::Point2f RefineCorner(const cv::Mat& image, const cv::Point2f& corner) {
   const float du = (c * p - b * q) / determinant, dv = (a * q - b * p) / determinant;
   if (std::abs(du) > 1 || std::abs(dv) > 1) return corner;
   return {corner.x + du, corner.y + dv};
-}
-
-// Strongest first; equal ones by row, then by column. FAST's scores and places are whole numbers >= 0, so the
-// order fits into one integer, which sorts several times faster than corners do.
-void SortByStrength(std::vector<cv::KeyPoint>& corners) {
-  std::vector<std::pair<std::uint64_t, std::size_t>> order(corners.size());
-  for (std::size_t i = 0; i < corners.size(); ++i) {
-    const cv::KeyPoint& k = corners[i];
-    const std::uint64_t weakness = 0xFFFFU - static_cast<std::uint64_t>(k.response);
-    order[i] = {
-        (weakness << 40) | (static_cast<std::uint64_t>(k.pt.y) << 20) | static_cast<std::uint64_t>(k.pt.x),
-        i};
-  }
-  std::sort(order.begin(), order.end());
-  std::vector<cv::KeyPoint> sorted;
-  sorted.reserve(corners.size());
-  for (const auto& [key, i] : order) sorted.push_back(corners[i]);
-  corners = std::move(sorted);
-}
-
-// Keeps `wanted` corners, round by round the strongest left in each grid cell. Corners below the upper
-// threshold count only where a cell has nothing better, so that weak texture is covered without crowding out
-// strong corners.
-std::vector<cv::KeyPoint> Spread(std::vector<cv::KeyPoint> corners, const cv::Size& size, int wanted,
-                                 int threshold) {
-  if (static_cast<int>(corners.size()) <= wanted) return corners;
-  const double area = double(size.width) * size.height;
-  const double cell = std::max(8.0, std::sqrt(area / std::max(1, wanted)) * 1.2);
-  const int columns = std::max(1, static_cast<int>(std::ceil(size.width / cell)));
-  const int rows = std::max(1, static_cast<int>(std::ceil(size.height / cell)));
-  SortByStrength(corners);
-  std::vector<std::vector<int>> cells(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
-  for (std::size_t i = 0; i < corners.size(); ++i) {
-    const int c = std::min(columns - 1, static_cast<int>(corners[i].pt.x / cell));
-    const int r = std::min(rows - 1, static_cast<int>(corners[i].pt.y / cell));
-    const int at = r * columns + c;
-    auto& list = cells[static_cast<std::size_t>(at)];
-    if (!list.empty() && corners[i].response < static_cast<float>(threshold)) continue;
-    list.push_back(static_cast<int>(i));
-  }
-  std::vector<int> chosen;
-  for (std::size_t round = 0; static_cast<int>(chosen.size()) < wanted; ++round) {
-    std::vector<int> layer;
-    for (const auto& list : cells) {
-      if (round < list.size()) layer.push_back(list[round]);
-    }
-    if (layer.empty()) break;
-    std::sort(layer.begin(), layer.end());  // by strength
-    const std::size_t room = static_cast<std::size_t>(wanted) - chosen.size();
-    if (layer.size() > room) layer.resize(room);
-    chosen.insert(chosen.end(), layer.begin(), layer.end());
-  }
-  std::sort(chosen.begin(), chosen.end());
-  std::vector<cv::KeyPoint> out;
-  out.reserve(chosen.size());
-  for (int i : chosen) out.push_back(corners[static_cast<std::size_t>(i)]);
-  return out;
 }
 
 std::vector<int> FeaturesPerLevel(const OdometryOptions& options) {
@@ -262,16 +206,9 @@ FrameFeatures ExtractOrb(const std::vector<cv::Mat>& pyramid, const OdometryOpti
   std::vector<cv::Mat> descriptors;
   for (std::size_t l = 0; l < pyramid.size(); ++l) {
     const cv::Mat& image = pyramid[l];
-    const int width = image.cols - 2 * kBorder, height = image.rows - 2 * kBorder;
-    if (width < 1 || height < 1) break;
-    std::vector<cv::KeyPoint> corners;
-    // The detector needs 3 px around the part in which corners may lie.
-    const cv::Rect part(kBorder - 3, kBorder - 3, width + 6, height + 6);
-    cv::FAST(image(part), corners, options.fast_threshold_min, true);
-    for (cv::KeyPoint& k : corners) k.pt += cv::Point2f(-3, -3);
-    corners = Spread(std::move(corners), cv::Size(width, height), wanted[l], options.fast_threshold);
+    std::vector<cv::KeyPoint> corners =
+        DetectCorners(image, {wanted[l], options.fast_threshold, options.fast_threshold_min, kBorder});
     for (cv::KeyPoint& k : corners) {
-      k.pt += cv::Point2f(kBorder, kBorder);
       k.angle = Orientation(image, static_cast<int>(k.pt.x), static_cast<int>(k.pt.y));
       k.octave = 0;
       k.size = 2 * kHalfPatch + 1;

@@ -14,6 +14,7 @@
 #include "apps/run/checkpoint.h"
 #include "apps/run/interrupt.h"
 #include "apps/run/live_files.h"
+#include "apps/run/odometry_alone.h"
 #include "apps/run/outputs.h"
 #include "apps/run/planted_loops.h"
 #include "apps/run/prefetcher.h"
@@ -62,9 +63,7 @@ class Run {
       });
     }
     slam_->SetChangeListener([this](const Odometry& odometry, std::int64_t last) {
-      if (alone_) return;
-      alone_ = odometry;
-      alone_last_ = last;
+      if (!alone_) alone_ = std::make_unique<OdometryAlone>(odometry, last, AloneBeside());
     });
     total_ = dataset.FrameSupply() == Supply::kStored ? dataset.Size() : static_cast<std::size_t>(-1);
     result_.endless = dataset.FrameSupply() != Supply::kStored;
@@ -122,21 +121,20 @@ class Run {
     result_.stage_ms["read_wait"] = so_far_.read_wait_ms;
     if (!slam_->AppearanceOnly()) result_.stage_ms["odometry_extract"] += so_far_.extract_ms;
     result_.wall_s = WallSeconds();
+    if (alone_) alone_->Tracked();
     result_.cpu_s = CpuSeconds();
     if (Recorder() != nullptr) result_.stages = SummarizeStages(recorder_.Spans(), result_.wall_s);
     result_.trajectory_online = live_.trajectory();
   }
 
-  // What the odometry would have done alone: the copy from before the first change tracks the rest.
+  // What the odometry would have done alone: where it has not tracked beside the run, it does now.
   void TrackUntouched() {
     if (!alone_) return;
-    const std::size_t begin = so_far_.positions.at(alone_last_) + 1, end = result_.frames_total;
-    if (begin >= end) return;
-    const internal::Stopwatch watch;
-    const bool again = config_.run.odometry_pass && dataset_.FrameSupply() != Supply::kOnce;
-    result_.odometry_complete = again && TrackAgain(*alone_, begin, end);
-    alone_->FinishMapping();
-    result_.odometry_pass_s = watch.Seconds();
+    const std::size_t begin = alone_->last() < 0 ? 0 : so_far_.positions.at(alone_->last()) + 1;
+    if (!TracksAlong() && begin < result_.frames_total)
+      result_.odometry_complete = TracksAfter() && TrackAgain(begin, result_.frames_total);
+    alone_->Finish();
+    result_.odometry_alone_cpu_s = alone_->CpuSeconds();
   }
 
   void Collect() {
@@ -153,13 +151,14 @@ class Run {
     if (!alone_) return;
     FrameRange session;
     if (FirstFrame() > 0) session.first = FirstFrame();
-    result_.trajectory_odometry = BodyTrajectory(alone_->FrameTrajectory(-1, session), result_.rig);
+    result_.trajectory_odometry = BodyTrajectory(alone_->Tracked().FrameTrajectory(-1, session), result_.rig);
   }
 
   // The sections of a checkpoint that are the run's own.
   template <class Archive>
   void State(Archive& archive) {
-    bool has_alone = alone_.has_value();
+    bool has_alone = alone_ != nullptr;
+    std::int64_t alone_last = has_alone ? alone_->last() : -1;
     Trajectory live = live_.trajectory();
     std::map<std::string, std::string> collected;
     if constexpr (!Archive::kReading) {
@@ -167,10 +166,10 @@ class Run {
         if (*observer->Name() != '\0') collected[observer->Name()] = observer->Save();
       }
     }
-    archive(so_far_, planted_, live, alone_last_, has_alone, collected);
+    archive(so_far_, planted_, live, alone_last, has_alone, collected);
     StateOfGrowing(archive, result_);
     if constexpr (Archive::kReading) {
-      if (has_alone) alone_.emplace(config_.odometry, result_.rig);
+      if (has_alone) resumed_alone_ = alone_last;
       resumed_live_ = std::move(live);
       for (const auto& observer : request_.observers) {
         const auto found = collected.find(observer->Name());
@@ -222,14 +221,23 @@ class Run {
     if (next < Listed()) playback_->Reach(dataset_.Stamp(next));
   }
 
-  // False if it was interrupted.
-  bool TrackAgain(Odometry& odometry, std::size_t begin, std::size_t end) {
+  // In real time, and with a source that gives each frame but once, nothing may hold the tracking up.
+  bool TracksAlong() const {
+    return config_.run.odometry_pass && !request_.realtime && dataset_.FrameSupply() != Supply::kOnce;
+  }
+  bool TracksAfter() const {
+    return config_.run.odometry_pass && request_.realtime && dataset_.FrameSupply() != Supply::kOnce;
+  }
+  bool AloneBeside() const { return TracksAlong() && config_.run.threads > 1; }
+
+  // After a run in real time. False if it was interrupted.
+  bool TrackAgain(std::size_t begin, std::size_t end) {
     Progress progress("odometry alone", end - begin, Out());
     PrefetchOptions options;
     options.begin = begin;
     options.end = end;
     options.ahead = Reading().ahead;
-    options.prepare = [&odometry](InputFrame& frame) { frame.features = odometry.Extract(frame); };
+    options.prepare = [this](InputFrame& frame) { frame.features = slam_->odometry()->Extract(frame); };
     Prefetcher frames(dataset_, options);
     // After a Ctrl-C this pass is the price of a complete file; a second Ctrl-C ends the process.
     for (std::size_t i = begin; i < end; ++i) {
@@ -237,7 +245,7 @@ class Run {
       frames.SkipTo(i);
       const std::optional<FetchedFrame> fetched = frames.Next();
       if (!fetched) return false;
-      if (fetched->read.frame) odometry.Track(*fetched->read.frame);
+      if (fetched->read.frame) alone_->Track(*fetched->read.frame);
       progress.Update(i + 1 - begin, "for trajectory_odometry.txt");
       if ((result_.interrupted || InterruptGuard::Requested()) && i + 1 < end) return false;
     }
@@ -269,6 +277,7 @@ class Run {
       so_far_.positions[fetched.read.frame->index] = so_far_.next;
       CountDepth(fetched.read, progress);
       TrackOne(*fetched.read.frame);
+      if (alone_ && TracksAlong()) alone_->Track(*fetched.read.frame);
       return;
     }
     const std::int64_t number = dataset_.Number(so_far_.next);
@@ -277,12 +286,16 @@ class Run {
   }
 
   double WallSeconds() const { return before_.wall_s + watch_.Seconds(); }
-  double CpuSeconds() const { return before_.cpu_s + ProcessCpuSeconds() - cpu_begin_; }
+  double CpuSeconds() const {
+    return before_.cpu_s + ProcessCpuSeconds() - cpu_begin_ - (alone_ ? alone_->CpuSeconds() : 0.0);
+  }
 
   void WriteCheckpoint() {
     so_far_.wall_s = WallSeconds();
     so_far_.cpu_s = CpuSeconds();
-    const auto write = [run = StateOf(*this), alone = alone_](const MapSink& sink) {
+    std::optional<Odometry> alone;
+    if (alone_) alone = alone_->Tracked();
+    const auto write = [run = StateOf(*this), alone = std::move(alone)](const MapSink& sink) {
       sink(kRunSection, run);
       if (alone) alone->SaveSections(sink);
     };
@@ -337,7 +350,10 @@ class Run {
     info.config = Watched(config_, request_);
     slam_ = SlamSystem::Load(checkpoint, info, Recorder(), [this](internal::SectionReader& file) {
       ReadState(file, kRunSection, this);
-      if (alone_) alone_->LoadSections(&file);
+      if (!resumed_alone_) return;
+      Odometry alone(config_.odometry, result_.rig);
+      alone.LoadSections(&file);
+      alone_ = std::make_unique<OdometryAlone>(alone, *resumed_alone_, AloneBeside());
     });
     live_.Skip(LoopsBefore());
     live_.Resume(std::move(resumed_live_), slam_->loops());
@@ -394,13 +410,13 @@ class Run {
   Span::Clock::time_point begin_ = Span::Clock::now();
   internal::Stopwatch watch_;
   double cpu_begin_ = ProcessCpuSeconds();
-  RunProgress so_far_, before_;        // before_: when this process began
-  Trajectory resumed_live_;            // on its way into live_
-  std::optional<Odometry> alone_;      // as it was before the detector first changed anything
-  std::int64_t alone_last_ = -1;       // index of the last input frame that it has seen
-  std::shared_ptr<FrameClock> clock_;  // of playback_
-  std::optional<Playback> playback_;   // in real time, unless the source keeps time itself
-  std::size_t total_ = 0;              // most frames; endless for a growing data set
+  RunProgress so_far_, before_;                // before_: when this process began
+  Trajectory resumed_live_;                    // on its way into live_
+  std::unique_ptr<OdometryAlone> alone_;       // from before the detector first changed anything
+  std::optional<std::int64_t> resumed_alone_;  // its last frame, on the way into alone_
+  std::shared_ptr<FrameClock> clock_;          // of playback_
+  std::optional<Playback> playback_;           // in real time, unless the source keeps time itself
+  std::size_t total_ = 0;                      // most frames; endless for a growing data set
   std::optional<Checkpointer> checkpoints_;
 };
 

@@ -88,6 +88,8 @@ int RunAndShow(const CLI::App& command, const RunArguments& arguments, RunReques
   std::fputs(ResultTable(result).c_str(), stdout);
   if (arguments.timing) {
     std::fputs(TimingTable(result.stages, result.wall_s, result.cpu_s, result.frames_total).c_str(), stdout);
+    if (result.odometry_alone_cpu_s > 0)
+      std::printf("  the odometry without loops: %.1f s more\n", result.odometry_alone_cpu_s);
   }
   std::printf("\n  results are in %s\n", result.folder.c_str());
   for (const std::string& doubt : DoubtsAbout(result))

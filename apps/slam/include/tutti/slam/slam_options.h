@@ -78,8 +78,8 @@ struct SlamOptions {
                "that nothing better exists (`tutti optimize --certify`); summary.json has the last of them",
                Section("graph"));
   TUTTI_OPTION(bool, odometry_pass, true,
-               "after loops moved the map: track the rest again without them for trajectory_odometry.txt, "
-               "outside of the timings; false: it ends at the first correction",
+               "after loops moved the map: beside the run, track the rest without them, too, for "
+               "trajectory_odometry.txt (after a run in real time); false: it ends at the first correction",
                Basic());
   TUTTI_OPTIONS_END;
 

@@ -143,24 +143,8 @@ void FrameFeatures::FillGrid() {
 void FrameFeatures::InArea(const cv::Point2f& centre, float radius, int first_octave, int last_octave,
                            std::vector<int>* out) const {
   out->clear();
-  if (entries_.empty()) return;
-  const int c0 = std::max(0, static_cast<int>(std::floor((centre.x - radius) / kCell)));
-  const int c1 = std::min(columns_ - 1, static_cast<int>(std::floor((centre.x + radius) / kCell)));
-  const int r0 = std::max(0, static_cast<int>(std::floor((centre.y - radius) / kCell)));
-  const int r1 = std::min(rows_ - 1, static_cast<int>(std::floor((centre.y + radius) / kCell)));
-  if (c0 > c1) return;
-  for (int r = r0; r <= r1; ++r) {
-    // The cells of a row lie one after the other.
-    const int row = r * columns_, past = row + c1 + 1, first = row + c0;
-    const int begin = first_entry_[static_cast<std::size_t>(first)],
-              end = first_entry_[static_cast<std::size_t>(past)];
-    for (int e = begin; e < end; ++e) {
-      const Entry& entry = entries_[static_cast<std::size_t>(e)];
-      if (entry.octave < first_octave || entry.octave > last_octave) continue;
-      if (std::abs(entry.pixel.x - centre.x) <= radius && std::abs(entry.pixel.y - centre.y) <= radius)
-        out->push_back(entry.feature);
-    }
-  }
+  ForEachInArea(centre, radius, first_octave, last_octave,
+                [out](const cv::Point2f&, int, int feature) { out->push_back(feature); });
 }
 
 std::shared_ptr<const FrameFeatures> WithoutImages(const FrameFeatures& features) {

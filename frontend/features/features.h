@@ -5,7 +5,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <opencv2/core.hpp>
@@ -40,6 +42,10 @@ struct FrameFeatures {
   /// cell of the grid.
   void InArea(const cv::Point2f& centre, float radius, int first_octave, int last_octave,
               std::vector<int>* out) const;
+  /// The same, for each of them: visit(pixel, octave, index).
+  template <class Visit>
+  void ForEachInArea(const cv::Point2f& centre, float radius, int first_octave, int last_octave,
+                     const Visit& visit) const;
   /// Fills the grid that InArea uses; call after the keypoints are set.
   void BuildGrid(int width, int height);
   /// Everything, for saved maps; defined in frontend/store/features_state.h.
@@ -63,6 +69,29 @@ struct FrameFeatures {
   std::vector<Entry> entries_;    // cell by cell, rows of cells first; ascending within a cell
   std::vector<int> first_entry_;  // of each cell, and the number of entries at the end
 };
+
+template <class Visit>
+void FrameFeatures::ForEachInArea(const cv::Point2f& centre, float radius, int first_octave, int last_octave,
+                                  const Visit& visit) const {
+  if (entries_.empty()) return;
+  const int c0 = std::max(0, static_cast<int>(std::floor((centre.x - radius) / kCell)));
+  const int c1 = std::min(columns_ - 1, static_cast<int>(std::floor((centre.x + radius) / kCell)));
+  const int r0 = std::max(0, static_cast<int>(std::floor((centre.y - radius) / kCell)));
+  const int r1 = std::min(rows_ - 1, static_cast<int>(std::floor((centre.y + radius) / kCell)));
+  if (c0 > c1) return;
+  for (int r = r0; r <= r1; ++r) {
+    // The cells of a row lie one after the other.
+    const int row = r * columns_, past = row + c1 + 1, first = row + c0;
+    const int begin = first_entry_[static_cast<std::size_t>(first)],
+              end = first_entry_[static_cast<std::size_t>(past)];
+    for (int e = begin; e < end; ++e) {
+      const Entry& entry = entries_[static_cast<std::size_t>(e)];
+      if (entry.octave < first_octave || entry.octave > last_octave) continue;
+      if (std::abs(entry.pixel.x - centre.x) <= radius && std::abs(entry.pixel.y - centre.y) <= radius)
+        visit(entry.pixel, entry.octave, entry.feature);
+    }
+  }
+}
 
 /// A copy that holds no images.
 std::shared_ptr<const FrameFeatures> WithoutImages(const FrameFeatures& features);

@@ -234,7 +234,6 @@ std::vector<std::pair<int, int>> MatchEpipolar(const Map& map, const PinholeCame
                                       : Eigen::Vector2d(-1e6, -1e6);
   std::vector<int> source(second.features->size(), -1),
       taken(second.features->size(), std::numeric_limits<int>::max());
-  std::vector<int> near;
   for (std::size_t i = 0; i < first.features->size(); ++i) {
     if (first.landmarks[i] >= 0) continue;
     const cv::KeyPoint& k = first.features->keypoints[i];
@@ -254,27 +253,27 @@ std::vector<std::pair<int, int>> MatchEpipolar(const Map& map, const PinholeCame
     const double length = std::min((a - b).norm(), double(camera.width));
     const int steps = std::max(1, static_cast<int>(std::ceil(length / 24.0)));
     const Eigen::Vector2d direction = (a - b).normalized();
+    const std::uint8_t* const descriptor = first.features->Descriptor(static_cast<int>(i));
     Best best;
     int last_seen = -1;
     for (int s = 0; s <= steps; ++s) {
       const Eigen::Vector2d p = b + direction * (length * s / steps);
       if (!p.allFinite() || !camera.Contains(p, -20)) continue;
-      second.features->InArea(cv::Point2f(static_cast<float>(p.x()), static_cast<float>(p.y())), 14.0F,
-                              k.octave - 1, k.octave + 1, &near);
-      for (int f : near) {
-        const std::size_t j = static_cast<std::size_t>(f);
-        if (f == last_seen || second.landmarks[j] >= 0 || f == best.feature) continue;
-        const cv::KeyPoint& q = second.features->keypoints[j];
-        const double sigma = map.scales()[static_cast<std::size_t>(q.octave)];
-        const double distance = std::abs(line.dot(Eigen::Vector3d(q.pt.x, q.pt.y, 1))) / line_norm;
-        if (distance > 1.96 * sigma) continue;
-        if ((Eigen::Vector2d(q.pt.x, q.pt.y) - epipole).squaredNorm() < 100 * sigma)
-          continue;  // no parallax there
-        const int d =
-            HammingDistance(first.features->Descriptor(static_cast<int>(i)), second.features->Descriptor(f));
-        if (d <= kStrictDistance) best.Offer(d, f, 0);
-        last_seen = f;
-      }
+      second.features->ForEachInArea(
+          cv::Point2f(static_cast<float>(p.x()), static_cast<float>(p.y())), 14.0F, k.octave - 1,
+          k.octave + 1, [&](const cv::Point2f& q, int octave, int f) {
+            // The cheapest test that most fail comes first.
+            const double sigma = map.scales()[static_cast<std::size_t>(octave)];
+            const double distance = std::abs(line.dot(Eigen::Vector3d(q.x, q.y, 1))) / line_norm;
+            if (distance > 1.96 * sigma) return;
+            if (f == last_seen || f == best.feature || second.landmarks[static_cast<std::size_t>(f)] >= 0)
+              return;
+            if ((Eigen::Vector2d(q.x, q.y) - epipole).squaredNorm() < 100 * sigma)
+              return;  // no parallax there
+            const int d = HammingDistance(descriptor, second.features->Descriptor(f));
+            if (d <= kStrictDistance) best.Offer(d, f, 0);
+            last_seen = f;
+          });
     }
     if (best.feature < 0) continue;
     const std::size_t j = static_cast<std::size_t>(best.feature);

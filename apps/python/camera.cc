@@ -1,0 +1,48 @@
+// tutti.Camera: a pinhole camera.
+#include "tutti/core/camera.h"
+
+#include <pybind11/stl.h>
+
+#include "apps/python/bindings.h"
+#include "apps/python/options.h"
+#include "apps/python/poses.h"
+#include "tutti/core/error.h"
+
+namespace tutti::python {
+namespace {
+
+PinholeCamera CameraOf(const py::kwargs& keywords) {
+  RunConfig config;
+  SetOptions("Camera", "camera", keywords, config);
+  if (!config.dataset.camera) throw InputError("Camera: needs width, height, fx, fy, cx, cy");
+  return *config.dataset.camera;
+}
+
+}  // namespace
+
+void BindCamera(py::module_& module) {
+  py::class_<PinholeCamera>(
+      module, "Camera",
+      (std::string(doc::PinholeCamera) + "\n\nKeywords:\n" + DescribeOptions("camera")).c_str())
+      .def(py::init(&CameraOf))
+      .def_readonly("width", &PinholeCamera::width, "image width [px]")
+      .def_readonly("height", &PinholeCamera::height, "image height [px]")
+      .def_readonly("fx", &PinholeCamera::fx, "focal length [px]")
+      .def_readonly("fy", &PinholeCamera::fy, "focal length [px]")
+      .def_readonly("cx", &PinholeCamera::cx, "principal point [px]")
+      .def_readonly("cy", &PinholeCamera::cy, "principal point [px]")
+      .def_property_readonly(
+          "distortion", [](const PinholeCamera& camera) { return WordOf(camera.distortion); },
+          "lens model: none, radtan or equidistant")
+      .def_readonly("coefficients", &PinholeCamera::coefficients, doc::DistortionCoefficients)
+      .def_property_readonly(
+          "matrix", [](const PinholeCamera& camera) { return ArrayOf(Eigen::MatrixXd(camera.Matrix())); },
+          doc::PinholeCamera_Matrix)
+      .def("__repr__", [](const PinholeCamera& camera) {
+        return py::str("Camera(width={}, height={}, fx={}, fy={}, cx={}, cy={}, distortion='{}')")
+            .format(camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy,
+                    WordOf(camera.distortion));
+      });
+}
+
+}  // namespace tutti::python

@@ -16,6 +16,7 @@ void BindTrajectories(py::module_& module);
 void BindLoopResult(py::module_& module);
 void BindLoopDetector(py::module_& module);
 void BindDataset(py::module_& module);
+void BindOptimizationReport(py::module_& module);
 void BindPoseGraph(py::module_& module);
 void BindSlamSystem(py::module_& module);
 void BindEvaluation(py::module_& module);

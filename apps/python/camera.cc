@@ -3,6 +3,9 @@
 
 #include <pybind11/stl.h>
 
+#include <map>
+#include <string>
+
 #include "apps/python/bindings.h"
 #include "apps/python/options.h"
 #include "apps/python/poses.h"
@@ -11,7 +14,28 @@
 namespace tutti::python {
 namespace {
 
+// Name and sentence of each keyword. The section of the YAML files has more: what the rig is told.
+std::map<std::string, std::string> CameraKeywords() {
+  std::map<std::string, std::string> keywords;
+  const PinholeCamera camera;
+  ForEachOption(camera, [&](const OptionText& text, const auto& /*field*/) {
+    keywords[text.name] = text.sentence + (*text.unit == '\0' ? "" : " [" + std::string(text.unit) + "]");
+  });
+  return keywords;
+}
+
+std::string DescribeCamera() {
+  std::string text = std::string(doc::PinholeCamera) + "\n\nKeywords:\n";
+  for (const auto& [name, sentence] : CameraKeywords()) text += name + ": " + sentence + "\n";
+  return text;
+}
+
 PinholeCamera CameraOf(const py::kwargs& keywords) {
+  for (const char* of_the_rig : {"baseline_m", "readout_s"}) {
+    if (keywords.contains(of_the_rig))
+      throw py::type_error("Camera: " + std::string(of_the_rig) +
+                           " is told to the Rig, or to Dataset(camera={...})");
+  }
   RunConfig config;
   SetOptions("Camera", "camera", keywords, config);
   if (!config.dataset.camera) throw InputError("Camera: needs width, height, fx, fy, cx, cy");
@@ -21,9 +45,7 @@ PinholeCamera CameraOf(const py::kwargs& keywords) {
 }  // namespace
 
 void BindCamera(py::module_& module) {
-  py::class_<PinholeCamera>(
-      module, "Camera",
-      (std::string(doc::PinholeCamera) + "\n\nKeywords:\n" + DescribeOptions("camera")).c_str())
+  py::class_<PinholeCamera>(module, "Camera", DescribeCamera().c_str())
       .def(py::init(&CameraOf))
       .def_readonly("width", &PinholeCamera::width, "image width [px]")
       .def_readonly("height", &PinholeCamera::height, "image height [px]")

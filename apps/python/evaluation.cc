@@ -17,24 +17,25 @@
 namespace tutti::python {
 namespace {
 
-py::object ObjectOf(const nlohmann::ordered_json& json) {
+py::object PythonOf(const nlohmann::ordered_json& json) {
   if (json.is_boolean()) return py::bool_(json.get<bool>());
   if (json.is_number_integer()) return py::int_(json.get<std::int64_t>());
   if (json.is_number()) return py::float_(json.get<double>());
   if (json.is_string()) return py::str(json.get<std::string>());
   if (json.is_array()) {
     py::list list;
-    for (const auto& item : json) list.append(ObjectOf(item));
+    for (const auto& item : json) list.append(PythonOf(item));
     return list;
   }
   if (!json.is_object()) return py::none();
   py::dict dict;
-  for (const auto& [key, value] : json.items()) dict[key.c_str()] = ObjectOf(value);
+  for (const auto& [key, value] : json.items()) dict[key.c_str()] = PythonOf(value);
   return dict;
 }
 
 // A file, or an array of (N, 8).
-cli::NamedPoses PosesOf(const py::object& object, const std::string& name, const std::vector<double>& times) {
+cli::NamedPoses NamedPosesOf(const py::object& object, const std::string& name,
+                             const std::vector<double>& times) {
   if (!py::isinstance<py::str>(object) && !py::hasattr(object, "__fspath__")) {
     cli::NamedPoses poses;
     poses.name = name;
@@ -49,15 +50,15 @@ py::dict Evaluate(const py::object& reference, const py::object& estimate, const
                   const std::vector<double>& times, const EvaluationOptions& given, bool errors) {
   EvaluationOptions options = given;
   options.alignment = ParseTrajectoryAlignment(alignment);
-  const cli::NamedPoses of_reference = PosesOf(reference, "reference", times);
-  const cli::NamedPoses of_estimate = PosesOf(estimate, "estimate", times);
+  const cli::NamedPoses of_reference = NamedPosesOf(reference, "reference", times);
+  const cli::NamedPoses of_estimate = NamedPosesOf(estimate, "estimate", times);
   EvaluationReport report;
   {
     const py::gil_scoped_release release;
     report =
         cli::EvaluateFiles(of_reference, of_estimate, "times (read_times of KITTI's times.txt)", options);
   }
-  py::dict result = ObjectOf(cli::ReportJson(report, options));
+  py::dict result = PythonOf(cli::ReportJson(report, options));
   if (!errors) return result;
   py::dict lists;
   lists["stamp"] = report.poses.stamps_s;
@@ -67,10 +68,10 @@ py::dict Evaluate(const py::object& reference, const py::object& estimate, const
   return result;
 }
 
-EvaluationOptions OptionsFrom(double max_time_difference_s, double time_offset_s, bool interpolate,
-                              double max_interpolation_s, std::size_t align_first,
-                              const std::array<double, 3>& vertical, double rpe_delta,
-                              const std::string& rpe_unit, bool rpe_all_pairs, double rpe_tolerance) {
+EvaluationOptions EvaluationOptionsOf(double max_time_difference_s, double time_offset_s, bool interpolate,
+                                      double max_interpolation_s, std::size_t align_first,
+                                      const std::array<double, 3>& vertical, double rpe_delta,
+                                      const std::string& rpe_unit, bool rpe_all_pairs, double rpe_tolerance) {
   EvaluationOptions options;
   options.max_time_difference_s = max_time_difference_s;
   options.time_offset_s = time_offset_s;
@@ -85,7 +86,7 @@ EvaluationOptions OptionsFrom(double max_time_difference_s, double time_offset_s
   return options;
 }
 
-std::string Describe() {
+std::string DescribeEvaluation() {
   const auto line = [](const char* name, const char* text) { return std::string(name) + ": " + text + "\n"; };
   return std::string(
              "The errors of an estimate against a reference, with the conventions and numbers of evo: a dict "
@@ -123,10 +124,11 @@ void BindEvaluation(py::module_& module) {
          bool interpolate, double max_interpolation_s, std::size_t align_first,
          const std::array<double, 3>& vertical, double rpe_delta, const std::string& rpe_unit,
          bool rpe_all_pairs, double rpe_tolerance, bool errors) {
-        return Evaluate(reference, estimate, alignment, times,
-                        OptionsFrom(max_time_difference_s, time_offset_s, interpolate, max_interpolation_s,
-                                    align_first, vertical, rpe_delta, rpe_unit, rpe_all_pairs, rpe_tolerance),
-                        errors);
+        return Evaluate(
+            reference, estimate, alignment, times,
+            EvaluationOptionsOf(max_time_difference_s, time_offset_s, interpolate, max_interpolation_s,
+                                align_first, vertical, rpe_delta, rpe_unit, rpe_all_pairs, rpe_tolerance),
+            errors);
       },
       "reference"_a, "estimate"_a, "alignment"_a = ToString(d.alignment), py::kw_only(),
       "times"_a = std::vector<double>(), "max_time_difference_s"_a = d.max_time_difference_s,
@@ -134,7 +136,7 @@ void BindEvaluation(py::module_& module) {
       "max_interpolation_s"_a = d.max_interpolation_s, "align_first"_a = d.align_first,
       "vertical"_a = std::array<double, 3>{d.vertical.x(), d.vertical.y(), d.vertical.z()},
       "rpe_delta"_a = d.rpe_delta, "rpe_unit"_a = ToString(d.rpe_unit), "rpe_all_pairs"_a = d.rpe_all_pairs,
-      "rpe_tolerance"_a = d.rpe_tolerance, "errors"_a = true, Describe().c_str());
+      "rpe_tolerance"_a = d.rpe_tolerance, "errors"_a = true, DescribeEvaluation().c_str());
 }
 
 }  // namespace tutti::python

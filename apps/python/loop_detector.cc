@@ -74,7 +74,7 @@ LoopResult Locate(Detector& self, const py::object& image, const py::object& dep
   });
 }
 
-py::dict Options(Detector& self) {
+py::dict DetectorOptions(Detector& self) {
   RunConfig config;
   config.loops = self.Run([](LoopDetector& detector) { return detector.options(); });
   py::dict options = OptionsOf(config, "loops");
@@ -175,7 +175,7 @@ void BindLoopDetector(py::module_& module) {
       .def_property_readonly(
           "last_id", [](Detector& self) { return self.Run([](LoopDetector& d) { return d.LastId(); }); },
           doc::LoopDetector_LastId)
-      .def_property_readonly("options", &Options, doc::LoopDetector_options);
+      .def_property_readonly("options", &DetectorOptions, doc::LoopDetector_options);
 }
 
 }  // namespace tutti::python

@@ -14,7 +14,7 @@ using Posterior = std::vector<std::pair<std::int64_t, double>>;
 
 // One member of each element, without a copy.
 template <class T, class Element>
-py::array Column(const std::vector<Element>& elements, const T Element::*field, const py::object& owner) {
+py::array FieldsOf(const std::vector<Element>& elements, const T Element::*field, const py::object& owner) {
   const T* first = elements.empty() ? nullptr : &(elements.front().*field);
   py::array array(py::dtype::of<T>(), {static_cast<py::ssize_t>(elements.size())},
                   {static_cast<py::ssize_t>(sizeof(Element))}, first, owner);
@@ -35,14 +35,14 @@ py::array Pixels(const std::vector<VerifiedMatch>& matches, const cv::Point2f Ve
 template <class Class, class Field>
 auto Locations(Field field) {
   return [field](const py::object& self) {
-    return Column(self.cast<const Class&>().*field, &Posterior::value_type::first, self);
+    return FieldsOf(self.cast<const Class&>().*field, &Posterior::value_type::first, self);
   };
 }
 
 template <class Class, class Field>
 auto Posteriors(Field field) {
   return [field](const py::object& self) {
-    return Column(self.cast<const Class&>().*field, &Posterior::value_type::second, self);
+    return FieldsOf(self.cast<const Class&>().*field, &Posterior::value_type::second, self);
   };
 }
 

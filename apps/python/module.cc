@@ -15,6 +15,7 @@ PYBIND11_MODULE(_tutti, module) {
   BindLoopResult(module);
   BindLoopDetector(module);
   BindDataset(module);
+  BindOptimizationReport(module);
   BindPoseGraph(module);
   BindSlamSystem(module);
   BindEvaluation(module);

@@ -14,6 +14,7 @@
 #include "apps/python/errors.h"
 #include "apps/python/guarded.h"
 #include "apps/python/interrupts.h"
+#include "apps/python/optimization_report.h"
 #include "apps/python/options.h"
 #include "apps/python/poses.h"
 #include "tutti/backend/certificate.h"
@@ -108,15 +109,7 @@ std::unique_ptr<Graph> ReadGraph(const fs::path& file, const std::string& bad_in
   return std::make_unique<Graph>(std::move(read.graph));
 }
 
-template <class T, class Take>
-py::array_t<T> Column(std::size_t size, Take take) {
-  py::array_t<T> array(static_cast<py::ssize_t>(size));
-  T* values = array.mutable_data();
-  for (std::size_t i = 0; i < size; ++i) values[i] = take(i);
-  return array;
-}
-
-py::array_t<double> PosesOf(Graph& self) {
+py::array_t<double> NodePoses(Graph& self) {
   const auto nodes = self.Run([](PoseGraph& graph) { return graph.nodes(); });
   std::vector<Pose> poses;
   poses.reserve(nodes.size());
@@ -160,75 +153,10 @@ Certificate Certify(Graph& self, double certified_gap, double max_shift) {
   return certificate;
 }
 
-py::dict Costs(const GraphCosts& costs) {
-  py::dict all;
-  all["chi2"] = costs.chi2;
-  all["chi2log"] = costs.chi2log;
-  all["chordal"] = costs.chordal;
-  return all;
-}
-
-void BindReports(py::module_& module) {
-  using Report = PoseGraphReport;
-  py::class_<Report>(module, "OptimizationReport",
-                     "What PoseGraph.optimize did. Arrays are parallel to the edges.")
-      .def_readonly("success", &Report::success, doc::PoseGraphReport_success)
-      .def_readonly("reason", &Report::reason, doc::PoseGraphReport_reason)
-      .def_readonly("termination", &Report::termination, doc::PoseGraphReport_termination)
-      .def_property_readonly(
-          "start", [](const Report& report) { return ToString(report.start); }, doc::PoseGraphReport_start)
-      .def_readonly("iterations", &Report::iterations, doc::PoseGraphReport_iterations)
-      .def_readonly("initial_objective", &Report::initial_objective, doc::PoseGraphReport_initial_objective)
-      .def_readonly("objective", &Report::objective, "what was minimised, of the result")
-      .def_property_readonly(
-          "initial_costs", [](const Report& report) { return Costs(report.initial_costs); },
-          "chi2, chi2log and chordal (docs/backend.md) at the start that was taken")
-      .def_property_readonly(
-          "costs", [](const Report& report) { return Costs(report.costs); }, "the same of the result")
-      .def_property_readonly(
-          "chi2",
-          [](const Report& r) {
-            return Column<double>(r.edges.size(), [&](std::size_t e) { return r.edges[e].chi2; });
-          },
-          (std::string("(E,) float64: ") + doc::EdgeOutcome_chi2).c_str())
-      .def_property_readonly(
-          "weights",
-          [](const Report& r) {
-            return Column<double>(r.edges.size(), [&](std::size_t e) { return r.edges[e].weight; });
-          },
-          (std::string("(E,) float64: ") + doc::EdgeOutcome_weight).c_str())
-      .def_property_readonly(
-          "down_weighted",
-          [](const Report& r) {
-            return Column<bool>(r.edges.size(), [&](std::size_t e) { return r.edges[e].down_weighted; });
-          },
-          (std::string("(E,) bool: ") + doc::EdgeOutcome_down_weighted).c_str())
-      .def_readonly("time_s", &Report::time_s, doc::PoseGraphReport_time_s)
-      .def("__repr__", [](const Report& report) {
-        return py::str("OptimizationReport(success={}, termination='{}', iterations={}, objective={:.6g})")
-            .format(report.success, report.termination, report.iterations, report.objective);
-      });
-  py::class_<Certificate>(module, "Certificate", doc::Certificate)
-      .def_readonly("available", &Certificate::available, doc::Certificate_available)
-      .def_readonly("certified", &Certificate::certified, doc::Certificate_certified)
-      .def_readonly("reason", &Certificate::reason, doc::Certificate_reason)
-      .def_readonly("chordal", &Certificate::chordal, doc::Certificate_chordal)
-      .def_readonly("lower_bound", &Certificate::lower_bound, doc::Certificate_lower_bound)
-      .def_readonly("relative_gap", &Certificate::relative_gap, doc::Certificate_relative_gap)
-      .def_readonly("min_eigenvalue_bound", &Certificate::min_eigenvalue_bound,
-                    doc::Certificate_min_eigenvalue_bound)
-      .def_readonly("time_s", &Certificate::time_s, "[s]")
-      .def("__repr__", [](const Certificate& certificate) {
-        return py::str("Certificate(certified={}, relative_gap={:.3g}, reason='{}')")
-            .format(certificate.certified, certificate.relative_gap, certificate.reason);
-      });
-}
-
 }  // namespace
 
 void BindPoseGraph(py::module_& module) {
   using namespace pybind11::literals;  // NOLINT(google-build-using-namespace)
-  BindReports(module);
   const CertificateOptions defaults;
   const std::string text =
       std::string(doc::PoseGraph) +
@@ -301,7 +229,7 @@ void BindPoseGraph(py::module_& module) {
             return Column<int>(nodes.size(), [&](std::size_t k) { return nodes[k].id; });
           },
           "(N,) int32: of the nodes, in the order in which they were added")
-      .def_property_readonly("poses", &PosesOf,
+      .def_property_readonly("poses", &NodePoses,
                              "(N, 7) float64, parallel to ids: x, y, z [m], qx, qy, qz, qw of T_world_node")
       .def_property_readonly(
           "scales",
@@ -316,7 +244,9 @@ void BindPoseGraph(py::module_& module) {
           "measurement (E, 7), x, y, z [m], qx, qy, qz, qw of T_from_to; scale (E,).")
       .def(
           "costs",
-          [](Graph& self) { return Costs(self.Run([](PoseGraph& graph) { return EvaluateCosts(graph); })); },
+          [](Graph& self) {
+            return CostsOf(self.Run([](PoseGraph& graph) { return EvaluateCosts(graph); }));
+          },
           (std::string("chi2, chi2log, chordal. ") + doc::GraphCosts).c_str())
       .def("optimize", &Optimize, optimize.c_str())
       .def("certify", &Certify, "certified_gap"_a = defaults.certified_gap,

@@ -12,7 +12,7 @@ namespace {
 namespace py = pybind11;
 
 // Row of seven: x, y, z, qx, qy, qz, qw.
-void Write(const Pose& pose, double* row) {
+void WriteRow(const Pose& pose, double* row) {
   const Eigen::Vector4d& quaternion = pose.rotation.coeffs();
   row = std::copy_n(pose.translation.data(), 3, row);
   std::copy_n(quaternion.data(), 4, row);
@@ -126,7 +126,7 @@ py::array_t<double> ArrayOf(const Similarity& similarity) {
 py::array_t<double> ArrayOf(const std::vector<Pose>& poses) {
   py::array_t<double> array({static_cast<py::ssize_t>(poses.size()), py::ssize_t{7}});
   double* row = array.mutable_data();
-  for (const Pose& pose : poses) Write(pose, row), row += 7;
+  for (const Pose& pose : poses) WriteRow(pose, row), row += 7;
   return array;
 }
 
@@ -135,7 +135,7 @@ py::array_t<double> ArrayOf(const Trajectory& trajectory) {
   double* row = array.mutable_data();
   for (const StampedPose& stamped : trajectory) {
     *row = stamped.stamp_s;
-    Write(stamped.pose, row + 1);
+    WriteRow(stamped.pose, row + 1);
     row += 8;
   }
   return array;

@@ -15,14 +15,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-py::array_t<double> Read(const fs::path& file, const std::optional<std::string>& format,
-                         const std::vector<double>& times) {
+py::array_t<double> ReadRows(const fs::path& file, const std::optional<std::string>& format,
+                             const std::vector<double>& times) {
   std::optional<PoseFileFormat> known;
   if (format) known = ParsePoseFileFormat(*format);
   return ArrayOf(Reading(file, [&] { return ReadPoseFile(file, known, times).trajectory; }));
 }
 
-void Write(const fs::path& file, const py::object& rows, const std::string& format) {
+void WriteRows(const fs::path& file, const py::object& rows, const std::string& format) {
   const Trajectory trajectory = TrajectoryOf(rows, "trajectory");
   const PoseFileFormat known = ParsePoseFileFormat(format);
   Writing([&] { WritePoseFile(file, trajectory, known); });
@@ -56,7 +56,7 @@ py::array_t<double> PosesOfMatrices(const py::object& object) {
 
 void BindTrajectories(py::module_& module) {
   module.def(
-      "read_trajectory", &Read, py::arg("file"), py::arg("format") = py::none(),
+      "read_trajectory", &ReadRows, py::arg("file"), py::arg("format") = py::none(),
       py::arg("times") = std::vector<double>(),
       (std::string(
            "Returns (N, 8) of float64: stamp [s], x, y, z [m], qx, qy, qz, qw; T_world_body. `format`: "
@@ -64,7 +64,7 @@ void BindTrajectories(py::module_& module) {
        doc::ReadPoseFile)
           .c_str());
   module.def(
-      "write_trajectory", &Write, py::arg("file"), py::arg("trajectory"), py::arg("format") = "tum",
+      "write_trajectory", &WriteRows, py::arg("file"), py::arg("trajectory"), py::arg("format") = "tum",
       (std::string("`trajectory`: (N, 8) as read_trajectory returns it.\n\n") + doc::WritePoseFile).c_str());
   module.def("pose_matrices", &Matrices, py::arg("poses"),
              "Poses (N, 7), or a trajectory (N, 8), as matrices (N, 4, 4).");

@@ -26,7 +26,8 @@ std::map<std::string, std::string> CameraKeywords() {
 
 std::string DescribeCamera() {
   std::string text = std::string(doc::PinholeCamera) + "\n\nKeywords:\n";
-  for (const auto& [name, sentence] : CameraKeywords()) text += name + ": " + sentence + "\n";
+  for (const auto& [name, sentence] : CameraKeywords())
+    text.append(name).append(": ").append(sentence).append("\n");
   return text;
 }
 

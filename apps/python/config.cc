@@ -31,7 +31,7 @@ void BindConfig(py::module_& module) {
       .def(py::init(&ConfigOf), py::arg("file") = py::none())
       .def("options", &OptionsOf, py::arg("section"), "The present values of a section.");
   module.def(
-      "describe", &DescribeOptions, py::arg("section"),
+      "describe", [](const std::string& section) { return DescribeOptions(section); }, py::arg("section"),
       "What the keys of a section of the configuration do: its options, defaults, units and ranges. The "
       "keywords of LoopDetector are those of section \"loops\", of Camera \"camera\", of PoseGraph.optimize "
       "\"graph\".");

@@ -30,15 +30,16 @@ void BindErrors(py::module_& module) {
                          py::make_tuple(base, py::reinterpret_borrow<py::object>(PyExc_ValueError)));
   file_error = NewError(module, "FileError", "A file that can't be opened, or not be written in full.",
                         py::make_tuple(input_error, py::reinterpret_borrow<py::object>(PyExc_OSError)));
-  py::register_exception_translator([](std::exception_ptr pointer) {
-    try {
-      if (pointer) std::rethrow_exception(pointer);
-    } catch (const FileError& error) {
-      PyErr_SetString(file_error.ptr(), error.what());
-    } catch (const InputError& error) {
-      PyErr_SetString(input_error.ptr(), error.what());
-    }
-  });
+  py::register_exception_translator(
+      [](std::exception_ptr pointer) {  // NOLINT(performance-unnecessary-value-param)
+        try {
+          if (pointer) std::rethrow_exception(pointer);
+        } catch (const FileError& error) {
+          PyErr_SetString(file_error.ptr(), error.what());
+        } catch (const InputError& error) {
+          PyErr_SetString(input_error.ptr(), error.what());
+        }
+      });
 }
 
 }  // namespace tutti::python

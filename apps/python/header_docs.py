@@ -57,6 +57,7 @@ def described(text):
 
 def pythonic(text):
     """The same in the words of Python."""
+    text = text.replace("posterior_by_location", "posteriors")
     text = re.sub(r"\b([Tt])hrows\b", lambda m: ("R" if m[1] == "T" else "r") + "aises", text)
     text = re.sub(r"\bthrow\b", "raise", text)
     text = re.sub(r"(?<!tutti\.)\bInputError\b", "tutti.InputError", text)

@@ -47,6 +47,16 @@ py::object ObjectOf(const std::string& yaml) {
   return list;
 }
 
+// What is said of a key to who writes Python.
+std::string InPython(std::string text) {
+  const std::pair<const char*, const char*> words[] = {{"::", "."}, {"posterior_by_location", "posteriors"}};
+  for (const auto& [word, other] : words) {
+    for (std::size_t at; (at = text.find(word)) != std::string::npos;)
+      text.replace(at, std::string(word).size(), other);
+  }
+  return text;
+}
+
 // Sets keys below `prefix`; `given` is how the caller got there: "extraction.".
 void Assign(const std::string& function, const std::string& prefix, const std::string& given,
             const py::dict& keywords, const ConfigTable& table) {
@@ -62,13 +72,16 @@ void Assign(const std::string& function, const std::string& prefix, const std::s
     if (table.HasSection(path)) {
       if (!py::isinstance<py::dict>(value))
         throw InputError(function + ": " + given + name + " needs a dict of options");
-      Assign(function, path + ".", given + name + ".", py::reinterpret_borrow<py::dict>(value), table);
+      std::string within = given;
+      within.append(name).append(".");
+      Assign(function, path + ".", within, py::reinterpret_borrow<py::dict>(value), table);
       continue;
     }
     const ConfigKey* key = table.Find(path);
     if (key == nullptr) {
-      const std::string within = given.empty() ? "" : " in " + given.substr(0, given.size() - 1);
-      throw py::type_error(function + within + ": " + table.Unknown(prefix, name));
+      std::string words = function;
+      if (!given.empty()) words.append(" in ").append(given, 0, given.size() - 1);
+      throw py::type_error(words.append(": ").append(table.Unknown(prefix, name)));
     }
     std::string wrong;
     try {
@@ -111,16 +124,16 @@ py::dict OptionsOf(const RunConfig& config, const std::string& section) {
   return options;
 }
 
-std::string DescribeOptions(const std::string& section) {
-  RunConfig defaults;
+std::string DescribeOptions(const std::string& section, RunConfig defaults) {
   const ConfigTable table(defaults);
   std::string text, within;
   for (const ConfigKey& key : table.keys()) {
     if (key.section != section && key.section.rfind(section + ".", 0) != 0) continue;
     const bool nested = key.section != section;
-    if (nested && key.section != within) text += key.section.substr(section.size() + 1) + ": a dict of\n";
+    if (nested && key.section != within) text.append(key.section, section.size() + 1).append(": a dict of\n");
     within = nested ? key.section : "";
-    text += (nested ? "    " : "") + key.name + " = " + key.show() + ": " + key.doc + "\n";
+    text.append(nested ? "    " : "").append(key.name).append(" = ").append(key.show()).append(": ");
+    text.append(InPython(key.doc)).append("\n");
   }
   return text;
 }

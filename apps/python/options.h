@@ -19,6 +19,6 @@ void SetOptions(const std::string& function, const std::string& section, const p
 py::dict OptionsOf(const RunConfig& config, const std::string& section);
 
 /// What each keyword of a section does, for a docstring.
-std::string DescribeOptions(const std::string& section);
+std::string DescribeOptions(const std::string& section, RunConfig defaults = {});
 
 }  // namespace tutti::python

@@ -137,7 +137,7 @@ PoseGraphReport Optimize(Graph& self, const py::kwargs& keywords) {
   config.graph = PoseGraphOptions();
   SetOptions("PoseGraph.optimize", "graph", keywords, config);
   Interrupts interrupts;
-  const PoseGraphReport report = self.Run([&](PoseGraph& graph) {
+  PoseGraphReport report = self.Run([&](PoseGraph& graph) {
     return PoseGraphOptimizer(config.graph).Optimize(graph, [&] { return interrupts.Came(); });
   });
   interrupts.Rethrow();
@@ -146,7 +146,7 @@ PoseGraphReport Optimize(Graph& self, const py::kwargs& keywords) {
 
 Certificate Certify(Graph& self, double certified_gap, double max_shift) {
   Interrupts interrupts;
-  const Certificate certificate = self.Run([&](PoseGraph& graph) {
+  Certificate certificate = self.Run([&](PoseGraph& graph) {
     return CertifyOptimum(graph, {certified_gap, max_shift}, {}, [&] { return interrupts.Came(); });
   });
   interrupts.Rethrow();
@@ -158,17 +158,18 @@ Certificate Certify(Graph& self, double certified_gap, double max_shift) {
 void BindPoseGraph(py::module_& module) {
   using namespace pybind11::literals;  // NOLINT(google-build-using-namespace)
   const CertificateOptions defaults;
+  RunConfig graphs;
+  graphs.graph = PoseGraphOptions();
   const std::string text =
       std::string(doc::PoseGraph) +
       "\n\nkind: se2, se3 or sim3 (one camera, whose scale drifts). Poses map points of the node into "
       "the world: x, y, z [m], qx, qy, qz, qw, and for sim3 a scale; or a matrix of 4 x 4; se2 also "
       "x, y, heading [rad].";
-  const std::string optimize =
-      std::string(doc::PoseGraphOptimizer_Optimize) +
-      " Ctrl-C gives up; the graph then has its poses of before. Keywords, all optional; SLAM "
-      "graphs that may hold false loops should use robust=\"gnc\". With their defaults in a "
-      "run, of which init (auto here), robust (none here) and the limits differ:\n" +
-      DescribeOptions("graph");
+  const std::string optimize = std::string(doc::PoseGraphOptimizer_Optimize) +
+                               " Ctrl-C gives up; the graph then has its poses of before. Keywords, all "
+                               "optional; SLAM graphs that may hold "
+                               "false loops should use robust=\"gnc\":\n" +
+                               DescribeOptions("graph", graphs);
   py::class_<Graph>(module, "PoseGraph", text.c_str())
       .def(py::init([](const std::string& kind) { return std::make_unique<Graph>(PoseGraph(KindOf(kind))); }),
            "kind"_a = "se3")

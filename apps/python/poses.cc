@@ -60,6 +60,7 @@ py::array_t<double> RowsOf(const py::object& object, const std::string& name,
                                                                        array.shape(1)) != columns.end());
   if (!fits) {
     std::vector<std::string> words;
+    words.reserve(columns.size());
     for (const py::ssize_t count : columns) words.push_back("(N, " + std::to_string(count) + ")");
     throw py::value_error(name + " must be of shape " +
                           (words.empty() ? "(N, columns)" : JoinText(words, " or ")) + ", not " +

@@ -23,6 +23,12 @@ def town(tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
+def stereo(town):
+    """It as a data set with both cameras."""
+    return tutti.Dataset(town, tutti.Config(town / "config.yaml"))
+
+
+@pytest.fixture(scope="session")
 def source():
     return pathlib.Path(os.environ["TUTTI_SOURCE"])
 

@@ -11,7 +11,7 @@ import tutti
 
 def circle(n=200):
     """(N, 8): once around, 10 m wide, looking ahead."""
-    angle = np.linspace(0, 2 * np.pi, n)
+    angle = np.linspace(-np.pi, np.pi, n)
     zero = np.zeros(n)
     return np.column_stack([0.1 * np.arange(n), 10 * np.cos(angle), 10 * np.sin(angle), zero,
                             zero, zero, np.sin(angle / 2), np.cos(angle / 2)])
@@ -90,7 +90,7 @@ def test_what_is_no_trajectory_is_refused(tmp_path):
             (lambda: tutti.evaluate(truth, truth[:, :7]), ValueError, r"estimate must be of shape \(N, 8\)"),
             (lambda: tutti.evaluate(truth, truth[::-1]), tutti.InputError, "estimate, row 1: time stamps must grow"),
             (lambda: tutti.evaluate(truth, truth * np.nan), tutti.InputError, "estimate, row 0"),
-            (lambda: tutti.evaluate(truth, truth + [100] + [0] * 7), tutti.InputError, "estimate against reference"),
+            (lambda: tutti.evaluate(truth, truth + np.eye(8)[0] * 100), tutti.InputError, "estimate against reference"),
             (lambda: tutti.evaluate(truth, truth, "se4"), tutti.InputError, "se3"),
             (lambda: tutti.evaluate(truth, truth, rpe_delta=-1), tutti.InputError, "rpe_delta|delta"),
             (lambda: tutti.evaluate(truth, None), TypeError, "estimate must be an array"),

@@ -96,7 +96,7 @@ def test_views_of_arrays_are_as_good_as_copies(images):
 def test_nothing_of_an_image_is_kept(images):
     given, copied = tutti.LoopDetector(), tutti.LoopDetector()
     buffer = np.empty_like(images[0])
-    for image in images:
+    for image in images[::3]:
         buffer[...] = image
         a, b = given.detect(buffer), copied.detect(image)
         buffer[...] = 0

@@ -43,7 +43,7 @@ def functions():
 
 def members(cls):
     own = public(vars(cls))
-    if vars(cls).get("__init__") is not None and "self" not in (vars(cls)["__init__"].__doc__ or ""):
+    if not (getattr(cls, "__init__").__doc__ or "").startswith("__init__("):
         own.discard("__init__")  # pybind11's own, which says that there is no constructor
     return own
 

@@ -11,6 +11,8 @@ namespace {
 
 namespace py = pybind11;
 
+using Numbers = py::array_t<double, py::array::c_style | py::array::forcecast>;
+
 // Row of seven: x, y, z, qx, qy, qz, qw.
 void WriteRow(const Pose& pose, double* row) {
   const Eigen::Vector4d& quaternion = pose.rotation.coeffs();
@@ -47,15 +49,19 @@ Similarity SimilarityOfMatrix(const py::array_t<double>& array, const std::strin
   return Similarity(scale, rigid.rotation, matrix.col(3));
 }
 
+Numbers NumbersOf(const py::object& object, const std::string& name) {
+  if (!object.is_none()) {  // which numpy takes for a number that is none
+    if (Numbers array = Numbers::ensure(object)) return array;
+  }
+  PyErr_Clear();
+  throw py::type_error(name + " must be an array of numbers");
+}
+
 }  // namespace
 
 py::array_t<double> RowsOf(const py::object& object, const std::string& name,
                            const std::vector<py::ssize_t>& columns) {
-  const auto array = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(object);
-  if (!array) {
-    PyErr_Clear();
-    throw py::type_error(name + " must be an array of numbers");
-  }
+  const Numbers array = NumbersOf(object, name);
   const bool fits = array.ndim() == 2 && (columns.empty() || std::find(columns.begin(), columns.end(),
                                                                        array.shape(1)) != columns.end());
   if (!fits) {
@@ -70,11 +76,7 @@ py::array_t<double> RowsOf(const py::object& object, const std::string& name,
 }
 
 Similarity SimilarityOf(const py::object& object, const std::string& name) {
-  const auto array = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(object);
-  if (!array) {
-    PyErr_Clear();
-    throw py::type_error(name + " must be an array of numbers");
-  }
+  const Numbers array = NumbersOf(object, name);
   if (array.ndim() == 2 && (array.shape(0) == 3 || array.shape(0) == 4) && array.shape(1) == 4)
     return SimilarityOfMatrix(array, name);
   if (array.ndim() != 1 || (array.shape(0) != 7 && array.shape(0) != 8)) {

@@ -42,7 +42,7 @@ py::array_t<double> Matrices(const py::object& object) {
 
 py::array_t<double> PosesOfMatrices(const py::object& object) {
   const auto matrices = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(object);
-  if (!matrices) throw py::error_already_set();
+  if (!matrices) throw py::type_error("matrices must be an array of numbers");
   const bool fits =
       matrices.ndim() == 3 && (matrices.shape(1) == 3 || matrices.shape(1) == 4) && matrices.shape(2) == 4;
   if (!fits) throw py::value_error("matrices must be of shape (N, 4, 4) or (N, 3, 4)");

@@ -109,14 +109,15 @@ def test_what_is_no_graph_is_refused(tmp_path):
             call()
 
 
-def large_graph(n=6000):
+def endless_graph(n=1000):
+    """Measurements that contradict each other: the objective falls by ever less, for more iterations than anybody waits."""
     rng = np.random.default_rng(5)
     graph = tutti.PoseGraph()
     for k in range(n):
         graph.add_pose(k, [*rng.normal(size=3) * 10, *rng.normal(size=4)])
     for k in range(1, n):
         graph.add_edge(k - 1, k, [1, 0, 0, *rng.normal(size=4)], sigmas=(0.1, 0.1))
-    for a, b in rng.integers(0, n, (3000, 2)):
+    for a, b in rng.integers(0, n, (500, 2)):
         if abs(a - b) > 1:
             graph.add_edge(a, b, [0, 0, 0, *rng.normal(size=4)], sigmas=(0.1, 0.1))
     return graph
@@ -124,7 +125,7 @@ def large_graph(n=6000):
 
 @pytest.mark.parametrize("solver", ["ceres", "block"])
 def test_ctrl_c_ends_a_long_solution(solver):
-    graph = large_graph()
+    graph = endless_graph()
     poses = graph.poses
     timer = threading.Timer(0.7, lambda: os.kill(os.getpid(), signal.SIGINT))
     began = time.monotonic()

@@ -136,10 +136,6 @@ class Reader {
     return there;
   }
 
-  static void Warn(const std::string& text) {
-    if (PyErr_WarnEx(PyExc_RuntimeWarning, text.c_str(), 1) != 0) throw py::error_already_set();
-  }
-
   std::unique_ptr<const Dataset> dataset_;
 };
 
@@ -203,7 +199,9 @@ py::array_t<double> GroundTruth(const Reader& reader, std::optional<fs::path> fi
   if (!file) file = dataset.GroundTruthFile();
   if (!file) throw FileError("the data set has no ground truth; give its file");
   std::vector<std::string> warnings;
-  return ArrayOf(Reading(*file, [&] { return dataset.ReadGroundTruth(*file, &warnings); }));
+  const Trajectory trajectory = Reading(*file, [&] { return dataset.ReadGroundTruth(*file, &warnings); });
+  for (const std::string& warning : warnings) Warn(warning);
+  return ArrayOf(trajectory);
 }
 
 }  // namespace
@@ -239,7 +237,8 @@ void BindDataset(py::module_& module) {
            (std::string("(N, 8): stamp [s], x, y, z [m], qx, qy, qz, qw; T_world_body. file: None for that "
                         "in its usual "
                         "place in the folder. ") +
-            doc::Dataset_ReadGroundTruth)
+            "Poses of KITTI get the data set's stamps, and must be as many. A time stamp that stands there "
+            "twice keeps its first pose, with a warning. Raises tutti.InputError with file and line.")
                .c_str())
       .def_property_readonly(
           "rig", [](const Reader& reader) { return reader.dataset().Rig(); }, doc::Dataset_Rig)

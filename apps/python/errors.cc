@@ -22,6 +22,10 @@ py::handle NewError(py::module_& module, const char* name, const char* doc, cons
 
 bool CanBeRead(const std::filesystem::path& path) { return ::access(path.c_str(), R_OK) == 0; }
 
+void Warn(const std::string& text) {
+  if (PyErr_WarnEx(PyExc_RuntimeWarning, text.c_str(), 1) != 0) throw py::error_already_set();
+}
+
 void BindErrors(py::module_& module) {
   static py::handle input_error, file_error;
   const py::handle base = NewError(module, "Error", "All errors of tutti. The message says what to do.",

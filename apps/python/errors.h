@@ -38,4 +38,7 @@ void Writing(Work work) {
   }
 }
 
+/// A RuntimeWarning of Python's. May raise, where the user wants warnings to be errors.
+void Warn(const std::string& text);
+
 }  // namespace tutti::python

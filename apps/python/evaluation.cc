@@ -43,7 +43,9 @@ cli::NamedPoses NamedPosesOf(const py::object& object, const std::string& name,
     return poses;
   }
   const auto file = py::module_::import("os").attr("fspath")(object).cast<std::string>();
-  return {file, Reading(file, [&] { return ReadPoseFile(file, {}, times); })};
+  cli::NamedPoses read = {file, Reading(file, [&] { return ReadPoseFile(file, {}, times); })};
+  for (const std::string& warning : read.poses.warnings) Warn(warning);
+  return read;
 }
 
 py::dict Evaluate(const py::object& reference, const py::object& estimate, const std::string& alignment,

@@ -10,6 +10,8 @@ import pathlib
 import re
 import sys
 
+# Parameters that Python has not, or under another name: what is said of them is left out.
+CPP_ONLY = re.compile(r"`(?:stop|chordal_optimum|recorder|more|times_s|format)`(?:[^.]|\.(?! |$))*\. ?")
 SCOPE = re.compile(r"^(?:struct|class) (\w+)[^;]*{")
 FUNCTION = re.compile(r"(~?\w+|operator\S+) ?\(")
 NAMES = re.compile(r"(\w+)(?: = [^,;]+|\{[^}]*\})?(?=[,;])")
@@ -57,14 +59,15 @@ def described(text):
 
 def pythonic(text):
     """The same in the words of Python."""
-    text = text.replace("posterior_by_location", "posteriors")
+    text = CPP_ONLY.sub("", text).replace("posterior_by_location", "posteriors")
     text = re.sub(r"\b([Tt])hrows\b", lambda m: ("R" if m[1] == "T" else "r") + "aises", text)
     text = re.sub(r"\bthrow\b", "raise", text)
     text = re.sub(r"(?<!tutti\.)\bInputError\b", "tutti.InputError", text)
     text = re.sub(r"\bk([A-Z]\w*)", lambda m: '"' + m[1].lower() + '"', text)
     text = re.sub(r"\b(?!cv::)(\w+)::(\w+)", lambda m: m[1] + "." + snake(m[2]), text)
-    text = re.sub(r"\b([A-Z][a-z]\w*)\(", lambda m: snake(m[1]) + "(", text)
-    return re.sub(r"(?<=[a-z,] )(Detect|Locate|Load|Save|Track|Finish)\b", lambda m: snake(m[1]), text)
+    text = re.sub(r"\b(?!Sim\()([A-Z][a-z]\w*)\(", lambda m: snake(m[1]) + "(", text)
+    text = text.replace("(Finish)", "(finish)").replace("(null)", "(None)")
+    return re.sub(r"(?<=[a-z,] )(Detect|Locate|Load|Save|Track|Finish|ReadTrajectory)\b", lambda m: snake(m[1]), text)
 
 
 def snake(name):

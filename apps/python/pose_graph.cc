@@ -103,9 +103,7 @@ std::unique_ptr<Graph> ReadGraph(const fs::path& file, const std::string& bad_in
     const py::gil_scoped_release release;
     read = Reading(file, [&] { return ReadG2o(file, bad); });
   }
-  for (const std::string& warning : read.warnings) {
-    if (PyErr_WarnEx(PyExc_RuntimeWarning, warning.c_str(), 1) != 0) throw py::error_already_set();
-  }
+  for (const std::string& warning : read.warnings) Warn(warning);
   return std::make_unique<Graph>(std::move(read.graph));
 }
 

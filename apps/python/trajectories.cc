@@ -19,7 +19,9 @@ py::array_t<double> ReadRows(const fs::path& file, const std::optional<std::stri
                              const std::vector<double>& times) {
   std::optional<PoseFileFormat> known;
   if (format) known = ParsePoseFileFormat(*format);
-  return ArrayOf(Reading(file, [&] { return ReadPoseFile(file, known, times).trajectory; }));
+  const PoseFile read = Reading(file, [&] { return ReadPoseFile(file, known, times); });
+  for (const std::string& warning : read.warnings) Warn(warning);
+  return ArrayOf(read.trajectory);
 }
 
 void WriteRows(const fs::path& file, const py::object& rows, const std::string& format) {
@@ -60,7 +62,8 @@ void BindTrajectories(py::module_& module) {
       py::arg("times") = std::vector<double>(),
       (std::string(
            "Returns (N, 8) of float64: stamp [s], x, y, z [m], qx, qy, qz, qw; T_world_body. `format`: "
-           "\"tum\", \"kitti\", \"euroc\", \"g2o\"; None: by the content.\n\n") +
+           "\"tum\", \"kitti\", \"euroc\", \"g2o\"; None: by the content. `times`: stamps [s] of "
+           "KITTI's lines (one each), or of g2o's ids.\n\n") +
        doc::ReadPoseFile)
           .c_str());
   module.def(

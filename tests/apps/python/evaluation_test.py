@@ -76,6 +76,16 @@ def test_files_have_the_same_trajectory(tmp_path, format):
     np.testing.assert_allclose(tutti.pose_matrices(again), tutti.pose_matrices(truth), atol=1e-6)
 
 
+def test_what_a_file_is_taken_for_is_a_warning(tmp_path):
+    tutti.write_trajectory(tmp_path / "truth", circle())
+    lines = (tmp_path / "truth").read_text().splitlines()
+    (tmp_path / "twice").write_text("\n".join(lines[:3] + lines[2:]))
+    with pytest.warns(RuntimeWarning, match="twice:4"):
+        assert tutti.read_trajectory(tmp_path / "twice").shape == (200, 8)
+    with pytest.warns(RuntimeWarning, match="twice:4"):
+        assert tutti.evaluate(tmp_path / "truth", tmp_path / "twice")["ate"]["rmse"] < 1e-9
+
+
 def test_matrices_and_poses_are_the_same():
     truth = circle()
     matrices = tutti.pose_matrices(truth)

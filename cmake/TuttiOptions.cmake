@@ -33,6 +33,8 @@ tutti_option(TUTTI_BUILD_BENCH "Build the programs under bench/ (needs Google Be
   "TUTTI_BUILD_APPS;NOT BUILD_SHARED_LIBS" "TUTTI_BUILD_APPS, and static libraries")
 tutti_option(TUTTI_BUILD_FUZZERS "Build the libFuzzer programs under tests/fuzz (needs clang; see ./dev fuzz)" OFF
   "TUTTI_BUILD_LOOPCLOSURE;NOT BUILD_SHARED_LIBS" "TUTTI_BUILD_LOOPCLOSURE, and static libraries")
+tutti_option(TUTTI_BUILD_PYTHON "Build the Python module (needs pybind11)" OFF
+  "TUTTI_BUILD_SLAM;NOT BUILD_SHARED_LIBS" "TUTTI_BUILD_SLAM, and static libraries")
 option(TUTTI_INSTALL "Install and package what is built" ${PROJECT_IS_TOP_LEVEL})
 option(TUTTI_WERROR "Treat warnings as errors (./dev turns it on)" OFF)
 option(TUTTI_NATIVE "Compile for this very machine (-march=native); never for packages" OFF)

@@ -57,4 +57,10 @@ Recognises places that were seen before by an ensemble of Bayesian filters.
 Evaluates trajectories and loops, and makes reports for a browser.")
   set(CPACK_DEBIAN_PROGRAM_PACKAGE_SHLIBDEPS ON)
 endif()
+if(TUTTI_BUILD_PYTHON)
+  tutti_package(python python3-tutti python "visual SLAM and loop closure for Python
+Loop closure for any camera, visual SLAM, pose graphs and evaluation of trajectories
+with numpy arrays.")
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_SHLIBDEPS ON)
+endif()
 include(CPack)

@@ -13,6 +13,13 @@ foreach(component IN LISTS CPACK_COMPONENTS_ALL)
   if(EXISTS "${root}/zsh/site-functions") # that folder is the administrator's
     file(RENAME "${root}/zsh/site-functions" "${root}/zsh/vendor-completions")
   endif()
+  file(GLOB modules "${root}/../lib/python3.*/dist-packages")
+  if(modules) # packages share one folder for all versions of Python 3
+    file(MAKE_DIRECTORY "${root}/../lib/python3")
+    file(RENAME "${modules}" "${root}/../lib/python3/dist-packages")
+    cmake_path(GET modules PARENT_PATH versioned)
+    file(REMOVE_RECURSE "${versioned}")
+  endif()
   file(GLOB pages "${root}/man/man1/*.1")
   if(pages)
     execute_process(COMMAND gzip -9n ${pages} COMMAND_ERROR_IS_FATAL ANY)

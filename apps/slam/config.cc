@@ -20,11 +20,6 @@ namespace {
   throw InputError(file + ":" + std::to_string(mark.line + 1) + ": " + what);
 }
 
-std::string NearestHint(const std::string& word, const std::vector<std::string>& valid) {
-  const std::string nearest = NearestWord(word, valid);
-  return nearest.empty() ? "" : "; did you mean '" + nearest + "'?";
-}
-
 // Where each key was set, so that a value that is found to be out of range later can be traced to its line.
 struct KeyMarks {
   std::vector<std::pair<std::string, YAML::Mark>> keys;
@@ -86,48 +81,14 @@ void Check(const std::string& file, const std::string& section, const KeyMarks& 
   Fail(file, where, section + ": " + problem);
 }
 
-// Only the keys that a data set without calibration of its own needs beside its images: baseline, depth
-// scale.
-void DropUnsetCamera(DatasetOptions& options) {
-  if (options.camera->fx == 0 && options.camera->fy == 0) options.camera.reset();
-}
-
-/// Section and what is out of range in it.
-std::optional<std::pair<std::string, std::string>> FirstProblem(const RunConfig& config) {
-  const std::pair<std::string, std::string> problems[] = {
-      {"camera", config.dataset.camera ? config.dataset.camera->Validate() : ""},
-      {"dataset", config.dataset.Validate()},
-      {"odometry", config.odometry.Validate()},
-      {"loops", config.loops.Validate()},
-      {"graph", config.graph.Validate()},
-      {"run", config.run.Validate()}};
-  for (const auto& problem : problems) {
-    if (!problem.second.empty()) return problem;
-  }
-  return std::nullopt;
-}
-
 // Sets one key from `key=value`, the key without `prefix`.
 void Assign(const std::string& assignment, const std::string& prefix, const ConfigTable& table) {
   const std::size_t equals = assignment.find('=');
   const std::string form = prefix.empty() ? "section.key=value" : "key=value";
   if (equals == std::string::npos) throw InputError("'" + assignment + "': write it as " + form);
-  const std::string given = assignment.substr(0, equals), path = prefix + given;
-  const std::size_t dot = path.rfind('.');
-  const ConfigKey* key =
-      dot == std::string::npos ? nullptr : table.Find(path.substr(0, dot), path.substr(dot + 1));
-  if (key == nullptr) {
-    std::vector<std::string> valid;
-    std::string elsewhere;  // a key of this name, where the section was left out
-    for (const ConfigKey& known : table.keys()) {
-      const std::string name = known.section + "." + known.name;
-      if (name.rfind(prefix, 0) != 0) continue;
-      valid.push_back(name.substr(prefix.size()));
-      if (elsewhere.empty() && known.name == given) elsewhere = "; did you mean '" + valid.back() + "'?";
-    }
-    throw InputError("'" + assignment + "': unknown key '" + given + "'" +
-                     (elsewhere.empty() ? NearestHint(given, valid) : elsewhere));
-  }
+  const std::string given = assignment.substr(0, equals);
+  const ConfigKey* key = table.Find(prefix + given);
+  if (key == nullptr) throw InputError("'" + assignment + "': " + table.Unknown(prefix, given));
   std::string wrong;
   try {
     wrong = key->read(YAML::Load(assignment.substr(equals + 1)));

@@ -205,6 +205,23 @@ const ConfigKey* ConfigTable::Find(const std::string& section, const std::string
   return nullptr;
 }
 
+const ConfigKey* ConfigTable::Find(const std::string& path) const {
+  const std::size_t dot = path.rfind('.');
+  return dot == std::string::npos ? nullptr : Find(path.substr(0, dot), path.substr(dot + 1));
+}
+
+std::string ConfigTable::Unknown(const std::string& prefix, const std::string& given) const {
+  std::vector<std::string> valid;
+  std::string elsewhere;  // a key of this name, where the section was left out
+  for (const ConfigKey& known : keys_) {
+    const std::string name = known.section + "." + known.name;
+    if (name.rfind(prefix, 0) != 0) continue;
+    valid.push_back(name.substr(prefix.size()));
+    if (elsewhere.empty() && known.name == given) elsewhere = "; did you mean '" + valid.back() + "'?";
+  }
+  return "unknown key '" + given + "'" + (elsewhere.empty() ? NearestHint(given, valid) : elsewhere);
+}
+
 bool ConfigTable::HasSection(const std::string& section) const {
   return std::any_of(keys_.begin(), keys_.end(),
                      [&](const ConfigKey& key) { return key.section == section; });
@@ -232,6 +249,31 @@ std::vector<std::string> ConfigTable::Names(const std::string& section) const {
     if (key.section == section) out.push_back(key.name);
   }
   return out;
+}
+
+// Only the keys that a data set without calibration of its own needs beside its images: baseline, depth
+// scale.
+void DropUnsetCamera(DatasetOptions& options) {
+  if (options.camera->fx == 0 && options.camera->fy == 0) options.camera.reset();
+}
+
+std::optional<std::pair<std::string, std::string>> FirstProblem(const RunConfig& config) {
+  const std::pair<std::string, std::string> problems[] = {
+      {"camera", config.dataset.camera ? config.dataset.camera->Validate() : ""},
+      {"dataset", config.dataset.Validate()},
+      {"odometry", config.odometry.Validate()},
+      {"loops", config.loops.Validate()},
+      {"graph", config.graph.Validate()},
+      {"run", config.run.Validate()}};
+  for (const auto& problem : problems) {
+    if (!problem.second.empty()) return problem;
+  }
+  return std::nullopt;
+}
+
+std::string NearestHint(const std::string& word, const std::vector<std::string>& valid) {
+  const std::string nearest = NearestWord(word, valid);
+  return nearest.empty() ? "" : "; did you mean '" + nearest + "'?";
 }
 
 }  // namespace tutti

@@ -4,7 +4,9 @@
 #include <yaml-cpp/yaml.h>
 
 #include <functional>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tutti/core/options.h"
@@ -29,6 +31,11 @@ class ConfigTable {
   const std::vector<ConfigKey>& keys() const { return keys_; }
   /// The key, or nullptr.
   const ConfigKey* Find(const std::string& section, const std::string& name) const;
+  /// The same of a whole path: "loops.extraction.features".
+  const ConfigKey* Find(const std::string& path) const;
+  /// "unknown key 'GIVEN'; did you mean 'NEAREST'?", among the keys whose paths begin with `prefix`, without
+  /// it.
+  std::string Unknown(const std::string& prefix, const std::string& given) const;
   bool HasSection(const std::string& section) const;
   std::vector<std::string> Sections() const;
   std::vector<std::string> TopSections() const;  ///< without those within another
@@ -45,5 +52,14 @@ class ConfigTable {
 
   std::vector<ConfigKey> keys_;
 };
+
+/// Takes out the camera that ConfigTable put in, where no key has made one of it.
+void DropUnsetCamera(DatasetOptions& options);
+
+/// Section and what is out of range in it; nothing if all is usable.
+std::optional<std::pair<std::string, std::string>> FirstProblem(const RunConfig& config);
+
+/// "; did you mean 'NEAREST'?"; empty if nothing is valid.
+std::string NearestHint(const std::string& word, const std::vector<std::string>& valid);
 
 }  // namespace tutti

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "apps/tutti/checks.h"
+#include "apps/tutti/evaluation_report.h"
 #include "tutti/backend/trajectory_file.h"
 #include "tutti/core/error.h"
 
@@ -35,26 +36,13 @@ EvaluationOptions Options(const EvaluationInput& input) {
   return options;
 }
 
-EvaluatedEstimate Evaluate(const PoseFile& reference, const EvaluationInput& input, const std::string& file,
+EvaluatedEstimate Evaluate(const NamedPoses& reference, const EvaluationInput& input, const std::string& file,
                            const std::vector<double>& times) {
-  const PoseFile estimate = Read(file, input.format, times);
   EvaluatedEstimate out;
   out.file = file;
   out.options = Options(input);
-  if (reference.has_stamps != estimate.has_stamps) {
-    const bool of_reference = !reference.has_stamps;
-    throw InputError((of_reference ? input.reference : file) + ": has no time stamps, but " +
-                     (of_reference ? file : input.reference) + " has; give --times (KITTI: times.txt)");
-  }
-  // Ids of g2o's vertices pair as stamps do; KITTI's lines must be equally many.
-  const bool graph = reference.format == PoseFileFormat::kG2o || estimate.format == PoseFileFormat::kG2o;
-  out.options.by_index = !reference.has_stamps && !graph;
-  try {
-    out.report = EvaluateTrajectory(reference.trajectory, estimate.trajectory, out.options,
-                                    {reference.rotations_as_written, estimate.rotations_as_written});
-  } catch (const InputError& error) {
-    throw InputError(file + " against " + input.reference + ": " + error.what());
-  }
+  out.report = EvaluateFiles(reference, {file, Read(file, input.format, times)}, "--times (KITTI: times.txt)",
+                             out.options);
   return out;
 }
 
@@ -157,8 +145,8 @@ std::vector<EvaluatedEstimate> EvaluateInput(const EvaluationInput& input) {
     times = ReadTimes(input.times);
     if (times.empty()) throw InputError(input.times + ": holds no time stamp");
   }
-  const PoseFile reference =
-      Read(input.reference, input.reference_format.empty() ? input.format : input.reference_format, times);
+  const std::string& format = input.reference_format.empty() ? input.format : input.reference_format;
+  const NamedPoses reference = {input.reference, Read(input.reference, format, times)};
   const std::vector<std::string> names = input.names.empty() ? ShortNames(input.estimates) : input.names;
   std::vector<EvaluatedEstimate> out;
   for (std::size_t k = 0; k < input.estimates.size(); ++k) {

@@ -2,61 +2,19 @@
 
 #include <cstdio>
 
+#include "apps/tutti/evaluation_report.h"
+
 namespace tutti::cli {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json StatisticsJson(const ErrorStatistics& s) {
-  return {{"rmse", s.rmse}, {"mean", s.mean}, {"median", s.median}, {"std", s.std},
-          {"min", s.min},   {"max", s.max},   {"sse", s.sse},       {"count", s.count}};
-}
-
-Json SegmentsJson(const SegmentErrors& errors) {
-  Json json = {{"segments", errors.segments}};
-  if (errors.segments == 0) return json;
-  json["t_rel_percent"] = errors.translation_percent;
-  json["r_rel_deg_per_m"] = errors.rotation_deg_per_m;
-  return json;
-}
-
-Json ReportJson(const std::string& reference, const EvaluatedEstimate& estimate) {
-  const EvaluationReport& r = estimate.report;
-  const EvaluationOptions& o = estimate.options;
-  const Similarity& S = r.S_reference_estimate;
-  const Eigen::Quaterniond& q = S.rotation;
-  const auto relative = [&](const ErrorStatistics& s) {
-    return r.rpe.count > 0 ? StatisticsJson(s) : Json();
-  };
+Json EstimateJson(const std::string& reference, const EvaluatedEstimate& estimate) {
   Json json;
   json["reference"] = reference;
   json["estimate"] = estimate.file;
   json["name"] = estimate.name;
-  json["pairs"] = r.pairs;
-  json["reference_poses"] = r.reference_poses;
-  json["estimate_poses"] = r.estimate_poses;
-  json["path_length_m"] = r.path_length_m;
-  json["association"] = {{"by", o.by_index      ? "line"
-                                : o.interpolate ? "interpolation"
-                                                : "time"},
-                         {"max_time_difference_s", o.max_time_difference_s},
-                         {"time_offset_s", o.time_offset_s}};
-  json["alignment"] = {{"mode", ToString(r.alignment)},
-                       {"first_poses", o.align_first},
-                       {"scale", S.scale},
-                       {"translation", {S.translation.x(), S.translation.y(), S.translation.z()}},
-                       {"quaternion_xyzw", {q.x(), q.y(), q.z(), q.w()}}};
-  json["ate"] = StatisticsJson(r.ate);
-  json["ate_rotation_deg"] = StatisticsJson(r.ate_rotation);
-  json["ate_full"] = StatisticsJson(r.ate_full);
-  json["rpe"] = {{"delta", o.rpe_delta},
-                 {"unit", ToString(o.rpe_unit)},
-                 {"all_pairs", o.rpe_all_pairs},
-                 {"translation", relative(r.rpe)},
-                 {"rotation_deg", relative(r.rpe_rotation)},
-                 {"full", relative(r.rpe_full)}};
-  json["kitti"] = SegmentsJson(r.kitti);
-  json["drift"] = SegmentsJson(r.drift);
+  json.update(ReportJson(estimate.report, estimate.options));
   return json;
 }
 
@@ -142,10 +100,10 @@ std::string CompareEvaluations(const std::vector<EvaluatedEstimate>& estimates, 
 }
 
 Json EvaluationJson(const std::string& reference, const std::vector<EvaluatedEstimate>& estimates) {
-  if (estimates.size() == 1) return ReportJson(reference, estimates.front());
+  if (estimates.size() == 1) return EstimateJson(reference, estimates.front());
   Json json = {{"reference", reference}, {"estimates", Json::array()}};
   for (const EvaluatedEstimate& estimate : estimates)
-    json["estimates"].push_back(ReportJson(reference, estimate));
+    json["estimates"].push_back(EstimateJson(reference, estimate));
   return json;
 }
 

@@ -30,6 +30,7 @@ class LevenbergMarquardt {
     region_.radius = limits_.trust_region;
     while (out_.usable && !out_.converged && out_.iterations < limits_.max_iterations) {
       if (limits_.max_time_s > 0 && watch.Seconds() >= limits_.max_time_s) break;
+      ThrowIfStopped(limits_.stop);
       if (!linearised_) Linearise();
       if (!out_.usable || out_.converged) break;
       ++out_.iterations;

@@ -47,6 +47,23 @@ class EdgeCost final : public ceres::SizedCostFunction<N, BlockSize<N>(), BlockS
   const double& weight_;
 };
 
+/// Ends a solution that nobody wants any more.
+class StopCallback final : public ceres::IterationCallback {
+ public:
+  /// `stop` outlives this object.
+  explicit StopCallback(const StopRequest& stop) : stop_(stop) {}
+
+  ceres::CallbackReturnType operator()(const ceres::IterationSummary& /*summary*/) override {
+    stopped_ = stop_();
+    return stopped_ ? ceres::SOLVER_ABORT : ceres::SOLVER_CONTINUE;
+  }
+  bool stopped() const { return stopped_; }
+
+ private:
+  const StopRequest& stop_;
+  bool stopped_ = false;
+};
+
 template <int N>
 class CeresSolver final : public GraphSolver<N> {
  public:
@@ -60,7 +77,11 @@ class CeresSolver final : public GraphSolver<N> {
     if (!problem_ || active_ != graph.Active()) Build(graph);
     loss_.Reset(graph.loss.get(), ceres::DO_NOT_TAKE_OWNERSHIP);
     ceres::Solver::Summary summary;
-    ceres::Solve(Options(limits), &*problem_, &summary);
+    ceres::Solver::Options options = Options(limits);
+    StopCallback stop_callback(limits.stop);
+    if (limits.stop) options.callbacks.push_back(&stop_callback);
+    ceres::Solve(options, &*problem_, &summary);
+    if (stop_callback.stopped()) throw Stopped();
     SolveSummary out;
     out.usable = summary.IsSolutionUsable();
     out.converged = summary.termination_type == ceres::CONVERGENCE;

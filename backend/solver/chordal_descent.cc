@@ -99,6 +99,7 @@ class ChordalDescent {
     out.converged = pattern_.unknowns == 0;
     while (!out.converged && out.iterations < limits.max_iterations) {
       if (limits.max_time_s > 0 && watch.Seconds() >= limits.max_time_s) break;
+      ThrowIfStopped(limits.stop);
       // The first step leads from a relaxation or another objective's optimum, where residuals mislead.
       bool exact = out.iterations++ > 0;
       double expected = 0;
@@ -241,10 +242,11 @@ SolveSummary Minimise(const PoseGraph& graph, const GraphStructure& structure, c
 }  // namespace
 
 SolveSummary MinimiseChordal(const PoseGraph& graph, const GraphStructure& structure, int max_iterations,
-                             double max_time_s, std::vector<Similarity>& poses) {
+                             double max_time_s, std::vector<Similarity>& poses, const StopRequest& stop) {
   SolveLimits limits;
   limits.max_iterations = max_iterations;
   limits.max_time_s = max_time_s;
+  limits.stop = stop;
   return graph.kind() == GraphKind::kSE2 ? Minimise<3>(graph, structure, limits, poses)
                                          : Minimise<6>(graph, structure, limits, poses);
 }

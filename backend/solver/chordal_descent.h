@@ -16,7 +16,7 @@ namespace tutti::internal {
 /// The second derivative of a rotation's constraint is a block of the diagonal (the multipliers of
 /// certificate.h), so that both Hessians have one pattern.
 SolveSummary MinimiseChordal(const PoseGraph& graph, const GraphStructure& structure, int max_iterations,
-                             double max_time_s, std::vector<Similarity>& poses);
+                             double max_time_s, std::vector<Similarity>& poses, const StopRequest& stop = {});
 
 /// f at these poses.
 double ChordalCost(const PoseGraph& graph, const GraphStructure& structure,

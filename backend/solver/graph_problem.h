@@ -92,9 +92,12 @@ class GraphProblem {
   /// rounds of few iterations, which would spend them all on narrowing it.
   void KeepTrustRegion() { trust_region_ = std::min(last_trust_region_, kInitialTrustRegion); }
 
+  /// Solve() asks it before each iteration, and throws Stopped.
+  void SetStop(StopRequest stop) { stop_ = std::move(stop); }
+
   SolveSummary Solve(int max_iterations, double max_time_s) {
-    SolveSummary summary =
-        solver_->Solve(weighted_, {max_iterations, max_time_s, options_.function_tolerance, trust_region_});
+    SolveSummary summary = solver_->Solve(
+        weighted_, {max_iterations, max_time_s, options_.function_tolerance, trust_region_, stop_});
     last_trust_region_ = summary.trust_region;
     trust_region_ = kInitialTrustRegion;
     return summary;
@@ -105,6 +108,7 @@ class GraphProblem {
   const PoseGraphOptions& options_;
   double threshold_;
   std::vector<bool> excluded_;  // parallel to edges
+  StopRequest stop_;
   double trust_region_ = kInitialTrustRegion, last_trust_region_ = kInitialTrustRegion;
   WeightedGraph<N> weighted_;
   std::unique_ptr<GraphSolver<N>> solver_;  // last: refers to the graph

@@ -13,6 +13,7 @@
 
 #include "backend/graph/edge_error.h"
 #include "backend/graph/graph_structure.h"
+#include "backend/solver/stop.h"
 
 namespace tutti::internal {
 
@@ -85,6 +86,7 @@ struct SolveLimits {
   double max_time_s = 0;  ///< 0: no limit
   double function_tolerance = 1e-9;
   double trust_region = kInitialTrustRegion;  ///< radius to begin with, in Ceres' sense [1]
+  StopRequest stop;                           ///< asked before each iteration; Stopped is thrown then
 };
 
 /// How a solve ended.

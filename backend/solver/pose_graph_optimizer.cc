@@ -26,14 +26,16 @@ template <int N>
 class Run {
  public:
   Run(PoseGraph& graph, const GraphStructure& structure, const PoseGraphOptions& options,
-      PoseGraphReport& report)
+      const internal::StopRequest& stop, PoseGraphReport& report)
       : graph_(graph),
         structure_(structure),
         options_(options),
+        stop_(stop),
         report_(report),
         problem_(graph, structure, options),
         robust_(problem_, options, graph.edges().size(),
                 [this](int iterations) { return SolveOnce(iterations); }) {
+    problem_.SetStop(stop);
     if (!options.pairwise_consistency) return;
     const std::vector<bool> agree =
         internal::PairwiseConsistentEdges(graph, structure, options.objective, problem_.threshold());
@@ -184,7 +186,7 @@ class Run {
     if (graph_.kind() == GraphKind::kSim3) return;
     std::vector<Similarity> poses = starts_.front().poses;
     const internal::SolveSummary summary =
-        internal::MinimiseChordal(graph_, structure_, options_.max_iterations, TimeLeft(), poses);
+        internal::MinimiseChordal(graph_, structure_, options_.max_iterations, TimeLeft(), poses, stop_);
     report_.iterations += summary.iterations;
     if (!summary.usable) return;
     problem_.SetPoses(poses);
@@ -280,6 +282,7 @@ class Run {
   PoseGraph& graph_;
   const GraphStructure& structure_;
   const PoseGraphOptions& options_;
+  const internal::StopRequest& stop_;
   PoseGraphReport& report_;
   GraphProblem<N> problem_;
   internal::RobustSolver<N> robust_;
@@ -290,9 +293,9 @@ class Run {
 
 template <int N>
 void OptimizeAs(PoseGraph& graph, const GraphStructure& structure, const PoseGraphOptions& options,
-                PoseGraphReport& report) {
+                const internal::StopRequest& stop, PoseGraphReport& report) {
   const Stopwatch watch;
-  Run<N> run(graph, structure, options, report);
+  Run<N> run(graph, structure, options, stop, report);
   const bool initialized = run.CollectStarts();
   report.init_time_s = watch.Seconds();
   if (initialized && run.Solve()) {
@@ -304,6 +307,21 @@ void OptimizeAs(PoseGraph& graph, const GraphStructure& structure, const PoseGra
   }
 }
 
+void OptimizeKind(PoseGraph& graph, const GraphStructure& structure, const PoseGraphOptions& options,
+                  const internal::StopRequest& stop, PoseGraphReport& report) {
+  switch (graph.kind()) {
+    case GraphKind::kSE2:
+      OptimizeAs<3>(graph, structure, options, stop, report);
+      break;
+    case GraphKind::kSE3:
+      OptimizeAs<6>(graph, structure, options, stop, report);
+      break;
+    case GraphKind::kSim3:
+      OptimizeAs<7>(graph, structure, options, stop, report);
+      break;
+  }
+}
+
 }  // namespace
 
 PoseGraphOptimizer::PoseGraphOptimizer(const PoseGraphOptions& options) : options_(options) {
@@ -311,7 +329,7 @@ PoseGraphOptimizer::PoseGraphOptimizer(const PoseGraphOptions& options) : option
   if (!wrong.empty()) throw InputError(wrong);
 }
 
-PoseGraphReport PoseGraphOptimizer::Optimize(PoseGraph& graph) const {
+PoseGraphReport PoseGraphOptimizer::Optimize(PoseGraph& graph, const std::function<bool()>& stop) const {
   const Stopwatch watch;
   PoseGraphReport report;
   report.solver = options_.solver;
@@ -321,16 +339,16 @@ PoseGraphReport PoseGraphOptimizer::Optimize(PoseGraph& graph) const {
     report.success = true;
     report.termination = "nothing to do";
   } else {
-    switch (graph.kind()) {
-      case GraphKind::kSE2:
-        OptimizeAs<3>(graph, structure, options_, report);
-        break;
-      case GraphKind::kSE3:
-        OptimizeAs<6>(graph, structure, options_, report);
-        break;
-      case GraphKind::kSim3:
-        OptimizeAs<7>(graph, structure, options_, report);
-        break;
+    try {
+      OptimizeKind(graph, structure, options_, stop, report);
+    } catch (const internal::Stopped&) {
+      PoseGraphReport stopped;
+      stopped.solver = options_.solver;
+      stopped.components = structure.components;
+      stopped.termination = "stopped";
+      stopped.reason = "stopped by the caller";
+      stopped.costs = EvaluateCosts(graph);
+      report = stopped;
     }
   }
   report.time_s = watch.Seconds();

@@ -128,14 +128,17 @@ class CertificateMatrix {
 /// `certifying` / 100, since what is below is only more digits. Negative if none up to `largest` does. Each
 /// try is a factorisation: the usual case needs one.
 template <int D>
-double SmallestShift(CertificateMatrix<D>& matrix, double certifying, double largest) {
+double SmallestShift(CertificateMatrix<D>& matrix, double certifying, double largest,
+                     const internal::StopRequest& stop) {
   for (const double tighter : {0.01, 0.1, 1.0}) {
+    internal::ThrowIfStopped(stop);
     if (matrix.IsPositiveDefiniteWith(tighter * certifying)) return tighter * certifying;
   }
   int fails = 0, holds = 0;  // powers of ten
   while (certifying * std::pow(10, holds + 1) <= largest) ++holds;
   if (holds == 0 || !matrix.IsPositiveDefiniteWith(certifying * std::pow(10, holds))) return -1;
   while (holds - fails > 1) {
+    internal::ThrowIfStopped(stop);
     const int middle = (fails + holds) / 2;
     (matrix.IsPositiveDefiniteWith(certifying * std::pow(10, middle)) ? holds : fails) = middle;
   }
@@ -144,13 +147,13 @@ double SmallestShift(CertificateMatrix<D>& matrix, double certifying, double lar
 
 template <int D>
 void Bound(const PoseGraph& graph, const std::vector<Similarity>& solution, const GraphStructure& structure,
-           const CertificateOptions& options, Certificate& out) {
+           const CertificateOptions& options, const internal::StopRequest& stop, Certificate& out) {
   CertificateMatrix<D> matrix(graph, solution, structure);
   const double traces = D * static_cast<double>(graph.nodes().size());  // trace(R R^T) of any rotations
   const double largest = matrix.LargestRotationEntry();
   const double rounding = 1e-14 * largest;
   const double eta = SmallestShift(matrix, std::max(rounding, options.certified_gap * out.chordal / traces),
-                                   options.max_shift * largest);
+                                   options.max_shift * largest, stop);
   if (eta < 0) {
     out.reason = "the certificate matrix has a large negative eigenvalue";
     out.min_eigenvalue_bound = -std::numeric_limits<double>::infinity();
@@ -168,19 +171,8 @@ void Bound(const PoseGraph& graph, const std::vector<Similarity>& solution, cons
   }
 }
 
-}  // namespace
-
-std::string CertificateOptions::Validate() const {
-  if (!(certified_gap > 0 && certified_gap < 1)) return "certificate: certified_gap must be in (0, 1)";
-  if (!(max_shift > 0) || !std::isfinite(max_shift)) return "certificate: max_shift must be positive";
-  return {};
-}
-
-Certificate CertifyOptimum(const PoseGraph& graph, const CertificateOptions& options,
-                           std::vector<Similarity> chordal_optimum) {
-  const std::string wrong = options.Validate();
-  if (!wrong.empty()) throw InputError(wrong);
-  const internal::Stopwatch watch;
+Certificate Certify(const PoseGraph& graph, const CertificateOptions& options,
+                    std::vector<Similarity> chordal_optimum, const internal::StopRequest& stop) {
   Certificate out;
   const GraphStructure structure = internal::AnalyseGraph(graph);
   if (graph.kind() == GraphKind::kSim3) {
@@ -195,7 +187,7 @@ Certificate CertifyOptimum(const PoseGraph& graph, const CertificateOptions& opt
     for (const PoseGraphNode& node : graph.nodes()) chordal_optimum.push_back(node.pose);
     constexpr int kIterations = 200;
     const internal::SolveSummary summary =
-        internal::MinimiseChordal(graph, structure, kIterations, 0, chordal_optimum);
+        internal::MinimiseChordal(graph, structure, kIterations, 0, chordal_optimum, stop);
     if (!summary.usable) {
       out.reason = "the chordal objective could not be minimised: " + summary.message;
       return out;
@@ -207,9 +199,31 @@ Certificate CertifyOptimum(const PoseGraph& graph, const CertificateOptions& opt
   out.available = true;
   out.chordal = internal::ChordalCost(graph, structure, chordal_optimum);
   if (graph.kind() == GraphKind::kSE2) {
-    Bound<2>(graph, chordal_optimum, structure, options, out);
+    Bound<2>(graph, chordal_optimum, structure, options, stop, out);
   } else {
-    Bound<3>(graph, chordal_optimum, structure, options, out);
+    Bound<3>(graph, chordal_optimum, structure, options, stop, out);
+  }
+  return out;
+}
+
+}  // namespace
+
+std::string CertificateOptions::Validate() const {
+  if (!(certified_gap > 0 && certified_gap < 1)) return "certificate: certified_gap must be in (0, 1)";
+  if (!(max_shift > 0) || !std::isfinite(max_shift)) return "certificate: max_shift must be positive";
+  return {};
+}
+
+Certificate CertifyOptimum(const PoseGraph& graph, const CertificateOptions& options,
+                           std::vector<Similarity> chordal_optimum, const std::function<bool()>& stop) {
+  const std::string wrong = options.Validate();
+  if (!wrong.empty()) throw InputError(wrong);
+  const internal::Stopwatch watch;
+  Certificate out;
+  try {
+    out = Certify(graph, options, std::move(chordal_optimum), stop);
+  } catch (const internal::Stopped&) {
+    out.reason = "stopped by the caller";
   }
   out.time_s = watch.Seconds();
   return out;

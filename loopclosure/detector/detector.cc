@@ -14,6 +14,22 @@
 
 namespace tutti {
 
+const char* ToString(ConstraintType type) {
+  switch (type) {
+    case ConstraintType::kNone:
+      return "none";
+    case ConstraintType::kFundamental:
+      return "fundamental";
+    case ConstraintType::kEssential:
+      return "essential";
+    case ConstraintType::kRigid:
+      return "rigid";
+    case ConstraintType::kSimilarity:
+      return "similarity";
+  }
+  return "?";
+}
+
 /// What happens to an image.
 class LoopDetector::Impl {
  public:

@@ -22,15 +22,16 @@ function(expect_not pattern)
   endif()
 endfunction()
 
-configure(-DBUILD_SHARED_LIBS=ON -DTUTTI_BUILD_BACKEND=OFF -DTUTTI_BUILD_APPS=ON -DCMAKE_DISABLE_FIND_PACKAGE_Ceres=ON
+configure(-DBUILD_SHARED_LIBS=ON -DTUTTI_BUILD_BACKEND=OFF -DTUTTI_BUILD_APPS=ON -DTUTTI_BUILD_PYTHON=ON -DCMAKE_DISABLE_FIND_PACKAGE_Ceres=ON
   -DCMAKE_DISABLE_FIND_PACKAGE_GTest=ON -DCMAKE_DISABLE_FIND_PACKAGE_CLI11=ON)
 expect("TUTTI_BUILD_SLAM is off: it needs TUTTI_BUILD_LOOPCLOSURE and TUTTI_BUILD_BACKEND")
 expect("TUTTI_BUILD_APPS is off: it needs TUTTI_BUILD_SLAM")
 expect("TUTTI_BUILD_TESTS is off: it needs static libraries")
+expect("TUTTI_BUILD_PYTHON is off: it needs TUTTI_BUILD_SLAM, and static libraries")
 expect("no cpack: the Debian packages are made of static libraries")
 
 # What was off comes back, when what it needs does, and what was switched off by hand does not speak.
-configure(-DBUILD_SHARED_LIBS=OFF -DTUTTI_BUILD_BACKEND=ON -DBUILD_TESTING=OFF
+configure(-DBUILD_SHARED_LIBS=OFF -DTUTTI_BUILD_BACKEND=ON -DBUILD_TESTING=OFF -DTUTTI_BUILD_PYTHON=OFF
   -DCMAKE_DISABLE_FIND_PACKAGE_Ceres=OFF -DCMAKE_DISABLE_FIND_PACKAGE_CLI11=OFF)
 expect_not("is off")
 expect_not("no cpack")

@@ -1,6 +1,6 @@
 # The Debian packages: made, unpacked into a folder as dpkg would into /, used from there, and removed.
 # usage: cmake -DCPACK=cpack -DBUILD=folder -DWORK=folder -DSOURCE=tests/install -DVERSION=... -DGENERATOR=... -DCXX=...
-#        -P packages_test.cmake
+#        [-DPYTHON=/usr/bin/python3] -P packages_test.cmake
 find_program(DPKG_DEB dpkg-deb)
 find_program(SHLIBDEPS dpkg-shlibdeps)
 find_program(FILE_COMMAND file)
@@ -9,6 +9,9 @@ if(NOT DPKG_DEB OR NOT SHLIBDEPS OR NOT FILE_COMMAND)
   return()
 endif()
 set(libraries libtutti-core-dev libtutti-loopclosure-dev libtutti-backend-dev libtutti-slam-dev)
+if(PYTHON)
+  set(python3-tutti_wanted python3-tutti)
+endif()
 
 file(REMOVE_RECURSE "${WORK}")
 execute_process(COMMAND "${CPACK}" -G DEB --config "${BUILD}/CPackConfig.cmake" -B "${WORK}/packages" OUTPUT_QUIET
@@ -18,7 +21,7 @@ execute_process(COMMAND "${CPACK}" -G DEB --config "${BUILD}/CPackConfig.cmake" 
 file(GLOB debs "${WORK}/packages/*.deb")
 list(LENGTH debs count)
 set(all_files "")
-foreach(name IN ITEMS tutti ${libraries})
+foreach(name IN ITEMS tutti ${libraries} ${python3-tutti_wanted})
   file(GLOB deb "${WORK}/packages/${name}_${VERSION}_*.deb")
   if(NOT deb)
     message(FATAL_ERROR "no package ${name}: ${debs}")
@@ -39,7 +42,12 @@ foreach(name IN ITEMS tutti ${libraries})
   string(REGEX MATCHALL "[^\n]*[^/\n]\n" files "${files}")
   list(APPEND all_files ${files})
 endforeach()
-if(NOT count EQUAL 5)
+if(PYTHON)
+  set(expected 6)
+else()
+  set(expected 5)
+endif()
+if(NOT count EQUAL expected)
   message(SEND_ERROR "other packages than these: ${debs}")
 endif()
 list(LENGTH all_files count)
@@ -104,5 +112,16 @@ endforeach()
 execute_process(COMMAND gzip -dc "${WORK}/root/usr/share/man/man1/tutti.1.gz" OUTPUT_VARIABLE page)
 if(NOT page MATCHES "[(]/usr/share/tutti/configs")
   message(SEND_ERROR "the man page does not name /usr/share/tutti/configs")
+endif()
+if(PYTHON) # alone: it needs no other package of tutti
+  unpack("${WORK}/python" python3-tutti)
+  foreach(needed "python3 .>= 3" python3-numpy libopencv-core)
+    if(NOT python3-tutti_depends MATCHES "${needed}")
+      message(SEND_ERROR "python3-tutti should depend on ${needed}: ${python3-tutti_depends}")
+    endif()
+  endforeach()
+  execute_process(COMMAND "${CMAKE_COMMAND}" -E env "PYTHONPATH=${WORK}/python/usr/lib/python3/dist-packages" "${PYTHON}" -c
+    "import tutti; assert tutti.__version__ == '${VERSION}'; assert tutti.__file__.startswith('${WORK}/python/'); tutti.LoopDetector()"
+    COMMAND_ERROR_IS_FATAL ANY)
 endif()
 file(REMOVE_RECURSE "${WORK}")

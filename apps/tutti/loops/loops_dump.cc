@@ -8,22 +8,6 @@
 namespace tutti::cli {
 namespace {
 
-const char* TypeName(ConstraintType type) {
-  switch (type) {
-    case ConstraintType::kNone:
-      return "none";
-    case ConstraintType::kFundamental:
-      return "fundamental";
-    case ConstraintType::kEssential:
-      return "essential";
-    case ConstraintType::kRigid:
-      return "rigid";
-    case ConstraintType::kSimilarity:
-      return "similarity";
-  }
-  return "?";
-}
-
 std::string CandidateLines(const LoopRun& run, const LoopResult& result, const LoopGroundTruth& truth) {
   std::string text;
   for (std::size_t i = 0; i < result.posterior_by_location.size(); ++i) {
@@ -59,7 +43,7 @@ std::string VerificationLines(const LoopRun& run, const LoopResult& result, cons
     std::snprintf(cells, sizeof cells, "%ld,%ld,%s,%d,%d,%d,%s,%d,%d,%.9g,%d,%.9g,%.9g,%.9g,",
                   run.Number(result.query), run.Number(tried.candidate), LabelName(label), order++,
                   tried.accepted ? 1 : 0, result.accepted && tried.candidate == result.candidate ? 1 : 0,
-                  TypeName(tried.type), tried.matches, tried.inliers, tried.mass, tried.coverage,
+                  ToString(tried.type), tried.matches, tried.inliers, tried.mass, tried.coverage,
                   tried.expected_inliers, tried.log_nfa, tried.motion_spread);
     text += cells + Quoted(tried.reason) + "\n";
   }

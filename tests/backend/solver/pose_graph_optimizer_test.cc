@@ -45,6 +45,37 @@ TEST(PoseGraphOptimizer, LoopsRemoveTheDriftOfTheOdometry) {
   }
 }
 
+TEST(PoseGraphOptimizer, StopsWhenItIsAskedToAndThePosesStay) {
+  for (const GraphKind kind : testing::kGraphKinds) {
+    for (const PoseGraphSolver solver : {PoseGraphSolver::kCeres, PoseGraphSolver::kBlock}) {
+      for (const GraphInit init : {GraphInit::kFile, GraphInit::kChordal}) {
+        PoseGraph graph = MakeSyntheticGraph(Noisy(kind)).graph;
+        const std::map<int, Similarity> before = graph.Poses();
+        PoseGraphOptions options;
+        options.solver = solver;
+        options.init = init;
+        int asked = 0;
+        const PoseGraphReport report =
+            PoseGraphOptimizer(options).Optimize(graph, [&asked] { return ++asked == 2; });
+        EXPECT_FALSE(report.success);
+        EXPECT_EQ(report.termination, "stopped");
+        EXPECT_EQ(report.reason, "stopped by the caller");
+        EXPECT_EQ(asked, 2) << ToString(kind) << ToString(solver);
+        for (const auto& [id, pose] : before)
+          EXPECT_EQ(graph.Node(id).pose.translation, pose.translation) << ToString(kind) << ToString(solver);
+      }
+    }
+  }
+}
+
+TEST(PoseGraphOptimizer, AskingWhetherToStopChangesNothing) {
+  PoseGraph asked = MakeSyntheticGraph(Noisy(GraphKind::kSE3)).graph, plain = asked;
+  PoseGraphOptimizer().Optimize(asked, [] { return false; });
+  PoseGraphOptimizer().Optimize(plain);
+  EXPECT_EQ(PositionError(asked, MakeSyntheticGraph(Noisy(GraphKind::kSE3)).truth),
+            PositionError(plain, MakeSyntheticGraph(Noisy(GraphKind::kSE3)).truth));
+}
+
 TEST(PoseGraphOptimizer, TheChordalStartIsTriedAtItsRelaxationAndAtItsOptimum) {
   for (GraphKind kind : {GraphKind::kSE2, GraphKind::kSE3, GraphKind::kSim3}) {
     PoseGraph graph = MakeSyntheticGraph(Noisy(kind)).graph;

@@ -33,6 +33,18 @@ TEST(Certificate, ProvesTheOptimumOfAGraphWithModerateNoise) {
   }
 }
 
+TEST(Certificate, IsNotAvailableIfTheCallerStopsIt) {
+  const PoseGraph graph = Noisy(GraphKind::kSE3).graph;
+  for (const int when : {1, 4}) {
+    int asked = 0;
+    const Certificate certificate = CertifyOptimum(graph, {}, {}, [&] { return ++asked >= when; });
+    EXPECT_EQ(asked, when);
+    EXPECT_FALSE(certificate.available);
+    EXPECT_FALSE(certificate.certified);
+    EXPECT_EQ(certificate.reason, "stopped by the caller");
+  }
+}
+
 // A ring whose rotations wind once too often is a stationary point, and a wrong one.
 TEST(Certificate, RefusesALocalMinimum) {
   constexpr int kNodes = 20;

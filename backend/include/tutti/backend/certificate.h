@@ -11,6 +11,7 @@
 // the wrong side.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -43,11 +44,12 @@ struct Certificate {
 /// Certifies the graph's poses: polishes a copy of them for the chordal objective (solutions for chi2 and
 /// chordal differ a little), then bounds the objective from below. `chordal_optimum`: what the polishing
 /// would find, parallel to the nodes, if it is known (PoseGraphReport::chordal_optimum); empty: it is looked
-/// for. All edges count with weight 1. SE(2) and SE(3); not available for Sim(3), or where more than one node
-/// of a connected part is fixed. Throws InputError if the options are not usable, or if the chordal optimum
-/// is one of another graph. Deterministic.
+/// for. `stop` is asked now and then: true gives up. All edges count with weight 1. SE(2) and SE(3); not
+/// available for Sim(3), or where more than one node of a connected part is fixed. Throws InputError if the
+/// options are not usable, or if the chordal optimum is one of another graph. Deterministic.
 Certificate CertifyOptimum(const PoseGraph& graph, const CertificateOptions& options = {},
-                           std::vector<Similarity> chordal_optimum = {});
+                           std::vector<Similarity> chordal_optimum = {},
+                           const std::function<bool()>& stop = {});
 
 }  // namespace tutti
 #pragma GCC visibility pop

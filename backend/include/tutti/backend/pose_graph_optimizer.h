@@ -12,6 +12,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -165,7 +166,8 @@ struct PoseGraphReport {
   double objective = 0;          ///< and after
   int iterations = 0;            ///< of all starts, those on the chordal objective included
   int gnc_rounds = 0;
-  std::string termination;  ///< "converged", "iteration limit", "time limit", "nothing to do", "failed"
+  std::string
+      termination;  ///< "converged", "iteration limit", "time limit", "nothing to do", "stopped", "failed"
   double init_time_s = 0;
   double time_s = 0;                       ///< wall time, initialisation included
   std::vector<EdgeOutcome> edges;          ///< parallel to PoseGraph::edges()
@@ -181,7 +183,8 @@ class PoseGraphOptimizer {
 
   /// Moves the nodes of `graph` to the optimum. On failure the graph keeps its poses and the report says why.
   /// A component without a fixed node is anchored at its smallest id, which keeps its pose.
-  PoseGraphReport Optimize(PoseGraph& graph) const;
+  /// `stop` is asked before each iteration: true gives up, which is a failure with the termination "stopped".
+  PoseGraphReport Optimize(PoseGraph& graph, const std::function<bool()>& stop = {}) const;
 
   const PoseGraphOptions& options() const { return options_; }
 

@@ -108,6 +108,8 @@ enum class ConstraintType {
   kRigid,        ///< points in metres: pose in SE(3), with information
   kSimilarity,   ///< mono with points of a drifting scale: pose and scale in Sim(3), with information
 };
+/// "none", "fundamental", "essential", "rigid", "similarity".
+const char* ToString(ConstraintType type);
 
 /// Outcome of the geometric verification of one candidate.
 struct Verification {

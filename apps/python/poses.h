@@ -1,0 +1,42 @@
+// Poses and trajectories as numpy arrays.
+#pragma once
+
+#include <pybind11/numpy.h>
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "tutti/core/pose.h"
+#include "tutti/core/trajectory.h"
+
+namespace tutti::python {
+
+/// The rows of an array of numbers that can be cast to float64. Raises TypeError, or ValueError if it has not
+/// two dimensions and one of these numbers of columns (none given: any).
+pybind11::array_t<double> RowsOf(const pybind11::object& array, const std::string& name,
+                                 const std::vector<pybind11::ssize_t>& columns);
+
+/// x, y, z, qx, qy, qz, qw (and scale), or a matrix of 4 x 4 or 3 x 4, whose 3 x 3 part is a rotation times a
+/// scale. Throws InputError where that is none.
+Similarity SimilarityOf(const pybind11::object& array, const std::string& name);
+/// The same without a scale.
+Pose PoseOf(const pybind11::object& array, const std::string& name);
+/// A square matrix of N x N.
+Eigen::MatrixXd MatrixOf(const pybind11::object& array, const std::string& name, int size);
+
+/// (4, 4), of float64.
+pybind11::array_t<double> ArrayOf(const Pose& pose);
+/// (4, 4); the 3 x 3 part is the rotation times the scale.
+pybind11::array_t<double> ArrayOf(const Similarity& similarity);
+/// (N, 7): x, y, z, qx, qy, qz, qw.
+pybind11::array_t<double> ArrayOf(const std::vector<Pose>& poses);
+/// (N, 8): stamp, x, y, z, qx, qy, qz, qw.
+pybind11::array_t<double> ArrayOf(const Trajectory& trajectory);
+/// Any matrix of Eigen.
+pybind11::array_t<double> ArrayOf(const Eigen::MatrixXd& matrix);
+
+/// From (N, 8). Throws InputError that names the row for a stamp that does not grow, and for what is no pose.
+Trajectory TrajectoryOf(const pybind11::object& array, const std::string& name);
+
+}  // namespace tutti::python

@@ -1,0 +1,261 @@
+// tutti.SlamSystem
+#include "tutti/slam/slam_system.h"
+
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "apps/python/bindings.h"
+#include "apps/python/errors.h"
+#include "apps/python/guarded.h"
+#include "apps/python/images.h"
+#include "apps/python/options.h"
+#include "apps/python/poses.h"
+
+namespace tutti::python {
+namespace {
+
+namespace fs = std::filesystem;
+
+using Slam = Guarded<std::unique_ptr<SlamSystem>>;
+
+std::unique_ptr<Slam> MakeSlam(const CameraRig& rig, const std::optional<RunConfig>& config,
+                               const py::kwargs& sections) {
+  RunConfig all = config.value_or(RunConfig());
+  SetOptions("SlamSystem", "", sections, all);
+  const auto make = [&] {
+    const py::gil_scoped_release release;
+    return std::make_unique<Slam>(std::make_unique<SlamSystem>(all, rig));
+  };
+  return make();
+}
+
+std::unique_ptr<Slam> LoadSlam(const fs::path& file, std::optional<int> threads) {
+  const auto load = [&] {
+    const py::gil_scoped_release release;
+    MapInfo info = ReadMapInfo(file);
+    if (threads) info.config.run.threads = *threads;
+    const std::string problem = info.config.run.Validate();
+    if (!problem.empty()) throw InputError(problem);
+    return std::make_unique<Slam>(SlamSystem::Load(file, info));
+  };
+  return Reading(file, load);
+}
+
+// With the odometry, which a rig without calibration has none of.
+template <class Work>
+auto WithOdometry(Slam& slam, Work work) {
+  return slam.Run([&](std::unique_ptr<SlamSystem>& s) {
+    if (s->AppearanceOnly()) throw InputError("the rig has no calibration: there are loops but no poses");
+    return work(*s->odometry());
+  });
+}
+
+py::array_t<double> KeyframeTrajectory(Slam& slam) {
+  return ArrayOf(WithOdometry(slam, [](const Odometry& odometry) {
+    Trajectory trajectory;
+    for (const int id : odometry.KeyframeIds())
+      trajectory.push_back({odometry.KeyframeStamp(id), odometry.KeyframePose(id)});
+    return trajectory;
+  }));
+}
+
+KeyframeView Keyframe(Slam& slam, int id) {
+  return WithOdometry(slam, [id](const Odometry& odometry) {
+    const std::vector<int> ids = odometry.KeyframeIds();
+    if (!std::binary_search(ids.begin(), ids.end(), id))
+      throw py::index_error("there is no keyframe " + std::to_string(id));
+    return odometry.Keyframe(id);
+  });
+}
+
+py::array_t<double> PointsOf(const std::vector<Eigen::Vector3d>& points) {
+  py::array_t<double> array({static_cast<py::ssize_t>(points.size()), py::ssize_t{3}});
+  double* row = array.mutable_data();
+  for (const Eigen::Vector3d& point : points) row = std::copy_n(point.data(), 3, row);
+  return array;
+}
+
+py::array_t<double> Landmarks(Slam& slam) {
+  return PointsOf(WithOdometry(slam, [](const Odometry& odometry) {
+    std::vector<Eigen::Vector3d> points;
+    for (const LandmarkView& landmark : odometry.Landmarks()) points.push_back(landmark.position);
+    return points;
+  }));
+}
+
+py::object OptionalPose(const TrackResult& result) {
+  if (result.state != TrackingState::kTracking) return py::none();
+  return ArrayOf(result.T_world_camera);
+}
+
+void BindResults(py::module_& module) {
+  py::class_<TrackResult>(module, "TrackResult", doc::TrackResult)
+      .def_property_readonly(
+          "state", [](const TrackResult& result) { return ToString(result.state); },
+          "initializing, tracking or lost")
+      .def_readonly("reason", &TrackResult::reason, doc::TrackResult_reason)
+      .def_property_readonly(
+          "T_world_camera", &OptionalPose,
+          "(4, 4) float64; None if the frame has no pose. What it was then: trajectory() has what loops "
+          "made of it.")
+      .def_readonly("features", &TrackResult::features, doc::TrackResult_features)
+      .def_readonly("inliers", &TrackResult::inliers, doc::TrackResult_inliers)
+      .def_readonly("keyframe", &TrackResult::keyframe, "id of the keyframe that this frame became, or -1")
+      .def("__repr__", [](const TrackResult& result) {
+        return py::str("TrackResult(state='{}', inliers={}, keyframe={}, reason='{}')")
+            .format(ToString(result.state), result.inliers, result.keyframe, result.reason);
+      });
+  py::class_<LoopRecord>(module, "LoopRecord", doc::LoopRecord)
+      .def_readonly("query", &LoopRecord::query, doc::LoopRecord_query)
+      .def_readonly("candidate", &LoopRecord::candidate, "0-based index of the input frame")
+      .def_readonly("query_stamp", &LoopRecord::query_stamp_s, "[s]")
+      .def_readonly("candidate_stamp", &LoopRecord::candidate_stamp_s, "[s]")
+      .def_readonly("members", &LoopRecord::members, "what each member of the ensemble believed")
+      .def_readonly("hypothesis", &LoopRecord::hypothesis, doc::LoopRecord_hypothesis)
+      .def_readonly("posterior", &LoopRecord::posterior, doc::LoopRecord_posterior)
+      .def_readonly("probability", &LoopRecord::probability, doc::LoopRecord_probability)
+      .def_readonly("matches", &LoopRecord::matches, "that were considered")
+      .def_readonly("inliers", &LoopRecord::inliers, "of these, those that fit one camera motion")
+      .def_readonly("verified", &LoopRecord::verified, doc::LoopRecord_verified)
+      .def_readonly("accepted", &LoopRecord::accepted, doc::LoopRecord_accepted)
+      .def_readonly("weight", &LoopRecord::weight, doc::LoopRecord_weight)
+      .def_readonly("revoked", &LoopRecord::revoked, doc::LoopRecord_revoked)
+      .def_readonly("pending", &LoopRecord::pending, doc::LoopRecord_pending)
+      .def_readonly("reason", &LoopRecord::reason, doc::LoopRecord_reason)
+      .def_property_readonly(
+          "S_candidate_query",
+          [](const LoopRecord& loop) -> py::object {
+            if (!loop.S_candidate_query) return py::none();
+            return ArrayOf(*loop.S_candidate_query);
+          },
+          "(4, 4): maps points of the query camera into the candidate's; None if it could not be computed.")
+      .def("__repr__", [](const LoopRecord& loop) {
+        return py::str("LoopRecord(query={}, candidate={}, accepted={}, probability={:.4g}, reason='{}')")
+            .format(loop.query, loop.candidate, loop.accepted, loop.probability, loop.reason);
+      });
+}
+
+void BindKeyframe(py::module_& module) {
+  py::class_<KeyframeView>(module, "Keyframe", doc::KeyframeView)
+      .def_readonly("id", &KeyframeView::id, doc::KeyframeView_id)
+      .def_readonly("frame_index", &KeyframeView::frame_index, doc::KeyframeView_frame_index)
+      .def_readonly("stamp", &KeyframeView::stamp_s, "[s]")
+      .def_readonly("map_piece", &KeyframeView::map_piece, doc::KeyframeView_map_piece)
+      .def_property_readonly(
+          "T_world_camera", [](const KeyframeView& view) { return ArrayOf(view.T_world_camera); },
+          "(4, 4) float64")
+      .def_property_readonly(
+          "pixels",
+          [](const KeyframeView& view) {
+            py::array_t<float> array({static_cast<py::ssize_t>(view.keypoints.size()), py::ssize_t{2}});
+            float* row = array.mutable_data();
+            for (const cv::KeyPoint& keypoint : view.keypoints)
+              *row++ = keypoint.pt.x, *row++ = keypoint.pt.y;
+            return array;
+          },
+          "(N, 2) float32: x, y of the features [px]")
+      .def_property_readonly(
+          "descriptors", [](const KeyframeView& view) { return ArrayOfImage(view.descriptors); },
+          "(N, 32) uint8: ORB")
+      .def_property_readonly(
+          "points", [](const KeyframeView& view) { return PointsOf(view.points); },
+          (std::string("(N, 3) float64: ") + doc::KeyframeView_points).c_str())
+      .def_property_readonly(
+          "landmarks",
+          [](const KeyframeView& view) {
+            return py::array_t<int>(static_cast<py::ssize_t>(view.landmarks.size()), view.landmarks.data());
+          },
+          (std::string("(N,) int32: ") + doc::KeyframeView_landmarks).c_str());
+}
+
+}  // namespace
+
+void BindSlamSystem(py::module_& module) {
+  using namespace pybind11::literals;  // NOLINT(google-build-using-namespace)
+  BindResults(module);
+  BindKeyframe(module);
+  using System = std::unique_ptr<SlamSystem>;
+  const std::string text = std::string(doc::SlamSystem) +
+                           "\n\nSlamSystem(dataset.rig, config, run={\"threads\": 1}): sections of the "
+                           "configuration are keywords, as in "
+                           "Config.";
+  py::class_<Slam>(module, "SlamSystem", text.c_str())
+      .def(py::init(&MakeSlam), "rig"_a, "config"_a = py::none(),
+           "Raises tutti.InputError if the configuration does not fit the rig.")
+      .def_static("load", &LoadSlam, "file"_a, "threads"_a = py::none(),
+                  "Goes on from a file that save wrote exactly as the saved one would have gone on, with so "
+                  "many threads "
+                  "(None: as saved). Raises tutti.InputError for a file that is not usable.")
+      .def(
+          "track",
+          [](Slam& slam, const InputFrame& frame) {
+            return slam.Run([&](System& s) { return s->Track(frame); });
+          },
+          "frame"_a, doc::SlamSystem_Track)
+      .def(
+          "finish", [](Slam& slam) { slam.Run([](System& s) { s->Finish(); }); }, doc::SlamSystem_Finish)
+      .def(
+          "save",
+          [](Slam& slam, const fs::path& file) {
+            Writing([&] { slam.Run([&](System& s) { s->Save(file); }); });
+          },
+          "file"_a, doc::SlamSystem_Save)
+      .def(
+          "begin_localization", [](Slam& slam) { slam.Run([](System& s) { s->BeginLocalization(); }); },
+          doc::SlamSystem_BeginLocalization)
+      .def(
+          "begin_session",
+          [](Slam& slam, const CameraRig& rig) { slam.Run([&](System& s) { s->BeginSession(rig); }); },
+          "rig"_a, doc::SlamSystem_BeginSession)
+      .def(
+          "prune", [](Slam& slam) { return slam.Run([](System& s) { return s->Prune(); }); },
+          doc::SlamSystem_Prune)
+      .def(
+          "trajectory",
+          [](Slam& slam, int piece) {
+            return ArrayOf(WithOdometry(slam, [&](const Odometry& o) { return o.FrameTrajectory(piece); }));
+          },
+          "piece"_a = -1,
+          (std::string("(N, 8): stamp [s], x, y, z [m], qx, qy, qz, qw. ") + doc::Odometry_FrameTrajectory)
+              .c_str())
+      .def("keyframe_trajectory", &KeyframeTrajectory,
+           "(N, 8), as trajectory: of all keyframes, in the order of keyframe_ids.")
+      .def("keyframe", &Keyframe, "id"_a, doc::Odometry_Keyframe)
+      .def_property_readonly(
+          "keyframe_ids",
+          [](Slam& slam) { return WithOdometry(slam, [](const Odometry& o) { return o.KeyframeIds(); }); },
+          doc::Odometry_KeyframeIds)
+      .def("landmarks", &Landmarks, "(N, 3) float64: points of the map in the world [m], by id.")
+      .def_property_readonly(
+          "loops", [](Slam& slam) { return slam.Run([](System& s) { return s->loops(); }); },
+          doc::SlamSystem_loops)
+      .def(
+          "graph",
+          [](Slam& slam) {
+            return std::make_unique<Guarded<PoseGraph>>(slam.Run([](System& s) { return s->Graph(); }));
+          },
+          doc::SlamSystem_Graph)
+      .def_property_readonly(
+          "appearance_only",
+          [](Slam& slam) { return slam.Run([](System& s) { return s->AppearanceOnly(); }); },
+          doc::SlamSystem_AppearanceOnly)
+      .def_property_readonly(
+          "corrections", [](Slam& slam) { return slam.Run([](System& s) { return s->Corrections(); }); },
+          doc::SlamSystem_Corrections)
+      .def_property_readonly(
+          "relocalized", [](Slam& slam) { return slam.Run([](System& s) { return s->Relocalized(); }); },
+          doc::SlamSystem_Relocalized)
+      .def(
+          "take_warnings", [](Slam& slam) { return slam.Run([](System& s) { return s->TakeWarnings(); }); },
+          doc::SlamSystem_TakeWarnings)
+      .def_property_readonly(
+          "stage_ms", [](Slam& slam) { return slam.Run([](System& s) { return s->StageMilliseconds(); }); },
+          doc::SlamSystem_StageMilliseconds);
+}
+
+}  // namespace tutti::python

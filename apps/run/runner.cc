@@ -27,6 +27,7 @@
 #include "core/stopwatch.h"
 #include "tutti/core/error.h"
 #include "tutti/slam/slam_system.h"
+#include "tutti/slam/trajectory_closer.h"
 
 namespace tutti {
 namespace {
@@ -38,11 +39,13 @@ constexpr std::uint32_t kRunSection = 300;  // of a checkpoint; the odometry wit
 /// One run from its first frame to its last.
 class Run {
  public:
-  Run(const RunRequest& request, const RunConfig& config, const Dataset& dataset, const fs::path& out,
-      RunResult& result)
+  /// `given`: the odometry that is followed; null: there is none.
+  Run(const RunRequest& request, const RunConfig& config, const Dataset& dataset, const GivenOdometry* given,
+      const fs::path& out, RunResult& result)
       : request_(request),
         config_(config),
         dataset_(dataset),
+        given_(given),
         result_(result),
         planted_(config.run, config.loops.seed),
         live_(out, dataset.Rig(), config) {
@@ -63,7 +66,8 @@ class Run {
       });
     }
     slam_->SetChangeListener([this](const Odometry& odometry, std::int64_t last) {
-      if (!alone_) alone_ = std::make_unique<OdometryAlone>(odometry, last, AloneBeside());
+      if (alone_ || given_ != nullptr) return;
+      alone_ = std::make_unique<OdometryAlone>(odometry, last, AloneBeside());
     });
     total_ = dataset.FrameSupply() == Supply::kStored ? dataset.Size() : static_cast<std::size_t>(-1);
     result_.endless = dataset.FrameSupply() != Supply::kStored;
@@ -148,6 +152,7 @@ class Run {
     result_.frames_relocalized = slam_->Relocalized();
     result_.graph = slam_->Graph();
     result_.graph_proof = slam_->GraphProof();
+    if (given_ != nullptr && !slam_->AppearanceOnly()) CorrectGiven();
     if (!alone_) return;
     FrameRange session;
     if (FirstFrame() > 0) session.first = FirstFrame();
@@ -182,6 +187,25 @@ class Run {
   std::string Trace() const { return ChromeTrace(recorder_.Spans(), begin_); }
 
  private:
+  // Every pose of the other odometry, as the keyframes are now.
+  void CorrectGiven() {
+    Trajectory before;
+    for (const StampedPose& keyframe : result_.keyframe_trajectory)
+      before.push_back({keyframe.stamp_s, given_->At(keyframe.stamp_s).value()});
+    result_.trajectory_odometry = given_->trajectory();
+    result_.trajectory = CorrectTrajectory(given_->trajectory(), before, result_.keyframe_trajectory);
+  }
+
+  TrackResult Track(const InputFrame& frame) {
+    if (given_ == nullptr || slam_->AppearanceOnly()) return slam_->Track(frame);
+    if (const std::optional<Pose> T_odom_body = given_->At(frame.stamp_s))
+      return slam_->Follow(frame, *T_odom_body * result_.rig.T_body_camera);
+    TrackResult none;
+    none.state = TrackingState::kLost;
+    none.reason = "the trajectory has no pose at its time";
+    return none;
+  }
+
   RunState State() const { return {slam_->odometry(), slam_->loops(), slam_->Corrections(), FirstFrame()}; }
   // In the map's numbers.
   std::int64_t FirstFrame() const { return slam_->AppearanceOnly() ? 0 : slam_->odometry()->FrameOffset(); }
@@ -370,7 +394,7 @@ class Run {
   void TrackOne(const InputFrame& frame) {
     const ScopedSpan span(Recorder(), Lane::kTracking, "frame");
     const internal::Stopwatch watch;
-    const TrackResult track = slam_->Track(frame);
+    const TrackResult track = Track(frame);
     result_.frame_ms.push_back(watch.Milliseconds());
     if (track.keyframe >= 0) planted_.OnKeyframe(track.keyframe, slam_.get());
     live_.Add(frame.stamp_s, track, State());
@@ -402,6 +426,7 @@ class Run {
   const RunRequest& request_;
   const RunConfig& config_;
   const Dataset& dataset_;
+  const GivenOdometry* given_;
   RunResult& result_;
   SpanRecorder recorder_;
   std::unique_ptr<SlamSystem> slam_;
@@ -452,9 +477,16 @@ RunResult RunSlam(const RunRequest& request, const RunConfig& given) {
   result.dataset = request.dataset.string();
   // The modules use threads of their own where that can't change a result; OpenCV's would reorder keypoints.
   cv::setNumThreads(1);
-  const std::unique_ptr<Dataset> dataset = OpenDataset(request.dataset, result.config.dataset);
+  std::optional<GivenOdometry> odometry;
+  if (request.odometry) {
+    odometry.emplace(*request.odometry, request.dataset, result.config.dataset);
+    result.config = FollowingConfig(result.config);
+  }
+  const std::unique_ptr<Dataset> dataset =
+      odometry ? odometry->Open() : OpenDataset(request.dataset, result.config.dataset);
   result.rig = dataset->Rig();
   std::vector<std::string> warnings = dataset->Warnings();
+  if (odometry) warnings.insert(warnings.end(), odometry->notes().begin(), odometry->notes().end());
   const auto reference = ReadReference(*dataset, request, &warnings);
   const InterruptGuard guard;
   if (request.map) RefuseToReplace(request.out, *request.map);
@@ -473,7 +505,7 @@ RunResult RunSlam(const RunRequest& request, const RunConfig& given) {
                    f.advice.c_str());
     }
   }
-  Run run(request, result.config, *dataset, folder.path(), result);
+  Run run(request, result.config, *dataset, odometry ? &*odometry : nullptr, folder.path(), result);
   Attempts attempts;
   attempts.Try([&] { run.TrackAll(); });
   attempts.Try([&] { run.Count(); });

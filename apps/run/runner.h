@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "apps/run/frame_clock.h"
+#include "apps/run/given_odometry.h"
 #include "apps/run/output_folder.h"
 #include "apps/run/run_observer.h"
 #include "apps/run/run_result.h"
@@ -33,6 +34,8 @@ struct RunRequest {
   std::optional<std::filesystem::path> resume;    ///< checkpoint to go on from
   std::optional<std::filesystem::path> map;       ///< go on in this map, as another session
   std::optional<std::filesystem::path> save_map;  ///< write the map there; kMap: into `out`
+  /// Follow this one instead of tracking; not with realtime, resume, map and checkpoint_s.
+  std::optional<GivenOdometryFiles> odometry;
   bool realtime = false;                       ///< play by the time stamps, drop frames that it can't follow
   std::shared_ptr<FrameClock> clock;           ///< for realtime; null: the machine's
   bool timing = false;                         ///< measure every stage (RunResult::stages)

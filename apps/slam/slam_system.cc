@@ -49,6 +49,19 @@ class SlamSystem::Impl {
     return result;
   }
 
+  TrackResult Follow(const InputFrame& frame, const Pose& T_odom_camera) {
+    if (!odometry_) return Track(frame);
+    BringIn();
+    ++frames_;
+    sessions_.CountFrame();
+    const TrackResult result = odometry_->Follow(frame, T_odom_camera);
+    last_ = frame.index;
+    sessions_.SetLastFrame(last_);
+    if (result.keyframe >= 0 && (loops_.Searching() || on_keyframe_)) unmapped_[result.keyframe] = frame;
+    SubmitMapped();
+    return result;
+  }
+
   void BeginSession(const CameraRig& rig) {
     CheckHasMap("gone on with");
     if (localizing_) throw InputError("frames are only being located: a recording can't go on in this map");
@@ -353,6 +366,9 @@ void SlamSystem::SetChangeListener(std::function<void(const Odometry&, std::int6
 }
 
 TrackResult SlamSystem::Track(const InputFrame& frame) { return impl_->Track(frame); }
+TrackResult SlamSystem::Follow(const InputFrame& frame, const Pose& T_odom_camera) {
+  return impl_->Follow(frame, T_odom_camera);
+}
 void SlamSystem::AddLoop(int candidate, int query, const Similarity& S_candidate_query,
                          const Matrix7d& information) {
   impl_->AddLoop(candidate, query, S_candidate_query, information);

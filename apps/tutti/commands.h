@@ -16,6 +16,7 @@ void SetUpCalibrateCheck(CLI::App& command, int& exit_code);
 void SetUpEvaluate(CLI::App& command, int& exit_code);
 void SetUpConvert(CLI::App& command, int& exit_code);
 void SetUpPlot(CLI::App& command, int& exit_code);
+void SetUpClose(CLI::App& command, int& exit_code);
 void SetUpCompare(CLI::App& command, int& exit_code);
 void SetUpCollect(CLI::App& command, int& exit_code);
 void SetUpLoops(CLI::App& command, int& exit_code);

@@ -25,6 +25,7 @@ int main(int argc, char** argv) {
       {"generate", tutti::cli::SetUpGenerate}, {"demo", tutti::cli::SetUpDemo},
       {"map", tutti::cli::SetUpMap},           {"localize", tutti::cli::SetUpLocalize},
       {"export", tutti::cli::SetUpExport},     {"merge", tutti::cli::SetUpMerge},
+      {"close", tutti::cli::SetUpClose},
   };
   return tutti::cli::RunProgram(argc, argv, own, nullptr);
 }

@@ -21,6 +21,7 @@ struct Command {
 // All commands of tutti, in the order of the help.
 constexpr Command kCommands[] = {
     {"run", "visual SLAM on a data set: trajectories, loops, summary"},
+    {"close", "loops and a corrected trajectory for the odometry of another program"},
     {"localize", "where the frames of a data set are in the map of an earlier run"},
     {"merge", "two maps with common places become one"},
     {"map", "what is in a map file: keyframes, landmarks, loops, size, extent"},

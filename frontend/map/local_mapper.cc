@@ -20,7 +20,8 @@ constexpr double kMaxCosine = 0.9996;  // 1.6 deg of parallax at least, for a de
 // Strict: so many standard deviations of parallax. Most landmarks are made as soon as their parallax is large
 // enough, which is when noise makes it too large: too near, so that one camera's scale shrinks.
 constexpr double kMinParallaxSigmas = 8;
-constexpr int kEnough = 3;  // times the fewest inliers: a keyframe with so many landmarks is strict
+constexpr double kFirstDepth = 10;  // in baselines, where poses are known and landmarks are not
+constexpr int kEnough = 3;          // times the fewest inliers: a keyframe with so many landmarks is strict
 }  // namespace
 
 int LocalMapper::AddDepthLandmarks(int id, int at_least, Map* map) {
@@ -111,6 +112,17 @@ std::optional<Eigen::Vector3d> LocalMapper::PointOf(const Keyframe& a, int fa, c
   return point;
 }
 
+// Keyframes that new landmarks are made with.
+std::vector<int> LocalMapper::Neighbours(int id, int count, const Map& map) const {
+  if (!keeps_poses_) return map.BestCovisible(id, count, 15);
+  std::vector<int> before;
+  for (int k = id - 1; k >= 0 && static_cast<int>(before.size()) < count; --k) {
+    if (map.keyframe(k).piece == map.keyframe(id).piece && map.keyframe(k).replaced_by < 0)
+      before.push_back(k);
+  }
+  return before;
+}
+
 int LocalMapper::Triangulate(int id, Map* map) {
   const bool mono = rig_.sensor == Sensor::kMono;
   const int neighbours =
@@ -118,11 +130,12 @@ int LocalMapper::Triangulate(int id, Map* map) {
   const std::vector<int>& seen = std::as_const(*map).keyframe(id).landmarks;
   auto known = std::count_if(seen.begin(), seen.end(), [](int l) { return l >= 0; });
   int made = 0;
-  for (int other : map->BestCovisible(id, neighbours, 15)) {
+  for (int other : Neighbours(id, neighbours, *map)) {
     const double baseline =
         (map->keyframe(id).T_world_camera.translation - map->keyframe(other).T_world_camera.translation)
             .norm();
-    const double median_depth = map->MedianDepth(other);
+    double median_depth = map->MedianDepth(other);
+    if (median_depth <= 0 && keeps_poses_) median_depth = kFirstDepth * baseline;
     if (median_depth <= 0) continue;
     if (mono ? baseline < 0.01 * median_depth : baseline < rig_.baseline_m) continue;
     const auto pairs =
@@ -165,7 +178,7 @@ void LocalMapper::Process(int id, Map* map, StageTimes* stages) {
     for (int l : map->keyframe(id).landmarks) {
       if (l >= 0) map->UpdateLandmark(l);
     }
-    CullRecent(id, map);
+    if (!keeps_poses_) CullRecent(id, map);
     const auto timed = [&](const char* name, auto&& step) {
       const ScopedSpan span(stages->recorder, Lane::kMapping, name);
       step();
@@ -173,6 +186,10 @@ void LocalMapper::Process(int id, Map* map, StageTimes* stages) {
     timed("triangulate", [&] { Triangulate(id, map); });
     timed("fuse", [&] { FuseNeighbours(rig_.camera, id, map); });
     timed("align", [&] { Align(id, map); });
+  }
+  if (keeps_poses_) {
+    recent_.clear();
+    return;
   }
   const ScopedStopwatch watch(stages, Lane::kMapping, "local_ba");
   BundleAdjustmentOptions ba;

@@ -32,6 +32,10 @@ class LocalMapper {
   /// Goes on with what is known of the same camera.
   void KeepLens(const SelfCalibration& lens) { lens_ = lens; }
 
+  /// From now on keyframes stay where they are, since another odometry knows their poses: no bundle
+  /// adjustment, and landmarks are made between neighbours in time.
+  void KeepPoses() { keeps_poses_ = true; }
+
   /// Full treatment of the newest keyframe; its landmark matches, and those of its own depth, are already in
   /// the map. Adds milliseconds to `stages`.
   void Process(int keyframe, Map* map, StageTimes* stages);
@@ -47,12 +51,14 @@ class LocalMapper {
   void CullRecent(int keyframe, Map* map);
   std::optional<Eigen::Vector3d> PointOf(const Keyframe& a, int fa, const Keyframe& b, int fb, const Map& map,
                                          bool strict) const;
+  std::vector<int> Neighbours(int keyframe, int count, const Map& map) const;
   int Triangulate(int keyframe, Map* map);
   void Align(int keyframe, Map* map);
 
   OdometryOptions options_;
   CameraRig rig_;
   SelfCalibration lens_;
+  bool keeps_poses_ = false;
   std::vector<std::pair<int, int>> recent_;  // landmark, keyframe in which it was made
 };
 

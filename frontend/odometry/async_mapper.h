@@ -39,6 +39,9 @@ class AsyncMapper {
   /// A keyframe that needs no more treatment.
   void Skip(int keyframe) { mapped_.push_back(keyframe); }
 
+  /// LocalMapper::KeepPoses. Nothing may be under way.
+  void KeepPoses() { mapper_.KeepPoses(); }
+
   bool Busy() const { return outcome_.valid(); }
   void NextFrame() { ++frames_; }
   /// True if the result is to enter now.

@@ -51,6 +51,11 @@ std::shared_ptr<const FrameFeatures> Odometry::Extract(const InputFrame& frame) 
 }
 
 TrackResult Odometry::Track(const InputFrame& frame) { return impl_->Track(frame); }
+TrackResult Odometry::Follow(const InputFrame& frame, const Pose& T_odom_camera) {
+  if (!T_odom_camera.IsFinite())
+    throw InputError("frame " + std::to_string(frame.index) + ": its pose has a number that is not finite");
+  return impl_->Follow(frame, T_odom_camera);
+}
 TrackResult Odometry::RelocalizeAt(int keyframe) { return impl_->RelocalizeAt(keyframe); }
 void Odometry::BeginSession(const CameraRig& rig, std::int64_t frame_offset) {
   const std::string problem = OtherCameraProblem(impl_->rig(), rig, impl_->map().scales());

@@ -20,7 +20,8 @@ Odometry::Impl::Impl(const OdometryOptions& options, const CameraRig& rig)
       mapper_(options, rig),
       initializer_(options, rig),
       tracker_(options, rig),
-      relocalizer_(options, rig) {}
+      relocalizer_(options, rig),
+      follower_(options, rig) {}
 
 void Odometry::Impl::GoOn(const Impl& before, std::int64_t frame_offset) {
   UseOwnThreads(before.mapper_.own_threads());
@@ -55,6 +56,49 @@ TrackResult Odometry::Impl::Track(const InputFrame& input) {
   result_ = tracker_.state() == TrackingState::kInitializing ? Initialize(frame) : TrackMap(frame);
   result_.features = static_cast<int>(frame.features->size());
   return result_;
+}
+
+TrackResult Odometry::Impl::Follow(const InputFrame& input, const Pose& T_odom_camera) {
+  mapper_.NextFrame();
+  if (mapper_.Due()) EnterMapping();
+  const TrackedFrame frame = Prepare(input);
+  if (!follower_.started()) {
+    result_ = FollowFirst(frame, T_odom_camera);
+  } else {
+    const ScopedStopwatch watch(&stages_, Lane::kTracking, "follow");
+    const Pose T_world_camera = follower_.Next(T_odom_camera, tracker_.last().T_camera_world.Inverse());
+    const int newest = tracker_.last().newest_keyframe;
+    const PoseFix fix = follower_.See(map(), frame, newest, T_world_camera.Inverse());
+    tracker_.Follow(fix);
+    result_ = TrackResult();
+    result_.state = TrackingState::kTracking;
+    result_.inliers = fix.inliers;
+    if (follower_.WantsKeyframe(map(), fix, newest)) result_.keyframe = InsertKeyframe();
+    const LastFrame& last = tracker_.last();
+    history_.Add(last.frame, last.T_camera_world, map().keyframe(last.reference));
+    result_.T_world_camera = last.T_camera_world.Inverse();
+  }
+  result_.features = static_cast<int>(frame.features->size());
+  return result_;
+}
+
+// The map's frame of reference is the other odometry's.
+TrackResult Odometry::Impl::FollowFirst(const TrackedFrame& frame, const Pose& T_odom_camera) {
+  TrackResult result;
+  if (rig_.sensor != Sensor::kMono && !frame.features->has_depth) {
+    result.reason = "initialising: waiting for a frame with depth";
+    return result;
+  }
+  mapper_.KeepPoses();
+  const Pose T_world_camera = follower_.Next(T_odom_camera, Pose());
+  result.keyframe = mapper_.AddKeyframe(frame, initializer_.piece(), T_world_camera, {});
+  const tutti::Keyframe& keyframe = map().keyframe(result.keyframe);
+  tracker_.Begin(frame, keyframe);
+  history_.Add(frame, tracker_.last().T_camera_world, keyframe);
+  mapper_.Skip(result.keyframe);
+  result.state = TrackingState::kTracking;
+  result.T_world_camera = T_world_camera;
+  return result;
 }
 
 TrackedFrame Odometry::Impl::Prepare(const InputFrame& input) {
@@ -216,6 +260,7 @@ void Odometry::Impl::Correct(const std::map<int, Similarity>& S_world_keyframe,
   if (reference >= 0) {
     const Pose& T_world_old = map().keyframe(reference).T_world_camera;
     const auto moved = S_world_keyframe.find(reference);
+    if (moved != S_world_keyframe.end()) follower_.Rescale(moved->second.scale);
     tracker_.FollowReference(T_world_old.Inverse().Inverse(),
                              moved != S_world_keyframe.end() ? moved->second : Similarity(T_world_old));
   }

@@ -10,6 +10,7 @@
 #include "frontend/odometry/async_mapper.h"
 #include "frontend/odometry/frame_history.h"
 #include "frontend/odometry/map_initializer.h"
+#include "frontend/odometry/pose_follower.h"
 #include "frontend/odometry/relocalizer.h"
 #include "frontend/odometry/stage_times.h"
 #include "frontend/odometry/tracker.h"
@@ -29,6 +30,7 @@ class Odometry::Impl {
   void Append(const Impl& other, std::int64_t frame_offset);
 
   TrackResult Track(const InputFrame& frame);
+  TrackResult Follow(const InputFrame& frame, const Pose& T_odom_camera);
   TrackResult RelocalizeAt(int keyframe);
   void BeginLocalization();
   bool BeyondMap() const;
@@ -70,6 +72,7 @@ class Odometry::Impl {
  private:
   TrackedFrame Prepare(const InputFrame& input);
   TrackResult Initialize(const TrackedFrame& frame);
+  TrackResult FollowFirst(const TrackedFrame& frame, const Pose& T_odom_camera);
   TrackResult TrackMap(const TrackedFrame& frame);
   TrackResult Accept(const Tracker::Tracked& tracked);
   bool MustExtend(const Tracker::Tracked& tracked) const;
@@ -84,6 +87,7 @@ class Odometry::Impl {
   MapInitializer initializer_;
   Tracker tracker_;
   Relocalizer relocalizer_;
+  PoseFollower follower_;
   FrameHistory history_;
   TrackResult result_;                               // of the last frame
   std::vector<double> row_errors_, stereo_matches_;  // stereo: of each pair

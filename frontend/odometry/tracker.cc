@@ -50,6 +50,17 @@ Tracker::Tracked Tracker::Accept(PoseFix fix, const Map& map) {
   return {std::move(fix), need, by_grey_before};
 }
 
+void Tracker::Follow(const PoseFix& fix) {
+  last_.frame = fix.frame;
+  last_.matches = fix.matches;
+  last_.T_camera_world = fix.T_camera_world;
+  last_.reference = fix.reference;
+  last_.velocity.reset();
+  last_.steady = false;
+  ++last_.frames_since_keyframe;
+  state_ = TrackingState::kTracking;
+}
+
 void Tracker::Begin(const TrackedFrame& frame, const Keyframe& keyframe) {
   // That the camera goes on as it did is likelier than that it has stopped: what stands still before it in
   // the first frame may be a lorry that drives along. Another map of one camera has another unit.

@@ -30,6 +30,8 @@ class Tracker {
 
   /// The next frame, after Begin.
   Tracked Track(const TrackedFrame& frame, const Map& map);
+  /// The next frame, whose pose is known from elsewhere.
+  void Follow(const PoseFix& fix);
   /// Goes on from a fix at a keyframe, where the motion so far says nothing (Relocalizer).
   Tracked Relocalize(int keyframe, PoseFix fix, const Map& map);
 

@@ -105,6 +105,14 @@ class Odometry {
   /// Tracks the next frame; frames come in order of time. Never throws for hard images.
   TrackResult Track(const InputFrame& frame);
 
+  /// The next frame of another odometry, which says where it is in that one's world: keyframes and landmarks
+  /// are made at its poses, and none of them moves until somebody corrects the map. The map's frame of
+  /// reference is that world at first; the frame after a correction goes on from where it moved. One camera's
+  /// landmarks are triangulated between neighbouring keyframes, in the unit of the poses. Either all frames
+  /// of an object come here or all to Track. Not lost, unless depth is awaited for the first keyframe. Throws
+  /// InputError for a pose that is not finite.
+  TrackResult Follow(const InputFrame& frame, const Pose& T_odom_camera);
+
   /// Tries the frame that Track has just lost (or could not start a map with) again, from a keyframe that
   /// shows the same place: tracking goes on from there if the map agrees. To be called before the next Track.
   /// Returns what Track did if that fails, or if there is no such frame.

@@ -1,0 +1,186 @@
+#include "apps/run/given_odometry.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "tutti/backend/evaluation.h"
+#include "tutti/backend/trajectory_file.h"
+#include "tutti/core/error.h"
+#include "tutti/core/text.h"
+
+namespace tutti {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kLongestGap = 1.0;  // between poses that are interpolated [s]
+constexpr double kSameTime = 0.02;   // of a pose and an image [s]
+
+/// A data set with other time stamps.
+class RestampedDataset : public Dataset {
+ public:
+  RestampedDataset(std::unique_ptr<Dataset> images, std::vector<double> stamps)
+      : images_(std::move(images)), stamps_(std::move(stamps)) {}
+
+  Supply FrameSupply() const override { return images_->FrameSupply(); }
+  std::size_t Size() const override { return images_->Size(); }
+  double Stamp(std::size_t i) const override { return stamps_.at(static_cast<std::size_t>(Number(i))); }
+  std::int64_t Number(std::size_t i) const override { return images_->Number(i); }
+  ReadResult Read(std::size_t i) const override {
+    ReadResult read = images_->Read(i);
+    if (read.frame) read.frame->stamp_s = Stamp(i);
+    return read;
+  }
+  ColourImage ReadColour(std::size_t i) const override { return images_->ReadColour(i); }
+  const CameraRig& Rig() const override { return images_->Rig(); }
+  std::optional<fs::path> GroundTruthFile() const override { return images_->GroundTruthFile(); }
+  Trajectory ReadGroundTruth(const fs::path& file, std::vector<std::string>* warnings) const override {
+    const PoseFile read = ReadPoseFile(file);
+    if (read.has_stamps) return images_->ReadGroundTruth(file, warnings);
+    return ReadPoseFile(file, read.format, stamps_).trajectory;
+  }
+  const std::vector<std::string>& Warnings() const override { return images_->Warnings(); }
+
+ private:
+  std::unique_ptr<Dataset> images_;
+  std::vector<double> stamps_;
+};
+
+// All images, whatever part of them is to be used.
+DatasetOptions Whole(DatasetOptions options) {
+  options.start = options.end = 0;
+  options.stride = 1;
+  options.noise = 0;
+  return options;
+}
+
+bool HasOwnStamps(const fs::path& images, const DatasetOptions& options) {
+  const DatasetType type = options.type != DatasetType::kAuto ? options.type : DetectDatasetType(images);
+  return type != DatasetType::kImages && type != DatasetType::kVideo;
+}
+
+bool Grows(const std::vector<double>& stamps) {
+  return std::adjacent_find(stamps.begin(), stamps.end(), std::greater_equal<>()) == stamps.end();
+}
+
+PoseFile ReadPoses(const GivenOdometryFiles& files, const std::vector<double>& times) {
+  std::optional<PoseFileFormat> format;
+  if (files.format != "auto") format = ParsePoseFileFormat(files.format);
+  return ReadPoseFile(files.trajectory, format, times);
+}
+
+}  // namespace
+
+GivenOdometry::GivenOdometry(const GivenOdometryFiles& files, const fs::path& images,
+                             const DatasetOptions& options)
+    : files_(files), images_(images), options_(options) {
+  PoseFile poses = ReadPoses(files, {});
+  if (poses.format == PoseFileFormat::kG2o)
+    throw InputError(files.trajectory.string() + ": is a graph; a trajectory (TUM, KITTI, EuRoC) is needed");
+  if (poses.trajectory.empty()) throw InputError(files.trajectory.string() + ": holds no pose");
+  const std::unique_ptr<Dataset> all = OpenDataset(images, Whole(options));
+  std::vector<double> times;
+  if (files.times) times = ReadTimes(*files.times);
+  const bool own = HasOwnStamps(images, options);
+  if (files.times && times.size() != all->Size() &&
+      (poses.has_stamps || times.size() != poses.trajectory.size()))
+    throw InputError(files.times->string() + ": has " + std::to_string(times.size()) + " time stamps, but " +
+                     images.string() + " has " + std::to_string(all->Size()) + " images and " +
+                     files.trajectory.string() + " " + std::to_string(poses.trajectory.size()) +
+                     " poses; one for each image is needed");
+  if (!poses.has_stamps && times.size() == poses.trajectory.size()) poses = ReadPoses(files, times);
+  notes_ = poses.warnings;
+  trajectory_ = std::move(poses.trajectory);
+  has_stamps_ = poses.has_stamps || (files.times && times.size() == trajectory_.size());
+  if (!own) {
+    stamps_ = ImageStamps(*all);
+  } else if (files.times && times.size() == all->Size() && has_stamps_ &&
+             times.size() != trajectory_.size()) {
+    stamps_ = times;
+  }
+  if (has_stamps_) return;
+  // Lines have no stamps: one for each image, in order.
+  if (trajectory_.size() != all->Size())
+    throw InputError(files.trajectory.string() + ": has no time stamps, and " +
+                     std::to_string(trajectory_.size()) + " poses for " + std::to_string(all->Size()) +
+                     " images; give the times of the poses (--times)");
+  for (std::size_t i = 0; i < trajectory_.size(); ++i)
+    trajectory_[i].stamp_s = stamps_.empty() ? all->Stamp(i) : stamps_[i];
+}
+
+std::vector<double> GivenOdometry::StampsByName(std::size_t count) const {
+  std::error_code code;
+  if (!fs::is_directory(images_, code)) return {};
+  std::vector<double> stamps;
+  for (const fs::directory_entry& entry : fs::directory_iterator(images_, code)) {
+    const std::string stem = entry.path().stem().string();
+    const bool like_a_time = stem.find('.') != std::string::npos || stem.size() >= 10;
+    const std::optional<double> number = like_a_time ? ParseDouble(stem) : std::nullopt;
+    if (number && std::isfinite(*number)) stamps.push_back(*number > 1e14 ? 1e-9 * *number : *number);
+  }
+  std::sort(stamps.begin(), stamps.end());
+  return stamps.size() == count && Grows(stamps) ? stamps : std::vector<double>();
+}
+
+std::vector<double> GivenOdometry::ImageStamps(const Dataset& all) {
+  const std::size_t count = all.Size();
+  std::vector<fs::path> places;
+  if (files_.times) places.push_back(*files_.times);
+  const fs::path folder = fs::absolute(images_).lexically_normal() / "";
+  for (const fs::path& above : {folder.parent_path(), folder.parent_path().parent_path()}) {
+    std::error_code code;
+    if (fs::is_regular_file(above / "times.txt", code)) places.push_back(above / "times.txt");
+  }
+  for (const fs::path& place : places) {
+    std::vector<double> times = ReadTimes(place);
+    if (times.size() != count) continue;
+    if (!Grows(times)) throw InputError(place.string() + ": the time stamps must grow from line to line");
+    notes_.push_back("the images have the time stamps of " + place.string());
+    return times;
+  }
+  std::vector<double> names = StampsByName(count);
+  if (!names.empty()) {
+    notes_.push_back("the images have the time stamps that they are called by");
+    return names;
+  }
+  if (trajectory_.size() != count)
+    throw InputError(images_.string() + ": nothing says when its " + std::to_string(count) +
+                     " images were taken, and " + files_.trajectory.string() + " has " +
+                     std::to_string(trajectory_.size()) +
+                     " poses; give one time stamp for each image (--times FILE)");
+  notes_.push_back("each image has the pose of the same place in the file, since there are as many");
+  std::vector<double> stamps;
+  for (std::size_t i = 0; i < count; ++i)
+    stamps.push_back(has_stamps_ ? trajectory_[i].stamp_s : all.Stamp(i));
+  return stamps;
+}
+
+std::unique_ptr<Dataset> GivenOdometry::Open() const {
+  std::unique_ptr<Dataset> dataset = OpenDataset(images_, options_);
+  if (!stamps_.empty()) dataset = std::make_unique<RestampedDataset>(std::move(dataset), stamps_);
+  for (std::size_t i = 0; i < dataset->Size(); ++i) {
+    if (At(dataset->Stamp(i))) return dataset;
+  }
+  throw InputError(files_.trajectory.string() + ": has no pose for any image: it is from " +
+                   std::to_string(trajectory_.front().stamp_s) + " s to " +
+                   std::to_string(trajectory_.back().stamp_s) + " s, the images from " +
+                   std::to_string(dataset->Stamp(0)) + " s to " +
+                   std::to_string(dataset->Stamp(dataset->Size() - 1)) +
+                   " s; check the unit and the clock (--times gives the images' stamps)");
+}
+
+std::optional<Pose> GivenOdometry::At(double stamp_s) const {
+  const auto later = std::lower_bound(trajectory_.begin(), trajectory_.end(), stamp_s,
+                                      [](const StampedPose& p, double s) { return p.stamp_s < s; });
+  if (later != trajectory_.end() && later->stamp_s - stamp_s < 1e-6) return later->pose;
+  if (auto pose = InterpolatePose(trajectory_, stamp_s, kLongestGap)) return pose;
+  auto nearest = later;
+  if (later == trajectory_.end() ||
+      (later != trajectory_.begin() && stamp_s - (later - 1)->stamp_s < later->stamp_s - stamp_s))
+    nearest = later - 1;
+  if (std::abs(nearest->stamp_s - stamp_s) > kSameTime) return std::nullopt;
+  return nearest->pose;
+}
+
+}  // namespace tutti

@@ -1,0 +1,108 @@
+#include "tutti/slam/trajectory_closer.h"
+
+#include <map>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include "tutti/core/error.h"
+#include "tutti/slam/slam_system.h"
+
+namespace tutti {
+
+RunConfig FollowingConfig(RunConfig config) {
+  config.run.global_adjustment = false;
+  return config;
+}
+
+class TrajectoryCloser::Impl {
+ public:
+  Impl(const RunConfig& config, const CameraRig& rig)
+      : slam_(FollowingConfig(config), rig),
+        T_body_camera_(rig.T_body_camera),
+        T_camera_body_(rig.T_body_camera.Inverse()) {}
+
+  TrackResult Push(const InputFrame& frame, const Pose& T_odom_body) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!(frame.stamp_s > last_s_.value_or(frame.stamp_s - 1)))
+      throw InputError("frame " + std::to_string(frame.index) +
+                       ": its time stamp does not grow; push images in order of time");
+    const TrackResult result = slam_.Follow(frame, T_odom_body * T_body_camera_);
+    last_s_ = frame.stamp_s;
+    if (result.state != TrackingState::kTracking) return result;
+    T_map_body_ = result.T_world_camera * T_camera_body_;
+    T_odom_body_ = T_odom_body;
+    if (result.keyframe >= 0) of_keyframe_[result.keyframe] = {frame.stamp_s, T_odom_body};
+    return result;
+  }
+
+  void Finish() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    slam_.Finish();
+    if (slam_.odometry() == nullptr) return;
+    const Trajectory frames = slam_.odometry()->FrameTrajectory();
+    if (!frames.empty()) T_map_body_ = frames.back().pose * T_camera_body_;
+  }
+
+  Pose T_map_odom() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return T_map_body_ * T_odom_body_.Inverse();
+  }
+
+  Trajectory Corrected(const Trajectory& odometry) const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    Trajectory before;
+    for (const auto& [id, pose] : of_keyframe_) before.push_back(pose);
+    return CorrectTrajectory(odometry, before, KeyframesNow());
+  }
+
+  Trajectory Keyframes() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return KeyframesNow();
+  }
+  std::vector<LoopRecord> Loops() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return slam_.loops();
+  }
+  PoseGraph Graph() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return slam_.Graph();
+  }
+  int Corrections() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return slam_.Corrections();
+  }
+
+ private:
+  Trajectory KeyframesNow() const {
+    Trajectory now;
+    for (const auto& [id, odom] : of_keyframe_)
+      now.push_back({odom.stamp_s, slam_.odometry()->KeyframePose(id) * T_camera_body_});
+    return now;
+  }
+
+  mutable std::mutex mutex_;
+  SlamSystem slam_;
+  Pose T_body_camera_, T_camera_body_;
+  std::optional<double> last_s_;
+  Pose T_map_body_, T_odom_body_;           // of the newest image
+  std::map<int, StampedPose> of_keyframe_;  // T_odom_body
+};
+
+TrajectoryCloser::TrajectoryCloser(const RunConfig& config, const CameraRig& rig)
+    : impl_(std::make_unique<Impl>(config, rig)) {}
+TrajectoryCloser::~TrajectoryCloser() = default;
+TrackResult TrajectoryCloser::Push(const InputFrame& frame, const Pose& T_odom_body) {
+  return impl_->Push(frame, T_odom_body);
+}
+void TrajectoryCloser::Finish() { impl_->Finish(); }
+Pose TrajectoryCloser::T_map_odom() const { return impl_->T_map_odom(); }
+Trajectory TrajectoryCloser::Corrected(const Trajectory& odometry) const {
+  return impl_->Corrected(odometry);
+}
+Trajectory TrajectoryCloser::Keyframes() const { return impl_->Keyframes(); }
+std::vector<LoopRecord> TrajectoryCloser::Loops() const { return impl_->Loops(); }
+PoseGraph TrajectoryCloser::Graph() const { return impl_->Graph(); }
+int TrajectoryCloser::Corrections() const { return impl_->Corrections(); }
+
+}  // namespace tutti

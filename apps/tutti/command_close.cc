@@ -1,0 +1,133 @@
+// tutti close: loops and a corrected trajectory for another odometry.
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "apps/report/page.h"
+#include "apps/run/outputs.h"
+#include "apps/run/runner.h"
+#include "apps/tutti/checks.h"
+#include "apps/tutti/commands.h"
+#include "apps/tutti/run_with_report.h"
+#include "tutti/core/error.h"
+#include "tutti/slam/config.h"
+
+namespace tutti::cli {
+namespace {
+
+struct CloseArguments {
+  GivenOdometryFiles odometry;
+  std::string trajectory, images, times, config, out, ground_truth;
+  std::vector<double> sigma;     // share of the way, degrees
+  std::vector<std::string> set;  // SECTION.KEY=VALUE
+  std::uint64_t seed = 1;
+  int threads = 2, start = 0, end = 0, stride = 1;
+  bool keep = false, no_report = false, quiet = false;
+};
+
+RunConfig ConfigOf(const CloseArguments& arguments) {
+  RunConfig config = arguments.config.empty() ? RunConfig() : LoadConfig(arguments.config);
+  if (!arguments.sigma.empty()) {
+    config.run.odometry_sigma_fraction = arguments.sigma[0];
+    config.run.odometry_sigma_deg = arguments.sigma[1];
+  }
+  SetOptions(arguments.set, config);
+  const std::string problem = config.run.Validate();
+  if (!problem.empty()) throw InputError("--odometry-sigma: " + problem);
+  return config;
+}
+
+int ExitCode(const RunResult& result) {
+  if (result.interrupted) {
+    std::fprintf(stderr, "tutti: interrupted; what there was by then is in %s\n", result.folder.c_str());
+    return 130;
+  }
+  if (result.frames_total > 0 && result.bad.size() == result.frames_total) {
+    std::fprintf(stderr, "tutti: not one image could be read; the first: %s\n",
+                 result.bad.front().error.c_str());
+    return 1;
+  }
+  if (result.keyframes == 0 && !result.appearance_only) {
+    const std::string reason = result.lost.empty() ? std::string("no images") : result.lost.back().reason;
+    std::fprintf(stderr, "tutti: no image became a keyframe (%s)\n", reason.c_str());
+    return 1;
+  }
+  return 0;
+}
+
+int Close(const CLI::App& command, const CloseArguments& arguments) {
+  RunRequest request;
+  request.config = arguments.config.empty() ? "(defaults)" : arguments.config;
+  request.dataset = arguments.images;
+  request.out = arguments.out;
+  request.quiet = arguments.quiet;
+  request.keep = arguments.keep;
+  request.odometry = arguments.odometry;
+  request.odometry->trajectory = arguments.trajectory;
+  if (!arguments.times.empty()) request.odometry->times = arguments.times;
+  if (!arguments.ground_truth.empty()) request.ground_truth = arguments.ground_truth;
+  if (command.count("--seed") > 0) request.seed = arguments.seed;
+  if (command.count("--threads") > 0) request.threads = arguments.threads;
+  if (command.count("--start") > 0) request.start = arguments.start;
+  if (command.count("--end") > 0) request.end = arguments.end;
+  if (command.count("--stride") > 0) request.stride = arguments.stride;
+  const RunConfig config = ConfigOf(arguments);
+  const RunResult result = arguments.no_report ? RunSlam(request, config) : RunWithReport(request, config);
+  std::fputs(ResultTable(result).c_str(), stdout);
+  std::printf("\n  results are in %s\n", result.folder.c_str());
+  if (result.appearance_only)
+    std::fprintf(stderr,
+                 "tutti: without a calibration (--config with camera: fx, fy, cx, cy) loops have no poses: "
+                 "there are loops.csv and summary.json, but no corrected trajectory and no graph\n");
+  if (!arguments.no_report && !arguments.quiet && !ReportsAvailable())
+    std::fprintf(stderr, "tutti: %s\n", ReportsMissing().c_str());
+  return ExitCode(result);
+}
+
+}  // namespace
+
+void SetUpClose(CLI::App& command, int& exit_code) {
+  const auto arguments = std::make_shared<CloseArguments>();
+  command
+      .add_option("--trajectory", arguments->trajectory,
+                  "poses of the odometry, in metres: TUM 'stamp x y z qx qy qz qw', KITTI or EuRoC")
+      ->required();
+  command
+      .add_option("--images", arguments->images,
+                  "what the camera saw along it: a folder of images, a data set (KITTI, TUM, EuRoC; with "
+                  "depth or right images distances are measured), a video, or a ROS 1 bag")
+      ->required();
+  command.add_option("--config", arguments->config,
+                     "YAML file with the camera; without a calibration there is loops.csv alone");
+  command.add_option("--out", arguments->out, "folder for the results, as of `tutti run`")->required();
+  command.add_option("--format", arguments->odometry.format, "of --trajectory; auto: by content")
+      ->check(CLI::IsMember({"auto", "tum", "kitti", "euroc"}))
+      ->capture_default_str();
+  command.add_option(
+      "--times", arguments->times,
+      "time stamps [s], one a line: of the images (default: times.txt in the folder or above it, else the "
+      "file names, else the poses by order), or of the poses of a KITTI file");
+  command
+      .add_option("--odometry-sigma", arguments->sigma,
+                  "FRACTION DEG: standard deviation of the odometry between two keyframes, as a share of the "
+                  "way and as an angle (run.odometry_sigma_fraction, run.odometry_sigma_deg)")
+      ->expected(2);
+  command.add_option("--ground-truth", arguments->ground_truth,
+                     "trajectory to evaluate against (default: the data set's own; 'none': don't)");
+  command.add_option("--set", arguments->set, "SECTION.KEY=VALUE, as of `tutti run`");
+  command.add_option("--seed", arguments->seed, "of everything that draws random numbers")
+      ->check(NotNegative());
+  command.add_option("--threads", arguments->threads, "most threads; the result is the same for any number");
+  command.add_option("--start", arguments->start, "first image that is used, counted from 0")
+      ->check(NotNegative());
+  command.add_option("--end", arguments->end, "image before which to stop")->check(Positive());
+  command.add_option("--stride", arguments->stride, "use every so many images")->check(Positive());
+  command.add_flag("--keep", arguments->keep, "don't replace earlier results in --out: number them");
+  command.add_flag("--no-report", arguments->no_report, "no report.html and report.json");
+  command.add_flag("--quiet", arguments->quiet, "no progress and no notes");
+  command.callback([&command, arguments, &exit_code] { exit_code = Close(command, *arguments); });
+}
+
+}  // namespace tutti::cli

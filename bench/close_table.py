@@ -1,0 +1,193 @@
+#!/usr/bin/env python3
+"""Loops for other odometries: `tutti close` on trajectories that are given as files.
+
+usage: ./dev bench close [ROW...] [--write]
+
+Rows: `own`, the trajectory that `tutti run` has without loops on kitti_00_head, beside `tutti run` with them; `walk`, the ground
+truth of kitti_00_head with a random walk of yaw and scale (1 sigma after one metre) from fixed seeds; `kitchen`, the same of
+redkitchen; `published`, ORB-SLAM's and S-PTAM's trajectories of KITTI 00, the frames of kitti_00_head. Drift at the loop: error
+of the last pose, seen from the earlier pose that is nearest to it in truth. ATE is after SE(3) alignment, of own and ORB-SLAM's
+after Sim(3).
+"""
+import json
+import math
+import random
+import subprocess
+import sys
+
+import table
+
+ROWS = ["own", "walk", "kitchen", "published"]
+WALKS = [(0.02, 0.02), (0.05, 0.05), (0.1, 0.1)]  # yaw [deg], scale [%], after one metre
+SEED = 1
+REMOVED = 0.8  # of the drift at the loop, at least
+
+
+def matrix(words):
+    return [words[0:4], words[4:8], words[8:12], [0, 0, 0, 1]]
+
+
+def times(a, b):
+    return [[sum(a[i][k] * b[k][j] for k in range(4)) for j in range(4)] for i in range(4)]
+
+
+def inverse(m):
+    r = [[m[j][i] for j in range(3)] for i in range(3)]
+    return [[*r[i], -sum(r[i][k] * m[k][3] for k in range(3))] for i in range(3)] + [[0, 0, 0, 1]]
+
+
+def read_kitti(file, count=None):
+    return [matrix(list(map(float, line.split()))) for line in open(file)][:count]
+
+
+def read_tum(file):
+    poses = []
+    for line in open(file):
+        if line.startswith("#") or not line.strip():
+            continue
+        s, x, y, z, a, b, c, w = map(float, line.split())
+        n = math.sqrt(a * a + b * b + c * c + w * w)
+        a, b, c, w = a / n, b / n, c / n, w / n
+        poses.append((s, [[1 - 2 * (b * b + c * c), 2 * (a * b - c * w), 2 * (a * c + b * w), x],
+                          [2 * (a * b + c * w), 1 - 2 * (a * a + c * c), 2 * (b * c - a * w), y],
+                          [2 * (a * c - b * w), 2 * (b * c + a * w), 1 - 2 * (a * a + b * b), z], [0, 0, 0, 1]]))
+    return poses
+
+
+def write_kitti(file, poses):
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text("".join(" ".join(f"{v:.12g}" for row in p[:3] for v in row) + "\n" for p in poses))
+
+
+def disturbed(poses, yaw_deg, scale_percent):
+    """The steps of `poses` with a random walk."""
+    draw = random.Random(SEED)
+    out, log_scale = [poses[0]], 0.0
+    for before, after in zip(poses, poses[1:]):
+        step = times(inverse(before), after)
+        root = math.sqrt(math.sqrt(sum(step[i][3] ** 2 for i in range(3))))
+        log_scale += 0.01 * scale_percent * root * draw.gauss(0, 1)
+        yaw = math.radians(yaw_deg) * root * draw.gauss(0, 1)
+        for i in range(3):
+            step[i][3] *= math.exp(log_scale)
+        c, s = math.cos(yaw), math.sin(yaw)
+        out.append(times(out[-1], times(step, [[c, 0, s, 0], [0, 1, 0, 0], [-s, 0, c, 0], [0, 0, 0, 1]])))
+    return out
+
+
+def drift(truth, estimate):
+    """Of the last pose, seen from the earlier one that is nearest to it in truth [m]."""
+    place = lambda p: [p[i][3] for i in range(3)]
+    end = len(truth) - 1
+    near = min(range(end // 2), key=lambda i: math.dist(place(truth[i]), place(truth[end])))
+    seen = lambda p: [row[3] for row in times(inverse(p[near]), p[end])[:3]]
+    return math.dist(seen(truth), seen(estimate))
+
+
+def close(a, name, data, config, trajectory, more=()):
+    """Summary and corrected poses."""
+    out = a.out / name
+    if not (a.reuse and (out / "summary.json").exists()):
+        subprocess.run([a.tutti, "close", "--quiet", "--no-report", "--trajectory", trajectory, "--images", data, "--config", config,
+                        "--out", out, *map(str, more)], check=True, stdout=subprocess.DEVNULL)
+    summary = json.loads((out / "summary.json").read_text())
+    said = summary["evaluation"]
+    return {"name": name, "before_ate_m": said["odometry"]["ate_rmse_m"], "ate_m": said["slam"]["ate_rmse_m"],
+            "true": summary["loops"]["true"], "false": summary["loops"]["false"]}, read_tum(out / "trajectory.txt")
+
+
+def kitti(a):
+    return a.data / "kitti_00_head", table.ROOT / "data" / "configs" / "kitti_00-02_mono.yaml"
+
+
+def own(a):
+    data, config = kitti(a)
+    out = a.out / "own-run"
+    if not (a.reuse and (out / "summary.json").exists()):
+        subprocess.run([a.tutti, "run", "--quiet", "--no-report", "--no-map", "--config", config, "--dataset", data, "--out", out],
+                       check=True, stdout=subprocess.DEVNULL)
+    run = json.loads((out / "summary.json").read_text())["evaluation"]["slam"]["ate_rmse_m"]
+    row, _ = close(a, "own", data, config, out / "trajectory_odometry.txt")
+    return [dict(row, run_ate_m=run)]
+
+
+def walk(a):
+    data, config = kitti(a)
+    truth = read_kitti(data / "poses.txt")
+    rows = []
+    for yaw, scale in WALKS:
+        given = disturbed(truth, yaw, scale)
+        file = a.out / f"walk-{yaw}-{scale}.txt"
+        write_kitti(file, given)
+        row, corrected = close(a, f"walk-{yaw}-{scale}", data, config, file)
+        rows.append(dict(row, before_m=drift(truth, given), after_m=drift(truth, [p for _, p in corrected])))
+    return rows
+
+
+def kitchen(a):
+    data, config = a.data / "redkitchen", table.ROOT / "data" / "configs" / "7scenes.yaml"
+    truth = read_tum(data / "groundtruth.txt")
+    stamps = a.out / "kitchen-times.txt"
+    stamps.parent.mkdir(parents=True, exist_ok=True)
+    stamps.write_text("".join(f"{s:.9f}\n" for s, _ in truth))
+    rows = []
+    for yaw, scale in [(1, 1), (3, 3)]:  # 7 m are short
+        given = disturbed([p for _, p in truth], yaw, scale)
+        file = a.out / f"kitchen-{yaw}-{scale}.txt"
+        write_kitti(file, given)
+        row, corrected = close(a, f"kitchen-{yaw}-{scale}", data, config, file, ["--times", stamps])
+        rows.append(dict(row, before_m=drift([p for _, p in truth], given),
+                         after_m=drift([p for _, p in truth], [p for _, p in corrected])))
+    return rows
+
+
+def published(a):
+    data, config = kitti(a)
+    rows = []
+    for name in ("ORB", "SPTAM"):
+        file = a.out / f"{name}.txt"
+        write_kitti(file, read_kitti(a.data / "trajectories" / f"KITTI_00_{name}.txt", 1700))
+        rows.append(close(a, name, data, config, file)[0])
+    return rows
+
+
+def document(results):
+    text = ["# Loops for other odometries", "", "Written by `./dev bench close --write` (bench/close_table.py): `tutti close` on "
+            "trajectories that are given as files. `ATE` after Sim(3) alignment where the camera is one (kitti_00_head), else SE(3). "
+            "Drift at the loop: error of the last pose, seen from the earlier pose that is nearest to it in truth.", "",
+            "| trajectory | ATE, given | closed | drift at the loop, given | closed | loops true / false | must hold |",
+            "|---|---|---|---|---|---|---|"]
+    for r in [r for row in ROWS for r in results.get(row, [])]:
+        drifts, missed, must = "| | ", [], "not worse than given"
+        if "before_m" in r:
+            drifts = f"| {r['before_m']:.3f} m | {r['after_m']:.3f} m "
+            must = f"{100 * REMOVED:.0f} % of the drift removed"
+            if r["after_m"] > (1 - REMOVED) * r["before_m"]:
+                missed.append(f"{100 * (1 - r['after_m'] / r['before_m']):.0f} %")
+        elif "run_ate_m" in r:
+            must = f"ATE within 20 % of `tutti run` ({r['run_ate_m']:.2f} m)"
+            if r["ate_m"] > 1.2 * r["run_ate_m"]:
+                missed.append(f"{100 * (r['ate_m'] / r['run_ate_m'] - 1):.0f} % more")
+        elif r["ate_m"] > r["before_ate_m"]:
+            missed.append("worse")
+        if r["false"] > 0:
+            missed.append(f"{r['false']} false loops")
+        text.append(f"| `{r['name']}` | {r['before_ate_m']:.3f} m | {r['ate_m']:.3f} m {drifts}| {r['true']} / {r['false']} | {must}"
+                    f"{'; **missed: ' + ', '.join(missed) + '**' if missed else ''} |")
+    return "\n".join(text)
+
+
+def main():
+    a = table.parse(table.parser(__doc__, "close", ROWS), ROWS)
+    data = table.RESULTS / "close.json"
+    results = json.loads(data.read_text()) if data.exists() else {}
+    for row in a.rows:
+        results[row] = {"own": own, "walk": walk, "kitchen": kitchen, "published": published}[row](a)
+        if a.write:
+            data.write_text(json.dumps(results, indent=1) + "\n")
+    table.put(a, table.RESULTS / "close.md", document(results))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

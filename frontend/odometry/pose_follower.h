@@ -1,0 +1,37 @@
+// Frames whose poses another odometry knows: what they see of the map, and when one becomes a keyframe.
+#pragma once
+
+#include <optional>
+
+#include "frontend/map/map.h"
+#include "frontend/odometry/tracked_frame.h"
+#include "tutti/frontend/frame.h"
+#include "tutti/frontend/odometry_options.h"
+
+namespace tutti {
+
+/// Stands where PoseSearch and KeyframePolicy stand for the odometry's own poses. Value type.
+class PoseFollower {
+ public:
+  PoseFollower(const OdometryOptions& options, const CameraRig& rig) : options_(options), rig_(rig) {}
+
+  /// Where a frame is in the map, of which the other odometry says T_odom_camera; `T_world_last`: where the
+  /// frame before is now, which corrections may have moved. The first frame is where the odometry says.
+  Pose Next(const Pose& T_odom_camera, const Pose& T_world_last);
+  /// The map around the last frame has become larger by this factor, and steps of the odometry with it.
+  void Rescale(double factor) { scale_ *= factor; }
+  bool started() const { return T_odom_last_.has_value(); }
+
+  /// What a frame at this pose sees of the landmarks around a keyframe. The pose is not changed.
+  PoseFix See(const Map& map, const TrackedFrame& frame, int keyframe, const Pose& T_camera_world) const;
+  /// By distance in terms of the scene's depth, rotation, and how little of the newest keyframe is in view.
+  bool WantsKeyframe(const Map& map, const PoseFix& fix, int newest_keyframe) const;
+
+ private:
+  OdometryOptions options_;
+  CameraRig rig_;
+  std::optional<Pose> T_odom_last_;
+  double scale_ = 1;  // of the map where the last frame is, by the odometry's unit
+};
+
+}  // namespace tutti

@@ -1,0 +1,142 @@
+// Loop closure around an odometry that somebody else has: truth with a random walk on it.
+#include "tutti/slam/trajectory_closer.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <limits>
+
+#include "tests/support/disturbed.h"
+#include "tests/support/recording.h"
+#include "tests/support/small_town.h"
+#include "tutti/core/error.h"
+
+namespace tutti {
+namespace {
+
+using testing::Recording;
+
+Recording Town(SyntheticSensor sensor) {
+  SyntheticOptions options = testing::SmallStereoTownWithALoop(320, 160);
+  options.sensor = sensor;
+  if (sensor == SyntheticSensor::kMono) options.rate_hz = 9;
+  const SyntheticWorld world(options);
+  return testing::Record(world, world.Size());
+}
+
+RunConfig Small(int threads) {
+  RunConfig config;
+  config.odometry.features = 800;
+  config.run.threads = threads;
+  return config;
+}
+
+struct Closed {
+  double drift_before = 0, drift_after = 0;
+  std::size_t keyframes = 0, loops = 0;
+  int corrections = 0;
+  Pose T_map_odom;
+  Trajectory trajectory;
+};
+
+Closed CloseTown(const Recording& town, const Trajectory& odometry, int threads = 2) {
+  TrajectoryCloser closer(Small(threads), town.rig);
+  for (std::size_t i = 0; i < town.frames.size(); ++i) closer.Push(town.frames[i], odometry[i].pose);
+  closer.Finish();
+  Closed closed;
+  closed.trajectory = closer.Corrected(odometry);
+  closed.drift_before = testing::DriftAtTheEnd(town.truth, odometry);
+  closed.drift_after = testing::DriftAtTheEnd(town.truth, closed.trajectory);
+  closed.keyframes = closer.Keyframes().size();
+  closed.loops = CountAccepted(closer.Loops());
+  closed.corrections = closer.Corrections();
+  closed.T_map_odom = closer.T_map_odom();
+  std::printf("  %zu keyframes, %zu loops, %d corrections; drift %.3f m, then %.3f m\n", closed.keyframes,
+              closed.loops, closed.corrections, closed.drift_before, closed.drift_after);
+  return closed;
+}
+
+void ExpectTheDriftIsGone(SyntheticSensor sensor) {
+  const Recording town = Town(sensor);
+  const Closed closed = CloseTown(town, testing::Disturbed(town.truth, 0.5, 0.2, 3));
+  EXPECT_GT(closed.corrections, 0);
+  EXPECT_LT(closed.drift_after, 0.2 * closed.drift_before);
+  EXPECT_EQ(closed.trajectory.size(), town.truth.size());
+}
+
+TEST(TrajectoryCloser, StereoRemovesTheDriftOfTheOdometry) { ExpectTheDriftIsGone(SyntheticSensor::kStereo); }
+TEST(TrajectoryCloser, DepthImagesRemoveTheDriftOfTheOdometry) {
+  ExpectTheDriftIsGone(SyntheticSensor::kRgbd);
+}
+TEST(TrajectoryCloser, OneCameraTakesItsScaleFromTheOdometry) {
+  ExpectTheDriftIsGone(SyntheticSensor::kMono);
+}
+
+TEST(TrajectoryCloser, APerfectOdometryStaysNearlyAsItIs) {
+  const Recording town = Town(SyntheticSensor::kStereo);
+  const Closed closed = CloseTown(town, town.truth);
+  EXPECT_GT(closed.loops, 0u);
+  for (std::size_t i = 0; i < town.truth.size(); ++i)
+    EXPECT_LT((closed.trajectory[i].pose.translation - town.truth[i].pose.translation).norm(), 0.15) << i;
+}
+
+TEST(TrajectoryCloser, TheCorrectionMapsTheNewestPoseOfTheOdometry) {
+  const Recording town = Town(SyntheticSensor::kStereo);
+  const Trajectory odometry = testing::Disturbed(town.truth, 0.5, 0.2, 3);
+  const Closed closed = CloseTown(town, odometry);
+  const Pose by_map = closed.T_map_odom * odometry.back().pose;
+  EXPECT_LT((by_map.translation - closed.trajectory.back().pose.translation).norm(), 0.05);
+  EXPECT_GT((closed.T_map_odom * odometry.back().pose.translation - odometry.back().pose.translation).norm(),
+            0.1);
+}
+
+TEST(TrajectoryCloser, ThreadsChangeNothing) {
+  const Recording town = Town(SyntheticSensor::kStereo);
+  const Trajectory odometry = testing::Disturbed(town.truth, 0.5, 0.2, 3);
+  const Closed one = CloseTown(town, odometry, 1), two = CloseTown(town, odometry, 2);
+  ASSERT_EQ(one.trajectory.size(), two.trajectory.size());
+  for (std::size_t i = 0; i < one.trajectory.size(); ++i) {
+    EXPECT_EQ(one.trajectory[i].pose.translation, two.trajectory[i].pose.translation) << i;
+    EXPECT_EQ(one.trajectory[i].pose.rotation.coeffs(), two.trajectory[i].pose.rotation.coeffs()) << i;
+  }
+}
+
+TEST(TrajectoryCloser, RefusesPosesThatAreNotFiniteAndTimesThatDoNotGrow) {
+  const Recording town = [] {
+    const SyntheticWorld world(testing::SmallStereoTown(320, 160));
+    return testing::Record(world, 2);
+  }();
+  TrajectoryCloser closer(Small(1), town.rig);
+  Pose bad;
+  bad.translation.x() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW(closer.Push(town.frames[0], bad), InputError);
+  EXPECT_EQ(closer.Push(town.frames[0], Pose()).state, TrackingState::kTracking);
+  EXPECT_THROW(closer.Push(town.frames[0], Pose()), InputError);
+  EXPECT_EQ(closer.Push(town.frames[1], Pose()).state, TrackingState::kTracking);
+  EXPECT_EQ(closer.Keyframes().size(), 1u);  // the odometry says that the camera stands still
+}
+
+Trajectory Straight(std::initializer_list<double> stamps) {
+  Trajectory out;
+  for (const double s : stamps) out.push_back({s, Pose(Eigen::Quaterniond::Identity(), {s, 0, 0})});
+  return out;
+}
+
+TEST(CorrectTrajectory, PosesBetweenKeyframesAreMovedByBothAndThoseOutsideByTheNearest) {
+  const Trajectory before = Straight({1, 3});
+  Trajectory after = before;
+  after[1].pose.translation = {5, 1, 0};  // twice as long, and aside
+  const Trajectory out = CorrectTrajectory(Straight({0, 1, 2, 3, 4}), before, after);
+  ASSERT_EQ(out.size(), 5u);
+  EXPECT_TRUE(out[1].pose.translation.isApprox(Eigen::Vector3d(1, 0, 0)));
+  EXPECT_TRUE(out[2].pose.translation.isApprox(Eigen::Vector3d(3, 0.5, 0)));
+  EXPECT_TRUE(out[3].pose.translation.isApprox(Eigen::Vector3d(5, 1, 0)));
+  const double stretch = std::sqrt(17.0) / 2;
+  EXPECT_TRUE(out[4].pose.translation.isApprox(Eigen::Vector3d(5 + stretch, 1, 0)));
+  EXPECT_NEAR(out[0].pose.translation.x(), 1 - stretch, 1e-12);
+  EXPECT_EQ(CorrectTrajectory(before, {}, {}).size(), 2u);
+  EXPECT_THROW(CorrectTrajectory(before, before, {}), InputError);
+}
+
+}  // namespace
+}  // namespace tutti

@@ -70,6 +70,15 @@ bool PinholeCamera::Contains(const Eigen::Vector2d& pixel, double border) const 
 
 std::string PinholeCamera::Validate() const {
   std::string problem = OutOfRange(*this, "camera.");
+  // Beyond it a pixel sees half of all directions, or none; the arithmetic ends in infinities before.
+  constexpr double kWidest = 0.01, kNarrowest = 1000;  // focal length / image size
+  const auto plausible = [](double focal, int size) {
+    return focal >= kWidest * size && focal <= kNarrowest * size;
+  };
+  if (problem.empty() && !(plausible(fx, width) && plausible(fy, height)))
+    problem =
+        "camera: the focal lengths (fx, fy) are no pixels of this image; 0.01 to 1000 times its size are "
+        "possible";
   if (problem.empty() && (cx < 0 || cx > width || cy < 0 || cy > height)) {
     problem =
         "camera: the principal point (cx, cy) lies outside the image; is the calibration of another image "

@@ -26,6 +26,11 @@ std::string OptionText::Range() const {
 std::string OptionText::Refusal(const std::string& key, double value) const {
   const bool enough = !has_least || value > least || (least_included && value == least);
   const bool too_much = has_most && !(value < most || (most_included && value == most));
+  // Squares and cubes of what is nearer to 0 or further from it leave the numbers that a double holds.
+  constexpr double kLeast = 1e-30, kMost = 1e30;
+  const bool computable = value == 0 || (std::abs(value) >= kLeast && std::abs(value) <= kMost);
+  if (std::isfinite(value) && !computable && enough && !too_much)
+    return key + " must be 0 or of 1e-30 to 1e30 in magnitude, not " + Number(value);
   if (std::isfinite(value) && enough && !too_much) return "";
   std::string wanted = Range();
   if (wanted.empty()) wanted = "a finite number";

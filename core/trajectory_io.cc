@@ -3,6 +3,7 @@
 #include <fstream>
 #include <functional>
 
+#include "core/text_input.h"
 #include "core/tum_line.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
@@ -25,9 +26,13 @@ void ForEachLine(const std::filesystem::path& file,
   std::ifstream in(file);
   if (!in) throw InputError(file.string() + ": can't be opened; check the path and that it is readable");
   std::string text;
+  internal::SkipByteOrderMark(in);
   for (std::size_t line = 1; std::getline(in, text); ++line) {
     const std::size_t comment = text.find('#');
     if (comment != std::string::npos) text.resize(comment);
+    const std::string comma = internal::DecimalComma(text);
+    if (!comma.empty())
+      Fail(file, line, "'" + internal::Excerpt(comma) + "' has a decimal comma; write decimal points");
     const std::vector<std::string> words = SplitText(text);
     if (!words.empty()) use(line, words);
   }
@@ -35,12 +40,14 @@ void ForEachLine(const std::filesystem::path& file,
 
 double Number(const std::filesystem::path& file, std::size_t line, const std::string& word) {
   const std::optional<double> value = ParseDouble(word);
-  if (!value) Fail(file, line, "'" + word + "' is not a number");
+  if (!value) Fail(file, line, "'" + internal::Excerpt(word) + "' is not a number");
   if (!std::isfinite(*value))
     Fail(file, line, "'" + word + "' is not finite; remove this pose or repair the file");
   constexpr double kLargest = 1e100;  // squares of what is beyond it overflow
   if (std::abs(*value) > kLargest)
-    Fail(file, line, "'" + word + "' is too large to compute with; remove this pose or repair the file");
+    Fail(file, line,
+         "'" + internal::Excerpt(word) +
+             "' is too large to compute with; remove this pose or repair the file");
   return *value;
 }
 
@@ -119,6 +126,10 @@ Trajectory ReadKitti(const std::filesystem::path& file, std::vector<Eigen::Matri
   return out;
 }
 
+constexpr const char* kNoNanoseconds =
+    "' is no time stamp in nanoseconds, which EuRoC's format begins with; seconds and TUM's columns with "
+    "commas are --format tum (--from tum)";
+
 Trajectory ReadEuroc(const std::filesystem::path& file, Oddities& odd) {
   Trajectory out;
   ForEachLine(file, [&](std::size_t line, const std::vector<std::string>& w) {
@@ -126,10 +137,18 @@ Trajectory ReadEuroc(const std::filesystem::path& file, Oddities& odd) {
                    "the EuRoC format has at least 8: stamp [ns], x, y, z, qw, qx, qy, qz");
     double v[8];
     for (int i = 0; i < 8; ++i) v[i] = Number(file, line, w[static_cast<std::size_t>(i)]);
+    // Seconds, in TUM's order with commas, would be read as nanoseconds and the quaternion in the wrong
+    // order.
+    if (v[0] != std::floor(v[0])) Fail(file, line, "'" + w[0] + kNoNanoseconds);
     const double stamp = v[0] * 1e-9;
     if (LeaveOut(file, line, out, stamp, odd)) return;
     out.push_back({stamp, QuaternionPose(file, line, {v[1], v[2], v[3]}, v[5], v[6], v[7], v[4], odd)});
   });
+  constexpr double kFastest_s = 1e-6;  // nothing measures a million poses a second
+  const auto gaps = static_cast<double>(out.size()) - 1;
+  if (gaps > 0 && out.back().stamp_s - out.front().stamp_s < kFastest_s * gaps)
+    throw InputError(file.string() + ": '" + std::to_string(std::llround(out.back().stamp_s * 1e9)) +
+                     kNoNanoseconds);
   return out;
 }
 
@@ -143,14 +162,23 @@ TrajectoryFormat ParseTrajectoryFormat(const std::string& name) {
 }
 
 TrajectoryFormat GuessTrajectoryFormat(const std::filesystem::path& file) {
+  std::error_code code;
+  if (std::filesystem::exists(file, code) && !std::filesystem::is_regular_file(file, code))
+    throw InputError(file.string() +
+                     ": is no file, so that its format can't be guessed; name it, or give a file");
   std::ifstream in(file);
   if (!in) throw InputError(file.string() + ": can't be opened; check the path and that it is readable");
+  internal::SkipByteOrderMark(in);
   std::string text;
   while (std::getline(in, text)) {
-    if (text.empty() || text[0] == '#') continue;
-    if (text.find(',') != std::string::npos) return TrajectoryFormat::kEuroc;
-    if (SplitText(text).size() == 12) return TrajectoryFormat::kKitti;
-    break;
+    const std::vector<std::string> words = SplitText(text);
+    if (words.empty() || words[0][0] == '#') continue;
+    const bool decimal_comma = !internal::DecimalComma(text).empty();
+    if (text.find(',') == std::string::npos || decimal_comma)
+      return words.size() == 12 && !decimal_comma ? TrajectoryFormat::kKitti : TrajectoryFormat::kTum;
+    // EuRoC's stamps are whole nanoseconds. Commas after seconds are TUM's columns.
+    const std::optional<double> stamp = ParseDouble(words[0]);
+    return stamp && *stamp != std::floor(*stamp) ? TrajectoryFormat::kTum : TrajectoryFormat::kEuroc;
   }
   return TrajectoryFormat::kTum;
 }

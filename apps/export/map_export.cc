@@ -157,7 +157,7 @@ class FolderExport {
                                          {"images", chosen_.size()},
                                          {"keyframes", model_.keyframes.size()},
                                          {"landmarks", model_.landmarks.size()}};
-    return json.dump(2) + "\n";
+    return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
   }
 
   const MapModel& model_;

@@ -40,7 +40,7 @@ std::string NerfTransforms(const MapModel& model, const std::vector<std::size_t>
     json["frames"].push_back({{"file_path", "images/" + ImageName(keyframe.frame_index)},
                               {"transform_matrix", OpenGlPose(keyframe.T_world_camera)}});
   }
-  return json.dump(2) + "\n";
+  return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace tutti

@@ -114,7 +114,12 @@ RunConfig ParseConfig(const std::string& text, const std::string& name) {
   const ConfigTable table(config);
   YAML::Node root;
   try {
-    root = YAML::Load(text);
+    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
+    if (!documents.empty()) root = documents.front();
+    if (documents.size() > 1) {
+      throw InputError(name + ": holds " + std::to_string(documents.size()) +
+                       " YAML documents (separated by ---), and only one could be used; write one");
+    }
   } catch (const YAML::Exception& e) {
     Fail(name, e.mark, "not valid YAML: " + e.msg);
   }

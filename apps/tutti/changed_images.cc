@@ -6,11 +6,13 @@
 #include <opencv2/imgcodecs.hpp>
 #include <set>
 #include <string>
+#include <system_error>
 #include <thread>
 #include <vector>
 
 #include "apps/tutti/files.h"
 #include "apps/tutti/loops/loops_input.h"
+#include "frontend/dataset/image_file.h"
 #include "tutti/core/error.h"
 
 namespace tutti::cli {
@@ -18,7 +20,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-void Prepare(const fs::path& from, const fs::path& out, bool force) {
+// `stems`: of all images in `from`, which an earlier call has written from.
+void Prepare(const fs::path& from, const fs::path& out, const std::set<std::string>& stems, bool force) {
   std::error_code error;
   if (fs::equivalent(from, out, error)) {
     throw InputError(out.string() + ": holds the images that are read; give another folder");
@@ -29,7 +32,13 @@ void Prepare(const fs::path& from, const fs::path& out, bool force) {
   if (fs::exists(out, error) && !fs::is_empty(out, error)) {
     if (!force)
       throw InputError(out.string() + ": is not empty; give another folder, or --force to write into it");
-    for (const fs::path& old : ImagesIn(out)) fs::remove(old, error);
+    const std::vector<fs::path> old = ImagesIn(out);
+    for (const fs::path& image : old) {
+      if (stems.count(image.stem().string()) > 0) continue;
+      throw InputError(image.string() + ": was not made from an image in " + from.string() +
+                       ", so --force leaves it alone; move it, or give another folder");
+    }
+    for (const fs::path& image : old) fs::remove(image, error);
   }
   MakeFolder(out);
 }
@@ -49,6 +58,7 @@ class Writer {
   Writer(const ImageChange& change, const ChangedImagesOptions& options)
       : change_(change), options_(options) {
     const std::vector<fs::path> all = ListImages(options.from);
+    for (const fs::path& image : all) all_stems_.insert(image.stem().string());
     for (std::size_t i = 0; i < all.size(); i += static_cast<std::size_t>(options.stride))
       images_.push_back(all[i]);
     std::set<std::string> stems;
@@ -62,9 +72,12 @@ class Writer {
   }
 
   ChangedImages Run() {
-    Prepare(options_.from, options_.out, options_.force);
+    Prepare(options_.from, options_.out, all_stems_, options_.force);
     std::vector<std::thread> threads;
-    for (int k = 1; k < options_.threads; ++k) threads.emplace_back([this] { Work(); });
+    try {
+      for (int k = 1; k < options_.threads; ++k) threads.emplace_back([this] { Work(); });
+    } catch (const std::system_error&) {  // the system has no more: those that are there do all
+    }
     Work();
     for (std::thread& thread : threads) thread.join();
     if (failure_) std::rethrow_exception(failure_);
@@ -103,13 +116,9 @@ class Writer {
       if (error) throw InputError(from.string() + ": can't be copied (" + error.message() + ")");
       return;
     }
-    cv::Mat image;
-    try {
-      image = cv::imread(from.string(), cv::IMREAD_ANYCOLOR);
-    } catch (const cv::Exception&) {
-      image.release();
-    }
-    if (image.empty()) throw InputError(from.string() + ": is no image that can be read, or is damaged");
+    const ImageFile read = ReadImageFile(from, cv::IMREAD_ANYCOLOR);
+    if (!read.error.empty()) throw InputError(read.error);
+    const cv::Mat& image = read.image;
     const fs::path to = options_.out / (from.stem().string() + ".png");
     bool good = false;
     const cv::Mat changed = change_.Apply(GreyIfColourless(image), options_.seed, static_cast<int>(i));
@@ -125,7 +134,8 @@ class Writer {
   const ImageChange& change_;
   const ChangedImagesOptions& options_;
   std::vector<fs::path> images_;
-  std::mutex mutex_;  // of what follows
+  std::set<std::string> all_stems_;  // with those that the stride leaves out
+  std::mutex mutex_;                 // of what follows
   std::size_t next_ = 0, done_ = 0;
   bool stop_ = false;
   std::exception_ptr failure_;

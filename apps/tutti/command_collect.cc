@@ -63,7 +63,7 @@ void RunCollect(const CollectArguments& arguments) {
     if (!ReportsAvailable()) throw InputError("--report: " + ReportsMissing());
     WriteComparisonReport(arguments.report, "tutti collect", comparison);
   }
-  if (!arguments.json.empty()) WriteText(arguments.json, ComparisonJson(comparison).dump(2) + "\n");
+  if (!arguments.json.empty()) WriteText(arguments.json, JsonText(ComparisonJson(comparison)));
 }
 
 }  // namespace

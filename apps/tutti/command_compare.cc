@@ -208,7 +208,7 @@ void WriteComparison(OutputFolder& folder, const Comparison& comparison) {
                   WriteText(file, DescribeComparison(comparison, TableFormat::kMarkdown));
                 }});
   folder.Write({"comparison.json",
-                [&](const fs::path& file) { WriteText(file, ComparisonJson(comparison).dump(2) + "\n"); }});
+                [&](const fs::path& file) { WriteText(file, JsonText(ComparisonJson(comparison))); }});
   if (ReportsAvailable()) {
     folder.Write({"report.html", [&](const fs::path& file) {
                     WriteComparisonReport(file, "tutti compare: " + comparison.runs.front().dataset,

@@ -82,7 +82,7 @@ int CompareLoops(const CompareArguments& arguments) {
   if (tables.size() < static_cast<std::size_t>(kLeastPairs)) {
     std::printf("p is given from %d sets on: with fewer, one lucky set decides\n", kLeastPairs);
   }
-  if (!arguments.out.empty()) WriteText(arguments.out, tests.dump(2) + "\n");
+  if (!arguments.out.empty()) WriteText(arguments.out, JsonText(tests));
   return 0;
 }
 

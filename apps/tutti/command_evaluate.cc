@@ -24,7 +24,7 @@ void RunEvaluate(const EvaluateArguments& arguments) {
                                                  : CompareEvaluations(estimates, format);
   std::fputs(text.c_str(), stdout);
   if (!arguments.json.empty())
-    WriteText(arguments.json, EvaluationJson(arguments.input.reference, estimates).dump(2) + "\n");
+    WriteText(arguments.json, JsonText(EvaluationJson(arguments.input.reference, estimates)));
   if (!arguments.errors.empty()) WriteText(arguments.errors, ErrorsCsv(estimates));
 }
 

@@ -1,7 +1,6 @@
 // tutti optimize: a g2o file in, its optimum out.
 #include <algorithm>
 #include <cstdio>
-#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -11,6 +10,7 @@
 #include "apps/run/graph_json.h"
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
+#include "apps/tutti/files.h"
 #include "tutti/backend/certificate.h"
 #include "tutti/backend/g2o_io.h"
 #include "tutti/backend/pose_graph_optimizer.h"
@@ -146,11 +146,7 @@ void Print(const Certificate& certificate) {
 void WriteJson(const OptimizeArguments& arguments, const G2oFile& file, const PoseGraphReport& report,
                const std::optional<Certificate>& certificate) {
   if (arguments.json.empty()) return;
-  std::ofstream out(arguments.json);
-  out << ToJson(arguments, file, report, certificate).dump(2) << '\n';
-  out.flush();
-  if (!out)
-    throw InputError(arguments.json + ": can't be written; check that the folder exists and is writable");
+  WriteText(arguments.json, JsonText(ToJson(arguments, file, report, certificate)));
 }
 
 void RunOptimize(OptimizeArguments arguments) {

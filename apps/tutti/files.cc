@@ -13,6 +13,10 @@ void MakeFolder(const std::filesystem::path& folder) {
   if (error) throw InputError(folder.string() + ": can't be made (" + error.message() + ")");
 }
 
+std::string JsonText(const nlohmann::ordered_json& json) {
+  return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+}
+
 void WriteText(const std::filesystem::path& file, const std::string& text) {
   std::ofstream out(file, std::ios::binary);
   out << text;

@@ -6,6 +6,8 @@
 #include <vector>
 
 #include "apps/tutti/describe.h"
+#include "apps/tutti/exhausted.h"
+#include "apps/tutti/number_checks.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 #include "tutti/slam/version.h"
@@ -79,6 +81,7 @@ int RunProgram(int argc, char** argv, const std::map<std::string, SetUp>& own, i
     CLI::App* command = app.add_subcommand(entry.name, entry.sentence);
     if (add != own.end()) {
       add->second(*command, exit_code);
+      RefuseAbsurdNumbers(*command);
       AddDescribeFlag(*command);
       continue;
     }
@@ -96,6 +99,11 @@ int RunProgram(int argc, char** argv, const std::map<std::string, SetUp>& own, i
     std::fprintf(stderr, "tutti: %s\n", e.what());
     return 1;
   } catch (const std::exception& e) {
+    const std::string exhausted = WhatRanOut(e);
+    if (!exhausted.empty()) {
+      std::fprintf(stderr, "tutti: %s\n", exhausted.c_str());
+      return 1;
+    }
     std::fprintf(stderr, "tutti: internal error: %s; please report it with the command line\n", e.what());
     return 2;
   }

@@ -7,18 +7,20 @@
 #include <thread>
 
 #include "apps/view/live_access.h"
+#include "apps/view/live_connections.h"
 #include "apps/view/live_message.h"
 #include "apps/view/live_page.h"
+#include "apps/view/live_stream.h"
+#include "apps/view/live_threads.h"
 #include "tutti/core/error.h"
 
 namespace tutti::view {
 namespace {
 
-constexpr int kMostViewers = 4;  // each keeps a thread
-constexpr int kThreads = kMostViewers + 4;
+constexpr int kMostViewers = 4;
 constexpr double kNewsEvery_s = 0.1;  // at most ten messages a second to each
-constexpr int kWriteTimeout_s = 5;    // a browser that takes nothing for so long is gone
 constexpr double kHeartbeat_s = 1;    // a comment, so that a dead one is noticed
+constexpr double kGoodbye_s = 1;      // for viewers to take the last message, once the run is over
 
 // One viewer's stream.
 class Viewer {
@@ -59,16 +61,49 @@ class Viewer {
   LiveCursor cursor_;
 };
 
+// httplib's server, with bounds on what a client may send and hold open.
+class BoundedServer : public httplib::Server {
+ public:
+  explicit BoundedServer(LiveConnections& connections) : connections_(connections) {
+    new_task_queue = [&connections] { return new LiveThreads(connections); };  // httplib deletes it
+  }
+
+ private:
+  // In place of httplib's own, which reads headers of any size for as long as they come.
+  bool process_and_close_socket(socket_t socket) override {
+    bool served = false;
+    try {
+      served = connections_.Open(socket) && Serve(socket);
+    } catch (const std::exception&) {  // no memory for an answer: the run goes on without it
+    }
+    connections_.Leave(socket);
+    shutdown(socket, SHUT_RDWR);
+    close(socket);
+    return served;
+  }
+
+  bool Serve(int socket) {
+    LiveStream stream(socket);
+    bool closed = false;
+    return process_request(stream, true, closed, [this, socket](httplib::Request& request) {
+      connections_.Asked(socket);
+      // No request has a body, and nothing is served in parts: neither is read, unpacked or answered.
+      request.ranges.clear();
+      for (const char* name : {"Content-Length", "Content-Encoding", "Content-Type", "Transfer-Encoding"})
+        request.headers.erase(name);
+      request.headers.emplace("Content-Length", "0");
+    });
+  }
+
+  LiveConnections& connections_;
+};
+
 }  // namespace
 
 class LiveServer::Impl {
  public:
   Impl(const LiveViewOptions& options, LiveState& state) : options_(options), state_(state) {
     if (!IsLoopback(options.address)) token_ = RandomToken();
-    server_.new_task_queue = [] { return new httplib::ThreadPool(kThreads); };  // httplib deletes it
-    server_.set_write_timeout(kWriteTimeout_s);
-    server_.set_keep_alive_max_count(1);
-    server_.set_payload_max_length(1024);
     server_.set_pre_routing_handler([this](const httplib::Request& request, httplib::Response& response) {
       Harden(response);
       if (Allowed(request)) return httplib::Server::HandlerResponse::Unhandled;
@@ -88,6 +123,7 @@ class LiveServer::Impl {
 
   ~Impl() {
     state_.Close();
+    connections_.Close(kGoodbye_s);
     server_.stop();
     if (thread_.joinable()) thread_.join();
   }
@@ -111,7 +147,10 @@ class LiveServer::Impl {
           "; is it in use, or the address of another machine? --view-port 0 takes any free port");
     }
     thread_ = std::thread([this] {
-      server_.listen_after_bind();
+      try {
+        server_.listen_after_bind();
+      } catch (const std::exception&) {  // no memory: the run goes on without a view
+      }
       over_ = true;
     });
     // httplib's stop() does nothing before the loop runs: a run that fails at once would wait for it for
@@ -171,7 +210,8 @@ class LiveServer::Impl {
   LiveState& state_;
   std::string token_;
   std::atomic<int> viewers_{0};
-  httplib::Server server_;
+  LiveConnections connections_;
+  BoundedServer server_{connections_};
   int port_ = 0;
   std::atomic<bool> over_{false};  // no longer listens
   std::thread thread_;

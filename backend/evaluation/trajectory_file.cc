@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <fstream>
 
+#include "core/text_input.h"
 #include "tutti/backend/g2o_io.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
@@ -25,6 +26,7 @@ TrajectoryFormat CoreFormat(PoseFileFormat format) {
 /// The first word that carries data; empty if there is none.
 std::string FirstWord(const std::filesystem::path& file) {
   std::ifstream in(file);
+  internal::SkipByteOrderMark(in);
   std::string text;
   while (std::getline(in, text)) {
     const std::vector<std::string> words = SplitText(text);

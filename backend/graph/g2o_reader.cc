@@ -7,6 +7,7 @@
 
 #include "backend/graph/bad_information.h"
 #include "backend/graph/graph_structure.h"
+#include "core/text_input.h"
 #include "tutti/backend/g2o_io.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
@@ -41,6 +42,7 @@ class Reader {
       throw InputError(file_.string() + ": is a folder; give a g2o file");
     std::ifstream in(file_);
     if (!in) throw InputError(file_.string() + ": can't be opened; check the path and that it is readable");
+    internal::SkipByteOrderMark(in);
     std::string text;
     for (line_ = 1; std::getline(in, text); ++line_) {
       const std::size_t comment = text.find('#');
@@ -93,14 +95,18 @@ class Reader {
   int Id(std::size_t word) const {
     const std::optional<long long> value = ParseInteger(words_[word]);
     if (!value || *value < -2000000000LL || *value > 2000000000LL) {
-      Fail(line_, "'" + words_[word] + "' is not a node id (a whole number)");
+      Fail(line_, "'" + internal::Excerpt(words_[word]) + "' is not a node id (a whole number)");
     }
     return static_cast<int>(*value);
   }
 
   double Number(std::size_t word) const {
     const std::optional<double> value = ParseDouble(words_[word]);
-    if (!value) Fail(line_, "'" + words_[word] + "' is not a number");
+    const std::string& text = words_[word];
+    if (!value && text.find(',') != std::string::npos)
+      Fail(line_,
+           "'" + internal::Excerpt(text) + "' has a comma; write decimal points, and blanks between numbers");
+    if (!value) Fail(line_, "'" + internal::Excerpt(text) + "' is not a number");
     if (!std::isfinite(*value))
       Fail(line_, "'" + words_[word] + "' is not finite; remove or repair this line");
     return *value;
@@ -210,7 +216,8 @@ class Reader {
   G2oFile Build() {
     if (edges_.empty()) {
       std::string hint;
-      if (!unknown_.empty()) hint = " (tutti does not know '" + unknown_.begin()->first + "')";
+      if (!unknown_.empty())
+        hint = " (tutti does not know '" + internal::Excerpt(unknown_.begin()->first) + "')";
       throw InputError(file_.string() + ": holds no edge of a pose graph" + hint + "; is it a g2o file?");
     }
     RefuseBad();
@@ -238,9 +245,9 @@ class Reader {
 
   void Warn(G2oFile& out, std::size_t linked, std::size_t missing) const {
     for (const auto& [tag, where] : unknown_) {
-      out.warnings.push_back(file_.string() + ":" + std::to_string(where.second) + ": unknown tag '" + tag +
-                             "', " + std::to_string(where.first) + (where.first == 1 ? " line" : " lines") +
-                             " ignored");
+      out.warnings.push_back(file_.string() + ":" + std::to_string(where.second) + ": unknown tag '" +
+                             internal::Excerpt(tag) + "', " + std::to_string(where.first) +
+                             (where.first == 1 ? " line" : " lines") + " ignored");
     }
     if (bad_lines_ > 0) out.warnings.push_back(WhatWasDone(out.skipped));
     if (missing > 0 && !nodes_.empty()) {

@@ -3,6 +3,7 @@
 
 #include <ceres/ceres.h>
 
+#include <algorithm>
 #include <cmath>
 #include <deque>
 #include <memory>
@@ -85,7 +86,8 @@ class CeresSolver final : public GraphSolver<N> {
     SolveSummary out;
     out.usable = summary.IsSolutionUsable();
     out.converged = summary.termination_type == ceres::CONVERGENCE;
-    out.iterations = summary.num_successful_steps + summary.num_unsuccessful_steps;
+    // -1 each where nothing is free to move.
+    out.iterations = std::max(0, summary.num_successful_steps + summary.num_unsuccessful_steps);
     if (!summary.iterations.empty()) out.trust_region = summary.iterations.back().trust_region_radius;
     out.message = "Ceres: " + summary.message;
     return out;

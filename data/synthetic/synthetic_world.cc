@@ -20,10 +20,16 @@ std::string SyntheticOptions::Validate() const {
   if (size_given && (width < 32 || height < 32 || width > 8192 || height > 8192)) {
     return "width and height must both be given, 32 to 8192 pixels";
   }
-  if (!(focal_px >= 0) || !(baseline_m >= 0) || !(rate_hz >= 0) || !(max_depth_m >= 0) || !(speed_mps >= 0)) {
-    return "focal_px, baseline_m, rate_hz, max_depth_m and speed_mps must not be negative";
-  }
-  if (!(depth_units_per_m > 0)) return "depth_units_per_m must be greater than 0";
+  if (!(focal_px == 0 || (focal_px >= 1 && focal_px <= 1e5)))
+    return "focal_px must be 1 to 100000 pixels, or 0";
+  if (!(baseline_m >= 0 && baseline_m <= 100)) return "baseline_m must be 0 to 100 m";
+  if (!(rate_hz == 0 || (rate_hz >= 0.001 && rate_hz <= 10000)))
+    return "rate_hz must be 0.001 to 10000 Hz, or 0";
+  if (!(speed_mps == 0 || (speed_mps >= 0.001 && speed_mps <= 100)))
+    return "speed_mps must be 0.001 to 100 m/s, or 0";
+  if (!(max_depth_m >= 0 && max_depth_m <= 10000)) return "max_depth_m must be 0 to 10000 m";
+  if (!(depth_units_per_m >= 0.001 && depth_units_per_m <= 1e6))
+    return "depth_units_per_m must be 0.001 to 1000000";
   if (!(laps > 0 && laps <= 10000)) return "laps must be greater than 0 and at most 10000";
   if (frames < 0) return "frames must not be negative; 0 means all";
   if (blocks_x < 1 || blocks_y < 1 || blocks_x > 12 || blocks_y > 12)

@@ -7,8 +7,10 @@
 #include <fstream>
 #include <mutex>
 #include <opencv2/imgcodecs.hpp>
+#include <regex>
 #include <sstream>
 #include <string>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -59,6 +61,51 @@ void WriteText(const fs::path& file, const std::string& text) {
     throw InputError(file.string() + ": can't be written; is the folder writable and the disk not full?");
 }
 
+constexpr const char* kImageFolders[] = {"image_0", "image_1", "images", "rgb", "depth"};
+constexpr const char* kWritten = "# Written by `tutti generate`";
+
+// As NumberName and StampName make it.
+bool IsOwnName(const std::string& name) {
+  static const std::regex kOwn("[0-9]{6,}\\.png|[0-9]+\\.[0-9]{6}\\.png");
+  return std::regex_match(name, kOwn);
+}
+
+// True unless the folder holds another one's recording, whose files may have the same names.
+bool IsOwnFolder(const fs::path& folder) {
+  std::error_code code;
+  bool recording = false;
+  for (const char* part : {"image_0", "image_1", "rgb", "depth"})
+    recording = recording || fs::exists(folder / part, code);
+  if (!recording) return true;
+  std::ifstream in(folder / "config.yaml");
+  std::string first;
+  std::getline(in, first);
+  return first.rfind(kWritten, 0) == 0;
+}
+
+// Old frames would mix with the new ones. Nothing is removed if something must stay.
+void RemoveOwn(const fs::path& folder) {
+  if (!IsOwnFolder(folder))
+    throw InputError(folder.string() +
+                     ": holds a recording that tutti generate did not write (its config.yaml "
+                     "would say so), which --force leaves alone; give another folder");
+  std::error_code code;
+  std::vector<fs::path> stale;
+  for (const char* part : kImageFolders) {
+    for (fs::directory_iterator it(folder / part, code), end; !code && it != end; it.increment(code)) {
+      if (!IsOwnName(it->path().filename().string()))
+        throw InputError(it->path().string() +
+                         ": is none of tutti generate's files, so --force leaves it alone; "
+                         "move it, or give another folder");
+      stale.push_back(it->path());
+    }
+  }
+  for (const fs::path& file : stale) fs::remove(file, code);
+  for (const char* part : kImageFolders) fs::remove(folder / part, code);
+  for (const char* list : {"times.txt", "calib.txt", "poses.txt", "rgb.txt", "depth.txt", "groundtruth.txt"})
+    fs::remove(folder / list, code);
+}
+
 void PrepareFolder(const fs::path& folder, const std::vector<std::string>& parts, bool force) {
   std::error_code code;
   if (fs::exists(folder, code) && !fs::is_directory(folder, code)) {
@@ -67,19 +114,7 @@ void PrepareFolder(const fs::path& folder, const std::vector<std::string>& parts
   if (fs::exists(folder, code) && !fs::is_empty(folder, code)) {
     if (!force)
       throw InputError(folder.string() + ": is not empty; give another folder, or --force to write into it");
-    for (const char* old :
-         {"image_0", "image_1", "images", "rgb", "depth"}) {  // or old frames would mix with the new ones
-      std::vector<fs::path> stale;
-      for (fs::directory_iterator it(folder / old, code), end; !code && it != end; it.increment(code)) {
-        if (it->path().extension() == ".png") stale.push_back(it->path());
-      }
-      for (const fs::path& file : stale) fs::remove(file, code);
-      fs::remove(folder / old, code);  // only if it is empty now
-    }
-    for (const char* old :
-         {"times.txt", "calib.txt", "poses.txt", "rgb.txt", "depth.txt", "groundtruth.txt"}) {
-      fs::remove(folder / old, code);
-    }
+    RemoveOwn(folder);
   }
   for (const std::string& part : parts) {
     fs::create_directories(folder / part, code);
@@ -101,7 +136,7 @@ std::string ConfigText(const SyntheticWorld& world) {
   std::ostringstream out;
   out.precision(10);
   const bool rgbd = o.sensor == SyntheticSensor::kRgbd, stereo = o.sensor == SyntheticSensor::kStereo;
-  out << "# Written by `tutti generate`: synthetic " << SceneName(o.scene) << ", seed " << o.seed
+  out << kWritten << ": synthetic " << SceneName(o.scene) << ", seed " << o.seed
       << ".\n# tutti run --config THIS_FILE --dataset THIS_FOLDER --out DIR\n"
       << "dataset:\n  type: " << (rgbd ? "tum" : "kitti") << "  # layout on disk\n"
       << "  sensor: "
@@ -153,7 +188,10 @@ class Writer {
     }
     if (sensor_ != SyntheticSensor::kSides) WriteText(folder_ / "config.yaml", ConfigText(world_));
     std::vector<std::thread> threads;
-    for (int k = 1; k < std::max(1, options_.threads); ++k) threads.emplace_back([this] { Work(); });
+    try {
+      for (int k = 1; k < std::max(1, options_.threads); ++k) threads.emplace_back([this] { Work(); });
+    } catch (const std::system_error&) {  // the system has no more: those that are there do all
+    }
     Work();
     for (std::thread& thread : threads) thread.join();
     if (failure_) std::rethrow_exception(failure_);

@@ -5,6 +5,7 @@
 #include <fstream>
 #include <opencv2/imgproc.hpp>
 
+#include "core/text_input.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 
@@ -20,18 +21,20 @@ std::string At(const std::filesystem::path& file, std::size_t line) {
 }
 
 std::vector<TextLine> ReadTextLines(const std::filesystem::path& file) {
-  std::error_code code;
-  std::ifstream in(file);
-  if (!in || std::filesystem::is_directory(file, code)) {
+  std::error_code code;  // a pipe would be waited for without end
+  std::ifstream in;
+  if (std::filesystem::is_regular_file(file, code)) in.open(file);
+  if (!in.is_open()) {
     throw InputError(file.string() + ": can't be opened; check that it is a readable file");
   }
+  internal::SkipByteOrderMark(in);
   std::vector<TextLine> lines;
   std::string text;
   for (std::size_t number = 1; std::getline(in, text); ++number) {
     const std::size_t comment = text.find('#');
     if (comment != std::string::npos) text.resize(comment);
     std::vector<std::string> words = SplitText(text);
-    if (!words.empty()) lines.push_back({number, std::move(words)});
+    if (!words.empty()) lines.push_back({number, std::move(words), text});
   }
   return lines;
 }
@@ -42,8 +45,13 @@ double NumberAt(const std::filesystem::path& file, const TextLine& line, std::si
                      " columns; at least " + std::to_string(word + 1) + " are needed");
   }
   const std::optional<double> value = ParseDouble(line.words[word]);
+  const std::string comma = internal::DecimalComma(line.text);
+  if (!comma.empty()) {
+    throw InputError(At(file, line.number) + "'" + internal::Excerpt(comma) +
+                     "' has a decimal comma; write decimal points");
+  }
   if (!value || !std::isfinite(*value)) {
-    throw InputError(At(file, line.number) + "'" + line.words[word] +
+    throw InputError(At(file, line.number) + "'" + internal::Excerpt(line.words[word]) +
                      "' is not a finite number; repair or remove the line");
   }
   return *value;
@@ -246,6 +254,12 @@ std::optional<std::filesystem::path> FolderDataset::GroundTruthFile() const {
   std::error_code code;
   for (const std::filesystem::path& file : contents_.truth_places) {
     if (std::filesystem::is_regular_file(file, code)) return file;
+    // A folder, or a link that leads nowhere: the run is not to end without its figures and without a word.
+    if (std::filesystem::exists(std::filesystem::symlink_status(file, code))) {
+      throw InputError(file.string() +
+                       ": should be the ground truth, but is no readable file; repair or remove it, or give "
+                       "--ground-truth FILE or none");
+    }
   }
   return std::nullopt;
 }

@@ -81,8 +81,9 @@ class FolderDataset : public Dataset {
 struct TextLine {
   std::size_t number = 0;
   std::vector<std::string> words;
+  std::string text;  ///< the line as it is, without the comment
 };
-/// All lines that carry data. Throws InputError if the file can't be opened.
+/// All lines that carry data. Throws InputError if the file can't be opened, or is none (a folder, a pipe).
 std::vector<TextLine> ReadTextLines(const std::filesystem::path& file);
 /// "file:line: ".
 std::string At(const std::filesystem::path& file, std::size_t line);

@@ -15,18 +15,31 @@ struct StampedFile {
   std::filesystem::path file;
 };
 
+// What follows the stamp. It may have blanks and commas if such a file is there. Empty: no name.
+std::string NameIn(const TextLine& line, const std::filesystem::path& folder) {
+  if (line.words.size() < 2) return {};
+  if (line.words.size() == 2) return line.words[1];
+  constexpr const char* kBlank = " \t\r,";
+  const std::size_t stamp = line.text.find(line.words[0]) + line.words[0].size();
+  const std::size_t begin = line.text.find_first_not_of(kBlank, stamp);
+  std::string name = line.text.substr(begin, line.text.find_last_not_of(kBlank) + 1 - begin);
+  std::error_code code;
+  return std::filesystem::exists(folder / name, code) ? name : std::string();
+}
+
 std::vector<StampedFile> ReadList(const std::filesystem::path& folder, const char* name,
                                   std::vector<std::string>& warnings) {
   const std::filesystem::path list = folder / name;
   std::vector<StampedFile> files;
   StampOrder order(list, warnings);
   for (const TextLine& line : ReadTextLines(list)) {
-    if (line.words.size() != 2) {
+    const std::string name_in_list = NameIn(line, folder);
+    if (name_in_list.empty()) {
       throw InputError(At(list, line.number) + "has " + std::to_string(line.words.size()) +
                        " columns; 2 are needed: time stamp [s] and file name");
     }
     const double stamp = NumberAt(list, line, 0);
-    if (order.Accept(line.number, stamp)) files.push_back({stamp, folder / line.words[1]});
+    if (order.Accept(line.number, stamp)) files.push_back({stamp, folder / name_in_list});
   }
   if (files.empty())
     throw InputError(list.string() + ": lists no images; each line needs a time stamp and a file name");

@@ -10,6 +10,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "frontend/dataset/image_size.h"
 #include "tutti/core/text.h"
 
 namespace tutti {
@@ -58,9 +59,19 @@ bool JpegIsComplete(const Bytes& b) {
   return false;
 }
 
+// A few bytes may claim any size.
+std::string TooLarge(const Bytes& b) {
+  const std::optional<ClaimedSize> size = SizeInHeader(b);
+  if (!size || size->width == 0 || size->height <= kMostImagePixels / size->width) return {};
+  return "says that it has " + std::to_string(size->width) + " x " + std::to_string(size->height) +
+         " pixels; at most " + std::to_string(kMostImagePixels / 1000000) + " million are read";
+}
+
 // What is wrong with the bytes of an image file; empty if nothing is seen from outside.
 std::string Damage(const Bytes& b) {
   if (b.empty()) return "is empty (0 bytes)";
+  const std::string too_large = TooLarge(b);
+  if (!too_large.empty()) return too_large;
   const auto starts = [&](const char* magic, std::size_t size, std::size_t at = 0) {
     return b.size() >= at + size && std::memcmp(b.data() + at, magic, size) == 0;
   };
@@ -80,14 +91,22 @@ std::string Damage(const Bytes& b) {
 ImageFile Decode(const std::filesystem::path& file, int flags) {
   ImageFile out;
   std::error_code code;
-  if (!std::filesystem::exists(file, code)) {
+  const std::filesystem::file_status status = std::filesystem::status(file, code);
+  if (status.type() == std::filesystem::file_type::not_found) {
     out.error = file.string() + ": is missing";
     return out;
   }
-  std::ifstream in(file, std::ios::binary | std::ios::ate);
-  const std::streamoff size = in ? std::streamoff(in.tellg()) : -1;
-  if (size < 0 || std::filesystem::is_directory(file, code)) {
+  // Nothing else is opened: one waits at a pipe without end.
+  std::ifstream in;
+  if (std::filesystem::is_regular_file(status)) in.open(file, std::ios::binary | std::ios::ate);
+  const std::streamoff size = in.is_open() ? std::streamoff(in.tellg()) : -1;
+  if (size < 0) {
     out.error = file.string() + ": can't be read; check that it is a readable file";
+    return out;
+  }
+  if (size > kMostImageBytes) {
+    out.error = file.string() + ": is too large for an image (" + std::to_string(size / 1000000) +
+                " MB; at most " + std::to_string(kMostImageBytes / 1000000) + " are read)";
     return out;
   }
   Bytes bytes(static_cast<std::size_t>(size));
@@ -128,6 +147,7 @@ ImageFile ReadPixels(const std::filesystem::path& file, int colour) {
 
 ImageFile ReadGreyFile(const std::filesystem::path& file) { return ReadPixels(file, cv::IMREAD_GRAYSCALE); }
 ImageFile ReadColourFile(const std::filesystem::path& file) { return ReadPixels(file, cv::IMREAD_COLOR); }
+ImageFile ReadImageFile(const std::filesystem::path& file, int flags) { return Decode(file, flags); }
 
 ImageFile ReadDepthFile(const std::filesystem::path& file) {
   ImageFile out = Decode(file, cv::IMREAD_UNCHANGED);

@@ -1,11 +1,13 @@
 // Reads image files without trusting them.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <opencv2/core.hpp>
 #include <string>
 #include <vector>
 
+#pragma GCC visibility push(default)  // of the commands, too
 namespace tutti {
 
 /// An image, or what is wrong with the file (`error` is empty if there is an image).
@@ -14,11 +16,18 @@ struct ImageFile {
   std::string error;
 };
 
+/// More is no image of a camera; memory and time to read one have a bound: 16-bit colour needs 6 bytes a
+/// pixel.
+constexpr std::uint64_t kMostImagePixels = 1ULL << 27;  // 134 million, 11585 x 11585
+constexpr std::int64_t kMostImageBytes = 1000000000;    // of the file
+
 /// Reads an image in grey, 8 or 16 bit as stored. Decoders fill the missing part of a truncated JPEG, PNG or
 /// WebP with grey without a word, so the ends of these are checked first. Never throws; thread-safe.
 ImageFile ReadGreyFile(const std::filesystem::path& file);
 /// The same in colour, 3 channels, blue first.
 ImageFile ReadColourFile(const std::filesystem::path& file);
+/// The same as cv::imread with these flags gives it.
+ImageFile ReadImageFile(const std::filesystem::path& file, int flags);
 /// Reads a depth image as stored: one channel of 16 bit or float.
 ImageFile ReadDepthFile(const std::filesystem::path& file);
 
@@ -41,3 +50,4 @@ bool HasImageExtension(const std::filesystem::path& file);
 std::vector<std::filesystem::path> ListImages(const std::filesystem::path& folder);
 
 }  // namespace tutti
+#pragma GCC visibility pop

@@ -21,6 +21,7 @@
 #include "apps/tutti/loops/loops_pictures.h"
 #include "apps/tutti/loops/loops_table.h"
 #include "core/stopwatch.h"
+#include "frontend/dataset/image_file.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 #include "tutti/loopclosure/detector.h"
@@ -69,7 +70,7 @@ LoopRow Process(const std::filesystem::path& file, const std::filesystem::path& 
   LoopQuery query;
   query.id = number;
   query.stamp_s = static_cast<double>(number);
-  query.image = right.empty() ? cv::imread(file.string(), cv::IMREAD_UNCHANGED)
+  query.image = right.empty() ? ReadImageFile(file, cv::IMREAD_UNCHANGED).image
                               : ReadJoined(file, right, &query.cameras);
   row.read = !query.image.empty();
   if (row.read && camera) {
@@ -216,7 +217,9 @@ void SetUpLoops(CLI::App& command, int& exit_code) {
       ->required();
   command.add_option("--out", arguments->out, "folder for results.json, hypotheses.csv, curves and pictures")
       ->required();
-  command.add_option("--stride", arguments->truth.stride, "every n-th image")->capture_default_str();
+  command.add_option("--stride", arguments->truth.stride, "every n-th image")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
   command.add_flag("--join-pairs", arguments->truth.join_pairs,
                    "two images in a row, left and right, make one image (City Centre, New College)");
   command.add_flag("--keep-posterior", arguments->options.keep_posterior,

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <opencv2/imgcodecs.hpp>
 
+#include "frontend/dataset/image_file.h"
 #include "tutti/core/error.h"
 
 namespace tutti::cli {
@@ -25,8 +26,8 @@ std::vector<std::filesystem::path> TakeRightImages(const std::string& folder,
 
 cv::Mat ReadJoined(const std::filesystem::path& left, const std::filesystem::path& right,
                    std::vector<cv::Rect>* cameras) {
-  const cv::Mat a = cv::imread(left.string(), cv::IMREAD_UNCHANGED);
-  const cv::Mat b = cv::imread(right.string(), cv::IMREAD_UNCHANGED);
+  const cv::Mat a = ReadImageFile(left, cv::IMREAD_UNCHANGED).image;
+  const cv::Mat b = ReadImageFile(right, cv::IMREAD_UNCHANGED).image;
   if (a.empty() || b.empty() || a.type() != b.type()) return {};
   cv::Mat joined = cv::Mat::zeros(std::max(a.rows, b.rows), a.cols + b.cols, a.type());
   const cv::Rect in_left(0, 0, a.cols, a.rows), in_right(a.cols, 0, b.cols, b.rows);

@@ -9,6 +9,7 @@
 
 #include "apps/plot/plot_picture.h"
 #include "apps/tutti/loops/loops_pictures.h"
+#include "frontend/dataset/image_file.h"
 #include "tutti/loopclosure/features.h"
 
 namespace tutti::cli {
@@ -64,7 +65,7 @@ cv::Mat Thumb(const LoopRun& run, long image, const char* absent) {
   cv::Mat read;
   if (image >= 0 && image < static_cast<long>(run.rows.size())) {
     const std::string& name = run.rows[static_cast<std::size_t>(image)].file;
-    read = cv::imread((std::filesystem::path(run.images) / name).string(), cv::IMREAD_UNCHANGED);
+    read = ReadImageFile(std::filesystem::path(run.images) / name, cv::IMREAD_UNCHANGED).image;
     absent = "the image can't be read";
   }
   if (read.empty()) {

@@ -1,8 +1,6 @@
 #include "apps/tutti/loops/loops_input.h"
 
 #include <algorithm>
-#include <array>
-#include <cctype>
 #include <cmath>
 #include <fstream>
 #include <optional>
@@ -12,6 +10,8 @@
 #include "apps/tutti/loops/joined_pairs.h"
 #include "apps/tutti/loops/mat_file.h"
 #include "core/median.h"
+#include "core/text_input.h"
+#include "frontend/dataset/image_file.h"
 #include "tutti/backend/evaluation.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
@@ -22,19 +22,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool IsImage(const fs::path& path) {
-  static const std::array<const char*, 12> kTypes = {".png",  ".jpg", ".jpeg", ".bmp", ".webp", ".tif",
-                                                     ".tiff", ".pgm", ".ppm",  ".jp2", ".pnm",  ".exr"};
-  std::string type = path.extension().string();
-  std::transform(type.begin(), type.end(), type.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return std::find(kTypes.begin(), kTypes.end(), type) != kTypes.end();
-}
-
 // A trajectory has lines of 8 numbers (TUM) or 12 (KITTI), or commas and a header (EuRoC). A text matrix that
 // has just as many columns has as many rows, too.
 bool LooksLikeTrajectory(const fs::path& file) {
   std::ifstream in(file);
+  internal::SkipByteOrderMark(in);
   std::string line;
   std::size_t columns = 0;
   std::size_t rows = 0;
@@ -153,15 +145,9 @@ std::vector<fs::path> ListImages(const fs::path& folder) {
 
 std::vector<fs::path> ImagesIn(const fs::path& folder) {
   std::error_code error;
-  std::vector<fs::path> images;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
-    if (entry.is_regular_file() && IsImage(entry.path())) images.push_back(entry.path());
-  }
+  const fs::directory_iterator readable(folder, error);
   if (error) throw InputError(folder.string() + ": can't be read (" + error.message() + ")");
-  std::sort(images.begin(), images.end(), [](const fs::path& a, const fs::path& b) {
-    return NaturalLess(a.filename().string(), b.filename().string());
-  });
-  return images;
+  return tutti::ListImages(folder);
 }
 
 LoopGroundTruth LoadGroundTruth(const GroundTruthArguments& arguments, const std::vector<fs::path>& images) {

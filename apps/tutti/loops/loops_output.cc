@@ -220,7 +220,7 @@ std::filesystem::path WriteLoopRun(const LoopRun& run, const LoopReport& report,
   json["protocol"]["threads"] = run.options.threads;
   if (run.earlier > 0) json["earlier"] = {{"images", run.earlier}, {"loops", EarlierLoops(run)}};
   const CurvePlot curves = PlotCurves(run, report);
-  folder.Write({"results.json", [&](File file) { WriteText(file, json.dump(2) + "\n"); }});
+  folder.Write({"results.json", [&](File file) { WriteText(file, JsonText(json)); }});
   folder.Write({"hypotheses.csv", [&](File file) { WriteText(file, Csv(run)); }});
   folder.Write({"precision_recall.csv", [&](File file) { WriteCurvesCsv(report, file); }});
   folder.Write({"precision_recall.svg", [&](File file) { WriteSvg(file, curves); }});

@@ -255,7 +255,7 @@ void WriteLoopTable(const LoopTable& table, OutputFolder& folder) {
   const std::string markdown = Markdown(table, json);
   std::printf("%s\n", markdown.c_str());
   using File = const std::filesystem::path&;
-  folder.Write({"table.json", [&](File file) { WriteText(file, json.dump(2) + "\n"); }});
+  folder.Write({"table.json", [&](File file) { WriteText(file, JsonText(json)); }});
   folder.Write({"table.md", [&](File file) { WriteText(file, markdown); }});
   folder.Write({"table.csv", [&](File file) { WriteText(file, Csv(table)); }});
   ThrowFailures(folder.failures(), folder.Finish(true));

@@ -161,6 +161,19 @@ TEST_F(CollectCommand, OneRunHasNoIntervalAndNoTest) {
   EXPECT_THAT(run.output, AllOf(HasSubstr("| orb"), HasSubstr(" 0.6000 |"), Not(HasSubstr("nan"))));
 }
 
+TEST_F(CollectCommand, ARunWhoseDataSetHasNoNameIsInTheTable) {
+  Summary("orb", 0, 0.5);
+  const fs::path file = folder_ / "runs" / "orbcounts0" / "summary.json";
+  for (const char* name : {"null", "[]", "{}"}) {
+    nlohmann::json json = nlohmann::json::parse(ReadAll(file));
+    json["dataset"] = nlohmann::json::parse(name);
+    WriteAll(file, json.dump());
+    const auto run = Collect();
+    EXPECT_EQ(run.status, 0) << run.output;
+    EXPECT_THAT(run.output, HasSubstr("0.5000"));
+  }
+}
+
 TEST_F(CollectCommand, WhatIsNoRunIsRefused) {
   fs::create_directories(folder_ / "runs");
   EXPECT_THAT(Collect().output, AllOf(StartsWith("tutti: "), HasSubstr("holds no summary.json")));

@@ -111,17 +111,24 @@ TEST(GenerateFromImages, ADamagedImageIsNamed) {
   EXPECT_THAT(run.output, HasSubstr("10.5.bmp"));
 }
 
-TEST(GenerateFromImages, ForceRemovesTheOldImages) {
+TEST(GenerateFromImages, ForceRemovesTheOldImagesAndNoOthers) {
   const fs::path from = SixImages(), out = from.parent_path() / "out";
   fs::create_directories(out);
-  WriteAll(out / "99.png", "old");
+  WriteAll(out / "8.5.bmp", "old");
   WriteAll(out / "keep.txt", "mine");
   std::vector<std::string> arguments = {"generate", "--from-images", from, "--out", out, "--change", "jpeg"};
   EXPECT_NE(RunTutti(arguments).status, 0);
   arguments.emplace_back("--force");
   EXPECT_EQ(RunTutti(arguments).status, 0);
-  EXPECT_FALSE(fs::exists(out / "99.png"));
+  EXPECT_FALSE(fs::exists(out / "8.5.bmp"));
+  EXPECT_TRUE(fs::exists(out / "8.5.png"));
   EXPECT_TRUE(fs::exists(out / "keep.txt"));
+  WriteAll(out / "99.png", "mine");
+  const auto refused = RunTutti(arguments);
+  EXPECT_EQ(refused.status, 1);
+  EXPECT_THAT(refused.output, HasSubstr("99.png: was not made from"));
+  EXPECT_EQ(ReadAll(out / "99.png"), "mine");
+  EXPECT_TRUE(fs::exists(out / "8.5.png"));
 }
 
 }  // namespace

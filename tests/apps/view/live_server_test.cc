@@ -3,6 +3,17 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <sys/resource.h>
+
+#include <atomic>
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include "core/stopwatch.h"
+#include "tests/apps/view/live_client.h"
 #include "tutti/core/error.h"
 
 namespace tutti::view {
@@ -28,6 +39,125 @@ TEST(LiveServer, SaysThatItCanNotListen) {
   LiveViewOptions options = AnyPort();
   options.address = "192.0.2.1";  // of no machine (RFC 5737)
   EXPECT_THROW(LiveServer(options, state), InputError);
+}
+
+int OpenDescriptors() {
+  int n = 0;
+  for (auto it = std::filesystem::directory_iterator("/proc/self/fd");
+       it != std::filesystem::directory_iterator(); ++it)
+    ++n;
+  return n;
+}
+
+void Wait(double seconds) { std::this_thread::sleep_for(std::chrono::duration<double>(seconds)); }
+
+std::string Get(const std::string& path, const std::string& headers = "") {
+  return "GET " + path + " HTTP/1.1\r\nHost: localhost\r\n" + headers + "\r\n";
+}
+
+TEST(LiveServer, AThousandConnectionsUseUpNoDescriptors) {
+  LiveState state;
+  const LiveServer server(AnyPort(), state);
+  const int before = OpenDescriptors();
+  std::vector<std::unique_ptr<LiveClient>> clients;
+  int most = 0;
+  for (int k = 0; k < 400; ++k) {
+    clients.push_back(std::make_unique<LiveClient>(server.Url()));
+    if (k % 10 == 0) Wait(0.005);
+    most = std::max(most, OpenDescriptors() - before - static_cast<int>(clients.size()));
+  }
+  Wait(0.3);
+  most = std::max(most, OpenDescriptors() - before - static_cast<int>(clients.size()));
+  EXPECT_LE(most, 32);
+}
+
+TEST(LiveServer, LastDescriptorsAreTheRuns) {
+  LiveState state;
+  const LiveServer server(AnyPort(), state);
+  LiveClient client(server.Url());
+  LiveClient refused(server.Url());
+  client.Send(Get("/"));
+  EXPECT_THAT(client.Answer(2), ::testing::StartsWith("HTTP/1.1 200"));
+  rlimit all{};
+  getrlimit(RLIMIT_NOFILE, &all);
+  const rlimit few{60, all.rlim_max};
+  setrlimit(RLIMIT_NOFILE, &few);
+  LiveClient late(server.Url());
+  late.Send(Get("/"));
+  EXPECT_EQ(late.Answer(2), "");
+  setrlimit(RLIMIT_NOFILE, &all);
+}
+
+TEST(LiveServer, SlowClientsDoNotHoldUpThePage) {
+  LiveState state;
+  const LiveServer server(AnyPort(), state);
+  std::vector<std::unique_ptr<LiveClient>> slow;
+  for (int k = 0; k < 50; ++k) {
+    slow.push_back(std::make_unique<LiveClient>(server.Url()));
+    slow.back()->Send("GET / HT");
+    Wait(0.005);
+  }
+  LiveClient client(server.Url());
+  client.Send(Get("/"));
+  EXPECT_THAT(client.Answer(3), ::testing::StartsWith("HTTP/1.1 200"));
+}
+
+TEST(LiveServer, EndsWithinTwoSecondsWhateverClientsDo) {
+  LiveState state;
+  auto server = std::make_unique<LiveServer>(AnyPort(), state);
+  std::vector<std::unique_ptr<LiveClient>> slow;
+  for (int k = 0; k < 10; ++k) slow.push_back(std::make_unique<LiveClient>(server->Url()));
+  for (int k = 0; k < 4; ++k) {  // viewers that take nothing
+    slow.push_back(std::make_unique<LiveClient>(server->Url()));
+    slow.back()->Send(Get("/events"));
+  }
+  std::atomic<bool> over{false};
+  std::thread byte_for_byte([&] {
+    while (!over) {
+      for (int k = 0; k < 10; ++k) slow[static_cast<std::size_t>(k)]->Send("G");
+      Wait(0.2);
+    }
+  });
+  for (int k = 0; k < 200; ++k) state.Log(std::string(100000, 'x'));  // more than the sockets' buffers hold
+  Wait(0.5);
+  state.Finish();
+  const double begin_s = internal::SteadySeconds();
+  server.reset();
+  EXPECT_LT(internal::SteadySeconds() - begin_s, 2);
+  over = true;
+  byte_for_byte.join();
+}
+
+TEST(LiveServer, HeadersHaveABound) {
+  LiveState state;
+  const LiveServer server(AnyPort(), state);
+  LiveClient client(server.Url());
+  std::size_t sent = client.Send("GET / HTTP/1.1\r\n");
+  const std::string header = "X: " + std::string(1000, 'a') + "\r\n";
+  while (sent < 100000000 && client.Send(header) == header.size()) sent += header.size();
+  EXPECT_LT(sent, 20000000U);  // what the sockets' buffers take
+}
+
+TEST(LiveServer, RangesAreNotCopies) {
+  LiveState state;
+  const LiveServer server(AnyPort(), state);
+  std::string ranges = "Range: bytes=0-";
+  for (int k = 0; k < 1500; ++k) ranges += ",0-";
+  LiveClient whole(server.Url());
+  whole.Send(Get("/"));
+  const std::string page = whole.Answer(2);
+  LiveClient parts(server.Url());
+  parts.Send(Get("/", ranges + "\r\n"));
+  EXPECT_EQ(parts.Answer(2), page);
+}
+
+TEST(LiveServer, BodiesAreNotWaitedFor) {
+  LiveState state;
+  const LiveServer server(AnyPort(), state);
+  LiveClient client(server.Url());
+  client.Send(
+      "POST /control?do=pause HTTP/1.1\r\nHost: localhost\r\nX-Tutti: 1\r\nContent-Length: 1000\r\n\r\n");
+  EXPECT_THAT(client.Answer(2), ::testing::StartsWith("HTTP/1.1 204"));
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // Bad data sets: each gives one clear message that names the file and what to do, or one skipped frame; never
 // a crash.
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -302,6 +303,43 @@ TEST(DatasetBadInputTest, OptionsAreChecked) {
   options = With(Sensor::kMono);
   options.type = DatasetType::kVideo;
   EXPECT_THAT(OpenError(folder, options), HasSubstr("is a folder"));
+}
+
+TEST(DatasetBadInputTest, ListsMayBeginWithAMarkAndNameFilesWithBlanks) {
+  const auto folder = FreshFolder();
+  WriteImage(folder / "rgb" / "a b, c.png", Picture(64, 48, 1));
+  WriteImage(folder / "rgb" / "d.png", Picture(64, 48, 2));
+  WriteText(folder / "rgb.txt",
+            "\xEF\xBB\xBF"
+            "0.1 rgb/a b, c.png\r\n0.2 rgb/d.png\r\n");
+  DatasetOptions options = With(Sensor::kMono);
+  options.camera = tutti::testing::SmallCamera();
+  const auto data = OpenDataset(folder, options);
+  ASSERT_EQ(data->Size(), 2U);
+  EXPECT_TRUE(data->Read(0).frame) << data->Read(0).error;
+  EXPECT_TRUE(data->Read(1).frame) << data->Read(1).error;
+  WriteText(folder / "rgb.txt", "0,1 rgb/d.png\n");
+  EXPECT_THAT(OpenError(folder, options), HasSubstr("rgb.txt:1: '0,1' has a decimal comma"));
+}
+
+TEST(DatasetBadInputTest, WhatNoImageIsCostsNeitherMemoryNorTime) {
+  const auto folder = FreshFolder();
+  MakeKitti(folder, 6, false);
+  const auto image = [&](int i) { return folder / "image_0" / ("00000" + std::to_string(i) + ".png"); };
+  for (int i = 1; i < 6; ++i) std::filesystem::remove(image(i));
+  WriteText(image(1), "P5 60000 60000 255\n" + std::string(100, 'x'));
+  WriteText(image(2), "BM" + std::string(16, '\0') + "\x60\xEA" + std::string(2, '\0') + "\xA0\x15\xFF\xFF" +
+                          std::string(60, '\0'));  // from the top row: its height is -60000
+  WriteText(image(3), "");
+  std::filesystem::resize_file(image(3), 300000000000ULL);
+  ASSERT_EQ(mkfifo(image(4).c_str(), 0600), 0);
+  std::filesystem::create_symlink(image(5), image(5));
+  const auto data = OpenDataset(folder, With(Sensor::kMono));
+  EXPECT_TRUE(data->Read(0).frame);
+  for (const std::size_t i : {1U, 2U}) EXPECT_THAT(data->Read(i).error, HasSubstr("60000 x 60000 pixels"));
+  EXPECT_THAT(data->Read(3).error, HasSubstr("too large for an image (300000 MB"));
+  EXPECT_THAT(data->Read(4).error, HasSubstr("can't be read"));
+  EXPECT_THAT(data->Read(5).error, HasSubstr("can't be read"));
 }
 
 }  // namespace

@@ -1,0 +1,65 @@
+#include "apps/tutti/number_checks.h"
+
+#include <charconv>
+#include <cmath>
+#include <cstdint>
+#include <string>
+#include <system_error>
+
+#include "tutti/core/text.h"
+
+namespace tutti::cli {
+namespace {
+
+constexpr double kMost = 1e15, kLeast = 1e-15;
+constexpr long long kMostThreads = 1024;
+
+// What is no number at all is for the conversion to refuse.
+std::string RefuseReal(const std::string& text) {
+  const char* end = text.data() + text.size();
+  double value = 0;
+  const auto [last, error] = std::from_chars(text.data() + (text.rfind('+', 0) == 0 ? 1 : 0), end, value);
+  if (last != end || error == std::errc::invalid_argument) return {};
+  const double size = std::abs(value);
+  if (error == std::errc() && (size == 0 || (size >= kLeast && size <= kMost))) return {};
+  return "'" + text + "' can't be computed with; give a number of 1e-15 to 1e15 in magnitude, or 0";
+}
+
+template <class Whole>
+bool Overflows(const std::string& text) {
+  Whole value = 0;
+  const auto [last, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return last == text.data() + text.size() && error == std::errc::result_out_of_range;
+}
+
+std::string RefuseWhole(const std::string& text) {
+  const bool negative = text.rfind('-', 0) == 0;
+  const std::string digits = text.rfind('+', 0) == 0 ? text.substr(1) : text;
+  if (!(negative ? Overflows<std::int64_t>(digits) : Overflows<std::uint64_t>(digits))) return {};
+  return "'" + text + "' is beyond the whole numbers of 64 bits (18446744073709551615)";
+}
+
+std::string RefuseThreads(const std::string& text) {
+  const std::optional<long long> value = ParseInteger(text);
+  if (!value || *value <= kMostThreads) return {};
+  return "'" + text + "' is more than " + std::to_string(kMostThreads) +
+         " threads; as many as cores are enough";
+}
+
+CLI::Validator Check(std::string (*refuse)(const std::string&)) {
+  return CLI::Validator([refuse](std::string& text) { return refuse(text); }, "");
+}
+
+}  // namespace
+
+void RefuseAbsurdNumbers(CLI::App& command) {
+  for (CLI::Option* option : command.get_options()) {
+    const std::string type = option->get_type_name();
+    const std::string kind = type.substr(0, type.find(':'));
+    if (kind == "FLOAT" || kind == "SECONDS") option->check(Check(RefuseReal));
+    if (kind == "INT" || kind == "UINT") option->check(Check(RefuseWhole));
+    if (option->check_lname("threads")) option->check(Check(RefuseThreads));
+  }
+}
+
+}  // namespace tutti::cli

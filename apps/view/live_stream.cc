@@ -1,0 +1,80 @@
+#include "apps/view/live_stream.h"
+
+#include <poll.h>
+#include <sys/socket.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+
+#include "core/stopwatch.h"
+
+namespace tutti::view {
+namespace {
+
+// False: not within the time.
+bool WaitUntil(double end_s, int socket, short event) {
+  while (true) {
+    const double left_s = end_s - internal::SteadySeconds();
+    if (left_s <= 0) return false;
+    pollfd entry{socket, event, 0};
+    const int ready = poll(&entry, 1, static_cast<int>(left_s * 1000) + 1);
+    if (ready > 0) return true;
+    if (ready < 0 && errno != EINTR) return false;
+  }
+}
+
+bool TryAgain() { return errno == EAGAIN || errno == EINTR; }
+
+}  // namespace
+
+LiveStream::LiveStream(int socket)
+    : socket_(socket), request_end_s_(internal::SteadySeconds() + kRequest_s) {}
+
+bool LiveStream::is_readable() const { return begin_ < end_ || received_ < kMostRequest; }
+
+bool LiveStream::is_writable() const {
+  char byte = 0;
+  const ssize_t n = recv(socket_, &byte, 1, MSG_PEEK | MSG_DONTWAIT);
+  return n > 0 || (n < 0 && TryAgain());  // 0: the other side has gone
+}
+
+bool LiveStream::Fill() {
+  const std::size_t room = std::min(buffer_.size(), kMostRequest - received_);
+  while (room > 0 && WaitUntil(request_end_s_, socket_, POLLIN)) {
+    const ssize_t n = recv(socket_, buffer_.data(), room, MSG_DONTWAIT);
+    if (n < 0 && TryAgain()) continue;
+    if (n <= 0) return false;
+    begin_ = 0;
+    end_ = static_cast<std::size_t>(n);
+    received_ += end_;
+    return true;
+  }
+  return false;
+}
+
+ssize_t LiveStream::read(char* to, size_t size) {
+  if (begin_ == end_ && !Fill()) return -1;
+  const std::size_t n = std::min(size, end_ - begin_);
+  std::memcpy(to, buffer_.data() + begin_, n);
+  begin_ += n;
+  return static_cast<ssize_t>(n);
+}
+
+ssize_t LiveStream::write(const char* from, size_t size) {
+  const double end_s = internal::SteadySeconds() + kWrite_s;
+  std::size_t sent = 0;
+  while (sent < size) {
+    if (!WaitUntil(end_s, socket_, POLLOUT)) return -1;
+    const ssize_t n = send(socket_, from + sent, size - sent, MSG_NOSIGNAL | MSG_DONTWAIT);
+    if (n < 0 && TryAgain()) continue;
+    if (n < 0) return -1;
+    sent += static_cast<std::size_t>(n);
+  }
+  return static_cast<ssize_t>(size);
+}
+
+void LiveStream::get_remote_ip_and_port(std::string&, int&) const {}
+void LiveStream::get_local_ip_and_port(std::string&, int&) const {}
+
+}  // namespace tutti::view

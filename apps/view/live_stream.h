@@ -1,0 +1,39 @@
+// A connection to the live view as httplib reads and writes it.
+#pragma once
+
+#include <httplib.h>
+
+#include <array>
+#include <string>
+
+namespace tutti::view {
+
+/// Reads no more bytes and no longer than a request may have, and gives up on who takes nothing.
+class LiveStream : public httplib::Stream {
+ public:
+  static constexpr std::size_t kMostRequest = 16384;  ///< bytes of a request, with its headers and body
+  static constexpr double kRequest_s = 5;             ///< for the whole request, from the beginning
+  static constexpr double kWrite_s = 5;               ///< for a message to be taken
+
+  /// Does not own `socket`.
+  explicit LiveStream(int socket);
+
+  bool is_readable() const override;
+  bool is_writable() const override;
+  ssize_t read(char* to, size_t size) override;
+  ssize_t write(const char* from, size_t size) override;
+  void get_remote_ip_and_port(std::string& ip, int& port) const override;
+  void get_local_ip_and_port(std::string& ip, int& port) const override;
+  socket_t socket() const override { return socket_; }
+
+ private:
+  bool Fill();
+
+  int socket_;
+  double request_end_s_;
+  std::array<char, 4096> buffer_{};
+  std::size_t begin_ = 0, end_ = 0;  // what of the buffer is unread
+  std::size_t received_ = 0;
+};
+
+}  // namespace tutti::view

@@ -1,0 +1,234 @@
+// What strangers' files and odd command lines do to the commands: one clear line or a result, never a crash,
+// a hang or "internal error".
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "tests/apps/tiny_town.h"
+#include "tests/apps/tutti/executable.h"
+#include "tests/loopclosure/features/textured_image.h"
+#include "tests/support/test_data.h"
+
+namespace tutti {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using testing::ReadAll;
+using testing::RunTutti;
+using ::testing::StartsWith;
+using testing::WriteAll;
+
+constexpr const char* kMark = "\xEF\xBB\xBF";
+constexpr const char* kNoUtf8 = "n\xFF";
+
+std::string Replaced(std::string text, char what, const std::string& with) {
+  for (std::size_t at = 0; (at = text.find(what, at)) != std::string::npos; at += with.size())
+    text.replace(at, 1, with);
+  return text;
+}
+
+class HardInput : public ::testing::Test {
+ protected:
+  static std::string Tum() {
+    std::string text;
+    for (int i = 0; i < 9; ++i) {
+      const std::string n = std::to_string(i);
+      text += "1" + n + ".5 " + n + ".5 " + std::to_string(i * i) + ".25 0 0 0 0.6 0.8\n";
+    }
+    return text;
+  }
+  static std::string Graph(const std::string& more = "") {
+    return "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\nEDGE_SE2 0 1 1.5 0.25 0 1 0 0 1 0 1\n" + more;
+  }
+  fs::path File(const std::string& name, const std::string& text) const {
+    WriteAll(folder_ / name, text);
+    return folder_ / name;
+  }
+  // Refused in one short sentence.
+  static void ExpectRefused(const testing::ProcessResult& run, const std::string& what) {
+    EXPECT_EQ(run.status, 1) << run.output;
+    EXPECT_THAT(run.output, AllOf(HasSubstr(what), Not(HasSubstr("internal error"))));
+    EXPECT_LT(run.output.size(), 700U);
+  }
+
+  const fs::path folder_ = testing::FreshFolder();
+};
+
+TEST_F(HardInput, ATrajectoryIsTheSameWithMarkCarriageReturnsAndCommas) {
+  const fs::path plain = File("plain.txt", Tum());
+  for (const std::string& text : {kMark + Tum(), Replaced(Tum(), '\n', "\r\n"), Replaced(Tum(), ' ', ","),
+                                  Replaced(Tum(), ' ', ", ")}) {
+    const fs::path other = File("other.txt", text), out = folder_ / "out.txt";
+    const auto run = RunTutti({"convert", other, out, "--to", "tum"});
+    EXPECT_EQ(run.status, 0) << run.output;
+    EXPECT_THAT(run.output, HasSubstr("(tum)"));
+    ASSERT_EQ(RunTutti({"convert", plain, folder_ / "as_is.txt", "--to", "tum"}).status, 0);
+    EXPECT_EQ(ReadAll(out), ReadAll(folder_ / "as_is.txt"));
+  }
+}
+
+TEST_F(HardInput, SecondsAreNoNanoseconds) {
+  const fs::path file = File("tum.csv", Replaced(Tum(), ' ', ","));
+  ExpectRefused(RunTutti({"convert", file, folder_ / "o", "--to", "tum", "--from", "euroc"}), "nanoseconds");
+  const fs::path whole = File("whole.csv", "0,1,0,0,0,0,0,1\n1,2,0,0,0,0,0,1\n2,3,1,0,0,0,0,1\n");
+  ExpectRefused(RunTutti({"convert", whole, folder_ / "o", "--to", "tum"}), "nanoseconds");
+}
+
+TEST_F(HardInput, DecimalCommasAreNamed) {
+  const fs::path tum = File("tum.txt", Replaced(Tum(), '.', ","));
+  ExpectRefused(RunTutti({"evaluate", "--reference", tum, "--estimate", tum}),
+                "tum.txt:1: '10,5' has a decimal comma");
+  const fs::path graph = File("graph.g2o", Replaced(Graph(), '.', ","));
+  ExpectRefused(RunTutti({"optimize", graph, "--out", folder_ / "o.g2o"}), "graph.g2o:3: '0,25' has a comma");
+}
+
+TEST_F(HardInput, AGraphIsTheSameWithMarkAndCarriageReturns) {
+  const fs::path out = folder_ / "out.g2o";
+  ASSERT_EQ(RunTutti({"optimize", File("a.g2o", Graph()), "--out", out}).status, 0);
+  const std::string plain = ReadAll(out);
+  for (const std::string& text : {kMark + Graph(), Replaced(Graph(), '\n', "\r\n")}) {
+    const auto run = RunTutti({"optimize", File("b.g2o", text), "--out", out});
+    EXPECT_THAT(run.output, Not(HasSubstr("warning")));
+    EXPECT_EQ(ReadAll(out), plain);
+  }
+}
+
+TEST_F(HardInput, LongWordsAreCutOff) {
+  const std::string word(1000000, 'X');
+  ExpectRefused(RunTutti({"optimize", File("tag.g2o", word + " 1 2\n"), "--out", folder_ / "o"}), "XXX...");
+  const auto warned = RunTutti({"optimize", File("more.g2o", Graph(word + " 1\n")), "--out", folder_ / "o"});
+  EXPECT_EQ(warned.status, 0);
+  EXPECT_LT(warned.output.size(), 1500U);
+  ExpectRefused(RunTutti({"convert", File("t.txt", word + " 0 0 0 0 0 0 1\n"), folder_ / "o", "--to", "tum"}),
+                "XXX...' is not a number");
+}
+
+TEST_F(HardInput, WhereNothingCanMoveThereAreNoIterations) {
+  const fs::path graph = File("fixed.g2o", Graph("FIX 0\nFIX 1\n"));
+  for (const char* solver : {"ceres", "block"}) {
+    const auto run = RunTutti({"optimize", graph, "--out", folder_ / "o.g2o", "--solver", solver});
+    EXPECT_EQ(run.status, 0);
+    EXPECT_THAT(run.output, HasSubstr("after 0 iterations"));
+  }
+}
+
+TEST_F(HardInput, NamesThatAreNotUtf8KeepTheResults) {
+  const fs::path tum = File(std::string(kNoUtf8) + ".txt", Tum()), json = folder_ / "out.json";
+  EXPECT_EQ(RunTutti({"evaluate", "--reference", tum, "--estimate", tum, "--json", json}).status, 0);
+  EXPECT_NO_THROW(nlohmann::json::parse(ReadAll(json)));
+  const fs::path graph = File(std::string(kNoUtf8) + ".g2o", Graph());
+  EXPECT_EQ(RunTutti({"optimize", graph, "--out", folder_ / "o.g2o", "--json", json}).status, 0);
+  EXPECT_NO_THROW(nlohmann::json::parse(ReadAll(json)));
+}
+
+TEST_F(HardInput, NumbersHaveABound) {
+  const std::vector<std::string> base = {"generate", "--sensor", "mono",    "--out", folder_ / "world",
+                                         "--frames", "1",        "--width", "64",    "--height",
+                                         "48"};
+  const std::vector<std::pair<std::string, std::string>> wrong = {
+      {"--focal", "inf"},   {"--focal", "nan"},       {"--focal", "1e-300"},
+      {"--focal", "0.001"}, {"--rate", "1e308"},      {"--rate", "1e-20"},
+      {"--rate", "1e12"},   {"--speed", "inf"},       {"--baseline", "inf"},
+      {"--laps", "inf"},    {"--threads", "1000000"}, {"--seed", "99999999999999999999999"}};
+  for (const auto& [option, value] : wrong) {
+    std::vector<std::string> arguments = base;
+    arguments.insert(arguments.end(), {option, value});
+    const auto run = RunTutti(arguments);
+    EXPECT_EQ(run.status, 1) << option << " " << value << ": " << run.output;
+    EXPECT_FALSE(fs::exists(folder_ / "world")) << option << " " << value;
+  }
+  std::vector<std::string> greatest = base;
+  greatest.insert(greatest.end(), {"--seed", "18446744073709551615"});
+  EXPECT_EQ(RunTutti(greatest).status, 0);
+  ExpectRefused(
+      RunTutti({"loops", "--images", "x", "--ground-truth", "y", "--out", "z", "--threads", "100000"}),
+      "--threads");
+}
+
+TEST_F(HardInput, ConfigurationsThatCanNotBeComputedWithAreRefused) {
+  const fs::path config = testing::TinyConfig(folder_);
+  const auto with = [&](const std::string& name, const std::string& text) {
+    return RunTutti(testing::RunArguments(File(name, text), testing::TinyTown(), folder_ / "out"));
+  };
+  for (const char* focal : {"1e-300", "1e300", "0.1"}) {
+    const auto run =
+        with("fx.yaml", ReadAll(config) + "camera:\n  width: 320\n  height: 160\n  fx: " + focal +
+                            "\n  fy: 100\n  cx: 160\n  cy: 80\n");
+    ExpectRefused(run, "camera");
+  }
+  ExpectRefused(with("two.yaml", ReadAll(config) + "---\nrun:\n  threads: 1\n"), "2 YAML documents");
+  EXPECT_FALSE(fs::exists(folder_ / "out" / "summary.json"));
+}
+
+TEST_F(HardInput, AGroundTruthThatIsNoFileIsNamed) {
+  const fs::path data = testing::CopyOfTinyTown(folder_ / "data");
+  fs::remove(data / "poses.txt");
+  fs::create_directories(data / "poses.txt");
+  ExpectRefused(RunTutti(testing::RunArguments(testing::TinyConfig(folder_), data, folder_ / "out")),
+                "poses.txt: should be the ground truth");
+}
+
+TEST_F(HardInput, LoopsSkipsAndCountsWhatIsNoImage) {
+  const fs::path images = folder_ / "images", out = folder_ / "out";
+  fs::create_directories(images);
+  constexpr int kGood = 4, kBad = 4;
+  for (int i = 0; i < kGood; ++i)
+    cv::imwrite((images / (std::string(kNoUtf8) + std::to_string(i) + ".png")).string(),
+                testing::TexturedImage(static_cast<std::uint32_t>(i)));
+  const std::string claims("\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\xEA\x60\0\0\xEA\x60\x08\0\0\0\0\0\0\0\0", 33);
+  WriteAll(images / "a.png", claims + std::string("\0\0\0\0IEND\xAE\x42\x60\x82", 12));
+  ASSERT_EQ(mkfifo((images / "b.png").c_str(), 0600), 0);
+  fs::create_symlink("c.png", images / "c.png");
+  WriteAll(images / "d.png", "");
+  fs::resize_file(images / "d.png", 300000000000ULL);
+  fs::create_directories(images / "e.png");
+  WriteAll(folder_ / "truth.txt", Replaced(std::string(kGood + kBad, 'x'), 'x', "0 0 0 0 0 0 0 0\n"));
+  const auto run =
+      RunTutti({"loops", "--images", images, "--ground-truth", folder_ / "truth.txt", "--out", out});
+  ASSERT_EQ(run.status, 0) << run.output;
+  const auto json = nlohmann::json::parse(ReadAll(out / "results.json"));
+  EXPECT_EQ(json["images"], kGood + kBad);
+  EXPECT_EQ(json["images_damaged"], kBad);
+}
+
+TEST_F(HardInput, ForceRemovesNoneButItsOwnFiles) {
+  const fs::path world = folder_ / "world";
+  const std::vector<std::string> arguments = {"generate", "--sensor", "mono", "--out",    world, "--frames",
+                                              "1",        "--width",  "64",   "--height", "48",  "--force"};
+  ASSERT_EQ(RunTutti(arguments).status, 0);
+  EXPECT_EQ(RunTutti(arguments).status, 0);
+  WriteAll(world / "image_0" / "mine.png", "mine");
+  ExpectRefused(RunTutti(arguments), "mine.png: is none of tutti generate's files");
+  EXPECT_EQ(ReadAll(world / "image_0" / "mine.png"), "mine");
+  EXPECT_TRUE(fs::exists(world / "image_0" / "000000.png"));
+  fs::remove(world / "image_0" / "mine.png");
+  WriteAll(world / "config.yaml", "mine");
+  ExpectRefused(RunTutti(arguments), "did not write");
+  EXPECT_TRUE(fs::exists(world / "image_0" / "000000.png"));
+}
+
+TEST_F(HardInput, WhatRanOutIsSaid) {
+#ifdef TUTTI_SANITIZED
+  GTEST_SKIP() << "sanitizers need more addresses than the limit leaves";
+#endif
+  const auto limited = [&](const std::string& limit, std::vector<std::string> arguments) {
+    std::vector<std::string> shell = {"-c", "ulimit " + limit + "; exec \"$0\" \"$@\"", TUTTI_EXECUTABLE};
+    shell.insert(shell.end(), arguments.begin(), arguments.end());
+    return testing::RunProgramAndSignal("/bin/sh", shell, "", 0);
+  };
+  std::string long_graph;
+  for (int i = 0; i < 300000; ++i)
+    long_graph += "EDGE_SE2 " + std::to_string(i) + " " + std::to_string(i + 1) + " 1 0 0 1 0 0 1 0 1\n";
+  ExpectRefused(limited("-v 150000", {"optimize", File("long.g2o", long_graph), "--out", folder_ / "o"}),
+                "not enough memory");
+}
+
+}  // namespace
+}  // namespace tutti

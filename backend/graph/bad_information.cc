@@ -8,11 +8,14 @@ namespace tutti::internal {
 InformationFault FaultOf(const Matrix7d& information, GraphKind kind) {
   const std::vector<int> used = TangentCoordinates(kind);
   const Eigen::MatrixXd m = information(used, used);
-  constexpr double kLargest = 1e100;  // beyond it costs overflow
+  constexpr double kLargest = 1e100;    // beyond it costs overflow
+  constexpr double kSmallest = 1e-100;  // below it they vanish, and their quotients are NaN
   if (!m.allFinite()) return InformationFault::kNotFinite;
   if (m.cwiseAbs().maxCoeff() > kLargest) return InformationFault::kTooLarge;
   if ((m - m.transpose()).cwiseAbs().maxCoeff() > 1e-9 * m.cwiseAbs().maxCoeff())
     return InformationFault::kNotSymmetric;
+  const double largest = m.diagonal().maxCoeff();
+  if (largest > 0 && largest < kSmallest) return InformationFault::kTooSmall;
   const Eigen::LLT<Eigen::MatrixXd> llt(m);
   if (llt.info() != Eigen::Success) return InformationFault::kNotPositiveDefinite;
   const Eigen::MatrixXd l = llt.matrixL();

@@ -7,7 +7,7 @@
 namespace tutti::internal {
 
 /// What CheckInformation finds.
-enum class InformationFault { kNone, kNotFinite, kTooLarge, kNotSymmetric, kNotPositiveDefinite };
+enum class InformationFault { kNone, kNotFinite, kTooLarge, kTooSmall, kNotSymmetric, kNotPositiveDefinite };
 InformationFault FaultOf(const Matrix7d& information, GraphKind kind);
 
 /// What is left of a symmetric matrix that is not positive definite; zero if nothing is: then the edge has to

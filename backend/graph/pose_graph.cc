@@ -65,6 +65,8 @@ std::string CheckInformation(const Matrix7d& information, GraphKind kind) {
       return "its information matrix is not finite";
     case internal::InformationFault::kTooLarge:
       return "its information matrix has entries beyond 1e100; give them in 1/m^2 and 1/rad^2";
+    case internal::InformationFault::kTooSmall:
+      return "its information matrix has no entry above 1e-100; give them in 1/m^2 and 1/rad^2";
     case internal::InformationFault::kNotSymmetric:
       return "its information matrix is not symmetric";
     case internal::InformationFault::kNotPositiveDefinite:

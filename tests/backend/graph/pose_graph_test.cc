@@ -75,6 +75,12 @@ TEST(PoseGraph, RefusesAnInformationWithWhichCostsOverflow) {
             std::string::npos);
 }
 
+TEST(PoseGraph, RefusesAnInformationWithWhichCostsVanish) {
+  EXPECT_NE(CheckInformation(1e-300 * Matrix7d::Identity(), GraphKind::kSE3).find("above 1e-100"),
+            std::string::npos);
+  EXPECT_EQ(CheckInformation(1e-20 * Matrix7d::Identity(), GraphKind::kSE3), "");
+}
+
 TEST(PoseGraph, JudgesOnlyTheCoordinatesThatItsKindUses) {
   Matrix7d information = Matrix7d::Zero();
   information(0, 0) = information(1, 1) = information(5, 5) = 1;

@@ -78,9 +78,9 @@ class SlamSystem {
 
   /// Tracks the next frame and brings in what is due. Never throws for hard images.
   TrackResult Track(const InputFrame& frame);
-  /// The next frame of another odometry and its pose in that one's world (Odometry::Follow), instead of Track:
-  /// loops are found and closed as ever, and the odometry stays as it is between them. Without calibration as
-  /// Track. Throws InputError for a pose that is not finite.
+  /// The next frame of another odometry and its pose in that one's world (Odometry::Follow), instead of
+  /// Track: loops are found and closed as ever, and the odometry stays as it is between them. Without
+  /// calibration as Track. Throws InputError for a pose that is not finite.
   TrackResult Follow(const InputFrame& frame, const Pose& T_odom_camera);
   /// A loop that somebody else knows (a marker, a survey, a test) between two keyframes, the older one first:
   /// S_candidate_query maps points of the query camera into the candidate's, `information` is of

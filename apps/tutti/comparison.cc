@@ -252,7 +252,8 @@ RunFigures ReadRunFigures(const std::filesystem::path& summary) {
   RunFigures run;
   run.folder = summary.parent_path();
   run.dataset = "?";
-  if (json.contains("dataset") && json["dataset"].is_string()) run.dataset = json["dataset"].get<std::string>();
+  if (json.contains("dataset") && json["dataset"].is_string())
+    run.dataset = json["dataset"].get<std::string>();
   run.variant = VariantOf(json);
   const auto whole = [&json](const std::string& path) {
     const double number = Number(json, path);

@@ -57,6 +57,7 @@ def main():
     parser.add_argument("--stride", type=int, default=5, help="every n-th image")
     parser.add_argument("--end", type=int, default=1700, help="of the first so many")
     parser.add_argument("--call", action="store_true", help="measure a call without detection alone")
+    parser.add_argument("--write", action="store_true", help="as other tables have it; this one is printed only")
     options = parser.parse_args()
     python = "/usr/bin/python3"
     env = dict(os.environ, PYTHONPATH=str(BUILD / "apps" / "python"))

@@ -57,6 +57,11 @@ std::string InPython(std::string text) {
   return text;
 }
 
+[[noreturn]] void Refuse(const std::string& function, const std::string& given, const std::string& name,
+                         const std::string& why) {
+  throw InputError(function + ": " + given + name + why);
+}
+
 // Sets keys below `prefix`; `given` is how the caller got there: "extraction.".
 void Assign(const std::string& function, const std::string& prefix, const std::string& given,
             const py::dict& keywords, const ConfigTable& table) {
@@ -70,8 +75,7 @@ void Assign(const std::string& function, const std::string& prefix, const std::s
   for (const auto& [name, value] : items) {
     const std::string path = prefix + name;
     if (table.HasSection(path)) {
-      if (!py::isinstance<py::dict>(value))
-        throw InputError(function + ": " + given + name + " needs a dict of options");
+      if (!py::isinstance<py::dict>(value)) Refuse(function, given, name, " needs a dict of options");
       std::string within = given;
       within.append(name).append(".");
       Assign(function, path + ".", within, py::reinterpret_borrow<py::dict>(value), table);
@@ -89,7 +93,7 @@ void Assign(const std::string& function, const std::string& prefix, const std::s
     } catch (const InputError& error) {
       wrong = error.what();
     }
-    if (!wrong.empty()) throw InputError(function + ": " + given + name + ": " + wrong);
+    if (!wrong.empty()) Refuse(function, given, name, ": " + wrong);
   }
 }
 

@@ -75,7 +75,6 @@ TEST(LiveServer, LastDescriptorsAreTheRuns) {
   LiveState state;
   const LiveServer server(AnyPort(), state);
   LiveClient client(server.Url());
-  LiveClient refused(server.Url());
   client.Send(Get("/"));
   EXPECT_THAT(client.Answer(2), ::testing::StartsWith("HTTP/1.1 200"));
   rlimit all{};

@@ -46,7 +46,7 @@ double NumberAt(const std::filesystem::path& file, const TextLine& line, std::si
   }
   const std::optional<double> value = ParseDouble(line.words[word]);
   const std::string comma = internal::DecimalComma(line.text);
-  if (!comma.empty()) {
+  if (comma.rfind(line.words[word] + ",", 0) == 0) {
     throw InputError(At(file, line.number) + "'" + internal::Excerpt(comma) +
                      "' has a decimal comma; write decimal points");
   }

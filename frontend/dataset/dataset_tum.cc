@@ -33,12 +33,12 @@ std::vector<StampedFile> ReadList(const std::filesystem::path& folder, const cha
   std::vector<StampedFile> files;
   StampOrder order(list, warnings);
   for (const TextLine& line : ReadTextLines(list)) {
+    const double stamp = NumberAt(list, line, 0);
     const std::string name_in_list = NameIn(line, folder);
     if (name_in_list.empty()) {
       throw InputError(At(list, line.number) + "has " + std::to_string(line.words.size()) +
                        " columns; 2 are needed: time stamp [s] and file name");
     }
-    const double stamp = NumberAt(list, line, 0);
     if (order.Accept(line.number, stamp)) files.push_back({stamp, folder / name_in_list});
   }
   if (files.empty())

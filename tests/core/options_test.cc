@@ -63,12 +63,21 @@ TEST(Options, TheFirstThatIsOutOfItsRangeIsNamedWithTheRange) {
 TEST(Options, WhatIsNotFiniteIsOutOfEveryRange) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   OptionText text{"x", ""};
-  EXPECT_EQ(text.Refusal("x", 1e300), "");
+  EXPECT_EQ(text.Refusal("x", -1e30), "");
   EXPECT_EQ(text.Refusal("x", kNan), "x must be a finite number, not nan");
   EXPECT_NE(text.Refusal("x", std::numeric_limits<double>::infinity()), "");
   option_marks::From(0)(text);
   EXPECT_EQ(text.Refusal("x", kNan), "x must be at least 0, not nan");
   EXPECT_NE(text.Refusal("x", std::numeric_limits<double>::infinity()), "");
+}
+
+TEST(Options, WhatCantBeComputedWithIsOutOfEveryRange) {
+  OptionText text{"x", ""};
+  EXPECT_EQ(text.Refusal("x", 0), "");
+  EXPECT_EQ(text.Refusal("x", 1e-30), "");
+  for (const double value : {1e300, -1e300, 1e-300, -1e-300}) {
+    EXPECT_NE(text.Refusal("x", value).find("must be 0 or of 1e-30 to 1e30"), std::string::npos) << value;
+  }
 }
 
 TEST(Options, ValuesOfEnumerationsHaveWords) { EXPECT_STREQ(WordOf(Shape::kSquare), "square"); }

@@ -32,10 +32,10 @@ RunConfig ConfigOf(const CloseArguments& arguments) {
   if (!arguments.sigma.empty()) {
     config.run.odometry_sigma_fraction = arguments.sigma[0];
     config.run.odometry_sigma_deg = arguments.sigma[1];
+    const std::string problem = config.run.Validate();
+    if (!problem.empty()) throw InputError("--odometry-sigma: " + problem);
   }
   SetOptions(arguments.set, config);
-  const std::string problem = config.run.Validate();
-  if (!problem.empty()) throw InputError("--odometry-sigma: " + problem);
   return config;
 }
 

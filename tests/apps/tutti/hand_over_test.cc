@@ -61,7 +61,7 @@ TEST(Start, EveryCommandOfTheHelpExplainsItselfInEitherWay) {
     EXPECT_THAT(help.output, HasSubstr("Usage: tutti " + name)) << name;
     EXPECT_EQ(help.output, RunTutti({"help", name}).output);
   }
-  EXPECT_EQ(count, 16);
+  EXPECT_EQ(count, 17);
 }
 
 TEST(Start, AnUnknownCommandIsRefusedWithTheNearest) {

@@ -29,6 +29,7 @@ inline std::string Excerpt(const std::string& word) {
 
 /// The first word such as "0,25" of a line whose columns are separated by blanks; empty if there is none.
 inline std::string DecimalComma(const std::string& line) {
+  if (line.find(',') == std::string::npos) return {};  // nearly all lines
   const std::vector<std::string> words = SplitText(line, " \t\r;");
   if (words.size() < 2) return {};
   const auto digit = [](char c) { return std::isdigit(static_cast<unsigned char>(c)) != 0; };

@@ -39,24 +39,24 @@ Tracker::Tracked Tracker::Accept(PoseFix fix, const Map& map) {
   const Vector6d motion = LogSE3(fix.T_camera_world * last_.T_camera_world.Inverse());
   last_.velocity = moves ? std::optional<Vector6d>(motion / dt) : std::nullopt;
   if (fix.motion) last_.velocity = fix.motion;
-  last_.frame = fix.frame;
-  last_.matches = fix.matches;
-  last_.T_camera_world = fix.T_camera_world;
-  last_.reference = fix.reference;
-  ++last_.frames_since_keyframe;
+  Keep(fix);
   const int by_grey_before = fix.by_grey ? 0 : last_.by_grey;
   last_.by_grey = fix.by_grey ? last_.by_grey + 1 : 0;
-  state_ = TrackingState::kTracking;
   return {std::move(fix), need, by_grey_before};
 }
 
 void Tracker::Follow(const PoseFix& fix) {
+  last_.velocity.reset();
+  last_.steady = false;
+  Keep(fix);
+}
+
+// As what the next frame starts from.
+void Tracker::Keep(const PoseFix& fix) {
   last_.frame = fix.frame;
   last_.matches = fix.matches;
   last_.T_camera_world = fix.T_camera_world;
   last_.reference = fix.reference;
-  last_.velocity.reset();
-  last_.steady = false;
   ++last_.frames_since_keyframe;
   state_ = TrackingState::kTracking;
 }

@@ -10,6 +10,7 @@
 #include "apps/run/runner.h"
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
+#include "apps/tutti/exit_code.h"
 #include "apps/tutti/run_with_report.h"
 #include "tutti/core/error.h"
 #include "tutti/slam/config.h"
@@ -37,24 +38,6 @@ RunConfig ConfigOf(const CloseArguments& arguments) {
   }
   SetOptions(arguments.set, config);
   return config;
-}
-
-int ExitCode(const RunResult& result) {
-  if (result.interrupted) {
-    std::fprintf(stderr, "tutti: interrupted; what there was by then is in %s\n", result.folder.c_str());
-    return 130;
-  }
-  if (result.frames_total > 0 && result.bad.size() == result.frames_total) {
-    std::fprintf(stderr, "tutti: not one image could be read; the first: %s\n",
-                 result.bad.front().error.c_str());
-    return 1;
-  }
-  if (result.keyframes == 0 && !result.appearance_only) {
-    const std::string reason = result.lost.empty() ? std::string("no images") : result.lost.back().reason;
-    std::fprintf(stderr, "tutti: no image became a keyframe (%s)\n", reason.c_str());
-    return 1;
-  }
-  return 0;
 }
 
 int Close(const CLI::App& command, const CloseArguments& arguments) {

@@ -13,6 +13,7 @@
 #include "apps/run/runner.h"
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
+#include "apps/tutti/exit_code.h"
 #include "apps/tutti/run_with_report.h"
 #include "apps/view/live_view.h"
 #include "core/example_configs.h"
@@ -48,36 +49,6 @@ std::shared_ptr<LiveView> StartView(const LiveViewOptions& options) {
   auto view = std::make_shared<LiveView>(options);
   std::fprintf(stderr, "tutti: look at %s\n", view->Url().c_str());
   return view;
-}
-
-// 130: ended by Ctrl-C, as shells say it; 1: no frame has a pose.
-int ExitCode(const RunResult& result) {
-  if (result.interrupted) {
-    std::fprintf(stderr, "tutti: interrupted; what there was by then is in %s\n", result.folder.c_str());
-    return 130;
-  }
-  if (result.frames_total > 0 && result.bad.size() == result.frames_total) {
-    std::fprintf(stderr, "tutti: the run is void: not one frame could be read; the first: %s\n",
-                 result.bad.front().error.c_str());
-    return 1;
-  }
-  if (result.Void() && result.frames_without_depth > 0 &&
-      result.frames_without_depth == result.frame_ms.size()) {
-    const char* const which = DepthSource(result.rig.sensor);
-    std::fprintf(stderr, "tutti: the run is void: not one frame has a %s image to start a map from%s%s\n",
-                 which, result.bad_depth.empty() ? "" : "; the first: ",
-                 result.bad_depth.empty() ? "" : result.bad_depth.front().error.c_str());
-    return 1;
-  }
-  if (result.Void()) {
-    const std::string reason = result.lost.empty() ? std::string("no frames") : result.lost.back().reason;
-    std::fprintf(
-        stderr,
-        "tutti: the run is void: no frame has a pose (%s); check the calibration and that the camera moves\n",
-        reason.c_str());
-    return 1;
-  }
-  return 0;
 }
 
 int RunAndShow(const CLI::App& command, const RunArguments& arguments, RunRequest request,

@@ -9,7 +9,6 @@
 #include "apps/report/page.h"
 #include "apps/run/outputs.h"
 #include "apps/run/run_doubts.h"
-#include "apps/run/run_parts.h"
 #include "apps/run/runner.h"
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"

@@ -8,7 +8,7 @@
 namespace tutti::internal {
 
 /// Their folder: share/tutti/configs of the installation that the running program belongs to, else
-/// data/configs of the source tree.
+/// data/configs of the source tree that it was built in.
 std::string ExampleConfigs();
 /// The same for a program in `folder`: in bin, libexec/tutti or lib/MACHINE/tutti of an installation, or
 /// elsewhere.

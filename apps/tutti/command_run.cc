@@ -1,5 +1,6 @@
 // tutti run: SLAM on a data set.
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <set>
 #include <string>
@@ -8,6 +9,7 @@
 
 #include "apps/report/page.h"
 #include "apps/run/outputs.h"
+#include "apps/run/recording.h"
 #include "apps/run/run_doubts.h"
 #include "apps/run/runner.h"
 #include "apps/tutti/checks.h"
@@ -23,9 +25,13 @@
 namespace tutti::cli {
 namespace {
 
+namespace fs = std::filesystem;
+
 struct RunArguments {
   std::string config, dataset, out, ground_truth;
   std::string trace, resume, map, save_map;
+  std::string calibration, camera, sensor;
+  double view_deg = 0;
   std::vector<std::string> set;  // SECTION.KEY=VALUE
   bool no_loops = false, no_report = false, quiet = false, keep = false, help_config = false,
        advanced = false, timing = false, realtime = false, no_map = false;
@@ -37,10 +43,6 @@ struct RunArguments {
   bool view = false;
   LiveViewOptions live;
 };
-
-void Require(const std::string& value, const char* option, const std::string& what) {
-  if (value.empty()) throw InputError(std::string("run: ") + option + " is missing; it names " + what);
-}
 
 std::shared_ptr<LiveView> StartView(const LiveViewOptions& options) {
   const std::string problem = options.Validate();
@@ -101,6 +103,17 @@ int Resume(const CLI::App& command, const RunArguments& arguments) {
   return RunAndShow(command, arguments, std::move(request), config);
 }
 
+CameraRequest CameraOf(const CLI::App& command, const RunArguments& arguments) {
+  CameraRequest camera;
+  if (!arguments.calibration.empty()) camera.calibration = arguments.calibration;
+  camera.camera = arguments.camera;
+  if (command.count("--fov") > 0) camera.view_deg = arguments.view_deg;
+  for (const auto& [word, value] : WordsOf(Sensor())) {
+    if (arguments.sensor == word) camera.sensor = value;
+  }
+  return camera;
+}
+
 // What the map was made with, for a recording of which all frames are used.
 RunConfig ConfigOf(const std::string& map) {
   RunConfig config = ReadMapInfo(map).config;
@@ -109,21 +122,43 @@ RunConfig ConfigOf(const std::string& map) {
   return config;
 }
 
+// From a file, or from the map to go on in, or from what the recording is.
+RunConfig ConfigFor(const CameraRequest& camera, const RunArguments& arguments) {
+  if (!arguments.config.empty() || !arguments.map.empty()) {
+    RunConfig config = arguments.config.empty() ? ConfigOf(arguments.map) : LoadConfig(arguments.config);
+    SetCamera(arguments.dataset, camera, config);
+    return config;
+  }
+  const Recording recording = Recognise(arguments.dataset, camera);
+  if (!arguments.quiet) {
+    for (const std::string& finding : recording.findings) std::fprintf(stderr, "  %s\n", finding.c_str());
+  }
+  return recording.config;
+}
+
+// tutti-out/NAME, where NAME is the recording's.
+fs::path DefaultOut(const std::string& dataset) {
+  if (IsCamera(dataset)) return fs::path("tutti-out") / "camera";
+  const fs::path whole = fs::absolute(dataset).lexically_normal();
+  const fs::path name = whole.has_filename() ? whole.filename() : whole.parent_path().filename();
+  std::error_code ignored;
+  return fs::path("tutti-out") / (fs::is_directory(whole, ignored) ? name : name.stem());
+}
+
 int Run(const CLI::App& command, const RunArguments& arguments) {
   if (arguments.help_config) {
     std::fputs(HelpConfig(arguments.advanced).c_str(), stdout);
     return 0;
   }
   if (!arguments.resume.empty()) return Resume(command, arguments);
-  if (arguments.map.empty())
-    Require(arguments.config, "--config",
-            "a YAML file, for example " + internal::ExampleConfigs() + "/tum_fr1_rgbd.yaml");
-  Require(arguments.dataset, "--dataset", "the data set's folder, a video file, or camera:0");
-  Require(arguments.out, "--out", "the folder for the results");
+  if (arguments.dataset.empty()) {
+    throw InputError(
+        "run: which recording? Give its folder, a video file, a bag or camera:0: tutti run DATASET");
+  }
   RunRequest request;
   request.config = arguments.config;
   request.dataset = arguments.dataset;
-  request.out = arguments.out;
+  request.out = arguments.out.empty() ? DefaultOut(arguments.dataset) : fs::path(arguments.out);
   request.no_loops = arguments.no_loops;
   request.quiet = arguments.quiet;
   request.keep = arguments.keep;
@@ -145,7 +180,7 @@ int Run(const CLI::App& command, const RunArguments& arguments) {
   if (!arguments.save_map.empty()) request.save_map = arguments.save_map;
   if (arguments.save_map.empty() && !arguments.no_map) request.save_map = kMap;
   if (!arguments.map.empty()) request.map = arguments.map;
-  RunConfig config = arguments.config.empty() ? ConfigOf(arguments.map) : LoadConfig(request.config);
+  RunConfig config = ConfigFor(CameraOf(command, arguments), arguments);
   SetOptions(arguments.set, config);
   return RunAndShow(command, arguments, std::move(request), config);
 }
@@ -154,15 +189,27 @@ int Run(const CLI::App& command, const RunArguments& arguments) {
 
 void SetUpRun(CLI::App& command, int& exit_code) {
   const auto arguments = std::make_shared<RunArguments>();
-  command.add_option("--config", arguments->config,
-                     "YAML file (" + internal::ExampleConfigs() + " has one for each public data set)");
   command.add_option(
-      "--dataset", arguments->dataset,
-      "folder of the data set, a video file, or a camera: camera:0 (the first one), camera:1, ...; "
-      "camera:FILE takes a video file for it");
+      "dataset,--dataset", arguments->dataset,
+      "the recording: folder of a data set or of images, a video file, a ROS bag, or a camera: camera:0 (the "
+      "first one), camera:1, ...; camera:FILE takes a video file for it");
+  command.add_option("--config", arguments->config,
+                     "YAML file (" + internal::ExampleConfigs() +
+                         " has one for each public data set). Without it, layout, sensor and calibration "
+                         "are found in the recording, and what was found is said");
+  command.add_option("--calibration", arguments->calibration,
+                     "the camera from a YAML file of Kalibr, ORB-SLAM, OpenCV, ROS or EuRoC");
+  command.add_option("--camera", arguments->camera, "the camera as fx,fy,cx,cy[,k1,k2,p1,p2[,k3]] in pixels");
+  command
+      .add_option("--fov", arguments->view_deg,
+                  "the camera by its horizontal field of view [deg], principal point in the middle")
+      ->check(NumberThat([](double v) { return v >= 5 && v <= 170; }, "from 5 to 170", "DEGREES"));
+  command
+      .add_option("--sensor", arguments->sensor, "what to use of the recording; default: all that is there")
+      ->check(OneOf(Sensor()));
   command.add_option("--out", arguments->out,
-                     "folder for the results: a new or empty one, or that of an earlier run, whose results "
-                     "are replaced when the new ones are complete");
+                     "folder for the results (default: tutti-out/NAME): a new or empty one, or that of an "
+                     "earlier run, whose results are replaced when the new ones are complete");
   command.add_flag(
       "--keep", arguments->keep,
       "don't replace earlier results in --out: move them into OUT/1, the next ones into OUT/2, ...");

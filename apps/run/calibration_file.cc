@@ -1,0 +1,263 @@
+#include "apps/run/calibration_file.h"
+
+#include <yaml-cpp/yaml.h>
+
+#include <cmath>
+#include <fstream>
+#include <initializer_list>
+#include <sstream>
+#include <vector>
+
+#include "tutti/core/error.h"
+#include "tutti/slam/config.h"
+
+namespace tutti {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A YAML file with errors that name it.
+class CalibrationText {
+ public:
+  explicit CalibrationText(const fs::path& file) : file_(file) {
+    std::error_code ignored;
+    std::ifstream in(file);
+    if (!in || fs::is_directory(file, ignored))
+      throw InputError(
+          file.string() +
+          ": can't be opened; --calibration needs a YAML file of Kalibr, ORB-SLAM, OpenCV or ROS");
+    std::string line;
+    while (std::getline(in, line)) {
+      // OpenCV's "%YAML:1.0" is no YAML.
+      text_ += (line.rfind("%YAML", 0) == 0 ? std::string() : line) + "\n";
+    }
+    try {
+      root_ = YAML::Load(text_);
+    } catch (const YAML::Exception& e) {
+      throw InputError(file.string() + ":" + std::to_string(e.mark.line + 1) + ": not valid YAML: " + e.msg);
+    }
+    if (!root_.IsMap()) throw InputError(file.string() + ": holds no keys; " + Known());
+  }
+
+  static std::string Known() {
+    return "the formats that are known are those of Kalibr (cam0: intrinsics), ORB-SLAM (Camera.fx or "
+           "Camera1.fx), OpenCV and ROS (camera_matrix), EuRoC (intrinsics) and tutti (camera: fx)";
+  }
+  const fs::path& file() const { return file_; }
+  const std::string& text() const { return text_; }
+  const YAML::Node& root() const { return root_; }
+
+  [[noreturn]] void Fail(const YAML::Node& at, const std::string& what) const {
+    const int line = at.IsDefined() ? at.Mark().line + 1 : 0;
+    throw InputError(file_.string() + (line > 0 ? ":" + std::to_string(line) : std::string()) + ": " + what);
+  }
+  double Number(const YAML::Node& node, const std::string& key) const {
+    double value = 0;
+    try {
+      value = node.as<double>();
+    } catch (const YAML::Exception&) {
+      Fail(node, "'" + key + "' is no number");
+    }
+    if (!std::isfinite(value)) Fail(node, "'" + key + "' is not finite");
+    return value;
+  }
+  std::optional<double> Number(const std::string& key) const {
+    const YAML::Node node = root_[key];
+    if (!node.IsDefined()) return std::nullopt;
+    return Number(node, key);
+  }
+  double Needed(const std::string& key) const {
+    const std::optional<double> value = Number(key);
+    if (!value) throw InputError(file_.string() + ": has no key '" + key + "'");
+    return *value;
+  }
+  std::vector<double> Numbers(const YAML::Node& node, const std::string& key) const {
+    if (!node.IsSequence()) Fail(node, "'" + key + "' is no list of numbers");
+    std::vector<double> values;
+    for (const YAML::Node& value : node) values.push_back(Number(value, key));
+    return values;
+  }
+  // A matrix of OpenCV or ROS ({rows, cols, data}), or a plain list.
+  std::vector<double> Matrix(const YAML::Node& node, const std::string& key) const {
+    if (node.IsMap() && !node["data"].IsDefined()) Fail(node, "'" + key + "' has no data");
+    return Numbers(node.IsMap() ? node["data"] : node, key);
+  }
+
+ private:
+  fs::path file_;
+  std::string text_;
+  YAML::Node root_;
+};
+
+void SetLens(const CalibrationText& text, const YAML::Node& at, const std::string& model,
+             const std::vector<double>& values, PinholeCamera& camera) {
+  bool all_zero = true;
+  for (const double value : values) all_zero = all_zero && value == 0;
+  if (all_zero) return;
+  const bool fisheye = model == "equidistant" || model == "equi" || model == "fisheye" ||
+                       model == "KannalaBrandt8" || model == "kannala_brandt";
+  const bool radtan = model.empty() || model == "radtan" || model == "plumb_bob" ||
+                      model == "radial-tangential" || model == "PinHole";
+  if (!fisheye && !radtan)
+    text.Fail(at, "the lens model '" + model +
+                      "' is not known; tutti has radtan (plumb_bob) and equidistant "
+                      "(fisheye)");
+  const std::size_t most = fisheye ? 4 : 5;
+  if (values.size() < 4 || values.size() > 14)
+    text.Fail(at, "the lens has " + std::to_string(values.size()) + " coefficients; 4 or 5 are needed");
+  for (std::size_t i = most; i < values.size(); ++i) {
+    if (values[i] != 0)
+      text.Fail(at, "the lens has more than " + std::to_string(most) +
+                        " coefficients (a rational model?); calibrate with radtan or equidistant");
+  }
+  camera.distortion = fisheye ? Distortion::kEquidistant : Distortion::kRadTan;
+  for (std::size_t i = 0; i < std::min(most, values.size()); ++i) camera.coefficients[i] = values[i];
+}
+
+void SetIntrinsics(const CalibrationText& text, const YAML::Node& at, const std::vector<double>& values,
+                   PinholeCamera& camera) {
+  if (values.size() != 4)
+    text.Fail(at, "'intrinsics' has " + std::to_string(values.size()) + " values; fx, fy, cx, cy are needed");
+  camera.fx = values[0];
+  camera.fy = values[1];
+  camera.cx = values[2];
+  camera.cy = values[3];
+}
+
+void SetSize(const CalibrationText& text, const YAML::Node& size, PinholeCamera& camera) {
+  if (!size.IsDefined()) return;
+  const std::vector<double> values = text.Numbers(size, "resolution");
+  if (values.size() != 2) text.Fail(size, "'resolution' needs width and height");
+  camera.width = static_cast<int>(values[0]);
+  camera.height = static_cast<int>(values[1]);
+}
+
+std::string Word(const YAML::Node& node) { return node.IsDefined() && node.IsScalar() ? node.Scalar() : ""; }
+
+// Kalibr's cam0, or the whole of a sensor.yaml.
+Calibration FromIntrinsics(const CalibrationText& text, const YAML::Node& node, const std::string& format) {
+  Calibration out;
+  out.format = format;
+  const std::string model = Word(node["camera_model"]);
+  if (!model.empty() && model != "pinhole")
+    text.Fail(node["camera_model"], "camera_model '" + model + "': tutti has pinhole alone");
+  SetIntrinsics(text, node, text.Numbers(node["intrinsics"], "intrinsics"), out.camera);
+  SetSize(text, node["resolution"], out.camera);
+  const bool kalibr = node["distortion_coeffs"].IsDefined();
+  const YAML::Node lens = node[kalibr ? "distortion_coeffs" : "distortion_coefficients"];
+  if (lens.IsDefined() && Word(node["distortion_model"]) != "none") {
+    SetLens(text, lens, Word(node["distortion_model"]), text.Numbers(lens, "distortion_coeffs"), out.camera);
+  }
+  if (node["rate_hz"].IsDefined()) out.rate_hz = text.Number(node["rate_hz"], "rate_hz");
+  return out;
+}
+
+Calibration FromOrbSlam(const CalibrationText& text) {
+  Calibration out;
+  const bool three = text.root()["Camera1.fx"].IsDefined();
+  out.format = three ? "ORB-SLAM3" : "ORB-SLAM";
+  const std::string prefix = three ? "Camera1." : "Camera.";
+  PinholeCamera& c = out.camera;
+  c.fx = text.Needed(prefix + "fx");
+  c.fy = text.Needed(prefix + "fy");
+  c.cx = text.Needed(prefix + "cx");
+  c.cy = text.Needed(prefix + "cy");
+  c.width = static_cast<int>(text.Number("Camera.width").value_or(0));
+  c.height = static_cast<int>(text.Number("Camera.height").value_or(0));
+  const std::string model = Word(text.root()["Camera.type"]);
+  const bool fisheye = model == "KannalaBrandt8";
+  std::vector<double> lens;
+  for (const char* key : {"k1", "k2", fisheye ? "k3" : "p1", fisheye ? "k4" : "p2"})
+    lens.push_back(text.Number(prefix + key).value_or(0));
+  if (!fisheye) lens.push_back(text.Number(prefix + "k3").value_or(0));
+  if (model != "Rectified") SetLens(text, text.root()["Camera.type"], model, lens, c);
+  out.rate_hz = text.Number("Camera.fps").value_or(0);
+  out.depth_units_per_m =
+      text.Number("RGBD.DepthMapFactor").value_or(text.Number("DepthMapFactor").value_or(0));
+  out.baseline_m = text.Number("Stereo.b").value_or(0);
+  if (const std::optional<double> bf = text.Number("Camera.bf"); bf && out.baseline_m == 0 && c.fx > 0)
+    out.baseline_m = *bf / c.fx;
+  return out;
+}
+
+YAML::Node FirstOf(const YAML::Node& root, std::initializer_list<const char*> names) {
+  for (const char* name : names) {
+    if (root[name].IsDefined()) return root[name];
+  }
+  return YAML::Node(YAML::NodeType::Undefined);
+}
+
+Calibration FromMatrix(const CalibrationText& text, const YAML::Node& matrix) {
+  Calibration out;
+  const YAML::Node& root = text.root();
+  out.format = root["camera_name"].IsDefined() || root["projection_matrix"].IsDefined() ? "ROS" : "OpenCV";
+  const std::vector<double> k = text.Matrix(matrix, "camera_matrix");
+  if (k.size() != 9)
+    text.Fail(matrix, "the camera matrix has " + std::to_string(k.size()) + " values; 9 are needed");
+  out.camera.fx = k[0];
+  out.camera.cx = k[2];
+  out.camera.fy = k[4];
+  out.camera.cy = k[5];
+  const YAML::Node width = FirstOf(root, {"image_width", "image_Width", "width"});
+  const YAML::Node height = FirstOf(root, {"image_height", "image_Height", "height"});
+  if (width.IsDefined() && height.IsDefined()) {
+    out.camera.width = static_cast<int>(text.Number(width, "image_width"));
+    out.camera.height = static_cast<int>(text.Number(height, "image_height"));
+  }
+  const YAML::Node lens = FirstOf(root, {"distortion_coefficients", "Distortion_Coefficients", "dist_coeffs",
+                                         "distCoeffs", "dist_coeff", "D"});
+  if (lens.IsDefined()) {
+    SetLens(text, lens, Word(FirstOf(root, {"distortion_model", "camera_model"})),
+            text.Matrix(lens, "distortion_coefficients"), out.camera);
+  }
+  return out;
+}
+
+Calibration FromTutti(const CalibrationText& text) {
+  const RunConfig config = ParseConfig(text.text(), text.file().string());
+  Calibration out;
+  out.format = "tutti";
+  if (config.dataset.camera) out.camera = *config.dataset.camera;
+  out.baseline_m = config.dataset.baseline_m;
+  out.rate_hz = config.dataset.rate_hz;
+  out.depth_units_per_m = config.dataset.depth_units_per_m;
+  return out;
+}
+
+Calibration Read(const CalibrationText& text) {
+  const YAML::Node& root = text.root();
+  if (root["cam0"].IsDefined() && root["cam0"].IsMap() && root["cam0"]["intrinsics"].IsDefined())
+    return FromIntrinsics(text, root["cam0"], "Kalibr");
+  if (root["intrinsics"].IsDefined()) return FromIntrinsics(text, root, "EuRoC");
+  if (root["Camera1.fx"].IsDefined() || root["Camera.fx"].IsDefined()) return FromOrbSlam(text);
+  if (root["camera"].IsDefined() && root["camera"].IsMap()) return FromTutti(text);
+  const YAML::Node matrix = FirstOf(root, {"camera_matrix", "Camera_Matrix", "cameraMatrix", "K"});
+  if (matrix.IsDefined()) return FromMatrix(text, matrix);
+  throw InputError(text.file().string() + ": holds no calibration; " + CalibrationText::Known());
+}
+
+}  // namespace
+
+Calibration ReadCalibration(const fs::path& file) {
+  const CalibrationText text(file);
+  Calibration out = Read(text);
+  PinholeCamera check = out.camera;
+  if (check.width == 0 || check.height == 0) {  // of the images, later
+    check.width = static_cast<int>(std::lround(2 * std::max(1.0, check.cx)));
+    check.height = static_cast<int>(std::lround(2 * std::max(1.0, check.cy)));
+  }
+  const std::string problem = check.Validate();
+  if (!problem.empty()) throw InputError(file.string() + ": " + problem);
+  return out;
+}
+
+std::optional<fs::path> CalibrationBeside(const fs::path& folder) {
+  std::error_code ignored;
+  for (const char* name : {"calibration.yaml", "calibration.yml", "camera.yaml", "camera.yml", "calib.yaml",
+                           "calib.yml", "camera_info.yaml", "camchain.yaml", "sensor.yaml", "ost.yaml"}) {
+    if (fs::is_regular_file(folder / name, ignored)) return folder / name;
+  }
+  return std::nullopt;
+}
+
+}  // namespace tutti

@@ -1,0 +1,312 @@
+#include "apps/run/recording.h"
+
+#include <cmath>
+#include <cstdio>
+#include <memory>
+
+#include "apps/run/calibration_file.h"
+#include "core/angle.h"
+#include "core/example_configs.h"
+#include "tutti/core/error.h"
+#include "tutti/core/text.h"
+#include "tutti/frontend/dataset.h"
+
+namespace tutti {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Horizontal field of view where nothing says it: between phones and webcams (60 to 70 deg) and those of
+// robots and cars (70 to 90).
+constexpr double kUsualView = 67;
+
+bool HasImages(const fs::path& folder) {
+  std::error_code ignored;
+  return fs::is_directory(folder, ignored) && !fs::is_empty(folder, ignored);
+}
+
+std::string Short(double value) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.6g", value);
+  return text;
+}
+
+// A configuration of those that come along, for all but its camera.
+RunConfig Published(const std::string& name) {
+  return LoadConfig(fs::path(internal::ExampleConfigs()) / (name + ".yaml"));
+}
+
+// The pixels that the camera must fit.
+void SetImageSize(const fs::path& dataset, const DatasetOptions& options, PinholeCamera& camera) {
+  if (camera.width > 0 && camera.height > 0) return;
+  DatasetOptions any = options;
+  any.sensor = Sensor::kMono;
+  any.start = any.end = 0;
+  any.camera.reset();
+  const DatasetType type = IsCamera(dataset.string()) ? DatasetType::kVideo : DetectDatasetType(dataset);
+  if (type == DatasetType::kKitti || type == DatasetType::kTum) {
+    // Without any camera these can't be opened: one that fits every image.
+    std::error_code ignored;
+    any.type = DatasetType::kImages;
+    for (const char* images : {"image_0", "image_2", "rgb"}) {
+      if (!HasImages(dataset / images)) continue;
+      const PinholeCamera seen = OpenDataset(dataset / images, any)->Rig().camera;
+      camera.width = seen.width;
+      camera.height = seen.height;
+      return;
+    }
+    throw InputError(dataset.string() +
+                     ": the size of the images is not known; use --calibration with a file that has it");
+  }
+  if (IsCameraDevice(dataset.string()))
+    throw InputError(dataset.string() + ": a live camera needs a calibration with its image size");
+  const PinholeCamera seen = OpenDataset(dataset, any)->Rig().camera;
+  camera.width = seen.width;
+  camera.height = seen.height;
+}
+
+PinholeCamera ParseCamera(const std::string& text) {
+  std::vector<double> values;
+  for (std::size_t at = 0; at <= text.size();) {
+    const std::size_t comma = std::min(text.find(',', at), text.size());
+    const std::optional<double> value = ParseDouble(text.substr(at, comma - at));
+    if (!value || !std::isfinite(*value))
+      throw InputError("--camera: '" + text.substr(at, comma - at) +
+                       "' is no number; write fx,fy,cx,cy or fx,fy,cx,cy,k1,k2,p1,p2[,k3] in pixels");
+    values.push_back(*value);
+    at = comma + 1;
+  }
+  if (values.size() != 4 && values.size() != 8 && values.size() != 9)
+    throw InputError("--camera: has " + std::to_string(values.size()) +
+                     " numbers; write fx,fy,cx,cy or fx,fy,cx,cy,k1,k2,p1,p2[,k3] in pixels");
+  PinholeCamera camera;
+  camera.fx = values[0];
+  camera.fy = values[1];
+  camera.cx = values[2];
+  camera.cy = values[3];
+  for (std::size_t i = 4; i < values.size(); ++i) {
+    camera.coefficients[i - 4] = values[i];
+    if (values[i] != 0) camera.distortion = Distortion::kRadTan;
+  }
+  return camera;
+}
+
+void SetView(double view_deg, PinholeCamera& camera) {
+  camera.fx = camera.fy = 0.5 * camera.width / std::tan(0.5 * view_deg / internal::kDegrees);
+  camera.cx = 0.5 * (camera.width - 1);
+  camera.cy = 0.5 * (camera.height - 1);
+}
+
+void CheckCamera(const PinholeCamera& camera, const std::string& source) {
+  const std::string problem = camera.Validate();
+  if (!problem.empty()) throw InputError(source + ": " + problem);
+}
+
+// Where the camera comes from, for the findings.
+std::string SetRequested(const fs::path& dataset, const CameraRequest& request, DatasetOptions& options) {
+  const int given =
+      int(request.calibration.has_value()) + int(!request.camera.empty()) + int(request.view_deg.has_value());
+  if (given > 1) throw InputError("--calibration, --camera and --fov say the same; give one of them");
+  PinholeCamera camera;
+  std::string source;
+  if (request.calibration) {
+    const Calibration calibration = ReadCalibration(*request.calibration);
+    camera = calibration.camera;
+    if (calibration.baseline_m > 0) options.baseline_m = calibration.baseline_m;
+    if (calibration.depth_units_per_m > 0) options.depth_units_per_m = calibration.depth_units_per_m;
+    source = request.calibration->filename().string() + ", " + calibration.format;
+    SetImageSize(dataset, options, camera);
+  } else if (!request.camera.empty()) {
+    camera = ParseCamera(request.camera);
+    source = "--camera";
+    SetImageSize(dataset, options, camera);
+  } else {
+    SetImageSize(dataset, options, camera);
+    SetView(*request.view_deg, camera);
+    source = "--fov " + Short(*request.view_deg);
+  }
+  CheckCamera(camera, source);
+  options.camera = camera;
+  return source;
+}
+
+/// Puts a Recording together.
+class Recogniser {
+ public:
+  Recogniser(const fs::path& dataset, const CameraRequest& request)
+      : dataset_(dataset), request_(request), sensor_(request.sensor) {}
+
+  Recording Make() {
+    const bool live = IsCamera(dataset_.string());
+    const DatasetType type = live ? DatasetType::kVideo : DetectDatasetType(dataset_);
+    if (type == DatasetType::kKitti) {
+      Kitti();
+    } else if (type == DatasetType::kTum) {
+      Tum();
+    } else if (type == DatasetType::kEuroc) {
+      Euroc();
+    } else {
+      Single(type, live);
+    }
+    Say();
+    return out_;
+  }
+
+ private:
+  DatasetOptions& Options() { return out_.config.dataset; }
+  bool Exists(const char* name) const {
+    std::error_code ignored;
+    return fs::exists(dataset_ / name, ignored);
+  }
+
+  void Kitti() {
+    const bool grey = HasImages(dataset_ / "image_0");
+    const char* const right = grey ? "image_1" : "image_3";
+    layout_ = std::string("KITTI (") + (grey ? "image_0" : "image_2");
+    if (!sensor_ && HasImages(dataset_ / right)) {
+      sensor_ = Sensor::kStereo;
+      layout_ += std::string(", ") + right;
+    }
+    layout_ += ")";
+    out_.config = Published(sensor_ == Sensor::kStereo ? "kitti_00-02_stereo" : "kitti_00-02_mono");
+    ForgetCamera();
+    if (request_.HasLens()) {
+      Requested();
+    } else if (Exists("calib.txt")) {
+      source_ = "calib.txt";
+    } else {
+      BesideOrGuess();
+    }
+    if (sensor_ == Sensor::kStereo && Options().baseline_m == 0 && !Exists("calib.txt")) {
+      if (request_.sensor)
+        throw InputError(dataset_.string() +
+                         ": the distance of the two cameras is not known; a calib.txt "
+                         "has it, an ORB-SLAM file (--calibration), or --set camera.baseline_m=METRES");
+      sensor_ = Sensor::kMono;
+      note_ = "the right camera is not used: no file says how far apart the two are";
+    }
+  }
+
+  void Tum() {
+    layout_ = "TUM (" + std::string(Exists("rgb.txt") ? "rgb.txt" : "associations.txt");
+    const bool depth = Exists("depth.txt") || Exists("associations.txt");
+    if (!sensor_) sensor_ = depth ? Sensor::kRgbd : Sensor::kMono;
+    layout_ += depth && Exists("depth.txt") ? ", depth.txt)" : ")";
+    const std::string kind = sensor_ == Sensor::kRgbd ? "rgbd" : "mono";
+    const std::string known = TumCamera();
+    out_.config = Published((known.empty() ? "tum_fr3" : known) + "_" + kind);
+    const std::optional<PinholeCamera> published = Options().camera;
+    ForgetCamera();
+    if (request_.HasLens()) {
+      Requested();
+    } else if (!known.empty() && !CalibrationBeside(dataset_)) {
+      Options().camera = published;
+      source_ = "the one published for freiburg" + known.substr(6);
+    } else {
+      BesideOrGuess();
+    }
+  }
+
+  // The public data set's cameras are named in its folders.
+  std::string TumCamera() const {
+    const std::string name = fs::absolute(dataset_).lexically_normal().string();
+    for (const char* number : {"1", "2", "3"}) {
+      if (name.find(std::string("freiburg") + number) != std::string::npos)
+        return std::string("tum_fr") + number;
+    }
+    return {};
+  }
+
+  void Euroc() {
+    const fs::path base = HasImages(dataset_ / "mav0") ? dataset_ / "mav0" : dataset_;
+    const bool pair = HasImages(base / "cam1" / "data");
+    if (!sensor_) sensor_ = pair ? Sensor::kStereo : Sensor::kMono;
+    layout_ = sensor_ == Sensor::kStereo ? "EuRoC (cam0, cam1)" : "EuRoC (cam0)";
+    out_.config = Published(sensor_ == Sensor::kStereo ? "euroc_stereo" : "euroc_mono");
+    source_ = "sensor.yaml";
+    if (request_.HasLens()) Requested();
+  }
+
+  void Single(DatasetType type, bool live) {
+    layout_ = live                           ? "a camera"
+              : type == DatasetType::kImages ? "a folder of images"
+              : type == DatasetType::kBag    ? "a ROS bag"
+                                             : "a video";
+    out_.config = Published("images");
+    if (type != DatasetType::kImages) Options().rate_hz = 0;  // its own
+    if (!sensor_) sensor_ = Sensor::kMono;
+    if (request_.HasLens()) {
+      Requested();
+    } else if (type == DatasetType::kBag) {
+      source_ = "camera_info";
+    } else if (IsCameraDevice(dataset_.string())) {
+      source_.clear();  // appearance only
+    } else {
+      BesideOrGuess();
+    }
+  }
+
+  void ForgetCamera() {
+    Options().camera.reset();
+    Options().baseline_m = 0;
+  }
+  void Requested() {
+    Options().sensor = sensor_.value_or(Sensor::kMono);
+    source_ = SetRequested(dataset_, request_, Options());
+  }
+  void BesideOrGuess() {
+    std::error_code ignored;
+    const fs::path folder = fs::is_directory(dataset_, ignored) ? dataset_ : dataset_.parent_path();
+    CameraRequest request;
+    request.calibration = CalibrationBeside(folder);
+    if (!request.calibration) {
+      request.view_deg = kUsualView;
+      out_.guessed_lens = true;
+    }
+    source_ = SetRequested(dataset_, request, Options());
+    if (out_.guessed_lens) source_ = "guessed: a field of view of " + Short(kUsualView) + " deg";
+  }
+
+  void Say() {
+    Options().sensor = sensor_.value_or(Sensor::kMono);
+    std::string sensor = "one camera";
+    std::string other;
+    if (Options().sensor == Sensor::kStereo) {
+      sensor = "stereo";
+      other = "; --sensor mono uses the left camera alone";
+    } else if (Options().sensor == Sensor::kRgbd) {
+      sensor = "RGB-D, " + Short(Options().depth_units_per_m) + " units of depth a metre";
+      other = " (--set dataset.depth_units_per_m=1000 for millimetres); --sensor mono uses colour alone";
+    }
+    if (!note_.empty()) other += "; " + note_;
+    std::string camera = source_.empty() ? "not known: loops, but no trajectory" : source_;
+    if (Options().camera) {
+      const PinholeCamera& c = *Options().camera;
+      char text[160];
+      std::snprintf(text, sizeof text, "%dx%d px, fx %.1f, fy %.1f (", c.width, c.height, c.fx, c.fy);
+      camera = text + camera + ")";
+    }
+    out_.findings = {
+        "layout  " + layout_ + "; --set dataset.type=... for another", "sensor  " + sensor + other,
+        "camera  " + camera + "; --calibration FILE, --camera fx,fy,cx,cy or --fov DEG for another"};
+  }
+
+  const fs::path& dataset_;
+  const CameraRequest& request_;
+  std::optional<Sensor> sensor_;
+  Recording out_;
+  std::string layout_, source_, note_;
+};
+
+}  // namespace
+
+Recording Recognise(const fs::path& dataset, const CameraRequest& camera) {
+  return Recogniser(dataset, camera).Make();
+}
+
+void SetCamera(const fs::path& dataset, const CameraRequest& camera, RunConfig& config) {
+  if (camera.sensor) config.dataset.sensor = *camera.sensor;
+  if (camera.HasLens()) SetRequested(dataset, camera, config.dataset);
+}
+
+}  // namespace tutti

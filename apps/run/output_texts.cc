@@ -194,6 +194,7 @@ std::string Row(const std::string& name, const std::string& a, const std::string
 
 std::string Improvement(double before, double after) {
   if (!(before > 0) || !(after > 0)) return "";
+  if (std::abs(after - before) < 0.005 * before) return "none";
   if (after > before) return Cell(after / before, 2, "x, worse");
   return Cell(before / after, 2, "x better");
 }
@@ -205,6 +206,7 @@ std::string SummaryJson(const RunResult& r) {
   json["version"] = kVersion;
   json["dataset"] = r.dataset;
   json["config_file"] = r.config_file;
+  if (!r.camera_source.empty()) json["camera_source"] = r.camera_source;
   json["sensor"] = WordOf(r.rig.sensor);
   json["seed"] = r.config.loops.seed;
   json["realtime"] = r.realtime;
@@ -317,9 +319,14 @@ std::string ResultTable(const RunResult& r) {
       << " proposed";
   if (r.evaluation)
     out << " (" << r.evaluation->loops_true << " true, " << r.evaluation->loops_false << " false)";
-  out << "\n  time " << Cell(r.wall_s, 1, " s") << " (" << Cell(Quantile(r.frame_ms, 0.5), 1)
-      << " ms per frame, p99 " << Cell(Quantile(r.frame_ms, 0.99), 1) << " ms); memory "
-      << Cell(r.peak_memory_mb, 0, " MB") << "\n";
+  out << "\n  time " << Cell(r.wall_s, 1, " s");
+  if (r.frames_total > 0 && r.wall_s > 0) {
+    const auto frames = static_cast<double>(r.frames_total);
+    out << ", " << Cell(frames / r.wall_s, 1, " frames/s") << ", " << Cell(1000 * r.cpu_s / frames, 1)
+        << " ms of processor time per frame (p99 of tracking " << Cell(Quantile(r.frame_ms, 0.99), 1)
+        << " ms)";
+  }
+  out << "; memory " << Cell(r.peak_memory_mb, 0, " MB") << "\n";
   if (r.map && r.in_map) {
     out << "  in the map " << r.map->file;
     if (r.map->sessions.back().joined_at) out << " from frame " << *r.map->sessions.back().joined_at << " on";

@@ -1,35 +1,69 @@
 #include "apps/run/progress.h"
 
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <utility>
 
 namespace tutti {
+namespace {
 
-Progress::Progress(std::string title, std::size_t total, std::FILE* out)
+// "45 s", "3:20", "2:05:00".
+std::string TimeLeft(double seconds) {
+  const auto all = static_cast<long long>(std::min(seconds + 0.5, 1e7));
+  const long long h = all / 3600, m = all / 60 % 60, s = all % 60;
+  char text[40];
+  if (h > 0) {
+    std::snprintf(text, sizeof text, "%lld:%02lld:%02lld", h, m, s);
+  } else if (m > 0) {
+    std::snprintf(text, sizeof text, "%lld:%02lld", m, s);
+  } else {
+    std::snprintf(text, sizeof text, "%lld s", s);
+  }
+  return text;
+}
+
+}  // namespace
+
+Progress::Progress(std::string title, std::size_t total, std::FILE* out, std::size_t columns)
     : title_(std::move(title)),
       total_(total),
       out_(out),
+      columns_(columns),
       terminal_(out != nullptr && isatty(fileno(out)) != 0) {}
 
 Progress::~Progress() { Finish(); }
 
+std::size_t Progress::Columns() const {
+  if (columns_ > 0) return columns_;
+  winsize size{};
+  if (terminal_ && ioctl(fileno(out_), TIOCGWINSZ, &size) == 0 && size.ws_col > 0) return size.ws_col;
+  return 80;
+}
+
 std::string Progress::Line(std::size_t done, const std::string& status) const {
   const double seconds = since_begin_.Seconds();
+  const double rate = seconds > 0 ? static_cast<double>(done) / seconds : 0.0;
   char text[256];
-  const double share = total_ > 0 ? static_cast<double>(done) / static_cast<double>(total_) : 1.0;
   if (total_ == 0) {
-    std::snprintf(text, sizeof text, " %zu frames  %.1f/s  %s", done,
-                  seconds > 0 ? static_cast<double>(done) / seconds : 0.0, status.c_str());
-    return title_ + text;
+    std::snprintf(text, sizeof text, " %zu frames  %.1f/s  ", done, rate);
+    return (title_ + text + status).substr(0, Columns() - 1);
   }
-  std::snprintf(text, sizeof text, " %3.0f%%  %zu/%zu frames  %.1f/s  %s", 100 * share, done, total_,
-                seconds > 0 ? static_cast<double>(done) / seconds : 0.0, status.c_str());
-  if (!terminal_) return title_ + text;
-  constexpr std::size_t kWidth = 24;
-  const std::size_t filled = std::min(kWidth, static_cast<std::size_t>(share * static_cast<double>(kWidth)));
-  return title_ + " [" + std::string(filled, '#') + std::string(kWidth - filled, '.') + "]" + text;
+  const double share = static_cast<double>(done) / static_cast<double>(total_);
+  std::snprintf(text, sizeof text, " %3.0f%%  %zu/%zu  %.1f/s  ", 100 * share, done, total_, rate);
+  std::string line = text;
+  if (rate > 0 && done < total_) line += TimeLeft(static_cast<double>(total_ - done) / rate) + " left  ";
+  line += status;
+  // A bar where there is room for one.
+  constexpr std::size_t kWidest = 24, kNarrowest = 8;
+  const std::size_t used = title_.size() + line.size() + 4;
+  if (terminal_ && used + kNarrowest <= Columns()) {
+    const std::size_t width = std::min(kWidest, Columns() - used);
+    const std::size_t filled = std::min(width, static_cast<std::size_t>(share * static_cast<double>(width)));
+    line = " [" + std::string(filled, '#') + std::string(width - filled, '.') + "]" + line;
+  }
+  return (title_ + line).substr(0, Columns() - 1);
 }
 
 void Progress::Update(std::size_t done, const std::string& status) {

@@ -12,13 +12,13 @@ namespace tutti {
 /// Writes to `out` (stderr by default; nullptr: silent). Never part of a result.
 class Progress {
  public:
-  /// `total` frames; 0: nobody knows how many.
-  Progress(std::string title, std::size_t total, std::FILE* out = stderr);
+  /// `total` frames; 0: nobody knows how many. `columns`: width of a line; 0: that of the terminal.
+  Progress(std::string title, std::size_t total, std::FILE* out = stderr, std::size_t columns = 0);
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  /// `done` of `total` frames; `status` is free text (state, loops).
+  /// `done` of `total` frames; `status` is free text (state, loops). The line never fills the last column.
   void Update(std::size_t done, const std::string& status);
   /// A message above the progress line.
   void Note(const std::string& message);
@@ -26,10 +26,12 @@ class Progress {
 
  private:
   std::string Line(std::size_t done, const std::string& status) const;
+  std::size_t Columns() const;
 
   std::string title_;
   std::size_t total_;
   std::FILE* out_;
+  std::size_t columns_;  // 0: of the terminal, which may change
   bool terminal_ = false;
   bool line_open_ = false;
   std::size_t next_tenth_ = 1;

@@ -17,6 +17,9 @@ std::string Of(std::ptrdiff_t part, std::ptrdiff_t whole) {
 std::vector<std::string> DoubtsAbout(const RunResult& r) {
   std::vector<std::string> doubts;
   if (r.appearance_only || r.Void()) return doubts;
+  if (r.camera_guessed)
+    doubts.push_back("the camera is not calibrated (" + r.camera_source +
+                     "): turns and lengths can be wrong by tens of percent");
   const auto read = static_cast<std::ptrdiff_t>(r.frames_total - r.bad.size() - r.frames_dropped);
   const auto posed = static_cast<std::ptrdiff_t>(r.frames_tracked);
   if (static_cast<double>(posed) < kLeastPosed * static_cast<double>(read)) {

@@ -68,6 +68,8 @@ struct MapGoneOn {
 struct RunResult {
   // What was run.
   std::string dataset, config_file;
+  std::string camera_source;    ///< RunRequest::camera_source
+  bool camera_guessed = false;  ///< its focal length is one that cameras often have
   RunConfig config;
   CameraRig rig;
 

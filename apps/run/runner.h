@@ -19,9 +19,11 @@ namespace tutti {
 
 /// What the command line can say.
 struct RunRequest {
-  std::filesystem::path config;                       ///< YAML file
-  std::filesystem::path dataset;                      ///< folder, video file, or camera:0
-  std::filesystem::path out;                          ///< folder for the results; made if it is not there
+  std::filesystem::path config;   ///< YAML file
+  std::filesystem::path dataset;  ///< folder, video file, or camera:0
+  std::string camera_source;      ///< where the camera comes from, for summary.json; empty: from `config`
+  bool camera_guessed = false;    ///< nobody knows its focal length
+  std::filesystem::path out;      ///< folder for the results; made if it is not there
   std::optional<std::filesystem::path> ground_truth;  ///< "none": don't evaluate; default: the data set's own
   bool keep = false;  ///< number an earlier result in `out` instead of replacing it
   bool no_loops = false;

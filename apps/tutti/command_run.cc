@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "apps/report/page.h"
+#include "apps/run/focal_length.h"
 #include "apps/run/outputs.h"
 #include "apps/run/recording.h"
 #include "apps/run/run_doubts.h"
@@ -64,6 +65,10 @@ int RunAndShow(const CLI::App& command, const RunArguments& arguments, RunReques
       std::printf("  the odometry without loops: %.1f s more\n", result.odometry_alone_cpu_s);
   }
   std::printf("\n  results are in %s\n", result.folder.c_str());
+  const fs::path report = fs::path(result.folder) / "report.html";
+  std::error_code ignored;
+  if (!arguments.no_report && fs::exists(report, ignored))
+    std::printf("  look at %s\n", fs::absolute(report, ignored).c_str());
   for (const std::string& doubt : DoubtsAbout(result))
     std::fprintf(stderr, "tutti: warning: %s\n", doubt.c_str());
   if (!arguments.no_report && !arguments.quiet && !ReportsAvailable())
@@ -122,17 +127,40 @@ RunConfig ConfigOf(const std::string& map) {
   return config;
 }
 
+// Where nothing says what the focal length is, the images may.
+void MeasureGuess(const RunArguments& arguments, Recording& recording, RunRequest& request) {
+  const auto say = [&](const std::string& text) {
+    if (!arguments.quiet) std::fprintf(stderr, "  camera  %s\n", text.c_str());
+  };
+  say("measuring the focal length on the first frames ...");
+  const FocalLength found = MeasureFocalLength(arguments.dataset, recording.config);
+  char text[200];
+  if (found.measured) {
+    recording.config.dataset.camera = found.camera;
+    std::snprintf(text, sizeof text, "focal length measured on %d frames: %.1f px, give or take %.1f %%",
+                  found.frames, found.camera.fx, 100 * found.sigma);
+  } else {
+    request.camera_guessed = true;
+    std::snprintf(text, sizeof text, "focal length guessed, %.1f px: in the first %d frames %s",
+                  found.camera.fx, found.frames, found.reason.c_str());
+  }
+  request.camera_source = text;
+  say(text);
+}
+
 // From a file, or from the map to go on in, or from what the recording is.
-RunConfig ConfigFor(const CameraRequest& camera, const RunArguments& arguments) {
+RunConfig ConfigFor(const CameraRequest& camera, const RunArguments& arguments, RunRequest& request) {
   if (!arguments.config.empty() || !arguments.map.empty()) {
     RunConfig config = arguments.config.empty() ? ConfigOf(arguments.map) : LoadConfig(arguments.config);
     SetCamera(arguments.dataset, camera, config);
     return config;
   }
-  const Recording recording = Recognise(arguments.dataset, camera);
+  Recording recording = Recognise(arguments.dataset, camera);
   if (!arguments.quiet) {
     for (const std::string& finding : recording.findings) std::fprintf(stderr, "  %s\n", finding.c_str());
   }
+  SetOptions(arguments.set, recording.config);
+  if (recording.guessed_lens && !IsCamera(arguments.dataset)) MeasureGuess(arguments, recording, request);
   return recording.config;
 }
 
@@ -180,7 +208,7 @@ int Run(const CLI::App& command, const RunArguments& arguments) {
   if (!arguments.save_map.empty()) request.save_map = arguments.save_map;
   if (arguments.save_map.empty() && !arguments.no_map) request.save_map = kMap;
   if (!arguments.map.empty()) request.map = arguments.map;
-  RunConfig config = ConfigFor(CameraOf(command, arguments), arguments);
+  RunConfig config = ConfigFor(CameraOf(command, arguments), arguments, request);
   SetOptions(arguments.set, config);
   return RunAndShow(command, arguments, std::move(request), config);
 }

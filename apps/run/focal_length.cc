@@ -1,0 +1,270 @@
+#include "apps/run/focal_length.h"
+
+#include <ceres/ceres.h>
+#include <ceres/rotation.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "tutti/frontend/odometry.h"
+
+namespace tutti {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kPixelSigma = 1.0;    // of a keypoint [px]
+constexpr double kDepthSigma = 0.02;   // of a depth, as share of it
+constexpr double kLensSigma = 0.05;    // prior of k1
+constexpr double kCentreSigma = 0.01;  // prior of the principal point, as share of the width
+constexpr double kCorrelation = 3.0;   // errors of neighbouring keypoints are not independent
+constexpr double kWorstSigma = 0.05;   // of a focal length that is worth more than a guess
+constexpr int kFewestKeyframes = 6;
+constexpr std::size_t kMostLandmarks = 3000;
+
+struct Observation {
+  int keyframe = 0, landmark = 0;  // places in Scene
+  Eigen::Vector2d offset;          // from the principal point [px]
+  double depth = 0;                // [m]; 0: not measured
+};
+
+// A map as numbers that Ceres moves.
+struct Scene {
+  std::vector<std::array<double, 6>> cameras;  // angle-axis and translation, camera from world
+  std::vector<Eigen::Vector3d> landmarks;
+  std::vector<Observation> observations;
+  std::array<double, 4> lens = {{0, 0, 0, 0}};  // log of the focal length [px], k1, move of the centre [px]
+  double width = 0;
+};
+
+struct PixelError {
+  Eigen::Vector2d offset;
+  template <class T>
+  bool operator()(const T* camera, const T* landmark, const T* lens, T* error) const {
+    T p[3];
+    ceres::AngleAxisRotatePoint(camera, landmark, p);
+    for (int i = 0; i < 3; ++i) p[i] += camera[3 + i];
+    if (p[2] < T(1e-6)) return false;
+    const T x = p[0] / p[2], y = p[1] / p[2];
+    using std::exp;
+    const T scale = exp(lens[0]) * (T(1) + lens[1] * (x * x + y * y));
+    error[0] = (scale * x + lens[2] - T(offset.x())) / T(kPixelSigma);
+    error[1] = (scale * y + lens[3] - T(offset.y())) / T(kPixelSigma);
+    return true;
+  }
+};
+
+struct DepthError {
+  double depth;
+  template <class T>
+  bool operator()(const T* camera, const T* landmark, T* error) const {
+    T p[3];
+    ceres::AngleAxisRotatePoint(camera, landmark, p);
+    error[0] = (p[2] + camera[5] - T(depth)) / T(kDepthSigma * depth);
+    return true;
+  }
+};
+
+struct LensPrior {
+  double width;
+  template <class T>
+  bool operator()(const T* lens, T* error) const {
+    error[0] = lens[1] / T(kLensSigma);
+    for (int i = 1; i < 3; ++i) error[i] = lens[1 + i] / T(kCentreSigma * width);
+    return true;
+  }
+};
+
+struct Fit {
+  bool usable = false;
+  double cost = 0;
+  int residuals = 0;
+};
+
+// Adjusts the scene; `fixed_focal`: all but the focal length.
+Fit Adjust(Scene& scene, bool fixed_focal) {
+  ceres::Problem problem;
+  for (const Observation& o : scene.observations) {
+    double* const camera = scene.cameras[static_cast<std::size_t>(o.keyframe)].data();
+    double* const landmark = scene.landmarks[static_cast<std::size_t>(o.landmark)].data();
+    problem.AddResidualBlock(
+        new ceres::AutoDiffCostFunction<PixelError, 2, 6, 3, 4>(new PixelError{o.offset}),
+        new ceres::HuberLoss(2.0), camera, landmark, scene.lens.data());
+    if (o.depth > 0) {
+      problem.AddResidualBlock(new ceres::AutoDiffCostFunction<DepthError, 1, 6, 3>(new DepthError{o.depth}),
+                               new ceres::CauchyLoss(2.0), camera, landmark);
+    }
+  }
+  problem.AddResidualBlock(new ceres::AutoDiffCostFunction<LensPrior, 3, 4>(new LensPrior{scene.width}),
+                           nullptr, scene.lens.data());
+  problem.SetParameterBlockConstant(scene.cameras.front().data());
+  if (fixed_focal) problem.SetManifold(scene.lens.data(), new ceres::SubsetManifold(4, {0}));
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::SPARSE_SCHUR;
+  options.max_num_iterations = 40;
+  options.function_tolerance = 1e-5;
+  options.num_threads = 1;  // sums in one order
+  options.logging_type = ceres::SILENT;
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &problem, &summary);
+  return {summary.IsSolutionUsable(), summary.final_cost, summary.num_residuals_reduced};
+}
+
+// The largest piece of the map: landmarks that three keyframes see, those seen most first.
+std::optional<Scene> SceneOf(const Odometry& odometry, const std::map<int, cv::Mat>& depths) {
+  const std::vector<int> pieces = odometry.Pieces();
+  if (pieces.empty()) return std::nullopt;
+  std::vector<LandmarkView> landmarks = odometry.Landmarks();
+  landmarks.erase(
+      std::remove_if(landmarks.begin(), landmarks.end(),
+                     [](const LandmarkView& l) { return l.observations < 3 || !l.position.allFinite(); }),
+      landmarks.end());
+  std::stable_sort(landmarks.begin(), landmarks.end(), [](const LandmarkView& a, const LandmarkView& b) {
+    return a.observations > b.observations;
+  });
+  if (landmarks.size() > kMostLandmarks) landmarks.resize(kMostLandmarks);
+  Scene scene;
+  std::map<int, int> place;
+  for (const LandmarkView& landmark : landmarks) {
+    place[landmark.id] = static_cast<int>(scene.landmarks.size());
+    scene.landmarks.push_back(landmark.position);
+  }
+  const PinholeCamera& c = odometry.Rig().camera;
+  for (const int id : odometry.KeyframeIds()) {
+    const KeyframeView view = odometry.Keyframe(id);
+    if (view.map_piece != pieces.front() || !view.T_world_camera.IsFinite()) continue;
+    const Pose T_camera_world = view.T_world_camera.Inverse();
+    const auto depth = depths.find(id);
+    for (std::size_t f = 0; f < view.landmarks.size(); ++f) {
+      const auto found = place.find(view.landmarks[f]);
+      if (found == place.end()) continue;
+      const auto at = static_cast<std::size_t>(found->second);
+      if (!((T_camera_world * scene.landmarks[at]).z() > 0)) continue;
+      const cv::Point2f pixel = view.keypoints[f].pt;
+      Observation o{static_cast<int>(scene.cameras.size()),
+                    found->second,
+                    {double(pixel.x) - c.cx, double(pixel.y) - c.cy},
+                    0};
+      if (depth != depths.end()) {
+        const cv::Point whole(cvRound(pixel.x), cvRound(pixel.y));
+        if (cv::Rect(cv::Point(), depth->second.size()).contains(whole))
+          o.depth = double(depth->second.at<float>(whole));
+      }
+      scene.observations.push_back(o);
+    }
+    const Eigen::AngleAxisd turn(T_camera_world.rotation);
+    const Eigen::Vector3d r = turn.angle() * turn.axis(), t = T_camera_world.translation;
+    scene.cameras.push_back({{r.x(), r.y(), r.z(), t.x(), t.y(), t.z()}});
+  }
+  if (static_cast<int>(scene.cameras.size()) < kFewestKeyframes || scene.landmarks.size() < 50)
+    return std::nullopt;
+  scene.lens = {{std::log(std::sqrt(c.fx * c.fy)), 0, 0, 0}};
+  scene.width = c.width;
+  return scene;
+}
+
+struct Pass {
+  std::optional<Scene> scene;
+  int frames = 0, posed = 0;
+};
+
+Pass Track(const Dataset& dataset, const RunConfig& config, const PinholeCamera& camera, int frames) {
+  CameraRig rig = dataset.Rig();
+  rig.camera = camera;
+  OdometryOptions options = config.odometry;
+  options.lens_sigma = 0;  // the lens is sought here
+  Odometry odometry(options, rig);
+  std::map<int, cv::Mat> depths;
+  Pass pass;
+  for (std::size_t i = 0; i < dataset.Size() && pass.frames < frames; ++i) {
+    const ReadResult read = dataset.Read(i);
+    if (!read.frame) continue;
+    ++pass.frames;
+    const TrackResult track = odometry.Track(*read.frame);
+    pass.posed += int(track.state == TrackingState::kTracking);
+    if (track.keyframe >= 0 && !read.frame->depth_m.empty()) depths[track.keyframe] = read.frame->depth_m;
+  }
+  odometry.FinishMapping();
+  pass.scene = SceneOf(odometry, depths);
+  return pass;
+}
+
+// How far the focal length can be from the best one, as share of it.
+double SigmaOf(const Scene& best, const Fit& fit) {
+  constexpr double kStep = 0.03;
+  double rise = 0;
+  for (const double step : {-kStep, kStep}) {
+    Scene moved = best;
+    moved.lens[0] += step;
+    const Fit other = Adjust(moved, true);
+    if (!other.usable) return 1;
+    rise += 0.5 * (other.cost - fit.cost);
+  }
+  if (!(rise > 0)) return 1;
+  const auto free = static_cast<double>(6 * best.cameras.size() + 3 * best.landmarks.size());
+  const double variance = 2 * fit.cost / std::max(1.0, fit.residuals - free);
+  return kCorrelation * kStep * std::sqrt(std::max(variance, 1e-4) / (2 * rise));
+}
+
+PinholeCamera CameraOf(const PinholeCamera& before, const std::array<double, 4>& lens) {
+  PinholeCamera camera = before;
+  camera.fx = camera.fy = std::exp(lens[0]);
+  camera.cx = std::clamp(before.cx + lens[2], 0.0, double(before.width));
+  camera.cy = std::clamp(before.cy + lens[3], 0.0, double(before.height));
+  return camera;
+}
+
+}  // namespace
+
+FocalLength MeasureFocalLength(const fs::path& path, const RunConfig& config, int frames) {
+  constexpr int kMostPasses = 5;
+  constexpr double kSettled = 0.01;
+  const std::unique_ptr<Dataset> dataset = OpenDataset(path, config.dataset);
+  FocalLength result;
+  result.camera = dataset->Rig().camera;
+  // From the usual one; a wide or a narrow one where that loses its way.
+  const double usual = result.camera.fx;
+  for (const double share : {1.0, 0.65, 1.5}) {
+    PinholeCamera camera = result.camera;
+    camera.fx = camera.fy = share * usual;
+    for (int i = 0; i < kMostPasses; ++i) {
+      Pass pass = Track(*dataset, config, camera, frames);
+      result.frames = pass.frames;
+      if (!pass.scene || 2 * pass.posed < pass.frames) {
+        result.reason = "too little of it could be tracked";
+        break;
+      }
+      const Fit fit = Adjust(*pass.scene, false);
+      const PinholeCamera found = CameraOf(camera, pass.scene->lens);
+      if (!fit.usable || !(found.fx > 0.2 * camera.width) || !(found.fx < 10 * camera.width)) {
+        result.reason = "its frames agree with no focal length";
+        break;
+      }
+      const bool settled = std::abs(std::log(found.fx / camera.fx)) < kSettled;
+      camera = found;
+      if (!settled && i + 1 < kMostPasses) continue;
+      result.sigma = SigmaOf(*pass.scene, fit);
+      if (result.sigma > kWorstSigma) {
+        result.reason = "its motion does not tell the focal length";
+        return result;
+      }
+      result.measured = true;
+      result.reason.clear();
+      result.camera = camera;
+      if (std::abs(pass.scene->lens[1]) > 0.01) {
+        result.camera.distortion = Distortion::kRadTan;
+        result.camera.coefficients = {pass.scene->lens[1], 0, 0, 0, 0};
+      }
+      return result;
+    }
+  }
+  return result;
+}
+
+}  // namespace tutti

@@ -1,0 +1,30 @@
+// The focal length of a camera that nobody calibrated, from its images.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "tutti/core/camera.h"
+#include "tutti/slam/config.h"
+
+namespace tutti {
+
+/// What the first frames of a recording say of its camera.
+struct FocalLength {
+  bool measured = false;  ///< false: `camera` is as it was
+  PinholeCamera camera;   ///< square pixels; k1 where the lens has one
+  double sigma = 0;       ///< standard deviation of the focal length, as share of it
+  int frames = 0;         ///< that were looked at
+  std::string reason;     ///< why it was not measured
+};
+
+/// Odometry on at most `frames` frames with the camera of `config`, then a bundle adjustment of its keyframes
+/// with focal length, principal point and radial distortion free (Brown's model, k1 alone); both again with
+/// what was found, until it stays. Priors: principal point as it is, give or take 1 % of the width; k1 0,
+/// give or take 0.05. `sigma` is from how much worse the adjusted map
+/// fits with another focal length. One camera, or colour and depth, without distortion. The same input
+/// gives the same result. Throws InputError if the data set can't be opened.
+FocalLength MeasureFocalLength(const std::filesystem::path& dataset, const RunConfig& config,
+                               int frames = 300);
+
+}  // namespace tutti

@@ -1,0 +1,185 @@
+// Calibrations of other programs, as those programs write them.
+#include "apps/run/calibration_file.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "tests/support/test_data.h"
+#include "tutti/core/error.h"
+
+namespace tutti {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+
+Calibration Read(const std::string& text) {
+  const fs::path file = testing::FreshFolder() / "camera.yaml";
+  std::ofstream(file) << text;
+  return ReadCalibration(file);
+}
+
+std::string Refusal(const std::string& text) {
+  try {
+    Read(text);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(CalibrationFile, OfKalibrGivesItsFirstCamera) {
+  const Calibration c = Read(R"(cam0:
+  cam_overlaps: [1]
+  camera_model: pinhole
+  distortion_coeffs: [-0.28, 0.07, 0.0002, 1.76e-05]
+  distortion_model: radtan
+  intrinsics: [458.654, 457.296, 367.215, 248.375]
+  resolution: [752, 480]
+  rostopic: /cam0/image_raw
+cam1:
+  camera_model: pinhole
+  intrinsics: [1, 2, 3, 4]
+)");
+  EXPECT_EQ(c.format, "Kalibr");
+  EXPECT_EQ(c.camera.fx, 458.654);
+  EXPECT_EQ(c.camera.cy, 248.375);
+  EXPECT_EQ(c.camera.width, 752);
+  EXPECT_EQ(c.camera.distortion, Distortion::kRadTan);
+  EXPECT_EQ(c.camera.coefficients[3], 1.76e-05);
+}
+
+TEST(CalibrationFile, OfKalibrMayBeAFisheye) {
+  const Calibration c = Read(
+      "cam0: {camera_model: pinhole, distortion_model: equidistant, distortion_coeffs: [0.1, 0.2, 0.3, 0.4], "
+      "intrinsics: [400, 400, 320, 240], resolution: [640, 480]}\n");
+  EXPECT_EQ(c.camera.distortion, Distortion::kEquidistant);
+  EXPECT_EQ(c.camera.coefficients[3], 0.4);
+}
+
+TEST(CalibrationFile, OfOrbSlam3GivesStereoAndDepthToo) {
+  const Calibration c = Read(R"(%YAML:1.0
+---
+File.version: "1.0"
+Camera.type: "PinHole"
+Camera1.fx: 535.4
+Camera1.fy: 539.2
+Camera1.cx: 320.1
+Camera1.cy: 247.6
+Camera1.k1: 0.1
+Camera1.p2: 0.02
+Camera.width: 640
+Camera.height: 480
+Camera.fps: 30
+Stereo.b: 0.0745
+RGBD.DepthMapFactor: 5208.0
+)");
+  EXPECT_EQ(c.format, "ORB-SLAM3");
+  EXPECT_EQ(c.camera.fy, 539.2);
+  EXPECT_EQ(c.camera.coefficients, (DistortionCoefficients{0.1, 0, 0, 0.02, 0}));
+  EXPECT_EQ(c.baseline_m, 0.0745);
+  EXPECT_EQ(c.depth_units_per_m, 5208);
+  EXPECT_EQ(c.rate_hz, 30);
+}
+
+TEST(CalibrationFile, OfOrbSlam2HasItsBaselineInPixels) {
+  const Calibration c = Read(
+      "%YAML:1.0\nCamera.fx: 718.856\nCamera.fy: 718.856\nCamera.cx: 607.2\nCamera.cy: 185.2\n"
+      "Camera.k1: 0.0\nCamera.bf: 386.1448\n");
+  EXPECT_NEAR(c.baseline_m, 0.537166, 1e-6);
+  EXPECT_EQ(c.camera.width, 0);
+  EXPECT_EQ(c.camera.distortion, Distortion::kNone);
+}
+
+TEST(CalibrationFile, OfOrbSlam3MayBeAFisheye) {
+  const Calibration c = Read(
+      "%YAML:1.0\nCamera.type: \"KannalaBrandt8\"\nCamera1.fx: 190\nCamera1.fy: 190\nCamera1.cx: 254\n"
+      "Camera1.cy: 256\nCamera1.k1: 0.003\nCamera1.k2: 0.0007\nCamera1.k3: -0.002\nCamera1.k4: 0.0002\n");
+  EXPECT_EQ(c.camera.distortion, Distortion::kEquidistant);
+  EXPECT_EQ(c.camera.coefficients, (DistortionCoefficients{0.003, 0.0007, -0.002, 0.0002, 0}));
+}
+
+TEST(CalibrationFile, OfOpenCvHoldsMatrices) {
+  const Calibration c = Read(R"(%YAML:1.0
+---
+image_width: 640
+image_height: 480
+camera_matrix: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [ 520., 0., 318., 0., 521., 236., 0., 0., 1. ]
+distortion_coefficients: !!opencv-matrix
+   rows: 5
+   cols: 1
+   dt: d
+   data: [ 0.2, -0.4, 0.001, 0.002, 0.1 ]
+)");
+  EXPECT_EQ(c.format, "OpenCV");
+  EXPECT_EQ(c.camera.fy, 521);
+  EXPECT_EQ(c.camera.cx, 318);
+  EXPECT_EQ(c.camera.coefficients[4], 0.1);
+}
+
+TEST(CalibrationFile, OfRosNamesItsModel) {
+  const Calibration c = Read(
+      "image_width: 640\nimage_height: 480\ncamera_name: front\n"
+      "camera_matrix: {rows: 3, cols: 3, data: [500, 0, 320, 0, 500, 240, 0, 0, 1]}\n"
+      "distortion_model: plumb_bob\n"
+      "distortion_coefficients: {rows: 1, cols: 5, data: [0, 0, 0, 0, 0]}\n");
+  EXPECT_EQ(c.format, "ROS");
+  EXPECT_EQ(c.camera.distortion, Distortion::kNone);
+  EXPECT_EQ(c.camera.fx, 500);
+}
+
+TEST(CalibrationFile, OfTuttiIsItsCameraSection) {
+  const Calibration c = Read(
+      "camera:\n  width: 640\n  height: 480\n  fx: 500\n  fy: 500\n  cx: 320\n  cy: 240\n  baseline_m: "
+      "0.1\n");
+  EXPECT_EQ(c.format, "tutti");
+  EXPECT_EQ(c.baseline_m, 0.1);
+}
+
+TEST(CalibrationFile, ThatCantBeUsedIsRefusedWithLineAndReason) {
+  EXPECT_THAT(Refusal("hello: 1\n"), HasSubstr("camera.yaml: holds no calibration; the formats"));
+  EXPECT_THAT(Refusal("- 1\n"), HasSubstr("holds no keys"));
+  EXPECT_THAT(Refusal("a: [1\n"), HasSubstr("not valid YAML"));
+  EXPECT_THAT(Refusal("Camera.fx: 500\nCamera.fy: x\nCamera.cx: 1\nCamera.cy: 1\n"),
+              HasSubstr("camera.yaml:2: 'Camera.fy' is no number"));
+  EXPECT_THAT(Refusal("Camera.fx: .nan\nCamera.fy: 5\nCamera.cx: 1\nCamera.cy: 1\n"),
+              HasSubstr("'Camera.fx' is not finite"));
+  EXPECT_THAT(Refusal("Camera.fx: 500\nCamera.cx: 1\nCamera.cy: 1\n"), HasSubstr("has no key 'Camera.fy'"));
+  EXPECT_THAT(Refusal("cam0:\n  camera_model: omni\n  intrinsics: [1, 2, 3, 4, 5]\n"),
+              HasSubstr("camera_model 'omni'"));
+  EXPECT_THAT(Refusal("cam0:\n  intrinsics: [1, 2, 3]\n"), HasSubstr("has 3 values"));
+  EXPECT_THAT(Refusal("cam0:\n  intrinsics: [500, 500, 320, 240]\n  distortion_model: fov\n"
+                      "  distortion_coeffs: [0.9, 0, 0, 0]\n"),
+              HasSubstr("camera.yaml:4: the lens model 'fov' is not known"));
+  EXPECT_THAT(Refusal("camera_matrix: {data: [1, 2]}\n"), HasSubstr("has 2 values; 9 are needed"));
+  EXPECT_THAT(Refusal("camera_matrix: {data: [500, 0, 320, 0, 500, 240, 0, 0, 1]}\n"
+                      "distortion_coefficients: {data: [0.1, 0, 0, 0, 0, 0.3, 0, 0]}\n"),
+              HasSubstr("more than 5 coefficients"));
+  EXPECT_THAT(Refusal("Camera.fx: -500\nCamera.fy: 500\nCamera.cx: 320\nCamera.cy: 240\n"),
+              HasSubstr("camera.fx"));
+}
+
+TEST(CalibrationFile, ThatIsNotThereIsNamed) {
+  try {
+    ReadCalibration("/nowhere/camera.yaml");
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("/nowhere/camera.yaml: can't be opened"));
+  }
+}
+
+TEST(CalibrationFile, BesideTheImagesIsFoundByItsUsualNames) {
+  const fs::path folder = testing::FreshFolder();
+  EXPECT_FALSE(CalibrationBeside(folder));
+  std::ofstream(folder / "camchain.yaml") << "\n";
+  EXPECT_EQ(CalibrationBeside(folder), folder / "camchain.yaml");
+}
+
+}  // namespace
+}  // namespace tutti

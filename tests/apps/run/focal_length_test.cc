@@ -1,0 +1,88 @@
+// A focal length that nobody told is found in the images, or it is said that it can't be.
+#include "apps/run/focal_length.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "apps/run/recording.h"
+#include "tests/apps/generated_dataset.h"
+#include "tests/support/test_data.h"
+#include "tutti/core/error.h"
+
+namespace tutti {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+
+constexpr double kFocal = 260;
+constexpr int kFrames = 50;
+
+// A walk around in a room, in colour and depth.
+const fs::path& Room() {
+  static const testing::GeneratedDataset room("focal_length_room", [] {
+    SyntheticOptions options;
+    options.scene = SyntheticScene::kRoom;
+    options.sensor = SyntheticSensor::kRgbd;
+    options.width = 320;
+    options.height = 240;
+    options.focal_px = kFocal;
+    options.supersample = 1;
+    options.rate_hz = 5;
+    options.frames = kFrames;
+    return options;
+  }());
+  return room.path();
+}
+
+RunConfig RoomConfig(double focal_px) {
+  CameraRequest camera;
+  const std::string focal = std::to_string(focal_px);
+  camera.camera = focal + "," + focal + ",159.5,119.5";
+  return Recognise(Room(), camera).config;
+}
+
+TEST(FocalLength, OfARoomIsFoundFromAWrongOne) {
+  for (const double share : {0.8, 1.25}) {
+    const FocalLength found = MeasureFocalLength(Room(), RoomConfig(share * kFocal), kFrames);
+    ASSERT_TRUE(found.measured) << found.reason;
+    EXPECT_NEAR(found.camera.fx / kFocal, 1, 0.05);
+    EXPECT_LT(std::abs(std::log(found.camera.fx / kFocal)), 4 * found.sigma + 0.01);
+    EXPECT_EQ(found.camera.fx, found.camera.fy);
+  }
+}
+
+TEST(FocalLength, IsTheSameAgain) {
+  const RunConfig config = RoomConfig(1.1 * kFocal);
+  const FocalLength once = MeasureFocalLength(Room(), config, 20),
+                    again = MeasureFocalLength(Room(), config, 20);
+  EXPECT_EQ(once.measured, again.measured);
+  EXPECT_EQ(once.camera.fx, again.camera.fx);
+  EXPECT_EQ(once.sigma, again.sigma);
+}
+
+TEST(FocalLength, OfAFewFramesIsNotMeasured) {
+  const FocalLength found = MeasureFocalLength(Room(), RoomConfig(1.2 * kFocal), 4);
+  EXPECT_FALSE(found.measured);
+  EXPECT_THAT(found.reason, HasSubstr("too little of it"));
+  EXPECT_EQ(found.frames, 4);
+  EXPECT_DOUBLE_EQ(found.camera.fx, 1.2 * kFocal);
+}
+
+TEST(FocalLength, OfKittiAndRedkitchenIsFoundWithinFivePercent) {
+  for (const auto& [name, truth] :
+       {std::pair<const char*, double>{"kitti_00_head", 718.856}, {"redkitchen", 520}}) {
+    TUTTI_REQUIRE_DATA(folder, name);
+    CameraRequest camera;
+    camera.view_deg = 67;  // what is guessed where there is no calibration
+    const Recording recording = Recognise(folder, camera);
+    const FocalLength found = MeasureFocalLength(folder, recording.config, 200);
+    ASSERT_TRUE(found.measured) << name << ": " << found.reason;
+    EXPECT_NEAR(found.camera.fx / truth, 1, 0.05) << name;
+  }
+}
+
+}  // namespace
+}  // namespace tutti

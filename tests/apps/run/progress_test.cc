@@ -1,0 +1,50 @@
+// A line of progress fits the terminal and says when it will be over.
+#include "apps/run/progress.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <iterator>
+#include <sstream>
+
+#include "tests/support/test_data.h"
+
+namespace tutti {
+namespace {
+
+using ::testing::HasSubstr;
+
+// What is written for the first half of `total` frames, in lines of `columns`.
+std::string Written(std::size_t total, std::size_t columns, const std::string& status) {
+  const std::filesystem::path file = testing::FreshFolder() / "progress";
+  std::FILE* out = std::fopen(file.c_str(), "w");
+  {
+    Progress progress("slam", total, out, columns);
+    for (std::size_t i = 1; i <= total / 2; ++i) progress.Update(i, status);
+  }
+  std::fclose(out);
+  std::ifstream in(file);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+TEST(Progress, SaysRateAndTimeLeft) {
+  const std::string text = Written(1000, 120, "tracking  loops 1/2");
+  EXPECT_THAT(text, HasSubstr("500/1000"));
+  EXPECT_THAT(text, HasSubstr("/s  "));
+  EXPECT_THAT(text, HasSubstr(" left  tracking  loops 1/2"));
+}
+
+TEST(Progress, NeverFillsTheLine) {
+  std::istringstream lines(Written(100000, 60, std::string(200, 'x')));
+  std::string line;
+  int seen = 0;
+  while (std::getline(lines, line)) {
+    EXPECT_LT(line.size(), 60u) << line;
+    ++seen;
+  }
+  EXPECT_GE(seen, 4);
+}
+
+}  // namespace
+}  // namespace tutti

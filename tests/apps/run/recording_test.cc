@@ -1,0 +1,146 @@
+// What a recording is, from its folder alone.
+#include "apps/run/recording.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <opencv2/imgcodecs.hpp>
+
+#include "tests/apps/tiny_town.h"
+#include "tests/support/test_data.h"
+#include "tutti/core/error.h"
+
+namespace tutti {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+
+void WriteImages(const fs::path& folder, int count = 3, cv::Size size = {64, 48}) {
+  fs::create_directories(folder);
+  for (int i = 0; i < count; ++i)
+    cv::imwrite((folder / (std::to_string(i) + ".png")).string(), cv::Mat(size, CV_8UC1, cv::Scalar(80)));
+}
+
+fs::path TumFolder(const std::string& name, bool depth) {
+  const fs::path folder = testing::FreshFolder() / name;
+  WriteImages(folder / "rgb");
+  std::ofstream rgb(folder / "rgb.txt");
+  for (int i = 0; i < 3; ++i) rgb << i << " rgb/" << i << ".png\n";
+  if (!depth) return folder;
+  WriteImages(folder / "depth");
+  std::ofstream list(folder / "depth.txt");
+  for (int i = 0; i < 3; ++i) list << i << " depth/" << i << ".png\n";
+  return folder;
+}
+
+std::string Refusal(const fs::path& dataset, const CameraRequest& camera) {
+  try {
+    Recognise(dataset, camera);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(Recording, OfKittiWithTwoCamerasIsStereoWithItsOwnCalibration) {
+  const Recording town = Recognise(testing::TinyTown(), {});
+  EXPECT_EQ(town.config.dataset.type, DatasetType::kKitti);
+  EXPECT_EQ(town.config.dataset.sensor, Sensor::kStereo);
+  EXPECT_FALSE(town.config.dataset.camera);  // calib.txt has it
+  EXPECT_FALSE(town.guessed_lens);
+  ASSERT_EQ(town.findings.size(), 3u);
+  EXPECT_THAT(town.findings[0], HasSubstr("KITTI (image_0, image_1)"));
+  EXPECT_THAT(town.findings[1], HasSubstr("stereo; --sensor mono"));
+  EXPECT_THAT(town.findings[2], HasSubstr("calib.txt"));
+  const auto dataset = OpenDataset(testing::TinyTown(), town.config.dataset);
+  EXPECT_GT(dataset->Rig().baseline_m, 0.1);
+}
+
+TEST(Recording, IsOfOneCameraWhereThatIsAskedFor) {
+  CameraRequest camera;
+  camera.sensor = Sensor::kMono;
+  EXPECT_EQ(Recognise(testing::TinyTown(), camera).config.dataset.sensor, Sensor::kMono);
+}
+
+TEST(Recording, OfKittiWithoutCalibrationIsOneCameraWithAGuess) {
+  const fs::path folder = testing::CopyOfTinyTown(testing::FreshFolder() / "town");
+  fs::remove(folder / "calib.txt");
+  const Recording town = Recognise(folder, {});
+  EXPECT_TRUE(town.guessed_lens);
+  EXPECT_EQ(town.config.dataset.sensor, Sensor::kMono);
+  EXPECT_THAT(town.findings[1], HasSubstr("the right camera is not used"));
+  EXPECT_THAT(town.findings[2], HasSubstr("guessed"));
+  EXPECT_NO_THROW(OpenDataset(folder, town.config.dataset));
+  CameraRequest camera;
+  camera.sensor = Sensor::kStereo;
+  EXPECT_THAT(Refusal(folder, camera), HasSubstr("the distance of the two cameras is not known"));
+}
+
+TEST(Recording, OfTumWithDepthIsRgbd) {
+  EXPECT_EQ(Recognise(TumFolder("a", true), {}).config.dataset.sensor, Sensor::kRgbd);
+  EXPECT_EQ(Recognise(TumFolder("a", false), {}).config.dataset.sensor, Sensor::kMono);
+}
+
+TEST(Recording, OfTumsFolderNamesHasThePublishedCamera) {
+  const Recording known = Recognise(TumFolder("rgbd_dataset_freiburg1_desk", true), {});
+  ASSERT_TRUE(known.config.dataset.camera);
+  EXPECT_DOUBLE_EQ(known.config.dataset.camera->fx, 517.306408);
+  EXPECT_FALSE(known.guessed_lens);
+  const Recording other = Recognise(TumFolder("my_desk", true), {});
+  ASSERT_TRUE(other.config.dataset.camera);
+  EXPECT_TRUE(other.guessed_lens);
+  EXPECT_EQ(other.config.dataset.camera->width, 64);
+}
+
+TEST(Recording, OfImagesTakesTheCalibrationBesideThem) {
+  const fs::path folder = testing::FreshFolder();
+  WriteImages(folder);
+  EXPECT_TRUE(Recognise(folder, {}).guessed_lens);
+  std::ofstream(folder / "calibration.yaml")
+      << "Camera.fx: 60\nCamera.fy: 60\nCamera.cx: 32\nCamera.cy: 24\n";
+  const Recording known = Recognise(folder, {});
+  EXPECT_FALSE(known.guessed_lens);
+  EXPECT_EQ(known.config.dataset.camera->fx, 60);
+  EXPECT_EQ(known.config.dataset.camera->width, 64);
+  EXPECT_THAT(known.findings[2], HasSubstr("calibration.yaml, ORB-SLAM"));
+}
+
+TEST(Recording, TakesTheCameraOfTheCommandLineFirst) {
+  CameraRequest camera;
+  camera.camera = "70,71,30,20";
+  const auto given = Recognise(testing::TinyTown(), camera).config.dataset.camera;
+  ASSERT_TRUE(given);
+  EXPECT_EQ(given->fy, 71);
+  EXPECT_EQ(given->distortion, Distortion::kNone);
+  camera.camera = "70,71,30,20,0.1,0.2,0,0";
+  EXPECT_EQ(Recognise(testing::TinyTown(), camera).config.dataset.camera->distortion, Distortion::kRadTan);
+}
+
+TEST(Recording, KnowsTheFocalLengthOfAFieldOfView) {
+  CameraRequest camera;
+  camera.view_deg = 90;
+  const fs::path folder = testing::FreshFolder();
+  WriteImages(folder);
+  const auto given = Recognise(folder, camera).config.dataset.camera;
+  EXPECT_NEAR(given->fx, 32, 1e-9);
+  EXPECT_NEAR(given->cx, 31.5, 1e-9);
+}
+
+TEST(Recording, RefusesACameraThatCantBe) {
+  const fs::path town = testing::TinyTown();
+  CameraRequest camera;
+  camera.camera = "70,71,30";
+  EXPECT_THAT(Refusal(town, camera), HasSubstr("--camera: has 3 numbers"));
+  camera.camera = "70,x,30,20";
+  EXPECT_THAT(Refusal(town, camera), HasSubstr("'x' is no number"));
+  camera.camera = "70,71,-30,20";
+  EXPECT_THAT(Refusal(town, camera), HasSubstr("principal point"));
+  camera.view_deg = 60;
+  EXPECT_THAT(Refusal(town, camera), HasSubstr("give one of them"));
+  EXPECT_THAT(Refusal("/nowhere", {}), HasSubstr("does not exist"));
+}
+
+}  // namespace
+}  // namespace tutti

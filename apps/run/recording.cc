@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstdio>
+#include <fstream>
 #include <memory>
 
 #include "apps/run/calibration_file.h"
@@ -19,6 +20,8 @@ namespace fs = std::filesystem;
 // Horizontal field of view where nothing says it: between phones and webcams (60 to 70 deg) and those of
 // robots and cars (70 to 90).
 constexpr double kUsualView = 67;
+
+constexpr const char* kConfiguration = "config.yaml";
 
 bool HasImages(const fs::path& folder) {
   std::error_code ignored;
@@ -139,7 +142,9 @@ class Recogniser {
   Recording Make() {
     const bool live = IsCamera(dataset_.string());
     const DatasetType type = live ? DatasetType::kVideo : DetectDatasetType(dataset_);
-    if (type == DatasetType::kKitti) {
+    if (!live && HasConfiguration()) {
+      Configured();
+    } else if (type == DatasetType::kKitti) {
       Kitti();
     } else if (type == DatasetType::kTum) {
       Tum();
@@ -157,6 +162,26 @@ class Recogniser {
   bool Exists(const char* name) const {
     std::error_code ignored;
     return fs::exists(dataset_ / name, ignored);
+  }
+
+  // Of tutti generate, or somebody's own; other programs have files of that name, too.
+  bool HasConfiguration() const {
+    std::error_code ignored;
+    if (!fs::is_regular_file(dataset_ / kConfiguration, ignored)) return false;
+    for (std::ifstream in(dataset_ / kConfiguration); in.good();) {
+      std::string line;
+      std::getline(in, line);
+      if (line.rfind("dataset:", 0) == 0) return true;
+    }
+    return false;
+  }
+
+  void Configured() {
+    layout_ = std::string("as ") + kConfiguration + " in the folder says";
+    source_ = kConfiguration;
+    out_.config = LoadConfig(dataset_ / kConfiguration);
+    if (!sensor_) sensor_ = Options().sensor;
+    if (request_.HasLens()) Requested();
   }
 
   void Kitti() {

@@ -30,10 +30,11 @@ struct Recording {
   bool guessed_lens = false;  ///< nothing says what the focal length is: config has a usual one
 };
 
-/// Layout from the folder's content; sensor from the cameras that have images; calibration from `camera`,
-/// else from the data set's own files, else from a calibration file in the folder, else the one that is
-/// published for a folder of that name (TUM's freiburg1 to 3), else guessed. Cameras (camera:0) and videos
-/// too. Throws InputError for a missing or empty folder, and for a calibration that can't be used.
+/// A config.yaml of tutti in the folder counts first. Else: layout from the folder's content; sensor from the
+/// cameras that have images; calibration from `camera`, else from the data set's own files, else from a
+/// calibration file in the folder, else the one that is published for a folder of that name (TUM's freiburg1
+/// to 3), else guessed. Cameras (camera:0) and videos too. Throws InputError for a missing or empty folder,
+/// and for a calibration that can't be used.
 Recording Recognise(const std::filesystem::path& dataset, const CameraRequest& camera);
 
 /// Sets the camera that the command line names, in a configuration from elsewhere. Throws InputError as

@@ -35,6 +35,13 @@ fs::path TumFolder(const std::string& name, bool depth) {
   return folder;
 }
 
+// A generated town as KITTI comes: without a configuration of tutti.
+fs::path KittiTown() {
+  const fs::path folder = testing::CopyOfTinyTown(testing::FreshFolder() / "town");
+  fs::remove(folder / "config.yaml");
+  return folder;
+}
+
 std::string Refusal(const fs::path& dataset, const CameraRequest& camera) {
   try {
     Recognise(dataset, camera);
@@ -45,7 +52,8 @@ std::string Refusal(const fs::path& dataset, const CameraRequest& camera) {
 }
 
 TEST(Recording, OfKittiWithTwoCamerasIsStereoWithItsOwnCalibration) {
-  const Recording town = Recognise(testing::TinyTown(), {});
+  const fs::path folder = KittiTown();
+  const Recording town = Recognise(folder, {});
   EXPECT_EQ(town.config.dataset.type, DatasetType::kKitti);
   EXPECT_EQ(town.config.dataset.sensor, Sensor::kStereo);
   EXPECT_FALSE(town.config.dataset.camera);  // calib.txt has it
@@ -54,18 +62,18 @@ TEST(Recording, OfKittiWithTwoCamerasIsStereoWithItsOwnCalibration) {
   EXPECT_THAT(town.findings[0], HasSubstr("KITTI (image_0, image_1)"));
   EXPECT_THAT(town.findings[1], HasSubstr("stereo; --sensor mono"));
   EXPECT_THAT(town.findings[2], HasSubstr("calib.txt"));
-  const auto dataset = OpenDataset(testing::TinyTown(), town.config.dataset);
+  const auto dataset = OpenDataset(folder, town.config.dataset);
   EXPECT_GT(dataset->Rig().baseline_m, 0.1);
 }
 
 TEST(Recording, IsOfOneCameraWhereThatIsAskedFor) {
   CameraRequest camera;
   camera.sensor = Sensor::kMono;
-  EXPECT_EQ(Recognise(testing::TinyTown(), camera).config.dataset.sensor, Sensor::kMono);
+  EXPECT_EQ(Recognise(KittiTown(), camera).config.dataset.sensor, Sensor::kMono);
 }
 
 TEST(Recording, OfKittiWithoutCalibrationIsOneCameraWithAGuess) {
-  const fs::path folder = testing::CopyOfTinyTown(testing::FreshFolder() / "town");
+  const fs::path folder = KittiTown();
   fs::remove(folder / "calib.txt");
   const Recording town = Recognise(folder, {});
   EXPECT_TRUE(town.guessed_lens);
@@ -107,15 +115,29 @@ TEST(Recording, OfImagesTakesTheCalibrationBesideThem) {
   EXPECT_THAT(known.findings[2], HasSubstr("calibration.yaml, ORB-SLAM"));
 }
 
+TEST(Recording, WithAConfigurationInItsFolderIsReadAsThatSays) {
+  const fs::path folder = TumFolder("a", true);
+  std::ofstream(folder / "config.yaml") << "camera_model: theirs\n";
+  EXPECT_TRUE(Recognise(folder, {}).guessed_lens);
+  std::ofstream(folder / "config.yaml")
+      << "dataset:\n  type: tum\n  sensor: rgbd\n  max_depth_m: 3\ncamera:\n"
+         "  width: 64\n  height: 48\n  fx: 50\n  fy: 50\n  cx: 31\n  cy: 23\n";
+  const Recording own = Recognise(folder, {});
+  EXPECT_FALSE(own.guessed_lens);
+  EXPECT_EQ(own.config.dataset.max_depth_m, 3);
+  EXPECT_THAT(own.findings[0], HasSubstr("config.yaml"));
+}
+
 TEST(Recording, TakesTheCameraOfTheCommandLineFirst) {
   CameraRequest camera;
   camera.camera = "70,71,30,20";
-  const auto given = Recognise(testing::TinyTown(), camera).config.dataset.camera;
+  const fs::path town = KittiTown();
+  const auto given = Recognise(town, camera).config.dataset.camera;
   ASSERT_TRUE(given);
   EXPECT_EQ(given->fy, 71);
   EXPECT_EQ(given->distortion, Distortion::kNone);
   camera.camera = "70,71,30,20,0.1,0.2,0,0";
-  EXPECT_EQ(Recognise(testing::TinyTown(), camera).config.dataset.camera->distortion, Distortion::kRadTan);
+  EXPECT_EQ(Recognise(town, camera).config.dataset.camera->distortion, Distortion::kRadTan);
 }
 
 TEST(Recording, KnowsTheFocalLengthOfAFieldOfView) {
@@ -129,7 +151,7 @@ TEST(Recording, KnowsTheFocalLengthOfAFieldOfView) {
 }
 
 TEST(Recording, RefusesACameraThatCantBe) {
-  const fs::path town = testing::TinyTown();
+  const fs::path town = KittiTown();
   CameraRequest camera;
   camera.camera = "70,71,30";
   EXPECT_THAT(Refusal(town, camera), HasSubstr("--camera: has 3 numbers"));

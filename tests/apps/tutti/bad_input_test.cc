@@ -74,8 +74,8 @@ TEST_F(BadInput, UnknownKeyNamesTheNearestValidOne) {
 }
 
 TEST_F(BadInput, MissingOptionSaysWhich) {
-  const auto run = RunTutti({"run", "--dataset", "x", "--out", "y"});
-  ExpectRefused(run, "--config");
+  const auto run = RunTutti({"run", "--out", "y"});
+  ExpectRefused(run, "tutti run DATASET");
 }
 
 TEST_F(BadInput, OutputFolderThatCantBeWritten) {

@@ -101,6 +101,7 @@ LoopRun Run(const LoopsArguments& arguments, const LoopDetectorOptions& options,
   LoopRun run;
   run.images = arguments.images;
   run.stride = arguments.truth.stride;
+  run.judged = !arguments.truth.file.empty();
   run.options = options;
   LoopDetectorOptions with_posterior = options;
   with_posterior.keep_posterior = true;  // for confusion.png
@@ -168,8 +169,18 @@ int RunTable(const LoopsArguments& arguments, const Input& set) {
   return 0;
 }
 
+std::string DefaultOut(const std::string& images) {
+  const std::filesystem::path whole = std::filesystem::absolute(images).lexically_normal();
+  const std::filesystem::path name = whole.has_filename() ? whole : whole.parent_path();
+  return (std::filesystem::path("tutti-out") / (name.filename().string() + "-loops")).string();
+}
+
 int RunLoops(const LoopsArguments& given) {
   LoopsArguments arguments = given;
+  arguments.images = ImageFolder(arguments.images).string();
+  if (arguments.out.empty()) arguments.out = DefaultOut(given.images);
+  if (arguments.table && arguments.truth.file.empty())
+    throw InputError("--table compares rules by a ground truth; give --ground-truth");
   if (arguments.truth.join_pairs && !arguments.camera.empty()) {
     throw InputError(
         "--camera: images that --join-pairs joins have no common camera; leave one of the two out");
@@ -209,14 +220,16 @@ int RunLoops(const LoopsArguments& given) {
 
 void SetUpLoops(CLI::App& command, int& exit_code) {
   auto arguments = std::make_shared<LoopsArguments>();
-  command.add_option("--images", arguments->images, "folder of images, taken in natural order")->required();
   command
-      .add_option("--ground-truth", arguments->truth.file,
-                  "loop matrix (PNG, BMP, text, MATLAB .mat; row = current image) or trajectory (TUM, "
-                  "KITTI, EuRoC)")
+      .add_option("images,--images", arguments->images,
+                  "folder of images, taken in natural order, or a data set's (KITTI, TUM, EuRoC)")
       ->required();
-  command.add_option("--out", arguments->out, "folder for results.json, hypotheses.csv, curves and pictures")
-      ->required();
+  command.add_option("--ground-truth", arguments->truth.file,
+                     "loop matrix (PNG, BMP, text, MATLAB .mat; row = current image) or trajectory (TUM, "
+                     "KITTI, EuRoC); without one the loops are listed and shown, but not judged");
+  command.add_option("--out", arguments->out,
+                     "folder for loops.csv, results.json, hypotheses.csv, curves and pictures (default: "
+                     "tutti-out/NAME-loops)");
   command.add_option("--stride", arguments->truth.stride, "every n-th image")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();

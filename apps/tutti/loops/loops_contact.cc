@@ -24,6 +24,7 @@ constexpr double kTextHeight = 15;
 struct Entry {
   std::size_t row = 0;  // of LoopRun::rows
   bool missed = false;
+  bool found = false;  // accepted, and nobody knows whether rightly
 };
 
 std::vector<std::size_t> RowsOf(const LoopReport& report, LoopOutcome outcome) {
@@ -153,6 +154,17 @@ std::vector<std::string> Wrapped(const std::string& text, double width) {
   return {text.substr(0, end), Fitted(text.substr(end + 1), width)};
 }
 
+// Where nothing is known: accepted loops, evenly.
+std::vector<Entry> ChooseFound(const LoopRun& run) {
+  std::vector<std::size_t> accepted;
+  for (std::size_t i = 0; i < run.rows.size(); ++i) {
+    if (run.rows[i].result.accepted) accepted.push_back(i);
+  }
+  std::vector<Entry> entries;
+  for (const std::size_t row : Spread(accepted, kMostRows)) entries.push_back({row, false, true});
+  return entries;
+}
+
 void DrawEntry(const LoopRun& run, const Entry& entry, cv::Mat strip) {
   const LoopRow& row = run.rows[entry.row];
   const LoopResult& r = row.result;
@@ -160,11 +172,12 @@ void DrawEntry(const LoopRun& run, const Entry& entry, cv::Mat strip) {
   const long said = row.Said();
   const TruthOfRow truth = LookUp(run.truth, image, said);
   const long shown[] = {image, said, truth.shown};
-  const char* absent[] = {"", "nothing was proposed", "no loop in the ground truth"};
+  const char* absent[] = {"", "nothing was proposed",
+                          entry.found ? "there is no ground truth" : "no loop in the ground truth"};
   const std::string heads[] = {"image " + Name(run, image),
                                (r.accepted ? "accepted: " : "best: ") + Name(run, said),
-                               TruthText(run, truth)};
-  const std::string color = entry.missed ? kMissedColor : kFalseColor;
+                               entry.found ? "" : TruthText(run, truth)};
+  const std::string color = entry.found ? kTrueColor : entry.missed ? kMissedColor : kFalseColor;
   std::string reason = !row.read ? "the image can't be read" : r.reason;
   if (entry.missed && r.accepted) reason = "accepted on a pair that the ground truth ignores";
   if (!entry.missed) reason = "accepted";
@@ -175,8 +188,8 @@ void DrawEntry(const LoopRun& run, const Entry& entry, cv::Mat strip) {
     shapes.push_back(
         PlotText({static_cast<double>(left), kCaption - 8.0}, Fitted(heads[k], kThumbWidth), kTextHeight));
   }
-  const std::string line =
-      std::string(entry.missed ? "missed: " : "false positive: ") + Numbers(run, r) + "; " + reason;
+  const std::string kind = entry.found ? "loop: " : entry.missed ? "missed: " : "false positive: ";
+  const std::string line = kind + Numbers(run, r) + "; " + reason;
   double y = 28;
   for (const std::string& part : Wrapped(line, kWidth - 2 * kMargin)) {
     shapes.push_back(PlotText({kMargin, y}, part, kTextHeight));
@@ -190,7 +203,7 @@ void DrawEntry(const LoopRun& run, const Entry& entry, cv::Mat strip) {
 void WriteContactSheet(const LoopRun& run, const LoopReport& report, const std::filesystem::path& file) {
   const std::vector<std::size_t> wrong = RowsOf(report, LoopOutcome::kFalsePositive);
   const std::vector<std::size_t> missed = RowsOf(report, LoopOutcome::kMissed);
-  const std::vector<Entry> entries = Choose(wrong, missed, run);
+  const std::vector<Entry> entries = run.judged ? Choose(wrong, missed, run) : ChooseFound(run);
   const int strip = kCaption + kThumbHeight + kMargin;
   const int height = kHeader + std::max(1, static_cast<int>(entries.size())) * strip;
   cv::Mat picture(height, kWidth, CV_8UC3, cv::Scalar::all(255));
@@ -199,7 +212,9 @@ void WriteContactSheet(const LoopRun& run, const LoopReport& report, const std::
   std::snprintf(text, sizeof text, "false positives: %zu, missed loops: %zu, at probability >= %g",
                 wrong.size(), missed.size(), run.options.loop_threshold);
   std::string summary = text;
-  if (entries.size() < wrong.size() + missed.size())
+  if (!run.judged) {
+    summary = std::to_string(entries.size()) + " of the accepted loops, evenly; all are in loops.csv";
+  } else if (entries.size() < wrong.size() + missed.size())
     summary +=
         "; " + std::to_string(entries.size()) +
         " are shown: the most probable of the false ones, the missed ones evenly; all are in hypotheses.csv";
@@ -207,7 +222,8 @@ void WriteContactSheet(const LoopRun& run, const LoopReport& report, const std::
                                    PlotText({kMargin, 64}, summary, 16)};
   if (entries.empty())
     shapes.push_back(PlotText({0.5 * kWidth, kHeader + 0.5 * strip},
-                              "none: no false positive, no missed loop", 22, PlotShape::Anchor::kMiddle));
+                              run.judged ? "none: no false positive, no missed loop" : "no loop was accepted",
+                              22, PlotShape::Anchor::kMiddle));
   DrawShapes(shapes, picture);
   for (std::size_t k = 0; k < entries.size(); ++k) {
     const int top = kHeader + static_cast<int>(k) * strip;

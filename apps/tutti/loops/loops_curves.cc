@@ -52,6 +52,7 @@ std::string RunTitle(const LoopRun& run, const LoopReport& report) {
   std::string text =
       RuleName(run.options) + ", " + std::to_string(report.verified.images) + " images of " + name;
   if (run.stride > 1) text += " (stride " + std::to_string(run.stride) + ")";
+  if (!run.judged) return text;
   return text + ", " + std::to_string(report.verified.rows_with_loop) + " with a loop";
 }
 

@@ -131,7 +131,25 @@ LoopGroundTruth FromPoses(const GroundTruthArguments& arguments, const std::vect
   return truth;
 }
 
+LoopGroundTruth NoTruth(int images) {
+  LoopGroundTruth truth(images);
+  for (int row = 0; row < images; ++row) {
+    for (int column = 0; column < row; ++column) truth.Set(row, column, LoopLabel::kIgnore);
+  }
+  return truth;
+}
+
 }  // namespace
+
+fs::path ImageFolder(const fs::path& folder) {
+  std::error_code error;
+  if (!fs::is_directory(folder, error) || !ImagesIn(folder).empty()) return folder;
+  for (const char* images : {"image_0", "image_2", "rgb", "mav0/cam0/data", "images"}) {
+    if (fs::is_directory(folder / images, error) && !ImagesIn(folder / images).empty())
+      return folder / images;
+  }
+  return folder;
+}
 
 std::vector<fs::path> ListImages(const fs::path& folder) {
   std::error_code error;
@@ -181,11 +199,12 @@ ImageSet LoadImageSet(const std::string& folder, const GroundTruthArguments& arg
   std::vector<fs::path> rights(images.size());
   if (arguments.join_pairs) rights = TakeRightImages(folder, images);
   ImageSet set;
-  set.truth = LoadGroundTruth(arguments, images);
   for (std::size_t i = 0; i < images.size(); i += static_cast<std::size_t>(arguments.stride)) {
     set.images.push_back(images[i]);
     set.rights.push_back(rights[i]);
   }
+  set.truth = arguments.file.empty() ? NoTruth(static_cast<int>(set.images.size()))
+                                     : LoadGroundTruth(arguments, images);
   return set;
 }
 

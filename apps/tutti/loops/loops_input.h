@@ -18,7 +18,7 @@ std::vector<std::filesystem::path> ListImages(const std::filesystem::path& folde
 std::vector<std::filesystem::path> ImagesIn(const std::filesystem::path& folder);
 
 struct GroundTruthArguments {
-  std::string file;  ///< a loop matrix or a trajectory
+  std::string file;  ///< a loop matrix or a trajectory; empty: there is none
   LoopRule rule;
   int stride = 1;
   bool join_pairs = false;  ///< each of the images is two, and the ground truth may be of the single ones
@@ -35,8 +35,12 @@ LoopGroundTruth LoadGroundTruth(const GroundTruthArguments& arguments,
 struct ImageSet {
   std::vector<std::filesystem::path> images;  ///< every stride-th
   std::vector<std::filesystem::path> rights;  ///< beside each of them; empty without join_pairs
-  LoopGroundTruth truth;
+  LoopGroundTruth truth;                      ///< of a set without one: every pair is ignored
 };
+
+/// The folder of images that a data set's folder holds (KITTI: image_0, TUM: rgb, EuRoC: mav0/cam0/data), or
+/// the folder itself where it holds images or no data set.
+std::filesystem::path ImageFolder(const std::filesystem::path& folder);
 
 /// A loop matrix that lies among the images is none of them. Throws InputError.
 ImageSet LoadImageSet(const std::string& folder, const GroundTruthArguments& arguments);

@@ -82,6 +82,11 @@ std::ptrdiff_t EarlierLoops(const LoopRun& run) {
                        [](const LoopRow& row) { return row.earlier.has_value(); });
 }
 
+std::ptrdiff_t AcceptedLoops(const LoopRun& run) {
+  return std::count_if(run.rows.begin(), run.rows.end(),
+                       [](const LoopRow& row) { return row.result.accepted; });
+}
+
 std::string Csv(const LoopRun& run) {
   std::string text =
       "image,file,hypothesis,candidate,posterior,probability,proposed,accepted,verified_candidate,matches,"
@@ -97,11 +102,12 @@ std::string Csv(const LoopRun& run) {
     const long verified = r.accepted ? run.Number(r.candidate) : -1;
     const long location = row.Said();
     char numbers[256];
-    std::snprintf(numbers, sizeof numbers, ",%.9g,%ld,%.9g,%.9g,%d,%d,%ld,%d,%d,%s,%d", r.hypothesis,
-                  run.Number(r.best), r.posterior, r.probability, r.proposed ? 1 : 0, r.accepted ? 1 : 0,
-                  verified, r.verification.matches, r.verification.inliers,
-                  location < 0 ? "-" : LabelName(run.truth.At(image, static_cast<int>(location))),
-                  run.truth.HasLoop(image) ? 1 : 0);
+    std::snprintf(
+        numbers, sizeof numbers, ",%.9g,%ld,%.9g,%.9g,%d,%d,%ld,%d,%d,%s,%d", r.hypothesis,
+        run.Number(r.best), r.posterior, r.probability, r.proposed ? 1 : 0, r.accepted ? 1 : 0, verified,
+        r.verification.matches, r.verification.inliers,
+        location < 0 || !run.judged ? "-" : LabelName(run.truth.At(image, static_cast<int>(location))),
+        run.truth.HasLoop(image) ? 1 : 0);
     text += std::to_string(run.Number(image)) + "," + Quoted(row.file) + numbers;
     for (std::size_t k = 0; k < run.options.members.size(); ++k) {
       const MemberOpinion opinion = k < r.members.size() ? r.members[k] : MemberOpinion();
@@ -114,6 +120,27 @@ std::string Csv(const LoopRun& run) {
   return text;
 }
 
+// Without a ground truth there is nothing to rank against.
+nlohmann::ordered_json FoundJson(const LoopRun& run, const LoopReport& report) {
+  return {{"images", run.rows.size()},
+          {"images_damaged", report.damaged},
+          {"accepted", AcceptedLoops(run)},
+          {"threshold", run.options.loop_threshold},
+          {"ms_per_image", {{"median", report.ms_median}, {"p99", report.ms_p99}}},
+          {"stage_ms_median", Stages(run.rows)}};
+}
+
+void PrintFound(const LoopRun& run, const LoopReport& report, const std::filesystem::path& folder) {
+  std::printf("%-34s %s\n", "rule", RuleName(run.options).c_str());
+  std::printf("%-34s %zu, %d of them damaged\n", "images", run.rows.size(), report.damaged);
+  std::printf("%-34s %td, at a probability of %g or more\n", "loops accepted", AcceptedLoops(run),
+              run.options.loop_threshold);
+  std::printf("%-34s %.1f median, %.1f p99\n", "ms per image", report.ms_median, report.ms_p99);
+  std::printf("written: %s, contact_sheet.png (look at it), hypotheses.csv, results.json, confusion.png\n",
+              (folder / "loops.csv").string().c_str());
+  std::printf("with --ground-truth (a loop matrix or a trajectory) they are judged as well\n");
+}
+
 }  // namespace
 
 const char* LabelName(LoopLabel label) {
@@ -124,6 +151,21 @@ std::string Quoted(const std::string& text) {
   std::string result = "\"";
   for (const char c : text) result += c == '"' ? "\"\"" : std::string(1, c);
   return result + "\"";
+}
+
+std::string FoundLoopsCsv(const LoopRun& run) {
+  std::string text = "image,loop_with,probability,inliers,matches,file,loop_with_file\n";
+  for (const LoopRow& row : run.rows) {
+    const LoopResult& r = row.result;
+    if (!r.accepted) continue;
+    char numbers[128];
+    std::snprintf(numbers, sizeof numbers, "%ld,%ld,%.9g,%d,%d,", run.Number(r.query),
+                  run.Number(r.candidate), r.probability, r.verification.inliers, r.verification.matches);
+    const auto candidate = static_cast<std::size_t>(r.candidate);
+    const std::string other = candidate < run.rows.size() ? run.rows[candidate].file : "";
+    text += numbers + Quoted(row.file) + "," + Quoted(other) + "\n";
+  }
+  return text;
 }
 
 LoopReport EvaluateRun(const LoopRun& run) {
@@ -174,20 +216,22 @@ nlohmann::ordered_json FiguresJson(const LoopRun& run, const LoopReport& report)
 }
 
 nlohmann::ordered_json ProtocolJson(const LoopRun& run) {
-  return {{"image_folder", run.images},
-          {"stride", run.stride},
-          {"ground_truth", run.truth.description},
-          {"tolerance_frames", 0},
-          {"exclusion", "the newest " + std::to_string(run.options.stm_size) + " images (short-term memory)"},
-          {"threshold",
-           "recall_at_100_precision: chosen after the fact; at_default_threshold: fixed, of the probability; "
-           "posterior: of H"}};
+  return {
+      {"image_folder", run.images},
+      {"stride", run.stride},
+      {"ground_truth", run.judged ? nlohmann::ordered_json(run.truth.description) : nlohmann::ordered_json()},
+      {"tolerance_frames", 0},
+      {"exclusion", "the newest " + std::to_string(run.options.stm_size) + " images (short-term memory)"},
+      {"threshold",
+       "recall_at_100_precision: chosen after the fact; at_default_threshold: fixed, of the probability; "
+       "posterior: of H"}};
 }
 
 OutputFolder OpenLoopsFolder(const std::filesystem::path& folder, bool table) {
   const auto is_result = [](const std::filesystem::path& entry) {
     static const std::set<std::string> kFiles = {"results.json",
                                                  "hypotheses.csv",
+                                                 "loops.csv",
                                                  "precision_recall.csv",
                                                  "precision_recall.svg",
                                                  "confusion.png",
@@ -212,19 +256,22 @@ OutputFolder OpenLoopsFolder(const std::filesystem::path& folder, bool table) {
 std::filesystem::path WriteLoopRun(const LoopRun& run, const LoopReport& report, bool finished,
                                    OutputFolder& folder) {
   using File = const std::filesystem::path&;
-  nlohmann::ordered_json json = FiguresJson(run, report);
+  nlohmann::ordered_json json = run.judged ? FiguresJson(run, report) : FoundJson(run, report);
   json["protocol"] = ProtocolJson(run);
   json["protocol"]["rule"] = RuleName(run.options);
   json["protocol"]["members"] = run.options.members;
   json["protocol"]["seed"] = run.options.seed;
   json["protocol"]["threads"] = run.options.threads;
   if (run.earlier > 0) json["earlier"] = {{"images", run.earlier}, {"loops", EarlierLoops(run)}};
-  const CurvePlot curves = PlotCurves(run, report);
   folder.Write({"results.json", [&](File file) { WriteText(file, JsonText(json)); }});
   folder.Write({"hypotheses.csv", [&](File file) { WriteText(file, Csv(run)); }});
-  folder.Write({"precision_recall.csv", [&](File file) { WriteCurvesCsv(report, file); }});
-  folder.Write({"precision_recall.svg", [&](File file) { WriteSvg(file, curves); }});
-  folder.Write({"precision_recall.png", [&](File file) { WritePng(file, curves); }});
+  folder.Write({"loops.csv", [&](File file) { WriteText(file, FoundLoopsCsv(run)); }});
+  if (run.judged) {
+    const CurvePlot curves = PlotCurves(run, report);
+    folder.Write({"precision_recall.csv", [&](File file) { WriteCurvesCsv(report, file); }});
+    folder.Write({"precision_recall.svg", [&](File file) { WriteSvg(file, curves); }});
+    folder.Write({"precision_recall.png", [&](File file) { WritePng(file, curves); }});
+  }
   folder.Write({"confusion.png", [&](File file) { WriteConfusion(run, report, file); }});
   folder.Write({"contact_sheet.png", [&](File file) { WriteContactSheet(run, report, file); }});
   if (run.earlier > 0)
@@ -237,6 +284,7 @@ std::filesystem::path WriteLoopRun(const LoopRun& run, const LoopReport& report,
 }
 
 void PrintLoopRun(const LoopRun& run, const LoopReport& report, const std::filesystem::path& folder) {
+  if (!run.judged) return PrintFound(run, report, folder);
   const LoopEvaluation &verified = report.verified, &ranked = report.ranked, &posterior = report.posterior;
   std::printf("%-34s %s\n", "rule", RuleName(run.options).c_str());
   std::printf("%-34s %d (%d with a loop)\n", "images", verified.images, verified.rows_with_loop);
@@ -270,7 +318,8 @@ void PrintLoopRun(const LoopRun& run, const LoopReport& report, const std::files
   }
   std::printf("%-34s %.1f median, %.1f p99\n", "ms per image", report.ms_median, report.ms_p99);
   std::printf(
-      "written: %s, hypotheses.csv, precision_recall.{csv,svg,png}, confusion.png, contact_sheet.png\n",
+      "written: %s, loops.csv, hypotheses.csv, precision_recall.{csv,svg,png}, confusion.png, "
+      "contact_sheet.png\n",
       (folder / "results.json").string().c_str());
 }
 

@@ -41,7 +41,8 @@ struct LoopRun {
   LoopDetectorOptions options;
   std::string images;
   int stride = 1;
-  LoopGroundTruth truth;  ///< of the rows
+  LoopGroundTruth truth;  ///< of the rows; where there is none, every pair is ignored
+  bool judged = true;     ///< there is a ground truth
   std::vector<LoopRow> rows;
   std::int64_t earlier = 0;  ///< images of earlier runs that it went on from
   cv::Mat posterior;  ///< CV_32FC1, square: the posterior of past images (columns), by AddPosterior; may be
@@ -75,6 +76,9 @@ nlohmann::ordered_json ProtocolJson(const LoopRun& run);
 /// The folder of one run, or of a table of runs, each of which has a folder of its own in it. Throws
 /// InputError as OutputFolder does.
 OutputFolder OpenLoopsFolder(const std::filesystem::path& folder, bool table = false);
+
+/// The loops that were accepted, one a line: both images with their files, probability, inliers.
+std::string FoundLoopsCsv(const LoopRun& run);
 
 /// Writes all files of a run and puts them into place. Returns where. Throws InputError that names those that
 /// can't be written.

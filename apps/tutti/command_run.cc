@@ -102,14 +102,14 @@ int Resume(const CLI::App& command, const RunArguments& arguments) {
 }
 
 // What the map was made with, for a recording of which all frames are used.
-RunConfig ConfigOf(const std::string& map) {
+RunConfig ConfigOfMap(const std::string& map) {
   RunConfig config = ReadMapInfo(map).config;
   config.dataset.start = config.dataset.end = 0;
   config.dataset.stride = 1;
   return config;
 }
 
-int Run(const CLI::App& command, const RunArguments& arguments) {
+int RunOnce(const CLI::App& command, const RunArguments& arguments) {
   if (arguments.help_config) {
     std::fputs(HelpConfig(arguments.advanced).c_str(), stdout);
     return 0;
@@ -145,7 +145,7 @@ int Run(const CLI::App& command, const RunArguments& arguments) {
   if (!arguments.save_map.empty()) request.save_map = arguments.save_map;
   if (arguments.save_map.empty() && !arguments.no_map) request.save_map = kMap;
   if (!arguments.map.empty()) request.map = arguments.map;
-  RunConfig config = arguments.config.empty() ? ConfigOf(arguments.map) : LoadConfig(request.config);
+  RunConfig config = arguments.config.empty() ? ConfigOfMap(arguments.map) : LoadConfig(request.config);
   SetOptions(arguments.set, config);
   return RunAndShow(command, arguments, std::move(request), config);
 }
@@ -241,7 +241,7 @@ void SetUpRun(CLI::App& command, int& exit_code) {
   command.add_flag("--help-config", arguments->help_config,
                    "print the keys of the configuration that users set, with their defaults");
   command.add_flag("--advanced", arguments->advanced, "with --help-config: all keys");
-  command.callback([&command, arguments, &exit_code] { exit_code = Run(command, *arguments); });
+  command.callback([&command, arguments, &exit_code] { exit_code = RunOnce(command, *arguments); });
 }
 
 }  // namespace tutti::cli

@@ -55,4 +55,16 @@ inline InputFrame Black(InputFrame frame) {
   return frame;
 }
 
+/// Something to see, but nothing of the map and no depth.
+inline InputFrame Snow(InputFrame frame) {
+  cv::RNG random(static_cast<std::uint64_t>(frame.index) + 1);
+  for (cv::Mat* image : {&frame.image, &frame.right}) {
+    if (image->empty()) continue;
+    *image = image->clone();
+    random.fill(*image, cv::RNG::UNIFORM, 0, 256);
+  }
+  if (!frame.depth_m.empty()) frame.depth_m = cv::Mat::zeros(frame.depth_m.size(), CV_32FC1);
+  return frame;
+}
+
 }  // namespace tutti::testing

@@ -96,8 +96,8 @@ void DropEvidence(bool with_posterior, LoopResult& result) {
 }
 
 // Up to Ctrl-C: a run that ended early has the ground truth of its images only. A dump goes into `folder`.
-LoopRun Run(const LoopsArguments& arguments, const LoopDetectorOptions& options, const Input& set,
-            const std::filesystem::path& folder) {
+LoopRun RunDetector(const LoopsArguments& arguments, const LoopDetectorOptions& options, const Input& set,
+                    const std::filesystem::path& folder) {
   LoopRun run;
   run.images = arguments.images;
   run.stride = arguments.truth.stride;
@@ -153,7 +153,7 @@ int RunTable(const LoopsArguments& arguments, const Input& set) {
     LoopDetectorOptions options = arguments.options;
     SetRule(rule, options);
     OutputFolder part = OpenLoopsFolder(folder.path() / rule);
-    const LoopRun run = Run(arguments, options, set, part.Staging());
+    const LoopRun run = RunDetector(arguments, options, set, part.Staging());
     if (run.rows.size() < set.images.size()) {
       std::fprintf(stderr,
                    "tutti: interrupted in the rule '%s'; no table is written, only the rules before\n",
@@ -193,7 +193,7 @@ int RunLoops(const LoopsArguments& given) {
   if (arguments.table) return RunTable(arguments, set);
 
   OutputFolder folder = OpenLoopsFolder(arguments.out);
-  const LoopRun run = Run(arguments, arguments.options, set, folder.Staging());
+  const LoopRun run = RunDetector(arguments, arguments.options, set, folder.Staging());
   const LoopReport report = EvaluateRun(run);
   const bool finished = run.rows.size() == set.images.size();
   PrintLoopRun(run, report, WriteLoopRun(run, report, finished, folder));

@@ -32,7 +32,7 @@ SyntheticOptions TownOptions() {
 
 // The beginning of a lap and a half around a block, 10 frames a second. Each test runs in a process of its
 // own: it renders no more than it needs.
-Recording Town(std::size_t frames) { return testing::Record(SyntheticWorld(TownOptions()), frames); }
+Recording TownFrames(std::size_t frames) { return testing::Record(SyntheticWorld(TownOptions()), frames); }
 
 Recording WholeTown() {
   const SyntheticWorld world(TownOptions());
@@ -161,7 +161,7 @@ TEST(HardToLose, ARollingShutterInAShakingHand) {
 }
 
 TEST(HardToLose, ExposureJumps) {
-  Recording jumps = Town(60);
+  Recording jumps = TownFrames(60);
   for (std::size_t i = 15; i < jumps.frames.size(); ++i) {
     ForEachImage(jumps.frames[i], [&](cv::Mat& image) {
       const int step = static_cast<int>(i / 15) % 3;
@@ -174,7 +174,7 @@ TEST(HardToLose, ExposureJumps) {
 }
 
 TEST(HardToLose, APlainMovingObjectCoversThirtyPercentOfTheView) {
-  Recording covered = Town(60);
+  Recording covered = TownFrames(60);
   const cv::Size size = covered.frames.front().image.size();
   // The plain side of a lorry: shades, an edge, a few marks.
   cv::Mat object(size.height, size.width * 3 / 10, CV_8UC1, cv::Scalar(150));
@@ -262,13 +262,13 @@ TEST(HardToLose, StandingStillForAMinute) {
 // ---------------------------------------------------------------- missing frames
 
 TEST(HardToLose, EverySecondFrameIsMissing) {
-  const Outcome out = Follow(Selected(Town(120), Range(0, 120, 2)));
+  const Outcome out = Follow(Selected(TownFrames(120), Range(0, 120, 2)));
   EXPECT_EQ(out.posed, out.frames);
   EXPECT_LT(out.ate_m, 0.01 * out.path_m);
 }
 
 TEST(HardToLose, TwoOfThreeFramesAreMissing) {
-  const Outcome out = Follow(Selected(Town(120), Range(0, 120, 3)));
+  const Outcome out = Follow(Selected(TownFrames(120), Range(0, 120, 3)));
   EXPECT_EQ(out.posed, out.frames);
   EXPECT_LT(out.ate_m, 0.01 * out.path_m);
 }
@@ -276,7 +276,7 @@ TEST(HardToLose, TwoOfThreeFramesAreMissing) {
 TEST(HardToLose, AGapOfASecond) {
   std::vector<std::size_t> which = Range(0, 12);
   for (const std::size_t i : Range(22, 80)) which.push_back(i);
-  const Outcome out = Follow(Selected(Town(80), which));
+  const Outcome out = Follow(Selected(TownFrames(80), which));
   EXPECT_EQ(out.posed, out.frames);
   EXPECT_LT(out.ate_m, 0.01 * out.path_m);
 }
@@ -295,7 +295,7 @@ TEST(HardToLose, BlackOutOfThreeSeconds) {
 TEST(HardToLose, KidnappedToAPlaceSeenBefore) {
   std::vector<std::size_t> which = Range(0, 120);
   for (const std::size_t i : Range(10, 60)) which.push_back(i);
-  const Recording kidnapped = Carried(Town(120), which);
+  const Recording kidnapped = Carried(TownFrames(120), which);
   const Outcome out = Follow(kidnapped);
   EXPECT_EQ(out.relocalized, 1U);
   EXPECT_EQ(out.pieces, 1);
@@ -306,7 +306,7 @@ TEST(HardToLose, KidnappedToAPlaceSeenBefore) {
 TEST(HardToLose, KidnappedToAPlaceSeenBeforeWithTheLeftCameraAlone) {
   std::vector<std::size_t> which = Range(0, 120);
   for (const std::size_t i : Range(10, 40)) which.push_back(i);
-  Recording kidnapped = Carried(Town(120), which);
+  Recording kidnapped = Carried(TownFrames(120), which);
   for (std::size_t i = 120; i < 130; ++i) kidnapped.frames[i].right = cv::Mat();
   const Outcome out = Follow(kidnapped);
   EXPECT_EQ(out.relocalized, 1U);

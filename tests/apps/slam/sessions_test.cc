@@ -21,7 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 using testing::Recording;
 
-SyntheticOptions Town(SyntheticSensor sensor, std::uint64_t seed = 1) {
+SyntheticOptions SessionTown(SyntheticSensor sensor, std::uint64_t seed = 1) {
   SyntheticOptions options = testing::SmallStereoTownWithALoop(320, 160);
   options.sensor = sensor;
   options.laps = 1.4;
@@ -107,7 +107,7 @@ INSTANTIATE_TEST_SUITE_P(Sensors, Sessions,
                          });
 
 TEST_P(Sessions, AnotherRecordingJoinsTheMapWhoseFrameOfReferenceStaysWithTheSameBytesForAnyThreads) {
-  const SyntheticWorld world(Town(GetParam()));
+  const SyntheticWorld world(SessionTown(GetParam()));
   const Recording day = Part(world, 0, kLap), next = Part(world, kLap, world.Size());
   const fs::path map = MapOfALap(day);
   std::string first_bytes;
@@ -144,7 +144,7 @@ TEST_P(Sessions, AnotherRecordingJoinsTheMapWhoseFrameOfReferenceStaysWithTheSam
 }
 
 TEST(SessionsOfAMap, GoOnFromAFileAndTheMapOfTwoSessionsCanBeLocalizedIn) {
-  const SyntheticWorld world(Town(SyntheticSensor::kStereo));
+  const SyntheticWorld world(SessionTown(SyntheticSensor::kStereo));
   const Recording day = Part(world, 0, 120), next = Part(world, 100, 200);
   const fs::path folder = testing::FreshFolder();
   SlamSystem whole(Configured(), day.rig);
@@ -171,8 +171,8 @@ TEST(SessionsOfAMap, GoOnFromAFileAndTheMapOfTwoSessionsCanBeLocalizedIn) {
 }
 
 TEST(SessionsOfAMap, AnotherCameraGoesOnInItsOwnPixels) {
-  const SyntheticWorld world(Town(SyntheticSensor::kStereo));
-  SyntheticOptions other_options = Town(SyntheticSensor::kStereo);
+  const SyntheticWorld world(SessionTown(SyntheticSensor::kStereo));
+  SyntheticOptions other_options = SessionTown(SyntheticSensor::kStereo);
   other_options.width = 400;
   other_options.height = 180;
   other_options.focal_px = 210;  // 186 px in the other
@@ -190,7 +190,8 @@ TEST(SessionsOfAMap, AnotherCameraGoesOnInItsOwnPixels) {
 }
 
 TEST(SessionsOfAMap, OtherPlacesStandApartAndOtherSensorsAreRefused) {
-  const SyntheticWorld world(Town(SyntheticSensor::kStereo)), elsewhere(Town(SyntheticSensor::kStereo, 7));
+  const SyntheticWorld world(SessionTown(SyntheticSensor::kStereo)),
+      elsewhere(SessionTown(SyntheticSensor::kStereo, 7));
   const Recording day = Part(world, 0, 60), next = Part(elsewhere, 0, 60);
   SlamSystem slam(Configured(), day.rig);
   EXPECT_NE(testing::ErrorOf([&] { slam.BeginSession(next.rig); }).find("there is no map"),
@@ -236,7 +237,7 @@ class Merging : public ::testing::Test {
 };
 
 TEST_F(Merging, TwoMapsWithCommonPlacesAreOneInEitherOrderForAnyThreads) {
-  const SyntheticWorld world(Town(SyntheticSensor::kStereo));
+  const SyntheticWorld world(SessionTown(SyntheticSensor::kStereo));
   const Recording a = Part(world, 0, 140), b = Part(world, 90, 240);
   std::string first_bytes;
   for (const int threads : {1, 2}) {
@@ -266,7 +267,8 @@ TEST_F(Merging, TwoMapsWithCommonPlacesAreOneInEitherOrderForAnyThreads) {
 }
 
 TEST_F(Merging, MapsWithoutACommonPlaceAreNotOne) {
-  const SyntheticWorld world(Town(SyntheticSensor::kStereo)), elsewhere(Town(SyntheticSensor::kStereo, 7));
+  const SyntheticWorld world(SessionTown(SyntheticSensor::kStereo)),
+      elsewhere(SessionTown(SyntheticSensor::kStereo, 7));
   const auto map = MapOf(Part(world, 0, 60)), other = MapOf(Part(elsewhere, 0, 60));
   EXPECT_FALSE(map->Merge(other.get()));
 }

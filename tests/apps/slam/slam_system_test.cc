@@ -29,7 +29,7 @@ const Recording& TwoLaps() {
   return recording;
 }
 
-RunConfig Small(bool global_adjustment, int threads) {
+RunConfig SmallConfig(bool global_adjustment, int threads) {
   RunConfig config;
   config.odometry.features = 800;
   config.run.global_adjustment = global_adjustment;
@@ -45,7 +45,7 @@ struct Result {
   double ate_m = 0;
 };
 
-Result Drive(const RunConfig& config) {
+Result DriveThrough(const RunConfig& config) {
   SlamSystem slam(config, TwoLaps().rig);
   for (const InputFrame& frame : TwoLaps().frames) slam.Track(frame);
   slam.Finish();
@@ -63,7 +63,7 @@ Result Drive(const RunConfig& config) {
 }
 
 TEST(SlamSystem, ASecondLapNeedsFewKeyframesAndTheWholeMapIsAdjusted) {
-  const Result with = Drive(Small(true, 2)), without = Drive(Small(false, 2));
+  const Result with = DriveThrough(SmallConfig(true, 2)), without = DriveThrough(SmallConfig(false, 2));
   ASSERT_GT(with.corrections, 0);
   EXPECT_GT(with.adjustments, 0);
   EXPECT_EQ(without.adjustments, 0);
@@ -85,7 +85,7 @@ TEST(SlamSystem, OdometryEdgesTieEveryKeyframeOfAMonoMapToTheOthers) {
   SyntheticOptions options = testing::SmallStereoTown(320, 160);
   options.sensor = SyntheticSensor::kMono;
   const Recording recording = testing::Record(SyntheticWorld(options), 40);
-  SlamSystem slam(Small(true, 1), recording.rig);
+  SlamSystem slam(SmallConfig(true, 1), recording.rig);
   for (const InputFrame& frame : recording.frames) slam.Track(frame);
   slam.Finish();
   const PoseGraph graph = slam.Graph();
@@ -104,17 +104,17 @@ void ExpectTheSameBits(const Result& a, const Result& b) {
 }
 
 TEST(SlamSystem, WhatBackgroundWorkFindsDoesNotDependOnTheThreads) {
-  ExpectTheSameBits(Drive(Small(true, 1)), Drive(Small(true, 2)));
+  ExpectTheSameBits(DriveThrough(SmallConfig(true, 1)), DriveThrough(SmallConfig(true, 2)));
 }
 
 TEST(SlamSystem, LoopsThatAreGatedDoNotDependOnTheThreads) {
   const auto gated = [](int threads) {
-    RunConfig config = Small(false, threads);
+    RunConfig config = SmallConfig(false, threads);
     config.run.loop_gate_sigmas = 20;
     return config;
   };
-  const Result one = Drive(gated(1)), whole = Drive(Small(false, 2));
-  ExpectTheSameBits(one, Drive(gated(2)));
+  const Result one = DriveThrough(gated(1)), whole = DriveThrough(SmallConfig(false, 2));
+  ExpectTheSameBits(one, DriveThrough(gated(2)));
   EXPECT_EQ(one.corrections, whole.corrections) << "the gate refuses no true loop";
   EXPECT_NEAR(one.ate_m, whole.ate_m, 0.1 * whole.ate_m);
 }
@@ -123,11 +123,11 @@ TEST(SlamSystem, LoopsThatAreGatedDoNotDependOnTheThreads) {
 // of threads.
 TEST(SlamSystem, TheDetectorIsToldOfLoopsThatTheMapContradicts) {
   const auto strict = [](int threads) {
-    RunConfig config = Small(false, threads);
+    RunConfig config = SmallConfig(false, threads);
     config.run.loop_gate_sigmas = 0.001;
     return config;
   };
-  const Result one = Drive(strict(1)), two = Drive(strict(2));
+  const Result one = DriveThrough(strict(1)), two = DriveThrough(strict(2));
   const auto revoked = [](const LoopRecord& loop) { return loop.revoked; };
   ASSERT_GT(std::count_if(one.loops.begin(), one.loops.end(), revoked), 0);
   for (const LoopRecord& loop : one.loops) {
@@ -145,7 +145,7 @@ TEST(SlamSystem, TheDetectorIsToldOfLoopsThatTheMapContradicts) {
 }
 
 TEST(SlamSystem, LoopsFromElsewhereNeedKeyframesThatAreThereAndFiniteNumbers) {
-  SlamSystem slam(Small(true, 1), TwoLaps().rig);
+  SlamSystem slam(SmallConfig(true, 1), TwoLaps().rig);
   for (std::size_t i = 0; i < 20; ++i) slam.Track(TwoLaps().frames[i]);
   const Matrix7d information = MakeInformation(0.1, 0.1);
   Similarity nowhere;
@@ -158,7 +158,8 @@ TEST(SlamSystem, LoopsFromElsewhereNeedKeyframesThatAreThereAndFiniteNumbers) {
 }
 
 TEST(SlamSystem, NothingIsRevokedWhereTheMapAgrees) {
-  for (const LoopRecord& loop : Drive(Small(true, 2)).loops) EXPECT_FALSE(loop.revoked) << loop.query;
+  for (const LoopRecord& loop : DriveThrough(SmallConfig(true, 2)).loops)
+    EXPECT_FALSE(loop.revoked) << loop.query;
 }
 
 }  // namespace

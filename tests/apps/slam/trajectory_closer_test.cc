@@ -16,7 +16,7 @@ namespace {
 
 using testing::Recording;
 
-Recording Town(SyntheticSensor sensor) {
+Recording RecordedTown(SyntheticSensor sensor) {
   SyntheticOptions options = testing::SmallStereoTownWithALoop(320, 160);
   options.sensor = sensor;
   if (sensor == SyntheticSensor::kMono) options.rate_hz = 9;
@@ -65,7 +65,7 @@ Closed CloseTown(const Recording& town, const Trajectory& odometry, const RunCon
 }
 
 void ExpectTheDriftIsGone(SyntheticSensor sensor, double yaw_deg) {
-  const Recording town = Town(sensor);
+  const Recording town = RecordedTown(sensor);
   const Closed closed = CloseTown(town, testing::Disturbed(town.truth, yaw_deg, 0.2, 3), OfAWalk());
   EXPECT_GT(closed.corrections, 0);
   EXPECT_LT(closed.drift_after, 0.2 * closed.drift_before);
@@ -83,7 +83,7 @@ TEST(TrajectoryCloser, OneCameraTakesItsScaleFromTheOdometry) {
 }
 
 TEST(TrajectoryCloser, APerfectOdometryStaysNearlyAsItIs) {
-  const Recording town = Town(SyntheticSensor::kStereo);
+  const Recording town = RecordedTown(SyntheticSensor::kStereo);
   const Closed closed = CloseTown(town, town.truth, Small(2));
   EXPECT_GT(closed.loops, 0u);
   for (std::size_t i = 0; i < town.truth.size(); ++i)
@@ -91,7 +91,7 @@ TEST(TrajectoryCloser, APerfectOdometryStaysNearlyAsItIs) {
 }
 
 TEST(TrajectoryCloser, TheCorrectionMapsTheNewestPoseOfTheOdometry) {
-  const Recording town = Town(SyntheticSensor::kStereo);
+  const Recording town = RecordedTown(SyntheticSensor::kStereo);
   const Trajectory odometry = testing::Disturbed(town.truth, 0.5, 0.2, 3);
   const Closed closed = CloseTown(town, odometry, OfAWalk());
   const Pose by_map = closed.T_map_odom * odometry.back().pose;
@@ -101,7 +101,7 @@ TEST(TrajectoryCloser, TheCorrectionMapsTheNewestPoseOfTheOdometry) {
 }
 
 TEST(TrajectoryCloser, ThreadsChangeNothing) {
-  const Recording town = Town(SyntheticSensor::kStereo);
+  const Recording town = RecordedTown(SyntheticSensor::kStereo);
   const Trajectory odometry = testing::Disturbed(town.truth, 0.5, 0.2, 3);
   const Closed one = CloseTown(town, odometry, OfAWalk(1)), two = CloseTown(town, odometry, OfAWalk(2));
   ASSERT_EQ(one.trajectory.size(), two.trajectory.size());

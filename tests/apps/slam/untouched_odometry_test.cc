@@ -36,7 +36,7 @@ testing::Recording Drive(SyntheticSensor sensor, Change change) {
   return recording;
 }
 
-RunConfig Configured(Change change) {
+RunConfig ConfiguredFor(Change change) {
   RunConfig config;
   config.odometry.features = 800;
   config.run.threads = 2;
@@ -51,7 +51,7 @@ RunConfig Configured(Change change) {
 TEST_P(UntouchedOdometry, TrackedOnHasTheBitsOfTheOdometryAlone) {
   const auto [sensor, change] = GetParam();
   const testing::Recording recording = Drive(sensor, change);
-  const RunConfig config = Configured(change);
+  const RunConfig config = ConfiguredFor(change);
   SlamSystem slam(config, recording.rig);
   std::optional<Odometry> untouched;
   std::int64_t seen = -1;

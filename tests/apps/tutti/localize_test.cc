@@ -20,7 +20,7 @@ using ::testing::HasSubstr;
 using testing::ReadAll;
 using testing::RunTutti;
 
-SyntheticOptions Town(std::uint64_t seed) {
+SyntheticOptions TownToLocalizeIn(std::uint64_t seed) {
   SyntheticOptions options = testing::SmallStereoTownWithALoop(320, 160);
   options.laps = 1.6;
   options.seed = seed;
@@ -43,7 +43,7 @@ class LocalizeCommand : public ::testing::Test {
     return RunTutti(words);
   }
   static constexpr int kMapped = 175;  // of the frames: one lap
-  const testing::GeneratedDataset town_{"town_to_localize_in", Town(1)};
+  const testing::GeneratedDataset town_{"town_to_localize_in", TownToLocalizeIn(1)};
   const fs::path folder_ = testing::FreshFolder(), map_ = folder_ / "map" / "map.tutti",
                  out_ = folder_ / "out";
 };
@@ -85,7 +85,7 @@ TEST_F(LocalizeCommand, TheResultDoesNotDependOnTheThreads) {
 }
 
 TEST_F(LocalizeCommand, InTheMapOfAnotherTownNoFrameIsFound) {
-  const testing::GeneratedDataset other("another_town", Town(7));
+  const testing::GeneratedDataset other("another_town", TownToLocalizeIn(7));
   const auto run = Localize(other.path(), {"--end", "60"});
   EXPECT_EQ(run.status, 1) << run.output;
   EXPECT_THAT(run.output, HasSubstr("not one frame was found in the map"));
@@ -93,7 +93,7 @@ TEST_F(LocalizeCommand, InTheMapOfAnotherTownNoFrameIsFound) {
 }
 
 TEST_F(LocalizeCommand, AnotherCameraAndAFolderThatHoldsTheMapAreRefused) {
-  SyntheticOptions options = Town(1);
+  SyntheticOptions options = TownToLocalizeIn(1);
   options.width = 400;
   const testing::GeneratedDataset wider("wider_town", options);
   const auto camera = Localize(wider.path(), {"--config", (wider.path() / "config.yaml").string()});

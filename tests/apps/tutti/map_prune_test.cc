@@ -17,7 +17,7 @@ using ::testing::HasSubstr;
 using testing::ReadAll;
 using testing::RunTutti;
 
-SyntheticOptions TwoLaps() {
+SyntheticOptions TwoLapsToPrune() {
   SyntheticOptions options = testing::SmallStereoTownWithALoop(320, 160);
   options.laps = 1.6;
   return options;
@@ -31,7 +31,7 @@ class MapPrune : public ::testing::Test {
                   .status,
               0);
   }
-  const testing::GeneratedDataset town_{"town_to_prune", TwoLaps()};
+  const testing::GeneratedDataset town_{"town_to_prune", TwoLapsToPrune()};
   const fs::path folder_ = testing::FreshFolder(), map_ = folder_ / "run" / "map.tutti",
                  small_ = folder_ / "small.tutti";
 };

@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kBorder = 19;
 
-cv::Mat Town(int frame) {
+cv::Mat TownImage(int frame) {
   SyntheticOptions options;
   options.width = 480;
   options.height = 240;
@@ -75,7 +75,7 @@ std::vector<cv::KeyPoint> ByTheBook(const cv::Mat& image, const CornerOptions& o
   return out;
 }
 
-void ExpectSame(const std::vector<cv::KeyPoint>& found, const std::vector<cv::KeyPoint>& expected) {
+void ExpectSameCorners(const std::vector<cv::KeyPoint>& found, const std::vector<cv::KeyPoint>& expected) {
   ASSERT_EQ(found.size(), expected.size());
   for (std::size_t i = 0; i < found.size(); ++i) {
     EXPECT_EQ(found[i].pt, expected[i].pt) << i;
@@ -86,11 +86,11 @@ void ExpectSame(const std::vector<cv::KeyPoint>& found, const std::vector<cv::Ke
 TEST(CornerDetector, FindsWhatAllCornersSortedAndSpreadWouldBe) {
   int several = 0;
   for (const int seed : {1, 2, 3}) {
-    for (const cv::Mat& image : {Uneven(seed), Town(seed)}) {
+    for (const cv::Mat& image : {Uneven(seed), TownImage(seed)}) {
       for (const int wanted : {0, 1, 30, 150, 400, 1500}) {
         const CornerOptions options{wanted, 20, 7, kBorder};
         const std::vector<cv::KeyPoint> found = DetectCorners(image, options);
-        ExpectSame(found, ByTheBook(image, options));
+        ExpectSameCorners(found, ByTheBook(image, options));
         several += found.size() > 20 ? 1 : 0;
       }
     }
@@ -113,7 +113,7 @@ TEST(CornerDetector, WeakCornersOnlyWhereACellHasNothingElse) {
 
 TEST(CornerDetector, OneThresholdIsEnough) {
   const CornerOptions options{100, 20, 20, kBorder};
-  ExpectSame(DetectCorners(Uneven(2), options), ByTheBook(Uneven(2), options));
+  ExpectSameCorners(DetectCorners(Uneven(2), options), ByTheBook(Uneven(2), options));
 }
 
 TEST(CornerDetector, NothingInImagesThatAreBlankOrSmall) {

@@ -12,7 +12,7 @@
 namespace tutti {
 namespace {
 
-cv::Mat Town() {
+cv::Mat StreetImage() {
   SyntheticOptions options;
   options.width = 480;
   options.height = 240;
@@ -73,7 +73,7 @@ TEST(FrameFeatures, ImagesTooSmallForADescriptorHaveNone) {
 }
 
 TEST(FrameFeatures, NumberIsWhatWasAskedForAndEveryPartOfTheImageHasSome) {
-  const cv::Mat image = Town();
+  const cv::Mat image = StreetImage();
   OdometryOptions options;
   options.features = 800;
   const FrameFeatures features = Detect(image, options);
@@ -95,7 +95,7 @@ TEST(FrameFeatures, NumberIsWhatWasAskedForAndEveryPartOfTheImageHasSome) {
 }
 
 TEST(FrameFeatures, SameImageGivesTheSameBits) {
-  const cv::Mat image = Town();
+  const cv::Mat image = StreetImage();
   const FrameFeatures a = Detect(image), b = Detect(image.clone());
   ASSERT_EQ(a.size(), b.size());
   for (std::size_t i = 0; i < a.size(); ++i) {
@@ -139,7 +139,7 @@ TEST(FrameFeatures, PyramidLevelsHaveNoOffset) {
 }
 
 TEST(FrameFeatures, AreaSearchFindsWhatLooksAtEveryFeatureFind) {
-  const FrameFeatures features = Detect(Town());
+  const FrameFeatures features = Detect(StreetImage());
   cv::RNG rng(5);
   std::vector<int> found;
   for (int trial = 0; trial < 200; ++trial) {

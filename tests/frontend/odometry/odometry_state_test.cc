@@ -24,6 +24,7 @@ namespace fs = std::filesystem;
 using testing::Black;
 using ::testing::HasSubstr;
 using testing::Recording;
+using testing::Snow;
 
 constexpr internal::SectionFileKind kFile = {{'T', 'E', 'S', 'T', 'O', 'D', 'O', '\n'}, 1, "test", "a test"};
 constexpr std::uint32_t kKeyframe = 101, kLandmarks = 102, kTimes = 104;
@@ -67,18 +68,6 @@ void Write(const fs::path& file, const Sections& sections) {
 void Load(const fs::path& file, Odometry* odometry) {
   internal::SectionReader in(file, kFile);
   odometry->LoadSections(&in);
-}
-
-// Something to see, but nothing of the map and no depth.
-InputFrame Snow(InputFrame frame) {
-  cv::RNG random(static_cast<std::uint64_t>(frame.index) + 1);
-  for (cv::Mat* image : {&frame.image, &frame.right}) {
-    if (image->empty()) continue;
-    *image = image->clone();
-    random.fill(*image, cv::RNG::UNIFORM, 0, 256);
-  }
-  if (!frame.depth_m.empty()) frame.depth_m = cv::Mat::zeros(frame.depth_m.size(), CV_32FC1);
-  return frame;
 }
 
 constexpr std::size_t kFrames = 44, kDark = 14, kLoop = 20, kEnter = 24, kElsewhere = 28, kBack = 34;
@@ -400,7 +389,7 @@ TEST_F(DamagedOdometryState, WrongNumbersWithRightChecksumsAreRefusedOrHarmless)
 
 // What is at this place of the first section with this tag becomes another number, under a right checksum.
 template <class T>
-Sections With(Sections sections, std::uint32_t tag, std::size_t at, T value) {
+Sections WithValue(Sections sections, std::uint32_t tag, std::size_t at, T value) {
   const auto section =
       std::find_if(sections.begin(), sections.end(), [&](const Section& s) { return s.tag == tag; });
   std::memcpy(&section->bytes.at(at), &value, sizeof value);
@@ -408,17 +397,17 @@ Sections With(Sections sections, std::uint32_t tag, std::size_t at, T value) {
 }
 
 TEST_F(DamagedOdometryState, WrongNumbersAreCalledByTheirName) {
-  Write(file_, With(sections_, kKeyframe, 0, 1));
+  Write(file_, WithValue(sections_, kKeyframe, 0, 1));
   ExpectRefused("an index out of range");
-  Write(file_, With(sections_, kKeyframe, 28, std::nan("")));
+  Write(file_, WithValue(sections_, kKeyframe, 28, std::nan("")));
   ExpectRefused("a rotation that is none");
   const auto landmarks = std::find_if(sections_.begin(), sections_.end(),
                                       [](const Section& section) { return section.tag == kLandmarks; });
   std::size_t alive = 0;
   while (landmarks->bytes.at(alive) == 0) alive += 1 + sizeof(int);  // a dead one: what replaced it
-  Write(file_, With(sections_, kLandmarks, alive + 1, std::nan("")));
+  Write(file_, WithValue(sections_, kLandmarks, alive + 1, std::nan("")));
   ExpectRefused("a place that is none");
-  Write(file_, With(sections_, kLandmarks, alive + 1, 1e300));
+  Write(file_, WithValue(sections_, kLandmarks, alive + 1, 1e300));
   ExpectRefused("a place that is none");
 }
 

@@ -13,6 +13,7 @@ using ::testing::HasSubstr;
 
 using testing::Black;
 using testing::Recording;
+using testing::Snow;
 
 SyntheticOptions SmallWorld(SyntheticScene scene, SyntheticSensor sensor) {
   SyntheticOptions options;
@@ -289,16 +290,6 @@ TEST(Odometry, BlackFrameIsLostWithAReasonAndTheNextOnesAreFoundAgain) {
   EXPECT_EQ(estimate.size(), Stereo().frames.size() - 1);
   EXPECT_LT(EndError(Stereo().truth, estimate, false), 0.02 * PathLength(Stereo().truth));
   EXPECT_EQ(odometry.KeyframePiece(odometry.KeyframeIds().back()), 0);
-}
-
-// Something to see, but nothing of the map and no depth.
-InputFrame Snow(InputFrame frame) {
-  cv::RNG random(static_cast<std::uint64_t>(frame.index) + 1);
-  for (cv::Mat* image : {&frame.image, &frame.right}) {
-    *image = image->clone();
-    random.fill(*image, cv::RNG::UNIFORM, 0, 256);
-  }
-  return frame;
 }
 
 TEST(Odometry, LongWithNothingOfTheMapInViewStartsANewPiece) {

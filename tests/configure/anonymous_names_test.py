@@ -1,0 +1,109 @@
+#!/usr/bin/env python3
+"""No two .cc files of a target define the same name in an unnamed namespace: unity builds compile them as one file.
+
+usage: anonymous_names_test.py TARGETS     one line per target: its name, then its sources, all separated by ';'
+       anonymous_names_test.py --self-test
+"""
+import collections
+import pathlib
+import re
+import sys
+import tempfile
+
+NOISE = re.compile(r'//[^\n]*|/\*.*?\*/|R"(?P<end>[^(]*)\(.*?\)(?P=end)"|"(?:\\.|[^"\\\n])*"|(?<![0-9a-fA-F])\'(?:\\.|[^\'\\\n])+\'|^[ \t]*#(?:\\\n|[^\n])*',
+                   re.S | re.M)
+TYPE = re.compile(r"\b(?:class|struct|union|enum(?: class| struct)?)\s+(?:alignas\([^)]*\)\s*)?(\w+)")
+USING = re.compile(r"\busing\s+(?:\w+::)*(\w+)\s*(?:=.*)?$", re.S)
+ALIAS = re.compile(r"\bnamespace\s+(\w+)\s*=")
+
+
+def statements(text):
+    """What stands directly in unnamed namespaces: each declaration up to its body, initialiser or semicolon."""
+    text = NOISE.sub(lambda found: '""' if '"' in found.group(0)[:3] else " ", text)
+    scopes, begin, head = [], 0, ""
+    for mark in re.finditer(r"[{};]", text):
+        part = text[begin:mark.start()]
+        begin = mark.end()
+        here = bool(scopes) and all(kind == "namespace" for kind, _ in scopes) and any(name == "" for _, name in scopes)
+        if mark.group() == "{":
+            space = re.fullmatch(r"\s*(?:inline\s+)?namespace\s*([\w:]*)\s*", part)
+            if space:
+                scopes.append(("namespace", space.group(1)))
+                continue
+            if here:
+                yield part
+            scopes.append(("body", ""))
+        elif mark.group() == "}":
+            if scopes and scopes.pop()[0] == "body":
+                head = "after a body"
+                continue
+        elif here and head != "after a body" and part.strip():
+            yield part
+        elif here and part.strip() and re.match(r"\s*\w+\s*$", part):
+            yield part  # struct {...} name;
+        head = ""
+
+
+def name_of(statement):
+    """The name that a declaration declares; None for what declares none, and for tests, whose names GTest checks."""
+    statement = re.sub(r"\[\[.*?\]\]", " ", statement, flags=re.S).strip()
+    previous = None
+    while previous != statement:  # templates' parameters and arguments
+        previous, statement = statement, re.sub(r"<[^<>;]*>", " ", statement)
+    statement = re.sub(r"^\s*template\s+", "", statement)
+    if not statement or re.match(r"(?:TEST|TEST_F|TEST_P|INSTANTIATE_TEST_SUITE_P|TYPED_TEST\w*|static_assert)\b", statement):
+        return None
+    for pattern in (ALIAS, USING):
+        found = pattern.match(statement)
+        if found:
+            return found.group(1)
+    found = TYPE.match(statement)
+    if found and "(" not in statement[:found.end()]:
+        return found.group(1)
+    operator = re.search(r"\boperator\s*\S+?\s*(?=\()", statement)
+    if operator:
+        return None  # chosen by its arguments
+    before = re.split(r"\(|=(?!=)|\[", statement, maxsplit=1)[0]
+    found = re.search(r"(~?[\w:]+)\s*$", before)
+    return None if not found or "::" in found.group(1) else found.group(1)
+
+
+def definitions(path):
+    """{name: its text where it is another name for something, which may be said twice in the same words}."""
+    found = {}
+    for statement in statements(path.read_text()):
+        name = name_of(statement)
+        if name:
+            words = " ".join(statement.replace(" tutti::", " ").split())
+            found[name] = words if ALIAS.match(words) or USING.match(words) else ""
+    return found
+
+
+def repeated(sources):
+    """{name: files} of the names that more than one file defines."""
+    files = collections.defaultdict(dict)
+    for source in sources:
+        for name, words in definitions(source).items():
+            files[name][source] = words
+    return {name: sorted(where) for name, where in files.items()
+            if len(where) > 1 and (len(set(where.values())) > 1 or "" in where.values())}
+
+
+def report(targets):
+    count, bad = 0, []
+    for line in pathlib.Path(targets).read_text().splitlines():
+        target, *sources = line.split(";")
+        sources = [pathlib.Path(source) for source in sources if source.endswith(".cc")]
+        count += len(sources)
+        bad += [f"{target}: '{name}' is defined in {' and '.join(map(str, where))}: rename it in one, or move it into "
+                "a header" for name, where in sorted(repeated(sources).items())]
+    print("\n".join(bad) or f"{count} files, no name stands twice in a target")
+    return 1 if bad or not count else 0
+
+
+def main():
+    return report(sys.argv[1])
+
+
+if __name__ == "__main__":
+    sys.exit(main())

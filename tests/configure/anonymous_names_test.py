@@ -101,8 +101,49 @@ def report(targets):
     return 1 if bad or not count else 0
 
 
+# What the check must find (the name) and what it must leave alone (None): in one file, and in the other.
+CASES = [
+    ("Number", "std::string Number(double value) { return {}; }", "int Number(const char* word, int line);"),
+    ("kHalf", "constexpr int kHalf = 3;  // [px]", "constexpr double kHalf = 0.5, kOther = 1;"),
+    ("Town", "struct Town { int Size() const { return 1; } };", "cv::Mat Town(int frame) { return {}; }"),
+    ("Kind", "enum class Kind : int { kOne };", "class Kind : public Base<int> {};"),
+    ("Pick", "template <typename T, int N>\nconst T* Pick(const std::vector<T>& all) { return nullptr; }",
+     "std::array<int, 2> Pick(int) { return {1, 2}; }"),
+    ("Row", "using Row = std::vector<int>;", "using Row = std::vector<double>;"),
+    ("At", "Pose At(double x, double turn = 0.0) { return Pose({x, 0, 0}); }", "double At(int i) { return i; }"),
+    ("After", "struct First {};\nint After() { return 1; }", "void After() {}"),
+    (None, "namespace fs = std::filesystem;\nusing testing::Snow;", "namespace fs = std::filesystem;\nusing tutti::testing::Snow;"),
+    (None, "// int Same() {}\nconst char* one = \"int Same() {\";", "/* struct Same {}; */ const char* two = R\"(void Same() {})\";"),
+    (None, "struct One { int Same() { return 1; } };", "struct Two { int Same() { return 2; } };"),
+    (None, "void One() { int same = 1; { same = 2; } }", "void Two() { int same = 1; }"),
+    (None, "TEST(Loop, IsFound) { EXPECT_EQ(1, 1); }", "TEST(Loop, IsRefused) { EXPECT_EQ(1, 1); }"),
+    (None, "}\nint Public(int a) { return a; }\nnamespace {", "}\nint Public(char a) { return a; }\nnamespace {"),
+]
+
+
+def self_test():
+    wrong = []
+    with tempfile.TemporaryDirectory() as folder:
+        files = [pathlib.Path(folder) / name for name in ("a.cc", "b.cc")]
+        for expected, *texts in CASES:
+            for file, text in zip(files, texts):
+                file.write_text(f"#include <x>\nnamespace tutti {{\nnamespace {{\n{text}\n}}  // namespace\n}}  // namespace tutti\n")
+            found = sorted(repeated(files))
+            if found != ([expected] if expected else []):
+                wrong.append(f"{texts}: wanted {expected}, found {found}")
+        targets = pathlib.Path(folder) / "targets"
+        files[0].write_text("namespace { int Twice() { return 1; } }")
+        files[1].write_text("namespace { int Twice() { return 2; } }")
+        for text, status in (("t;" + ";".join(map(str, files)), 1), (f"t;{files[0]}\nu;{files[1]}", 0), ("", 1)):
+            targets.write_text(text)
+            if report(targets) != status:
+                wrong.append(f"{text}: the status should be {status}")
+    print("\n".join(wrong) or f"{len(CASES)} cases are as they should be")
+    return 1 if wrong else 0
+
+
 def main():
-    return report(sys.argv[1])
+    return self_test() if sys.argv[1] == "--self-test" else report(sys.argv[1])
 
 
 if __name__ == "__main__":

@@ -26,7 +26,9 @@ struct Recording {
   }
 };
 
-inline CameraRig RigOf(const SyntheticWorld& world) {
+/// Of a SyntheticWorld or a RenderedWorld.
+template <class World>
+CameraRig RigOf(const World& world) {
   CameraRig rig;
   const SyntheticSensor sensor = world.Options().sensor;
   rig.sensor = sensor == SyntheticSensor::kStereo ? Sensor::kStereo
@@ -40,7 +42,8 @@ inline CameraRig RigOf(const SyntheticWorld& world) {
 }
 
 /// The first `count` frames of a world.
-inline Recording Record(const SyntheticWorld& world, std::size_t count) {
+template <class World>
+Recording Record(const World& world, std::size_t count) {
   Recording out;
   out.rig = RigOf(world);
   for (std::size_t i = 0; i < count; ++i) out.Add(world.Render(i));

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "tests/support/recording.h"
+#include "tests/support/rendered_world.h"
 #include "tests/support/small_town.h"
 
 namespace tutti {
@@ -21,7 +22,7 @@ const Recording& LapAndMore() {
   static const Recording recording = [] {
     SyntheticOptions options = testing::SmallStereoTownWithALoop(320, 160);
     options.laps = 1.4;
-    const SyntheticWorld world(options);
+    const testing::RenderedWorld world(options);
     return testing::Record(world, world.Size());
   }();
   return recording;

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "tests/support/recording.h"
+#include "tests/support/rendered_world.h"
 #include "tests/support/small_town.h"
 #include "tutti/backend/evaluation.h"
 #include "tutti/core/error.h"
@@ -23,7 +24,7 @@ const Recording& TwoLaps() {
     SyntheticOptions options = testing::SmallStereoTown(320, 160);
     options.block_m = 20;
     options.laps = 2;
-    const SyntheticWorld world(options);
+    const testing::RenderedWorld world(options);
     return testing::Record(world, world.Size());
   }();
   return recording;
@@ -84,7 +85,7 @@ TEST(SlamSystem, ASecondLapNeedsFewKeyframesAndTheWholeMapIsAdjusted) {
 TEST(SlamSystem, OdometryEdgesTieEveryKeyframeOfAMonoMapToTheOthers) {
   SyntheticOptions options = testing::SmallStereoTown(320, 160);
   options.sensor = SyntheticSensor::kMono;
-  const Recording recording = testing::Record(SyntheticWorld(options), 40);
+  const Recording recording = testing::Record(testing::RenderedWorld(options), 40);
   SlamSystem slam(SmallConfig(true, 1), recording.rig);
   for (const InputFrame& frame : recording.frames) slam.Track(frame);
   slam.Finish();

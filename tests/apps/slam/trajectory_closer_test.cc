@@ -8,6 +8,7 @@
 
 #include "tests/support/disturbed.h"
 #include "tests/support/recording.h"
+#include "tests/support/rendered_world.h"
 #include "tests/support/small_town.h"
 #include "tutti/core/error.h"
 
@@ -20,7 +21,7 @@ Recording RecordedTown(SyntheticSensor sensor) {
   SyntheticOptions options = testing::SmallStereoTownWithALoop(320, 160);
   options.sensor = sensor;
   if (sensor == SyntheticSensor::kMono) options.rate_hz = 9;
-  const SyntheticWorld world(options);
+  const testing::RenderedWorld world(options);
   return testing::Record(world, world.Size());
 }
 
@@ -113,7 +114,7 @@ TEST(TrajectoryCloser, ThreadsChangeNothing) {
 
 TEST(TrajectoryCloser, RefusesPosesThatAreNotFiniteAndTimesThatDoNotGrow) {
   const Recording town = [] {
-    const SyntheticWorld world(testing::SmallStereoTown(320, 160));
+    const testing::RenderedWorld world(testing::SmallStereoTown(320, 160));
     return testing::Record(world, 2);
   }();
   TrajectoryCloser closer(Small(1), town.rig);

@@ -1,4 +1,5 @@
 #include "frontend/features/corner_detector.h"
+#include "tests/support/rendered_world.h"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +8,6 @@
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 #include <tuple>
-
-#include "data/synthetic/synthetic_world.h"
 
 namespace tutti {
 namespace {
@@ -19,7 +18,7 @@ cv::Mat TownImage(int frame) {
   SyntheticOptions options;
   options.width = 480;
   options.height = 240;
-  return SyntheticWorld(options).Render(frame).image;
+  return testing::RenderedWorld(options).Render(frame).image;
 }
 
 // Strong texture at the left, weak in the middle, none at the right.

@@ -1,4 +1,5 @@
 #include "frontend/features/features.h"
+#include "tests/support/rendered_world.h"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +8,6 @@
 #include <limits>
 #include <opencv2/imgproc.hpp>
 
-#include "data/synthetic/synthetic_world.h"
-
 namespace tutti {
 namespace {
 
@@ -16,7 +15,7 @@ cv::Mat StreetImage() {
   SyntheticOptions options;
   options.width = 480;
   options.height = 240;
-  return SyntheticWorld(options).Render(3).image;
+  return testing::RenderedWorld(options).Render(3).image;
 }
 
 FrameFeatures Detect(const cv::Mat& image, const OdometryOptions& options = {}) {

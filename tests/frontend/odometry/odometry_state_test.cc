@@ -13,6 +13,7 @@
 #include "core/section_file.h"
 #include "tests/support/error_of.h"
 #include "tests/support/recording.h"
+#include "tests/support/rendered_world.h"
 #include "tests/support/small_town.h"
 #include "tests/support/test_data.h"
 #include "tutti/core/error.h"
@@ -81,7 +82,7 @@ Recording Ride(Sensor sensor) {
     options.sensor = SyntheticSensor::kRgbd;
     options.height = 300;
   }
-  Recording ride = testing::Record(SyntheticWorld(options), kFrames);
+  Recording ride = testing::Record(testing::RenderedWorld(options), kFrames);
   if (sensor == Sensor::kMono) {
     ride.rig.sensor = Sensor::kMono;
     ride.rig.baseline_m = 0;

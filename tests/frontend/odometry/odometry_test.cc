@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/support/recording.h"
+#include "tests/support/rendered_world.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -27,7 +28,7 @@ SyntheticOptions SmallWorld(SyntheticScene scene, SyntheticSensor sensor) {
 }
 
 Recording Record(SyntheticScene scene, SyntheticSensor sensor, std::size_t count) {
-  return testing::Record(SyntheticWorld(SmallWorld(scene, sensor)), count);
+  return testing::Record(testing::RenderedWorld(SmallWorld(scene, sensor)), count);
 }
 
 const Recording& Stereo() {
@@ -206,7 +207,7 @@ TEST(Odometry, FastTurnsGetAKeyframeBeforeMostOfTheViewIsNew) {
   options.height = 256;
   options.rate_hz = 20;
   options.speed_mps = 1.5;  // and 30 degrees a second and more
-  const Recording room = testing::Record(SyntheticWorld(options), 110);
+  const Recording room = testing::Record(testing::RenderedWorld(options), 110);
   const auto error = [&](double uncovered_ratio) {
     OdometryOptions odometry_options;
     odometry_options.keyframe_uncovered_ratio = uncovered_ratio;

@@ -21,7 +21,7 @@ using Pair = std::pair<std::int64_t, std::int64_t>;
 const Recording& LapAndMore() {
   static const Recording recording = [] {
     SyntheticOptions options = testing::SmallStereoTownWithALoop(320, 160);
-    options.laps = 1.4;
+    options.laps = 1.25;
     const testing::RenderedWorld world(options);
     return testing::Record(world, world.Size());
   }();

@@ -16,14 +16,13 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using testing::kEmptySheet;
 using testing::kLoopImages;
 using testing::kLoopPlaces;
 using ::testing::Not;
 using testing::ReadAll;
 using ::testing::StartsWith;
 using testing::WriteAll;
-
-constexpr int kEmptySheet = 84 + 340;  // height of a contact sheet with one strip [px]
 
 class LoopsCommand : public testing::LoopsFixture {};
 

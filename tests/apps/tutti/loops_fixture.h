@@ -16,6 +16,7 @@
 
 namespace tutti::testing {
 
+constexpr int kEmptySheet = 84 + 340;  // height of a contact sheet with one strip [px]
 constexpr int kLoopPlaces = 15, kLoopImages = 20;
 
 class LoopsFixture : public ::testing::Test {

@@ -16,11 +16,10 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using testing::kEmptySheet;
 using testing::kLoopImages;
 using testing::ReadAll;
 using testing::WriteAll;
-
-constexpr int kEmptySheet = 84 + 340;  // height of a contact sheet with one strip [px]
 
 class LoopsGroundTruth : public testing::LoopsFixture {};
 

@@ -134,10 +134,10 @@ TEST_F(Resume, MapInfoTellsWhatIsInAMapAndChecksIt) {
   EXPECT_EQ(text.status, 0) << text.output;
   EXPECT_THAT(text.output,
               AllOf(HasSubstr("keyframes"), HasSubstr("stereo"), HasSubstr("checksums are right")));
-  const auto json = nlohmann::json::parse(RunTutti({"map", "info", map.string(), "--json"}).output);
-  EXPECT_EQ(json["frames"], 5);
-  EXPECT_GT(json["landmarks"], 50);
-  EXPECT_EQ(json["run"]["dataset"], testing::TinyTown().string());
+  const auto info = nlohmann::json::parse(RunTutti({"map", "info", map.string(), "--json"}).output);
+  EXPECT_EQ(info["frames"], 5);
+  EXPECT_GT(info["landmarks"], 50);
+  EXPECT_EQ(info["run"]["dataset"], testing::TinyTown().string());
   std::string bytes = ReadAll(map);
   bytes[bytes.size() / 2] ^= 1;
   testing::WriteAll(map, bytes);

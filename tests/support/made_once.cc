@@ -51,7 +51,8 @@ fs::path MadeOnce(const std::string& name, const fs::path& made_by,
                   const std::function<void(const fs::path&)>& make) {
   const fs::path all = TUTTI_MADE_ONCE;
   fs::create_directories(all);
-  const fs::path place = all / name, mark = place / "made-by", folder = place / "content";
+  const fs::path place = all / name, mark = place / "made-by";
+  fs::path folder = place / "content";
   const Lock lock(all / (name + ".lock"));
   const std::string maker = DigestOf(ContentsOf(made_by));
   if (ContentsOf(mark) == maker) return folder;

@@ -38,7 +38,7 @@ void ForEachLine(const std::filesystem::path& file,
   }
 }
 
-double Number(const std::filesystem::path& file, std::size_t line, const std::string& word) {
+double NumberOf(const std::filesystem::path& file, std::size_t line, const std::string& word) {
   const std::optional<double> value = ParseDouble(word);
   if (!value) Fail(file, line, "'" + internal::Excerpt(word) + "' is not a number");
   if (!std::isfinite(*value))
@@ -99,7 +99,7 @@ Trajectory ReadTum(const std::filesystem::path& file, Oddities& odd) {
            "has " + std::to_string(w.size()) + " columns; the TUM format has 8: stamp tx ty tz qx qy qz qw");
     }
     double v[8];
-    for (int i = 0; i < 8; ++i) v[i] = Number(file, line, w[static_cast<std::size_t>(i)]);
+    for (int i = 0; i < 8; ++i) v[i] = NumberOf(file, line, w[static_cast<std::size_t>(i)]);
     if (LeaveOut(file, line, out, v[0], odd)) return;
     out.push_back({v[0], QuaternionPose(file, line, {v[1], v[2], v[3]}, v[4], v[5], v[6], v[7], odd)});
   });
@@ -115,7 +115,7 @@ Trajectory ReadKitti(const std::filesystem::path& file, std::vector<Eigen::Matri
                " columns; the KITTI format has 12: the 3x4 matrix [R|t] by rows");
     }
     Eigen::Matrix<double, 3, 4> m;
-    for (int i = 0; i < 12; ++i) m(i / 4, i % 4) = Number(file, line, w[static_cast<std::size_t>(i)]);
+    for (int i = 0; i < 12; ++i) m(i / 4, i % 4) = NumberOf(file, line, w[static_cast<std::size_t>(i)]);
     const Eigen::Matrix3d rotation = m.leftCols<3>();
     // Entries too big for a determinant make it NaN.
     if (!(std::abs(rotation.determinant() - 1.0) <= 0.1 && rotation.cwiseAbs().maxCoeff() <= 2))
@@ -136,7 +136,7 @@ Trajectory ReadEuroc(const std::filesystem::path& file, Oddities& odd) {
     RequireColumns(file, line, w.size(), 8,
                    "the EuRoC format has at least 8: stamp [ns], x, y, z, qw, qx, qy, qz");
     double v[8];
-    for (int i = 0; i < 8; ++i) v[i] = Number(file, line, w[static_cast<std::size_t>(i)]);
+    for (int i = 0; i < 8; ++i) v[i] = NumberOf(file, line, w[static_cast<std::size_t>(i)]);
     // Seconds, in TUM's order with commas, would be read as nanoseconds and the quaternion in the wrong
     // order.
     if (v[0] != std::floor(v[0])) Fail(file, line, "'" + w[0] + kNoNanoseconds);
@@ -214,7 +214,7 @@ Trajectory ReadTrajectory(const std::filesystem::path& file, TrajectoryFormat fo
 std::vector<double> ReadTimes(const std::filesystem::path& file) {
   std::vector<double> out;
   ForEachLine(file, [&](std::size_t line, const std::vector<std::string>& w) {
-    out.push_back(Number(file, line, w[0]));
+    out.push_back(NumberOf(file, line, w[0]));
   });
   return out;
 }

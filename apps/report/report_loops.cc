@@ -24,7 +24,7 @@ LoopRule RuleFor(Sensor sensor) {
   return rule;
 }
 
-std::string Describe(const LoopRule& rule) {
+std::string DescribeRule(const LoopRule& rule) {
   char text[160];
   std::snprintf(text, sizeof text,
                 "same place: less than %g m and %g deg apart, at least %g s older; ignored: younger, or less "
@@ -33,7 +33,7 @@ std::string Describe(const LoopRule& rule) {
   return text;
 }
 
-int RowOf(const KnownLoops& known, std::int64_t frame) {
+int RowOfFrame(const KnownLoops& known, std::int64_t frame) {
   const auto row = known.row_of.find(frame);
   return row == known.row_of.end() ? -1 : row->second;
 }
@@ -104,7 +104,7 @@ KnownLoops FindKnownLoops(const RunResult& result, const DetectionLog& log) {
   if (poses.empty()) return known;
   const LoopRule rule = RuleFor(result.rig.sensor);
   known.truth = LoopsFromTrajectory(poses, rule);
-  known.rule = Describe(rule);
+  known.rule = DescribeRule(rule);
   return known;
 }
 
@@ -119,9 +119,9 @@ Json PrecisionRecallJson(const RunResult& result, const DetectionLog& log, const
       LoopObservation observation;
       observation.image = static_cast<int>(row);
       observation.hypothesis = opinion.took_part ? opinion.hypothesis : 0;
-      observation.best = RowOf(known, opinion.best);
+      observation.best = RowOfFrame(known, opinion.best);
       observation.accepted = detection.verified;
-      observation.verified = detection.verified ? RowOf(known, detection.candidate) : -1;
+      observation.verified = detection.verified ? RowOfFrame(known, detection.candidate) : -1;
       observation.probability = detection.probability;
       observation.proposed = detection.proposed;
       by_name[opinion.name].push_back(observation);

@@ -14,7 +14,7 @@ double Microseconds(Span::Clock::duration duration) {
   return std::chrono::duration<double, std::micro>(duration).count();
 }
 
-std::string Row(const StageTiming& stage) {
+std::string StageRow(const StageTiming& stage) {
   char cpu[16] = "-", text[160];
   if (stage.cpu_ms >= 0) std::snprintf(cpu, sizeof cpu, "%.0f", stage.cpu_ms);
   std::snprintf(text, sizeof text, "  %-13s %-14s %7zu %9.2f %9.2f %10.0f %9s %6.1f %%\n",
@@ -64,7 +64,7 @@ std::string TimingTable(const std::vector<StageTiming>& stages, double wall_s, d
   std::snprintf(text, sizeof text, "\n  %-13s %-14s %7s %9s %9s %10s %9s %8s\n", "", "stage", "calls",
                 "median ms", "p99 ms", "total ms", "CPU ms", "share");
   std::string out = text;
-  for (const StageTiming& stage : stages) out += Row(stage);
+  for (const StageTiming& stage : stages) out += StageRow(stage);
   std::snprintf(text, sizeof text,
                 "  share: of the run's %.1f s; stages lie within each other (frame has them all)\n"
                 "  processor time, all threads: %.1f s, %.1f ms per frame\n",

@@ -66,6 +66,11 @@ void ReadSection(const std::string& file, const std::string& section, const YAML
   for (const auto& item : items) ReadItem(file, section, item, table, seen, marks);
 }
 
+// Some messages name their section themselves, as they are said without a file, too.
+std::string InSection(const std::string& section, const std::string& problem) {
+  return problem.rfind(section + ": ", 0) == 0 ? problem : section + ": " + problem;
+}
+
 // Points to the line of the key that the message of Validate() speaks of, else to the section.
 void Check(const std::string& file, const std::string& section, const KeyMarks& marks,
            const std::string& problem) {
@@ -78,7 +83,7 @@ void Check(const std::string& file, const std::string& section, const KeyMarks& 
       where = mark;
     }
   }
-  Fail(file, where, section + ": " + problem);
+  Fail(file, where, InSection(section, problem));
 }
 
 // Sets one key from `key=value`, the key without `prefix`.
@@ -169,7 +174,7 @@ void SetOptions(const std::vector<std::string>& assignments, RunConfig& config) 
   for (const std::string& assignment : assignments) Assign(assignment, "", table);
   DropUnsetCamera(changed.dataset);
   const auto problem = FirstProblem(changed);
-  if (problem) throw InputError("--set: " + problem->first + ": " + problem->second);
+  if (problem) throw InputError("--set: " + InSection(problem->first, problem->second));
   config = changed;
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <cstring>
 #include <optional>
 #include <type_traits>
 #include <utility>
@@ -23,12 +24,14 @@ std::string Wrong(const YAML::Node& node, const std::string& wanted) {
   return "'" + node.Scalar() + "' is not " + wanted;
 }
 
-// The shortest text that reads back to the same number.
+// The shortest text that reads back to the same number, with a power of ten only where zeros would be
+// counted.
 std::string ShowDouble(double value) {
+  const bool plain = std::abs(value) >= 1e-4 && std::abs(value) < 1e6;
   char text[40];
   for (int digits = 1; digits <= 17; ++digits) {
     std::snprintf(text, sizeof text, "%.*g", digits, value);
-    if (ParseDouble(text) == value) break;
+    if (ParseDouble(text) == value && !(plain && std::strchr(text, 'e') != nullptr)) break;
   }
   return text;
 }

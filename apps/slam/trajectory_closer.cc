@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "apps/slam/trajectory_correction.h"
 #include "tutti/core/error.h"
 #include "tutti/slam/slam_system.h"
 

@@ -1,8 +1,8 @@
-#include <algorithm>
+#include "apps/slam/trajectory_correction.h"
+
 #include <string>
 
 #include "tutti/core/error.h"
-#include "tutti/slam/trajectory_closer.h"
 
 namespace tutti {
 namespace {

@@ -17,7 +17,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-struct CompareArguments {
+struct CompareLoopsArguments {
   std::vector<std::string> tables;
   std::string out;
 };
@@ -32,7 +32,7 @@ Json ReadTable(const std::string& file) {
 }
 
 // One recall per table; `rule` "best single" is each table's own best member.
-std::vector<double> Recalls(const CompareArguments& arguments, const std::vector<Json>& tables,
+std::vector<double> Recalls(const CompareLoopsArguments& arguments, const std::vector<Json>& tables,
                             const std::string& rule, const std::string& ranking) {
   const std::string key =
       ranking == "verified" ? "recall_at_100_precision" : "recall_at_100_precision_posterior";
@@ -52,7 +52,7 @@ std::vector<double> Recalls(const CompareArguments& arguments, const std::vector
   return recalls;
 }
 
-int CompareLoops(const CompareArguments& arguments) {
+int CompareLoops(const CompareLoopsArguments& arguments) {
   std::vector<Json> tables;
   for (const std::string& file : arguments.tables) tables.push_back(ReadTable(file));
   Json tests = Json::array();
@@ -89,7 +89,7 @@ int CompareLoops(const CompareArguments& arguments) {
 }  // namespace
 
 void SetUpCompareLoops(CLI::App& command, int& exit_code) {
-  auto arguments = std::make_shared<CompareArguments>();
+  auto arguments = std::make_shared<CompareLoopsArguments>();
   command.add_option("tables", arguments->tables, "table.json files of `tutti loops --table`, one per set")
       ->required();
   command.add_option("--out", arguments->out, "JSON file for the outcome (default: print only)");

@@ -120,7 +120,7 @@ CameraRequest CameraOf(const CLI::App& command, const RunArguments& arguments) {
 }
 
 // What the map was made with, for a recording of which all frames are used.
-RunConfig ConfigOf(const std::string& map) {
+RunConfig ConfigOfMap(const std::string& map) {
   RunConfig config = ReadMapInfo(map).config;
   config.dataset.start = config.dataset.end = 0;
   config.dataset.stride = 1;
@@ -151,7 +151,7 @@ void MeasureGuess(const RunArguments& arguments, Recording& recording, RunReques
 // From a file, or from the map to go on in, or from what the recording is.
 RunConfig ConfigFor(const CameraRequest& camera, const RunArguments& arguments, RunRequest& request) {
   if (!arguments.config.empty() || !arguments.map.empty()) {
-    RunConfig config = arguments.config.empty() ? ConfigOf(arguments.map) : LoadConfig(arguments.config);
+    RunConfig config = arguments.config.empty() ? ConfigOfMap(arguments.map) : LoadConfig(arguments.config);
     SetCamera(arguments.dataset, camera, config);
     return config;
   }
@@ -165,7 +165,7 @@ RunConfig ConfigFor(const CameraRequest& camera, const RunArguments& arguments, 
 }
 
 // tutti-out/NAME, where NAME is the recording's.
-fs::path DefaultOut(const std::string& dataset) {
+fs::path DefaultRunFolder(const std::string& dataset) {
   if (IsCamera(dataset)) return fs::path("tutti-out") / "camera";
   const fs::path whole = fs::absolute(dataset).lexically_normal();
   const fs::path name = whole.has_filename() ? whole.filename() : whole.parent_path().filename();
@@ -173,7 +173,7 @@ fs::path DefaultOut(const std::string& dataset) {
   return fs::path("tutti-out") / (fs::is_directory(whole, ignored) ? name : name.stem());
 }
 
-int Run(const CLI::App& command, const RunArguments& arguments) {
+int RunOnce(const CLI::App& command, const RunArguments& arguments) {
   if (arguments.help_config) {
     std::fputs(HelpConfig(arguments.advanced).c_str(), stdout);
     return 0;
@@ -186,7 +186,7 @@ int Run(const CLI::App& command, const RunArguments& arguments) {
   RunRequest request;
   request.config = arguments.config;
   request.dataset = arguments.dataset;
-  request.out = arguments.out.empty() ? DefaultOut(arguments.dataset) : fs::path(arguments.out);
+  request.out = arguments.out.empty() ? DefaultRunFolder(arguments.dataset) : fs::path(arguments.out);
   request.no_loops = arguments.no_loops;
   request.quiet = arguments.quiet;
   request.keep = arguments.keep;
@@ -209,6 +209,8 @@ int Run(const CLI::App& command, const RunArguments& arguments) {
   if (arguments.save_map.empty() && !arguments.no_map) request.save_map = kMap;
   if (!arguments.map.empty()) request.map = arguments.map;
   RunConfig config = ConfigFor(CameraOf(command, arguments), arguments, request);
+=======
+  RunConfig config = arguments.config.empty() ? ConfigOfMap(arguments.map) : LoadConfig(request.config);
   SetOptions(arguments.set, config);
   return RunAndShow(command, arguments, std::move(request), config);
 }
@@ -316,7 +318,7 @@ void SetUpRun(CLI::App& command, int& exit_code) {
   command.add_flag("--help-config", arguments->help_config,
                    "print the keys of the configuration that users set, with their defaults");
   command.add_flag("--advanced", arguments->advanced, "with --help-config: all keys");
-  command.callback([&command, arguments, &exit_code] { exit_code = Run(command, *arguments); });
+  command.callback([&command, arguments, &exit_code] { exit_code = RunOnce(command, *arguments); });
 }
 
 }  // namespace tutti::cli

@@ -46,7 +46,7 @@ std::string RefuseThreads(const std::string& text) {
          " threads; as many as cores are enough";
 }
 
-CLI::Validator Check(std::string (*refuse)(const std::string&)) {
+CLI::Validator CheckedBy(std::string (*refuse)(const std::string&)) {
   return CLI::Validator([refuse](std::string& text) { return refuse(text); }, "");
 }
 
@@ -56,9 +56,9 @@ void RefuseAbsurdNumbers(CLI::App& command) {
   for (CLI::Option* option : command.get_options()) {
     const std::string type = option->get_type_name();
     const std::string kind = type.substr(0, type.find(':'));
-    if (kind == "FLOAT" || kind == "SECONDS") option->check(Check(RefuseReal));
-    if (kind == "INT" || kind == "UINT") option->check(Check(RefuseWhole));
-    if (option->check_lname("threads")) option->check(Check(RefuseThreads));
+    if (kind == "FLOAT" || kind == "SECONDS") option->check(CheckedBy(RefuseReal));
+    if (kind == "INT" || kind == "UINT") option->check(CheckedBy(RefuseWhole));
+    if (option->check_lname("threads")) option->check(CheckedBy(RefuseThreads));
   }
 }
 

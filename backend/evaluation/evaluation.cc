@@ -15,7 +15,7 @@ PoseMatrix Between(const PoseMatrix& a, const PoseMatrix& b) {
   return {a.rotation.transpose() * b.rotation, a.rotation.transpose() * (b.translation - a.translation)};
 }
 
-void Add(const PoseMatrix& error, PoseErrors& out) {
+void AddError(const PoseMatrix& error, PoseErrors& out) {
   const double off = (error.rotation - Eigen::Matrix3d::Identity()).squaredNorm();
   out.translation.push_back(error.translation.norm());
   out.rotation_deg.push_back(internal::kDegrees *
@@ -97,7 +97,7 @@ ErrorStatistics Summarize(std::vector<double> errors) {
 PoseErrors AbsoluteErrors(const std::vector<PoseMatrix>& reference, const std::vector<PoseMatrix>& estimate) {
   PoseErrors out;
   for (std::size_t k = 0; k < reference.size(); ++k) {
-    Add(Between(estimate[k], reference[k]), out);
+    AddError(Between(estimate[k], reference[k]), out);
     // Not through the rotation: it need not be quite one.
     out.translation.back() = (reference[k].translation - estimate[k].translation).norm();
   }
@@ -108,7 +108,7 @@ PoseErrors RelativeErrors(const std::vector<PoseMatrix>& reference, const std::v
                           const std::vector<std::pair<std::size_t, std::size_t>>& pairs) {
   PoseErrors out;
   for (const auto& [i, j] : pairs)
-    Add(Between(Between(reference[i], reference[j]), Between(estimate[i], estimate[j])), out);
+    AddError(Between(Between(reference[i], reference[j]), Between(estimate[i], estimate[j])), out);
   return out;
 }
 

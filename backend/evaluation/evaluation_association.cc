@@ -44,8 +44,8 @@ void RequirePoses(const Trajectory& reference, const Trajectory& estimate) {
   if (estimate.empty()) throw InputError("evaluation: the estimate holds no pose");
 }
 
-void Add(AssociatedPoses& out, const Trajectory& reference, const Trajectory& estimate, std::size_t r,
-         std::size_t e) {
+void AddPair(AssociatedPoses& out, const Trajectory& reference, const Trajectory& estimate, std::size_t r,
+             std::size_t e) {
   out.indices.emplace_back(r, e);
   out.stamps_s.push_back(estimate[e].stamp_s);
   out.reference.push_back(reference[r].pose);
@@ -68,7 +68,7 @@ AssociatedPoses AssociateByTime(const Trajectory& reference, const Trajectory& e
     const double stamp = shorter[s].stamp_s + offset_of_shorter;
     const std::size_t l = Nearest(longer, stamp);
     if (std::abs(longer[l].stamp_s - stamp) > max_difference_s) continue;
-    estimate_is_longer ? Add(out, reference, estimate, s, l) : Add(out, reference, estimate, l, s);
+    estimate_is_longer ? AddPair(out, reference, estimate, s, l) : AddPair(out, reference, estimate, l, s);
   }
   if (out.indices.empty()) {
     throw InputError("evaluation: no two poses are within " + Short(max_difference_s) +
@@ -87,7 +87,7 @@ AssociatedPoses AssociateByInterpolation(const Trajectory& reference, const Traj
     if (!pose) continue;
     std::size_t before = Nearest(reference, stamp);
     if (before > 0 && reference[before].stamp_s > stamp) --before;
-    Add(out, reference, estimate, before, e);
+    AddPair(out, reference, estimate, before, e);
     out.reference.back() = *pose;
   }
   if (out.indices.empty()) {
@@ -131,7 +131,7 @@ AssociatedPoses AssociateByIndex(const Trajectory& reference, const Trajectory& 
                      "; poses without time stamps are paired line by line and the counts must agree");
   }
   AssociatedPoses out;
-  for (std::size_t k = 0; k < reference.size(); ++k) Add(out, reference, estimate, k, k);
+  for (std::size_t k = 0; k < reference.size(); ++k) AddPair(out, reference, estimate, k, k);
   return out;
 }
 

@@ -9,7 +9,7 @@ namespace tutti {
 namespace {
 
 /// Position of the word; the lists below are in the order of their enumerations.
-std::size_t Find(const std::vector<std::string>& names, const std::string& name, const char* what) {
+std::size_t PlaceOf(const std::vector<std::string>& names, const std::string& name, const char* what) {
   const auto found = std::find(names.begin(), names.end(), name);
   if (found != names.end()) return static_cast<std::size_t>(found - names.begin());
   throw InputError(std::string("unknown ") + what + " '" + name + "'; use one of " + JoinText(names));
@@ -23,7 +23,7 @@ const std::vector<std::string>& TrajectoryAlignmentNames() {
 }
 
 TrajectoryAlignment ParseTrajectoryAlignment(const std::string& name) {
-  return static_cast<TrajectoryAlignment>(Find(TrajectoryAlignmentNames(), name, "alignment"));
+  return static_cast<TrajectoryAlignment>(PlaceOf(TrajectoryAlignmentNames(), name, "alignment"));
 }
 
 const char* ToString(TrajectoryAlignment alignment) {
@@ -36,7 +36,7 @@ const std::vector<std::string>& DeltaUnitNames() {
 }
 
 DeltaUnit ParseDeltaUnit(const std::string& name) {
-  return static_cast<DeltaUnit>(Find(DeltaUnitNames(), name, "unit"));
+  return static_cast<DeltaUnit>(PlaceOf(DeltaUnitNames(), name, "unit"));
 }
 
 const char* ToString(DeltaUnit unit) { return DeltaUnitNames().at(static_cast<std::size_t>(unit)).c_str(); }

@@ -68,7 +68,7 @@ cv::Mat Grey(const cv::Mat& pixels, const std::string& encoding) {
 }
 
 /// Every image of a topic as it is stored; `error` says why there is none.
-cv::Mat Decode(const rosbag::MessageInstance& message, bool depth, bool* metres, std::string* error) {
+cv::Mat DecodeMessage(const rosbag::MessageInstance& message, bool depth, bool* metres, std::string* error) {
   *metres = false;
   if (const auto image = message.instantiate<sensor_msgs::Image>()) {
     const cv::Mat pixels = Pixels(*image);
@@ -287,7 +287,7 @@ class BagDataset : public Dataset {
     std::string error;
     for (std::size_t i = 0; i < std::min<std::size_t>(50, frames_.size()) && first.empty(); ++i) {
       bool metres = false;
-      first = Decode(*frames_[i].image->message, false, &metres, &error);
+      first = DecodeMessage(*frames_[i].image->message, false, &metres, &error);
     }
     if (first.empty()) throw InputError(file_.string() + ": none of the first images can be read: " + error);
     size_ = first.size();
@@ -312,7 +312,7 @@ class BagDataset : public Dataset {
     cv::Mat image;
     {
       const std::lock_guard<std::mutex> lock(mutex_);
-      image = Decode(*message.message, depth, metres, &error);
+      image = DecodeMessage(*message.message, depth, metres, &error);
     }
     if (image.empty()) throw InputError(error);
     if (image.size() != size_) throw InputError("an image has another size than the first one");

@@ -12,13 +12,13 @@
 namespace tutti {
 namespace {
 
-constexpr int kHalf = 1;  // of the square that is compared [px of the level]
-constexpr int kSamples = (2 * kHalf + 1) * (2 * kHalf + 1);
+constexpr int kHalfSquare = 1;  // of the square that is compared [px of the level]
+constexpr int kSamples = (2 * kHalfSquare + 1) * (2 * kHalfSquare + 1);
 constexpr int kLeastPoints = 60;
-constexpr int kIterations = 12;
-constexpr double kGreySigma = 8;         // of what a sample may differ by [grey levels]; beyond, Huber's loss
+constexpr int kAlignerIterations = 12;
+constexpr double kSampleSigma = 8;       // of what a sample may differ by [grey levels]; beyond, Huber's loss
 constexpr double kLeastExplained = 0.5;  // of the variance of the samples
-constexpr internal::GaussNewtonLimits kAlignerLimits{kIterations, 1e-5, 1e-4, 1e-9};
+constexpr internal::GaussNewtonLimits kAlignerLimits{kAlignerIterations, 1e-5, 1e-4, 1e-9};
 constexpr int kUnknowns = 13;  // pose, motion, brightness
 
 // The pyramid and two coarser levels, each half as large as the one before.
@@ -33,7 +33,7 @@ std::vector<cv::Mat> Coarse(const std::vector<cv::Mat>& pyramid) {
   return levels;
 }
 
-Eigen::Vector2d ToLevel(const Eigen::Vector2d& pixel, const Eigen::Vector2d& scale) {
+Eigen::Vector2d PixelOfLevel(const Eigen::Vector2d& pixel, const Eigen::Vector2d& scale) {
   return ((pixel.array() + 0.5) / scale.array() - 0.5).matrix();
 }
 
@@ -62,7 +62,7 @@ class ImageAligner::Level {
     const Eigen::Matrix3d turned =
         (start.T_camera_world.rotation * T_reference_world.rotation.conjugate()).toRotationMatrix();
     for (const Point& point : points) {
-      const Eigen::Vector2d p = ToLevel(point.pixel, scale_);
+      const Eigen::Vector2d p = PixelOfLevel(point.pixel, scale_);
       if (!Inside(from_, p)) continue;
       const Eigen::Vector3d q = start.T_camera_world * point.in_world;
       Eigen::Vector2d unused;
@@ -73,8 +73,8 @@ class ImageAligner::Level {
       Eigen::Matrix<double, 3, 2> lift;
       lift << point.in_reference.z() / camera_.fx, 0, 0, point.in_reference.z() / camera_.fy, 0, 0;
       Target target{point.in_world, projection * turned * lift, {}};
-      for (int v = -kHalf, n = 0; v <= kHalf; ++v) {
-        for (int u = -kHalf; u <= kHalf; ++u, ++n)
+      for (int v = -kHalfSquare, n = 0; v <= kHalfSquare; ++v) {
+        for (int u = -kHalfSquare; u <= kHalfSquare; ++u, ++n)
           target.grey[static_cast<std::size_t>(n)] =
               Bilinear(from_.data, from_.step, static_cast<float>(p.x() + u), static_cast<float>(p.y() + v));
       }
@@ -132,14 +132,14 @@ class ImageAligner::Level {
     if (!internal::Reprojection<2>::Residual(camera_, p, {Eigen::Vector2d::Zero()}, kMinDepth, &pixel,
                                              &by_point))
       return;
-    const Eigen::Vector2d at = ToLevel(pixel, scale_);
+    const Eigen::Vector2d at = PixelOfLevel(pixel, scale_);
     if (!Inside(to_, at)) return;
     Eigen::Matrix2d gg = Eigen::Matrix2d::Zero();
     Eigen::Vector2d g_sum = Eigen::Vector2d::Zero(), gr = Eigen::Vector2d::Zero();
     double r_sum = 0, w_sum = 0;
-    constexpr double kUnit = 1 / (kGreySigma * kGreySigma * kSamples);  // neighbours say about the same
-    for (int v = -kHalf, n = 0; v <= kHalf; ++v) {
-      for (int u = -kHalf; u <= kHalf; ++u, ++n) {
+    constexpr double kUnit = 1 / (kSampleSigma * kSampleSigma * kSamples);  // neighbours say about the same
+    for (int v = -kHalfSquare, n = 0; v <= kHalfSquare; ++v) {
+      for (int u = -kHalfSquare; u <= kHalfSquare; ++u, ++n) {
         const Eigen::Vector2d q = at + target.A * Eigen::Vector2d(u, v);
         if (!Inside(to_, q)) continue;
         const float x = static_cast<float>(q.x()), y = static_cast<float>(q.y());
@@ -149,13 +149,13 @@ class ImageAligner::Level {
             0.5 * (Bilinear(to_.data, to_.step, x + 1, y) - Bilinear(to_.data, to_.step, x - 1, y)),
             0.5 * (Bilinear(to_.data, to_.step, x, y + 1) - Bilinear(to_.data, to_.step, x, y - 1)));
         const double r = here - before - brightness;
-        const double w = kUnit * internal::HuberWeight(r * r, kGreySigma * kGreySigma);
+        const double w = kUnit * internal::HuberWeight(r * r, kSampleSigma * kSampleSigma);
         gg += w * g * g.transpose();
         gr += w * r * g;
         g_sum += w * g;
         r_sum += w * r;
         w_sum += w;
-        equations->cost += kUnit * internal::HuberCost(r * r, kGreySigma * kGreySigma);
+        equations->cost += kUnit * internal::HuberCost(r * r, kSampleSigma * kSampleSigma);
         sums->squares += r * r;
         sums->grey += before;
         sums->grey2 += before * before;

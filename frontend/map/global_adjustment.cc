@@ -8,7 +8,7 @@
 namespace tutti {
 namespace {
 
-constexpr int kIterations = 5;
+constexpr int kAdjustmentIterations = 5;
 constexpr int kMinLandmarks = 20;  // a keyframe with fewer follows its neighbours
 
 GlobalAdjustment::Work::Outcome MakeOutcome(const Map& before, const Map& after,
@@ -39,7 +39,7 @@ GlobalAdjustment::Work::Work(const OdometryOptions& odometry, const CameraRig& r
     (fixed.empty() ? fixed : moving_).push_back(id);
   }
   BundleAdjustmentOptions options;
-  options.iterations = kIterations;
+  options.iterations = kAdjustmentIterations;
   options.pixel_sigma = odometry.pixel_sigma;
   options.metric = rig.sensor != Sensor::kMono;
   options.lens.value = lens;

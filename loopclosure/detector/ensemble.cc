@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "loopclosure/detector/parallel.h"
+#include "loopclosure/index.h"
 #include "loopclosure/memory/dense.h"
 #include "tutti/core/error.h"
 
@@ -38,7 +39,7 @@ SeenWords Placed(std::vector<int> words, const std::vector<cv::KeyPoint>& keypoi
   return seen;
 }
 
-std::size_t Index(int i) { return static_cast<std::size_t>(i); }
+using internal::Index;
 
 }  // namespace
 

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "core/byte_stream.h"
+#include "loopclosure/index.h"
 
 namespace tutti {
 namespace {
@@ -21,7 +22,7 @@ constexpr double kLeastRepeated = 0.1;     // a member that repeats nothing may 
 constexpr double kLongestLasting = 40;     // images that the share of lasting aliases stands for at most
 constexpr int kFollows = 2;                // slots from the image before's to the next one's alias
 
-std::size_t Index(int slot) { return static_cast<std::size_t>(slot); }
+using internal::Index;
 
 // Largest count of the places, and of those that are not near, each with its slot (-1: no place has any).
 struct Largest {

@@ -6,6 +6,7 @@
 
 #include "loopclosure/detector/parallel.h"
 #include "loopclosure/filter/transition_model.h"
+#include "loopclosure/index.h"
 
 namespace tutti::internal {
 namespace {
@@ -13,7 +14,7 @@ namespace {
 constexpr int kPatience = 3;                     // locations in vain on a way along the path
 constexpr double kBeside = 22.0 * M_PI / 180.0;  // so much aside is near enough: the way off is short
 
-std::size_t Index(int i) { return static_cast<std::size_t>(i); }
+using internal::Index;
 
 // Only the direction of the translation is known.
 bool ScaleFree(const Verification& v) {

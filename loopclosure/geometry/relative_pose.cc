@@ -235,7 +235,8 @@ void FinishSimilarity(const SimilarityProblem& problem, const RelativePoseOption
 // Refines the model on its inliers and chooses the inliers anew, a few times; keeps the last state that did
 // not lose any support.
 template <typename Model, typename Fit, typename Select>
-void Refine(int rounds, const Fit& fit, const Select& select, Model& model, std::vector<int>& inliers) {
+void RefineOnInliers(int rounds, const Fit& fit, const Select& select, Model& model,
+                     std::vector<int>& inliers) {
   for (int round = 0; round < rounds; ++round) {
     Model refined = model;
     if (!fit(inliers, refined)) return;
@@ -286,7 +287,7 @@ PnpResult SolvePnp(const std::vector<Eigen::Vector3d>& points, const std::vector
       },
       result.T_camera_points);
   if (result.inliers.size() >= 4) {
-    Refine(
+    RefineOnInliers(
         options.refine_rounds,
         [&](const std::vector<int>& inliers, Pose& pose) {
           return RefinePnp(problem, inliers, 0.5 * options.threshold_px, pose);
@@ -332,7 +333,7 @@ SimilarityResult SolveSimilarity(const std::vector<Eigen::Vector3d>& points_a,
       best);
   result.S_a_b = best.S_a_b;
   if (result.inliers.size() >= 4) {
-    Refine(
+    RefineOnInliers(
         options.refine_rounds,
         [&](const std::vector<int>& inliers, Similarity& S) {
           return RefineSimilarity(problem, inliers, 0.5 * options.threshold_px, S);

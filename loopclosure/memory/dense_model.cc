@@ -4,20 +4,21 @@
 
 #include "core/byte_stream.h"
 #include "core/median.h"
+#include "loopclosure/index.h"
 #include "loopclosure/memory/dense.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
 namespace {
 
-constexpr std::size_t kTooFewPlaces = 12;  // in so few, nothing can stand out
-constexpr double kDeviation = 1.4826;      // standard deviations of a normal law in a median deviation
-constexpr double kLeastDeviation = 0.002;  // of scores: cosines differ by so much without a reason
-constexpr double kPlain = 2.0;             // standard deviations that say nothing
-constexpr double kMost = 20.0;             // counts of one place
-constexpr double kHalfWay = 4.0;           // standard deviations beyond kPlain that make half of them
+constexpr std::size_t kTooFewToStandOut = 12;  // in so few, nothing can stand out
+constexpr double kDeviation = 1.4826;          // standard deviations of a normal law in a median deviation
+constexpr double kLeastDeviation = 0.002;      // of scores: cosines differ by so much without a reason
+constexpr double kPlain = 2.0;                 // standard deviations that say nothing
+constexpr double kMost = 20.0;                 // counts of one place
+constexpr double kHalfWay = 4.0;               // standard deviations beyond kPlain that make half of them
 
-std::size_t Index(int slot) { return static_cast<std::size_t>(slot); }
+using internal::Index;
 
 float Cosine(const cv::Mat& a, const cv::Mat& b) {
   if (a.empty() || b.empty()) return 0.0f;
@@ -164,7 +165,7 @@ void DenseModel::ForEachPair(LevelOf level_of, Call call) const {
 
 std::vector<double> DenseModel::Counts(const std::vector<int>& places) const {
   std::vector<double> sums(descriptors_.size(), 0.0);
-  if (recent_.empty() || places.size() < kTooFewPlaces) return sums;
+  if (recent_.empty() || places.size() < kTooFewToStandOut) return sums;
   ForEachPair([&](const Row& row) { return MeanOver(places, row); },
               [&](std::size_t place, double above_mean) { sums[place] += above_mean / kSequence; });
   return Contrast(std::move(sums), places);
@@ -172,7 +173,7 @@ std::vector<double> DenseModel::Counts(const std::vector<int>& places) const {
 
 std::vector<double> DenseModel::Contrast(std::vector<double> scores, const std::vector<int>& places) {
   std::vector<double> counts(scores.size(), 0.0);
-  if (places.size() < kTooFewPlaces) return counts;
+  if (places.size() < kTooFewToStandOut) return counts;
   std::vector<double> values;
   values.reserve(places.size());
   for (const int slot : places) values.push_back(scores[Index(slot)]);

@@ -6,6 +6,7 @@
 
 #include "core/byte_stream.h"
 #include "loopclosure/geometry/shuffle.h"
+#include "loopclosure/index.h"
 #include "loopclosure/vocabulary/descriptor_index.h"
 #include "loopclosure/vocabulary/word_bytes.h"
 #include "loopclosure/vocabulary/word_storage.h"
@@ -17,7 +18,7 @@ using Tree = flann::KDTreeIndex<flann::L2<float>>;
 
 constexpr int kSpareDeadWords = 1024;  // the trees are not grown anew for fewer
 
-std::size_t Index(int i) { return static_cast<std::size_t>(i); }
+using internal::Index;
 
 struct GrownTree {
   std::unique_ptr<Tree> index;

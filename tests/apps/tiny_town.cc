@@ -2,14 +2,14 @@
 
 #include <string>
 
-#include "tests/apps/generated_dataset.h"
 #include "tests/apps/tutti/executable.h"
+#include "tests/support/generated_dataset.h"
 
 namespace tutti::testing {
 namespace fs = std::filesystem;
 
 const fs::path& TinyTown() {
-  static const GeneratedDataset town("tiny-town", [] {
+  static const fs::path town = GeneratedDataset([] {
     SyntheticOptions options;
     options.sensor = SyntheticSensor::kStereo;
     options.width = 480;
@@ -18,7 +18,7 @@ const fs::path& TinyTown() {
     options.frames = kTinyFrames;
     return options;
   }());
-  return town.path();
+  return town;
 }
 
 fs::path CopyOfTinyTown(const fs::path& where) {

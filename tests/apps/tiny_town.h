@@ -1,4 +1,4 @@
-// A short drive through the synthetic town in KITTI's layout, made once per test program.
+// A short drive through the synthetic town in KITTI's layout, made once for all tests.
 #pragma once
 
 #include <filesystem>

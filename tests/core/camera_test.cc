@@ -8,7 +8,7 @@
 namespace tutti {
 namespace {
 
-PinholeCamera Camera(Distortion distortion) {
+PinholeCamera CameraWith(Distortion distortion) {
   PinholeCamera camera;
   camera.width = 752;
   camera.height = 480;
@@ -25,7 +25,7 @@ PinholeCamera Camera(Distortion distortion) {
 
 TEST(PinholeCamera, UnprojectInvertsProjectForEveryDistortion) {
   for (Distortion distortion : {Distortion::kNone, Distortion::kRadTan, Distortion::kEquidistant}) {
-    const PinholeCamera camera = Camera(distortion);
+    const PinholeCamera camera = CameraWith(distortion);
     for (double u = 0; u < camera.width; u += 47) {
       for (double v = 0; v < camera.height; v += 41) {
         const Eigen::Vector3d ray = camera.Unproject({u, v});
@@ -37,7 +37,7 @@ TEST(PinholeCamera, UnprojectInvertsProjectForEveryDistortion) {
 }
 
 TEST(PinholeCamera, EquidistantWithoutCoefficientsIsTheAngleTimesTheFocalLength) {
-  PinholeCamera camera = Camera(Distortion::kEquidistant);
+  PinholeCamera camera = CameraWith(Distortion::kEquidistant);
   camera.coefficients = {};
   const double angle = 0.6;
   const Eigen::Vector2d pixel = camera.Project({std::tan(angle), 0, 1});
@@ -45,7 +45,7 @@ TEST(PinholeCamera, EquidistantWithoutCoefficientsIsTheAngleTimesTheFocalLength)
 }
 
 TEST(PinholeCamera, RadialTangentialMatchesTheFormulaByHand) {
-  PinholeCamera camera = Camera(Distortion::kRadTan);
+  PinholeCamera camera = CameraWith(Distortion::kRadTan);
   camera.coefficients = {0.1, 0.01, 0.001, 0.002, 0.003};
   const double x = 0.2, y = -0.1, r2 = 0.05;
   const double radial = 1 + 0.1 * r2 + 0.01 * r2 * r2 + 0.003 * r2 * r2 * r2;
@@ -57,7 +57,7 @@ TEST(PinholeCamera, RadialTangentialMatchesTheFormulaByHand) {
 }
 
 TEST(PinholeCamera, ContainsRespectsTheBorder) {
-  const PinholeCamera camera = Camera(Distortion::kNone);
+  const PinholeCamera camera = CameraWith(Distortion::kNone);
   EXPECT_TRUE(camera.Contains({0, 0}));
   EXPECT_TRUE(camera.Contains({751, 479}));
   EXPECT_FALSE(camera.Contains({751.5, 10}));
@@ -65,14 +65,14 @@ TEST(PinholeCamera, ContainsRespectsTheBorder) {
 }
 
 TEST(PinholeCamera, ValidateSaysWhatIsWrong) {
-  EXPECT_EQ(Camera(Distortion::kRadTan).Validate(), "");
-  PinholeCamera camera = Camera(Distortion::kNone);
+  EXPECT_EQ(CameraWith(Distortion::kRadTan).Validate(), "");
+  PinholeCamera camera = CameraWith(Distortion::kNone);
   camera.fx = 0;
   EXPECT_EQ(camera.Validate(), "camera.fx must be above 0 [px], not 0");
-  camera = Camera(Distortion::kNone);
+  camera = CameraWith(Distortion::kNone);
   camera.cx = 5000;
   EXPECT_NE(camera.Validate().find("principal point"), std::string::npos);
-  camera = Camera(Distortion::kRadTan);
+  camera = CameraWith(Distortion::kRadTan);
   camera.coefficients[0] = std::numeric_limits<double>::quiet_NaN();
   EXPECT_NE(camera.Validate().find("camera.coefficients"), std::string::npos);
 }

@@ -23,7 +23,7 @@ std::string ErrorOf(const std::string& text, TrajectoryFormat format) {
   return "no error";
 }
 
-Trajectory Curve() {
+Trajectory CurvedWay() {
   Trajectory out;
   for (int k = 0; k < 50; ++k) {
     const double a = 0.1 * k;
@@ -36,7 +36,7 @@ TEST(TrajectoryIo, EveryFormatReadsBackWhatWasWritten) {
   for (TrajectoryFormat format :
        {TrajectoryFormat::kTum, TrajectoryFormat::kKitti, TrajectoryFormat::kEuroc}) {
     const std::filesystem::path file = testing::FreshFolder() / "poses.txt";
-    const Trajectory written = Curve();
+    const Trajectory written = CurvedWay();
     WriteTrajectory(file, written, format);
     EXPECT_EQ(GuessTrajectoryFormat(file), format);
     const Trajectory read = ReadTrajectory(file, format);
@@ -102,7 +102,8 @@ TEST(TrajectoryIo, RepeatedStampsAreLeftOutWithAWarningWhereTheCallerAsks) {
 TEST(TrajectoryIo, FilesThatCanNotBeOpenedAreInputErrors) {
   EXPECT_THROW(ReadTrajectory("/nonexistent/poses.txt", TrajectoryFormat::kTum), InputError);
   EXPECT_THROW(ReadTrajectory(testing::FreshFolder(), TrajectoryFormat::kTum), InputError);
-  EXPECT_THROW(WriteTrajectory("/nonexistent/folder/poses.txt", Curve(), TrajectoryFormat::kTum), InputError);
+  EXPECT_THROW(WriteTrajectory("/nonexistent/folder/poses.txt", CurvedWay(), TrajectoryFormat::kTum),
+               InputError);
   EXPECT_THROW(ReadTimes("/nonexistent/times.txt"), InputError);
   EXPECT_THROW(ParseTrajectoryFormat("tumm"), InputError);
 }

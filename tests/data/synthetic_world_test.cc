@@ -2,34 +2,19 @@
 
 #include <gtest/gtest.h>
 
-#include <fstream>
 #include <opencv2/features2d.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
-#include <sstream>
 
 #include "core/byte_stream.h"
 #include "data/synthetic/image_change.h"
-#include "data/synthetic/synthetic_writer.h"
 #include "gmock/gmock.h"
-#include "tests/frontend/dataset/dataset_files.h"
-#include "tests/support/test_data.h"
+#include "tests/data/small_world.h"
+#include "tutti/core/error.h"
 
 namespace tutti {
 namespace {
 
-using tutti::testing::FreshFolder;
-using tutti::testing::With;
-
-SyntheticOptions Small(SyntheticScene scene, SyntheticSensor sensor) {
-  SyntheticOptions o;
-  o.scene = scene;
-  o.sensor = sensor;
-  o.width = 320;
-  o.height = scene == SyntheticScene::kTown ? 160 : 240;
-  o.blocks_x = 1;
-  return o;
-}
+using testing::SmallWorld;
 
 // Fraction of pixels of image a, moved into image b by depth and poses, that show what a shows (within
 // `tolerance` grey levels), among those that are not hidden there.
@@ -62,7 +47,7 @@ double AgreementByWarp(const SyntheticWorld& world, std::size_t a, std::size_t b
 
 TEST(SyntheticWorldTest, GroundTruthAndDepthExplainTheImages) {
   for (const SyntheticScene scene : {SyntheticScene::kTown, SyntheticScene::kRoom}) {
-    const SyntheticWorld world(Small(scene, SyntheticSensor::kRgbd));
+    const SyntheticWorld world(SmallWorld(scene, SyntheticSensor::kRgbd));
     double compared = 0;
     for (const std::size_t i : {3U, 40U}) {
       EXPECT_GT(AgreementByWarp(world, i, i + 3, 12, &compared), 0.9) << i;
@@ -72,7 +57,7 @@ TEST(SyntheticWorldTest, GroundTruthAndDepthExplainTheImages) {
 }
 
 TEST(SyntheticWorldTest, RightImageIsTheLeftOneMovedByItsDisparity) {
-  SyntheticOptions options = Small(SyntheticScene::kTown, SyntheticSensor::kStereo);
+  SyntheticOptions options = SmallWorld(SyntheticScene::kTown, SyntheticSensor::kStereo);
   const SyntheticWorld world(options);
   const SyntheticFrame frame = world.Render(5);
   const cv::Mat depth = world.ExactDepth(5);
@@ -96,7 +81,7 @@ TEST(SyntheticWorldTest, RightImageIsTheLeftOneMovedByItsDisparity) {
 
 TEST(SyntheticWorldTest, EveryViewHasCornersToTrack) {
   for (const SyntheticScene scene : {SyntheticScene::kTown, SyntheticScene::kRoom}) {
-    SyntheticOptions options = Small(scene, SyntheticSensor::kMono);
+    SyntheticOptions options = SmallWorld(scene, SyntheticSensor::kMono);
     options.width = 640;
     options.height = scene == SyntheticScene::kTown ? 320 : 480;
     const SyntheticWorld world(options);
@@ -110,7 +95,7 @@ TEST(SyntheticWorldTest, EveryViewHasCornersToTrack) {
 }
 
 TEST(SyntheticWorldTest, MotionIsSmoothAndTheSecondLapRevisitsTheFirst) {
-  SyntheticOptions options = Small(SyntheticScene::kTown, SyntheticSensor::kMono);
+  SyntheticOptions options = SmallWorld(SyntheticScene::kTown, SyntheticSensor::kMono);
   options.laps = 2;
   const SyntheticWorld world(options);
   const Trajectory truth = world.GroundTruth();
@@ -130,7 +115,7 @@ TEST(SyntheticWorldTest, MotionIsSmoothAndTheSecondLapRevisitsTheFirst) {
 }
 
 TEST(SyntheticWorldTest, SameSeedSameBytesOtherSeedOtherTown) {
-  SyntheticOptions options = Small(SyntheticScene::kTown, SyntheticSensor::kMono);
+  SyntheticOptions options = SmallWorld(SyntheticScene::kTown, SyntheticSensor::kMono);
   options.noise_sigma = 4;
   const cv::Mat one = SyntheticWorld(options).Render(7).image, two = SyntheticWorld(options).Render(7).image;
   EXPECT_EQ(cv::norm(one, two, cv::NORM_INF), 0);
@@ -141,7 +126,7 @@ TEST(SyntheticWorldTest, SameSeedSameBytesOtherSeedOtherTown) {
 }
 
 TEST(SyntheticWorldTest, NoiseBlurLightAndMovingObjectsChangeTheImages) {
-  SyntheticOptions options = Small(SyntheticScene::kTown, SyntheticSensor::kRgbd);
+  SyntheticOptions options = SmallWorld(SyntheticScene::kTown, SyntheticSensor::kRgbd);
   options.laps = 1.3;
   const SyntheticWorld plain(options);
   const std::size_t late = plain.FramesPerLap() + 45;  // second lap, cloud complete
@@ -176,7 +161,7 @@ std::vector<double> Tones(const cv::Mat& image) {
 }
 
 SyntheticOptions SmallTwoLaps() {
-  SyntheticOptions o = Small(SyntheticScene::kTown, SyntheticSensor::kStereo);
+  SyntheticOptions o = SmallWorld(SyntheticScene::kTown, SyntheticSensor::kStereo);
   o.laps = 2;
   o.supersample = 1;
   o.noise_sigma = 2;
@@ -189,7 +174,7 @@ bool SameImages(const SyntheticFrame& a, const SyntheticFrame& b) {
 
 TEST(SyntheticWorldTest, WorldsLookAsTheyAlwaysDid) {
   const auto frame = [](SyntheticScene scene, std::size_t i) {
-    return SyntheticWorld(Small(scene, SyntheticSensor::kMono)).Render(i).image;
+    return SyntheticWorld(SmallWorld(scene, SyntheticSensor::kMono)).Render(i).image;
   };
   using ::testing::DoubleNear;
   using ::testing::Pointwise;
@@ -215,10 +200,10 @@ TEST(SyntheticWorldTest, ImagesAreTheSameBytesWithEveryCompiler) {
   const auto checksum = [](const SyntheticOptions& o, std::size_t i) {
     return Checksum(SyntheticWorld(o).Render(i).image);
   };
-  SyntheticOptions town = Small(SyntheticScene::kTown, SyntheticSensor::kMono);
+  SyntheticOptions town = SmallWorld(SyntheticScene::kTown, SyntheticSensor::kMono);
   EXPECT_EQ(checksum(town, 7), 1569755144U);
-  EXPECT_EQ(checksum(Small(SyntheticScene::kRoom, SyntheticSensor::kMono), 7), 3208442277U);
-  EXPECT_EQ(checksum(Small(SyntheticScene::kCorridor, SyntheticSensor::kMono), 7), 2192339742U);
+  EXPECT_EQ(checksum(SmallWorld(SyntheticScene::kRoom, SyntheticSensor::kMono), 7), 3208442277U);
+  EXPECT_EQ(checksum(SmallWorld(SyntheticScene::kCorridor, SyntheticSensor::kMono), 7), 2192339742U);
   town.laps = 2;
   town.dusk = town.other_cars = true;
   town.occlusion = 0.3;
@@ -282,7 +267,7 @@ TEST(SyntheticWorldTest, OtherCarsAreParkedWhenAPlaceIsSeenAgain) {
 }
 
 TEST(SyntheticWorldTest, KinectNoiseGrowsWithDepthAndLeavesHoles) {
-  SyntheticOptions options = Small(SyntheticScene::kRoom, SyntheticSensor::kRgbd);
+  SyntheticOptions options = SmallWorld(SyntheticScene::kRoom, SyntheticSensor::kRgbd);
   options.kinect_noise = true;
   const SyntheticWorld world(options);
   const cv::Mat noisy = world.Render(3).depth_m, exact = world.ExactDepth(3);
@@ -296,7 +281,7 @@ TEST(SyntheticWorldTest, KinectNoiseGrowsWithDepthAndLeavesHoles) {
 
 // Every row of a shaken camera with a rolling shutter is that of a still camera at the row's time.
 TEST(SyntheticWorldTest, RowsOfARollingShutterAreSeenFromWhereTheCameraIsThen) {
-  SyntheticOptions options = Small(SyntheticScene::kRoom, SyntheticSensor::kRgbd);
+  SyntheticOptions options = SmallWorld(SyntheticScene::kRoom, SyntheticSensor::kRgbd);
   options.supersample = 1;
   options.rate_hz = 30;
   options.shake_deg_per_s = 200;
@@ -315,47 +300,6 @@ TEST(SyntheticWorldTest, RowsOfARollingShutterAreSeenFromWhereTheCameraIsThen) {
       EXPECT_LT(cv::mean(difference)[0], 0.3) << first;  // edges between pixels fall to either side
     }
   }
-}
-
-TEST(SyntheticWorldTest, WrittenStereoTownIsReadBackByTheKittiReader) {
-  SyntheticOptions options = Small(SyntheticScene::kTown, SyntheticSensor::kStereo);
-  options.frames = 5;
-  const SyntheticWorld world(options);
-  const auto folder = FreshFolder() / "town";
-  SyntheticWriteOptions write;
-  write.threads = 2;
-  EXPECT_EQ(WriteSyntheticDataset(world, folder, write), 5U);
-  const auto data = OpenDataset(folder, With(Sensor::kStereo));
-  ASSERT_EQ(data->Size(), 5U);
-  EXPECT_NEAR(data->Rig().baseline_m, 0.54, 1e-9);
-  EXPECT_NEAR(data->Rig().camera.fx, world.Camera().fx, 1e-9);
-  const SyntheticFrame frame = world.Render(3);
-  EXPECT_EQ(cv::norm(data->Read(3).frame->image, frame.image, cv::NORM_INF), 0);
-  EXPECT_EQ(cv::norm(data->Read(3).frame->right, frame.right, cv::NORM_INF), 0);
-  const Trajectory truth = data->ReadGroundTruth(*data->GroundTruthFile(), nullptr);
-  EXPECT_LT((truth[4].pose.translation - world.PoseOf(4).translation).norm(), 1e-9);
-}
-
-TEST(SyntheticWorldTest, WrittenRoomIsReadBackByTheTumReader) {
-  SyntheticOptions options = Small(SyntheticScene::kRoom, SyntheticSensor::kRgbd);
-  options.frames = 4;
-  options.readout_s = 0.03;
-  const SyntheticWorld world(options);
-  const auto folder = FreshFolder();
-  WriteSyntheticDataset(world, folder);
-  std::ifstream config(folder / "config.yaml");
-  std::stringstream text;
-  text << config.rdbuf();
-  EXPECT_NE(text.str().find("readout_s: 0.03 "), std::string::npos) << text.str();
-  DatasetOptions read = With(Sensor::kRgbd);
-  read.camera = world.Camera();
-  const auto data = OpenDataset(folder, read);
-  ASSERT_EQ(data->Size(), 4U);
-  EXPECT_LT(cv::norm(data->Read(2).frame->depth_m, world.Render(2).depth_m, cv::NORM_INF), 2e-4);
-  const Trajectory truth = data->ReadGroundTruth(*data->GroundTruthFile(), nullptr);
-  ASSERT_EQ(truth.size(), 4U);
-  EXPECT_LT((truth[3].pose.translation - world.PoseOf(3).translation).norm(), 1e-8);
-  EXPECT_NEAR(truth[3].stamp_s, data->Stamp(3), 1e-6);
 }
 
 TEST(SyntheticWorldTest, TheCorridorHasLittleToSeeAndIsWalkedAgain) {
@@ -383,55 +327,6 @@ TEST(SyntheticWorldTest, TheCorridorHasLittleToSeeAndIsWalkedAgain) {
   for (std::size_t i = lap; i < lap + 3; ++i)
     nearest = std::min(nearest, (world.PoseOf(i).translation - world.PoseOf(0).translation).norm());
   EXPECT_LT(nearest, 1.0);
-}
-
-TEST(SyntheticWorldTest, SidesLookLeftAndRightAndAreNumberedInPairs) {
-  SyntheticOptions options = Small(SyntheticScene::kTown, SyntheticSensor::kSides);
-  options.frames = 3;
-  options.sides_deg = 40;
-  const SyntheticWorld world(options);
-  // A camera that looks 40 degrees to the left of the way sees at its right edge what lies ahead; the one to
-  // the right sees it at its left edge. So the two images are different and both are full.
-  const SyntheticFrame frame = world.Render(1);
-  ASSERT_EQ(frame.right.size(), frame.image.size());
-  EXPECT_GT(cv::norm(frame.image, frame.right, cv::NORM_L1) / static_cast<double>(frame.image.total()), 5);
-  const auto folder = FreshFolder();
-  EXPECT_EQ(WriteSyntheticDataset(world, folder), 3U);
-  const cv::Mat left = cv::imread((folder / "images/000003.png").string(), cv::IMREAD_UNCHANGED);
-  const cv::Mat right = cv::imread((folder / "images/000004.png").string(), cv::IMREAD_UNCHANGED);
-  EXPECT_EQ(cv::norm(left, frame.image, cv::NORM_INF), 0);
-  EXPECT_EQ(cv::norm(right, frame.right, cv::NORM_INF), 0);
-  EXPECT_EQ(ReadTrajectory(folder / "poses.txt", TrajectoryFormat::kKitti).size(), 3U);
-}
-
-TEST(SyntheticWorldTest, AFullFolderIsRefusedUnlessForced) {
-  SyntheticOptions options = Small(SyntheticScene::kRoom, SyntheticSensor::kMono);
-  options.frames = 4;
-  const auto folder = FreshFolder();
-  WriteSyntheticDataset(SyntheticWorld(options), folder);
-  options.frames = 2;
-  const SyntheticWorld shorter(options);
-  EXPECT_THROW(WriteSyntheticDataset(shorter, folder), InputError);
-  SyntheticWriteOptions force;
-  force.force = true;
-  EXPECT_EQ(WriteSyntheticDataset(shorter, folder, force), 2U);
-  EXPECT_EQ(OpenDataset(folder, With(Sensor::kMono))->Size(), 2U);  // no old frames left
-}
-
-TEST(SyntheticWorldTest, StoppingKeepsACompleteBeginning) {
-  SyntheticOptions options = Small(SyntheticScene::kRoom, SyntheticSensor::kMono);
-  options.frames = 20;
-  const auto folder = FreshFolder();
-  SyntheticWriteOptions write;
-  write.threads = 2;
-  write.progress = [](std::size_t done, std::size_t) { return done < 3; };
-  const std::size_t written = WriteSyntheticDataset(SyntheticWorld(options), folder, write);
-  EXPECT_GE(written, 3U);
-  EXPECT_LT(written, 20U);
-  const auto data = OpenDataset(folder, With(Sensor::kMono));
-  EXPECT_EQ(data->Size(), written);
-  EXPECT_TRUE(data->Read(written - 1).frame);
-  EXPECT_EQ(data->ReadGroundTruth(folder / "poses.txt", nullptr).size(), written);
 }
 
 TEST(SyntheticWorldTest, BadOptionsAreNamed) {

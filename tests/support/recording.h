@@ -26,7 +26,9 @@ struct Recording {
   }
 };
 
-inline CameraRig RigOf(const SyntheticWorld& world) {
+/// Of a SyntheticWorld or a RenderedWorld.
+template <class World>
+CameraRig RigOf(const World& world) {
   CameraRig rig;
   const SyntheticSensor sensor = world.Options().sensor;
   rig.sensor = sensor == SyntheticSensor::kStereo ? Sensor::kStereo
@@ -40,7 +42,8 @@ inline CameraRig RigOf(const SyntheticWorld& world) {
 }
 
 /// The first `count` frames of a world.
-inline Recording Record(const SyntheticWorld& world, std::size_t count) {
+template <class World>
+Recording Record(const World& world, std::size_t count) {
   Recording out;
   out.rig = RigOf(world);
   for (std::size_t i = 0; i < count; ++i) out.Add(world.Render(i));
@@ -52,6 +55,18 @@ inline InputFrame Black(InputFrame frame) {
   for (cv::Mat* image : {&frame.image, &frame.right, &frame.depth_m}) {
     if (!image->empty()) *image = cv::Mat(image->size(), image->type(), cv::Scalar(0));
   }
+  return frame;
+}
+
+/// Something to see, but nothing of the map and no depth.
+inline InputFrame Snow(InputFrame frame) {
+  cv::RNG random(static_cast<std::uint64_t>(frame.index) + 1);
+  for (cv::Mat* image : {&frame.image, &frame.right}) {
+    if (image->empty()) continue;
+    *image = image->clone();
+    random.fill(*image, cv::RNG::UNIFORM, 0, 256);
+  }
+  if (!frame.depth_m.empty()) frame.depth_m = cv::Mat::zeros(frame.depth_m.size(), CV_32FC1);
   return frame;
 }
 

@@ -96,8 +96,8 @@ void DropEvidence(bool with_posterior, LoopResult& result) {
 }
 
 // Up to Ctrl-C: a run that ended early has the ground truth of its images only. A dump goes into `folder`.
-LoopRun Run(const LoopsArguments& arguments, const LoopDetectorOptions& options, const Input& set,
-            const std::filesystem::path& folder) {
+LoopRun RunDetector(const LoopsArguments& arguments, const LoopDetectorOptions& options, const Input& set,
+                    const std::filesystem::path& folder) {
   LoopRun run;
   run.images = arguments.images;
   run.stride = arguments.truth.stride;
@@ -154,7 +154,7 @@ int RunTable(const LoopsArguments& arguments, const Input& set) {
     LoopDetectorOptions options = arguments.options;
     SetRule(rule, options);
     OutputFolder part = OpenLoopsFolder(folder.path() / rule);
-    const LoopRun run = Run(arguments, options, set, part.Staging());
+    const LoopRun run = RunDetector(arguments, options, set, part.Staging());
     if (run.rows.size() < set.images.size()) {
       std::fprintf(stderr,
                    "tutti: interrupted in the rule '%s'; no table is written, only the rules before\n",
@@ -169,7 +169,7 @@ int RunTable(const LoopsArguments& arguments, const Input& set) {
   return 0;
 }
 
-std::string DefaultOut(const std::string& images) {
+std::string DefaultLoopsFolder(const std::string& images) {
   const std::filesystem::path whole = std::filesystem::absolute(images).lexically_normal();
   const std::filesystem::path name = whole.has_filename() ? whole : whole.parent_path();
   return (std::filesystem::path("tutti-out") / (name.filename().string() + "-loops")).string();
@@ -178,7 +178,7 @@ std::string DefaultOut(const std::string& images) {
 int RunLoops(const LoopsArguments& given) {
   LoopsArguments arguments = given;
   arguments.images = ImageFolder(arguments.images).string();
-  if (arguments.out.empty()) arguments.out = DefaultOut(given.images);
+  if (arguments.out.empty()) arguments.out = DefaultLoopsFolder(given.images);
   if (arguments.table && arguments.truth.file.empty())
     throw InputError("--table compares rules by a ground truth; give --ground-truth");
   if (arguments.truth.join_pairs && !arguments.camera.empty()) {
@@ -204,7 +204,7 @@ int RunLoops(const LoopsArguments& given) {
   if (arguments.table) return RunTable(arguments, set);
 
   OutputFolder folder = OpenLoopsFolder(arguments.out);
-  const LoopRun run = Run(arguments, arguments.options, set, folder.Staging());
+  const LoopRun run = RunDetector(arguments, arguments.options, set, folder.Staging());
   const LoopReport report = EvaluateRun(run);
   const bool finished = run.rows.size() == set.images.size();
   PrintLoopRun(run, report, WriteLoopRun(run, report, finished, folder));

@@ -84,7 +84,7 @@ Json Significance(const LoopTable& table) {
   return tests;
 }
 
-std::string Percent(const Json& share) {
+std::string PercentCell(const Json& share) {
   char text[32];
   std::snprintf(text, sizeof text, "%.1f", 100 * share.get<double>());
   return text;
@@ -93,7 +93,7 @@ std::string Percent(const Json& share) {
 // "95.5 / 88.6": with verification / posterior only.
 std::string Both(const Json& figures, const std::string& key, const char* inner = nullptr) {
   const auto value = [&](const std::string& name) {
-    return Percent(inner == nullptr ? figures[name] : figures[name][inner]);
+    return PercentCell(inner == nullptr ? figures[name] : figures[name][inner]);
   };
   return value(key) + " / " + value(key + "_posterior");
 }
@@ -102,10 +102,11 @@ std::string Both(const Json& figures, const std::string& key, const char* inner 
 std::string Calibration(const Json& figures, const std::string& suffix) {
   const Json& error = figures["calibration_error" + suffix];
   if (error.is_null()) return "-";
-  return Percent(error) + " (n = " + std::to_string(figures["calibration_images" + suffix].get<int>()) + ")";
+  return PercentCell(error) + " (n = " + std::to_string(figures["calibration_images" + suffix].get<int>()) +
+         ")";
 }
 
-std::string Line(const std::vector<std::string>& cells) {
+std::string TableLine(const std::vector<std::string>& cells) {
   static constexpr int kWidths[] = {8, 25, 33, 13, 13, 24, 22, 17, 17, 12};
   std::string line = "|";
   for (std::size_t k = 0; k < cells.size(); ++k) {
@@ -154,25 +155,25 @@ std::string Markdown(const LoopTable& table, const Json& json) {
       "Figures in %: with verification / posterior only. Ranked: images that the verification refused stay, "
       "behind the accepted ones; no loop can be closed with them. Calibration error: of the accepted images' "
       "probability / of H from the threshold on, over n images.\n\n";
-  text += Line({"rule", "recall at 100 % precision", "recall at 100 % precision, ranked", "area", "best F1",
-                "precision at the default", "recall at the default", "F1 at the default", "calibration error",
-                "ms per image"});
+  text += TableLine({"rule", "recall at 100 % precision", "recall at 100 % precision, ranked", "area",
+                     "best F1", "precision at the default", "recall at the default", "F1 at the default",
+                     "calibration error", "ms per image"});
   text += "|---|---|---|---|---|---|---|---|---|---|\n";
   for (const LoopTableRow& row : table.rows) {
     char ms[32];
     std::snprintf(ms, sizeof ms, "%.1f", row.report.ms_median);
-    text +=
-        Line({row.rule, Both(row.figures, "recall_at_100_precision"),
-              Percent(row.figures["recall_at_100_precision_ranked"]), Both(row.figures, "area_under_curve"),
-              Both(row.figures, "best_f1"), Both(row.figures, "at_default_threshold", "precision"),
-              Both(row.figures, "at_default_threshold", "recall"), Both(row.figures, "f1_at_default"),
-              Calibration(row.figures, "") + " / " + Calibration(row.figures, "_posterior"), ms});
+    text += TableLine(
+        {row.rule, Both(row.figures, "recall_at_100_precision"),
+         PercentCell(row.figures["recall_at_100_precision_ranked"]), Both(row.figures, "area_under_curve"),
+         Both(row.figures, "best_f1"), Both(row.figures, "at_default_threshold", "precision"),
+         Both(row.figures, "at_default_threshold", "recall"), Both(row.figures, "f1_at_default"),
+         Calibration(row.figures, "") + " / " + Calibration(row.figures, "_posterior"), ms});
   }
   text += "\nOver the images with a loop, found at each rule's own threshold of 100 % precision or not:\n\n";
   return text + SignificanceText(json["significance"]);
 }
 
-std::string Csv(const LoopTable& table) {
+std::string TableCsv(const LoopTable& table) {
   std::string text = "rule";
   const std::vector<std::string> keys = {"recall_at_100_precision", "area_under_curve", "best_f1"};
   const std::vector<std::string> suffixes = {"", "_posterior", "_ranked"};
@@ -257,7 +258,7 @@ void WriteLoopTable(const LoopTable& table, OutputFolder& folder) {
   using File = const std::filesystem::path&;
   folder.Write({"table.json", [&](File file) { WriteText(file, JsonText(json)); }});
   folder.Write({"table.md", [&](File file) { WriteText(file, markdown); }});
-  folder.Write({"table.csv", [&](File file) { WriteText(file, Csv(table)); }});
+  folder.Write({"table.csv", [&](File file) { WriteText(file, TableCsv(table)); }});
   ThrowFailures(folder.failures(), folder.Finish(true));
   std::printf("written: %s, table.md, table.csv, and a folder for each rule\n",
               (folder.path() / "table.json").string().c_str());

@@ -39,7 +39,7 @@ std::vector<double> Copied(const void* data, std::size_t count) {
 }
 
 // So many numbers of a variable that was read; empty for what are none.
-std::vector<double> Numbers(const matvar_t& variable, const void* data, std::size_t count) {
+std::vector<double> NumbersOf(const matvar_t& variable, const void* data, std::size_t count) {
   if (data == nullptr) return {};
   switch (variable.data_type) {
     case MAT_T_INT8:
@@ -72,7 +72,7 @@ std::vector<double> Numbers(const matvar_t& variable, const void* data, std::siz
 std::optional<std::vector<double>> FromSparse(mat_t* file, matvar_t& variable, std::size_t n) {
   if (Mat_VarReadDataAll(file, &variable) != 0 || variable.data == nullptr) return {};
   const auto& sparse = *static_cast<const mat_sparse_t*>(variable.data);
-  const std::vector<double> numbers = Numbers(variable, sparse.data, sparse.ndata);
+  const std::vector<double> numbers = NumbersOf(variable, sparse.data, sparse.ndata);
   if (sparse.njc < n + 1 || sparse.jc == nullptr || sparse.ir == nullptr) return {};
   std::vector<double> values(n * n, 0.0);
   for (std::size_t c = 0; c < n; ++c) {
@@ -95,7 +95,7 @@ std::optional<std::vector<double>> FromFull(mat_t* file, matvar_t& variable, std
       return {};
   }
   if (bytes != again || Mat_SizeOf(variable.data_type) != size) return {};
-  const std::vector<double> columns = Numbers(variable, bytes.data(), n * n);
+  const std::vector<double> columns = NumbersOf(variable, bytes.data(), n * n);
   if (columns.size() != n * n) return {};
   std::vector<double> values(n * n);  // MATLAB keeps a matrix column by column
   for (std::size_t c = 0; c < n; ++c) {

@@ -1,4 +1,5 @@
-// Reports of real runs in a real browser. TUTTI_DATA/redkitchen if it is there, a synthetic town otherwise.
+// Reports of real runs in a real browser: of the synthetic town of `tutti demo`; for pictures (--shots), which show real data,
+// of TUTTI_DATA/redkitchen if it is there.
 // usage: node report_test.mjs TUTTI CONFIGS [--shots DIR]
 import { spawnSync } from 'node:child_process';
 import { existsSync, mkdirSync, mkdtempSync, rmSync, statSync } from 'node:fs';
@@ -18,11 +19,11 @@ function run(...words) {
 // A run with loops.
 function realRun(folder) {
   const kitchen = join(process.env.TUTTI_DATA ?? '', 'redkitchen');
-  if (process.env.TUTTI_DATA && existsSync(kitchen)) {
+  if (shots && process.env.TUTTI_DATA && existsSync(kitchen)) {
     run('run', '--config', join(configs, '7scenes.yaml'), '--dataset', kitchen, '--out', join(folder, 'kitchen'), '--quiet');
     return join(folder, 'kitchen', 'report.html');
   }
-  console.log('no TUTTI_DATA/redkitchen: the synthetic town of `tutti demo` takes its place');
+  if (shots) console.log('no TUTTI_DATA/redkitchen: the synthetic town of `tutti demo` takes its place');
   run('demo', '--out', join(folder, 'demo'));
   return join(folder, 'demo', 'run', 'report.html');
 }

@@ -3,8 +3,8 @@
 #include <gtest/gtest.h>
 
 #include "tests/apps/export/colmap_files.h"
-#include "tests/apps/generated_dataset.h"
 #include "tests/apps/tutti/executable.h"
+#include "tests/support/generated_dataset.h"
 #include "tests/support/test_data.h"
 
 namespace tutti {
@@ -28,14 +28,14 @@ SyntheticOptions SmallTown() {
 class ExportCommand : public ::testing::Test {
  protected:
   ExportCommand()
-      : town_("export-town", SmallTown()), folder_(testing::FreshFolder()), run_(folder_ / "run") {
-    const testing::ProcessResult said = RunTutti(testing::RunArguments(
-        town_.path() / "config.yaml", town_.path(), run_, {"--no-report", "--no-loops"}));
-    EXPECT_EQ(said.status, 0) << said.output;
+      : town_(testing::GeneratedDataset(SmallTown())),
+        folder_(testing::FreshFolder()),
+        run_(folder_ / "run") {
+    fs::copy(testing::RunMadeOnce(town_ / "config.yaml", town_, {"--no-report", "--no-loops"}), run_,
+             fs::copy_options::recursive);
   }
 
-  testing::GeneratedDataset town_;
-  fs::path folder_, run_;
+  fs::path town_, folder_, run_;
 };
 
 TEST_F(ExportCommand, WritesWhatTheRunKnowsAndSaysWithWhatToOpenIt) {
@@ -53,7 +53,12 @@ TEST_F(ExportCommand, WritesWhatTheRunKnowsAndSaysWithWhatToOpenIt) {
 }
 
 TEST_F(ExportCommand, ImagesThatWereMovedAreNamed) {
-  fs::rename(town_.path(), folder_ / "moved");
+  const fs::path there = folder_ / "there";
+  fs::copy(town_, there, fs::copy_options::recursive);
+  ASSERT_EQ(RunTutti(testing::RunArguments(there / "config.yaml", there, run_, {"--no-report", "--no-loops"}))
+                .status,
+            0);
+  fs::rename(there, folder_ / "moved");
   const testing::ProcessResult grey =
       RunTutti({"export", run_ / "map.tutti", "--landmarks", folder_ / "map.ply"});
   EXPECT_EQ(grey.status, 0) << grey.output;
@@ -62,9 +67,9 @@ TEST_F(ExportCommand, ImagesThatWereMovedAreNamed) {
   const testing::ProcessResult refused = RunTutti(colmap);
   EXPECT_EQ(refused.status, 1);
   EXPECT_FALSE(fs::exists(folder_ / "model"));
-  std::vector<std::string> there = colmap;
-  there.insert(there.end(), {"--dataset", folder_ / "moved"});
-  const testing::ProcessResult found = RunTutti(there);
+  std::vector<std::string> given = colmap;
+  given.insert(given.end(), {"--dataset", folder_ / "moved"});
+  const testing::ProcessResult found = RunTutti(given);
   EXPECT_EQ(found.status, 0) << found.output;
 }
 

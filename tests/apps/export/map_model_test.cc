@@ -8,6 +8,7 @@
 
 #include "tests/apps/export/mapped_room.h"
 #include "tests/support/recording.h"
+#include "tests/support/rendered_world.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -68,7 +69,7 @@ TEST(MapModel, LeavesOutWhatWasNeverJoinedToTheLargestPiece) {
   options.width = 400;
   options.height = 200;
   options.supersample = 1;
-  const SyntheticWorld world(options);
+  const testing::RenderedWorld world(options);
   testing::Recording recording = testing::Record(world, 20);
   const InputFrame black = testing::Black(recording.frames.back());
   for (int i = 0; i < 15; ++i) recording.frames.push_back(black);

@@ -2,7 +2,9 @@
 
 #include <utility>
 
-#include "tests/apps/generated_dataset.h"
+#include "tests/support/generated_dataset.h"
+#include "tests/support/made_once.h"
+#include "tutti/slam/map_file.h"
 
 namespace tutti::testing {
 
@@ -30,17 +32,28 @@ SyntheticOptions RoomOf(int frames) {
   return options;
 }
 
-}  // namespace
-
-const MappedRoom& Room() {
-  static const GeneratedDataset data("export-room", RoomOf(60));
-  static const MappedRoom room = MapOf(data.path() / "config.yaml", data.path(), 0);
+// The map is in a file, as `tutti export` takes it.
+MappedRoom LoadedRoom(int frames) {
+  const std::filesystem::path data = GeneratedDataset(RoomOf(frames)), config = data / "config.yaml";
+  const std::filesystem::path folder =
+      MadeOnce("room-" + std::to_string(frames), "/proc/self/exe", [&](const std::filesystem::path& made) {
+        std::filesystem::create_directories(made);
+        MapOf(config, data, 0).slam->Save(made / "map.tutti");
+      });
+  const std::filesystem::path map = folder / "map.tutti";
+  MappedRoom room;
+  room.dataset = OpenDataset(data, LoadConfig(config).dataset);
+  room.slam = SlamSystem::Load(map, ReadMapInfo(map));
   return room;
 }
 
-MappedRoom WholeRoom() {
-  static const GeneratedDataset data("export-whole-room", RoomOf(320));
-  return MapOf(data.path() / "config.yaml", data.path(), 0);
+}  // namespace
+
+const MappedRoom& Room() {
+  static const MappedRoom room = LoadedRoom(60);
+  return room;
 }
+
+MappedRoom WholeRoom() { return LoadedRoom(320); }
 
 }  // namespace tutti::testing

@@ -10,7 +10,7 @@
 
 namespace tutti::testing {
 
-/// What a run in this process leaves.
+/// What a run leaves.
 struct MappedRoom {
   std::unique_ptr<Dataset> dataset;
   std::unique_ptr<SlamSystem> slam;
@@ -20,10 +20,10 @@ struct MappedRoom {
 /// Runs on the first `frames` frames of a data set (0: all).
 MappedRoom MapOf(const std::filesystem::path& config, const std::filesystem::path& dataset, int frames);
 
-/// A short walk. Made once per test program: don't change it.
+/// A short walk. Its map is made once for all tests, and loaded once per test program: don't change it.
 const MappedRoom& Room();
 
-/// Once round the room and a little farther, so that the loop is closed.
+/// Once round the room and a little farther, so that the loop is closed. Made once for all tests.
 MappedRoom WholeRoom();
 
 }  // namespace tutti::testing

@@ -6,21 +6,16 @@
 #include <fstream>
 #include <limits>
 #include <opencv2/imgcodecs.hpp>
-#include <sstream>
 
 #include "apps/plot/plot_picture.h"
+#include "tests/apps/tutti/executable.h"
 #include "tests/support/test_data.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
 namespace {
 
-std::string ReadAll(const std::filesystem::path& file) {
-  std::ifstream in(file);
-  std::stringstream text;
-  text << in.rdbuf();
-  return text.str();
-}
+using testing::ReadAll;
 
 TrajectoryPlot Circle() {
   TrajectoryPlot plot;

@@ -18,11 +18,11 @@ namespace {
 namespace fs = std::filesystem;
 using testing::ReadAll;
 
-constexpr int kFrames = 8;
+constexpr int kFramesBefore = 8;
 
 class ThrowsInAFrame : public RunObserver {
   void OnFrame(const InputFrame& frame, const TrackResult&, const RunState&) override {
-    if (frame.index == kFrames - 1) throw std::bad_alloc();
+    if (frame.index == kFramesBefore - 1) throw std::bad_alloc();
   }
 };
 
@@ -55,13 +55,13 @@ TEST_F(BrokenOffRun, WritesWhatThereIsAndThrowsOn) {
   EXPECT_THROW(RunSlam(request), std::bad_alloc);
   for (const char* name : {"trajectory.txt", "trajectory_online.txt", "trajectory_odometry.txt"}) {
     EXPECT_EQ(ReadTrajectory(request.out / name, TrajectoryFormat::kTum).size(),
-              static_cast<std::size_t>(kFrames))
+              static_cast<std::size_t>(kFramesBefore))
         << name;
   }
   EXPECT_FALSE(ReadAll(request.out / "graph.g2o").empty());
   const nlohmann::json summary = Summary(request.out);
   EXPECT_EQ(summary["failure"], std::bad_alloc().what());
-  EXPECT_EQ(summary["frames"]["tracked"], kFrames);
+  EXPECT_EQ(summary["frames"]["tracked"], kFramesBefore);
   EXPECT_FALSE(fs::exists(request.out / "trajectory_live.txt"));
 }
 

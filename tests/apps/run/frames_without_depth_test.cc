@@ -6,8 +6,8 @@
 #include <set>
 #include <sstream>
 
-#include "tests/apps/generated_dataset.h"
 #include "tests/apps/tutti/executable.h"
+#include "tests/support/generated_dataset.h"
 #include "tests/support/test_data.h"
 #include "tutti/core/text.h"
 #include "tutti/core/trajectory.h"
@@ -22,9 +22,9 @@ using testing::ReadAll;
 using testing::RunTutti;
 using testing::WriteAll;
 
-// Once around a room and a bit more, with loops. Made once per program.
+// Once around a room and a bit more, with loops.
 const fs::path& Room() {
-  static const testing::GeneratedDataset room("room", [] {
+  static const fs::path room = testing::GeneratedDataset([] {
     SyntheticOptions options;
     options.scene = SyntheticScene::kRoom;
     options.sensor = SyntheticSensor::kRgbd;
@@ -34,7 +34,7 @@ const fs::path& Room() {
     options.laps = 1.15;
     return options;
   }());
-  return room.path();
+  return room;
 }
 
 // Lines of a list without its comment, each "stamp file".

@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "data/synthetic/synthetic_writer.h"
 #include "tests/apps/tutti/executable.h"
+#include "tests/support/generated_dataset.h"
 #include "tests/support/small_town.h"
 #include "tests/support/test_data.h"
 #include "tutti/core/text.h"
@@ -20,13 +20,6 @@ using ::testing::EndsWith;
 using testing::ReadAll;
 
 constexpr int kPlanted = 15;
-
-// Long enough for loops, true ones and planted ones.
-void WriteTown(const fs::path& folder) {
-  SyntheticWriteOptions write;
-  write.threads = 2;
-  WriteSyntheticDataset(SyntheticWorld(testing::SmallStereoTownWithALoop(320, 160)), folder, write);
-}
 
 struct LoopLine {
   std::string reason;
@@ -62,7 +55,9 @@ nlohmann::json RunTown(const fs::path& folder, const fs::path& out, int planted)
                     "dataset: {type: kitti, sensor: stereo}\n"
                     "odometry: {features: 600}\n"
                     "loops: {members: [surf], verification: {max_hypotheses: 1, neighbours: 0}}\n");
-  const auto run = testing::RunTutti({"run", "--config", config, "--dataset", folder / "town", "--out", out,
+  // Long enough for loops, true ones and planted ones.
+  const fs::path town = testing::GeneratedDataset(testing::SmallStereoTownWithALoop(320, 160));
+  const auto run = testing::RunTutti({"run", "--config", config, "--dataset", town, "--out", out,
                                       "--inject-false-loops", std::to_string(planted), "--quiet"});
   EXPECT_EQ(run.status, 0) << run.output;
   return nlohmann::json::parse(ReadAll(out / "summary.json"));
@@ -70,7 +65,6 @@ nlohmann::json RunTown(const fs::path& folder, const fs::path& out, int planted)
 
 TEST(InjectFalseLoops, LeaveTheTrajectoryAndAreListedWithReasonAndWeight) {
   const fs::path folder = testing::FreshFolder();
-  WriteTown(folder / "town");
   const nlohmann::json without = RunTown(folder, folder / "without", 0);
   const nlohmann::json with = RunTown(folder, folder / "with", kPlanted);
 

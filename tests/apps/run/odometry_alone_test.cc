@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "tests/support/recording.h"
+#include "tests/support/rendered_world.h"
 #include "tests/support/small_town.h"
 
 namespace tutti {
@@ -15,7 +16,7 @@ constexpr std::size_t kFrames = 40, kCopiedAfter = 15;
 class OdometryAloneTest : public ::testing::TestWithParam<bool> {
  protected:
   OdometryAloneTest() {
-    const SyntheticWorld world(testing::SmallStereoTown(320, 160));
+    const testing::RenderedWorld world(testing::SmallStereoTown(320, 160));
     recording_ = testing::Record(world, kFrames);
     options_.features = 500;
     odometry_.emplace(options_, recording_.rig);

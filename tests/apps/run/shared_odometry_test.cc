@@ -7,7 +7,7 @@
 #include <iterator>
 
 #include "apps/run/outputs.h"
-#include "tests/apps/generated_dataset.h"
+#include "tests/support/generated_dataset.h"
 #include "tests/support/small_town.h"
 #include "tests/support/test_data.h"
 #include "tutti/core/error.h"
@@ -17,14 +17,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A lap around a block and a bit more, with loops. Made once per program.
+// A lap around a block and a bit more, with loops.
 const fs::path& TownWithALoop() {
-  static const testing::GeneratedDataset town("loop-town", [] {
+  static const fs::path town = testing::GeneratedDataset([] {
     SyntheticOptions options = testing::SmallStereoTownWithALoop(512, 256);
     options.noise_sigma = 4;
     return options;
   }());
-  return town.path();
+  return town;
 }
 
 class SharedOdometry : public ::testing::Test {

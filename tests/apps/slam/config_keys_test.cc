@@ -57,7 +57,7 @@ void ForEach(RunConfig& config, const Visitor& visit) {
 }
 
 // Another value that can be read.
-void Change(const OptionText& text, double& field) {
+void ChangeField(const OptionText& text, double& field) {
   for (const double other : {0.9 * field, 1.1 * field, 0.5, 0.05}) {
     if (other == field || !text.Refusal("", other).empty()) continue;
     field = other;
@@ -65,21 +65,21 @@ void Change(const OptionText& text, double& field) {
   }
   ADD_FAILURE() << text.name;
 }
-void Change(const OptionText& /*text*/, bool& field) { field = !field; }
-void Change(const OptionText& /*text*/, int& field) { ++field; }
-void Change(const OptionText& /*text*/, std::uint64_t& field) { ++field; }
-void Change(const OptionText& /*text*/, std::string& field) { field = "some thing"; }
-void Change(const OptionText& /*text*/, std::optional<PinholeCamera>& /*visited itself*/) {}
-void Change(const OptionText& text, std::vector<std::string>& field) {
+void ChangeField(const OptionText& /*text*/, bool& field) { field = !field; }
+void ChangeField(const OptionText& /*text*/, int& field) { ++field; }
+void ChangeField(const OptionText& /*text*/, std::uint64_t& field) { ++field; }
+void ChangeField(const OptionText& /*text*/, std::string& field) { field = "some thing"; }
+void ChangeField(const OptionText& /*text*/, std::optional<PinholeCamera>& /*visited itself*/) {}
+void ChangeField(const OptionText& text, std::vector<std::string>& field) {
   if (text.in_files) field = {"sift", "orb"};
 }
-void Change(const OptionText& /*text*/, CombinationRule& field) { field = CombinationRule::kMajority; }
+void ChangeField(const OptionText& /*text*/, CombinationRule& field) { field = CombinationRule::kMajority; }
 template <std::size_t N>
-void Change(const OptionText& /*text*/, std::array<double, N>& field) {
+void ChangeField(const OptionText& /*text*/, std::array<double, N>& field) {
   for (std::size_t i = 0; i < N; ++i) field[i] += 0.125 * static_cast<double>(i + 1);
 }
 template <class Enum, class = std::enable_if_t<std::is_enum_v<Enum>>>
-void Change(const OptionText& /*text*/, Enum& field) {
+void ChangeField(const OptionText& /*text*/, Enum& field) {
   const auto words = WordsOf(field);
   field = words.back().second == field ? words.front().second : words.back().second;
 }
@@ -88,7 +88,7 @@ void Change(const OptionText& /*text*/, Enum& field) {
 RunConfig ChangedConfig() {
   RunConfig config;
   config.dataset.camera = PinholeCamera();
-  ForEach(config, [](const OptionText& text, auto& field) { Change(text, field); });
+  ForEach(config, [](const OptionText& text, auto& field) { ChangeField(text, field); });
   return config;
 }
 

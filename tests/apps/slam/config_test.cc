@@ -7,6 +7,7 @@
 #include <array>
 #include <filesystem>
 
+#include "tests/support/error_of.h"
 #include "tests/support/test_data.h"
 #include "tutti/core/error.h"
 
@@ -119,6 +120,14 @@ TEST(Config, ValuesOutOfRangePointToTheirLine) {
               HasSubstr("my.yaml:"));
 }
 
+TEST(Config, ACameraThatCanNotBeIsNamedOnce) {
+  const std::string size = "camera: {width: 640, height: 480, fx: ", centre = ", cy: 240}\n";
+  EXPECT_THAT(Message(size + "0.1, fy: 500, cx: 320" + centre),
+              HasSubstr("my.yaml:1: camera: the focal lengths"));
+  EXPECT_THAT(Message(size + "500, fy: 500, cx: 900" + centre),
+              HasSubstr("my.yaml:1: camera: the principal point"));
+}
+
 TEST(Config, BrokenYamlNamesTheLine) { EXPECT_THAT(Message("run:\n  threads: [1\n"), HasSubstr("my.yaml:")); }
 
 TEST(Config, MissingFileSaysWhatIsNeeded) {
@@ -162,6 +171,12 @@ TEST(SetOptions, SaysWhatIsWrongAndChangesNothing) {
   };
   EXPECT_THAT(message("run.threads"), HasSubstr("section.key=value"));
   EXPECT_THAT(message("odometry.feature=3"), HasSubstr("did you mean 'odometry.features'?"));
+  RunConfig config;
+  SetOptions({"camera.fx=500", "camera.fy=500", "camera.width=640", "camera.height=480", "camera.cx=320",
+              "camera.cy=240"},
+             config);
+  EXPECT_THAT(testing::ErrorOf([&] { SetOptions({"camera.fx=0.1"}, config); }),
+              HasSubstr("--set: camera: the focal lengths"));
   EXPECT_THAT(message("rule=orb"), HasSubstr("did you mean 'loops.rule'?"));
   EXPECT_THAT(message("run.threads=0"), HasSubstr("run: threads"));
   EXPECT_THAT(message("graph.solver=quick"), HasSubstr("graph.solver=quick"));
@@ -208,6 +223,18 @@ TEST(Config, HelpIsAValidFileWithTheDefaults) {
   ASSERT_EQ(a.size(), b.size());
   for (std::size_t i = 0; i < a.size(); ++i)
     EXPECT_EQ(a[i].value, b[i].value) << a[i].section << "." << a[i].name;
+}
+
+TEST(Config, HelpWritesNumbersOutUnlessTheyAreTinyOrHuge) {
+  EXPECT_THAT(HelpConfig(true), HasSubstr("depth_units_per_m: 5000 "));
+  EXPECT_THAT(HelpConfig(true), Not(HasSubstr("e+")));
+  RunConfig config;
+  config.dataset.depth_units_per_m = 80;
+  std::string shown;
+  for (const ConfigEntry& entry : DescribeConfig(config)) {
+    if (entry.name == "depth_units_per_m") shown = entry.value;
+  }
+  EXPECT_EQ(shown, "80");
 }
 
 TEST(Config, HelpShowsWhatUsersSetAndAllWhenAsked) {

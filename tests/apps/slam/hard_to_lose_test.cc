@@ -9,6 +9,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "tests/support/recording.h"
+#include "tests/support/rendered_world.h"
 #include "tests/support/small_town.h"
 #include "tests/support/test_data.h"
 #include "tutti/backend/evaluation.h"
@@ -32,10 +33,12 @@ SyntheticOptions TownOptions() {
 
 // The beginning of a lap and a half around a block, 10 frames a second. Each test runs in a process of its
 // own: it renders no more than it needs.
-Recording Town(std::size_t frames) { return testing::Record(SyntheticWorld(TownOptions()), frames); }
+Recording TownFrames(std::size_t frames) {
+  return testing::Record(testing::RenderedWorld(TownOptions()), frames);
+}
 
 Recording WholeTown() {
-  const SyntheticWorld world(TownOptions());
+  const testing::RenderedWorld world(TownOptions());
   return testing::Record(world, world.Size());
 }
 
@@ -129,7 +132,7 @@ Outcome Follow(const Recording& recording, RunConfig config = RunConfig()) {
 TEST(HardToLose, MotionBlur) {
   SyntheticOptions options = TownOptions();
   options.motion_blur_s = 0.03;
-  const Outcome out = Follow(testing::Record(SyntheticWorld(options), 60));
+  const Outcome out = Follow(testing::Record(testing::RenderedWorld(options), 60));
   EXPECT_EQ(out.posed, out.frames);
   EXPECT_LT(out.ate_m, 0.01 * out.path_m);
 }
@@ -152,7 +155,7 @@ SyntheticOptions Shaken() {
 TEST(HardToLose, ARollingShutterInAShakingHand) {
   SyntheticOptions options = Shaken();
   options.readout_s = 0.03;
-  Recording rolling = testing::Record(SyntheticWorld(options), 120);
+  Recording rolling = testing::Record(testing::RenderedWorld(options), 120);
   const Outcome out = Follow(rolling);
   EXPECT_EQ(out.posed, out.frames);
   EXPECT_LT(out.ate_m, 0.01 + 0.005 * out.path_m);
@@ -161,7 +164,7 @@ TEST(HardToLose, ARollingShutterInAShakingHand) {
 }
 
 TEST(HardToLose, ExposureJumps) {
-  Recording jumps = Town(60);
+  Recording jumps = TownFrames(60);
   for (std::size_t i = 15; i < jumps.frames.size(); ++i) {
     ForEachImage(jumps.frames[i], [&](cv::Mat& image) {
       const int step = static_cast<int>(i / 15) % 3;
@@ -174,7 +177,7 @@ TEST(HardToLose, ExposureJumps) {
 }
 
 TEST(HardToLose, APlainMovingObjectCoversThirtyPercentOfTheView) {
-  Recording covered = Town(60);
+  Recording covered = TownFrames(60);
   const cv::Size size = covered.frames.front().image.size();
   // The plain side of a lorry: shades, an edge, a few marks.
   cv::Mat object(size.height, size.width * 3 / 10, CV_8UC1, cv::Scalar(150));
@@ -207,13 +210,13 @@ TEST(HardToLose, TurningOnTheSpot) {
   options.width = 320;
   options.height = 240;
   options.supersample = 1;
-  const SyntheticWorld world(options);
+  const testing::RenderedWorld world(options);
   Recording turning;
   turning.rig = testing::RigOf(world);
   constexpr int kFrames = 150;  // a full turn in 10 s
   for (int i = 0; i < kFrames; ++i) {
     const Pose turned(ExpSO3(Eigen::Vector3d(0, 2 * M_PI * i / kFrames, 0)), Eigen::Vector3d::Zero());
-    turning.Add(world.RenderFrom(static_cast<std::size_t>(i), turned));
+    turning.Add(world.World().RenderFrom(static_cast<std::size_t>(i), turned));
   }
   RunConfig config;
   SlamSystem slam(config, turning.rig);
@@ -228,7 +231,7 @@ TEST(HardToLose, TurningOnTheSpot) {
 }
 
 TEST(HardToLose, StandingStillForAMinute) {
-  const SyntheticWorld world([] {
+  const testing::RenderedWorld world([] {
     SyntheticOptions options = TownOptions();
     options.noise_sigma = 3;
     return options;
@@ -236,7 +239,8 @@ TEST(HardToLose, StandingStillForAMinute) {
   Recording still = testing::Record(world, 20);
   constexpr std::size_t kStill = 240;  // a quarter of a second apart
   std::vector<SyntheticFrame> noises;
-  for (std::size_t i = 0; i < 10; ++i) noises.push_back(world.RenderFrom(19 + i, still.truth.back().pose));
+  for (std::size_t i = 0; i < 10; ++i)
+    noises.push_back(world.World().RenderFrom(19 + i, still.truth.back().pose));
   for (std::size_t i = 0; i < kStill; ++i) {
     SyntheticFrame frame = noises[(i * 7 + i / 10) % noises.size()];
     frame.stamp_s = world.Stamp(20) + 0.25 * static_cast<double>(i);
@@ -262,13 +266,13 @@ TEST(HardToLose, StandingStillForAMinute) {
 // ---------------------------------------------------------------- missing frames
 
 TEST(HardToLose, EverySecondFrameIsMissing) {
-  const Outcome out = Follow(Selected(Town(120), Range(0, 120, 2)));
+  const Outcome out = Follow(Selected(TownFrames(120), Range(0, 120, 2)));
   EXPECT_EQ(out.posed, out.frames);
   EXPECT_LT(out.ate_m, 0.01 * out.path_m);
 }
 
 TEST(HardToLose, TwoOfThreeFramesAreMissing) {
-  const Outcome out = Follow(Selected(Town(120), Range(0, 120, 3)));
+  const Outcome out = Follow(Selected(TownFrames(120), Range(0, 120, 3)));
   EXPECT_EQ(out.posed, out.frames);
   EXPECT_LT(out.ate_m, 0.01 * out.path_m);
 }
@@ -276,7 +280,7 @@ TEST(HardToLose, TwoOfThreeFramesAreMissing) {
 TEST(HardToLose, AGapOfASecond) {
   std::vector<std::size_t> which = Range(0, 12);
   for (const std::size_t i : Range(22, 80)) which.push_back(i);
-  const Outcome out = Follow(Selected(Town(80), which));
+  const Outcome out = Follow(Selected(TownFrames(80), which));
   EXPECT_EQ(out.posed, out.frames);
   EXPECT_LT(out.ate_m, 0.01 * out.path_m);
 }
@@ -295,7 +299,7 @@ TEST(HardToLose, BlackOutOfThreeSeconds) {
 TEST(HardToLose, KidnappedToAPlaceSeenBefore) {
   std::vector<std::size_t> which = Range(0, 120);
   for (const std::size_t i : Range(10, 60)) which.push_back(i);
-  const Recording kidnapped = Carried(Town(120), which);
+  const Recording kidnapped = Carried(TownFrames(120), which);
   const Outcome out = Follow(kidnapped);
   EXPECT_EQ(out.relocalized, 1U);
   EXPECT_EQ(out.pieces, 1);
@@ -306,7 +310,7 @@ TEST(HardToLose, KidnappedToAPlaceSeenBefore) {
 TEST(HardToLose, KidnappedToAPlaceSeenBeforeWithTheLeftCameraAlone) {
   std::vector<std::size_t> which = Range(0, 120);
   for (const std::size_t i : Range(10, 40)) which.push_back(i);
-  Recording kidnapped = Carried(Town(120), which);
+  Recording kidnapped = Carried(TownFrames(120), which);
   for (std::size_t i = 120; i < 130; ++i) kidnapped.frames[i].right = cv::Mat();
   const Outcome out = Follow(kidnapped);
   EXPECT_EQ(out.relocalized, 1U);

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/support/recording.h"
+#include "tests/support/rendered_world.h"
 #include "tests/support/small_town.h"
 
 namespace tutti {
@@ -19,7 +20,7 @@ class LoopCloserTest : public ::testing::Test {
   static constexpr int kFirst = 1, kLater = 20;  // keyframes: ends of the loops
 
   LoopCloserTest()
-      : recording_(testing::Record(SyntheticWorld(World()), 100)),
+      : recording_(testing::Record(testing::RenderedWorld(World()), 100)),
         odometry_(OdometryConfig(), recording_.rig) {
     for (const InputFrame& frame : recording_.frames) odometry_.Track(frame);
     odometry_.FinishMapping();

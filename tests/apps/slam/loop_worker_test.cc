@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "tests/support/recording.h"
+#include "tests/support/rendered_world.h"
 #include "tests/support/small_town.h"
 
 namespace tutti {
@@ -20,8 +21,8 @@ using Pair = std::pair<std::int64_t, std::int64_t>;
 const Recording& LapAndMore() {
   static const Recording recording = [] {
     SyntheticOptions options = testing::SmallStereoTownWithALoop(320, 160);
-    options.laps = 1.4;
-    const SyntheticWorld world(options);
+    options.laps = 1.25;
+    const testing::RenderedWorld world(options);
     return testing::Record(world, world.Size());
   }();
   return recording;
@@ -41,7 +42,7 @@ struct Told {
 };
 
 // Each answer is taken `delay` images later, as SlamSystem does; the first loop is taken back then.
-Told Drive(bool own_thread, bool unlink) {
+Told ToldOnADrive(bool own_thread, bool unlink) {
   constexpr std::size_t kDelay = 2;
   LoopDetectorOptions options;
   options.threads = 1;
@@ -89,12 +90,12 @@ TEST(LoopWorker, ALoopThatIsTakenBackIsUnlinkedBeforeTheNextImage) {
   ASSERT_TRUE(expected.first_loop);
   ASSERT_FALSE(expected.hypotheses.empty());
   for (const bool own_thread : {false, true}) {
-    const Told told = Drive(own_thread, true);
+    const Told told = ToldOnADrive(own_thread, true);
     EXPECT_EQ(told.first_loop, expected.first_loop);
     EXPECT_EQ(told.hypotheses, expected.hypotheses) << own_thread;
     EXPECT_EQ(told.probabilities, expected.probabilities) << own_thread;
   }
-  EXPECT_NE(Drive(false, false).hypotheses, expected.hypotheses) << "it was linked";
+  EXPECT_NE(ToldOnADrive(false, false).hypotheses, expected.hypotheses) << "it was linked";
 }
 
 TEST(LoopWorker, UnlinkingWhatWasNeverALoopChangesNothing) {

@@ -12,6 +12,7 @@
 #include "apps/slam/map_state.h"
 #include "tests/support/error_of.h"
 #include "tests/support/recording.h"
+#include "tests/support/rendered_world.h"
 #include "tests/support/small_town.h"
 #include "tests/support/test_data.h"
 #include "tutti/core/error.h"
@@ -22,15 +23,15 @@ namespace {
 
 namespace fs = std::filesystem;
 
-testing::Recording Drive(SyntheticSensor sensor) {
+testing::Recording MappedDrive(SyntheticSensor sensor) {
   SyntheticOptions options = testing::SmallStereoTownWithALoop(320, 160);
   options.sensor = sensor;
   options.laps = 1.4;
-  const SyntheticWorld world(options);
+  const testing::RenderedWorld world(options);
   return testing::Record(world, world.Size());
 }
 
-RunConfig Configured(int threads) {
+RunConfig MapConfig(int threads) {
   RunConfig config;
   config.odometry.features = 800;
   config.run.threads = threads;
@@ -38,15 +39,15 @@ RunConfig Configured(int threads) {
 }
 
 /// All that a run leaves, as bytes.
-struct Outcome {
+struct MapOutcome {
   std::string poses, loops, graph;
   int corrections = 0, adjustments = 0;
   std::vector<std::int64_t> frames;
 };
 
-Outcome Finished(SlamSystem& slam) {
+MapOutcome Finished(SlamSystem& slam) {
   slam.Finish();
-  Outcome outcome;
+  MapOutcome outcome;
   const Odometry& odometry = *slam.odometry();
   std::vector<std::pair<double, Pose>> poses;
   for (const StampedPose& pose : odometry.FrameTrajectory()) poses.emplace_back(pose.stamp_s, pose.pose);
@@ -64,7 +65,7 @@ Outcome Finished(SlamSystem& slam) {
   return outcome;
 }
 
-void ExpectTheSame(const Outcome& a, const Outcome& b, const std::string& which) {
+void ExpectTheSame(const MapOutcome& a, const MapOutcome& b, const std::string& which) {
   EXPECT_EQ(a.frames, b.frames) << which;
   EXPECT_EQ(a.poses == b.poses, true) << which << ": other poses";
   EXPECT_EQ(a.loops == b.loops, true) << which << ": other loops";
@@ -76,9 +77,9 @@ void ExpectTheSame(const Outcome& a, const Outcome& b, const std::string& which)
 class MapFile : public ::testing::TestWithParam<SyntheticSensor> {};
 
 TEST_P(MapFile, ARunThatGoesOnFromAnyFrameIsTheOneThatNeverStopped) {
-  const testing::Recording recording = Drive(GetParam());
+  const testing::Recording recording = MappedDrive(GetParam());
   const fs::path folder = testing::FreshFolder();
-  SlamSystem whole(Configured(2), recording.rig);
+  SlamSystem whole(MapConfig(2), recording.rig);
   const std::size_t n = recording.frames.size();
   std::vector<std::size_t> saved;
   bool moved = false, adjusting = false;  // what was under way when something was saved
@@ -96,7 +97,7 @@ TEST_P(MapFile, ARunThatGoesOnFromAnyFrameIsTheOneThatNeverStopped) {
     corrections = whole.Corrections();
     whole.Track(recording.frames[i]);
   }
-  const Outcome expected = Finished(whole);
+  const MapOutcome expected = Finished(whole);
   ASSERT_GT(expected.corrections, 0);
   EXPECT_GT(expected.adjustments, 0);
   EXPECT_TRUE(moved && adjusting) << "not all moments were tried";
@@ -112,9 +113,9 @@ TEST_P(MapFile, ARunThatGoesOnFromAnyFrameIsTheOneThatNeverStopped) {
 }
 
 TEST_P(MapFile, SavingDisturbsNothing) {
-  const testing::Recording recording = Drive(GetParam());
+  const testing::Recording recording = MappedDrive(GetParam());
   const fs::path folder = testing::FreshFolder();
-  SlamSystem often(Configured(2), recording.rig), never(Configured(1), recording.rig);
+  SlamSystem often(MapConfig(2), recording.rig), never(MapConfig(1), recording.rig);
   for (std::size_t i = 0; i < recording.frames.size(); ++i) {
     if (i % 9 == 0) often.Save(folder / "often");
     often.Track(recording.frames[i]);
@@ -125,10 +126,10 @@ TEST_P(MapFile, SavingDisturbsNothing) {
 
 // What the file of the long-term memory holds is then of later than the map.
 TEST(MapFileWithLongTermMemory, GoesOnFromTheMapWhateverTheMemorysFileHasSeenSince) {
-  const testing::Recording recording = Drive(SyntheticSensor::kStereo);
+  const testing::Recording recording = MappedDrive(SyntheticSensor::kStereo);
   const fs::path folder = testing::FreshFolder();
   const auto configured = [&](const char* file) {
-    RunConfig config = Configured(2);
+    RunConfig config = MapConfig(2);
     config.loops.wm_limit = 12;
     config.loops.ltm_file = (folder / file).string();
     return config;
@@ -169,10 +170,10 @@ class DamagedMap : public ::testing::Test {
     std::ofstream(file_, std::ios::binary | std::ios::trunc) << bytes;
     return testing::ErrorOf([&] { SlamSystem::Load(file_, ReadMapInfo(file_)); });
   }
-  void SaveSome() const {
+  void SaveSome(std::size_t frames = 30) const {
     const testing::Recording recording =
-        testing::Record(SyntheticWorld(testing::SmallStereoTown(320, 160)), 30);
-    SlamSystem slam(Configured(1), recording.rig);
+        testing::Record(testing::RenderedWorld(testing::SmallStereoTown(320, 160)), frames);
+    SlamSystem slam(MapConfig(1), recording.rig);
     for (const InputFrame& frame : recording.frames) slam.Track(frame);
     slam.Save(file_);
   }
@@ -180,8 +181,9 @@ class DamagedMap : public ::testing::Test {
 };
 
 TEST_F(DamagedMap, IsRefusedByNameWhereverItIsDamaged) {
-  SaveSome();
+  SaveSome(10);  // each part of a map, and no more than that of each
   const std::string bytes = Content(file_);
+  ASSERT_GT(ReadMapInfo(file_).keyframes, 2);
   ASSERT_EQ(Refusal(bytes), "no error");
   constexpr std::size_t kVariants = 400;
   for (std::size_t v = 0; v < kVariants; ++v) {
@@ -207,8 +209,9 @@ TEST_F(DamagedMap, ANewerVersionIsSaidAndSomethingElseIsNoMap) {
 TEST_F(DamagedMap, WhatCantBeWrittenLeavesTheOldOne) {
   SaveSome();
   const std::string before = Content(file_);
-  const testing::Recording recording = testing::Record(SyntheticWorld(testing::SmallStereoTown(320, 160)), 3);
-  const SlamSystem slam(Configured(1), recording.rig);
+  const testing::Recording recording =
+      testing::Record(testing::RenderedWorld(testing::SmallStereoTown(320, 160)), 3);
+  const SlamSystem slam(MapConfig(1), recording.rig);
   EXPECT_THROW(slam.Snapshot().Write(file_, [](const MapSink&) { throw InputError("stop"); }), InputError);
   EXPECT_EQ(Content(file_) == before, true);
   EXPECT_THROW(slam.Save(file_ / "no" / "folder"), InputError);

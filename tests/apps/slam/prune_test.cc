@@ -11,6 +11,7 @@
 #include "apps/slam/map_state.h"
 #include "tests/support/error_of.h"
 #include "tests/support/recording.h"
+#include "tests/support/rendered_world.h"
 #include "tests/support/small_town.h"
 #include "tests/support/test_data.h"
 #include "tutti/core/error.h"
@@ -32,7 +33,7 @@ testing::Recording DriveLaps(SyntheticSensor sensor) {
   SyntheticOptions options = testing::SmallStereoTownWithALoop(320, 160);
   options.sensor = sensor;
   options.laps = 2.3;
-  const SyntheticWorld world(options);
+  const testing::RenderedWorld world(options);
   return testing::Record(world, world.Size());
 }
 

@@ -11,6 +11,7 @@
 #include "apps/slam/map_state.h"
 #include "tests/support/error_of.h"
 #include "tests/support/recording.h"
+#include "tests/support/rendered_world.h"
 #include "tests/support/small_town.h"
 #include "tests/support/test_data.h"
 #include "tutti/slam/slam_system.h"
@@ -21,7 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 using testing::Recording;
 
-SyntheticOptions Town(SyntheticSensor sensor, std::uint64_t seed = 1) {
+SyntheticOptions SessionTown(SyntheticSensor sensor, std::uint64_t seed = 1) {
   SyntheticOptions options = testing::SmallStereoTownWithALoop(320, 160);
   options.sensor = sensor;
   options.laps = 1.4;
@@ -30,7 +31,7 @@ SyntheticOptions Town(SyntheticSensor sensor, std::uint64_t seed = 1) {
 }
 
 // Frames first..end of a world, as a recording of another day: its numbers and time stamps begin at 0.
-Recording Part(const SyntheticWorld& world, std::size_t first, std::size_t end) {
+Recording Part(const testing::RenderedWorld& world, std::size_t first, std::size_t end) {
   Recording part;
   part.rig = testing::RigOf(world);
   for (std::size_t i = first; i < std::min(end, world.Size()); ++i) part.Add(world.Render(i));
@@ -107,7 +108,7 @@ INSTANTIATE_TEST_SUITE_P(Sensors, Sessions,
                          });
 
 TEST_P(Sessions, AnotherRecordingJoinsTheMapWhoseFrameOfReferenceStaysWithTheSameBytesForAnyThreads) {
-  const SyntheticWorld world(Town(GetParam()));
+  const testing::RenderedWorld world(SessionTown(GetParam()));
   const Recording day = Part(world, 0, kLap), next = Part(world, kLap, world.Size());
   const fs::path map = MapOfALap(day);
   std::string first_bytes;
@@ -144,7 +145,7 @@ TEST_P(Sessions, AnotherRecordingJoinsTheMapWhoseFrameOfReferenceStaysWithTheSam
 }
 
 TEST(SessionsOfAMap, GoOnFromAFileAndTheMapOfTwoSessionsCanBeLocalizedIn) {
-  const SyntheticWorld world(Town(SyntheticSensor::kStereo));
+  const testing::RenderedWorld world(SessionTown(SyntheticSensor::kStereo));
   const Recording day = Part(world, 0, 120), next = Part(world, 100, 200);
   const fs::path folder = testing::FreshFolder();
   SlamSystem whole(Configured(), day.rig);
@@ -171,12 +172,12 @@ TEST(SessionsOfAMap, GoOnFromAFileAndTheMapOfTwoSessionsCanBeLocalizedIn) {
 }
 
 TEST(SessionsOfAMap, AnotherCameraGoesOnInItsOwnPixels) {
-  const SyntheticWorld world(Town(SyntheticSensor::kStereo));
-  SyntheticOptions other_options = Town(SyntheticSensor::kStereo);
+  const testing::RenderedWorld world(SessionTown(SyntheticSensor::kStereo));
+  SyntheticOptions other_options = SessionTown(SyntheticSensor::kStereo);
   other_options.width = 400;
   other_options.height = 180;
   other_options.focal_px = 210;  // 186 px in the other
-  const SyntheticWorld other(other_options);
+  const testing::RenderedWorld other(other_options);
   const Recording day = Part(world, 0, kLap), next = Part(other, kLap, other.Size());
   SlamSystem slam(Configured(), day.rig);
   TrackAll(day, &slam);
@@ -190,7 +191,8 @@ TEST(SessionsOfAMap, AnotherCameraGoesOnInItsOwnPixels) {
 }
 
 TEST(SessionsOfAMap, OtherPlacesStandApartAndOtherSensorsAreRefused) {
-  const SyntheticWorld world(Town(SyntheticSensor::kStereo)), elsewhere(Town(SyntheticSensor::kStereo, 7));
+  const testing::RenderedWorld world(SessionTown(SyntheticSensor::kStereo)),
+      elsewhere(SessionTown(SyntheticSensor::kStereo, 7));
   const Recording day = Part(world, 0, 60), next = Part(elsewhere, 0, 60);
   SlamSystem slam(Configured(), day.rig);
   EXPECT_NE(testing::ErrorOf([&] { slam.BeginSession(next.rig); }).find("there is no map"),
@@ -236,7 +238,7 @@ class Merging : public ::testing::Test {
 };
 
 TEST_F(Merging, TwoMapsWithCommonPlacesAreOneInEitherOrderForAnyThreads) {
-  const SyntheticWorld world(Town(SyntheticSensor::kStereo));
+  const testing::RenderedWorld world(SessionTown(SyntheticSensor::kStereo));
   const Recording a = Part(world, 0, 140), b = Part(world, 90, 240);
   std::string first_bytes;
   for (const int threads : {1, 2}) {
@@ -266,7 +268,8 @@ TEST_F(Merging, TwoMapsWithCommonPlacesAreOneInEitherOrderForAnyThreads) {
 }
 
 TEST_F(Merging, MapsWithoutACommonPlaceAreNotOne) {
-  const SyntheticWorld world(Town(SyntheticSensor::kStereo)), elsewhere(Town(SyntheticSensor::kStereo, 7));
+  const testing::RenderedWorld world(SessionTown(SyntheticSensor::kStereo)),
+      elsewhere(SessionTown(SyntheticSensor::kStereo, 7));
   const auto map = MapOf(Part(world, 0, 60)), other = MapOf(Part(elsewhere, 0, 60));
   EXPECT_FALSE(map->Merge(other.get()));
 }

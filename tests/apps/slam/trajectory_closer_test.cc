@@ -8,6 +8,7 @@
 
 #include "tests/support/disturbed.h"
 #include "tests/support/recording.h"
+#include "tests/support/rendered_world.h"
 #include "tests/support/small_town.h"
 #include "tutti/core/error.h"
 
@@ -16,11 +17,11 @@ namespace {
 
 using testing::Recording;
 
-Recording Town(SyntheticSensor sensor) {
+Recording RecordedTown(SyntheticSensor sensor) {
   SyntheticOptions options = testing::SmallStereoTownWithALoop(320, 160);
   options.sensor = sensor;
   if (sensor == SyntheticSensor::kMono) options.rate_hz = 9;
-  const SyntheticWorld world(options);
+  const testing::RenderedWorld world(options);
   return testing::Record(world, world.Size());
 }
 
@@ -65,7 +66,7 @@ Closed CloseTown(const Recording& town, const Trajectory& odometry, const RunCon
 }
 
 void ExpectTheDriftIsGone(SyntheticSensor sensor, double yaw_deg) {
-  const Recording town = Town(sensor);
+  const Recording town = RecordedTown(sensor);
   const Closed closed = CloseTown(town, testing::Disturbed(town.truth, yaw_deg, 0.2, 3), OfAWalk());
   EXPECT_GT(closed.corrections, 0);
   EXPECT_LT(closed.drift_after, 0.2 * closed.drift_before);
@@ -83,7 +84,7 @@ TEST(TrajectoryCloser, OneCameraTakesItsScaleFromTheOdometry) {
 }
 
 TEST(TrajectoryCloser, APerfectOdometryStaysNearlyAsItIs) {
-  const Recording town = Town(SyntheticSensor::kStereo);
+  const Recording town = RecordedTown(SyntheticSensor::kStereo);
   const Closed closed = CloseTown(town, town.truth, Small(2));
   EXPECT_GT(closed.loops, 0u);
   for (std::size_t i = 0; i < town.truth.size(); ++i)
@@ -91,7 +92,7 @@ TEST(TrajectoryCloser, APerfectOdometryStaysNearlyAsItIs) {
 }
 
 TEST(TrajectoryCloser, TheCorrectionMapsTheNewestPoseOfTheOdometry) {
-  const Recording town = Town(SyntheticSensor::kStereo);
+  const Recording town = RecordedTown(SyntheticSensor::kStereo);
   const Trajectory odometry = testing::Disturbed(town.truth, 0.5, 0.2, 3);
   const Closed closed = CloseTown(town, odometry, OfAWalk());
   const Pose by_map = closed.T_map_odom * odometry.back().pose;
@@ -101,7 +102,7 @@ TEST(TrajectoryCloser, TheCorrectionMapsTheNewestPoseOfTheOdometry) {
 }
 
 TEST(TrajectoryCloser, ThreadsChangeNothing) {
-  const Recording town = Town(SyntheticSensor::kStereo);
+  const Recording town = RecordedTown(SyntheticSensor::kStereo);
   const Trajectory odometry = testing::Disturbed(town.truth, 0.5, 0.2, 3);
   const Closed one = CloseTown(town, odometry, OfAWalk(1)), two = CloseTown(town, odometry, OfAWalk(2));
   ASSERT_EQ(one.trajectory.size(), two.trajectory.size());
@@ -113,7 +114,7 @@ TEST(TrajectoryCloser, ThreadsChangeNothing) {
 
 TEST(TrajectoryCloser, RefusesPosesThatAreNotFiniteAndTimesThatDoNotGrow) {
   const Recording town = [] {
-    const SyntheticWorld world(testing::SmallStereoTown(320, 160));
+    const testing::RenderedWorld world(testing::SmallStereoTown(320, 160));
     return testing::Record(world, 2);
   }();
   TrajectoryCloser closer(Small(1), town.rig);
@@ -124,28 +125,6 @@ TEST(TrajectoryCloser, RefusesPosesThatAreNotFiniteAndTimesThatDoNotGrow) {
   EXPECT_THROW(closer.Push(town.frames[0], Pose()), InputError);
   EXPECT_EQ(closer.Push(town.frames[1], Pose()).state, TrackingState::kTracking);
   EXPECT_EQ(closer.Keyframes().size(), 1u);  // the odometry says that the camera stands still
-}
-
-Trajectory Straight(std::initializer_list<double> stamps) {
-  Trajectory out;
-  for (const double s : stamps) out.push_back({s, Pose(Eigen::Quaterniond::Identity(), {s, 0, 0})});
-  return out;
-}
-
-TEST(CorrectTrajectory, PosesBetweenKeyframesAreMovedByBothAndThoseOutsideByTheNearest) {
-  const Trajectory before = Straight({1, 3});
-  Trajectory after = before;
-  after[1].pose.translation = {5, 1, 0};  // twice as long, and aside
-  const Trajectory out = CorrectTrajectory(Straight({0, 1, 2, 3, 4}), before, after);
-  ASSERT_EQ(out.size(), 5u);
-  EXPECT_TRUE(out[1].pose.translation.isApprox(Eigen::Vector3d(1, 0, 0)));
-  EXPECT_TRUE(out[2].pose.translation.isApprox(Eigen::Vector3d(3, 0.5, 0)));
-  EXPECT_TRUE(out[3].pose.translation.isApprox(Eigen::Vector3d(5, 1, 0)));
-  const double stretch = std::sqrt(17.0) / 2;
-  EXPECT_TRUE(out[4].pose.translation.isApprox(Eigen::Vector3d(5 + stretch, 1, 0)));
-  EXPECT_NEAR(out[0].pose.translation.x(), 1 - stretch, 1e-12);
-  EXPECT_EQ(CorrectTrajectory(before, {}, {}).size(), 2u);
-  EXPECT_THROW(CorrectTrajectory(before, before, {}), InputError);
 }
 
 }  // namespace

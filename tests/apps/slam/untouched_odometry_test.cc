@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "tests/support/recording.h"
+#include "tests/support/rendered_world.h"
 #include "tests/support/small_town.h"
 #include "tutti/slam/slam_system.h"
 
@@ -24,7 +25,7 @@ testing::Recording Drive(SyntheticSensor sensor, Change change) {
                                  ? testing::SmallStereoTown(320, 160)
                                  : testing::SmallStereoTownWithALoop(320, 160);
   options.sensor = sensor;
-  const SyntheticWorld world(options);
+  const testing::RenderedWorld world(options);
   if (change != Change::kALostFrameIsFound) return testing::Record(world, world.Size());
   testing::Recording recording = testing::Record(world, 120);
   for (std::size_t i = 10; i < 60; ++i) {
@@ -36,7 +37,7 @@ testing::Recording Drive(SyntheticSensor sensor, Change change) {
   return recording;
 }
 
-RunConfig Configured(Change change) {
+RunConfig ConfiguredFor(Change change) {
   RunConfig config;
   config.odometry.features = 800;
   config.run.threads = 2;
@@ -51,7 +52,7 @@ RunConfig Configured(Change change) {
 TEST_P(UntouchedOdometry, TrackedOnHasTheBitsOfTheOdometryAlone) {
   const auto [sensor, change] = GetParam();
   const testing::Recording recording = Drive(sensor, change);
-  const RunConfig config = Configured(change);
+  const RunConfig config = ConfiguredFor(change);
   SlamSystem slam(config, recording.rig);
   std::optional<Odometry> untouched;
   std::int64_t seen = -1;

@@ -8,6 +8,8 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "tests/support/made_once.h"
+
 namespace tutti::testing {
 
 ProcessResult RunProgramAndSignal(const std::filesystem::path& program,
@@ -63,6 +65,16 @@ std::vector<std::string> RunArguments(const std::filesystem::path& config,
   std::vector<std::string> arguments = {"run", "--config", config, "--dataset", dataset, "--out", out};
   arguments.insert(arguments.end(), more.begin(), more.end());
   return arguments;
+}
+
+std::filesystem::path RunMadeOnce(const std::filesystem::path& config, const std::filesystem::path& dataset,
+                                  const std::vector<std::string>& more) {
+  std::string words = ReadAll(config) + dataset.string();
+  for (const std::string& word : more) words += " " + word;
+  return MadeOnce("run-" + DigestOf(words), TUTTI_IMAGES_EXECUTABLE, [&](const std::filesystem::path& out) {
+    const ProcessResult run = RunTutti(RunArguments(config, dataset, out, more));
+    if (run.status != 0) throw std::runtime_error("tutti run: " + run.output);
+  });
 }
 
 std::string ReadAll(const std::filesystem::path& file) {

@@ -28,6 +28,11 @@ std::vector<std::string> RunArguments(const std::filesystem::path& config,
                                       const std::filesystem::path& dataset, const std::filesystem::path& out,
                                       const std::vector<std::string>& more = {});
 
+/// The folder that `tutti run` with these writes, made once for all tests (MadeOnce): copy what a test
+/// changes.
+std::filesystem::path RunMadeOnce(const std::filesystem::path& config, const std::filesystem::path& dataset,
+                                  const std::vector<std::string>& more = {});
+
 /// RunProgramAndSignal for tutti.
 ProcessResult RunTuttiAndSignal(const std::vector<std::string>& arguments, const std::string& text,
                                 int signal);

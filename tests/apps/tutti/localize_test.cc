@@ -6,8 +6,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "tests/apps/generated_dataset.h"
 #include "tests/apps/tutti/executable.h"
+#include "tests/support/generated_dataset.h"
 #include "tests/support/small_town.h"
 #include "tests/support/test_data.h"
 #include "tutti/core/trajectory.h"
@@ -20,7 +20,7 @@ using ::testing::HasSubstr;
 using testing::ReadAll;
 using testing::RunTutti;
 
-SyntheticOptions Town(std::uint64_t seed) {
+SyntheticOptions TownToLocalizeIn(std::uint64_t seed) {
   SyntheticOptions options = testing::SmallStereoTownWithALoop(320, 160);
   options.laps = 1.6;
   options.seed = seed;
@@ -29,13 +29,6 @@ SyntheticOptions Town(std::uint64_t seed) {
 
 class LocalizeCommand : public ::testing::Test {
  protected:
-  void SetUp() override {
-    ASSERT_EQ(RunTutti({"run", "--config", (town_.path() / "config.yaml").string(), "--dataset",
-                        town_.path().string(), "--end", std::to_string(kMapped), "--out",
-                        (folder_ / "map").string(), "--no-report"})
-                  .status,
-              0);
-  }
   testing::ProcessResult Localize(const fs::path& dataset, const std::vector<std::string>& more) const {
     std::vector<std::string> words = {"localize",       "--map", map_.string(), "--dataset",
                                       dataset.string(), "--out", out_.string()};
@@ -43,14 +36,15 @@ class LocalizeCommand : public ::testing::Test {
     return RunTutti(words);
   }
   static constexpr int kMapped = 175;  // of the frames: one lap
-  const testing::GeneratedDataset town_{"town_to_localize_in", Town(1)};
-  const fs::path folder_ = testing::FreshFolder(), map_ = folder_ / "map" / "map.tutti",
-                 out_ = folder_ / "out";
+  const fs::path town_ = testing::GeneratedDataset(TownToLocalizeIn(1));
+  const fs::path run_ = testing::RunMadeOnce(town_ / "config.yaml", town_,
+                                             {"--end", std::to_string(kMapped), "--no-report"}),
+                 map_ = run_ / "map.tutti", out_ = testing::FreshFolder() / "out";
 };
 
 TEST_F(LocalizeCommand, FramesOfASecondLapAreFoundInTheMapOfTheFirstWhichStaysAsItIs) {
   const std::string before = ReadAll(map_);
-  const auto run = Localize(town_.path(), {"--start", std::to_string(kMapped)});
+  const auto run = Localize(town_, {"--start", std::to_string(kMapped)});
   ASSERT_EQ(run.status, 0) << run.output;
   EXPECT_EQ(ReadAll(map_) == before, true) << "the map's bytes have changed";
   const auto summary = nlohmann::json::parse(ReadAll(out_ / "summary.json"));
@@ -60,7 +54,7 @@ TEST_F(LocalizeCommand, FramesOfASecondLapAreFoundInTheMapOfTheFirstWhichStaysAs
   // The world is the map's, whose first camera is where the truth begins.
   const Trajectory found = ReadTrajectory(out_ / "trajectory.txt", TrajectoryFormat::kTum);
   EXPECT_EQ(static_cast<double>(found.size()), localized);
-  const Trajectory truth = ReadTrajectory(town_.path() / "poses.txt", TrajectoryFormat::kKitti);
+  const Trajectory truth = ReadTrajectory(town_ / "poses.txt", TrajectoryFormat::kKitti);
   double worst = 0;
   for (const StampedPose& pose : found) {
     const auto frame = static_cast<std::size_t>(std::lround(pose.stamp_s * 4.5));
@@ -78,29 +72,29 @@ TEST_F(LocalizeCommand, FramesOfASecondLapAreFoundInTheMapOfTheFirstWhichStaysAs
 
 TEST_F(LocalizeCommand, TheResultDoesNotDependOnTheThreads) {
   const std::string start = std::to_string(kMapped + 20);
-  ASSERT_EQ(Localize(town_.path(), {"--start", start, "--threads", "1"}).status, 0);
+  ASSERT_EQ(Localize(town_, {"--start", start, "--threads", "1"}).status, 0);
   const std::string one = ReadAll(out_ / "trajectory.txt");
-  ASSERT_EQ(Localize(town_.path(), {"--start", start, "--threads", "2"}).status, 0);
+  ASSERT_EQ(Localize(town_, {"--start", start, "--threads", "2"}).status, 0);
   EXPECT_EQ(ReadAll(out_ / "trajectory.txt") == one, true);
 }
 
 TEST_F(LocalizeCommand, InTheMapOfAnotherTownNoFrameIsFound) {
-  const testing::GeneratedDataset other("another_town", Town(7));
-  const auto run = Localize(other.path(), {"--end", "60"});
+  const fs::path other = testing::GeneratedDataset(TownToLocalizeIn(7));
+  const auto run = Localize(other, {"--end", "60"});
   EXPECT_EQ(run.status, 1) << run.output;
   EXPECT_THAT(run.output, HasSubstr("not one frame was found in the map"));
   EXPECT_EQ(nlohmann::json::parse(ReadAll(out_ / "summary.json"))["frames"]["localized"], 0);
 }
 
 TEST_F(LocalizeCommand, AnotherCameraAndAFolderThatHoldsTheMapAreRefused) {
-  SyntheticOptions options = Town(1);
+  SyntheticOptions options = TownToLocalizeIn(1);
   options.width = 400;
-  const testing::GeneratedDataset wider("wider_town", options);
-  const auto camera = Localize(wider.path(), {"--config", (wider.path() / "config.yaml").string()});
+  const fs::path wider = testing::GeneratedDataset(options);
+  const auto camera = Localize(wider, {"--config", (wider / "config.yaml").string()});
   EXPECT_EQ(camera.status, 1);
   EXPECT_THAT(camera.output, HasSubstr("has another camera than the map"));
-  const auto inside = RunTutti({"localize", "--map", map_.string(), "--dataset", town_.path().string(),
-                                "--out", (folder_ / "map").string()});
+  const auto inside =
+      RunTutti({"localize", "--map", map_.string(), "--dataset", town_.string(), "--out", run_.string()});
   EXPECT_EQ(inside.status, 1);
   EXPECT_THAT(inside.output, HasSubstr("choose another --out"));
   EXPECT_TRUE(fs::exists(map_));

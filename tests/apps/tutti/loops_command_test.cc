@@ -1,4 +1,4 @@
-// `tutti loops` and `tutti compare-loops`, end to end, through the real executable.
+// `tutti loops`, end to end, through the real executable.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -7,10 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
-#include "tests/apps/tutti/executable.h"
-#include "tests/apps/tutti/mat_bytes.h"
-#include "tests/loopclosure/features/textured_image.h"
-#include "tests/support/test_data.h"
+#include "tests/apps/tutti/loops_fixture.h"
 #include "tutti/core/text.h"
 
 namespace tutti {
@@ -19,59 +16,15 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using testing::kEmptySheet;
+using testing::kLoopImages;
+using testing::kLoopPlaces;
 using ::testing::Not;
 using testing::ReadAll;
-using testing::RunTutti;
 using ::testing::StartsWith;
 using testing::WriteAll;
 
-constexpr int kPlaces = 15, kImages = 20;
-constexpr int kEmptySheet = 84 + 340;  // height of a contact sheet with one strip [px]
-
-class LoopsCommand : public ::testing::Test {
- protected:
-  // Images 15 to 19 show the places of 0 to 4 again.
-  void WriteImages(int count = kImages) const {
-    fs::create_directories(images_);
-    for (int i = 0; i < count; ++i) {
-      const cv::Mat place = testing::TexturedImage(static_cast<std::uint32_t>(i % kPlaces));
-      cv::imwrite((images_ / (std::to_string(i) + ".png")).string(),
-                  i < kPlaces ? place : testing::SeenAgain(place));
-    }
-  }
-  // A matrix of `count` images with these (row, column) pairs as loops.
-  fs::path Truth(const std::vector<std::pair<int, int>>& pairs, int count = kImages) const {
-    cv::Mat matrix = cv::Mat::zeros(count, count, CV_8U);
-    for (const auto& [row, column] : pairs) matrix.at<std::uint8_t>(row, column) = 255;
-    fs::path file = folder_ / "truth.png";
-    cv::imwrite(file.string(), matrix);
-    return file;
-  }
-  static std::vector<std::pair<int, int>> TruePairs() {
-    std::vector<std::pair<int, int>> pairs;
-    for (int i = kPlaces; i < kImages; ++i) pairs.emplace_back(i, i - kPlaces);
-    return pairs;
-  }
-  testing::ProcessResult Run(const fs::path& truth, const fs::path& out,
-                             const std::vector<std::string>& more = {}) const {
-    std::vector<std::string> arguments = {"loops",        "--images", images_.string(), "--ground-truth",
-                                          truth.string(), "--out",    out.string()};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return RunTutti(arguments);
-  }
-  static nlohmann::json Json(const fs::path& file) { return nlohmann::json::parse(ReadAll(file)); }
-  static cv::Size PictureSize(const fs::path& file) { return cv::imread(file.string()).size(); }
-  static void ExpectAllFiles(const fs::path& out) {
-    for (const char* name :
-         {"results.json", "hypotheses.csv", "precision_recall.csv", "precision_recall.svg"})
-      EXPECT_GT(ReadAll(out / name).size(), 50u) << name;
-    for (const char* name : {"precision_recall.png", "confusion.png", "contact_sheet.png"})
-      EXPECT_GT(PictureSize(out / name).area(), 100000) << name;
-  }
-
-  const fs::path folder_ = testing::FreshFolder();
-  const fs::path images_ = folder_ / "images", out_ = folder_ / "out";
-};
+class LoopsCommand : public testing::LoopsFixture {};
 
 TEST_F(LoopsCommand, WritesEverythingThatScriptsRelyOn) {
   WriteImages();
@@ -79,7 +32,7 @@ TEST_F(LoopsCommand, WritesEverythingThatScriptsRelyOn) {
   ASSERT_EQ(run.status, 0) << run.output;
   ExpectAllFiles(out_);
   const nlohmann::json r = Json(out_ / "results.json");
-  EXPECT_EQ(r["images"], kImages);
+  EXPECT_EQ(r["images"], kLoopImages);
   EXPECT_EQ(r["rows_with_loop"], 5);
   EXPECT_EQ(r["accepted"]["false"], 0);
   EXPECT_GT(r["recall_at_100_precision"].get<double>(), 0.5);
@@ -211,7 +164,7 @@ TEST_F(LoopsCommand, TheDumpSaysWhatEachCandidateLookedLike) {
     ASSERT_EQ(cells.size(), 13u) << line;
     const int image = std::stoi(cells[0]), location = std::stoi(cells[1]);
     EXPECT_LT(location, image - 9);  // short-term memory is no candidate
-    EXPECT_EQ(cells[2], image == location + kPlaces ? "loop" : "none");
+    EXPECT_EQ(cells[2], image == location + kLoopPlaces ? "loop" : "none");
     loops += cells[2] == "loop" ? 1 : 0;
     EXPECT_GT(*ParseDouble(cells[4]) + *ParseDouble(cells[7]) + *ParseDouble(cells[10]), 0) << line;
     for (const std::size_t likelihood : {5u, 8u, 11u})  // few words speak against a place, down to 1 / e
@@ -271,7 +224,7 @@ TEST_F(LoopsCommand, NumbersAreThoseOfAllImagesAlsoWithAStride) {
     start.append(",\"").append(number).append(".png\"");
     EXPECT_THAT(line, StartsWith(start));
   }
-  EXPECT_EQ(image, kImages);
+  EXPECT_EQ(image, kLoopImages);
   for (const char* file : {"posteriors.csv", "dump_candidates.csv", "dump_verification.csv"}) {
     std::istringstream table(ReadAll(out_ / file));
     std::getline(table, line);
@@ -283,145 +236,11 @@ TEST_F(LoopsCommand, NumbersAreThoseOfAllImagesAlsoWithAStride) {
   }
 }
 
-TEST_F(LoopsCommand, ImagesWithoutAPoseAreIgnoredWhereNamesAreTimeStamps) {
-  fs::create_directories(images_);
-  std::string truth;
-  for (int i = 0; i < 16; ++i) {  // two laps of 8 places
-    const std::string stamp = std::to_string(100 + i) + ".0";
-    cv::imwrite((images_ / (stamp + ".png")).string(),
-                testing::TexturedImage(static_cast<std::uint32_t>(i % 8)));
-    const std::string x = std::to_string(20 * (i % 8));
-    if (i > 0) truth.append(stamp).append(" ").append(x).append(" 0 0 0 0 0 1\n");
-  }
-  const auto loops = [&](const std::string& first) {
-    WriteAll(folder_ / "truth.txt", first + truth);
-    const auto run = Run(folder_ / "truth.txt", out_, {"--rule", "orb", "--gt-exclude-s", "5"});
-    EXPECT_EQ(run.status, 0) << run.output;
-    return Json(out_ / "results.json");
-  };
-  const nlohmann::json whole = loops("100.0 0 0 0 0 0 0 1\n");
-  EXPECT_EQ(whole["rows_with_loop"], 8);
-  const nlohmann::json near = loops("100.4 0 0 0 0 0 0 1\n100.45 0 0 0 0 0 0 1\n");
-  EXPECT_EQ(near["rows_with_loop"], 8) << "0.4 s is less than half a frame";
-  const nlohmann::json without = loops("");
-  EXPECT_EQ(without["rows_with_loop"], 7);
-  EXPECT_THAT(without["protocol"]["ground_truth"].get<std::string>(),
-              HasSubstr("of 1 images it says nothing"));
-}
-
 TEST_F(LoopsCommand, ATableOfOneRuleIsAContradiction) {
   WriteImages(2);
   const auto run = Run(Truth({}, 2), out_, {"--table", "--rule", "mean"});
   EXPECT_NE(run.status, 0);
   EXPECT_THAT(run.output, AllOf(HasSubstr("--table"), HasSubstr("--rule")));
-}
-
-TEST_F(LoopsCommand, ALaterRunWithTheSameMemoryFindsLoopsIntoTheImagesOfTheFirst) {
-  WriteImages(kPlaces);
-  constexpr int kAgain = 4;
-  const fs::path later = folder_ / "later";
-  fs::create_directories(later);
-  for (int i = 0; i < kAgain; ++i)
-    cv::imwrite((later / (std::to_string(i) + ".png")).string(),
-                testing::SeenAgain(testing::TexturedImage(static_cast<std::uint32_t>(i))));
-  const fs::path memory = folder_ / "memory", out = folder_ / "later_out";
-  const std::vector<std::vector<std::string>> ways = {{"--set", "ltm_file=" + memory.string() + ".ltm"},
-                                                      {"--places", memory.string() + ".places"}};
-  for (const std::vector<std::string>& way : ways) {
-    ASSERT_EQ(Run(Truth({}, kPlaces), out_, way).status, 0);
-    EXPECT_FALSE(fs::exists(out_ / "earlier_loops.csv"));
-    const auto go_on = [&] {
-      return RunTutti({"loops", "--images", later.string(), "--ground-truth", Truth({}, kAgain).string(),
-                       "--out", out.string(), way[0], way[1]});
-    };
-    const auto run = go_on();
-    ASSERT_EQ(run.status, 0) << run.output;
-    EXPECT_THAT(run.output, HasSubstr("4 images, into 15"));
-    const nlohmann::json json = Json(out / "results.json");
-    EXPECT_EQ(json["earlier"]["images"], kPlaces);
-    EXPECT_EQ(json["earlier"]["loops"], kAgain);
-    EXPECT_EQ(json["images"], kAgain);
-    EXPECT_EQ(json["accepted"]["false"], 0) << "the ground truth does not know the earlier images";
-    const std::vector<std::string> lines = SplitText(ReadAll(out / "earlier_loops.csv"), "\n");
-    ASSERT_EQ(lines.size(), 1u + kAgain);
-    for (int i = 0; i < kAgain; ++i) {
-      const std::string name = std::to_string(i) + ".png";
-      EXPECT_THAT(lines[static_cast<std::size_t>(i) + 1],
-                  StartsWith(std::to_string(i) + ",\"" + name + "\"," + std::to_string(i) + ",\"" +
-                             (images_ / name).string() + "\","));
-    }
-    EXPECT_THAT(ReadAll(out / "hypotheses.csv"), HasSubstr((images_ / "0.png").string()));
-    ASSERT_EQ(go_on().status, 0);
-    EXPECT_EQ(Json(out / "results.json")["earlier"]["images"], kPlaces + kAgain) << "numbers go on";
-  }
-}
-
-TEST_F(LoopsCommand, AMemoryThatIsOfNoUseIsNamed) {
-  WriteImages(3);
-  const std::string memory = (folder_ / "memory.ltm").string(), set = "ltm_file=" + memory;
-  const fs::path truth = Truth({}, 3);
-  const auto table = Run(truth, out_, {"--set", set, "--table"});
-  EXPECT_EQ(table.status, 1);
-  EXPECT_THAT(table.output, AllOf(HasSubstr(memory), HasSubstr("--table")));
-  ASSERT_EQ(Run(truth, out_, {"--set", set}).status, 0);
-  const auto other = Run(truth, out_, {"--set", set, "--rule", "orb"});
-  EXPECT_EQ(other.status, 1);
-  EXPECT_THAT(other.output, AllOf(HasSubstr(memory), HasSubstr("another configuration")));
-  WriteAll(memory + ".images.csv", "image,file\nthree,x.png\n");
-  const auto damaged = Run(truth, out_, {"--set", set});
-  EXPECT_EQ(damaged.status, 1);
-  EXPECT_THAT(damaged.output, HasSubstr(memory + ".images.csv:2"));
-  fs::remove(memory + ".images.csv");
-  EXPECT_EQ(Run(truth, out_, {"--set", set}).status, 0) << "without names";
-}
-
-TEST_F(LoopsCommand, GroundTruthOfAnotherSizeNamesBothSizes) {
-  WriteImages(4);
-  for (const char* flag : {"--table", "--rule=mean"}) {
-    const auto run = Run(Truth({}, 7), out_, {flag});
-    EXPECT_EQ(run.status, 1);
-    EXPECT_THAT(run.output, AllOf(HasSubstr("7 x 7"), HasSubstr("4 images")));
-  }
-}
-
-TEST_F(LoopsCommand, TransposedGroundTruthIsTheSameGroundTruth) {
-  WriteImages();
-  ASSERT_EQ(Run(Truth(TruePairs()), out_).status, 0);
-  std::vector<std::pair<int, int>> transposed;
-  for (const auto& [row, column] : TruePairs()) transposed.emplace_back(column, row);
-  ASSERT_EQ(Run(Truth(transposed), folder_ / "transposed").status, 0);
-  EXPECT_EQ(ReadAll(out_ / "hypotheses.csv"), ReadAll(folder_ / "transposed" / "hypotheses.csv"));
-  EXPECT_EQ(ReadAll(out_ / "precision_recall.csv"), ReadAll(folder_ / "transposed" / "precision_recall.csv"));
-}
-
-TEST_F(LoopsCommand, AMatlabFileIsTheSameGroundTruthAndADamagedOneIsOneLine) {
-  WriteImages(2);
-  const auto write = [this](const std::string& bytes) {
-    WriteAll(folder_ / "truth.mat", bytes);
-    return folder_ / "truth.mat";
-  };
-  const std::string mat = testing::MatHeader() +
-                          testing::MatVariable(testing::kDoubles, 2, 2,
-                                               testing::MatElement<double>(testing::kDouble, {0, 1, 0, 0}));
-  const auto run = Run(write(mat), out_);
-  ASSERT_EQ(run.status, 0) << run.output;
-  EXPECT_EQ(Json(out_ / "results.json")["rows_with_loop"], 1);
-  const auto damaged = Run(write(mat.substr(0, mat.size() - 9)), out_);
-  EXPECT_EQ(damaged.status, 1);
-  EXPECT_NE(damaged.output.find("truth.mat: damaged MATLAB file"), std::string::npos) << damaged.output;
-}
-
-TEST_F(LoopsCommand, NoLoopInTheGroundTruthMakesEveryAcceptedOneFalse) {
-  WriteImages();
-  const auto run = Run(Truth({}), out_);
-  ASSERT_EQ(run.status, 0) << run.output;
-  ExpectAllFiles(out_);
-  const nlohmann::json r = Json(out_ / "results.json");
-  EXPECT_EQ(r["rows_with_loop"], 0);
-  EXPECT_EQ(r["recall_at_100_precision"], 0);
-  EXPECT_GT(r["accepted"]["false"].get<int>(), 1);
-  EXPECT_THAT(ReadAll(out_ / "precision_recall.svg"), HasSubstr("the ground truth has no loop"));
-  EXPECT_GT(PictureSize(out_ / "contact_sheet.png").height, kEmptySheet);
 }
 
 TEST_F(LoopsCommand, NothingWrongGivesAContactSheetThatSaysNone) {
@@ -444,26 +263,6 @@ TEST_F(LoopsCommand, OneImageAloneIsARunAndATable) {
   EXPECT_EQ(Json(out_ / "table.json")["significance"][0]["mcnemar"]["p"], 1.0);
 }
 
-TEST_F(LoopsCommand, BlankAndDamagedImagesMissEveryLoopButStayInTheDenominator) {
-  fs::create_directories(images_);
-  for (int i = 0; i < kImages; ++i) {
-    const fs::path file = images_ / (std::to_string(i) + ".png");
-    if (i % 4 == 3) {
-      WriteAll(file, "not an image");
-    } else {
-      cv::imwrite(file.string(), cv::Mat(120, 160, CV_16UC1, cv::Scalar(900)));
-    }
-  }
-  const auto run = Run(Truth(TruePairs()), out_);
-  ASSERT_EQ(run.status, 0) << run.output;
-  ExpectAllFiles(out_);
-  const nlohmann::json r = Json(out_ / "results.json");
-  EXPECT_EQ(r["images_damaged"], 5);
-  EXPECT_EQ(r["rows_with_loop"], 5);
-  EXPECT_EQ(r["at_default_threshold"]["recall"], 0);
-  EXPECT_EQ(PictureSize(out_ / "contact_sheet.png").height, 84 + 5 * 340);
-}
-
 TEST_F(LoopsCommand, AnOutputFolderThatCantBeMadeIsOneLine) {
   WriteImages(1);
   WriteAll(folder_ / "pairs.txt", "0\n");
@@ -478,7 +277,7 @@ TEST_F(LoopsCommand, CtrlCWritesTheImagesSoFar) {
                                                Truth(TruePairs()).string(), "--out", out_.string()},
                                               " 20%", SIGINT);
   EXPECT_EQ(run.status, 130) << run.output;
-  EXPECT_LT(Json(out_ / "results.json")["images"].get<int>(), kImages);
+  EXPECT_LT(Json(out_ / "results.json")["images"].get<int>(), kLoopImages);
   ExpectAllFiles(out_);
 }
 
@@ -492,56 +291,6 @@ TEST_F(LoopsCommand, AForeignFolderIsRefusedAndAnEarlierResultReplaced) {
   EXPECT_EQ(Run(Truth(TruePairs()), out_, {"--rule", "orb"}).status, 0);
   EXPECT_FALSE(fs::exists(out_ / "dump_candidates.csv"));  // it was the earlier run's
   ExpectAllFiles(out_);
-}
-
-std::string SmallTable(double joint, double naive, double surf) {
-  nlohmann::json table;
-  table["best_single"] = {{"verified", "surf"}, {"posterior", "surf"}};
-  for (const auto& [rule, recall] : std::vector<std::pair<std::string, double>>{
-           {"joint", joint}, {"mean", surf}, {"naive", naive}, {"surf", surf}})
-    table["rules"][rule] = {{"recall_at_100_precision", recall},
-                            {"recall_at_100_precision_posterior", recall}};
-  return table.dump();
-}
-
-TEST_F(LoopsCommand, CompareLoopsIsThePairedTTestOverTheSets) {
-  // joint - naive: 0.3, 0.2, 0.1, 0.3, 0.1: their mean 0.2, deviation 0.1, t = 0.2 / (0.1 / sqrt 5) = 4.4721.
-  // With four degrees of freedom and x = t / sqrt(4 + t^2), p = 1 - x (3 - x^2) / 2 = 0.0111.
-  const std::vector<std::pair<double, double>> recalls = {
-      {0.8, 0.5}, {0.9, 0.7}, {0.7, 0.6}, {0.7, 0.4}, {0.9, 0.8}};
-  const std::string out = (folder_ / "t.json").string();
-  std::vector<std::string> arguments = {"compare-loops", "--out", out};
-  for (const auto& [joint, naive] : recalls) {
-    arguments.push_back((folder_ / (std::to_string(arguments.size()) + ".json")).string());
-    WriteAll(arguments.back(), SmallTable(joint, naive, joint));
-  }
-  const auto run = RunTutti(arguments);
-  ASSERT_EQ(run.status, 0) << run.output;
-  const nlohmann::json tests = Json(out);
-  ASSERT_EQ(tests.size(), 8u);
-  EXPECT_EQ(tests[1]["a"], "joint");
-  EXPECT_EQ(tests[1]["b"], "naive");
-  EXPECT_EQ(tests[1]["sets"], 5);
-  EXPECT_NEAR(tests[1]["t"].get<double>(), 4.4721, 1e-4);
-  EXPECT_NEAR(tests[1]["p"].get<double>(), 0.0111, 1e-4);
-  EXPECT_EQ(tests[2]["b"], "best single");
-  EXPECT_EQ(tests[2]["p"], 1.0);  // no difference at all
-  // Four sets are too few for a p.
-  arguments.pop_back();
-  const auto few = RunTutti(arguments);
-  ASSERT_EQ(few.status, 0) << few.output;
-  EXPECT_FALSE(Json(out)[1].contains("p"));
-  EXPECT_THAT(few.output, HasSubstr("p is given from 5 sets on"));
-}
-
-TEST_F(LoopsCommand, CompareLoopsRefusesWhatIsNoTable) {
-  WriteAll(folder_ / "1.json", "[1, 2");
-  WriteAll(folder_ / "2.json", R"({"rules": {}, "best_single": {}})");
-  for (const char* name : {"1.json", "2.json", "none.json"}) {
-    const auto run = RunTutti({"compare-loops", (folder_ / name).string()});
-    EXPECT_EQ(run.status, 1) << run.output;
-    EXPECT_THAT(run.output, HasSubstr(name));
-  }
 }
 
 }  // namespace

@@ -2,8 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "tests/apps/generated_dataset.h"
 #include "tests/apps/tutti/executable.h"
+#include "tests/support/generated_dataset.h"
 #include "tests/support/small_town.h"
 #include "tests/support/test_data.h"
 #include "tutti/slam/map_file.h"
@@ -16,10 +16,10 @@ using testing::RunProgramAndSignal;
 
 TEST(MapExample, MapsALapAndLocatesTheNextFramesInIt) {
   constexpr int kLap = 142;
-  const testing::GeneratedDataset town("town_of_the_example", testing::SmallStereoTownWithALoop(320, 160));
+  const std::filesystem::path town = testing::GeneratedDataset(testing::SmallStereoTownWithALoop(320, 160));
   const std::filesystem::path map = testing::FreshFolder() / "map.tutti";
-  const auto run = RunProgramAndSignal(
-      TUTTI_EXAMPLE_06, {town.path() / "config.yaml", town.path(), std::to_string(kLap), map}, "", 0);
+  const auto run =
+      RunProgramAndSignal(TUTTI_EXAMPLE_06, {town / "config.yaml", town, std::to_string(kLap), map}, "", 0);
   EXPECT_EQ(run.status, 0) << run.output;
   EXPECT_THAT(run.output, HasSubstr("map of 142 frames: "));
   EXPECT_THAT(run.output, HasSubstr(" landmarks, sigma 0.0"));

@@ -2,8 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "tests/apps/generated_dataset.h"
 #include "tests/apps/tutti/executable.h"
+#include "tests/support/generated_dataset.h"
 #include "tests/support/small_town.h"
 #include "tests/support/test_data.h"
 #include "tutti/slam/map_file.h"
@@ -17,7 +17,7 @@ using ::testing::HasSubstr;
 using testing::ReadAll;
 using testing::RunTutti;
 
-SyntheticOptions TwoLaps() {
+SyntheticOptions TwoLapsToPrune() {
   SyntheticOptions options = testing::SmallStereoTownWithALoop(320, 160);
   options.laps = 1.6;
   return options;
@@ -26,13 +26,10 @@ SyntheticOptions TwoLaps() {
 class MapPrune : public ::testing::Test {
  protected:
   void SetUp() override {
-    ASSERT_EQ(RunTutti({"run", "--config", town_.path() / "config.yaml", "--dataset", town_.path(), "--out",
-                        folder_ / "run", "--no-report", "--quiet"})
-                  .status,
-              0);
+    fs::copy(testing::RunMadeOnce(town_ / "config.yaml", town_, {"--no-report"}) / "map.tutti", map_);
   }
-  const testing::GeneratedDataset town_{"town_to_prune", TwoLaps()};
-  const fs::path folder_ = testing::FreshFolder(), map_ = folder_ / "run" / "map.tutti",
+  const fs::path town_ = testing::GeneratedDataset(TwoLapsToPrune());
+  const fs::path folder_ = testing::FreshFolder(), map_ = folder_ / "map.tutti",
                  small_ = folder_ / "small.tutti";
 };
 

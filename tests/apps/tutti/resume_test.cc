@@ -7,9 +7,9 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
-#include "tests/apps/generated_dataset.h"
 #include "tests/apps/tiny_town.h"
 #include "tests/apps/tutti/executable.h"
+#include "tests/support/generated_dataset.h"
 #include "tests/support/small_town.h"
 #include "tests/support/test_data.h"
 
@@ -47,16 +47,10 @@ class Resume : public ::testing::Test {
 
 TEST_F(Resume, AfterThirtyKillsAtAnyMomentTheResultsAreTheSame) {
   SyntheticOptions options = testing::SmallStereoTownWithALoop(320, 160);
-  const testing::GeneratedDataset town("town_with_a_loop", options);
-  const std::vector<std::string> first = {"run",
-                                          "--config",
-                                          (town.path() / "config.yaml").string(),
-                                          "--out",
-                                          out_.string(),
-                                          "--dataset",
-                                          town.path().string(),
-                                          "--checkpoint",
-                                          "0",
+  const fs::path town = testing::GeneratedDataset(options);
+  const std::vector<std::string> first = {"run",         "--config",     (town / "config.yaml").string(),
+                                          "--out",       out_.string(),  "--dataset",
+                                          town.string(), "--checkpoint", "0",
                                           "--no-report"};
   std::vector<std::string> never = first;
   never[4] = whole_.string();
@@ -140,10 +134,10 @@ TEST_F(Resume, MapInfoTellsWhatIsInAMapAndChecksIt) {
   EXPECT_EQ(text.status, 0) << text.output;
   EXPECT_THAT(text.output,
               AllOf(HasSubstr("keyframes"), HasSubstr("stereo"), HasSubstr("checksums are right")));
-  const auto json = nlohmann::json::parse(RunTutti({"map", "info", map.string(), "--json"}).output);
-  EXPECT_EQ(json["frames"], 5);
-  EXPECT_GT(json["landmarks"], 50);
-  EXPECT_EQ(json["run"]["dataset"], testing::TinyTown().string());
+  const auto info = nlohmann::json::parse(RunTutti({"map", "info", map.string(), "--json"}).output);
+  EXPECT_EQ(info["frames"], 5);
+  EXPECT_GT(info["landmarks"], 50);
+  EXPECT_EQ(info["run"]["dataset"], testing::TinyTown().string());
   std::string bytes = ReadAll(map);
   bytes[bytes.size() / 2] ^= 1;
   testing::WriteAll(map, bytes);

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "tests/apps/generated_dataset.h"
 #include "tests/apps/tutti/executable.h"
+#include "tests/support/generated_dataset.h"
 #include "tests/support/small_town.h"
 #include "tests/support/test_data.h"
 #include "tutti/core/trajectory.h"
@@ -29,19 +29,17 @@ SyntheticOptions Town(std::uint64_t seed) {
 
 class SessionsCommand : public ::testing::Test {
  protected:
-  testing::ProcessResult Run(const testing::GeneratedDataset& town, const fs::path& out,
+  testing::ProcessResult Run(const fs::path& town, const fs::path& out,
                              const std::vector<std::string>& more) const {
-    std::vector<std::string> words = {"run",         "--dataset", town.path().string(), "--out", out.string(),
-                                      "--no-report", "--quiet"};
+    std::vector<std::string> words = {"run",        "--dataset",   town.string(), "--out",
+                                      out.string(), "--no-report", "--quiet"};
     words.insert(words.end(), more.begin(), more.end());
     return RunTutti(words);
   }
-  static std::string Config(const testing::GeneratedDataset& town) {
-    return (town.path() / "config.yaml").string();
-  }
+  static std::string Config(const fs::path& town) { return (town / "config.yaml").string(); }
   static json Summary(const fs::path& out) { return json::parse(ReadAll(out / "summary.json")); }
 
-  const testing::GeneratedDataset town_{"town_of_sessions", Town(1)};
+  const fs::path town_ = testing::GeneratedDataset(Town(1));
   const fs::path folder_ = testing::FreshFolder(), day_ = folder_ / "day", next_ = folder_ / "next";
 };
 
@@ -62,7 +60,7 @@ TEST_F(SessionsCommand, ARunGoesOnInTheMapOfAnotherAndBothAreInTheNewOne) {
   // Its frames, in the frame of reference of the map, which begins where the truth does.
   const Trajectory found = ReadTrajectory(next_ / "trajectory.txt", TrajectoryFormat::kTum);
   EXPECT_EQ(found.size(), static_cast<std::size_t>(summary["frames"]["tracked"]));
-  const Trajectory truth = ReadTrajectory(town_.path() / "poses.txt", TrajectoryFormat::kKitti);
+  const Trajectory truth = ReadTrajectory(town_ / "poses.txt", TrajectoryFormat::kKitti);
   EXPECT_GE(found.size(), (truth.size() - 150) * 9 / 10);
   double worst = 0;
   for (const StampedPose& pose : found) {
@@ -97,11 +95,11 @@ TEST_F(SessionsCommand, MapsAreMergedWhereTheyShowTheSameAndRefusedWhereNot) {
   EXPECT_EQ(info["sessions"].size(), 2u);
   EXPECT_EQ(info["submaps"], 1);
   EXPECT_EQ(info["frames"], 230);
-  const auto localized = RunTutti({"localize", "--map", both, "--dataset", town_.path().string(), "--start",
-                                   "150", "--end", "180", "--out", (folder_ / "where").string()});
+  const auto localized = RunTutti({"localize", "--map", both, "--dataset", town_.string(), "--start", "150",
+                                   "--end", "180", "--out", (folder_ / "where").string()});
   EXPECT_EQ(localized.status, 0) << localized.output;
 
-  const testing::GeneratedDataset other("another_town_of_sessions", Town(7));
+  const fs::path other = testing::GeneratedDataset(Town(7));
   const fs::path elsewhere = folder_ / "elsewhere";
   ASSERT_EQ(Run(other, elsewhere, {"--config", Config(other), "--end", "60"}).status, 0);
   const std::string none = (folder_ / "none.tutti").string();

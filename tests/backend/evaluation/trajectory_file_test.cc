@@ -15,7 +15,7 @@ using ::testing::AllOf;
 using testing::ErrorOf;
 using ::testing::HasSubstr;
 
-Trajectory Curve() {
+Trajectory ShortCurve() {
   Trajectory out;
   for (int k = 0; k < 20; ++k) {
     const double a = 0.1 * k;
@@ -33,7 +33,7 @@ std::vector<double> Stamps(const Trajectory& trajectory) {
 std::filesystem::path Write(const std::string& text) { return testing::FreshFile("poses.txt", text); }
 
 TEST(TrajectoryFile, EveryFormatIsRecognisedAndReadBack) {
-  const Trajectory written = Curve();
+  const Trajectory written = ShortCurve();
   for (const std::string& name : PoseFileFormatNames()) {
     SCOPED_TRACE(name);
     const PoseFileFormat format = ParsePoseFileFormat(name);
@@ -55,18 +55,18 @@ TEST(TrajectoryFile, EveryFormatIsRecognisedAndReadBack) {
 
 TEST(TrajectoryFile, WithoutTimesKittiAndG2oHaveNoStamps) {
   const std::filesystem::path folder = testing::FreshFolder();
-  WritePoseFile(folder / "a.txt", Curve(), PoseFileFormat::kKitti);
-  WritePoseFile(folder / "a.g2o", Curve(), PoseFileFormat::kG2o);
+  WritePoseFile(folder / "a.txt", ShortCurve(), PoseFileFormat::kKitti);
+  WritePoseFile(folder / "a.g2o", ShortCurve(), PoseFileFormat::kG2o);
   EXPECT_FALSE(ReadPoseFile(folder / "a.txt").has_stamps);
   EXPECT_FALSE(ReadPoseFile(folder / "a.g2o").has_stamps);
-  WriteTimes(folder / "times.txt", Curve());
+  WriteTimes(folder / "times.txt", ShortCurve());
   EXPECT_TRUE(ReadPoseFile(folder / "a.txt", {}, ReadTimes(folder / "times.txt")).has_stamps);
 }
 
 TEST(TrajectoryFile, TimesThatDoNotFitAreRefused) {
   const std::filesystem::path folder = testing::FreshFolder();
-  WritePoseFile(folder / "a.txt", Curve(), PoseFileFormat::kKitti);
-  WritePoseFile(folder / "a.g2o", Curve(), PoseFileFormat::kG2o);
+  WritePoseFile(folder / "a.txt", ShortCurve(), PoseFileFormat::kKitti);
+  WritePoseFile(folder / "a.g2o", ShortCurve(), PoseFileFormat::kG2o);
   EXPECT_THAT(ErrorOf([&] {
                 ReadPoseFile(folder / "a.txt", {}, {1, 2, 3});
               }),
@@ -78,7 +78,7 @@ TEST(TrajectoryFile, TimesThatDoNotFitAreRefused) {
 
 TEST(TrajectoryFile, AnotherFormatThanAskedForIsNamed) {
   const std::filesystem::path file = testing::FreshFolder() / "a.txt";
-  WritePoseFile(file, Curve(), PoseFileFormat::kKitti);
+  WritePoseFile(file, ShortCurve(), PoseFileFormat::kKitti);
   EXPECT_THAT(ErrorOf([&] { ReadPoseFile(file, PoseFileFormat::kTum); }),
               AllOf(HasSubstr("a.txt:1:"), HasSubstr("looks like the format kitti")));
 }

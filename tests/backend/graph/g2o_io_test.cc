@@ -12,11 +12,11 @@ namespace {
 
 using ::testing::HasSubstr;
 
-std::filesystem::path Write(const std::string& text) { return testing::FreshFile("graph.g2o", text); }
+std::filesystem::path GraphFile(const std::string& text) { return testing::FreshFile("graph.g2o", text); }
 
-std::string ErrorOf(const std::string& text, BadInformation bad = BadInformation::kRefuse) {
+std::string ErrorOfText(const std::string& text, BadInformation bad = BadInformation::kRefuse) {
   try {
-    ReadG2o(Write(text), bad);
+    ReadG2o(GraphFile(text), bad);
   } catch (const InputError& error) {
     return error.what();
   }
@@ -67,7 +67,7 @@ TEST(G2o, RoundTripKeepsEveryNumberOfEveryKind) {
 }
 
 TEST(G2o, ReadsTheUpperTriangleOfTheInformationByRows) {
-  const G2oFile file = ReadG2o(Write(std::string(kVertices) + "EDGE_SE2 0 1 1 0 0.1 10 2 3 20 4 30\n"));
+  const G2oFile file = ReadG2o(GraphFile(std::string(kVertices) + "EDGE_SE2 0 1 1 0 0.1 10 2 3 20 4 30\n"));
   const Matrix7d& I = file.graph.edges()[0].information;
   EXPECT_EQ(I(0, 1), 2);
   EXPECT_EQ(I(1, 0), 2);
@@ -77,7 +77,7 @@ TEST(G2o, ReadsTheUpperTriangleOfTheInformationByRows) {
 }
 
 TEST(G2o, VerticesMayBeMissing) {
-  const G2oFile file = ReadG2o(Write("EDGE_SE2 3 1 1 0 0 1 0 0 1 0 1\nEDGE_SE2 1 2 1 0 0 1 0 0 1 0 1\n"));
+  const G2oFile file = ReadG2o(GraphFile("EDGE_SE2 3 1 1 0 0 1 0 0 1 0 1\nEDGE_SE2 1 2 1 0 0 1 0 0 1 0 1\n"));
   EXPECT_FALSE(file.has_all_vertices);
   ASSERT_EQ(file.graph.nodes().size(), 3u);
   EXPECT_FALSE(file.graph.nodes()[0].has_estimate);
@@ -87,37 +87,41 @@ TEST(G2o, VerticesMayBeMissing) {
 
 TEST(G2o, UnknownTagsAreReportedOnceAndDoNotStopTheReading) {
   const G2oFile file =
-      ReadG2o(Write(std::string(kVertices) + "LANDMARK 1 2\n" + kEdge + "LANDMARK 3 4\n# comment\n"));
+      ReadG2o(GraphFile(std::string(kVertices) + "LANDMARK 1 2\n" + kEdge + "LANDMARK 3 4\n# comment\n"));
   ASSERT_EQ(file.warnings.size(), 1u);
   EXPECT_THAT(file.warnings[0], HasSubstr("graph.g2o:3: unknown tag 'LANDMARK', 2 lines ignored"));
   EXPECT_EQ(file.graph.edges().size(), 1u);
 }
 
 TEST(G2o, AcceptsWindowsLineEndsTabsAndComments) {
-  const G2oFile file =
-      ReadG2o(Write("# a graph\r\nVERTEX_SE2 0 0 0 0\r\nVERTEX_SE2\t1 1 0 0.1\r\nEDGE_SE2 0 1 1 0 0.1  1 0 0 "
-                    "1 0 1 # odometry\r\nFIX 1\r\n"));
+  const G2oFile file = ReadG2o(
+      GraphFile("# a graph\r\nVERTEX_SE2 0 0 0 0\r\nVERTEX_SE2\t1 1 0 0.1\r\nEDGE_SE2 0 1 1 0 0.1  1 0 0 "
+                "1 0 1 # odometry\r\nFIX 1\r\n"));
   EXPECT_TRUE(file.graph.Node(1).fixed);
 }
 
 TEST(G2o, DamagedFilesNameTheLine) {
   const std::string good = std::string(kVertices) + kEdge;
-  EXPECT_THAT(ErrorOf(good + "EDGE_SE2 0 1 1 0 0.1 1 0 0 1 0\n"),
+  EXPECT_THAT(ErrorOfText(good + "EDGE_SE2 0 1 1 0 0.1 1 0 0 1 0\n"),
               HasSubstr("graph.g2o:4: EDGE_SE2 has 10 numbers; 11 are needed"));
-  EXPECT_THAT(ErrorOf(good + "EDGE_SE2 0 1 1 0 zero 1 0 0 1 0 1\n"), HasSubstr(":4: 'zero' is not a number"));
-  EXPECT_THAT(ErrorOf(good + "EDGE_SE2 0 1 1 0 nan 1 0 0 1 0 1\n"), HasSubstr(":4: 'nan' is not finite"));
-  EXPECT_THAT(ErrorOf(good + "EDGE_SE2 0 1 1 0 0 1 5 0 1 0 1\n"),
+  EXPECT_THAT(ErrorOfText(good + "EDGE_SE2 0 1 1 0 zero 1 0 0 1 0 1\n"),
+              HasSubstr(":4: 'zero' is not a number"));
+  EXPECT_THAT(ErrorOfText(good + "EDGE_SE2 0 1 1 0 nan 1 0 0 1 0 1\n"), HasSubstr(":4: 'nan' is not finite"));
+  EXPECT_THAT(ErrorOfText(good + "EDGE_SE2 0 1 1 0 0 1 5 0 1 0 1\n"),
               HasSubstr(":4: its information matrix is not positive definite"));
-  EXPECT_THAT(ErrorOf(good + "EDGE_SE2 1 1 1 0 0 1 0 0 1 0 1\n"),
+  EXPECT_THAT(ErrorOfText(good + "EDGE_SE2 1 1 1 0 0 1 0 0 1 0 1\n"),
               HasSubstr(":4: the edge leads from node 1 to itself"));
-  EXPECT_THAT(ErrorOf(good + "EDGE_SE2 0 1.5 1 0 0 1 0 0 1 0 1\n"), HasSubstr(":4: '1.5' is not a node id"));
-  EXPECT_THAT(ErrorOf(good + "EDGE_SE2 0 99999999999 1 0 0 1 0 0 1 0 1\n"), HasSubstr("is not a node id"));
-  EXPECT_THAT(ErrorOf(good + "VERTEX_SE2 1 0 0 0\n"), HasSubstr(":4: vertex 1 was given before"));
-  EXPECT_THAT(ErrorOf(good + "FIX 77\n"), HasSubstr(":4: FIX names node 77"));
-  EXPECT_THAT(ErrorOf(good + "VERTEX_SE3:QUAT 5 0 0 0 0 0 0 1\n"),
+  EXPECT_THAT(ErrorOfText(good + "EDGE_SE2 0 1.5 1 0 0 1 0 0 1 0 1\n"),
+              HasSubstr(":4: '1.5' is not a node id"));
+  EXPECT_THAT(ErrorOfText(good + "EDGE_SE2 0 99999999999 1 0 0 1 0 0 1 0 1\n"),
+              HasSubstr("is not a node id"));
+  EXPECT_THAT(ErrorOfText(good + "VERTEX_SE2 1 0 0 0\n"), HasSubstr(":4: vertex 1 was given before"));
+  EXPECT_THAT(ErrorOfText(good + "FIX 77\n"), HasSubstr(":4: FIX names node 77"));
+  EXPECT_THAT(ErrorOfText(good + "VERTEX_SE3:QUAT 5 0 0 0 0 0 0 1\n"),
               HasSubstr(":4: VERTEX_SE3:QUAT in a graph of SE(2)"));
-  EXPECT_THAT(ErrorOf("VERTEX_SE3:QUAT 5 0 0 0 0 0 0 0\n"), HasSubstr(":1: the quaternion is zero"));
-  EXPECT_THAT(ErrorOf("VERTEX_SIM3:QUAT 5 0 0 0 0 0 0 1 -2\n"), HasSubstr(":1: the scale must be positive"));
+  EXPECT_THAT(ErrorOfText("VERTEX_SE3:QUAT 5 0 0 0 0 0 0 0\n"), HasSubstr(":1: the quaternion is zero"));
+  EXPECT_THAT(ErrorOfText("VERTEX_SIM3:QUAT 5 0 0 0 0 0 0 1 -2\n"),
+              HasSubstr(":1: the scale must be positive"));
 }
 
 /// A chain 0 - 1 - 2 whose second edge has eigenvalues 1, 3 and -1 (x and y are correlated too much), and a
@@ -126,18 +130,18 @@ const char* const kBadInformation =
     "EDGE_SE2 0 1 1 0 0  1 0 0 1 0 1\nEDGE_SE2 1 2 1 0 0  1 2 0 1 0 1\nEDGE_SE2 0 2 2 0 0  -1 0 0 0 0 -2\n";
 
 TEST(G2o, InformationThatIsNotPositiveDefiniteIsRefusedWithTheNumberOfEdges) {
-  const std::string error = ErrorOf(kBadInformation);
+  const std::string error = ErrorOfText(kBadInformation);
   EXPECT_THAT(error,
               HasSubstr("graph.g2o:2: its information matrix is not positive definite; it is the first "
                         "of 2 of 3 edges"));
   EXPECT_THAT(error, HasSubstr("--bad-information"));
   // What else is wrong with such an edge is not forgiven.
   const std::string overflow = "EDGE_SE2 0 1 1 0 0 1e300 0 0 1 0 1\n";
-  EXPECT_THROW(ReadG2o(Write(kBadInformation + overflow), BadInformation::kProject), InputError);
+  EXPECT_THROW(ReadG2o(GraphFile(kBadInformation + overflow), BadInformation::kProject), InputError);
 }
 
 TEST(G2o, InformationIsProjectedOnTheNearestPositiveSemidefiniteMatrix) {
-  const G2oFile file = ReadG2o(Write(kBadInformation), BadInformation::kProject);
+  const G2oFile file = ReadG2o(GraphFile(kBadInformation), BadInformation::kProject);
   EXPECT_EQ(file.bad_information, 2u);
   EXPECT_EQ(file.skipped, 1u);  // nothing of the loop is positive
   ASSERT_EQ(file.graph.edges().size(), 2u);
@@ -152,7 +156,7 @@ TEST(G2o, InformationIsProjectedOnTheNearestPositiveSemidefiniteMatrix) {
 }
 
 TEST(G2o, OfBadInformationTheDiagonalMayBeKept) {
-  const G2oFile file = ReadG2o(Write(kBadInformation), BadInformation::kDiagonal);
+  const G2oFile file = ReadG2o(GraphFile(kBadInformation), BadInformation::kDiagonal);
   ASSERT_EQ(file.graph.edges().size(), 2u);
   const Matrix7d& I = file.graph.edges()[1].information;
   EXPECT_EQ(I(0, 0), 1);
@@ -161,20 +165,20 @@ TEST(G2o, OfBadInformationTheDiagonalMayBeKept) {
 }
 
 TEST(G2o, EdgesOfBadInformationMayBeSkippedIfTheGraphHoldsTogether) {
-  const std::string bridge = ErrorOf(kBadInformation, BadInformation::kSkip);
+  const std::string bridge = ErrorOfText(kBadInformation, BadInformation::kSkip);
   EXPECT_THAT(bridge, HasSubstr("graph.g2o:2: without the 2 of 3 edges"));
   EXPECT_THAT(bridge, HasSubstr("falls into 2 pieces (before: 1)"));
   const std::string held = "EDGE_SE2 2 1 -1 0 0  1 0 0 1 0 1\n";
-  const G2oFile file = ReadG2o(Write(kBadInformation + held), BadInformation::kSkip);
+  const G2oFile file = ReadG2o(GraphFile(kBadInformation + held), BadInformation::kSkip);
   EXPECT_EQ(file.graph.edges().size(), 2u);
   EXPECT_EQ(file.skipped, 2u);
   EXPECT_THAT(file.warnings[0], HasSubstr("2 are left out"));
 }
 
 TEST(G2o, FilesThatHoldNoGraphSaySo) {
-  EXPECT_THAT(ErrorOf(""), HasSubstr("holds no edge"));
-  EXPECT_THAT(ErrorOf(std::string("\0\xff\x01garbage\n", 11)), HasSubstr("is it a g2o file?"));
-  EXPECT_THAT(ErrorOf(kVertices), HasSubstr("holds no edge"));
+  EXPECT_THAT(ErrorOfText(""), HasSubstr("holds no edge"));
+  EXPECT_THAT(ErrorOfText(std::string("\0\xff\x01garbage\n", 11)), HasSubstr("is it a g2o file?"));
+  EXPECT_THAT(ErrorOfText(kVertices), HasSubstr("holds no edge"));
   EXPECT_THROW(ReadG2o("/nonexistent/graph.g2o"), InputError);
   EXPECT_THROW(ReadG2o(testing::FreshFolder()), InputError);
 }

@@ -47,7 +47,7 @@ LoopEdge TrueLoop(const testing::SyntheticGraph& synthetic, int candidate, int q
   return loop;
 }
 
-double Error(const KeyframeCorrection& correction, const std::vector<Similarity>& truth) {
+double CorrectionError(const KeyframeCorrection& correction, const std::vector<Similarity>& truth) {
   double worst = 0;
   for (const auto& [id, pose] : correction.S_world_keyframe) {
     worst = std::max(worst, (pose.translation - truth[static_cast<std::size_t>(id)].translation).norm());
@@ -68,14 +68,14 @@ TEST(KeyframeGraph, ATrueLoopPullsTheTrajectoryTogether) {
   for (GraphKind kind : {GraphKind::kSE3, GraphKind::kSim3}) {
     const auto synthetic = Drifting(kind);
     const KeyframeGraph graph = FromOdometry(synthetic, kind);
-    const double before = Error(graph.Optimize({}), synthetic.truth);
+    const double before = CorrectionError(graph.Optimize({}), synthetic.truth);
     const KeyframeCorrection correction =
         graph.Optimize({TrueLoop(synthetic, 5, 105), TrueLoop(synthetic, 90, 190)});
     EXPECT_TRUE(correction.success);
     ASSERT_EQ(correction.loops.size(), 2u);
     EXPECT_FALSE(correction.loops[0].down_weighted);
     EXPECT_FALSE(correction.loops[1].down_weighted);
-    EXPECT_LT(Error(correction, synthetic.truth), 0.8 * before) << ToString(kind);
+    EXPECT_LT(CorrectionError(correction, synthetic.truth), 0.8 * before) << ToString(kind);
   }
 }
 
@@ -99,14 +99,14 @@ TEST(KeyframeGraph, AFalseLoopIsReportedAndDoesLittleHarm) {
   const auto synthetic = Drifting(GraphKind::kSE3);
   const KeyframeGraph graph = FromOdometry(synthetic, GraphKind::kSE3);
   const LoopEdge good = TrueLoop(synthetic, 5, 105);
-  const double error = Error(graph.Optimize({good}), synthetic.truth);
+  const double error = CorrectionError(graph.Optimize({good}), synthetic.truth);
   LoopEdge wrong = TrueLoop(synthetic, 20, 50);
   wrong.S_candidate_query = Similarity(1, ExpSO3({0, 0, 0.3}), {0.5, 0, 0});  // they are 40 m apart
   const KeyframeCorrection correction = graph.Optimize({good, wrong});
   EXPECT_FALSE(correction.loops[0].down_weighted);
   EXPECT_TRUE(correction.loops[1].down_weighted);
   EXPECT_LT(correction.loops[1].weight, 0.01);
-  EXPECT_LT(Error(correction, synthetic.truth), 1.1 * error + 0.05);
+  EXPECT_LT(CorrectionError(correction, synthetic.truth), 1.1 * error + 0.05);
 }
 
 // The second round was mapped after tracking was lost, in a frame of reference of its own (mono: and a scale
@@ -143,7 +143,7 @@ TEST(KeyframeGraph, ALoopJoinsTwoMapPieces) {
     const KeyframeCorrection correction = graph.Optimize({pieces.loop});
     EXPECT_TRUE(correction.success);
     EXPECT_EQ(correction.merges, (std::map<int, int>{{1, 0}}));
-    EXPECT_LT(Error(correction, pieces.synthetic.truth), 1e-4) << ToString(kind);
+    EXPECT_LT(CorrectionError(correction, pieces.synthetic.truth), 1e-4) << ToString(kind);
     EXPECT_NEAR(correction.S_world_keyframe.at(100).scale, 1.0 / pieces.scale, 1e-6);
   }
 }

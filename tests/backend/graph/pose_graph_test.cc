@@ -16,7 +16,7 @@ PoseGraph TwoNodes() {
   return graph;
 }
 
-std::string ErrorOf(PoseGraph& graph, const PoseGraphEdge& edge) {
+std::string ErrorOfEdge(PoseGraph& graph, const PoseGraphEdge& edge) {
   try {
     graph.AddEdge(edge);
   } catch (const InputError& error) {
@@ -49,18 +49,18 @@ TEST(PoseGraph, RefusesPosesThatAreNotFinite) {
 TEST(PoseGraph, RefusesEdgesThatAreNotUsableAndNamesThem) {
   PoseGraph graph = TwoNodes();
   PoseGraphEdge edge{3, 8, Similarity(), Matrix7d::Identity(), EdgeKind::kLoop};
-  EXPECT_NE(ErrorOf(graph, edge).find("edge 3 -> 8: there is no node 8"), std::string::npos);
+  EXPECT_NE(ErrorOfEdge(graph, edge).find("edge 3 -> 8: there is no node 8"), std::string::npos);
   edge.to = 3;
-  EXPECT_NE(ErrorOf(graph, edge).find("to itself"), std::string::npos);
+  EXPECT_NE(ErrorOfEdge(graph, edge).find("to itself"), std::string::npos);
   edge.to = 7;
   edge.information(0, 0) = -1;
-  EXPECT_NE(ErrorOf(graph, edge).find("not positive definite"), std::string::npos);
+  EXPECT_NE(ErrorOfEdge(graph, edge).find("not positive definite"), std::string::npos);
   edge.information.setIdentity();
   edge.information(0, 1) = 0.5;
-  EXPECT_NE(ErrorOf(graph, edge).find("not symmetric"), std::string::npos);
+  EXPECT_NE(ErrorOfEdge(graph, edge).find("not symmetric"), std::string::npos);
   edge.information.setIdentity();
   edge.measurement.scale = 0;
-  EXPECT_NE(ErrorOf(graph, edge).find("not finite"), std::string::npos);
+  EXPECT_NE(ErrorOfEdge(graph, edge).find("not finite"), std::string::npos);
   EXPECT_TRUE(graph.edges().empty());
 }
 

@@ -10,7 +10,7 @@ namespace {
 using internal::GraphProblem;
 using internal::LeaveOneOut;
 
-PoseGraph Solved(GraphKind kind) {
+PoseGraph SolvedGraph(GraphKind kind) {
   PoseGraph graph = testing::MakeSyntheticGraph(testing::NoisyOptions(kind, 0.02, 0.004)).graph;
   PoseGraphOptimizer().Optimize(graph);
   return graph;
@@ -45,9 +45,9 @@ void ExpectTheFallOfTheCost(const PoseGraph& graph) {
 }
 
 TEST(LeaveOneOut, IsWhatTheCostFallsByWhenTheEdgeLeaves) {
-  ExpectTheFallOfTheCost<3>(Solved(testing::kGraphKinds[0]));
-  ExpectTheFallOfTheCost<6>(Solved(testing::kGraphKinds[1]));
-  ExpectTheFallOfTheCost<7>(Solved(testing::kGraphKinds[2]));
+  ExpectTheFallOfTheCost<3>(SolvedGraph(testing::kGraphKinds[0]));
+  ExpectTheFallOfTheCost<6>(SolvedGraph(testing::kGraphKinds[1]));
+  ExpectTheFallOfTheCost<7>(SolvedGraph(testing::kGraphKinds[2]));
 }
 
 TEST(LeaveOneOut, IsZeroForAnEdgeThatAloneHoldsItsEnds) {

@@ -12,7 +12,7 @@ PoseGraph NoisyGraph(GraphKind kind) {
   return testing::MakeSyntheticGraph(testing::NoisyOptions(kind, 0.02, 0.01)).graph;
 }
 
-PoseGraph Moved(const PoseGraph& graph, const Similarity& shift) {
+PoseGraph MovedGraph(const PoseGraph& graph, const Similarity& shift) {
   PoseGraph out = graph;
   for (const PoseGraphNode& node : graph.nodes()) out.SetPose(node.id, shift * node.pose);
   return out;
@@ -33,9 +33,9 @@ TEST(PoseGraphNumerics, TheOptimumDoesNotDependOnWhereTheGraphLies) {
   for (const GraphKind kind : testing::kGraphKinds) {
     PoseGraph graph = NoisyGraph(kind);
     const bool planar = kind == GraphKind::kSE2;
-    PoseGraph moved =
-        Moved(graph, Similarity(1, ExpSO3(planar ? Eigen::Vector3d(0, 0, 2) : Eigen::Vector3d(0.3, -1, 2)),
-                                {1e3, -500, planar ? 0.0 : 77.0}));
+    PoseGraph moved = MovedGraph(
+        graph, Similarity(1, ExpSO3(planar ? Eigen::Vector3d(0, 0, 2) : Eigen::Vector3d(0.3, -1, 2)),
+                          {1e3, -500, planar ? 0.0 : 77.0}));
     const double objective = PoseGraphOptimizer().Optimize(graph).objective;
     EXPECT_NEAR(PoseGraphOptimizer().Optimize(moved).objective, objective, 1e-8 * objective)
         << ToString(kind);
@@ -49,7 +49,7 @@ TEST(PoseGraphNumerics, AMillionMetresFromTheOriginTheOptimumIsAsExactAsThere) {
       PoseGraph graph = NoisyGraph(kind);
       const Similarity shift(1, Eigen::Quaterniond::Identity(),
                              {1e6, -1e6, kind == GraphKind::kSE2 ? 0 : 1e6});
-      PoseGraph far = Moved(graph, shift);
+      PoseGraph far = MovedGraph(graph, shift);
       PoseGraphOptions options;
       options.init = init;
       const double objective = PoseGraphOptimizer(options).Optimize(graph).objective;

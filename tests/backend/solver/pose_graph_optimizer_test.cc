@@ -13,7 +13,7 @@ using testing::PositionError;
 using testing::SyntheticGraph;
 using testing::SyntheticGraphOptions;
 
-SyntheticGraphOptions Noisy(GraphKind kind) { return testing::NoisyOptions(kind, 0.02, 0.01); }
+SyntheticGraphOptions NoisyGraphOptions(GraphKind kind) { return testing::NoisyOptions(kind, 0.02, 0.01); }
 
 TEST(PoseGraphOptimizer, ReturnsToTheTruthFromPerturbedPosesForEveryKind) {
   for (GraphKind kind : {GraphKind::kSE2, GraphKind::kSE3, GraphKind::kSim3}) {
@@ -36,7 +36,7 @@ TEST(PoseGraphOptimizer, ReturnsToTheTruthFromPerturbedPosesForEveryKind) {
 
 TEST(PoseGraphOptimizer, LoopsRemoveTheDriftOfTheOdometry) {
   for (GraphKind kind : {GraphKind::kSE2, GraphKind::kSE3, GraphKind::kSim3}) {
-    SyntheticGraph synthetic = MakeSyntheticGraph(Noisy(kind));
+    SyntheticGraph synthetic = MakeSyntheticGraph(NoisyGraphOptions(kind));
     const double before = PositionError(synthetic.graph, synthetic.truth);
     const PoseGraphReport report = PoseGraphOptimizer().Optimize(synthetic.graph);
     EXPECT_TRUE(report.success);
@@ -49,7 +49,7 @@ TEST(PoseGraphOptimizer, StopsWhenItIsAskedToAndThePosesStay) {
   for (const GraphKind kind : testing::kGraphKinds) {
     for (const PoseGraphSolver solver : {PoseGraphSolver::kCeres, PoseGraphSolver::kBlock}) {
       for (const GraphInit init : {GraphInit::kFile, GraphInit::kChordal}) {
-        PoseGraph graph = MakeSyntheticGraph(Noisy(kind)).graph;
+        PoseGraph graph = MakeSyntheticGraph(NoisyGraphOptions(kind)).graph;
         const std::map<int, Similarity> before = graph.Poses();
         PoseGraphOptions options;
         options.solver = solver;
@@ -69,16 +69,16 @@ TEST(PoseGraphOptimizer, StopsWhenItIsAskedToAndThePosesStay) {
 }
 
 TEST(PoseGraphOptimizer, AskingWhetherToStopChangesNothing) {
-  PoseGraph asked = MakeSyntheticGraph(Noisy(GraphKind::kSE3)).graph, plain = asked;
+  PoseGraph asked = MakeSyntheticGraph(NoisyGraphOptions(GraphKind::kSE3)).graph, plain = asked;
   PoseGraphOptimizer().Optimize(asked, [] { return false; });
   PoseGraphOptimizer().Optimize(plain);
-  EXPECT_EQ(PositionError(asked, MakeSyntheticGraph(Noisy(GraphKind::kSE3)).truth),
-            PositionError(plain, MakeSyntheticGraph(Noisy(GraphKind::kSE3)).truth));
+  EXPECT_EQ(PositionError(asked, MakeSyntheticGraph(NoisyGraphOptions(GraphKind::kSE3)).truth),
+            PositionError(plain, MakeSyntheticGraph(NoisyGraphOptions(GraphKind::kSE3)).truth));
 }
 
 TEST(PoseGraphOptimizer, TheChordalStartIsTriedAtItsRelaxationAndAtItsOptimum) {
   for (GraphKind kind : {GraphKind::kSE2, GraphKind::kSE3, GraphKind::kSim3}) {
-    PoseGraph graph = MakeSyntheticGraph(Noisy(kind)).graph;
+    PoseGraph graph = MakeSyntheticGraph(NoisyGraphOptions(kind)).graph;
     PoseGraphOptions options;
     options.init = GraphInit::kChordal;
     const PoseGraphReport report = PoseGraphOptimizer(options).Optimize(graph);
@@ -99,7 +99,7 @@ TEST(PoseGraphOptimizer, TheChordalStartIsTriedAtItsRelaxationAndAtItsOptimum) {
 }
 
 TEST(PoseGraphOptimizer, ARobustLossHasOneStart) {
-  PoseGraph graph = MakeSyntheticGraph(Noisy(GraphKind::kSE3)).graph;
+  PoseGraph graph = MakeSyntheticGraph(NoisyGraphOptions(GraphKind::kSE3)).graph;
   PoseGraphOptions options;
   options.init = GraphInit::kChordal;
   options.robust = RobustLoss::kGnc;
@@ -169,7 +169,7 @@ TEST(PoseGraphOptimizer, AnchorsDisconnectedPartsAndReportsThem) {
 }
 
 TEST(PoseGraphOptimizer, FixedNodesDoNotMove) {
-  SyntheticGraph synthetic = MakeSyntheticGraph(Noisy(GraphKind::kSE3));
+  SyntheticGraph synthetic = MakeSyntheticGraph(NoisyGraphOptions(GraphKind::kSE3));
   synthetic.graph.SetFixed(30, true);
   synthetic.graph.SetFixed(50, true);
   const Similarity a = synthetic.graph.Node(30).pose, b = synthetic.graph.Node(50).pose,
@@ -182,7 +182,7 @@ TEST(PoseGraphOptimizer, FixedNodesDoNotMove) {
 
 TEST(PoseGraphOptimizer, RobustLossesRejectPlantedFalseLoops) {
   for (GraphKind kind : {GraphKind::kSE2, GraphKind::kSE3, GraphKind::kSim3}) {
-    SyntheticGraphOptions options = Noisy(kind);
+    SyntheticGraphOptions options = NoisyGraphOptions(kind);
     SyntheticGraph clean = MakeSyntheticGraph(options);
     PoseGraphOptimizer().Optimize(clean.graph);
     options.false_loops = 20;
@@ -207,7 +207,7 @@ TEST(PoseGraphOptimizer, RobustLossesRejectPlantedFalseLoops) {
 }
 
 TEST(PoseGraphOptimizer, SwitchableConstraintsSwitchAFewFalseLoopsOff) {
-  SyntheticGraphOptions options = Noisy(GraphKind::kSE3);
+  SyntheticGraphOptions options = NoisyGraphOptions(GraphKind::kSE3);
   SyntheticGraph clean = MakeSyntheticGraph(options);
   PoseGraphOptimizer().Optimize(clean.graph);
   options.false_loops = 3;
@@ -222,7 +222,7 @@ TEST(PoseGraphOptimizer, SwitchableConstraintsSwitchAFewFalseLoopsOff) {
 
 TEST(PoseGraphOptimizer, PairwiseConsistencyKeepsTheTrueLoopsOnly) {
   for (GraphKind kind : {GraphKind::kSE2, GraphKind::kSE3}) {
-    SyntheticGraphOptions options = Noisy(kind);
+    SyntheticGraphOptions options = NoisyGraphOptions(kind);
     options.noise_rotation = 0.002;
     options.false_loops = 20;
     SyntheticGraph spoiled = MakeSyntheticGraph(options);
@@ -235,7 +235,7 @@ TEST(PoseGraphOptimizer, PairwiseConsistencyKeepsTheTrueLoopsOnly) {
 }
 
 TEST(PoseGraphOptimizer, TheSigmaTestTakesOutWhatHuberLeavesAndBringsTrueLoopsBack) {
-  SyntheticGraphOptions options = Noisy(GraphKind::kSE3);
+  SyntheticGraphOptions options = NoisyGraphOptions(GraphKind::kSE3);
   SyntheticGraph synthetic = MakeSyntheticGraph(options);
   const Similarity wrong = synthetic.truth[10].Inverse() * synthetic.truth[70] *
                            Similarity(1, Eigen::Quaterniond::Identity(), {0, 0, 0.5});
@@ -275,7 +275,7 @@ TEST(PoseGraphOptimizer, AThresholdThatIsTooWideForTheGraphIsBroughtDown) {
 }
 
 TEST(PoseGraphOptimizer, HuberIsLessSpoiledByAWrongLoopThanLeastSquares) {
-  const SyntheticGraph synthetic = MakeSyntheticGraph(Noisy(GraphKind::kSE3));
+  const SyntheticGraph synthetic = MakeSyntheticGraph(NoisyGraphOptions(GraphKind::kSE3));
   PoseGraph clean = synthetic.graph, plain = synthetic.graph;
   const Similarity wrong = synthetic.truth[10].Inverse() * synthetic.truth[70] *
                            Similarity(1, Eigen::Quaterniond::Identity(), {0, 0, 2});
@@ -317,7 +317,7 @@ TEST(PoseGraphOptimizer, DuplicateEdgesCountTwice) {
 }
 
 TEST(PoseGraphOptimizer, SameInputGivesTheSameBits) {
-  SyntheticGraphOptions options = Noisy(GraphKind::kSim3);
+  SyntheticGraphOptions options = NoisyGraphOptions(GraphKind::kSim3);
   options.false_loops = 5;
   PoseGraphOptions solver;
   solver.robust = RobustLoss::kGnc;

@@ -13,7 +13,7 @@
 namespace tutti {
 namespace {
 
-testing::SyntheticGraph Noisy(GraphKind kind, double noise = 0.02) {
+testing::SyntheticGraph NoisyGraphOf(GraphKind kind, double noise = 0.02) {
   testing::SyntheticGraphOptions options;
   options.kind = kind;
   options.noise_translation = options.noise_rotation = noise;
@@ -22,7 +22,7 @@ testing::SyntheticGraph Noisy(GraphKind kind, double noise = 0.02) {
 
 TEST(Certificate, ProvesTheOptimumOfAGraphWithModerateNoise) {
   for (GraphKind kind : {GraphKind::kSE2, GraphKind::kSE3}) {
-    PoseGraph graph = Noisy(kind).graph;
+    PoseGraph graph = NoisyGraphOf(kind).graph;
     PoseGraphOptimizer().Optimize(graph);
     const Certificate certificate = CertifyOptimum(graph);
     EXPECT_TRUE(certificate.available) << certificate.reason;
@@ -34,7 +34,7 @@ TEST(Certificate, ProvesTheOptimumOfAGraphWithModerateNoise) {
 }
 
 TEST(Certificate, IsNotAvailableIfTheCallerStopsIt) {
-  const PoseGraph graph = Noisy(GraphKind::kSE3).graph;
+  const PoseGraph graph = NoisyGraphOf(GraphKind::kSE3).graph;
   for (const int when : {1, 4}) {
     int asked = 0;
     const Certificate certificate = CertifyOptimum(graph, {}, {}, [&] { return ++asked >= when; });
@@ -69,7 +69,7 @@ TEST(Certificate, HoldsForGraphsWithoutNoiseAndForSeveralParts) {
   testing::SyntheticGraphOptions options;
   PoseGraph exact = testing::MakeSyntheticGraph(options).graph;
   EXPECT_TRUE(CertifyOptimum(exact).certified);
-  PoseGraph parts = Noisy(GraphKind::kSE3).graph;
+  PoseGraph parts = NoisyGraphOf(GraphKind::kSE3).graph;
   for (int id = 500; id < 504; ++id) parts.AddNode(id, Pose());
   for (int id = 500; id < 503; ++id) {
     parts.AddOdometry(id, id + 1, Similarity(1, ExpSO3({0.1, 0, 0}), {1, 0, 0}), MakeInformation(0.1, 0.1));
@@ -80,8 +80,8 @@ TEST(Certificate, HoldsForGraphsWithoutNoiseAndForSeveralParts) {
 
 TEST(Certificate, SaysWhyThereIsNone) {
   EXPECT_FALSE(CertifyOptimum(PoseGraph()).available);
-  EXPECT_NE(CertifyOptimum(Noisy(GraphKind::kSim3).graph).reason.find("scale"), std::string::npos);
-  PoseGraph fixed = Noisy(GraphKind::kSE3).graph;
+  EXPECT_NE(CertifyOptimum(NoisyGraphOf(GraphKind::kSim3).graph).reason.find("scale"), std::string::npos);
+  PoseGraph fixed = NoisyGraphOf(GraphKind::kSE3).graph;
   fixed.SetFixed(0, true);
   EXPECT_TRUE(CertifyOptimum(fixed).available);
   fixed.SetFixed(7, true);

@@ -6,7 +6,7 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "data/synthetic/synthetic_world.h"
+#include "tests/support/rendered_world.h"
 #include "tests/support/test_data.h"
 
 namespace tutti {
@@ -28,7 +28,7 @@ const Town& StereoTown() {
     options.height = 240;
     options.supersample = 1;
     options.frames = 40;
-    const SyntheticWorld world(options);
+    const testing::RenderedWorld world(options);
     Town out;
     out.rig.sensor = Sensor::kStereo;
     out.rig.camera = world.Camera();

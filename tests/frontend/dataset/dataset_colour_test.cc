@@ -26,7 +26,7 @@ cv::Mat Colourful(int number) {
   return image;
 }
 
-DatasetOptions Options() {
+DatasetOptions ColourOptions() {
   DatasetOptions options;
   options.camera = testing::SmallCamera();
   return options;
@@ -41,7 +41,7 @@ fs::path FolderOfThree() {
 double Difference(const cv::Mat& a, const cv::Mat& b) { return cv::norm(a, b, cv::NORM_INF); }
 
 TEST(ReadColour, HasTheColoursOfTheFile) {
-  const auto dataset = OpenDataset(FolderOfThree(), Options());
+  const auto dataset = OpenDataset(FolderOfThree(), ColourOptions());
   for (int i = 0; i < 3; ++i) {
     const ColourImage read = dataset->ReadColour(static_cast<std::size_t>(i));
     ASSERT_EQ(read.error, "");
@@ -50,7 +50,7 @@ TEST(ReadColour, HasTheColoursOfTheFile) {
 }
 
 TEST(ReadColour, IsRectifiedAsTheGreyImageIs) {
-  DatasetOptions options = Options();
+  DatasetOptions options = ColourOptions();
   options.camera->distortion = Distortion::kRadTan;
   options.camera->coefficients = {-0.3, 0.1, 0, 0, 0};
   const auto dataset = OpenDataset(FolderOfThree(), options);
@@ -62,7 +62,7 @@ TEST(ReadColour, IsRectifiedAsTheGreyImageIs) {
 }
 
 TEST(ReadColour, OfPartsOfADataSetIsThatOfTheirFramesWithoutNoise) {
-  DatasetOptions options = Options();
+  DatasetOptions options = ColourOptions();
   options.start = 1;
   options.noise = 20;
   const auto dataset = OpenDataset(FolderOfThree(), options);
@@ -72,7 +72,7 @@ TEST(ReadColour, OfPartsOfADataSetIsThatOfTheirFramesWithoutNoise) {
 TEST(ReadColour, OfGreyImagesIsGrey) {
   const fs::path folder = testing::FreshFolder();
   testing::WriteImage(folder / "0.png", testing::Picture(64, 48, 3));
-  const ColourImage read = OpenDataset(folder, Options())->ReadColour(0);
+  const ColourImage read = OpenDataset(folder, ColourOptions())->ReadColour(0);
   cv::Mat expected;
   cv::cvtColor(testing::Picture(64, 48, 3), expected, cv::COLOR_GRAY2BGR);
   EXPECT_EQ(Difference(read.image, expected), 0.0);
@@ -80,7 +80,7 @@ TEST(ReadColour, OfGreyImagesIsGrey) {
 
 TEST(ReadColour, WhatIsWrongIsSaid) {
   const fs::path folder = FolderOfThree();
-  const auto dataset = OpenDataset(folder, Options());
+  const auto dataset = OpenDataset(folder, ColourOptions());
   testing::Truncate(folder / "1.png", 0.5);
   testing::WriteImage(folder / "2.png", cv::Mat(20, 20, CV_8UC3, cv::Scalar(1, 2, 3)));
   EXPECT_THAT(dataset->ReadColour(1).error, HasSubstr("1.png: is truncated"));
@@ -97,7 +97,7 @@ TEST(ReadColour, OfAVideoInAnyOrder) {
   ASSERT_TRUE(writer.isOpened());
   for (int i = 0; i < 6; ++i) writer.write(Colourful(i));
   writer.release();
-  const auto dataset = OpenDataset(file, Options());
+  const auto dataset = OpenDataset(file, ColourOptions());
   for (const int i : {4, 1, 5, 0}) {
     const ColourImage read = dataset->ReadColour(static_cast<std::size_t>(i));
     ASSERT_EQ(read.error, "") << i;

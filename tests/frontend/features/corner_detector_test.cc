@@ -1,4 +1,5 @@
 #include "frontend/features/corner_detector.h"
+#include "tests/support/rendered_world.h"
 
 #include <gtest/gtest.h>
 
@@ -8,18 +9,16 @@
 #include <opencv2/imgproc.hpp>
 #include <tuple>
 
-#include "data/synthetic/synthetic_world.h"
-
 namespace tutti {
 namespace {
 
 constexpr int kBorder = 19;
 
-cv::Mat Town(int frame) {
+cv::Mat TownImage(int frame) {
   SyntheticOptions options;
   options.width = 480;
   options.height = 240;
-  return SyntheticWorld(options).Render(frame).image;
+  return testing::RenderedWorld(options).Render(frame).image;
 }
 
 // Strong texture at the left, weak in the middle, none at the right.
@@ -75,7 +74,7 @@ std::vector<cv::KeyPoint> ByTheBook(const cv::Mat& image, const CornerOptions& o
   return out;
 }
 
-void ExpectSame(const std::vector<cv::KeyPoint>& found, const std::vector<cv::KeyPoint>& expected) {
+void ExpectSameCorners(const std::vector<cv::KeyPoint>& found, const std::vector<cv::KeyPoint>& expected) {
   ASSERT_EQ(found.size(), expected.size());
   for (std::size_t i = 0; i < found.size(); ++i) {
     EXPECT_EQ(found[i].pt, expected[i].pt) << i;
@@ -86,11 +85,11 @@ void ExpectSame(const std::vector<cv::KeyPoint>& found, const std::vector<cv::Ke
 TEST(CornerDetector, FindsWhatAllCornersSortedAndSpreadWouldBe) {
   int several = 0;
   for (const int seed : {1, 2, 3}) {
-    for (const cv::Mat& image : {Uneven(seed), Town(seed)}) {
+    for (const cv::Mat& image : {Uneven(seed), TownImage(seed)}) {
       for (const int wanted : {0, 1, 30, 150, 400, 1500}) {
         const CornerOptions options{wanted, 20, 7, kBorder};
         const std::vector<cv::KeyPoint> found = DetectCorners(image, options);
-        ExpectSame(found, ByTheBook(image, options));
+        ExpectSameCorners(found, ByTheBook(image, options));
         several += found.size() > 20 ? 1 : 0;
       }
     }
@@ -113,7 +112,7 @@ TEST(CornerDetector, WeakCornersOnlyWhereACellHasNothingElse) {
 
 TEST(CornerDetector, OneThresholdIsEnough) {
   const CornerOptions options{100, 20, 20, kBorder};
-  ExpectSame(DetectCorners(Uneven(2), options), ByTheBook(Uneven(2), options));
+  ExpectSameCorners(DetectCorners(Uneven(2), options), ByTheBook(Uneven(2), options));
 }
 
 TEST(CornerDetector, NothingInImagesThatAreBlankOrSmall) {

@@ -1,4 +1,5 @@
 #include "frontend/features/features.h"
+#include "tests/support/rendered_world.h"
 
 #include <gtest/gtest.h>
 
@@ -7,16 +8,14 @@
 #include <limits>
 #include <opencv2/imgproc.hpp>
 
-#include "data/synthetic/synthetic_world.h"
-
 namespace tutti {
 namespace {
 
-cv::Mat Town() {
+cv::Mat StreetImage() {
   SyntheticOptions options;
   options.width = 480;
   options.height = 240;
-  return SyntheticWorld(options).Render(3).image;
+  return testing::RenderedWorld(options).Render(3).image;
 }
 
 FrameFeatures Detect(const cv::Mat& image, const OdometryOptions& options = {}) {
@@ -73,7 +72,7 @@ TEST(FrameFeatures, ImagesTooSmallForADescriptorHaveNone) {
 }
 
 TEST(FrameFeatures, NumberIsWhatWasAskedForAndEveryPartOfTheImageHasSome) {
-  const cv::Mat image = Town();
+  const cv::Mat image = StreetImage();
   OdometryOptions options;
   options.features = 800;
   const FrameFeatures features = Detect(image, options);
@@ -95,7 +94,7 @@ TEST(FrameFeatures, NumberIsWhatWasAskedForAndEveryPartOfTheImageHasSome) {
 }
 
 TEST(FrameFeatures, SameImageGivesTheSameBits) {
-  const cv::Mat image = Town();
+  const cv::Mat image = StreetImage();
   const FrameFeatures a = Detect(image), b = Detect(image.clone());
   ASSERT_EQ(a.size(), b.size());
   for (std::size_t i = 0; i < a.size(); ++i) {
@@ -139,7 +138,7 @@ TEST(FrameFeatures, PyramidLevelsHaveNoOffset) {
 }
 
 TEST(FrameFeatures, AreaSearchFindsWhatLooksAtEveryFeatureFind) {
-  const FrameFeatures features = Detect(Town());
+  const FrameFeatures features = Detect(StreetImage());
   cv::RNG rng(5);
   std::vector<int> found;
   for (int trial = 0; trial < 200; ++trial) {

@@ -34,7 +34,7 @@ FrameFeatures Frame(const cv::Mat& image, const Eigen::Vector2d& at) {
 }
 
 // The texture under p -> a p + t.
-cv::Mat Moved(const cv::Mat& image, double a, const Eigen::Vector2d& t) {
+cv::Mat MovedImage(const cv::Mat& image, double a, const Eigen::Vector2d& t) {
   const cv::Matx23d m(a, 0, t.x(), 0, a, t.y());
   cv::Mat out;
   cv::warpAffine(image, out, m, image.size(), cv::INTER_CUBIC, cv::BORDER_REFLECT);
@@ -45,7 +45,7 @@ TEST(PatchAligner, FindsAShiftToATenthOfAPixel) {
   const auto patch = CutPatch(kCamera, Frame(Texture(), kPoint), 0);
   ASSERT_NE(patch, nullptr);
   const Eigen::Vector2d shift(3.4, -1.7), truth = kPoint + shift;
-  const FrameFeatures frame = Frame(Moved(Texture(), 1, shift), truth);
+  const FrameFeatures frame = Frame(MovedImage(Texture(), 1, shift), truth);
   const auto found =
       AlignPatch(*patch, frame, Eigen::Matrix2d::Identity(), truth + Eigen::Vector2d(1.0, -0.8));
   ASSERT_TRUE(found.has_value());
@@ -56,7 +56,7 @@ TEST(PatchAligner, FindsAPointThatCameNearerUnderOtherLight) {
   const auto patch = CutPatch(kCamera, Frame(Texture(), kPoint), 0);
   const double zoom = 1.3;
   const Eigen::Vector2d shift(-80, -60), truth = zoom * kPoint + shift;
-  cv::Mat image = Moved(Texture(), zoom, shift);
+  cv::Mat image = MovedImage(Texture(), zoom, shift);
   image.convertTo(image, -1, 0.7, 30);
   const auto found = AlignPatch(*patch, Frame(image, truth), Eigen::Matrix2d::Identity() * zoom,
                                 truth + Eigen::Vector2d(0.7, 0.7));
@@ -85,7 +85,7 @@ TEST(PatchAligner, FindsThePointOfTwoFeaturesThatLookAlike) {
   const Eigen::Vector3d in_a = 5.0 * kCamera.Unproject(kPoint);
   const Eigen::Vector2d truth = kCamera.Project(T_b_a * in_a);
   const FrameFeatures a = Frame(Texture(), kPoint);
-  const cv::Mat image = Moved(Texture(), 1, truth - kPoint);
+  const cv::Mat image = MovedImage(Texture(), 1, truth - kPoint);
   const FrameFeatures b = Frame(image, truth + Eigen::Vector2d(1.1, 0.6));
   const auto found = FindPoint(kCamera, a, 0, b, 0, T_b_a, in_a);
   ASSERT_TRUE(found.has_value());
@@ -104,7 +104,8 @@ TEST(PatchAligner, MovesTheKeypointsOfLandmarksAndTrustsThemMore) {
   const Eigen::Vector3d position = 5.0 * kCamera.Unproject(kPoint);
   const int landmark = map.AddLandmark(position, 0, 0);
   const Eigen::Vector2d truth = kCamera.Project(T_world_second.Inverse() * position);
-  const FrameFeatures frame = Frame(Moved(Texture(), 1, truth - kPoint), truth + Eigen::Vector2d(1.1, 0.6));
+  const FrameFeatures frame =
+      Frame(MovedImage(Texture(), 1, truth - kPoint), truth + Eigen::Vector2d(1.1, 0.6));
   const auto moved = AlignFeatures(map, kCamera, T_world_second.Inverse(), {landmark}, frame);
   ASSERT_NE(moved, nullptr);
   const cv::Point2f& at = moved->keypoints[0].pt;

@@ -11,7 +11,7 @@
 namespace tutti {
 namespace {
 
-CameraRig Rig(int width, int height) {
+CameraRig StereoRig(int width, int height) {
   CameraRig rig;
   rig.sensor = Sensor::kStereo;
   rig.camera.width = width;
@@ -96,7 +96,7 @@ std::vector<double> DisparityErrors(const FrameFeatures& features, const CameraR
 }
 
 TEST(StereoMatcher, FlatSurfaceHasItsSubPixelDisparity) {
-  const CameraRig rig = Rig(480, 240);
+  const CameraRig rig = StereoRig(480, 240);
   const cv::Mat left = LeftView(480, 240);
   for (const double disparity : {3.0, 7.3, 20.5}) {
     const auto errors =
@@ -108,7 +108,7 @@ TEST(StereoMatcher, FlatSurfaceHasItsSubPixelDisparity) {
 }
 
 TEST(StereoMatcher, SlantedSurfaceHasTheDisparityOfTheKeypointItself) {
-  const CameraRig rig = Rig(480, 240);
+  const CameraRig rig = StereoRig(480, 240);
   const cv::Mat left = LeftView(480, 240);
   // The ground under a car (shear), walls on both sides of the way (stretch).
   for (const auto& [dx, dy] : {std::pair{0.0, 0.25}, {0.08, 0.0}, {-0.08, 0.0}}) {
@@ -180,14 +180,14 @@ TEST(StereoMatcher, DisparityIsUnbiasedOnEveryPyramidLevelOfTheTown) {
 }
 
 TEST(StereoMatcher, RowErrorTellsOfABadRectification) {
-  const CameraRig rig = Rig(480, 240);
+  const CameraRig rig = StereoRig(480, 240);
   const cv::Mat left = LeftView(480, 240);
   EXPECT_LT(Extract(rig, left, RightView(480, 240, 7.3, 0, 0)).row_error_px, 0.05);
   EXPECT_NEAR(Extract(rig, left, RightView(480, 240, 7.3, 0, 0, 0.7)).row_error_px, 0.7, 0.1);
 }
 
 TEST(StereoMatcher, BrightnessOfTheCamerasMayDiffer) {
-  const CameraRig rig = Rig(480, 240);
+  const CameraRig rig = StereoRig(480, 240);
   const cv::Mat left = LeftView(480, 240) * 0.8;
   const cv::Mat right = RightView(480, 240, 7.3, 0, 0) * 0.8 + cv::Scalar(25);
   const auto errors = DisparityErrors(Extract(rig, left, right), rig, 7.3, 0, 0);
@@ -196,7 +196,7 @@ TEST(StereoMatcher, BrightnessOfTheCamerasMayDiffer) {
 }
 
 TEST(StereoMatcher, ViewsOfDifferentPlacesHaveHardlyAMatch) {
-  const CameraRig rig = Rig(480, 240);
+  const CameraRig rig = StereoRig(480, 240);
   const cv::Mat left = LeftView(480, 240);
   cv::Mat other;
   cv::rotate(left, other, cv::ROTATE_180);
@@ -206,7 +206,7 @@ TEST(StereoMatcher, ViewsOfDifferentPlacesHaveHardlyAMatch) {
 }
 
 TEST(StereoMatcher, BlankOrTinyRightImageGivesFeaturesWithoutDepth) {
-  const CameraRig rig = Rig(480, 240);
+  const CameraRig rig = StereoRig(480, 240);
   const cv::Mat left = LeftView(480, 240);
   for (const int grey : {0, 128, 255}) {
     const FrameFeatures features = Extract(rig, left, cv::Mat(left.size(), CV_8UC1, cv::Scalar(grey)));
@@ -217,7 +217,7 @@ TEST(StereoMatcher, BlankOrTinyRightImageGivesFeaturesWithoutDepth) {
   }
   for (const int side : {1, 20, 39, 50}) {
     const cv::Mat small = LeftView(side, side);
-    EXPECT_LT(Extract(Rig(side, side), small, small).size(), 100U) << side;
+    EXPECT_LT(Extract(StereoRig(side, side), small, small).size(), 100U) << side;
   }
 }
 

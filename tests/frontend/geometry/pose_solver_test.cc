@@ -8,7 +8,7 @@
 namespace tutti {
 namespace {
 
-PinholeCamera Camera() {
+PinholeCamera SolverCamera() {
   PinholeCamera camera;
   camera.width = 640;
   camera.height = 480;
@@ -24,7 +24,7 @@ double Uniform(std::mt19937& generator, double low, double high) {
 }
 
 // `count` points in front of a camera that stands at T_camera_world, seen without error.
-std::vector<PointObservation> Seen(const Pose& T_camera_world, int count, bool with_depth) {
+std::vector<PointObservation> PointsSeen(const Pose& T_camera_world, int count, bool with_depth) {
   std::mt19937 generator(7);
   std::vector<PointObservation> out;
   for (int i = 0; i < count; ++i) {
@@ -33,7 +33,7 @@ std::vector<PointObservation> Seen(const Pose& T_camera_world, int count, bool w
     const Eigen::Vector3d in_camera(x, y, z);
     PointObservation o;
     o.point = T_camera_world.Inverse() * in_camera;
-    o.pixel = Camera().Project(in_camera);
+    o.pixel = SolverCamera().Project(in_camera);
     if (with_depth) {
       o.inverse_depth = 1 / in_camera.z();
       o.inverse_depth_sigma = 0.005;
@@ -46,21 +46,21 @@ std::vector<PointObservation> Seen(const Pose& T_camera_world, int count, bool w
 const Pose kTruth(ExpSO3({0.1, -0.2, 0.05}), {0.4, -0.3, 0.7});
 const Pose kGuess(ExpSO3({0.12, -0.17, 0.04}), {0.3, -0.25, 0.8});
 
-double Distance(const Pose& a, const Pose& b) { return LogSE3(a * b.Inverse()).norm(); }
+double PoseDistance(const Pose& a, const Pose& b) { return LogSE3(a * b.Inverse()).norm(); }
 
 TEST(ReprojectionResidual, JacobianIsThatOfFiniteDifferences) {
   for (const bool with_depth : {false, true}) {
-    for (PointObservation o : Seen(kTruth, 20, with_depth)) {
+    for (PointObservation o : PointsSeen(kTruth, 20, with_depth)) {
       o.pixel_sigma = 1.7;
       Eigen::Vector3d at_guess;
       Eigen::Matrix<double, 3, 6> jacobian;
-      ASSERT_TRUE(ReprojectionResidual(Camera(), kGuess, o, &at_guess, &jacobian));
+      ASSERT_TRUE(ReprojectionResidual(SolverCamera(), kGuess, o, &at_guess, &jacobian));
       for (int k = 0; k < 6; ++k) {
         constexpr double kStep = 1e-6;
         Eigen::Vector3d plus, minus;
         const Vector6d step = kStep * Vector6d::Unit(k);
-        ASSERT_TRUE(ReprojectionResidual(Camera(), ExpSE3(step) * kGuess, o, &plus, nullptr));
-        ASSERT_TRUE(ReprojectionResidual(Camera(), ExpSE3(-step) * kGuess, o, &minus, nullptr));
+        ASSERT_TRUE(ReprojectionResidual(SolverCamera(), ExpSE3(step) * kGuess, o, &plus, nullptr));
+        ASSERT_TRUE(ReprojectionResidual(SolverCamera(), ExpSE3(-step) * kGuess, o, &minus, nullptr));
         const Eigen::Vector3d numeric = (plus - minus) / (2 * kStep);
         EXPECT_LT((numeric - jacobian.col(k)).norm(), 1e-4 * (1 + numeric.norm())) << "parameter " << k;
       }
@@ -69,36 +69,36 @@ TEST(ReprojectionResidual, JacobianIsThatOfFiniteDifferences) {
 }
 
 TEST(ReprojectionResidual, IsWhitenedAndZeroAtTheTruth) {
-  PointObservation o = Seen(kTruth, 1, true)[0];
+  PointObservation o = PointsSeen(kTruth, 1, true)[0];
   Eigen::Vector3d r;
-  ASSERT_TRUE(ReprojectionResidual(Camera(), kTruth, o, &r, nullptr));
+  ASSERT_TRUE(ReprojectionResidual(SolverCamera(), kTruth, o, &r, nullptr));
   EXPECT_LT(r.norm(), 1e-9);
   o.pixel.x() += 3;
   o.pixel_sigma = 2;
   o.inverse_depth -= 0.01;
-  ASSERT_TRUE(ReprojectionResidual(Camera(), kTruth, o, &r, nullptr));
+  ASSERT_TRUE(ReprojectionResidual(SolverCamera(), kTruth, o, &r, nullptr));
   EXPECT_NEAR(std::abs(r.x()), 1.5, 1e-9);
   EXPECT_NEAR(std::abs(r.z()), 2.0, 1e-9);
 }
 
 TEST(ReprojectionResidual, PointsBehindTheCameraHaveNone) {
-  PointObservation o = Seen(kTruth, 1, false)[0];
+  PointObservation o = PointsSeen(kTruth, 1, false)[0];
   o.point = kTruth.Inverse() * Eigen::Vector3d(0, 0, -5);
   Eigen::Vector3d r;
-  EXPECT_FALSE(ReprojectionResidual(Camera(), kTruth, o, &r, nullptr));
+  EXPECT_FALSE(ReprojectionResidual(SolverCamera(), kTruth, o, &r, nullptr));
 }
 
 TEST(RefinePose, FindsThePoseThatExplainsThePixels) {
   for (const bool with_depth : {false, true}) {
     Pose pose = kGuess;
     std::vector<char> inlier;
-    EXPECT_EQ(RefinePose(Camera(), Seen(kTruth, 60, with_depth), &pose, &inlier), 60);
-    EXPECT_LT(Distance(pose, kTruth), 1e-6);
+    EXPECT_EQ(RefinePose(SolverCamera(), PointsSeen(kTruth, 60, with_depth), &pose, &inlier), 60);
+    EXPECT_LT(PoseDistance(pose, kTruth), 1e-6);
   }
 }
 
 TEST(RefinePose, WrongMatchesAreMarkedAndDoNotMoveThePose) {
-  std::vector<PointObservation> observations = Seen(kTruth, 80, false);
+  std::vector<PointObservation> observations = PointsSeen(kTruth, 80, false);
   std::mt19937 generator(2);
   for (std::size_t i = 0; i < observations.size(); i += 4) {
     const double dy = Uniform(generator, -80, -20), dx = Uniform(generator, 20, 80);
@@ -106,28 +106,28 @@ TEST(RefinePose, WrongMatchesAreMarkedAndDoNotMoveThePose) {
   }
   Pose pose = kGuess;
   std::vector<char> inlier;
-  EXPECT_EQ(RefinePose(Camera(), observations, &pose, &inlier), 60);
+  EXPECT_EQ(RefinePose(SolverCamera(), observations, &pose, &inlier), 60);
   ASSERT_EQ(inlier.size(), 80U);
   for (std::size_t i = 0; i < inlier.size(); ++i) EXPECT_EQ(inlier[i] != 0, i % 4 != 0) << i;
-  EXPECT_LT(Distance(pose, kTruth), 1e-3);
+  EXPECT_LT(PoseDistance(pose, kTruth), 1e-3);
 }
 
 TEST(RefinePose, NoObservationsAndPointsBehindLeaveThePoseFinite) {
   Pose pose = kGuess;
   std::vector<char> inlier;
-  EXPECT_EQ(RefinePose(Camera(), {}, &pose, &inlier), 0);
-  EXPECT_LT(Distance(pose, kGuess), 1e-12);
-  std::vector<PointObservation> behind = Seen(kTruth, 30, false);
+  EXPECT_EQ(RefinePose(SolverCamera(), {}, &pose, &inlier), 0);
+  EXPECT_LT(PoseDistance(pose, kGuess), 1e-12);
+  std::vector<PointObservation> behind = PointsSeen(kTruth, 30, false);
   for (PointObservation& o : behind) o.point = kTruth.Inverse() * Eigen::Vector3d(0.1, 0.1, -3);
-  EXPECT_EQ(RefinePose(Camera(), behind, &pose, &inlier), 0);
+  EXPECT_EQ(RefinePose(SolverCamera(), behind, &pose, &inlier), 0);
   EXPECT_TRUE(pose.IsFinite());
 }
 
 TEST(RefinePose, OnePointSeenManyTimesIsDegenerateButFinite) {
-  std::vector<PointObservation> observations(40, Seen(kTruth, 1, false)[0]);
+  std::vector<PointObservation> observations(40, PointsSeen(kTruth, 1, false)[0]);
   Pose pose = kGuess;
   std::vector<char> inlier;
-  RefinePose(Camera(), observations, &pose, &inlier);
+  RefinePose(SolverCamera(), observations, &pose, &inlier);
   EXPECT_TRUE(pose.IsFinite());
 }
 
@@ -138,7 +138,7 @@ struct PointsAndPixels {
 
 PointsAndPixels PnpProblem(int count) {
   PointsAndPixels out;
-  for (const PointObservation& o : Seen(kTruth, count, false)) {
+  for (const PointObservation& o : PointsSeen(kTruth, count, false)) {
     out.points.push_back(o.point);
     out.pixels.emplace_back(static_cast<float>(o.pixel.x()), static_cast<float>(o.pixel.y()));
   }
@@ -148,20 +148,20 @@ PointsAndPixels PnpProblem(int count) {
 TEST(SolvePnp, FindsThePoseAmongOutliersWithoutAGuess) {
   PointsAndPixels p = PnpProblem(60);
   for (std::size_t i = 0; i < 60; i += 3) p.pixels[i] += cv::Point2f(90, -70);
-  const std::optional<Pose> pose = SolvePnp(Camera(), p.points, p.pixels, 30);
+  const std::optional<Pose> pose = SolvePnp(SolverCamera(), p.points, p.pixels, 30);
   ASSERT_TRUE(pose);
-  EXPECT_LT(Distance(*pose, kTruth), 0.01);
-  EXPECT_FALSE(SolvePnp(Camera(), p.points, p.pixels, 41)) << "40 are inliers";
+  EXPECT_LT(PoseDistance(*pose, kTruth), 0.01);
+  EXPECT_FALSE(SolvePnp(SolverCamera(), p.points, p.pixels, 41)) << "40 are inliers";
 }
 
 TEST(SolvePnp, TooFewOrDegeneratePointsHaveNoPose) {
   for (const int count : {0, 1, 3}) {
     const PointsAndPixels p = PnpProblem(count);
-    EXPECT_FALSE(SolvePnp(Camera(), p.points, p.pixels, 4)) << count;
+    EXPECT_FALSE(SolvePnp(SolverCamera(), p.points, p.pixels, 4)) << count;
   }
   const std::vector<Eigen::Vector3d> nowhere(
       20, Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()));
-  EXPECT_FALSE(SolvePnp(Camera(), nowhere, PnpProblem(20).pixels, 4));
+  EXPECT_FALSE(SolvePnp(SolverCamera(), nowhere, PnpProblem(20).pixels, 4));
 }
 
 }  // namespace

@@ -8,7 +8,7 @@
 namespace tutti {
 namespace {
 
-CameraRig Rig() {
+CameraRig RollingRig() {
   CameraRig rig;
   rig.sensor = Sensor::kRgbd;
   rig.camera.width = 400;
@@ -21,15 +21,15 @@ CameraRig Rig() {
 }
 
 // What a moving camera sees of points: the pixel in whose row a point is when that row is read.
-struct Scene {
-  CameraRig rig = Rig();
+struct RollingScene {
+  CameraRig rig = RollingRig();
   RollingShutter shutter{rig};
   Pose T_camera_world{ExpSO3({0.1, -0.2, 0.05}), {0.2, 0.1, -0.1}};
   Vector6d motion;
   std::vector<Eigen::Vector3d> points;  // in the world
   std::vector<PointObservation> seen;   // as the image has them
 
-  explicit Scene(double depth_sigma) {
+  explicit RollingScene(double depth_sigma) {
     motion << 0.5, -0.3, 0.2, 1.5, -2.5, 3.0;
     for (int i = 0; i < 150; ++i) {
       const Eigen::Vector3d p(1.6 * std::sin(1.3 * i), 1.2 * std::sin(2.1 * i + 1), 2.5 + std::sin(0.7 * i));
@@ -47,7 +47,7 @@ struct Scene {
 };
 
 TEST(RollingShutterTest, StraightenedFeaturesAreWhereTheMiddleRowsTimeSawThem) {
-  const Scene scene(0.01);
+  const RollingScene scene(0.01);
   ASSERT_GT(scene.seen.size(), 60U);
   FrameFeatures seen;
   for (const PointObservation& o : scene.seen) {
@@ -69,7 +69,7 @@ TEST(RollingShutterTest, StraightenedFeaturesAreWhereTheMiddleRowsTimeSawThem) {
 }
 
 TEST(RollingShutterTest, TheRowsTellHowTheCameraMoves) {
-  const Scene scene(0.01);
+  const RollingScene scene(0.01);
   Pose pose(ExpSO3({0.12, -0.22, 0.04}), {0.25, 0.05, -0.1});
   Vector6d motion;
   MotionPrior prior;
@@ -82,7 +82,7 @@ TEST(RollingShutterTest, TheRowsTellHowTheCameraMoves) {
 }
 
 TEST(RollingShutterTest, TheStepFromTheLastFrameTellsTheMotionThatFewPointsDoNot) {
-  Scene scene(0);
+  RollingScene scene(0);
   scene.seen.resize(8);
   MotionPrior prior;
   prior.since_s = 1.0 / 30;
@@ -99,7 +99,7 @@ TEST(RollingShutterTest, TheStepFromTheLastFrameTellsTheMotionThatFewPointsDoNot
 }
 
 TEST(RollingShutterTest, WrongMatchesAreOutliers) {
-  Scene scene(0);
+  RollingScene scene(0);
   for (std::size_t i = 0; i < scene.seen.size(); i += 5) scene.seen[i].pixel.x() += 25;
   Pose pose = scene.T_camera_world;
   Vector6d motion;
@@ -112,12 +112,12 @@ TEST(RollingShutterTest, WrongMatchesAreOutliers) {
 }
 
 TEST(RollingShutterTest, AGlobalShutterDoesNotRoll) {
-  CameraRig rig = Rig();
+  CameraRig rig = RollingRig();
   rig.readout_s = 0;
   EXPECT_FALSE(RollingShutter(rig).Rolls());
-  EXPECT_TRUE(RollingShutter(Rig()).Rolls());
-  EXPECT_NEAR(RollingShutter(Rig()).TimeOf(0), -0.015, 1e-12);
-  EXPECT_NEAR(RollingShutter(Rig()).TimeOf(300), 0.015, 1e-12);
+  EXPECT_TRUE(RollingShutter(RollingRig()).Rolls());
+  EXPECT_NEAR(RollingShutter(RollingRig()).TimeOf(0), -0.015, 1e-12);
+  EXPECT_NEAR(RollingShutter(RollingRig()).TimeOf(300), 0.015, 1e-12);
 }
 
 }  // namespace

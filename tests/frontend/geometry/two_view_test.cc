@@ -12,7 +12,7 @@
 namespace tutti {
 namespace {
 
-PinholeCamera Camera() { return testing::PlainCamera(500); }
+PinholeCamera TwoViewCamera() { return testing::PlainCamera(500); }
 
 const Pose kMotion(ExpSO3({0.01, -0.06, 0.02}), {-0.9, 0.1, 0.3});  // T_second_first
 
@@ -22,13 +22,13 @@ struct Matches {
 };
 
 // Points in a box, or on one slanted plane; `noise_px` on both pixels.
-Matches Scene(const Pose& T_second_first, bool planar, int count, double noise_px) {
+Matches MatchedScene(const Pose& T_second_first, bool planar, int count, double noise_px) {
   std::mt19937 generator(5);
   const auto uniform = [&](double low, double high) {
     return low + (high - low) * static_cast<double>(generator() % 100000) / 1e5;
   };
   const auto pixel = [&](const Eigen::Vector3d& p) {
-    const Eigen::Vector2d u = Camera().Project(p);
+    const Eigen::Vector2d u = TwoViewCamera().Project(p);
     const double dy = uniform(-noise_px, noise_px), dx = uniform(-noise_px, noise_px);
     return cv::Point2f(static_cast<float>(u.x() + dx), static_cast<float>(u.y() + dy));
   };
@@ -57,8 +57,8 @@ TEST(Triangulate, MeetsThePointOfTwoRays) {
 }
 
 TEST(EstimateTwoView, BoxOfPointsGivesMotionAndPoints) {
-  const Matches m = Scene(kMotion, false, 200, 0);
-  const TwoViewResult result = EstimateTwoView(Camera(), m.first, m.second, TwoViewOptions());
+  const Matches m = MatchedScene(kMotion, false, 200, 0);
+  const TwoViewResult result = EstimateTwoView(TwoViewCamera(), m.first, m.second, TwoViewOptions());
   ExpectMotion(result, 2e-3);
   EXPECT_FALSE(result.homography);
   EXPECT_GT(result.parallax_deg, 3);
@@ -73,8 +73,8 @@ TEST(EstimateTwoView, BoxOfPointsGivesMotionAndPoints) {
 }
 
 TEST(EstimateTwoView, PlaneGivesTheMotionByItsHomography) {
-  const Matches m = Scene(kMotion, true, 200, 0.3);
-  const TwoViewResult result = EstimateTwoView(Camera(), m.first, m.second, TwoViewOptions());
+  const Matches m = MatchedScene(kMotion, true, 200, 0.3);
+  const TwoViewResult result = EstimateTwoView(TwoViewCamera(), m.first, m.second, TwoViewOptions());
   // A plane may leave two motions that explain it equally well: then it must refuse, not guess.
   if (!result.success) {
     EXPECT_FALSE(result.reason.empty());
@@ -84,36 +84,36 @@ TEST(EstimateTwoView, PlaneGivesTheMotionByItsHomography) {
 }
 
 TEST(EstimateTwoView, WrongMatchesDoNotDisturb) {
-  Matches m = Scene(kMotion, false, 240, 0.3);
+  Matches m = MatchedScene(kMotion, false, 240, 0.3);
   for (std::size_t i = 0; i < m.second.size(); i += 4) m.second[i] = m.first[(i + 77) % m.first.size()];
-  ExpectMotion(EstimateTwoView(Camera(), m.first, m.second, TwoViewOptions()), 0.05);
+  ExpectMotion(EstimateTwoView(TwoViewCamera(), m.first, m.second, TwoViewOptions()), 0.05);
 }
 
 TEST(EstimateTwoView, RotationAloneHasNoParallaxAndSaysSo) {
-  const Matches m = Scene(Pose(ExpSO3({0, 0.1, 0}), Eigen::Vector3d::Zero()), false, 200, 0.3);
-  const TwoViewResult result = EstimateTwoView(Camera(), m.first, m.second, TwoViewOptions());
+  const Matches m = MatchedScene(Pose(ExpSO3({0, 0.1, 0}), Eigen::Vector3d::Zero()), false, 200, 0.3);
+  const TwoViewResult result = EstimateTwoView(TwoViewCamera(), m.first, m.second, TwoViewOptions());
   EXPECT_FALSE(result.success);
   EXPECT_FALSE(result.reason.empty());
 }
 
 TEST(EstimateTwoView, FewOrIdenticalOrUnequalMatchesAreRefused) {
-  const Matches few = Scene(kMotion, false, 5, 0);
-  EXPECT_FALSE(EstimateTwoView(Camera(), few.first, few.second, TwoViewOptions()).success);
-  EXPECT_FALSE(EstimateTwoView(Camera(), {}, {}, TwoViewOptions()).success);
+  const Matches few = MatchedScene(kMotion, false, 5, 0);
+  EXPECT_FALSE(EstimateTwoView(TwoViewCamera(), few.first, few.second, TwoViewOptions()).success);
+  EXPECT_FALSE(EstimateTwoView(TwoViewCamera(), {}, {}, TwoViewOptions()).success);
   const std::vector<cv::Point2f> same(100, cv::Point2f(100, 100));
-  EXPECT_FALSE(EstimateTwoView(Camera(), same, same, TwoViewOptions()).success);
+  EXPECT_FALSE(EstimateTwoView(TwoViewCamera(), same, same, TwoViewOptions()).success);
 }
 
 TEST(EstimateTwoView, SameInputGivesTheSameBits) {
-  const Matches m = Scene(kMotion, false, 150, 0.5);
-  const TwoViewResult a = EstimateTwoView(Camera(), m.first, m.second, TwoViewOptions());
-  const TwoViewResult b = EstimateTwoView(Camera(), m.first, m.second, TwoViewOptions());
+  const Matches m = MatchedScene(kMotion, false, 150, 0.5);
+  const TwoViewResult a = EstimateTwoView(TwoViewCamera(), m.first, m.second, TwoViewOptions());
+  const TwoViewResult b = EstimateTwoView(TwoViewCamera(), m.first, m.second, TwoViewOptions());
   ASSERT_TRUE(a.success);
   EXPECT_EQ(a.T_second_first.Matrix(), b.T_second_first.Matrix());
   EXPECT_EQ(a.valid, b.valid);
 }
 
-std::vector<TwoViewPoint> Seen(const std::vector<Eigen::Vector3d>& points, double sigma_px) {
+std::vector<TwoViewPoint> SeenTwice(const std::vector<Eigen::Vector3d>& points, double sigma_px) {
   std::vector<TwoViewPoint> seen;
   for (const Eigen::Vector3d& p : points) seen.push_back({p, sigma_px, sigma_px});
   return seen;
@@ -142,12 +142,12 @@ double DirectionError(const std::vector<Eigen::Vector3d>& points, double sigma_p
         o.measured.pixel_sigma = sigma_px;
         const Eigen::Vector2d across = noise(), down = noise();
         o.measured.pixel =
-            Camera().Project(camera == 0 ? kMotion * p : p) + Eigen::Vector2d(across.x(), down.x());
+            TwoViewCamera().Project(camera == 0 ? kMotion * p : p) + Eigen::Vector2d(across.x(), down.x());
         window.observations.push_back(o);
       }
       window.first_observation.push_back(window.observations.size());
     }
-    EXPECT_TRUE(SolveWindow(Camera(), 20, &window).usable);
+    EXPECT_TRUE(SolveWindow(TwoViewCamera(), 20, &window).usable);
     const Eigen::Vector3d found = window.T_camera_world[0].Inverse().translation.normalized();
     squared += (found - kMotion.Inverse().translation.normalized()).squaredNorm();
   }
@@ -155,8 +155,8 @@ double DirectionError(const std::vector<Eigen::Vector3d>& points, double sigma_p
 }
 
 TEST(DirectionSigma, IsWhatNoiseDoesToTheDirection) {
-  const std::vector<Eigen::Vector3d> points = Scene(kMotion, false, 100, 0).points;
-  const double sigma = DirectionSigma(Camera(), kMotion, Seen(points, 0.5));
+  const std::vector<Eigen::Vector3d> points = MatchedScene(kMotion, false, 100, 0).points;
+  const double sigma = DirectionSigma(TwoViewCamera(), kMotion, SeenTwice(points, 0.5));
   // Of two components the larger one is returned: the error of both is 1 to 1.41 times as much.
   const double error = DirectionError(points, 0.5, 60);
   EXPECT_GT(error, 0.8 * sigma);
@@ -164,23 +164,23 @@ TEST(DirectionSigma, IsWhatNoiseDoesToTheDirection) {
 }
 
 TEST(DirectionSigma, GrowsWithTheNoiseAndNotWithTheUnitOfLength) {
-  const std::vector<Eigen::Vector3d> points = Scene(kMotion, false, 100, 0).points;
-  const double sigma = DirectionSigma(Camera(), kMotion, Seen(points, 0.5));
-  EXPECT_NEAR(DirectionSigma(Camera(), kMotion, Seen(points, 1)), 2 * sigma, 1e-6 * sigma);
+  const std::vector<Eigen::Vector3d> points = MatchedScene(kMotion, false, 100, 0).points;
+  const double sigma = DirectionSigma(TwoViewCamera(), kMotion, SeenTwice(points, 0.5));
+  EXPECT_NEAR(DirectionSigma(TwoViewCamera(), kMotion, SeenTwice(points, 1)), 2 * sigma, 1e-6 * sigma);
   std::vector<Eigen::Vector3d> larger;
   for (const Eigen::Vector3d& p : points) larger.emplace_back(10 * p);
   const Pose longer(kMotion.rotation, 10 * kMotion.translation);
-  EXPECT_NEAR(DirectionSigma(Camera(), longer, Seen(larger, 0.5)), sigma, 1e-6 * sigma);
+  EXPECT_NEAR(DirectionSigma(TwoViewCamera(), longer, SeenTwice(larger, 0.5)), sigma, 1e-6 * sigma);
   const Pose shorter(kMotion.rotation, 0.1 * kMotion.translation);
-  EXPECT_GT(DirectionSigma(Camera(), shorter, Seen(points, 0.5)), 5 * sigma);
+  EXPECT_GT(DirectionSigma(TwoViewCamera(), shorter, SeenTwice(points, 0.5)), 5 * sigma);
 }
 
 TEST(DirectionSigma, IsInfiniteWhereTheMotionIsOpen) {
-  const std::vector<Eigen::Vector3d> points = Scene(kMotion, false, 100, 0).points;
+  const std::vector<Eigen::Vector3d> points = MatchedScene(kMotion, false, 100, 0).points;
   const Pose turn(kMotion.rotation, Eigen::Vector3d::Zero());
-  EXPECT_EQ(DirectionSigma(Camera(), turn, Seen(points, 0.5)), INFINITY);
-  EXPECT_EQ(DirectionSigma(Camera(), kMotion, Seen({points[0], points[1]}, 0.5)), INFINITY);
-  EXPECT_EQ(DirectionSigma(Camera(), kMotion, {}), INFINITY);
+  EXPECT_EQ(DirectionSigma(TwoViewCamera(), turn, SeenTwice(points, 0.5)), INFINITY);
+  EXPECT_EQ(DirectionSigma(TwoViewCamera(), kMotion, SeenTwice({points[0], points[1]}, 0.5)), INFINITY);
+  EXPECT_EQ(DirectionSigma(TwoViewCamera(), kMotion, {}), INFINITY);
 }
 
 }  // namespace

@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kKeyframes = 5, kPoints = 60;
 
-PinholeCamera Camera() { return testing::PlainCamera(500); }
+PinholeCamera BundleCamera() { return testing::PlainCamera(500); }
 
 // A camera that moves to the right past a cloud of points; every keyframe sees all of them.
 struct World {
@@ -35,7 +35,7 @@ struct World {
       features->descriptors = cv::Mat::zeros(kPoints, 32, CV_8U);
       for (const Eigen::Vector3d& point : points) {
         const Eigen::Vector3d p = T_world_camera.Inverse() * point;
-        const Eigen::Vector2d pixel = Camera().Project(p);
+        const Eigen::Vector2d pixel = BundleCamera().Project(p);
         features->keypoints.emplace_back(static_cast<float>(pixel.x()), static_cast<float>(pixel.y()), 31.0F);
         features->keypoints.back().octave = 0;
         features->inverse_depth.push_back(with_depth ? static_cast<float>(1 / p.z()) : 0.0F);
@@ -71,7 +71,7 @@ struct World {
   }
 };
 
-BundleAdjustmentOptions Options(bool metric) {
+BundleAdjustmentOptions BundleOptions(bool metric) {
   BundleAdjustmentOptions options;
   options.iterations = 30;
   options.metric = metric;
@@ -83,7 +83,7 @@ TEST(BundleAdjustment, BringsPosesAndPointsBack) {
     World world(with_depth);
     world.Disturb({2, 3, 4});
     const BundleAdjustmentReport report =
-        AdjustWindow(Camera(), {2, 3, 4}, {0, 1}, Options(with_depth), &world.map);
+        AdjustWindow(BundleCamera(), {2, 3, 4}, {0, 1}, BundleOptions(with_depth), &world.map);
     EXPECT_TRUE(report.usable);
     EXPECT_EQ(report.removed, 0);
     EXPECT_EQ(report.observations, kKeyframes * kPoints);
@@ -95,14 +95,14 @@ TEST(BundleAdjustment, BringsPosesAndPointsBack) {
 TEST(BundleAdjustment, DepthFixesTheScaleWithOneFixedKeyframe) {
   World world(true);
   world.Disturb({1, 2, 3, 4});
-  EXPECT_TRUE(AdjustWindow(Camera(), {1, 2, 3, 4}, {0}, Options(true), &world.map).usable);
+  EXPECT_TRUE(AdjustWindow(BundleCamera(), {1, 2, 3, 4}, {0}, BundleOptions(true), &world.map).usable);
   EXPECT_LT(world.WorstError(), 2e-3);
 }
 
 TEST(BundleAdjustment, FixedKeyframesStayWhereTheyAre) {
   World world(false);
   world.Disturb({2, 3, 4});
-  AdjustWindow(Camera(), {2, 3, 4}, {0, 1}, Options(false), &world.map);
+  AdjustWindow(BundleCamera(), {2, 3, 4}, {0, 1}, BundleOptions(false), &world.map);
   for (int k : {0, 1}) {
     EXPECT_EQ(world.map.keyframe(k).T_world_camera.Matrix(),
               world.truth[static_cast<std::size_t>(k)].Matrix());
@@ -115,19 +115,20 @@ TEST(BundleAdjustment, WrongMatchesAreRemoved) {
   for (int i = 0; i < 5; ++i) features->keypoints[static_cast<std::size_t>(i)].pt += cv::Point2f(40, -30);
   world.map.keyframe(4).features = features;
   world.Disturb({2, 3, 4});
-  const BundleAdjustmentReport report = AdjustWindow(Camera(), {2, 3, 4}, {0, 1}, Options(false), &world.map);
+  const BundleAdjustmentReport report =
+      AdjustWindow(BundleCamera(), {2, 3, 4}, {0, 1}, BundleOptions(false), &world.map);
   EXPECT_EQ(report.removed, 5);
   for (int i = 0; i < 5; ++i) EXPECT_EQ(world.map.keyframe(4).landmarks[static_cast<std::size_t>(i)], -1);
   // The Huber loss has bounded their pull; the next adjustment is free of it.
   EXPECT_LT(world.WorstError(), 0.02);
-  EXPECT_EQ(AdjustWindow(Camera(), {2, 3, 4}, {0, 1}, Options(false), &world.map).removed, 0);
+  EXPECT_EQ(AdjustWindow(BundleCamera(), {2, 3, 4}, {0, 1}, BundleOptions(false), &world.map).removed, 0);
   EXPECT_LT(world.WorstError(), 1e-3);
 }
 
 TEST(BundleAdjustment, LocalWindowFixesItsOldestKeyframesWhereNothingElseDoes) {
   for (const bool metric : {false, true}) {
     World world(metric);
-    const BundleAdjustmentReport report = AdjustLocally(Camera(), 4, Options(metric), &world.map);
+    const BundleAdjustmentReport report = AdjustLocally(BundleCamera(), 4, BundleOptions(metric), &world.map);
     EXPECT_TRUE(report.usable);
     EXPECT_EQ(report.fixed, metric ? 1 : 2);
     EXPECT_EQ(report.keyframes + report.fixed, kKeyframes);
@@ -136,19 +137,19 @@ TEST(BundleAdjustment, LocalWindowFixesItsOldestKeyframesWhereNothingElseDoes) {
 
 TEST(BundleAdjustment, NothingToAdjustIsNoCrash) {
   World world(false);
-  EXPECT_FALSE(AdjustWindow(Camera(), {}, {0, 1}, Options(false), &world.map).usable);
+  EXPECT_FALSE(AdjustWindow(BundleCamera(), {}, {0, 1}, BundleOptions(false), &world.map).usable);
   Map empty({1.0F});
   Keyframe lonely;
   lonely.features = std::make_shared<FrameFeatures>();
   empty.AddKeyframe(lonely);
-  EXPECT_FALSE(AdjustLocally(Camera(), 0, Options(true), &empty).usable);
+  EXPECT_FALSE(AdjustLocally(BundleCamera(), 0, BundleOptions(true), &empty).usable);
 }
 
 TEST(BundleAdjustment, SameInputGivesTheSameBits) {
   const auto run = [] {
     World world(true);
     world.Disturb({1, 2, 3, 4});
-    AdjustWindow(Camera(), {1, 2, 3, 4}, {0}, Options(true), &world.map);
+    AdjustWindow(BundleCamera(), {1, 2, 3, 4}, {0}, BundleOptions(true), &world.map);
     return world.map.keyframe(4).T_world_camera.Matrix();
   };
   EXPECT_EQ(run(), run());

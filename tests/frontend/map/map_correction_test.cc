@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/support/recording.h"
+#include "tests/support/rendered_world.h"
 #include "tests/support/small_town.h"
 
 namespace tutti {
@@ -12,7 +13,8 @@ namespace {
 using testing::Recording;
 
 const Recording& Drive() {
-  static const Recording recording = testing::Record(SyntheticWorld(testing::SmallStereoTown(400, 200)), 40);
+  static const Recording recording =
+      testing::Record(testing::RenderedWorld(testing::SmallStereoTown(400, 200)), 40);
   return recording;
 }
 

@@ -7,7 +7,7 @@
 namespace tutti {
 namespace {
 
-PinholeCamera Camera(int width, int height, double f, double cx, double cy) {
+PinholeCamera CameraOfSize(int width, int height, double f, double cx, double cy) {
   PinholeCamera camera;
   camera.width = width;
   camera.height = height;
@@ -17,7 +17,7 @@ PinholeCamera Camera(int width, int height, double f, double cx, double cy) {
   return camera;
 }
 
-CameraRig Rig(Sensor sensor, const PinholeCamera& camera) {
+CameraRig RigWith(Sensor sensor, const PinholeCamera& camera) {
   CameraRig rig;
   rig.sensor = sensor;
   rig.camera = camera;
@@ -25,10 +25,11 @@ CameraRig Rig(Sensor sensor, const PinholeCamera& camera) {
 }
 
 const std::vector<float> kScales = {1.0F, 1.2F, 1.44F, 1.728F, 2.0736F, 2.48832F};
-const PinholeCamera kOld = Camera(640, 480, 500, 320, 240), kNew = Camera(800, 600, 720, 390, 310);
+const PinholeCamera kOld = CameraOfSize(640, 480, 500, 320, 240),
+                    kNew = CameraOfSize(800, 600, 720, 390, 310);
 
 // Two keyframes that see one point.
-Map Seen(const PinholeCamera& camera, const Eigen::Vector3d& point) {
+Map MapThatSees(const PinholeCamera& camera, const Eigen::Vector3d& point) {
   Map map(kScales);
   for (int k = 0; k < 2; ++k) {
     auto features = std::make_shared<FrameFeatures>();
@@ -55,7 +56,7 @@ Map Seen(const PinholeCamera& camera, const Eigen::Vector3d& point) {
 
 TEST(OtherCamera, FeaturesAreWhereTheOtherCameraWouldHaveSeenThem) {
   const Eigen::Vector3d point(0.4, -0.3, 4);
-  const Map map = Seen(kOld, point);
+  const Map map = MapThatSees(kOld, point);
   Map carried(kScales);
   CarryOver(map, kOld, kNew, &carried);
   ASSERT_EQ(carried.KeyframeCount(), 2);
@@ -76,21 +77,21 @@ TEST(OtherCamera, FeaturesAreWhereTheOtherCameraWouldHaveSeenThem) {
 }
 
 TEST(OtherCamera, OtherSensorsAndVeryOtherFocalLengthsAreNone) {
-  const CameraRig stereo = Rig(Sensor::kStereo, kOld);
-  EXPECT_EQ(OtherCameraProblem(stereo, Rig(Sensor::kStereo, kNew), kScales), "");
-  EXPECT_NE(OtherCameraProblem(stereo, Rig(Sensor::kMono, kOld), kScales).find("kind of sensor"),
+  const CameraRig stereo = RigWith(Sensor::kStereo, kOld);
+  EXPECT_EQ(OtherCameraProblem(stereo, RigWith(Sensor::kStereo, kNew), kScales), "");
+  EXPECT_NE(OtherCameraProblem(stereo, RigWith(Sensor::kMono, kOld), kScales).find("kind of sensor"),
             std::string::npos);
   PinholeCamera tele = kOld;
   tele.fx = tele.fy = 1500;
-  EXPECT_NE(OtherCameraProblem(stereo, Rig(Sensor::kStereo, tele), kScales).find("focal length"),
+  EXPECT_NE(OtherCameraProblem(stereo, RigWith(Sensor::kStereo, tele), kScales).find("focal length"),
             std::string::npos);
   EXPECT_TRUE(SameCamera(stereo, stereo));
-  EXPECT_FALSE(SameCamera(stereo, Rig(Sensor::kStereo, kNew)));
+  EXPECT_FALSE(SameCamera(stereo, RigWith(Sensor::kStereo, kNew)));
 }
 
 TEST(OtherCamera, AnAppendedMapHasItsOwnNumbers) {
-  Map map = Seen(kOld, {0.4, -0.3, 4});
-  const Map other = Seen(kOld, {-0.2, 0.1, 3});
+  Map map = MapThatSees(kOld, {0.4, -0.3, 4});
+  const Map other = MapThatSees(kOld, {-0.2, 0.1, 3});
   map.Append(other, 1000, 5);
   ASSERT_EQ(map.KeyframeCount(), 4);
   ASSERT_EQ(map.LandmarkCount(), 2);

@@ -22,7 +22,7 @@ std::shared_ptr<const FrameFeatures> OneFeature(float x, float y) {
 }
 
 // What a window says that knows k1 to `sigma`.
-LensError Seen(const SelfCalibration& calibration, double k1, double sigma) {
+LensError LensErrorSeen(const SelfCalibration& calibration, double k1, double sigma) {
   LensError seen;
   seen.value = {k1 - calibration.Applied().x(), -calibration.Applied().y()};
   seen.information = Eigen::Matrix2d::Identity() / (sigma * sigma);
@@ -41,7 +41,7 @@ class SelfCalibrationTest : public ::testing::Test {
 
 TEST_F(SelfCalibrationTest, ComesToWhatTheWindowsSay) {
   SelfCalibration calibration(OdometryOptions(), Rig(Sensor::kMono));
-  for (int i = 0; i < 200; ++i) calibration.Learn(Seen(calibration, -0.02, 0.001), 10, &map_);
+  for (int i = 0; i < 200; ++i) calibration.Learn(LensErrorSeen(calibration, -0.02, 0.001), 10, &map_);
   EXPECT_NEAR(calibration.Applied().x(), -0.02, 0.001);
 }
 
@@ -49,7 +49,7 @@ TEST_F(SelfCalibrationTest, SaysWhatItFoundAndHowWellItIsKnown) {
   SelfCalibration calibration(OdometryOptions(), Rig(Sensor::kMono));
   const double at_first = calibration.Found().k1_sigma;
   EXPECT_NEAR(at_first, OdometryOptions().lens_sigma, 1e-9);
-  for (int i = 0; i < 50; ++i) calibration.Learn(Seen(calibration, -0.02, 0.001), 10, &map_);
+  for (int i = 0; i < 50; ++i) calibration.Learn(LensErrorSeen(calibration, -0.02, 0.001), 10, &map_);
   const LensFound found = calibration.Found();
   EXPECT_NEAR(found.k1, -0.02, 0.002);
   EXPECT_LT(found.k1_sigma, 0.2 * at_first);
@@ -60,7 +60,7 @@ TEST_F(SelfCalibrationTest, SaysWhatItFoundAndHowWellItIsKnown) {
 
 TEST_F(SelfCalibrationTest, CorrectsNewFeaturesAndThoseOfTheMapAlike) {
   SelfCalibration calibration(OdometryOptions(), Rig(Sensor::kMono));
-  for (int i = 0; i < 50; ++i) calibration.Learn(Seen(calibration, -0.02, 0.001), 10, &map_);
+  for (int i = 0; i < 50; ++i) calibration.Learn(LensErrorSeen(calibration, -0.02, 0.001), 10, &map_);
   const cv::Point2f fresh = calibration.Correct(OneFeature(600, 400))->keypoints[0].pt;
   const cv::Point2f old = map_.keyframe(0).features->keypoints[0].pt;
   EXPECT_LT(fresh.x, 598);  // towards the principal point
@@ -70,7 +70,7 @@ TEST_F(SelfCalibrationTest, CorrectsNewFeaturesAndThoseOfTheMapAlike) {
 
 TEST_F(SelfCalibrationTest, WindowsThatHardlyKnowAreNotBelieved) {
   SelfCalibration calibration(OdometryOptions(), Rig(Sensor::kMono));
-  for (int i = 0; i < 500; ++i) calibration.Learn(Seen(calibration, -0.3, 0.08), 10, &map_);
+  for (int i = 0; i < 500; ++i) calibration.Learn(LensErrorSeen(calibration, -0.3, 0.08), 10, &map_);
   EXPECT_TRUE(calibration.Applied().isZero());
 }
 

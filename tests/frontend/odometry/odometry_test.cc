@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/support/recording.h"
+#include "tests/support/rendered_world.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -13,6 +14,7 @@ using ::testing::HasSubstr;
 
 using testing::Black;
 using testing::Recording;
+using testing::Snow;
 
 SyntheticOptions SmallWorld(SyntheticScene scene, SyntheticSensor sensor) {
   SyntheticOptions options;
@@ -26,7 +28,7 @@ SyntheticOptions SmallWorld(SyntheticScene scene, SyntheticSensor sensor) {
 }
 
 Recording Record(SyntheticScene scene, SyntheticSensor sensor, std::size_t count) {
-  return testing::Record(SyntheticWorld(SmallWorld(scene, sensor)), count);
+  return testing::Record(testing::RenderedWorld(SmallWorld(scene, sensor)), count);
 }
 
 const Recording& Stereo() {
@@ -205,7 +207,7 @@ TEST(Odometry, FastTurnsGetAKeyframeBeforeMostOfTheViewIsNew) {
   options.height = 256;
   options.rate_hz = 20;
   options.speed_mps = 1.5;  // and 30 degrees a second and more
-  const Recording room = testing::Record(SyntheticWorld(options), 110);
+  const Recording room = testing::Record(testing::RenderedWorld(options), 110);
   const auto error = [&](double uncovered_ratio) {
     OdometryOptions odometry_options;
     odometry_options.keyframe_uncovered_ratio = uncovered_ratio;
@@ -289,16 +291,6 @@ TEST(Odometry, BlackFrameIsLostWithAReasonAndTheNextOnesAreFoundAgain) {
   EXPECT_EQ(estimate.size(), Stereo().frames.size() - 1);
   EXPECT_LT(EndError(Stereo().truth, estimate, false), 0.02 * PathLength(Stereo().truth));
   EXPECT_EQ(odometry.KeyframePiece(odometry.KeyframeIds().back()), 0);
-}
-
-// Something to see, but nothing of the map and no depth.
-InputFrame Snow(InputFrame frame) {
-  cv::RNG random(static_cast<std::uint64_t>(frame.index) + 1);
-  for (cv::Mat* image : {&frame.image, &frame.right}) {
-    *image = image->clone();
-    random.fill(*image, cv::RNG::UNIFORM, 0, 256);
-  }
-  return frame;
 }
 
 TEST(Odometry, LongWithNothingOfTheMapInViewStartsANewPiece) {

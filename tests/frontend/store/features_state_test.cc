@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/state_archive.h"
+#include "tests/support/rendered_world.h"
 #include "tests/support/small_town.h"
 
 namespace tutti {
@@ -58,7 +59,7 @@ TEST(FeaturesState, RepeatedNumbersTakeAByteAndKeepTheirBits) {
 }
 
 FrameFeatures OfATown() {
-  const SyntheticWorld world(testing::SmallStereoTown(400, 200));
+  const testing::RenderedWorld world(testing::SmallStereoTown(400, 200));
   const SyntheticFrame rendered = world.Render(0);
   CameraRig rig;
   rig.sensor = Sensor::kStereo;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/rendered_world.h"
 #include "tests/support/small_town.h"
 
 namespace tutti::internal {
@@ -21,7 +22,7 @@ TEST(GreyBytes, AnyImageComesBackAsItWas) {
     ExpectBack(image);
     ExpectBack(cv::Mat(size, CV_8UC1, cv::Scalar(255)));
   }
-  const cv::Mat town = SyntheticWorld(testing::SmallStereoTown(400, 200)).Render(0).image;
+  const cv::Mat town = testing::RenderedWorld(testing::SmallStereoTown(400, 200)).Render(0).image;
   ExpectBack(town);
   ExpectBack(town(cv::Rect(10, 20, 50, 30)));  // rows that do not follow each other
   EXPECT_LT(PackGrey(town).size(), 0.8 * static_cast<double>(town.total()));

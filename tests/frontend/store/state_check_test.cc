@@ -12,7 +12,8 @@ namespace {
 
 using ::testing::HasSubstr;
 
-constexpr internal::SectionFileKind kFile = {{'T', 'E', 'S', 'T', 'O', 'D', 'O', '\n'}, 1, "test", "a test"};
+constexpr internal::SectionFileKind kMapFile = {
+    {'T', 'E', 'S', 'T', 'O', 'D', 'O', '\n'}, 1, "test", "a test"};
 
 // Two keyframes that see the same points.
 class MapCheck : public ::testing::Test, protected testing::PointScene {
@@ -29,8 +30,8 @@ class MapCheck : public ::testing::Test, protected testing::PointScene {
   }
   std::string Complaint() const {
     const auto file = testing::FreshFolder() / "map.tutti";
-    internal::SectionWriter(file, kFile).Finish();
-    return testing::ErrorOf([&] { map_.Check(internal::SectionReader(file, kFile)); });
+    internal::SectionWriter(file, kMapFile).Finish();
+    return testing::ErrorOf([&] { map_.Check(internal::SectionReader(file, kMapFile)); });
   }
   // What is said of the map after a change, which is taken back.
   template <class Change>

@@ -26,7 +26,7 @@ namespace {
 namespace fs = std::filesystem;
 using testing::Walk;
 
-constexpr int kPlaces = 14;
+constexpr int kFilePlaces = 14;
 
 LoopDetectorOptions BoundedOptions() {
   LoopDetectorOptions options = testing::SmallOptions();
@@ -49,11 +49,11 @@ class SavedDetector : public ::testing::Test {
   // Saved after 20 images, and loaded: both see the same from then on.
   void ExpectToGoOnExactly(const LoopDetectorOptions& options) {
     LoopDetector saved(options);
-    Walk(saved, 0, 20, kPlaces);
+    Walk(saved, 0, 20, kFilePlaces);
     saved.Save(file_);
     LoopDetector loaded(options);
     loaded.Load(file_);
-    testing::ExpectEqual(Walk(saved, 20, 28, kPlaces), Walk(loaded, 20, 28, kPlaces));
+    testing::ExpectEqual(Walk(saved, 20, 28, kFilePlaces), Walk(loaded, 20, 28, kFilePlaces));
   }
 
   fs::path folder_ = testing::FreshFolder();
@@ -67,30 +67,30 @@ TEST_F(SavedDetector, MergedLocationsAreForgottenAndTheirPlacesFoundInTheOlderOn
     if (memory == MemoryKind::kPerMember) SetRule("mean", options);
     options.memory = memory;
     LoopDetector whole(options);
-    Walk(whole, 0, 24, kPlaces);
+    Walk(whole, 0, 24, kFilePlaces);
     whole.Save(file_);
     const auto size = fs::file_size(file_);
     LoopDetector merged(options);
     merged.Load(file_);
-    EXPECT_FALSE(merged.Merge(23, 23 - kPlaces)) << "the newest stays";
+    EXPECT_FALSE(merged.Merge(23, 23 - kFilePlaces)) << "the newest stays";
     EXPECT_FALSE(merged.Merge(3, 17)) << "only into an older one";
     EXPECT_FALSE(merged.Merge(99, 3));
     EXPECT_FALSE(merged.Merge(22, 99));
-    for (int id = kPlaces; id < 23; ++id) EXPECT_TRUE(merged.Merge(id, id - kPlaces)) << id;
+    for (int id = kFilePlaces; id < 23; ++id) EXPECT_TRUE(merged.Merge(id, id - kFilePlaces)) << id;
     EXPECT_TRUE(merged.Merge(20, 3)) << "it is merged already";
-    EXPECT_EQ(merged.NumLocations(), kPlaces + 1u);
+    EXPECT_EQ(merged.NumLocations(), kFilePlaces + 1u);
     merged.Save(file_);
     EXPECT_LT(static_cast<double>(fs::file_size(file_)), 0.8 * static_cast<double>(size));
     LoopDetector loaded(options);
     loaded.Load(file_);
-    const std::vector<LoopResult> later = Walk(merged, 24, 42, kPlaces);
-    testing::ExpectEqual(later, Walk(loaded, 24, 42, kPlaces));
-    EXPECT_GE(testing::CountTrue(later, kPlaces), 15);
+    const std::vector<LoopResult> later = Walk(merged, 24, 42, kFilePlaces);
+    testing::ExpectEqual(later, Walk(loaded, 24, 42, kFilePlaces));
+    EXPECT_GE(testing::CountTrue(later, kFilePlaces), 15);
     for (const LoopResult& result : later) {
-      const bool gone = result.accepted && result.candidate >= kPlaces && result.candidate < 23;
+      const bool gone = result.accepted && result.candidate >= kFilePlaces && result.candidate < 23;
       EXPECT_FALSE(gone) << result.query;
     }
-    EXPECT_EQ(testing::CountFalse(later, kPlaces), 0);
+    EXPECT_EQ(testing::CountFalse(later, kFilePlaces), 0);
   }
 }
 
@@ -100,7 +100,7 @@ TEST_F(SavedDetector, MergedLocationsOfLongTermMemoryAreNotSavedAndStayAwayFromI
   std::size_t long_term = 0;
   {
     LoopDetector detector(options);
-    Walk(detector, 0, 18, kPlaces);
+    Walk(detector, 0, 18, kFilePlaces);
     long_term = detector.NumLongTerm();
     ASSERT_GT(long_term, 3u);
     for (int id = 1; id < 12; ++id) EXPECT_TRUE(detector.Merge(id, 0));
@@ -111,7 +111,7 @@ TEST_F(SavedDetector, MergedLocationsOfLongTermMemoryAreNotSavedAndStayAwayFromI
     LoopDetector loaded(without);
     loaded.Load(file_);
     EXPECT_EQ(loaded.NumLongTerm(), detector.NumLongTerm());
-    testing::ExpectEqual(Walk(detector, 18, 24, kPlaces), Walk(loaded, 18, 24, kPlaces));
+    testing::ExpectEqual(Walk(detector, 18, 24, kFilePlaces), Walk(loaded, 18, 24, kFilePlaces));
     long_term = detector.NumLongTerm();
   }
   const LoopDetector again(options);
@@ -125,15 +125,15 @@ TEST_F(SavedDetector, ALoadedOneGoesOnExactlyAsTheSavedOne) {
       SetRule(rule, options);
       options.memory = memory;
       LoopDetector saved(options);
-      Walk(saved, 0, 18, kPlaces);
+      Walk(saved, 0, 18, kFilePlaces);
       EXPECT_GT(saved.NumLongTerm(), 0u);
       saved.Save(file_);
       LoopDetector loaded(options);
-      Walk(loaded, 0, 3, kPlaces);  // what it knew before is replaced
+      Walk(loaded, 0, 3, kFilePlaces);  // what it knew before is replaced
       loaded.Load(file_);
       EXPECT_EQ(loaded.NumLocations(), saved.NumLocations());
       EXPECT_EQ(loaded.NumLongTerm(), saved.NumLongTerm());
-      testing::ExpectEqual(Walk(saved, 18, 28, kPlaces), Walk(loaded, 18, 28, kPlaces));
+      testing::ExpectEqual(Walk(saved, 18, 28, kFilePlaces), Walk(loaded, 18, 28, kFilePlaces));
     }
   }
 }
@@ -153,35 +153,35 @@ TEST_F(SavedDetector, WhatTheMembersWereRightAboutIsSavedToo) {
 TEST_F(SavedDetector, SavingChangesNothingAndTwiceGivesTheSameFile) {
   LoopDetector saved(BoundedOptions());
   LoopDetector other(BoundedOptions());
-  Walk(saved, 0, 16, kPlaces);
-  Walk(other, 0, 16, kPlaces);
+  Walk(saved, 0, 16, kFilePlaces);
+  Walk(other, 0, 16, kFilePlaces);
   saved.Save(file_);
   saved.Save(folder_ / "again.tutti");
   EXPECT_TRUE(Content(file_) == Content(folder_ / "again.tutti"));
-  testing::ExpectEqual(Walk(saved, 16, 22, kPlaces), Walk(other, 16, 22, kPlaces));
+  testing::ExpectEqual(Walk(saved, 16, 22, kFilePlaces), Walk(other, 16, 22, kFilePlaces));
 }
 
 TEST_F(SavedDetector, AnEmptyOneCanBeSavedAndLoaded) {
   LoopDetector(BoundedOptions()).Save(file_);
   LoopDetector loaded(BoundedOptions());
-  Walk(loaded, 0, 5, kPlaces);
+  Walk(loaded, 0, 5, kFilePlaces);
   loaded.Load(file_);
   EXPECT_EQ(loaded.NumLocations(), 0u);
   EXPECT_EQ(loaded.LastId(), -1);
-  EXPECT_NO_THROW(Walk(loaded, 0, 2, kPlaces));
+  EXPECT_NO_THROW(Walk(loaded, 0, 2, kFilePlaces));
 }
 
 TEST_F(SavedDetector, LoadingIntoAFileOfItsOwnFillsThatFile) {
   LoopDetector saved(BoundedOptions());
-  Walk(saved, 0, 16, kPlaces);
+  Walk(saved, 0, 16, kFilePlaces);
   saved.Save(file_);
   LoopDetectorOptions options = BoundedOptions();
   options.ltm_file = (folder_ / "places.ltm").string();
   {
     LoopDetector durable(options);
-    Walk(durable, 0, 4, kPlaces);
+    Walk(durable, 0, 4, kFilePlaces);
     durable.Load(file_);
-    testing::ExpectEqual(Walk(saved, 16, 20, kPlaces), Walk(durable, 16, 20, kPlaces));
+    testing::ExpectEqual(Walk(saved, 16, 20, kFilePlaces), Walk(durable, 16, 20, kFilePlaces));
   }
   LoopDetector reopened(options);
   EXPECT_EQ(reopened.LastId(), 19);
@@ -189,9 +189,9 @@ TEST_F(SavedDetector, LoadingIntoAFileOfItsOwnFillsThatFile) {
 }
 
 // The message that loading fails with, after which the object must be as it was.
-std::string Refusal(const fs::path& file) {
+std::string RefusedFile(const fs::path& file) {
   LoopDetector detector(BoundedOptions());
-  Walk(detector, 0, 6, kPlaces);
+  Walk(detector, 0, 6, kFilePlaces);
   std::string message;
   try {
     detector.Load(file);
@@ -205,17 +205,17 @@ std::string Refusal(const fs::path& file) {
 
 TEST_F(SavedDetector, OtherFilesVersionsAndMembersAreRefused) {
   LoopDetector saved(BoundedOptions());
-  Walk(saved, 0, 5, kPlaces);
+  Walk(saved, 0, 5, kFilePlaces);
   saved.Save(file_);
   const std::string bytes = Content(file_);
 
-  EXPECT_NE(Refusal(folder_ / "absent").find("no such file"), std::string::npos);
+  EXPECT_NE(RefusedFile(folder_ / "absent").find("no such file"), std::string::npos);
   WriteContent(folder_ / "text", "this is no detector at all");
-  EXPECT_NE(Refusal(folder_ / "text").find("is no saved loop detector"), std::string::npos);
+  EXPECT_NE(RefusedFile(folder_ / "text").find("is no saved loop detector"), std::string::npos);
   std::string newer = bytes;
   newer[8] = 9;
   WriteContent(folder_ / "newer", newer);
-  EXPECT_NE(Refusal(folder_ / "newer").find("version 9"), std::string::npos);
+  EXPECT_NE(RefusedFile(folder_ / "newer").find("version 9"), std::string::npos);
 
   LoopDetectorOptions options = BoundedOptions();
   options.members = {"orb"};
@@ -230,12 +230,12 @@ TEST_F(SavedDetector, OtherFilesVersionsAndMembersAreRefused) {
 
 TEST_F(SavedDetector, ADamagedFileIsRefusedWhereverItIsDamaged) {
   LoopDetector saved(BoundedOptions());
-  Walk(saved, 0, 12, kPlaces);
+  Walk(saved, 0, 12, kFilePlaces);
   saved.Save(file_);
   const std::string bytes = Content(file_);
   const fs::path damaged = folder_ / "damaged";
   LoopDetector detector(BoundedOptions());
-  Walk(detector, 0, 4, kPlaces);
+  Walk(detector, 0, 4, kFilePlaces);
   for (std::size_t i = 0; i < 60; ++i) {
     const std::size_t at = i * bytes.size() / 60;
     WriteContent(damaged, bytes.substr(0, at));
@@ -246,7 +246,7 @@ TEST_F(SavedDetector, ADamagedFileIsRefusedWhereverItIsDamaged) {
     EXPECT_THROW(detector.Load(damaged), InputError) << "another byte at " << at;
   }
   EXPECT_EQ(detector.NumLocations(), 4u);
-  EXPECT_NO_THROW(Walk(detector, 4, 6, kPlaces));
+  EXPECT_NO_THROW(Walk(detector, 4, 6, kFilePlaces));
 }
 
 // A saved detector with the content of all sections of one kind changed, under right checksums.
@@ -262,7 +262,7 @@ void Change(const fs::path& from, const fs::path& to, std::uint32_t kind,
 
 TEST_F(SavedDetector, FeaturesThatNoImageCouldHaveAreRefusedThoughTheChecksumsAreRight) {
   LoopDetector saved(BoundedOptions());
-  Walk(saved, 0, 5, kPlaces);
+  Walk(saved, 0, 5, kFilePlaces);
   saved.Save(file_);
   const fs::path changed = folder_ / "changed";
   const auto load = [&](const std::function<void(View&)>& change) {
@@ -317,7 +317,7 @@ TEST(SavedView, KeepsItsCamerasAndTheCallersNumbers) {
 TEST_F(SavedDetector, MemoriesOfOtherLocationsThanTheStatisticsSayAreRefused) {
   constexpr std::uint32_t kStatistics = 7;
   LoopDetector saved(BoundedOptions());
-  Walk(saved, 0, 5, kPlaces);
+  Walk(saved, 0, 5, kFilePlaces);
   saved.Save(file_);
   const fs::path changed = folder_ / "changed";
   const auto load = [&](std::size_t at, const auto& value) {
@@ -338,11 +338,11 @@ TEST_F(SavedDetector, MemoriesOfOtherLocationsThanTheStatisticsSayAreRefused) {
 
 TEST_F(SavedDetector, AFullDiskOrNoFolderIsSaidAndTheOldFileStays) {
   LoopDetector saved(BoundedOptions());
-  Walk(saved, 0, 8, kPlaces);
+  Walk(saved, 0, 8, kFilePlaces);
   EXPECT_THROW(saved.Save(folder_ / "no" / "such" / "folder"), InputError);
   saved.Save(file_);
   const std::string before = Content(file_);
-  Walk(saved, 8, 9, kPlaces);
+  Walk(saved, 8, 9, kFilePlaces);
   std::signal(SIGXFSZ, SIG_IGN);
   rlimit limit{};
   getrlimit(RLIMIT_FSIZE, &limit);

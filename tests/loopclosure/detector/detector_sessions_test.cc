@@ -11,7 +11,7 @@ using testing::Query;
 using testing::SeenAgain;
 using testing::TexturedImage;
 
-LoopDetectorOptions Options() {
+LoopDetectorOptions SessionOptions() {
   LoopDetectorOptions options = testing::SmallOptions();
   options.stm_size = 8;
   options.extraction.features = 300;
@@ -19,7 +19,7 @@ LoopDetectorOptions Options() {
 }
 
 TEST(DetectorSessions, WhatWasSeenLastIsACandidateForTheNextRecording) {
-  LoopDetector one(Options()), two(Options());
+  LoopDetector one(SessionOptions()), two(SessionOptions());
   constexpr int kPlaces = 18, kNew = 13;  // places 13 and 14 are in short-term memory
   for (int i = 0; i < kPlaces; ++i) {
     one.Detect(Query(i, TexturedImage(static_cast<std::uint32_t>(i))));
@@ -39,9 +39,9 @@ TEST(DetectorSessions, WhatWasSeenLastIsACandidateForTheNextRecording) {
 }
 
 TEST(DetectorSessions, ThePlacesOfOneDetectorAreRecognisedByAnother) {
-  LoopDetectorOptions options = Options();
+  LoopDetectorOptions options = SessionOptions();
   options.wm_limit = 6;  // some are in long-term memory
-  LoopDetector one(Options()), two(options);
+  LoopDetector one(SessionOptions()), two(options);
   constexpr int kPlaces = 18, kAgain = 6;
   for (int i = 0; i < kPlaces; ++i) {
     one.Detect(Query(i, TexturedImage(static_cast<std::uint32_t>(i))));
@@ -66,7 +66,7 @@ TEST(DetectorSessions, ThePlacesOfOneDetectorAreRecognisedByAnother) {
 }
 
 TEST(DetectorSessions, DenseMembersHaveNoPlacesToShow) {
-  LoopDetectorOptions options = Options();
+  LoopDetectorOptions options = SessionOptions();
   options.members = {"orb", "hog"};
   LoopDetector detector(options);
   EXPECT_THROW(detector.Places(), InputError);

@@ -20,7 +20,8 @@ using testing::ErrorOf;
 using ::testing::HasSubstr;
 using testing::kWallPlaces;
 
-LoopDetectorOptions Options(const std::vector<std::string>& members, const std::filesystem::path& model) {
+LoopDetectorOptions DnnMemberOptions(const std::vector<std::string>& members,
+                                     const std::filesystem::path& model) {
   LoopDetectorOptions options = testing::SmallOptions();
   options.members = members;
   options.rule = members.size() == 1 ? CombinationRule::kSingle : CombinationRule::kJoint;
@@ -31,7 +32,7 @@ LoopDetectorOptions Options(const std::vector<std::string>& members, const std::
   return options;
 }
 
-std::vector<LoopResult> TwoWalks(const LoopDetectorOptions& options, int images_again) {
+std::vector<LoopResult> TwoWalksOfDnn(const LoopDetectorOptions& options, int images_again) {
   LoopDetector detector(options);
   std::vector<LoopResult> results;
   for (int i = 0; i < kWallPlaces + images_again; ++i) {
@@ -41,7 +42,7 @@ std::vector<LoopResult> TwoWalks(const LoopDetectorOptions& options, int images_
   return results;
 }
 
-int Found(const std::vector<LoopResult>& results) {
+int LoopsFound(const std::vector<LoopResult>& results) {
   int found = 0;
   for (std::size_t i = kWallPlaces; i < results.size(); ++i) {
     const bool near = std::abs(results[i].best - (results[i].query - kWallPlaces)) <= 1;
@@ -53,25 +54,25 @@ int Found(const std::vector<LoopResult>& results) {
 class DnnMember : public testing::SmallNetworks {};
 
 TEST_F(DnnMember, FindsTheSecondLapAloneAndAmongOthers) {
-  const std::vector<LoopResult> alone = TwoWalks(Options({"dnn"}, Network("edges")), 30);
-  EXPECT_GE(Found(alone), 15);
+  const std::vector<LoopResult> alone = TwoWalksOfDnn(DnnMemberOptions({"dnn"}, Network("edges")), 30);
+  EXPECT_GE(LoopsFound(alone), 15);
   EXPECT_EQ(alone.back().members.front().name, "dnn");
   EXPECT_TRUE(alone.back().members.front().took_part);
   EXPECT_EQ(alone.back().members.front().features, 1);
-  const int corners = Found(TwoWalks(Options({"orb"}, ""), 30));
-  EXPECT_GE(Found(TwoWalks(Options({"orb", "dnn"}, Network("edges")), 30)), corners - 1);
+  const int corners = LoopsFound(TwoWalksOfDnn(DnnMemberOptions({"orb"}, ""), 30));
+  EXPECT_GE(LoopsFound(TwoWalksOfDnn(DnnMemberOptions({"orb", "dnn"}, Network("edges")), 30)), corners - 1);
 }
 
 TEST_F(DnnMember, SameResultsForAnyNumberOfThreads) {
-  LoopDetectorOptions options = Options({"orb", "dnn", "hog"}, Network("edges"));
+  LoopDetectorOptions options = DnnMemberOptions({"orb", "dnn", "hog"}, Network("edges"));
   options.threads = 1;
-  const std::vector<LoopResult> one = TwoWalks(options, 12);
+  const std::vector<LoopResult> one = TwoWalksOfDnn(options, 12);
   options.threads = 2;
-  testing::ExpectEqual(one, TwoWalks(options, 12));
+  testing::ExpectEqual(one, TwoWalksOfDnn(options, 12));
 }
 
 TEST_F(DnnMember, LocatesOneImageByItself) {
-  LoopDetector detector(Options({"dnn"}, Network("edges")));
+  LoopDetector detector(DnnMemberOptions({"dnn"}, Network("edges")));
   for (int i = 0; i < kWallPlaces; ++i) detector.Detect(AlongWall(i), i);
   LoopQuery query;
   query.image = testing::SeenAgain(AlongWall(12));
@@ -79,7 +80,7 @@ TEST_F(DnnMember, LocatesOneImageByItself) {
 }
 
 TEST_F(DnnMember, SavedMemoriesAreForTheSameNetwork) {
-  const LoopDetectorOptions options = Options({"orb", "dnn"}, Network("means"));
+  const LoopDetectorOptions options = DnnMemberOptions({"orb", "dnn"}, Network("means"));
   LoopDetector detector(options);
   for (int i = 0; i < 20; ++i) detector.Detect(AlongWall(i), i);
   const std::filesystem::path file = folder() / "memory";
@@ -92,8 +93,8 @@ TEST_F(DnnMember, SavedMemoriesAreForTheSameNetwork) {
   }
   LoopDetectorOptions resized = options;
   resized.dnn.width = 80;
-  for (const LoopDetectorOptions& other :
-       {Options({"orb", "dnn"}, Network("three")), Options({"orb", "dnn"}, Network("other")), resized}) {
+  for (const LoopDetectorOptions& other : {DnnMemberOptions({"orb", "dnn"}, Network("three")),
+                                           DnnMemberOptions({"orb", "dnn"}, Network("other")), resized}) {
     LoopDetector another(other);
     EXPECT_THAT(ErrorOf([&] { another.Load(file); }),
                 AllOf(HasSubstr("another configuration"), HasSubstr("dnn (4 values of network")));
@@ -102,7 +103,7 @@ TEST_F(DnnMember, SavedMemoriesAreForTheSameNetwork) {
 }
 
 TEST_F(DnnMember, LongTermMemoriesAreForTheSameNetwork) {
-  LoopDetectorOptions options = Options({"dnn"}, Network("edges"));
+  LoopDetectorOptions options = DnnMemberOptions({"dnn"}, Network("edges"));
   options.ltm_file = (folder() / "ltm.sqlite").string();
   options.wm_limit = 15;
   {
@@ -119,16 +120,16 @@ TEST_F(DnnMember, LongTermMemoriesAreForTheSameNetwork) {
 }
 
 TEST_F(DnnMember, WhatTheNetworkCantDoLeavesTheDetectorAsItWas) {
-  EXPECT_THAT(ErrorOf([&] { LoopDetector detector(Options({"dnn"}, Network("map"))); }),
+  EXPECT_THAT(ErrorOf([&] { LoopDetector detector(DnnMemberOptions({"dnn"}, Network("map"))); }),
               HasSubstr("is a vector"));
-  LoopDetector detector(Options({"orb", "dnn"}, Network("huge")));
+  LoopDetector detector(DnnMemberOptions({"orb", "dnn"}, Network("huge")));
   EXPECT_THAT(ErrorOf([&] { detector.Detect(AlongWall(0), 0); }), HasSubstr("not a finite number"));
   EXPECT_EQ(detector.LastId(), -1);
   EXPECT_EQ(detector.NumLocations(), 0u);
 }
 
 TEST_F(DnnMember, DescriptorsOfTheCallersOwnAreAsLong) {
-  LoopDetector detector(Options({"dnn"}, Network("means")));
+  LoopDetector detector(DnnMemberOptions({"dnn"}, Network("means")));
   LoopQuery query;
   query.member_features["dnn"].descriptors = cv::Mat::ones(1, 5, CV_32F);
   EXPECT_THAT(ErrorOf([&] { detector.Detect(query); }), HasSubstr("5 values"));

@@ -55,7 +55,7 @@ void ExpectIs(const cv::Mat& descriptor, const std::vector<float>& values) {
       << descriptor << " is not along " << wanted;
 }
 
-std::string Problem(const DnnOptions& options) {
+std::string ProblemOf(const DnnOptions& options) {
   return testing::ErrorOf([&] { const DnnDescriptor descriptor(options); });
 }
 
@@ -121,24 +121,24 @@ TEST_F(DnnDescriptorTest, LayersHaveTheNamesOfTheFile) {
     EXPECT_EQ(cv::norm(Describe(options, TwoColours()) - whole), 0.0) << layer;
   }
   options.layer = "pol";
-  EXPECT_THAT(Problem(options),
+  EXPECT_THAT(ProblemOf(options),
               AllOf(HasSubstr("means.onnx"), HasSubstr("no layer 'pol' (dnn.layer); near ones: 'pool'"),
                     HasSubstr("its outputs: 'descriptor'")));
   options.layer = "mix";
-  EXPECT_THAT(Problem(options),
+  EXPECT_THAT(ProblemOf(options),
               AllOf(HasSubstr("layer 'mix' gives 1 x 4 x 48 x 64 values"), HasSubstr("is a vector")));
   options = Plain(Network("two"));
-  EXPECT_THAT(Problem(options), AllOf(HasSubstr("2 outputs ('mean', 'most')"), HasSubstr("dnn.layer")));
+  EXPECT_THAT(ProblemOf(options), AllOf(HasSubstr("2 outputs ('mean', 'most')"), HasSubstr("dnn.layer")));
   options.layer = "most";
   ExpectIs(Describe(options, TwoColours()), {120, 80, 50});
 }
 
 TEST_F(DnnDescriptorTest, SaysWhatIsWrongWithAFile) {
   DnnOptions options = Plain(folder() / "nowhere.onnx");
-  EXPECT_THAT(Problem(options),
+  EXPECT_THAT(ProblemOf(options),
               AllOf(HasSubstr("nowhere.onnx (dnn.model): can't be read"), HasSubstr("give the path")));
   options.model = folder().string();
-  EXPECT_THAT(Problem(options), HasSubstr("can't be read"));
+  EXPECT_THAT(ProblemOf(options), HasSubstr("can't be read"));
   const auto write = [&](const std::string& bytes) {
     options.model = (folder() / "bad.onnx").string();
     std::ofstream(options.model, std::ios::binary) << bytes;
@@ -148,15 +148,16 @@ TEST_F(DnnDescriptorTest, SaysWhatIsWrongWithAFile) {
   for (const std::string& bytes :
        {std::string(), std::string("no network\n"), whole.substr(0, whole.size() / 2)}) {
     write(bytes);
-    EXPECT_THAT(Problem(options), AllOf(HasSubstr("bad.onnx (dnn.model): is no ONNX file that OpenCV reads"),
-                                        HasSubstr("OpenCV 4"), Not(HasSubstr("\n"))))
+    EXPECT_THAT(ProblemOf(options),
+                AllOf(HasSubstr("bad.onnx (dnn.model): is no ONNX file that OpenCV reads"),
+                      HasSubstr("OpenCV 4"), Not(HasSubstr("\n"))))
         << bytes.size();
   }
 }
 
 TEST_F(DnnDescriptorTest, SaysWhatIsWrongWithAnOutput) {
-  EXPECT_THAT(Problem(Plain(Network("map"))), HasSubstr("layer 'mixed' gives 1 x 4 x 48 x 64 values"));
-  EXPECT_THAT(Problem(Plain(Network("one"))), HasSubstr("gives 1 x 1 values"));
+  EXPECT_THAT(ProblemOf(Plain(Network("map"))), HasSubstr("layer 'mixed' gives 1 x 4 x 48 x 64 values"));
+  EXPECT_THAT(ProblemOf(Plain(Network("one"))), HasSubstr("gives 1 x 1 values"));
   EXPECT_THAT(testing::ErrorOf([&] { Describe(Plain(Network("huge")), TwoColours()); }),
               AllOf(HasSubstr("huge.onnx"), HasSubstr("not a finite number"), HasSubstr("dnn.scale")));
 }
@@ -165,10 +166,10 @@ TEST_F(DnnDescriptorTest, SaysThatANetworkTakesAnotherSize) {
   DnnOptions options = Plain(Network("sized"));
   EXPECT_EQ(DnnDescriptor(options).width(), 5);
   options.width = 80;
-  EXPECT_THAT(Problem(options), AllOf(HasSubstr("sized.onnx"), HasSubstr("an image of 80 x 48 pixels"),
-                                      HasSubstr("set dnn.width and dnn.height"), HasSubstr("OpenCV 4")));
+  EXPECT_THAT(ProblemOf(options), AllOf(HasSubstr("sized.onnx"), HasSubstr("an image of 80 x 48 pixels"),
+                                        HasSubstr("set dnn.width and dnn.height"), HasSubstr("OpenCV 4")));
   options.width = 15;
-  EXPECT_EQ(Problem(options), "dnn.width must be 16 to 4096 [px], not 15");
+  EXPECT_EQ(ProblemOf(options), "dnn.width must be 16 to 4096 [px], not 15");
 }
 
 TEST_F(DnnDescriptorTest, ReadsTheHeadOfPublicModels) {

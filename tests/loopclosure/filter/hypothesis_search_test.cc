@@ -8,14 +8,14 @@ namespace {
 
 using ::testing::HasSubstr;
 
-constexpr int kPlaces = 60;
+constexpr int kSearchPlaces = 60;
 constexpr int kInliers = 100;
 
-// A path of kPlaces images; the newest is the query, and the belief points at one place of the path.
+// A path of kSearchPlaces images; the newest is the query, and the belief points at one place of the path.
 class HypothesisSearchTest : public ::testing::Test {
  protected:
-  HypothesisSearchTest() : memory_(options_.stm_size), views_(kPlaces) {
-    for (int i = 0; i < kPlaces; ++i) {
+  HypothesisSearchTest() : memory_(options_.stm_size), views_(kSearchPlaces) {
+    for (int i = 0; i < kSearchPlaces; ++i) {
       views_[static_cast<std::size_t>(i)].id = i;
       memory_.Add(i);
       memory_.Settle();
@@ -25,7 +25,7 @@ class HypothesisSearchTest : public ::testing::Test {
   // `alike`: whether geometry finds two images alike, by their ids.
   LoopResult Search(int query, int place, const std::function<bool(std::int64_t, std::int64_t)>& alike) {
     Belief belief;
-    belief.places.assign(kPlaces, 0.0);
+    belief.places.assign(kSearchPlaces, 0.0);
     belief.places[static_cast<std::size_t>(place)] = 0.9;
     const HypothesisSearch search(
         options_, memory_,
@@ -51,13 +51,13 @@ class HypothesisSearchTest : public ::testing::Test {
 };
 
 TEST_F(HypothesisSearchTest, WhatWasInSightAllTheTimeIsNoReturn) {
-  const LoopResult result = Search(kPlaces - 1, 40, [](auto, auto) { return true; });
+  const LoopResult result = Search(kSearchPlaces - 1, 40, [](auto, auto) { return true; });
   EXPECT_FALSE(result.accepted);
   EXPECT_THAT(result.reason, HasSubstr("in sight all the time"));
 }
 
 TEST_F(HypothesisSearchTest, AShortWayRoundAndBackIsAReturn) {
-  const int query = kPlaces - 1;
+  const int query = kSearchPlaces - 1;
   const LoopResult result =
       Search(query, 40, [&](auto a, auto b) { return a == query && (b <= 42 || b >= 57); });
   EXPECT_TRUE(result.accepted);
@@ -65,7 +65,7 @@ TEST_F(HypothesisSearchTest, AShortWayRoundAndBackIsAReturn) {
 }
 
 TEST_F(HypothesisSearchTest, AnOldPlaceIsAskedForItselfAlone) {
-  const LoopResult result = Search(kPlaces - 1, 5, [](auto, auto) { return true; });
+  const LoopResult result = Search(kSearchPlaces - 1, 5, [](auto, auto) { return true; });
   EXPECT_TRUE(result.accepted);
 }
 

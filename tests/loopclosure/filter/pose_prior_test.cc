@@ -17,7 +17,7 @@ namespace {
 using internal::ApplyGains;
 using internal::PoseTrack;
 
-PosePrior At(double x, double sigma_m = 2.0, double drift = 0.01) {
+PosePrior PriorAt(double x, double sigma_m = 2.0, double drift = 0.01) {
   PosePrior prior;
   prior.position_m = {x, 0, 0};
   prior.sigma_m = sigma_m;
@@ -56,14 +56,14 @@ double PosteriorAt(const LoopResult& result, std::int64_t id) {
 }
 
 TEST(PosePrior, OfTwoPlacesThatLookAlikeTheNearerOneWins) {
-  const auto prior = [](double x) { return At(x); };
+  const auto prior = [](double x) { return PriorAt(x); };
   EXPECT_EQ(SeeTheDoorAgain(prior, kTwin + 0.5).candidate, kTwin);
   EXPECT_EQ(SeeTheDoorAgain(prior, kOtherTwin - 0.5).candidate, kOtherTwin);
 }
 
 TEST(PosePrior, WithAHugeUncertaintyNothingChanges) {
   const LoopResult without = SeeTheDoorAgain([](double) { return std::nullopt; }, 0);
-  const LoopResult with = SeeTheDoorAgain([](double x) { return At(x, 1e6); }, kTwin);
+  const LoopResult with = SeeTheDoorAgain([](double x) { return PriorAt(x, 1e6); }, kTwin);
   EXPECT_EQ(with.best, without.best);
   EXPECT_NEAR(with.hypothesis, without.hypothesis, 1e-6);
   for (const std::int64_t door : {kTwin, kOtherTwin})
@@ -73,13 +73,13 @@ TEST(PosePrior, WithAHugeUncertaintyNothingChanges) {
 TEST(PosePrior, PositionsOfAnotherWorldSayNothing) {
   int images = 0;
   const auto lost = [&images](double x) {
-    PosePrior prior = At(x);
+    PosePrior prior = PriorAt(x);
     prior.frame = images++ < kDoors ? 0 : 1;
     return prior;
   };
   int others = 0;
   const auto silent = [&others](double x) {
-    return others++ < kDoors ? std::optional<PosePrior>(At(x)) : std::nullopt;
+    return others++ < kDoors ? std::optional<PosePrior>(PriorAt(x)) : std::nullopt;
   };
   const LoopResult without = SeeTheDoorAgain(silent, 0);
   const LoopResult with = SeeTheDoorAgain(lost, kTwin);
@@ -91,8 +91,8 @@ TEST(PosePrior, OfNumbersThatAreNoneIsRefused) {
   LoopDetector detector(testing::SmallOptions());
   LoopQuery query;
   query.image = testing::TexturedImage(1, 240, 180);
-  for (const PosePrior& prior :
-       {At(std::nan("")), At(0, 0), At(0, 1, -1), At(0, std::numeric_limits<double>::infinity())}) {
+  for (const PosePrior& prior : {PriorAt(std::nan("")), PriorAt(0, 0), PriorAt(0, 1, -1),
+                                 PriorAt(0, std::numeric_limits<double>::infinity())}) {
     query.pose_prior = prior;
     EXPECT_THROW(detector.Detect(query), InputError);
   }
@@ -102,10 +102,10 @@ TEST(PoseTrack, GainsAreOneInTheMeanAndBounded) {
   PoseTrack track;
   std::vector<int> places;
   for (int i = 0; i < 200; ++i) {
-    track.Add(i, At(i, 1.0, 0.0));
+    track.Add(i, PriorAt(i, 1.0, 0.0));
     places.push_back(i);
   }
-  track.Add(200, At(3, 1.0, 0.0));
+  track.Add(200, PriorAt(3, 1.0, 0.0));
   const std::vector<double> gains = track.Gains(places);
   const auto [least, most] = std::minmax_element(gains.begin(), gains.begin() + 200);
   EXPECT_EQ(*most, PoseTrack::kMostGain);
@@ -116,11 +116,11 @@ TEST(PoseTrack, GainsAreOneInTheMeanAndBounded) {
 
 TEST(PoseTrack, TheLongerTheWayTheLessItKnows) {
   PoseTrack track;
-  track.Add(0, At(0, 1.0, 0.1));
-  track.Add(1, At(4, 1.0, 0.1));
-  const std::vector<double> early = (track.Add(2, At(0, 1.0, 0.1)), track.Gains({0, 1}));
-  track.Add(3, At(100, 1.0, 0.1));
-  const std::vector<double> late = (track.Add(4, At(0, 1.0, 0.1)), track.Gains({0, 1}));
+  track.Add(0, PriorAt(0, 1.0, 0.1));
+  track.Add(1, PriorAt(4, 1.0, 0.1));
+  const std::vector<double> early = (track.Add(2, PriorAt(0, 1.0, 0.1)), track.Gains({0, 1}));
+  track.Add(3, PriorAt(100, 1.0, 0.1));
+  const std::vector<double> late = (track.Add(4, PriorAt(0, 1.0, 0.1)), track.Gains({0, 1}));
   EXPECT_GT(early[0] / early[1], 2 * late[0] / late[1]);
   EXPECT_GT(late[0], late[1]);
 }

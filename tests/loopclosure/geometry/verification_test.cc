@@ -13,7 +13,7 @@ namespace {
 constexpr int kPoints = 200;
 constexpr std::uint32_t kSeed = 7;
 
-PinholeCamera Camera() { return testing::PlainCamera(500); }
+PinholeCamera VerifiedCamera() { return testing::PlainCamera(500); }
 
 // A cloud in front of the camera of the query, 4 to 12 m away.
 std::vector<Eigen::Vector3d> Cloud() {
@@ -37,12 +37,12 @@ View See(const Pose& T_world_camera, std::int64_t id, bool calibrated, bool with
   View view;
   view.id = id;
   view.size = {640, 480};
-  if (calibrated) view.camera = Camera();
+  if (calibrated) view.camera = VerifiedCamera();
   View::Set set;
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     const Eigen::Vector3d p = T_world_camera.Inverse() * cloud[i];
-    const Eigen::Vector2d pixel = Camera().Project(p);
-    if (p.z() < 0.1 || !Camera().Contains(pixel)) continue;
+    const Eigen::Vector2d pixel = VerifiedCamera().Project(p);
+    if (p.z() < 0.1 || !VerifiedCamera().Contains(pixel)) continue;
     std::mt19937 own(static_cast<std::uint32_t>(i + 1));
     cv::Mat row(1, 32, CV_8U);
     for (int c = 0; c < 32; ++c) row.at<std::uint8_t>(0, c) = static_cast<std::uint8_t>(own());
@@ -55,11 +55,11 @@ View See(const Pose& T_world_camera, std::int64_t id, bool calibrated, bool with
   return view;
 }
 
-Pose At(double x, double z, double turn = 0.0) { return Pose(ExpSO3({0, turn, 0}), {x, 0, z}); }
+Pose PoseAt(double x, double z, double turn = 0.0) { return Pose(ExpSO3({0, turn, 0}), {x, 0, z}); }
 
 TEST(GeometricVerifier, WithMetricPointsTheConstraintIsTheRelativePose) {
   const GeometricVerifier verifier({}, 1);
-  const Pose query = At(0.4, 0.2, 0.05);
+  const Pose query = PoseAt(0.4, 0.2, 0.05);
   const Verification v = verifier.Verify(See(query, 9, true, true), See(Pose(), 1, true, true));
   ASSERT_TRUE(v.accepted) << v.reason;
   EXPECT_EQ(v.type, ConstraintType::kRigid);
@@ -71,7 +71,7 @@ TEST(GeometricVerifier, WithMetricPointsTheConstraintIsTheRelativePose) {
 
 TEST(GeometricVerifier, WithCalibrationAloneTheDirectionIsKnown) {
   const GeometricVerifier verifier({}, 1);
-  const Verification v = verifier.Verify(See(At(0.8, 0.0), 9, true, false), See(Pose(), 1, true, false));
+  const Verification v = verifier.Verify(See(PoseAt(0.8, 0.0), 9, true, false), See(Pose(), 1, true, false));
   ASSERT_TRUE(v.accepted) << v.reason;
   EXPECT_EQ(v.type, ConstraintType::kEssential);
   EXPECT_NEAR(std::abs(v.S_candidate_query.translation.normalized().x()), 1.0, 0.02);
@@ -88,12 +88,12 @@ TEST_P(Ahead, IsOneForAQueryFurtherOnAndSmallForOneBeside) {
     EXPECT_TRUE(v.accepted) << v.reason;
     return v.ahead;
   };
-  EXPECT_GT(ahead(At(0.0, 1.5)), 0.97);
-  EXPECT_GT(ahead(At(0.0, -1.5)), 0.97);
-  EXPECT_LT(ahead(At(1.0, 0.0)), 0.25);
+  EXPECT_GT(ahead(PoseAt(0.0, 1.5)), 0.97);
+  EXPECT_GT(ahead(PoseAt(0.0, -1.5)), 0.97);
+  EXPECT_LT(ahead(PoseAt(1.0, 0.0)), 0.25);
   // Along a path that passes by, it falls towards the nearest point and rises again.
-  EXPECT_GT(ahead(At(0.7, -2.0)), ahead(At(0.7, -0.5)));
-  EXPECT_GT(ahead(At(0.7, 2.0)), ahead(At(0.7, 0.5)));
+  EXPECT_GT(ahead(PoseAt(0.7, -2.0)), ahead(PoseAt(0.7, -0.5)));
+  EXPECT_GT(ahead(PoseAt(0.7, 2.0)), ahead(PoseAt(0.7, 0.5)));
 }
 
 TEST(GeometricVerifier, AnotherPlaceIsRefusedWithAReason) {
@@ -103,7 +103,7 @@ TEST(GeometricVerifier, AnotherPlaceIsRefusedWithAReason) {
   for (cv::Point2f& p : other.members[0].pixels) {  // the same features, elsewhere in the image
     p = {static_cast<float>(generator() % 640u), static_cast<float>(generator() % 480u)};
   }
-  const Verification v = verifier.Verify(See(At(0.2, 0), 9, false, false), other);
+  const Verification v = verifier.Verify(See(PoseAt(0.2, 0), 9, false, false), other);
   EXPECT_FALSE(v.accepted);
   EXPECT_FALSE(v.reason.empty());
 }
@@ -116,7 +116,7 @@ TEST(GeometricVerifier, EvidencePartsOnePlaceFromChanceWhateverIsDecided) {
   for (cv::Point2f& p : chance.members[0].pixels) {
     p = {static_cast<float>(generator() % 640u), static_cast<float>(generator() % 480u)};
   }
-  const View query = See(At(0.8, 0.2), 9, false, false);
+  const View query = See(PoseAt(0.8, 0.2), 9, false, false);
   const Verification same = GeometricVerifier(strict, 1).Verify(query, See(Pose(), 1, false, false));
   const Verification other = GeometricVerifier(strict, 1).Verify(query, chance);
   ASSERT_FALSE(same.accepted);
@@ -131,7 +131,7 @@ TEST(GeometricVerifier, EvidencePartsOnePlaceFromChanceWhateverIsDecided) {
 
 TEST(GeometricVerifier, WithMetricPointsEvidenceIsByPixels) {
   const Verification v =
-      GeometricVerifier({}, 1).Verify(See(At(0.4, 0.2, 0.05), 9, true, true), See(Pose(), 1, true, true));
+      GeometricVerifier({}, 1).Verify(See(PoseAt(0.4, 0.2, 0.05), 9, true, true), See(Pose(), 1, true, true));
   ASSERT_EQ(v.type, ConstraintType::kRigid);
   EXPECT_LT(v.expected_inliers, 3.1);  // the sample of three
   EXPECT_LT(v.log_nfa, -300);
@@ -139,7 +139,7 @@ TEST(GeometricVerifier, WithMetricPointsEvidenceIsByPixels) {
 }
 
 TEST(GeometricVerifier, MatchesInOneSpotAreRefused) {
-  View query = See(At(0.8, 0), 9, false, false), candidate = See(Pose(), 1, false, false);
+  View query = See(PoseAt(0.8, 0), 9, false, false), candidate = See(Pose(), 1, false, false);
   for (View* view : {&query, &candidate}) {
     for (cv::Point2f& p : view->members[0].pixels)
       p = cv::Point2f(300, 200) + (p - cv::Point2f(320, 240)) * 0.08f;
@@ -218,7 +218,7 @@ TEST_P(WithOverlay, TwoPlacesAreNotOneByWhatTheCameraCarriesAlong) {
 }
 
 TEST_P(WithOverlay, APlaceSeenAgainIsOneByWhatMoves) {
-  View query = See(At(0.5, 0.3), 9, false, false), candidate = See(Pose(), 1, false, false);
+  View query = See(PoseAt(0.5, 0.3), 9, false, false), candidate = See(Pose(), 1, false, false);
   Add(GetParam(), query);
   Add(GetParam(), candidate);
   const Verification v = GeometricVerifier({}, 1).Verify(query, candidate);
@@ -240,7 +240,7 @@ class Turned : public ::testing::TestWithParam<bool> {};
 INSTANTIATE_TEST_SUITE_P(Calibrated, Turned, ::testing::Bool());
 
 TEST_P(Turned, OnTheSpotIsAcceptedByItsHomography) {
-  const Pose query = At(0, 0, 0.2);
+  const Pose query = PoseAt(0, 0, 0.2);
   const Verification v =
       GeometricVerifier({}, 1).Verify(See(query, 9, GetParam(), false), See(Pose(), 1, GetParam(), false));
   ASSERT_TRUE(v.accepted) << v.reason;
@@ -265,8 +265,8 @@ View SeeFlat(const Pose& T_world_camera, std::int64_t id, bool calibrated) {
     const Eigen::Vector3d ray(std::cos(0.5 * static_cast<double>(i * i)),
                               std::sin(1.7 * static_cast<double>(i * i)) * 0.7, 1);
     const Eigen::Vector3d point(3 * ray.x(), 3 * ray.y(), 6 + ray.x());
-    const Eigen::Vector2d pixel = Camera().Project(T_world_camera.Inverse() * point);
-    if (!Camera().Contains(pixel)) continue;
+    const Eigen::Vector2d pixel = VerifiedCamera().Project(T_world_camera.Inverse() * point);
+    if (!VerifiedCamera().Contains(pixel)) continue;
     const double dy = noise(generator), dx = noise(generator);
     flat.pixels.emplace_back(static_cast<float>(pixel.x() + dx), static_cast<float>(pixel.y() + dy));
     flat.descriptors.push_back(Descriptor(static_cast<std::uint32_t>(900000 + i)));
@@ -276,7 +276,7 @@ View SeeFlat(const Pose& T_world_camera, std::int64_t id, bool calibrated) {
 }
 
 TEST_P(Turned, AFlatSceneIsAcceptedByItsHomography) {
-  const Verification v = GeometricVerifier({}, 1).Verify(SeeFlat(At(0.8, 0.2, 0.1), 9, GetParam()),
+  const Verification v = GeometricVerifier({}, 1).Verify(SeeFlat(PoseAt(0.8, 0.2, 0.1), 9, GetParam()),
                                                          SeeFlat(Pose(), 1, GetParam()));
   ASSERT_TRUE(v.accepted) << v.reason;
   EXPECT_TRUE(v.homography);
@@ -297,7 +297,7 @@ TEST_P(Turned, ChanceIsNoHomography) {
 
 TEST(GeometricVerifier, AMotionWithParallaxIsNoHomography) {
   const Verification v =
-      GeometricVerifier({}, 1).Verify(See(At(0.8, 0.2), 9, false, false), See(Pose(), 1, false, false));
+      GeometricVerifier({}, 1).Verify(See(PoseAt(0.8, 0.2), 9, false, false), See(Pose(), 1, false, false));
   ASSERT_TRUE(v.accepted) << v.reason;
   EXPECT_FALSE(v.homography);
 }
@@ -322,7 +322,7 @@ class OfTwoCameras : public ::testing::TestWithParam<bool> {};
 INSTANTIATE_TEST_SUITE_P(OtherWay, OfTwoCameras, ::testing::Bool());
 
 TEST_P(OfTwoCameras, ImagesHaveAGeometryEachAndTheirEvidenceAddsUp) {
-  View query = SeeTwo(At(0.8, 0.1), Pose(ExpSO3({0, 0, 0.3}), {0, 0.8, -0.3}), 9, GetParam());
+  View query = SeeTwo(PoseAt(0.8, 0.1), Pose(ExpSO3({0, 0, 0.3}), {0, 0.8, -0.3}), 9, GetParam());
   View candidate = SeeTwo(Pose(), Pose(), 1, false);
   const Verification each = GeometricVerifier({}, 1).Verify(query, candidate);
   query.cameras.clear();
@@ -335,7 +335,7 @@ TEST_P(OfTwoCameras, ImagesHaveAGeometryEachAndTheirEvidenceAddsUp) {
 }
 
 TEST(GeometricVerifier, OneCameraDoesNotSpeakForTheOtherUnlessThatSeesNothing) {
-  const View query = SeeTwo(At(0.8, 0.1), Pose(ExpSO3({0, 0, 0.3}), {0, 0.8, -0.3}), 9, false);
+  const View query = SeeTwo(PoseAt(0.8, 0.1), Pose(ExpSO3({0, 0, 0.3}), {0, 0.8, -0.3}), 9, false);
   View candidate = SeeTwo(Pose(), Pose(), 1, false);
   View::Set& set = candidate.members[0];
   std::mt19937 generator(3);
@@ -362,7 +362,7 @@ TEST(GeometricVerifier, OneCameraDoesNotSpeakForTheOtherUnlessThatSeesNothing) {
 
 TEST(GeometricVerifier, TheBarIsScaledToTheMembersThatPool) {
   VerificationOptions options;
-  View query = See(At(0.5, 0.3), 9, false, false), candidate = See(Pose(), 1, false, false);
+  View query = See(PoseAt(0.5, 0.3), 9, false, false), candidate = See(Pose(), 1, false, false);
   query.members[0].pixels.resize(28);
   query.members[0].descriptors = query.members[0].descriptors.rowRange(0, 28).clone();
   EXPECT_FALSE(GeometricVerifier(options, 1).Verify(query, candidate).accepted);
@@ -376,7 +376,7 @@ TEST(GeometricVerifier, TheBarIsScaledToTheMembersThatPool) {
 
 TEST(GeometricVerifier, IsDeterministicForASeedAndAnyNumberOfThreads) {
   const GeometricVerifier verifier({}, 5);
-  const View query = See(At(0.5, 0.3), 9, false, false), candidate = See(Pose(), 1, false, false);
+  const View query = See(PoseAt(0.5, 0.3), 9, false, false), candidate = See(Pose(), 1, false, false);
   const Verification a = verifier.Verify(query, candidate, 1), b = verifier.Verify(query, candidate, 2);
   EXPECT_EQ(a.inliers, b.inliers);
   EXPECT_EQ(a.ahead, b.ahead);

@@ -36,7 +36,7 @@ TEST(Likelihood, TfIdfAddsTermFrequencyTimesInverseDocumentFrequency) {
   EXPECT_EQ(scores[2], 0.0);
 }
 
-SeenWords Seen(std::vector<int> words, std::vector<int> cells) {
+SeenWords WordsSeen(std::vector<int> words, std::vector<int> cells) {
   SeenWords seen;
   seen.words = std::move(words);
   seen.cells = std::move(cells);
@@ -49,7 +49,7 @@ TEST(Likelihood, CountsFollowTheEquation) {
   model.Add(Signature({1, 5}));
   model.Add(Signature({8, 9}));
   // Word 1 twice, in cells 0 and 6; word 2 in cell 1, of the same strip as 0; 77 and -1 nobody knows.
-  const std::vector<double> counts = model.Counts(Seen({1, 1, 2, 77, -1}, {0, 6, 1, 2, 3}));
+  const std::vector<double> counts = model.Counts(WordsSeen({1, 1, 2, 77, -1}, {0, 6, 1, 2, 3}));
   const double one =
       std::log10(3.0 / 2.0) / std::log10(3.0) / 2;  // an occurrence of 1, at each of its two cells
   const double first_strip = std::log1p(2 * one) + std::log1p(1.0);
@@ -72,7 +72,7 @@ TEST(Likelihood, WhatAgreesInOneSpotCountsLessThanWhatAgreesAllOver) {
     one_spot.push_back(9);
     all_over.push_back(w * 2);
   }
-  EXPECT_GT(model.Counts(Seen(words, all_over))[3], 3 * model.Counts(Seen(words, one_spot))[3]);
+  EXPECT_GT(model.Counts(WordsSeen(words, all_over))[3], 3 * model.Counts(WordsSeen(words, one_spot))[3]);
 }
 
 TEST(Likelihood, WhatHasBeenInSightEverSinceIsNoSignOfAReturn) {
@@ -85,7 +85,7 @@ TEST(Likelihood, WhatHasBeenInSightEverSinceIsNoSignOfAReturn) {
     if (slot == 0 || slot == 13) words.push_back(2);
     model.Add(Signature(words));
   }
-  const SeenWords newest = Seen({1, 2}, {0, 7});
+  const SeenWords newest = WordsSeen({1, 2}, {0, 7});
   const std::vector<double> all = model.Counts(newest);
   const std::vector<double> returns = model.Counts(newest, {12, 5});
   for (const int slot : {6, 7}) {
@@ -101,7 +101,7 @@ TEST(Likelihood, WhatHasBeenInSightEverSinceIsNoSignOfAReturn) {
 TEST(Likelihood, ASlotThatComesBackCountsAsIfItHadNeverBeenAway) {
   LikelihoodModel model(LikelihoodKind::kTfIdf);
   for (int slot = 0; slot < 8; ++slot) model.Add(Signature({1, 10 + slot, 20 + slot % 2}));
-  const SeenWords query = Seen({1, 20, 21, 13}, {0, 2, 4, 6});
+  const SeenWords query = WordsSeen({1, 20, 21, 13}, {0, 2, 4, 6});
   const std::vector<double> before = model.Counts(query, {6, 5});
   model.Remove(3);
   model.Restore(3, Signature({1, 13, 21}));

@@ -87,7 +87,7 @@ TEST(LocationMemory, ALinkIsMadeOnce) {
 }
 
 // Ten locations in WM (0..9) and one in STM (10).
-LocationMemory Chain() {
+LocationMemory ShortChain() {
   LocationMemory memory(1);
   for (int i = 0; i < 11; ++i) {
     memory.Add(i);
@@ -111,7 +111,7 @@ TEST(LocationMemory, ALoopIsTakenBackAndOdometryStays) {
 }
 
 TEST(LocationMemory, TheLightestThenTheOldestIsTransferredFirst) {
-  LocationMemory memory = Chain();
+  LocationMemory memory = ShortChain();
   EXPECT_EQ(memory.NextToTransfer(0.0, {}), 0);
   memory.AddLink(0, 4, LinkType::kLoop);
   EXPECT_EQ(memory.NextToTransfer(0.0, {0, 1}), 2);
@@ -175,7 +175,7 @@ TEST(LocationMemory, WeightKeepsALocationAndRecentOnesAndThoseLinkedToShortTermM
 }
 
 TEST(LocationMemory, LongTermNeighboursAreFoundAcrossLongTermMemory) {
-  LocationMemory memory = Chain();
+  LocationMemory memory = ShortChain();
   for (const int slot : {3, 4, 5}) EXPECT_TRUE(memory.Transfer(slot));
   EXPECT_FALSE(memory.Transfer(3));
   EXPECT_EQ(memory.state(4), State::kLongTerm);

@@ -25,12 +25,6 @@ namespace tutti {
 /// after loops, which would replace the odometry's shape by that of the images.
 RunConfig FollowingConfig(RunConfig config);
 
-/// A trajectory as moved keyframes say: `odometry` and `before` are poses of the odometry, `after` (as many
-/// as `before`, same stamps) where the keyframes are now. Poses between two keyframes are moved by both, the
-/// nearer one more; those before the first and after the last keyframe go with it, at the scale of the
-/// keyframes next to it. `odometry` comes back as it is if there are no keyframes. All are T_world_body.
-Trajectory CorrectTrajectory(const Trajectory& odometry, const Trajectory& before, const Trajectory& after);
-
 /// Keyframes, loops and pose graph around someone else's odometry (VIO, wheels, LiDAR, ...): poses and images
 /// go in, the correction comes out. Safe to use from several threads at once; what a pose and an image do
 /// enters a fixed number of images later, so the result does not depend on threads or load. Poses should be

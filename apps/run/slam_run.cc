@@ -1,0 +1,274 @@
+#include "apps/run/slam_run.h"
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "apps/run/interrupt.h"
+#include "apps/run/run_note.h"
+#include "apps/slam/trajectory_correction.h"
+
+namespace tutti {
+
+SlamRun::SlamRun(const RunRequest& request, const RunConfig& config, const Dataset& dataset,
+                 const GivenOdometry* given, const std::filesystem::path& out, RunResult& result)
+    : request_(request),
+      config_(config),
+      dataset_(dataset),
+      given_(given),
+      result_(result),
+      planted_(config.run, config.loops.seed),
+      live_(out, dataset.Rig(), config) {
+  if (request.resume) {
+    Resume(*request.resume);
+  } else if (request.map) {
+    GoOnIn(*request.map);
+  } else {
+    slam_ = std::make_unique<SlamSystem>(Watched(config, request), dataset.Rig(), Recorder());
+  }
+  if (request.checkpoint_s) checkpoints_.emplace(out / kCheckpoint, *request.checkpoint_s);
+  slam_->SetDetectionListener([this](const LoopResult& detection) {
+    for (const auto& observer : request_.observers) observer->OnDetection(detection);
+  });
+  if (!request.observers.empty()) {
+    slam_->SetKeyframeListener([this](const InputFrame& frame, int keyframe) {
+      for (const auto& observer : request_.observers) observer->OnKeyframe(frame, keyframe, State());
+    });
+  }
+  slam_->SetChangeListener([this](const Odometry& odometry, std::int64_t last) {
+    if (alone_ || given_ != nullptr) return;
+    alone_ = std::make_unique<OdometryAlone>(odometry, last, AloneBeside());
+  });
+  total_ = dataset.FrameSupply() == Supply::kStored ? dataset.Size() : static_cast<std::size_t>(-1);
+  result_.endless = dataset.FrameSupply() != Supply::kStored;
+  result_.realtime = request.realtime;
+  if (!request.realtime || dataset.FrameSupply() == Supply::kOnce) return;
+  clock_ = request.clock ? request.clock : std::make_shared<SteadyFrameClock>();
+  playback_.emplace(*clock_);
+}
+
+void SlamRun::TrackAll() {
+  for (const auto& observer : request_.observers) observer->OnStart(result_.rig);
+  begin_ = Span::Clock::now();
+  watch_ = internal::Stopwatch();
+  cpu_begin_ = ProcessCpuSeconds();
+  Progress progress(config_.run.loops ? "slam" : "odometry",
+                    total_ == static_cast<std::size_t>(-1) ? 0 : total_, Out());
+  Prefetcher frames(dataset_, Reading());
+  const double waited_ms = so_far_.read_wait_ms;
+  while (!InterruptGuard::Requested()) {
+    if (checkpoints_ && checkpoints_->Due()) WriteCheckpoint();
+    if (playback_) AwaitFrame(frames);
+    const std::optional<FetchedFrame> fetched = frames.Next();
+    so_far_.read_wait_ms = waited_ms + frames.WaitedMs();
+    if (!fetched) break;
+    TakeFrame(*fetched, progress);
+    NoteWarnings(progress);
+    progress.Update(++so_far_.next, Status());
+  }
+  result_.interrupted = InterruptGuard::Requested();
+  if (checkpoints_) EndCheckpoints(progress);
+  slam_->Finish();
+  planted_.PlantRest(slam_.get());
+  live_.AddLoops(slam_->loops());
+  for (const auto& observer : request_.observers) observer->OnEnd(State());
+  NoteWarnings(progress);
+  progress.Finish();
+  if (result_.interrupted) {
+    progress.Note("tutti: interrupted after " + std::to_string(so_far_.next) + " of " +
+                  std::to_string(Listed()) + " frames; writing what is there");
+  }
+  if (result_.realtime) {
+    progress.Note("tutti: real time: " + std::to_string(so_far_.dropped.size()) + " of " +
+                  std::to_string(so_far_.next) + " frames were dropped");
+  }
+}
+
+void SlamRun::Count() {
+  result_.frames_total = so_far_.next;
+  result_.frames_dropped = so_far_.dropped.size();
+  result_.frames_listed = dataset_.Size();
+  result_.frame_interval_s = FrameInterval(dataset_);
+  result_.stage_ms = slam_->StageMilliseconds();
+  result_.stage_ms["read"] = so_far_.read_ms;
+  result_.stage_ms["read_wait"] = so_far_.read_wait_ms;
+  if (!slam_->AppearanceOnly()) result_.stage_ms["odometry_extract"] += so_far_.extract_ms;
+  result_.wall_s = WallSeconds();
+  if (alone_) alone_->Tracked();
+  result_.cpu_s = CpuSeconds();
+  if (Recorder() != nullptr) result_.stages = SummarizeStages(recorder_.Spans(), result_.wall_s);
+  result_.trajectory_online = live_.trajectory();
+}
+
+void SlamRun::TrackUntouched() {
+  if (!alone_) return;
+  const std::size_t begin = alone_->last() < 0 ? 0 : so_far_.positions.at(alone_->last()) + 1;
+  if (!TracksAlong() && begin < result_.frames_total)
+    result_.odometry_complete = TracksAfter() && TrackAgain(begin, result_.frames_total);
+  alone_->Finish();
+  result_.odometry_alone_cpu_s = alone_->CpuSeconds();
+}
+
+void SlamRun::Collect() {
+  CollectMap(State(), result_);
+  if (request_.map) {
+    result_.map = MapGoneOn{request_.map->string(), slam_->Sessions(), {}};
+    CollectEarlierSessions(State(), result_);
+    CollectStamps(*slam_->odometry(), result_.map->sessions, result_);
+  }
+  result_.global_adjustments = slam_->GlobalAdjustments();
+  result_.frames_relocalized = slam_->Relocalized();
+  result_.graph = slam_->Graph();
+  result_.graph_proof = slam_->GraphProof();
+  if (given_ != nullptr && !slam_->AppearanceOnly()) CorrectGiven();
+  if (!alone_) return;
+  FrameRange session;
+  if (FirstFrame() > 0) session.first = FirstFrame();
+  result_.trajectory_odometry = BodyTrajectory(alone_->Tracked().FrameTrajectory(-1, session), result_.rig);
+}
+
+void SlamRun::CorrectGiven() {
+  Trajectory before;
+  for (const StampedPose& keyframe : result_.keyframe_trajectory)
+    before.push_back({keyframe.stamp_s, given_->At(keyframe.stamp_s).value()});
+  result_.trajectory_odometry = given_->trajectory();
+  result_.trajectory = CorrectTrajectory(given_->trajectory(), before, result_.keyframe_trajectory);
+}
+
+TrackResult SlamRun::Track(const InputFrame& frame) {
+  if (given_ == nullptr || slam_->AppearanceOnly()) return slam_->Track(frame);
+  if (const std::optional<Pose> T_odom_body = given_->At(frame.stamp_s))
+    return slam_->Follow(frame, *T_odom_body * result_.rig.T_body_camera);
+  TrackResult none;
+  none.state = TrackingState::kLost;
+  none.reason = "the trajectory has no pose at its time";
+  return none;
+}
+
+PrefetchOptions SlamRun::Reading() {
+  PrefetchOptions options;
+  options.begin = so_far_.next;
+  options.end = total_;
+  options.ahead = config_.run.threads > 1 ? 4 : 0;
+  options.stop = &InterruptGuard::Requested;
+  options.recorder = Recorder();
+  options.prepare = [this](InputFrame& frame) { Extract(frame); };
+  if (request_.realtime && !playback_) {  // a camera keeps its own time
+    options.ahead = 1;
+    options.newest = true;
+  }
+  return options;
+}
+
+void SlamRun::Extract(InputFrame& frame) {
+  if (slam_->AppearanceOnly()) return;
+  const ScopedSpan span(Recorder(), Lane::kReading, "extract");
+  frame.features = slam_->odometry()->Extract(frame);
+}
+
+void SlamRun::AwaitFrame(Prefetcher& frames) {
+  std::size_t next = so_far_.next;
+  while (next + 1 < Listed() && playback_->Due(dataset_.Stamp(next + 1))) ++next;
+  frames.SkipTo(next);
+  if (next < Listed()) playback_->Reach(dataset_.Stamp(next));
+}
+
+bool SlamRun::TracksAlong() const {
+  return config_.run.odometry_pass && !request_.realtime && dataset_.FrameSupply() != Supply::kOnce;
+}
+
+bool SlamRun::TracksAfter() const {
+  return config_.run.odometry_pass && request_.realtime && dataset_.FrameSupply() != Supply::kOnce;
+}
+
+bool SlamRun::TrackAgain(std::size_t begin, std::size_t end) {
+  Progress progress("odometry alone", end - begin, Out());
+  PrefetchOptions options;
+  options.begin = begin;
+  options.end = end;
+  options.ahead = Reading().ahead;
+  options.prepare = [this](InputFrame& frame) { frame.features = slam_->odometry()->Extract(frame); };
+  Prefetcher frames(dataset_, options);
+  // After a Ctrl-C this pass is the price of a complete file; a second Ctrl-C ends the process.
+  for (std::size_t i = begin; i < end; ++i) {
+    if (so_far_.dropped.count(i) != 0) continue;
+    frames.SkipTo(i);
+    const std::optional<FetchedFrame> fetched = frames.Next();
+    if (!fetched) return false;
+    if (fetched->read.frame) alone_->Track(*fetched->read.frame);
+    progress.Update(i + 1 - begin, "for trajectory_odometry.txt");
+    if ((result_.interrupted || InterruptGuard::Requested()) && i + 1 < end) return false;
+  }
+  return true;
+}
+
+void SlamRun::CountDepth(const ReadResult& read, Progress& progress) {
+  const InputFrame& frame = *read.frame;
+  if (result_.rig.sensor == Sensor::kMono || !frame.right.empty() || !frame.depth_m.empty()) return;
+  ++result_.frames_without_depth;
+  if (read.depth_error.empty()) return;
+  result_.bad_depth.push_back({frame.index, read.depth_error});
+  progress.Note("tutti: frame " + std::to_string(frame.index) + " is tracked without its " +
+                DepthSource(result_.rig.sensor) + " image: " + read.depth_error);
+}
+
+void SlamRun::NoteWarnings(Progress& progress) {
+  for (const std::string& warning : slam_->TakeWarnings()) progress.Note("tutti: warning: " + warning);
+  for (const std::string& problem : live_.TakeProblems()) progress.Note("tutti: warning: " + problem);
+  const auto problem = checkpoints_ ? checkpoints_->TakeProblem() : std::nullopt;
+  if (problem) progress.Note("tutti: warning: " + *problem);
+}
+
+void SlamRun::TakeFrame(const FetchedFrame& fetched, Progress& progress) {
+  so_far_.read_ms += fetched.read_ms;
+  so_far_.extract_ms += fetched.prepare_ms;
+  for (; so_far_.next < fetched.position; ++so_far_.next) so_far_.dropped.insert(so_far_.next);
+  if (fetched.read.frame) {
+    so_far_.positions[fetched.read.frame->index] = so_far_.next;
+    CountDepth(fetched.read, progress);
+    TrackOne(*fetched.read.frame);
+    if (alone_ && TracksAlong()) alone_->Track(*fetched.read.frame);
+    return;
+  }
+  const std::int64_t number = dataset_.Number(so_far_.next);
+  result_.bad.push_back({number, fetched.read.error});
+  progress.Note("tutti: frame " + std::to_string(number) + " is skipped: " + fetched.read.error);
+}
+
+double SlamRun::CpuSeconds() const {
+  return before_.cpu_s + ProcessCpuSeconds() - cpu_begin_ - (alone_ ? alone_->CpuSeconds() : 0.0);
+}
+
+void SlamRun::TrackOne(const InputFrame& frame) {
+  const ScopedSpan span(Recorder(), Lane::kTracking, "frame");
+  const internal::Stopwatch watch;
+  const TrackResult track = Track(frame);
+  result_.frame_ms.push_back(watch.Milliseconds());
+  if (track.keyframe >= 0) planted_.OnKeyframe(track.keyframe, slam_.get());
+  live_.Add(frame.stamp_s, track, State());
+  InputFrame numbered = frame;
+  numbered.index += FirstFrame();
+  for (const auto& observer : request_.observers) observer->OnFrame(numbered, track, State());
+  so_far_.state = slam_->AppearanceOnly() ? "appearance only" : ToString(track.state);
+  if (slam_->AppearanceOnly() || track.state == TrackingState::kTracking) {
+    so_far_.lost_open = false;
+    return;
+  }
+  ++result_.frames_lost;
+  if (!so_far_.lost_open || result_.lost.back().state != so_far_.state) {
+    result_.lost.push_back({frame.index, frame.index, so_far_.state, track.reason});
+    so_far_.lost_open = true;
+  }
+  result_.lost.back().last = frame.index;
+}
+
+std::string SlamRun::Status() const {
+  std::string status = so_far_.state;
+  if (config_.run.loops) {
+    const std::vector<LoopRecord>& loops = slam_->loops();
+    status += "  loops " + std::to_string(CountAccepted(loops)) + "/" + std::to_string(loops.size());
+  }
+  return status;
+}
+
+}  // namespace tutti

@@ -116,7 +116,7 @@ std::vector<PlotShape> Titled(Plot plot, const std::string& title) {
 
 void RunPlot(const PlotArguments& arguments) {
   for (const std::string& file : arguments.out) CheckPlotFile(file);
-  const std::vector<EvaluatedEstimate> estimates = EvaluateInput(arguments.input);
+  const std::vector<EvaluatedEstimate> estimates = EvaluateInput(Resolved(arguments.input));
   const std::vector<PlotShape> shapes = arguments.what == "error" ? Titled(Errors(estimates), arguments.title)
                                         : arguments.what == "rpe"
                                             ? Titled(RelativeErrorCurves(estimates), arguments.title)
@@ -131,6 +131,7 @@ void RunPlot(const PlotArguments& arguments) {
 
 void SetUpPlot(CLI::App& command, int&) {
   const auto arguments = std::make_shared<PlotArguments>();
+  arguments->input.reference_comes_first = false;
   AddEvaluationOptions(command, arguments->input);
   command
       .add_option(

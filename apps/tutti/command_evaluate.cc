@@ -2,14 +2,17 @@
 #include <cstdio>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "apps/tutti/against.h"
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/evaluation_input.h"
 #include "apps/tutti/evaluation_output.h"
 #include "apps/tutti/files.h"
+#include "apps/tutti/published.h"
 
 namespace tutti::cli {
 namespace {
@@ -19,6 +22,7 @@ constexpr int kLimitNotMet = 3;  // 1 is bad input, 2 an internal error
 struct EvaluateArguments {
   EvaluationInput input;
   std::string json, errors, table_format = "text";
+  Against against;
   double max_ate_m = std::numeric_limits<double>::infinity();
   double min_coverage = 0;
 };
@@ -41,12 +45,24 @@ bool MeetsLimits(const EvaluatedEstimate& estimate, const EvaluateArguments& arg
 int RunEvaluate(const EvaluateArguments& arguments) {
   const TableFormat format = ParseTableFormat(arguments.table_format);
   const EvaluationInput input = Resolved(arguments.input);
+  const bool against = !arguments.against.benchmark.empty();
+  if (against && input.reference.empty() && input.estimates.empty()) {
+    std::fputs(DescribePublished(arguments.against.benchmark, format).c_str(), stdout);
+    return 0;
+  }
+  RequireFiles(input);
+  std::optional<PublishedComparison> published;
+  if (against) published.emplace(arguments.against, input);
   const std::vector<EvaluatedEstimate> estimates = EvaluateInput(input);
-  const std::string text = estimates.size() == 1 ? DescribeEvaluation(estimates.front(), format)
-                                                 : CompareEvaluations(estimates, format);
+  std::string text = estimates.size() == 1 ? DescribeEvaluation(estimates.front(), format)
+                                           : CompareEvaluations(estimates, format);
+  if (published) text += published->Describe(estimates, format);
   std::fputs(text.c_str(), stdout);
-  if (!arguments.json.empty())
-    WriteText(arguments.json, JsonText(EvaluationJson(input.reference, estimates)));
+  if (!arguments.json.empty()) {
+    nlohmann::ordered_json json = EvaluationJson(input.reference, estimates);
+    if (published) json["published"] = published->ToJson();
+    WriteText(arguments.json, JsonText(json));
+  }
   if (!arguments.errors.empty()) WriteText(arguments.errors, ErrorsCsv(estimates));
   bool met = true;
   for (const EvaluatedEstimate& estimate : estimates) met = MeetsLimits(estimate, arguments) && met;
@@ -61,6 +77,14 @@ void SetUpEvaluate(CLI::App& command, int& exit_code) {
   AddTableFormatOption(command, arguments->table_format);
   command.add_option("--json", arguments->json, "Write every figure to this file");
   command.add_option("--errors", arguments->errors, "Write the errors pose by pose to this file (CSV)");
+  command
+      .add_option("--against", arguments->against.benchmark,
+                  "Print the published errors of other systems beside these; without files, those alone")
+      ->check(OneOf(PublishedBenchmarks()));
+  command.add_option("--sequence", arguments->against.sequence,
+                     "--against: which sequence it is, if the names of the files don't say it");
+  command.add_option("--sensor", arguments->against.sensor, "--against: what the estimates were made with")
+      ->check(OneOf({"mono", "stereo", "rgbd", "stereo-inertial"}));
   command
       .add_option("--max-ate", arguments->max_ate_m,
                   "Exit status 3 if the ATE (rmse) of an estimate is above this [m]")
@@ -83,6 +107,7 @@ void SetUpEvaluate(CLI::App& command, int& exit_code) {
       "Examples:\n"
       "  tutti evaluate groundtruth.txt out/trajectory.txt --align sim3\n"
       "  tutti evaluate --run out --max-ate 0.05 --min-coverage 0.95\n"
+      "  tutti evaluate MH_01/gt.csv out/trajectory.txt --against euroc --sensor stereo\n"
       "  tutti evaluate --reference poses/00.txt --times 00/times.txt --estimate out/trajectory.txt\n"
       "  tutti evaluate gt.txt a.txt b.txt c.txt --table-format latex\n"
       "  tutti evaluate gt.txt a.txt --rpe-delta 2 --rpe-unit seconds --rpe-all-pairs\n"

@@ -72,7 +72,7 @@ std::vector<std::string> ShortNames(const std::vector<std::string>& files) {
 
 }  // namespace
 
-std::vector<EvaluatedEstimate> EvaluateInput(EvaluationInput input) {
+void RequireFiles(const EvaluationInput& input) {
   if (input.reference.empty()) {
     throw InputError(input.frames_of_run.empty()
                          ? "there is no reference; give one as `GT EST...` or with --reference GT"
@@ -80,6 +80,10 @@ std::vector<EvaluatedEstimate> EvaluateInput(EvaluationInput input) {
   }
   if (input.estimates.empty())
     throw InputError("there is no estimate; give one or several as `GT EST...` or with --estimate EST...");
+}
+
+std::vector<EvaluatedEstimate> EvaluateInput(EvaluationInput input) {
+  RequireFiles(input);
   if (!input.names.empty() && input.names.size() != input.estimates.size()) {
     throw InputError("--name: " + std::to_string(input.names.size()) + " names for " +
                      std::to_string(input.estimates.size()) + " estimates; give one for each");

@@ -33,8 +33,12 @@ struct EvaluationInput {
 void AddEvaluationOptions(CLI::App& command, EvaluationInput& input);
 
 /// Files without option, runs and evo's words taken apart: `reference` (may be empty), `estimates`, `align`
-/// and formats are set then. Throws InputError that says how to call the command if something is missing.
+/// and formats are set then. Throws InputError if there is no such run, or if runs differ.
 EvaluationInput Resolved(EvaluationInput input);
+
+/// Throws InputError that says how to call the command if there is no reference or no estimate. `input`:
+/// resolved.
+void RequireFiles(const EvaluationInput& input);
 
 /// One estimate, measured.
 struct EvaluatedEstimate {

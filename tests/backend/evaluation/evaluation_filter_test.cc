@@ -148,7 +148,9 @@ TEST(EvaluationFilter, RadiansAreDegreesOfAnotherSize) {
     const auto pairs = RelativePairs(poses, stamps, radians);
     EXPECT_EQ(pairs, RelativePairs(poses, stamps, degrees));
     ASSERT_FALSE(pairs.empty());
-    if (!all_pairs) EXPECT_EQ(pairs[0], (std::pair<std::size_t, std::size_t>(0, 5)));
+    if (!all_pairs) {
+      EXPECT_EQ(pairs[0], (std::pair<std::size_t, std::size_t>(0, 5)));
+    }
   }
 }
 

@@ -40,19 +40,27 @@ EvaluationOptions Options(const EvaluationInput& input) {
   return options;
 }
 
-EvaluatedEstimate Evaluate(const NamedPoses& reference, const EvaluationInput& input, const std::string& file,
-                           const std::vector<double>& times) {
+EvaluatedEstimate Evaluate(const NamedPoses& reference, const EvaluationInput& input,
+                           const NamedPoseFile& estimate) {
   EvaluatedEstimate out;
-  out.file = file;
+  out.name = estimate.name;
+  out.file = estimate.file;
   out.options = Options(input);
-  const NamedPoses estimate = {file, Read(file, input.format, times)};
-  out.report = EvaluateFiles(reference, estimate, "--times (KITTI: times.txt)", out.options);
-  const auto run = input.frames_of_run.find(file);
+  out.report =
+      EvaluateFiles(reference, {estimate.file, estimate.poses}, "--times (KITTI: times.txt)", out.options);
+  const auto run = input.frames_of_run.find(estimate.file);
   if (run != input.frames_of_run.end() && run->second > 0) {
     out.report.coverage.posed = std::min(estimate.poses.trajectory.size(), run->second);
     out.report.coverage.all = run->second;
   }
   return out;
+}
+
+std::vector<double> Times(const EvaluationInput& input) {
+  if (input.times.empty()) return {};
+  std::vector<double> times = ReadTimes(input.times);
+  if (times.empty()) throw InputError(input.times + ": holds no time stamp");
+  return times;
 }
 
 // The files' names, with as much of their folders as it takes to tell them apart.
@@ -82,27 +90,30 @@ void RequireFiles(const EvaluationInput& input) {
     throw InputError("there is no estimate; give one or several as `GT EST...` or with --estimate EST...");
 }
 
-std::vector<EvaluatedEstimate> EvaluateInput(EvaluationInput input) {
-  RequireFiles(input);
+std::vector<NamedPoseFile> ReadEstimates(const EvaluationInput& input) {
   if (!input.names.empty() && input.names.size() != input.estimates.size()) {
     throw InputError("--name: " + std::to_string(input.names.size()) + " names for " +
                      std::to_string(input.estimates.size()) + " estimates; give one for each");
   }
-  std::vector<double> times;
-  if (!input.times.empty()) {
-    times = ReadTimes(input.times);
-    if (times.empty()) throw InputError(input.times + ": holds no time stamp");
+  const std::vector<double> times = Times(input);
+  const std::vector<std::string> names = input.names.empty() ? ShortNames(input.estimates) : input.names;
+  std::vector<NamedPoseFile> out;
+  for (std::size_t k = 0; k < input.estimates.size(); ++k) {
+    const auto run = input.run_names.find(input.estimates[k]);
+    out.push_back({run == input.run_names.end() ? names[k] : run->second, input.estimates[k],
+                   Read(input.estimates[k], input.format, times)});
   }
+  return out;
+}
+
+std::vector<EvaluatedEstimate> EvaluateInput(EvaluationInput input) {
+  RequireFiles(input);
   if (!input.frames.empty()) input.options.frame_stamps_s = ReadFrameStamps(input.frames);
   const std::string& format = input.reference_format.empty() ? input.format : input.reference_format;
-  const NamedPoses reference = {input.reference, Read(input.reference, format, times)};
-  const std::vector<std::string> names = input.names.empty() ? ShortNames(input.estimates) : input.names;
+  const NamedPoses reference = {input.reference, Read(input.reference, format, Times(input))};
   std::vector<EvaluatedEstimate> out;
-  for (std::size_t k = 0; k < input.estimates.size(); ++k) {
-    out.push_back(Evaluate(reference, input, input.estimates[k], times));
-    const auto run = input.run_names.find(input.estimates[k]);
-    out.back().name = run == input.run_names.end() ? names[k] : run->second;
-  }
+  for (const NamedPoseFile& estimate : ReadEstimates(input))
+    out.push_back(Evaluate(reference, input, estimate));
   return out;
 }
 

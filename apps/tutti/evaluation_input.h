@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "tutti/backend/evaluation.h"
+#include "tutti/backend/trajectory_file.h"
 
 namespace tutti::cli {
 
@@ -39,6 +40,14 @@ EvaluationInput Resolved(EvaluationInput input);
 /// Throws InputError that says how to call the command if there is no reference or no estimate. `input`:
 /// resolved.
 void RequireFiles(const EvaluationInput& input);
+
+/// An estimate as its file has it.
+struct NamedPoseFile {
+  std::string name, file;
+  PoseFile poses;
+};
+/// `input`: resolved. Warnings go to stderr. Throws InputError that names the file.
+std::vector<NamedPoseFile> ReadEstimates(const EvaluationInput& input);
 
 /// One estimate, measured.
 struct EvaluatedEstimate {

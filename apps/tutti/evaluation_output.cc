@@ -98,6 +98,7 @@ std::string DescribeEvaluation(const EvaluatedEstimate& estimate, TableFormat fo
     add(rpe + " distance [m]", r.rpe_point_distance);
     if (r.rpe_point_distance_ratio.count > 0) add(rpe + " distance [%]", r.rpe_point_distance_ratio);
   }
+  if (format == TableFormat::kCsv) return Render(table, format);
   std::string text = Title(estimate) + Render(table, format);
   if (IsPartial(r)) text += kPartly;
   if (r.rpe.count == 0) text += "  " + rpe + ": no two poses are that far apart\n";
@@ -126,6 +127,7 @@ std::string CompareEvaluations(const std::vector<EvaluatedEstimate>& estimates, 
          relative ? Fixed(r.rpe_rotation.rmse, 6) : "-", Rate(r.kitti, r.kitti.translation_percent, 4),
          Rate(r.kitti, 100 * r.kitti.rotation_deg_per_m, 4), Rate(r.drift, r.drift.translation_percent, 4)});
   }
+  if (format == TableFormat::kCsv) return Render(table, format);
   return std::string("alignment ") + ToString(options.alignment) + "; rotations and relative errors: rmse\n" +
          Render(table, format) + (partly ? kPartly : "");
 }

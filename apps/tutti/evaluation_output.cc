@@ -121,7 +121,8 @@ std::string CompareEvaluations(const std::vector<EvaluatedEstimate>& estimates, 
     const bool relative = r.rpe.count > 0;
     partly = partly || IsPartial(r);
     table.rows.push_back(
-        {estimate.name, std::to_string(r.pairs), Percent(r.coverage) + (IsPartial(r) ? " !" : ""),
+        {estimate.name, std::to_string(r.pairs),
+         Percent(r.coverage) + (IsPartial(r) && format != TableFormat::kCsv ? " !" : ""),
          Fixed(r.ate.rmse, 6), Fixed(r.ate.mean, 6), Fixed(r.ate.median, 6), Fixed(r.ate.max, 6),
          Fixed(r.ate_rotation.rmse, 6), relative ? Fixed(r.rpe.rmse, 6) : "-",
          relative ? Fixed(r.rpe_rotation.rmse, 6) : "-", Rate(r.kitti, r.kitti.translation_percent, 4),

@@ -25,12 +25,15 @@ std::vector<std::string> Distinct(std::vector<std::string> words) {
   return out;
 }
 
+[[noreturn]] void Refuse(const std::string& where, const std::string& entry, const char* why) {
+  throw InputError(where + "'" + entry + "' " + why);
+}
+
 PublishedRow ParseRow(const std::string& line, const std::string& where) {
   const std::vector<std::string> cells = SplitText(line, "\t");
-  if (cells.size() != kColumns) {
+  if (cells.size() != kColumns)
     throw InputError(where + std::to_string(cells.size()) + " columns instead of " +
                      std::to_string(kColumns));
-  }
   PublishedRow row{cells[0], cells[1], cells[2], cells[3], cells[4], cells[5], {}};
   if (row.alignment != "se3" && row.alignment != "sim3")
     throw InputError(where + "the alignment '" + row.alignment + "' is neither se3 nor sim3");
@@ -40,8 +43,8 @@ PublishedRow ParseRow(const std::string& line, const std::string& where) {
     const std::string figure = equals == std::string::npos ? "" : entry.substr(equals + 1);
     const std::optional<double> value = ParseDouble(figure);
     if (name.empty() || (figure != "x" && !(value && *value > 0)))
-      throw InputError(where + "'" + entry + "' is no SEQUENCE=METRES");
-    if (row.Of(name) != nullptr) throw InputError(where + "two figures for " + name);
+      Refuse(where, entry, "is no SEQUENCE=METRES");
+    if (row.Of(name) != nullptr) Refuse(where, entry, "is a second figure of that sequence");
     row.ate_m.emplace_back(name, value);
   }
   return row;

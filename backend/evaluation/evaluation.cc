@@ -172,6 +172,7 @@ std::vector<double> PointDistanceErrors(const std::vector<PoseMatrix>& reference
                                         const std::vector<PoseMatrix>& estimate,
                                         const std::vector<std::pair<std::size_t, std::size_t>>& pairs) {
   std::vector<double> out;
+  out.reserve(pairs.size());
   for (const auto& [i, j] : pairs) {
     out.push_back(std::abs((reference[i].translation - reference[j].translation).norm() -
                            (estimate[i].translation - estimate[j].translation).norm()));

@@ -30,7 +30,7 @@ TEST(Published, AMalformedLineIsNamed) {
   };
   EXPECT_THAT(error("MH01=0.1 MH02"), HasSubstr("published.tsv:2:"));
   EXPECT_THAT(error("MH01=-1"), HasSubstr("MH01=-1"));
-  EXPECT_THAT(error("MH01=1 MH01=2"), HasSubstr("two figures"));
+  EXPECT_THAT(error("MH01=1 MH01=2"), HasSubstr("second figure"));
   EXPECT_THAT(ErrorOf([] { ParsePublished("euroc\tA\tmono\n"); }), HasSubstr("3 columns"));
   EXPECT_FALSE(ParsePublished("euroc\tA\tmono\tsim3\ts\tp\tMH01=x").front().Of("MH01")->has_value());
 }

@@ -168,12 +168,15 @@ std::vector<std::size_t> EvenlySpacedPoses(std::size_t poses, std::size_t count)
 std::vector<std::size_t> MovedPoses(const Trajectory& trajectory, const MotionFilter& filter);
 /// The angles a, b, c of R = Rz(c) Ry(b) Rx(a) [rad]: roll, pitch, yaw. Where b is +-90 degrees, c is 0.
 Eigen::Vector3d RollPitchYaw(const Eigen::Matrix3d& rotation);
+/// The pose in the plane: its third coordinate 0, its rotation that about the plane's normal, an angle of
+/// RollPitchYaw.
 PoseMatrix ProjectToPlane(const PoseMatrix& pose, ProjectionPlane plane);
 
 /// How much of the reference's span of time an estimate has poses for.
 struct TrajectoryCoverage {
   std::size_t posed = 0;  ///< poses, or frames with a pose, within the span
   std::size_t all = 0;    ///< those, and frames without a pose
+  /// From 0 to 1.
   double share() const { return all == 0 ? 0 : static_cast<double>(posed) / static_cast<double>(all); }
 };
 /// An ATE says little of a run that covers less than this of the reference.

@@ -18,6 +18,7 @@ struct PlotSeries {
   std::string color = "#000000";        ///< #rrggbb
   double width = 1.5;                   ///< [px]
   bool dashed = false;
+  std::vector<double> values = {};  ///< one for each point: the line is coloured by them, `color` is not used
 };
 
 /// What to draw. The two axes with the largest extent (of the first series, then of all) span the plane.
@@ -25,6 +26,7 @@ struct TrajectoryPlot {
   std::string title;
   std::string unit = "m";  ///< of both axes
   std::vector<PlotSeries> series;
+  std::string values_name;  ///< of all `values`, at the bar of colours
   std::string edges_name = "loops";
   std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> edges;  ///< loop edges
   std::string edges_color = "#009e73";

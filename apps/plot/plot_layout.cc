@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "apps/plot/plot.h"
+#include "apps/plot/plot_heat.h"
 #include "apps/plot/plot_picture.h"
 
 namespace tutti {
@@ -73,7 +74,9 @@ void AddLegend(const TrajectoryPlot& plot, const PlotAxes& axes, std::vector<Plo
     shapes.push_back(PlotText({x + 42, y}, name, 14));
     y += 20;
   };
-  for (const PlotSeries& series : plot.series) entry(series.name, series.color, series.width, series.dashed);
+  for (const PlotSeries& series : plot.series) {
+    if (series.values.empty()) entry(series.name, series.color, series.width, series.dashed);
+  }
   if (!plot.edges.empty()) entry(plot.edges_name, plot.edges_color, 2, false);
 }
 
@@ -126,6 +129,27 @@ PlotAxes FittedAxes(const CurvePlot& plot) {
   return axes;
 }
 
+// Series with values, and what their colours mean.
+void AddHeat(const TrajectoryPlot& plot, const View& view, const PlotAxes& axes,
+             std::vector<PlotShape>& shapes) {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const PlotSeries& series : plot.series) {
+    for (const double value : series.values) {
+      if (!std::isfinite(value)) continue;
+      low = std::min(low, value);
+      high = std::max(high, value);
+    }
+  }
+  if (!(low <= high)) return;
+  for (const PlotSeries& series : plot.series) {
+    if (series.values.empty()) continue;
+    std::vector<Eigen::Vector2d> points;
+    for (const Eigen::Vector3d& p : series.points) points.push_back(axes.Page(view.World(p)));
+    AddHeatLine(points, series.values, low, high, series.width, shapes);
+  }
+  AddHeatBar(axes, plot.values_name, low, high, shapes);
+}
+
 }  // namespace
 
 std::vector<PlotShape> LayOut(const TrajectoryPlot& plot) {
@@ -138,6 +162,7 @@ std::vector<PlotShape> LayOut(const TrajectoryPlot& plot) {
   std::vector<PlotShape> shapes;
   AddAxes(axes, shapes);
   for (const PlotSeries& series : plot.series) {
+    if (!series.values.empty()) continue;
     PlotShape line;
     line.color = series.color;
     line.size = series.width;
@@ -155,6 +180,7 @@ std::vector<PlotShape> LayOut(const TrajectoryPlot& plot) {
     }
     end_line();
   }
+  AddHeat(plot, view, axes, shapes);
   for (const auto& [a, b] : plot.edges) {
     const Eigen::Vector2d from = axes.Page(view.World(a)), to = axes.Page(view.World(b));
     shapes.push_back(PlotLine(from, to, plot.edges_color, 1.5));

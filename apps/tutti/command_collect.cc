@@ -7,8 +7,10 @@
 #include <vector>
 
 #include "apps/report/page.h"
+#include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/comparison.h"
+#include "apps/tutti/comparison_columns.h"
 #include "apps/tutti/comparison_page.h"
 #include "apps/tutti/files.h"
 #include "tutti/core/error.h"
@@ -23,6 +25,7 @@ struct CollectArguments {
   std::vector<std::string> runs;
   std::string table_format = "text", json, report;
   bool by_folder = false;
+  TableChoice choice;
 };
 
 /// The summary of a run's folder, or all summaries below a folder, in natural order of their paths.
@@ -58,7 +61,7 @@ void RunCollect(const CollectArguments& arguments) {
       if (arguments.by_folder) comparison.runs.back().variant = FolderAbove(file);
     }
   }
-  std::fputs(DescribeComparison(comparison, format).c_str(), stdout);
+  std::fputs(DescribeComparison(comparison, format, arguments.choice).c_str(), stdout);
   if (!arguments.report.empty()) {
     if (!ReportsAvailable()) throw InputError("--report: " + ReportsMissing());
     WriteComparisonReport(arguments.report, "tutti collect", comparison);
@@ -76,6 +79,15 @@ void SetUpCollect(CLI::App& command, int&) {
   command.add_flag("--by-folder", arguments->by_folder,
                    "a run's variant is the name of the folder above its own (CONFIGURATION/start_0)");
   AddTableFormatOption(command, arguments->table_format);
+  command
+      .add_option("--columns", arguments->choice.columns,
+                  "Which columns, in this order: " + JoinText(ComparisonColumns()) + "; all if none is given")
+      ->delimiter(',')
+      ->check(OneOf(ComparisonColumns()));
+  command.add_option("--precision", arguments->choice.decimals, "Decimals of the errors")
+      ->check(NumberThat([](double value) { return value >= 0 && value <= 12; }, "of 0 to 12", "0..12"));
+  command.add_flag("--bold-best", arguments->choice.bold_best,
+                   "The best of each column in bold (markdown, latex) or with a star (text)");
   command.add_option("--json", arguments->json, "Write the table to this file");
   command.add_option(
       "--report", arguments->report,
@@ -88,7 +100,9 @@ void SetUpCollect(CLI::App& command, int&) {
       "the "
       "noise or\n"
       "the seed alone: the table says in which, and the interval is over them.\n"
-      "Example: tutti collect results/ --table-format markdown > table.md");
+      "Examples:\n"
+      "  tutti collect results/ --table-format markdown > table.md\n"
+      "  tutti collect results/ --columns ate,rpe,time --precision 3 --bold-best --table-format latex");
   command.callback([arguments] { RunCollect(*arguments); });
 }
 

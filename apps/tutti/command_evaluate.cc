@@ -1,41 +1,98 @@
 // tutti evaluate: how far are trajectories from the reference?
 #include <cstdio>
+#include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "apps/tutti/against.h"
+#include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/evaluation_input.h"
 #include "apps/tutti/evaluation_output.h"
 #include "apps/tutti/files.h"
+#include "apps/tutti/published.h"
 
 namespace tutti::cli {
 namespace {
 
+constexpr int kLimitNotMet = 3;  // 1 is bad input, 2 an internal error
+
 struct EvaluateArguments {
   EvaluationInput input;
   std::string json, errors, table_format = "text";
+  Against against;
+  double max_ate_m = std::numeric_limits<double>::infinity();
+  double min_coverage = 0;
 };
 
-void RunEvaluate(const EvaluateArguments& arguments) {
+/// Says on standard error which limits an estimate does not meet.
+bool MeetsLimits(const EvaluatedEstimate& estimate, const EvaluateArguments& arguments) {
+  const double ate = estimate.report.ate.rmse, coverage = estimate.report.coverage.share();
+  const bool accurate = ate <= arguments.max_ate_m, covers = coverage >= arguments.min_coverage;
+  if (!accurate) {
+    std::fprintf(stderr, "tutti: %s: the ATE of %g m is above --max-ate %g\n", estimate.name.c_str(), ate,
+                 arguments.max_ate_m);
+  }
+  if (!covers) {
+    std::fprintf(stderr, "tutti: %s: the coverage of %g is below --min-coverage %g\n", estimate.name.c_str(),
+                 coverage, arguments.min_coverage);
+  }
+  return accurate && covers;
+}
+
+int RunEvaluate(const EvaluateArguments& arguments) {
   const TableFormat format = ParseTableFormat(arguments.table_format);
-  const std::vector<EvaluatedEstimate> estimates = EvaluateInput(arguments.input);
-  const std::string text = estimates.size() == 1 ? DescribeEvaluation(estimates.front(), format)
-                                                 : CompareEvaluations(estimates, format);
+  const EvaluationInput input = Resolved(arguments.input);
+  const bool against = !arguments.against.benchmark.empty();
+  if (against && input.reference.empty() && input.estimates.empty()) {
+    std::fputs(DescribePublished(arguments.against.benchmark, format).c_str(), stdout);
+    return 0;
+  }
+  RequireFiles(input);
+  std::optional<PublishedComparison> published;
+  if (against) published.emplace(arguments.against, input);
+  const std::vector<EvaluatedEstimate> estimates = EvaluateInput(input);
+  std::string text = estimates.size() == 1 ? DescribeEvaluation(estimates.front(), format)
+                                           : CompareEvaluations(estimates, format);
+  if (published) text += published->Describe(estimates, format);
   std::fputs(text.c_str(), stdout);
-  if (!arguments.json.empty())
-    WriteText(arguments.json, JsonText(EvaluationJson(arguments.input.reference, estimates)));
+  if (!arguments.json.empty()) {
+    nlohmann::ordered_json json = EvaluationJson(input.reference, estimates);
+    if (published) json["published"] = published->ToJson();
+    WriteText(arguments.json, JsonText(json));
+  }
   if (!arguments.errors.empty()) WriteText(arguments.errors, ErrorsCsv(estimates));
+  bool met = true;
+  for (const EvaluatedEstimate& estimate : estimates) met = MeetsLimits(estimate, arguments) && met;
+  return met ? 0 : kLimitNotMet;
 }
 
 }  // namespace
 
-void SetUpEvaluate(CLI::App& command, int&) {
+void SetUpEvaluate(CLI::App& command, int& exit_code) {
   const auto arguments = std::make_shared<EvaluateArguments>();
   AddEvaluationOptions(command, arguments->input);
   AddTableFormatOption(command, arguments->table_format);
   command.add_option("--json", arguments->json, "Write every figure to this file");
   command.add_option("--errors", arguments->errors, "Write the errors pose by pose to this file (CSV)");
+  command
+      .add_option("--against", arguments->against.benchmark,
+                  "Print the published errors of other systems beside these; without files, those alone")
+      ->check(OneOf(PublishedBenchmarks()));
+  command.add_option("--sequence", arguments->against.sequence,
+                     "--against: which sequence it is, if the names of the files don't say it");
+  command.add_option("--sensor", arguments->against.sensor, "--against: what the estimates were made with")
+      ->check(OneOf({"mono", "stereo", "rgbd", "stereo-inertial"}));
+  command
+      .add_option("--max-ate", arguments->max_ate_m,
+                  "Exit status 3 if the ATE (rmse) of an estimate is above this [m]")
+      ->check(NotNegative());
+  command
+      .add_option("--min-coverage", arguments->min_coverage,
+                  "Exit status 3 if an estimate covers less of the reference's time than this share, 0 to 1")
+      ->check(NumberThat([](double value) { return value >= 0 && value <= 1; }, "of 0 to 1", "0..1"));
   command.footer(
       "ATE is the distance between associated positions after the alignment: is the map where it should be? "
       "RPE compares\n"
@@ -45,13 +102,21 @@ void SetUpEvaluate(CLI::App& command, int&) {
       "so "
       "that short\n"
       "paths have one too. Figures agree with evo's (evo_ape, evo_rpe) and with KITTI's development kit.\n"
+      "Coverage is the share of frames within the reference's time that have a pose.\n"
+      "Exit status: 0; 1 for bad input; 3 if --max-ate or --min-coverage is not met.\n"
       "Examples:\n"
-      "  tutti evaluate --reference groundtruth.txt --estimate out/trajectory.txt --align sim3\n"
+      "  tutti evaluate groundtruth.txt out/trajectory.txt --align sim3\n"
+      "  tutti evaluate --run out --max-ate 0.05 --min-coverage 0.95\n"
+      "  tutti evaluate MH_01/gt.csv out/trajectory.txt --against euroc --sensor stereo\n"
       "  tutti evaluate --reference poses/00.txt --times 00/times.txt --estimate out/trajectory.txt\n"
-      "  tutti evaluate --reference gt.txt --estimate a.txt b.txt c.txt --table-format latex\n"
-      "  tutti evaluate --reference gt.txt --estimate a.txt --rpe-delta 2 --rpe-unit seconds "
-      "--rpe-all-pairs");
-  command.callback([arguments] { RunEvaluate(*arguments); });
+      "  tutti evaluate gt.txt a.txt b.txt c.txt --table-format latex\n"
+      "  tutti evaluate gt.txt a.txt --rpe-delta 2 --rpe-unit seconds --rpe-all-pairs\n"
+      "Options of evo that mean the same: -a, -s, --align_origin, --n_to_align, --t_max_diff, --t_offset, "
+      "-d/--delta,\n"
+      "-u/--delta_unit, -t/--delta_tol, --all_pairs, --downsample, --motion_filter, --project_to_plane, and "
+      "the words\n"
+      "tum, kitti and euroc before the files.");
+  command.callback([arguments, &exit_code] { exit_code = RunEvaluate(*arguments); });
 }
 
 }  // namespace tutti::cli

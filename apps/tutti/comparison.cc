@@ -7,6 +7,7 @@
 #include <set>
 #include <tuple>
 
+#include "apps/tutti/comparison_columns.h"
 #include "apps/tutti/stage_times.h"
 #include "tutti/core/error.h"
 #include "tutti/core/significance.h"
@@ -15,7 +16,6 @@ namespace tutti::cli {
 namespace {
 
 using Json = nlohmann::ordered_json;
-constexpr const char* kEnsemble = "ensemble";
 
 /// The number at a path like "evaluation/slam/ate_rmse_m"; NaN if there is none.
 double Number(const Json& json, const std::string& path) {
@@ -70,17 +70,6 @@ std::vector<Variant> Variants(const Comparison& comparison, const std::string& d
   return out;
 }
 
-MeanInterval Over(const Variant& variant, double RunFigures::*field) {
-  std::vector<double> values;
-  for (const RunFigures* run : variant.runs) values.push_back(run->*field);
-  return MeanWithInterval(values);
-}
-
-std::size_t Failures(const Variant& variant) {
-  return static_cast<std::size_t>(std::count_if(variant.runs.begin(), variant.runs.end(),
-                                                [](const RunFigures* run) { return !run->failure.empty(); }));
-}
-
 /// What the runs of a table differ in, for a reader: "first frame (0 to 4); noise drawn anew, ...".
 std::string WhatVaries(const std::vector<Variant>& variants) {
   std::set<std::string> datasets;
@@ -107,56 +96,6 @@ std::string WhatVaries(const std::vector<Variant>& variants) {
     add("image noise, drawn anew (standard deviation " + Fixed(noise, 1) + " of 255)");
   if (seeds.size() > 1) add("the seed of the loop detector alone");
   return text.empty() ? "nothing" : text;
-}
-
-/// ATE of the variant minus that of the ensemble, over the samples that both have.
-PairedTTestResult AgainstEnsemble(const Variant& variant, const std::vector<Variant>& all) {
-  std::vector<double> a, b;
-  for (const Variant& other : all) {
-    if (other.name != kEnsemble) continue;
-    for (const RunFigures* run : variant.runs) {
-      for (const RunFigures* ensemble : other.runs) {
-        if (!(run->sample == ensemble->sample) || !std::isfinite(run->ate_m) ||
-            !std::isfinite(ensemble->ate_m))
-          continue;
-        a.push_back(run->ate_m);
-        b.push_back(ensemble->ate_m);
-      }
-    }
-  }
-  return PairedTTest(a, b);
-}
-
-TextTable Table(const std::vector<Variant>& variants) {
-  TextTable table;
-  table.header = {"variant",      "runs",      "proposed",          "accepted",
-                  "false",        "ATE [m]",   "worst ATE [m]",     "p",
-                  "RPE [m]",      "t_rel [%]", "r_rel [deg/100 m]", "time [s]",
-                  "odometry [s]", "loops [s]", "frame [ms]",        "memory [MB]"};
-  for (const Variant& variant : variants) {
-    const PairedTTestResult test = AgainstEnsemble(variant, variants);
-    MeanInterval rotation = Over(variant, &RunFigures::r_rel_deg_per_m);
-    rotation.mean *= 100;
-    rotation.half_width *= 100;
-    const std::size_t failed = Failures(variant);
-    table.rows.push_back({variant.name,
-                          std::to_string(variant.runs.size() - failed) +
-                              (failed > 0 ? " (" + std::to_string(failed) + " failed)" : ""),
-                          IntervalCell(Over(variant, &RunFigures::proposed), 1),
-                          IntervalCell(Over(variant, &RunFigures::accepted), 1),
-                          IntervalCell(Over(variant, &RunFigures::false_loops), 1),
-                          IntervalCell(Over(variant, &RunFigures::ate_m), 4),
-                          IntervalCell({1, Over(variant, &RunFigures::ate_m).largest}, 4),
-                          variant.name == kEnsemble || test.pairs < kLeastPairs ? "-" : Fixed(test.p, 4),
-                          IntervalCell(Over(variant, &RunFigures::rpe_m), 4),
-                          IntervalCell(Over(variant, &RunFigures::t_rel_percent), 3),
-                          IntervalCell(rotation, 3), IntervalCell(Over(variant, &RunFigures::wall_s), 1),
-                          IntervalCell(Over(variant, &RunFigures::odometry_s), 1),
-                          IntervalCell(Over(variant, &RunFigures::loops_s), 1),
-                          IntervalCell(Over(variant, &RunFigures::frame_ms), 1),
-                          IntervalCell(Over(variant, &RunFigures::memory_mb), 0)});
-  }
-  return table;
 }
 
 /// Where the ensemble helped, where that can't be told, and where it did not, in words.
@@ -228,6 +167,22 @@ Json VariantJson(const Variant& variant, const std::vector<Variant>& all) {
   json["ate_minus_ensemble"] = {{"pairs", test.pairs}, {"mean_m", test.mean_difference}, {"t", test.t}};
   if (test.pairs >= kLeastPairs) json["ate_minus_ensemble"]["p"] = test.p;
   return json;
+}
+
+/// For other programs: the data set is a column, and notes are left out.
+TextTable AsOneTable(const std::vector<ComparisonTable>& tables) {
+  TextTable out;
+  for (const ComparisonTable& table : tables) {
+    if (out.header.empty()) {
+      out.header = table.table.header;
+      out.header.insert(out.header.begin(), "data set");
+    }
+    for (std::vector<std::string> row : table.table.rows) {
+      row.insert(row.begin(), table.dataset);
+      out.rows.push_back(std::move(row));
+    }
+  }
+  return out;
 }
 
 }  // namespace
@@ -306,21 +261,23 @@ std::string IntervalCell(const MeanInterval& value, int decimals) {
   return text;
 }
 
-std::vector<ComparisonTable> ComparisonTables(const Comparison& comparison) {
+std::vector<ComparisonTable> ComparisonTables(const Comparison& comparison, const TableChoice& choice) {
   std::vector<ComparisonTable> tables;
   for (const std::string& dataset :
        InOrder(comparison.runs, [](const RunFigures& run) { return run.dataset; })) {
     const std::vector<Variant> variants = Variants(comparison, dataset);
     std::vector<std::string> notes = Verdict(variants);
     notes.insert(notes.begin(), "What varies between the runs of a variant: " + WhatVaries(variants) + ".");
-    tables.push_back({dataset, Table(variants), StageTable(variants), std::move(notes)});
+    tables.push_back({dataset, FiguresTable(variants, choice), StageTable(variants), std::move(notes)});
   }
   return tables;
 }
 
-std::string DescribeComparison(const Comparison& comparison, TableFormat format) {
+std::string DescribeComparison(const Comparison& comparison, TableFormat format, const TableChoice& choice) {
+  const std::vector<ComparisonTable> tables = ComparisonTables(comparison, choice);
+  if (format == TableFormat::kCsv) return Render(AsOneTable(tables), format);
   std::string text;
-  for (const ComparisonTable& table : ComparisonTables(comparison)) {
+  for (const ComparisonTable& table : tables) {
     text += (text.empty() ? "" : "\n") + table.dataset + "\n\n" + Render(table.table, format) + "\n";
     for (const std::string& note : table.notes) text += note + "\n";
     if (!table.notes.empty()) text += "\n";

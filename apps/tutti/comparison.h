@@ -6,6 +6,7 @@
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -74,12 +75,20 @@ struct ComparisonTable {
   TextTable stages;  ///< StageTable; no rows: the runs say nothing of their stages
   std::vector<std::string> notes;
 };
-std::vector<ComparisonTable> ComparisonTables(const Comparison& comparison);
+
+/// How the figures are printed.
+struct TableChoice {
+  std::vector<std::string> columns;  ///< of ComparisonColumns(), in this order; empty: all
+  std::optional<int> decimals;       ///< of errors; nothing: those that fit each column
+  bool bold_best = false;            ///< the best mean of each column of errors, times and memory
+};
+std::vector<ComparisonTable> ComparisonTables(const Comparison& comparison, const TableChoice& choice = {});
 
 /// One table per data set and one of the time per stage, with the paired t-test of each variant's ATE against
 /// the ensemble's over common samples (from kLeastPairs on), and below it what varies between the runs, which
-/// variants the ensemble beats, and which it does not.
-std::string DescribeComparison(const Comparison& comparison, TableFormat format);
+/// variants the ensemble beats, and which it does not. CSV: the first table alone, for all data sets.
+std::string DescribeComparison(const Comparison& comparison, TableFormat format,
+                               const TableChoice& choice = {});
 nlohmann::ordered_json ComparisonJson(const Comparison& comparison);
 
 }  // namespace tutti::cli

@@ -1,12 +1,13 @@
 #include "apps/tutti/evaluation_input.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <optional>
 #include <set>
 
-#include "apps/tutti/checks.h"
 #include "apps/tutti/evaluation_report.h"
+#include "apps/tutti/frame_stamps.h"
 #include "tutti/backend/trajectory_file.h"
 #include "tutti/core/error.h"
 
@@ -31,19 +32,35 @@ Eigen::Vector3d Axis(const std::string& name) {
 EvaluationOptions Options(const EvaluationInput& input) {
   EvaluationOptions options = input.options;
   options.alignment = ParseTrajectoryAlignment(input.align);
+  options.plane = ParseProjectionPlane(input.plane);
+  if (!input.motion_filter.empty())
+    options.motion_filter = MotionFilter{input.motion_filter.at(0), input.motion_filter.at(1)};
   options.vertical = Axis(input.vertical);
   options.rpe_unit = ParseDeltaUnit(input.rpe_unit);
   return options;
 }
 
-EvaluatedEstimate Evaluate(const NamedPoses& reference, const EvaluationInput& input, const std::string& file,
-                           const std::vector<double>& times) {
+EvaluatedEstimate Evaluate(const NamedPoses& reference, const EvaluationInput& input,
+                           const NamedPoseFile& estimate) {
   EvaluatedEstimate out;
-  out.file = file;
+  out.name = estimate.name;
+  out.file = estimate.file;
   out.options = Options(input);
-  out.report = EvaluateFiles(reference, {file, Read(file, input.format, times)}, "--times (KITTI: times.txt)",
-                             out.options);
+  out.report =
+      EvaluateFiles(reference, {estimate.file, estimate.poses}, "--times (KITTI: times.txt)", out.options);
+  const auto run = input.frames_of_run.find(estimate.file);
+  if (run != input.frames_of_run.end() && run->second > 0) {
+    out.report.coverage.posed = std::min(estimate.poses.trajectory.size(), run->second);
+    out.report.coverage.all = run->second;
+  }
   return out;
+}
+
+std::vector<double> Times(const EvaluationInput& input) {
+  if (input.times.empty()) return {};
+  std::vector<double> times = ReadTimes(input.times);
+  if (times.empty()) throw InputError(input.times + ": holds no time stamp");
+  return times;
 }
 
 // The files' names, with as much of their folders as it takes to tell them apart.
@@ -61,98 +78,42 @@ std::vector<std::string> ShortNames(const std::vector<std::string>& files) {
   return all_differ(names) ? names : all_differ(longer) ? longer : files;
 }
 
-void AddFiles(CLI::App& command, EvaluationInput& input) {
-  command.add_option("--reference", input.reference, "Ground truth")->required();
-  command.add_option("--estimate", input.estimates, "Trajectories to judge, one or several")->required();
-  command.add_option("--name", input.names, "Names of the estimates for the table, in their order");
-  command
-      .add_option("--format", input.format,
-                  "auto: by content; tum: 'stamp x y z qx qy qz qw'; kitti: 12 numbers a line; euroc: ASL "
-                  "csv; g2o: the vertices of a graph, in the order of their ids")
-      ->check(CLI::IsMember({"auto", "tum", "kitti", "euroc", "g2o"}))
-      ->capture_default_str();
-  command
-      .add_option("--reference-format", input.reference_format,
-                  "Of the reference, where it is not that of --format")
-      ->check(CLI::IsMember({"auto", "tum", "kitti", "euroc", "g2o"}));
-  command.add_option("--times", input.times,
-                     "KITTI's times.txt: the time stamps of files that have none (kitti, g2o)");
-}
-
-void AddAssociation(CLI::App& command, EvaluationInput& input) {
-  command
-      .add_option("--align", input.align,
-                  "How the estimate is laid on the reference: none; origin: first poses coincide; se3: best "
-                  "rigid fit; sim3: best fit with scale (mono); scale: the scale of sim3 alone; yaw: turn "
-                  "about --vertical and move")
-      ->check(CLI::IsMember(TrajectoryAlignmentNames()))
-      ->capture_default_str();
-  command
-      .add_option("--align-first", input.options.align_first,
-                  "Align by so many associated poses from the start; 0: by all")
-      ->check(NotNegative())
-      ->capture_default_str();
-  command.add_option("--vertical", input.vertical, "Axis of the reference that yaw turns about")
-      ->check(CLI::IsMember({"x", "y", "z"}))
-      ->capture_default_str();
-  command
-      .add_option("--max-diff", input.options.max_time_difference_s, "Largest time difference of a pair [s]")
-      ->check(NotNegative())
-      ->capture_default_str();
-  command.add_option("--time-offset", input.options.time_offset_s, "Added to the estimate's time stamps [s]")
-      ->capture_default_str();
-  command.add_flag("--interpolate", input.options.interpolate,
-                   "Compare with the reference interpolated at the estimate's stamps, not with its nearest "
-                   "pose");
-  command
-      .add_option("--max-gap", input.options.max_interpolation_s,
-                  "Don't interpolate between poses further apart [s]")
-      ->check(Positive())
-      ->capture_default_str();
-}
-
-void AddRelative(CLI::App& command, EvaluationInput& input) {
-  command.add_option("--rpe-delta", input.options.rpe_delta, "Distance of the relative errors")
-      ->check(Positive())
-      ->capture_default_str();
-  command.add_option("--rpe-unit", input.rpe_unit, "Unit of --rpe-delta")
-      ->check(CLI::IsMember(DeltaUnitNames()))
-      ->capture_default_str();
-  command.add_flag("--rpe-all-pairs", input.options.rpe_all_pairs,
-                   "Relative errors from every pose, overlapping");
-  command
-      .add_option("--rpe-tolerance", input.options.rpe_tolerance,
-                  "All pairs: allowed deviation from --rpe-delta, as a fraction of it")
-      ->check(NotNegative())
-      ->capture_default_str();
-}
-
 }  // namespace
 
-void AddEvaluationOptions(CLI::App& command, EvaluationInput& input) {
-  AddFiles(command, input);
-  AddAssociation(command, input);
-  AddRelative(command, input);
+void RequireFiles(const EvaluationInput& input) {
+  if (input.reference.empty()) {
+    throw InputError(input.frames_of_run.empty()
+                         ? "there is no reference; give one as `GT EST...` or with --reference GT"
+                         : "the runs have no ground truth; give one with --reference");
+  }
+  if (input.estimates.empty())
+    throw InputError("there is no estimate; give one or several as `GT EST...` or with --estimate EST...");
 }
 
-std::vector<EvaluatedEstimate> EvaluateInput(const EvaluationInput& input) {
+std::vector<NamedPoseFile> ReadEstimates(const EvaluationInput& input) {
   if (!input.names.empty() && input.names.size() != input.estimates.size()) {
     throw InputError("--name: " + std::to_string(input.names.size()) + " names for " +
                      std::to_string(input.estimates.size()) + " estimates; give one for each");
   }
-  std::vector<double> times;
-  if (!input.times.empty()) {
-    times = ReadTimes(input.times);
-    if (times.empty()) throw InputError(input.times + ": holds no time stamp");
-  }
-  const std::string& format = input.reference_format.empty() ? input.format : input.reference_format;
-  const NamedPoses reference = {input.reference, Read(input.reference, format, times)};
+  const std::vector<double> times = Times(input);
   const std::vector<std::string> names = input.names.empty() ? ShortNames(input.estimates) : input.names;
-  std::vector<EvaluatedEstimate> out;
+  std::vector<NamedPoseFile> out;
   for (std::size_t k = 0; k < input.estimates.size(); ++k) {
-    out.push_back(Evaluate(reference, input, input.estimates[k], times));
-    out.back().name = names[k];
+    const auto run = input.run_names.find(input.estimates[k]);
+    out.push_back({run == input.run_names.end() ? names[k] : run->second, input.estimates[k],
+                   Read(input.estimates[k], input.format, times)});
   }
+  return out;
+}
+
+std::vector<EvaluatedEstimate> EvaluateInput(EvaluationInput input) {
+  RequireFiles(input);
+  if (!input.frames.empty()) input.options.frame_stamps_s = ReadFrameStamps(input.frames);
+  const std::string& format = input.reference_format.empty() ? input.format : input.reference_format;
+  const NamedPoses reference = {input.reference, Read(input.reference, format, Times(input))};
+  std::vector<EvaluatedEstimate> out;
+  for (const NamedPoseFile& estimate : ReadEstimates(input))
+    out.push_back(Evaluate(reference, input, estimate));
   return out;
 }
 

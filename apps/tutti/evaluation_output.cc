@@ -19,7 +19,7 @@ Json EstimateJson(const std::string& reference, const EvaluatedEstimate& estimat
 }
 
 std::string DeltaName(const EvaluationOptions& options) {
-  static constexpr const char* kShort[] = {"frames", "m", "deg", "s"};
+  static constexpr const char* kShort[] = {"frames", "m", "deg", "s", "rad"};
   char text[64];
   const bool one_frame = options.rpe_unit == DeltaUnit::kFrames && options.rpe_delta == 1;
   std::snprintf(text, sizeof text, "%g %s", options.rpe_delta,
@@ -36,6 +36,29 @@ std::string Plural(std::size_t count, const char* what) {
   return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
 }
 
+bool IsPartial(const EvaluationReport& report) { return report.coverage.share() < kFullCoverage; }
+
+std::string Percent(const TrajectoryCoverage& coverage) { return Fixed(100 * coverage.share(), 2); }
+
+constexpr const char* kPartly =
+    "! covers less than 99 % of the reference: the ATE is that of the part with poses\n";
+
+std::string AssociationLine(const EvaluatedEstimate& estimate) {
+  const EvaluationReport& r = estimate.report;
+  std::string text = "unmatched: reference " + std::to_string(r.association.reference_unmatched) +
+                     ", estimate " + std::to_string(r.association.estimate_unmatched);
+  if (!estimate.options.by_index && !estimate.options.interpolate) {
+    text += "; time difference of a pair: median " + Fixed(1e3 * r.association.median_time_difference_s, 3) +
+            " ms, largest " + Fixed(1e3 * r.association.largest_time_difference_s, 3) + " ms";
+  }
+  return text + "\n";
+}
+
+std::string CoverageLine(const TrajectoryCoverage& coverage) {
+  return "coverage: " + Percent(coverage) + " % (" + std::to_string(coverage.posed) + " of " +
+         std::to_string(coverage.all) + " frames of the reference's time have a pose)\n";
+}
+
 std::string Title(const EvaluatedEstimate& estimate) {
   const EvaluationReport& r = estimate.report;
   std::string text = Plural(r.pairs, "pair") + " of poses (reference " + std::to_string(r.reference_poses) +
@@ -45,7 +68,9 @@ std::string Title(const EvaluatedEstimate& estimate) {
     text += " by the first " + std::to_string(estimate.options.align_first);
   if (r.alignment == TrajectoryAlignment::kSim3 || r.alignment == TrajectoryAlignment::kScale)
     text += " (scale " + Fixed(r.S_reference_estimate.scale, 6) + ")";
-  return text + "\n";
+  if (estimate.options.plane != ProjectionPlane::kNone)
+    text += std::string(", in the plane ") + ToString(estimate.options.plane);
+  return text + "\n" + AssociationLine(estimate) + CoverageLine(r.coverage);
 }
 
 std::string Rate(const SegmentErrors& errors, double value, int decimals) {
@@ -62,7 +87,7 @@ std::string DescribeEvaluation(const EvaluatedEstimate& estimate, TableFormat fo
     table.rows.push_back({name, Fixed(s.rmse, 6), Fixed(s.mean, 6), Fixed(s.median, 6), Fixed(s.std, 6),
                           Fixed(s.min, 6), Fixed(s.max, 6), Fixed(s.sse, 6)});
   };
-  add("ATE [m]", r.ate);
+  add(IsPartial(r) ? "ATE [m] !" : "ATE [m]", r.ate);
   add("ATE rotation [deg]", r.ate_rotation);
   add("ATE full", r.ate_full);
   const std::string rpe = "RPE per " + DeltaName(estimate.options);
@@ -70,8 +95,12 @@ std::string DescribeEvaluation(const EvaluatedEstimate& estimate, TableFormat fo
     add(rpe + " [m]", r.rpe);
     add(rpe + " [deg]", r.rpe_rotation);
     add(rpe + " full", r.rpe_full);
+    add(rpe + " distance [m]", r.rpe_point_distance);
+    if (r.rpe_point_distance_ratio.count > 0) add(rpe + " distance [%]", r.rpe_point_distance_ratio);
   }
+  if (format == TableFormat::kCsv) return Render(table, format);
   std::string text = Title(estimate) + Render(table, format);
+  if (IsPartial(r)) text += kPartly;
   if (r.rpe.count == 0) text += "  " + rpe + ": no two poses are that far apart\n";
   if (r.kitti.segments > 0) text += SegmentsLine("KITTI, 100..800 m", r.kitti);
   if (r.drift.segments > 0) text += SegmentsLine("drift, 10..50 % of the path", r.drift);
@@ -82,21 +111,26 @@ std::string CompareEvaluations(const std::vector<EvaluatedEstimate>& estimates, 
   const EvaluationOptions& options = estimates.front().options;
   const std::string rpe = "RPE per " + DeltaName(options);
   TextTable table;
-  table.header = {"estimate", "pairs",     "ATE rmse [m]",      "mean",
-                  "median",   "max",       "rotation [deg]",    rpe + " [m]",
-                  "[deg]",    "t_rel [%]", "r_rel [deg/100 m]", "drift [%]"};
+  bool partly = false;
+  table.header = {"estimate",   "pairs",  "coverage [%]", "ATE rmse [m]",
+                  "mean",       "median", "max",          "rotation [deg]",
+                  rpe + " [m]", "[deg]",  "t_rel [%]",    "r_rel [deg/100 m]",
+                  "drift [%]"};
   for (const EvaluatedEstimate& estimate : estimates) {
     const EvaluationReport& r = estimate.report;
     const bool relative = r.rpe.count > 0;
+    partly = partly || IsPartial(r);
     table.rows.push_back(
-        {estimate.name, std::to_string(r.pairs), Fixed(r.ate.rmse, 6), Fixed(r.ate.mean, 6),
-         Fixed(r.ate.median, 6), Fixed(r.ate.max, 6), Fixed(r.ate_rotation.rmse, 6),
-         relative ? Fixed(r.rpe.rmse, 6) : "-", relative ? Fixed(r.rpe_rotation.rmse, 6) : "-",
-         Rate(r.kitti, r.kitti.translation_percent, 4), Rate(r.kitti, 100 * r.kitti.rotation_deg_per_m, 4),
-         Rate(r.drift, r.drift.translation_percent, 4)});
+        {estimate.name, std::to_string(r.pairs),
+         Percent(r.coverage) + (IsPartial(r) && format != TableFormat::kCsv ? " !" : ""),
+         Fixed(r.ate.rmse, 6), Fixed(r.ate.mean, 6), Fixed(r.ate.median, 6), Fixed(r.ate.max, 6),
+         Fixed(r.ate_rotation.rmse, 6), relative ? Fixed(r.rpe.rmse, 6) : "-",
+         relative ? Fixed(r.rpe_rotation.rmse, 6) : "-", Rate(r.kitti, r.kitti.translation_percent, 4),
+         Rate(r.kitti, 100 * r.kitti.rotation_deg_per_m, 4), Rate(r.drift, r.drift.translation_percent, 4)});
   }
+  if (format == TableFormat::kCsv) return Render(table, format);
   return std::string("alignment ") + ToString(options.alignment) + "; rotations and relative errors: rmse\n" +
-         Render(table, format);
+         Render(table, format) + (partly ? kPartly : "");
 }
 
 Json EvaluationJson(const std::string& reference, const std::vector<EvaluatedEstimate>& estimates) {

@@ -55,12 +55,22 @@ nlohmann::ordered_json ReportJson(const EvaluationReport& r, const EvaluationOpt
                                 : o.interpolate ? "interpolation"
                                                 : "time"},
                          {"max_time_difference_s", o.max_time_difference_s},
-                         {"time_offset_s", o.time_offset_s}};
+                         {"time_offset_s", o.time_offset_s},
+                         {"reference_unmatched", r.association.reference_unmatched},
+                         {"estimate_unmatched", r.association.estimate_unmatched},
+                         {"time_difference_s",
+                          {{"median", r.association.median_time_difference_s},
+                           {"largest", r.association.largest_time_difference_s}}}};
+  json["coverage"] = {{"share", r.coverage.share()},
+                      {"posed", r.coverage.posed},
+                      {"all", r.coverage.all},
+                      {"full", r.coverage.share() >= kFullCoverage}};
   json["alignment"] = {{"mode", ToString(r.alignment)},
                        {"first_poses", o.align_first},
                        {"scale", S.scale},
                        {"translation", {S.translation.x(), S.translation.y(), S.translation.z()}},
                        {"quaternion_xyzw", {q.x(), q.y(), q.z(), q.w()}}};
+  json["plane"] = ToString(o.plane);
   json["ate"] = StatisticsJson(r.ate);
   json["ate_rotation_deg"] = StatisticsJson(r.ate_rotation);
   json["ate_full"] = StatisticsJson(r.ate_full);
@@ -69,7 +79,9 @@ nlohmann::ordered_json ReportJson(const EvaluationReport& r, const EvaluationOpt
                  {"all_pairs", o.rpe_all_pairs},
                  {"translation", relative(r.rpe)},
                  {"rotation_deg", relative(r.rpe_rotation)},
-                 {"full", relative(r.rpe_full)}};
+                 {"full", relative(r.rpe_full)},
+                 {"point_distance", relative(r.rpe_point_distance)},
+                 {"point_distance_percent", relative(r.rpe_point_distance_ratio)}};
   json["kitti"] = SegmentsJson(r.kitti);
   json["drift"] = SegmentsJson(r.drift);
   return json;

@@ -82,11 +82,51 @@ std::string MarkdownRule(const std::vector<std::size_t>& widths) {
   return line + "\n";
 }
 
+constexpr const char* kPlusMinus = " +- ";
+
+std::string CsvCell(const std::string& text) {
+  if (text == "-") return {};
+  if (text.find_first_of(",\"\n") == std::string::npos) return text;
+  std::string out = "\"";
+  for (const char c : text) out += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return out + "\"";
+}
+
+std::string RenderCsv(const TextTable& table) {
+  std::vector<bool> splits(table.header.size(), false);
+  for (const std::vector<std::string>& row : table.rows) {
+    for (std::size_t k = 0; k < row.size(); ++k)
+      splits[k] = splits[k] || row[k].find(kPlusMinus) != std::string::npos;
+  }
+  const auto line = [&](const std::vector<std::string>& cells, bool is_header) {
+    std::string out;
+    for (std::size_t k = 0; k < cells.size(); ++k) {
+      const std::size_t at = is_header ? std::string::npos : cells[k].find(kPlusMinus);
+      out += (k > 0 ? "," : "") + CsvCell(cells[k].substr(0, at));
+      if (!splits[k]) continue;
+      const std::string half =
+          at == std::string::npos ? "-" : cells[k].substr(at + std::string(kPlusMinus).size());
+      out += "," + CsvCell(is_header ? cells[k] + " +-" : half);
+    }
+    return out + "\n";
+  };
+  std::string out = line(table.header, true);
+  for (const std::vector<std::string>& row : table.rows) out += line(row, false);
+  return out;
+}
+
+std::string Bold(const std::string& cell, TableFormat format) {
+  if (format == TableFormat::kMarkdown) return "**" + cell + "**";
+  return format == TableFormat::kLatex ? "\\textbf{" + cell + "}" : "*" + cell;
+}
+
 }  // namespace
 
 void AddTableFormatOption(CLI::App& command, std::string& name) {
-  command.add_option("--table-format", name, "How tables are printed; latex needs the package booktabs")
-      ->check(CLI::IsMember({"text", "markdown", "latex"}))
+  command
+      .add_option("--table-format", name,
+                  "How tables are printed; latex needs the package booktabs, csv is for other programs")
+      ->check(CLI::IsMember({"text", "markdown", "latex", "csv"}))
       ->capture_default_str();
 }
 
@@ -94,10 +134,12 @@ TableFormat ParseTableFormat(const std::string& name) {
   if (name == "text") return TableFormat::kText;
   if (name == "markdown") return TableFormat::kMarkdown;
   if (name == "latex") return TableFormat::kLatex;
-  throw InputError("unknown table format '" + name + "'; use text, markdown or latex");
+  if (name == "csv") return TableFormat::kCsv;
+  throw InputError("unknown table format '" + name + "'; use text, markdown, latex or csv");
 }
 
 std::string Render(const TextTable& table, TableFormat format) {
+  if (format == TableFormat::kCsv) return RenderCsv(table);
   std::vector<std::vector<std::string>> lines = {table.header};
   lines.insert(lines.end(), table.rows.begin(), table.rows.end());
   std::vector<std::size_t> widths(table.header.size(), 0);
@@ -105,8 +147,14 @@ std::string Render(const TextTable& table, TableFormat format) {
     for (std::size_t k = 0; k < line.size(); ++k) {
       if (format == TableFormat::kLatex) line[k] = WithPlusMinus(EscapedForLatex(line[k]));
       if (format == TableFormat::kMarkdown) line[k] = EscapedForMarkdown(line[k]);
-      widths.at(k) = std::max(widths[k], Width(line[k]));
     }
+  }
+  for (const auto& [row, column] : table.bold) {
+    std::string& cell = lines.at(row + 1).at(column);
+    cell = Bold(cell, format);
+  }
+  for (const std::vector<std::string>& line : lines) {
+    for (std::size_t k = 0; k < line.size(); ++k) widths.at(k) = std::max(widths[k], Width(line[k]));
   }
   if (format == TableFormat::kMarkdown) {
     for (std::size_t& width : widths) width = std::max<std::size_t>(width, 3);
@@ -126,6 +174,8 @@ std::string Render(const TextTable& table, TableFormat format) {
       case TableFormat::kLatex:
         out += Line(lines[k], widths, "", " & ", " \\\\");
         if (k == 0) out += "\\midrule\n";
+        break;
+      case TableFormat::kCsv:
         break;
     }
   }

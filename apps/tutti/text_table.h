@@ -3,12 +3,13 @@
 
 #include <CLI/CLI.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace tutti::cli {
 
-enum class TableFormat { kText, kMarkdown, kLatex };
-/// Adds --table-format to a command; `name` holds the word ("text", "markdown", "latex").
+enum class TableFormat { kText, kMarkdown, kLatex, kCsv };
+/// Adds --table-format to a command; `name` holds the word ("text", "markdown", "latex", "csv").
 void AddTableFormatOption(CLI::App& command, std::string& name);
 /// Throws InputError for another word.
 TableFormat ParseTableFormat(const std::string& name);
@@ -18,10 +19,12 @@ TableFormat ParseTableFormat(const std::string& name);
 struct TextTable {
   std::vector<std::string> header;
   std::vector<std::vector<std::string>> rows;
+  std::vector<std::pair<std::size_t, std::size_t>>
+      bold;  ///< (row, column); a star before it where text has no bold
 };
 
 /// The table, each line ended by a newline. LaTeX: a tabular for the package booktabs, special characters
-/// escaped.
+/// escaped. CSV: a column of "a +- b" becomes two; nothing is bold, and "-" is an empty cell.
 std::string Render(const TextTable& table, TableFormat format);
 
 /// The value with so many decimals; "-" if it is not finite.

@@ -46,6 +46,55 @@ AssociatedPoses Associate(const Trajectory& reference, const Trajectory& estimat
   return AssociateByTime(reference, estimate, options.max_time_difference_s, options.time_offset_s);
 }
 
+/// The poses, and their rotations as written where there are such, that are to be paired.
+struct Kept {
+  Trajectory trajectory;
+  std::vector<Eigen::Matrix3d> written;
+
+  void Only(const std::vector<std::size_t>& indices) {
+    const auto chosen = [&](const auto& list) {
+      std::decay_t<decltype(list)> out;
+      for (const std::size_t k : indices) out.push_back(list[k]);
+      return out;
+    };
+    trajectory = chosen(trajectory);
+    if (!written.empty()) written = chosen(written);
+  }
+};
+
+Kept Keep(const Trajectory& trajectory, const std::vector<Eigen::Matrix3d>& written,
+          const EvaluationOptions& options) {
+  Kept out{trajectory, written};
+  if (options.downsample > 0) out.Only(EvenlySpacedPoses(trajectory.size(), options.downsample));
+  if (options.motion_filter) out.Only(MovedPoses(out.trajectory, *options.motion_filter));
+  return out;
+}
+
+AssociationStatistics StatisticsOf(const AssociatedPoses& poses, const Trajectory& reference,
+                                   const Trajectory& estimate, const EvaluationOptions& options) {
+  std::vector<double> differences;
+  std::vector<bool> paired_r(reference.size()), paired_e(estimate.size());
+  for (const auto& [r, e] : poses.indices) {
+    paired_r[r] = paired_e[e] = true;
+    differences.push_back(std::abs(reference[r].stamp_s - estimate[e].stamp_s - options.time_offset_s));
+  }
+  AssociationStatistics out;
+  out.reference_unmatched = static_cast<std::size_t>(std::count(paired_r.begin(), paired_r.end(), false));
+  out.estimate_unmatched = static_cast<std::size_t>(std::count(paired_e.begin(), paired_e.end(), false));
+  if (options.by_index || options.interpolate) return out;
+  const ErrorStatistics statistics = Summarize(std::move(differences));
+  out.median_time_difference_s = statistics.median;
+  out.largest_time_difference_s = statistics.max;
+  return out;
+}
+
+void Project(ProjectionPlane plane, std::vector<Pose>& poses, std::vector<PoseMatrix>& matrices) {
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    matrices[k] = ProjectToPlane(matrices[k], plane);
+    poses[k] = Pose(Eigen::Quaterniond(matrices[k].rotation), matrices[k].translation);
+  }
+}
+
 void RequireOnePerPose(const std::vector<Eigen::Matrix3d>& written, const Trajectory& trajectory) {
   if (!written.empty() && written.size() != trajectory.size())
     throw InputError("evaluation: rotations as written and poses differ in number");
@@ -67,6 +116,13 @@ std::string EvaluationOptions::Validate() const {
     return "evaluation: no two poses are more than 180 degrees apart; rpe_delta is too large";
   if (rpe_unit == DeltaUnit::kSeconds && by_index)
     return "evaluation: rpe_unit seconds needs time stamps (KITTI: give its times.txt)";
+  if (rpe_unit == DeltaUnit::kRadians && rpe_delta > M_PI && rpe_all_pairs)
+    return "evaluation: no two poses are more than pi apart; rpe_delta is too large";
+  if (motion_filter && !(motion_filter->distance_m >= 0 && motion_filter->angle_deg >= 0))
+    return "evaluation: the limits of motion_filter must not be negative";
+  if (motion_filter && by_index)
+    return "evaluation: poses that are paired line by line can't be filtered by their motion; give time "
+           "stamps (KITTI: times.txt)";
   if (!(rpe_tolerance >= 0)) return "evaluation: rpe_tolerance must not be negative";
   return {};
 }
@@ -112,27 +168,59 @@ PoseErrors RelativeErrors(const std::vector<PoseMatrix>& reference, const std::v
   return out;
 }
 
+std::vector<double> PointDistanceErrors(const std::vector<PoseMatrix>& reference,
+                                        const std::vector<PoseMatrix>& estimate,
+                                        const std::vector<std::pair<std::size_t, std::size_t>>& pairs) {
+  std::vector<double> out;
+  out.reserve(pairs.size());
+  for (const auto& [i, j] : pairs) {
+    out.push_back(std::abs((reference[i].translation - reference[j].translation).norm() -
+                           (estimate[i].translation - estimate[j].translation).norm()));
+  }
+  return out;
+}
+
+std::vector<double> PointDistanceRatios(const std::vector<PoseMatrix>& reference,
+                                        const std::vector<PoseMatrix>& estimate,
+                                        const std::vector<std::pair<std::size_t, std::size_t>>& pairs) {
+  const std::vector<double> errors = PointDistanceErrors(reference, estimate, pairs);
+  std::vector<double> out;
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    const auto& [i, j] = pairs[k];
+    const double distance = (reference[i].translation - reference[j].translation).norm();
+    if (distance > 0) out.push_back(100 * errors[k] / distance);
+  }
+  return out;
+}
+
 EvaluationReport EvaluateTrajectory(const Trajectory& reference, const Trajectory& estimate,
                                     const EvaluationOptions& options, const RotationsAsWritten& written) {
   const std::string wrong = options.Validate();
   if (!wrong.empty()) throw InputError(wrong);
   RequireOnePerPose(written.reference, reference);
   RequireOnePerPose(written.estimate, estimate);
+  const Kept r = Keep(reference, written.reference, options), e = Keep(estimate, written.estimate, options);
   EvaluationReport out;
-  out.poses = Associate(reference, estimate, options);
+  out.poses = Associate(r.trajectory, e.trajectory, options);
   out.pairs = out.poses.indices.size();
-  out.reference_poses = reference.size();
-  out.estimate_poses = estimate.size();
+  out.reference_poses = r.trajectory.size();
+  out.estimate_poses = e.trajectory.size();
+  out.association = StatisticsOf(out.poses, r.trajectory, e.trajectory, options);
+  out.coverage = CoverageOf(reference, estimate, options.time_offset_s, options.max_time_difference_s,
+                            options.frame_stamps_s);
   out.alignment = options.alignment;
   out.S_reference_estimate = AlignPoses(out.poses, options);
   if (options.alignment != TrajectoryAlignment::kNone) {
     for (Pose& pose : out.poses.estimate) pose = ApplyAlignment(out.S_reference_estimate, pose);
   }
-  const std::vector<PoseMatrix> a =
-      Matrices(out.poses, true, options.interpolate ? std::vector<Eigen::Matrix3d>() : written.reference,
+  std::vector<PoseMatrix> a =
+      Matrices(out.poses, true, options.interpolate ? std::vector<Eigen::Matrix3d>() : r.written,
                Eigen::Quaterniond::Identity());
-  const std::vector<PoseMatrix> b =
-      Matrices(out.poses, false, written.estimate, out.S_reference_estimate.rotation);
+  std::vector<PoseMatrix> b = Matrices(out.poses, false, e.written, out.S_reference_estimate.rotation);
+  if (options.plane != ProjectionPlane::kNone) {
+    Project(options.plane, out.poses.reference, a);
+    Project(options.plane, out.poses.estimate, b);
+  }
   out.path_length_m = PathLengths(a).back();
   out.absolute = AbsoluteErrors(a, b);
   out.ate = Summarize(out.absolute.translation);
@@ -143,6 +231,9 @@ EvaluationReport EvaluateTrajectory(const Trajectory& reference, const Trajector
   out.rpe = Summarize(out.relative.translation);
   out.rpe_rotation = Summarize(out.relative.rotation_deg);
   out.rpe_full = Summarize(out.relative.full);
+  out.point_distance_errors = PointDistanceErrors(a, b, out.relative_pairs);
+  out.rpe_point_distance = Summarize(out.point_distance_errors);
+  out.rpe_point_distance_ratio = Summarize(PointDistanceRatios(a, b, out.relative_pairs));
   if (options.kitti) {
     out.kitti = EvaluateKitti(a, b);
     out.drift = EvaluateDrift(a, b);

@@ -31,7 +31,7 @@ const char* ToString(TrajectoryAlignment alignment) {
 }
 
 const std::vector<std::string>& DeltaUnitNames() {
-  static const std::vector<std::string> names = {"frames", "metres", "degrees", "seconds"};
+  static const std::vector<std::string> names = {"frames", "metres", "degrees", "seconds", "radians"};
   return names;
 }
 
@@ -40,5 +40,18 @@ DeltaUnit ParseDeltaUnit(const std::string& name) {
 }
 
 const char* ToString(DeltaUnit unit) { return DeltaUnitNames().at(static_cast<std::size_t>(unit)).c_str(); }
+
+const std::vector<std::string>& ProjectionPlaneNames() {
+  static const std::vector<std::string> names = {"none", "xy", "xz", "yz"};
+  return names;
+}
+
+ProjectionPlane ParseProjectionPlane(const std::string& name) {
+  return static_cast<ProjectionPlane>(Find(ProjectionPlaneNames(), name, "plane"));
+}
+
+const char* ToString(ProjectionPlane plane) {
+  return ProjectionPlaneNames().at(static_cast<std::size_t>(plane)).c_str();
+}
 
 }  // namespace tutti

@@ -112,6 +112,9 @@ Pairs RelativePairs(const std::vector<Pose>& estimate, const std::vector<double>
                                    : Pieces(Cuts(Steps(estimate), delta));
     case DeltaUnit::kDegrees:
       return PairsByAngle(estimate, delta, tolerance, options.rpe_all_pairs);
+    case DeltaUnit::kRadians:
+      return PairsByAngle(estimate, internal::kDegrees * delta, internal::kDegrees * tolerance,
+                          options.rpe_all_pairs);
     case DeltaUnit::kSeconds:
       return PairsByTime(stamps_s, delta, tolerance, options.rpe_all_pairs);
   }

@@ -21,7 +21,7 @@ Calibration Read(const std::string& text) {
   return ReadCalibration(file);
 }
 
-std::string Refusal(const std::string& text) {
+std::string RefusalOfFile(const std::string& text) {
   try {
     Read(text);
   } catch (const InputError& error) {
@@ -143,25 +143,26 @@ TEST(CalibrationFile, OfTuttiIsItsCameraSection) {
 }
 
 TEST(CalibrationFile, ThatCantBeUsedIsRefusedWithLineAndReason) {
-  EXPECT_THAT(Refusal("hello: 1\n"), HasSubstr("camera.yaml: holds no calibration; the formats"));
-  EXPECT_THAT(Refusal("- 1\n"), HasSubstr("holds no keys"));
-  EXPECT_THAT(Refusal("a: [1\n"), HasSubstr("not valid YAML"));
-  EXPECT_THAT(Refusal("Camera.fx: 500\nCamera.fy: x\nCamera.cx: 1\nCamera.cy: 1\n"),
+  EXPECT_THAT(RefusalOfFile("hello: 1\n"), HasSubstr("camera.yaml: holds no calibration; the formats"));
+  EXPECT_THAT(RefusalOfFile("- 1\n"), HasSubstr("holds no keys"));
+  EXPECT_THAT(RefusalOfFile("a: [1\n"), HasSubstr("not valid YAML"));
+  EXPECT_THAT(RefusalOfFile("Camera.fx: 500\nCamera.fy: x\nCamera.cx: 1\nCamera.cy: 1\n"),
               HasSubstr("camera.yaml:2: 'Camera.fy' is no number"));
-  EXPECT_THAT(Refusal("Camera.fx: .nan\nCamera.fy: 5\nCamera.cx: 1\nCamera.cy: 1\n"),
+  EXPECT_THAT(RefusalOfFile("Camera.fx: .nan\nCamera.fy: 5\nCamera.cx: 1\nCamera.cy: 1\n"),
               HasSubstr("'Camera.fx' is not finite"));
-  EXPECT_THAT(Refusal("Camera.fx: 500\nCamera.cx: 1\nCamera.cy: 1\n"), HasSubstr("has no key 'Camera.fy'"));
-  EXPECT_THAT(Refusal("cam0:\n  camera_model: omni\n  intrinsics: [1, 2, 3, 4, 5]\n"),
+  EXPECT_THAT(RefusalOfFile("Camera.fx: 500\nCamera.cx: 1\nCamera.cy: 1\n"),
+              HasSubstr("has no key 'Camera.fy'"));
+  EXPECT_THAT(RefusalOfFile("cam0:\n  camera_model: omni\n  intrinsics: [1, 2, 3, 4, 5]\n"),
               HasSubstr("camera_model 'omni'"));
-  EXPECT_THAT(Refusal("cam0:\n  intrinsics: [1, 2, 3]\n"), HasSubstr("has 3 values"));
-  EXPECT_THAT(Refusal("cam0:\n  intrinsics: [500, 500, 320, 240]\n  distortion_model: fov\n"
-                      "  distortion_coeffs: [0.9, 0, 0, 0]\n"),
+  EXPECT_THAT(RefusalOfFile("cam0:\n  intrinsics: [1, 2, 3]\n"), HasSubstr("has 3 values"));
+  EXPECT_THAT(RefusalOfFile("cam0:\n  intrinsics: [500, 500, 320, 240]\n  distortion_model: fov\n"
+                            "  distortion_coeffs: [0.9, 0, 0, 0]\n"),
               HasSubstr("camera.yaml:4: the lens model 'fov' is not known"));
-  EXPECT_THAT(Refusal("camera_matrix: {data: [1, 2]}\n"), HasSubstr("has 2 values; 9 are needed"));
-  EXPECT_THAT(Refusal("camera_matrix: {data: [500, 0, 320, 0, 500, 240, 0, 0, 1]}\n"
-                      "distortion_coefficients: {data: [0.1, 0, 0, 0, 0, 0.3, 0, 0]}\n"),
+  EXPECT_THAT(RefusalOfFile("camera_matrix: {data: [1, 2]}\n"), HasSubstr("has 2 values; 9 are needed"));
+  EXPECT_THAT(RefusalOfFile("camera_matrix: {data: [500, 0, 320, 0, 500, 240, 0, 0, 1]}\n"
+                            "distortion_coefficients: {data: [0.1, 0, 0, 0, 0, 0.3, 0, 0]}\n"),
               HasSubstr("more than 5 coefficients"));
-  EXPECT_THAT(Refusal("Camera.fx: -500\nCamera.fy: 500\nCamera.cx: 320\nCamera.cy: 240\n"),
+  EXPECT_THAT(RefusalOfFile("Camera.fx: -500\nCamera.fy: 500\nCamera.cx: 320\nCamera.cy: 240\n"),
               HasSubstr("camera.fx"));
 }
 

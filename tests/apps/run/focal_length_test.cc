@@ -17,21 +17,21 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 
-constexpr double kFocal = 260;
-constexpr int kFrames = 50;
+constexpr double kRoomFocal = 260;
+constexpr int kRoomFrames = 50;
 
 // A walk around in a room, in colour and depth.
-const fs::path& Room() {
+const fs::path& RoomToMeasure() {
   static const testing::GeneratedDataset room("focal_length_room", [] {
     SyntheticOptions options;
     options.scene = SyntheticScene::kRoom;
     options.sensor = SyntheticSensor::kRgbd;
     options.width = 320;
     options.height = 240;
-    options.focal_px = kFocal;
+    options.focal_px = kRoomFocal;
     options.supersample = 1;
     options.rate_hz = 5;
-    options.frames = kFrames;
+    options.frames = kRoomFrames;
     return options;
   }());
   return room.path();
@@ -41,34 +41,35 @@ RunConfig RoomConfig(double focal_px) {
   CameraRequest camera;
   const std::string focal = std::to_string(focal_px);
   camera.camera = focal + "," + focal + ",159.5,119.5";
-  return Recognise(Room(), camera).config;
+  return Recognise(RoomToMeasure(), camera).config;
 }
 
 TEST(FocalLength, OfARoomIsFoundFromAWrongOne) {
   for (const double share : {0.8, 1.25}) {
-    const FocalLength found = MeasureFocalLength(Room(), RoomConfig(share * kFocal), kFrames);
+    const FocalLength found =
+        MeasureFocalLength(RoomToMeasure(), RoomConfig(share * kRoomFocal), kRoomFrames);
     ASSERT_TRUE(found.measured) << found.reason;
-    EXPECT_NEAR(found.camera.fx / kFocal, 1, 0.05);
-    EXPECT_LT(std::abs(std::log(found.camera.fx / kFocal)), 4 * found.sigma + 0.01);
+    EXPECT_NEAR(found.camera.fx / kRoomFocal, 1, 0.05);
+    EXPECT_LT(std::abs(std::log(found.camera.fx / kRoomFocal)), 4 * found.sigma + 0.01);
     EXPECT_EQ(found.camera.fx, found.camera.fy);
   }
 }
 
 TEST(FocalLength, IsTheSameAgain) {
-  const RunConfig config = RoomConfig(1.1 * kFocal);
-  const FocalLength once = MeasureFocalLength(Room(), config, 20),
-                    again = MeasureFocalLength(Room(), config, 20);
+  const RunConfig config = RoomConfig(1.1 * kRoomFocal);
+  const FocalLength once = MeasureFocalLength(RoomToMeasure(), config, 20),
+                    again = MeasureFocalLength(RoomToMeasure(), config, 20);
   EXPECT_EQ(once.measured, again.measured);
   EXPECT_EQ(once.camera.fx, again.camera.fx);
   EXPECT_EQ(once.sigma, again.sigma);
 }
 
 TEST(FocalLength, OfAFewFramesIsNotMeasured) {
-  const FocalLength found = MeasureFocalLength(Room(), RoomConfig(1.2 * kFocal), 4);
+  const FocalLength found = MeasureFocalLength(RoomToMeasure(), RoomConfig(1.2 * kRoomFocal), 4);
   EXPECT_FALSE(found.measured);
   EXPECT_THAT(found.reason, HasSubstr("too little of it"));
   EXPECT_EQ(found.frames, 4);
-  EXPECT_DOUBLE_EQ(found.camera.fx, 1.2 * kFocal);
+  EXPECT_DOUBLE_EQ(found.camera.fx, 1.2 * kRoomFocal);
 }
 
 TEST(FocalLength, OfKittiAndRedkitchenIsFoundWithinFivePercent) {

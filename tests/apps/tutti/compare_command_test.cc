@@ -79,6 +79,43 @@ TEST_F(CollectCommand, MeansIntervalsAndThePairedTestOverFirstFrames) {
                     HasSubstr("* Lower than that of odometry (3.0000 m), p < 0.05.")));
 }
 
+TEST_F(CollectCommand, ColumnsPrecisionAndTheBestInBoldAreChosen) {
+  for (int start = 0; start < 2; ++start) {
+    Summary("joint", start, 0.5 + 0.1 * start);
+    Summary("orb", start, 0.61 + 0.1 * start);
+  }
+  const std::vector<std::string> choice = {"--columns", "ate,worst-ate,time", "--precision", "2",
+                                           "--bold-best"};
+  const auto with = [&](const std::string& format) {
+    std::vector<std::string> arguments = choice;
+    arguments.insert(arguments.end(), {"--table-format", format});
+    return Collect(arguments).output;
+  };
+  const std::string markdown = with("markdown");
+  EXPECT_THAT(
+      markdown.substr(0, markdown.find("What varies")),
+      AllOf(HasSubstr("| **0.55 +- 0.64** |      **0.60** | 2.5 +- 0.0 |"), HasSubstr("| 0.66 +- 0.64 "),
+            Not(HasSubstr("RPE")), Not(HasSubstr("**2.5"))));  // all times are the same
+  EXPECT_THAT(with("latex"), HasSubstr("\\textbf{0.55 $\\pm$ 0.64}"));
+  EXPECT_THAT(with("text"), HasSubstr("*0.55 +- 0.64"));
+  const auto wrong = Collect({"--columns", "ate,rpf"});
+  EXPECT_EQ(wrong.status, 1);
+  EXPECT_THAT(wrong.output, HasSubstr("'rpe'"));
+  EXPECT_EQ(Collect({"--precision", "13"}).status, 1);
+}
+
+TEST_F(CollectCommand, CsvIsOneTableForOtherPrograms) {
+  for (int start = 0; start < 2; ++start) {
+    Summary("joint", start, 0.5 + 0.1 * start);
+    Summary("orb", start, 0.61 + 0.1 * start);
+  }
+  const auto run = Collect({"--columns", "runs,ate,p", "--precision", "3", "--table-format", "csv"});
+  EXPECT_EQ(run.output,
+            "data set,variant,runs,ATE [m],ATE [m] +-,p\n"
+            "town,ensemble,2,0.550,0.635,\n"
+            "town,orb,2,0.660,0.635,\n");
+}
+
 TEST_F(CollectCommand, FewerThanFivePairsHaveNoP) {
   for (int start = 1; start <= 4; ++start) {
     Summary("odometry", start, 1 + 0.01 * start);

@@ -20,7 +20,7 @@ using testing::RunTutti;
 constexpr int kPlaces = 15, kImages = 20;
 
 // KITTI's layout; images 15 to 19 show the places of 0 to 4 again.
-fs::path Recording() {
+fs::path DriveWithLoops() {
   fs::path folder = testing::FreshFolder() / "drive";
   fs::create_directories(folder / "image_0");
   for (int i = 0; i < kImages; ++i) {
@@ -32,7 +32,7 @@ fs::path Recording() {
 }
 
 TEST(LoopsWithoutTruth, AreListedAndShownButNotJudged) {
-  const fs::path folder = Recording(), out = folder / "out";
+  const fs::path folder = DriveWithLoops(), out = folder / "out";
   const auto run = RunTutti({"loops", folder.string(), "--out", out.string(), "--set", "stm_size=3"});
   ASSERT_EQ(run.status, 0) << run.output;
   EXPECT_THAT(run.output, HasSubstr("loops accepted"));
@@ -52,7 +52,7 @@ TEST(LoopsWithoutTruth, AreListedAndShownButNotJudged) {
 }
 
 TEST(LoopsWithoutTruth, CantBeATable) {
-  const fs::path folder = Recording();
+  const fs::path folder = DriveWithLoops();
   const auto run = RunTutti({"loops", folder.string(), "--table", "--out", (folder / "out").string()});
   EXPECT_EQ(run.status, 1);
   EXPECT_THAT(run.output, HasSubstr("--table compares rules by a ground truth"));

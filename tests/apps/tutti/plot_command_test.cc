@@ -68,6 +68,56 @@ TEST_F(PlotCommand, EveryKindIsDrawnAsSvgAndPng) {
   EXPECT_THAT(ReadAll(folder_ / "error.svg"), HasSubstr("distance along the reference [m]"));
 }
 
+TEST_F(PlotCommand, WithoutAReferenceTheFilesAreDrawnAsTheyAre) {
+  const std::string good = (folder_ / "good.txt").string(), bad = (folder_ / "bad.txt").string();
+  for (const std::string what : {"trajectory", "xyz", "rpy", "speed"}) {
+    const std::string svg = (folder_ / (what + ".svg")).string();
+    const auto run = RunTutti({"plot", good, bad, "--what", what, "--out", svg});
+    ASSERT_EQ(run.status, 0) << run.output;
+    EXPECT_THAT(ReadAll(svg), AllOf(HasSubstr(">good.txt<"), HasSubstr(">bad.txt<"), HasSubstr("</svg>"),
+                                    Not(HasSubstr(">reference<")), Not(HasSubstr("nan"))));
+  }
+  EXPECT_THAT(ReadAll(folder_ / "xyz.svg"),
+              AllOf(HasSubstr("x [m]"), HasSubstr("z [m]"), HasSubstr("time [s]")));
+  EXPECT_THAT(ReadAll(folder_ / "rpy.svg"), AllOf(HasSubstr("roll [deg]"), HasSubstr("yaw [deg]")));
+  EXPECT_THAT(ReadAll(folder_ / "speed.svg"), HasSubstr("speed [m/s]"));
+}
+
+TEST_F(PlotCommand, OverTimeTheReferenceIsDrawnToo) {
+  for (const std::string what : {"xyz", "rpy", "speed"}) {
+    ASSERT_EQ(Plot(what, {what + ".svg"}).status, 0);
+    EXPECT_THAT(ReadAll(folder_ / (what + ".svg")), HasSubstr(">reference<"));
+  }
+}
+
+TEST_F(PlotCommand, ErrorsAreDrawnOnTheMapAndAsDistributions) {
+  for (const std::string what : {"error-map", "box", "violin"}) {
+    const auto run = Plot(what, {what + ".svg", what + ".png"});
+    ASSERT_EQ(run.status, 0) << run.output;
+    EXPECT_THAT(ReadAll(folder_ / (what + ".svg")), AllOf(HasSubstr("[m]"), Not(HasSubstr("nan"))));
+    EXPECT_FALSE(cv::imread((folder_ / (what + ".png")).string()).empty());
+  }
+  // Many colours, and the bar that explains them.
+  EXPECT_THAT(ReadAll(folder_ / "error-map.svg"), AllOf(HasSubstr("absolute translation error [m]"),
+                                                        HasSubstr(">reference<"), HasSubstr("stroke=\"#")));
+  EXPECT_THAT(ReadAll(folder_ / "box.svg"), AllOf(HasSubstr(">good.txt<"), HasSubstr(">bad.txt<")));
+}
+
+TEST_F(PlotCommand, WhatNeedsAReferenceOrStampsSaysSo) {
+  const std::string good = (folder_ / "good.txt").string(), svg = (folder_ / "a.svg").string();
+  for (const std::string what : {"error", "rpe", "error-map", "box", "violin"}) {
+    const auto run = RunTutti({"plot", good, "--what", what, "--out", svg});
+    EXPECT_EQ(run.status, 1);
+    EXPECT_THAT(run.output, HasSubstr("--reference")) << what;
+  }
+  EXPECT_EQ(RunTutti({"plot", "--out", svg}).status, 1);
+  const std::string kitti = (folder_ / "a.kitti").string();
+  ASSERT_EQ(RunTutti({"convert", good, kitti, "--to", "kitti"}).status, 0);
+  EXPECT_THAT(RunTutti({"plot", kitti, "--what", "speed", "--out", svg}).output, HasSubstr("--times"));
+  ASSERT_EQ(RunTutti({"plot", kitti, "--what", "xyz", "--out", svg}).status, 0);
+  EXPECT_THAT(ReadAll(svg), HasSubstr(">frame<"));
+}
+
 TEST_F(PlotCommand, PdfIsWrittenOrTheMissingLibraryIsNamed) {
   const auto run = Plot("error", {"a.pdf"});
   if (run.status != 0) {

@@ -30,12 +30,28 @@ const char* ToString(TrajectoryAlignment alignment);
 
 /// Distance between the two poses of a relative error: along the path, in accumulated rotation (all pairs:
 /// rotation between the two), in time.
-enum class DeltaUnit { kFrames, kMetres, kDegrees, kSeconds };
-/// "frames", "metres", "degrees", "seconds".
+enum class DeltaUnit { kFrames, kMetres, kDegrees, kSeconds, kRadians };
+/// "frames", "metres", "degrees", "seconds", "radians".
 const std::vector<std::string>& DeltaUnitNames();
 /// Throws InputError for another word.
 DeltaUnit ParseDeltaUnit(const std::string& name);
 const char* ToString(DeltaUnit unit);
+
+/// Planes that poses can be projected to after the alignment (evo's --project_to_plane): the third coordinate
+/// becomes 0, the rotation that about the plane's normal.
+enum class ProjectionPlane { kNone, kXY, kXZ, kYZ };
+/// "none", "xy", "xz", "yz".
+const std::vector<std::string>& ProjectionPlaneNames();
+/// Throws InputError for another word.
+ProjectionPlane ParseProjectionPlane(const std::string& name);
+const char* ToString(ProjectionPlane plane);
+
+/// A pose counts once the path since the last that counted is so long, or the rotation since then so large
+/// (evo's --motion_filter).
+struct MotionFilter {
+  double distance_m = 0;  ///< along the path [m]
+  double angle_deg = 0;   ///< [deg]
+};
 
 struct EvaluationOptions {
   TrajectoryAlignment alignment = TrajectoryAlignment::kSE3;
@@ -45,6 +61,10 @@ struct EvaluationOptions {
   double time_offset_s = 0;             ///< added to the estimate's time stamps [s]
   bool interpolate = false;          ///< the reference at the estimate's stamps instead of its nearest pose
   double max_interpolation_s = 0.2;  ///< interpolate: not between poses that are further apart in time [s]
+  std::size_t downsample = 0;        ///< before the association, at most so many evenly spaced poses; 0: all
+  std::optional<MotionFilter> motion_filter;       ///< before the association, after downsample
+  ProjectionPlane plane = ProjectionPlane::kNone;  ///< after the alignment
+  std::vector<double> frame_stamps_s;  ///< of all images, for the coverage [s]; empty: they are estimated
   bool by_index = false;   ///< pair poses by position (KITTI) instead of by time; the counts must agree
   double rpe_delta = 1.0;  ///< distance of a relative error's two poses, in rpe_unit
   DeltaUnit rpe_unit = DeltaUnit::kFrames;
@@ -123,6 +143,14 @@ struct PoseErrors {
 };
 /// Absolute errors of poses with the same index.
 PoseErrors AbsoluteErrors(const std::vector<PoseMatrix>& reference, const std::vector<PoseMatrix>& estimate);
+/// | |R_i - R_j| - |P_i - P_j| | of the positions of each pair [m] (evo's point_distance).
+std::vector<double> PointDistanceErrors(const std::vector<PoseMatrix>& reference,
+                                        const std::vector<PoseMatrix>& estimate,
+                                        const std::vector<std::pair<std::size_t, std::size_t>>& pairs);
+/// The same over |R_i - R_j| [%]; pairs whose reference does not move are left out.
+std::vector<double> PointDistanceRatios(const std::vector<PoseMatrix>& reference,
+                                        const std::vector<PoseMatrix>& estimate,
+                                        const std::vector<std::pair<std::size_t, std::size_t>>& pairs);
 /// Relative errors of the pairs (i, j): E = (R_i^-1 R_j)^-1 (P_i^-1 P_j), reference R and estimate P (Sturm
 /// et al., IROS 2012).
 PoseErrors RelativeErrors(const std::vector<PoseMatrix>& reference, const std::vector<PoseMatrix>& estimate,
@@ -133,6 +161,39 @@ PoseErrors RelativeErrors(const std::vector<PoseMatrix>& reference, const std::v
 std::vector<std::pair<std::size_t, std::size_t>> RelativePairs(const std::vector<Pose>& estimate,
                                                                const std::vector<double>& stamps_s,
                                                                const EvaluationOptions& options);
+
+/// Indices of at most `count` of `poses` poses, evenly spaced, first and last among them.
+std::vector<std::size_t> EvenlySpacedPoses(std::size_t poses, std::size_t count);
+/// Indices of the poses that count, the first among them.
+std::vector<std::size_t> MovedPoses(const Trajectory& trajectory, const MotionFilter& filter);
+/// The angles a, b, c of R = Rz(c) Ry(b) Rx(a) [rad]: roll, pitch, yaw. Where b is +-90 degrees, c is 0.
+Eigen::Vector3d RollPitchYaw(const Eigen::Matrix3d& rotation);
+/// The pose in the plane: its third coordinate 0, its rotation that about the plane's normal, an angle of
+/// RollPitchYaw.
+PoseMatrix ProjectToPlane(const PoseMatrix& pose, ProjectionPlane plane);
+
+/// How much of the reference's span of time an estimate has poses for.
+struct TrajectoryCoverage {
+  std::size_t posed = 0;  ///< poses, or frames with a pose, within the span
+  std::size_t all = 0;    ///< those, and frames without a pose
+  /// From 0 to 1.
+  double share() const { return all == 0 ? 0 : static_cast<double>(posed) / static_cast<double>(all); }
+};
+/// An ATE says little of a run that covers less than this of the reference.
+constexpr double kFullCoverage = 0.99;
+/// Frames without a pose are counted by the estimate's median interval: where a gap is n intervals long, n -
+/// 1 are missing, and n before the first pose and after the last. A list of keyframes has uneven gaps; give
+/// `frame_stamps_s` for these, and where the reference begins before the images or ends after them.
+/// `tolerance_s`: poses so far outside of the span are within it.
+TrajectoryCoverage CoverageOf(const Trajectory& reference, const Trajectory& estimate, double offset_s,
+                              double tolerance_s, const std::vector<double>& frame_stamps_s = {});
+
+/// How two lists of poses were paired.
+struct AssociationStatistics {
+  std::size_t reference_unmatched = 0, estimate_unmatched = 0;  ///< poses in no pair
+  double median_time_difference_s = 0;   ///< of a pair, without sign [s]; 0 for interpolation and by index
+  double largest_time_difference_s = 0;  ///< [s]
+};
 
 /// Mean relative errors over segments of the path.
 struct SegmentErrors {
@@ -157,22 +218,27 @@ SegmentErrors EvaluateDrift(const std::vector<PoseMatrix>& reference,
                             const std::vector<PoseMatrix>& estimate);
 
 struct EvaluationReport {
-  std::size_t pairs = 0;  ///< associated poses
-  std::size_t reference_poses = 0, estimate_poses = 0;
+  std::size_t pairs = 0;                                ///< associated poses
+  std::size_t reference_poses = 0, estimate_poses = 0;  ///< that could have been paired
+  AssociationStatistics association;
+  TrajectoryCoverage coverage;  ///< before downsample and motion_filter
   TrajectoryAlignment alignment = TrajectoryAlignment::kSE3;
-  Similarity S_reference_estimate;  ///< the alignment that was applied
-  double path_length_m = 0;         ///< of the associated reference poses
-  ErrorStatistics ate;              ///< [m]
-  ErrorStatistics ate_rotation;     ///< [deg]
-  ErrorStatistics ate_full;         ///< [-]
-  ErrorStatistics rpe;              ///< [m]; count 0 if no pair is rpe_delta apart
-  ErrorStatistics rpe_rotation;     ///< [deg]
-  ErrorStatistics rpe_full;         ///< [-]
+  Similarity S_reference_estimate;           ///< the alignment that was applied
+  double path_length_m = 0;                  ///< of the associated reference poses
+  ErrorStatistics ate;                       ///< [m]
+  ErrorStatistics ate_rotation;              ///< [deg]
+  ErrorStatistics ate_full;                  ///< [-]
+  ErrorStatistics rpe;                       ///< [m]; count 0 if no pair is rpe_delta apart
+  ErrorStatistics rpe_rotation;              ///< [deg]
+  ErrorStatistics rpe_full;                  ///< [-]
+  ErrorStatistics rpe_point_distance;        ///< [m]
+  ErrorStatistics rpe_point_distance_ratio;  ///< [%]
   KittiErrors kitti;
   SegmentErrors drift;
   // What the figures are of, for plots.
   AssociatedPoses poses;  ///< the estimate aligned
   PoseErrors absolute, relative;
+  std::vector<double> point_distance_errors;                        ///< of `relative_pairs` [m]
   std::vector<std::pair<std::size_t, std::size_t>> relative_pairs;  ///< indices into `poses`
 };
 

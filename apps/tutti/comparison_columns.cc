@@ -1,0 +1,161 @@
+#include "apps/tutti/comparison_columns.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "tutti/core/error.h"
+#include "tutti/core/text.h"
+
+namespace tutti::cli {
+namespace {
+
+std::size_t Failures(const Variant& variant) {
+  return static_cast<std::size_t>(std::count_if(variant.runs.begin(), variant.runs.end(),
+                                                [](const RunFigures* run) { return !run->failure.empty(); }));
+}
+
+enum class Kind { kRuns, kMean, kWorst, kP };
+
+struct Column {
+  const char* word;
+  const char* header;
+  Kind kind;
+  double RunFigures::*field;
+  int decimals;
+  bool is_error;  ///< --precision holds
+  bool has_best;  ///< the least is the best
+  double scale;   ///< from the figure to the column's unit
+};
+
+constexpr Column kColumns[] = {
+    {"runs", "runs", Kind::kRuns, nullptr, 0, false, false, 1},
+    {"proposed", "proposed", Kind::kMean, &RunFigures::proposed, 1, false, false, 1},
+    {"accepted", "accepted", Kind::kMean, &RunFigures::accepted, 1, false, false, 1},
+    {"false", "false", Kind::kMean, &RunFigures::false_loops, 1, false, true, 1},
+    {"ate", "ATE [m]", Kind::kMean, &RunFigures::ate_m, 4, true, true, 1},
+    {"worst-ate", "worst ATE [m]", Kind::kWorst, &RunFigures::ate_m, 4, true, true, 1},
+    {"p", "p", Kind::kP, nullptr, 4, false, false, 1},
+    {"rpe", "RPE [m]", Kind::kMean, &RunFigures::rpe_m, 4, true, true, 1},
+    {"t_rel", "t_rel [%]", Kind::kMean, &RunFigures::t_rel_percent, 3, true, true, 1},
+    {"r_rel", "r_rel [deg/100 m]", Kind::kMean, &RunFigures::r_rel_deg_per_m, 3, true, true, 100},
+    {"time", "time [s]", Kind::kMean, &RunFigures::wall_s, 1, false, true, 1},
+    {"odometry", "odometry [s]", Kind::kMean, &RunFigures::odometry_s, 1, false, true, 1},
+    {"loops", "loops [s]", Kind::kMean, &RunFigures::loops_s, 1, false, true, 1},
+    {"frame", "frame [ms]", Kind::kMean, &RunFigures::frame_ms, 1, false, true, 1},
+    {"memory", "memory [MB]", Kind::kMean, &RunFigures::memory_mb, 0, false, true, 1},
+};
+
+std::vector<const Column*> Chosen(const TableChoice& choice) {
+  std::vector<const Column*> out;
+  if (choice.columns.empty()) {
+    for (const Column& column : kColumns) out.push_back(&column);
+  }
+  for (const std::string& word : choice.columns) {
+    const Column* found = std::find_if(std::begin(kColumns), std::end(kColumns),
+                                       [&](const Column& c) { return word == c.word; });
+    if (found == std::end(kColumns)) {
+      throw InputError("there is no column '" + word + "'; the nearest is '" +
+                       NearestWord(word, ComparisonColumns()) + "' of " + JoinText(ComparisonColumns()));
+    }
+    out.push_back(found);
+  }
+  return out;
+}
+
+/// What stands in the column: a mean with its interval, or the largest alone.
+MeanInterval FigureOf(const Column& column, const Variant& variant) {
+  MeanInterval figure = Over(variant, column.field);
+  if (column.kind == Kind::kWorst) return {figure.count == 0 ? 0u : 1u, figure.largest};
+  figure.mean *= column.scale;
+  figure.half_width *= column.scale;
+  return figure;
+}
+
+int DecimalsOf(const Column& column, const TableChoice& choice) {
+  return column.is_error ? choice.decimals.value_or(column.decimals) : column.decimals;
+}
+
+std::string CellOf(const Column& column, const Variant& variant, const std::vector<Variant>& all,
+                   const TableChoice& choice) {
+  if (column.kind == Kind::kRuns) {
+    const std::size_t failed = Failures(variant);
+    return std::to_string(variant.runs.size() - failed) +
+           (failed > 0 ? " (" + std::to_string(failed) + " failed)" : "");
+  }
+  if (column.kind == Kind::kP) {
+    const PairedTTestResult test = AgainstEnsemble(variant, all);
+    return variant.name == kEnsemble || test.pairs < kLeastPairs ? "-" : Fixed(test.p, column.decimals);
+  }
+  return IntervalCell(FigureOf(column, variant), DecimalsOf(column, choice));
+}
+
+/// Rows whose mean is the least, as it is printed. A column in which all rows are the same has no best.
+std::vector<std::size_t> BestRows(const Column& column, const std::vector<Variant>& variants, int decimals) {
+  std::vector<std::string> printed;
+  double least = std::numeric_limits<double>::infinity();
+  std::string best;
+  for (const Variant& variant : variants) {
+    const MeanInterval figure = FigureOf(column, variant);
+    printed.push_back(figure.count == 0 ? "-" : Fixed(figure.mean, decimals));
+    if (figure.count == 0 || !(figure.mean < least)) continue;
+    least = figure.mean;
+    best = printed.back();
+  }
+  std::vector<std::size_t> rows;
+  for (std::size_t k = 0; k < printed.size(); ++k) {
+    if (printed[k] == best) rows.push_back(k);
+  }
+  return rows.size() == printed.size() ? std::vector<std::size_t>() : rows;
+}
+
+}  // namespace
+
+MeanInterval Over(const Variant& variant, double RunFigures::*field) {
+  std::vector<double> values;
+  for (const RunFigures* run : variant.runs) values.push_back(run->*field);
+  return MeanWithInterval(values);
+}
+
+PairedTTestResult AgainstEnsemble(const Variant& variant, const std::vector<Variant>& all) {
+  std::vector<double> a, b;
+  for (const Variant& other : all) {
+    if (other.name != kEnsemble) continue;
+    for (const RunFigures* run : variant.runs) {
+      for (const RunFigures* ensemble : other.runs) {
+        if (!(run->sample == ensemble->sample) || !std::isfinite(run->ate_m) ||
+            !std::isfinite(ensemble->ate_m))
+          continue;
+        a.push_back(run->ate_m);
+        b.push_back(ensemble->ate_m);
+      }
+    }
+  }
+  return PairedTTest(a, b);
+}
+
+std::vector<std::string> ComparisonColumns() {
+  std::vector<std::string> words;
+  for (const Column& column : kColumns) words.emplace_back(column.word);
+  return words;
+}
+
+TextTable FiguresTable(const std::vector<Variant>& variants, const TableChoice& choice) {
+  const std::vector<const Column*> columns = Chosen(choice);
+  TextTable table;
+  table.header = {"variant"};
+  for (const Column* column : columns) table.header.emplace_back(column->header);
+  for (const Variant& variant : variants) {
+    table.rows.push_back({variant.name});
+    for (const Column* column : columns)
+      table.rows.back().push_back(CellOf(*column, variant, variants, choice));
+  }
+  for (std::size_t k = 0; choice.bold_best && k < columns.size(); ++k) {
+    if (!columns[k]->has_best) continue;
+    for (const std::size_t row : BestRows(*columns[k], variants, DecimalsOf(*columns[k], choice)))
+      table.bold.emplace_back(row, k + 1);
+  }
+  return table;
+}
+
+}  // namespace tutti::cli

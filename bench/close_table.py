@@ -16,47 +16,12 @@ import subprocess
 import sys
 
 import table
+from pose_files import inverse, matrix, read_kitti, read_tum, seen_from, times, write_kitti
 
 ROWS = ["own", "walk", "kitchen", "published"]
 WALKS = [(0.02, 0.02), (0.05, 0.05), (0.1, 0.1)]  # yaw [deg], scale [%], after one metre
 SEED = 1
 REMOVED = 0.8  # of the drift at the loop, at least
-
-
-def matrix(words):
-    return [words[0:4], words[4:8], words[8:12], [0, 0, 0, 1]]
-
-
-def times(a, b):
-    return [[sum(a[i][k] * b[k][j] for k in range(4)) for j in range(4)] for i in range(4)]
-
-
-def inverse(m):
-    r = [[m[j][i] for j in range(3)] for i in range(3)]
-    return [[*r[i], -sum(r[i][k] * m[k][3] for k in range(3))] for i in range(3)] + [[0, 0, 0, 1]]
-
-
-def read_kitti(file, count=None):
-    return [matrix(list(map(float, line.split()))) for line in open(file)][:count]
-
-
-def read_tum(file):
-    poses = []
-    for line in open(file):
-        if line.startswith("#") or not line.strip():
-            continue
-        s, x, y, z, a, b, c, w = map(float, line.split())
-        n = math.sqrt(a * a + b * b + c * c + w * w)
-        a, b, c, w = a / n, b / n, c / n, w / n
-        poses.append((s, [[1 - 2 * (b * b + c * c), 2 * (a * b - c * w), 2 * (a * c + b * w), x],
-                          [2 * (a * b + c * w), 1 - 2 * (a * a + c * c), 2 * (b * c - a * w), y],
-                          [2 * (a * c - b * w), 2 * (b * c + a * w), 1 - 2 * (a * a + b * b), z], [0, 0, 0, 1]]))
-    return poses
-
-
-def write_kitti(file, poses):
-    file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_text("".join(" ".join(f"{v:.12g}" for row in p[:3] for v in row) + "\n" for p in poses))
 
 
 def disturbed(poses, yaw_deg, scale_percent):
@@ -80,8 +45,7 @@ def drift(truth, estimate):
     place = lambda p: [p[i][3] for i in range(3)]
     end = len(truth) - 1
     near = min(range(end // 2), key=lambda i: math.dist(place(truth[i]), place(truth[end])))
-    seen = lambda p: [row[3] for row in times(inverse(p[near]), p[end])[:3]]
-    return math.dist(seen(truth), seen(estimate))
+    return math.dist(seen_from(truth[near], truth[end]), seen_from(estimate[near], estimate[end]))
 
 
 def close(a, name, data, config, trajectory, more=()):
@@ -93,7 +57,7 @@ def close(a, name, data, config, trajectory, more=()):
     summary = json.loads((out / "summary.json").read_text())
     said = summary["evaluation"]
     return {"name": name, "before_ate_m": said["odometry"]["ate_rmse_m"], "ate_m": said["slam"]["ate_rmse_m"],
-            "true": summary["loops"]["true"], "false": summary["loops"]["false"]}, read_tum(out / "trajectory.txt")
+            "true": summary["loops"]["true"], "false": summary["loops"]["false"]}, [matrix(p) for p in read_tum(out / "trajectory.txt").values()]
 
 
 def kitti(a):
@@ -120,24 +84,24 @@ def walk(a):
         file = a.out / f"walk-{yaw}-{scale}.txt"
         write_kitti(file, given)
         row, corrected = close(a, f"walk-{yaw}-{scale}", data, config, file)
-        rows.append(dict(row, before_m=drift(truth, given), after_m=drift(truth, [p for _, p in corrected])))
+        rows.append(dict(row, before_m=drift(truth, given), after_m=drift(truth, corrected)))
     return rows
 
 
 def kitchen(a):
     data, config = a.data / "redkitchen", table.ROOT / "data" / "configs" / "7scenes.yaml"
-    truth = read_tum(data / "groundtruth.txt")
+    read = read_tum(data / "groundtruth.txt")
+    truth = [matrix(p) for p in read.values()]
     stamps = a.out / "kitchen-times.txt"
     stamps.parent.mkdir(parents=True, exist_ok=True)
-    stamps.write_text("".join(f"{s:.9f}\n" for s, _ in truth))
+    stamps.write_text("".join(f"{s:.9f}\n" for s in read))
     rows = []
     for yaw, scale in [(1, 1), (3, 3)]:  # 7 m are short
-        given = disturbed([p for _, p in truth], yaw, scale)
+        given = disturbed(truth, yaw, scale)
         file = a.out / f"kitchen-{yaw}-{scale}.txt"
         write_kitti(file, given)
         row, corrected = close(a, f"kitchen-{yaw}-{scale}", data, config, file, ["--times", stamps, "--odometry-sigma", 0.01 * scale, yaw / 3])
-        rows.append(dict(row, before_m=drift([p for _, p in truth], given),
-                         after_m=drift([p for _, p in truth], [p for _, p in corrected])))
+        rows.append(dict(row, before_m=drift(truth, given), after_m=drift(truth, corrected)))
     return rows
 
 

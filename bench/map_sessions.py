@@ -2,7 +2,8 @@
 import subprocess
 
 import table
-from map_use import KITCHEN, KITTI, MAPPED, ate, map_info, poses, run, tutti
+from map_use import KITCHEN, KITTI, MAPPED, ate, map_info, run, tutti
+from pose_files import read_tum as poses
 
 SECOND = 1000  # first frame of KITTI's second recording
 DUSK = ["--sensor", "stereo", "--blocks-x", 1, "--laps", 2, "--dusk"]

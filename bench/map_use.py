@@ -11,6 +11,7 @@ import shutil
 import subprocess
 
 import table
+from pose_files import read_tum as poses
 
 KITCHEN = ("7scenes.yaml", "redkitchen")
 KITTI = ("kitti_00-02_mono.yaml", "kitti_00_head")
@@ -60,16 +61,6 @@ def summary(folder):
 def map_info(a, file):
     done = subprocess.run([a.tutti, "map", "info", file, "--json"], check=True, capture_output=True, text=True)
     return json.loads(done.stdout)
-
-
-def poses(file):
-    """Time stamp: (position, quaternion x y z w) of a TUM trajectory."""
-    out = {}
-    for line in file.read_text().splitlines():
-        if line and not line.startswith("#"):
-            v = [float(word) for word in line.split()]
-            out[round(v[0], 6)] = (v[1:4], v[4:8])
-    return out
 
 
 def away(a, b):

@@ -19,6 +19,7 @@ void BindDataset(py::module_& module);
 void BindOptimizationReport(py::module_& module);
 void BindPoseGraph(py::module_& module);
 void BindSlamSystem(py::module_& module);
+void BindTrajectoryCloser(py::module_& module);
 void BindEvaluation(py::module_& module);
 
 }  // namespace tutti::python

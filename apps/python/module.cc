@@ -18,5 +18,6 @@ PYBIND11_MODULE(_tutti, module) {
   BindOptimizationReport(module);
   BindPoseGraph(module);
   BindSlamSystem(module);
+  BindTrajectoryCloser(module);
   BindEvaluation(module);
 }

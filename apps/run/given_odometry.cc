@@ -4,10 +4,11 @@
 #include <cmath>
 #include <utility>
 
+#include "apps/run/depth_beside.h"
+#include "frontend/dataset/image_file.h"
 #include "tutti/backend/evaluation.h"
 #include "tutti/backend/trajectory_file.h"
 #include "tutti/core/error.h"
-#include "tutti/core/text.h"
 
 namespace tutti {
 namespace {
@@ -75,14 +76,21 @@ PoseFile ReadPoses(const GivenOdometryFiles& files, const std::vector<double>& t
 GivenOdometry::GivenOdometry(const GivenOdometryFiles& files, const fs::path& images,
                              const DatasetOptions& options)
     : files_(files), images_(images), options_(options) {
+  if (files.depth) {
+    if (DetectDatasetType(images) != DatasetType::kImages)
+      throw InputError(images.string() +
+                       ": --depth goes with a plain folder of images; this one says itself where its depth is");
+    options_.type = DatasetType::kImages;
+    options_.sensor = Sensor::kMono;  // what a plain folder is
+  }
   PoseFile poses = ReadPoses(files, {});
   if (poses.format == PoseFileFormat::kG2o)
     throw InputError(files.trajectory.string() + ": is a graph; a trajectory (TUM, KITTI, EuRoC) is needed");
   if (poses.trajectory.empty()) throw InputError(files.trajectory.string() + ": holds no pose");
-  const std::unique_ptr<Dataset> all = OpenDataset(images, Whole(options));
+  const std::unique_ptr<Dataset> all = OpenDataset(images, Whole(options_));
   std::vector<double> times;
   if (files.times) times = ReadTimes(*files.times);
-  const bool own = HasOwnStamps(images, options);
+  const bool own = HasOwnStamps(images, options_);
   if (files.times && times.size() != all->Size() &&
       (poses.has_stamps || times.size() != poses.trajectory.size()))
     throw InputError(files.times->string() + ": has " + std::to_string(times.size()) + " time stamps, but " +
@@ -113,14 +121,8 @@ std::vector<double> GivenOdometry::StampsByName(std::size_t count) const {
   std::error_code code;
   if (!fs::is_directory(images_, code)) return {};
   std::vector<double> stamps;
-  for (const fs::directory_entry& entry : fs::directory_iterator(images_, code)) {
-    const std::string stem = entry.path().stem().string();
-    const bool like_a_time = stem.find('.') != std::string::npos || stem.size() >= 10;
-    const std::optional<double> number = like_a_time ? ParseDouble(stem) : std::nullopt;
-    if (number && std::isfinite(*number)) stamps.push_back(*number > 1e14 ? 1e-9 * *number : *number);
-  }
-  std::sort(stamps.begin(), stamps.end());
-  return stamps.size() == count && Grows(stamps) ? stamps : std::vector<double>();
+  for (const auto& [stamp, file] : StampsInNames(ListImages(images_))) stamps.push_back(stamp);
+  return stamps.size() == count ? stamps : std::vector<double>();
 }
 
 std::vector<double> GivenOdometry::ImageStamps(const Dataset& all) {
@@ -159,6 +161,8 @@ std::vector<double> GivenOdometry::ImageStamps(const Dataset& all) {
 std::unique_ptr<Dataset> GivenOdometry::Open() const {
   std::unique_ptr<Dataset> dataset = OpenDataset(images_, options_);
   if (!stamps_.empty()) dataset = std::make_unique<RestampedDataset>(std::move(dataset), stamps_);
+  if (files_.depth)
+    dataset = std::make_unique<DepthBeside>(std::move(dataset), stamps_, *files_.depth, options_);
   for (std::size_t i = 0; i < dataset->Size(); ++i) {
     if (At(dataset->Stamp(i))) return dataset;
   }

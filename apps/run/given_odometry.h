@@ -15,6 +15,7 @@ namespace tutti {
 struct GivenOdometryFiles {
   std::filesystem::path trajectory;            ///< TUM, KITTI or EuRoC
   std::string format = "auto";                 ///< or tum, kitti, euroc
+  std::optional<std::filesystem::path> depth;  ///< folder of depth images for a plain folder of images
   std::optional<std::filesystem::path> times;  ///< one stamp a line: of the images, of KITTI's poses, or both
 };
 

@@ -1,6 +1,7 @@
 #include "apps/slam/loop_closer.h"
 
 #include <algorithm>
+#include <cstdio>
 #include <utility>
 
 #include "core/angle.h"
@@ -181,6 +182,26 @@ LoopUpdate LoopCloser::Enter(std::vector<LoopEdge> entering, const Odometry& odo
   return update;
 }
 
+// The larger of what is configured and what the images say.
+OdometryUncertainty::Sigmas LoopCloser::Sigmas() const {
+  OdometryUncertainty::Sigmas sigmas = uncertainty_.Estimate();
+  sigmas.fraction = std::max(sigmas.fraction, options_.odometry_sigma_fraction);
+  sigmas.rotation_rad = std::max(sigmas.rotation_rad, options_.odometry_sigma_deg * internal::kRadians);
+  return sigmas;
+}
+
+std::string LoopCloser::Uncertainty() const {
+  const OdometryUncertainty::Sigmas sigmas = Sigmas();
+  const double deg = sigmas.rotation_rad * internal::kDegrees;
+  if (sigmas.fraction <= options_.odometry_sigma_fraction && deg <= options_.odometry_sigma_deg) return "";
+  char text[240];
+  std::snprintf(text, sizeof text,
+                "the images contradict the odometry by more than its standard deviation says: between two "
+                "keyframes %.2g of the way and %.2g deg count, instead of %.2g and %.2g deg",
+                sigmas.fraction, deg, options_.odometry_sigma_fraction, options_.odometry_sigma_deg);
+  return text;
+}
+
 // Solves the graph with them beside the tracking; those that come meanwhile wait for their turn.
 void LoopCloser::Start(std::vector<LoopEdge> entering, const Odometry& odometry, std::int64_t frames) {
   if (solver_.Running()) {
@@ -191,6 +212,8 @@ void LoopCloser::Start(std::vector<LoopEdge> entering, const Odometry& odometry,
   const internal::Stopwatch watch;
   solved_keyframes_ = KeyframesOf(odometry);
   graph_.Update(solved_keyframes_, CovisibleOf(odometry, options_.covisibility_min_shared));
+  const OdometryUncertainty::Sigmas sigmas = Sigmas();
+  graph_.SetSigmas(sigmas.fraction, sigmas.rotation_rad);
   solver_.Start(graph_, accepted_, entering, options_, recorder_);
   solved_due_ = frames + SolutionFrames(solved_keyframes_.size());
   stages_["loop_optimize"] += watch.Milliseconds();

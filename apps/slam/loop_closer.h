@@ -16,6 +16,7 @@
 #include "apps/slam/loop_gate.h"
 #include "apps/slam/loop_solver.h"
 #include "apps/slam/loop_update.h"
+#include "apps/slam/odometry_uncertainty.h"
 #include "tutti/core/span_recorder.h"
 #include "tutti/loopclosure/detector.h"
 #include "tutti/slam/config.h"
@@ -48,6 +49,12 @@ class LoopCloser {
   /// the map. The update is to be applied at once.
   LoopUpdate Consider(const LoopRecord& proposed, const Verification& verification, int candidate, int query,
                       const Odometry& odometry, std::int64_t frames);
+  /// What the images say of a step of the odometry that is followed: if it is less certain than configured,
+  /// loops are judged by what they say from the next one on.
+  void NoteStep(const StepCheck& check) { uncertainty_.Add(check); }
+  /// Where it is: in plain words, what counts instead; else empty.
+  std::string Uncertainty() const;
+
   /// A proposed loop between images without poses.
   void List(const LoopRecord& proposed) { records_.push_back(proposed); }
   /// A loop that is not the detector's: past the gate into the pose graph, which may refuse it.
@@ -106,6 +113,7 @@ class LoopCloser {
  private:
   LoopConstraint Measure(const Verification& verification, int candidate, int query,
                          const Odometry& odometry);
+  OdometryUncertainty::Sigmas Sigmas() const;
   LoopUpdate Enter(std::vector<LoopEdge> entering, const Odometry& odometry, std::int64_t frames);
   void Start(std::vector<LoopEdge> entering, const Odometry& odometry, std::int64_t frames);
   void Settle(const LoopVerdict& verdict, LoopUpdate* update);
@@ -120,6 +128,7 @@ class LoopCloser {
   CameraRig rig_;
   std::uint64_t seed_;
   std::vector<LoopRecord> records_;
+  OdometryUncertainty uncertainty_;  // of an odometry that is followed; not saved, as such a map is not
   LoopGate gate_;
   KeyframeGraph graph_;
   std::vector<LoopEdge> accepted_;  // in the map

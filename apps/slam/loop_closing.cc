@@ -121,7 +121,10 @@ std::optional<LoopUpdate> LoopClosing::Rest(const Odometry* odometry, std::int64
   if (!update && odometry != nullptr && closer_.CloseDeferred(*odometry, frames)) update.emplace();
   if (!update && odometry != nullptr) update = closer_.Adjusted(*odometry, frames, Entering::kAtOnce);
   if (update) TellRevoked(*update);
-  if (!update) closer_.Finish();
+  if (update) return update;
+  closer_.Finish();
+  const std::string uncertainty = closer_.Uncertainty();
+  if (!uncertainty.empty()) warnings_.push_back(uncertainty);
   return update;
 }
 

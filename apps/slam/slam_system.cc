@@ -55,6 +55,7 @@ class SlamSystem::Impl {
     ++frames_;
     sessions_.CountFrame();
     const TrackResult result = odometry_->Follow(frame, T_odom_camera);
+    if (result.step) loops_.NoteStep(*result.step);
     last_ = frame.index;
     sessions_.SetLastFrame(last_);
     if (result.keyframe >= 0 && (loops_.Searching() || on_keyframe_)) unmapped_[result.keyframe] = frame;

@@ -73,6 +73,10 @@ class TrajectoryCloser::Impl {
     const std::lock_guard<std::mutex> lock(mutex_);
     return slam_.Corrections();
   }
+  std::vector<std::string> TakeWarnings() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return slam_.TakeWarnings();
+  }
 
  private:
   Trajectory KeyframesNow() const {
@@ -105,5 +109,6 @@ Trajectory TrajectoryCloser::Keyframes() const { return impl_->Keyframes(); }
 std::vector<LoopRecord> TrajectoryCloser::Loops() const { return impl_->Loops(); }
 PoseGraph TrajectoryCloser::Graph() const { return impl_->Graph(); }
 int TrajectoryCloser::Corrections() const { return impl_->Corrections(); }
+std::vector<std::string> TrajectoryCloser::TakeWarnings() { return impl_->TakeWarnings(); }
 
 }  // namespace tutti

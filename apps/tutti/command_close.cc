@@ -20,7 +20,7 @@ namespace {
 
 struct CloseArguments {
   GivenOdometryFiles odometry;
-  std::string trajectory, images, times, config, out, ground_truth;
+  std::string trajectory, images, depth, times, config, out, ground_truth;
   std::vector<double> sigma;     // share of the way, degrees
   std::vector<std::string> set;  // SECTION.KEY=VALUE
   std::uint64_t seed = 1;
@@ -49,6 +49,7 @@ int Close(const CLI::App& command, const CloseArguments& arguments) {
   request.keep = arguments.keep;
   request.odometry = arguments.odometry;
   request.odometry->trajectory = arguments.trajectory;
+  if (!arguments.depth.empty()) request.odometry->depth = arguments.depth;
   if (!arguments.times.empty()) request.odometry->times = arguments.times;
   if (!arguments.ground_truth.empty()) request.ground_truth = arguments.ground_truth;
   if (command.count("--seed") > 0) request.seed = arguments.seed;
@@ -82,6 +83,9 @@ void SetUpClose(CLI::App& command, int& exit_code) {
                   "what the camera saw along it: a folder of images, a data set (KITTI, TUM, EuRoC; with "
                   "depth or right images distances are measured), a video, or a ROS 1 bag")
       ->required();
+  command.add_option("--depth", arguments->depth,
+                     "folder of depth images, registered to those of --images, if that is a plain folder: in "
+                     "the same order if there are as many, else by the time stamps that they are called by");
   command.add_option("--config", arguments->config,
                      "YAML file with the camera; without a calibration there is loops.csv alone");
   command.add_option("--out", arguments->out, "folder for the results, as of `tutti run`")->required();

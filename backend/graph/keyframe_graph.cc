@@ -239,6 +239,15 @@ double KeyframeGraph::SigmaFloor() const {
   return options_.sigma_translation_floor * mean_length + 1e-6;
 }
 
+void KeyframeGraph::SetSigmas(double translation_ratio, double rotation_rad) {
+  KeyframeGraphOptions options = options_;
+  options.sigma_translation_ratio = translation_ratio;
+  options.sigma_rotation_rad = rotation_rad;
+  const std::string problem = options.Validate();
+  if (!problem.empty()) throw InputError(problem);
+  options_ = options;
+}
+
 // Of (translation, rotation, log scale). Over several steps errors of length add up as if they were all in
 // one direction: that makes up for what the turns between them do to the end.
 Vector7d KeyframeGraph::Sigmas(const Edge& edge, double floor) const {

@@ -10,6 +10,7 @@
 #include "frontend/map/map_correction.h"
 #include "frontend/map/other_camera.h"
 #include "frontend/map/redundant_keyframes.h"
+#include "frontend/odometry/step_check.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -68,12 +69,16 @@ TrackResult Odometry::Impl::Follow(const InputFrame& input, const Pose& T_odom_c
     const ScopedStopwatch watch(&stages_, Lane::kTracking, "follow");
     const Pose T_world_camera = follower_.Next(T_odom_camera, tracker_.last().T_camera_world.Inverse());
     const int newest = tracker_.last().newest_keyframe;
-    const PoseFix fix = follower_.See(map(), frame, newest, T_world_camera.Inverse());
+    const auto [fix, matched] = follower_.See(map(), frame, newest, T_world_camera.Inverse());
     tracker_.Follow(fix);
     result_ = TrackResult();
     result_.state = TrackingState::kTracking;
     result_.inliers = fix.inliers;
-    if (follower_.WantsKeyframe(map(), fix, newest)) result_.keyframe = InsertKeyframe();
+    if (follower_.WantsKeyframe(map(), fix, newest)) {
+      result_.step =
+          CheckStep(map(), rig_, options_, newest, *fix.frame.features, matched, fix.T_camera_world);
+      result_.keyframe = InsertKeyframe();
+    }
     const LastFrame& last = tracker_.last();
     history_.Add(last.frame, last.T_camera_world, map().keyframe(last.reference));
     result_.T_world_camera = last.T_camera_world.Inverse();

@@ -32,9 +32,10 @@ Pose PoseFollower::Next(const Pose& T_odom_camera, const Pose& T_world_last) {
   return T_world_camera;
 }
 
-PoseFix PoseFollower::See(const Map& map, const TrackedFrame& frame, int keyframe,
-                          const Pose& T_camera_world) const {
-  PoseFix fix(frame);
+PoseFollower::Sight PoseFollower::See(const Map& map, const TrackedFrame& frame, int keyframe,
+                                      const Pose& T_camera_world) const {
+  Sight sight{PoseFix(frame), {}};
+  PoseFix& fix = sight.fix;
   fix.T_camera_world = T_camera_world;
   fix.reference = keyframe;
   std::vector<int> near = map.BestCovisible(keyframe, kNear, 1);
@@ -46,6 +47,7 @@ PoseFix PoseFollower::See(const Map& map, const TrackedFrame& frame, int keyfram
     fix.frame.features = moved;
     fix.matches.features = moved.get();
   }
+  sight.matched = fix.matches.landmarks;
   for (std::size_t f = 0; f < fix.matches.landmarks.size(); ++f) {
     int& landmark = fix.matches.landmarks[f];
     if (landmark < 0) continue;
@@ -60,7 +62,7 @@ PoseFix PoseFollower::See(const Map& map, const TrackedFrame& frame, int keyfram
     }
   }
   fix.found = fix.matches.landmarks;
-  return fix;
+  return sight;
 }
 
 bool PoseFollower::WantsKeyframe(const Map& map, const PoseFix& fix, int newest_keyframe) const {

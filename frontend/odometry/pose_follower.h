@@ -22,8 +22,12 @@ class PoseFollower {
   void Rescale(double factor) { scale_ *= factor; }
   bool started() const { return T_odom_last_.has_value(); }
 
+  struct Sight {
+    PoseFix fix;               ///< landmarks where the pose says they are
+    std::vector<int> matched;  ///< per feature of fix.frame: landmarks that look alike, near there; -1: none
+  };
   /// What a frame at this pose sees of the landmarks around a keyframe. The pose is not changed.
-  PoseFix See(const Map& map, const TrackedFrame& frame, int keyframe, const Pose& T_camera_world) const;
+  Sight See(const Map& map, const TrackedFrame& frame, int keyframe, const Pose& T_camera_world) const;
   /// By distance in terms of the scene's depth, rotation, and how little of the newest keyframe is in view.
   bool WantsKeyframe(const Map& map, const PoseFix& fix, int newest_keyframe) const;
 

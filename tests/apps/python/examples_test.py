@@ -61,6 +61,13 @@ def test_evaluate_trajectories(source, town, tmp_path):
     assert good == pytest.approx(0.01 * 3 ** 0.5, rel=0.2) and bad == pytest.approx(3 ** 0.5, rel=0.2)
 
 
+def test_own_odometry(source, town, tmp_path):
+    tutti.write_trajectory(tmp_path / "odometry.txt", tutti.Dataset(town).ground_truth())
+    said = run(source, "own_odometry.py", town / "config.yaml", town, tmp_path / "odometry.txt", tmp_path / "corrected.txt")
+    assert int(re.search(r"(\d+) keyframes, (\d+) loops", said)[2]) > 1
+    assert tutti.read_trajectory(tmp_path / "corrected.txt").shape == (151, 8)
+
+
 def test_own_descriptors(source, town):
     said = run(source, "own_descriptors.py", town / "image_0")
     loops = loops_of(said)

@@ -16,6 +16,7 @@ OPTIONS = {
     ("PoseGraph", "optimize"): ("graph", set(), {"certify"}),
     ("Config", "__init__"): (None, set(), set()),
     ("SlamSystem", "__init__"): (None, set(), set()),
+    ("TrajectoryCloser", "__init__"): (None, set(), set()),
 }
 SECTIONS = {"dataset", "camera", "odometry", "loops", "graph", "run"}
 

@@ -32,14 +32,6 @@ RunConfig Small(int threads) {
   return config;
 }
 
-// What its user knows of an odometry with the walk of these tests.
-RunConfig OfAWalk(int threads = 2) {
-  RunConfig config = Small(threads);
-  config.run.odometry_sigma_fraction = 0.02;
-  config.run.odometry_sigma_deg = 0.5;
-  return config;
-}
-
 struct Closed {
   double drift_before = 0, drift_after = 0;
   std::size_t keyframes = 0, loops = 0;
@@ -67,7 +59,7 @@ Closed CloseTown(const Recording& town, const Trajectory& odometry, const RunCon
 
 void ExpectTheDriftIsGone(SyntheticSensor sensor, double yaw_deg) {
   const Recording town = RecordedTown(sensor);
-  const Closed closed = CloseTown(town, testing::Disturbed(town.truth, yaw_deg, 0.2, 3), OfAWalk());
+  const Closed closed = CloseTown(town, testing::Disturbed(town.truth, yaw_deg, 0.2, 3), Small(2));
   EXPECT_GT(closed.corrections, 0);
   EXPECT_LT(closed.drift_after, 0.2 * closed.drift_before);
   EXPECT_EQ(closed.trajectory.size(), town.truth.size());
@@ -94,7 +86,7 @@ TEST(TrajectoryCloser, APerfectOdometryStaysNearlyAsItIs) {
 TEST(TrajectoryCloser, TheCorrectionMapsTheNewestPoseOfTheOdometry) {
   const Recording town = RecordedTown(SyntheticSensor::kStereo);
   const Trajectory odometry = testing::Disturbed(town.truth, 0.5, 0.2, 3);
-  const Closed closed = CloseTown(town, odometry, OfAWalk());
+  const Closed closed = CloseTown(town, odometry, Small(2));
   const Pose by_map = closed.T_map_odom * odometry.back().pose;
   EXPECT_LT((by_map.translation - closed.trajectory.back().pose.translation).norm(), 0.05);
   EXPECT_GT((closed.T_map_odom * odometry.back().pose.translation - odometry.back().pose.translation).norm(),
@@ -104,7 +96,7 @@ TEST(TrajectoryCloser, TheCorrectionMapsTheNewestPoseOfTheOdometry) {
 TEST(TrajectoryCloser, ThreadsChangeNothing) {
   const Recording town = RecordedTown(SyntheticSensor::kStereo);
   const Trajectory odometry = testing::Disturbed(town.truth, 0.5, 0.2, 3);
-  const Closed one = CloseTown(town, odometry, OfAWalk(1)), two = CloseTown(town, odometry, OfAWalk(2));
+  const Closed one = CloseTown(town, odometry, Small(1)), two = CloseTown(town, odometry, Small(2));
   ASSERT_EQ(one.trajectory.size(), two.trajectory.size());
   for (std::size_t i = 0; i < one.trajectory.size(); ++i) {
     EXPECT_EQ(one.trajectory[i].pose.translation, two.trajectory[i].pose.translation) << i;

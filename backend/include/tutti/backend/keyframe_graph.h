@@ -136,6 +136,9 @@ class KeyframeGraph {
   /// units.
   void Move(const std::map<int, Similarity>& S_world_keyframe, const std::map<int, int>& merges);
 
+  /// Of odometry edges, from now on (KeyframeGraphOptions). Throws InputError if they are not usable.
+  void SetSigmas(double translation_ratio, double rotation_rad);
+
   /// The map as it is says more than what was kept (a bundle adjustment of all of it): edges are measured
   /// from it again.
   void MeasureAgain() { kept_.clear(); }

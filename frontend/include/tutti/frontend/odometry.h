@@ -29,6 +29,16 @@ class SectionReader;
 enum class TrackingState { kInitializing, kTracking, kLost };
 const char* ToString(TrackingState state);
 
+/// What the images say of a step that another odometry measured, from the keyframe before to a new one:
+/// Exp(translation_m, rotation_rad) T_given = T_seen in the new keyframe's camera.
+struct StepCheck {
+  double way_m = 0;  ///< length of the step
+  Eigen::Vector3d translation_m = Eigen::Vector3d::Zero();
+  Eigen::Vector3d rotation_rad = Eigen::Vector3d::Zero();
+  double sigma_translation_m = 0;  ///< of what the images say, on its worst axis
+  double sigma_rotation_rad = 0;   ///< the same
+};
+
 /// What became of one frame.
 struct TrackResult {
   TrackingState state = TrackingState::kInitializing;
@@ -37,6 +47,7 @@ struct TrackResult {
   int features = 0;     ///< in the image
   int inliers = 0;      ///< landmarks that agree with the pose
   int keyframe = -1;    ///< id of the keyframe that this frame became, or -1; see TakeMapped
+  std::optional<StepCheck> step;  ///< Follow, of a keyframe, if the images say enough
 };
 
 /// A keyframe's features as the loop closure and the pose graph see them. Frames of reference: the camera's.

@@ -10,6 +10,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "tutti/backend/pose_graph.h"
@@ -57,6 +58,9 @@ class TrajectoryCloser {
   PoseGraph Graph() const;
   /// How often loops moved the trajectory.
   int Corrections() const;
+  /// What went wrong without stopping it since the last call, and, after Finish, whether the images show that
+  /// the odometry is less certain than configured.
+  std::vector<std::string> TakeWarnings();
 
  private:
   class Impl;

@@ -1,0 +1,100 @@
+#include "apps/run/depth_beside.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "frontend/dataset/image_file.h"
+#include "tutti/core/error.h"
+#include "tutti/core/text.h"
+
+namespace tutti {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string SizeOf(const cv::Mat& image) {
+  return std::to_string(image.cols) + "x" + std::to_string(image.rows);
+}
+
+}  // namespace
+
+std::vector<std::pair<double, fs::path>> StampsInNames(const std::vector<fs::path>& files) {
+  std::vector<std::pair<double, fs::path>> stamps;
+  for (const fs::path& file : files) {
+    const std::string stem = file.stem().string();
+    const bool like_a_time = stem.find('.') != std::string::npos || stem.size() >= 10;
+    const std::optional<double> number = like_a_time ? ParseDouble(stem) : std::nullopt;
+    if (number && std::isfinite(*number))
+      stamps.emplace_back(*number > 1e14 ? 1e-9 * *number : *number, file);
+  }
+  std::sort(stamps.begin(), stamps.end());
+  const auto same = [](const auto& a, const auto& b) { return a.first == b.first; };
+  if (std::adjacent_find(stamps.begin(), stamps.end(), same) != stamps.end()) stamps.clear();
+  return stamps;
+}
+
+DepthBeside::DepthBeside(std::unique_ptr<Dataset> images, const std::vector<double>& stamps,
+                         const fs::path& depth, const DatasetOptions& options)
+    : images_(std::move(images)), options_(options), rig_(images_->Rig()), warnings_(images_->Warnings()) {
+  rig_.sensor = Sensor::kRgbd;
+  rig_.max_depth_m = options.max_depth_m;
+  if (options.camera && options.camera->distortion != Distortion::kNone) {
+    PinholeCamera camera = *options.camera;  // of the images' size, as OpenDataset has checked
+    camera.width = rig_.camera.width;
+    camera.height = rig_.camera.height;
+    rectifier_.emplace(camera);
+  }
+  const std::vector<fs::path> found = ListImages(depth);
+  if (found.empty()) throw InputError(depth.string() + ": holds no depth image (--depth)");
+  if (found.size() == stamps.size()) {
+    files_ = found;
+    return;
+  }
+  const auto named = StampsInNames(found);
+  files_.resize(stamps.size());
+  std::size_t alone = stamps.size();
+  for (std::size_t i = 0; i < stamps.size() && !named.empty(); ++i) {
+    const auto later =
+        std::lower_bound(named.begin(), named.end(), stamps[i],
+                         [](const auto& stamp_and_file, double s) { return stamp_and_file.first < s; });
+    auto nearest = later;
+    if (later == named.end() ||
+        (later != named.begin() && stamps[i] - (later - 1)->first < later->first - stamps[i]))
+      nearest = later - 1;
+    if (std::abs(nearest->first - stamps[i]) > options.max_association_s) continue;
+    files_[i] = nearest->second;
+    --alone;
+  }
+  if (alone == stamps.size())
+    throw InputError(depth.string() + ": has " + std::to_string(found.size()) + " depth images for " +
+                     std::to_string(stamps.size()) +
+                     " images, and their names are no time stamps near those of the images; give as many, or "
+                     "name them by their time");
+  if (alone > 0)
+    warnings_.push_back(depth.string() + ": " + std::to_string(alone) + " of " +
+                        std::to_string(stamps.size()) + " images have no depth image within " +
+                        std::to_string(options.max_association_s) + " s");
+}
+
+ReadResult DepthBeside::Read(std::size_t i) const {
+  ReadResult result = images_->Read(i);
+  if (!result.frame) return result;
+  const fs::path& file = files_.at(static_cast<std::size_t>(Number(i)));
+  if (file.empty()) return result;
+  const ImageFile read = ReadDepthFile(file);
+  if (!read.error.empty()) {
+    result.depth_error = read.error;
+    return result;
+  }
+  if (read.image.size() != result.frame->image.size()) {
+    result.depth_error = file.string() + ": the depth image has " + SizeOf(read.image) +
+                         " pixels, but the images have " + SizeOf(result.frame->image) +
+                         "; depth must be registered to them";
+    return result;
+  }
+  const cv::Mat metres = DepthInMetres(read.image, options_.depth_units_per_m, options_.max_depth_m);
+  result.frame->depth_m = rectifier_ ? rectifier_->Apply(metres, Sampling::kNearest) : metres;
+  return result;
+}
+
+}  // namespace tutti

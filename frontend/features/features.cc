@@ -8,6 +8,7 @@
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "core/clones.h"
 #include "frontend/features/corner_detector.h"
 #include "frontend/features/stereo_matcher.h"
 
@@ -104,6 +105,7 @@ inline int PopCount(std::uint64_t x) {
 
 }  // namespace
 
+TUTTI_CLONES("popcnt")
 int HammingDistance(const std::uint8_t* a, const std::uint8_t* b) {
   int distance = 0;
   for (int i = 0; i < 32; i += 8) {

@@ -189,7 +189,7 @@ cv::Mat DepthInMetres(const cv::Mat& stored, double units_per_m, double max_dept
   for (int v = 0; v < depth.rows; ++v) {
     float* row = depth.ptr<float>(v);
     for (int u = 0; u < depth.cols; ++u) {
-      if (!(row[u] > 0.0F && row[u] <= limit)) row[u] = 0.0F;
+      row[u] = ((row[u] > 0.0F) & (row[u] <= limit)) ? row[u] : 0.0F;  // without a jump: vectors
     }
   }
   return depth;

@@ -5,9 +5,11 @@
 #include <cstdint>
 #include <cstring>
 #include <numeric>
+#include <opencv2/core/hal/intrin.hpp>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "core/clones.h"
 #include "frontend/features/corner_detector.h"
 #include "frontend/features/stereo_matcher.h"
 
@@ -17,37 +19,49 @@ namespace {
 constexpr int kBorder = 19;     // [px] a descriptor's patch (rotated, 31 px) stays inside the image
 constexpr int kHalfPatch = 15;  // [px] radius of the orientation patch
 
-// Half width of the orientation patch at each row distance from its centre.
-const std::array<int, kHalfPatch + 1>& PatchWidths() {
-  static const std::array<int, kHalfPatch + 1> widths = [] {
-    std::array<int, kHalfPatch + 1> w{};
+// Columns -15 .. 16 of each row of the orientation patch, from its middle row on: 0 outside of the patch.
+struct PatchRows {
+  static constexpr int kColumns = 32;
+  std::array<std::array<std::int16_t, kColumns>, kHalfPatch + 1> one{}, column{};
+};
+
+const PatchRows& OrientationPatch() {
+  static const PatchRows patch = [] {
+    PatchRows rows;
     for (int v = 0; v <= kHalfPatch; ++v) {
-      w[static_cast<std::size_t>(v)] =
-          static_cast<int>(std::lround(std::sqrt(double(kHalfPatch * kHalfPatch - v * v))));
+      const int width = static_cast<int>(std::lround(std::sqrt(double(kHalfPatch * kHalfPatch - v * v))));
+      for (int u = -width; u <= width; ++u) {
+        const auto row = static_cast<std::size_t>(v), column = static_cast<std::size_t>(u + kHalfPatch);
+        rows.one[row][column] = 1;
+        rows.column[row][column] = static_cast<std::int16_t>(u);
+      }
     }
-    return w;
+    return rows;
   }();
-  return widths;
+  return patch;
 }
 
 // Orientation by the intensity centroid (Rublee 2011, section 3.2) [deg].
 float Orientation(const cv::Mat& image, int x, int y) {
-  const auto& widths = PatchWidths();
-  int m01 = 0, m10 = 0;
-  const std::uint8_t* centre = image.ptr<std::uint8_t>(y) + x;
-  for (int u = -kHalfPatch; u <= kHalfPatch; ++u) m10 += u * centre[u];
-  for (int v = 1; v <= kHalfPatch; ++v) {
-    const std::uint8_t* below = image.ptr<std::uint8_t>(y + v) + x;
-    const std::uint8_t* above = image.ptr<std::uint8_t>(y - v) + x;
-    int row = 0;
-    const int w = widths[static_cast<std::size_t>(v)];
-    for (int u = -w; u <= w; ++u) {
-      row += below[u] - above[u];
-      m10 += u * (below[u] + above[u]);
+  constexpr int kLanes = cv::v_int16x8::nlanes;
+  const PatchRows& patch = OrientationPatch();
+  cv::v_int32x4 across = cv::v_setzero_s32();
+  int m01 = 0;
+  for (int v = 0; v <= kHalfPatch; ++v) {
+    const std::uint8_t* below = image.ptr<std::uint8_t>(y + v) + x - kHalfPatch;
+    const std::uint8_t* above = image.ptr<std::uint8_t>(y - v) + x - kHalfPatch;
+    const auto row = static_cast<std::size_t>(v);
+    cv::v_int32x4 down = cv::v_setzero_s32();
+    for (int u = 0; u < PatchRows::kColumns; u += kLanes) {
+      const cv::v_int16x8 b = cv::v_reinterpret_as_s16(cv::v_load_expand(below + u));
+      const cv::v_int16x8 a = cv::v_reinterpret_as_s16(cv::v_load_expand(above + u));
+      const cv::v_int16x8 both = v == 0 ? b : a + b;
+      across = cv::v_dotprod(both, cv::v_load(patch.column[row].data() + u), across);
+      down = cv::v_dotprod(b - a, cv::v_load(patch.one[row].data() + u), down);
     }
-    m01 += v * row;
+    m01 += v * cv::v_reduce_sum(down);
   }
-  return cv::fastAtan2(static_cast<float>(m01), static_cast<float>(m10));
+  return cv::fastAtan2(static_cast<float>(m01), static_cast<float>(cv::v_reduce_sum(across)));
 }
 
 // Sub-pixel corner: the point that is nearest to all the lines through the window's pixels along their edges
@@ -104,6 +118,7 @@ inline int PopCount(std::uint64_t x) {
 
 }  // namespace
 
+TUTTI_CLONES("popcnt")
 int HammingDistance(const std::uint8_t* a, const std::uint8_t* b) {
   int distance = 0;
   for (int i = 0; i < 32; i += 8) {

@@ -74,10 +74,10 @@ template <class Visit>
 void FrameFeatures::ForEachInArea(const cv::Point2f& centre, float radius, int first_octave, int last_octave,
                                   const Visit& visit) const {
   if (entries_.empty()) return;
-  const int c0 = std::max(0, static_cast<int>(std::floor((centre.x - radius) / kCell)));
-  const int c1 = std::min(columns_ - 1, static_cast<int>(std::floor((centre.x + radius) / kCell)));
-  const int r0 = std::max(0, static_cast<int>(std::floor((centre.y - radius) / kCell)));
-  const int r1 = std::min(rows_ - 1, static_cast<int>(std::floor((centre.y + radius) / kCell)));
+  const int c0 = std::max(0, cvFloor((centre.x - radius) / kCell));
+  const int c1 = std::min(columns_ - 1, cvFloor((centre.x + radius) / kCell));
+  const int r0 = std::max(0, cvFloor((centre.y - radius) / kCell));
+  const int r1 = std::min(rows_ - 1, cvFloor((centre.y + radius) / kCell));
   if (c0 > c1) return;
   for (int r = r0; r <= r1; ++r) {
     // The cells of a row lie one after the other.
@@ -86,9 +86,12 @@ void FrameFeatures::ForEachInArea(const cv::Point2f& centre, float radius, int f
               end = first_entry_[static_cast<std::size_t>(past)];
     for (int e = begin; e < end; ++e) {
       const Entry& entry = entries_[static_cast<std::size_t>(e)];
-      if (entry.octave < first_octave || entry.octave > last_octave) continue;
-      if (std::abs(entry.pixel.x - centre.x) <= radius && std::abs(entry.pixel.y - centre.y) <= radius)
-        visit(entry.pixel, entry.octave, entry.feature);
+      // One branch, which is mostly not taken: a processor guesses wrong at each of several.
+      const int inside = static_cast<int>(entry.octave >= first_octave) &
+                         static_cast<int>(entry.octave <= last_octave) &
+                         static_cast<int>(std::abs(entry.pixel.x - centre.x) <= radius) &
+                         static_cast<int>(std::abs(entry.pixel.y - centre.y) <= radius);
+      if (inside != 0) visit(entry.pixel, entry.octave, entry.feature);
     }
   }
 }

@@ -249,6 +249,7 @@ std::vector<std::pair<int, int>> MatchEpipolar(const Map& map, const PinholeCame
     const Eigen::Vector3d line = fundamental * Eigen::Vector3d(k.pt.x, k.pt.y, 1);
     const double line_norm = line.head<2>().norm();
     if (line_norm < 1e-12) continue;
+    const double just_above_norm = line_norm * (1 + 1e-9);
     // Walk along the segment in steps, so that only features near the line are looked at.
     const double length = std::min((a - b).norm(), double(camera.width));
     const int steps = std::max(1, static_cast<int>(std::ceil(length / 24.0)));
@@ -264,8 +265,9 @@ std::vector<std::pair<int, int>> MatchEpipolar(const Map& map, const PinholeCame
           k.octave + 1, [&](const cv::Point2f& q, int octave, int f) {
             // The cheapest test that most fail comes first.
             const double sigma = map.scales()[static_cast<std::size_t>(octave)];
-            const double distance = std::abs(line.dot(Eigen::Vector3d(q.x, q.y, 1))) / line_norm;
-            if (distance > 1.96 * sigma) return;
+            const double off = std::abs(line.dot(Eigen::Vector3d(q.x, q.y, 1)));
+            if (off > 1.96 * sigma * just_above_norm) return;  // most, without a division
+            if (off / line_norm > 1.96 * sigma) return;
             if (f == last_seen || f == best.feature || second.landmarks[static_cast<std::size_t>(f)] >= 0)
               return;
             if ((Eigen::Vector2d(q.x, q.y) - epipole).squaredNorm() < 100 * sigma)

@@ -93,10 +93,7 @@ bool Fit(const Template& t, const cv::Mat& image, float* x, float* y) {
           *y + reach < float(image.rows - 1)))
       return false;
     Window r;
-    for (int v = -kHalf, n = 0; v <= kHalf; ++v) {
-      for (int u = -kHalf; u <= kHalf; ++u, ++n)
-        r(n) = Bilinear(image.data, image.step, *x + float(u), *y + float(v));
-    }
+    BilinearWindow<kHalf>(image.data, image.step, *x, *y, &r);
     if (iteration == 0) offset = WindowWeights<kHalf>().dot(r);
     r.array() -= gain * t.grey.array() + offset;
     residual = WindowWeights<kHalf>().dot(r.cwiseAbs2());

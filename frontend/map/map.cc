@@ -1,6 +1,7 @@
 #include "frontend/map/map.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <cstring>
 #include <limits>
 #include <utility>
@@ -246,14 +247,25 @@ std::vector<int> Map::BestCovisible(int id, int count, int min_shared) const {
 }
 
 std::vector<int> Map::LandmarksOf(const std::vector<int>& keyframes) const {
-  std::vector<int> out;
+  constexpr std::size_t kBits = 64;
+  std::vector<std::uint64_t> seen;  // a bit for each landmark: much faster than to sort the many
+  std::size_t count = 0;
   for (int id : keyframes) {
     for (int l : keyframe(id).landmarks) {
-      if (l >= 0) out.push_back(l);
+      if (l < 0) continue;
+      const auto bit = static_cast<std::size_t>(l);
+      if (bit / kBits >= seen.size()) seen.resize(bit / kBits + 1, 0);
+      seen[bit / kBits] |= std::uint64_t{1} << (bit % kBits);
+      ++count;
     }
   }
-  std::sort(out.begin(), out.end());
-  out.erase(std::unique(out.begin(), out.end()), out.end());
+  std::vector<int> out;
+  out.reserve(count);
+  for (std::size_t word = 0; word < seen.size(); ++word) {
+    for (std::uint64_t bits = seen[word]; bits != 0; bits &= bits - 1) {
+      out.push_back(static_cast<int>(word * kBits) + __builtin_ctzll(bits));
+    }
+  }
   return out;
 }
 

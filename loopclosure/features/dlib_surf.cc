@@ -6,8 +6,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 #include <utility>
 
+#include "loopclosure/features/scratch_pool.h"
+#include "loopclosure/features/surf_hessian.h"
 #include "loopclosure/features/surf_integral.h"
 #include "tutti/loopclosure/features.h"
 
@@ -40,34 +43,80 @@ const std::array<double, 36>& AngleWeights() {
   return weights;
 }
 
-// As dlib::compute_dominant_angle, sum for sum; but a sample is offered only to those of the overlapping
-// slices of the circle that it can lie in, a fifth of them.
-double DominantAngle(const Integral& image, const dlib::vector<double, 2>& centre, double scale) {
-  constexpr int kSlices = 45;
-  constexpr int kRadius = 6;
+constexpr int kSlices = 45;  // of the circle; each is a sixth of it, so that they overlap
+constexpr double kStep = 2 * CV_PI / kSlices;
+constexpr double kWidth = CV_PI / 3;
+using SliceSums = std::array<dlib::vector<double, 2>, kSlices>;
+
+// Rounded, as dlib does it; of coordinates inside of an image.
+dlib::point Nearest(const dlib::vector<double, 2>& p) {
+  return {static_cast<long>(p.x() + 0.5), static_cast<long>(p.y() + 0.5)};
+}
+
+// atan2 to 1e-5 (Abramowitz & Stegun 4.4.49 with terms of a smaller error); (x, y) is not 0.
+double RoughAngle(double y, double x) {
+  const double across = std::abs(x);
+  const double along = std::abs(y);
+  const double a = std::min(across, along) / std::max(across, along);
+  const double s = a * a;
+  double angle =
+      a * (0.99997726 +
+           s * (-0.33262347 + s * (0.19354346 + s * (-0.11643287 + s * (0.05265332 - s * 0.01172120)))));
+  if (along > across) angle = CV_PI / 2 - angle;
+  if (x < 0) angle = CV_PI - angle;
+  return y < 0 ? -angle : angle;
+}
+
+// Adds a sample to the slices that hold its angle, as dlib::compute_dominant_angle asks for them: of the
+// overlapping ones a fifth can.
+void AddByAngle(const dlib::vector<double, 2>& sample, SliceSums& sums) {
   constexpr double kPi = CV_PI;
-  constexpr double kStep = 2 * kPi / kSlices;
-  constexpr double kWidth = kPi / 3;
   constexpr int kReach = 9;  // slices back from the newest that can hold an angle: kWidth / kStep, rounded up
-  std::array<dlib::vector<double, 2>, kSlices> sums;
+  const double angle = std::atan2(sample.y(), sample.x());
+  const int newest = static_cast<int>((angle + kPi) / kStep) + 1;
+  for (int s = newest - kReach; s <= newest; ++s) {
+    const int slice = (s + kSlices) % kSlices;
+    const double begin = kStep * slice - kPi;
+    const double end = begin + kWidth;
+    const bool inside = begin <= angle && angle <= end;
+    if (inside || (end > kPi && (angle >= begin || angle <= -2 * kPi + end))) {
+      sums[static_cast<std::size_t>(slice)] += sample;
+    }
+  }
+}
+
+// The same. Slices begin and end at whole sectors, two to a step: only a sample next to a sector's border
+// needs its angle exactly.
+void AddBySector(const dlib::vector<double, 2>& sample, SliceSums& sums) {
+  constexpr int kSectors = 2 * kSlices;
+  constexpr int kSectorsOfSlice = 15;
+  constexpr double kMargin = 0.01;  // of a sector, 70 times the error of the angle
+  static_assert(kSectorsOfSlice * 6 == kSectors);
+  if (sample.x() == 0 && sample.y() == 0) return;
+  const double place = (RoughAngle(sample.y(), sample.x()) + CV_PI) * (kSectors / (2 * CV_PI));
+  const int sector = static_cast<int>(place);
+  const double within = place - sector;
+  if (within < kMargin || within > 1 - kMargin) {
+    AddByAngle(sample, sums);
+    return;
+  }
+  const int last = sector / 2;
+  for (int s = last - (kSectorsOfSlice - 1) / 2 + sector % 2; s <= last; ++s) {
+    sums[static_cast<std::size_t>(s < 0 ? s + kSlices : s)] += sample;
+  }
+}
+
+// As dlib::compute_dominant_angle, sum for sum.
+double DominantAngle(const Integral& image, const dlib::vector<double, 2>& centre, double scale) {
+  constexpr int kRadius = 6;
+  SliceSums sums;
   const long sc = std::lround(scale);
   for (long r = -kRadius; r <= kRadius; ++r) {
     for (long c = -kRadius; c <= kRadius; ++c) {
       if (r * r + c * c >= kRadius * kRadius) continue;
       const double weight = AngleWeights()[static_cast<std::size_t>(r * r + c * c)];
-      const auto [x, y] = image.Haar(sc * dlib::point(c, r) + centre, 4 * sc);
-      const dlib::vector<double, 2> sample(weight * x, weight * y);
-      const double angle = std::atan2(sample.y(), sample.x());
-      const int newest = static_cast<int>((angle + kPi) / kStep) + 1;
-      for (int s = newest - kReach; s <= newest; ++s) {
-        const int slice = (s + kSlices) % kSlices;
-        const double begin = kStep * slice - kPi;
-        const double end = begin + kWidth;
-        const bool inside = begin <= angle && angle <= end;
-        if (inside || (end > kPi && (angle >= begin || angle <= -2 * kPi + end))) {
-          sums[static_cast<std::size_t>(slice)] += sample;
-        }
-      }
+      const auto [x, y] = image.Haar(Nearest(sc * dlib::point(c, r) + centre), 4 * sc);
+      AddBySector(dlib::vector<double, 2>(weight * x, weight * y), sums);
     }
   }
   double longest = 0.0;
@@ -95,7 +144,7 @@ void SurfDescriptor(const Integral& image, const dlib::vector<double, 2>& centre
     for (std::size_t x = 0; x < kSide; ++x) {
       const dlib::vector<double, 2> offset(scale * (static_cast<double>(x) - kHalf),
                                            scale * (static_cast<double>(y) - kHalf));
-      const auto [dx, dy] = image.Haar(dlib::point(rotate(offset) + centre), 2 * sc);
+      const auto [dx, dy] = image.Haar(Nearest(rotate(offset) + centre), 2 * sc);
       samples[y][x] = rotate_back(dlib::vector<double, 2>(dx, dy));
     }
   }
@@ -126,29 +175,25 @@ void SurfDescriptor(const Integral& image, const dlib::vector<double, 2>& centre
   for (std::size_t i = 0; i < values.size(); ++i) descriptor[i] = static_cast<float>(values[i] / length);
 }
 
-// Determinants of the Hessian as dlib::hessian_pyramid computes them, sum for sum; but each line of sums is
-// looked up once for its row, not once for each of its boxes.
-class HessianPyramid {
+// Where the determinant of the Hessian has a maximum among its neighbours in place and scale.
+class HessianMaxima {
  public:
-  HessianPyramid(const Integral& image, int octaves) : octaves_(octaves) {
-    layers_.resize(static_cast<std::size_t>(octaves) * kIntervals);
-    for (int o = 0; o < octaves; ++o) {
-      for (int i = 0; i < kIntervals; ++i) Fill(image, o, i);
-    }
-  }
+  explicit HessianMaxima(const internal::SurfHessian& hessian) : hessian_(hessian) {}
 
   // As dlib::get_interest_points.
   std::vector<dlib::interest_point> Points(double threshold) const {
     std::vector<dlib::interest_point> points;
-    for (int o = 0; o < octaves_; ++o) {
-      for (int i = 1; i < kIntervals - 1; ++i) {
+    for (int o = 0; o < hessian_.octaves(); ++o) {
+      for (int i = 1; i < Hessian::kIntervals - 1; ++i) {
         const cv::Mat& layer = Layer(o, i);
-        const int margin = Border(i + 1) + 1;
+        const int margin = Hessian::Border(i + 1) + 1;
         for (int r = margin; r < layer.rows - margin; ++r) {
           const double* line = layer.ptr<double>(r);
           for (int c = margin; c < layer.cols - margin; ++c) {
             dlib::interest_point point;
-            if (std::abs(line[c]) >= threshold && IsMaximum(o, i, r, c) && Interpolate(o, i, r, c, point)) {
+            const double value = std::abs(line[c]);
+            if (value < threshold || std::abs(line[c - 1]) > value || std::abs(line[c + 1]) > value) continue;
+            if (IsMaximum(o, i, r, c) && Interpolate(o, i, r, c, point)) {
               points.push_back(point);
             }
           }
@@ -159,59 +204,11 @@ class HessianPyramid {
   }
 
  private:
-  static constexpr int kIntervals = 4;
-  static constexpr int kFirstStep = 2;
+  using Hessian = internal::SurfHessian;
 
-  static int Border(int interval) { return (3 * (2 * (interval + 1) + 1) + 1) / 2; }
-  static int Step(int octave) { return kFirstStep << octave; }
-
-  static std::size_t At(int octave, int interval) {
-    return static_cast<std::size_t>(octave) * kIntervals + static_cast<std::size_t>(interval);
-  }
-  const cv::Mat& Layer(int octave, int interval) const { return layers_[At(octave, interval)]; }
+  const cv::Mat& Layer(int octave, int interval) const { return hessian_.Layer(octave, interval); }
   double Value(int octave, int interval, int r, int c) const {
     return std::abs(Layer(octave, interval).at<double>(r, c));
-  }
-
-  void Fill(const Integral& image, int octave, int interval) {
-    const int step = Step(octave);
-    const int border = Border(interval) * step;
-    const int lobe = (2 << octave) * (interval + 1) + 1;
-    const int half = lobe / 2;
-    const int wide = 3 * lobe / 2;
-    const double area = 1.0 / ((3.0 * lobe) * (3.0 * lobe));
-    const int rows = static_cast<int>(image.nr());
-    const int cols = static_cast<int>(image.nc());
-    cv::Mat& layer = layers_[At(octave, interval)];
-    layer.create(rows / step, cols / step, CV_64F);
-    for (int y = border; y < rows - border && y / step < layer.rows; y += step) {
-      double* out = layer.ptr<double>(y / step);
-      // Lines of sums above and below: of the box of xx, the outer and inner box of yy, the four of xy.
-      const int* xx0 = image.Row(y - lobe + 1);
-      const int* xx1 = image.Row(y + lobe);
-      const int* yy0 = image.Row(y - wide);
-      const int* yy1 = image.Row(y - half);
-      const int* yy2 = image.Row(y + half + 1);
-      const int* yy3 = image.Row(y + wide + 1);
-      const int* xy0 = image.Row(y - lobe);
-      const int* xy1 = image.Row(y);
-      const int* xy2 = image.Row(y + 1);
-      const int* xy3 = image.Row(y + lobe + 1);
-      for (int x = border; x < cols - border && x / step < layer.cols; x += step) {
-        const auto between = [x](const int* above, const int* below, int left, int right) {
-          return below[x + right] - below[x + left] - above[x + right] + above[x + left];
-        };
-        const int xx = between(xx0, xx1, -wide, wide + 1) - 3 * between(xx0, xx1, -half, half + 1);
-        const int yy = between(yy0, yy3, 1 - lobe, lobe) - 3 * between(yy1, yy2, 1 - lobe, lobe);
-        const int xy = between(xy2, xy3, -lobe, 0) + between(xy0, xy1, 1, lobe + 1) -
-                       between(xy0, xy1, -lobe, 0) - between(xy2, xy3, 1, lobe + 1);
-        const double dxx = xx * area;
-        const double dyy = yy * area;
-        const double dxy = xy * area;
-        const double determinant = std::max(0.0, dxx * dyy - 0.81 * dxy * dxy);
-        out[x / step] = dxx + dyy < 0 ? -determinant : determinant;
-      }
-    }
   }
 
   bool IsMaximum(int octave, int interval, int row, int col) const {
@@ -243,15 +240,15 @@ class HessianPyramid {
     const cv::Vec3d offset = -(curvature.inv() * slope);
     if (!(std::abs(offset[0]) < 0.5 && std::abs(offset[1]) < 0.5 && std::abs(offset[2]) < 0.5)) return false;
     const double lobe = static_cast<double>(2 << o) * (i + offset[2] + 1) + 1;
-    point.center = dlib::vector<double, 2>(c + offset[0], r + offset[1]) * static_cast<double>(Step(o));
+    point.center =
+        dlib::vector<double, 2>(c + offset[0], r + offset[1]) * static_cast<double>(Hessian::Step(o));
     point.scale = 1.2 / 9.0 * 3 * lobe;
     point.score = value;
     point.laplacian = Layer(o, i).at<double>(r, c) > 0 ? 1 : -1;
     return true;
   }
 
-  int octaves_;
-  std::vector<cv::Mat> layers_;
+  const Hessian& hessian_;
 };
 
 class DlibSurf : public cv::Feature2D {
@@ -263,9 +260,11 @@ class DlibSurf : public cv::Feature2D {
                         cv::OutputArray descriptors, bool use_provided) override {
     const cv::Mat grey = image.getMat();
     CV_Assert(grey.type() == CV_8UC1);
-    const Integral integral(grey);
-    if (!use_provided) Detect(integral, mask.getMat(), keypoints);
-    if (descriptors.needed()) Describe(integral, keypoints, descriptors);
+    std::unique_ptr<Scratch> scratch = scratches_.Take();
+    scratch->integral.Compute(grey);
+    if (!use_provided) Detect(*scratch, mask.getMat(), keypoints);
+    if (descriptors.needed()) Describe(scratch->integral, keypoints, descriptors);
+    scratches_.Give(std::move(scratch));
   }
 
   int descriptorSize() const override { return kDescriptorSize; }
@@ -274,20 +273,26 @@ class DlibSurf : public cv::Feature2D {
   cv::String getDefaultName() const override { return "tutti.DlibSurf"; }
 
  private:
+  struct Scratch {
+    Integral integral;
+    internal::SurfHessian hessian;
+  };
+
   static bool Describable(const Integral& integral, const dlib::vector<double, 2>& centre, double scale) {
     const unsigned long border = static_cast<unsigned long>(kBorder * scale);
     const dlib::rectangle image(0, 0, integral.nc() - 1, integral.nr() - 1);
     return image.contains(dlib::centered_rect(dlib::point(centre), border, border));
   }
 
-  void Detect(const Integral& integral, const cv::Mat& mask, std::vector<cv::KeyPoint>& keypoints) const {
-    std::vector<dlib::interest_point> points = HessianPyramid(integral, octaves_).Points(threshold_);
+  void Detect(Scratch& scratch, const cv::Mat& mask, std::vector<cv::KeyPoint>& keypoints) const {
+    scratch.hessian.Compute(scratch.integral, octaves_);
+    std::vector<dlib::interest_point> points = HessianMaxima(scratch.hessian).Points(threshold_);
     std::stable_sort(points.begin(), points.end(),
                      [](const auto& a, const auto& b) { return a.score > b.score; });
     keypoints.clear();
     for (const dlib::interest_point& point : points) {
       if (static_cast<int>(keypoints.size()) >= max_features_) break;
-      if (!Describable(integral, point.center, point.scale)) continue;
+      if (!Describable(scratch.integral, point.center, point.scale)) continue;
       const float x = static_cast<float>(point.center.x());
       const float y = static_cast<float>(point.center.y());
       if (!mask.empty() && mask.at<std::uint8_t>(cvRound(y), cvRound(x)) == 0) continue;
@@ -318,6 +323,7 @@ class DlibSurf : public cv::Feature2D {
   int max_features_;
   int octaves_;
   double threshold_;
+  internal::ScratchPool<Scratch> scratches_;
 };
 
 }  // namespace

@@ -200,14 +200,14 @@ FeatureExtractor::FeatureExtractor(const std::string& name, const ExtractionOpti
   if (std::find(known.begin(), known.end(), name) == known.end()) {
     throw InputError("unknown member '" + name + "'; did you mean '" + NearestWord(name, known) + "'?");
   }
+  if (name == "surf") {
+    surf_ = CreateDlibSurf(options.features * kOversampling, options.surf_octaves,
+                           std::min(options.surf_threshold, options.surf_min_threshold));
+  }
 }
 
 cv::Ptr<cv::Feature2D> FeatureExtractor::Create(cv::Size size) const {
   const int wanted = options_.features * kOversampling;
-  if (name_ == "surf") {
-    return CreateDlibSurf(wanted, options_.surf_octaves,
-                          std::min(options_.surf_threshold, options_.surf_min_threshold));
-  }
   if (name_ == "orb") return CreateOrb(size, wanted, options_);
   if (name_ == "gftt") return CreateGfttBrief(wanted);
   if (name_ == "akaze") return cv::AKAZE::create();
@@ -238,14 +238,13 @@ Features FeatureExtractor::Extract(const cv::Mat& grey) const {
     features = internal::ExtractSift(image, kImageBlur * std::max(1.0, 1.0 / factor), options_, *scratch);
     scratches_->Give(std::move(scratch));
   } else if (name_ == "surf") {
-    const cv::Ptr<cv::Feature2D> member = Create(image.size());
     // Describing costs more than detecting, and what was detected stays valid: describe what is kept.
     std::vector<cv::KeyPoint> detected;
-    member->detect(image, detected);
+    surf_->detect(image, detected);
     DropWeak(options_.surf_threshold, options_.features, detected);
     features.keypoints =
         Picked(detected, SelectSpread(detected, image.size(), options_.features, options_.grid_columns));
-    member->compute(image, features.keypoints, features.descriptors);
+    surf_->compute(image, features.keypoints, features.descriptors);
   } else {
     std::vector<cv::KeyPoint> keypoints;
     cv::Mat descriptors;

@@ -3,12 +3,10 @@
 
 #include <array>
 #include <cstdint>
-#include <memory>
-#include <mutex>
 #include <opencv2/core.hpp>
-#include <utility>
 #include <vector>
 
+#include "loopclosure/features/scratch_pool.h"
 #include "tutti/loopclosure/features.h"
 
 namespace tutti::internal {
@@ -23,27 +21,8 @@ struct SiftScratch {
   std::vector<std::uint8_t> found;             ///< of one line
 };
 
-/// Scratches that are not in use. Safe from several threads at once.
-class SiftScratchPool {
- public:
-  /// One that nobody else uses until it is given back.
-  std::unique_ptr<SiftScratch> Take() {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    if (free_.empty()) return std::make_unique<SiftScratch>();
-    std::unique_ptr<SiftScratch> scratch = std::move(free_.back());
-    free_.pop_back();
-    return scratch;
-  }
-  /// Gives it back.
-  void Give(std::unique_ptr<SiftScratch> scratch) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    free_.push_back(std::move(scratch));
-  }
-
- private:
-  std::mutex mutex_;
-  std::vector<std::unique_ptr<SiftScratch>> free_;
-};
+/// Declared in a public header.
+class SiftScratchPool : public ScratchPool<SiftScratch> {};
 
 /// SIFT of an 8-bit grey image (Lowe 2004, with the constants of cv::SIFT), its first octave the image as it
 /// is: at most options.features, keypoints in pixels of this image, descriptors 128 whole numbers as CV_32F.

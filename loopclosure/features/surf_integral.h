@@ -15,8 +15,8 @@ class SurfIntegral {
  public:
   using value_type = int;
 
-  /// Of an 8-bit grey image of at most 2^23 pixels.
-  explicit SurfIntegral(const cv::Mat& grey) { cv::integral(grey, sums_, CV_32S); }
+  /// Of an 8-bit grey image of at most 2^23 pixels, in place of the one before.
+  void Compute(const cv::Mat& grey) { cv::integral(grey, sums_, CV_32S); }
 
   long nr() const { return sums_.rows - 1; }
   long nc() const { return sums_.cols - 1; }

@@ -2,6 +2,8 @@
 
 #include <limits>
 
+#include "core/clones.h"
+
 namespace tutti::internal {
 
 TUTTI_CLONES("avx2")

@@ -36,12 +36,3 @@ void HammingDistances(const std::uint8_t* query, const std::uint8_t* rows, int c
 float UpdateNearest(const float* distances, int count, int row, float* nearest, std::int32_t* nearest_row);
 
 }  // namespace tutti::internal
-
-// Functions compiled for plain x86-64 and once more with newer instructions, chosen at run time. Sanitizers
-// do not get along with the resolvers that choose.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
-    !defined(__SANITIZE_THREAD__)
-#define TUTTI_CLONES(...) __attribute__((target_clones("default", __VA_ARGS__)))
-#else
-#define TUTTI_CLONES(...)
-#endif

@@ -2,6 +2,7 @@
 #include <random>
 
 #include "core/byte_stream.h"
+#include "core/clones.h"
 #include "loopclosure/vocabulary/bit_trie.h"
 #include "loopclosure/vocabulary/descriptor_index.h"
 #include "loopclosure/vocabulary/distances.h"

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <set>
+
 namespace tutti {
 namespace {
 
@@ -57,6 +59,24 @@ TEST(Map, CovisibilityCountsCommonLandmarks) {
   EXPECT_EQ(map.BestCovisible(0, 5, 1), (std::vector<int>{1, 2}));
   EXPECT_EQ(map.BestCovisible(0, 5, 3), std::vector<int>{1});
   EXPECT_EQ(map.BestCovisible(0, 1, 1), std::vector<int>{1});
+}
+
+TEST(Map, LandmarksOfSomeKeyframesComeOnceEachInAscendingOrder) {
+  Map map({1.0F, 1.2F, 1.44F});
+  for (int i = 0; i < 3; ++i) map.AddKeyframe(MakeKeyframe(i, 200));
+  std::set<int> of_both;
+  for (int i = 0; i < 300; ++i) {  // more than a machine word has bits
+    const int keyframe = i * 7 % 3;
+    const int l = map.AddLandmark({0, 0, 5}, keyframe, 199 - i / 3);
+    if (i % 5 == 0) map.AddObservation(l, (keyframe + 1) % 3, i / 5);
+    for (const Observation& seen : map.landmark(l).observations) {
+      if (seen.keyframe != 1) of_both.insert(l);
+    }
+  }
+  const std::vector<int> landmarks = map.LandmarksOf({2, 0});
+  EXPECT_GT(landmarks.size(), 200U);
+  EXPECT_EQ(landmarks, std::vector<int>(of_both.begin(), of_both.end()));
+  EXPECT_TRUE(map.LandmarksOf({}).empty());
 }
 
 TEST(Map, OneKeyframeSeesALandmarkOnce) {

@@ -78,7 +78,8 @@ class FeatureExtractor {
 
   std::string name_;
   ExtractionOptions options_;
-  std::shared_ptr<internal::SiftScratchPool> scratches_;  // copies share them
+  cv::Ptr<cv::Feature2D> surf_;                           // copies share it, and the scratches
+  std::shared_ptr<internal::SiftScratchPool> scratches_;  // of sift
 };
 
 }  // namespace tutti

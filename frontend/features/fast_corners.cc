@@ -15,10 +15,10 @@ using Lanes = cv::v_uint8x16;
 
 constexpr int kRadius = 3;  // [px]
 constexpr int kRows = 2 * kRadius + 1;
-constexpr std::size_t kAround = 16;    // pixels of the circle
-constexpr int kLanes = Lanes::nlanes;  // pixels that are looked at at once
+constexpr std::size_t kRingPixels = 16;  // pixels of the circle
+constexpr int kLanes = Lanes::nlanes;    // pixels that are looked at at once
 using Rows = std::array<const Pixel*, kRows>;
-using Circle = std::array<Lanes, kAround>;
+using Circle = std::array<Lanes, kRingPixels>;
 
 // The pixels at the same place of the circle around each.
 Circle CircleAround(const Rows& rows, int x) {
@@ -45,8 +45,8 @@ bool MayBeCorner(const Rows& rows, int x, const Lanes& here, const Lanes& thresh
 
 // Of each arc of nine the least difference, and of these the greatest.
 Lanes OfBestArc(const Circle& difference) {
-  const auto at = [&difference](std::size_t k) -> const Lanes& { return difference[k % kAround]; };
-  std::array<Lanes, kAround / 2> two, four;  // least of so many in a row, from each odd one on
+  const auto at = [&difference](std::size_t k) -> const Lanes& { return difference[k % kRingPixels]; };
+  std::array<Lanes, kRingPixels / 2> two, four;  // least of so many in a row, from each odd one on
   for (std::size_t k = 0; k < two.size(); ++k) two[k] = cv::v_min(at(2 * k + 1), at(2 * k + 2));
   for (std::size_t k = 0; k < two.size(); ++k) four[k] = cv::v_min(two[k], two[(k + 1) % two.size()]);
   // The arcs that begin one earlier and end one later share eight.
@@ -62,9 +62,10 @@ Lanes OfBestArc(const Circle& difference) {
 Lanes Scores(const Rows& rows, int x, const Lanes& here, const Lanes& threshold) {
   const Circle around = CircleAround(rows, x);
   Circle difference;
-  for (std::size_t k = 0; k < kAround; ++k) difference[k] = around[k] - here;  // 0 where it would be negative
+  for (std::size_t k = 0; k < kRingPixels; ++k)
+    difference[k] = around[k] - here;  // 0 where it would be negative
   Lanes best = OfBestArc(difference);
-  for (std::size_t k = 0; k < kAround; ++k) difference[k] = here - around[k];
+  for (std::size_t k = 0; k < kRingPixels; ++k) difference[k] = here - around[k];
   best = cv::v_max(best, OfBestArc(difference));
   return (best & (best > threshold)) - cv::v_setall_u8(1);
 }

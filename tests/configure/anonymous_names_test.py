@@ -47,6 +47,7 @@ def statements(text):
 def name_of(statement):
     """The name that a declaration declares; None for what declares none, and for tests, whose names GTest checks."""
     statement = re.sub(r"\[\[.*?\]\]", " ", statement, flags=re.S).strip()
+    statement = re.sub(r"^[A-Z][A-Z_]+_CLONES\s*\([^)]*\)", " ", statement).strip()  # an attribute
     previous = None
     while previous != statement:  # templates' parameters and arguments
         previous, statement = statement, re.sub(r"<[^<>;]*>", " ", statement)

@@ -21,10 +21,10 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 
-constexpr int kFrames = 12;
+constexpr int kRoomImages = 12;
 
 // RGB-D in TUM's layout; images are called by their time stamps.
-const fs::path& Room() {
+const fs::path& RoomOfImages() {
   static const testing::GeneratedDataset room("close-room", [] {
     SyntheticOptions options;
     options.sensor = SyntheticSensor::kRgbd;
@@ -32,7 +32,7 @@ const fs::path& Room() {
     options.width = 320;
     options.height = 240;
     options.supersample = 1;
-    options.frames = kFrames;
+    options.frames = kRoomImages;
     return options;
   }());
   return room.path();
@@ -52,13 +52,16 @@ class CloseImages : public ::testing::Test {
     WriteTrajectory(odometry_, Truth(), TrajectoryFormat::kTum);
   }
 
-  static Trajectory Truth() { return ReadTrajectory(Room() / "groundtruth.txt", TrajectoryFormat::kTum); }
+  static Trajectory Truth() {
+    return ReadTrajectory(RoomOfImages() / "groundtruth.txt", TrajectoryFormat::kTum);
+  }
   // A copy of a folder of the room whose images have other names.
   fs::path Renamed(const std::string& from, const std::function<std::string(int)>& name) const {
     const fs::path to = folder_ / (from + "-renamed");
     fs::create_directories(to);
     std::vector<fs::path> images;
-    for (const fs::directory_entry& entry : fs::directory_iterator(Room() / from)) images.push_back(entry);
+    for (const fs::directory_entry& entry : fs::directory_iterator(RoomOfImages() / from))
+      images.push_back(entry);
     std::sort(images.begin(), images.end());
     for (std::size_t i = 0; i < images.size(); ++i)
       fs::copy(images[i], to / (name(static_cast<int>(i)) + ".png"));
@@ -79,7 +82,7 @@ class CloseImages : public ::testing::Test {
 };
 
 TEST_F(CloseImages, ArePairedWithPosesByTheTimeStampsThatTheyAreCalledBy) {
-  const auto seconds = Close(Room() / "rgb", mono_, "seconds");
+  const auto seconds = Close(RoomOfImages() / "rgb", mono_, "seconds");
   ASSERT_EQ(seconds.status, 0) << seconds.output;
   EXPECT_THAT(seconds.output, HasSubstr("the time stamps that they are called by"));
   EXPECT_THAT(seconds.output, HasSubstr("frames 12 of 12"));
@@ -87,7 +90,7 @@ TEST_F(CloseImages, ArePairedWithPosesByTheTimeStampsThatTheyAreCalledBy) {
   Trajectory later = Truth();
   for (StampedPose& p : later) p.stamp_s += 6.0 / 15;
   WriteTrajectory(odometry_, later, TrajectoryFormat::kTum);
-  const auto half = Close(Room() / "rgb", mono_, "half");
+  const auto half = Close(RoomOfImages() / "rgb", mono_, "half");
   ASSERT_EQ(half.status, 0) << half.output;
   EXPECT_THAT(half.output, HasSubstr("frames 6 of 12"));
 }
@@ -110,7 +113,7 @@ TEST_F(CloseImages, ArePairedByOrderIfThereAreAsManyPosesAndRefusedElse) {
   const auto order = Close(images, mono_, "order");
   ASSERT_EQ(order.status, 0) << order.output;
   EXPECT_THAT(order.output, HasSubstr("the pose of the same place in the file"));
-  ASSERT_EQ(Close(Room() / "rgb", mono_, "names").status, 0);
+  ASSERT_EQ(Close(RoomOfImages() / "rgb", mono_, "names").status, 0);
   EXPECT_EQ(Graph("order"), Graph("names"));
   Trajectory fewer = Truth();
   fewer.pop_back();
@@ -122,11 +125,11 @@ TEST_F(CloseImages, ArePairedByOrderIfThereAreAsManyPosesAndRefusedElse) {
 }
 
 TEST_F(CloseImages, GetDepthFromAFolderBeside) {
-  ASSERT_EQ(Close(Room(), Room() / "config.yaml", "layout").status, 0);
-  ASSERT_EQ(Close(Room() / "rgb", mono_, "mono").status, 0);
-  const std::vector<std::string> depth = {"--depth", (Room() / "depth").string(), "--set",
+  ASSERT_EQ(Close(RoomOfImages(), RoomOfImages() / "config.yaml", "layout").status, 0);
+  ASSERT_EQ(Close(RoomOfImages() / "rgb", mono_, "mono").status, 0);
+  const std::vector<std::string> depth = {"--depth", (RoomOfImages() / "depth").string(), "--set",
                                           "dataset.max_depth_m=8"};
-  const auto beside = Close(Room() / "rgb", mono_, "beside", depth);
+  const auto beside = Close(RoomOfImages() / "rgb", mono_, "beside", depth);
   ASSERT_EQ(beside.status, 0) << beside.output;
   EXPECT_EQ(Graph("beside"), Graph("layout"));
   EXPECT_NE(Graph("beside"), Graph("mono"));
@@ -137,7 +140,7 @@ TEST_F(CloseImages, GetDepthFromAFolderBeside) {
     return std::string(name);
   });
   fs::remove(few / "0.073333.png");
-  const auto fewer = Close(Room() / "rgb", mono_, "fewer", {"--depth", few.string()});
+  const auto fewer = Close(RoomOfImages() / "rgb", mono_, "fewer", {"--depth", few.string()});
   ASSERT_EQ(fewer.status, 0) << fewer.output;
   EXPECT_THAT(fewer.output, HasSubstr("1 of 12 images have no depth image within"));
 }
@@ -148,11 +151,11 @@ TEST_F(CloseImages, SayWhatIsWrongWithDepth) {
     EXPECT_EQ(done.status, 1) << done.output;
     EXPECT_THAT(done.output, HasSubstr(words));
   };
-  refused(Room() / "rgb", folder_ / "nowhere", "nowhere");
-  refused(Room(), Room() / "depth", "--depth goes with a plain folder of images");
+  refused(RoomOfImages() / "rgb", folder_ / "nowhere", "nowhere");
+  refused(RoomOfImages(), RoomOfImages() / "depth", "--depth goes with a plain folder of images");
   const fs::path far = Renamed("depth", [](int i) { return "9" + std::to_string(i); });
   fs::remove(far / "90.png");
-  refused(Room() / "rgb", far, "has 11 depth images for 12 images");
+  refused(RoomOfImages() / "rgb", far, "has 11 depth images for 12 images");
 }
 
 }  // namespace

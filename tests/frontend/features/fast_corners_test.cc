@@ -27,7 +27,7 @@ std::size_t Compare(const cv::Mat& image, int threshold) {
 }
 
 // Noise that is smooth, black and white, or neither.
-cv::Mat Noise(int kind, const cv::Size& size, cv::RNG& random) {
+cv::Mat NoiseOfKind(int kind, const cv::Size& size, cv::RNG& random) {
   cv::Mat noise(size, CV_8UC1), image;
   random.fill(noise, cv::RNG::UNIFORM, 0, 256);
   if (kind == 0) return noise;
@@ -39,7 +39,7 @@ TEST(FastCorners, AreThoseOfOpenCv) {
   cv::RNG random(3);
   std::size_t corners = 0;
   for (int kind = 0; kind < 3; ++kind) {
-    const cv::Mat image = Noise(kind, {333, 240}, random);
+    const cv::Mat image = NoiseOfKind(kind, {333, 240}, random);
     for (const int threshold : {0, 1, 7, 20, 60, 254, 255, 300}) corners += Compare(image, threshold);
   }
   EXPECT_GT(corners, 10000U);
@@ -50,14 +50,14 @@ TEST(FastCorners, AreThoseOfOpenCvInImagesOfAnySize) {
   std::size_t corners = 0;
   for (int i = 0; i < 1500; ++i) {
     const cv::Size size(random.uniform(1, 60), random.uniform(1, 30));
-    corners += Compare(Noise(i % 3, size, random), random.uniform(0, 80));
+    corners += Compare(NoiseOfKind(i % 3, size, random), random.uniform(0, 80));
   }
   EXPECT_GT(corners, 1000U);
 }
 
 TEST(FastCorners, AreThoseOfOpenCvInPartsOfAnImage) {
   cv::RNG random(5);
-  const cv::Mat image = Noise(1, {200, 100}, random);
+  const cv::Mat image = NoiseOfKind(1, {200, 100}, random);
   EXPECT_GT(Compare(image(cv::Rect(13, 7, 101, 60)), 10), 0U);
 }
 

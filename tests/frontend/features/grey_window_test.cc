@@ -17,7 +17,7 @@ cv::Mat Noise() {
   return noise;
 }
 
-void ExpectSameBits(const cv::Mat& image, float x, float y) {
+void ExpectSameGrey(const cv::Mat& image, float x, float y) {
   GreyWindow<kHalf> grey;
   BilinearWindow<kHalf>(image.data, image.step, x, y, &grey);
   for (int v = -kHalf, n = 0; v <= kHalf; ++v) {
@@ -30,8 +30,8 @@ TEST(GreyWindow, IsWhatEachSampleIsByItself) {
   const cv::Mat image = Noise();
   cv::RNG random(6);
   for (int i = 0; i < 20000; ++i)
-    ExpectSameBits(image, random.uniform(4.0F, 2094.0F), random.uniform(4.0F, 74.0F));
-  ExpectSameBits(image, 4, 4);
+    ExpectSameGrey(image, random.uniform(4.0F, 2094.0F), random.uniform(4.0F, 74.0F));
+  ExpectSameGrey(image, 4, 4);
 }
 
 TEST(GreyWindow, SurvivesSumsThatAreRoundedToTheNextPixel) {
@@ -39,8 +39,8 @@ TEST(GreyWindow, SurvivesSumsThatAreRoundedToTheNextPixel) {
   for (const float power : {8.0F, 16.0F, 64.0F, 256.0F, 1024.0F, 2048.0F}) {
     const float just_below = std::nextafter(power, 0.0F);
     ASSERT_EQ(just_below + 1, power + 1) << "no such case";
-    ExpectSameBits(image, just_below, 10.5F);
-    if (power < 70) ExpectSameBits(image, 100.25F, just_below);
+    ExpectSameGrey(image, just_below, 10.5F);
+    if (power < 70) ExpectSameGrey(image, 100.25F, just_below);
   }
 }
 

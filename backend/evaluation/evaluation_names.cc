@@ -47,7 +47,7 @@ const std::vector<std::string>& ProjectionPlaneNames() {
 }
 
 ProjectionPlane ParseProjectionPlane(const std::string& name) {
-  return static_cast<ProjectionPlane>(Find(ProjectionPlaneNames(), name, "plane"));
+  return static_cast<ProjectionPlane>(PlaceOf(ProjectionPlaneNames(), name, "plane"));
 }
 
 const char* ToString(ProjectionPlane plane) {

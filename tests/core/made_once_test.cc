@@ -43,6 +43,7 @@ TEST_F(MadeOnceTest, IsMadeTheFirstTimeAndAgainOnlyForAnotherMaker) {
   EXPECT_EQ(Make(), folder);
   EXPECT_EQ(made_, 2);
   fs::remove_all(folder.parent_path());
+  fs::remove(folder.parent_path().string() + ".lock");
 }
 
 TEST_F(MadeOnceTest, WhatIsHalfMadeIsMadeAnew) {
@@ -53,6 +54,7 @@ TEST_F(MadeOnceTest, WhatIsHalfMadeIsMadeAnew) {
   EXPECT_EQ(made_, 1);
   EXPECT_TRUE(fs::exists(folder / "number"));
   fs::remove_all(folder.parent_path());
+  fs::remove(folder.parent_path().string() + ".lock");
 }
 
 TEST(DigestOf, TellsTextsApart) {

@@ -107,11 +107,14 @@ def kitchen(a):
 
 def published(a):
     data, config = kitti(a)
+    truth = read_kitti(data / "poses.txt")
     rows = []
     for name in ("ORB", "SPTAM"):
         file = a.out / f"{name}.txt"
-        write_kitti(file, read_kitti(a.data / "trajectories" / f"KITTI_00_{name}.txt", 1700))
-        rows.append(close(a, name, data, config, file)[0])
+        given = read_kitti(a.data / "trajectories" / f"KITTI_00_{name}.txt", len(truth))
+        write_kitti(file, given)
+        row, corrected = close(a, name, data, config, file)
+        rows.append(dict(row, from_truth_m=drift(truth, given), moved_m=drift(given, corrected)))
     return rows
 
 
@@ -139,6 +142,11 @@ def document(results):
         bound, reached, holds = verdict(r)
         text.append(f"| `{r['name']}` | {r['before_ate_m']:.3f} m | {r['ate_m']:.3f} m | {drifts} | {r['true']} / {r['false']} | "
                     f"{bound} | {reached} | {'holds' if holds and r['false'] == 0 else '**fails**'} |")
+    for r in [r for r in results.get("published", []) if r["name"] == "ORB"]:
+        text += ["", f"The ground truth of kitti_00_head (GPS and inertial) is not exact at the loop: ORB-SLAM's trajectory, which has closed "
+                 f"it, is {r['from_truth_m']:.2f} m from it there, and the loops found here move that trajectory by {r['moved_m']:.2f} m. "
+                 "So two measurements from images agree with each other and not with the ground truth; a drift or an ATE below that "
+                 "distance can't be told from an error of the ground truth."]
     return "\n".join(text)
 
 

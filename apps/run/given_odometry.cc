@@ -78,8 +78,9 @@ GivenOdometry::GivenOdometry(const GivenOdometryFiles& files, const fs::path& im
     : files_(files), images_(images), options_(options) {
   if (files.depth) {
     if (DetectDatasetType(images) != DatasetType::kImages)
-      throw InputError(images.string() +
-                       ": --depth goes with a plain folder of images; this one says itself where its depth is");
+      throw InputError(
+          images.string() +
+          ": --depth goes with a plain folder of images; this one says itself where its depth is");
     options_.type = DatasetType::kImages;
     options_.sensor = Sensor::kMono;  // what a plain folder is
   }

@@ -5,12 +5,15 @@
 
 #include <cstdio>
 #include <limits>
+#include <string>
+#include <vector>
 
 #include "tests/support/disturbed.h"
 #include "tests/support/recording.h"
 #include "tests/support/rendered_world.h"
 #include "tests/support/small_town.h"
 #include "tutti/core/error.h"
+#include "tutti/slam/slam_system.h"
 
 namespace tutti {
 namespace {
@@ -73,6 +76,33 @@ TEST(TrajectoryCloser, DepthImagesRemoveTheDriftOfTheOdometry) {
 }
 TEST(TrajectoryCloser, OneCameraTakesItsScaleFromTheOdometry) {
   ExpectTheDriftIsGone(SyntheticSensor::kMono, 0.1);
+}
+
+TEST(TrajectoryCloser, TheImagesTellThatAnOdometryIsBadAndTrueLoopsEnterThen) {
+  const Recording town = Town(SyntheticSensor::kStereo);
+  const Trajectory odometry = testing::Disturbed(town.truth, 1.5, 1, 3);
+  TrajectoryCloser closer(Small(2), town.rig);
+  for (std::size_t i = 0; i < town.frames.size(); ++i) closer.Push(town.frames[i], odometry[i].pose);
+  closer.Finish();
+  const std::vector<std::string> warnings = closer.TakeWarnings();
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].find("the images contradict the odometry"), std::string::npos) << warnings[0];
+  EXPECT_TRUE(closer.TakeWarnings().empty());
+  EXPECT_LT(testing::DriftAtTheEnd(town.truth, closer.Corrected(odometry)),
+            0.2 * testing::DriftAtTheEnd(town.truth, odometry));
+}
+
+TEST(TrajectoryCloser, APlantedLoopStaysOutOfABadOdometryAsWell) {
+  const Recording town = Town(SyntheticSensor::kStereo);
+  const Trajectory odometry = testing::Disturbed(town.truth, 1.5, 1, 3);
+  SlamSystem slam(FollowingConfig(Small(2)), town.rig);
+  for (std::size_t i = 0; i < town.frames.size(); ++i) slam.Follow(town.frames[i], odometry[i].pose);
+  slam.Finish();
+  const std::vector<int> ids = slam.odometry()->KeyframeIds();
+  slam.AddLoop(ids[2], ids[ids.size() / 2], Similarity(), MakeInformation(0.1, 0.01));
+  slam.Finish();
+  EXPECT_FALSE(slam.loops().back().accepted);
+  EXPECT_FALSE(slam.loops().back().reason.empty());
 }
 
 TEST(TrajectoryCloser, APerfectOdometryStaysNearlyAsItIs) {

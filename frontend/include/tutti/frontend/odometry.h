@@ -42,11 +42,11 @@ struct StepCheck {
 /// What became of one frame.
 struct TrackResult {
   TrackingState state = TrackingState::kInitializing;
-  std::string reason;   ///< why the frame has no pose (empty when it has one)
-  Pose T_world_camera;  ///< valid if state == kTracking
-  int features = 0;     ///< in the image
-  int inliers = 0;      ///< landmarks that agree with the pose
-  int keyframe = -1;    ///< id of the keyframe that this frame became, or -1; see TakeMapped
+  std::string reason;             ///< why the frame has no pose (empty when it has one)
+  Pose T_world_camera;            ///< valid if state == kTracking
+  int features = 0;               ///< in the image
+  int inliers = 0;                ///< landmarks that agree with the pose
+  int keyframe = -1;              ///< id of the keyframe that this frame became, or -1; see TakeMapped
   std::optional<StepCheck> step;  ///< Follow, of a keyframe, if the images say enough
 };
 

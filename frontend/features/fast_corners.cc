@@ -15,8 +15,8 @@ using Lanes = cv::v_uint8x16;
 
 constexpr int kRadius = 3;  // [px]
 constexpr int kRows = 2 * kRadius + 1;
-constexpr std::size_t kRingPixels = 16;  // pixels of the circle
-constexpr int kLanes = Lanes::nlanes;    // pixels that are looked at at once
+constexpr std::size_t kRingPixels = 16;     // pixels of the circle
+constexpr int kPixelLanes = Lanes::nlanes;  // pixels that are looked at at once
 using Rows = std::array<const Pixel*, kRows>;
 using Circle = std::array<Lanes, kRingPixels>;
 
@@ -73,8 +73,8 @@ Lanes Scores(const Rows& rows, int x, const Lanes& here, const Lanes& threshold)
 // From each first place of a row of lanes; the last ones overlap.
 template <class Visit>
 void ForLanes(int cols, const Visit& visit) {
-  const int last = cols - kRadius - kLanes;
-  for (int x = kRadius; x < last; x += kLanes) visit(x);
+  const int last = cols - kRadius - kPixelLanes;
+  for (int x = kRadius; x < last; x += kPixelLanes) visit(x);
   visit(last);
 }
 
@@ -115,7 +115,7 @@ void AddStrongest(const Pixel* above, const Pixel* here, const Pixel* below, int
 std::vector<cv::KeyPoint> FastCorners(const cv::Mat& image, int threshold) {
   std::vector<cv::KeyPoint> corners;
   threshold = std::clamp(threshold, 0, 255);
-  if (image.cols < 2 * kRadius + kLanes) {
+  if (image.cols < 2 * kRadius + kPixelLanes) {
     cv::FAST(image, corners, threshold, true);
     return corners;
   }

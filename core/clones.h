@@ -1,5 +1,5 @@
-// Functions compiled for plain x86-64 and once more with newer instructions, chosen at run time. None of these
-// sets of instructions fuses a multiplication with an addition: results are the same bits. Internal.
+// Functions compiled for plain x86-64 and once more with newer instructions, chosen at run time. None of
+// these sets of instructions fuses a multiplication with an addition: results are the same bits. Internal.
 #pragma once
 
 // Sanitizers do not get along with the resolvers that choose.

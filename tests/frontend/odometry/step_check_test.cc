@@ -15,12 +15,12 @@ namespace {
 
 using testing::Recording;
 
-constexpr std::size_t kFrames = 60;
+constexpr std::size_t kCheckedFrames = 60;
 
 Recording Street(SyntheticSensor sensor) {
   SyntheticOptions options = testing::SmallStereoTown(320, 160);
   options.sensor = sensor;
-  return testing::Record(SyntheticWorld(options), kFrames);
+  return testing::Record(SyntheticWorld(options), kCheckedFrames);
 }
 
 // Of all keyframes whose step the images could check. After each step the odometry turns by `yaw_deg`, and

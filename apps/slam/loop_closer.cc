@@ -191,9 +191,9 @@ OdometryUncertainty::Sigmas LoopCloser::Sigmas() const {
 }
 
 std::string LoopCloser::Uncertainty() const {
-  const OdometryUncertainty::Sigmas sigmas = Sigmas();
+  const OdometryUncertainty::Sigmas seen = uncertainty_.Estimate(), sigmas = Sigmas();
+  if (seen.fraction < sigmas.fraction && seen.rotation_rad < sigmas.rotation_rad) return "";
   const double deg = sigmas.rotation_rad * internal::kDegrees;
-  if (sigmas.fraction <= options_.odometry_sigma_fraction && deg <= options_.odometry_sigma_deg) return "";
   char text[240];
   std::snprintf(text, sizeof text,
                 "the images contradict the odometry by more than its standard deviation says: between two "

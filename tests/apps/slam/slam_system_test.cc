@@ -161,5 +161,18 @@ TEST(SlamSystem, LoopsFromElsewhereNeedKeyframesThatAreThereAndFiniteNumbers) {
   EXPECT_TRUE(slam.loops().empty());
 }
 
+TEST(SlamSystem, AnOdometryOfItsOwnIsAsUncertainAsConfigured) {
+  const testing::RenderedWorld world(testing::SmallStereoTown(320, 160));
+  const testing::Recording town = testing::Record(world, 3);
+  for (const double deg : {0.1, 0.21, 0.42}) {
+    RunConfig config = Small(true, 1);
+    config.run.odometry_sigma_deg = deg;
+    SlamSystem slam(config, town.rig);
+    for (const InputFrame& frame : town.frames) slam.Track(frame);
+    slam.Finish();
+    EXPECT_TRUE(slam.TakeWarnings().empty()) << deg;
+  }
+}
+
 }  // namespace
 }  // namespace tutti

@@ -133,7 +133,11 @@ void MeasureGuess(const RunArguments& arguments, Recording& recording, RunReques
     if (!arguments.quiet) std::fprintf(stderr, "  camera  %s\n", text.c_str());
   };
   say("measuring the focal length on the first frames ...");
-  const FocalLength found = MeasureFocalLength(arguments.dataset, recording.config);
+  RunConfig range = recording.config;
+  if (request.start) range.dataset.start = *request.start;
+  if (request.end) range.dataset.end = *request.end;
+  if (request.stride) range.dataset.stride = *request.stride;
+  const FocalLength found = MeasureFocalLength(arguments.dataset, range);
   char text[200];
   if (found.measured) {
     recording.config.dataset.camera = found.camera;
@@ -209,8 +213,6 @@ int RunOnce(const CLI::App& command, const RunArguments& arguments) {
   if (arguments.save_map.empty() && !arguments.no_map) request.save_map = kMap;
   if (!arguments.map.empty()) request.map = arguments.map;
   RunConfig config = ConfigFor(CameraOf(command, arguments), arguments, request);
-=======
-  RunConfig config = arguments.config.empty() ? ConfigOfMap(arguments.map) : LoadConfig(request.config);
   SetOptions(arguments.set, config);
   return RunAndShow(command, arguments, std::move(request), config);
 }

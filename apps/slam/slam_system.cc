@@ -54,7 +54,7 @@ class SlamSystem::Impl {
     BringIn();
     ++frames_;
     sessions_.CountFrame();
-    const TrackResult result = odometry_->Follow(frame, T_odom_camera);
+    TrackResult result = odometry_->Follow(frame, T_odom_camera);
     if (result.step) loops_.NoteStep(*result.step);
     last_ = frame.index;
     sessions_.SetLastFrame(last_);

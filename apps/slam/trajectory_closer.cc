@@ -28,7 +28,7 @@ class TrajectoryCloser::Impl {
     if (!(frame.stamp_s > last_s_.value_or(frame.stamp_s - 1)))
       throw InputError("frame " + std::to_string(frame.index) +
                        ": its time stamp does not grow; push images in order of time");
-    const TrackResult result = slam_.Follow(frame, T_odom_body * T_body_camera_);
+    TrackResult result = slam_.Follow(frame, T_odom_body * T_body_camera_);
     last_s_ = frame.stamp_s;
     if (result.state != TrackingState::kTracking) return result;
     T_map_body_ = result.T_world_camera * T_camera_body_;

@@ -70,7 +70,7 @@ std::string TooLarge(const Bytes& b) {
 // What is wrong with the bytes of an image file; empty if nothing is seen from outside.
 std::string Damage(const Bytes& b) {
   if (b.empty()) return "is empty (0 bytes)";
-  const std::string too_large = TooLarge(b);
+  std::string too_large = TooLarge(b);
   if (!too_large.empty()) return too_large;
   const auto starts = [&](const char* magic, std::size_t size, std::size_t at = 0) {
     return b.size() >= at + size && std::memcmp(b.data() + at, magic, size) == 0;

@@ -79,9 +79,8 @@ class CornerGrid {
         if (!Cell(row, first).empty()) continue;
         int past = first + 1;
         while (past < columns_ && Cell(row, past).empty()) ++past;
-        const int begin = row * columns_;
-        AddWeak(Detect(Around(row, first, past), options_.threshold_min),
-                static_cast<std::size_t>(begin + first), static_cast<std::size_t>(begin + past));
+        AddWeak(Detect(Around(row, first, past), options_.threshold_min), PlaceOf(row, first),
+                PlaceOf(row, past));
         first = past;
       }
     }
@@ -114,14 +113,17 @@ class CornerGrid {
  private:
   static constexpr Rank kNone = ~Rank{0};
 
+  // Of a cell, or of the one behind a row's last.
+  std::size_t PlaceOf(int row, int column) const {
+    return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
+           static_cast<std::size_t>(column);
+  }
   std::size_t CellOf(const cv::KeyPoint& corner) const {
     const int c = std::min(columns_ - 1, static_cast<int>(corner.pt.x / cell_));
     const int r = std::min(rows_ - 1, static_cast<int>(corner.pt.y / cell_));
-    return static_cast<std::size_t>(r * columns_ + c);
+    return PlaceOf(r, c);
   }
-  const std::vector<Rank>& Cell(int row, int column) const {
-    return cells_[static_cast<std::size_t>(row * columns_ + column)];
-  }
+  const std::vector<Rank>& Cell(int row, int column) const { return cells_[PlaceOf(row, column)]; }
 
   // The places of some cells of a row and those next to them, without which a corner does not know whether it
   // is stronger than its neighbours.

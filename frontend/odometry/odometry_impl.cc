@@ -284,8 +284,7 @@ std::map<int, int> Odometry::Impl::RemoveRedundantKeyframes(
   const std::size_t least_views = rig_.sensor == Sensor::kMono ? 2 : 1;  // that tell where a landmark is
   const std::set<int> keep = {last().reference, last().newest_keyframe, result_.keyframe};
   FuseAll(rig_.camera, mapper_.MutableMap());
-  const std::map<int, int> removed =
-      tutti::RemoveRedundantKeyframes(keep, least_views, may, mapper_.MutableMap());
+  std::map<int, int> removed = tutti::RemoveRedundantKeyframes(keep, least_views, may, mapper_.MutableMap());
   history_.Rehang(removed, map());
   tracker_.FollowLandmarks(map());
   return removed;

@@ -154,6 +154,7 @@ void SavedDetector::LoadInto(DetectorState& state, LongTermMemory& long_term) {
   Load(Tag(Section::kStatistics), [&](ByteReader& bytes) { state.LoadStatistics(bytes); });
   std::map<int, View> views = LoadViews();
   std::vector<const View*> in_order;
+  in_order.reserve(views.size());
   for (const auto& [slot, view] : views) in_order.push_back(&view);
   for (std::size_t m = 0; m < state.members().size(); ++m) {
     Load(Tag(Section::kMember), [&](ByteReader& bytes) {

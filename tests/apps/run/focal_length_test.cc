@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "apps/run/recording.h"
-#include "tests/apps/generated_dataset.h"
+#include "tests/support/generated_dataset.h"
 #include "tests/support/test_data.h"
 #include "tutti/core/error.h"
 
@@ -22,7 +22,7 @@ constexpr int kRoomFrames = 50;
 
 // A walk around in a room, in colour and depth.
 const fs::path& RoomToMeasure() {
-  static const testing::GeneratedDataset room("focal_length_room", [] {
+  static const fs::path room = testing::GeneratedDataset([] {
     SyntheticOptions options;
     options.scene = SyntheticScene::kRoom;
     options.sensor = SyntheticSensor::kRgbd;
@@ -34,7 +34,7 @@ const fs::path& RoomToMeasure() {
     options.frames = kRoomFrames;
     return options;
   }());
-  return room.path();
+  return room;
 }
 
 RunConfig RoomConfig(double focal_px) {

@@ -243,7 +243,7 @@ TEST(HardToLose, StandingStillForAMinute) {
     noises.push_back(world.World().RenderFrom(19 + i, still.truth.back().pose));
   for (std::size_t i = 0; i < kStill; ++i) {
     SyntheticFrame frame = noises[(i * 7 + i / 10) % noises.size()];
-    frame.stamp_s = world.Stamp(20) + 0.25 * static_cast<double>(i);
+    frame.stamp_s = world.World().Stamp(20) + 0.25 * static_cast<double>(i);
     still.Add(frame);
   }
   RunConfig config;

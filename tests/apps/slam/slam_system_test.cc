@@ -165,7 +165,7 @@ TEST(SlamSystem, AnOdometryOfItsOwnIsAsUncertainAsConfigured) {
   const testing::RenderedWorld world(testing::SmallStereoTown(320, 160));
   const testing::Recording town = testing::Record(world, 3);
   for (const double deg : {0.1, 0.21, 0.42}) {
-    RunConfig config = Small(true, 1);
+    RunConfig config = SmallConfig(true, 1);
     config.run.odometry_sigma_deg = deg;
     SlamSystem slam(config, town.rig);
     for (const InputFrame& frame : town.frames) slam.Track(frame);

@@ -79,7 +79,7 @@ TEST(TrajectoryCloser, OneCameraTakesItsScaleFromTheOdometry) {
 }
 
 TEST(TrajectoryCloser, TheImagesTellThatAnOdometryIsBadAndTrueLoopsEnterThen) {
-  const Recording town = Town(SyntheticSensor::kStereo);
+  const Recording town = RecordedTown(SyntheticSensor::kStereo);
   const Trajectory odometry = testing::Disturbed(town.truth, 1.5, 1, 3);
   TrajectoryCloser closer(Small(2), town.rig);
   for (std::size_t i = 0; i < town.frames.size(); ++i) closer.Push(town.frames[i], odometry[i].pose);
@@ -93,7 +93,7 @@ TEST(TrajectoryCloser, TheImagesTellThatAnOdometryIsBadAndTrueLoopsEnterThen) {
 }
 
 TEST(TrajectoryCloser, APlantedLoopStaysOutOfABadOdometryAsWell) {
-  const Recording town = Town(SyntheticSensor::kStereo);
+  const Recording town = RecordedTown(SyntheticSensor::kStereo);
   const Trajectory odometry = testing::Disturbed(town.truth, 1.5, 1, 3);
   SlamSystem slam(FollowingConfig(Small(2)), town.rig);
   for (std::size_t i = 0; i < town.frames.size(); ++i) slam.Follow(town.frames[i], odometry[i].pose);

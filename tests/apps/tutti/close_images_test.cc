@@ -10,8 +10,8 @@
 #include <sstream>
 #include <vector>
 
-#include "tests/apps/generated_dataset.h"
 #include "tests/apps/tutti/executable.h"
+#include "tests/support/generated_dataset.h"
 #include "tests/support/test_data.h"
 #include "tutti/core/trajectory.h"
 
@@ -25,7 +25,7 @@ constexpr int kRoomImages = 12;
 
 // RGB-D in TUM's layout; images are called by their time stamps.
 const fs::path& RoomOfImages() {
-  static const testing::GeneratedDataset room("close-room", [] {
+  static const fs::path room = testing::GeneratedDataset([] {
     SyntheticOptions options;
     options.sensor = SyntheticSensor::kRgbd;
     options.scene = SyntheticScene::kRoom;
@@ -35,7 +35,7 @@ const fs::path& RoomOfImages() {
     options.frames = kRoomImages;
     return options;
   }());
-  return room.path();
+  return room;
 }
 
 std::string Text(const fs::path& file) {

@@ -11,20 +11,29 @@ std::string ExampleConfigs() {
 }
 
 std::string ExampleConfigs(const fs::path& folder) {
-  constexpr int kInstalled = 3;  // lib/MACHINE/tutti
-  constexpr int kBuilt = 5;      // build/release/tests/apps/export
-  const fs::path here = fs::path("data") / "configs";
-  fs::path above = folder, source;
-  std::error_code ignored;
-  for (int i = 0; i < kBuilt && above.has_relative_path(); ++i) {
+  constexpr int kLevels = 3;  // lib/MACHINE/tutti
+  fs::path above = folder;
+  for (int i = 0; i < kLevels && above.has_relative_path(); ++i) {
     above = above.parent_path();
     const fs::path configs = above / TUTTI_DATA_FOLDER / "tutti" / "configs";
-    if (i < kInstalled && fs::is_directory(configs, ignored)) return configs.string();
-    if (source.empty() && fs::is_regular_file(above / here / "images.yaml", ignored)) source = above / here;
+    std::error_code ignored;
+    if (fs::is_directory(configs, ignored)) return configs.string();
   }
-  // The shorter name, where it is one.
-  if (source.empty() || fs::equivalent(source, here, ignored)) return here.string();
-  return source.string();
+  return "data/configs";
+}
+
+fs::path ExampleConfig(const std::string& name) {
+  constexpr int kLevels = 5;  // build/release/tests/apps/export
+  const fs::path usual = fs::path(ExampleConfigs()) / name;
+  std::error_code ignored;
+  if (fs::is_regular_file(usual, ignored)) return usual;
+  fs::path above = fs::read_symlink("/proc/self/exe", ignored).parent_path();
+  for (int i = 0; i < kLevels && above.has_relative_path(); ++i) {
+    above = above.parent_path();
+    const fs::path file = above / "data" / "configs" / name;
+    if (fs::is_regular_file(file, ignored)) return file;
+  }
+  return usual;
 }
 
 }  // namespace tutti::internal

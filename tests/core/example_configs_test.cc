@@ -21,6 +21,14 @@ TEST(ExampleConfigs, AreThoseOfTheInstallationOrElseTheSourceTrees) {
       << "a build tree is no installation";
 }
 
+TEST(ExampleConfigs, AreFoundFromAnyWorkingFolder) {
+  const std::filesystem::path before = std::filesystem::current_path();
+  std::filesystem::current_path("/");
+  const bool found = std::filesystem::is_regular_file(internal::ExampleConfig("euroc_mono.yaml"));
+  std::filesystem::current_path(before);
+  EXPECT_TRUE(found);
+}
+
 TEST(ExampleConfigs, OfABuildTreeAreTheSourceTrees) {
   EXPECT_EQ(internal::ExampleConfigs(), "data/configs") << "this test runs from one";
 }

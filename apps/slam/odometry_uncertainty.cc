@@ -9,8 +9,11 @@
 namespace tutti {
 namespace {
 
-constexpr std::size_t kWindows = 8;        // that a standard deviation takes, without overlap
-constexpr std::size_t kLongest = 16;       // window [keyframes]
+constexpr std::size_t kWindows = 8;   // that a standard deviation takes, without overlap
+constexpr std::size_t kLongest = 16;  // window [keyframes]
+// Of a step's length: on short steps, what the images err by themselves looks like more, and a map that gives
+// way to that takes false loops, too.
+constexpr double kMostFraction = 0.05;
 constexpr double kSigmaOfMedian = 1.4826;  // a normal distribution's, by the median of its absolute values
 
 using Values = std::array<std::vector<double>, 3>;  // absolute values by axis
@@ -56,6 +59,7 @@ OdometryUncertainty::Sigmas OdometryUncertainty::Estimate() const {
     largest.fraction = std::max(largest.fraction, sigmas.fraction);
     largest.rotation_rad = std::max(largest.rotation_rad, sigmas.rotation_rad);
   }
+  largest.fraction = std::min(largest.fraction, kMostFraction);
   return largest;
 }
 

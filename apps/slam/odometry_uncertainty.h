@@ -19,7 +19,8 @@ class OdometryUncertainty {
   void Add(const StepCheck& check) { checks_.push_back(check); }
 
   struct Sigmas {
-    double fraction = 0;      ///< of a step's translation, as a share of its length [1]; 0: too few steps
+    double fraction = 0;      ///< of a step's translation, as a share of its length, up to 0.05 [1];
+                              ///< 0: too few steps
     double rotation_rad = 0;  ///< of its rotation; 0: too few steps
   };
   /// On the worst axis of each.

@@ -56,8 +56,8 @@ TEST(OdometryUncertainty, AnErrorOfOneAxisCountsInFull) {
 
 TEST(OdometryUncertainty, AnErrorThatStaysCountsAsWhatItBecomesOverManySteps) {
   OdometryUncertainty uncertainty;
-  for (int i = 0; i < 200; ++i) uncertainty.Add(Step({0, 0, 0.02}, {0, 0.004, 0}));
-  EXPECT_GT(uncertainty.Estimate().fraction, 3.9 * 0.02);
+  for (int i = 0; i < 200; ++i) uncertainty.Add(Step({0, 0, 0.01}, {0, 0.004, 0}));
+  EXPECT_GT(uncertainty.Estimate().fraction, 3.9 * 0.01);
   EXPECT_GT(uncertainty.Estimate().rotation_rad, 3.9 * 0.004);
 }
 
@@ -67,6 +67,13 @@ TEST(OdometryUncertainty, WhatTheImagesThemselvesErrByDoesNotCount) {
   for (int i = 0; i < 500; ++i) uncertainty.Add(Step(noise(0.001), noise(0.0005)));
   EXPECT_LT(uncertainty.Estimate().fraction, 0.001);
   EXPECT_LT(uncertainty.Estimate().rotation_rad, 0.0005);
+}
+
+TEST(OdometryUncertainty, OfALengthIsNeverSoLargeThatAnyLoopFits) {
+  OdometryUncertainty uncertainty;
+  Noise noise(5);
+  for (int i = 0; i < 100; ++i) uncertainty.Add(Step(noise(0.5), noise(0.01)));
+  EXPECT_EQ(uncertainty.Estimate().fraction, 0.05);
 }
 
 TEST(OdometryUncertainty, FewStepsThatTheImagesGotWrongDoNotMatter) {

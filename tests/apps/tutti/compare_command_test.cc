@@ -94,7 +94,7 @@ TEST_F(CollectCommand, ColumnsPrecisionAndTheBestInBoldAreChosen) {
   const std::string markdown = with("markdown");
   EXPECT_THAT(
       markdown.substr(0, markdown.find("What varies")),
-      AllOf(HasSubstr("| **0.55 +- 0.64** |      **0.60** | 2.5 +- 0.0 |"), HasSubstr("| 0.66 +- 0.64 "),
+      AllOf(HasSubstr("| **0.55 +- 0.64** |      **0.60** | 2.5 +- 0.0 |"), HasSubstr(" 0.66 +- 0.64 |"),
             Not(HasSubstr("RPE")), Not(HasSubstr("**2.5"))));  // all times are the same
   EXPECT_THAT(with("latex"), HasSubstr("\\textbf{0.55 $\\pm$ 0.64}"));
   EXPECT_THAT(with("text"), HasSubstr("*0.55 +- 0.64"));

@@ -79,8 +79,8 @@ TEST(StepCheck, FindsAHeadingThatTurnsAway) {
 
 TEST(StepCheck, OfOneCameraFindsAHeadingThatTurnsAway) {
   const Recording street = Street(SyntheticSensor::kMono);
-  const double right = MedianYawDeg(Checks(street, 0.3, 1)), left = MedianYawDeg(Checks(street, -0.3, 1));
-  EXPECT_GT(std::min(std::abs(right), std::abs(left)), 0.15);
+  const double right = MedianYawDeg(Checks(street, 0.1, 1)), left = MedianYawDeg(Checks(street, -0.1, 1));
+  EXPECT_GT(std::min(std::abs(right), std::abs(left)), 0.05);
   EXPECT_LT(right * left, 0);
 }
 

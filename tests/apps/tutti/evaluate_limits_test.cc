@@ -86,7 +86,7 @@ TEST_F(EvaluateLimits, NamesThatUsersOfEvoKnowMeanTheSame) {
   EXPECT_EQ(mode({"--align_origin"}), "origin");
   EXPECT_EQ(Evaluate({reference_, scaled, "-s", "--align", "sim3"}).status, 1);
   struct Unit {
-    std::string letter, name, delta;  // a pose turns by 1.72 deg
+    std::string letter, name, delta;  // a pose goes on by 0.6 m and turns by 1.72 deg
   };
   for (const auto& [letter, unit, delta] : {Unit{"f", "frames", "1"},
                                             {"m", "metres", "1"},

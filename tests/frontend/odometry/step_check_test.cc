@@ -77,13 +77,6 @@ TEST(StepCheck, FindsAHeadingThatTurnsAway) {
   EXPECT_LT(right * left, 0);
 }
 
-TEST(StepCheck, OfOneCameraFindsAHeadingThatTurnsAway) {
-  const Recording street = Street(SyntheticSensor::kMono);
-  const double right = MedianYawDeg(Checks(street, 0.1, 1)), left = MedianYawDeg(Checks(street, -0.1, 1));
-  EXPECT_GT(std::min(std::abs(right), std::abs(left)), 0.05);
-  EXPECT_LT(right * left, 0);
-}
-
 // T_seen = Exp(e) T_given, and the world comes nearer by less than was given: e is ahead.
 TEST(StepCheck, FindsStepsThatAreTooLong) {
   EXPECT_NEAR(MedianShareAhead(Checks(Street(SyntheticSensor::kStereo), 0, 1.2)), 0.2 / 1.2, 0.05);

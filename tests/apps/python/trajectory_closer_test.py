@@ -65,7 +65,8 @@ def test_pushing_frame_by_frame_is_the_same(stereo, odometry, closed):
     for frame, pose in zip(stereo, tutti.pose_matrices(odometry)):
         assert closer.push(frame, pose).state == "tracking"
     closer.finish()
-    assert (closer.corrected(odometry) == closed[0].corrected(odometry)).all()
+    difference = np.abs(closer.corrected(odometry) - closed[0].corrected(odometry)).max()
+    assert difference < 1e-6  # poses as matrices and as quaternions round differently
 
 
 def test_what_can_not_be_used_is_refused(stereo, odometry):

@@ -89,7 +89,7 @@ TEST_F(EvaluateLimits, NamesThatUsersOfEvoKnowMeanTheSame) {
     std::string letter, name, delta;  // a pose goes on by 0.6 m and turns by 1.72 deg
   };
   for (const auto& [letter, unit, delta] : {Unit{"f", "frames", "1"},
-                                            {"m", "metres", "1"},
+                                            {"m", "metres", "1.2"},
                                             {"d", "degrees", "1.7"},
                                             {"r", "radians", "1"},
                                             {"s", "seconds", "1"}}) {

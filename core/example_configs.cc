@@ -24,13 +24,13 @@ std::string ExampleConfigs(const fs::path& folder) {
 
 fs::path ExampleConfig(const std::string& name) {
   constexpr int kLevels = 5;  // build/release/tests/apps/export
-  const fs::path usual = fs::path(ExampleConfigs()) / name;
+  fs::path usual = fs::path(ExampleConfigs()) / name;
   std::error_code ignored;
   if (fs::is_regular_file(usual, ignored)) return usual;
   fs::path above = fs::read_symlink("/proc/self/exe", ignored).parent_path();
   for (int i = 0; i < kLevels && above.has_relative_path(); ++i) {
     above = above.parent_path();
-    const fs::path file = above / "data" / "configs" / name;
+    fs::path file = above / "data" / "configs" / name;
     if (fs::is_regular_file(file, ignored)) return file;
   }
   return usual;

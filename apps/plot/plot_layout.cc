@@ -167,18 +167,12 @@ std::vector<PlotShape> LayOut(const TrajectoryPlot& plot) {
     line.color = series.color;
     line.size = series.width;
     line.dashed = series.dashed;
-    const auto end_line = [&] {
-      if (!line.points.empty()) shapes.push_back(line);
-      line.points.clear();
-    };
-    for (const Eigen::Vector3d& p : series.points) {
-      if (p.allFinite()) {
-        line.points.push_back(axes.Page(view.World(p)));
-      } else {
-        end_line();
-      }
-    }
-    end_line();
+    constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+    std::vector<Eigen::Vector2d> points;
+    points.reserve(series.points.size());
+    for (const Eigen::Vector3d& p : series.points)
+      points.push_back(p.allFinite() ? axes.Page(view.World(p)) : Eigen::Vector2d(kNone, kNone));
+    AddBrokenLine(line, points, shapes);
   }
   AddHeat(plot, view, axes, shapes);
   for (const auto& [a, b] : plot.edges) {

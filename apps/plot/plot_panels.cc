@@ -37,18 +37,10 @@ void AddCurve(const PlotCurve& curve, const PlotAxes& axes, std::vector<PlotShap
   line.color = curve.color;
   line.size = curve.width;
   line.dashed = curve.dashed;
-  const auto end_line = [&] {
-    if (!line.points.empty()) shapes.push_back(line);
-    line.points.clear();
-  };
-  for (const Eigen::Vector2d& p : curve.points) {
-    if (p.allFinite()) {
-      line.points.push_back(axes.Page(p));
-    } else {
-      end_line();
-    }
-  }
-  end_line();
+  std::vector<Eigen::Vector2d> points;
+  points.reserve(curve.points.size());
+  for (const Eigen::Vector2d& p : curve.points) points.push_back(axes.Page(p));
+  AddBrokenLine(line, points, shapes);
 }
 
 /// In one line, cut off at the right.

@@ -84,6 +84,23 @@ PlotShape PlotLine(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const std
   return shape;
 }
 
+void AddBrokenLine(PlotShape line, const std::vector<Eigen::Vector2d>& points,
+                   std::vector<PlotShape>& shapes) {
+  const auto end_piece = [&] {
+    if (!line.points.empty()) shapes.push_back(line);
+    line.points.clear();
+  };
+  line.points.clear();
+  for (const Eigen::Vector2d& p : points) {
+    if (p.allFinite()) {
+      line.points.push_back(p);
+    } else {
+      end_piece();
+    }
+  }
+  end_piece();
+}
+
 PlotShape PlotDisc(const Eigen::Vector2d& at, double radius, const std::string& color) {
   PlotShape shape;
   shape.kind = PlotShape::Kind::kDisc;

@@ -28,6 +28,9 @@ struct PlotShape {
 
 PlotShape PlotLine(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const std::string& color,
                    double width);
+/// Adds the line through these points of the page in the style of `line`, in pieces where one is not finite.
+void AddBrokenLine(PlotShape line, const std::vector<Eigen::Vector2d>& points,
+                   std::vector<PlotShape>& shapes);
 PlotShape PlotDisc(const Eigen::Vector2d& at, double radius, const std::string& color);
 PlotShape PlotBox(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const std::string& color);
 PlotShape PlotText(const Eigen::Vector2d& at, const std::string& text, double height,

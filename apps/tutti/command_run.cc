@@ -16,6 +16,7 @@
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/exit_code.h"
+#include "apps/tutti/files.h"
 #include "apps/tutti/run_with_report.h"
 #include "apps/view/live_view.h"
 #include "core/example_configs.h"
@@ -168,13 +169,9 @@ RunConfig ConfigFor(const CameraRequest& camera, const RunArguments& arguments, 
   return recording.config;
 }
 
-// tutti-out/NAME, where NAME is the recording's.
-fs::path DefaultRunFolder(const std::string& dataset) {
-  if (IsCamera(dataset)) return fs::path("tutti-out") / "camera";
-  const fs::path whole = fs::absolute(dataset).lexically_normal();
-  const fs::path name = whole.has_filename() ? whole.filename() : whole.parent_path().filename();
-  std::error_code ignored;
-  return fs::path("tutti-out") / (fs::is_directory(whole, ignored) ? name : name.stem());
+fs::path OutputOf(const RunArguments& arguments) {
+  if (!arguments.out.empty()) return arguments.out;
+  return DefaultOutput(IsCamera(arguments.dataset) ? "camera" : arguments.dataset);
 }
 
 int RunOnce(const CLI::App& command, const RunArguments& arguments) {
@@ -190,7 +187,7 @@ int RunOnce(const CLI::App& command, const RunArguments& arguments) {
   RunRequest request;
   request.config = arguments.config;
   request.dataset = arguments.dataset;
-  request.out = arguments.out.empty() ? DefaultRunFolder(arguments.dataset) : fs::path(arguments.out);
+  request.out = OutputOf(arguments);
   request.no_loops = arguments.no_loops;
   request.quiet = arguments.quiet;
   request.keep = arguments.keep;

@@ -91,12 +91,6 @@ DistributionPlot Distributions(const std::vector<EvaluatedEstimate>& estimates, 
   return plot;
 }
 
-template <typename Plot>
-std::vector<PlotShape> WithTitle(Plot plot, const std::string& title, const std::string& otherwise) {
-  plot.title = title.empty() ? otherwise : title;
-  return LayOut(plot);
-}
-
 }  // namespace
 
 std::vector<PlotShape> ErrorShapes(const std::vector<EvaluatedEstimate>& estimates, const std::string& what,
@@ -108,12 +102,12 @@ std::vector<PlotShape> ErrorShapes(const std::vector<EvaluatedEstimate>& estimat
     char text[96];
     std::snprintf(text, sizeof text, "Relative translation error over %g %s", options.rpe_delta,
                   ToString(options.rpe_unit));
-    return WithTitle(RelativeErrorCurves(estimates), title, text);
+    return Titled(RelativeErrorCurves(estimates), title, text);
   }
-  if (what == "error-map") return WithTitle(ErrorMap(estimates), title, absolute);
+  if (what == "error-map") return Titled(ErrorMap(estimates), title, absolute);
   if (what == "box" || what == "violin")
-    return WithTitle(Distributions(estimates, what == "violin"), title, absolute);
-  return WithTitle(AbsoluteErrorCurves(estimates), title, absolute);
+    return Titled(Distributions(estimates, what == "violin"), title, absolute);
+  return Titled(AbsoluteErrorCurves(estimates), title, absolute);
 }
 
 }  // namespace tutti::cli

@@ -13,6 +13,14 @@ void MakeFolder(const std::filesystem::path& folder) {
   if (error) throw InputError(folder.string() + ": can't be made (" + error.message() + ")");
 }
 
+std::filesystem::path DefaultOutput(const std::string& recording, const std::string& suffix) {
+  const std::filesystem::path whole = std::filesystem::absolute(recording).lexically_normal();
+  const std::filesystem::path name = (whole.has_filename() ? whole : whole.parent_path()).filename();
+  std::error_code ignored;
+  const std::filesystem::path bare = std::filesystem::is_directory(whole, ignored) ? name : name.stem();
+  return std::filesystem::path("tutti-out") / (bare.string() + suffix);
+}
+
 std::string JsonText(const nlohmann::ordered_json& json) {
   return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }

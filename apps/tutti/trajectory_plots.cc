@@ -87,12 +87,6 @@ PanelPlot Speeds(const std::vector<DrawnTrajectory>& trajectories) {
   return plot;
 }
 
-template <typename Plot>
-std::vector<PlotShape> Titled(Plot plot, const std::string& title, const std::string& otherwise) {
-  plot.title = title.empty() ? otherwise : title;
-  return LayOut(plot);
-}
-
 }  // namespace
 
 const std::vector<std::string>& PlotNames() {

@@ -39,4 +39,11 @@ std::vector<PlotShape> TrajectoryShapes(const std::vector<DrawnTrajectory>& traj
 std::vector<PlotShape> ErrorShapes(const std::vector<EvaluatedEstimate>& estimates, const std::string& what,
                                    const std::string& title);
 
+/// A plot laid out under this title, or under `otherwise` if that is empty.
+template <typename Plot>
+std::vector<PlotShape> Titled(Plot plot, const std::string& title, const std::string& otherwise) {
+  plot.title = title.empty() ? otherwise : title;
+  return LayOut(plot);
+}
+
 }  // namespace tutti::cli

@@ -169,16 +169,10 @@ int RunTable(const LoopsArguments& arguments, const Input& set) {
   return 0;
 }
 
-std::string DefaultLoopsFolder(const std::string& images) {
-  const std::filesystem::path whole = std::filesystem::absolute(images).lexically_normal();
-  const std::filesystem::path name = whole.has_filename() ? whole : whole.parent_path();
-  return (std::filesystem::path("tutti-out") / (name.filename().string() + "-loops")).string();
-}
-
 int RunLoops(const LoopsArguments& given) {
   LoopsArguments arguments = given;
   arguments.images = ImageFolder(arguments.images).string();
-  if (arguments.out.empty()) arguments.out = DefaultLoopsFolder(given.images);
+  if (arguments.out.empty()) arguments.out = DefaultOutput(given.images, "-loops").string();
   if (arguments.table && arguments.truth.file.empty())
     throw InputError("--table compares rules by a ground truth; give --ground-truth");
   if (arguments.truth.join_pairs && !arguments.camera.empty()) {

@@ -106,7 +106,7 @@ function(tutti_add_library name)
   tutti_describe_library(${name} PACKAGE ${ARG_PACKAGE} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
 endfunction()
 
-# tutti_add_test(name SOURCES ... LIBS ...): one GTest program per module; ctest sees each test.
+# tutti_add_test(name SOURCES ... LIBS ...): one GTest program per module; ctest sees each test, or each suite.
 function(tutti_add_test name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LIBS" ${ARGN})
   set(target tutti_${name}_tests)
@@ -119,6 +119,13 @@ function(tutti_add_test name)
   if(TUTTI_SANITIZE) # a test takes ten to twenty times as long
     set(timeout 1800)
   endif()
+  get_directory_property(before TEST_INCLUDE_FILES)
   gtest_discover_tests(${target} TEST_PREFIX "${name}." DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 120
     PROPERTIES TIMEOUT ${timeout} ENVIRONMENT "TUTTI_DATA=$ENV{TUTTI_DATA}")
+  get_directory_property(one_by_one TEST_INCLUDE_FILES)
+  list(REMOVE_ITEM one_by_one ${before})
+  set(program "${CMAKE_CURRENT_BINARY_DIR}/${target}")
+  math(EXPR suite_timeout "3 * ${timeout}")
+  configure_file("${PROJECT_SOURCE_DIR}/cmake/tests_by_suite.cmake.in" "${target}_by_suite.cmake" @ONLY)
+  set_property(DIRECTORY PROPERTY TEST_INCLUDE_FILES ${before} "${CMAKE_CURRENT_BINARY_DIR}/${target}_by_suite.cmake")
 endfunction()

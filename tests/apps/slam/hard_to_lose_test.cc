@@ -31,15 +31,13 @@ SyntheticOptions TownOptions() {
   return options;
 }
 
-// The beginning of a lap and a half around a block, 10 frames a second. Each test runs in a process of its
-// own: it renders no more than it needs.
-Recording TownFrames(std::size_t frames) {
-  return testing::Record(testing::RenderedWorld(TownOptions()), frames);
-}
-
-Recording WholeTown() {
-  const testing::RenderedWorld world(TownOptions());
-  return testing::Record(world, world.Size());
+// A lap and a half around a block, 10 frames a second.
+const Recording& WholeTown() {
+  static const Recording town = [] {
+    const testing::RenderedWorld world(TownOptions());
+    return testing::Record(world, world.Size());
+  }();
+  return town;
 }
 
 Recording Selected(const Recording& all, const std::vector<std::size_t>& which) {
@@ -58,6 +56,9 @@ std::vector<std::size_t> Range(std::size_t begin, std::size_t end, std::size_t s
   for (std::size_t i = begin; i < end; i += step) out.push_back(i);
   return out;
 }
+
+// The beginning of the lap.
+Recording TownFrames(std::size_t frames) { return Selected(WholeTown(), Range(0, frames)); }
 
 // The same frames in an order of one's own: time goes on evenly.
 Recording Carried(const Recording& all, const std::vector<std::size_t>& which) {
@@ -320,7 +321,7 @@ TEST(HardToLose, KidnappedToAPlaceSeenBeforeWithTheLeftCameraAlone) {
 }
 
 TEST(HardToLose, KidnappedToANewPlaceThatIsJoinedLater) {
-  const Recording town = WholeTown();
+  const Recording& town = WholeTown();
   const std::size_t begin = town.frames.size() / 3;
   std::vector<std::size_t> which = Range(0, begin);
   for (const std::size_t i : Range(begin + 40, town.frames.size())) which.push_back(i);

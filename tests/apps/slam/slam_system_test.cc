@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
+#include <tuple>
 
 #include "tests/support/recording.h"
 #include "tests/support/rendered_world.h"
@@ -30,11 +32,24 @@ const Recording& TwoLaps() {
   return recording;
 }
 
-RunConfig SmallConfig(bool global_adjustment, int threads) {
+// Of a run: what the tests vary.
+struct Setting {
+  bool global_adjustment = true;
+  int threads = 1;
+  double gate_sigmas = SlamOptions().loop_gate_sigmas;
+
+  bool operator<(const Setting& other) const {
+    return std::tie(global_adjustment, threads, gate_sigmas) <
+           std::tie(other.global_adjustment, other.threads, other.gate_sigmas);
+  }
+};
+
+RunConfig SmallConfig(const Setting& setting) {
   RunConfig config;
   config.odometry.features = 800;
-  config.run.global_adjustment = global_adjustment;
-  config.run.threads = threads;
+  config.run.global_adjustment = setting.global_adjustment;
+  config.run.threads = setting.threads;
+  config.run.loop_gate_sigmas = setting.gate_sigmas;
   return config;
 }
 
@@ -46,7 +61,7 @@ struct Result {
   double ate_m = 0;
 };
 
-Result DriveThrough(const RunConfig& config) {
+Result Drive(const RunConfig& config) {
   SlamSystem slam(config, TwoLaps().rig);
   for (const InputFrame& frame : TwoLaps().frames) slam.Track(frame);
   slam.Finish();
@@ -63,8 +78,16 @@ Result DriveThrough(const RunConfig& config) {
   return result;
 }
 
+// Each once, however many tests look at it.
+const Result& DriveThrough(const Setting& setting) {
+  static std::map<Setting, Result> driven;
+  const auto known = driven.find(setting);
+  return known != driven.end() ? known->second
+                               : driven.emplace(setting, Drive(SmallConfig(setting))).first->second;
+}
+
 TEST(SlamSystem, ASecondLapNeedsFewKeyframesAndTheWholeMapIsAdjusted) {
-  const Result with = DriveThrough(SmallConfig(true, 2)), without = DriveThrough(SmallConfig(false, 2));
+  const Result &with = DriveThrough({true, 2}), &without = DriveThrough({false, 2});
   ASSERT_GT(with.corrections, 0);
   EXPECT_GT(with.adjustments, 0);
   EXPECT_EQ(without.adjustments, 0);
@@ -86,7 +109,7 @@ TEST(SlamSystem, OdometryEdgesTieEveryKeyframeOfAMonoMapToTheOthers) {
   SyntheticOptions options = testing::SmallStereoTown(320, 160);
   options.sensor = SyntheticSensor::kMono;
   const Recording recording = testing::Record(testing::RenderedWorld(options), 40);
-  SlamSystem slam(SmallConfig(true, 1), recording.rig);
+  SlamSystem slam(SmallConfig({true, 1}), recording.rig);
   for (const InputFrame& frame : recording.frames) slam.Track(frame);
   slam.Finish();
   const PoseGraph graph = slam.Graph();
@@ -105,20 +128,15 @@ void ExpectTheSameBits(const Result& a, const Result& b) {
 }
 
 TEST(SlamSystem, WhatBackgroundWorkFindsDoesNotDependOnTheThreadsAndNothingIsRevokedWhereTheMapAgrees) {
-  const Result one = DriveThrough(SmallConfig(true, 1)), two = DriveThrough(SmallConfig(true, 2));
+  const Result &one = DriveThrough({true, 1}), &two = DriveThrough({true, 2});
   ExpectTheSameBits(one, two);
   ASSERT_GT(two.corrections, 0);
   for (const LoopRecord& loop : two.loops) EXPECT_FALSE(loop.revoked) << loop.query;
 }
 
 TEST(SlamSystem, LoopsThatAreGatedDoNotDependOnTheThreads) {
-  const auto gated = [](int threads) {
-    RunConfig config = SmallConfig(false, threads);
-    config.run.loop_gate_sigmas = 20;
-    return config;
-  };
-  const Result one = DriveThrough(gated(1)), whole = DriveThrough(SmallConfig(false, 2));
-  ExpectTheSameBits(one, DriveThrough(gated(2)));
+  const Result &one = DriveThrough({false, 1, 20}), &whole = DriveThrough({false, 2});
+  ExpectTheSameBits(one, DriveThrough({false, 2, 20}));
   EXPECT_EQ(one.corrections, whole.corrections) << "the gate refuses no true loop";
   EXPECT_NEAR(one.ate_m, whole.ate_m, 0.1 * whole.ate_m);
 }
@@ -126,12 +144,7 @@ TEST(SlamSystem, LoopsThatAreGatedDoNotDependOnTheThreads) {
 // The gate's limit is so low that it refuses all: the detector hears of it, at the same image for any number
 // of threads.
 TEST(SlamSystem, TheDetectorIsToldOfLoopsThatTheMapContradicts) {
-  const auto strict = [](int threads) {
-    RunConfig config = SmallConfig(false, threads);
-    config.run.loop_gate_sigmas = 0.001;
-    return config;
-  };
-  const Result one = DriveThrough(strict(1)), two = DriveThrough(strict(2));
+  const Result &one = DriveThrough({false, 1, 0.001}), &two = DriveThrough({false, 2, 0.001});
   const auto revoked = [](const LoopRecord& loop) { return loop.revoked; };
   ASSERT_GT(std::count_if(one.loops.begin(), one.loops.end(), revoked), 0);
   for (const LoopRecord& loop : one.loops) {
@@ -149,7 +162,7 @@ TEST(SlamSystem, TheDetectorIsToldOfLoopsThatTheMapContradicts) {
 }
 
 TEST(SlamSystem, LoopsFromElsewhereNeedKeyframesThatAreThereAndFiniteNumbers) {
-  SlamSystem slam(SmallConfig(true, 1), TwoLaps().rig);
+  SlamSystem slam(SmallConfig({true, 1}), TwoLaps().rig);
   for (std::size_t i = 0; i < 20; ++i) slam.Track(TwoLaps().frames[i]);
   const Matrix7d information = MakeInformation(0.1, 0.1);
   Similarity nowhere;
@@ -165,7 +178,7 @@ TEST(SlamSystem, AnOdometryOfItsOwnIsAsUncertainAsConfigured) {
   const testing::RenderedWorld world(testing::SmallStereoTown(320, 160));
   const testing::Recording town = testing::Record(world, 3);
   for (const double deg : {0.1, 0.21, 0.42}) {
-    RunConfig config = SmallConfig(true, 1);
+    RunConfig config = SmallConfig({true, 1});
     config.run.odometry_sigma_deg = deg;
     SlamSystem slam(config, town.rig);
     for (const InputFrame& frame : town.frames) slam.Track(frame);

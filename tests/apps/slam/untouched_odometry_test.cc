@@ -2,9 +2,11 @@
 // the odometry that never saw a loop.
 #include <gtest/gtest.h>
 
+#include <map>
 #include <optional>
 #include <string>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "tests/support/recording.h"
@@ -49,9 +51,29 @@ RunConfig ConfiguredFor(Change change) {
   return config;
 }
 
+// The three changes of the map see the same recording, and so does the odometry alone.
+struct Alone {
+  testing::Recording recording;
+  Trajectory trajectory;
+};
+
+const Alone& AloneOn(SyntheticSensor sensor, Change change) {
+  static std::map<std::pair<SyntheticSensor, bool>, Alone> tracked;
+  const std::pair key(sensor, change == Change::kALostFrameIsFound);
+  const auto known = tracked.find(key);
+  if (known != tracked.end()) return known->second;
+  Alone alone;
+  alone.recording = Drive(sensor, change);
+  Odometry odometry(ConfiguredFor(change).odometry, alone.recording.rig);
+  for (const InputFrame& frame : alone.recording.frames) odometry.Track(frame);
+  odometry.FinishMapping();
+  alone.trajectory = odometry.FrameTrajectory();
+  return tracked.emplace(key, std::move(alone)).first->second;
+}
+
 TEST_P(UntouchedOdometry, TrackedOnHasTheBitsOfTheOdometryAlone) {
   const auto [sensor, change] = GetParam();
-  const testing::Recording recording = Drive(sensor, change);
+  const testing::Recording& recording = AloneOn(sensor, change).recording;
   const RunConfig config = ConfiguredFor(change);
   SlamSystem slam(config, recording.rig);
   std::optional<Odometry> untouched;
@@ -61,18 +83,15 @@ TEST_P(UntouchedOdometry, TrackedOnHasTheBitsOfTheOdometryAlone) {
     untouched = odometry;
     seen = last;
   });
-  Odometry alone(config.odometry, recording.rig);
   bool planted = false;
   for (const InputFrame& frame : recording.frames) {
     slam.Track(frame);
-    alone.Track(frame);
     const std::vector<int> ids = slam.odometry()->KeyframeIds();
     if (planted || change != Change::kFalseLoopsAreRefused || ids.size() < 12) continue;
     slam.AddLoop(ids[1], ids[9], Similarity(1, ExpSO3({0, 1, 0}), {3, 4, 5}), MakeInformation(0.01, 0.01));
     planted = true;
   }
   slam.Finish();
-  alone.FinishMapping();
   if (change == Change::kALostFrameIsFound && sensor != SyntheticSensor::kMono) {
     ASSERT_GT(slam.Relocalized(), 0u);
   }
@@ -84,7 +103,7 @@ TEST_P(UntouchedOdometry, TrackedOnHasTheBitsOfTheOdometryAlone) {
     if (frame.index > seen) untouched->Track(frame);
   }
   untouched->FinishMapping();
-  const Trajectory a = alone.FrameTrajectory(), b = untouched->FrameTrajectory();
+  const Trajectory &a = AloneOn(sensor, change).trajectory, b = untouched->FrameTrajectory();
   ASSERT_EQ(a.size(), b.size());
   ASSERT_GT(a.size(), recording.frames.size() / 3);
   for (std::size_t i = 0; i < a.size(); ++i) EXPECT_EQ(a[i].pose.Matrix(), b[i].pose.Matrix()) << i;

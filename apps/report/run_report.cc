@@ -51,7 +51,17 @@ Json ErrorJson(const RunResult& result, const Trajectory& estimate) {
       error.push_back(Rounded(evaluation.absolute.translation[k], 5));
       turn.push_back(Rounded(evaluation.absolute.rotation_deg[k], 4));
     }
-    return {{"distance", distance}, {"error", error}, {"turn_deg", turn}, {"rmse", evaluation.ate.rmse}};
+    Json relative_distance = Json::array(), relative = Json::array();
+    for (const std::size_t k : Thinned(evaluation.relative_pairs.size(), kMostErrors)) {
+      relative_distance.push_back(Rounded(path[evaluation.relative_pairs[k].second], 3));
+      relative.push_back(Rounded(evaluation.relative.translation[k], 5));
+    }
+    return {
+        {"distance", distance},
+        {"error", error},
+        {"turn_deg", turn},
+        {"rmse", evaluation.ate.rmse},
+        {"relative", {{"distance", relative_distance}, {"error", relative}, {"rmse", evaluation.rpe.rmse}}}};
   } catch (const InputError&) {
     return Json();  // the summary says why
   }

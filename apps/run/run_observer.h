@@ -1,6 +1,7 @@
 // A window into a run: the report, the live view and the comparison's shared odometry look through it.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -30,8 +31,8 @@ class RunObserver {
   /// True: OnDetection gets posterior_by_location and the members' evidence, which costs O(locations x
   /// members) per image.
   virtual bool WantsPosteriors() const { return false; }
-  /// Before the first frame.
-  virtual void OnStart(const CameraRig& /*rig*/) {}
+  /// Before the first frame. `frames`: that are to come, 0: nobody knows how many.
+  virtual void OnStart(const CameraRig& /*rig*/, std::size_t /*frames*/) {}
   /// After each frame that could be read.
   virtual void OnFrame(const InputFrame& /*frame*/, const TrackResult& /*track*/, const RunState& /*state*/) {
   }

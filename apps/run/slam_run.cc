@@ -48,19 +48,19 @@ SlamRun::SlamRun(const RunRequest& request, const RunConfig& config, const Datas
 }
 
 void SlamRun::TrackAll() {
-  for (const auto& observer : request_.observers) observer->OnStart(result_.rig);
+  const std::size_t frames = total_ == static_cast<std::size_t>(-1) ? 0 : total_;
+  for (const auto& observer : request_.observers) observer->OnStart(result_.rig, frames);
   begin_ = Span::Clock::now();
   watch_ = internal::Stopwatch();
   cpu_begin_ = ProcessCpuSeconds();
-  Progress progress(config_.run.loops ? "slam" : "odometry",
-                    total_ == static_cast<std::size_t>(-1) ? 0 : total_, Out());
-  Prefetcher frames(dataset_, Reading());
+  Progress progress(config_.run.loops ? "slam" : "odometry", frames, Out());
+  Prefetcher reader(dataset_, Reading());
   const double waited_ms = so_far_.read_wait_ms;
   while (!InterruptGuard::Requested()) {
     if (checkpoints_ && checkpoints_->Due()) WriteCheckpoint();
-    if (playback_) AwaitFrame(frames);
-    const std::optional<FetchedFrame> fetched = frames.Next();
-    so_far_.read_wait_ms = waited_ms + frames.WaitedMs();
+    if (playback_) AwaitFrame(reader);
+    const std::optional<FetchedFrame> fetched = reader.Next();
+    so_far_.read_wait_ms = waited_ms + reader.WaitedMs();
     if (!fetched) break;
     TakeFrame(*fetched, progress);
     NoteWarnings(progress);

@@ -54,7 +54,10 @@ Json FrameJson(const LiveFrame& frame) {
 }  // namespace
 
 std::string LiveMessage(const LiveNews& news) {
-  Json json = {{"paused", news.paused}, {"finished", news.finished}, {"frame", FrameJson(news.frame)}};
+  Json json = {{"paused", news.paused},
+               {"finished", news.finished},
+               {"total", news.total},
+               {"frame", FrameJson(news.frame)}};
   json["places"] = Json::array();
   for (const LivePlace& place : *news.places) {
     const Eigen::Quaterniond& q = place.T_world_camera.rotation;

@@ -52,6 +52,11 @@ std::vector<LiveLoop> LiveState::LoopsOf(const RunState& state) {
   return loops;
 }
 
+void LiveState::SetTotal(std::size_t frames) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  now_.total = frames;
+}
+
 void LiveState::SetFrame(const InputFrame& frame, const TrackResult& track, const RunState& state) {
   LiveFrame next;
   next.index = frame.index;

@@ -67,6 +67,7 @@ struct LiveNews {
   std::vector<LivePoints> points;
   std::vector<LiveEvent> events;
   std::uint64_t version = 0;
+  std::size_t total = 0;  ///< frames of the run; 0: nobody knows how many
   bool paused = false, finished = false;
 };
 
@@ -83,6 +84,7 @@ class LiveState {
   static constexpr std::size_t kPointsPerKeyframe = 40;
 
   // ---- the run's side
+  void SetTotal(std::size_t frames);
   void SetFrame(const InputFrame& frame, const TrackResult& track, const RunState& state);
   void SetKeyframe(int keyframe, const RunState& state);
   void AddDetection(const LoopResult& result);

@@ -27,7 +27,10 @@ LiveView::~LiveView() = default;
 
 bool LiveViewAvailable() { return true; }
 std::string LiveView::Url() const { return impl_->server_.Url(); }
-void LiveView::OnStart(const CameraRig&) { impl_->state_.WaitForViewer(impl_->options_.idle_s); }
+void LiveView::OnStart(const CameraRig&, std::size_t frames) {
+  impl_->state_.SetTotal(frames);
+  impl_->state_.WaitForViewer(impl_->options_.idle_s);
+}
 void LiveView::OnFrame(const InputFrame& frame, const TrackResult& track, const RunState& state) {
   impl_->state_.SetFrame(frame, track, state);
   impl_->state_.WaitWhilePaused(impl_->options_.abandoned_s);

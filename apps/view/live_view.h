@@ -39,7 +39,7 @@ class LiveView : public RunObserver {
   /// What to open in a browser, with the token if there is one.
   std::string Url() const;
 
-  void OnStart(const CameraRig& rig) override;
+  void OnStart(const CameraRig& rig, std::size_t frames) override;
   void OnFrame(const InputFrame& frame, const TrackResult& track, const RunState& state) override;
   void OnKeyframe(const InputFrame& frame, int keyframe, const RunState& state) override;
   void OnDetection(const LoopResult& result) override;

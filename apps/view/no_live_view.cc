@@ -15,7 +15,7 @@ LiveView::LiveView(const LiveViewOptions&) {
 }
 LiveView::~LiveView() = default;
 std::string LiveView::Url() const { return {}; }
-void LiveView::OnStart(const CameraRig&) {}
+void LiveView::OnStart(const CameraRig&, std::size_t) {}
 void LiveView::OnFrame(const InputFrame&, const TrackResult&, const RunState&) {}
 void LiveView::OnKeyframe(const InputFrame&, int, const RunState&) {}
 void LiveView::OnDetection(const LoopResult&) {}

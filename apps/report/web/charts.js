@@ -1,13 +1,34 @@
 'use strict';
 // Errors, precision and recall, times.
 
-async function drawErrors(panel) {
+// Errors of every trajectory of the data set, with its name.
+function errorLines() {
   const lines = [];
   const runs = runsHere();
   const alone = runs.find((run) => run.variant === 'odometry') ?? chosen();
   if (alone.errors.odometry) lines.push(['odometry', alone.errors.odometry]);
   for (const run of runs) if (run.variant !== 'odometry' && run.errors.slam) lines.push([run.variant, run.errors.slam]);
-  if (!lines.length) return panel.append(note('No ground truth covers this run, so there is no error to show.'));
+  return lines;
+}
+
+const missingErrors = () => (errorLines().length ? '' : 'No errors: no ground truth covers this run.');
+
+// A panel for each trajectory, with the same axes: curves that jump about hide each other in one.
+async function drawRelative(panel, lines) {
+  const known = lines.filter(([, error]) => error.relative?.error.length);
+  if (!known.length) return;
+  const top = 1.05 * Math.max(...known.flatMap(([, error]) => error.relative.error));
+  const pair = el('div', { class: 'pair', id: 'relative' });
+  panel.append(el('h2', {}, 'Relative translation error, frame to frame'), pair);
+  for (const [name, error] of known) {
+    await chart(pair, 'small', [{ type: 'scatter', mode: 'lines', x: error.relative.distance, y: error.relative.error, name: label(name),
+      line: { ...lineOf(name, 1.2), dash: 'solid' }, hovertemplate: '%{x:.1f} m: %{y:.4f} m<extra></extra>' }],
+    layoutOf(`${name}: rmse ${lengthText(error.relative.rmse)}`, { showlegend: false, xaxis: axis('distance along the reference [m]'), yaxis: axis('RPE [m]', { range: [0, top] }) }));
+  }
+}
+
+async function drawErrors(panel) {
+  const lines = errorLines();
   const traces = (field) => lines.map(([name, error]) => ({ type: 'scatter', mode: 'lines', x: error.distance,
     y: error[field], name: field === 'error' ? `${label(name)}: rmse ${lengthText(error.rmse)}` : label(name), line: lineOf(name) }));
   const range = { rangemode: 'tozero' };
@@ -16,6 +37,7 @@ async function drawErrors(panel) {
     { xaxis: axis(x), yaxis: axis('error [m]', range), hovermode: 'x unified' }));
   await chart(panel, '', traces('turn_deg'), layoutOf('Absolute rotation error',
     { xaxis: axis(x), yaxis: axis('error [deg]', range), hovermode: 'x unified' }));
+  await drawRelative(panel, lines);
   const figures = chosen().figures;
   panel.append(note(`Aligned by ${figures.alignment === 'sim3' ? 'Sim(3)' : 'SE(3)'}, as tutti evaluate.`));
 }
@@ -30,6 +52,9 @@ function recallLine(curve, name, style) {
       hovertemplate: 'at the default threshold: recall %{x:.3f}, precision %{y:.3f}' },
   ];
 }
+
+const missingRecall = () => (runsHere().some((run) => run.precision_recall) ? '' : 'No precision and recall: this run looked for no loops, or nobody knows ' +
+  'its loops (no ground truth covers it, or no image comes back to an earlier place).');
 
 async function drawRecall(panel) {
   const run = chosen();
@@ -46,8 +71,7 @@ async function drawRecall(panel) {
     }
   }
   if (!run.precision_recall) {
-    return panel.append(note('No curve for this run: it looked for no loops, or nobody knows its loops ' +
-      '(no ground truth covers it, or no image comes back to an earlier place).'));
+    return panel.append(note('No curves of members: the chosen run looked for no loops.'));
   }
   const traces = run.precision_recall.curves.flatMap((curve) =>
     recallLine(curve, curve.name === 'verified' ? 'ensemble, verified' : curve.name, lineOf(curve.name)));

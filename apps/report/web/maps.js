@@ -11,6 +11,9 @@ function extents(path) {
   });
 }
 
+// Of several paths together.
+const boxOf = (all) => extents(Object.fromEntries(AXES.map((a) => [a, all.flatMap((path) => path[a])])));
+
 // The path that the axes are chosen by.
 const mainPath = () => {
   const runs = runsHere();
@@ -74,9 +77,16 @@ function edgeTraces(run, make) {
   return traces;
 }
 
+const missingMap = () => (runsHere().some((run) => run.slam.x.length) && chosen().slam.x.length ? ''
+  : 'No map: there is no trajectory. Without a calibration there are loops alone.');
+
 async function drawTop(panel) {
+  await drawTopChart(panel, 'tall');
+  panel.append(note(mapNote(chosen())));
+}
+
+async function drawTopChart(panel, size) {
   const run = chosen();
-  if (!run.slam.x.length) return panel.append(note('No trajectory: without a calibration there are loops alone.'));
   const { plane: [right, ahead], up } = planeOf(mainPath());
   const make = (points) => ({ type: 'scatter', x: points[right], y: points[ahead] });
   make.size = 8;
@@ -89,8 +99,7 @@ async function drawTop(panel) {
     yaxis: axis(`${AXES[ahead]} [${run.unit}]`, { scaleanchor: 'x', scaleratio: 1 }),
     dragmode: 'pan',
   });
-  await chart(panel, 'tall', traces, layout);
-  panel.append(note(mapNote(run)));
+  await chart(panel, size, traces, layout);
 }
 
 function mapNote(run) {
@@ -104,7 +113,6 @@ function mapNote(run) {
 
 async function draw3d(panel) {
   const run = chosen();
-  if (!run.slam.x.length) return panel.append(note('No trajectory: without a calibration there are loops alone.'));
   const { up } = planeOf(mainPath());
   const make = (points) => ({ type: 'scatter3d', x: points[0], y: points[1], z: points[2] });
   make.size = 4;
@@ -112,11 +120,14 @@ async function draw3d(panel) {
     line: lineOf(line.name, line.width + 2), hovertemplate: '%{x:.2f}, %{y:.2f}, %{z:.2f}' }));
   traces.push(...edgeTraces(run, make));
   const sign = up === 1 ? -1 : 1;  // a camera's y points down
-  const away = narrow() ? 2 : 1.3;
-  const eye = [away, away, away];
-  eye[up] = (away + 0.2) * sign;
+  // All of it at first sight: a box whose longest side is 1, seen from as far as its diagonal needs.
+  const size = boxOf(paths().map((line) => line.path)), longest = Math.max(...size, 1e-9);
+  const box = size.map((side) => Math.max(side / longest, 0.05));
+  const away = (narrow() ? 1.5 : 0.95) * Math.hypot(...box);
+  const eye = [away * 0.7, away * 0.7, away * 0.7];
+  eye[up] = away * sign;
   const vector = (v) => ({ x: v[0], y: v[1], z: v[2] });
-  const scene = { aspectmode: 'data', camera: { up: vector([0, 1, 2].map((k) => (k === up ? sign : 0))), eye: vector(eye) } };
+  const scene = { aspectmode: 'manual', aspectratio: vector(box), camera: { up: vector([0, 1, 2].map((k) => (k === up ? sign : 0))), eye: vector(eye) } };
   for (const a of AXES) {
     scene[`${a}axis`] = { title: { text: `${a} [${run.unit}]` }, gridcolor: css('--line'), color: css('--ink'),
       backgroundcolor: css('--raised'), showbackground: true, zerolinecolor: css('--line') };

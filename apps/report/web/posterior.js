@@ -128,7 +128,7 @@ async function drawOneImage(panel, run, logs, roots) {
     return node;
   };
   const name = el('b', { id: 'image-name' });
-  const words = el('div', { class: 'pair', id: 'image-words' }), charts = el('div', { class: 'pair' });
+  const words = el('div', { class: 'pair', id: 'image-words' }), charts = el('div', { class: 'pair', id: 'image-charts' });
   panel.append(el('h2', {}, 'One image'), el('div', { class: 'chooser' },
     button('\u2039 proposed', (k) => proposed.filter((i) => i < k).at(-1)), button('proposed \u203a', (k) => proposed.find((i) => i > k)), slider, name), words, charts);
   const over = (maps, value) => maps.map(([of, rows]) => ({ type: 'scatter', mode: 'lines', x: p.place_t, y: rows.map((row) => value(row[Number(slider.value)])),
@@ -166,10 +166,10 @@ async function drawOneImage(panel, run, logs, roots) {
   };
 }
 
-async function drawMaps(panel, run, logs, roots) {
+async function drawMaps(panel, first, run, logs, roots) {
   const p = run.posterior, marks = loopMarks(run, p);
   const pair = el('div', { class: 'pair', id: 'belief-maps' });
-  panel.append(el('h2', {}, 'All images'), pair);
+  panel.append(el('h2', {}, 'Evidence and posterior of each member'), pair);
   const largest = Math.max(0.05, extent(roots)[1]);
   const ticks = [0.001, 0.01, 0.03, 0.1, 0.3, 1].filter((v) => Math.sqrt(v) <= largest);
   const [low, high] = extent(logs).map((v) => (Number.isFinite(v) ? v : 0));
@@ -179,38 +179,44 @@ async function drawMaps(panel, run, logs, roots) {
   const evidence = (k) => chart(pair, '', [{ type: 'heatmap', x: p.t, y: p.place_t, z: logs[k], zmin: -reach, zmax: reach, hoverongaps: false,
     colorscale: [[0, '#d55e00'], [0.5, css('--raised')], [1, css('--accent')]], colorbar: { thickness: 10, title: { text: 'ln L', side: 'top' } },
     hovertemplate: `${hover}ln L = %{z:.1f}<extra></extra>` }], layoutOf(`Evidence: ${p.evidence.maps[k].name}`, axes));
+  const isEnsemble = (k) => p.maps[k].name === 'ensemble' || p.maps.length === 1;
   const posterior = (k) => {
-    const top = p.maps[k].name === 'ensemble' ? marks : [];
-    return chart(pair, '', [{ type: 'heatmap', x: p.t, y: p.place_t, z: roots[k], colorscale: 'Cividis', zmin: 0, zmax: largest,
+    const top = isEnsemble(k) ? marks : [];
+    return chart(isEnsemble(k) ? first : pair, isEnsemble(k) ? 'tall' : '', [{ type: 'heatmap', x: p.t, y: p.place_t, z: roots[k], colorscale: 'Cividis', zmin: 0, zmax: largest,
       customdata: roots[k].map((row) => row.map((v) => v * v)),
       colorbar: { thickness: 10, title: { text: 'p', side: 'top' }, tickvals: ticks.map(Math.sqrt), ticktext: ticks.map(String) },
       hovertemplate: `${hover}p = %{customdata:.4f}<extra></extra>` }, ...top],
     layoutOf(`Posterior: ${p.maps[k].name}`, { ...axes, showlegend: false }));
   };
+  for (const [k] of p.maps.entries()) if (isEnsemble(k)) await posterior(k);
   for (const [k, map] of p.maps.entries()) {
     const of = p.evidence.maps.findIndex((e) => e.name === map.name);
     if (of >= 0) await evidence(of);
     else if (p.maps.length === 1) await evidence(0);  // a member alone is the ensemble
-    await posterior(k);
+    if (!isEnsemble(k)) await posterior(k);
   }
+}
+
+function missingPosterior() {
+  const p = chosen().posterior;
+  if (!p) return 'No posterior: this run asked no loop detector.';
+  if (p.maps.some((map) => /[^\0]/.test(atob(map.q)))) return '';
+  return 'No posterior: no image had a place to compare with. The run is so short that all its keyframes were still in short-term memory (loops.stm_size).';
 }
 
 async function drawPosterior(panel) {
   const run = chosen(), p = run.posterior;
-  if (!p) return panel.append(note('This run asked no loop detector.'));
   const roots = p.maps.map((map) => unpackMap(map, p.cells, rootOf));
   const logs = p.evidence.maps.map((map) => unpackMap(map, p.cells, logOf(p.evidence)));
-  if (!roots.some((rows) => rows.some((row) => row.some((v) => v > 0)))) {
-    return panel.append(note('No image had a place to compare with: the run is so short that all its keyframes were still in short-term memory (`loops.stm_size`).'));
-  }
+  // The ensemble's map is the first and the largest, the members' follow.
+  const first = el('div', { id: 'ensemble-map' });
+  panel.append(first);
   await drawOverTime(panel, run);
-  const times = [...panel.querySelectorAll('.chart')];
   const watch = await drawOneImage(panel, run, logs, roots);
   panel.append(note('ln L, p there: at the ensemble\'s best place. Lines in the charts: dashed at the best place, solid where geometry looked. ' +
     'Weights: shares of the members\' counts in the sum that the ensemble\'s filter gets (other rules than joint: all the same). A click into any other chart chooses its image.'));
-  const before = panel.querySelectorAll('.chart').length;
-  await drawMaps(panel, run, logs, roots);
-  for (const div of [...times, ...[...panel.querySelectorAll('.chart')].slice(before)]) await watch(div);
+  await drawMaps(panel, first, run, logs, roots);
+  for (const div of panel.querySelectorAll('.chart')) if (!div.closest('#image-charts')) await watch(div);
   panel.append(note(`${p.cells} x ${p.cells} cells: a column is the one of its images that says most, a cell the largest value of its places. The rest of a posterior is "a new place". ` +
     'Evidence is of the image alone, before the filter: above 0 it speaks for the place, below 0 against it. White marks: accepted loops (crosses: false ones).'));
 }

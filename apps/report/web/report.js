@@ -1,17 +1,19 @@
 'use strict';
 // Tabs and choices. A tab is drawn when it is first looked at, and again when the choice or the colours change.
 
+// Each with what is missing of it here: a sentence for the overview, or nothing. Such a tab is left out.
 const TABS = [
-  ['overview', 'Overview', drawOverview],
-  ['map', 'Map', drawTop],
-  ['space', '3D', draw3d],
-  ['error', 'Error', drawErrors],
-  ['recall', 'Precision-recall', drawRecall],
-  ['posterior', 'Posterior', drawPosterior],
-  ['gallery', 'Gallery', drawGallery],
-  ['timing', 'Timing', drawTiming],
-  ['configuration', 'Configuration', drawConfiguration],
+  ['overview', 'Overview', drawOverview, () => ''],
+  ['map', 'Map', drawTop, missingMap],
+  ['space', '3D', draw3d, missingMap],
+  ['error', 'Error', drawErrors, missingErrors],
+  ['recall', 'Precision-recall', drawRecall, missingRecall],
+  ['posterior', 'Posterior', drawPosterior, missingPosterior],
+  ['gallery', 'Gallery', drawGallery, missingGallery],
+  ['timing', 'Timing', drawTiming, () => ''],
+  ['configuration', 'Configuration', drawConfiguration, () => ''],
 ];
+const shownTabs = () => TABS.filter(([, , , missing]) => !missing());
 
 async function show(id) {
   state.tab = id;
@@ -38,7 +40,13 @@ async function redraw() {
     panel.replaceChildren();
     panel.dataset.state = '';
   }
+  hideEmpty();
   await show(state.tab);
+}
+
+function hideEmpty() {
+  for (const [id, , , missing] of TABS) document.getElementById(`tab-${id}`).hidden = Boolean(missing());
+  if (document.getElementById(`tab-${state.tab}`)?.hidden) state.tab = 'overview';
 }
 
 function choice(name, values, current, set) {
@@ -69,8 +77,8 @@ function tabs() {
   bar.addEventListener('keydown', (event) => {
     const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
     if (!step) return;
-    const at = TABS.findIndex(([id]) => id === state.tab);
-    const next = TABS[(at + step + TABS.length) % TABS.length][0];
+    const shown = shownTabs(), at = shown.findIndex(([id]) => id === state.tab);
+    const next = shown[(at + step + shown.length) % shown.length][0];
     show(next);
     document.getElementById(`tab-${next}`).focus();
   });
@@ -85,6 +93,7 @@ async function start() {
   state.variant = (runsHere().find((run) => run.variant === 'ensemble') ?? data.runs[0]).variant;
   choices();
   tabs();
+  hideEmpty();
   try {
     await loadCharts();
   } catch (error) {

@@ -42,6 +42,9 @@ async function drawOverview(panel) {
   if (!run.odometry_complete) panel.append(note('The odometry of this run ends at the first correction (run.odometry_pass: false, or it was interrupted).'));
   for (const finding of run.findings) panel.append(note(`The calibration can't be right: ${finding}`));
   for (const failure of data.failures ?? []) panel.append(note(`Failed: ${failure}`));
+  // Several tabs may lack the same thing.
+  for (const missing of new Set(TABS.map(([, , , why]) => why()).filter((why) => why))) panel.append(note(missing));
+  if (!missingMap()) await drawTopChart(panel, '');
   const loops = run.loops.filter((loop) => loop.outcome !== 'missed');
   if (loops.length) {
     const rows = loops.map((l) => [`${OUTCOMES[l.outcome].sign} ${OUTCOMES[l.outcome].name}`, l.query, l.candidate, fixed(l.h, 3), fixed(l.p, 3), l.inliers, l.reason]);
@@ -50,19 +53,43 @@ async function drawOverview(panel) {
   }
 }
 
+const missingGallery = () => (chosen().gallery.entries.length ? '' : 'No gallery: no loop was proposed, and none is known.');
+
+// Opens a picture as large as the window; arrows go on to the next one, Escape or a click closes it.
+function openPicture(figures, at) {
+  const picture = el('img', { alt: '' }), words = el('p', {});
+  const dialog = el('dialog', { class: 'large', 'aria-label': 'picture' }, picture, words);
+  const go = (k) => {
+    at = (k + figures.length) % figures.length;
+    picture.src = figures[at].querySelector('img').src;
+    picture.alt = words.textContent = figures[at].querySelector('figcaption').innerText.replace(/\n/g, ': ');
+  };
+  dialog.addEventListener('click', () => dialog.close());
+  dialog.addEventListener('close', () => { dialog.remove(); figures[at].querySelector('button').focus(); });
+  dialog.addEventListener('keydown', (event) => {
+    const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+    if (step) go(at + step);
+  });
+  go(at);
+  document.body.append(dialog);
+  dialog.showModal();
+}
+
 async function drawGallery(panel) {
   const gallery = chosen().gallery;
   if (gallery.note) panel.append(note(gallery.note));
-  if (!gallery.entries.length) return panel.append(note('No loop to show.'));
-  panel.append(note('Left: the image. Right: the place that was meant (missed: where the ground truth says it was before). Lines: matched features.'));
+  panel.append(note('Left: the image. Right: the place that was meant (missed: where the ground truth says it was before). Lines: matched features. A click enlarges a picture.'));
   for (const [outcome, style] of Object.entries(OUTCOMES)) {
     const entries = gallery.entries.filter((entry) => entry.outcome === outcome);
     if (!entries.length) continue;
     panel.append(el('h2', {}, `${style.sign} ${style.name}`));
     panel.append(el('div', { class: 'gallery' }, entries.map((entry) => el('figure', { style: `--mark: ${style.color}` },
-      el('img', { src: entry.picture, alt: `${style.name}: ${entry.title}`, loading: 'lazy' }),
+      el('button', { type: 'button', 'aria-label': `enlarge: ${entry.title}` },
+        el('img', { src: entry.picture, alt: `${style.name}: ${entry.title}`, loading: 'lazy' })),
       el('figcaption', {}, el('b', { 'data-sign': style.sign }, entry.title), el('br'), entry.text)))));
   }
+  const figures = [...panel.querySelectorAll('figure')];
+  figures.forEach((figure, k) => figure.querySelector('button').addEventListener('click', () => openPicture(figures, k)));
 }
 
 async function drawConfiguration(panel) {

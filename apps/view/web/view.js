@@ -5,12 +5,15 @@ const COLORS = { surf: '#e69f00', sift: '#56b4e9', orb: '#cc79a7', ensemble: '#0
 const DASHES = { surf: [8, 3, 2, 3], sift: [10, 5], orb: [2, 3], ensemble: [] };
 const MOST_ANSWERS = 1500, MOST_LINES = 300;
 const TRACK_OLD = 5;  // frames before this one that show it (of the last 10)
+const WIDE = 2;  // times as wide as high: an image gets a row of its own
+const TURN = 0.008;  // of the map in 3D [rad per pixel]
+const SPEED_S = 5;  // that frames a second are counted over
 const by = (id) => document.getElementById(id);
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 const token = new URLSearchParams(location.search).get('token');
 const address = (path, query = {}) => `${path}?${new URLSearchParams(token ? { ...query, token } : query)}`;
 
-const state = { news: null, picture: null, answers: [], points: new Map(), view: null, received: 0 };
+const state = { news: null, picture: null, answers: [], points: new Map(), view: null, turn: null, received: 0, speed: [] };
 
 function sharp(canvas, ratio) {
   const width = Math.round(canvas.clientWidth * devicePixelRatio), height = Math.round(width * ratio);
@@ -24,6 +27,7 @@ function sharp(canvas, ratio) {
 function drawImage() {
   const picture = state.picture;
   if (!picture) return;
+  by('image-panel').classList.toggle('wide', picture.width > WIDE * picture.height);
   const canvas = by('image'), context = sharp(canvas, picture.height / picture.width);
   context.scale(canvas.width / picture.width, canvas.width / picture.width);
   context.drawImage(picture, 0, 0);
@@ -58,22 +62,33 @@ function transform([tx, ty, tz, x, y, z, w], [a, b, c]) {
   return [a + w * u + y * t - z * v + tx, b + w * v + z * u - x * t + ty, c + w * t + x * v - y * u + tz];
 }
 
-// Top view: x to the right, z ahead (cameras have y down).
+// To the right and up on the screen, in metres, of a place: from above, x to the right and z ahead (cameras have y down);
+// turned by `turn` = { yaw, pitch } [rad], a pitch of pi/2 looking straight down.
+function onScreen([x, y, z], turn) {
+  if (!turn) return [x, z];
+  const ahead = Math.cos(turn.yaw) * z - Math.sin(turn.yaw) * x;
+  return [Math.cos(turn.yaw) * x + Math.sin(turn.yaw) * z, Math.sin(turn.pitch) * ahead - Math.cos(turn.pitch) * y];
+}
+
 function fit(canvas, places) {
   let [left, right, low, high] = [Infinity, -Infinity, Infinity, -Infinity];
   for (const [, , , p] of places) {
-    left = Math.min(left, p[0]); right = Math.max(right, p[0]);
-    low = Math.min(low, p[2]); high = Math.max(high, p[2]);
+    const [x, y] = onScreen(p, state.turn);
+    left = Math.min(left, x); right = Math.max(right, x);
+    low = Math.min(low, y); high = Math.max(high, y);
   }
-  if (!(right >= left)) return { x: 0, z: 0, scale: 50 };
+  if (!(right >= left)) return { x: 0, y: 0, scale: 50 };
   const scale = 0.65 * Math.min(canvas.width / Math.max(right - left, 1e-3), canvas.height / Math.max(high - low, 1e-3), canvas.width / 0.5);
-  return { x: (left + right) / 2, z: (low + high) / 2, scale };
+  return { x: (left + right) / 2, y: (low + high) / 2, scale };
 }
 
 function drawMap() {
   const canvas = by('map'), context = sharp(canvas, 0.75), places = state.news.places;
   const view = state.view ?? fit(canvas, places);
-  const at = (p) => [canvas.width / 2 + view.scale * (p[0] - view.x), canvas.height / 2 - view.scale * (p[2] - view.z)];
+  const at = (p) => {
+    const [x, y] = onScreen(p, state.turn);
+    return [canvas.width / 2 + view.scale * (x - view.x), canvas.height / 2 - view.scale * (y - view.y)];
+  };
   const poses = new Map(places.map(([id, , , pose]) => [id, pose])), frames = new Map(places.map(([, frame, , pose]) => [frame, pose]));
   context.fillStyle = css('--faint');
   context.globalAlpha = 0.5;
@@ -168,14 +183,30 @@ function addLines(events) {
   log.scrollTop = log.scrollHeight;
 }
 
+// Frames a second over the last seconds that the run was not paused, and the time that is left [s]; null: not known yet.
+function speed() {
+  const { frame, total, paused, finished } = state.news, now = performance.now() / 1000, seen = state.speed;
+  if (paused || finished) seen.length = 0;
+  seen.push([now, frame.number]);
+  while (seen.length > 2 && now - seen[0][0] > SPEED_S) seen.shift();
+  const [[since, first]] = seen;
+  if (now - since < 0.5 || frame.number === first) return { rate: null, left: null };
+  const rate = (frame.number - first) / (now - since);
+  return { rate, left: total > frame.number ? (total - frame.number) / rate : null };
+}
+
+const clock = (seconds) => `${Math.floor(seconds / 60)}:${String(Math.round(seconds) % 60).padStart(2, '0')}`;
+
 function showStatus() {
-  const { frame, paused, finished } = state.news;
+  const { frame, total, paused, finished } = state.news, { rate, left } = speed();
+  by('state').dataset.state = paused ? 'paused' : frame.state;
+  by('state').textContent = finished ? `done, ${frame.state}` : paused ? `paused, ${frame.state}` : frame.state;
   by('pause').textContent = paused ? 'Resume' : 'Pause';
   by('pause').disabled = finished;
   by('step').disabled = !paused || finished;
   const accepted = state.news.loops.filter((loop) => loop[2]).length;
-  by('status').textContent = `${finished ? 'done' : paused ? 'paused' : 'running'}, frame ${frame.index}: ${frame.state}` +
-    `${frame.reason ? ` (${frame.reason})` : ''}, ${frame.features} features, ${frame.inliers} inliers, ` +
+  by('status').textContent = `frame ${frame.index}${total ? ` of ${total}` : ''}${frame.reason ? ` (${frame.reason})` : ''}, ` +
+    `${rate ? `${rate.toFixed(1)} frames/s, ` : ''}${left !== null && !paused ? `${clock(left)} left, ` : ''}${frame.features} features, ${frame.inliers} inliers, ` +
     `${state.news.places.length} keyframes, ${accepted} loops`;
   document.body.dataset.frame = frame.number;
   document.body.dataset.paused = paused ? '1' : '0';
@@ -231,20 +262,34 @@ function moveMap() {
     if (others.length) {
       const apart = (f) => Math.hypot(f.clientX - others[0].clientX, f.clientY - others[0].clientY);
       zoom(apart(event) / Math.max(1, apart(before)));
+    } else if (state.turn && !event.shiftKey) {
+      state.turn.yaw += (event.clientX - before.clientX) * TURN;
+      state.turn.pitch = Math.min(Math.PI / 2, Math.max(0, state.turn.pitch + (event.clientY - before.clientY) * TURN));
     } else {
       state.view.x -= (event.clientX - before.clientX) * devicePixelRatio / state.view.scale;
-      state.view.z += (event.clientY - before.clientY) * devicePixelRatio / state.view.scale;
+      state.view.y += (event.clientY - before.clientY) * devicePixelRatio / state.view.scale;
     }
     fingers.set(event.pointerId, event);
     draw();
   });
 }
 
+function turnMap(on) {
+  state.turn = on ? { yaw: 0.6, pitch: 0.6 } : null;
+  state.view = null;
+  by('space').setAttribute('aria-pressed', String(on));
+  by('space').textContent = on ? 'From above' : '3D';
+  by('map-words').textContent = on ? 'Map in 3D. Drag turns, with Shift it moves.' : 'Map, top view. Drag moves.';
+  draw();
+}
+
+by('space').addEventListener('click', () => turnMap(!state.turn));
 by('pause').addEventListener('click', () => command(state.news?.paused ? 'resume' : 'pause'));
 by('step').addEventListener('click', () => command('step'));
 matchMedia('(prefers-color-scheme: dark)').addEventListener('change', draw);
 window.addEventListener('resize', draw);
 moveMap();
+turnMap(false);
 const source = new EventSource(address('events'));
 source.onmessage = (message) => {
   const news = JSON.parse(message.data);

@@ -88,6 +88,18 @@ async function drive(browser, folder, data) {
   await sleep(700);
   check(await frame(page) === at + 1, `a step is one frame, not ${await frame(page) - at}`);
   for (const id of ['image', 'map']) check(await page.evaluate(inked, id), `the canvas ${id} is drawn`);
+  // State, speed and what is left; the map in 3D and from above.
+  check(await page.evaluate(() => document.getElementById('state').dataset.state === 'paused'), 'the state is shown as paused');
+  const map = () => page.evaluate(() => document.getElementById('map').toDataURL());
+  const mapChanges = (before) => waitFor(page, `document.getElementById('map').toDataURL() !== '${before}'`);
+  const above = await map();
+  await page.click('#space');
+  await mapChanges(above);
+  check(await page.evaluate(inked, 'map'), 'the map in 3D is not empty');
+  const turned = await map();
+  await page.click('#space');
+  await mapChanges(turned);
+  check(await page.evaluate(() => document.getElementById('space').textContent === '3D'), 'from above again');
   const { count, drawn, tails, step } = await page.evaluate(tracksOnPage);
   check(count > 50, `features are tracked (${count})`);
   check(drawn > 0.8 * count, `tracks are on the image, but for a few under others (${drawn} of ${count})`);
@@ -96,6 +108,8 @@ async function drive(browser, folder, data) {
   check(await page.evaluate(() => /tracks/.test(document.querySelector('#image + figcaption').textContent)), 'the legend says what tracks are');
   await page.click('#pause');
   await waitFor(page, (before) => Number(document.body.dataset.frame) > before + 20, at);
+  await waitFor(page, () => /frame \d+ of \d+.*[\d.]+ frames\/s, \d+:\d\d left/.test(document.getElementById('status').textContent) &&
+    document.getElementById('state').textContent === 'tracking');
   await pauseWhen(page, () => state.answers.length > 5);
   await waitFor(page, inked, 'posterior');
   const phone = await openPage(browser, url, { allow, viewport: PHONE, scheme: 'dark' });

@@ -59,11 +59,35 @@ async function chooseImages(page, where) {
   check(/, 0\.0 s/.test((await shown()).name), `${where}: a click into a chart does not choose its image`);
 }
 
+// A picture of the gallery opens large, goes on by the arrow keys, and closes.
+async function enlarge(page, where) {
+  const large = () => page.evaluate(() => {
+    const dialog = document.querySelector('dialog.large[open]');
+    return dialog && { src: dialog.querySelector('img').src, width: dialog.getBoundingClientRect().width / window.innerWidth };
+  });
+  await page.evaluate(() => document.querySelector('#gallery figure button').click());
+  const opened = await large();
+  check(opened?.width > 0.7, `${where}: a picture does not open large (${opened?.width})`);
+  await page.keyboard.press('ArrowRight');
+  const pictures = await page.evaluate(() => document.querySelectorAll('#gallery figure').length);
+  check(pictures < 2 || (await large()).src !== opened.src, `${where}: the arrow key shows no other picture`);
+  await page.keyboard.press('Escape');
+  check(await large() === null, `${where}: the picture does not close`);
+}
+
+// The ensemble's heat map comes first and is the largest.
+const beliefMaps = (page) => page.evaluate(() => {
+  const area = (div) => { const box = div.getBoundingClientRect(); return box.width * box.height; };
+  return { first: area(document.querySelector('#ensemble-map .chart')), rest: [...document.querySelectorAll('#belief-maps .chart')].map(area) };
+});
+
 async function lookOnce(browser, file, [look, viewport, scheme], expected, words, shots) {
   const { page, problems } = await openPage(browser, pathToFileURL(resolve(file)).href, { viewport, scheme });
   await page.waitForFunction(() => document.documentElement.dataset.ready === '1', { timeout: 120000 });
-  const tabs = await page.evaluate(() => [...document.querySelectorAll('[role=tab]')].map((tab) => tab.id.slice(4)));
-  check(tabs.length === 9, `${file}: 9 tabs, not ${tabs.length}`);
+  const [tabs, hidden] = await page.evaluate(() => [false, true].map((hidden) =>
+    [...document.querySelectorAll('[role=tab]')].filter((tab) => tab.hidden === hidden).map((tab) => tab.id.slice(4))));
+  check(tabs.length + hidden.length === 9, `${file}: 9 tabs, not ${tabs.length} and ${hidden.length} without anything to show`);
+  for (const tab of expected) check(tabs.includes(tab), `${file}: no tab ${tab}`);
   for (const tab of tabs) {
     await openTab(page, tab);
     const found = await lookAt(page, tab);
@@ -76,7 +100,17 @@ async function lookOnce(browser, file, [look, viewport, scheme], expected, words
     }
     check(found.images.every((good) => good), `${where}: a picture is missing`);
     if (words[tab]) check(found.tables.includes(words[tab]), `${where}: no table with ${words[tab]}`);
-    if (expected.includes(tab)) check(found.charts.length + found.images.length > 0, `${where}: nothing drawn`);
+    // Nothing is empty, and the overview says what is left out.
+    if (tab !== 'configuration' && tab !== 'overview') check(found.charts.length + found.images.length > 0, `${where}: nothing drawn`);
+    if (tab === 'overview') {
+      check(found.charts.length === (tabs.includes('map') ? 1 : 0), `${where}: no map`);
+      if (hidden.length) check(/\bNo (map|errors|precision|posterior|gallery)/.test(await page.evaluate(() => document.getElementById('overview').innerText)), `${where}: does not say why there is no ${hidden}`);
+    }
+    if (tab === 'posterior' && look !== 'phone') {
+      const { first, rest } = await beliefMaps(page);
+      check(rest.every((area) => area < first), `${where}: the ensemble's map is not the largest`);
+    }
+    if (tab === 'gallery' && !shots) await enlarge(page, where);
     if (tab === 'space' && found.charts.length) check(await colours3d(page) > 3, `${where}: the 3D view is blank`);
     const chooser = tab === 'posterior' && await page.$('#image');
     if (chooser && !shots) await chooseImages(page, where);

@@ -32,6 +32,12 @@ TEST(LiveMessage, AFrameWithoutAPoseHasNoTracks) {
   EXPECT_EQ(nlohmann::json::parse(LiveMessage(NewsOf(320, {})))["frame"]["tracks"], nlohmann::json::array());
 }
 
+TEST(LiveMessage, SaysHowManyFramesAreToCome) {
+  LiveNews news = NewsOf(320, {});
+  news.total = 1700;
+  EXPECT_EQ(nlohmann::json::parse(LiveMessage(news))["total"], 1700);
+}
+
 TEST(LiveMessage, IsOneLineWhateverTheTextsHold) {
   LiveNews news = NewsOf(320, {});
   news.events.push_back({});

@@ -28,7 +28,8 @@ using Circle = std::array<Lanes, kRingPixels>;
 // The pixels at the same place of the circle around each.
 inline Circle CircleAround(const Rows& rows, int x) {
   const auto at = [&](int dx, int dy) {
-    return cv::v_load(rows[static_cast<std::size_t>(kRadius + dy)] + x + dx);
+    const int row = kRadius + dy;
+    return cv::v_load(rows[static_cast<std::size_t>(row)] + x + dx);
   };
   return {at(0, 3),  at(1, 3),   at(2, 2),   at(3, 1),   at(3, 0),  at(3, -1), at(2, -2), at(1, -3),
           at(0, -3), at(-1, -3), at(-2, -2), at(-3, -1), at(-3, 0), at(-3, 1), at(-2, 2), at(-1, 3)};
@@ -37,7 +38,8 @@ inline Circle CircleAround(const Rows& rows, int x) {
 // Whether one of them may be a corner: of each fourth pixel of the circle an arc of nine holds two in a row.
 inline bool MayBeCorner(const Rows& rows, int x, const Lanes& here, const Lanes& threshold) {
   const auto at = [&](int dx, int dy) {
-    return cv::v_load(rows[static_cast<std::size_t>(kRadius + dy)] + x + dx);
+    const int row = kRadius + dy;
+    return cv::v_load(rows[static_cast<std::size_t>(row)] + x + dx);
   };
   const Lanes n = at(0, -3), s = at(0, 3), w = at(-3, 0), e = at(3, 0);
   const Lanes nw = at(-2, -2), ne = at(2, -2), sw = at(-2, 2), se = at(2, 2);

@@ -24,9 +24,10 @@ class IntensityCentroid {
   explicit IntensityCentroid(const HalfWidths& widths) {
     for (std::size_t row = 0; row < widths.size(); ++row) {
       for (int u = -widths[row]; u <= widths[row]; ++u) {
-        const auto column = static_cast<std::size_t>(u + kRadius);
-        one_[row][column] = 1;
-        column_[row][column] = static_cast<std::int16_t>(u);
+        const int column = u + kRadius;
+        const auto at = static_cast<std::size_t>(column);
+        one_[row][at] = 1;
+        column_[row][at] = static_cast<std::int16_t>(u);
       }
     }
   }

@@ -17,13 +17,13 @@
 namespace tutti::internal {
 namespace {
 
-struct Found {
+struct Detected {
   std::vector<cv::KeyPoint> keypoints;
   cv::Mat descriptors;
 };
 
-Found ByOpenCv(const cv::Mat& image, const OrbOptions& options) {
-  Found found;
+Detected ByOpenCv(const cv::Mat& image, const OrbOptions& options) {
+  Detected found;
   cv::ORB::create(options.features, 1.2F, options.levels, options.edge, 0, 2, cv::ORB::HARRIS_SCORE, 31,
                   options.fast_threshold)
       ->detectAndCompute(image, cv::noArray(), found.keypoints, found.descriptors);
@@ -34,7 +34,7 @@ auto All(const cv::KeyPoint& k) {
   return std::make_tuple(k.pt.x, k.pt.y, k.size, k.angle, k.response, k.octave, k.class_id);
 }
 
-void ExpectSame(const Found& ours, const Found& expected, const std::string& what) {
+void ExpectSame(const Detected& ours, const Detected& expected, const std::string& what) {
   ASSERT_EQ(ours.keypoints.size(), expected.keypoints.size()) << what;
   for (std::size_t i = 0; i < ours.keypoints.size(); ++i) {
     ASSERT_EQ(All(ours.keypoints[i]), All(expected.keypoints[i])) << what << ", point " << i;
@@ -48,10 +48,10 @@ void ExpectSame(const Found& ours, const Found& expected, const std::string& wha
 // Number of points; both ways have to give the same ones in the same order.
 std::size_t Compare(const cv::Mat& image, const OrbOptions& options, const std::string& what = {}) {
   const Orb orb(image, options);
-  Found ours;
+  Detected ours;
   ours.keypoints = orb.Detect();
   ours.descriptors = orb.Describe(ours.keypoints);
-  const Found expected = ByOpenCv(image, options);
+  const Detected expected = ByOpenCv(image, options);
   ExpectSame(ours, expected,
              what + " " + std::to_string(image.cols) + "x" + std::to_string(image.rows) + ", " +
                  std::to_string(options.features) + " features");
@@ -142,8 +142,8 @@ TEST(Orb, NothingInImagesThatAreBlankOrSmall) {
 TEST(Orb, SomePointsInAnyOrderGetTheDescriptorsThatTheyHaveAmongAll) {
   const cv::Mat texture = testing::TexturedImage(9, 480, 360);
   const Orb orb(texture, Default(texture));
-  const Found all = ByOpenCv(texture, Default(texture));
-  Found ours, expected;
+  const Detected all = ByOpenCv(texture, Default(texture));
+  Detected ours, expected;
   const std::vector<cv::KeyPoint> detected = orb.Detect();
   for (std::size_t i = 0; i < detected.size(); i += 3) {
     const std::size_t at = detected.size() - 1 - i;
@@ -157,7 +157,7 @@ TEST(Orb, SomePointsInAnyOrderGetTheDescriptorsThatTheyHaveAmongAll) {
 
 // What the member makes of all that OpenCV detects and describes.
 Features SpreadByOpenCv(const cv::Mat& image, const ExtractionOptions& options) {
-  const Found all = ByOpenCv(image, OrbOptionsFor(image.size(), 2 * options.features, options));
+  const Detected all = ByOpenCv(image, OrbOptionsFor(image.size(), 2 * options.features, options));
   Features kept;
   for (const int i : SelectSpread(all.keypoints, image.size(), options.features, options.grid_columns)) {
     kept.keypoints.push_back(all.keypoints[static_cast<std::size_t>(i)]);

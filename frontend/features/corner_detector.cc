@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <utility>
 
-#include "frontend/features/fast_corners.h"
+#include "core/fast_corners.h"
 
 namespace tutti {
 namespace {
@@ -43,7 +43,7 @@ class CornerGrid {
   std::vector<cv::KeyPoint> Detect(const cv::Rect& part, int threshold) const {
     const int rim = options_.border - kCircle;
     const cv::Rect seen(part.x + rim, part.y + rim, part.width + 2 * kCircle, part.height + 2 * kCircle);
-    std::vector<cv::KeyPoint> corners = FastCorners(image_(seen), threshold);
+    std::vector<cv::KeyPoint> corners = internal::FastCorners(image_(seen), threshold);
     const cv::Point2f moved(static_cast<float>(part.x - kCircle), static_cast<float>(part.y - kCircle));
     for (cv::KeyPoint& corner : corners) corner.pt += moved;
     return corners;

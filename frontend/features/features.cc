@@ -5,63 +5,31 @@
 #include <cstdint>
 #include <cstring>
 #include <numeric>
-#include <opencv2/core/hal/intrin.hpp>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "core/clones.h"
+#include "core/intensity_centroid.h"
 #include "frontend/features/corner_detector.h"
 #include "frontend/features/stereo_matcher.h"
 
 namespace tutti {
 namespace {
 
-constexpr int kBorder = 19;     // [px] a descriptor's patch (rotated, 31 px) stays inside the image
-constexpr int kHalfPatch = 15;  // [px] radius of the orientation patch
+constexpr int kBorder = 19;  // [px] a descriptor's patch (rotated, 31 px) stays inside the image
+constexpr int kHalfPatch = internal::IntensityCentroid::kRadius;  // [px]
 
-// Columns -15 .. 16 of each row of the orientation patch, from its middle row on: 0 outside of the patch.
-struct PatchRows {
-  static constexpr int kColumns = 32;
-  std::array<std::array<std::int16_t, kColumns>, kHalfPatch + 1> one{}, column{};
-};
-
-const PatchRows& OrientationPatch() {
-  static const PatchRows patch = [] {
-    PatchRows rows;
+// The patch of the orientation: a disc.
+const internal::IntensityCentroid& OrientationPatch() {
+  static const internal::IntensityCentroid patch = [] {
+    internal::IntensityCentroid::HalfWidths widths{};
     for (int v = 0; v <= kHalfPatch; ++v) {
-      const int width = static_cast<int>(std::lround(std::sqrt(double(kHalfPatch * kHalfPatch - v * v))));
-      for (int u = -width; u <= width; ++u) {
-        const auto row = static_cast<std::size_t>(v), column = static_cast<std::size_t>(u + kHalfPatch);
-        rows.one[row][column] = 1;
-        rows.column[row][column] = static_cast<std::int16_t>(u);
-      }
+      widths[static_cast<std::size_t>(v)] =
+          static_cast<int>(std::lround(std::sqrt(double(kHalfPatch * kHalfPatch - v * v))));
     }
-    return rows;
+    return internal::IntensityCentroid(widths);
   }();
   return patch;
-}
-
-// Orientation by the intensity centroid (Rublee 2011, section 3.2) [deg].
-float Orientation(const cv::Mat& image, int x, int y) {
-  constexpr int kLanes = cv::v_int16x8::nlanes;
-  const PatchRows& patch = OrientationPatch();
-  cv::v_int32x4 across = cv::v_setzero_s32();
-  int m01 = 0;
-  for (int v = 0; v <= kHalfPatch; ++v) {
-    const std::uint8_t* below = image.ptr<std::uint8_t>(y + v) + x - kHalfPatch;
-    const std::uint8_t* above = image.ptr<std::uint8_t>(y - v) + x - kHalfPatch;
-    const auto row = static_cast<std::size_t>(v);
-    cv::v_int32x4 down = cv::v_setzero_s32();
-    for (int u = 0; u < PatchRows::kColumns; u += kLanes) {
-      const cv::v_int16x8 b = cv::v_reinterpret_as_s16(cv::v_load_expand(below + u));
-      const cv::v_int16x8 a = cv::v_reinterpret_as_s16(cv::v_load_expand(above + u));
-      const cv::v_int16x8 both = v == 0 ? b : a + b;
-      across = cv::v_dotprod(both, cv::v_load(patch.column[row].data() + u), across);
-      down = cv::v_dotprod(b - a, cv::v_load(patch.one[row].data() + u), down);
-    }
-    m01 += v * cv::v_reduce_sum(down);
-  }
-  return cv::fastAtan2(static_cast<float>(m01), static_cast<float>(cv::v_reduce_sum(across)));
 }
 
 // Sub-pixel corner: the point that is nearest to all the lines through the window's pixels along their edges
@@ -208,7 +176,7 @@ FrameFeatures ExtractOrb(const std::vector<cv::Mat>& pyramid, const OdometryOpti
     std::vector<cv::KeyPoint> corners =
         DetectCorners(image, {wanted[l], options.fast_threshold, options.fast_threshold_min, kBorder});
     for (cv::KeyPoint& k : corners) {
-      k.angle = Orientation(image, static_cast<int>(k.pt.x), static_cast<int>(k.pt.y));
+      k.angle = OrientationPatch().Angle(image, static_cast<int>(k.pt.x), static_cast<int>(k.pt.y));
       k.octave = 0;
       k.size = 2 * kHalfPatch + 1;
     }

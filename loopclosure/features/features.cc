@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 #include <tuple>
 
+#include "loopclosure/features/orb.h"
 #include "loopclosure/features/sift.h"
 #include "loopclosure/features/smallest_image.h"
 #include "tutti/core/error.h"
@@ -15,22 +16,13 @@
 namespace tutti {
 namespace {
 
-// A detector gives more than are kept, so that there is something to choose from when spreading.
-constexpr int kOversampling = 2;
 constexpr double kImageBlur = 0.5;  // what an image is taken to be smoothed by [px]
 
-// ORB drops points near the border; its default of 31 px leaves small images without upper pyramid levels
-// (loop-closure.md section 6). A twentieth of the shorter side keeps them; ORB reflects the image at its
-// border.
-cv::Ptr<cv::Feature2D> CreateOrb(cv::Size size, int features, const ExtractionOptions& options) {
-  constexpr float kScale = 1.2f;
-  constexpr int kPatch = 31;
-  const int side = std::min(size.width, size.height);
-  const int edge = std::clamp(static_cast<int>(options.orb_border * side), 3, 31);
-  int levels = 1;
-  for (double s = side / kScale; levels < 8 && s > 2 * edge + kPatch; s /= kScale) ++levels;
-  return cv::ORB::create(features, kScale, levels, edge, 0, 2, cv::ORB::HARRIS_SCORE, kPatch,
-                         options.orb_fast_threshold);
+// How many points are to be detected for those that are kept: more, so that there is something to choose from
+// when spreading.
+int NumDetected(const ExtractionOptions& options) {
+  constexpr int kOversampling = 2;
+  return options.features * kOversampling;
 }
 
 std::vector<cv::KeyPoint> Picked(const std::vector<cv::KeyPoint>& keypoints,
@@ -201,14 +193,13 @@ FeatureExtractor::FeatureExtractor(const std::string& name, const ExtractionOpti
     throw InputError("unknown member '" + name + "'; did you mean '" + NearestWord(name, known) + "'?");
   }
   if (name == "surf") {
-    surf_ = CreateDlibSurf(options.features * kOversampling, options.surf_octaves,
+    surf_ = CreateDlibSurf(NumDetected(options), options.surf_octaves,
                            std::min(options.surf_threshold, options.surf_min_threshold));
   }
 }
 
 cv::Ptr<cv::Feature2D> FeatureExtractor::Create(cv::Size size) const {
-  const int wanted = options_.features * kOversampling;
-  if (name_ == "orb") return CreateOrb(size, wanted, options_);
+  const int wanted = NumDetected(options_);
   if (name_ == "gftt") return CreateGfttBrief(wanted);
   if (name_ == "akaze") return cv::AKAZE::create();
   if (name_ == "brisk") return cv::BRISK::create();
@@ -233,6 +224,9 @@ Features FeatureExtractor::Extract(const cv::Mat& grey) const {
     if (std::min(size.width, size.height) < kMinSide) return features;
     cv::resize(grey, image, size, 0, 0, factor > 1.0 ? cv::INTER_AREA : cv::INTER_LINEAR);
   }
+  const auto spread = [&](const std::vector<cv::KeyPoint>& detected) {
+    return SelectSpread(detected, image.size(), options_.features, options_.grid_columns);
+  };
   if (name_ == "sift") {
     std::unique_ptr<internal::SiftScratch> scratch = scratches_->Take();
     features = internal::ExtractSift(image, kImageBlur * std::max(1.0, 1.0 / factor), options_, *scratch);
@@ -242,16 +236,19 @@ Features FeatureExtractor::Extract(const cv::Mat& grey) const {
     std::vector<cv::KeyPoint> detected;
     surf_->detect(image, detected);
     DropWeak(options_.surf_threshold, options_.features, detected);
-    features.keypoints =
-        Picked(detected, SelectSpread(detected, image.size(), options_.features, options_.grid_columns));
+    features.keypoints = Picked(detected, spread(detected));
     surf_->compute(image, features.keypoints, features.descriptors);
+  } else if (name_ == "orb") {
+    const internal::Orb orb(image, internal::OrbOptionsFor(image.size(), NumDetected(options_), options_));
+    const std::vector<cv::KeyPoint> detected = orb.Detect();
+    features.keypoints = Picked(detected, spread(detected));
+    features.descriptors = orb.Describe(features.keypoints);
   } else {
     std::vector<cv::KeyPoint> keypoints;
     cv::Mat descriptors;
     Create(image.size())->detectAndCompute(image, cv::noArray(), keypoints, descriptors);
     if (keypoints.empty() || descriptors.rows != static_cast<int>(keypoints.size())) return features;
-    const std::vector<int> selected =
-        SelectSpread(keypoints, image.size(), options_.features, options_.grid_columns);
+    const std::vector<int> selected = spread(keypoints);
     features.keypoints = Picked(keypoints, selected);
     features.descriptors.create(static_cast<int>(selected.size()), descriptors.cols, descriptors.type());
     for (std::size_t i = 0; i < selected.size(); ++i) {

@@ -1,4 +1,8 @@
-#include "frontend/features/fast_corners.h"
+// FAST: corners that nine neighbouring pixels of a circle around them are all brighter, or all darker, than.
+// E. Rosten, T. Drummond, "Machine learning for high-speed corner detection", ECCV 2006.
+//
+// For the modules that link OpenCV; core itself does not. Not installed.
+#pragma once
 
 #include <algorithm>
 #include <array>
@@ -6,9 +10,10 @@
 #include <cstdint>
 #include <opencv2/core/hal/intrin.hpp>
 #include <opencv2/features2d.hpp>
+#include <vector>
 
-namespace tutti {
-namespace {
+namespace tutti::internal {
+namespace fast {  // what only FastCorners needs
 
 using Pixel = std::uint8_t;
 using Lanes = cv::v_uint8x16;
@@ -21,18 +26,20 @@ using Rows = std::array<const Pixel*, kRows>;
 using Circle = std::array<Lanes, kRingPixels>;
 
 // The pixels at the same place of the circle around each.
-Circle CircleAround(const Rows& rows, int x) {
+inline Circle CircleAround(const Rows& rows, int x) {
   const auto at = [&](int dx, int dy) {
-    return cv::v_load(rows[static_cast<std::size_t>(kRadius + dy)] + x + dx);
+    const int row = kRadius + dy;
+    return cv::v_load(rows[static_cast<std::size_t>(row)] + x + dx);
   };
   return {at(0, 3),  at(1, 3),   at(2, 2),   at(3, 1),   at(3, 0),  at(3, -1), at(2, -2), at(1, -3),
           at(0, -3), at(-1, -3), at(-2, -2), at(-3, -1), at(-3, 0), at(-3, 1), at(-2, 2), at(-1, 3)};
 }
 
 // Whether one of them may be a corner: of each fourth pixel of the circle an arc of nine holds two in a row.
-bool MayBeCorner(const Rows& rows, int x, const Lanes& here, const Lanes& threshold) {
+inline bool MayBeCorner(const Rows& rows, int x, const Lanes& here, const Lanes& threshold) {
   const auto at = [&](int dx, int dy) {
-    return cv::v_load(rows[static_cast<std::size_t>(kRadius + dy)] + x + dx);
+    const int row = kRadius + dy;
+    return cv::v_load(rows[static_cast<std::size_t>(row)] + x + dx);
   };
   const Lanes n = at(0, -3), s = at(0, 3), w = at(-3, 0), e = at(3, 0);
   const Lanes nw = at(-2, -2), ne = at(2, -2), sw = at(-2, 2), se = at(2, 2);
@@ -44,7 +51,7 @@ bool MayBeCorner(const Rows& rows, int x, const Lanes& here, const Lanes& thresh
 }
 
 // Of each arc of nine the least difference, and of these the greatest.
-Lanes OfBestArc(const Circle& difference) {
+inline Lanes OfBestArc(const Circle& difference) {
   const auto at = [&difference](std::size_t k) -> const Lanes& { return difference[k % kRingPixels]; };
   std::array<Lanes, kRingPixels / 2> two, four;  // least of so many in a row, from each odd one on
   for (std::size_t k = 0; k < two.size(); ++k) two[k] = cv::v_min(at(2 * k + 1), at(2 * k + 2));
@@ -59,7 +66,7 @@ Lanes OfBestArc(const Circle& difference) {
 }
 
 // The greatest threshold at which each still is a corner; 0 where it is none.
-Lanes Scores(const Rows& rows, int x, const Lanes& here, const Lanes& threshold) {
+inline Lanes Scores(const Rows& rows, int x, const Lanes& here, const Lanes& threshold) {
   const Circle around = CircleAround(rows, x);
   Circle difference;
   for (std::size_t k = 0; k < kRingPixels; ++k)
@@ -78,7 +85,7 @@ void ForLanes(int cols, const Visit& visit) {
   visit(last);
 }
 
-void ScoreRow(const Rows& rows, int cols, Pixel threshold, Pixel* scores) {
+inline void ScoreRow(const Rows& rows, int cols, Pixel threshold, Pixel* scores) {
   const Lanes above = cv::v_setall_u8(threshold);
   ForLanes(cols, [&](int x) {
     const Lanes here = cv::v_load(rows[kRadius] + x);
@@ -88,8 +95,8 @@ void ScoreRow(const Rows& rows, int cols, Pixel threshold, Pixel* scores) {
 }
 
 // Adds the corners of a row that are stronger than the eight pixels around them.
-void AddStrongest(const Pixel* above, const Pixel* here, const Pixel* below, int cols, int row,
-                  std::vector<cv::KeyPoint>& corners) {
+inline void AddStrongest(const Pixel* above, const Pixel* here, const Pixel* below, int cols, int row,
+                         std::vector<cv::KeyPoint>& corners) {
   int next = 0;
   ForLanes(cols, [&](int x) {
     const Lanes scores = cv::v_load(here + x);
@@ -110,9 +117,10 @@ void AddStrongest(const Pixel* above, const Pixel* here, const Pixel* below, int
   });
 }
 
-}  // namespace
-
-std::vector<cv::KeyPoint> FastCorners(const cv::Mat& image, int threshold) {
+/// What cv::FAST(image, corners, threshold, true) finds in an 8-bit grey image (16 pixels around, 9 in a row,
+/// those next to a stronger one left out), in the same order: by row, then by column; none above 255. In a
+/// fraction of its time: scores are computed for many corners at once.
+inline std::vector<cv::KeyPoint> FastCorners(const cv::Mat& image, int threshold) {
   std::vector<cv::KeyPoint> corners;
   threshold = std::clamp(threshold, 0, 255);
   if (image.cols < 2 * kRadius + kPixelLanes) {
@@ -137,4 +145,8 @@ std::vector<cv::KeyPoint> FastCorners(const cv::Mat& image, int threshold) {
   return corners;
 }
 
-}  // namespace tutti
+}  // namespace fast
+
+using fast::FastCorners;
+
+}  // namespace tutti::internal

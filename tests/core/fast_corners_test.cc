@@ -1,11 +1,11 @@
-#include "frontend/features/fast_corners.h"
+#include "core/fast_corners.h"
 
 #include <gtest/gtest.h>
 
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 
-namespace tutti {
+namespace tutti::internal {
 namespace {
 
 // Number of corners; both ways have to give the same.
@@ -62,4 +62,4 @@ TEST(FastCorners, AreThoseOfOpenCvInPartsOfAnImage) {
 }
 
 }  // namespace
-}  // namespace tutti
+}  // namespace tutti::internal

@@ -82,7 +82,7 @@ std::vector<PlotShape> LayOut(const PanelPlot& plot) {
     const Eigen::Vector2d y = RangeOf(CurvesOf(plot.panels[k]), 1, 0.06);
     axes.low = {x[0], y[0]};
     axes.high = {x[1], y[1]};
-    axes.y_ticks = std::max(2.0, 6 / count);
+    axes.y_ticks = std::max(3.0, 12 / count);
     axes.y_name = plot.panels[k].y_name;
     if (k + 1 == plot.panels.size()) axes.x_name = plot.x_name;
     AddAxes(axes, shapes);

@@ -1,9 +1,8 @@
-// What every picture of tutti is drawn with: simple shapes on a page, the same as SVG and as PNG, and axes
-// with ticks. No display, no plotting library.
+// What every picture of tutti is drawn with: simple shapes on a page, the same in every format
+// (plot_picture.h), and axes with ticks. No display, no plotting library.
 #pragma once
 
 #include <Eigen/Core>
-#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -54,8 +53,5 @@ struct PlotAxes {
 
 /// Grid, ticks, numbers, frame, names and title.
 void AddAxes(const PlotAxes& axes, std::vector<PlotShape>& shapes);
-
-/// Throws InputError if the file can't be written in full.
-void WriteSvg(const std::filesystem::path& file, const std::vector<PlotShape>& shapes, int width, int height);
 
 }  // namespace tutti

@@ -4,10 +4,10 @@
 #include <string>
 #include <vector>
 
+#include "apps/plot/plot_picture.h"
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/evaluation_input.h"
-#include "apps/tutti/plot_file.h"
 #include "apps/tutti/trajectory_plots.h"
 #include "tutti/core/error.h"
 
@@ -18,6 +18,7 @@ struct PlotArguments {
   EvaluationInput input;
   std::vector<std::string> out;
   std::string what = "trajectory", title;
+  PlotFont font;
 };
 
 std::vector<PlotShape> Shapes(const PlotArguments& arguments) {
@@ -38,10 +39,10 @@ std::vector<PlotShape> Shapes(const PlotArguments& arguments) {
 }
 
 void RunPlot(const PlotArguments& arguments) {
-  for (const std::string& file : arguments.out) CheckPlotFile(file);
+  for (const std::string& file : arguments.out) PlotFormatOf(file);  // before the work
   const std::vector<PlotShape> shapes = Shapes(arguments);
   for (const std::string& file : arguments.out) {
-    WritePlotFile(file, shapes);
+    WritePlot(file, PlotFormatOf(file), shapes, arguments.font);
     std::printf("%s\n", file.c_str());
   }
 }
@@ -64,11 +65,19 @@ void SetUpPlot(CLI::App& command, int&) {
   command.add_option("--out", arguments->out, "Files to write; the ending is the format: .svg, .png, .pdf")
       ->required();
   command.add_option("--title", arguments->title, "Text above the plot");
+  command
+      .add_option("--font", arguments->font.family,
+                  "Family of all texts, as `fc-list : family` names it; for papers: \"Times New Roman\", "
+                  "\"Latin Modern Roman\"")
+      ->capture_default_str();
+  command.add_option("--font-scale", arguments->font.scale, "Factor of the texts' heights")
+      ->check(CLI::Range(0.25, 4.0))
+      ->capture_default_str();
   command.footer(
       "trajectory, xyz, rpy and speed need no reference; with one, poses are associated and aligned as "
       "`tutti "
       "evaluate`\n"
-      "does. PDF needs a build with Cairo (Debian: libcairo2-dev).\n"
+      "does.\n"
       "Examples:\n"
       "  tutti plot a.txt b.txt --what xyz --out xyz.svg\n"
       "  tutti plot a.txt b.txt --reference gt.txt --out map.svg map.pdf\n"

@@ -76,7 +76,7 @@ TEST_F(LoopsCommand, WritesEverythingThatScriptsRelyOn) {
               StartsWith("image,file,hypothesis,candidate,posterior,probability,proposed,"));
   EXPECT_THAT(ReadAll(out_ / "precision_recall.svg"),
               AllOf(HasSubstr("with verification"), HasSubstr("posterior only"), HasSubstr("ranked behind"),
-                    HasSubstr(">recall<")));
+                    HasSubstr("\nrecall\n")));
 }
 
 // The area and the recall before the first false positive, from the curve's file again.

@@ -22,6 +22,7 @@
 #include "core/example_configs.h"
 #include "tutti/core/error.h"
 #include "tutti/slam/config.h"
+#include "core/terminal.h"
 #include "tutti/slam/map_file.h"
 
 namespace tutti::cli {
@@ -176,7 +177,7 @@ fs::path OutputOf(const RunArguments& arguments) {
 
 int RunOnce(const CLI::App& command, const RunArguments& arguments) {
   if (arguments.help_config) {
-    std::fputs(HelpConfig(arguments.advanced).c_str(), stdout);
+    std::fputs(HelpConfig(arguments.advanced, internal::TerminalColumns(stdout)).c_str(), stdout);
     return 0;
   }
   if (!arguments.resume.empty()) return Resume(command, arguments);

@@ -17,12 +17,14 @@
 #include "apps/tutti/commands.h"
 #include "apps/tutti/exit_code.h"
 #include "apps/tutti/files.h"
+#include "apps/tutti/mask_option.h"
 #include "apps/tutti/run_with_report.h"
 #include "apps/view/live_view.h"
+#include "core/camera_text.h"
 #include "core/example_configs.h"
+#include "core/terminal.h"
 #include "tutti/core/error.h"
 #include "tutti/slam/config.h"
-#include "core/terminal.h"
 #include "tutti/slam/map_file.h"
 
 namespace tutti::cli {
@@ -33,7 +35,8 @@ namespace fs = std::filesystem;
 struct RunArguments {
   std::string config, dataset, out, ground_truth;
   std::string trace, resume, map, save_map;
-  std::string calibration, camera, sensor;
+  std::string calibration, camera, sensor, mask;
+  int rotate = 0;
   double view_deg = 0;
   std::vector<std::string> set;  // SECTION.KEY=VALUE
   bool no_loops = false, no_report = false, quiet = false, keep = false, help_config = false,
@@ -124,9 +127,13 @@ CameraRequest CameraOf(const CLI::App& command, const RunArguments& arguments) {
 // What the map was made with, for a recording of which all frames are used.
 RunConfig ConfigOfMap(const std::string& map) {
   RunConfig config = ReadMapInfo(map).config;
-  config.dataset.start = config.dataset.end = 0;
-  config.dataset.stride = 1;
+  config.dataset = ForAnotherRecording(config.dataset);
   return config;
+}
+
+void SetImageUse(const RunArguments& arguments, DatasetOptions& options) {
+  SetMask(arguments.mask, options);
+  if (arguments.rotate != 0) options.rotate = arguments.rotate;
 }
 
 // Where nothing says what the focal length is, the images may.
@@ -159,14 +166,21 @@ RunConfig ConfigFor(const CameraRequest& camera, const RunArguments& arguments, 
   if (!arguments.config.empty() || !arguments.map.empty()) {
     RunConfig config = arguments.config.empty() ? ConfigOfMap(arguments.map) : LoadConfig(arguments.config);
     SetCamera(arguments.dataset, camera, config);
+    SetImageUse(arguments, config.dataset);
     return config;
   }
   Recording recording = Recognise(arguments.dataset, camera);
   if (!arguments.quiet) {
     for (const std::string& finding : recording.findings) std::fprintf(stderr, "  %s\n", finding.c_str());
   }
+  SetImageUse(arguments, recording.config.dataset);
   SetOptions(arguments.set, recording.config);
-  if (recording.guessed_lens && !IsCamera(arguments.dataset)) MeasureGuess(arguments, recording, request);
+  if (recording.guessed_lens && IsCamera(arguments.dataset)) {
+    request.camera_guessed = true;
+    request.camera_source = "focal length guessed: frames that come once can't be measured before";
+  } else if (recording.guessed_lens) {
+    MeasureGuess(arguments, recording, request);
+  }
   return recording.config;
 }
 
@@ -222,14 +236,17 @@ void SetUpRun(CLI::App& command, int& exit_code) {
   command.add_option(
       "dataset,--dataset", arguments->dataset,
       "the recording: folder of a data set or of images, a video file, a ROS bag, or a camera: camera:0 (the "
-      "first one), camera:1, ...; camera:FILE takes a video file for it");
+      "first one), camera:1, ...; camera:FILE takes a video file for it; or the address of a stream, "
+      "rtsp://... "
+      "or http://...");
   command.add_option("--config", arguments->config,
                      "YAML file (" + internal::ExampleConfigs() +
                          " has one for each public data set). Without it, layout, sensor and calibration "
                          "are found in the recording, and what was found is said");
   command.add_option("--calibration", arguments->calibration,
                      "the camera from a YAML file of Kalibr, ORB-SLAM, OpenCV, ROS or EuRoC");
-  command.add_option("--camera", arguments->camera, "the camera as fx,fy,cx,cy[,k1,k2,p1,p2[,k3]] in pixels");
+  command.add_option("--camera", arguments->camera,
+                     std::string("the camera as ") + internal::kCameraText + " in pixels");
   command
       .add_option("--fov", arguments->view_deg,
                   "the camera by its horizontal field of view [deg], principal point in the middle")
@@ -237,6 +254,12 @@ void SetUpRun(CLI::App& command, int& exit_code) {
   command
       .add_option("--sensor", arguments->sensor, "what to use of the recording; default: all that is there")
       ->check(OneOf(Sensor()));
+  AddMaskOption(command, arguments->mask);
+  command
+      .add_option("--rotate", arguments->rotate,
+                  "turn the images so far clockwise, so that they are upright; the camera is given as it is, "
+                  "before that, and is turned with them. Not for stereo")
+      ->check(OneOf({"90", "180", "270"}));
   command.add_option("--out", arguments->out,
                      "folder for the results (default: tutti-out/NAME): a new or empty one, or that of an "
                      "earlier run, whose results are replaced when the new ones are complete");

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "apps/run/calibration_file.h"
+#include "apps/run/photo_lens.h"
 #include "core/angle.h"
 #include "core/camera_text.h"
 #include "core/example_configs.h"
@@ -263,7 +264,26 @@ class Recogniser {
       out_.guessed_lens = true;
     }
     source_ = SetRequested(dataset_, request, Options());
-    if (out_.guessed_lens) source_ = "guessed: a field of view of " + Short(kUsualView) + " deg";
+    if (!out_.guessed_lens) return;
+    source_ = "guessed: a field of view of " + Short(kUsualView) + " deg";
+    UsePhotos();
+  }
+  // The focal length of the first photo that has one, as a better guess.
+  void UsePhotos() {
+    constexpr std::size_t kLooked = 5;
+    std::vector<fs::path> photos = ListImages(dataset_);
+    if (photos.empty()) photos = ListImages(ImagesOfDataset(dataset_).value_or(dataset_));
+    photos.resize(std::min(kLooked, photos.size()));
+    PinholeCamera& camera = *Options().camera;
+    for (const fs::path& photo : photos) {
+      if (const std::optional<PhotoLens> lens = ReadPhotoLens(photo, camera.width, camera.height)) {
+        camera.fx = camera.fy = lens->focal_px;
+        source_ = out_.photo_lens = lens->text;
+        return;
+      }
+    }
+    if (!photos.empty() && HasUnreadLens(photos.front()))
+      source_ += "; the photos may name one (EXIF), but this tutti was built without libexif";
   }
 
   void Say() {

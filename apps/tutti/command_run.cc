@@ -131,6 +131,12 @@ RunConfig ConfigOfMap(const std::string& map) {
   return config;
 }
 
+std::string Pixels(double focal_px) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.1f px", focal_px);
+  return text;
+}
+
 void SetImageUse(const RunArguments& arguments, DatasetOptions& options) {
   SetMask(arguments.mask, options);
   if (arguments.rotate != 0) options.rotate = arguments.rotate;
@@ -153,9 +159,11 @@ void MeasureGuess(const RunArguments& arguments, Recording& recording, RunReques
     std::snprintf(text, sizeof text, "focal length measured on %d frames: %.1f px, give or take %.1f %%",
                   found.frames, found.camera.fx, 100 * found.sigma);
   } else {
-    request.camera_guessed = true;
-    std::snprintf(text, sizeof text, "focal length guessed, %.1f px: in the first %d frames %s",
-                  found.camera.fx, found.frames, found.reason.c_str());
+    request.camera_guessed = recording.photo_lens.empty();
+    const std::string source =
+        request.camera_guessed ? "guessed, " + Pixels(found.camera.fx) : recording.photo_lens;
+    std::snprintf(text, sizeof text, "focal length %s: in the first %d frames %s", source.c_str(),
+                  found.frames, found.reason.c_str());
   }
   request.camera_source = text;
   say(text);

@@ -6,6 +6,7 @@
 
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "apps/python/bindings.h"
 #include "apps/python/errors.h"
@@ -23,22 +24,23 @@ namespace fs = std::filesystem;
 
 // From Python, whose arrays may change: the map needs the images later.
 InputFrame MakeFrame(const py::object& image, double stamp, std::int64_t index, const py::object& right,
-                     const py::object& depth, bool rgb) {
+                     const py::object& depth, const py::object& mask, bool rgb) {
   InputFrame frame;
   frame.index = index;
   frame.stamp_s = stamp;
   const ImageView left_view = ViewOfImage(image, "image", rgb), right_view = ViewOfImage(right, "right", rgb);
-  const ImageView depth_view = ViewOfDepth(depth, "depth");
+  const ImageView depth_view = ViewOfDepth(depth, "depth"), mask_view = ViewOfMask(mask, "mask");
   const cv::Size size = left_view.pixels.size();
   if (size.empty()) throw py::value_error("image: a frame needs one");
-  for (const ImageView* other : {&right_view, &depth_view}) {
+  for (const auto& [other, name] :
+       {std::pair(&right_view, "right"), {&depth_view, "depth"}, {&mask_view, "mask"}}) {
     if (!other->pixels.empty() && other->pixels.size() != size)
-      throw py::value_error(std::string(other == &right_view ? "right" : "depth") +
-                            " must be as large as image");
+      throw py::value_error(std::string(name) + " must be as large as image");
   }
   frame.image = ToGrey8(left_view.pixels).clone();
   frame.right = ToGrey8(right_view.pixels).clone();
   frame.depth_m = depth_view.pixels.clone();
+  frame.mask = mask_view.pixels.clone();
   return frame;
 }
 
@@ -149,11 +151,11 @@ void BindFrame(py::module_& module) {
   using namespace pybind11::literals;  // NOLINT(google-build-using-namespace)
   py::class_<InputFrame>(module, "Frame", doc::InputFrame)
       .def(py::init(&MakeFrame), "image"_a, "stamp"_a, "index"_a = 0, py::kw_only(), "right"_a = py::none(),
-           "depth"_a = py::none(), "rgb"_a = false,
+           "depth"_a = py::none(), "mask"_a = py::none(), "rgb"_a = false,
            "From arrays, which are copied; colour becomes grey. Rectified: the rig's camera has no "
            "distortion. image, "
            "right: uint8 (H, W) or (H, W, 3), blue, green, red unless rgb. depth: float32 (H, W) [m], 0 = "
-           "unknown. "
+           "unknown. mask: uint8 or bool (H, W); there are no features where it is 0. "
            "index grows.")
       .def_readonly("index", &InputFrame::index, doc::InputFrame_index)
       .def_readonly("stamp", &InputFrame::stamp_s, doc::InputFrame_stamp_s)
@@ -167,6 +169,9 @@ void BindFrame(py::module_& module) {
           "depth", [](const InputFrame& frame) { return ArrayOfImage(frame.depth_m); },
           "RGB-D: float32 (H, W) [m], registered to image, 0 = no measurement; else, or where it is absent, "
           "None.")
+      .def_property_readonly(
+          "mask", [](const InputFrame& frame) { return ArrayOfImage(frame.mask); },
+          "uint8 (H, W); there are no features where it is 0. None: everywhere.")
       .def("__repr__", [](const InputFrame& frame) {
         return py::str("Frame(index={}, stamp={}, size={}x{})")
             .format(frame.index, frame.stamp_s, frame.image.cols, frame.image.rows);

@@ -131,15 +131,15 @@ Json Entry(const Dataset& dataset, const ShownLoop& loop) {
 Json GalleryJson(const RunResult& result, const std::vector<ShownLoop>& loops) {
   Json json = {{"note", ""}, {"entries", Json::array()}};
   if (loops.empty()) return json;
+  if (IsCamera(result.dataset)) {
+    json["note"] = "a camera's images can't be read again, so there are no pictures";
+    return json;
+  }
   std::unique_ptr<Dataset> dataset;
   try {
     dataset = OpenDataset(result.dataset, result.config.dataset);
   } catch (const InputError& error) {
     json["note"] = std::string("the images can't be read again: ") + error.what();
-    return json;
-  }
-  if (dataset->FrameSupply() == Supply::kOnce) {
-    json["note"] = "a camera's images can't be read again, so there are no pictures";
     return json;
   }
   std::string note;

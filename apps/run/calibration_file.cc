@@ -8,6 +8,7 @@
 #include <sstream>
 #include <vector>
 
+#include "frontend/dataset/sensor_yaml.h"
 #include "tutti/core/error.h"
 #include "tutti/slam/config.h"
 
@@ -134,21 +135,29 @@ void SetSize(const CalibrationText& text, const YAML::Node& size, PinholeCamera&
 
 std::string Word(const YAML::Node& node) { return node.IsDefined() && node.IsScalar() ? node.Scalar() : ""; }
 
-// Kalibr's cam0, or the whole of a sensor.yaml.
-Calibration FromIntrinsics(const CalibrationText& text, const YAML::Node& node, const std::string& format) {
+// Kalibr's cam0, or what stands there alone.
+Calibration FromKalibr(const CalibrationText& text, const YAML::Node& node) {
   Calibration out;
-  out.format = format;
+  out.format = "Kalibr";
   const std::string model = Word(node["camera_model"]);
   if (!model.empty() && model != "pinhole")
     text.Fail(node["camera_model"], "camera_model '" + model + "': tutti has pinhole alone");
   SetIntrinsics(text, node, text.Numbers(node["intrinsics"], "intrinsics"), out.camera);
   SetSize(text, node["resolution"], out.camera);
-  const bool kalibr = node["distortion_coeffs"].IsDefined();
-  const YAML::Node lens = node[kalibr ? "distortion_coeffs" : "distortion_coefficients"];
+  const YAML::Node lens = node["distortion_coeffs"];
   if (lens.IsDefined() && Word(node["distortion_model"]) != "none") {
     SetLens(text, lens, Word(node["distortion_model"]), text.Numbers(lens, "distortion_coeffs"), out.camera);
   }
   if (node["rate_hz"].IsDefined()) out.rate_hz = text.Number(node["rate_hz"], "rate_hz");
+  return out;
+}
+
+Calibration FromEuroc(const CalibrationText& text) {
+  const SensorYaml read = ReadSensorYaml(text.file());
+  Calibration out;
+  out.format = "EuRoC";
+  out.camera = read.camera;
+  out.rate_hz = read.rate_hz.value_or(0);
   return out;
 }
 
@@ -227,8 +236,9 @@ Calibration FromTutti(const CalibrationText& text) {
 Calibration Read(const CalibrationText& text) {
   const YAML::Node& root = text.root();
   if (root["cam0"].IsDefined() && root["cam0"].IsMap() && root["cam0"]["intrinsics"].IsDefined())
-    return FromIntrinsics(text, root["cam0"], "Kalibr");
-  if (root["intrinsics"].IsDefined()) return FromIntrinsics(text, root, "EuRoC");
+    return FromKalibr(text, root["cam0"]);
+  if (root["intrinsics"].IsDefined() && root["distortion_coeffs"].IsDefined()) return FromKalibr(text, root);
+  if (root["intrinsics"].IsDefined()) return FromEuroc(text);
   if (root["Camera1.fx"].IsDefined() || root["Camera.fx"].IsDefined()) return FromOrbSlam(text);
   if (root["camera"].IsDefined() && root["camera"].IsMap()) return FromTutti(text);
   const YAML::Node matrix = FirstOf(root, {"camera_matrix", "Camera_Matrix", "cameraMatrix", "K"});

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "frontend/dataset/image_file.h"
+#include "frontend/dataset/turned_dataset.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 
@@ -11,10 +12,6 @@ namespace tutti {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string SizeOf(const cv::Mat& image) {
-  return std::to_string(image.cols) + "x" + std::to_string(image.rows);
-}
 
 }  // namespace
 
@@ -39,9 +36,10 @@ DepthBeside::DepthBeside(std::unique_ptr<Dataset> images, const std::vector<doub
   rig_.sensor = Sensor::kRgbd;
   rig_.max_depth_m = options.max_depth_m;
   if (options.camera && options.camera->distortion != Distortion::kNone) {
+    const PinholeCamera stored = TurnedCamera(rig_.camera, (360 - options.rotate) % 360);
     PinholeCamera camera = *options.camera;  // of the images' size, as OpenDataset has checked
-    camera.width = rig_.camera.width;
-    camera.height = rig_.camera.height;
+    camera.width = stored.width;
+    camera.height = stored.height;
     rectifier_.emplace(camera);
   }
   const std::vector<fs::path> found = ListImages(depth);
@@ -86,14 +84,18 @@ ReadResult DepthBeside::Read(std::size_t i) const {
     result.depth_error = read.error;
     return result;
   }
-  if (read.image.size() != result.frame->image.size()) {
-    result.depth_error = file.string() + ": the depth image has " + SizeOf(read.image) +
-                         " pixels, but the images have " + SizeOf(result.frame->image) +
+  const bool upright = options_.rotate % 180 == 0;
+  const cv::Size turned = result.frame->image.size();
+  const cv::Size stored = upright ? turned : cv::Size(turned.height, turned.width);
+  if (read.image.size() != stored) {
+    result.depth_error = file.string() + ": the depth image has " + SizeText(read.image.size()) +
+                         " pixels, but the images have " + SizeText(stored) +
                          "; depth must be registered to them";
     return result;
   }
   const cv::Mat metres = DepthInMetres(read.image, options_.depth_units_per_m, options_.max_depth_m);
-  result.frame->depth_m = rectifier_ ? rectifier_->Apply(metres, Sampling::kNearest) : metres;
+  const cv::Mat rectified = rectifier_ ? rectifier_->Apply(metres, Sampling::kNearest) : metres;
+  result.frame->depth_m = TurnedImage(rectified, options_.rotate);
   return result;
 }
 

@@ -225,7 +225,9 @@ PinholeCamera CameraOf(const PinholeCamera& before, const std::array<double, 4>&
 FocalLength MeasureFocalLength(const fs::path& path, const RunConfig& config, int frames) {
   constexpr int kMostPasses = 5;
   constexpr double kSettled = 0.01;
-  const std::unique_ptr<Dataset> dataset = OpenDataset(path, config.dataset);
+  DatasetOptions as_stored = config.dataset;
+  as_stored.rotate = 0;
+  const std::unique_ptr<Dataset> dataset = OpenDataset(path, as_stored);
   FocalLength result;
   result.camera = dataset->Rig().camera;
   // From the usual one; a wide or a narrow one where that loses its way.

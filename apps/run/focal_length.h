@@ -22,7 +22,8 @@ struct FocalLength {
 /// with focal length, principal point and radial distortion free (Brown's model, k1 alone); both again with
 /// what was found, until it stays. Priors: principal point as it is, give or take 1 % of the width; k1 0,
 /// give or take 0.05. `sigma` is from how much worse the adjusted map
-/// fits with another focal length. One camera, or colour and depth, without distortion. The same input
+/// fits with another focal length. One camera, or colour and depth, without distortion; it is that of the
+/// images as they are stored (without dataset.rotate). The same input
 /// gives the same result. Throws InputError if the data set can't be opened.
 FocalLength MeasureFocalLength(const std::filesystem::path& dataset, const RunConfig& config,
                                int frames = 300);

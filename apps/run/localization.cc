@@ -37,11 +37,8 @@ bool IsLocalization(const fs::path& entry) {
 }
 
 DatasetOptions Reading(const LocalizationRequest& request, const MapInfo& info) {
-  DatasetOptions options = request.options.value_or(info.config.dataset);
-  if (!request.options) {
-    options.start = options.end = 0;
-    options.stride = 1;
-  }
+  DatasetOptions options = request.options.value_or(ForAnotherRecording(info.config.dataset));
+  if (request.mask) options.mask = request.mask->string();
   if (request.start) options.start = *request.start;
   if (request.end) options.end = *request.end;
   if (request.stride) options.stride = *request.stride;
@@ -101,6 +98,7 @@ std::string Summary(const LocalizationRequest& request, const Localization& l) {
                     {"localized", l.Localized()},
                     {"lost", l.frames.size() - l.Localized()},
                     {"bad", l.bad}};
+  if (l.masked) json["frames"]["without_mask"] = l.without_mask;
   json["time"] = {{"load_s", l.load_s}, {"wall_s", l.wall_s}, {"cpu_s", l.cpu_s}};
   if (l.first_pose_s) json["time"]["first_pose_s"] = *l.first_pose_s;
   return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
@@ -155,6 +153,7 @@ void LocateAll(const LocalizationRequest& request, const Dataset& dataset, const
       continue;
     }
     const InputFrame& frame = *fetched->read.frame;
+    if (frame.mask.empty()) ++result.without_mask;
     const std::size_t recognised = slam.Relocalized();
     LocalizedFrame located;
     located.index = frame.index;
@@ -181,12 +180,14 @@ Localization Localize(const LocalizationRequest& request) {
   const internal::Stopwatch since;
   cv::setNumThreads(1);
   const MapInfo info = ReadMapInfo(request.map);
-  const std::unique_ptr<Dataset> dataset = OpenDataset(request.dataset, Reading(request, info));
+  const DatasetOptions options = Reading(request, info);
+  const std::unique_ptr<Dataset> dataset = OpenDataset(request.dataset, options);
   CheckRig(request, info.rig, dataset->Rig());
   const InterruptGuard guard;
   RefuseToReplace(request.out, request.map);
   OutputFolder folder(request.out, {IsLocalization, kSummary, "version", {}, nullptr});
   Localization result;
+  result.masked = !options.mask.empty();
   const std::unique_ptr<SlamSystem> slam = OpenMap(request, info);
   result.load_s = since.Seconds();
   result.map_keyframes = slam->odometry()->NextKeyframeId();

@@ -15,8 +15,9 @@ namespace tutti {
 
 struct LocalizationRequest {
   std::filesystem::path map, dataset, out;
-  std::optional<DatasetOptions> options;  ///< how to read the data set; none: as the map's was read
-  std::optional<int> start, end, stride;  ///< instead of those of the options [frames]
+  std::optional<DatasetOptions> options;      ///< how to read the data set; none: as the map's was read
+  std::optional<std::filesystem::path> mask;  ///< instead of that of the options
+  std::optional<int> start, end, stride;      ///< instead of those of the options [frames]
   int threads = 2;
   bool quiet = false;  ///< no progress, no notes
 };
@@ -36,6 +37,8 @@ struct Localization {
   std::vector<LocalizedFrame> frames;  ///< that could be read
   int map_keyframes = 0;               ///< keyframes from this id on are none of the map's
   std::size_t bad = 0;                 ///< that could not
+  bool masked = false;                 ///< not all of the images is used
+  std::size_t without_mask = 0;        ///< frames that could be read, without a mask
   Trajectory trajectory;               ///< T_world_body of those with a pose; the world is the map's
   double wall_s = 0, cpu_s = 0;        ///< without loading the map
   double load_s = 0;                   ///< of loading the map

@@ -96,6 +96,7 @@ Json FramesJson(const RunResult& r) {
                  {"relocalized", r.frames_relocalized},
                  {"dropped", r.frames_dropped},
                  {"in_dataset", r.frames_listed},
+                 {"without_mask", r.frames_without_mask},
                  {"without_depth", r.frames_without_depth}};
   for (const auto& [name, list] : {std::pair("bad_frames", &r.bad), {"bad_depth", &r.bad_depth}}) {
     frames[name] = Json::array();
@@ -312,6 +313,7 @@ std::string ResultTable(const RunResult& r) {
   std::ostringstream out;
   out << "\n  frames " << r.frames_tracked << " of " << r.frames_total << " tracked";
   if (!r.bad.empty()) out << ", " << r.bad.size() << " bad";
+  if (r.frames_without_mask > 0) out << ", " << r.frames_without_mask << " without mask";
   if (r.frames_without_depth > 0)
     out << ", " << r.frames_without_depth << " without " << DepthSource(r.rig.sensor) << " image";
   if (r.realtime) out << ", " << r.frames_dropped << " dropped";

@@ -1,10 +1,11 @@
 #include "apps/run/progress.h"
 
-#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <utility>
+
+#include "core/terminal.h"
 
 namespace tutti {
 namespace {
@@ -35,12 +36,7 @@ Progress::Progress(std::string title, std::size_t total, std::FILE* out, std::si
 
 Progress::~Progress() { Finish(); }
 
-std::size_t Progress::Columns() const {
-  if (columns_ > 0) return columns_;
-  winsize size{};
-  if (terminal_ && ioctl(fileno(out_), TIOCGWINSZ, &size) == 0 && size.ws_col > 0) return size.ws_col;
-  return 80;
-}
+std::size_t Progress::Columns() const { return columns_ > 0 ? columns_ : internal::TerminalColumns(out_); }
 
 std::string Progress::Line(std::size_t done, const std::string& status) const {
   const double seconds = since_begin_.Seconds();

@@ -6,10 +6,12 @@
 #include <memory>
 
 #include "apps/run/calibration_file.h"
+#include "apps/run/photo_lens.h"
 #include "core/angle.h"
+#include "core/camera_text.h"
 #include "core/example_configs.h"
+#include "frontend/dataset/image_file.h"
 #include "tutti/core/error.h"
-#include "tutti/core/text.h"
 #include "tutti/frontend/dataset.h"
 
 namespace tutti {
@@ -44,14 +46,14 @@ void SetImageSize(const fs::path& dataset, const DatasetOptions& options, Pinhol
   any.sensor = Sensor::kMono;
   any.start = any.end = 0;
   any.camera.reset();
+  any.mask.clear();
+  any.rotate = 0;
   const DatasetType type = IsCamera(dataset.string()) ? DatasetType::kVideo : DetectDatasetType(dataset);
   if (type == DatasetType::kKitti || type == DatasetType::kTum) {
     // Without any camera these can't be opened: one that fits every image.
-    std::error_code ignored;
     any.type = DatasetType::kImages;
-    for (const char* images : {"image_0", "image_2", "rgb"}) {
-      if (!HasImages(dataset / images)) continue;
-      const PinholeCamera seen = OpenDataset(dataset / images, any)->Rig().camera;
+    if (const std::optional<fs::path> images = ImagesOfDataset(dataset)) {
+      const PinholeCamera seen = OpenDataset(*images, any)->Rig().camera;
       camera.width = seen.width;
       camera.height = seen.height;
       return;
@@ -59,37 +61,11 @@ void SetImageSize(const fs::path& dataset, const DatasetOptions& options, Pinhol
     throw InputError(dataset.string() +
                      ": the size of the images is not known; use --calibration with a file that has it");
   }
-  if (IsCameraDevice(dataset.string()))
+  if (IsCameraDevice(dataset.string()) && !IsStream(dataset.string()))
     throw InputError(dataset.string() + ": a live camera needs a calibration with its image size");
   const PinholeCamera seen = OpenDataset(dataset, any)->Rig().camera;
   camera.width = seen.width;
   camera.height = seen.height;
-}
-
-PinholeCamera ParseCamera(const std::string& text) {
-  std::vector<double> values;
-  for (std::size_t at = 0; at <= text.size();) {
-    const std::size_t comma = std::min(text.find(',', at), text.size());
-    const std::optional<double> value = ParseDouble(text.substr(at, comma - at));
-    if (!value || !std::isfinite(*value))
-      throw InputError("--camera: '" + text.substr(at, comma - at) +
-                       "' is no number; write fx,fy,cx,cy or fx,fy,cx,cy,k1,k2,p1,p2[,k3] in pixels");
-    values.push_back(*value);
-    at = comma + 1;
-  }
-  if (values.size() != 4 && values.size() != 8 && values.size() != 9)
-    throw InputError("--camera: has " + std::to_string(values.size()) +
-                     " numbers; write fx,fy,cx,cy or fx,fy,cx,cy,k1,k2,p1,p2[,k3] in pixels");
-  PinholeCamera camera;
-  camera.fx = values[0];
-  camera.fy = values[1];
-  camera.cx = values[2];
-  camera.cy = values[3];
-  for (std::size_t i = 4; i < values.size(); ++i) {
-    camera.coefficients[i - 4] = values[i];
-    if (values[i] != 0) camera.distortion = Distortion::kRadTan;
-  }
-  return camera;
 }
 
 void SetView(double view_deg, PinholeCamera& camera) {
@@ -118,7 +94,7 @@ std::string SetRequested(const fs::path& dataset, const CameraRequest& request, 
     source = request.calibration->filename().string() + ", " + calibration.format;
     SetImageSize(dataset, options, camera);
   } else if (!request.camera.empty()) {
-    camera = ParseCamera(request.camera);
+    camera = internal::ParseCamera(request.camera);
     source = "--camera";
     SetImageSize(dataset, options, camera);
   } else {
@@ -251,7 +227,8 @@ class Recogniser {
   }
 
   void Single(DatasetType type, bool live) {
-    layout_ = live                           ? "a camera"
+    layout_ = live && IsStream(dataset_)     ? "a stream"
+              : live                         ? "a camera"
               : type == DatasetType::kImages ? "a folder of images"
               : type == DatasetType::kBag    ? "a ROS bag"
                                              : "a video";
@@ -262,7 +239,7 @@ class Recogniser {
       Requested();
     } else if (type == DatasetType::kBag) {
       source_ = "camera_info";
-    } else if (IsCameraDevice(dataset_.string())) {
+    } else if (IsCameraDevice(dataset_.string()) && !IsStream(dataset_.string())) {
       source_.clear();  // appearance only
     } else {
       BesideOrGuess();
@@ -281,13 +258,32 @@ class Recogniser {
     std::error_code ignored;
     const fs::path folder = fs::is_directory(dataset_, ignored) ? dataset_ : dataset_.parent_path();
     CameraRequest request;
-    request.calibration = CalibrationBeside(folder);
+    if (!IsStream(dataset_.string())) request.calibration = CalibrationBeside(folder);
     if (!request.calibration) {
       request.view_deg = kUsualView;
       out_.guessed_lens = true;
     }
     source_ = SetRequested(dataset_, request, Options());
-    if (out_.guessed_lens) source_ = "guessed: a field of view of " + Short(kUsualView) + " deg";
+    if (!out_.guessed_lens) return;
+    source_ = "guessed: a field of view of " + Short(kUsualView) + " deg";
+    UsePhotos();
+  }
+  // The focal length of the first photo that has one, as a better guess.
+  void UsePhotos() {
+    constexpr std::size_t kLooked = 5;
+    std::vector<fs::path> photos = ListImages(dataset_);
+    if (photos.empty()) photos = ListImages(ImagesOfDataset(dataset_).value_or(dataset_));
+    photos.resize(std::min(kLooked, photos.size()));
+    PinholeCamera& camera = *Options().camera;
+    for (const fs::path& photo : photos) {
+      if (const std::optional<PhotoLens> lens = ReadPhotoLens(photo, camera.width, camera.height)) {
+        camera.fx = camera.fy = lens->focal_px;
+        source_ = out_.photo_lens = lens->text;
+        return;
+      }
+    }
+    if (!photos.empty() && HasUnreadLens(photos.front()))
+      source_ += "; the photos may name one (EXIF), but this tutti was built without libexif";
   }
 
   void Say() {

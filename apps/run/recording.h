@@ -27,13 +27,15 @@ struct Recording {
   RunConfig config;
   /// What was found: layout, sensor, camera, a line each, with what to pass for another choice.
   std::vector<std::string> findings;
-  bool guessed_lens = false;  ///< nothing says what the focal length is: config has a usual one
+  bool guessed_lens = false;  ///< nothing says what the focal length is: config has a usual one, or a photo's
+  std::string photo_lens;     ///< what the photos say of it ("32 mm (EXIF) = 591.7 px"); empty: nothing
 };
 
 /// A config.yaml of tutti in the folder counts first. Else: layout from the folder's content; sensor from the
 /// cameras that have images; calibration from `camera`, else from the data set's own files, else from a
 /// calibration file in the folder, else the one that is published for a folder of that name (TUM's freiburg1
-/// to 3), else guessed. Cameras (camera:0) and videos too. Throws InputError for a missing or empty folder,
+/// to 3), else guessed, from what the photos say (EXIF) if they do. Cameras (camera:0), streams and videos
+/// too. Throws InputError for a missing or empty folder,
 /// and for a calibration that can't be used.
 Recording Recognise(const std::filesystem::path& dataset, const CameraRequest& camera);
 

@@ -47,8 +47,8 @@ void State(Archive& archive, LostStretch& lost) {
 /// What a result has already while the run goes on.
 template <class Archive>
 void StateOfGrowing(Archive& archive, RunResult& result) {
-  archive(result.frames_lost, result.frames_without_depth, result.bad, result.bad_depth, result.lost,
-          result.frame_ms);
+  archive(result.frames_lost, result.frames_without_mask, result.frames_without_depth, result.bad,
+          result.bad_depth, result.lost, result.frame_ms);
 }
 
 }  // namespace tutti

@@ -83,6 +83,7 @@ struct RunResult {
   std::size_t frames_relocalized = 0;    ///< lost, but the loop detector knew the place
   bool realtime = false;                 ///< played by the time stamps
   std::size_t frames_dropped = 0;        ///< not looked at, since newer ones were there already
+  std::size_t frames_without_mask = 0;   ///< where each image has a mask of its own: read, but without one
   std::size_t frames_without_depth = 0;  ///< stereo and RGB-D: read, but without a right or depth image
   std::vector<BadFrame> bad;
   std::vector<BadFrame> bad_depth;  ///< of those without depth the ones that have an image for it

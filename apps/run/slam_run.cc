@@ -226,6 +226,7 @@ void SlamRun::TakeFrame(const FetchedFrame& fetched, Progress& progress) {
   if (fetched.read.frame) {
     so_far_.positions[fetched.read.frame->index] = so_far_.next;
     CountDepth(fetched.read, progress);
+    if (!config_.dataset.mask.empty() && fetched.read.frame->mask.empty()) ++result_.frames_without_mask;
     TrackOne(*fetched.read.frame);
     if (alone_ && TracksAlong()) alone_->Track(*fetched.read.frame);
     return;

@@ -10,6 +10,7 @@
 
 #include "apps/slam/config_table.h"
 #include "core/example_configs.h"
+#include "core/terminal.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 
@@ -200,14 +201,38 @@ std::vector<ConfigEntry> DescribeConfig(const RunConfig& config) {
   return entries;
 }
 
-std::string HelpConfig(bool advanced) {
+namespace {
+
+// A line of YAML and a comment beside it, in lines of at most so many columns; 0: in one line.
+std::string WithComment(const std::string& line, const std::string& comment, std::size_t columns) {
+  const std::size_t column = columns == 0 || columns >= 110 ? 44 : columns >= 60 ? 30 : 4;
+  const std::size_t width = columns > column + 2 ? columns - column - 2 : 1;
+  std::string out = line;
+  std::size_t used = line.size();
+  for (const std::string& part : internal::WrapText(comment, columns == 0 ? comment.size() : width)) {
+    if (columns > 0 && used >= column) {
+      out += "\n";
+      used = 0;
+    }
+    out += std::string(used < column ? column - used : 1, ' ') + "# " + part;
+    used = columns;
+  }
+  return out + "\n";
+}
+
+}  // namespace
+
+std::string HelpConfig(bool advanced, std::size_t columns) {
   RunConfig defaults;
   defaults.dataset.camera = PinholeCamera();
   std::ostringstream out;
-  out << (advanced
-              ? "# All keys of the configuration with their defaults. A file needs only what it changes.\n"
-              : "# What users set, with its defaults; --help-config --advanced shows all keys. A file needs "
-                "only what it\n# changes.\n");
+  const std::string head =
+      advanced ? "All keys of the configuration with their defaults. A file needs only what it changes."
+               : "What users set, with its defaults; --help-config --advanced shows all keys. A file needs "
+                 "only what it changes.";
+  for (const std::string& line :
+       internal::WrapText(head, columns == 0 ? 108 : std::max<std::size_t>(columns, 22) - 2))
+    out << "# " << line << "\n";
   std::string section;
   for (const ConfigEntry& entry : DescribeConfig(defaults)) {
     if (entry.advanced && !advanced) continue;
@@ -218,8 +243,7 @@ std::string HelpConfig(bool advanced) {
     if (entry.section != section && dot != std::string::npos)
       out << "  " << entry.section.substr(dot + 1) << ":\n";
     section = entry.section;
-    const std::string line = indent + entry.name + ": " + entry.value;
-    out << line << std::string(line.size() < 44 ? 44 - line.size() : 1, ' ') << "# " << entry.doc << "\n";
+    out << WithComment(indent + entry.name + ": " + entry.value, entry.doc, columns);
   }
   return out.str();
 }

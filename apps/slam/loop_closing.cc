@@ -20,6 +20,7 @@ LoopQuery Query(const InputFrame& frame) {
   query.stamp_s = frame.stamp_s;
   query.image = frame.image;
   query.depth_m = frame.depth_m;
+  query.mask = frame.mask;
   return query;
 }
 

@@ -52,7 +52,7 @@ void State(Archive& archive, InputFrame& frame) {
     for (int r = 0; r < rows; ++r)
       depth.insert(depth.end(), frame.depth_m.ptr<float>(r), frame.depth_m.ptr<float>(r) + columns);
   }
-  archive(frame.index, frame.stamp_s, frame.image, frame.right, rows, columns, depth);
+  archive(frame.index, frame.stamp_s, frame.image, frame.right, frame.mask, rows, columns, depth);
   if constexpr (Archive::kReading) {
     if (rows < 0 || columns < 0 || std::uint64_t(rows) * std::uint64_t(columns) != depth.size())
       archive.Damaged("a depth image of an impossible size");

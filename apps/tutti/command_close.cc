@@ -11,6 +11,7 @@
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/exit_code.h"
+#include "apps/tutti/mask_option.h"
 #include "apps/tutti/run_with_report.h"
 #include "tutti/core/error.h"
 #include "tutti/slam/config.h"
@@ -20,7 +21,7 @@ namespace {
 
 struct CloseArguments {
   GivenOdometryFiles odometry;
-  std::string trajectory, images, depth, times, config, out, ground_truth;
+  std::string trajectory, images, depth, times, config, out, ground_truth, mask;
   std::vector<double> sigma;     // share of the way, degrees
   std::vector<std::string> set;  // SECTION.KEY=VALUE
   std::uint64_t seed = 1;
@@ -36,6 +37,7 @@ RunConfig ConfigOf(const CloseArguments& arguments) {
     const std::string problem = config.run.Validate();
     if (!problem.empty()) throw InputError("--odometry-sigma: " + problem);
   }
+  SetMask(arguments.mask, config.dataset);
   SetOptions(arguments.set, config);
   return config;
 }
@@ -88,6 +90,7 @@ void SetUpClose(CLI::App& command, int& exit_code) {
                      "the same order if there are as many, else by the time stamps that they are called by");
   command.add_option("--config", arguments->config,
                      "YAML file with the camera; without a calibration there is loops.csv alone");
+  AddMaskOption(command, arguments->mask);
   command.add_option("--out", arguments->out, "folder for the results, as of `tutti run`")->required();
   command.add_option("--format", arguments->odometry.format, "of --trajectory; auto: by content")
       ->check(CLI::IsMember({"auto", "tum", "kitti", "euroc"}))

@@ -45,8 +45,10 @@ std::unique_ptr<Dataset> OpenImages(const ExportArguments& arguments, const MapI
   if (!request.landmarks && !request.colmap && !request.transforms) return nullptr;
   const std::string path = arguments.dataset.empty() ? DatasetOfNote(session.note) : arguments.dataset;
   if (path.empty() || IsCamera(path)) return nullptr;
+  DatasetOptions options = info.config.dataset;
+  options.mask.clear();  // colours and pictures are of the whole images
   try {
-    return OpenDataset(path, info.config.dataset);
+    return OpenDataset(path, options);
   } catch (const InputError& error) {
     if (!arguments.dataset.empty() || request.colmap || request.transforms) throw;
     Warn(error.what());

@@ -6,13 +6,14 @@
 #include "apps/run/localization.h"
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
+#include "apps/tutti/mask_option.h"
 #include "tutti/slam/config.h"
 
 namespace tutti::cli {
 namespace {
 
 struct LocalizeArguments {
-  std::string map, dataset, out, config;
+  std::string map, dataset, out, config, mask;
   int start = 0, end = 0, stride = 1, threads = 2;
   bool quiet = false;
 };
@@ -25,14 +26,16 @@ int RunLocalize(const CLI::App& command, const LocalizeArguments& arguments) {
   request.out = arguments.out;
   request.threads = arguments.threads;
   request.quiet = arguments.quiet;
+  if (!arguments.mask.empty()) request.mask = arguments.mask;
   if (!arguments.config.empty()) request.options = LoadConfig(arguments.config).dataset;
   if (command.count("--start") > 0) request.start = arguments.start;
   if (command.count("--end") > 0) request.end = arguments.end;
   if (command.count("--stride") > 0) request.stride = arguments.stride;
   const Localization result = Localize(request);
   const std::size_t total = result.frames.size() + result.bad;
-  std::printf("\n  frames %zu of %zu localized; map loaded in %.2f s, ", result.Localized(), total,
-              result.load_s);
+  std::printf("\n  frames %zu of %zu localized", result.Localized(), total);
+  if (result.masked && result.without_mask > 0) std::printf(", %zu without mask", result.without_mask);
+  std::printf("; map loaded in %.2f s, ", result.load_s);
   if (result.first_pose_s) std::printf("first pose after %.2f s, ", *result.first_pose_s);
   std::printf("%.1f ms of processor time per frame\n",
               total > 0 ? 1000 * result.cpu_s / static_cast<double>(total) : 0.0);
@@ -57,6 +60,7 @@ void SetUpLocalize(CLI::App& command, int& exit_code) {
       "--config", arguments->config,
       "YAML file that says how to read the data set (sections dataset and camera); without it, as "
       "the map's was read");
+  AddMaskOption(command, arguments->mask);
   command.add_option("--start", arguments->start, "first frame that is used, counted from 0")
       ->check(NotNegative());
   command.add_option("--end", arguments->end, "frame before which to stop")->check(Positive());

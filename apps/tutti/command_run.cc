@@ -17,9 +17,12 @@
 #include "apps/tutti/commands.h"
 #include "apps/tutti/exit_code.h"
 #include "apps/tutti/files.h"
+#include "apps/tutti/mask_option.h"
 #include "apps/tutti/run_with_report.h"
 #include "apps/view/live_view.h"
+#include "core/camera_text.h"
 #include "core/example_configs.h"
+#include "core/terminal.h"
 #include "tutti/core/error.h"
 #include "tutti/slam/config.h"
 #include "tutti/slam/map_file.h"
@@ -32,7 +35,8 @@ namespace fs = std::filesystem;
 struct RunArguments {
   std::string config, dataset, out, ground_truth;
   std::string trace, resume, map, save_map;
-  std::string calibration, camera, sensor;
+  std::string calibration, camera, sensor, mask;
+  int rotate = 0;
   double view_deg = 0;
   std::vector<std::string> set;  // SECTION.KEY=VALUE
   bool no_loops = false, no_report = false, quiet = false, keep = false, help_config = false,
@@ -123,9 +127,19 @@ CameraRequest CameraOf(const CLI::App& command, const RunArguments& arguments) {
 // What the map was made with, for a recording of which all frames are used.
 RunConfig ConfigOfMap(const std::string& map) {
   RunConfig config = ReadMapInfo(map).config;
-  config.dataset.start = config.dataset.end = 0;
-  config.dataset.stride = 1;
+  config.dataset = ForAnotherRecording(config.dataset);
   return config;
+}
+
+std::string Pixels(double focal_px) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.1f px", focal_px);
+  return text;
+}
+
+void SetImageUse(const RunArguments& arguments, DatasetOptions& options) {
+  SetMask(arguments.mask, options);
+  if (arguments.rotate != 0) options.rotate = arguments.rotate;
 }
 
 // Where nothing says what the focal length is, the images may.
@@ -145,9 +159,11 @@ void MeasureGuess(const RunArguments& arguments, Recording& recording, RunReques
     std::snprintf(text, sizeof text, "focal length measured on %d frames: %.1f px, give or take %.1f %%",
                   found.frames, found.camera.fx, 100 * found.sigma);
   } else {
-    request.camera_guessed = true;
-    std::snprintf(text, sizeof text, "focal length guessed, %.1f px: in the first %d frames %s",
-                  found.camera.fx, found.frames, found.reason.c_str());
+    request.camera_guessed = recording.photo_lens.empty();
+    const std::string source =
+        request.camera_guessed ? "guessed, " + Pixels(found.camera.fx) : recording.photo_lens;
+    std::snprintf(text, sizeof text, "focal length %s: in the first %d frames %s", source.c_str(),
+                  found.frames, found.reason.c_str());
   }
   request.camera_source = text;
   say(text);
@@ -158,14 +174,21 @@ RunConfig ConfigFor(const CameraRequest& camera, const RunArguments& arguments, 
   if (!arguments.config.empty() || !arguments.map.empty()) {
     RunConfig config = arguments.config.empty() ? ConfigOfMap(arguments.map) : LoadConfig(arguments.config);
     SetCamera(arguments.dataset, camera, config);
+    SetImageUse(arguments, config.dataset);
     return config;
   }
   Recording recording = Recognise(arguments.dataset, camera);
   if (!arguments.quiet) {
     for (const std::string& finding : recording.findings) std::fprintf(stderr, "  %s\n", finding.c_str());
   }
+  SetImageUse(arguments, recording.config.dataset);
   SetOptions(arguments.set, recording.config);
-  if (recording.guessed_lens && !IsCamera(arguments.dataset)) MeasureGuess(arguments, recording, request);
+  if (recording.guessed_lens && IsCamera(arguments.dataset)) {
+    request.camera_guessed = true;
+    request.camera_source = "focal length guessed: frames that come once can't be measured before";
+  } else if (recording.guessed_lens) {
+    MeasureGuess(arguments, recording, request);
+  }
   return recording.config;
 }
 
@@ -176,7 +199,7 @@ fs::path OutputOf(const RunArguments& arguments) {
 
 int RunOnce(const CLI::App& command, const RunArguments& arguments) {
   if (arguments.help_config) {
-    std::fputs(HelpConfig(arguments.advanced).c_str(), stdout);
+    std::fputs(HelpConfig(arguments.advanced, internal::TerminalColumns(stdout)).c_str(), stdout);
     return 0;
   }
   if (!arguments.resume.empty()) return Resume(command, arguments);
@@ -221,14 +244,17 @@ void SetUpRun(CLI::App& command, int& exit_code) {
   command.add_option(
       "dataset,--dataset", arguments->dataset,
       "the recording: folder of a data set or of images, a video file, a ROS bag, or a camera: camera:0 (the "
-      "first one), camera:1, ...; camera:FILE takes a video file for it");
+      "first one), camera:1, ...; camera:FILE takes a video file for it; or the address of a stream, "
+      "rtsp://... "
+      "or http://...");
   command.add_option("--config", arguments->config,
                      "YAML file (" + internal::ExampleConfigs() +
                          " has one for each public data set). Without it, layout, sensor and calibration "
                          "are found in the recording, and what was found is said");
   command.add_option("--calibration", arguments->calibration,
                      "the camera from a YAML file of Kalibr, ORB-SLAM, OpenCV, ROS or EuRoC");
-  command.add_option("--camera", arguments->camera, "the camera as fx,fy,cx,cy[,k1,k2,p1,p2[,k3]] in pixels");
+  command.add_option("--camera", arguments->camera,
+                     std::string("the camera as ") + internal::kCameraText + " in pixels");
   command
       .add_option("--fov", arguments->view_deg,
                   "the camera by its horizontal field of view [deg], principal point in the middle")
@@ -236,6 +262,12 @@ void SetUpRun(CLI::App& command, int& exit_code) {
   command
       .add_option("--sensor", arguments->sensor, "what to use of the recording; default: all that is there")
       ->check(OneOf(Sensor()));
+  AddMaskOption(command, arguments->mask);
+  command
+      .add_option("--rotate", arguments->rotate,
+                  "turn the images so far clockwise, so that they are upright; the camera is given as it is, "
+                  "before that, and is turned with them. Not for stereo")
+      ->check(OneOf({"90", "180", "270"}));
   command.add_option("--out", arguments->out,
                      "folder for the results (default: tutti-out/NAME): a new or empty one, or that of an "
                      "earlier run, whose results are replaced when the new ones are complete");

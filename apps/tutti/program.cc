@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <cstdio>
 #include <exception>
+#include <memory>
 #include <vector>
 
 #include "apps/tutti/describe.h"
 #include "apps/tutti/exhausted.h"
+#include "apps/tutti/help.h"
 #include "apps/tutti/number_checks.h"
+#include "core/terminal.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 #include "tutti/slam/version.h"
@@ -68,6 +71,7 @@ std::string UnknownCommand(const std::string& word, const std::vector<std::strin
 
 int RunProgram(int argc, char** argv, const std::map<std::string, SetUp>& own, int (*other)(char** argv)) {
   CLI::App app{"tutti: visual SLAM with an ensemble of Bayesian loop-closure filters", "tutti"};
+  app.formatter(std::make_shared<WrappedHelp>(internal::TerminalColumns(stdout)));
   app.require_subcommand(1);
   app.set_version_flag("--version", std::string("tutti ") + kVersion);
   AddDescribeFlag(app);

@@ -6,6 +6,7 @@
 #include "frontend/dataset/dataset_folder.h"
 #include "frontend/dataset/image_file.h"
 #include "frontend/dataset/selected_dataset.h"
+#include "frontend/dataset/turned_dataset.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -18,6 +19,16 @@ EnumWords<DatasetType> WordsOf(DatasetType /*of*/) {
 
 EnumWords<Sensor> WordsOf(Sensor /*of*/) {
   return {{"mono", Sensor::kMono}, {"stereo", Sensor::kStereo}, {"rgbd", Sensor::kRgbd}};
+}
+
+std::string DatasetOptions::Validate() const { return OutOfRange(*this); }
+
+DatasetOptions ForAnotherRecording(DatasetOptions options) {
+  std::error_code ignored;
+  options.start = options.end = 0;
+  options.stride = 1;
+  if (std::filesystem::is_directory(options.mask, ignored)) options.mask.clear();
+  return options;
 }
 
 bool Dataset::WaitFor(std::size_t i, const std::function<bool()>&) const { return i < Size(); }
@@ -166,12 +177,16 @@ std::unique_ptr<Dataset> OpenWhole(const std::filesystem::path& path, const Data
 std::unique_ptr<Dataset> OpenDataset(const std::filesystem::path& path, const DatasetOptions& options) {
   const std::string problem = options.Validate();
   if (!problem.empty()) throw InputError("dataset: " + problem);
+  if (options.rotate % 90 != 0)
+    throw InputError("dataset: rotate must be 0, 90, 180 or 270 deg, not " + std::to_string(options.rotate));
   DatasetOptions use = options;
   if (use.camera && use.camera->fy < 0) {  // ICL-NUIM's own calibration: y up
     use.camera->fy = -use.camera->fy;
     use.mirrored_ground_truth = true;
   }
-  return SelectFrames(OpenWhole(path, use), use, path.string());
+  std::unique_ptr<Dataset> whole = OpenWhole(path, use);
+  if (use.rotate != 0) whole = std::make_unique<TurnedDataset>(std::move(whole), use.rotate, path.string());
+  return SelectFrames(std::move(whole), use, path.string());
 }
 
 }  // namespace tutti

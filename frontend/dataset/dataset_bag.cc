@@ -142,6 +142,7 @@ class BagDataset : public Dataset {
       frame.index = Number(i);
       frame.stamp_s = at.image->stamp_s;
       frame.image = ReadGrey(*at.image, options_.topic);
+      frame.mask = mask_;
       result.depth_error = AddDepth(at, i, &frame);
       result.frame = std::move(frame);
     } catch (const std::exception& e) {
@@ -295,6 +296,7 @@ class BagDataset : public Dataset {
     const double span = Stamp(frames_.size() - 1) - Stamp(0);
     const double rate = span > 0 ? static_cast<double>(frames_.size() - 1) / span : 10.0;
     rig_ = SingleCameraRig(options_, size_, rate, file_.string(), rectifier_, warnings_);
+    mask_ = SingleCameraMask(options_, size_, rectifier_);
     rig_.sensor = options_.sensor;
     rig_.max_depth_m = options_.max_depth_m;
     if (options_.sensor != Sensor::kStereo) return;

@@ -1,5 +1,7 @@
-// A live camera, camera:0; or a video file in its stead, camera:FILE: frames come once, in order.
+// A live camera, camera:0, or a stream, rtsp://...; or a video file in its stead, camera:FILE: frames come
+// once, in order.
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <chrono>
 #include <map>
@@ -19,13 +21,15 @@ constexpr const char* kPrefix = "camera:";
 class CameraDataset : public Dataset {
  public:
   CameraDataset(const std::string& name, const DatasetOptions& options) : name_(name) {
-    const std::string source = name.substr(std::string(kPrefix).size());
-    Open(source, options);
+    Open(IsStream(name) ? name : name.substr(std::string(kPrefix).size()), options);
     const double rate = options.rate_hz > 0 ? options.rate_hz : capture_.get(cv::CAP_PROP_FPS);
     rate_hz_ = rate > 0 && rate < 1e4 ? rate : 30.0;
-    if (!Grab()) throw InputError(name_ + ": delivers no image; is it in use by another program?");
+    if (!Grab())
+      throw InputError(name_ + ": delivers no image; is it " +
+                       (IsStream(name_) ? "a stream of video?" : "in use by another program?"));
     rig_ = SingleCameraRig(options, frames_.at(0).image.size(), rate_hz_, name_, rectifier_, warnings_);
     size_ = frames_.at(0).image.size();
+    mask_ = SingleCameraMask(options, size_, rectifier_);
   }
 
   Supply FrameSupply() const override { return Supply::kOnce; }
@@ -70,6 +74,7 @@ class CameraDataset : public Dataset {
       return result;
     }
     if (rectifier_) frame.image = rectifier_->Apply(frame.image);
+    frame.mask = mask_;
     result.frame = std::move(frame);
     return result;
   }
@@ -77,6 +82,7 @@ class CameraDataset : public Dataset {
  private:
   void Open(const std::string& source, const DatasetOptions& options) {
     device_ = IsCameraDevice(name_);
+    if (IsStream(name_)) return OpenVideoStream(source, capture_);
     if (!device_) return OpenVideoFile(source, capture_);
     bool opened = false;
     try {
@@ -119,6 +125,7 @@ class CameraDataset : public Dataset {
   bool device_ = false;
   CameraRig rig_;
   cv::Size size_;
+  cv::Mat mask_;
   std::vector<std::string> warnings_;
   std::optional<Rectifier> rectifier_;
   double rate_hz_ = 30;
@@ -133,9 +140,16 @@ class CameraDataset : public Dataset {
 
 }  // namespace
 
-bool IsCamera(const std::string& name) { return name.rfind(kPrefix, 0) == 0; }
+bool IsStream(const std::string& name) {
+  constexpr std::array<const char*, 4> kSchemes = {"rtsp://", "rtsps://", "http://", "https://"};
+  return std::any_of(kSchemes.begin(), kSchemes.end(),
+                     [&](const char* scheme) { return name.rfind(scheme, 0) == 0; });
+}
+
+bool IsCamera(const std::string& name) { return name.rfind(kPrefix, 0) == 0 || IsStream(name); }
 
 bool IsCameraDevice(const std::string& name) {
+  if (IsStream(name)) return true;
   const std::string source = IsCamera(name) ? name.substr(std::string(kPrefix).size()) : std::string();
   return !source.empty() && source.size() < 5 &&
          std::all_of(source.begin(), source.end(), [](unsigned char c) { return std::isdigit(c) != 0; });

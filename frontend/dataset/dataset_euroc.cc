@@ -35,6 +35,19 @@ std::vector<StampedImage> ReadCsv(const std::filesystem::path& camera, std::vect
   return images;
 }
 
+struct MountedCamera {
+  PinholeCamera camera;
+  Pose T_body_camera;
+  double rate_hz = 20;
+};
+
+MountedCamera ReadMounted(const std::filesystem::path& file) {
+  const SensorYaml read = ReadSensorYaml(file);
+  if (!read.T_body_sensor)
+    throw InputError(file.string() + ": has no key 'data' (T_BS: where the camera is on the body)");
+  return {read.camera, *read.T_body_sensor, read.rate_hz.value_or(MountedCamera().rate_hz)};
+}
+
 // Cameras that one clock triggers have equal stamps; other rigs differ by less than a millisecond or two.
 constexpr std::int64_t kSamePairNs = 2'500'000;
 
@@ -50,16 +63,16 @@ FolderContents FindEuroc(const std::filesystem::path& folder, const DatasetOptio
   const std::filesystem::path mav = inside ? folder : folder / "mav0";
   FolderContents out;
   out.folder = folder;
-  const SensorYaml left = ReadSensorYaml(mav / "cam0" / "sensor.yaml");
+  const MountedCamera left = ReadMounted(mav / "cam0" / "sensor.yaml");
   out.left = options.camera ? *options.camera : left.camera;
-  out.T_body_left = left.T_body_sensor;
+  out.T_body_left = left.T_body_camera;
   out.rate_hz = left.rate_hz;
   const std::vector<StampedImage> images = ReadCsv(mav / "cam0", out.warnings);
   std::vector<StampedImage> right_images;
   if (options.sensor == Sensor::kStereo) {
-    const SensorYaml right = ReadSensorYaml(mav / "cam1" / "sensor.yaml");
+    const MountedCamera right = ReadMounted(mav / "cam1" / "sensor.yaml");
     out.right = right.camera;
-    out.T_right_left = right.T_body_sensor.Inverse() * left.T_body_sensor;
+    out.T_right_left = right.T_body_camera.Inverse() * left.T_body_camera;
     right_images = ReadCsv(mav / "cam1", out.warnings);
   }
   std::size_t alone = 0;

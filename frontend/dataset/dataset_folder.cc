@@ -10,12 +10,6 @@
 #include "tutti/core/text.h"
 
 namespace tutti {
-namespace {
-
-std::string SizeText(cv::Size size) { return std::to_string(size.width) + "x" + std::to_string(size.height); }
-
-}  // namespace
-
 std::string At(const std::filesystem::path& file, std::size_t line) {
   return file.string() + ":" + std::to_string(line) + ": ";
 }
@@ -95,6 +89,7 @@ FolderDataset::FolderDataset(FolderContents contents, const DatasetOptions& opti
   }
   FindImageSize();
   SetUpRig();
+  SetUpMasks();
 }
 
 void FolderDataset::FindImageSize() {
@@ -176,6 +171,40 @@ void FolderDataset::SetUpRig() {
   rig_.readout_s = RectifiedReadout(options_.readout_s, left, rig_.camera);
 }
 
+void FolderDataset::SetUpMasks() {
+  if (options_.mask.empty()) return;
+  ImageMasks masks(options_.mask);
+  if (!masks.PerImage()) {
+    mask_ = masks.OfAll(size_);
+    if (left_) mask_ = left_->Apply(mask_, Sampling::kNearest);
+    return;
+  }
+  masks_ = std::move(masks);
+  std::size_t without = 0, with = 0;
+  for (const FrameFiles& frame : contents_.frames) {
+    const std::string stem = frame.image.stem().string();
+    if (!masks_->Has(stem)) {
+      ++without;
+    } else if (with++ == 0) {
+      masks_->Of(stem, size_);  // what is wrong with all is known before the long work
+    }
+  }
+  if (options_.follow_s > 0 || without == 0) return;
+  const std::string of_all = " of " + std::to_string(contents_.frames.size()) + " images";
+  if (with == 0)
+    throw InputError(options_.mask + ": holds no mask for any" + of_all + " of " + contents_.folder.string() +
+                     "; a mask has the name of its image (" + contents_.frames.front().image.stem().string() +
+                     ".png)");
+  contents_.warnings.push_back(options_.mask + ": " + std::to_string(without) + of_all +
+                               " have no mask; all of them is used");
+}
+
+cv::Mat FolderDataset::MaskOf(const std::filesystem::path& image) const {
+  if (!masks_) return mask_;
+  const cv::Mat mask = masks_->Of(image.stem().string(), size_);
+  return mask.empty() || !left_ ? mask : left_->Apply(mask, Sampling::kNearest);
+}
+
 // What is wrong with the image that was read from `file`; else `out` gets it, 8 bit and rectified.
 std::string FolderDataset::Rectify(const ImageFile& read, const std::filesystem::path& file,
                                    const Rectifier* rectifier, cv::Mat& out) const {
@@ -238,6 +267,7 @@ ReadResult FolderDataset::ReadFiles(std::size_t i, const FrameFiles& files) cons
     frame.stamp_s = files.stamp_s;
     result.error = Rectify(ReadGreyFile(files.image), files.image, left_ ? &*left_ : nullptr, frame.image);
     if (!result.error.empty()) return result;
+    frame.mask = MaskOf(files.image);
     if (!files.right.empty())
       result.depth_error =
           Rectify(ReadGreyFile(files.right), files.right, right_ ? &*right_ : nullptr, frame.right);

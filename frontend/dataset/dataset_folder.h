@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "frontend/dataset/image_file.h"
+#include "frontend/dataset/image_mask.h"
 #include "frontend/features/rectifier.h"
 #include "tutti/frontend/dataset.h"
 
@@ -63,10 +64,13 @@ class FolderDataset : public Dataset {
  private:
   void FindImageSize();
   void SetUpRig();
+  void SetUpMasks();
   PinholeCamera WithSize(PinholeCamera camera, const char* which) const;
   std::string Rectify(const ImageFile& read, const std::filesystem::path& file, const Rectifier* rectifier,
                       cv::Mat& out) const;
   std::string NoFrame(std::size_t i) const;
+  // Rectified; empty if this image has none. Throws InputError.
+  cv::Mat MaskOf(const std::filesystem::path& image) const;
   std::string ReadDepth(const std::filesystem::path& file, cv::Mat& out) const;
 
   FolderContents contents_;
@@ -75,6 +79,8 @@ class FolderDataset : public Dataset {
   cv::Size size_;
   int bits_ = 8;
   std::optional<Rectifier> left_, right_;
+  std::optional<ImageMasks> masks_;  // a mask for each image
+  cv::Mat mask_;                     // for all images, rectified; empty: none
 };
 
 /// One line of a text file: its number and its words, comments removed.

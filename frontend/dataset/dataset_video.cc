@@ -87,6 +87,7 @@ class VideoDataset : public Dataset {
       throw InputError(file_.string() + ": no frame can be decoded; is it a complete video file?");
     size_ = first.size();
     rig_ = SingleCameraRig(options, size_, rate_hz_, file_.string(), rectifier_, warnings_);
+    mask_ = SingleCameraMask(options, size_, rectifier_);
   }
 
   std::size_t Size() const override { return frames_; }
@@ -117,6 +118,7 @@ class VideoDataset : public Dataset {
     if (!result.error.empty()) return result;
     frame.index = static_cast<std::int64_t>(i);
     frame.stamp_s = Stamp(i);
+    frame.mask = mask_;
     result.frame = std::move(frame);
     return result;
   }
@@ -146,6 +148,7 @@ class VideoDataset : public Dataset {
   double rate_hz_ = 30;
   std::size_t frames_ = 0;
   cv::Size size_;
+  cv::Mat mask_;
 };
 
 }  // namespace

@@ -159,6 +159,8 @@ ImageFile ReadDepthFile(const std::filesystem::path& file) {
   return out;
 }
 
+std::string SizeText(cv::Size size) { return std::to_string(size.width) + "x" + std::to_string(size.height); }
+
 cv::Mat To8Bit(const cv::Mat& image, int bits) {
   if (image.depth() == CV_8U) return image;
   cv::Mat out;
@@ -217,6 +219,13 @@ std::vector<std::filesystem::path> ListImages(const std::filesystem::path& folde
     return NaturalLess(a.filename().string(), b.filename().string());
   });
   return files;
+}
+
+std::optional<std::filesystem::path> ImagesOfDataset(const std::filesystem::path& folder) {
+  for (const char* images : {"image_0", "image_2", "rgb", "mav0/cam0/data", "cam0/data", "images"}) {
+    if (!ListImages(folder / images).empty()) return folder / images;
+  }
+  return std::nullopt;
 }
 
 }  // namespace tutti

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -31,6 +32,9 @@ ImageFile ReadImageFile(const std::filesystem::path& file, int flags);
 /// Reads a depth image as stored: one channel of 16 bit or float.
 ImageFile ReadDepthFile(const std::filesystem::path& file);
 
+/// "640x480", for messages.
+std::string SizeText(cv::Size size);
+
 /// To 8 bit, any channels. 16-bit images are divided by 2^(bits - 8) and saturated; `bits`: significant bits,
 /// 8 to 16.
 cv::Mat To8Bit(const cv::Mat& image, int bits);
@@ -45,6 +49,9 @@ cv::Mat DepthInMetres(const cv::Mat& stored, double units_per_m, double max_dept
 
 /// True if the name ends like an image file that OpenCV can read.
 bool HasImageExtension(const std::filesystem::path& file);
+/// Where a data set's folder has the images of its (left) camera (KITTI: image_0 or image_2, TUM: rgb, EuRoC:
+/// mav0/cam0/data; images): the first of these that holds any.
+std::optional<std::filesystem::path> ImagesOfDataset(const std::filesystem::path& folder);
 /// The images in a folder in natural order (hidden and other files ignored); empty if the folder can't be
 /// read.
 std::vector<std::filesystem::path> ListImages(const std::filesystem::path& folder);

@@ -57,12 +57,7 @@ const TextLine& Get(const std::filesystem::path& file, const Values& values, con
   return text;
 }
 
-}  // namespace
-
-SensorYaml ReadSensorYaml(const std::filesystem::path& file) {
-  const Values values = ReadValues(file);
-  SensorYaml out;
-  const TextLine& transform = Get(file, values, "data", 16);
+Pose ReadTransform(const std::filesystem::path& file, const TextLine& transform) {
   Eigen::Matrix<double, 3, 4> matrix;
   for (std::size_t i = 0; i < 12; ++i) {
     matrix(static_cast<int>(i) / 4, static_cast<int>(i) % 4) = NumberAt(file, transform, i);
@@ -71,7 +66,24 @@ SensorYaml ReadSensorYaml(const std::filesystem::path& file) {
     throw InputError(At(file, transform.number) +
                      "T_BS is not a rigid transform (its rotation has a determinant other than 1)");
   }
-  out.T_body_sensor = Pose::FromMatrix(matrix);
+  return Pose::FromMatrix(matrix);
+}
+
+void CheckModel(const std::filesystem::path& file, const Values& values) {
+  if (values.count("camera_model") == 0) return;
+  const TextLine& model = Get(file, values, "camera_model", 1);
+  if (model.words[0] != "pinhole")
+    throw InputError(At(file, model.number) + "camera_model '" + model.words[0] +
+                     "': tutti has pinhole alone");
+}
+
+}  // namespace
+
+SensorYaml ReadSensorYaml(const std::filesystem::path& file) {
+  const Values values = ReadValues(file);
+  SensorYaml out;
+  if (values.count("data") != 0) out.T_body_sensor = ReadTransform(file, Get(file, values, "data", 16));
+  CheckModel(file, values);
 
   const TextLine& intrinsics = Get(file, values, "intrinsics", 4);
   PinholeCamera& c = out.camera;

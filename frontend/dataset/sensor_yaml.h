@@ -2,17 +2,19 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 
 #include "tutti/core/camera.h"
 #include "tutti/core/pose.h"
 
+#pragma GCC visibility push(default)  // of `tutti run --calibration`, too
 namespace tutti {
 
 /// One camera of an ASL data set.
 struct SensorYaml {
   PinholeCamera camera;
-  Pose T_body_sensor;  ///< T_BS
-  double rate_hz = 20;
+  std::optional<Pose> T_body_sensor;  ///< T_BS, where the file has it
+  std::optional<double> rate_hz;
 };
 
 /// Throws InputError that names file and line for a missing file or key, a wrong number of values, an unknown
@@ -20,3 +22,4 @@ struct SensorYaml {
 SensorYaml ReadSensorYaml(const std::filesystem::path& file);
 
 }  // namespace tutti
+#pragma GCC visibility pop

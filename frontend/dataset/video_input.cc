@@ -4,6 +4,7 @@
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio/registry.hpp>
 
+#include "frontend/dataset/image_mask.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -28,6 +29,16 @@ void OpenVideoFile(const std::filesystem::path& file, cv::VideoCapture& capture)
   }
   throw InputError(file.string() +
                    ": can't be opened as a video; is it complete and of a format that OpenCV decodes?");
+}
+
+void OpenVideoStream(const std::string& address, cv::VideoCapture& capture) {
+  try {
+    if (capture.open(address, Backends().front())) return;
+  } catch (const cv::Exception&) {  // said below
+  }
+  throw InputError(address +
+                   ": no stream of video can be opened there; check the address, the network, and whether a "
+                   "video player shows it");
 }
 
 bool ReadGreyFrame(cv::VideoCapture& capture, cv::Mat& grey) {
@@ -81,6 +92,13 @@ CameraRig SingleCameraRig(const DatasetOptions& options, cv::Size size, double r
   rig.camera = rectifier->Camera();
   rig.readout_s = RectifiedReadout(options.readout_s, camera, rig.camera);
   return rig;
+}
+
+cv::Mat SingleCameraMask(const DatasetOptions& options, cv::Size size,
+                         const std::optional<Rectifier>& rectifier) {
+  if (options.mask.empty()) return {};
+  const cv::Mat mask = ImageMasks(options.mask).OfAll(size);
+  return rectifier ? rectifier->Apply(mask, Sampling::kNearest) : mask;
 }
 
 }  // namespace tutti

@@ -14,6 +14,9 @@ namespace tutti {
 /// Opens a video file with FFmpeg or OpenCV's own decoder. Throws InputError.
 void OpenVideoFile(const std::filesystem::path& file, cv::VideoCapture& capture);
 
+/// Opens a stream by its address (rtsp://, http://) with FFmpeg or GStreamer. Throws InputError.
+void OpenVideoStream(const std::string& address, cv::VideoCapture& capture);
+
 /// The next frame in grey (8 bit); false at the end, and where it can't be decoded.
 bool ReadGreyFrame(cv::VideoCapture& capture, cv::Mat& grey);
 /// The same in colour, 3 channels, blue first.
@@ -24,5 +27,9 @@ bool ReadColourFrame(cv::VideoCapture& capture, cv::Mat& colour);
 CameraRig SingleCameraRig(const DatasetOptions& options, cv::Size size, double rate_hz,
                           const std::string& name, std::optional<Rectifier>& rectifier,
                           std::vector<std::string>& warnings);
+
+/// options.mask, which must be one for all images, rectified; empty if there is none. Throws InputError.
+cv::Mat SingleCameraMask(const DatasetOptions& options, cv::Size size,
+                         const std::optional<Rectifier>& rectifier);
 
 }  // namespace tutti

@@ -30,7 +30,8 @@ cv::KeyPoint CornerOf(Rank rank) {
 // Places are those within the image's borders.
 class CornerGrid {
  public:
-  CornerGrid(const cv::Mat& image, const CornerOptions& options) : image_(image), options_(options) {
+  CornerGrid(const cv::Mat& image, const cv::Mat& mask, const CornerOptions& options)
+      : image_(image), mask_(mask), options_(options) {
     size_ = {image.cols - 2 * options.border, image.rows - 2 * options.border};
     const double area = double(size_.width) * size_.height;
     cell_ = std::max(8.0, std::sqrt(area / std::max(1, options.wanted)) * 1.2);
@@ -39,13 +40,20 @@ class CornerGrid {
     cells_.resize(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_));
   }
 
-  // All corners in a part of the places.
+  // All corners in a part of the places that are not masked.
   std::vector<cv::KeyPoint> Detect(const cv::Rect& part, int threshold) const {
     const int rim = options_.border - kCircle;
     const cv::Rect seen(part.x + rim, part.y + rim, part.width + 2 * kCircle, part.height + 2 * kCircle);
     std::vector<cv::KeyPoint> corners = internal::FastCorners(image_(seen), threshold);
     const cv::Point2f moved(static_cast<float>(part.x - kCircle), static_cast<float>(part.y - kCircle));
     for (cv::KeyPoint& corner : corners) corner.pt += moved;
+    if (!mask_.empty()) {
+      const auto masked = [this](const cv::KeyPoint& corner) {
+        return mask_.at<std::uint8_t>(static_cast<int>(corner.pt.y) + options_.border,
+                                      static_cast<int>(corner.pt.x) + options_.border) == 0;
+      };
+      corners.erase(std::remove_if(corners.begin(), corners.end(), masked), corners.end());
+    }
     return corners;
   }
   std::vector<cv::KeyPoint> DetectAll(int threshold) const {
@@ -145,6 +153,7 @@ class CornerGrid {
   }
 
   const cv::Mat& image_;
+  const cv::Mat& mask_;
   const CornerOptions& options_;
   cv::Size size_;  // of the image within its borders
   double cell_ = 0;
@@ -157,9 +166,10 @@ class CornerGrid {
 // Few corners of an image are weak ones that are wanted, and many are weak: they are looked for where nothing
 // else is. A corner has the same score whatever threshold it is looked for with, and is suppressed by
 // stronger ones alone, so that it makes no difference to what comes out.
-std::vector<cv::KeyPoint> DetectCorners(const cv::Mat& image, const CornerOptions& options) {
+std::vector<cv::KeyPoint> DetectCorners(const cv::Mat& image, const CornerOptions& options,
+                                        const cv::Mat& mask) {
   if (image.cols <= 2 * options.border || image.rows <= 2 * options.border) return {};
-  CornerGrid grid(image, options);
+  CornerGrid grid(image, mask, options);
   const auto wanted = static_cast<std::size_t>(std::max(0, options.wanted));
   std::vector<cv::KeyPoint> corners = grid.DetectAll(options.threshold);
   if (corners.size() > wanted) {

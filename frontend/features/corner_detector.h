@@ -19,7 +19,9 @@ struct CornerOptions {
 /// Corners of an 8-bit grey image at whole pixels, with FAST's score as response. If there are more than
 /// wanted, then round by round the strongest that is left in each cell, and in the order of their strength;
 /// corners below the upper threshold count only where a cell has nothing better, so that weak texture is
-/// covered without crowding out strong corners. An image that is smaller than its borders has none.
-std::vector<cv::KeyPoint> DetectCorners(const cv::Mat& image, const CornerOptions& options);
+/// covered without crowding out strong corners. An image that is smaller than its borders has none, and
+/// neither has a place where `mask` (CV_8UC1, as large as the image; empty: nowhere) is 0.
+std::vector<cv::KeyPoint> DetectCorners(const cv::Mat& image, const CornerOptions& options,
+                                        const cv::Mat& mask = {});
 
 }  // namespace tutti

@@ -61,6 +61,27 @@ cv::Point2f RefineCorner(const cv::Mat& image, const cv::Point2f& corner) {
   return {corner.x + du, corner.y + dv};
 }
 
+// The pixel of a mask that stands for this place.
+const std::uint8_t& MaskAt(const cv::Mat& mask, const cv::Point2f& p) {
+  const int x = std::clamp(static_cast<int>(std::lround(p.x)), 0, mask.cols - 1);
+  const int y = std::clamp(static_cast<int>(std::lround(p.y)), 0, mask.rows - 1);
+  return mask.at<std::uint8_t>(y, x);
+}
+
+bool IsMaskedAt(const cv::Mat& mask, const cv::Point2f& p) { return !mask.empty() && MaskAt(mask, p) == 0; }
+
+// What the mask says of the places of a level's pixels.
+template <class InImage>
+cv::Mat MaskOfLevel(const cv::Mat& mask, cv::Size size, const InImage& in_image) {
+  if (mask.empty() || mask.size() == size) return mask;
+  cv::Mat level(size, CV_8UC1);
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x)
+      level.at<std::uint8_t>(y, x) = MaskAt(mask, in_image({static_cast<float>(x), static_cast<float>(y)}));
+  }
+  return level;
+}
+
 std::vector<int> FeaturesPerLevel(const OdometryOptions& options) {
   // A geometric series: each level gets features in proportion to its side length.
   const double factor = 1.0 / options.scale_factor;
@@ -163,7 +184,8 @@ cv::Mat NextLevel(const cv::Mat& image, const cv::Size& size) {
   return level;
 }
 
-FrameFeatures ExtractOrb(const std::vector<cv::Mat>& pyramid, const OdometryOptions& options) {
+FrameFeatures ExtractOrb(const std::vector<cv::Mat>& pyramid, const OdometryOptions& options,
+                         const cv::Mat& mask) {
   FrameFeatures out;
   if (pyramid.empty() || pyramid[0].empty()) return out;
   const std::vector<float> scales = PyramidScales(options);
@@ -173,8 +195,17 @@ FrameFeatures ExtractOrb(const std::vector<cv::Mat>& pyramid, const OdometryOpti
   std::vector<cv::Mat> descriptors;
   for (std::size_t l = 0; l < pyramid.size(); ++l) {
     const cv::Mat& image = pyramid[l];
+    // Pixel centres have integer coordinates on every level, so the levels' corners are half a pixel apart;
+    // and their sizes are rounded. Ignoring either biases coarse features by more than a pixel, and mono
+    // scale drifts with them.
+    const float sx = static_cast<float>(pyramid[0].cols) / static_cast<float>(image.cols);
+    const float sy = static_cast<float>(pyramid[0].rows) / static_cast<float>(image.rows);
+    const auto in_image = [sx, sy](const cv::Point2f& p) {
+      return cv::Point2f((p.x + 0.5F) * sx - 0.5F, (p.y + 0.5F) * sy - 0.5F);
+    };
     std::vector<cv::KeyPoint> corners =
-        DetectCorners(image, {wanted[l], options.fast_threshold, options.fast_threshold_min, kBorder});
+        DetectCorners(image, {wanted[l], options.fast_threshold, options.fast_threshold_min, kBorder},
+                      MaskOfLevel(mask, image.size(), in_image));
     for (cv::KeyPoint& k : corners) {
       k.angle = OrientationPatch().Angle(image, static_cast<int>(k.pt.x), static_cast<int>(k.pt.y));
       k.octave = 0;
@@ -184,15 +215,10 @@ FrameFeatures ExtractOrb(const std::vector<cv::Mat>& pyramid, const OdometryOpti
     if (!corners.empty()) orb->compute(image, corners, level_descriptors);
     if (corners.empty()) continue;
     descriptors.push_back(level_descriptors);
-    // Pixel centres have integer coordinates on every level, so the levels' corners are half a pixel apart;
-    // and their sizes are rounded. Ignoring either biases coarse features by more than a pixel, and mono
-    // scale drifts with them.
-    const float sx = static_cast<float>(pyramid[0].cols) / static_cast<float>(image.cols);
-    const float sy = static_cast<float>(pyramid[0].rows) / static_cast<float>(image.rows);
     for (cv::KeyPoint k : corners) {
-      const cv::Point2f p = RefineCorner(image, k.pt);
+      const cv::Point2f refined = in_image(RefineCorner(image, k.pt));
       k.octave = static_cast<int>(l);
-      k.pt = cv::Point2f((p.x + 0.5F) * sx - 0.5F, (p.y + 0.5F) * sy - 0.5F);
+      k.pt = IsMaskedAt(mask, refined) ? in_image(k.pt) : refined;
       k.size *= scales[l];
       out.keypoints.push_back(k);
     }
@@ -232,7 +258,7 @@ void AddDepthFromImage(const cv::Mat& depth_m, const CameraRig& rig, const Odome
 FrameFeatures ExtractFeatures(const InputFrame& frame, const CameraRig& rig, const OdometryOptions& options) {
   const auto shared = std::make_shared<const std::vector<cv::Mat>>(BuildPyramid(frame.image, options));
   const std::vector<cv::Mat>& pyramid = *shared;
-  FrameFeatures features = ExtractOrb(pyramid, options);
+  FrameFeatures features = ExtractOrb(pyramid, options, frame.mask);
   features.pyramid = shared;
   features.has_depth = !frame.depth_m.empty() || !frame.right.empty();
   if (!frame.depth_m.empty()) AddDepthFromImage(frame.depth_m, rig, options, &features);

@@ -108,8 +108,10 @@ std::vector<cv::Mat> BuildPyramid(const cv::Mat& image, const OdometryOptions& o
 /// The level of a pyramid after `image`.
 cv::Mat NextLevel(const cv::Mat& image, const cv::Size& size);
 
-/// Detects and describes features of one 8-bit grey image; no depth. Blank or tiny images give none.
-FrameFeatures ExtractOrb(const std::vector<cv::Mat>& pyramid, const OdometryOptions& options);
+/// Detects and describes features of one 8-bit grey image; no depth. Blank or tiny images give none. No
+/// feature's pixel, rounded, is one where `mask` (CV_8UC1, as large as level 0; empty: nowhere) is 0.
+FrameFeatures ExtractOrb(const std::vector<cv::Mat>& pyramid, const OdometryOptions& options,
+                         const cv::Mat& mask = {});
 
 /// Everything for one frame of the rig: features of the (left) image, and depth from the depth image or from
 /// the right image (descriptor search along the row, then a least-squares fit). Pure: may run on any thread.

@@ -4,7 +4,6 @@
 #include <filesystem>
 #include <memory>
 #include <opencv2/core/utility.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -20,10 +19,12 @@
 #include "apps/tutti/loops/loops_output.h"
 #include "apps/tutti/loops/loops_pictures.h"
 #include "apps/tutti/loops/loops_table.h"
+#include "apps/tutti/mask_option.h"
+#include "core/camera_text.h"
 #include "core/stopwatch.h"
-#include "frontend/dataset/image_file.h"
+#include "frontend/dataset/image_mask.h"
 #include "tutti/core/error.h"
-#include "tutti/core/text.h"
+#include "tutti/frontend/dataset.h"
 #include "tutti/loopclosure/detector.h"
 #include "tutti/slam/config.h"
 
@@ -31,7 +32,7 @@ namespace tutti::cli {
 namespace {
 
 struct LoopsArguments {
-  std::string images, out, rule, preset, camera, places;
+  std::string images, out, rule, preset, camera, places, mask;
   GroundTruthArguments truth;
   std::vector<std::string> set;  // key=value, keys of the section `loops` of a configuration
   LoopDetectorOptions options;
@@ -42,46 +43,50 @@ struct LoopsArguments {
 // What every rule of a table shares.
 struct Input : ImageSet {
   std::optional<PinholeCamera> camera;
+  std::optional<ImageMasks> masks;
 };
 
-std::optional<PinholeCamera> ParseCamera(const std::string& text) {
-  if (text.empty()) return std::nullopt;
-  const std::vector<std::string> words = SplitText(text, ", ");
-  std::vector<double> values;
-  for (const std::string& word : words) {
-    const auto value = ParseDouble(word);
-    if (value) values.push_back(*value);
-  }
-  if (words.size() != 4 || values.size() != 4 || !(values[0] > 0) || !(values[1] > 0)) {
-    throw InputError("--camera " + text + ": give four numbers, fx,fy,cx,cy in pixels");
-  }
-  PinholeCamera camera;
-  camera.fx = values[0];
-  camera.fy = values[1];
-  camera.cx = values[2];
-  camera.cy = values[3];
-  return camera;
-}
-
-LoopRow Process(const std::filesystem::path& file, const std::filesystem::path& right, std::int64_t number,
-                const std::optional<PinholeCamera>& camera, LoopDetector& detector) {
+LoopRow Process(const Input& set, std::size_t i, std::int64_t number, LoopDetector& detector) {
+  const std::filesystem::path &file = set.images[i], &right = set.rights[i];
   LoopRow row;
   row.file = file.filename().string();
   LoopQuery query;
   query.id = number;
   query.stamp_s = static_cast<double>(number);
-  query.image = right.empty() ? ReadImageFile(file, cv::IMREAD_UNCHANGED).image
-                              : ReadJoined(file, right, &query.cameras);
+  query.image = right.empty() ? set.Read(i) : ReadJoined(file, right, &query.cameras);
   row.read = !query.image.empty();
-  if (row.read && camera) {
-    query.camera = camera;
+  if (row.read && set.camera) {
+    query.camera = set.camera;
     query.camera->width = query.image.cols;
     query.camera->height = query.image.rows;
   }
+  if (row.read && set.masks) query.mask = set.masks->Of(file.stem().string(), query.image.size());
   const internal::Stopwatch watch;
   row.result = detector.Detect(query);
   row.ms = watch.Milliseconds();
   return row;
+}
+
+// --mask, and a word about images that have none.
+std::optional<ImageMasks> MasksFor(const LoopsArguments& arguments, const ImageSet& set) {
+  if (arguments.mask.empty()) return std::nullopt;
+  if (arguments.truth.join_pairs)
+    throw InputError("--mask: images that --join-pairs joins have no common mask; leave one of the two out");
+  ImageMasks masks(arguments.mask);
+  if (set.video) {
+    const PinholeCamera& camera = set.video->Rig().camera;
+    masks.OfAll({camera.width, camera.height});  // refuses what can't be used
+  }
+  const auto without = std::count_if(set.images.begin(), set.images.end(),
+                                     [&](const auto& image) { return !masks.Has(image.stem().string()); });
+  const std::string of_all = " of " + std::to_string(set.images.size()) + " images";
+  if (without == static_cast<std::ptrdiff_t>(set.images.size()))
+    throw InputError(arguments.mask + ": holds no mask for any" + of_all +
+                     "; a mask has the name of its image");
+  if (without > 0)
+    std::fprintf(stderr, "tutti: %s: %td%s have no mask; all of them is used\n", arguments.mask.c_str(),
+                 without, of_all.c_str());
+  return masks;
 }
 
 // What was kept for the pictures and the dump alone.
@@ -103,6 +108,7 @@ LoopRun RunDetector(const LoopsArguments& arguments, const LoopDetectorOptions& 
   run.stride = arguments.truth.stride;
   run.judged = !arguments.truth.file.empty();
   run.options = options;
+  run.image = [&set](std::size_t row) { return set.Read(row); };
   LoopDetectorOptions with_posterior = options;
   with_posterior.keep_posterior = true;  // for confusion.png
   with_posterior.keep_evidence = arguments.dump || options.keep_evidence;
@@ -120,7 +126,7 @@ LoopRun RunDetector(const LoopsArguments& arguments, const LoopDetectorOptions& 
     if (InterruptGuard::Requested()) break;
     const std::filesystem::path& image = set.images[i];
     const std::int64_t number = earlier.first() + static_cast<std::int64_t>(i);
-    run.rows.push_back(Process(image, set.rights[i], number, set.camera, detector));
+    run.rows.push_back(Process(set, i, number, detector));
     LoopRow& row = run.rows.back();
     earlier.Add(number, image);
     earlier.Separate(&row);
@@ -192,7 +198,9 @@ int RunLoops(const LoopsArguments& given) {
   const std::string problem = arguments.truth.rule.Validate();
   if (!problem.empty()) throw InputError("ground truth: " + problem);
   cv::setNumThreads(arguments.options.threads);
-  const Input set = {LoadImageSet(arguments.images, arguments.truth), ParseCamera(arguments.camera)};
+  Input set = {LoadImageSet(arguments.images, arguments.truth), std::nullopt, std::nullopt};
+  if (!arguments.camera.empty()) set.camera = internal::ParseCamera(arguments.camera);
+  set.masks = MasksFor(arguments, set);
   const InterruptGuard interrupt;
   RefuseToReplace(arguments.out, arguments.truth.file);
   if (arguments.table) return RunTable(arguments, set);
@@ -215,8 +223,9 @@ int RunLoops(const LoopsArguments& given) {
 void SetUpLoops(CLI::App& command, int& exit_code) {
   auto arguments = std::make_shared<LoopsArguments>();
   command
-      .add_option("images,--images", arguments->images,
-                  "folder of images, taken in natural order, or a data set's (KITTI, TUM, EuRoC)")
+      .add_option(
+          "images,--images", arguments->images,
+          "folder of images, taken in natural order, or a data set's (KITTI, TUM, EuRoC), or a video file")
       ->required();
   command.add_option("--ground-truth", arguments->truth.file,
                      "loop matrix (PNG, BMP, text, MATLAB .mat; row = current image) or trajectory (TUM, "
@@ -259,7 +268,9 @@ void SetUpLoops(CLI::App& command, int& exit_code) {
                 "for each")
       ->excludes(command.get_option("--rule"));
   command.add_option("--camera", arguments->camera,
-                     "fx,fy,cx,cy [px]: verify with the essential matrix (default: fundamental matrix)");
+                     std::string(internal::kCameraText) +
+                         " [px]: verify with the essential matrix (default: fundamental matrix)");
+  AddMaskOption(command, arguments->mask);
   command
       .add_option("--threads", arguments->options.threads,
                   "most threads; the result is the same for any number")

@@ -1,15 +1,15 @@
 // The contact sheet of `tutti loops`: what went wrong, to look at.
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
-#include <opencv2/imgcodecs.hpp>
+#include <map>
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
 #include "apps/plot/plot_picture.h"
 #include "apps/tutti/loops/loops_pictures.h"
-#include "frontend/dataset/image_file.h"
 #include "tutti/loopclosure/features.h"
 
 namespace tutti::cli {
@@ -60,21 +60,19 @@ std::vector<Entry> Choose(std::vector<std::size_t> wrong, const std::vector<std:
   return entries;
 }
 
-// Colour, 8 bits, in the middle of a thumb; a line of text where there is none.
-cv::Mat Thumb(const LoopRun& run, long image, const char* absent) {
+// A line of text where an image would be.
+cv::Mat EmptyThumb(const char* text) {
   cv::Mat thumb(kThumbHeight, kThumbWidth, CV_8UC3, cv::Scalar::all(236));
-  cv::Mat read;
-  if (image >= 0 && image < static_cast<long>(run.rows.size())) {
-    const std::string& name = run.rows[static_cast<std::size_t>(image)].file;
-    read = ReadImageFile(std::filesystem::path(run.images) / name, cv::IMREAD_UNCHANGED).image;
-    absent = "the image can't be read";
-  }
-  if (read.empty()) {
-    DrawShapes(
-        {PlotText({0.5 * kThumbWidth, 0.5 * kThumbHeight}, absent, kTextHeight, PlotShape::Anchor::kMiddle)},
-        thumb);
-    return thumb;
-  }
+  DrawShapes(
+      {PlotText({0.5 * kThumbWidth, 0.5 * kThumbHeight}, text, kTextHeight, PlotShape::Anchor::kMiddle)},
+      thumb);
+  return thumb;
+}
+
+// Colour, 8 bits, in the middle of a thumb.
+cv::Mat Thumb(cv::Mat read) {
+  if (read.empty()) return EmptyThumb("the image can't be read");
+  cv::Mat thumb(kThumbHeight, kThumbWidth, CV_8UC3, cv::Scalar::all(236));
   if (read.depth() != CV_8U) read = ToGrey8(read);
   if (read.channels() == 1) cv::cvtColor(read, read, cv::COLOR_GRAY2BGR);
   if (read.channels() == 4) cv::cvtColor(read, read, cv::COLOR_BGRA2BGR);
@@ -165,13 +163,40 @@ std::vector<Entry> ChooseFound(const LoopRun& run) {
   return entries;
 }
 
-void DrawEntry(const LoopRun& run, const Entry& entry, cv::Mat strip) {
+// The images of a row: its own, what was said, what is true; -1: none.
+struct Shown {
+  TruthOfRow truth;
+  std::array<long, 3> images;
+};
+
+Shown ShownBy(const LoopRun& run, const Entry& entry) {
+  const LoopRow& row = run.rows[entry.row];
+  const int image = static_cast<int>(row.result.query);
+  Shown shown;
+  shown.truth = LookUp(run.truth, image, row.Said());
+  shown.images = {image, row.Said(), shown.truth.shown};
+  return shown;
+}
+
+using Thumbs = std::map<long, cv::Mat>;
+
+// In the order of their numbers: a video's frames are not to be had in any other without beginning again.
+Thumbs ReadThumbs(const LoopRun& run, const std::vector<Entry>& entries) {
+  Thumbs thumbs;
+  for (const Entry& entry : entries) {
+    for (const long image : ShownBy(run, entry).images) {
+      if (image >= 0 && image < static_cast<long>(run.rows.size())) thumbs[image];
+    }
+  }
+  for (auto& [image, thumb] : thumbs) thumb = Thumb(run.image(static_cast<std::size_t>(image)));
+  return thumbs;
+}
+
+void DrawEntry(const LoopRun& run, const Entry& entry, const Thumbs& thumbs, cv::Mat strip) {
   const LoopRow& row = run.rows[entry.row];
   const LoopResult& r = row.result;
-  const int image = static_cast<int>(r.query);
-  const long said = row.Said();
-  const TruthOfRow truth = LookUp(run.truth, image, said);
-  const long shown[] = {image, said, truth.shown};
+  const auto [truth, shown] = ShownBy(run, entry);
+  const long image = shown[0], said = shown[1];
   const char* absent[] = {"", "nothing was proposed",
                           entry.found ? "there is no ground truth" : "no loop in the ground truth"};
   const std::string heads[] = {"image " + Name(run, image),
@@ -184,7 +209,9 @@ void DrawEntry(const LoopRun& run, const Entry& entry, cv::Mat strip) {
   std::vector<PlotShape> shapes = {PlotBox({kMargin, 4}, {kWidth - kMargin, 8}, color)};
   for (int k = 0; k < 3; ++k) {
     const int left = kMargin + k * (kThumbWidth + kMargin);
-    Thumb(run, shown[k], absent[k]).copyTo(strip(cv::Rect(left, kCaption, kThumbWidth, kThumbHeight)));
+    const auto found = thumbs.find(shown[static_cast<std::size_t>(k)]);
+    const cv::Mat thumb = found != thumbs.end() ? found->second : EmptyThumb(absent[k]);
+    thumb.copyTo(strip(cv::Rect(left, kCaption, kThumbWidth, kThumbHeight)));
     shapes.push_back(
         PlotText({static_cast<double>(left), kCaption - 8.0}, Fitted(heads[k], kThumbWidth), kTextHeight));
   }
@@ -225,9 +252,10 @@ void WriteContactSheet(const LoopRun& run, const LoopReport& report, const std::
                               run.judged ? "none: no false positive, no missed loop" : "no loop was accepted",
                               22, PlotShape::Anchor::kMiddle));
   DrawShapes(shapes, picture);
+  const Thumbs thumbs = ReadThumbs(run, entries);
   for (std::size_t k = 0; k < entries.size(); ++k) {
     const int top = kHeader + static_cast<int>(k) * strip;
-    DrawEntry(run, entries[k], picture(cv::Rect(0, top, kWidth, strip)));
+    DrawEntry(run, entries[k], thumbs, picture(cv::Rect(0, top, kWidth, strip)));
   }
   WritePicture(file, picture);
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <opencv2/imgcodecs.hpp>
 #include <optional>
 #include <sstream>
 #include <utility>
@@ -16,6 +17,7 @@
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 #include "tutti/core/trajectory.h"
+#include "tutti/frontend/dataset.h"
 
 namespace tutti::cli {
 namespace {
@@ -144,11 +146,7 @@ LoopGroundTruth NoTruth(int images) {
 fs::path ImageFolder(const fs::path& folder) {
   std::error_code error;
   if (!fs::is_directory(folder, error) || !ImagesIn(folder).empty()) return folder;
-  for (const char* images : {"image_0", "image_2", "rgb", "mav0/cam0/data", "images"}) {
-    if (fs::is_directory(folder / images, error) && !ImagesIn(folder / images).empty())
-      return folder / images;
-  }
-  return folder;
+  return ImagesOfDataset(folder).value_or(folder);
 }
 
 std::vector<fs::path> ListImages(const fs::path& folder) {
@@ -190,15 +188,40 @@ LoopGroundTruth LoadGroundTruth(const GroundTruthArguments& arguments, const std
                    "; give the one that belongs to them");
 }
 
-ImageSet LoadImageSet(const std::string& folder, const GroundTruthArguments& arguments) {
-  std::vector<fs::path> images = ListImages(folder);
+cv::Mat ImageSet::Read(std::size_t i) const {
+  if (!video) return ReadImageFile(images.at(i), cv::IMREAD_UNCHANGED).image;
+  return video->ReadColour(i * static_cast<std::size_t>(stride)).image;
+}
+
+namespace {
+
+// The names of a video's frames, which are opened here.
+std::vector<fs::path> FramesOf(const fs::path& file, std::shared_ptr<const Dataset>* video) {
+  if (DetectDatasetType(file) != DatasetType::kVideo)
+    throw InputError(file.string() + ": loops are looked for in folders of images and in videos; " +
+                     "`tutti run` finds them in bags");
+  *video = OpenDataset(file, DatasetOptions());
+  std::vector<fs::path> frames;
+  for (std::size_t i = 0; i < (*video)->Size(); ++i) frames.push_back(file / ("frame " + std::to_string(i)));
+  return frames;
+}
+
+}  // namespace
+
+ImageSet LoadImageSet(const std::string& folder_or_video, const GroundTruthArguments& arguments) {
+  ImageSet set;
+  set.stride = arguments.stride;
   std::error_code error;
+  std::vector<fs::path> images = fs::is_regular_file(folder_or_video, error)
+                                     ? FramesOf(folder_or_video, &set.video)
+                                     : ListImages(folder_or_video);
   images.erase(std::remove_if(images.begin(), images.end(),
                               [&](const auto& p) { return fs::equivalent(p, arguments.file, error); }),
                images.end());
   std::vector<fs::path> rights(images.size());
-  if (arguments.join_pairs) rights = TakeRightImages(folder, images);
-  ImageSet set;
+  if (arguments.join_pairs && set.video)
+    throw InputError(folder_or_video + ": --join-pairs joins images of a folder, not frames of a video");
+  if (arguments.join_pairs) rights = TakeRightImages(folder_or_video, images);
   for (std::size_t i = 0; i < images.size(); i += static_cast<std::size_t>(arguments.stride)) {
     set.images.push_back(images[i]);
     set.rights.push_back(rights[i]);

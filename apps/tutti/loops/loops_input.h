@@ -3,10 +3,16 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
+#include <opencv2/core.hpp>
 #include <string>
 #include <vector>
 
 #include "tutti/loopclosure/ground_truth.h"
+
+namespace tutti {
+class Dataset;
+}
 
 namespace tutti::cli {
 
@@ -31,18 +37,24 @@ struct GroundTruthArguments {
 LoopGroundTruth LoadGroundTruth(const GroundTruthArguments& arguments,
                                 const std::vector<std::filesystem::path>& images);
 
-/// The images of a folder with their ground truth.
+/// The images of a folder, or the frames of a video, with their ground truth.
 struct ImageSet {
-  std::vector<std::filesystem::path> images;  ///< every stride-th
+  std::vector<std::filesystem::path> images;  ///< every stride-th; of a video: FILE/frame 12
   std::vector<std::filesystem::path> rights;  ///< beside each of them; empty without join_pairs
   LoopGroundTruth truth;                      ///< of a set without one: every pair is ignored
+  std::shared_ptr<const Dataset> video;       ///< null: the images are files
+  int stride = 1;                             ///< of the images among the video's frames
+
+  /// The (left) image in colour or grey, as it is stored; empty where it can't be read.
+  cv::Mat Read(std::size_t i) const;
 };
 
-/// The folder of images that a data set's folder holds (KITTI: image_0, TUM: rgb, EuRoC: mav0/cam0/data), or
-/// the folder itself where it holds images or no data set.
+/// The folder of images that a data set's folder holds, or the folder itself where it holds images or no data
+/// set.
 std::filesystem::path ImageFolder(const std::filesystem::path& folder);
 
-/// A loop matrix that lies among the images is none of them. Throws InputError.
-ImageSet LoadImageSet(const std::string& folder, const GroundTruthArguments& arguments);
+/// Of a folder of images, or a video file. A loop matrix that lies among the images is none of them. Throws
+/// InputError.
+ImageSet LoadImageSet(const std::string& folder_or_video, const GroundTruthArguments& arguments);
 
 }  // namespace tutti::cli

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 #include <optional>
@@ -44,7 +45,8 @@ struct LoopRun {
   LoopGroundTruth truth;  ///< of the rows; where there is none, every pair is ignored
   bool judged = true;     ///< there is a ground truth
   std::vector<LoopRow> rows;
-  std::int64_t earlier = 0;  ///< images of earlier runs that it went on from
+  std::int64_t earlier = 0;                   ///< images of earlier runs that it went on from
+  std::function<cv::Mat(std::size_t)> image;  ///< reads a row's (left) image again; empty: can't be read
   cv::Mat posterior;  ///< CV_32FC1, square: the posterior of past images (columns), by AddPosterior; may be
                       ///< empty
 

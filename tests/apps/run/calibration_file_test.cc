@@ -166,6 +166,33 @@ TEST(CalibrationFile, ThatCantBeUsedIsRefusedWithLineAndReason) {
               HasSubstr("camera.fx"));
 }
 
+TEST(CalibrationFile, OfEurocIsReadAsItsDataSetsAre) {
+  const Calibration c = Read(R"(sensor_type: camera
+T_BS:
+  cols: 4
+  rows: 4
+  data: [1.0, 0.0, 0.0, 0.1,
+         0.0, 1.0, 0.0, 0.2,
+         0.0, 0.0, 1.0, 0.3,
+         0.0, 0.0, 0.0, 1.0]
+rate_hz: 20
+resolution: [752, 480]
+camera_model: pinhole
+intrinsics: [458.654, 457.296, 367.215, 248.375] #fu, fv, cu, cv
+distortion_model: radial-tangential
+distortion_coefficients: [-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05]
+)");
+  EXPECT_EQ(c.format, "EuRoC");
+  EXPECT_EQ(c.camera.fy, 457.296);
+  EXPECT_EQ(c.camera.height, 480);
+  EXPECT_EQ(c.camera.distortion, Distortion::kRadTan);
+  EXPECT_EQ(c.rate_hz, 20);
+  EXPECT_THAT(RefusalOfFile("intrinsics: [1, 2, 3]\nresolution: [64, 48]\n"),
+              HasSubstr("camera.yaml:1: 'intrinsics' has 3 values; 4 are needed"));
+  EXPECT_THAT(RefusalOfFile("camera_model: omni\nintrinsics: [1, 2, 3, 4]\n"),
+              HasSubstr("camera.yaml:1: camera_model 'omni': tutti has pinhole alone"));
+}
+
 TEST(CalibrationFile, ThatIsNotThereIsNamed) {
   try {
     ReadCalibration("/nowhere/camera.yaml");

@@ -150,6 +150,12 @@ TEST(Recording, KnowsTheFocalLengthOfAFieldOfView) {
   EXPECT_NEAR(given->cx, 31.5, 1e-9);
 }
 
+TEST(Recording, OfAStreamIsNotLookedForAmongFiles) {
+  CameraRequest camera;
+  camera.camera = "70,71,30,20";
+  EXPECT_THAT(Refusal("rtsp://127.0.0.1:1/front", camera), HasSubstr("no stream of video can be opened"));
+}
+
 TEST(Recording, RefusesACameraThatCantBe) {
   const fs::path town = KittiTown();
   CameraRequest camera;

@@ -115,6 +115,21 @@ TEST(CornerDetector, OneThresholdIsEnough) {
   ExpectSameCorners(DetectCorners(Uneven(2), options), ByTheBook(Uneven(2), options));
 }
 
+TEST(CornerDetector, NoneUnderTheMaskAndAsManyBesideIt) {
+  const cv::Mat image = TownImage(2);
+  cv::Mat mask(image.size(), CV_8UC1, cv::Scalar(255));
+  mask.rowRange(0, image.rows / 2).setTo(0);
+  const CornerOptions options{150, 20, 7, kBorder};
+  const std::vector<cv::KeyPoint> found = DetectCorners(image, options, mask);
+  for (const cv::KeyPoint& k : found) EXPECT_GE(k.pt.y, static_cast<float>(image.rows / 2));
+  std::size_t beside = 0;
+  for (const cv::KeyPoint& k : DetectCorners(image, options))
+    beside += k.pt.y >= static_cast<float>(image.rows / 2) ? 1 : 0;
+  EXPECT_GE(found.size(), beside);  // those under the mask take nobody's place
+  mask.setTo(1);
+  ExpectSameCorners(DetectCorners(image, options, mask), DetectCorners(image, options));
+}
+
 TEST(CornerDetector, NothingInImagesThatAreBlankOrSmall) {
   const CornerOptions options{100, 20, 7, kBorder};
   EXPECT_TRUE(DetectCorners(cv::Mat(240, 320, CV_8UC1, cv::Scalar(90)), options).empty());

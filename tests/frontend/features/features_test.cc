@@ -48,6 +48,25 @@ TEST(FrameFeatures, ScalesAreAGeometricSeries) {
   EXPECT_FLOAT_EQ(scales[7], std::pow(1.2F, 7.0F));
 }
 
+TEST(FrameFeatures, NoneLiesUnderTheMaskOnAnyLevel) {
+  const cv::Mat image = StreetImage();
+  cv::Mat mask(image.size(), CV_8UC1, cv::Scalar(255));
+  for (int y = 0; y < mask.rows; ++y) {
+    for (int x = 0; x < mask.cols; ++x) mask.at<std::uint8_t>(y, x) = (x / 23 + y / 17) % 2 == 0 ? 0 : 9;
+  }
+  const OdometryOptions options;
+  const FrameFeatures masked = ExtractOrb(BuildPyramid(image, options), options, mask);
+  EXPECT_GT(masked.size(), Detect(image).size() / 3);
+  ASSERT_EQ(masked.descriptors.rows, static_cast<int>(masked.size()));
+  int highest = 0;
+  for (const cv::KeyPoint& k : masked.keypoints) {
+    highest = std::max(highest, k.octave);
+    EXPECT_NE(mask.at<std::uint8_t>(int(std::lround(k.pt.y)), int(std::lround(k.pt.x))), 0)
+        << k.pt << " on " << k.octave;
+  }
+  EXPECT_GE(highest, 3);
+}
+
 TEST(FrameFeatures, BlankImagesHaveNone) {
   for (const int grey : {0, 128, 255}) {
     const FrameFeatures features = Detect(cv::Mat(240, 320, CV_8UC1, cv::Scalar(grey)));

@@ -64,6 +64,15 @@ struct DatasetOptions {
   TUTTI_OPTION(int, end, 0, "frame before which to stop (the first that is not used); 0: use all", Basic(),
                From(0));
   TUTTI_OPTION(int, stride, 1, "use every stride-th frame, from the first that is used on", Basic(), From(1));
+  TUTTI_OPTION(std::string, mask, "",
+               "8-bit image as large as those of the (left) camera, as they are stored: where it is 0 (the "
+               "robot's own body), the images are not used; or a folder with such a mask for each image, "
+               "which has the image's name (for what moves). Empty: all is used",
+               Basic());
+  TUTTI_OPTION(int, rotate, 0,
+               "turn the images so far clockwise, so that they are upright: 90, 180 or 270. The camera is "
+               "given as it is, before that",
+               Basic(), Unit("deg"), From(0), To(270));
   TUTTI_OPTION(double, noise, 0,
                "standard deviation of Gaussian noise that is added to the images, to see how a result holds; "
                "0: none",
@@ -84,8 +93,11 @@ struct DatasetOptions {
   TUTTI_OPTIONS_END;
 
   /// Empty if usable, else what is wrong.
-  std::string Validate() const { return OutOfRange(*this); }
+  std::string Validate() const;
 };
+
+/// The options of a recording, for another one of the same camera: all frames, and no masks of single images.
+DatasetOptions ForAnotherRecording(DatasetOptions options);
 
 /// How frames come to be there.
 enum class Supply {
@@ -138,15 +150,18 @@ std::optional<std::size_t> FindStamp(const Dataset& dataset, double stamp_s);
 /// holds no data set.
 DatasetType DetectDatasetType(const std::filesystem::path& path);
 
-/// True for "camera:0" and "camera:FILE".
+/// True for what gives its frames once, in order, and is no file to look at before: "camera:0",
+/// "camera:FILE", and addresses of streams (IsStream).
 bool IsCamera(const std::string& name);
-/// True for "camera:0" alone.
+/// True for those that keep their own time: "camera:0" and streams.
 bool IsCameraDevice(const std::string& name);
+/// True for addresses: "rtsp://...", "rtsps://...", "http://...", "https://...".
+bool IsStream(const std::string& name);
 
-/// Opens a data set: a folder, a video file, a camera (camera:0), or a video file that stands in for one
-/// (camera:FILE). Throws InputError if there is nothing usable: missing or empty
-/// folder, no calibration where one is needed, unsorted time stamps, ... The message says what was expected
-/// where.
+/// Opens a data set: a folder, a video file, a camera (camera:0), a video file that stands in for one
+/// (camera:FILE), or a stream (rtsp://..., http://...). Throws InputError if there is nothing usable: missing
+/// or empty folder, no calibration where one is needed, unsorted time stamps, ... The message says what was
+/// expected where.
 std::unique_ptr<Dataset> OpenDataset(const std::filesystem::path& path, const DatasetOptions& options);
 
 }  // namespace tutti

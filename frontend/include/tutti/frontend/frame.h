@@ -40,6 +40,7 @@ struct InputFrame {
   cv::Mat right;           ///< stereo: CV_8UC1, same size as image; else, or where it is absent, empty
   cv::Mat depth_m;  ///< RGB-D: CV_32FC1 [m], registered to image, 0 = no measurement; else, or where it
                     ///< is absent, empty
+  cv::Mat mask;     ///< optional: CV_8UC1, same size as image; there are no features where it is 0
   std::shared_ptr<const FrameFeatures>
       features;  ///< optional: Odometry::Extract's result, made on another thread
 };

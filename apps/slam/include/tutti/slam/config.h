@@ -50,8 +50,9 @@ struct ConfigEntry {
 /// All keys in the order of the sections.
 std::vector<ConfigEntry> DescribeConfig(const RunConfig& config);
 
-/// The keys that users set, or all of them, with units and defaults, as a commented YAML file.
-std::string HelpConfig(bool advanced);
+/// The keys that users set, or all of them, with units and defaults, as a commented YAML file. Comments are
+/// wrapped to this many columns; 0: each in one line.
+std::string HelpConfig(bool advanced, std::size_t columns = 0);
 
 }  // namespace tutti
 #pragma GCC visibility pop

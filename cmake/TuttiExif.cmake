@@ -1,0 +1,13 @@
+# Focal lengths of photos, optional: libexif (LGPL-2.1, a shared library; Debian: libexif-dev). Sets TUTTI_EXIF_FOUND, _INCLUDE, _LIBRARY.
+option(TUTTI_EXIF "Read the focal length of photos where libexif-dev is installed" ON)
+set(TUTTI_EXIF_FOUND FALSE)
+if(TUTTI_EXIF)
+  find_path(TUTTI_EXIF_INCLUDE libexif/exif-data.h)
+  find_library(TUTTI_EXIF_LIBRARY exif)
+  if(TUTTI_EXIF_INCLUDE AND TUTTI_EXIF_LIBRARY)
+    set(TUTTI_EXIF_FOUND TRUE)
+  endif()
+endif()
+if(NOT TUTTI_EXIF_FOUND)
+  message(STATUS "EXIF of photos: off (libexif-dev)")
+endif()

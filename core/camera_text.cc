@@ -1,0 +1,41 @@
+#include "core/camera_text.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <vector>
+
+#include "tutti/core/error.h"
+#include "tutti/core/text.h"
+
+namespace tutti::internal {
+
+PinholeCamera ParseCamera(const std::string& text, const std::string& option) {
+  const std::string remedy = std::string("; write ") + kCameraText + " in pixels";
+  std::vector<double> values;
+  for (std::size_t at = 0; at <= text.size();) {
+    const std::size_t comma = std::min(text.find(',', at), text.size());
+    const std::vector<std::string> words = SplitText(text.substr(at, comma - at), " \t");
+    const std::optional<double> value = words.size() == 1 ? ParseDouble(words[0]) : std::nullopt;
+    if (!value || !std::isfinite(*value))
+      throw InputError(option + ": '" + text.substr(at, comma - at) + "' is no number" + remedy);
+    values.push_back(*value);
+    at = comma + 1;
+  }
+  if (values.size() != 4 && values.size() != 8 && values.size() != 9)
+    throw InputError(option + ": has " + std::to_string(values.size()) + " numbers" + remedy);
+  if (!(values[0] > 0) || !(values[1] > 0))
+    throw InputError(option + " " + text + ": fx and fy must be above 0" + remedy);
+  PinholeCamera camera;
+  camera.fx = values[0];
+  camera.fy = values[1];
+  camera.cx = values[2];
+  camera.cy = values[3];
+  for (std::size_t i = 4; i < values.size(); ++i) {
+    camera.coefficients[i - 4] = values[i];
+    if (values[i] != 0) camera.distortion = Distortion::kRadTan;
+  }
+  return camera;
+}
+
+}  // namespace tutti::internal

@@ -1,0 +1,41 @@
+// A camera in one word.
+#include "core/camera_text.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/support/error_of.h"
+
+namespace tutti::internal {
+namespace {
+
+using ::testing::HasSubstr;
+
+TEST(CameraText, HasFourNumbersOrALensToo) {
+  const PinholeCamera plain = ParseCamera("500,501,320, 240");
+  EXPECT_EQ(plain.fx, 500);
+  EXPECT_EQ(plain.fy, 501);
+  EXPECT_EQ(plain.cy, 240);
+  EXPECT_EQ(plain.width, 0);
+  EXPECT_EQ(plain.distortion, Distortion::kNone);
+  const PinholeCamera lens = ParseCamera("500,500,320,240,-0.1,0.2,0,0.001,0.3");
+  EXPECT_EQ(lens.distortion, Distortion::kRadTan);
+  EXPECT_EQ(lens.coefficients, (DistortionCoefficients{-0.1, 0.2, 0, 0.001, 0.3}));
+  EXPECT_EQ(ParseCamera("500,500,320,240,0,0,0,0").distortion, Distortion::kNone);
+}
+
+TEST(CameraText, ThatIsWrongIsNamedWithTheOption) {
+  for (const auto& [text, what] : {std::pair("1,2,3", "has 3 numbers"),
+                                   {"1,2,3,4,5", "has 5 numbers"},
+                                   {"1,x,3,4", "'x' is no number"},
+                                   {"1,nan,3,4", "'nan' is no number"},
+                                   {"", "'' is no number"},
+                                   {"0,5,3,4", "fx and fy must be above 0"}}) {
+    EXPECT_THAT(tutti::testing::ErrorOf([&, text = text] { ParseCamera(text, "--lens"); }),
+                ::testing::AllOf(HasSubstr("--lens"), HasSubstr(what), HasSubstr("fx,fy,cx,cy")))
+        << text;
+  }
+}
+
+}  // namespace
+}  // namespace tutti::internal

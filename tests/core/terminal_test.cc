@@ -1,0 +1,47 @@
+// Text as wide as the terminal.
+#include "core/terminal.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <pty.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+namespace tutti::internal {
+namespace {
+
+using ::testing::ElementsAre;
+
+TEST(Terminal, HasTheColumnsThatItSays) {
+  int master = -1, slave = -1;
+  winsize size{};
+  size.ws_col = 133;
+  ASSERT_EQ(openpty(&master, &slave, nullptr, nullptr, &size), 0);
+  std::FILE* out = fdopen(slave, "w");
+  ASSERT_NE(out, nullptr);
+  EXPECT_EQ(TerminalColumns(out), 133u);
+  size.ws_col = 0;
+  ASSERT_EQ(ioctl(slave, TIOCSWINSZ, &size), 0);
+  EXPECT_EQ(TerminalColumns(out), 80u);
+  std::fclose(out);
+  close(master);
+}
+
+TEST(Terminal, OfAFileHas80Columns) {
+  std::FILE* file = std::tmpfile();
+  ASSERT_NE(file, nullptr);
+  EXPECT_EQ(TerminalColumns(file), 80u);
+  EXPECT_EQ(TerminalColumns(nullptr), 80u);
+  std::fclose(file);
+}
+
+TEST(WrapText, BreaksBetweenWordsAndFillsEachLine) {
+  EXPECT_THAT(WrapText("one two three four", 9), ElementsAre("one two", "three", "four"));
+  EXPECT_THAT(WrapText("one  two", 80), ElementsAre("one two"));
+  EXPECT_THAT(WrapText("a verylongword b", 5), ElementsAre("a", "verylongword", "b"));
+  EXPECT_THAT(WrapText("one\ntwo", 80), ElementsAre("one", "two"));
+  EXPECT_THAT(WrapText("", 80), ElementsAre(""));
+}
+
+}  // namespace
+}  // namespace tutti::internal

@@ -71,12 +71,12 @@ CombinedBelief CombineMajority(const std::vector<const Belief*>& members, double
   // first member's.
   for (const Belief* centre : voters) {
     const int best = centre->Best();
-    const std::vector<std::pair<int, int>> near = memory.Neighbours(best, kAgreementLevels);
+    const std::vector<LocationMemory::Neighbour> near = memory.Neighbours(best, kAgreementLevels);
     std::vector<const Belief*> group;
     double sum = 0.0;
     for (const Belief* voter : voters) {
       const int vote = voter->Best();
-      if (std::any_of(near.begin(), near.end(), [vote](const auto& n) { return n.first == vote; })) {
+      if (std::any_of(near.begin(), near.end(), [vote](const auto& n) { return n.slot == vote; })) {
         group.push_back(voter);
         sum += voter->Hypothesis();
       }

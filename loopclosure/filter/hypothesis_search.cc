@@ -54,7 +54,7 @@ std::vector<int> HypothesisSearch::TopPlaces(const Belief& belief) const {
     if (places.size() == wanted && options_.island_levels == 0) break;
     if (std::find(covered.begin(), covered.end(), slot) != covered.end()) continue;
     places.push_back(slot);
-    for (const auto& [near, level] : memory_.Neighbours(slot, 1 + options_.verification.neighbours)) {
+    for (const auto& [near, level, loops] : memory_.Neighbours(slot, 1 + options_.verification.neighbours)) {
       covered.push_back(near);
     }
   }
@@ -68,7 +68,7 @@ void HypothesisSearch::RankByIsland(const Belief& belief, std::vector<int>& plac
   std::vector<std::pair<double, int>> ranked;
   for (const int place : places) {
     double sum = 0;
-    for (const auto& [slot, level] : memory_.Neighbours(place, options_.island_levels)) {
+    for (const auto& [slot, level, loops] : memory_.Neighbours(place, options_.island_levels)) {
       sum += PosteriorAt(belief, slot);
     }
     ranked.emplace_back(sum, place);
@@ -166,7 +166,7 @@ void HypothesisSearch::Verify(const View& query, const Belief& belief, LoopResul
 std::vector<int> HypothesisSearch::ViewsOf(int place, const Belief& belief) const {
   constexpr std::size_t kMostNeighbours = 3;
   std::vector<int> views;
-  for (const auto& [slot, level] : memory_.Neighbours(place, options_.verification.neighbours)) {
+  for (const auto& [slot, level, loops] : memory_.Neighbours(place, options_.verification.neighbours)) {
     if (slot != place) views.push_back(slot);
   }
   std::stable_sort(views.begin(), views.end(),

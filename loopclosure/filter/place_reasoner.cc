@@ -202,16 +202,18 @@ bool PlaceReasoner::Proposes(const CombinedBelief& combined, LoopResult& result)
 void PlaceReasoner::FollowCandidate(int best) {
   constexpr int kLevels = 3;
   const int before = last_candidate_ < 0 ? -1 : memory().Find(last_candidate_);
-  const auto near = before < 0 ? std::vector<std::pair<int, int>>() : memory().Neighbours(before, kLevels);
+  const auto near =
+      before < 0 ? std::vector<LocationMemory::Neighbour>() : memory().Neighbours(before, kLevels);
   const bool follows =
-      std::any_of(near.begin(), near.end(), [best](const auto& n) { return n.first == best; });
+      std::any_of(near.begin(), near.end(), [best](const auto& n) { return n.slot == best; });
   candidates_in_a_row_ = follows ? candidates_in_a_row_ + 1 : 0;
   last_candidate_ = memory().id(best);
 }
 
 double PlaceReasoner::MassAround(const Belief& belief, int slot) const {
   double mass = 0;
-  for (const auto& [near, level] : memory().Neighbours(slot, kAboutHere)) mass += PosteriorAt(belief, near);
+  for (const auto& [near, level, loops] : memory().Neighbours(slot, kAboutHere))
+    mass += PosteriorAt(belief, near);
   return std::min(1.0, mass);
 }
 

@@ -1,6 +1,7 @@
 #include "loopclosure/filter/transition_model.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace tutti {
 namespace {
@@ -27,11 +28,11 @@ void TransitionModel::Update(const LocationMemory& memory, const std::vector<int
       columns_[static_cast<std::size_t>(slot)] = Runs();
       // Paths that led through it are cut: all within reach of those that it was linked to.
       for (const LocationMemory::Link& link : memory.links(slot)) {
-        for (const auto& [near, level] : memory.Neighbours(link.slot, kLevels)) dirty.push_back(near);
+        for (const auto& [near, level, loops] : memory.Neighbours(link.slot, kLevels)) dirty.push_back(near);
       }
       continue;
     }
-    for (const auto& [near, level] : memory.Neighbours(slot, kLevels)) dirty.push_back(near);
+    for (const auto& [near, level, loops] : memory.Neighbours(slot, kLevels)) dirty.push_back(near);
   }
   std::sort(dirty.begin(), dirty.end());
   dirty.erase(std::unique(dirty.begin(), dirty.end()), dirty.end());
@@ -54,8 +55,8 @@ void TransitionModel::ShareInner(Runs& column) {
 TransitionModel::Runs TransitionModel::ComputeColumn(const LocationMemory& memory, int slot) {
   std::vector<std::pair<int, double>> column;
   double sum = 0.0;
-  for (const auto& [neighbour, level] : memory.Neighbours(slot, kLevels)) {
-    const double value = LevelValues()[static_cast<std::size_t>(level)];
+  for (const auto& [neighbour, level, loops] : memory.Neighbours(slot, kLevels)) {
+    const double value = LevelValues()[static_cast<std::size_t>(level)] * std::pow(kLoopShare, loops);
     column.emplace_back(neighbour, value);
     sum += value;
   }

@@ -13,8 +13,9 @@ namespace tutti {
 /// Sparse, banded transition matrix (loop-closure.md section 2, "Prediction"; Labbe & Michaud 2013, section
 /// III-E). Column j = p(. | S_{t-1} = j):
 ///   from the virtual place: p(-1 | -1) = 0.9, p(i | -1) = 0.1 / (m - 1);
-///   from a real place j: a Gaussian (sigma 1.6, 16 levels) over the graph neighbours in working memory, a
-///   deficit below 0.9 given to j itself, the real places scaled to 0.9; p(-1 | j) = 0.1.
+///   from a real place j: a Gaussian (sigma 1.6, 16 levels) over the graph neighbours in working memory,
+///   times kLoopShare for each loop link on the way, a deficit below 0.9 given to j itself, the real places
+///   scaled to 0.9; p(-1 | j) = 0.1.
 /// Columns are cached; a change in the graph recomputes only those within 16 levels. A prediction costs
 /// O(|WM|), whatever the camera's path: LocationMemory bounds the neighbours of a place that is seen over and
 /// over.
@@ -24,6 +25,9 @@ class TransitionModel {
   /// p(real place at this graph level), before scaling: self, level 1, ..., level 16.
   static const std::array<double, kLevels + 1>& LevelValues();
   static constexpr double kToNewPlace = 0.1;  ///< p(-1 | j)
+  /// Of a place behind a loop link, times the value of its level: the link may be false, and a true one has
+  /// the images' own evidence at both ends.
+  static constexpr double kLoopShare = 0.2;
 
   /// `virtual_place_prior`: p(-1 | -1), 0.9 in the specification.
   explicit TransitionModel(double virtual_place_prior) : virtual_place_prior_(virtual_place_prior) {}

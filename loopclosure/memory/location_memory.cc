@@ -177,7 +177,7 @@ bool LocationMemory::Retrieve(int slot) {
 
 std::vector<int> LocationMemory::LongTermNeighbours(int slot, int levels, int count) const {
   std::vector<int> found;
-  for (const auto& [near, level] : Walk(slot, levels, [](State) { return true; })) {
+  for (const auto& [near, level, loops] : Walk(slot, levels, [](State) { return true; })) {
     if (static_cast<int>(found.size()) == count) break;
     if (state(near) == State::kLongTerm) found.push_back(near);
   }
@@ -201,13 +201,14 @@ int LocationMemory::Find(std::int64_t id) const {
   return found == slot_of_id_.end() ? -1 : found->second;
 }
 
-std::vector<std::pair<int, int>> LocationMemory::Neighbours(int slot, int levels) const {
+std::vector<LocationMemory::Neighbour> LocationMemory::Neighbours(int slot, int levels) const {
   return Walk(slot, levels, [](State state) { return state == State::kWorking; });
 }
 
 template <typename Walkable>
-std::vector<std::pair<int, int>> LocationMemory::Walk(int slot, int levels, const Walkable& walkable) const {
-  std::vector<std::pair<int, int>> found;
+std::vector<LocationMemory::Neighbour> LocationMemory::Walk(int slot, int levels,
+                                                            const Walkable& walkable) const {
+  std::vector<Neighbour> found;
   if (!walkable(state(slot))) return found;
   // Level by level; the places of a ring by how many loop links their paths have taken.
   using Ring = std::array<std::vector<int>, kMostLoopsOfAWalk + 1>;
@@ -234,7 +235,7 @@ std::vector<std::pair<int, int>> LocationMemory::Walk(int slot, int levels, cons
       }
     }
     std::sort(reached.begin(), reached.end());
-    for (const int node : reached) found.emplace_back(node, level);
+    for (const int node : reached) found.push_back({node, level, static_cast<int>(fewest_loops.at(node))});
     ring.swap(next);
   }
   return found;

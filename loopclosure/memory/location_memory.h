@@ -51,6 +51,17 @@ class LocationMemory {
   /// Loop links that one path takes at most.
   static constexpr int kMostLoopsOfAWalk = 2;
 
+  /// A place that a walk over the links leads to.
+  struct Neighbour {
+    int slot = -1;
+    int level = 0;  ///< odometry links on the way
+    int loops = 0;  ///< loop links on it, the fewest of the shortest ways
+
+    bool operator==(const Neighbour& other) const {
+      return slot == other.slot && level == other.level && loops == other.loops;
+    }
+  };
+
   /// Empty. `stm_size`: locations that STM holds after Settle, at least 1.
   explicit LocationMemory(int stm_size) : stm_size_(stm_size) {}
 
@@ -131,7 +142,7 @@ class LocationMemory {
   /// Slots in WM within `levels` graph levels of `slot` (itself included), each with its level, in order of
   /// level, then slot. Odometry links count 1, loop links 0, of which a walk takes kMostLoopsOfAWalk. Only WM
   /// is walked.
-  std::vector<std::pair<int, int>> Neighbours(int slot, int levels) const;
+  std::vector<Neighbour> Neighbours(int slot, int levels) const;
 
  private:
   struct Node {
@@ -148,7 +159,7 @@ class LocationMemory {
   void Enter(int slot);
   // (slot, level) of every location within `levels` that `walkable` admits, `slot` first.
   template <typename Walkable>
-  std::vector<std::pair<int, int>> Walk(int slot, int levels, const Walkable& walkable) const;
+  std::vector<Neighbour> Walk(int slot, int levels, const Walkable& walkable) const;
 
   int stm_size_;
   std::vector<Node> nodes_;

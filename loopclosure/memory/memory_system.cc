@@ -211,7 +211,7 @@ std::vector<int> MemorySystem::NearBest(const PlaceFilter& place_filter) const {
   std::vector<int> near;
   const int best = place_filter.filter.posterior().Best();
   if (best < 0) return near;
-  for (const auto& [slot, level] : memory_.Neighbours(best, kNearLevels)) near.push_back(slot);
+  for (const auto& [slot, level, loops] : memory_.Neighbours(best, kNearLevels)) near.push_back(slot);
   std::sort(near.begin(), near.end());
   return near;
 }

@@ -112,7 +112,7 @@ int MemorySystem::NextToTransfer(int best, const std::vector<int>& retrieved) co
   std::set<int> immune(retrieved.begin(), retrieved.end());
   if (best >= 0) {
     immune.insert(best);
-    for (const auto& [slot, level] : memory_.Neighbours(best, kImmuneLevels)) immune.insert(slot);
+    for (const auto& [slot, level, loops] : memory_.Neighbours(best, kImmuneLevels)) immune.insert(slot);
   }
   return memory_.NextToTransfer(options_.recent_share, immune);
 }

@@ -56,13 +56,13 @@ TEST(TransitionModel, ALoneLocationKeepsTheDeficitToItself) {
   EXPECT_NEAR(At(model, 0, 0), 0.9, 1e-12);
 }
 
-TEST(TransitionModel, ALoopLinkBringsPlacesToTheSameLevel) {
+TEST(TransitionModel, WhatLiesBehindALoopLinkHasAShareOfItsLevel) {
   TransitionModel model(0.9);
   LocationMemory memory = Chain(60, model);
   ASSERT_TRUE(memory.AddLink(10, 50, LocationMemory::LinkType::kLoop));
   model.Update(memory, {10, 50});
-  EXPECT_NEAR(At(model, 10, 50), At(model, 10, 10), 1e-12);
-  EXPECT_NEAR(At(model, 10, 51), At(model, 10, 11), 1e-12);
+  EXPECT_NEAR(At(model, 10, 50), TransitionModel::kLoopShare * At(model, 10, 10), 1e-12);
+  EXPECT_NEAR(At(model, 10, 51), TransitionModel::kLoopShare * At(model, 10, 11), 1e-12);
   EXPECT_NEAR(Sum(model, 10), 0.9, 1e-12);
 }
 

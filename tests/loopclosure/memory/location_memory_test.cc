@@ -33,7 +33,8 @@ TEST(LocationMemory, NeighboursCountOdometryLinksButNotLoopLinks) {
   memory.Settle();
   memory.AddLink(2, 8, LinkType::kLoop);
   const auto near = memory.Neighbours(2, 1);
-  const std::vector<std::pair<int, int>> expected = {{2, 0}, {8, 0}, {1, 1}, {3, 1}, {7, 1}, {9, 1}};
+  const std::vector<LocationMemory::Neighbour> expected = {{2, 0, 0}, {8, 0, 1}, {1, 1, 0},
+                                                           {3, 1, 0}, {7, 1, 1}, {9, 1, 1}};
   EXPECT_EQ(near, expected);
 }
 
@@ -41,7 +42,7 @@ TEST(LocationMemory, ShortTermMemoryIsNoNeighbour) {
   LocationMemory memory(2);
   for (int i = 0; i < 5; ++i) memory.Add(i);
   memory.Settle();
-  for (const auto& [slot, level] : memory.Neighbours(2, 5)) EXPECT_LE(slot, 2);
+  for (const auto& [slot, level, loops] : memory.Neighbours(2, 5)) EXPECT_LE(slot, 2);
   EXPECT_TRUE(memory.Neighbours(4, 5).empty());
 }
 
@@ -134,8 +135,9 @@ TEST(LocationMemory, APlaceSeenOverAndOverKeepsAFewLoopLinksToWalk) {
   }
   EXPECT_EQ(memory.links(0).size(), 10u);  // all are known
   const auto same_place = memory.Neighbours(0, 0);
-  EXPECT_EQ(same_place, (std::vector<std::pair<int, int>>{{0, 0}, {4, 0}, {8, 0}, {12, 0}, {16, 0}}));
-  EXPECT_EQ(memory.Neighbours(36, 0), (std::vector<std::pair<int, int>>{{36, 0}}));
+  EXPECT_EQ(same_place, (std::vector<LocationMemory::Neighbour>{
+                            {0, 0, 0}, {4, 0, 1}, {8, 0, 1}, {12, 0, 1}, {16, 0, 1}}));
+  EXPECT_EQ(memory.Neighbours(36, 0), (std::vector<LocationMemory::Neighbour>{{36, 0, 0}}));
 }
 
 TEST(LocationMemory, ANeighbourIsOneFromEitherEnd) {
@@ -149,7 +151,7 @@ TEST(LocationMemory, ANeighbourIsOneFromEitherEnd) {
   }
   std::map<std::pair<int, int>, int> levels;
   for (int a = 0; a < 200; ++a) {
-    for (const auto& [b, level] : memory.Neighbours(a, 3)) levels[{a, b}] = level;
+    for (const auto& [b, level, loops] : memory.Neighbours(a, 3)) levels[{a, b}] = level;
   }
   for (const auto& [pair, level] : levels) {
     const auto back = levels.find({pair.second, pair.first});
@@ -184,7 +186,7 @@ TEST(LocationMemory, LongTermNeighboursAreFoundAcrossLongTermMemory) {
   EXPECT_EQ(memory.LongTermNeighbours(7, 1, 2), std::vector<int>{});
   EXPECT_EQ(memory.LongTermNeighbours(7, 10, 9), (std::vector<int>{5, 4, 3}));
   // Neighbours for the filter do not reach through it.
-  for (const auto& [slot, level] : memory.Neighbours(2, 16)) EXPECT_LE(slot, 2);
+  for (const auto& [slot, level, loops] : memory.Neighbours(2, 16)) EXPECT_LE(slot, 2);
   EXPECT_TRUE(memory.Retrieve(4));
   EXPECT_FALSE(memory.Retrieve(4));
   EXPECT_EQ(memory.num_long_term(), 2);
@@ -257,7 +259,7 @@ TEST(LocationMemory, AMergedLocationHandsLinksWeightAndNamesToAnOlderOne) {
   EXPECT_EQ(memory.state(4), State::kMerged);
   EXPECT_EQ(memory.Find(14), 1);
   EXPECT_EQ(memory.weight(1), 1);
-  const std::vector<std::pair<int, int>> near = {{1, 0}, {0, 1}, {2, 1}, {3, 1}};
+  const std::vector<LocationMemory::Neighbour> near = {{1, 0, 0}, {0, 1, 0}, {2, 1, 0}, {3, 1, 0}};
   EXPECT_EQ(memory.Neighbours(1, 1), near) << "3 was before it";
   ASSERT_TRUE(memory.CanMerge(1, 0));
   memory.Merge(1, 0);

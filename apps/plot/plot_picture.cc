@@ -191,11 +191,16 @@ cv::Mat Pixels(const Surface& surface) {
           static_cast<std::size_t>(cairo_image_surface_get_stride(surface.get()))};
 }
 
+// Blue, green and red, whatever comes behind them.
+void CopyColours(const cv::Mat& from, cv::Mat& to) {
+  constexpr int kChannels[] = {0, 0, 1, 1, 2, 2};
+  cv::mixChannels(&from, 1, &to, 1, kChannels, 3);
+}
+
 Surface CopyOf(const cv::Mat& picture) {
   Surface surface = PixelsOf(picture.cols, picture.rows);
   cv::Mat pixels = Pixels(surface);
-  constexpr int kChannels[] = {0, 0, 1, 1, 2, 2};
-  cv::mixChannels(&picture, 1, &pixels, 1, kChannels, 3);
+  CopyColours(picture, pixels);
   cairo_surface_mark_dirty(surface.get());
   return surface;
 }
@@ -218,9 +223,7 @@ void DrawShapes(const std::vector<PlotShape>& shapes, cv::Mat& picture) {
   const Page page = PageOn(surface, {});
   for (const PlotShape& shape : shapes) Draw(page.get(), shape, 1);
   cairo_surface_flush(surface.get());
-  const cv::Mat pixels = Pixels(surface);
-  constexpr int kChannels[] = {0, 0, 1, 1, 2, 2};
-  cv::mixChannels(&pixels, 1, &picture, 1, kChannels, 3);
+  CopyColours(Pixels(surface), picture);
 }
 
 void WritePicture(const std::filesystem::path& file, const cv::Mat& picture) {

@@ -27,6 +27,7 @@ constexpr double kCorrelation = 3.0;   // errors of neighbouring keypoints are n
 constexpr double kWorstSigma = 0.05;   // of a focal length that is worth more than a guess
 constexpr int kFewestKeyframes = 6;
 constexpr std::size_t kMostLandmarks = 3000;
+constexpr std::size_t kCheckedKeyframes = 40, kCheckedLandmarks = 800;
 
 struct Observation {
   int keyframe = 0, landmark = 0;  // places in Scene
@@ -116,11 +117,50 @@ Fit Adjust(Scene& scene, bool fixed_focal) {
   return {summary.IsSolutionUsable(), summary.final_cost, summary.num_residuals_reduced};
 }
 
-// The largest piece of the map: landmarks that three keyframes see, those seen most first.
-std::optional<Scene> SceneOf(const Odometry& odometry, const std::map<int, cv::Mat>& depths) {
-  const std::vector<int> pieces = odometry.Pieces();
-  if (pieces.empty()) return std::nullopt;
+// Keyframes of the piece with most frames.
+std::vector<int> LargestPiece(const Odometry& odometry, const FrameRange& session) {
+  std::vector<int> keyframes;
+  const std::vector<int> pieces = odometry.Pieces(session);
+  if (pieces.empty()) return keyframes;
+  for (const int id : odometry.KeyframeIds()) {
+    if (odometry.KeyframePiece(id) == pieces.front() && session.Has(odometry.KeyframeFrameIndex(id)) &&
+        odometry.KeyframePose(id).IsFinite())
+      keyframes.push_back(id);
+  }
+  return keyframes;
+}
+
+// So many in a row between which the camera turns most.
+std::vector<int> WhereItTurns(const Odometry& odometry, const std::vector<int>& keyframes, std::size_t most) {
+  if (keyframes.size() <= most) return keyframes;
+  std::vector<double> turned = {0};  // up to each keyframe
+  for (std::size_t k = 1; k < keyframes.size(); ++k) {
+    const Pose before = odometry.KeyframePose(keyframes[k - 1]), here = odometry.KeyframePose(keyframes[k]);
+    turned.push_back(turned.back() + (before.Inverse() * here).Angle());
+  }
+  std::size_t best = 0;
+  const auto turn = [&](std::size_t begin) { return turned[begin + most - 1] - turned[begin]; };
+  for (std::size_t begin = 1; begin + most <= keyframes.size(); ++begin) {
+    if (turn(begin) > turn(best)) best = begin;
+  }
+  const auto first = keyframes.begin() + static_cast<std::ptrdiff_t>(best);
+  return {first, first + static_cast<std::ptrdiff_t>(most)};
+}
+
+// Landmarks that three of the keyframes see, those seen most first.
+std::optional<Scene> SceneOf(const Odometry& odometry, const std::vector<int>& keyframes,
+                             const std::map<int, cv::Mat>& depths, std::size_t most_landmarks) {
+  std::vector<KeyframeView> views;
+  std::map<int, int> seen;
+  for (const int id : keyframes) {
+    views.push_back(odometry.Keyframe(id));
+    for (const int landmark : views.back().landmarks) ++seen[landmark];
+  }
   std::vector<LandmarkView> landmarks = odometry.Landmarks();
+  for (LandmarkView& landmark : landmarks) {
+    const auto found = seen.find(landmark.id);
+    landmark.observations = found == seen.end() ? 0 : found->second;
+  }
   landmarks.erase(
       std::remove_if(landmarks.begin(), landmarks.end(),
                      [](const LandmarkView& l) { return l.observations < 3 || !l.position.allFinite(); }),
@@ -128,7 +168,7 @@ std::optional<Scene> SceneOf(const Odometry& odometry, const std::map<int, cv::M
   std::stable_sort(landmarks.begin(), landmarks.end(), [](const LandmarkView& a, const LandmarkView& b) {
     return a.observations > b.observations;
   });
-  if (landmarks.size() > kMostLandmarks) landmarks.resize(kMostLandmarks);
+  if (landmarks.size() > most_landmarks) landmarks.resize(most_landmarks);
   Scene scene;
   std::map<int, int> place;
   for (const LandmarkView& landmark : landmarks) {
@@ -136,11 +176,9 @@ std::optional<Scene> SceneOf(const Odometry& odometry, const std::map<int, cv::M
     scene.landmarks.push_back(landmark.position);
   }
   const PinholeCamera& c = odometry.Rig().camera;
-  for (const int id : odometry.KeyframeIds()) {
-    const KeyframeView view = odometry.Keyframe(id);
-    if (view.map_piece != pieces.front() || !view.T_world_camera.IsFinite()) continue;
+  for (const KeyframeView& view : views) {
     const Pose T_camera_world = view.T_world_camera.Inverse();
-    const auto depth = depths.find(id);
+    const auto depth = depths.find(view.id);
     for (std::size_t f = 0; f < view.landmarks.size(); ++f) {
       const auto found = place.find(view.landmarks[f]);
       if (found == place.end()) continue;
@@ -191,7 +229,7 @@ Pass Track(const Dataset& dataset, const RunConfig& config, const PinholeCamera&
     if (track.keyframe >= 0 && !read.frame->depth_m.empty()) depths[track.keyframe] = read.frame->depth_m;
   }
   odometry.FinishMapping();
-  pass.scene = SceneOf(odometry, depths);
+  pass.scene = SceneOf(odometry, LargestPiece(odometry, {}), depths, kMostLandmarks);
   return pass;
 }
 
@@ -265,6 +303,22 @@ FocalLength MeasureFocalLength(const fs::path& path, const RunConfig& config, in
     }
   }
   return result;
+}
+
+LensCheck CheckLens(const Odometry& odometry, const FrameRange& session) {
+  LensCheck check;
+  const std::vector<int> keyframes =
+      WhereItTurns(odometry, LargestPiece(odometry, session), kCheckedKeyframes);
+  std::optional<Scene> scene = SceneOf(odometry, keyframes, {}, kCheckedLandmarks);
+  if (!scene) return check;
+  const double given = scene->lens[0];
+  const Fit fit = Adjust(*scene, false);
+  if (!fit.usable) return check;
+  check.sigma = SigmaOf(*scene, fit);
+  check.measured = check.sigma <= kWorstSigma;
+  check.focal_ratio = std::exp(scene->lens[0] - given);
+  check.k1 = scene->lens[1];
+  return check;
 }
 
 }  // namespace tutti

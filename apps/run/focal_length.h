@@ -37,7 +37,7 @@ struct LensCheck {
 };
 
 /// The bundle adjustment of MeasureFocalLength, once, on the keyframes of these frames where the camera turns
-/// most: 40 in a row of the piece with most frames, 800 landmarks. Less than a second; depths are not used.
+/// most: 40 in a row of the piece with most frames, 800 landmarks. Less than a second.
 LensCheck CheckLens(const Odometry& odometry, const FrameRange& session = {});
 
 }  // namespace tutti

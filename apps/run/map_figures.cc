@@ -78,7 +78,7 @@ MapFigures MeasureMap(const Odometry& odometry, const FrameRange& session) {
     }
   }
   const PinholeCamera& c = odometry.Rig().camera;
-  std::vector<double> counts, misfits;
+  std::vector<double> counts, misfits, depth_misfits;
   std::vector<Step> steps;
   int still = 0;
   for (std::size_t k = 0; k < views.size(); ++k) {
@@ -96,6 +96,8 @@ MapFigures MeasureMap(const Odometry& odometry, const FrameRange& session) {
       angles.push_back(std::max(Angle(ray, landmark.position - landmark.first),
                                 Angle(ray, landmark.position - landmark.last)));
       if (landmark.observations < kFewestViews) continue;
+      if (const double inverse = double(views[k].inverse_depth[f]); inverse > 0)
+        depth_misfits.push_back(std::abs(p.z() * inverse - 1));
       const cv::Point2f pixel = views[k].keypoints[f].pt;
       misfits.push_back(std::hypot(c.fx * p.x() / p.z() + c.cx - double(pixel.x),
                                    c.fy * p.y() / p.z() + c.cy - double(pixel.y)));
@@ -114,6 +116,7 @@ MapFigures MeasureMap(const Odometry& odometry, const FrameRange& session) {
   if (views.empty()) return figures;
   figures.landmarks = internal::Median(std::move(counts));
   figures.misfit_px = internal::Median(std::move(misfits));
+  figures.depth_misfit = internal::Median(std::move(depth_misfits));
   figures.without_parallax = still / static_cast<double>(views.size());
   figures.scale_jump = ScaleJump(steps);
   return figures;

@@ -13,7 +13,7 @@ using Value = std::optional<double>;
 constexpr int kFewInliers = 30;
 constexpr int kFewestKeyframes = 6;         // of which a map says something
 constexpr std::ptrdiff_t kMostRefused = 2;  // verified loops that did not enter the map
-constexpr double kSigmas = 3;               // that the focal length must be off
+constexpr double kSigmas = 2;               // that a focal length may be off
 constexpr std::size_t kNeighbours = 7;      // steps on either side of one
 
 bool HasMap(const RunResult& r) {
@@ -74,10 +74,13 @@ Value WithoutParallax(const RunResult& r) {
 
 Value Misfit(const RunResult& r) { return HasMap(r) ? Value(r.map_figures.misfit_px) : std::nullopt; }
 
+Value DepthMisfit(const RunResult& r) {
+  return HasMap(r) && r.rig.sensor != Sensor::kMono ? Value(r.map_figures.depth_misfit) : std::nullopt;
+}
+
 Value FocalLengthOff(const RunResult& r) {
   if (!HasMap(r) || !r.lens_check.measured) return std::nullopt;
-  const double off = std::abs(std::log(r.lens_check.focal_ratio));
-  return off > kSigmas * r.lens_check.sigma ? off : 0;
+  return std::max(0.0, std::abs(std::log(r.lens_check.focal_ratio)) - kSigmas * r.lens_check.sigma);
 }
 
 // At the middle of the image's left or right edge.
@@ -126,7 +129,7 @@ const std::vector<SignKind>& SignKinds() {
        0.1, 0.5, "%s of the poses rest on fewer than 30 landmarks",
        "dark, blurred or bare images; raise odometry.features, or slow down", FewInliers},
       {"speed_jump", "factor", "greatest step between two frames over those around it, by their times",
-       kAbove, 3, kNever, "the trajectory jumps: one step is %s times those around it",
+       kAbove, 2.5, kNever, "the trajectory jumps: one step is %s times those around it",
        "look at trajectory.svg there; frames may be missing", SpeedJump},
       {"scale_jump", "factor",
        "one camera: greatest factor by which depths and speed changed together between three keyframes and "
@@ -143,9 +146,18 @@ const std::vector<SignKind>& SignKinds() {
       {"misfit", "px", "reprojection error of landmarks that three keyframes see, median", kAbove, 1.0,
        kNever, "landmarks are %s px off where keyframes see them, in the median",
        "check the camera: focal length, distortion, rolling shutter; tutti calibrate-check", Misfit},
+      {"depth_misfit", "share",
+       "stereo and depth images: how far landmarks that three keyframes see are from where a keyframe "
+       "measures "
+       "them, of their depth, median",
+       kAbove, 0.05, kNever,
+       "landmarks are %s of their depth off where keyframes measure them, in the median",
+       "check focal length and baseline or depth scale, and that images and depth are of the same time",
+       DepthMisfit},
       {"focal_length_off", "share",
-       "how far the focal length that fits the map best is from the given one; 0 within its uncertainty",
-       kAbove, 0.04, kNever, "the map fits another focal length better, %s away",
+       "how far, at least, the focal length that fits the map best is from the given one (less two standard "
+       "deviations)",
+       kAbove, 0.02, kNever, "the map fits another focal length better, at least %s away",
        "check fx and fy; without --config and --camera tutti run measures them", FocalLengthOff},
       {"lens_off", "share",
        "radial distortion that the calibration left over, at the middle of the image's side edge", kAbove,

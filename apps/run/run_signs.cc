@@ -150,7 +150,7 @@ const std::vector<SignKind>& SignKinds() {
        "stereo and depth images: how far landmarks that three keyframes see are from where a keyframe "
        "measures "
        "them, of their depth, median",
-       kAbove, 0.05, kNever,
+       kAbove, 0.08, kNever,
        "landmarks are %s of their depth off where keyframes measure them, in the median",
        "check focal length and baseline or depth scale, and that images and depth are of the same time",
        DepthMisfit},
@@ -161,7 +161,7 @@ const std::vector<SignKind>& SignKinds() {
        "check fx and fy; without --config and --camera tutti run measures them", FocalLengthOff},
       {"lens_off", "share",
        "radial distortion that the calibration left over, at the middle of the image's side edge", kAbove,
-       0.02, kNever, "the lens bends the image by %s at its edge, beyond what the calibration says",
+       0.025, kNever, "the lens bends the image by %s at its edge, beyond what the calibration says",
        "check the distortion's model and coefficients", LensOff},
       {"loops_refused", "share", "loops that were recognised and contradict the map, if there are 3", kAbove,
        0.5, kNever, "the map contradicts %s of the loops that were recognised",

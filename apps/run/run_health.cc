@@ -43,11 +43,6 @@ std::optional<RunHealth> HealthOf(const RunResult& result) {
   if (result.appearance_only) return std::nullopt;
   RunHealth health;
   health.signs = SignsOf(result);
-  if (result.Void()) {
-    health.word = HealthWord::kFailed;
-    health.reasons.push_back("no frame has a pose; frames.lost_stretches in summary.json says why");
-    return health;
-  }
   for (const RunSign& sign : health.signs) {
     HealthWord word = HealthWord::kGood;
     if (sign.kind->IsDoubtful(sign.value)) word = HealthWord::kDoubtful;
@@ -55,6 +50,10 @@ std::optional<RunHealth> HealthOf(const RunResult& result) {
     if (word == HealthWord::kGood) continue;
     health.reasons.push_back(Sentence(sign));
     health.word = std::max(health.word, word);
+  }
+  if (result.Void() && health.word != HealthWord::kFailed) {  // nothing to take a share of
+    health.word = HealthWord::kFailed;
+    health.reasons.push_back("no frame could be read; frames.bad_frames in summary.json says why");
   }
   return health;
 }

@@ -41,7 +41,11 @@ TEST(RunHealth, OfARunWithoutAPoseIsFailed) {
   const auto health = HealthOf(WithPoses(0));
   EXPECT_EQ(health->word, HealthWord::kFailed);
   ASSERT_EQ(health->reasons.size(), 1u);
-  EXPECT_THAT(health->reasons[0], HasSubstr("no frame has a pose"));
+  EXPECT_THAT(health->reasons[0], HasSubstr("only 0.0 % of the frames have a pose"));
+  RunResult unread = WithPoses(0);
+  unread.bad.resize(100);
+  EXPECT_EQ(HealthOf(unread)->word, HealthWord::kFailed);
+  EXPECT_THAT(HealthOf(unread)->reasons[0], HasSubstr("no frame could be read"));
 }
 
 TEST(RunHealth, OneDoubtDoesNotHideAFailure) {

@@ -5,9 +5,9 @@ usage: ./dev bench health [--draw N] [--runs N] [--write]
 
 A run is a short cut of a generated world or of real data, as it is or damaged: wrong focal length or distortion, blur, darkness,
 a covered lens, missing frames, late depth, right and left exchanged. What is drawn (world, first frame, damage) depends on --draw
-alone. The limits of apps/run/run_signs.cc were set on draw 1 and such (--draw 1 --signs shows every sign of every run); draw 2 judges
-them and is what --write writes. About 5 s of processor time a run; --reuse goes on after an interruption. Without data the real cuts
-are left out.
+alone. The limits of apps/run/run_signs.cc were set on draw 1 and such (--draw 1 --signs shows every sign of every run); draw 2
+judges them and is what --write writes. About 5 s of processor time a run; --reuse goes on with the runs in --out, or those in
+docs/results/health.json. Without data the real cuts are left out.
 """
 import json
 import random
@@ -23,7 +23,7 @@ GOOD_PERCENT, FAILED_PERCENT = 1, 5  # ATE, of the path
 POSED = 0.95  # a run that has lost more than that is not good, whatever the rest of its trajectory is like
 FLAGGED_FAILED, FLAGGED_GOOD = 95, 5  # %, at least and at most
 LEAST = 100  # good runs, and failed ones
-JUDGED = 2  # the draw
+JUDGED = 2  # the draw; its rows are known by now: after a change of limits, judge on a higher one
 REFUSED = "refused"
 DAMAGED = 0.55  # share of the runs
 
@@ -240,7 +240,8 @@ def main():
         p.error(f"--write: the limits are judged on draw {JUDGED} alone")
     sources = [s for s in SOURCES if SOURCES[s][0] not in REAL or (a.data / SOURCES[s][0]).exists()]
     kept = a.out / f"draw-{a.draw}.json"
-    rows = json.loads(kept.read_text()) if a.reuse and kept.exists() else []
+    before = [f for f in [kept, *([table.RESULTS / "health.json"] if a.draw == JUDGED else [])] if f.exists()]
+    rows = json.loads(before[0].read_text()) if a.reuse and before else []
     for i, drawn in enumerate(draw_runs(a.draw, sources)):
         enough = min(sum(map(is_good, rows)), sum(map(is_failed, rows))) >= LEAST
         if i >= a.runs or (enough and i >= len(rows)):

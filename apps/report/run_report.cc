@@ -6,6 +6,7 @@
 #include "apps/report/build_info.h"
 #include "apps/report/page.h"
 #include "apps/report/report_parts.h"
+#include "apps/run/outputs.h"
 #include "apps/run/timing.h"
 #include "tutti/backend/evaluation.h"
 #include "tutti/core/error.h"
@@ -187,6 +188,7 @@ Json ReportJson(const RunResult& result, const DetectionLog& log, const std::str
   json["findings"] = Json::array();
   for (const CalibrationFinding& finding : result.calibration_findings)
     json["findings"].push_back(finding.measured + "; " + finding.advice);
+  json["health"] = HealthJson(result);
   json["reference"] = scored ? PathJson(result.reference, {}) : Json();
   json["odometry"] = PathJson(result.trajectory_odometry, align_odometry);
   json["odometry_complete"] = result.odometry_complete;

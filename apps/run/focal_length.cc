@@ -19,19 +19,22 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kPixelSigma = 1.0;    // of a keypoint [px]
-constexpr double kDepthSigma = 0.02;   // of a depth, as share of it
-constexpr double kLensSigma = 0.05;    // prior of k1
-constexpr double kCentreSigma = 0.01;  // prior of the principal point, as share of the width
-constexpr double kCorrelation = 3.0;   // errors of neighbouring keypoints are not independent
-constexpr double kWorstSigma = 0.05;   // of a focal length that is worth more than a guess
+constexpr double kPixelSigma = 1.0;     // of a keypoint [px]
+constexpr double kDepthSigma = 0.02;    // of a depth, as share of it
+constexpr double kLensSigma = 0.05;     // prior of k1
+constexpr double kCentreSigma = 0.01;   // prior of the principal point, as share of the width
+constexpr double kCorrelation = 3.0;    // errors of neighbouring keypoints are not independent
+constexpr double kWorstSigma = 0.05;    // of a focal length that is worth more than a guess
+constexpr double kWorstChecked = 0.15;  // of one that can speak against another
 constexpr int kFewestKeyframes = 6;
 constexpr std::size_t kMostLandmarks = 3000;
+constexpr std::size_t kCheckedKeyframes = 40, kCheckedLandmarks = 800;
 
 struct Observation {
   int keyframe = 0, landmark = 0;  // places in Scene
   Eigen::Vector2d offset;          // from the principal point [px]
   double depth = 0;                // [m]; 0: not measured
+  double depth_sigma = 0;          // as share of it
 };
 
 // A map as numbers that Ceres moves.
@@ -41,6 +44,8 @@ struct Scene {
   std::vector<Observation> observations;
   std::array<double, 4> lens = {{0, 0, 0, 0}};  // log of the focal length [px], k1, move of the centre [px]
   double width = 0;
+  bool stereo = false;  // depths are disparities, which another focal length would make others
+  double given = 0;     // log of the focal length that depths are of
 };
 
 struct PixelError {
@@ -61,12 +66,15 @@ struct PixelError {
 };
 
 struct DepthError {
-  double depth;
+  double depth, sigma, given;
+  bool stereo;
   template <class T>
-  bool operator()(const T* camera, const T* landmark, T* error) const {
+  bool operator()(const T* camera, const T* landmark, const T* lens, T* error) const {
     T p[3];
     ceres::AngleAxisRotatePoint(camera, landmark, p);
-    error[0] = (p[2] + camera[5] - T(depth)) / T(kDepthSigma * depth);
+    using std::exp;
+    const T measured = stereo ? T(depth) * exp(lens[0] - T(given)) : T(depth);
+    error[0] = (p[2] + camera[5] - measured) / (T(sigma) * measured);
     return true;
   }
 };
@@ -97,8 +105,9 @@ Fit Adjust(Scene& scene, bool fixed_focal) {
         new ceres::AutoDiffCostFunction<PixelError, 2, 6, 3, 4>(new PixelError{o.offset}),
         new ceres::HuberLoss(2.0), camera, landmark, scene.lens.data());
     if (o.depth > 0) {
-      problem.AddResidualBlock(new ceres::AutoDiffCostFunction<DepthError, 1, 6, 3>(new DepthError{o.depth}),
-                               new ceres::CauchyLoss(2.0), camera, landmark);
+      problem.AddResidualBlock(new ceres::AutoDiffCostFunction<DepthError, 1, 6, 3, 4>(
+                                   new DepthError{o.depth, o.depth_sigma, scene.given, scene.stereo}),
+                               new ceres::CauchyLoss(2.0), camera, landmark, scene.lens.data());
     }
   }
   problem.AddResidualBlock(new ceres::AutoDiffCostFunction<LensPrior, 3, 4>(new LensPrior{scene.width}),
@@ -116,11 +125,50 @@ Fit Adjust(Scene& scene, bool fixed_focal) {
   return {summary.IsSolutionUsable(), summary.final_cost, summary.num_residuals_reduced};
 }
 
-// The largest piece of the map: landmarks that three keyframes see, those seen most first.
-std::optional<Scene> SceneOf(const Odometry& odometry, const std::map<int, cv::Mat>& depths) {
-  const std::vector<int> pieces = odometry.Pieces();
-  if (pieces.empty()) return std::nullopt;
+// Keyframes of the piece with most frames.
+std::vector<int> LargestPiece(const Odometry& odometry, const FrameRange& session) {
+  std::vector<int> keyframes;
+  const std::vector<int> pieces = odometry.Pieces(session);
+  if (pieces.empty()) return keyframes;
+  for (const int id : odometry.KeyframeIds()) {
+    if (odometry.KeyframePiece(id) == pieces.front() && session.Has(odometry.KeyframeFrameIndex(id)) &&
+        odometry.KeyframePose(id).IsFinite())
+      keyframes.push_back(id);
+  }
+  return keyframes;
+}
+
+// So many in a row between which the camera turns most.
+std::vector<int> WhereItTurns(const Odometry& odometry, const std::vector<int>& keyframes, std::size_t most) {
+  if (keyframes.size() <= most) return keyframes;
+  std::vector<double> turned = {0};  // up to each keyframe
+  for (std::size_t k = 1; k < keyframes.size(); ++k) {
+    const Pose before = odometry.KeyframePose(keyframes[k - 1]), here = odometry.KeyframePose(keyframes[k]);
+    turned.push_back(turned.back() + (before.Inverse() * here).Angle());
+  }
+  std::size_t best = 0;
+  const auto turn = [&](std::size_t begin) { return turned[begin + most - 1] - turned[begin]; };
+  for (std::size_t begin = 1; begin + most <= keyframes.size(); ++begin) {
+    if (turn(begin) > turn(best)) best = begin;
+  }
+  const auto first = keyframes.begin() + static_cast<std::ptrdiff_t>(best);
+  return {first, first + static_cast<std::ptrdiff_t>(most)};
+}
+
+// Landmarks that three of the keyframes see, those seen most first.
+std::optional<Scene> SceneOf(const Odometry& odometry, const std::vector<int>& keyframes,
+                             std::size_t most_landmarks) {
+  std::vector<KeyframeView> views;
+  std::map<int, int> seen;
+  for (const int id : keyframes) {
+    views.push_back(odometry.Keyframe(id));
+    for (const int landmark : views.back().landmarks) ++seen[landmark];
+  }
   std::vector<LandmarkView> landmarks = odometry.Landmarks();
+  for (LandmarkView& landmark : landmarks) {
+    const auto found = seen.find(landmark.id);
+    landmark.observations = found == seen.end() ? 0 : found->second;
+  }
   landmarks.erase(
       std::remove_if(landmarks.begin(), landmarks.end(),
                      [](const LandmarkView& l) { return l.observations < 3 || !l.position.allFinite(); }),
@@ -128,7 +176,7 @@ std::optional<Scene> SceneOf(const Odometry& odometry, const std::map<int, cv::M
   std::stable_sort(landmarks.begin(), landmarks.end(), [](const LandmarkView& a, const LandmarkView& b) {
     return a.observations > b.observations;
   });
-  if (landmarks.size() > kMostLandmarks) landmarks.resize(kMostLandmarks);
+  if (landmarks.size() > most_landmarks) landmarks.resize(most_landmarks);
   Scene scene;
   std::map<int, int> place;
   for (const LandmarkView& landmark : landmarks) {
@@ -136,11 +184,8 @@ std::optional<Scene> SceneOf(const Odometry& odometry, const std::map<int, cv::M
     scene.landmarks.push_back(landmark.position);
   }
   const PinholeCamera& c = odometry.Rig().camera;
-  for (const int id : odometry.KeyframeIds()) {
-    const KeyframeView view = odometry.Keyframe(id);
-    if (view.map_piece != pieces.front() || !view.T_world_camera.IsFinite()) continue;
+  for (const KeyframeView& view : views) {
     const Pose T_camera_world = view.T_world_camera.Inverse();
-    const auto depth = depths.find(id);
     for (std::size_t f = 0; f < view.landmarks.size(); ++f) {
       const auto found = place.find(view.landmarks[f]);
       if (found == place.end()) continue;
@@ -150,11 +195,11 @@ std::optional<Scene> SceneOf(const Odometry& odometry, const std::map<int, cv::M
       Observation o{static_cast<int>(scene.cameras.size()),
                     found->second,
                     {double(pixel.x) - c.cx, double(pixel.y) - c.cy},
+                    0,
                     0};
-      if (depth != depths.end()) {
-        const cv::Point whole(cvRound(pixel.x), cvRound(pixel.y));
-        if (cv::Rect(cv::Point(), depth->second.size()).contains(whole))
-          o.depth = double(depth->second.at<float>(whole));
+      if (const double inverse = double(view.inverse_depth[f]); inverse > 0) {
+        o.depth = 1 / inverse;
+        o.depth_sigma = std::max(kDepthSigma, double(view.inverse_depth_sigma[f]) / inverse);
       }
       scene.observations.push_back(o);
     }
@@ -164,7 +209,9 @@ std::optional<Scene> SceneOf(const Odometry& odometry, const std::map<int, cv::M
   }
   if (static_cast<int>(scene.cameras.size()) < kFewestKeyframes || scene.landmarks.size() < 50)
     return std::nullopt;
-  scene.lens = {{std::log(std::sqrt(c.fx * c.fy)), 0, 0, 0}};
+  scene.given = std::log(std::sqrt(c.fx * c.fy));
+  scene.lens = {{scene.given, 0, 0, 0}};
+  scene.stereo = odometry.Rig().sensor == Sensor::kStereo;
   scene.width = c.width;
   return scene;
 }
@@ -180,7 +227,6 @@ Pass Track(const Dataset& dataset, const RunConfig& config, const PinholeCamera&
   OdometryOptions options = config.odometry;
   options.lens_sigma = 0;  // the lens is sought here
   Odometry odometry(options, rig);
-  std::map<int, cv::Mat> depths;
   Pass pass;
   for (std::size_t i = 0; i < dataset.Size() && pass.frames < frames; ++i) {
     const ReadResult read = dataset.Read(i);
@@ -188,10 +234,9 @@ Pass Track(const Dataset& dataset, const RunConfig& config, const PinholeCamera&
     ++pass.frames;
     const TrackResult track = odometry.Track(*read.frame);
     pass.posed += int(track.state == TrackingState::kTracking);
-    if (track.keyframe >= 0 && !read.frame->depth_m.empty()) depths[track.keyframe] = read.frame->depth_m;
   }
   odometry.FinishMapping();
-  pass.scene = SceneOf(odometry, depths);
+  pass.scene = SceneOf(odometry, LargestPiece(odometry, {}), kMostLandmarks);
   return pass;
 }
 
@@ -267,6 +312,21 @@ FocalLength MeasureFocalLength(const fs::path& path, const RunConfig& config, in
     }
   }
   return result;
+}
+
+LensCheck CheckLens(const Odometry& odometry, const FrameRange& session) {
+  LensCheck check;
+  const std::vector<int> keyframes =
+      WhereItTurns(odometry, LargestPiece(odometry, session), kCheckedKeyframes);
+  std::optional<Scene> scene = SceneOf(odometry, keyframes, kCheckedLandmarks);
+  if (!scene) return check;
+  const Fit fit = Adjust(*scene, false);
+  if (!fit.usable) return check;
+  check.sigma = SigmaOf(*scene, fit);
+  check.measured = check.sigma <= kWorstChecked;
+  check.focal_ratio = std::exp(scene->lens[0] - scene->given);
+  check.k1 = scene->lens[1];
+  return check;
 }
 
 }  // namespace tutti

@@ -8,7 +8,7 @@
 
 #include "apps/run/graph_json.h"
 #include "apps/run/outputs.h"
-#include "apps/run/run_doubts.h"
+#include "apps/run/run_health.h"
 #include "apps/run/run_note.h"
 #include "apps/run/run_parts.h"
 #include "apps/run/timing.h"
@@ -202,6 +202,14 @@ std::string Improvement(double before, double after) {
 
 }  // namespace
 
+Json HealthJson(const RunResult& r) {
+  const std::optional<RunHealth> health = HealthOf(r);
+  if (!health) return Json();
+  Json signs = Json::object();
+  for (const RunSign& sign : health->signs) signs[sign.kind->name] = sign.value;
+  return {{"word", ToString(health->word)}, {"reasons", health->reasons}, {"signs", signs}};
+}
+
 std::string SummaryJson(const RunResult& r) {
   Json json;
   json["version"] = kVersion;
@@ -222,7 +230,7 @@ std::string SummaryJson(const RunResult& r) {
   json["calibration_findings"] = Json::array();
   for (const CalibrationFinding& f : r.calibration_findings)
     json["calibration_findings"].push_back({{"measured", f.measured}, {"advice", f.advice}});
-  json["doubts"] = DoubtsAbout(r);
+  json["health"] = HealthJson(r);
   json["keyframes"] = r.keyframes;
   json["loops"] = LoopsJson(r);
   if (r.config.run.certify) json["graph"] = GraphJson(r);
@@ -269,12 +277,14 @@ std::vector<std::string> OtherMembers(const std::vector<std::string>& members) {
 std::string LoopsCsvHeader(const std::vector<std::string>& members) {
   std::string line =
       "query,candidate,query_stamp_s,candidate_stamp_s,surf,sift,orb,ensemble,inliers,matches,accepted,"
-      "reason,verified,tx,ty,tz,qx,qy,qz,qw,scale,sigmas,weight,injected,probability";
+      "reason,verified,tx,ty,tz,qx,qy,qz,qw,scale,sigmas,weight,injected,probability,distance_m,angle_deg,"
+      "error_m,error_deg,correct";
   for (const std::string& name : members) line += "," + name;
   return line + "\n";
 }
 
-std::string LoopsCsvLine(const LoopRecord& loop, const std::vector<std::string>& members) {
+std::string LoopsCsvLine(const LoopRecord& loop, const std::vector<std::string>& members,
+                         const LoopError& error) {
   std::ostringstream out;
   out << loop.query << ',' << loop.candidate << ',' << Cell(loop.query_stamp_s, 9) << ','
       << Cell(loop.candidate_stamp_s, 9);
@@ -293,6 +303,9 @@ std::string LoopsCsvLine(const LoopRecord& loop, const std::vector<std::string>&
   out << ',' << (loop.gate_sigmas ? Cell(*loop.gate_sigmas, 6) : "");
   out << ',' << Cell(loop.weight, 6) << ',' << (loop.injected ? 1 : 0);
   out << ',' << Cell(loop.probability, 6);
+  for (const double v : {error.distance_m, error.angle_deg, error.error_m, error.error_deg})
+    out << ',' << Cell(v, 4);
+  out << ',' << (loop.correct ? (*loop.correct ? "1" : "0") : "");
   for (const std::string& name : members) out << ',' << Cell(MemberPosterior(loop, name), 6);
   out << '\n';
   return out.str();
@@ -305,7 +318,8 @@ std::string LoopsCsv(const RunResult& r) {
   }
   names = OtherMembers(names);
   std::string text = LoopsCsvHeader(names);
-  for (const LoopRecord& loop : r.loops) text += LoopsCsvLine(loop, names);
+  for (std::size_t i = 0; i < r.loops.size(); ++i)
+    text += LoopsCsvLine(r.loops[i], names, i < r.loop_errors.size() ? r.loop_errors[i] : LoopError());
   return text;
 }
 

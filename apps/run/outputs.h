@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -28,13 +29,17 @@ void WriteOutputs(OutputFolder& folder, const RunRequest& request, RunResult& re
                   const std::function<void(const std::filesystem::path&)>& map = {},
                   const std::function<std::string()>& trace = {});
 
+/// HealthOf as in summary.json and report.json: word, reasons, signs; null without poses.
+nlohmann::ordered_json HealthJson(const RunResult& result);
+
 /// summary.json and loops.csv as texts.
 std::string SummaryJson(const RunResult& result);
 std::string LoopsCsv(const RunResult& result);
 /// loops.csv in parts. `members` have columns beside SURF, SIFT and ORB: those that OtherMembers returns.
 std::vector<std::string> OtherMembers(const std::vector<std::string>& members);
 std::string LoopsCsvHeader(const std::vector<std::string>& members);
-std::string LoopsCsvLine(const LoopRecord& loop, const std::vector<std::string>& members);
+std::string LoopsCsvLine(const LoopRecord& loop, const std::vector<std::string>& members,
+                         const LoopError& error = {});
 
 /// The comparison with and without the ensemble, for the terminal.
 std::string ResultTable(const RunResult& result);

@@ -10,10 +10,11 @@
 namespace tutti {
 namespace {
 
-constexpr double kMaxDifference = 0.01;        // of time stamps [s], as evo
-constexpr double kMonoFalseDistance = 10.0;    // [m]
-constexpr double kMetricFalseDistance = 0.20;  // [m]
-constexpr double kMetricFalseAngle = 8.0;      // [deg]
+constexpr double kMaxDifference = 0.01;  // of time stamps [s], as evo
+constexpr double kDepthShare = 0.1;      // of the median depth, that a true loop's constraint may be off
+constexpr double kPathShare = 0.005;     // of the path between its ends, the same
+constexpr double kLeastAllowed = 0.05;   // [m]; references are not better
+constexpr double kFalseAngle = 8.0;      // [deg]
 
 TrajectoryScore Score(const Trajectory& reference, const Trajectory& estimate, bool with_scale) {
   TrajectoryScore score;
@@ -40,26 +41,63 @@ TrajectoryScore Score(const Trajectory& reference, const Trajectory& estimate, b
   return score;
 }
 
-enum class Verdict { kTrue, kFalse, kUnknown };
-
-Verdict Judge(const LoopRecord& loop, const Trajectory& reference, const RunResult& result) {
-  const double interval_s = result.frame_interval_s;
-  const CameraRig& rig = result.rig;
-  const std::optional<Pose> candidate = PoseOfFrame(reference, loop.candidate_stamp_s, interval_s);
-  const std::optional<Pose> query = PoseOfFrame(reference, loop.query_stamp_s, interval_s);
-  if (!candidate || !query) return Verdict::kUnknown;
-  if (rig.sensor == Sensor::kMono || !loop.S_candidate_query) {
-    const double distance = (candidate->translation - query->translation).norm();
-    return distance > kMonoFalseDistance ? Verdict::kFalse : Verdict::kTrue;
+// Along the poses between two times.
+double PathBetween(const Trajectory& trajectory, double begin_s, double end_s) {
+  double path = 0;
+  const StampedPose* before = nullptr;
+  for (const StampedPose& pose : trajectory) {
+    if (pose.stamp_s < begin_s || pose.stamp_s > end_s) continue;
+    if (before != nullptr) path += (pose.pose.translation - before->pose.translation).norm();
+    before = &pose;
   }
-  const Pose T_candidate_query = (*candidate * rig.T_body_camera).Inverse() * (*query * rig.T_body_camera);
-  const Pose difference = T_candidate_query.Inverse() * loop.S_candidate_query->RigidPart();
-  const bool wrong = difference.translation.norm() > kMetricFalseDistance ||
-                     difference.Angle() * internal::kDegrees > kMetricFalseAngle;
-  return wrong ? Verdict::kFalse : Verdict::kTrue;
+  return path;
+}
+
+LoopError Apart(const Pose& candidate, const Pose& query) {
+  LoopError apart;
+  apart.distance_m = (candidate.translation - query.translation).norm();
+  apart.angle_deg = (candidate.Inverse() * query).Angle() * internal::kDegrees;
+  return apart;
+}
+
+// Whether a loop is right, if the ground truth can tell; `scale`: metres in a unit of the map, if known.
+std::optional<bool> Judge(const LoopRecord& loop, const Trajectory& reference, std::optional<double> scale,
+                          const RunResult& result, LoopError& error) {
+  const CameraRig& rig = result.rig;
+  const std::optional<Pose> candidate =
+      PoseOfFrame(reference, loop.candidate_stamp_s, result.frame_interval_s);
+  const std::optional<Pose> query = PoseOfFrame(reference, loop.query_stamp_s, result.frame_interval_s);
+  if (!candidate || !query) return std::nullopt;
+  const Pose candidate_camera = *candidate * rig.T_body_camera, query_camera = *query * rig.T_body_camera;
+  error = Apart(candidate_camera, query_camera);
+  if (!scale) return std::nullopt;
+  const auto found = result.map_figures.depth.find(loop.query);
+  const double depth = found == result.map_figures.depth.end() ? 0 : *scale * found->second;
+  const double path = PathBetween(reference, loop.candidate_stamp_s, loop.query_stamp_s);
+  const double by_path = std::max(kLeastAllowed, kPathShare * path);
+  if (!loop.S_candidate_query) return error.distance_m <= std::max(by_path, depth);
+  Pose constraint = loop.S_candidate_query->RigidPart();
+  constraint.translation *= *scale;
+  const Pose difference = (candidate_camera.Inverse() * query_camera).Inverse() * constraint;
+  error.error_m = difference.translation.norm();
+  error.error_deg = difference.Angle() * internal::kDegrees;
+  return error.error_m <= std::max(by_path, kDepthShare * depth) && error.error_deg <= kFalseAngle;
 }
 
 }  // namespace
+
+void MeasureLoops(RunResult& result) {
+  result.loop_errors.clear();
+  for (const LoopRecord& loop : result.loops) {
+    const auto pose = [&](double stamp_s) {
+      return PoseOfFrame(result.trajectory, stamp_s, result.frame_interval_s);
+    };
+    const std::optional<Pose> candidate = pose(loop.candidate_stamp_s), query = pose(loop.query_stamp_s);
+    const Pose& T_body_camera = result.rig.T_body_camera;
+    result.loop_errors.push_back(
+        candidate && query ? Apart(*candidate * T_body_camera, *query * T_body_camera) : LoopError());
+  }
+}
 
 void EvaluateRun(const Trajectory& reference, const std::string& file, RunResult& result) {
   RunEvaluation evaluation;
@@ -80,21 +118,15 @@ void EvaluateRun(const Trajectory& reference, const std::string& file, RunResult
       result.reference.push_back(pose);
     }
   }
-  for (LoopRecord& loop : result.loops) {
+  MeasureLoops(result);
+  std::optional<double> scale = 1.0;
+  if (mono) scale = evaluation.slam.valid ? std::optional<double>(evaluation.slam.scale) : std::nullopt;
+  for (std::size_t i = 0; i < result.loops.size(); ++i) {
+    LoopRecord& loop = result.loops[i];
+    const std::optional<bool> correct = Judge(loop, reference, scale, result, result.loop_errors[i]);
     if (!loop.accepted) continue;
-    switch (Judge(loop, reference, result)) {
-      case Verdict::kTrue:
-        ++evaluation.loops_true;
-        loop.correct = true;
-        break;
-      case Verdict::kFalse:
-        ++evaluation.loops_false;
-        loop.correct = false;
-        break;
-      case Verdict::kUnknown:
-        ++evaluation.loops_unknown;
-        break;
-    }
+    loop.correct = correct;
+    ++(!correct ? evaluation.loops_unknown : *correct ? evaluation.loops_true : evaluation.loops_false);
   }
   result.evaluation = evaluation;
 }

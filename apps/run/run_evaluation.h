@@ -7,11 +7,18 @@
 
 namespace tutti {
 
-/// Scores both trajectories of the result and judges its accepted loops. Mono: alignment by Sim(3), a loop is
-/// false if the reference's positions are more than 10 m apart. Metric sensors: SE(3), a loop is false if its
-/// transform differs from the reference's relative pose by more than 0.20 m or 8 deg. Everything else that
-/// was accepted is true; loops whose ends have no reference (PoseOfFrame) count as neither. Sets
-/// result.reference (cut to the run), result.evaluation and LoopRecord::correct.
+/// How far apart the two ends of each loop are, by trajectory.txt: fills result.loop_errors. EvaluateRun goes
+/// over them again with the ground truth.
+void MeasureLoops(RunResult& result);
+
+/// Scores both trajectories of the result and judges its loops. Mono: alignment by Sim(3), metric sensors:
+/// SE(3). The error of a loop is that of its constraint (in mono scaled by the alignment) against the
+/// reference's relative pose. It is false if its translation is off by more than the scene and the path
+/// allow, the greatest of 10 % of the median depth of the query's landmarks, 0.5 % of the path between its
+/// ends, and 0.05 m; or its rotation by more than 8 deg. Where there is no constraint, the distance of the
+/// two places takes the error's place, and the whole median depth that of the 10 %. Accepted loops whose ends
+/// have no reference (PoseOfFrame) count as neither. Sets result.reference (cut to the run),
+/// result.evaluation, result.loop_errors and LoopRecord::correct.
 void EvaluateRun(const Trajectory& reference, const std::string& file, RunResult& result);
 
 }  // namespace tutti

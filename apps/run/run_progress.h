@@ -48,7 +48,7 @@ void State(Archive& archive, LostStretch& lost) {
 template <class Archive>
 void StateOfGrowing(Archive& archive, RunResult& result) {
   archive(result.frames_lost, result.frames_without_mask, result.frames_without_depth, result.bad,
-          result.bad_depth, result.lost, result.frame_ms);
+          result.bad_depth, result.lost, result.frame_ms, result.frame_inliers);
 }
 
 }  // namespace tutti

@@ -3,11 +3,14 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "apps/run/focal_length.h"
+#include "apps/run/map_figures.h"
 #include "apps/run/timing.h"
 #include "tutti/backend/evaluation.h"
 #include "tutti/backend/keyframe_graph.h"
@@ -56,6 +59,15 @@ struct RunEvaluation {
   int loops_true = 0, loops_false = 0, loops_unknown = 0;  ///< of the accepted ones
 };
 
+/// A loop as it lies in the world. NaN where it is not known.
+struct LoopError {
+  static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+  double distance_m = kUnknown;  ///< between the two poses: of the ground truth, else of trajectory.txt
+  double angle_deg = kUnknown;   ///< between them
+  double error_m = kUnknown;     ///< of the constraint against the ground truth
+  double error_deg = kUnknown;
+};
+
 /// The map that a run went on in.
 struct MapGoneOn {
   std::string file;
@@ -101,7 +113,8 @@ struct RunResult {
   bool in_map = false;           ///< `trajectory` is in that map's frame of reference: the run has joined it
 
   // Loops.
-  std::vector<LoopRecord> loops;  ///< frames by their numbers in the map (MapSession::frame_offset)
+  std::vector<LoopRecord> loops;       ///< frames by their numbers in the map (MapSession::frame_offset)
+  std::vector<LoopError> loop_errors;  ///< of each, in their order; empty: not measured
   int corrections = 0;
   int global_adjustments = 0;
 
@@ -111,6 +124,10 @@ struct RunResult {
   std::vector<Trajectory> other_pieces;  ///< of the map, after losses; no loop joined them to `trajectory`
   bool odometry_complete =
       true;  ///< false: it ends at the first correction (interrupted, or run.odometry_pass: false)
+  MapFigures map_figures;          ///< zeros without poses
+  LensCheck lens_check;            ///< not measured where another odometry is followed
+  std::vector<int> frame_inliers;  ///< of each frame with a pose, when it came: TrackResult::inliers
+  bool given_odometry = false;     ///< another odometry was followed
   PoseGraph graph;
   std::optional<KeyframeGraphProof> graph_proof;  ///< with graph.certify, if loops moved the map
   std::optional<RunEvaluation> evaluation;

@@ -91,6 +91,7 @@ RunResult RunSlam(const RunRequest& request, const RunConfig& given) {
   attempts.Try([&] { run.Count(); });
   if (!attempts.Failed()) attempts.Try([&] { run.TrackUntouched(); });
   attempts.Try([&] { run.Collect(); });
+  attempts.Try([&] { MeasureLoops(result); });
   if (reference) attempts.Try([&] { EvaluateRun(reference->first, reference->second, result); });
   result.failure = attempts.Failure();
   const auto trace = [&run] { return run.Trace(); };

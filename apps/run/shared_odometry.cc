@@ -132,6 +132,7 @@ RunResult CloseLoops(const TrackedSequence& tracked, const RunRequest& request, 
     result.graph_proof = replay.loops().closer().proof();
     result.trajectory_odometry = tracked.result.trajectory;
   });
+  attempts.Try([&] { MeasureLoops(result); });
   if (reference) attempts.Try([&] { EvaluateRun(reference->first, reference->second, result); });
   result.failure = attempts.Failure();
   WriteOutputs(folder, request, result);

@@ -121,9 +121,12 @@ void SlamRun::Collect() {
   result_.graph = slam_->Graph();
   result_.graph_proof = slam_->GraphProof();
   if (given_ != nullptr && !slam_->AppearanceOnly()) CorrectGiven();
-  if (!alone_) return;
   FrameRange session;
   if (FirstFrame() > 0) session.first = FirstFrame();
+  result_.given_odometry = given_ != nullptr;
+  if (given_ == nullptr && !slam_->AppearanceOnly())
+    result_.lens_check = CheckLens(*slam_->odometry(), session);
+  if (!alone_) return;
   result_.trajectory_odometry = BodyTrajectory(alone_->Tracked().FrameTrajectory(-1, session), result_.rig);
 }
 
@@ -253,6 +256,7 @@ void SlamRun::TrackOne(const InputFrame& frame) {
   so_far_.state = slam_->AppearanceOnly() ? "appearance only" : ToString(track.state);
   if (slam_->AppearanceOnly() || track.state == TrackingState::kTracking) {
     so_far_.lost_open = false;
+    if (!slam_->AppearanceOnly()) result_.frame_inliers.push_back(track.inliers);
     return;
   }
   ++result_.frames_lost;

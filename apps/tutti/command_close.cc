@@ -7,6 +7,7 @@
 
 #include "apps/report/page.h"
 #include "apps/run/outputs.h"
+#include "apps/run/run_health.h"
 #include "apps/run/runner.h"
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
@@ -69,6 +70,7 @@ int Close(const CLI::App& command, const CloseArguments& arguments) {
                  "there are loops.csv and summary.json, but no corrected trajectory and no graph\n");
   if (!arguments.no_report && !arguments.quiet && !ReportsAvailable())
     std::fprintf(stderr, "tutti: %s\n", ReportsMissing().c_str());
+  std::fputs(HealthText(result).c_str(), stdout);
   return ExitCode(result);
 }
 

@@ -11,7 +11,7 @@
 #include "apps/run/focal_length.h"
 #include "apps/run/outputs.h"
 #include "apps/run/recording.h"
-#include "apps/run/run_doubts.h"
+#include "apps/run/run_health.h"
 #include "apps/run/runner.h"
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
@@ -74,10 +74,9 @@ int RunAndShow(const CLI::App& command, const RunArguments& arguments, RunReques
   std::error_code ignored;
   if (!arguments.no_report && fs::exists(report, ignored))
     std::printf("  look at %s\n", fs::absolute(report, ignored).c_str());
-  for (const std::string& doubt : DoubtsAbout(result))
-    std::fprintf(stderr, "tutti: warning: %s\n", doubt.c_str());
   if (!arguments.no_report && !arguments.quiet && !ReportsAvailable())
     std::fprintf(stderr, "tutti: %s\n", ReportsMissing().c_str());
+  std::fputs(HealthText(result).c_str(), stdout);
   return ExitCode(result);
 }
 // What a run can be told that goes on: the rest is as it was.

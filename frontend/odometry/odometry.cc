@@ -116,6 +116,8 @@ KeyframeView Odometry::Keyframe(int id) const {
   view.keypoints = k.features->keypoints;
   view.descriptors = k.features->descriptors;
   view.landmarks = k.landmarks;
+  view.inverse_depth = k.features->inverse_depth;
+  view.inverse_depth_sigma = k.features->inverse_depth_sigma;
   const Pose T_camera_world = k.T_world_camera.Inverse();
   const double nan = std::numeric_limits<double>::quiet_NaN();
   view.points.assign(k.features->size(), Eigen::Vector3d::Constant(nan));

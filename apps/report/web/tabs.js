@@ -36,6 +36,7 @@ async function drawOverview(panel) {
   }
   const run = chosen();
   if (data.runs.length > 1) panel.append(el('h2', {}, `${run.variant}, seed ${run.seed}`));
+  panel.append(healthOf(run));
   panel.append(cardsOf(run));
   if (run.figures.slam?.error) panel.append(note(`No evaluation: ${run.figures.slam.error}`));
   if (!run.figures.slam) panel.append(note('No ground truth, so no errors; loops are neither true nor false.'));

@@ -16,7 +16,7 @@ namespace tutti {
 namespace {
 
 namespace fs = std::filesystem;
-using ::testing::EndsWith;
+using ::testing::HasSubstr;
 using testing::ReadAll;
 
 constexpr int kPlanted = 15;
@@ -27,22 +27,25 @@ struct LoopLine {
   double weight = -1;
 };
 
-// The reason is the only quoted cell, `accepted` stands before it, `weight`, `injected` and
-// `probability` are the last three.
+// The reason is the only quoted cell, `accepted` stands before it; of the cells behind it `weight` is the
+// eleventh and `injected` the next.
 std::vector<LoopLine> ReadLoops(const fs::path& file) {
   std::istringstream in(ReadAll(file));
   std::string line;
   std::getline(in, line);
-  EXPECT_THAT(line, EndsWith(",weight,injected,probability"));
+  EXPECT_THAT(line,
+              HasSubstr("reason,verified,tx,ty,tz,qx,qy,qz,qw,scale,sigmas,weight,injected,probability,"));
   std::vector<LoopLine> loops;
   while (std::getline(in, line)) {
     LoopLine loop;
     const std::size_t begin = line.find('"') + 1, end = line.rfind('"');
-    const std::vector<std::string> after = SplitText(line.substr(end), ",");
+    std::istringstream behind(line.substr(end + 2));
+    std::vector<std::string> after;
+    for (std::string cell; std::getline(behind, cell, ',');) after.push_back(cell);
     loop.reason = line.substr(begin, end - begin);
     loop.accepted = line.at(begin - 3) == '1';
-    loop.injected = after.at(after.size() - 2) == "1";
-    loop.weight = ParseDouble(after.at(after.size() - 3)).value_or(-1);
+    loop.injected = after.at(11) == "1";
+    loop.weight = ParseDouble(after.at(10)).value_or(-1);
     loops.push_back(loop);
   }
   return loops;

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 namespace tutti {
 namespace {
 
@@ -53,6 +55,73 @@ TEST(RunEvaluation, AFalseLoopThereIsFalse) {
   result.loops[0].S_candidate_query->translation = {0.3, 0, 0};
   result = Judged(result, TruthFrom(10.015));
   EXPECT_EQ(result.evaluation->loops_false, 1);
+}
+
+// A walk of 1 m/s ahead and back again: the loop's ends are in one place, 2 m of path apart.
+Trajectory ThereAndBack(double metres) {
+  Trajectory truth;
+  for (double t = 10; t < 12.995; t += 0.01)
+    truth.push_back({t, Pose(Eigen::Quaterniond::Identity(), {0, 0, metres * (t < 11 ? t - 10 : 12 - t)})});
+  return truth;
+}
+
+RunResult OffBy(double error_m, double depth) {
+  RunResult result = OneLoop();
+  result.loops[0].S_candidate_query->translation = {error_m, 0, 0};
+  result.map_figures.depth[60] = depth;
+  return result;
+}
+
+TEST(RunEvaluation, ALoopMayBeOffByATenthOfTheDepth) {
+  EXPECT_EQ(Judged(OffBy(0.3, 2), ThereAndBack(1)).evaluation->loops_false, 1);
+  EXPECT_EQ(Judged(OffBy(0.3, 4), ThereAndBack(1)).evaluation->loops_true, 1);
+  EXPECT_EQ(Judged(OffBy(1.0, 20), ThereAndBack(1)).evaluation->loops_true, 1);
+}
+
+TEST(RunEvaluation, OrByAShareOfThePath) {
+  EXPECT_EQ(Judged(OffBy(0.3, 2), ThereAndBack(10)).evaluation->loops_false, 1);
+  EXPECT_EQ(Judged(OffBy(0.3, 2), ThereAndBack(100)).evaluation->loops_true, 1);
+}
+
+TEST(RunEvaluation, ALoopThatIsTurnedIsFalse) {
+  RunResult result = OffBy(0, 100);
+  result.loops[0].S_candidate_query->rotation = Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitY());
+  result = Judged(result, ThereAndBack(1));
+  EXPECT_EQ(result.evaluation->loops_false, 1);
+  EXPECT_NEAR(result.loop_errors[0].error_deg, 0.2 * 57.29578, 1e-3);
+}
+
+TEST(RunEvaluation, OneCamerasLoopsAreJudgedInMetresInASmallRoomToo) {
+  RunResult result = OneLoop();
+  result.rig.sensor = Sensor::kMono;
+  Trajectory truth;
+  for (double t = 10; t < 12.995; t += 0.01) {
+    const double angle = 3 * (t - 10);
+    truth.push_back({t, Pose(Eigen::Quaterniond::Identity(), {2 * std::cos(angle), 0, 2 * std::sin(angle)})});
+    result.trajectory.push_back(truth.back());
+    result.trajectory.back().pose.translation *= 0.1;  // a unit of the map is 10 m
+  }
+  result.map_figures.depth[60] = 0.3;
+  const Pose T_candidate_query = truth.front().pose.Inverse() * truth[200].pose;
+  result.loops[0].S_candidate_query->translation = 0.1 * T_candidate_query.translation;
+  const RunResult right = Judged(result, truth);
+  EXPECT_EQ(right.evaluation->loops_true, 1);
+  EXPECT_LT(right.loop_errors[0].error_m, 0.01);
+  EXPECT_NEAR(right.loop_errors[0].distance_m, T_candidate_query.translation.norm(), 1e-3);
+  result.loops[0].S_candidate_query->translation = {0, 0,
+                                                    0};  // 0.6 m would do, 10 m would not have been seen
+  EXPECT_EQ(Judged(result, truth).evaluation->loops_false, 1);
+}
+
+TEST(RunEvaluation, WithoutGroundTruthTheTrajectorySaysHowFarTheEndsAreApart) {
+  RunResult result = OneLoop();
+  result.trajectory = {{10, Pose()}, {12, Pose(Eigen::Quaterniond::Identity(), {3, 0, 4})}};
+  MeasureLoops(result);
+  ASSERT_EQ(result.loop_errors.size(), 1u);
+  EXPECT_NEAR(result.loop_errors[0].distance_m, 5, 1e-12);
+  EXPECT_NEAR(result.loop_errors[0].angle_deg, 0, 1e-9);
+  EXPECT_TRUE(std::isnan(result.loop_errors[0].error_m));
+  EXPECT_FALSE(result.loops[0].correct);
 }
 
 }  // namespace

@@ -38,40 +38,28 @@ TEST(Summary, WithoutPosesThereIsNoGraphThatCouldDoubtALoop) {
   EXPECT_EQ(nlohmann::json::parse(SummaryJson(result))["loops"]["accepted"], 1);
 }
 
-LoopRecord Recognised(double candidate_s, double query_s, bool accepted) {
-  LoopRecord loop;
-  loop.candidate_stamp_s = candidate_s;
-  loop.query_stamp_s = query_s;
-  loop.verified = true;
-  loop.accepted = accepted;
-  return loop;
-}
-
-RunResult WhereAllIsWell() {
+TEST(Summary, SaysHowGoodTheResultIsAndWhy) {
   RunResult result;
   result.frames_total = result.frames_tracked = 100;
-  for (int i = 0; i < 3; ++i) result.loops.push_back(Recognised(i, 60 + i, true));
-  return result;
-}
-
-TEST(Summary, DoubtsARunWhoseMapContradictsMostLoops) {
-  RunResult result = WhereAllIsWell();
-  for (int i = 0; i < 9; ++i) result.loops.push_back(Recognised(i, i + 1, false));  // neighbours: no loops
-  EXPECT_TRUE(nlohmann::json::parse(SummaryJson(result))["doubts"].empty());
-  for (int i = 0; i < 6; ++i) result.loops.push_back(Recognised(i, 70 + i, false));
-  const nlohmann::json doubts = nlohmann::json::parse(SummaryJson(result))["doubts"];
-  ASSERT_EQ(doubts.size(), 1u);
-  EXPECT_NE(doubts[0].get<std::string>().find("contradicts 6 of 9 loops"), std::string::npos) << doubts[0];
-}
-
-TEST(Summary, DoubtsARunThatLostManyFrames) {
-  RunResult result = WhereAllIsWell();
+  const auto health = [&] { return nlohmann::json::parse(SummaryJson(result))["health"]; };
+  EXPECT_EQ(health()["word"], "good");
+  EXPECT_TRUE(health()["reasons"].empty());
   result.frames_tracked = 94;
-  const nlohmann::json doubts = nlohmann::json::parse(SummaryJson(result))["doubts"];
-  ASSERT_EQ(doubts.size(), 1u);
-  EXPECT_NE(doubts[0].get<std::string>().find("only 94 of 100 frames"), std::string::npos) << doubts[0];
-  result.bad.resize(3);  // what could not be read is counted elsewhere
-  EXPECT_TRUE(nlohmann::json::parse(SummaryJson(result))["doubts"].empty());
+  EXPECT_EQ(health()["word"], "doubtful");
+  ASSERT_EQ(health()["reasons"].size(), 1u);
+  EXPECT_EQ(health()["signs"]["frames_posed"], 0.94);
+  result.appearance_only = true;
+  EXPECT_TRUE(health().is_null());
+}
+
+TEST(Summary, LoopsCsvSaysHowFarApartTheEndsOfALoopAre) {
+  RunResult result = WithOneLoopOfWeight(1);
+  EXPECT_NE(LoopsCsv(result).find(",distance_m,angle_deg,error_m,error_deg,correct\n"), std::string::npos);
+  EXPECT_NE(LoopsCsv(result).find(",,,,,\n"), std::string::npos);
+  result.loop_errors = {{1.5, 30, 0.25, 2}};
+  result.loops[0].correct = true;
+  EXPECT_NE(LoopsCsv(result).find(",1.5000,30.0000,0.2500,2.0000,1\n"), std::string::npos)
+      << LoopsCsv(result);
 }
 
 TEST(Summary, TheLensSaysHowItWasFound) {

@@ -58,6 +58,7 @@ TEST_F(CloseCommand, ReadsTumKittiAndEurocAndGivesBackEveryPose) {
       EXPECT_LT((out[i].pose.translation - poses[i].pose.translation).norm(), 1e-5) << i;
     }
     EXPECT_TRUE(fs::exists(folder_ / "out" / "graph.g2o"));
+    EXPECT_THAT(done.output, HasSubstr("  good: nothing that the run shows"));
     EXPECT_TRUE(fs::exists(folder_ / "out" / "loops.csv"));
     EXPECT_TRUE(fs::exists(folder_ / "out" / "trajectory_odometry.txt"));
   }

@@ -61,6 +61,8 @@ TEST(RunCommand, WritesEverythingThatScriptsRelyOn) {
   EXPECT_TRUE(s["config"]["loops"]["verification"].contains("min_inliers"));
   EXPECT_EQ(s["seed"], 1);
   EXPECT_FALSE(s["version"].get<std::string>().empty());
+  EXPECT_EQ(s["health"]["word"], "good") << s["health"];
+  EXPECT_THAT(run.output, HasSubstr("  good: nothing that the run shows"));
 }
 
 TEST(RunCommand, SameBytesForOneAndTwoThreadsAndWithoutLoops) {
@@ -140,7 +142,9 @@ TEST(RunCommand, ACalibrationThatCanNotBeRightIsSaidAndTheRunGoesOn) {
   EXPECT_THAT(wrong.output, HasSubstr("left and right are swapped"));
   auto arguments = Arguments(config, swapped, folder / "out");
   arguments.insert(arguments.end(), {"--end", "3"});
-  EXPECT_THAT(RunTutti(arguments).output, HasSubstr("warning: the calibration can't be right"));
+  const std::string output = RunTutti(arguments).output;
+  EXPECT_THAT(output, HasSubstr("warning: the calibration can't be right"));
+  EXPECT_THAT(output, HasSubstr("    * the calibration can't be right"));
   EXPECT_EQ(Summary(folder / "out")["calibration_findings"].size(), 1u);
 }
 

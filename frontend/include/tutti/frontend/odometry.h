@@ -61,6 +61,8 @@ struct KeyframeView {
   cv::Mat descriptors;                  ///< N x 32, CV_8U (ORB)
   std::vector<Eigen::Vector3d> points;  ///< N points in the camera frame [m]; NaN where unknown
   std::vector<int> landmarks;           ///< N landmark ids, -1 where none
+  std::vector<float> inverse_depth;     ///< N, measured by stereo or depth images [1/m]; 0 where they did not
+  std::vector<float> inverse_depth_sigma;  ///< N, standard deviation of inverse_depth [1/m]
 };
 
 /// A point of the map. Frame of reference: the world of its map piece.

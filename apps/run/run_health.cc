@@ -1,0 +1,72 @@
+#include "apps/run/run_health.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <string_view>
+
+namespace tutti {
+namespace {
+
+std::string Shown(const RunSign& sign) {
+  const std::string_view unit = sign.kind->unit;
+  char text[40];
+  if (unit == "share") {
+    std::snprintf(text, sizeof text, "%.1f %%", 100 * sign.value);
+  } else {
+    std::snprintf(text, sizeof text, unit == "1" ? "%.0f" : "%.2f", sign.value);
+  }
+  return text;
+}
+
+std::string Sentence(const RunSign& sign) {
+  std::string text = sign.kind->says;
+  const std::size_t place = text.find("%s");
+  if (place != std::string::npos) text.replace(place, 2, Shown(sign));
+  return text + "; " + sign.kind->advice;
+}
+
+}  // namespace
+
+const char* ToString(HealthWord word) {
+  switch (word) {
+    case HealthWord::kGood:
+      return "good";
+    case HealthWord::kDoubtful:
+      return "doubtful";
+    case HealthWord::kFailed:
+      return "failed";
+  }
+  return "";
+}
+
+std::optional<RunHealth> HealthOf(const RunResult& result) {
+  if (result.appearance_only) return std::nullopt;
+  RunHealth health;
+  health.signs = SignsOf(result);
+  for (const RunSign& sign : health.signs) {
+    HealthWord word = HealthWord::kGood;
+    if (sign.kind->IsDoubtful(sign.value)) word = HealthWord::kDoubtful;
+    if (sign.kind->IsFailed(sign.value)) word = HealthWord::kFailed;
+    if (word == HealthWord::kGood) continue;
+    health.reasons.push_back(Sentence(sign));
+    health.word = std::max(health.word, word);
+  }
+  if (result.Void() && health.word != HealthWord::kFailed) {  // nothing to take a share of
+    health.word = HealthWord::kFailed;
+    health.reasons.push_back("no frame could be read; frames.bad_frames in summary.json says why");
+  }
+  return health;
+}
+
+std::string HealthText(const RunResult& result) {
+  const std::optional<RunHealth> health = HealthOf(result);
+  if (!health) return "";
+  const std::string word = ToString(health->word);
+  if (health->word == HealthWord::kGood)
+    return "\n  " + word + ": nothing that the run shows speaks against its result\n";
+  std::string text = "\n  " + word + ":\n";
+  for (const std::string& reason : health->reasons) text += "    * " + reason + "\n";
+  return text;
+}
+
+}  // namespace tutti

@@ -1,0 +1,190 @@
+#include "apps/run/run_signs.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/median.h"
+
+namespace tutti {
+namespace {
+
+using Value = std::optional<double>;
+
+constexpr int kFewInliers = 30;
+constexpr int kFewestKeyframes = 6;         // of which a map says something
+constexpr std::ptrdiff_t kMostRefused = 2;  // verified loops that did not enter the map
+constexpr double kSigmas = 2;               // that a focal length may be off
+constexpr std::size_t kNeighbours = 7;      // steps on either side of one
+
+bool HasMap(const RunResult& r) {
+  return !r.given_odometry && !r.Void() && r.map_figures.keyframes >= kFewestKeyframes;
+}
+
+Value Share(double part, double whole) { return whole > 0 ? Value(part / whole) : std::nullopt; }
+
+Value FramesPosed(const RunResult& r) {
+  const auto read = static_cast<double>(r.frames_total - r.bad.size() - r.frames_dropped);
+  return Share(static_cast<double>(r.frames_tracked), read);
+}
+
+Value LargestPiece(const RunResult& r) {
+  auto all = static_cast<double>(r.frames_tracked);
+  for (const Trajectory& piece : r.other_pieces) all += static_cast<double>(piece.size());
+  return Share(static_cast<double>(r.frames_tracked), all);
+}
+
+Value FewInliers(const RunResult& r) {
+  const auto few = std::count_if(r.frame_inliers.begin(), r.frame_inliers.end(),
+                                 [](int inliers) { return inliers < kFewInliers; });
+  return Share(static_cast<double>(few), static_cast<double>(r.frame_inliers.size()));
+}
+
+Value SpeedJump(const RunResult& r) {
+  if (r.given_odometry) return std::nullopt;
+  std::vector<double> speeds;
+  for (std::size_t i = 1; i < r.trajectory.size(); ++i) {
+    const double time = r.trajectory[i].stamp_s - r.trajectory[i - 1].stamp_s;
+    const double way = (r.trajectory[i].pose.translation - r.trajectory[i - 1].pose.translation).norm();
+    if (time > 0) speeds.push_back(way / time);
+  }
+  if (speeds.size() < kNeighbours) return std::nullopt;
+  const double usual = internal::Median(speeds);
+  if (!(usual > 0)) return std::nullopt;
+  double jump = 1;
+  for (std::size_t i = 0; i < speeds.size(); ++i) {
+    const std::size_t begin = i < kNeighbours ? 0 : i - kNeighbours;
+    const std::size_t end = std::min(speeds.size(), i + kNeighbours + 1);
+    const double around =
+        internal::Median(std::vector<double>(speeds.begin() + static_cast<std::ptrdiff_t>(begin),
+                                             speeds.begin() + static_cast<std::ptrdiff_t>(end)));
+    jump = std::max(jump, speeds[i] / std::max(around, 0.5 * usual));
+  }
+  return jump;
+}
+
+Value ScaleJump(const RunResult& r) {
+  return HasMap(r) && r.rig.sensor == Sensor::kMono ? Value(r.map_figures.scale_jump) : std::nullopt;
+}
+
+Value Landmarks(const RunResult& r) { return HasMap(r) ? Value(r.map_figures.landmarks) : std::nullopt; }
+
+Value WithoutParallax(const RunResult& r) {
+  return HasMap(r) && r.rig.sensor == Sensor::kMono ? Value(r.map_figures.without_parallax) : std::nullopt;
+}
+
+Value Misfit(const RunResult& r) { return HasMap(r) ? Value(r.map_figures.misfit_px) : std::nullopt; }
+
+Value DepthMisfit(const RunResult& r) {
+  return HasMap(r) && r.rig.sensor != Sensor::kMono ? Value(r.map_figures.depth_misfit) : std::nullopt;
+}
+
+Value FocalLengthOff(const RunResult& r) {
+  if (!HasMap(r) || !r.lens_check.measured) return std::nullopt;
+  return std::max(0.0, std::abs(std::log(r.lens_check.focal_ratio)) - kSigmas * r.lens_check.sigma);
+}
+
+// At the middle of the image's left or right edge.
+Value LensOff(const RunResult& r) {
+  if (!HasMap(r)) return std::nullopt;
+  const double edge = 0.5 * r.rig.camera.width / r.rig.camera.fx;
+  const double found = r.lens ? r.lens->k1 + r.lens->k2 * edge * edge : 0.0;
+  const double checked = r.lens_check.measured ? r.lens_check.k1 : 0.0;
+  return std::max(std::abs(found), std::abs(checked)) * edge * edge;
+}
+
+Value LoopsRefused(const RunResult& r) {
+  // What is younger is in the local map, and was never to enter.
+  const auto recognised = [&](const LoopRecord& loop) {
+    return loop.verified && !loop.injected &&
+           loop.query_stamp_s - loop.candidate_stamp_s >= r.config.run.loop_min_age_s;
+  };
+  const auto all = std::count_if(r.loops.begin(), r.loops.end(), recognised);
+  const auto refused = std::count_if(r.loops.begin(), r.loops.end(), [&](const LoopRecord& loop) {
+    return recognised(loop) && !loop.accepted;
+  });
+  if (refused <= kMostRefused) return 0;
+  return Share(static_cast<double>(refused), static_cast<double>(all));
+}
+
+Value CalibrationFindings(const RunResult& r) { return static_cast<double>(r.calibration_findings.size()); }
+
+Value CameraGuessed(const RunResult& r) { return r.camera_guessed ? 1 : 0; }
+
+}  // namespace
+
+const std::vector<SignKind>& SignKinds() {
+  constexpr double kNever = SignKind::kNever;
+  constexpr bool kAbove = true, kBelow = false;
+  static const std::vector<SignKind> kinds = {
+      {"frames_posed", "share", "frames with a pose in trajectory.txt, of those that could be read", kBelow,
+       0.95, 0.5, "only %s of the frames have a pose in trajectory.txt",
+       "frames.lost_stretches in summary.json says where and why; slower motion, more light or a higher "
+       "frame "
+       "rate help",
+       FramesPosed},
+      {"largest_piece", "share", "poses in trajectory.txt, of those in all pieces of the map", kBelow, 0.95,
+       0.5, "the map is in pieces: only %s of the poses are in trajectory.txt",
+       "the others are in trajectory_piece_1.txt, ...; a view of a known place joins them", LargestPiece},
+      {"few_inliers", "share", "frames with a pose, but fewer than 30 landmarks that agree with it", kAbove,
+       0.1, 0.5, "%s of the poses rest on fewer than 30 landmarks",
+       "dark, blurred or bare images; raise odometry.features, or slow down", FewInliers},
+      {"speed_jump", "factor", "greatest step between two frames over those around it, by their times",
+       kAbove, 2.5, kNever, "the trajectory jumps: one step is %s times those around it",
+       "look at trajectory.svg there; frames may be missing", SpeedJump},
+      {"scale_jump", "factor",
+       "one camera: greatest factor by which depths and speed changed together between three keyframes and "
+       "the next three",
+       kAbove, 2, kNever, "the scale jumps: depths and speed change together by a factor of %s",
+       "one camera can't see its scale; a loop, stereo or depth can", ScaleJump},
+      {"landmarks", "1", "landmarks that a keyframe sees, median", kBelow, 40, 10,
+       "the map is thin: a keyframe sees %s landmarks", "bare or dark images; raise odometry.features",
+       Landmarks},
+      {"without_parallax", "share",
+       "one camera: keyframes whose landmarks are seen under less than 1 deg from the others", kAbove, 0.5,
+       kNever, "the camera turns more than it moves: %s of the keyframes have no parallax",
+       "move sideways while turning", WithoutParallax},
+      {"misfit", "px", "reprojection error of landmarks that three keyframes see, median", kAbove, 1.0,
+       kNever, "landmarks are %s px off where keyframes see them, in the median",
+       "check the camera: focal length, distortion, rolling shutter; tutti calibrate-check", Misfit},
+      {"depth_misfit", "share",
+       "stereo and depth images: how far landmarks that three keyframes see are from where a keyframe "
+       "measures "
+       "them, of their depth, median",
+       kAbove, 0.08, kNever,
+       "landmarks are %s of their depth off where keyframes measure them, in the median",
+       "check focal length and baseline or depth scale, and that images and depth are of the same time",
+       DepthMisfit},
+      {"focal_length_off", "share",
+       "how far, at least, the focal length that fits the map best is from the given one (less two standard "
+       "deviations)",
+       kAbove, 0.02, kNever, "the map fits another focal length better, at least %s away",
+       "check fx and fy; without --config and --camera tutti run measures them", FocalLengthOff},
+      {"lens_off", "share",
+       "radial distortion that the calibration left over, at the middle of the image's side edge", kAbove,
+       0.025, kNever, "the lens bends the image by %s at its edge, beyond what the calibration says",
+       "check the distortion's model and coefficients", LensOff},
+      {"loops_refused", "share", "loops that were recognised and contradict the map, if there are 3", kAbove,
+       0.5, kNever, "the map contradicts %s of the loops that were recognised",
+       "its shape or scale may be wrong; loops.csv says why each was refused", LoopsRefused},
+      {"calibration_findings", "1", "findings of tutti calibrate-check", kAbove, 0, kNever,
+       "the calibration can't be right: findings: %s", "calibration_findings in summary.json says what to do",
+       CalibrationFindings},
+      {"camera_guessed", "1", "1: nobody calibrated the camera, and its focal length could not be measured",
+       kAbove, 0, kNever, "the camera is not calibrated, its focal length is a guess",
+       "turns and lengths can be wrong by tens of percent; give --camera, --fov or --calibration",
+       CameraGuessed},
+  };
+  return kinds;
+}
+
+std::vector<RunSign> SignsOf(const RunResult& result) {
+  std::vector<RunSign> signs;
+  if (result.appearance_only) return signs;
+  for (const SignKind& kind : SignKinds()) {
+    const Value value = kind.measure(result);
+    if (value && std::isfinite(*value)) signs.push_back({&kind, *value});
+  }
+  return signs;
+}
+
+}  // namespace tutti

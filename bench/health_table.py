@@ -1,0 +1,265 @@
+#!/usr/bin/env python3
+"""Does a run that went wrong say so? The word of `tutti run` (good, doubtful, failed) against the error of its trajectory.
+
+usage: ./dev bench health [--draw N] [--runs N] [--write]
+
+A run is a short cut of a generated world or of real data, as it is or damaged: wrong focal length or distortion, blur, darkness,
+a covered lens, missing frames, late depth, right and left exchanged. What is drawn (world, first frame, damage) depends on --draw
+alone. The limits of apps/run/run_signs.cc were set on draw 1 and such (--draw 1 --signs shows every sign of every run); draw 2
+judges them and is what --write writes. About 5 s of processor time a run; --reuse goes on with the runs in --out, or those in
+docs/results/health.json. Without data the real cuts are left out.
+"""
+import json
+import random
+import shutil
+import struct
+import subprocess
+import sys
+import zlib
+
+import table
+
+GOOD_PERCENT, FAILED_PERCENT = 1, 5  # ATE, of the path
+POSED = 0.95  # a run that has lost more than that is not good, whatever the rest of its trajectory is like
+FLAGGED_FAILED, FLAGGED_GOOD = 95, 5  # %, at least and at most
+LEAST = 100  # good runs, and failed ones
+JUDGED = 2  # the draw; its rows are known by now: after a change of limits, judge on a higher one
+REFUSED = "refused"
+DAMAGED = 0.55  # share of the runs
+
+SMALL = ["--supersample", 1, "--threads", 1]
+TOWN = ["--world", "town", "--sensor", "stereo", "--width", 320, "--height", 160, "--block", 45, "--frames", 400, *SMALL]
+ROOM = ["--world", "room", "--sensor", "rgbd", "--width", 320, "--height", 240, "--laps", 1.3, *SMALL]
+CORRIDOR = ["--world", "corridor", "--sensor", "rgbd", "--width", 320, "--height", 240, "--speed", 1, "--frames", 400, *SMALL]
+WORLDS = {"town": TOWN, "room": ROOM, "shaken room": [*ROOM, "--shake", 120, "--blur", 0.01], "corridor": CORRIDOR}
+STRAIGHT = ["kitti_00_head", "corridor"]  # a cut hardly turns: a wrong camera does it no harm, and is not drawn
+REAL = {"kitti_00_head": "kitti_00-02_mono", "redkitchen": "7scenes"}
+
+# source: world or real data, sensor, frames, every n-th, weight in the draw
+SOURCES = {
+    "town, stereo": ("town", "stereo", 80, 1, 3),
+    "town, one camera": ("town", "mono", 80, 1, 3),
+    "room, RGB-D": ("room", "rgbd", 80, 1, 3),
+    "room, one camera": ("room", "mono", 90, 1, 3),
+    "shaken room, RGB-D": ("shaken room", "rgbd", 70, 1, 1),
+    "shaken room, one camera": ("shaken room", "mono", 80, 1, 1),
+    "corridor, RGB-D": ("corridor", "rgbd", 70, 1, 1),
+    "corridor, one camera": ("corridor", "mono", 80, 1, 1),
+    "KITTI 00, one camera": ("kitti_00_head", "mono", 60, 1, 2),
+    "RedKitchen, RGB-D": ("redkitchen", "rgbd", 70, 2, 1),
+    "RedKitchen, one camera": ("redkitchen", "mono", 70, 2, 1),
+}
+
+# damage: what it does to the camera, to the frames, to the images; for which sensors; weight in the draw
+ALL, DEPTH, STEREO, SEEN = {"mono", "stereo", "rgbd"}, {"rgbd"}, {"stereo"}, {"mono", "rgbd"}
+DAMAGES = {
+    "focal length 5 % off": ({"focal": 1.05}, ALL, 1), "focal length 12 % off": ({"focal": 0.88}, ALL, 1),
+    "focal length 25 % off": ({"focal": 1.25}, ALL, 4), "focal length 40 % off": ({"focal": 0.6}, ALL, 4),
+    "distortion that is not there": ({"k1": -0.2}, SEEN, 1), "distortion of the wrong sign": ({"k1": 0.1}, SEEN, 1),
+    "blur": ({"change": "blur:2"}, SEEN, 1), "dark": ({"change": "dark:2"}, SEEN, 2), "every 5th frame": ({"stride": 5}, ALL, 1),
+    "every 10th frame": ({"stride": 10}, {"mono"}, 3), "20 frames missing": ({"gap": 20}, ALL, 1),
+    "20 frames covered": ({"covered": 20}, ALL, 1), "depth 0.2 s late": ({"late": 0.2}, DEPTH, 1),
+    "depth 0.5 s late": ({"late": 0.5}, DEPTH, 2), "left and right exchanged": ({"exchanged": True}, STEREO, 2),
+}
+
+
+def draw_runs(draw, sources):
+    """Endless: (source, world seed, place of the first frame 0..1, damage or None)."""
+    rng = random.Random(f"tutti health {draw}")
+    names = [s for s in sources for _ in range(SOURCES[s][4])]
+    while True:
+        source = rng.choice(names)
+        damages = [d for d in DAMAGES for _ in range(DAMAGES[d][2]) if SOURCES[source][1] in DAMAGES[d][1] and
+                   not (SOURCES[source][0] in STRAIGHT and {"focal", "k1"} & set(DAMAGES[d][0]))]
+        damage = rng.choice(damages) if rng.random() < DAMAGED else None
+        yield source, 10 * draw + rng.randrange(4), rng.random(), damage
+
+
+def grey_png(file, width, height):
+    """An image without anything on it."""
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+    rows = (b"\0" + b"\x60" * width) * height
+    file.write_bytes(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)) +
+                     chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
+
+
+def frames_of(folder):
+    """Of a data set: the files of each frame by folder, its time and its pose (KITTI), in order."""
+    if (folder / "image_0").exists():
+        kinds = [k for k in ("image_0", "image_1") if (folder / k).exists()]
+        files = {k: sorted((folder / k).iterdir()) for k in kinds}
+        times, poses = ((folder / name).read_text().splitlines() for name in ("times.txt", "poses.txt"))
+        return [({k: files[k][i] for k in kinds}, times[i], poses[i]) for i in range(len(times))]
+    rows = {k: [line.split() for line in open(folder / f"{k}.txt") if not line.startswith("#")] for k in ("rgb", "depth")}
+    depth = {stamp: name for stamp, name in rows["depth"]}
+    return [({"rgb": folder / name, "depth": folder / depth[stamp]}, stamp, None) for stamp, name in rows["rgb"] if stamp in depth]
+
+
+def write_cut(a, folder, source, frames, damage, size):
+    """A data set of these frames alone, damaged."""
+    shutil.rmtree(folder, ignore_errors=True)
+    for kind in frames[0][0]:
+        (folder / kind).mkdir(parents=True)
+    middle = len(frames) // 2
+    if "gap" in damage:
+        frames = frames[:middle] + frames[middle + damage["gap"]:]
+    main = "image_0" if "image_0" in frames[0][0] else "rgb"
+    changed = {}
+    if "change" in damage:
+        before = folder / "before"
+        before.mkdir()
+        for i, (files, _, _) in enumerate(frames):
+            (before / f"{i:06d}{files[main].suffix}").symlink_to(files[main])
+        subprocess.run([a.tutti, "generate", "--from-images", before, "--change", damage["change"], "--out", folder / "after"],
+                       check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        changed = {i: folder / "after" / f"{i:06d}.png" for i in range(len(frames))}
+    if "covered" in damage:
+        grey_png(folder / "grey.png", *size)
+        changed = {i: folder / "grey.png" for i in range(middle, middle + damage["covered"])}
+    lists = {kind: [] for kind in frames[0][0]}
+    for i, (files, stamp, _) in enumerate(frames):
+        for kind, file in files.items():
+            to = folder / kind / f"{i:06d}{file.suffix}"
+            if damage.get("exchanged"):
+                file = files["image_1" if kind == "image_0" else "image_0"]
+            to.symlink_to(changed.get(i, file) if kind != "depth" else file)
+            late = damage.get("late", 0) if kind == "depth" else 0
+            lists[kind].append(f"{float(stamp) + late:.6f} {kind}/{to.name}\n")
+    if main == "image_0":
+        (folder / "times.txt").write_text("".join(stamp + "\n" for _, stamp, _ in frames))
+        (folder / "poses.txt").write_text("".join(pose + "\n" for _, _, pose in frames))
+    else:
+        for kind, lines in lists.items():
+            (folder / f"{kind}.txt").write_text("".join(lines))
+        shutil.copy(source / "groundtruth.txt", folder)
+
+
+def camera_of(config):
+    """The figures of the section camera."""
+    words = (line.split("#")[0].split(":") for line in config.read_text().splitlines())
+    return {w[0].strip(): float(w[1]) for w in words if len(w) == 2 and w[0].strip() in ("fx", "fy", "width", "height")}
+
+
+def measure(a, folder, source, seed, place, damage_name):
+    """One run: what it says and what is true."""
+    where, sensor, count, step, _ = SOURCES[source]
+    damage = DAMAGES[damage_name][0] if damage_name else {}
+    if where in REAL:
+        data, config = a.data / where, table.ROOT / "data/configs" / f"{REAL[where]}.yaml"
+    else:
+        name = where.replace(" ", "-")
+        data = table.generate(a.tutti, a.out / "worlds" / f"{name}-{seed}", [*WORLDS[where], "--seed", seed])
+        config = data / "config.yaml"
+    step *= damage.get("stride", 1)
+    frames = frames_of(data)
+    first = int(place * max(0, len(frames) - count * step))
+    frames = frames[first:first + count * step:step]
+    camera = camera_of(config)
+    write_cut(a, folder / "cut", data, frames, damage, (int(camera["width"]), int(camera["height"])))
+    more = []
+    if "focal" in damage:
+        more = [f"camera.{f}={camera[f] * damage['focal']}" for f in ("fx", "fy")]
+    if "k1" in damage:
+        more = ["camera.distortion=radtan", f"camera.coefficients=[{damage['k1']}, 0, 0, 0, 0]"]
+    sets = [f"dataset.sensor={sensor}", "run.odometry_pass=false", *more]
+    run = subprocess.run([a.tutti, "run", "--quiet", "--no-report", "--no-map", "--threads", "1", "--config", config, "--dataset",
+                          folder / "cut", "--out", folder / "run", *(w for s in sets for w in ("--set", s))],
+                         stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    summary = folder / "run" / "summary.json"
+    if not summary.exists():  # bad input: nothing to judge
+        print(f"health: {source}, {damage_name}: refused: {run.stderr.strip()}", file=sys.stderr)
+        return {"source": source, "seed": seed, "first": first, "damage": damage_name, "word": REFUSED}
+    summary = json.loads(summary.read_text())
+    slam = summary["evaluation"]["slam"]
+    path = summary["evaluation"]["path_m"]
+    shutil.rmtree(folder)
+    return {"source": source, "seed": seed, "first": first, "damage": damage_name, "path_m": round(path, 3),
+            "ate_percent": round(100 * slam["ate_rmse_m"] / path, 3) if "ate_rmse_m" in slam and path > 0 else None,
+            "posed": round(summary["frames"]["tracked"] / summary["frames"]["total"], 4), "word": summary["health"]["word"],
+            "signs": {k: round(v, 4) for k, v in summary["health"]["signs"].items()}}
+
+
+def is_good(row):
+    return row["word"] != REFUSED and row["ate_percent"] is not None and row["ate_percent"] <= GOOD_PERCENT and row["posed"] >= POSED
+
+
+def is_failed(row):
+    return row["word"] != REFUSED and (row["ate_percent"] is None or row["ate_percent"] > FAILED_PERCENT)
+
+
+def is_wrong_camera(row):
+    return bool(row["damage"]) and bool({"focal", "k1"} & set(DAMAGES[row["damage"]][0]))
+
+
+def flagged(rows):
+    return sum(r["word"] != "good" for r in rows)
+
+
+def share(rows):
+    return f"{flagged(rows)} of {len(rows)} ({100 * flagged(rows) / len(rows):.1f} %)" if rows else "none"
+
+
+def document(rows, draw):
+    rows = [r for r in rows if r["word"] != REFUSED]
+    good, failed = [r for r in rows if is_good(r)], [r for r in rows if is_failed(r)]
+    few = "" if min(len(good), len(failed)) >= LEAST else (
+        f" **Fewer than {LEAST} of a kind:** `./dev bench health --reuse --write` measures the rest.")
+    met = [failed and 100 * flagged(failed) >= FLAGGED_FAILED * len(failed), good and 100 * flagged(good) <= FLAGGED_GOOD * len(good)]
+    text = ["# Does a run in doubt say so?", "", f"Written by `./dev bench health --write` (bench/health_table.py), draw {draw}: {len(rows)} "
+            "short runs, each a cut of a generated world or of real data, as it is or damaged. The limits of the signs "
+            "(`apps/run/run_signs.cc`) were set on other draws of such runs, with other worlds, first frames and damages; no row of this "
+            "draw has set one. Flagged: the run calls itself doubtful or failed. Failed: ATE over "
+            f"{FAILED_PERCENT} % of the path, or no trajectory. Good: at most {GOOD_PERCENT} %, and at least {100 * POSED:.0f} % of "
+            f"the frames posed. What lies between is in neither. Every run is in `health.json`.{few}", "",
+            "| runs | flagged | bound | met |", "|---|---|---|---|",
+            f"| failed | {share(failed)} | >= {FLAGGED_FAILED} % | {'yes' if met[0] else '**no**'} |",
+            f"| good | {share(good)} | <= {FLAGGED_GOOD} % | {'yes' if met[1] else '**no**'} |",
+            f"| good, not damaged | {share([r for r in good if not r['damage']])} | | |",
+            f"| good by luck: with a wrong camera | {share([r for r in good if is_wrong_camera(r)])} | | |",
+            f"| good, the others | {share([r for r in good if not is_wrong_camera(r)])} | | |",
+            f"| between | {share([r for r in rows if not is_good(r) and not is_failed(r)])} | | |", ""]
+    for title, key, names in (("source", "source", SOURCES), ("damage", "damage", [None, *DAMAGES])):
+        text += [f"| {title} | failed: flagged | good: flagged | between: flagged |", "|---|---|---|---|"]
+        for name in names:
+            of = [r for r in rows if r[key] == name]
+            if of:
+                text.append(f"| {name or 'none'} | {share([r for r in of if is_failed(r)])} | {share([r for r in of if is_good(r)])} | "
+                            f"{share([r for r in of if not is_failed(r) and not is_good(r)])} |")
+        text.append("")
+    return "\n".join(text)
+
+
+def main():
+    p = table.parser(__doc__, "health")
+    p.add_argument("--draw", type=int, default=JUDGED, help="which runs are drawn")
+    p.add_argument("--runs", type=int, default=600, help=f"at most; it ends earlier with {LEAST} good and {LEAST} failed ones")
+    p.add_argument("--signs", action="store_true", help="print every run with its signs")
+    a = table.parse(p)
+    if a.write and a.draw != JUDGED:
+        p.error(f"--write: the limits are judged on draw {JUDGED} alone")
+    sources = [s for s in SOURCES if SOURCES[s][0] not in REAL or (a.data / SOURCES[s][0]).exists()]
+    kept = a.out / f"draw-{a.draw}.json"
+    before = [f for f in [kept, *([table.RESULTS / "health.json"] if a.draw == JUDGED else [])] if f.exists()]
+    rows = json.loads(before[0].read_text()) if a.reuse and before else []
+    for i, drawn in enumerate(draw_runs(a.draw, sources)):
+        enough = min(sum(map(is_good, rows)), sum(map(is_failed, rows))) >= LEAST
+        if i >= a.runs or (enough and i >= len(rows)):
+            break
+        if i < len(rows):
+            continue
+        rows.append(measure(a, a.out / f"run-{a.draw}", *drawn))
+        kept.write_text(json.dumps(rows))
+        print(f"health: run {i + 1}: {rows[-1]['source']}, {rows[-1]['damage']}: {rows[-1]['word']}", file=sys.stderr)
+    if a.signs:
+        for row in rows:
+            print(json.dumps(row))
+    if a.write:
+        lines = ",\n".join(json.dumps(row) for row in rows)
+        (table.RESULTS / "health.json").write_text(f"[\n{lines}\n]\n")
+    table.put(a, table.RESULTS / "health.md", document(rows, a.draw))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -118,9 +118,8 @@ const std::vector<SignKind>& SignKinds() {
   static const std::vector<SignKind> kinds = {
       {"frames_posed", "share", "frames with a pose in trajectory.txt, of those that could be read", kBelow,
        0.95, 0.5, "only %s of the frames have a pose in trajectory.txt",
-       "frames.lost_stretches in summary.json says where and why; slower motion, more light or a higher "
-       "frame "
-       "rate help",
+       "frames.lost_stretches in summary.json says where and why; slower motion, more light or more frames "
+       "a second help",
        FramesPosed},
       {"largest_piece", "share", "poses in trajectory.txt, of those in all pieces of the map", kBelow, 0.95,
        0.5, "the map is in pieces: only %s of the poses are in trajectory.txt",
@@ -147,9 +146,8 @@ const std::vector<SignKind>& SignKinds() {
        kNever, "landmarks are %s px off where keyframes see them, in the median",
        "check the camera: focal length, distortion, rolling shutter; tutti calibrate-check", Misfit},
       {"depth_misfit", "share",
-       "stereo and depth images: how far landmarks that three keyframes see are from where a keyframe "
-       "measures "
-       "them, of their depth, median",
+       "stereo and depth images: how far landmarks that three keyframes see are from where one of them "
+       "measures them, of their depth, median",
        kAbove, 0.08, kNever,
        "landmarks are %s of their depth off where keyframes measure them, in the median",
        "check focal length and baseline or depth scale, and that images and depth are of the same time",

@@ -11,13 +11,13 @@ namespace {
 using Value = std::optional<double>;
 
 constexpr int kFewInliers = 30;
-constexpr int kFewestKeyframes = 6;         // of which a map says something
+constexpr int kEnoughKeyframes = 6;         // of which a map says something
 constexpr std::ptrdiff_t kMostRefused = 2;  // verified loops that did not enter the map
 constexpr double kSigmas = 2;               // that a focal length may be off
 constexpr std::size_t kNeighbours = 7;      // steps on either side of one
 
 bool HasMap(const RunResult& r) {
-  return !r.given_odometry && !r.Void() && r.map_figures.keyframes >= kFewestKeyframes;
+  return !r.given_odometry && !r.Void() && r.map_figures.keyframes >= kEnoughKeyframes;
 }
 
 Value Share(double part, double whole) { return whole > 0 ? Value(part / whole) : std::nullopt; }
@@ -27,7 +27,7 @@ Value FramesPosed(const RunResult& r) {
   return Share(static_cast<double>(r.frames_tracked), read);
 }
 
-Value LargestPiece(const RunResult& r) {
+Value ShareOfLargestPiece(const RunResult& r) {
   auto all = static_cast<double>(r.frames_tracked);
   for (const Trajectory& piece : r.other_pieces) all += static_cast<double>(piece.size());
   return Share(static_cast<double>(r.frames_tracked), all);
@@ -62,7 +62,7 @@ Value SpeedJump(const RunResult& r) {
   return jump;
 }
 
-Value ScaleJump(const RunResult& r) {
+Value JumpOfScale(const RunResult& r) {
   return HasMap(r) && r.rig.sensor == Sensor::kMono ? Value(r.map_figures.scale_jump) : std::nullopt;
 }
 
@@ -123,7 +123,8 @@ const std::vector<SignKind>& SignKinds() {
        FramesPosed},
       {"largest_piece", "share", "poses in trajectory.txt, of those in all pieces of the map", kBelow, 0.95,
        0.5, "the map is in pieces: only %s of the poses are in trajectory.txt",
-       "the others are in trajectory_piece_1.txt, ...; a view of a known place joins them", LargestPiece},
+       "the others are in trajectory_piece_1.txt, ...; a view of a known place joins them",
+       ShareOfLargestPiece},
       {"few_inliers", "share", "frames with a pose, but fewer than 30 landmarks that agree with it", kAbove,
        0.1, 0.5, "%s of the poses rest on fewer than 30 landmarks",
        "dark, blurred or bare images; raise odometry.features, or slow down", FewInliers},
@@ -134,7 +135,7 @@ const std::vector<SignKind>& SignKinds() {
        "one camera: greatest factor by which depths and speed changed together between three keyframes and "
        "the next three",
        kAbove, 2, kNever, "the scale jumps: depths and speed change together by a factor of %s",
-       "one camera can't see its scale; a loop, stereo or depth can", ScaleJump},
+       "one camera can't see its scale; a loop, stereo or depth can", JumpOfScale},
       {"landmarks", "1", "landmarks that a keyframe sees, median", kBelow, 40, 10,
        "the map is thin: a keyframe sees %s landmarks", "bare or dark images; raise odometry.features",
        Landmarks},

@@ -12,7 +12,7 @@ namespace tutti {
 namespace {
 
 // 100 frames, 1 m each 0.1 s, with a map of one camera.
-RunResult Straight() {
+RunResult StraightAhead() {
   RunResult result;
   result.rig.sensor = Sensor::kMono;
   result.rig.camera.width = 200;
@@ -48,7 +48,7 @@ TEST(RunSigns, EachHasItsOwnNameAUnitAndASentenceWithOneValueAtMost) {
 }
 
 TEST(RunSigns, NoneOfASmoothRunIsBeyondItsLimit) {
-  const std::vector<RunSign> signs = SignsOf(Straight());
+  const std::vector<RunSign> signs = SignsOf(StraightAhead());
   EXPECT_GT(signs.size(), 8u);
   for (const RunSign& sign : signs) {
     EXPECT_FALSE(sign.kind->IsDoubtful(sign.value)) << sign.kind->name << " " << sign.value;
@@ -57,7 +57,7 @@ TEST(RunSigns, NoneOfASmoothRunIsBeyondItsLimit) {
 }
 
 TEST(RunSigns, FramesThatCouldNotBeReadAreNotLost) {
-  RunResult result = Straight();
+  RunResult result = StraightAhead();
   result.frames_tracked = 90;
   EXPECT_DOUBLE_EQ(*Sign(result, "frames_posed"), 0.9);
   result.bad.resize(10);
@@ -65,32 +65,32 @@ TEST(RunSigns, FramesThatCouldNotBeReadAreNotLost) {
 }
 
 TEST(RunSigns, OtherPiecesCountAgainstTheLargest) {
-  RunResult result = Straight();
+  RunResult result = StraightAhead();
   result.other_pieces = {Trajectory(100)};
   EXPECT_DOUBLE_EQ(*Sign(result, "largest_piece"), 0.5);
 }
 
 TEST(RunSigns, FramesWithFewInliersAreCounted) {
-  RunResult result = Straight();
+  RunResult result = StraightAhead();
   for (int i = 0; i < 25; ++i) result.frame_inliers[static_cast<std::size_t>(i)] = 12;
   EXPECT_DOUBLE_EQ(*Sign(result, "few_inliers"), 0.25);
 }
 
 TEST(RunSigns, AStepThatIsLongerThanThoseAroundItIsAJump) {
-  EXPECT_NEAR(*Sign(Straight(), "speed_jump"), 1, 1e-6);
-  RunResult result = Straight();
+  EXPECT_NEAR(*Sign(StraightAhead(), "speed_jump"), 1, 1e-6);
+  RunResult result = StraightAhead();
   for (std::size_t i = 50; i < 100; ++i) result.trajectory[i].pose.translation.z() += 6;
   EXPECT_NEAR(*Sign(result, "speed_jump"), 7, 1e-6);
 }
 
 TEST(RunSigns, FramesThatAreMissingAreNoJump) {
-  RunResult result = Straight();
+  RunResult result = StraightAhead();
   result.trajectory.erase(result.trajectory.begin() + 40, result.trajectory.begin() + 50);
   EXPECT_NEAR(*Sign(result, "speed_jump"), 1, 1e-6);
 }
 
 TEST(RunSigns, AFocalLengthIsOffOnlyBeyondItsUncertainty) {
-  RunResult result = Straight();
+  RunResult result = StraightAhead();
   EXPECT_FALSE(Sign(result, "focal_length_off"));
   result.lens_check = {true, 1.2, 0.01, 0};
   EXPECT_NEAR(*Sign(result, "focal_length_off"), std::log(1.2) - 0.02, 1e-12);
@@ -99,7 +99,7 @@ TEST(RunSigns, AFocalLengthIsOffOnlyBeyondItsUncertainty) {
 }
 
 TEST(RunSigns, TheLensIsJudgedAtTheEdgeOfTheImage) {
-  RunResult result = Straight();
+  RunResult result = StraightAhead();
   result.lens = LensFound();
   result.lens->k1 = -0.05;
   EXPECT_NEAR(*Sign(result, "lens_off"), 0.05, 1e-12);  // the edge is at 45 degrees
@@ -117,7 +117,7 @@ LoopRecord Recognised(double candidate_s, double query_s, bool accepted) {
 }
 
 TEST(RunSigns, LoopsThatTheMapRefusesCountFromThreeOnAndNeighboursDoNot) {
-  RunResult result = Straight();
+  RunResult result = StraightAhead();
   for (int i = 0; i < 3; ++i) result.loops.push_back(Recognised(i, 60 + i, true));
   for (int i = 0; i < 9; ++i) result.loops.push_back(Recognised(i, i + 1, false));
   EXPECT_EQ(*Sign(result, "loops_refused"), 0);
@@ -128,7 +128,7 @@ TEST(RunSigns, LoopsThatTheMapRefusesCountFromThreeOnAndNeighboursDoNot) {
 }
 
 TEST(RunSigns, OneCamerasSignsAreNotThoseOfDepth) {
-  RunResult result = Straight();
+  RunResult result = StraightAhead();
   EXPECT_TRUE(Sign(result, "scale_jump"));
   EXPECT_TRUE(Sign(result, "without_parallax"));
   result.rig.sensor = Sensor::kRgbd;
@@ -137,7 +137,7 @@ TEST(RunSigns, OneCamerasSignsAreNotThoseOfDepth) {
 }
 
 TEST(RunSigns, AnOdometryThatIsFollowedIsNotJudgedByTheMap) {
-  RunResult result = Straight();
+  RunResult result = StraightAhead();
   result.given_odometry = true;
   EXPECT_FALSE(Sign(result, "landmarks"));
   EXPECT_FALSE(Sign(result, "speed_jump"));
@@ -145,7 +145,7 @@ TEST(RunSigns, AnOdometryThatIsFollowedIsNotJudgedByTheMap) {
 }
 
 TEST(RunSigns, ImagesWithoutPosesHaveNone) {
-  RunResult result = Straight();
+  RunResult result = StraightAhead();
   result.appearance_only = true;
   EXPECT_TRUE(SignsOf(result).empty());
 }

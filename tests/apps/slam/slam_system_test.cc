@@ -61,7 +61,7 @@ struct Result {
   double ate_m = 0;
 };
 
-Result Drive(const RunConfig& config) {
+Result DriveOnce(const RunConfig& config) {
   SlamSystem slam(config, TwoLaps().rig);
   for (const InputFrame& frame : TwoLaps().frames) slam.Track(frame);
   slam.Finish();
@@ -83,7 +83,7 @@ const Result& DriveThrough(const Setting& setting) {
   static std::map<Setting, Result> driven;
   const auto known = driven.find(setting);
   return known != driven.end() ? known->second
-                               : driven.emplace(setting, Drive(SmallConfig(setting))).first->second;
+                               : driven.emplace(setting, DriveOnce(SmallConfig(setting))).first->second;
 }
 
 TEST(SlamSystem, ASecondLapNeedsFewKeyframesAndTheWholeMapIsAdjusted) {

@@ -6,8 +6,6 @@
 #include <vector>
 
 #include "backend/robust/robust_loss.h"
-#include "backend/solver/block_solver.h"
-#include "backend/solver/ceres_solver.h"
 #include "backend/solver/graph_solver.h"
 #include "backend/solver/linearized_edge.h"
 
@@ -28,11 +26,7 @@ class GraphProblem {
       weighted_.constants.push_back(MakeEdgeConstants<N>(edge, options.objective));
       weighted_.is_loop.push_back(edge.kind == EdgeKind::kLoop);
     }
-    if (options.solver == PoseGraphSolver::kBlock) {
-      solver_ = std::make_unique<BlockSolver<N>>();
-    } else {
-      solver_ = std::make_unique<CeresSolver<N>>();
-    }
+    solver_ = MakeGraphSolver<N>(options.solver);
   }
 
   /// Chi-square beyond which a loop is doubted.
@@ -86,7 +80,7 @@ class GraphProblem {
 
   /// From now on each open loop has a switch (switchable constraints), which starts at 1. Ceres solves this,
   /// whatever was chosen: a switch is a variable that is no node.
-  void AddSwitches() { solver_ = std::make_unique<CeresSolver<N>>(threshold_); }
+  void AddSwitches() { solver_ = MakeSwitchingSolver<N>(threshold_); }
 
   /// The next solution goes on with the trust region that the last one ended with, instead of a wide one. For
   /// rounds of few iterations, which would spend them all on narrowing it.

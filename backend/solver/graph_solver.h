@@ -14,6 +14,7 @@
 #include "backend/graph/edge_error.h"
 #include "backend/graph/graph_structure.h"
 #include "backend/solver/stop.h"
+#include "tutti/backend/pose_graph_optimizer.h"
 
 namespace tutti::internal {
 
@@ -106,5 +107,12 @@ class GraphSolver {
   virtual ~GraphSolver() = default;
   virtual SolveSummary Solve(WeightedGraph<N>& graph, const SolveLimits& limits) = 0;
 };
+
+/// The solver of that name. For N = 3, 6, 7; graph_solver.cc alone compiles them.
+template <int N>
+std::unique_ptr<GraphSolver<N>> MakeGraphSolver(PoseGraphSolver solver);
+/// Each loop has a switch (CeresSolver); `threshold`: chi-square beyond which a loop is doubted.
+template <int N>
+std::unique_ptr<GraphSolver<N>> MakeSwitchingSolver(double threshold);
 
 }  // namespace tutti::internal

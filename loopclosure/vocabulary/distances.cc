@@ -3,12 +3,18 @@
 #include <limits>
 
 #include "core/clones.h"
+#include "core/sanitized_range.h"
 
 namespace tutti::internal {
 
 TUTTI_CLONES("avx2")
-void SquaredDistances(const float* query, const float* rows, int count, int dimensions, std::size_t step,
-                      float* distances) {
+TUTTI_CHECKED_AS_A_WHOLE void SquaredDistances(const float* query, const float* rows, int count,
+                                               int dimensions, std::size_t step, float* distances) {
+  if (count > 0) {
+    CheckReadable(query, static_cast<std::size_t>(dimensions));
+    CheckReadable(rows, static_cast<std::size_t>(count - 1) * step + static_cast<std::size_t>(dimensions));
+    CheckReadable(distances, static_cast<std::size_t>(count));
+  }
   for (int j = 0; j < count; ++j) {
     const float* row = rows + static_cast<std::size_t>(j) * step;
     float sums[16] = {};

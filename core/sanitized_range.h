@@ -1,0 +1,34 @@
+// For inner loops over whole arrays: a sanitizer would check each access, which was two thirds of the time of
+// the loop detector's tests. They are checked as a whole instead. Internal.
+#pragma once
+
+#include <cstddef>
+
+#if defined(__clang__)
+#if __has_feature(address_sanitizer)
+#define TUTTI_ADDRESS_SANITIZER
+#include <sanitizer/asan_interface.h>
+#elif __has_feature(thread_sanitizer)
+#define TUTTI_THREAD_SANITIZER
+extern "C" void __tsan_read_range(void* begin, unsigned long bytes);
+#endif
+/// A function whose arrays went through CheckReadable.
+#define TUTTI_CHECKED_AS_A_WHOLE __attribute__((no_sanitize("address", "thread", "undefined")))
+#else
+#define TUTTI_CHECKED_AS_A_WHOLE
+#endif
+
+namespace tutti::internal {
+
+/// Under a sanitizer: reports `count` numbers from `begin` on that may not be read. Else nothing.
+template <class T>
+void CheckReadable([[maybe_unused]] const T* begin, [[maybe_unused]] std::size_t count) {
+#if defined(TUTTI_ADDRESS_SANITIZER)
+  const void* bad = __asan_region_is_poisoned(const_cast<T*>(begin), count * sizeof(T));
+  if (bad != nullptr) static_cast<void>(*static_cast<const volatile char*>(bad));
+#elif defined(TUTTI_THREAD_SANITIZER)
+  __tsan_read_range(const_cast<T*>(begin), count * sizeof(T));
+#endif
+}
+
+}  // namespace tutti::internal

@@ -113,20 +113,20 @@ class Reader {
   }
 
   Similarity ReadPose(std::size_t word) const {
+    std::array<double, 8> v{};  // read in their order, so that the first bad one is named
+    for (std::size_t i = 0; i < PoseNumbers(*kind_); ++i) v.at(i) = Number(word + i);
     Similarity pose;
     if (*kind_ == GraphKind::kSE2) {
-      const double half = 0.5 * Number(word + 2);
-      pose.translation = Eigen::Vector3d(Number(word), Number(word + 1), 0);
-      pose.rotation = Eigen::Quaterniond(std::cos(half), 0, 0, std::sin(half));
+      pose.translation = Eigen::Vector3d(v[0], v[1], 0);
+      pose.rotation = Eigen::Quaterniond(std::cos(0.5 * v[2]), 0, 0, std::sin(0.5 * v[2]));
       return pose;
     }
-    pose.translation = Eigen::Vector3d(Number(word), Number(word + 1), Number(word + 2));
-    pose.rotation =
-        Eigen::Quaterniond(Number(word + 6), Number(word + 3), Number(word + 4), Number(word + 5));
+    pose.translation = Eigen::Vector3d(v[0], v[1], v[2]);
+    pose.rotation = Eigen::Quaterniond(v[6], v[3], v[4], v[5]);
     if (pose.rotation.norm() < 1e-6) Fail(line_, "the quaternion is zero; a unit quaternion is needed");
     pose.rotation.normalize();
     if (*kind_ == GraphKind::kSim3) {
-      pose.scale = Number(word + 7);
+      pose.scale = v[7];
       if (pose.scale <= 0) Fail(line_, "the scale must be positive");
     }
     return pose;

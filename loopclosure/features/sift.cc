@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/clones.h"
+#include "loopclosure/features/gaussian_blur.h"
 #include "loopclosure/features/sift_descriptor.h"
 
 namespace tutti::internal {
@@ -32,11 +33,6 @@ struct Point {
   float angle_deg = 0.0;  // as cv::KeyPoint has it
 };
 
-void Blur(const cv::Mat& from, double sigma, cv::Mat& to) {
-  const int width = 2 * static_cast<int>(std::ceil(3.0 * sigma)) + 1;
-  cv::GaussianBlur(from, to, cv::Size(width, width), sigma, sigma, cv::BORDER_REFLECT_101);
-}
-
 void Build(const cv::Mat& image, double blur, SiftScratch& scratch) {
   const int side = std::min(image.rows, image.cols);
   const int octaves = std::max(1, cvRound(std::log2(static_cast<double>(side))) - 2);
@@ -46,13 +42,13 @@ void Build(const cv::Mat& image, double blur, SiftScratch& scratch) {
   for (std::size_t o = 0; o < pyramid.size(); ++o) {
     if (o == 0) {
       image.convertTo(scratch.values, CV_32F);
-      Blur(scratch.values, std::sqrt(std::max(0.01, kSigma * kSigma - blur * blur)), pyramid[0][0]);
+      GaussianBlur(scratch.values, std::sqrt(std::max(0.01, kSigma * kSigma - blur * blur)), pyramid[0][0]);
     } else {
       cv::resize(pyramid[o - 1][kLayers], pyramid[o][0], cv::Size(), 0.5, 0.5, cv::INTER_NEAREST);
     }
     double sigma = kSigma;
     for (std::size_t i = 1; i < kBlurs; ++i) {
-      Blur(pyramid[o][i - 1], sigma * std::sqrt(step * step - 1.0), pyramid[o][i]);
+      GaussianBlur(pyramid[o][i - 1], sigma * std::sqrt(step * step - 1.0), pyramid[o][i]);
       sigma *= step;
     }
   }

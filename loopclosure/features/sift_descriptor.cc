@@ -5,7 +5,8 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
-#include <opencv2/core/hal/hal.hpp>
+
+#include "loopclosure/features/polar.h"
 
 namespace tutti::internal {
 namespace {
@@ -22,6 +23,7 @@ constexpr int kGrid = 24;            // samples of a descriptor, each way: along
 constexpr int kSamples = kGrid * kGrid;
 constexpr int kPadded = kCells + 2;  // with a margin that takes what falls outside
 static_assert(kCells * kCells * kCellBins == int{kSiftValues});
+static_assert(RoomForPolar(kSamples) == kSamples);
 
 // The samples of a descriptor: the same for all, but for scale and angle.
 struct Sample {
@@ -73,7 +75,8 @@ std::vector<float> SiftOrientations(const cv::Mat& image, const cv::Point2f& at,
   const int left = std::max(1, centre.x - radius);
   const int right = std::min(image.cols - 2, centre.x + radius);
   const int width = std::max(0, right - left + 1);
-  std::vector<float> dx(static_cast<std::size_t>(width));
+  const auto columns = static_cast<std::size_t>(width);
+  std::vector<float> dx(RoomForPolar(columns));
   std::vector<float> dy(dx.size());
   std::vector<float> length(dx.size());
   std::vector<float> angle(dx.size());
@@ -82,12 +85,11 @@ std::vector<float> SiftOrientations(const cv::Mat& image, const cv::Point2f& at,
     const float* u = image.ptr<float>(y - 1) + left;
     const float* h = image.ptr<float>(y) + left;
     const float* d = image.ptr<float>(y + 1) + left;
-    for (std::size_t i = 0; i < dx.size(); ++i) {
+    for (std::size_t i = 0; i < columns; ++i) {
       dx[i] = h[i + 1] - *(h + i - 1);
       dy[i] = u[i] - d[i];
     }
-    cv::hal::magnitude32f(dx.data(), dy.data(), length.data(), width);
-    cv::hal::fastAtan32f(dy.data(), dx.data(), angle.data(), width, true);
+    Polar(dx.data(), dy.data(), columns, length.data(), angle.data());
     const float row_weight = falloff[static_cast<std::size_t>(std::abs(y - centre.y))];
     for (int i = 0; i < width; ++i) {
       const auto k = static_cast<std::size_t>(i);
@@ -139,8 +141,7 @@ void DescribeSift(const cv::Mat& image, const cv::Point2f& at, float scale, floa
     dx[i] = h[1] - h[-1];
     dy[i] = *(image.ptr<float>(y - 1) + x) - *(image.ptr<float>(y + 1) + x);
   }
-  cv::hal::magnitude32f(dx.data(), dy.data(), length.data(), kSamples);
-  cv::hal::fastAtan32f(dy.data(), dx.data(), angle.data(), kSamples, true);
+  Polar(dx.data(), dy.data(), kSamples, length.data(), angle.data());
 
   constexpr int kStride = kCellBins + 1;  // the last direction is the first one, again
   std::array<float, kPadded * kPadded * kStride> bins{};

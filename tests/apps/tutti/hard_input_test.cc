@@ -86,7 +86,7 @@ TEST_F(HardInput, DecimalCommasAreNamed) {
   ExpectRefused(RunTutti({"evaluate", "--reference", tum, "--estimate", tum}),
                 "tum.txt:1: '10,5' has a decimal comma");
   const fs::path graph = File("graph.g2o", Replaced(Graph(), '.', ","));
-  ExpectRefused(RunTutti({"optimize", graph, "--out", folder_ / "o.g2o"}), "graph.g2o:3: '0,25' has a comma");
+  ExpectRefused(RunTutti({"optimize", graph, "--out", folder_ / "o.g2o"}), "graph.g2o:3: '1,5' has a comma");
 }
 
 TEST_F(HardInput, AGraphIsTheSameWithMarkAndCarriageReturns) {

@@ -9,6 +9,7 @@
 #include "loopclosure/geometry/matching.h"
 #include "tests/loopclosure/features/textured_image.h"
 #include "tutti/core/error.h"
+#include "tutti/loopclosure/detector_options.h"
 
 namespace tutti {
 namespace {
@@ -152,6 +153,28 @@ TEST(Features, SmallImagesKeepTheUpperPyramidLevelsOfOrb) {
   int top = 0;
   for (const cv::KeyPoint& keypoint : features.keypoints) top = std::max(top, keypoint.octave);
   EXPECT_GE(top, 4);
+}
+
+class DefaultMember : public ::testing::TestWithParam<std::string> {};
+INSTANTIATE_TEST_SUITE_P(Members, DefaultMember, ::testing::ValuesIn(LoopDetectorOptions().members));
+
+// AVX2 and FMA, where the processor has them, or plain x86-64.
+TEST_P(DefaultMember, InstructionsThatOpenCvMayUseChangeNoBit) {
+  const FeatureExtractor extractor(GetParam(), ExtractionOptions());
+  for (const cv::Size size : {cv::Size(1241, 376), cv::Size(240, 192), cv::Size(1500, 1100)}) {
+    const cv::Mat image = testing::TexturedImage(6, size.width, size.height);
+    const Features all = extractor.Extract(image);
+    cv::setUseOptimized(false);
+    const Features plain = extractor.Extract(image);
+    cv::setUseOptimized(true);
+    ASSERT_EQ(all.keypoints.size(), plain.keypoints.size()) << size;
+    EXPECT_EQ(cv::norm(all.descriptors, plain.descriptors, cv::NORM_INF), 0) << size;
+    for (std::size_t i = 0; i < all.keypoints.size(); ++i) {
+      const cv::KeyPoint &a = all.keypoints[i], &b = plain.keypoints[i];
+      EXPECT_TRUE(a.pt == b.pt && a.size == b.size && a.angle == b.angle && a.response == b.response)
+          << size << " point " << i;
+    }
+  }
 }
 
 class QuotaMember : public ::testing::TestWithParam<std::string> {};

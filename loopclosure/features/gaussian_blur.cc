@@ -1,0 +1,90 @@
+#include "loopclosure/features/gaussian_blur.h"
+
+#include <cmath>
+#include <cstddef>
+#include <opencv2/imgproc.hpp>
+#include <utility>
+#include <vector>
+
+#include "core/clones.h"
+
+namespace tutti::internal {
+namespace {
+
+// Eight floats side by side, anywhere in memory: one register of AVX2, two of SSE.
+using Eight = float __attribute__((vector_size(32), aligned(4), may_alias));
+constexpr int kEight = 8, kBlock = 4 * kEight;  // [px]; a block's sums stay in registers
+
+/// out[x] = k[0] left[0][x] + sum over i > 0 of k[i] (left[i][x] + right[i][x]), summed up in this order.
+TUTTI_CLONES("avx2")
+void SymmetricSum(const std::vector<const float*>& left, const std::vector<const float*>& right,
+                  const std::vector<float>& kernel, int count, float* out) {
+  const std::size_t taps = kernel.size();
+  int x = 0;
+  for (; x + kBlock <= count; x += kBlock) {
+    const auto* middle = reinterpret_cast<const Eight*>(left[0] + x);
+    Eight s0 = kernel[0] * middle[0], s1 = kernel[0] * middle[1], s2 = kernel[0] * middle[2],
+          s3 = kernel[0] * middle[3];
+    for (std::size_t i = 1; i < taps; ++i) {
+      const auto* a = reinterpret_cast<const Eight*>(left[i] + x);
+      const auto* b = reinterpret_cast<const Eight*>(right[i] + x);
+      s0 += kernel[i] * (a[0] + b[0]);
+      s1 += kernel[i] * (a[1] + b[1]);
+      s2 += kernel[i] * (a[2] + b[2]);
+      s3 += kernel[i] * (a[3] + b[3]);
+    }
+    auto* to = reinterpret_cast<Eight*>(out + x);
+    to[0] = s0;
+    to[1] = s1;
+    to[2] = s2;
+    to[3] = s3;
+  }
+  for (; x < count; ++x) {
+    float sum = kernel[0] * left[0][x];
+    for (std::size_t i = 1; i < taps; ++i) sum += kernel[i] * (left[i][x] + right[i][x]);
+    out[x] = sum;
+  }
+}
+
+/// From the middle to the end; with its mirror image the sum is 1.
+std::vector<float> HalfKernel(double sigma) {
+  const int radius = static_cast<int>(std::ceil(3.0 * sigma));
+  const cv::Mat whole = cv::getGaussianKernel(2 * radius + 1, sigma, CV_32F);
+  std::vector<float> half;
+  for (int i = radius; i <= 2 * radius; ++i) half.push_back(whole.at<float>(i));
+  return half;
+}
+
+}  // namespace
+
+void GaussianBlur(const cv::Mat& from, double sigma, cv::Mat& to) {
+  CV_Assert(from.type() == CV_32FC1 && from.data != to.data);
+  to.create(from.size(), CV_32FC1);
+  const std::vector<float> kernel = HalfKernel(sigma);
+  const int radius = static_cast<int>(kernel.size()) - 1;
+  std::vector<const float*> left(kernel.size()), right(kernel.size());
+  std::vector<float> line(static_cast<std::size_t>(from.cols + 2 * radius));  // with its mirrored ends
+  float* const begin = line.data() + radius;
+  std::vector<std::pair<int, int>> mirrored;  // pixel outside, and the one inside that it shows
+  for (int x = 1; x <= radius; ++x) {
+    for (const int outside : {-x, from.cols - 1 + x}) {
+      mirrored.emplace_back(outside, cv::borderInterpolate(outside, from.cols, cv::BORDER_REFLECT_101));
+    }
+  }
+  for (int y = 0; y < from.rows; ++y) {
+    for (int i = 0; i <= radius; ++i) {
+      const auto at = static_cast<std::size_t>(i);
+      left[at] = from.ptr<float>(cv::borderInterpolate(y - i, from.rows, cv::BORDER_REFLECT_101));
+      right[at] = from.ptr<float>(cv::borderInterpolate(y + i, from.rows, cv::BORDER_REFLECT_101));
+    }
+    SymmetricSum(left, right, kernel, from.cols, begin);
+    for (const auto& [outside, inside] : mirrored) begin[outside] = begin[inside];
+    for (int i = 0; i <= radius; ++i) {
+      left[static_cast<std::size_t>(i)] = begin - i;
+      right[static_cast<std::size_t>(i)] = begin + i;
+    }
+    SymmetricSum(left, right, kernel, from.cols, to.ptr<float>(y));
+  }
+}
+
+}  // namespace tutti::internal

@@ -11,8 +11,9 @@
 #elif __has_feature(thread_sanitizer)
 #define TUTTI_THREAD_SANITIZER
 extern "C" void __tsan_read_range(void* begin, unsigned long bytes);
+extern "C" void __tsan_write_range(void* begin, unsigned long bytes);
 #endif
-/// A function whose arrays went through CheckReadable.
+/// A function whose arrays went through CheckReadable and CheckWritable.
 #define TUTTI_CHECKED_AS_A_WHOLE __attribute__((no_sanitize("address", "thread", "undefined")))
 #else
 #define TUTTI_CHECKED_AS_A_WHOLE
@@ -28,6 +29,16 @@ void CheckReadable([[maybe_unused]] const T* begin, [[maybe_unused]] std::size_t
   if (bad != nullptr) static_cast<void>(*static_cast<const volatile char*>(bad));
 #elif defined(TUTTI_THREAD_SANITIZER)
   __tsan_read_range(const_cast<T*>(begin), count * sizeof(T));
+#endif
+}
+
+/// The same of what will be written: to the address sanitizer there is no difference.
+template <class T>
+void CheckWritable(T* begin, std::size_t count) {
+#if defined(TUTTI_THREAD_SANITIZER)
+  __tsan_write_range(begin, count * sizeof(T));
+#else
+  CheckReadable(begin, count);
 #endif
 }
 

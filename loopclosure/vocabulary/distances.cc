@@ -13,7 +13,7 @@ TUTTI_CHECKED_AS_A_WHOLE void SquaredDistances(const float* query, const float* 
   if (count > 0) {
     CheckReadable(query, static_cast<std::size_t>(dimensions));
     CheckReadable(rows, static_cast<std::size_t>(count - 1) * step + static_cast<std::size_t>(dimensions));
-    CheckReadable(distances, static_cast<std::size_t>(count));
+    CheckWritable(distances, static_cast<std::size_t>(count));
   }
   for (int j = 0; j < count; ++j) {
     const float* row = rows + static_cast<std::size_t>(j) * step;

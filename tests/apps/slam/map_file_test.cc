@@ -94,6 +94,8 @@ TEST_P(MapFile, ARunThatGoesOnFromAnyFrameIsTheOneThatNeverStopped) {
       moved = moved || corrections > 0;
       adjusting = adjusting || whole.GlobalAdjustments() < whole.Corrections();
       next = i + (just_moved ? 6 : 61);  // an adjustment takes 20 frames
+    } else if (i % 9 == 0) {
+      whole.Save(folder / "often");
     }
     corrections = whole.Corrections();
     whole.Track(recording.frames[i]);

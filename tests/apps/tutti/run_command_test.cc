@@ -65,6 +65,14 @@ TEST(RunCommand, WritesEverythingThatScriptsRelyOn) {
   EXPECT_THAT(run.output, HasSubstr("  good: nothing that the run shows"));
 }
 
+// Of two runs, byte for byte.
+void ExpectTheSameResults(const fs::path& one, const fs::path& other) {
+  for (const char* name : {"trajectory.txt", "keyframes.txt", "loops.csv", "graph.g2o"}) {
+    EXPECT_EQ(ReadAll(one / name), ReadAll(other / name)) << name;
+  }
+  EXPECT_FALSE(ReadAll(one / "trajectory.txt").empty());
+}
+
 TEST(RunCommand, SameBytesForOneAndTwoThreadsAndWithoutLoops) {
   const fs::path folder = testing::FreshFolder(), config = testing::TinyConfig(folder);
   auto one = Arguments(config, testing::TinyTown(), folder / "one");
@@ -76,12 +84,9 @@ TEST(RunCommand, SameBytesForOneAndTwoThreadsAndWithoutLoops) {
   ASSERT_EQ(RunTutti(one).status, 0);
   ASSERT_EQ(RunTutti(two).status, 0);
   ASSERT_EQ(RunTutti(odometry).status, 0);
-  for (const char* name : {"trajectory.txt", "keyframes.txt", "loops.csv", "graph.g2o"}) {
-    EXPECT_EQ(ReadAll(folder / "one" / name), ReadAll(folder / "two" / name)) << name;
-  }
+  ExpectTheSameResults(folder / "one", folder / "two");
   EXPECT_EQ(ReadAll(folder / "one" / "trajectory_odometry.txt"),
             ReadAll(folder / "odometry" / "trajectory.txt"));
-  EXPECT_FALSE(ReadAll(folder / "one" / "trajectory.txt").empty());
 }
 
 TEST(RunCommand, SameBytesWhereOpenCvMayNotUseAvx2AndFma) {
@@ -93,10 +98,7 @@ TEST(RunCommand, SameBytesWhereOpenCvMayNotUseAvx2AndFma) {
   }
   const auto run = testing::RunProgramAndSignal("/usr/bin/env", arguments, "", 0);
   ASSERT_EQ(run.status, 0) << run.output;
-  for (const char* name : {"trajectory.txt", "keyframes.txt", "loops.csv", "graph.g2o"}) {
-    EXPECT_EQ(ReadAll(folder / "all" / name), ReadAll(folder / "less" / name)) << name;
-  }
-  EXPECT_FALSE(ReadAll(folder / "all" / "trajectory.txt").empty());
+  ExpectTheSameResults(folder / "all", folder / "less");
 }
 
 TEST(RunCommand, MaxFramesAndGroundTruthNone) {

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <cstring>
 #include <opencv2/imgproc.hpp>
 #include <utility>
 #include <vector>
@@ -11,9 +12,17 @@
 namespace tutti::internal {
 namespace {
 
-// Eight floats side by side, anywhere in memory: one register of AVX2, two of SSE.
-using Eight = float __attribute__((vector_size(32), aligned(4), may_alias));
+// Eight floats side by side: one register of AVX2, two of SSE.
+using Eight = float __attribute__((vector_size(32)));
 constexpr int kEight = 8, kBlock = 4 * kEight;  // [px]; a block's sums stay in registers
+
+/// sum += weight (a + b), of arrays anywhere in memory: no alignment is asked for.
+inline void Add(float weight, const float* a, const float* b, Eight& sum) {
+  Eight left, right;
+  std::memcpy(&left, a, sizeof(left));
+  std::memcpy(&right, b, sizeof(right));
+  sum += weight * (left + right);
+}
 
 /// out[x] = k[0] left[0][x] + sum over i > 0 of k[i] (left[i][x] + right[i][x]), summed up in this order.
 TUTTI_CLONES("avx2")
@@ -22,22 +31,23 @@ void SymmetricSum(const std::vector<const float*>& left, const std::vector<const
   const std::size_t taps = kernel.size();
   int x = 0;
   for (; x + kBlock <= count; x += kBlock) {
-    const auto* middle = reinterpret_cast<const Eight*>(left[0] + x);
-    Eight s0 = kernel[0] * middle[0], s1 = kernel[0] * middle[1], s2 = kernel[0] * middle[2],
-          s3 = kernel[0] * middle[3];
+    Eight s0, s1, s2, s3;
+    std::memcpy(&s0, left[0] + x, sizeof(s0));
+    std::memcpy(&s1, left[0] + x + kEight, sizeof(s1));
+    std::memcpy(&s2, left[0] + x + 2 * kEight, sizeof(s2));
+    std::memcpy(&s3, left[0] + x + 3 * kEight, sizeof(s3));
+    s0 *= kernel[0], s1 *= kernel[0], s2 *= kernel[0], s3 *= kernel[0];
     for (std::size_t i = 1; i < taps; ++i) {
-      const auto* a = reinterpret_cast<const Eight*>(left[i] + x);
-      const auto* b = reinterpret_cast<const Eight*>(right[i] + x);
-      s0 += kernel[i] * (a[0] + b[0]);
-      s1 += kernel[i] * (a[1] + b[1]);
-      s2 += kernel[i] * (a[2] + b[2]);
-      s3 += kernel[i] * (a[3] + b[3]);
+      const float *a = left[i] + x, *b = right[i] + x;
+      Add(kernel[i], a, b, s0);
+      Add(kernel[i], a + kEight, b + kEight, s1);
+      Add(kernel[i], a + 2 * kEight, b + 2 * kEight, s2);
+      Add(kernel[i], a + 3 * kEight, b + 3 * kEight, s3);
     }
-    auto* to = reinterpret_cast<Eight*>(out + x);
-    to[0] = s0;
-    to[1] = s1;
-    to[2] = s2;
-    to[3] = s3;
+    std::memcpy(out + x, &s0, sizeof(s0));
+    std::memcpy(out + x + kEight, &s1, sizeof(s1));
+    std::memcpy(out + x + 2 * kEight, &s2, sizeof(s2));
+    std::memcpy(out + x + 3 * kEight, &s3, sizeof(s3));
   }
   for (; x < count; ++x) {
     float sum = kernel[0] * left[0][x];

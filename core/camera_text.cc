@@ -38,4 +38,9 @@ PinholeCamera ParseCamera(const std::string& text, const std::string& option) {
   return camera;
 }
 
+int PixelsOf(double value) {
+  constexpr double kMost = 1e6;
+  return value >= 0 && value <= kMost ? static_cast<int>(value) : -1;
+}
+
 }  // namespace tutti::internal

@@ -14,5 +14,9 @@ constexpr const char* kCameraText = "fx,fy,cx,cy[,k1,k2,p1,p2[,k3]]";
 /// The camera of a text like that [px]; width and height stay 0. Throws InputError that names `option`.
 PinholeCamera ParseCamera(const std::string& text, const std::string& option = "--camera");
 
+/// A width or height that a file gives as any number [px]. Of what is no such size: -1, which
+/// PinholeCamera::Validate refuses.
+int PixelsOf(double value);
+
 }  // namespace tutti::internal
 #pragma GCC visibility pop

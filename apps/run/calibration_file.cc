@@ -8,6 +8,7 @@
 #include <sstream>
 #include <vector>
 
+#include "core/camera_text.h"
 #include "frontend/dataset/sensor_yaml.h"
 #include "tutti/core/error.h"
 #include "tutti/slam/config.h"
@@ -129,8 +130,8 @@ void SetSize(const CalibrationText& text, const YAML::Node& size, PinholeCamera&
   if (!size.IsDefined()) return;
   const std::vector<double> values = text.Numbers(size, "resolution");
   if (values.size() != 2) text.Fail(size, "'resolution' needs width and height");
-  camera.width = static_cast<int>(values[0]);
-  camera.height = static_cast<int>(values[1]);
+  camera.width = internal::PixelsOf(values[0]);
+  camera.height = internal::PixelsOf(values[1]);
 }
 
 std::string Word(const YAML::Node& node) { return node.IsDefined() && node.IsScalar() ? node.Scalar() : ""; }
@@ -171,8 +172,8 @@ Calibration FromOrbSlam(const CalibrationText& text) {
   c.fy = text.Needed(prefix + "fy");
   c.cx = text.Needed(prefix + "cx");
   c.cy = text.Needed(prefix + "cy");
-  c.width = static_cast<int>(text.Number("Camera.width").value_or(0));
-  c.height = static_cast<int>(text.Number("Camera.height").value_or(0));
+  c.width = internal::PixelsOf(text.Number("Camera.width").value_or(0));
+  c.height = internal::PixelsOf(text.Number("Camera.height").value_or(0));
   const std::string model = Word(text.root()["Camera.type"]);
   const bool fisheye = model == "KannalaBrandt8";
   std::vector<double> lens;
@@ -210,8 +211,8 @@ Calibration FromMatrix(const CalibrationText& text, const YAML::Node& matrix) {
   const YAML::Node width = FirstOf(root, {"image_width", "image_Width", "width"});
   const YAML::Node height = FirstOf(root, {"image_height", "image_Height", "height"});
   if (width.IsDefined() && height.IsDefined()) {
-    out.camera.width = static_cast<int>(text.Number(width, "image_width"));
-    out.camera.height = static_cast<int>(text.Number(height, "image_height"));
+    out.camera.width = internal::PixelsOf(text.Number(width, "image_width"));
+    out.camera.height = internal::PixelsOf(text.Number(height, "image_height"));
   }
   const YAML::Node lens = FirstOf(root, {"distortion_coefficients", "Distortion_Coefficients", "dist_coeffs",
                                          "distCoeffs", "dist_coeff", "D"});
@@ -253,8 +254,8 @@ Calibration ReadCalibration(const fs::path& file) {
   Calibration out = Read(text);
   PinholeCamera check = out.camera;
   if (check.width == 0 || check.height == 0) {  // of the images, later
-    check.width = static_cast<int>(std::lround(2 * std::max(1.0, check.cx)));
-    check.height = static_cast<int>(std::lround(2 * std::max(1.0, check.cy)));
+    check.width = internal::PixelsOf(std::round(2 * std::max(1.0, check.cx)));
+    check.height = internal::PixelsOf(std::round(2 * std::max(1.0, check.cy)));
   }
   const std::string problem = check.Validate();
   if (!problem.empty()) throw InputError(file.string() + ": " + problem);

@@ -52,7 +52,8 @@ RunRequest RequestOf(const std::string& note, const fs::path& file) {
 
 std::string DatasetOfNote(const std::string& note) {
   const nlohmann::json json = nlohmann::json::parse(note, nullptr, false);
-  return json.is_object() ? json.value("dataset", std::string()) : std::string();
+  const bool named = json.is_object() && json.contains("dataset") && json["dataset"].is_string();
+  return named ? json["dataset"].get<std::string>() : std::string();
 }
 
 }  // namespace tutti

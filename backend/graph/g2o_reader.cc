@@ -123,7 +123,9 @@ class Reader {
     }
     pose.translation = Eigen::Vector3d(v[0], v[1], v[2]);
     pose.rotation = Eigen::Quaterniond(v[6], v[3], v[4], v[5]);
-    if (pose.rotation.norm() < 1e-6) Fail(line_, "the quaternion is zero; a unit quaternion is needed");
+    const double norm = pose.rotation.norm();
+    if (norm < 1e-6) Fail(line_, "the quaternion is zero; a unit quaternion is needed");
+    if (!std::isfinite(norm)) Fail(line_, "the quaternion is too large; a unit quaternion is needed");
     pose.rotation.normalize();
     if (*kind_ == GraphKind::kSim3) {
       pose.scale = v[7];

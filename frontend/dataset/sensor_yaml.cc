@@ -1,9 +1,11 @@
 #include "frontend/dataset/sensor_yaml.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <string>
 
+#include "core/camera_text.h"
 #include "frontend/dataset/dataset_folder.h"
 #include "tutti/core/error.h"
 
@@ -62,7 +64,7 @@ Pose ReadTransform(const std::filesystem::path& file, const TextLine& transform)
   for (std::size_t i = 0; i < 12; ++i) {
     matrix(static_cast<int>(i) / 4, static_cast<int>(i) % 4) = NumberAt(file, transform, i);
   }
-  if (std::abs(matrix.leftCols<3>().determinant() - 1.0) > 0.01) {
+  if (!(std::abs(matrix.leftCols<3>().determinant() - 1.0) <= 0.01)) {  // also if it is not finite
     throw InputError(At(file, transform.number) +
                      "T_BS is not a rigid transform (its rotation has a determinant other than 1)");
   }
@@ -92,8 +94,8 @@ SensorYaml ReadSensorYaml(const std::filesystem::path& file) {
   c.cx = NumberAt(file, intrinsics, 2);
   c.cy = NumberAt(file, intrinsics, 3);
   const TextLine& size = Get(file, values, "resolution", 2);
-  c.width = static_cast<int>(NumberAt(file, size, 0));
-  c.height = static_cast<int>(NumberAt(file, size, 1));
+  c.width = internal::PixelsOf(NumberAt(file, size, 0));
+  c.height = internal::PixelsOf(NumberAt(file, size, 1));
 
   const TextLine& model = Get(file, values, "distortion_model", 1);
   const std::string& name = model.words[0];

@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "tests/support/error_of.h"
 
 namespace tutti::internal {
@@ -35,6 +37,14 @@ TEST(CameraText, ThatIsWrongIsNamedWithTheOption) {
                 ::testing::AllOf(HasSubstr("--lens"), HasSubstr(what), HasSubstr("fx,fy,cx,cy")))
         << text;
   }
+}
+
+TEST(CameraText, WhatIsNoNumberOfPixelsIsOneThatNoCameraHas) {
+  EXPECT_EQ(PixelsOf(640), 640);
+  EXPECT_EQ(PixelsOf(0), 0);
+  for (const double wrong :
+       {-1.0, 1e9, 1e300, -1e300, static_cast<double>(INFINITY), static_cast<double>(NAN)})
+    EXPECT_EQ(PixelsOf(wrong), -1) << wrong;
 }
 
 }  // namespace

@@ -1,22 +1,18 @@
-// Saved detectors for fuzzing: small ones, and their files without what random bytes would never get past
-// (lengths, checksums, the 6 KB of a random generator's state).
+// Saved detectors for fuzzing: small ones.
 #pragma once
 
 #include <cstdint>
 #include <random>
-#include <sstream>
 #include <string>
 #include <string_view>
 
-#include "core/byte_stream.h"
-#include "core/section_file.h"
+#include "loopclosure/detector/detector_file.h"
+#include "tests/fuzz/sections.h"
 #include "tutti/loopclosure/detector.h"
 
 namespace tutti::fuzz {
 
 constexpr int kKinds = 4;
-constexpr std::string_view kHeader("TUTTILC\n\x07\0\0\0\x04\x03\x02\x01", 16);
-constexpr std::string_view kGeneratorMark = "<RNG>";
 constexpr std::uint32_t kEndTag = 8;
 
 /// Two external members, so that no time goes into extraction; a kind for each sort of memory and rule.
@@ -80,37 +76,14 @@ inline LoopQuery StateQuery(std::int64_t id, std::uint32_t place, bool calibrate
   return query;
 }
 
-/// A saved detector's file from sections of one byte tag, two bytes size, content; a last one that is cut off
-/// counts with what is there.
+/// A saved detector's file from what PutSections takes.
 inline std::string WrapState(std::string_view sections) {
-  static const std::string generator = [] {
-    std::ostringstream text;
-    text << std::mt19937_64(1);
-    internal::ByteWriter out;
-    out.PutString(text.str());
-    return out.bytes();
-  }();
   internal::ByteWriter file;
-  file.PutRaw(kHeader.data(), kHeader.size());
-  const auto put = [&](std::uint32_t tag, const std::string& content) {
-    internal::SectionHeader header = {tag, 0, content.size(), content.size(), 0};
-    header.checksum = internal::SectionChecksum(header, content);
-    file.Put(header);
-    file.PutRaw(content.data(), content.size());
-  };
-  while (sections.size() >= 3) {
-    const auto byte = [&](std::size_t i) { return static_cast<std::uint8_t>(sections[i]); };
-    const std::uint32_t tag = byte(0);
-    std::string content(sections.substr(3, byte(1) + 256u * byte(2)));
-    sections.remove_prefix(3 + content.size());
-    for (std::size_t at = content.find(kGeneratorMark); at != std::string::npos;
-         at = content.find(kGeneratorMark, at + generator.size())) {
-      content.replace(at, kGeneratorMark.size(), generator);
-    }
-    put(tag, content);
-  }
-  put(kEndTag, "");
-  put(internal::kEndOfSections, "");
+  const std::string header = FileHeader(internal::kDetectorFile);
+  file.PutRaw(header.data(), header.size());
+  PutSections(sections, file);
+  PutSection(kEndTag, "", file);
+  PutSection(internal::kEndOfSections, "", file);
   return file.bytes();
 }
 

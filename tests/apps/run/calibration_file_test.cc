@@ -166,6 +166,19 @@ TEST(CalibrationFile, ThatCantBeUsedIsRefusedWithLineAndReason) {
               HasSubstr("camera.fx"));
 }
 
+TEST(CalibrationFile, WithANumberThatIsNoSizeIsRefused) {
+  const std::string lens = "intrinsics: [400, 400, 320, 240]\n";
+  EXPECT_THAT(RefusalOfFile("cam0: {intrinsics: [400, 400, 320, 240], resolution: [1e300, 480]}\n"),
+              HasSubstr("camera.width"));
+  EXPECT_THAT(RefusalOfFile(lens + "resolution: [752, 1e300]\ndistortion_model: none\n"),
+              HasSubstr("camera.height"));
+  EXPECT_THAT(RefusalOfFile("Camera.fx: 500\nCamera.fy: 500\nCamera.cx: 1e300\nCamera.cy: 240\n"),
+              HasSubstr("camera.width"));
+  EXPECT_THAT(RefusalOfFile("Camera.fx: 500\nCamera.fy: 500\nCamera.cx: 320\nCamera.cy: 240\n"
+                            "Camera.width: -1e20\nCamera.height: 480\n"),
+              HasSubstr("camera.width"));
+}
+
 TEST(CalibrationFile, OfEurocIsReadAsItsDataSetsAre) {
   const Calibration c = Read(R"(sensor_type: camera
 T_BS:

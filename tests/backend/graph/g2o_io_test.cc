@@ -120,6 +120,8 @@ TEST(G2o, DamagedFilesNameTheLine) {
   EXPECT_THAT(ErrorOfText(good + "VERTEX_SE3:QUAT 5 0 0 0 0 0 0 1\n"),
               HasSubstr(":4: VERTEX_SE3:QUAT in a graph of SE(2)"));
   EXPECT_THAT(ErrorOfText("VERTEX_SE3:QUAT 5 0 0 0 0 0 0 0\n"), HasSubstr(":1: the quaternion is zero"));
+  EXPECT_THAT(ErrorOfText("VERTEX_SE3:QUAT 5 0 0 0 0 0 0 1e300\n"),
+              HasSubstr(":1: the quaternion is too large"));
   EXPECT_THAT(ErrorOfText("VERTEX_SIM3:QUAT 5 0 0 0 0 0 0 1 -2\n"),
               HasSubstr(":1: the scale must be positive"));
 }

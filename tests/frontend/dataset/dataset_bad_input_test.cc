@@ -283,6 +283,10 @@ TEST(DatasetBadInputTest, EurocSensorYamlIsChecked) {
   EXPECT_THAT(OpenError(folder, With(Sensor::kMono)), HasSubstr("omni"));
   WriteText(camera / "sensor.yaml", replaced("[1.0, 0.0", "[0.0, 0.0"));
   EXPECT_THAT(OpenError(folder, With(Sensor::kMono)), HasSubstr("T_BS"));
+  WriteText(camera / "sensor.yaml", replaced("[1.0, 0.0, 0.0, 0.5,", "[1e200, 1e200, 0.0, 0.5,"));
+  EXPECT_THAT(OpenError(folder, With(Sensor::kMono)), HasSubstr("T_BS"));
+  WriteText(camera / "sensor.yaml", replaced("[64, 48]", "[1e300, 48]"));
+  EXPECT_THAT(OpenError(folder, With(Sensor::kMono)), HasSubstr("camera.width"));
   WriteText(camera / "sensor.yaml", good);
   WriteText(camera / "data.csv", "12x,a.png\n");
   EXPECT_THAT(OpenError(folder, With(Sensor::kMono)), HasSubstr("data.csv:1: "));

@@ -1,0 +1,40 @@
+#include "apps/run/run_note.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/support/error_of.h"
+
+namespace tutti {
+namespace {
+
+using ::testing::HasSubstr;
+
+TEST(RunNote, HasTheRequestAgain) {
+  RunRequest request;
+  request.dataset = "/data/drive";
+  request.config = "car.yaml";
+  request.checkpoint_s = 5;
+  request.keep = true;
+  const std::string note = NoteOf(request);
+  EXPECT_EQ(DatasetOfNote(note), "/data/drive");
+  const RunRequest again = RequestOf(note, "map");
+  EXPECT_EQ(again.dataset, request.dataset);
+  EXPECT_EQ(again.config, request.config);
+  EXPECT_EQ(again.checkpoint_s, request.checkpoint_s);
+  EXPECT_TRUE(again.keep);
+}
+
+// Whoever has a map may have written anything there.
+TEST(RunNote, OfSomebodyElseHasNoDataSet) {
+  for (const char* note :
+       {"", "found in the attic", "[1]", "{}", R"({"dataset": 5})", R"({"dataset": null})"}) {
+    EXPECT_EQ(DatasetOfNote(note), "") << note;
+    EXPECT_THAT(testing::ErrorOf([&] { RequestOf(note, "some.map"); }),
+                HasSubstr("some.map: is no checkpoint of tutti run"))
+        << note;
+  }
+}
+
+}  // namespace
+}  // namespace tutti

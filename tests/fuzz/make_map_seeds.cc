@@ -1,0 +1,25 @@
+// Seeds for map_fuzzer: tutti_make_map_seeds FOLDER saves small maps there, in its format.
+#include <filesystem>
+#include <string>
+
+#include "apps/slam/map_parts.h"
+#include "tests/fuzz/sections.h"
+#include "tests/fuzz/tiny_map.h"
+#include "tutti/slam/slam_system.h"
+
+int main(int argc, char** argv) {
+  if (argc != 2) return 1;
+  const std::filesystem::path folder = argv[1];
+  std::filesystem::create_directories(folder);
+  const tutti::testing::Recording drive = tutti::fuzz::TinyDrive(6);
+  tutti::SlamSystem slam(tutti::fuzz::TinyConfig(), drive.rig);
+  for (const tutti::InputFrame& frame : drive.frames) {
+    const std::filesystem::path saved = folder / "saved";
+    slam.Track(frame);
+    slam.Save(saved);
+    tutti::fuzz::WriteSeed(folder / std::to_string(frame.index),
+                           tutti::fuzz::SectionsOf(saved, tutti::kMapFile, tutti::internal::kEndOfSections));
+    std::filesystem::remove(saved);
+  }
+  return 0;
+}

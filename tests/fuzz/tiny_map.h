@@ -1,0 +1,31 @@
+// A map of few and small frames, for fuzzing.
+#pragma once
+
+#include "data/synthetic/synthetic_world.h"
+#include "tests/support/recording.h"
+#include "tutti/slam/config.h"
+
+namespace tutti::fuzz {
+
+inline RunConfig TinyConfig() {
+  RunConfig config;
+  config.run.threads = 1;
+  config.odometry.features = 100;
+  config.loops.members = {"orb"};
+  config.loops.extraction.features = 50;
+  config.loops.stm_size = 1;
+  return config;
+}
+
+inline testing::Recording TinyDrive(std::size_t frames) {
+  SyntheticOptions options;
+  options.scene = SyntheticScene::kRoom;
+  options.sensor = SyntheticSensor::kRgbd;
+  options.width = 128;
+  options.height = 96;
+  options.supersample = 1;
+  options.rate_hz = 4;
+  return testing::Record(SyntheticWorld(options), frames);
+}
+
+}  // namespace tutti::fuzz

@@ -32,6 +32,7 @@ inline LoopDetectorOptions StateOptions(int kind) {
   options.verification.max_iterations = 20;
   options.ignore_bad_signatures = kind % 2 == 1;
   if (kind == 1) options.memory = MemoryKind::kPerMember;
+  if (kind == 1) options.rule = CombinationRule::kMean;  // the default needs a memory that all share
   if (kind == 1) options.rehearsal = true;
   if (kind == 2) options.rule = CombinationRule::kNaive;
   if (kind == 3) options.rule = CombinationRule::kMajority;

@@ -14,7 +14,7 @@ import subprocess
 import sys
 
 # Longest inputs [bytes], where libFuzzer's 4096 are too few to hold a seed.
-MAX_LENGTH = {"detector_state": 16384, "memory": 16384, "map": 131072, "bag": 16384}
+MAX_LENGTH = {"detector_state": 16384, "memory": 16384, "map": 262144, "bag": 16384}
 READERS = {
     "bag": "ROS 1 bags", "calibration": "calibrations of other programs, EuRoC's sensor.yaml",
     "config": "configurations of runs, `--set`", "dataset": "lists of images, calibrations, ground truths of KITTI, TUM, EuRoC",
@@ -65,7 +65,7 @@ def main():
     parser.add_argument("--minutes", type=float, default=10, help="for each (default 10)")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="at a time (default: all cores)")
     parser.add_argument("--write", action="store_true", help="figures into docs/results/fuzz.md")
-    arguments = parser.parse_args()
+    arguments = parser.parse_intermixed_args()
     build = arguments.build.resolve()
     there = sorted(p.name[len("tutti_fuzz_"):] for p in (build / "tests" / "fuzz").glob("tutti_fuzz_*") if p.is_file())
     unknown = [name for name in arguments.fuzzers if name not in there]

@@ -10,13 +10,14 @@
 
 #include "core/clones.h"
 #include "core/intensity_centroid.h"
+#include "core/orb_description.h"
 #include "frontend/features/corner_detector.h"
 #include "frontend/features/stereo_matcher.h"
 
 namespace tutti {
 namespace {
 
-constexpr int kBorder = 19;  // [px] a descriptor's patch (rotated, 31 px) stays inside the image
+constexpr int kBorder = internal::OrbDescription::kMargin;        // [px]
 constexpr int kHalfPatch = internal::IntensityCentroid::kRadius;  // [px]
 
 // The patch of the orientation: a disc.
@@ -190,8 +191,6 @@ FrameFeatures ExtractOrb(const std::vector<cv::Mat>& pyramid, const OdometryOpti
   if (pyramid.empty() || pyramid[0].empty()) return out;
   const std::vector<float> scales = PyramidScales(options);
   const std::vector<int> wanted = FeaturesPerLevel(options);
-  const cv::Ptr<cv::ORB> orb =
-      cv::ORB::create(1, 1.2F, 1, kBorder - 1, 0, 2, cv::ORB::FAST_SCORE, 2 * kHalfPatch + 1);
   std::vector<cv::Mat> descriptors;
   for (std::size_t l = 0; l < pyramid.size(); ++l) {
     const cv::Mat& image = pyramid[l];
@@ -206,14 +205,16 @@ FrameFeatures ExtractOrb(const std::vector<cv::Mat>& pyramid, const OdometryOpti
     std::vector<cv::KeyPoint> corners =
         DetectCorners(image, {wanted[l], options.fast_threshold, options.fast_threshold_min, kBorder},
                       MaskOfLevel(mask, image.size(), in_image));
-    for (cv::KeyPoint& k : corners) {
-      k.angle = OrientationPatch().Angle(image, static_cast<int>(k.pt.x), static_cast<int>(k.pt.y));
-      k.octave = 0;
-      k.size = 2 * kHalfPatch + 1;
-    }
-    cv::Mat level_descriptors;
-    if (!corners.empty()) orb->compute(image, corners, level_descriptors);
     if (corners.empty()) continue;
+    const internal::OrbDescription description(image);
+    cv::Mat level_descriptors(static_cast<int>(corners.size()), internal::OrbDescription::kBytes, CV_8UC1);
+    for (std::size_t i = 0; i < corners.size(); ++i) {
+      cv::KeyPoint& k = corners[i];
+      const int x = static_cast<int>(k.pt.x), y = static_cast<int>(k.pt.y);
+      k.angle = OrientationPatch().Angle(image, x, y);
+      k.size = 2 * kHalfPatch + 1;
+      description.Describe(x, y, k.angle, level_descriptors.ptr(static_cast<int>(i)));
+    }
     descriptors.push_back(level_descriptors);
     for (cv::KeyPoint k : corners) {
       const cv::Point2f refined = in_image(RefineCorner(image, k.pt));

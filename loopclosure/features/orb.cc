@@ -7,9 +7,11 @@
 #include <opencv2/core/hal/intrin.hpp>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 
 #include "core/fast_corners.h"
 #include "core/intensity_centroid.h"
+#include "core/orb_description.h"
 
 namespace tutti::internal {
 namespace {
@@ -170,29 +172,21 @@ std::vector<cv::KeyPoint> Orb::Detect() const {
   return keypoints;
 }
 
-// cv::ORB describes: it smooths a level as a whole and each point costs it little.
 cv::Mat Orb::Describe(std::vector<cv::KeyPoint>& keypoints) const {
+  static_assert(kPadding >= OrbDescription::kMargin);
   cv::Mat descriptors;
   if (keypoints.empty()) return descriptors;
-  const cv::Ptr<cv::ORB> orb = cv::ORB::create(1, kScale, 1, options_.edge);
-  descriptors.create(static_cast<int>(keypoints.size()), orb->descriptorSize(), orb->descriptorType());
+  descriptors.create(static_cast<int>(keypoints.size()), OrbDescription::kBytes, CV_8UC1);
   for (std::size_t l = 0; l < levels_.size(); ++l) {
     const Level& level = levels_[l];
-    std::vector<cv::KeyPoint> corners;  // in pixels of the level
-    std::vector<int> rows;
+    std::optional<OrbDescription> description;  // costs nothing on a level without points
     for (std::size_t i = 0; i < keypoints.size(); ++i) {
       if (keypoints[i].octave != static_cast<int>(l)) continue;
-      const cv::Point at = PixelOf(keypoints[i], level.scale);
-      keypoints[i].angle = OrbPatch().Angle(level.padded, at.x + kPadding, at.y + kPadding);
-      corners.emplace_back(cv::Point2f(at), static_cast<float>(kPatch), keypoints[i].angle);
-      rows.push_back(static_cast<int>(i));
+      if (!description) description.emplace(level.padded, kPadding);
+      const cv::Point at = PixelOf(keypoints[i], level.scale) + cv::Point(kPadding, kPadding);
+      keypoints[i].angle = OrbPatch().Angle(level.padded, at.x, at.y);
+      description->Describe(at.x, at.y, keypoints[i].angle, descriptors.ptr(static_cast<int>(i)));
     }
-    if (corners.empty()) continue;
-    cv::Mat found;
-    orb->compute(level.image, corners, found);
-    CV_Assert(found.rows == static_cast<int>(rows.size()));
-    for (int r = 0; r < found.rows; ++r)
-      found.row(r).copyTo(descriptors.row(rows[static_cast<std::size_t>(r)]));
   }
   return descriptors;
 }

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/slam/map_state.h"
+#include "tests/apps/slam/map_outcome.h"
 #include "tests/support/error_of.h"
 #include "tests/support/recording.h"
 #include "tests/support/rendered_world.h"
@@ -22,6 +22,9 @@ namespace tutti {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::ExpectTheSame;
+using testing::Finished;
+using testing::MapOutcome;
 
 testing::Recording MappedDrive(SyntheticSensor sensor) {
   SyntheticOptions options = testing::SmallStereoTownWithALoop(320, 160);
@@ -36,42 +39,6 @@ RunConfig MapConfig(int threads) {
   config.odometry.features = 800;
   config.run.threads = threads;
   return config;
-}
-
-/// All that a run leaves, as bytes.
-struct MapOutcome {
-  std::string poses, loops, graph;
-  int corrections = 0, adjustments = 0;
-  std::vector<std::int64_t> frames;
-};
-
-MapOutcome Finished(SlamSystem& slam) {
-  slam.Finish();
-  MapOutcome outcome;
-  const Odometry& odometry = *slam.odometry();
-  std::vector<std::pair<double, Pose>> poses;
-  for (const StampedPose& pose : odometry.FrameTrajectory()) poses.emplace_back(pose.stamp_s, pose.pose);
-  outcome.poses = StateOf(poses);
-  outcome.loops = StateOf(slam.loops());
-  const PoseGraph graph = slam.Graph();
-  std::vector<std::pair<int, Similarity>> nodes;
-  for (const PoseGraphNode& node : graph.nodes()) nodes.emplace_back(node.id, node.pose);
-  std::vector<Similarity> edges;
-  for (const PoseGraphEdge& edge : graph.edges()) edges.push_back(edge.measurement);
-  outcome.graph = StateOf(nodes) + StateOf(edges);
-  outcome.corrections = slam.Corrections();
-  outcome.adjustments = slam.GlobalAdjustments();
-  outcome.frames = odometry.FrameIndices();
-  return outcome;
-}
-
-void ExpectTheSame(const MapOutcome& a, const MapOutcome& b, const std::string& which) {
-  EXPECT_EQ(a.frames, b.frames) << which;
-  EXPECT_EQ(a.poses == b.poses, true) << which << ": other poses";
-  EXPECT_EQ(a.loops == b.loops, true) << which << ": other loops";
-  EXPECT_EQ(a.graph == b.graph, true) << which << ": another graph";
-  EXPECT_EQ(a.corrections, b.corrections) << which;
-  EXPECT_EQ(a.adjustments, b.adjustments) << which;
 }
 
 class MapFile : public ::testing::TestWithParam<SyntheticSensor> {};

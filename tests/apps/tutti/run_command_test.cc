@@ -89,18 +89,6 @@ TEST(RunCommand, SameBytesForOneAndTwoThreadsAndWithoutLoops) {
             ReadAll(folder / "odometry" / "trajectory.txt"));
 }
 
-TEST(RunCommand, SameBytesWhereOpenCvMayNotUseAvx2AndFma) {
-  const fs::path folder = testing::FreshFolder(), config = testing::TinyConfig(folder);
-  ASSERT_EQ(RunTutti(Arguments(config, testing::TinyTown(), folder / "all")).status, 0);
-  std::vector<std::string> arguments = {"OPENCV_CPU_DISABLE=AVX2,FMA3", TUTTI_EXECUTABLE};
-  for (const std::string& word : Arguments(config, testing::TinyTown(), folder / "less")) {
-    arguments.push_back(word);
-  }
-  const auto run = testing::RunProgramAndSignal("/usr/bin/env", arguments, "", 0);
-  ASSERT_EQ(run.status, 0) << run.output;
-  ExpectTheSameResults(folder / "all", folder / "less");
-}
-
 TEST(RunCommand, MaxFramesAndGroundTruthNone) {
   const fs::path folder = testing::FreshFolder(), out = folder / "out";
   auto arguments = Arguments(testing::TinyConfig(folder), testing::TinyTown(), out);

@@ -206,7 +206,7 @@ class OrbDescription {
   // that is the end that has to be the brighter one.
   static const Pattern& OrbPattern() {
     static const Pattern pattern = [] {
-      constexpr int kReach = 15, kOffsets = 2 * kReach + 1, kCell = 40;  // [px]
+      constexpr int kReach = 15, kOffsets = 2 * kReach + 1, kCell = 2 * kReach + 2;  // [px]
       constexpr int kGrey = 100, kSpeck = 11;  // the speck's middle is smoothed to 0.51, next to it to 0.45
       std::vector<cv::KeyPoint> corners;
       cv::Mat dark(kOffsets * kCell, kOffsets * kCell, CV_8UC1, cv::Scalar(kGrey)), bright = dark.clone();
@@ -218,7 +218,7 @@ class OrbDescription {
         corners.emplace_back(cv::Point2f(corner), 31.0F, 0.0F);
       }
       Pattern found;
-      const cv::Ptr<cv::ORB> orb = cv::ORB::create(1, 1.2F, 1, kMargin);
+      const cv::Ptr<cv::ORB> orb = cv::ORB::create(1, 1.2F, 1, kReach);
       for (const std::size_t end : {0, 1}) {  // the darker one, the brighter one
         cv::Mat bits;
         orb->compute(end == 0 ? dark : bright, corners, bits);

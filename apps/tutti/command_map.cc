@@ -61,8 +61,8 @@ void PrintText(const MapInfo& info, const std::string& file) {
   const char* const unit = mono ? "(units of the first scale)" : "m";
   const Eigen::Vector3d size = info.most - info.least;
   std::printf("  %s: %.1f MB, written by tutti %s\n", file.c_str(), Megabytes(file), info.program.c_str());
-  if (const auto note = NoteOf(info); note.contains("dataset") && note["dataset"].is_string())
-    std::printf("  of             %s\n", note["dataset"].get<std::string>().c_str());
+  if (const std::string dataset = DatasetOfNote(info.note); !dataset.empty())
+    std::printf("  of             %s\n", dataset.c_str());
   std::printf("  sensor         %s, %dx%d px, fx %.2f, fy %.2f px\n", WordOf(info.rig.sensor), c.width,
               c.height, c.fx, c.fy);
   std::printf("  frames         %lld, the last one %lld\n", static_cast<long long>(info.frames),

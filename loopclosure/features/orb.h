@@ -20,8 +20,8 @@ struct OrbOptions {
 /// For images of this size.
 OrbOptions OrbOptionsFor(cv::Size size, int features, const ExtractionOptions& options);
 
-/// ORB (Rublee et al., ICCV 2011) of one image: points and angles are those of cv::ORB, bit for bit, and so
-/// are descriptors but for a few bits in a thousand (OrbDescription).
+/// ORB (Rublee et al., ICCV 2011) of one image: points and descriptors are those of cv::ORB, bit for bit, as
+/// it computes them where the processor has FMA (OrbDescription).
 class Orb {
  public:
   /// Of an 8-bit grey image that is not empty.

@@ -8,6 +8,7 @@
 
 #include "apps/run/recording.h"
 #include "tests/support/generated_dataset.h"
+#include "tests/support/small_room.h"
 #include "tests/support/test_data.h"
 #include "tutti/core/error.h"
 
@@ -23,13 +24,8 @@ constexpr int kRoomFrames = 50;
 // A walk around in a room, in colour and depth.
 const fs::path& RoomToMeasure() {
   static const fs::path room = testing::GeneratedDataset([] {
-    SyntheticOptions options;
-    options.scene = SyntheticScene::kRoom;
-    options.sensor = SyntheticSensor::kRgbd;
-    options.width = 320;
-    options.height = 240;
+    SyntheticOptions options = testing::SmallRgbdRoom(320, 240);
     options.focal_px = kRoomFocal;
-    options.supersample = 1;
     options.rate_hz = 5;
     options.frames = kRoomFrames;
     return options;

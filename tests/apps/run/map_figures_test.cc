@@ -8,18 +8,14 @@
 #include "apps/run/focal_length.h"
 #include "tests/support/recording.h"
 #include "tests/support/rendered_world.h"
+#include "tests/support/small_room.h"
 
 namespace tutti {
 namespace {
 
 // A walk around a room, seen by one camera whose focal length is taken to be so many times what it is.
 Odometry Tracked(double focal_share) {
-  SyntheticOptions options;
-  options.scene = SyntheticScene::kRoom;
-  options.sensor = SyntheticSensor::kRgbd;
-  options.width = 320;
-  options.height = 240;
-  options.supersample = 1;
+  SyntheticOptions options = testing::SmallRgbdRoom(320, 240);
   options.rate_hz = 8;
   options.frames = 60;
   static const testing::Recording room = testing::Record(testing::RenderedWorld(options), 60);

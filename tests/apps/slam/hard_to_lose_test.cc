@@ -10,6 +10,7 @@
 
 #include "tests/support/recording.h"
 #include "tests/support/rendered_world.h"
+#include "tests/support/small_room.h"
 #include "tests/support/small_town.h"
 #include "tests/support/test_data.h"
 #include "tutti/backend/evaluation.h"
@@ -141,12 +142,7 @@ TEST(HardToLose, MotionBlur) {
 // A hand that shakes in a room, up to 200 deg/s about each axis, seen by a camera that takes 30 ms for an
 // image.
 SyntheticOptions Shaken() {
-  SyntheticOptions options;
-  options.scene = SyntheticScene::kRoom;
-  options.sensor = SyntheticSensor::kRgbd;
-  options.width = 320;
-  options.height = 240;
-  options.supersample = 1;
+  SyntheticOptions options = testing::SmallRgbdRoom(320, 240);
   options.rate_hz = 30;
   options.kinect_noise = true;
   options.shake_deg_per_s = 200;
@@ -205,13 +201,7 @@ TEST(HardToLose, APlainMovingObjectCoversThirtyPercentOfTheView) {
 // ---------------------------------------------------------------- motion
 
 TEST(HardToLose, TurningOnTheSpot) {
-  SyntheticOptions options;
-  options.scene = SyntheticScene::kRoom;
-  options.sensor = SyntheticSensor::kRgbd;
-  options.width = 320;
-  options.height = 240;
-  options.supersample = 1;
-  const testing::RenderedWorld world(options);
+  const testing::RenderedWorld world(testing::SmallRgbdRoom(320, 240));
   Recording turning;
   turning.rig = testing::RigOf(world);
   constexpr int kFrames = 150;  // a full turn in 10 s

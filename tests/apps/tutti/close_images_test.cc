@@ -12,6 +12,7 @@
 
 #include "tests/apps/tutti/executable.h"
 #include "tests/support/generated_dataset.h"
+#include "tests/support/small_room.h"
 #include "tests/support/test_data.h"
 #include "tutti/core/trajectory.h"
 
@@ -26,12 +27,7 @@ constexpr int kRoomImages = 12;
 // RGB-D in TUM's layout; images are called by their time stamps.
 const fs::path& RoomOfImages() {
   static const fs::path room = testing::GeneratedDataset([] {
-    SyntheticOptions options;
-    options.sensor = SyntheticSensor::kRgbd;
-    options.scene = SyntheticScene::kRoom;
-    options.width = 320;
-    options.height = 240;
-    options.supersample = 1;
+    SyntheticOptions options = testing::SmallRgbdRoom(320, 240);
     options.frames = kRoomImages;
     return options;
   }());

@@ -7,6 +7,7 @@
 
 #include "data/synthetic/synthetic_world.h"
 #include "tests/support/recording.h"
+#include "tests/support/small_room.h"
 
 namespace tutti {
 namespace {
@@ -24,15 +25,7 @@ class ImageAlignerTest : public ::testing::Test {
       reference_.depth.push_back(inverse > 0 ? 1 / double(inverse) : 0);
     start_.T_camera_world = reference_.T_camera_world;
   }
-  static SyntheticOptions Options() {
-    SyntheticOptions o;
-    o.scene = SyntheticScene::kRoom;
-    o.sensor = SyntheticSensor::kRgbd;
-    o.width = 320;
-    o.height = 240;
-    o.supersample = 1;
-    return o;
-  }
+  static SyntheticOptions Options() { return testing::SmallRgbdRoom(320, 240); }
   std::shared_ptr<const FrameFeatures> Features(const SyntheticFrame& rendered) const {
     InputFrame frame;
     frame.image = rendered.image;

@@ -1,5 +1,4 @@
 // ROS 1 bags: any bytes give frames in order, or an InputError. The first byte chooses the sensor.
-#include <array>
 #include <cmath>
 #include <cstdlib>
 
@@ -11,9 +10,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (size == 0) return 0;
   tutti::DatasetOptions options;
   options.type = tutti::DatasetType::kBag;
-  constexpr std::array<tutti::Sensor, 3> kSensors = {tutti::Sensor::kMono, tutti::Sensor::kStereo,
-                                                     tutti::Sensor::kRgbd};
-  options.sensor = kSensors[data[0] % kSensors.size()];
+  options.sensor = static_cast<tutti::Sensor>(data[0] % 3);
   if (options.sensor != tutti::Sensor::kMono) options.topic = "/left";
   if (options.sensor == tutti::Sensor::kStereo) options.right_topic = "/right";
   if (options.sensor == tutti::Sensor::kRgbd) options.depth_topic = "/depth";

@@ -1,8 +1,6 @@
 // Folders of a data set: any lists of images, calibrations and ground truths beside readable images give
 // frames in order, or an InputError. The first byte chooses the layout, the second the sensor; the files
 // follow, with a byte 0x1e between them.
-#include <unistd.h>
-
 #include <array>
 #include <cmath>
 #include <cstdlib>
@@ -48,7 +46,7 @@ const fs::path& Folder(std::size_t layout) {
   static const std::array<fs::path, 3> folders = [] {
     std::array<fs::path, 3> made;
     for (std::size_t k = 0; k < made.size(); ++k) {
-      made[k] = "/dev/shm/tutti_fuzz_dataset_" + std::to_string(getpid()) + "_" + std::to_string(k);
+      made[k] = tutti::fuzz::ScratchPath("dataset" + std::to_string(k));
       for (const char* name : Layouts()[k].images) {
         fs::create_directories((made[k] / name).parent_path());
         const bool depth = std::string_view(name).find("depth") != std::string_view::npos;
@@ -99,9 +97,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   WriteFiles(layout, Folder(which), {reinterpret_cast<const char*>(data) + 2, size - 2});
   tutti::DatasetOptions options;
   options.type = layout.type;
-  constexpr std::array<tutti::Sensor, 3> kSensors = {tutti::Sensor::kMono, tutti::Sensor::kStereo,
-                                                     tutti::Sensor::kRgbd};
-  options.sensor = kSensors[data[1] % kSensors.size()];
+  options.sensor = static_cast<tutti::Sensor>(data[1] % 3);
   try {
     CheckDataset(*tutti::OpenDataset(Folder(which), options));
   } catch (const tutti::InputError&) {

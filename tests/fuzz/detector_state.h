@@ -79,13 +79,7 @@ inline LoopQuery StateQuery(std::int64_t id, std::uint32_t place, bool calibrate
 
 /// A saved detector's file from what PutSections takes.
 inline std::string WrapState(std::string_view sections) {
-  internal::ByteWriter file;
-  const std::string header = FileHeader(internal::kDetectorFile);
-  file.PutRaw(header.data(), header.size());
-  PutSections(sections, file);
-  PutSection(kEndTag, "", file);
-  PutSection(internal::kEndOfSections, "", file);
-  return file.bytes();
+  return FileOf(internal::kDetectorFile, sections, {kEndTag, internal::kEndOfSections});
 }
 
 }  // namespace tutti::fuzz

@@ -1,7 +1,5 @@
 // Saved loop detectors: any sections under right checksums give a detector that can go on and be saved again,
 // or an InputError. The first byte chooses the options.
-#include <unistd.h>
-
 #include <cstdlib>
 #include <filesystem>
 #include <limits>
@@ -46,7 +44,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     return 0;
   }
   if (detector.LastId() > std::numeric_limits<std::int64_t>::max() - 4 || !GoesOn(detector)) return 0;
-  static const std::filesystem::path again = "/dev/shm/tutti_fuzz_state_" + std::to_string(getpid());
+  static const std::filesystem::path again = tutti::fuzz::ScratchPath("state");
   detector.Save(again);
   tutti::LoopDetector(options).Load(again);
   std::filesystem::remove(again);

@@ -1,7 +1,5 @@
 // Pose graphs: any bytes give a graph of finite numbers that can be written and read again, or an InputError.
 // The first byte chooses what becomes of bad information matrices.
-#include <unistd.h>
-
 #include <cstdlib>
 #include <filesystem>
 #include <stdexcept>
@@ -30,7 +28,7 @@ void CheckGraph(const tutti::PoseGraph& graph) {
 }
 
 void CheckWritten(const tutti::PoseGraph& graph) {
-  static const std::filesystem::path again = "/dev/shm/tutti_fuzz_g2o_" + std::to_string(getpid());
+  static const std::filesystem::path again = tutti::fuzz::ScratchPath("g2o");
   tutti::WriteG2o(again, graph);
   try {
     const tutti::G2oFile read = tutti::ReadG2o(again);

@@ -8,7 +8,7 @@
 #include <iterator>
 #include <string>
 
-#include "tests/fuzz/sections.h"
+#include "tests/fuzz/seed_file.h"
 
 namespace {
 
@@ -26,9 +26,7 @@ sensor_msgs::Image Message(const std::string& encoding, std::uint32_t bytes_per_
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 2) return 1;
-  const std::filesystem::path folder = argv[1];
-  std::filesystem::create_directories(folder);
+  const std::filesystem::path folder = tutti::fuzz::SeedFolder(argc, argv);
   for (int sensor = 0; sensor < 3; ++sensor) {
     for (const auto compression :
          {rosbag::compression::Uncompressed, rosbag::compression::BZ2, rosbag::compression::LZ4}) {

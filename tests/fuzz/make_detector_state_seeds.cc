@@ -4,11 +4,10 @@
 #include <string>
 
 #include "tests/fuzz/detector_state.h"
+#include "tests/fuzz/seed_file.h"
 
 int main(int argc, char** argv) {
-  if (argc != 2) return 1;
-  const std::filesystem::path folder = argv[1];
-  std::filesystem::create_directories(folder);
+  const std::filesystem::path folder = tutti::fuzz::SeedFolder(argc, argv);
   for (int kind = 0; kind < tutti::fuzz::kKinds; ++kind) {
     tutti::LoopDetector detector(tutti::fuzz::StateOptions(kind));
     for (int images = 0; images <= 7; ++images) {

@@ -4,12 +4,10 @@
 #include <string>
 #include <vector>
 
-#include "tests/fuzz/sections.h"
+#include "tests/fuzz/seed_file.h"
 
 int main(int argc, char** argv) {
-  if (argc != 2) return 1;
-  const std::filesystem::path folder = argv[1];
-  std::filesystem::create_directories(folder);
+  const std::filesystem::path folder = tutti::fuzz::SeedFolder(argc, argv);
   for (const int type : {CV_8UC1, CV_8UC3, CV_16UC1}) {
     cv::Mat image(12, 16, type);
     cv::RNG random(1);

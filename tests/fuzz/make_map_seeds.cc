@@ -4,13 +4,12 @@
 
 #include "apps/slam/map_parts.h"
 #include "tests/fuzz/sections.h"
+#include "tests/fuzz/seed_file.h"
 #include "tests/fuzz/tiny_map.h"
 #include "tutti/slam/slam_system.h"
 
 int main(int argc, char** argv) {
-  if (argc != 2) return 1;
-  const std::filesystem::path folder = argv[1];
-  std::filesystem::create_directories(folder);
+  const std::filesystem::path folder = tutti::fuzz::SeedFolder(argc, argv);
   const tutti::testing::Recording drive = tutti::fuzz::TinyDrive(6);
   tutti::SlamSystem slam(tutti::fuzz::TinyConfig(), drive.rig);
   for (const tutti::InputFrame& frame : drive.frames) {

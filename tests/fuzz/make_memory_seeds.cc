@@ -4,11 +4,10 @@
 
 #include "tests/fuzz/detector_state.h"
 #include "tests/fuzz/memory_records.h"
+#include "tests/fuzz/seed_file.h"
 
 int main(int argc, char** argv) {
-  if (argc != 2) return 1;
-  const std::filesystem::path folder = argv[1];
-  std::filesystem::create_directories(folder);
+  const std::filesystem::path folder = tutti::fuzz::SeedFolder(argc, argv);
   for (int kind = 0; kind < tutti::fuzz::kKinds; ++kind) {
     for (const int images : {1, 2, 4, 8}) {
       const std::filesystem::path file = folder / "filled";

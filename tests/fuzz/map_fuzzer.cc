@@ -1,7 +1,5 @@
 // Saved maps: any sections under right checksums give a map that goes on and can be saved again, or an
 // InputError.
-#include <unistd.h>
-
 #include <filesystem>
 #include <memory>
 #include <stdexcept>
@@ -27,19 +25,11 @@ void GoOn(tutti::SlamSystem& slam, const tutti::MapInfo& info) {
   slam.Finish();
 }
 
-std::string Wrapped(const std::uint8_t* data, std::size_t size) {
-  tutti::internal::ByteWriter file;
-  const std::string header = tutti::fuzz::FileHeader(tutti::kMapFile);
-  file.PutRaw(header.data(), header.size());
-  tutti::fuzz::PutSections({reinterpret_cast<const char*>(data), size}, file);
-  tutti::fuzz::PutSection(tutti::internal::kEndOfSections, "", file);
-  return file.Take();
-}
-
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  const std::string bytes = Wrapped(data, size);
+  const std::string bytes = tutti::fuzz::FileOf(tutti::kMapFile, {reinterpret_cast<const char*>(data), size},
+                                                {tutti::internal::kEndOfSections});
   const auto file =
       tutti::fuzz::MemoryFile(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());
   tutti::MapInfo info;
@@ -52,7 +42,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   } catch (const tutti::InputError&) {
     return 0;
   }
-  static const std::filesystem::path again = "/dev/shm/tutti_fuzz_map_" + std::to_string(getpid());
+  static const std::filesystem::path again = tutti::fuzz::ScratchPath("map");
   slam->Save(again);
   try {
     tutti::SlamSystem::Load(again, tutti::ReadMapInfo(again));

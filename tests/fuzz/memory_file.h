@@ -22,4 +22,9 @@ inline std::filesystem::path MemoryFile(const std::uint8_t* data, std::size_t si
   return path;
 }
 
+/// A path of this process' own, for what has to be written: memory, too.
+inline std::filesystem::path ScratchPath(const std::string& name) {
+  return "/dev/shm/tutti_fuzz_" + name + "_" + std::to_string(getpid());
+}
+
 }  // namespace tutti::fuzz

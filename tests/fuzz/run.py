@@ -29,6 +29,7 @@ def run(build, fuzzer, seconds):
     for folder in (corpus, seeds):
         folder.mkdir(parents=True, exist_ok=True)
     log = build / f"{fuzzer}.log"
+    print(f"{fuzzer:15} runs for {seconds} s", flush=True)
     command = [build / "tests" / "fuzz" / f"tutti_fuzz_{fuzzer}", f"-max_total_time={seconds}",
                f"-max_len={MAX_LENGTH.get(fuzzer, 4096)}", "-timeout=20", "-print_final_stats=1",
                f"-artifact_prefix={build}/{fuzzer}-", corpus, seeds]

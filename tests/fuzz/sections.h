@@ -5,7 +5,7 @@
 #include <cctype>
 #include <cstdint>
 #include <filesystem>
-#include <fstream>
+#include <initializer_list>
 #include <random>
 #include <sstream>
 #include <stdexcept>
@@ -19,15 +19,6 @@
 namespace tutti::fuzz {
 
 constexpr std::string_view kGeneratorMark = "<RNG>";
-
-/// A file's first 16 bytes.
-inline std::string FileHeader(const internal::SectionFileKind& kind) {
-  internal::ByteWriter out;
-  out.PutRaw(kind.magic, sizeof kind.magic);
-  out.Put(kind.version);
-  out.Put(std::uint32_t{0x01020304});
-  return out.bytes();
-}
 
 /// Appends a section as it stands in a file.
 inline void PutSection(std::uint32_t tag, const std::string& content, internal::ByteWriter& file) {
@@ -59,6 +50,18 @@ inline void PutSections(std::string_view sections, internal::ByteWriter& file) {
     }
     PutSection(tag, content, file);
   }
+}
+
+/// A file of what PutSections takes, and of an empty section of each of `ends`.
+inline std::string FileOf(const internal::SectionFileKind& kind, std::string_view sections,
+                          std::initializer_list<std::uint32_t> ends) {
+  internal::ByteWriter file;
+  file.PutRaw(kind.magic, sizeof kind.magic);
+  file.Put(kind.version);
+  file.Put(std::uint32_t{0x01020304});  // the order of bytes
+  PutSections(sections, file);
+  for (const std::uint32_t end : ends) PutSection(end, "", file);
+  return file.Take();
 }
 
 // A random generator's state is a string of some thousand digits, after its length.
@@ -94,11 +97,6 @@ inline std::string SectionsOf(const std::filesystem::path& file, const internal:
     sections += content;
   }
   return sections;
-}
-
-inline void WriteSeed(const std::filesystem::path& file, const std::string& bytes) {
-  if (!(std::ofstream(file, std::ios::binary) << bytes).flush())
-    throw std::logic_error("a seed can't be written");
 }
 
 }  // namespace tutti::fuzz

@@ -3,6 +3,7 @@
 
 #include "data/synthetic/synthetic_world.h"
 #include "tests/support/recording.h"
+#include "tests/support/small_room.h"
 #include "tutti/slam/config.h"
 
 namespace tutti::fuzz {
@@ -18,12 +19,7 @@ inline RunConfig TinyConfig() {
 }
 
 inline testing::Recording TinyDrive(std::size_t frames) {
-  SyntheticOptions options;
-  options.scene = SyntheticScene::kRoom;
-  options.sensor = SyntheticSensor::kRgbd;
-  options.width = 128;
-  options.height = 96;
-  options.supersample = 1;
+  SyntheticOptions options = testing::SmallRgbdRoom(128, 96);
   options.rate_hz = 4;
   return testing::Record(SyntheticWorld(options), frames);
 }

@@ -19,6 +19,8 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "core/sanitized_range.h"
+
 namespace tutti::internal {
 namespace orb_smoothing {  // what only OrbDescription needs
 
@@ -29,14 +31,16 @@ using Rows = std::array<const float*, kTaps>;  // the middle one and its neighbo
 
 // a b + c as the processor fuses it.
 struct Fused {
-  float operator()(float a, float b, float c) const { return __builtin_fmaf(a, b, c); }
+  TUTTI_CHECKED_AS_A_WHOLE float operator()(float a, float b, float c) const {
+    return __builtin_fmaf(a, b, c);
+  }
 };
 
 // The same of numbers >= 0 where no processor does: the product is exact in double, and the sum is rounded to
 // odd, so that rounding once more to float rounds as if it were the only time. S. Boldo, G. Melquiond,
 // "Emulation of a FMA and correctly rounded sums: proved algorithms using rounding to odd", 2008.
 struct EmulatedFused {
-  float operator()(float a, float b, float c) const {
+  TUTTI_CHECKED_AS_A_WHOLE float operator()(float a, float b, float c) const {
     const double product = static_cast<double>(a) * static_cast<double>(b), add = static_cast<double>(c);
     double sum = product + add;
     const double part = sum - product;
@@ -51,28 +55,33 @@ struct EmulatedFused {
 
 // `from` points at the pixel kRadius to the left of the first one.
 template <class Fuse>
-inline void SmoothRow(const std::uint8_t* __restrict from, Kernel kernel, int count, float* __restrict to,
-                      const Fuse& fuse) {
+TUTTI_CHECKED_AS_A_WHOLE inline void SmoothRow(const std::uint8_t* __restrict from, Kernel kernel, int count,
+                                               float* __restrict to, const Fuse& fuse) {
+  CheckReadable(from, static_cast<std::size_t>(count + 2 * kRadius));
+  CheckWritable(to, static_cast<std::size_t>(count));
+  const float* weights = kernel.data();
   for (int x = 0; x < count; ++x) {
-    float sum = kernel[0] * static_cast<float>(from[x]);
-    for (int k = 1; k < kTaps; ++k)
-      sum = fuse(kernel[static_cast<std::size_t>(k)], static_cast<float>(from[x + k]), sum);
+    float sum = weights[0] * static_cast<float>(from[x]);
+    for (int k = 1; k < kTaps; ++k) sum = fuse(weights[k], static_cast<float>(from[x + k]), sum);
     to[x] = sum;
   }
 }
 
 template <class Fuse>
-inline void SmoothColumn(const Rows& rows, Kernel kernel, int count, std::uint8_t* __restrict to,
-                         const Fuse& fuse) {
+TUTTI_CHECKED_AS_A_WHOLE inline void SmoothColumn(const Rows& rows, Kernel kernel, int count,
+                                                  std::uint8_t* __restrict to, const Fuse& fuse) {
+  for (const float* row : rows) CheckReadable(row, static_cast<std::size_t>(count));
+  CheckWritable(to, static_cast<std::size_t>(count));
   constexpr float kToEven = 8388608.0F;  // 2^23: floats from here on are whole, halves went to even
   const float *a = rows[0], *b = rows[1], *c = rows[2], *d = rows[3], *e = rows[4], *f = rows[5],
-              *g = rows[6];
+              *g = rows[6], *weights = kernel.data();
   for (int x = 0; x < count; ++x) {
-    float sum = kernel[3] * d[x];
-    sum = fuse(e[x] + c[x], kernel[4], sum);
-    sum = fuse(f[x] + b[x], kernel[5], sum);
-    sum = fuse(g[x] + a[x], kernel[6], sum);
-    to[x] = static_cast<std::uint8_t>(std::min(255, static_cast<int>((sum + kToEven) - kToEven)));
+    float sum = weights[3] * d[x];
+    sum = fuse(e[x] + c[x], weights[4], sum);
+    sum = fuse(f[x] + b[x], weights[5], sum);
+    sum = fuse(g[x] + a[x], weights[6], sum);
+    const int grey = static_cast<int>((sum + kToEven) - kToEven);
+    to[x] = static_cast<std::uint8_t>(grey < 255 ? grey : 255);
   }
 }
 
@@ -81,16 +90,18 @@ struct Smoothing {
   void (*column)(const Rows&, Kernel, int, std::uint8_t*);
 };
 
-inline void EmulatedRow(const std::uint8_t* from, Kernel kernel, int count, float* to) {
+TUTTI_CHECKED_AS_A_WHOLE inline void EmulatedRow(const std::uint8_t* from, Kernel kernel, int count,
+                                                 float* to) {
   SmoothRow(from, kernel, count, to, EmulatedFused());
 }
-inline void EmulatedColumn(const Rows& rows, Kernel kernel, int count, std::uint8_t* to) {
+TUTTI_CHECKED_AS_A_WHOLE inline void EmulatedColumn(const Rows& rows, Kernel kernel, int count,
+                                                    std::uint8_t* to) {
   SmoothColumn(rows, kernel, count, to, EmulatedFused());
 }
 #if defined(__x86_64__)
-#define TUTTI_FUSES __attribute__((target("avx2,fma"), flatten))
+#define TUTTI_FUSES __attribute__((target("avx2,fma"), flatten)) TUTTI_CHECKED_AS_A_WHOLE
 #else
-#define TUTTI_FUSES
+#define TUTTI_FUSES TUTTI_CHECKED_AS_A_WHOLE
 #endif
 TUTTI_FUSES inline void FusedRow(const std::uint8_t* from, Kernel kernel, int count, float* to) {
   SmoothRow(from, kernel, count, to, Fused());
@@ -185,14 +196,10 @@ class OrbDescription {
         offset[i + lane] = rows[lane] * step + columns[lane];
     }
     const std::uint8_t* corner = smooth_.ptr<std::uint8_t>(y) + x;
-    for (int byte = 0; byte < kBytes; ++byte) {
-      unsigned bits = 0;
-      for (unsigned bit = 0; bit < 8; ++bit) {
-        const std::size_t pair = static_cast<std::size_t>(byte) * 8 + bit;
-        bits |= static_cast<unsigned>(corner[offset[2 * pair]] < corner[offset[2 * pair + 1]]) << bit;
-      }
-      descriptor[byte] = static_cast<std::uint8_t>(bits);
-    }
+    constexpr int kSide = 2 * kMargin + 1;
+    for (int row = -kMargin; row <= kMargin; ++row) CheckReadable(corner + row * step - kMargin, kSide);
+    CheckWritable(descriptor, kBytes);
+    Compare(corner, offset.data(), descriptor);
   }
 
  private:
@@ -200,6 +207,17 @@ class OrbDescription {
   struct Pattern {
     std::array<float, kEnds> x{}, y{};  // first and second end of each pair in turn [px]
   };
+
+  // Bit by bit: is the first end darker than the second?
+  TUTTI_CHECKED_AS_A_WHOLE static void Compare(const std::uint8_t* corner, const int* offset,
+                                               std::uint8_t* descriptor) {
+    for (int byte = 0; byte < kBytes; ++byte) {
+      unsigned bits = 0;
+      for (unsigned bit = 0; bit < 8; ++bit, offset += 2)
+        bits |= static_cast<unsigned>(corner[offset[0]] < corner[offset[1]]) << bit;
+      descriptor[byte] = static_cast<std::uint8_t>(bits);
+    }
+  }
 
   // The pairs that the paper's authors learned, as cv::ORB has them. It is asked for them: where one pixel
   // differs by so little that smoothing leaves of it one grey level at its own place alone, a bit is set if

@@ -70,20 +70,24 @@ cv::Mat Grey(const cv::Mat& pixels, const std::string& encoding) {
 /// Every image of a topic as it is stored; `error` says why there is none.
 cv::Mat DecodeMessage(const rosbag::MessageInstance& message, bool depth, bool* metres, std::string* error) {
   *metres = false;
-  if (const auto image = message.instantiate<sensor_msgs::Image>()) {
-    const cv::Mat pixels = Pixels(*image);
-    if (pixels.empty())
-      *error = "an image of encoding '" + image->encoding + "' can't be read, or is cut off";
-    *metres = image->encoding == "32FC1";
-    return pixels.empty() ? cv::Mat() : depth ? pixels.clone() : Grey(pixels, image->encoding);
+  try {
+    if (const auto image = message.instantiate<sensor_msgs::Image>()) {
+      const cv::Mat pixels = Pixels(*image);
+      if (pixels.empty())
+        *error = "an image of encoding '" + image->encoding + "' can't be read, or is cut off";
+      *metres = image->encoding == "32FC1";
+      return pixels.empty() ? cv::Mat() : depth ? pixels.clone() : Grey(pixels, image->encoding);
+    }
+    if (const auto image = message.instantiate<sensor_msgs::CompressedImage>()) {
+      cv::Mat pixels = cv::imdecode(
+          image->data, depth ? cv::IMREAD_UNCHANGED : cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
+      if (pixels.empty()) *error = "a compressed image ('" + image->format + "') can't be decoded";
+      return pixels;
+    }
+    *error = "a message is no image";
+  } catch (const ros::Exception& e) {
+    *error = std::string("a message is damaged (") + e.what() + ")";
   }
-  if (const auto image = message.instantiate<sensor_msgs::CompressedImage>()) {
-    cv::Mat pixels =
-        cv::imdecode(image->data, depth ? cv::IMREAD_UNCHANGED : cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
-    if (pixels.empty()) *error = "a compressed image ('" + image->format + "') can't be decoded";
-    return pixels;
-  }
-  *error = "a message is no image";
   return {};
 }
 
@@ -116,13 +120,13 @@ class BagDataset : public Dataset {
   BagDataset(const fs::path& file, const DatasetOptions& options) : file_(file), options_(options) {
     try {
       bag_.open(file.string(), rosbag::bagmode::Read);
-    } catch (const rosbag::BagException& e) {
-      throw InputError(file.string() + ": can't be opened as a ROS bag (" + e.what() +
+      FindTopics();
+      Index();
+      SetUpRig();
+    } catch (const ros::Exception& e) {
+      throw InputError(file.string() + ": can't be read as a ROS bag (" + e.what() +
                        "); if it was cut off while recording, repair it with 'rosbag reindex'");
     }
-    FindTopics();
-    Index();
-    SetUpRig();
   }
 
   std::size_t Size() const override { return frames_.size(); }
@@ -200,10 +204,18 @@ class BagDataset : public Dataset {
     Messages messages;
     rosbag::View view(bag_, rosbag::TopicQuery(topic));
     std::vector<std::uint8_t> buffer;
+    std::size_t damaged = 0;
+    std::string damage;
     for (const rosbag::MessageInstance& message : view) {
-      buffer.resize(message.size());
-      ros::serialization::OStream stream(buffer.data(), static_cast<std::uint32_t>(buffer.size()));
-      message.write(stream);
+      try {
+        buffer.resize(message.size());
+        ros::serialization::OStream stream(buffer.data(), static_cast<std::uint32_t>(buffer.size()));
+        message.write(stream);
+      } catch (const ros::Exception& e) {
+        ++damaged;
+        damage = e.what();
+        continue;
+      }
       if (buffer.size() < 12) continue;
       const auto word = [&](std::size_t at) {
         return double(buffer[at]) + 256.0 * buffer[at + 1] + 65536.0 * buffer[at + 2] +
@@ -211,6 +223,11 @@ class BagDataset : public Dataset {
       };
       messages.push_back(
           {word(4) + 1e-9 * word(8), std::make_shared<const rosbag::MessageInstance>(message)});
+    }
+    if (damaged > 0) {
+      warnings_.push_back(file_.string() + ": " + std::to_string(damaged) + " of " +
+                          std::to_string(messages.size() + damaged) + " images of " + topic +
+                          " can't be read (" + damage + ") and are skipped");
     }
     const std::size_t all = messages.size();
     std::stable_sort(messages.begin(), messages.end(),
@@ -344,6 +361,7 @@ class BagDataset : public Dataset {
   cv::Size size_;
   int bits_ = 8;
   std::vector<std::string> warnings_;
+  cv::Mat mask_;  // rectified; empty: none
   std::optional<Rectifier> rectifier_;
   mutable std::mutex mutex_;  // a bag reads from one place at a time
   rosbag::Bag bag_;

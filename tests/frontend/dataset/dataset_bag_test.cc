@@ -2,6 +2,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fstream>
+#include <iterator>
+#include <string>
+
 #include "tests/frontend/dataset/dataset_files.h"
 #include "tests/support/test_data.h"
 
@@ -128,7 +132,42 @@ TEST(BagDataset, DamagedFilesAreRefused) {
   testing::Truncate(file, 0.5);
   EXPECT_THAT(OpenError(file, Topic("/grey/image")), HasSubstr("cut.bag"));
   testing::WriteText(file, "no bag at all");
-  EXPECT_THAT(OpenError(file, Topic("/grey/image")), HasSubstr("can't be opened as a ROS bag"));
+  EXPECT_THAT(OpenError(file, Topic("/grey/image")), HasSubstr("can't be read as a ROS bag"));
+}
+
+TEST(BagDataset, ImagesOfADamagedChunkAreSkippedAndCounted) {
+  const fs::path file = FreshFolder() / "damaged.bag";
+  {
+    rosbag::Bag bag(file.string(), rosbag::bagmode::Write);
+    bag.setCompression(rosbag::compression::LZ4);
+    bag.setChunkThreshold(1000);  // [bytes], so that each image has a chunk
+    for (int i = 0; i < 4; ++i)
+      bag.write("/image", ros::Time(200 + i), Message(Picture(64, 48, i), "mono8", 100 + i));
+  }
+  std::ifstream in(file, std::ios::binary);
+  std::string bytes((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+  std::size_t chunk = 0;
+  for (int i = 0; i < 2; ++i) chunk = bytes.find("compression=lz4", chunk + 1);
+  ASSERT_NE(chunk, std::string::npos);
+  for (std::size_t i = 60; i < 160; ++i) bytes[chunk + i] = '\xff';
+  testing::WriteText(file, bytes);
+
+  const auto dataset = OpenDataset(file, Topic("/image"));
+  ASSERT_EQ(dataset->Size(), 3u);
+  EXPECT_DOUBLE_EQ(dataset->Stamp(1), 102);
+  EXPECT_THAT(dataset->Warnings().front(), HasSubstr("1 of 4 images of /image can't be read"));
+  EXPECT_TRUE(dataset->Read(1).frame.has_value());
+}
+
+TEST(BagDataset, TheMaskIsOfEveryFrame) {
+  DatasetOptions options = Topic("/grey/image");
+  cv::Mat mask(48, 64, CV_8UC1, cv::Scalar(255));
+  mask.rowRange(40, 48).setTo(0);
+  options.mask = FreshFolder() / "mask.png";
+  testing::WriteImage(options.mask, mask);
+  const ReadResult read = OpenDataset(Bag(), options)->Read(1);
+  ASSERT_TRUE(read.frame.has_value()) << read.error;
+  EXPECT_EQ(cv::countNonZero(read.frame->mask != mask), 0);
 }
 
 #endif

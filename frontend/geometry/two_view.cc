@@ -6,8 +6,11 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/calib3d.hpp>
+#include <opencv2/core/eigen.hpp>
+#include <optional>
 
 #include "core/reprojection.h"
+#include "frontend/geometry/essential_matrix.h"
 #include "frontend/geometry/pose_solver.h"
 
 namespace tutti {
@@ -23,6 +26,15 @@ Pose ToPose(const cv::Mat& rotation, const cv::Mat& translation) {
   const double n = pose.translation.norm();
   if (n > 1e-12) pose.translation /= n;
   return pose;
+}
+
+// The first two coordinates of (x/z, y/z, 1).
+std::vector<Eigen::Vector2d> Rays(const PinholeCamera& camera, const std::vector<cv::Point2f>& pixels) {
+  std::vector<Eigen::Vector2d> rays;
+  rays.reserve(pixels.size());
+  for (const cv::Point2f& pixel : pixels)
+    rays.push_back(camera.Unproject(Eigen::Vector2d(pixel.x, pixel.y)).head<2>());
+  return rays;
 }
 
 // Points in front of both cameras that reproject within the bound.
@@ -167,21 +179,17 @@ TwoViewResult EstimateTwoView(const PinholeCamera& camera, const std::vector<cv:
   }
   const double sigma = options.pixel_sigma;
   const cv::Matx33d k(camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1);
-  // OpenCV's RANSAC seeds its own generator with a constant: deterministic.
-  cv::Mat mask;
-  const cv::Mat essential =
-      cv::findEssentialMat(first, second, cv::Mat(k), cv::RANSAC, 0.9999, 1.5 * sigma, mask);
-  if (essential.rows != 3) {
+  const std::optional<internal::EssentialMatrix> essential = internal::FitEssential(
+      Rays(camera, first), Rays(camera, second), 1.5 * sigma / (0.5 * (camera.fx + camera.fy)), 0.9999);
+  if (!essential) {
     result.reason = "no essential matrix fits the matches";
     return result;
   }
   const Eigen::Matrix3d k_inverse = camera.Matrix().inverse();
-  Eigen::Matrix3d e;
-  for (int r = 0; r < 3; ++r) {
-    for (int c = 0; c < 3; ++c) e(r, c) = essential.at<double>(r, c);
-  }
   std::vector<char> inliers;
-  const double score_e = EpipolarScore(k_inverse.transpose() * e * k_inverse, first, second, sigma, &inliers);
+  const double score_e =
+      EpipolarScore(k_inverse.transpose() * essential->matrix * k_inverse, first, second, sigma, &inliers);
+  // OpenCV's RANSAC seeds its own generator with a constant: deterministic.
   const cv::Mat homography =
       cv::findHomography(first, second, cv::RANSAC, 2.5 * sigma, cv::noArray(), 2000, 0.999);
   double score_h = 0;
@@ -201,8 +209,9 @@ TwoViewResult EstimateTwoView(const PinholeCamera& camera, const std::vector<cv:
       motions.push_back(ToPose(rotations[i], translations[i]));
     inliers.assign(first.size(), 1);
   } else {
-    cv::Mat r1, r2, t;
-    cv::decomposeEssentialMat(essential, r1, r2, t);
+    cv::Mat e, r1, r2, t;
+    cv::eigen2cv(essential->matrix, e);
+    cv::decomposeEssentialMat(e, r1, r2, t);
     const cv::Mat minus = -t;
     motions = {ToPose(r1, t), ToPose(r1, minus), ToPose(r2, t), ToPose(r2, minus)};
   }

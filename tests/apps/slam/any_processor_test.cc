@@ -12,7 +12,8 @@ namespace {
 
 class AnyProcessor : public ::testing::TestWithParam<SyntheticSensor> {};
 INSTANTIATE_TEST_SUITE_P(Sensors, AnyProcessor,
-                         ::testing::Values(SyntheticSensor::kStereo, SyntheticSensor::kRgbd));
+                         ::testing::Values(SyntheticSensor::kMono, SyntheticSensor::kStereo,
+                                           SyntheticSensor::kRgbd));
 
 testing::MapOutcome Driven(const testing::Recording& recording) {
   RunConfig config;

@@ -7,10 +7,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
 #include <map>
 #include <mutex>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <string>
+#include <string_view>
 
 #include "frontend/dataset/dataset_folder.h"
 #include "frontend/dataset/video_input.h"
@@ -27,6 +32,29 @@ struct StampedMessage {
   std::shared_ptr<const rosbag::MessageInstance> message;
 };
 using Messages = std::vector<StampedMessage>;
+
+// librosbag believes every length: a damaged one would end in 4 GB of memory.
+void CheckLengths(const fs::path& file) {
+  constexpr std::string_view kMagic = "#ROSBAG V2.0\n";
+  std::ifstream in(file, std::ios::binary);
+  std::string magic(kMagic.size(), '\0');
+  if (!in.read(magic.data(), static_cast<std::streamsize>(magic.size())) || magic != kMagic)
+    return;  // librosbag says what it is
+  std::error_code error;
+  const std::uint64_t size = fs::file_size(file, error);
+  for (std::uint64_t at = kMagic.size(), next = at; at < size; at = next) {
+    for (int part = 0; part < 2; ++part) {  // a record's header, its data
+      std::uint32_t length = 0;
+      in.seekg(static_cast<std::streamoff>(next));
+      in.read(reinterpret_cast<char*>(&length), sizeof length);
+      next += sizeof length + length;
+      if (!in || next > size) {
+        throw InputError(file.string() + ": the record at byte " + std::to_string(at) +
+                         " reaches beyond the file's end; repair it with 'rosbag reindex'");
+      }
+    }
+  }
+}
 
 bool IsImage(const std::string& type) {
   return type == "sensor_msgs/Image" || type == "sensor_msgs/CompressedImage";
@@ -118,6 +146,7 @@ std::optional<PinholeCamera> CameraFrom(const sensor_msgs::CameraInfo& info, con
 class BagDataset : public Dataset {
  public:
   BagDataset(const fs::path& file, const DatasetOptions& options) : file_(file), options_(options) {
+    CheckLengths(file);
     try {
       bag_.open(file.string(), rosbag::bagmode::Read);
       FindTopics();

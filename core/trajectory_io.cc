@@ -3,6 +3,7 @@
 #include <fstream>
 #include <functional>
 
+#include "core/angle.h"
 #include "core/text_input.h"
 #include "core/tum_line.h"
 #include "tutti/core/error.h"
@@ -91,17 +92,30 @@ bool LeaveOut(const std::filesystem::path& file, std::size_t line, const Traject
   return true;
 }
 
-Trajectory ReadTum(const std::filesystem::path& file, Oddities& odd) {
+// From the words of a line, in metres and degrees.
+MotionSigma SigmaOf(const std::filesystem::path& file, std::size_t line, const std::string& translation,
+                    const std::string& rotation) {
+  const double metres = NumberOf(file, line, translation), degrees = NumberOf(file, line, rotation);
+  if (metres < 0 || degrees < 0) Fail(file, line, "a standard deviation is below 0");
+  return {metres, degrees * internal::kRadians};
+}
+
+Trajectory ReadTum(const std::filesystem::path& file, Oddities& odd, std::vector<MotionSigma>* sigmas) {
   Trajectory out;
+  std::size_t columns = 8;
   ForEachLine(file, [&](std::size_t line, const std::vector<std::string>& w) {
-    if (w.size() != 8) {
+    if (sigmas != nullptr && out.empty() && w.size() == 10) columns = 10;
+    if (w.size() != columns) {
       Fail(file, line,
-           "has " + std::to_string(w.size()) + " columns; the TUM format has 8: stamp tx ty tz qx qy qz qw");
+           "has " + std::to_string(w.size()) +
+               (columns == 8 ? " columns; the TUM format has 8: stamp tx ty tz qx qy qz qw"
+                             : " columns; the first line has 10"));
     }
     double v[8];
     for (int i = 0; i < 8; ++i) v[i] = NumberOf(file, line, w[static_cast<std::size_t>(i)]);
     if (LeaveOut(file, line, out, v[0], odd)) return;
     out.push_back({v[0], QuaternionPose(file, line, {v[1], v[2], v[3]}, v[4], v[5], v[6], v[7], odd)});
+    if (columns == 10) sigmas->push_back(SigmaOf(file, line, w[8], w[9]));
   });
   return out;
 }
@@ -184,14 +198,16 @@ TrajectoryFormat GuessTrajectoryFormat(const std::filesystem::path& file) {
 }
 
 Trajectory ReadTrajectory(const std::filesystem::path& file, TrajectoryFormat format,
-                          std::vector<std::string>* warnings, std::vector<Eigen::Matrix3d>* rotations) {
+                          std::vector<std::string>* warnings, std::vector<Eigen::Matrix3d>* rotations,
+                          std::vector<MotionSigma>* sigmas) {
   Trajectory out;
   Oddities odd;
   odd.tolerated = warnings != nullptr;
   if (rotations != nullptr) rotations->clear();
+  if (sigmas != nullptr) sigmas->clear();
   switch (format) {
     case TrajectoryFormat::kTum:
-      out = ReadTum(file, odd);
+      out = ReadTum(file, odd, sigmas);
       break;
     case TrajectoryFormat::kKitti:
       out = ReadKitti(file, rotations);
@@ -209,6 +225,28 @@ Trajectory ReadTrajectory(const std::filesystem::path& file, TrajectoryFormat fo
   warn(odd.repeats, "repeats the time stamp of the pose before it; left out");
   warn(odd.lengths, "the quaternion is not of length 1; normalised");
   return out;
+}
+
+std::vector<MotionSigma> ReadMotionSigmas(const std::filesystem::path& file, const Trajectory& trajectory) {
+  constexpr double kSameTime_s = 1e-3;
+  std::vector<MotionSigma> sigmas;
+  ForEachLine(file, [&](std::size_t line, const std::vector<std::string>& w) {
+    const std::size_t columns = w.size();
+    if (columns != 2 && columns != 3)
+      Fail(file, line,
+           "has " + std::to_string(columns) +
+               " columns; standard deviations have 2, metres and degrees, or a time stamp and these");
+    if (sigmas.size() == trajectory.size())
+      Fail(file, line, "there are only " + std::to_string(trajectory.size()) + " poses; one line for each");
+    const double stamp_s = trajectory[sigmas.size()].stamp_s;
+    if (columns == 3 && !(std::abs(NumberOf(file, line, w[0]) - stamp_s) <= kSameTime_s))
+      Fail(file, line, "is not of the time of its pose, " + std::to_string(stamp_s) + " s");
+    sigmas.push_back(SigmaOf(file, line, w[columns - 2], w[columns - 1]));
+  });
+  if (sigmas.size() != trajectory.size())
+    throw InputError(file.string() + ": has " + std::to_string(sigmas.size()) + " lines for " +
+                     std::to_string(trajectory.size()) + " poses; one for each is needed");
+  return sigmas;
 }
 
 std::vector<double> ReadTimes(const std::filesystem::path& file) {

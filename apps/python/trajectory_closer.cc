@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "apps/python/bindings.h"
 #include "apps/python/errors.h"
@@ -25,10 +26,13 @@ std::unique_ptr<TrajectoryCloser> MakeCloser(const CameraRig& rig, const std::op
   return std::make_unique<TrajectoryCloser>(all, rig);
 }
 
-TrackResult Push(TrajectoryCloser& closer, const InputFrame& frame, const py::object& T_odom_body) {
+TrackResult Push(TrajectoryCloser& closer, const InputFrame& frame, const py::object& T_odom_body,
+                 const std::optional<std::pair<double, double>>& sigma) {
   const Pose pose = PoseOf(T_odom_body, "T_odom_body");
+  std::optional<MotionSigma> of_motion;
+  if (sigma) of_motion = {sigma->first, sigma->second};
   const py::gil_scoped_release release;
-  return closer.Push(frame, pose);
+  return closer.Push(frame, pose, of_motion);
 }
 
 // work(closer) without the interpreter's lock.
@@ -78,10 +82,12 @@ void BindTrajectoryCloser(py::module_& module) {
                        const py::kwargs& sections) { return MakeCloser(rig, config, sections); }),
            "rig"_a, "config"_a = py::none(),
            "Raises tutti.InputError if the configuration does not fit the rig.")
-      .def("push", &Push, "frame"_a, "T_odom_body"_a,
-           (std::string("`T_odom_body`: (4, 4), or (7,) of x, y, z [m], qx, qy, qz, qw.\n\n") +
-            doc::TrajectoryCloser_Push)
-               .c_str())
+      .def(
+          "push", &Push, "frame"_a, "T_odom_body"_a, "sigma"_a = py::none(),
+          (std::string("`T_odom_body`: (4, 4), or (7,) of x, y, z [m], qx, qy, qz, qw. `sigma`: (translation "
+                       "[m], rotation [rad]), on each axis.\n\n") +
+           doc::TrajectoryCloser_Push)
+              .c_str())
       .def(
           "finish", [](TrajectoryCloser& c) { Free(c, [&](const TrajectoryCloser&) { c.Finish(); }); },
           doc::TrajectoryCloser_Finish)

@@ -102,6 +102,8 @@ GivenOdometry::GivenOdometry(const GivenOdometryFiles& files, const fs::path& im
   notes_ = poses.warnings;
   trajectory_ = std::move(poses.trajectory);
   has_stamps_ = poses.has_stamps || (files.times && times.size() == trajectory_.size());
+  if (files.sigmas) poses.sigmas = ReadMotionSigmas(*files.sigmas, trajectory_);
+  SumUp(poses.sigmas);
   if (!own) {
     stamps_ = ImageStamps(*all);
   } else if (files.times && times.size() == all->Size() && has_stamps_ &&
@@ -116,6 +118,31 @@ GivenOdometry::GivenOdometry(const GivenOdometryFiles& files, const fs::path& im
                      " images; give the times of the poses (--times)");
   for (std::size_t i = 0; i < trajectory_.size(); ++i)
     trajectory_[i].stamp_s = stamps_.empty() ? all->Stamp(i) : stamps_[i];
+}
+
+void GivenOdometry::SumUp(const std::vector<MotionSigma>& sigmas) {
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  for (std::size_t i = 0; i < sigmas.size(); ++i) {
+    if (i > 0) sum += Eigen::Vector2d(sigmas[i].translation_m, sigmas[i].rotation_rad).cwiseAbs2();
+    variances_.push_back(sum);
+  }
+}
+
+Eigen::Vector2d GivenOdometry::Variance(double stamp_s) const {
+  const auto later = std::lower_bound(trajectory_.begin(), trajectory_.end(), stamp_s,
+                                      [](const StampedPose& p, double s) { return p.stamp_s < s; });
+  if (later == trajectory_.begin()) return variances_.front();
+  if (later == trajectory_.end()) return variances_.back();
+  const auto i = static_cast<std::size_t>(later - trajectory_.begin());
+  const double begin_s = trajectory_[i - 1].stamp_s;
+  const double share = (stamp_s - begin_s) / (trajectory_[i].stamp_s - begin_s);
+  return variances_[i - 1] + share * (variances_[i] - variances_[i - 1]);
+}
+
+std::optional<MotionSigma> GivenOdometry::SigmaBetween(double from_s, double to_s) const {
+  if (variances_.empty()) return std::nullopt;
+  const Eigen::Vector2d sigma = (Variance(to_s) - Variance(from_s)).cwiseMax(0).cwiseSqrt();
+  return MotionSigma{sigma[0], sigma[1]};
 }
 
 std::vector<double> GivenOdometry::StampsByName(std::size_t count) const {

@@ -17,6 +17,7 @@ struct GivenOdometryFiles {
   std::string format = "auto";                 ///< or tum, kitti, euroc
   std::optional<std::filesystem::path> depth;  ///< folder of depth images for a plain folder of images
   std::optional<std::filesystem::path> times;  ///< one stamp a line: of the images, of KITTI's poses, or both
+  std::optional<std::filesystem::path> sigmas;  ///< how uncertain its motions are (ReadMotionSigmas)
 };
 
 /// Poses of a body for the images of a data set. Immutable.
@@ -32,6 +33,9 @@ class GivenOdometry {
   std::unique_ptr<Dataset> Open() const;
   /// T_odom_body at that time: interpolated between poses at most 1 s apart, else of a pose within 0.02 s.
   std::optional<Pose> At(double stamp_s) const;
+  /// How uncertain the motion from the one time to the other is, as far as the files say: in the trajectory's
+  /// own columns or a file beside it. Within a motion the variance grows evenly.
+  std::optional<MotionSigma> SigmaBetween(double from_s, double to_s) const;
   const Trajectory& trajectory() const { return trajectory_; }
   /// What was found and decided.
   const std::vector<std::string>& notes() const { return notes_; }
@@ -39,13 +43,16 @@ class GivenOdometry {
  private:
   std::vector<double> ImageStamps(const Dataset& all);
   std::vector<double> StampsByName(std::size_t count) const;
+  void SumUp(const std::vector<MotionSigma>& sigmas);
+  Eigen::Vector2d Variance(double stamp_s) const;
 
   GivenOdometryFiles files_;
   std::filesystem::path images_;
   DatasetOptions options_;
   Trajectory trajectory_;
-  bool has_stamps_ = true;      // false: numbers of lines
-  std::vector<double> stamps_;  // of all images; empty: the data set has its own
+  std::vector<Eigen::Vector2d> variances_;  // of translation and rotation, from the first pose to each
+  bool has_stamps_ = true;                  // false: numbers of lines
+  std::vector<double> stamps_;              // of all images; empty: the data set has its own
   std::vector<std::string> notes_;
 };
 

@@ -140,8 +140,11 @@ void SlamRun::CorrectGiven() {
 
 TrackResult SlamRun::Track(const InputFrame& frame) {
   if (given_ == nullptr || slam_->AppearanceOnly()) return slam_->Track(frame);
-  if (const std::optional<Pose> T_odom_body = given_->At(frame.stamp_s))
-    return slam_->Follow(frame, *T_odom_body * result_.rig.T_body_camera);
+  if (const std::optional<Pose> T_odom_body = given_->At(frame.stamp_s)) {
+    const double before_s = std::exchange(followed_s_, frame.stamp_s).value_or(frame.stamp_s);
+    return slam_->Follow(frame, *T_odom_body * result_.rig.T_body_camera,
+                         given_->SigmaBetween(before_s, frame.stamp_s));
+  }
   TrackResult none;
   none.state = TrackingState::kLost;
   none.reason = "the trajectory has no pose at its time";

@@ -89,6 +89,7 @@ class SlamRun {
   const RunConfig& config_;
   const Dataset& dataset_;
   const GivenOdometry* given_;
+  std::optional<double> followed_s_;  // the last frame that was given a pose
   RunResult& result_;
   SpanRecorder recorder_;
   std::unique_ptr<SlamSystem> slam_;

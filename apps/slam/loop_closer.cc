@@ -1,6 +1,7 @@
 #include "apps/slam/loop_closer.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <utility>
 
@@ -182,23 +183,39 @@ LoopUpdate LoopCloser::Enter(std::vector<LoopEdge> entering, const Odometry& odo
   return update;
 }
 
-// The larger of what is configured and what the images say.
-OdometryUncertainty::Sigmas LoopCloser::Sigmas() const {
-  OdometryUncertainty::Sigmas sigmas = uncertainty_.Estimate();
-  sigmas.fraction = std::max(sigmas.fraction, options_.odometry_sigma_fraction);
-  sigmas.rotation_rad = std::max(sigmas.rotation_rad, options_.odometry_sigma_deg * internal::kRadians);
-  return sigmas;
+void LoopCloser::NoteMotion(int keyframe, const MotionSigma& sigma, const Eigen::Vector3d& position) {
+  walk_.since_keyframe.translation_m = std::hypot(walk_.since_keyframe.translation_m, sigma.translation_m);
+  walk_.since_keyframe.rotation_rad = std::hypot(walk_.since_keyframe.rotation_rad, sigma.rotation_rad);
+  if (keyframe < 0) return;
+  const MotionSigma motion = std::exchange(walk_.since_keyframe, {});
+  graph_.NoteMotion(keyframe, motion);
+  if (walk_.keyframe) {
+    walk_.translation_m2 += motion.translation_m * motion.translation_m;
+    walk_.rotation_rad2 += motion.rotation_rad * motion.rotation_rad;
+    walk_.way_m2 += (position - *walk_.keyframe).squaredNorm();
+    ++walk_.motions;
+  }
+  walk_.keyframe = position;
+}
+
+// Between two keyframes: by the odometry itself (the mean), else as configured.
+OdometryUncertainty::Sigmas LoopCloser::Stated() const {
+  if (walk_.motions == 0)
+    return {options_.odometry_sigma_fraction, options_.odometry_sigma_deg * internal::kRadians};
+  return {walk_.way_m2 > 0 ? std::sqrt(walk_.translation_m2 / walk_.way_m2) : 0,
+          std::sqrt(walk_.rotation_rad2 / walk_.motions)};
 }
 
 std::string LoopCloser::Uncertainty() const {
-  const OdometryUncertainty::Sigmas seen = uncertainty_.Estimate(), sigmas = Sigmas();
-  if (seen.fraction < sigmas.fraction && seen.rotation_rad < sigmas.rotation_rad) return "";
-  const double deg = sigmas.rotation_rad * internal::kDegrees;
+  const OdometryUncertainty::Sigmas seen = uncertainty_.Estimate(), stated = Stated();
+  if (seen.fraction < stated.fraction && seen.rotation_rad < stated.rotation_rad) return "";
   char text[240];
   std::snprintf(text, sizeof text,
                 "the images contradict the odometry by more than its standard deviation says: between two "
                 "keyframes %.2g of the way and %.2g deg count, instead of %.2g and %.2g deg",
-                sigmas.fraction, deg, options_.odometry_sigma_fraction, options_.odometry_sigma_deg);
+                std::max(seen.fraction, stated.fraction),
+                std::max(seen.rotation_rad, stated.rotation_rad) * internal::kDegrees, stated.fraction,
+                stated.rotation_rad * internal::kDegrees);
   return text;
 }
 
@@ -212,8 +229,14 @@ void LoopCloser::Start(std::vector<LoopEdge> entering, const Odometry& odometry,
   const internal::Stopwatch watch;
   solved_keyframes_ = KeyframesOf(odometry);
   graph_.Update(solved_keyframes_, CovisibleOf(odometry, options_.covisibility_min_shared));
-  const OdometryUncertainty::Sigmas sigmas = Sigmas();
-  graph_.SetSigmas(sigmas.fraction, sigmas.rotation_rad);
+  // Every edge has at least what the images say of all. What the odometry says of each motion, the graph has.
+  constexpr double kLeastRotation_rad = 1e-6;  // an edge is never certain
+  OdometryUncertainty::Sigmas sigmas = uncertainty_.Estimate();
+  if (walk_.motions == 0) {
+    sigmas.fraction = std::max(sigmas.fraction, options_.odometry_sigma_fraction);
+    sigmas.rotation_rad = std::max(sigmas.rotation_rad, options_.odometry_sigma_deg * internal::kRadians);
+  }
+  graph_.SetSigmas(sigmas.fraction, std::max(sigmas.rotation_rad, kLeastRotation_rad));
   solver_.Start(graph_, accepted_, entering, options_, recorder_);
   solved_due_ = frames + SolutionFrames(solved_keyframes_.size());
   stages_["loop_optimize"] += watch.Milliseconds();

@@ -18,6 +18,7 @@
 #include "apps/slam/loop_update.h"
 #include "apps/slam/odometry_uncertainty.h"
 #include "tutti/core/span_recorder.h"
+#include "tutti/core/trajectory.h"
 #include "tutti/loopclosure/detector.h"
 #include "tutti/slam/config.h"
 #include "tutti/slam/loop_record.h"
@@ -52,7 +53,10 @@ class LoopCloser {
   /// What the images say of a step of the odometry that is followed: if it is less certain than configured,
   /// loops are judged by what they say from the next one on.
   void NoteStep(const StepCheck& check) { uncertainty_.Add(check); }
-  /// Where it is: in plain words, what counts instead; else empty.
+  /// The odometry that is followed says how uncertain its motion since the last call is, which led to this
+  /// position, and to this keyframe if it is not -1. It counts in place of what is configured.
+  void NoteMotion(int keyframe, const MotionSigma& sigma, const Eigen::Vector3d& position);
+  /// Where the images say more: in plain words, what counts instead; else empty.
   std::string Uncertainty() const;
 
   /// A proposed loop between images without poses.
@@ -113,7 +117,7 @@ class LoopCloser {
  private:
   LoopConstraint Measure(const Verification& verification, int candidate, int query,
                          const Odometry& odometry);
-  OdometryUncertainty::Sigmas Sigmas() const;
+  OdometryUncertainty::Sigmas Stated() const;
   LoopUpdate Enter(std::vector<LoopEdge> entering, const Odometry& odometry, std::int64_t frames);
   void Start(std::vector<LoopEdge> entering, const Odometry& odometry, std::int64_t frames);
   void Settle(const LoopVerdict& verdict, LoopUpdate* update);
@@ -129,6 +133,14 @@ class LoopCloser {
   std::uint64_t seed_;
   std::vector<LoopRecord> records_;
   OdometryUncertainty uncertainty_;  // of an odometry that is followed; not saved, as such a map is not
+  struct Walk {                      // what that odometry itself says
+    MotionSigma since_keyframe;
+    std::optional<Eigen::Vector3d> keyframe;  // the last one's position
+    double translation_m2 = 0, rotation_rad2 = 0,
+           way_m2 = 0;  // sums of squares over motions between keyframes
+    int motions = 0;
+  };
+  Walk walk_;
   LoopGate gate_;
   KeyframeGraph graph_;
   std::vector<LoopEdge> accepted_;  // in the map

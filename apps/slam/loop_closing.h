@@ -51,8 +51,11 @@ class LoopClosing {
   /// A new keyframe as the map has it, null: an image without a pose. Those that come too soon after the one
   /// before (loop_every_keyframes, loop_min_interval_s) are not searched.
   void Submit(const InputFrame& frame, const KeyframeView* view, std::int64_t frames);
-  /// LoopCloser::NoteStep.
+  /// As LoopCloser.
   void NoteStep(const StepCheck& check) { closer_.NoteStep(check); }
+  void NoteMotion(int keyframe, const MotionSigma& sigma, const Eigen::Vector3d& position) {
+    closer_.NoteMotion(keyframe, sigma, position);
+  }
   /// The keyframe that shows the place of a lost frame; -1 if none is known.
   int Locate(const InputFrame& frame);
   /// A loop from elsewhere (LoopCloser::Add).

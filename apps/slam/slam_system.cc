@@ -49,13 +49,19 @@ class SlamSystem::Impl {
     return result;
   }
 
-  TrackResult Follow(const InputFrame& frame, const Pose& T_odom_camera) {
+  TrackResult Follow(const InputFrame& frame, const Pose& T_odom_camera,
+                     const std::optional<MotionSigma>& sigma) {
+    if (sigma && !(sigma->translation_m >= 0 && sigma->rotation_rad >= 0 &&
+                   std::isfinite(sigma->translation_m) && std::isfinite(sigma->rotation_rad)))
+      throw InputError("frame " + std::to_string(frame.index) +
+                       ": the odometry's standard deviation is below 0 or not finite");
     if (!odometry_) return Track(frame);
     BringIn();
     ++frames_;
     sessions_.CountFrame();
     TrackResult result = odometry_->Follow(frame, T_odom_camera);
     if (result.step) loops_.NoteStep(*result.step);
+    if (sigma) loops_.NoteMotion(result.keyframe, *sigma, T_odom_camera.translation);
     last_ = frame.index;
     sessions_.SetLastFrame(last_);
     if (result.keyframe >= 0 && (loops_.Searching() || on_keyframe_)) unmapped_[result.keyframe] = frame;
@@ -367,8 +373,9 @@ void SlamSystem::SetChangeListener(std::function<void(const Odometry&, std::int6
 }
 
 TrackResult SlamSystem::Track(const InputFrame& frame) { return impl_->Track(frame); }
-TrackResult SlamSystem::Follow(const InputFrame& frame, const Pose& T_odom_camera) {
-  return impl_->Follow(frame, T_odom_camera);
+TrackResult SlamSystem::Follow(const InputFrame& frame, const Pose& T_odom_camera,
+                               const std::optional<MotionSigma>& sigma) {
+  return impl_->Follow(frame, T_odom_camera, sigma);
 }
 void SlamSystem::AddLoop(int candidate, int query, const Similarity& S_candidate_query,
                          const Matrix7d& information) {

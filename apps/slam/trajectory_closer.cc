@@ -23,12 +23,13 @@ class TrajectoryCloser::Impl {
         T_body_camera_(rig.T_body_camera),
         T_camera_body_(rig.T_body_camera.Inverse()) {}
 
-  TrackResult Push(const InputFrame& frame, const Pose& T_odom_body) {
+  TrackResult Push(const InputFrame& frame, const Pose& T_odom_body,
+                   const std::optional<MotionSigma>& sigma) {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (!(frame.stamp_s > last_s_.value_or(frame.stamp_s - 1)))
       throw InputError("frame " + std::to_string(frame.index) +
                        ": its time stamp does not grow; push images in order of time");
-    TrackResult result = slam_.Follow(frame, T_odom_body * T_body_camera_);
+    TrackResult result = slam_.Follow(frame, T_odom_body * T_body_camera_, sigma);
     last_s_ = frame.stamp_s;
     if (result.state != TrackingState::kTracking) return result;
     T_map_body_ = result.T_world_camera * T_camera_body_;
@@ -97,8 +98,9 @@ class TrajectoryCloser::Impl {
 TrajectoryCloser::TrajectoryCloser(const RunConfig& config, const CameraRig& rig)
     : impl_(std::make_unique<Impl>(config, rig)) {}
 TrajectoryCloser::~TrajectoryCloser() = default;
-TrackResult TrajectoryCloser::Push(const InputFrame& frame, const Pose& T_odom_body) {
-  return impl_->Push(frame, T_odom_body);
+TrackResult TrajectoryCloser::Push(const InputFrame& frame, const Pose& T_odom_body,
+                                   const std::optional<MotionSigma>& sigma) {
+  return impl_->Push(frame, T_odom_body, sigma);
 }
 void TrajectoryCloser::Finish() { impl_->Finish(); }
 Pose TrajectoryCloser::T_map_odom() const { return impl_->T_map_odom(); }

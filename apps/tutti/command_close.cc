@@ -1,6 +1,7 @@
 // tutti close: loops and a corrected trajectory for another odometry.
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -15,6 +16,7 @@
 #include "apps/tutti/mask_option.h"
 #include "apps/tutti/run_with_report.h"
 #include "tutti/core/error.h"
+#include "tutti/core/text.h"
 #include "tutti/slam/config.h"
 
 namespace tutti::cli {
@@ -23,8 +25,8 @@ namespace {
 struct CloseArguments {
   GivenOdometryFiles odometry;
   std::string trajectory, images, depth, times, config, out, ground_truth, mask;
-  std::vector<double> sigma;     // share of the way, degrees
-  std::vector<std::string> set;  // SECTION.KEY=VALUE
+  std::vector<std::string> sigma;  // share of the way and degrees, or a file
+  std::vector<std::string> set;    // SECTION.KEY=VALUE
   std::uint64_t seed = 1;
   int threads = 2, start = 0, end = 0, stride = 1;
   bool keep = false, no_report = false, quiet = false;
@@ -32,9 +34,14 @@ struct CloseArguments {
 
 RunConfig ConfigOf(const CloseArguments& arguments) {
   RunConfig config = arguments.config.empty() ? RunConfig() : LoadConfig(arguments.config);
-  if (!arguments.sigma.empty()) {
-    config.run.odometry_sigma_fraction = arguments.sigma[0];
-    config.run.odometry_sigma_deg = arguments.sigma[1];
+  if (arguments.sigma.size() == 2) {
+    const std::optional<double> fraction = ParseDouble(arguments.sigma[0]),
+                                deg = ParseDouble(arguments.sigma[1]);
+    if (!fraction || !deg)
+      throw InputError("--odometry-sigma: '" + arguments.sigma[fraction ? 1 : 0] +
+                       "' is not a number; give FRACTION DEG, or one file");
+    config.run.odometry_sigma_fraction = *fraction;
+    config.run.odometry_sigma_deg = *deg;
     const std::string problem = config.run.Validate();
     if (!problem.empty()) throw InputError("--odometry-sigma: " + problem);
   }
@@ -54,6 +61,7 @@ int Close(const CLI::App& command, const CloseArguments& arguments) {
   request.odometry->trajectory = arguments.trajectory;
   if (!arguments.depth.empty()) request.odometry->depth = arguments.depth;
   if (!arguments.times.empty()) request.odometry->times = arguments.times;
+  if (arguments.sigma.size() == 1) request.odometry->sigmas = arguments.sigma[0];
   if (!arguments.ground_truth.empty()) request.ground_truth = arguments.ground_truth;
   if (command.count("--seed") > 0) request.seed = arguments.seed;
   if (command.count("--threads") > 0) request.threads = arguments.threads;
@@ -102,10 +110,13 @@ void SetUpClose(CLI::App& command, int& exit_code) {
       "time stamps [s], one a line: of the images (default: times.txt in the folder or above it, else the "
       "file names, else the poses by order), or of the poses of a KITTI file");
   command
-      .add_option("--odometry-sigma", arguments->sigma,
-                  "FRACTION DEG: standard deviation of the odometry between two keyframes, as a share of the "
-                  "way and as an angle (run.odometry_sigma_fraction, run.odometry_sigma_deg)")
-      ->expected(2);
+      .add_option(
+          "--odometry-sigma", arguments->sigma,
+          "FRACTION DEG: standard deviation of the odometry between two keyframes, as a share of the "
+          "way and as an angle (run.odometry_sigma_fraction, run.odometry_sigma_deg); or a FILE with a "
+          "line for each pose: standard deviations of the motion since the pose before, in metres and "
+          "degrees on each axis (a TUM file may have these as columns 9 and 10)")
+      ->expected(1, 2);
   command.add_option("--ground-truth", arguments->ground_truth,
                      "trajectory to evaluate against (default: the data set's own; 'none': don't)");
   command.add_option("--set", arguments->set, "SECTION.KEY=VALUE, as of `tutti run`");

@@ -74,9 +74,9 @@ PoseFile ReadAs(const std::filesystem::path& file, PoseFileFormat format, const 
   PoseFile out;
   out.format = format;
   out.has_stamps = format == PoseFileFormat::kTum || format == PoseFileFormat::kEuroc;
-  out.trajectory = format == PoseFileFormat::kG2o
-                       ? GraphTrajectory(file, out.warnings)
-                       : ReadTrajectory(file, CoreFormat(format), &out.warnings, &out.rotations_as_written);
+  out.trajectory = format == PoseFileFormat::kG2o ? GraphTrajectory(file, out.warnings)
+                                                  : ReadTrajectory(file, CoreFormat(format), &out.warnings,
+                                                                   &out.rotations_as_written, &out.sigmas);
   if (!out.has_stamps && !times.empty()) GiveStamps(file, times, out);
   return out;
 }

@@ -248,13 +248,29 @@ void KeyframeGraph::SetSigmas(double translation_ratio, double rotation_rad) {
   options_ = options;
 }
 
+void KeyframeGraph::NoteMotion(int keyframe, const MotionSigma& sigma) {
+  const Eigen::Vector2d before = walked_.empty() ? Eigen::Vector2d::Zero() : walked_.back().second;
+  walked_.emplace_back(keyframe,
+                       before + Eigen::Vector2d(sigma.translation_m, sigma.rotation_rad).cwiseAbs2());
+}
+
+// Variances of translation and rotation since the first keyframe.
+Eigen::Vector2d KeyframeGraph::Walked(int keyframe) const {
+  const auto after = std::upper_bound(walked_.begin(), walked_.end(), keyframe,
+                                      [](int id, const auto& walked) { return id < walked.first; });
+  return after == walked_.begin() ? Eigen::Vector2d::Zero() : std::prev(after)->second;
+}
+
 // Of (translation, rotation, log scale). Over several steps errors of length add up as if they were all in
 // one direction: that makes up for what the turns between them do to the end.
 Vector7d KeyframeGraph::Sigmas(const Edge& edge, double floor) const {
   const double steps = std::sqrt(edge.steps);
+  const Eigen::Vector2d walked = (Walked(edge.newer) - Walked(edge.older)).cwiseAbs().cwiseSqrt();
   Vector7d sigmas;
-  sigmas << Eigen::Vector3d::Constant(options_.sigma_translation_ratio * edge.Way() + steps * floor),
-      Eigen::Vector3d::Constant(steps * options_.sigma_rotation_rad), steps * options_.sigma_log_scale;
+  sigmas << Eigen::Vector3d::Constant(
+      std::max(walked[0], options_.sigma_translation_ratio * edge.Way() + steps * floor)),
+      Eigen::Vector3d::Constant(std::max(walked[1], steps * options_.sigma_rotation_rad)),
+      steps * options_.sigma_log_scale;
   return sigmas;
 }
 

@@ -99,6 +99,49 @@ TEST(TrajectoryIo, RepeatedStampsAreLeftOutWithAWarningWhereTheCallerAsks) {
   EXPECT_THAT(warnings[0], HasSubstr("poses.txt:2: repeats the time stamp"));
 }
 
+TEST(TrajectoryIo, TwoMoreColumnsAreStandardDeviations) {
+  const std::string two = "0 0 0 0 0 0 0 1 0 0\n1 1 0 0 0 0 0 1 0.5 90\n";
+  std::vector<MotionSigma> sigmas;
+  EXPECT_EQ(ReadTrajectory(Write(two), TrajectoryFormat::kTum, nullptr, nullptr, &sigmas).size(), 2u);
+  ASSERT_EQ(sigmas.size(), 2u);
+  EXPECT_DOUBLE_EQ(sigmas[1].translation_m, 0.5);
+  EXPECT_NEAR(sigmas[1].rotation_rad, M_PI / 2, 1e-12);
+  EXPECT_THAT(ErrorOf(two, TrajectoryFormat::kTum), HasSubstr(":1: has 10 columns; the TUM format has 8"));
+  const auto refused = [&](const std::string& text) {
+    try {
+      ReadTrajectory(Write(text), TrajectoryFormat::kTum, nullptr, nullptr, &sigmas);
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string("no error");
+  };
+  EXPECT_THAT(refused(two + "2 1 0 0 0 0 0 1\n"), HasSubstr(":3: has 8 columns; the first line has 10"));
+  EXPECT_THAT(refused("0 0 0 0 0 0 0 1 -1 0\n"), HasSubstr(":1: a standard deviation is below 0"));
+  EXPECT_THAT(refused("0 0 0 0 0 0 0 1 nan 0\n"), HasSubstr("not finite"));
+}
+
+TEST(TrajectoryIo, StandardDeviationsMayBeInAFileOfTheirOwn) {
+  const Trajectory poses = {{10, Pose()}, {11, Pose()}};
+  const auto read = [&](const std::string& text) {
+    return ReadMotionSigmas(testing::FreshFile("sigmas.txt", text), poses);
+  };
+  EXPECT_DOUBLE_EQ(read("# m deg\n0 0\n0.2 1\n")[1].translation_m, 0.2);
+  EXPECT_NEAR(read("10 0 0\n11 0.2 180\n")[1].rotation_rad, M_PI, 1e-12);
+  const auto refused = [&](const std::string& text) {
+    try {
+      read(text);
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string("no error");
+  };
+  EXPECT_THAT(refused("10 0 0\n12 0 0\n"), HasSubstr("sigmas.txt:2: is not of the time of its pose"));
+  EXPECT_THAT(refused("0 0\n"), HasSubstr("sigmas.txt: has 1 lines for 2 poses"));
+  EXPECT_THAT(refused("0 0\n0 0\n0 0\n"), HasSubstr("sigmas.txt:3: there are only 2 poses"));
+  EXPECT_THAT(refused("0 0 0 0\n"), HasSubstr("sigmas.txt:1: has 4 columns"));
+  EXPECT_THAT(refused("0 -1\n0 0\n"), HasSubstr("below 0"));
+}
+
 TEST(TrajectoryIo, FilesThatCanNotBeOpenedAreInputErrors) {
   EXPECT_THROW(ReadTrajectory("/nonexistent/poses.txt", TrajectoryFormat::kTum), InputError);
   EXPECT_THROW(ReadTrajectory(testing::FreshFolder(), TrajectoryFormat::kTum), InputError);

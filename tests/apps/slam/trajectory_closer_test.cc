@@ -3,8 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -92,6 +94,35 @@ TEST(TrajectoryCloser, TheImagesTellThatAnOdometryIsBadAndTrueLoopsEnterThen) {
             0.2 * testing::DriftAtTheEnd(town.truth, odometry));
 }
 
+// An odometry that is good but for one slip of its heading, and knows when that was.
+TEST(TrajectoryCloser, ALoopBendsTheTrajectoryWhereTheOdometryIsUncertain) {
+  const Recording town = RecordedTown(SyntheticSensor::kStereo);
+  const std::size_t slip = town.truth.size() / 2;
+  Trajectory odometry = town.truth;
+  const Pose turned(ExpSO3({0, 0.1, 0}), Eigen::Vector3d::Zero());  // about 6 degrees
+  for (std::size_t i = slip; i < odometry.size(); ++i)
+    odometry[i].pose =
+        town.truth[slip - 1].pose * turned * town.truth[slip - 1].pose.Inverse() * town.truth[i].pose;
+  const auto error = [&](bool told) {
+    TrajectoryCloser closer(Small(2), town.rig);
+    for (std::size_t i = 0; i < town.frames.size(); ++i) {
+      std::optional<MotionSigma> sigma;
+      if (told) sigma = i == slip ? MotionSigma{0.02, 0.1} : MotionSigma{0.002, 0.0002};
+      closer.Push(town.frames[i], odometry[i].pose, sigma);
+    }
+    closer.Finish();
+    EXPECT_GT(closer.Corrections(), 0);
+    const Trajectory corrected = closer.Corrected(odometry);
+    double worst = 0;
+    for (std::size_t i = 0; i < corrected.size(); ++i)
+      worst = std::max(worst, (corrected[i].pose.translation - town.truth[i].pose.translation).norm());
+    return worst;
+  };
+  const double told = error(true), untold = error(false);
+  std::printf("  farthest from the truth: %.3f m, %.3f m if it does not say\n", told, untold);
+  EXPECT_LT(told, 0.5 * untold);
+}
+
 TEST(TrajectoryCloser, APerfectOdometryStaysNearlyAsItIs) {
   const Recording town = RecordedTown(SyntheticSensor::kStereo);
   const Closed closed = CloseTown(town, town.truth, Small(2));
@@ -130,6 +161,8 @@ TEST(TrajectoryCloser, RefusesPosesThatAreNotFiniteAndTimesThatDoNotGrow) {
   Pose bad;
   bad.translation.x() = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THROW(closer.Push(town.frames[0], bad), InputError);
+  EXPECT_THROW(closer.Push(town.frames[0], Pose(), MotionSigma{-1, 0}), InputError);
+  EXPECT_THROW(closer.Push(town.frames[0], Pose(), MotionSigma{0, bad.translation.x()}), InputError);
   EXPECT_EQ(closer.Push(town.frames[0], Pose()).state, TrackingState::kTracking);
   EXPECT_THROW(closer.Push(town.frames[0], Pose()), InputError);
   EXPECT_EQ(closer.Push(town.frames[1], Pose()).state, TrackingState::kTracking);

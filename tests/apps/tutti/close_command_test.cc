@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "tests/apps/tiny_town.h"
@@ -62,6 +63,33 @@ TEST_F(CloseCommand, ReadsTumKittiAndEurocAndGivesBackEveryPose) {
     EXPECT_TRUE(fs::exists(folder_ / "out" / "loops.csv"));
     EXPECT_TRUE(fs::exists(folder_ / "out" / "trajectory_odometry.txt"));
   }
+}
+
+TEST_F(CloseCommand, TheOdometrySaysHowUncertainItIsInColumnsOrAFile) {
+  const Trajectory poses = TownPoses();
+  WriteTrajectory(folder_ / "odometry.txt", poses, TrajectoryFormat::kTum);
+  std::ifstream in(folder_ / "odometry.txt");
+  std::string columns, lines;
+  for (std::string line; std::getline(in, line);) {
+    columns += line[0] == '#' ? line + "\n" : line + " 0.25 2\n";
+    if (line[0] != '#') lines += "0.25 2\n";
+  }
+  testing::WriteAll(folder_ / "columns.txt", columns);
+  testing::WriteAll(folder_ / "sigmas.txt", lines);
+  const auto graph = [&](const fs::path& trajectory, const std::vector<std::string>& more) {
+    const auto done = Close(trajectory, testing::TinyTown(), more);
+    EXPECT_EQ(done.status, 0) << done.output;
+    return testing::ReadAll(folder_ / "out" / "graph.g2o");
+  };
+  const std::string in_columns = graph(folder_ / "columns.txt", {});
+  EXPECT_EQ(graph(folder_ / "odometry.txt", {"--odometry-sigma", (folder_ / "sigmas.txt").string()}),
+            in_columns);
+  EXPECT_NE(graph(folder_ / "odometry.txt", {}), in_columns);
+  testing::WriteAll(folder_ / "few.txt", "0 0\n");
+  const auto few = Close(folder_ / "odometry.txt", testing::TinyTown(),
+                         {"--odometry-sigma", (folder_ / "few.txt").string()});
+  EXPECT_EQ(few.status, 1);
+  EXPECT_THAT(few.output, HasSubstr("few.txt: has 1 lines for"));
 }
 
 TEST_F(CloseCommand, PosesWithoutAnImageAreCorrectedToo) {

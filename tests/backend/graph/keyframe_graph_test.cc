@@ -209,6 +209,35 @@ TEST(KeyframeGraph, OnlyTheStrongestCovisiblePairsGetAnEdge) {
   EXPECT_EQ(built.edges().size(), 9u + 2u) << "8 and 9 have one already";
 }
 
+TEST(KeyframeGraph, AnEdgeIsAsUncertainAsTheMotionsBetweenItsEnds) {
+  KeyframeGraphOptions options;
+  options.sigma_translation_ratio = 0;
+  options.sigma_rotation_rad = 1e-4;
+  KeyframeGraph graph(options);
+  std::vector<MapKeyframe> keyframes;
+  for (int id = 0; id < 5; ++id) {
+    keyframes.push_back({id, 0, Pose(Eigen::Quaterniond::Identity(), {1.0 * id, 0, 0})});
+    if (id < 4) graph.NoteMotion(id, {0.3 * id, 0.01 * id});
+  }
+  graph.Update(keyframes, {{0, 2, 100}});
+  const PoseGraph known = graph.Graph({});
+  for (const PoseGraphEdge& edge : known.edges()) {
+    double translation2 = 0, rotation2 = 0;
+    for (int id = edge.from + 1; id <= std::min(edge.to, 3); ++id) {
+      translation2 += 0.09 * id * id;
+      rotation2 += 1e-4 * id * id;
+    }
+    if (edge.to == 4) {  // its motion was not noted
+      EXPECT_GT(edge.information(0, 0), 1e4);
+      EXPECT_NEAR(edge.information(3, 3), 1e8, 1);
+    } else {
+      EXPECT_NEAR(1 / edge.information(0, 0), translation2, 1e-9) << edge.from << " " << edge.to;
+      EXPECT_NEAR(1 / edge.information(3, 3), rotation2, 1e-9) << edge.from << " " << edge.to;
+    }
+  }
+  EXPECT_EQ(known.edges().size(), 5u);
+}
+
 TEST(KeyframeGraph, RefusesKeyframesOutOfOrderAndLoopsToUnknownOnes) {
   KeyframeGraph graph;
   EXPECT_THROW(graph.Update({{1, 0, Pose()}, {0, 0, Pose()}}), InputError);

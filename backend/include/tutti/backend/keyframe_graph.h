@@ -12,11 +12,13 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tutti/backend/certificate.h"
 #include "tutti/backend/pose_graph.h"
 #include "tutti/backend/pose_graph_optimizer.h"
+#include "tutti/core/trajectory.h"
 
 #pragma GCC visibility push(default)
 namespace tutti {
@@ -138,6 +140,10 @@ class KeyframeGraph {
 
   /// Of odometry edges, from now on (KeyframeGraphOptions). Throws InputError if they are not usable.
   void SetSigmas(double translation_ratio, double rotation_rad);
+  /// How uncertain the odometry's motion to this keyframe is, since the one that was noted before it;
+  /// ascending by id. An edge is at least as uncertain as all such motions between its ends. Not part of
+  /// State.
+  void NoteMotion(int keyframe, const MotionSigma& sigma);
 
   /// The map as it is says more than what was kept (a bundle adjustment of all of it): edges are measured
   /// from it again.
@@ -190,6 +196,7 @@ class KeyframeGraph {
   std::map<int, Similarity> JoinedPieces(const std::vector<LoopEdge>& loops) const;
   const MapKeyframe& At(int id) const;
   bool Consecutive(int older, int newer) const;
+  Eigen::Vector2d Walked(int keyframe) const;
   double SigmaFloor() const;
   Vector7d Sigmas(const Edge& edge, double floor) const;
   Edge Between(int older, int newer) const;
@@ -204,6 +211,8 @@ class KeyframeGraph {
   std::vector<Edge> kept_;     // measurements from before the last correction, in present units
   std::vector<Edge> carried_;  // edges that were moved to what stands for keyframes that have left
   std::vector<int> sessions_;  // first keyframes of recordings but the first, ascending
+  std::vector<std::pair<int, Eigen::Vector2d>> walked_;  // keyframes; variances of translation and rotation
+                                                         // of the odometry's motion up to there
 };
 
 /// Carries a loop over to the units of a corrected map (mono): S' = scale(s_c) S scale(1/s_q).

@@ -26,7 +26,8 @@ PoseFileFormat GuessPoseFileFormat(const std::filesystem::path& file);
 struct PoseFile {
   PoseFileFormat format = PoseFileFormat::kTum;
   Trajectory trajectory;
-  bool has_stamps = true;  ///< false: the "stamps" are line numbers from 0 (KITTI) or ids (g2o)
+  bool has_stamps = true;           ///< false: the "stamps" are line numbers from 0 (KITTI) or ids (g2o)
+  std::vector<MotionSigma> sigmas;  ///< TUM with 10 columns alone, one per pose; see ReadTrajectory
   std::vector<Eigen::Matrix3d> rotations_as_written;  ///< KITTI alone: not quite rotations; see evaluation.h
   std::vector<std::string> warnings;
 };

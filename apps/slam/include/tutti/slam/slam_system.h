@@ -80,8 +80,10 @@ class SlamSystem {
   TrackResult Track(const InputFrame& frame);
   /// The next frame of another odometry and its pose in that one's world (Odometry::Follow), instead of
   /// Track: loops are found and closed as ever, and the odometry stays as it is between them. Without
-  /// calibration as Track. Throws InputError for a pose that is not finite.
-  TrackResult Follow(const InputFrame& frame, const Pose& T_odom_camera);
+  /// calibration as Track. `sigma`: how uncertain the motion since the last call is; without it the
+  /// configuration says. Throws InputError for a pose that is not finite and a sigma below 0 or not finite.
+  TrackResult Follow(const InputFrame& frame, const Pose& T_odom_camera,
+                     const std::optional<MotionSigma>& sigma = {});
   /// A loop that somebody else knows (a marker, a survey, a test) between two keyframes, the older one first:
   /// S_candidate_query maps points of the query camera into the candidate's, `information` is of
   /// (translation, rotation, log scale). It goes past detector and gate into the pose graph, which may refuse

@@ -10,6 +10,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -39,9 +40,11 @@ class TrajectoryCloser {
   TrajectoryCloser& operator=(const TrajectoryCloser&) = delete;
 
   /// The next image and the odometry's pose at its time; in order of time. T_odom_body: the body is what
-  /// CameraRig::T_body_camera says. Throws InputError for a pose that is not finite and a time that does not
-  /// grow; nothing has happened then.
-  TrackResult Push(const InputFrame& frame, const Pose& T_odom_body);
+  /// CameraRig::T_body_camera says. `sigma`: how uncertain the odometry's motion since the last image is;
+  /// without it run.odometry_sigma_fraction and odometry_sigma_deg say. Throws InputError for a pose that is
+  /// not finite, a sigma below 0 or not finite and a time that does not grow; nothing has happened then.
+  TrackResult Push(const InputFrame& frame, const Pose& T_odom_body,
+                   const std::optional<MotionSigma>& sigma = {});
   /// After the last image: brings in all that is on its way.
   void Finish();
 

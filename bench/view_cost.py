@@ -1,45 +1,137 @@
 #!/usr/bin/env python3
-"""What the live view costs: processor time of a run without it and with a browser's stream being read.
+"""What the live view costs a run, with a browser that looks at it and under attack.
 
-usage: ./dev bench view [--frames N] [--rounds N]   (or bench/view_cost.py --build build/release)
-Runs take turns, so that the machine's load reaches both. `tracking`: the thread that tracks, per frame; `all`: every
-thread of the process. Needs Python 3 alone.
+usage: ./dev bench view [--frames N] [--rounds N] [--write]   (or bench/view_cost.py --build build/release)
+Runs take turns, so that the machine's load reaches all alike. The attack, from this machine: 1,000 connections that are
+opened again whenever they are closed, 50 clients that send a byte a second, 200 MB of garbage. `tracking`: the thread that
+tracks, per frame; `all`: every thread of the process. Needs Python 3 alone.
 """
 import json
+import os
+import pathlib
 import re
+import select
+import socket
 import statistics
 import subprocess
-import tempfile
 import threading
+import time
 import urllib.request
 
 import table
 
+DOCUMENT = table.RESULTS / "live-view.md"
+WAYS = {"none": "without the view", "browser": "with a browser", "attack": "with a browser, under attack"}
+CONNECTIONS, SLOW, GARBAGE_MB = 1000, 50, 200
+
 
 def read_stream(url, counter):
-    with urllib.request.urlopen(url + "events") as stream:
-        for line in stream:
-            counter[0] += line.startswith(b"data:")
+    try:
+        with urllib.request.urlopen(url + "events") as stream:
+            for line in stream:
+                counter["messages"] += line.startswith(b"data:")
+    except OSError:
+        pass  # the run has ended
 
 
-def run(a, view):
-    with tempfile.TemporaryDirectory() as out:
-        command = [a.tutti, "run", "--config", table.ROOT / "data/configs/7scenes.yaml", "--dataset", a.data / "redkitchen", "--out", out,
-                   "--end", str(a.frames), "--timing", "--no-report", "--quiet"]
-        if view:
-            command += ["--view", "--view-port", "0", "--view-wait", "30"]
-        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-        messages = [0]
-        if view:
-            url = re.search(r"look at (\S+)", process.stderr.readline()).group(1)
-            reader = threading.Thread(target=read_stream, args=(url, messages), daemon=True)
-            reader.start()
-        process.communicate()
-        if process.returncode != 0:
-            raise SystemExit(f"tutti ended with {process.returncode}")
-        timing = json.loads((pathlib.Path(out) / "summary.json").read_text())["timing"]
-        frame = next(s for s in timing["stages"] if s["name"] == "frame")
-        return frame["cpu_ms"] / frame["calls"], 1000 * timing["cpu_s"] / frame["calls"], messages[0]
+class Attack(threading.Thread):
+    """Goes on until `end`; counts what reached the server."""
+
+    def __init__(self, port, counter):
+        super().__init__(daemon=True)
+        self.port, self.counter, self.end = port, counter, threading.Event()
+
+    def connect(self):
+        client = socket.socket()
+        client.settimeout(0.2)
+        try:
+            client.connect(("127.0.0.1", self.port))
+            client.setblocking(False)
+            self.counter["connections"] += 1
+            return client
+        except OSError:
+            client.close()
+            return None
+
+    @staticmethod
+    def closed(client):
+        """Whether the server hung up; reads what it said."""
+        try:
+            while data := client.recv(1 << 16):
+                del data
+            return True
+        except BlockingIOError:
+            return False
+        except OSError:
+            return True
+
+    def held(self, clients, count):
+        """These connections without those that are closed, and up to 50 new ones."""
+        kept = []
+        for client in clients:
+            if self.closed(client):
+                client.close()
+            else:
+                kept.append(client)
+        for _ in range(min(50, count - len(kept))):
+            client = self.connect()
+            if client:
+                kept.append(client)
+        return kept
+
+    def run(self):
+        idle, slow, garbage, next_byte = [], [], [], 0.0
+        chunk = os.urandom(1 << 16)
+        while not self.end.is_set():
+            idle, slow, garbage = self.held(idle, CONNECTIONS), self.held(slow, SLOW), self.held(garbage, 8)
+            if time.monotonic() > next_byte:
+                next_byte = time.monotonic() + 1
+                for client in slow:
+                    self.send(client, b"G")
+            if self.counter["garbage"] < GARBAGE_MB * 1_000_000:
+                for client in select.select([], garbage, [], 0)[1]:
+                    self.counter["garbage"] += self.send(client, chunk)
+            time.sleep(0.01)
+        for client in idle + slow + garbage:
+            client.close()
+
+    @staticmethod
+    def send(client, data):
+        try:
+            return client.send(data)
+        except OSError:
+            return 0
+
+
+def run(a, way):
+    """Figures of one run, and the bytes of its trajectory."""
+    out = a.out / way
+    command = [a.tutti, "run", "--config", table.ROOT / "data/configs/7scenes.yaml", "--dataset", a.data / "redkitchen", "--out", out,
+               "--end", str(a.frames), "--timing", "--no-report", "--quiet"]
+    if way != "none":
+        command += ["--view", "--view-port", "0", "--view-wait", "30"]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    counter = {"messages": 0, "connections": 0, "garbage": 0}
+    attack = None
+    if way != "none":
+        url = re.search(r"look at (\S+)", process.stderr.readline()).group(1)
+        if way == "attack":
+            attack = Attack(int(re.search(r":(\d+)/", url).group(1)), counter)
+        threading.Thread(target=read_stream, args=(url, counter), daemon=True).start()
+        if attack:
+            attack.start()
+    said = process.stderr.read()
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if attack:
+        attack.end.set()
+        attack.join()
+    if process.returncode != 0:
+        raise SystemExit(f"tutti ended with {process.returncode}: {said}")
+    timing = json.loads((out / "summary.json").read_text())["timing"]
+    frame = next(s for s in timing["stages"] if s["name"] == "frame")
+    return {"tracking": frame["cpu_ms"] / frame["calls"], "all": 1000 * timing["cpu_s"] / frame["calls"],
+            "memory": usage.ru_maxrss / 1024, "bytes": (out / "trajectory.txt").read_bytes(), **counter}
 
 
 def main():
@@ -47,14 +139,26 @@ def main():
     parser.add_argument("--frames", type=int, default=300)
     parser.add_argument("--rounds", type=int, default=3)
     a = table.parse(parser)
-    results = {False: [], True: []}
+    results = {way: [] for way in WAYS}
     for _ in range(a.rounds):
-        for view in (False, True):
-            results[view].append(run(a, view))
-    for k, name in enumerate(("tracking", "all")):
-        off, on = (statistics.median(r[k] for r in results[view]) for view in (False, True))
-        print(f"{name}: {off:.2f} ms per frame without, {on:.2f} ms with the view: {100 * (on / off - 1):+.1f} %")
-    print(f"messages to the browser: {statistics.median(r[2] for r in results[True]):.0f} for {a.frames} frames")
+        for way in WAYS:
+            results[way].append(run(a, way))
+    middle = {way: {key: statistics.median(r[key] for r in runs) for key in runs[0] if key != "bytes"}
+              for way, runs in results.items()}
+    lines = ["# What the live view costs", "",
+             f"Medians of {a.rounds} runs each, taking turns, of redkitchen's first {a.frames} frames; `./dev bench view --write`. The",
+             f"attack comes from the same machine: {CONNECTIONS:,} connections that are opened again whenever they are closed, {SLOW} clients",
+             f"that send a byte a second, {GARBAGE_MB} MB of garbage.", "",
+             "| | tracking, CPU-ms per frame | all threads | most memory, MB | messages to the browser | connections | garbage, MB | same bytes |",
+             "|---|---|---|---|---|---|---|---|"]
+    off = middle["none"]
+    for way, words in WAYS.items():
+        m = middle[way]
+        same = all(r["bytes"] == results["none"][0]["bytes"] for r in results[way])
+        lines.append(f"| {words} | {m['tracking']:.2f} ({100 * (m['tracking'] / off['tracking'] - 1):+.1f} %) | {m['all']:.1f} "
+                     f"({100 * (m['all'] / off['all'] - 1):+.1f} %) | {m['memory']:.0f} ({m['memory'] - off['memory']:+.0f}) | "
+                     f"{m['messages']:.0f} | {m['connections']:.0f} | {m['garbage'] / 1e6:.0f} | {'yes' if same else '**no**'} |")
+    table.put(a, DOCUMENT, "\n".join(lines))
 
 
 if __name__ == "__main__":

@@ -79,6 +79,8 @@ def test_what_can_not_be_used_is_refused(stereo, odometry):
     closer = tutti.TrajectoryCloser(stereo.rig, **CONFIG)
     with pytest.raises(tutti.InputError, match="T_odom_body"):
         closer.push(stereo[0], np.full((4, 4), np.nan))
-    closer.push(stereo[0], np.eye(4))
+    with pytest.raises(tutti.InputError, match="standard deviation"):
+        closer.push(stereo[0], np.eye(4), sigma=(-1, 0))
+    closer.push(stereo[0], np.eye(4), sigma=(0.01, 0.001))
     with pytest.raises(tutti.InputError, match="does not grow"):
         closer.push(stereo[0], np.eye(4))

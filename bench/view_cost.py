@@ -43,22 +43,17 @@ class Attack(threading.Thread):
 
     def connect(self):
         client = socket.socket()
-        client.settimeout(0.2)
-        try:
-            client.connect(("127.0.0.1", self.port))
-            client.setblocking(False)
-            self.counter["connections"] += 1
-            return client
-        except OSError:
-            client.close()
-            return None
+        client.setblocking(False)
+        client.connect_ex(("127.0.0.1", self.port))  # the server need not take it
+        self.counter["connections"] += 1
+        return client
 
     @staticmethod
     def closed(client):
         """Whether the server hung up; reads what it said."""
         try:
-            while data := client.recv(1 << 16):
-                del data
+            while client.recv(1 << 16):
+                pass
             return True
         except BlockingIOError:
             return False
@@ -66,18 +61,14 @@ class Attack(threading.Thread):
             return True
 
     def held(self, clients, count):
-        """These connections without those that are closed, and up to 50 new ones."""
+        """As many connections: those of before that are open, and new ones."""
         kept = []
         for client in clients:
             if self.closed(client):
                 client.close()
             else:
                 kept.append(client)
-        for _ in range(min(50, count - len(kept))):
-            client = self.connect()
-            if client:
-                kept.append(client)
-        return kept
+        return kept + [self.connect() for _ in range(count - len(kept))]
 
     def run(self):
         idle, slow, garbage, next_byte = [], [], [], 0.0

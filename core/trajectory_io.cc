@@ -168,6 +168,13 @@ Trajectory ReadEuroc(const std::filesystem::path& file, Oddities& odd) {
 
 }  // namespace
 
+MotionSigma& MotionSigma::operator+=(const MotionSigma& next) {
+  const auto both = [](double a, double b) { return std::sqrt(a * a + b * b); };
+  translation_m = both(translation_m, next.translation_m);
+  rotation_rad = both(rotation_rad, next.rotation_rad);
+  return *this;
+}
+
 TrajectoryFormat ParseTrajectoryFormat(const std::string& name) {
   if (name == "tum") return TrajectoryFormat::kTum;
   if (name == "kitti") return TrajectoryFormat::kKitti;

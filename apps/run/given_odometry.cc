@@ -102,22 +102,24 @@ GivenOdometry::GivenOdometry(const GivenOdometryFiles& files, const fs::path& im
   notes_ = poses.warnings;
   trajectory_ = std::move(poses.trajectory);
   has_stamps_ = poses.has_stamps || (files.times && times.size() == trajectory_.size());
-  if (files.sigmas) poses.sigmas = ReadMotionSigmas(*files.sigmas, trajectory_);
-  SumUp(poses.sigmas);
   if (!own) {
     stamps_ = ImageStamps(*all);
   } else if (files.times && times.size() == all->Size() && has_stamps_ &&
              times.size() != trajectory_.size()) {
     stamps_ = times;
   }
-  if (has_stamps_) return;
-  // Lines have no stamps: one for each image, in order.
-  if (trajectory_.size() != all->Size())
-    throw InputError(files.trajectory.string() + ": has no time stamps, and " +
-                     std::to_string(trajectory_.size()) + " poses for " + std::to_string(all->Size()) +
+  if (!has_stamps_) StampByOrder(*all);
+  SumUp(files.sigmas ? ReadMotionSigmas(*files.sigmas, trajectory_) : poses.sigmas);
+}
+
+// Lines have no stamps: one for each image, in order.
+void GivenOdometry::StampByOrder(const Dataset& all) {
+  if (trajectory_.size() != all.Size())
+    throw InputError(files_.trajectory.string() + ": has no time stamps, and " +
+                     std::to_string(trajectory_.size()) + " poses for " + std::to_string(all.Size()) +
                      " images; give the times of the poses (--times)");
   for (std::size_t i = 0; i < trajectory_.size(); ++i)
-    trajectory_[i].stamp_s = stamps_.empty() ? all->Stamp(i) : stamps_[i];
+    trajectory_[i].stamp_s = stamps_.empty() ? all.Stamp(i) : stamps_[i];
 }
 
 void GivenOdometry::SumUp(const std::vector<MotionSigma>& sigmas) {

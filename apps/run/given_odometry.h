@@ -43,6 +43,7 @@ class GivenOdometry {
  private:
   std::vector<double> ImageStamps(const Dataset& all);
   std::vector<double> StampsByName(std::size_t count) const;
+  void StampByOrder(const Dataset& all);
   void SumUp(const std::vector<MotionSigma>& sigmas);
   Eigen::Vector2d Variance(double stamp_s) const;
 

@@ -184,16 +184,14 @@ LoopUpdate LoopCloser::Enter(std::vector<LoopEdge> entering, const Odometry& odo
 }
 
 void LoopCloser::NoteMotion(int keyframe, const MotionSigma& sigma, const Eigen::Vector3d& position) {
-  walk_.since_keyframe.translation_m = std::hypot(walk_.since_keyframe.translation_m, sigma.translation_m);
-  walk_.since_keyframe.rotation_rad = std::hypot(walk_.since_keyframe.rotation_rad, sigma.rotation_rad);
+  walk_.since_keyframe += sigma;
   if (keyframe < 0) return;
   const MotionSigma motion = std::exchange(walk_.since_keyframe, {});
   graph_.NoteMotion(keyframe, motion);
   if (walk_.keyframe) {
-    walk_.translation_m2 += motion.translation_m * motion.translation_m;
-    walk_.rotation_rad2 += motion.rotation_rad * motion.rotation_rad;
+    walk_.between_keyframes += motion;
     walk_.way_m2 += (position - *walk_.keyframe).squaredNorm();
-    ++walk_.motions;
+    if (walk_.motions++ == 0) SetSigmas();
   }
   walk_.keyframe = position;
 }
@@ -202,8 +200,21 @@ void LoopCloser::NoteMotion(int keyframe, const MotionSigma& sigma, const Eigen:
 OdometryUncertainty::Sigmas LoopCloser::Stated() const {
   if (walk_.motions == 0)
     return {options_.odometry_sigma_fraction, options_.odometry_sigma_deg * internal::kRadians};
-  return {walk_.way_m2 > 0 ? std::sqrt(walk_.translation_m2 / walk_.way_m2) : 0,
-          std::sqrt(walk_.rotation_rad2 / walk_.motions)};
+  return {walk_.way_m2 > 0 ? walk_.between_keyframes.translation_m / std::sqrt(walk_.way_m2) : 0,
+          walk_.between_keyframes.rotation_rad / std::sqrt(walk_.motions)};
+}
+
+// Every edge has at least what the images say of all of them, and what is configured; in place of the latter
+// the graph has what the odometry says of each motion.
+void LoopCloser::SetSigmas() {
+  constexpr double kLeastRotation_rad = 1e-6;  // an edge is never certain
+  OdometryUncertainty::Sigmas sigmas = uncertainty_.Estimate();
+  if (walk_.motions == 0) {
+    const OdometryUncertainty::Sigmas configured = Stated();
+    sigmas.fraction = std::max(sigmas.fraction, configured.fraction);
+    sigmas.rotation_rad = std::max(sigmas.rotation_rad, configured.rotation_rad);
+  }
+  graph_.SetSigmas(sigmas.fraction, std::max(sigmas.rotation_rad, kLeastRotation_rad));
 }
 
 std::string LoopCloser::Uncertainty() const {
@@ -229,14 +240,7 @@ void LoopCloser::Start(std::vector<LoopEdge> entering, const Odometry& odometry,
   const internal::Stopwatch watch;
   solved_keyframes_ = KeyframesOf(odometry);
   graph_.Update(solved_keyframes_, CovisibleOf(odometry, options_.covisibility_min_shared));
-  // Every edge has at least what the images say of all. What the odometry says of each motion, the graph has.
-  constexpr double kLeastRotation_rad = 1e-6;  // an edge is never certain
-  OdometryUncertainty::Sigmas sigmas = uncertainty_.Estimate();
-  if (walk_.motions == 0) {
-    sigmas.fraction = std::max(sigmas.fraction, options_.odometry_sigma_fraction);
-    sigmas.rotation_rad = std::max(sigmas.rotation_rad, options_.odometry_sigma_deg * internal::kRadians);
-  }
-  graph_.SetSigmas(sigmas.fraction, std::max(sigmas.rotation_rad, kLeastRotation_rad));
+  SetSigmas();
   solver_.Start(graph_, accepted_, entering, options_, recorder_);
   solved_due_ = frames + SolutionFrames(solved_keyframes_.size());
   stages_["loop_optimize"] += watch.Milliseconds();

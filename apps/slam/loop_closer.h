@@ -118,6 +118,7 @@ class LoopCloser {
   LoopConstraint Measure(const Verification& verification, int candidate, int query,
                          const Odometry& odometry);
   OdometryUncertainty::Sigmas Stated() const;
+  void SetSigmas();
   LoopUpdate Enter(std::vector<LoopEdge> entering, const Odometry& odometry, std::int64_t frames);
   void Start(std::vector<LoopEdge> entering, const Odometry& odometry, std::int64_t frames);
   void Settle(const LoopVerdict& verdict, LoopUpdate* update);
@@ -134,11 +135,10 @@ class LoopCloser {
   std::vector<LoopRecord> records_;
   OdometryUncertainty uncertainty_;  // of an odometry that is followed; not saved, as such a map is not
   struct Walk {                      // what that odometry itself says
-    MotionSigma since_keyframe;
+    MotionSigma since_keyframe, between_keyframes;
     std::optional<Eigen::Vector3d> keyframe;  // the last one's position
-    double translation_m2 = 0, rotation_rad2 = 0,
-           way_m2 = 0;  // sums of squares over motions between keyframes
-    int motions = 0;
+    double way_m2 = 0;                        // sum of squares between keyframes
+    int motions = 0;                          // between keyframes
   };
   Walk walk_;
   LoopGate gate_;

@@ -36,7 +36,9 @@ using Messages = std::vector<StampedMessage>;
 // librosbag believes every length: a damaged one would end in 4 GB of memory.
 void CheckLengths(const fs::path& file) {
   constexpr std::string_view kMagic = "#ROSBAG V2.0\n";
-  std::ifstream in(file, std::ios::binary);
+  std::ifstream in;
+  in.rdbuf()->pubsetbuf(nullptr, 0);  // four bytes here and there
+  in.open(file, std::ios::binary);
   std::string magic(kMagic.size(), '\0');
   if (!in.read(magic.data(), static_cast<std::streamsize>(magic.size())) || magic != kMagic)
     return;  // librosbag says what it is

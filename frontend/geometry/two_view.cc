@@ -195,9 +195,7 @@ TwoViewResult EstimateTwoView(const PinholeCamera& camera, const std::vector<cv:
   double score_h = 0;
   if (!homography.empty()) {
     Eigen::Matrix3d h;
-    for (int r = 0; r < 3; ++r) {
-      for (int c = 0; c < 3; ++c) h(r, c) = homography.at<double>(r, c);
-    }
+    cv::cv2eigen(homography, h);
     if (std::abs(h.determinant()) > 1e-12) score_h = HomographyScore(h, first, second, sigma);
   }
   std::vector<Pose> motions;

@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "tests/support/error_of.h"
 #include "tests/support/test_data.h"
 #include "tutti/core/error.h"
 #include "tutti/core/trajectory.h"
@@ -15,12 +16,7 @@ using ::testing::HasSubstr;
 std::filesystem::path Write(const std::string& text) { return testing::FreshFile("poses.txt", text); }
 
 std::string ErrorOf(const std::string& text, TrajectoryFormat format) {
-  try {
-    ReadTrajectory(Write(text), format);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "no error";
+  return testing::ErrorOf([&] { ReadTrajectory(Write(text), format); });
 }
 
 Trajectory CurvedWay() {
@@ -108,12 +104,8 @@ TEST(TrajectoryIo, TwoMoreColumnsAreStandardDeviations) {
   EXPECT_NEAR(sigmas[1].rotation_rad, M_PI / 2, 1e-12);
   EXPECT_THAT(ErrorOf(two, TrajectoryFormat::kTum), HasSubstr(":1: has 10 columns; the TUM format has 8"));
   const auto refused = [&](const std::string& text) {
-    try {
-      ReadTrajectory(Write(text), TrajectoryFormat::kTum, nullptr, nullptr, &sigmas);
-    } catch (const InputError& error) {
-      return std::string(error.what());
-    }
-    return std::string("no error");
+    return testing::ErrorOf(
+        [&] { ReadTrajectory(Write(text), TrajectoryFormat::kTum, nullptr, nullptr, &sigmas); });
   };
   EXPECT_THAT(refused(two + "2 1 0 0 0 0 0 1\n"), HasSubstr(":3: has 8 columns; the first line has 10"));
   EXPECT_THAT(refused("0 0 0 0 0 0 0 1 -1 0\n"), HasSubstr(":1: a standard deviation is below 0"));
@@ -127,14 +119,7 @@ TEST(TrajectoryIo, StandardDeviationsMayBeInAFileOfTheirOwn) {
   };
   EXPECT_DOUBLE_EQ(read("# m deg\n0 0\n0.2 1\n")[1].translation_m, 0.2);
   EXPECT_NEAR(read("10 0 0\n11 0.2 180\n")[1].rotation_rad, M_PI, 1e-12);
-  const auto refused = [&](const std::string& text) {
-    try {
-      read(text);
-    } catch (const InputError& error) {
-      return std::string(error.what());
-    }
-    return std::string("no error");
-  };
+  const auto refused = [&](const std::string& text) { return testing::ErrorOf([&] { read(text); }); };
   EXPECT_THAT(refused("10 0 0\n12 0 0\n"), HasSubstr("sigmas.txt:2: is not of the time of its pose"));
   EXPECT_THAT(refused("0 0\n"), HasSubstr("sigmas.txt: has 1 lines for 2 poses"));
   EXPECT_THAT(refused("0 0\n0 0\n0 0\n"), HasSubstr("sigmas.txt:3: there are only 2 poses"));

@@ -195,13 +195,9 @@ TEST(SetLoopOptions, TakesTheKeysOfTheLoopsSection) {
 TEST(SetLoopOptions, SaysWhatIsWrongAndChangesNothing) {
   const auto message = [](const std::string& assignment) {
     LoopDetectorOptions options;
-    try {
-      SetLoopOptions({"stm_size=20", assignment}, options);
-    } catch (const InputError& error) {
-      EXPECT_EQ(options.stm_size, LoopDetectorOptions().stm_size);
-      return std::string(error.what());
-    }
-    return std::string("no error");
+    const std::string error = testing::ErrorOf([&] { SetLoopOptions({"stm_size=20", assignment}, options); });
+    EXPECT_EQ(options.stm_size, LoopDetectorOptions().stm_size);
+    return error;
   };
   EXPECT_THAT(message("stm_size"), HasSubstr("key=value"));
   EXPECT_THAT(message("extraction.feature=3"), HasSubstr("did you mean 'extraction.features'?"));

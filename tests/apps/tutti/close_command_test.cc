@@ -85,6 +85,12 @@ TEST_F(CloseCommand, TheOdometrySaysHowUncertainItIsInColumnsOrAFile) {
   EXPECT_EQ(graph(folder_ / "odometry.txt", {"--odometry-sigma", (folder_ / "sigmas.txt").string()}),
             in_columns);
   EXPECT_NE(graph(folder_ / "odometry.txt", {}), in_columns);
+  // KITTI's lines get the stamps of the images before those of the deviations are looked at.
+  WriteTrajectory(folder_ / "kitti.txt", poses, TrajectoryFormat::kKitti);
+  std::string stamped;
+  for (const StampedPose& pose : poses) stamped += std::to_string(pose.stamp_s) + " 0.25 2\n";
+  testing::WriteAll(folder_ / "stamped.txt", stamped);
+  graph(folder_ / "kitti.txt", {"--odometry-sigma", (folder_ / "stamped.txt").string()});
   testing::WriteAll(folder_ / "few.txt", "0 0\n");
   const auto few = Close(folder_ / "odometry.txt", testing::TinyTown(),
                          {"--odometry-sigma", (folder_ / "few.txt").string()});

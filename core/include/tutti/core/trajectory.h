@@ -24,6 +24,7 @@ using Trajectory = std::vector<StampedPose>;
 struct MotionSigma {
   double translation_m = 0;
   double rotation_rad = 0;
+  MotionSigma& operator+=(const MotionSigma& next);  ///< another motion follows
 };
 
 /// kTum: "stamp tx ty tz qx qy qz qw", '#' comments. kKitti: 12 numbers a line, row-major 3x4, no stamps

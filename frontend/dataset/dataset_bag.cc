@@ -33,7 +33,8 @@ struct StampedMessage {
 };
 using Messages = std::vector<StampedMessage>;
 
-// librosbag believes every length: a damaged one would end in 4 GB of memory.
+// librosbag believes every length: a damaged one of a record would end in 4 GB of memory. It believes those
+// inside of records, too (SECURITY.md).
 void CheckLengths(const fs::path& file) {
   constexpr std::string_view kMagic = "#ROSBAG V2.0\n";
   std::ifstream in;

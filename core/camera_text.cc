@@ -12,13 +12,16 @@ namespace tutti::internal {
 
 PinholeCamera ParseCamera(const std::string& text, const std::string& option) {
   const std::string remedy = std::string("; write ") + kCameraText + " in pixels";
+  const auto no_number = [&](const std::string& part) {
+    throw InputError(option + ": '" + part + "' is no number" + remedy);
+  };
   std::vector<double> values;
   for (std::size_t at = 0; at <= text.size();) {
     const std::size_t comma = std::min(text.find(',', at), text.size());
-    const std::vector<std::string> words = SplitText(text.substr(at, comma - at), " \t");
+    const std::string part = text.substr(at, comma - at);
+    const std::vector<std::string> words = SplitText(part, " \t");
     const std::optional<double> value = words.size() == 1 ? ParseDouble(words[0]) : std::nullopt;
-    if (!value || !std::isfinite(*value))
-      throw InputError(option + ": '" + text.substr(at, comma - at) + "' is no number" + remedy);
+    if (!value || !std::isfinite(*value)) no_number(part);
     values.push_back(*value);
     at = comma + 1;
   }

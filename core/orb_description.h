@@ -57,7 +57,7 @@ struct EmulatedFused {
 template <class Fuse>
 TUTTI_CHECKED_AS_A_WHOLE inline void SmoothRow(const std::uint8_t* __restrict from, Kernel kernel, int count,
                                                float* __restrict to, const Fuse& fuse) {
-  CheckReadable(from, static_cast<std::size_t>(count + 2 * kRadius));
+  CheckReadable(from, static_cast<std::size_t>(count) + 2 * kRadius);
   CheckWritable(to, static_cast<std::size_t>(count));
   const float* weights = kernel.data();
   for (int x = 0; x < count; ++x) {
@@ -129,7 +129,7 @@ inline void Smooth(const cv::Mat& from, int rim, cv::Mat& to) {
   for (int k = 0; k < kTaps; ++k) kernel[static_cast<std::size_t>(k)] = weights.at<float>(k);
   const Smoothing smoothing = Chosen();
   const int rows = to.rows, columns = to.cols;
-  std::vector<std::uint8_t> line(static_cast<std::size_t>(columns + 2 * kRadius));  // with what is mirrored
+  std::vector<std::uint8_t> line(static_cast<std::size_t>(columns) + 2 * kRadius);  // with what is mirrored
   cv::Mat across(kTaps, columns, CV_32FC1);  // the last rows, each in its number modulo kTaps
   const auto at = [&across](int row) { return across.ptr<float>((row + kTaps) % kTaps); };
   const auto mirrored = [](int i, int count) {
@@ -144,7 +144,8 @@ inline void Smooth(const cv::Mat& from, int rim, cv::Mat& to) {
       std::copy(row, row + columns, line.begin() + kRadius);
       for (int i = 1; i <= kRadius; ++i) {
         line[static_cast<std::size_t>(kRadius - i)] = row[mirrored(-i, columns)];
-        line[static_cast<std::size_t>(kRadius + columns - 1 + i)] = row[mirrored(columns - 1 + i, columns)];
+        line[line.size() - 1 - static_cast<std::size_t>(kRadius - i)] =
+            row[mirrored(columns - 1 + i, columns)];
       }
       source = line.data();
     }
@@ -243,10 +244,11 @@ class OrbDescription {
         CV_Assert(bits.rows == kOffsets * kOffsets && bits.cols == kBytes);
         int ends = 0;
         for (int i = 0; i < bits.rows; ++i) {
+          const int x = i % kOffsets - kReach, y = i / kOffsets - kReach;
           for (int pair = 0; pair < 8 * kBytes; ++pair) {
             if ((bits.at<std::uint8_t>(i, pair / 8) >> (pair % 8) & 1) == 0) continue;
-            found.x[2 * static_cast<std::size_t>(pair) + end] = static_cast<float>(i % kOffsets - kReach);
-            found.y[2 * static_cast<std::size_t>(pair) + end] = static_cast<float>(i / kOffsets - kReach);
+            found.x[2 * static_cast<std::size_t>(pair) + end] = static_cast<float>(x);
+            found.y[2 * static_cast<std::size_t>(pair) + end] = static_cast<float>(y);
             ++ends;
           }
         }

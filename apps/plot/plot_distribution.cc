@@ -49,6 +49,7 @@ void AddViolin(const std::vector<double>& values, double center, double half, co
   for (const Eigen::Vector2d& d : density) most = std::max(most, d.y());
   if (!(most > 0)) return;
   std::vector<Eigen::Vector2d> outline;
+  outline.reserve(2 * density.size() + 1);
   for (const Eigen::Vector2d& d : density)
     outline.push_back(axes.Page({center + half * d.y() / most, d.x()}));
   for (auto d = density.rbegin(); d != density.rend(); ++d)

@@ -50,6 +50,7 @@ using SliceSums = std::array<dlib::vector<double, 2>, kSlices>;
 
 // Rounded, as dlib does it; of coordinates inside of an image.
 dlib::point Nearest(const dlib::vector<double, 2>& p) {
+  // NOLINTNEXTLINE(bugprone-incorrect-roundings): other bits at halves
   return {static_cast<long>(p.x() + 0.5), static_cast<long>(p.y() + 0.5)};
 }
 

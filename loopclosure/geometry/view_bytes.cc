@@ -14,6 +14,7 @@ namespace {
 Eigen::Vector3f Unknown() { return Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN()); }
 bool IsUnknown(const Eigen::Vector3f& point) {
   const Eigen::Vector3f unknown = Unknown();
+  // NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): these bits of all that are no number
   return std::memcmp(point.data(), unknown.data(), sizeof(float) * 3) == 0;
 }
 

@@ -23,4 +23,5 @@ std::filesystem::path FreshFile(const std::string& name, const std::string& cont
 /// Skips the test with a clear line where the real data is absent.
 #define TUTTI_REQUIRE_DATA(variable, name)                               \
   const std::filesystem::path variable = tutti::testing::RealData(name); \
-  if (variable.empty()) GTEST_SKIP() << "real data '" << (name) << "' is absent; set TUTTI_DATA to its folder"
+  if ((variable).empty())                                                \
+  GTEST_SKIP() << "real data '" << (name) << "' is absent; set TUTTI_DATA to its folder"

@@ -24,7 +24,7 @@ void WriteImages(const fs::path& folder, int count = 3, cv::Size size = {64, 48}
 }
 
 fs::path TumFolder(const std::string& name, bool depth) {
-  const fs::path folder = testing::FreshFolder() / name;
+  fs::path folder = testing::FreshFolder() / name;
   WriteImages(folder / "rgb");
   std::ofstream rgb(folder / "rgb.txt");
   for (int i = 0; i < 3; ++i) rgb << i << " rgb/" << i << ".png\n";
@@ -37,7 +37,7 @@ fs::path TumFolder(const std::string& name, bool depth) {
 
 // A generated town as KITTI comes: without a configuration of tutti.
 fs::path KittiTown() {
-  const fs::path folder = testing::CopyOfTinyTown(testing::FreshFolder() / "town");
+  fs::path folder = testing::CopyOfTinyTown(testing::FreshFolder() / "town");
   fs::remove(folder / "config.yaml");
   return folder;
 }

@@ -195,7 +195,7 @@ TEST(SetLoopOptions, TakesTheKeysOfTheLoopsSection) {
 TEST(SetLoopOptions, SaysWhatIsWrongAndChangesNothing) {
   const auto message = [](const std::string& assignment) {
     LoopDetectorOptions options;
-    const std::string error = testing::ErrorOf([&] { SetLoopOptions({"stm_size=20", assignment}, options); });
+    std::string error = testing::ErrorOf([&] { SetLoopOptions({"stm_size=20", assignment}, options); });
     EXPECT_EQ(options.stm_size, LoopDetectorOptions().stm_size);
     return error;
   };

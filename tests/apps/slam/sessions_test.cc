@@ -92,7 +92,7 @@ class Sessions : public ::testing::TestWithParam<SyntheticSensor> {
   fs::path MapOfALap(const Recording& day) const {
     SlamSystem slam(Configured(), day.rig);
     TrackAll(day, &slam);
-    const fs::path file = testing::FreshFolder() / "map.tutti";
+    fs::path file = testing::FreshFolder() / "map.tutti";
     slam.Save(file);
     return file;
   }

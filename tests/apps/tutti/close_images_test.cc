@@ -53,7 +53,7 @@ class CloseImages : public ::testing::Test {
   }
   // A copy of a folder of the room whose images have other names.
   fs::path Renamed(const std::string& from, const std::function<std::string(int)>& name) const {
-    const fs::path to = folder_ / (from + "-renamed");
+    fs::path to = folder_ / (from + "-renamed");
     fs::create_directories(to);
     std::vector<fs::path> images;
     for (const fs::directory_entry& entry : fs::directory_iterator(RoomOfImages() / from))

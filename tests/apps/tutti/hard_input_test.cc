@@ -22,7 +22,6 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 using testing::ReadAll;
 using testing::RunTutti;
-using ::testing::StartsWith;
 using testing::WriteAll;
 
 constexpr const char* kMark = "\xEF\xBB\xBF";
@@ -39,8 +38,8 @@ class HardInput : public ::testing::Test {
   static std::string Tum() {
     std::string text;
     for (int i = 0; i < 9; ++i) {
-      const std::string n = std::to_string(i);
-      text += "1" + n + ".5 " + n + ".5 " + std::to_string(i * i) + ".25 0 0 0 0.6 0.8\n";
+      text += std::to_string(10 + i) + ".5 " + std::to_string(i) + ".5 ";
+      text += std::to_string(i * i) + ".25 0 0 0 0.6 0.8\n";
     }
     return text;
   }

@@ -25,7 +25,7 @@ constexpr int kHidden = 90;  // rows of 240
 class ImageUse : public ::testing::Test {
  protected:
   fs::path Painted() const {
-    const fs::path town = testing::CopyOfTinyTown(folder_ / "painted");
+    fs::path town = testing::CopyOfTinyTown(folder_ / "painted");
     cv::RNG random(7);
     cv::Mat pattern(kHidden / 3, 160, CV_8UC1), large;
     random.fill(pattern, cv::RNG::UNIFORM, 0, 256);

@@ -105,6 +105,7 @@ TEST(LiveServer, EndsWithinTwoSecondsWhateverClientsDo) {
   LiveState state;
   auto server = std::make_unique<LiveServer>(AnyPort(), state);
   std::vector<std::unique_ptr<LiveClient>> slow;
+  slow.reserve(14);
   for (int k = 0; k < 10; ++k) slow.push_back(std::make_unique<LiveClient>(server->Url()));
   for (int k = 0; k < 4; ++k) {  // viewers that take nothing
     slow.push_back(std::make_unique<LiveClient>(server->Url()));

@@ -31,7 +31,7 @@ cv::Mat LowerRows(cv::Size size = {64, 48}) {
 }
 
 fs::path ThreeImages() {
-  const fs::path folder = FreshFolder() / "images";
+  fs::path folder = FreshFolder() / "images";
   for (int i = 0; i < 3; ++i) WriteImage(folder / ("view" + std::to_string(i) + ".png"), Picture(64, 48, i));
   return folder;
 }

@@ -27,7 +27,7 @@ DatasetOptions Turned(int degrees, Sensor sensor = Sensor::kMono) {
 }
 
 fs::path ColourAndDepth() {
-  const fs::path folder = FreshFolder() / "room";
+  fs::path folder = FreshFolder() / "room";
   cv::Mat depth = Picture(64, 48, 3, CV_16UC1);
   WriteImage(folder / "rgb/0.png", Picture(64, 48, 0));
   WriteImage(folder / "depth/0.png", depth);

@@ -58,7 +58,8 @@ std::vector<cv::KeyPoint> ByTheBook(const cv::Mat& image, const CornerOptions& o
   for (std::size_t i = 0; i < corners.size(); ++i) {
     const int c = std::min(columns - 1, static_cast<int>((corners[i].pt.x - border) / cell));
     const int r = std::min(rows - 1, static_cast<int>((corners[i].pt.y - border) / cell));
-    std::size_t& count = in_cell[static_cast<std::size_t>(r * columns + c)];
+    std::size_t& count = in_cell.at(static_cast<std::size_t>(r) * static_cast<std::size_t>(columns) +
+                                    static_cast<std::size_t>(c));
     const bool crowded_out = count > 0 && corners[i].response < static_cast<float>(options.threshold);
     round[i] = crowded_out ? corners.size() : count++;
     if (!crowded_out) last = std::max(last, round[i]);
@@ -118,13 +119,14 @@ TEST(CornerDetector, OneThresholdIsEnough) {
 TEST(CornerDetector, NoneUnderTheMaskAndAsManyBesideIt) {
   const cv::Mat image = TownImage(2);
   cv::Mat mask(image.size(), CV_8UC1, cv::Scalar(255));
-  mask.rowRange(0, image.rows / 2).setTo(0);
+  const int middle = image.rows / 2;
+  const auto half = static_cast<float>(middle);
+  mask.rowRange(0, middle).setTo(0);
   const CornerOptions options{150, 20, 7, kBorder};
   const std::vector<cv::KeyPoint> found = DetectCorners(image, options, mask);
-  for (const cv::KeyPoint& k : found) EXPECT_GE(k.pt.y, static_cast<float>(image.rows / 2));
+  for (const cv::KeyPoint& k : found) EXPECT_GE(k.pt.y, half);
   std::size_t beside = 0;
-  for (const cv::KeyPoint& k : DetectCorners(image, options))
-    beside += k.pt.y >= static_cast<float>(image.rows / 2) ? 1 : 0;
+  for (const cv::KeyPoint& k : DetectCorners(image, options)) beside += k.pt.y >= half ? 1 : 0;
   EXPECT_GE(found.size(), beside);  // those under the mask take nobody's place
   mask.setTo(1);
   ExpectSameCorners(DetectCorners(image, options, mask), DetectCorners(image, options));

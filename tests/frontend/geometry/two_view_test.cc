@@ -115,6 +115,7 @@ TEST(EstimateTwoView, SameInputGivesTheSameBits) {
 
 std::vector<TwoViewPoint> SeenTwice(const std::vector<Eigen::Vector3d>& points, double sigma_px) {
   std::vector<TwoViewPoint> seen;
+  seen.reserve(points.size());
   for (const Eigen::Vector3d& p : points) seen.push_back({p, sigma_px, sigma_px});
   return seen;
 }
@@ -168,6 +169,7 @@ TEST(DirectionSigma, GrowsWithTheNoiseAndNotWithTheUnitOfLength) {
   const double sigma = DirectionSigma(TwoViewCamera(), kMotion, SeenTwice(points, 0.5));
   EXPECT_NEAR(DirectionSigma(TwoViewCamera(), kMotion, SeenTwice(points, 1)), 2 * sigma, 1e-6 * sigma);
   std::vector<Eigen::Vector3d> larger;
+  larger.reserve(points.size());
   for (const Eigen::Vector3d& p : points) larger.emplace_back(10 * p);
   const Pose longer(kMotion.rotation, 10 * kMotion.translation);
   EXPECT_NEAR(DirectionSigma(TwoViewCamera(), longer, SeenTwice(larger, 0.5)), sigma, 1e-6 * sigma);

@@ -50,12 +50,14 @@ std::vector<StepCheck> Checks(const Recording& street, double yaw_deg, double fa
 
 double MedianYawDeg(const std::vector<StepCheck>& checks) {
   std::vector<double> values;
+  values.reserve(checks.size());
   for (const StepCheck& check : checks) values.push_back(check.rotation_rad.y() * internal::kDegrees);
   return internal::Median(std::move(values));
 }
 
 double MedianShareAhead(const std::vector<StepCheck>& checks) {
   std::vector<double> values;
+  values.reserve(checks.size());
   for (const StepCheck& check : checks) values.push_back(check.translation_m.z() / check.way_m);
   return internal::Median(std::move(values));
 }

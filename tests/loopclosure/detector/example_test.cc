@@ -33,7 +33,7 @@ Outcome RunExample(const std::string& program, const std::string& arguments) {
   return outcome;
 }
 
-constexpr int kPlaces = 15;
+constexpr int kWalkPlaces = 15;
 
 // Images begin .. end - 1 of a walk past 15 places and past the same places again, beside a file that is
 // none.
@@ -41,9 +41,9 @@ std::string MakeFolder(const std::filesystem::path& folder, int begin, int end) 
   std::filesystem::create_directories(folder);
   std::ofstream(folder / "notes.txt") << "not an image\n";
   for (int i = begin; i < end; ++i) {
-    const cv::Mat place = testing::TexturedImage(static_cast<std::uint32_t>(i % kPlaces));
+    const cv::Mat place = testing::TexturedImage(static_cast<std::uint32_t>(i % kWalkPlaces));
     cv::imwrite((folder / (std::to_string(i) + ".png")).string(),
-                i < kPlaces ? place : testing::SeenAgain(place));
+                i < kWalkPlaces ? place : testing::SeenAgain(place));
   }
   return "'" + folder.string() + "'";
 }
@@ -77,8 +77,8 @@ class Example03 : public ::testing::Test {
 };
 
 TEST_F(Example03, ASecondRunFindsThePlacesOfTheFirstWithTheirPoses) {
-  const std::string first_walk = MakeFolder(folder_ / "first", 0, kPlaces);
-  const std::string second_walk = MakeFolder(folder_ / "second", kPlaces, kPlaces + 6);
+  const std::string first_walk = MakeFolder(folder_ / "first", 0, kWalkPlaces);
+  const std::string second_walk = MakeFolder(folder_ / "second", kWalkPlaces, kWalkPlaces + 6);
   const Outcome first = RunOn(first_walk, "2.0");
   EXPECT_EQ(first.status, 0) << first.text;
   EXPECT_TRUE(first.Has("0 keyframes known\n")) << first.text;

@@ -85,6 +85,8 @@ class ByteReader {
   void GetRaw(void* data, std::size_t size) {
     if (size > 0) std::memcpy(data, Take(size), size);
   }
+  /// The next bytes, where they lie.
+  std::string_view GetView(std::size_t size) { return {Take(size), size}; }
   /// A number of things that take at least `least_bytes` each.
   std::size_t GetCount(std::size_t least_bytes);
   /// An index in [0, end).

@@ -127,7 +127,7 @@ FolderContents FindImages(const std::filesystem::path& folder, const DatasetOpti
 std::unique_ptr<Dataset> FollowFolder(std::function<FolderContents()> find, const DatasetOptions& options);
 /// camera:0, or camera:FILE with a video file.
 std::unique_ptr<Dataset> OpenCamera(const std::string& name, const DatasetOptions& options);
-/// A ROS 1 bag; throws InputError where tutti was built without them.
+/// A ROS 1 bag.
 std::unique_ptr<Dataset> OpenBag(const std::filesystem::path& file, const DatasetOptions& options);
 std::unique_ptr<Dataset> OpenVideo(const std::filesystem::path& file, const DatasetOptions& options);
 

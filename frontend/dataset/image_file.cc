@@ -115,23 +115,10 @@ ImageFile Decode(const std::filesystem::path& file, int flags) {
     out.error = file.string() + ": can't be read in full";
     return out;
   }
-  out.error = Damage(bytes);
-  if (!out.error.empty()) {
-    out.error = file.string() + ": " + out.error;
-    return out;
-  }
-  try {
-    out.image = cv::imdecode(bytes, flags);
-  } catch (const cv::Exception&) {
-    out.image.release();
-  }
-  if (out.image.empty()) out.error = file.string() + ": is damaged or not an image that OpenCV can decode";
+  out = DecodeImage(bytes, flags);
+  if (!out.error.empty()) out.error = file.string() + ": " + out.error;
   return out;
 }
-
-}  // namespace
-
-namespace {
 
 ImageFile ReadPixels(const std::filesystem::path& file, int colour) {
   ImageFile out = Decode(file, colour | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
@@ -144,6 +131,19 @@ ImageFile ReadPixels(const std::filesystem::path& file, int colour) {
 }
 
 }  // namespace
+
+ImageFile DecodeImage(const std::vector<unsigned char>& bytes, int flags) {
+  ImageFile out;
+  out.error = Damage(bytes);
+  if (!out.error.empty()) return out;
+  try {
+    out.image = cv::imdecode(bytes, flags);
+  } catch (const cv::Exception&) {
+    out.image.release();
+  }
+  if (out.image.empty()) out.error = "is damaged or not an image that OpenCV can decode";
+  return out;
+}
 
 ImageFile ReadGreyFile(const std::filesystem::path& file) { return ReadPixels(file, cv::IMREAD_GRAYSCALE); }
 ImageFile ReadColourFile(const std::filesystem::path& file) { return ReadPixels(file, cv::IMREAD_COLOR); }

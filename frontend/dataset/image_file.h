@@ -29,6 +29,8 @@ ImageFile ReadGreyFile(const std::filesystem::path& file);
 ImageFile ReadColourFile(const std::filesystem::path& file);
 /// The same as cv::imread with these flags gives it.
 ImageFile ReadImageFile(const std::filesystem::path& file, int flags);
+/// The same of the bytes of such a file.
+ImageFile DecodeImage(const std::vector<unsigned char>& bytes, int flags);
 /// Reads a depth image as stored: one channel of 16 bit or float.
 ImageFile ReadDepthFile(const std::filesystem::path& file);
 

@@ -1,53 +1,26 @@
 // Seeds for bag_fuzzer: tutti_make_bag_seeds FOLDER writes small bags there.
-#include <rosbag/bag.h>
-#include <sensor_msgs/CameraInfo.h>
-#include <sensor_msgs/Image.h>
-
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <string>
 
 #include "tests/fuzz/seed_file.h"
-
-namespace {
-
-sensor_msgs::Image Message(const std::string& encoding, std::uint32_t bytes_per_pixel, double stamp_s) {
-  sensor_msgs::Image message;
-  message.header.stamp = ros::Time(stamp_s);
-  message.width = 8;
-  message.height = 6;
-  message.step = message.width * bytes_per_pixel;
-  message.encoding = encoding;
-  message.data.assign(message.step * message.height, 77);
-  return message;
-}
-
-}  // namespace
+#include "tests/support/bag_writer.h"
 
 int main(int argc, char** argv) {
+  using tutti::testing::BagPacking;
   const std::filesystem::path folder = tutti::fuzz::SeedFolder(argc, argv);
+  const cv::Mat grey(6, 8, CV_8UC1, cv::Scalar(77)), depth(6, 8, CV_16UC1, cv::Scalar(1500));
   for (int sensor = 0; sensor < 3; ++sensor) {
-    for (const auto compression :
-         {rosbag::compression::Uncompressed, rosbag::compression::BZ2, rosbag::compression::LZ4}) {
-      const std::filesystem::path file = folder / "written";
-      {
-        rosbag::Bag bag(file.string(), rosbag::bagmode::Write);
-        bag.setCompression(compression);
-        for (int i = 0; i < 2; ++i) {
-          const double stamp = 100 + 0.1 * i;
-          const ros::Time received(stamp);
-          bag.write("/left", received, Message("mono8", 1, stamp));
-          if (sensor == 1) bag.write("/right", received, Message("mono8", 1, stamp));
-          if (sensor == 2) bag.write("/depth", received, Message("16UC1", 2, stamp));
-        }
+    for (const auto packing : {BagPacking::kPlain, BagPacking::kBz2, BagPacking::kLz4}) {
+      tutti::testing::BagWriter bag(packing, 200);
+      for (int i = 0; i < 2; ++i) {
+        const double stamp = 100 + 0.1 * i;
+        const std::string type = "sensor_msgs/Image";
+        bag.Write("/left", type, tutti::testing::ImageMessage(grey, "mono8", stamp));
+        if (sensor == 1) bag.Write("/right", type, tutti::testing::ImageMessage(grey, "mono8", stamp));
+        if (sensor == 2) bag.Write("/depth", type, tutti::testing::ImageMessage(depth, "16UC1", stamp));
       }
-      std::ifstream in(file, std::ios::binary);
-      const std::string bytes((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
       tutti::fuzz::WriteSeed(
-          folder / (std::to_string(sensor) + "_" + std::to_string(static_cast<int>(compression))),
-          std::string(1, static_cast<char>(sensor)) + bytes);
-      std::filesystem::remove(file);
+          folder / (std::to_string(sensor) + "_" + std::to_string(static_cast<int>(packing))),
+          std::string(1, static_cast<char>(sensor)) + bag.Finish());
     }
   }
   return 0;

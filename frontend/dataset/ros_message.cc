@@ -1,0 +1,146 @@
+#include "frontend/dataset/ros_message.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <map>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <string_view>
+#include <vector>
+
+#include "core/byte_stream.h"
+#include "tutti/core/error.h"
+
+namespace tutti {
+namespace {
+
+using internal::ByteReader;
+
+std::string_view Text(ByteReader& in) { return in.GetView(in.Get<std::uint32_t>()); }
+
+void SkipHeader(ByteReader& in) {
+  in.GetView(12);  // number, seconds, nanoseconds
+  Text(in);        // the frame's name
+}
+
+/// How pixels of an encoding lie in memory, and how they become grey; nothing to do: -1.
+struct Encoding {
+  int type, to_grey;
+};
+
+// ROS names Bayer patterns by their first row, OpenCV by the second.
+const std::map<std::string, Encoding, std::less<>>& Encodings() {
+  static const std::map<std::string, Encoding, std::less<>> encodings = {
+      {"mono8", {CV_8UC1, -1}},
+      {"8UC1", {CV_8UC1, -1}},
+      {"mono16", {CV_16UC1, -1}},
+      {"16UC1", {CV_16UC1, -1}},
+      {"32FC1", {CV_32FC1, -1}},
+      {"bgr8", {CV_8UC3, cv::COLOR_BGR2GRAY}},
+      {"8UC3", {CV_8UC3, cv::COLOR_BGR2GRAY}},
+      {"bgr16", {CV_16UC3, cv::COLOR_BGR2GRAY}},
+      {"rgb8", {CV_8UC3, cv::COLOR_RGB2GRAY}},
+      {"rgb16", {CV_16UC3, cv::COLOR_RGB2GRAY}},
+      {"bgra8", {CV_8UC4, cv::COLOR_BGRA2GRAY}},
+      {"rgba8", {CV_8UC4, cv::COLOR_RGBA2GRAY}},
+      {"bayer_rggb8", {CV_8UC1, cv::COLOR_BayerBG2GRAY}},
+      {"bayer_bggr8", {CV_8UC1, cv::COLOR_BayerRG2GRAY}},
+      {"bayer_gbrg8", {CV_8UC1, cv::COLOR_BayerGR2GRAY}},
+      {"bayer_grbg8", {CV_8UC1, cv::COLOR_BayerGB2GRAY}}};
+  return encodings;
+}
+
+void DecodeRaw(ByteReader& in, bool depth, MessageImage* out) {
+  const auto height = in.Get<std::uint32_t>(), width = in.Get<std::uint32_t>();
+  const std::string_view encoding = Text(in);
+  const bool big_endian = in.Get<std::uint8_t>() != 0;
+  const std::size_t step = in.Get<std::uint32_t>();
+  const std::string_view data = Text(in);
+  const auto known = Encodings().find(encoding);
+  if (known == Encodings().end() || (big_endian && CV_ELEM_SIZE1(known->second.type) > 1)) {
+    out->error = "an image of encoding '" + std::string(encoding) + "'" +
+                 (big_endian ? ", big-endian," : "") + " can't be read";
+    return;
+  }
+  const int type = known->second.type;
+  if (width == 0 || height == 0 || std::uint64_t{width} * height > kMostImagePixels ||
+      step < std::size_t{width} * static_cast<std::size_t>(CV_ELEM_SIZE(type)) ||
+      data.size() / step < height) {
+    out->error = "an image says that it has " + std::to_string(width) + " x " + std::to_string(height) +
+                 " pixels, and its " + std::to_string(data.size()) + " bytes are not that";
+    return;
+  }
+  const cv::Mat pixels(static_cast<int>(height), static_cast<int>(width), type,
+                       const_cast<char*>(data.data()), step);
+  out->metres = encoding == "32FC1";
+  if (depth || known->second.to_grey < 0) {
+    out->image = pixels.clone();
+  } else {
+    cv::cvtColor(pixels, out->image, known->second.to_grey);
+  }
+}
+
+void DecodeCompressed(ByteReader& in, bool depth, MessageImage* out) {
+  const std::string format(Text(in));
+  const std::string_view data = Text(in);
+  const ImageFile decoded = DecodeImage(
+      {data.begin(), data.end()}, depth ? cv::IMREAD_UNCHANGED : cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
+  out->image = decoded.image;
+  if (!decoded.error.empty()) out->error = "a compressed image ('" + format + "') " + decoded.error;
+}
+
+}  // namespace
+
+bool IsImageMessage(const std::string& type) {
+  return type == "sensor_msgs/Image" || type == "sensor_msgs/CompressedImage";
+}
+
+MessageImage DecodeImageMessage(const std::string& message, const std::string& type, bool depth) {
+  MessageImage out;
+  try {
+    ByteReader in(message, "a message");
+    SkipHeader(in);
+    type == "sensor_msgs/Image" ? DecodeRaw(in, depth, &out) : DecodeCompressed(in, depth, &out);
+  } catch (const InputError&) {
+    out.error = "a message is damaged: it ends too early";
+  } catch (const std::exception& e) {  // of OpenCV, and no memory
+    out.image.release();
+    out.error = e.what();
+  }
+  return out;
+}
+
+std::optional<PinholeCamera> CameraOfMessage(const std::string& message, const std::string& source) {
+  ByteReader in(message, source + ": a camera_info");
+  SkipHeader(in);
+  PinholeCamera camera;
+  camera.height = static_cast<int>(in.Get<std::uint32_t>());
+  camera.width = static_cast<int>(in.Get<std::uint32_t>());
+  const std::string model(Text(in));
+  const auto count = in.Get<std::uint32_t>();
+  bool distorted = false;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const auto value = in.Get<double>();
+    distorted = distorted || value != 0;
+    if (i < camera.coefficients.size()) camera.coefficients[i] = value;
+  }
+  const auto K = in.Get<std::array<double, 9>>();  // row by row
+  if (!(K[0] > 0)) return std::nullopt;
+  camera.fx = K[0];
+  camera.cx = K[2];
+  camera.fy = K[4];
+  camera.cy = K[5];
+  if (!distorted) return camera;
+  if (model == "plumb_bob") {
+    camera.distortion = Distortion::kRadTan;
+  } else if (model == "equidistant" || model == "fisheye") {
+    camera.distortion = Distortion::kEquidistant;
+  } else {
+    throw InputError(source + ": unknown distortion model '" + model +
+                     "' in its camera_info; give the section camera: in the configuration");
+  }
+  return camera;
+}
+
+}  // namespace tutti

@@ -1,0 +1,99 @@
+#include "frontend/dataset/ros_message.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <opencv2/imgcodecs.hpp>
+#include <string>
+
+#include "tests/frontend/dataset/dataset_files.h"
+#include "tests/support/bag_writer.h"
+#include "tests/support/error_of.h"
+
+namespace tutti {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::ImageMessage;
+using testing::Picture;
+
+const char* const kImage = "sensor_msgs/Image";
+
+MessageImage Raw(const cv::Mat& image, const std::string& encoding, bool depth = false) {
+  return DecodeImageMessage(ImageMessage(image, encoding, 1), kImage, depth);
+}
+
+TEST(DecodeImageMessage, ColoursInTheirOrder) {
+  const cv::Mat red(4, 6, CV_8UC3, cv::Scalar(200, 0, 0));  // the first channel
+  EXPECT_NEAR(Raw(red, "rgb8").image.at<unsigned char>(1, 1), 0.299 * 200, 1);
+  EXPECT_NEAR(Raw(red, "bgr8").image.at<unsigned char>(1, 1), 0.114 * 200, 1);
+  EXPECT_EQ(Raw(red, "rgb8", true).image.type(), CV_8UC3);
+}
+
+TEST(DecodeImageMessage, BayerIsNamedByItsFirstRow) {
+  cv::Mat pattern(8, 8, CV_8UC1, cv::Scalar(0));
+  for (int y = 0; y < 8; y += 2) {
+    for (int x = 0; x < 8; x += 2) pattern.at<unsigned char>(y, x) = 200;  // red alone
+  }
+  EXPECT_NEAR(Raw(pattern, "bayer_rggb8").image.at<unsigned char>(4, 4), 0.299 * 200, 2);
+  EXPECT_NEAR(Raw(pattern, "bayer_bggr8").image.at<unsigned char>(4, 4), 0.114 * 200, 2);
+}
+
+TEST(DecodeImageMessage, DepthAsStored) {
+  const MessageImage metres = Raw(cv::Mat(3, 3, CV_32FC1, cv::Scalar(2.5)), "32FC1", true);
+  EXPECT_TRUE(metres.metres);
+  EXPECT_EQ(metres.image.at<float>(2, 2), 2.5F);
+  const MessageImage units = Raw(cv::Mat(3, 3, CV_16UC1, cv::Scalar(2500)), "16UC1", true);
+  EXPECT_FALSE(units.metres);
+  EXPECT_EQ(units.image.at<std::uint16_t>(2, 2), 2500);
+}
+
+TEST(DecodeImageMessage, CompressedOnes) {
+  std::vector<unsigned char> png;
+  cv::imencode(".png", Picture(16, 12, 5), png);
+  const std::string type = "sensor_msgs/CompressedImage";
+  const MessageImage read = DecodeImageMessage(testing::CompressedMessage(png, "png", 1), type, false);
+  EXPECT_EQ(cv::norm(read.image, Picture(16, 12, 5), cv::NORM_INF), 0) << read.error;
+  png.resize(png.size() / 2);
+  EXPECT_THAT(DecodeImageMessage(testing::CompressedMessage(png, "png", 1), type, false).error,
+              HasSubstr("a compressed image ('png') is truncated"));
+}
+
+TEST(DecodeImageMessage, SaysWhatIsWrong) {
+  const cv::Mat image = Picture(8, 6, 1);
+  EXPECT_THAT(Raw(image, "yuv422").error, HasSubstr("encoding 'yuv422'"));
+  EXPECT_THAT(Raw(image, "rgb8").error, HasSubstr("8 x 6 pixels"));
+  const std::string message = ImageMessage(image, "mono8", 1);
+  for (std::size_t size = 0; size < message.size(); ++size)
+    EXPECT_NE(DecodeImageMessage(message.substr(0, size), kImage, false).error, "") << size;
+  for (std::size_t i = 0; i + 4 <= 50; ++i) {  // any length may be a lie
+    std::string changed = message;
+    changed.replace(i, 4, "\xff\xff\xff\x7f");
+    const MessageImage read = DecodeImageMessage(changed, kImage, false);
+    EXPECT_EQ(read.image.empty(), !read.error.empty());
+  }
+}
+
+TEST(CameraOfMessage, PinholeAndLens) {
+  const std::array<double, 9> K = {20, 0, 8, 0, 21, 6, 0, 0, 1};
+  const auto camera = [&](const std::string& model, const std::vector<double>& lens) {
+    return CameraOfMessage(testing::CameraInfoMessage({16, 12}, K, model, lens), "x.bag");
+  };
+  const auto plain = camera("plumb_bob", {0, 0, 0, 0, 0});
+  ASSERT_TRUE(plain.has_value());
+  EXPECT_EQ(plain->distortion, Distortion::kNone);
+  EXPECT_EQ(plain->width, 16);
+  EXPECT_EQ(plain->fy, 21);
+  EXPECT_EQ(plain->cx, 8);
+  const auto lens = camera("plumb_bob", {0.1, 0.2, 0.3, 0.4, 0.5});
+  EXPECT_EQ(lens->distortion, Distortion::kRadTan);
+  EXPECT_EQ(lens->coefficients[4], 0.5);
+  EXPECT_EQ(camera("equidistant", {0.1, 0, 0, 0})->distortion, Distortion::kEquidistant);
+  EXPECT_THAT(testing::ErrorOf([&] { camera("odd", {0.1}); }), HasSubstr("unknown distortion model 'odd'"));
+  EXPECT_FALSE(CameraOfMessage(testing::CameraInfoMessage({16, 12}, {}, "plumb_bob", {}), "x.bag"));
+  EXPECT_THAT(testing::ErrorOf([&] { CameraOfMessage("short", "x.bag"); }), HasSubstr("x.bag"));
+}
+
+}  // namespace
+}  // namespace tutti

@@ -23,19 +23,27 @@ GrowingFile::~GrowingFile() {
 }
 
 void GrowingFile::Append(const std::string& lines) {
-  if (failed_) return;
+  if (descriptor_ < 0 && held_up_) return;  // it was never opened
+  waiting_ += lines;
   const off_t begin = lseek(descriptor_, 0, SEEK_CUR);
-  for (std::size_t done = 0; done < lines.size();) {
-    const ssize_t size = write(descriptor_, lines.data() + done, lines.size() - done);
+  for (std::size_t done = 0; done < waiting_.size();) {
+    const ssize_t size = write(descriptor_, waiting_.data() + done, waiting_.size() - done);
     if (size < 0 && errno == EINTR) continue;
     if (size < 0) {
-      failed_ = true;
-      problem_ = file_.string() + " grows no further (" + std::strerror(errno) + "); the run goes on";
-      if (begin >= 0 && ftruncate(descriptor_, begin) != 0) return;  // half a line stays then
+      if (!std::exchange(held_up_, true)) {
+        problem_ = file_.string() + " can't grow (" + std::strerror(errno) + "); the run goes on" +
+                   (descriptor_ < 0 ? "" : ", and it is tried again");
+      }
+      // Half of what waits is taken back; if that fails, too, half a line stays.
+      if (begin < 0 || ftruncate(descriptor_, begin) != 0 || lseek(descriptor_, begin, SEEK_SET) != begin)
+        waiting_.erase(0, done);
       return;
     }
     done += static_cast<std::size_t>(size);
   }
+  waiting_.clear();
+  if (std::exchange(held_up_, false))
+    problem_ = file_.string() + " grows again, and nothing is missing in it";
 }
 
 std::optional<std::string> GrowingFile::TakeProblem() { return std::exchange(problem_, std::nullopt); }

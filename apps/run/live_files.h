@@ -23,15 +23,16 @@ class GrowingFile {
   GrowingFile(const GrowingFile&) = delete;
   GrowingFile& operator=(const GrowingFile&) = delete;
 
-  /// Does nothing any more once a write has failed: what there is stays a beginning of the whole.
+  /// What can't be written waits for the next call: what there is stays a beginning of the whole.
   void Append(const std::string& lines);
-  /// Why it grows no further, once.
+  /// Why it does not grow, or that it does again, once each.
   std::optional<std::string> TakeProblem();
 
  private:
   std::filesystem::path file_;
   int descriptor_;
-  bool failed_ = false;
+  std::string waiting_;
+  bool held_up_ = false;
   std::optional<std::string> problem_;
 };
 
@@ -48,7 +49,7 @@ class LiveFiles {
   void AddLoops(const std::vector<LoopRecord>& loops);
   /// In place of what the files hold: the poses and loops so far of a run that is gone on with.
   void Resume(Trajectory trajectory, const std::vector<LoopRecord>& loops);
-  /// For the terminal: why a file grows no further.
+  /// For the terminal: why a file does not grow, or that it does again.
   std::vector<std::string> TakeProblems();
 
   /// All poses so far, T_world_body.

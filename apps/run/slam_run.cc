@@ -231,6 +231,8 @@ void SlamRun::TakeFrame(const FetchedFrame& fetched, Progress& progress) {
   for (; so_far_.next < fetched.position; ++so_far_.next) so_far_.dropped.insert(so_far_.next);
   if (fetched.read.frame) {
     so_far_.positions[fetched.read.frame->index] = so_far_.next;
+    const auto pause = pauses_.Next(fetched.read.frame->index, fetched.read.frame->stamp_s);
+    if (pause) progress.Note("tutti: warning: " + *pause);
     CountDepth(fetched.read, progress);
     if (!config_.dataset.mask.empty() && fetched.read.frame->mask.empty()) ++result_.frames_without_mask;
     TrackOne(*fetched.read.frame);

@@ -20,6 +20,7 @@
 #include "apps/run/run_parts.h"
 #include "apps/run/run_progress.h"
 #include "apps/run/runner.h"
+#include "apps/run/stamp_pauses.h"
 #include "apps/run/timing.h"
 #include "core/stopwatch.h"
 #include "tutti/slam/slam_system.h"
@@ -95,6 +96,7 @@ class SlamRun {
   std::unique_ptr<SlamSystem> slam_;
   PlantedLoops planted_;
   LiveFiles live_;
+  StampPauses pauses_;
   Span::Clock::time_point begin_ = Span::Clock::now();
   internal::Stopwatch watch_;
   double cpu_begin_ = ProcessCpuSeconds();

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/apps/tutti/executable.h"
+#include "tests/support/full_disk.h"
 #include "tests/support/test_data.h"
 
 namespace tutti {
@@ -50,6 +51,21 @@ TEST(GrowingFile, AFullDiskIsSaidOnceAndEndsNoRun) {
   EXPECT_THAT(*problem, HasSubstr("No space left on device"));
   file.Append("line\n");
   EXPECT_FALSE(file.TakeProblem());
+}
+
+TEST(GrowingFile, WhatAFullDiskHeldUpIsWrittenOnceThereIsRoom) {
+  const auto path = testing::FreshFolder() / "file";
+  GrowingFile file(path, "header\n");
+  {
+    const testing::FullDisk full(10);  // room for half of the line
+    file.Append("line 1\n");
+    file.Append("line 2\n");
+    EXPECT_THAT(*file.TakeProblem(), HasSubstr("can't grow (File too large)"));
+    EXPECT_EQ(ReadAll(path), "header\n");  // whole lines alone
+  }
+  file.Append("line 3\n");
+  EXPECT_EQ(ReadAll(path), "header\nline 1\nline 2\nline 3\n");
+  EXPECT_THAT(*file.TakeProblem(), HasSubstr("grows again"));
 }
 
 }  // namespace

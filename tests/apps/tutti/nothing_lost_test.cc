@@ -134,7 +134,7 @@ TEST_F(NothingLost, WhatHasNoRoomIsNamedAndTheRestIsWritten) {
 TEST_F(NothingLost, AFileAtItsLimitEndsTheRunLikeAHangUp) {
   const auto run = RunAfter("ulimit -f 5; exec", {});  // 2.5 KB: the poses of some 25 frames
   EXPECT_EQ(run.status, 1) << run.output;
-  EXPECT_THAT(run.output, AllOf(HasSubstr("trajectory_live.txt grows no further (File too large)"),
+  EXPECT_THAT(run.output, AllOf(HasSubstr("trajectory_live.txt can't grow (File too large)"),
                                 HasSubstr("interrupted after")));
   EXPECT_GE(ReadTrajectory(out_ / "trajectory_live.txt", TrajectoryFormat::kTum).size(), 20u);
 }

@@ -1,14 +1,13 @@
 // LoopDetector's memory: transfer, retrieval, members' own memories, and the file that outlives the process.
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <csignal>
 #include <filesystem>
 #include <fstream>
 
 #include "tests/loopclosure/detector/two_laps.h"
+#include "tests/support/full_disk.h"
 #include "tests/support/test_data.h"
 #include "tutti/core/error.h"
 #include "tutti/loopclosure/detector.h"
@@ -201,30 +200,13 @@ TEST_F(DurableMemory, AFileInUseOrOfOtherMembersOrDamagedIsRefused) {
   EXPECT_NE(Refusal(options).find(options.ltm_file), std::string::npos);
 }
 
-// Files of this process can't grow beyond `bytes` while this lives: as on a full disk.
-class FullDisk {
- public:
-  explicit FullDisk(rlim_t bytes) {
-    std::signal(SIGXFSZ, SIG_IGN);
-    getrlimit(RLIMIT_FSIZE, &before_);
-    const rlimit limit = {bytes, before_.rlim_max};
-    setrlimit(RLIMIT_FSIZE, &limit);
-  }
-  ~FullDisk() { setrlimit(RLIMIT_FSIZE, &before_); }
-  FullDisk(const FullDisk&) = delete;
-  FullDisk& operator=(const FullDisk&) = delete;
-
- private:
-  rlimit before_{};
-};
-
 TEST_F(DurableMemory, AFullDiskIsAWarningAndNothingIsLost) {
   LoopDetectorOptions options = Options();
   {
     LoopDetector detector(options);
     Walk(detector, 0, 4, kMemoryPlaces);
     {
-      const FullDisk full(64 << 10);
+      const testing::FullDisk full(64 << 10);
       for (const LoopResult& result : Walk(detector, 4, kMemoryPlaces, kMemoryPlaces)) {
         EXPECT_NE(result.warning.find(options.ltm_file), std::string::npos);
         for (const std::int64_t id : result.transferred) EXPECT_LT(id, 4);  // what can't be stored stays

@@ -1,0 +1,33 @@
+#include "apps/run/stamp_pauses.h"
+
+#include <cmath>
+#include <utility>
+
+#include "core/median.h"
+
+namespace tutti {
+namespace {
+
+constexpr double kLeast_s = 10, kTimesTheUsual = 20;
+constexpr std::size_t kRemembered = 31;  // frames
+
+}  // namespace
+
+std::optional<std::string> StampPauses::Next(std::int64_t frame, double stamp_s) {
+  const std::optional<double> before = std::exchange(before_s_, stamp_s);
+  if (!before) return std::nullopt;
+  const double interval = stamp_s - *before;
+  const bool pause = !intervals_s_.empty() && interval > kLeast_s &&
+                     interval > kTimesTheUsual * internal::Median(intervals_s_);
+  if (intervals_s_.size() < kRemembered) {
+    intervals_s_.push_back(interval);
+  } else {
+    intervals_s_[std::exchange(oldest_, (oldest_ + 1) % kRemembered)] = interval;
+  }
+  if (!pause) return std::nullopt;
+  return "frame " + std::to_string(frame) + " comes " + std::to_string(std::llround(interval)) +
+         " s after the one before it: of the motion between them nothing is known. Did the camera stop, or "
+         "was its clock set?";
+}
+
+}  // namespace tutti

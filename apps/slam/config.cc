@@ -1,5 +1,7 @@
 #include "tutti/slam/config.h"
 
+#include <yaml-cpp/eventhandler.h>
+
 #include <algorithm>
 #include <fstream>
 #include <map>
@@ -104,6 +106,36 @@ void Assign(const std::string& assignment, const std::string& prefix, const Conf
   if (!wrong.empty()) throw InputError("'" + assignment + "': " + wrong);
 }
 
+// Takes no notice of what a parser finds.
+class NoNotice : public YAML::EventHandler {
+ public:
+  void OnDocumentStart(const YAML::Mark&) override {}
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnAlias(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t, const std::string&) override {}
+  void OnSequenceStart(const YAML::Mark&, const std::string&, YAML::anchor_t,
+                       YAML::EmitterStyle::value) override {}
+  void OnSequenceEnd() override {}
+  void OnMapStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {
+  }
+  void OnMapEnd() override {}
+};
+
+// The one document of a text. YAML::LoadAll finds endless ones where it does not understand the first mark of
+// one, as in "," or "]".
+YAML::Node LoadOne(const std::string& text, const std::string& name) {
+  std::istringstream in(text);
+  YAML::Parser parser(in);
+  NoNotice none;
+  if (parser.HandleNextDocument(none) && parser.HandleNextDocument(none)) {
+    throw InputError(name +
+                     ": holds more than one YAML document (separated by ---), or text that is none, and only "
+                     "one document could be used");
+  }
+  return YAML::Load(text);
+}
+
 }  // namespace
 
 RunConfig::RunConfig() {
@@ -120,12 +152,7 @@ RunConfig ParseConfig(const std::string& text, const std::string& name) {
   const ConfigTable table(config);
   YAML::Node root;
   try {
-    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
-    if (!documents.empty()) root = documents.front();
-    if (documents.size() > 1) {
-      throw InputError(name + ": holds " + std::to_string(documents.size()) +
-                       " YAML documents (separated by ---), and only one could be used; write one");
-    }
+    root = LoadOne(text, name);
   } catch (const YAML::Exception& e) {
     Fail(name, e.mark, "not valid YAML: " + e.msg);
   }

@@ -128,6 +128,19 @@ TEST(Config, ACameraThatCanNotBeIsNamedOnce) {
               HasSubstr("my.yaml:1: camera: the principal point"));
 }
 
+TEST(Config, OneDocumentAlone) {
+  for (const char* text : {"---\nrun:\n  threads: 1\n", "# a\n---\nrun:\n  threads: 1\n...\n",
+                           "%YAML 1.2\n---\nrun:\n  threads: 1\n# end\n", "run: {threads: 1}\n...\n# end\n",
+                           "\xEF\xBB\xBF# a\n---\nrun:\n  threads: 1\n"})
+    EXPECT_EQ(ParseConfig(text, "my.yaml").run.threads, 1) << text;
+  for (const char* text : {"---\n---\nrun:\n  threads: 1\n", "run: {threads: 1}\n--- \nrun: {threads: 2}\n",
+                           ", run:\n  threads: 1\n", ","})  // of commas LoadAll makes documents without end
+    EXPECT_THAT(Message(text), HasSubstr("my.yaml: holds more than one YAML document")) << text;
+  for (const char* text : {"]\nrun:\n  threads: 1\n", "run: {threads: 1}\n, graph: {}\n"})
+    EXPECT_THAT(Message(text), HasSubstr("not valid YAML")) << text;
+  EXPECT_EQ(ParseConfig("--- # nothing\n", "my.yaml").run.threads, RunConfig().run.threads);
+}
+
 TEST(Config, BrokenYamlNamesTheLine) { EXPECT_THAT(Message("run:\n  threads: [1\n"), HasSubstr("my.yaml:")); }
 
 TEST(Config, MissingFileSaysWhatIsNeeded) {

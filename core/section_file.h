@@ -116,5 +116,10 @@ class SectionReader {
   std::unique_ptr<SectionPacker> packer_;
 };
 
+/// Throws InputError unless `index` is in [first, end).
+inline void CheckIndex(int index, int first, int end, const SectionReader& file) {
+  if (index < first || index >= end) file.Damaged("an index out of range");
+}
+
 }  // namespace tutti::internal
 #pragma GCC visibility pop

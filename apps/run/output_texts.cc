@@ -12,6 +12,7 @@
 #include "apps/run/run_note.h"
 #include "apps/run/run_parts.h"
 #include "apps/run/timing.h"
+#include "core/angle.h"
 #include "tutti/slam/version.h"
 
 namespace tutti {
@@ -246,6 +247,13 @@ std::string SummaryJson(const RunResult& r) {
   json["memory"] = {{"peak_mb", r.peak_memory_mb}};
   if (r.rig.sensor == Sensor::kStereo) {
     json["stereo"] = {{"row_error_px", r.stereo_row_error_px}, {"matches", r.stereo_matches}};
+  }
+  if (r.given_odometry && !r.appearance_only) {
+    const auto sigmas = [](double fraction, double rotation_rad) {
+      return Json{{"fraction", fraction}, {"rotation_deg", rotation_rad * internal::kDegrees}};
+    };
+    json["given_odometry"] = {{"stated", sigmas(r.followed.stated_fraction, r.followed.stated_rotation_rad)},
+                              {"seen", sigmas(r.followed.seen_fraction, r.followed.seen_rotation_rad)}};
   }
   if (r.lens) json["lens"] = LensJson(*r.lens);
   if (r.evaluation) {

@@ -21,6 +21,7 @@
 #include "tutti/slam/config.h"
 #include "tutti/slam/loop_record.h"
 #include "tutti/slam/map_file.h"
+#include "tutti/slam/slam_system.h"
 
 namespace tutti {
 
@@ -128,6 +129,7 @@ struct RunResult {
   LensCheck lens_check;            ///< not measured where another odometry is followed
   std::vector<int> frame_inliers;  ///< of each frame with a pose, when it came: TrackResult::inliers
   bool given_odometry = false;     ///< another odometry was followed
+  FollowedUncertainty followed;    ///< how uncertain it counts as
   PoseGraph graph;
   std::optional<KeyframeGraphProof> graph_proof;  ///< with graph.certify, if loops moved the map
   std::optional<RunEvaluation> evaluation;

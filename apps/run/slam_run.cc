@@ -124,6 +124,7 @@ void SlamRun::Collect() {
   FrameRange session;
   if (FirstFrame() > 0) session.first = FirstFrame();
   result_.given_odometry = given_ != nullptr;
+  result_.followed = slam_->Followed();
   if (given_ == nullptr && !slam_->AppearanceOnly())
     result_.lens_check = CheckLens(*slam_->odometry(), session);
   if (!alone_) return;

@@ -61,6 +61,19 @@ PoseGraph LoopCloser::Graph(const Odometry& odometry) const {
   return graph.Graph(accepted_);
 }
 
+void LoopCloser::Check(int end, const internal::SectionReader& file) const {
+  for (const auto* loops : {&accepted_, &deferred_, &queued_, &gate_.waiting()}) {
+    for (const LoopEdge& loop : *loops) {
+      internal::CheckIndex(loop.candidate, 0, end, file);
+      internal::CheckIndex(loop.query, 0, end, file);
+    }
+  }
+  for (const MapKeyframe& keyframe : solved_keyframes_) internal::CheckIndex(keyframe.id, 0, end, file);
+  for (const std::size_t record : untied_) {
+    if (record >= records_.size()) file.Damaged("a loop that is not listed");
+  }
+}
+
 LoopConstraint LoopCloser::Measure(const Verification& verification, int candidate, int query,
                                    const Odometry& odometry) {
   const ScopedSpan span(recorder_, Lane::kOptimisation, "measure_loop");
@@ -218,7 +231,7 @@ void LoopCloser::SetSigmas() {
 }
 
 std::string LoopCloser::Uncertainty() const {
-  const OdometryUncertainty::Sigmas seen = uncertainty_.Estimate(), stated = Stated();
+  const OdometryUncertainty::Sigmas seen = Seen(), stated = Stated();
   if (seen.fraction < stated.fraction && seen.rotation_rad < stated.rotation_rad) return "";
   char text[240];
   std::snprintf(text, sizeof text,

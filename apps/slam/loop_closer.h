@@ -17,6 +17,7 @@
 #include "apps/slam/loop_solver.h"
 #include "apps/slam/loop_update.h"
 #include "apps/slam/odometry_uncertainty.h"
+#include "core/section_file.h"
 #include "tutti/core/span_recorder.h"
 #include "tutti/core/trajectory.h"
 #include "tutti/loopclosure/detector.h"
@@ -56,6 +57,9 @@ class LoopCloser {
   /// The odometry that is followed says how uncertain its motion since the last call is, which led to this
   /// position, and to this keyframe if it is not -1. It counts in place of what is configured.
   void NoteMotion(int keyframe, const MotionSigma& sigma, const Eigen::Vector3d& position);
+  /// Of the odometry that is followed, between two keyframes: by itself or as configured, and by the images.
+  OdometryUncertainty::Sigmas Stated() const;
+  OdometryUncertainty::Sigmas Seen() const { return uncertainty_.Estimate(); }
   /// Where the images say more: in plain words, what counts instead; else empty.
   std::string Uncertainty() const;
 
@@ -104,6 +108,9 @@ class LoopCloser {
             adjust_piece_, adjuster_, proof_, corrections_, adjustments_, stages_, sessions_);
   }
 
+  /// Of what was loaded. Throws InputError where it names a keyframe from `end` on.
+  void Check(int end, const internal::SectionReader& file) const;
+
   const std::vector<LoopRecord>& records() const { return records_; }
   /// Keyframes, odometry edges and accepted loops at the present poses.
   PoseGraph Graph(const Odometry& odometry) const;
@@ -117,7 +124,6 @@ class LoopCloser {
  private:
   LoopConstraint Measure(const Verification& verification, int candidate, int query,
                          const Odometry& odometry);
-  OdometryUncertainty::Sigmas Stated() const;
   void SetSigmas();
   LoopUpdate Enter(std::vector<LoopEdge> entering, const Odometry& odometry, std::int64_t frames);
   void Start(std::vector<LoopEdge> entering, const Odometry& odometry, std::int64_t frames);

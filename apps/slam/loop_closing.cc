@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/section_file.h"
 #include "core/stopwatch.h"
 
 namespace tutti {
@@ -169,12 +170,21 @@ LoopUpdate LoopClosing::Deliver(const Odometry* odometry, std::int64_t frames) {
   if (appended_ && result.query >= *appended_ && result.candidate >= *appended_) return {};
   LoopRecord record = Record(result);
   if (odometry != nullptr) {
-    return closer_.Consider(record, result.verification, KeyframeOf(record.candidate),
-                            KeyframeOf(record.query), *odometry, frames);
+    const int candidate = KeyframeOf(record.candidate), query = KeyframeOf(record.query);
+    if (candidate >= 0 && query >= 0)
+      return closer_.Consider(record, result.verification, candidate, query, *odometry, frames);
+    record.verified = false;  // of a detector whose file was changed
+    record.reason = "the map has no keyframe of it";
   }
   record.accepted = record.verified;
   closer_.List(record);
   return {};
+}
+
+void LoopClosing::Check(const Odometry* odometry, const internal::SectionReader& file) const {
+  const int end = odometry != nullptr ? odometry->NextKeyframeId() : 0;
+  for (const auto& [frame, keyframe] : keyframe_of_frame_) internal::CheckIndex(keyframe, 0, end, file);
+  closer_.Check(end, file);
 }
 
 // -1 if the detector does not know the frame.

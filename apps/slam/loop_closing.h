@@ -95,6 +95,8 @@ class LoopClosing {
     archive(closer_, submitted_, keyframe_of_frame_, stamps_, keyframes_seen_, warnings_, last_warning_,
             stages_, session_);
   }
+  /// Of that. Throws InputError where it names a keyframe that the odometry (nullptr: none) has not.
+  void Check(const Odometry* odometry, const internal::SectionReader& file) const;
   void ResumeDetector(internal::SectionReader* detector, LoopWorker::Saved saved) {
     worker_->Resume(detector, std::move(saved));
   }

@@ -170,6 +170,7 @@ class SlamSystem::Impl {
   void Load(internal::SectionReader& file, const std::function<void(internal::SectionReader&)>& more) {
     ReadState(file, MapSection::kState, this);
     if (odometry_) odometry_->LoadSections(&file);
+    loops_.Check(odometry(), file);
     std::optional<LoopSolution> solution;
     if (Next(file, MapSection::kSolution)) ReadState(file, MapSection::kSolution, &solution.emplace());
     std::optional<GlobalAdjustment> adjustment;
@@ -390,6 +391,12 @@ const std::vector<LoopRecord>& SlamSystem::loops() const { return impl_->loops_.
 std::size_t SlamSystem::Relocalized() const { return impl_->relocalized_; }
 int SlamSystem::Corrections() const { return impl_->loops_.closer().Corrections(); }
 int SlamSystem::GlobalAdjustments() const { return impl_->loops_.closer().Adjustments(); }
+
+FollowedUncertainty SlamSystem::Followed() const {
+  const OdometryUncertainty::Sigmas stated = impl_->loops_.closer().Stated(),
+                                    seen = impl_->loops_.closer().Seen();
+  return {stated.fraction, stated.rotation_rad, seen.fraction, seen.rotation_rad};
+}
 
 PoseGraph SlamSystem::Graph() const {
   return odometry() != nullptr ? impl_->loops_.closer().Graph(*odometry()) : PoseGraph();

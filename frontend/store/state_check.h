@@ -12,11 +12,6 @@
 
 namespace tutti::internal {
 
-/// Throws InputError unless `index` is in [first, end).
-inline void CheckIndex(int index, int first, int end, const SectionReader& file) {
-  if (index < first || index >= end) file.Damaged("an index out of range");
-}
-
 /// Of a keyframe of `map`, or -1 if `none_too`.
 inline void CheckKeyframe(int id, const Map& map, const SectionReader& file, bool none_too = false) {
   CheckIndex(id, none_too ? -1 : 0, map.KeyframeCount(), file);

@@ -3,9 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "apps/slam/map_parts.h"
 #include "tests/support/recording.h"
 #include "tests/support/rendered_world.h"
 #include "tests/support/small_town.h"
+#include "tests/support/test_data.h"
+#include "tutti/core/error.h"
 
 namespace tutti {
 namespace {
@@ -195,6 +198,16 @@ TEST_F(LoopCloserTest, LoopsThatComeWhileTheGraphIsSolvedEnterAfterIt) {
   Solve(&closer);
   for (const LoopRecord& record : closer.records()) EXPECT_TRUE(record.accepted || !record.reason.empty());
   EXPECT_FALSE(closer.Solved(odometry_, frames_ + 1000)) << "nothing is left";
+}
+
+TEST_F(LoopCloserTest, LoopsOfKeyframesThatAreNotThereAreDamage) {
+  LoopCloser closer = Closer();
+  ConsiderTwo(&closer, 0);  // they wait for a correction
+  const auto path = testing::FreshFolder() / "map.tutti";
+  internal::SectionWriter(path, kMapFile).Finish();
+  const internal::SectionReader file(path, kMapFile);
+  EXPECT_NO_THROW(closer.Check(odometry_.NextKeyframeId(), file));
+  EXPECT_THROW(closer.Check(kLater + 1, file), InputError);
 }
 
 TEST_F(LoopCloserTest, WhatTheMapContradictsIsRevokedOnceAndForTheDetectorToForget) {

@@ -84,7 +84,13 @@ TEST_F(CloseCommand, TheOdometrySaysHowUncertainItIsInColumnsOrAFile) {
   const std::string in_columns = graph(folder_ / "columns.txt", {});
   EXPECT_EQ(graph(folder_ / "odometry.txt", {"--odometry-sigma", (folder_ / "sigmas.txt").string()}),
             in_columns);
+  const auto stated = [&] {
+    return nlohmann::json::parse(
+        testing::ReadAll(folder_ / "out" / "summary.json"))["given_odometry"]["stated"];
+  };
+  EXPECT_GT(stated()["rotation_deg"], 2);  // of several motions
   EXPECT_NE(graph(folder_ / "odometry.txt", {}), in_columns);
+  EXPECT_NEAR(stated()["fraction"], 0.01, 1e-9);  // the default
   // KITTI's lines get the stamps of the images before those of the deviations are looked at.
   WriteTrajectory(folder_ / "kitti.txt", poses, TrajectoryFormat::kKitti);
   std::string stamped;

@@ -27,6 +27,15 @@
 #pragma GCC visibility push(default)
 namespace tutti {
 
+/// How uncertain another odometry counts as between two keyframes, as standard deviations
+/// (SlamSystem::Follow).
+struct FollowedUncertainty {
+  double stated_fraction = 0;      ///< of the way, by the odometry itself, else as configured [1]
+  double stated_rotation_rad = 0;  ///< the same of the rotation
+  double seen_fraction = 0;        ///< what its disagreement with the images comes to; 0: too few steps
+  double seen_rotation_rad = 0;    ///< where it is larger than what is stated, it counts instead
+};
+
 /// The pipeline. The odometry runs on the caller's thread, the loop detector and the pose graph beside it;
 /// what they find enters the map a fixed number of frames after it was asked for (run.loop_delay_frames; the
 /// pose graph: by the size of the map), so the result does not depend on the number of threads or on the
@@ -113,6 +122,8 @@ class SlamSystem {
   int Corrections() const;
   /// How often the whole map was adjusted (bundle adjustment) after loops had moved it.
   int GlobalAdjustments() const;
+  /// Of the odometry that is followed, so far.
+  FollowedUncertainty Followed() const;
   /// Keyframes, odometry edges and accepted loops at the present poses.
   PoseGraph Graph() const;
   /// With graph.certify, of the last solution of the pose graph that moved the map: where each start leads,

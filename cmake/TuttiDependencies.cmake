@@ -39,7 +39,7 @@ macro(tutti_names_of library)
   elseif("${library}" STREQUAL "Threads::Threads")
     set(libs -pthread)
   elseif("${library}" STREQUAL "BZip2::BZip2")
-    set(requires bzip2)
+    set(libs -lbz2) # Debian 12 has no bzip2.pc
     set(packages libbz2-dev)
   else()
     message(FATAL_ERROR "cmake/TuttiDependencies.cmake has no names for ${library}")

@@ -91,7 +91,7 @@ def main():
     growth = 1024 * (samples[-1][1] - half[1]) / (samples[-1][0] - half[0])
     text = ["# A long run", "",
             f"{a.frames} frames round one synthetic block (stereo, 320x240, {a.laps} rendered laps played over and over, fresh noise of "
-            f"{a.noise:g} grey levels in each frame); `./dev bench soak --write`.", "",
+            f"{a.noise:g} grey levels in each frame); `./dev bench soak --frames {a.frames} --write`.", "",
             f"{frames['tracked']} of {frames['total']} frames tracked, {summary['keyframes']} keyframes, {loops['accepted']} loops; ATE "
             f"{summary['evaluation']['slam']['ate_rmse_m']:.3f} m. In the second half memory grew by {growth:.2f} kB a frame.", "",
             "| frames | resident memory, MB | CPU-ms per frame | open files |", "|---|---|---|---|", *rows]

@@ -46,8 +46,8 @@ def run(build, fuzzer, seconds):
 
 def document(results, minutes, commit):
     lines = ["# Fuzzing the readers", "",
-             f"libFuzzer with the address and the undefined-behaviour sanitizer, {minutes:g} minutes each, from the seeds that",
-             f"`tests/fuzz` makes and what earlier runs had found. `./dev fuzz --minutes {minutes:g} --write`; "
+             f"libFuzzer with the address and the undefined-behaviour sanitizer, {minutes:g} minutes each or up to a finding, from the",
+             f"seeds that `tests/fuzz` makes and what earlier runs had found. `./dev fuzz --minutes {minutes:g} --write`; "
              f"{datetime.date.today()}, commit {commit}.", "",
              "An edge is a branch of the program that some input took; libraries of others are not counted. A finding is an",
              "input that crashed, hung for 20 s, took 2 GB, or broke what the fuzzer checks (`tests/fuzz/<fuzzer>_fuzzer.cc`).", "",

@@ -165,10 +165,8 @@ class BagDataset : public Dataset {
     if (options_.topic.size() > 11 && options_.topic.substr(slash) == "/compressed")
       base = base.substr(0, std::max<std::size_t>(1, base.find_last_of('/')));
     const std::string topic = base + "/camera_info";
-    const bool there = std::any_of(bag_.topics().begin(), bag_.topics().end(), [&](const RosBag::Topic& t) {
-      return t.name == topic && t.type == "sensor_msgs/CameraInfo";
-    });
-    const Messages infos = there ? bag_.Messages(topic) : Messages();
+    if (bag_.TypeOf(topic) != "sensor_msgs/CameraInfo") return;
+    const Messages infos = bag_.Messages(topic);
     if (infos.empty()) return;
     options_.camera = CameraOfMessage(bag_.Read(infos.front()), file_.string());
     if (options_.camera) warnings_.push_back(file_.string() + ": calibration of " + topic);
@@ -200,10 +198,8 @@ class BagDataset : public Dataset {
   }
 
   MessageImage Decode(const BagMessage& message, const std::string& topic, bool depth) const {
-    const auto at = std::find_if(bag_.topics().begin(), bag_.topics().end(),
-                                 [&](const RosBag::Topic& t) { return t.name == topic; });
     try {
-      return DecodeImageMessage(bag_.Read(message), at->type, depth);
+      return DecodeImageMessage(bag_.Read(message), bag_.TypeOf(topic), depth);
     } catch (const InputError& e) {
       MessageImage none;
       none.error = e.what();

@@ -283,6 +283,12 @@ void RosBag::ListTopics() {
                 topics_.end());
 }
 
+std::string RosBag::TypeOf(const std::string& topic) const {
+  const auto at =
+      std::find_if(topics_.begin(), topics_.end(), [&](const Topic& t) { return t.name == topic; });
+  return at != topics_.end() ? at->type : std::string();
+}
+
 std::vector<BagMessage> RosBag::Messages(const std::string& topic) const {
   std::vector<BagMessage> found;
   for (const BagMessage& message : messages_) {

@@ -35,6 +35,8 @@ class RosBag {
 
   /// By name; one that two nodes publish is there once.
   const std::vector<Topic>& topics() const { return topics_; }
+  /// Empty: it has no such topic.
+  std::string TypeOf(const std::string& topic) const;
   /// In the order of the file.
   std::vector<BagMessage> Messages(const std::string& topic) const;
   /// Messages of the topic that lie in chunks that can't be unpacked, as the chunks' own indices count them.

@@ -4,10 +4,11 @@
 // 2004.
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+
+#include "core/dense_solvers.h"
 
 namespace tutti::internal {
 
@@ -69,7 +70,7 @@ bool GaussNewton(const GaussNewtonLimits& limits, const Linearise& linearise, co
     if (!equations.gradient.allFinite()) return false;  // LDLT would answer with no step at all
     const double damping = limits.damping * equations.hessian.trace();
     const Eigen::Matrix<double, N, 1> step =
-        (equations.hessian + damping * Matrix::Identity()).ldlt().solve(-equations.gradient);
+        SolveLdlt<N>(equations.hessian + damping * Matrix::Identity(), -equations.gradient);
     if (!step.allFinite() || !move(step)) return false;
     if (step.norm() < limits.step_tolerance) break;
     if (iteration > 0 && std::abs(last_cost - equations.cost) < limits.cost_tolerance * equations.cost) break;

@@ -1,7 +1,8 @@
 #include "tutti/core/pose.h"
 
-#include <Eigen/SVD>
 #include <cmath>
+
+#include "core/dense_solvers.h"
 
 namespace tutti {
 
@@ -46,10 +47,10 @@ Eigen::Matrix3d RightJacobianInverseSO3(const Eigen::Vector3d& v) {
 
 Pose Pose::FromMatrix(const Eigen::Matrix<double, 3, 4>& matrix) {
   const Eigen::Matrix3d r = matrix.leftCols<3>();
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(r, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const internal::Svd3 svd = internal::SingularValues(r);
   Eigen::Matrix3d d = Eigen::Matrix3d::Identity();
-  d(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1.0 : 1.0;
-  const Eigen::Matrix3d nearest = svd.matrixU() * d * svd.matrixV().transpose();
+  d(2, 2) = (svd.u * svd.v.transpose()).determinant() < 0 ? -1.0 : 1.0;
+  const Eigen::Matrix3d nearest = svd.u * d * svd.v.transpose();
   return Pose(Eigen::Quaterniond(nearest).normalized(), matrix.col(3));
 }
 

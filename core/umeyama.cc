@@ -1,7 +1,8 @@
 #include "core/umeyama.h"
 
-#include <Eigen/SVD>
 #include <algorithm>
+
+#include "core/dense_solvers.h"
 
 namespace tutti::internal {
 
@@ -21,18 +22,18 @@ std::optional<Similarity> Umeyama(const std::vector<Eigen::Vector3d>& a,
     variance_a += (a[i] - mean_a).squaredNorm() / n;
     variance_b += (b[i] - mean_b).squaredNorm() / n;
   }
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Svd3 svd = SingularValues(covariance);
   // The second singular value vanishes where one of the two lies on a line (all vanish where one stands
   // still). The bound is against the spread of the points, with room for the rounding of coordinates.
-  if (!(svd.singularValues()(1) > 1e-14 * std::max(variance_a, variance_b)) || !(variance_b > 0)) {
+  if (!(svd.values(1) > 1e-14 * std::max(variance_a, variance_b)) || !(variance_b > 0)) {
     return std::nullopt;
   }
   Eigen::Vector3d sign(1, 1, 1);  // eq. 43: no reflection
-  if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0) sign.z() = -1;
-  const Eigen::Matrix3d rotation = svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
+  if (svd.u.determinant() * svd.v.determinant() < 0) sign.z() = -1;
+  const Eigen::Matrix3d rotation = svd.u * sign.asDiagonal() * svd.v.transpose();
   Similarity S;
   S.rotation = Eigen::Quaterniond(rotation).normalized();
-  S.scale = with_scale ? svd.singularValues().dot(sign) / variance_b : 1.0;
+  S.scale = with_scale ? svd.values.dot(sign) / variance_b : 1.0;
   S.translation = mean_a - S.scale * (S.rotation * mean_b);
   return S;
 }

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/angle.h"
+#include "core/dense_solvers.h"
 #include "core/median.h"
 #include "tutti/loopclosure/relative_pose.h"
 
@@ -30,7 +31,7 @@ Matrix7d WithFloor(const Matrix7d& information, double sigma_translation, double
   floor << Eigen::Vector3d::Constant(sigma_translation * sigma_translation),
       Eigen::Vector3d::Constant(sigma_rotation * sigma_rotation), sigma_scale * sigma_scale;
   covariance += floor.asDiagonal();
-  const Matrix7d inverse = covariance.inverse();
+  const Matrix7d inverse = internal::Inverse(covariance);
   return 0.5 * (inverse + inverse.transpose());
 }
 

@@ -1,7 +1,6 @@
 #include "backend/graph/bad_information.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
+#include "core/dense_solvers.h"
 
 namespace tutti::internal {
 
@@ -16,12 +15,12 @@ InformationFault FaultOf(const Matrix7d& information, GraphKind kind) {
     return InformationFault::kNotSymmetric;
   const double largest = m.diagonal().maxCoeff();
   if (largest > 0 && largest < kSmallest) return InformationFault::kTooSmall;
-  const Eigen::LLT<Eigen::MatrixXd> llt(m);
-  if (llt.info() != Eigen::Success) return InformationFault::kNotPositiveDefinite;
-  const Eigen::MatrixXd l = llt.matrixL();
+  const CholeskyFactor factor = UpperCholesky(m);
+  if (!factor.positive_definite) return InformationFault::kNotPositiveDefinite;
   // A factor whose diagonal collapses against the matrix' own is singular in all but rounding.
   for (Eigen::Index i = 0; i < m.rows(); ++i) {
-    if (!(l(i, i) * l(i, i) > 1e-13 * m(i, i))) return InformationFault::kNotPositiveDefinite;
+    const double pivot = factor.upper(i, i) * factor.upper(i, i);
+    if (!(pivot > 1e-13 * m(i, i))) return InformationFault::kNotPositiveDefinite;
   }
   return InformationFault::kNone;
 }
@@ -31,13 +30,12 @@ Matrix7d Repaired(const Matrix7d& information, GraphKind kind, BadInformation ho
   const Eigen::MatrixXd m = information(used, used);
   Matrix7d out = Matrix7d::Zero();
   if (how == BadInformation::kProject) {
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(m);
-    const Eigen::VectorXd& values = eigen.eigenvalues();  // ascending
+    const Eigenpairs eigen = SymmetricEigen(m);
+    const SmallVector& values = eigen.values;  // ascending
     const double largest = values(values.size() - 1);
     if (largest <= 0) return out;
-    const Eigen::MatrixXd raised = eigen.eigenvectors() *
-                                   values.cwiseMax(kLeastEigenvalue * largest).asDiagonal() *
-                                   eigen.eigenvectors().transpose();
+    const Eigen::MatrixXd raised =
+        eigen.vectors * values.cwiseMax(kLeastEigenvalue * largest).asDiagonal() * eigen.vectors.transpose();
     out(used, used) = 0.5 * (raised + raised.transpose());
   } else if (how == BadInformation::kDiagonal) {
     const Eigen::VectorXd values = m.diagonal();

@@ -8,12 +8,12 @@
 // with J = Jr^-1(rotation vector) for chi2log and J = (w I + [v]x) / 2 for chi2 (q = (v, w), w >= 0).
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <array>
 #include <cmath>
 
+#include "core/dense_solvers.h"
 #include "tutti/backend/pose_graph.h"
 #include "tutti/backend/pose_graph_optimizer.h"
 
@@ -62,7 +62,7 @@ EdgeConstants<N> MakeEdgeConstants(const PoseGraphEdge& edge, GraphObjective obj
           edge.information(order[static_cast<std::size_t>(r)], order[static_cast<std::size_t>(k)]);
     }
   }
-  c.sqrt_information = information.llt().matrixU();
+  c.sqrt_information = UpperCholesky(information).upper;
   c.log_rotation = objective == GraphObjective::kChi2Log;
   return c;
 }

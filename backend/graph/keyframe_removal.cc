@@ -1,11 +1,11 @@
 // KeyframeGraph: keyframes leave the map, and their edges lead to what stands for them.
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <map>
 #include <set>
 #include <utility>
 #include <vector>
 
+#include "core/dense_solvers.h"
 #include "tutti/backend/keyframe_graph.h"
 
 namespace tutti {
@@ -43,8 +43,8 @@ Edge Joined(int a, const Edge& first, int over, const Edge& second, int b) {
 
 // (information^-1 + covariance)^-1, for any information.
 Matrix7d LessSure(const Matrix7d& information, const Matrix7d& covariance) {
-  const Matrix7d sum = information + covariance.inverse();
-  const Matrix7d less = information - information * sum.ldlt().solve(information);
+  const Matrix7d sum = information + internal::Inverse(covariance);
+  const Matrix7d less = information - information * internal::SolveLdlt(sum, information);
   return 0.5 * (less + less.transpose());
 }
 

@@ -1,13 +1,13 @@
 // How well does a loop agree with the rest of the graph? Private to the back end.
 #pragma once
 
-#include <Eigen/Eigenvalues>
 #include <utility>
 #include <vector>
 
 #include "backend/solver/graph_problem.h"
 #include "backend/solver/linearized_edge.h"
 #include "backend/uncertainty/selected_inverse.h"
+#include "core/dense_solvers.h"
 
 namespace tutti::internal {
 
@@ -42,11 +42,11 @@ class LeaveOneOut {
           P += edge.jacobian[a] * Covariance(at[a], at[b]) * edge.jacobian[b].transpose();
       }
     }
-    const Eigen::SelfAdjointEigenSolver<Square> eigen(P);
-    const Eigen::Matrix<double, N, 1> error = eigen.eigenvectors().transpose() * edge.error;
+    const Eigenpairs eigen = SymmetricEigen(P);
+    const Eigen::Matrix<double, N, 1> error = eigen.vectors.transpose() * edge.error;
     double sum = 0;
     for (int k = 0; k < N; ++k) {
-      const double rest = 1 - eigen.eigenvalues()(k);
+      const double rest = 1 - eigen.values(k);
       if (rest > kLeastHold) sum += error(k) * error(k) / rest;
     }
     return sum;

@@ -1,20 +1,19 @@
 #include "backend/uncertainty/edge_covariance.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
+#include <Eigen/Core>
 #include <array>
 #include <limits>
 
 #include "backend/graph/edge_error.h"
+#include "core/dense_solvers.h"
 
 namespace tutti::internal {
 namespace {
 
 template <int N>
 double Distance(const Eigen::Matrix<double, N, 1>& d, const Eigen::Matrix<double, N, N>& covariance) {
-  const Eigen::LLT<Eigen::Matrix<double, N, N>> llt(covariance);
-  if (llt.info() != Eigen::Success) return std::numeric_limits<double>::infinity();
-  return d.dot(llt.solve(d));
+  if (!UpperCholesky(covariance).positive_definite) return std::numeric_limits<double>::infinity();
+  return d.dot(SolveLdlt<N>(covariance, d));
 }
 
 }  // namespace
@@ -23,7 +22,7 @@ Matrix6d EdgeCovariance(const PoseGraphEdge& edge, GraphKind kind, GraphObjectiv
   const std::vector<int> used = TangentCoordinates(kind == GraphKind::kSE2 ? kind : GraphKind::kSE3);
   const Eigen::MatrixXd information = edge.information(used, used);
   Matrix6d out = Matrix6d::Zero();
-  const Eigen::MatrixXd covariance = information.inverse();
+  const Eigen::MatrixXd covariance = Inverse(information);
   out(used, used) = covariance;
   if (objective == GraphObjective::kChi2 && kind != GraphKind::kSE2) {
     out.bottomRows<3>() *= 2;

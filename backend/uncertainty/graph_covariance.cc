@@ -1,7 +1,5 @@
 #include "tutti/backend/graph_covariance.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
 #include <Eigen/SparseCholesky>
 #include <array>
 #include <string>
@@ -10,6 +8,7 @@
 #include "backend/graph/edge_error.h"
 #include "backend/graph/graph_structure.h"
 #include "backend/solver/linearized_edge.h"
+#include "core/dense_solvers.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -78,8 +77,8 @@ class CovarianceOf final : public GraphCovariance::Impl {
     Eigen::Matrix<double, N, 1> error;
     const Square<N> predicted = Predicted(measurement, error);
     const Square<N> S = MakeEdgeConstants<N>(measurement, GraphObjective::kChi2Log).sqrt_information;
-    const Square<N> own = (S.transpose() * S).inverse();
-    return error.dot((predicted + own).ldlt().solve(error));
+    const Square<N> own = internal::Inverse(S.transpose() * S);
+    return error.dot(internal::SolveLdlt<N>(predicted + own, error));
   }
 
  private:

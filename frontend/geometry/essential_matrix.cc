@@ -1,6 +1,6 @@
 #include "frontend/geometry/essential_matrix.h"
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <Eigen/QR>
 #include <algorithm>
@@ -8,6 +8,8 @@
 #include <cmath>
 #include <limits>
 #include <opencv2/core.hpp>
+
+#include "core/dense_solvers.h"
 
 namespace tutti::internal {
 namespace {
@@ -115,13 +117,11 @@ std::vector<Eigen::Matrix3d> FivePointEssential(const Eigen::Matrix<double, kSam
   Eigen::Matrix<double, 10, 10> times_x = Eigen::Matrix<double, 10, 10>::Zero();
   times_x.topRows<6>() = -reduced.topRows<6>();
   times_x(6, 0) = times_x(7, 1) = times_x(8, 2) = times_x(9, 6) = 1;
-  const Eigen::EigenSolver<Eigen::Matrix<double, 10, 10>> solver(times_x);
-  std::vector<Eigen::Matrix3d> solutions;
-  if (solver.info() != Eigen::Success) return solutions;
   constexpr double kReal = 1e-10;  // a double root may split into two that are nearly real
-  for (int i = 0; i < 10; ++i) {
-    if (std::abs(solver.eigenvalues()(i).imag()) > kReal) continue;
-    const Eigen::Vector4d weights = solver.eigenvectors().col(i).tail<4>().real();  // of x, y, z and 1
+  const Eigenpairs found = RealEigen(times_x, kReal);
+  std::vector<Eigen::Matrix3d> solutions;
+  for (Eigen::Index i = 0; i < found.values.size(); ++i) {
+    const Eigen::Vector4d weights = found.vectors.col(i).tail<4>();  // of x, y, z and 1
     const Eigen::Matrix<double, 9, 1> solution = (basis * weights).normalized();
     if (!solution.allFinite()) continue;
     solutions.emplace_back(Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(solution.data()));

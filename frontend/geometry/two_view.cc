@@ -1,14 +1,12 @@
 #include "frontend/geometry/two_view.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/eigen.hpp>
 #include <optional>
 
+#include "core/dense_solvers.h"
 #include "core/reprojection.h"
 #include "frontend/geometry/essential_matrix.h"
 #include "frontend/geometry/pose_solver.h"
@@ -124,8 +122,7 @@ Eigen::Vector3d Triangulate(const Eigen::Vector3d& first_ray, const Eigen::Vecto
   a.row(1) = Eigen::RowVector4d(0, -1, first_ray.y(), 0);
   a.row(2) = second_ray.x() * p.row(2) - p.row(0);
   a.row(3) = second_ray.y() * p.row(2) - p.row(1);
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> solver(a.transpose() * a);
-  const Eigen::Vector4d x = solver.eigenvectors().col(0);
+  const Eigen::Vector4d x = internal::SymmetricEigen(a.transpose() * a).vectors.col(0);
   return x.head<3>() / x(3);
 }
 
@@ -152,7 +149,7 @@ double DirectionSigma(const PinholeCamera& camera, const Pose& T_second_first,
     const Projection::PointJacobian by_point = by_q * rotation;
     const Eigen::Matrix3d known = by_p.transpose() * by_p + by_point.transpose() * by_point;
     const Eigen::Matrix<double, 6, 3> shared = by_pose.transpose() * by_point;
-    information += by_pose.transpose() * by_pose - shared * known.ldlt().solve(shared.transpose());
+    information += by_pose.transpose() * by_pose - shared * internal::SolveLdlt(known, shared.transpose());
   }
   const double length = T_second_first.translation.norm();
   if (!(length > 0)) return INFINITY;
@@ -161,12 +158,10 @@ double DirectionSigma(const PinholeCamera& camera, const Pose& T_second_first,
   free.block<3, 1>(0, 1) = T_second_first.translation.cross(free.block<3, 1>(0, 0)).normalized();
   free.block<3, 3>(3, 2).setIdentity();
   const Eigen::Matrix<double, 5, 5> of_free = free.transpose() * information * free;
-  const Eigen::LDLT<Eigen::Matrix<double, 5, 5>> solver(of_free);
-  if (solver.info() != Eigen::Success || !(solver.rcond() > 1e-12)) return INFINITY;
-  const Eigen::Matrix2d covariance =
-      solver.solve(Eigen::Matrix<double, 5, 5>::Identity()).topLeftCorner<2, 2>();
+  const auto covariance = internal::InverseInformation(of_free);
+  if (!covariance) return INFINITY;
   const double variance =
-      Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(covariance).eigenvalues()(1) / (length * length);
+      internal::SymmetricEigen(covariance->topLeftCorner<2, 2>()).values(1) / (length * length);
   return variance > 0 ? std::sqrt(variance) : INFINITY;
 }
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/dense_solvers.h"
+
 namespace tutti {
 
 ReducedSystem::ReducedSystem(int cameras, std::vector<std::pair<int, int>> pairs) : cameras_(cameras) {
@@ -103,7 +105,8 @@ bool ReducedSystem::SolveSparse(const Eigen::VectorXd& right, Eigen::VectorXd* s
   const Eigen::VectorXd poses = factor_->solve(right.head(6 * cameras_));
   const Eigen::MatrixXd by_lens = factor_->solve(border_);
   *lens_information = lens_ - border_.transpose() * by_lens;
-  const Eigen::Vector2d lens = lens_information->ldlt().solve(right.tail<2>() - border_.transpose() * poses);
+  const Eigen::Vector2d lens =
+      internal::SolveLdlt<2>(*lens_information, right.tail<2>() - border_.transpose() * poses);
   solution->resize(right.size());
   *solution << poses - by_lens * lens, lens;
   return solution->allFinite();

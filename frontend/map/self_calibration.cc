@@ -1,9 +1,10 @@
 #include "frontend/map/self_calibration.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <utility>
+
+#include "core/dense_solvers.h"
 
 namespace tutti {
 namespace {
@@ -31,8 +32,8 @@ void SelfCalibration::Learn(const LensError& seen, int keyframes, Map* map) {
   // Each view is in about as many windows as a window has keyframes; counted once, it tells so much less.
   const double share = 1.0 / std::max(1, keyframes);
   remaining_.information += share * seen.information;
-  remaining_.value +=
-      share * remaining_.information.ldlt().solve(seen.information * (seen.value - remaining_.value));
+  remaining_.value += share * internal::SolveLdlt<2>(remaining_.information,
+                                                     seen.information * (seen.value - remaining_.value));
   const Eigen::Vector2d lens = remaining_.value;
   if (LargestMove(lens) < kVisible) return;
   remaining_.value.setZero();

@@ -1,9 +1,9 @@
 #include "frontend/odometry/odometry_impl.h"
 
-#include <Eigen/Cholesky>
 #include <set>
 #include <utility>
 
+#include "core/dense_solvers.h"
 #include "frontend/geometry/measured.h"
 #include "frontend/map/global_adjustment.h"
 #include "frontend/map/landmark_fusion.h"
@@ -201,13 +201,12 @@ std::optional<Matrix6d> Odometry::Impl::PoseCovariance() const {
     if (!ReprojectionResidual(rig_.camera, last.T_camera_world, seen, &residual, &by_pose)) continue;
     information += by_pose.transpose() * by_pose;
   }
-  const Eigen::LDLT<Matrix6d> solver(information);
-  if (solver.info() != Eigen::Success || !(solver.rcond() > 1e-12)) return std::nullopt;
-  const Matrix6d covariance = solver.solve(Matrix6d::Identity());
+  const auto covariance = internal::InverseInformation(information);
+  if (!covariance) return std::nullopt;
   // Exp(d) T_camera_world is T_world_camera Exp(-d): the camera moves by -R_world_camera d in the world.
   Matrix6d turn = Matrix6d::Identity();
   turn.topLeftCorner<3, 3>() = last.T_camera_world.rotation.conjugate().toRotationMatrix();
-  return turn * covariance * turn.transpose();
+  return turn * Matrix6d(*covariance) * turn.transpose();
 }
 
 TrackResult Odometry::Impl::Accept(const Tracker::Tracked& tracked) {

@@ -1,9 +1,9 @@
 #include "frontend/odometry/step_check.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
+#include "core/dense_solvers.h"
 #include "frontend/geometry/measured.h"
 
 namespace tutti {
@@ -45,9 +45,9 @@ bool Sigmas(const PinholeCamera& camera, const std::vector<PointObservation>& po
     if (inlier[i] && ReprojectionResidual(camera, pose, points[i], &residual, &by_pose))
       information += by_pose.transpose() * by_pose;
   }
-  const Eigen::LDLT<Matrix6d> solver(information);
-  if (solver.info() != Eigen::Success || !(solver.rcond() > 1e-12)) return false;
-  const Vector6d variances = kVariances * solver.solve(Matrix6d::Identity()).diagonal();
+  const auto covariance = internal::InverseInformation(information);
+  if (!covariance) return false;
+  const Vector6d variances = kVariances * covariance->diagonal();
   check->sigma_translation_m = std::sqrt(variances.head<3>().maxCoeff());
   check->sigma_rotation_rad = std::sqrt(variances.tail<3>().maxCoeff());
   return true;

@@ -1,8 +1,9 @@
 #include "loopclosure/geometry/epipolar.h"
 
-#include <Eigen/SVD>
 #include <cmath>
 #include <opencv2/calib3d.hpp>
+
+#include "core/dense_solvers.h"
 
 namespace tutti::internal {
 namespace {
@@ -46,8 +47,8 @@ std::vector<cv::Point2d> Undistorted(const std::vector<cv::Point2f>& pixels, con
 // The rotation that is nearest to a homography between rays.
 Eigen::Matrix3d NearestRotation(const Eigen::Matrix3d& homography) {
   const Eigen::Matrix3d sign = homography.determinant() < 0 ? -homography : homography;
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sign, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Matrix3d R = svd.matrixU() * svd.matrixV().transpose();
+  const internal::Svd3 svd = internal::SingularValues(sign);
+  const Eigen::Matrix3d R = svd.u * svd.v.transpose();
   return R.determinant() < 0 ? Eigen::Matrix3d::Identity() : R;
 }
 

@@ -1,12 +1,12 @@
 #include "loopclosure/geometry/verification.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdarg>
 #include <cstdio>
 
+#include "core/dense_solvers.h"
 #include "loopclosure/features/static_features.h"
 #include "loopclosure/filter/evidence.h"
 #include "loopclosure/geometry/match_pool.h"
@@ -33,8 +33,7 @@ double Spread(const std::vector<cv::Point2f>& pixels, const cv::Size& size) {
   }
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
   for (const Eigen::Vector2d& p : scaled) covariance += (p - mean) * (p - mean).transpose() / n;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(covariance, Eigen::EigenvaluesOnly);
-  return std::sqrt(std::max(0.0, solver.eigenvalues()[0]));
+  return std::sqrt(std::max(0.0, internal::SymmetricEigen(covariance).values(0)));
 }
 
 __attribute__((format(printf, 1, 2))) std::string Format(const char* format, ...) {

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """A long run round and round one place: does memory, time per frame or anything else grow with the frames?
 
-usage: ./dev bench soak [--frames 200000] [--laps 4] [--noise 2] [--write]   (or bench/soak.py --build build/release)
+usage: ./dev bench soak [--frames 200000] [--laps 4] [--noise 2] [--prune 20] [--write]   (or bench/soak.py --build build/release)
 Renders --laps laps of a block (stereo, 320x240), and plays them one after the other until there are --frames, each frame with
-fresh noise (dataset.noise). Memory must follow the map, not the frames. `trajectory_odometry.txt` is left out
+fresh noise (dataset.noise). Memory must follow the map, not the frames; --prune is run.prune_every (0: never). `trajectory_odometry.txt` is left out
 (run.odometry_pass: false): an odometry without loops does not know that it is the same block. About 25 ms of a processor a
 frame. Needs nothing but Python 3 and /proc.
 """
@@ -27,7 +27,7 @@ def render(tutti, folder, laps):
                     "--supersample", "1", "--seed", "3", "--laps", str(laps), "--out", folder], check=True)
 
 
-def repeat(laps, folder, frames, noise):
+def repeat(laps, folder, frames, noise, prune):
     """A data set of `frames` frames that are links to the rendered ones, with their times and poses."""
     shutil.rmtree(folder, ignore_errors=True)
     names = sorted(p.name for p in (laps / "image_0").iterdir())
@@ -45,7 +45,7 @@ def repeat(laps, folder, frames, noise):
     config = (laps / "config.yaml").read_text()
     assert re.search(r"^dataset:", config, re.M)
     config = re.sub(r"^dataset:\n", f"dataset:\n  noise: {noise}\n", config, flags=re.M)
-    (folder / "config.yaml").write_text(config + "run:\n  odometry_pass: false\n")
+    (folder / "config.yaml").write_text(config + f"run:\n  odometry_pass: false\n  prune_every: {prune}\n")
 
 
 def sample(pid):
@@ -77,9 +77,10 @@ def main():
     parser.add_argument("--frames", type=int, default=200000)
     parser.add_argument("--laps", type=int, default=4)
     parser.add_argument("--noise", type=float, default=2)
+    parser.add_argument("--prune", type=int, default=20)
     a = table.parse(parser)
     render(a.tutti, a.out / "laps", a.laps)
-    repeat(a.out / "laps", a.out / "data", a.frames, a.noise)
+    repeat(a.out / "laps", a.out / "data", a.frames, a.noise, a.prune)
     samples, summary = run(a.tutti, a.out / "data", a.out / "result")
     frames, loops = summary["frames"], summary["loops"]
     rows = []
@@ -91,7 +92,7 @@ def main():
     growth = 1024 * (samples[-1][1] - half[1]) / (samples[-1][0] - half[0])
     text = ["# A long run", "",
             f"{a.frames} frames round one synthetic block (stereo, 320x240, {a.laps} rendered laps played over and over, fresh noise of "
-            f"{a.noise:g} grey levels in each frame); `./dev bench soak --frames {a.frames} --write`.", "",
+            f"{a.noise:g} grey levels in each frame, run.prune_every {a.prune}); `./dev bench soak --frames {a.frames} --prune {a.prune} --write`.", "",
             f"{frames['tracked']} of {frames['total']} frames tracked, {summary['keyframes']} keyframes, {loops['accepted']} loops; ATE "
             f"{summary['evaluation']['slam']['ate_rmse_m']:.3f} m. In the second half memory grew by {growth:.2f} kB a frame.", "",
             "| frames | resident memory, MB | CPU-ms per frame | open files |", "|---|---|---|---|", *rows]

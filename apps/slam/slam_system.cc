@@ -46,6 +46,10 @@ class SlamSystem::Impl {
     if (odometry_) sessions_.NoteJoined(*odometry_);
     if (result.keyframe >= 0 && (loops_.Searching() || on_keyframe_)) unmapped_[result.keyframe] = numbered;
     SubmitMapped();
+    if (PruneDue(result.keyframe)) {
+      Announce();
+      Prune();
+    }
     return result;
   }
 
@@ -206,6 +210,10 @@ class SlamSystem::Impl {
   std::map<std::string, double> stages_;
 
  private:
+  bool PruneDue(int new_keyframe) const {
+    return new_keyframe > 0 && config_.run.prune_every > 0 && new_keyframe % config_.run.prune_every == 0;
+  }
+
   // What is due by now.
   void BringIn() {
     do {

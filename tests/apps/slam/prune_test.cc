@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "apps/slam/map_state.h"
+#include "tests/apps/slam/map_outcome.h"
 #include "tests/support/error_of.h"
 #include "tests/support/recording.h"
 #include "tests/support/rendered_world.h"
@@ -159,6 +160,41 @@ INSTANTIATE_TEST_SUITE_P(Sensors, Pruned, ::testing::Values(SyntheticSensor::kSt
                          [](const auto& param) {
                            return param.param == SyntheticSensor::kStereo ? "Stereo" : "Mono";
                          });
+
+TEST(Prune, WhileRunningKeepsTheMapSmallAndARunThatGoesOnIsTheOneThatNeverStopped) {
+  const testing::Recording recording = DriveLaps(SyntheticSensor::kStereo);
+  RunConfig config = WithFewFeatures();
+  config.run.threads = 2;
+  SlamSystem whole(config, recording.rig);
+  config.run.prune_every = 12;
+  SlamSystem pruned(config, recording.rig);
+  const fs::path file = testing::FreshFolder() / "map.tutti";
+  std::size_t saved = 0;
+  for (std::size_t i = 0; i < recording.frames.size(); ++i) {
+    whole.Track(recording.frames[i]);
+    if (saved == 0 && pruned.odometry()->KeyframeIds().size() < whole.odometry()->KeyframeIds().size() &&
+        i > recording.frames.size() / 2) {
+      pruned.Save(file);
+      saved = i;
+    }
+    EXPECT_EQ(pruned.Track(recording.frames[i]).state, TrackingState::kTracking) << i;
+  }
+  const testing::MapOutcome outcome = testing::Finished(pruned);
+  whole.Finish();
+  const std::size_t left = pruned.odometry()->KeyframeIds().size(),
+                    all = whole.odometry()->KeyframeIds().size();
+  std::printf("  %zu keyframes, %zu if pruned while running\n", all, left);
+  EXPECT_LT(left, all * 9 / 10);
+  ExpectOnePiece(pruned);
+  EXPECT_LT(FarthestApart(pruned.odometry()->FrameTrajectory(), whole.odometry()->FrameTrajectory()), 0.5);
+
+  ASSERT_GT(saved, 0u);
+  MapInfo info = ReadMapInfo(file);
+  info.config.run.threads = 1;
+  const auto resumed = SlamSystem::Load(file, info);
+  for (std::size_t i = saved; i < recording.frames.size(); ++i) resumed->Track(recording.frames[i]);
+  testing::ExpectTheSame(testing::Finished(*resumed), outcome, "from frame " + std::to_string(saved));
+}
 
 TEST(Prune, WithoutPosesThereIsNothingToPrune) {
   CameraRig rig;

@@ -77,6 +77,12 @@ struct SlamOptions {
                "chordal), take another one than the map if it leads lower, and prove, if that is possible, "
                "that nothing better exists (`tutti optimize --certify`); summary.json has the last of them",
                Section("graph"));
+  TUTTI_OPTION(
+      int, prune_every, 0,
+      "each time so many keyframes have come, those that the map can do without are removed, as by "
+      "`tutti map prune`: a place that is driven again and again then takes no more memory; tracking "
+      "waits meanwhile; 0: never",
+      Basic(), From(0));
   TUTTI_OPTION(bool, odometry_pass, true,
                "after loops moved the map: beside the run, track the rest without them, too, for "
                "trajectory_odometry.txt (after a run in real time); false: it ends at the first correction",

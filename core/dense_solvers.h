@@ -50,8 +50,8 @@ Eigen::Matrix<double, N, 1> SolveLdlt(const Eigen::Matrix<double, N, N>& a,
 /// The same for each column of `b`.
 SmallMatrix SolveLdlt(const SmallMatrixRef& a, const SmallMatrixRef& b);
 
-/// The covariance that belongs to an information matrix; none if it is not positive definite or nearly singular
-/// (reciprocal condition number not above 1e-12).
+/// The covariance that belongs to an information matrix; none if it is not positive definite or nearly
+/// singular (reciprocal condition number not above 1e-12).
 std::optional<SmallMatrix> InverseInformation(const SmallMatrixRef& information);
 
 /// a = u diag(values) v^T, values descending.

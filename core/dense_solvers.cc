@@ -15,35 +15,33 @@ CholeskyFactor UpperCholesky(const SmallMatrixRef& a) {
 
 SmallMatrix Inverse(const SmallMatrixRef& a) { return Eigen::PartialPivLU<SmallMatrix>(a).inverse(); }
 
+namespace {
+
 // Where Eigen sums up a triangle's rows in another order if it knows their number, it is told.
 template <int N>
-Eigen::Matrix<double, N, 1> SolveLdlt(const Eigen::Matrix<double, N, N>& a,
-                                      const Eigen::Matrix<double, N, 1>& b) {
-  const Eigen::LDLT<SmallMatrix> factor(a);
-  if constexpr (N < 3 || N > 8) {
-    return factor.solve(SmallVector(b));
-  } else {
-    const Eigen::Matrix<double, N, N> ldlt = factor.matrixLDLT();
-    Eigen::Matrix<double, N, 1> x = factor.transpositionsP() * b;
-    ldlt.template triangularView<Eigen::UnitLower>().solveInPlace(x);
-    for (int i = 0; i < N; ++i)  // as Eigen does: zero where the pivot is
-      x(i) = std::abs(ldlt(i, i)) > std::numeric_limits<double>::min() ? x(i) / ldlt(i, i) : 0;
-    ldlt.transpose().template triangularView<Eigen::UnitUpper>().solveInPlace(x);
-    return factor.transpositionsP().transpose() * x;
-  }
+void SolveFixed(const double* a, const double* b, double* x) {
+  const Eigen::Map<const Eigen::Matrix<double, N, N>> matrix(a);
+  const Eigen::Map<const Eigen::Matrix<double, N, 1>> right(b);
+  Eigen::Map<Eigen::Matrix<double, N, 1>> out(x);
+  const Eigen::LDLT<SmallMatrix> factor(matrix);
+  const Eigen::Matrix<double, N, N> ldlt = factor.matrixLDLT();
+  Eigen::Matrix<double, N, 1> y = factor.transpositionsP() * right;
+  ldlt.template triangularView<Eigen::UnitLower>().solveInPlace(y);
+  for (int i = 0; i < N; ++i)  // as Eigen does: zero where the pivot is
+    y(i) = std::abs(ldlt(i, i)) > std::numeric_limits<double>::min() ? y(i) / ldlt(i, i) : 0;
+  ldlt.transpose().template triangularView<Eigen::UnitUpper>().solveInPlace(y);
+  out = factor.transpositionsP().transpose() * y;
 }
 
-#define TUTTI_SOLVE_LDLT(N)                                                             \
-  template Eigen::Matrix<double, N, 1> SolveLdlt<N>(const Eigen::Matrix<double, N, N>&, \
-                                                    const Eigen::Matrix<double, N, 1>&);
-TUTTI_SOLVE_LDLT(1)
-TUTTI_SOLVE_LDLT(2)
-TUTTI_SOLVE_LDLT(3)
-TUTTI_SOLVE_LDLT(6)
-TUTTI_SOLVE_LDLT(7)
-TUTTI_SOLVE_LDLT(12)
-TUTTI_SOLVE_LDLT(13)
-#undef TUTTI_SOLVE_LDLT
+}  // namespace
+
+void SolveLdlt(int n, const double* a, const double* b, double* x) {
+  if (n == 3) return SolveFixed<3>(a, b, x);
+  if (n == 6) return SolveFixed<6>(a, b, x);
+  if (n == 7) return SolveFixed<7>(a, b, x);
+  const Eigen::LDLT<SmallMatrix> factor(Eigen::Map<const Eigen::MatrixXd>(a, n, n));
+  Eigen::Map<Eigen::VectorXd>(x, n) = factor.solve(SmallVector(Eigen::Map<const Eigen::VectorXd>(b, n)));
+}
 
 SmallMatrix SolveLdlt(const SmallMatrixRef& a, const SmallMatrixRef& b) {
   return Eigen::LDLT<SmallMatrix>(a).solve(SmallMatrix(b));

@@ -42,11 +42,17 @@ CholeskyFactor UpperCholesky(const SmallMatrixRef& a);
 /// By LU with partial pivoting.
 SmallMatrix Inverse(const SmallMatrixRef& a);
 
-/// x of a x = b by LDL^T with pivoting, `a` positive or negative semidefinite. N: 2, 3, 6, 7, 12, 13.
+/// x of a x = b by LDL^T with pivoting, `a` positive or negative semidefinite with `n` rows, at most
+/// kMostRows.
+void SolveLdlt(int n, const double* a, const double* b, double* x);
 template <int N>
 Eigen::Matrix<double, N, 1> SolveLdlt(const Eigen::Matrix<double, N, N>& a,
-                                      const Eigen::Matrix<double, N, 1>& b);
-
+                                      const Eigen::Matrix<double, N, 1>& b) {
+  static_assert(N <= kMostRows && N != 4 && N != 5 && N != 8, "Eigen's bits need a case of their own");
+  Eigen::Matrix<double, N, 1> x;
+  SolveLdlt(N, a.data(), b.data(), x.data());
+  return x;
+}
 /// The same for each column of `b`.
 SmallMatrix SolveLdlt(const SmallMatrixRef& a, const SmallMatrixRef& b);
 

@@ -82,7 +82,7 @@ struct SlamOptions {
       "each time so many keyframes have come, those that the map can do without are removed, as by "
       "`tutti map prune`: a place that is driven again and again then takes no more memory; tracking "
       "waits meanwhile; 0: never",
-      Basic(), From(0));
+      From(0));
   TUTTI_OPTION(bool, odometry_pass, true,
                "after loops moved the map: beside the run, track the rest without them, too, for "
                "trajectory_odometry.txt (after a run in real time); false: it ends at the first correction",

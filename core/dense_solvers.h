@@ -1,8 +1,8 @@
 // Decompositions of small dense matrices. Not installed.
 //
 // They are Eigen's, compiled here once: the templates behind each of them cost a compiler seconds in every
-// file that they are called from. Where a size is not a template parameter, the bits are those of a matrix of
-// fixed size.
+// file that they are called from. The bits are those of Eigen's matrices of fixed size, but for eigenvalues
+// of 3 rows and inverses of fewer than 5, where Eigen has formulas for the size.
 #pragma once
 
 #include <Eigen/Core>

@@ -53,8 +53,8 @@ class BlockCholesky {
   /// Inverse of the lower triangle; the upper one is not looked at. (Eigen's own goes the way of large
   /// matrices.)
   static Block InverseOfLower(const Block& L);
-  void Order(int size, const std::vector<std::pair<int, int>>& pairs);
 
+  void Order(int size, const std::vector<std::pair<int, int>>& pairs);
   void SortIntoRows(const std::vector<std::pair<int, int>>& pairs);
   std::size_t Place(int old) const { return place_[static_cast<std::size_t>(old)]; }
 

@@ -10,10 +10,10 @@
 namespace tutti::internal {
 namespace {
 
-template <int N>
-double Distance(const Eigen::Matrix<double, N, 1>& d, const Eigen::Matrix<double, N, N>& covariance) {
-  if (!UpperCholesky(covariance).positive_definite) return std::numeric_limits<double>::infinity();
-  return d.dot(SolveLdlt<N>(covariance, d));
+double Distance(const SmallVector& d, const SmallMatrixRef& covariance) {
+  const CholeskyFactor factor = UpperCholesky(covariance);
+  if (!factor.positive_definite) return std::numeric_limits<double>::infinity();
+  return factor.upper.transpose().triangularView<Eigen::Lower>().solve(d).squaredNorm();
 }
 
 }  // namespace
@@ -43,9 +43,9 @@ Matrix6d Transported(const Matrix6d& covariance, const Pose& T_a_b) {
 double Mahalanobis(const Vector6d& d, const Matrix6d& covariance, GraphKind kind) {
   if (kind == GraphKind::kSE2) {
     const std::array<int, 3> used = SolverOrder<3>();
-    return Distance<3>(d(used), covariance(used, used));
+    return Distance(d(used), covariance(used, used));
   }
-  return Distance<6>(d, covariance);
+  return Distance(d, covariance);
 }
 
 }  // namespace tutti::internal

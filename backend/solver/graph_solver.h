@@ -4,7 +4,6 @@
 
 #include <ceres/loss_function.h>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <cstddef>
 #include <memory>
@@ -17,21 +16,6 @@
 #include "tutti/backend/pose_graph_optimizer.h"
 
 namespace tutti::internal {
-
-/// Whitened error r = S e of one edge; its Jacobians with respect to the two tangents where asked for (null:
-/// not).
-template <int N>
-void WhitenedError(const EdgeConstants<N>& constants, const double* block_i, const double* block_j,
-                   Eigen::Matrix<double, N, 1>& residual, Eigen::Matrix<double, N, N>* jacobian_i,
-                   Eigen::Matrix<double, N, N>* jacobian_j) {
-  Eigen::Matrix<double, N, 1> error;
-  Eigen::Matrix<double, N, N> J[2];
-  EdgeError<N>(constants, block_i, block_j, error, jacobian_i != nullptr ? &J[0] : nullptr,
-               jacobian_j != nullptr ? &J[1] : nullptr);
-  residual.noalias() = constants.sqrt_information * error;
-  if (jacobian_i != nullptr) jacobian_i->noalias() = constants.sqrt_information * J[0];
-  if (jacobian_j != nullptr) jacobian_j->noalias() = constants.sqrt_information * J[1];
-}
 
 /// 1/2 sum rho(w e^T Omega e) over the edges, rho on loops only, as a function of the nodes that are not
 /// constant. Edges of weight 0 are no part of the system of equations, and neither is their fill-in.

@@ -1,9 +1,9 @@
 #include "backend/solver/block_cholesky.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/OrderingMethods>
 #include <Eigen/SparseCore>
 #include <algorithm>
+#include <cmath>
 
 namespace tutti::internal {
 
@@ -51,9 +51,8 @@ bool BlockCholesky<N>::Factorise(const std::vector<Block>& diagonal, const std::
       pivot.noalias() -= L * L.transpose();
       values_[end[i]++] = L;
     }
-    const Eigen::LLT<Block> llt(pivot);
-    if (llt.info() != Eigen::Success) return false;
-    diagonal_inverse_[k] = InverseOfLower(llt.matrixLLT());
+    if (!LowerCholesky(pivot)) return false;
+    diagonal_inverse_[k] = InverseOfLower(pivot);
     if (!diagonal_inverse_[k].allFinite()) return false;
   }
   return true;
@@ -76,6 +75,23 @@ void BlockCholesky<N>::Solve(Eigen::VectorXd& b) const {
     Segment(y, k) = (diagonal_inverse_[k].transpose() * Segment(y, k)).eval();
   }
   for (std::size_t k = 0; k < size(); ++k) Segment(b, order_[k]) = Segment(y, k);
+}
+
+template <int N>
+bool BlockCholesky<N>::LowerCholesky(Block& a) {
+  for (int c = 0; c < N; ++c) {
+    double pivot = 0;
+    for (int k = 0; k < c; ++k) pivot += a(c, k) * a(c, k);
+    pivot = a(c, c) - pivot;
+    if (pivot <= 0) return false;
+    a(c, c) = std::sqrt(pivot);
+    for (int r = c + 1; r < N; ++r) {
+      double sum = 0;
+      for (int k = 0; k < c; ++k) sum += a(r, k) * a(c, k);
+      a(r, c) = (a(r, c) - sum) / a(c, c);
+    }
+  }
+  return true;
 }
 
 template <int N>

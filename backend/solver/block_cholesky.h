@@ -53,6 +53,8 @@ class BlockCholesky {
   /// Inverse of the lower triangle; the upper one is not looked at. (Eigen's own goes the way of large
   /// matrices.)
   static Block InverseOfLower(const Block& L);
+  /// L of a = L L^T in the lower triangle, the upper one stays; false if `a` is not positive definite.
+  static bool LowerCholesky(Block& a);
 
   void Order(int size, const std::vector<std::pair<int, int>>& pairs);
   void SortIntoRows(const std::vector<std::pair<int, int>>& pairs);

@@ -38,12 +38,16 @@ tutti_option(TUTTI_BUILD_PYTHON "Build the Python module (needs pybind11)" OFF
 option(TUTTI_INSTALL "Install and package what is built" ${PROJECT_IS_TOP_LEVEL})
 option(TUTTI_WERROR "Treat warnings as errors (./dev turns it on)" OFF)
 option(TUTTI_NATIVE "Compile for this very machine (-march=native); never for packages" OFF)
+option(TUTTI_PRECOMPILE "Read the headers of Eigen, of OpenCV and of the standard library once (GCC: a tenth of the build's time)" OFF)
 set(TUTTI_SANITIZE "" CACHE STRING "Sanitizers, as -fsanitize= takes them: address,undefined or thread")
 
 if(PROJECT_IS_TOP_LEVEL)
   find_program(CCACHE_PROGRAM ccache)
   if(CCACHE_PROGRAM AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
     set(CMAKE_CXX_COMPILER_LAUNCHER "${CCACHE_PROGRAM}")
+    if(TUTTI_PRECOMPILE) # ccache's manual, "Precompiled headers"
+      set(CMAKE_CXX_COMPILER_LAUNCHER "${CMAKE_COMMAND}" -E env CCACHE_SLOPPINESS=pch_defines,time_macros "${CCACHE_PROGRAM}")
+    endif()
   endif()
   if(NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
     set(CMAKE_BUILD_TYPE Release CACHE STRING "Debug, Release, RelWithDebInfo" FORCE)

@@ -1,6 +1,7 @@
 # Helpers that give every target the same language level, warnings and install rules.
 
 include(TuttiDependencies)
+include(TuttiPrecompiled)
 
 # tutti_compile_options(target): C++17, strict warnings, optional sanitizers. -march=native stays off
 # unless asked for, for all targets alike (Eigen's alignment must agree between libraries). What a library exports is what
@@ -79,6 +80,7 @@ function(tutti_add_library name)
   tutti_share_imported()
   tutti_compile_options(${target})
   tutti_unity_groups(${target})
+  tutti_precompile(${target})
   target_include_directories(${target} PUBLIC
     "$<BUILD_INTERFACE:${CMAKE_CURRENT_SOURCE_DIR}/include>"
     "$<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>")

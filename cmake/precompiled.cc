@@ -1,0 +1,1 @@
+// CMake needs a file to precompile headers for: see TuttiPrecompiled.cmake.

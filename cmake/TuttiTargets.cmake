@@ -37,6 +37,7 @@ endfunction()
 # the JSON library and of GTest take half as long again with -O3. Never for code that computes.
 function(tutti_compile_quickly target)
   target_compile_options(${target} PRIVATE "$<$<CONFIG:Release>:-O1>")
+  set_target_properties(${target} PROPERTIES TUTTI_QUICKLY ON)
 endfunction()
 
 # tutti_unity_groups(target): with CMAKE_UNITY_BUILD the files of a folder are compiled together.

@@ -1,11 +1,41 @@
 #include "tests/support/test_data.h"
 
+#include <gtest/gtest.h>
 #include <unistd.h>
 
 #include <cstdlib>
 #include <fstream>
 
 namespace tutti::testing {
+namespace {
+
+// Removes what the tests wrote, once all of them have passed.
+class FolderOfThisProcess : public ::testing::EmptyTestEventListener {
+ public:
+  FolderOfThisProcess()
+      : path_(std::filesystem::temp_directory_path() / ("tutti_test_" + std::to_string(::getpid()))) {}
+
+  const std::filesystem::path& path() const { return path_; }
+
+  void OnTestProgramEnd(const ::testing::UnitTest& tests) override {
+    std::error_code error;
+    if (tests.Passed()) std::filesystem::remove_all(path_, error);
+  }
+
+ private:
+  std::filesystem::path path_;
+};
+
+const std::filesystem::path& ScratchFolder() {
+  static const FolderOfThisProcess* const kFolder = [] {
+    auto* folder = new FolderOfThisProcess;
+    ::testing::UnitTest::GetInstance()->listeners().Append(folder);  // which deletes it
+    return folder;
+  }();
+  return kFolder->path();
+}
+
+}  // namespace
 
 std::filesystem::path SourceDir() { return TUTTI_SOURCE_DIR; }
 
@@ -20,9 +50,8 @@ std::filesystem::path RealData(const std::string& name) {
 
 std::filesystem::path FreshFolder() {
   const ::testing::TestInfo* info = ::testing::UnitTest::GetInstance()->current_test_info();
-  std::filesystem::path folder = std::filesystem::temp_directory_path() /
-                                 ("tutti_test_" + std::to_string(::getpid())) /
-                                 (std::string(info->test_suite_name()) + "." + info->name());
+  std::filesystem::path folder =
+      ScratchFolder() / (std::string(info->test_suite_name()) + "." + info->name());
   std::filesystem::remove_all(folder);
   std::filesystem::create_directories(folder);
   return folder;

@@ -106,6 +106,7 @@ class LoopClosing {
 
   /// What went wrong without stopping it since the last call.
   std::vector<std::string> TakeWarnings();
+  void Warn(std::string warning) { warnings_.push_back(std::move(warning)); }
   /// Milliseconds spent, summed, by stage.
   std::map<std::string, double> StageMilliseconds() const;
 

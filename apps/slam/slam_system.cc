@@ -60,6 +60,8 @@ class SlamSystem::Impl {
       throw InputError("frame " + std::to_string(frame.index) +
                        ": the odometry's standard deviation is below 0 or not finite");
     if (!odometry_) return Track(frame);
+    if (frames_ == 0 && config_.run.prune_every > 0)
+      loops_.Warn("run.prune_every: no effect on a trajectory that is given: no keyframe is removed");
     BringIn();
     ++frames_;
     sessions_.CountFrame();

@@ -169,5 +169,21 @@ TEST(TrajectoryCloser, RefusesPosesThatAreNotFiniteAndTimesThatDoNotGrow) {
   EXPECT_EQ(closer.Keyframes().size(), 1u);  // the odometry says that the camera stands still
 }
 
+TEST(TrajectoryCloser, SaysOnceThatNoKeyframeIsRemoved) {
+  const testing::RenderedWorld world(testing::SmallStereoTown(320, 160));
+  const Recording town = testing::Record(world, 2);
+  RunConfig config = Small(1);
+  config.run.prune_every = 20;
+  TrajectoryCloser closer(config, town.rig);
+  for (const InputFrame& frame : town.frames) closer.Push(frame, Pose());
+  const std::vector<std::string> warnings = closer.TakeWarnings();
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].find("run.prune_every"), std::string::npos) << warnings[0];
+  config.run.prune_every = 0;
+  TrajectoryCloser quiet(config, town.rig);
+  quiet.Push(town.frames[0], Pose());
+  EXPECT_TRUE(quiet.TakeWarnings().empty());
+}
+
 }  // namespace
 }  // namespace tutti

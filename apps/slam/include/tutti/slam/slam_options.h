@@ -81,7 +81,7 @@ struct SlamOptions {
       int, prune_every, 0,
       "each time so many keyframes have come, those that the map can do without are removed, as by "
       "`tutti map prune`: a place that is driven again and again then takes no more memory; tracking "
-      "waits meanwhile; 0: never",
+      "waits meanwhile; not in `tutti close`; 0: never",
       From(0));
   TUTTI_OPTION(bool, odometry_pass, true,
                "after loops moved the map: beside the run, track the rest without them, too, for "

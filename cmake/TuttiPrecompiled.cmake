@@ -36,9 +36,9 @@ function(tutti_precompiled_headers target)
   target_link_libraries(${target} PRIVATE Eigen3::Eigen)
   target_include_directories(${target} SYSTEM PRIVATE ${OpenCV_INCLUDE_DIRS})
   target_precompile_headers(${target} PRIVATE
-    <algorithm> <array> <cmath> <cstdint> <cstdio> <filesystem> <fstream> <functional> <map> <memory> <mutex> <optional>
-    <set> <sstream> <string> <string_view> <thread> <utility> <vector>
-    <Eigen/Core> <Eigen/Geometry> <Eigen/LU> <opencv2/core.hpp> <opencv2/imgproc.hpp>)
+    <algorithm> <array> <chrono> <cmath> <condition_variable> <cstdint> <cstdio> <deque> <filesystem> <fstream> <functional>
+    <future> <map> <memory> <mutex> <numeric> <optional> <random> <set> <sstream> <string> <string_view> <thread> <utility>
+    <vector> <Eigen/Core> <Eigen/Geometry> <Eigen/LU> <opencv2/calib3d.hpp> <opencv2/core.hpp> <opencv2/imgproc.hpp>)
   if(target MATCHES "_quickly$")
     tutti_compile_quickly(${target})
     find_package(nlohmann_json REQUIRED)

@@ -193,7 +193,7 @@ def document(results):
             "(kitti_00_head), else SE(3). Drift at the loop: error of a pose, seen from the earlier one that is nearest to it in truth; "
             f"median over all poses that come back to within {BACK['kitti'][0]} m (kitchen: {BACK['kitchen'][0]} m) of a place. "
             "`walk-A-B`, `kitchen-A-B`: ground truth with a random walk of A degrees of yaw and B % of scale after one "
-            f"metre, {len(SEEDS)} of them: median (least to most), all their loops; a bound holds if it does for each. No row may have a "
+            f"metre, {len(SEEDS)} seeds each: median (least to most), the loops of all together; a bound holds if it does for each seed. No row may have a "
             "false loop.", "",
             "| trajectory | ATE, given | closed | drift at the loop, given | closed | loops true / false | bound | reached | |",
             "|---|---|---|---|---|---|---|---|---|"]

@@ -38,7 +38,7 @@ tutti_option(TUTTI_BUILD_PYTHON "Build the Python module (needs pybind11)" OFF
 option(TUTTI_INSTALL "Install and package what is built" ${PROJECT_IS_TOP_LEVEL})
 option(TUTTI_WERROR "Treat warnings as errors (./dev turns it on)" OFF)
 option(TUTTI_NATIVE "Compile for this very machine (-march=native); never for packages" OFF)
-option(TUTTI_PRECOMPILE "Read the headers of Eigen, of OpenCV and of the standard library once (GCC: a tenth of the build's time)" OFF)
+option(TUTTI_PRECOMPILE "Read the headers of Eigen, of OpenCV and of the standard library once for all files" OFF)
 set(TUTTI_SANITIZE "" CACHE STRING "Sanitizers, as -fsanitize= takes them: address,undefined or thread")
 
 if(PROJECT_IS_TOP_LEVEL)

@@ -2,13 +2,13 @@
 # To be called after tutti_compile_quickly, where that is.
 #
 # Off by default, and in the builds that the tests and ./dev lint use: a file that lacks an include must not compile there
-# because its neighbour's headers came along. Files with a target option of their own opt out (SKIP_PRECOMPILE_HEADERS).
+# because its neighbour's headers came along. Files with compile options of their own opt out (SKIP_PRECOMPILE_HEADERS).
 # Not CLI11, which costs each file that reads it seconds, precompiled or not.
 function(tutti_precompile target)
   if(NOT TUTTI_PRECOMPILE)
     return()
   endif()
-  # A set for each level of optimisation: GCC takes the other's, and then half as long again.
+  # A set for each level of optimisation: with that of another level GCC needs half as long again, and says nothing.
   get_target_property(quickly ${target} TUTTI_QUICKLY)
   if(quickly)
     tutti_precompiled_headers(tutti_precompiled_quickly)

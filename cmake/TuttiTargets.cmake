@@ -40,9 +40,10 @@ function(tutti_compile_quickly target)
   set_target_properties(${target} PROPERTIES TUTTI_QUICKLY ON)
 endfunction()
 
-# tutti_unity_groups(target): with CMAKE_UNITY_BUILD the files of a folder are compiled together.
-# Files that can't be, as their neighbours have the same names for other things, are to be given
-# SKIP_UNITY_BUILD_INCLUSION.
+# tutti_unity_groups(target [folder...]): with CMAKE_UNITY_BUILD the files of a folder are compiled together; with
+# TUTTI_PRECOMPILE those of all these folders are, as each unit pays a second for what was precompiled. Not where
+# Eigen's templates abound (see core/CMakeLists.txt). Files that can't be, as their neighbours have the same names for
+# other things, are to be given SKIP_UNITY_BUILD_INCLUSION.
 function(tutti_unity_groups target)
   set_target_properties(${target} PROPERTIES UNITY_BUILD_MODE GROUP)
   get_target_property(sources ${target} SOURCES)
@@ -51,6 +52,9 @@ function(tutti_unity_groups target)
     if(NOT group)
       get_filename_component(folder "${source}" DIRECTORY)
       get_filename_component(folder "${folder}" NAME)
+      if(TUTTI_PRECOMPILE AND folder IN_LIST ARGN)
+        set(folder together)
+      endif()
       set_source_files_properties("${source}" PROPERTIES UNITY_GROUP "${target}_${folder}")
     endif()
   endforeach()
@@ -70,17 +74,17 @@ function(tutti_share_imported)
   endforeach()
 endfunction()
 
-# tutti_add_library(name SOURCES ... [PUBLIC libs...] [PRIVATE libs...] [PACKAGE component])
+# tutti_add_library(name SOURCES ... [PUBLIC libs...] [PRIVATE libs...] [TOGETHER folders...] [PACKAGE component])
 # Makes tutti_<name>, its alias tutti::<name>, its include folder, and installs and exports it with a pkg-config file.
-# PACKAGE: the Debian package that it belongs to, where that has another name.
+# PACKAGE: the Debian package that it belongs to, where that has another name. TOGETHER: see tutti_unity_groups.
 function(tutti_add_library name)
-  cmake_parse_arguments(ARG "" "PACKAGE" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  cmake_parse_arguments(ARG "" "PACKAGE" "SOURCES;PUBLIC;PRIVATE;TOGETHER" ${ARGN})
   set(target tutti_${name})
   add_library(${target} ${ARG_SOURCES})
   add_library(tutti::${name} ALIAS ${target})
   tutti_share_imported()
   tutti_compile_options(${target})
-  tutti_unity_groups(${target})
+  tutti_unity_groups(${target} ${ARG_TOGETHER})
   tutti_precompile(${target})
   target_include_directories(${target} PUBLIC
     "$<BUILD_INTERFACE:${CMAKE_CURRENT_SOURCE_DIR}/include>"

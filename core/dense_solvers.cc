@@ -3,8 +3,9 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <Eigen/SVD>
-#include <cmath>
-#include <limits>
+#include <algorithm>
+
+#include "core/small_ldlt.h"
 
 namespace tutti::internal {
 
@@ -15,31 +16,18 @@ CholeskyFactor UpperCholesky(const SmallMatrixRef& a) {
 
 SmallMatrix Inverse(const SmallMatrixRef& a) { return Eigen::PartialPivLU<SmallMatrix>(a).inverse(); }
 
-namespace {
-
-// Where Eigen sums up a triangle's rows in another order if it knows their number, it is told.
-template <int N>
-void SolveFixed(const double* a, const double* b, double* x) {
-  const Eigen::Map<const Eigen::Matrix<double, N, N>> matrix(a);
-  const Eigen::Map<const Eigen::Matrix<double, N, 1>> right(b);
-  Eigen::Map<Eigen::Matrix<double, N, 1>> out(x);
-  const Eigen::LDLT<SmallMatrix> factor(matrix);
-  const Eigen::Matrix<double, N, N> ldlt = factor.matrixLDLT();
-  Eigen::Matrix<double, N, 1> y = factor.transpositionsP() * right;
-  ldlt.template triangularView<Eigen::UnitLower>().solveInPlace(y);
-  for (int i = 0; i < N; ++i)  // as Eigen does: zero where the pivot is
-    y(i) = std::abs(ldlt(i, i)) > std::numeric_limits<double>::min() ? y(i) / ldlt(i, i) : 0;
-  ldlt.transpose().template triangularView<Eigen::UnitUpper>().solveInPlace(y);
-  out = factor.transpositionsP().transpose() * y;
+SmallMatrix SolveLu(const SmallMatrixRef& a, const SmallMatrixRef& b) {
+  return Eigen::PartialPivLU<SmallMatrix>(a).solve(SmallMatrix(b));
 }
 
-}  // namespace
-
 void SolveLdlt(int n, const double* a, const double* b, double* x) {
-  if (n == 3) return SolveFixed<3>(a, b, x);
-  if (n == 6) return SolveFixed<6>(a, b, x);
-  if (n == 7) return SolveFixed<7>(a, b, x);
   const Eigen::LDLT<SmallMatrix> factor(Eigen::Map<const Eigen::MatrixXd>(a, n, n));
+  if (n == 3 || n == 6 ||
+      n == 7) {  // here the order of Eigen's sums depends on whether it knows their number
+    std::copy_n(b, n, x);
+    small_ldlt::SolveInPlace<7>(factor, x);
+    return;
+  }
   Eigen::Map<Eigen::VectorXd>(x, n) = factor.solve(SmallVector(Eigen::Map<const Eigen::VectorXd>(b, n)));
 }
 

@@ -41,6 +41,8 @@ CholeskyFactor UpperCholesky(const SmallMatrixRef& a);
 
 /// By LU with partial pivoting.
 SmallMatrix Inverse(const SmallMatrixRef& a);
+/// x of a x = b for each column of `b`, likewise.
+SmallMatrix SolveLu(const SmallMatrixRef& a, const SmallMatrixRef& b);
 
 /// x of a x = b by LDL^T with pivoting, `a` positive or negative semidefinite with `n` rows, at most
 /// kMostRows.

@@ -7,7 +7,6 @@
 #include <fstream>
 #include <mutex>
 #include <opencv2/imgcodecs.hpp>
-#include <regex>
 #include <sstream>
 #include <string>
 #include <system_error>
@@ -64,10 +63,14 @@ void WriteText(const fs::path& file, const std::string& text) {
 constexpr const char* kImageFolders[] = {"image_0", "image_1", "images", "rgb", "depth"};
 constexpr const char* kWritten = "# Written by `tutti generate`";
 
-// As NumberName and StampName make it.
+// As NumberName and StampName make it: at least six digits, or a number with six decimals.
 bool IsOwnName(const std::string& name) {
-  static const std::regex kOwn("[0-9]{6,}\\.png|[0-9]+\\.[0-9]{6}\\.png");
-  return std::regex_match(name, kOwn);
+  constexpr const char* kDigits = "0123456789";
+  const std::size_t digits = std::min(name.find_first_not_of(kDigits), name.size());
+  const std::string rest = name.substr(digits);
+  if (digits >= 6 && rest == ".png") return true;
+  return digits >= 1 && rest.size() == 11 && rest[0] == '.' && rest.find_first_not_of(kDigits, 1) == 7 &&
+         rest.substr(7) == ".png";
 }
 
 // True unless the folder holds another one's recording, whose files may have the same names.

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/reprojection.h"
+#include "core/small_ldlt.h"
 #include "frontend/features/grey_window.h"
 #include "frontend/geometry/lens_error.h"
 #include "frontend/geometry/pose_solver.h"
@@ -97,7 +98,8 @@ bool Fit(const Template& t, const cv::Mat& image, float* x, float* y) {
     if (iteration == 0) offset = WindowWeights<kHalf>().dot(r);
     r.array() -= gain * t.grey.array() + offset;
     residual = WindowWeights<kHalf>().dot(r.cwiseAbs2());
-    const Vector4f step = t.solver.solve(t.weighted.transpose() * r);
+    Vector4f step = t.weighted.transpose() * r;
+    internal::small_ldlt::SolveInPlace<4>(t.solver, step.data());
     *x -= step(0) / std::max(gain, 0.1F);
     *y -= step(1) / std::max(gain, 0.1F);
     gain += step(2);

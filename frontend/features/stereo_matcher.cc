@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "core/median.h"
+#include "core/small_ldlt.h"
 #include "frontend/features/grey_window.h"
 
 namespace tutti {
@@ -103,7 +104,8 @@ bool FitWarp(const cv::Mat& left, const cv::Mat& right, int x, int y, Warp* warp
     r.array() -= grey.array() + warp->brightness;
     warp->residual = weights.dot(r.cwiseAbs2());
     const Vector5f now(0, warp->stretch, warp->shear, warp->row, 0);
-    const Vector5f step = -solver.solve(weighted.transpose() * r + prior.cwiseProduct(now));
+    Vector5f step = -(weighted.transpose() * r + prior.cwiseProduct(now));
+    internal::small_ldlt::SolveInPlace<5>(solver, step.data());
     warp->shift += step(0);
     warp->stretch += step(1);
     warp->shear += step(2);

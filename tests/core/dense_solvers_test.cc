@@ -9,6 +9,7 @@
 #include <cmath>
 #include <random>
 
+#include "core/small_ldlt.h"
 #include "tutti/core/pose.h"
 
 namespace tutti::internal {
@@ -56,6 +57,34 @@ TEST(DenseSolvers, SolveLdltOfColumnsHasEigensBits) {
 }
 
 template <int N>
+void ExpectEigensSingleLdlt() {
+  std::mt19937_64 random(N);
+  for (int k = 0; k < 200; ++k) {
+    const Eigen::Matrix<float, N, N> a = RandomInformation<N>(random).template cast<float>();
+    const Eigen::Matrix<float, N, 1> b = Random<N>(random).col(0).template cast<float>();
+    const Eigen::LDLT<Eigen::Matrix<float, N, N>> factor(a);
+    Eigen::Matrix<float, N, 1> x = b;
+    small_ldlt::SolveInPlace<N>(factor, x.data());
+    ASSERT_EQ(x, factor.solve(b)) << N << " unknowns, case " << k;
+  }
+}
+
+TEST(DenseSolvers, SmallLdltOfSinglePrecisionHasEigensBits) {
+  ExpectEigensSingleLdlt<1>();
+  ExpectEigensSingleLdlt<4>();
+  ExpectEigensSingleLdlt<5>();
+}
+
+TEST(DenseSolvers, SolveLuHasEigensBits) {
+  std::mt19937_64 random(3);
+  for (int k = 0; k < 200; ++k) {
+    const Eigen::Matrix<double, 10, 10> a = Random<10>(random), b = Random<10>(random);
+    ASSERT_EQ((Eigen::Matrix<double, 10, 10>(SolveLu(a, b))),
+              (Eigen::Matrix<double, 10, 10>(a.partialPivLu().solve(b))));
+  }
+}
+
+template <int N>
 void ExpectEigensSpectrum() {
   std::mt19937_64 random(N);
   for (int k = 0; k < 200; ++k) {
@@ -73,6 +102,16 @@ TEST(DenseSolvers, SymmetricEigenHasEigensBits) {
   ExpectEigensSpectrum<4>();
   ExpectEigensSpectrum<6>();
   ExpectEigensSpectrum<7>();
+  ExpectEigensSpectrum<13>();
+}
+
+TEST(DenseSolvers, SymmetricEigenOfASingleNumberAndOfZeros) {
+  const Eigenpairs single = SymmetricEigen(SmallMatrix::Constant(1, 1, -3));
+  EXPECT_EQ(single.values(0), -3);
+  EXPECT_EQ(single.vectors(0, 0), 1);
+  const Eigenpairs zeros = SymmetricEigen(SmallMatrix::Zero(4, 4));
+  EXPECT_EQ(Eigen::Vector4d(zeros.values), Eigen::Vector4d::Zero());
+  EXPECT_EQ(Eigen::Matrix4d(zeros.vectors), Eigen::Matrix4d::Identity());
 }
 
 TEST(DenseSolvers, InverseAndCholeskyHaveEigensBits) {

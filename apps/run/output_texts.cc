@@ -351,6 +351,10 @@ std::string ResultTable(const RunResult& r) {
         << " ms)";
   }
   out << "; memory " << Cell(r.peak_memory_mb, 0, " MB") << "\n";
+  if (r.given_odometry && !r.appearance_only && r.LoopsAccepted() > 0 && r.corrections == 0 &&
+      r.global_adjustments == 0)
+    out << "  the loops contradict the given trajectory by no more than they err themselves: it stays as it "
+           "is\n";
   if (r.map && r.in_map) {
     out << "  in the map " << r.map->file;
     if (r.map->sessions.back().joined_at) out << " from frame " << *r.map->sessions.back().joined_at << " on";

@@ -176,11 +176,23 @@ void LoopCloser::Add(int candidate, int query, const Similarity& S_candidate_que
   Start({edge}, odometry, frames);
 }
 
+// Somebody else's trajectory that was not moved yet and needs not be.
+bool LoopCloser::LeavesAsItIs(const std::vector<LoopEdge>& entering, const Odometry& odometry) const {
+  if (!followed_ || corrections_ > 0 || solver_.Running()) return false;
+  std::vector<LoopEdge> loops = deferred_;
+  loops.insert(loops.end(), entering.begin(), entering.end());
+  return gate_.WithinNoise(loops, Places(odometry));
+}
+
 // What the map fulfils already waits, so that not every loop moves it.
 LoopUpdate LoopCloser::Enter(std::vector<LoopEdge> entering, const Odometry& odometry, std::int64_t frames) {
   const LoopGate::Map places = Places(odometry);
   const auto fulfilled = [&](const LoopEdge& loop) { return gate_.Fulfilled(loop, places); };
   LoopUpdate update;
+  if (LeavesAsItIs(entering, odometry)) {
+    deferred_.insert(deferred_.end(), entering.begin(), entering.end());
+    return update;
+  }
   if (!solver_.Running() && std::all_of(deferred_.begin(), deferred_.end(), fulfilled) &&
       std::all_of(entering.begin(), entering.end(), fulfilled)) {
     deferred_.insert(deferred_.end(), entering.begin(), entering.end());
@@ -378,8 +390,19 @@ void LoopCloser::Applied(const LoopUpdate& update, const std::vector<int>& commo
 
 bool LoopCloser::CloseDeferred(const Odometry& odometry, std::int64_t frames) {
   if (deferred_.empty()) return false;
-  Start(std::exchange(deferred_, {}), odometry, frames);
-  return true;
+  std::vector<LoopEdge> entering = std::exchange(deferred_, {});
+  if (!LeavesAsItIs(entering, odometry)) {
+    Start(std::move(entering), odometry, frames);
+    return true;
+  }
+  LoopUpdate none_is_revoked;
+  for (LoopEdge& loop : entering) {
+    LoopVerdict verdict;
+    verdict.loop = std::move(loop);
+    verdict.weight = 1;
+    Settle(verdict, &none_is_revoked);
+  }
+  return false;
 }
 
 void LoopCloser::Removed(const std::map<int, int>& into, const Odometry& before) {

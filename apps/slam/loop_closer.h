@@ -57,6 +57,9 @@ class LoopCloser {
   /// The odometry that is followed says how uncertain its motion since the last call is, which led to this
   /// position, and to this keyframe if it is not -1. It counts in place of what is configured.
   void NoteMotion(int keyframe, const MotionSigma& sigma, const Eigen::Vector3d& position);
+  /// The poses are somebody else's: where they differ from all loops by no more than loops err themselves
+  /// (LoopGate::WithinNoise), they stay as they are.
+  void FollowOdometry() { followed_ = true; }
   /// Of the odometry that is followed, between two keyframes: by itself or as configured, and by the images.
   OdometryUncertainty::Sigmas Stated() const;
   OdometryUncertainty::Sigmas Seen() const { return uncertainty_.Estimate(); }
@@ -125,6 +128,7 @@ class LoopCloser {
   LoopConstraint Measure(const Verification& verification, int candidate, int query,
                          const Odometry& odometry);
   void SetSigmas();
+  bool LeavesAsItIs(const std::vector<LoopEdge>& entering, const Odometry& odometry) const;
   LoopUpdate Enter(std::vector<LoopEdge> entering, const Odometry& odometry, std::int64_t frames);
   void Start(std::vector<LoopEdge> entering, const Odometry& odometry, std::int64_t frames);
   void Settle(const LoopVerdict& verdict, LoopUpdate* update);
@@ -139,7 +143,8 @@ class LoopCloser {
   CameraRig rig_;
   std::uint64_t seed_;
   std::vector<LoopRecord> records_;
-  OdometryUncertainty uncertainty_;  // of an odometry that is followed; not saved, as such a map is not
+  bool followed_ = false;            // somebody else's odometry; not saved, as such a map is not
+  OdometryUncertainty uncertainty_;  // of an odometry that is followed; not saved either
   struct Walk {                      // what that odometry itself says
     MotionSigma since_keyframe, between_keyframes;
     std::optional<Eigen::Vector3d> keyframe;  // the last one's position

@@ -53,6 +53,7 @@ class LoopClosing {
   void Submit(const InputFrame& frame, const KeyframeView* view, std::int64_t frames);
   /// As LoopCloser.
   void NoteStep(const StepCheck& check) { closer_.NoteStep(check); }
+  void FollowOdometry() { closer_.FollowOdometry(); }
   void NoteMotion(int keyframe, const MotionSigma& sigma, const Eigen::Vector3d& position) {
     closer_.NoteMotion(keyframe, sigma, position);
   }

@@ -1,5 +1,6 @@
 #include "apps/slam/loop_gate.h"
 
+#include <cmath>
 #include <cstdlib>
 #include <utility>
 
@@ -39,6 +40,22 @@ bool LoopGate::Fulfilled(const LoopEdge& loop, const Map& map) const {
   const std::optional<Disagreement> d = WithMap(loop, map);
   return d && d->fraction < options_.loop_defer_fraction && d->angle_deg < options_.loop_defer_deg &&
          d->log_scale < options_.loop_defer_fraction;
+}
+
+bool LoopGate::WithinNoise(const std::vector<LoopEdge>& loops, const Map& map) const {
+  constexpr double kCoordinates = 6;
+  double sum = 0;
+  for (const LoopEdge& loop : loops) {
+    const Place q = map(loop.query), c = map(loop.candidate);
+    if (q.piece != c.piece) return false;
+    // As the pose graph has it (PoseGraphEdge): in the query's frame.
+    const Similarity E =
+        loop.S_candidate_query.Inverse() * Similarity(c.T_world_camera.Inverse() * q.T_world_camera);
+    Vector7d error;
+    error << E.translation, LogSO3(E.rotation), std::log(E.scale);
+    sum += error.dot(loop.information * error);
+  }
+  return sum <= kCoordinates * static_cast<double>(loops.size());
 }
 
 std::vector<LoopEdge> LoopGate::Offer(const LoopEdge& loop, const std::vector<LoopEdge>& accepted,

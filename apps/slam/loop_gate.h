@@ -36,6 +36,10 @@ class LoopGate {
   /// True if the present map fulfils the loop so well that it need not move for it.
   bool Fulfilled(const LoopEdge& loop, const Map& map) const;
 
+  /// True if the map differs from these loops, all in all, by no more than they err themselves: the mean of
+  /// their squared Mahalanobis distances [1], by their own information, is at most the number of coordinates.
+  bool WithinNoise(const std::vector<LoopEdge>& loops, const Map& map) const;
+
   /// Those that wait; mono: to be measured again when the map's scale changes.
   const std::vector<LoopEdge>& waiting() const { return waiting_; }
   std::vector<LoopEdge>& waiting() { return waiting_; }

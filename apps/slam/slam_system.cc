@@ -62,6 +62,7 @@ class SlamSystem::Impl {
     if (!odometry_) return Track(frame);
     if (frames_ == 0 && config_.run.prune_every > 0)
       loops_.Warn("run.prune_every: no effect on a trajectory that is given: no keyframe is removed");
+    loops_.FollowOdometry();
     BringIn();
     ++frames_;
     sessions_.CountFrame();

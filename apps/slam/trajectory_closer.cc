@@ -12,7 +12,7 @@
 namespace tutti {
 
 RunConfig FollowingConfig(RunConfig config) {
-  config.run.global_adjustment = false;
+  config.run.global_adjustment = config.run.global_adjustment && config.run.adjust_given;
   return config;
 }
 
@@ -53,6 +53,7 @@ class TrajectoryCloser::Impl {
 
   Trajectory Corrected(const Trajectory& odometry) const {
     const std::lock_guard<std::mutex> lock(mutex_);
+    if (slam_.Corrections() == 0 && slam_.GlobalAdjustments() == 0) return odometry;
     Trajectory before;
     for (const auto& [id, pose] : of_keyframe_) before.push_back(pose);
     return CorrectTrajectory(odometry, before, KeyframesNow());

@@ -56,6 +56,34 @@ TEST(LoopGate, LoopThatTheMapAlreadySaysEntersAlone) {
   EXPECT_EQ(gate.Offer(loop, {}, PlaceOf).size(), 1u);
 }
 
+TEST(LoopGate, WhatLoopsErrThemselvesIsNoContradiction) {
+  const LoopGate gate{SlamOptions()};
+  const auto loop = [](int candidate, double error) {  // 0.1 m and 0.01 rad are one standard deviation
+    LoopEdge edge = LoopTo(candidate, 5 + error);
+    edge.information.diagonal() << 100, 100, 100, 1e4, 1e4, 1e4, 1e4;
+    return edge;
+  };
+  const auto within = [&](double first, double second) {
+    return gate.WithinNoise({loop(10, first), loop(20, second)}, PlaceOf);
+  };
+  EXPECT_TRUE(within(0, 0));
+  EXPECT_TRUE(within(0.24, -0.24));
+  EXPECT_TRUE(within(0.33, 0));  // in the mean
+  EXPECT_FALSE(within(0.25, 0.25));
+  LoopEdge turned = loop(10, 0);
+  turned.S_candidate_query.rotation = ExpSO3({0, 0, 0.03});
+  EXPECT_FALSE(gate.WithinNoise({turned}, PlaceOf));
+  LoopEdge scaled = loop(10, 0);
+  scaled.S_candidate_query.scale = 1.03;
+  EXPECT_FALSE(gate.WithinNoise({scaled}, PlaceOf));
+  const auto two_pieces = [](int id) {
+    LoopGate::Place place = PlaceOf(id);
+    place.piece = id / 100;
+    return place;
+  };
+  EXPECT_FALSE(gate.WithinNoise({loop(10, 0)}, two_pieces));  // it would join them
+}
+
 TEST(LoopGate, AcceptedLoopsVouchForLaterOnes) {
   LoopGate gate{SlamOptions()};
   EXPECT_EQ(gate.Offer(LoopTo(13), {LoopTo(10)}, PlaceOf).size(), 1u);

@@ -24,7 +24,7 @@
 namespace tutti {
 
 /// The configuration of a run that follows another odometry: without the bundle adjustment of the whole map
-/// after loops, which would replace the odometry's shape by that of the images.
+/// after loops, which would replace the odometry's shape by that of the images, unless run.adjust_given.
 RunConfig FollowingConfig(RunConfig config);
 
 /// Keyframes, loops and pose graph around someone else's odometry (VIO, wheels, LiDAR, ...): poses and images

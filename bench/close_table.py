@@ -92,9 +92,9 @@ def own(a):
     data, config = kitti(a)
     out = a.out / "own-run"
     run(a, data, config, out)
-    run = json.loads((out / "summary.json").read_text())["evaluation"]["slam"]["ate_rmse_m"]
+    of_run = json.loads((out / "summary.json").read_text())["evaluation"]["slam"]["ate_rmse_m"]
     row, _ = close(a, "own", data, config, out / "trajectory_odometry.txt")
-    return [dict(row, run_ate_m=run)]
+    return [dict(row, run_ate_m=of_run)]
 
 
 def walked(a, name, config, data, truth, walks, where, more, others):

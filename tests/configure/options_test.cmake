@@ -1,4 +1,5 @@
-# Options that need each other: what can't be on is off, with a message, and nothing that is off is looked for.
+# Options that need each other: what can't be on is off, with a message, and nothing that is off is looked for. And the
+# preset of ./dev demo.
 # usage: cmake -DTUTTI=source -DWORK=folder -DGENERATOR=... -DCXX=compiler -P options_test.cmake
 file(REMOVE_RECURSE "${WORK}")
 
@@ -39,4 +40,11 @@ file(STRINGS "${WORK}/CMakeCache.txt" apps REGEX "^TUTTI_BUILD_(SLAM|APPS):BOOL=
 list(LENGTH apps count)
 if(NOT count EQUAL 2)
   message(SEND_ERROR "SLAM and the programs should be built again: ${apps}")
+endif()
+
+# As ./dev demo does it, which builds otherwise than the tests.
+execute_process(COMMAND "${CMAKE_COMMAND}" --preset demo -B "${WORK}/demo" WORKING_DIRECTORY "${TUTTI}"
+  OUTPUT_VARIABLE said ERROR_VARIABLE said RESULT_VARIABLE result)
+if(NOT result EQUAL 0)
+  message(SEND_ERROR "cmake --preset demo: ${said}")
 endif()

@@ -211,7 +211,8 @@ def document(results):
                  "`image` below, a trajectory from the images alone, is as far from it as this table says: ORB-SLAM's of KITTI 00 in the "
                  "ground truth's scale, `tutti run`'s own of the kitchen. What `tutti close` leaves is about as far from the ground truth, "
                  "whatever it was given; so the same drifts once more, seen by `image`."]
-        text += [f"(The loops found here move ORB-SLAM's trajectory, which has closed them, by {m:.2f} m.)" for m in moved]
+        text += [f"(The loops found here move ORB-SLAM's trajectory, which has closed them, by {m:.2f} m.)" if m > 0.005 else
+                 "(ORB-SLAM's trajectory, which has closed these loops, is not moved by those found here.)" for m in moved]
         text += ["", "| trajectory | `image` from the ground truth, at the loop | drift at the loop by `image`, given | closed | removed | "
                  f">= {100 * REMOVED:.0f} % |", "|---|---|---|---|---|---|"]
         for r in walks:

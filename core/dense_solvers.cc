@@ -22,8 +22,8 @@ SmallMatrix SolveLu(const SmallMatrixRef& a, const SmallMatrixRef& b) {
 
 void SolveLdlt(int n, const double* a, const double* b, double* x) {
   const Eigen::LDLT<SmallMatrix> factor(Eigen::Map<const Eigen::MatrixXd>(a, n, n));
-  if (n == 3 || n == 6 ||
-      n == 7) {  // here the order of Eigen's sums depends on whether it knows their number
+  // Of these the order of Eigen's sums depends on whether it knows their number.
+  if (n == 3 || n == 6 || n == 7) {
     std::copy_n(b, n, x);
     small_ldlt::SolveInPlace<7>(factor, x);
     return;

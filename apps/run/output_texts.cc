@@ -353,8 +353,7 @@ std::string ResultTable(const RunResult& r) {
   out << "; memory " << Cell(r.peak_memory_mb, 0, " MB") << "\n";
   if (r.given_odometry && !r.appearance_only && r.LoopsAccepted() > 0 && r.corrections == 0 &&
       r.global_adjustments == 0)
-    out << "  the loops contradict the given trajectory by no more than they err themselves: it stays as it "
-           "is\n";
+    out << "  all loops agree with the given trajectory within their own uncertainty: it is not changed\n";
   if (r.map && r.in_map) {
     out << "  in the map " << r.map->file;
     if (r.map->sessions.back().joined_at) out << " from frame " << *r.map->sessions.back().joined_at << " on";

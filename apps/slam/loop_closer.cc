@@ -396,12 +396,7 @@ bool LoopCloser::CloseDeferred(const Odometry& odometry, std::int64_t frames) {
     return true;
   }
   LoopUpdate none_is_revoked;
-  for (LoopEdge& loop : entering) {
-    LoopVerdict verdict;
-    verdict.loop = std::move(loop);
-    verdict.weight = 1;
-    Settle(verdict, &none_is_revoked);
-  }
+  for (const LoopEdge& loop : entering) Settle({loop, "", false, 1, std::nullopt}, &none_is_revoked);
   return false;
 }
 

@@ -83,7 +83,7 @@ class LoopCloser {
   std::optional<LoopUpdate> Adjusted(const Odometry& odometry, std::int64_t frames,
                                      Entering entering = Entering::kWhenDue);
   /// After the last loop: lets in what the map fulfils and what therefore waited for a correction. True if
-  /// there is any; it is due as usual.
+  /// the graph is solved for it, which is due as usual; a followed odometry may stay as it is.
   bool CloseDeferred(const Odometry& odometry, std::int64_t frames);
   /// After the last loop, when nothing is due any more.
   void Finish();

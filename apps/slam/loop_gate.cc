@@ -29,11 +29,17 @@ bool LoopGate::Agree(const LoopEdge& a, const LoopEdge& b, const Map& map) const
       a.depth));
 }
 
-std::optional<Disagreement> LoopGate::WithMap(const LoopEdge& loop, const Map& map) const {
+// Nothing between pieces.
+std::optional<Similarity> LoopGate::InMap(const LoopEdge& loop, const Map& map) {
   const Place q = map(loop.query), c = map(loop.candidate);
   if (q.piece != c.piece) return std::nullopt;
-  const Similarity T_query_candidate(q.T_world_camera.Inverse() * c.T_world_camera);
-  return Measure(loop.S_candidate_query * T_query_candidate, loop.depth);
+  return Similarity(q.T_world_camera.Inverse() * c.T_world_camera);
+}
+
+std::optional<Disagreement> LoopGate::WithMap(const LoopEdge& loop, const Map& map) const {
+  const std::optional<Similarity> T_query_candidate = InMap(loop, map);
+  if (!T_query_candidate) return std::nullopt;
+  return Measure(loop.S_candidate_query * *T_query_candidate, loop.depth);
 }
 
 bool LoopGate::Fulfilled(const LoopEdge& loop, const Map& map) const {
@@ -43,14 +49,13 @@ bool LoopGate::Fulfilled(const LoopEdge& loop, const Map& map) const {
 }
 
 bool LoopGate::WithinNoise(const std::vector<LoopEdge>& loops, const Map& map) const {
-  constexpr double kCoordinates = 6;
+  constexpr double kCoordinates = 6;  // one camera's seventh, the scale, only makes it stricter
   double sum = 0;
   for (const LoopEdge& loop : loops) {
-    const Place q = map(loop.query), c = map(loop.candidate);
-    if (q.piece != c.piece) return false;
+    const std::optional<Similarity> T_query_candidate = InMap(loop, map);
+    if (!T_query_candidate) return false;
     // As the pose graph has it (PoseGraphEdge): in the query's frame.
-    const Similarity E =
-        loop.S_candidate_query.Inverse() * Similarity(c.T_world_camera.Inverse() * q.T_world_camera);
+    const Similarity E = (*T_query_candidate * loop.S_candidate_query).Inverse();
     Vector7d error;
     error << E.translation, LogSO3(E.rotation), std::log(E.scale);
     sum += error.dot(loop.information * error);

@@ -50,6 +50,7 @@ class LoopGate {
   }
 
  private:
+  static std::optional<Similarity> InMap(const LoopEdge& loop, const Map& map);  // T_query_candidate
   std::optional<Disagreement> WithMap(const LoopEdge& loop, const Map& map) const;
   bool Within(const Disagreement& d) const;
   bool Near(const LoopEdge& a, const LoopEdge& b) const;

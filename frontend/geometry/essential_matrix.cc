@@ -9,6 +9,7 @@
 #include <opencv2/core.hpp>
 
 #include "core/dense_solvers.h"
+#include "core/householder.h"
 
 namespace tutti::internal {
 namespace {
@@ -92,22 +93,6 @@ int SamplesNeeded(double confidence, double inlier_share, int most) {
 
 }  // namespace
 
-namespace {
-
-// As qr.householderQ() * Identity().rightCols<4>() without what Eigen's template adds for matrices of more
-// than 48 columns.
-Eigen::Matrix<double, 9, 4> LastColumnsOfQ(
-    const Eigen::ColPivHouseholderQR<Eigen::Matrix<double, 9, kSample>>& qr) {
-  Eigen::Matrix<double, 9, 4> q = Eigen::Matrix<double, 9, 9>::Identity().rightCols<4>();
-  Eigen::RowVector4d workspace;
-  for (int k = kSample; k-- > 0;)
-    q.bottomRightCorner(9 - k, 4).applyHouseholderOnTheLeft(qr.matrixQR().col(k).tail(8 - k), qr.hCoeffs()(k),
-                                                            workspace.data());
-  return q;
-}
-
-}  // namespace
-
 std::vector<Eigen::Matrix3d> FivePointEssential(const Eigen::Matrix<double, kSample, 2>& first,
                                                 const Eigen::Matrix<double, kSample, 2>& second) {
   Eigen::Matrix<double, 9, kSample> equations;  // a column per pair, of E's elements by rows
@@ -118,7 +103,8 @@ std::vector<Eigen::Matrix3d> FivePointEssential(const Eigen::Matrix<double, kSam
   // Every solution is a sum of these four, scaled so that the last has weight 1.
   const Eigen::ColPivHouseholderQR<Eigen::Matrix<double, 9, kSample>> qr(equations);
   if (qr.rank() < kSample) return {};
-  const Eigen::Matrix<double, 9, 4> basis = LastColumnsOfQ(qr);
+  Eigen::Matrix<double, 9, 4> basis = Eigen::Matrix<double, 9, 9>::Identity().rightCols<4>();
+  Reflect(qr.matrixQR(), qr.hCoeffs(), 0, &basis);
   std::array<std::array<Linear, 3>, 3> e;
   for (int r = 0; r < 3; ++r) {
     for (int c = 0; c < 3; ++c) e[r][c] = basis.row(3 * r + c).transpose();

@@ -72,10 +72,11 @@ struct SlamOptions {
                "after loops: fusion of the landmarks of both ends, and bundle adjustment of the whole map "
                "beside the tracking",
                Basic());
-  TUTTI_OPTION(bool, adjust_given, false,
-               "`tutti close`: after loops, bundle adjustment of the whole map as in a run: the given "
-               "trajectory gives way to the images; for one that drifts far more than they do, a good one "
-               "gets worse");
+  TUTTI_OPTION(
+      bool, adjust_given, false,
+      "`tutti close`: after loops, bundle adjustment of the whole map as in a run: the given "
+      "trajectory gives way to the images. Helps one that drifts far more than they do, makes a good "
+      "one worse");
   TUTTI_OPTION(bool, certify, false,
                "when loops move the map: solve the pose graph from each start (the map, the odometry, "
                "chordal), take another one than the map if it leads lower, and prove, if that is possible, "

@@ -1,4 +1,5 @@
-// What is compiled once for any size answers as Eigen's own for matrices of fixed size, bit by bit.
+// What is compiled once for any size answers as Eigen's own for matrices of fixed size, bit by bit. Few
+// sizes, even and odd: each costs a compiler four to eight seconds here.
 #include "core/dense_solvers.h"
 
 #include <gtest/gtest.h>
@@ -6,6 +7,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -27,6 +29,12 @@ Eigen::Matrix<double, N, N> RandomInformation(std::mt19937_64& random) {
   return a * a.transpose();
 }
 
+// Without what GTest needs to print matrices of each size.
+template <typename Matrix>
+bool Same(const Matrix& a, const Matrix& b) {
+  return std::equal(a.data(), a.data() + a.size(), b.data(), b.data() + b.size());
+}
+
 template <int N>
 void ExpectEigensLdlt() {
   std::mt19937_64 random(N);
@@ -37,7 +45,8 @@ void ExpectEigensLdlt() {
       a.col(1).setZero();
     }
     const Eigen::Matrix<double, N, 1> b = Random<N>(random).col(0);
-    ASSERT_EQ(SolveLdlt<N>(a, b), a.ldlt().solve(b)) << N << " unknowns, case " << k;
+    const Eigen::Matrix<double, N, 1> expected = a.ldlt().solve(b);
+    ASSERT_TRUE(Same(SolveLdlt<N>(a, b), expected)) << N << " unknowns, case " << k;
   }
 }
 
@@ -46,14 +55,13 @@ TEST(DenseSolvers, SolveLdltHasEigensBits) {
   ExpectEigensLdlt<3>();
   ExpectEigensLdlt<6>();
   ExpectEigensLdlt<7>();
-  ExpectEigensLdlt<12>();
   ExpectEigensLdlt<13>();
 }
 
 TEST(DenseSolvers, SolveLdltOfColumnsHasEigensBits) {
   std::mt19937_64 random(1);
   const Matrix7d a = RandomInformation<7>(random), b = Random<7>(random);
-  EXPECT_EQ(Matrix7d(SolveLdlt(a, b)), Matrix7d(a.ldlt().solve(b)));
+  EXPECT_TRUE(Same<Matrix7d>(SolveLdlt(a, b), a.ldlt().solve(b)));
 }
 
 template <int N>
@@ -65,12 +73,12 @@ void ExpectEigensSingleLdlt() {
     const Eigen::LDLT<Eigen::Matrix<float, N, N>> factor(a);
     Eigen::Matrix<float, N, 1> x = b;
     small_ldlt::SolveInPlace<N>(factor, x.data());
-    ASSERT_EQ(x, factor.solve(b)) << N << " unknowns, case " << k;
+    const Eigen::Matrix<float, N, 1> expected = factor.solve(b);
+    ASSERT_TRUE(Same(x, expected)) << N << " unknowns, case " << k;
   }
 }
 
 TEST(DenseSolvers, SmallLdltOfSinglePrecisionHasEigensBits) {
-  ExpectEigensSingleLdlt<1>();
   ExpectEigensSingleLdlt<4>();
   ExpectEigensSingleLdlt<5>();
 }
@@ -78,9 +86,9 @@ TEST(DenseSolvers, SmallLdltOfSinglePrecisionHasEigensBits) {
 TEST(DenseSolvers, SolveLuHasEigensBits) {
   std::mt19937_64 random(3);
   for (int k = 0; k < 200; ++k) {
-    const Eigen::Matrix<double, 10, 10> a = Random<10>(random), b = Random<10>(random);
-    ASSERT_EQ((Eigen::Matrix<double, 10, 10>(SolveLu(a, b))),
-              (Eigen::Matrix<double, 10, 10>(a.partialPivLu().solve(b))));
+    using Matrix10d = Eigen::Matrix<double, 10, 10>;
+    const Matrix10d a = Random<10>(random), b = Random<10>(random);
+    ASSERT_TRUE(Same<Matrix10d>(SolveLu(a, b), a.partialPivLu().solve(b)));
   }
 }
 
@@ -91,18 +99,16 @@ void ExpectEigensSpectrum() {
     const Eigen::Matrix<double, N, N> a = RandomInformation<N>(random);
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, N, N>> expected(a);
     const Eigenpairs found = SymmetricEigen(a);
-    ASSERT_EQ((Eigen::Matrix<double, N, 1>(found.values)), expected.eigenvalues())
+    ASSERT_TRUE((Same<Eigen::Matrix<double, N, 1>>(found.values, expected.eigenvalues())))
         << N << " rows, case " << k;
-    ASSERT_EQ((Eigen::Matrix<double, N, N>(found.vectors)), expected.eigenvectors());
+    ASSERT_TRUE((Same<Eigen::Matrix<double, N, N>>(found.vectors, expected.eigenvectors())));
   }
 }
 
 TEST(DenseSolvers, SymmetricEigenHasEigensBits) {
   ExpectEigensSpectrum<2>();
   ExpectEigensSpectrum<4>();
-  ExpectEigensSpectrum<6>();
   ExpectEigensSpectrum<7>();
-  ExpectEigensSpectrum<13>();
 }
 
 TEST(DenseSolvers, SymmetricEigenOfASingleNumberAndOfZeros) {
@@ -118,8 +124,8 @@ TEST(DenseSolvers, InverseAndCholeskyHaveEigensBits) {
   std::mt19937_64 random(2);
   for (int k = 0; k < 200; ++k) {
     const Matrix6d a = RandomInformation<6>(random);
-    ASSERT_EQ(Matrix6d(Inverse(a)), Matrix6d(a.inverse()));
-    ASSERT_EQ(Matrix6d(UpperCholesky(a).upper), Matrix6d(a.llt().matrixU()));
+    ASSERT_TRUE(Same<Matrix6d>(Inverse(a), a.inverse()));
+    ASSERT_TRUE(Same<Matrix6d>(UpperCholesky(a).upper, a.llt().matrixU()));
     ASSERT_TRUE(UpperCholesky(a).positive_definite);
   }
   Matrix6d indefinite = Matrix6d::Identity();

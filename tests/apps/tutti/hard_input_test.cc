@@ -162,7 +162,8 @@ TEST_F(HardInput, ConfigurationsThatCanNotBeComputedWithAreRefused) {
                             "\n  fy: 100\n  cx: 160\n  cy: 80\n");
     ExpectRefused(run, "camera");
   }
-  ExpectRefused(with("two.yaml", ReadAll(config) + "---\nrun:\n  threads: 1\n"), "more than one YAML document");
+  ExpectRefused(with("two.yaml", ReadAll(config) + "---\nrun:\n  threads: 1\n"),
+                "more than one YAML document");
   EXPECT_FALSE(fs::exists(folder_ / "out" / "summary.json"));
 }
 

@@ -1,7 +1,9 @@
 // What may happen to a camera or a computer in the middle of a run.
+#include <dlfcn.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <ctime>
 #include <iomanip>
 #include <sstream>
 #include <string>
@@ -56,6 +58,25 @@ TEST_F(FaultsWhileRunning, AProcessThatIsStoppedForASecondGoesOnWithTheSameBytes
   EXPECT_EQ(run.status, 0) << run.output;
   for (const char* file : {"trajectory.txt", "loops.csv", "graph.g2o"})
     EXPECT_EQ(testing::ReadAll(folder_ / "held" / file), testing::ReadAll(folder_ / "quiet" / file)) << file;
+}
+
+// Waiting, writing checkpoints and keeping pace go by a clock that nobody can set.
+TEST_F(FaultsWhileRunning, AClockThatIsSetBackAgainAndAgainChangesNothing) {
+#ifdef TUTTI_SANITIZED
+  GTEST_SKIP() << "a sanitizer has functions of its own in these places";
+#endif
+  void* const module = dlopen(TUTTI_CLOCK_SET_BACK, RTLD_NOW);
+  ASSERT_NE(module, nullptr) << dlerror();
+  const auto clock = reinterpret_cast<std::time_t (*)(std::time_t*)>(dlsym(module, "time"));
+  const std::time_t first = clock(nullptr), second = clock(nullptr);
+  EXPECT_LT(second, first - 80000) << "the clock is not set back";
+  ASSERT_EQ(testing::RunTutti(Arguments("quiet")).status, 0);
+  const auto run =
+      InShell("LD_PRELOAD='" TUTTI_CLOCK_SET_BACK "' \"$@\" --checkpoint 0.1 --follow 1", "set_back");
+  EXPECT_EQ(run.status, 0) << run.output;
+  for (const char* file : {"trajectory.txt", "loops.csv", "graph.g2o"})
+    EXPECT_EQ(testing::ReadAll(folder_ / "set_back" / file), testing::ReadAll(folder_ / "quiet" / file))
+        << file;
 }
 
 TEST_F(FaultsWhileRunning, AFolderThatStallsIsWaitedFor) {

@@ -93,7 +93,8 @@ Belief AliasEvidence::Weighed(const std::vector<double>& counts, const std::vect
   const double least = std::exp(options_.floor);
   // Most places share too little to reach the least, whatever their own level: they need no more arithmetic.
   const double lowest_level = share * options_.alias_share * Level() / kMostAttraction;
-  const double enough = std::exp(options_.floor / sharpness) * (lowest_level + 1.0) - 1.0;
+  const double enough =
+      sharpness > 0.0 ? std::exp(options_.floor / sharpness) * (lowest_level + 1.0) - 1.0 : -1.0;
   for (const int slot : working_memory) {
     const double count = counts[Index(slot)];
     double& value = likelihood.places[Index(slot)];

@@ -121,8 +121,8 @@ const std::vector<SignKind>& SignKinds() {
        "frames.lost_stretches in summary.json says where and why; slower motion, more light or more frames "
        "a second help",
        FramesPosed},
-      {"largest_piece", "share", "poses in trajectory.txt, of those in all pieces of the map", kBelow, 0.95,
-       0.5, "the map is in pieces: only %s of the poses are in trajectory.txt",
+      {"largest_piece", "share", "poses in trajectory.txt, of those in all submaps", kBelow, 0.95, 0.5,
+       "the map is several submaps: only %s of the poses are in trajectory.txt",
        "the others are in trajectory_piece_1.txt, ...; a view of a known place joins them",
        ShareOfLargestPiece},
       {"few_inliers", "share", "frames with a pose, but fewer than 30 landmarks that agree with it", kAbove,

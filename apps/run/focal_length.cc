@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "apps/run/map_figures.h"
 #include "tutti/frontend/odometry.h"
 
 namespace tutti {
@@ -125,19 +126,6 @@ Fit Adjust(Scene& scene, bool fixed_focal) {
   return {summary.IsSolutionUsable(), summary.final_cost, summary.num_residuals_reduced};
 }
 
-// Keyframes of the piece with most frames.
-std::vector<int> LargestPiece(const Odometry& odometry, const FrameRange& session) {
-  std::vector<int> keyframes;
-  const std::vector<int> pieces = odometry.Pieces(session);
-  if (pieces.empty()) return keyframes;
-  for (const int id : odometry.KeyframeIds()) {
-    if (odometry.KeyframePiece(id) == pieces.front() && session.Has(odometry.KeyframeFrameIndex(id)) &&
-        odometry.KeyframePose(id).IsFinite())
-      keyframes.push_back(id);
-  }
-  return keyframes;
-}
-
 // So many in a row between which the camera turns most.
 std::vector<int> WhereItTurns(const Odometry& odometry, const std::vector<int>& keyframes, std::size_t most) {
   if (keyframes.size() <= most) return keyframes;
@@ -236,7 +224,7 @@ Pass Track(const Dataset& dataset, const RunConfig& config, const PinholeCamera&
     pass.posed += int(track.state == TrackingState::kTracking);
   }
   odometry.FinishMapping();
-  pass.scene = SceneOf(odometry, LargestPiece(odometry, {}), kMostLandmarks);
+  pass.scene = SceneOf(odometry, KeyframesOfLargestSubmap(odometry, {}), kMostLandmarks);
   return pass;
 }
 
@@ -317,7 +305,7 @@ FocalLength MeasureFocalLength(const fs::path& path, const RunConfig& config, in
 LensCheck CheckLens(const Odometry& odometry, const FrameRange& session) {
   LensCheck check;
   const std::vector<int> keyframes =
-      WhereItTurns(odometry, LargestPiece(odometry, session), kCheckedKeyframes);
+      WhereItTurns(odometry, KeyframesOfLargestSubmap(odometry, session), kCheckedKeyframes);
   std::optional<Scene> scene = SceneOf(odometry, keyframes, kCheckedLandmarks);
   if (!scene) return check;
   const Fit fit = Adjust(*scene, false);

@@ -52,18 +52,26 @@ double ScaleJump(const std::vector<Step>& steps) {
 
 }  // namespace
 
+std::vector<int> KeyframesOfLargestSubmap(const Odometry& odometry, const FrameRange& session) {
+  std::vector<int> keyframes;
+  const std::vector<int> submaps = odometry.Pieces(session);
+  if (submaps.empty()) return keyframes;
+  for (const int id : odometry.KeyframeIds()) {
+    if (odometry.KeyframePiece(id) == submaps.front() && session.Has(odometry.KeyframeFrameIndex(id)) &&
+        odometry.KeyframePose(id).IsFinite())
+      keyframes.push_back(id);
+  }
+  return keyframes;
+}
+
 MapFigures MeasureMap(const Odometry& odometry, const FrameRange& session) {
   MapFigures figures;
-  const std::vector<int> pieces = odometry.Pieces(session);
-  if (pieces.empty()) return figures;
   std::vector<KeyframeView> views;
-  for (const int id : odometry.KeyframeIds()) {
-    if (odometry.KeyframePiece(id) != pieces.front() || !session.Has(odometry.KeyframeFrameIndex(id)))
-      continue;
-    KeyframeView view = odometry.Keyframe(id);
-    view.descriptors.release();
-    if (view.T_world_camera.IsFinite()) views.push_back(std::move(view));
+  for (const int id : KeyframesOfLargestSubmap(odometry, session)) {
+    views.push_back(odometry.Keyframe(id));
+    views.back().descriptors.release();
   }
+  if (views.empty()) return figures;
   std::unordered_map<int, Sighting> landmarks;
   for (const LandmarkView& l : odometry.Landmarks()) {
     if (l.position.allFinite()) landmarks[l.id] = {l.position, l.observations, {}, {}, false};

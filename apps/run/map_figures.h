@@ -3,12 +3,17 @@
 
 #include <cstdint>
 #include <map>
+#include <vector>
 
 #include "tutti/frontend/odometry.h"
 
 namespace tutti {
 
-/// Of the map piece with most frames; zeros where it has no keyframe.
+/// Keyframes of the submap with most of these frames: its ids in order, those of these frames, with finite
+/// poses.
+std::vector<int> KeyframesOfLargestSubmap(const Odometry& odometry, const FrameRange& session);
+
+/// Of that submap; zeros where it has no keyframe.
 struct MapFigures {
   int keyframes = 0;
   double landmarks = 0;    ///< that a keyframe sees, median

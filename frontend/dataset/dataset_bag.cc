@@ -168,7 +168,13 @@ class BagDataset : public Dataset {
     if (bag_.TypeOf(topic) != "sensor_msgs/CameraInfo") return;
     const Messages infos = bag_.Messages(topic);
     if (infos.empty()) return;
-    options_.camera = CameraOfMessage(bag_.Read(infos.front()), file_.string());
+    std::string info;
+    try {
+      info = bag_.Read(infos.front());
+    } catch (const InputError& e) {
+      throw InputError(file_.string() + ": " + topic + ": " + e.what());
+    }
+    options_.camera = CameraOfMessage(info, file_.string());
     if (options_.camera) warnings_.push_back(file_.string() + ": calibration of " + topic);
   }
 

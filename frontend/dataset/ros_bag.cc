@@ -249,13 +249,13 @@ void RosBag::OpenChunk(const Record& record, std::uint64_t file_end) {
   const auto number = static_cast<std::int32_t>(chunks_.size() - 1);
   try {
     if (!chunk.lz4 && compression != "bz2")
-      throw InputError(file_.string() + ": the chunk at byte " + std::to_string(chunk.begin) +
+      throw InputError("the chunk at byte " + std::to_string(chunk.begin) +
                        " is compressed in an unknown way");
     unpacked_bytes_ = Unpack(chunks_.size() - 1);
     unpacked_ = number;
   } catch (const InputError& e) {
     chunk_lost_ = true;
-    if (damage_.empty()) damage_ = e.what();
+    if (damage_.empty()) damage_ = file_.string() + ": " + e.what();
     return;
   }
   Walk(MemoryBytes(unpacked_bytes_), 0, unpacked_bytes_.size(), number);
@@ -263,7 +263,7 @@ void RosBag::OpenChunk(const Record& record, std::uint64_t file_end) {
 
 std::string RosBag::Unpack(std::size_t number) const {
   const Chunk& chunk = chunks_[number];
-  const std::string at = file_.string() + ": the chunk at byte " + std::to_string(chunk.begin);
+  const std::string at = "the chunk at byte " + std::to_string(chunk.begin);
   if (chunk.size > kMostChunkBytes || chunk.unpacked_size > kMostChunkBytes)
     throw InputError(at + " is too large (at most " + std::to_string(kMostChunkBytes) + " bytes are read)");
   std::string packed(chunk.size, '\0'), out;
@@ -320,7 +320,7 @@ std::string RosBag::Read(const BagMessage& message) const {
   const bool read = message.chunk < 0
                         ? FileBytes(&in_).Read(message.begin, bytes.size(), bytes.data())
                         : MemoryBytes(unpacked_bytes_).Read(message.begin, bytes.size(), bytes.data());
-  if (!read) throw InputError(file_.string() + ": a message can't be read (any more)");
+  if (!read) throw InputError("a message can't be read (any more)");
   return bytes;
 }
 

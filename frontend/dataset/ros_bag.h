@@ -41,7 +41,8 @@ class RosBag {
   std::vector<BagMessage> Messages(const std::string& topic) const;
   /// Messages of the topic that lie in chunks that can't be unpacked, as the chunks' own indices count them.
   std::size_t Lost(const std::string& topic) const;
-  /// The bytes of a message. Throws InputError if they can't be read (any more). Thread-safe.
+  /// The bytes of a message. Throws InputError, which does not name the file, if they can't be read (any
+  /// more). Thread-safe.
   std::string Read(const BagMessage& message) const;
   /// One sentence if not all of the file could be read; empty: it is whole.
   const std::string& damage() const { return damage_; }

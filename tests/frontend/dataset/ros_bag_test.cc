@@ -107,6 +107,17 @@ TEST(RosBag, ADamagedChunkIsCountedByItsIndexAndTheOthersAreRead) {
   EXPECT_THAT(bag.damage(), HasSubstr("can't be unpacked"));
 }
 
+// Who reads a frame says which file it is of.
+TEST(RosBag, AMessageThatIsGoneIsSaidWithoutTheFilesName) {
+  const std::filesystem::path file = FreshFile("x.bag", Of(BagPacking::kLz4));
+  const RosBag bag(file);
+  const std::vector<BagMessage> messages = bag.Messages("/a");
+  std::filesystem::resize_file(file, 20);
+  const std::string error = ErrorOf([&] { bag.Read(messages.front()); });
+  EXPECT_THAT(error, HasSubstr("can't be read"));
+  EXPECT_EQ(error.find("x.bag"), std::string::npos) << error;
+}
+
 TEST(RosBag, ADamagedRecordLosesTheRestOfItsChunkAlone) {
   std::string bytes = Of(BagPacking::kPlain);
   const std::size_t second = bytes.find("message 1") - Message(0).size() - 60;

@@ -33,7 +33,7 @@ testing::Recording Drive(SyntheticSensor sensor, Change change) {
   for (std::size_t i = 10; i < 60; ++i) {
     InputFrame again = recording.frames[i];
     again.index = static_cast<std::int64_t>(recording.frames.size());
-    again.stamp_s = recording.frames.back().stamp_s + 1 / options.rate_hz;
+    again.stamp_s = recording.frames.back().stamp_s + 1 / world.Options().rate_hz;
     recording.frames.push_back(again);
   }
   return recording;

@@ -9,7 +9,7 @@ Eigenpairs RealEigen(const SmallMatrixRef& a, double most_imaginary) {
   const Eigen::EigenSolver<SmallMatrix> solver((SmallMatrix(a)));
   Eigenpairs out;
   if (solver.info() != Eigen::Success) return out;
-  const auto values = solver.eigenvalues();
+  const auto& values = solver.eigenvalues();
   const auto vectors = solver.eigenvectors();
   out.values.resize(a.rows());
   out.vectors.resize(a.rows(), a.rows());

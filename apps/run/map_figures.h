@@ -9,11 +9,11 @@
 
 namespace tutti {
 
-/// Keyframes of the submap with most of these frames: its ids in order, those of these frames, with finite
-/// poses.
+/// Ids, ascending, of the session's keyframes that are in its largest submap (by frames) and have a finite
+/// pose.
 std::vector<int> KeyframesOfLargestSubmap(const Odometry& odometry, const FrameRange& session);
 
-/// Of that submap; zeros where it has no keyframe.
+/// Of the largest submap; zeros where it has no keyframe.
 struct MapFigures {
   int keyframes = 0;
   double landmarks = 0;    ///< that a keyframe sees, median

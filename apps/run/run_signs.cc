@@ -122,7 +122,7 @@ const std::vector<SignKind>& SignKinds() {
        "a second help",
        FramesPosed},
       {"largest_piece", "share", "poses in trajectory.txt, of those in all submaps", kBelow, 0.95, 0.5,
-       "the map is several submaps: only %s of the poses are in trajectory.txt",
+       "the map consists of several submaps: only %s of the poses are in trajectory.txt",
        "the others are in trajectory_piece_1.txt, ...; a view of a known place joins them",
        ShareOfLargestPiece},
       {"few_inliers", "share", "frames with a pose, but fewer than 30 landmarks that agree with it", kAbove,

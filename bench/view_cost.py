@@ -3,8 +3,9 @@
 
 usage: ./dev bench view [--frames N] [--rounds N] [--write]   (or bench/view_cost.py --build build/release)
 Runs take turns, so that the machine's load reaches all alike. The attack, from this machine: 1,000 connections that are
-opened again whenever they are closed, 50 clients that send a byte a second, up to 200 MB of garbage. `tracking`: the thread that
-tracks, per frame; `all`: every thread of the process. Needs Python 3 alone.
+opened again whenever they are closed, 50 clients that send a byte a second, up to 200 MB of garbage. After it a run beside a
+loop that takes as much processor time as the attacker took: what it costs to share a machine with anything that busy.
+`tracking`: the thread that tracks, per frame; `all`: every thread of the process. Needs Python 3 alone.
 """
 import json
 import os
@@ -21,7 +22,8 @@ import urllib.request
 import table
 
 DOCUMENT = table.RESULTS / "live-view.md"
-WAYS = {"none": "without the view", "browser": "with a browser", "attack": "with a browser, under attack"}
+WAYS = {"none": "without the view", "browser": "with a browser", "attack": "with a browser, under attack",
+        "busy": "with a browser, beside a program as busy as the attacker"}
 CONNECTIONS, SLOW, GARBAGE_MB = 1000, 50, 200
 
 
@@ -94,8 +96,23 @@ class Attack(threading.Thread):
             return 0
 
 
-def run(a, way):
-    """Figures of one run, and the bytes of its trajectory."""
+class Busy(threading.Thread):
+    """Takes a share of one processor, until `end`."""
+
+    def __init__(self, share):
+        super().__init__(daemon=True)
+        self.share, self.end = share, threading.Event()
+
+    def run(self):
+        begin, used = time.monotonic(), time.thread_time()
+        while not self.end.is_set():
+            while time.thread_time() - used < self.share * (time.monotonic() - begin):
+                pass
+            time.sleep(0.01)
+
+
+def run(a, way, share):
+    """Figures of one run, and the bytes of its trajectory; `share` is that of one processor which Busy takes."""
     out = a.out / way
     command = [a.tutti, "run", "--config", table.ROOT / "data/configs/7scenes.yaml", "--dataset", a.data / "redkitchen", "--out", out,
                "--end", str(a.frames), "--timing", "--no-report", "--quiet"]
@@ -103,26 +120,30 @@ def run(a, way):
         command += ["--view", "--view-port", "0", "--view-wait", "30"]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     counter = {"messages": 0, "connections": 0, "garbage": 0}
-    attack = None
+    beside = None
+    begin = time.monotonic(), time.process_time()
     if way != "none":
         url = re.search(r"look at (\S+)", process.stderr.readline()).group(1)
         if way == "attack":
-            attack = Attack(int(re.search(r":(\d+)/", url).group(1)), counter)
+            beside = Attack(int(re.search(r":(\d+)/", url).group(1)), counter)
+        if way == "busy":
+            beside = Busy(share)
         threading.Thread(target=read_stream, args=(url, counter), daemon=True).start()
-        if attack:
-            attack.start()
+        if beside:
+            beside.start()
     said = process.stderr.read()
     _, status, usage = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)
-    if attack:
-        attack.end.set()
-        attack.join()
+    if beside:
+        beside.end.set()
+        beside.join()
+    share = min(0.95, (time.process_time() - begin[1]) / (time.monotonic() - begin[0]))
     if process.returncode != 0:
         raise SystemExit(f"tutti ended with {process.returncode}: {said}")
     timing = json.loads((out / "summary.json").read_text())["timing"]
     frame = next(s for s in timing["stages"] if s["name"] == "frame")
     return {"tracking": frame["cpu_ms"] / frame["calls"], "all": 1000 * timing["cpu_s"] / frame["calls"],
-            "memory": usage.ru_maxrss / 1024, "bytes": (out / "trajectory.txt").read_bytes(), **counter}
+            "memory": usage.ru_maxrss / 1024, "share": share, "bytes": (out / "trajectory.txt").read_bytes(), **counter}
 
 
 def main():
@@ -132,23 +153,26 @@ def main():
     a = table.parse(parser)
     results = {way: [] for way in WAYS}
     for _ in range(a.rounds):
-        for way in WAYS:
-            results[way].append(run(a, way))
+        share = 0
+        for way in WAYS:  # "busy" as the attack before it
+            results[way].append(run(a, way, share))
+            share = results[way][-1]["share"]
     middle = {way: {key: statistics.median(r[key] for r in runs) for key in runs[0] if key != "bytes"}
               for way, runs in results.items()}
     lines = ["# What the live view costs", "",
              f"Medians of {a.rounds} runs each, taking turns, of redkitchen's first {a.frames} frames; `./dev bench view --write`. The",
              f"attack comes from the same machine: {CONNECTIONS:,} connections that are opened again whenever they are closed, {SLOW} clients",
-             f"that send a byte a second, up to {GARBAGE_MB} MB of garbage (the table has what got through).", "",
-             "| | tracking, CPU-ms per frame | all threads | most memory, MB | messages to the browser | connections | garbage, MB | same bytes |",
-             "|---|---|---|---|---|---|---|---|"]
+             f"that send a byte a second, up to {GARBAGE_MB} MB of garbage (the table has what got through). The last row is beside a loop that",
+             "takes as much processor time as the attacker: what is left of the row before it is the view's.", "",
+             "| | tracking, CPU-ms per frame | all threads | most memory, MB | beside it, of a processor | messages to the browser | connections | garbage, MB | same bytes |",
+             "|---|---|---|---|---|---|---|---|---|"]
     off = middle["none"]
     for way, words in WAYS.items():
         m = middle[way]
         same = all(r["bytes"] == results["none"][0]["bytes"] for r in results[way])
         lines.append(f"| {words} | {m['tracking']:.2f} ({100 * (m['tracking'] / off['tracking'] - 1):+.1f} %) | {m['all']:.1f} "
                      f"({100 * (m['all'] / off['all'] - 1):+.1f} %) | {m['memory']:.0f} ({m['memory'] - off['memory']:+.0f}) | "
-                     f"{m['messages']:.0f} | {m['connections']:.0f} | {m['garbage'] / 1e6:.0f} | {'yes' if same else '**no**'} |")
+                     f"{100 * m['share']:.0f} % | {m['messages']:.0f} | {m['connections']:.0f} | {m['garbage'] / 1e6:.0f} | {'yes' if same else '**no**'} |")
     table.put(a, DOCUMENT, "\n".join(lines))
 
 

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "apps/tutti/commands.h"
+#include "apps/tutti/configuration_of.h"
 #include "tutti/core/error.h"
 #include "tutti/frontend/calibration_check.h"
 #include "tutti/slam/config.h"
@@ -16,7 +17,7 @@ struct CheckArguments {
 };
 
 int Check(const CheckArguments& arguments) {
-  const RunConfig config = LoadConfig(arguments.config);
+  const RunConfig config = ConfigurationOf(arguments.config, arguments.dataset);
   const std::unique_ptr<Dataset> dataset = OpenDataset(arguments.dataset, config.dataset);
   const CameraRig& rig = dataset->Rig();
   for (const std::string& warning : dataset->Warnings()) std::printf("  note: %s\n", warning.c_str());
@@ -54,8 +55,10 @@ int Check(const CheckArguments& arguments) {
 
 void SetUpCalibrateCheck(CLI::App& command, int& exit_code) {
   const auto arguments = std::make_shared<CheckArguments>();
-  command.add_option("--config", arguments->config, "YAML file, as for run")->required();
-  command.add_option("--dataset", arguments->dataset, "data set, as for run")->required();
+  command.add_option("dataset,--dataset", arguments->dataset, "the recording, as for `tutti run`")
+      ->required();
+  command.add_option("--config", arguments->config,
+                     "YAML file, as for `tutti run`; without it, what is found in the recording is checked");
   command.callback([arguments, &exit_code] { exit_code = Check(*arguments); });
 }
 

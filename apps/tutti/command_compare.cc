@@ -16,6 +16,7 @@
 #include "apps/tutti/commands.h"
 #include "apps/tutti/comparison.h"
 #include "apps/tutti/comparison_page.h"
+#include "apps/tutti/configuration_of.h"
 #include "apps/tutti/files.h"
 #include "apps/tutti/run_apart.h"
 #include "apps/tutti/run_with_report.h"
@@ -219,10 +220,11 @@ void WriteComparison(OutputFolder& folder, const Comparison& comparison) {
   ThrowFailures(folder.failures(), where);
 }
 
-int RunCompare(const CLI::App& command, const CompareArguments& arguments) {
+int RunCompare(const CLI::App& command, CompareArguments arguments) {
+  if (arguments.out.empty()) arguments.out = DefaultOutput(arguments.datasets.front(), "-compared");
   const TableFormat format = ParseTableFormat(arguments.table_format);
   CheckVariants(arguments);
-  const RunConfig config = LoadConfig(arguments.config);
+  const RunConfig config = ConfigurationOf(arguments.config, arguments.datasets.front());
   const Experiment experiment(command, arguments, config);
   for (const std::string& dataset : arguments.datasets)
     OpenDataset(dataset, config.dataset);  // what no variant can read is said once
@@ -254,15 +256,16 @@ int RunCompare(const CLI::App& command, const CompareArguments& arguments) {
 
 void SetUpCompare(CLI::App& command, int& exit_code) {
   const auto arguments = std::make_shared<CompareArguments>();
-  command.add_option("--config", arguments->config, "YAML file, as for `tutti run`")->required();
   command
-      .add_option("--dataset", arguments->datasets,
-                  "folder of the data set, or a video file; several (worlds of one kind) make one table")
+      .add_option("dataset,--dataset", arguments->datasets,
+                  "the recording, as for `tutti run`; several (of one kind, read alike) make one table")
       ->required();
-  command
-      .add_option("--out", arguments->out,
-                  "folder for all runs and for comparison.md, comparison.json and report.html")
-      ->required();
+  command.add_option("--config", arguments->config,
+                     "YAML file, as for `tutti run`; without it, layout, sensor and calibration are found in "
+                     "the first recording, and what was found is said");
+  command.add_option("--out", arguments->out,
+                     "folder for all runs and for comparison.md, comparison.json and report.html (default: "
+                     "tutti-out/NAME-compared)");
   command
       .add_option("--variants", arguments->variants,
                   "odometry: no loops; surf, sift, orb, ...: that member alone; naive, product, majority, "
@@ -299,10 +302,8 @@ void SetUpCompare(CLI::App& command, int& exit_code) {
       "run "
       "of its own,\n"
       "whose loops move the map that it tracks on. A run that fails is reported, and the rest go on.\n"
-      "Example: tutti compare --config " +
-      internal::ExampleConfigs() +
-      "/7scenes.yaml --dataset redkitchen --out cmp --variants "
-      "odometry,orb,ensemble");
+      "Example: tutti compare redkitchen --config " +
+      internal::ExampleConfigs() + "/7scenes.yaml --variants odometry,orb,ensemble");
   command.callback([&command, arguments, &exit_code] { exit_code = RunCompare(command, *arguments); });
 }
 

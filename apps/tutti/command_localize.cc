@@ -6,6 +6,7 @@
 #include "apps/run/localization.h"
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
+#include "apps/tutti/files.h"
 #include "apps/tutti/mask_option.h"
 #include "tutti/slam/config.h"
 
@@ -24,6 +25,7 @@ int RunLocalize(const CLI::App& command, const LocalizeArguments& arguments) {
   request.map = arguments.map;
   request.dataset = arguments.dataset;
   request.out = arguments.out;
+  if (arguments.out.empty()) request.out = DefaultOutput(arguments.dataset, "-localized");
   request.threads = arguments.threads;
   request.quiet = arguments.quiet;
   if (!arguments.mask.empty()) request.mask = arguments.mask;
@@ -52,10 +54,13 @@ int RunLocalize(const CLI::App& command, const LocalizeArguments& arguments) {
 void SetUpLocalize(CLI::App& command, int& exit_code) {
   const auto arguments = std::make_shared<LocalizeArguments>();
   command.add_option("--map", arguments->map, "map.tutti of a run; it is only read")->required();
-  command.add_option("--dataset", arguments->dataset, "data set, as for run, of the same camera")->required();
   command
-      .add_option("--out", arguments->out, "folder for the results: a new or empty one, or an earlier one's")
+      .add_option("dataset,--dataset", arguments->dataset,
+                  "the recording, as for `tutti run`, of the same camera")
       ->required();
+  command.add_option("--out", arguments->out,
+                     "folder for the results (default: tutti-out/NAME-localized): a new or empty one, or an "
+                     "earlier one's");
   command.add_option(
       "--config", arguments->config,
       "YAML file that says how to read the data set (sections dataset and camera); without it, as "

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/in_folder.h"
 #include "tests/support/test_data.h"
 
 namespace tutti {
@@ -22,11 +23,8 @@ TEST(ExampleConfigs, AreThoseOfTheInstallationOrElseTheSourceTrees) {
 }
 
 TEST(ExampleConfigs, AreFoundFromAnyWorkingFolder) {
-  const std::filesystem::path before = std::filesystem::current_path();
-  std::filesystem::current_path("/");
-  const bool found = std::filesystem::is_regular_file(internal::ExampleConfig("euroc_mono.yaml"));
-  std::filesystem::current_path(before);
-  EXPECT_TRUE(found);
+  const testing::InFolder root("/");
+  EXPECT_TRUE(std::filesystem::is_regular_file(internal::ExampleConfig("euroc_mono.yaml")));
 }
 
 TEST(ExampleConfigs, OfABuildTreeAreTheSourceTrees) {

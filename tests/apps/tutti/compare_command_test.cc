@@ -8,6 +8,7 @@
 
 #include "tests/apps/tiny_town.h"
 #include "tests/apps/tutti/executable.h"
+#include "tests/support/in_folder.h"
 #include "tests/support/test_data.h"
 
 namespace tutti {
@@ -267,6 +268,22 @@ TEST(CompareCommand, SeveralDataSetsMakeOneTable) {
   EXPECT_EQ(json["datasets"][0]["varies"], "the data set (2)");
   EXPECT_EQ(json["datasets"][0]["variants"][1]["samples"].size(), 2u);
   EXPECT_THAT(run.output, HasSubstr(" and 1 more"));
+}
+
+TEST(CompareCommand, ARecordingThatSaysWhatItIsNeedsNoOption) {
+  const testing::InFolder here(testing::FreshFolder());
+  const fs::path town = fs::absolute(testing::CopyOfTinyTown("town"));
+  const auto run =
+      RunTutti({"compare", town.string(), "--variants", "odometry,orb", "--runs", "1", "--end", "8"});
+  ASSERT_EQ(run.status, 0) << run.output;
+  EXPECT_THAT(run.output, HasSubstr("  camera "));
+  EXPECT_TRUE(fs::exists("tutti-out/town-compared/comparison.json"));
+  // Images alone do not say what the camera is.
+  const auto unknown = RunTutti({"compare", (town / "image_0").string(), "--out", "out"});
+  EXPECT_EQ(unknown.status, 1);
+  EXPECT_THAT(unknown.output,
+              AllOf(HasSubstr("nothing here says what the camera is"), HasSubstr("--config")));
+  EXPECT_FALSE(fs::exists("out"));
 }
 
 TEST(CompareCommand, BadInputIsRefusedBeforeTheFirstRun) {

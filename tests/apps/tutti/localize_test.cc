@@ -8,6 +8,7 @@
 
 #include "tests/apps/tutti/executable.h"
 #include "tests/support/generated_dataset.h"
+#include "tests/support/in_folder.h"
 #include "tests/support/small_town.h"
 #include "tests/support/test_data.h"
 #include "tutti/core/trajectory.h"
@@ -68,6 +69,15 @@ TEST_F(LocalizeCommand, FramesOfASecondLapAreFoundInTheMapOfTheFirstWhichStaysAs
   EXPECT_THAT(csv, ::testing::StartsWith("frame,stamp_s,state,recognised,keyframe,inliers,position_sigma_m"));
   EXPECT_EQ(static_cast<double>(std::count(csv.begin(), csv.end(), '\n')), total + 1);
   EXPECT_THAT(ReadAll(out_ / "localization.svg"), HasSubstr("beyond the map"));
+}
+
+TEST_F(LocalizeCommand, MapAndRecordingAreEnough) {
+  const std::string town = fs::absolute(town_), map = fs::absolute(map_);
+  const testing::InFolder here(testing::FreshFolder());
+  const auto run = RunTutti({"localize", town, "--map", map, "--start", "180", "--end", "184"});
+  ASSERT_EQ(run.status, 0) << run.output;
+  EXPECT_TRUE(fs::exists("tutti-out/" + town_.filename().string() + "-localized/trajectory.txt"))
+      << run.output;
 }
 
 TEST_F(LocalizeCommand, TheResultDoesNotDependOnTheThreads) {

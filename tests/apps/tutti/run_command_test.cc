@@ -137,6 +137,10 @@ TEST(RunCommand, ACalibrationThatCanNotBeRightIsSaidAndTheRunGoesOn) {
       RunTutti({"calibrate-check", "--config", config.string(), "--dataset", testing::TinyTown().string()});
   EXPECT_EQ(right.status, 0) << right.output;
   EXPECT_THAT(right.output, HasSubstr("nothing speaks against"));
+  // What is found in the recording, where no file is given.
+  const auto found = RunTutti({"calibrate-check", testing::TinyTown().string()});
+  EXPECT_EQ(found.status, 0) << found.output;
+  EXPECT_THAT(found.output, HasSubstr("nothing speaks against"));
   const fs::path swapped = testing::CopyOfTinyTown(folder / "swapped");
   fs::rename(swapped / "image_0", swapped / "image");
   fs::rename(swapped / "image_1", swapped / "image_0");

@@ -1,0 +1,15 @@
+// What a command that reads a recording starts from.
+#pragma once
+
+#include <string>
+
+#include "tutti/slam/config.h"
+
+namespace tutti::cli {
+
+/// The configuration in the file `config`; without one (empty), what the recording itself says, which is
+/// printed on stderr. Throws InputError as LoadConfig and Recognise do, and where nothing says what the
+/// camera is.
+RunConfig ConfigurationOf(const std::string& config, const std::string& dataset);
+
+}  // namespace tutti::cli

@@ -163,7 +163,7 @@ def main():
              f"Medians of {a.rounds} runs each, taking turns, of redkitchen's first {a.frames} frames; `./dev bench view --write`. The",
              f"attack comes from the same machine: {CONNECTIONS:,} connections that are opened again whenever they are closed, {SLOW} clients",
              f"that send a byte a second, up to {GARBAGE_MB} MB of garbage (the table has what got through). The last row is beside a loop that",
-             "takes as much processor time as the attacker: what is left of the row before it is the view's.", "",
+             "takes as much processor time as the attacker: the view itself costs the difference between the last two rows.", "",
              "| | tracking, CPU-ms per frame | all threads | most memory, MB | beside it, of a processor | messages to the browser | connections | garbage, MB | same bytes |",
              "|---|---|---|---|---|---|---|---|---|"]
     off = middle["none"]

@@ -15,6 +15,7 @@
 #include "apps/run/runner.h"
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
+#include "apps/tutti/configuration_of.h"
 #include "apps/tutti/exit_code.h"
 #include "apps/tutti/files.h"
 #include "apps/tutti/mask_option.h"
@@ -177,9 +178,7 @@ RunConfig ConfigFor(const CameraRequest& camera, const RunArguments& arguments, 
     return config;
   }
   Recording recording = Recognise(arguments.dataset, camera);
-  if (!arguments.quiet) {
-    for (const std::string& finding : recording.findings) std::fprintf(stderr, "  %s\n", finding.c_str());
-  }
+  if (!arguments.quiet) SayFindings(recording);
   SetImageUse(arguments, recording.config.dataset);
   SetOptions(arguments.set, recording.config);
   if (recording.guessed_lens && IsCamera(arguments.dataset)) {

@@ -2,10 +2,13 @@
 
 #include <cstdio>
 
-#include "apps/run/recording.h"
 #include "tutti/core/error.h"
 
 namespace tutti::cli {
+
+void SayFindings(const Recording& recording) {
+  for (const std::string& finding : recording.findings) std::fprintf(stderr, "  %s\n", finding.c_str());
+}
 
 RunConfig ConfigurationOf(const std::string& config, const std::string& dataset) {
   if (!config.empty()) return LoadConfig(config);
@@ -14,10 +17,10 @@ RunConfig ConfigurationOf(const std::string& config, const std::string& dataset)
     throw InputError(
         dataset +
         ": nothing here says what the camera is: give --config FILE with a section camera, or put "
-        "the file of a calibration beside the images (`tutti run` measures a focal length: "
-        "camera_source in its summary.json)");
+        "a calibration file into its folder (`tutti run` measures a focal length: camera_source "
+        "in its summary.json)");
   }
-  for (const std::string& finding : recording.findings) std::fprintf(stderr, "  %s\n", finding.c_str());
+  SayFindings(recording);
   return recording.config;
 }
 

@@ -3,9 +3,13 @@
 
 #include <string>
 
+#include "apps/run/recording.h"
 #include "tutti/slam/config.h"
 
 namespace tutti::cli {
+
+/// What Recognise found, a line each on stderr.
+void SayFindings(const Recording& recording);
 
 /// The configuration in the file `config`; without one (empty), what the recording itself says, which is
 /// printed on stderr. Throws InputError as LoadConfig and Recognise do, and where nothing says what the

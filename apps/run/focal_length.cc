@@ -113,7 +113,9 @@ Fit Adjust(Scene& scene, bool fixed_focal) {
   }
   problem.AddResidualBlock(new ceres::AutoDiffCostFunction<LensPrior, 3, 4>(new LensPrior{scene.width}),
                            nullptr, scene.lens.data());
-  problem.SetParameterBlockConstant(scene.cameras.front().data());
+  // The first that has seen one of the landmarks: the others are not in the problem.
+  const auto first = static_cast<std::size_t>(scene.observations.front().keyframe);
+  problem.SetParameterBlockConstant(scene.cameras[first].data());
   if (fixed_focal) problem.SetManifold(scene.lens.data(), new ceres::SubsetManifold(4, {0}));
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::SPARSE_SCHUR;
@@ -195,7 +197,8 @@ std::optional<Scene> SceneOf(const Odometry& odometry, const std::vector<int>& k
     const Eigen::Vector3d r = turn.angle() * turn.axis(), t = T_camera_world.translation;
     scene.cameras.push_back({{r.x(), r.y(), r.z(), t.x(), t.y(), t.z()}});
   }
-  if (static_cast<int>(scene.cameras.size()) < kFewestKeyframes || scene.landmarks.size() < 50)
+  if (static_cast<int>(scene.cameras.size()) < kFewestKeyframes || scene.landmarks.size() < 50 ||
+      scene.observations.empty())
     return std::nullopt;
   scene.given = std::log(std::sqrt(c.fx * c.fy));
   scene.lens = {{scene.given, 0, 0, 0}};

@@ -155,6 +155,7 @@ void FrameFeatures::InArea(const cv::Point2f& centre, float radius, int first_oc
 std::shared_ptr<const FrameFeatures> WithoutImages(const FrameFeatures& features) {
   auto out = std::make_shared<FrameFeatures>(features);
   out->pyramid.reset();
+  out->depth_grid.reset();
   return out;
 }
 
@@ -234,24 +235,52 @@ FrameFeatures ExtractOrb(const std::vector<cv::Mat>& pyramid, const OdometryOpti
 
 namespace {
 
+// Inverse depth at a pixel [1/m]; 0 where it is not known, negative at an edge: there, what is seen may
+// belong to either side.
+float InverseDepthAt(const cv::Mat& depth_m, int x, int y, const CameraRig& rig,
+                     const OdometryOptions& options) {
+  if (x < 1 || y < 1 || x + 1 >= depth_m.cols || y + 1 >= depth_m.rows) return 0;
+  const float z = depth_m.at<float>(y, x);
+  if (!(z > 0.05F) || (rig.max_depth_m > 0 && z > rig.max_depth_m)) return 0;
+  bool edge = false;
+  for (const auto& [dx, dy] : {std::pair{-1, 0}, {1, 0}, {0, -1}, {0, 1}}) {
+    const float n = depth_m.at<float>(y + dy, x + dx);
+    edge |= n > 0 && std::abs(1 / n - 1 / z) > 6 * static_cast<float>(options.rgbd_inverse_sigma);
+  }
+  return edge ? -1.0F / z : 1.0F / z;
+}
+
 void AddDepthFromImage(const cv::Mat& depth_m, const CameraRig& rig, const OdometryOptions& options,
                        FrameFeatures* features) {
   for (std::size_t i = 0; i < features->size(); ++i) {
     const cv::Point2f& p = features->keypoints[i].pt;
-    const int x = static_cast<int>(std::lround(p.x)), y = static_cast<int>(std::lround(p.y));
-    if (x < 1 || y < 1 || x + 1 >= depth_m.cols || y + 1 >= depth_m.rows) continue;
-    const float z = depth_m.at<float>(y, x);
-    if (!(z > 0.05F) || (rig.max_depth_m > 0 && z > rig.max_depth_m)) continue;
-    // At a depth edge the corner may belong to either side: trust it only where its neighbours agree.
-    bool edge = false;
-    for (const auto& [dx, dy] : {std::pair{-1, 0}, {1, 0}, {0, -1}, {0, 1}}) {
-      const float n = depth_m.at<float>(y + dy, x + dx);
-      edge |= n > 0 && std::abs(1 / n - 1 / z) > 6 * static_cast<float>(options.rgbd_inverse_sigma);
-    }
-    if (edge) continue;
-    features->inverse_depth[i] = 1.0F / z;
+    const float inverse = InverseDepthAt(depth_m, static_cast<int>(std::lround(p.x)),
+                                         static_cast<int>(std::lround(p.y)), rig, options);
+    if (!(inverse > 0)) continue;
+    features->inverse_depth[i] = inverse;
     features->inverse_depth_sigma[i] = static_cast<float>(options.rgbd_inverse_sigma);
   }
+}
+
+// About 2000 elements: enough for any image that is aligned by them.
+std::shared_ptr<const DepthGrid> GridOf(const cv::Mat& depth_m, const cv::Mat& mask, const CameraRig& rig,
+                                        const OdometryOptions& options) {
+  constexpr int kElements = 2000;
+  constexpr int kFinest = 8;  // [px]
+  auto grid = std::make_shared<DepthGrid>();
+  const double area = double(depth_m.cols) * depth_m.rows;
+  grid->step = std::max(kFinest, static_cast<int>(std::lround(std::sqrt(area / kElements))));
+  grid->columns = depth_m.cols / grid->step;
+  const int rows = depth_m.rows / grid->step;
+  if (rows < 1 || grid->columns < 1) return nullptr;
+  for (int r = 0; r < rows; ++r) {
+    for (int c = 0; c < grid->columns; ++c) {
+      const int x = grid->step / 2 + c * grid->step, y = grid->step / 2 + r * grid->step;
+      const bool masked = !mask.empty() && mask.at<std::uint8_t>(y, x) == 0;
+      grid->inverse_depth.push_back(masked ? 0 : InverseDepthAt(depth_m, x, y, rig, options));
+    }
+  }
+  return grid;
 }
 
 }  // namespace
@@ -262,7 +291,10 @@ FrameFeatures ExtractFeatures(const InputFrame& frame, const CameraRig& rig, con
   FrameFeatures features = ExtractOrb(pyramid, options, frame.mask);
   features.pyramid = shared;
   features.has_depth = !frame.depth_m.empty() || !frame.right.empty();
-  if (!frame.depth_m.empty()) AddDepthFromImage(frame.depth_m, rig, options, &features);
+  if (!frame.depth_m.empty()) {
+    AddDepthFromImage(frame.depth_m, rig, options, &features);
+    features.depth_grid = GridOf(frame.depth_m, frame.mask, rig, options);
+  }
   if (!frame.right.empty()) {
     const std::vector<cv::Mat> right_pyramid = BuildPyramid(frame.right, options);
     const FrameFeatures right = ExtractOrb(right_pyramid, options);

@@ -22,6 +22,29 @@ namespace tutti {
 /// Number of differing bits of two 256-bit descriptors.
 int HammingDistance(const std::uint8_t* a, const std::uint8_t* b);
 
+/// Inverse depth of every step-th pixel.
+struct DepthGrid {
+  int step = 1;                      ///< [px]; the first is in row and column step / 2
+  int columns = 0;                   ///< of one row
+  std::vector<float> inverse_depth;  ///< row by row [1/m]; 0 where it is not known, negative beside an edge
+
+  int Rows() const { return static_cast<int>(inverse_depth.size()) / std::max(1, columns); }
+  float At(int row, int column) const {
+    return inverse_depth[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) +
+                         static_cast<std::size_t>(column)];
+  }
+  Eigen::Vector2d PixelOf(int row, int column) const {
+    return {step / 2 + column * step, step / 2 + row * step};
+  }
+  /// Of the element nearest to a pixel, without its sign.
+  float Near(const Eigen::Vector2d& pixel) const {
+    const auto nearest = [&](double at, int count) {
+      return std::clamp(static_cast<int>(std::lround((at - step / 2) / step)), 0, count - 1);
+    };
+    return std::abs(At(nearest(pixel.y(), Rows()), nearest(pixel.x(), columns)));
+  }
+};
+
 /// Features of one rectified frame. N features.
 struct FrameFeatures {
   std::vector<cv::KeyPoint> keypoints;             ///< N, level-0 pixels, with octave and angle [deg]
@@ -33,7 +56,9 @@ struct FrameFeatures {
   std::vector<cv::Point2f> rolled;  ///< N, what RollingShutter moved the keypoints by [px]; empty: nothing
   std::vector<int> aligned;         ///< N, landmark whose patch the position was aligned with, or -1
   std::shared_ptr<const std::vector<cv::Mat>>
-      pyramid;              ///< of the (left) image; null where it is not needed any more
+      pyramid;  ///< of the (left) image; null where it is not needed any more
+  /// RGB-D: the depth image in short, for ImageAligner; null where it is not needed any more.
+  std::shared_ptr<const DepthGrid> depth_grid;
   bool has_depth = false;   ///< the frame came with a depth or right image
   double row_error_px = 0;  ///< stereo: median absolute row difference of the matches [px]
   int stereo_matches = 0;   ///< stereo: features with a match in the right image

@@ -1,10 +1,13 @@
 // How a camera moved, by the grey values of its images alone: for images too blurred to show corners.
 //
 // C. Forster, M. Pizzoli, D. Scaramuzza, "SVO: Fast Semi-Direct Monocular Visual Odometry", ICRA 2014 (sparse
-// image alignment), on coarse images, where blur is small, as G. Klein and D. Murray, "Improving the Agility
-// of Keyframe-Based SLAM", ECCV 2008, do.
+// image alignment), on coarse images, as G. Klein and D. Murray, "Improving the Agility of Keyframe-Based
+// SLAM", ECCV 2008, do; and each image blurred once more by the other's motion, so that both are blurred
+// alike (P. Liu, X. Zuo, V. Larsson, M. Pollefeys, "MBA-VO: Motion Blur Aware Visual Odometry", ICCV 2021,
+// blur the sharp one).
 #pragma once
 
+#include <array>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <vector>
@@ -19,6 +22,14 @@ namespace tutti {
 struct CameraMotion {
   Pose T_camera_world;
   Vector6d motion = Vector6d::Zero();
+  Vector6d change = Vector6d::Zero();  ///< of the motion, per second
+
+  /// T_then_now: `seconds` later.
+  Pose Then(double seconds) const { return ExpSE3((motion + 0.5 * seconds * change) * seconds); }
+  /// The same, from a time that is `time` later.
+  Pose Then(double time, double seconds) const {
+    return ExpSE3((motion + (time + 0.5 * seconds) * change) * seconds);
+  }
 };
 
 /// Immutable.
@@ -29,18 +40,34 @@ class ImageAligner {
   /// Places of an earlier frame that are known in the world.
   struct Reference {
     const FrameFeatures* features = nullptr;
-    Pose T_camera_world;
-    std::vector<double> depth;  ///< of each feature [m]; 0: not known
+    CameraMotion camera;
+    std::vector<double> depth;     ///< of each feature [m]; 0: not known
+    double since_s = 0;            ///< the reference was taken so long before [s]
+    std::optional<Vector6d> step;  ///< mean motion from the frame before to the reference
   };
 
   /// Where the camera is that sees `seen` (features as the image has them), from about `start`, so that the
-  /// places look as in the reference. None if they do not, or if an image is not there any more.
-  /// `start.sigma`: holds the motion.
+  /// places look as in the reference. Both images are exposed for `exposure_s`. None if they do not, or if an
+  /// image is not there any more. With a rolling shutter `prior` holds the motion, which else goes on
+  /// changing as it did from `start.motion`, that between the two frames before.
   std::optional<CameraMotion> Align(const Reference& reference, const FrameFeatures& seen,
-                                    const CameraMotion& start, const MotionPrior& prior) const;
+                                    const CameraMotion& start, const MotionPrior& prior,
+                                    double exposure_s) const;
+
+  /// Exposures that Misfits compares [s].
+  static constexpr int kExposures = 9;
+  static double Exposure(int i) { return 0.005 * i; }
+  /// Mean square difference of the grey values if the images were exposed for each of them. All zero: that
+  /// can't be told.
+  std::array<double, kExposures> Misfits(const Reference& reference, const FrameFeatures& seen,
+                                         const CameraMotion& camera) const;
 
  private:
   class Level;
+  struct Point;
+  struct Streak;
+  void MoveOn(const Reference& from, CameraMotion* reference, CameraMotion* now) const;
+  std::vector<Point> PointsOf(const Reference& reference) const;
   PinholeCamera camera_;
   RollingShutter shutter_;
 };

@@ -11,7 +11,7 @@ namespace tutti {
 /// Why a frame becomes a keyframe; the first one that holds.
 enum class KeyframeNeed {
   kNone,       ///< it does not
-  kVeryWeak,   ///< tracking would soon be lost
+  kVeryWeak,   ///< tracking would soon be lost, or lives on grey values alone
   kFewNear,    ///< stereo and depth: few landmarks are near enough to hold the camera's place
   kWeak,       ///< fewer landmarks than OdometryOptions::keyframe_inlier_ratio are left
   kUncovered,  ///< stereo and depth: too much of the image has no landmark

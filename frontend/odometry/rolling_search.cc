@@ -17,7 +17,11 @@ constexpr double kTurningNoise = 0.02;  // of what rows tell [rad/s]
 constexpr double kMovingNoise = 0.01;   // [1/s], in units of that depth
 constexpr double kMotionHolds = 0.1;    // after so long nothing is known of the motion [s]
 constexpr double kUnknownDepth = 3;     // of a view without landmarks [m]
-constexpr int kMostByGrey = 30;         // frames in a row that grey values alone pose
+constexpr double kBlurred = 10;         // corners are at the ends of streaks that are longer [px]
+constexpr double kLongExposure = 0.03;  // of what may be blurred as long as nothing is known [s]
+constexpr int kAskAgain = 8;            // frames, after which the exposure may be another
+constexpr double kManyInliers = 3;      // that outweigh grey values, in units of those that a pose needs
+constexpr int kMostByGrey = 90;         // frames in a row that grey values alone pose
 constexpr double kFastestTurn = 10;     // [rad/s]
 constexpr double kFastestMove = 2;      // [1/s], in units of the depth of what is in view
 
@@ -28,7 +32,25 @@ Vector6d Sigma(double dt, double depth) {
   return sigma;
 }
 
+// Of a motion that steps between frames tell.
+Vector6d SigmaOfChange(double dt, double depth) {
+  const double curve = 5.0 / 12 * dt * dt;  // what an even change leaves out
+  Vector6d sigma;
+  sigma << Eigen::Vector3d::Constant(depth * (kMovingJerk * curve + kMovingNoise)),
+      Eigen::Vector3d::Constant(kTurningJerk * curve + kTurningNoise);
+  return sigma;
+}
+
+bool AsksExposure(const TrackedFrame& frame, const LastFrame& last) {
+  return !last.exposure.IsKnown() || frame.index % kAskAgain == 0;
+}
+
 }  // namespace
+
+// How fast what is in view moves through the image [px/s].
+double RollingSearch::SpeedOf(const Vector6d& motion, double depth) const {
+  return focal_px_ * (motion.tail<3>().norm() + motion.head<3>().norm() / depth);
+}
 
 RollingSearch::Expected RollingSearch::Expect(const Map& map, const TrackedFrame& frame,
                                               const LastFrame& last) const {
@@ -38,9 +60,13 @@ RollingSearch::Expected RollingSearch::Expect(const Map& map, const TrackedFrame
   const bool known = last.velocity && dt > 0 && dt < kMotionHolds;
   if (known) expected.camera.motion = *last.velocity;
   expected.camera.T_camera_world = ExpSE3(expected.camera.motion * dt) * last.T_camera_world;
+  const Vector6d next = last.motion + dt * last.change;  // of a camera that goes on changing its motion
+  for (const Vector6d& motion : {expected.camera.motion, next})
+    expected.speed_px_s = std::max(expected.speed_px_s, SpeedOf(motion, expected.depth));
+  expected.exposure_s = last.exposure.Seconds();
   expected.prior.motion = expected.camera.motion;
   expected.prior.sigma = Sigma(known ? dt : kMotionHolds, expected.depth);
-  if (known && shutter_.Rolls()) {
+  if (known && shutter_.Rolls() && last.by_grey == 0) {
     expected.prior.since_s = dt;
     expected.prior.T_camera_world_before = last.T_camera_world;
     expected.prior.motion_before = *last.velocity;
@@ -63,6 +89,9 @@ std::optional<PoseFix> RollingSearch::Find(const Map& map, const TrackedFrame& f
   if (last.reference < 0) return std::nullopt;
   const Expected expected = Expect(map, frame, last);
   std::optional<PoseFix> fix;
+  if (!lost && expected.speed_px_s * expected.exposure_s > kBlurred)
+    fix = Blurred(map, frame, last, expected);
+  if (fix) return fix;
   if (last.by_grey > 0) fix = Near(map, frame, last, expected);
   if (!fix) {
     TrackedFrame straight = frame;
@@ -70,6 +99,10 @@ std::optional<PoseFix> RollingSearch::Find(const Map& map, const TrackedFrame& f
     fix = search_.Find(map, straight, last, lost);
     if (!fix) return lost ? fix : ByGreyValues(map, frame, last, expected);
     if (shutter_.Rolls()) fix = Again(map, *frame.features, expected, *std::move(fix));
+  }
+  if (!lost && AsksExposure(frame, last) && expected.speed_px_s * kLongExposure > kBlurred) {
+    if (const auto by_grey = Aligned(map, frame, last, expected))
+      TellExposure(map, frame, last, *by_grey, &*fix);
   }
   if (last.by_grey > 0) {
     if (const auto by_grey = Aligned(map, frame, last, expected))
@@ -88,13 +121,14 @@ std::optional<PoseFix> RollingSearch::Near(const Map& map, const TrackedFrame& f
   return fix && shutter_.Rolls() ? Again(map, *frame.features, expected, *std::move(fix)) : fix;
 }
 
-// Where the grey values of the last frame say that the camera is.
-std::optional<CameraMotion> RollingSearch::Aligned(const Map& map, const TrackedFrame& frame,
-                                                   const LastFrame& last, const Expected& expected) const {
-  const double dt = frame.stamp_s - last.frame.stamp_s;
-  if (!(dt > 0 && dt < kMotionHolds)) return std::nullopt;
+ImageAligner::Reference RollingSearch::ReferenceOf(const Map& map, const LastFrame& last,
+                                                   double stamp_s) const {
   const FrameFeatures& before = *last.frame.features;
-  ImageAligner::Reference reference{&before, last.T_camera_world, std::vector<double>(before.size(), 0)};
+  ImageAligner::Reference reference{&before,
+                                    {last.T_camera_world, last.motion, last.change},
+                                    std::vector<double>(before.size(), 0),
+                                    stamp_s - last.frame.stamp_s,
+                                    last.step};
   for (std::size_t f = 0; f < before.size(); ++f) {
     const int l = last.matches.landmarks[f];
     if (l >= 0 && map.landmark(l).alive) {
@@ -104,8 +138,58 @@ std::optional<CameraMotion> RollingSearch::Aligned(const Map& map, const Tracked
       reference.depth[f] = 1 / double(before.inverse_depth[f]);
     }
   }
-  std::optional<CameraMotion> found =
-      aligner_.Align(reference, *frame.features, expected.camera, expected.prior);
+  return reference;
+}
+
+// Of an image that is expected to be blurred: by grey values, unless it is sharp after all and shows the map.
+std::optional<PoseFix> RollingSearch::Blurred(const Map& map, const TrackedFrame& frame,
+                                              const LastFrame& last, const Expected& expected) const {
+  if (last.by_grey >= kMostByGrey) return std::nullopt;
+  const std::optional<CameraMotion> aligned = Aligned(map, frame, last, expected);
+  if (!aligned) return std::nullopt;
+  Expected found = expected;
+  found.camera = *aligned;
+  PoseFix fix = FixByGrey(frame, last, found);
+  if (AsksExposure(frame, last)) TellExposure(map, frame, last, *aligned, &fix);
+  fix.sharp = SpeedOf(aligned->motion, expected.depth) * expected.exposure_s <= kBlurred;
+  if (!fix.sharp) return fix;
+  found.prior.motion = aligned->motion;
+  found.prior.sigma = SigmaOfChange(frame.stamp_s - last.frame.stamp_s, expected.depth);
+  found.prior.since_s = 0;
+  std::optional<PoseFix> near = Near(map, frame, last, found);
+  if (!near || near->inliers < kManyInliers * options_.min_inliers) return fix;
+  near->drift = LogSE3(near->T_camera_world * fix.T_camera_world.Inverse());
+  near->misfits = fix.misfits;
+  return near;
+}
+
+PoseFix RollingSearch::FixByGrey(const TrackedFrame& frame, const LastFrame& last,
+                                 const Expected& found) const {
+  TrackedFrame straight = frame;
+  straight.features = Straight(frame, found);
+  PoseFix fix(straight);
+  fix.T_camera_world = found.camera.T_camera_world;
+  fix.reference = last.reference;
+  fix.by_grey = true;
+  if (shutter_.Rolls()) fix.motion = found.camera.motion;
+  return fix;
+}
+
+void RollingSearch::TellExposure(const Map& map, const TrackedFrame& frame, const LastFrame& last,
+                                 const CameraMotion& camera, PoseFix* fix) const {
+  const auto misfits = aligner_.Misfits(ReferenceOf(map, last, frame.stamp_s), *frame.features, camera);
+  if (misfits[0] > 0) fix->misfits = misfits;
+}
+
+// Where the grey values of the last frame say that the camera is.
+std::optional<CameraMotion> RollingSearch::Aligned(const Map& map, const TrackedFrame& frame,
+                                                   const LastFrame& last, const Expected& expected) const {
+  const double dt = frame.stamp_s - last.frame.stamp_s;
+  if (!(dt > 0 && dt < kMotionHolds)) return std::nullopt;
+  MotionPrior prior = expected.prior;
+  if (last.step) prior.sigma = SigmaOfChange(dt, expected.depth);
+  std::optional<CameraMotion> found = aligner_.Align(ReferenceOf(map, last, frame.stamp_s), *frame.features,
+                                                     expected.camera, prior, expected.exposure_s);
   if (!found) return std::nullopt;
   const Vector6d step = LogSE3(found->T_camera_world * last.T_camera_world.Inverse());
   const bool possible =
@@ -122,13 +206,8 @@ std::optional<PoseFix> RollingSearch::ByGreyValues(const Map& map, const Tracked
   better.camera.T_camera_world = found->T_camera_world;
   if (shutter_.Rolls()) better.camera.motion = found->motion;
   if (auto fix = Near(map, frame, last, better)) return fix;
-  TrackedFrame straight = frame;
-  straight.features = Straight(frame, better);
-  PoseFix fix(straight);
-  fix.T_camera_world = found->T_camera_world;
-  fix.reference = last.reference;
-  fix.by_grey = true;
-  if (shutter_.Rolls()) fix.motion = found->motion;
+  PoseFix fix = FixByGrey(frame, last, better);
+  fix.sharp = last.exposure.IsKnown();
   return fix;
 }
 

@@ -11,13 +11,14 @@ namespace tutti {
 
 /// With a global shutter, PoseSearch. With a rolling one, features are straightened first by the motion so
 /// far, and, once the frame is found, by the motion that its own rows tell: of a turning camera, they show it
-/// better than the step from the last frame. Where landmarks can't be found, because the image is blurred,
-/// the grey values of the last frame tell where the camera went. Frames come with features as the image has
+/// better than the step from the last frame. In an image that is blurred, as far as the exposure is known,
+/// landmarks are found at the ends of their streaks, or not at all: there, and where else none are found, the
+/// grey values of the last frame tell where the camera went. Frames come with features as the image has
 /// them; a fix has them straightened.
 class RollingSearch {
  public:
   RollingSearch(const OdometryOptions& options, const CameraRig& rig)
-      : options_(options), search_(options, rig), shutter_(rig), aligner_(rig) {}
+      : options_(options), focal_px_(rig.camera.fx), search_(options, rig), shutter_(rig), aligner_(rig) {}
 
   /// As PoseSearch::Find.
   std::optional<PoseFix> Find(const Map& map, const TrackedFrame& frame, const LastFrame& last,
@@ -29,12 +30,21 @@ class RollingSearch {
   struct Expected {
     CameraMotion camera;
     MotionPrior prior;
-    double depth = 0;  // of what is in view [m]
+    double depth = 0;       // of what is in view [m]
+    double speed_px_s = 0;  // of what is in view, through the image
+    double exposure_s = 0;  // as far as it is known
   };
+  double SpeedOf(const Vector6d& motion, double depth) const;
   Expected Expect(const Map& map, const TrackedFrame& frame, const LastFrame& last) const;
   std::shared_ptr<const FrameFeatures> Straight(const TrackedFrame& frame, const Expected& expected) const;
   std::optional<CameraMotion> Aligned(const Map& map, const TrackedFrame& frame, const LastFrame& last,
                                       const Expected& expected) const;
+  std::optional<PoseFix> Blurred(const Map& map, const TrackedFrame& frame, const LastFrame& last,
+                                 const Expected& expected) const;
+  ImageAligner::Reference ReferenceOf(const Map& map, const LastFrame& last, double stamp_s) const;
+  PoseFix FixByGrey(const TrackedFrame& frame, const LastFrame& last, const Expected& found) const;
+  void TellExposure(const Map& map, const TrackedFrame& frame, const LastFrame& last,
+                    const CameraMotion& camera, PoseFix* fix) const;
   std::optional<PoseFix> ByGreyValues(const Map& map, const TrackedFrame& frame, const LastFrame& last,
                                       const Expected& expected) const;
   std::optional<PoseFix> Near(const Map& map, const TrackedFrame& frame, const LastFrame& last,
@@ -42,6 +52,7 @@ class RollingSearch {
   PoseFix Again(const Map& map, const FrameFeatures& seen, const Expected& expected, PoseFix fix) const;
 
   OdometryOptions options_;
+  double focal_px_;
   PoseSearch search_;
   RollingShutter shutter_;
   ImageAligner aligner_;

@@ -9,6 +9,7 @@
 
 #include "frontend/features/features.h"
 #include "frontend/features/matcher.h"
+#include "frontend/odometry/exposure_estimate.h"
 #include "tutti/core/pose.h"
 
 namespace tutti {
@@ -33,11 +34,13 @@ struct PoseFix {
   TrackedFrame frame;    ///< its features are aligned with their landmarks
   FrameMatches matches;  ///< of frame.features
   Pose T_camera_world;
-  int reference = -1;              ///< keyframe that shares most landmarks with it
-  std::vector<int> visible;        ///< landmarks that should be in view
-  std::vector<int> found;          ///< those that are, -1 between them
-  int inliers = 0;                 ///< landmarks that agree with the pose
-  bool by_grey = false;            ///< no landmarks: the grey values of the last frame say so
+  int reference = -1;        ///< keyframe that shares most landmarks with it
+  std::vector<int> visible;  ///< landmarks that should be in view
+  std::vector<int> found;    ///< those that are, -1 between them
+  int inliers = 0;           ///< landmarks that agree with the pose
+  bool by_grey = false;      ///< no landmarks: the grey values of the last frame say so
+  bool sharp = false;        ///< by grey values, and known to be sharp enough for a keyframe
+  std::optional<ExposureEstimate::Misfits> misfits;  ///< if the image says something of its exposure
   std::optional<Vector6d> drift;   ///< of the frames by grey values before it: T = Exp(drift) T_by_grey
   std::optional<Vector6d> motion;  ///< that the rows of a rolling shutter tell: T_later = Exp(motion dt) T
 
@@ -55,7 +58,11 @@ struct LastFrame {
   TrackedFrame frame;
   FrameMatches matches;  ///< of frame.features
   Pose T_camera_world;
-  std::optional<Vector6d> velocity;        ///< of T_camera_world, per second: T_now = Exp(v dt) T_last
+  std::optional<Vector6d> velocity;    ///< of T_camera_world, per second: T_now = Exp(v dt) T_last
+  std::optional<Vector6d> step;        ///< mean motion from the frame before, as the velocity
+  Vector6d motion = Vector6d::Zero();  ///< while it was exposed, by this step and the one before
+  Vector6d change = Vector6d::Zero();  ///< of that motion, per second
+  ExposureEstimate exposure;
   bool steady = false;                     ///< the velocity before led to where the frame was found
   int reference = -1;                      ///< keyframe that shares most landmarks with it; -1: no frame yet
   int newest_keyframe = -1;                ///< or the one where the frame was found again
@@ -67,8 +74,8 @@ struct LastFrame {
 
   template <class Archive>
   void State(Archive& archive) {
-    archive(frame, matches.landmarks, T_camera_world, velocity, steady, reference, newest_keyframe,
-            frames_since_keyframe, by_grey);
+    archive(frame, matches.landmarks, T_camera_world, velocity, step, motion, change, exposure, steady,
+            reference, newest_keyframe, frames_since_keyframe, by_grey);
     if (Archive::kReading) matches.features = frame.features.get();
   }
 };

@@ -32,21 +32,35 @@ bool Tracker::GoesOn(const PoseFix& fix, const Map& map) const {
 
 // The frame has this pose: it may become a keyframe, and is what the next one starts from.
 Tracker::Tracked Tracker::Accept(PoseFix fix, const Map& map) {
-  const KeyframeNeed need = fix.by_grey ? KeyframeNeed::kNone : policy_.Need(map, fix, last_);
+  const KeyframeNeed need = policy_.Need(map, fix, last_);
   const double dt = fix.frame.stamp_s - last_.frame.stamp_s;
   const bool moves = state_ == TrackingState::kTracking && dt > 0 && dt < kLongestGap;
   last_.steady = moves && GoesOn(fix, map);
-  const Vector6d motion = LogSE3(fix.T_camera_world * last_.T_camera_world.Inverse());
-  last_.velocity = moves ? std::optional<Vector6d>(motion / dt) : std::nullopt;
+  // What grey values had drifted by before is no motion.
+  const Pose seen = fix.drift ? ExpSE3(*fix.drift).Inverse() * fix.T_camera_world : fix.T_camera_world;
+  const Vector6d motion = LogSE3(seen * last_.T_camera_world.Inverse());
+  Move(moves ? std::optional<Vector6d>(motion / dt) : std::nullopt, dt);
   if (fix.motion) last_.velocity = fix.motion;
+  if (fix.misfits) last_.exposure.Add(*fix.misfits);
   Keep(fix);
   const int by_grey_before = fix.by_grey ? 0 : last_.by_grey;
   last_.by_grey = fix.by_grey ? last_.by_grey + 1 : 0;
   return {std::move(fix), need, by_grey_before};
 }
 
+// The mean motion from the last frame to this one; none: it is not known.
+void Tracker::Move(const std::optional<Vector6d>& step, double dt) {
+  const std::optional<Vector6d> before = last_.step;
+  last_.velocity = last_.step = step;
+  last_.motion = step.value_or(Vector6d::Zero());
+  last_.change = Vector6d::Zero();
+  if (!step || !before) return;
+  last_.change = (*step - *before) / dt;
+  last_.motion += 0.5 * (*step - *before);
+}
+
 void Tracker::Follow(const PoseFix& fix) {
-  last_.velocity.reset();
+  Move(std::nullopt, 0);
   last_.steady = false;
   Keep(fix);
 }
@@ -66,6 +80,9 @@ void Tracker::Begin(const TrackedFrame& frame, const Keyframe& keyframe) {
   // the first frame may be a lorry that drives along. Another map of one camera has another unit.
   const double lost_s = frame.stamp_s - last_.frame.stamp_s;
   if (sensor_ == Sensor::kMono || !(lost_s >= 0 && lost_s <= kVelocityHolds)) last_.velocity.reset();
+  const std::optional<Vector6d> velocity = last_.velocity;
+  Move(std::nullopt, 0);
+  last_.velocity = velocity;
   last_.frame = frame;
   last_.matches.features = frame.features.get();
   last_.T_camera_world = keyframe.T_world_camera.Inverse();
@@ -91,7 +108,11 @@ void Tracker::FollowReference(const Pose& T_world_old, const Similarity& S_world
   Pose T_reference_camera = T_world_old.Inverse() * last_.T_camera_world.Inverse();
   T_reference_camera.translation *= S_world_new.scale;
   last_.T_camera_world = (S_world_new.RigidPart() * T_reference_camera).Inverse();
-  if (last_.velocity) last_.velocity->head<3>() *= S_world_new.scale;
+  for (std::optional<Vector6d>* motion : {&last_.velocity, &last_.step}) {
+    if (*motion) (*motion)->head<3>() *= S_world_new.scale;
+  }
+  last_.motion.head<3>() *= S_world_new.scale;
+  last_.change.head<3>() *= S_world_new.scale;
 }
 
 void Tracker::FollowLandmarks(const Map& map) {

@@ -61,6 +61,7 @@ class Tracker {
  private:
   Tracked Accept(PoseFix fix, const Map& map);
   bool GoesOn(const PoseFix& fix, const Map& map) const;
+  void Move(const std::optional<Vector6d>& step, double dt);
   void Keep(const PoseFix& fix);
 
   RollingSearch search_;

@@ -1,6 +1,7 @@
 // The state of features and keyframes, for saved maps (core/state_archive.h): most of what such a map is.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -154,6 +155,23 @@ void StateOfPyramid(Archive& archive, std::shared_ptr<const std::vector<cv::Mat>
   }
 }
 
+template <class Archive>
+void StateOfDepthGrid(Archive& archive, std::shared_ptr<const DepthGrid>* grid) {
+  bool is_there = *grid != nullptr;
+  archive(is_there);
+  if (!is_there) return;
+  DepthGrid state = *grid ? **grid : DepthGrid();
+  archive(state.step, state.columns, state.inverse_depth);
+  if constexpr (Archive::kReading) {
+    const std::size_t size = state.inverse_depth.size();
+    const bool whole = state.columns > 0 && size > 0 && size % static_cast<std::size_t>(state.columns) == 0;
+    const bool finite = std::all_of(state.inverse_depth.begin(), state.inverse_depth.end(),
+                                    [](float d) { return std::isfinite(d); });
+    if (state.step < 1 || !whole || !finite) archive.Damaged("depths that are none");
+    *grid = std::make_shared<const DepthGrid>(std::move(state));
+  }
+}
+
 }  // namespace internal
 
 template <class Archive>
@@ -183,6 +201,7 @@ void FrameFeatures::State(Archive& archive) {
   }
   archive(lens, other_camera, has_depth, row_error_px, stereo_matches, columns_, rows_);
   internal::StateOfPyramid(archive, &pyramid);
+  internal::StateOfDepthGrid(archive, &depth_grid);
   if constexpr (Archive::kReading) {
     const bool described =
         descriptors.rows == static_cast<int>(size()) && (size() == 0 || descriptors.cols == 32);

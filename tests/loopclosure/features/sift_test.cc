@@ -189,8 +189,9 @@ std::vector<double> DescriptorOfARamp(double turn_deg) {
   const auto before = static_cast<std::size_t>(direction);
   const double after = direction - static_cast<double>(before);
   for (std::size_t cell = 0; cell < 16; ++cell) {
+    const std::size_t row = cell / 4, column = cell % 4;
     const double weight =
-        ShareOfCells(static_cast<double>(cell % 4) - 1.5) * ShareOfCells(static_cast<double>(cell / 4) - 1.5);
+        ShareOfCells(static_cast<double>(column) - 1.5) * ShareOfCells(static_cast<double>(row) - 1.5);
     values[8 * cell + before % 8] += weight * (1 - after);
     values[8 * cell + (before + 1) % 8] += weight * after;
   }

@@ -18,6 +18,7 @@ cv::Mat ValuesOf(const std::vector<float>& values) { return cv::Mat(values, true
 // Places far from each other.
 std::vector<cv::Point2f> FarApart(int count) {
   std::vector<cv::Point2f> points;
+  points.reserve(static_cast<std::size_t>(count));
   for (int i = 0; i < count; ++i) points.emplace_back(10.0f * static_cast<float>(i), 0.0f);
   return points;
 }

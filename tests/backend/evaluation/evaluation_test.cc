@@ -189,6 +189,23 @@ TEST(Evaluation, KittiErrorsFollowTheDevelopmentKitForMatricesThatAreNotQuiteRot
   EXPECT_NEAR(errors.rotation_deg_per_m, 180 / M_PI * r / static_cast<double>(n), 1e-12);
 }
 
+// Where the trace says that the cosine is more than one: matrices of files are rotations but for rounding.
+TEST(Evaluation, KittiErrorsOfNoTurnAndOfHalfATurnAreNumbersInSpiteOfRounding) {
+  std::vector<PoseMatrix> reference, no_turn, half_turn;
+  for (int k = 0; k <= 150; ++k) {
+    PoseMatrix pose{Eigen::Matrix3d::Identity(), {1.0 * k, 0, 0}};
+    reference.push_back(pose);
+    pose.rotation *= 1 - 1e-6 * k;
+    no_turn.push_back(pose);
+    if (k > 60) pose.rotation *= Eigen::Vector3d(-1, -1, 1).asDiagonal();
+    half_turn.push_back(pose);
+  }
+  const KittiErrors none = EvaluateKitti(reference, no_turn);
+  EXPECT_EQ(none.segments, 5u);  // of 100 m each
+  EXPECT_EQ(none.rotation_deg_per_m, 0);
+  EXPECT_NEAR(EvaluateKitti(reference, half_turn).rotation_deg_per_m, 180.0 / 100, 1e-12);
+}
+
 TEST(Evaluation, DriftOfAKnownScaleErrorOnAShortPath) {
   std::vector<PoseMatrix> reference, estimate;
   for (int k = 0; k <= 100; ++k) {

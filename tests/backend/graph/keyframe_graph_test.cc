@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
+#include <utility>
 #include <vector>
 
 #include "tests/backend/graph/synthetic_graph.h"
@@ -302,6 +304,105 @@ TEST(KeyframeGraph, EdgesOfRemovedKeyframesLeadToWhatStandsForThem) {
     EXPECT_NEAR(step / turned, 3, 0.01) << "three edges in a row have three times the variance";
     EXPECT_TRUE(graph.Optimize({}).success);
   }
+}
+
+// Between which nothing was measured, though there are edges from the one to others, and from others to it.
+TEST(KeyframeGraph, AKeyframeMayGoIntoOneThatItHasNoEdgeTo) {
+  for (const int other : {1, 4, 5}) {
+    const auto synthetic = Drifting(GraphKind::kSE3, 10);
+    std::vector<MapKeyframe> keyframes = KeyframesOf(synthetic);
+    KeyframeGraph graph{KeyframeGraphOptions()};
+    graph.Update(keyframes, {{1, 9, 100}, {4, 9, 100}, {5, 8, 100}});
+    const auto at = [&](int id) { return keyframes[static_cast<std::size_t>(id)].T_world_keyframe; };
+    LoopEdge loop;
+    loop.candidate = 0;
+    loop.query = 7;
+    loop.information = MakeInformation(0.02, 0.01, 0.05);
+    ASSERT_TRUE(graph.Rehang({{7, other}}, &loop));
+    EXPECT_EQ(loop.query, other);
+    const Pose expected = at(7).Inverse() * at(other);  // the loop itself says that 0 and 7 are in one place
+    EXPECT_LT((loop.S_candidate_query.translation - expected.translation).norm(), 1e-12) << other;
+    graph.Remove({{7, other}});
+    keyframes.erase(keyframes.begin() + 7);
+    graph.Update(keyframes);
+    const PoseGraph small = graph.Graph({});
+    for (const PoseGraphEdge& edge : small.edges()) {
+      const Pose in_map = synthetic.graph.Node(edge.from).pose.RigidPart().Inverse() *
+                          synthetic.graph.Node(edge.to).pose.RigidPart();
+      EXPECT_LT((edge.measurement.translation - in_map.translation).norm(), 1e-12)
+          << edge.from << ", " << edge.to << " after 7 went into " << other;
+    }
+  }
+}
+
+// Of two ways to the same keyframe the one over fewer edges is the surer one.
+TEST(KeyframeGraph, AnEdgeThatIsThereIsNotReplacedByOneThatLeadsOverARemovedKeyframe) {
+  const auto synthetic = Drifting(GraphKind::kSE3, 10);
+  std::vector<MapKeyframe> keyframes = KeyframesOf(synthetic);
+  KeyframeGraph graph{KeyframeGraphOptions()};
+  graph.Update(keyframes, {{2, 4, 100}});
+  const auto turn_variance = [&graph](int from, int to) {
+    const PoseGraph built = graph.Graph({});
+    for (const PoseGraphEdge& edge : built.edges()) {
+      if (std::minmax(edge.from, edge.to) == std::minmax(from, to)) return 1 / edge.information(3, 3);
+    }
+    return 0.0;
+  };
+  const double direct = turn_variance(2, 4);
+  EXPECT_GT(direct, 0);
+  graph.Remove({{3, 2}, {7, 6}});
+  keyframes.erase(keyframes.begin() + 7);
+  keyframes.erase(keyframes.begin() + 3);
+  graph.Update(keyframes);
+  EXPECT_NEAR(turn_variance(2, 4), direct, 1e-9 * direct);
+  EXPECT_NEAR(turn_variance(6, 8), 2 * direct, 1e-9 * direct) << "over 7";
+}
+
+// Length of the way that an edge's uncertainty is of, after keyframes of a path round corners have left.
+double WayOf(const std::pair<int, int>& ends, const std::map<int, int>& into) {
+  KeyframeGraphOptions options;
+  options.sigma_translation_floor = 1e-12;
+  std::vector<MapKeyframe> keyframes;
+  for (const Eigen::Vector3d& at : {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(3, 0, 0),
+                                    Eigen::Vector3d(3, 4, 0), Eigen::Vector3d(3, 4, 12)})
+    keyframes.push_back({static_cast<int>(keyframes.size()), 0, Pose(ExpSO3(0.1 * at), at)});
+  KeyframeGraph graph(options);
+  graph.Update(keyframes, {{0, 3, 100}});
+  graph.Remove(into);
+  const PoseGraph built = graph.Graph({});
+  for (const PoseGraphEdge& edge : built.edges()) {
+    if (std::minmax(edge.from, edge.to) == std::minmax(ends.first, ends.second))
+      return 1 / std::sqrt(edge.information(0, 0)) / options.sigma_translation_ratio;
+  }
+  return 0;
+}
+
+// Errors of length add up along the way round a corner, not along the straight line.
+TEST(KeyframeGraph, AnEdgeOverARemovedKeyframeIsAsUncertainAsItsWayIsLong) {
+  EXPECT_NEAR(WayOf({0, 3}, {}), 13, 1e-3);
+  EXPECT_NEAR(WayOf({0, 2}, {{1, 0}}), 3 + 4, 1e-3);
+  EXPECT_NEAR(WayOf({1, 3}, {{2, 1}}), 4 + 12, 1e-3);
+  EXPECT_NEAR(WayOf({0, 2}, {{3, 2}}), 13 + 12, 1e-3) << "from the newer one to an older one";
+}
+
+// A correction moves the keyframes apart, but what was measured between them stays.
+TEST(KeyframeGraph, ALoopOfARemovedKeyframeIsLedOnAsMeasured) {
+  const auto synthetic = Drifting(GraphKind::kSE3);
+  KeyframeGraph graph = FromOdometry(synthetic, GraphKind::kSE3);
+  const KeyframeCorrection correction = graph.Optimize({TrueLoop(synthetic, 5, 105)});
+  graph.Move(correction.S_world_keyframe, correction.merges);
+  std::vector<MapKeyframe> moved;
+  for (const auto& [id, S] : correction.S_world_keyframe) moved.push_back({id, 0, S.RigidPart()});
+  graph.Update(moved);
+  LoopEdge loop = TrueLoop(synthetic, 5, 105);
+  loop.S_candidate_query = Similarity();
+  ASSERT_TRUE(graph.Rehang({{105, 104}}, &loop));
+  const auto odometry = [&](int id) { return synthetic.graph.Node(id).pose; };
+  const Similarity measured = odometry(105).Inverse() * odometry(104);
+  const Similarity in_map =
+      correction.S_world_keyframe.at(105).Inverse() * correction.S_world_keyframe.at(104);
+  EXPECT_GT((measured.translation - in_map.translation).norm(), 1e-4);
+  EXPECT_LT((loop.S_candidate_query.translation - measured.translation).norm(), 1e-9);
 }
 
 TEST(KeyframeGraph, RemovedKeyframesLeaveTheMeasurementsOfBeforeACorrection) {

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 namespace tutti {
 namespace {
 
@@ -28,6 +30,58 @@ TEST(RobustLoss, DcsIsBoundedAndSmoothAtItsThreshold) {
   const double numeric =
       (RobustWeight(RobustLoss::kDcs, 10 + h, 4.0) - RobustWeight(RobustLoss::kDcs, 10 - h, 4.0)) / (2 * h);
   EXPECT_NEAR(rho[2], numeric, 1e-7);
+}
+
+TEST(RobustLoss, DerivativesThatCeresGetsAreThoseOfTheCost) {
+  const internal::DcsLoss dcs(4.0);
+  const internal::GemanMcClureLoss geman_mcclure(4.0);
+  for (const ceres::LossFunction* loss : {static_cast<const ceres::LossFunction*>(&dcs),
+                                          static_cast<const ceres::LossFunction*>(&geman_mcclure)}) {
+    for (double s : {0.5, 3.0, 6.0, 50.0}) {
+      constexpr double kStep = 1e-5;
+      double here[3], before[3], after[3];
+      loss->Evaluate(s, here);
+      loss->Evaluate(s - kStep, before);
+      loss->Evaluate(s + kStep, after);
+      EXPECT_NEAR(here[1], (after[0] - before[0]) / (2 * kStep), 1e-8) << s;
+      EXPECT_NEAR(here[2], (after[1] - before[1]) / (2 * kStep), 1e-8) << s;
+    }
+  }
+  double rho[3];
+  geman_mcclure.Evaluate(4.0, rho);
+  EXPECT_NEAR(rho[0], 2.0, 1e-12) << "half of its bound where s is the threshold";
+}
+
+// Of switchable constraints the cost is that of the best switch: its own, (1 - switch)^2 times the threshold,
+// and the edge's at the square of the switch.
+TEST(RobustLoss, SwitchableConstraintsCostWhatTheBestSwitchDoes) {
+  for (double s : {0.5, 4.0, 30.0}) {
+    const auto cost = [s](double at) { return (1 - at) * (1 - at) * 4.0 + at * at * s; };
+    const double best = RobustWeight(RobustLoss::kSwitchable, s, 4.0);
+    EXPECT_NEAR(RobustCost(RobustLoss::kSwitchable, s, 4.0), cost(best), 1e-12);
+    EXPECT_LT(cost(best), cost(best + 1e-3));
+    EXPECT_LT(cost(best), cost(best - 1e-3));
+  }
+}
+
+// Probability that a chi-square variable is smaller, by numerical integration of its density.
+double ChiSquareProbability(int degrees_of_freedom, double quantile) {
+  constexpr int kSteps = 20000;
+  const double half = 0.5 * degrees_of_freedom, step = quantile / kSteps;
+  double sum = 0;
+  for (int i = 0; i < kSteps; ++i) {
+    const double x = (i + 0.5) * step;
+    sum += step * std::pow(x, half - 1) * std::exp(-0.5 * x);
+  }
+  return sum / (std::pow(2.0, half) * std::tgamma(half));
+}
+
+TEST(ChiSquare, QuantilesHaveTheirProbabilities) {
+  for (int n : {3, 6, 7}) {
+    EXPECT_NEAR(ChiSquareProbability(n, internal::ChiSquare99(n)), 0.99, 1e-6) << n;
+    EXPECT_NEAR(ChiSquareProbability(n, internal::ChiSquareMedian(n)), 0.5, 1e-6) << n;
+    EXPECT_NEAR(ChiSquareProbability(n, internal::ChiSquare3Sigma(n)), std::erf(3 / std::sqrt(2)), 1e-6) << n;
+  }
 }
 
 TEST(RobustLoss, GncWeightsGoFromSmoothToInOrOut) {

@@ -74,6 +74,42 @@ TEST(ChordalDescent, EndsWhereNoPoseCanMoveAndLowerTheCost) {
   }
 }
 
+// Residuals of eleven degrees: with less than the exact second derivatives it takes dozens of steps.
+TEST(ChordalDescent, ConvergesInAFewStepsHoweverNoisyTheGraph) {
+  for (GraphKind kind : kKinds) {
+    const testing::SyntheticGraph noisy = testing::MakeSyntheticGraph(testing::NoisyOptions(kind, 0.6, 0.2));
+    std::vector<Similarity> poses = noisy.truth;
+    const internal::SolveSummary summary =
+        MinimiseChordal(noisy.graph, internal::AnalyseGraph(noisy.graph), 200, 0, poses);
+    EXPECT_TRUE(summary.converged);
+    EXPECT_LE(summary.iterations, 12) << ToString(kind);
+  }
+}
+
+// From poses that are anywhere, where many a step leads uphill and has to be taken back.
+TEST(ChordalDescent, NeverEndsHigherForOneIterationMore) {
+  for (GraphKind kind : kKinds) {
+    const testing::SyntheticGraph noisy = testing::MakeSyntheticGraph(testing::NoisyOptions(kind, 0.3, 0.2));
+    const internal::GraphStructure structure = internal::AnalyseGraph(noisy.graph);
+    for (unsigned seed = 1; seed <= 3; ++seed) {
+      std::mt19937 random(seed);
+      std::vector<Similarity> start = noisy.truth;
+      for (std::size_t k = 1; k < start.size(); ++k) start[k] = testing::RandomPose(kind, random, 20, 2);
+      double last = ChordalCost(noisy.graph, structure, start);
+      int lower = 0;
+      for (int iterations = 1; iterations <= 40; ++iterations) {
+        std::vector<Similarity> poses = start;
+        EXPECT_TRUE(MinimiseChordal(noisy.graph, structure, iterations, 0, poses).usable);
+        const double cost = ChordalCost(noisy.graph, structure, poses);
+        EXPECT_LE(cost, last * (1 + 1e-12)) << ToString(kind) << ", " << iterations << " iterations";
+        lower += cost < last ? 1 : 0;
+        last = cost;
+      }
+      EXPECT_GT(lower, 5);
+    }
+  }
+}
+
 TEST(ChordalDescent, FixedNodesAndAnchorsStay) {
   PoseGraph graph = testing::MakeSyntheticGraph(testing::NoisyOptions(GraphKind::kSE3, 0.1, 0.1)).graph;
   graph.SetFixed(17, true);

@@ -2,9 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <random>
+#include <utility>
+#include <vector>
 
 #include "tests/loopclosure/vocabulary/random_descriptors.h"
 
@@ -30,6 +34,34 @@ double Recall(DescriptorIndex& index, const cv::Mat& rows, const Noise& noise) {
     found += index.Search(query)[0].first == i ? 1 : 0;
   }
   return found / (rows.rows / 10.0);
+}
+
+// Equal distances go to the smaller id.
+TEST(TwoNearest, AreTheSameInWhateverOrderCandidatesCome) {
+  std::vector<std::pair<float, int>> candidates = {{1, 7}, {2, 3}, {2, 5}, {2, 9}, {4, 1}, {4, 8}};
+  for (const float nearest : {1.0f, 2.0f, 4.0f}) {  // alone, one of four alike, one of three
+    candidates[0].first = nearest;
+    std::vector<std::pair<float, int>> order = candidates;
+    std::sort(order.begin(), order.end());
+    const std::vector<std::pair<float, int>> expected = order;
+    do {
+      TwoNearest found;
+      for (const auto& [distance, word] : order) found.Offer(word, distance);
+      for (const auto& [distance, word] : order) found.Offer(word, distance);  // none counts twice
+      ASSERT_EQ(found.first, expected[0].second);
+      ASSERT_EQ(found.second, expected[1].second);
+      ASSERT_EQ(found.first_distance, expected[0].first);
+      ASSERT_EQ(found.second_distance, expected[1].first);
+    } while (std::next_permutation(order.begin(), order.end()));
+  }
+}
+
+TEST(TwoNearest, OfOneCandidateHaveNoSecond) {
+  TwoNearest found;
+  found.Offer(4, 2.5f);
+  EXPECT_EQ(found.first, 4);
+  EXPECT_EQ(found.second, -1);
+  EXPECT_EQ(found.second_distance, std::numeric_limits<float>::infinity());
 }
 
 TEST(DescriptorIndex, KdForestFindsMostNearestNeighbours) {

@@ -139,7 +139,6 @@ void LocateAll(const LocalizationRequest& request, const Dataset& dataset, const
   reading.end = dataset.Size();
   reading.ahead = request.threads > 1 ? 4 : 0;
   reading.stop = &InterruptGuard::Requested;
-  reading.prepare = [&slam](InputFrame& frame) { frame.features = slam.odometry()->Extract(frame); };
   Prefetcher frames(dataset, reading);
   Progress progress("localize", dataset.Size(), request.quiet ? nullptr : stderr);
   const Pose T_camera_body = dataset.Rig().T_body_camera.Inverse();

@@ -24,10 +24,12 @@ Window MakeWindow(const Map& map, const std::vector<int>& moving, const std::vec
   window.first_observation.push_back(0);
   for (int id : landmarks) {
     const Landmark& l = map.landmark(id);
+    const bool stays = id < options.kept_landmarks;
     window.points.push_back(l.position);
+    if (stays) ++window.fixed_points;
     for (const Observation& o : l.observations) {
       const auto camera = cameras.find(o.keyframe);
-      if (camera == cameras.end()) continue;
+      if (camera == cameras.end() || (stays && camera->second >= window.moving)) continue;
       if (options.only_aligned && map.Doubtful(o, id)) continue;
       window.observations.push_back(
           {camera->second, Measured(map, *map.keyframe(o.keyframe).features, o, id, options.pixel_sigma)});
@@ -49,6 +51,7 @@ int RemoveMisfits(const PinholeCamera& camera, const std::vector<int>& moving, c
   for (int id : landmarks) {
     const Landmark& l = map->landmark(id);
     for (const Observation& o : l.observations) {
+      if (o.keyframe < options.kept_keyframes) continue;
       const auto pose = T_camera_world.find(o.keyframe);
       if (pose == T_camera_world.end()) continue;
       PointObservation m = Measured(*map, *map->keyframe(o.keyframe).features, o, id, options.pixel_sigma);
@@ -111,7 +114,8 @@ BundleAdjustmentReport AdjustWindow(const PinholeCamera& camera, const std::vect
   if (options.observe_lens) report.lens_seen = ObserveLens(camera, window);
   for (std::size_t i = 0; i < moving.size(); ++i)
     map->keyframe(moving[i]).T_world_camera = window.T_camera_world[i].Inverse();
-  for (std::size_t i = 0; i < landmarks.size(); ++i) map->landmark(landmarks[i]).position = window.points[i];
+  for (std::size_t i = window.fixed_points; i < landmarks.size(); ++i)
+    map->landmark(landmarks[i]).position = window.points[i];
   report.removed = RemoveMisfits(camera, moving, fixed, landmarks, options, window.lens, map);
   Refresh(landmarks, map);
   return report;
@@ -122,6 +126,7 @@ BundleAdjustmentReport AdjustLocally(const PinholeCamera& camera, int keyframe,
   std::vector<int> moving = map->BestCovisible(keyframe, options.keyframes - 1, 15);
   moving.push_back(keyframe);
   std::sort(moving.begin(), moving.end());
+  moving.erase(moving.begin(), std::lower_bound(moving.begin(), moving.end(), options.kept_keyframes));
   std::map<int, int> votes;  // keyframes outside the window -> common landmarks
   for (int id : moving) {
     for (int l : map->keyframe(id).landmarks) {

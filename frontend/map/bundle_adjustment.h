@@ -14,6 +14,8 @@ namespace tutti {
 struct BundleAdjustmentOptions {
   int keyframes = 12;         ///< keyframes that move: the newest and those most covisible with it
   int fixed_keyframes = 20;   ///< others that see the same landmarks hold the window in place
+  int kept_keyframes = 0;     ///< keyframes with smaller ids stay as they are, and keep all that they see
+  int kept_landmarks = 0;     ///< landmarks with smaller ids stay where they are
   int iterations = 6;         ///< most Levenberg-Marquardt iterations
   double pixel_sigma = 1.0;   ///< standard deviation of a keypoint at pyramid level 0 [px]
   bool metric = false;        ///< depth measurements fix the scale: one fixed keyframe is enough, else two

@@ -15,7 +15,7 @@ constexpr float kFusionError =
 constexpr float kLoopError = 5.0F;  // of a landmark that a loop projects [standard deviations of a corner]
 }  // namespace
 
-void FuseInto(int keyframe, const std::vector<std::pair<int, int>>& found, Map* map) {
+void FuseInto(int keyframe, const std::vector<std::pair<int, int>>& found, Map* map, int kept) {
   for (const auto& [landmark, feature] : found) {
     if (!map->landmark(landmark).alive) continue;
     const int present = map->keyframe(keyframe).landmarks[static_cast<std::size_t>(feature)];
@@ -23,22 +23,24 @@ void FuseInto(int keyframe, const std::vector<std::pair<int, int>>& found, Map* 
     if (present < 0) {
       map->AddObservation(landmark, keyframe, feature);
     } else {
-      const bool keep_present =
+      const bool more_views =
           map->landmark(present).observations.size() >= map->landmark(landmark).observations.size();
+      const bool one_is_kept = (present < kept) != (landmark < kept);
+      const bool keep_present = one_is_kept ? present < kept : more_views;
       map->Merge(keep_present ? landmark : present, keep_present ? present : landmark);
     }
   }
 }
 
-void FuseNeighbours(const PinholeCamera& camera, int id, Map* map) {
+void FuseNeighbours(const PinholeCamera& camera, int id, Map* map, int kept) {
   const std::vector<int> neighbours = map->BestCovisible(id, kNeighbours, kMinShared);
   for (int other : neighbours) {
     const auto found =
         MatchForFusion(*map, camera, map->keyframe(other), map->LandmarksOf({id}), kFusionError);
-    FuseInto(other, found, map);
+    FuseInto(other, found, map, kept);
   }
   FuseInto(id, MatchForFusion(*map, camera, map->keyframe(id), map->LandmarksOf(neighbours), kFusionError),
-           map);
+           map, kept);
   for (int l : map->LandmarksOf({id})) map->UpdateLandmark(l);
 }
 

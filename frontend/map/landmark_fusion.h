@@ -10,12 +10,13 @@
 namespace tutti {
 
 /// Lets `keyframe` see the landmarks at the features of `found` (landmark, feature). Where it sees another
-/// one there, the two are merged into the one with more views.
-void FuseInto(int keyframe, const std::vector<std::pair<int, int>>& found, Map* map);
+/// one there, the two are merged into the one with more views; a landmark with an id below `kept` wins
+/// against one that has none.
+void FuseInto(int keyframe, const std::vector<std::pair<int, int>>& found, Map* map, int kept = 0);
 
 /// What a keyframe and those with most landmarks in common with it see is looked for in each other, and
 /// fused.
-void FuseNeighbours(const PinholeCamera& camera, int keyframe, Map* map);
+void FuseNeighbours(const PinholeCamera& camera, int keyframe, Map* map, int kept = 0);
 
 /// After a loop: what the keyframes around `older` see is looked for in those around `newer`, and fused.
 /// `T_older_newer`: as the loop says, which is more precise than the map. Returns how many landmarks the two

@@ -161,13 +161,14 @@ void LocalMapper::Align(int id, Map* map) {
   std::vector<int> window = map->BestCovisible(id, kImages, 15);
   window.push_back(id);
   for (int k : window) {
+    if (k < kept_keyframes_) continue;
     const Keyframe& frame = map->keyframe(k);
     if (!frame.features->pyramid) continue;
     auto moved =
         AlignFeatures(*map, rig_.camera, frame.T_world_camera.Inverse(), frame.landmarks, *frame.features);
     if (moved) map->keyframe(k).features = moved;
   }
-  if (id < kImages) return;
+  if (id - kImages < kept_keyframes_) return;
   Keyframe& old = map->keyframe(id - kImages);
   old.features = WithoutImages(*old.features);
 }
@@ -184,7 +185,7 @@ void LocalMapper::Process(int id, Map* map, StageTimes* stages) {
       step();
     };
     timed("triangulate", [&] { Triangulate(id, map); });
-    timed("fuse", [&] { FuseNeighbours(rig_.camera, id, map); });
+    timed("fuse", [&] { FuseNeighbours(rig_.camera, id, map, kept_landmarks_); });
     timed("align", [&] { Align(id, map); });
   }
   if (keeps_poses_) {
@@ -195,12 +196,14 @@ void LocalMapper::Process(int id, Map* map, StageTimes* stages) {
   BundleAdjustmentOptions ba;
   ba.keyframes = options_.ba_keyframes;
   ba.fixed_keyframes = options_.ba_fixed_keyframes;
+  ba.kept_keyframes = kept_keyframes_;
+  ba.kept_landmarks = kept_landmarks_;
   ba.iterations = options_.ba_iterations;
   ba.pixel_sigma = options_.pixel_sigma;
   ba.metric = rig_.sensor != Sensor::kMono;
   ba.only_aligned = !ba.metric;
   ba.lens.value = lens_.Remaining().value;  // known and fixed: a lens that each window fits for itself bends
-  ba.observe_lens = lens_.Enabled();        // the map
+  ba.observe_lens = lens_.Enabled() && kept_keyframes_ == 0;  // the map
   const BundleAdjustmentReport report = AdjustLocally(rig_.camera, id, ba, map);
   if (report.lens_seen) lens_.Learn(*report.lens_seen, report.keyframes + report.fixed, map);
 }

@@ -36,6 +36,13 @@ class LocalMapper {
   /// adjustment, and landmarks are made between neighbours in time.
   void KeepPoses() { keeps_poses_ = true; }
 
+  /// From now on what is in the map stays as it is; keyframes and landmarks that come are fitted to it.
+  void Keep(const Map& map) {
+    kept_keyframes_ = map.KeyframeCount();
+    kept_landmarks_ = map.LandmarkCount();
+    recent_.clear();
+  }
+
   /// Full treatment of the newest keyframe; its landmark matches, and those of its own depth, are already in
   /// the map. Adds milliseconds to `stages`.
   void Process(int keyframe, Map* map, StageTimes* stages);
@@ -59,7 +66,8 @@ class LocalMapper {
   CameraRig rig_;
   SelfCalibration lens_;
   bool keeps_poses_ = false;
-  std::vector<std::pair<int, int>> recent_;  // landmark, keyframe in which it was made
+  int kept_keyframes_ = 0, kept_landmarks_ = 0;  // of a map that stays: those with smaller ids
+  std::vector<std::pair<int, int>> recent_;      // landmark, keyframe in which it was made
 };
 
 }  // namespace tutti

@@ -157,6 +157,7 @@ class WindowSolver {
         else
           AddObservation<2>(n, i);
       }
+      if (i < window_.fixed_points) FixPoint(i);
     }
   }
 
@@ -186,6 +187,14 @@ class WindowSolver {
     pose_gradient_[c].noalias() += jc.transpose() * r;
     pose_lens_[c].noalias() += jc.transpose() * jl;
     pose_point_[n].noalias() = jc.transpose() * jp;
+  }
+
+  // Nothing asks it to move, and no camera moves with it.
+  void FixPoint(std::size_t i) {
+    point_gradient_[i].setZero();
+    point_lens_[i].setZero();
+    for (std::size_t n = window_.first_observation[i]; n < window_.first_observation[i + 1]; ++n)
+      pose_point_[n].setZero();
   }
 
   // Solves the damped normal equations; `predicted`: by how much the cost should fall.

@@ -28,7 +28,8 @@ struct WindowObservation {
 struct Window {
   std::vector<Pose> T_camera_world;             ///< the `moving` ones first, then the fixed
   int moving = 0;                               ///< cameras that are adjusted
-  std::vector<Eigen::Vector3d> points;          ///< in the world
+  std::vector<Eigen::Vector3d> points;          ///< in the world; the fixed ones first
+  std::size_t fixed_points = 0;                 ///< points that are not adjusted
   std::vector<WindowObservation> observations;  ///< those of point 0, of point 1, ...
   std::vector<std::size_t> first_observation;   ///< of each point, and their number at the end
   LensError lens;                               ///< in: what is known of it; out: with what the window says

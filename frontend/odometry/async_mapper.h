@@ -42,6 +42,9 @@ class AsyncMapper {
   /// LocalMapper::KeepPoses. Nothing may be under way.
   void KeepPoses() { mapper_.KeepPoses(); }
 
+  /// LocalMapper::Keep, of all that is in the map. Nothing may be under way.
+  void KeepMap() { mapper_.Keep(map_); }
+
   bool Busy() const { return outcome_.valid(); }
   void NextFrame() { ++frames_; }
   /// True if the result is to enter now.

@@ -79,8 +79,11 @@ void Odometry::Append(const Odometry& other, std::int64_t frame_offset) {
 std::int64_t Odometry::FrameOffset() const { return impl_->frame_offset(); }
 int Odometry::SessionPiece() const { return impl_->session_piece(); }
 void Odometry::BeginLocalization() { impl_->BeginLocalization(); }
-bool Odometry::BeyondMap() const { return impl_->BeyondMap(); }
-int Odometry::ReferenceKeyframe() const { return impl_->last().reference; }
+bool Odometry::BeyondMap() const { return impl_->localizer().Beyond(); }
+int Odometry::ReferenceKeyframe() const {
+  const int of_map = impl_->localizer().keyframe();
+  return of_map >= 0 ? of_map : impl_->last().reference;
+}
 std::optional<Matrix6d> Odometry::PoseCovariance() const { return impl_->PoseCovariance(); }
 void Odometry::FinishMapping() { impl_->EnterMapping(); }
 std::vector<int> Odometry::TakeMapped() { return impl_->TakeMapped(); }

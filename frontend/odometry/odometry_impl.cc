@@ -22,7 +22,8 @@ Odometry::Impl::Impl(const OdometryOptions& options, const CameraRig& rig)
       initializer_(options, rig),
       tracker_(options, rig),
       relocalizer_(options, rig),
-      follower_(options, rig) {}
+      follower_(options, rig),
+      localizer_(options, rig) {}
 
 void Odometry::Impl::GoOn(const Impl& before, std::int64_t frame_offset) {
   UseOwnThreads(before.mapper_.own_threads());
@@ -53,16 +54,35 @@ void Odometry::Impl::Append(const Impl& other, std::int64_t frame_offset) {
 TrackResult Odometry::Impl::Track(const InputFrame& input) {
   mapper_.NextFrame();
   if (mapper_.Due()) EnterMapping();
-  const TrackedFrame frame = Prepare(input);
-  result_ = tracker_.state() == TrackingState::kInitializing ? Initialize(frame) : TrackMap(frame);
+  if (tracker_.state() == TrackingState::kInitializing) {
+    const TrackedFrame frame = Prepare(input, options_.features);
+    result_ = Initialize(frame);
+    result_.features = static_cast<int>(frame.features->size());
+    return result_;
+  }
+  const bool few = !input.features && localizer_.features() < options_.features;
+  TrackedFrame frame = Prepare(input, localizer_.features());
+  const std::optional<Tracker> before = few ? std::optional(tracker_) : std::nullopt;
+  Tracker::Tracked tracked = Look(frame);
+  if (few && (!tracked.fix || localizer_.Doubts(*tracked.fix, last().frames_since_keyframe))) {
+    tracker_ = *before;
+    frame = Prepare(input, options_.features);
+    tracked = Look(frame);
+  }
+  result_ = TrackMap(frame, tracked);
   result_.features = static_cast<int>(frame.features->size());
   return result_;
+}
+
+Tracker::Tracked Odometry::Impl::Look(const TrackedFrame& frame) {
+  const ScopedStopwatch watch(&stages_, Lane::kTracking, "track");
+  return tracker_.Track(frame, map());
 }
 
 TrackResult Odometry::Impl::Follow(const InputFrame& input, const Pose& T_odom_camera) {
   mapper_.NextFrame();
   if (mapper_.Due()) EnterMapping();
-  const TrackedFrame frame = Prepare(input);
+  const TrackedFrame frame = Prepare(input, options_.features);
   if (!follower_.started()) {
     result_ = FollowFirst(frame, T_odom_camera);
   } else {
@@ -106,11 +126,13 @@ TrackResult Odometry::Impl::FollowFirst(const TrackedFrame& frame, const Pose& T
   return result;
 }
 
-TrackedFrame Odometry::Impl::Prepare(const InputFrame& input) {
+TrackedFrame Odometry::Impl::Prepare(const InputFrame& input, int features) {
   TrackedFrame frame{input.index + frame_offset_, input.stamp_s, input.features};
   if (!frame.features) {
     const ScopedStopwatch watch(&stages_, Lane::kTracking, "extract");
-    frame.features = std::make_shared<const FrameFeatures>(ExtractFeatures(input, rig_, options_));
+    OdometryOptions options = options_;
+    options.features = features;
+    frame.features = std::make_shared<const FrameFeatures>(ExtractFeatures(input, rig_, options));
   }
   frame.features = mapper_.lens().Correct(frame.features);
   if (rig_.sensor == Sensor::kStereo && frame.features->has_depth) {
@@ -146,14 +168,10 @@ TrackResult Odometry::Impl::Initialize(const TrackedFrame& frame) {
   return result;
 }
 
-TrackResult Odometry::Impl::TrackMap(const TrackedFrame& frame) {
-  Tracker::Tracked tracked;
-  {
-    const ScopedStopwatch watch(&stages_, Lane::kTracking, "track");
-    tracked = tracker_.Track(frame, map());
-  }
+TrackResult Odometry::Impl::TrackMap(const TrackedFrame& frame, const Tracker::Tracked& tracked) {
   if (tracked.fix) return Accept(tracked);
-  if (relocalizer_.Lose(frame) && !map_keyframes_) {  // a loop closure may join the two pieces later
+  localizer_.Lost();
+  if (relocalizer_.Lose(frame) && !localizer_.Begun()) {  // a loop closure may join the two pieces later
     tracker_.GiveUp();
     initializer_.NextPiece();
   }
@@ -179,7 +197,8 @@ TrackResult Odometry::Impl::RelocalizeAt(int keyframe) {
 
 void Odometry::Impl::BeginLocalization() {
   EnterMapping();
-  map_keyframes_ = map().KeyframeCount();
+  localizer_.Begin(map());
+  mapper_.KeepMap();
   initializer_.Reset();
   tracker_.Forget();
   relocalizer_.Found();
@@ -217,23 +236,18 @@ TrackResult Odometry::Impl::Accept(const Tracker::Tracked& tracked) {
   TrackResult result;
   result.state = TrackingState::kTracking;
   result.inliers = tracked.fix->inliers;
-  if (map_keyframes_ ? MustExtend(tracked) : tracked.need != KeyframeNeed::kNone)
-    result.keyframe = InsertKeyframe();
+  localizer_.Found(*tracked.fix, map());
+  if (BecomesKeyframe(tracked)) result.keyframe = InsertKeyframe();
   const LastFrame& last = tracker_.last();
   history_.Add(last.frame, last.T_camera_world, map().keyframe(last.reference));
   result.T_world_camera = last.T_camera_world.Inverse();
-  if (BeyondMap()) relocalizer_.Wait(last.frame);
+  if (localizer_.Beyond()) relocalizer_.Wait(last.frame);
   return result;
 }
 
-// The map has too little of what is in view.
-bool Odometry::Impl::MustExtend(const Tracker::Tracked& tracked) const {
-  return tracked.need == KeyframeNeed::kVeryWeak || tracked.need == KeyframeNeed::kFewNear ||
-         (tracked.need == KeyframeNeed::kWeak && tracked.fix->Share() < 0.3);
-}
-
-bool Odometry::Impl::BeyondMap() const {
-  return map_keyframes_ && tracker_.last().reference >= *map_keyframes_;
+bool Odometry::Impl::BecomesKeyframe(const Tracker::Tracked& tracked) const {
+  return localizer_.Begun() ? localizer_.MustExtend(*tracked.fix, last().frames_since_keyframe)
+                            : tracked.need != KeyframeNeed::kNone;
 }
 
 // Makes the last tracked frame a keyframe.
@@ -278,7 +292,7 @@ void Odometry::Impl::Correct(const std::map<int, Similarity>& S_world_keyframe,
 
 std::map<int, int> Odometry::Impl::RemoveRedundantKeyframes(
     const std::function<bool(int removed, int into)>& may) {
-  if (map_keyframes_) throw InputError("frames are being located in the map: it must stay as it is");
+  if (localizer_.Begun()) throw InputError("frames are being located in the map: it must stay as it is");
   EnterMapping();
   const std::size_t least_views = rig_.sensor == Sensor::kMono ? 2 : 1;  // that tell where a landmark is
   const std::set<int> keep = {last().reference, last().newest_keyframe, result_.keyframe};

@@ -9,6 +9,7 @@
 #include "core/section_file.h"
 #include "frontend/odometry/async_mapper.h"
 #include "frontend/odometry/frame_history.h"
+#include "frontend/odometry/localizer.h"
 #include "frontend/odometry/map_initializer.h"
 #include "frontend/odometry/pose_follower.h"
 #include "frontend/odometry/relocalizer.h"
@@ -33,7 +34,6 @@ class Odometry::Impl {
   TrackResult Follow(const InputFrame& frame, const Pose& T_odom_camera);
   TrackResult RelocalizeAt(int keyframe);
   void BeginLocalization();
-  bool BeyondMap() const;
   std::optional<Matrix6d> PoseCovariance() const;
   /// Waits for the mapping that is under way, if any, and brings its result in.
   void EnterMapping();
@@ -60,6 +60,7 @@ class Odometry::Impl {
   const AsyncMapper& mapper() const { return mapper_; }
   const FrameHistory& history() const { return history_; }
   const LastFrame& last() const { return tracker_.last(); }
+  const Localizer& localizer() const { return localizer_; }
   std::int64_t frame_offset() const { return frame_offset_; }
   int session_piece() const { return session_piece_; }
   const StageTimes& stages() const { return stages_; }
@@ -70,24 +71,25 @@ class Odometry::Impl {
   void SetRecorder(SpanRecorder* recorder) { stages_.recorder = recorder; }
 
  private:
-  TrackedFrame Prepare(const InputFrame& input);
+  TrackedFrame Prepare(const InputFrame& input, int features);
+  Tracker::Tracked Look(const TrackedFrame& frame);
   TrackResult Initialize(const TrackedFrame& frame);
   TrackResult FollowFirst(const TrackedFrame& frame, const Pose& T_odom_camera);
-  TrackResult TrackMap(const TrackedFrame& frame);
+  TrackResult TrackMap(const TrackedFrame& frame, const Tracker::Tracked& tracked);
   TrackResult Accept(const Tracker::Tracked& tracked);
-  bool MustExtend(const Tracker::Tracked& tracked) const;
+  bool BecomesKeyframe(const Tracker::Tracked& tracked) const;
   int InsertKeyframe();
   void Check(const internal::SectionReader& file) const;
 
   OdometryOptions options_;
   CameraRig rig_;
-  std::optional<int> map_keyframes_;  // localizing: so many are the map's, the others are for the time being
   StageTimes stages_;
   AsyncMapper mapper_;
   MapInitializer initializer_;
   Tracker tracker_;
   Relocalizer relocalizer_;
   PoseFollower follower_;
+  Localizer localizer_;
   FrameHistory history_;
   TrackResult result_;                               // of the last frame
   std::vector<double> row_errors_, stereo_matches_;  // stereo: of each pair

@@ -135,6 +135,30 @@ TEST(BundleAdjustment, LocalWindowFixesItsOldestKeyframesWhereNothingElseDoes) {
   }
 }
 
+TEST(BundleAdjustment, WhatIsKeptStaysAsItIsAndHoldsWhatIsNew) {
+  World world(true);
+  const int kept = kPoints / 2;
+  auto features = std::make_shared<FrameFeatures>(*world.map.keyframe(2).features);
+  features->keypoints[0].pt += cv::Point2f(40, -30);  // a view that does not fit
+  world.map.keyframe(2).features = features;
+  world.Disturb({3, 4});
+  for (int i = 0; i < kept; ++i) world.map.landmark(i).position = world.points[static_cast<std::size_t>(i)];
+  BundleAdjustmentOptions options = BundleOptions(true);
+  options.kept_keyframes = 3;
+  options.kept_landmarks = kept;
+  const BundleAdjustmentReport report = AdjustLocally(BundleCamera(), 4, options, &world.map);
+  EXPECT_TRUE(report.usable);
+  EXPECT_EQ(report.keyframes, 2);
+  EXPECT_LT(world.WorstError(), 2e-3);
+  for (int k = 0; k < options.kept_keyframes; ++k) {
+    EXPECT_EQ(world.map.keyframe(k).T_world_camera.Matrix(),
+              world.truth[static_cast<std::size_t>(k)].Matrix());
+  }
+  for (int i = 0; i < kept; ++i)
+    EXPECT_EQ(world.map.landmark(i).position, world.points[static_cast<std::size_t>(i)]);
+  EXPECT_EQ(world.map.keyframe(2).landmarks[0], 0) << "what a kept keyframe sees, it keeps";
+}
+
 TEST(BundleAdjustment, NothingToAdjustIsNoCrash) {
   World world(false);
   EXPECT_FALSE(AdjustWindow(BundleCamera(), {}, {0, 1}, BundleOptions(false), &world.map).usable);

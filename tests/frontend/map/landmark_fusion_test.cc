@@ -75,6 +75,19 @@ TEST_F(LandmarkFusion, AFusedLoopIsFusedAlready) {
   EXPECT_EQ(Alive(), alive);
 }
 
+TEST_F(LandmarkFusion, ALandmarkOfAMapThatStaysWinsAgainstOneWithMoreViews) {
+  SeenTwice(Pose());
+  const int old = map_.keyframe(0).landmarks[0], recent = map_.keyframe(2).landmarks[0];
+  ASSERT_NE(old, recent);
+  map_.RemoveObservation(old, 1);
+  ASSERT_LT(map_.landmark(old).observations.size(), map_.landmark(recent).observations.size());
+  Map grows = map_;
+  FuseInto(2, {{old, 0}}, &grows);
+  EXPECT_EQ(grows.Present(old), recent);
+  FuseInto(2, {{old, 0}}, &map_, old + 1);
+  EXPECT_EQ(map_.Present(recent), old);
+}
+
 TEST_F(LandmarkFusion, MergedLandmarksLeadToTheOneThatStays) {
   SeenTwice(drift_);
   FuseLoop(camera_, 0, 2, T_first_third_, &map_);

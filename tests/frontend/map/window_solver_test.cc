@@ -64,6 +64,19 @@ TEST(WindowSolver, FindsPosesAndPoints) {
   EXPECT_LT(WorstPose(window, truth), 1e-4);
 }
 
+TEST(WindowSolver, FixedPointsStayAndPosesAreFoundByThem) {
+  const Window truth = DriveForward({0, 0});
+  Window window = truth;
+  Disturb(&window);
+  window.fixed_points = 50;
+  for (std::size_t i = 0; i < window.fixed_points; ++i) window.points[i] = truth.points[i];
+  EXPECT_TRUE(SolveWindow(testing::PlainCamera(450), 30, &window).usable);
+  for (std::size_t i = 0; i < window.fixed_points; ++i) EXPECT_EQ(window.points[i], truth.points[i]);
+  EXPECT_LT(WorstPose(window, truth), 1e-4);
+  for (std::size_t i = 0; i < truth.points.size(); ++i)
+    EXPECT_LT((window.points[i] - truth.points[i]).norm(), 1e-3);
+}
+
 TEST(WindowSolver, FindsTheErrorOfTheLens) {
   const Eigen::Vector2d lens(0.02, -0.01);
   const Window truth = DriveForward(lens);

@@ -151,13 +151,16 @@ class Odometry {
   int SessionPiece() const;
 
   /// From now on frames are located in the map that is there. The frames so far are forgotten, and the next
-  /// one is lost until RelocalizeAt finds it. Time stamps may begin anew. Where the map shows too little of
-  /// what is in view, keyframes are made for the time being (BeyondMap), and RelocalizeAt may be called at
-  /// any frame to find back from there.
+  /// one is lost until RelocalizeAt finds it. Time stamps may begin anew. The map stays as it is; where it
+  /// shows too little of what is in view, keyframes are made for the time being. Frames without
+  /// InputFrame::features get no more features than their pose needs. Beyond the map, RelocalizeAt may be
+  /// called at any frame to find back from there.
   void BeginLocalization();
-  /// True if the last frame that has a pose hangs on a keyframe of after BeginLocalization.
+  /// True if, after BeginLocalization, too few of the map's landmarks agree with the last frame that has a
+  /// pose: fewer than a lost frame is found again by.
   bool BeyondMap() const;
-  /// Keyframe that shares most landmarks with the last frame that has a pose; -1 if there was none.
+  /// Keyframe that shares most landmarks with the last frame that has a pose, after BeginLocalization one of
+  /// the map unless BeyondMap(); -1 if there was none.
   int ReferenceKeyframe() const;
   /// Covariance of the pose of that frame given the map: position [m] in the world, then rotation [rad] about
   /// the camera's axes (T_world_camera Exp(tangent), to the first order). None if there was no such frame, or

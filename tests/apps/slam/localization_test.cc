@@ -1,0 +1,117 @@
+// Frames that are located in a map (SlamSystem::BeginLocalization).
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <memory>
+#include <vector>
+
+#include "tests/support/recording.h"
+#include "tests/support/rendered_world.h"
+#include "tests/support/small_town.h"
+#include "tutti/slam/slam_system.h"
+
+namespace tutti {
+namespace {
+
+// The first lap through a small town is mapped; then come its end again, and a street that is new.
+class LocatingFrames : public ::testing::TestWithParam<SyntheticSensor> {
+ protected:
+  static constexpr std::size_t kMapped = 110, kBack = 60, kEnd = 150;
+
+  static SyntheticOptions Town() {
+    SyntheticOptions options = testing::SmallStereoTownWithALoop(320, 160);
+    options.sensor = GetParam();
+    return options;
+  }
+  static RunConfig Config() {
+    RunConfig config;
+    config.odometry.features = 800;
+    return config;
+  }
+  // A map of the first frames, ready to be located in.
+  std::unique_ptr<SlamSystem> Mapped() const {
+    auto slam = std::make_unique<SlamSystem>(Config(), recording_.rig);
+    for (std::size_t i = 0; i < kMapped; ++i) slam->Track(recording_.frames[i]);
+    slam->Finish();
+    slam->BeginLocalization();
+    return slam;
+  }
+
+  const testing::RenderedWorld world_{Town()};
+  const testing::Recording recording_ = testing::Record(world_, kEnd);
+};
+
+INSTANTIATE_TEST_SUITE_P(Sensors, LocatingFrames,
+                         ::testing::Values(SyntheticSensor::kMono, SyntheticSensor::kStereo,
+                                           SyntheticSensor::kRgbd),
+                         [](const auto& test) {
+                           return test.param == SyntheticSensor::kMono     ? "Mono"
+                                  : test.param == SyntheticSensor::kStereo ? "Stereo"
+                                                                           : "Rgbd";
+                         });
+
+TEST_P(LocatingFrames, TheMapStaysAsItIsWhileTheCameraDrivesOnBeyondIt) {
+  const auto slam = Mapped();
+  const Odometry before = *slam->odometry();
+  const int keyframes = before.NextKeyframeId();
+  std::size_t found = 0, within = 0;
+  for (std::size_t i = kBack; i < kEnd; ++i) {
+    if (slam->Track(recording_.frames[i]).state != TrackingState::kTracking) continue;
+    ++found;
+    if (slam->odometry()->BeyondMap()) continue;
+    ++within;
+    EXPECT_LT(slam->odometry()->ReferenceKeyframe(), keyframes) << "frame " << i;
+  }
+  EXPECT_GE(found, (kEnd - kBack) * 9 / 10);
+  EXPECT_GE(within, kMapped - kBack - 5);
+  EXPECT_GT(slam->odometry()->NextKeyframeId(), keyframes) << "keyframes for the time being";
+  for (int id = 0; id < keyframes; ++id)
+    EXPECT_EQ(slam->odometry()->KeyframePose(id).Matrix(), before.KeyframePose(id).Matrix()) << id;
+  const std::vector<LandmarkView> old = before.Landmarks(), now = slam->odometry()->Landmarks();
+  std::size_t kept = 0;
+  for (const LandmarkView& landmark : old) {
+    const auto same = std::find_if(
+        now.begin(), now.end(), [&landmark](const LandmarkView& other) { return other.id == landmark.id; });
+    if (same == now.end()) continue;  // it was found to be the same as another one of the map
+    ++kept;
+    EXPECT_EQ(same->position, landmark.position);
+  }
+  EXPECT_GE(kept, old.size() * 98 / 100);
+}
+
+TEST_P(LocatingFrames, NoMoreFeaturesAreSoughtThanThePoseNeeds) {
+  const auto slam = Mapped();
+  const int all = slam->Track(recording_.frames[kBack]).features;
+  int least = all, most_inliers = 0;
+  for (std::size_t i = kBack + 1; i < kBack + 8; ++i) {
+    const TrackResult result = slam->Track(recording_.frames[i]);
+    ASSERT_EQ(result.state, TrackingState::kTracking) << "frame " << i;
+    EXPECT_FALSE(slam->odometry()->BeyondMap()) << "frame " << i;
+    least = std::min(least, result.features);
+    most_inliers = std::max(most_inliers, result.inliers);
+  }
+  std::printf("  %d to %d features, up to %d inliers\n", least, all, most_inliers);
+  if (GetParam() != SyntheticSensor::kMono) {
+    EXPECT_LT(least, 0.9 * all);
+  }
+  EXPECT_GT(most_inliers, 100);
+  // Who has extracted features already gets what they tell.
+  InputFrame frame = recording_.frames[kBack + 8];
+  frame.features = slam->odometry()->Extract(frame);
+  EXPECT_GT(slam->Track(frame).features, 0.9 * all);
+}
+
+TEST_P(LocatingFrames, AfterACoveredLensTheCameraIsFoundAgainWithAllFeatures) {
+  const auto slam = Mapped();
+  constexpr std::size_t kCovered = kBack + 3, kFree = kBack + 6;
+  for (std::size_t i = kBack; i < kCovered; ++i) slam->Track(recording_.frames[i]);
+  for (std::size_t i = kCovered; i < kFree; ++i)
+    EXPECT_EQ(slam->Track(testing::Black(recording_.frames[i])).state, TrackingState::kLost);
+  const TrackResult again = slam->Track(recording_.frames[kFree]);
+  EXPECT_EQ(again.state, TrackingState::kTracking) << again.reason;
+  EXPECT_GT(again.features, 500);
+}
+
+}  // namespace
+}  // namespace tutti

@@ -22,6 +22,7 @@ constexpr internal::GaussNewtonLimits kAlignerLimits{kAlignerIterations, 1e-5, 1
 constexpr int kUnknowns = 13;  // pose, motion, brightness
 constexpr std::size_t kMostPoints = 1000;
 constexpr int kLeastContrast = 3;     // of what is worth a look [grey levels]
+constexpr double kLongestHalf = 40;   // of a streak [px of the level]
 constexpr double kOtherDepth = 0.05;  // [1/m]
 constexpr double kLeastArea = 0.1;    // of a square after its turn, of what it was
 
@@ -55,15 +56,16 @@ struct ImageAligner::Streak {
   Streak Mapped(const Eigen::Matrix2d& by) const { return {by * straight, by * curved}; }
   // Places along it at which grey values are read, one a pixel.
   int Samples() const {
-    constexpr int kMost = 40;
-    const int n = std::min(kMost, static_cast<int>(std::ceil(2 * straight.norm())));
+    constexpr double kMost = 40;
+    const int n = static_cast<int>(std::min(kMost, std::ceil(2 * straight.norm())));
     return n < 1 ? 1 : n + 1;
   }
   Eigen::Vector2d Sample(int k, int samples) const {
     return samples == 1 ? Eigen::Vector2d(0, 0) : At(2.0 * (k + 0.5) / samples - 1);
   }
   bool IsInside(const cv::Mat& image, const Eigen::Vector2d& at) const {
-    return Inside(image, at + At(-1)) && Inside(image, at + At(1));
+    const Eigen::Vector2d most = straight.cwiseAbs() + curved.cwiseAbs();  // a curve may turn back within it
+    return Inside(image, at - most) && Inside(image, at + most);
   }
 };
 
@@ -168,8 +170,10 @@ class ImageAligner::Level {
                           earlier = camera.Then(time, -0.5 * exposure_s) * p;
     if (!(later.z() > kMinDepth) || !(p.z() > kMinDepth) || !(earlier.z() > kMinDepth)) return std::nullopt;
     const Eigen::Vector2d to = camera_.Project(later), from = camera_.Project(earlier);
-    return Streak{(0.5 * (to - from)).cwiseQuotient(scale_),
-                  (0.5 * (to + from) - camera_.Project(p)).cwiseQuotient(scale_)};
+    const Streak streak{(0.5 * (to - from)).cwiseQuotient(scale_),
+                        (0.5 * (to + from) - camera_.Project(p)).cwiseQuotient(scale_)};
+    if (!(streak.straight.norm() + streak.curved.norm() < kLongestHalf)) return std::nullopt;
+    return streak;
   }
 
   // A point in the camera when its row is read, and when that is, from where it is in the middle row's time.

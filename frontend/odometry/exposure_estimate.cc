@@ -11,7 +11,7 @@ constexpr double kClearly = 0.9;  // of the difference that is left without any 
 
 void ExposureEstimate::Add(const Misfits& misfits) {
   for (std::size_t i = 0; i < sum_.size(); ++i) sum_[i] = kForget * sum_[i] + misfits[i];
-  frames_ = std::min(frames_ + 1, kFewest);
+  known_ = true;
 }
 
 double ExposureEstimate::Seconds() const {

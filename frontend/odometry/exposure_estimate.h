@@ -14,20 +14,19 @@ class ExposureEstimate {
 
   /// What one frame says (ImageAligner::Misfits).
   void Add(const Misfits& misfits);
-  /// False: too few frames have said something.
-  bool IsKnown() const { return frames_ >= kFewest; }
+  /// False: no frame has said anything.
+  bool IsKnown() const { return known_; }
   /// [s]; 0 until it is known.
   double Seconds() const;
 
   template <class Archive>
   void State(Archive& archive) {
-    archive(sum_, frames_);
+    archive(sum_, known_);
   }
 
  private:
-  static constexpr int kFewest = 3;
   Misfits sum_{};  // of older frames less: light changes, and the exposure with it
-  int frames_ = 0;
+  bool known_ = false;
 };
 
 }  // namespace tutti

@@ -74,7 +74,7 @@ int KeyframePolicy::Established(const Map& map, int keyframe) const {
 KeyframeNeed KeyframePolicy::Need(const Map& map, const PoseFix& fix, const LastFrame& before) const {
   if (rig_.sensor != Sensor::kMono && !fix.frame.features->has_depth) return KeyframeNeed::kNone;
   if (fix.by_grey)  // there are no landmarks
-    return fix.sharp && fix.frame.features->has_depth ? KeyframeNeed::kVeryWeak : KeyframeNeed::kNone;
+    return fix.sharp && rig_.sensor != Sensor::kMono ? KeyframeNeed::kVeryWeak : KeyframeNeed::kNone;
   const int established = Established(map, fix.reference);
   const bool very_weak = fix.inliers < 0.4 * established || fix.inliers < 3 * options_.min_inliers;
   if (very_weak) return KeyframeNeed::kVeryWeak;

@@ -21,7 +21,7 @@ constexpr double kBlurred = 10;         // corners are at the ends of streaks th
 constexpr double kLongExposure = 0.03;  // of what may be blurred as long as nothing is known [s]
 constexpr int kAskAgain = 8;            // frames, after which the exposure may be another
 constexpr double kManyInliers = 3;      // that outweigh grey values, in units of those that a pose needs
-constexpr int kMostByGrey = 90;         // frames in a row that grey values alone pose
+constexpr int kMostByGrey = 300;        // frames in a row that grey values alone pose
 constexpr double kFastestTurn = 10;     // [rad/s]
 constexpr double kFastestMove = 2;      // [1/s], in units of the depth of what is in view
 
@@ -39,10 +39,6 @@ Vector6d SigmaOfChange(double dt, double depth) {
   sigma << Eigen::Vector3d::Constant(depth * (kMovingJerk * curve + kMovingNoise)),
       Eigen::Vector3d::Constant(kTurningJerk * curve + kTurningNoise);
   return sigma;
-}
-
-bool AsksExposure(const TrackedFrame& frame, const LastFrame& last) {
-  return !last.exposure.IsKnown() || frame.index % kAskAgain == 0;
 }
 
 }  // namespace
@@ -87,7 +83,21 @@ std::shared_ptr<const FrameFeatures> RollingSearch::Straight(const TrackedFrame&
 std::optional<PoseFix> RollingSearch::Find(const Map& map, const TrackedFrame& frame, const LastFrame& last,
                                            bool lost) const {
   if (last.reference < 0) return std::nullopt;
-  const Expected expected = Expect(map, frame, last);
+  Expected expected = Expect(map, frame, last);
+  const auto misfits = lost ? std::nullopt : MisfitsOf(map, frame, last, expected);
+  if (misfits) {
+    ExposureEstimate exposure = last.exposure;
+    exposure.Add(*misfits);
+    expected.exposure_s = exposure.Seconds();
+  }
+  std::optional<PoseFix> fix = FindExpected(map, frame, last, expected, lost);
+  if (fix) fix->misfits = misfits;
+  return fix;
+}
+
+std::optional<PoseFix> RollingSearch::FindExpected(const Map& map, const TrackedFrame& frame,
+                                                   const LastFrame& last, const Expected& expected,
+                                                   bool lost) const {
   std::optional<PoseFix> fix;
   if (!lost && expected.speed_px_s * expected.exposure_s > kBlurred)
     fix = Blurred(map, frame, last, expected);
@@ -99,10 +109,6 @@ std::optional<PoseFix> RollingSearch::Find(const Map& map, const TrackedFrame& f
     fix = search_.Find(map, straight, last, lost);
     if (!fix) return lost ? fix : ByGreyValues(map, frame, last, expected);
     if (shutter_.Rolls()) fix = Again(map, *frame.features, expected, *std::move(fix));
-  }
-  if (!lost && AsksExposure(frame, last) && expected.speed_px_s * kLongExposure > kBlurred) {
-    if (const auto by_grey = Aligned(map, frame, last, expected))
-      TellExposure(map, frame, last, *by_grey, &*fix);
   }
   if (last.by_grey > 0) {
     if (const auto by_grey = Aligned(map, frame, last, expected))
@@ -150,7 +156,6 @@ std::optional<PoseFix> RollingSearch::Blurred(const Map& map, const TrackedFrame
   Expected found = expected;
   found.camera = *aligned;
   PoseFix fix = FixByGrey(frame, last, found);
-  if (AsksExposure(frame, last)) TellExposure(map, frame, last, *aligned, &fix);
   fix.sharp = SpeedOf(aligned->motion, expected.depth) * expected.exposure_s <= kBlurred;
   if (!fix.sharp) return fix;
   found.prior.motion = aligned->motion;
@@ -159,7 +164,6 @@ std::optional<PoseFix> RollingSearch::Blurred(const Map& map, const TrackedFrame
   std::optional<PoseFix> near = Near(map, frame, last, found);
   if (!near || near->inliers < kManyInliers * options_.min_inliers) return fix;
   near->drift = LogSE3(near->T_camera_world * fix.T_camera_world.Inverse());
-  near->misfits = fix.misfits;
   return near;
 }
 
@@ -175,10 +179,16 @@ PoseFix RollingSearch::FixByGrey(const TrackedFrame& frame, const LastFrame& las
   return fix;
 }
 
-void RollingSearch::TellExposure(const Map& map, const TrackedFrame& frame, const LastFrame& last,
-                                 const CameraMotion& camera, PoseFix* fix) const {
-  const auto misfits = aligner_.Misfits(ReferenceOf(map, last, frame.stamp_s), *frame.features, camera);
-  if (misfits[0] > 0) fix->misfits = misfits;
+// What a fast frame says of its exposure, if it is asked.
+std::optional<ExposureEstimate::Misfits> RollingSearch::MisfitsOf(const Map& map, const TrackedFrame& frame,
+                                                                  const LastFrame& last,
+                                                                  const Expected& expected) const {
+  const bool ask = !last.exposure.IsKnown() || frame.index % kAskAgain == 0;
+  if (!ask || !(expected.speed_px_s * kLongExposure > kBlurred)) return std::nullopt;
+  const std::optional<CameraMotion> aligned = Aligned(map, frame, last, expected);
+  if (!aligned) return std::nullopt;
+  const auto misfits = aligner_.Misfits(ReferenceOf(map, last, frame.stamp_s), *frame.features, *aligned);
+  return misfits[0] > 0 ? std::optional(misfits) : std::nullopt;
 }
 
 // Where the grey values of the last frame say that the camera is.

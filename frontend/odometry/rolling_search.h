@@ -35,6 +35,8 @@ class RollingSearch {
     double exposure_s = 0;  // as far as it is known
   };
   double SpeedOf(const Vector6d& motion, double depth) const;
+  std::optional<PoseFix> FindExpected(const Map& map, const TrackedFrame& frame, const LastFrame& last,
+                                      const Expected& expected, bool lost) const;
   Expected Expect(const Map& map, const TrackedFrame& frame, const LastFrame& last) const;
   std::shared_ptr<const FrameFeatures> Straight(const TrackedFrame& frame, const Expected& expected) const;
   std::optional<CameraMotion> Aligned(const Map& map, const TrackedFrame& frame, const LastFrame& last,
@@ -43,8 +45,8 @@ class RollingSearch {
                                  const Expected& expected) const;
   ImageAligner::Reference ReferenceOf(const Map& map, const LastFrame& last, double stamp_s) const;
   PoseFix FixByGrey(const TrackedFrame& frame, const LastFrame& last, const Expected& found) const;
-  void TellExposure(const Map& map, const TrackedFrame& frame, const LastFrame& last,
-                    const CameraMotion& camera, PoseFix* fix) const;
+  std::optional<ExposureEstimate::Misfits> MisfitsOf(const Map& map, const TrackedFrame& frame,
+                                                     const LastFrame& last, const Expected& expected) const;
   std::optional<PoseFix> ByGreyValues(const Map& map, const TrackedFrame& frame, const LastFrame& last,
                                       const Expected& expected) const;
   std::optional<PoseFix> Near(const Map& map, const TrackedFrame& frame, const LastFrame& last,

@@ -4,10 +4,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "apps/run/recording.h"
 #include "tests/support/generated_dataset.h"
+#include "tests/support/recording.h"
 #include "tests/support/small_room.h"
 #include "tests/support/test_data.h"
 #include "tutti/core/error.h"
@@ -58,6 +61,40 @@ TEST(FocalLength, IsTheSameAgain) {
   EXPECT_EQ(once.measured, again.measured);
   EXPECT_EQ(once.camera.fx, again.camera.fx);
   EXPECT_EQ(once.sigma, again.sigma);
+}
+
+// Of a camera that turns by nearly half of its view from frame to frame at first, the first keyframes see
+// nothing that three of them see.
+TEST(LensCheck, OfAMapWhoseFirstKeyframesSeeNothingOfTheRest) {
+  SyntheticOptions options = testing::SmallRgbdRoom(320, 240);
+  options.focal_px = kRoomFocal;
+  options.rate_hz = 5;
+  const SyntheticWorld world(options);
+  Odometry odometry(OdometryOptions(), testing::RigOf(world));
+  double turned = 0;
+  for (int i = 0; i < 30; ++i) {
+    Pose pose = world.PoseOf(static_cast<std::size_t>(i));
+    pose.rotation = pose.rotation * ExpSO3({0, turned, 0});
+    turned += i < 4 ? 0.5 : 0.08;
+    const SyntheticFrame rendered = world.RenderFrom(static_cast<std::size_t>(i), pose);
+    InputFrame frame;
+    frame.index = i;
+    frame.stamp_s = rendered.stamp_s;
+    frame.image = rendered.image;
+    frame.depth_m = rendered.depth_m;
+    ASSERT_EQ(odometry.Track(frame).state, TrackingState::kTracking) << i;
+  }
+  odometry.FinishMapping();
+  const auto shared = [&](int first, int second) {
+    const std::vector<int> a = odometry.Keyframe(first).landmarks, b = odometry.Keyframe(second).landmarks;
+    return std::count_if(a.begin(), a.end(),
+                         [&](int l) { return l >= 0 && std::find(b.begin(), b.end(), l) != b.end(); });
+  };
+  ASSERT_GT(shared(0, 1), 0);
+  ASSERT_EQ(shared(0, 2), 0) << "what this test is about";
+  const LensCheck check = CheckLens(odometry);
+  ASSERT_TRUE(check.measured);
+  EXPECT_NEAR(check.focal_ratio, 1, 0.03);
 }
 
 TEST(FocalLength, OfAFewFramesIsNotMeasured) {

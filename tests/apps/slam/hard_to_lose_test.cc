@@ -87,6 +87,7 @@ struct Outcome {
   double path_m = 0;
   int pieces = 0;  // that have frames
   std::vector<TrackResult> results;
+  Trajectory estimate;
 
   double PosedShare() const { return static_cast<double>(posed) / static_cast<double>(frames); }
 };
@@ -111,7 +112,7 @@ Outcome Follow(const Recording& recording, RunConfig config = RunConfig()) {
     EXPECT_TRUE(slam.odometry()->KeyframePose(id).IsFinite());
   }
   out.pieces = static_cast<int>(pieces.size());
-  const Trajectory estimate = slam.odometry()->FrameTrajectory();
+  const Trajectory& estimate = out.estimate = slam.odometry()->FrameTrajectory();
   out.posed = estimate.size();
   EvaluationOptions options;
   options.max_time_difference_s = 0.02;  // real ground truth has stamps of its own
@@ -141,8 +142,8 @@ TEST(HardToLose, MotionBlur) {
 
 // A hand that shakes in a room, up to 200 deg/s about each axis, seen by a camera that takes 30 ms for an
 // image.
-SyntheticOptions Shaken() {
-  SyntheticOptions options = testing::SmallRgbdRoom(320, 240);
+SyntheticOptions Shaken(int width = 320, int height = 240) {
+  SyntheticOptions options = testing::SmallRgbdRoom(width, height);
   options.rate_hz = 30;
   options.kinect_noise = true;
   options.shake_deg_per_s = 200;
@@ -158,6 +159,32 @@ TEST(HardToLose, ARollingShutterInAShakingHand) {
   EXPECT_LT(out.ate_m, 0.01 + 0.005 * out.path_m);
   rolling.rig.readout_s = 0;
   EXPECT_GT(Follow(rolling).ate_m, 1.5 * out.ate_m) << "what the readout is known for";
+}
+
+// The largest error of the motion from one frame to the next [m].
+double LargestStepError(const Trajectory& truth, const Trajectory& estimate) {
+  double largest = 0;
+  for (std::size_t i = 1; i < std::min(truth.size(), estimate.size()); ++i) {
+    const Pose should = truth[i - 1].pose.Inverse() * truth[i].pose,
+               is = estimate[i - 1].pose.Inverse() * estimate[i].pose;
+    largest = std::max(largest, (should.translation - is.translation).norm());
+  }
+  return largest;
+}
+
+// Streaks are up to 45 px long, and no frame of a second and more is sharp.
+TEST(HardToLose, BlurInAShakingHand) {
+  for (const double readout_s : {0.0, 0.03}) {
+    SyntheticOptions options = Shaken(400, 300);
+    options.motion_blur_s = 0.03;
+    options.readout_s = readout_s;
+    const Recording blurred = testing::Record(testing::RenderedWorld(options), 120);
+    const Outcome out = Follow(blurred);
+    EXPECT_EQ(out.posed, out.frames) << readout_s;
+    EXPECT_LT(out.ate_m, 0.01 + 0.01 * out.path_m)
+        << readout_s << ": 0.5 % on the longer way of `bench fast`";
+    EXPECT_LT(LargestStepError(blurred.truth, out.estimate), 0.03) << readout_s;
+  }
 }
 
 TEST(HardToLose, ExposureJumps) {

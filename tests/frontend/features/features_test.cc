@@ -226,5 +226,50 @@ TEST_F(DepthImageTest, DepthEdgesAreNotTrusted) {
   EXPECT_EQ(Known(WithDepth(depth)), 0);
 }
 
+TEST_F(DepthImageTest, TheGridHasEveryEighthPixelOfASmallImage) {
+  cv::Mat depth(240, 240, CV_32FC1, cv::Scalar(2.0));
+  depth(cv::Rect(120, 0, 120, 240)) = 4.0;  // an edge between columns 119 and 120
+  depth(cv::Rect(0, 0, 240, 16)) = 0;
+  const FrameFeatures features = WithDepth(depth);
+  ASSERT_TRUE(features.depth_grid);
+  const DepthGrid& grid = *features.depth_grid;
+  EXPECT_EQ(grid.step, 8);
+  EXPECT_EQ(grid.columns, 30);
+  EXPECT_EQ(grid.Rows(), 30);
+  EXPECT_EQ(grid.PixelOf(2, 1), Eigen::Vector2d(12, 20));
+  EXPECT_FLOAT_EQ(grid.At(10, 3), 0.5F);
+  EXPECT_FLOAT_EQ(grid.At(10, 20), 0.25F);
+  EXPECT_EQ(grid.At(0, 3), 0) << "nothing was measured";
+  EXPECT_FLOAT_EQ(grid.Near({115, 100}), 0.5F);
+  EXPECT_FLOAT_EQ(grid.Near({1e4, -5}), 0) << "of the nearest element, as far as it may be";
+  EXPECT_FALSE(WithoutImages(features)->depth_grid);
+}
+
+TEST_F(DepthImageTest, TheGridSaysWhereAnEdgeIsAndLeavesOutWhatIsMasked) {
+  cv::Mat depth(240, 240, CV_32FC1, cv::Scalar(2.0));
+  depth(cv::Rect(125, 0, 115, 240)) = 4.0;  // beside column 124 of the grid
+  InputFrame frame;
+  frame.image = Square();
+  frame.depth_m = depth;
+  frame.mask = cv::Mat(240, 240, CV_8UC1, cv::Scalar(255));
+  frame.mask(cv::Rect(0, 0, 40, 240)) = 0;
+  const FrameFeatures features = ExtractFeatures(frame, rig_, OdometryOptions());
+  ASSERT_TRUE(features.depth_grid);
+  EXPECT_FLOAT_EQ(features.depth_grid->At(10, 15), -0.5F);
+  EXPECT_FLOAT_EQ(features.depth_grid->Near({124, 84}), 0.5F);
+  EXPECT_EQ(features.depth_grid->At(10, 4), 0);
+  EXPECT_FLOAT_EQ(features.depth_grid->At(10, 5), 0.5F);
+}
+
+TEST_F(DepthImageTest, TheGridOfALargeImageIsCoarser) {
+  InputFrame frame;
+  frame.image = cv::Mat(960, 1280, CV_8UC1, cv::Scalar(90));
+  frame.depth_m = cv::Mat(960, 1280, CV_32FC1, cv::Scalar(2.0));
+  const FrameFeatures features = ExtractFeatures(frame, rig_, OdometryOptions());
+  ASSERT_TRUE(features.depth_grid);
+  EXPECT_EQ(features.depth_grid->step, 25);
+  EXPECT_NEAR(double(features.depth_grid->inverse_depth.size()), 2000, 200);
+}
+
 }  // namespace
 }  // namespace tutti

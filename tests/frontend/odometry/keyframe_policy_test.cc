@@ -54,6 +54,19 @@ TEST_F(KeyframePolicyTest, WhenTooSmallAShareOfTheReferenceIsSeen) {
   EXPECT_EQ(Need(Fix(0.8)), KeyframeNeed::kWeak);
 }
 
+TEST_F(KeyframePolicyTest, WhatGreyValuesAlonePoseIsOneIfItIsSharpAndHasDepth) {
+  PoseFix fix = Fix(0, 0.1, true);
+  fix.by_grey = true;
+  EXPECT_EQ(Need(fix, Sensor::kRgbd), KeyframeNeed::kNone) << "blurred";
+  fix.sharp = true;
+  EXPECT_EQ(Need(fix, Sensor::kRgbd), KeyframeNeed::kVeryWeak);
+  EXPECT_EQ(Need(fix, Sensor::kMono), KeyframeNeed::kNone) << "one camera knows no depths of what is new";
+  auto features = std::make_shared<FrameFeatures>(*fix.frame.features);
+  features->has_depth = false;
+  fix.frame.features = features;
+  EXPECT_EQ(Need(fix, Sensor::kRgbd), KeyframeNeed::kNone);
+}
+
 TEST_F(KeyframePolicyTest, WhatOneKeyframeAloneHasSeenDoesNotCount) {
   for (int l = 0; l < Count() / 2; ++l) map_.RemoveObservation(l, 1);
   EXPECT_EQ(Need(Fix(0.5)), KeyframeNeed::kNone) << "half of the landmarks are all that is established";

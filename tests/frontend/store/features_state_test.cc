@@ -3,10 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
+#include <memory>
 
 #include "core/state_archive.h"
 #include "tests/support/rendered_world.h"
 #include "tests/support/small_town.h"
+#include "tutti/core/error.h"
 
 namespace tutti {
 namespace {
@@ -140,6 +143,35 @@ TEST(FeaturesState, ImpossibleFeaturesAreRefused) {
   expect_refused([](FrameFeatures& f) {
     f.pyramid = std::make_shared<const std::vector<cv::Mat>>(f.pyramid->rbegin(), f.pyramid->rend());
   });
+}
+
+struct WithGrid {
+  std::shared_ptr<const DepthGrid> grid;
+  template <class Archive>
+  void State(Archive& archive) {
+    internal::StateOfDepthGrid(archive, &grid);
+  }
+};
+
+TEST(FeaturesState, DepthGridsAreAsTheyWere) {
+  WithGrid none;
+  EXPECT_FALSE(Read<WithGrid>(Bytes(none)).grid);
+  WithGrid written{std::make_shared<const DepthGrid>(DepthGrid{8, 2, {0.5F, -0.25F, 0, 1}})};
+  const WithGrid read = Read<WithGrid>(Bytes(written));
+  ASSERT_TRUE(read.grid);
+  EXPECT_EQ(read.grid->step, 8);
+  EXPECT_EQ(read.grid->columns, 2);
+  EXPECT_EQ(read.grid->inverse_depth, written.grid->inverse_depth);
+}
+
+TEST(FeaturesState, DepthGridsThatAreNoneAreRefused) {
+  for (const DepthGrid& grid :
+       {DepthGrid{0, 2, {1, 1}}, DepthGrid{8, 0, {1, 1}}, DepthGrid{8, 3, {1, 1}}, DepthGrid{8, 1, {}},
+        DepthGrid{8, 1, {std::numeric_limits<float>::quiet_NaN()}}}) {
+    WithGrid damaged{std::make_shared<const DepthGrid>(grid)};
+    const std::string bytes = Bytes(damaged);
+    EXPECT_THROW(Read<WithGrid>(bytes), InputError);
+  }
 }
 
 }  // namespace

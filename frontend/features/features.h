@@ -38,8 +38,9 @@ struct DepthGrid {
   }
   /// Of the element nearest to a pixel, without its sign.
   float Near(const Eigen::Vector2d& pixel) const {
+    const int first = step / 2;
     const auto nearest = [&](double at, int count) {
-      return std::clamp(static_cast<int>(std::lround((at - step / 2) / step)), 0, count - 1);
+      return std::clamp(static_cast<int>(std::lround((at - first) / step)), 0, count - 1);
     };
     return std::abs(At(nearest(pixel.y(), Rows()), nearest(pixel.x(), columns)));
   }

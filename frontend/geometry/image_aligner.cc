@@ -135,12 +135,17 @@ class ImageAligner::Level {
            internal::GaussNewton<kUnknowns>(kAlignerLimits, linearise, move);
   }
 
-  // Mean square difference; 0: too little is in view.
+  // Sum of square differences, by that of the squares' own contrasts; 0: too little is in view.
   double Misfit(const CameraMotion& now) const {
     internal::NormalEquations<kUnknowns> unused;
     Sums sums;
     for (const Target& target : targets_) Add(target, now, 0, &unused, &sums);
-    return sums.points < kLeastPoints ? 0 : sums.squares / sums.samples;
+    double contrast = 0;  // what blurs more shows less, and differs by less
+    for (const Target& target : targets_) {
+      const Eigen::Map<const Eigen::Array<float, kSamples, 1>> grey(target.grey.data());
+      contrast += double((grey - grey.mean()).square().sum());
+    }
+    return sums.points < kLeastPoints || !(contrast > 0) ? 0 : sums.squares / contrast;
   }
 
  private:

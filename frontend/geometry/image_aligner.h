@@ -57,8 +57,8 @@ class ImageAligner {
   /// Exposures that Misfits compares [s].
   static constexpr int kExposures = 9;
   static double Exposure(int i) { return 0.005 * i; }
-  /// Mean square difference of the grey values if the images were exposed for each of them. All zero: that
-  /// can't be told.
+  /// Square differences of the grey values, by their contrast, if the images were exposed so long. All zero:
+  /// that can't be told.
   std::array<double, kExposures> Misfits(const Reference& reference, const FrameFeatures& seen,
                                          const CameraMotion& camera) const;
 

@@ -17,7 +17,7 @@ constexpr double kTurningNoise = 0.02;  // of what rows tell [rad/s]
 constexpr double kMovingNoise = 0.01;   // [1/s], in units of that depth
 constexpr double kMotionHolds = 0.1;    // after so long nothing is known of the motion [s]
 constexpr double kUnknownDepth = 3;     // of a view without landmarks [m]
-constexpr double kBlurred = 10;         // corners are at the ends of streaks that are longer [px]
+constexpr double kBlurred = 0.03;       // corners are at the ends of streaks that are longer [rad]
 constexpr double kLongExposure = 0.03;  // of what may be blurred as long as nothing is known [s]
 constexpr int kAskAgain = 8;            // frames, after which the exposure may be another
 constexpr double kManyInliers = 3;      // that outweigh grey values, in units of those that a pose needs
@@ -41,12 +41,12 @@ Vector6d SigmaOfChange(double dt, double depth) {
   return sigma;
 }
 
-}  // namespace
-
-// How fast what is in view moves through the image [px/s].
-double RollingSearch::SpeedOf(const Vector6d& motion, double depth) const {
-  return focal_px_ * (motion.tail<3>().norm() + motion.head<3>().norm() / depth);
+// How fast what is in view moves, as seen by the camera [rad/s].
+double SpeedOf(const Vector6d& motion, double depth) {
+  return motion.tail<3>().norm() + motion.head<3>().norm() / depth;
 }
+
+}  // namespace
 
 RollingSearch::Expected RollingSearch::Expect(const Map& map, const TrackedFrame& frame,
                                               const LastFrame& last) const {
@@ -58,7 +58,7 @@ RollingSearch::Expected RollingSearch::Expect(const Map& map, const TrackedFrame
   expected.camera.T_camera_world = ExpSE3(expected.camera.motion * dt) * last.T_camera_world;
   const Vector6d next = last.motion + dt * last.change;  // of a camera that goes on changing its motion
   for (const Vector6d& motion : {expected.camera.motion, next})
-    expected.speed_px_s = std::max(expected.speed_px_s, SpeedOf(motion, expected.depth));
+    expected.speed_rad_s = std::max(expected.speed_rad_s, SpeedOf(motion, expected.depth));
   expected.exposure_s = last.exposure.Seconds();
   expected.prior.motion = expected.camera.motion;
   expected.prior.sigma = Sigma(known ? dt : kMotionHolds, expected.depth);
@@ -99,7 +99,7 @@ std::optional<PoseFix> RollingSearch::FindExpected(const Map& map, const Tracked
                                                    const LastFrame& last, const Expected& expected,
                                                    bool lost) const {
   std::optional<PoseFix> fix;
-  if (!lost && expected.speed_px_s * expected.exposure_s > kBlurred)
+  if (!lost && expected.speed_rad_s * expected.exposure_s > kBlurred)
     fix = Blurred(map, frame, last, expected);
   if (fix) return fix;
   if (last.by_grey > 0) fix = Near(map, frame, last, expected);
@@ -184,7 +184,7 @@ std::optional<ExposureEstimate::Misfits> RollingSearch::MisfitsOf(const Map& map
                                                                   const LastFrame& last,
                                                                   const Expected& expected) const {
   const bool ask = !last.exposure.IsKnown() || frame.index % kAskAgain == 0;
-  if (!ask || !(expected.speed_px_s * kLongExposure > kBlurred)) return std::nullopt;
+  if (!ask || !(expected.speed_rad_s * kLongExposure > kBlurred)) return std::nullopt;
   const std::optional<CameraMotion> aligned = Aligned(map, frame, last, expected);
   if (!aligned) return std::nullopt;
   const auto misfits = aligner_.Misfits(ReferenceOf(map, last, frame.stamp_s), *frame.features, *aligned);

@@ -18,7 +18,7 @@ namespace tutti {
 class RollingSearch {
  public:
   RollingSearch(const OdometryOptions& options, const CameraRig& rig)
-      : options_(options), focal_px_(rig.camera.fx), search_(options, rig), shutter_(rig), aligner_(rig) {}
+      : options_(options), search_(options, rig), shutter_(rig), aligner_(rig) {}
 
   /// As PoseSearch::Find.
   std::optional<PoseFix> Find(const Map& map, const TrackedFrame& frame, const LastFrame& last,
@@ -30,11 +30,10 @@ class RollingSearch {
   struct Expected {
     CameraMotion camera;
     MotionPrior prior;
-    double depth = 0;       // of what is in view [m]
-    double speed_px_s = 0;  // of what is in view, through the image
-    double exposure_s = 0;  // as far as it is known
+    double depth = 0;        // of what is in view [m]
+    double speed_rad_s = 0;  // of what is in view, as seen by the camera
+    double exposure_s = 0;   // as far as it is known
   };
-  double SpeedOf(const Vector6d& motion, double depth) const;
   std::optional<PoseFix> FindExpected(const Map& map, const TrackedFrame& frame, const LastFrame& last,
                                       const Expected& expected, bool lost) const;
   Expected Expect(const Map& map, const TrackedFrame& frame, const LastFrame& last) const;
@@ -54,7 +53,6 @@ class RollingSearch {
   PoseFix Again(const Map& map, const FrameFeatures& seen, const Expected& expected, PoseFix fix) const;
 
   OdometryOptions options_;
-  double focal_px_;
   PoseSearch search_;
   RollingShutter shutter_;
   ImageAligner aligner_;

@@ -6,8 +6,7 @@
 namespace tutti {
 namespace {
 constexpr double kForget = 0.9;
-constexpr double kClearly =
-    0.5;  // of the difference that is left without any blur; sharp images, smoothed, lose some
+constexpr double kClearly = 0.5;  // of the difference without blur: sharp images, smoothed, lose some
 }  // namespace
 
 void ExposureEstimate::Add(const Misfits& misfits) {

@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "tests/support/each_sensor.h"
 #include "tests/support/recording.h"
 #include "tests/support/rendered_world.h"
 #include "tests/support/small_town.h"
@@ -42,14 +43,7 @@ class LocatingFrames : public ::testing::TestWithParam<SyntheticSensor> {
   const testing::Recording recording_ = testing::Record(world_, kEnd);
 };
 
-INSTANTIATE_TEST_SUITE_P(Sensors, LocatingFrames,
-                         ::testing::Values(SyntheticSensor::kMono, SyntheticSensor::kStereo,
-                                           SyntheticSensor::kRgbd),
-                         [](const auto& test) {
-                           return test.param == SyntheticSensor::kMono     ? "Mono"
-                                  : test.param == SyntheticSensor::kStereo ? "Stereo"
-                                                                           : "Rgbd";
-                         });
+INSTANTIATE_TEST_SUITE_P(Sensors, LocatingFrames, testing::EachSensor(), testing::SensorName);
 
 TEST_P(LocatingFrames, TheMapStaysAsItIsWhileTheCameraDrivesOnBeyondIt) {
   const auto slam = Mapped();

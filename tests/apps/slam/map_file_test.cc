@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "tests/apps/slam/map_outcome.h"
+#include "tests/support/each_sensor.h"
 #include "tests/support/error_of.h"
 #include "tests/support/recording.h"
 #include "tests/support/rendered_world.h"
@@ -110,14 +111,7 @@ TEST(MapFileWithLongTermMemory, GoesOnFromTheMapWhateverTheMemorysFileHasSeenSin
   EXPECT_TRUE(fs::exists(folder / "broken.ltm"));
 }
 
-INSTANTIATE_TEST_SUITE_P(Sensors, MapFile,
-                         ::testing::Values(SyntheticSensor::kMono, SyntheticSensor::kStereo,
-                                           SyntheticSensor::kRgbd),
-                         [](const auto& test) {
-                           return test.param == SyntheticSensor::kMono     ? "Mono"
-                                  : test.param == SyntheticSensor::kStereo ? "Stereo"
-                                                                           : "Rgbd";
-                         });
+INSTANTIATE_TEST_SUITE_P(Sensors, MapFile, testing::EachSensor(), testing::SensorName);
 
 class DamagedMap : public ::testing::Test {
  protected:

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "apps/slam/map_state.h"
+#include "tests/support/each_sensor.h"
 #include "tests/support/error_of.h"
 #include "tests/support/recording.h"
 #include "tests/support/rendered_world.h"
@@ -98,14 +99,7 @@ class Sessions : public ::testing::TestWithParam<SyntheticSensor> {
   }
 };
 
-INSTANTIATE_TEST_SUITE_P(Sensors, Sessions,
-                         ::testing::Values(SyntheticSensor::kMono, SyntheticSensor::kStereo,
-                                           SyntheticSensor::kRgbd),
-                         [](const auto& test) {
-                           return test.param == SyntheticSensor::kMono     ? "Mono"
-                                  : test.param == SyntheticSensor::kStereo ? "Stereo"
-                                                                           : "Rgbd";
-                         });
+INSTANTIATE_TEST_SUITE_P(Sensors, Sessions, testing::EachSensor(), testing::SensorName);
 
 TEST_P(Sessions, AnotherRecordingJoinsTheMapWhoseFrameOfReferenceStaysWithTheSameBytesForAnyThreads) {
   const testing::RenderedWorld world(SessionTown(GetParam()));

@@ -385,15 +385,21 @@ TEST(KeyframeGraph, AnEdgeOverARemovedKeyframeIsAsUncertainAsItsWayIsLong) {
   EXPECT_NEAR(WayOf({0, 2}, {{3, 2}}), 13 + 12, 1e-3) << "from the newer one to an older one";
 }
 
+// Moves the keyframes as a loop asks; returns where they are then.
+std::vector<MapKeyframe> Correct(const KeyframeCorrection& correction, KeyframeGraph* graph) {
+  graph->Move(correction.S_world_keyframe, correction.merges);
+  std::vector<MapKeyframe> moved;
+  for (const auto& [id, S] : correction.S_world_keyframe) moved.push_back({id, 0, S.RigidPart()});
+  graph->Update(moved);
+  return moved;
+}
+
 // A correction moves the keyframes apart, but what was measured between them stays.
 TEST(KeyframeGraph, ALoopOfARemovedKeyframeIsLedOnAsMeasured) {
   const auto synthetic = Drifting(GraphKind::kSE3);
   KeyframeGraph graph = FromOdometry(synthetic, GraphKind::kSE3);
   const KeyframeCorrection correction = graph.Optimize({TrueLoop(synthetic, 5, 105)});
-  graph.Move(correction.S_world_keyframe, correction.merges);
-  std::vector<MapKeyframe> moved;
-  for (const auto& [id, S] : correction.S_world_keyframe) moved.push_back({id, 0, S.RigidPart()});
-  graph.Update(moved);
+  Correct(correction, &graph);
   LoopEdge loop = TrueLoop(synthetic, 5, 105);
   loop.S_candidate_query = Similarity();
   ASSERT_TRUE(graph.Rehang({{105, 104}}, &loop));
@@ -409,10 +415,7 @@ TEST(KeyframeGraph, RemovedKeyframesLeaveTheMeasurementsOfBeforeACorrection) {
   const auto synthetic = Drifting(GraphKind::kSE3);
   KeyframeGraph graph = FromOdometry(synthetic, GraphKind::kSE3);
   const KeyframeCorrection correction = graph.Optimize({TrueLoop(synthetic, 5, 105)});
-  graph.Move(correction.S_world_keyframe, correction.merges);
-  std::vector<MapKeyframe> moved;
-  for (const auto& [id, S] : correction.S_world_keyframe) moved.push_back({id, 0, S.RigidPart()});
-  graph.Update(moved);
+  std::vector<MapKeyframe> moved = Correct(correction, &graph);
   graph.Remove({{50, 49}});
   moved.erase(moved.begin() + 50);
   graph.Update(moved);

@@ -10,10 +10,17 @@
 #include "frontend/map/map_correction.h"
 #include "frontend/map/other_camera.h"
 #include "frontend/map/redundant_keyframes.h"
+#include "frontend/map/scale_ramp.h"
 #include "frontend/odometry/step_check.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
+namespace {
+
+constexpr int kRamp = 40, kShortestRamp = 10;  // keyframes that a drift of the scale is spread over
+constexpr double kKnown = 0.3;                 // share of landmarks by which a place is one seen before
+
+}  // namespace
 
 Odometry::Impl::Impl(const OdometryOptions& options, const CameraRig& rig)
     : options_(options),
@@ -62,6 +69,7 @@ TrackResult Odometry::Impl::Track(const InputFrame& input) {
   }
   const bool few = !input.features && localizer_.features() < options_.features;
   TrackedFrame frame = Prepare(input, localizer_.features());
+  const Pose T_last_world = last().T_camera_world;
   const std::optional<Tracker> before = few ? std::optional(tracker_) : std::nullopt;
   Tracker::Tracked tracked = Look(frame);
   if (few && (!tracked.fix || localizer_.Doubts(*tracked.fix, last().frames_since_keyframe))) {
@@ -69,6 +77,9 @@ TrackResult Odometry::Impl::Track(const InputFrame& input) {
     frame = Prepare(input, options_.features);
     tracked = Look(frame);
   }
+  if (tracked.fix && rig_.sensor == Sensor::kMono && options_.keep_height && !localizer_.Begun())
+    height_.See(rig_.camera, frame.features, last().T_camera_world, T_last_world,
+                map().MedianDepth(last().reference));
   result_ = TrackMap(frame, tracked);
   result_.features = static_cast<int>(frame.features->size());
   return result_;
@@ -158,6 +169,7 @@ TrackResult Odometry::Impl::Initialize(const TrackedFrame& frame) {
   }
   const tutti::Keyframe& keyframe = map().keyframe(start.keyframe);
   tracker_.Begin(frame, keyframe);
+  height_.Forget();
   relocalizer_.Found();
   history_.Add(frame, tracker_.last().T_camera_world, keyframe);
   mapper_.Skip(start.keyframe);
@@ -253,6 +265,7 @@ bool Odometry::Impl::BecomesKeyframe(const Tracker::Tracked& tracked) const {
 // Makes the last tracked frame a keyframe.
 int Odometry::Impl::InsertKeyframe() {
   EnterMapping();
+  KeepScale();
   const LastFrame& last = tracker_.last();
   const int id = mapper_.AddKeyframe(last.frame, map().keyframe(last.reference).piece,
                                      last.T_camera_world.Inverse(), last.matches.landmarks);
@@ -274,6 +287,34 @@ void Odometry::Impl::EnterMapping() {
 void Odometry::Impl::Correct(const std::map<int, Similarity>& S_world_keyframe,
                              const std::map<int, int>& merges, const GlobalAdjustment::Work* adjustment) {
   EnterMapping();
+  first_unmoved_ = map().KeyframeCount();
+  const auto here = S_world_keyframe.find(last().reference);
+  if (here != S_world_keyframe.end()) height_.Follow(here->second.scale);
+  MoveMap(S_world_keyframe, merges, adjustment);
+}
+
+// Takes the drift that CameraHeight tells out of the newest keyframes. What a loop has moved stays, and so
+// does the map where the camera sees what it has seen long before.
+void Odometry::Impl::KeepScale() {
+  const std::optional<double> drift = height_.Drift();
+  const int newest = last().newest_keyframe, first = std::max(first_unmoved_, newest - kRamp);
+  if (!drift || newest - first < kShortestRamp) return;
+  int all = 0, old = 0;
+  for (const int l : last().matches.landmarks) {
+    if (l < 0 || !map().landmark(l).alive) continue;
+    ++all;
+    old += map().landmark(l).reference < first ? 1 : 0;
+  }
+  if (old > kKnown * all) return;
+  const std::map<int, Similarity> moved = ScaleRamp(map(), first, newest, -*drift);
+  const auto here = moved.find(last().reference);
+  if (here == moved.end()) return;
+  height_.Correct(here->second.scale);
+  MoveMap(moved, {}, nullptr);
+}
+
+void Odometry::Impl::MoveMap(const std::map<int, Similarity>& S_world_keyframe,
+                             const std::map<int, int>& merges, const GlobalAdjustment::Work* adjustment) {
   const int reference = tracker_.last().reference;
   if (reference >= 0) {
     const Pose& T_world_old = map().keyframe(reference).T_world_camera;

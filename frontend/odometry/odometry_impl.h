@@ -8,6 +8,7 @@
 
 #include "core/section_file.h"
 #include "frontend/odometry/async_mapper.h"
+#include "frontend/odometry/camera_height.h"
 #include "frontend/odometry/frame_history.h"
 #include "frontend/odometry/localizer.h"
 #include "frontend/odometry/map_initializer.h"
@@ -51,7 +52,7 @@ class Odometry::Impl {
   template <class Archive>
   void State(Archive& archive) {
     archive(mapper_, initializer_, tracker_, relocalizer_, history_, result_, row_errors_, stereo_matches_,
-            frame_offset_, session_piece_);
+            frame_offset_, session_piece_, height_, first_unmoved_);
   }
 
   const OdometryOptions& options() const { return options_; }
@@ -79,6 +80,9 @@ class Odometry::Impl {
   TrackResult Accept(const Tracker::Tracked& tracked);
   bool BecomesKeyframe(const Tracker::Tracked& tracked) const;
   int InsertKeyframe();
+  void KeepScale();
+  void MoveMap(const std::map<int, Similarity>& S_world_keyframe, const std::map<int, int>& merges,
+               const GlobalAdjustment::Work* adjustment);
   void Check(const internal::SectionReader& file) const;
 
   OdometryOptions options_;
@@ -90,10 +94,12 @@ class Odometry::Impl {
   Relocalizer relocalizer_;
   PoseFollower follower_;
   Localizer localizer_;
+  CameraHeight height_;
   FrameHistory history_;
   TrackResult result_;                               // of the last frame
   std::vector<double> row_errors_, stereo_matches_;  // stereo: of each pair
   std::int64_t frame_offset_ = 0;                    // of the recording, in the map's numbers
+  int first_unmoved_ = 0;                            // keyframe from which on no loop has moved any
   int session_piece_ = 0;                            // that the recording began with
 };
 

@@ -217,6 +217,8 @@ void Odometry::Impl::Check(const internal::SectionReader& file) const {
   internal::CheckIndex(static_cast<int>(result_.state), 0, static_cast<int>(TrackingState::kLost) + 1, file);
   internal::CheckKeyframe(result_.keyframe, map(), file, true);
   internal::CheckIndex(session_piece_, 0, initializer_.piece() + 1, file);
+  internal::CheckIndex(first_unmoved_, 0, map().KeyframeCount() + 1, file);
+  if (!height_.IsPossible()) file.Damaged("a height above the ground that is none");
   if (frame_offset_ < 0) file.Damaged("frames with impossible numbers");
   for (const std::vector<double>* numbers : {&row_errors_, &stereo_matches_}) {
     if (!std::all_of(numbers->begin(), numbers->end(), [](double v) { return std::isfinite(v); }))

@@ -36,6 +36,10 @@ struct OdometryOptions {
                "standard deviation; learnt on the way; 0: there is none",
                From(0));
 
+  TUTTI_OPTION(bool, keep_height, true,
+               "mono: a camera that stays at one height above the ground before it, as on a vehicle, keeps "
+               "its map's scale by it; without such a ground nothing happens");
+
   // Tracking.
   TUTTI_OPTION(double, pixel_sigma, 1.0, "standard deviation of a keypoint at pyramid level 0", Basic(),
                Unit("px"), Above(0));

@@ -1,0 +1,187 @@
+#include "frontend/geometry/ground_plane.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "core/dense_solvers.h"
+#include "core/median.h"
+
+namespace tutti {
+namespace {
+
+constexpr double kNearest = 3, kFarthest = 8, kAside = 1.2;  // of the ground that is looked at [heights]
+constexpr int kBelowHorizon = 5;                             // [px]
+constexpr double kMostPixels = 2500, kMostInSearch = 600, kFewestPixels = 150;
+constexpr int kIterations = 10;
+constexpr double kConverged = 1e-3, kNearlyConverged = 1e-2;  // of the plane
+constexpr double kHuber = 1.5, kLeastSpread = 0.5;            // [standard deviations], [grey levels]
+constexpr double kLowest = 0.05, kHighest = 20;               // that is searched [ways between the images]
+constexpr int kHeights = 121;
+
+struct Pixel {
+  Eigen::Vector3d ray;  // z = 1
+  double grey = 0;
+};
+
+// Of what the plane says is ground, at most so many pixels on a regular grid.
+std::vector<Pixel> GroundPixels(const PinholeCamera& camera, const cv::Mat& image,
+                                const Eigen::Vector3d& plane, double most) {
+  const double height = 1 / plane.norm();
+  struct Row {
+    int v, from, to;
+  };
+  std::vector<Row> rows;
+  double area = 0;
+  for (int v = std::max(0, static_cast<int>(camera.cy) + kBelowHorizon); v < image.rows - 4; ++v) {
+    const double below = (v - camera.cy) / camera.fy, inverse = plane.y() * below + plane.z();
+    if (!(inverse > 1 / (kFarthest * height)) || !(inverse < 1 / (kNearest * height))) continue;
+    const double half = camera.fx * kAside * height * inverse;
+    const Row row{v, std::max(1, static_cast<int>(std::ceil(camera.cx - half))),
+                  std::min(image.cols - 2, static_cast<int>(std::floor(camera.cx + half)))};
+    if (row.to <= row.from) continue;
+    area += row.to - row.from;
+    rows.push_back(row);
+  }
+  std::vector<Pixel> pixels;
+  if (area < kFewestPixels) return pixels;
+  const int stride = std::max(1, static_cast<int>(std::ceil(std::sqrt(area / most))));
+  for (const Row& row : rows) {
+    if (row.v % stride != 0) continue;
+    const unsigned char* const greys = image.ptr<unsigned char>(row.v);
+    for (int u = row.from; u < row.to; u += stride)
+      pixels.push_back({{(u - camera.cx) / camera.fx, (row.v - camera.cy) / camera.fy, 1}, double(greys[u])});
+  }
+  return pixels;
+}
+
+struct Sample {
+  double grey = 0;
+  Eigen::Vector2d slope = Eigen::Vector2d::Zero();  // [grey levels per px]
+};
+
+// Between four pixels. False: outside.
+bool SampleAt(const cv::Mat& image, double u, double v, Sample* sample) {
+  if (!(u >= 2) || !(v >= 2) || !(u < image.cols - 3) || !(v < image.rows - 3)) return false;
+  const int x = static_cast<int>(u), y = static_cast<int>(v);
+  const double fx = u - x, fy = v - y;
+  const unsigned char *const above = image.ptr<unsigned char>(y) + x, *const below =
+                                                                          image.ptr<unsigned char>(y + 1) + x;
+  const double a = above[0], b = above[1], c = below[0], d = below[1];
+  sample->grey = (a * (1 - fx) + b * fx) * (1 - fy) + (c * (1 - fx) + d * fx) * fy;
+  sample->slope = {(b - a) * (1 - fy) + (d - c) * fy, (c - a) * (1 - fx) + (d - b) * fx};
+  return true;
+}
+
+// What of the first image is found in the second one by a plane.
+struct Pairs {
+  std::vector<double> first, second;      // grey values
+  std::vector<Eigen::Vector3d> by_plane;  // derivative of the second
+};
+
+void Find(const PinholeCamera& camera, const std::vector<Pixel>& pixels, const cv::Mat& second,
+          const Pose& T_second_first, const Eigen::Vector3d& plane, Pairs* pairs) {
+  pairs->first.clear();
+  pairs->second.clear();
+  pairs->by_plane.clear();
+  const Eigen::Matrix3d R = T_second_first.rotation.toRotationMatrix();
+  const Eigen::Vector3d& t = T_second_first.translation;
+  for (const Pixel& p : pixels) {
+    const Eigen::Vector3d X = R * p.ray + plane.dot(p.ray) * t;  // over the depth in the first image
+    if (!(X.z() > 0.05)) continue;
+    const double z = 1 / X.z(), x = X.x() * z, y = X.y() * z;
+    Sample sample;
+    if (!SampleAt(second, camera.fx * x + camera.cx, camera.fy * y + camera.cy, &sample)) continue;
+    const double along = sample.slope.x() * camera.fx * (t.x() - x * t.z()) * z +
+                         sample.slope.y() * camera.fy * (t.y() - y * t.z()) * z;
+    pairs->first.push_back(p.grey);
+    pairs->second.push_back(sample.grey);
+    pairs->by_plane.push_back(along * p.ray);
+  }
+}
+
+struct Brightness {
+  double gain = 1, offset = 0, correlation = 0;
+};
+
+// first = gain second + offset, by least squares.
+Brightness Compare(const Pairs& pairs) {
+  const double n = static_cast<double>(pairs.first.size());
+  double a = 0, b = 0, aa = 0, ab = 0, bb = 0;
+  for (std::size_t i = 0; i < pairs.first.size(); ++i) {
+    a += pairs.first[i];
+    b += pairs.second[i];
+    aa += pairs.first[i] * pairs.first[i];
+    ab += pairs.first[i] * pairs.second[i];
+    bb += pairs.second[i] * pairs.second[i];
+  }
+  const double va = aa - a * a / n, vb = bb - b * b / n, cov = ab - a * b / n;
+  Brightness out;
+  if (!(va > n) || !(vb > n)) return out;  // less than a grey level of contrast
+  out.gain = cov / vb;
+  out.offset = (a - out.gain * b) / n;
+  out.correlation = cov / std::sqrt(va * vb);
+  return out;
+}
+
+}  // namespace
+
+std::optional<GroundPlane> AlignGround(const PinholeCamera& camera, const cv::Mat& first,
+                                       const cv::Mat& second, const Pose& T_second_first,
+                                       const Eigen::Vector3d& start) {
+  const std::vector<Pixel> pixels = GroundPixels(camera, first, start, kMostPixels);
+  Eigen::Vector3d plane = start;
+  Pairs pairs;
+  std::vector<double> sizes;
+  double last_step = INFINITY;
+  for (int iteration = 0; iteration < kIterations; ++iteration) {
+    Find(camera, pixels, second, T_second_first, plane, &pairs);
+    if (static_cast<double>(pairs.first.size()) < kFewestPixels) return std::nullopt;
+    const Brightness brightness = Compare(pairs);
+    sizes.clear();
+    for (std::size_t i = 0; i < pairs.first.size(); ++i)
+      sizes.push_back(std::abs(brightness.gain * pairs.second[i] + brightness.offset - pairs.first[i]));
+    const double spread = 1.4826 * internal::Median(sizes) + kLeastSpread;
+    Eigen::Matrix<double, 5, 5> hessian = Eigen::Matrix<double, 5, 5>::Zero();
+    Eigen::Matrix<double, 5, 1> gradient = Eigen::Matrix<double, 5, 1>::Zero(), step;
+    for (std::size_t i = 0; i < sizes.size(); ++i) {
+      const double residual = brightness.gain * pairs.second[i] + brightness.offset - pairs.first[i];
+      const double weight = 1 / std::max(1.0, sizes[i] / (kHuber * spread));
+      Eigen::Matrix<double, 5, 1> j;
+      j << brightness.gain * pairs.by_plane[i], pairs.second[i] / 100, 1;
+      hessian.selfadjointView<Eigen::Lower>().rankUpdate(j, weight);
+      gradient += weight * residual * j;
+    }
+    hessian = Eigen::Matrix<double, 5, 5>(hessian.selfadjointView<Eigen::Lower>());
+    internal::SolveLdlt(5, hessian.data(), gradient.data(), step.data());
+    if (!step.allFinite()) return std::nullopt;
+    plane -= step.head<3>();
+    if (!(plane.norm() > 0)) return std::nullopt;
+    last_step = step.head<3>().norm() / plane.norm();
+    if (last_step < kConverged) break;
+  }
+  if (!(last_step < kNearlyConverged)) return std::nullopt;
+  Find(camera, pixels, second, T_second_first, plane, &pairs);
+  if (static_cast<double>(pairs.first.size()) < kFewestPixels) return std::nullopt;
+  const double correlation = Compare(pairs).correlation;
+  if (!(correlation > 0)) return std::nullopt;
+  return GroundPlane{plane, correlation};
+}
+
+std::optional<GroundPlane> SearchGround(const PinholeCamera& camera, const cv::Mat& first,
+                                        const cv::Mat& second, const Pose& T_second_first) {
+  const double way = T_second_first.translation.norm();
+  std::optional<GroundPlane> best;
+  Pairs pairs;
+  for (int i = 0; way > 0 && i < kHeights; ++i) {
+    const double height = way * kLowest * std::pow(kHighest / kLowest, i / (kHeights - 1.0));
+    const Eigen::Vector3d plane(0, 1 / height, 0);
+    Find(camera, GroundPixels(camera, first, plane, kMostInSearch), second, T_second_first, plane, &pairs);
+    if (static_cast<double>(pairs.first.size()) < kFewestPixels) continue;
+    const double correlation = Compare(pairs).correlation;
+    if (!best || correlation > best->correlation) best = GroundPlane{plane, correlation};
+  }
+  return best;
+}
+
+}  // namespace tutti

@@ -1,0 +1,135 @@
+#include "frontend/odometry/camera_height.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tutti {
+namespace {
+
+constexpr double kWay = 0.4, kLongestWay = 2;   // between the two images [heights]
+constexpr int kOldest = 10;                     // [frames]
+constexpr double kWayOfDepth = 0.03;            // while the height is not known [depths]
+constexpr int kWait = 10;                       // frames from one search to the next
+constexpr double kFound = 0.85, kAgrees = 0.7;  // correlation of what is found, of what is known
+constexpr double kTurned = 0.12;                // of the ground against the camera [rad]
+constexpr double kMisfit = 0.25;                // of a logarithm: no measurement of the ground
+constexpr double kSigma = 0.06;  // of one, over a way of one height; errors of the road as well
+constexpr double kWalk = 0.003;  // of the drift, over a way of one height
+constexpr int kEnough = 40, kMostFailures = 10, kOthers = 5;
+constexpr double kOften = 0.6, kSpread = 0.1, kBias = 0.06;
+constexpr double kMemory = 0.04;  // weight of the newest measurement in what holds "of late"
+constexpr double kWorth = 0.002;  // a smaller drift waits
+
+}  // namespace
+
+void CameraHeight::See(const PinholeCamera& camera, const std::shared_ptr<const FrameFeatures>& features,
+                       const Pose& T_camera_world, const Pose& T_last_world, double depth) {
+  if (!features->pyramid || features->pyramid->empty()) return;
+  const auto begin = [&] {
+    first_ = features;
+    T_last_first_ = Pose();
+    age_ = 0;
+  };
+  if (!first_) return begin();
+  T_last_first_ = T_camera_world * T_last_world.Inverse() * T_last_first_;
+  ++age_;
+  ++waited_;
+  const double way = T_last_first_.translation.norm();
+  const bool known = !plane_.isZero();
+  const double least = known ? kWay / plane_.norm() : kWayOfDepth * depth;
+  if (way < least) {
+    if (age_ >= kOldest) begin();
+    return;
+  }
+  if (known) {
+    Measure(camera, *features);
+  } else if (waited_ >= kWait) {
+    Search(camera, *features);
+    waited_ = 0;
+  }
+  begin();
+}
+
+void CameraHeight::Search(const PinholeCamera& camera, const FrameFeatures& now) {
+  const cv::Mat &first = first_->pyramid->front(), &second = now.pyramid->front();
+  std::optional<GroundPlane> found = SearchGround(camera, first, second, T_last_first_);
+  if (!found || !(found->correlation > kFound - 0.15)) return;
+  found = AlignGround(camera, first, second, T_last_first_, found->normal_by_height);
+  if (!found || !(found->correlation > kFound)) return;
+  const Eigen::Vector3d normal = found->normal_by_height.normalized();
+  if (!(std::acos(std::clamp(normal.y(), -1.0, 1.0)) < 2 * kTurned)) return;
+  // One that is known stays, unless it is another ground.
+  const bool same = seen_ > 0 && std::abs(std::log(found->Height()) - reference_ - drift_) < kMisfit;
+  if (!same) {
+    if (seen_ > 0 && ++others_ < kOthers) return;
+    *this = CameraHeight();
+    reference_ = std::log(found->Height());
+    covariance_(0, 0) = 1;
+  }
+  plane_ = found->normal_by_height;
+  failures_ = others_ = 0;
+}
+
+void CameraHeight::Measure(const PinholeCamera& camera, const FrameFeatures& now) {
+  const double way = T_last_first_.translation.norm() * plane_.norm();
+  if (way > kLongestWay) return;
+  const auto found =
+      AlignGround(camera, first_->pyramid->front(), now.pyramid->front(), T_last_first_, plane_);
+  const bool agrees = found && found->correlation > kAgrees &&
+                      std::acos(std::clamp(found->normal_by_height.normalized().dot(plane_.normalized()),
+                                           -1.0, 1.0)) < kTurned &&
+                      std::abs(std::log(found->Height()) - reference_ - drift_) < kMisfit;
+  ++seen_;
+  const double weight = std::max(kMemory, 1.0 / seen_);
+  share_ += weight * ((agrees ? 1 : 0) - share_);
+  covariance_(1, 1) += kWalk * kWalk * way;
+  if (!agrees) {
+    if (++failures_ >= kMostFailures) plane_.setZero();
+    return;
+  }
+  failures_ = 0;
+  plane_ += 0.2 * (found->normal_by_height - plane_);
+  Update(std::log(found->Height()), way);
+}
+
+// Kalman filter; a misfit beyond twice what is usual counts as if it were so much.
+void CameraHeight::Update(double log_height, double way) {
+  const Eigen::RowVector2d by(1, 1);
+  const double misfit = log_height - reference_ - drift_;
+  const double weight = std::max(kMemory, 1.0 / seen_);
+  spread_ += weight * (misfit * misfit - spread_);
+  bias_ += weight * (misfit - bias_);
+  const double usual = 0.5 * kSigma / std::sqrt(way);
+  const double variance = kSigma * kSigma / way * std::max(1.0, std::abs(misfit) / (2 * usual));
+  const Eigen::Vector2d gain = covariance_ * by.transpose() / (by * covariance_ * by.transpose() + variance);
+  reference_ += gain(0) * misfit;
+  drift_ += gain(1) * misfit;
+  covariance_ -= Eigen::Matrix2d(gain * by * covariance_);
+}
+
+std::optional<double> CameraHeight::Drift() const {
+  if (seen_ < kEnough || share_ < kOften || spread_ > kSpread * kSpread || std::abs(bias_) > kBias)
+    return std::nullopt;
+  if (std::abs(drift_) < kWorth) return std::nullopt;
+  return drift_;
+}
+
+void CameraHeight::Correct(double scale) {
+  drift_ += std::log(scale);
+  plane_ /= scale;
+  T_last_first_.translation *= scale;
+}
+
+bool CameraHeight::IsPossible() const {
+  return T_last_first_.IsFinite() && plane_.allFinite() && covariance_.allFinite() && age_ >= 0 &&
+         waited_ >= 0 && seen_ >= 0 && failures_ >= 0 && others_ >= 0 && std::isfinite(reference_) &&
+         std::isfinite(drift_) && std::isfinite(share_) && std::isfinite(spread_) && std::isfinite(bias_);
+}
+
+void CameraHeight::Follow(double scale) {
+  reference_ += std::log(scale);
+  plane_ /= scale;
+  T_last_first_.translation *= scale;
+}
+
+}  // namespace tutti

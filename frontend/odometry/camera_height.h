@@ -1,0 +1,56 @@
+// One camera on a vehicle: how high it is above the ground, in the map's unit. The height stays; where the
+// map says otherwise, its scale has drifted.
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <optional>
+
+#include "frontend/features/features.h"
+#include "frontend/geometry/ground_plane.h"
+
+namespace tutti {
+
+/// Value type. Trusts nothing of it until the ground has been seen again and again at one height: a camera
+/// in a hand, on a drone, or before anything but a ground gives no drift.
+class CameraHeight {
+ public:
+  /// The next frame, which has its image. `depth`: what is in view, typically [map units].
+  void See(const PinholeCamera& camera, const std::shared_ptr<const FrameFeatures>& features,
+           const Pose& T_camera_world, const Pose& T_last_world, double depth);
+  /// Nothing that was known holds any more: another piece of the map.
+  void Forget() { *this = CameraHeight(); }
+  /// Logarithm of how much larger the map is here than where the height was first seen; none: not known, or
+  /// not enough to say.
+  std::optional<double> Drift() const;
+  /// The map around the camera was made larger by this factor, to take a drift out.
+  void Correct(double scale);
+  /// It was, since a loop says so: it is right there.
+  void Follow(double scale);
+
+  /// False: not what a file can have kept of one.
+  bool IsPossible() const;
+
+  template <class Archive>
+  void State(Archive& archive) {
+    archive(first_, T_last_first_, age_, waited_, plane_, reference_, drift_, covariance_, seen_, share_,
+            spread_, bias_, failures_, others_);
+  }
+
+ private:
+  void Search(const PinholeCamera& camera, const FrameFeatures& now);
+  void Measure(const PinholeCamera& camera, const FrameFeatures& now);
+  void Update(double log_height, double way);
+
+  std::shared_ptr<const FrameFeatures> first_;  // the frame that the next ones are compared with
+  Pose T_last_first_;
+  int age_ = 0, waited_ = 0;                         // frames since first_, and since the last search
+  Eigen::Vector3d plane_ = Eigen::Vector3d::Zero();  // GroundPlane::normal_by_height; 0: not known
+  double reference_ = 0, drift_ = 0;                 // logarithms: of the height at first, and of the drift
+  Eigen::Matrix2d covariance_ = Eigen::Matrix2d::Zero();  // of both
+  int seen_ = 0;                                          // measurements since the search
+  double share_ = 0, spread_ = 0, bias_ = 0;  // of late: that agreed, their squared misfit, their misfit
+  int failures_ = 0, others_ = 0;             // in a row: without the ground; searches that found another
+};
+
+}  // namespace tutti

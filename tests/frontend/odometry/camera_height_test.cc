@@ -1,0 +1,123 @@
+#include "frontend/odometry/camera_height.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include "data/synthetic/synthetic_world.h"
+#include "tests/support/rendered_world.h"
+#include "tests/support/small_town.h"
+
+namespace tutti {
+namespace {
+
+constexpr std::size_t kDriven = 160;
+constexpr double kDepth = 15;  // [m], about
+
+const testing::RenderedWorld& Town() {
+  static const testing::RenderedWorld town([] {
+    SyntheticOptions options = testing::SmallStereoTown(640, 320);
+    options.sensor = SyntheticSensor::kMono;
+    options.block_m = 60;
+    return options;
+  }());
+  return town;
+}
+
+Pose PoseOf(std::size_t i) { return Town().World().PoseOf(i); }
+
+std::shared_ptr<const FrameFeatures> Features(const cv::Mat& image) {
+  auto features = std::make_shared<FrameFeatures>();
+  features->pyramid = std::make_shared<const std::vector<cv::Mat>>(1, image);
+  return features;
+}
+
+// A drive of whose map the scale changes by `rate` a frame; where a drift is told, it is taken out if
+// `corrected`. Returns the logarithm of the scale at its end, over where it was at first.
+double Drive(double rate, bool corrected, CameraHeight* height) {
+  double scale = 1;
+  Pose T_world_camera = PoseOf(0), last = T_world_camera;
+  for (std::size_t i = 0; i < kDriven; ++i) {
+    if (i > 0) {
+      Pose step = PoseOf(i - 1).Inverse() * PoseOf(i);
+      scale *= std::exp(rate);
+      step.translation *= scale;
+      T_world_camera = last * step;
+    }
+    height->See(Town().Camera(), Features(Town().Render(i).image), T_world_camera.Inverse(), last.Inverse(),
+                kDepth);
+    last = T_world_camera;
+    const auto drift = height->Drift();
+    if (!corrected || !drift) continue;
+    scale *= std::exp(-*drift);
+    height->Correct(std::exp(-*drift));
+  }
+  return std::log(scale);
+}
+
+TEST(CameraHeight, TellsNoDriftWhereThereIsNone) {
+  CameraHeight height;
+  Drive(0, false, &height);
+  EXPECT_LT(std::abs(height.Drift().value_or(0)), 0.01);
+}
+
+TEST(CameraHeight, TellsADriftAndItsSign) {
+  for (const double rate : {0.0005, -0.0005}) {  // 8 % in all
+    CameraHeight height;
+    Drive(rate, false, &height);
+    ASSERT_TRUE(height.Drift());
+    EXPECT_GT(*height.Drift() / rate, 0.3 * kDriven);
+    EXPECT_LT(*height.Drift() / rate, 1.2 * kDriven);
+  }
+}
+
+TEST(CameraHeight, KeepsTheScaleWhereItsDriftIsTakenOut) {
+  CameraHeight height;
+  EXPECT_LT(std::abs(Drive(0.0005, true, &height)), 0.7 * 0.0005 * kDriven);
+}
+
+TEST(CameraHeight, BelievesALoop) {
+  CameraHeight height;
+  Drive(0.0005, false, &height);
+  const auto before = height.Drift();
+  height.Follow(0.9);
+  EXPECT_EQ(height.Drift(), before) << "the map is right where a loop has moved it";
+}
+
+TEST(CameraHeight, SaysNothingBeforeAWallOrSnow) {
+  CameraHeight height;
+  cv::RNG random(1);
+  for (int i = 0; i < 100; ++i) {
+    cv::Mat snow(200, 400, CV_8U);
+    random.fill(snow, cv::RNG::UNIFORM, 0, 255);
+    const Pose now(Eigen::Quaterniond::Identity(), {0, 0, 0.8 * i}),
+        last(Eigen::Quaterniond::Identity(), {0, 0, 0.8 * std::max(0, i - 1)});
+    height.See(Town().Camera(), Features(snow), now.Inverse(), last.Inverse(), kDepth);
+  }
+  EXPECT_FALSE(height.Drift());
+}
+
+// On a drone the height is what changes, and not the scale.
+TEST(CameraHeight, SaysNothingOfACameraThatClimbs) {
+  CameraHeight height;
+  Pose last = PoseOf(0);
+  for (std::size_t i = 0; i < 80; ++i) {
+    Pose now = PoseOf(i);
+    now.translation += 0.02 * static_cast<double>(i) * (now.rotation * Eigen::Vector3d(0, -1, 0));
+    height.See(Town().Camera(), Features(Town().World().RenderFrom(i, now).image), now.Inverse(),
+               last.Inverse(), kDepth);
+    last = now;
+    EXPECT_LT(std::abs(height.Drift().value_or(0)), 0.03) << i;
+  }
+}
+
+TEST(CameraHeight, NeedsImages) {
+  CameraHeight height;
+  height.See(Town().Camera(), std::make_shared<FrameFeatures>(), Pose(), Pose(), kDepth);
+  EXPECT_FALSE(height.Drift());
+}
+
+}  // namespace
+}  // namespace tutti

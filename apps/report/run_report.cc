@@ -127,6 +127,8 @@ Json FiguresJson(const RunResult& r) {
                     {"k2_sigma", r.lens->k2_sigma},
                     {"steps", r.lens->steps.size()}};
   }
+  if (r.height)
+    json["height"] = {{"measurements", r.height->measurements}, {"corrections", r.height->corrections}};
   if (r.evaluation) {
     json["true"] = r.evaluation->loops_true;
     json["false"] = r.evaluation->loops_false;

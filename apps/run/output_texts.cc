@@ -256,6 +256,12 @@ std::string SummaryJson(const RunResult& r) {
                               {"seen", sigmas(r.followed.seen_fraction, r.followed.seen_rotation_rad)}};
   }
   if (r.lens) json["lens"] = LensJson(*r.lens);
+  if (r.height)
+    json["height"] = {{"height", r.height->height},
+                      {"measurements", r.height->measurements},
+                      {"agreeing", r.height->agreeing},
+                      {"corrections", r.height->corrections},
+                      {"log_scale", r.height->log_scale}};
   if (r.evaluation) {
     json["evaluation"] = {
         {"alignment", r.evaluation->alignment},  {"ground_truth", r.evaluation->file},

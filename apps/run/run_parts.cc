@@ -170,6 +170,7 @@ void CollectMap(const RunState& state, RunResult& result) {
   result.stereo_row_error_px = odometry.StereoRowErrorPx();
   result.stereo_matches = odometry.StereoMatches();
   result.lens = odometry.Lens();
+  result.height = odometry.Height();
   result.map_figures = MeasureMap(odometry, session);
   CollectKeyframes(odometry, session, result);
 }

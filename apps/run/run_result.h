@@ -143,7 +143,8 @@ struct RunResult {
   std::vector<StageTiming> stages;         ///< with RunRequest::timing or trace only
   double peak_memory_mb = 0;
   double stereo_row_error_px = 0, stereo_matches = 0;
-  std::optional<LensFound> lens;  ///< mono, with self-calibration
+  std::optional<LensFound> lens;      ///< mono, with self-calibration
+  std::optional<HeightFound> height;  ///< mono, where the ground was seen
 
   std::filesystem::path folder;  ///< where everything was written: RunRequest::out, or "unfinished" inside
 

@@ -62,7 +62,7 @@ void CameraHeight::Search(const PinholeCamera& camera, const FrameFeatures& now)
   const bool same = seen_ > 0 && std::abs(std::log(found->Height()) - reference_ - drift_) < kMisfit;
   if (!same) {
     if (seen_ > 0 && ++others_ < kOthers) return;
-    *this = CameraHeight();
+    Forget();
     reference_ = std::log(found->Height());
     covariance_(0, 0) = 1;
   }
@@ -116,14 +116,30 @@ std::optional<double> CameraHeight::Drift() const {
 
 void CameraHeight::Correct(double scale) {
   drift_ += std::log(scale);
+  corrected_ += std::log(scale);
+  ++corrections_;
   plane_ /= scale;
   T_last_first_.translation *= scale;
 }
 
+void CameraHeight::Forget() {
+  const int corrections = corrections_;
+  const double corrected = corrected_;
+  *this = CameraHeight();
+  corrections_ = corrections;
+  corrected_ = corrected;
+}
+
+std::optional<HeightFound> CameraHeight::Found() const {
+  if (seen_ == 0 && corrections_ == 0) return std::nullopt;
+  return HeightFound{std::exp(reference_ + drift_), seen_, share_, corrections_, corrected_};
+}
+
 bool CameraHeight::IsPossible() const {
   return T_last_first_.IsFinite() && plane_.allFinite() && covariance_.allFinite() && age_ >= 0 &&
-         waited_ >= 0 && seen_ >= 0 && failures_ >= 0 && others_ >= 0 && std::isfinite(reference_) &&
-         std::isfinite(drift_) && std::isfinite(share_) && std::isfinite(spread_) && std::isfinite(bias_);
+         waited_ >= 0 && seen_ >= 0 && failures_ >= 0 && others_ >= 0 && corrections_ >= 0 &&
+         std::isfinite(corrected_) && std::isfinite(reference_) && std::isfinite(drift_) &&
+         std::isfinite(share_) && std::isfinite(spread_) && std::isfinite(bias_);
 }
 
 void CameraHeight::Follow(double scale) {

@@ -8,6 +8,7 @@
 
 #include "frontend/features/features.h"
 #include "frontend/geometry/ground_plane.h"
+#include "tutti/frontend/odometry.h"
 
 namespace tutti {
 
@@ -19,7 +20,7 @@ class CameraHeight {
   void See(const PinholeCamera& camera, const std::shared_ptr<const FrameFeatures>& features,
            const Pose& T_camera_world, const Pose& T_last_world, double depth);
   /// Nothing that was known holds any more: another piece of the map.
-  void Forget() { *this = CameraHeight(); }
+  void Forget();
   /// Logarithm of how much larger the map is here than where the height was first seen; none: not known, or
   /// not enough to say.
   std::optional<double> Drift() const;
@@ -28,13 +29,15 @@ class CameraHeight {
   /// It was, since a loop says so: it is right there.
   void Follow(double scale);
 
+  /// What is known, and what was corrected so far; none: nothing is.
+  std::optional<HeightFound> Found() const;
   /// False: not what a file can have kept of one.
   bool IsPossible() const;
 
   template <class Archive>
   void State(Archive& archive) {
     archive(first_, T_last_first_, age_, waited_, plane_, reference_, drift_, covariance_, seen_, share_,
-            spread_, bias_, failures_, others_);
+            spread_, bias_, failures_, others_, corrections_, corrected_);
   }
 
  private:
@@ -50,6 +53,8 @@ class CameraHeight {
   Eigen::Matrix2d covariance_ = Eigen::Matrix2d::Zero();  // of both
   int seen_ = 0;                                          // measurements since the search
   double share_ = 0, spread_ = 0, bias_ = 0;  // of late: that agreed, their squared misfit, their misfit
+  int corrections_ = 0;                       // by Correct, ever
+  double corrected_ = 0;                      // the logarithm of all of them
   int failures_ = 0, others_ = 0;             // in a row: without the ground; searches that found another
 };
 

@@ -220,6 +220,7 @@ void Odometry::SetRecorder(SpanRecorder* recorder) { impl_->SetRecorder(recorder
 double Odometry::StereoRowErrorPx() const { return internal::Median(impl_->row_errors()); }
 double Odometry::StereoMatches() const { return internal::Median(impl_->stereo_matches()); }
 
+std::optional<HeightFound> Odometry::Height() const { return impl_->height().Found(); }
 std::optional<LensFound> Odometry::Lens() const {
   const SelfCalibration& lens = impl_->mapper().lens();
   return lens.Enabled() ? std::optional(lens.Found()) : std::nullopt;

@@ -61,6 +61,7 @@ class Odometry::Impl {
   const AsyncMapper& mapper() const { return mapper_; }
   const FrameHistory& history() const { return history_; }
   const LastFrame& last() const { return tracker_.last(); }
+  const CameraHeight& height() const { return height_; }
   const Localizer& localizer() const { return localizer_; }
   std::int64_t frame_offset() const { return frame_offset_; }
   int session_piece() const { return session_piece_; }

@@ -26,6 +26,8 @@ function cardsOf(run) {
     const known = (name) => `${name} ${fixed(f.lens[name], 4)} ± ${fixed(f.lens[`${name}_sigma`], 4)}`;
     cards.push(card('lens, self-calibrated', known('k1'), `${known('k2')}; moved ${f.lens.steps} times`));
   }
+  if (f.height && f.height.corrections > 0)
+    cards.push(card('scale, by the height', `${f.height.corrections} corrections`, `ground measured ${f.height.measurements} times`));
   return el('div', { class: 'cards' }, cards);
 }
 

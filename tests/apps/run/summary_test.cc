@@ -66,6 +66,10 @@ TEST(Summary, TheLensSaysHowItWasFound) {
   RunResult result;
   EXPECT_FALSE(nlohmann::json::parse(SummaryJson(result)).contains("lens"));
   result.lens = LensFound{-0.01, 0.002, 0.001, 0.003, {{40, -0.008, 0.001, 0.002, 0.004}}};
+  result.height = HeightFound{0.07, 50, 0.9, 3, -0.01};
+  const nlohmann::json height = nlohmann::json::parse(SummaryJson(result))["height"];
+  EXPECT_EQ(height["measurements"], 50);
+  EXPECT_EQ(height["log_scale"], -0.01);
   const nlohmann::json lens = nlohmann::json::parse(SummaryJson(result))["lens"];
   EXPECT_EQ(lens["k1"], -0.01);
   EXPECT_EQ(lens["k1_sigma"], 0.001);

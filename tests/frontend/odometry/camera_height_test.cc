@@ -75,7 +75,15 @@ TEST(CameraHeight, TellsADriftAndItsSign) {
 
 TEST(CameraHeight, KeepsTheScaleWhereItsDriftIsTakenOut) {
   CameraHeight height;
+  EXPECT_FALSE(height.Found());
   EXPECT_LT(std::abs(Drive(0.0005, true, &height)), 0.7 * 0.0005 * kDriven);
+  ASSERT_TRUE(height.Found());
+  EXPECT_GT(height.Found()->measurements, 100);
+  EXPECT_GT(height.Found()->corrections, 0);
+  EXPECT_LT(height.Found()->log_scale, 0);
+  height.Forget();
+  EXPECT_EQ(height.Found()->measurements, 0);
+  EXPECT_GT(height.Found()->corrections, 0) << "what was done stays known";
 }
 
 TEST(CameraHeight, BelievesALoop) {

@@ -99,6 +99,15 @@ struct LensFound {
   std::vector<Step> steps;
 };
 
+/// What one camera's images told of its height above the ground (odometry.keep_height).
+struct HeightFound {
+  double height = 0;     ///< in the map's unit
+  int measurements = 0;  ///< since the ground was found
+  double agreeing = 0;   ///< share of the newest ones that found the ground at that height
+  int corrections = 0;   ///< so often the scale of the newest keyframes was corrected by it
+  double log_scale = 0;  ///< logarithm of all these corrections together
+};
+
 /// Odometry of one camera rig. A value type: a copy goes on independently (the pipeline uses that to know
 /// what the odometry alone would have done). Deterministic: the same frames give the same bits.
 class Odometry {
@@ -254,6 +263,8 @@ class Odometry {
   double StereoMatches() const;
   /// One camera: the lens by self-calibration, so far. None with depth, or with lens_sigma 0.
   std::optional<LensFound> Lens() const;
+  /// One camera: how high it is above the ground. None: no ground was seen, or nobody looked for it.
+  std::optional<HeightFound> Height() const;
 
   /// For files that hold more than an odometry (maps of tutti::slam): gives all that this object knows to
   /// `sink`, section by section; whether to use threads, and the recorder, belong to the object that loads

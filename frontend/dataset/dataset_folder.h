@@ -17,10 +17,26 @@
 
 namespace tutti {
 
+/// A path without its parts, which take ten times its memory: there may be hundreds of thousands.
+class ShortPath {
+ public:
+  ShortPath() = default;
+  ShortPath(const std::filesystem::path& path) : text_(path.native()) {}
+
+  operator std::filesystem::path() const { return text_; }
+  const std::string& string() const { return text_; }
+  std::filesystem::path stem() const { return std::filesystem::path(text_).stem(); }
+  bool empty() const { return text_.empty(); }
+  bool operator==(const ShortPath& other) const { return text_ == other.text_; }
+
+ private:
+  std::string text_;
+};
+
 /// Files of one frame; empty paths where the sensor, or the folder, has none.
 struct FrameFiles {
   double stamp_s = 0;
-  std::filesystem::path image, right, depth;
+  ShortPath image, right, depth;
 };
 
 /// What a reader finds out about its folder.

@@ -73,8 +73,8 @@ std::optional<std::int64_t> NumberOf(const std::filesystem::path& file) {
 }
 
 // Frame number -> image. KITTI's names are the frame numbers; other names count from 0 in natural order.
-std::map<std::int64_t, std::filesystem::path> NumberedImages(const std::filesystem::path& folder) {
-  std::map<std::int64_t, std::filesystem::path> numbered, counted;
+std::map<std::int64_t, ShortPath> NumberedImages(const std::filesystem::path& folder) {
+  std::map<std::int64_t, ShortPath> numbered, counted;
   bool all_numbers = true;
   for (const std::filesystem::path& file : ListImages(folder)) {
     counted.emplace(static_cast<std::int64_t>(counted.size()), file);
@@ -90,8 +90,8 @@ std::map<std::int64_t, std::filesystem::path> NumberedImages(const std::filesyst
 }
 
 // What the image of that number would be called.
-std::string NameLike(const std::map<std::int64_t, std::filesystem::path>& images, std::int64_t number) {
-  const std::filesystem::path& like = images.begin()->second;
+std::string NameLike(const std::map<std::int64_t, ShortPath>& images, std::int64_t number) {
+  const std::filesystem::path like = images.begin()->second;
   std::string digits = std::to_string(number);
   const std::size_t width = like.stem().string().size();
   if (digits.size() < width) digits.insert(0, width - digits.size(), '0');
@@ -126,7 +126,7 @@ FolderContents FindKitti(const std::filesystem::path& folder, const DatasetOptio
   const auto images = NumberedImages(left_folder);
   if (images.empty())
     throw InputError(left_folder.string() + ": holds no images; put the sequence's images there");
-  std::map<std::int64_t, std::filesystem::path> right_images;
+  std::map<std::int64_t, ShortPath> right_images;
   if (options.sensor == Sensor::kStereo) {
     right_images = NumberedImages(right_folder);
     if (right_images.empty()) {
@@ -169,7 +169,7 @@ FolderContents FindKitti(const std::filesystem::path& folder, const DatasetOptio
     }
     const auto image = images.find(n);
     const auto right = right_images.find(n);
-    frame.image = image != images.end() ? image->second : left_folder / NameLike(images, n);
+    frame.image = image != images.end() ? image->second : ShortPath(left_folder / NameLike(images, n));
     if (right != right_images.end()) frame.right = right->second;
     if (image != images.end()) ++(right != right_images.end() ? pairs : alone);
     out.pose_stamps.emplace_back(n, frame.stamp_s);

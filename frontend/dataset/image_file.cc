@@ -208,16 +208,17 @@ bool HasImageExtension(const std::filesystem::path& file) {
 }
 
 std::vector<std::filesystem::path> ListImages(const std::filesystem::path& folder) {
-  std::vector<std::filesystem::path> files;
+  std::vector<std::string> names;
   std::error_code code;
   for (std::filesystem::directory_iterator it(folder, code), end; !code && it != end; it.increment(code)) {
-    const std::filesystem::path& file = it->path();
-    if (file.filename().string().front() == '.' || !HasImageExtension(file)) continue;
-    if (!it->is_directory(code)) files.push_back(file);
+    std::string name = it->path().filename().string();
+    if (name.front() == '.' || !HasImageExtension(it->path())) continue;
+    if (!it->is_directory(code)) names.push_back(std::move(name));
   }
-  std::sort(files.begin(), files.end(), [](const std::filesystem::path& a, const std::filesystem::path& b) {
-    return NaturalLess(a.filename().string(), b.filename().string());
-  });
+  std::sort(names.begin(), names.end(), NaturalLess);
+  std::vector<std::filesystem::path> files;
+  files.reserve(names.size());
+  for (const std::string& name : names) files.push_back(folder / name);
   return files;
 }
 

@@ -15,7 +15,7 @@ constexpr double kTurned = 0.12;                // of the ground against the cam
 constexpr double kMisfit = 0.25;                // of a logarithm: no measurement of the ground
 constexpr double kSigma = 0.06;  // of one, over a way of one height; errors of the road as well
 constexpr double kWalk = 0.003;  // of the drift, over a way of one height
-constexpr int kEnough = 40, kMostFailures = 10, kOthers = 5;
+constexpr int kMeasurements = 40, kMostFailures = 10, kOthers = 5;
 constexpr double kOften = 0.6, kSpread = 0.1, kBias = 0.06;
 constexpr double kMemory = 0.04;  // weight of the newest measurement in what holds "of late"
 constexpr double kWorth = 0.002;  // a smaller drift waits
@@ -108,7 +108,7 @@ void CameraHeight::Update(double log_height, double way) {
 }
 
 std::optional<double> CameraHeight::Drift() const {
-  if (seen_ < kEnough || share_ < kOften || spread_ > kSpread * kSpread || std::abs(bias_) > kBias)
+  if (seen_ < kMeasurements || share_ < kOften || spread_ > kSpread * kSpread || std::abs(bias_) > kBias)
     return std::nullopt;
   if (std::abs(drift_) < kWorth) return std::nullopt;
   return drift_;

@@ -16,7 +16,7 @@ namespace {
 constexpr std::size_t kDriven = 160;
 constexpr double kDepth = 15;  // [m], about
 
-const testing::RenderedWorld& Town() {
+const testing::RenderedWorld& LongTown() {
   static const testing::RenderedWorld town([] {
     SyntheticOptions options = testing::SmallStereoTown(640, 320);
     options.sensor = SyntheticSensor::kMono;
@@ -26,7 +26,7 @@ const testing::RenderedWorld& Town() {
   return town;
 }
 
-Pose PoseOf(std::size_t i) { return Town().World().PoseOf(i); }
+Pose PoseOf(std::size_t i) { return LongTown().World().PoseOf(i); }
 
 std::shared_ptr<const FrameFeatures> Features(const cv::Mat& image) {
   auto features = std::make_shared<FrameFeatures>();
@@ -36,7 +36,7 @@ std::shared_ptr<const FrameFeatures> Features(const cv::Mat& image) {
 
 // A drive of whose map the scale changes by `rate` a frame; where a drift is told, it is taken out if
 // `corrected`. Returns the logarithm of the scale at its end, over where it was at first.
-double Drive(double rate, bool corrected, CameraHeight* height) {
+double DriveOn(double rate, bool corrected, CameraHeight* height) {
   double scale = 1;
   Pose T_world_camera = PoseOf(0), last = T_world_camera;
   for (std::size_t i = 0; i < kDriven; ++i) {
@@ -46,8 +46,8 @@ double Drive(double rate, bool corrected, CameraHeight* height) {
       step.translation *= scale;
       T_world_camera = last * step;
     }
-    height->See(Town().Camera(), Features(Town().Render(i).image), T_world_camera.Inverse(), last.Inverse(),
-                kDepth);
+    height->See(LongTown().Camera(), Features(LongTown().Render(i).image), T_world_camera.Inverse(),
+                last.Inverse(), kDepth);
     last = T_world_camera;
     const auto drift = height->Drift();
     if (!corrected || !drift) continue;
@@ -59,14 +59,14 @@ double Drive(double rate, bool corrected, CameraHeight* height) {
 
 TEST(CameraHeight, TellsNoDriftWhereThereIsNone) {
   CameraHeight height;
-  Drive(0, false, &height);
+  DriveOn(0, false, &height);
   EXPECT_LT(std::abs(height.Drift().value_or(0)), 0.01);
 }
 
 TEST(CameraHeight, TellsADriftAndItsSign) {
   for (const double rate : {0.0005, -0.0005}) {  // 8 % in all
     CameraHeight height;
-    Drive(rate, false, &height);
+    DriveOn(rate, false, &height);
     ASSERT_TRUE(height.Drift());
     EXPECT_GT(*height.Drift() / rate, 0.3 * kDriven);
     EXPECT_LT(*height.Drift() / rate, 1.2 * kDriven);
@@ -76,7 +76,7 @@ TEST(CameraHeight, TellsADriftAndItsSign) {
 TEST(CameraHeight, KeepsTheScaleWhereItsDriftIsTakenOut) {
   CameraHeight height;
   EXPECT_FALSE(height.Found());
-  EXPECT_LT(std::abs(Drive(0.0005, true, &height)), 0.7 * 0.0005 * kDriven);
+  EXPECT_LT(std::abs(DriveOn(0.0005, true, &height)), 0.7 * 0.0005 * kDriven);
   ASSERT_TRUE(height.Found());
   EXPECT_GT(height.Found()->measurements, 100);
   EXPECT_GT(height.Found()->corrections, 0);
@@ -88,7 +88,7 @@ TEST(CameraHeight, KeepsTheScaleWhereItsDriftIsTakenOut) {
 
 TEST(CameraHeight, BelievesALoop) {
   CameraHeight height;
-  Drive(0.0005, false, &height);
+  DriveOn(0.0005, false, &height);
   const auto before = height.Drift();
   height.Follow(0.9);
   EXPECT_EQ(height.Drift(), before) << "the map is right where a loop has moved it";
@@ -102,7 +102,7 @@ TEST(CameraHeight, SaysNothingBeforeAWallOrSnow) {
     random.fill(snow, cv::RNG::UNIFORM, 0, 255);
     const Pose now(Eigen::Quaterniond::Identity(), {0, 0, 0.8 * i}),
         last(Eigen::Quaterniond::Identity(), {0, 0, 0.8 * std::max(0, i - 1)});
-    height.See(Town().Camera(), Features(snow), now.Inverse(), last.Inverse(), kDepth);
+    height.See(LongTown().Camera(), Features(snow), now.Inverse(), last.Inverse(), kDepth);
   }
   EXPECT_FALSE(height.Drift());
 }
@@ -114,7 +114,7 @@ TEST(CameraHeight, SaysNothingOfACameraThatClimbs) {
   for (std::size_t i = 0; i < 80; ++i) {
     Pose now = PoseOf(i);
     now.translation += 0.02 * static_cast<double>(i) * (now.rotation * Eigen::Vector3d(0, -1, 0));
-    height.See(Town().Camera(), Features(Town().World().RenderFrom(i, now).image), now.Inverse(),
+    height.See(LongTown().Camera(), Features(LongTown().World().RenderFrom(i, now).image), now.Inverse(),
                last.Inverse(), kDepth);
     last = now;
     EXPECT_LT(std::abs(height.Drift().value_or(0)), 0.03) << i;
@@ -123,7 +123,7 @@ TEST(CameraHeight, SaysNothingOfACameraThatClimbs) {
 
 TEST(CameraHeight, NeedsImages) {
   CameraHeight height;
-  height.See(Town().Camera(), std::make_shared<FrameFeatures>(), Pose(), Pose(), kDepth);
+  height.See(LongTown().Camera(), std::make_shared<FrameFeatures>(), Pose(), Pose(), kDepth);
   EXPECT_FALSE(height.Drift());
 }
 

@@ -14,6 +14,7 @@
 #include "tutti/core/camera.h"
 #include "tutti/frontend/odometry.h"
 #include "tutti/loopclosure/detector.h"
+#include "tutti/loopclosure/detector_options.h"
 #include "tutti/slam/slam_options.h"
 
 #pragma GCC visibility push(default)  // used across libraries
@@ -46,8 +47,9 @@ std::vector<MissedLoop> FindMissedLoops(const std::vector<StandingKeyframe>& key
 /// Whether the query sees the candidate's landmarks: matches among the landmarks of both have to fit one
 /// camera motion. That asks for fewer than the detector does, which searches everywhere; what is found is to
 /// be confirmed by another loop. Accepted, it can be measured by MakeLoopConstraint.
+/// The share of the matches and their spread over both images are asked for as there.
 Verification VerifyLandmarks(const KeyframeView& candidate, const KeyframeView& query, const CameraRig& rig,
-                             double min_inlier_ratio, std::uint64_t seed);
+                             const VerificationOptions& verification, std::uint64_t seed);
 
 }  // namespace tutti
 #pragma GCC visibility pop

@@ -234,10 +234,10 @@ class SlamSystem::Impl {
     } while (true);
   }
 
-  // Loops that the detector missed, and then the whole map adjusted until it rests.
+  // Loops that the detector missed, and then the whole map adjusted.
   void Connect(int piece) {
     constexpr int kSearches = 4;     // a loop brings places together that were too far apart
-    constexpr int kAdjustments = 4;  // with landmarks fused that now lie together; more changed nothing
+    constexpr int kAdjustments = 4;  // with landmarks fused that now lie together
     for (int i = 0; i < kSearches && CloseMissedLoops() > 0; ++i) {
     }
     for (int i = 0; i < kAdjustments; ++i) {
@@ -261,8 +261,8 @@ class SlamSystem::Impl {
          FindMissedLoops(keyframes, loops_.closer().Graph(*odometry_), config_.run)) {
       const KeyframeView query = odometry_->Keyframe(loop.query);
       for (const int candidate : loop.candidates) {
-        const Verification found = VerifyLandmarks(odometry_->Keyframe(candidate), query, rig_,
-                                                   options.verification.min_inlier_ratio, options.seed);
+        const Verification found =
+            VerifyLandmarks(odometry_->Keyframe(candidate), query, rig_, options.verification, options.seed);
         if (!found.accepted) continue;
         Take(loops_.ConsiderFound(found, candidate, loop.query, *odometry_, frames_));
         break;

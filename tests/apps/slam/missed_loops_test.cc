@@ -96,7 +96,7 @@ TEST(MissedLoops, TheSameLandmarksTellWhereTheQueryStands) {
   const Pose moved(ExpSO3({0.02, -0.05, 0.01}), {0.4, -0.1, 0.8});
   const KeyframeView candidate = ViewOf(1, Pose(), 40), query = ViewOf(1, moved, 40);
   for (const Sensor sensor : {Sensor::kStereo, Sensor::kMono}) {
-    const Verification found = VerifyLandmarks(candidate, query, SceneRig(sensor), 0.3, 1);
+    const Verification found = VerifyLandmarks(candidate, query, SceneRig(sensor), VerificationOptions(), 1);
     ASSERT_TRUE(found.accepted) << found.reason;
     EXPECT_EQ(found.type == ConstraintType::kSimilarity, sensor == Sensor::kMono);
     EXPECT_LT((found.S_candidate_query.translation - moved.translation).norm(), 1e-3);
@@ -104,10 +104,29 @@ TEST(MissedLoops, TheSameLandmarksTellWhereTheQueryStands) {
   }
 }
 
+TEST(MissedLoops, WhatLiesInOneSpotOfTheImageIsNoLoop) {
+  const KeyframeView wide = ViewOf(1, Pose(), 40);
+  KeyframeView spot = wide;  // a sign of 0.6 x 0.4 m, 10 m away
+  for (std::size_t i = 0; i < spot.points.size(); ++i) {
+    spot.points[i].x() *= 0.1;
+    spot.points[i].y() *= 0.1;
+    const Eigen::Vector2d pixel = SceneRig(Sensor::kStereo).camera.Project(spot.points[i]);
+    spot.keypoints[i].pt = {static_cast<float>(pixel.x()), static_cast<float>(pixel.y())};
+  }
+  const auto verified = [](const KeyframeView& view) {
+    return VerifyLandmarks(view, view, SceneRig(Sensor::kStereo), VerificationOptions(), 1);
+  };
+  EXPECT_TRUE(verified(wide).accepted);
+  EXPECT_GE(verified(spot).inliers, 35);
+  EXPECT_FALSE(verified(spot).accepted);
+  EXPECT_FALSE(verified(spot).reason.empty());
+}
+
 TEST(MissedLoops, AnotherSceneOrAHandfulOfLandmarksIsNoLoopAndSaysWhy) {
   const KeyframeView candidate = ViewOf(1, Pose(), 40);
   for (const KeyframeView& query : {ViewOf(2, Pose(), 40), ViewOf(1, Pose(), 8)}) {
-    const Verification found = VerifyLandmarks(candidate, query, SceneRig(Sensor::kStereo), 0.3, 1);
+    const Verification found =
+        VerifyLandmarks(candidate, query, SceneRig(Sensor::kStereo), VerificationOptions(), 1);
     EXPECT_FALSE(found.accepted);
     EXPECT_FALSE(found.reason.empty());
   }

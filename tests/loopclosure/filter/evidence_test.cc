@@ -55,7 +55,8 @@ TEST(NarrowestSpread, PixelsOnALineOrInASpotAreNarrowWhereverTheyLie) {
   const cv::Size image(640, 480);
   std::vector<cv::Point2f> line, spot, wide;
   for (int i = 0; i < 100; ++i) {
-    const auto x = static_cast<float>(i % 10), y = static_cast<float>(i / 10);
+    const int row = i / 10;
+    const auto x = static_cast<float>(i % 10), y = static_cast<float>(row);
     line.emplace_back(6.4F * static_cast<float>(i), 4.8F * static_cast<float>(i));
     spot.emplace_back(500 + x, 100 + y);
     wide.emplace_back(64 * x, 48 * y);

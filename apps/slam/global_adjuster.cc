@@ -23,6 +23,13 @@ void GlobalAdjuster::MapMoved(const Odometry& odometry, int piece, std::int64_t 
   due_ = frame + kLeastFrames + running_->Keyframes() / kKeyframesPerFrame;
 }
 
+void GlobalAdjuster::Converge(const Odometry& odometry, int piece) {
+  constexpr int kIterations = 100;
+  Cancel();
+  running_.emplace(odometry.BeginGlobalAdjustment(piece, kIterations));
+  due_ = 0;
+}
+
 GlobalAdjustment GlobalAdjuster::Take() {
   GlobalAdjustment taken = std::move(*running_);
   running_.reset();

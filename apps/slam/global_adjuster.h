@@ -17,6 +17,8 @@ class GlobalAdjuster {
  public:
   /// Loops have moved the map: what is under way is of no use any more, and a new one begins.
   void MapMoved(const Odometry& odometry, int piece, std::int64_t frame);
+  /// One with so many iterations that it converges begins, due at once.
+  void Converge(const Odometry& odometry, int piece);
   /// The map is no longer one that can be adjusted.
   void Cancel();
 

@@ -124,7 +124,7 @@ bool LoopCloser::OfOneSession(std::int64_t frame, std::int64_t other) const {
 
 // Measures it against the map, and lets it in if something else says the same.
 LoopUpdate LoopCloser::Consider(const LoopRecord& proposed, const Verification& verification, int candidate,
-                                int query, const Odometry& odometry, std::int64_t frames) {
+                                int query, const Odometry& odometry, std::int64_t frames, bool across) {
   records_.push_back(proposed);
   LoopRecord& record = records_.back();
   if (!record.verified) return {};
@@ -141,7 +141,7 @@ LoopUpdate LoopCloser::Consider(const LoopRecord& proposed, const Verification& 
   LoopEdge edge = constraint.edge;
   edge.record = records_.size() - 1;
   record.S_candidate_query = edge.S_candidate_query;
-  std::vector<LoopEdge> entering = gate_.Offer(edge, accepted_, Places(odometry));
+  std::vector<LoopEdge> entering = gate_.Offer(edge, accepted_, Places(odometry), across);
   if (entering.empty()) {
     record.pending = true;
     record.reason = "waits for a second loop that agrees";
@@ -365,6 +365,12 @@ std::optional<LoopUpdate> LoopCloser::Adjusted(const Odometry& odometry, std::in
   }
   stages_["global_adjustment"] += watch.Milliseconds();
   return update;
+}
+
+bool LoopCloser::Converge(const Odometry& odometry, int piece) {
+  if (!options_.global_adjustment || !untied_.empty()) return false;
+  adjuster_.Converge(odometry, piece);
+  return true;
 }
 
 void LoopCloser::Applied(const LoopUpdate& update, const std::vector<int>& common, const Odometry& odometry,

@@ -48,9 +48,9 @@ class LoopCloser {
   void Append(const LoopCloser& other, std::int64_t first_frame, int first_keyframe);
 
   /// A proposed loop, in the order of the queries. `candidate`, `query`: its keyframes; they have a place in
-  /// the map. The update is to be applied at once.
+  /// the map. The update is to be applied at once. `across`: as LoopGate::Offer.
   LoopUpdate Consider(const LoopRecord& proposed, const Verification& verification, int candidate, int query,
-                      const Odometry& odometry, std::int64_t frames);
+                      const Odometry& odometry, std::int64_t frames, bool across = false);
   /// What the images say of a step of the odometry that is followed: if it is less certain than configured,
   /// loops are judged by what they say from the next one on.
   void NoteStep(const StepCheck& check) { uncertainty_.Add(check); }
@@ -82,6 +82,9 @@ class LoopCloser {
   /// What the adjustment of the whole map has found, if it enters now; waits for it.
   std::optional<LoopUpdate> Adjusted(const Odometry& odometry, std::int64_t frames,
                                      Entering entering = Entering::kWhenDue);
+  /// The whole piece of the map is adjusted until it converges; what comes of it is Adjusted's. False if a
+  /// loop is not held together by landmarks: the adjustment would open it again.
+  bool Converge(const Odometry& odometry, int piece);
   /// After the last loop: lets in what the map fulfils and what therefore waited for a correction. True if
   /// the graph is solved for it, which is due as usual; a followed odometry may stay as it is.
   bool CloseDeferred(const Odometry& odometry, std::int64_t frames);

@@ -181,6 +181,22 @@ LoopUpdate LoopClosing::Deliver(const Odometry* odometry, std::int64_t frames) {
   return {};
 }
 
+LoopUpdate LoopClosing::ConsiderFound(const Verification& found, int candidate, int query,
+                                      const Odometry& odometry, std::int64_t frames) {
+  LoopRecord record;
+  record.query = odometry.KeyframeFrameIndex(query);
+  record.candidate = odometry.KeyframeFrameIndex(candidate);
+  record.query_stamp_s = odometry.KeyframeStamp(query);
+  record.candidate_stamp_s = odometry.KeyframeStamp(candidate);
+  record.matches = found.matches;
+  record.inliers = found.inliers;
+  record.verified = found.accepted;
+  record.reason = found.reason;
+  LoopUpdate update = closer_.Consider(record, found, candidate, query, odometry, frames, true);
+  TellRevoked(update);
+  return update;
+}
+
 void LoopClosing::Check(const Odometry* odometry, const internal::SectionReader& file) const {
   const int end = odometry != nullptr ? odometry->NextKeyframeId() : 0;
   for (const auto& [frame, keyframe] : keyframe_of_frame_) internal::CheckIndex(keyframe, 0, end, file);

@@ -65,6 +65,12 @@ class LoopClosing {
     closer_.Add(candidate, query, S_candidate_query, information, odometry, frames);
   }
 
+  /// A loop that was found between two keyframes of the map, and its verification.
+  LoopUpdate ConsiderFound(const Verification& found, int candidate, int query, const Odometry& odometry,
+                           std::int64_t frames);
+  /// LoopCloser::Converge.
+  bool Converge(const Odometry& odometry, int piece) { return closer_.Converge(odometry, piece); }
+
   /// True if Due may move the map: mapping that is under way should be brought in first.
   bool MayMove(std::int64_t frames) const { return closer_.MayMove(frames); }
   /// The next thing that is due; nothing if all is in. A correction is to be applied before the next call.

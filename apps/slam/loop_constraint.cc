@@ -37,8 +37,6 @@ Matrix7d WithFloor(const Matrix7d& information, double sigma_translation, double
 
 std::string Percent(double share) { return std::to_string(std::lround(100 * share)) + " %"; }
 
-using Match = std::pair<int, int>;  // features of the candidate and of the query
-
 bool IsLandmark(const KeyframeView& view, int feature) {
   return feature >= 0 && static_cast<std::size_t>(feature) < view.points.size() &&
          view.points[static_cast<std::size_t>(feature)].allFinite();
@@ -55,11 +53,12 @@ cv::Mat LandmarkDescriptors(const KeyframeView& view, std::vector<int>& features
   return rows;
 }
 
-// What the verification matched, and the mutual best matches of the landmarks among themselves: the
-// verification saw the query when it was new and had few landmarks.
-std::vector<Match> LandmarkMatches(const Verification& verification, const KeyframeView& candidate,
-                                   const KeyframeView& query) {
-  std::vector<Match> matches;
+}  // namespace
+
+// The verification saw the query when it was new and had few landmarks.
+std::vector<LandmarkMatch> LandmarkMatches(const Verification& verification, const KeyframeView& candidate,
+                                           const KeyframeView& query) {
+  std::vector<LandmarkMatch> matches;
   std::set<int> used_candidate, used_query;
   const auto add = [&](int c, int q) {
     if (!IsLandmark(candidate, c) || !IsLandmark(query, q)) return;
@@ -81,6 +80,8 @@ std::vector<Match> LandmarkMatches(const Verification& verification, const Keyfr
   }
   return matches;
 }
+
+namespace {
 
 SimilarityResult SimilarityOfLandmarks(const Verification& verification, const KeyframeView& candidate,
                                        const KeyframeView& query, const CameraRig& rig, std::uint64_t seed) {

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "tutti/backend/keyframe_graph.h"
 #include "tutti/frontend/odometry.h"
@@ -26,6 +28,12 @@ struct LoopConstraint {
 LoopConstraint MakeLoopConstraint(const Verification& verification, const KeyframeView& candidate,
                                   const KeyframeView& query, const CameraRig& rig, const SlamOptions& options,
                                   std::uint64_t seed);
+
+using LandmarkMatch = std::pair<int, int>;  ///< features of the candidate and of the query
+
+/// Landmarks of both keyframes: what the verification matched, and the mutual best matches of the others.
+std::vector<LandmarkMatch> LandmarkMatches(const Verification& verification, const KeyframeView& candidate,
+                                           const KeyframeView& query);
 
 /// Median z of the keyframe's points; 0 if it has none.
 double MedianDepth(const KeyframeView& view);

@@ -19,6 +19,13 @@ bool LoopGate::Near(const LoopEdge& a, const LoopEdge& b) const {
   return within(a.query_frame, b.query_frame) && within(a.candidate_frame, b.candidate_frame);
 }
 
+bool LoopGate::SideBySide(const LoopEdge& a, const LoopEdge& b, const Map& map) {
+  const auto apart = [&map](int x, int y) {
+    return (map(x).T_world_camera.translation - map(y).T_world_camera.translation).norm();
+  };
+  return apart(a.query, b.query) <= a.depth && apart(a.candidate, b.candidate) <= a.depth;
+}
+
 bool LoopGate::Agree(const LoopEdge& a, const LoopEdge& b, const Map& map) const {
   const Place qa = map(a.query), qb = map(b.query), ca = map(a.candidate), cb = map(b.candidate);
   if (qa.piece != qb.piece || ca.piece != cb.piece) return false;  // no odometry between them
@@ -64,17 +71,21 @@ bool LoopGate::WithinNoise(const std::vector<LoopEdge>& loops, const Map& map) c
 }
 
 std::vector<LoopEdge> LoopGate::Offer(const LoopEdge& loop, const std::vector<LoopEdge>& accepted,
-                                      const Map& map) {
+                                      const Map& map, bool across) {
+  const auto agrees_with = [&](const LoopEdge& other) {
+    if (other.candidate == loop.candidate && other.query == loop.query) return false;
+    return (Near(loop, other) || (across && SideBySide(loop, other, map))) && Agree(loop, other, map);
+  };
   std::vector<LoopEdge> entering;
   std::vector<LoopEdge> still_waiting;
   int agreeing = 1;
   for (const LoopEdge& other : waiting_) {
-    const bool agrees = Near(loop, other) && Agree(loop, other, map);
+    const bool agrees = agrees_with(other);
     agreeing += agrees ? 1 : 0;
     (agrees ? entering : still_waiting).push_back(other);
   }
   for (const LoopEdge& other : accepted) {
-    if (Near(loop, other) && Agree(loop, other, map)) ++agreeing;
+    if (agrees_with(other)) ++agreeing;
   }
   if (agreeing < options_.loop_confirmations && !Fulfilled(loop, map)) {
     waiting_.push_back(loop);

@@ -27,8 +27,12 @@ class LoopGate {
   explicit LoopGate(const SlamOptions& options) : options_(options) {}
 
   /// The loops that may enter now: none while `loop` waits for another one that agrees, else it and those
-  /// that waited. Loops that are in the map (`accepted`) vouch for it as well.
-  std::vector<LoopEdge> Offer(const LoopEdge& loop, const std::vector<LoopEdge>& accepted, const Map& map);
+  /// that waited. Loops that are in the map (`accepted`) vouch for it as well. Loops can agree whose frames
+  /// are close; with `across`, also those whose keyframes stand side by side in the map, at both ends: drives
+  /// at different times that are tied to each other. A loop between the same two keyframes is not another
+  /// one.
+  std::vector<LoopEdge> Offer(const LoopEdge& loop, const std::vector<LoopEdge>& accepted, const Map& map,
+                              bool across = false);
 
   /// True if the two loops agree with each other through the odometry between their ends.
   bool Agree(const LoopEdge& a, const LoopEdge& b, const Map& map) const;
@@ -54,6 +58,7 @@ class LoopGate {
   std::optional<Disagreement> WithMap(const LoopEdge& loop, const Map& map) const;
   bool Within(const Disagreement& d) const;
   bool Near(const LoopEdge& a, const LoopEdge& b) const;
+  static bool SideBySide(const LoopEdge& a, const LoopEdge& b, const Map& map);
 
   SlamOptions options_;
   std::vector<LoopEdge> waiting_;

@@ -8,6 +8,7 @@
 #include "apps/slam/loop_closing.h"
 #include "apps/slam/map_parts.h"
 #include "apps/slam/map_state.h"
+#include "apps/slam/missed_loops.h"
 #include "apps/slam/session_list.h"
 #include "core/section_file.h"
 #include "core/stopwatch.h"
@@ -116,8 +117,11 @@ class SlamSystem::Impl {
     Finish();
     frames_ = std::max(frames_, all_frames);
     const std::vector<int> ids = odometry_->KeyframeIds();
-    return std::any_of(ids.begin() + first_keyframe, ids.end(),
-                       [&](int id) { return odometry_->KeyframePiece(id) < first_piece; });
+    const auto joined = std::find_if(std::lower_bound(ids.begin(), ids.end(), first_keyframe), ids.end(),
+                                     [&](int id) { return odometry_->KeyframePiece(id) < first_piece; });
+    if (joined == ids.end()) return false;
+    Connect(odometry_->KeyframePiece(*joined));
+    return true;
   }
 
   std::vector<MapSession> Sessions() const { return sessions_.WithKeyframes(odometry()); }
@@ -228,6 +232,44 @@ class SlamSystem::Impl {
       if (!update) return;
       Take(*update);
     } while (true);
+  }
+
+  // Loops that the detector missed, and then the whole map adjusted.
+  void Connect(int piece) {
+    constexpr int kSearches = 4;     // a loop brings places together that were too far apart
+    constexpr int kAdjustments = 4;  // with landmarks fused that now lie together
+    for (int i = 0; i < kSearches && CloseMissedLoops() > 0; ++i) {
+    }
+    for (int i = 0; i < kAdjustments; ++i) {
+      odometry_->FuseAll();
+      if (!loops_.Converge(*odometry_, piece)) break;
+      Finish();
+    }
+  }
+
+  // How many entered.
+  std::size_t CloseMissedLoops() {
+    const auto accepted = [this] { return CountAccepted(loops_.closer().records()); };
+    const std::size_t before = accepted();
+    std::vector<StandingKeyframe> keyframes;
+    for (const int id : odometry_->KeyframeIds()) {
+      const KeyframeView view = odometry_->Keyframe(id);
+      keyframes.push_back({id, view.map_piece, view.T_world_camera, MedianDepth(view)});
+    }
+    const LoopDetectorOptions& options = config_.loops;
+    for (const MissedLoop& loop :
+         FindMissedLoops(keyframes, loops_.closer().Graph(*odometry_), config_.run)) {
+      const KeyframeView query = odometry_->Keyframe(loop.query);
+      for (const int candidate : loop.candidates) {
+        const Verification found =
+            VerifyLandmarks(odometry_->Keyframe(candidate), query, rig_, options.verification, options.seed);
+        if (!found.accepted) continue;
+        Take(loops_.ConsiderFound(found, candidate, loop.query, *odometry_, frames_));
+        break;
+      }
+    }
+    Finish();
+    return accepted() - std::min(before, accepted());
   }
 
   void Take(const LoopUpdate& update) {

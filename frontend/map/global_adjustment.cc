@@ -8,7 +8,6 @@
 namespace tutti {
 namespace {
 
-constexpr int kAdjustmentIterations = 5;
 constexpr int kMinLandmarks = 20;  // a keyframe with fewer follows its neighbours
 
 GlobalAdjustment::Work::Outcome MakeOutcome(const Map& before, const Map& after,
@@ -32,14 +31,14 @@ GlobalAdjustment::Work::Outcome MakeOutcome(const Map& before, const Map& after,
 }  // namespace
 
 GlobalAdjustment::Work::Work(const OdometryOptions& odometry, const CameraRig& rig, const Map& map, int piece,
-                             const Eigen::Vector2d& lens, bool own_thread) {
+                             const Eigen::Vector2d& lens, int iterations, bool own_thread) {
   std::vector<int> fixed;
   for (int id = 0; id < map.KeyframeCount(); ++id) {
     if (map.keyframe(id).piece != piece || map.LandmarksOf({id}).size() < kMinLandmarks) continue;
     (fixed.empty() ? fixed : moving_).push_back(id);
   }
   BundleAdjustmentOptions options;
-  options.iterations = kAdjustmentIterations;
+  options.iterations = iterations;
   options.pixel_sigma = odometry.pixel_sigma;
   options.metric = rig.sensor != Sensor::kMono;
   options.lens.value = lens;

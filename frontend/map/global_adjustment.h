@@ -33,7 +33,7 @@ class GlobalAdjustment::Work {
   /// Adjusts the keyframes of one piece; the oldest one stays where it is. `lens`: the camera's error as it
   /// is known, and stays.
   Work(const OdometryOptions& options, const CameraRig& rig, const Map& map, int piece,
-       const Eigen::Vector2d& lens, bool own_thread);
+       const Eigen::Vector2d& lens, int iterations, bool own_thread);
   /// One that was saved after its end.
   Work(std::vector<int> moving, Outcome outcome);
   ~Work();

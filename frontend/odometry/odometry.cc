@@ -179,6 +179,8 @@ void Odometry::ApplyCorrection(const std::map<int, Similarity>& S_world_keyframe
   impl_->Correct(S_world_keyframe, merges, nullptr);
 }
 
+void Odometry::FuseAll() { impl_->FuseAll(); }
+
 int Odometry::FuseLoop(int older, int newer, const Similarity& S_older_newer) {
   return impl_->FuseLoop(older, newer, S_older_newer);
 }
@@ -187,11 +189,11 @@ std::map<int, int> Odometry::RemoveRedundantKeyframes(const std::function<bool(i
   return impl_->RemoveRedundantKeyframes(may);
 }
 
-GlobalAdjustment Odometry::BeginGlobalAdjustment(int piece) const {
+GlobalAdjustment Odometry::BeginGlobalAdjustment(int piece, int iterations) const {
   const AsyncMapper& mapper = impl_->mapper();
-  return GlobalAdjustment(
-      std::make_shared<GlobalAdjustment::Work>(impl_->options(), impl_->rig(), mapper.map(), piece,
-                                               mapper.lens().Remaining().value, mapper.own_threads()));
+  return GlobalAdjustment(std::make_shared<GlobalAdjustment::Work>(
+      impl_->options(), impl_->rig(), mapper.map(), piece, mapper.lens().Remaining().value, iterations,
+      mapper.own_threads()));
 }
 
 std::optional<std::map<int, Similarity>> Odometry::CorrectionOf(const GlobalAdjustment& adjustment) const {

@@ -337,11 +337,17 @@ std::map<int, int> Odometry::Impl::RemoveRedundantKeyframes(
   EnterMapping();
   const std::size_t least_views = rig_.sensor == Sensor::kMono ? 2 : 1;  // that tell where a landmark is
   const std::set<int> keep = {last().reference, last().newest_keyframe, result_.keyframe};
-  FuseAll(rig_.camera, mapper_.MutableMap());
+  tutti::FuseAll(rig_.camera, mapper_.MutableMap());
   std::map<int, int> removed = tutti::RemoveRedundantKeyframes(keep, least_views, may, mapper_.MutableMap());
   history_.Rehang(removed, map());
   tracker_.FollowLandmarks(map());
   return removed;
+}
+
+void Odometry::Impl::FuseAll() {
+  EnterMapping();
+  tutti::FuseAll(rig_.camera, mapper_.MutableMap());
+  mapper_.MutableMap()->UpdateGeometry();
 }
 
 int Odometry::Impl::FuseLoop(int older, int newer, const Similarity& S_older_newer) {

@@ -42,6 +42,7 @@ class Odometry::Impl {
   /// what it made of them.
   void Correct(const std::map<int, Similarity>& S_world_keyframe, const std::map<int, int>& merges,
                const GlobalAdjustment::Work* adjustment);
+  void FuseAll();
   int FuseLoop(int older, int newer, const Similarity& S_older_newer);
   std::map<int, int> RemoveRedundantKeyframes(const std::function<bool(int removed, int into)>& may);
 

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "core/dense_solvers.h"
+
 namespace tutti::internal {
 namespace {
 
@@ -77,6 +79,27 @@ double MotionSpread(const std::vector<cv::Point2f>& first, const std::vector<cv:
     squares += moved.dot(moved) / n;
   }
   return std::sqrt(std::max(0.0, squares - x * x - y * y)) / std::hypot(image.width, image.height);
+}
+
+double NarrowestSpread(const std::vector<cv::Point2f>& pixels, const cv::Size& image) {
+  if (pixels.empty() || image.empty()) return 0.0;
+  const double n = static_cast<double>(pixels.size());
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  std::vector<Eigen::Vector2d> scaled;
+  for (const cv::Point2f& p : pixels) {
+    scaled.emplace_back(p.x / image.width, p.y / image.height);
+    mean += scaled.back() / n;
+  }
+  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
+  for (const Eigen::Vector2d& p : scaled) covariance += (p - mean) * (p - mean).transpose() / n;
+  return std::sqrt(std::max(0.0, SymmetricEigen(covariance).values(0)));
+}
+
+// What a motion is known by grows with number times spread squared.
+double SpreadNeeded(double spread, int least, int inliers) {
+  constexpr double kLeastShare = 0.6;  // of the spread, however many the inliers
+  const double abundance = std::sqrt(1.5 * least / static_cast<double>(inliers));
+  return spread * std::clamp(abundance, kLeastShare, 1.0);
 }
 
 }  // namespace tutti::internal

@@ -42,4 +42,12 @@ int OccupiedCells(const std::vector<cv::Point2f>& pixels, const cv::Size& image)
 double MotionSpread(const std::vector<cv::Point2f>& first, const std::vector<cv::Point2f>& second,
                     const cv::Size& image);
 
+/// Standard deviation of the pixels along their narrowest direction, x as a share of the width and y of the
+/// height: matches on one line or in one spot fit many camera motions.
+double NarrowestSpread(const std::vector<cv::Point2f>& pixels, const cv::Size& image);
+
+/// How wide that has to be for `inliers` in abundance, beyond 1.5 times the `least`: they may lie closer
+/// together, down to 0.6 of `spread`.
+double SpreadNeeded(double spread, int least, int inliers);
+
 }  // namespace tutti::internal

@@ -6,7 +6,6 @@
 #include <cstdarg>
 #include <cstdio>
 
-#include "core/dense_solvers.h"
 #include "loopclosure/features/static_features.h"
 #include "loopclosure/filter/evidence.h"
 #include "loopclosure/geometry/match_pool.h"
@@ -17,24 +16,6 @@ namespace tutti {
 namespace {
 
 using internal::PooledMatch;
-
-constexpr double kLeastSpreadShare = 0.6;  // of min_spread, however many the inliers
-
-// Standard deviation of the pixels along their narrowest direction, x as a share of the width and y of the
-// height: matches on one line or in one spot fit many camera motions.
-double Spread(const std::vector<cv::Point2f>& pixels, const cv::Size& size) {
-  if (pixels.empty() || size.empty()) return 0.0;
-  const double n = static_cast<double>(pixels.size());
-  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
-  std::vector<Eigen::Vector2d> scaled;
-  for (const cv::Point2f& p : pixels) {
-    scaled.emplace_back(p.x / size.width, p.y / size.height);
-    mean += scaled.back() / n;
-  }
-  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
-  for (const Eigen::Vector2d& p : scaled) covariance += (p - mean) * (p - mean).transpose() / n;
-  return std::sqrt(std::max(0.0, internal::SymmetricEigen(covariance).values(0)));
-}
 
 __attribute__((format(printf, 1, 2))) std::string Format(const char* format, ...) {
   std::array<char, 200> text{};
@@ -106,10 +87,9 @@ std::string Judge(const std::vector<PooledMatch>& pool, const std::vector<int>& 
     return Format("only %.0f %% of the matches fit one camera motion, %.0f %% are needed", 100 * ratio,
                   100 * bars.ratio);
   }
-  // What a motion is known by grows with number times spread squared: many inliers may lie closer together.
-  const double abundance = std::sqrt(1.5 * bars.inliers / static_cast<double>(result.inliers));
-  const double needed = options.min_spread * std::clamp(abundance, kLeastSpreadShare, 1.0);
-  const double spread = std::min(Spread(in_query, query.size), Spread(in_candidate, candidate.size));
+  const double needed = internal::SpreadNeeded(options.min_spread, bars.inliers, result.inliers);
+  const double spread = std::min(internal::NarrowestSpread(in_query, query.size),
+                                 internal::NarrowestSpread(in_candidate, candidate.size));
   if (spread < needed) {
     return Format("the matches cover too narrow a part of the image (%.3f of its size, %.3f is needed)",
                   spread, needed);

@@ -92,10 +92,30 @@ TEST(LoopGate, AcceptedLoopsVouchForLaterOnes) {
 TEST(LoopGate, ScaleMustAgreeToo) {
   LoopGate gate{SlamOptions()};
   EXPECT_TRUE(gate.Offer(LoopTo(10), {}, PlaceOf).empty());
-  LoopEdge other = LoopTo(10);
-  other.candidate_frame = 11;
+  LoopEdge other = LoopTo(11);
   other.S_candidate_query.scale = 1.5;
   EXPECT_TRUE(gate.Offer(other, {}, PlaceOf).empty());
+}
+
+TEST(LoopGate, DrivesAtDifferentTimesVouchForEachOtherOnlyAcrossThem) {
+  for (const bool across : {false, true}) {
+    LoopGate gate{SlamOptions()};
+    EXPECT_TRUE(gate.Offer(LoopTo(10), {}, PlaceOf).empty());
+    LoopEdge other = LoopTo(12);
+    other.query_frame += 100000;  // of another recording, whose keyframes stand beside the first one's
+    EXPECT_EQ(gate.Offer(other, {}, PlaceOf, across).size(), across ? 2u : 0u);
+  }
+  LoopGate gate{SlamOptions()};
+  EXPECT_TRUE(gate.Offer(LoopTo(10), {}, PlaceOf).empty());
+  LoopEdge far = LoopTo(30);  // 20 m on, 10 m deep
+  far.query_frame += 100000;
+  EXPECT_TRUE(gate.Offer(far, {}, PlaceOf, true).empty());
+}
+
+TEST(LoopGate, TheSameTwoKeyframesAgainAreNoSecondLoop) {
+  LoopGate gate{SlamOptions()};
+  EXPECT_TRUE(gate.Offer(LoopTo(10), {}, PlaceOf).empty());
+  EXPECT_TRUE(gate.Offer(LoopTo(10), {}, PlaceOf).empty());
 }
 
 TEST(LoopGate, OneConfirmationTrustsEachLoopAlone) {

@@ -261,6 +261,36 @@ TEST_F(Merging, TwoMapsWithCommonPlacesAreOneInEitherOrderForAnyThreads) {
   EXPECT_LT(WorstError(*map, map->Sessions()[1], a, b.truth.front().pose), 1.5);
 }
 
+// The two share a stretch in the middle of a round. Where the second one comes to the round's begin, the
+// detector proposes other places, and the search of the joined map has to find it. The gap is small either
+// way: it tells whether what was found is true.
+TEST_F(Merging, TheOpenEndOfARoundIsClosed) {
+  SyntheticOptions options = SessionTown(SyntheticSensor::kStereo);
+  constexpr std::size_t kRound = 141;  // frames
+  const testing::RenderedWorld world(options);
+  const Recording a = Part(world, 0, 90), b = Part(world, 70, kRound + 10);
+  const auto map = MapOf(a), other = MapOf(b);
+  const std::size_t known = map->loops().size() + other->loops().size();
+  ASSERT_TRUE(map->Merge(other.get()));
+  const auto proposed_by_nobody = [](const LoopRecord& loop) {
+    return loop.accepted && loop.hypothesis == 0;
+  };
+  EXPECT_GE(std::count_if(map->loops().begin() + static_cast<std::ptrdiff_t>(known), map->loops().end(),
+                          proposed_by_nobody),
+            2);
+  const std::int64_t offset = map->Sessions()[1].frame_offset;
+  const auto position = [&](std::int64_t number) {
+    FrameRange one;
+    one.first = one.last = number;
+    return map->odometry()->FrameTrajectory(-1, one).at(0).pose.translation;
+  };
+  constexpr std::int64_t kStart = 4, kEnd = kRound + 4 - 70;  // the same place
+  const double gap = (position(offset + kEnd) - position(kStart)).norm(),
+               truth = (b.truth[kEnd].pose.translation - a.truth[kStart].pose.translation).norm();
+  std::printf("  where the round ends: %.3f m from its begin, in truth %.3f m\n", gap, truth);
+  EXPECT_NEAR(gap, truth, 0.1);
+}
+
 TEST_F(Merging, MapsWithoutACommonPlaceAreNotOne) {
   const testing::RenderedWorld world(SessionTown(SyntheticSensor::kStereo)),
       elsewhere(SessionTown(SyntheticSensor::kStereo, 7));

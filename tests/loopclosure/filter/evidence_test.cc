@@ -51,5 +51,28 @@ TEST(MotionSpread, IsZeroForWhatMovesAsOneAndTheDeviationElsewhere) {
   EXPECT_NEAR(MotionSpread(first, {{18, 10}, {92, 10}, {18, 100}, {42, 50}}, kImage), 0.01, 1e-6);
 }
 
+TEST(NarrowestSpread, PixelsOnALineOrInASpotAreNarrowWhereverTheyLie) {
+  const cv::Size image(640, 480);
+  std::vector<cv::Point2f> line, spot, wide;
+  for (int i = 0; i < 100; ++i) {
+    const int row = i / 10;
+    const auto x = static_cast<float>(i % 10), y = static_cast<float>(row);
+    line.emplace_back(6.4F * static_cast<float>(i), 4.8F * static_cast<float>(i));
+    spot.emplace_back(500 + x, 100 + y);
+    wide.emplace_back(64 * x, 48 * y);
+  }
+  EXPECT_NEAR(NarrowestSpread(line, image), 0, 1e-3);
+  EXPECT_LT(NarrowestSpread(spot, image), 0.01);
+  EXPECT_NEAR(NarrowestSpread(wide, image), 0.287, 1e-3);
+  EXPECT_DOUBLE_EQ(NarrowestSpread({}, image), 0);
+}
+
+TEST(SpreadNeeded, InliersInAbundanceMayLieCloserTogether) {
+  EXPECT_DOUBLE_EQ(SpreadNeeded(0.1, 12, 12), 0.1);
+  EXPECT_DOUBLE_EQ(SpreadNeeded(0.1, 12, 18), 0.1);
+  EXPECT_NEAR(SpreadNeeded(0.1, 12, 36), 0.0707, 1e-4);
+  EXPECT_NEAR(SpreadNeeded(0.1, 12, 1000), 0.06, 1e-12);
+}
+
 }  // namespace
 }  // namespace tutti::internal

@@ -223,6 +223,9 @@ class Odometry {
   /// both sides have in common then.
   int FuseLoop(int older, int newer, const Similarity& S_older_newer);
 
+  /// What keyframes see of the same landmarks is looked for in all that should see it, and fused.
+  void FuseAll();
+
   /// Removes keyframes that the map can do without, the newest first: at least 90 % of their landmarks are
   /// seen by three others, or from an earlier visit. What keyframes see of the same landmarks is found first,
   /// and fused. The first keyframe of each piece stays, and what the last frame hangs on. Frames
@@ -233,8 +236,8 @@ class Odometry {
   std::map<int, int> RemoveRedundantKeyframes(const std::function<bool(int removed, int into)>& may);
 
   /// Begins to adjust all keyframes of a map piece and what they see (bundle adjustment) to each other,
-  /// beside the tracking. The oldest keyframe stays where it is.
-  GlobalAdjustment BeginGlobalAdjustment(int map_piece) const;
+  /// beside the tracking, with at most so many iterations. The oldest keyframe stays where it is.
+  GlobalAdjustment BeginGlobalAdjustment(int map_piece, int iterations = 5) const;
   /// Waits for it. Where it moves the keyframes; those that came since follow. None if it found nothing
   /// better.
   std::optional<std::map<int, Similarity>> CorrectionOf(const GlobalAdjustment& adjustment) const;

@@ -11,37 +11,78 @@ namespace tutti {
 namespace {
 
 constexpr double kNearest = 3, kFarthest = 8, kAside = 1.2;  // of the ground that is looked at [heights]
-constexpr int kBelowHorizon = 5;                             // [px]
+constexpr int kFromEdge = 4;                                 // of the image [px]
 constexpr double kMostPixels = 2500, kMostInSearch = 600, kFewestPixels = 150;
 constexpr int kIterations = 10;
 constexpr double kConverged = 1e-3, kNearlyConverged = 1e-2;  // of the plane
 constexpr double kHuber = 1.5, kLeastSpread = 0.5;            // [standard deviations], [grey levels]
 constexpr double kLowest = 0.05, kHighest = 20;               // that is searched [ways between the images]
 constexpr int kHeights = 121;
+constexpr double kSteepest = 0.71;  // of the way against the camera's x-z plane [sine]
 
 struct Pixel {
   Eigen::Vector3d ray;  // z = 1
   double grey = 0;
 };
 
+// What the plane n . X = h says is between kNearest and kFarthest ahead, and kAside to each side [heights]:
+// four half planes of rays r with n . r > 0, each with a . r > 0. Ahead is where the camera looks.
+using Field = Eigen::Matrix<double, 5, 3>;
+
+Field FieldOf(const Eigen::Vector3d& plane) {
+  const Eigen::Vector3d normal = plane.normalized();
+  const Eigen::Vector3d ahead =
+      (Eigen::Vector3d::UnitZ() - normal.z() * normal).stableNormalized();  // 0: it looks straight down
+  const Eigen::Vector3d aside = normal.cross(ahead);
+  Field field;
+  field.row(0) = normal;
+  field.row(1) = ahead - kNearest * normal;
+  field.row(2) = kFarthest * normal - ahead;
+  field.row(3) = kAside * normal - aside;
+  field.row(4) = kAside * normal + aside;
+  return field;
+}
+
+// The columns of a row of the image that are in it.
+struct Columns {
+  int from = 0, to = 0;  // the last one is in, too
+};
+
+Columns ColumnsOf(const PinholeCamera& camera, const cv::Mat& image, const Field& field, double y) {
+  double from = 1, to = image.cols - 2;
+  for (int i = 0; i < field.rows(); ++i) {
+    const double slope = field(i, 0) / camera.fx;
+    const double at_cx = field(i, 1) * y + field(i, 2);  // positive: the column cx is in
+    if (std::abs(slope) < 1e-12) {
+      if (!(at_cx > 0)) to = -1;
+      continue;
+    }
+    const double edge = camera.cx - at_cx / slope;
+    if (slope > 0) {
+      from = std::max(from, edge);
+    } else {
+      to = std::min(to, edge);
+    }
+  }
+  if (!(to >= from)) return {0, -1};
+  return {static_cast<int>(std::ceil(from)), static_cast<int>(std::floor(to))};
+}
+
 // Of what the plane says is ground, at most so many pixels on a regular grid.
 std::vector<Pixel> GroundPixels(const PinholeCamera& camera, const cv::Mat& image,
                                 const Eigen::Vector3d& plane, double most) {
-  const double height = 1 / plane.norm();
+  const Field field = FieldOf(plane);
   struct Row {
-    int v, from, to;
+    int v;
+    Columns columns;
   };
   std::vector<Row> rows;
   double area = 0;
-  for (int v = std::max(0, static_cast<int>(camera.cy) + kBelowHorizon); v < image.rows - 4; ++v) {
-    const double below = (v - camera.cy) / camera.fy, inverse = plane.y() * below + plane.z();
-    if (!(inverse > 1 / (kFarthest * height)) || !(inverse < 1 / (kNearest * height))) continue;
-    const double half = camera.fx * kAside * height * inverse;
-    const Row row{v, std::max(1, static_cast<int>(std::ceil(camera.cx - half))),
-                  std::min(image.cols - 2, static_cast<int>(std::floor(camera.cx + half)))};
-    if (row.to <= row.from) continue;
-    area += row.to - row.from;
-    rows.push_back(row);
+  for (int v = kFromEdge; v < image.rows - kFromEdge; ++v) {
+    const Columns columns = ColumnsOf(camera, image, field, (v - camera.cy) / camera.fy);
+    if (columns.to <= columns.from) continue;
+    area += columns.to - columns.from;
+    rows.push_back({v, columns});
   }
   std::vector<Pixel> pixels;
   if (area < kFewestPixels) return pixels;
@@ -49,7 +90,7 @@ std::vector<Pixel> GroundPixels(const PinholeCamera& camera, const cv::Mat& imag
   for (const Row& row : rows) {
     if (row.v % stride != 0) continue;
     const unsigned char* const greys = image.ptr<unsigned char>(row.v);
-    for (int u = row.from; u < row.to; u += stride)
+    for (int u = row.columns.from; u < row.columns.to; u += stride)
       pixels.push_back({{(u - camera.cx) / camera.fx, (row.v - camera.cy) / camera.fy, 1}, double(greys[u])});
   }
   return pixels;
@@ -168,14 +209,23 @@ std::optional<GroundPlane> AlignGround(const PinholeCamera& camera, const cv::Ma
   return GroundPlane{plane, correlation};
 }
 
+std::optional<Eigen::Vector3d> NormalBelow(const Pose& T_second_first) {
+  const Eigen::Vector3d way = T_second_first.rotation.conjugate() * T_second_first.translation;
+  if (!(way.norm() > 0)) return std::nullopt;
+  const Eigen::Vector3d along = way.normalized(), y = Eigen::Vector3d::UnitY();
+  if (!(std::abs(along.y()) < kSteepest)) return std::nullopt;
+  return (y - along.y() * along).normalized();
+}
+
 std::optional<GroundPlane> SearchGround(const PinholeCamera& camera, const cv::Mat& first,
                                         const cv::Mat& second, const Pose& T_second_first) {
   const double way = T_second_first.translation.norm();
   std::optional<GroundPlane> best;
+  const std::optional<Eigen::Vector3d> normal = NormalBelow(T_second_first);
   Pairs pairs;
-  for (int i = 0; way > 0 && i < kHeights; ++i) {
+  for (int i = 0; normal && i < kHeights; ++i) {
     const double height = way * kLowest * std::pow(kHighest / kLowest, i / (kHeights - 1.0));
-    const Eigen::Vector3d plane(0, 1 / height, 0);
+    const Eigen::Vector3d plane = *normal / height;
     Find(camera, GroundPixels(camera, first, plane, kMostInSearch), second, T_second_first, plane, &pairs);
     if (static_cast<double>(pairs.first.size()) < kFewestPixels) continue;
     const double correlation = Compare(pairs).correlation;

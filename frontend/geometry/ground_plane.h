@@ -27,8 +27,13 @@ std::optional<GroundPlane> AlignGround(const PinholeCamera& camera, const cv::Ma
                                        const cv::Mat& second, const Pose& T_second_first,
                                        const Eigen::Vector3d& start);
 
-/// A plane right below the camera whose height is not known at all, for AlignGround to start with: the one
-/// whose grey values agree best. None: they agree nowhere.
+/// The direction of a ground that the camera drives along, in the first camera: at right angles to the way,
+/// and as nearly below as can be (the camera's y). So a camera may look up or down. None: it did not move, or
+/// it moved more along its y axis than across it.
+std::optional<Eigen::Vector3d> NormalBelow(const Pose& T_second_first);
+
+/// A plane of that direction whose height is not known at all, for AlignGround to start with: the one whose
+/// grey values agree best. None: they agree nowhere.
 std::optional<GroundPlane> SearchGround(const PinholeCamera& camera, const cv::Mat& first,
                                         const cv::Mat& second, const Pose& T_second_first);
 

@@ -15,10 +15,14 @@ constexpr double kTurned = 0.12;                // of the ground against the cam
 constexpr double kMisfit = 0.25;                // of a logarithm: no measurement of the ground
 constexpr double kSigma = 0.06;  // of one, over a way of one height; errors of the road as well
 constexpr double kWalk = 0.003;  // of the drift, over a way of one height
-constexpr int kMeasurements = 40, kMostFailures = 10, kOthers = 5;
+constexpr int kMeasurements = 40, kMostFailures = 10, kOthers = 5, kMostChanges = 8;
 constexpr double kOften = 0.6, kSpread = 0.1, kBias = 0.06;
 constexpr double kMemory = 0.04;  // weight of the newest measurement in what holds "of late"
 constexpr double kWorth = 0.002;  // a smaller drift waits
+
+double AngleBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return std::acos(std::clamp(a.normalized().dot(b.normalized()), -1.0, 1.0));
+}
 
 }  // namespace
 
@@ -56,8 +60,8 @@ void CameraHeight::Search(const PinholeCamera& camera, const FrameFeatures& now)
   if (!found || !(found->correlation > kFound - 0.15)) return;
   found = AlignGround(camera, first, second, T_last_first_, found->normal_by_height);
   if (!found || !(found->correlation > kFound)) return;
-  const Eigen::Vector3d normal = found->normal_by_height.normalized();
-  if (!(std::acos(std::clamp(normal.y(), -1.0, 1.0)) < 2 * kTurned)) return;
+  const std::optional<Eigen::Vector3d> below = NormalBelow(T_last_first_);
+  if (!below || !(AngleBetween(found->normal_by_height, *below) < 2 * kTurned)) return;
   // One that is known stays, unless it is another ground.
   const bool same = seen_ > 0 && std::abs(std::log(found->Height()) - reference_ - drift_) < kMisfit;
   if (!same) {
@@ -76,8 +80,7 @@ void CameraHeight::Measure(const PinholeCamera& camera, const FrameFeatures& now
   const auto found =
       AlignGround(camera, first_->pyramid->front(), now.pyramid->front(), T_last_first_, plane_);
   const bool agrees = found && found->correlation > kAgrees &&
-                      std::acos(std::clamp(found->normal_by_height.normalized().dot(plane_.normalized()),
-                                           -1.0, 1.0)) < kTurned &&
+                      AngleBetween(found->normal_by_height, plane_) < kTurned &&
                       std::abs(std::log(found->Height()) - reference_ - drift_) < kMisfit;
   ++seen_;
   const double weight = std::max(kMemory, 1.0 / seen_);
@@ -90,6 +93,18 @@ void CameraHeight::Measure(const PinholeCamera& camera, const FrameFeatures& now
   failures_ = 0;
   plane_ += 0.2 * (found->normal_by_height - plane_);
   Update(std::log(found->Height()), way);
+  if (seen_ >= kMeasurements / 2 && std::abs(bias_) > kBias) BeginAnew();
+}
+
+// What is measured runs away from what is expected: no scale drifts so fast, the camera rises or sinks.
+void CameraHeight::BeginAnew() {
+  const Eigen::Vector3d plane = plane_;
+  const int changes = std::min(changes_ + 1, kMostChanges);
+  Forget();
+  changes_ = changes;
+  plane_ = plane;
+  reference_ = -std::log(plane.norm());
+  covariance_(0, 0) = 1;
 }
 
 // Kalman filter; a misfit beyond twice what is usual counts as if it were so much.
@@ -108,7 +123,8 @@ void CameraHeight::Update(double log_height, double way) {
 }
 
 std::optional<double> CameraHeight::Drift() const {
-  if (seen_ < kMeasurements || share_ < kOften || spread_ > kSpread * kSpread || std::abs(bias_) > kBias)
+  // Each time that the height was found to change, it must be seen to stay for twice as long.
+  if (seen_ < (kMeasurements << changes_) || share_ < kOften || spread_ > kSpread * kSpread)
     return std::nullopt;
   if (std::abs(drift_) < kWorth) return std::nullopt;
   return drift_;
@@ -123,9 +139,10 @@ void CameraHeight::Correct(double scale) {
 }
 
 void CameraHeight::Forget() {
-  const int corrections = corrections_;
+  const int corrections = corrections_, changes = changes_;
   const double corrected = corrected_;
   *this = CameraHeight();
+  changes_ = changes;
   corrections_ = corrections;
   corrected_ = corrected;
 }
@@ -137,9 +154,10 @@ std::optional<HeightFound> CameraHeight::Found() const {
 
 bool CameraHeight::IsPossible() const {
   return T_last_first_.IsFinite() && plane_.allFinite() && covariance_.allFinite() && age_ >= 0 &&
-         waited_ >= 0 && seen_ >= 0 && failures_ >= 0 && others_ >= 0 && corrections_ >= 0 &&
-         std::isfinite(corrected_) && std::isfinite(reference_) && std::isfinite(drift_) &&
-         std::isfinite(share_) && std::isfinite(spread_) && std::isfinite(bias_);
+         waited_ >= 0 && seen_ >= 0 && failures_ >= 0 && others_ >= 0 && changes_ >= 0 &&
+         changes_ <= kMostChanges && corrections_ >= 0 && std::isfinite(corrected_) &&
+         std::isfinite(reference_) && std::isfinite(drift_) && std::isfinite(share_) &&
+         std::isfinite(spread_) && std::isfinite(bias_);
 }
 
 void CameraHeight::Follow(double scale) {

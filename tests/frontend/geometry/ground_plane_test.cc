@@ -45,6 +45,42 @@ TEST_F(GroundPlaneTest, IsFoundWhereTheHeightIsNotKnown) {
   EXPECT_NEAR(found->Height(), kHeight, 0.05 * kHeight);
 }
 
+// As on a robot whose camera looks at the floor before it, or a dash camera that looks up. Not every pair of
+// images tells it: of these some must.
+TEST_F(GroundPlaneTest, IsFoundByACameraThatLooksDownOrUp) {
+  for (const double degrees : {25.0, 15.0, -8.0}) {
+    const Pose T_level_pitched(
+        Eigen::Quaterniond(Eigen::AngleAxisd(-degrees * M_PI / 180, Eigen::Vector3d::UnitX())),
+        Eigen::Vector3d::Zero());
+    int found_in = 0;
+    for (const std::size_t i : {20, 30, 40}) {
+      const Pose first = world_.PoseOf(i) * T_level_pitched, second = world_.PoseOf(i + 1) * T_level_pitched;
+      first_ = world_.RenderFrom(i, first).image;
+      second_ = world_.RenderFrom(i + 1, second).image;
+      const Pose T = second.Inverse() * first;
+      const auto about = SearchGround(world_.Camera(), first_, second_, T);
+      if (!about) continue;
+      const auto found = AlignGround(world_.Camera(), first_, second_, T, about->normal_by_height);
+      if (!found) continue;
+      ++found_in;
+      EXPECT_NEAR(found->Height(), kHeight, 0.05 * kHeight) << degrees << " " << i;
+      EXPECT_NEAR(std::asin(found->normal_by_height.normalized().z()), degrees * M_PI / 180, 0.08) << i;
+    }
+    EXPECT_GE(found_in, 2) << degrees;
+  }
+}
+
+TEST_F(GroundPlaneTest, IsRightBelowWhereTheWayIsLevel) {
+  const auto along_z = NormalBelow(Pose(Eigen::Quaterniond::Identity(), {0, 0, -1}));
+  ASSERT_TRUE(along_z);
+  EXPECT_LT((*along_z - Eigen::Vector3d::UnitY()).norm(), 1e-12);
+  const auto uphill = NormalBelow(Pose(Eigen::Quaterniond::Identity(), {0, 0.1, -1}));  // it moves to -y
+  ASSERT_TRUE(uphill);
+  EXPECT_GT(uphill->z(), 0.09);
+  EXPECT_FALSE(NormalBelow(Pose()));
+  EXPECT_FALSE(NormalBelow(Pose(Eigen::Quaterniond::Identity(), {0, 1, 0}))) << "a lift";
+}
+
 TEST_F(GroundPlaneTest, HasTheUnitOfTheWayBetweenTheViews) {
   T_second_first_.translation *= 0.5;
   const auto found = Align(0.5 * 1.03 * kHeight);

@@ -3,8 +3,9 @@
 
 usage: ./dev bench straight [ROW...] [--write]
 
-Rows: `road`, 400 m of a generated street, and `kitti`, the straights of kitti_00_head (stretches of at least 70 m whose heading
-stays within 8 degrees). What varies on the road: the world, the first frame (0 to 4 are skipped), and the images' compression
+Rows: `road`, 400 m of a generated street; `other`, drives that set no constant of the odometry, with and without
+`odometry.keep_height`; and `kitti`, the straights of kitti_00_head (stretches of at least 70 m whose heading stays within 8
+degrees). What varies on the road: the world, the first frame (0 to 4 are skipped), and the images' compression
 (none, JPEG); once with a perfect lens, once with one whose k1 is 0.01 off. On KITTI each stretch is run with self-calibration
 and without (lens_sigma: 0). Odometry alone; ATE after Sim(3) alignment. Needs ffmpeg for the JPEG images.
 """
@@ -17,10 +18,19 @@ import sys
 
 import table
 
-ROWS = ["road", "kitti"]
+ROWS = ["road", "other", "kitti"]
 STARTS = range(5)
 WORLDS = [1, 2]
 LENSES = {"perfect": [], "k1 0.01 off": ["--set", "camera.distortion=radtan", "--set", "camera.coefficients=[0.01, 0, 0, 0, 0]"]}
+STREET = ["--block", "200", "--blocks-x", "4", "--frames", "505"]
+TURNS = ["--block", "60", "--blocks-x", "2", "--blocks-y", "2", "--laps", "0.95"]
+OTHER = {  # by the seed of its world
+    21: ("another street", STREET), 22: ("and another", STREET),
+    25: ("the camera looks 15 deg down", [*STREET, "--pitch", "15"]), 35: ("8 deg up", [*STREET, "--pitch", "-8"]),
+    27: ("hills of 6 m", [*STREET, "--hills", "6"]), 30: ("15 m/s", [*STREET[:4], "--frames", "300", "--speed", "15"]),
+    31: ("oncoming cars", [*STREET, "--moving-objects", "12"]), 32: ("320 x 240", [*STREET, "--width", "320", "--height", "240"]),
+    33: ("turns", TURNS), 34: ("turns, hills of 8 m", [*TURNS, "--hills", "8"])}
+OTHER_STARTS = range(3)
 ROAD_BOUND = 0.12  # % of the path, the worst
 HEADING_DEG, LENGTH_M = 8, 70
 
@@ -55,14 +65,26 @@ def ate(a, name, config, dataset, *options):
 def road(a):
     runs = []
     for world in WORLDS:
-        plain = table.generate(a.tutti, a.out / f"road-{world}", ["--sensor", "mono", "--block", "200", "--blocks-x", "4", "--frames",
-                                                                 "505", "--seed", str(world)])
+        plain = table.generate(a.tutti, a.out / f"road-{world}", ["--sensor", "mono", *STREET, "--seed", str(world)])
         for image, dataset in (("png", plain), ("jpeg", compressed(plain))):
             for lens, options in LENSES.items():
                 for start in STARTS:
                     name = f"road/{world}-{image}-{lens.replace(' ', '-')}-{start}"
                     run = ate(a, name, dataset / "config.yaml", dataset, "--start", start, *options)
                     runs.append(dict(run, world=world, image=image, lens=lens, start=start))
+    return runs
+
+
+def other(a):
+    runs = []
+    for world, (what, options) in OTHER.items():
+        dataset = table.generate(a.tutti, a.out / f"other-{world}", ["--sensor", "mono", *options, "--seed", str(world)])
+        for start in OTHER_STARTS:
+            cut = ["--start", start]
+            name = f"other/{world}-{start}"
+            free = ate(a, name + "-free", dataset / "config.yaml", dataset, *cut, "--set", "odometry.keep_height=false")
+            run = ate(a, name, dataset / "config.yaml", dataset, *cut)
+            runs.append(dict(run, world=world, what=what, start=start, free_ate_m=free["ate_m"]))
     return runs
 
 
@@ -117,6 +139,16 @@ def document(results):
                 text.append(f"| {image} | {lens} | {len(runs)} | {statistics.median(r['ate_m'] for r in runs):.2f} m | "
                             f"{max(r['ate_m'] for r in runs):.2f} m | {share:.3f}{'' if share <= ROAD_BOUND else ' (**missed**)'} | "
                             f"{max(r['without_pose'] for r in runs)} |")
+    if results.get("other"):
+        text += ["", f"## Drives that set no constant\n\nOne world each, first frames 0 to {OTHER_STARTS[-1]}; with the height above the "
+                 "ground, and without (`odometry.keep_height: false`).\n",
+                 "| drive | path | ATE, median | worst | without, median | worst | frames without a pose |", "|---|---|---|---|---|---|---|"]
+        for world, (what, _) in OTHER.items():
+            runs = [r for r in results["other"] if r["world"] == world]
+            if runs:
+                median, worst = ([f(r[key] for r in runs) for key in ("ate_m", "free_ate_m")] for f in (statistics.median, max))
+                text.append(f"| {what} | {runs[0]['path_m']:.0f} m | {median[0]:.2f} m | {worst[0]:.2f} m | {median[1]:.2f} m | "
+                            f"{worst[1]:.2f} m | {max(r['without_pose'] for r in runs)} |")
     if results.get("kitti"):
         text += ["", "## The straights of kitti_00_head\n\nWith self-calibration of the lens, and without (`lens_sigma: 0`); the "
                  "ratio must not exceed 1.1.\n", "| frames | path | ATE | without | ratio |", "|---|---|---|---|---|"]
@@ -132,7 +164,7 @@ def main():
     data = table.RESULTS / "straight.json"
     results = json.loads(data.read_text()) if data.exists() else {}
     for row in a.rows:
-        results[row] = {"road": road, "kitti": kitti}[row](a) or results.get(row, [])
+        results[row] = {"road": road, "other": other, "kitti": kitti}[row](a) or results.get(row, [])
     if a.write:
         data.write_text(json.dumps(results, indent=1) + "\n")
     table.put(a, table.RESULTS / "straight.md", document(results))

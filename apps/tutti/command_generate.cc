@@ -214,6 +214,12 @@ void AddOptions(CLI::App& c, GenerateArguments& a) {
       ->capture_default_str();
   c.add_option("--sides", w.sides_deg, "sensor sides: each camera looks so far from the way [deg]")
       ->capture_default_str();
+  c.add_option("--pitch", w.pitch_deg, "the camera looks so far down [deg]; negative: up")
+      ->capture_default_str();
+  c.add_option("--hills", w.hills_m,
+               "town: its streets go up and down so far [m], every 150 m; without a number 4")
+      ->expected(0, 1)
+      ->default_str("4");
   c.add_option("--noise", w.noise_sigma, "pixel noise [grey levels]; without a number 4")
       ->expected(0, 1)
       ->default_str("4");

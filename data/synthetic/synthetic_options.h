@@ -23,6 +23,7 @@ struct SyntheticOptions {
   double focal_px = 0;     ///< [px]
   double baseline_m = 0;   ///< stereo [m]; 0: 0.54 in the town (as KITTI), 0.12 indoors
   double sides_deg = 60;   ///< sides: each camera looks so far from the way [deg]
+  double pitch_deg = 0;    ///< the camera looks so far down [deg]; negative: up
   double rate_hz = 0;      ///< frames per second; 0: 10 in the town, 15 indoors
   double max_depth_m = 0;  ///< RGB-D: farther depth is not measured [m]; 0: 13 in the town, 8 indoors
   double depth_units_per_m = 5000;  ///< RGB-D: value of one metre in the 16-bit files (which end at 65535)
@@ -46,6 +47,8 @@ struct SyntheticOptions {
       1;  ///< of the town's posters and shop signs that are there [0..1]; no two look alike
   int road_surfaces =
       6;  ///< different ones, each with its cracks, patches and manhole: few are aliasing, too
+
+  double hills_m = 0;  ///< its streets go up and down so far [m]: hills every 150 and 115 m
 
   // The corridor: a ring, twice as long as wide.
   double corridor_m = 40;  ///< its longer side [m]

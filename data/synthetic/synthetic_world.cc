@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "data/synthetic/hand.h"
+#include "data/synthetic/hills.h"
 #include "data/synthetic/scene.h"
 #include "data/synthetic/shutter.h"
 #include "data/synthetic/synthetic_random.h"
@@ -42,6 +43,9 @@ std::string SyntheticOptions::Validate() const {
   if (road_surfaces < 1 || road_surfaces > 1000) return "road_surfaces must be 1 to 1000";
   if (!(corridor_m >= 12 && corridor_m <= 500)) return "corridor_m must be 12 to 500 m";
   if (!(sides_deg > 0 && sides_deg <= 120)) return "sides_deg must be above 0 and at most 120 degrees";
+  if (!(pitch_deg >= -45 && pitch_deg <= 45)) return "pitch_deg must be -45 to 45 degrees";
+  if (!(hills_m >= 0 && hills_m <= 10)) return "hills_m must be 0 to 10 m";
+  if (hills_m > 0 && scene != SyntheticScene::kTown) return "hills_m is the town's alone";
   if (!(noise_sigma >= 0 && noise_sigma <= 100)) return "noise_sigma must be 0 to 100 grey levels";
   if (!(motion_blur_s >= 0 && motion_blur_s <= 0.1)) return "motion_blur_s must be 0 to 0.1 s";
   if (!(readout_s >= 0 && readout_s <= 0.1)) return "readout_s must be 0 to 0.1 s";
@@ -71,10 +75,11 @@ SyntheticOptions SyntheticOptions::Resolved() const {
 }
 
 struct SyntheticWorld::Impl {
-  explicit Impl(const SyntheticOptions& o) : options(o), hand(o.seed, o.shake_deg_per_s) {}
+  explicit Impl(const SyntheticOptions& o) : options(o), hand(o.seed, o.shake_deg_per_s), hills(o.hills_m) {}
 
   SyntheticOptions options;
   synthetic::Hand hand;
+  synthetic::Hills hills;
   synthetic::Scene scene;
   PinholeCamera camera;
   std::size_t frames = 0;
@@ -99,10 +104,11 @@ struct SyntheticWorld::Impl {
     const double heading = Way().HeadingAt(s);
     const Eigen::Vector2d point =
         Way().PointAt(s) + lateral * Eigen::Vector2d(-std::sin(heading), std::cos(heading));
-    const double height =
-        scene.eye_height + 0.015 * std::sin(2 * M_PI * 0.9 * t) + 0.01 * std::sin(2 * M_PI * 0.37 * t + 1);
+    const double height = hills.HeightAt(point) + scene.eye_height + 0.015 * std::sin(2 * M_PI * 0.9 * t) +
+                          0.01 * std::sin(2 * M_PI * 0.37 * t + 1);
     const double yaw = heading - scene.gaze_right + turned_left + scene.sway * std::sin(2 * M_PI * 0.21 * t);
-    const double down = scene.gaze_down + scene.sway * std::sin(2 * M_PI * 0.43 * t + 0.7);
+    const double down = scene.gaze_down + options.pitch_deg * M_PI / 180 - hills.SlopeAt(point, heading) +
+                        scene.sway * std::sin(2 * M_PI * 0.43 * t + 0.7);
     const double roll = scene.sway * std::sin(2 * M_PI * 0.31 * t + 2.1);
     Eigen::Matrix3d level;  // columns: right, down, forward of a camera that looks along yaw
     level << std::sin(yaw), 0, std::cos(yaw), -std::cos(yaw), 0, std::sin(yaw), 0, -1, 0;
@@ -172,7 +178,7 @@ struct SyntheticWorld::Impl {
     const double heading = Way().HeadingAt(s);
     const Eigen::Vector2d at =
         Way().PointAt(s) + left * Eigen::Vector2d(-std::sin(heading), std::cos(heading));
-    AppendBox(faces, {at.x(), at.y(), 0.01}, size, heading,
+    AppendBox(faces, {at.x(), at.y(), hills.HeightAt(at) + 0.01}, size, heading,
               scene.lorries[static_cast<std::size_t>(look) % scene.lorries.size()]);
   }
 
@@ -241,7 +247,7 @@ struct SyntheticWorld::Impl {
       const Eigen::Vector2d at =
           Way().PointAt(s) + scene.mover_left * Eigen::Vector2d(-std::sin(heading), std::cos(heading));
       const auto& look = scene.movers[static_cast<std::size_t>(k) % scene.movers.size()];
-      AppendBox(faces, {at.x(), at.y(), 0.01}, scene.mover_size, heading, look);
+      AppendBox(faces, {at.x(), at.y(), hills.HeightAt(at) + 0.01}, scene.mover_size, heading, look);
     }
     return faces;
   }
@@ -350,6 +356,9 @@ SyntheticWorld::SyntheticWorld(const SyntheticOptions& options) {
   impl_->scene = o.scene == SyntheticScene::kTown   ? synthetic::BuildTown(o)
                  : o.scene == SyntheticScene::kRoom ? synthetic::BuildRoom(o)
                                                     : synthetic::BuildCorridor(o);
+  impl_->hills.Lift(&impl_->scene.faces);
+  for (synthetic::ParkingPlace& place : impl_->scene.parking) impl_->hills.Lift(&place.later);
+  for (Eigen::Vector3d& lamp : impl_->scene.lamps) lamp.z() += impl_->hills.HeightAt(lamp.head<2>());
   impl_->PlanParking();
   PinholeCamera& c = impl_->camera;
   c.width = o.width;

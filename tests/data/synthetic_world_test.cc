@@ -266,6 +266,42 @@ TEST(SyntheticWorldTest, OtherCarsAreParkedWhenAPlaceIsSeenAgain) {
   EXPECT_GT(changed, 0.8 * frames);
 }
 
+// The road is as far below the camera on a slope as on flat ground, and is seen as there.
+TEST(SyntheticWorldTest, StreetsGoUpAndDownHills) {
+  SyntheticOptions options = SmallTwoLaps();
+  options.hills_m = 4;
+  const SyntheticWorld world(options);
+  double low = 0, high = 0;
+  for (std::size_t i = 0; i < world.FramesPerLap(); ++i) {
+    const double up = -world.PoseOf(i).translation.y();  // of the first camera, which is nearly level
+    low = std::min(low, up);
+    high = std::max(high, up);
+  }
+  EXPECT_GT(high - low, 3);
+  EXPECT_LT(high - low, 14);
+  const PinholeCamera& camera = world.Camera();
+  for (std::size_t i = 0; i < world.FramesPerLap(); i += 40) {
+    const cv::Mat depth = world.ExactDepth(i);
+    const int row = camera.height - 6;
+    const double z = depth.at<float>(row, camera.width / 2);
+    EXPECT_NEAR(z * (row - camera.cy) / camera.fy, 1.65, 0.35) << i;
+  }
+}
+
+TEST(SyntheticWorldTest, TheCameraLooksDownOrUp) {
+  SyntheticOptions options = SmallTwoLaps();
+  const SyntheticWorld level(options);
+  options.pitch_deg = 20;
+  const SyntheticWorld down(options);
+  const auto middle = [](const SyntheticWorld& world) {
+    return world.ExactDepth(5).at<float>(world.Camera().height / 2, world.Camera().width / 2);
+  };
+  EXPECT_NEAR(middle(down), 1.65 / std::sin(20 * M_PI / 180), 0.4);
+  EXPECT_GT(middle(level), 3 * middle(down));
+  options.pitch_deg = 60;
+  EXPECT_NE(options.Validate(), "");
+}
+
 TEST(SyntheticWorldTest, KinectNoiseGrowsWithDepthAndLeavesHoles) {
   SyntheticOptions options = SmallWorld(SyntheticScene::kRoom, SyntheticSensor::kRgbd);
   options.kinect_noise = true;

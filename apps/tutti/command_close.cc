@@ -1,5 +1,6 @@
 // tutti close: loops and a corrected trajectory for another odometry.
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -8,11 +9,15 @@
 
 #include "apps/report/page.h"
 #include "apps/run/outputs.h"
+#include "apps/run/recording.h"
 #include "apps/run/run_health.h"
 #include "apps/run/runner.h"
+#include "apps/tutti/camera_options.h"
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
+#include "apps/tutti/configuration_of.h"
 #include "apps/tutti/exit_code.h"
+#include "apps/tutti/files.h"
 #include "apps/tutti/mask_option.h"
 #include "apps/tutti/run_with_report.h"
 #include "tutti/core/error.h"
@@ -22,9 +27,12 @@
 namespace tutti::cli {
 namespace {
 
+namespace fs = std::filesystem;
+
 struct CloseArguments {
   GivenOdometryFiles odometry;
   std::string trajectory, images, depth, times, config, out, ground_truth, mask;
+  CameraWords camera;
   std::vector<std::string> sigma;  // share of the way and degrees, or a file
   std::vector<std::string> set;    // SECTION.KEY=VALUE
   std::uint64_t seed = 1;
@@ -32,8 +40,26 @@ struct CloseArguments {
   bool keep = false, no_report = false, quiet = false;
 };
 
-RunConfig ConfigOf(const CloseArguments& arguments) {
-  RunConfig config = arguments.config.empty() ? RunConfig() : LoadConfig(arguments.config);
+// From a file, or from what the recording is. Where nothing says what the camera is, it is not guessed: loops
+// then have no poses.
+RunConfig CameraAndMore(const CameraRequest& camera, const CloseArguments& arguments) {
+  if (!arguments.config.empty()) {
+    RunConfig config = LoadConfig(arguments.config);
+    SetCamera(arguments.images, camera, config);
+    return config;
+  }
+  const Recording recording = Recognise(arguments.images, camera);
+  if (recording.guessed_lens) {
+    RunConfig config;
+    SetCamera(arguments.images, camera, config);
+    return config;
+  }
+  if (!arguments.quiet) SayFindings(recording);
+  return recording.config;
+}
+
+RunConfig ConfigOf(const CameraRequest& camera, const CloseArguments& arguments) {
+  RunConfig config = CameraAndMore(camera, arguments);
   if (arguments.sigma.size() == 2) {
     const std::optional<double> fraction = ParseDouble(arguments.sigma[0]),
                                 deg = ParseDouble(arguments.sigma[1]);
@@ -54,7 +80,7 @@ int Close(const CLI::App& command, const CloseArguments& arguments) {
   RunRequest request;
   request.config = arguments.config.empty() ? "(defaults)" : arguments.config;
   request.dataset = arguments.images;
-  request.out = arguments.out;
+  request.out = arguments.out.empty() ? DefaultOutput(arguments.images, "-closed") : fs::path(arguments.out);
   request.quiet = arguments.quiet;
   request.keep = arguments.keep;
   request.odometry = arguments.odometry;
@@ -68,7 +94,7 @@ int Close(const CLI::App& command, const CloseArguments& arguments) {
   if (command.count("--start") > 0) request.start = arguments.start;
   if (command.count("--end") > 0) request.end = arguments.end;
   if (command.count("--stride") > 0) request.stride = arguments.stride;
-  const RunConfig config = ConfigOf(arguments);
+  const RunConfig config = ConfigOf(CameraOf(command, arguments.camera), arguments);
   const RunResult result = arguments.no_report ? RunSlam(request, config) : RunWithReport(request, config);
   std::fputs(ResultTable(result).c_str(), stdout);
   std::printf("\n  results are in %s\n", result.folder.c_str());
@@ -98,10 +124,14 @@ void SetUpClose(CLI::App& command, int& exit_code) {
   command.add_option("--depth", arguments->depth,
                      "folder of depth images, registered to those of --images, if that is a plain folder: in "
                      "the same order if there are as many, else by the time stamps that they are called by");
-  command.add_option("--config", arguments->config,
-                     "YAML file with the camera; without a calibration there is loops.csv alone");
+  command.add_option(
+      "--config", arguments->config,
+      "YAML file; without it, layout, sensor and calibration are found in --images, and what was "
+      "found is said. Where there is no calibration, there is loops.csv alone");
+  AddCameraOptions(command, arguments->camera);
   AddMaskOption(command, arguments->mask);
-  command.add_option("--out", arguments->out, "folder for the results, as of `tutti run`")->required();
+  command.add_option("--out", arguments->out,
+                     "folder for the results, as of `tutti run` (default: tutti-out/NAME-closed)");
   command.add_option("--format", arguments->odometry.format, "of --trajectory; auto: by content")
       ->check(CLI::IsMember({"auto", "tum", "kitti", "euroc"}))
       ->capture_default_str();

@@ -13,6 +13,7 @@
 #include "apps/run/recording.h"
 #include "apps/run/run_health.h"
 #include "apps/run/runner.h"
+#include "apps/tutti/camera_options.h"
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/configuration_of.h"
@@ -21,7 +22,6 @@
 #include "apps/tutti/mask_option.h"
 #include "apps/tutti/run_with_report.h"
 #include "apps/view/live_view.h"
-#include "core/camera_text.h"
 #include "core/example_configs.h"
 #include "core/terminal.h"
 #include "tutti/core/error.h"
@@ -36,9 +36,9 @@ namespace fs = std::filesystem;
 struct RunArguments {
   std::string config, dataset, out, ground_truth;
   std::string trace, resume, map, save_map;
-  std::string calibration, camera, sensor, mask;
+  std::string mask;
+  CameraWords camera;
   int rotate = 0;
-  double view_deg = 0;
   std::vector<std::string> set;  // SECTION.KEY=VALUE
   bool no_loops = false, no_report = false, quiet = false, keep = false, help_config = false,
        advanced = false, timing = false, realtime = false, no_map = false;
@@ -111,17 +111,6 @@ int Resume(const CLI::App& command, const RunArguments& arguments) {
   if (!arguments.save_map.empty()) request.save_map = arguments.save_map;
   if (arguments.no_map) request.save_map.reset();
   return RunAndShow(command, arguments, std::move(request), config);
-}
-
-CameraRequest CameraOf(const CLI::App& command, const RunArguments& arguments) {
-  CameraRequest camera;
-  if (!arguments.calibration.empty()) camera.calibration = arguments.calibration;
-  camera.camera = arguments.camera;
-  if (command.count("--fov") > 0) camera.view_deg = arguments.view_deg;
-  for (const auto& [word, value] : WordsOf(Sensor())) {
-    if (arguments.sensor == word) camera.sensor = value;
-  }
-  return camera;
 }
 
 // What the map was made with, for a recording of which all frames are used.
@@ -230,7 +219,7 @@ int RunOnce(const CLI::App& command, const RunArguments& arguments) {
   if (!arguments.save_map.empty()) request.save_map = arguments.save_map;
   if (arguments.save_map.empty() && !arguments.no_map) request.save_map = kMap;
   if (!arguments.map.empty()) request.map = arguments.map;
-  RunConfig config = ConfigFor(CameraOf(command, arguments), arguments, request);
+  RunConfig config = ConfigFor(CameraOf(command, arguments.camera), arguments, request);
   SetOptions(arguments.set, config);
   return RunAndShow(command, arguments, std::move(request), config);
 }
@@ -249,17 +238,7 @@ void SetUpRun(CLI::App& command, int& exit_code) {
                      "YAML file (" + internal::ExampleConfigs() +
                          " has one for each public data set). Without it, layout, sensor and calibration "
                          "are found in the recording, and what was found is said");
-  command.add_option("--calibration", arguments->calibration,
-                     "the camera from a YAML file of Kalibr, ORB-SLAM, OpenCV, ROS or EuRoC");
-  command.add_option("--camera", arguments->camera,
-                     std::string("the camera as ") + internal::kCameraText + " in pixels");
-  command
-      .add_option("--fov", arguments->view_deg,
-                  "the camera by its horizontal field of view [deg], principal point in the middle")
-      ->check(NumberThat([](double v) { return v >= 5 && v <= 170; }, "from 5 to 170", "DEGREES"));
-  command
-      .add_option("--sensor", arguments->sensor, "what to use of the recording; default: all that is there")
-      ->check(OneOf(Sensor()));
+  AddCameraOptions(command, arguments->camera);
   AddMaskOption(command, arguments->mask);
   command
       .add_option("--rotate", arguments->rotate,

@@ -8,6 +8,7 @@
 
 #include "tests/apps/tiny_town.h"
 #include "tests/apps/tutti/executable.h"
+#include "tests/support/in_folder.h"
 #include "tests/support/test_data.h"
 #include "tutti/core/trajectory.h"
 
@@ -129,6 +130,25 @@ TEST_F(CloseCommand, AFolderOfImagesGetsItsStampsFromTimesAboveItOrFromTheOption
                 "--out", (folder_ / "out").string(), "--times", (folder_ / "few.txt").string()});
   EXPECT_EQ(few.status, 1);
   EXPECT_THAT(few.output, HasSubstr("few.txt: has 2 time stamps"));
+}
+
+TEST_F(CloseCommand, FindsTheCameraInTheRecordingOrTakesItFromTheOptions) {
+  WriteTrajectory(folder_ / "odometry.txt", TownPoses(), TrajectoryFormat::kTum);
+  const std::string odometry = fs::absolute(folder_ / "odometry.txt"),
+                    town = fs::absolute(testing::TinyTown());
+  const testing::InFolder here(folder_);
+  const auto stereo = RunTutti({"close", "--trajectory", odometry, "--images", town, "--no-report"});
+  ASSERT_EQ(stereo.status, 0) << stereo.output;
+  EXPECT_THAT(stereo.output, HasSubstr("stereo"));
+  EXPECT_TRUE(fs::exists("tutti-out/" + fs::path(town).filename().string() + "-closed/graph.g2o"))
+      << stereo.output;
+  const auto images = RunTutti({"close", "--trajectory", odometry, "--images", town + "/image_0", "--camera",
+                                "185,185,159.5,79.5", "--no-report", "--out", "images"});
+  ASSERT_EQ(images.status, 0) << images.output;
+  EXPECT_TRUE(fs::exists("images/graph.g2o")) << images.output;
+  const auto both = RunTutti({"close", "--trajectory", odometry, "--images", town, "--fov", "3"});
+  EXPECT_NE(both.status, 0);
+  EXPECT_THAT(both.output, HasSubstr("from 5 to 170"));
 }
 
 TEST_F(CloseCommand, Example08DoesTheSameInCode) {

@@ -3,12 +3,13 @@
 
 #include <algorithm>
 #include <functional>
-#include <utility>
+#include <tuple>
 #include <vector>
 
 #include "backend/robust/loop_clusters.h"
 #include "backend/solver/graph_problem.h"
 #include "backend/uncertainty/edge_prediction.h"
+#include "core/median.h"
 
 namespace tutti::internal {
 
@@ -42,8 +43,9 @@ class ClusterGrowth {
     for (double gate = kFirstGate; !waiting.empty();) {
       if (!prediction_.Update()) return false;
       std::vector<std::size_t> joining = Certain(waiting, gate * problem_.threshold());
-      if (joining.empty() && gate == 1) break;
-      if (joining.empty()) gate = std::min(1.0, kGateStep * gate);
+      const double widest = WidestGate();
+      if (joining.empty() && gate >= widest) break;
+      if (joining.empty()) gate = std::min(widest, kGateStep * gate);
       if (!joining.empty() && !Join(joining, waiting)) return false;
     }
     return WeighSingleLoops();
@@ -55,15 +57,26 @@ class ClusterGrowth {
 
   /// Of the waiting clusters whose chi-square passes, the half that the graph is more certain of.
   std::vector<std::size_t> Certain(const std::vector<std::size_t>& waiting, double gate) {
-    std::vector<std::pair<double, std::size_t>> passing;
+    std::vector<std::tuple<double, double, std::size_t>> passing;  // spread, chi-square, cluster
     for (const std::size_t k : waiting) {
       const PredictedEdge predicted = Predicted(clusters_[k]);
-      if (predicted.chi2 <= gate) passing.push_back({predicted.spread, k});
+      if (predicted.chi2 <= gate) passing.push_back({predicted.spread, predicted.chi2, k});
     }
     std::sort(passing.begin(), passing.end());
     std::vector<std::size_t> out;
-    for (std::size_t k = 0; 2 * k < passing.size(); ++k) out.push_back(passing[k].second);
+    for (std::size_t k = 0; 2 * k < passing.size(); ++k) {
+      joined_chi2_.push_back(std::get<1>(passing[k]));
+      out.push_back(std::get<2>(passing[k]));
+    }
     return out;
+  }
+
+  /// Three sigma, on top of the 99 % quantile, of the noise that the clusters have shown when they joined; as
+  /// a share of the threshold.
+  double WidestGate() const {
+    constexpr double kSigmas = 3;
+    if (joined_chi2_.empty()) return 1;
+    return std::min(1.0, kSigmas * kSigmas * Median(joined_chi2_) / ChiSquareMedian(N));
   }
 
   /// Of its first, middle and last loop the median chi-square and the least spread.
@@ -114,6 +127,7 @@ class ClusterGrowth {
   const std::vector<LoopCluster>& clusters_;
   const std::function<bool(int)>& solve_once_;
   EdgePrediction<N> prediction_;
+  std::vector<double> joined_chi2_;  // of each cluster that has joined, before
 };
 
 }  // namespace tutti::internal

@@ -8,6 +8,7 @@
 
 #include "backend/robust/cluster_growth.h"
 #include "backend/robust/cluster_score.h"
+#include "backend/robust/leave_one_out.h"
 #include "backend/robust/loop_clusters.h"
 #include "backend/robust/robust_solver.h"
 #include "backend/solver/graph_initialization.h"
@@ -35,6 +36,7 @@ class ClusterSearch {
   /// one otherwise.
   bool Improve() {
     if (!FindRejectedClusters()) return false;
+    SetPenalty();
     Keep();
     bool better = false;
     problem_.SetPoses(OdometryInitialization(graph_, problem_.structure()));
@@ -77,6 +79,20 @@ class ClusterSearch {
     });
   }
 
+  /// The score's threshold: three sigma, on top of the 99 % quantile, of the noise that the median loop
+  /// shows, as RobustSolver::DropStrained takes it.
+  void SetPenalty() {
+    constexpr double kSigmas = 3;
+    const LeaveOneOut<N> without(problem_, problem_.weights().size());
+    std::vector<double> chi2;
+    for (std::size_t e = 0; without.Ok() && e < problem_.weights().size(); ++e) {
+      if (problem_.IsOpen(e) && problem_.weight(e) > 0) chi2.push_back(without.Chi2(e));
+    }
+    if (chi2.empty()) return;
+    const double shown = std::min(1.0, kSigmas * kSigmas * Median(chi2) / ChiSquareMedian(N));
+    threshold_ *= shown;
+  }
+
   /// Decides the loops from where the problem is; true if the result is the best one so far.
   bool Finish() {
     if (!robust_.DecideLoops(problem_.threshold()) || !robust_.Refine()) return false;
@@ -102,7 +118,7 @@ class ClusterSearch {
   GraphProblem<N>& problem_;
   RobustSolver<N>& robust_;
   std::function<bool(int)> solve_once_;
-  double threshold_;  // of the first solution: one measure for all
+  double threshold_;  // of the score: one for all solutions
   std::vector<LoopCluster> clusters_;
   Solution best_;
 };

@@ -23,6 +23,8 @@ TEST(ClusterScore, IsTheChiSquareOfWhatIsInAndALogarithmForEachClusterThatIsOut)
   problem.SetWeight(1, 0);
   problem.SetWeight(3, 0);
   problem.SetWeight(4, 0);
+  EXPECT_NEAR(internal::ClusterScore(problem, clusters, 5.0), 4 + 2 * 5 + 5 * (1 + std::log(2.0)) + 5, 1e-9)
+      << "a loop costs no more inside than outside";
   EXPECT_EQ(internal::RejectedLoops(problem, clusters[0]), 2u);
   EXPECT_NEAR(internal::ClusterScore(problem, clusters, 10.0), 4 + 2 * 9 + 10 * (1 + std::log(2.0)) + 10,
               1e-9);

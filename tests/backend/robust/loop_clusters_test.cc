@@ -9,7 +9,7 @@ namespace {
 
 using internal::LoopCluster;
 
-constexpr double kThreshold = 16.8;
+constexpr double kAgreementThreshold = 16.8;
 
 // A straight way of 200 m, a node a metre; without the step to `gap`, if there is one.
 PoseGraph StraightWay(int gap = -1) {
@@ -31,8 +31,8 @@ void AddRevisit(PoseGraph& graph, int from, int to, double off = 0) {
 // Sizes in the order in which the clusters begin.
 std::vector<std::size_t> ClusterSizes(const PoseGraph& graph) {
   std::vector<std::size_t> sizes;
-  for (const LoopCluster& cluster :
-       internal::ClusterLoops(graph, internal::AnalyseGraph(graph), GraphObjective::kChi2Log, kThreshold))
+  for (const LoopCluster& cluster : internal::ClusterLoops(graph, internal::AnalyseGraph(graph),
+                                                           GraphObjective::kChi2Log, kAgreementThreshold))
     sizes.push_back(cluster.size());
   return sizes;
 }
@@ -49,8 +49,8 @@ TEST(LoopClusters, ListTheirLoopsByTheEarlierEnd) {
   AddRevisit(graph, 159, 9);
   AddRevisit(graph, 3, 153);
   AddRevisit(graph, 6, 156);
-  const std::vector<LoopCluster> clusters =
-      internal::ClusterLoops(graph, internal::AnalyseGraph(graph), GraphObjective::kChi2Log, kThreshold);
+  const std::vector<LoopCluster> clusters = internal::ClusterLoops(
+      graph, internal::AnalyseGraph(graph), GraphObjective::kChi2Log, kAgreementThreshold);
   ASSERT_EQ(clusters.size(), 1u);
   EXPECT_EQ(clusters[0], (LoopCluster{odometry + 1, odometry + 2, odometry}));
 }

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "backend/graph/graph_structure.h"
+#include "backend/robust/cluster_search.h"
 #include "backend/robust/pairwise_consistency.h"
 #include "backend/robust/robust_solver.h"
 #include "backend/solver/chordal_descent.h"
@@ -137,10 +138,20 @@ class Run {
     for (std::size_t e = 0; e < best_weights.size(); ++e) problem_.SetWeight(e, best_weights[e]);
     if (robust) {
       robust_.Refine();
+      if (options_.robust == RobustLoss::kGnc) ReconsiderClusters();
       report_.objective = problem_.Objective();
     }
     report_.starts.push_back({start.start, start.objective, report_.objective, false});
     return true;
+  }
+
+  void ReconsiderClusters() {
+    const std::string termination = report_.termination, reason = report_.reason;
+    internal::ClusterSearch<N> search(graph_, options_, problem_, robust_,
+                                      [this](int iterations) { return SolveOnce(iterations); });
+    if (search.Improve()) return;
+    report_.termination = termination;
+    report_.reason = reason;
   }
 
   /// Least squares. The chordal objective has fewer valleys than the one that is asked for, so its optimum is

@@ -1,0 +1,66 @@
+#include "backend/robust/loop_agreement.h"
+
+#include <algorithm>
+
+#include "backend/robust/pairwise_consistency.h"
+#include "backend/solver/graph_initialization.h"
+#include "backend/uncertainty/edge_covariance.h"
+
+namespace tutti::internal {
+
+MeasuredLoop MeasuredLoop::Reversed() const {
+  return {edge, to, from, measurement.Inverse(), Transported(covariance, measurement)};
+}
+
+LoopAgreement::LoopAgreement(const PoseGraph& graph, const GraphStructure& structure,
+                             GraphObjective objective)
+    : kind_(graph.kind()) {
+  FollowOdometry(graph, structure, objective);
+  for (std::size_t e = 0; e < graph.edges().size(); ++e) {
+    const PoseGraphEdge& edge = graph.edges()[e];
+    if (edge.kind != EdgeKind::kLoop) continue;
+    loops_.push_back({e, structure.ends[e].from, structure.ends[e].to, edge.measurement.RigidPart(),
+                      EdgeCovariance(edge, graph.kind(), objective)});
+  }
+}
+
+void LoopAgreement::FollowOdometry(const PoseGraph& graph, const GraphStructure& structure,
+                                   GraphObjective objective) {
+  const std::size_t n = graph.nodes().size();
+  for (const Similarity& pose : OdometryInitialization(graph, structure))
+    T_world_node_.push_back(pose.RigidPart());
+  covariance_.assign(n, Matrix6d::Zero());
+  segment_.assign(n, 0);
+  std::vector<const PoseGraphEdge*> step(n, nullptr);  // from the node before
+  for (std::size_t e = 0; e < graph.edges().size(); ++e) {
+    if (graph.edges()[e].kind == EdgeKind::kLoop) continue;
+    const auto [low, high] = std::minmax(structure.ends[e].from, structure.ends[e].to);
+    if (high == low + 1) step[high] = &graph.edges()[e];
+  }
+  for (std::size_t k = 1; k < n; ++k) {
+    segment_[k] = segment_[k - 1] + (step[k] == nullptr ? 1 : 0);
+    if (step[k] == nullptr) continue;
+    const std::size_t to = graph.IndexOf(step[k]->to);
+    covariance_[k] = covariance_[k - 1] +
+                     Transported(EdgeCovariance(*step[k], graph.kind(), objective), T_world_node_[to]);
+  }
+}
+
+Matrix6d LoopAgreement::Between(std::size_t i, std::size_t j, const Pose& T_target_world) const {
+  const Matrix6d way = i < j ? covariance_[j] - covariance_[i] : covariance_[i] - covariance_[j];
+  return Transported(way, T_target_world);
+}
+
+double LoopAgreement::CycleChi2(const MeasuredLoop& a, const MeasuredLoop& b) const {
+  const auto& T = T_world_node_;
+  const Pose back = T[b.from].Inverse() * T[a.from];
+  const Pose rest = b.measurement.Inverse() * back;
+  const Pose E = LoopCycle(a.measurement, T[a.to].Inverse() * T[b.to], b.measurement, back);
+  const Matrix6d covariance = Transported(a.covariance, (T[a.to].Inverse() * T[b.to] * rest).Inverse()) +
+                              Transported(b.covariance, rest.Inverse()) +
+                              Between(a.to, b.to, rest.Inverse() * T[b.to].Inverse()) +
+                              Between(b.from, a.from, T[a.from].Inverse());
+  return Mahalanobis(LogSE3(E), covariance, kind_);
+}
+
+}  // namespace tutti::internal

@@ -1,0 +1,47 @@
+// Do two loops agree with each other through the odometry between their ends? Private to the back end.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "backend/graph/graph_structure.h"
+#include "tutti/backend/pose_graph.h"
+#include "tutti/backend/pose_graph_optimizer.h"
+
+namespace tutti::internal {
+
+/// One loop as its end `from` sees it.
+struct MeasuredLoop {
+  std::size_t edge = 0;          ///< position in edges()
+  std::size_t from = 0, to = 0;  ///< positions in nodes()
+  Pose measurement;              ///< T_from_to; the scale of Sim(3) is left out
+  Matrix6d covariance;           ///< as a perturbation of the frame of `to` [m^2, m rad, rad^2]
+
+  /// The same loop as its other end sees it.
+  MeasuredLoop Reversed() const;
+};
+
+/// The loops of a graph and the odometry along its chain of nodes, both with their covariances.
+class LoopAgreement {
+ public:
+  LoopAgreement(const PoseGraph& graph, const GraphStructure& structure, GraphObjective objective);
+
+  const std::vector<MeasuredLoop>& loops() const { return loops_; }
+  /// False: a node is missing from the chain of odometry edges between i and j.
+  bool HasOdometry(std::size_t i, std::size_t j) const { return segment_[i] == segment_[j]; }
+  /// Chi-square of the cycle loop a, odometry, loop b backwards, odometry, to first order (Mangelson et al.,
+  /// ICRA 2018, eq. 3). Both pairs of ends must have odometry.
+  double CycleChi2(const MeasuredLoop& a, const MeasuredLoop& b) const;
+
+ private:
+  void FollowOdometry(const PoseGraph& graph, const GraphStructure& structure, GraphObjective objective);
+  Matrix6d Between(std::size_t i, std::size_t j, const Pose& T_target_world) const;
+
+  GraphKind kind_;
+  std::vector<MeasuredLoop> loops_;
+  std::vector<Pose> T_world_node_;
+  std::vector<Matrix6d> covariance_;  // of the way from the chain's start, in world coordinates
+  std::vector<int> segment_;          // nodes of different segments have no odometry between them
+};
+
+}  // namespace tutti::internal

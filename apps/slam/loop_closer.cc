@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <utility>
 
+#include "apps/slam/joining_loops.h"
 #include "core/angle.h"
 #include "core/stopwatch.h"
 
@@ -149,6 +150,42 @@ LoopUpdate LoopCloser::Consider(const LoopRecord& proposed, const Verification& 
   }
   for (const LoopEdge& loop : entering) untied_.insert(loop.record);
   return Enter(std::move(entering), odometry, frames);
+}
+
+std::string LoopCloser::Join(const std::vector<ProposedLoop>& proposed, const Odometry& odometry,
+                             std::int64_t frames, LoopUpdate* update) {
+  std::vector<LoopEdge> loops;
+  for (const ProposedLoop& loop : proposed) {
+    records_.push_back(loop.record);
+    LoopRecord& record = records_.back();
+    if (!record.verified) continue;
+    LoopConstraint constraint = Measure(loop.verification, loop.candidate, loop.query, odometry);
+    record.reason = constraint.reason;
+    if (!constraint.usable) continue;
+    record.S_candidate_query = constraint.edge.S_candidate_query;
+    constraint.edge.record = records_.size() - 1;
+    loops.push_back(constraint.edge);
+  }
+  const JoiningLoops joining = ChooseJoiningLoops(loops, Places(odometry), Graph(odometry), options_);
+  for (std::size_t i = 0; i < loops.size(); ++i) {
+    records_[loops[i].record].reason = joining.reasons[i];
+    if (!joining.reasons[i].empty()) Revoke(loops[i].record, update);
+  }
+  std::vector<LoopEdge> entering;
+  for (const std::size_t i : joining.chosen) entering.push_back(loops[i]);
+  for (const LoopEdge& loop : entering) untied_.insert(loop.record);
+  if (!entering.empty()) Start(std::move(entering), odometry, frames);
+  return joining.reason;
+}
+
+LoopUpdate LoopCloser::MoveAll(const std::map<int, Similarity>& S_world_keyframe, const Odometry& odometry) {
+  graph_.Update(KeyframesOf(odometry), CovisibleOf(odometry, options_.covisibility_min_shared));
+  graph_.Move(S_world_keyframe, {});
+  Rescale(S_world_keyframe);
+  LoopUpdate update;
+  update.correction.emplace();
+  update.correction->S_world_keyframe = S_world_keyframe;
+  return update;
 }
 
 void LoopCloser::Add(int candidate, int query, const Similarity& S_candidate_query,

@@ -30,6 +30,13 @@ namespace tutti {
 /// What is worked out beside the tracking enters when it is due; at the end of a recording at once.
 enum class Entering { kWhenDue, kAtOnce };
 
+/// A loop between two keyframes of the map, as it was proposed.
+struct ProposedLoop {
+  LoopRecord record;
+  Verification verification;
+  int candidate = -1, query = -1;
+};
+
 /// Measures verified loops against the odometry's map, lets those in that agree, and works out how the map
 /// is to move; it never touches the map itself. The pose graph is solved beside the tracking, and its answer
 /// is due a number of frames later that depends on the size of the map alone; so it is with the adjustment
@@ -51,6 +58,11 @@ class LoopCloser {
   /// the map. The update is to be applied at once. `across`: as LoopGate::Offer.
   LoopUpdate Consider(const LoopRecord& proposed, const Verification& verification, int candidate, int query,
                       const Odometry& odometry, std::int64_t frames, bool across = false);
+  /// Loops between two maps, of which the second one was appended (Append): those join them that
+  /// ChooseJoiningLoops says, all at once. Why none does; empty: the graph is being solved with them.
+  /// `update`: says which others the detector is to forget.
+  std::string Join(const std::vector<ProposedLoop>& proposed, const Odometry& odometry, std::int64_t frames,
+                   LoopUpdate* update);
   /// What the images say of a step of the odometry that is followed: if it is less certain than configured,
   /// loops are judged by what they say from the next one on.
   void NoteStep(const StepCheck& check) { uncertainty_.Add(check); }
@@ -90,6 +102,9 @@ class LoopCloser {
   bool CloseDeferred(const Odometry& odometry, std::int64_t frames);
   /// After the last loop, when nothing is due any more.
   void Finish();
+
+  /// Each piece of the map moves as a whole, such that keyframes are there. To be applied at once.
+  LoopUpdate MoveAll(const std::map<int, Similarity>& S_world_keyframe, const Odometry& odometry);
 
   /// To be called when an update with a correction has been applied. `common`: what Apply() returned.
   void Applied(const LoopUpdate& update, const std::vector<int>& common, const Odometry& odometry,

@@ -44,7 +44,6 @@ void LoopClosing::SetDetectionListener(std::function<void(const LoopResult&)> li
 void LoopClosing::BeginSession(const CameraRig& rig, std::int64_t first_frame, int first_keyframe) {
   rig_ = rig;
   session_ = first_frame;
-  appended_.reset();
   keyframes_seen_ = 0;
   stages_.clear();
   closer_.BeginSession(rig, first_frame, first_keyframe);
@@ -58,27 +57,53 @@ void LoopClosing::Submit(const InputFrame& frame, const KeyframeView* view, std:
   Ask(Query(frame), view, frames);
 }
 
-void LoopClosing::Append(const LoopClosing& other, std::int64_t first_frame, int first_keyframe) {
-  appended_ = session_ = first_frame;
-  closer_.Append(other.closer_, first_frame, first_keyframe);
+std::vector<ProposedLoop> LoopClosing::Compare(
+    std::vector<LoopPlace> places, std::int64_t first_frame,
+    const std::function<std::optional<KeyframeView>(std::int64_t frame)>& view) {
   worker_->BeginSession();
-}
-
-void LoopClosing::ShowPlace(LoopPlace place, const KeyframeView& view, std::int64_t frames) {
-  LoopQuery query;
-  query.id = place.id;
-  query.stamp_s = view.stamp_s;
-  query.member_features = std::move(place.member_features);
-  if (place.camera) {  // an earlier session's may be another one than that of the keyframes' pixels
-    const PinholeCamera &from = *place.camera, &to = rig_.camera;
-    for (auto& [name, features] : query.member_features) {
-      for (cv::KeyPoint& k : features.keypoints) {
-        k.pt.x = static_cast<float>((double(k.pt.x) - from.cx) / from.fx * to.fx + to.cx);
-        k.pt.y = static_cast<float>((double(k.pt.y) - from.cy) / from.fy * to.fy + to.cy);
+  std::vector<ProposedLoop> loops;
+  const auto take = [&] {
+    const LoopResult result = TakeResult();
+    // Loops within the other map are known.
+    if (!result.proposed || result.candidate >= first_frame) return;
+    const int candidate = KeyframeOf(result.candidate), query = KeyframeOf(result.query);
+    if (candidate < 0 || query < 0) return;  // of a detector whose file was changed
+    loops.push_back({Record(result), result.verification, candidate, query});
+  };
+  for (LoopPlace& place : places) {
+    const std::optional<KeyframeView> of = view(place.id);
+    if (!of) continue;
+    LoopQuery query;
+    query.id = first_frame + place.id;
+    query.stamp_s = of->stamp_s;
+    query.member_features = std::move(place.member_features);
+    if (place.camera) {  // an earlier session's may be another one than that of the keyframes' pixels
+      const PinholeCamera &from = *place.camera, &to = rig_.camera;
+      for (auto& [name, features] : query.member_features) {
+        for (cv::KeyPoint& k : features.keypoints) {
+          k.pt.x = static_cast<float>((double(k.pt.x) - from.cx) / from.fx * to.fx + to.cx);
+          k.pt.y = static_cast<float>((double(k.pt.y) - from.cy) / from.fy * to.fy + to.cy);
+        }
       }
     }
+    Ask(std::move(query), &*of, 0);
+    while (submitted_.size() > static_cast<std::size_t>(options_.loop_delay_frames)) take();
   }
-  Ask(std::move(query), &view, frames);
+  while (!submitted_.empty()) take();
+  return loops;
+}
+
+std::string LoopClosing::Join(const std::vector<ProposedLoop>& loops, const Odometry& odometry,
+                              std::int64_t frames) {
+  LoopUpdate update;
+  std::string reason = closer_.Join(loops, odometry, frames, &update);
+  TellRevoked(update);
+  return reason;
+}
+
+LoopUpdate LoopClosing::MoveAll(const std::map<int, Similarity>& S_world_keyframe, const Odometry& odometry) {
+  if (worker_) worker_->ForgetPositions();
+  return closer_.MoveAll(S_world_keyframe, odometry);
 }
 
 void LoopClosing::Ask(LoopQuery query, const KeyframeView* view, std::int64_t frames) {
@@ -156,18 +181,22 @@ LoopRecord LoopClosing::Record(const LoopResult& r) const {
   return record;
 }
 
-// Takes the oldest answer.
-LoopUpdate LoopClosing::Deliver(const Odometry* odometry, std::int64_t frames) {
+// The oldest answer.
+LoopResult LoopClosing::TakeResult() {
   submitted_.pop_front();
-  const LoopResult result = worker_->Take();
+  LoopResult result = worker_->Take();
   if (on_detection_) on_detection_(result);
   for (const auto& [name, ms] : LoopStages(result)) stages_[std::string("loop_") + name] += ms;
   if (!result.warning.empty() && result.warning != last_warning_) {
     last_warning_ = result.warning;
     warnings_.push_back(result.warning);
   }
+  return result;
+}
+
+LoopUpdate LoopClosing::Deliver(const Odometry* odometry, std::int64_t frames) {
+  const LoopResult result = TakeResult();
   if (!result.proposed) return {};
-  if (appended_ && result.query >= *appended_ && result.candidate >= *appended_) return {};
   LoopRecord record = Record(result);
   if (odometry != nullptr) {
     const int candidate = KeyframeOf(record.candidate), query = KeyframeOf(record.query);

@@ -35,19 +35,33 @@ class LoopClosing {
   /// Calls `listener` with each answer of the detector before it is considered.
   void SetDetectionListener(std::function<void(const LoopResult&)> listener);
 
+  void SwapListener(LoopClosing* other) { on_detection_.swap(other->on_detection_); }
+
   /// True if loops are searched for (run.loops).
   bool Searching() const { return worker_ != nullptr; }
   /// Another recording begins, of this rig, with this frame number and keyframe. Nothing may be on its way.
   void BeginSession(const CameraRig& rig, std::int64_t first_frame, int first_keyframe);
-  /// The places and loops of another map whose keyframes have been appended to this one's; its first frame
-  /// and first keyframe have these numbers here. Its places are to be shown by ShowPlace then.
-  void Append(const LoopClosing& other, std::int64_t first_frame, int first_keyframe);
+  /// The loops of another map whose keyframes have been appended to this one's; its first frame and first
+  /// keyframe have these numbers here. Its places are to be compared then (Compare).
+  void Append(const LoopClosing& other, std::int64_t first_frame, int first_keyframe) {
+    session_ = first_frame;
+    closer_.Append(other.closer_, first_frame, first_keyframe);
+  }
   /// The places that the detector knows, in their order.
   std::vector<LoopPlace> Places() const { return worker_->Places(); }
   /// The keyframe that is a place of this detector; -1: none.
   int KeyframeOf(std::int64_t frame) const;
-  /// A place of the map that was appended, under its frame number here, and its keyframe.
-  void ShowPlace(LoopPlace place, const KeyframeView& view, std::int64_t frames);
+  /// What is proposed when the places of another map, which get frame numbers from this one on, are shown to
+  /// the detector, one after the other: all loops between the two, verified or not. None enters. `view`: of
+  /// the keyframe that the frame with such a number is, null: it is none. Nothing may be on its way.
+  std::vector<ProposedLoop> Compare(
+      std::vector<LoopPlace> places, std::int64_t first_frame,
+      const std::function<std::optional<KeyframeView>(std::int64_t frame)>& view);
+  /// LoopCloser::Join. What stays outside is no loop for the detector either.
+  std::string Join(const std::vector<ProposedLoop>& loops, const Odometry& odometry, std::int64_t frames);
+  /// The whole map moves, and nothing in it: the keyframes to these poses. To be applied at once. The
+  /// detector forgets where places are.
+  LoopUpdate MoveAll(const std::map<int, Similarity>& S_world_keyframe, const Odometry& odometry);
   /// A new keyframe as the map has it, null: an image without a pose. Those that come too soon after the one
   /// before (loop_every_keyframes, loop_min_interval_s) are not searched.
   void Submit(const InputFrame& frame, const KeyframeView* view, std::int64_t frames);
@@ -127,6 +141,7 @@ class LoopClosing {
     }
   };
   LoopUpdate Deliver(const Odometry* odometry, std::int64_t frames);
+  LoopResult TakeResult();
   void TellRevoked(const LoopUpdate& update);
   LoopRecord Record(const LoopResult& result) const;
   void Ask(LoopQuery query, const KeyframeView* view, std::int64_t frames);
@@ -143,8 +158,6 @@ class LoopClosing {
   std::vector<std::string> warnings_;  // not taken yet
   std::string last_warning_;
   std::map<std::string, double> stages_;
-  std::optional<std::int64_t>
-      appended_;              // frame number that an appended map begins with: its loops are known
   std::int64_t session_ = 0;  // frame number that the present recording began with
 };
 

@@ -109,6 +109,23 @@ SimilarityResult SimilarityOfLandmarks(const Verification& verification, const K
 
 }  // namespace
 
+Verification Reversed(const Verification& verification, std::int64_t candidate) {
+  Verification out = verification;
+  out.candidate = candidate;
+  out.S_candidate_query = verification.S_candidate_query.Inverse();
+  // A motion of the one camera is one of the other, too: its information goes along by the adjoint.
+  const Eigen::Matrix3d R = out.S_candidate_query.rotation.toRotationMatrix();
+  Matrix6d adjoint = Matrix6d::Zero();
+  adjoint.topLeftCorner<3, 3>() = adjoint.bottomRightCorner<3, 3>() = R;
+  adjoint.topRightCorner<3, 3>() = Skew(out.S_candidate_query.translation) * R;
+  out.information = adjoint.transpose() * verification.information * adjoint;
+  for (VerifiedMatch& match : out.inlier_matches) {
+    std::swap(match.candidate, match.query);
+    std::swap(match.candidate_feature, match.query_feature);
+  }
+  return out;
+}
+
 double MedianDepth(const KeyframeView& view) {
   std::vector<double> depths;
   for (const Eigen::Vector3d& point : view.points) {

@@ -1,6 +1,7 @@
 // From what the detector verified to an edge of the pose graph.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <utility>
 #include <vector>
@@ -28,6 +29,10 @@ struct LoopConstraint {
 LoopConstraint MakeLoopConstraint(const Verification& verification, const KeyframeView& candidate,
                                   const KeyframeView& query, const CameraRig& rig, const SlamOptions& options,
                                   std::uint64_t seed);
+
+/// The same with candidate and query exchanged: what another detector found, which knew the newer keyframe.
+/// `candidate`: id of what is the candidate then.
+Verification Reversed(const Verification& verification, std::int64_t candidate);
 
 using LandmarkMatch = std::pair<int, int>;  ///< features of the candidate and of the query
 

@@ -175,6 +175,12 @@ void LoopWorker::BeginSession() {
   waited_ms_ = 0;
 }
 
+void LoopWorker::ForgetPositions() {
+  std::unique_lock<std::mutex> lock(mutex_);
+  changed_.wait(lock, [this] { return tasks_.empty() && !busy_; });
+  detector_.ForgetPositions();
+}
+
 LoopResult LoopWorker::Take() {
   const ScopedSpan span(recorder_, Lane::kTracking, "wait_for_loop");
   const internal::Stopwatch watch;

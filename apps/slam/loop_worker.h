@@ -43,6 +43,8 @@ class LoopWorker {
   std::vector<LoopPlace> Places() const { return detector_.Places(); }
   /// Another recording begins (LoopDetector::BeginSession), once the queries that are on their way are done.
   void BeginSession();
+  /// LoopDetector::ForgetPositions, once the queries that are on their way are done.
+  void ForgetPositions();
   /// The result of the oldest query that was not taken yet; waits for it. Rethrows what the detector threw.
   LoopResult Take();
   /// Where an image was taken (LoopDetector::Locate), once the queries that are on their way are done.

@@ -5,6 +5,7 @@
 #include <functional>
 #include <queue>
 #include <string>
+#include <tuple>
 #include <utility>
 
 #include "apps/slam/loop_constraint.h"
@@ -39,19 +40,19 @@ Neighbours NeighboursOf(const PoseGraph& graph) {
   return neighbours;
 }
 
-std::map<int, double> Ways(int node, const Neighbours& neighbours) {
-  using Reached = std::pair<double, int>;
-  std::map<int, double> ways;
+std::map<int, Way> Ways(int node, const Neighbours& neighbours) {
+  using Reached = std::tuple<double, int, int>;  // length, node, edges
+  std::map<int, Way> ways;
   std::priority_queue<Reached, std::vector<Reached>, std::greater<>> open;
-  open.emplace(0, node);
+  open.emplace(0, node, 0);
   while (!open.empty()) {
-    const auto [way, at] = open.top();
+    const auto [way, at, edges] = open.top();
     open.pop();
-    if (!ways.emplace(at, way).second) continue;
+    if (!ways.emplace(at, Way{way, edges}).second) continue;
     const auto next = neighbours.find(at);
     if (next == neighbours.end()) continue;
     for (const auto& [to, length] : next->second) {
-      if (ways.count(to) == 0) open.emplace(way + length, to);
+      if (ways.count(to) == 0) open.emplace(way + length, to, edges + 1);
     }
   }
   return ways;
@@ -76,7 +77,7 @@ bool CoverBothImages(const std::vector<LandmarkMatch>& matches, const std::vecto
 
 }  // namespace
 
-std::map<int, double> WaysFrom(int node, const PoseGraph& graph) { return Ways(node, NeighboursOf(graph)); }
+std::map<int, Way> WaysFrom(int node, const PoseGraph& graph) { return Ways(node, NeighboursOf(graph)); }
 
 std::vector<MissedLoop> FindMissedLoops(const std::vector<StandingKeyframe>& keyframes,
                                         const PoseGraph& graph, const SlamOptions& options) {
@@ -84,15 +85,15 @@ std::vector<MissedLoop> FindMissedLoops(const std::vector<StandingKeyframe>& key
   std::vector<MissedLoop> missed;
   for (const StandingKeyframe& query : keyframes) {
     if (!(query.depth > 0)) continue;
-    const std::map<int, double> ways = Ways(query.id, neighbours);
+    const std::map<int, Way> ways = Ways(query.id, neighbours);
     std::vector<std::pair<double, int>> near;
     for (const StandingKeyframe& candidate : keyframes) {
       if (candidate.id >= query.id) break;
       if (candidate.piece != query.piece || !(candidate.depth > 0)) continue;
       const auto way = ways.find(candidate.id);
-      if (way == ways.end() || way->second < kLongWay * candidate.depth) continue;
+      if (way == ways.end() || way->second.length < kLongWay * candidate.depth) continue;
       const double apart = (candidate.T_world_camera.translation - query.T_world_camera.translation).norm();
-      const double drift = kSigmas * options.odometry_sigma_fraction * way->second;
+      const double drift = kSigmas * options.odometry_sigma_fraction * way->second.length;
       if (apart > options.loop_apart_fraction * candidate.depth + drift) continue;
       if (!LookTheSameWay(candidate.T_world_camera, query.T_world_camera)) continue;
       near.emplace_back(apart, candidate.id);

@@ -34,9 +34,14 @@ struct MissedLoop {
   std::vector<int> candidates;
 };
 
-/// Lengths of the shortest ways over the edges of a graph from one node to the others that can be reached.
-/// Loops are edges, too.
-std::map<int, double> WaysFrom(int node, const PoseGraph& graph);
+/// A way over edges of a graph.
+struct Way {
+  double length = 0;
+  int edges = 0;
+};
+
+/// The shortest ways from one node to the others that can be reached. Loops are edges, too, of no length.
+std::map<int, Way> WaysFrom(int node, const PoseGraph& graph);
 
 /// Pairs of keyframes of one piece that look the same way, so near that they see the same if the map has
 /// drifted along the way between them as an odometry may, and so far along that way that a loop says much

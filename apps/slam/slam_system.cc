@@ -3,12 +3,15 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <tuple>
 #include <utility>
 
 #include "apps/slam/loop_closing.h"
+#include "apps/slam/loop_constraint.h"
+#include "apps/slam/map_connection.h"
 #include "apps/slam/map_parts.h"
+#include "apps/slam/map_reference.h"
 #include "apps/slam/map_state.h"
-#include "apps/slam/missed_loops.h"
 #include "apps/slam/session_list.h"
 #include "core/section_file.h"
 #include "core/stopwatch.h"
@@ -20,7 +23,7 @@ namespace tutti {
 class SlamSystem::Impl {
  public:
   Impl(const RunConfig& config, const CameraRig& rig, SpanRecorder* recorder, bool resumes = false)
-      : loops_(config, rig, recorder, resumes), config_(config), rig_(rig) {
+      : loops_(config, rig, recorder, resumes), config_(config), rig_(rig), recorder_(recorder) {
     if (!rig.calibrated) return;
     odometry_.emplace(config.odometry, rig);
     odometry_->SetRecorder(recorder);
@@ -92,36 +95,72 @@ class SlamSystem::Impl {
     sessions_.Begin(offset, odometry_->SessionPiece());
   }
 
-  bool Merge(Impl* other) {
+  bool Merge(Impl* other, std::string* reason) {
     CheckHasMap("merged");
     other->CheckHasMap("merged");
     Finish();
     other->Finish();
-    const std::vector<LoopPlace> places = other->loops_.Places();
+    std::vector<LoopPlace> places = loops_.Places(), others = other->loops_.Places();
     const std::int64_t offset = sessions_.NextOffset(*odometry_);
     const int first_keyframe = odometry_->NextKeyframeId();
     odometry_->Append(*other->odometry_, offset);
     const int first_piece = odometry_->SessionPiece();
     loops_.Append(other->loops_, offset, first_keyframe);
     sessions_.Append(other->sessions_, offset, first_piece);
-    const std::int64_t all_frames = frames_ + other->frames_;
+    frames_ += other->frames_;
     last_ = other->last_;
-    for (LoopPlace place : places) {
-      const int keyframe = other->loops_.KeyframeOf(place.id);
-      if (keyframe < 0) continue;
-      BringIn();
-      ++frames_;
-      place.id += offset;
-      loops_.ShowPlace(std::move(place), odometry_->Keyframe(first_keyframe + keyframe), frames_);
+    std::vector<ProposedLoop> loops = loops_.Compare(std::move(others), offset, [&](std::int64_t frame) {
+      const int keyframe = other->loops_.KeyframeOf(frame);
+      return keyframe >= 0 ? std::optional(odometry_->Keyframe(first_keyframe + keyframe)) : std::nullopt;
+    });
+    for (ProposedLoop& loop : other->Seen(std::move(places), *this, offset, first_keyframe)) {
+      const auto known = std::find_if(loops.begin(), loops.end(), [&loop](const ProposedLoop& l) {
+        return l.candidate == loop.candidate && l.query == loop.query;
+      });
+      if (known == loops.end()) {
+        loops.push_back(std::move(loop));
+      } else if (loop.record.verified && !known->record.verified) {
+        *known = std::move(loop);
+      }
     }
+    *reason = loops_.Join(loops, *odometry_, frames_);
     Finish();
-    frames_ = std::max(frames_, all_frames);
     const std::vector<int> ids = odometry_->KeyframeIds();
     const auto joined = std::find_if(std::lower_bound(ids.begin(), ids.end(), first_keyframe), ids.end(),
                                      [&](int id) { return odometry_->KeyframePiece(id) < first_piece; });
-    if (joined == ids.end()) return false;
-    Connect(odometry_->KeyframePiece(*joined));
+    if (joined == ids.end()) {
+      if (reason->empty()) *reason = "the loops between them contradict the maps";
+      return false;
+    }
+    MapConnection(config_, rig_, frames_, &loops_, &*odometry_, [this](const LoopUpdate& update) {
+      Take(update);
+    }).Connect(odometry_->KeyframePiece(*joined));
     return true;
+  }
+
+  // True if the two can be merged in either order, and this one is to be the second then.
+  bool ComesAfter(const Impl& other) const {
+    if (!odometry_ || !other.odometry_ || recorder_ != other.recorder_) return false;
+    const auto settings = [](const Impl& map) {
+      RunConfig config = map.config_;
+      config.dataset = {};
+      return StateOf(config) + StateOf(map.rig_);
+    };
+    if (settings(*this) != settings(other)) return false;
+    const auto key = [](const Impl& map) {
+      const MapInfo i = map.Info("");
+      return std::tuple(i.first_stamp_s, i.last_stamp_s, i.frames, i.keyframes, i.landmarks, i.loops,
+                        i.least.norm(), i.most.norm());
+    };
+    return key(other) < key(*this);
+  }
+
+  // The merged map takes the place of the one that was appended, from its keyframe with this number on.
+  void TakeThePlaceOf(Impl* appended, const Odometry& before, int first_keyframe) {
+    std::swap(on_keyframe_, appended->on_keyframe_);
+    std::swap(on_change_, appended->on_change_);
+    loops_.SwapListener(&appended->loops_);
+    Take(loops_.MoveAll(InFrameOf(before, first_keyframe, *odometry_), *odometry_));
   }
 
   std::vector<MapSession> Sessions() const { return sessions_.WithKeyframes(odometry()); }
@@ -209,6 +248,8 @@ class SlamSystem::Impl {
 
   const Odometry* odometry() const { return odometry_ ? &*odometry_ : nullptr; }
 
+  int NextKeyframe() const { return odometry_ ? odometry_->NextKeyframeId() : 0; }
+
   LoopClosing loops_;
   SessionList sessions_;
   std::function<void(const InputFrame&, int)> on_keyframe_;            // may be empty
@@ -234,42 +275,33 @@ class SlamSystem::Impl {
     } while (true);
   }
 
-  // Loops that the detector missed, and then the whole map adjusted.
-  void Connect(int piece) {
-    constexpr int kSearches = 4;     // a loop brings places together that were too far apart
-    constexpr int kAdjustments = 4;  // with landmarks fused that now lie together
-    for (int i = 0; i < kSearches && CloseMissedLoops() > 0; ++i) {
+  // Loops to the places of `older`, whose detector was not asked: this map's own is shown them, and the loops
+  // are turned round. This map was appended to `older`, where it has these numbers.
+  std::vector<ProposedLoop> Seen(std::vector<LoopPlace> places, const Impl& older, std::int64_t first_frame,
+                                 int first_keyframe) {
+    const std::int64_t offset = sessions_.NextOffset(*odometry_);
+    int pieces = 0;  // here; those of the other map are others
+    for (const int id : odometry_->KeyframeIds()) pieces = std::max(pieces, odometry_->KeyframePiece(id) + 1);
+    loops_.BeginSession(older.rig_, offset, odometry_->NextKeyframeId());
+    std::vector<ProposedLoop> loops =
+        loops_.Compare(std::move(places), offset, [&](std::int64_t frame) -> std::optional<KeyframeView> {
+          const int keyframe = older.loops_.KeyframeOf(frame);
+          if (keyframe < 0) return std::nullopt;
+          KeyframeView view = older.odometry_->Keyframe(keyframe);
+          view.map_piece += pieces;
+          return view;
+        });
+    for (ProposedLoop& loop : loops) {
+      loop.verification = Reversed(loop.verification, loop.record.query - offset);
+      LoopRecord& record = loop.record;
+      std::swap(record.query, record.candidate);
+      std::swap(record.query_stamp_s, record.candidate_stamp_s);
+      record.query += first_frame;
+      record.candidate -= offset;
+      std::swap(loop.query, loop.candidate);
+      loop.query += first_keyframe;
     }
-    for (int i = 0; i < kAdjustments; ++i) {
-      odometry_->FuseAll();
-      if (!loops_.Converge(*odometry_, piece)) break;
-      Finish();
-    }
-  }
-
-  // How many entered.
-  std::size_t CloseMissedLoops() {
-    const auto accepted = [this] { return CountAccepted(loops_.closer().records()); };
-    const std::size_t before = accepted();
-    std::vector<StandingKeyframe> keyframes;
-    for (const int id : odometry_->KeyframeIds()) {
-      const KeyframeView view = odometry_->Keyframe(id);
-      keyframes.push_back({id, view.map_piece, view.T_world_camera, MedianDepth(view)});
-    }
-    const LoopDetectorOptions& options = config_.loops;
-    for (const MissedLoop& loop :
-         FindMissedLoops(keyframes, loops_.closer().Graph(*odometry_), config_.run)) {
-      const KeyframeView query = odometry_->Keyframe(loop.query);
-      for (const int candidate : loop.candidates) {
-        const Verification found =
-            VerifyLandmarks(odometry_->Keyframe(candidate), query, rig_, options.verification, options.seed);
-        if (!found.accepted) continue;
-        Take(loops_.ConsiderFound(found, candidate, loop.query, *odometry_, frames_));
-        break;
-      }
-    }
-    Finish();
-    return accepted() - std::min(before, accepted());
+    return loops;
   }
 
   void Take(const LoopUpdate& update) {
@@ -385,6 +417,7 @@ class SlamSystem::Impl {
 
   RunConfig config_;
   CameraRig rig_;
+  SpanRecorder* recorder_;
   std::optional<Odometry> odometry_;    // with a calibration
   std::map<int, InputFrame> unmapped_;  // keyframes that the detector waits for
   bool localizing_ = false;
@@ -400,7 +433,17 @@ SlamSystem::~SlamSystem() = default;
 
 void SlamSystem::BeginSession(const CameraRig& rig) { impl_->BeginSession(rig); }
 std::vector<MapSession> SlamSystem::Sessions() const { return impl_->Sessions(); }
-bool SlamSystem::Merge(SlamSystem* other) { return impl_->Merge(other->impl_.get()); }
+bool SlamSystem::Merge(SlamSystem* other, std::string* reason) {
+  std::string ignored;
+  if (reason == nullptr) reason = &ignored;
+  if (!impl_->ComesAfter(*other->impl_)) return impl_->Merge(other->impl_.get(), reason);
+  const Odometry before = *impl_->odometry();
+  const int first_keyframe = other->impl_->NextKeyframe();
+  const bool joined = other->impl_->Merge(impl_.get(), reason);
+  impl_.swap(other->impl_);
+  impl_->TakeThePlaceOf(other->impl_.get(), before, first_keyframe);
+  return joined;
+}
 void SlamSystem::BeginLocalization() { impl_->BeginLocalization(); }
 MapSnapshot SlamSystem::Snapshot(const std::string& note) const { return impl_->Snapshot(note); }
 

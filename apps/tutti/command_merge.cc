@@ -31,7 +31,7 @@ std::unique_ptr<SlamSystem> OpenMap(const std::string& file, int threads) {
 }
 
 // Of what the merged map was made; the data set is that of the last session, as in the map of a run.
-std::string MergedNote(const MergeArguments& arguments, const MapInfo& last) {
+std::string MergedNote(const MergeArguments& arguments, const MapSession& last) {
   nlohmann::json note = nlohmann::json::parse(last.note, nullptr, false);
   if (!note.is_object()) note = nlohmann::json::object();
   note["command"] = "merge";
@@ -50,8 +50,9 @@ int Merge(const MergeArguments& arguments) {
                                     other = OpenMap(arguments.second, arguments.threads);
   const std::size_t known = slam->loops().size() + other->loops().size();
   bool joined = false;
+  std::string reason;
   try {
-    joined = slam->Merge(other.get());
+    joined = slam->Merge(other.get(), &reason);
   } catch (const InputError& error) {
     throw InputError(arguments.first + " and " + arguments.second + " can't be merged: " + error.what());
   }
@@ -60,12 +61,12 @@ int Merge(const MergeArguments& arguments) {
   const auto accepted = std::count_if(begin, loops.end(), [](const LoopRecord& l) { return l.accepted; });
   if (!joined) {
     std::fprintf(stderr,
-                 "tutti: %s shows no place of %s that two loops agree on (%td were proposed, none is in the "
-                 "map); nothing is written\n",
-                 arguments.second.c_str(), arguments.first.c_str(), loops.end() - begin);
+                 "tutti: %s shows no place of %s that can be relied on: %s (%td were proposed); nothing is "
+                 "written\n",
+                 arguments.second.c_str(), arguments.first.c_str(), reason.c_str(), loops.end() - begin);
     return 1;
   }
-  slam->Snapshot(MergedNote(arguments, ReadMapInfo(arguments.second))).Write(arguments.out);
+  slam->Snapshot(MergedNote(arguments, slam->Sessions().back())).Write(arguments.out);
   std::printf("  %s: %zu sessions, %zu keyframes; %td loops between the two maps, of %td proposed\n",
               arguments.out.c_str(), slam->Sessions().size(), slam->odometry()->KeyframeIds().size(),
               static_cast<std::ptrdiff_t>(accepted), loops.end() - begin);

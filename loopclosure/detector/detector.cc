@@ -153,6 +153,7 @@ LoopResult LoopDetector::Detect(const cv::Mat& image, std::int64_t id) {
 LoopResult LoopDetector::Locate(const LoopQuery& query) const { return impl_->Locate(query); }
 
 void LoopDetector::BeginSession() { impl_->state().reasoner().BeginSession(); }
+void LoopDetector::ForgetPositions() { impl_->state().reasoner().track().Forget(); }
 
 std::vector<LoopPlace> LoopDetector::Places() const {
   const internal::DetectorState& state = impl_->state();

@@ -39,6 +39,11 @@ void PoseTrack::Add(int slot, const std::optional<PosePrior>& prior) {
   stations_.push_back({prior, way_m_});
 }
 
+void PoseTrack::Forget() {
+  for (Station& station : stations_) station.prior.reset();
+  last_.reset();
+}
+
 std::vector<double> PoseTrack::Gains(const std::vector<int>& working_memory) const {
   if (stations_.empty() || !stations_.back().prior) return {};
   const Station& here = stations_.back();

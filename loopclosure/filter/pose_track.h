@@ -24,6 +24,9 @@ class PoseTrack {
   /// The next location is not where the way of the last one led.
   void Interrupt() { last_.reset(); }
 
+  /// Locations so far have no position any more.
+  void Forget();
+
   /// Factor of each place (by slot) for the likelihood of the newest: max(e^-3, exp(-d^2 / (2 sigma^2))) with
   /// sigma = sigma_m + drift s, where s is the way since; over the places of working memory with a position
   /// their mean is 1, and none is above kMostGain. 1 for a place without one; empty if the newest has none,

@@ -122,5 +122,36 @@ TEST(LoopConstraint, MetricSensorsTakeTheVerifiedTransformAndNothingLess) {
   EXPECT_THAT(make().reason, HasSubstr("without depth"));
 }
 
+// A small motion of the one camera, and its mirror image of the other one, cost the same.
+TEST(LoopConstraint, ALoopTurnedRoundSaysTheSame) {
+  Verification found;
+  found.candidate = 7;
+  found.S_candidate_query = Similarity(1, ExpSO3({0.3, -0.2, 0.1}), {0.5, -1, 2});
+  found.information.diagonal() << 400, 100, 25, 9e4, 4e4, 1e4;
+  found.information(0, 4) = found.information(4, 0) = 1000;
+  VerifiedMatch match;
+  match.query = {1, 2};
+  match.candidate = {3, 4};
+  match.query_feature = 5;
+  match.candidate_feature = 6;
+  found.inlier_matches = {match};
+  const Verification turned = Reversed(found, 12);
+  EXPECT_EQ(turned.candidate, 12);
+  EXPECT_EQ(turned.inlier_matches[0].query_feature, 6);
+  EXPECT_EQ(turned.inlier_matches[0].candidate_feature, 5);
+  EXPECT_EQ(turned.inlier_matches[0].query, match.candidate);
+  const Similarity none = turned.S_candidate_query * found.S_candidate_query;
+  EXPECT_LT(none.translation.norm() + LogSO3(none.rotation).norm(), 1e-12);
+  const auto cost = [](const Verification& of, const Pose& T_candidate_query) {
+    const Vector6d off = LogSE3(of.S_candidate_query.RigidPart().Inverse() * T_candidate_query);
+    return off.dot(of.information * off);
+  };
+  Vector6d motion;
+  motion << 1e-4, -2e-4, 3e-4, 1e-4, 2e-4, -1e-4;
+  const Pose moved = found.S_candidate_query.RigidPart() * ExpSE3(motion);
+  const double expected = cost(found, moved);
+  EXPECT_NEAR(cost(turned, moved.Inverse()), expected, 1e-6 * expected);
+}
+
 }  // namespace
 }  // namespace tutti

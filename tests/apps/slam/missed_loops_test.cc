@@ -41,7 +41,9 @@ TEST(MissedLoops, TheOpenEndOfARoundIsFoundWithTheNearestCandidateFirst) {
 TEST(MissedLoops, WhatALoopTiesAlreadyIsNotMissed) {
   OpenRound round(4);
   round.graph.AddLoop(0, kCorners, Similarity(), MakeInformation(0.1, 0.01));
-  EXPECT_DOUBLE_EQ(WaysFrom(0, round.graph).at(kCorners), 0);
+  EXPECT_DOUBLE_EQ(WaysFrom(0, round.graph).at(kCorners).length, 0);
+  EXPECT_EQ(WaysFrom(0, round.graph).at(kCorners).edges, 1);
+  EXPECT_EQ(WaysFrom(0, round.graph).at(2).edges, 2);
   EXPECT_TRUE(round.Missed().empty());
 }
 

@@ -132,5 +132,16 @@ TEST(PoseTrack, APlaceNearByGainsNothingByThatAlone) {
   EXPECT_EQ(likelihood.places, (std::vector<double>{0.4, 1.0, 11.0, 1.5, 0.2}));
 }
 
+TEST(PoseTrack, PositionsOfAnotherWorldAreForgotten) {
+  PoseTrack track;
+  for (int slot = 0; slot < 3; ++slot) track.Add(slot, PriorAt(slot));
+  ASSERT_FALSE(track.Gains({0, 1}).empty());
+  track.Forget();
+  track.Add(3, PriorAt(1000));  // of the new world, in which nothing is known
+  EXPECT_TRUE(track.Gains({0, 1, 2}).empty());
+  track.Add(4, PriorAt(1001));
+  EXPECT_FALSE(track.Gains({0, 1, 2, 3}).empty());
+}
+
 }  // namespace
 }  // namespace tutti

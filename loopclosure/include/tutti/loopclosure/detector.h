@@ -211,6 +211,8 @@ class LoopDetector {
   /// Another recording begins, which may start anywhere: the locations of short-term memory become
   /// candidates, and the filters start from "all places are as likely". Ids must go on to grow.
   void BeginSession();
+  /// The odometry's world is another one from now on: positions of before (PosePrior) say nothing any more.
+  void ForgetPositions();
 
   /// Adds a neighbour link between two locations (a caller's own odometry link); consecutive ids are linked
   /// by themselves.

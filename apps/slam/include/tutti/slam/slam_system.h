@@ -68,14 +68,18 @@ class SlamSystem {
   /// relocalised frames and milliseconds begin anew. Throws InputError, and changes nothing, if there is no
   /// map, no detector that knows it, or for a rig that does not fit.
   void BeginSession(const CameraRig& rig);
-  /// Appends another map and looks for common places: its places are shown to the detector one after the
-  /// other, loops pass the same checks as those of a run, and what shows the same becomes one. The frame of
-  /// reference of this map stays. `other`: its detector must have the same members, its sensor must be of the
-  /// same kind. Both bring in first all that is on its way. True: they are one map now, which can be saved,
-  /// localised in, and gone on with (BeginSession; no frame may be tracked before that). False: no place of
-  /// the other one was found in this one, which is of no use any more. Throws InputError if they can't be
-  /// compared.
-  bool Merge(SlamSystem* other);
+  /// This map and another one become one, if they have places in common: the places of each are shown to the
+  /// detector of the other, one after the other; of the loops that are verified, the largest set that agrees
+  /// joins the two, if it clearly outnumbers the next one, and what shows the same becomes one. The frame of
+  /// reference of this map stays. Which map is which decides nothing else if configuration and camera are the
+  /// same: sessions, frames and keyframes are numbered in the order of the maps' time stamps then. Otherwise
+  /// those of this map come first. `other`: its detector must have the same members, its sensor must be of
+  /// the same kind. Both bring in first all that is on its way; `other` is of no use any more. True: they are
+  /// one map now, which can be saved, localised in, and gone on with (BeginSession; no frame may be tracked
+  /// before that). False: no places in common were found that can be relied on, and this map is of no use any
+  /// more either; `reason`, which may be null, says why in plain words. Throws InputError if they can't be
+  /// compared. Recorders must outlive both.
+  bool Merge(SlamSystem* other, std::string* reason = nullptr);
   /// The recordings so far, oldest first; there is always one, and the last one goes on.
   std::vector<MapSession> Sessions() const;
 

@@ -1,0 +1,19 @@
+// The frame of reference that a map has after it was merged into another one.
+#pragma once
+
+#include <map>
+
+#include "tutti/core/pose.h"
+#include "tutti/frontend/odometry.h"
+
+#pragma GCC visibility push(default)  // used across libraries
+namespace tutti {
+
+/// Where the keyframes of `merged` are in the frame of reference of `first`, a map that was appended to
+/// another one and whose keyframes have numbers from `first_keyframe` on: of each piece, the oldest keyframe
+/// of `first` is where it was. One camera: what that one sees is as far away as it was. Pieces without
+/// keyframes of `first` stay where they are.
+std::map<int, Similarity> InFrameOf(const Odometry& first, int first_keyframe, const Odometry& merged);
+
+}  // namespace tutti
+#pragma GCC visibility pop

@@ -3,12 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
-#include <tuple>
 #include <utility>
 
 #include "apps/slam/loop_closing.h"
-#include "apps/slam/loop_constraint.h"
-#include "apps/slam/map_connection.h"
+#include "apps/slam/map_merge.h"
 #include "apps/slam/map_parts.h"
 #include "apps/slam/map_reference.h"
 #include "apps/slam/map_state.h"
@@ -100,59 +98,18 @@ class SlamSystem::Impl {
     other->CheckHasMap("merged");
     Finish();
     other->Finish();
-    std::vector<LoopPlace> places = loops_.Places(), others = other->loops_.Places();
-    const std::int64_t offset = sessions_.NextOffset(*odometry_);
-    const int first_keyframe = odometry_->NextKeyframeId();
-    odometry_->Append(*other->odometry_, offset);
-    const int first_piece = odometry_->SessionPiece();
-    loops_.Append(other->loops_, offset, first_keyframe);
-    sessions_.Append(other->sessions_, offset, first_piece);
+    MapMerge merge(config_, ToMerge(), other->ToMerge());
+    merge.Append();
     frames_ += other->frames_;
     last_ = other->last_;
-    std::vector<ProposedLoop> loops = loops_.Compare(std::move(others), offset, [&](std::int64_t frame) {
-      const int keyframe = other->loops_.KeyframeOf(frame);
-      return keyframe >= 0 ? std::optional(odometry_->Keyframe(first_keyframe + keyframe)) : std::nullopt;
-    });
-    for (ProposedLoop& loop : other->Seen(std::move(places), *this, offset, first_keyframe)) {
-      const auto known = std::find_if(loops.begin(), loops.end(), [&loop](const ProposedLoop& l) {
-        return l.candidate == loop.candidate && l.query == loop.query;
-      });
-      if (known == loops.end()) {
-        loops.push_back(std::move(loop));
-      } else if (loop.record.verified && !known->record.verified) {
-        *known = std::move(loop);
-      }
-    }
-    *reason = loops_.Join(loops, *odometry_, frames_);
-    Finish();
-    const std::vector<int> ids = odometry_->KeyframeIds();
-    const auto joined = std::find_if(std::lower_bound(ids.begin(), ids.end(), first_keyframe), ids.end(),
-                                     [&](int id) { return odometry_->KeyframePiece(id) < first_piece; });
-    if (joined == ids.end()) {
-      if (reason->empty()) *reason = "the loops between them contradict the maps";
-      return false;
-    }
-    MapConnection(config_, rig_, frames_, &loops_, &*odometry_, [this](const LoopUpdate& update) {
-      Take(update);
-    }).Connect(odometry_->KeyframePiece(*joined));
-    return true;
+    return merge.Join(
+        frames_, [this](const LoopUpdate& update) { Take(update); }, reason);
   }
 
   // True if the two can be merged in either order, and this one is to be the second then.
   bool ComesAfter(const Impl& other) const {
-    if (!odometry_ || !other.odometry_ || recorder_ != other.recorder_) return false;
-    const auto settings = [](const Impl& map) {
-      RunConfig config = map.config_;
-      config.dataset = {};
-      return StateOf(config) + StateOf(map.rig_);
-    };
-    if (settings(*this) != settings(other)) return false;
-    const auto key = [](const Impl& map) {
-      const MapInfo i = map.Info("");
-      return std::tuple(i.first_stamp_s, i.last_stamp_s, i.frames, i.keyframes, i.landmarks, i.loops,
-                        i.least.norm(), i.most.norm());
-    };
-    return key(other) < key(*this);
+    return odometry_ && other.odometry_ && recorder_ == other.recorder_ &&
+           tutti::ComesAfter(Info(""), other.Info(""));
   }
 
   // The merged map takes the place of the one that was appended, from its keyframe with this number on.
@@ -275,34 +232,7 @@ class SlamSystem::Impl {
     } while (true);
   }
 
-  // Loops to the places of `older`, whose detector was not asked: this map's own is shown them, and the loops
-  // are turned round. This map was appended to `older`, where it has these numbers.
-  std::vector<ProposedLoop> Seen(std::vector<LoopPlace> places, const Impl& older, std::int64_t first_frame,
-                                 int first_keyframe) {
-    const std::int64_t offset = sessions_.NextOffset(*odometry_);
-    int pieces = 0;  // here; those of the other map are others
-    for (const int id : odometry_->KeyframeIds()) pieces = std::max(pieces, odometry_->KeyframePiece(id) + 1);
-    loops_.BeginSession(older.rig_, offset, odometry_->NextKeyframeId());
-    std::vector<ProposedLoop> loops =
-        loops_.Compare(std::move(places), offset, [&](std::int64_t frame) -> std::optional<KeyframeView> {
-          const int keyframe = older.loops_.KeyframeOf(frame);
-          if (keyframe < 0) return std::nullopt;
-          KeyframeView view = older.odometry_->Keyframe(keyframe);
-          view.map_piece += pieces;
-          return view;
-        });
-    for (ProposedLoop& loop : loops) {
-      loop.verification = Reversed(loop.verification, loop.record.query - offset);
-      LoopRecord& record = loop.record;
-      std::swap(record.query, record.candidate);
-      std::swap(record.query_stamp_s, record.candidate_stamp_s);
-      record.query += first_frame;
-      record.candidate -= offset;
-      std::swap(loop.query, loop.candidate);
-      loop.query += first_keyframe;
-    }
-    return loops;
-  }
+  MapToMerge ToMerge() { return {rig_, loops_, sessions_, *odometry_}; }
 
   void Take(const LoopUpdate& update) {
     if (!update.correction) return;

@@ -5,7 +5,6 @@
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
-#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -229,7 +228,10 @@ constexpr double kLater_s = 1000;  // a recording that began after the other one
 class Merging : public ::testing::Test {
  protected:
   static std::unique_ptr<SlamSystem> MapOf(const Recording& recording, int threads = 2) {
-    auto slam = std::make_unique<SlamSystem>(Configured(threads), recording.rig);
+    return MapOf(recording, Configured(threads));
+  }
+  static std::unique_ptr<SlamSystem> MapOf(const Recording& recording, const RunConfig& config) {
+    auto slam = std::make_unique<SlamSystem>(config, recording.rig);
     TrackAll(recording, slam.get());
     return slam;
   }
@@ -301,41 +303,69 @@ TEST_F(Merging, WhichMapComesFirstDecidesTheFrameOfReferenceAlone) {
   EXPECT_GT(heard, 0);
 }
 
-// The two share a stretch in the middle of a round. Where the second one comes to the round's begin,
-// its detector or the other map's has to find it, or the search of the joined map. The gap is small either
-// way: it tells whether what was found is true.
-TEST_F(Merging, TheOpenEndOfARoundIsClosed) {
-  SyntheticOptions options = SessionTown(SyntheticSensor::kStereo);
-  constexpr std::size_t kRound = 141;  // frames
-  const testing::RenderedWorld world(options);
-  const Recording a = Part(world, 0, 90), b = Part(world, 70, kRound + 10, kLater_s);
-  const auto map = MapOf(a), other = MapOf(b);
-  const std::size_t known = map->loops().size() + other->loops().size();
-  ASSERT_TRUE(map->Merge(other.get()));
-  const std::int64_t offset = map->Sessions()[1].frame_offset;
-  constexpr std::int64_t kNear = 20;  // frames
-  const auto closes_the_round = [&](const LoopRecord& loop) {
-    return loop.accepted && loop.candidate < kNear &&
-           std::abs(loop.query - offset - static_cast<std::int64_t>(kRound - 70)) < kNear;
-  };
-  EXPECT_GE(std::count_if(map->loops().begin() + static_cast<std::ptrdiff_t>(known), map->loops().end(),
-                          closes_the_round),
-            1);
-  std::set<std::pair<std::int64_t, std::int64_t>> offered;  // each once
-  for (const LoopRecord& loop : map->loops()) {
-    if (loop.hypothesis > 0) continue;
-    EXPECT_TRUE(offered.emplace(loop.candidate, loop.query).second) << loop.query;
+// Two maps share a stretch in the middle of a round, and the second one ends where the first one began.
+struct MergedRound {
+  static constexpr std::size_t kRound = 141, kBegin = 70;  // frames of the world
+  static constexpr std::int64_t kEnd = kRound - kBegin;    // of the second recording
+  Recording first, second;
+
+  // The first ends at frame `end`, the second `past` frames after the round.
+  MergedRound(std::size_t end, std::size_t past) {
+    const testing::RenderedWorld world(SessionTown(SyntheticSensor::kStereo));
+    first = Part(world, 0, end);
+    second = Part(world, kBegin, kRound + past, kLater_s);
   }
-  const auto position = [&](std::int64_t number) {
-    FrameRange one;
-    one.first = one.last = number;
-    return map->odometry()->FrameTrajectory(-1, one).at(0).pose.translation;
-  };
-  constexpr std::int64_t kStart = 4, kEnd = kRound + 4 - 70;  // the same place
-  const double gap = (position(offset + kEnd) - position(kStart)).norm(),
-               truth = (b.truth[kEnd].pose.translation - a.truth[kStart].pose.translation).norm();
-  std::printf("  where the round ends: %.3f m from its begin, in truth %.3f m\n", gap, truth);
-  EXPECT_NEAR(gap, truth, 0.1);
+
+  // Loops of the merged map that close the round.
+  static std::vector<LoopRecord> Closing(const SlamSystem& map) {
+    const std::int64_t offset = map.Sessions()[1].frame_offset;
+    constexpr std::int64_t kNear = 20;  // frames
+    std::vector<LoopRecord> closing;
+    for (const LoopRecord& loop : map.loops()) {
+      if (loop.accepted && loop.candidate < kNear && std::abs(loop.query - offset - kEnd) < kNear)
+        closing.push_back(loop);
+    }
+    return closing;
+  }
+
+  // Where the round ends, how far its end is from its begin, and how far in truth.
+  void ExpectTrueGap(const SlamSystem& map) const {
+    const auto position = [&](std::int64_t number) {
+      FrameRange one;
+      one.first = one.last = number;
+      return map.odometry()->FrameTrajectory(-1, one).at(0).pose.translation;
+    };
+    constexpr std::int64_t kThere = 4, kAgain = kEnd + kThere;
+    const double gap = (position(map.Sessions()[1].frame_offset + kAgain) - position(kThere)).norm(),
+                 truth =
+                     (second.truth[kAgain].pose.translation - first.truth[kThere].pose.translation).norm();
+    std::printf("  where the round ends: %.3f m from its begin, in truth %.3f m\n", gap, truth);
+    EXPECT_NEAR(gap, truth, 0.1);
+  }
+};
+
+// Where the second one comes to the round's begin, its detector or the other map's finds it, or the search of
+// the joined map. The gap is small either way: it tells whether what was found is true.
+TEST_F(Merging, TheOpenEndOfARoundIsClosed) {
+  const MergedRound round(90, 10);
+  const auto map = MapOf(round.first), other = MapOf(round.second);
+  ASSERT_TRUE(map->Merge(other.get()));
+  EXPECT_GE(MergedRound::Closing(*map).size(), 1u);
+  round.ExpectTrueGap(*map);
+}
+
+// The detectors know every fourth keyframe, enough to join the maps in the middle, and propose nothing where
+// the round ends. The search looks at all keyframes.
+TEST_F(Merging, WhatTheDetectorsMissedIsFoundInTheJoinedMap) {
+  RunConfig config = Configured();
+  config.run.loop_every_keyframes = 4;
+  const MergedRound round(110, 19);
+  const auto map = MapOf(round.first, config), other = MapOf(round.second, config);
+  ASSERT_TRUE(map->Merge(other.get()));
+  const std::vector<LoopRecord> closing = MergedRound::Closing(*map);
+  EXPECT_GE(closing.size(), 2u);
+  for (const LoopRecord& loop : closing) EXPECT_EQ(loop.hypothesis, 0) << "a detector's: " << loop.query;
+  round.ExpectTrueGap(*map);
 }
 
 TEST_F(Merging, MapsWithoutACommonPlaceAreNotOne) {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/median.h"
+
 namespace tutti {
 namespace {
 
@@ -18,7 +20,13 @@ constexpr double kWalk = 0.003;  // of the drift, over a way of one height
 constexpr int kMeasurements = 40, kMostFailures = 10, kOthers = 5, kMostChanges = 8;
 constexpr double kOften = 0.6, kSpread = 0.1, kBias = 0.06;
 constexpr double kMemory = 0.04;  // weight of the newest measurement in what holds "of late"
-constexpr double kWorth = 0.002;  // a smaller drift waits
+constexpr std::size_t kSpeeds = 15;
+constexpr double kLongMemory = 0.01;  // weight of the newest speed in what is known for long
+constexpr double kMoves = 0.02;       // from frame to frame [heights]
+constexpr int kBiased = 8;            // measurements in a row
+constexpr double kLeastJump = 0.1;    // of a logarithm, that the speed can tell from what drivers do
+constexpr double kJump = 0.1;         // standard deviation of a drift that ran away
+constexpr double kWorth = 0.002;      // a smaller drift waits
 
 double AngleBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::acos(std::clamp(a.normalized().dot(b.normalized()), -1.0, 1.0));
@@ -35,7 +43,9 @@ void CameraHeight::See(const PinholeCamera& camera, const std::shared_ptr<const 
     age_ = 0;
   };
   if (!first_) return begin();
-  T_last_first_ = T_camera_world * T_last_world.Inverse() * T_last_first_;
+  const Pose step = T_camera_world * T_last_world.Inverse();
+  SeeSpeed(step.translation.norm());
+  T_last_first_ = step * T_last_first_;
   ++age_;
   ++waited_;
   const double way = T_last_first_.translation.norm();
@@ -66,9 +76,15 @@ void CameraHeight::Search(const PinholeCamera& camera, const FrameFeatures& now)
   const bool same = seen_ > 0 && std::abs(std::log(found->Height()) - reference_ - drift_) < kMisfit;
   if (!same) {
     if (seen_ > 0 && ++others_ < kOthers) return;
-    Forget();
-    reference_ = std::log(found->Height());
-    covariance_(0, 0) = 1;
+    const double height = std::log(found->Height()), by = height - reference_ - drift_;
+    if (seen_ >= kMeasurements && ScaleChanged(by)) {
+      drift_ += by;
+      covariance_(1, 1) = kJump * kJump;
+    } else {
+      Forget();
+      reference_ = height;
+      covariance_(0, 0) = 1;
+    }
   }
   plane_ = found->normal_by_height;
   failures_ = others_ = 0;
@@ -79,9 +95,9 @@ void CameraHeight::Measure(const PinholeCamera& camera, const FrameFeatures& now
   if (way > kLongestWay) return;
   const auto found =
       AlignGround(camera, first_->pyramid->front(), now.pyramid->front(), T_last_first_, plane_);
+  const double misfit = found ? std::log(found->Height()) - reference_ - drift_ : 0;
   const bool agrees = found && found->correlation > kAgrees &&
-                      AngleBetween(found->normal_by_height, plane_) < kTurned &&
-                      std::abs(std::log(found->Height()) - reference_ - drift_) < kMisfit;
+                      AngleBetween(found->normal_by_height, plane_) < kTurned && std::abs(misfit) < kMisfit;
   ++seen_;
   const double weight = std::max(kMemory, 1.0 / seen_);
   share_ += weight * ((agrees ? 1 : 0) - share_);
@@ -93,7 +109,34 @@ void CameraHeight::Measure(const PinholeCamera& camera, const FrameFeatures& now
   failures_ = 0;
   plane_ += 0.2 * (found->normal_by_height - plane_);
   Update(std::log(found->Height()), way);
-  if (seen_ >= kMeasurements / 2 && std::abs(bias_) > kBias) BeginAnew();
+  biased_ = std::abs(bias_) > kBias ? biased_ + 1 : 0;
+  if (seen_ < kMeasurements / 2 || biased_ < kBiased) return;  // until all known speeds are new
+  if (ScaleChanged(misfit)) {
+    covariance_(1, 1) = kJump * kJump;
+    bias_ = 0;
+    biased_ = 0;
+    spread_ = kSigma * kSigma;
+  } else {
+    BeginAnew();
+  }
+}
+
+void CameraHeight::SeeSpeed(double step) {
+  if (seen_ == 0 || !(step > kMoves * std::exp(reference_ + drift_))) return;
+  const double speed = std::log(step);
+  if (speeds_.empty()) known_speed_ = speed - drift_;
+  if (speeds_.size() >= kSpeeds) speeds_.erase(speeds_.begin());
+  speeds_.push_back(speed);
+  if (failures_ == 0) known_speed_ += kLongMemory * (speed - drift_ - known_speed_);
+}
+
+// A scale that changes by this logarithm makes the camera faster as well as higher; one that rises goes on as
+// fast as before.
+bool CameraHeight::ScaleChanged(double by) const {
+  if (speeds_.size() < kSpeeds) return false;
+  std::vector<double> speeds = speeds_;
+  const double faster = (internal::Median(speeds) - drift_ - known_speed_) / by;
+  return std::abs(by) > kLeastJump && faster > 0.6 && faster < 1.6;
 }
 
 // What is measured runs away from what is expected: no scale drifts so fast, the camera rises or sinks.
@@ -124,7 +167,8 @@ void CameraHeight::Update(double log_height, double way) {
 
 std::optional<double> CameraHeight::Drift() const {
   // Each time that the height was found to change, it must be seen to stay for twice as long.
-  if (seen_ < (kMeasurements << changes_) || share_ < kOften || spread_ > kSpread * kSpread)
+  if (seen_ < (kMeasurements << changes_) || share_ < kOften || spread_ > kSpread * kSpread ||
+      std::abs(bias_) > kBias)
     return std::nullopt;
   if (std::abs(drift_) < kWorth) return std::nullopt;
   return drift_;
@@ -132,6 +176,7 @@ std::optional<double> CameraHeight::Drift() const {
 
 void CameraHeight::Correct(double scale) {
   drift_ += std::log(scale);
+  for (double& speed : speeds_) speed += std::log(scale);
   corrected_ += std::log(scale);
   ++corrections_;
   plane_ /= scale;
@@ -154,14 +199,18 @@ std::optional<HeightFound> CameraHeight::Found() const {
 
 bool CameraHeight::IsPossible() const {
   return T_last_first_.IsFinite() && plane_.allFinite() && covariance_.allFinite() && age_ >= 0 &&
-         waited_ >= 0 && seen_ >= 0 && failures_ >= 0 && others_ >= 0 && changes_ >= 0 &&
+         waited_ >= 0 && seen_ >= 0 && failures_ >= 0 && others_ >= 0 && biased_ >= 0 && changes_ >= 0 &&
          changes_ <= kMostChanges && corrections_ >= 0 && std::isfinite(corrected_) &&
-         std::isfinite(reference_) && std::isfinite(drift_) && std::isfinite(share_) &&
-         std::isfinite(spread_) && std::isfinite(bias_);
+         speeds_.size() <= kSpeeds &&
+         std::all_of(speeds_.begin(), speeds_.end(), [](double v) { return std::isfinite(v); }) &&
+         std::isfinite(known_speed_) && std::isfinite(reference_) && std::isfinite(drift_) &&
+         std::isfinite(share_) && std::isfinite(spread_) && std::isfinite(bias_);
 }
 
 void CameraHeight::Follow(double scale) {
   reference_ += std::log(scale);
+  for (double& speed : speeds_) speed += std::log(scale);
+  known_speed_ += std::log(scale);
   plane_ /= scale;
   T_last_first_.translation *= scale;
 }

@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "frontend/features/features.h"
 #include "frontend/geometry/ground_plane.h"
@@ -37,13 +38,16 @@ class CameraHeight {
   template <class Archive>
   void State(Archive& archive) {
     archive(first_, T_last_first_, age_, waited_, plane_, reference_, drift_, covariance_, seen_, share_,
-            spread_, bias_, failures_, others_, changes_, corrections_, corrected_);
+            spread_, bias_, failures_, others_, changes_, biased_, corrections_, corrected_, speeds_,
+            known_speed_);
   }
 
  private:
   void Search(const PinholeCamera& camera, const FrameFeatures& now);
   void Measure(const PinholeCamera& camera, const FrameFeatures& now);
   void Update(double log_height, double way);
+  void SeeSpeed(double step);
+  bool ScaleChanged(double by) const;
   void BeginAnew();
 
   std::shared_ptr<const FrameFeatures> first_;  // the frame that the next ones are compared with
@@ -54,10 +58,14 @@ class CameraHeight {
   Eigen::Matrix2d covariance_ = Eigen::Matrix2d::Zero();  // of both
   int seen_ = 0;                                          // measurements since the search
   double share_ = 0, spread_ = 0, bias_ = 0;  // of late: that agreed, their squared misfit, their misfit
+  int biased_ = 0;                            // measurements in a row that run away
   int changes_ = 0;                           // times that it was found to rise or sink, at most 8
   int corrections_ = 0;                       // by Correct, ever
   double corrected_ = 0;                      // the logarithm of all of them
-  int failures_ = 0, others_ = 0;             // in a row: without the ground; searches that found another
+  // Logarithms of the way from frame to frame [map units]: the newest ones, and for long, without the drift.
+  std::vector<double> speeds_;
+  double known_speed_ = 0;
+  int failures_ = 0, others_ = 0;  // in a row: without the ground; searches that found another
 };
 
 }  // namespace tutti

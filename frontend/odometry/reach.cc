@@ -3,6 +3,7 @@
 namespace tutti {
 namespace {
 constexpr double kMaxAcceleration = 10;  // [m/s^2]
+constexpr double kChange = 0.5;          // of the way from frame to frame, where there are no metres
 constexpr double kPoseError = 0.02;      // of the depth
 constexpr double kSlip = 0.2;            // of a pose in a blurred image [m]
 }  // namespace
@@ -13,8 +14,11 @@ bool Reach::Has(const Pose& T_camera_world) const {
 
 std::optional<Reach> ReachOf(const LastFrame& last, double stamp_s, double depth_m, Sensor sensor) {
   const double since = stamp_s - last.frame.stamp_s;
-  if (sensor == Sensor::kMono || !last.velocity || !(since > 0 && since <= kVelocityHolds))
-    return std::nullopt;
+  if (!last.velocity || !(since > 0 && since <= kVelocityHolds)) return std::nullopt;
+  if (sensor == Sensor::kMono) {
+    const double way = last.velocity->head<3>().norm() * since;
+    return Reach{last.After(since).Inverse().translation, kChange * way + kPoseError * depth_m};
+  }
   return Reach{last.After(since).Inverse().translation,
                kMaxAcceleration * since * since + kPoseError * depth_m + kSlip};
 }

@@ -25,7 +25,7 @@ Tracker::Tracked Tracker::Relocalize(int keyframe, PoseFix fix, const Map& map) 
 
 // True if it is within reach of the motion so far.
 bool Tracker::GoesOn(const PoseFix& fix, const Map& map) const {
-  if (sensor_ == Sensor::kMono || !last_.velocity) return false;
+  if (!last_.velocity) return false;
   const auto reach = ReachOf(last_, fix.frame.stamp_s, map.MedianDepth(last_.reference), sensor_);
   return reach && reach->Has(fix.T_camera_world);
 }

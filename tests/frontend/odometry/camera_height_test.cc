@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <memory>
 
 #include "data/synthetic/synthetic_world.h"
@@ -20,7 +21,7 @@ const testing::RenderedWorld& LongTown() {
   static const testing::RenderedWorld town([] {
     SyntheticOptions options = testing::SmallStereoTown(640, 320);
     options.sensor = SyntheticSensor::kMono;
-    options.block_m = 60;
+    options.block_m = 200;  // no curve: as fast at the end as at first
     return options;
   }());
   return town;
@@ -36,13 +37,13 @@ std::shared_ptr<const FrameFeatures> Features(const cv::Mat& image) {
 
 // A drive of whose map the scale changes by `rate` a frame; where a drift is told, it is taken out if
 // `corrected`. Returns the logarithm of the scale at its end, over where it was at first.
-double DriveOn(double rate, bool corrected, CameraHeight* height) {
+double DriveOn(const std::function<double(std::size_t)>& rate, bool corrected, CameraHeight* height) {
   double scale = 1;
   Pose T_world_camera = PoseOf(0), last = T_world_camera;
   for (std::size_t i = 0; i < kDriven; ++i) {
     if (i > 0) {
       Pose step = PoseOf(i - 1).Inverse() * PoseOf(i);
-      scale *= std::exp(rate);
+      scale *= std::exp(rate(i));
       step.translation *= scale;
       T_world_camera = last * step;
     }
@@ -55,6 +56,10 @@ double DriveOn(double rate, bool corrected, CameraHeight* height) {
     height->Correct(std::exp(-*drift));
   }
   return std::log(scale);
+}
+
+double DriveOn(double rate, bool corrected, CameraHeight* height) {
+  return DriveOn([rate](std::size_t) { return rate; }, corrected, height);
 }
 
 TEST(CameraHeight, TellsNoDriftWhereThereIsNone) {
@@ -84,6 +89,16 @@ TEST(CameraHeight, KeepsTheScaleWhereItsDriftIsTakenOut) {
   height.Forget();
   EXPECT_EQ(height.Found()->measurements, 0);
   EXPECT_GT(height.Found()->corrections, 0) << "what was done stays known";
+}
+
+// As where landmarks were taken for others: the scale is another one within five frames. It makes the camera
+// faster as well as higher, so it is no camera that sinks.
+TEST(CameraHeight, TakesAScaleThatJumpsForADrift) {
+  CameraHeight height;
+  const double jump = std::log(0.8);
+  const auto rate = [&](std::size_t i) { return i >= 80 && i < 85 ? jump / 5 : 0; };
+  EXPECT_LT(std::abs(DriveOn(rate, true, &height)), 0.4 * std::abs(jump));
+  EXPECT_GT(height.Found()->measurements, 100) << "it did not begin anew";
 }
 
 TEST(CameraHeight, BelievesALoop) {
@@ -121,7 +136,7 @@ TEST(CameraHeight, SaysNothingOfACameraThatClimbs) {
   }
 }
 
-// A camera in a hand, or on a mast that is raised while the vehicle drives: by a quarter over this drive. No
+// A camera in a hand, or on a mast that is raised while the vehicle drives: by two fifths over this drive. No
 // scale drifts so fast, so what was learnt is given up, and the height that is there is the one to keep.
 TEST(CameraHeight, BeginsAnewWhereTheHeightChanges) {
   CameraHeight height;
@@ -130,12 +145,12 @@ TEST(CameraHeight, BeginsAnewWhereTheHeightChanges) {
   for (std::size_t i = 0; i < kDriven; ++i) {
     Pose now = PoseOf(i);
     const double way = static_cast<double>(i) / kDriven;
-    now.translation += 0.4 * way * (now.rotation * Eigen::Vector3d(0, -1, 0));
+    now.translation += 0.7 * way * (now.rotation * Eigen::Vector3d(0, -1, 0));
     height.See(LongTown().Camera(), Features(LongTown().World().RenderFrom(i, now).image), now.Inverse(),
                last.Inverse(), kDepth);
     last = now;
     if (i >= 60) least = std::min(least, height.Found() ? height.Found()->measurements : 0);
-    EXPECT_LT(std::abs(height.Drift().value_or(0)), 0.08) << i << ": a third of it";
+    EXPECT_LT(std::abs(height.Drift().value_or(0)), 0.12) << i << ": a third of it";
   }
   EXPECT_LT(least, 20);
 }

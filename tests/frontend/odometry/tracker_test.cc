@@ -57,9 +57,16 @@ TEST_F(TrackerTest, AMotionIsSteadyOnceItHasLedToTheNextFrame) {
   EXPECT_TRUE(stereo.last().steady);
   ASSERT_TRUE(goes_to(1.2, 0.3)) << "nearly all landmarks say so";
   EXPECT_FALSE(stereo.last().steady);
-  Track(Frame(Moved(0, 0.1), 0.1));
-  Track(Frame(Moved(0, 0.2), 0.2));
-  EXPECT_FALSE(tracker_.last().steady) << "one camera has no metres";
+}
+
+TEST_F(TrackerTest, OneCameraIsSteadyByTheShareOfItsWay) {
+  const auto goes_to = [&](double z, double stamp_s) {
+    return Track(Frame(Moved(0, z), stamp_s)).fix.has_value() && tracker_.last().steady;
+  };
+  EXPECT_FALSE(goes_to(0.1, 0.1));
+  EXPECT_TRUE(goes_to(0.2, 0.2));
+  EXPECT_TRUE(goes_to(0.33, 0.3)) << "a third more";
+  EXPECT_FALSE(goes_to(1.33, 0.4)) << "eight times as much";
 }
 
 TEST_F(TrackerTest, ALostFrameKeepsThePlaceAndTheNextIsFoundThere) {

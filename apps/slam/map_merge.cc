@@ -12,15 +12,15 @@
 namespace tutti {
 namespace {
 
-// A loop that was found as one from `older` to `newer`, turned round and with the numbers of the merged map:
-// its query is a place of the map that was appended.
-void TurnRound(std::int64_t query_offset, std::int64_t first_frame, int first_keyframe, ProposedLoop* loop) {
-  loop->verification = Reversed(loop->verification, loop->record.query - query_offset);
+// A loop from a place of the map, shown to the other one's detector with frame numbers from `offset` on, to a
+// place of that one: turned round, and in the numbers of the merged map.
+void TurnRound(std::int64_t offset, std::int64_t first_frame, int first_keyframe, ProposedLoop* loop) {
+  loop->verification = Reversed(loop->verification, loop->record.query - offset);
   LoopRecord& record = loop->record;
   std::swap(record.query, record.candidate);
   std::swap(record.query_stamp_s, record.candidate_stamp_s);
   record.query += first_frame;
-  record.candidate -= query_offset;
+  record.candidate -= offset;
   std::swap(loop->query, loop->candidate);
   loop->query += first_keyframe;
 }

@@ -29,7 +29,7 @@ struct Pixel {
 // four half planes of rays r with n . r > 0, each with a . r > 0. Ahead is where the camera looks.
 using Field = Eigen::Matrix<double, 5, 3>;
 
-Field FieldOnPlane(const Eigen::Vector3d& plane) {
+Field LookedAt(const Eigen::Vector3d& plane) {
   const Eigen::Vector3d normal = plane.normalized();
   const Eigen::Vector3d ahead =
       (Eigen::Vector3d::UnitZ() - normal.z() * normal).stableNormalized();  // 0: it looks straight down
@@ -71,7 +71,7 @@ Columns ColumnsOf(const PinholeCamera& camera, const cv::Mat& image, const Field
 // Of what the plane says is ground, at most so many pixels on a regular grid.
 std::vector<Pixel> GroundPixels(const PinholeCamera& camera, const cv::Mat& image,
                                 const Eigen::Vector3d& plane, double most) {
-  const Field field = FieldOnPlane(plane);
+  const Field field = LookedAt(plane);
   struct Row {
     int v;
     Columns columns;

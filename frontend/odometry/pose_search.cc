@@ -57,18 +57,22 @@ std::vector<Pose> Predictions(const LastFrame& last, double stamp_s) {
 
 // The guesses for one frame so far.
 struct PoseSearch::Contest {
-  bool Convinces(const PoseFix& fix) const {
-    const int enough = std::max(least_inliers, best ? best->inliers + 1 : 1);
-    return fix.inliers >= enough && fix.Share() >= kLeastShare &&
-           (!reach || reach->Has(fix.T_camera_world) || fix.Share() >= kShareForAJump);
+  bool Convinces(const PoseFix& fix) const { return IsBetter(fix, best) && IsWithinReach(fix); }
+  bool IsBetter(const PoseFix& fix, const std::optional<PoseFix>& than) const {
+    const int enough = std::max(least_inliers, than ? than->inliers + 1 : 1);
+    return fix.inliers >= enough && fix.Share() >= kLeastShare;
+  }
+  bool IsWithinReach(const PoseFix& fix) const {
+    return !reach || reach->Has(fix.T_camera_world) || fix.Share() >= kShareForAJump;
   }
 
   const Map& map;
   int least_inliers;
-  double depth;                 // of what is in view [m]
-  std::optional<Reach> reach;   // by a motion that was steady
-  std::vector<Pose> offered;    // what would show the same is not settled again
-  std::optional<PoseFix> best;  // none: no guess has convinced yet
+  double depth;                   // of what is in view [m]
+  std::optional<Reach> reach;     // by a motion that was steady
+  std::vector<Pose> offered;      // what would show the same is not settled again
+  std::optional<PoseFix> best;    // none: no guess has convinced yet
+  std::optional<PoseFix> beyond;  // one camera: would convince but for the reach, which knows no metres
 };
 
 std::optional<PoseFix> PoseSearch::Find(const Map& map, const TrackedFrame& frame, const LastFrame& last,
@@ -77,7 +81,8 @@ std::optional<PoseFix> PoseSearch::Find(const Map& map, const TrackedFrame& fram
   const double depth = std::max(1e-6, map.MedianDepth(last.reference));
   Contest contest{map,   lost ? 2 * options_.min_inliers : options_.min_inliers,
                   depth, last.steady ? ReachOf(last, frame.stamp_s, depth, rig_.sensor) : std::nullopt,
-                  {},    {}};
+                  {},    {},
+                  {}};
   const float base = rig_.sensor == Sensor::kStereo ? 8.0F : 15.0F;
   for (const Pose& prediction : Predictions(last, frame.stamp_s)) {
     for (const float radius : {base, 2 * base, 4 * base}) {
@@ -96,12 +101,12 @@ std::optional<PoseFix> PoseSearch::Find(const Map& map, const TrackedFrame& fram
     if (map.keyframe(k).replaced_by >= 0) continue;
     if (std::find(near.begin(), near.end(), k) == near.end() && settled(k)) break;
   }
-  return contest.best;
+  return contest.best ? std::move(contest.best) : std::move(contest.beyond);
 }
 
 std::optional<PoseFix> PoseSearch::FindAt(const Map& map, const TrackedFrame& frame, int keyframe) const {
   if (keyframe < 0 || keyframe >= map.KeyframeCount()) return std::nullopt;
-  Contest contest{map, 2 * options_.min_inliers, 1.0, {}, {}, {}};
+  Contest contest{map, 2 * options_.min_inliers, 1.0, {}, {}, {}, {}};
   Offer(GuessFromKeyframe(map, frame, map.PresentKeyframe(keyframe)), &contest);
   return contest.best;
 }
@@ -201,7 +206,7 @@ bool PoseSearch::Settle(const Map& map, PoseFix* fix) const {
 
 std::optional<PoseFix> PoseSearch::FindNear(const Map& map, const TrackedFrame& frame, int keyframe,
                                             const Pose& T_camera_world) const {
-  Contest contest{map, options_.min_inliers, std::max(1e-6, map.MedianDepth(keyframe)), {}, {}, {}};
+  Contest contest{map, options_.min_inliers, std::max(1e-6, map.MedianDepth(keyframe)), {}, {}, {}, {}};
   std::vector<int> near = map.BestCovisible(keyframe, 10, 15);
   near.push_back(keyframe);
   const std::vector<int> landmarks = map.LandmarksOf(near);
@@ -232,7 +237,12 @@ bool PoseSearch::Offer(std::optional<PoseFix> guess, Contest* contest) const {
   };
   if (std::any_of(contest->offered.begin(), contest->offered.end(), same)) return false;
   contest->offered.push_back(guess->T_camera_world);
-  if (Settle(contest->map, &*guess) && contest->Convinces(*guess)) contest->best = std::move(guess);
+  if (!Settle(contest->map, &*guess)) return false;
+  if (contest->Convinces(*guess)) {
+    contest->best = std::move(guess);
+  } else if (rig_.sensor == Sensor::kMono && contest->IsBetter(*guess, contest->beyond)) {
+    contest->beyond = std::move(guess);
+  }
   return contest->best && contest->best->Share() >= kSureShare;
 }
 

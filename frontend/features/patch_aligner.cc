@@ -35,6 +35,11 @@ Eigen::Vector2d ToLevel(const Eigen::Vector2d& pixel, const Eigen::Vector2d& sca
   return ((pixel.array() + 0.5) / scale.array() - 0.5).matrix();
 }
 
+// Level-0 pixels of a frame per pixel of the patch.
+double SizeIn(const Patch& patch, const Eigen::Matrix2d& A_frame_patch) {
+  return patch.scale_x * std::sqrt(std::abs(A_frame_patch.determinant()));
+}
+
 // The patch as the frame should see it, one pixel wider than the window on each side; false if the patch does
 // not reach so far.
 bool Warp(const Patch& patch, const Eigen::Matrix2f& A_patch_level, float (*grey)[kSide + 2]) {
@@ -162,7 +167,7 @@ std::optional<Eigen::Vector2d> AlignPatch(const Patch& patch, const FrameFeature
   if (!frame.pyramid || frame.pyramid->empty()) return std::nullopt;
   const std::vector<cv::Mat>& pyramid = *frame.pyramid;
   // The level at which the patch keeps its size.
-  const double size = patch.scale_x * std::sqrt(std::abs(A_frame_patch.determinant()));
+  const double size = SizeIn(patch, A_frame_patch);
   std::size_t level = 0;
   while (level + 1 < pyramid.size() && std::abs(std::log(LevelScale(pyramid, level + 1).x() / size)) <
                                            std::abs(std::log(LevelScale(pyramid, level).x() / size)))
@@ -198,6 +203,13 @@ std::optional<Eigen::Matrix2d> PatchToFrame(const PinholeCamera& camera, const P
   return Eigen::Matrix2d(projection * r * lift);
 }
 
+// The same for a landmark, and a frame at `T_camera_world`.
+std::optional<Eigen::Matrix2d> PatchToFrame(const Map& map, const PinholeCamera& camera,
+                                            const Pose& T_camera_world, const Landmark& landmark) {
+  const Pose& T_world_patch = map.keyframe(landmark.patch_source.keyframe).T_world_camera;
+  return PatchToFrame(camera, T_camera_world * T_world_patch, T_world_patch.Inverse() * landmark.position);
+}
+
 }  // namespace
 
 std::optional<Eigen::Vector2d> FindPoint(const PinholeCamera& camera, const FrameFeatures& a, int feature_a,
@@ -211,6 +223,25 @@ std::optional<Eigen::Vector2d> FindPoint(const PinholeCamera& camera, const Fram
   return OutOfImage(camera, b, feature_b, *found);
 }
 
+std::vector<PatchView> FindPatches(const Map& map, const PinholeCamera& camera, const Pose& T_camera_world,
+                                   const std::vector<int>& landmarks, const FrameFeatures& features) {
+  std::vector<PatchView> views;
+  if (!features.pyramid || !features.rolled.empty()) return views;
+  for (int id : landmarks) {
+    const Landmark& l = map.landmark(id);
+    if (!l.alive || !l.patch) continue;
+    const std::optional<Eigen::Matrix2d> A = PatchToFrame(map, camera, T_camera_world, l);
+    if (!A) continue;  // behind the camera
+    const Eigen::Vector2d expected = camera.Project(T_camera_world * l.position);
+    if (!camera.Contains(expected)) continue;
+    const std::optional<Eigen::Vector2d> found =
+        AlignPatch(*l.patch, features, *A, LensError::Uncorrect(camera, features.lens, expected));
+    if (!found) continue;
+    views.push_back({id, LensError::Correct(camera, features.lens, *found), SizeIn(*l.patch, *A)});
+  }
+  return views;
+}
+
 std::shared_ptr<const FrameFeatures> AlignFeatures(const Map& map, const PinholeCamera& camera,
                                                    const Pose& T_camera_world,
                                                    const std::vector<int>& landmarks,
@@ -221,9 +252,7 @@ std::shared_ptr<const FrameFeatures> AlignFeatures(const Map& map, const Pinhole
     if (landmarks[f] < 0) continue;
     const Landmark& l = map.landmark(landmarks[f]);
     if (!l.patch || features.aligned[f] == landmarks[f]) continue;
-    const Pose& T_world_patch = map.keyframe(l.patch_source.keyframe).T_world_camera;
-    const std::optional<Eigen::Matrix2d> A =
-        PatchToFrame(camera, T_camera_world * T_world_patch, T_world_patch.Inverse() * l.position);
+    const std::optional<Eigen::Matrix2d> A = PatchToFrame(map, camera, T_camera_world, l);
     if (!A) continue;
     const int feature = static_cast<int>(f);
     const std::optional<Eigen::Vector2d> found =

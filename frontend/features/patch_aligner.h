@@ -10,6 +10,7 @@
 #include <memory>
 #include <opencv2/core.hpp>
 #include <optional>
+#include <vector>
 
 #include "frontend/features/features.h"
 #include "frontend/map/map.h"
@@ -33,6 +34,19 @@ std::optional<Eigen::Vector2d> AlignPatch(const Patch& patch, const FrameFeature
 std::optional<Eigen::Vector2d> FindPoint(const PinholeCamera& camera, const FrameFeatures& a, int feature_a,
                                          const FrameFeatures& b, int feature_b, const Pose& T_b_a,
                                          const Eigen::Vector3d& in_a);
+
+/// A landmark's patch, found in a frame.
+struct PatchView {
+  int landmark = -1;
+  Eigen::Vector2d pixel;  ///< where it is seen, without the lens's error that is known [px, level 0]
+  double scale = 1;       ///< level-0 pixels per pixel of the patch there
+};
+
+/// Looks for landmarks where a pose says that they are, whatever corners the frame has: the patches of those
+/// that are alike there, within a few pixels of their level. `T_camera_world`: of the frame. Nothing is found
+/// without an image, or in features that a rolling shutter moved.
+std::vector<PatchView> FindPatches(const Map& map, const PinholeCamera& camera, const Pose& T_camera_world,
+                                   const std::vector<int>& landmarks, const FrameFeatures& features);
 
 /// Finds landmarks precisely in a frame whose pose is about known: for each feature with a landmark (-1:
 /// none) moves the keypoint. `T_camera_world`: of the frame. Returns the moved features, or null where

@@ -13,6 +13,7 @@ namespace tutti {
 namespace {
 
 constexpr int kMinProjected = 20;        // matches by projection below which the search is widened
+constexpr double kAlikeShare = 0.25;     // of what the last frame saw, whose patches agree with a motion
 constexpr int kMinInKeyframe = 15;       // matches with a keyframe that may show the same place
 constexpr int kMinGuess = 10;            // inliers of a guess
 constexpr int kRecentKeyframes = 10;     // that a frame without a pose is compared with
@@ -84,7 +85,13 @@ std::optional<PoseFix> PoseSearch::Find(const Map& map, const TrackedFrame& fram
                   {},    {},
                   {}};
   const float base = rig_.sensor == Sensor::kStereo ? 8.0F : 15.0F;
-  for (const Pose& prediction : Predictions(last, frame.stamp_s)) {
+  const std::vector<Pose> predictions = Predictions(last, frame.stamp_s);
+  // Corners near a place may all be those of the next of equal windows, and one camera measures no depths
+  // that say so. What is alike just where the motion leads is the right window.
+  if (rig_.sensor == Sensor::kMono && last.velocity &&
+      Offer(GuessFromPatches(map, frame, last, predictions.front()), &contest))
+    return contest.best;
+  for (const Pose& prediction : predictions) {
     for (const float radius : {base, 2 * base, 4 * base}) {
       if (Offer(GuessFromLastFrame(map, frame, last, prediction, radius), &contest)) return contest.best;
     }
@@ -128,6 +135,37 @@ int PoseSearch::Refine(const Map& map, FrameMatches* matches, Pose* T_camera_wor
     if (!inlier[i]) matches->landmarks[feature[i]] = -1;
   }
   return inliers;
+}
+
+// The camera went on as before: what the last frame saw is alike where it should be by now.
+std::optional<PoseFix> PoseSearch::GuessFromPatches(const Map& map, const TrackedFrame& frame,
+                                                    const LastFrame& last, const Pose& prediction) const {
+  std::vector<int> seen;
+  std::copy_if(last.matches.landmarks.begin(), last.matches.landmarks.end(), std::back_inserter(seen),
+               [](int l) { return l >= 0; });
+  const std::vector<PatchView> views = FindPatches(map, rig_.camera, prediction, seen, *frame.features);
+  std::vector<PointObservation> observations;
+  for (const PatchView& view : views) {
+    PointObservation o;
+    o.point = map.landmark(view.landmark).position;
+    o.pixel = view.pixel;
+    o.pixel_sigma = options_.pixel_sigma * options_.aligned_sigma * view.scale;
+    observations.push_back(o);
+  }
+  PoseFix fix(frame);
+  fix.T_camera_world = prediction;
+  std::vector<char> inlier;
+  const int needed =
+      std::max(kMinProjected, static_cast<int>(kAlikeShare * static_cast<double>(seen.size())));
+  if (static_cast<int>(views.size()) < needed ||
+      RefinePose(rig_.camera, observations, &fix.T_camera_world, &inlier) < needed)
+    return std::nullopt;
+  if (MatchToLandmarks(map, rig_.camera, fix.T_camera_world, seen, 1.0F, &fix.matches, &fix.visible) <
+          kMinProjected ||
+      Refine(map, &fix.matches, &fix.T_camera_world) < kMinGuess)
+    return std::nullopt;
+  fix.visible.clear();
+  return fix;
 }
 
 std::optional<PoseFix> PoseSearch::GuessFromLastFrame(const Map& map, const TrackedFrame& frame,

@@ -41,6 +41,8 @@ class PoseSearch {
  private:
   struct Contest;
 
+  std::optional<PoseFix> GuessFromPatches(const Map& map, const TrackedFrame& frame, const LastFrame& last,
+                                          const Pose& prediction) const;
   std::optional<PoseFix> GuessFromLastFrame(const Map& map, const TrackedFrame& frame, const LastFrame& last,
                                             const Pose& prediction, float radius_px) const;
   std::optional<PoseFix> GuessFromKeyframe(const Map& map, const TrackedFrame& frame, int keyframe) const;

@@ -125,5 +125,31 @@ TEST(PatchAligner, MovesTheKeypointsOfLandmarksAndTrustsThemMore) {
   EXPECT_EQ(AlignFeatures(map, kCamera, T_world_second.Inverse(), {landmark}, *moved), nullptr);
 }
 
+TEST(PatchAligner, FindsLandmarksWhereAPoseSaysThatTheyAreWhateverCornersThereAre) {
+  Map map(PyramidScales(OdometryOptions()), kCamera, 0.5);
+  Keyframe keyframe;
+  keyframe.features = std::make_shared<const FrameFeatures>(Frame(Texture(), kPoint));
+  map.AddKeyframe(keyframe);
+  const int landmark = map.AddLandmark(5.0 * kCamera.Unproject(kPoint), 0, 0);
+  const Pose T_second_world(Eigen::Quaterniond::Identity(), {-0.1, 0, 0});  // 9 px to the left
+  FrameFeatures second = Frame(MovedImage(Texture(), 1, {-9, 0}), {20, 20});
+  const auto found = [&](double error_px) {
+    const Pose about(Eigen::Quaterniond::Identity(), {-0.1 + 5 * error_px / kCamera.fx, 0, 0});
+    return FindPatches(map, kCamera, about, {landmark}, second);
+  };
+  ASSERT_EQ(found(1.5).size(), 1U);
+  EXPECT_EQ(found(1.5)[0].landmark, landmark);
+  EXPECT_LT((found(1.5)[0].pixel - (kPoint + Eigen::Vector2d(-9, 0))).norm(), 0.1);
+  EXPECT_NEAR(found(1.5)[0].scale, 1, 1e-6);
+  EXPECT_TRUE(found(25).empty()) << "the patch looks different there";
+  EXPECT_TRUE(found(1e4).empty()) << "beyond the image";
+  second.rolled = {cv::Point2f(1, 0)};
+  EXPECT_TRUE(found(1.5).empty()) << "a rolling shutter";
+  second = *WithoutImages(second);
+  EXPECT_TRUE(found(1.5).empty());
+  map.RemoveLandmark(landmark);
+  EXPECT_TRUE(FindPatches(map, kCamera, T_second_world, {landmark}, second).empty());
+}
+
 }  // namespace
 }  // namespace tutti

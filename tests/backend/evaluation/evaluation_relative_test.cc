@@ -124,5 +124,25 @@ TEST(EvaluateSegments, OfAKnownTurnAndStretch) {
   EXPECT_NEAR(errors.rotation_deg_per_m, 0.02 * (48 * 11.0 / 10 + 38 * 51.0 / 50) / 86, 1e-6);
 }
 
+// Of a path of 100 m: those of 10, 20, 30, 40 and 50 m, from each pose on, that end a metre further.
+TEST(EvaluateDrift, IsOfTheTenthsOfThePathUpToItsHalf) {
+  std::vector<PoseMatrix> reference, estimate;
+  for (int k = 0; k <= 100; ++k) {
+    reference.push_back({Eigen::Matrix3d::Identity(), {1.0 * k, 0, 0}});
+    estimate.push_back({Eigen::Matrix3d::Identity(), {1.1 * k, 0, 0}});
+  }
+  std::size_t segments = 0;
+  double percent = 0;
+  for (const std::size_t length : {10u, 20u, 30u, 40u, 50u}) {
+    const std::size_t starts = 100 - length;
+    segments += starts;
+    percent +=
+        static_cast<double>(starts) * 10 * static_cast<double>(length + 1) / static_cast<double>(length);
+  }
+  const SegmentErrors drift = EvaluateDrift(reference, estimate);
+  EXPECT_EQ(drift.segments, segments);
+  EXPECT_NEAR(drift.translation_percent, percent / static_cast<double>(segments), 1e-9);
+}
+
 }  // namespace
 }  // namespace tutti

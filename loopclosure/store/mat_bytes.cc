@@ -47,9 +47,13 @@ void PutMat(const cv::Mat& matrix, ByteWriter& out) {
     });
     return out.PutPlanes(values);
   }
-  cv::Mat stored = matrix;
-  if (pack) cv::transpose(matrix, stored);  // values of one dimension are alike
-  if (pack) stored.convertTo(stored, CV_8U);
+  cv::Mat stored;  // of its own: OpenCV would transpose a square matrix in the caller's memory
+  if (pack) {
+    cv::transpose(matrix, stored);  // values of one dimension are alike
+    stored.convertTo(stored, CV_8U);
+  } else {
+    stored = matrix;
+  }
   for (int r = 0; r < stored.rows; ++r) {
     out.PutRaw(stored.ptr(r), static_cast<std::size_t>(stored.cols) * stored.elemSize());
   }

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "backend/graph/edge_weights.h"
 #include "tests/backend/graph/synthetic_graph.h"
 
 namespace tutti {
@@ -40,6 +41,71 @@ TEST(GraphInitialization, ChordalIsExactWithoutNoiseForEveryKind) {
     EXPECT_EQ(reason, "");
     ASSERT_EQ(poses.size(), synthetic.truth.size());
     EXPECT_LT(MaxPositionError(poses, synthetic.truth), 1e-6) << ToString(kind);
+  }
+}
+
+// Turn about the vertical [rad].
+Similarity Turned(double heading, double scale, const Eigen::Vector3d& translation) {
+  return Similarity(scale, ExpSO3({0, 0, heading}), translation);
+}
+
+// Rotations are drawn towards the mean of the matrices, scales to that of their logarithms, each by its
+// weight; whichever way an edge points.
+TEST(GraphInitialization, TwoEdgesThatContradictEachOtherMeetByTheirWeights) {
+  constexpr double kFirst = 0.3, kSecond = 1.1, kScaleFirst = 1.2, kScaleSecond = 0.7;
+  for (GraphKind kind : {GraphKind::kSE2, GraphKind::kSE3, GraphKind::kSim3}) {
+    const bool scaled = kind == GraphKind::kSim3;
+    for (const bool backwards : {false, true}) {
+      PoseGraph graph(kind);
+      for (int id : {0, 1}) graph.AddNode(PoseGraphNode{id, Similarity(), id == 0, true});
+      graph.AddOdometry(0, 1, Turned(kFirst, scaled ? kScaleFirst : 1, {1, 0, 0}), 3 * Matrix7d::Identity());
+      const Similarity second = Turned(kSecond, scaled ? kScaleSecond : 1, {1, 0, 0});
+      graph.AddLoop(backwards ? 1 : 0, backwards ? 0 : 1, backwards ? second.Inverse() : second,
+                    2 * Matrix7d::Identity());
+      std::string reason;
+      const auto poses = internal::ChordalInitialization(graph, internal::AnalyseGraph(graph), reason);
+      ASSERT_EQ(poses.size(), 2u) << reason;
+      const double heading = std::atan2(3 * std::sin(kFirst) + 2 * std::sin(kSecond),
+                                        3 * std::cos(kFirst) + 2 * std::cos(kSecond));
+      EXPECT_NEAR(LogSO3(poses[1].rotation).z(), heading, 1e-9) << ToString(kind);
+      const double log_scale = (3 * std::log(kScaleFirst) + 2 * std::log(kScaleSecond)) / 5;
+      EXPECT_NEAR(std::log(poses[1].scale), scaled ? log_scale : 0, 1e-9);
+    }
+  }
+}
+
+// What the edges leave of the translations, each by its weight and in the unit of the node that it comes
+// from.
+double TranslationCost(const PoseGraph& graph, const internal::GraphStructure& structure,
+                       const std::vector<Similarity>& poses) {
+  double cost = 0;
+  for (std::size_t e = 0; e < graph.edges().size(); ++e) {
+    const PoseGraphEdge& edge = graph.edges()[e];
+    const Similarity &i = poses[structure.ends[e].from], &j = poses[structure.ends[e].to];
+    cost += internal::MakeChordalWeights(edge, graph.kind()).translation *
+            (i.Inverse() * j.translation - edge.measurement.translation).squaredNorm();
+  }
+  return cost;
+}
+
+TEST(GraphInitialization, NoPositionCanMoveAndLowerTheCost) {
+  for (GraphKind kind : {GraphKind::kSE2, GraphKind::kSE3, GraphKind::kSim3}) {
+    testing::SyntheticGraphOptions options = testing::NoisyOptions(kind, 0.05, 0.03);
+    if (kind == GraphKind::kSim3) options.noise_log_scale = 0.02;
+    const PoseGraph graph = testing::MakeSyntheticGraph(options).graph;
+    const internal::GraphStructure structure = internal::AnalyseGraph(graph);
+    std::string reason;
+    const std::vector<Similarity> poses = internal::ChordalInitialization(graph, structure, reason);
+    const double least = TranslationCost(graph, structure, poses);
+    for (std::size_t k = 1; k < poses.size(); k += 13) {
+      for (const double step : {-1e-3, 1e-3}) {
+        for (int axis = 0; axis < (kind == GraphKind::kSE2 ? 2 : 3); ++axis) {
+          std::vector<Similarity> moved = poses;
+          moved[k].translation[axis] += step;
+          EXPECT_GT(TranslationCost(graph, structure, moved), least) << ToString(kind) << " node " << k;
+        }
+      }
+    }
   }
 }
 

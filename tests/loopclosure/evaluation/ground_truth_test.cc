@@ -55,6 +55,35 @@ TEST(LoopMatrix, ImagesWithWhiteGreyAndBlack) {
   EXPECT_EQ(truth.At(3, 2), LoopLabel::kNone);
 }
 
+// What compression may have made of black and white, and images of zeros and ones.
+TEST(LoopMatrix, NearlyBlackIsBlackAndNearlyWhiteIsWhite) {
+  cv::Mat image = cv::Mat::zeros(6, 6, CV_8U);
+  const std::vector<std::uint8_t> greys = {1, 5, 6, 249, 250};
+  for (std::size_t c = 0; c < greys.size(); ++c) image.at<std::uint8_t>(5, static_cast<int>(c)) = greys[c];
+  const fs::path file = testing::FreshFolder() / "t.png";
+  cv::imwrite(file.string(), image);
+  const LoopGroundTruth truth = ReadLoopMatrix(file, 6);
+  std::vector<LoopLabel> labels;
+  for (int c = 0; c < 5; ++c) labels.push_back(truth.At(5, c));
+  EXPECT_EQ(labels, (std::vector<LoopLabel>{LoopLabel::kLoop, LoopLabel::kNone, LoopLabel::kIgnore,
+                                            LoopLabel::kIgnore, LoopLabel::kLoop}));
+}
+
+// Two lines of two numbers are a matrix, other numbers of lines are pairs, whichever comes first.
+TEST(LoopMatrix, TwoColumnsArePairsUnlessTheyAreSquare) {
+  EXPECT_EQ(ReadLoopMatrix(FreshFile("t.txt", "0 0\n1 0\n"), 9).size(), 2);
+  const LoopGroundTruth pairs = ReadLoopMatrix(FreshFile("t.txt", "1 5\n8 2\n0 8\n"), 9);
+  EXPECT_EQ(pairs.size(), 9);
+  EXPECT_EQ(pairs.At(5, 1), LoopLabel::kLoop);
+  EXPECT_EQ(pairs.At(8, 2), LoopLabel::kLoop);
+  EXPECT_EQ(pairs.At(8, 0), LoopLabel::kLoop);
+  EXPECT_EQ(pairs.RowsWithLoop(), 2);
+  EXPECT_FALSE(Problem(FreshFile("t.txt", "1 5\n10 2\n0 8\n")).empty());
+  EXPECT_FALSE(Problem(FreshFile("t.txt", "1 5\n2 10\n0 8\n")).empty());
+  EXPECT_FALSE(Problem(FreshFile("t.txt", "1.5 5\n2 3\n0 8\n")).empty());
+  EXPECT_FALSE(Problem(FreshFile("t.txt", "1 5.5\n2 3\n0 8\n")).empty());
+}
+
 TEST(LoopMatrix, NumbersAreLabelsWhereThereIsOneForEachPair) {
   const LoopGroundTruth truth = LoopsFromMatrix({0, 0, 0, 250, 0, 0, 249, 1, 0}, 3);
   EXPECT_EQ(truth.At(1, 0), LoopLabel::kLoop);
@@ -152,6 +181,44 @@ TEST(LoopsFromTrajectory, FollowsTheStatedRule) {
   LoopRule bad;
   bad.ignore_m = 1;
   EXPECT_THROW(LoopsFromTrajectory(trajectory, bad), InputError);
+}
+
+// Just within and just beyond each bound.
+TEST(LoopsFromTrajectory, LabelsChangeAtTheBoundsOfTheRule) {
+  LoopRule rule;
+  rule.distance_m = 4;
+  rule.angle_deg = 50;
+  rule.exclude_s = 20;
+  rule.ignore_m = 9;
+  const auto label = [&](double seconds, double metres, double degrees) {
+    const Pose first(ExpSO3({0.3, 0.2, 0.1}), {1, 2, 3});
+    const Pose second = first * Pose(ExpSO3({0, degrees * M_PI / 180, 0}), {0.6 * metres, 0, 0.8 * metres});
+    return LoopsFromTrajectory({{100, first}, {100 + seconds, second}}, rule).At(1, 0);
+  };
+  EXPECT_EQ(label(20, 3.9, 49), LoopLabel::kLoop);
+  EXPECT_EQ(label(19.9, 3.9, 49), LoopLabel::kIgnore);
+  EXPECT_EQ(label(19.9, 500, 0), LoopLabel::kIgnore);
+  EXPECT_EQ(label(20, 4.1, 49), LoopLabel::kIgnore);
+  EXPECT_EQ(label(20, 3.9, 51), LoopLabel::kIgnore);
+  EXPECT_EQ(label(20, 8.9, 0), LoopLabel::kIgnore);
+  EXPECT_EQ(label(20, 9.1, 0), LoopLabel::kNone);
+}
+
+TEST(LoopRule, OfValuesOutOfRangeIsRefused) {
+  const auto refused = [](double distance, double angle, double exclude, double ignore) {
+    LoopRule rule;
+    rule.distance_m = distance;
+    rule.angle_deg = angle;
+    rule.exclude_s = exclude;
+    rule.ignore_m = ignore;
+    return !rule.Validate().empty();
+  };
+  EXPECT_FALSE(refused(4, 180, 0, 4));
+  EXPECT_TRUE(refused(0, 180, 0, 4));
+  EXPECT_TRUE(refused(4, 181, 0, 4));
+  EXPECT_TRUE(refused(4, 0, 0, 4));
+  EXPECT_TRUE(refused(4, 180, -1, 4));
+  EXPECT_TRUE(refused(4, 180, 0, 3.9));
 }
 
 TEST(LoopsFromTrajectory, AgreesWithTheMatrixThatComesWithKitti) {

@@ -53,5 +53,58 @@ TEST(DlibSurf, GivesThePointsAndDescriptorsOfDlib) {
   EXPECT_LE(other_angle, kPoints / 50);
 }
 
+// Down to the faintest and up to the border; of four intervals, where dlib has six as it stands.
+TEST(DlibSurf, FindsEveryPointOfDlibAndNoOther) {
+  const cv::Mat image = testing::TexturedImage(5, 401, 303);
+  dlib::array2d<unsigned char> copy(image.rows, image.cols);
+  for (int r = 0; r < image.rows; ++r) std::copy_n(image.ptr(r), image.cols, &copy[r][0]);
+  dlib::hessian_pyramid pyramid;
+  dlib::integral_image sums;
+  sums.load(copy);
+  pyramid.build_pyramid(sums, 4, 4, 2);
+  std::vector<dlib::interest_point> found, expected;
+  dlib::get_interest_points(pyramid, 1.0, found);
+  const dlib::rectangle inside(0, 0, image.cols - 1, image.rows - 1);
+  for (const dlib::interest_point& point : found) {
+    const auto border = static_cast<unsigned long>(32 * point.scale);
+    if (inside.contains(dlib::centered_rect(dlib::point(point.center), border, border)))
+      expected.push_back(point);
+  }
+  std::vector<cv::KeyPoint> keypoints;
+  CreateDlibSurf(100000, 4, 1.0)->detect(image, keypoints);
+  EXPECT_GT(expected.size(), 200u);
+  EXPECT_EQ(keypoints.size(), expected.size());
+  for (const dlib::interest_point& point : expected) {
+    EXPECT_TRUE(std::any_of(keypoints.begin(), keypoints.end(),
+                            [&](const cv::KeyPoint& k) {
+                              return std::abs(point.center.x() - k.pt.x) < 1e-3 &&
+                                     std::abs(point.center.y() - k.pt.y) < 1e-3 &&
+                                     std::abs(20 * point.scale - k.size) < 1e-3 &&
+                                     std::abs(point.score - k.response) < 1e-3 * point.score &&
+                                     (point.laplacian > 0) == (k.class_id > 0);
+                            }))
+        << point.center.x() << ", " << point.center.y();
+  }
+}
+
+TEST(DlibSurf, FindsNothingUnderTheMaskAndDescribesWhatLiesFarEnoughInside) {
+  const cv::Mat image = testing::TexturedImage(5, 401, 303);
+  cv::Mat mask(image.size(), CV_8UC1, cv::Scalar(255)), descriptors;
+  mask.colRange(0, 200).setTo(0);
+  std::vector<cv::KeyPoint> keypoints;
+  const cv::Ptr<cv::Feature2D> surf = CreateDlibSurf(1000, 4, 1.0);
+  surf->detect(image, keypoints, mask);
+  ASSERT_FALSE(keypoints.empty());
+  for (const cv::KeyPoint& keypoint : keypoints) EXPECT_GE(keypoint.pt.x, 199.5);
+  // A window of 32 scales about it: 64 pixels for a scale of 2.
+  keypoints = {cv::KeyPoint(200, 150, 40), cv::KeyPoint(31, 150, 40), cv::KeyPoint(33, 150, 40),
+               cv::KeyPoint(200, 150, 0)};
+  surf->compute(image, keypoints, descriptors);
+  ASSERT_EQ(keypoints.size(), 2u);
+  EXPECT_EQ(descriptors.rows, 2);
+  EXPECT_EQ(keypoints[1].pt.x, 33);
+  for (int i = 0; i < 2; ++i) EXPECT_NEAR(cv::norm(descriptors.row(i)), 1, 1e-5);
+}
+
 }  // namespace
 }  // namespace tutti

@@ -2,8 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
+#include <numeric>
+#include <set>
+#include <utility>
 
 #include "loopclosure/detector/parallel.h"
 #include "loopclosure/geometry/matching.h"
@@ -270,6 +275,49 @@ TEST(SelectSpread, GivesEveryCellItsShareBeforeTheStrongestTakeTheRest) {
   EXPECT_EQ(chosen.back(), 100);
   EXPECT_EQ(SelectSpread(keypoints, cv::Size(100, 100), 200, 4).size(), 101u);
   EXPECT_TRUE(SelectSpread({}, cv::Size(100, 100), 10, 4).empty());
+}
+
+// A cell's best, up to an equal share of all; of what is left the strongest, wherever they are.
+std::set<int> SpreadByHand(const std::vector<cv::KeyPoint>& keypoints, int cell, int share, int count) {
+  std::vector<int> order(keypoints.size());
+  std::iota(order.begin(), order.end(), 0);
+  const auto response = [&](int i) { return keypoints[static_cast<std::size_t>(i)].response; };
+  std::sort(order.begin(), order.end(), [&](int a, int b) { return response(a) > response(b); });
+  std::map<std::pair<int, int>, int> taken;
+  std::set<int> chosen;
+  for (const bool of_cells : {true, false}) {
+    for (const int i : order) {
+      const cv::Point2f& p = keypoints[static_cast<std::size_t>(i)].pt;
+      int& used = taken[{static_cast<int>(p.x) / cell, static_cast<int>(p.y) / cell}];
+      if (static_cast<int>(chosen.size()) == count || (of_cells && used == share)) continue;
+      used += chosen.insert(i).second ? 1 : 0;
+    }
+  }
+  return chosen;
+}
+
+// Images that lie and that stand: cells are along the longer side, and the last ones are cut off.
+TEST(SelectSpread, IsThatOfTheCellsByHand) {
+  for (const cv::Size& size : {cv::Size(200, 90), cv::Size(90, 200)}) {
+    cv::RNG random(5);
+    std::vector<cv::KeyPoint> keypoints;
+    for (int i = 0; i < 400; ++i) {
+      const float across = random.uniform(0.0f, 1.0f), down = random.uniform(0.0f, 1.0f);
+      keypoints.emplace_back(across * across * static_cast<float>(size.width),
+                             down * down * static_cast<float>(size.height), 5.0f, 0.0f,
+                             random.uniform(0.0f, 1.0f));
+    }
+    // Five cells of 40 px along the longer side, three along the other.
+    for (const int count : {10, 15, 60, 150, 399}) {
+      const std::vector<int> ours = SelectSpread(keypoints, size, count, 5);
+      EXPECT_EQ(std::set<int>(ours.begin(), ours.end()),
+                SpreadByHand(keypoints, 40, std::max(1, count / 15), count));
+      EXPECT_TRUE(std::is_sorted(ours.begin(), ours.end(), [&](int a, int b) {
+        return keypoints[static_cast<std::size_t>(a)].response >
+               keypoints[static_cast<std::size_t>(b)].response;
+      }));
+    }
+  }
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Values of SIFT's points and descriptors: against OpenCV, and where they can be computed by hand.
+// SIFT's points: against OpenCV, and as the paper defines them.
 #include "loopclosure/features/sift.h"
 
 #include <gtest/gtest.h>
@@ -9,19 +9,13 @@
 #include <functional>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 #include <random>
 #include <set>
 #include <vector>
 
-#include "loopclosure/features/sift_descriptor.h"
-
 namespace tutti::internal {
 namespace {
-
-constexpr float kScale = 3.0f;      // of the points on ramps [px]
-const cv::Point2f kCentre(40, 40);  // theirs
-constexpr int kSide = 81;           // of the images of ramps [px]
-constexpr double kLongest = 512;    // length of a descriptor
 
 double Apart(double a_deg, double b_deg) { return std::abs(std::remainder(a_deg - b_deg, 360.0)); }
 
@@ -132,92 +126,176 @@ TEST_F(SiftOfOpenCv, DescribesThePointsAlmostAlike) {
   EXPECT_GT(least, 0.97);
 }
 
-// Grey levels that rise by one a pixel towards a direction [deg, counter-clockwise].
-cv::Mat RampTowards(double direction_deg) {
-  const double radians = direction_deg * CV_PI / 180;
-  cv::Mat image(kSide, kSide, CV_32F);
-  for (int y = 0; y < kSide; ++y) {
-    for (int x = 0; x < kSide; ++x) {
-      image.at<float>(y, x) = static_cast<float>(std::cos(radians) * x - std::sin(radians) * y);
+// What the definition finds in a pyramid: a point of an octave, in its own pixels, and of a layer.
+struct ExtremePoint {
+  int octave;
+  double x, y, layer, contrast;
+};
+
+// Differences of neighbouring images of an octave.
+class Differences {
+ public:
+  explicit Differences(const SiftScratch::Octave& octave) {
+    for (std::size_t i = 0; i + 1 < octave.size(); ++i) {
+      cv::Mat difference = octave[i + 1] - octave[i];
+      difference.convertTo(layers_[i], CV_64F);
     }
   }
-  return image;
-}
-
-TEST(SiftOrientations, OfARampIsItsDirection) {
-  for (int direction = 0; direction < 360; direction += 10) {
-    const std::vector<float> angles = SiftOrientations(RampTowards(direction), kCentre, kScale);
-    ASSERT_EQ(angles.size(), 1u) << direction;
-    EXPECT_LT(Apart(angles[0], direction), 0.01) << direction;
+  int rows() const { return layers_[0].rows; }
+  int cols() const { return layers_[0].cols; }
+  double At(const cv::Vec3i& p) const {
+    return layers_[static_cast<std::size_t>(p[2])].at<double>(p[1], p[0]);
   }
-}
 
-// A valley that rises by one a pixel to the right, and by `other` to the left.
-std::vector<float> OrientationsInAValley(float other) {
-  cv::Mat image(kSide, kSide, CV_32F);
-  for (int x = 0; x < kSide; ++x) {
-    const float right = static_cast<float>(x) - kCentre.x;
-    image.col(x).setTo(right > 0 ? right : -other * right);
+  // Of all places and layers, the largest or the smallest of its 27.
+  bool IsExtreme(const cv::Vec3i& p) const {
+    for (int k = 0; k < 27; ++k) {
+      const double other = At(p + cv::Vec3i(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1));
+      if (At(p) > 0 ? other > At(p) : other < At(p)) return false;
+    }
+    return true;
   }
-  return SiftOrientations(image, kCentre, kScale);
-}
-
-TEST(SiftOrientations, ASecondOneCountsFromFourFifthsOfTheFirst) {
-  EXPECT_EQ(OrientationsInAValley(0.77f).size(), 1u);
-  const std::vector<float> both = OrientationsInAValley(0.83f);
-  ASSERT_EQ(both.size(), 2u);
-  EXPECT_LT(Apart(both[0], 0), 0.01);
-  EXPECT_LT(Apart(both[1], 180), 0.01);
-}
-
-// Share of a row or column of cells, -1.5 to 1.5 from the middle, in what lies under a window of a standard
-// deviation of two cells; each place is shared by the two cells beside it.
-double ShareOfCells(double middle) {
-  constexpr double kStep = 1e-3;
-  double sum = 0;
-  for (double x = middle - 1 + 0.5 * kStep; x < middle + 1; x += kStep) {
-    sum += kStep * (1 - std::abs(x - middle)) * std::exp(-x * x / (2 * 2 * 2));
+  cv::Vec3d Slope(const cv::Vec3i& p) const {
+    cv::Vec3d slope;
+    for (int a = 0; a < 3; ++a) slope[a] = (At(p + Step(a)) - At(p - Step(a))) / 2;
+    return slope;
   }
-  return sum;
+  cv::Matx33d Curvature(const cv::Vec3i& p) const {
+    cv::Matx33d curvature;
+    for (int a = 0; a < 3; ++a) {
+      for (int b = 0; b < 3; ++b) {
+        curvature(a, b) = a == b ? At(p + Step(a)) + At(p - Step(a)) - 2 * At(p)
+                                 : (At(p + Step(a) + Step(b)) + At(p - Step(a) - Step(b)) -
+                                    At(p + Step(a) - Step(b)) - At(p - Step(a) + Step(b))) /
+                                       4;
+      }
+    }
+    return curvature;
+  }
+  bool Holds(const cv::Vec3i& p) const {
+    return p[0] >= 5 && p[0] < cols() - 5 && p[1] >= 5 && p[1] < rows() - 5 && p[2] >= 1 && p[2] <= 3;
+  }
+
+ private:
+  static cv::Vec3i Step(int axis) { return {axis == 0 ? 1 : 0, axis == 1 ? 1 : 0, axis == 2 ? 1 : 0}; }
+  std::array<cv::Mat, SiftScratch::kBlurs - 1> layers_;
+};
+
+// The top of the parabola around a place, after at most five steps towards it: not where it is faint, or
+// where it is an edge, with principal curvatures of more than one to ten.
+std::optional<ExtremePoint> Top(const Differences& differences, cv::Vec3i p, double least) {
+  for (int step = 0; step < 5 && differences.Holds(p); ++step) {
+    const cv::Matx33d curvature = differences.Curvature(p);
+    const cv::Vec3d slope = differences.Slope(p), offset = -(curvature.inv() * slope);
+    if (cv::norm(offset, cv::NORM_INF) < 0.5) {
+      const double contrast = std::abs(differences.At(p) + 0.5 * slope.dot(offset));
+      const double trace = curvature(0, 0) + curvature(1, 1),
+                   determinant = curvature(0, 0) * curvature(1, 1) - curvature(0, 1) * curvature(0, 1);
+      if (contrast < least || determinant <= 0 || trace * trace / determinant >= 12.1) return {};
+      return ExtremePoint{0, p[0] + offset[0], p[1] + offset[1], p[2] + offset[2], contrast};
+    }
+    p += cv::Vec3i(cvRound(offset[0]), cvRound(offset[1]), cvRound(offset[2]));
+  }
+  return {};
 }
 
-// Of a ramp that rises `turn_deg` counter-clockwise of a point's orientation: in all cells the same two
-// directions.
-std::vector<double> DescriptorOfARamp(double turn_deg) {
-  std::vector<double> values(kSiftValues, 0.0);
-  const double direction = turn_deg / 45;
-  const auto before = static_cast<std::size_t>(direction);
-  const double after = direction - static_cast<double>(before);
-  for (std::size_t cell = 0; cell < 16; ++cell) {
-    const std::size_t row = cell / 4, column = cell % 4;
-    const double weight =
-        ShareOfCells(static_cast<double>(column) - 1.5) * ShareOfCells(static_cast<double>(row) - 1.5);
-    values[8 * cell + before % 8] += weight * (1 - after);
-    values[8 * cell + (before + 1) % 8] += weight * after;
+std::vector<ExtremePoint> PointsByDefinition(const SiftScratch& scratch, double least) {
+  std::vector<ExtremePoint> points;
+  for (std::size_t o = 0; o < scratch.pyramid.size(); ++o) {
+    const Differences differences(scratch.pyramid[o]);
+    for (int i = 0; i < 3 * differences.rows() * differences.cols(); ++i) {
+      const cv::Vec3i p(i / 3 % differences.cols(), i / 3 / differences.cols(), 1 + i % 3);
+      if (!differences.Holds(p) || std::abs(differences.At(p)) < 0.5 * least || !differences.IsExtreme(p))
+        continue;
+      std::optional<ExtremePoint> point = Top(differences, p, least);
+      if (!point) continue;
+      point->octave = static_cast<int>(o);
+      points.push_back(*point);
+    }
   }
-  const auto stretch = [&](double length) {
-    const double now = cv::norm(values);
-    for (double& value : values) value *= length / now;
+  return points;
+}
+
+bool IsAt(const ExtremePoint& point, const cv::KeyPoint& keypoint) {
+  const double zoom = std::pow(2, point.octave), size = 2 * 1.6 * std::pow(2, point.layer / 3) * zoom;
+  return keypoint.octave == point.octave && std::abs(keypoint.pt.x - zoom * point.x) < 0.01 * size &&
+         std::abs(keypoint.pt.y - zoom * point.y) < 0.01 * size &&
+         std::abs(keypoint.size / size - 1) < 0.01 && std::abs(keypoint.response / point.contrast - 1) < 0.01;
+}
+
+// But for what is on a bound of the definition, up to rounding.
+TEST(Sift, PointsAreTheTopsOfAllExtremesInPlaceAndScale) {
+  ExtractionOptions options;
+  options.features = 100000;
+  options.sift_contrast = options.sift_min_contrast = 0.01;
+  SiftScratch scratch;
+  const std::vector<cv::KeyPoint> ours = ExtractSift(Clouds(), 0.5, options, scratch).keypoints;
+  const std::vector<ExtremePoint> expected = PointsByDefinition(scratch, 0.01 * 255 / 3);
+  ASSERT_GT(expected.size(), 300u);
+  const auto in_ours = [&](const ExtremePoint& point) {
+    return std::any_of(ours.begin(), ours.end(), [&](const cv::KeyPoint& k) { return IsAt(point, k); });
   };
-  stretch(1.0);
-  for (double& value : values) value = std::min(value, 0.2);
-  stretch(kLongest);
-  return values;
+  const auto in_expected = [&](const cv::KeyPoint& k) {
+    return std::any_of(expected.begin(), expected.end(),
+                       [&](const ExtremePoint& point) { return IsAt(point, k); });
+  };
+  EXPECT_LE(std::count_if(expected.begin(), expected.end(), std::not_fn(in_ours)), 2);
+  EXPECT_LE(std::count_if(ours.begin(), ours.end(), std::not_fn(in_expected)), 2);
 }
 
-TEST(SiftDescriptor, OfARampIsTheWindowInTwoDirectionsOfEveryCell) {
-  for (const double orientation : {0.0, 37.0, 200.0}) {
-    for (const double turn : {0.0, 22.5, 60.0, 135.0, 300.0, 341.0}) {
-      std::array<float, kSiftValues> ours{};
-      // cv::KeyPoint's angle is clockwise.
-      DescribeSift(RampTowards(orientation + turn), kCentre, kScale, static_cast<float>(360 - orientation),
-                   ours.data());
-      const std::vector<double> expected = DescriptorOfARamp(turn);
-      double worst = 0;
-      for (std::size_t i = 0; i < kSiftValues; ++i) worst = std::max(worst, std::abs(ours[i] - expected[i]));
-      EXPECT_LT(worst, 2.0);
+// Each image of an octave has the blur that its place says, whatever it was made from.
+TEST(Sift, ImagesOfAnOctaveDoubleTheirBlurInThreeSteps) {
+  cv::Mat dot = cv::Mat::zeros(128, 128, CV_8U);
+  dot.at<std::uint8_t>(64, 64) = 255;
+  SiftScratch scratch;
+  ExtractSift(dot, 0.5, ExtractionOptions(), scratch);
+  ASSERT_EQ(scratch.pyramid.size(), 5u) << "down to eight pixels";
+  for (std::size_t o = 0; o < 3; ++o) {
+    const double zoom = std::pow(2, o);
+    for (std::size_t i = 0; i < 6; ++i) {
+      const cv::Mat& image = scratch.pyramid[o][i];
+      EXPECT_EQ(image.cols, std::lround(128 / zoom));
+      const int middle = static_cast<int>(64 / zoom);
+      double sum = 0, squares = 0;
+      for (int x = 0; x < image.cols; ++x) {
+        const double value = cv::sum(image.col(x))[0];
+        sum += value;
+        squares += value * (x - middle) * (x - middle);
+      }
+      // A dot is no picture of a scene, which would have the half pixel of blur from the start.
+      const double sigma = 1.6 * std::pow(2, static_cast<double>(i) / 3);
+      EXPECT_NEAR(std::sqrt(squares / sum) / std::sqrt(sigma * sigma - 0.25 / zoom / zoom), 1, 0.03)
+          << "octave " << o << ", image " << i;
     }
   }
+}
+
+// Where fewer than wanted reach the contrast, the next ones by contrast fill up.
+TEST(Sift, FaintPointsAreTakenWhereThereAreTooFewOthers) {
+  const cv::Mat image = Clouds();
+  ExtractionOptions options;
+  SiftScratch scratch;
+  const auto contrasts = [&](int features) {
+    options.features = features;
+    const Features found = ExtractSift(image, 0.5, options, scratch);
+    EXPECT_EQ(found.descriptors.rows, static_cast<int>(found.keypoints.size()));
+    std::vector<float> sorted;
+    for (const cv::KeyPoint& keypoint : found.keypoints) sorted.push_back(keypoint.response);
+    std::sort(sorted.begin(), sorted.end());
+    return sorted;
+  };
+  options.sift_contrast = options.sift_min_contrast = 0.003;
+  const std::vector<float> all = contrasts(100000);
+  const int number = static_cast<int>(all.size());
+  const float median = all[all.size() / 2];
+  options.sift_contrast = static_cast<double>(median) * 3 / 255;
+  const std::vector<float> few = contrasts(number / 4), many = contrasts(3 * number / 4);
+  EXPECT_EQ(static_cast<int>(few.size()), number / 4);
+  EXPECT_GE(few.front(), 0.999f * median);
+  EXPECT_EQ(static_cast<int>(many.size()), 3 * number / 4);
+  EXPECT_LT(many.front(), 0.999f * median);
+  options.sift_min_contrast = options.sift_contrast;
+  EXPECT_GE(contrasts(number).front(), 0.999f * median);
 }
 
 }  // namespace

@@ -8,27 +8,18 @@
 #include <limits>
 #include <numeric>
 #include <random>
+#include <utility>
 
 #include "core/byte_stream.h"
 #include "loopclosure/filter/bayes_filter.h"
+#include "tests/loopclosure/filter/image_counts.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
 namespace {
 
-std::vector<int> Places(int n) {
-  std::vector<int> places(static_cast<std::size_t>(n));
-  std::iota(places.begin(), places.end(), 0);
-  return places;
-}
-
-// Counts of images that show nothing known: at most `most`.
-std::vector<double> Resemblances(int n, double most, std::mt19937& random) {
-  std::uniform_real_distribution<double> uniform(0.0, most);
-  std::vector<double> counts(static_cast<std::size_t>(n));
-  for (double& count : counts) count = uniform(random);
-  return counts;
-}
+using testing::Places;
+using testing::Resemblances;
 
 // After many images of a new place.
 AliasEvidence Experienced(int n, double most) {
@@ -184,91 +175,126 @@ TEST(AliasEvidence, GoesOnWhereItWasSavedAndRefusesDamage) {
   }
 }
 
-// A member's weight after images in which it repeats so much and is wrong so much.
-double WeightOf(double repeated, double wrong) {
-  MemberWeight weight;
-  std::vector<double> counts(40, 0.0);
-  counts[30] = wrong;
-  for (int i = 0; i < 50; ++i) {
-    weight.Repeat(repeated);
-    weight.Learn(counts, Places(40), {3, 4, 5});
+// An image as the filter sees it, at random.
+struct SeenImage {
+  explicit SeenImage(std::mt19937& random) : counts(Resemblances(30, 9.0, random)) {
+    const auto between = [&random](double low, double high) {
+      return std::uniform_real_distribution<double>(low, high)(random);
+    };
+    words = between(100, 900);
+    repeated = between(0, 30);
+    overlap = between(-0.2, 1.2);
+    new_place = between(0, 1);
+    const int first = static_cast<int>(between(0, 26));
+    for (int slot = first; slot < first + 4; ++slot) near.push_back(slot);
   }
-  return weight.Value();
-}
-
-TEST(MemberWeight, IsLargeForWhatRepeatsAndIsNotWrong) {
-  EXPECT_GT(WeightOf(20, 2), 5 * WeightOf(20, 10));  // matches everything everywhere
-  EXPECT_GT(WeightOf(20, 2), 20 * WeightOf(0, 2));   // sees nothing again
-  EXPECT_GT(WeightOf(0, 0), 0.0);                    // but may come to
-}
-
-TEST(MemberWeight, LearnsNothingFromWhereTheImageWasTaken) {
-  MemberWeight weight;
-  std::vector<double> counts(40, 0.0);
-  counts[4] = 100;
-  weight.Repeat(20);
-  weight.Learn(counts, Places(40), {3, 4, 5});
-  EXPECT_NEAR(weight.Value(), 20.1, 1e-9);
-}
-
-// Counts of a member that looks at the same images as another: partly alike, or the same but for chance.
-std::vector<double> Alike(const std::vector<double>& counts, double noise, std::mt19937& random) {
-  std::normal_distribution<double> normal(0.0, noise);
-  std::vector<double> alike;
-  alike.reserve(counts.size());
-  for (const double count : counts) alike.push_back(std::max(0.0, count + normal(random)));
-  return alike;
-}
-
-TEST(MemberOverlap, CountsAMemberThatSaysTheSameOnceAndLeavesOthersAlone) {
-  MemberOverlap overlap;
-  EXPECT_EQ(overlap.Copies(0), 1.0);
-  EXPECT_EQ(overlap.Copies(7), 1.0);
-  std::mt19937 random(1);
-  for (int i = 0; i < 50; ++i) {
-    const std::vector<double> first = Resemblances(100, 10, random);
-    const std::vector<double> copy = Alike(first, 0.3, random);   // correlation 0.995
-    const std::vector<double> other = Alike(first, 4.0, random);  // 0.58
-    overlap.Learn({&first, &copy, &other}, Places(100), {});
+  bool IsNear(std::size_t slot) const {
+    return std::count(near.begin(), near.end(), static_cast<int>(slot)) != 0;
   }
-  EXPECT_NEAR(overlap.Copies(0), 2.0, 0.1);
-  EXPECT_NEAR(overlap.Copies(1), 2.0, 0.1);
-  EXPECT_NEAR(overlap.Copies(2), 1.0, 0.05);
-}
 
-TEST(MemberOverlap, LearnsNothingFromWhereTheImageWasTakenNorFromWhoSatOut) {
-  MemberOverlap overlap;
-  std::mt19937 random(2);
-  for (int i = 0; i < 50; ++i) {
-    std::vector<double> first = Resemblances(100, 10, random);
-    std::vector<double> second = Resemblances(100, 10, random);
-    for (std::size_t slot = 40; slot < 45; ++slot) first[slot] = second[slot] = 500;  // both know the place
-    overlap.Learn({&first, &second, nullptr}, Places(100), {40, 41, 42, 43, 44});
+  std::vector<double> counts;
+  std::vector<int> near;
+  double words, repeated, overlap, new_place;
+};
+
+// The means that the evidence keeps, one image after the other: what it says is computed from them at once.
+class AliasMeans {
+ public:
+  void See(const SeenImage& image) {
+    if (++images_ <= AliasEvidence::kFirstImages) {
+      words_ += image.words;
+      log_level_ = std::log1p(0.02 * words_ / images_);
+    }
+    log_repeated_ = std::log(image.repeated + 0.1);
   }
-  EXPECT_LT(overlap.Copies(0), 1.05);
-  EXPECT_EQ(overlap.Copies(2), 1.0);
+
+  double Level() const { return std::expm1(log_level_); }
+  double LevelOf(std::size_t slot) const {
+    const double own = (sums_[slot] + 20 * Mean()) / (seen_[slot] + 20);
+    const double attraction = std::pow((own + 0.02) / (Mean() + 0.02), options_.attraction);
+    return options_.alias_share * Level() * std::min(3.0, std::max(1.0 / 3, attraction));
+  }
+  double Lasting() const { return lasting_; }
+
+  double Likelihood(const SeenImage& image, std::size_t slot) const {
+    const double repeats = repeated_images_ == 0 ? 1 : std::exp(log_repeated_ - log_usual_);
+    const double level = LevelOf(slot) * std::min(1.0, std::max(0.15, repeats));
+    const double said =
+        std::min(1.0, options_.persistence * lasting_) * std::min(1.0, std::max(0.0, image.overlap));
+    const double speaks = (1 - said) * options_.sharpness * std::log((image.counts[slot] + 1) / (level + 1));
+    return std::exp(std::max(options_.floor, speaks));
+  }
+
+  void Learn(const SeenImage& image) {
+    double best = 0, best_far = 0;
+    int alias = -1, far_alias = -1;
+    for (std::size_t slot = 0; slot < 30; ++slot) {
+      const double count = image.counts[slot];
+      if (count > best) best = count, alias = static_cast<int>(slot);
+      if (count > best_far && !image.IsNear(slot)) best_far = count, far_alias = static_cast<int>(slot);
+    }
+    stands_for_ = std::min(80.0, stands_for_ + 1);
+    for (const auto& [share, count] :
+         {std::pair(image.new_place, best), std::pair(1 - image.new_place, best_far)})
+      log_level_ += share * (std::log1p(count) - log_level_) / stands_for_;
+    const bool is_new = image.new_place > 0.5;
+    const int now = is_new ? alias : far_alias;
+    const bool follows = last_ >= 0 && std::abs(now - last_) <= 2;
+    lasting_ += ((follows ? 1 : 0) - lasting_) / std::min(40.0, stands_for_);
+    last_ = now;
+    if (is_new) {
+      repeated_images_ = std::min(80, repeated_images_ + 1);
+      log_usual_ += (log_repeated_ - log_usual_) / repeated_images_;
+    }
+    for (std::size_t slot = 0; slot < 30; ++slot) {
+      const double share = image.IsNear(slot) ? image.new_place : 1;
+      sums_[slot] += share * image.counts[slot];
+      seen_[slot] += share;
+    }
+  }
+
+ private:
+  double Mean() const {
+    const double seen = std::accumulate(seen_.begin(), seen_.end(), 0.0);
+    return seen > 0 ? std::accumulate(sums_.begin(), sums_.end(), 0.0) / seen : 0;
+  }
+
+  EvidenceOptions options_;
+  int images_ = 0, repeated_images_ = 0, last_ = -1;
+  double words_ = 0, log_level_ = 0, stands_for_ = 15, log_repeated_ = 0, log_usual_ = 0, lasting_ = 0;
+  std::vector<double> sums_ = std::vector<double>(30, 0.0), seen_ = sums_;
+};
+
+TEST(AliasEvidence, FollowsTheMeansOfAllImagesBefore) {
+  AliasEvidence evidence{EvidenceOptions()};
+  AliasMeans means;
+  std::mt19937 random(6);
+  for (int i = 0; i < 130; ++i) {
+    const SeenImage image(random);
+    means.See(image);
+    const Belief said =
+        evidence.Likelihood(image.counts, Places(30), image.words, image.repeated, image.overlap);
+    for (std::size_t slot = 0; slot < 30; ++slot) {
+      const double expected = means.Likelihood(image, slot);
+      ASSERT_NEAR(said.places[slot], expected, 1e-9 * expected) << "image " << i << ", slot " << slot;
+    }
+    evidence.Learn(image.counts, Places(30), image.near, image.new_place);
+    means.Learn(image);
+    ASSERT_NEAR(evidence.Level(), means.Level(), 1e-9) << i;
+    ASSERT_NEAR(evidence.Lasting(), means.Lasting(), 1e-12) << i;
+    for (std::size_t slot = 0; slot < 30; ++slot)
+      ASSERT_NEAR(evidence.LevelOf(static_cast<int>(slot)), means.LevelOf(slot), 1e-9) << i;
+  }
 }
 
-TEST(MemberOverlap, GoesOnWhereItWasSavedAndRefusesDamage) {
-  MemberOverlap overlap;
-  std::mt19937 random(3);
-  const std::vector<double> first = Resemblances(100, 10, random);
-  overlap.Learn({&first, &first}, Places(100), {});
-  internal::ByteWriter out;
-  overlap.Save(out);
-  MemberOverlap again;
-  internal::ByteReader in(out.bytes(), "memory");
-  again.Load(in);
-  EXPECT_EQ(again.Copies(1), overlap.Copies(1));
-  std::string damaged(out.bytes());
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  std::memcpy(damaged.data() + damaged.size() - sizeof nan, &nan, sizeof nan);
-  internal::ByteReader bad(damaged, "memory");
-  EXPECT_THROW(again.Load(bad), InputError);
-  damaged.assign(out.bytes());
-  damaged[0] = 3;  // members: as many as there are not
-  internal::ByteReader wrong(damaged, "memory");
-  EXPECT_THROW(again.Load(wrong), InputError);
+TEST(AliasEvidence, LearnsFromMoreThanTwentyPlacesAlone) {
+  for (const int places : {20, 21}) {
+    AliasEvidence evidence{EvidenceOptions()};
+    const std::vector<double> counts(static_cast<std::size_t>(places), 3.0);
+    evidence.Likelihood(counts, Places(places), 1000, 20, 0);
+    evidence.Learn(counts, Places(places), {}, 1.0);
+    EXPECT_EQ(evidence.Level() < 19.9, places == 21) << places;
+  }
 }
 
 }  // namespace

@@ -27,9 +27,14 @@ class HypothesisSearchTest : public ::testing::Test {
   }
 
   LoopResult Search(int query, int place, const HypothesisSearch::VerifyPair& verify) {
+    return SearchWhere(query, {{place, 0.9}}, verify);
+  }
+
+  LoopResult SearchWhere(int query, const std::map<int, double>& posterior,
+                         const HypothesisSearch::VerifyPair& verify) {
     Belief belief;
     belief.places.assign(kSearchPlaces, 0.0);
-    belief.places[static_cast<std::size_t>(place)] = 0.9;
+    for (const auto& [place, value] : posterior) belief.places[static_cast<std::size_t>(place)] = value;
     const HypothesisSearch search(options_, memory_, verify, [&](int slot) -> const View& {
       return views_[static_cast<std::size_t>(slot)];
     });
@@ -79,6 +84,108 @@ TEST_F(HypothesisSearchTest, AnOldPlaceIsAskedForItselfAlone) {
 TEST_F(HypothesisSearchTest, AnImageByItselfHasNoWayThatLedToIt) {
   const LoopResult result = SearchAlike(1000, 40, [](auto, auto) { return true; });
   EXPECT_TRUE(result.accepted);
+}
+
+// From four short-term memories on nothing stays in sight; half-way between two images lies one of its own.
+TEST_F(HypothesisSearchTest, WhatWasInSightIsAskedHalfWayOfARecentPlace) {
+  const int query = kSearchPlaces - 1;
+  const auto asked = [&](int place) {
+    std::vector<std::int64_t> ids;
+    SearchWhere(query, {{place, 0.9}}, [&](const View& a, const View& b, int) {
+      EXPECT_EQ(a.id, query);
+      ids.push_back(b.id);
+      Verification verification;
+      verification.candidate = b.id;
+      verification.accepted = b.id == place;
+      verification.inliers = verification.accepted ? kInliers : 5;
+      return verification;
+    });
+    return ids;
+  };
+  const std::vector<std::int64_t> recent = asked(query - 40), old = asked(query - 41);
+  ASSERT_GE(recent.size(), 2u);
+  EXPECT_EQ(recent[1], query - 20);
+  EXPECT_THAT(old, ::testing::Not(::testing::Contains(query - 21)));
+}
+
+TEST_F(HypothesisSearchTest, HalfOfTheInliersHalfWayAreTheSameThing) {
+  for (const int between : {49, 50}) {
+    const LoopResult result = Search(kSearchPlaces - 1, 39, [&](const View&, const View& b, int) {
+      Verification verification;
+      verification.candidate = b.id;
+      verification.accepted = b.id == 39 || b.id == 49;
+      verification.inliers = b.id == 39 ? kInliers : verification.accepted ? between : 5;
+      return verification;
+    });
+    EXPECT_EQ(result.accepted, between == 49);
+  }
+}
+
+// What is tried of an image by itself where geometry finds so many inliers and accepts nothing.
+class OrderOfSearch : public HypothesisSearchTest {
+ protected:
+  std::vector<std::int64_t> Tried(const std::map<int, double>& posterior,
+                                  const std::map<std::int64_t, int>& inliers = {}) {
+    const LoopResult result = SearchWhere(1000, posterior, [&](const View&, const View& b, int) {
+      Verification verification;
+      verification.candidate = b.id;
+      const auto found = inliers.find(b.id);
+      verification.inliers = found == inliers.end() ? 5 : found->second;
+      return verification;
+    });
+    EXPECT_FALSE(result.accepted);
+    std::vector<std::int64_t> ids;
+    for (const Verification& tried : result.tried) ids.push_back(tried.candidate);
+    return ids;
+  }
+  using Ids = std::vector<std::int64_t>;
+};
+
+TEST_F(OrderOfSearch, PlacesComeByTheirPosteriorAndTheFirstOnesNeighboursBeforeTheNext) {
+  EXPECT_EQ(Tried({{10, 0.2}, {25, 0.5}, {26, 0.02}, {24, 0.01}, {40, 0.1}, {5, 0.05}}),
+            (Ids{25, 26, 24, 10, 40}));
+}
+
+TEST_F(OrderOfSearch, PlacesNextToATakenOneAreNoneOfTheirOwn) {
+  EXPECT_EQ(Tried({{20, 0.5}, {21, 0.3}, {22, 0.2}, {23, 0.1}}), (Ids{20, 21, 19, 23}));
+  options_.verification.neighbours = 0;
+  EXPECT_EQ(Tried({{20, 0.5}, {21, 0.3}, {22, 0.2}, {23, 0.1}}), (Ids{20, 22}));
+}
+
+TEST_F(OrderOfSearch, OfTwoThatAreEquallyProbableTheNewerIsFirst) {
+  options_.verification.neighbours = 0;
+  EXPECT_EQ(Tried({{10, 0.3}, {30, 0.3}}), (Ids{30, 10}));
+}
+
+TEST_F(OrderOfSearch, NeighboursOfALaterPlaceAreTriedWhereItShowsHalfOfWhatALoopNeeds) {
+  const std::map<int, double> posterior = {{10, 0.2}, {25, 0.5}};
+  options_.verification.min_inliers = 30;
+  EXPECT_EQ(Tried(posterior, {{10, 14}}), (Ids{25, 24, 26, 10}));
+  EXPECT_EQ(Tried(posterior, {{10, 15}}), (Ids{25, 24, 26, 10, 9, 11}));
+}
+
+TEST_F(OrderOfSearch, OfAPlaceThatWasSeenOftenThreeNeighboursAreTried) {
+  options_.verification.neighbours = 4;
+  EXPECT_EQ(Tried({{20, 0.5}, {18, 0.03}, {22, 0.02}, {24, 0.01}}), (Ids{20, 18, 22, 24}));
+}
+
+TEST_F(OrderOfSearch, IslandsAreRankedByAllThatLiesNear) {
+  options_.verification.neighbours = 0;
+  options_.verification.max_hypotheses = 2;
+  options_.island_levels = 2;
+  EXPECT_EQ(Tried({{10, 0.3}, {30, 0.2}, {31, 0.15}, {45, 0.05}}), (Ids{30, 10}));
+}
+
+TEST_F(OrderOfSearch, TheBestThatWasTriedIsToldThoughNothingIsAccepted) {
+  const LoopResult result = SearchWhere(1000, {{10, 0.2}, {25, 0.5}}, [&](const View&, const View& b, int) {
+    Verification verification;
+    verification.candidate = b.id;
+    verification.inliers = b.id == 10 ? 12 : 5;
+    verification.reason = "reason of " + std::to_string(b.id);
+    return verification;
+  });
+  EXPECT_EQ(result.verification.candidate, 10);
+  EXPECT_EQ(result.reason, "reason of 10");
 }
 
 // An image by itself, of which the belief says place 20. Where geometry finds it alike, and how much.

@@ -6,7 +6,9 @@
 #include <functional>
 #include <limits>
 #include <optional>
+#include <vector>
 
+#include "core/byte_stream.h"
 #include "loopclosure/filter/pose_track.h"
 #include "tests/loopclosure/detector/two_laps.h"
 #include "tutti/core/error.h"
@@ -141,6 +143,45 @@ TEST(PoseTrack, PositionsOfAnotherWorldAreForgotten) {
   EXPECT_TRUE(track.Gains({0, 1, 2}).empty());
   track.Add(4, PriorAt(1001));
   EXPECT_FALSE(track.Gains({0, 1, 2, 3}).empty());
+}
+
+// Steps of 3 m along a way; the newest is back at the start. Of the places one has no position, one another
+// world's.
+TEST(PoseTrack, GainsFollowTheEquation) {
+  constexpr double kSigma = 2, kDrift = 0.05;
+  PoseTrack track;
+  const std::vector<int> places = {0, 1, 2, 3, 4, 5};
+  for (const int slot : places) {
+    std::optional<PosePrior> prior = PriorAt(3.0 * slot, kSigma, kDrift);
+    if (slot == 2) prior.reset();
+    if (slot == 4) prior->frame = 7;
+    track.Add(slot, prior);
+  }
+  track.Add(6, PriorAt(12, kSigma, kDrift));
+  // The way: 3 m to slot 1, 6 m to 3; what follows the other world begins anew, and slot 6 is 3 m on.
+  const std::vector<double> way = {0, 3, 0, 9, 0, 9, 12};
+  std::vector<double> expected(7, 1.0);
+  double sum = 0;
+  const std::vector<int> known = {0, 1, 3, 5};
+  for (const int slot : known) {
+    const auto i = static_cast<std::size_t>(slot);
+    const double off = (12 - 3.0 * slot) / (kSigma + kDrift * (way[6] - way[i]));
+    expected[i] = std::exp(std::max(-3.0, -0.5 * off * off));
+    sum += expected[i];
+  }
+  for (const int slot : known) expected[static_cast<std::size_t>(slot)] *= 4 / sum;
+  const std::vector<double> gains = track.Gains(places);
+  ASSERT_EQ(gains.size(), expected.size());
+  for (std::size_t i = 0; i < gains.size(); ++i) EXPECT_NEAR(gains[i], expected[i], 1e-12) << i;
+
+  internal::ByteWriter out;
+  track.Save(out);
+  PoseTrack loaded;
+  internal::ByteReader in(out.bytes(), "memory");
+  loaded.Load(in);
+  EXPECT_EQ(loaded.Gains(places), gains);
+  for (PoseTrack* both : {&track, &loaded}) both->Add(7, PriorAt(9, kSigma, kDrift));
+  EXPECT_EQ(loaded.Gains(places), track.Gains(places));
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <cmath>
+#include <functional>
 #include <random>
 
 namespace tutti {
@@ -128,6 +129,71 @@ TEST(SolvePnp, PointNoiseLowersTheInformation) {
   EXPECT_LT(soft.information(0, 0), 0.5 * sharp.information(0, 0));
 }
 
+// Second derivative of a cost around 0, by differences.
+template <int N>
+Eigen::Matrix<double, N, N> Curvature(const std::function<double(const Eigen::Matrix<double, N, 1>&)>& cost) {
+  constexpr double kStep = 1e-4;
+  const Eigen::Matrix<double, N, N> steps = kStep * Eigen::Matrix<double, N, N>::Identity();
+  Eigen::Matrix<double, N, N> curvature;
+  for (int a = 0; a < N; ++a) {
+    for (int b = 0; b < N; ++b) {
+      curvature(a, b) = (cost(steps.col(a) + steps.col(b)) - cost(steps.col(a) - steps.col(b)) -
+                         cost(steps.col(b) - steps.col(a)) + cost(-steps.col(a) - steps.col(b))) /
+                        (4 * kStep * kStep);
+    }
+  }
+  return curvature;
+}
+
+// Where all residuals are 0, that of half the sum of their squares over their variances.
+TEST(SolvePnp, InformationIsTheCurvatureOfTheCost) {
+  const PnpData data = MakePnp(40, 0, 0, 7);
+  RelativePoseOptions options;
+  options.pixel_sigma = 0.7;
+  std::vector<double> sigma_m;
+  for (std::size_t i = 0; i < data.points.size(); ++i) sigma_m.push_back(1e-3 * static_cast<double>(i));
+  const PnpResult result = SolvePnp(data.points, data.pixels, Camera(), options, sigma_m);
+  ASSERT_TRUE(result.success) << result.reason;
+  const Pose T_points_camera = kTrueQueryCandidate.Inverse();
+  const Matrix6d expected = Curvature<6>([&](const Vector6d& tangent) {
+    const Pose T_camera_points = (T_points_camera * ExpSE3(tangent)).Inverse();
+    double cost = 0;
+    for (std::size_t i = 0; i < data.points.size(); ++i) {
+      const double depth = (kTrueQueryCandidate * data.points[i]).z();
+      const double variance = 0.7 * 0.7 + std::pow(Camera().fx * sigma_m[i] / depth, 2);
+      cost += 0.5 * (Camera().Project(T_camera_points * data.points[i]) - data.pixels[i]).squaredNorm() /
+              variance;
+    }
+    return cost;
+  });
+  EXPECT_LT((result.information - expected).norm(), 1e-3 * expected.norm());
+}
+
+TEST(SolvePnp, RmseIsThatOfItsInliers) {
+  const PnpData data = MakePnp(60, 10, 0.6, 8);
+  const PnpResult result = SolvePnp(data.points, data.pixels, Camera(), {});
+  double squares = 0;
+  for (const int i : result.inliers) {
+    const auto k = static_cast<std::size_t>(i);
+    squares += (Camera().Project(result.T_camera_points * data.points[k]) - data.pixels[k]).squaredNorm();
+  }
+  EXPECT_NEAR(result.rmse_px, std::sqrt(squares / static_cast<double>(result.inliers.size())), 1e-9);
+}
+
+TEST(SolvePnp, SeesThroughALens) {
+  PnpData data = MakePnp(40, 0, 0, 9);
+  PinholeCamera lens = Camera();
+  lens.fy = 540;
+  lens.distortion = Distortion::kRadTan;
+  lens.coefficients = {-0.2, 0.05, 1e-3, -1e-3, 0};
+  for (std::size_t i = 0; i < data.points.size(); ++i)
+    data.pixels[i] = lens.Project(kTrueQueryCandidate * data.points[i]);
+  const PnpResult result = SolvePnp(data.points, data.pixels, lens, {});
+  ASSERT_TRUE(result.success) << result.reason;
+  EXPECT_EQ(result.inliers.size(), 40u);
+  EXPECT_LT(LogSE3(result.T_camera_points.Inverse() * kTrueQueryCandidate).norm(), 1e-6);
+}
+
 struct SimilarityData {
   std::vector<Eigen::Vector3d> points_a, points_b;
   std::vector<Eigen::Vector2d> pixels_a, pixels_b;
@@ -170,6 +236,43 @@ TEST(SolveSimilarity, FindsScaleRotationAndTranslation) {
   EXPECT_GT(Eigen::SelfAdjointEigenSolver<Matrix7d>(noisy.information).eigenvalues()[0], 0.0);
 }
 
+// Half the sum of the squared residuals in both images, over their variance.
+TEST(SolveSimilarity, InformationIsTheCurvatureOfTheCost) {
+  const SimilarityData data = MakeSimilarity(40, 0, 0, 5);
+  RelativePoseOptions options;
+  options.pixel_sigma = 0.7;
+  const SimilarityResult result = Solve(data, options);
+  ASSERT_TRUE(result.success) << result.reason;
+  const Matrix7d expected = Curvature<7>([&](const Vector7d& tangent) {
+    const Similarity step(std::exp(tangent[6]), ExpSO3(tangent.segment<3>(3)), tangent.head<3>());
+    const Similarity S_a_b = kTrueSimilarity * step, S_b_a = S_a_b.Inverse();
+    double cost = 0;
+    for (std::size_t i = 0; i < data.points_a.size(); ++i) {
+      cost += (Camera().Project(S_a_b * data.points_b[i]) - data.pixels_a[i]).squaredNorm();
+      cost += (Camera().Project(S_b_a * data.points_a[i]) - data.pixels_b[i]).squaredNorm();
+    }
+    return 0.5 * cost / (0.7 * 0.7);
+  });
+  EXPECT_LT((result.information - expected).norm(), 1e-3 * expected.norm());
+}
+
+TEST(SolveSimilarity, RmseIsThatOfItsInliersInBothImages) {
+  const SimilarityData data = MakeSimilarity(60, 10, 0.5, 6);
+  RelativePoseOptions options;
+  options.threshold_px = 4;
+  const SimilarityResult result = Solve(data, options);
+  double squares = 0;
+  for (const int i : result.inliers) {
+    const auto k = static_cast<std::size_t>(i);
+    const Eigen::Vector2d in_a = Camera().Project(result.S_a_b * data.points_b[k]) - data.pixels_a[k];
+    const Eigen::Vector2d in_b =
+        Camera().Project(result.S_a_b.Inverse() * data.points_a[k]) - data.pixels_b[k];
+    EXPECT_LT(std::max(in_a.norm(), in_b.norm()), 4);
+    squares += 0.5 * (in_a.squaredNorm() + in_b.squaredNorm());
+  }
+  EXPECT_NEAR(result.rmse_px, std::sqrt(squares / static_cast<double>(result.inliers.size())), 1e-9);
+}
+
 TEST(SolveSimilarity, SaysWhyItFails) {
   EXPECT_NE(Solve(MakeSimilarity(2, 0, 0, 3)).reason.find("only 2 matches"), std::string::npos);
   EXPECT_FALSE(Solve(MakeSimilarity(0, 50, 0, 4)).success);
@@ -180,6 +283,12 @@ TEST(RelativePoseOptions, ValidateNamesTheField) {
   EXPECT_EQ(options.Validate(), "");
   options.threshold_px = 0;
   EXPECT_NE(options.Validate().find("threshold_px"), std::string::npos);
+  options = {};
+  options.min_inliers = 3;
+  EXPECT_NE(options.Validate().find("min_inliers"), std::string::npos);
+  options = {};
+  options.confidence = 1;
+  EXPECT_NE(options.Validate().find("confidence"), std::string::npos);
 }
 
 }  // namespace

@@ -16,7 +16,7 @@ namespace tutti::internal {
 namespace {
 
 // Every third feature has no point.
-View::Set SetOf(int features, bool with_points) {
+View::Set ViewSetOf(int features, bool with_points) {
   View::Set set;
   if (features == 0) return set;
   cv::RNG random(static_cast<std::uint64_t>(features));
@@ -43,8 +43,8 @@ View WholeView() {
   view.camera->fy = 510;
   view.camera->distortion = Distortion::kRadTan;
   view.camera->coefficients = {-0.2, 0.1, 1e-3, -2e-3, 0.05};
-  view.members = {SetOf(7, true), SetOf(8, true), SetOf(0, false), SetOf(25, false)};
-  view.caller = SetOf(9, true);
+  view.members = {ViewSetOf(7, true), ViewSetOf(8, true), ViewSetOf(0, false), ViewSetOf(25, false)};
+  view.caller = ViewSetOf(9, true);
   return view;
 }
 

@@ -10,7 +10,7 @@
 namespace tutti::internal {
 namespace {
 
-std::string BytesOf(const cv::Mat& matrix) {
+std::string BytesOfMat(const cv::Mat& matrix) {
   ByteWriter out;
   PutMat(matrix, out);
   return std::string(out.bytes());
@@ -30,7 +30,7 @@ cv::Mat RandomMat(int rows, int columns, int type, double low, double high) {
 }
 
 void ExpectRoundTrip(const cv::Mat& matrix) {
-  const cv::Mat back = MatOf(BytesOf(matrix));
+  const cv::Mat back = MatOf(BytesOfMat(matrix));
   ASSERT_EQ(back.type(), matrix.type());
   ASSERT_EQ(back.size(), matrix.size());
   EXPECT_EQ(cv::norm(back, matrix, cv::NORM_INF), 0) << matrix.size();
@@ -47,7 +47,7 @@ TEST(MatBytes, OfAnySizeComeBackTheSame) {
       ExpectRoundTrip(whole);
     }
   }
-  EXPECT_TRUE(MatOf(BytesOf(cv::Mat())).empty());
+  EXPECT_TRUE(MatOf(BytesOfMat(cv::Mat())).empty());
   ExpectRoundTrip(RandomMat(9, 40, CV_8U, 0, 256).colRange(3, 20));
   ExpectRoundTrip(RandomMat(9, 40, CV_32F, -1, 1).colRange(3, 20));
 }
@@ -63,20 +63,20 @@ TEST(MatBytes, ASquareMatrixStaysAsItIs) {
 
 TEST(MatBytes, FloatsTakeAByteWhereAllAreWholeNumbersThatFitIt) {
   cv::Mat matrix(3, 8, CV_32F, cv::Scalar(255));
-  const std::size_t packed = BytesOf(matrix).size();
+  const std::size_t packed = BytesOfMat(matrix).size();
   EXPECT_LT(packed, 24u + 16u);
   matrix.at<float>(2, 3) = 0;
-  EXPECT_EQ(BytesOf(matrix).size(), packed);
+  EXPECT_EQ(BytesOfMat(matrix).size(), packed);
   for (const float other : {256.0f, -1.0f, 0.5f}) {
     matrix.at<float>(2, 3) = other;
-    EXPECT_GE(BytesOf(matrix).size(), 24u * 4u) << other;
+    EXPECT_GE(BytesOfMat(matrix).size(), 24u * 4u) << other;
     ExpectRoundTrip(matrix);
   }
 }
 
 TEST(MatBytes, DamagedOnesAreRefused) {
   for (const cv::Mat& matrix : {RandomMat(3, 5, CV_8U, 0, 256), RandomMat(3, 5, CV_32F, -1, 1)}) {
-    const std::string good = BytesOf(matrix);
+    const std::string good = BytesOfMat(matrix);
     for (std::size_t length = 0; length < good.size(); ++length) {
       const std::string cut = good.substr(0, length);
       ByteReader in(cut, "test");

@@ -69,21 +69,19 @@ struct PoseSearch::Contest {
 
   const Map& map;
   int least_inliers;
-  double depth;                   // of what is in view [m]
-  std::optional<Reach> reach;     // by a motion that was steady
-  std::vector<Pose> offered;      // what would show the same is not settled again
-  std::optional<PoseFix> best;    // none: no guess has convinced yet
-  std::optional<PoseFix> beyond;  // one camera: would convince but for the reach, which knows no metres
+  double depth;                        // of what is in view [m]
+  std::optional<Reach> reach = {};     // by a motion that was steady
+  std::vector<Pose> offered = {};      // what would show the same is not settled again
+  std::optional<PoseFix> best = {};    // none: no guess has convinced yet
+  std::optional<PoseFix> beyond = {};  // one camera: would convince but for the reach, which knows no metres
 };
 
 std::optional<PoseFix> PoseSearch::Find(const Map& map, const TrackedFrame& frame, const LastFrame& last,
                                         bool lost) const {
   if (last.reference < 0) return std::nullopt;
   const double depth = std::max(1e-6, map.MedianDepth(last.reference));
-  Contest contest{map,   lost ? 2 * options_.min_inliers : options_.min_inliers,
-                  depth, last.steady ? ReachOf(last, frame.stamp_s, depth, rig_.sensor) : std::nullopt,
-                  {},    {},
-                  {}};
+  Contest contest{map, lost ? 2 * options_.min_inliers : options_.min_inliers, depth,
+                  last.steady ? ReachOf(last, frame.stamp_s, depth, rig_.sensor) : std::nullopt};
   const float base = rig_.sensor == Sensor::kStereo ? 8.0F : 15.0F;
   const std::vector<Pose> predictions = Predictions(last, frame.stamp_s);
   // Corners near a place may all be those of the next of equal windows, and one camera measures no depths
@@ -113,7 +111,7 @@ std::optional<PoseFix> PoseSearch::Find(const Map& map, const TrackedFrame& fram
 
 std::optional<PoseFix> PoseSearch::FindAt(const Map& map, const TrackedFrame& frame, int keyframe) const {
   if (keyframe < 0 || keyframe >= map.KeyframeCount()) return std::nullopt;
-  Contest contest{map, 2 * options_.min_inliers, 1.0, {}, {}, {}, {}};
+  Contest contest{map, 2 * options_.min_inliers, 1.0};
   Offer(GuessFromKeyframe(map, frame, map.PresentKeyframe(keyframe)), &contest);
   return contest.best;
 }
@@ -244,7 +242,7 @@ bool PoseSearch::Settle(const Map& map, PoseFix* fix) const {
 
 std::optional<PoseFix> PoseSearch::FindNear(const Map& map, const TrackedFrame& frame, int keyframe,
                                             const Pose& T_camera_world) const {
-  Contest contest{map, options_.min_inliers, std::max(1e-6, map.MedianDepth(keyframe)), {}, {}, {}, {}};
+  Contest contest{map, options_.min_inliers, std::max(1e-6, map.MedianDepth(keyframe))};
   std::vector<int> near = map.BestCovisible(keyframe, 10, 15);
   near.push_back(keyframe);
   const std::vector<int> landmarks = map.LandmarksOf(near);

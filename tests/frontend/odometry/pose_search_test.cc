@@ -200,7 +200,7 @@ class PoseSearchOfWindows : public ::testing::Test {
   }
 
   const PinholeCamera camera_ = testing::PlainCamera(450);
-  const OdometryOptions options_;
+  OdometryOptions options_;
 };
 
 TEST_F(PoseSearchOfWindows, TheMotionTellsWhichOneItIsWhereCornersSayTheNext) {

@@ -150,19 +150,27 @@ std::optional<PoseFix> PoseSearch::GuessFromPatches(const Map& map, const Tracke
     o.pixel_sigma = options_.pixel_sigma * options_.aligned_sigma * view.scale;
     observations.push_back(o);
   }
-  PoseFix fix(frame);
-  fix.T_camera_world = prediction;
+  Pose T_camera_world = prediction;
   std::vector<char> inlier;
   const int needed =
       std::max(kMinProjected, static_cast<int>(kAlikeShare * static_cast<double>(seen.size())));
   if (static_cast<int>(views.size()) < needed ||
-      RefinePose(rig_.camera, observations, &fix.T_camera_world, &inlier) < needed)
+      RefinePose(rig_.camera, observations, &T_camera_world, &inlier) < needed)
     return std::nullopt;
-  if (MatchToLandmarks(map, rig_.camera, fix.T_camera_world, seen, 1.0F, &fix.matches, &fix.visible) <
+  return GuessFromLandmarks(map, frame, seen, T_camera_world, 1.0F);
+}
+
+// The corners of these landmarks are where a pose shows them.
+std::optional<PoseFix> PoseSearch::GuessFromLandmarks(const Map& map, const TrackedFrame& frame,
+                                                      const std::vector<int>& landmarks,
+                                                      const Pose& T_camera_world, float radius_factor) const {
+  PoseFix fix(frame);
+  fix.T_camera_world = T_camera_world;
+  std::vector<int> visible;
+  if (MatchToLandmarks(map, rig_.camera, T_camera_world, landmarks, radius_factor, &fix.matches, &visible) <
           kMinProjected ||
       Refine(map, &fix.matches, &fix.T_camera_world) < kMinGuess)
     return std::nullopt;
-  fix.visible.clear();
   return fix;
 }
 
@@ -247,14 +255,7 @@ std::optional<PoseFix> PoseSearch::FindNear(const Map& map, const TrackedFrame& 
   near.push_back(keyframe);
   const std::vector<int> landmarks = map.LandmarksOf(near);
   for (const float radius : {2.0F, 5.0F}) {
-    PoseFix fix(frame);
-    fix.T_camera_world = T_camera_world;
-    std::vector<int> visible;
-    if (MatchToLandmarks(map, rig_.camera, T_camera_world, landmarks, radius, &fix.matches, &visible) <
-            kMinProjected ||
-        Refine(map, &fix.matches, &fix.T_camera_world) < kMinGuess)
-      continue;
-    if (Offer(std::move(fix), &contest)) break;
+    if (Offer(GuessFromLandmarks(map, frame, landmarks, T_camera_world, radius), &contest)) break;
   }
   return contest.best;
 }

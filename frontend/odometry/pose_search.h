@@ -43,6 +43,9 @@ class PoseSearch {
 
   std::optional<PoseFix> GuessFromPatches(const Map& map, const TrackedFrame& frame, const LastFrame& last,
                                           const Pose& prediction) const;
+  std::optional<PoseFix> GuessFromLandmarks(const Map& map, const TrackedFrame& frame,
+                                            const std::vector<int>& landmarks, const Pose& T_camera_world,
+                                            float radius_factor) const;
   std::optional<PoseFix> GuessFromLastFrame(const Map& map, const TrackedFrame& frame, const LastFrame& last,
                                             const Pose& prediction, float radius_px) const;
   std::optional<PoseFix> GuessFromKeyframe(const Map& map, const TrackedFrame& frame, int keyframe) const;

@@ -9,6 +9,8 @@
 #include <random>
 #include <vector>
 
+#include "tests/loopclosure/features/angles.h"
+
 namespace tutti::internal {
 namespace {
 
@@ -17,7 +19,7 @@ const cv::Point2f kCentre(40, 40);  // theirs
 constexpr int kSide = 81;           // of the images of ramps [px]
 constexpr double kLongest = 512;    // length of a descriptor
 
-double AnglesApart(double a_deg, double b_deg) { return std::abs(std::remainder(a_deg - b_deg, 360.0)); }
+using testing::AnglesApart;
 
 // Grey levels that rise by one a pixel towards a direction [deg, counter-clockwise].
 cv::Mat RampTowards(double direction_deg) {

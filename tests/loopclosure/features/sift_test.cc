@@ -14,10 +14,12 @@
 #include <set>
 #include <vector>
 
+#include "tests/loopclosure/features/angles.h"
+
 namespace tutti::internal {
 namespace {
 
-double Apart(double a_deg, double b_deg) { return std::abs(std::remainder(a_deg - b_deg, 360.0)); }
+using testing::AnglesApart;
 
 // Structure of every size and no symmetry, which would leave the orientation to rounding.
 cv::Mat Clouds() {
@@ -68,7 +70,7 @@ class SiftOfOpenCv : public ::testing::Test {
   int InTheirs(const cv::KeyPoint& ours) const {
     const auto same =
         std::find_if(theirs_.keypoints.begin(), theirs_.keypoints.end(), [&](const cv::KeyPoint& theirs) {
-          return IsSamePlace(ours, theirs) && Apart(ours.angle, theirs.angle) < 3;
+          return IsSamePlace(ours, theirs) && AnglesApart(ours.angle, theirs.angle) < 3;
         });
     return same == theirs_.keypoints.end() ? -1 : static_cast<int>(same - theirs_.keypoints.begin());
   }

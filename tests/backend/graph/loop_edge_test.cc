@@ -57,6 +57,7 @@ TEST(KeyframeGraphSigmas, OfTwiceTheNoiseLetALoopMoveTheMapMore) {
   const auto distance = [](double ratio, double rotation) {
     KeyframeGraph graph{KeyframeGraphOptions()};
     std::vector<MapKeyframe> keyframes;
+    keyframes.reserve(30);
     for (int id = 0; id < 30; ++id)
       keyframes.push_back({id, 0, Pose(Eigen::Quaterniond::Identity(), {1.0 * id, 0, 0})});
     graph.Update(keyframes);

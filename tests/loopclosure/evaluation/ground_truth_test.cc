@@ -64,6 +64,7 @@ TEST(LoopMatrix, NearlyBlackIsBlackAndNearlyWhiteIsWhite) {
   cv::imwrite(file.string(), image);
   const LoopGroundTruth truth = ReadLoopMatrix(file, 6);
   std::vector<LoopLabel> labels;
+  labels.reserve(greys.size());
   for (int c = 0; c < 5; ++c) labels.push_back(truth.At(5, c));
   EXPECT_EQ(labels, (std::vector<LoopLabel>{LoopLabel::kLoop, LoopLabel::kNone, LoopLabel::kIgnore,
                                             LoopLabel::kIgnore, LoopLabel::kLoop}));

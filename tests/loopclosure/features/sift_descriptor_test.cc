@@ -195,9 +195,11 @@ void AddSample(double x, double y, double length, double direction, std::vector<
   for (int row = 0; row < 4; ++row) {
     for (int column = 0; column < 4; ++column) {
       const double cell = share(x - (column - 1.5)) * share(y - (row - 1.5));
-      for (int k = 0; k < 8; ++k)
-        values[static_cast<std::size_t>(8 * (4 * row + column) + k)] +=
+      for (int k = 0; k < 8; ++k) {
+        const int at = 8 * (4 * row + column) + k;
+        values[static_cast<std::size_t>(at)] +=
             length * cell * share(std::remainder(direction / 45 - k, 8.0));
+      }
     }
   }
 }

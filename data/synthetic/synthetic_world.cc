@@ -104,18 +104,19 @@ struct SyntheticWorld::Impl {
     const double heading = Way().HeadingAt(s);
     const Eigen::Vector2d point =
         Way().PointAt(s) + lateral * Eigen::Vector2d(-std::sin(heading), std::cos(heading));
-    const double height = hills.HeightAt(point) + scene.eye_height + 0.015 * std::sin(2 * M_PI * 0.9 * t) +
-                          0.01 * std::sin(2 * M_PI * 0.37 * t + 1);
+    const double above =
+        scene.eye_height + 0.015 * std::sin(2 * M_PI * 0.9 * t) + 0.01 * std::sin(2 * M_PI * 0.37 * t + 1);
     const double yaw = heading - scene.gaze_right + turned_left + scene.sway * std::sin(2 * M_PI * 0.21 * t);
-    const double down = scene.gaze_down + options.pitch_deg * M_PI / 180 - hills.SlopeAt(point, heading) +
+    const double down = scene.gaze_down + options.pitch_deg * M_PI / 180 - hills.SlopeAt(point, yaw) +
                         scene.sway * std::sin(2 * M_PI * 0.43 * t + 0.7);
-    const double roll = scene.sway * std::sin(2 * M_PI * 0.31 * t + 2.1);
+    const double roll =
+        scene.sway * std::sin(2 * M_PI * 0.31 * t + 2.1) - hills.SlopeAt(point, yaw - M_PI / 2);
     Eigen::Matrix3d level;  // columns: right, down, forward of a camera that looks along yaw
     level << std::sin(yaw), 0, std::cos(yaw), -std::cos(yaw), 0, std::sin(yaw), 0, -1, 0;
     const Eigen::Quaterniond rotation = Eigen::Quaterniond(level) *
                                         Eigen::AngleAxisd(-down, Eigen::Vector3d::UnitX()) *
                                         Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitZ());
-    return Pose(rotation.normalized(), {point.x(), point.y(), height});
+    return Pose(rotation.normalized(), hills.PointAt(point, above));
   }
 
   double StampOf(std::size_t i) const { return static_cast<double>(i) / options.rate_hz; }

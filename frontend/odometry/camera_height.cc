@@ -46,6 +46,7 @@ void CameraHeight::See(const PinholeCamera& camera, const std::shared_ptr<const 
   const Pose step = T_camera_world * T_last_world.Inverse();
   SeeSpeed(step.translation.norm());
   T_last_first_ = step * T_last_first_;
+  for (const GroundAhead::Height& height : ahead_.Approach(step)) Take(height);
   ++age_;
   ++waited_;
   const double way = T_last_first_.translation.norm();
@@ -81,9 +82,7 @@ void CameraHeight::Search(const PinholeCamera& camera, const FrameFeatures& now)
       drift_ += by;
       covariance_(1, 1) = kJump * kJump;
     } else {
-      Forget();
-      reference_ = height;
-      covariance_(0, 0) = 1;
+      Learn(height);
     }
   }
   plane_ = found->normal_by_height;
@@ -108,7 +107,13 @@ void CameraHeight::Measure(const PinholeCamera& camera, const FrameFeatures& now
   }
   failures_ = 0;
   plane_ += 0.2 * (found->normal_by_height - plane_);
-  Update(std::log(found->Height()), way);
+  ahead_.Add(found->normal_by_height, T_last_first_, way);
+}
+
+void CameraHeight::Take(const GroundAhead::Height& height) {
+  const double misfit = height.log_height - reference_ - drift_;
+  if (!(std::abs(misfit) < kMisfit)) return;
+  Update(height.log_height, height.way);
   biased_ = std::abs(bias_) > kBias ? biased_ + 1 : 0;
   if (seen_ < kMeasurements / 2 || biased_ < kBiased) return;  // until all known speeds are new
   if (ScaleChanged(misfit)) {
@@ -142,11 +147,14 @@ bool CameraHeight::ScaleChanged(double by) const {
 // What is measured runs away from what is expected: no scale drifts so fast, the camera rises or sinks.
 void CameraHeight::BeginAnew() {
   const Eigen::Vector3d plane = plane_;
-  const int changes = std::min(changes_ + 1, kMostChanges);
-  Forget();
-  changes_ = changes;
+  changes_ = std::min(changes_ + 1, kMostChanges);
+  Learn(-std::log(plane.norm()));
   plane_ = plane;
-  reference_ = -std::log(plane.norm());
+}
+
+void CameraHeight::Learn(double log_height) {
+  Forget();
+  reference_ = log_height;
   covariance_(0, 0) = 1;
 }
 
@@ -176,11 +184,16 @@ std::optional<double> CameraHeight::Drift() const {
 
 void CameraHeight::Correct(double scale) {
   drift_ += std::log(scale);
-  for (double& speed : speeds_) speed += std::log(scale);
   corrected_ += std::log(scale);
   ++corrections_;
+  Scale(scale);
+}
+
+void CameraHeight::Scale(double scale) {
+  for (double& speed : speeds_) speed += std::log(scale);
   plane_ /= scale;
   T_last_first_.translation *= scale;
+  ahead_.Scale(scale);
 }
 
 void CameraHeight::Forget() {
@@ -199,9 +212,9 @@ std::optional<HeightFound> CameraHeight::Found() const {
 
 bool CameraHeight::IsPossible() const {
   return T_last_first_.IsFinite() && plane_.allFinite() && covariance_.allFinite() && age_ >= 0 &&
-         waited_ >= 0 && seen_ >= 0 && failures_ >= 0 && others_ >= 0 && biased_ >= 0 && changes_ >= 0 &&
-         changes_ <= kMostChanges && corrections_ >= 0 && std::isfinite(corrected_) &&
-         speeds_.size() <= kSpeeds &&
+         waited_ >= 0 && ahead_.IsPossible() && seen_ >= 0 && failures_ >= 0 && others_ >= 0 &&
+         biased_ >= 0 && changes_ >= 0 && changes_ <= kMostChanges && corrections_ >= 0 &&
+         std::isfinite(corrected_) && speeds_.size() <= kSpeeds &&
          std::all_of(speeds_.begin(), speeds_.end(), [](double v) { return std::isfinite(v); }) &&
          std::isfinite(known_speed_) && std::isfinite(reference_) && std::isfinite(drift_) &&
          std::isfinite(share_) && std::isfinite(spread_) && std::isfinite(bias_);
@@ -209,10 +222,8 @@ bool CameraHeight::IsPossible() const {
 
 void CameraHeight::Follow(double scale) {
   reference_ += std::log(scale);
-  for (double& speed : speeds_) speed += std::log(scale);
   known_speed_ += std::log(scale);
-  plane_ /= scale;
-  T_last_first_.translation *= scale;
+  Scale(scale);
 }
 
 }  // namespace tutti

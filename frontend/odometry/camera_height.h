@@ -9,6 +9,7 @@
 
 #include "frontend/features/features.h"
 #include "frontend/geometry/ground_plane.h"
+#include "frontend/odometry/ground_ahead.h"
 #include "tutti/frontend/odometry.h"
 
 namespace tutti {
@@ -37,22 +38,26 @@ class CameraHeight {
 
   template <class Archive>
   void State(Archive& archive) {
-    archive(first_, T_last_first_, age_, waited_, plane_, reference_, drift_, covariance_, seen_, share_,
-            spread_, bias_, failures_, others_, changes_, biased_, corrections_, corrected_, speeds_,
+    archive(first_, T_last_first_, age_, waited_, ahead_, plane_, reference_, drift_, covariance_, seen_,
+            share_, spread_, bias_, failures_, others_, changes_, biased_, corrections_, corrected_, speeds_,
             known_speed_);
   }
 
  private:
   void Search(const PinholeCamera& camera, const FrameFeatures& now);
   void Measure(const PinholeCamera& camera, const FrameFeatures& now);
+  void Take(const GroundAhead::Height& height);
   void Update(double log_height, double way);
+  void Scale(double scale);
   void SeeSpeed(double step);
   bool ScaleChanged(double by) const;
   void BeginAnew();
+  void Learn(double log_height);
 
   std::shared_ptr<const FrameFeatures> first_;  // the frame that the next ones are compared with
   Pose T_last_first_;
   int age_ = 0, waited_ = 0;                         // frames since first_, and since the last search
+  GroundAhead ahead_;                                // what Measure has found
   Eigen::Vector3d plane_ = Eigen::Vector3d::Zero();  // GroundPlane::normal_by_height; 0: not known
   double reference_ = 0, drift_ = 0;                 // logarithms: of the height at first, and of the drift
   Eigen::Matrix2d covariance_ = Eigen::Matrix2d::Zero();  // of both

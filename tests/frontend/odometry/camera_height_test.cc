@@ -68,6 +68,22 @@ TEST(CameraHeight, TellsNoDriftWhereThereIsNone) {
   EXPECT_LT(std::abs(height.Drift().value_or(0)), 0.01);
 }
 
+// A road that bends up and down is seen steeper ahead than it is below the camera.
+TEST(CameraHeight, TellsNoDriftOverHills) {
+  SyntheticOptions options = LongTown().Options();
+  options.hills_m = 8;
+  const testing::RenderedWorld hills(options);
+  CameraHeight height;
+  Pose last = hills.World().PoseOf(0);
+  for (std::size_t i = 0; i < kDriven; ++i) {
+    const Pose now = hills.World().PoseOf(i);
+    height.See(hills.Camera(), Features(hills.Render(i).image), now.Inverse(), last.Inverse(), kDepth);
+    last = now;
+    EXPECT_LT(std::abs(height.Drift().value_or(0)), 0.03) << i;
+  }
+  EXPECT_GT(height.Found()->measurements, 100);
+}
+
 TEST(CameraHeight, TellsADriftAndItsSign) {
   for (const double rate : {0.0005, -0.0005}) {  // 8 % in all
     CameraHeight height;

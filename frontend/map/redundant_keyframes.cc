@@ -2,13 +2,14 @@
 
 #include <algorithm>
 #include <utility>
+#include <vector>
 
 #include "frontend/map/landmark_fusion.h"
 
 namespace tutti {
 namespace {
 
-constexpr double kShare = 0.9;      // of a redundant keyframe's landmarks that
+constexpr double kShare = 0.85;     // of a redundant keyframe's landmarks that
 constexpr std::size_t kOthers = 3;  // so many others see
 constexpr int kCoarserLevels = 1;   // that a view of the others may be coarser: a corner's level wavers
 constexpr double kElsewhere = 0.1;  // of its landmarks: who has fewer in common with it saw something else
@@ -57,15 +58,17 @@ bool IsRedundant(const Map& map, int id, std::size_t least_views) {
   return seen > 0 && redundant >= kShare * static_cast<double>(seen);
 }
 
-// The older keyframe of the same piece with most common landmarks (ties: the oldest); -1 if there is none.
-int StandIn(const Map& map, int id) {
-  int best = -1, most = kLeastInCommon - 1;
+// Older keyframes of the same piece: those with most common landmarks first (ties: the oldest).
+std::vector<int> StandIns(const Map& map, int id) {
+  std::vector<std::pair<int, int>> by_shared;
   for (const auto& [other, shared] : map.keyframe(id).covisible) {
-    if (other >= id || shared <= most || map.keyframe(other).piece != map.keyframe(id).piece) continue;
-    best = other;
-    most = shared;
+    if (other < id && shared >= kLeastInCommon && map.keyframe(other).piece == map.keyframe(id).piece)
+      by_shared.emplace_back(-shared, other);
   }
-  return best;
+  std::sort(by_shared.begin(), by_shared.end());
+  std::vector<int> stand_ins;
+  for (const auto& [shared, other] : by_shared) stand_ins.push_back(other);
+  return stand_ins;
 }
 
 // The oldest of each piece: they hold it where it is.
@@ -93,10 +96,12 @@ std::map<int, int> RemoveRedundantKeyframes(const std::set<int>& keep, std::size
   for (int id = now.KeyframeCount() - 1; id > 0; --id) {
     if (now.keyframe(id).replaced_by >= 0 || keep.count(id) != 0 || first.count(id) != 0) continue;
     if (!IsRedundant(now, id, least_views)) continue;
-    const int into = StandIn(now, id);
-    if (into < 0 || !may(id, into)) continue;
-    map->RemoveKeyframe(id, into, least_views);
-    removed[id] = into;
+    const std::vector<int> stand_ins = StandIns(now, id);
+    const auto into =
+        std::find_if(stand_ins.begin(), stand_ins.end(), [&](int other) { return may(id, other); });
+    if (into == stand_ins.end()) continue;
+    map->RemoveKeyframe(id, *into, least_views);
+    removed[id] = *into;
   }
   if (!removed.empty()) map->UpdateGeometry();
   return removed;

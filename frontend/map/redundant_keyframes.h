@@ -14,7 +14,7 @@ namespace tutti {
 /// landmarks that are one become one: until then, none of their views is known to be superfluous.
 void FuseAll(const PinholeCamera& camera, Map* map);
 
-/// Removes redundant keyframes: at least 90 % of the landmarks that one sees are seen by others from as near
+/// Removes redundant keyframes: at least 85 % of the landmarks that one sees are seen by others from as near
 /// as it sees them, or nearer, by three (R. Mur-Artal et al., "ORB-SLAM", T-RO 31(5), 2015, section VI-E), or
 /// by `least_views` of an earlier visit (a keyframe in between has not even a tenth in common). The latter is
 /// what lets a place that is driven again and again cost what the first time did: where keyframes are far
@@ -22,9 +22,9 @@ void FuseAll(const PinholeCamera& camera, Map* map);
 ///
 /// From the newest to the oldest, so the first visits stay. So do the first keyframe of each map piece, and
 /// those of `keep`. For each one that is removed the older keyframe stands that has most landmarks in common
-/// with it; `may(removed, into)`, asked last, can forbid it. Landmarks with fewer than `least_views` views
-/// left (that many tell where one is) are removed as well. Returns which keyframe stands for each, which may
-/// have been removed itself.
+/// with it; `may(removed, into)`, asked last, can forbid it, and is then asked for the next one. Landmarks
+/// with fewer than `least_views` views left (that many tell where one is) are removed as well. Returns which
+/// keyframe stands for each, which may have been removed itself.
 std::map<int, int> RemoveRedundantKeyframes(const std::set<int>& keep, std::size_t least_views,
                                             const std::function<bool(int removed, int into)>& may, Map* map);
 

@@ -226,13 +226,13 @@ class Odometry {
   /// What keyframes see of the same landmarks is looked for in all that should see it, and fused.
   void FuseAll();
 
-  /// Removes keyframes that the map can do without, the newest first: at least 90 % of their landmarks are
+  /// Removes keyframes that the map can do without, the newest first: at least 85 % of their landmarks are
   /// seen by three others, or from an earlier visit. What keyframes see of the same landmarks is found first,
   /// and fused. The first keyframe of each piece stays, and what the last frame hangs on. Frames
   /// hang on the keyframe that stands for theirs, and stay where they are. `may(removed, into)`, asked of
-  /// each, can forbid it. Returns which older keyframe stands for each that was removed; that one may be
-  /// removed, too. Ids stay as they are. Throws InputError while frames are being located
-  /// (BeginLocalization).
+  /// each, can forbid it, and is asked again for other keyframes to stand for it. Returns which older
+  /// keyframe stands for each that was removed; that one may be removed, too. Ids stay as they are. Throws
+  /// InputError while frames are being located (BeginLocalization).
   std::map<int, int> RemoveRedundantKeyframes(const std::function<bool(int removed, int into)>& may);
 
   /// Begins to adjust all keyframes of a map piece and what they see (bundle adjustment) to each other,

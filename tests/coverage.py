@@ -5,6 +5,7 @@ build/coverage/html has every line with its count, build/coverage/missed.txt the
 """
 import argparse
 import collections
+import datetime
 import json
 import os
 import pathlib
@@ -41,7 +42,7 @@ def cov(command, merged, programs, *options):
 
 
 def missed_lines(build, text):
-    """Lines with the count 0 of `llvm-cov show`, in ranges, by file."""
+    """Lines with the count 0 of `llvm-cov show`, in ranges, by file; the same into missed.txt."""
     missed, file = collections.defaultdict(list), None
     for line in text.splitlines():
         if line.startswith("/") and line.endswith(":"):
@@ -55,10 +56,10 @@ def missed_lines(build, text):
             missed[file][-1][1] = number
         else:
             missed[file].append([number, number])
-    with open(build / "missed.txt", "w") as out:
-        for file, ranges in sorted(missed.items()):
-            spans = (f"{a}" if a == b else f"{a}-{b}" for a, b in ranges)
-            print(f"{file.relative_to(ROOT)}: {' '.join(spans)}", file=out)
+    spans = {str(file.relative_to(ROOT)): " ".join(f"{a}" if a == b else f"{a}-{b}" for a, b in ranges)
+             for file, ranges in sorted(missed.items())}
+    (build / "missed.txt").write_text("".join(f"{file}: {lines}\n" for file, lines in spans.items()))
+    return spans
 
 
 def module_of(file):
@@ -89,8 +90,8 @@ def main():
         module, count = module_of(file["filename"]), file["summary"]["lines"]
         lines[module] += count["count"]
         covered[module] += count["covered"]
-        files.append((count["percent"], str(pathlib.Path(file["filename"]).relative_to(ROOT)), count["count"] - count["covered"]))
-    missed_lines(build, cov("show", merged, programs))
+        files.append((count["percent"], str(pathlib.Path(file["filename"]).relative_to(ROOT))))
+    missed = missed_lines(build, cov("show", merged, programs))
     cov("show", merged, programs, "-format=html", f"-output-dir={build}/html")
     table = ["| module | lines that can run | reached by its tests | |", "|---|---:|---:|---|"]
     short = False
@@ -99,17 +100,21 @@ def main():
         below = percent < BOUND.get(name, 0)
         short |= below
         table.append(f"| {name} | {lines[name]:,} | {percent:.1f} % | {f'below {BOUND[name]} %' if below else ''} |")
-    worst = [f"| `{name}` | {percent:.1f} % | {count} |" for percent, name, count in sorted(files)
-             if module_of(ROOT / name) in modules and percent < 90]
-    text = "\n".join(table + ["", "Files below 90 %:", "", "| file | reached | lines missed |", "|---|---:|---:|"] + worst) + "\n"
+    worst = [f"| `{name}` | {percent:.1f} % | {missed[name]} |" for percent, name in sorted(files)
+             if module_of(ROOT / name) in modules and name in missed]
+    text = "\n".join(table + ["", "What nothing reached, the least covered file first:", "", "| file | reached | lines that are not |",
+                              "|---|---:|---|"] + worst) + "\n"
     print(text)
     print(f"lines that nothing reached: {build / 'missed.txt'}; all of them with counts: {build / 'html' / 'index.html'}")
     if failed:
         print(f"FAILED: {' '.join(failed)}; see the logs in {build}", file=sys.stderr)
     if arguments.write and not failed:
-        (ROOT / "docs" / "results" / "coverage.md").write_text(
-            "# Lines that tests reach\n\nOf each module by the unit tests of " + ", ".join(modules) + "; `./dev coverage "
-            + " ".join(arguments.modules) + (" " if arguments.modules else "") + "--write`. Tests of the programs are not counted.\n\n" + text)
+        commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, check=True, capture_output=True, text=True).stdout.strip()
+        command = " ".join(["./dev coverage", *arguments.modules, "--write"])
+        (ROOT / "docs" / "results" / "coverage.md").write_text("\n".join([
+            "# Lines that tests reach", "",
+            f"Of each module by the unit tests of {', '.join(modules)}, counted by clang; tests of the programs are not counted.",
+            f"`{command}`; {datetime.date.today()}, commit {commit}.", "", text]))
     return 1 if failed or short else 0
 
 

@@ -87,6 +87,17 @@ TEST(TrajectoryCoverage, WithTheImagesStampsTheFiguresAreExact) {
   EXPECT_LT(Covered(Frames(0, 999), Frames(100, 399)).share(), 0.31);
 }
 
+TEST(TrajectoryCoverage, TheOffsetIsAddedToTheImagesStampsToo) {
+  // The clock of the images is 50 s late, and so are the stamps of the poses.
+  std::vector<double> frames;
+  Trajectory late = Frames(0, 499);
+  for (StampedPose& pose : late) pose.stamp_s += 50;
+  for (int k = 0; k < 1000; ++k) frames.push_back(150 + 0.1 * k);
+  const TrajectoryCoverage c = Covered(Frames(0, 999), late, -50, frames);
+  EXPECT_EQ(c.all, 1000u);
+  EXPECT_EQ(c.posed, 500u);
+}
+
 TEST(TrajectoryCoverage, OnePoseIsOneOfTheReferences) {
   const TrajectoryCoverage c = Covered(Frames(0, 99), Frames(50, 50));
   EXPECT_EQ(c.posed, 1u);

@@ -78,6 +78,17 @@ TEST(Certificate, HoldsForGraphsWithoutNoiseAndForSeveralParts) {
   EXPECT_TRUE(CertifyOptimum(parts).certified);
 }
 
+// So little noise that the bound's rounding is more than the accepted share of the cost.
+TEST(Certificate, HoldsWhereTheGapIsOnlyRounding) {
+  for (const GraphKind kind : {GraphKind::kSE2, GraphKind::kSE3}) {
+    PoseGraph graph = NoisyGraphOf(kind, 1e-7).graph;
+    PoseGraphOptimizer().Optimize(graph);
+    const Certificate certificate = CertifyOptimum(graph);
+    EXPECT_GT(certificate.relative_gap, CertificateOptions().certified_gap);
+    EXPECT_TRUE(certificate.certified) << certificate.reason << " gap " << certificate.relative_gap;
+  }
+}
+
 TEST(Certificate, SaysWhyThereIsNone) {
   EXPECT_FALSE(CertifyOptimum(PoseGraph()).available);
   EXPECT_NE(CertifyOptimum(NoisyGraphOf(GraphKind::kSim3).graph).reason.find("scale"), std::string::npos);

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <string>
+#include <vector>
+
 #include "tutti/core/error.h"
 #include "tutti/loopclosure/detector.h"
 
@@ -90,6 +93,43 @@ TEST(LoopDetectorOptions, ValuesOutOfRangeAreNamed) {
               o.external_members = {"mine"};
             }),
             "");
+}
+
+// Each beside the same without the other half.
+TEST(LoopDetectorOptions, ChoicesThatContradictEachOtherAreRefused) {
+  const auto problem = [](auto change) {
+    LoopDetectorOptions options;
+    change(options);
+    return options.Validate();
+  };
+  const auto single = [&](std::vector<std::string> members) {
+    return problem([&](auto& o) {
+      o.rule = CombinationRule::kSingle;
+      o.members = members;
+    });
+  };
+  EXPECT_EQ(single({"orb"}), "");
+  EXPECT_NE(single({"orb", "sift"}).find("exactly one member, not 2"), std::string::npos);
+  const auto with_rule = [&](CombinationRule rule, MemoryKind memory, EvidenceKind evidence) {
+    return problem([&](auto& o) {
+      o.rule = rule;
+      o.memory = memory;
+      o.evidence.kind = evidence;
+    });
+  };
+  EXPECT_EQ(with_rule(CombinationRule::kMean, MemoryKind::kPerMember, EvidenceKind::kStandardised), "");
+  EXPECT_NE(with_rule(CombinationRule::kJoint, MemoryKind::kPerMember, EvidenceKind::kCounts).find("memory"),
+            std::string::npos);
+  EXPECT_NE(with_rule(CombinationRule::kJoint, MemoryKind::kShared, EvidenceKind::kStandardised)
+                .find("evidence.kind"),
+            std::string::npos);
+  const auto deepest = [&](double depth) {
+    return problem([=](auto& o) { o.verification.max_depth_m = depth; });
+  };
+  const double nearest = VerificationOptions().min_depth_m;
+  EXPECT_EQ(deepest(2 * nearest), "");
+  EXPECT_NE(deepest(nearest).find("min_depth_m must be below"), std::string::npos);
+  EXPECT_NE(problem([](auto& o) { o.dense_members = {"mine"}; }).find("external_members"), std::string::npos);
 }
 
 }  // namespace

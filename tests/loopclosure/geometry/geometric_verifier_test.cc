@@ -2,10 +2,12 @@
 // numbers.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
 #include <string>
+#include <vector>
 
 #include "core/dense_solvers.h"
 #include "loopclosure/geometry/verification.h"
@@ -41,7 +43,7 @@ class TwoViews {
         q = kCandidateQuery.Inverse() * p;
         a = candidate_.camera->Project(p);
         b = query_.camera->Project(q);
-      } while (!candidate_.camera->Contains(a) || !query_.camera->Contains(b));
+      } while (!candidate_.camera->Contains(a) || !query_.camera->Contains(b) || !IsAlone(a, b));
       AddMatch(a, b, with_points ? p : Nowhere(), Nowhere());
       true_points_.push_back(p);
     }
@@ -50,7 +52,11 @@ class TwoViews {
   // Matches of nothing.
   TwoViews& AddFalse(int count, bool with_points) {
     for (int i = 0; i < count; ++i) {
-      const Eigen::Vector2d a(Between(0, 640), Between(0, 480)), b(Between(0, 640), Between(0, 480));
+      Eigen::Vector2d a, b;
+      do {
+        a = {Between(0, 640), Between(0, 480)};  // in braces: drawn in this order by every compiler
+        b = {Between(0, 640), Between(0, 480)};
+      } while (!IsAlone(a, b));
       AddMatch(a, b,
                with_points ? Eigen::Vector3d(Between(5, 6) * candidate_.camera->Unproject(a)) : Nowhere(),
                Nowhere());
@@ -80,6 +86,16 @@ class TwoViews {
   double Between(double low, double high) { return low + (high - low) * (random_() % 1000000u) / 1e6; }
   static Eigen::Vector3d Nowhere() {
     return Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
+  }
+  // Of matches in the same 4 x 4 px of an image the verifier counts one.
+  bool IsAlone(const Eigen::Vector2d& in_candidate, const Eigen::Vector2d& in_query) const {
+    const auto far = [](const View& view, const Eigen::Vector2d& pixel) {
+      const std::vector<cv::Point2f>& others = view.members[0].pixels;
+      return std::none_of(others.begin(), others.end(), [&](const cv::Point2f& other) {
+        return (Eigen::Vector2d(other.x, other.y) - pixel).norm() < 6;
+      });
+    };
+    return far(candidate_, in_candidate) && far(query_, in_query);
   }
   void AddMatch(const Eigen::Vector2d& in_candidate, const Eigen::Vector2d& in_query,
                 const Eigen::Vector3d& candidate_point, const Eigen::Vector3d& query_point) {

@@ -87,7 +87,8 @@ std::vector<Match> MatchesOf(const cv::Mat& query, const cv::Mat& candidate,
       if (cv::norm(points[static_cast<std::size_t>(j)] - points[static_cast<std::size_t>(best)]) > 4)
         second = std::min(second, Between(query.row(i), candidate.row(j)));
     }
-    const double ratio = Between(query.row(i), candidate.row(best)) / second;
+    const double least = Between(query.row(i), candidate.row(best));
+    const double ratio = second > 0 ? least / second : 1;  // the same in two places: says nothing
     if (ratio <= kRatio) matches.push_back({i, best, static_cast<float>(ratio)});
   }
   return matches;

@@ -67,6 +67,7 @@ std::vector<int> StandIns(const Map& map, int id) {
   }
   std::sort(by_shared.begin(), by_shared.end());
   std::vector<int> stand_ins;
+  stand_ins.reserve(by_shared.size());
   for (const auto& [shared, other] : by_shared) stand_ins.push_back(other);
   return stand_ins;
 }

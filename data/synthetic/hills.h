@@ -1,7 +1,7 @@
 // What the town's streets go up and down over.
 #pragma once
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <vector>

@@ -10,8 +10,8 @@
 namespace tutti {
 namespace {
 
-constexpr double kNearest = 3, kFarthest = 8, kAside = 1.2;  // of the ground that is looked at [heights]
-constexpr int kFromEdge = 4;                                 // of the image [px]
+constexpr double kNearest = 3, kFarthest = 8;  // of the ground that is looked at [heights]
+constexpr int kFromEdge = 4;                   // of the image [px]
 constexpr double kMostPixels = 2500, kMostInSearch = 600, kFewestPixels = 150;
 constexpr int kIterations = 10;
 constexpr double kConverged = 1e-3, kNearlyConverged = 1e-2;  // of the plane
@@ -25,21 +25,20 @@ struct Pixel {
   double grey = 0;
 };
 
-// What the plane n . X = h says is between kNearest and kFarthest ahead, and kAside to each side [heights]:
-// four half planes of rays r with n . r > 0, each with a . r > 0. Ahead is where the camera looks.
+// What the plane n . X = h says is between kNearest and kFarthest ahead, and kGroundAside to each side
+// [heights]: four half planes of rays r with n . r > 0, each with a . r > 0. Ahead is where the camera looks.
 using Field = Eigen::Matrix<double, 5, 3>;
 
 Field LookedAt(const Eigen::Vector3d& plane) {
   const Eigen::Vector3d normal = plane.normalized();
-  const Eigen::Vector3d ahead =
-      (Eigen::Vector3d::UnitZ() - normal.z() * normal).stableNormalized();  // 0: it looks straight down
+  const Eigen::Vector3d ahead = AheadOnGround(normal);
   const Eigen::Vector3d aside = normal.cross(ahead);
   Field field;
   field.row(0) = normal;
   field.row(1) = ahead - kNearest * normal;
   field.row(2) = kFarthest * normal - ahead;
-  field.row(3) = kAside * normal - aside;
-  field.row(4) = kAside * normal + aside;
+  field.row(3) = kGroundAside * normal - aside;
+  field.row(4) = kGroundAside * normal + aside;
   return field;
 }
 
@@ -166,6 +165,10 @@ Brightness Compare(const Pairs& pairs) {
 }
 
 }  // namespace
+
+Eigen::Vector3d AheadOnGround(const Eigen::Vector3d& normal) {
+  return (Eigen::Vector3d::UnitZ() - normal.z() * normal).stableNormalized();
+}
 
 std::optional<GroundPlane> AlignGround(const PinholeCamera& camera, const cv::Mat& first,
                                        const cv::Mat& second, const Pose& T_second_first,

@@ -21,8 +21,14 @@ struct GroundPlane {
   double Height() const { return 1 / normal_by_height.norm(); }
 };
 
-/// The ground between 3 and 8 heights ahead of the first camera, and 1.2 to each side. Images are CV_8U and
-/// rectified. None: too little of it is in both images, or the search came to no end.
+/// How far to each side the ground is looked at [heights].
+inline constexpr double kGroundAside = 1.2;
+
+/// Where a camera looks, along a ground of this normal (of length 1). 0: it looks straight down.
+Eigen::Vector3d AheadOnGround(const Eigen::Vector3d& normal);
+
+/// The ground between 3 and 8 heights ahead of the first camera, and kGroundAside to each side. Images are
+/// CV_8U and rectified. None: too little of it is in both images, or the search came to no end.
 std::optional<GroundPlane> AlignGround(const PinholeCamera& camera, const cv::Mat& first,
                                        const cv::Mat& second, const Pose& T_second_first,
                                        const Eigen::Vector3d& start);

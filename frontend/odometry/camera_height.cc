@@ -74,10 +74,10 @@ void CameraHeight::Search(const PinholeCamera& camera, const FrameFeatures& now)
   const std::optional<Eigen::Vector3d> below = NormalBelow(T_last_first_);
   if (!below || !(AngleBetween(found->normal_by_height, *below) < 2 * kTurned)) return;
   // One that is known stays, unless it is another ground.
-  const bool same = seen_ > 0 && std::abs(std::log(found->Height()) - reference_ - drift_) < kMisfit;
+  const double height = std::log(found->Height()), by = Misfit(height);
+  const bool same = seen_ > 0 && std::abs(by) < kMisfit;
   if (!same) {
     if (seen_ > 0 && ++others_ < kOthers) return;
-    const double height = std::log(found->Height()), by = height - reference_ - drift_;
     if (seen_ >= kMeasurements && ScaleChanged(by)) {
       drift_ += by;
       covariance_(1, 1) = kJump * kJump;
@@ -94,7 +94,7 @@ void CameraHeight::Measure(const PinholeCamera& camera, const FrameFeatures& now
   if (way > kLongestWay) return;
   const auto found =
       AlignGround(camera, first_->pyramid->front(), now.pyramid->front(), T_last_first_, plane_);
-  const double misfit = found ? std::log(found->Height()) - reference_ - drift_ : 0;
+  const double misfit = found ? Misfit(std::log(found->Height())) : 0;
   const bool agrees = found && found->correlation > kAgrees &&
                       AngleBetween(found->normal_by_height, plane_) < kTurned && std::abs(misfit) < kMisfit;
   ++seen_;
@@ -111,9 +111,9 @@ void CameraHeight::Measure(const PinholeCamera& camera, const FrameFeatures& now
 }
 
 void CameraHeight::Take(const GroundAhead::Height& height) {
-  const double misfit = height.log_height - reference_ - drift_;
+  const double misfit = Misfit(height.log_height);
   if (!(std::abs(misfit) < kMisfit)) return;
-  Update(height.log_height, height.way);
+  Update(misfit, height.way);
   biased_ = std::abs(bias_) > kBias ? biased_ + 1 : 0;
   if (seen_ < kMeasurements / 2 || biased_ < kBiased) return;  // until all known speeds are new
   if (ScaleChanged(misfit)) {
@@ -159,9 +159,8 @@ void CameraHeight::Learn(double log_height) {
 }
 
 // Kalman filter; a misfit beyond twice what is usual counts as if it were so much.
-void CameraHeight::Update(double log_height, double way) {
+void CameraHeight::Update(double misfit, double way) {
   const Eigen::RowVector2d by(1, 1);
-  const double misfit = log_height - reference_ - drift_;
   const double weight = std::max(kMemory, 1.0 / seen_);
   spread_ += weight * (misfit * misfit - spread_);
   bias_ += weight * (misfit - bias_);

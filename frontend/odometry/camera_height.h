@@ -47,7 +47,8 @@ class CameraHeight {
   void Search(const PinholeCamera& camera, const FrameFeatures& now);
   void Measure(const PinholeCamera& camera, const FrameFeatures& now);
   void Take(const GroundAhead::Height& height);
-  void Update(double log_height, double way);
+  void Update(double misfit, double way);
+  double Misfit(double log_height) const { return log_height - reference_ - drift_; }
   void Scale(double scale);
   void SeeSpeed(double step);
   bool ScaleChanged(double by) const;

@@ -3,13 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "frontend/geometry/ground_plane.h"
+
 namespace tutti {
 namespace {
 
 // Ahead of where it is seen [heights]. What is looked at lies between 3 and 8 (GroundPlane), but near ground
 // has more pixels, and the nearer, the less an error of the way's direction does.
 constexpr double kAbove = 2.8;
-constexpr double kAside = 1.2;  // farther than that, another ground may be below the camera [heights]
 constexpr std::size_t kMost = 12;
 
 }  // namespace
@@ -24,12 +25,12 @@ std::vector<GroundAhead::Height> GroundAhead::Approach(const Pose& step) {
   const auto passed = [&](Piece& piece) {
     piece.T_camera_first = step * piece.T_camera_first;
     const Eigen::Vector3d normal = piece.plane.normalized();
-    const Eigen::Vector3d ahead =
-        (Eigen::Vector3d::UnitZ() - normal.z() * normal).stableNormalized();  // 0: it looked straight down
+    const Eigen::Vector3d ahead = AheadOnGround(normal);
     const Eigen::Vector3d here = piece.plane.norm() * piece.T_camera_first.Inverse().translation;
     if (!(ahead.dot(here) >= kAbove)) return false;
     const double height = 1 - normal.dot(here);
-    if (std::abs(normal.cross(ahead).dot(here)) < kAside && height > 0)
+    const double aside = std::abs(normal.cross(ahead).dot(here));  // beyond what was looked at: unknown
+    if (aside < kGroundAside && height > 0)
       reached.push_back({std::log(height / piece.plane.norm()), piece.way});
     return true;
   };

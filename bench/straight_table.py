@@ -38,7 +38,8 @@ HEADING_DEG, LENGTH_M = 8, 70
 def compressed(folder):
     """A copy of a generated drive whose images are JPEG."""
     out = folder.with_name(folder.name + "-jpeg")
-    if not (out / "done").exists():
+    done, world = out / "done", (folder / ".options").read_text()
+    if not (done.exists() and done.read_text() == world):
         shutil.rmtree(out, ignore_errors=True)
         (out / "image_0").mkdir(parents=True)
         for file in folder.iterdir():
@@ -46,7 +47,7 @@ def compressed(folder):
                 shutil.copy(file, out)
         subprocess.run(["ffmpeg", "-loglevel", "error", "-i", folder / "image_0" / "%06d.png", "-q:v", "3", "-start_number", "0",
                         out / "image_0" / "%06d.jpg"], check=True)
-        (out / "done").touch()
+        done.write_text(world)
     return out
 
 

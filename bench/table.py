@@ -3,6 +3,7 @@
 Nothing that git tracks is rewritten without --write.
 """
 import argparse
+import hashlib
 import json
 import os
 import pathlib
@@ -80,9 +81,10 @@ def shown(path):
 
 
 def generate(tutti, folder, options):
-    """The folder of a world, which is made once; it is deterministic."""
+    """The folder of a world, which is made once for these options and this code; it is deterministic."""
     done = folder / ".options"
-    words = " ".join(map(str, options))
+    code = hashlib.sha256(b"".join(f.read_bytes() for f in sorted((ROOT / "data" / "synthetic").iterdir()))).hexdigest()
+    words = " ".join(map(str, [*options, code]))
     if not (done.exists() and done.read_text() == words):
         shutil.rmtree(folder, ignore_errors=True)
         subprocess.run([tutti, "generate", "--out", folder, *map(str, options)], check=True, stdout=subprocess.DEVNULL)

@@ -17,7 +17,7 @@ constexpr double kTurned = 0.12;                // of the ground against the cam
 constexpr double kMisfit = 0.25;                // of a logarithm: no measurement of the ground
 constexpr double kSigma = 0.06;  // of one, over a way of one height; errors of the road as well
 constexpr double kWalk = 0.003;  // of the drift, over a way of one height
-constexpr int kMeasurements = 40, kMostFailures = 10, kOthers = 5, kMostChanges = 8;
+constexpr int kMeasurements = 40, kMostFailures = 10, kOtherGrounds = 5, kMostChanges = 8;
 constexpr double kOften = 0.6, kSpread = 0.1, kBias = 0.06;
 constexpr double kMemory = 0.04;  // weight of the newest measurement in what holds "of late"
 constexpr std::size_t kSpeeds = 15;
@@ -77,7 +77,7 @@ void CameraHeight::Search(const PinholeCamera& camera, const FrameFeatures& now)
   const double height = std::log(found->Height()), by = Misfit(height);
   const bool same = seen_ > 0 && std::abs(by) < kMisfit;
   if (!same) {
-    if (seen_ > 0 && ++others_ < kOthers) return;
+    if (seen_ > 0 && ++others_ < kOtherGrounds) return;
     if (seen_ >= kMeasurements && ScaleChanged(by)) {
       drift_ += by;
       covariance_(1, 1) = kJump * kJump;

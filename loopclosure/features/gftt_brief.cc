@@ -17,8 +17,8 @@ constexpr int kHalf = kPatch / 2;
 constexpr int kApart = 5;           // corners are no nearer to each other [px]
 constexpr double kQuality = 0.001;  // of the best corner, below which there is none
 constexpr double kLeastCorner =
-    1e-4;                  // smaller eigenvalue below which there is no corner, as cv::cornerMinEigenVal
-constexpr int kBlock = 3;  // window of a corner [px]
+    1e-4;  // smaller eigenvalue below which there is no corner, as cv::cornerMinEigenVal
+constexpr int kCornerBlock = 3;  // window of a corner [px]
 
 struct Pair {
   cv::Point a;
@@ -70,9 +70,9 @@ class GfttBrief : public cv::Feature2D {
   void Detect(const cv::Mat& grey, const cv::Mat& mask, std::vector<cv::KeyPoint>& keypoints) const {
     keypoints.clear();
     cv::Mat strength;
-    cv::cornerMinEigenVal(grey, strength, kBlock);
+    cv::cornerMinEigenVal(grey, strength, kCornerBlock);
     std::vector<cv::Point2f> corners;
-    cv::goodFeaturesToTrack(grey, corners, max_features_, kQuality, kApart, mask, kBlock);
+    cv::goodFeaturesToTrack(grey, corners, max_features_, kQuality, kApart, mask, kCornerBlock);
     for (const cv::Point2f& corner : corners) {
       const float response = strength.at<float>(cvRound(corner.y), cvRound(corner.x));
       if (static_cast<double>(response) < kLeastCorner) continue;

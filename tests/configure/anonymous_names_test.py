@@ -69,6 +69,18 @@ def name_of(statement):
     return None if not found or "::" in found.group(1) else found.group(1)
 
 
+def further_names(statement):
+    """Those after the first one that a declaration of constants declares: constexpr int a = 1, b = F(2, 3)."""
+    if not re.match(r"\s*(?:static|constexpr|const|inline)\s", statement):
+        return []
+    previous = None
+    while previous != statement:  # arguments, whose commas part no declarations
+        previous, statement = statement, re.sub(r"\([^()]*\)|\[[^\[\]]*\]|<[^<>;]*>", " ", statement)
+    first, *others = statement.split(",")
+    found = [re.match(r"[\s*&]*(\w+)\s*(?:=|$)", part) for part in others] if "=" in first else []
+    return [name.group(1) for name in found if name]
+
+
 def definitions(path):
     """{name: its text where it is another name for something, which may be said twice in the same words}."""
     found = {}
@@ -77,6 +89,7 @@ def definitions(path):
         if name:
             words = " ".join(statement.replace(" tutti::", " ").split())
             found[name] = words if ALIAS.match(words) or USING.match(words) else ""
+        found.update(dict.fromkeys(further_names(statement), ""))
     return found
 
 
@@ -106,6 +119,7 @@ def report(targets):
 CASES = [
     ("Number", "std::string Number(double value) { return {}; }", "int Number(const char* word, int line);"),
     ("kHalf", "constexpr int kHalf = 3;  // [px]", "constexpr double kHalf = 0.5, kOther = 1;"),
+    ("kLeast", "constexpr int kMost = F(2, 3), kLeast = 5;", "constexpr std::size_t kLeast = 3;"),
     ("Town", "struct Town { int Size() const { return 1; } };", "cv::Mat Town(int frame) { return {}; }"),
     ("Kind", "enum class Kind : int { kOne };", "class Kind : public Base<int> {};"),
     ("Pick", "template <typename T, int N>\nconst T* Pick(const std::vector<T>& all) { return nullptr; }",

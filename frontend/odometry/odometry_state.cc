@@ -114,7 +114,7 @@ void ReadLandmarks(int count, internal::StateReader& in, Map* map) {
   std::string packed;
   in(packed);
   cv::Mat all(patches * Patch::kSide, Patch::kSide, CV_8UC1);
-  if (!internal::UnpackGrey(packed, &all)) in.Damaged("patches that are none");
+  if (!internal::GetGrey(packed, &all)) in.Damaged("patches that are none");
   LandmarkDescriptors descriptors;
   in(descriptors);
   descriptors.Give(&landmarks, *map, in);
@@ -167,7 +167,7 @@ void Odometry::Impl::Save(const internal::SectionSink& sink) const {
     const int end = std::min(first + kLandmarksPerSection, head.landmarks);
     write(Section::kLandmarks, [&](auto& out) {
       for (int id = first; id < end; ++id) out(map().landmark(id));
-      out(internal::PackGrey(PatchesOf(map(), first, end)));
+      out(internal::PutGrey(PatchesOf(map(), first, end)));
       LandmarkDescriptors descriptors;
       for (int id = first; id < end; ++id) {
         if (map().landmark(id).alive) descriptors.Add(map().landmark(id), map());

@@ -136,15 +136,15 @@ void StateOfPyramid(Archive& archive, std::shared_ptr<const std::vector<cv::Mat>
   archive(sizes);
   std::string packed;
   if constexpr (!Archive::kReading) {
-    if (!levels.empty()) packed = PackGrey(levels[0]);
+    if (!levels.empty()) packed = PutGrey(levels[0]);
   }
   archive(packed);
   if constexpr (Archive::kReading) {
     constexpr std::size_t kMostLevels = 16;
-    if (sizes.empty() || sizes.size() > kMostLevels || !CanBeGrey(packed, sizes[0].second, sizes[0].first))
+    if (sizes.empty() || sizes.size() > kMostLevels || !IsGrey(packed, sizes[0].second, sizes[0].first))
       archive.Damaged("a pyramid without its image");
     levels.emplace_back(sizes[0].second, sizes[0].first, CV_8UC1);
-    if (!UnpackGrey(packed, &levels[0])) archive.Damaged("an image that is none");
+    if (!GetGrey(packed, &levels[0])) archive.Damaged("an image that is none");
     for (std::size_t l = 1; l < sizes.size(); ++l) {
       const auto& [columns, rows] = sizes[l];
       if (columns < 1 || rows < 1 || columns > sizes[l - 1].first || rows > sizes[l - 1].second)

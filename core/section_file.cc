@@ -225,6 +225,14 @@ std::uint32_t SectionReader::Peek() {
   return header.tag;
 }
 
+void SectionReader::SkipTo(std::uint32_t tag) {
+  while (Peek() != tag) {
+    const std::uint64_t stored = ReadHeader().stored;
+    in_.seekg(static_cast<std::streamoff>(stored), std::ios::cur);
+    left_ -= stored;
+  }
+}
+
 void SectionReader::Damaged(const std::string& what) const { ByteReader("", name_).Damaged(what); }
 
 void SectionReader::Read(void* data, std::size_t size) {

@@ -97,6 +97,12 @@ class SectionReader {
   std::string Expect(std::uint32_t tag);
   /// The tag of the next section, which is still to be read.
   std::uint32_t Peek();
+  /// Leaves out, unread, what stands before the next section with this tag.
+  template <typename Enum>
+  void SkipTo(Enum tag) {
+    SkipTo(static_cast<std::uint32_t>(tag));
+  }
+  void SkipTo(std::uint32_t tag);
 
   [[noreturn]] void Damaged(const std::string& what) const;
   const std::string& name() const { return name_; }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <future>
 #include <optional>
 #include <utility>
 
@@ -173,9 +174,16 @@ class SlamSystem::Impl {
     return MapSnapshot(std::move(parts));
   }
 
-  // From what follows MapSection::kInfo.
+  // From what follows MapSection::kInfo. The detector's half of the file is read beside the other.
   void Load(internal::SectionReader& file, const std::function<void(internal::SectionReader&)>& more) {
     ReadState(file, MapSection::kState, this);
+    std::optional<internal::SectionReader> second;
+    std::future<void> detector;
+    if (loops_.Searching()) {
+      second.emplace(file.name(), kMapFile);
+      detector = std::async(config_.run.threads > 1 ? std::launch::async : std::launch::deferred,
+                            [&] { LoadDetector(*second); });
+    }
     if (odometry_) odometry_->LoadSections(&file);
     loops_.Check(odometry(), file);
     std::optional<LoopSolution> solution;
@@ -186,15 +194,22 @@ class SlamSystem::Impl {
       adjustment = odometry_.value().LoadGlobalAdjustment(&file);
     }
     loops_.ResumePending(std::move(solution), std::move(adjustment));
-    if (loops_.Searching()) {
-      LoopWorker::Saved saved;
-      ReadState(file, MapSection::kDetector, &saved);
-      loops_.ResumeDetector(&file, std::move(saved));
+    if (second) {
+      if (!Next(file, MapSection::kDetector)) file.Damaged("a section out of place");
+      detector.get();
     }
-    if (more) more(file);
+    internal::SectionReader& end = second ? *second : file;
+    if (more) more(end);
     std::string rest;  // of whoever wrote them
-    while (file.Next(&rest) != internal::kEndOfSections) {
+    while (end.Next(&rest) != internal::kEndOfSections) {
     }
+  }
+
+  void LoadDetector(internal::SectionReader& file) {
+    file.SkipTo(MapSection::kDetector);
+    LoopWorker::Saved saved;
+    ReadState(file, MapSection::kDetector, &saved);
+    loops_.ResumeDetector(&file, std::move(saved));
   }
 
   // What MapSection::kState holds.

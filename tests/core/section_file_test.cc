@@ -65,6 +65,15 @@ TEST_F(SectionFile, AnotherSectionThanTheExpectedOneIsDamage) {
   EXPECT_THROW(in.Expect(Section::kThird), InputError);
 }
 
+TEST_F(SectionFile, WhatStandsBeforeASectionCanBeLeftOut) {
+  WriteTwoSections();
+  SectionReader in(file_, kKind);
+  in.SkipTo(Section::kSecond);
+  in.SkipTo(Section::kSecond);
+  EXPECT_EQ(in.Expect(Section::kSecond), std::string("a\0b", 3));
+  EXPECT_THROW(in.SkipTo(Section::kFirst), InputError);
+}
+
 TEST_F(SectionFile, WithoutFinishNothingIsLeftAndTheOldFileStays) {
   WriteTwoSections();
   const std::string before = Content(file_);

@@ -107,8 +107,8 @@ def document(rows):
             p = rows[name]["parts"].get(part, {"kb": 0, "content_kb": 0})
             cells.append(f"{p['kb']:.1f} ({p['content_kb']:.1f})")
         lines.append(f"| {ROWS[name][0]} | " + " | ".join(cells) + " |")
-    lines += ["", "A view's descriptors are most of it: those of SURF are floats whose mantissas nothing packs. What views share "
-              "with the odometry's keyframes, and words with views, is stored once.", "", *use_table(rows)]
+    lines += ["", "A view's descriptors are most of it. What views share with the odometry's keyframes, and words with views, is "
+              "stored once.", "", *use_table(rows)]
     return "\n".join(lines)
 
 

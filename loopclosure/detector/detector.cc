@@ -173,7 +173,7 @@ std::vector<LoopPlace> LoopDetector::Places() const {
     for (std::size_t m = 0; m < view.members.size(); ++m) {
       Features& features = place.member_features[state.members()[m].name()];
       cv::KeyPoint::convert(view.members[m].pixels, features.keypoints);
-      features.descriptors = view.members[m].descriptors;
+      features.descriptors = view.members[m].descriptors.Unpacked();
     }
     places.push_back(std::move(place));
   }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/byte_stream.h"
+#include "loopclosure/detector/parallel.h"
 #include "loopclosure/geometry/view_bytes.h"
 #include "tutti/core/error.h"
 
@@ -67,8 +68,8 @@ void LoadRecord(ByteReader& in, LocationStore& store) {
 }
 
 // The descriptors of a member's features in views, in their order: most of its words are among them.
-std::vector<cv::Mat> DescriptorsOf(std::size_t member, const std::vector<const View*>& views) {
-  std::vector<cv::Mat> all;
+std::vector<PackedMat> DescriptorsOf(std::size_t member, const std::vector<const View*>& views) {
+  std::vector<PackedMat> all;
   for (const View* view : views) {
     if (member < view->members.size()) all.push_back(view->members[member].descriptors);
   }
@@ -137,12 +138,16 @@ void SavedDetector::ReadOptions() {
   seed_ = bytes.Get<std::uint64_t>();
 }
 
-template <typename Read>
-void SavedDetector::Load(std::uint32_t section, const Read& read) {
-  const std::string content = in_.Expect(section);
+template <typename Take>
+void SavedDetector::Read(const std::string& content, const Take& take) const {
   ByteReader bytes(content, in_.name());
-  read(bytes);
+  take(bytes);
   if (!bytes.AtEnd()) bytes.Damaged("a section is too long");
+}
+
+template <typename Take>
+void SavedDetector::Load(std::uint32_t section, const Take& take) {
+  Read(in_.Expect(section), take);
 }
 
 void SavedDetector::LoadInto(DetectorState& state, LongTermMemory& long_term) {
@@ -156,11 +161,14 @@ void SavedDetector::LoadInto(DetectorState& state, LongTermMemory& long_term) {
   std::vector<const View*> in_order;
   in_order.reserve(views.size());
   for (const auto& [slot, view] : views) in_order.push_back(&view);
-  for (std::size_t m = 0; m < state.members().size(); ++m) {
-    Load(Tag(Section::kMember), [&](ByteReader& bytes) {
-      state.ensemble().members()[m].vocabulary().Load(DescriptorsOf(m, in_order), bytes);
-    });
-  }
+  std::vector<Member>& members = state.ensemble().members();
+  std::vector<std::string> vocabularies;
+  for (std::size_t m = 0; m < members.size(); ++m) vocabularies.push_back(in_.Expect(Section::kMember));
+  RunParallel(static_cast<int>(members.size()), state.options().threads, [&](int member) {
+    const auto m = static_cast<std::size_t>(member);
+    Read(vocabularies[m],
+         [&](ByteReader& bytes) { members[m].vocabulary().Load(DescriptorsOf(m, in_order), bytes); });
+  });
   for (auto& system : reasoner.systems()) {
     Load(Tag(Section::kMemory), [&](ByteReader& bytes) { system->Load(bytes); });
   }

@@ -16,7 +16,7 @@
 namespace tutti::internal {
 
 inline constexpr SectionFileKind kDetectorFile = {
-    {'T', 'U', 'T', 'T', 'I', 'L', 'C', '\n'}, 7, "saved loop detector", "LoopDetector::Save"};
+    {'T', 'U', 'T', 'T', 'I', 'L', 'C', '\n'}, 8, "saved loop detector", "LoopDetector::Save"};
 
 /// Writes all that a detector knows, its long-term memory with it; a file that is there is replaced only by a
 /// complete one. Throws InputError if it can't be written.
@@ -53,9 +53,11 @@ class SavedDetector {
 
  private:
   void ReadOptions();
-  template <typename Read>
-  void Load(std::uint32_t section, const Read& read);
-  std::map<int, View> LoadViews();  // by slot
+  template <typename Take>
+  void Read(const std::string& content, const Take& take) const;
+  template <typename Take>
+  void Load(std::uint32_t section, const Take& take);  // the next one
+  std::map<int, View> LoadViews();                     // by slot
   void LoadRest(DetectorState& state, LongTermMemory& long_term);
 
   std::unique_ptr<SectionReader> own_;  // null: somebody else's

@@ -39,8 +39,8 @@ void DetectorState::LoadView(int slot, View view, const std::string& source) {
   const ByteReader in("", source);
   if (view.id != memory().id(slot)) in.Damaged("features of another location");
   if (view.members.size() != members().size()) in.Damaged("features of other members");
-  const cv::Mat& own = view.caller.descriptors;
-  if (!own.empty() && (own.type() != callers_descriptors_.type || own.cols != callers_descriptors_.width)) {
+  const PackedMat& own = view.caller.descriptors;
+  if (!own.empty() && (own.type() != callers_descriptors_.type || own.cols() != callers_descriptors_.width)) {
     in.Damaged("features of another kind");
   }
   At(slot) = std::move(view);

@@ -77,7 +77,7 @@ std::vector<PooledMatch> PoolMatches(const View& query, const View& candidate, d
     const std::size_t k = static_cast<std::size_t>(task);
     const View::Set& q = k < members ? query.members[k] : query.caller;
     const View::Set& c = k < members ? candidate.members[k] : candidate.caller;
-    matches[k] = MatchDescriptors(q.descriptors, c.descriptors, c.pixels, max_ratio);
+    matches[k] = MatchDescriptors(q.descriptors.Unpacked(), c.descriptors.Unpacked(), c.pixels, max_ratio);
   });
   std::vector<PooledMatch> pool;
   AppendMatches(query.caller, candidate.caller, matches[members], true, pool);

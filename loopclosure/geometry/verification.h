@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "loopclosure/store/packed_mat.h"
 #include "tutti/core/camera.h"
 #include "tutti/loopclosure/detector.h"
 #include "tutti/loopclosure/detector_options.h"
@@ -20,7 +21,7 @@ struct View {
   /// The features of one source.
   struct Set {
     std::vector<cv::Point2f> pixels;      ///< N [px]
-    cv::Mat descriptors;                  ///< N rows
+    internal::PackedMat descriptors;      ///< N rows
     std::vector<Eigen::Vector3f> points;  ///< empty, or N points in the camera frame; NaN where unknown
     std::vector<int> numbers;             ///< the caller's number of each, growing; empty: 0 to N - 1
   };

@@ -53,14 +53,18 @@ void LookUpDepth(const LoopQuery& query, const VerificationOptions& options, Vie
 void DropMasked(const cv::Mat& mask, View::Set& set) {
   if (mask.empty()) return;
   View::Set kept;
+  const cv::Mat all = set.descriptors.Unpacked();
+  cv::Mat descriptors;
   for (std::size_t i = 0; i < set.pixels.size(); ++i) {
     if (IsMasked(mask, set.pixels[i])) continue;
     kept.pixels.push_back(set.pixels[i]);
-    kept.descriptors.push_back(set.descriptors.row(static_cast<int>(i)));
+    descriptors.push_back(all.row(static_cast<int>(i)));
     if (!set.points.empty()) kept.points.push_back(set.points[i]);
     kept.numbers.push_back(static_cast<int>(i));
   }
-  if (kept.pixels.size() < set.pixels.size()) set = std::move(kept);
+  if (kept.pixels.size() == set.pixels.size()) return;
+  kept.descriptors = descriptors;
+  set = std::move(kept);
 }
 
 // Of the image; without one (the caller extracts all features) of the camera, or what the features reach

@@ -5,7 +5,7 @@
 #include <cstring>
 #include <limits>
 
-#include "loopclosure/store/mat_bytes.h"
+#include "loopclosure/store/packed_mat.h"
 
 namespace tutti::internal {
 namespace {
@@ -27,7 +27,7 @@ void SaveSet(const View::Set& set, ByteWriter& out) {
   };
   put_part([](const cv::Point2f& p) { return p.x; });
   put_part([](const cv::Point2f& p) { return p.y; });
-  PutMat(set.descriptors, out);
+  set.descriptors.Put(out);
   std::vector<float> known;
   std::vector<std::uint8_t> is_known((set.points.size() + 7) / 8, 0);
   for (std::size_t i = 0; i < set.points.size(); ++i) {
@@ -69,8 +69,8 @@ View::Set LoadSet(ByteReader& in) {
   }
   set.pixels.reserve(x.size());
   for (std::size_t i = 0; i < x.size(); ++i) set.pixels.emplace_back(x[i], y[i]);
-  set.descriptors = GetMat(in);
-  if (static_cast<std::size_t>(set.descriptors.rows) != set.pixels.size())
+  set.descriptors = PackedMat::Get(in);
+  if (static_cast<std::size_t>(set.descriptors.rows()) != set.pixels.size())
     in.Damaged("features without descriptors");
   LoadPoints(set, in);
   return set;

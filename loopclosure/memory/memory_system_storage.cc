@@ -2,7 +2,7 @@
 #include <set>
 
 #include "loopclosure/memory/memory_system.h"
-#include "loopclosure/store/mat_bytes.h"
+#include "loopclosure/store/packed_mat.h"
 #include "tutti/core/error.h"
 
 namespace tutti::internal {
@@ -36,7 +36,7 @@ void LoadNodes(int number, LocationStore& store, LocationMemory& memory) {
 
 void StoreWord(const Vocabulary& vocabulary, std::size_t member, int word, LocationStore& store) {
   ByteWriter record;
-  PutMat(vocabulary.Descriptor(word), record);
+  PackedMat(vocabulary.Descriptor(word)).Put(record);
   store.Put(LocationStore::Kind::kWord, static_cast<std::int64_t>(member), word, record.bytes());
 }
 
@@ -98,7 +98,7 @@ void MemorySystem::ReadWord(std::size_t member, int word, LocationStore& store, 
   cv::Mat row;
   if (record) {
     ByteReader in(*record, store.name());
-    row = GetMat(in);
+    row = PackedMat::Get(in).Unpacked();
   }
   const bool fits = descriptors.empty() || (row.cols == descriptors.cols && row.type() == descriptors.type());
   if (row.rows != 1 || !fits || !members_[member].vocabulary().Problem(row).empty()) {

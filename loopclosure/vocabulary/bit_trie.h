@@ -49,6 +49,12 @@ class BitTrie {
     }
   }
 
+  /// The same for many, into an empty trie.
+  void InsertAll(std::vector<int> rows, const WordStorage& storage) {
+    free_leaves_.push_back(root_);
+    root_ = Grow(rows.data(), rows.data() + rows.size(), 0, storage);
+  }
+
   /// The row must be there.
   void Remove(int row, const WordStorage& storage) {
     const std::uint8_t* descriptor = storage.At(row);
@@ -146,6 +152,36 @@ class BitTrie {
     return leaf;
   }
 
+  int NewSplit() {
+    if (free_splits_.empty()) {
+      splits_.Extend();
+      return static_cast<int>(splits_.size()) - 1;
+    }
+    const int split = free_splits_.back();
+    free_splits_.pop_back();
+    return split;
+  }
+
+  // A subtree of these rows, whose order is lost.
+  int Grow(int* begin, int* end, std::size_t depth, const WordStorage& storage) {
+    const int count = static_cast<int>(end - begin);
+    if (count <= kLeaf || depth == order_.size()) {
+      const int link = NewLeaf();
+      Leaf& leaf = LeafAt(link);
+      leaf.count = count;
+      int* const others = begin + std::min(count, kLeaf);
+      std::copy(begin, others, leaf.rows.begin());
+      if (others != end) overflow_[link].assign(others, end);
+      return link;
+    }
+    int* const middle = std::partition(begin, end, [&](int row) { return Bit(storage.At(row), depth) == 0; });
+    const int split = NewSplit();
+    const int first = Grow(begin, middle, depth + 1, storage);
+    const int second = Grow(middle, end, depth + 1, storage);
+    splits_[static_cast<std::size_t>(split)] = {first, second};
+    return split;
+  }
+
   // A full leaf becomes the first child of a new split, whose number is returned.
   int Split(int link, std::size_t depth, const WordStorage& storage) {
     const Leaf full = LeafAt(link);
@@ -155,13 +191,7 @@ class BitTrie {
       Leaf& leaf = LeafAt(children[Bit(storage.At(row), depth)]);
       leaf.rows[static_cast<std::size_t>(leaf.count++)] = row;
     }
-    int split = static_cast<int>(splits_.size());
-    if (free_splits_.empty()) {
-      splits_.Extend();
-    } else {
-      split = free_splits_.back();
-      free_splits_.pop_back();
-    }
+    const int split = NewSplit();
     splits_[static_cast<std::size_t>(split)] = children;
     return split;
   }

@@ -12,6 +12,7 @@ namespace tutti {
 namespace internal {
 class ByteReader;
 class ByteWriter;
+class PackedMat;
 }  // namespace internal
 
 /// The two nearest words of a descriptor, by TRUE distance (Euclidean, not squared; or Hamming in bits).
@@ -43,10 +44,10 @@ class DescriptorIndex {
   virtual int size() const = 0;
   /// Appends the whole state, such that a loaded index goes on as the saved one would. `known`: descriptors
   /// that whoever loads it has, too (SaveWords).
-  virtual void Save(const std::vector<cv::Mat>& known, internal::ByteWriter& out) const = 0;
+  virtual void Save(const std::vector<internal::PackedMat>& known, internal::ByteWriter& out) const = 0;
   /// Takes up what Save wrote, into a new index of the same kind, width and seed. Throws InputError if it is
   /// damaged.
-  virtual void Load(const std::vector<cv::Mat>& known, internal::ByteReader& in) = 0;
+  virtual void Load(const std::vector<internal::PackedMat>& known, internal::ByteReader& in) = 0;
 };
 
 /// kd-forest over CV_32F descriptors (Muja & Lowe 2009): `trees` randomised trees, `checks` leaves per

@@ -107,7 +107,7 @@ class FlannIndex : public DescriptorIndex {
   int size() const override { return size_; }
 
   // Which row a word lies in changes no answer: rows are numbered anew, by word id.
-  void Save(const std::vector<cv::Mat>& known, internal::ByteWriter& out) const override {
+  void Save(const std::vector<internal::PackedMat>& known, internal::ByteWriter& out) const override {
     std::vector<int> rank(Index(storage_.end()), -1);
     int next = 0;
     internal::SaveWords(storage_, CV_32F, known, out);
@@ -123,7 +123,7 @@ class FlannIndex : public DescriptorIndex {
     }
   }
 
-  void Load(const std::vector<cv::Mat>& known, internal::ByteReader& in) override {
+  void Load(const std::vector<internal::PackedMat>& known, internal::ByteReader& in) override {
     internal::LoadWords(storage_, CV_32F, known, in,
                         [this](int word, const std::uint8_t* descriptor) { storage_.Add(word, descriptor); });
     const std::size_t count = Index(storage_.size());

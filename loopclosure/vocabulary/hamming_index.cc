@@ -60,15 +60,16 @@ class HammingIndex : public DescriptorIndex {
   int size() const override { return storage_.size(); }
 
   // Which row a word lies in, and the order within a leaf, change no answer: words and descriptors are all.
-  void Save(const std::vector<cv::Mat>& known, internal::ByteWriter& out) const override {
+  void Save(const std::vector<internal::PackedMat>& known, internal::ByteWriter& out) const override {
     internal::SaveWords(storage_, CV_8U, known, out);
   }
 
-  void Load(const std::vector<cv::Mat>& known, internal::ByteReader& in) override {
-    internal::LoadWords(storage_, CV_8U, known, in, [this](int word, const std::uint8_t* descriptor) {
-      const int row = storage_.Add(word, descriptor);
-      for (internal::BitTrie& trie : tries_) trie.Insert(row, storage_);
+  void Load(const std::vector<internal::PackedMat>& known, internal::ByteReader& in) override {
+    std::vector<int> rows;
+    internal::LoadWords(storage_, CV_8U, known, in, [&](int word, const std::uint8_t* descriptor) {
+      rows.push_back(storage_.Add(word, descriptor));
     });
+    for (internal::BitTrie& trie : tries_) trie.InsertAll(rows, storage_);
   }
 
  private:

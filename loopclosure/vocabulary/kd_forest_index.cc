@@ -87,7 +87,7 @@ class KdForestIndex : public DescriptorIndex {
   int size() const override { return storage_.size(); }
 
   // Which row a word lies in changes no answer: rows are numbered anew, by word id.
-  void Save(const std::vector<cv::Mat>& known, internal::ByteWriter& out) const override {
+  void Save(const std::vector<internal::PackedMat>& known, internal::ByteWriter& out) const override {
     std::vector<int> rank(static_cast<std::size_t>(storage_.end()), -1);
     int next = 0;
     internal::SaveWords(storage_, CV_32F, known, out);
@@ -99,7 +99,7 @@ class KdForestIndex : public DescriptorIndex {
     }
   }
 
-  void Load(const std::vector<cv::Mat>& known, internal::ByteReader& in) override {
+  void Load(const std::vector<internal::PackedMat>& known, internal::ByteReader& in) override {
     internal::LoadWords(storage_, CV_32F, known, in,
                         [this](int word, const std::uint8_t* descriptor) { storage_.Add(word, descriptor); });
     if (in.Get<std::uint64_t>() != trees_.size()) in.Damaged("another number of kd-trees");

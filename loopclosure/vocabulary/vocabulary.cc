@@ -167,7 +167,7 @@ cv::Mat Vocabulary::Descriptor(int word) const {
   return row;
 }
 
-void Vocabulary::Save(const std::vector<cv::Mat>& known, internal::ByteWriter& out) const {
+void Vocabulary::Save(const std::vector<internal::PackedMat>& known, internal::ByteWriter& out) const {
   out.Put<std::int32_t>(type_);
   out.Put<std::int32_t>(width_);
   out.Put<std::int32_t>(created_);
@@ -181,7 +181,7 @@ void Vocabulary::Save(const std::vector<cv::Mat>& known, internal::ByteWriter& o
   if (index_) index_->Save(known, out);
 }
 
-void Vocabulary::Load(const std::vector<cv::Mat>& known, internal::ByteReader& in) {
+void Vocabulary::Load(const std::vector<internal::PackedMat>& known, internal::ByteReader& in) {
   static_assert(kMostWords == internal::WordStorage::kMostWords);
   constexpr int kMostColumns = 1 << 16;
   type_ = in.Get<std::int32_t>();

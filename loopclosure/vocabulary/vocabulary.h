@@ -74,9 +74,9 @@ class Vocabulary {
 
   /// Appends the whole state. `known`: descriptors that whoever loads it has, too, and in the same order; a
   /// word that is among them takes a few bytes.
-  void Save(const std::vector<cv::Mat>& known, internal::ByteWriter& out) const;
+  void Save(const std::vector<internal::PackedMat>& known, internal::ByteWriter& out) const;
   /// Takes up what Save wrote, into a new object of the same options. Throws InputError if it is damaged.
-  void Load(const std::vector<cv::Mat>& known, internal::ByteReader& in);
+  void Load(const std::vector<internal::PackedMat>& known, internal::ByteReader& in);
 
  private:
   void CheckType(const cv::Mat& descriptors);

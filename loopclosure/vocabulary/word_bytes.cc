@@ -5,8 +5,6 @@
 #include <string_view>
 #include <utility>
 
-#include "loopclosure/store/mat_bytes.h"
-
 namespace tutti::internal {
 namespace {
 
@@ -14,52 +12,63 @@ int Width(const WordStorage& storage, int type) {
   return static_cast<int>(storage.row_bytes() / static_cast<std::size_t>(CV_ELEM_SIZE(type)));
 }
 
-// Rows of the matrices that are of a vocabulary's kind.
-std::vector<const std::uint8_t*> RowsOf(const std::vector<cv::Mat>& known, int type, int width) {
-  std::vector<const std::uint8_t*> rows;
-  for (const cv::Mat& matrix : known) {
-    if (matrix.type() != type || matrix.cols != width) continue;
-    for (int r = 0; r < matrix.rows; ++r) rows.push_back(matrix.ptr(r));
+// Rows of the matrices that are of a vocabulary's kind, numbered through.
+class KnownRows {
+ public:
+  KnownRows(const std::vector<PackedMat>& known, int type, int width) {
+    for (const PackedMat& matrix : known) {
+      if (matrix.type() != type || matrix.cols() != width) continue;
+      for (int r = 0; r < matrix.rows(); ++r) rows_.emplace_back(&matrix, r);
+    }
   }
-  return rows;
-}
+  std::int64_t size() const { return static_cast<std::int64_t>(rows_.size()); }
+  void Copy(std::int64_t row, std::uint8_t* to) const {
+    const auto& [matrix, r] = rows_[static_cast<std::size_t>(row)];
+    matrix->CopyRow(r, to);
+  }
+
+ private:
+  std::vector<std::pair<const PackedMat*, int>> rows_;
+};
 
 // Finds rows by what is in them.
 class RowIndex {
  public:
-  RowIndex(const std::vector<const std::uint8_t*>& rows, std::size_t row_bytes)
-      : rows_(rows), row_bytes_(row_bytes) {
-    numbers_.reserve(rows.size());
-    for (std::size_t r = 0; r < rows.size(); ++r)
-      numbers_.emplace_back(Checksum(rows[r]), static_cast<std::uint32_t>(r));
+  RowIndex(const KnownRows& rows, std::size_t row_bytes) : rows_(rows), row_(row_bytes) {
+    numbers_.reserve(static_cast<std::size_t>(rows.size()));
+    for (std::int64_t r = 0; r < rows.size(); ++r) {
+      rows.Copy(r, row_.data());
+      numbers_.emplace_back(Checksum(row_.data()), static_cast<std::uint32_t>(r));
+    }
     std::sort(numbers_.begin(), numbers_.end());
   }
   // The first that is the same, -1 if there is none.
-  std::int64_t Find(const std::uint8_t* descriptor) const {
+  std::int64_t Find(const std::uint8_t* descriptor) {
     const std::uint32_t checksum = Checksum(descriptor);
     auto at = std::lower_bound(numbers_.begin(), numbers_.end(), std::make_pair(checksum, 0U));
     for (; at != numbers_.end() && at->first == checksum; ++at) {
-      if (std::memcmp(rows_[at->second], descriptor, row_bytes_) == 0) return at->second;
+      rows_.Copy(at->second, row_.data());
+      if (std::equal(row_.begin(), row_.end(), descriptor)) return at->second;
     }
     return -1;
   }
 
  private:
   std::uint32_t Checksum(const std::uint8_t* row) const {
-    return Crc32(std::string_view(reinterpret_cast<const char*>(row), row_bytes_));
+    return Crc32(std::string_view(reinterpret_cast<const char*>(row), row_.size()));
   }
 
-  const std::vector<const std::uint8_t*>& rows_;
-  std::size_t row_bytes_;
+  const KnownRows& rows_;
+  std::vector<std::uint8_t> row_;                                 // the last that was looked at
   std::vector<std::pair<std::uint32_t, std::uint32_t>> numbers_;  // checksum, row
 };
 
 }  // namespace
 
-void SaveWords(const WordStorage& storage, int type, const std::vector<cv::Mat>& known, ByteWriter& out) {
+void SaveWords(const WordStorage& storage, int type, const std::vector<PackedMat>& known, ByteWriter& out) {
   const int width = Width(storage, type);
-  const std::vector<const std::uint8_t*> rows = RowsOf(known, type, width);
-  const RowIndex index(rows, storage.row_bytes());
+  const KnownRows rows(known, type, width);
+  RowIndex index(rows, storage.row_bytes());
   cv::Mat others(0, width, type);
   int word_before = -1;
   std::int64_t row_before = -1;
@@ -76,13 +85,13 @@ void SaveWords(const WordStorage& storage, int type, const std::vector<cv::Mat>&
       others.push_back(cv::Mat(1, width, type, storage.At(row)));
     }
   });
-  PutMat(others, out);
+  PackedMat(others).Put(out);
 }
 
-void LoadWords(const WordStorage& storage, int type, const std::vector<cv::Mat>& known, ByteReader& in,
+void LoadWords(const WordStorage& storage, int type, const std::vector<PackedMat>& known, ByteReader& in,
                const WordSink& sink) {
   const int width = Width(storage, type);
-  const std::vector<const std::uint8_t*> rows = RowsOf(known, type, width);
+  const KnownRows rows(known, type, width);
   const std::uint64_t count = in.GetVarint();
   if (count > in.Left() / 2) in.Damaged("more words than bytes");
   std::vector<std::pair<int, std::int64_t>> words;  // with their rows; -1: among the others
@@ -93,7 +102,7 @@ void LoadWords(const WordStorage& storage, int type, const std::vector<cv::Mat>&
     word_before += 1 + in.GetVarintIndex(WordStorage::kMostWords - 1 - word_before);
     std::int64_t row = -1;
     if (in.GetVarintIndex(2) == 1) {
-      const std::int64_t step = in.GetSignedVarint(), most = static_cast<std::int64_t>(rows.size());
+      const std::int64_t step = in.GetSignedVarint(), most = rows.size();
       if (step < -most || step > most || row_before + step < 0 || row_before + step >= most)
         in.Damaged("a word of features that are nowhere");
       row = row_before += step;
@@ -102,12 +111,19 @@ void LoadWords(const WordStorage& storage, int type, const std::vector<cv::Mat>&
     }
     words.emplace_back(word_before, row);
   }
-  const cv::Mat rest = GetMat(in);
+  const cv::Mat rest = PackedMat::Get(in).Unpacked();
   if (rest.rows != others || (others > 0 && (rest.type() != type || rest.cols != width)))
     in.Damaged("words without descriptors");
+  std::vector<std::uint8_t> known_row(storage.row_bytes());
   int next = 0;
-  for (const auto& [word, row] : words)
-    sink(word, row >= 0 ? rows[static_cast<std::size_t>(row)] : rest.ptr(next++));
+  for (const auto& [word, row] : words) {
+    if (row < 0) {
+      sink(word, rest.ptr(next++));
+    } else {
+      rows.Copy(row, known_row.data());
+      sink(word, known_row.data());
+    }
+  }
 }
 
 }  // namespace tutti::internal

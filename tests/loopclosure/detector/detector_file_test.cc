@@ -292,7 +292,7 @@ TEST(SavedView, KeepsItsCamerasAndTheCallersNumbers) {
   view.cameras = {{0, 0, 320, 240}, {320, 0, 320, 240}};
   view.members.resize(1);
   view.caller.pixels = {{1, 2}, {3, 4}};
-  view.caller.descriptors = cv::Mat::eye(2, 8, CV_8U);
+  view.caller.descriptors = cv::Mat(cv::Mat::eye(2, 8, CV_8U));
   view.caller.numbers = {4, 7};
   const auto again = [](const View& saved) {
     internal::ByteWriter out;

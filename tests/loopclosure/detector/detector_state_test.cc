@@ -68,7 +68,7 @@ TEST(DetectorState, AViewOfAnotherLocationOrOtherMembersOrAnotherKindIsRefused) 
   EXPECT_NE(RefusalOf([&] { Load(state, 1, bad); }).find("other members"), std::string::npos);
   bad = good;
   bad.caller.pixels = {{1, 2}};
-  bad.caller.descriptors = cv::Mat::zeros(1, 8, CV_8U);
+  bad.caller.descriptors = cv::Mat(1, 8, CV_8U, cv::Scalar(0));
   EXPECT_NE(RefusalOf([&] { Load(state, 1, bad); }).find("another kind"), std::string::npos);
   EXPECT_EQ(BytesOf(state.view(1)), BytesOf(good));
 }

@@ -226,12 +226,17 @@ TEST_P(QuotaMember, AnImageWithoutTextureStaysWithoutFeatures) {
   EXPECT_LT(extractor.Extract(noise).keypoints.size(), 40u);
 }
 
-TEST(Features, SurfDescriptorsHaveUnitLength) {
+TEST(Features, SurfDescriptorsHaveUnitLengthAndFitBytes) {
   const Features features = FeatureExtractor("surf", ExtractionOptions()).Extract(testing::TexturedImage(1));
   ASSERT_FALSE(features.keypoints.empty());
   EXPECT_EQ(features.descriptors.cols, 64);
   for (int i = 0; i < features.descriptors.rows; ++i)
-    EXPECT_NEAR(cv::norm(features.descriptors.row(i)), 1.0, 1e-4);
+    EXPECT_NEAR(cv::norm(features.descriptors.row(i)), 1.0, 0.01);
+  cv::Mat steps, bytes;
+  features.descriptors.convertTo(steps, CV_32F, 256);
+  steps.convertTo(bytes, CV_8S);
+  bytes.convertTo(bytes, CV_32F);
+  EXPECT_EQ(cv::norm(bytes, steps, cv::NORM_INF), 0);
 }
 
 TEST(Features, UnknownMemberNamesTheNearest) {

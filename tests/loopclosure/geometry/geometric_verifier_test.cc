@@ -11,6 +11,7 @@
 
 #include "core/dense_solvers.h"
 #include "loopclosure/geometry/verification.h"
+#include "tests/loopclosure/geometry/append_rows.h"
 #include "tests/support/plain_camera.h"
 #include "tutti/loopclosure/relative_pose.h"
 
@@ -104,7 +105,7 @@ class TwoViews {
     const auto add = [&](View::Set& set, const Eigen::Vector2d& pixel, const Eigen::Vector3d& point) {
       set.pixels.emplace_back(static_cast<float>(pixel.x()), static_cast<float>(pixel.y()));
       set.points.push_back(point.cast<float>());
-      set.descriptors.push_back(descriptor);
+      testing::AppendRows(descriptor, &set.descriptors);
     };
     add(candidate_.members[0], in_candidate, candidate_point);
     add(query_.members[0], in_query, query_point);

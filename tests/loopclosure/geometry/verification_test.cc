@@ -5,6 +5,7 @@
 #include <cmath>
 #include <random>
 
+#include "tests/loopclosure/geometry/append_rows.h"
 #include "tests/support/plain_camera.h"
 
 namespace tutti {
@@ -46,7 +47,7 @@ View See(const Pose& T_world_camera, std::int64_t id, bool calibrated, bool with
     std::mt19937 own(static_cast<std::uint32_t>(i + 1));
     cv::Mat row(1, 32, CV_8U);
     for (int c = 0; c < 32; ++c) row.at<std::uint8_t>(0, c) = static_cast<std::uint8_t>(own());
-    set.descriptors.push_back(row);
+    testing::AppendRows(row, &set.descriptors);
     const double dy = noise(generator), dx = noise(generator);
     set.pixels.emplace_back(static_cast<float>(pixel.x() + dx), static_cast<float>(pixel.y() + dy));
     if (with_points) set.points.push_back(p.cast<float>());
@@ -158,7 +159,7 @@ cv::Mat Descriptor(std::uint32_t of) {
 
 void AddFeature(View& view, const cv::Point2f& pixel, std::uint32_t descriptor) {
   view.members[0].pixels.push_back(pixel);
-  view.members[0].descriptors.push_back(Descriptor(descriptor));
+  testing::AppendRows(Descriptor(descriptor), &view.members[0].descriptors);
 }
 
 // Features all over the image that no other view has.
@@ -269,7 +270,7 @@ View SeeFlat(const Pose& T_world_camera, std::int64_t id, bool calibrated) {
     if (!VerifiedCamera().Contains(pixel)) continue;
     const double dy = noise(generator), dx = noise(generator);
     flat.pixels.emplace_back(static_cast<float>(pixel.x() + dx), static_cast<float>(pixel.y() + dy));
-    flat.descriptors.push_back(Descriptor(static_cast<std::uint32_t>(900000 + i)));
+    testing::AppendRows(Descriptor(static_cast<std::uint32_t>(900000 + i)), &flat.descriptors);
   }
   set = flat;
   return view;
@@ -307,10 +308,7 @@ View SeeTwo(const Pose& left, const Pose& right, std::int64_t id, bool swapped) 
   View view = See(left, id, false, false);
   View second = See(right, id, false, false);
   for (cv::Point2f& p : (swapped ? view : second).members[0].pixels) p.x += 640;
-  for (int i = 0; i < second.members[0].descriptors.rows; ++i) {
-    cv::bitwise_not(second.members[0].descriptors.row(i), second.members[0].descriptors.row(i));
-  }
-  view.members[0].descriptors.push_back(second.members[0].descriptors);
+  testing::AppendRows(~second.members[0].descriptors.Unpacked(), &view.members[0].descriptors);
   view.members[0].pixels.insert(view.members[0].pixels.end(), second.members[0].pixels.begin(),
                                 second.members[0].pixels.end());
   view.size = {1280, 480};
@@ -341,15 +339,17 @@ TEST(GeometricVerifier, OneCameraDoesNotSpeakForTheOtherUnlessThatSeesNothing) {
   std::mt19937 generator(3);
   View blind = candidate;
   blind.members[0] = View::Set();
+  cv::Mat descriptors = set.descriptors.Unpacked().clone();
   for (std::size_t i = 0; i < set.pixels.size(); ++i) {
     if (set.pixels[i].x < 640) {
       blind.members[0].pixels.push_back(set.pixels[i]);
-      blind.members[0].descriptors.push_back(set.descriptors.row(static_cast<int>(i)));
+      testing::AppendRows(descriptors.row(static_cast<int>(i)), &blind.members[0].descriptors);
     } else {  // the right one stands before another house
-      cv::Mat row = set.descriptors.row(static_cast<int>(i));
+      cv::Mat row = descriptors.row(static_cast<int>(i));
       Descriptor(static_cast<std::uint32_t>(500000 + i)).copyTo(row);
     }
   }
+  set.descriptors = descriptors;
   const Verification v = GeometricVerifier({}, 1).Verify(query, candidate);
   EXPECT_FALSE(v.accepted);
   EXPECT_NE(v.reason.find("one of the cameras"), std::string::npos) << v.reason;
@@ -364,7 +364,7 @@ TEST(GeometricVerifier, TheBarIsScaledToTheMembersThatPool) {
   VerificationOptions options;
   View query = See(PoseAt(0.5, 0.3), 9, false, false), candidate = See(Pose(), 1, false, false);
   query.members[0].pixels.resize(28);
-  query.members[0].descriptors = query.members[0].descriptors.rowRange(0, 28).clone();
+  query.members[0].descriptors = query.members[0].descriptors.Unpacked().rowRange(0, 28).clone();
   EXPECT_FALSE(GeometricVerifier(options, 1).Verify(query, candidate).accepted);
   options.scale_bar = true;  // 10 for one member
   const Verification scaled = GeometricVerifier(options, 1).Verify(query, candidate);

@@ -29,8 +29,9 @@ View::Set ViewSetOf(int features, bool with_points) {
       set.points.emplace_back(x / 100, -y / 100, static_cast<float>(i) + 0.5f);
     }
   }
-  set.descriptors.create(features, 32, CV_8U);
-  random.fill(set.descriptors, cv::RNG::UNIFORM, 0, 256);
+  cv::Mat descriptors(features, 32, CV_8U);
+  random.fill(descriptors, cv::RNG::UNIFORM, 0, 256);
+  set.descriptors = descriptors;
   return set;
 }
 
@@ -66,9 +67,10 @@ void ExpectSameSet(const View::Set& a, const View::Set& b) {
       EXPECT_EQ(a.points[i], b.points[i]) << i;
     }
   }
-  ASSERT_EQ(a.descriptors.size(), b.descriptors.size());
-  if (a.descriptors.empty()) return;
-  EXPECT_EQ(cv::norm(a.descriptors, b.descriptors, cv::NORM_HAMMING), 0);
+  const cv::Mat descriptors = a.descriptors.Unpacked(), others = b.descriptors.Unpacked();
+  ASSERT_EQ(descriptors.size(), others.size());
+  if (descriptors.empty()) return;
+  EXPECT_EQ(cv::norm(descriptors, others, cv::NORM_HAMMING), 0);
 }
 
 TEST(ViewBytes, EverythingComesBack) {

@@ -140,7 +140,7 @@ TEST(View, TheCallersFeaturesKeepTheirNumbersWhereOthersAreMasked) {
   EXPECT_EQ(view.caller.numbers, (std::vector<int>{1, 3}));
   ASSERT_EQ(view.caller.pixels.size(), 2u);
   EXPECT_EQ(view.caller.pixels[1].x, 150.0f);
-  EXPECT_EQ(view.caller.descriptors.at<float>(1), 3.0f);
+  EXPECT_EQ(view.caller.descriptors.Unpacked().at<float>(1), 3.0f);
 }
 
 TEST(View, WithoutAnImageItsSizeIsTheCamerasOrReachesOverTheFeatures) {

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/byte_stream.h"
 #include "tests/loopclosure/vocabulary/random_descriptors.h"
 
 namespace tutti {
@@ -175,6 +176,39 @@ TEST(DescriptorIndex, EqualDescriptorsComeAndGo) {
     for (int i = 0; i < rows.rows - 1; ++i) index->Remove(i);
     EXPECT_EQ(index->Search(rows.row(0))[0].first, rows.rows - 1);
     EXPECT_EQ(index->Search(rows.row(0))[0].second, -1);
+  }
+}
+
+// With more equal ones than fit into a leaf.
+TEST(DescriptorIndex, SavedOnesAnswerAndForgetAsBefore) {
+  cv::Mat floats = RandomFloats(3000, 16, 3), bytes = RandomBytes(3000, 3);
+  floats.push_back(cv::Mat::ones(40, 16, CV_32F));
+  bytes.push_back(cv::Mat::ones(40, 32, CV_8U));
+  for (const cv::Mat& rows : {floats, bytes}) {
+    const auto make = [&] {
+      return rows.type() == CV_8U ? MakeHammingIndex(32, 8, 1) : MakeKdForestIndex(16, 4, 32, 1);
+    };
+    const std::unique_ptr<DescriptorIndex> index = make(), again = make();
+    index->Add(Ids(0, rows.rows), rows);
+    internal::ByteWriter saved;
+    index->Save({rows}, saved);
+    internal::ByteReader in(saved.bytes(), "test");
+    again->Load({rows}, in);
+    const auto expect_the_same = [&] {
+      const std::vector<TwoNearest> expected = index->Search(rows), found = again->Search(rows);
+      for (std::size_t i = 0; i < found.size(); ++i) {
+        EXPECT_EQ(found[i].first, expected[i].first) << i;
+        EXPECT_EQ(found[i].second, expected[i].second) << i;
+        EXPECT_EQ(found[i].second_distance, expected[i].second_distance) << i;
+      }
+    };
+    expect_the_same();
+    for (int i = 0; i < rows.rows; i += i < 3000 ? 3 : 1) {
+      index->Remove(i);
+      again->Remove(i);
+    }
+    EXPECT_EQ(again->size(), index->size());
+    expect_the_same();
   }
 }
 

@@ -179,8 +179,8 @@ TEST(Vocabulary, WordsThatAreKnownAnywayTakeFewBytes) {
   for (const bool binary : {false, true}) {
     Churn churn(binary);
     for (int i = 0; i < 20; ++i) churn.Step();
-    std::vector<cv::Mat> known;
-    for (const auto& [descriptors, signature] : churn.images_) known.push_back(descriptors.clone());
+    std::vector<internal::PackedMat> known;
+    for (const auto& [descriptors, signature] : churn.images_) known.emplace_back(descriptors.clone());
     internal::ByteWriter alone, with;
     churn.vocabulary_.Save({}, alone);
     churn.vocabulary_.Save(known, with);

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "loopclosure/store/mat_bytes.h"
+#include "loopclosure/store/packed_mat.h"
 #include "tests/loopclosure/vocabulary/random_descriptors.h"
 #include "tutti/core/error.h"
 
@@ -20,7 +20,7 @@ constexpr std::size_t kRowBytes = 32;
 
 std::string RowText(const std::uint8_t* row) { return {row, row + kRowBytes}; }
 
-std::map<int, std::string> LoadedWords(const std::string& bytes, const std::vector<cv::Mat>& known) {
+std::map<int, std::string> LoadedWords(const std::string& bytes, const std::vector<PackedMat>& known) {
   ByteReader in(bytes, "test");
   std::map<int, std::string> words;
   LoadWords(WordStorage(kRowBytes), CV_8U, known, in,
@@ -30,14 +30,14 @@ std::map<int, std::string> LoadedWords(const std::string& bytes, const std::vect
 }
 
 TEST(WordBytes, EverythingComesBack) {
-  const std::vector<cv::Mat> known = {testing::RandomBytes(5, 1), testing::RandomFloats(3, 32, 2),
-                                      testing::RandomBytes(4, 3)};
+  const cv::Mat first = testing::RandomBytes(5, 1), third = testing::RandomBytes(4, 3);
+  const std::vector<PackedMat> known = {first, testing::RandomFloats(3, 32, 2), third};
   const cv::Mat others = testing::RandomBytes(2, 4);
   WordStorage storage(kRowBytes);
-  storage.Add(3, known[2].ptr(3));
+  storage.Add(3, third.ptr(3));
   storage.Add(4, others.ptr(0));
-  storage.Add(40, known[0].ptr(0));
-  storage.Add(700, known[2].ptr(0));
+  storage.Add(40, first.ptr(0));
+  storage.Add(700, third.ptr(0));
   storage.Add(90000, others.ptr(1));
   ByteWriter out;
   SaveWords(storage, CV_8U, known, out);
@@ -48,7 +48,7 @@ TEST(WordBytes, EverythingComesBack) {
 
 // A file that names rows one after the other: the first `step` from -1, the next from there.
 TEST(WordBytes, RowsThatAreNowhereAreRefused) {
-  const std::vector<cv::Mat> known = {testing::RandomBytes(3, 1)};
+  const std::vector<PackedMat> known = {testing::RandomBytes(3, 1)};
   const auto refused = [&](const std::vector<std::int64_t>& steps) {
     ByteWriter out;
     out.PutVarint(steps.size());
@@ -57,7 +57,7 @@ TEST(WordBytes, RowsThatAreNowhereAreRefused) {
       out.PutVarint(1);
       out.PutSignedVarint(step);
     }
-    PutMat(cv::Mat(0, static_cast<int>(kRowBytes), CV_8U), out);
+    PackedMat().Put(out);
     try {
       EXPECT_EQ(LoadedWords(out.bytes(), known).size(), steps.size());
     } catch (const InputError&) {

@@ -1,8 +1,9 @@
-// Matrices of descriptors as bytes and back.
-#include "loopclosure/store/mat_bytes.h"
+// Matrices of descriptors as fewer bytes and back.
+#include "loopclosure/store/packed_mat.h"
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <string>
 
 #include "tutti/core/error.h"
@@ -12,15 +13,15 @@ namespace {
 
 std::string BytesOfMat(const cv::Mat& matrix) {
   ByteWriter out;
-  PutMat(matrix, out);
+  PackedMat(matrix).Put(out);
   return std::string(out.bytes());
 }
 
 cv::Mat MatOf(const std::string& bytes) {
   ByteReader in(bytes, "test");
-  cv::Mat matrix = GetMat(in);
+  const PackedMat packed = PackedMat::Get(in);
   EXPECT_EQ(in.Left(), 0u);
-  return matrix;
+  return packed.Unpacked();
 }
 
 cv::Mat RandomMat(int rows, int columns, int type, double low, double high) {
@@ -29,15 +30,26 @@ cv::Mat RandomMat(int rows, int columns, int type, double low, double high) {
   return matrix;
 }
 
-void ExpectRoundTrip(const cv::Mat& matrix) {
-  const cv::Mat back = MatOf(BytesOfMat(matrix));
+void ExpectTheSame(const cv::Mat& back, const cv::Mat& matrix) {
   ASSERT_EQ(back.type(), matrix.type());
   ASSERT_EQ(back.size(), matrix.size());
   EXPECT_EQ(cv::norm(back, matrix, cv::NORM_INF), 0) << matrix.size();
 }
 
+void ExpectRoundTrip(const cv::Mat& matrix) {
+  const PackedMat packed(matrix);
+  EXPECT_EQ(packed.rows(), matrix.rows);
+  EXPECT_EQ(packed.cols(), matrix.cols);
+  EXPECT_EQ(packed.type(), matrix.type());
+  ExpectTheSame(packed.Unpacked(), matrix);
+  ExpectTheSame(MatOf(BytesOfMat(matrix)), matrix);
+  cv::Mat rows(matrix.size(), matrix.type());
+  for (int r = 0; r < rows.rows; ++r) packed.CopyRow(r, rows.ptr(r));
+  ExpectTheSame(rows, matrix);
+}
+
 // A single row, a single column, and columns of any remainder by four, in which they are kept.
-TEST(MatBytes, OfAnySizeComeBackTheSame) {
+TEST(PackedMat, OfAnySizeComeBackTheSame) {
   for (const int rows : {1, 2, 7}) {
     for (const int columns : {1, 2, 3, 4, 5, 32, 66}) {
       ExpectRoundTrip(RandomMat(rows, columns, CV_8U, 0, 256));
@@ -45,6 +57,7 @@ TEST(MatBytes, OfAnySizeComeBackTheSame) {
       cv::Mat whole = RandomMat(rows, columns, CV_8U, 0, 256);
       whole.convertTo(whole, CV_32F);
       ExpectRoundTrip(whole);
+      ExpectRoundTrip((whole - 128) / 256);
     }
   }
   EXPECT_TRUE(MatOf(BytesOfMat(cv::Mat())).empty());
@@ -53,7 +66,7 @@ TEST(MatBytes, OfAnySizeComeBackTheSame) {
 }
 
 // 128 features of SIFT, for example.
-TEST(MatBytes, ASquareMatrixStaysAsItIs) {
+TEST(PackedMat, ASquareMatrixStaysAsItIs) {
   cv::Mat matrix = RandomMat(128, 128, CV_8U, 0, 256);
   matrix.convertTo(matrix, CV_32F);
   const cv::Mat before = matrix.clone();
@@ -61,7 +74,7 @@ TEST(MatBytes, ASquareMatrixStaysAsItIs) {
   EXPECT_EQ(cv::norm(matrix, before, cv::NORM_INF), 0);
 }
 
-TEST(MatBytes, FloatsTakeAByteWhereAllAreWholeNumbersThatFitIt) {
+TEST(PackedMat, FloatsTakeAByteWhereAllAreWholeNumbersThatFitIt) {
   cv::Mat matrix(3, 8, CV_32F, cv::Scalar(255));
   const std::size_t packed = BytesOfMat(matrix).size();
   EXPECT_LT(packed, 24u + 16u);
@@ -74,13 +87,35 @@ TEST(MatBytes, FloatsTakeAByteWhereAllAreWholeNumbersThatFitIt) {
   }
 }
 
-TEST(MatBytes, DamagedOnesAreRefused) {
-  for (const cv::Mat& matrix : {RandomMat(3, 5, CV_8U, 0, 256), RandomMat(3, 5, CV_32F, -1, 1)}) {
+TEST(PackedMat, FloatsTakeAByteWhereAllAreStepsThatFitIt) {
+  cv::Mat matrix(3, 8, CV_32F, cv::Scalar(-0.5));
+  matrix.at<float>(0, 1) = 127.0f / 256;
+  EXPECT_LT(BytesOfMat(matrix).size(), 24u + 16u);
+  ExpectRoundTrip(matrix);
+  for (const float other : {0.5f, -129.0f / 256, 1.0f / 512, -0.0f}) {
+    matrix.at<float>(2, 3) = other;
+    EXPECT_GE(BytesOfMat(matrix).size(), 24u * 4u) << other;
+    ExpectRoundTrip(matrix);
+  }
+}
+
+// Where a detector looks descriptors up by their bits.
+TEST(PackedMat, ZeroKeepsItsSign) {
+  for (const float zero : {0.0f, -0.0f}) {
+    const cv::Mat back = MatOf(BytesOfMat(cv::Mat(2, 3, CV_32F, cv::Scalar(zero))));
+    EXPECT_EQ(std::signbit(back.at<float>(1, 2)), std::signbit(zero));
+  }
+}
+
+TEST(PackedMat, DamagedOnesAreRefused) {
+  cv::Mat bytes = RandomMat(3, 5, CV_8U, 0, 256), steps;
+  bytes.convertTo(steps, CV_32F, 1.0 / 256, -0.5);
+  for (const cv::Mat& matrix : {bytes, RandomMat(3, 5, CV_32F, -1, 1), steps}) {
     const std::string good = BytesOfMat(matrix);
     for (std::size_t length = 0; length < good.size(); ++length) {
       const std::string cut = good.substr(0, length);
       ByteReader in(cut, "test");
-      EXPECT_THROW(GetMat(in), InputError) << length << " of " << good.size();
+      EXPECT_THROW(PackedMat::Get(in), InputError) << length << " of " << good.size();
     }
     // Kind, then rows and columns in four bytes each.
     for (const std::size_t at : {1u, 5u}) {
@@ -88,13 +123,13 @@ TEST(MatBytes, DamagedOnesAreRefused) {
         std::string bad = good;
         for (std::size_t k = 0; k < 4; ++k) bad[at + k] = value;
         ByteReader in(bad, "test");
-        EXPECT_THROW(GetMat(in), InputError);
+        EXPECT_THROW(PackedMat::Get(in), InputError);
       }
     }
     std::string unknown = good;
-    unknown[0] = 4;
+    unknown[0] = 5;
     ByteReader in(unknown, "test");
-    EXPECT_THROW(GetMat(in), InputError);
+    EXPECT_THROW(PackedMat::Get(in), InputError);
   }
 }
 

@@ -1,0 +1,43 @@
+// Matrices of descriptors in as few bytes as may be, in memory and in files.
+#pragma once
+
+#include <cstdint>
+#include <opencv2/core.hpp>
+
+#include "core/byte_stream.h"
+
+namespace tutti::internal {
+
+/// A matrix of CV_8U or CV_32F, without loss. CV_32F takes a byte a value where all are whole numbers 0..255
+/// (SIFT) or -128..127 of 1/256 (SURF). Copies share what they hold, as those of cv::Mat do.
+class PackedMat {
+ public:
+  PackedMat() = default;
+  /// Shares the matrix's memory where nothing is packed.
+  PackedMat(const cv::Mat& matrix);  // NOLINT(google-explicit-constructor): the same by another name
+
+  /// The matrix, N x D: in memory of its own where it was packed.
+  cv::Mat Unpacked() const;
+  /// One row of Unpacked(), in its bytes, into as many as there are.
+  void CopyRow(int row, std::uint8_t* to) const;
+
+  bool empty() const { return values_.empty(); }
+  int rows() const { return values_.rows; }
+  int cols() const { return values_.cols; }
+  int type() const { return unit_ != nullptr ? CV_32F : values_.type(); }
+
+  /// Appends the matrix, such that zstd makes less of it.
+  void Put(ByteWriter& out) const;
+  /// What Put wrote. Throws InputError where that is damaged.
+  static PackedMat Get(ByteReader& in);
+
+ private:
+  enum class Kind : std::uint8_t { kEmpty, kBytes, kFloatPlanes, kWholeAsBytes, kStepsAsBytes };
+  struct Unit;
+  static const Unit kUnits[2];
+
+  cv::Mat values_;              // CV_8U where there is a unit
+  const Unit* unit_ = nullptr;  // of each value; null: they are as they were
+};
+
+}  // namespace tutti::internal

@@ -145,8 +145,9 @@ LoopGroundTruth NoTruth(int images) {
 
 fs::path ImageFolder(const fs::path& folder) {
   std::error_code error;
-  if (!fs::is_directory(folder, error) || !ImagesIn(folder).empty()) return folder;
-  return ImagesOfDataset(folder).value_or(folder);
+  if (!fs::is_directory(folder, error)) return folder;
+  const std::optional<fs::path> images = ImagesOfDataset(folder);
+  return images && ImagesIn(*images).size() > ImagesIn(folder).size() ? *images : folder;
 }
 
 std::vector<fs::path> ListImages(const fs::path& folder) {

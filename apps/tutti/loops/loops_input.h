@@ -49,8 +49,8 @@ struct ImageSet {
   cv::Mat Read(std::size_t i) const;
 };
 
-/// The folder of images that a data set's folder holds, or the folder itself where it holds images or no data
-/// set.
+/// The folder of images that a data set's folder holds, or the folder itself where it is no data set's, or
+/// holds more images (a picture or two may lie beside a data set).
 std::filesystem::path ImageFolder(const std::filesystem::path& folder);
 
 /// Of a folder of images, or a video file. A loop matrix that lies among the images is none of them. Throws

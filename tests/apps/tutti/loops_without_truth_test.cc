@@ -19,10 +19,11 @@ using testing::RunTutti;
 
 constexpr int kPlaces = 15, kImages = 20;
 
-// KITTI's layout; images 15 to 19 show the places of 0 to 4 again.
+// KITTI's layout, with a picture beside the images; images 15 to 19 show the places of 0 to 4 again.
 fs::path DriveWithLoops() {
   fs::path folder = testing::FreshFolder() / "drive";
   fs::create_directories(folder / "image_0");
+  cv::imwrite((folder / "loop_matrix.png").string(), cv::Mat(kImages, kImages, CV_8UC1, cv::Scalar(0)));
   for (int i = 0; i < kImages; ++i) {
     const cv::Mat place = testing::TexturedImage(static_cast<std::uint32_t>(i % kPlaces));
     cv::imwrite((folder / "image_0" / (std::to_string(i) + ".png")).string(),

@@ -47,7 +47,7 @@ struct PackedMat::Unit {
 };
 
 const PackedMat::Unit PackedMat::kUnits[2] = {{Kind::kWholeAsBytes, 1.0f, 0},            // SIFT
-                                              {Kind::kStepsAsBytes, 1.0f / 256, -128}};  // SURF
+                                              {Kind::kStepsAsBytes, 1.0f / 128, -128}};  // SURF
 
 PackedMat::PackedMat(const cv::Mat& matrix) : values_(matrix) {
   CV_Assert(matrix.empty() || matrix.type() == CV_8U || matrix.type() == CV_32F);

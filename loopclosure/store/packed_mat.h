@@ -9,7 +9,7 @@
 namespace tutti::internal {
 
 /// A matrix of CV_8U or CV_32F, without loss. CV_32F takes a byte a value where all are whole numbers 0..255
-/// (SIFT) or -128..127 of 1/256 (SURF). Copies share what they hold, as those of cv::Mat do.
+/// (SIFT) or -128..127 of 1/128 (SURF). Copies share what they hold, as those of cv::Mat do.
 class PackedMat {
  public:
   PackedMat() = default;

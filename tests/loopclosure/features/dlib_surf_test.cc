@@ -47,10 +47,9 @@ TEST(DlibSurf, GivesThePointsAndDescriptorsOfDlib) {
       continue;
     }
     for (int k = 0; k < descriptors.cols; ++k) {
-      const float steps = descriptors.at<float>(i, k) * 256;
+      const float steps = descriptors.at<float>(i, k) * 128;
       EXPECT_EQ(steps, std::round(steps)) << "point " << i << ", value " << k;
-      EXPECT_NEAR(steps, std::clamp(point.des(k) * 256, -128.0, 127.0), 0.5 + 256 * 2e-3)
-          << "point " << i << ", value " << k;
+      EXPECT_NEAR(steps, point.des(k) * 128, 0.5 + 128 * 2e-3) << "point " << i << ", value " << k;
     }
   }
   EXPECT_LE(other_angle, kPoints / 50);
@@ -106,7 +105,7 @@ TEST(DlibSurf, FindsNothingUnderTheMaskAndDescribesWhatLiesFarEnoughInside) {
   ASSERT_EQ(keypoints.size(), 2u);
   EXPECT_EQ(descriptors.rows, 2);
   EXPECT_EQ(keypoints[1].pt.x, 33);
-  for (int i = 0; i < 2; ++i) EXPECT_NEAR(cv::norm(descriptors.row(i)), 1, 0.01);
+  for (int i = 0; i < 2; ++i) EXPECT_NEAR(cv::norm(descriptors.row(i)), 1, 0.02);
 }
 
 }  // namespace

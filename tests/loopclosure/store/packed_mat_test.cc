@@ -57,7 +57,7 @@ TEST(PackedMat, OfAnySizeComeBackTheSame) {
       cv::Mat whole = RandomMat(rows, columns, CV_8U, 0, 256);
       whole.convertTo(whole, CV_32F);
       ExpectRoundTrip(whole);
-      ExpectRoundTrip((whole - 128) / 256);
+      ExpectRoundTrip((whole - 128) / 128);
     }
   }
   EXPECT_TRUE(MatOf(BytesOfMat(cv::Mat())).empty());
@@ -88,11 +88,11 @@ TEST(PackedMat, FloatsTakeAByteWhereAllAreWholeNumbersThatFitIt) {
 }
 
 TEST(PackedMat, FloatsTakeAByteWhereAllAreStepsThatFitIt) {
-  cv::Mat matrix(3, 8, CV_32F, cv::Scalar(-0.5));
-  matrix.at<float>(0, 1) = 127.0f / 256;
+  cv::Mat matrix(3, 8, CV_32F, cv::Scalar(-1));
+  matrix.at<float>(0, 1) = 127.0f / 128;
   EXPECT_LT(BytesOfMat(matrix).size(), 24u + 16u);
   ExpectRoundTrip(matrix);
-  for (const float other : {0.5f, -129.0f / 256, 1.0f / 512, -0.0f}) {
+  for (const float other : {1.0f, -129.0f / 128, 1.0f / 256, -0.0f}) {
     matrix.at<float>(2, 3) = other;
     EXPECT_GE(BytesOfMat(matrix).size(), 24u * 4u) << other;
     ExpectRoundTrip(matrix);
@@ -109,7 +109,7 @@ TEST(PackedMat, ZeroKeepsItsSign) {
 
 TEST(PackedMat, DamagedOnesAreRefused) {
   cv::Mat bytes = RandomMat(3, 5, CV_8U, 0, 256), steps;
-  bytes.convertTo(steps, CV_32F, 1.0 / 256, -0.5);
+  bytes.convertTo(steps, CV_32F, 1.0 / 128, -1);
   for (const cv::Mat& matrix : {bytes, RandomMat(3, 5, CV_32F, -1, 1), steps}) {
     const std::string good = BytesOfMat(matrix);
     for (std::size_t length = 0; length < good.size(); ++length) {

@@ -12,6 +12,7 @@
 #include "loopclosure/features/scratch_pool.h"
 #include "loopclosure/features/surf_hessian.h"
 #include "loopclosure/features/surf_integral.h"
+#include "loopclosure/store/signed_squares.h"
 #include "tutti/loopclosure/features.h"
 
 extern "C" void tutti_cblas_dscal(const CBLAS_INT_TYPE n, const double alpha, double* x,
@@ -130,17 +131,9 @@ double DominantAngle(const Integral& image, const dlib::vector<double, 2>& centr
   return std::atan2(best.y(), best.x());
 }
 
-// In whole steps that fit a byte, as SIFT's are: a saved map is a fifth smaller, and distances are exact. The
-// error of a descriptor is 0.02 of its length. A byte for all of -1 .. 1: twice as fine, it would cut off
-// what straight edges give.
-float InSteps(double value) {
-  constexpr float kStepsOfLength = 128;
-  const long steps = std::lround(value * static_cast<double>(kStepsOfLength));
-  return static_cast<float>(std::clamp(steps, -128L, 127L)) / kStepsOfLength;
-}
-
 // As dlib::compute_surf_descriptor, sum for sum; but its 4 x 4 cells overlap, and each of the 20 x 20 samples
-// is taken from the image and turned once.
+// is taken from the image and turned once. Values are rounded such that they fit a byte, as SIFT's do: a
+// saved map is a fifth smaller.
 void SurfDescriptor(const Integral& image, const dlib::vector<double, 2>& centre, double scale, double angle,
                     float* descriptor) {
   constexpr int kSide = 20, kHalf = kSide / 2;
@@ -182,7 +175,9 @@ void SurfDescriptor(const Integral& image, const dlib::vector<double, 2>& centre
   double squares = 0.0;
   for (const double v : values) squares += v * v;
   const double length = std::sqrt(squares) + 1e-7;
-  for (std::size_t i = 0; i < values.size(); ++i) descriptor[i] = InSteps(values[i] / length);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    descriptor[i] = internal::SignedSquare(internal::SignedRoot(static_cast<float>(values[i] / length)));
+  }
 }
 
 // Where the determinant of the Hessian has a maximum among its neighbours in place and scale.

@@ -1,10 +1,12 @@
 #include "loopclosure/store/packed_mat.h"
 
 #include <algorithm>
-#include <cmath>
+#include <array>
 #include <cstdint>
-#include <iterator>
+#include <cstring>
 #include <vector>
+
+#include "loopclosure/store/signed_squares.h"
 
 namespace tutti::internal {
 namespace {
@@ -21,67 +23,76 @@ void ForEachColumn(int columns, const Call& call) {
 
 }  // namespace
 
-// Floats that are so many units each take a byte.
-struct PackedMat::Unit {
+// 256 floats, of which each takes a byte.
+struct PackedMat::Code {
   Kind kind;
-  float size;  // a power of two
-  int least;   // of 256 numbers that follow each other [units]
+  int (*byte_of)(float);  // of a float that is one of them; of others any
+  std::array<float, 256> values;
 
-  // Of a row; false if a value is no such number.
+  // Of a row; false if a value is none of them.
   bool Pack(const float* from, int count, std::uint8_t* to) const {
-    const float per_unit = 1 / size;
-    const auto low = static_cast<float>(least), high = static_cast<float>(least + 255);
-    bool whole = true;
+    bool all = true;
     for (int i = 0; i < count; ++i) {
-      const float units = from[i] * per_unit;
-      const bool inside = units >= low && units <= high;
-      const int number = inside ? static_cast<int>(units) : 0;
-      to[i] = static_cast<std::uint8_t>(number - least);
-      whole &= inside && static_cast<float>(number) == units && !(number == 0 && std::signbit(units));
+      to[i] = static_cast<std::uint8_t>(byte_of(from[i]));
+      all &= SameBits(values[to[i]], from[i]);
     }
-    return whole;
+    return all;
   }
   void Unpack(const std::uint8_t* from, int count, float* to) const {
-    for (int i = 0; i < count; ++i) to[i] = static_cast<float>(from[i] + least) * size;
+    for (int i = 0; i < count; ++i) to[i] = values[from[i]];
   }
+
+ private:
+  static bool SameBits(float a, float b) { return std::memcmp(&a, &b, sizeof a) == 0; }
 };
 
-const PackedMat::Unit PackedMat::kUnits[2] = {{Kind::kWholeAsBytes, 1.0f, 0},            // SIFT
-                                              {Kind::kStepsAsBytes, 1.0f / 128, -128}};  // SURF
+const std::array<PackedMat::Code, 2>& PackedMat::Codes() {
+  const auto whole = [](float v) { return v >= 0 && v <= 255 ? static_cast<int>(v) : 0; };
+  const auto root = [](float v) { return v >= -1 && v <= 1 ? SignedRoot(v) & 0xff : 0; };
+  static const std::array<Code, 2> codes = [&] {
+    std::array<Code, 2> made = {Code{Kind::kWholeAsBytes, whole, {}}, Code{Kind::kSquaresAsBytes, root, {}}};
+    for (int i = 0; i < 256; ++i) {
+      made[0].values[static_cast<std::size_t>(i)] = static_cast<float>(i);
+      made[1].values[static_cast<std::size_t>(i)] = SignedSquare(i < 128 ? i : i - 256);
+    }
+    return made;
+  }();
+  return codes;
+}
 
 PackedMat::PackedMat(const cv::Mat& matrix) : values_(matrix) {
   CV_Assert(matrix.empty() || matrix.type() == CV_8U || matrix.type() == CV_32F);
   if (matrix.empty() || matrix.type() == CV_8U) return;
   cv::Mat bytes(matrix.size(), CV_8U);
-  for (const Unit& unit : kUnits) {
+  for (const Code& code : Codes()) {
     int r = 0;
-    while (r < matrix.rows && unit.Pack(matrix.ptr<float>(r), matrix.cols, bytes.ptr(r))) ++r;
+    while (r < matrix.rows && code.Pack(matrix.ptr<float>(r), matrix.cols, bytes.ptr(r))) ++r;
     if (r < matrix.rows) continue;
     values_ = bytes;
-    unit_ = &unit;
+    code_ = &code;
     return;
   }
 }
 
 cv::Mat PackedMat::Unpacked() const {
-  if (unit_ == nullptr) return values_;
+  if (code_ == nullptr) return values_;
   cv::Mat matrix(values_.size(), CV_32F);
-  for (int r = 0; r < matrix.rows; ++r) unit_->Unpack(values_.ptr(r), matrix.cols, matrix.ptr<float>(r));
+  for (int r = 0; r < matrix.rows; ++r) code_->Unpack(values_.ptr(r), matrix.cols, matrix.ptr<float>(r));
   return matrix;
 }
 
 void PackedMat::CopyRow(int row, std::uint8_t* to) const {
-  if (unit_ == nullptr) {
+  if (code_ == nullptr) {
     std::copy_n(values_.ptr(row), static_cast<std::size_t>(values_.cols) * values_.elemSize(), to);
   } else {
-    unit_->Unpack(values_.ptr(row), values_.cols, reinterpret_cast<float*>(to));
+    code_->Unpack(values_.ptr(row), values_.cols, reinterpret_cast<float*>(to));
   }
 }
 
 void PackedMat::Put(ByteWriter& out) const {
   if (empty()) return out.Put(Kind::kEmpty);
   const bool floats = values_.type() == CV_32F;
-  out.Put(unit_ != nullptr ? unit_->kind : floats ? Kind::kFloatPlanes : Kind::kBytes);
+  out.Put(code_ != nullptr ? code_->kind : floats ? Kind::kFloatPlanes : Kind::kBytes);
   out.Put<std::int32_t>(values_.rows);
   out.Put<std::int32_t>(values_.cols);
   const auto rows = static_cast<std::size_t>(values_.rows), columns = static_cast<std::size_t>(values_.cols);
@@ -92,7 +103,7 @@ void PackedMat::Put(ByteWriter& out) const {
       for (int r = 0; r < values_.rows; ++r) values.push_back(values_.ptr<float>(r)[c]);
     });
     out.PutPlanes(values);
-  } else if (unit_ != nullptr) {
+  } else if (code_ != nullptr) {
     const cv::Mat transposed = values_.t();
     ForEachColumn(values_.cols, [&](int c) { out.PutRaw(transposed.ptr(c), rows); });
   } else {
@@ -103,7 +114,7 @@ void PackedMat::Put(ByteWriter& out) const {
 PackedMat PackedMat::Get(ByteReader& in) {
   const auto kind = static_cast<Kind>(in.Get<std::uint8_t>());
   if (kind == Kind::kEmpty) return {};
-  if (kind > Kind::kStepsAsBytes) in.Damaged("a matrix of an unknown kind");
+  if (kind > Kind::kSquaresAsBytes) in.Damaged("a matrix of an unknown kind");
   const auto rows = in.Get<std::int32_t>();
   const auto columns = in.Get<std::int32_t>();
   const bool planes = kind == Kind::kFloatPlanes;
@@ -129,8 +140,8 @@ PackedMat PackedMat::Get(ByteReader& in) {
     cv::Mat transposed(columns, rows, CV_8U);
     ForEachColumn(columns, [&](int c) { in.GetRaw(transposed.ptr(c), height); });
     packed.values_ = transposed.t();
-    packed.unit_ =
-        std::find_if(std::begin(kUnits), std::end(kUnits), [&](const Unit& u) { return u.kind == kind; });
+    packed.code_ =
+        std::find_if(Codes().begin(), Codes().end(), [&](const Code& code) { return code.kind == kind; });
   }
   return packed;
 }

@@ -1,6 +1,7 @@
 // Matrices of descriptors in as few bytes as may be, in memory and in files.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <opencv2/core.hpp>
 
@@ -9,7 +10,7 @@
 namespace tutti::internal {
 
 /// A matrix of CV_8U or CV_32F, without loss. CV_32F takes a byte a value where all are whole numbers 0..255
-/// (SIFT) or -128..127 of 1/128 (SURF). Copies share what they hold, as those of cv::Mat do.
+/// (SIFT) or signed squares (SURF). Copies share what they hold, as those of cv::Mat do.
 class PackedMat {
  public:
   PackedMat() = default;
@@ -24,7 +25,7 @@ class PackedMat {
   bool empty() const { return values_.empty(); }
   int rows() const { return values_.rows; }
   int cols() const { return values_.cols; }
-  int type() const { return unit_ != nullptr ? CV_32F : values_.type(); }
+  int type() const { return code_ != nullptr ? CV_32F : values_.type(); }
 
   /// Appends the matrix, such that zstd makes less of it.
   void Put(ByteWriter& out) const;
@@ -32,12 +33,12 @@ class PackedMat {
   static PackedMat Get(ByteReader& in);
 
  private:
-  enum class Kind : std::uint8_t { kEmpty, kBytes, kFloatPlanes, kWholeAsBytes, kStepsAsBytes };
-  struct Unit;
-  static const Unit kUnits[2];
+  enum class Kind : std::uint8_t { kEmpty, kBytes, kFloatPlanes, kWholeAsBytes, kSquaresAsBytes };
+  struct Code;
+  static const std::array<Code, 2>& Codes();
 
-  cv::Mat values_;              // CV_8U where there is a unit
-  const Unit* unit_ = nullptr;  // of each value; null: they are as they were
+  cv::Mat values_;              // CV_8U where there is a code
+  const Code* code_ = nullptr;  // of each value; null: they are as they were
 };
 
 }  // namespace tutti::internal

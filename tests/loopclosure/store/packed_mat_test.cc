@@ -3,9 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <string>
 
+#include "loopclosure/store/signed_squares.h"
 #include "tutti/core/error.h"
 
 namespace tutti::internal {
@@ -54,10 +57,12 @@ TEST(PackedMat, OfAnySizeComeBackTheSame) {
     for (const int columns : {1, 2, 3, 4, 5, 32, 66}) {
       ExpectRoundTrip(RandomMat(rows, columns, CV_8U, 0, 256));
       ExpectRoundTrip(RandomMat(rows, columns, CV_32F, -1, 1));
-      cv::Mat whole = RandomMat(rows, columns, CV_8U, 0, 256);
+      cv::Mat whole = RandomMat(rows, columns, CV_8U, 0, 255);
       whole.convertTo(whole, CV_32F);
       ExpectRoundTrip(whole);
-      ExpectRoundTrip((whole - 128) / 128);
+      for (auto v = whole.begin<float>(); v != whole.end<float>(); ++v)
+        *v = SignedSquare(static_cast<int>(*v) - 127);
+      ExpectRoundTrip(whole);
     }
   }
   EXPECT_TRUE(MatOf(BytesOfMat(cv::Mat())).empty());
@@ -87,12 +92,12 @@ TEST(PackedMat, FloatsTakeAByteWhereAllAreWholeNumbersThatFitIt) {
   }
 }
 
-TEST(PackedMat, FloatsTakeAByteWhereAllAreStepsThatFitIt) {
-  cv::Mat matrix(3, 8, CV_32F, cv::Scalar(-1));
-  matrix.at<float>(0, 1) = 127.0f / 128;
+TEST(PackedMat, FloatsTakeAByteWhereAllAreSignedSquares) {
+  cv::Mat matrix(3, 8, CV_32F, cv::Scalar(SignedSquare(-kMostRoot)));
+  matrix.at<float>(0, 1) = SignedSquare(kMostRoot);
   EXPECT_LT(BytesOfMat(matrix).size(), 24u + 16u);
   ExpectRoundTrip(matrix);
-  for (const float other : {1.0f, -129.0f / 128, 1.0f / 256, -0.0f}) {
+  for (const float other : {1.0f, 1.5f, 1.0f / (1 << 15), -0.0f}) {
     matrix.at<float>(2, 3) = other;
     EXPECT_GE(BytesOfMat(matrix).size(), 24u * 4u) << other;
     ExpectRoundTrip(matrix);
@@ -107,9 +112,23 @@ TEST(PackedMat, ZeroKeepsItsSign) {
   }
 }
 
+TEST(SignedSquares, AreTheNearestByTheirRoots) {
+  for (int root = -kMostRoot; root <= kMostRoot; ++root) {
+    EXPECT_EQ(SignedRoot(SignedSquare(root)), root);
+    if (root > -kMostRoot) EXPECT_LT(SignedSquare(root - 1), SignedSquare(root));
+  }
+  EXPECT_EQ(SignedRoot(0.25f + 0.003f), 64);
+  EXPECT_EQ(SignedRoot(-0.25f - 0.005f), -65);
+  EXPECT_EQ(SignedRoot(1), kMostRoot);
+  EXPECT_EQ(SignedRoot(-7), -kMostRoot);
+  EXPECT_FALSE(std::signbit(SignedSquare(SignedRoot(-1e-6f))));
+}
+
 TEST(PackedMat, DamagedOnesAreRefused) {
-  cv::Mat bytes = RandomMat(3, 5, CV_8U, 0, 256), steps;
-  bytes.convertTo(steps, CV_32F, 1.0 / 128, -1);
+  cv::Mat bytes = RandomMat(3, 5, CV_8U, 0, 255), steps;
+  steps.create(bytes.size(), CV_32F);
+  std::transform(bytes.begin<std::uint8_t>(), bytes.end<std::uint8_t>(), steps.begin<float>(),
+                 [](int byte) { return SignedSquare(byte - 127); });
   for (const cv::Mat& matrix : {bytes, RandomMat(3, 5, CV_32F, -1, 1), steps}) {
     const std::string good = BytesOfMat(matrix);
     for (std::size_t length = 0; length < good.size(); ++length) {

@@ -6,33 +6,20 @@
 #include <numeric>
 #include <opencv2/imgproc.hpp>
 
+#include "core/sanitized_range.h"
+
 namespace tutti::synthetic {
 
-// First in the file, so that the compiler can inline them into the inner loop.
-inline float Texture::Level::Bilinear(float u, float v) const {
-  const float x = u * static_cast<float>(width) - 0.5F, y = v * static_cast<float>(height) - 0.5F;
-  int ix = static_cast<int>(x), iy = static_cast<int>(y);  // floor: without SSE 4.1, std::floor is a call
-  ix -= x < static_cast<float>(ix) ? 1 : 0;
-  iy -= y < static_cast<float>(iy) ? 1 : 0;
-  const float ax = x - static_cast<float>(ix), ay = y - static_cast<float>(iy);
-  const int mask_x = width - 1, mask_y = height - 1;
-  const int x0 = ix & mask_x, x1 = (x0 + 1) & mask_x;
-  const std::uint8_t* row0 = &texels[static_cast<std::size_t>(iy & mask_y) * static_cast<std::size_t>(width)];
-  const std::uint8_t* row1 =
-      &texels[static_cast<std::size_t>((iy + 1) & mask_y) * static_cast<std::size_t>(width)];
-  const float top = row0[x0] + ax * static_cast<float>(row0[x1] - row0[x0]);
-  const float bottom = row1[x0] + ax * static_cast<float>(row1[x1] - row1[x0]);
-  return top + ay * (bottom - top);
+Texture::Detail Texture::At(float lod) const {
+  const float level = std::clamp(lod, 0.0F, static_cast<float>(levels_.size() - 1));
+  const std::size_t low = static_cast<std::size_t>(level), next = std::min(low + 1, levels_.size() - 1);
+  return {levels_[low].Seen(), levels_[next].Seen(), level - static_cast<float>(low)};
 }
 
-float Texture::Sample(float u, float v, float lod) const {
-  const float last = static_cast<float>(levels_.size() - 1);
-  const float level = std::clamp(lod, 0.0F, last);
-  const std::size_t low = static_cast<std::size_t>(level);
-  const float fraction = level - static_cast<float>(low);
-  const float fine = levels_[low].Bilinear(u, v);
-  if (fraction <= 0.0F) return fine;
-  return fine + fraction * (levels_[low + 1].Bilinear(u, v) - fine);
+void Texture::CheckReadable() const {
+  for (const Level& level : levels_)
+    internal::CheckReadable(level.texels.data(),
+                            static_cast<std::size_t>(level.width) * static_cast<std::size_t>(level.height));
 }
 
 namespace {
@@ -88,10 +75,45 @@ struct Fill {
   const Texture* texture;
 };
 
+// At (u, v) in texture units (1 = the whole texture).
+TUTTI_CHECKED_AS_A_WHOLE inline float Bilinear(const Texture::Texels& texels, float u, float v) {
+  const float x = u * static_cast<float>(texels.width) - 0.5F,
+              y = v * static_cast<float>(texels.height) - 0.5F;
+  int ix = static_cast<int>(x), iy = static_cast<int>(y);  // floor: without SSE 4.1, std::floor is a call
+  ix -= x < static_cast<float>(ix) ? 1 : 0;
+  iy -= y < static_cast<float>(iy) ? 1 : 0;
+  const float ax = x - static_cast<float>(ix), ay = y - static_cast<float>(iy);
+  const int mask_x = texels.width - 1, mask_y = texels.height - 1;
+  const int x0 = ix & mask_x, x1 = (x0 + 1) & mask_x;
+  const auto width = static_cast<std::size_t>(texels.width);
+  const std::uint8_t* row0 = texels.begin + static_cast<std::size_t>(iy & mask_y) * width;
+  const std::uint8_t* row1 = texels.begin + static_cast<std::size_t>((iy + 1) & mask_y) * width;
+  const float top = row0[x0] + ax * static_cast<float>(row0[x1] - row0[x0]);
+  const float bottom = row1[x0] + ax * static_cast<float>(row1[x1] - row1[x0]);
+  return top + ay * (bottom - top);
+}
+
+// Pixels of a row that have one level of detail. `nu`, `nv`, `nn`: f.u, f.v and f.n at the first of them.
+TUTTI_CHECKED_AS_A_WHOLE inline void FillSpan(const Fill& f, const Texture::Detail& detail, double nu,
+                                              double nv, double nn, int count, float* grey, float* depth) {
+  for (int x = 0; x < count; ++x, nu += f.u.dx, nv += f.v.dx, nn += f.n.dx) {
+    const float inverse_z = static_cast<float>(nn * f.inverse_z_scale);
+    if (inverse_z <= depth[x]) continue;
+    depth[x] = inverse_z;
+    const double r = 1.0 / nn;
+    const float u = static_cast<float>(nu * r), v = static_cast<float>(nv * r);
+    float texel = Bilinear(detail.fine, u, v);
+    if (detail.fraction > 0.0F) texel += detail.fraction * (Bilinear(detail.coarse, u, v) - texel);
+    grey[x] = f.shade * texel;
+  }
+}
+
 void FillRow(Target& target, const Fill& f, int y, int x_begin, int x_end) {
   constexpr int kSpan = 16;  // pixels with one level of detail
   float* grey = &target.grey[static_cast<std::size_t>(y) * static_cast<std::size_t>(target.width)];
   float* depth = &target.inverse_z[static_cast<std::size_t>(y) * static_cast<std::size_t>(target.width)];
+  internal::CheckWritable(grey + x_begin, static_cast<std::size_t>(x_end - x_begin));
+  internal::CheckWritable(depth + x_begin, static_cast<std::size_t>(x_end - x_begin));
   const double tw = f.texture->Width(), th = f.texture->Height();
   for (int x0 = x_begin; x0 < x_end; x0 += kSpan) {
     const int x1 = std::min(x0 + kSpan, x_end);
@@ -105,14 +127,8 @@ void FillRow(Target& target, const Fill& f, int y, int x_begin, int x_end) {
     const double along_x = ux * ux + vx * vx, along_y = uy * uy + vy * vy;
     const double texels = std::max({std::min(along_x, along_y), std::max(along_x, along_y) / 9.0, 1e-12});
     const float lod = 0.5F * static_cast<float>(std::log2(texels));
-    double nu = f.u.At(x0, y), nv = f.v.At(x0, y), nn = f.n.At(x0, y);
-    for (int x = x0; x < x1; ++x, nu += f.u.dx, nv += f.v.dx, nn += f.n.dx) {
-      const float inverse_z = static_cast<float>(nn * f.inverse_z_scale);
-      if (inverse_z <= depth[x]) continue;
-      depth[x] = inverse_z;
-      const double r = 1.0 / nn;
-      grey[x] = f.shade * f.texture->Sample(static_cast<float>(nu * r), static_cast<float>(nv * r), lod);
-    }
+    FillSpan(f, f.texture->At(lod), f.u.At(x0, y), f.v.At(x0, y), f.n.At(x0, y), x1 - x0, grey + x0,
+             depth + x0);
   }
 }
 
@@ -233,6 +249,8 @@ Rendering Render(const std::vector<Face>& faces, const std::vector<Texture>& tex
       static_cast<std::size_t>(target.width) * static_cast<std::size_t>(target.height);
   target.grey.assign(samples, 0.0F);
   target.inverse_z.assign(samples, 0.0F);
+
+  for (const Texture& texture : textures) texture.CheckReadable();
 
   // Near faces first, so that hidden samples cost no texture access.
   const Pose T_camera_world = T_world_camera.Inverse();

@@ -16,16 +16,29 @@ class Texture {
  public:
   /// `image`: CV_8UC1 with power-of-two sides.
   explicit Texture(const cv::Mat& image);
-  /// Trilinear sample at (u, v) in texture units (1 = the whole texture); `lod`: log2 of texels per sample.
-  float Sample(float u, float v, float lod) const;
   int Width() const { return levels_[0].width; }
   int Height() const { return levels_[0].height; }
+
+  /// A mip level as inner loops read it.
+  struct Texels {
+    const std::uint8_t* begin;
+    int width, height;
+  };
+  /// Between two mip levels: `fraction` of the way from `fine` to `coarse`.
+  struct Detail {
+    Texels fine, coarse;
+    float fraction;
+  };
+  /// `lod`: log2 of texels per sample.
+  Detail At(float lod) const;
+  /// For sanitizers (core/sanitized_range.h).
+  void CheckReadable() const;
 
  private:
   struct Level {
     int width, height;
     std::vector<std::uint8_t> texels;
-    float Bilinear(float u, float v) const;
+    Texels Seen() const { return {texels.data(), width, height}; }
   };
   std::vector<Level> levels_;
 };

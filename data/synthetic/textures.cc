@@ -99,16 +99,16 @@ void Window(cv::Mat& image, const cv::Rect& r, double frame, int style, Random& 
 }  // namespace
 
 cv::Mat Noise(int width, int height, int coarse, double amplitude, std::uint64_t seed) {
-  cv::Mat sum(height, width, CV_32FC1, cv::Scalar(0));
+  cv::Mat sum(height, width, CV_32FC1, cv::Scalar(0)), octave;  // once: under a sanitizer memory is costly
   Random random(seed ^ 0xA0153EULL);
   for (int wave = coarse; wave >= 2; wave /= 2) {
     cv::Mat grid(std::max(2, height / wave), std::max(2, width / wave), CV_32FC1);
     for (int y = 0; y < grid.rows; ++y) {
       for (int x = 0; x < grid.cols; ++x) grid.at<float>(y, x) = random.Normal();
     }
-    cv::Mat octave;
     cv::resize(grid, octave, sum.size(), 0, 0, cv::INTER_LINEAR);
-    sum += octave * (amplitude * 0.5);
+    octave.convertTo(octave, CV_32F, amplitude * 0.5);
+    sum += octave;
   }
   return sum;
 }

@@ -29,8 +29,9 @@ const GreyWindow<Half>& WindowWeights() {
 }
 
 /// Grey value between pixels; (x, y) and the pixels right of and below it must lie in the image, whose rows
-/// are `step` bytes apart.
-inline float Bilinear(const std::uint8_t* data, std::size_t step, float x, float y) {
+/// are `step` bytes apart. Checked by a sanitizer where it is called, or there as a whole.
+__attribute__((always_inline)) inline float Bilinear(const std::uint8_t* data, std::size_t step, float x,
+                                                     float y) {
   const int ix = static_cast<int>(x), iy = static_cast<int>(y);
   const float ax = x - static_cast<float>(ix), ay = y - static_cast<float>(iy);
   const std::uint8_t* r0 = data + static_cast<std::size_t>(iy) * step + ix;

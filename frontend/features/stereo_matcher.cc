@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "core/median.h"
+#include "core/sanitized_range.h"
 #include "core/small_ldlt.h"
 #include "frontend/features/grey_window.h"
 
@@ -24,17 +25,28 @@ constexpr float kMaxShear = 0.8F;       // of the ground: baseline / height
 constexpr float kMaxResidual = 0.3F;    // of the window's variance
 constexpr float kResidualRatio = 6.0F;  // to the median of all matches
 
-// Sum of absolute differences of two windows, each relative to its own centre (so that brightness may
-// differ).
-int Sad(const cv::Mat& a, int ax, int ay, const cv::Mat& b, int bx, int by) {
-  const int ca = a.at<std::uint8_t>(ay, ax), cb = b.at<std::uint8_t>(by, bx);
+// Sum of absolute differences of two windows, whose middles and rows' lengths in bytes are given, each
+// relative to its own centre (so that brightness may differ).
+TUTTI_CHECKED_AS_A_WHOLE int Sad(const std::uint8_t* a, std::size_t a_step, const std::uint8_t* b,
+                                 std::size_t b_step) {
+  const int ca = *a, cb = *b;
+  a -= kHalf * a_step;
+  b -= kHalf * b_step;
   int sum = 0;
-  for (int dy = -kHalf; dy <= kHalf; ++dy) {
-    const std::uint8_t* ra = a.ptr<std::uint8_t>(ay + dy) + ax;
-    const std::uint8_t* rb = b.ptr<std::uint8_t>(by + dy) + bx;
-    for (int dx = -kHalf; dx <= kHalf; ++dx) sum += std::abs((ra[dx] - ca) - (rb[dx] - cb));
+  for (int dy = -kHalf; dy <= kHalf; ++dy, a += a_step, b += b_step) {
+    for (int dx = -kHalf; dx <= kHalf; ++dx) {
+      const int difference = (a[dx] - ca) - (b[dx] - cb);
+      sum += difference < 0 ? -difference : difference;
+    }
   }
   return sum;
+}
+
+// For Sad: windows of the image with middles up to `aside` pixels left and right of (x, y).
+void CheckWindows(const cv::Mat& image, int x, int y, int aside) {
+  for (int dy = -kHalf; dy <= kHalf; ++dy)
+    internal::CheckReadable(image.ptr<std::uint8_t>(y + dy) + x - kHalf - aside,
+                            static_cast<std::size_t>(kSide + 2 * aside));
 }
 
 using Window = GreyWindow<kHalf>;
@@ -48,6 +60,17 @@ struct Warp {
   float contrast = 0;  // weighted variance of the left window [grey levels^2]
 };
 
+// Grey values at (x + gain i, y) for all pixels i of a window's row.
+TUTTI_CHECKED_AS_A_WHOLE void SampleRow(const std::uint8_t* data, std::size_t step, float x, float gain,
+                                        float y, float* grey) {
+  const int left = static_cast<int>(x - gain * kHalf), right = static_cast<int>(x + gain * kHalf) + 1;
+  const std::uint8_t* first = data + static_cast<std::size_t>(y) * step + left;
+  internal::CheckReadable(first, static_cast<std::size_t>(right - left + 1));
+  internal::CheckReadable(first + step, static_cast<std::size_t>(right - left + 1));
+  for (int i = -kHalf; i <= kHalf; ++i)
+    grey[i + kHalf] = Bilinear(data, step, x + gain * static_cast<float>(i), y);
+}
+
 // Grey values of the left window, shifted and warped, in the right image; false if it reaches beyond the
 // image.
 bool SampleWarped(const cv::Mat& right, int x, int y, const Warp& w, Window* grey) {
@@ -56,12 +79,9 @@ bool SampleWarped(const cv::Mat& right, int x, int y, const Warp& w, Window* gre
   if (!(fx + w.shift - reach >= 0 && fx + w.shift + reach < static_cast<float>(right.cols - 1) &&
         fy + w.row - h >= 0 && fy + w.row + h < static_cast<float>(right.rows - 1)))
     return false;
-  for (int j = -kHalf, n = 0; j <= kHalf; ++j) {
-    const float start = fx + w.shift + w.shear * static_cast<float>(j);
-    for (int i = -kHalf; i <= kHalf; ++i, ++n)
-      (*grey)(n) = Bilinear(right.data, right.step, start + (1 + w.stretch) * static_cast<float>(i),
-                            fy + static_cast<float>(j) + w.row);
-  }
+  for (int j = -kHalf; j <= kHalf; ++j)
+    SampleRow(right.data, right.step, fx + w.shift + w.shear * static_cast<float>(j), 1 + w.stretch,
+              fy + static_cast<float>(j) + w.row, grey->data() + (j + kHalf) * kSide);
   return true;
 }
 
@@ -133,9 +153,12 @@ bool Refine(const cv::Mat& left, const cv::Mat& right, const cv::Point2f& scale,
   const int margin = kHalf + 1;
   if (x < margin || y < margin || x + margin >= left.cols || y + margin >= left.rows) return false;
   if (x0 - kSearch < margin || x0 + kSearch + margin >= right.cols || y + margin >= right.rows) return false;
+  CheckWindows(left, x, y, 0);
+  CheckWindows(right, x0, y, kSearch);
+  const std::uint8_t *at_left = left.ptr<std::uint8_t>(y) + x, *at_right = right.ptr<std::uint8_t>(y) + x0;
   int best = 0, least = std::numeric_limits<int>::max();
   for (int d = -kSearch; d <= kSearch; ++d) {
-    const int sad = Sad(left, x, y, right, x0 + d, y);
+    const int sad = Sad(at_left, left.step, at_right + d, right.step);
     if (sad < least) {
       least = sad;
       best = d;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/clones.h"
+#include "core/sanitized_range.h"
 
 namespace tutti::internal {
 namespace {
@@ -17,18 +18,23 @@ using Eight = float __attribute__((vector_size(32)));
 constexpr int kEight = 8, kBlock = 4 * kEight;  // [px]; a block's sums stay in registers
 
 /// sum += weight (a + b), of arrays anywhere in memory: no alignment is asked for.
-inline void Add(float weight, const float* a, const float* b, Eight& sum) {
+TUTTI_CHECKED_AS_A_WHOLE inline void Add(float weight, const float* a, const float* b, Eight& sum) {
   Eight left, right;
   std::memcpy(&left, a, sizeof(left));
   std::memcpy(&right, b, sizeof(right));
   sum += weight * (left + right);
 }
 
-/// out[x] = k[0] left[0][x] + sum over i > 0 of k[i] (left[i][x] + right[i][x]), summed up in this order.
+/// out[x] = k[0] left[0][x] + sum over 0 < i < taps of k[i] (left[i][x] + right[i][x]), summed up in this
+/// order.
 TUTTI_CLONES("avx2")
-void SymmetricSum(const std::vector<const float*>& left, const std::vector<const float*>& right,
-                  const std::vector<float>& kernel, int count, float* out) {
-  const std::size_t taps = kernel.size();
+TUTTI_CHECKED_AS_A_WHOLE void SymmetricSum(const float* const* left, const float* const* right,
+                                           const float* kernel, std::size_t taps, int count, float* out) {
+  for (std::size_t i = 0; i < taps; ++i) {
+    CheckReadable(left[i], static_cast<std::size_t>(count));
+    CheckReadable(right[i], static_cast<std::size_t>(count));
+  }
+  CheckWritable(out, static_cast<std::size_t>(count));
   int x = 0;
   for (; x + kBlock <= count; x += kBlock) {
     Eight s0, s1, s2, s3;
@@ -87,13 +93,13 @@ void GaussianBlur(const cv::Mat& from, double sigma, cv::Mat& to) {
       left[at] = from.ptr<float>(cv::borderInterpolate(y - i, from.rows, cv::BORDER_REFLECT_101));
       right[at] = from.ptr<float>(cv::borderInterpolate(y + i, from.rows, cv::BORDER_REFLECT_101));
     }
-    SymmetricSum(left, right, kernel, from.cols, begin);
+    SymmetricSum(left.data(), right.data(), kernel.data(), kernel.size(), from.cols, begin);
     for (const auto& [outside, inside] : mirrored) begin[outside] = begin[inside];
     for (int i = 0; i <= radius; ++i) {
       left[static_cast<std::size_t>(i)] = begin - i;
       right[static_cast<std::size_t>(i)] = begin + i;
     }
-    SymmetricSum(left, right, kernel, from.cols, to.ptr<float>(y));
+    SymmetricSum(left.data(), right.data(), kernel.data(), kernel.size(), from.cols, to.ptr<float>(y));
   }
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/clones.h"
+#include "core/sanitized_range.h"
 #include "loopclosure/features/gaussian_blur.h"
 #include "loopclosure/features/sift_descriptor.h"
 
@@ -128,15 +129,29 @@ bool Refine(const Octave& octave, int layer, int row, int col, float least, Poin
   return true;
 }
 
+// As std::max and std::min, which sanitizers would not let be inlined below.
+TUTTI_CHECKED_AS_A_WHOLE inline float Larger(float a, float b) { return a < b ? b : a; }
+TUTTI_CHECKED_AS_A_WHOLE inline float Smaller(float a, float b) { return b < a ? b : a; }
+
+TUTTI_CHECKED_AS_A_WHOLE void WriteOut(const Line& line, int cols, float* to) {
+  const float *fine = line.fine, *coarse = line.coarse;
+  CheckReadable(fine, static_cast<std::size_t>(cols));
+  CheckReadable(coarse, static_cast<std::size_t>(cols));
+  CheckWritable(to, static_cast<std::size_t>(cols));
+  for (int c = 0; c < cols; ++c) to[c] = coarse[c] - fine[c];
+}
+
 // Where a row of differences is above or below its nearest neighbours: what may be an extremum.
 TUTTI_CLONES("avx2")
-void Candidates(const float* h, const float* u, const float* d, const float* b, const float* a, int cols,
-                float least, std::uint8_t* found) {
+TUTTI_CHECKED_AS_A_WHOLE void Candidates(const float* h, const float* u, const float* d, const float* b,
+                                         const float* a, int cols, float least, std::uint8_t* found) {
+  for (const float* line : {h, u, d, b, a}) CheckReadable(line, static_cast<std::size_t>(cols));
+  CheckWritable(found, static_cast<std::size_t>(cols));
   for (int c = kBorder; c < cols - kBorder; ++c) {
-    const float high = std::max(std::max(std::max(h[c - 1], h[c + 1]), std::max(u[c], d[c])),
-                                std::max(std::max(a[c], b[c]), least));
-    const float low = std::min(std::min(std::min(h[c - 1], h[c + 1]), std::min(u[c], d[c])),
-                               std::min(std::min(a[c], b[c]), -least));
+    const float high =
+        Larger(Larger(Larger(h[c - 1], h[c + 1]), Larger(u[c], d[c])), Larger(Larger(a[c], b[c]), least));
+    const float low = Smaller(Smaller(Smaller(h[c - 1], h[c + 1]), Smaller(u[c], d[c])),
+                              Smaller(Smaller(a[c], b[c]), -least));
     found[c] = static_cast<std::uint8_t>((h[c] >= high) | (h[c] <= low));
   }
 }
@@ -164,9 +179,7 @@ std::vector<Point> Detect(SiftScratch& scratch, float least) {
     const auto line = [&](int layer, int row) { return scratch.lines.ptr<float>(3 * layer + row % 3); };
     const auto fill = [&](int row) {
       for (int layer = 0; layer < kBlurs - 1; ++layer) {
-        const Line from = Difference(octave, layer, row, 0);
-        float* to = line(layer, row);
-        for (int c = 0; c < cols; ++c) to[c] = from[c];
+        WriteOut(Difference(octave, layer, row, 0), cols, line(layer, row));
       }
     };
     fill(kBorder - 1);

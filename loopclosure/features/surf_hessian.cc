@@ -1,10 +1,11 @@
 #include "loopclosure/features/surf_hessian.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <cstddef>
 
 #include "core/clones.h"
+#include "core/sanitized_range.h"
 
 namespace tutti::internal {
 namespace {
@@ -37,18 +38,32 @@ class Reader {
   int odd_ = 0;
 };
 
-// A box of sums: of each place above left, above right, below left, below right.
-using Corners = std::array<const Sum*, 4>;
+// A box of sums: of each place.
+struct Corners {
+  const Sum *above_left, *above_right, *below_left, *below_right;
+};
 
 Corners Box(const Reader& at, const Sum* above, const Sum* below, int left, int right) {
   return {at.At(above, left), at.At(above, right), at.At(below, left), at.At(below, right)};
 }
 
-inline Sum Inside(const Corners& box, int i) { return (box[3][i] - box[2][i]) - (box[1][i] - box[0][i]); }
+void CheckBox(const Corners& box, int step, int count) {
+  if (count <= 0) return;
+  for (const Sum* corner : {box.above_left, box.above_right, box.below_left, box.below_right})
+    CheckReadable(corner, static_cast<std::size_t>(count - 1) * static_cast<std::size_t>(step) + 1);
+}
+
+TUTTI_CHECKED_AS_A_WHOLE inline Sum Inside(const Corners& box, int i) {
+  return (box.below_right[i] - box.below_left[i]) - (box.above_right[i] - box.above_left[i]);
+}
 
 // The outer box less three times the inner one, for `count` places.
 TUTTI_CLONES("avx2")
-void SecondDerivative(const Corners& outer, const Corners& inner, int step, int count, Sum* out) {
+TUTTI_CHECKED_AS_A_WHOLE void SecondDerivative(const Corners& outer, const Corners& inner, int step,
+                                               int count, Sum* out) {
+  CheckBox(outer, step, count);
+  CheckBox(inner, step, count);
+  CheckWritable(out, static_cast<std::size_t>(count));
   const Corners o = outer;
   const Corners n = inner;
   if (step == 1) {
@@ -60,8 +75,12 @@ void SecondDerivative(const Corners& outer, const Corners& inner, int step, int 
 
 // The boxes of one diagonal less those of the other. Lines of sums, from above to below.
 TUTTI_CLONES("avx2")
-void MixedDerivative(const Corners& above_right, const Corners& below_left, const Corners& above_left,
-                     const Corners& below_right, int step, int count, Sum* out) {
+TUTTI_CHECKED_AS_A_WHOLE void MixedDerivative(const Corners& above_right, const Corners& below_left,
+                                              const Corners& above_left, const Corners& below_right, int step,
+                                              int count, Sum* out) {
+  for (const Corners* box : {&above_right, &below_left, &above_left, &below_right})
+    CheckBox(*box, step, count);
+  CheckWritable(out, static_cast<std::size_t>(count));
   const Corners a = above_right;
   const Corners b = below_left;
   const Corners c = above_left;

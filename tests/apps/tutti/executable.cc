@@ -25,6 +25,7 @@ ProcessResult RunProgramAndSignal(const std::filesystem::path& program,
   argv.push_back(nullptr);
   const pid_t child = fork();
   if (child == 0) {
+    if (signal == SIGHUP) std::signal(SIGHUP, SIG_DFL);  // tests under nohup ignore it, as would the program
     dup2(pipe_ends[1], STDOUT_FILENO);
     dup2(pipe_ends[1], STDERR_FILENO);
     close(pipe_ends[0]);

@@ -115,7 +115,7 @@ TEST(PackedMat, ZeroKeepsItsSign) {
 TEST(SignedSquares, AreTheNearestByTheirRoots) {
   for (int root = -kMostRoot; root <= kMostRoot; ++root) {
     EXPECT_EQ(SignedRoot(SignedSquare(root)), root);
-    if (root > -kMostRoot) EXPECT_LT(SignedSquare(root - 1), SignedSquare(root));
+    EXPECT_LT(SignedSquare(root - 1), SignedSquare(root));
   }
   EXPECT_EQ(SignedRoot(0.25f + 0.003f), 64);
   EXPECT_EQ(SignedRoot(-0.25f - 0.005f), -65);

@@ -6,7 +6,17 @@
 namespace tutti {
 namespace {
 
-TEST(InterruptGuard, EachSignalThatEndsARunSetsTheFlag) {
+// Whether or not the tests run under nohup.
+class InterruptGuardTest : public ::testing::Test {
+ protected:
+  InterruptGuardTest() : before_(std::signal(SIGHUP, SIG_DFL)) {}
+  ~InterruptGuardTest() override { std::signal(SIGHUP, before_); }
+
+ private:
+  void (*before_)(int);
+};
+
+TEST_F(InterruptGuardTest, EachSignalThatEndsARunSetsTheFlag) {
   for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGXFSZ}) {
     const InterruptGuard guard;
     EXPECT_FALSE(InterruptGuard::Requested());
@@ -15,20 +25,17 @@ TEST(InterruptGuard, EachSignalThatEndsARunSetsTheFlag) {
   }
 }
 
-TEST(InterruptGuard, ATerminalThatIsGoneSaysSoMoreThanOnce) {
+TEST_F(InterruptGuardTest, ATerminalThatIsGoneSaysSoMoreThanOnce) {
   const InterruptGuard guard;
   for (const int signal : {SIGHUP, SIGHUP, SIGXFSZ, SIGXFSZ, SIGPIPE}) std::raise(signal);
   EXPECT_TRUE(InterruptGuard::Requested());
 }
 
-TEST(InterruptGuard, NohupStays) {
-  const auto before = std::signal(SIGHUP, SIG_IGN);
-  {
-    const InterruptGuard guard;
-    std::raise(SIGHUP);
-    EXPECT_FALSE(InterruptGuard::Requested());
-  }
-  std::signal(SIGHUP, before);
+TEST_F(InterruptGuardTest, NohupStays) {
+  std::signal(SIGHUP, SIG_IGN);
+  const InterruptGuard guard;
+  std::raise(SIGHUP);
+  EXPECT_FALSE(InterruptGuard::Requested());
 }
 
 TEST(InterruptGuardDeathTest, ASecondCtrlCEndsTheProcess) {

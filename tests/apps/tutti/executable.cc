@@ -25,7 +25,8 @@ ProcessResult RunProgramAndSignal(const std::filesystem::path& program,
   argv.push_back(nullptr);
   const pid_t child = fork();
   if (child == 0) {
-    if (signal == SIGHUP) std::signal(SIGHUP, SIG_DFL);  // tests under nohup ignore it, as would the program
+    // Started by nohup, or by a shell in the background, the tests ignore it, and so would the program.
+    if (signal != 0) std::signal(signal, SIG_DFL);
     dup2(pipe_ends[1], STDOUT_FILENO);
     dup2(pipe_ends[1], STDERR_FILENO);
     close(pipe_ends[0]);

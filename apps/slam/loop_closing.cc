@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "apps/slam/map_parts.h"
+#include "apps/slam/map_state.h"
 #include "core/section_file.h"
 #include "core/stopwatch.h"
 
@@ -230,6 +232,13 @@ void LoopClosing::Check(const Odometry* odometry, const internal::SectionReader&
   const int end = odometry != nullptr ? odometry->NextKeyframeId() : 0;
   for (const auto& [frame, keyframe] : keyframe_of_frame_) internal::CheckIndex(keyframe, 0, end, file);
   closer_.Check(end, file);
+}
+
+void LoopClosing::ResumeDetector(internal::SectionReader* file) {
+  file->SkipTo(MapSection::kDetector);
+  LoopWorker::Saved saved;
+  ReadState(*file, MapSection::kDetector, &saved);
+  worker_->Resume(file, std::move(saved));
 }
 
 // -1 if the detector does not know the frame.

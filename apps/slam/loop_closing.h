@@ -118,9 +118,8 @@ class LoopClosing {
   }
   /// Of that. Throws InputError where it names a keyframe that the odometry (nullptr: none) has not.
   void Check(const Odometry* odometry, const internal::SectionReader& file) const;
-  void ResumeDetector(internal::SectionReader* detector, LoopWorker::Saved saved) {
-    worker_->Resume(detector, std::move(saved));
-  }
+  /// Reads the detector from a map, and touches nothing else: it may run beside what reads the rest.
+  void ResumeDetector(internal::SectionReader* file);
   void ResumePending(std::optional<LoopSolution> solution, std::optional<GlobalAdjustment> adjustment) {
     closer_.Resume(std::move(solution), std::move(adjustment));
   }

@@ -182,7 +182,7 @@ class SlamSystem::Impl {
     if (loops_.Searching()) {
       second.emplace(file.name(), kMapFile);
       detector = std::async(config_.run.threads > 1 ? std::launch::async : std::launch::deferred,
-                            [&] { LoadDetector(*second); });
+                            [&] { loops_.ResumeDetector(&*second); });
     }
     if (odometry_) odometry_->LoadSections(&file);
     loops_.Check(odometry(), file);
@@ -203,13 +203,6 @@ class SlamSystem::Impl {
     std::string rest;  // of whoever wrote them
     while (end.Next(&rest) != internal::kEndOfSections) {
     }
-  }
-
-  void LoadDetector(internal::SectionReader& file) {
-    file.SkipTo(MapSection::kDetector);
-    LoopWorker::Saved saved;
-    ReadState(file, MapSection::kDetector, &saved);
-    loops_.ResumeDetector(&file, std::move(saved));
   }
 
   // What MapSection::kState holds.

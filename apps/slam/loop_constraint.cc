@@ -3,10 +3,9 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <opencv2/features2d.hpp>
-#include <set>
 #include <utility>
 
+#include "apps/slam/landmark_matches.h"
 #include "core/angle.h"
 #include "core/dense_solvers.h"
 #include "core/median.h"
@@ -16,7 +15,6 @@ namespace tutti {
 namespace {
 
 constexpr int kMinSimilarityInliers = 12;  // of 3D-3D matches; fewer leave the scale open
-constexpr float kMaxHamming = 60;  // of 256 bits; beyond it two ORB descriptors have nothing in common
 
 Eigen::Vector2d Pixel(const cv::KeyPoint& keypoint) { return {keypoint.pt.x, keypoint.pt.y}; }
 
@@ -36,52 +34,6 @@ Matrix7d WithFloor(const Matrix7d& information, double sigma_translation, double
 }
 
 std::string Percent(double share) { return std::to_string(std::lround(100 * share)) + " %"; }
-
-bool IsLandmark(const KeyframeView& view, int feature) {
-  return feature >= 0 && static_cast<std::size_t>(feature) < view.points.size() &&
-         view.points[static_cast<std::size_t>(feature)].allFinite();
-}
-
-// Rows of the features that are landmarks, and which features they are.
-cv::Mat LandmarkDescriptors(const KeyframeView& view, std::vector<int>& features) {
-  cv::Mat rows;
-  for (int i = 0; i < view.descriptors.rows; ++i) {
-    if (!IsLandmark(view, i)) continue;
-    features.push_back(i);
-    rows.push_back(view.descriptors.row(i));
-  }
-  return rows;
-}
-
-}  // namespace
-
-// The verification saw the query when it was new and had few landmarks.
-std::vector<LandmarkMatch> LandmarkMatches(const Verification& verification, const KeyframeView& candidate,
-                                           const KeyframeView& query) {
-  std::vector<LandmarkMatch> matches;
-  std::set<int> used_candidate, used_query;
-  const auto add = [&](int c, int q) {
-    if (!IsLandmark(candidate, c) || !IsLandmark(query, q)) return;
-    if (!used_candidate.insert(c).second || !used_query.insert(q).second) return;
-    matches.emplace_back(c, q);
-  };
-  for (const VerifiedMatch& match : verification.inlier_matches)
-    add(match.candidate_feature, match.query_feature);
-  std::vector<int> features_c, features_q;
-  const cv::Mat rows_c = LandmarkDescriptors(candidate, features_c),
-                rows_q = LandmarkDescriptors(query, features_q);
-  if (rows_c.empty() || rows_q.empty()) return matches;
-  std::vector<cv::DMatch> mutual;
-  cv::BFMatcher(cv::NORM_HAMMING, true).match(rows_q, rows_c, mutual);
-  for (const cv::DMatch& match : mutual) {
-    if (match.distance > kMaxHamming) continue;
-    add(features_c[static_cast<std::size_t>(match.trainIdx)],
-        features_q[static_cast<std::size_t>(match.queryIdx)]);
-  }
-  return matches;
-}
-
-namespace {
 
 SimilarityResult SimilarityOfLandmarks(const Verification& verification, const KeyframeView& candidate,
                                        const KeyframeView& query, const CameraRig& rig, std::uint64_t seed) {
@@ -164,13 +116,17 @@ LoopConstraint MakeLoopConstraint(const Verification& verification, const Keyfra
     }
     information = fit.information;
   } else {
-    if (verification.type != ConstraintType::kRigid) {
-      out.reason = "verified without depth: no metric transform";
+    // The detector knew the depths of two frames; the map has those of landmarks that many frames saw.
+    const Verification metric = verification.type == ConstraintType::kRigid
+                                    ? verification
+                                    : VerifyLandmarks(candidate, query, rig, VerificationOptions(), seed);
+    if (metric.type != ConstraintType::kRigid) {
+      out.reason = "verified without depth, and the map's landmarks give none: " + metric.reason;
       return out;
     }
-    edge.S_candidate_query = verification.S_candidate_query;
+    edge.S_candidate_query = metric.S_candidate_query;
     edge.S_candidate_query.scale = 1;
-    information = MakeInformation(verification.information, 1.0);
+    information = MakeInformation(metric.information, 1.0);
   }
   // The residual of an edge lives in the query's frame, the depth in the candidate's.
   const double sigma_translation = options.loop_sigma_fraction * edge.depth / edge.S_candidate_query.scale;

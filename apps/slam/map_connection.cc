@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "apps/slam/landmark_matches.h"
 #include "apps/slam/loop_constraint.h"
 #include "apps/slam/missed_loops.h"
 #include "tutti/slam/loop_record.h"

@@ -102,7 +102,7 @@ TEST(LoopConstraint, KeyframesWithoutCommonLandmarksGiveNone) {
                    .usable);
 }
 
-TEST(LoopConstraint, MetricSensorsTakeTheVerifiedTransformAndNothingLess) {
+TEST(LoopConstraint, MetricSensorsTakeTheVerifiedTransform) {
   const Views views(Similarity(1.0, Eigen::Quaterniond::Identity(), {0, 0, 1}));
   Verification verification;
   verification.type = ConstraintType::kRigid;
@@ -117,7 +117,23 @@ TEST(LoopConstraint, MetricSensorsTakeTheVerifiedTransformAndNothingLess) {
   EXPECT_EQ(found.edge.S_candidate_query.translation, verification.S_candidate_query.translation);
   // No surer than the options' floor: 1 % of a depth of 10.
   EXPECT_LT(found.edge.information(0, 0), 1 / (0.1 * 0.1));
+}
+
+TEST(LoopConstraint, MetricSensorsMeasureWhatWasVerifiedWithoutDepthByTheMapsLandmarks) {
+  const Similarity S(1.0, ExpSO3({0.02, -0.1, 0.03}), {0.6, -0.2, 1.1});
+  Views views(S);
+  Verification verification;
   verification.type = ConstraintType::kEssential;
+  verification.S_candidate_query = Similarity(1.0, S.rotation, S.translation.normalized());
+  const auto make = [&] {
+    return MakeLoopConstraint(verification, views.candidate, views.query, Rig(Sensor::kStereo), SlamOptions(),
+                              kSeed);
+  };
+  const LoopConstraint found = make();
+  ASSERT_TRUE(found.usable) << found.reason;
+  EXPECT_LT((found.edge.S_candidate_query.translation - S.translation).norm(), 1e-3) << "in metres";
+  EXPECT_EQ(found.edge.S_candidate_query.scale, 1);
+  views.query.points.assign(kLandmarks, Eigen::Vector3d::Constant(std::nan("")));
   EXPECT_FALSE(make().usable);
   EXPECT_THAT(make().reason, HasSubstr("without depth"));
 }

@@ -68,6 +68,7 @@ TEST(Pyramid, ManyThreadsMayAskAtOnce) {
   const std::shared_ptr<const Pyramid> loaded = Loaded(Saved(made));
   std::vector<const cv::Mat*> first(8);
   std::vector<std::thread> threads;
+  threads.reserve(first.size());
   for (const cv::Mat*& level : first) threads.emplace_back([&] { level = &loaded->Levels().front(); });
   for (std::thread& thread : threads) thread.join();
   for (const cv::Mat* level : first) EXPECT_EQ(level, first[0]);

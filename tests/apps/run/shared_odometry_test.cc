@@ -36,13 +36,30 @@ class SharedOdometry : public ::testing::Test {
     config.odometry.features = 1000;
     return config;
   }
-  RunRequest Request(const std::string& out) const {
+  static RunRequest Request(const fs::path& out) {
     RunRequest request;
     request.config = "test";
     request.dataset = TownWithALoop();
-    request.out = folder_ / out;
+    request.out = out;
     request.quiet = true;
+    request.threads = 2;
     return request;
+  }
+  // Tracked once, and its loops closed once, with two threads: however many tests look at it.
+  struct Shared {
+    fs::path out;
+    TrackedSequence tracked;
+    RunResult closed;
+  };
+  static const Shared& WithTwoThreads() {
+    static const Shared shared = [] {
+      Shared made;
+      made.out = testing::FreshFolder();
+      made.tracked = TrackSequence(Request(made.out / "odometry"), Config());
+      made.closed = CloseLoops(made.tracked, Request(made.out / "ensemble"), Config());
+      return made;
+    }();
+    return shared;
   }
   static std::string Text(const Trajectory& trajectory, const fs::path& file) {
     WriteTrajectory(file, trajectory, TrajectoryFormat::kTum);
@@ -65,10 +82,9 @@ class SharedOdometry : public ::testing::Test {
 };
 
 TEST_F(SharedOdometry, LoopsMoveTheMapAndLeaveTheOdometryAlone) {
-  const TrackedSequence tracked = TrackSequence(Request("odometry"), Config());
+  const auto& [out, tracked, closed] = WithTwoThreads();
   ASSERT_TRUE(tracked.odometry);
   EXPECT_EQ(tracked.result.loops.size(), 0u);
-  const RunResult closed = CloseLoops(tracked, Request("ensemble"), Config());
   EXPECT_TRUE(closed.shared_odometry);
   ASSERT_GT(closed.LoopsAccepted(), 0u);
   ASSERT_GT(closed.corrections, 0);
@@ -78,13 +94,12 @@ TEST_F(SharedOdometry, LoopsMoveTheMapAndLeaveTheOdometryAlone) {
   ASSERT_TRUE(closed.evaluation && tracked.result.evaluation);
   EXPECT_LT(closed.evaluation->slam.ate.rmse, tracked.result.evaluation->slam.ate.rmse);
   EXPECT_EQ(closed.reference.size(), tracked.result.reference.size());
-  EXPECT_TRUE(fs::exists(folder_ / "ensemble" / "loops.csv"));
+  EXPECT_TRUE(fs::exists(out / "ensemble" / "loops.csv"));
 }
 
 TEST_F(SharedOdometry, UntilTheFirstVerifiedLoopTheDetectorAnswersAsInARunOfItsOwn) {
-  const TrackedSequence tracked = TrackSequence(Request("odometry"), Config());
-  const RunResult closed = CloseLoops(tracked, Request("shared"), Config());
-  const RunResult apart = RunSlam(Request("apart"), Config());
+  const auto& [out, tracked, closed] = WithTwoThreads();
+  const RunResult apart = RunSlam(Request(folder_ / "apart"), Config());
   EXPECT_EQ(Text(apart.trajectory_odometry, folder_ / "a"), Text(tracked.result.trajectory, folder_ / "b"));
   std::int64_t first = -1;
   for (const LoopRecord& loop : apart.loops) {
@@ -97,18 +112,17 @@ TEST_F(SharedOdometry, UntilTheFirstVerifiedLoopTheDetectorAnswersAsInARunOfItsO
 }
 
 TEST_F(SharedOdometry, TheSameForAnyNumberOfThreads) {
-  RunRequest one = Request("one"), two = Request("two");
+  RunRequest one = Request(folder_ / "one");
   one.threads = 1;
-  two.threads = 2;
   const RunResult a = CloseLoops(TrackSequence(one, Config()), one, Config());
-  const RunResult b = CloseLoops(TrackSequence(two, Config()), two, Config());
+  const RunResult& b = WithTwoThreads().closed;
   EXPECT_EQ(LoopsCsv(a), LoopsCsv(b));
   EXPECT_EQ(Text(a.trajectory, folder_ / "a"), Text(b.trajectory, folder_ / "b"));
 }
 
 TEST_F(SharedOdometry, WithoutACalibrationThereIsNone) {
   TrackedSequence tracked;
-  EXPECT_THROW(CloseLoops(tracked, Request("none"), Config()), InputError);
+  EXPECT_THROW(CloseLoops(tracked, Request(folder_ / "none"), Config()), InputError);
 }
 
 }  // namespace

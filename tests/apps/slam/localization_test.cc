@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <filesystem>
+#include <map>
 #include <memory>
 #include <vector>
 
@@ -10,10 +12,14 @@
 #include "tests/support/recording.h"
 #include "tests/support/rendered_world.h"
 #include "tests/support/small_town.h"
+#include "tests/support/test_data.h"
+#include "tutti/slam/map_file.h"
 #include "tutti/slam/slam_system.h"
 
 namespace tutti {
 namespace {
+
+namespace fs = std::filesystem;
 
 // The first lap through a small town is mapped; then come its end again, and a street that is new.
 class LocatingFrames : public ::testing::TestWithParam<SyntheticSensor> {
@@ -32,11 +38,22 @@ class LocatingFrames : public ::testing::TestWithParam<SyntheticSensor> {
   }
   // A map of the first frames, ready to be located in.
   std::unique_ptr<SlamSystem> Mapped() const {
-    auto slam = std::make_unique<SlamSystem>(Config(), recording_.rig);
-    for (std::size_t i = 0; i < kMapped; ++i) slam->Track(recording_.frames[i]);
-    slam->Finish();
+    const fs::path& file = MapFile();
+    std::unique_ptr<SlamSystem> slam = SlamSystem::Load(file, ReadMapInfo(file));
     slam->BeginLocalization();
     return slam;
+  }
+  // Each sensor's once for all tests.
+  const fs::path& MapFile() const {
+    static std::map<SyntheticSensor, fs::path> mapped;
+    fs::path& file = mapped[GetParam()];
+    if (!file.empty()) return file;
+    file = testing::FreshFolder() / "map.tutti";
+    SlamSystem slam(Config(), recording_.rig);
+    for (std::size_t i = 0; i < kMapped; ++i) slam.Track(recording_.frames[i]);
+    slam.Finish();
+    slam.Save(file);
+    return file;
   }
 
   const testing::RenderedWorld world_{Town()};

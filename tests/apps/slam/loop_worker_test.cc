@@ -35,6 +35,14 @@ LoopQuery QueryOf(const InputFrame& frame) {
   return query;
 }
 
+// One member: what is told to the detector, and when, does not depend on their number; the time does.
+LoopDetectorOptions OneMember() {
+  LoopDetectorOptions options;
+  options.members = {"orb"};
+  options.threads = 1;
+  return options;
+}
+
 struct Told {
   std::optional<Pair> first_loop;  // that was accepted
   std::vector<double> hypotheses;  // of the images from the second after it on
@@ -44,9 +52,7 @@ struct Told {
 // Each answer is taken `delay` images later, as SlamSystem does; the first loop is taken back then.
 Told ToldOnADrive(bool own_thread, bool unlink) {
   constexpr std::size_t kDelay = 2;
-  LoopDetectorOptions options;
-  options.threads = 1;
-  LoopWorker worker(options, own_thread);
+  LoopWorker worker(OneMember(), own_thread);
   Told told;
   const std::vector<InputFrame>& frames = LapAndMore().frames;
   for (std::size_t i = 0; i < frames.size() + kDelay; ++i) {
@@ -67,9 +73,7 @@ Told ToldOnADrive(bool own_thread, bool unlink) {
 // What the detector itself says when it is told at the same place in the order of images.
 Told DriveDetector() {
   constexpr std::int64_t kDelay = 2;
-  LoopDetectorOptions options;
-  options.threads = 1;
-  LoopDetector detector(options);
+  LoopDetector detector(OneMember());
   Told told;
   for (const InputFrame& frame : LapAndMore().frames) {
     if (told.first_loop && frame.index == told.first_loop->first + kDelay + 1)

@@ -37,10 +37,11 @@ struct Setting {
   bool global_adjustment = true;
   int threads = 1;
   double gate_sigmas = SlamOptions().loop_gate_sigmas;
+  bool whole = true;  // both laps with the ensemble; else the loops of one member where the second lap begins
 
   bool operator<(const Setting& other) const {
-    return std::tie(global_adjustment, threads, gate_sigmas) <
-           std::tie(other.global_adjustment, other.threads, other.gate_sigmas);
+    return std::tie(global_adjustment, threads, gate_sigmas, whole) <
+           std::tie(other.global_adjustment, other.threads, other.gate_sigmas, other.whole);
   }
 };
 
@@ -50,6 +51,7 @@ RunConfig SmallConfig(const Setting& setting) {
   config.run.global_adjustment = setting.global_adjustment;
   config.run.threads = setting.threads;
   config.run.loop_gate_sigmas = setting.gate_sigmas;
+  if (!setting.whole) config.loops.members = {"orb"};
   return config;
 }
 
@@ -61,9 +63,10 @@ struct Result {
   double ate_m = 0;
 };
 
-Result DriveOnce(const RunConfig& config) {
-  SlamSystem slam(config, TwoLaps().rig);
-  for (const InputFrame& frame : TwoLaps().frames) slam.Track(frame);
+Result DriveOnce(const Setting& setting) {
+  SlamSystem slam(SmallConfig(setting), TwoLaps().rig);
+  const std::size_t all = TwoLaps().frames.size(), count = setting.whole ? all : all * 7 / 10;
+  for (std::size_t i = 0; i < count; ++i) slam.Track(TwoLaps().frames[i]);
   slam.Finish();
   Result result;
   result.adjustments = slam.GlobalAdjustments();
@@ -82,8 +85,7 @@ Result DriveOnce(const RunConfig& config) {
 const Result& DriveThrough(const Setting& setting) {
   static std::map<Setting, Result> driven;
   const auto known = driven.find(setting);
-  return known != driven.end() ? known->second
-                               : driven.emplace(setting, DriveOnce(SmallConfig(setting))).first->second;
+  return known != driven.end() ? known->second : driven.emplace(setting, DriveOnce(setting)).first->second;
 }
 
 TEST(SlamSystem, ASecondLapNeedsFewKeyframesAndTheWholeMapIsAdjusted) {
@@ -135,16 +137,17 @@ TEST(SlamSystem, WhatBackgroundWorkFindsDoesNotDependOnTheThreadsAndNothingIsRev
 }
 
 TEST(SlamSystem, LoopsThatAreGatedDoNotDependOnTheThreads) {
-  const Result &one = DriveThrough({false, 1, 20}), &whole = DriveThrough({false, 2});
-  ExpectTheSameBits(one, DriveThrough({false, 2, 20}));
-  EXPECT_EQ(one.corrections, whole.corrections) << "the gate refuses no true loop";
-  EXPECT_NEAR(one.ate_m, whole.ate_m, 0.1 * whole.ate_m);
+  const Result &one = DriveThrough({false, 1, 20, false}), &ungated = DriveThrough({false, 2, 0, false});
+  ExpectTheSameBits(one, DriveThrough({false, 2, 20, false}));
+  ASSERT_GT(one.corrections, 0);
+  EXPECT_EQ(one.corrections, ungated.corrections) << "the gate refuses no true loop";
+  EXPECT_NEAR(one.ate_m, ungated.ate_m, 0.1 * ungated.ate_m);
 }
 
 // The gate's limit is so low that it refuses all: the detector hears of it, at the same image for any number
 // of threads.
 TEST(SlamSystem, TheDetectorIsToldOfLoopsThatTheMapContradicts) {
-  const Result &one = DriveThrough({false, 1, 0.001}), &two = DriveThrough({false, 2, 0.001});
+  const Result &one = DriveThrough({false, 1, 0.001, false}), &two = DriveThrough({false, 2, 0.001, false});
   const auto revoked = [](const LoopRecord& loop) { return loop.revoked; };
   ASSERT_GT(std::count_if(one.loops.begin(), one.loops.end(), revoked), 0);
   for (const LoopRecord& loop : one.loops) {

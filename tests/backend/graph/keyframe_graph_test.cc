@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/dense_solvers.h"
 #include "tests/backend/graph/synthetic_graph.h"
 #include "tutti/core/error.h"
 
@@ -279,7 +280,8 @@ TEST(KeyframeGraph, EdgesOfRemovedKeyframesLeadToWhatStandsForThem) {
     const Similarity link = Similarity(left[107].T_world_keyframe.Inverse() * left[7].T_world_keyframe);
     EXPECT_LT((loop.S_candidate_query.translation - (before.S_candidate_query * link).translation).norm(),
               1e-9);
-    const double before_turn = before.information.inverse()(3, 3), turn = loop.information.inverse()(3, 3);
+    const double before_turn = internal::Inverse(before.information)(3, 3),
+                 turn = internal::Inverse(loop.information)(3, 3);
     EXPECT_GT(turn, 1.05 * before_turn) << "less sure";
     graph.Remove(into);
     left.erase(

@@ -1,5 +1,6 @@
 #include "tests/backend/graph/synthetic_graph.h"
 
+#include <Eigen/LU>
 #include <cmath>
 
 namespace tutti::testing {
@@ -117,5 +118,7 @@ double PositionError(const PoseGraph& graph, const std::vector<Similarity>& trut
   }
   return std::sqrt(sum / static_cast<double>(graph.nodes().size()));
 }
+
+Eigen::MatrixXd DenseInverse(const Eigen::MatrixXd& matrix) { return matrix.inverse(); }
 
 }  // namespace tutti::testing

@@ -44,4 +44,7 @@ Similarity RandomPose(GraphKind kind, std::mt19937& random, double translation, 
 /// A random positive definite matrix with strong off-diagonal terms.
 Matrix7d RandomInformation(std::mt19937& random);
 
+/// By Eigen. Compiled once: its templates take as long as the rest of a test.
+Eigen::MatrixXd DenseInverse(const Eigen::MatrixXd& matrix);
+
 }  // namespace tutti::testing

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Dense>
+#include <Eigen/LU>
 
 #include "tests/backend/graph/synthetic_graph.h"
 
@@ -78,7 +78,7 @@ TEST(EdgePrediction, SpreadIsThatOfTheDenseCovariance) {
     }
     if (e < last) H += J.transpose() * J;
   }
-  const Eigen::MatrixXd S = Eigen::MatrixXd::Identity(3, 3) + J * H.inverse() * J.transpose();
+  const Eigen::Matrix3d S = Eigen::Matrix3d::Identity() + J * testing::DenseInverse(H) * J.transpose();
   EXPECT_NEAR(prediction.Of(last).spread, std::log(S.determinant()), 1e-6);
 }
 

@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/LU>
-
 #include "tests/backend/graph/synthetic_graph.h"
 #include "tutti/backend/pose_graph_optimizer.h"
 #include "tutti/core/error.h"
@@ -40,7 +38,7 @@ TEST(GraphCovariance, IsTheInverseOfTheEdgeInformationForOneEdgeOfEveryKind) {
     const Matrix7d information = testing::RandomInformation(random);
     graph.AddOdometry(0, 1, step, information);
     const std::vector<int> used = TangentCoordinates(kind);
-    const Eigen::MatrixXd expected = Eigen::MatrixXd(information(used, used)).inverse();
+    const Eigen::MatrixXd expected = testing::DenseInverse(information(used, used));
     EXPECT_TRUE(GraphCovariance(graph).OfRelativePose(0, 1).isApprox(expected, 1e-9)) << ToString(kind);
   }
 }

@@ -2,8 +2,9 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/LU>
 #include <random>
+
+#include "tests/backend/graph/synthetic_graph.h"
 
 namespace tutti {
 namespace {
@@ -35,7 +36,7 @@ Eigen::SparseMatrix<double> RandomMatrix(int blocks) {
 TEST(SelectedInverse, EqualsTheDenseInverseWhereverTheMatrixHasAnEntry) {
   const Eigen::SparseMatrix<double> H = RandomMatrix(40);
   const Eigen::SparseMatrix<double> full = H.selfadjointView<Eigen::Lower>();
-  const Eigen::MatrixXd dense = Eigen::MatrixXd(full).inverse();
+  const Eigen::MatrixXd dense = testing::DenseInverse(full);
   const SelectedInverse inverse(H);
   ASSERT_TRUE(inverse.Ok());
   for (int c = 0; c < H.outerSize(); ++c) {

@@ -187,8 +187,8 @@ TEST(VerifierWithoutScale, FindsTheScaleOfTheCandidatesPointsOverTheQuerys) {
   const SimilarityResult fit = SolveSimilarity(points_c, pixels_c, *views.candidate().camera, points_q,
                                                pixels_q, *views.query().camera, options);
   ASSERT_EQ(fit.inliers.size(), 50u);
-  const Matrix6d covariance = Matrix7d(fit.information.inverse()).topLeftCorner<6, 6>();
-  const Matrix6d expected = covariance.inverse();
+  const Matrix6d covariance = internal::Inverse(fit.information).topLeftCorner<6, 6>();
+  const Matrix6d expected = internal::Inverse(covariance);
   EXPECT_LT((v.information - expected).norm(), 1e-2 * expected.norm());
 }
 

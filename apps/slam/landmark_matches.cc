@@ -76,7 +76,7 @@ std::vector<LandmarkMatch> LandmarkMatches(const Verification& verification, con
 }
 
 Verification VerifyLandmarks(const KeyframeView& candidate, const KeyframeView& query, const CameraRig& rig,
-                             const VerificationOptions& verification, std::uint64_t seed) {
+                             const LoopDetectorOptions& detector) {
   Verification out;
   out.candidate = candidate.frame_index;
   std::vector<Eigen::Vector3d> points;
@@ -89,14 +89,14 @@ Verification VerifyLandmarks(const KeyframeView& candidate, const KeyframeView& 
   }
   out.matches = static_cast<int>(points.size());
   RelativePoseOptions options;
-  options.min_inliers =
-      std::max(kMinInliers, static_cast<int>(std::ceil(verification.min_inlier_ratio * out.matches)));
-  options.seed = seed;
+  options.min_inliers = std::max(
+      kMinInliers, static_cast<int>(std::ceil(detector.verification.min_inlier_ratio * out.matches)));
+  options.seed = detector.seed;
   const PnpResult found = SolvePnp(points, pixels, rig.camera, options);
   out.inliers = static_cast<int>(found.inliers.size());
   out.reason = found.reason;
   if (!found.success) return out;
-  if (!CoverBothImages(matches, found.inliers, candidate, query, rig, verification)) {
+  if (!CoverBothImages(matches, found.inliers, candidate, query, rig, detector.verification)) {
     out.reason = "the matches cover too narrow a part of the image";
     return out;
   }

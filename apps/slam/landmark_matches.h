@@ -1,7 +1,6 @@
 // Landmarks that two keyframes have in common, as the map has them.
 #pragma once
 
-#include <cstdint>
 #include <utility>
 #include <vector>
 
@@ -21,10 +20,10 @@ std::vector<LandmarkMatch> LandmarkMatches(const Verification& verification, con
 
 /// Whether the query sees the candidate's landmarks: matches among the landmarks of both have to fit one
 /// camera motion. That asks for fewer than the detector does, which searches everywhere; what is found is to
-/// be confirmed by another loop. Accepted, it can be measured by MakeLoopConstraint.
-/// The share of the matches and their spread over both images are asked for as there.
+/// be confirmed by another loop. Accepted, it can be measured by MakeLoopConstraint. The share of the matches
+/// and their spread over both images are asked for as there: by the detector's options.
 Verification VerifyLandmarks(const KeyframeView& candidate, const KeyframeView& query, const CameraRig& rig,
-                             const VerificationOptions& verification, std::uint64_t seed);
+                             const LoopDetectorOptions& detector);
 
 }  // namespace tutti
 #pragma GCC visibility pop

@@ -88,7 +88,7 @@ double MedianDepth(const KeyframeView& view) {
 
 LoopConstraint MakeLoopConstraint(const Verification& verification, const KeyframeView& candidate,
                                   const KeyframeView& query, const CameraRig& rig, const SlamOptions& options,
-                                  std::uint64_t seed) {
+                                  const LoopDetectorOptions& detector) {
   LoopConstraint out;
   LoopEdge& edge = out.edge;
   edge.candidate = candidate.id;
@@ -102,7 +102,7 @@ LoopConstraint MakeLoopConstraint(const Verification& verification, const Keyfra
   }
   Matrix7d information = Matrix7d::Zero();
   if (rig.sensor == Sensor::kMono) {
-    const SimilarityResult fit = SimilarityOfLandmarks(verification, candidate, query, rig, seed);
+    const SimilarityResult fit = SimilarityOfLandmarks(verification, candidate, query, rig, detector.seed);
     if (!fit.success) {
       out.reason = "no scale for it: " + fit.reason;
       return out;
@@ -116,17 +116,16 @@ LoopConstraint MakeLoopConstraint(const Verification& verification, const Keyfra
     }
     information = fit.information;
   } else {
-    // The detector knew the depths of two frames; the map has those of landmarks that many frames saw.
-    const Verification metric = verification.type == ConstraintType::kRigid
-                                    ? verification
-                                    : VerifyLandmarks(candidate, query, rig, VerificationOptions(), seed);
-    if (metric.type != ConstraintType::kRigid) {
+    if (verification.type != ConstraintType::kRigid) {
+      // The detector knew the depths of two frames; the map has those of landmarks that many frames saw.
+      const Verification metric = VerifyLandmarks(candidate, query, rig, detector);
+      if (metric.accepted) return MakeLoopConstraint(metric, candidate, query, rig, options, detector);
       out.reason = "verified without depth, and the map's landmarks give none: " + metric.reason;
       return out;
     }
-    edge.S_candidate_query = metric.S_candidate_query;
+    edge.S_candidate_query = verification.S_candidate_query;
     edge.S_candidate_query.scale = 1;
-    information = MakeInformation(metric.information, 1.0);
+    information = MakeInformation(verification.information, 1.0);
   }
   // The residual of an edge lives in the query's frame, the depth in the candidate's.
   const double sigma_translation = options.loop_sigma_fraction * edge.depth / edge.S_candidate_query.scale;

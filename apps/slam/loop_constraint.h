@@ -28,7 +28,7 @@ struct LoopConstraint {
 /// scene share their errors, so inliers alone promise too much. Fills everything of the edge but `record`.
 LoopConstraint MakeLoopConstraint(const Verification& verification, const KeyframeView& candidate,
                                   const KeyframeView& query, const CameraRig& rig, const SlamOptions& options,
-                                  std::uint64_t seed);
+                                  const LoopDetectorOptions& detector);
 
 /// The same with candidate and query exchanged: what another detector found, which knew the newer keyframe.
 /// `candidate`: id of what is the candidate then.

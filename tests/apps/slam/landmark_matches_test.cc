@@ -43,7 +43,7 @@ TEST(LandmarkMatches, TheSameLandmarksTellWhereTheQueryStands) {
   const Pose moved(ExpSO3({0.02, -0.05, 0.01}), {0.4, -0.1, 0.8});
   const KeyframeView candidate = ViewOf(1, Pose(), 40), query = ViewOf(1, moved, 40);
   for (const Sensor sensor : {Sensor::kStereo, Sensor::kMono}) {
-    const Verification found = VerifyLandmarks(candidate, query, SceneRig(sensor), VerificationOptions(), 1);
+    const Verification found = VerifyLandmarks(candidate, query, SceneRig(sensor), LoopDetectorOptions());
     ASSERT_TRUE(found.accepted) << found.reason;
     EXPECT_EQ(found.type == ConstraintType::kSimilarity, sensor == Sensor::kMono);
     EXPECT_LT((found.S_candidate_query.translation - moved.translation).norm(), 1e-3);
@@ -61,7 +61,7 @@ TEST(LandmarkMatches, WhatLiesInOneSpotOfTheImageIsNoLoop) {
     spot.keypoints[i].pt = {static_cast<float>(pixel.x()), static_cast<float>(pixel.y())};
   }
   const auto verified = [](const KeyframeView& view) {
-    return VerifyLandmarks(view, view, SceneRig(Sensor::kStereo), VerificationOptions(), 1);
+    return VerifyLandmarks(view, view, SceneRig(Sensor::kStereo), LoopDetectorOptions());
   };
   EXPECT_TRUE(verified(wide).accepted);
   EXPECT_GE(verified(spot).inliers, 35);
@@ -73,7 +73,7 @@ TEST(LandmarkMatches, AnotherSceneOrAHandfulOfLandmarksIsNoLoopAndSaysWhy) {
   const KeyframeView candidate = ViewOf(1, Pose(), 40);
   for (const KeyframeView& query : {ViewOf(2, Pose(), 40), ViewOf(1, Pose(), 8)}) {
     const Verification found =
-        VerifyLandmarks(candidate, query, SceneRig(Sensor::kStereo), VerificationOptions(), 1);
+        VerifyLandmarks(candidate, query, SceneRig(Sensor::kStereo), LoopDetectorOptions());
     EXPECT_FALSE(found.accepted);
     EXPECT_FALSE(found.reason.empty());
   }

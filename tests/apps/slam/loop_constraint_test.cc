@@ -13,7 +13,6 @@ namespace {
 using ::testing::HasSubstr;
 
 constexpr int kLandmarks = 80;
-constexpr std::uint64_t kSeed = 3;
 
 PinholeCamera Camera() {
   PinholeCamera camera;
@@ -68,7 +67,7 @@ CameraRig Rig(Sensor sensor) {
 LoopConstraint Mono(const Similarity& S) {
   const Views views(S);
   return MakeLoopConstraint(Verification(), views.candidate, views.query, Rig(Sensor::kMono), SlamOptions(),
-                            kSeed);
+                            LoopDetectorOptions());
 }
 
 TEST(LoopConstraint, MonoFindsPoseAndScaleFromTheLandmarksOfBothKeyframes) {
@@ -94,12 +93,12 @@ TEST(LoopConstraint, KeyframesWithoutCommonLandmarksGiveNone) {
   Views views(Similarity(1.0, Eigen::Quaterniond::Identity(), {0, 0, 1}));
   views.query.points.assign(kLandmarks, Eigen::Vector3d::Constant(std::nan("")));
   const LoopConstraint found = MakeLoopConstraint(Verification(), views.candidate, views.query,
-                                                  Rig(Sensor::kMono), SlamOptions(), kSeed);
+                                                  Rig(Sensor::kMono), SlamOptions(), LoopDetectorOptions());
   EXPECT_FALSE(found.usable);
   EXPECT_THAT(found.reason, HasSubstr("only 0 of its matches are landmarks"));
   views.candidate.points.assign(kLandmarks, Eigen::Vector3d::Constant(std::nan("")));
   EXPECT_FALSE(MakeLoopConstraint(Verification(), views.candidate, views.query, Rig(Sensor::kMono),
-                                  SlamOptions(), kSeed)
+                                  SlamOptions(), LoopDetectorOptions())
                    .usable);
 }
 
@@ -111,7 +110,7 @@ TEST(LoopConstraint, MetricSensorsTakeTheVerifiedTransform) {
   verification.information = 1e4 * Matrix6d::Identity();
   const auto make = [&] {
     return MakeLoopConstraint(verification, views.candidate, views.query, Rig(Sensor::kRgbd), SlamOptions(),
-                              kSeed);
+                              LoopDetectorOptions());
   };
   const LoopConstraint found = make();
   ASSERT_TRUE(found.usable) << found.reason;
@@ -128,7 +127,7 @@ TEST(LoopConstraint, MetricSensorsMeasureWhatWasVerifiedWithoutDepthByTheMapsLan
   verification.S_candidate_query = Similarity(1.0, S.rotation, S.translation.normalized());
   const auto make = [&] {
     return MakeLoopConstraint(verification, views.candidate, views.query, Rig(Sensor::kStereo), SlamOptions(),
-                              kSeed);
+                              LoopDetectorOptions());
   };
   const LoopConstraint found = make();
   ASSERT_TRUE(found.usable) << found.reason;

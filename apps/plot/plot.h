@@ -30,6 +30,8 @@ struct TrajectoryPlot {
   std::string edges_name = "loops";
   std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> edges;  ///< loop edges
   std::string edges_color = "#009e73";
+  std::string marks_name;
+  std::vector<Eigen::Vector3d> marks;  ///< places with a ring around them
 };
 
 /// One curve over two axes.
@@ -54,6 +56,9 @@ struct CurvePlot {
 /// the 7th series on colours repeat; draw those dashed.
 const char* PlotPalette(std::size_t k);
 constexpr std::size_t kPlotPaletteSize = 6;
+/// Of the k-th recording that a map held before, in every picture and page (view.js, base.js); none is that
+/// of a run's own trajectory.
+const char* SessionColor(std::size_t k);
 
 /// The shapes of a plot on a page of kPlotWidth x kPlotHeight. Points that are not finite are left out.
 std::vector<PlotShape> LayOut(const TrajectoryPlot& plot);

@@ -60,6 +60,19 @@ View ChooseView(const TrajectoryPlot& plot) {
   return view;
 }
 
+PlotShape Ring(const Eigen::Vector2d& center) {
+  constexpr int kCorners = 24;
+  constexpr double kRadius = 7;  // [px]
+  PlotShape ring;
+  ring.color = kPlotInk;
+  ring.size = 1.6;
+  for (int k = 0; k <= kCorners; ++k) {
+    const double angle = 2 * M_PI * k / kCorners;
+    ring.points.push_back(center + kRadius * Eigen::Vector2d(std::cos(angle), std::sin(angle)));
+  }
+  return ring;
+}
+
 PlotShape LegendLine(double x, double y, const std::string& color, double width, bool dashed) {
   PlotShape line = PlotLine({x, y - 5}, {x + 34, y - 5}, color, std::max(2.0, width));
   line.dashed = dashed;
@@ -78,6 +91,9 @@ void AddLegend(const TrajectoryPlot& plot, const PlotAxes& axes, std::vector<Plo
     if (series.values.empty()) entry(series.name, series.color, series.width, series.dashed);
   }
   if (!plot.edges.empty()) entry(plot.edges_name, plot.edges_color, 2, false);
+  if (plot.marks.empty()) return;
+  shapes.push_back(Ring({x + 17, y - 5}));
+  shapes.push_back(PlotText({x + 42, y}, plot.marks_name, 14));
 }
 
 // Precision-recall curves: at the lower left, where they rarely pass; on white, as they may. Fitted axes: at
@@ -180,6 +196,7 @@ std::vector<PlotShape> LayOut(const TrajectoryPlot& plot) {
     shapes.push_back(PlotLine(from, to, plot.edges_color, 1.5));
     for (const Eigen::Vector2d& end : {from, to}) shapes.push_back(PlotDisc(end, 3, plot.edges_color));
   }
+  for (const Eigen::Vector3d& mark : plot.marks) shapes.push_back(Ring(axes.Page(view.World(mark))));
   AddLegend(plot, axes, shapes);
   return shapes;
 }

@@ -137,7 +137,10 @@ Json GalleryJson(const RunResult& result, const std::vector<ShownLoop>& loops) {
   }
   std::unique_ptr<Dataset> dataset;
   try {
-    dataset = OpenDataset(result.dataset, result.config.dataset);
+    DatasetOptions options = result.config.dataset;
+    options.start = options.end = 0;
+    options.stride = 1;  // a loop may lead to an earlier recording of the same images
+    dataset = OpenDataset(result.dataset, options);
   } catch (const InputError& error) {
     json["note"] = std::string("the images can't be read again: ") + error.what();
     return json;
@@ -156,7 +159,8 @@ Json GalleryJson(const RunResult& result, const std::vector<ShownLoop>& loops) {
             std::to_string(std::min(of_a_kind.size(), kMostOfAKind)) + " of " +
             std::to_string(of_a_kind.size());
   }
-  json["note"] = "Shown, evenly over the run: " + note + ".";
+  json["note"] = json["entries"].empty() ? "the images of the loops are of other recordings."
+                                         : "Shown, evenly over the run: " + note + ".";
   return json;
 }
 

@@ -6,6 +6,7 @@
 #include "apps/report/build_info.h"
 #include "apps/report/page.h"
 #include "apps/report/report_parts.h"
+#include "apps/run/frame_places.h"
 #include "apps/run/outputs.h"
 #include "apps/run/timing.h"
 #include "tutti/backend/evaluation.h"
@@ -68,12 +69,14 @@ Json ErrorJson(const RunResult& result, const Trajectory& estimate) {
   }
 }
 
+Json PointJson(const Eigen::Vector3d& p) { return {Rounded(p.x(), 4), Rounded(p.y(), 4), Rounded(p.z(), 4)}; }
+
 Json EdgesJson(const RunResult& result, const std::vector<ShownLoop>& loops, const Similarity& alignment) {
-  std::map<double, Eigen::Vector3d> at;
-  for (const StampedPose& pose : result.trajectory) at[pose.stamp_s] = alignment * pose.pose.translation;
+  const FramePlaces places(result, alignment);
   Json edges = Json::array();
   for (const ShownLoop& loop : loops) {
-    const auto a = at.find(loop.candidate_stamp_s), b = at.find(loop.query_stamp_s);
+    const auto a = places.AtEnd(loop.candidate, loop.candidate_stamp_s),
+               b = places.AtEnd(loop.query, loop.query_stamp_s);
     Json edge = {{"outcome", ToString(loop.outcome)},
                  {"query", loop.query},
                  {"candidate", loop.candidate},
@@ -83,13 +86,25 @@ Json EdgesJson(const RunResult& result, const std::vector<ShownLoop>& loops, con
                  {"reason", loop.reason},
                  {"qt", Rounded(loop.query_stamp_s, 3)},
                  {"ct", Rounded(loop.candidate_stamp_s, 3)}};
-    if (a != at.end() && b != at.end()) {
-      for (const auto& [name, p] : {std::pair("a", a->second), std::pair("b", b->second)})
-        edge[name] = {Rounded(p.x(), 4), Rounded(p.y(), 4), Rounded(p.z(), 4)};
+    if (a && b) {
+      edge["a"] = PointJson(*a);
+      edge["b"] = PointJson(*b);
     }
     edges.push_back(std::move(edge));
   }
   return edges;
+}
+
+// Frames that were found in the map, where they are in the trajectory.
+Json FoundJson(const RunResult& result, const Similarity& alignment) {
+  const FramePlaces places(result, alignment);
+  Json found = Json::array();
+  for (const FoundFrame& frame : result.found) {
+    const auto p = places.At(frame.stamp_s);
+    if (!p) continue;  // in another submap
+    found.push_back({{"frame", frame.index}, {"by_loop", frame.by_loop}, {"p", PointJson(*p)}});
+  }
+  return found;
 }
 
 Json ScoreJson(const TrajectoryScore& score) {
@@ -198,6 +213,7 @@ Json ReportJson(const RunResult& result, const DetectionLog& log, const std::str
   json["earlier"] = Json::array();
   for (std::size_t k = 0; result.map && k < result.map->earlier.size(); ++k)
     json["earlier"].push_back(PathJson(result.map->earlier[k], align_slam));
+  json["found"] = FoundJson(result, align_slam);
   json["loops"] = EdgesJson(result, loops, align_slam);
   json["errors"] = {{"odometry", scored ? ErrorJson(result, result.trajectory_odometry) : Json()},
                     {"slam", scored ? ErrorJson(result, result.trajectory) : Json()}};

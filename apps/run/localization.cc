@@ -104,24 +104,48 @@ std::string Summary(const LocalizationRequest& request, const Localization& l) {
   return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
-// The map's keyframes from above, and where the frames are.
-TrajectoryPlot Picture(const LocalizationRequest& request, const Odometry& odometry, const Localization& l) {
+// The map's keyframes from above, by recording.
+std::vector<PlotSeries> MapSeries(const RunState& state) {
+  const std::size_t count = state.sessions.size();
+  std::vector<PlotSeries> series(count);
+  for (std::size_t k = 0; k < count; ++k) {
+    if (count == 1) {
+      series[k] = {"map", {}, "#999999", 2.5, false};
+    } else {
+      series[k] = {"session " + std::to_string(k + 1), {}, SessionColor(k), 2.5, false};
+    }
+  }
+  std::vector<int> pieces(count, -1);
+  for (const int id : state.odometry->KeyframeIds()) {
+    if (id >= state.end_of_map) break;
+    const std::size_t session = state.SessionOf(state.odometry->KeyframeFrameIndex(id));
+    std::vector<Eigen::Vector3d>& points = series[session].points;
+    const int piece = state.odometry->KeyframePiece(id);
+    if (std::exchange(pieces[session], piece) != piece) points.emplace_back(Eigen::Vector3d::Constant(NAN));
+    points.push_back(state.odometry->KeyframePose(id).translation);
+  }
+  return series;
+}
+
+// The map, and where the frames are in it.
+TrajectoryPlot Picture(const LocalizationRequest& request, const RunState& state, const Localization& l) {
   TrajectoryPlot plot;
   plot.title = "Frames of " + request.dataset.filename().string() + " in " + request.map.filename().string();
-  plot.unit = odometry.Rig().sensor == Sensor::kMono ? "initial scale" : "m";
-  PlotSeries map{"map", {}, "#999999", 2.5, false}, located{"localized", {}, "#0072b2", 1.8, false},
+  plot.unit = state.odometry->Rig().sensor == Sensor::kMono ? "initial scale" : "m";
+  PlotSeries located{"localized", {}, "#0072b2", 1.8, false},
       beyond{"beyond the map", {}, "#d55e00", 1.2, true};
-  for (const int id : odometry.KeyframeIds()) {
-    if (id < l.map_keyframes) map.points.push_back(odometry.KeyframePose(id).translation);
-  }
   const Eigen::Vector3d gap = Eigen::Vector3d::Constant(NAN);
   for (const LocalizedFrame& frame : l.frames) {
     const bool posed = frame.track.state == TrackingState::kTracking;
     const Eigen::Vector3d at = posed ? frame.track.T_world_camera.translation : gap;
     located.points.push_back(posed && !frame.beyond ? at : gap);
     beyond.points.push_back(posed && frame.beyond ? at : gap);
+    if (frame.recognised) plot.marks.push_back(at);
   }
-  plot.series = {map, located, beyond};
+  plot.marks_name = "recognised (" + std::to_string(plot.marks.size()) + ")";
+  plot.series = MapSeries(state);
+  plot.series.push_back(std::move(located));
+  plot.series.push_back(std::move(beyond));
   return plot;
 }
 
@@ -133,6 +157,15 @@ std::unique_ptr<SlamSystem> OpenMap(const LocalizationRequest& request, MapInfo 
   return slam;
 }
 
+// Of the map that is located in.
+RunState StateIn(const SlamSystem& slam, const Localization& l) {
+  RunState state = {slam.odometry(), slam.loops()};
+  state.sessions.clear();
+  for (const MapSession& session : slam.Sessions()) state.sessions.push_back(session.frame_offset);
+  state.end_of_map = l.map_keyframes;
+  return state;
+}
+
 void LocateAll(const LocalizationRequest& request, const Dataset& dataset, const internal::Stopwatch& since,
                SlamSystem& slam, Localization& result) {
   PrefetchOptions reading;
@@ -142,6 +175,10 @@ void LocateAll(const LocalizationRequest& request, const Dataset& dataset, const
   Prefetcher frames(dataset, reading);
   Progress progress("localize", dataset.Size(), request.quiet ? nullptr : stderr);
   const Pose T_camera_body = dataset.Rig().T_body_camera.Inverse();
+  RunState state = StateIn(slam, result);
+  const bool endless = dataset.FrameSupply() != Supply::kStored;
+  for (const auto& observer : request.observers)
+    observer->OnStart(dataset.Rig(), endless ? 0 : dataset.Size());
   for (std::size_t i = 0; !InterruptGuard::Requested(); ++i) {
     const std::optional<FetchedFrame> fetched = frames.Next();
     if (!fetched) break;
@@ -158,8 +195,10 @@ void LocateAll(const LocalizationRequest& request, const Dataset& dataset, const
     located.index = frame.index;
     located.stamp_s = frame.stamp_s;
     located.track = slam.Track(frame);
+    state.recognised = slam.Relocalized() > recognised;
+    for (const auto& observer : request.observers) observer->OnFrame(frame, located.track, state);
     if (located.track.state == TrackingState::kTracking) {
-      located.recognised = slam.Relocalized() > recognised;
+      located.recognised = state.recognised;
       located.beyond = slam.odometry()->BeyondMap();
       if (!located.beyond) located.keyframe = slam.odometry()->ReferenceKeyframe();
       located.covariance = slam.odometry()->PoseCovariance();
@@ -169,6 +208,7 @@ void LocateAll(const LocalizationRequest& request, const Dataset& dataset, const
     result.frames.push_back(std::move(located));
     progress.Update(i + 1, std::to_string(result.Localized()) + " localized");
   }
+  for (const auto& observer : request.observers) observer->OnEnd(state);
   progress.Finish();
   result.interrupted = InterruptGuard::Requested();
 }
@@ -199,8 +239,9 @@ Localization Localize(const LocalizationRequest& request) {
                   WriteTrajectory(file, result.trajectory, TrajectoryFormat::kTum);
                 }});
   folder.Write({kFrames, [&](const fs::path& file) { WriteTextFile(file, FramesCsv(result)); }});
-  folder.Write(
-      {kPicture, [&](const fs::path& file) { WriteSvg(file, Picture(request, *slam->odometry(), result)); }});
+  folder.Write({kPicture, [&](const fs::path& file) {
+                  WriteSvg(file, Picture(request, StateIn(*slam, result), result));
+                }});
   folder.Write({kSummary, [&](const fs::path& file) { WriteTextFile(file, Summary(request, result)); }});
   ThrowFailures(folder.failures(), folder.Finish(!result.interrupted));
   return result;

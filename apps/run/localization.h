@@ -3,10 +3,12 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "apps/run/run_observer.h"
 #include "tutti/core/trajectory.h"
 #include "tutti/frontend/dataset.h"
 #include "tutti/frontend/odometry.h"
@@ -20,6 +22,8 @@ struct LocalizationRequest {
   std::optional<int> start, end, stride;      ///< instead of those of the options [frames]
   int threads = 2;
   bool quiet = false;  ///< no progress, no notes
+  /// Get every frame and the map (RunState::OnlyLocated), but no keyframes and no answers of the detector.
+  std::vector<std::shared_ptr<RunObserver>> observers;
 };
 
 /// One frame in the map.

@@ -10,6 +10,7 @@
 #include "apps/plot/plot.h"
 #include "apps/run/attempts.h"
 #include "apps/run/checkpoint.h"
+#include "apps/run/frame_places.h"
 #include "apps/run/live_files.h"
 #include "apps/run/outputs.h"
 #include "apps/run/text_file.h"
@@ -71,15 +72,19 @@ TrajectoryPlot MakePlot(const RunResult& result) {
   }
   for (std::size_t k = 0; result.map && k < result.map->earlier.size(); ++k) {
     plot.series.push_back({"session " + std::to_string(k + 1), Positions(result.map->earlier[k], align_slam),
-                           PlotPalette(k + 3), 1.2, true});
+                           SessionColor(k), 1.2, true});
   }
-  std::map<double, Eigen::Vector3d> at;
-  for (const StampedPose& pose : result.trajectory) at[pose.stamp_s] = align_slam * pose.pose.translation;
+  const FramePlaces places(result, align_slam);
   for (const LoopRecord& loop : result.loops) {
-    const auto a = at.find(loop.candidate_stamp_s), b = at.find(loop.query_stamp_s);
-    if (loop.accepted && a != at.end() && b != at.end()) plot.edges.emplace_back(a->second, b->second);
+    const auto a = places.AtEnd(loop.candidate, loop.candidate_stamp_s),
+               b = places.AtEnd(loop.query, loop.query_stamp_s);
+    if (loop.accepted && a && b) plot.edges.emplace_back(*a, *b);
   }
   plot.edges_name = "accepted loops (" + std::to_string(result.LoopsAccepted()) + ")";
+  for (const FoundFrame& frame : result.found) {
+    if (const auto place = places.At(frame.stamp_s)) plot.marks.push_back(*place);
+  }
+  plot.marks_name = "found in the map (" + std::to_string(plot.marks.size()) + ")";
   return plot;
 }
 
@@ -97,6 +102,12 @@ void WriteTextFile(const fs::path& file, const std::string& text) {
 std::size_t RunResult::LoopsAccepted() const {
   std::size_t count = 0;
   for (const LoopRecord& loop : loops) count += loop.accepted ? 1 : 0;
+  return count;
+}
+
+std::size_t RunResult::FramesRelocalized() const {
+  std::size_t count = 0;
+  for (const FoundFrame& frame : found) count += frame.by_loop ? 0 : 1;
   return count;
 }
 

@@ -94,7 +94,7 @@ Json FramesJson(const RunResult& r) {
                  {"tracked", r.frames_tracked},
                  {"bad", r.bad.size()},
                  {"lost", r.frames_lost},
-                 {"relocalized", r.frames_relocalized},
+                 {"relocalized", r.FramesRelocalized()},
                  {"dropped", r.frames_dropped},
                  {"in_dataset", r.frames_listed},
                  {"without_mask", r.frames_without_mask},

@@ -1,8 +1,10 @@
 // A window into a run: the report, the live view and the comparison's shared odometry look through it.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -17,9 +19,22 @@ namespace tutti {
 struct RunState {
   const Odometry* odometry = nullptr;  ///< null: appearance only
   const std::vector<LoopRecord>& loops;
-  int corrections = 0;  ///< how often loops have moved the map
-  /// What has a smaller frame number is of an earlier recording of the map (MapSession::frame_offset).
-  std::int64_t first_frame = 0;
+  int corrections = 0;      ///< how often loops have moved the map
+  bool recognised = false;  ///< of OnFrame: the frame was lost, or the first, and the detector knew its place
+  /// MapSession::frame_offset of the recordings of the map, which are in the order of their numbers.
+  std::vector<std::int64_t> sessions = {0};
+  /// Frames are only located (SlamSystem::BeginLocalization): keyframes from this id on are none of the
+  /// map's.
+  int end_of_map = std::numeric_limits<int>::max();
+
+  /// What has a smaller frame number is of an earlier recording than the newest.
+  std::int64_t FirstFrame() const { return sessions.back(); }
+  /// The recording of a frame, by its number in the map.
+  std::size_t SessionOf(std::int64_t frame) const {
+    const auto next = std::upper_bound(sessions.begin() + 1, sessions.end(), frame);
+    return static_cast<std::size_t>(next - sessions.begin()) - 1;
+  }
+  bool OnlyLocated() const { return end_of_map != std::numeric_limits<int>::max(); }
 };
 
 /// Watches a run and changes nothing (it may hold it up, as a pause does). All calls come from the thread

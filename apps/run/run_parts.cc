@@ -35,9 +35,9 @@ void CollectKeyframes(const Odometry& odometry, const FrameRange& session, RunRe
 void CollectLoops(const RunState& state, RunResult& result) {
   result.loops.clear();
   for (const LoopRecord& loop : state.loops) {
-    if (loop.query < state.first_frame) continue;
+    if (loop.query < state.FirstFrame()) continue;
     result.loops.push_back(loop);
-    if (loop.candidate < state.first_frame)
+    if (loop.candidate < state.FirstFrame())
       result.loops.back().candidate_stamp_s =
           -std::numeric_limits<double>::infinity();  // no frame here has it
   }
@@ -114,23 +114,18 @@ Trajectory BodyTrajectory(Trajectory trajectory, const CameraRig& rig) {
 }
 
 void CollectEarlierSessions(const RunState& state, RunResult& result) {
-  const std::vector<MapSession>& sessions = result.map.value().sessions;
-  result.map->earlier.assign(sessions.size() - 1, {});
+  result.map.value().earlier.assign(state.sessions.size() - 1, {});
+  const Pose T_camera_body = result.rig.T_body_camera.Inverse();
   const std::vector<int> pieces =
-      state.odometry->Pieces(FrameRange{state.first_frame, std::numeric_limits<std::int64_t>::max()});
+      state.odometry->Pieces(FrameRange{state.FirstFrame(), std::numeric_limits<std::int64_t>::max()});
   if (pieces.empty()) return;
   for (const int id : state.odometry->KeyframeIds()) {
     const std::int64_t frame = state.odometry->KeyframeFrameIndex(id);
-    if (frame >= state.first_frame || state.odometry->KeyframePiece(id) != pieces.front()) continue;
-    const auto next =
-        std::upper_bound(sessions.begin(), sessions.end(), frame,
-                         [](std::int64_t f, const MapSession& s) { return f < s.frame_offset; });
-    const auto session = static_cast<std::size_t>(next - sessions.begin()) - 1;
-    result.map->earlier[session].push_back(
-        {state.odometry->KeyframeStamp(id), state.odometry->KeyframePose(id)});
+    if (frame >= state.FirstFrame() || state.odometry->KeyframePiece(id) != pieces.front()) continue;
+    const Pose T_world_body = state.odometry->KeyframePose(id) * T_camera_body;
+    result.map->earlier[state.SessionOf(frame)].push_back({state.odometry->KeyframeStamp(id), T_world_body});
+    result.map->keyframes[frame] = T_world_body;
   }
-  for (Trajectory& keyframes : result.map->earlier)
-    keyframes = BodyTrajectory(std::move(keyframes), result.rig);
 }
 
 void CollectStamps(const Odometry& odometry, const std::vector<MapSession>& sessions, RunResult& result) {
@@ -158,7 +153,7 @@ void CollectMap(const RunState& state, RunResult& result) {
   if (result.appearance_only) return;
   const Odometry& odometry = *state.odometry;
   FrameRange session;
-  if (state.first_frame > 0) session.first = state.first_frame;
+  if (state.FirstFrame() > 0) session.first = state.FirstFrame();
   result.trajectory = BodyTrajectory(odometry.FrameTrajectory(-1, session), result.rig);
   result.frames_tracked = result.trajectory.size();
   const std::vector<int> pieces = odometry.Pieces(session);

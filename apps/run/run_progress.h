@@ -44,11 +44,16 @@ void State(Archive& archive, LostStretch& lost) {
   archive(lost.first, lost.last, lost.state, lost.reason);
 }
 
+template <class Archive>
+void State(Archive& archive, FoundFrame& found) {
+  archive(found.index, found.stamp_s, found.by_loop);
+}
+
 /// What a result has already while the run goes on.
 template <class Archive>
 void StateOfGrowing(Archive& archive, RunResult& result) {
   archive(result.frames_lost, result.frames_without_mask, result.frames_without_depth, result.bad,
-          result.bad_depth, result.lost, result.frame_ms, result.frame_inliers);
+          result.bad_depth, result.lost, result.found, result.frame_ms, result.frame_inliers);
 }
 
 }  // namespace tutti

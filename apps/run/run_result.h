@@ -38,6 +38,13 @@ struct BadFrame {
   std::string error;
 };
 
+/// Where a frame found its place in the map again.
+struct FoundFrame {
+  std::int64_t index = 0;  ///< InputFrame::index
+  double stamp_s = 0;
+  bool by_loop = false;  ///< a loop joined the recording with the map; else the loop detector knew the place
+};
+
 /// One trajectory against the reference.
 struct TrajectoryScore {
   bool valid = false;
@@ -75,6 +82,7 @@ struct MapGoneOn {
   std::vector<MapSession> sessions;  ///< the last one is the run's own
   /// T_world_body of the keyframes of each but the last, in the submap that trajectory.txt is of.
   std::vector<Trajectory> earlier;
+  std::map<std::int64_t, Pose> keyframes;  ///< the same, by the numbers of their frames in the map
 };
 
 /// Frames, loops, times, trajectories of one run.
@@ -93,7 +101,6 @@ struct RunResult {
   std::size_t frames_listed = 0;         ///< that the data set has
   std::size_t frames_tracked = 0;        ///< with a pose in trajectory.txt
   std::size_t frames_lost = 0;           ///< read, but without a pose when they came
-  std::size_t frames_relocalized = 0;    ///< lost, but the loop detector knew the place
   bool realtime = false;                 ///< played by the time stamps
   std::size_t frames_dropped = 0;        ///< not looked at, since newer ones were there already
   std::size_t frames_without_mask = 0;   ///< where each image has a mask of its own: read, but without one
@@ -102,6 +109,7 @@ struct RunResult {
   std::vector<BadFrame> bad_depth;  ///< of those without depth the ones that have an image for it
   double frame_interval_s = 0;      ///< FrameInterval of the data set
   std::vector<LostStretch> lost;
+  std::vector<FoundFrame> found;  ///< lost, or the first of the recording, and in the map by then
   std::size_t keyframes = 0;
   bool interrupted = false;
   std::optional<std::int64_t> resumed_from_frame;  ///< the checkpoint's next frame, if it went on from one
@@ -149,6 +157,8 @@ struct RunResult {
   std::filesystem::path folder;  ///< where everything was written: RunRequest::out, or "unfinished" inside
 
   std::size_t LoopsAccepted() const;
+  /// Lost frames whose place the loop detector knew.
+  std::size_t FramesRelocalized() const;
   /// False if it ended before its data set did.
   bool Finished() const { return failure.empty() && (!interrupted || endless); }
   /// True if the run is void: frames were there, calibration was there, and not one got a pose.

@@ -26,6 +26,7 @@ SlamRun::SlamRun(const RunRequest& request, const RunConfig& config, const Datas
   } else {
     slam_ = std::make_unique<SlamSystem>(Watched(config, request), dataset.Rig(), Recorder());
   }
+  for (const MapSession& session : slam_->Sessions()) session_offsets_.push_back(session.frame_offset);
   if (request.checkpoint_s) checkpoints_.emplace(out / kCheckpoint, *request.checkpoint_s);
   slam_->SetDetectionListener([this](const LoopResult& detection) {
     for (const auto& observer : request_.observers) observer->OnDetection(detection);
@@ -112,12 +113,12 @@ void SlamRun::TrackUntouched() {
 void SlamRun::Collect() {
   CollectMap(State(), result_);
   if (request_.map) {
-    result_.map = MapGoneOn{request_.map->string(), slam_->Sessions(), {}};
+    result_.map = MapGoneOn{request_.map->string(), slam_->Sessions(), {}, {}};
     CollectEarlierSessions(State(), result_);
     CollectStamps(*slam_->odometry(), result_.map->sessions, result_);
+    NoteJoining(result_.map->sessions.back());
   }
   result_.global_adjustments = slam_->GlobalAdjustments();
-  result_.frames_relocalized = slam_->Relocalized();
   result_.graph = slam_->Graph();
   result_.graph_proof = slam_->GraphProof();
   if (given_ != nullptr && !slam_->AppearanceOnly()) CorrectGiven();
@@ -129,6 +130,14 @@ void SlamRun::Collect() {
     result_.lens_check = CheckLens(*slam_->odometry(), session);
   if (!alone_) return;
   result_.trajectory_odometry = BodyTrajectory(alone_->Tracked().FrameTrajectory(-1, session), result_.rig);
+}
+
+void SlamRun::NoteJoining(const MapSession& own) {
+  const auto same = [&](const FoundFrame& found) { return found.index == own.joined_at; };
+  if (!own.joined_at || std::any_of(result_.found.begin(), result_.found.end(), same)) return;
+  const auto position = so_far_.positions.find(*own.joined_at);
+  if (position != so_far_.positions.end())
+    result_.found.push_back({*own.joined_at, dataset_.Stamp(position->second), true});
 }
 
 void SlamRun::CorrectGiven() {
@@ -252,7 +261,10 @@ double SlamRun::CpuSeconds() const {
 void SlamRun::TrackOne(const InputFrame& frame) {
   const ScopedSpan span(Recorder(), Lane::kTracking, "frame");
   const internal::Stopwatch watch;
+  const std::size_t recognised = slam_->Relocalized();
   const TrackResult track = Track(frame);
+  recognised_ = slam_->Relocalized() > recognised;
+  if (recognised_) result_.found.push_back({frame.index, frame.stamp_s});
   result_.frame_ms.push_back(watch.Milliseconds());
   if (track.keyframe >= 0) planted_.OnKeyframe(track.keyframe, slam_.get());
   live_.Add(frame.stamp_s, track, State());

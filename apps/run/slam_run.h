@@ -52,7 +52,9 @@ class SlamRun {
   // Every pose of the other odometry, as the keyframes are now.
   void CorrectGiven();
   TrackResult Track(const InputFrame& frame);
-  RunState State() const { return {slam_->odometry(), slam_->loops(), slam_->Corrections(), FirstFrame()}; }
+  RunState State() const {
+    return {slam_->odometry(), slam_->loops(), slam_->Corrections(), recognised_, session_offsets_};
+  }
   // In the map's numbers.
   std::int64_t FirstFrame() const { return slam_->AppearanceOnly() ? 0 : slam_->odometry()->FrameOffset(); }
   std::FILE* Out() const { return request_.quiet ? nullptr : stderr; }
@@ -80,6 +82,8 @@ class SlamRun {
   void EndCheckpoints(Progress& progress);
   // The run is another session of a map.
   void GoOnIn(const std::filesystem::path& map);
+  // The recording joined the map by a loop: that is a place that was found, too.
+  void NoteJoining(const MapSession& own);
   // Loop records of earlier sessions.
   std::size_t LoopsBefore() const;
   void Resume(const std::filesystem::path& checkpoint);
@@ -90,7 +94,9 @@ class SlamRun {
   const RunConfig& config_;
   const Dataset& dataset_;
   const GivenOdometry* given_;
-  std::optional<double> followed_s_;  // the last frame that was given a pose
+  std::vector<std::int64_t> session_offsets_;  // MapSession::frame_offset of all
+  bool recognised_ = false;                    // the last frame was
+  std::optional<double> followed_s_;           // the last frame that was given a pose
   RunResult& result_;
   SpanRecorder recorder_;
   std::unique_ptr<SlamSystem> slam_;

@@ -8,6 +8,7 @@
 #include "apps/tutti/commands.h"
 #include "apps/tutti/files.h"
 #include "apps/tutti/mask_option.h"
+#include "apps/tutti/view_options.h"
 #include "tutti/slam/config.h"
 
 namespace tutti::cli {
@@ -17,6 +18,7 @@ struct LocalizeArguments {
   std::string map, dataset, out, config, mask;
   int start = 0, end = 0, stride = 1, threads = 2;
   bool quiet = false;
+  ViewOptions view;
 };
 
 // 130: ended by Ctrl-C; 1: no frame was found in the map.
@@ -33,6 +35,7 @@ int RunLocalize(const CLI::App& command, const LocalizeArguments& arguments) {
   if (command.count("--start") > 0) request.start = arguments.start;
   if (command.count("--end") > 0) request.end = arguments.end;
   if (command.count("--stride") > 0) request.stride = arguments.stride;
+  if (auto view = StartView(command, arguments.view)) request.observers.push_back(std::move(view));
   const Localization result = Localize(request);
   const std::size_t total = result.frames.size() + result.bad;
   std::printf("\n  frames %zu of %zu localized", result.Localized(), total);
@@ -41,8 +44,8 @@ int RunLocalize(const CLI::App& command, const LocalizeArguments& arguments) {
   if (result.first_pose_s) std::printf("first pose after %.2f s, ", *result.first_pose_s);
   std::printf("%.1f ms of processor time per frame\n",
               total > 0 ? 1000 * result.cpu_s / static_cast<double>(total) : 0.0);
-  std::printf("  poses in the map's frame of reference are in %s\n",
-              (request.out / "trajectory.txt").c_str());
+  std::printf("  poses in the map's frame of reference are in %s\n  look at %s\n",
+              (request.out / "trajectory.txt").c_str(), (request.out / "localization.svg").c_str());
   if (result.interrupted) return 130;
   if (result.Localized() > 0) return 0;
   std::fprintf(stderr, "tutti: not one frame was found in the map: it shows other places\n");
@@ -72,6 +75,7 @@ void SetUpLocalize(CLI::App& command, int& exit_code) {
   command.add_option("--stride", arguments->stride, "use every so many frames")->check(Positive());
   command.add_option("--threads", arguments->threads, "most threads; the result is the same for any number")
       ->check(Positive());
+  AddViewOptions(command, arguments->view);
   command.add_flag("--quiet", arguments->quiet, "no progress and no notes");
   command.callback([&command, arguments, &exit_code] { exit_code = RunLocalize(command, *arguments); });
 }

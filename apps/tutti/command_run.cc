@@ -21,7 +21,7 @@
 #include "apps/tutti/files.h"
 #include "apps/tutti/mask_option.h"
 #include "apps/tutti/run_with_report.h"
-#include "apps/view/live_view.h"
+#include "apps/tutti/view_options.h"
 #include "core/example_configs.h"
 #include "core/terminal.h"
 #include "tutti/core/error.h"
@@ -47,22 +47,12 @@ struct RunArguments {
   int inject_false_loops = 0;
   int start = 0, end = 0, stride = 1;
   double follow_s = 10, checkpoint_s = 30;
-  bool view = false;
-  LiveViewOptions live;
+  ViewOptions view;
 };
-
-std::shared_ptr<LiveView> StartView(const LiveViewOptions& options) {
-  const std::string problem = options.Validate();
-  if (!problem.empty()) throw InputError("--view: " + problem);
-  auto view = std::make_shared<LiveView>(options);
-  std::fprintf(stderr, "tutti: look at %s\n", view->Url().c_str());
-  return view;
-}
 
 int RunAndShow(const CLI::App& command, const RunArguments& arguments, RunRequest request,
                const RunConfig& config) {
-  const bool view = arguments.view || command.count("--view-address") > 0;
-  if (view) request.observers.push_back(StartView(arguments.live));
+  if (auto view = StartView(command, arguments.view)) request.observers.push_back(std::move(view));
   const RunResult result = arguments.no_report ? RunSlam(request, config) : RunWithReport(request, config);
   std::fputs(ResultTable(result).c_str(), stdout);
   if (arguments.timing) {
@@ -303,19 +293,7 @@ void SetUpRun(CLI::App& command, int& exit_code) {
       "--realtime", arguments->realtime,
       "play by the time stamps and drop the frames that it can't follow; without it every frame is "
       "processed, and the result does not depend on the machine's speed");
-  command.add_flag("--view", arguments->view,
-                   "serve a page to look at the run while it goes on, at 127.0.0.1 (through a tunnel: ssh -L "
-                   "8077:127.0.0.1:8077 robot)");
-  command.add_option("--view-port", arguments->live.port, "of that page; 0: any free one")
-      ->capture_default_str();
-  command.add_option(
-      "--view-address", arguments->live.address,
-      "serve it at this address of the machine (0.0.0.0: all); the address that is printed has a "
-      "token, without which nothing is answered");
-  command
-      .add_option("--view-wait", arguments->live.idle_s,
-                  "wait at most this long for a browser before the first frame [s]")
-      ->capture_default_str();
+  AddViewOptions(command, arguments->view);
   command.add_flag("--timing", arguments->timing,
                    "print how long each stage took: calls, median, p99, total, share");
   command.add_option(

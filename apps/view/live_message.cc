@@ -21,6 +21,19 @@ double Short(double value, double unit = 1000) { return std::round(value * unit)
 
 Json Position(const Eigen::Vector3d& p) { return {Short(p.x()), Short(p.y()), Short(p.z())}; }
 
+const char* WordOf(LiveSpot::Kind kind) {
+  switch (kind) {
+    case LiveSpot::Kind::kBeyond:
+      return "beyond";
+    case LiveSpot::Kind::kRecognised:
+      return "recognised";
+    case LiveSpot::Kind::kJoined:
+      return "joined";
+    default:
+      return "located";
+  }
+}
+
 // Each track: x, y of now, of the frame before that shows it, ...
 Json TracksJson(const LiveFrame& frame, double scale) {
   Json tracks = Json::array();
@@ -54,16 +67,15 @@ Json FrameJson(const LiveFrame& frame) {
 }  // namespace
 
 std::string LiveMessage(const LiveNews& news) {
-  Json json = {{"paused", news.paused},
-               {"finished", news.finished},
-               {"total", news.total},
-               {"frame", FrameJson(news.frame)}};
+  Json json = {
+      {"paused", news.paused},     {"finished", news.finished},         {"total", news.total},
+      {"sessions", news.sessions}, {"only_located", news.only_located}, {"frame", FrameJson(news.frame)}};
   json["places"] = Json::array();
   for (const LivePlace& place : *news.places) {
     const Eigen::Quaterniond& q = place.T_world_camera.rotation;
     Json p = Position(place.T_world_camera.translation);
     for (const double v : {q.x(), q.y(), q.z(), q.w()}) p.push_back(Short(v, 1e4));
-    json["places"].push_back({place.id, place.frame, place.piece, p, place.earlier ? 1 : 0});
+    json["places"].push_back({place.id, place.frame, place.piece, p, place.session});
   }
   json["loops"] = Json::array();
   for (const LiveLoop& loop : *news.loops)
@@ -74,6 +86,9 @@ std::string LiveMessage(const LiveNews& news) {
     for (const Eigen::Vector3f& p : points.points) list.push_back(Position(p.cast<double>()));
     json["points"].push_back({points.keyframe, list});
   }
+  json["spots"] = Json::array();
+  for (const LiveSpot& spot : news.spots)
+    json["spots"].push_back({WordOf(spot.kind), spot.frame, spot.keyframe, Position(spot.position)});
   json["events"] = Json::array();
   for (const LiveEvent& event : news.events) {
     Json e = {{"text", event.text}};

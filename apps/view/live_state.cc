@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <utility>
 
 #include "apps/run/interrupt.h"
 #include "core/stopwatch.h"
@@ -11,13 +12,29 @@
 namespace tutti::view {
 namespace {
 
-std::vector<LivePlace> PlacesOf(const Odometry& odometry, std::int64_t first_frame) {
+std::vector<LivePlace> PlacesOf(const RunState& state) {
+  const Odometry& odometry = *state.odometry;
   std::vector<LivePlace> places;
   for (const int id : odometry.KeyframeIds()) {
+    if (id >= state.end_of_map) break;
     const std::int64_t frame = odometry.KeyframeFrameIndex(id);
-    places.push_back({id, frame, odometry.KeyframePiece(id), frame < first_frame, odometry.KeyframePose(id)});
+    places.push_back(
+        {id, frame, odometry.KeyframePiece(id), state.SessionOf(frame), odometry.KeyframePose(id)});
   }
   return places;
+}
+
+std::string StateWord(const TrackResult& track, const RunState& state) {
+  if (state.odometry == nullptr) return "appearance only";
+  if (!state.OnlyLocated() || track.state != TrackingState::kTracking) return ToString(track.state);
+  return state.odometry->BeyondMap() ? "beyond the map" : "localized";
+}
+
+// The recording has become part of the map that was there before it.
+bool InEarlierMap(const RunState& state) {
+  const int keyframe = state.odometry->ReferenceKeyframe();
+  return !state.OnlyLocated() && keyframe >= 0 &&
+         state.odometry->KeyframePiece(keyframe) < state.odometry->SessionPiece();
 }
 
 std::vector<Eigen::Vector3f> SomePoints(const KeyframeView& view) {
@@ -62,7 +79,7 @@ void LiveState::SetFrame(const InputFrame& frame, const TrackResult& track, cons
   next.index = frame.index;
   next.stamp_s = frame.stamp_s;
   next.image = frame.image;
-  next.state = state.odometry == nullptr ? "appearance only" : ToString(track.state);
+  next.state = StateWord(track, state);
   next.reason = track.reason;
   next.features = track.features;
   next.inliers = track.inliers;
@@ -72,8 +89,10 @@ void LiveState::SetFrame(const InputFrame& frame, const TrackResult& track, cons
   std::shared_ptr<const std::vector<LiveLoop>> loops;
   const std::size_t accepted = CountAccepted(state.loops);
   const bool corrected = state.corrections != corrections_seen_;
-  if (state.odometry != nullptr && (new_keyframe_ || corrected))
-    places = std::make_shared<const std::vector<LivePlace>>(PlacesOf(*state.odometry, state.first_frame));
+  if (!begun_ && state.odometry != nullptr) SetMap(state);
+  if (state.odometry != nullptr && (new_keyframe_ || corrected || !begun_))
+    places = std::make_shared<const std::vector<LivePlace>>(PlacesOf(state));
+  begun_ = true;
   if (state.loops.size() != loops_seen_ || accepted != accepted_seen_)
     loops = std::make_shared<const std::vector<LiveLoop>>(LoopsOf(state));
   if (next.posed) {
@@ -82,6 +101,7 @@ void LiveState::SetFrame(const InputFrame& frame, const TrackResult& track, cons
     trail_.clear();
   }
   next.trail = trail_;
+  if (next.posed) AddSpot(next, state);
   if (corrected) Log("frame " + std::to_string(frame.index) + ": the loops moved the map");
   if (next.state != state_seen_)
     Log("frame " + std::to_string(frame.index) + ": " + next.state +
@@ -99,11 +119,57 @@ void LiveState::SetFrame(const InputFrame& frame, const TrackResult& track, cons
   Changed();
 }
 
+void LiveState::SetMap(const RunState& state) {
+  const std::vector<int> ids = state.odometry->KeyframeIds();
+  const std::size_t step = ids.size() / kMostPoints + 1;
+  for (std::size_t k = 0; k < ids.size(); k += step) AddPoints(ids[k], *state.odometry);
+  joined_ = InEarlierMap(state);  // of a run that was resumed
+  const std::lock_guard<std::mutex> lock(mutex_);
+  now_.sessions = state.sessions.size();
+  now_.only_located = state.OnlyLocated();
+}
+
+// The map moves when loops correct it, so a spot moves with the keyframe that the frame hangs on.
+void LiveState::AddSpot(const LiveFrame& frame, const RunState& state) {
+  const int keyframe = state.odometry->ReferenceKeyframe();
+  const bool known = keyframe >= 0 && keyframe < state.end_of_map;
+  const bool joins = !joined_ && InEarlierMap(state);
+  joined_ = joined_ || joins;
+  LiveSpot spot;
+  if (state.recognised) {
+    spot.kind = LiveSpot::Kind::kRecognised;
+  } else if (joins) {
+    spot.kind = LiveSpot::Kind::kJoined;
+  } else if (!state.OnlyLocated()) {
+    return;
+  } else if (state.odometry->BeyondMap()) {
+    spot.kind = LiveSpot::Kind::kBeyond;
+  }
+  spot.frame = frame.index;
+  spot.position = frame.T_world_camera.translation;
+  if (known) {
+    spot.keyframe = keyframe;
+    spot.position = state.odometry->KeyframePose(keyframe).Inverse() * spot.position;
+  }
+  if (state.recognised || joins)
+    Log("frame " + std::to_string(frame.index) +
+        (state.recognised ? ": recognised" : ": a loop joined the recording with the map") +
+        (known ? ", beside keyframe " + std::to_string(keyframe) : ""));
+  const std::lock_guard<std::mutex> lock(mutex_);
+  spot.number = next_spot_++;
+  spots_.push_back(spot);
+  if (spots_.size() > kMostSpots) spots_.pop_front();
+}
+
 void LiveState::SetKeyframe(int keyframe, const RunState& state) {
   new_keyframe_ = true;
+  AddPoints(keyframe, *state.odometry);
+}
+
+void LiveState::AddPoints(int keyframe, const Odometry& odometry) {
   LivePoints points;
   points.keyframe = keyframe;
-  points.points = SomePoints(state.odometry->Keyframe(keyframe));
+  points.points = SomePoints(odometry.Keyframe(keyframe));
   const std::lock_guard<std::mutex> lock(mutex_);
   points.number = next_points_++;
   points_.push_back(std::move(points));
@@ -209,11 +275,15 @@ bool LiveState::WaitForNews(LiveCursor* cursor, double seconds, LiveNews* news) 
   for (const LivePoints& points : points_) {
     if (points.number > cursor->points) news->points.push_back(points);
   }
+  for (const LiveSpot& spot : spots_) {
+    if (spot.number > cursor->spots) news->spots.push_back(spot);
+  }
   for (const LiveEvent& event : events_) {
     if (event.number > cursor->events) news->events.push_back(event);
   }
   cursor->version = now_.version;
   cursor->points = next_points_ - 1;
+  cursor->spots = next_spot_ - 1;
   cursor->events = next_event_ - 1;
   return true;
 }

@@ -34,7 +34,7 @@ struct LivePlace {
   int id = -1;
   std::int64_t frame = 0;
   int piece = 0;
-  bool earlier = false;  ///< of another recording, which the map held before this run
+  std::size_t session = 0;  ///< the recording that it is of
   Pose T_world_camera;
 };
 
@@ -51,6 +51,16 @@ struct LivePoints {
   std::vector<Eigen::Vector3f> points;
 };
 
+/// Where a frame was found in the map, or, where frames are only located, where it is.
+struct LiveSpot {
+  enum class Kind { kLocated, kBeyond, kRecognised, kJoined };
+  std::uint64_t number = 0;
+  Kind kind = Kind::kLocated;
+  std::int64_t frame = 0;
+  int keyframe = -1;  ///< `position` is in its camera's frame; -1: in the world's
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< [m]
+};
+
 /// One answer of the detector, or a line of the log.
 struct LiveEvent {
   std::uint64_t number = 0;
@@ -65,7 +75,10 @@ struct LiveNews {
   std::shared_ptr<const std::vector<LivePlace>> places;  ///< never null
   std::shared_ptr<const std::vector<LiveLoop>> loops;    ///< never null
   std::vector<LivePoints> points;
+  std::vector<LiveSpot> spots;
   std::vector<LiveEvent> events;
+  std::size_t sessions = 1;   ///< recordings of the map, the run's own among them
+  bool only_located = false;  ///< the frames do not become part of the map
   std::uint64_t version = 0;
   std::size_t total = 0;  ///< frames of the run; 0: nobody knows how many
   bool paused = false, finished = false;
@@ -73,15 +86,16 @@ struct LiveNews {
 
 /// What a viewer has by now.
 struct LiveCursor {
-  std::uint64_t version = 0, points = 0, events = 0;
+  std::uint64_t version = 0, points = 0, spots = 0, events = 0;
 };
 
-/// Thread-safe. Bounded: old events and points fall out. Locks are held for copies of pointers alone.
+/// Thread-safe. Bounded: old events, points and spots fall out. Locks are held for copies of pointers alone.
 class LiveState {
  public:
   static constexpr std::size_t kMostEvents = 400;
   static constexpr std::size_t kMostPoints = 1500;  ///< keyframes with points
   static constexpr std::size_t kPointsPerKeyframe = 40;
+  static constexpr std::size_t kMostSpots = 5000;
 
   // ---- the run's side
   void SetTotal(std::size_t frames);
@@ -111,18 +125,24 @@ class LiveState {
   void Changed();  // with mutex_ held
   std::vector<LiveLoop> LoopsOf(const RunState& state);
   void AddEvent(LiveEvent event);  // with mutex_ held
+  void AddPoints(int keyframe, const Odometry& odometry);
+  // The map that the run began with.
+  void SetMap(const RunState& state);
+  void AddSpot(const LiveFrame& frame, const RunState& state);
 
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   LiveNews now_;
   std::deque<LivePoints> points_;
+  std::deque<LiveSpot> spots_;
   std::deque<LiveEvent> events_;
-  std::uint64_t next_points_ = 1, next_event_ = 1;
+  std::uint64_t next_points_ = 1, next_spot_ = 1, next_event_ = 1;
   int viewers_ = 0;
   int steps_ = 0;
   bool closed_ = false;
   double last_viewer_s_ = 0;
   // Of the tracking thread alone.
+  bool begun_ = false, joined_ = false;
   std::size_t loops_seen_ = 0, accepted_seen_ = 0;
   int corrections_seen_ = 0;
   std::string state_seen_;

@@ -32,6 +32,7 @@ const LINES = {
   majority: { color: '#e69f00', dash: 'dot' },
 };
 const SPARE = ['#56b4e9', '#009e73', '#e69f00', '#cc79a7', '#0072b2', '#d55e00'];
+const SESSIONS = ['#cc79a7', '#56b4e9', '#8f7d2f', '#999999', '#7a5195', '#5a9a8f'];  // recordings that the map held before; then again
 const OUTCOMES = {
   accepted: { color: '#009e73', dash: 'solid', symbol: 'circle', sign: '\u25cf', name: 'accepted' },
   false: { color: '#d55e00', dash: 'dash', symbol: 'x', sign: '\u2715', name: 'accepted, but false' },
@@ -42,6 +43,8 @@ const OUTCOMES = {
 function lineOf(name, width = 2) {
   const known = LINES[name];
   if (known) return { color: known.color === 'ink' ? css('--ink') : known.color, dash: known.dash, width };
+  const session = /^session (\d+)$/.exec(name);
+  if (session) return { color: SESSIONS[(session[1] - 1) % SESSIONS.length], dash: 'dash', width };
   let sum = 0;
   for (const letter of String(name)) sum += letter.codePointAt(0);
   return { color: SPARE[sum % SPARE.length], dash: sum % 2 ? 'dash' : 'solid', width };

@@ -77,6 +77,15 @@ function edgeTraces(run, make) {
   return traces;
 }
 
+// Rings where a lost frame, or a new recording, was found in the map.
+function foundTraces(run, make) {
+  const found = run.found ?? [];
+  if (!found.length) return [];
+  const text = ({ frame, by_loop: loop }) => `frame ${frame}: ${loop ? 'a loop joined the recording with the map' : 'the loop detector knew the place'}`;
+  return [{ ...make(AXES.map((_, k) => found.map(({ p }) => p[k]))), mode: 'markers', name: `found in the map (${found.length})`, text: found.map(text),
+    hoverinfo: 'text', marker: { color: css('--ink'), symbol: 'circle-open', size: make.size + 5, line: { width: 2, color: css('--ink') } } }];
+}
+
 const missingMap = () => (runsHere().some((run) => run.slam.x.length) && chosen().slam.x.length ? ''
   : 'No map: there is no trajectory. Without a calibration there are loops alone.');
 
@@ -92,7 +101,7 @@ async function drawTopChart(panel, size) {
   make.size = 8;
   const traces = paths().map((line) => ({ ...make(AXES.map((a) => line.path[a])), mode: 'lines', name: label(line.name),
     line: lineOf(line.name, line.width), hovertemplate: '%{x:.2f}, %{y:.2f}' }));
-  traces.push(...edgeTraces(run, make));
+  traces.push(...edgeTraces(run, make), ...foundTraces(run, make));
   // Cameras look along z with y down: from above, x is right and z ahead.
   const layout = layoutOf(`Top view, along ${AXES[up]}`, {
     xaxis: axis(`${AXES[right]} [${run.unit}]`),
@@ -118,7 +127,7 @@ async function draw3d(panel) {
   make.size = 4;
   const traces = paths().map((line) => ({ ...make(AXES.map((a) => line.path[a])), mode: 'lines', name: label(line.name),
     line: lineOf(line.name, line.width + 2), hovertemplate: '%{x:.2f}, %{y:.2f}, %{z:.2f}' }));
-  traces.push(...edgeTraces(run, make));
+  traces.push(...edgeTraces(run, make), ...foundTraces(run, make));
   const sign = up === 1 ? -1 : 1;  // a camera's y points down
   // All of it at first sight: a box whose longest side is 1, seen from as far as its diagonal needs.
   const size = boxOf(paths().map((line) => line.path)), longest = Math.max(...size, 1e-9);

@@ -56,7 +56,8 @@ async function drawOverview(panel) {
   }
 }
 
-const missingGallery = () => (chosen().gallery.entries.length ? '' : 'No gallery: no loop was proposed, and none is known.');
+const missingGallery = () => (chosen().gallery.entries.length ? '' : chosen().gallery.note ? `No gallery: ${chosen().gallery.note}`
+  : 'No gallery: no loop was proposed, and none is known.');
 
 // Opens a picture as large as the window; arrows go on to the next one, Escape or a click closes it.
 function openPicture(figures, at) {

@@ -1,9 +1,10 @@
 'use strict';
 // The live view: newest state over server-sent events, drawn on canvases.
 
-const COLORS = { surf: '#e69f00', sift: '#56b4e9', orb: '#cc79a7', ensemble: '#0072b2', accepted: '#009e73', waiting: '#e69f00', path: '#0072b2', earlier: '#999999', here: '#d55e00', old: '#56b4e9', young: '#f0e442' };
+const COLORS = { surf: '#e69f00', sift: '#56b4e9', orb: '#cc79a7', ensemble: '#0072b2', accepted: '#009e73', waiting: '#e69f00', path: '#0072b2', beyond: '#e69f00', here: '#d55e00', old: '#56b4e9', young: '#f0e442' };
+const SESSIONS = ['#cc79a7', '#56b4e9', '#8f7d2f', '#999999', '#7a5195', '#5a9a8f'];  // recordings that the map held before; then again
 const DASHES = { surf: [8, 3, 2, 3], sift: [10, 5], orb: [2, 3], ensemble: [] };
-const MOST_ANSWERS = 1500, MOST_LINES = 300;
+const MOST_ANSWERS = 1500, MOST_LINES = 300, MOST_SPOTS = 5000;
 const TRACK_OLD = 5;  // frames before this one that show it (of the last 10)
 const WIDE = 2;  // times as wide as high: an image gets a row of its own
 const TURN = 0.008;  // of the map in 3D [rad per pixel]
@@ -13,7 +14,7 @@ const css = (name) => getComputedStyle(document.documentElement).getPropertyValu
 const token = new URLSearchParams(location.search).get('token');
 const address = (path, query = {}) => `${path}?${new URLSearchParams(token ? { ...query, token } : query)}`;
 
-const state = { news: null, picture: null, answers: [], points: new Map(), view: null, turn: null, received: 0, speed: [] };
+const state = { news: null, picture: null, answers: [], spots: [], points: new Map(), view: null, turn: null, received: 0, speed: [] };
 
 function sharp(canvas, ratio) {
   const width = Math.round(canvas.clientWidth * devicePixelRatio), height = Math.round(width * ratio);
@@ -82,6 +83,53 @@ function fit(canvas, places) {
   return { x: (left + right) / 2, y: (low + high) / 2, scale };
 }
 
+// The newest recording is the run's own, unless its frames are only located.
+const ownSession = () => (state.news.only_located ? state.news.sessions : state.news.sessions - 1);
+const sessionColor = (session) => (session === ownSession() ? COLORS.path : SESSIONS[session % SESSIONS.length]);
+const ringed = (kind) => kind === 'recognised' || kind === 'joined';
+
+// Frames that are only located, each a dot; a ring where one was found again.
+function drawSpots(context, at) {
+  const size = 2 * devicePixelRatio;
+  for (const [kind, , keyframe, position] of state.spots) {
+    const place = at(keyframe, position);
+    if (!place) continue;
+    const [x, y] = place;
+    if (ringed(kind)) {
+      context.strokeStyle = css('--ink');
+      context.beginPath();
+      context.arc(x, y, 4 * size, 0, 7);
+      context.stroke();
+    }
+    if (!state.news.only_located) continue;
+    context.fillStyle = kind === 'beyond' ? COLORS.beyond : COLORS.path;
+    context.fillRect(x - size / 2, y - size / 2, size, size);
+  }
+}
+
+// What the lines and marks of the map mean, once there is more than one kind.
+function showLegend() {
+  const { sessions, only_located: located } = state.news, entries = [];
+  const entry = (kind, color, words) => {
+    const mark = Object.assign(document.createElement('i'), { className: kind });
+    if (kind === 'dot') mark.style.background = color; else if (color) mark.style.borderColor = color;
+    const line = document.createElement('span');
+    line.append(mark, words);
+    entries.push(line);
+  };
+  for (let session = 0; session < sessions; ++session) {
+    if (session !== ownSession()) entry('line', sessionColor(session), located && sessions === 1 ? 'map' : `session ${session + 1}`);
+  }
+  if (located) entry('dot', COLORS.path, 'localized');
+  else if (sessions > 1) entry('line', COLORS.path, `session ${sessions}, this run`);
+  if (state.spots.some(([kind]) => kind === 'beyond')) entry('dot', COLORS.beyond, 'beyond the map');
+  const found = state.spots.filter(([kind]) => ringed(kind)).length;
+  if (found) entry('ring', '', `found in the map (${found})`);
+  by('map-legend').replaceChildren(...entries);
+  by('posterior-panel').hidden = located;  // no loops are searched for
+  by('log').parentElement.classList.toggle('wide', located);
+}
+
 function drawMap() {
   const canvas = by('map'), context = sharp(canvas, 0.75), places = state.news.places;
   const view = state.view ?? fit(canvas, places);
@@ -101,13 +149,13 @@ function drawMap() {
   }
   context.globalAlpha = 1;
   context.lineWidth = 2 * devicePixelRatio;
-  for (const old of [1, 0]) {  // recordings that the map held before, below this one
-    context.strokeStyle = old ? COLORS.earlier : COLORS.path;
+  for (let session = 0; session < state.news.sessions; ++session) {  // this run's above those of before
+    context.strokeStyle = sessionColor(session);
     context.beginPath();
     let piece = null;
-    for (const [, , now, pose, earlier] of places) {
+    for (const [, , now, pose, of] of places) {
       const [x, y] = at(pose);
-      const here = earlier === old ? now : null;
+      const here = of === session ? now : null;
       if (here !== null && here === piece) context.lineTo(x, y); else context.moveTo(x, y);
       piece = here;
     }
@@ -124,6 +172,7 @@ function drawMap() {
     context.stroke();
   }
   context.setLineDash([]);
+  drawSpots(context, (keyframe, p) => (keyframe < 0 ? at(p) : poses.has(keyframe) ? at(transform(poses.get(keyframe), p)) : null));
   const here = state.news.frame.position;
   if (!here) return;
   const [x, y] = at(here);
@@ -205,9 +254,11 @@ function showStatus() {
   by('pause').disabled = finished;
   by('step').disabled = !paused || finished;
   const accepted = state.news.loops.filter((loop) => loop[2]).length;
-  by('status').textContent = `frame ${frame.index}${total ? ` of ${total}` : ''}${frame.reason ? ` (${frame.reason})` : ''}, ` +
+  // Numbers of frames start at --start, in a map of several recordings far above.
+  const count = total && frame.index + 1 !== frame.number ? `, ${frame.number} of ${total}` : total ? ` of ${total}` : '';
+  by('status').textContent = `frame ${frame.index}${count}${frame.reason ? ` (${frame.reason})` : ''}, ` +
     `${rate ? `${rate.toFixed(1)} frames/s, ` : ''}${left !== null && !paused ? `${clock(left)} left, ` : ''}${frame.features} features, ${frame.inliers} inliers, ` +
-    `${state.news.places.length} keyframes, ${accepted} loops`;
+    `${state.news.places.length} keyframes${state.news.only_located ? ' in the map' : `, ${accepted} loops`}`;
   document.body.dataset.frame = frame.number;
   document.body.dataset.paused = paused ? '1' : '0';
   document.body.dataset.finished = finished ? '1' : '0';
@@ -228,9 +279,12 @@ function draw() {
 function take(news) {
   state.news = news;
   for (const [id, points] of news.points) state.points.set(id, points);
+  state.spots.push(...news.spots);
+  state.spots.splice(0, state.spots.length - MOST_SPOTS);
   for (const event of news.events) if ('query' in event) state.answers.push(event);
   state.answers.splice(0, state.answers.length - MOST_ANSWERS);
   addLines(news.events);
+  showLegend();
   showStatus();
   document.body.dataset.received = ++state.received;
   if (news.frame.image) {

@@ -20,9 +20,10 @@ function sequence(folder) {
 }
 
 // A run in the background, and the address that it prints.
-async function start(folder, name, [config, dataset], more = []) {
-  const run = spawn(tutti, ['run', '--config', config, '--dataset', dataset, '--out', join(folder, name), '--view-port', '0',
-    '--no-report', ...more]);
+const start = (folder, name, [config, dataset], more = []) => startCommand(['run', '--config', config, '--dataset', dataset,
+  '--out', join(folder, name), '--view-port', '0', '--no-report', ...more]);
+async function startCommand(words) {
+  const run = spawn(tutti, words);
   let text = '';
   const ended = new Promise((done) => run.on('close', done));
   const url = await new Promise((found, failed) => {
@@ -144,6 +145,50 @@ async function drive(browser, folder, data) {
   run.kill();
 }
 
+// How many pixels of the map have this colour (#rrggbb).
+const pixelsOf = (color) => {
+  const canvas = document.getElementById('map'), wanted = [1, 3, 5].map((k) => parseInt(color.slice(k, k + 2), 16));
+  const pixels = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
+  let count = 0;
+  for (let i = 0; i < pixels.length; i += 4) if (wanted.every((value, k) => Math.abs(pixels[i + k] - value) < 3)) ++count;
+  return count;
+};
+const finished = () => document.body.dataset.finished === '1';
+const legend = (page) => page.evaluate(() => [...document.querySelectorAll('#map-legend span')].map((entry) => entry.textContent));
+
+// Recordings of a map have a colour each, and it is seen where frames were found in it.
+async function sessions(browser, folder, [config, dataset]) {
+  const first = join(folder, 'first'), second = join(folder, 'second'), map = join(first, 'map.tutti');
+  const view = ['--view', '--view-port', '0', '--view-wait', '60'];
+  spawnSync(tutti, ['run', '--config', config, '--dataset', dataset, '--out', first, '--end', '120', '--no-report', '--quiet', '--set', 'loops.members=[orb]']);
+  const goesOn = await startCommand(['run', '--map', map, '--dataset', dataset, '--out', second, '--start', '280', '--end', '340', '--no-report', ...view]);
+  const run = await openPage(browser, goesOn.url, { allow: (target) => target.startsWith(goesOn.url) });
+  await waitFor(run.page, finished);
+  await waitFor(run.page, inked, 'map');
+  check((await legend(run.page)).join('; ') === 'session 1; session 2, this run; found in the map (1)', `the sessions have a legend: ${await legend(run.page)}`);
+  for (const color of ['#cc79a7', '#0072b2']) {
+    const count = await run.page.evaluate(pixelsOf, color);
+    check(count > 20, `a session is drawn in ${color} (${count} pixels)`);
+  }
+  check(await run.page.evaluate(() => /recognised, beside keyframe \d+/.test(document.getElementById('log').textContent)), 'the log says where it was found');
+  if (shots) await run.page.screenshot({ path: join(shots, 'live-sessions.png') });
+  check(await within(120000, goesOn.ended) === 0, 'the second session ends');
+  await run.page.close();
+  const located = await startCommand(['localize', dataset, '--map', join(second, 'map.tutti'), '--out', join(folder, 'located'), '--start', '60', '--end', '130', ...view]);
+  const page = await openPage(browser, located.url, { allow: (target) => target.startsWith(located.url) });
+  await waitFor(page.page, finished);
+  await waitFor(page.page, inked, 'map');
+  check((await legend(page.page)).slice(0, 3).join('; ') === 'session 1; session 2; localized', `the map's sessions, and what is located: ${await legend(page.page)}`);
+  check((await legend(page.page)).some((text) => /^found in the map \([1-9]/.test(text)), 'rings where frames were recognised');
+  check(await page.page.evaluate(() => document.getElementById('state').textContent === 'done, localized'), 'the state is said');
+  check(await page.page.evaluate(() => state.spots.length > 50), 'every frame that is located is on the map');
+  check(await page.page.evaluate(pixelsOf, '#0072b2') > 20, 'in the colour of the legend');
+  check(await page.page.evaluate(() => document.getElementById('posterior-panel').hidden), 'no empty panel of what is not computed');
+  if (shots) await page.page.screenshot({ path: join(shots, 'live-localize.png') });
+  check(await within(120000, located.ended) === 0, 'localization ends');
+  for (const problem of new Set([...run.problems, ...page.problems])) check(false, problem);
+}
+
 // A browser that connects and reads nothing must not hold the run up.
 async function sleepers(folder, data) {
   const { url, ended, run } = await start(folder, 'sleepers', data, ['--view', '--end', '80']);
@@ -192,6 +237,7 @@ try {
   await drive(browser, folder, data);
   await sleepers(folder, data);
   await strangers(folder, data);
+  await sessions(browser, folder, data);
 } finally {
   await browser.close();
   rmSync(folder, { recursive: true, force: true });

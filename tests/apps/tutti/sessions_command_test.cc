@@ -31,10 +31,27 @@ class SessionsCommand : public ::testing::Test {
  protected:
   testing::ProcessResult Run(const fs::path& town, const fs::path& out,
                              const std::vector<std::string>& more) const {
-    std::vector<std::string> words = {"run",        "--dataset",   town.string(), "--out",
-                                      out.string(), "--no-report", "--quiet"};
+    std::vector<std::string> words = {"run", "--dataset", town.string(), "--out", out.string(), "--quiet"};
     words.insert(words.end(), more.begin(), more.end());
     return RunTutti(words);
+  }
+  // Sessions in colours, a ring where this one was found in the map, and loops from one to the other.
+  void ExpectItIsSeen(const fs::path& out) const {
+    const std::string plot = ReadAll(out / "trajectory.svg");
+    EXPECT_THAT(plot, HasSubstr("session 1"));
+    EXPECT_THAT(plot, HasSubstr("found in the map (1)"));
+    const json report = json::parse(ReadAll(out / "report.json"));
+    EXPECT_EQ(report["earlier"].size(), 1u);
+    ASSERT_EQ(report["found"].size(), 1u);
+    EXPECT_EQ(report["found"][0]["frame"], Summary(out)["map"]["joined_at_frame"]);
+    EXPECT_EQ(report["found"][0]["p"].size(), 3u);
+    std::size_t between = 0;
+    for (const json& loop : report["loops"]) {
+      if (loop["candidate"] >= 100000 || loop["outcome"] != "accepted") continue;
+      EXPECT_TRUE(loop.contains("a") && loop.contains("b")) << loop;
+      ++between;
+    }
+    EXPECT_GT(between, 0u);
   }
   static std::string Config(const fs::path& town) { return (town / "config.yaml").string(); }
   static json Summary(const fs::path& out) { return json::parse(ReadAll(out / "summary.json")); }
@@ -44,11 +61,12 @@ class SessionsCommand : public ::testing::Test {
 };
 
 TEST_F(SessionsCommand, ARunGoesOnInTheMapOfAnotherAndBothAreInTheNewOne) {
-  const auto day = Run(town_, day_, {"--config", Config(town_), "--end", "150"});
+  const auto day = Run(town_, day_, {"--config", Config(town_), "--end", "150", "--no-report"});
   ASSERT_EQ(day.status, 0) << day.output;
   const std::string map = (day_ / "map.tutti").string();
   const std::string before = ReadAll(map);
   const auto next = Run(town_, next_, {"--map", map, "--start", "150"});  // with the map's configuration
+  ExpectItIsSeen(next_);
   ASSERT_EQ(next.status, 0) << next.output;
   EXPECT_THAT(next.output, HasSubstr("in the map " + map));
   EXPECT_EQ(ReadAll(map) == before, true);
@@ -84,8 +102,10 @@ TEST_F(SessionsCommand, ARunGoesOnInTheMapOfAnotherAndBothAreInTheNewOne) {
 }
 
 TEST_F(SessionsCommand, MapsAreMergedWhereTheyShowTheSameAndRefusedWhereNot) {
-  ASSERT_EQ(Run(town_, day_, {"--config", Config(town_), "--end", "130"}).status, 0);
-  ASSERT_EQ(Run(town_, next_, {"--config", Config(town_), "--start", "90", "--end", "190"}).status, 0);
+  ASSERT_EQ(Run(town_, day_, {"--config", Config(town_), "--end", "130", "--no-report"}).status, 0);
+  ASSERT_EQ(
+      Run(town_, next_, {"--config", Config(town_), "--start", "90", "--end", "190", "--no-report"}).status,
+      0);
   const std::string day = (day_ / "map.tutti").string(), next = (next_ / "map.tutti").string(),
                     both = (folder_ / "both.tutti").string();
   const auto merged = RunTutti({"merge", day, next, "-o", both});
@@ -101,7 +121,7 @@ TEST_F(SessionsCommand, MapsAreMergedWhereTheyShowTheSameAndRefusedWhereNot) {
 
   const fs::path other = testing::GeneratedDataset(Town(7));
   const fs::path elsewhere = folder_ / "elsewhere";
-  ASSERT_EQ(Run(other, elsewhere, {"--config", Config(other), "--end", "60"}).status, 0);
+  ASSERT_EQ(Run(other, elsewhere, {"--config", Config(other), "--end", "60", "--no-report"}).status, 0);
   const std::string none = (folder_ / "none.tutti").string();
   const auto refused = RunTutti({"merge", day, (elsewhere / "map.tutti").string(), "-o", none});
   EXPECT_EQ(refused.status, 1);
@@ -109,14 +129,15 @@ TEST_F(SessionsCommand, MapsAreMergedWhereTheyShowTheSameAndRefusedWhereNot) {
   EXPECT_FALSE(fs::exists(none));
   EXPECT_EQ(RunTutti({"merge", day, next, "-o", day}).status, 1);
   // A run that goes on there says that it stands apart.
-  const auto apart = Run(other, folder_ / "apart", {"--map", day, "--end", "40"});
+  const auto apart = Run(other, folder_ / "apart", {"--map", day, "--end", "40", "--no-report"});
   EXPECT_EQ(apart.status, 0) << apart.output;
   EXPECT_THAT(apart.output, HasSubstr("not joined with the map"));
   EXPECT_EQ(Summary(folder_ / "apart")["map"]["joined"], false);
 }
 
 TEST_F(SessionsCommand, WhatCantGoOnIsRefused) {
-  ASSERT_EQ(Run(town_, day_, {"--config", Config(town_), "--end", "30", "--no-loops"}).status, 0);
+  ASSERT_EQ(Run(town_, day_, {"--config", Config(town_), "--end", "30", "--no-loops", "--no-report"}).status,
+            0);
   const auto without = Run(town_, next_, {"--map", (day_ / "map.tutti").string()});
   EXPECT_EQ(without.status, 1);
   EXPECT_THAT(without.output, HasSubstr("without loop closure"));

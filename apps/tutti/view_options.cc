@@ -1,0 +1,34 @@
+#include "apps/tutti/view_options.h"
+
+#include <cstdio>
+
+#include "tutti/core/error.h"
+
+namespace tutti::cli {
+
+void AddViewOptions(CLI::App& command, ViewOptions& options) {
+  command.add_flag("--view", options.view,
+                   "serve a page to look at it while it goes on, at 127.0.0.1 (through a tunnel: ssh -L "
+                   "8077:127.0.0.1:8077 robot)");
+  command.add_option("--view-port", options.live.port, "of that page; 0: any free one")
+      ->capture_default_str();
+  command.add_option(
+      "--view-address", options.live.address,
+      "serve it at this address of the machine (0.0.0.0: all); the address that is printed has a "
+      "token, without which nothing is answered");
+  command
+      .add_option("--view-wait", options.live.idle_s,
+                  "wait at most this long for a browser before the first frame [s]")
+      ->capture_default_str();
+}
+
+std::shared_ptr<LiveView> StartView(const CLI::App& command, const ViewOptions& options) {
+  if (!options.view && command.count("--view-address") == 0) return nullptr;
+  const std::string problem = options.live.Validate();
+  if (!problem.empty()) throw InputError("--view: " + problem);
+  auto view = std::make_shared<LiveView>(options.live);
+  std::fprintf(stderr, "tutti: look at %s\n", view->Url().c_str());
+  return view;
+}
+
+}  // namespace tutti::cli

@@ -266,9 +266,9 @@ void LiveState::Step() {
 
 bool LiveState::WaitForNews(LiveCursor* cursor, double seconds, LiveNews* news) {
   std::unique_lock<std::mutex> lock(mutex_);
-  const bool there = changed_.wait_for(lock, std::chrono::duration<double>(seconds),
-                                       [&] { return closed_ || now_.version > cursor->version; });
-  if (closed_ || !there) return false;
+  changed_.wait_for(lock, std::chrono::duration<double>(seconds),
+                    [&] { return closed_ || now_.version > cursor->version; });
+  if (now_.version <= cursor->version) return false;
   *news = now_;
   if (!news->places) news->places = std::make_shared<const std::vector<LivePlace>>();
   if (!news->loops) news->loops = std::make_shared<const std::vector<LiveLoop>>();

@@ -115,9 +115,10 @@ class LiveState {
   int Viewers() const;
   void Pause(bool paused);
   void Step();
-  /// News after `cursor`, which moves on; false if there is none within the time, or the state was closed.
+  /// News after `cursor`, which moves on; false if there is none within the time, or by when the state was
+  /// closed: that the run is done is still said.
   bool WaitForNews(LiveCursor* cursor, double seconds, LiveNews* news);
-  /// Wakes all that wait; no news after it.
+  /// Wakes all that wait.
   void Close();
   bool Closed() const;
 

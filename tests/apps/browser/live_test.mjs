@@ -4,7 +4,7 @@ import { spawn, spawnSync } from 'node:child_process';
 import { existsSync, mkdtempSync, readFileSync, rmSync } from 'node:fs';
 import { request } from 'node:http';
 import { connect } from 'node:net';
-import { tmpdir } from 'node:os';
+import { setPriority, tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { check, DESKTOP, launch, openPage, PHONE, SKIP, sleep, within } from './browser.mjs';
 
@@ -24,6 +24,7 @@ const start = (folder, name, [config, dataset], more = []) => startCommand(['run
   '--out', join(folder, name), '--view-port', '0', '--no-report', ...more]);
 async function startCommand(words) {
   const run = spawn(tutti, words);
+  setPriority(run.pid, 10);  // the browser comes first: it must see the run while it goes on
   let text = '';
   const ended = new Promise((done) => run.on('close', done));
   const url = await new Promise((found, failed) => {
@@ -45,11 +46,14 @@ const status = (url, { method = 'GET', headers = {} } = {}) => new Promise((done
 });
 
 const frame = (page) => page.evaluate(() => Number(document.body.dataset.frame ?? 0));
-const waitFor = (page, test, argument) => page.waitForFunction(test, { timeout: 60000 }, argument);
+// Not by frames that are drawn, which a machine without a graphics card and with much to do may not get to in seconds.
+const waitFor = (page, test, argument) => page.waitForFunction(test, { timeout: 60000, polling: 100 }, argument);
+// At once when the page changes.
+const waitForNews = (page, test) => page.waitForFunction(test, { timeout: 60000, polling: 'mutation' });
 // Presses Pause in the same turn of the page in which test holds: no run is too fast for it.
 async function pauseWhen(page, test) {
-  await waitFor(page, `(${test})() && (document.getElementById('pause').click(), true)`);
-  await waitFor(page, () => document.body.dataset.paused === '1');
+  await waitForNews(page, `(${test})() && (document.getElementById('pause').click(), true)`);
+  await waitForNews(page, () => document.body.dataset.paused === '1');
 }
 // Whether a canvas has something on it.
 const inked = (id) => {
@@ -163,20 +167,22 @@ async function sessions(browser, folder, [config, dataset]) {
   spawnSync(tutti, ['run', '--config', config, '--dataset', dataset, '--out', first, '--end', '120', '--no-report', '--quiet', '--set', 'loops.members=[orb]']);
   const goesOn = await startCommand(['run', '--map', map, '--dataset', dataset, '--out', second, '--start', '280', '--end', '340', '--no-report', ...view]);
   const run = await openPage(browser, goesOn.url, { allow: (target) => target.startsWith(goesOn.url) });
-  await waitFor(run.page, finished);
+  await run.page.bringToFront();
+  await waitForNews(run.page, finished);
   await waitFor(run.page, inked, 'map');
   check((await legend(run.page)).join('; ') === 'session 1; session 2, this run; found in the map (1)', `the sessions have a legend: ${await legend(run.page)}`);
   for (const color of ['#cc79a7', '#0072b2']) {
     const count = await run.page.evaluate(pixelsOf, color);
     check(count > 20, `a session is drawn in ${color} (${count} pixels)`);
   }
-  check(await run.page.evaluate(() => /recognised, beside keyframe \d+/.test(document.getElementById('log').textContent)), 'the log says where it was found');
+  check(await run.page.evaluate(() => /(recognised|joined the recording with the map), beside keyframe \d+/.test(document.getElementById('log').textContent)), 'the log says where it was found');
   if (shots) await run.page.screenshot({ path: join(shots, 'live-sessions.png') });
   check(await within(120000, goesOn.ended) === 0, 'the second session ends');
   await run.page.close();
   const located = await startCommand(['localize', dataset, '--map', join(second, 'map.tutti'), '--out', join(folder, 'located'), '--start', '60', '--end', '130', ...view]);
   const page = await openPage(browser, located.url, { allow: (target) => target.startsWith(located.url) });
-  await waitFor(page.page, finished);
+  await page.page.bringToFront();  // a page in the background draws nothing
+  await waitForNews(page.page, finished);
   await waitFor(page.page, inked, 'map');
   check((await legend(page.page)).slice(0, 3).join('; ') === 'session 1; session 2; localized', `the map's sessions, and what is located: ${await legend(page.page)}`);
   check((await legend(page.page)).some((text) => /^found in the map \([1-9]/.test(text)), 'rings where frames were recognised');

@@ -43,6 +43,23 @@ TEST(Plot, SvgHasAxesUnitsLegendAndEscapedTitle) {
   EXPECT_EQ(svg.find("nan"), std::string::npos);
 }
 
+TEST(Plot, PlacesHaveARingAndALegend) {
+  const auto file = testing::FreshFolder() / "p.svg";
+  TrajectoryPlot plot = Circle();
+  const auto rings = [&] {
+    WriteSvg(file, plot);
+    const std::string svg = ReadAll(file), width = "stroke-width:1.6;";
+    std::size_t count = 0;
+    for (std::size_t at = svg.find(width); at != std::string::npos; at = svg.find(width, at + 1)) ++count;
+    return count;
+  };
+  EXPECT_EQ(rings(), 0u);
+  plot.marks_name = "found (1)";
+  plot.marks.emplace_back(1, 0, 2);
+  EXPECT_EQ(rings(), 2u);  // the place, and the legend
+  EXPECT_NE(ReadAll(file).find("\nfound (1)\n"), std::string::npos);
+}
+
 TEST(Plot, PngIsNotBlank) {
   const auto file = testing::FreshFolder() / "p.png";
   WritePng(file, Circle());

@@ -38,6 +38,22 @@ TEST(LiveMessage, SaysHowManyFramesAreToCome) {
   EXPECT_EQ(nlohmann::json::parse(LiveMessage(news))["total"], 1700);
 }
 
+TEST(LiveMessage, PlacesHaveTheirRecordingAndSpotsTheirKeyframe) {
+  LiveNews news = NewsOf(320, {});
+  news.sessions = 3;
+  news.only_located = true;
+  news.places = std::make_shared<const std::vector<LivePlace>>(std::vector<LivePlace>{{4, 100007, 0, 1, {}}});
+  news.spots = {{1, LiveSpot::Kind::kRecognised, 20, 4, {1, 2, 3}},
+                {2, LiveSpot::Kind::kBeyond, 21, -1, {4, 5, 6}}};
+  const auto json = nlohmann::json::parse(LiveMessage(news));
+  EXPECT_EQ(json["sessions"], 3);
+  EXPECT_EQ(json["only_located"], true);
+  EXPECT_EQ(json["places"][0][4], 1);
+  EXPECT_EQ(json["spots"],
+            nlohmann::json::parse(
+                R"([["recognised", 20, 4, [1.0, 2.0, 3.0]], ["beyond", 21, -1, [4.0, 5.0, 6.0]]])"));
+}
+
 TEST(LiveMessage, IsOneLineWhateverTheTextsHold) {
   LiveNews news = NewsOf(320, {});
   news.events.push_back({});

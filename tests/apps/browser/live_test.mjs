@@ -46,10 +46,17 @@ const status = (url, { method = 'GET', headers = {} } = {}) => new Promise((done
 });
 
 const frame = (page) => page.evaluate(() => Number(document.body.dataset.frame ?? 0));
-// Not by frames that are drawn, which a machine without a graphics card and with much to do may not get to in seconds.
-const waitFor = (page, test, argument) => page.waitForFunction(test, { timeout: 60000, polling: 100 }, argument);
-// At once when the page changes.
-const waitForNews = (page, test) => page.waitForFunction(test, { timeout: 60000, polling: 'mutation' });
+// Not by frames that are drawn, which a machine without a graphics card and with much to do may not get to in seconds: by
+// time, or at once when the page changes. What the page says is told if it does not come to that.
+async function waitFor(page, test, argument, polling = 100) {
+  try {
+    return await page.waitForFunction(test, { timeout: 60000, polling }, argument);
+  } catch (error) {
+    const { status, ...body } = await page.evaluate(() => ({ ...document.body.dataset, status: document.getElementById('status').textContent }));
+    throw new Error(`${error.message}, waiting for ${test} at ${JSON.stringify(body)}: ${status}`);
+  }
+}
+const waitForNews = (page, test) => waitFor(page, test, undefined, 'mutation');
 // Presses Pause in the same turn of the page in which test holds: no run is too fast for it.
 async function pauseWhen(page, test) {
   await waitForNews(page, `(${test})() && (document.getElementById('pause').click(), true)`);

@@ -34,6 +34,7 @@ std::string PartOf(std::uint32_t tag) {
   if (tag == internal::kMemberSection) return "vocabularies";
   if (tag < 100) return "detector's rest";
   if (tag == Tag(Section::kKeyframe)) return "keyframes";
+  if (tag == Tag(Section::kImage)) return "images";
   if (tag == Tag(Section::kLandmarks)) return "landmarks";
   return "rest";
 }

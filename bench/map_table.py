@@ -24,7 +24,7 @@ TOWN = ["--sensor", "stereo", "--blocks-x", 1, "--laps", 1.3]
 ROWS = {"town": ("generated town, stereo", None, None),
         "redkitchen": ("`redkitchen`, RGB-D", "7scenes.yaml", "redkitchen"),
         "kitti": ("`kitti_00_head`, mono", "kitti_00-02_mono.yaml", "kitti_00_head")}
-PARTS = ["keyframes", "landmarks", "views", "vocabularies", "detector's rest", "rest"]
+PARTS = ["keyframes", "images", "landmarks", "views", "vocabularies", "detector's rest", "rest"]
 LIMITS = {"kb": 250, "save_ms": 10, "load_ms": 1.5, "searchable_s": 15}
 LONG = 10000  # keyframes
 

@@ -52,7 +52,7 @@ LoopCloser::LoopCloser(const RunConfig& config, const CameraRig& rig, SpanRecord
     : recorder_(recorder),
       options_(config.run),
       rig_(rig),
-      seed_(config.loops.seed),
+      detector_(config.loops),
       gate_(config.run),
       graph_(GraphOptions(config, rig.sensor)) {}
 
@@ -80,7 +80,7 @@ LoopConstraint LoopCloser::Measure(const Verification& verification, int candida
   const ScopedSpan span(recorder_, Lane::kOptimisation, "measure_loop");
   const internal::Stopwatch watch;
   LoopConstraint constraint = MakeLoopConstraint(verification, odometry.Keyframe(candidate),
-                                                 odometry.Keyframe(query), rig_, options_, seed_);
+                                                 odometry.Keyframe(query), rig_, options_, detector_);
   stages_["loop_measure"] += watch.Milliseconds();
   return constraint;
 }

@@ -159,7 +159,7 @@ class LoopCloser {
   SpanRecorder* recorder_;
   SlamOptions options_;
   CameraRig rig_;
-  std::uint64_t seed_;
+  LoopDetectorOptions detector_;
   std::vector<LoopRecord> records_;
   bool followed_ = false;            // somebody else's odometry; not saved, as such a map is not
   OdometryUncertainty uncertainty_;  // of an odometry that is followed; not saved either

@@ -3,10 +3,9 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <opencv2/features2d.hpp>
-#include <set>
 #include <utility>
 
+#include "apps/slam/landmark_matches.h"
 #include "core/angle.h"
 #include "core/dense_solvers.h"
 #include "core/median.h"
@@ -16,7 +15,6 @@ namespace tutti {
 namespace {
 
 constexpr int kMinSimilarityInliers = 12;  // of 3D-3D matches; fewer leave the scale open
-constexpr float kMaxHamming = 60;  // of 256 bits; beyond it two ORB descriptors have nothing in common
 
 Eigen::Vector2d Pixel(const cv::KeyPoint& keypoint) { return {keypoint.pt.x, keypoint.pt.y}; }
 
@@ -36,52 +34,6 @@ Matrix7d WithFloor(const Matrix7d& information, double sigma_translation, double
 }
 
 std::string Percent(double share) { return std::to_string(std::lround(100 * share)) + " %"; }
-
-bool IsLandmark(const KeyframeView& view, int feature) {
-  return feature >= 0 && static_cast<std::size_t>(feature) < view.points.size() &&
-         view.points[static_cast<std::size_t>(feature)].allFinite();
-}
-
-// Rows of the features that are landmarks, and which features they are.
-cv::Mat LandmarkDescriptors(const KeyframeView& view, std::vector<int>& features) {
-  cv::Mat rows;
-  for (int i = 0; i < view.descriptors.rows; ++i) {
-    if (!IsLandmark(view, i)) continue;
-    features.push_back(i);
-    rows.push_back(view.descriptors.row(i));
-  }
-  return rows;
-}
-
-}  // namespace
-
-// The verification saw the query when it was new and had few landmarks.
-std::vector<LandmarkMatch> LandmarkMatches(const Verification& verification, const KeyframeView& candidate,
-                                           const KeyframeView& query) {
-  std::vector<LandmarkMatch> matches;
-  std::set<int> used_candidate, used_query;
-  const auto add = [&](int c, int q) {
-    if (!IsLandmark(candidate, c) || !IsLandmark(query, q)) return;
-    if (!used_candidate.insert(c).second || !used_query.insert(q).second) return;
-    matches.emplace_back(c, q);
-  };
-  for (const VerifiedMatch& match : verification.inlier_matches)
-    add(match.candidate_feature, match.query_feature);
-  std::vector<int> features_c, features_q;
-  const cv::Mat rows_c = LandmarkDescriptors(candidate, features_c),
-                rows_q = LandmarkDescriptors(query, features_q);
-  if (rows_c.empty() || rows_q.empty()) return matches;
-  std::vector<cv::DMatch> mutual;
-  cv::BFMatcher(cv::NORM_HAMMING, true).match(rows_q, rows_c, mutual);
-  for (const cv::DMatch& match : mutual) {
-    if (match.distance > kMaxHamming) continue;
-    add(features_c[static_cast<std::size_t>(match.trainIdx)],
-        features_q[static_cast<std::size_t>(match.queryIdx)]);
-  }
-  return matches;
-}
-
-namespace {
 
 SimilarityResult SimilarityOfLandmarks(const Verification& verification, const KeyframeView& candidate,
                                        const KeyframeView& query, const CameraRig& rig, std::uint64_t seed) {
@@ -136,7 +88,7 @@ double MedianDepth(const KeyframeView& view) {
 
 LoopConstraint MakeLoopConstraint(const Verification& verification, const KeyframeView& candidate,
                                   const KeyframeView& query, const CameraRig& rig, const SlamOptions& options,
-                                  std::uint64_t seed) {
+                                  const LoopDetectorOptions& detector) {
   LoopConstraint out;
   LoopEdge& edge = out.edge;
   edge.candidate = candidate.id;
@@ -150,7 +102,7 @@ LoopConstraint MakeLoopConstraint(const Verification& verification, const Keyfra
   }
   Matrix7d information = Matrix7d::Zero();
   if (rig.sensor == Sensor::kMono) {
-    const SimilarityResult fit = SimilarityOfLandmarks(verification, candidate, query, rig, seed);
+    const SimilarityResult fit = SimilarityOfLandmarks(verification, candidate, query, rig, detector.seed);
     if (!fit.success) {
       out.reason = "no scale for it: " + fit.reason;
       return out;
@@ -165,7 +117,10 @@ LoopConstraint MakeLoopConstraint(const Verification& verification, const Keyfra
     information = fit.information;
   } else {
     if (verification.type != ConstraintType::kRigid) {
-      out.reason = "verified without depth: no metric transform";
+      // The detector knew the depths of two frames; the map has those of landmarks that many frames saw.
+      const Verification metric = VerifyLandmarks(candidate, query, rig, detector);
+      if (metric.accepted) return MakeLoopConstraint(metric, candidate, query, rig, options, detector);
+      out.reason = "verified without depth, and the map's landmarks give none: " + metric.reason;
       return out;
     }
     edge.S_candidate_query = verification.S_candidate_query;

@@ -21,24 +21,18 @@ struct LoopConstraint {
   LoopEdge edge;
 };
 
-/// Metric sensors: the rigid transform of the verification. Mono: the similarity between the landmarks of the
-/// two keyframes as the map has them now (more and better ones than when the keyframe was new), over the
-/// features that the verification matched. The covariance is the verification's plus a floor: matched points
-/// of one scene share their errors, so inliers alone promise too much. Fills everything of the edge but
-/// `record`.
+/// Metric sensors: the rigid transform of the verification, or where that had no depths the one of the
+/// landmarks that both keyframes see (VerifyLandmarks). Mono: the similarity between the landmarks of the two
+/// keyframes as the map has them now (more and better ones than when the keyframe was new), over the features
+/// that the verification matched. The covariance is the verification's plus a floor: matched points of one
+/// scene share their errors, so inliers alone promise too much. Fills everything of the edge but `record`.
 LoopConstraint MakeLoopConstraint(const Verification& verification, const KeyframeView& candidate,
                                   const KeyframeView& query, const CameraRig& rig, const SlamOptions& options,
-                                  std::uint64_t seed);
+                                  const LoopDetectorOptions& detector);
 
 /// The same with candidate and query exchanged: what another detector found, which knew the newer keyframe.
 /// `candidate`: id of what is the candidate then.
 Verification Reversed(const Verification& verification, std::int64_t candidate);
-
-using LandmarkMatch = std::pair<int, int>;  ///< features of the candidate and of the query
-
-/// Landmarks of both keyframes: what the verification matched, and the mutual best matches of the others.
-std::vector<LandmarkMatch> LandmarkMatches(const Verification& verification, const KeyframeView& candidate,
-                                           const KeyframeView& query);
 
 /// Median z of the keyframe's points; 0 if it has none.
 double MedianDepth(const KeyframeView& view);

@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "apps/slam/landmark_matches.h"
 #include "apps/slam/loop_constraint.h"
 #include "apps/slam/missed_loops.h"
 #include "tutti/slam/loop_record.h"
@@ -31,13 +32,11 @@ std::size_t MapConnection::CloseMissedLoops() {
     const KeyframeView view = odometry_.Keyframe(id);
     keyframes.push_back({id, view.map_piece, view.T_world_camera, MedianDepth(view)});
   }
-  const LoopDetectorOptions& options = config_.loops;
   for (const MissedLoop& loop : FindMissedLoops(keyframes, loops_.closer().Graph(odometry_), config_.run)) {
     const KeyframeView query = odometry_.Keyframe(loop.query);
     for (const int candidate : loop.candidates) {
       if (offered_.count({candidate, loop.query}) != 0) break;
-      const Verification found =
-          VerifyLandmarks(odometry_.Keyframe(candidate), query, rig_, options.verification, options.seed);
+      const Verification found = VerifyLandmarks(odometry_.Keyframe(candidate), query, rig_, config_.loops);
       if (!found.accepted) continue;
       offered_.emplace(candidate, loop.query);
       take_(loops_.ConsiderFound(found, candidate, loop.query, odometry_, frames_));

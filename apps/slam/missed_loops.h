@@ -49,12 +49,5 @@ std::map<int, Way> WaysFrom(int node, const PoseGraph& graph);
 std::vector<MissedLoop> FindMissedLoops(const std::vector<StandingKeyframe>& keyframes,
                                         const PoseGraph& graph, const SlamOptions& options);
 
-/// Whether the query sees the candidate's landmarks: matches among the landmarks of both have to fit one
-/// camera motion. That asks for fewer than the detector does, which searches everywhere; what is found is to
-/// be confirmed by another loop. Accepted, it can be measured by MakeLoopConstraint.
-/// The share of the matches and their spread over both images are asked for as there.
-Verification VerifyLandmarks(const KeyframeView& candidate, const KeyframeView& query, const CameraRig& rig,
-                             const VerificationOptions& verification, std::uint64_t seed);
-
 }  // namespace tutti
 #pragma GCC visibility pop

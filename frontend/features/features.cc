@@ -180,12 +180,6 @@ std::vector<cv::Mat> BuildPyramid(const cv::Mat& image, const OdometryOptions& o
   return pyramid;
 }
 
-cv::Mat NextLevel(const cv::Mat& image, const cv::Size& size) {
-  cv::Mat level;
-  cv::resize(image, level, size, 0, 0, cv::INTER_LINEAR);
-  return level;
-}
-
 FrameFeatures ExtractOrb(const std::vector<cv::Mat>& pyramid, const OdometryOptions& options,
                          const cv::Mat& mask) {
   FrameFeatures out;
@@ -286,8 +280,8 @@ std::shared_ptr<const DepthGrid> GridOf(const cv::Mat& depth_m, const cv::Mat& m
 }  // namespace
 
 FrameFeatures ExtractFeatures(const InputFrame& frame, const CameraRig& rig, const OdometryOptions& options) {
-  const auto shared = std::make_shared<const std::vector<cv::Mat>>(BuildPyramid(frame.image, options));
-  const std::vector<cv::Mat>& pyramid = *shared;
+  const auto shared = std::make_shared<const Pyramid>(BuildPyramid(frame.image, options));
+  const std::vector<cv::Mat>& pyramid = shared->Levels();
   FrameFeatures features = ExtractOrb(pyramid, options, frame.mask);
   features.pyramid = shared;
   features.has_depth = !frame.depth_m.empty() || !frame.right.empty();

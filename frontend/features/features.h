@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "frontend/features/pyramid.h"
 #include "tutti/frontend/frame.h"
 #include "tutti/frontend/odometry_options.h"
 
@@ -56,8 +57,7 @@ struct FrameFeatures {
   bool other_camera = false;  ///< in the pixels of the map's camera, but another one took it (CarryOver)
   std::vector<cv::Point2f> rolled;  ///< N, what RollingShutter moved the keypoints by [px]; empty: nothing
   std::vector<int> aligned;         ///< N, landmark whose patch the position was aligned with, or -1
-  std::shared_ptr<const std::vector<cv::Mat>>
-      pyramid;  ///< of the (left) image; null where it is not needed any more
+  std::shared_ptr<const Pyramid> pyramid;  ///< of the (left) image; null where it is not needed any more
   /// RGB-D: the depth image in short, for ImageAligner; null where it is not needed any more.
   std::shared_ptr<const DepthGrid> depth_grid;
   bool has_depth = false;   ///< the frame came with a depth or right image
@@ -130,9 +130,6 @@ std::vector<float> PyramidScales(const OdometryOptions& options);
 
 /// Image pyramid; level l is smaller by scale_factor^l.
 std::vector<cv::Mat> BuildPyramid(const cv::Mat& image, const OdometryOptions& options);
-
-/// The level of a pyramid after `image`.
-cv::Mat NextLevel(const cv::Mat& image, const cv::Size& size);
 
 /// Detects and describes features of one 8-bit grey image; no depth. Blank or tiny images give none. No
 /// feature's pixel, rounded, is one where `mask` (CV_8UC1, as large as level 0; empty: nowhere) is 0.

@@ -141,9 +141,11 @@ std::shared_ptr<const Patch> CutPatch(const PinholeCamera& camera, const FrameFe
                                       int feature) {
   const cv::KeyPoint& k = features.keypoints[static_cast<std::size_t>(feature)];
   const std::size_t level = static_cast<std::size_t>(k.octave);
-  if (!features.pyramid || level >= features.pyramid->size()) return nullptr;
-  const cv::Mat& image = (*features.pyramid)[level];
-  const Eigen::Vector2d scale = LevelScale(*features.pyramid, level);
+  if (!features.pyramid) return nullptr;
+  const std::vector<cv::Mat>& levels = features.pyramid->Levels();
+  if (level >= levels.size()) return nullptr;
+  const cv::Mat& image = levels[level];
+  const Eigen::Vector2d scale = LevelScale(levels, level);
   const Eigen::Vector2d p = ToLevel(InImage(camera, features, feature), scale);
   const int x = static_cast<int>(std::lround(p.x())), y = static_cast<int>(std::lround(p.y()));
   if (x < Patch::kHalf || y < Patch::kHalf || x + Patch::kHalf >= image.cols ||
@@ -164,8 +166,8 @@ std::shared_ptr<const Patch> CutPatch(const PinholeCamera& camera, const FrameFe
 std::optional<Eigen::Vector2d> AlignPatch(const Patch& patch, const FrameFeatures& frame,
                                           const Eigen::Matrix2d& A_frame_patch,
                                           const Eigen::Vector2d& start) {
-  if (!frame.pyramid || frame.pyramid->empty()) return std::nullopt;
-  const std::vector<cv::Mat>& pyramid = *frame.pyramid;
+  if (!frame.pyramid || frame.pyramid->Levels().empty()) return std::nullopt;
+  const std::vector<cv::Mat>& pyramid = frame.pyramid->Levels();
   // The level at which the patch keeps its size.
   const double size = SizeIn(patch, A_frame_patch);
   std::size_t level = 0;

@@ -358,8 +358,8 @@ std::vector<ImageAligner::Point> ImageAligner::PointsOf(const Reference& referen
 namespace {
 
 bool HaveImages(const FrameFeatures& from, const FrameFeatures& seen) {
-  return from.pyramid && seen.pyramid && from.pyramid->size() == seen.pyramid->size() &&
-         !seen.pyramid->empty();
+  return from.pyramid && seen.pyramid && !seen.pyramid->Levels().empty() &&
+         from.pyramid->Levels().size() == seen.pyramid->Levels().size();
 }
 
 // The finest level that is compared.
@@ -390,11 +390,11 @@ std::optional<CameraMotion> ImageAligner::Align(const Reference& reference, cons
   if (!HaveImages(from, seen)) return std::nullopt;
   const std::vector<Point> points = PointsOf(reference);
   if (static_cast<int>(points.size()) < kLeastPoints) return std::nullopt;
-  const std::vector<cv::Mat> old = Coarse(*from.pyramid), now = Coarse(*seen.pyramid);
+  const std::vector<cv::Mat>& levels = from.pyramid->Levels();
+  const std::vector<cv::Mat> old = Coarse(levels), now = Coarse(seen.pyramid->Levels());
   CameraMotion found = start, before = reference.camera;
   double brightness = 0, explained = 0;
-  const std::size_t top = from.pyramid->size() - 1;
-  for (const std::size_t l : {old.size() - 1, old.size() - 2, top, Finest(*from.pyramid)}) {
+  for (const std::size_t l : {old.size() - 1, old.size() - 2, levels.size() - 1, Finest(levels)}) {
     if (l >= old.size()) continue;
     MoveOn(reference, &before, &found);
     MotionPrior held = prior;
@@ -418,9 +418,10 @@ std::array<double, ImageAligner::kExposures> ImageAligner::Misfits(const Referen
   const FrameFeatures& from = *reference.features;
   if (!HaveImages(from, seen)) return misfits;
   const std::vector<Point> points = PointsOf(reference);
-  const std::size_t l = Finest(*from.pyramid);
+  const std::vector<cv::Mat>& levels = from.pyramid->Levels();
+  const std::size_t l = Finest(levels);
   for (int i = 0; i < kExposures; ++i) {
-    Level level(*this, (*from.pyramid)[l], (*seen.pyramid)[l], (*from.pyramid)[0].size());
+    Level level(*this, levels[l], seen.pyramid->Levels()[l], levels[0].size());
     level.Prepare(points, from.depth_grid.get(), reference.camera, camera, Exposure(i));
     misfits[static_cast<std::size_t>(i)] = level.Misfit(camera);
     if (!(misfits[static_cast<std::size_t>(i)] > 0)) return {};

@@ -15,7 +15,7 @@
 
 namespace tutti {
 namespace {
-constexpr int kImages = 20;            // newest keyframes that keep their images
+constexpr int kImages = 12;            // newest keyframes that keep their images
 constexpr double kMaxCosine = 0.9996;  // 1.6 deg of parallax at least, for a depth from two views
 // Strict: so many standard deviations of parallax. Most landmarks are made as soon as their parallax is large
 // enough, which is when noise makes it too large: too near, so that one camera's scale shrinks.

@@ -36,7 +36,7 @@ double AngleBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
 
 void CameraHeight::See(const PinholeCamera& camera, const std::shared_ptr<const FrameFeatures>& features,
                        const Pose& T_camera_world, const Pose& T_last_world, double depth) {
-  if (!features->pyramid || features->pyramid->empty()) return;
+  if (!features->pyramid || features->pyramid->Levels().empty()) return;
   const auto begin = [&] {
     first_ = features;
     T_last_first_ = Pose();
@@ -66,7 +66,7 @@ void CameraHeight::See(const PinholeCamera& camera, const std::shared_ptr<const 
 }
 
 void CameraHeight::Search(const PinholeCamera& camera, const FrameFeatures& now) {
-  const cv::Mat &first = first_->pyramid->front(), &second = now.pyramid->front();
+  const cv::Mat &first = first_->pyramid->Levels().front(), &second = now.pyramid->Levels().front();
   std::optional<GroundPlane> found = SearchGround(camera, first, second, T_last_first_);
   if (!found || !(found->correlation > kFound - 0.15)) return;
   found = AlignGround(camera, first, second, T_last_first_, found->normal_by_height);
@@ -92,8 +92,8 @@ void CameraHeight::Search(const PinholeCamera& camera, const FrameFeatures& now)
 void CameraHeight::Measure(const PinholeCamera& camera, const FrameFeatures& now) {
   const double way = T_last_first_.translation.norm() * plane_.norm();
   if (way > kLongestWay) return;
-  const auto found =
-      AlignGround(camera, first_->pyramid->front(), now.pyramid->front(), T_last_first_, plane_);
+  const auto found = AlignGround(camera, first_->pyramid->Levels().front(), now.pyramid->Levels().front(),
+                                 T_last_first_, plane_);
   const double misfit = found ? Misfit(std::log(found->Height())) : 0;
   const bool agrees = found && found->correlation > kAgrees &&
                       AngleBetween(found->normal_by_height, plane_) < kTurned && std::abs(misfit) < kMisfit;

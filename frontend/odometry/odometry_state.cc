@@ -161,8 +161,13 @@ void Odometry::Impl::Save(const internal::SectionSink& sink) const {
   };
   const Head head{Fingerprint(rig_, map().scales()), map().KeyframeCount(), map().LandmarkCount()};
   write(Section::kHead, [&](auto& out) { out(head); });
-  for (int id = 0; id < head.keyframes; ++id)
-    write(Section::kKeyframe, [&](auto& out) { out(map().keyframe(id)); });
+  for (int id = 0; id < head.keyframes; ++id) {
+    const tutti::Keyframe& keyframe = map().keyframe(id);
+    // Before it: what is like the keyframe, a view, is like none of its image.
+    if (keyframe.features->pyramid)
+      write(Section::kImage, [&](auto& out) { out(keyframe.features->pyramid); });
+    write(Section::kKeyframe, [&](auto& out) { out(keyframe); });
+  }
   for (int first = 0; first < head.landmarks; first += kLandmarksPerSection) {
     const int end = std::min(first + kLandmarksPerSection, head.landmarks);
     write(Section::kLandmarks, [&](auto& out) {
@@ -191,6 +196,9 @@ void Odometry::Impl::Load(internal::SectionReader* file) {
   }
   Map* const map = mapper_.RestoredMap();
   for (int id = 0; id < head.keyframes; ++id) {
+    std::shared_ptr<const Pyramid> image;
+    if (file->Peek() == Tag(Section::kImage))
+      ReadSection(Section::kImage, file, &shared, [&](auto& in) { in(image); });
     tutti::Keyframe keyframe;
     ReadSection(Section::kKeyframe, file, &shared, [&](auto& in) { in(keyframe); });
     map->Restore(std::move(keyframe));

@@ -122,39 +122,6 @@ void StateOfKeypoints(Archive& archive, std::vector<cv::KeyPoint>* keypoints) {
   }
 }
 
-/// The image, and the sizes of the levels that are made from it again.
-template <class Archive>
-void StateOfPyramid(Archive& archive, std::shared_ptr<const std::vector<cv::Mat>>* pyramid) {
-  std::vector<cv::Mat> levels;
-  if (*pyramid) levels = **pyramid;
-  bool is_there = *pyramid != nullptr;
-  archive(is_there);
-  if (!is_there) return;
-  std::vector<std::pair<std::int32_t, std::int32_t>> sizes;
-  sizes.reserve(levels.size());
-  for (const cv::Mat& level : levels) sizes.emplace_back(level.cols, level.rows);
-  archive(sizes);
-  std::string packed;
-  if constexpr (!Archive::kReading) {
-    if (!levels.empty()) packed = PutGrey(levels[0]);
-  }
-  archive(packed);
-  if constexpr (Archive::kReading) {
-    constexpr std::size_t kMostLevels = 16;
-    if (sizes.empty() || sizes.size() > kMostLevels || !IsGrey(packed, sizes[0].second, sizes[0].first))
-      archive.Damaged("a pyramid without its image");
-    levels.emplace_back(sizes[0].second, sizes[0].first, CV_8UC1);
-    if (!GetGrey(packed, &levels[0])) archive.Damaged("an image that is none");
-    for (std::size_t l = 1; l < sizes.size(); ++l) {
-      const auto& [columns, rows] = sizes[l];
-      if (columns < 1 || rows < 1 || columns > sizes[l - 1].first || rows > sizes[l - 1].second)
-        archive.Damaged("a pyramid that grows");
-      levels.push_back(NextLevel(levels.back(), {columns, rows}));
-    }
-    *pyramid = std::make_shared<const std::vector<cv::Mat>>(std::move(levels));
-  }
-}
-
 template <class Archive>
 void StateOfDepthGrid(Archive& archive, std::shared_ptr<const DepthGrid>* grid) {
   bool is_there = *grid != nullptr;
@@ -173,6 +140,38 @@ void StateOfDepthGrid(Archive& archive, std::shared_ptr<const DepthGrid>* grid) 
 }
 
 }  // namespace internal
+
+/// The image, and the sizes of the levels that are made from it again.
+template <class Archive>
+void Pyramid::State(Archive& archive) {
+  std::vector<std::pair<std::int32_t, std::int32_t>> sizes;
+  std::string packed;
+  if constexpr (!Archive::kReading) {
+    const std::vector<cv::Mat>& levels = Levels();
+    for (const cv::Mat& level : levels) sizes.emplace_back(level.cols, level.rows);
+    if (!levels.empty()) packed = internal::PutGrey(levels[0]);
+  }
+  archive(sizes, packed);
+  if constexpr (Archive::kReading) {
+    constexpr std::size_t kMostLevels = 16;
+    if (sizes.empty() || sizes.size() > kMostLevels ||
+        !internal::IsGrey(packed, sizes[0].second, sizes[0].first))
+      archive.Damaged("a pyramid without its image");
+    for (std::size_t l = 1; l < sizes.size(); ++l) {
+      const auto& [columns, rows] = sizes[l];
+      if (columns < 1 || rows < 1 || columns > sizes[l - 1].first || rows > sizes[l - 1].second)
+        archive.Damaged("a pyramid that grows");
+    }
+    make_ = [sizes = std::move(sizes), packed = std::move(packed)] {
+      std::vector<cv::Mat> levels;
+      levels.emplace_back(sizes[0].second, sizes[0].first, CV_8UC1);
+      internal::GetGrey(packed, &levels[0]);  // it is one, as IsGrey said
+      for (std::size_t l = 1; l < sizes.size(); ++l)
+        levels.push_back(NextLevel(levels.back(), {sizes[l].first, sizes[l].second}));
+      return levels;
+    };
+  }
+}
 
 template <class Archive>
 void FrameFeatures::State(Archive& archive) {
@@ -200,7 +199,7 @@ void FrameFeatures::State(Archive& archive) {
     }
   }
   archive(lens, other_camera, has_depth, row_error_px, stereo_matches, columns_, rows_);
-  internal::StateOfPyramid(archive, &pyramid);
+  archive(pyramid);
   internal::StateOfDepthGrid(archive, &depth_grid);
   if constexpr (Archive::kReading) {
     const bool described =

@@ -13,6 +13,7 @@ enum class Section : std::uint32_t {
   kTracking,          ///< all that is no map
   kTimes,             ///< milliseconds by stage, the only thing that varies from run to run
   kGlobalAdjustment,  ///< GlobalAdjustment::SaveSections
+  kImage,             ///< of the keyframe that follows, if it has it still
   kEndOfOdometry = 199
 };
 

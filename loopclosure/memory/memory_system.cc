@@ -72,7 +72,10 @@ int MemorySystem::Remember(std::int64_t id, const std::vector<SeenWords>& words)
 
 void MemorySystem::BeginSession() {
   transition_.Update(memory_, memory_.Settle(0));
-  for (FilterUnit& unit : units_) unit.filter = BayesFilter();
+  for (FilterUnit& unit : units_) {
+    unit.filter = BayesFilter();
+    unit.repeated = 0;  // of images that the next one does not follow
+  }
   if (joint_) joint_->filter = BayesFilter();
 }
 

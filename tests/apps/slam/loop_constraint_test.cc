@@ -13,7 +13,6 @@ namespace {
 using ::testing::HasSubstr;
 
 constexpr int kLandmarks = 80;
-constexpr std::uint64_t kSeed = 3;
 
 PinholeCamera Camera() {
   PinholeCamera camera;
@@ -68,7 +67,7 @@ CameraRig Rig(Sensor sensor) {
 LoopConstraint Mono(const Similarity& S) {
   const Views views(S);
   return MakeLoopConstraint(Verification(), views.candidate, views.query, Rig(Sensor::kMono), SlamOptions(),
-                            kSeed);
+                            LoopDetectorOptions());
 }
 
 TEST(LoopConstraint, MonoFindsPoseAndScaleFromTheLandmarksOfBothKeyframes) {
@@ -94,16 +93,16 @@ TEST(LoopConstraint, KeyframesWithoutCommonLandmarksGiveNone) {
   Views views(Similarity(1.0, Eigen::Quaterniond::Identity(), {0, 0, 1}));
   views.query.points.assign(kLandmarks, Eigen::Vector3d::Constant(std::nan("")));
   const LoopConstraint found = MakeLoopConstraint(Verification(), views.candidate, views.query,
-                                                  Rig(Sensor::kMono), SlamOptions(), kSeed);
+                                                  Rig(Sensor::kMono), SlamOptions(), LoopDetectorOptions());
   EXPECT_FALSE(found.usable);
   EXPECT_THAT(found.reason, HasSubstr("only 0 of its matches are landmarks"));
   views.candidate.points.assign(kLandmarks, Eigen::Vector3d::Constant(std::nan("")));
   EXPECT_FALSE(MakeLoopConstraint(Verification(), views.candidate, views.query, Rig(Sensor::kMono),
-                                  SlamOptions(), kSeed)
+                                  SlamOptions(), LoopDetectorOptions())
                    .usable);
 }
 
-TEST(LoopConstraint, MetricSensorsTakeTheVerifiedTransformAndNothingLess) {
+TEST(LoopConstraint, MetricSensorsTakeTheVerifiedTransform) {
   const Views views(Similarity(1.0, Eigen::Quaterniond::Identity(), {0, 0, 1}));
   Verification verification;
   verification.type = ConstraintType::kRigid;
@@ -111,14 +110,30 @@ TEST(LoopConstraint, MetricSensorsTakeTheVerifiedTransformAndNothingLess) {
   verification.information = 1e4 * Matrix6d::Identity();
   const auto make = [&] {
     return MakeLoopConstraint(verification, views.candidate, views.query, Rig(Sensor::kRgbd), SlamOptions(),
-                              kSeed);
+                              LoopDetectorOptions());
   };
   const LoopConstraint found = make();
   ASSERT_TRUE(found.usable) << found.reason;
   EXPECT_EQ(found.edge.S_candidate_query.translation, verification.S_candidate_query.translation);
   // No surer than the options' floor: 1 % of a depth of 10.
   EXPECT_LT(found.edge.information(0, 0), 1 / (0.1 * 0.1));
+}
+
+TEST(LoopConstraint, MetricSensorsMeasureWhatWasVerifiedWithoutDepthByTheMapsLandmarks) {
+  const Similarity S(1.0, ExpSO3({0.02, -0.1, 0.03}), {0.6, -0.2, 1.1});
+  Views views(S);
+  Verification verification;
   verification.type = ConstraintType::kEssential;
+  verification.S_candidate_query = Similarity(1.0, S.rotation, S.translation.normalized());
+  const auto make = [&] {
+    return MakeLoopConstraint(verification, views.candidate, views.query, Rig(Sensor::kStereo), SlamOptions(),
+                              LoopDetectorOptions());
+  };
+  const LoopConstraint found = make();
+  ASSERT_TRUE(found.usable) << found.reason;
+  EXPECT_LT((found.edge.S_candidate_query.translation - S.translation).norm(), 1e-3) << "in metres";
+  EXPECT_EQ(found.edge.S_candidate_query.scale, 1);
+  views.query.points.assign(kLandmarks, Eigen::Vector3d::Constant(std::nan("")));
   EXPECT_FALSE(make().usable);
   EXPECT_THAT(make().reason, HasSubstr("without depth"));
 }

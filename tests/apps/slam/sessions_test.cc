@@ -237,66 +237,45 @@ class Merging : public ::testing::Test {
   }
 };
 
-// Two recordings with common places. Each is mapped by two threads once for all tests.
-struct CommonPlaces {
-  const testing::RenderedWorld world{SessionTown(SyntheticSensor::kStereo)};
-  const Recording a = Part(world, 0, 140), b = Part(world, 90, 240, kLater_s);
-  const fs::path folder = testing::FreshFolder();
-
-  static const CommonPlaces& Once() {
-    static const CommonPlaces places;
-    return places;
-  }
-  // The map, which is in a file from then on, too.
-  std::unique_ptr<SlamSystem> Mapped(const std::string& name) const {
-    const Recording& recording = name == "a" ? a : b;
-    auto slam = std::make_unique<SlamSystem>(Configured(), recording.rig);
-    TrackAll(recording, slam.get());
-    slam->Save(folder / name);
-    return slam;
-  }
-  std::unique_ptr<SlamSystem> FromFile(const std::string& name) const {
-    if (!fs::exists(folder / name)) Mapped(name);
-    return SlamSystem::Load(folder / name, ReadMapInfo(folder / name));
-  }
-  // Goes on in a merged map.
-  void TrackAThirdSession(SlamSystem* merged) const {
-    const Recording third = Part(world, 60, 110);
-    merged->BeginSession(third.rig);
-    TrackAll(third, merged);
-    EXPECT_EQ(merged->Sessions().size(), 3u);
-    EXPECT_TRUE(merged->Sessions()[2].joined_at.has_value());
-  }
-};
-
 TEST_F(Merging, TwoMapsWithCommonPlacesAreOneForAnyThreads) {
-  const CommonPlaces& places = CommonPlaces::Once();
+  const testing::RenderedWorld world(SessionTown(SyntheticSensor::kStereo));
+  const Recording a = Part(world, 0, 140), b = Part(world, 90, 240, kLater_s);
   std::string first_bytes;
   for (const int threads : {1, 2}) {
-    const bool alone = threads == 1;
-    const auto map = alone ? MapOf(places.a, threads) : places.Mapped("a"),
-               other = alone ? MapOf(places.b, threads) : places.Mapped("b");
+    std::unique_ptr<SlamSystem> map = MapOf(a, threads), other = MapOf(b, threads);
+    if (threads == 2) {  // as `tutti merge` has them
+      const fs::path folder = testing::FreshFolder();
+      map->Save(folder / "a");
+      other->Save(folder / "b");
+      map = SlamSystem::Load(folder / "a", ReadMapInfo(folder / "a"));
+      other = SlamSystem::Load(folder / "b", ReadMapInfo(folder / "b"));
+    }
     ASSERT_TRUE(map->Merge(other.get()));
     EXPECT_EQ(map->odometry()->Pieces().size(), 1u);
     const std::string bytes = StateOfAll(*map);
     if (threads == 1) first_bytes = bytes;
-    EXPECT_EQ(bytes == first_bytes, true) << "another result with more threads";
+    EXPECT_EQ(bytes == first_bytes, true) << "another result with more threads, or from files";
     const std::vector<MapSession> sessions = map->Sessions();
     ASSERT_EQ(sessions.size(), 2u);
-    EXPECT_LT(WorstError(*map, sessions[1], places.b, places.a.truth.front().pose), 1.5);
+    EXPECT_LT(WorstError(*map, sessions[1], b, a.truth.front().pose), 1.5);
     // Goes on, and is there again from a file.
     if (threads == 1) continue;
-    const fs::path file = places.folder / "merged";
+    const fs::path file = testing::FreshFolder() / "merged.tutti";
     map->Save(file);
-    places.TrackAThirdSession(SlamSystem::Load(file, ReadMapInfo(file)).get());
+    const auto again = SlamSystem::Load(file, ReadMapInfo(file));
+    const Recording third = Part(world, 60, 110);
+    again->BeginSession(third.rig);
+    TrackAll(third, again.get());
+    EXPECT_EQ(again->Sessions().size(), 3u);
+    EXPECT_TRUE(again->Sessions()[2].joined_at.has_value());
   }
 }
 
 // The same but for the frame of reference, which is that of the map that another one is merged into.
 TEST_F(Merging, WhichMapComesFirstDecidesTheFrameOfReferenceAlone) {
-  const CommonPlaces& places = CommonPlaces::Once();
-  const auto first = places.FromFile("a"), to_first = places.FromFile("b"), second = places.FromFile("b"),
-             to_second = places.FromFile("a");
+  const testing::RenderedWorld world(SessionTown(SyntheticSensor::kStereo));
+  const Recording a = Part(world, 0, 140), b = Part(world, 90, 240, kLater_s);
+  const auto first = MapOf(a), to_first = MapOf(b), second = MapOf(b), to_second = MapOf(a);
   const Pose first_begin = first->odometry()->KeyframePose(0),
              second_begin = second->odometry()->KeyframePose(0);
   int heard = 0;
@@ -324,7 +303,10 @@ TEST_F(Merging, WhichMapComesFirstDecidesTheFrameOfReferenceAlone) {
   for (const int id : ids) ASSERT_LT(apart(from(*second, id), from(*first, id)), 1e-6) << id;
   // It goes on as ever, with the listeners that it had.
   heard = 0;
-  places.TrackAThirdSession(second.get());
+  const Recording third = Part(world, 60, 110);
+  second->BeginSession(third.rig);
+  TrackAll(third, second.get());
+  EXPECT_TRUE(second->Sessions()[2].joined_at.has_value());
   EXPECT_GT(heard, 0);
 }
 

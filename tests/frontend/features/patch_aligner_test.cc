@@ -29,7 +29,7 @@ FrameFeatures Frame(const cv::Mat& image, const Eigen::Vector2d& at) {
   features.descriptors = cv::Mat::zeros(1, 32, CV_8U);
   features.inverse_depth = features.inverse_depth_sigma = {0.0F};
   features.aligned = {-1};
-  features.pyramid = std::make_shared<const std::vector<cv::Mat>>(BuildPyramid(image, OdometryOptions()));
+  features.pyramid = std::make_shared<const Pyramid>(BuildPyramid(image, OdometryOptions()));
   return features;
 }
 

@@ -31,7 +31,7 @@ Pose PoseOf(std::size_t i) { return LongTown().World().PoseOf(i); }
 
 std::shared_ptr<const FrameFeatures> Features(const cv::Mat& image) {
   auto features = std::make_shared<FrameFeatures>();
-  features->pyramid = std::make_shared<const std::vector<cv::Mat>>(1, image);
+  features->pyramid = std::make_shared<const Pyramid>(std::vector<cv::Mat>(1, image));
   return features;
 }
 

@@ -182,8 +182,8 @@ class PoseSearchOfWindows : public ::testing::Test {
     cv::normalize(wall, wall, 20, 220, cv::NORM_MINMAX);
     cv::warpAffine(wall, image, cv::Matx23d(1, 0, -80 - shift_px, 0, 1, 0), {camera_.width, camera_.height},
                    cv::INTER_CUBIC);
-    const auto pyramid = std::make_shared<const std::vector<cv::Mat>>(BuildPyramid(image, options_));
-    const FrameFeatures all = ExtractOrb(*pyramid, options_);
+    const auto pyramid = std::make_shared<const Pyramid>(BuildPyramid(image, options_));
+    const FrameFeatures all = ExtractOrb(pyramid->Levels(), options_);
     auto features = std::make_shared<FrameFeatures>();
     for (std::size_t f = 0; f < all.size(); ++f) {
       const cv::KeyPoint& k = all.keypoints[f];

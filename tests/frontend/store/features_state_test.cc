@@ -88,10 +88,10 @@ TEST(FeaturesState, PyramidAndGridAreMadeAgainAsTheyWere) {
   FrameFeatures written = OfATown();
   FrameFeatures read = Read<FrameFeatures>(Bytes(written));
   ASSERT_GT(read.size(), 500U);
-  ASSERT_EQ(read.pyramid->size(), written.pyramid->size());
-  ASSERT_GT(read.pyramid->size(), 3U);
-  for (std::size_t l = 0; l < read.pyramid->size(); ++l)
-    EXPECT_EQ(cv::norm((*read.pyramid)[l], (*written.pyramid)[l], cv::NORM_L1), 0) << l;
+  const std::vector<cv::Mat>&again = read.pyramid->Levels(), &first = written.pyramid->Levels();
+  ASSERT_EQ(again.size(), first.size());
+  ASSERT_GT(again.size(), 3U);
+  for (std::size_t l = 0; l < again.size(); ++l) EXPECT_EQ(cv::norm(again[l], first[l], cv::NORM_L1), 0) << l;
   for (const float radius : {5.0F, 40.0F, 1000.0F}) {
     std::vector<int> a, b;
     written.InArea({150, 90}, radius, 0, 3, &a);
@@ -141,7 +141,8 @@ TEST(FeaturesState, ImpossibleFeaturesAreRefused) {
   expect_refused([](FrameFeatures& f) { f.lens.x() = std::nan(""); });
   expect_refused([](FrameFeatures& f) { f.BuildGrid(1 << 20, 10); });
   expect_refused([](FrameFeatures& f) {
-    f.pyramid = std::make_shared<const std::vector<cv::Mat>>(f.pyramid->rbegin(), f.pyramid->rend());
+    const std::vector<cv::Mat>& levels = f.pyramid->Levels();
+    f.pyramid = std::make_shared<const Pyramid>(std::vector<cv::Mat>(levels.rbegin(), levels.rend()));
   });
 }
 

@@ -84,7 +84,7 @@ std::string Read(const YAML::Node& node, std::vector<std::string>& field) {
 
 // A matrix may be given row by row, or as a list of its rows.
 std::string Read(const YAML::Node& node, TransformRows& field) {
-  const std::string wanted = "needs 16 numbers, or 4 lists of 4";
+  const char* const wanted = "needs 16 numbers, or 4 lists of 4";
   if (!node.IsSequence()) return wanted;
   std::vector<YAML::Node> numbers;
   for (const YAML::Node& item : node) {

@@ -13,7 +13,6 @@ namespace {
 using ::testing::AllOf;
 using testing::ErrorOf;
 using ::testing::HasSubstr;
-using testing::SmallCamera;
 using testing::With;
 
 const cv::Size kSize(64, 48);

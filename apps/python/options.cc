@@ -104,7 +104,7 @@ void SetOptions(const std::string& function, const std::string& section, const p
   RunConfig changed = config;
   const ConfigTable table(changed);
   Assign(function, section.empty() ? "" : section + ".", "", keywords, table);
-  DropUnsetCamera(changed.dataset);
+  DropUnsetCameras(changed.dataset);
   if (const auto problem = FirstProblem(changed)) {
     const std::string where = problem->first == section ? "" : problem->first + ": ";
     throw InputError(function + ": " + where + problem->second);

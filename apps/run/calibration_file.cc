@@ -2,6 +2,7 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <initializer_list>
@@ -153,6 +154,43 @@ Calibration FromKalibr(const CalibrationText& text, const YAML::Node& node) {
   return out;
 }
 
+// A matrix of 4 rows in any of the forms.
+Pose TransformOf(const CalibrationText& text, const YAML::Node& node, const std::string& key) {
+  std::vector<double> values;
+  if (node.IsSequence() && node.size() == 4) {
+    for (const YAML::Node& row : node) {
+      for (const double value : text.Numbers(row, key)) values.push_back(value);
+    }
+  } else {
+    values = text.Matrix(node, key);
+  }
+  TransformRows rows{};
+  if (values.size() != rows.size())
+    text.Fail(node, "'" + key + "' has " + std::to_string(values.size()) + " values; 16 are needed");
+  std::copy(values.begin(), values.end(), rows.begin());
+  try {
+    if (const std::optional<Pose> T = RigidTransform(rows)) return *T;
+  } catch (const InputError& e) {
+    text.Fail(node, "'" + key + "' " + e.what());
+  }
+  text.Fail(node, "'" + key + "' is zeros");
+}
+
+void SetRight(const PinholeCamera& right, const Pose& T_right_left, Calibration& out) {
+  out.right = right;
+  const Eigen::Matrix4d matrix = T_right_left.Matrix();
+  for (std::size_t i = 0; i < out.T_right_left.size(); ++i)
+    out.T_right_left[i] = matrix(static_cast<int>(i) / 4, static_cast<int>(i) % 4);
+  out.baseline_m = 0;
+}
+
+// cam1 of a camchain, where it says how it stands to cam0.
+void AddKalibrRight(const CalibrationText& text, Calibration& out) {
+  const YAML::Node cam1 = text.root()["cam1"];
+  if (!cam1.IsDefined() || !cam1.IsMap() || !cam1["T_cn_cnm1"].IsDefined()) return;
+  SetRight(FromKalibr(text, cam1).camera, TransformOf(text, cam1["T_cn_cnm1"], "T_cn_cnm1"), out);
+}
+
 Calibration FromEuroc(const CalibrationText& text) {
   const SensorYaml read = ReadSensorYaml(text.file());
   Calibration out;
@@ -162,12 +200,9 @@ Calibration FromEuroc(const CalibrationText& text) {
   return out;
 }
 
-Calibration FromOrbSlam(const CalibrationText& text) {
-  Calibration out;
-  const bool three = text.root()["Camera1.fx"].IsDefined();
-  out.format = three ? "ORB-SLAM3" : "ORB-SLAM";
-  const std::string prefix = three ? "Camera1." : "Camera.";
-  PinholeCamera& c = out.camera;
+// `prefix`: "Camera.", "Camera1.", "Camera2.".
+PinholeCamera OrbSlamCamera(const CalibrationText& text, const std::string& prefix) {
+  PinholeCamera c;
   c.fx = text.Needed(prefix + "fx");
   c.fy = text.Needed(prefix + "fy");
   c.cx = text.Needed(prefix + "cx");
@@ -181,12 +216,24 @@ Calibration FromOrbSlam(const CalibrationText& text) {
     lens.push_back(text.Number(prefix + key).value_or(0));
   if (!fisheye) lens.push_back(text.Number(prefix + "k3").value_or(0));
   if (model != "Rectified") SetLens(text, text.root()["Camera.type"], model, lens, c);
+  return c;
+}
+
+Calibration FromOrbSlam(const CalibrationText& text, bool pairs) {
+  Calibration out;
+  const bool three = text.root()["Camera1.fx"].IsDefined();
+  out.format = three ? "ORB-SLAM3" : "ORB-SLAM";
+  out.camera = OrbSlamCamera(text, three ? "Camera1." : "Camera.");
   out.rate_hz = text.Number("Camera.fps").value_or(0);
   out.depth_units_per_m =
       text.Number("RGBD.DepthMapFactor").value_or(text.Number("DepthMapFactor").value_or(0));
   out.baseline_m = text.Number("Stereo.b").value_or(0);
-  if (const std::optional<double> bf = text.Number("Camera.bf"); bf && out.baseline_m == 0 && c.fx > 0)
-    out.baseline_m = *bf / c.fx;
+  if (const std::optional<double> bf = text.Number("Camera.bf");
+      bf && out.baseline_m == 0 && out.camera.fx > 0)
+    out.baseline_m = *bf / out.camera.fx;
+  const YAML::Node pose = text.root()["Stereo.T_c1_c2"];  // of the right camera in the left one's frame
+  if (pairs && pose.IsDefined() && text.root()["Camera2.fx"].IsDefined())
+    SetRight(OrbSlamCamera(text, "Camera2."), TransformOf(text, pose, "Stereo.T_c1_c2").Inverse(), out);
   return out;
 }
 
@@ -223,7 +270,7 @@ Calibration FromMatrix(const CalibrationText& text, const YAML::Node& matrix) {
   return out;
 }
 
-Calibration FromTutti(const CalibrationText& text) {
+Calibration FromTutti(const CalibrationText& text, bool pairs) {
   const RunConfig config = ParseConfig(text.text(), text.file().string());
   Calibration out;
   out.format = "tutti";
@@ -231,34 +278,47 @@ Calibration FromTutti(const CalibrationText& text) {
   out.baseline_m = config.dataset.baseline_m;
   out.rate_hz = config.dataset.rate_hz;
   out.depth_units_per_m = config.dataset.depth_units_per_m;
+  if (pairs) out.right = config.dataset.right;
+  if (out.right) out.T_right_left = config.dataset.T_right_left;
   return out;
 }
 
-Calibration Read(const CalibrationText& text) {
+Calibration KalibrOf(const CalibrationText& text, bool pairs) {
+  Calibration out = FromKalibr(text, text.root()["cam0"]);
+  if (pairs) AddKalibrRight(text, out);
+  return out;
+}
+
+Calibration Read(const CalibrationText& text, bool pairs) {
   const YAML::Node& root = text.root();
   if (root["cam0"].IsDefined() && root["cam0"].IsMap() && root["cam0"]["intrinsics"].IsDefined())
-    return FromKalibr(text, root["cam0"]);
+    return KalibrOf(text, pairs);
   if (root["intrinsics"].IsDefined() && root["distortion_coeffs"].IsDefined()) return FromKalibr(text, root);
   if (root["intrinsics"].IsDefined()) return FromEuroc(text);
-  if (root["Camera1.fx"].IsDefined() || root["Camera.fx"].IsDefined()) return FromOrbSlam(text);
-  if (root["camera"].IsDefined() && root["camera"].IsMap()) return FromTutti(text);
+  if (root["Camera1.fx"].IsDefined() || root["Camera.fx"].IsDefined()) return FromOrbSlam(text, pairs);
+  if (root["camera"].IsDefined() && root["camera"].IsMap()) return FromTutti(text, pairs);
   const YAML::Node matrix = FirstOf(root, {"camera_matrix", "Camera_Matrix", "cameraMatrix", "K"});
   if (matrix.IsDefined()) return FromMatrix(text, matrix);
   throw InputError(text.file().string() + ": holds no calibration; " + CalibrationText::Known());
 }
 
+// `which`: "right ", or "".
+void Check(const fs::path& file, const std::string& which, PinholeCamera camera) {
+  if (camera.width == 0 || camera.height == 0) {  // of the images, later
+    camera.width = internal::PixelsOf(std::round(2 * std::max(1.0, camera.cx)));
+    camera.height = internal::PixelsOf(std::round(2 * std::max(1.0, camera.cy)));
+  }
+  const std::string problem = camera.Validate();
+  if (!problem.empty()) throw InputError(file.string() + ": " + which + problem);
+}
+
 }  // namespace
 
-Calibration ReadCalibration(const fs::path& file) {
+Calibration ReadCalibration(const fs::path& file, bool pairs) {
   const CalibrationText text(file);
-  Calibration out = Read(text);
-  PinholeCamera check = out.camera;
-  if (check.width == 0 || check.height == 0) {  // of the images, later
-    check.width = internal::PixelsOf(std::round(2 * std::max(1.0, check.cx)));
-    check.height = internal::PixelsOf(std::round(2 * std::max(1.0, check.cy)));
-  }
-  const std::string problem = check.Validate();
-  if (!problem.empty()) throw InputError(file.string() + ": " + problem);
+  Calibration out = Read(text, pairs);
+  Check(file, "", out.camera);
+  if (out.right) Check(file, "right ", *out.right);
   return out;
 }
 

@@ -42,13 +42,16 @@ RunConfig Published(const std::string& name) { return LoadConfig(internal::Examp
 // The pixels that the camera must fit.
 void SetImageSize(const fs::path& dataset, const DatasetOptions& options, PinholeCamera& camera) {
   if (camera.width > 0 && camera.height > 0) return;
+  const bool live = IsCamera(dataset.string());
   DatasetOptions any = options;
-  any.sensor = Sensor::kMono;
+  if (!live) any.sensor = Sensor::kMono;  // of cameras it says how large one of two images is
   any.start = any.end = 0;
   any.camera.reset();
+  any.right.reset();
+  any.T_right_left = {};
   any.mask.clear();
   any.rotate = 0;
-  const DatasetType type = IsCamera(dataset.string()) ? DatasetType::kVideo : DetectDatasetType(dataset);
+  const DatasetType type = live ? DatasetType::kVideo : DetectDatasetType(dataset);
   if (type == DatasetType::kKitti || type == DatasetType::kTum) {
     // Without any camera these can't be opened: one that fits every image.
     any.type = DatasetType::kImages;
@@ -87,12 +90,17 @@ std::string SetRequested(const fs::path& dataset, const CameraRequest& request, 
   PinholeCamera camera;
   std::string source;
   if (request.calibration) {
-    const Calibration calibration = ReadCalibration(*request.calibration);
+    const Calibration calibration = ReadCalibration(*request.calibration, options.sensor == Sensor::kStereo);
     camera = calibration.camera;
-    if (calibration.baseline_m > 0) options.baseline_m = calibration.baseline_m;
+    if (calibration.baseline_m > 0 || calibration.right) {  // where the right camera is
+      options.baseline_m = calibration.baseline_m;
+      options.right = calibration.right;
+      options.T_right_left = calibration.T_right_left;
+    }
     if (calibration.depth_units_per_m > 0) options.depth_units_per_m = calibration.depth_units_per_m;
     source = request.calibration->filename().string() + ", " + calibration.format;
     SetImageSize(dataset, options, camera);
+    if (options.right) SetImageSize(dataset, options, *options.right);
   } else if (!request.camera.empty()) {
     camera = internal::ParseCamera(request.camera);
     source = "--camera";
@@ -103,6 +111,7 @@ std::string SetRequested(const fs::path& dataset, const CameraRequest& request, 
     source = "--fov " + Short(*request.view_deg);
   }
   CheckCamera(camera, source);
+  if (options.right) CheckCamera(*options.right, source + ": right");
   options.camera = camera;
   return source;
 }
@@ -176,7 +185,7 @@ class Recogniser {
     } else {
       BesideOrGuess();
     }
-    if (sensor_ == Sensor::kStereo && Options().baseline_m == 0 && !Exists("calib.txt")) {
+    if (sensor_ == Sensor::kStereo && Options().baseline_m == 0 && !Options().right && !Exists("calib.txt")) {
       if (request_.sensor)
         throw InputError(dataset_.string() +
                          ": the distance of the two cameras is not known; a calib.txt "
@@ -227,12 +236,19 @@ class Recogniser {
   }
 
   void Single(DatasetType type, bool live) {
+    const bool two = CameraSources(dataset_.string()).size() > 1;
+    if (two && !sensor_)
+      throw InputError(dataset_.string() +
+                       ": what are the two cameras? Give --sensor stereo (LEFT,RIGHT) or --sensor rgbd "
+                       "(COLOUR,DEPTH)");
     layout_ = live && IsStream(dataset_)     ? "a stream"
+              : two                          ? "two cameras"
               : live                         ? "a camera"
               : type == DatasetType::kImages ? "a folder of images"
               : type == DatasetType::kBag    ? "a ROS bag"
                                              : "a video";
     out_.config = Published("images");
+    if (live && !two && sensor_ == Sensor::kStereo) layout_ += ", left and right side by side";
     if (type != DatasetType::kImages) Options().rate_hz = 0;  // its own
     if (!sensor_) sensor_ = Sensor::kMono;
     if (request_.HasLens()) {
@@ -248,6 +264,8 @@ class Recogniser {
 
   void ForgetCamera() {
     Options().camera.reset();
+    Options().right.reset();
+    Options().T_right_left = {};
     Options().baseline_m = 0;
   }
   void Requested() {
@@ -259,6 +277,7 @@ class Recogniser {
     const fs::path folder = fs::is_directory(dataset_, ignored) ? dataset_ : dataset_.parent_path();
     CameraRequest request;
     if (!IsStream(dataset_.string())) request.calibration = CalibrationBeside(folder);
+    Options().sensor = sensor_.value_or(Sensor::kMono);
     if (!request.calibration) {
       request.view_deg = kUsualView;
       out_.guessed_lens = true;
@@ -287,15 +306,17 @@ class Recogniser {
   }
 
   void Say() {
+    const bool live = IsCamera(dataset_.string());
     Options().sensor = sensor_.value_or(Sensor::kMono);
     std::string sensor = "one camera";
     std::string other;
     if (Options().sensor == Sensor::kStereo) {
       sensor = "stereo";
-      other = "; --sensor mono uses the left camera alone";
+      if (!live) other = "; --sensor mono uses the left camera alone";
     } else if (Options().sensor == Sensor::kRgbd) {
       sensor = "RGB-D, " + Short(Options().depth_units_per_m) + " units of depth a metre";
-      other = " (--set dataset.depth_units_per_m=1000 for millimetres); --sensor mono uses colour alone";
+      other = " (--set dataset.depth_units_per_m=1000 for millimetres)";
+      if (!live) other += "; --sensor mono uses colour alone";
     }
     if (!note_.empty()) other += "; " + note_;
     std::string camera = source_.empty() ? "not known: loops, but no trajectory" : source_;

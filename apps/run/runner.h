@@ -20,7 +20,7 @@ namespace tutti {
 /// What the command line can say.
 struct RunRequest {
   std::filesystem::path config;   ///< YAML file
-  std::filesystem::path dataset;  ///< folder, video file, or camera:0
+  std::filesystem::path dataset;  ///< folder, video file, or camera:0, camera:0,1
   std::string camera_source;      ///< where the camera comes from, for summary.json; empty: from `config`
   bool camera_guessed = false;    ///< nobody knows its focal length
   std::filesystem::path out;      ///< folder for the results; made if it is not there

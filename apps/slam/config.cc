@@ -53,6 +53,9 @@ void ReadItem(const std::string& file, const std::string& section,
   const std::string wrong = key->read(item.second);
   if (!wrong.empty()) Fail(file, mark, section + "." + name + ": " + wrong);
   marks.keys.emplace_back(name, mark);
+  // The same name may stand in two sections within each other: camera.fx and camera.right.fx.
+  const std::size_t dot = section.find('.');
+  if (dot != std::string::npos) marks.keys.emplace_back(section.substr(dot + 1) + "." + name, mark);
 }
 
 void ReadSection(const std::string& file, const std::string& section, const YAML::Node& content,
@@ -171,7 +174,7 @@ RunConfig ParseConfig(const std::string& text, const std::string& name) {
       ReadSection(name, section, item.second, table, marks[section]);
     }
   }
-  DropUnsetCamera(config.dataset);
+  DropUnsetCameras(config.dataset);
   // Keys of the camera stand in DatasetOptions, too.
   const KeyMarks& camera = marks["camera"];
   marks["dataset"].keys.insert(marks["dataset"].keys.end(), camera.keys.begin(), camera.keys.end());
@@ -200,7 +203,7 @@ void SetOptions(const std::vector<std::string>& assignments, RunConfig& config) 
   RunConfig changed = config;
   const ConfigTable table(changed);
   for (const std::string& assignment : assignments) Assign(assignment, "", table);
-  DropUnsetCamera(changed.dataset);
+  DropUnsetCameras(changed.dataset);
   const auto problem = FirstProblem(changed);
   if (problem) throw InputError("--set: " + InSection(problem->first, problem->second));
   config = changed;
@@ -223,6 +226,7 @@ std::vector<ConfigEntry> DescribeConfig(const RunConfig& config) {
   for (const ConfigKey& key : table.keys()) {
     const bool of_a_camera = key.section == "camera" && key.name != "baseline_m" && key.name != "readout_s";
     if (of_a_camera && !config.dataset.camera) continue;
+    if (key.section == "camera.right" && !config.dataset.right) continue;
     entries.push_back({key.section, key.name, key.show(), key.doc, key.advanced});
   }
   return entries;
@@ -251,7 +255,7 @@ std::string WithComment(const std::string& line, const std::string& comment, std
 
 std::string HelpConfig(bool advanced, std::size_t columns) {
   RunConfig defaults;
-  defaults.dataset.camera = PinholeCamera();
+  defaults.dataset.camera = defaults.dataset.right = PinholeCamera();
   std::ostringstream out;
   const std::string head =
       advanced ? "All keys of the configuration with their defaults. A file needs only what it changes."

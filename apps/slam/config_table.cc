@@ -82,6 +82,29 @@ std::string Read(const YAML::Node& node, std::vector<std::string>& field) {
   return "";
 }
 
+// A matrix may be given row by row, or as a list of its rows.
+std::string Read(const YAML::Node& node, TransformRows& field) {
+  const char* const wanted = "needs 16 numbers, or 4 lists of 4";
+  if (!node.IsSequence()) return wanted;
+  std::vector<YAML::Node> numbers;
+  for (const YAML::Node& item : node) {
+    if (!item.IsSequence()) {
+      numbers.push_back(item);
+      continue;
+    }
+    if (item.size() != 4) return wanted;
+    for (const YAML::Node& number : item) numbers.push_back(number);
+  }
+  TransformRows values{};
+  if (numbers.size() != values.size()) return wanted;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    std::string wrong = Read(numbers[i], values[i]);
+    if (!wrong.empty()) return wrong;
+  }
+  field = values;
+  return "";
+}
+
 template <std::size_t N>
 std::string Read(const YAML::Node& node, std::array<double, N>& field) {
   // The distortion of most cameras has fewer than five numbers.
@@ -146,7 +169,9 @@ std::string DocOf(const OptionText& text) {
 }  // namespace
 
 ConfigTable::ConfigTable(RunConfig& config) {
-  if (!config.dataset.camera) config.dataset.camera = PinholeCamera();
+  for (std::optional<PinholeCamera>* camera : {&config.dataset.camera, &config.dataset.right}) {
+    if (!*camera) *camera = PinholeCamera();
+  }
   AddOptions("dataset", config.dataset);
   AddOptions("odometry", config.odometry);
   AddOptions("loops", config.loops);
@@ -161,6 +186,8 @@ void ConfigTable::AddOptions(const std::string& section, Options& options) {
     using Field = std::decay_t<decltype(field)>;
     if constexpr (std::is_same_v<Field, std::optional<PinholeCamera>>) {
       AddOptions(text.section, *field);
+      if (text.basic) return;
+      for (ConfigKey& key : keys_) key.advanced = key.advanced || key.section == text.section;
     } else if constexpr (kHasOptions<Field>) {
       AddOptions(section + "." + text.name, field);
     } else if (text.in_files) {
@@ -256,8 +283,10 @@ std::vector<std::string> ConfigTable::Names(const std::string& section) const {
 
 // Only the keys that a data set without calibration of its own needs beside its images: baseline, depth
 // scale.
-void DropUnsetCamera(DatasetOptions& options) {
-  if (options.camera->fx == 0 && options.camera->fy == 0) options.camera.reset();
+void DropUnsetCameras(DatasetOptions& options) {
+  for (std::optional<PinholeCamera>* camera : {&options.camera, &options.right}) {
+    if ((*camera)->fx == 0 && (*camera)->fy == 0) camera->reset();
+  }
 }
 
 std::optional<std::pair<std::string, std::string>> FirstProblem(const RunConfig& config) {

@@ -22,7 +22,7 @@ struct ConfigKey {
   bool advanced = true;                                ///< few users ever set it
 };
 
-/// Keys of all sections, bound to one RunConfig that must outlive the table. A camera is put in where it has
+/// Keys of all sections, bound to one RunConfig that must outlive the table. Cameras are put in where it has
 /// none, to bind to.
 class ConfigTable {
  public:
@@ -53,8 +53,8 @@ class ConfigTable {
   std::vector<ConfigKey> keys_;
 };
 
-/// Takes out the camera that ConfigTable put in, where no key has made one of it.
-void DropUnsetCamera(DatasetOptions& options);
+/// Takes out the cameras that ConfigTable put in, where no key has made one of them.
+void DropUnsetCameras(DatasetOptions& options);
 
 /// Section and what is out of range in it; nothing if all is usable.
 std::optional<std::pair<std::string, std::string>> FirstProblem(const RunConfig& config);

@@ -6,8 +6,10 @@
 namespace tutti::cli {
 
 void AddCameraOptions(CLI::App& command, CameraWords& words) {
-  command.add_option("--calibration", words.calibration,
-                     "the camera from a YAML file of Kalibr, ORB-SLAM, OpenCV, ROS or EuRoC");
+  command.add_option(
+      "--calibration", words.calibration,
+      "the camera from a YAML file of Kalibr, ORB-SLAM, OpenCV, ROS or EuRoC; with --sensor stereo "
+      "also the right one, of Kalibr or ORB-SLAM3");
   command.add_option("--camera", words.camera,
                      std::string("the camera as ") + internal::kCameraText + " in pixels");
   command

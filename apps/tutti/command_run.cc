@@ -221,9 +221,9 @@ void SetUpRun(CLI::App& command, int& exit_code) {
   command.add_option(
       "dataset,--dataset", arguments->dataset,
       "the recording: folder of a data set or of images, a video file, a ROS bag, or a camera: camera:0 (the "
-      "first one), camera:1, ...; camera:FILE takes a video file for it; or the address of a stream, "
-      "rtsp://... "
-      "or http://...");
+      "first one), camera:1, ...; camera:LEFT,RIGHT (camera:0,1) with --sensor stereo, or one camera whose "
+      "images have left and right side by side; camera:COLOUR,DEPTH with --sensor rgbd; files stand in for "
+      "cameras (camera:FILE); or the address of a stream, rtsp://... or http://...");
   command.add_option("--config", arguments->config,
                      "YAML file (" + internal::ExampleConfigs() +
                          " has one for each public data set). Without it, layout, sensor and calibration "

@@ -122,9 +122,8 @@ void CheckStereo(const std::vector<InputFrame>& frames, const CalibrationCheckOp
     report.findings.push_back(
         {Text("only %.0f %% of %d matches between left and right lie in the same row (median %.1f px apart)",
               100 * report.same_row, report.stereo_matches, report.row_error_px),
-         "the pairs are not rectified, or by another calibration: rectify them, or use the EuRoC layout with "
-         "the "
-         "sensor.yaml of each camera"});
+         "the pairs are not rectified, or by another calibration: rectify them, or give the right camera "
+         "(camera.right, or the sensor.yaml of each in the EuRoC layout)"});
   } else if (report.swapped > 0.6 && behind >= options.min_matches / 2) {
     report.findings.push_back(
         {Text("%.0f %% of the matches lie farther right in the right image than in the left one",

@@ -21,7 +21,38 @@ EnumWords<Sensor> WordsOf(Sensor /*of*/) {
   return {{"mono", Sensor::kMono}, {"stereo", Sensor::kStereo}, {"rgbd", Sensor::kRgbd}};
 }
 
-std::string DatasetOptions::Validate() const { return OutOfRange(*this); }
+std::optional<Pose> RigidTransform(const TransformRows& rows) {
+  if (std::all_of(rows.begin(), rows.end(), [](double v) { return v == 0; })) return std::nullopt;
+  const Eigen::Matrix4d matrix = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(rows.data());
+  const Eigen::Matrix3d R = matrix.topLeftCorner<3, 3>();
+  const bool rotation = (R * R.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() <= 0.01 &&
+                        R.determinant() > 0;  // false if anything is not finite
+  if (!rotation || matrix.row(3) != Eigen::RowVector4d(0, 0, 0, 1)) {
+    throw InputError(
+        "is not a rigid transform: 4 rows are needed, a rotation with the translation [m] behind it, and "
+        "0, 0, 0, 1");
+  }
+  return Pose::FromMatrix(matrix.topRows<3>());
+}
+
+std::string DatasetOptions::Validate() const {
+  std::string problem = OutOfRange(*this);
+  if (!problem.empty()) return problem;
+  const std::string key = "camera.right.T_right_left ";
+  std::optional<Pose> T;
+  try {
+    T = RigidTransform(T_right_left);
+  } catch (const InputError& e) {
+    return key + e.what();
+  }
+  if (right.has_value() != T.has_value())
+    return right ? key + "is missing: where is the right camera?"
+                 : key + "needs the right camera's fx, fy, cx and cy beside it";
+  if (!right) return "";
+  problem = right->Validate();
+  // It speaks of "camera.fx" or of the "camera: ...".
+  return problem.empty() ? "" : "camera.right" + problem.substr(std::string("camera").size());
+}
 
 DatasetOptions ForAnotherRecording(DatasetOptions options) {
   std::error_code ignored;

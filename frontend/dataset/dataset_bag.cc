@@ -29,7 +29,7 @@ class BagDataset : public Dataset {
 
   std::size_t Size() const override { return frames_.size(); }
   double Stamp(std::size_t i) const override { return frames_.at(i).image->stamp_s; }
-  const CameraRig& Rig() const override { return rig_; }
+  const CameraRig& Rig() const override { return rig_.rig; }
   std::optional<fs::path> GroundTruthFile() const override { return std::nullopt; }
   const std::vector<std::string>& Warnings() const override { return warnings_; }
   Trajectory ReadGroundTruth(const fs::path& file, std::vector<std::string>* warnings) const override {
@@ -43,7 +43,7 @@ class BagDataset : public Dataset {
       InputFrame frame;
       frame.index = Number(i);
       frame.stamp_s = at.image->stamp_s;
-      frame.image = ReadGrey(*at.image, options_.topic);
+      frame.image = ReadGrey(*at.image, options_.topic, rig_.left);
       frame.mask = mask_;
       result.depth_error = AddDepth(at, i, &frame);
       result.frame = std::move(frame);
@@ -63,7 +63,7 @@ class BagDataset : public Dataset {
   // The depth or right image, if there is one; or what is wrong with it.
   std::string AddDepth(const Frame& at, std::size_t i, InputFrame* frame) const {
     try {
-      if (at.right != nullptr) frame->right = ReadGrey(*at.right, options_.right_topic);
+      if (at.right != nullptr) frame->right = ReadGrey(*at.right, options_.right_topic, rig_.right);
       if (at.depth != nullptr) frame->depth_m = ReadDepth(*at.depth);
       return {};
     } catch (const std::exception& e) {
@@ -189,18 +189,8 @@ class BagDataset : public Dataset {
     bits_ = SignificantBits(first.image);
     const double span = Stamp(frames_.size() - 1) - Stamp(0);
     const double rate = span > 0 ? static_cast<double>(frames_.size() - 1) / span : 10.0;
-    rig_ = SingleCameraRig(options_, size_, rate, file_.string(), rectifier_, warnings_);
-    mask_ = SingleCameraMask(options_, size_, rectifier_);
-    rig_.sensor = options_.sensor;
-    rig_.max_depth_m = options_.max_depth_m;
-    if (options_.sensor != Sensor::kStereo) return;
-    if (options_.camera && options_.camera->distortion != Distortion::kNone)
-      throw InputError(file_.string() +
-                       ": stereo pairs of a bag must be rectified (image_rect); set distortion: none");
-    if (!(options_.baseline_m > 0))
-      throw InputError(file_.string() +
-                       ": the distance of the two cameras is not known; set camera.baseline_m [m]");
-    rig_.baseline_m = options_.baseline_m;
+    rig_ = RectifyRig(file_.string(), options_, size_, rate, warnings_);
+    mask_ = MaskOfAll(options_, size_, rig_.left);
   }
 
   MessageImage Decode(const BagMessage& message, const std::string& topic, bool depth) const {
@@ -221,12 +211,13 @@ class BagDataset : public Dataset {
     return read;
   }
 
-  cv::Mat ReadGrey(const BagMessage& message, const std::string& topic) const {
+  cv::Mat ReadGrey(const BagMessage& message, const std::string& topic,
+                   const std::optional<Rectifier>& rectifier) const {
     const cv::Mat image = OfTheSize(message, topic, false).image;
     if (image.depth() != CV_8U && image.depth() != CV_16U)
       throw InputError(topic + ": pixels are neither 8 nor 16 bit");
     const cv::Mat grey = To8Bit(image, bits_);
-    return rectifier_ ? rectifier_->Apply(grey) : grey;
+    return rectifier ? rectifier->Apply(grey) : grey;
   }
 
   cv::Mat ReadDepth(const BagMessage& message) const {
@@ -234,17 +225,16 @@ class BagDataset : public Dataset {
     if (read.image.channels() != 1) throw InputError(options_.depth_topic + ": is no depth image");
     cv::Mat depth =
         DepthInMetres(read.image, read.metres ? 1.0 : options_.depth_units_per_m, options_.max_depth_m);
-    return rectifier_ ? rectifier_->Apply(depth, Sampling::kNearest) : depth;
+    return rig_.left ? rig_.left->Apply(depth, Sampling::kNearest) : depth;
   }
 
   fs::path file_;
   DatasetOptions options_;
-  CameraRig rig_;
+  RectifiedRig rig_;
   cv::Size size_;
   int bits_ = 8;
   std::vector<std::string> warnings_;
   cv::Mat mask_;  // rectified; empty: none
-  std::optional<Rectifier> rectifier_;
   RosBag bag_;
   Messages images_, right_, depth_;
   std::vector<Frame> frames_;

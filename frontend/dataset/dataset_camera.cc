@@ -1,5 +1,5 @@
-// A live camera, camera:0, or a stream, rtsp://...; or a video file in its stead, camera:FILE: frames come
-// once, in order.
+// Live cameras: camera:0, a pair camera:0,1, a stream rtsp://...; or video files in their stead, camera:FILE.
+// Frames come once, in order.
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -8,10 +8,10 @@
 #include <mutex>
 
 #include "core/stopwatch.h"
+#include "frontend/dataset/camera_input.h"
 #include "frontend/dataset/dataset_folder.h"
 #include "frontend/dataset/video_input.h"
 #include "tutti/core/error.h"
-#include "tutti/core/text.h"
 
 namespace tutti {
 namespace {
@@ -20,16 +20,21 @@ constexpr const char* kPrefix = "camera:";
 
 class CameraDataset : public Dataset {
  public:
-  CameraDataset(const std::string& name, const DatasetOptions& options) : name_(name) {
-    Open(IsStream(name) ? name : name.substr(std::string(kPrefix).size()), options);
-    const double rate = options.rate_hz > 0 ? options.rate_hz : capture_.get(cv::CAP_PROP_FPS);
+  CameraDataset(const std::string& name, const DatasetOptions& options)
+      : name_(name),
+        options_(options),
+        device_(IsCameraDevice(name)),
+        first_(Open(0)),
+        second_(CameraSources(name).size() > 1 ? std::make_optional(Open(1)) : std::nullopt) {
+    const double rate = options.rate_hz > 0 ? options.rate_hz : first_.RateHz();
     rate_hz_ = rate > 0 && rate < 1e4 ? rate : 30.0;
     if (!Grab())
-      throw InputError(name_ + ": delivers no image; is it " +
+      throw InputError(name_ + ": " + (second_ ? first_.Source() + " " : std::string()) +
+                       "delivers no image; is it " +
                        (IsStream(name_) ? "a stream of video?" : "in use by another program?"));
-    rig_ = SingleCameraRig(options, frames_.at(0).image.size(), rate_hz_, name_, rectifier_, warnings_);
-    size_ = frames_.at(0).image.size();
-    mask_ = SingleCameraMask(options, size_, rectifier_);
+    CheckFirst(frames_.at(0));
+    rig_ = RectifyRig(name_, options_, size_, rate_hz_, warnings_);
+    mask_ = MaskOfAll(options_, size_, rig_.left);
   }
 
   Supply FrameSupply() const override { return Supply::kOnce; }
@@ -47,7 +52,7 @@ class CameraDataset : public Dataset {
     }
     return true;
   }
-  const CameraRig& Rig() const override { return rig_; }
+  const CameraRig& Rig() const override { return rig_.rig; }
   std::optional<std::filesystem::path> GroundTruthFile() const override { return std::nullopt; }
   const std::vector<std::string>& Warnings() const override { return warnings_; }
   Trajectory ReadGroundTruth(const std::filesystem::path& file,
@@ -57,86 +62,182 @@ class CameraDataset : public Dataset {
 
   ReadResult Read(std::size_t i) const override {
     ReadResult result;
-    InputFrame frame;
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       const auto found = frames_.find(i);
       if (found == frames_.end()) {
-        result.error =
-            name_ + ": frame " + std::to_string(i) + " is gone; a camera's frames come once, in order";
+        result.error = About(i) + " is gone; a camera's frames come once, in order";
         return result;
       }
-      frame = std::move(found->second);
+      result = std::move(found->second);
       frames_.erase(frames_.begin(), std::next(found));
     }
-    if (frame.image.size() != size_) {
-      result.error = name_ + ": frame " + std::to_string(i) + " has another size than the first";
+    if (result.frame->image.size() != size_) {
+      result.frame.reset();
+      result.error = About(i) + " has another size than the first";
       return result;
     }
-    if (rectifier_) frame.image = rectifier_->Apply(frame.image);
-    frame.mask = mask_;
-    result.frame = std::move(frame);
+    Rectify(result);
+    result.frame->mask = mask_;
     return result;
   }
 
  private:
-  void Open(const std::string& source, const DatasetOptions& options) {
-    device_ = IsCameraDevice(name_);
-    if (IsStream(name_)) return OpenVideoStream(source, capture_);
-    if (!device_) return OpenVideoFile(source, capture_);
-    bool opened = false;
-    try {
-      opened = capture_.open(static_cast<int>(*ParseInteger(source)), cv::CAP_V4L2);
-    } catch (const cv::Exception&) {  // no such camera, or OpenCV was built without V4L2
+  bool SideBySide() const { return options_.sensor == Sensor::kStereo && !second_; }
+  bool Depth() const { return options_.sensor == Sensor::kRgbd; }
+  std::string About(std::size_t i) const { return name_ + ": frame " + std::to_string(i); }
+
+  CameraInput Open(std::size_t which) const {
+    const std::vector<std::string> sources = CameraSources(name_);
+    DeviceMode mode;
+    mode.rate_hz = options_.rate_hz;
+    if (options_.camera && options_.camera->width > 0) {
+      const bool both_in_one = options_.sensor == Sensor::kStereo && sources.size() == 1;
+      mode.width = (both_in_one ? 2 : 1) * options_.camera->width;
+      mode.height = options_.camera->height;
     }
-    if (!opened) {
-      throw InputError(name_ + ": there is no such camera (/dev/video" + source +
-                       "), or no permission to use it; is it plugged in, and are you in the group video?");
-    }
-    if (options.camera && options.camera->width > 0) {
-      capture_.set(cv::CAP_PROP_FRAME_WIDTH, options.camera->width);
-      capture_.set(cv::CAP_PROP_FRAME_HEIGHT, options.camera->height);
-    }
-    if (options.rate_hz > 0) capture_.set(cv::CAP_PROP_FPS, options.rate_hz);
+    return {name_, sources[which], which == 1 && Depth() ? CameraContent::kDepth : CameraContent::kGrey,
+            mode};
   }
 
-  // Takes the next image into frames_; false at the end. Of one thread at a time.
+  // Takes the size of all images. What is wrong from the beginning is not only said of each frame.
+  void CheckFirst(const ReadResult& taken) {
+    const InputFrame& frame = *taken.frame;
+    size_ = frame.image.size();
+    if (SideBySide() && frame.right.empty())
+      throw InputError(name_ + ": with sensor stereo, one camera gives both images side by side, but " +
+                       SizeText(size_) + " pixels have an odd width; give two cameras (LEFT,RIGHT)");
+    if (SideBySide() && size_.width < size_.height)
+      warnings_.push_back(name_ + ": taken as two images of " + SizeText(size_) +
+                          " side by side, as sensor is stereo; for one image set it to mono");
+    if (!second_) return;
+    if (!taken.depth_error.empty()) throw InputError(taken.depth_error);
+    const cv::Size second = Depth() ? frame.depth_m.size() : frame.right.size();
+    if (second != size_)
+      throw InputError(name_ + ": " + first_.Source() + " gives images of " + SizeText(size_) + ", " +
+                       second_->Source() + " of " + SizeText(second) +
+                       (Depth() ? "; depth must be registered to colour" : "; both must be equally large"));
+  }
+
+  // Takes the next image, or pair, into frames_; false at the end. Of one thread at a time.
   bool Grab() const {
+    const auto seconds = [&] { return since_begin_.Seconds(); };
+    GrabbedPair grabbed;
+    if (second_ && !second_ended_) {
+      grabbed = GrabTogether(first_, *second_, 1 / rate_hz_, seconds);
+    } else {
+      grabbed = {first_.Grab(), false, seconds()};
+    }
+    ReadResult taken;
     InputFrame frame;
-    bool good = false;
-    try {
-      good = ReadGreyFrame(capture_, frame.image);
-    } catch (const cv::Exception&) {
-      good = false;
+    if (!grabbed.first || !first_.Retrieve(frame.image).empty()) return false;
+    if (second_) taken.depth_error = TakeSecond(grabbed.second, frame);
+    if (SideBySide() && frame.image.cols % 2 == 0) {
+      const int half = frame.image.cols / 2;
+      frame.right = frame.image.colRange(half, 2 * half).clone();
+      frame.image = frame.image.colRange(0, half).clone();
     }
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (!good) return false;
     // A device's stamps are seconds since 1970, by a clock that can't go back.
-    frame.stamp_s =
-        device_ ? begin_s_ + since_begin_.Seconds() : static_cast<double>(stamps_.size()) / rate_hz_;
+    frame.stamp_s = device_ ? begin_s_ + grabbed.first_s : static_cast<double>(stamps_.size()) / rate_hz_;
     if (!stamps_.empty() && frame.stamp_s <= stamps_.back()) frame.stamp_s = stamps_.back() + 1e-6;
     frame.index = static_cast<std::int64_t>(stamps_.size());
-    frames_[stamps_.size()] = std::move(frame);
-    stamps_.push_back(frames_.rbegin()->second.stamp_s);
+    stamps_.push_back(frame.stamp_s);
+    taken.frame = std::move(frame);
+    frames_[stamps_.size() - 1] = std::move(taken);
     return true;
   }
 
+  // The right or depth image of the frame that is next; or why there is none.
+  std::string TakeSecond(bool grabbed, InputFrame& frame) const {
+    const std::size_t i = Size();
+    if (grabbed) return second_->Retrieve(Depth() ? frame.depth_m : frame.right);
+    if (!second_ended_) second_ended_ = i;  // a device that was pulled out is not waited for again
+    const std::string absent = About(i) + " has no " + (Depth() ? "depth" : "right") + " image: ";
+    if (*second_ended_ == 0)
+      return absent + second_->Source() + " delivers none" +
+             (device_ ? "; is it in use by another program?" : "");
+    return absent + second_->Source() + " ended after " + std::to_string(*second_ended_) + " images";
+  }
+
+  void Rectify(ReadResult& result) const {
+    InputFrame& frame = *result.frame;
+    cv::Mat& second = Depth() ? frame.depth_m : frame.right;
+    if (!second.empty() && second.size() != size_) {
+      result.depth_error = About(static_cast<std::size_t>(frame.index)) + ": its " +
+                           (Depth() ? "depth" : "right") + " image has another size than the first";
+      second.release();
+    }
+    if (rig_.left) frame.image = rig_.left->Apply(frame.image);
+    if (!frame.right.empty() && rig_.right) frame.right = rig_.right->Apply(frame.right);
+    if (frame.depth_m.empty()) return;
+    frame.depth_m = DepthInMetres(frame.depth_m, options_.depth_units_per_m, options_.max_depth_m);
+    if (rig_.left) frame.depth_m = rig_.left->Apply(frame.depth_m, Sampling::kNearest);
+  }
+
   std::string name_;
+  DatasetOptions options_;
   bool device_ = false;
-  CameraRig rig_;
-  cv::Size size_;
+  RectifiedRig rig_;
+  cv::Size size_;  // of the left image
   cv::Mat mask_;
   std::vector<std::string> warnings_;
-  std::optional<Rectifier> rectifier_;
   double rate_hz_ = 30;
   const internal::Stopwatch since_begin_;
   const double begin_s_ =
       std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
-  mutable cv::VideoCapture capture_;
+  mutable CameraInput first_;                        // the left, colour, or only one
+  mutable std::optional<CameraInput> second_;        // the right one, or depth
+  mutable std::optional<std::size_t> second_ended_;  // it gave so many images
   mutable std::mutex mutex_;
   mutable std::vector<double> stamps_;                // guarded by mutex_
-  mutable std::map<std::size_t, InputFrame> frames_;  // not read yet; guarded by mutex_
+  mutable std::map<std::size_t, ReadResult> frames_;  // not read yet, as taken; guarded by mutex_
 };
+
+bool IsNumber(const std::string& source) {
+  return !source.empty() && source.size() < 5 &&
+         std::all_of(source.begin(), source.end(), [](unsigned char c) { return std::isdigit(c) != 0; });
+}
+
+bool AreNumbers(const std::vector<std::string>& sources) {
+  return std::all_of(sources.begin(), sources.end(), IsNumber);
+}
+
+// At every comma; "a," has an empty one at its end.
+std::vector<std::string> AtCommas(const std::string& text) {
+  std::vector<std::string> parts(1);
+  for (const char c : text) {
+    if (c == ',')
+      parts.emplace_back();
+    else
+      parts.back() += c;
+  }
+  return parts;
+}
+
+std::string BehindPrefix(const std::string& name) { return name.substr(std::string(kPrefix).size()); }
+
+void CheckSources(const std::string& name, const std::vector<std::string>& sources, Sensor sensor) {
+  const std::string forms =
+      "one camera, two for stereo (camera:LEFT,RIGHT), or two for RGB-D (camera:COLOUR,DEPTH)";
+  if (std::count(sources.begin(), sources.end(), "") > 0)
+    throw InputError(name + ": a camera has no name; give " + forms);
+  if (sources.size() > 2)
+    throw InputError(name + ": names " + std::to_string(sources.size()) + " cameras; give " + forms +
+                     ". A file with a comma in its name can't be one of two: rename it");
+  if (sources.size() == 2 && sensor == Sensor::kMono)
+    throw InputError(name +
+                     ": names two cameras, but sensor is mono; set sensor to stereo (LEFT,RIGHT) or "
+                     "rgbd (COLOUR,DEPTH), or name one");
+  if (sources.size() == 1 && sensor == Sensor::kRgbd)
+    throw InputError(name + ": RGB-D needs two cameras, camera:COLOUR,DEPTH; the second gives 16-bit depth");
+  if (sources.size() != 2) return;
+  if (sources[0] == sources[1]) throw InputError(name + ": names the same camera twice; give " + forms);
+  if (IsNumber(sources[0]) != IsNumber(sources[1]))
+    throw InputError(name +
+                     ": one is a device and one a file, whose images are not of the same time; give "
+                     "two devices or two files");
+}
 
 }  // namespace
 
@@ -150,13 +251,21 @@ bool IsCamera(const std::string& name) { return name.rfind(kPrefix, 0) == 0 || I
 
 bool IsCameraDevice(const std::string& name) {
   if (IsStream(name)) return true;
-  const std::string source = IsCamera(name) ? name.substr(std::string(kPrefix).size()) : std::string();
-  return !source.empty() && source.size() < 5 &&
-         std::all_of(source.begin(), source.end(), [](unsigned char c) { return std::isdigit(c) != 0; });
+  return IsCamera(name) && AreNumbers(AtCommas(BehindPrefix(name)));
+}
+
+std::vector<std::string> CameraSources(const std::string& name) {
+  if (IsStream(name)) return {name};
+  if (!IsCamera(name)) return {};
+  const std::string source = BehindPrefix(name);
+  std::vector<std::string> parts = AtCommas(source);
+  std::error_code ignored;
+  if (!AreNumbers(parts) && std::filesystem::exists(source, ignored)) return {source};
+  return parts;
 }
 
 std::unique_ptr<Dataset> OpenCamera(const std::string& name, const DatasetOptions& options) {
-  if (options.sensor != Sensor::kMono) throw InputError(name + ": a camera is mono; set sensor to mono");
+  CheckSources(name, CameraSources(name), options.sensor);
   return std::make_unique<CameraDataset>(name, options);
 }
 

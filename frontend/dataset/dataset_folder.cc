@@ -114,61 +114,18 @@ void FolderDataset::FindImageSize() {
                    " images can be read");
 }
 
-PinholeCamera FolderDataset::WithSize(PinholeCamera camera, const char* which) const {
-  if (camera.width == 0 && camera.height == 0) {
-    camera.width = size_.width;
-    camera.height = size_.height;
-  }
-  const cv::Size calibrated(camera.width, camera.height);
-  if (calibrated != size_) {
-    throw InputError(contents_.folder.string() + ": the " + which + " camera is calibrated for images of " +
-                     SizeText(calibrated) + ", but the images have " + SizeText(size_) +
-                     "; use the calibration of this data set");
-  }
-  const std::string problem = camera.Validate();
-  if (!problem.empty()) throw InputError(contents_.folder.string() + ": " + which + " " + problem);
-  return camera;
-}
-
 void FolderDataset::SetUpRig() {
-  rig_.sensor = options_.sensor;
-  rig_.rate_hz = contents_.rate_hz;
-  rig_.max_depth_m = options_.max_depth_m;
-  rig_.T_body_camera = contents_.T_body_left;
-  if (!contents_.left) {
-    rig_.calibrated = false;
-    rig_.camera = PinholeCamera();
-    rig_.camera.width = size_.width;
-    rig_.camera.height = size_.height;
-    return;
-  }
-  const PinholeCamera left = WithSize(*contents_.left, "left");
-  if (options_.sensor == Sensor::kStereo && contents_.T_right_left && contents_.right) {
-    const PinholeCamera right = WithSize(*contents_.right, "right");
-    StereoRectification stereo = RectifyStereo(left, right, *contents_.T_right_left);
-    left_ = std::move(stereo.left);
-    right_ = std::move(stereo.right);
-    rig_.baseline_m = stereo.baseline_m;
-    rig_.T_body_camera = contents_.T_body_left * stereo.T_left_rectified;
-  } else {
-    if (options_.sensor == Sensor::kStereo && left.distortion != Distortion::kNone) {
-      throw InputError(
-          contents_.folder.string() +
-          ": stereo pairs of this layout must be rectified, but the camera has distortion; set it to none, "
-          "or use the EuRoC layout with a sensor.yaml for each camera");
-    }
-    left_.emplace(left);
-    if (options_.sensor == Sensor::kStereo) {
-      rig_.baseline_m = contents_.baseline_m;
-      if (!(rig_.baseline_m > 0)) {
-        throw InputError(contents_.folder.string() +
-                         ": the distance of the two cameras is not known; set camera.baseline_m [m], or add "
-                         "calib.txt with P1");
-      }
-    }
-  }
-  rig_.camera = left_->Camera();
-  rig_.readout_s = RectifiedReadout(options_.readout_s, left, rig_.camera);
+  RigCalibration calibration;
+  calibration.left = contents_.left;
+  calibration.right = contents_.right;
+  calibration.T_right_left = contents_.T_right_left;
+  calibration.baseline_m = contents_.baseline_m;
+  calibration.T_body_left = contents_.T_body_left;
+  RectifiedRig made =
+      RectifyRig(contents_.folder.string(), std::move(calibration), options_, size_, contents_.rate_hz);
+  rig_ = made.rig;
+  left_ = std::move(made.left);
+  right_ = std::move(made.right);
 }
 
 void FolderDataset::SetUpMasks() {

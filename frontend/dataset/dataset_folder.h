@@ -12,7 +12,7 @@
 
 #include "frontend/dataset/image_file.h"
 #include "frontend/dataset/image_mask.h"
-#include "frontend/features/rectifier.h"
+#include "frontend/dataset/rectified_rig.h"
 #include "tutti/frontend/dataset.h"
 
 namespace tutti {
@@ -81,7 +81,6 @@ class FolderDataset : public Dataset {
   void FindImageSize();
   void SetUpRig();
   void SetUpMasks();
-  PinholeCamera WithSize(PinholeCamera camera, const char* which) const;
   std::string Rectify(const ImageFile& read, const std::filesystem::path& file, const Rectifier* rectifier,
                       cv::Mat& out) const;
   std::string NoFrame(std::size_t i) const;
@@ -141,7 +140,7 @@ FolderContents FindEuroc(const std::filesystem::path& folder, const DatasetOptio
 FolderContents FindImages(const std::filesystem::path& folder, const DatasetOptions& options);
 /// A folder that grows: `find` lists it as it is now. Waits options.follow_s for the first image.
 std::unique_ptr<Dataset> FollowFolder(std::function<FolderContents()> find, const DatasetOptions& options);
-/// camera:0, or camera:FILE with a video file.
+/// camera:0, a pair camera:0,1, the files that stand in for them, or a stream.
 std::unique_ptr<Dataset> OpenCamera(const std::string& name, const DatasetOptions& options);
 /// A ROS 1 bag.
 std::unique_ptr<Dataset> OpenBag(const std::filesystem::path& file, const DatasetOptions& options);

@@ -86,13 +86,13 @@ class VideoDataset : public Dataset {
     if (first.empty())
       throw InputError(file_.string() + ": no frame can be decoded; is it a complete video file?");
     size_ = first.size();
-    rig_ = SingleCameraRig(options, size_, rate_hz_, file_.string(), rectifier_, warnings_);
-    mask_ = SingleCameraMask(options, size_, rectifier_);
+    rig_ = RectifyRig(file_.string(), options, size_, rate_hz_, warnings_);
+    mask_ = MaskOfAll(options, size_, rig_.left);
   }
 
   std::size_t Size() const override { return frames_; }
   double Stamp(std::size_t i) const override { return static_cast<double>(i) / rate_hz_; }
-  const CameraRig& Rig() const override { return rig_; }
+  const CameraRig& Rig() const override { return rig_.rig; }
   std::optional<std::filesystem::path> GroundTruthFile() const override { return std::nullopt; }
   const std::vector<std::string>& Warnings() const override { return warnings_; }
 
@@ -136,15 +136,14 @@ class VideoDataset : public Dataset {
     if (image.empty()) return file_.string() + ": frame " + std::to_string(i) + " can't be decoded";
     if (image.size() != size_)
       return file_.string() + ": frame " + std::to_string(i) + " has another size than the first";
-    out = rectifier_ ? rectifier_->Apply(image) : image;
+    out = rig_.left ? rig_.left->Apply(image) : image;
     return {};
   }
 
   std::filesystem::path file_;
   VideoFrames grey_, colour_;
-  CameraRig rig_;
+  RectifiedRig rig_;
   std::vector<std::string> warnings_;
-  std::optional<Rectifier> rectifier_;
   double rate_hz_ = 30;
   std::size_t frames_ = 0;
   cv::Size size_;
@@ -155,7 +154,10 @@ class VideoDataset : public Dataset {
 
 std::unique_ptr<Dataset> OpenVideo(const std::filesystem::path& file, const DatasetOptions& options) {
   if (options.sensor != Sensor::kMono)
-    throw InputError(file.string() + ": a video is mono; set sensor to mono");
+    throw InputError(
+        file.string() +
+        ": a video is mono; set sensor to mono (camera:FILE takes a side-by-side video as stereo, "
+        "camera:LEFT,RIGHT two)");
   std::error_code code;
   if (std::filesystem::file_size(file, code) == 0 || code)
     throw InputError(file.string() + ": is empty or can't be read");

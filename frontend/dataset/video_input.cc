@@ -42,8 +42,12 @@ void OpenVideoStream(const std::string& address, cv::VideoCapture& capture) {
 }
 
 bool ReadGreyFrame(cv::VideoCapture& capture, cv::Mat& grey) {
+  return capture.grab() && RetrieveGreyFrame(capture, grey);
+}
+
+bool RetrieveGreyFrame(cv::VideoCapture& capture, cv::Mat& grey) {
   cv::Mat image;
-  if (!capture.read(image) || image.empty()) return false;
+  if (!capture.retrieve(image) || image.empty()) return false;
   if (image.channels() == 1) {
     grey = image.clone();
   } else {
@@ -63,39 +67,7 @@ bool ReadColourFrame(cv::VideoCapture& capture, cv::Mat& colour) {
   return true;
 }
 
-CameraRig SingleCameraRig(const DatasetOptions& options, cv::Size size, double rate_hz,
-                          const std::string& name, std::optional<Rectifier>& rectifier,
-                          std::vector<std::string>& warnings) {
-  CameraRig rig;
-  rig.rate_hz = rate_hz;
-  rig.calibrated = options.camera.has_value();
-  if (!options.camera) {
-    rig.camera.width = size.width;
-    rig.camera.height = size.height;
-    warnings.push_back(name +
-                       ": no calibration is given (camera: fx, fy, cx, cy); appearance only, no odometry");
-    return rig;
-  }
-  PinholeCamera camera = *options.camera;
-  if (camera.width == 0 && camera.height == 0) {
-    camera.width = size.width;
-    camera.height = size.height;
-  }
-  if (cv::Size(camera.width, camera.height) != size) {
-    throw InputError(name + ": the camera is calibrated for images of " + std::to_string(camera.width) + "x" +
-                     std::to_string(camera.height) + ", but these have " + std::to_string(size.width) + "x" +
-                     std::to_string(size.height) + "; use the calibration of this camera");
-  }
-  const std::string problem = camera.Validate();
-  if (!problem.empty()) throw InputError(name + ": " + problem);
-  rectifier.emplace(camera);
-  rig.camera = rectifier->Camera();
-  rig.readout_s = RectifiedReadout(options.readout_s, camera, rig.camera);
-  return rig;
-}
-
-cv::Mat SingleCameraMask(const DatasetOptions& options, cv::Size size,
-                         const std::optional<Rectifier>& rectifier) {
+cv::Mat MaskOfAll(const DatasetOptions& options, cv::Size size, const std::optional<Rectifier>& rectifier) {
   if (options.mask.empty()) return {};
   const cv::Mat mask = ImageMasks(options.mask).OfAll(size);
   return rectifier ? rectifier->Apply(mask, Sampling::kNearest) : mask;

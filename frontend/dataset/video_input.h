@@ -1,4 +1,4 @@
-// What video files and live cameras share: opening, grey frames, the rig of one camera.
+// What video files and live cameras share: opening, grey frames, the mask of all images.
 #pragma once
 
 #include <opencv2/videoio.hpp>
@@ -19,17 +19,12 @@ void OpenVideoStream(const std::string& address, cv::VideoCapture& capture);
 
 /// The next frame in grey (8 bit); false at the end, and where it can't be decoded.
 bool ReadGreyFrame(cv::VideoCapture& capture, cv::Mat& grey);
+/// The same of the frame that was grabbed last.
+bool RetrieveGreyFrame(cv::VideoCapture& capture, cv::Mat& grey);
 /// The same in colour, 3 channels, blue first.
 bool ReadColourFrame(cv::VideoCapture& capture, cv::Mat& colour);
 
-/// Rig and rectifier of one camera whose images have this size; without calibration a warning, and no
-/// rectifier. `name` is what messages call the source. Throws InputError if the calibration does not fit.
-CameraRig SingleCameraRig(const DatasetOptions& options, cv::Size size, double rate_hz,
-                          const std::string& name, std::optional<Rectifier>& rectifier,
-                          std::vector<std::string>& warnings);
-
 /// options.mask, which must be one for all images, rectified; empty if there is none. Throws InputError.
-cv::Mat SingleCameraMask(const DatasetOptions& options, cv::Size size,
-                         const std::optional<Rectifier>& rectifier);
+cv::Mat MaskOfAll(const DatasetOptions& options, cv::Size size, const std::optional<Rectifier>& rectifier);
 
 }  // namespace tutti

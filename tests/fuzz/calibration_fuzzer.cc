@@ -23,7 +23,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const auto file = tutti::fuzz::MemoryFile(data + 1, size - 1);
   try {
     if (data[0] % 2 == 0) {
-      const tutti::Calibration read = tutti::ReadCalibration(file);
+      const tutti::Calibration read = tutti::ReadCalibration(file, true);
       CheckCamera(read.camera);
       if (!std::isfinite(read.baseline_m) || !std::isfinite(read.rate_hz) ||
           !std::isfinite(read.depth_units_per_m))

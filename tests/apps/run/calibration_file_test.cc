@@ -15,15 +15,15 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 
-Calibration Read(const std::string& text) {
+Calibration Read(const std::string& text, bool pairs = false) {
   const fs::path file = testing::FreshFolder() / "camera.yaml";
   std::ofstream(file) << text;
-  return ReadCalibration(file);
+  return ReadCalibration(file, pairs);
 }
 
-std::string RefusalOfFile(const std::string& text) {
+std::string RefusalOfFile(const std::string& text, bool pairs = false) {
   try {
-    Read(text);
+    Read(text, pairs);
   } catch (const InputError& error) {
     return error.what();
   }
@@ -140,6 +140,70 @@ TEST(CalibrationFile, OfTuttiIsItsCameraSection) {
       "0.1\n");
   EXPECT_EQ(c.format, "tutti");
   EXPECT_EQ(c.baseline_m, 0.1);
+}
+
+// A camchain of two cameras, cam1 with this transform from cam0.
+std::string Camchain(const std::string& T_cn_cnm1) {
+  return "cam0: {camera_model: pinhole, intrinsics: [400, 401, 320, 240], resolution: [640, 480]}\n"
+         "cam1:\n  T_cn_cnm1: " +
+         T_cn_cnm1 +
+         "\n  camera_model: pinhole\n  distortion_model: radtan\n  distortion_coeffs: [0.1, 0.2, 0, 0]\n"
+         "  intrinsics: [410, 411, 321, 241]\n  resolution: [640, 480]\n";
+}
+
+TEST(CalibrationFile, OfKalibrGivesTheRightCameraOfPairs) {
+  const std::string file = Camchain("[[1, 0, 0, -0.11], [0, 1, 0, 0], [0, 0, 1, 0.02], [0, 0, 0, 1]]");
+  const Calibration c = Read(file, true);
+  EXPECT_EQ(c.camera.fx, 400);
+  ASSERT_TRUE(c.right);
+  EXPECT_EQ(c.right->fx, 410);
+  EXPECT_EQ(c.right->distortion, Distortion::kRadTan);
+  EXPECT_EQ(c.T_right_left, (TransformRows{1, 0, 0, -0.11, 0, 1, 0, 0, 0, 0, 1, 0.02, 0, 0, 0, 1}));
+  EXPECT_FALSE(Read(file).right) << "one camera is wanted";
+}
+
+TEST(CalibrationFile, OfOrbSlam3GivesTheRightCameraOfPairs) {
+  const Calibration c = Read(R"(%YAML:1.0
+Camera.type: "PinHole"
+Camera1.fx: 458.6
+Camera1.fy: 457.2
+Camera1.cx: 367.2
+Camera1.cy: 248.3
+Camera2.fx: 457.5
+Camera2.fy: 456.1
+Camera2.cx: 379.9
+Camera2.cy: 255.2
+Camera2.k1: -0.28
+Camera.width: 752
+Camera.height: 480
+Stereo.b: 0.11
+Stereo.T_c1_c2: !!opencv-matrix
+  rows: 4
+  cols: 4
+  dt: f
+  data: [1, 0, 0, 0.11,
+         0, 1, 0, 0,
+         0, 0, 1, -0.02,
+         0, 0, 0, 1]
+)",
+                             true);
+  ASSERT_TRUE(c.right);
+  EXPECT_EQ(c.right->cx, 379.9);
+  EXPECT_EQ(c.right->width, 752);
+  EXPECT_EQ(c.right->coefficients[0], -0.28);
+  EXPECT_EQ(c.baseline_m, 0) << "the transform has it";
+  EXPECT_NEAR(c.T_right_left[3], -0.11, 1e-12);  // the inverse: of points of the left camera
+  EXPECT_NEAR(c.T_right_left[11], 0.02, 1e-12);
+}
+
+TEST(CalibrationFile, OfPairsThatCantBeUsedIsRefused) {
+  EXPECT_THAT(RefusalOfFile(Camchain("[[1, 0], [0, 1], [0, 0], [0, 0]]"), true),
+              HasSubstr("'T_cn_cnm1' has 8 values; 16 are needed"));
+  EXPECT_THAT(RefusalOfFile(Camchain("[2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]"), true),
+              HasSubstr("'T_cn_cnm1' is not a rigid transform"));
+  EXPECT_THAT(RefusalOfFile(Camchain("[0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]"), true),
+              HasSubstr("'T_cn_cnm1' is zeros"));
+  EXPECT_THAT(RefusalOfFile(Camchain("5"), true), HasSubstr("'T_cn_cnm1' is no list of numbers"));
 }
 
 TEST(CalibrationFile, ThatCantBeUsedIsRefusedWithLineAndReason) {

@@ -6,6 +6,7 @@
 
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/videoio.hpp>
 
 #include "tests/apps/tiny_town.h"
 #include "tests/support/test_data.h"
@@ -16,6 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 void WriteImages(const fs::path& folder, int count = 3, cv::Size size = {64, 48}) {
   fs::create_directories(folder);
@@ -154,6 +156,26 @@ TEST(Recording, OfAStreamIsNotLookedForAmongFiles) {
   CameraRequest camera;
   camera.camera = "70,71,30,20";
   EXPECT_THAT(Refusal("rtsp://127.0.0.1:1/front", camera), HasSubstr("no stream of video can be opened"));
+}
+
+TEST(Recording, OfOneCameraWithSensorStereoHasBothImagesSideBySide) {
+  const fs::path file = testing::FreshFolder() / "both.avi";
+  cv::VideoWriter writer(file.string(), cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 25, cv::Size(128, 48));
+  if (!writer.isOpened()) GTEST_SKIP() << "this OpenCV can't write a video";
+  writer.write(cv::Mat(48, 128, CV_8UC3, cv::Scalar::all(80)));
+  writer.release();
+  CameraRequest camera;
+  camera.view_deg = 90;
+  camera.sensor = Sensor::kStereo;
+  const Recording found = Recognise("camera:" + file.string(), camera);
+  EXPECT_EQ(found.config.dataset.camera->width, 64) << "of one of the two images";
+  EXPECT_NEAR(found.config.dataset.camera->fx, 32, 1e-9);
+  EXPECT_THAT(found.findings[0], HasSubstr("a camera, left and right side by side"));
+  EXPECT_THAT(found.findings[1], Not(HasSubstr("--sensor mono")));
+}
+
+TEST(Recording, OfTwoCamerasNeedsToBeToldWhatTheyAre) {
+  EXPECT_THAT(Refusal("camera:0,1", {}), HasSubstr("what are the two cameras?"));
 }
 
 TEST(Recording, RefusesACameraThatCantBe) {

@@ -50,6 +50,7 @@ template <class Visitor>
 void ForEach(RunConfig& config, const Visitor& visit) {
   ForEach(config.dataset, visit);
   ForEach(*config.dataset.camera, visit);
+  ForEach(*config.dataset.right, visit);
   ForEach(config.odometry, visit);
   ForEach(config.loops, visit);
   ForEach(config.graph, visit);
@@ -74,6 +75,9 @@ void ChangeField(const OptionText& text, std::vector<std::string>& field) {
   if (text.in_files) field = {"sift", "orb"};
 }
 void ChangeField(const OptionText& /*text*/, CombinationRule& field) { field = CombinationRule::kMajority; }
+void ChangeField(const OptionText& /*text*/, TransformRows& field) {
+  field = {1, 0, 0, -0.5, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+}
 template <std::size_t N>
 void ChangeField(const OptionText& /*text*/, std::array<double, N>& field) {
   for (std::size_t i = 0; i < N; ++i) field[i] += 0.125 * static_cast<double>(i + 1);
@@ -84,18 +88,23 @@ void ChangeField(const OptionText& /*text*/, Enum& field) {
   field = words.back().second == field ? words.front().second : words.back().second;
 }
 
+// The defaults, and cameras whose keys are shown, too.
+RunConfig PlainConfig() {
+  RunConfig config;
+  config.dataset.camera = config.dataset.right = PinholeCamera();
+  return config;
+}
+
 // Differs from the defaults in every key.
 RunConfig ChangedConfig() {
-  RunConfig config;
-  config.dataset.camera = PinholeCamera();
+  RunConfig config = PlainConfig();
   ForEach(config, [](const OptionText& text, auto& field) { ChangeField(text, field); });
   return config;
 }
 
 TEST(ConfigKeys, EveryKeyIsReadAsItIsShown) {
-  RunConfig plain;
-  plain.dataset.camera = PinholeCamera();
-  const RunConfig changed = ChangedConfig(), read = ParseConfig(FileOf(changed), "my.yaml");
+  const RunConfig plain = PlainConfig(), changed = ChangedConfig(),
+                  read = ParseConfig(FileOf(changed), "my.yaml");
   const auto defaults = DescribeConfig(plain), wanted = DescribeConfig(changed), got = DescribeConfig(read);
   ASSERT_EQ(got.size(), defaults.size());
   for (std::size_t k = 0; k < wanted.size(); ++k) {
@@ -168,15 +177,15 @@ TEST(ConfigKeys, NoNumberOfACallerMayBeNan) {
 }
 
 TEST(ConfigKeys, HelpShowsEveryBasicKeyOnce) {
-  RunConfig config;
-  config.dataset.camera = PinholeCamera();
+  const RunConfig config = PlainConfig();
   const std::string help = HelpConfig(false);
   std::vector<std::string> lines = SplitText(help, "\n");
   int basic = 0;
   for (const ConfigEntry& entry : DescribeConfig(config)) {
-    const std::string begin = "  " + entry.name + ": " + entry.value + " ", end = "# " + entry.doc;
+    const std::string indent(entry.section.find('.') == std::string::npos ? 2 : 4, ' ');
+    const std::string begin = indent + entry.name + ": " + entry.value + " ", end = "# " + entry.doc;
     const auto shown = std::count_if(lines.begin(), lines.end(), [&](const std::string& line) {
-      return line.find(begin) != std::string::npos && line.find(end) != std::string::npos;
+      return line.rfind(begin, 0) == 0 && line.find(end) != std::string::npos;
     });
     EXPECT_EQ(shown, entry.advanced ? 0 : 1) << entry.section << "." << entry.name;
     basic += entry.advanced ? 0 : 1;

@@ -128,6 +128,29 @@ TEST(Config, ACameraThatCanNotBeIsNamedOnce) {
               HasSubstr("my.yaml:1: camera: the principal point"));
 }
 
+TEST(Config, TheRightCameraStandsWithinTheLeftOne) {
+  const std::string lens = "width: 640, height: 480, fx: 500, fy: 500, cx: 320, cy: 240";
+  const auto file = [&](const std::string& transform) {
+    return "camera:\n  width: 640\n  height: 480\n  fx: 510\n  fy: 510\n  cx: 320\n  cy: 240\n  right: {" +
+           lens + ", T_right_left: " + transform + "}\n";
+  };
+  const TransformRows wanted{1, 0, 0, -0.1, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+  for (const char* transform : {"[1, 0, 0, -0.1, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]",
+                                "[[1, 0, 0, -0.1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]"}) {
+    const RunConfig config = ParseConfig(file(transform), "my.yaml");
+    ASSERT_TRUE(config.dataset.right);
+    EXPECT_EQ(config.dataset.right->fx, 500);
+    EXPECT_EQ(config.dataset.camera->fx, 510);
+    EXPECT_EQ(config.dataset.T_right_left, wanted);
+  }
+  EXPECT_FALSE(ParseConfig("camera: {" + lens + "}\n", "my.yaml").dataset.right);
+  EXPECT_THAT(Message(file("[1, 2, 3]")), HasSubstr("needs 16 numbers, or 4 lists of 4"));
+  EXPECT_THAT(Message(file("[[1, 0], [0, 1]]")), HasSubstr("needs 16 numbers, or 4 lists of 4"));
+  EXPECT_THAT(Message(file("[2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]")),
+              HasSubstr("my.yaml:8: dataset: camera.right.T_right_left is not a rigid transform"));
+  EXPECT_THAT(Message("camera: {right: {" + lens + "}}\n"), HasSubstr("T_right_left is missing"));
+}
+
 TEST(Config, OneDocumentAlone) {
   for (const char* text : {"---\nrun:\n  threads: 1\n", "# a\n---\nrun:\n  threads: 1\n...\n",
                            "%YAML 1.2\n---\nrun:\n  threads: 1\n# end\n", "run: {threads: 1}\n...\n# end\n",

@@ -94,6 +94,31 @@ TEST(BagDataset, TopicsThatAreMissingAreListed) {
   EXPECT_THAT(OpenError(Bag(), Topic("/grey/image", Sensor::kStereo)), HasSubstr("right_topic"));
 }
 
+TEST(BagDataset, StereoPairsAreTakenAsTheyAreOrRectifiedWithTheRightCamera) {
+  testing::BagWriter bag(testing::BagPacking::kLz4);
+  for (int i = 0; i < 2; ++i) {
+    bag.Write("/left", "sensor_msgs/Image", ImageMessage(Picture(64, 48, i), "mono8", 100 + i));
+    bag.Write("/right", "sensor_msgs/Image", ImageMessage(Picture(64, 48, 50 + i), "mono8", 100 + i));
+  }
+  const fs::path file = FreshFolder() / "pairs.bag";
+  testing::WriteText(file, bag.Finish());
+  DatasetOptions options = Topic("/left", Sensor::kStereo);
+  options.right_topic = "/right";
+  options.camera = testing::SmallCamera();
+  EXPECT_THAT(OpenError(file, options), HasSubstr("camera.baseline_m"));
+  options.baseline_m = 0.5;
+  EXPECT_EQ(cv::norm(OpenDataset(file, options)->Read(1).frame->right, Picture(64, 48, 51), cv::NORM_INF), 0);
+  options.baseline_m = 0;
+  options.camera->distortion = Distortion::kRadTan;
+  options.camera->coefficients = {-0.1, 0, 0, 0, 0};
+  EXPECT_THAT(OpenError(file, options), HasSubstr("camera.right"));
+  options.right = options.camera;
+  options.T_right_left = {1, 0, 0, -0.2, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+  const auto raw = OpenDataset(file, options);
+  EXPECT_NEAR(raw->Rig().baseline_m, 0.2, 1e-9);
+  EXPECT_GT(cv::norm(raw->Read(1).frame->right, Picture(64, 48, 51), cv::NORM_INF), 0);
+}
+
 TEST(BagDataset, OneThatWasCutOffGivesTheFramesBefore) {
   const fs::path file = FreshFolder() / "cut.bag";
   fs::copy_file(Bag(), file);

@@ -102,7 +102,8 @@ TEST(Stream, IsToldByItsAddressAndNoFile) {
 TEST(Stream, ThatIsNotThereIsNamed) {
   EXPECT_THAT(OpenError("http://127.0.0.1:1/nobody", With(Sensor::kMono, true)),
               AllOf(HasSubstr("http://127.0.0.1:1/nobody"), HasSubstr("no stream of video")));
-  EXPECT_THAT(OpenError("rtsp://127.0.0.1:1/nobody", With(Sensor::kStereo, true)), HasSubstr("is mono"));
+  EXPECT_THAT(OpenError("rtsp://127.0.0.1:1/nobody", With(Sensor::kRgbd, true)),
+              HasSubstr("needs two cameras"));
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // Where frames come from: KITTI, TUM, EuRoC, a folder of images, a video.
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -9,6 +10,7 @@
 #include <vector>
 
 #include "tutti/core/options.h"
+#include "tutti/core/pose.h"
 #include "tutti/core/trajectory.h"
 #include "tutti/frontend/frame.h"
 
@@ -34,6 +36,9 @@ enum class DatasetType { kAuto, kKitti, kTum, kEuroc, kImages, kVideo, kBag };
 /// The words of the YAML files.
 EnumWords<DatasetType> WordsOf(DatasetType);
 
+/// A rigid transform as calibrations give it: 4x4 matrix, row by row, translation in metres. Zeros are none.
+using TransformRows = std::array<double, 16>;
+
 /// How to read a data set: sections `dataset:` and `camera:` of the YAML files.
 struct DatasetOptions {
   TUTTI_OPTION(DatasetType, type, DatasetType::kAuto,
@@ -52,7 +57,7 @@ struct DatasetOptions {
   TUTTI_OPTION(std::string, topic, "",
                "ROS bag: images of the left (or only, or colour) camera; empty: the bag's only one", Basic());
   TUTTI_OPTION(std::string, right_topic, "",
-               "ROS bag, stereo: images of the right camera, rectified like the left", Basic());
+               "ROS bag, stereo: images of the right camera, rectified, or raw with camera.right", Basic());
   TUTTI_OPTION(std::string, depth_topic, "",
                "ROS bag, RGB-D: depth images, 16UC1 (depth_units_per_m; ROS itself: 1000) or 32FC1 (metres)",
                Basic());
@@ -83,10 +88,22 @@ struct DatasetOptions {
                "mirrored when read");
   TUTTI_OPTION(std::optional<PinholeCamera>, camera, std::nullopt,
                "as calibrated, with its distortion; absent: from sensor.yaml (EuRoC), calib.txt (KITTI)",
-               Section("camera"));
-  TUTTI_OPTION(double, baseline_m, 0,
-               "stereo: distance of the cameras, where sensor.yaml or calib.txt does not say it", Basic(),
-               Section("camera"), Unit("m"), From(0));
+               Basic(), Section("camera"));
+  TUTTI_OPTION(
+      std::optional<PinholeCamera>, right, std::nullopt,
+      "stereo, raw pairs: the right camera as calibrated, with its distortion; absent: the pairs are "
+      "rectified, or sensor.yaml (EuRoC) says it",
+      Section("camera.right"));
+  TUTTI_OPTION(
+      TransformRows, T_right_left, {},
+      "stereo, raw pairs: 4x4 matrix, row by row, that takes a point from the left camera's frame to "
+      "the right one's (Kalibr: T_cn_cnm1 of cam1; OpenCV: R and T), translation in metres",
+      Section("camera.right"));
+  TUTTI_OPTION(
+      double, baseline_m, 0,
+      "stereo, rectified pairs: distance of the cameras, where sensor.yaml or calib.txt does not say "
+      "it",
+      Basic(), Section("camera"), Unit("m"), From(0));
   TUTTI_OPTION(double, readout_s, 0,
                "rolling shutter: the last row is read so long after the first; 0: all rows at once", Basic(),
                Section("camera"), Unit("s"), From(0), To(0.1));
@@ -95,6 +112,9 @@ struct DatasetOptions {
   /// Empty if usable, else what is wrong.
   std::string Validate() const;
 };
+
+/// The transform, or nothing where it is zeros. Throws InputError if it is not rigid.
+std::optional<Pose> RigidTransform(const TransformRows& rows);
 
 /// The options of a recording, for another one of the same camera: all frames, and no masks of single images.
 DatasetOptions ForAnotherRecording(DatasetOptions options);
@@ -150,18 +170,22 @@ std::optional<std::size_t> FindStamp(const Dataset& dataset, double stamp_s);
 /// holds no data set.
 DatasetType DetectDatasetType(const std::filesystem::path& path);
 
-/// True for what gives its frames once, in order, and is no file to look at before: "camera:0",
-/// "camera:FILE", and addresses of streams (IsStream).
+/// True for what gives its frames once, in order, and is no file to look at before: "camera:0", a pair
+/// "camera:0,1", files in their stead ("camera:FILE"), and addresses of streams (IsStream).
 bool IsCamera(const std::string& name);
-/// True for those that keep their own time: "camera:0" and streams.
+/// True for those that keep their own time: "camera:0", "camera:0,1" and streams.
 bool IsCameraDevice(const std::string& name);
+/// What is behind "camera:", split at commas: {"0", "1"} of "camera:0,1", {FILE} of "camera:FILE", also where
+/// the name of an existing file has a comma. Of a stream its address; of another name nothing.
+std::vector<std::string> CameraSources(const std::string& name);
 /// True for addresses: "rtsp://...", "rtsps://...", "http://...", "https://...".
 bool IsStream(const std::string& name);
 
-/// Opens a data set: a folder, a video file, a camera (camera:0), a video file that stands in for one
-/// (camera:FILE), or a stream (rtsp://..., http://...). Throws InputError if there is nothing usable: missing
-/// or empty folder, no calibration where one is needed, unsorted time stamps, ... The message says what was
-/// expected where.
+/// Opens a data set: a folder, a video file, a camera (camera:0), two (camera:LEFT,RIGHT for stereo,
+/// camera:COLOUR,DEPTH for RGB-D), files that stand in for them, or a stream (rtsp://..., http://...). One
+/// camera or stream with sensor stereo gives both images side by side, left and right. Throws InputError if
+/// there is nothing usable: missing or empty folder, no calibration where one is needed, unsorted time
+/// stamps, ... The message says what was expected where.
 std::unique_ptr<Dataset> OpenDataset(const std::filesystem::path& path, const DatasetOptions& options);
 
 }  // namespace tutti

@@ -1,0 +1,39 @@
+// From the calibration of a data set to what rectifies its images: one way for folders, videos, bags and
+// cameras.
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "frontend/features/rectifier.h"
+#include "tutti/frontend/dataset.h"
+
+namespace tutti {
+
+/// What is known of the cameras before rectification.
+struct RigCalibration {
+  std::optional<PinholeCamera> left, right;  ///< as calibrated; width and height 0: the images'
+  std::optional<Pose> T_right_left;          ///< with `right`: pairs need rectification
+  double baseline_m = 0;                     ///< of pairs that are rectified already
+  Pose T_body_left;                          ///< left camera as calibrated -> body
+};
+
+/// The rig after rectification, and what makes its images; nothing: they pass as they are.
+struct RectifiedRig {
+  CameraRig rig;
+  std::optional<Rectifier> left, right;
+};
+
+/// The rig of images of this size. options.right goes before calibration.right. Without a left camera the rig
+/// is not calibrated. `name` is what messages call the data set. Throws InputError if the calibration is that
+/// of another size, or can't be used, and for pairs that it does not suffice for.
+RectifiedRig RectifyRig(const std::string& name, RigCalibration calibration, const DatasetOptions& options,
+                        cv::Size size, double rate_hz);
+
+/// The same with what `options` say alone; adds to `warnings` that there is no calibration.
+RectifiedRig RectifyRig(const std::string& name, const DatasetOptions& options, cv::Size size, double rate_hz,
+                        std::vector<std::string>& warnings);
+
+}  // namespace tutti

@@ -15,6 +15,7 @@ constexpr int kEnoughKeyframes = 6;         // of which a map says something
 constexpr std::ptrdiff_t kMostRefused = 2;  // verified loops that did not enter the map
 constexpr double kSigmas = 2;               // that a focal length may be off
 constexpr std::size_t kNeighbours = 7;      // steps on either side of one
+constexpr double kStill = 0.002;            // of the scene's depth: images move by about a pixel
 
 bool HasMap(const RunResult& r) {
   return !r.given_odometry && !r.Void() && r.map_figures.keyframes >= kEnoughKeyframes;
@@ -39,13 +40,24 @@ Value FewInliers(const RunResult& r) {
   return Share(static_cast<double>(few), static_cast<double>(r.frame_inliers.size()));
 }
 
+// Of the keyframes' landmarks; 0: not known.
+double SceneDepth(const RunResult& r) {
+  std::vector<double> depths;
+  for (const auto& [frame, depth] : r.map_figures.depth) depths.push_back(depth);
+  return depths.empty() ? 0 : internal::Median(std::move(depths));
+}
+
+// A camera that stands still moves by what its poses are off: that is no speed to compare with.
 Value SpeedJump(const RunResult& r) {
   if (r.given_odometry) return std::nullopt;
-  std::vector<double> speeds;
+  const double still = kStill * SceneDepth(r);
+  std::vector<double> speeds, times;
   for (std::size_t i = 1; i < r.trajectory.size(); ++i) {
     const double time = r.trajectory[i].stamp_s - r.trajectory[i - 1].stamp_s;
     const double way = (r.trajectory[i].pose.translation - r.trajectory[i - 1].pose.translation).norm();
-    if (time > 0) speeds.push_back(way / time);
+    if (!(time > 0)) continue;
+    speeds.push_back(way / time);
+    times.push_back(time);
   }
   if (speeds.size() < kNeighbours) return std::nullopt;
   const double usual = internal::Median(speeds);
@@ -57,7 +69,7 @@ Value SpeedJump(const RunResult& r) {
     const double around =
         internal::Median(std::vector<double>(speeds.begin() + static_cast<std::ptrdiff_t>(begin),
                                              speeds.begin() + static_cast<std::ptrdiff_t>(end)));
-    jump = std::max(jump, speeds[i] / std::max(around, 0.5 * usual));
+    jump = std::max(jump, speeds[i] / std::max({around, 0.5 * usual, still / times[i]}));
   }
   return jump;
 }

@@ -83,6 +83,17 @@ TEST(RunSigns, AStepThatIsLongerThanThoseAroundItIsAJump) {
   EXPECT_NEAR(*Sign(result, "speed_jump"), 7, 1e-6);
 }
 
+TEST(RunSigns, ACameraThatStandsStillDoesNotJump) {
+  RunResult result = StraightAhead();
+  for (std::size_t i = 0; i < 100; ++i)
+    result.trajectory[i].pose.translation = {0, i % 2 == 0 ? 0 : 1e-4, i % 9 == 0 ? 3e-4 : 0};
+  EXPECT_GT(*Sign(result, "speed_jump"), 2.5);  // nobody knows how far away what it sees is
+  result.map_figures.depth = {{0, 2.0}, {50, 3.0}, {99, 3.0}};
+  EXPECT_EQ(*Sign(result, "speed_jump"), 1);
+  result.trajectory[60].pose.translation.x() = 0.1;
+  EXPECT_GT(*Sign(result, "speed_jump"), 10);
+}
+
 TEST(RunSigns, FramesThatAreMissingAreNoJump) {
   RunResult result = StraightAhead();
   result.trajectory.erase(result.trajectory.begin() + 40, result.trajectory.begin() + 50);

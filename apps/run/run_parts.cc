@@ -128,16 +128,14 @@ void CollectEarlierSessions(const RunState& state, RunResult& result) {
   }
 }
 
-void CollectStamps(const Odometry& odometry, const std::vector<MapSession>& sessions, RunResult& result) {
+void CollectStamps(const RunState& state, RunResult& result) {
+  const std::vector<MapSession>& sessions = result.map.value().sessions;
   const std::string own = fs::absolute(result.dataset).lexically_normal().string();
   std::map<std::int64_t, double> stamps;  // of keyframes, by frame
-  for (const int id : odometry.KeyframeIds()) {
-    const std::int64_t frame = odometry.KeyframeFrameIndex(id);
-    const auto later = [](std::int64_t f, const MapSession& s) { return f < s.frame_offset; };
-    const auto session = std::upper_bound(sessions.begin(), sessions.end() - 1, frame, later);
-    if (frame < sessions.back().frame_offset && session != sessions.begin() &&
-        DatasetOfNote((session - 1)->note) == own)
-      stamps[frame] = odometry.KeyframeStamp(id);
+  for (const int id : state.odometry->KeyframeIds()) {
+    const std::int64_t frame = state.odometry->KeyframeFrameIndex(id);
+    if (frame < state.FirstFrame() && DatasetOfNote(sessions[state.SessionOf(frame)].note) == own)
+      stamps[frame] = state.odometry->KeyframeStamp(id);
   }
   for (LoopRecord& loop : result.loops) {
     const auto stamp = stamps.find(loop.candidate);

@@ -45,6 +45,6 @@ void CollectEarlierSessions(const RunState& state, RunResult& result);
 
 /// Of loops to earlier sessions of the same data set (MapSession::note, as NoteOf has written it): the time
 /// stamp of the candidate, which has a frame in it.
-void CollectStamps(const Odometry& odometry, const std::vector<MapSession>& sessions, RunResult& result);
+void CollectStamps(const RunState& state, RunResult& result);
 
 }  // namespace tutti

@@ -115,7 +115,7 @@ void SlamRun::Collect() {
   if (request_.map) {
     result_.map = MapGoneOn{request_.map->string(), slam_->Sessions(), {}, {}};
     CollectEarlierSessions(State(), result_);
-    CollectStamps(*slam_->odometry(), result_.map->sessions, result_);
+    CollectStamps(State(), result_);
     NoteJoining(result_.map->sessions.back());
   }
   result_.global_adjustments = slam_->GlobalAdjustments();

@@ -126,6 +126,7 @@ Json FiguresJson(const RunResult& r) {
                {"lost", r.frames_lost},
                {"bad", r.bad.size()},
                {"without_depth", r.frames_without_depth},
+               {"by_grey_values", r.frames_by_grey_values},
                {"keyframes", r.keyframes},
                {"proposed", r.loops.size()},
                {"accepted", r.LoopsAccepted()},

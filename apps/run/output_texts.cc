@@ -98,7 +98,8 @@ Json FramesJson(const RunResult& r) {
                  {"dropped", r.frames_dropped},
                  {"in_dataset", r.frames_listed},
                  {"without_mask", r.frames_without_mask},
-                 {"without_depth", r.frames_without_depth}};
+                 {"without_depth", r.frames_without_depth},
+                 {"by_grey_values", r.frames_by_grey_values}};
   for (const auto& [name, list] : {std::pair("bad_frames", &r.bad), {"bad_depth", &r.bad_depth}}) {
     frames[name] = Json::array();
     for (const BadFrame& bad : *list) frames[name].push_back({{"index", bad.index}, {"error", bad.error}});
@@ -344,6 +345,7 @@ std::string ResultTable(const RunResult& r) {
   if (r.frames_without_mask > 0) out << ", " << r.frames_without_mask << " without mask";
   if (r.frames_without_depth > 0)
     out << ", " << r.frames_without_depth << " without " << DepthSource(r.rig.sensor) << " image";
+  if (r.frames_by_grey_values > 0) out << ", " << r.frames_by_grey_values << " by grey values alone";
   if (r.realtime) out << ", " << r.frames_dropped << " dropped";
   out << "; keyframes " << r.keyframes << "; loops " << r.LoopsAccepted() << " accepted of " << r.loops.size()
       << " proposed";

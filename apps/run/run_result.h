@@ -135,9 +135,10 @@ struct RunResult {
       true;  ///< false: it ends at the first correction (interrupted, or run.odometry_pass: false)
   MapFigures map_figures;          ///< zeros without poses
   LensCheck lens_check;            ///< not measured where another odometry is followed
-  std::vector<int> frame_inliers;  ///< of each frame with a pose, when it came: TrackResult::inliers
-  bool given_odometry = false;     ///< another odometry was followed
-  FollowedUncertainty followed;    ///< how uncertain it counts as
+  std::vector<int> frame_inliers;  ///< of each frame posed by landmarks, when it came: TrackResult::inliers
+  std::size_t frames_by_grey_values = 0;  ///< posed without landmarks: TrackResult::by_grey_values
+  bool given_odometry = false;            ///< another odometry was followed
+  FollowedUncertainty followed;           ///< how uncertain it counts as
   PoseGraph graph;
   std::optional<KeyframeGraphProof> graph_proof;  ///< with graph.certify, if loops moved the map
   std::optional<RunEvaluation> evaluation;

@@ -274,7 +274,11 @@ void SlamRun::TrackOne(const InputFrame& frame) {
   so_far_.state = slam_->AppearanceOnly() ? "appearance only" : ToString(track.state);
   if (slam_->AppearanceOnly() || track.state == TrackingState::kTracking) {
     so_far_.lost_open = false;
-    if (!slam_->AppearanceOnly()) result_.frame_inliers.push_back(track.inliers);
+    if (track.by_grey_values) {
+      ++result_.frames_by_grey_values;
+    } else if (!slam_->AppearanceOnly()) {
+      result_.frame_inliers.push_back(track.inliers);
+    }
     return;
   }
   ++result_.frames_lost;

@@ -61,6 +61,7 @@ class RollingShutter {
 
   /// False: a global shutter.
   bool Rolls() const { return readout_s_ > 0; }
+  const PinholeCamera& camera() const { return camera_; }
   /// When a row is read, counted from the middle row [s].
   double TimeOf(double row) const { return readout_s_ * (row / (camera_.height - 1) - 0.5); }
 

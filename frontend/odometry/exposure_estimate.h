@@ -16,6 +16,8 @@ class ExposureEstimate {
   void Add(const Misfits& misfits);
   /// False: no frame has said anything.
   bool IsKnown() const { return known_; }
+  /// True if nothing was said, or blur explains much of what was, but not enough yet: the next frame decides.
+  bool IsOpen() const;
   /// [s]; 0 until it is known.
   double Seconds() const;
 
@@ -25,6 +27,8 @@ class ExposureEstimate {
   }
 
  private:
+  std::size_t Likeliest() const;
+
   Misfits sum_{};  // of older frames less: light changes, and the exposure with it
   bool known_ = false;
 };

@@ -19,6 +19,7 @@ namespace {
 
 constexpr int kRamp = 40, kShortestRamp = 10;  // keyframes that a drift of the scale is spread over
 constexpr double kKnown = 0.3;                 // share of landmarks by which a place is one seen before
+constexpr int kStartRounds = 2;                // of finding how a rolling shutter's first frame moved
 
 }  // namespace
 
@@ -28,6 +29,7 @@ Odometry::Impl::Impl(const OdometryOptions& options, const CameraRig& rig)
       mapper_(options, rig),
       initializer_(options, rig),
       tracker_(options, rig),
+      rolling_start_(rig),
       relocalizer_(options, rig),
       follower_(options, rig),
       localizer_(options, rig) {}
@@ -87,6 +89,28 @@ TrackResult Odometry::Impl::Track(const InputFrame& input) {
 
 Tracker::Tracked Odometry::Impl::Look(const TrackedFrame& frame) {
   const ScopedStopwatch watch(&stages_, Lane::kTracking, "track");
+  return rolling_start_.Is(last()) ? LookFromStart(frame) : tracker_.Track(frame, map());
+}
+
+// Of the second frame of a piece, which tells how the camera moved in the first.
+Tracker::Tracked Odometry::Impl::LookFromStart(const TrackedFrame& frame) {
+  EnterMapping();
+  const Tracker start = tracker_;
+  const int first = last().reference;
+  const std::shared_ptr<const FrameFeatures> seen = last().frame.features;
+  Tracker::Tracked tracked = tracker_.Track(frame, map());
+  Vector6d motion = Vector6d::Zero();
+  for (int round = 0; round < kStartRounds && tracked.fix; ++round) {
+    const std::optional<Vector6d> found = RollingStart::MotionOf(start.last(), *tracked.fix, motion);
+    if (!found) break;
+    motion = *found;
+    tracker_ = start;
+    tracker_.Straighten(rolling_start_.Straighten(*seen, motion, first, mapper_.MutableMap()), motion);
+    tracked = tracker_.Track(frame, map());
+  }
+  if (tracked.fix || motion.isZero()) return tracked;
+  tracker_ = start;
+  rolling_start_.Straighten(*seen, Vector6d::Zero(), first, mapper_.MutableMap());
   return tracker_.Track(frame, map());
 }
 
@@ -248,6 +272,7 @@ TrackResult Odometry::Impl::Accept(const Tracker::Tracked& tracked) {
   TrackResult result;
   result.state = TrackingState::kTracking;
   result.inliers = tracked.fix->inliers;
+  result.by_grey_values = tracked.fix->by_grey;
   localizer_.Found(*tracked.fix, map());
   if (BecomesKeyframe(tracked)) result.keyframe = InsertKeyframe();
   const LastFrame& last = tracker_.last();

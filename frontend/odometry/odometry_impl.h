@@ -14,6 +14,7 @@
 #include "frontend/odometry/map_initializer.h"
 #include "frontend/odometry/pose_follower.h"
 #include "frontend/odometry/relocalizer.h"
+#include "frontend/odometry/rolling_start.h"
 #include "frontend/odometry/stage_times.h"
 #include "frontend/odometry/tracker.h"
 #include "tutti/frontend/odometry.h"
@@ -76,6 +77,7 @@ class Odometry::Impl {
  private:
   TrackedFrame Prepare(const InputFrame& input, int features);
   Tracker::Tracked Look(const TrackedFrame& frame);
+  Tracker::Tracked LookFromStart(const TrackedFrame& frame);
   TrackResult Initialize(const TrackedFrame& frame);
   TrackResult FollowFirst(const TrackedFrame& frame, const Pose& T_odom_camera);
   TrackResult TrackMap(const TrackedFrame& frame, const Tracker::Tracked& tracked);
@@ -93,6 +95,7 @@ class Odometry::Impl {
   AsyncMapper mapper_;
   MapInitializer initializer_;
   Tracker tracker_;
+  RollingStart rolling_start_;
   Relocalizer relocalizer_;
   PoseFollower follower_;
   Localizer localizer_;

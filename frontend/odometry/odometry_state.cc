@@ -19,7 +19,7 @@ namespace tutti {
 template <class Archive>
 void State(Archive& archive, TrackResult& result) {
   archive(result.state, result.reason, result.T_world_camera, result.features, result.inliers,
-          result.keyframe);
+          result.by_grey_values, result.keyframe);
 }
 
 namespace {

@@ -183,7 +183,7 @@ PoseFix RollingSearch::FixByGrey(const TrackedFrame& frame, const LastFrame& las
 std::optional<ExposureEstimate::Misfits> RollingSearch::MisfitsOf(const Map& map, const TrackedFrame& frame,
                                                                   const LastFrame& last,
                                                                   const Expected& expected) const {
-  const bool ask = !last.exposure.IsKnown() || frame.index % kAskAgain == 0;
+  const bool ask = last.exposure.IsOpen() || frame.index % kAskAgain == 0;
   if (!ask || !(expected.speed_rad_s * kLongExposure > kBlurred)) return std::nullopt;
   const std::optional<CameraMotion> aligned = Aligned(map, frame, last, expected);
   if (!aligned) return std::nullopt;

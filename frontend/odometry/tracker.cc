@@ -91,6 +91,12 @@ void Tracker::Begin(const TrackedFrame& frame, const Keyframe& keyframe) {
   BecomeKeyframe(keyframe);
 }
 
+void Tracker::Straighten(std::shared_ptr<const FrameFeatures> features, const Vector6d& motion) {
+  last_.frame.features = std::move(features);
+  last_.matches.features = last_.frame.features.get();
+  last_.velocity = motion;
+}
+
 void Tracker::BecomeKeyframe(const Keyframe& keyframe) {
   last_.matches.landmarks = keyframe.landmarks;
   last_.reference = last_.newest_keyframe = keyframe.id;

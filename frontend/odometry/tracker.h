@@ -37,6 +37,8 @@ class Tracker {
 
   /// The frame is the keyframe that a piece of the map starts with.
   void Begin(const TrackedFrame& frame, const Keyframe& keyframe);
+  /// The last frame's features as its motion shows them (RollingStart), which it goes on with.
+  void Straighten(std::shared_ptr<const FrameFeatures> features, const Vector6d& motion);
   /// The last frame has become the newest keyframe.
   void BecomeKeyframe(const Keyframe& keyframe);
   /// The map is given up: kInitializing until Begin. The last frame stays, to start the next piece from, and

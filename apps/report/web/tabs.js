@@ -17,7 +17,8 @@ function cardsOf(run) {
     cards.push(card('path', lengthText(f.path_m)));
   }
   const noDepth = f.without_depth ? `, ${f.without_depth} without depth` : '';
-  cards.push(card('frames with a pose', `${f.tracked} / ${f.frames}`, `${f.keyframes} keyframes${noDepth}`));
+  const blurred = f.by_grey_values ? `, ${f.by_grey_values} by grey values alone` : '';
+  cards.push(card('frames with a pose', `${f.tracked} / ${f.frames}`, `${f.keyframes} keyframes${noDepth}${blurred}`));
   const judged = 'true' in f ? `${f.true} true, ${f.false} false` : '';
   cards.push(card('loops accepted', `${f.accepted} of ${f.proposed}`, judged));
   cards.push(card('time', `${fixed(f.wall_s, 1)} s`, `${fixed(f.frame_ms, 1)} ms per frame, p99 ${fixed(f.frame_p99_ms, 1)} ms`));

@@ -34,6 +34,23 @@ TEST(ExposureEstimate, IsNoneWhereBlurExplainsNothing) {
   EXPECT_EQ(estimate.Seconds(), 0);
 }
 
+TEST(ExposureEstimate, IsOpenAsLongAsBlurExplainsMuchButNotEnough) {
+  const auto said = [](double blur, double exposure_s) {
+    ExposureEstimate estimate;
+    estimate.Add(ExposedFor(exposure_s, blur));
+    return estimate;
+  };
+  EXPECT_TRUE(ExposureEstimate().IsOpen());
+  EXPECT_TRUE(said(800, 0.03).IsOpen()) << "the least difference is 0.58 of that without blur";
+  EXPECT_FALSE(said(100, 0.03).IsOpen()) << "0.92: these images are sharp";
+  EXPECT_FALSE(said(4000, 0.03).IsOpen()) << "0.22: these are blurred";
+  EXPECT_FALSE(said(8000, 0.01).IsOpen()) << "0.56, but sharp images look like this, too";
+  ExposureEstimate estimate = said(800, 0.03);
+  estimate.Add(ExposedFor(0.03));
+  EXPECT_FALSE(estimate.IsOpen());
+  EXPECT_NEAR(estimate.Seconds(), 0.03, 1e-6);
+}
+
 TEST(ExposureEstimate, FollowsTheLight) {
   ExposureEstimate estimate;
   for (int frame = 0; frame < 20; ++frame) estimate.Add(ExposedFor(0.03));

@@ -46,6 +46,7 @@ struct TrackResult {
   Pose T_world_camera;            ///< valid if state == kTracking
   int features = 0;               ///< in the image
   int inliers = 0;                ///< landmarks that agree with the pose
+  bool by_grey_values = false;    ///< no landmarks: in a blurred image, the grey values of the one before
   int keyframe = -1;              ///< id of the keyframe that this frame became, or -1; see TakeMapped
   std::optional<StepCheck> step;  ///< Follow, of a keyframe, if the images say enough
 };

@@ -133,8 +133,8 @@ Json FiguresJson(const RunResult& r) {
                {"corrections", r.corrections},
                {"wall_s", Rounded(r.wall_s, 2)},
                {"cpu_s", Rounded(r.cpu_s, 2)},
-               {"frame_ms", Rounded(Quantile(r.frame_ms, 0.5), 2)},
-               {"frame_p99_ms", Rounded(Quantile(r.frame_ms, 0.99), 2)},
+               {"latency_ms", Rounded(Quantile(r.latency_ms, 0.5), 2)},
+               {"latency_p99_ms", Rounded(Quantile(r.latency_ms, 0.99), 2)},
                {"memory_mb", Rounded(r.peak_memory_mb, 1)}};
   if (r.lens) {
     json["lens"] = {{"k1", r.lens->k1},

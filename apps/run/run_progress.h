@@ -53,8 +53,8 @@ void State(Archive& archive, FoundFrame& found) {
 template <class Archive>
 void StateOfGrowing(Archive& archive, RunResult& result) {
   archive(result.frames_lost, result.frames_without_mask, result.frames_without_depth, result.bad,
-          result.bad_depth, result.lost, result.found, result.frame_ms, result.frame_inliers,
-          result.frames_by_grey_values);
+          result.bad_depth, result.lost, result.found, result.frame_ms, result.latency_ms,
+          result.frame_inliers, result.frames_by_grey_values);
 }
 
 }  // namespace tutti

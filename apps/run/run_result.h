@@ -147,7 +147,9 @@ struct RunResult {
   double wall_s = 0;                ///< of the run, without the evaluation
   double cpu_s = 0;                 ///< processor time of all threads, without that of the odometry alone
   double odometry_alone_cpu_s = 0;  ///< processor time of the odometry that loops did not reach
-  std::vector<double> frame_ms;     ///< of each frame, from having the image to having the pose
+  std::vector<double> frame_ms;     ///< of each frame, from having its features to having its pose
+  std::vector<double>
+      latency_ms;  ///< the same from having the image: without reading, and waiting in a queue
   std::map<std::string, double> stage_ms;  ///< summed over the run
   std::vector<StageTiming> stages;         ///< with RunRequest::timing or trace only
   double peak_memory_mb = 0;

@@ -246,6 +246,7 @@ void SlamRun::TakeFrame(const FetchedFrame& fetched, Progress& progress) {
     CountDepth(fetched.read, progress);
     if (!config_.dataset.mask.empty() && fetched.read.frame->mask.empty()) ++result_.frames_without_mask;
     TrackOne(*fetched.read.frame);
+    result_.latency_ms.push_back(fetched.prepare_ms + result_.frame_ms.back());
     if (alone_ && TracksAlong()) alone_->Track(*fetched.read.frame);
     return;
   }

@@ -21,7 +21,7 @@ function cardsOf(run) {
   cards.push(card('frames with a pose', `${f.tracked} / ${f.frames}`, `${f.keyframes} keyframes${noDepth}${blurred}`));
   const judged = 'true' in f ? `${f.true} true, ${f.false} false` : '';
   cards.push(card('loops accepted', `${f.accepted} of ${f.proposed}`, judged));
-  cards.push(card('time', `${fixed(f.wall_s, 1)} s`, `${fixed(f.frame_ms, 1)} ms per frame, p99 ${fixed(f.frame_p99_ms, 1)} ms`));
+  cards.push(card('time', `${fixed(f.wall_s, 1)} s`, `a pose ${fixed(f.latency_ms, 1)} ms after its image, p99 ${fixed(f.latency_p99_ms, 1)} ms`));
   cards.push(card('memory', `${fixed(f.memory_mb, 0)} MB`, `processor ${fixed(f.cpu_s, 1)} s`));
   if (f.lens) {
     const known = (name) => `${name} ${fixed(f.lens[name], 4)} ± ${fixed(f.lens[`${name}_sigma`], 4)}`;

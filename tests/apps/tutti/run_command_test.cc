@@ -50,6 +50,9 @@ TEST(RunCommand, WritesEverythingThatScriptsRelyOn) {
   EXPECT_GT(s["timing"]["wall_s"].get<double>(), 0);
   EXPECT_GT(s["timing"]["frame_ms"]["median"].get<double>(), 0);
   EXPECT_GE(s["timing"]["frame_ms"]["p99"].get<double>(), s["timing"]["frame_ms"]["median"].get<double>());
+  EXPECT_GT(s["timing"]["latency_ms"]["median"].get<double>(),
+            s["timing"]["frame_ms"]["median"].get<double>())
+      << "features take time";
   EXPECT_GT(s["timing"]["stage_ms"].size(), 3u);
   EXPECT_GT(s["memory"]["peak_mb"].get<double>(), 10);
   EXPECT_EQ(s["evaluation"]["alignment"], "se3");

@@ -23,6 +23,8 @@ namespace fs = std::filesystem;
 constexpr double kPixelSigma = 1.0;     // of a keypoint [px]
 constexpr double kDepthSigma = 0.02;    // of a depth, as share of it
 constexpr double kLensSigma = 0.05;     // prior of k1
+constexpr double kLensKept = 0.005;     // the same where the lens is taken to be as it was calibrated
+constexpr double kNeedsLens = 4;        // gain of another lens [squares of sigma] below which none is needed
 constexpr double kCentreSigma = 0.01;   // prior of the principal point, as share of the width
 constexpr double kCorrelation = 3.0;    // errors of neighbouring keypoints are not independent
 constexpr double kWorstSigma = 0.05;    // of a focal length that is worth more than a guess
@@ -45,6 +47,7 @@ struct Scene {
   std::vector<Observation> observations;
   std::array<double, 4> lens = {{0, 0, 0, 0}};  // log of the focal length [px], k1, move of the centre [px]
   double width = 0;
+  double lens_sigma = kLensSigma;
   bool stereo = false;  // depths are disparities, which another focal length would make others
   double given = 0;     // log of the focal length that depths are of
 };
@@ -81,10 +84,10 @@ struct DepthError {
 };
 
 struct LensPrior {
-  double width;
+  double width, sigma;
   template <class T>
   bool operator()(const T* lens, T* error) const {
-    error[0] = lens[1] / T(kLensSigma);
+    error[0] = lens[1] / T(sigma);
     for (int i = 1; i < 3; ++i) error[i] = lens[1 + i] / T(kCentreSigma * width);
     return true;
   }
@@ -111,8 +114,9 @@ Fit Adjust(Scene& scene, bool fixed_focal) {
                                new ceres::CauchyLoss(2.0), camera, landmark, scene.lens.data());
     }
   }
-  problem.AddResidualBlock(new ceres::AutoDiffCostFunction<LensPrior, 3, 4>(new LensPrior{scene.width}),
-                           nullptr, scene.lens.data());
+  problem.AddResidualBlock(
+      new ceres::AutoDiffCostFunction<LensPrior, 3, 4>(new LensPrior{scene.width, scene.lens_sigma}), nullptr,
+      scene.lens.data());
   // The first that has seen one of the landmarks: the others are not in the problem.
   const auto first = static_cast<std::size_t>(scene.observations.front().keyframe);
   problem.SetParameterBlockConstant(scene.cameras[first].data());
@@ -231,6 +235,12 @@ Pass Track(const Dataset& dataset, const RunConfig& config, const PinholeCamera&
   return pass;
 }
 
+// Of a residual, which would be 1 if sigmas were as they are said to be.
+double VarianceOf(const Scene& scene, const Fit& fit) {
+  const auto free = static_cast<double>(6 * scene.cameras.size() + 3 * scene.landmarks.size());
+  return std::max(1e-4, 2 * fit.cost / std::max(1.0, fit.residuals - free));
+}
+
 // How far the focal length can be from the best one, as share of it.
 double SigmaOf(const Scene& best, const Fit& fit) {
   constexpr double kStep = 0.03;
@@ -243,9 +253,7 @@ double SigmaOf(const Scene& best, const Fit& fit) {
     rise += 0.5 * (other.cost - fit.cost);
   }
   if (!(rise > 0)) return 1;
-  const auto free = static_cast<double>(6 * best.cameras.size() + 3 * best.landmarks.size());
-  const double variance = 2 * fit.cost / std::max(1.0, fit.residuals - free);
-  return kCorrelation * kStep * std::sqrt(std::max(variance, 1e-4) / (2 * rise));
+  return kCorrelation * kStep * std::sqrt(VarianceOf(best, fit) / (2 * rise));
 }
 
 PinholeCamera CameraOf(const PinholeCamera& before, const std::array<double, 4>& lens) {
@@ -311,8 +319,17 @@ LensCheck CheckLens(const Odometry& odometry, const FrameRange& session) {
       WhereItTurns(odometry, KeyframesOfLargestSubmap(odometry, session), kCheckedKeyframes);
   std::optional<Scene> scene = SceneOf(odometry, keyframes, kCheckedLandmarks);
   if (!scene) return check;
-  const Fit fit = Adjust(*scene, false);
+  // A wrong focal length and a wrong lens look nearly the same, and seldom are both wrong.
+  Scene kept = *scene;
+  kept.lens_sigma = kLensKept;
+  const Fit by_focal = Adjust(kept, false);
+  Fit fit = Adjust(*scene, false);
   if (!fit.usable) return check;
+  const double gain = 2 * (by_focal.cost - fit.cost) / VarianceOf(*scene, fit);
+  if (by_focal.usable && gain < kNeedsLens * kCorrelation * kCorrelation) {
+    scene = std::move(kept);
+    fit = by_focal;
+  }
   check.sigma = SigmaOf(*scene, fit);
   check.measured = check.sigma <= kWorstChecked;
   check.focal_ratio = std::exp(scene->lens[0] - scene->given);

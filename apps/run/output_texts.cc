@@ -257,6 +257,11 @@ std::string SummaryJson(const RunResult& r) {
     json["given_odometry"] = {{"stated", sigmas(r.followed.stated_fraction, r.followed.stated_rotation_rad)},
                               {"seen", sigmas(r.followed.seen_fraction, r.followed.seen_rotation_rad)}};
   }
+  if (!r.given_odometry && !r.appearance_only)
+    json["lens_check"] = {{"measured", r.lens_check.measured},
+                          {"focal_ratio", r.lens_check.focal_ratio},
+                          {"sigma", r.lens_check.sigma},
+                          {"k1", r.lens_check.k1}};
   if (r.lens) json["lens"] = LensJson(*r.lens);
   if (r.height)
     json["height"] = {{"height", r.height->height},

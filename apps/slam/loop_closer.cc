@@ -14,6 +14,7 @@ namespace {
 
 constexpr double kNoWeight = 0.01;  // of the robust loss: the map contradicts the loop
 constexpr int kLeastCommon = 30;    // landmarks that tie the two ends of a loop
+constexpr int kSurelySeen = 100;    // inliers of a loop within the local map that may contradict it
 
 KeyframeGraphOptions GraphOptions(const RunConfig& config, Sensor sensor) {
   KeyframeGraphOptions options;
@@ -129,12 +130,14 @@ LoopUpdate LoopCloser::Consider(const LoopRecord& proposed, const Verification& 
   records_.push_back(proposed);
   LoopRecord& record = records_.back();
   if (!record.verified) return {};
-  if (OfOneSession(record.query, record.candidate) &&
-      record.query_stamp_s - record.candidate_stamp_s < options_.loop_min_age_s) {
+  const LoopConstraint constraint = Measure(verification, candidate, query, odometry);
+  const bool recent = OfOneSession(record.query, record.candidate) &&
+                      record.query_stamp_s - record.candidate_stamp_s < options_.loop_min_age_s;
+  if (recent && !(constraint.usable && verification.inliers >= kSurelySeen &&
+                  !gate_.Fulfilled(constraint.edge, Places(odometry)))) {
     record.reason = "too recent: still in the local map";
     return {};
   }
-  const LoopConstraint constraint = Measure(verification, candidate, query, odometry);
   if (!constraint.usable) {
     record.reason = constraint.reason;
     return {};

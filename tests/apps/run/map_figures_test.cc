@@ -9,23 +9,29 @@
 #include "tests/support/recording.h"
 #include "tests/support/rendered_world.h"
 #include "tests/support/small_room.h"
+#include "tests/support/small_town.h"
 
 namespace tutti {
 namespace {
 
-// A walk around a room, seen by one camera whose focal length is taken to be so many times what it is.
+// With a camera whose focal length is taken to be so many times what it is.
+Odometry Tracked(const testing::Recording& recording, double focal_share) {
+  CameraRig rig = recording.rig;
+  rig.camera.fx *= focal_share;
+  rig.camera.fy *= focal_share;
+  Odometry odometry(OdometryOptions(), rig);
+  for (const InputFrame& frame : recording.frames) odometry.Track(frame);
+  odometry.FinishMapping();
+  return odometry;
+}
+
+// A walk around a room.
 Odometry Tracked(double focal_share) {
   SyntheticOptions options = testing::SmallRgbdRoom(320, 240);
   options.rate_hz = 8;
   options.frames = 60;
   static const testing::Recording room = testing::Record(testing::RenderedWorld(options), 60);
-  CameraRig rig = room.rig;
-  rig.camera.fx *= focal_share;
-  rig.camera.fy *= focal_share;
-  Odometry odometry(OdometryOptions(), rig);
-  for (const InputFrame& frame : room.frames) odometry.Track(frame);
-  odometry.FinishMapping();
-  return odometry;
+  return Tracked(room, focal_share);
 }
 
 TEST(MapFigures, OfTheRightCameraFit) {
@@ -56,6 +62,23 @@ TEST(LensCheck, FindsTheRightCameraRightAndAWrongOneWrong) {
   const LensCheck wrong = CheckLens(Tracked(1.25));
   EXPECT_LT(wrong.focal_ratio, 0.92);
   EXPECT_EQ(CheckLens(Tracked(1.25)).focal_ratio, wrong.focal_ratio);
+}
+
+// Another lens explains a part of it as well, and would make the focal length uncertain.
+TEST(LensCheck, OfStereoInTurnsTellsTheFocalLengthWithoutAnotherLens) {
+  const testing::Recording lap =
+      testing::Record(testing::RenderedWorld(testing::SmallStereoTownWithALoop(320, 160)), 45);
+  for (const double share : {1.0, 1.25}) {
+    const LensCheck check = CheckLens(Tracked(lap, share));
+    ASSERT_TRUE(check.measured) << share;
+    const double off = std::abs(std::log(check.focal_ratio));
+    EXPECT_LT(std::abs(check.k1), 0.01) << share;
+    if (share == 1.0) {
+      EXPECT_LT(off, 2 * check.sigma);
+    } else {
+      EXPECT_GT(off, 2 * check.sigma + 0.02) << check.focal_ratio << " +- " << check.sigma;
+    }
+  }
 }
 
 }  // namespace

@@ -107,6 +107,26 @@ TEST_F(LoopCloserTest, ALoopWithinTheLocalMapIsNone) {
   EXPECT_FALSE(closer.records()[0].pending);
 }
 
+// What a slip of the odometry has torn, in a blurred turn for example.
+TEST_F(LoopCloserTest, ALoopWithinTheLocalMapMendsItWhereItIsTorn) {
+  const auto said = [&](LoopCloser* closer, int query, double off, int inliers) {
+    Verification verification;
+    verification.type = ConstraintType::kRigid;
+    verification.S_candidate_query = InMap(kFirst, query, off);
+    verification.information = 1e4 * Matrix6d::Identity();
+    verification.inliers = inliers;
+    closer->Consider(Proposed(kFirst, query), verification, kFirst, query, odometry_, frames_);
+    return closer->records().back();
+  };
+  LoopCloser sure = Closer();
+  EXPECT_TRUE(said(&sure, kFirst + 1, 0.5, 200).pending) << "it waits for a second one, as all do";
+  said(&sure, kFirst + 2, 0.5, 200);
+  EXPECT_TRUE(Solve(&sure).correction);
+  LoopCloser weak = Closer(), whole = Closer();
+  EXPECT_THAT(said(&weak, kFirst + 1, 0.5, 60).reason, HasSubstr("too recent")) << "few landmarks may err";
+  EXPECT_THAT(said(&whole, kFirst + 1, 0, 200).reason, HasSubstr("too recent")) << "nothing is torn";
+}
+
 TEST_F(LoopCloserTest, ALoopAloneWaitsAndSaysSoInTheEnd) {
   LoopCloser closer = Closer();
   Consider(&closer, kFirst, kLater, 1.0);

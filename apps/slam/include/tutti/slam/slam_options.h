@@ -19,7 +19,9 @@ struct SlamOptions {
   TUTTI_OPTION(int, loop_every_keyframes, 1, "every n-th keyframe is searched", From(1));
   TUTTI_OPTION(double, loop_min_interval_s, 0.25, "and no more often than this", Unit("s"), From(0));
   TUTTI_OPTION(double, loop_min_age_s, 5.0,
-               "a candidate that is not this much older than the query is no loop", Unit("s"), From(0));
+               "a candidate that is not this much older than the query is no loop, but where the images show "
+               "surely that the local map is torn",
+               Unit("s"), From(0));
   TUTTI_OPTION(double, loop_apart_fraction, 0.5,
                "mono: cameras farther apart than this share of the median scene depth see too little in "
                "common to fix a scale",

@@ -5,7 +5,7 @@ usage: ./dev bench health [--draw N] [--runs N] [--write]
 
 A run is a short cut of a generated world or of real data, as it is or damaged: wrong focal length or distortion, blur, darkness,
 a covered lens, missing frames, late depth, right and left exchanged. What is drawn (world, first frame, damage) depends on --draw
-alone. The limits of apps/run/run_signs.cc were set on draws 2 and 5 and such (--draw 5 --signs shows every sign of every run); draw 3
+alone. The limits of apps/run/run_signs.cc were set on draws 2, 3 and 5 (--draw 5 --signs shows every sign of every run); draw 4
 judges them and is what --write writes. About 5 s of processor time a run; --reuse goes on with the runs in --out, or those in
 docs/results/health.json. Without data the real cuts are left out.
 """
@@ -24,7 +24,7 @@ GOOD_PERCENT, FAILED_PERCENT = 1, 5  # ATE, of the path
 POSED = 0.95  # a run that has lost more than that is not good, whatever the rest of its trajectory is like
 FLAGGED_FAILED, FLAGGED_GOOD = 95, 5  # %, at least and at most
 LEAST = 100  # good runs, and failed ones
-JUDGED = 3  # the draw; its rows are known by now: after a change of limits, judge on a higher one
+JUDGED = 4  # the draw; its rows are known by now: after a change of limits, judge on a higher one
 REFUSED = "refused"
 DAMAGED = 0.55  # share of the runs
 TURNS_DEG = 5  # a stereo cut that turns less looks the same with every focal length

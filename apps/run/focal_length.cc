@@ -326,7 +326,8 @@ LensCheck CheckLens(const Odometry& odometry, const FrameRange& session) {
   Fit fit = Adjust(*scene, false);
   if (!fit.usable) return check;
   const double gain = 2 * (by_focal.cost - fit.cost) / VarianceOf(*scene, fit);
-  if (by_focal.usable && gain < kNeedsLens * kCorrelation * kCorrelation) {
+  check.other_lens = !by_focal.usable || gain >= kNeedsLens * kCorrelation * kCorrelation;
+  if (!check.other_lens) {
     scene = std::move(kept);
     fit = by_focal;
   }

@@ -31,10 +31,11 @@ FocalLength MeasureFocalLength(const std::filesystem::path& dataset, const RunCo
 
 /// Whether a map agrees with the camera that it was made with.
 struct LensCheck {
-  bool measured = false;   ///< false: too small a map, or its motion does not tell
-  double focal_ratio = 1;  ///< focal length that fits the map best, over the one that it was made with
-  double sigma = 0;        ///< standard deviation of its logarithm
-  double k1 = 0;           ///< radial distortion that was left over, as of LensFound
+  bool measured = false;    ///< false: too small a map, or its motion does not tell
+  double focal_ratio = 1;   ///< focal length that fits the map best, over the one that it was made with
+  double sigma = 0;         ///< standard deviation of its logarithm
+  double k1 = 0;            ///< radial distortion that was left over, as of LensFound
+  bool other_lens = false;  ///< the map fits clearly better with this k1 than with another focal length alone
 };
 
 /// The bundle adjustment of MeasureFocalLength, once, on the keyframes of these frames where the camera turns

@@ -261,7 +261,8 @@ std::string SummaryJson(const RunResult& r) {
     json["lens_check"] = {{"measured", r.lens_check.measured},
                           {"focal_ratio", r.lens_check.focal_ratio},
                           {"sigma", r.lens_check.sigma},
-                          {"k1", r.lens_check.k1}};
+                          {"k1", r.lens_check.k1},
+                          {"other_lens", r.lens_check.other_lens}};
   if (r.lens) json["lens"] = LensJson(*r.lens);
   if (r.height)
     json["height"] = {{"height", r.height->height},

@@ -13,7 +13,7 @@ using Value = std::optional<double>;
 constexpr int kFewInliers = 30;
 constexpr int kEnoughKeyframes = 6;         // of which a map says something
 constexpr std::ptrdiff_t kMostRefused = 2;  // verified loops that did not enter the map
-constexpr double kSigmas = 2;               // that a focal length may be off
+constexpr double kSigmas = 1.25;            // that a focal length may be off; they are generous
 constexpr std::size_t kNeighbours = 7;      // steps on either side of one
 constexpr double kStill = 0.002;            // of the scene's depth: images move by about a pixel
 
@@ -100,7 +100,7 @@ Value LensOff(const RunResult& r) {
   if (!HasMap(r)) return std::nullopt;
   const double edge = 0.5 * r.rig.camera.width / r.rig.camera.fx;
   const double found = r.lens ? r.lens->k1 + r.lens->k2 * edge * edge : 0.0;
-  const double checked = r.lens_check.measured ? r.lens_check.k1 : 0.0;
+  const double checked = r.lens_check.measured || r.lens_check.other_lens ? r.lens_check.k1 : 0.0;
   return std::max(std::abs(found), std::abs(checked)) * edge * edge;
 }
 
@@ -166,8 +166,8 @@ const std::vector<SignKind>& SignKinds() {
        "check focal length and baseline or depth scale, and that images and depth are of the same time",
        DepthMisfit},
       {"focal_length_off", "share",
-       "how far, at least, the focal length that fits the map best is from the given one (less two standard "
-       "deviations)",
+       "how far, at least, the focal length that fits the map best is from the given one (less 1.25 "
+       "standard deviations)",
        kAbove, 0.02, kNever, "the map fits another focal length better, at least %s away",
        "check fx and fy; without --config and --camera tutti run measures them", FocalLengthOff},
       {"lens_off", "share",

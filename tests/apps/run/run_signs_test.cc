@@ -103,9 +103,9 @@ TEST(RunSigns, FramesThatAreMissingAreNoJump) {
 TEST(RunSigns, AFocalLengthIsOffOnlyBeyondItsUncertainty) {
   RunResult result = StraightAhead();
   EXPECT_FALSE(Sign(result, "focal_length_off"));
-  result.lens_check = {true, 1.2, 0.01, 0};
-  EXPECT_NEAR(*Sign(result, "focal_length_off"), std::log(1.2) - 0.02, 1e-12);
-  result.lens_check.sigma = 0.1;
+  result.lens_check = {true, 1.2, 0.01, 0, false};
+  EXPECT_NEAR(*Sign(result, "focal_length_off"), std::log(1.2) - 0.0125, 1e-12);
+  result.lens_check.sigma = 0.15;
   EXPECT_EQ(*Sign(result, "focal_length_off"), 0);
 }
 
@@ -116,6 +116,10 @@ TEST(RunSigns, TheLensIsJudgedAtTheEdgeOfTheImage) {
   EXPECT_NEAR(*Sign(result, "lens_off"), 0.05, 1e-12);  // the edge is at 45 degrees
   result.rig.camera.fx = 200;
   EXPECT_NEAR(*Sign(result, "lens_off"), 0.05 / 4, 1e-12);
+  result.lens_check = {false, 1, 1, 0.1, false};
+  EXPECT_NEAR(*Sign(result, "lens_off"), 0.05 / 4, 1e-12) << "nothing speaks for it";
+  result.lens_check.other_lens = true;
+  EXPECT_NEAR(*Sign(result, "lens_off"), 0.1 / 4, 1e-12) << "whatever the focal length is";
 }
 
 LoopRecord Recognised(double candidate_s, double query_s, bool accepted) {

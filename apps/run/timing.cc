@@ -10,6 +10,8 @@
 namespace tutti {
 namespace {
 
+using Json = nlohmann::ordered_json;
+
 double Microseconds(Span::Clock::duration duration) {
   return std::chrono::duration<double, std::micro>(duration).count();
 }
@@ -73,7 +75,6 @@ std::string TimingTable(const std::vector<StageTiming>& stages, double wall_s, d
 }
 
 std::string ChromeTrace(const std::vector<Span>& spans, Span::Clock::time_point begin) {
-  using Json = nlohmann::ordered_json;
   Json events = Json::array();
   const auto metadata = [&](const char* what, int thread, const char* name) {
     events.push_back({{"name", what}, {"ph", "M"}, {"pid", 1}, {"tid", thread}, {"args", {{"name", name}}}});

@@ -151,8 +151,8 @@ std::map<int, Similarity> Follow(const KeyframeCorrection& solved, const std::ve
 }
 
 std::int64_t SolutionFrames(std::size_t keyframes) {
-  constexpr std::int64_t kLeast = 5, kKeyframesPerFrame = 100;
-  return kLeast + static_cast<std::int64_t>(keyframes) / kKeyframesPerFrame;
+  constexpr std::int64_t kLeast = 5, kKeyframesOfAFrame = 100;
+  return kLeast + static_cast<std::int64_t>(keyframes) / kKeyframesOfAFrame;
 }
 
 void BackgroundLoopSolver::Start(const KeyframeGraph& graph, const std::vector<LoopEdge>& accepted,

@@ -7,7 +7,7 @@
 namespace tutti::internal {
 namespace {
 
-constexpr int kSide = 2 * IntensityCentroid::kMargin + 1;
+constexpr int kPatchSide = 2 * IntensityCentroid::kMargin + 1;
 constexpr int kMiddle = IntensityCentroid::kMargin;
 
 // A patch of the disc of that radius [px].
@@ -22,10 +22,10 @@ IntensityCentroid Disc(int radius) {
 
 TEST(IntensityCentroid, PointsToWhatIsBright) {
   for (int degrees = 0; degrees < 360; degrees += 15) {
-    cv::Mat image(kSide, kSide, CV_8UC1);
+    cv::Mat image(kPatchSide, kPatchSide, CV_8UC1);
     const double angle = degrees * CV_PI / 180;
-    for (int y = 0; y < kSide; ++y) {
-      for (int x = 0; x < kSide; ++x) {
+    for (int y = 0; y < kPatchSide; ++y) {
+      for (int x = 0; x < kPatchSide; ++x) {
         const double along = (x - kMiddle) * std::cos(angle) + (y - kMiddle) * std::sin(angle);
         image.at<std::uint8_t>(y, x) = cv::saturate_cast<std::uint8_t>(128 + 4 * along);
       }
@@ -37,7 +37,7 @@ TEST(IntensityCentroid, PointsToWhatIsBright) {
 
 TEST(IntensityCentroid, IsThatOfTheSumsOverThePatchAlone) {
   cv::RNG random(1);
-  cv::Mat image(kSide, kSide, CV_8UC1);
+  cv::Mat image(kPatchSide, kPatchSide, CV_8UC1);
   random.fill(image, cv::RNG::UNIFORM, 0, 256);
   for (const int radius : {3, 10, IntensityCentroid::kRadius}) {
     int m10 = 0, m01 = 0;

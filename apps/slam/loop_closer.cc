@@ -130,14 +130,16 @@ LoopUpdate LoopCloser::Consider(const LoopRecord& proposed, const Verification& 
   records_.push_back(proposed);
   LoopRecord& record = records_.back();
   if (!record.verified) return {};
-  const LoopConstraint constraint = Measure(verification, candidate, query, odometry);
   const bool recent = OfOneSession(record.query, record.candidate) &&
                       record.query_stamp_s - record.candidate_stamp_s < options_.loop_min_age_s;
-  if (recent && !(constraint.usable && verification.inliers >= kSurelySeen &&
-                  !gate_.Fulfilled(constraint.edge, Places(odometry)))) {
+  const auto refuse_recent = [&record] {
     record.reason = "too recent: still in the local map";
-    return {};
-  }
+    return LoopUpdate();
+  };
+  if (recent && verification.inliers < kSurelySeen) return refuse_recent();
+  const LoopConstraint constraint = Measure(verification, candidate, query, odometry);
+  if (recent && (!constraint.usable || gate_.Fulfilled(constraint.edge, Places(odometry))))
+    return refuse_recent();
   if (!constraint.usable) {
     record.reason = constraint.reason;
     return {};

@@ -15,7 +15,6 @@ constexpr double kTurningJerk = 140;    // [rad/s^3]
 constexpr double kMovingJerk = 15;      // [1/s^3], in units of that depth
 constexpr double kTurningNoise = 0.02;  // of what rows tell [rad/s]
 constexpr double kMovingNoise = 0.01;   // [1/s], in units of that depth
-constexpr double kMotionHolds = 0.1;    // after so long nothing is known of the motion [s]
 constexpr double kUnknownDepth = 3;     // of a view without landmarks [m]
 constexpr double kBlurred = 0.03;       // corners are at the ends of streaks that are longer [rad]
 constexpr double kLongExposure = 0.03;  // of what may be blurred as long as nothing is known [s]

@@ -3,9 +3,6 @@
 #include <utility>
 
 namespace tutti {
-namespace {
-constexpr double kLongestStep = 0.1;  // between two frames whose motions are alike [s]
-}
 
 bool RollingStart::Is(const LastFrame& last) const {
   return depth_ && shutter_.Rolls() && last.reference >= 0 && last.frames_since_keyframe == 0 &&
@@ -15,7 +12,7 @@ bool RollingStart::Is(const LastFrame& last) const {
 std::optional<Vector6d> RollingStart::MotionOf(const LastFrame& first, const PoseFix& next,
                                                const Vector6d& assumed) {
   const double dt = next.frame.stamp_s - first.frame.stamp_s;
-  if (!next.motion || !(dt > 0 && dt < kLongestStep)) return std::nullopt;
+  if (!next.motion || !(dt > 0 && dt < kMotionHolds)) return std::nullopt;
   const Vector6d step = LogSE3(next.T_camera_world * first.T_camera_world.Inverse()) / dt;
   return step - 0.5 * (*next.motion - assumed);
 }

@@ -52,6 +52,7 @@ struct PoseFix {
 };
 
 constexpr double kVelocityHolds = 1.5;  ///< longer after it, a velocity says nothing [s]
+constexpr double kMotionHolds = 0.1;    ///< and nothing of how the camera moves while an image is read [s]
 
 /// The last frame with a pose, and how the camera moved to it: what the next frame is looked for from.
 struct LastFrame {

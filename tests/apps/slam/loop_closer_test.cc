@@ -62,11 +62,12 @@ class LoopCloserTest : public ::testing::Test {
     if (!verified) record.reason = "refused by geometry";
     return record;
   }
-  LoopUpdate Consider(LoopCloser* closer, int candidate, int query, double off) const {
+  LoopUpdate Consider(LoopCloser* closer, int candidate, int query, double off, int inliers = 0) const {
     Verification verification;
     verification.type = ConstraintType::kRigid;
     verification.S_candidate_query = InMap(candidate, query, off);
     verification.information = 1e4 * Matrix6d::Identity();
+    verification.inliers = inliers;
     return closer->Consider(Proposed(candidate, query), verification, candidate, query, odometry_, frames_);
   }
   /// Two loops that agree: the later keyframes are `off` [m] beside where the map has them.
@@ -110,12 +111,7 @@ TEST_F(LoopCloserTest, ALoopWithinTheLocalMapIsNone) {
 // What a slip of the odometry has torn, in a blurred turn for example.
 TEST_F(LoopCloserTest, ALoopWithinTheLocalMapMendsItWhereItIsTorn) {
   const auto said = [&](LoopCloser* closer, int query, double off, int inliers) {
-    Verification verification;
-    verification.type = ConstraintType::kRigid;
-    verification.S_candidate_query = InMap(kFirst, query, off);
-    verification.information = 1e4 * Matrix6d::Identity();
-    verification.inliers = inliers;
-    closer->Consider(Proposed(kFirst, query), verification, kFirst, query, odometry_, frames_);
+    Consider(closer, kFirst, query, off, inliers);
     return closer->records().back();
   };
   LoopCloser sure = Closer();

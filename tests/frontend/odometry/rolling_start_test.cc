@@ -6,17 +6,14 @@
 #include <memory>
 #include <vector>
 
+#include "tests/frontend/geometry/rolling_scene.h"
+
 namespace tutti {
 namespace {
 
-CameraRig StartRig(Sensor sensor, double readout_s) {
-  CameraRig rig;
+CameraRig RigOf(Sensor sensor, double readout_s) {
+  CameraRig rig = testing::RollingRig();
   rig.sensor = sensor;
-  rig.camera.width = 400;
-  rig.camera.height = 301;
-  rig.camera.fx = rig.camera.fy = 330;
-  rig.camera.cx = 199.5;
-  rig.camera.cy = 150;
   rig.readout_s = readout_s;
   return rig;
 }
@@ -25,36 +22,21 @@ CameraRig StartRig(Sensor sensor, double readout_s) {
 class RollingStartTest : public ::testing::Test {
  protected:
   RollingStartTest() {
-    motion_ << 0.5, -0.3, 0.2, 1.5, -2.5, 3.0;
-    auto seen = std::make_shared<FrameFeatures>();
-    const RollingShutter shutter(rig_);
-    for (int i = 0; i < 150; ++i) {
-      const Eigen::Vector3d p(1.6 * std::sin(1.3 * i), 1.2 * std::sin(2.1 * i + 1), 2.5 + std::sin(0.7 * i));
-      Eigen::Vector2d pixel = rig_.camera.Project(p);
-      Eigen::Vector3d then = p;
-      for (int k = 0; k < 20; ++k) {
-        then = ExpSE3(motion_ * shutter.TimeOf(pixel.y())) * p;
-        pixel = rig_.camera.Project(then);
-      }
-      if (!rig_.camera.Contains(pixel)) continue;
-      points_.push_back(T_world_camera_ * p);
-      seen->keypoints.emplace_back(static_cast<float>(pixel.x()), static_cast<float>(pixel.y()), 31.0F);
-      seen->inverse_depth.push_back(static_cast<float>(1 / then.z()));
-      seen->inverse_depth_sigma.push_back(0.001F);
-    }
+    const auto seen = std::make_shared<FrameFeatures>(scene_.Features());
+    seen->inverse_depth_sigma.assign(seen->size(), 0.001F);
     seen->descriptors = cv::Mat::zeros(static_cast<int>(seen->keypoints.size()), 32, CV_8U);
     seen->BuildGrid(rig_.camera.width, rig_.camera.height);
     Keyframe k;
     k.features = seen;
-    k.T_world_camera = T_world_camera_;
+    k.T_world_camera = scene_.T_camera_world.Inverse();
     const int id = map_.AddKeyframe(std::move(k));
     for (std::size_t f = 0; f < points_.size(); ++f) {
       const cv::Point2f at = seen->keypoints[f].pt;
       const Eigen::Vector3d taken = rig_.camera.Unproject({at.x, at.y}) / double(seen->inverse_depth[f]);
-      map_.AddLandmark(T_world_camera_ * taken, id, static_cast<int>(f));
+      map_.AddLandmark(scene_.T_camera_world.Inverse() * taken, id, static_cast<int>(f));
     }
     first_.frame = {0, 0, seen};
-    first_.T_camera_world = T_world_camera_.Inverse();
+    first_.T_camera_world = scene_.T_camera_world;
     first_.reference = first_.newest_keyframe = id;
     seen_ = seen;
   }
@@ -67,10 +49,10 @@ class RollingStartTest : public ::testing::Test {
     return farthest;
   }
 
-  CameraRig rig_ = StartRig(Sensor::kRgbd, 0.03);
-  Pose T_world_camera_{ExpSO3({0.1, -0.2, 0.05}), {0.2, 0.1, -0.1}};
-  Vector6d motion_;
-  std::vector<Eigen::Vector3d> points_;  // in the world
+  const testing::RollingScene scene_{0.01};
+  const CameraRig& rig_ = scene_.rig;
+  const Vector6d& motion_ = scene_.motion;
+  const std::vector<Eigen::Vector3d>& points_ = scene_.points;  // in the world
   Map map_{std::vector<float>{1}};
   std::shared_ptr<const FrameFeatures> seen_;
   LastFrame first_;
@@ -117,8 +99,8 @@ TEST_F(RollingStartTest, TheStepAndTheChangeOfTheMotionTellHowItBegan) {
 
 TEST_F(RollingStartTest, OnlyAFrameThatMadeAMapIsOne) {
   EXPECT_TRUE(RollingStart(rig_).Is(first_));
-  EXPECT_FALSE(RollingStart(StartRig(Sensor::kRgbd, 0)).Is(first_)) << "a global shutter";
-  EXPECT_FALSE(RollingStart(StartRig(Sensor::kMono, 0.03)).Is(first_)) << "no depth";
+  EXPECT_FALSE(RollingStart(RigOf(Sensor::kRgbd, 0)).Is(first_)) << "a global shutter";
+  EXPECT_FALSE(RollingStart(RigOf(Sensor::kMono, 0.03)).Is(first_)) << "no depth";
   LastFrame last = first_;
   last.frames_since_keyframe = 1;
   EXPECT_FALSE(RollingStart(rig_).Is(last));

@@ -34,11 +34,16 @@ std::vector<MapKeyframe> KeyframesOf(const Odometry& odometry) {
   return keyframes;
 }
 
-std::vector<CovisiblePair> CovisibleOf(const Odometry& odometry, int min_shared) {
-  std::vector<CovisiblePair> covisible;
-  for (const auto& [pair, shared] : odometry.Covisibility(min_shared))
-    covisible.push_back({pair.first, pair.second, shared});
-  return covisible;
+OdometryUncertainty::Sigmas Larger(const OdometryUncertainty::Sigmas& a,
+                                   const OdometryUncertainty::Sigmas& b) {
+  return {std::max(a.fraction, b.fraction), std::max(a.rotation_rad, b.rotation_rad)};
+}
+
+// Of a contradiction, what its own standard deviation does not explain.
+double Beyond(const Eigen::Vector3d& contradiction, double sigma) {
+  constexpr double kOwnSigmas = 3;
+  const double least = kOwnSigmas * sigma, norm = contradiction.norm();
+  return std::sqrt(std::max(0.0, norm * norm - least * least));
 }
 
 LoopGate::Map Places(const Odometry& odometry) {
@@ -59,8 +64,16 @@ LoopCloser::LoopCloser(const RunConfig& config, const CameraRig& rig, SpanRecord
 
 PoseGraph LoopCloser::Graph(const Odometry& odometry) const {
   KeyframeGraph graph = graph_;
-  graph.Update(KeyframesOf(odometry), CovisibleOf(odometry, options_.covisibility_min_shared));
+  graph.Update(KeyframesOf(odometry), Covisible(odometry));
   return graph.Graph(accepted_);
+}
+
+std::vector<CovisiblePair> LoopCloser::Covisible(const Odometry& odometry) const {
+  if (followed_ && adjustments_ == 0) return {};
+  std::vector<CovisiblePair> covisible;
+  for (const auto& [pair, shared] : odometry.Covisibility(options_.covisibility_min_shared))
+    covisible.push_back({pair.first, pair.second, shared});
+  return covisible;
 }
 
 void LoopCloser::Check(int end, const internal::SectionReader& file) const {
@@ -147,6 +160,7 @@ LoopUpdate LoopCloser::Consider(const LoopRecord& proposed, const Verification& 
   LoopEdge edge = constraint.edge;
   edge.record = records_.size() - 1;
   record.S_candidate_query = edge.S_candidate_query;
+  if (followed_) gate_.SetOdometryUncertainty(Seen());
   std::vector<LoopEdge> entering = gate_.Offer(edge, accepted_, Places(odometry), across);
   if (entering.empty()) {
     record.pending = true;
@@ -184,7 +198,7 @@ std::string LoopCloser::Join(const std::vector<ProposedLoop>& proposed, const Od
 }
 
 LoopUpdate LoopCloser::MoveAll(const std::map<int, Similarity>& S_world_keyframe, const Odometry& odometry) {
-  graph_.Update(KeyframesOf(odometry), CovisibleOf(odometry, options_.covisibility_min_shared));
+  graph_.Update(KeyframesOf(odometry), Covisible(odometry));
   graph_.Move(S_world_keyframe, {});
   Rescale(S_world_keyframe);
   LoopUpdate update;
@@ -250,6 +264,12 @@ LoopUpdate LoopCloser::Enter(std::vector<LoopEdge> entering, const Odometry& odo
   return update;
 }
 
+void LoopCloser::NoteStep(int keyframe, const StepCheck& check) {
+  uncertainty_.Add(check);
+  graph_.NoteMotion(keyframe, {Beyond(check.translation_m, check.sigma_translation_m),
+                               Beyond(check.rotation_rad, check.sigma_rotation_rad)});
+}
+
 void LoopCloser::NoteMotion(int keyframe, const MotionSigma& sigma, const Eigen::Vector3d& position) {
   walk_.since_keyframe += sigma;
   if (keyframe < 0) return;
@@ -275,12 +295,7 @@ OdometryUncertainty::Sigmas LoopCloser::Stated() const {
 // the graph has what the odometry says of each motion.
 void LoopCloser::SetSigmas() {
   constexpr double kLeastRotation_rad = 1e-6;  // an edge is never certain
-  OdometryUncertainty::Sigmas sigmas = uncertainty_.Estimate();
-  if (walk_.motions == 0) {
-    const OdometryUncertainty::Sigmas configured = Stated();
-    sigmas.fraction = std::max(sigmas.fraction, configured.fraction);
-    sigmas.rotation_rad = std::max(sigmas.rotation_rad, configured.rotation_rad);
-  }
+  const OdometryUncertainty::Sigmas sigmas = walk_.motions == 0 ? Larger(Seen(), Stated()) : Seen();
   graph_.SetSigmas(sigmas.fraction, std::max(sigmas.rotation_rad, kLeastRotation_rad));
 }
 
@@ -306,7 +321,7 @@ void LoopCloser::Start(std::vector<LoopEdge> entering, const Odometry& odometry,
   const ScopedSpan span(recorder_, Lane::kOptimisation, "begin_closing");
   const internal::Stopwatch watch;
   solved_keyframes_ = KeyframesOf(odometry);
-  graph_.Update(solved_keyframes_, CovisibleOf(odometry, options_.covisibility_min_shared));
+  graph_.Update(solved_keyframes_, Covisible(odometry));
   SetSigmas();
   solver_.Start(graph_, accepted_, entering, options_, recorder_);
   solved_due_ = frames + SolutionFrames(solved_keyframes_.size());
@@ -364,7 +379,7 @@ MapCorrection LoopCloser::MoveBy(const KeyframeCorrection& solved, const Odometr
   correction.S_world_keyframe = Follow(solved, solved_keyframes_, now);
   correction.merges = solved.merges;
   ++corrections_;
-  graph_.Update(now, CovisibleOf(odometry, options_.covisibility_min_shared));
+  graph_.Update(now, Covisible(odometry));
   graph_.Move(correction.S_world_keyframe, correction.merges);
   Rescale(correction.S_world_keyframe);
   if (options_.global_adjustment) {
@@ -449,7 +464,7 @@ bool LoopCloser::CloseDeferred(const Odometry& odometry, std::int64_t frames) {
 }
 
 void LoopCloser::Removed(const std::map<int, int>& into, const Odometry& before) {
-  graph_.Update(KeyframesOf(before), CovisibleOf(before, options_.covisibility_min_shared));
+  graph_.Update(KeyframesOf(before), Covisible(before));
   for (std::vector<LoopEdge>* loops : {&accepted_, &gate_.waiting(), &deferred_, &queued_}) {
     std::vector<LoopEdge> stay;
     for (LoopEdge& loop : *loops) {

@@ -63,9 +63,10 @@ class LoopCloser {
   /// `update`: says which others the detector is to forget.
   std::string Join(const std::vector<ProposedLoop>& proposed, const Odometry& odometry, std::int64_t frames,
                    LoopUpdate* update);
-  /// What the images say of a step of the odometry that is followed: if it is less certain than configured,
-  /// loops are judged by what they say from the next one on.
-  void NoteStep(const StepCheck& check) { uncertainty_.Add(check); }
+  /// What the images say of a step of the odometry that is followed, which led to this keyframe: if it is
+  /// less certain than configured, loops are judged by what they say from the next one on. The graph takes
+  /// the step to be off by as much as they clearly contradict it.
+  void NoteStep(int keyframe, const StepCheck& check);
   /// The odometry that is followed says how uncertain its motion since the last call is, which led to this
   /// position, and to this keyframe if it is not -1. It counts in place of what is configured.
   void NoteMotion(int keyframe, const MotionSigma& sigma, const Eigen::Vector3d& position);
@@ -145,6 +146,10 @@ class LoopCloser {
  private:
   LoopConstraint Measure(const Verification& verification, int candidate, int query,
                          const Odometry& odometry);
+  /// Pairs that the pose graph has edges for beside consecutive keyframes. None of an odometry that is
+  /// followed: its keyframes stand where it says, so a pair would say once more what the steps between it
+  /// said. After an adjustment they stand where the images say.
+  std::vector<CovisiblePair> Covisible(const Odometry& odometry) const;
   void SetSigmas();
   bool LeavesAsItIs(const std::vector<LoopEdge>& entering, const Odometry& odometry) const;
   LoopUpdate Enter(std::vector<LoopEdge> entering, const Odometry& odometry, std::int64_t frames);

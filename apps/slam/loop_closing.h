@@ -66,7 +66,7 @@ class LoopClosing {
   /// before (loop_every_keyframes, loop_min_interval_s) are not searched.
   void Submit(const InputFrame& frame, const KeyframeView* view, std::int64_t frames);
   /// As LoopCloser.
-  void NoteStep(const StepCheck& check) { closer_.NoteStep(check); }
+  void NoteStep(int keyframe, const StepCheck& check) { closer_.NoteStep(keyframe, check); }
   void FollowOdometry() { closer_.FollowOdometry(); }
   void NoteMotion(int keyframe, const MotionSigma& sigma, const Eigen::Vector3d& position) {
     closer_.NoteMotion(keyframe, sigma, position);

@@ -1,15 +1,45 @@
 #include "apps/slam/loop_gate.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <utility>
 
 #include "backend/robust/pairwise_consistency.h"
+#include "core/angle.h"
 
 namespace tutti {
-bool LoopGate::Within(const Disagreement& d) const {
-  return d.fraction <= options_.loop_agree_fraction && d.angle_deg <= options_.loop_agree_deg &&
-         d.log_scale <= options_.loop_agree_scale;
+namespace {
+
+constexpr double kWalkSigmas = 3;  // of the odometry's drift between two loops
+// Limits grow to so many times what options say: farther apart, even a bad odometry's loops prove little.
+constexpr double kMostGrowth = 4;
+
+double Grown(double limit, double sigma) {
+  return std::min(std::hypot(limit, kWalkSigmas * sigma), kMostGrowth * limit);
+}
+
+}  // namespace
+
+bool LoopGate::Within(const Disagreement& d, const Disagreement& limits) const {
+  return d.fraction <= limits.fraction && d.angle_deg <= limits.angle_deg && d.log_scale <= limits.log_scale;
+}
+
+// A random walk: rotations between keyframes add up by their squares, and turn what lies behind them.
+Disagreement LoopGate::Limits(const LoopEdge& a, const LoopEdge& b, const Map& map) const {
+  const auto apart = [&map](int x, int y) {
+    return (map(x).T_world_camera.translation - map(y).T_world_camera.translation).norm();
+  };
+  const double steps = std::abs(a.query - b.query) + std::abs(a.candidate - b.candidate);
+  const double turn_rad = step_.rotation_rad * std::sqrt(steps),
+               at_candidates = apart(a.candidate, b.candidate);
+  const double shift = std::hypot(step_.fraction * (apart(a.query, b.query) + at_candidates),
+                                  turn_rad * (b.S_candidate_query.translation.norm() + at_candidates));
+  Disagreement limits;
+  limits.fraction = Grown(options_.loop_agree_fraction, shift / a.depth);
+  limits.angle_deg = Grown(options_.loop_agree_deg, turn_rad * internal::kDegrees);
+  limits.log_scale = options_.loop_agree_scale;
+  return limits;
 }
 
 bool LoopGate::Near(const LoopEdge& a, const LoopEdge& b) const {
@@ -31,9 +61,10 @@ bool LoopGate::Agree(const LoopEdge& a, const LoopEdge& b, const Map& map) const
   if (qa.piece != qb.piece || ca.piece != cb.piece) return false;  // no odometry between them
   const Similarity between_queries(qa.T_world_camera.Inverse() * qb.T_world_camera);
   const Similarity between_candidates(cb.T_world_camera.Inverse() * ca.T_world_camera);
-  return Within(Measure(
-      internal::LoopCycle(a.S_candidate_query, between_queries, b.S_candidate_query, between_candidates),
-      a.depth));
+  return Within(Measure(internal::LoopCycle(a.S_candidate_query, between_queries, b.S_candidate_query,
+                                            between_candidates),
+                        a.depth),
+                Limits(a, b, map));
 }
 
 // Nothing between pieces.

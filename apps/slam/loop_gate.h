@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "apps/slam/loop_solver.h"
+#include "apps/slam/odometry_uncertainty.h"
 #include "tutti/backend/keyframe_graph.h"
 #include "tutti/core/pose.h"
 #include "tutti/slam/slam_options.h"
@@ -25,6 +26,11 @@ class LoopGate {
   using Map = std::function<Place(int keyframe)>;
 
   explicit LoopGate(const SlamOptions& options) : options_(options) {}
+
+  /// Standard deviations of the odometry's motion from one keyframe to the next, for an odometry that may be
+  /// a bad one: two loops agree if it can have drifted by what they differ. Without this: as far as options
+  /// say.
+  void SetOdometryUncertainty(const OdometryUncertainty::Sigmas& step) { step_ = step; }
 
   /// The loops that may enter now: none while `loop` waits for another one that agrees, else it and those
   /// that waited. Loops that are in the map (`accepted`) vouch for it as well. Loops can agree whose frames
@@ -56,11 +62,13 @@ class LoopGate {
  private:
   static std::optional<Similarity> InMap(const LoopEdge& loop, const Map& map);  // T_query_candidate
   std::optional<Disagreement> WithMap(const LoopEdge& loop, const Map& map) const;
-  bool Within(const Disagreement& d) const;
+  bool Within(const Disagreement& d, const Disagreement& limits) const;
+  Disagreement Limits(const LoopEdge& a, const LoopEdge& b, const Map& map) const;
   bool Near(const LoopEdge& a, const LoopEdge& b) const;
   static bool SideBySide(const LoopEdge& a, const LoopEdge& b, const Map& map);
 
   SlamOptions options_;
+  OdometryUncertainty::Sigmas step_;  // not saved, as such a map is not
   std::vector<LoopEdge> waiting_;
 };
 

@@ -70,7 +70,7 @@ class SlamSystem::Impl {
     ++frames_;
     sessions_.CountFrame();
     TrackResult result = odometry_->Follow(frame, T_odom_camera);
-    if (result.step) loops_.NoteStep(*result.step);
+    if (result.step) loops_.NoteStep(result.keyframe, *result.step);
     if (sigma) loops_.NoteMotion(result.keyframe, *sigma, T_odom_camera.translation);
     last_ = frame.index;
     sessions_.SetLastFrame(last_);

@@ -43,6 +43,26 @@ TEST(LoopGate, LoopsThatContradictEachOtherStayOut) {
   EXPECT_EQ(gate.waiting().size(), 3u);
 }
 
+TEST(LoopGate, LoopsAgreeWhereABadOdometryMayHaveDriftedByTheirDifference) {
+  const auto enter = [](const OdometryUncertainty::Sigmas& step, const LoopEdge& second) {
+    LoopGate gate{SlamOptions()};
+    gate.SetOdometryUncertainty(step);
+    gate.Offer(LoopTo(10), {}, PlaceOf);
+    return gate.Offer(second, {}, PlaceOf).size();
+  };
+  const OdometryUncertainty::Sigmas good{0.005, 0.0005}, bad{0.05, 0.01};
+  const LoopEdge shifted = LoopTo(12, 0.5), shifted_more = LoopTo(12, 1.0);  // 4 m on, 0.2 m is the limit
+  LoopEdge turned = LoopTo(12), turned_more = turned;  // 4 steps on, 1.5 deg is the limit
+  turned.S_candidate_query.rotation = ExpSO3({0, 0, 0.05});
+  turned_more.S_candidate_query.rotation = ExpSO3({0, 0, 0.12});
+  EXPECT_EQ(enter(good, shifted), 0u);
+  EXPECT_EQ(enter(good, turned), 0u);
+  EXPECT_EQ(enter(bad, shifted), 2u);
+  EXPECT_EQ(enter(bad, turned), 2u);
+  EXPECT_EQ(enter(bad, shifted_more), 0u);
+  EXPECT_EQ(enter(bad, turned_more), 0u) << "nothing is let in beyond four times the limits";
+}
+
 TEST(LoopGate, LoopsFarApartDoNotVouchForEachOther) {
   LoopGate gate{SlamOptions()};
   EXPECT_TRUE(gate.Offer(LoopTo(1), {}, PlaceOf).empty());

@@ -213,11 +213,12 @@ std::vector<LocationMemory::Neighbour> LocationMemory::Walk(int slot, int levels
   // Level by level; the places of a ring by how many loop links their paths have taken.
   using Ring = std::array<std::vector<int>, kMostLoopsOfAWalk + 1>;
   std::unordered_map<int, std::size_t> fewest_loops;
-  Ring ring;
+  Ring ring, next;  // these and what is reached keep their storage from level to level
+  std::vector<int> reached;
   ring[0] = {slot};
   for (int level = 0; level <= levels; ++level) {
-    Ring next;
-    std::vector<int> reached;
+    for (std::vector<int>& of_next : next) of_next.clear();
+    reached.clear();
     for (std::size_t loops = 0; loops < ring.size(); ++loops) {
       for (const int node : ring[loops]) {
         const auto [known, is_new] = fewest_loops.emplace(node, loops);

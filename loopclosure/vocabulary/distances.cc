@@ -34,8 +34,13 @@ TUTTI_CHECKED_AS_A_WHOLE void SquaredDistances(const float* query, const float* 
 }
 
 TUTTI_CLONES("popcnt")
-void HammingDistances(const std::uint8_t* query, const std::uint8_t* rows, int count, int bytes,
-                      std::size_t step, float* distances) {
+TUTTI_CHECKED_AS_A_WHOLE void HammingDistances(const std::uint8_t* query, const std::uint8_t* rows, int count,
+                                               int bytes, std::size_t step, float* distances) {
+  if (count > 0) {
+    CheckReadable(query, static_cast<std::size_t>(bytes));
+    CheckReadable(rows, static_cast<std::size_t>(count - 1) * step + static_cast<std::size_t>(bytes));
+    CheckWritable(distances, static_cast<std::size_t>(count));
+  }
   if (bytes == 32) {  // ORB: a fixed length unrolls
     for (int j = 0; j < count; ++j) {
       distances[j] =
@@ -50,7 +55,11 @@ void HammingDistances(const std::uint8_t* query, const std::uint8_t* rows, int c
 }
 
 TUTTI_CLONES("avx2")
-float UpdateNearest(const float* distances, int count, int row, float* nearest, std::int32_t* nearest_row) {
+TUTTI_CHECKED_AS_A_WHOLE float UpdateNearest(const float* distances, int count, int row, float* nearest,
+                                             std::int32_t* nearest_row) {
+  CheckReadable(distances, static_cast<std::size_t>(count));
+  CheckWritable(nearest, static_cast<std::size_t>(count));
+  CheckWritable(nearest_row, static_cast<std::size_t>(count));
   // Floats that are not negative are ordered as their bits are, and integers need no order of evaluation.
   std::int32_t least = std::numeric_limits<std::int32_t>::max();
   for (int j = 0; j < count; ++j) {

@@ -5,10 +5,12 @@
 #include <cstdint>
 #include <cstring>
 
+#include "core/sanitized_range.h"
+
 namespace tutti::internal {
 
-/// Differing bits of two descriptors of `bytes` bytes.
-inline int HammingDistance(const std::uint8_t* a, const std::uint8_t* b, int bytes) {
+/// Differing bits of two descriptors of `bytes` bytes, which the caller checks as a whole.
+TUTTI_CHECKED_AS_A_WHOLE inline int HammingDistance(const std::uint8_t* a, const std::uint8_t* b, int bytes) {
   int bits = 0;
   int i = 0;
   for (; i + 8 <= bytes; i += 8) {

@@ -112,10 +112,12 @@ TUTTI_CLONES("popcnt")
 void HammingIndex::Scan(const std::vector<int>& rows, const std::uint8_t* descriptor,
                         TwoNearest& nearest) const {
   constexpr std::size_t kAhead = 8;  // words lie anywhere in memory: ask for them before they are needed
+  internal::CheckReadable(descriptor, static_cast<std::size_t>(bytes_));
   for (std::size_t i = 0; i < rows.size(); ++i) {
     if (i + kAhead < rows.size()) __builtin_prefetch(storage_.At(rows[i + kAhead]));
-    const float distance =
-        static_cast<float>(internal::HammingDistance(descriptor, storage_.At(rows[i]), bytes_));
+    const std::uint8_t* const word = storage_.At(rows[i]);
+    internal::CheckReadable(word, static_cast<std::size_t>(bytes_));
+    const float distance = static_cast<float>(internal::HammingDistance(descriptor, word, bytes_));
     if (distance <= nearest.second_distance) nearest.Offer(storage_.WordOf(rows[i]), distance);
   }
 }

@@ -39,11 +39,9 @@ OdometryUncertainty::Sigmas Larger(const OdometryUncertainty::Sigmas& a,
   return {std::max(a.fraction, b.fraction), std::max(a.rotation_rad, b.rotation_rad)};
 }
 
-// Of a contradiction, what its own standard deviation does not explain.
-double Beyond(const Eigen::Vector3d& contradiction, double sigma) {
-  constexpr double kOwnSigmas = 3;
-  const double least = kOwnSigmas * sigma, norm = contradiction.norm();
-  return std::sqrt(std::max(0.0, norm * norm - least * least));
+// Of a contradiction, what that much does not explain.
+double Beyond(const Eigen::Vector3d& contradiction, double explained) {
+  return std::sqrt(std::max(0.0, contradiction.squaredNorm() - explained * explained));
 }
 
 LoopGate::Map Places(const Odometry& odometry) {
@@ -264,10 +262,17 @@ LoopUpdate LoopCloser::Enter(std::vector<LoopEdge> entering, const Odometry& odo
   return update;
 }
 
+// Where one step differs, it may be the images that are wrong (a car that drives along), unless they are
+// known to be better than the odometry, or differ by far more than it should.
 void LoopCloser::NoteStep(int keyframe, const StepCheck& check) {
+  constexpr double kOwnSigmas = 3, kSlipSigmas = 5;
   uncertainty_.Add(check);
-  graph_.NoteMotion(keyframe, {Beyond(check.translation_m, check.sigma_translation_m),
-                               Beyond(check.rotation_rad, check.sigma_rotation_rad)});
+  const OdometryUncertainty::Sigmas seen = Seen(), stated = Stated();
+  const double slip_m = seen.fraction > stated.fraction ? 0 : kSlipSigmas * stated.fraction * check.way_m,
+               slip_rad = seen.rotation_rad > stated.rotation_rad ? 0 : kSlipSigmas * stated.rotation_rad;
+  graph_.NoteMotion(keyframe,
+                    {Beyond(check.translation_m, std::max(kOwnSigmas * check.sigma_translation_m, slip_m)),
+                     Beyond(check.rotation_rad, std::max(kOwnSigmas * check.sigma_rotation_rad, slip_rad))});
 }
 
 void LoopCloser::NoteMotion(int keyframe, const MotionSigma& sigma, const Eigen::Vector3d& position) {

@@ -11,7 +11,6 @@
 #include "frontend/map/other_camera.h"
 #include "frontend/map/redundant_keyframes.h"
 #include "frontend/map/scale_ramp.h"
-#include "frontend/odometry/step_check.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -124,14 +123,14 @@ TrackResult Odometry::Impl::Follow(const InputFrame& input, const Pose& T_odom_c
     const ScopedStopwatch watch(&stages_, Lane::kTracking, "follow");
     const Pose T_world_camera = follower_.Next(T_odom_camera, tracker_.last().T_camera_world.Inverse());
     const int newest = tracker_.last().newest_keyframe;
-    const auto [fix, matched] = follower_.See(map(), frame, newest, T_world_camera.Inverse());
+    const PoseFollower::Sight sight = follower_.See(map(), frame, newest, T_world_camera.Inverse());
+    const PoseFix& fix = sight.fix;
     tracker_.Follow(fix);
     result_ = TrackResult();
     result_.state = TrackingState::kTracking;
     result_.inliers = fix.inliers;
     if (follower_.WantsKeyframe(map(), fix, newest)) {
-      result_.step =
-          CheckStep(map(), rig_, options_, newest, *fix.frame.features, matched, fix.T_camera_world);
+      result_.step = follower_.Check(map(), sight, newest);
       result_.keyframe = InsertKeyframe();
     }
     const LastFrame& last = tracker_.last();

@@ -6,6 +6,7 @@
 #include "frontend/features/patch_aligner.h"
 #include "frontend/geometry/measured.h"
 #include "frontend/geometry/pose_solver.h"
+#include "frontend/odometry/step_check.h"
 
 namespace tutti {
 namespace {
@@ -63,6 +64,17 @@ PoseFollower::Sight PoseFollower::See(const Map& map, const TrackedFrame& frame,
   }
   fix.found = fix.matches.landmarks;
   return sight;
+}
+
+std::optional<StepCheck> PoseFollower::Check(const Map& map, const Sight& sight, int keyframe) const {
+  const TrackedFrame& frame = sight.fix.frame;
+  const Pose& given = sight.fix.T_camera_world;
+  const auto near = CheckStep(map, rig_, options_, keyframe, *frame.features, sight.matched, given, given);
+  if (near) return near;
+  const std::optional<PoseFix> found = search_.FindAt(map, frame, keyframe);
+  if (!found) return std::nullopt;
+  return CheckStep(map, rig_, options_, keyframe, *found->frame.features, found->matches.landmarks, given,
+                   found->T_camera_world);
 }
 
 bool PoseFollower::WantsKeyframe(const Map& map, const PoseFix& fix, int newest_keyframe) const {

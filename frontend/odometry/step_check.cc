@@ -57,7 +57,8 @@ bool Sigmas(const PinholeCamera& camera, const std::vector<PointObservation>& po
 
 std::optional<StepCheck> CheckStep(const Map& map, const CameraRig& rig, const OdometryOptions& options,
                                    int keyframe, const FrameFeatures& features,
-                                   const std::vector<int>& landmarks, const Pose& T_camera_world) {
+                                   const std::vector<int>& landmarks, const Pose& T_camera_world,
+                                   const Pose& T_seen_world) {
   const Keyframe& before = map.keyframe(keyframe);
   std::vector<PointObservation> points;
   for (std::size_t f = 0; f < landmarks.size(); ++f) {
@@ -70,7 +71,7 @@ std::optional<StepCheck> CheckStep(const Map& map, const CameraRig& rig, const O
   }
   if (static_cast<int>(points.size()) < kFewestPoints) return std::nullopt;
   const Pose given = T_camera_world * before.T_world_camera;
-  Pose seen = given;
+  Pose seen = T_seen_world * before.T_world_camera;
   std::vector<char> inlier;
   const int inliers = RefinePose(rig.camera, points, &seen, &inlier);
   if (inliers < kFewestPoints || inliers < kFewestShare * static_cast<double>(points.size()))

@@ -67,7 +67,7 @@ PoseGraph LoopCloser::Graph(const Odometry& odometry) const {
 }
 
 std::vector<CovisiblePair> LoopCloser::Covisible(const Odometry& odometry) const {
-  if (followed_ && adjustments_ == 0) return {};
+  if (ImagesJudgeSteps() && adjustments_ == 0) return {};
   std::vector<CovisiblePair> covisible;
   for (const auto& [pair, shared] : odometry.Covisibility(options_.covisibility_min_shared))
     covisible.push_back({pair.first, pair.second, shared});
@@ -158,7 +158,7 @@ LoopUpdate LoopCloser::Consider(const LoopRecord& proposed, const Verification& 
   LoopEdge edge = constraint.edge;
   edge.record = records_.size() - 1;
   record.S_candidate_query = edge.S_candidate_query;
-  if (followed_) gate_.SetOdometryUncertainty(Seen());
+  if (ImagesJudgeSteps()) gate_.SetOdometryUncertainty(Seen());
   std::vector<LoopEdge> entering = gate_.Offer(edge, accepted_, Places(odometry), across);
   if (entering.empty()) {
     record.pending = true;
@@ -267,6 +267,7 @@ LoopUpdate LoopCloser::Enter(std::vector<LoopEdge> entering, const Odometry& odo
 void LoopCloser::NoteStep(int keyframe, const StepCheck& check) {
   constexpr double kOwnSigmas = 3, kSlipSigmas = 5;
   uncertainty_.Add(check);
+  if (!ImagesJudgeSteps()) return;
   const OdometryUncertainty::Sigmas seen = Seen(), stated = Stated();
   const double slip_m = seen.fraction > stated.fraction ? 0 : kSlipSigmas * stated.fraction * check.way_m,
                slip_rad = seen.rotation_rad > stated.rotation_rad ? 0 : kSlipSigmas * stated.rotation_rad;

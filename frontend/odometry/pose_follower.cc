@@ -69,9 +69,10 @@ PoseFollower::Sight PoseFollower::See(const Map& map, const TrackedFrame& frame,
 std::optional<StepCheck> PoseFollower::Check(const Map& map, const Sight& sight, int keyframe) const {
   const TrackedFrame& frame = sight.fix.frame;
   const Pose& given = sight.fix.T_camera_world;
-  const auto near = CheckStep(map, rig_, options_, keyframe, *frame.features, sight.matched, given, given);
-  if (near || rig_.sensor == Sensor::kMono)
-    return near;  // one camera's landmarks are where the odometry says
+  std::optional<StepCheck> near =
+      CheckStep(map, rig_, options_, keyframe, *frame.features, sight.matched, given, given);
+  // One camera's landmarks are where the odometry says.
+  if (near || rig_.sensor == Sensor::kMono) return near;
   const std::optional<PoseFix> found = search_.FindAt(map, frame, keyframe);
   if (!found) return std::nullopt;
   return CheckStep(map, rig_, options_, keyframe, *found->frame.features, found->matches.landmarks, given,

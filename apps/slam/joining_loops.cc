@@ -9,7 +9,6 @@
 
 #include "apps/slam/loop_solver.h"
 #include "apps/slam/missed_loops.h"
-#include "backend/robust/pairwise_consistency.h"
 #include "core/angle.h"
 
 namespace tutti {
@@ -73,13 +72,6 @@ class SetFinder {
     if (query_way == query_ways.end() || candidate_way == candidate_ways.end()) return false;
     const double scale = a.S_candidate_query.scale;
     const Way q = query_way->second, c = candidate_way->second;
-    const auto between = [this](int from, int to) {
-      return Similarity(map_(from).T_world_camera.Inverse() * map_(to).T_world_camera);
-    };
-    const Disagreement d =
-        Measure(internal::LoopCycle(a.S_candidate_query, between(a.query, b.query), b.S_candidate_query,
-                                    between(b.candidate, a.candidate)),
-                a.depth);
     // What turns or scales one loop wrongly moves the other one, which stands that far away.
     const double edges = q.edges + c.edges, lever = std::max(q.length * scale, c.length);
     const auto drift = [edges](double loop, double edge) {
@@ -91,22 +83,19 @@ class SetFinder {
                               : 0;
     const double length = kDriftSigmas * options_.odometry_sigma_fraction * (q.length * scale + c.length) +
                           std::hypot(turn_deg * internal::kRadians, scales) * lever;
-    return d.fraction <= options_.loop_agree_fraction + length / a.depth &&
-           d.angle_deg <= options_.loop_agree_deg + turn_deg &&
-           d.log_scale <= options_.loop_agree_scale + scales;
+    return Within(LoopGate::Cycle(a, b, map_),
+                  {options_.loop_agree_fraction + length / a.depth, options_.loop_agree_deg + turn_deg,
+                   options_.loop_agree_scale + scales});
   }
 
   std::size_t PlacesOf(const std::vector<std::size_t>& of) const {
     std::vector<std::size_t> places;
-    const auto apart = [this](int x, int y) {
-      return (map_(x).T_world_camera.translation - map_(y).T_world_camera.translation).norm();
-    };
     for (const std::size_t i : of) {
       const LoopEdge& loop = loops_[i];
       const bool another = std::all_of(places.begin(), places.end(), [&](std::size_t p) {
         const LoopEdge& place = loops_[p];
-        return apart(loop.candidate, place.candidate) > place.depth &&
-               apart(loop.query, place.query) * place.S_candidate_query.scale > place.depth;
+        return LoopGate::Apart(loop.candidate, place.candidate, map_) > place.depth &&
+               LoopGate::Apart(loop.query, place.query, map_) * place.S_candidate_query.scale > place.depth;
       });
       if (another) places.push_back(i);
     }

@@ -21,19 +21,25 @@ double Grown(double limit, double sigma) {
 
 }  // namespace
 
-bool LoopGate::Within(const Disagreement& d, const Disagreement& limits) const {
-  return d.fraction <= limits.fraction && d.angle_deg <= limits.angle_deg && d.log_scale <= limits.log_scale;
+double LoopGate::Apart(int x, int y, const Map& map) {
+  return (map(x).T_world_camera.translation - map(y).T_world_camera.translation).norm();
+}
+
+Disagreement LoopGate::Cycle(const LoopEdge& a, const LoopEdge& b, const Map& map) {
+  const auto between = [&map](int from, int to) {
+    return Similarity(map(from).T_world_camera.Inverse() * map(to).T_world_camera);
+  };
+  return Measure(internal::LoopCycle(a.S_candidate_query, between(a.query, b.query), b.S_candidate_query,
+                                     between(b.candidate, a.candidate)),
+                 a.depth);
 }
 
 // A random walk: rotations between keyframes add up by their squares, and turn what lies behind them.
 Disagreement LoopGate::Limits(const LoopEdge& a, const LoopEdge& b, const Map& map) const {
-  const auto apart = [&map](int x, int y) {
-    return (map(x).T_world_camera.translation - map(y).T_world_camera.translation).norm();
-  };
   const double steps = std::abs(a.query - b.query) + std::abs(a.candidate - b.candidate);
   const double turn_rad = step_.rotation_rad * std::sqrt(steps),
-               at_candidates = apart(a.candidate, b.candidate);
-  const double shift = std::hypot(step_.fraction * (apart(a.query, b.query) + at_candidates),
+               at_candidates = Apart(a.candidate, b.candidate, map);
+  const double shift = std::hypot(step_.fraction * (Apart(a.query, b.query, map) + at_candidates),
                                   turn_rad * (b.S_candidate_query.translation.norm() + at_candidates));
   Disagreement limits;
   limits.fraction = Grown(options_.loop_agree_fraction, shift / a.depth);
@@ -50,21 +56,13 @@ bool LoopGate::Near(const LoopEdge& a, const LoopEdge& b) const {
 }
 
 bool LoopGate::SideBySide(const LoopEdge& a, const LoopEdge& b, const Map& map) {
-  const auto apart = [&map](int x, int y) {
-    return (map(x).T_world_camera.translation - map(y).T_world_camera.translation).norm();
-  };
-  return apart(a.query, b.query) <= a.depth && apart(a.candidate, b.candidate) <= a.depth;
+  return Apart(a.query, b.query, map) <= a.depth && Apart(a.candidate, b.candidate, map) <= a.depth;
 }
 
 bool LoopGate::Agree(const LoopEdge& a, const LoopEdge& b, const Map& map) const {
-  const Place qa = map(a.query), qb = map(b.query), ca = map(a.candidate), cb = map(b.candidate);
-  if (qa.piece != qb.piece || ca.piece != cb.piece) return false;  // no odometry between them
-  const Similarity between_queries(qa.T_world_camera.Inverse() * qb.T_world_camera);
-  const Similarity between_candidates(cb.T_world_camera.Inverse() * ca.T_world_camera);
-  return Within(Measure(internal::LoopCycle(a.S_candidate_query, between_queries, b.S_candidate_query,
-                                            between_candidates),
-                        a.depth),
-                Limits(a, b, map));
+  const bool odometry_between =
+      map(a.query).piece == map(b.query).piece && map(a.candidate).piece == map(b.candidate).piece;
+  return odometry_between && Within(Cycle(a, b, map), Limits(a, b, map));
 }
 
 // Nothing between pieces.

@@ -40,6 +40,11 @@ class LoopGate {
   std::vector<LoopEdge> Offer(const LoopEdge& loop, const std::vector<LoopEdge>& accepted, const Map& map,
                               bool across = false);
 
+  /// How far the cycle of two loops and the map between their ends is from closing.
+  static Disagreement Cycle(const LoopEdge& a, const LoopEdge& b, const Map& map);
+  /// Distance of two keyframes in the map.
+  static double Apart(int x, int y, const Map& map);
+
   /// True if the two loops agree with each other through the odometry between their ends.
   bool Agree(const LoopEdge& a, const LoopEdge& b, const Map& map) const;
 
@@ -62,7 +67,6 @@ class LoopGate {
  private:
   static std::optional<Similarity> InMap(const LoopEdge& loop, const Map& map);  // T_query_candidate
   std::optional<Disagreement> WithMap(const LoopEdge& loop, const Map& map) const;
-  bool Within(const Disagreement& d, const Disagreement& limits) const;
   Disagreement Limits(const LoopEdge& a, const LoopEdge& b, const Map& map) const;
   bool Near(const LoopEdge& a, const LoopEdge& b) const;
   static bool SideBySide(const LoopEdge& a, const LoopEdge& b, const Map& map);

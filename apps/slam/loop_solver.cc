@@ -89,6 +89,10 @@ void Prove(const KeyframeGraph& graph, const std::vector<LoopEdge>& accepted, co
 
 }  // namespace
 
+bool Within(const Disagreement& d, const Disagreement& limits) {
+  return d.fraction <= limits.fraction && d.angle_deg <= limits.angle_deg && d.log_scale <= limits.log_scale;
+}
+
 Disagreement Measure(const Similarity& E, double depth) {
   Disagreement d;
   d.fraction = E.translation.norm() / depth;

@@ -23,6 +23,7 @@ struct Disagreement {
   double log_scale = 0;  ///< |log(scale)|
 };
 Disagreement Measure(const Similarity& E, double depth);
+bool Within(const Disagreement& d, const Disagreement& limits);
 /// Too much for a loop that belongs to an optimised map (loop_after_fraction, loop_after_deg).
 bool Contradicts(const Disagreement& d, const SlamOptions& options);
 

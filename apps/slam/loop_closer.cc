@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <utility>
 
 #include "apps/slam/joining_loops.h"
@@ -34,16 +33,6 @@ std::vector<MapKeyframe> KeyframesOf(const Odometry& odometry) {
   return keyframes;
 }
 
-OdometryUncertainty::Sigmas Larger(const OdometryUncertainty::Sigmas& a,
-                                   const OdometryUncertainty::Sigmas& b) {
-  return {std::max(a.fraction, b.fraction), std::max(a.rotation_rad, b.rotation_rad)};
-}
-
-// Of a contradiction, what that much does not explain.
-double Beyond(const Eigen::Vector3d& contradiction, double explained) {
-  return std::sqrt(std::max(0.0, contradiction.squaredNorm() - explained * explained));
-}
-
 LoopGate::Map Places(const Odometry& odometry) {
   return [&odometry](int id) {
     return LoopGate::Place{odometry.KeyframePiece(id), odometry.KeyframePose(id)};
@@ -57,6 +46,7 @@ LoopCloser::LoopCloser(const RunConfig& config, const CameraRig& rig, SpanRecord
       options_(config.run),
       rig_(rig),
       detector_(config.loops),
+      followed_(config.run, rig.sensor),
       gate_(config.run),
       graph_(GraphOptions(config, rig.sensor)) {}
 
@@ -67,7 +57,7 @@ PoseGraph LoopCloser::Graph(const Odometry& odometry) const {
 }
 
 std::vector<CovisiblePair> LoopCloser::Covisible(const Odometry& odometry) const {
-  if (ImagesJudgeSteps() && adjustments_ == 0) return {};
+  if (followed_.ImagesJudgeSteps() && adjustments_ == 0) return {};
   std::vector<CovisiblePair> covisible;
   for (const auto& [pair, shared] : odometry.Covisibility(options_.covisibility_min_shared))
     covisible.push_back({pair.first, pair.second, shared});
@@ -158,7 +148,7 @@ LoopUpdate LoopCloser::Consider(const LoopRecord& proposed, const Verification& 
   LoopEdge edge = constraint.edge;
   edge.record = records_.size() - 1;
   record.S_candidate_query = edge.S_candidate_query;
-  if (ImagesJudgeSteps()) gate_.SetOdometryUncertainty(Seen());
+  if (followed_.ImagesJudgeSteps()) gate_.SetOdometryUncertainty(followed_.Seen());
   std::vector<LoopEdge> entering = gate_.Offer(edge, accepted_, Places(odometry), across);
   if (entering.empty()) {
     record.pending = true;
@@ -232,7 +222,7 @@ void LoopCloser::Add(int candidate, int query, const Similarity& S_candidate_que
 
 // Somebody else's trajectory that was not moved yet and needs not be.
 bool LoopCloser::LeavesAsItIs(const std::vector<LoopEdge>& entering, const Odometry& odometry) const {
-  if (!followed_ || corrections_ > 0 || solver_.Running()) return false;
+  if (!followed_.begun() || corrections_ > 0 || solver_.Running()) return false;
   std::vector<LoopEdge> loops = deferred_;
   loops.insert(loops.end(), entering.begin(), entering.end());
   return gate_.WithinNoise(loops, Places(odometry));
@@ -262,60 +252,21 @@ LoopUpdate LoopCloser::Enter(std::vector<LoopEdge> entering, const Odometry& odo
   return update;
 }
 
-// Where one step differs, it may be the images that are wrong (a car that drives along), unless they are
-// known to be better than the odometry, or differ by far more than it should.
 void LoopCloser::NoteStep(int keyframe, const StepCheck& check) {
-  constexpr double kOwnSigmas = 3, kSlipSigmas = 5;
-  uncertainty_.Add(check);
-  if (!ImagesJudgeSteps()) return;
-  const OdometryUncertainty::Sigmas seen = Seen(), stated = Stated();
-  const double slip_m = seen.fraction > stated.fraction ? 0 : kSlipSigmas * stated.fraction * check.way_m,
-               slip_rad = seen.rotation_rad > stated.rotation_rad ? 0 : kSlipSigmas * stated.rotation_rad;
-  graph_.NoteMotion(keyframe,
-                    {Beyond(check.translation_m, std::max(kOwnSigmas * check.sigma_translation_m, slip_m)),
-                     Beyond(check.rotation_rad, std::max(kOwnSigmas * check.sigma_rotation_rad, slip_rad))});
+  if (const auto sigma = followed_.NoteStep(check)) graph_.NoteMotion(keyframe, *sigma);
 }
 
 void LoopCloser::NoteMotion(int keyframe, const MotionSigma& sigma, const Eigen::Vector3d& position) {
-  walk_.since_keyframe += sigma;
-  if (keyframe < 0) return;
-  const MotionSigma motion = std::exchange(walk_.since_keyframe, {});
-  graph_.NoteMotion(keyframe, motion);
-  if (walk_.keyframe) {
-    walk_.between_keyframes += motion;
-    walk_.way_m2 += (position - *walk_.keyframe).squaredNorm();
-    if (walk_.motions++ == 0) SetSigmas();
-  }
-  walk_.keyframe = position;
+  const bool said_nothing = followed_.motions() == 0;
+  if (const auto motion = followed_.NoteMotion(keyframe, sigma, position))
+    graph_.NoteMotion(keyframe, *motion);
+  if (said_nothing && followed_.motions() > 0) SetSigmas();  // what is configured no longer counts
 }
 
-// Between two keyframes: by the odometry itself (the mean), else as configured.
-OdometryUncertainty::Sigmas LoopCloser::Stated() const {
-  if (walk_.motions == 0)
-    return {options_.odometry_sigma_fraction, options_.odometry_sigma_deg * internal::kRadians};
-  return {walk_.way_m2 > 0 ? walk_.between_keyframes.translation_m / std::sqrt(walk_.way_m2) : 0,
-          walk_.between_keyframes.rotation_rad / std::sqrt(walk_.motions)};
-}
-
-// Every edge has at least what the images say of all of them, and what is configured; in place of the latter
-// the graph has what the odometry says of each motion.
 void LoopCloser::SetSigmas() {
   constexpr double kLeastRotation_rad = 1e-6;  // an edge is never certain
-  const OdometryUncertainty::Sigmas sigmas = walk_.motions == 0 ? Larger(Seen(), Stated()) : Seen();
-  graph_.SetSigmas(sigmas.fraction, std::max(sigmas.rotation_rad, kLeastRotation_rad));
-}
-
-std::string LoopCloser::Uncertainty() const {
-  const OdometryUncertainty::Sigmas seen = Seen(), stated = Stated();
-  if (seen.fraction < stated.fraction && seen.rotation_rad < stated.rotation_rad) return "";
-  char text[240];
-  std::snprintf(text, sizeof text,
-                "the images contradict the odometry by more than its standard deviation says: between two "
-                "keyframes %.2g of the way and %.2g deg count, instead of %.2g and %.2g deg",
-                std::max(seen.fraction, stated.fraction),
-                std::max(seen.rotation_rad, stated.rotation_rad) * internal::kDegrees, stated.fraction,
-                stated.rotation_rad * internal::kDegrees);
-  return text;
+  const FollowedOdometry::Sigmas least = followed_.Least();
+  graph_.SetSigmas(least.fraction, std::max(least.rotation_rad, kLeastRotation_rad));
 }
 
 // Solves the graph with them beside the tracking; those that come meanwhile wait for their turn.

@@ -11,12 +11,12 @@
 #include <string>
 #include <vector>
 
+#include "apps/slam/followed_odometry.h"
 #include "apps/slam/global_adjuster.h"
 #include "apps/slam/loop_constraint.h"
 #include "apps/slam/loop_gate.h"
 #include "apps/slam/loop_solver.h"
 #include "apps/slam/loop_update.h"
-#include "apps/slam/odometry_uncertainty.h"
 #include "core/section_file.h"
 #include "tutti/core/span_recorder.h"
 #include "tutti/core/trajectory.h"
@@ -72,12 +72,8 @@ class LoopCloser {
   void NoteMotion(int keyframe, const MotionSigma& sigma, const Eigen::Vector3d& position);
   /// The poses are somebody else's: where they differ from all loops by no more than loops err themselves
   /// (LoopGate::WithinNoise), they stay as they are.
-  void FollowOdometry() { followed_ = true; }
-  /// Of the odometry that is followed, between two keyframes: by itself or as configured, and by the images.
-  OdometryUncertainty::Sigmas Stated() const;
-  OdometryUncertainty::Sigmas Seen() const { return uncertainty_.Estimate(); }
-  /// Where the images say more: in plain words, what counts instead; else empty.
-  std::string Uncertainty() const;
+  void FollowOdometry() { followed_.Begin(); }
+  const FollowedOdometry& followed() const { return followed_; }
 
   /// A proposed loop between images without poses.
   void List(const LoopRecord& proposed) { records_.push_back(proposed); }
@@ -146,10 +142,6 @@ class LoopCloser {
  private:
   LoopConstraint Measure(const Verification& verification, int candidate, int query,
                          const Odometry& odometry);
-  /// Whether the images tell of each step of an odometry that is followed how good it is. Not those of one
-  /// camera: landmarks stand where the odometry put them, and what is wrong goes on over many steps (of a
-  /// truth with 0.03 deg between keyframes, kitti_00_head says 0.3).
-  bool ImagesJudgeSteps() const { return followed_ && rig_.sensor != Sensor::kMono; }
   /// Pairs that the pose graph has edges for beside consecutive keyframes. None where images judge steps:
   /// keyframes stand where the odometry says, so a pair would say once more what the steps between it said.
   /// After an adjustment they stand where the images say.
@@ -170,15 +162,7 @@ class LoopCloser {
   CameraRig rig_;
   LoopDetectorOptions detector_;
   std::vector<LoopRecord> records_;
-  bool followed_ = false;            // somebody else's odometry; not saved, as such a map is not
-  OdometryUncertainty uncertainty_;  // of an odometry that is followed; not saved either
-  struct Walk {                      // what that odometry itself says
-    MotionSigma since_keyframe, between_keyframes;
-    std::optional<Eigen::Vector3d> keyframe;  // the last one's position
-    double way_m2 = 0;                        // sum of squares between keyframes
-    int motions = 0;                          // between keyframes
-  };
-  Walk walk_;
+  FollowedOdometry followed_;
   LoopGate gate_;
   KeyframeGraph graph_;
   std::vector<LoopEdge> accepted_;  // in the map

@@ -152,7 +152,7 @@ std::optional<LoopUpdate> LoopClosing::Rest(const Odometry* odometry, std::int64
   if (update) TellRevoked(*update);
   if (update) return update;
   closer_.Finish();
-  const std::string uncertainty = closer_.Uncertainty();
+  const std::string uncertainty = closer_.followed().Warning();
   if (!uncertainty.empty()) warnings_.push_back(uncertainty);
   return update;
 }

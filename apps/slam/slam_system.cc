@@ -427,8 +427,8 @@ int SlamSystem::Corrections() const { return impl_->loops_.closer().Corrections(
 int SlamSystem::GlobalAdjustments() const { return impl_->loops_.closer().Adjustments(); }
 
 FollowedUncertainty SlamSystem::Followed() const {
-  const OdometryUncertainty::Sigmas stated = impl_->loops_.closer().Stated(),
-                                    seen = impl_->loops_.closer().Seen();
+  const FollowedOdometry& followed = impl_->loops_.closer().followed();
+  const FollowedOdometry::Sigmas stated = followed.Stated(), seen = followed.Seen();
   return {stated.fraction, stated.rotation_rad, seen.fraction, seen.rotation_rad};
 }
 

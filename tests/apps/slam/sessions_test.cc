@@ -49,6 +49,13 @@ RunConfig Configured(int threads = 2) {
   return config;
 }
 
+// With one member: the ensemble once is enough.
+RunConfig WithOneMember() {
+  RunConfig config = Configured();
+  config.loops.members = {"orb"};
+  return config;
+}
+
 void TrackAll(const Recording& recording, SlamSystem* slam, std::size_t first = 0) {
   for (std::size_t i = first; i < recording.frames.size(); ++i) slam->Track(recording.frames[i]);
   slam->Finish();
@@ -92,7 +99,7 @@ class Sessions : public ::testing::TestWithParam<SyntheticSensor> {
  protected:
   // A map of one lap, in a file.
   fs::path MapOfALap(const Recording& day) const {
-    SlamSystem slam(Configured(), day.rig);
+    SlamSystem slam(GetParam() == SyntheticSensor::kStereo ? Configured() : WithOneMember(), day.rig);
     TrackAll(day, &slam);
     fs::path file = testing::FreshFolder() / "map.tutti";
     slam.Save(file);
@@ -143,7 +150,7 @@ TEST(SessionsOfAMap, GoOnFromAFileAndTheMapOfTwoSessionsCanBeLocalizedIn) {
   const testing::RenderedWorld world(SessionTown(SyntheticSensor::kStereo));
   const Recording day = Part(world, 0, 120), next = Part(world, 100, 200);
   const fs::path folder = testing::FreshFolder();
-  SlamSystem whole(Configured(), day.rig);
+  SlamSystem whole(WithOneMember(), day.rig);
   TrackAll(day, &whole);
   whole.BeginSession(next.rig);
   constexpr std::size_t kSaved = 30;
@@ -174,7 +181,7 @@ TEST(SessionsOfAMap, AnotherCameraGoesOnInItsOwnPixels) {
   other_options.focal_px = 210;  // 186 px in the other
   const testing::RenderedWorld other(other_options);
   const Recording day = Part(world, 0, kLap), next = Part(other, kLap, other.Size());
-  SlamSystem slam(Configured(), day.rig);
+  SlamSystem slam(WithOneMember(), day.rig);
   TrackAll(day, &slam);
   slam.BeginSession(next.rig);
   EXPECT_EQ(slam.odometry()->Rig().camera.width, 400);
@@ -189,7 +196,7 @@ TEST(SessionsOfAMap, OtherPlacesStandApartAndOtherSensorsAreRefused) {
   const testing::RenderedWorld world(SessionTown(SyntheticSensor::kStereo)),
       elsewhere(SessionTown(SyntheticSensor::kStereo, 7));
   const Recording day = Part(world, 0, 60), next = Part(elsewhere, 0, 60);
-  SlamSystem slam(Configured(), day.rig);
+  SlamSystem slam(WithOneMember(), day.rig);
   EXPECT_NE(testing::ErrorOf([&] { slam.BeginSession(next.rig); }).find("there is no map"),
             std::string::npos);
   TrackAll(day, &slam);
@@ -227,10 +234,8 @@ constexpr double kLater_s = 1000;  // a recording that began after the other one
 
 class Merging : public ::testing::Test {
  protected:
-  static std::unique_ptr<SlamSystem> MapOf(const Recording& recording, int threads = 2) {
-    return MapOf(recording, Configured(threads));
-  }
-  static std::unique_ptr<SlamSystem> MapOf(const Recording& recording, const RunConfig& config) {
+  static std::unique_ptr<SlamSystem> MapOf(const Recording& recording,
+                                           const RunConfig& config = WithOneMember()) {
     auto slam = std::make_unique<SlamSystem>(config, recording.rig);
     TrackAll(recording, slam.get());
     return slam;
@@ -242,7 +247,7 @@ TEST_F(Merging, TwoMapsWithCommonPlacesAreOneForAnyThreads) {
   const Recording a = Part(world, 0, 140), b = Part(world, 90, 240, kLater_s);
   std::string first_bytes;
   for (const int threads : {1, 2}) {
-    std::unique_ptr<SlamSystem> map = MapOf(a, threads), other = MapOf(b, threads);
+    std::unique_ptr<SlamSystem> map = MapOf(a, Configured(threads)), other = MapOf(b, Configured(threads));
     if (threads == 2) {  // as `tutti merge` has them
       const fs::path folder = testing::FreshFolder();
       map->Save(folder / "a");
@@ -275,7 +280,12 @@ TEST_F(Merging, TwoMapsWithCommonPlacesAreOneForAnyThreads) {
 TEST_F(Merging, WhichMapComesFirstDecidesTheFrameOfReferenceAlone) {
   const testing::RenderedWorld world(SessionTown(SyntheticSensor::kStereo));
   const Recording a = Part(world, 0, 140), b = Part(world, 90, 240, kLater_s);
-  const auto first = MapOf(a), to_first = MapOf(b), second = MapOf(b), to_second = MapOf(a);
+  const fs::path folder = testing::FreshFolder(), a_file = folder / "a", b_file = folder / "b";
+  const auto first = MapOf(a), to_first = MapOf(b);
+  first->Save(a_file);
+  to_first->Save(b_file);
+  const auto second = SlamSystem::Load(b_file, ReadMapInfo(b_file)),
+             to_second = SlamSystem::Load(a_file, ReadMapInfo(a_file));
   const Pose first_begin = first->odometry()->KeyframePose(0),
              second_begin = second->odometry()->KeyframePose(0);
   int heard = 0;
@@ -364,7 +374,7 @@ TEST_F(Merging, TheOpenEndOfARoundIsClosed) {
 // The detectors know every fourth keyframe, enough to join the maps in the middle, and propose nothing where
 // the round ends. The search looks at all keyframes.
 TEST_F(Merging, WhatTheDetectorsMissedIsFoundInTheJoinedMap) {
-  RunConfig config = Configured();
+  RunConfig config = WithOneMember();
   config.run.loop_every_keyframes = 4;
   const MergedRound round(110, 19);
   const auto map = MapOf(round.first, config), other = MapOf(round.second, config);

@@ -37,6 +37,17 @@ function(tutti_compile_options target)
   endif()
 endfunction()
 
+# tutti_pure(file...): files of this folder that only compute what their arguments say, in one thread, and keep nothing
+# (tests/configure/pure_sources_test.py). The thread sanitizer does not follow each pixel through them, which is most of
+# what it costs; what is handed to and by them it sees in their callers.
+function(tutti_pure)
+  list(TRANSFORM ARGN PREPEND "${CMAKE_CURRENT_SOURCE_DIR}/" OUTPUT_VARIABLE files)
+  set_property(GLOBAL APPEND PROPERTY TUTTI_PURE_SOURCES ${files})
+  if(TUTTI_SANITIZE STREQUAL "thread")
+    set_property(SOURCE ${ARGN} APPEND PROPERTY COMPILE_OPTIONS -fno-sanitize=thread)
+  endif()
+endfunction()
+
 # tutti_compile_quickly(target): -O1 for code that reads words and writes texts, and for tests; the templates of CLI11, of
 # the JSON library and of GTest take half as long again with -O3. Never for code that computes.
 function(tutti_compile_quickly target)

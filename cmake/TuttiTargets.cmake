@@ -37,9 +37,9 @@ function(tutti_compile_options target)
   endif()
 endfunction()
 
-# tutti_pure(file...): files of this folder that only compute what their arguments say, in one thread, and keep nothing
-# (tests/configure/pure_sources_test.py). The thread sanitizer does not follow each pixel through them, which is most of
-# what it costs; what is handed to and by them it sees in their callers.
+# tutti_pure(file...): files of this folder that only compute on their arguments and on the object that they are called
+# for, in one thread (tests/configure/pure_sources_test.py). The thread sanitizer does not follow each pixel and descriptor
+# through them, which is most of what it costs; what is handed to and by them it sees in their callers.
 function(tutti_pure)
   list(TRANSFORM ARGN PREPEND "${CMAKE_CURRENT_SOURCE_DIR}/" OUTPUT_VARIABLE files)
   set_property(GLOBAL APPEND PROPERTY TUTTI_PURE_SOURCES ${files})

@@ -1,17 +1,20 @@
 #include "apps/run/interrupt.h"
 
+#include <atomic>
+
 namespace tutti {
 namespace {
 
-// A signal handler can reach nothing but a global.
-volatile std::sig_atomic_t requested = 0;
+// A signal handler can reach nothing but a global. Any thread may be the one that is interrupted.
+std::atomic<bool> requested = false;
+static_assert(std::atomic<bool>::is_always_lock_free);
 
-extern "C" void OnSignal(int) { requested = 1; }
+extern "C" void OnSignal(int) { requested = true; }
 
 }  // namespace
 
 InterruptGuard::InterruptGuard() {
-  requested = 0;
+  requested = false;
   for (std::size_t i = 0; i < kSignals.size(); ++i) {
     const int signal = kSignals[i];
     sigaction(signal, nullptr, &old_[i]);
@@ -29,6 +32,6 @@ InterruptGuard::~InterruptGuard() {
   for (std::size_t i = 0; i < kSignals.size(); ++i) sigaction(kSignals[i], &old_[i], nullptr);
 }
 
-bool InterruptGuard::Requested() { return requested != 0; }
+bool InterruptGuard::Requested() { return requested; }
 
 }  // namespace tutti

@@ -2,6 +2,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <csignal>
 #include <cstdio>
 #include <memory>
@@ -20,8 +21,10 @@
 namespace tutti::cli {
 namespace {
 
-volatile std::sig_atomic_t interrupted = 0;
-void OnInterrupt(int) { interrupted = 1; }
+// Any of the threads may be the one that is interrupted.
+std::atomic<bool> interrupted = false;
+static_assert(std::atomic<bool>::is_always_lock_free);
+void OnInterrupt(int) { interrupted = true; }
 
 struct GenerateArguments {
   std::string out, sensor, scene = "town";
@@ -50,7 +53,7 @@ class ProgressLine {
                    terminal && done != total ? "   " : "\n");
       last_tenth_ = tenth;
     }
-    return interrupted == 0;
+    return !interrupted;
   }
 
  private:
@@ -70,7 +73,7 @@ int ChangeImages(const GenerateArguments& arguments) {
   o.force = arguments.force;
   ProgressLine progress;
   o.progress = [&progress](std::size_t done, std::size_t total) { return progress(done, total); };
-  interrupted = 0;
+  interrupted = false;
   const auto before = std::signal(SIGINT, OnInterrupt);
   const ChangedImages result = WriteChangedImages(change, o);
   std::signal(SIGINT, before);
@@ -110,7 +113,7 @@ int Generate(const GenerateArguments& arguments) {
   write.threads = arguments.Threads();
   ProgressLine progress;
   write.progress = [&progress](std::size_t done, std::size_t total) { return progress(done, total); };
-  interrupted = 0;
+  interrupted = false;
   const auto before = std::signal(SIGINT, OnInterrupt);
   const std::size_t written = WriteSyntheticDataset(world, arguments.out, write);
   std::signal(SIGINT, before);

@@ -15,8 +15,17 @@
 #include "tutti/core/text.h"
 #include "tutti/slam/version.h"
 
+// Of OpenMP, which comes with CHOLMOD; null without it.
+extern "C" __attribute__((weak)) void omp_set_max_active_levels(int levels);
+
 namespace tutti::cli {
 namespace {
+
+// CHOLMOD would start up to four threads, whatever --threads says, and keep them: a process that has some
+// can't be copied (RunApart).
+void StartNoThreadsOfOpenMp() {
+  if (omp_set_max_active_levels != nullptr) omp_set_max_active_levels(0);
+}
 
 struct Command {
   const char* name;
@@ -70,6 +79,7 @@ std::string UnknownCommand(const std::string& word, const std::vector<std::strin
 }  // namespace
 
 int RunProgram(int argc, char** argv, const std::map<std::string, SetUp>& own, int (*other)(char** argv)) {
+  StartNoThreadsOfOpenMp();
   CLI::App app{"tutti: visual SLAM with an ensemble of Bayesian loop-closure filters", "tutti"};
   app.formatter(std::make_shared<WrappedHelp>(internal::TerminalColumns(stdout)));
   app.require_subcommand(1);

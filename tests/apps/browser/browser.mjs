@@ -38,7 +38,7 @@ export async function openPage(browser, url, { viewport = DESKTOP, scheme = 'lig
   });
   await page.emulateMediaFeatures([{ name: 'prefers-color-scheme', value: scheme }]);
   await page.setViewport(viewport);
-  await page.goto(url, { waitUntil: 'load' });
+  await page.goto(url, { waitUntil: 'load', timeout: 120000 });
   return { page, problems };
 }
 

@@ -5,9 +5,10 @@ usage: ./dev bench close [ROW...] [--write]
 
 Rows: `own`, the trajectory that `tutti run` has without loops on kitti_00_head, beside `tutti run` with them; `walk`, the ground
 truth of kitti_00_head with a random walk of yaw and scale (1 sigma after one metre) from fixed seeds; `kitchen`, the same of
-redkitchen, seen by COLMAP's poses of every fifth image, too; `published`, ORB-SLAM's and S-PTAM's trajectories of KITTI 00, the frames of kitti_00_head. Drift at the loop: error
-of a pose, seen from the earlier one that is nearest to it in truth; median over all poses that come back to a place. ATE is after
-SE(3) alignment, of own and ORB-SLAM's after Sim(3).
+redkitchen, seen by COLMAP's poses of every fifth image, too (COLMAP takes 10 to 20 minutes; --reuse takes those that are there);
+`published`, ORB-SLAM's and S-PTAM's trajectories of KITTI 00, the frames of kitti_00_head. Drift at the loop: error of a pose,
+seen from the earlier one that is nearest to it in truth; median over all poses that come back to a place. ATE is after SE(3)
+alignment, of own and ORB-SLAM's after Sim(3).
 """
 import json
 import math
@@ -132,7 +133,7 @@ def kitchen(a):
     stamps.parent.mkdir(parents=True, exist_ok=True)
     stamps.write_text("".join(f"{s:.9f}\n" for s in read))
     truth = [matrix(p) for p in read.values()]
-    files = [data / line.split()[1] for line in (data / "rgb.txt").read_text().splitlines() if line and not line.startswith("#")]
+    files = table.tum_images(data)
     if len(files) != len(truth):
         raise RuntimeError(f"{data}: {len(files)} images, {len(truth)} true poses")
     others = in_scale_of(truth, structure_from_motion.poses({k: files[k] for k in range(0, len(files), EVERY)}, KITCHEN_CAMERA,

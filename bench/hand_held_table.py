@@ -27,12 +27,8 @@ def video(a, data, crf):
     out = a.out / f"redkitchen-crf{crf}.mp4"
     if out.exists():
         return out
-    names = [line.split()[1] for line in open(data / "rgb.txt") if not line.startswith("#")]
     order = a.out / "order"
-    shutil.rmtree(order, ignore_errors=True)
-    order.mkdir()
-    for i, name in enumerate(names):
-        (order / f"{i:06d}.jpg").symlink_to(data / name)
+    table.link_numbered(dict(enumerate(table.tum_images(data))), order)
     part = out.with_suffix(".part.mp4")
     subprocess.run(["ffmpeg", "-loglevel", "error", "-y", "-framerate", str(RATE_HZ), "-i", order / "%06d.jpg", "-c:v", "libx264",
                     "-crf", str(crf), "-pix_fmt", "yuv420p", part], check=True)

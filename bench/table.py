@@ -42,6 +42,19 @@ def parse(p, rows=()):
     return a
 
 
+def tum_images(data):
+    """The colour images of a folder in TUM's layout, in the order of rgb.txt."""
+    return [data / line.split()[1] for line in (data / "rgb.txt").read_text().splitlines() if line and not line.startswith("#")]
+
+
+def link_numbered(images, folder):
+    """Makes a folder anew, with a link for each {number: file}, named by its number."""
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    for number, file in images.items():
+        (folder / f"{number:06d}{file.suffix}").symlink_to(file.resolve())
+
+
 def put(a, document, text):
     """Shows a document, and writes it if --write says so."""
     if not a.write:

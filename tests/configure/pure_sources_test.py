@@ -14,7 +14,8 @@ THREADS = re.compile(r"\b(?:std::(?:j?thread|async|future|promise|(?:\w+_)?mutex
                      r"RunParallel|parallel_for_?|pthread_\w+|volatile|mutable|const_cast)\b")
 # A flag that says "stop", given by reference or pointer to const, is read; every other atomic is shared state.
 ATOMIC = re.compile(r"(?<!const )\bstd::atomic\b")
-STATIC = re.compile(r"\bstatic\s+(?!const\b|constexpr\b|inline constexpr\b)[^;{}()=]*(?:[;{=]|\((?!.*?\)\s*(?:const\s*)?\{))", re.S)
+# Not a function, whose parameters are followed by its body.
+STATIC = re.compile(r"\bstatic\s+(?!const\b|constexpr\b)[^;{}()=]*(?:[;{=]|\((?![^;{]*\)\s*(?:const\s*)?\{))")
 NAMESPACE_VARIABLE = re.compile(r"^(?!(?:using|namespace|class|struct|enum|template|typedef|return|const|constexpr|inline|static|static_assert|"
                                 r"extern|friend|public|private|case|default)\b)[A-Za-z_][\w:<>,& *]*\s\w+(?:\s*=[^;()]*|\[[^;]*)?;", re.M)
 
@@ -31,7 +32,7 @@ def faults(text):
 def self_test():
     refused = ["void F() { std::thread([] {}); }", "static int calls = 0;", "void F() { static cv::Mat kept; }", "std::mutex lock;",
                "int calls = 0;", "std::vector<int> found;", "void F(std::atomic<int>* n) { ++*n; }", "RunParallel(2, 2, work);",
-               "static std::map<int, int> known;", "void F() { static int known{3}; }",
+               "static std::map<int, int> known;", "static int calls(5);\nvoid F() {\n}", "void F() { static int known{3}; }",
                "class S {\n  mutable int last_;\n};"]
     allowed = ["static const int kA = 1;", "constexpr int kB = 2;", "const double kC[] = {1, 2};", "static int Twice(int a) { return 2 * a; }",
                "bool Go(const std::atomic<bool>* stop);", "void F() {\n  int local = 0;\n}", "// std::thread\n", "using A = int;",

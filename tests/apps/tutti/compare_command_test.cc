@@ -257,8 +257,8 @@ TEST(CompareCommand, RunsEveryVariantFromEveryFirstFrameAndWritesTheTable) {
   EXPECT_THAT(collected.output, HasSubstr("ensemble"));
 }
 
-// As long as the map is adjusted in the end, for which CHOLMOD would start threads: the thread sanitizer ends
-// a copy of a process that had some. Without it, all that can be seen is that no copy waits for them.
+// The map is adjusted in the end, for which CHOLMOD would start threads. The thread sanitizer ends a copy of
+// a process that had some; without it, all that can be seen is that no copy waits for them.
 TEST(CompareCommand, VariantsAreCopiesOfAProcessWithoutOtherThreads) {
   SyntheticOptions options = testing::SmallStereoTown(320, 160);
   options.frames = 40;

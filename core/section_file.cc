@@ -138,9 +138,10 @@ void SectionWriter::Fail(const std::string& why) const {
 }
 
 SectionReader::SectionReader(const fs::path& file, const SectionFileKind& kind)
-    : name_(file.string()), in_(file, std::ios::binary), packer_(std::make_unique<SectionPacker>()) {
-  std::error_code error;
-  if (!fs::is_regular_file(file, error) || !in_) {
+    : name_(file.string()), packer_(std::make_unique<SectionPacker>()) {
+  std::error_code error;  // nothing else is opened: one waits at a pipe without end
+  if (fs::is_regular_file(file, error)) in_.open(file, std::ios::binary);
+  if (!in_.is_open()) {
     throw InputError(name_ + ": can't be read (no such file, or no permission)");
   }
   size_ = left_ = fs::file_size(file, error);

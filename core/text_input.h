@@ -3,23 +3,11 @@
 
 #include <algorithm>
 #include <cctype>
-#include <istream>
 #include <string>
 
 #include "tutti/core/text.h"
 
 namespace tutti::internal {
-
-/// Editors of Windows begin a text in UTF-8 with three bytes that belong to no word. To be called before the
-/// first line is read.
-inline void SkipByteOrderMark(std::istream& in) {
-  if (in.peek() != 0xEF) return;
-  char mark[3] = {};
-  in.read(mark, 3);
-  if (in && mark[1] == '\xBB' && mark[2] == '\xBF') return;
-  in.clear();
-  in.seekg(0);
-}
 
 /// The beginning of a word that may be as long as a file, for a message.
 inline std::string Excerpt(const std::string& word) {

@@ -5,6 +5,7 @@
 
 #include "core/angle.h"
 #include "core/text_input.h"
+#include "core/text_reader.h"
 #include "core/tum_line.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
@@ -20,15 +21,10 @@ namespace {
 // Calls `use` for each line that carries data; '#' starts a comment.
 void ForEachLine(const std::filesystem::path& file,
                  const std::function<void(std::size_t, const std::vector<std::string>&)>& use) {
-  std::error_code ignored;
-  if (std::filesystem::is_directory(file, ignored)) {
-    throw InputError(file.string() + ": is a folder; give a file");
-  }
-  std::ifstream in(file);
-  if (!in) throw InputError(file.string() + ": can't be opened; check the path and that it is readable");
+  internal::TextReader in(file);
   std::string text;
-  internal::SkipByteOrderMark(in);
-  for (std::size_t line = 1; std::getline(in, text); ++line) {
+  while (in.Next(text)) {
+    const std::size_t line = in.number();
     const std::size_t comment = text.find('#');
     if (comment != std::string::npos) text.resize(comment);
     const std::string comma = internal::DecimalComma(text);
@@ -187,11 +183,9 @@ TrajectoryFormat GuessTrajectoryFormat(const std::filesystem::path& file) {
   if (std::filesystem::exists(file, code) && !std::filesystem::is_regular_file(file, code))
     throw InputError(file.string() +
                      ": is no file, so that its format can't be guessed; name it, or give a file");
-  std::ifstream in(file);
-  if (!in) throw InputError(file.string() + ": can't be opened; check the path and that it is readable");
-  internal::SkipByteOrderMark(in);
+  internal::TextReader in(file);
   std::string text;
-  while (std::getline(in, text)) {
+  while (in.Next(text)) {
     const std::vector<std::string> words = SplitText(text);
     if (words.empty() || words[0][0] == '#') continue;
     const bool decimal_comma = !internal::DecimalComma(text).empty();

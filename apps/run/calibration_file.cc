@@ -4,12 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <initializer_list>
 #include <sstream>
 #include <vector>
 
 #include "core/camera_text.h"
+#include "core/text_reader.h"
 #include "frontend/dataset/sensor_yaml.h"
 #include "tutti/core/error.h"
 #include "tutti/slam/config.h"
@@ -23,17 +23,12 @@ namespace fs = std::filesystem;
 class CalibrationText {
  public:
   explicit CalibrationText(const fs::path& file) : file_(file) {
-    std::error_code ignored;
-    std::ifstream in(file);
-    if (!in || fs::is_directory(file, ignored))
-      throw InputError(
-          file.string() +
-          ": can't be opened; --calibration needs a YAML file of Kalibr, ORB-SLAM, OpenCV or ROS");
-    std::string line;
-    while (std::getline(in, line)) {
-      // OpenCV's "%YAML:1.0" is no YAML.
-      text_ += (line.rfind("%YAML", 0) == 0 ? std::string() : line) + "\n";
-    }
+    constexpr std::size_t kMostBytes = 10'000'000;
+    text_ = internal::ReadText(file, "--calibration needs a YAML file of Kalibr, ORB-SLAM, OpenCV or ROS",
+                               kMostBytes);
+    // OpenCV's "%YAML:1.0" is no YAML.
+    const std::size_t directive = ("\n" + text_).find("\n%YAML");
+    if (directive != std::string::npos) text_.erase(directive, text_.find('\n', directive) - directive);
     try {
       root_ = YAML::Load(text_);
     } catch (const YAML::Exception& e) {

@@ -56,6 +56,8 @@ std::string Reason(int error, const std::exception& thrown) {
 }
 
 nlohmann::json ReadJson(const fs::path& file) {
+  std::error_code ignored;
+  if (!fs::is_regular_file(file, ignored)) return nlohmann::json::object();
   std::ifstream in(file);
   nlohmann::json json = nlohmann::json::parse(in, nullptr, false);
   return json.is_object() ? json : nlohmann::json::object();

@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <memory>
 
 #include "apps/run/calibration_file.h"
@@ -10,6 +9,7 @@
 #include "core/angle.h"
 #include "core/camera_text.h"
 #include "core/example_configs.h"
+#include "core/text_reader.h"
 #include "frontend/dataset/image_file.h"
 #include "tutti/core/error.h"
 #include "tutti/frontend/dataset.h"
@@ -151,9 +151,8 @@ class Recogniser {
   bool HasConfiguration() const {
     std::error_code ignored;
     if (!fs::is_regular_file(dataset_ / kConfiguration, ignored)) return false;
-    for (std::ifstream in(dataset_ / kConfiguration); in.good();) {
-      std::string line;
-      std::getline(in, line);
+    internal::TextReader in(dataset_ / kConfiguration);
+    for (std::string line; in.Next(line);) {
       if (line.rfind("dataset:", 0) == 0) return true;
     }
     return false;

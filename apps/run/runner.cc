@@ -70,6 +70,11 @@ RunResult RunSlam(const RunRequest& request, const RunConfig& given) {
   const auto reference = ReadReference(*dataset, request, &warnings);
   const InterruptGuard guard;
   if (request.map) RefuseToReplace(request.out, *request.map);
+  if (request.odometry) {
+    RefuseToReplace(request.out, request.odometry->trajectory);
+    for (const auto& beside : {request.odometry->times, request.odometry->sigmas})
+      if (beside) RefuseToReplace(request.out, *beside);
+  }
   OutputFolder folder = OpenOutputFolder(request, reference ? fs::path(reference->second) : fs::path());
   if (request.trace) CheckTrace(*request.trace);
   if (!request.quiet) {

@@ -3,7 +3,6 @@
 #include <yaml-cpp/eventhandler.h>
 
 #include <algorithm>
-#include <fstream>
 #include <map>
 #include <optional>
 #include <set>
@@ -13,6 +12,7 @@
 #include "apps/slam/config_table.h"
 #include "core/example_configs.h"
 #include "core/terminal.h"
+#include "core/text_reader.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 
@@ -184,19 +184,10 @@ RunConfig ParseConfig(const std::string& text, const std::string& name) {
 }
 
 RunConfig LoadConfig(const std::filesystem::path& file) {
-  std::error_code ignored;
-  if (std::filesystem::is_directory(file, ignored)) {
-    throw InputError(file.string() + ": is a folder; --config needs a YAML file such as " +
-                     internal::ExampleConfigs() + "/images.yaml");
-  }
-  std::ifstream in(file);
-  if (!in) {
-    throw InputError(file.string() + ": can't be opened; --config needs a YAML file such as " +
-                     internal::ExampleConfigs() + "/images.yaml");
-  }
-  std::ostringstream text;
-  text << in.rdbuf();
-  return ParseConfig(text.str(), file.string());
+  constexpr std::size_t kMostBytes = 10'000'000;
+  const std::string advice =
+      "--config needs a YAML file such as " + internal::ExampleConfigs() + "/images.yaml";
+  return ParseConfig(internal::ReadText(file, advice, kMostBytes), file.string());
 }
 
 void SetOptions(const std::vector<std::string>& assignments, RunConfig& config) {

@@ -55,12 +55,15 @@ std::string FolderAbove(const fs::path& summary) {
 void RunCollect(const CollectArguments& arguments) {
   const TableFormat format = ParseTableFormat(arguments.table_format);
   Comparison comparison;
+  std::vector<std::string> read;
   for (const std::string& where : arguments.runs) {
     for (const fs::path& file : Summaries(where)) {
+      read.push_back(file);
       comparison.runs.push_back(ReadRunFigures(file));
       if (arguments.by_folder) comparison.runs.back().variant = FolderAbove(file);
     }
   }
+  KeepInputs(read, {arguments.json, arguments.report});
   std::fputs(DescribeComparison(comparison, format, arguments.choice).c_str(), stdout);
   if (!arguments.report.empty()) {
     if (!ReportsAvailable()) throw InputError("--report: " + ReportsMissing());

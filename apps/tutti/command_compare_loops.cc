@@ -1,6 +1,5 @@
 // tutti compare-loops: the paper's t-test between rules, over several image sets.
 #include <cstdio>
-#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -23,9 +22,7 @@ struct CompareLoopsArguments {
 };
 
 Json ReadTable(const std::string& file) {
-  std::ifstream in(file);
-  if (!in) throw InputError(file + ": can't be opened; give a table.json of `tutti loops --table`");
-  Json table = Json::parse(in, nullptr, false);
+  Json table = ReadJson(file, "give a table.json of `tutti loops --table`");
   if (!table.is_object() || !table.contains("rules") || !table.contains("best_single"))
     throw InputError(file + ": is no table.json of `tutti loops --table`");
   return table;
@@ -53,6 +50,7 @@ std::vector<double> Recalls(const CompareLoopsArguments& arguments, const std::v
 }
 
 int CompareLoops(const CompareLoopsArguments& arguments) {
+  KeepInputs(arguments.tables, {arguments.out});
   std::vector<Json> tables;
   for (const std::string& file : arguments.tables) tables.push_back(ReadTable(file));
   Json tests = Json::array();

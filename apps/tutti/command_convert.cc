@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "apps/tutti/commands.h"
+#include "apps/tutti/files.h"
 #include "tutti/backend/trajectory_file.h"
 #include "tutti/core/error.h"
 
@@ -20,6 +21,7 @@ void RunConvert(const ConvertArguments& arguments) {
   std::optional<PoseFileFormat> from;
   if (arguments.from != "auto") from = ParsePoseFileFormat(arguments.from);
   const PoseFileFormat to = ParsePoseFileFormat(arguments.to);
+  KeepInputs({arguments.in, arguments.times}, {arguments.out, arguments.times_out});
   std::vector<double> times;
   if (!arguments.times.empty()) times = ReadTimes(arguments.times);
   const PoseFile in = ReadPoseFile(arguments.in, from, times);

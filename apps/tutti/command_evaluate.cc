@@ -51,6 +51,7 @@ int RunEvaluate(const EvaluateArguments& arguments) {
     return 0;
   }
   RequireFiles(input);
+  KeepInputs(FilesOf(input), {arguments.json, arguments.errors});
   std::optional<PublishedComparison> published;
   if (against) published.emplace(arguments.against, input);
   const std::vector<EvaluatedEstimate> estimates = EvaluateInput(input);

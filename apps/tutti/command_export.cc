@@ -10,6 +10,7 @@
 #include "apps/run/run_note.h"
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
+#include "apps/tutti/files.h"
 #include "tutti/core/error.h"
 #include "tutti/slam/map_file.h"
 #include "tutti/slam/slam_system.h"
@@ -58,6 +59,9 @@ std::unique_ptr<Dataset> OpenImages(const ExportArguments& arguments, const MapI
 
 void RunExport(const ExportArguments& arguments) {
   const fs::path file = MapFile(arguments.map);
+  const ExportRequest& wanted = arguments.request;
+  for (const auto& out : {wanted.landmarks, wanted.transforms, wanted.g2o, wanted.tum})
+    KeepInputs({file}, {out.value_or("")});
   const MapInfo info = ReadMapInfo(file);
   const std::unique_ptr<SlamSystem> slam = SlamSystem::Load(file, info);
   if (slam->AppearanceOnly())

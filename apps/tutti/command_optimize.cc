@@ -154,6 +154,7 @@ void RunOptimize(OptimizeArguments arguments) {
   arguments.options.objective = ParseGraphObjective(arguments.objective);
   arguments.options.robust = ParseRobustLoss(arguments.robust);
   arguments.options.solver = ParsePoseGraphSolver(arguments.solver);
+  KeepInputs({arguments.in}, {arguments.out, arguments.json});
   const PoseGraphOptimizer optimizer(arguments.options);
   G2oFile file = ReadG2o(arguments.in, ParseBadInformation(arguments.bad_information));
   for (const std::string& warning : file.warnings)

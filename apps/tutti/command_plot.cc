@@ -8,6 +8,7 @@
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/evaluation_input.h"
+#include "apps/tutti/files.h"
 #include "apps/tutti/trajectory_plots.h"
 #include "tutti/core/error.h"
 
@@ -23,6 +24,7 @@ struct PlotArguments {
 
 std::vector<PlotShape> Shapes(const PlotArguments& arguments) {
   const EvaluationInput input = Resolved(arguments.input);
+  KeepInputs(FilesOf(input), arguments.out);
   if (input.estimates.empty())
     throw InputError("there is no trajectory; give one or several as `tutti plot FILE...`");
   if (input.reference.empty()) {

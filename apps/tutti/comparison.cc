@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <set>
 #include <tuple>
 
 #include "apps/tutti/comparison_columns.h"
+#include "apps/tutti/files.h"
 #include "apps/tutti/stage_times.h"
 #include "tutti/core/error.h"
 #include "tutti/core/significance.h"
@@ -199,9 +199,7 @@ std::string Describe(const Sample& sample) {
 }
 
 RunFigures ReadRunFigures(const std::filesystem::path& summary) {
-  std::ifstream in(summary);
-  if (!in) throw InputError(summary.string() + ": can't be opened; give the summary.json of a run");
-  const Json json = Json::parse(in, nullptr, false);
+  const Json json = ReadJson(summary, "give the summary.json of a run");
   if (!json.is_object() || !json.contains("frames") || !json.contains("loops"))
     throw InputError(summary.string() + ": is no summary.json of `tutti run`");
   RunFigures run;

@@ -1,10 +1,10 @@
 // Which files are compared: by option, by place, or those of a run.
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "apps/tutti/evaluation_input.h"
+#include "apps/tutti/files.h"
 #include "tutti/core/error.h"
 
 namespace tutti::cli {
@@ -30,13 +30,9 @@ void TakeFormat(EvaluationInput& input) {
 
 Json Summary(const fs::path& folder) {
   const fs::path file = folder / "summary.json";
-  std::ifstream in(file);
-  if (!in) {
-    throw InputError("--run: " + file.string() +
-                     " can't be opened; give the folder of a `tutti run` that has "
-                     "finished, or its trajectory_live.txt as a file");
-  }
-  Json json = Json::parse(in, nullptr, false);
+  Json json = ReadJson(file,
+                       "--run takes the folder of a `tutti run` that has finished; of one that has not, give "
+                       "trajectory_live.txt as a file");
   if (!json.is_object()) throw InputError("--run: " + file.string() + ": is no summary of `tutti run`");
   return json;
 }
@@ -110,6 +106,12 @@ EvaluationInput Resolved(EvaluationInput input) {
   input.runs.clear();
   if (input.align.empty()) input.align = "se3";
   return input;
+}
+
+std::vector<std::string> FilesOf(const EvaluationInput& input) {
+  std::vector<std::string> files = input.estimates;
+  for (const std::string& file : {input.reference, input.times, input.frames}) files.push_back(file);
+  return files;
 }
 
 }  // namespace tutti::cli

@@ -37,6 +37,9 @@ void AddEvaluationOptions(CLI::App& command, EvaluationInput& input);
 /// and formats are set then. Throws InputError if there is no such run, or if runs differ.
 EvaluationInput Resolved(EvaluationInput input);
 
+/// All files that are read. `input`: resolved.
+std::vector<std::string> FilesOf(const EvaluationInput& input);
+
 /// Throws InputError that says how to call the command if there is no reference or no estimate. `input`:
 /// resolved.
 void RequireFiles(const EvaluationInput& input);

@@ -3,6 +3,7 @@
 #include <fstream>
 #include <system_error>
 
+#include "core/text_reader.h"
 #include "tutti/core/error.h"
 
 namespace tutti::cli {
@@ -23,6 +24,21 @@ std::filesystem::path DefaultOutput(const std::string& recording, const std::str
 
 std::string JsonText(const nlohmann::ordered_json& json) {
   return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+}
+
+nlohmann::ordered_json ReadJson(const std::filesystem::path& file, const std::string& advice) {
+  constexpr std::size_t kMostBytes = 200'000'000;
+  return nlohmann::ordered_json::parse(internal::ReadText(file, advice, kMostBytes), nullptr, false);
+}
+
+void KeepInputs(const std::vector<std::string>& read, const std::vector<std::string>& written) {
+  for (const std::string& out : written) {
+    for (const std::string& in : read) {
+      std::error_code none;  // one of them is not there
+      if (std::filesystem::is_regular_file(out, none) && std::filesystem::equivalent(in, out, none))
+        throw InputError(out + ": is read, and would be overwritten by the result; choose another name");
+    }
+  }
 }
 
 void WriteText(const std::filesystem::path& file, const std::string& text) {

@@ -3,6 +3,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <system_error>
 
@@ -32,11 +33,12 @@ bool Overflows(const std::string& text) {
   return last == text.data() + text.size() && error == std::errc::result_out_of_range;
 }
 
+template <class Whole>
 std::string RefuseWhole(const std::string& text) {
-  const bool negative = text.rfind('-', 0) == 0;
-  const std::string digits = text.rfind('+', 0) == 0 ? text.substr(1) : text;
-  if (!(negative ? Overflows<std::int64_t>(digits) : Overflows<std::uint64_t>(digits))) return {};
-  return "'" + text + "' is beyond the whole numbers of 64 bits (18446744073709551615)";
+  if (!Overflows<Whole>(text.rfind('+', 0) == 0 ? text.substr(1) : text)) return {};
+  const long long least = std::numeric_limits<Whole>::min();
+  return "'" + text + "' does not fit; give a whole number from " + std::to_string(least) + " to " +
+         std::to_string(std::numeric_limits<Whole>::max());
 }
 
 std::string RefuseThreads(const std::string& text) {
@@ -57,7 +59,8 @@ void RefuseAbsurdNumbers(CLI::App& command) {
     const std::string type = option->get_type_name();
     const std::string kind = type.substr(0, type.find(':'));
     if (kind == "FLOAT" || kind == "SECONDS") option->check(CheckedBy(RefuseReal));
-    if (kind == "INT" || kind == "UINT") option->check(CheckedBy(RefuseWhole));
+    if (kind == "INT") option->check(CheckedBy(RefuseWhole<int>));
+    if (kind == "UINT") option->check(CheckedBy(RefuseWhole<std::uint64_t>));
     if (option->check_lname("threads")) option->check(CheckedBy(RefuseThreads));
   }
 }

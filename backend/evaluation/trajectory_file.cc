@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <fstream>
 
-#include "core/text_input.h"
+#include "core/text_reader.h"
 #include "tutti/backend/g2o_io.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
@@ -25,10 +25,9 @@ TrajectoryFormat CoreFormat(PoseFileFormat format) {
 
 /// The first word that carries data; empty if there is none.
 std::string FirstWord(const std::filesystem::path& file) {
-  std::ifstream in(file);
-  internal::SkipByteOrderMark(in);
+  internal::TextReader in(file);
   std::string text;
-  while (std::getline(in, text)) {
+  while (in.Next(text)) {
     const std::vector<std::string> words = SplitText(text);
     if (!words.empty() && words[0][0] != '#') return words[0];
   }

@@ -1,6 +1,5 @@
 #include <array>
 #include <cmath>
-#include <fstream>
 #include <map>
 #include <optional>
 #include <set>
@@ -8,6 +7,7 @@
 #include "backend/graph/bad_information.h"
 #include "backend/graph/graph_structure.h"
 #include "core/text_input.h"
+#include "core/text_reader.h"
 #include "tutti/backend/g2o_io.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
@@ -37,20 +37,15 @@ class Reader {
   Reader(const std::filesystem::path& file, BadInformation bad) : file_(file), bad_(bad) {}
 
   G2oFile Read() {
-    std::error_code ignored;
-    if (std::filesystem::is_directory(file_, ignored))
-      throw InputError(file_.string() + ": is a folder; give a g2o file");
-    std::ifstream in(file_);
-    if (!in) throw InputError(file_.string() + ": can't be opened; check the path and that it is readable");
-    internal::SkipByteOrderMark(in);
+    internal::TextReader in(file_, "give a readable g2o file");
     std::string text;
-    for (line_ = 1; std::getline(in, text); ++line_) {
+    while (in.Next(text)) {
+      line_ = in.number();
       const std::size_t comment = text.find('#');
       if (comment != std::string::npos) text.resize(comment);
       words_ = SplitText(text, " \t\r");
       if (!words_.empty()) ReadLine();
     }
-    if (in.bad()) throw InputError(file_.string() + ": could not be read to its end");
     return Build();
   }
 

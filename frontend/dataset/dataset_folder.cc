@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <opencv2/imgproc.hpp>
 
 #include "core/text_input.h"
+#include "core/text_reader.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 
@@ -15,20 +15,14 @@ std::string At(const std::filesystem::path& file, std::size_t line) {
 }
 
 std::vector<TextLine> ReadTextLines(const std::filesystem::path& file) {
-  std::error_code code;  // a pipe would be waited for without end
-  std::ifstream in;
-  if (std::filesystem::is_regular_file(file, code)) in.open(file);
-  if (!in.is_open()) {
-    throw InputError(file.string() + ": can't be opened; check that it is a readable file");
-  }
-  internal::SkipByteOrderMark(in);
+  internal::TextReader in(file);
   std::vector<TextLine> lines;
   std::string text;
-  for (std::size_t number = 1; std::getline(in, text); ++number) {
+  while (in.Next(text)) {
     const std::size_t comment = text.find('#');
     if (comment != std::string::npos) text.resize(comment);
     std::vector<std::string> words = SplitText(text);
-    if (!words.empty()) lines.push_back({number, std::move(words), text});
+    if (!words.empty()) lines.push_back({in.number(), std::move(words), text});
   }
   return lines;
 }

@@ -4,6 +4,7 @@
 #include <map>
 #include <mutex>
 
+#include "core/text_reader.h"
 #include "frontend/dataset/dataset_folder.h"
 #include "frontend/dataset/video_input.h"
 #include "tutti/core/error.h"
@@ -153,6 +154,8 @@ class VideoDataset : public Dataset {
 }  // namespace
 
 std::unique_ptr<Dataset> OpenVideo(const std::filesystem::path& file, const DatasetOptions& options) {
+  internal::RequireFile(
+      file, "give a video file (a pipe that somebody writes a video to: camera:" + file.string() + ")");
   if (options.sensor != Sensor::kMono)
     throw InputError(
         file.string() +

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "core/angle.h"
+#include "core/text_reader.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 
@@ -62,12 +63,12 @@ std::vector<double> ParseRow(const std::string& line, const std::string& where) 
 }
 
 LoopGroundTruth ReadText(const std::filesystem::path& file, int num_images) {
-  std::ifstream in(file);
+  internal::TextReader in(file);
   std::vector<std::vector<double>> rows;
   std::string line;
-  for (int number = 1; std::getline(in, line); ++number) {
+  while (in.Next(line)) {
     if (line.empty() || line[0] == '#') continue;
-    const std::string where = file.string() + ":" + std::to_string(number);
+    const std::string where = file.string() + ":" + std::to_string(in.number());
     std::vector<double> row = ParseRow(line, where);
     if (row.empty()) continue;
     if (!rows.empty() && row.size() != rows.front().size()) {
@@ -201,12 +202,14 @@ LoopGroundTruth LoopsFromMatrix(const std::vector<double>& values, int size) {
 }
 
 LoopGroundTruth ReadLoopMatrix(const std::filesystem::path& file, int num_images) {
+  const std::string advice = "check the path of the ground truth";
+  internal::RequireFile(file, advice);
   std::ifstream in(file, std::ios::binary);
-  if (!in) throw InputError(file.string() + ": can't be opened; check the path of the ground truth");
+  if (!in) throw InputError(file.string() + ": can't be opened; " + advice);
   std::string head(512, '\0');
   in.read(head.data(), static_cast<std::streamsize>(head.size()));
   head.resize(static_cast<std::size_t>(std::max<std::streamsize>(0, in.gcount())));
-  if (head.empty()) throw InputError(file.string() + ": is empty or a folder");
+  if (head.empty()) throw InputError(file.string() + ": is empty");
   in.close();
 
   LoopGroundTruth truth = LooksLikeText(head) ? ReadText(file, num_images) : ReadImage(file);

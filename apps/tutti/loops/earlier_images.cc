@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/text_reader.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 
@@ -35,24 +36,27 @@ EarlierImages::EarlierImages(const LoopDetector& detector, const std::string& me
   if (memory_.empty()) return;
   list_ = memory_ + ".images.csv";
   first_ = detector.LastId() + 1;
-  std::ifstream in(list_);
+  if (std::error_code ignored; std::filesystem::exists(list_, ignored)) ReadNames();
+  out_.open(list_, first_ > 0 ? std::ios::app : std::ios::trunc);
+  if (first_ == 0 || names_.empty()) out_ << kHead << "\n";
+  if (!out_) Fail("can't be written");
+}
+
+void EarlierImages::ReadNames() {
+  internal::TextReader in(list_);
   std::string line;
-  for (int number = 1; std::getline(in, line); ++number) {
+  while (in.Next(line)) {
     const std::size_t comma = line.find(',');
     const auto id = ParseInteger(line.substr(0, comma));
     if (line == kHead) continue;
     if (comma == std::string::npos || !id) {
       throw InputError(
-          list_.string() + ":" + std::to_string(number) +
+          list_.string() + ":" + std::to_string(in.number()) +
           ": is no line of a list of images (number,file); remove it, and earlier images will have "
           "no names");
     }
     if (*id < first_) names_[*id] = line.substr(comma + 1);
   }
-  in.close();
-  out_.open(list_, first_ > 0 ? std::ios::app : std::ios::trunc);
-  if (first_ == 0 || names_.empty()) out_ << kHead << "\n";
-  if (!out_) Fail("can't be written");
 }
 
 void EarlierImages::Fail(const char* what) const {

@@ -32,6 +32,7 @@ class EarlierImages {
   void Separate(LoopRow* row) const;
 
  private:
+  void ReadNames();
   [[noreturn]] void Fail(const char* what) const;
 
   std::string memory_;          // empty: none

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <opencv2/imgcodecs.hpp>
 #include <optional>
 #include <sstream>
@@ -11,7 +10,7 @@
 #include "apps/tutti/loops/joined_pairs.h"
 #include "apps/tutti/loops/mat_file.h"
 #include "core/median.h"
-#include "core/text_input.h"
+#include "core/text_reader.h"
 #include "frontend/dataset/image_file.h"
 #include "tutti/backend/evaluation.h"
 #include "tutti/core/error.h"
@@ -25,15 +24,14 @@ namespace {
 namespace fs = std::filesystem;
 
 // A trajectory has lines of 8 numbers (TUM) or 12 (KITTI), or commas and a header (EuRoC). A text matrix that
-// has just as many columns has as many rows, too.
-bool LooksLikeTrajectory(const fs::path& file) {
-  std::ifstream in(file);
-  internal::SkipByteOrderMark(in);
+// has just as many columns has as many rows, too. Throws InputError if it is no text.
+bool LinesOfPoses(const fs::path& file) {
+  internal::TextReader in(file);
   std::string line;
   std::size_t columns = 0;
   std::size_t rows = 0;
   bool euroc = false;
-  while (std::getline(in, line) && rows < 20) {
+  while (rows < 20 && in.Next(line)) {
     if (line.rfind("#timestamp", 0) == 0 || line.rfind("#time", 0) == 0)
       euroc = line.find(',') != std::string::npos;
     if (line.empty() || line[0] == '#') continue;
@@ -45,6 +43,14 @@ bool LooksLikeTrajectory(const fs::path& file) {
   }
   if (euroc) return rows > 0;
   return (columns == 8 || columns == 12) && rows != columns;
+}
+
+bool LooksLikeTrajectory(const fs::path& file) {
+  try {
+    return LinesOfPoses(file);
+  } catch (const InputError&) {
+    return false;  // an image, or MATLAB's; its reader says what is wrong with it
+  }
 }
 
 Trajectory ReadPoses(const fs::path& file) {

@@ -14,12 +14,14 @@
 #include <system_error>
 #include <vector>
 
+#include "core/text_reader.h"
 #include "tutti/core/error.h"
 
 namespace tutti::cli {
 namespace {
 
-constexpr std::size_t kMaxRows = 20000;    // more is surely a damaged file
+constexpr std::size_t kMaxRows = 20000;  // more is surely a damaged file
+constexpr std::uintmax_t kMostBytes = 2'000'000'000;
 constexpr std::size_t kMostPacked = 1100;  // numbers of a byte each that zlib puts into one
 
 struct CloseFile {
@@ -142,10 +144,12 @@ bool IsMatFile(const std::filesystem::path& file) {
 
 LoopGroundTruth ReadMatLoops(const std::filesystem::path& path) {
   const auto fail = [&path](const std::string& what) { throw InputError(path.string() + ": " + what); };
-  std::error_code error;
+  internal::RequireFile(path, "check the path of the ground truth");
   std::ifstream in(path, std::ios::binary);
-  if (!in || !std::filesystem::is_regular_file(path, error))
-    fail("can't be opened; check the path of the ground truth");
+  if (!in) fail("can't be opened; check the path of the ground truth");
+  std::error_code error;
+  if (std::filesystem::file_size(path, error) > kMostBytes || error)
+    fail("is larger than " + std::to_string(kMostBytes / 1000000) + " MB; save the loop matrix alone");
   const std::string bytes((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
   const Container container = Examine(bytes);
   if (container == Container::kOther) fail("is no file of MATLAB 5 to 7; save it with -v6 or -v7");

@@ -163,6 +163,18 @@ TEST_F(CloseCommand, Example08DoesTheSameInCode) {
   EXPECT_EQ(ReadTrajectory(folder_ / "corrected.txt", TrajectoryFormat::kTum).size(), TownPoses().size());
 }
 
+// The odometry of an earlier run, closed into that run's folder.
+TEST_F(CloseCommand, TheResultDoesNotReplaceTheOdometryThatItIsMadeOf) {
+  const fs::path own = folder_ / "out" / "trajectory.txt";
+  fs::create_directories(folder_ / "out");
+  WriteTrajectory(own, TownPoses(), TrajectoryFormat::kTum);
+  const std::string before = testing::ReadAll(own);
+  const auto refused = Close(own, testing::TinyTown());
+  EXPECT_EQ(refused.status, 1);
+  EXPECT_THAT(refused.output, HasSubstr("which this run reads; choose another --out"));
+  EXPECT_EQ(testing::ReadAll(own), before);
+}
+
 TEST_F(CloseCommand, RefusesWhatCanNotBeUsedAndSaysWhy) {
   const auto refused = [&](const fs::path& file, const std::string& words) {
     const auto done = Close(file, testing::TinyTown());

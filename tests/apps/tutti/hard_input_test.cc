@@ -143,6 +143,9 @@ TEST_F(HardInput, NumbersHaveABound) {
     EXPECT_EQ(run.status, 1) << option << " " << value << ": " << run.output;
     EXPECT_FALSE(fs::exists(folder_ / "world")) << option << " " << value;
   }
+  ExpectRefused(
+      RunTutti({"generate", "--sensor", "mono", "--out", folder_ / "world", "--frames", "3000000000"}),
+      "--frames: '3000000000' does not fit; give a whole number from -2147483648 to 2147483647");
   std::vector<std::string> greatest = base;
   greatest.insert(greatest.end(), {"--seed", "18446744073709551615"});
   EXPECT_EQ(RunTutti(greatest).status, 0);
@@ -173,6 +176,78 @@ TEST_F(HardInput, AGroundTruthThatIsNoFileIsNamed) {
   fs::create_directories(data / "poses.txt");
   ExpectRefused(RunTutti(testing::RunArguments(testing::TinyConfig(folder_), data, folder_ / "out")),
                 "poses.txt: should be the ground truth");
+}
+
+// A file may claim any size, and /dev/zero never ends: neither time nor memory is spent on them. A pipe in a
+// folder may have nobody who writes.
+TEST_F(HardInput, TextsWithoutEndAreRefusedAtOnce) {
+  const fs::path tum = File("tum.txt", Tum()), graph = File("g.g2o", Graph()), out = folder_ / "out";
+  const fs::path sparse = File("sparse", "# text\n"), pipe = folder_ / "pipe", data = testing::TinyTown();
+  fs::resize_file(sparse, 300'000'000'000ULL);
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  using Commands = std::vector<std::vector<std::string>>;
+  const auto texts = [&](const fs::path& file) {
+    return Commands{{"run", data, "--out", out, "--config", file},
+                    {"run", data, "--out", out, "--calibration", file},
+                    {"close", "--trajectory", file, "--images", data, "--out", out},
+                    {"loops", data, "--out", out, "--ground-truth", file},
+                    {"optimize", file, "--out", folder_ / "o.g2o"},
+                    {"evaluate", tum, file, "--format", "tum"},
+                    {"collect", file}};
+  };
+  const auto everything = [&](const fs::path& file) {
+    Commands commands = texts(file);
+    for (const std::vector<std::string>& more :
+         Commands{{"run", data, "--out", out, "--ground-truth", file},
+                  {"run", file, "--out", out, "--fov", "80"},
+                  {"close", "--trajectory", tum, "--images", data, "--out", out, "--times", file},
+                  {"loops", data, "--out", out, "--mask", file},
+                  {"loops", data, "--out", out, "--places", file},
+                  {"evaluate", tum, file},
+                  {"evaluate", tum, tum, "--frames", file},
+                  {"convert", graph, folder_ / "o", "--to", "tum", "--times", file},
+                  {"plot", tum, file, "--out", folder_ / "o.svg"},
+                  {"compare-loops", file},
+                  {"map", "info", file},
+                  {"localize", "--map", file, data, "--out", out},
+                  {"merge", file, file, "--out", folder_ / "o.tutti"},
+                  {"export", file, "--tum", folder_ / "o"}})
+      commands.push_back(more);
+    return commands;
+  };
+  for (const Commands& commands : {texts(sparse), texts("/dev/zero"), everything(pipe)}) {
+    for (const std::vector<std::string>& command : commands) {
+      const auto run = RunTutti(command);
+      EXPECT_EQ(run.status, 1) << command[0] << ": " << run.output;
+      EXPECT_THAT(run.output, AllOf(Not(HasSubstr("internal error")), Not(HasSubstr("memory; give"))))
+          << command[0];
+    }
+  }
+}
+
+TEST_F(HardInput, NoResultTakesThePlaceOfWhatItIsMadeOf) {
+  const fs::path tum = File("tum.txt", Tum()), graph = File("g.g2o", Graph()),
+                 map = File("map.tutti", "a map");
+  const fs::path table = File("table.json", "{}"), times = File("times.txt", "1\n2\n");
+  const fs::path linked = folder_ / "linked.txt",
+                 summary = File("summary.json", "{\"frames\": 1, \"loops\": 1}");
+  fs::create_symlink("tum.txt", linked);
+  for (const std::vector<std::string>& command : std::vector<std::vector<std::string>>{
+           {"convert", tum, tum, "--to", "kitti"},
+           {"convert", tum, linked, "--to", "kitti"},
+           {"convert", graph, folder_ / "o", "--to", "tum", "--times", times, "--times-out", times},
+           {"evaluate", tum, tum, "--json", linked},
+           {"evaluate", tum, tum, "--errors", tum},
+           {"optimize", graph, "--out", graph},
+           {"optimize", graph, "--out", folder_ / "o.g2o", "--json", graph},
+           {"collect", summary, "--json", summary},
+           {"compare-loops", table, "--out", table},
+           {"export", map, "--tum", map},
+           {"export", map, "--landmarks", folder_ / "o.ply", "--g2o", folder_ / "." / "map.tutti"}}) {
+    ExpectRefused(RunTutti(command), "is read, and would be overwritten");
+  }
+  EXPECT_EQ(ReadAll(tum) + ReadAll(graph) + ReadAll(map), Tum() + Graph() + "a map");
+  EXPECT_FALSE(fs::exists(folder_ / "o"));
 }
 
 TEST_F(HardInput, LoopsSkipsAndCountsWhatIsNoImage) {

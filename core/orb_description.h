@@ -198,7 +198,7 @@ class OrbDescription {
     }
     const std::uint8_t* corner = smooth_.ptr<std::uint8_t>(y) + x;
     constexpr int kSide = 2 * kMargin + 1;
-    for (int row = -kMargin; row <= kMargin; ++row) CheckReadable(corner + row * step - kMargin, kSide);
+    CheckReadableRows(corner - kMargin * step - kMargin, kSide, step, kSide);
     CheckWritable(descriptor, kBytes);
     Compare(corner, offset.data(), descriptor);
   }

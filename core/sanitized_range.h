@@ -32,6 +32,14 @@ void CheckReadable([[maybe_unused]] const T* begin, [[maybe_unused]] std::size_t
 #endif
 }
 
+/// The same of a rectangle in an image, whose rows lie `step` numbers apart. An image is one block of memory,
+/// in which nothing is poisoned: if the first and the last row may be read, so may those between them.
+template <class T>
+void CheckReadableRows(const T* first, int rows, int step, std::size_t count) {
+  CheckReadable(first, count);
+  CheckReadable(first + static_cast<std::ptrdiff_t>(rows - 1) * step, count);
+}
+
 /// The same of what will be written: to the address sanitizer there is no difference.
 template <class T>
 void CheckWritable(T* begin, std::size_t count) {

@@ -44,9 +44,8 @@ TUTTI_CHECKED_AS_A_WHOLE int Sad(const std::uint8_t* a, std::size_t a_step, cons
 
 // For Sad: windows of the image with middles up to `aside` pixels left and right of (x, y).
 void CheckWindows(const cv::Mat& image, int x, int y, int aside) {
-  for (int dy = -kHalf; dy <= kHalf; ++dy)
-    internal::CheckReadable(image.ptr<std::uint8_t>(y + dy) + x - kHalf - aside,
-                            static_cast<std::size_t>(kSide + 2 * aside));
+  internal::CheckReadableRows(image.ptr<std::uint8_t>(y - kHalf) + x - kHalf - aside, kSide,
+                              static_cast<int>(image.step), static_cast<std::size_t>(kSide + 2 * aside));
 }
 
 using Window = GreyWindow<kHalf>;

@@ -44,18 +44,26 @@ def run(build, fuzzer, seconds):
     return result
 
 
-def document(results, minutes, commit):
+def row(result, minutes, commit):
+    return (f"| `{result['fuzzer']}` | {READERS.get(result['fuzzer'], '')} | {minutes:g} | {result['inputs']:,} | {result['edges']:,} "
+            f"| {result['corpus']:,} | {'1' if result['failed'] else '0'} | {datetime.date.today()}, {commit} |")
+
+
+def document(rows):
     lines = ["# Fuzzing the readers", "",
-             f"libFuzzer with the address and the undefined-behaviour sanitizer, {minutes:g} minutes each or up to a finding, from the",
-             f"seeds that `tests/fuzz` makes and what earlier runs had found. `./dev fuzz --minutes {minutes:g} --write`; "
-             f"{datetime.date.today()}, commit {commit}.", "",
+             "libFuzzer with the address and the undefined-behaviour sanitizer, for so many minutes or up to a finding, from the",
+             "seeds that `tests/fuzz` makes and what earlier runs had found. `./dev fuzz --minutes 10 --write` makes all rows anew,",
+             "`./dev fuzz --minutes 10 --write FUZZER...` those of some.", "",
              "An edge is a branch of the program that some input took; libraries of others are not counted. A finding is an",
              "input that crashed, hung for 20 s, took 2 GB, or broke what the fuzzer checks (`tests/fuzz/<fuzzer>_fuzzer.cc`).", "",
-             "| fuzzer | reads | inputs tried | edges | corpus | findings |", "|---|---|---:|---:|---:|---:|"]
-    for r in results:
-        lines.append(f"| `{r['fuzzer']}` | {READERS.get(r['fuzzer'], '')} | {r['inputs']:,} | {r['edges']:,} | {r['corpus']:,} "
-                     f"| {'1' if r['failed'] else '0'} |")
-    return "\n".join(lines) + "\n"
+             "| fuzzer | reads | minutes | inputs tried | edges | corpus | findings | date, commit |",
+             "|---|---|---:|---:|---:|---:|---:|---|"]
+    return "\n".join(lines + [rows[fuzzer] for fuzzer in sorted(rows)]) + "\n"
+
+
+def earlier_rows(file):
+    text = file.read_text() if file.exists() else ""
+    return {found[1]: found[0] for found in re.findall(r"^(\| `(\w+)` .*)$", text, re.MULTILINE)}
 
 
 def main():
@@ -72,15 +80,15 @@ def main():
     unknown = [name for name in arguments.fuzzers if name not in there]
     if unknown:
         parser.error(f"there is no fuzzer '{unknown[0]}'; fuzzers are {' '.join(there)}")
-    if arguments.write and arguments.fuzzers:
-        parser.error("--write is for all of them")
     with concurrent.futures.ThreadPoolExecutor(max(arguments.jobs, 1)) as pool:
         results = list(pool.map(lambda name: run(build, name, max(1, round(60 * arguments.minutes))),
                                 arguments.fuzzers or there))
     if arguments.write:
         root = pathlib.Path(__file__).resolve().parents[2]
         commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=root, capture_output=True, text=True).stdout.strip()
-        (root / "docs" / "results" / "fuzz.md").write_text(document(results, arguments.minutes, commit))
+        file = root / "docs" / "results" / "fuzz.md"
+        rows = {**earlier_rows(file), **{r["fuzzer"]: row(r, arguments.minutes, commit) for r in results}}
+        file.write_text(document({name: rows[name] for name in rows if name in READERS}))
     for left in pathlib.Path("/dev/shm").glob("tutti_fuzz_*"):
         subprocess.run(["rm", "-rf", left])
     return 1 if any(r["failed"] for r in results) else 0

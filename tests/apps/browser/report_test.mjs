@@ -1,5 +1,5 @@
-// Reports of real runs in a real browser: of the synthetic town of `tutti demo`; for pictures (--shots), which show real data,
-// of TUTTI_DATA/redkitchen if it is there.
+// Reports of real runs in a real browser: of a small synthetic town; for pictures (--shots), which show real data, of
+// TUTTI_DATA/redkitchen if it is there.
 // usage: node report_test.mjs TUTTI CONFIGS [--shots DIR]
 import { spawnSync } from 'node:child_process';
 import { existsSync, mkdirSync, mkdtempSync, rmSync, statSync } from 'node:fs';
@@ -23,9 +23,12 @@ function realRun(folder) {
     run('run', '--config', join(configs, '7scenes.yaml'), '--dataset', kitchen, '--out', join(folder, 'kitchen'), '--quiet');
     return join(folder, 'kitchen', 'report.html');
   }
-  if (shots) console.log('no TUTTI_DATA/redkitchen: the synthetic town of `tutti demo` takes its place');
-  run('demo', '--out', join(folder, 'demo'));
-  return join(folder, 'demo', 'run', 'report.html');
+  if (shots) console.log('no TUTTI_DATA/redkitchen: a small synthetic town takes its place');
+  const town = join(folder, 'town');
+  run('generate', '--out', town, '--sensor', 'stereo', '--blocks-x', '1', '--block', '26', '--laps', '1.15', '--rate', '4.5',
+    '--width', '320', '--height', '160', '--supersample', '1');
+  run('run', town, '--out', join(folder, 'run'), '--quiet');
+  return join(folder, 'run', 'report.html');
 }
 
 // A data set whose path is an attack: it ends the script element, and would run as an attribute, too.

@@ -44,8 +44,9 @@ TUTTI_CHECKED_AS_A_WHOLE int Sad(const std::uint8_t* a, std::size_t a_step, cons
 
 // For Sad: windows of the image with middles up to `aside` pixels left and right of (x, y).
 void CheckWindows(const cv::Mat& image, int x, int y, int aside) {
+  const int count = kSide + 2 * aside;
   internal::CheckReadableRows(image.ptr<std::uint8_t>(y - kHalf) + x - kHalf - aside, kSide,
-                              static_cast<int>(image.step), static_cast<std::size_t>(kSide + 2 * aside));
+                              static_cast<int>(image.step), static_cast<std::size_t>(count));
 }
 
 using Window = GreyWindow<kHalf>;
@@ -64,8 +65,8 @@ TUTTI_CHECKED_AS_A_WHOLE void SampleRow(const std::uint8_t* data, std::size_t st
                                         float y, float* grey) {
   const int left = static_cast<int>(x - gain * kHalf), right = static_cast<int>(x + gain * kHalf) + 1;
   const std::uint8_t* first = data + static_cast<std::size_t>(y) * step + left;
-  internal::CheckReadable(first, static_cast<std::size_t>(right - left + 1));
-  internal::CheckReadable(first + step, static_cast<std::size_t>(right - left + 1));
+  const int count = right - left + 1;
+  internal::CheckReadableRows(first, 2, static_cast<int>(step), static_cast<std::size_t>(count));
   for (int i = -kHalf; i <= kHalf; ++i)
     grey[i + kHalf] = Bilinear(data, step, x + gain * static_cast<float>(i), y);
 }

@@ -182,7 +182,8 @@ TEST_F(HardInput, AGroundTruthThatIsNoFileIsNamed) {
 // folder may have nobody who writes.
 TEST_F(HardInput, TextsWithoutEndAreRefusedAtOnce) {
   const fs::path tum = File("tum.txt", Tum()), graph = File("g.g2o", Graph()), out = folder_ / "out";
-  const fs::path sparse = File("sparse", "# text\n"), pipe = folder_ / "pipe", data = testing::TinyTown();
+  const fs::path sparse = File("sparse", "# text\n"), pipe = folder_ / "pipe";
+  const fs::path& data = testing::TinyTown();
   fs::resize_file(sparse, 300'000'000'000ULL);
   ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
   using Commands = std::vector<std::vector<std::string>>;

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#pragma GCC visibility push(default)  // used across libraries
 namespace tutti::internal {
 
 /// Throws InputError, which ends with `advice`, if `file` is not there, is a folder, or is a pipe in a
@@ -47,3 +48,4 @@ class TextReader {
 std::string ReadText(const std::filesystem::path& file, const std::string& advice, std::size_t most_bytes);
 
 }  // namespace tutti::internal
+#pragma GCC visibility pop

@@ -24,11 +24,13 @@ class CalibrationText {
  public:
   explicit CalibrationText(const fs::path& file) : file_(file) {
     constexpr std::size_t kMostBytes = 10'000'000;
-    text_ = internal::ReadText(file, "--calibration needs a YAML file of Kalibr, ORB-SLAM, OpenCV or ROS",
-                               kMostBytes);
-    // OpenCV's "%YAML:1.0" is no YAML.
-    const std::size_t directive = ("\n" + text_).find("\n%YAML");
-    if (directive != std::string::npos) text_.erase(directive, text_.find('\n', directive) - directive);
+    std::istringstream in(internal::ReadText(
+        file, "--calibration needs a YAML file of Kalibr, ORB-SLAM, OpenCV or ROS", kMostBytes));
+    std::string line;
+    while (std::getline(in, line)) {
+      // OpenCV's "%YAML:1.0" is no YAML.
+      text_ += (line.rfind("%YAML", 0) == 0 ? std::string() : line) + "\n";
+    }
     try {
       root_ = YAML::Load(text_);
     } catch (const YAML::Exception& e) {

@@ -151,9 +151,12 @@ class Recogniser {
   bool HasConfiguration() const {
     std::error_code ignored;
     if (!fs::is_regular_file(dataset_ / kConfiguration, ignored)) return false;
-    internal::TextReader in(dataset_ / kConfiguration);
-    for (std::string line; in.Next(line);) {
-      if (line.rfind("dataset:", 0) == 0) return true;
+    try {
+      internal::TextReader in(dataset_ / kConfiguration);
+      for (std::string line; in.Next(line);) {
+        if (line.rfind("dataset:", 0) == 0) return true;
+      }
+    } catch (const InputError&) {  // no text, so none of ours
     }
     return false;
   }

@@ -111,6 +111,8 @@ EvaluationInput Resolved(EvaluationInput input) {
 std::vector<std::string> FilesOf(const EvaluationInput& input) {
   std::vector<std::string> files = input.estimates;
   for (const std::string& file : {input.reference, input.times, input.frames}) files.push_back(file);
+  for (const auto& of_run : input.frames_of_run)
+    files.push_back(fs::path(of_run.first).replace_filename("summary.json").string());
   return files;
 }
 

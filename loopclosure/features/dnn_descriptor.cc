@@ -43,9 +43,10 @@ std::string Said(const std::exception& error) {
 }
 
 std::string ReadFile(const std::string& file) {
-  std::error_code ignored;
-  std::ifstream in(file, std::ios::binary);
-  if (!std::filesystem::is_regular_file(file, ignored) || !in) {
+  std::error_code ignored;  // nothing else is opened: one waits at a pipe without end
+  std::ifstream in;
+  if (std::filesystem::is_regular_file(file, ignored)) in.open(file, std::ios::binary);
+  if (!in.is_open()) {
     Fail(file, "can't be read (no such file, or no permission); give the path of a network's ONNX file");
   }
   std::string bytes(static_cast<std::size_t>(std::filesystem::file_size(file, ignored)), '\0');

@@ -53,7 +53,7 @@ def document(rows):
     lines = ["# Fuzzing the readers", "",
              "libFuzzer with the address and the undefined-behaviour sanitizer, for so many minutes or up to a finding, from the",
              "seeds that `tests/fuzz` makes and what earlier runs had found. `./dev fuzz --minutes 10 --write` makes all rows anew,",
-             "`./dev fuzz --minutes 10 --write FUZZER...` those of some.", "",
+             "`./dev fuzz --minutes 10 --write FUZZER...` those of the fuzzers that are named.", "",
              "An edge is a branch of the program that some input took; libraries of others are not counted. A finding is an",
              "input that crashed, hung for 20 s, took 2 GB, or broke what the fuzzer checks (`tests/fuzz/<fuzzer>_fuzzer.cc`).", "",
              "| fuzzer | reads | minutes | inputs tried | edges | corpus | findings | date, commit |",

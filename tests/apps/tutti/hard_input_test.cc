@@ -233,12 +233,14 @@ TEST_F(HardInput, NoResultTakesThePlaceOfWhatItIsMadeOf) {
   const fs::path linked = folder_ / "linked.txt",
                  summary = File("summary.json", "{\"frames\": 1, \"loops\": 1}");
   fs::create_symlink("tum.txt", linked);
+  File("trajectory.txt", Tum());  // with the summary: as a run's folder
   for (const std::vector<std::string>& command : std::vector<std::vector<std::string>>{
            {"convert", tum, tum, "--to", "kitti"},
            {"convert", tum, linked, "--to", "kitti"},
            {"convert", graph, folder_ / "o", "--to", "tum", "--times", times, "--times-out", times},
            {"evaluate", tum, tum, "--json", linked},
            {"evaluate", tum, tum, "--errors", tum},
+           {"evaluate", "--run", folder_, "--reference", tum, "--json", summary},
            {"optimize", graph, "--out", graph},
            {"optimize", graph, "--out", folder_ / "o.g2o", "--json", graph},
            {"collect", summary, "--json", summary},

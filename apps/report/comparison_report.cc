@@ -3,6 +3,7 @@
 #include <fstream>
 #include <map>
 #include <set>
+#include <system_error>
 #include <utility>
 
 #include "apps/report/page.h"
@@ -28,8 +29,10 @@ void CutGallery(Json& run) {
 }  // namespace
 
 std::optional<Json> ReadRunReport(const std::filesystem::path& folder) {
-  std::ifstream in(folder / "report.json", std::ios::binary);
-  if (!in) return std::nullopt;
+  std::error_code ignored;  // nothing else is opened: one waits at a pipe without end
+  const std::filesystem::path file = folder / "report.json";
+  if (!std::filesystem::is_regular_file(file, ignored)) return std::nullopt;
+  std::ifstream in(file, std::ios::binary);
   Json json = Json::parse(in, nullptr, false);
   if (!json.is_object() || json.value("format", 0) != kReportFormat) return std::nullopt;
   return json;

@@ -2,8 +2,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
-#include <csignal>
 #include <cstdio>
 #include <memory>
 #include <set>
@@ -11,6 +9,7 @@
 #include <thread>
 #include <vector>
 
+#include "apps/run/interrupt.h"
 #include "apps/tutti/changed_images.h"
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
@@ -20,11 +19,6 @@
 
 namespace tutti::cli {
 namespace {
-
-// Any of the threads may be the one that is interrupted.
-std::atomic<bool> interrupted = false;
-static_assert(std::atomic<bool>::is_always_lock_free);
-void OnInterrupt(int) { interrupted = true; }
 
 struct GenerateArguments {
   std::string out, sensor, scene = "town";
@@ -53,7 +47,7 @@ class ProgressLine {
                    terminal && done != total ? "   " : "\n");
       last_tenth_ = tenth;
     }
-    return !interrupted;
+    return !InterruptGuard::Requested();
   }
 
  private:
@@ -73,10 +67,8 @@ int ChangeImages(const GenerateArguments& arguments) {
   o.force = arguments.force;
   ProgressLine progress;
   o.progress = [&progress](std::size_t done, std::size_t total) { return progress(done, total); };
-  interrupted = false;
-  const auto before = std::signal(SIGINT, OnInterrupt);
+  const InterruptGuard guard;
   const ChangedImages result = WriteChangedImages(change, o);
-  std::signal(SIGINT, before);
   const char* d = arguments.out.c_str();
   if (result.written < result.taken) {
     std::fprintf(stderr, "\ninterrupted: %s holds the first %zu of %zu images and can be used\n", d,
@@ -113,10 +105,8 @@ int Generate(const GenerateArguments& arguments) {
   write.threads = arguments.Threads();
   ProgressLine progress;
   write.progress = [&progress](std::size_t done, std::size_t total) { return progress(done, total); };
-  interrupted = false;
-  const auto before = std::signal(SIGINT, OnInterrupt);
+  const InterruptGuard guard;
   const std::size_t written = WriteSyntheticDataset(world, arguments.out, write);
-  std::signal(SIGINT, before);
   const char* d = arguments.out.c_str();
   if (written < world.Size()) {
     std::fprintf(stderr, "\ninterrupted: %s holds the first %zu of %zu frames and can be used\n", d, written,

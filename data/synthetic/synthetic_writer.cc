@@ -13,6 +13,7 @@
 #include <thread>
 #include <vector>
 
+#include "core/text_reader.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -80,10 +81,12 @@ bool IsOwnFolder(const fs::path& folder) {
   for (const char* part : {"image_0", "image_1", "rgb", "depth"})
     recording = recording || fs::exists(folder / part, code);
   if (!recording) return true;
-  std::ifstream in(folder / "config.yaml");
-  std::string first;
-  std::getline(in, first);
-  return first.rfind(kWritten, 0) == 0;
+  try {
+    std::string first;
+    return internal::TextReader(folder / "config.yaml").Next(first) && first.rfind(kWritten, 0) == 0;
+  } catch (const InputError&) {
+    return false;  // no file, or no text
+  }
 }
 
 // Old frames would mix with the new ones. Nothing is removed if something must stay.

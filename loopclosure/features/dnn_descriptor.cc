@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <mutex>
@@ -26,6 +27,7 @@ namespace {
 constexpr double kLeastContrast = 0.5;     // deviation of an image with something to see [grey levels]
 constexpr std::size_t kNearNames = 5;      // that a message about an unknown layer lists
 constexpr std::size_t kLongestText = 300;  // of OpenCV's in a message
+constexpr std::uintmax_t kMostBytes = 2000000000;  // of a network; protobuf reads no more than 2^31
 
 using Names = std::vector<std::string>;
 
@@ -49,7 +51,9 @@ std::string ReadFile(const std::string& file) {
   if (!in.is_open()) {
     Fail(file, "can't be read (no such file, or no permission); give the path of a network's ONNX file");
   }
-  std::string bytes(static_cast<std::size_t>(std::filesystem::file_size(file, ignored)), '\0');
+  const std::uintmax_t size = std::filesystem::file_size(file, ignored);
+  if (size > kMostBytes) Fail(file, "is larger than 2 GB, which no ONNX file is; give the path of one");
+  std::string bytes(static_cast<std::size_t>(size), '\0');
   in.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   if (!in) Fail(file, "can't be read to its end");
   return bytes;

@@ -1,7 +1,10 @@
 #include "data/synthetic/synthetic_writer.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
+#include <cstdint>
+#include <filesystem>
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 #include <sstream>
@@ -89,6 +92,30 @@ TEST(SyntheticWriter, AFullFolderIsRefusedUnlessForced) {
   force.force = true;
   EXPECT_EQ(WriteSyntheticDataset(shorter, folder, force), 2U);
   EXPECT_EQ(OpenDataset(folder, With(Sensor::kMono))->Size(), 2U);  // no old frames left
+}
+
+TEST(SyntheticWriter, AnotherOnesRecordingStaysWhateverItsConfigurationIs) {
+  SyntheticOptions options = SmallWorld(SyntheticScene::kRoom, SyntheticSensor::kMono);
+  options.frames = 2;
+  const SyntheticWorld world(options);
+  SyntheticWriteOptions force;
+  force.force = true;
+  const auto folder = FreshFolder(), config = folder / "config.yaml",
+             image = folder / "image_0" / "000000.png";
+  std::filesystem::create_directories(folder / "image_0");
+  std::ofstream(image) << "another one's";
+  EXPECT_THROW(WriteSyntheticDataset(world, folder, force), InputError);
+  ASSERT_EQ(mkfifo(config.c_str(), 0600), 0);  // opened, it would wait for ever
+  EXPECT_THROW(WriteSyntheticDataset(world, folder, force), InputError);
+  std::filesystem::remove(config);
+  std::ofstream(config) << "#";
+  std::filesystem::resize_file(config, std::uintmax_t{300} << 30);  // one line of zeros
+  EXPECT_THROW(WriteSyntheticDataset(world, folder, force), InputError);
+  EXPECT_EQ(std::filesystem::file_size(image), 13U);
+  std::filesystem::remove(config);
+  WriteSyntheticDataset(world, folder / "own");
+  std::filesystem::copy(folder / "own" / "config.yaml", config);
+  EXPECT_EQ(WriteSyntheticDataset(world, folder, force), 2U);  // now it says that it is tutti's
 }
 
 TEST(SyntheticWriter, StoppingKeepsACompleteBeginning) {

@@ -1,6 +1,7 @@
 // report.html and report.json, without a browser (tests/apps/browser has one).
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -259,6 +260,9 @@ TEST(ReportOfARun, OtherFormatsAreNotRead) {
     testing::WriteAll(folder / "report.json", text);
     EXPECT_FALSE(ReadRunReport(folder)) << text;
   }
+  fs::remove(folder / "report.json");
+  ASSERT_EQ(mkfifo((folder / "report.json").c_str(), 0600), 0);  // opened, it would wait for ever
+  EXPECT_FALSE(ReadRunReport(folder));
 }
 
 }  // namespace

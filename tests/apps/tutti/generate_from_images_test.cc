@@ -1,7 +1,9 @@
-// `tutti generate --from-images`, as a user runs it.
+// `tutti generate`, as a user runs it, most of all --from-images.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <csignal>
 #include <filesystem>
 #include <opencv2/imgcodecs.hpp>
 
@@ -12,6 +14,7 @@ namespace tutti {
 namespace {
 
 namespace fs = std::filesystem;
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 using testing::ReadAll;
 using testing::RunTutti;
@@ -129,6 +132,22 @@ TEST(GenerateFromImages, ForceRemovesTheOldImagesAndNoOthers) {
   EXPECT_THAT(refused.output, HasSubstr("99.png: was not made from"));
   EXPECT_EQ(ReadAll(out / "99.png"), "mine");
   EXPECT_TRUE(fs::exists(out / "8.5.png"));
+}
+
+TEST(Generate, WhatASignalInterruptsCanBeUsed) {
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    const fs::path out = testing::FreshFolder() / "town";
+    const auto run =
+        testing::RunTuttiAndSignal({"generate", "--out", out, "--sensor", "mono", "--frames", "400",
+                                    "--width", "320", "--height", "160", "--threads", "2"},
+                                   "frame ", signal);
+    EXPECT_EQ(run.status, 130) << run.output;
+    EXPECT_THAT(run.output, AllOf(HasSubstr("interrupted"), HasSubstr("of 400 frames and can be used")));
+    const auto images = std::distance(fs::directory_iterator(out / "image_0"), {});
+    const std::string poses = ReadAll(out / "poses.txt");
+    EXPECT_EQ(std::count(poses.begin(), poses.end(), '\n'), images);
+    EXPECT_LT(images, 400);
+  }
 }
 
 }  // namespace

@@ -4,7 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstdint>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <functional>
 #include <limits>
@@ -153,6 +155,8 @@ TEST_F(DnnDescriptorTest, SaysWhatIsWrongWithAFile) {
                       HasSubstr("OpenCV 4"), Not(HasSubstr("\n"))))
         << bytes.size();
   }
+  std::filesystem::resize_file(options.model, std::uintmax_t{300} << 30);  // sparse: no byte of it is there
+  EXPECT_THAT(ProblemOf(options), HasSubstr("bad.onnx (dnn.model): is larger than 2 GB"));
 }
 
 TEST_F(DnnDescriptorTest, SaysWhatIsWrongWithAnOutput) {

@@ -6,7 +6,7 @@ In a copy of the sources (a git worktree below --out). A change is drawn among a
 files; it counts if it compiles and changes the machine code. It is caught if a test of its module fails, crashes, or takes
 five times as long as the whole module does else.
 """
-import concurrent.futures
+import contextlib
 import hashlib
 import os
 import pathlib
@@ -14,6 +14,7 @@ import random
 import re
 import subprocess
 import sys
+import tempfile
 import time
 
 import table
@@ -73,20 +74,37 @@ def program(folder, module):
     return folder / "tests" / module / f"tutti_{module}_tests"
 
 
+def failure(process, output):
+    """Name of a test that failed in a shard that has ended, or None."""
+    output.seek(0)
+    text = output.read().decode(errors="replace")
+    failed = re.findall(r"\[  FAILED  \] (\S+?)[, ]", text)
+    begun = re.findall(r"\[ RUN      \] (\S+)", text)
+    return failed[0] if failed else f"{begun[-1] if begun else '?'} (crashed)" if process.returncode else None
+
+
 def test(folder, module, patience_s):
-    """Name of a test that failed, or None."""
-    def shard(index):
-        environment = dict(os.environ, GTEST_TOTAL_SHARDS=str(SHARDS), GTEST_SHARD_INDEX=str(index), GTEST_FAIL_FAST="1")
-        exe = program(folder, module)
-        try:
-            run = subprocess.run([exe], cwd=exe.parent, env=environment, capture_output=True, text=True, errors="replace", timeout=patience_s)
-        except subprocess.TimeoutExpired:
-            return "(takes too long)"
-        failed = re.findall(r"\[  FAILED  \] (\S+?)[, ]", run.stdout)
-        begun = re.findall(r"\[ RUN      \] (\S+)", run.stdout)
-        return failed[0] if failed else f"{begun[-1] if begun else '?'} (crashed)" if run.returncode else None
-    with concurrent.futures.ThreadPoolExecutor(SHARDS) as pool:
-        return next((name for name in pool.map(shard, range(SHARDS)) if name), None)
+    """Name of the first test that failed, or None."""
+    exe = program(folder, module)
+    end = time.monotonic() + patience_s
+    with contextlib.ExitStack() as stack:
+        running = []
+        for index in range(SHARDS):
+            environment = dict(os.environ, GTEST_TOTAL_SHARDS=str(SHARDS), GTEST_SHARD_INDEX=str(index), GTEST_FAIL_FAST="1")
+            output = stack.enter_context(tempfile.TemporaryFile())
+            process = subprocess.Popen([exe], cwd=exe.parent, env=environment, stdout=output, stderr=subprocess.DEVNULL)
+            running.append((process, output))
+            stack.callback(process.wait)
+            stack.callback(process.kill)  # of no effect on one that has ended
+        while running:
+            for process, output in [one for one in running if one[0].poll() is not None]:
+                running.remove((process, output))
+                if (name := failure(process, output)) is not None:
+                    return name
+            if time.monotonic() > end:
+                return "(takes too long)"
+            time.sleep(0.1)
+    return None
 
 
 def digest(folder, module):

@@ -19,14 +19,15 @@ int Map::AddKeyframe(Keyframe keyframe) {
 }
 
 int Map::AddLandmark(const Eigen::Vector3d& position, int keyframe, int feature) {
-  const int id = static_cast<int>(landmarks_.size());
-  Landmark& l = landmarks_.Append({});
+  const int id = landmarks_.size();
+  Landmark l;
   l.alive = true;
   l.position = position;
   l.reference = keyframe;
   l.visible = l.found = 1;
   if (camera_) l.patch = CutPatch(*camera_, *std::as_const(*this).keyframe(keyframe).features, feature);
   l.patch_source = {keyframe, feature};
+  landmarks_.Append(std::move(l));
   AddObservation(id, keyframe, feature);
   return id;
 }
@@ -104,7 +105,7 @@ void Map::Merge(int loser, int winner) {
   const std::vector<Observation> seen = landmark(loser).observations;
   const int visible = landmark(loser).visible, found = landmark(loser).found;
   RemoveLandmark(loser);
-  landmark(loser).replaced_by = winner;
+  landmarks_.SetReplacedBy(loser, winner);
   for (const Observation& o : seen) AddObservation(winner, o.keyframe, o.feature);
   landmark(winner).visible += visible;
   landmark(winner).found += found;
@@ -144,13 +145,13 @@ void Map::Append(const Map& other, std::int64_t frame_offset, int first_piece) {
     for (Observation& o : l.observations) o.keyframe += keyframes;
     if (l.reference >= 0) l.reference += keyframes;
     if (l.patch_source.keyframe >= 0) l.patch_source.keyframe += keyframes;
-    if (l.replaced_by >= 0) l.replaced_by += landmarks;
-    landmarks_.Append(std::move(l));
+    const int replaced_by = other.ReplacedBy(id);
+    landmarks_.Append(std::move(l), replaced_by >= 0 ? replaced_by + landmarks : -1);
   }
 }
 
 int Map::Present(int id) const {
-  while (id >= 0 && !landmark(id).alive) id = landmark(id).replaced_by;
+  while (id >= 0 && !landmark(id).alive) id = ReplacedBy(id);
   return id;
 }
 

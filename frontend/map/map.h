@@ -2,14 +2,16 @@
 // both.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <map>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "frontend/features/features.h"
+#include "frontend/map/landmark.h"
+#include "frontend/map/landmark_store.h"
 #include "frontend/map/shared_vector.h"
 #include "tutti/core/camera.h"
 #include "tutti/core/pose.h"
@@ -19,61 +21,6 @@ class SectionReader;
 }
 
 namespace tutti {
-
-/// Feature `feature` of keyframe `keyframe` sees a landmark.
-struct Observation {
-  int keyframe = -1;
-  int feature = -1;
-
-  template <class Archive>
-  void State(Archive& archive) {
-    archive(keyframe, feature);
-  }
-};
-
-/// What a landmark looks like in the keyframe that made it, at the pyramid level of its corner.
-struct Patch {
-  static constexpr int kHalf = 8;  // [px of the level]
-  static constexpr int kSide = 2 * kHalf + 1;
-  std::array<std::uint8_t, kSide * kSide> grey{};
-  float offset_x = 0, offset_y = 0;  ///< of the landmark from the patch's centre [px of the level]
-  float scale_x = 1, scale_y = 1;    ///< level-0 pixels per pixel of the level
-
-  /// All but `grey`: those of many landmarks are saved as one image.
-  template <class Archive>
-  void State(Archive& archive) {
-    archive(offset_x, offset_y, scale_x, scale_y);
-  }
-};
-
-/// A 3D point.
-struct Landmark {
-  bool alive = false;
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< in the world [m]
-  Eigen::Vector3d normal =
-      Eigen::Vector3d::Zero();               ///< mean viewing direction (unit), from the cameras to the point
-  float min_distance = 0, max_distance = 0;  ///< distances at which its corner can be detected [m]
-  std::array<std::uint8_t, 32> descriptor{};  ///< the most central of its descriptors
-  std::vector<Observation> observations;      ///< ascending by keyframe; one per keyframe at most
-  int reference = -1;                         ///< keyframe that made it
-  std::shared_ptr<const Patch> patch;         ///< null if there was no image
-  Observation patch_source;                   ///< what the patch is of
-  int visible = 0, found = 0;                 ///< frames that should see it, and that did
-  int replaced_by = -1;                       ///< landmark that it was merged into, if it is not alive
-
-  /// All but `descriptor`, which is a keyframe's as a rule; of a dead one nobody asks for more than what
-  /// replaced it.
-  template <class Archive>
-  void State(Archive& archive) {
-    archive(alive);
-    if (!alive) return archive(replaced_by);
-    std::optional<Patch> own;
-    if (patch) own = *patch;
-    archive(position, normal, min_distance, max_distance, observations, reference, own, patch_source, visible,
-            found);
-    if (Archive::kReading && own) patch = std::make_shared<const Patch>(*own);
-  }
-};
 
 /// A frame that stays in the map.
 struct Keyframe {
@@ -92,7 +39,8 @@ struct Keyframe {
   void State(Archive& archive);
 };
 
-/// Map of one odometry. Ids are indices; dead landmarks and removed keyframes stay as empty shells.
+/// Map of one odometry. Ids are indices; removed keyframes stay as empty shells, of dead landmarks
+/// the number alone is left after a while.
 class Map {
  public:
   explicit Map(std::vector<float> scales) : scales_(std::move(scales)) {}
@@ -128,12 +76,14 @@ class Map {
   std::vector<int> BestCovisible(int keyframe, int count, int min_shared) const;
 
   int KeyframeCount() const { return static_cast<int>(keyframes_.size()); }  ///< removed ones too
-  int LandmarkCount() const { return static_cast<int>(landmarks_.size()); }  ///< dead ones too
+  int LandmarkCount() const { return landmarks_.size(); }                    ///< dead ones too
   /// For writing: a keyframe or landmark that a copy of the map shares is copied first.
   Keyframe& keyframe(int id) { return keyframes_.Mutable(static_cast<std::size_t>(id)); }
-  Landmark& landmark(int id) { return landmarks_.Mutable(static_cast<std::size_t>(id)); }
+  Landmark& landmark(int id) { return landmarks_.Mutable(id); }
   const Keyframe& keyframe(int id) const { return keyframes_[static_cast<std::size_t>(id)]; }
-  const Landmark& landmark(int id) const { return landmarks_[static_cast<std::size_t>(id)]; }
+  const Landmark& landmark(int id) const { return landmarks_[id]; }
+  /// The landmark that one was merged into, which is dead since; -1: into none.
+  int ReplacedBy(int landmark) const { return landmarks_.ReplacedBy(landmark); }
   /// The landmark itself, or the one that it ended in by merging; -1 if that one is gone, and for -1.
   int Present(int landmark) const;
   /// The keyframe itself, or the one that stands for it since it was removed.
@@ -150,9 +100,12 @@ class Map {
   /// that are there, its frames this offset. `first_piece`: what its piece 0 is called.
   void Append(const Map& other, std::int64_t frame_offset, int first_piece);
 
+  /// Gives the memory of dead landmarks back. References to landmarks end.
+  void Compact() { landmarks_.Compact(); }
+
   /// For loading: the next keyframe or landmark, as it was saved.
   void Restore(Keyframe keyframe) { keyframes_.Append(std::move(keyframe)); }
-  void Restore(Landmark landmark) { landmarks_.Append(std::move(landmark)); }
+  void Restore(Landmark landmark, int replaced_by) { landmarks_.Append(std::move(landmark), replaced_by); }
   /// Throws InputError if what was restored does not fit together.
   void Check(const internal::SectionReader& file) const;
 
@@ -161,7 +114,7 @@ class Map {
   std::optional<PinholeCamera> camera_;
   double aligned_sigma_ = 1;
   SharedVector<Keyframe, 1> keyframes_;
-  SharedVector<Landmark, 64> landmarks_;
+  LandmarkStore landmarks_;
 };
 
 }  // namespace tutti

@@ -81,7 +81,7 @@ void CarryOver(const Map& from, const PinholeCamera& camera, const PinholeCamera
       patch->scale_y *= static_cast<float>(moved.scale_y);
       landmark.patch = std::move(patch);
     }
-    to->Restore(std::move(landmark));
+    to->Restore(std::move(landmark), from.ReplacedBy(id));
   }
   to->UpdateGeometry();
 }

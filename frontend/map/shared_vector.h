@@ -16,6 +16,23 @@
 #endif
 
 namespace tutti {
+namespace internal {
+
+/// Whether nobody else holds it. If so, whatever other threads have read before they let go of it has
+/// happened.
+template <class T>
+bool IsAlone(const std::shared_ptr<T>& object) {
+#if TUTTI_UNDER_TSAN  // which does not know fences
+  const std::shared_ptr<T> again = object;
+  return again.use_count() == 2;
+#else
+  const bool alone = object.use_count() == 1;
+  std::atomic_thread_fence(std::memory_order_acquire);
+  return alone;
+#endif
+}
+
+}  // namespace internal
 
 /// Elements live in chunks of `kChunk`. A copy costs a pointer per chunk; the first write to a chunk that is
 /// shared copies that chunk. Copies may be used, and destroyed, on different threads.
@@ -41,21 +58,9 @@ class SharedVector {
  private:
   using Chunk = std::vector<T>;
 
-  // If so, whatever other threads have read before they let go of it has happened.
-  static bool IsAlone(const std::shared_ptr<Chunk>& chunk) {
-#if TUTTI_UNDER_TSAN  // which does not know fences
-    const std::shared_ptr<Chunk> again = chunk;
-    return again.use_count() == 2;
-#else
-    const bool alone = chunk.use_count() == 1;
-    std::atomic_thread_fence(std::memory_order_acquire);
-    return alone;
-#endif
-  }
-
   Chunk& Own(std::size_t c) {
     std::shared_ptr<Chunk>& chunk = chunks_[c];
-    if (!IsAlone(chunk)) {
+    if (!internal::IsAlone(chunk)) {
       auto copy = std::make_shared<Chunk>();
       copy->reserve(kChunk);  // references stay good while it grows
       copy->insert(copy->end(), chunk->begin(), chunk->end());

@@ -365,6 +365,7 @@ std::map<int, int> Odometry::Impl::RemoveRedundantKeyframes(
   std::map<int, int> removed = tutti::RemoveRedundantKeyframes(keep, least_views, may, mapper_.MutableMap());
   history_.Rehang(removed, map());
   tracker_.FollowLandmarks(map());
+  mapper_.MutableMap()->Compact();
   return removed;
 }
 

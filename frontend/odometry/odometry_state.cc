@@ -105,11 +105,18 @@ struct LandmarkDescriptors {
 };
 
 void ReadLandmarks(int count, internal::StateReader& in, Map* map) {
-  std::vector<Landmark> landmarks;
+  std::vector<Landmark> landmarks(static_cast<std::size_t>(count));
+  std::vector<int> replaced_by(landmarks.size(), -1);
   int patches = 0;
-  for (int i = 0; i < count; ++i) {
-    in(landmarks.emplace_back());
-    if (landmarks.back().patch) ++patches;
+  for (std::size_t i = 0; i < landmarks.size(); ++i) {
+    Landmark& landmark = landmarks[i];
+    in(landmark.alive);
+    if (landmark.alive) {
+      in(landmark);
+    } else {
+      in(replaced_by[i]);
+    }
+    if (landmark.patch) ++patches;
   }
   std::string packed;
   in(packed);
@@ -119,14 +126,15 @@ void ReadLandmarks(int count, internal::StateReader& in, Map* map) {
   in(descriptors);
   descriptors.Give(&landmarks, *map, in);
   const std::uint8_t* next = all.data;
-  for (Landmark& landmark : landmarks) {
+  for (std::size_t i = 0; i < landmarks.size(); ++i) {
+    Landmark& landmark = landmarks[i];
     if (landmark.patch) {
       auto patch = std::make_shared<Patch>(*landmark.patch);
       std::copy(next, next + patch->grey.size(), patch->grey.begin());
       next += patch->grey.size();
       landmark.patch = std::move(patch);
     }
-    map->Restore(std::move(landmark));
+    map->Restore(std::move(landmark), replaced_by[i]);
   }
 }
 
@@ -171,7 +179,15 @@ void Odometry::Impl::Save(const internal::SectionSink& sink) const {
   for (int first = 0; first < head.landmarks; first += kLandmarksPerSection) {
     const int end = std::min(first + kLandmarksPerSection, head.landmarks);
     write(Section::kLandmarks, [&](auto& out) {
-      for (int id = first; id < end; ++id) out(map().landmark(id));
+      for (int id = first; id < end; ++id) {
+        const Landmark& landmark = map().landmark(id);
+        out(landmark.alive);
+        if (landmark.alive) {
+          out(landmark);
+        } else {  // nobody asks for more than what replaced it
+          out(map().ReplacedBy(id));
+        }
+      }
       out(internal::PutGrey(PatchesOf(map(), first, end)));
       LandmarkDescriptors descriptors;
       for (int id = first; id < end; ++id) {

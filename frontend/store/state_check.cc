@@ -1,6 +1,9 @@
 #include "frontend/store/state_check.h"
 
+#include <algorithm>
+#include <cstddef>
 #include <limits>
+#include <vector>
 
 #include "frontend/odometry/async_mapper.h"
 #include "frontend/odometry/frame_history.h"
@@ -43,12 +46,16 @@ void CheckKeyframeState(const Map& map, int id, const SectionReader& file) {
   }
 }
 
-void CheckObservations(const Map& map, const Landmark& l, const SectionReader& file) {
+void CheckObservations(const Map& map, int id, const SectionReader& file) {
+  const Landmark& l = map.landmark(id);
   if (l.observations.empty()) file.Damaged("a landmark that nothing sees");
   int last = -1;
   for (const Observation& o : l.observations) {
     CheckIndex(o.keyframe, last + 1, map.KeyframeCount(), file);
-    CheckIndex(o.feature, 0, static_cast<int>(map.keyframe(o.keyframe).landmarks.size()), file);
+    const std::vector<int>& seen = map.keyframe(o.keyframe).landmarks;
+    CheckIndex(o.feature, 0, static_cast<int>(seen.size()), file);
+    if (seen[static_cast<std::size_t>(o.feature)] != id)
+      file.Damaged("a landmark with a view that is another's");
     last = o.keyframe;
   }
 }
@@ -63,9 +70,10 @@ void CheckPatch(const Map& map, const Landmark& l, const SectionReader& file) {
     file.Damaged("a patch that is none");
 }
 
-void CheckLandmarkState(const Map& map, const Landmark& l, const SectionReader& file) {
-  if (!l.alive) return CheckIndex(l.replaced_by, -1, map.LandmarkCount(), file);
-  CheckObservations(map, l, file);
+void CheckLandmarkState(const Map& map, int id, const SectionReader& file) {
+  const Landmark& l = map.landmark(id);
+  if (!l.alive) return CheckIndex(map.ReplacedBy(id), -1, map.LandmarkCount(), file);
+  CheckObservations(map, id, file);
   CheckPatch(map, l, file);
   CheckKeyframe(l.reference, map, file);
   CheckPlace(l.position, file);
@@ -76,11 +84,23 @@ void CheckLandmarkState(const Map& map, const Landmark& l, const SectionReader& 
   CheckIndex(l.found, 0, kMostFrames, file);
 }
 
-// Whoever follows replaced_by gets to an end.
+// What a keyframe sees knows of it. The other way round has been checked, so that as many are enough; else
+// the keyframe would still see a landmark that is removed.
+void CheckViews(const Map& map, const SectionReader& file) {
+  std::size_t views = 0, seen = 0;
+  for (int id = 0; id < map.LandmarkCount(); ++id) views += map.landmark(id).observations.size();
+  for (int id = 0; id < map.KeyframeCount(); ++id) {
+    const std::vector<int>& landmarks = map.keyframe(id).landmarks;
+    seen += landmarks.size() - static_cast<std::size_t>(std::count(landmarks.begin(), landmarks.end(), -1));
+  }
+  if (seen != views) file.Damaged("a keyframe that sees what does not know of it");
+}
+
+// Whoever follows ReplacedBy gets to an end.
 void CheckReplacements(const Map& map, const SectionReader& file) {
   std::vector<int> from(static_cast<std::size_t>(map.LandmarkCount()), -1);  // where the way began
   for (int start = 0; start < map.LandmarkCount(); ++start) {
-    for (int l = start; l >= 0 && !map.landmark(l).alive; l = map.landmark(l).replaced_by) {
+    for (int l = start; l >= 0 && !map.landmark(l).alive; l = map.ReplacedBy(l)) {
       int& before = from[static_cast<std::size_t>(l)];
       if (before == start) file.Damaged("landmarks that replaced each other");
       if (before >= 0) break;
@@ -93,7 +113,8 @@ void CheckReplacements(const Map& map, const SectionReader& file) {
 
 void Map::Check(const SectionReader& file) const {
   for (int id = 0; id < KeyframeCount(); ++id) CheckKeyframeState(*this, id, file);
-  for (int id = 0; id < LandmarkCount(); ++id) CheckLandmarkState(*this, landmark(id), file);
+  for (int id = 0; id < LandmarkCount(); ++id) CheckLandmarkState(*this, id, file);
+  CheckViews(*this, file);
   CheckReplacements(*this, file);
 }
 

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <map>
+
 #include "tests/frontend/map/point_scene.h"
 #include "tests/support/error_of.h"
 #include "tests/support/test_data.h"
@@ -58,11 +60,19 @@ TEST_F(MapCheck, LandmarksThatReplacedEachOtherAreRefused) {
   map_.RemoveLandmark(4);
   map_.RemoveLandmark(5);
   map_.RemoveLandmark(6);
-  const auto replace = [this](int a, int b) { map_.landmark(a).replaced_by = b; };
-  EXPECT_EQ(With([&] { replace(4, 5), replace(5, 6), replace(6, 7); }), "no error");
-  EXPECT_THAT(With([&] { replace(4, 5), replace(5, 6), replace(6, 4); }), HasSubstr("replaced each other"));
-  EXPECT_THAT(With([&] { replace(5, 5); }), HasSubstr("replaced each other"));
-  EXPECT_THAT(With([&] { replace(5, map_.LandmarkCount()); }), HasSubstr("out of range"));
+  const auto complaint = [this](const std::map<int, int>& replaced_by) {
+    return With([&] {
+      const Map before = map_;
+      map_ = Map(before.scales());
+      for (int id = 0; id < before.KeyframeCount(); ++id) map_.Restore(before.keyframe(id));
+      for (int id = 0; id < before.LandmarkCount(); ++id)
+        map_.Restore(before.landmark(id), replaced_by.count(id) != 0 ? replaced_by.at(id) : -1);
+    });
+  };
+  EXPECT_EQ(complaint({{4, 5}, {5, 6}, {6, 7}}), "no error");
+  EXPECT_THAT(complaint({{4, 5}, {5, 6}, {6, 4}}), HasSubstr("replaced each other"));
+  EXPECT_THAT(complaint({{5, 5}}), HasSubstr("replaced each other"));
+  EXPECT_THAT(complaint({{5, map_.LandmarkCount()}}), HasSubstr("out of range"));
 }
 
 TEST_F(MapCheck, KeyframesThatDoNotFitAreRefused) {
@@ -86,6 +96,18 @@ TEST_F(MapCheck, KeyframesThatDoNotFitAreRefused) {
                 map_.keyframe(0).landmarks[1] = 0;
               }),
               HasSubstr("sees what is gone"));
+}
+
+TEST_F(MapCheck, KeyframesAndLandmarksKnowOfEachOther) {
+  const Observation view = std::as_const(map_).landmark(2).observations[0];
+  const auto seen = [&](int landmark) {
+    return With(
+        [&] { map_.keyframe(view.keyframe).landmarks[static_cast<std::size_t>(view.feature)] = landmark; });
+  };
+  EXPECT_EQ(seen(2), "no error");
+  EXPECT_THAT(seen(-1), HasSubstr("another's"));
+  EXPECT_THAT(seen(3), HasSubstr("another's"));
+  EXPECT_THAT(With([&] { map_.landmark(2).observations.pop_back(); }), HasSubstr("does not know of it"));
 }
 
 TEST_F(MapCheck, LandmarksThatDoNotFitAreRefused) {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/byte_stream.h"
+#include "loopclosure/store/packed_mat.h"
 #include "tests/loopclosure/vocabulary/random_descriptors.h"
 
 namespace tutti {

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "core/byte_stream.h"
+#include "loopclosure/store/packed_mat.h"
 #include "tests/loopclosure/vocabulary/random_descriptors.h"
 #include "tutti/core/error.h"
 

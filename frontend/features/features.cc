@@ -129,9 +129,13 @@ void FrameFeatures::BuildGrid(int width, int height) {
 void FrameFeatures::FillGrid() {
   std::vector<std::size_t> cell_of(keypoints.size());
   first_entry_.assign(static_cast<std::size_t>(columns_ * rows_) + 1, 0);
+  // Outside of the image, the cell at its edge.
+  const auto cell_at = [](float pixel, int cells) {
+    return pixel > 0 ? static_cast<int>(std::min(pixel, static_cast<float>(cells * kCell - 1))) / kCell : 0;
+  };
   for (std::size_t i = 0; i < keypoints.size(); ++i) {
-    const int c = std::clamp(static_cast<int>(keypoints[i].pt.x) / kCell, 0, columns_ - 1);
-    const int r = std::clamp(static_cast<int>(keypoints[i].pt.y) / kCell, 0, rows_ - 1);
+    const int c = cell_at(keypoints[i].pt.x, columns_);
+    const int r = cell_at(keypoints[i].pt.y, rows_);
     const int cell = r * columns_ + c;
     cell_of[i] = static_cast<std::size_t>(cell);
     ++first_entry_[cell_of[i] + 1];

@@ -2,6 +2,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "core/dense_solvers.h"
@@ -9,7 +10,8 @@
 namespace tutti {
 namespace {
 
-constexpr double kVisible = 0.1;  // [px]: smaller corrections wait
+constexpr double kVisible = 0.1;   // [px]: smaller corrections wait
+constexpr double kFarthest = 1e6;  // [px]: nothing is seen further away
 
 }  // namespace
 
@@ -79,7 +81,9 @@ std::shared_ptr<const FrameFeatures> SelfCalibration::Moved(const FrameFeatures&
     const Eigen::Vector2d rolled = features.Rolled(f), seen(k.pt.x - rolled.x(), k.pt.y - rolled.y());
     const Eigen::Vector2d raw = LensError::Uncorrect(camera_, features.lens, seen);
     const Eigen::Vector2d to = LensError::Correct(camera_, applied_, raw) + rolled;
-    k.pt = cv::Point2f(static_cast<float>(to.x()), static_cast<float>(to.y()));
+    // An error so large that Uncorrect does not come to an end says nothing of where the pixel belongs.
+    if (std::abs(to.x()) < kFarthest && std::abs(to.y()) < kFarthest)
+      k.pt = cv::Point2f(static_cast<float>(to.x()), static_cast<float>(to.y()));
   }
   moved->lens = applied_;
   moved->BuildGrid(camera_.width, camera_.height);

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <memory>
+#include <utility>
+
 #include "tests/support/plain_camera.h"
 
 namespace tutti {
@@ -43,6 +46,17 @@ TEST_F(SelfCalibrationTest, ComesToWhatTheWindowsSay) {
   SelfCalibration calibration(OdometryOptions(), Rig(Sensor::kMono));
   for (int i = 0; i < 200; ++i) calibration.Learn(LensErrorSeen(calibration, -0.02, 0.001), 10, &map_);
   EXPECT_NEAR(calibration.Applied().x(), -0.02, 0.001);
+}
+
+TEST_F(SelfCalibrationTest, AnErrorBeyondAllReasonMovesNoPixel) {
+  SelfCalibration calibration(OdometryOptions(), Rig(Sensor::kMono));
+  for (int i = 0; i < 9; ++i) calibration.Learn(LensErrorSeen(calibration, 1e9, 0.001), 10, &map_);
+  ASSERT_GT(calibration.Applied().x(), 1e6);
+  EXPECT_EQ(std::as_const(map_).keyframe(0).features->keypoints[0].pt, cv::Point2f(600, 400));
+  // With this error taken out of it already, which can't be undone.
+  auto features = std::make_shared<FrameFeatures>(*OneFeature(500, 300));
+  features->lens = {1e9, 1e9};
+  EXPECT_EQ(calibration.Correct(features)->keypoints[0].pt, cv::Point2f(500, 300));
 }
 
 TEST_F(SelfCalibrationTest, SaysWhatItFoundAndHowWellItIsKnown) {

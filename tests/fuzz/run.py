@@ -80,12 +80,13 @@ def main():
     unknown = [name for name in arguments.fuzzers if name not in there]
     if unknown:
         parser.error(f"there is no fuzzer '{unknown[0]}'; fuzzers are {' '.join(there)}")
+    root = pathlib.Path(__file__).resolve().parents[2]
+    # Of what was built just now; an hour later there may be another.
+    commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=root, capture_output=True, text=True).stdout.strip()
     with concurrent.futures.ThreadPoolExecutor(max(arguments.jobs, 1)) as pool:
         results = list(pool.map(lambda name: run(build, name, max(1, round(60 * arguments.minutes))),
                                 arguments.fuzzers or there))
     if arguments.write:
-        root = pathlib.Path(__file__).resolve().parents[2]
-        commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=root, capture_output=True, text=True).stdout.strip()
         file = root / "docs" / "results" / "fuzz.md"
         rows = {**earlier_rows(file), **{r["fuzzer"]: row(r, arguments.minutes, commit) for r in results}}
         file.write_text(document({name: rows[name] for name in rows if name in READERS}))

@@ -15,7 +15,7 @@ Landmark& LandmarkStore::Append(Landmark landmark, int replaced_by) {
   ++size_;
   chunk.replaced_by[place] = replaced_by;
   if (!landmark.alive) return gone_ = {};
-  chunk.at[place] = static_cast<std::int8_t>(chunk.landmarks.size());
+  chunk.at[place] = static_cast<std::int16_t>(chunk.landmarks.size());
   return chunk.landmarks.emplace_back(std::move(landmark));
 }
 
@@ -41,7 +41,7 @@ void LandmarkStore::Compact() {
     for (std::size_t place = 0; place < kChunk; ++place) {
       const int at = chunks_[c]->at[place];
       if (at < 0 || !before[static_cast<std::size_t>(at)].alive) continue;
-      kept->at[place] = static_cast<std::int8_t>(kept->landmarks.size());
+      kept->at[place] = static_cast<std::int16_t>(kept->landmarks.size());
       kept->landmarks.push_back(before[static_cast<std::size_t>(at)]);
     }
     chunks_[c] = std::move(kept);

@@ -14,7 +14,7 @@
 namespace tutti {
 
 /// Numbers ascend and none is given twice. Landmarks live in chunks that copies share until one writes to
-/// them, as in SharedVector; of those that are dead, Compact leaves five bytes each. A run that goes round
+/// them, as in SharedVector; of those that are dead, Compact leaves six bytes each. A run that goes round
 /// and round one place makes landmarks for ever and keeps few.
 class LandmarkStore {
  public:
@@ -46,7 +46,7 @@ class LandmarkStore {
  private:
   static constexpr std::size_t kChunk = 64;
   struct Chunk {
-    std::array<std::int8_t, kChunk> at{};  // of `landmarks`; -1: it is in none
+    std::array<std::int16_t, kChunk> at{};  // of `landmarks`; -1: it is in none
     std::array<int, kChunk> replaced_by{};
     std::vector<Landmark> landmarks;
   };

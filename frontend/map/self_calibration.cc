@@ -10,8 +10,8 @@
 namespace tutti {
 namespace {
 
-constexpr double kVisible = 0.1;   // [px]: smaller corrections wait
-constexpr double kFarthest = 1e6;  // [px]: nothing is seen further away
+constexpr double kVisible = 0.1;     // [px]: smaller corrections wait
+constexpr double kOutOfSight = 1e6;  // [px]: nothing is seen further away
 
 }  // namespace
 
@@ -82,7 +82,7 @@ std::shared_ptr<const FrameFeatures> SelfCalibration::Moved(const FrameFeatures&
     const Eigen::Vector2d raw = LensError::Uncorrect(camera_, features.lens, seen);
     const Eigen::Vector2d to = LensError::Correct(camera_, applied_, raw) + rolled;
     // An error so large that Uncorrect does not come to an end says nothing of where the pixel belongs.
-    if (std::abs(to.x()) < kFarthest && std::abs(to.y()) < kFarthest)
+    if (std::abs(to.x()) < kOutOfSight && std::abs(to.y()) < kOutOfSight)
       k.pt = cv::Point2f(static_cast<float>(to.x()), static_cast<float>(to.y()));
   }
   moved->lens = applied_;

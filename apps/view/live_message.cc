@@ -67,9 +67,10 @@ Json FrameJson(const LiveFrame& frame) {
 }  // namespace
 
 std::string LiveMessage(const LiveNews& news) {
-  Json json = {
-      {"paused", news.paused},     {"finished", news.finished},         {"total", news.total},
-      {"sessions", news.sessions}, {"only_located", news.only_located}, {"frame", FrameJson(news.frame)}};
+  Json json = {{"paused", news.paused},         {"standing", news.standing},
+               {"finished", news.finished},     {"total", news.total},
+               {"sessions", news.sessions},     {"only_located", news.only_located},
+               {"frame", FrameJson(news.frame)}};
   json["places"] = Json::array();
   for (const LivePlace& place : *news.places) {
     const Eigen::Quaterniond& q = place.T_world_camera.rotation;

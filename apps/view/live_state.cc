@@ -225,8 +225,13 @@ void LiveState::WaitWhilePaused(double abandoned_s) {
       Changed();
       break;
     }
+    if (!now_.standing) {
+      now_.standing = true;
+      Changed();
+    }
     changed_.wait_for(lock, std::chrono::milliseconds(50));
   }
+  now_.standing = false;
   if (steps_ > 0) --steps_;
 }
 

@@ -81,7 +81,9 @@ struct LiveNews {
   bool only_located = false;  ///< the frames do not become part of the map
   std::uint64_t version = 0;
   std::size_t total = 0;  ///< frames of the run; 0: nobody knows how many
-  bool paused = false, finished = false;
+  bool paused = false;    ///< somebody asked for a pause; a frame that was begun is still computed
+  bool standing = false;  ///< the run stands still: it waits for the end of the pause, or for a step
+  bool finished = false;
 };
 
 /// What a viewer has by now.

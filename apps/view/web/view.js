@@ -247,9 +247,9 @@ function speed() {
 const clock = (seconds) => `${Math.floor(seconds / 60)}:${String(Math.round(seconds) % 60).padStart(2, '0')}`;
 
 function showStatus() {
-  const { frame, total, paused, finished } = state.news, { rate, left } = speed();
+  const { frame, total, paused, standing, finished } = state.news, { rate, left } = speed();
   by('state').dataset.state = paused ? 'paused' : frame.state;
-  by('state').textContent = finished ? `done, ${frame.state}` : paused ? `paused, ${frame.state}` : frame.state;
+  by('state').textContent = finished ? `done, ${frame.state}` : paused ? `${standing ? 'paused' : 'pausing'}, ${frame.state}` : frame.state;
   by('pause').textContent = paused ? 'Resume' : 'Pause';
   by('pause').disabled = finished;
   by('step').disabled = !paused || finished;
@@ -261,6 +261,7 @@ function showStatus() {
     `${state.news.places.length} keyframes${state.news.only_located ? ' in the map' : `, ${accepted} loops`}`;
   document.body.dataset.frame = frame.number;
   document.body.dataset.paused = paused ? '1' : '0';
+  document.body.dataset.standing = standing ? '1' : '0';
   document.body.dataset.finished = finished ? '1' : '0';
 }
 

@@ -60,8 +60,10 @@ const waitForNews = (page, test) => waitFor(page, test, undefined, 'mutation');
 // Presses Pause in the same turn of the page in which test holds: no run is too fast for it.
 async function pauseWhen(page, test) {
   await waitForNews(page, `(${test})() && (document.getElementById('pause').click(), true)`);
-  await waitForNews(page, () => document.body.dataset.paused === '1');
+  await waitForNews(page, stands);
 }
+// Not paused alone: a frame that was begun is still computed, which may take a second on a machine with much to do.
+const stands = () => document.body.dataset.paused === '1' && document.body.dataset.standing === '1';
 // Whether a canvas has something on it.
 const inked = (id) => {
   const canvas = document.getElementById(id);
@@ -91,13 +93,11 @@ async function drive(browser, folder, data) {
   const allow = (target) => target.startsWith(url);
   const { page, problems } = await openPage(browser, url, { allow });
   await pauseWhen(page, () => Number(document.body.dataset.frame) > 30);
-  await sleep(700);
   const at = await frame(page);
   await sleep(1500);
   check(await frame(page) === at, 'a run that is paused stands still');
   await page.click('#step');
-  await waitFor(page, (before) => Number(document.body.dataset.frame) > before, at);
-  await sleep(700);
+  await waitFor(page, (before) => Number(document.body.dataset.frame) > before && document.body.dataset.standing === '1', at);
   check(await frame(page) === at + 1, `a step is one frame, not ${await frame(page) - at}`);
   for (const id of ['image', 'map']) check(await page.evaluate(inked, id), `the canvas ${id} is drawn`);
   // State, speed and what is left; the map in 3D and from above.

@@ -119,7 +119,7 @@ void SetUpClose(CLI::App& command, int& exit_code) {
   command
       .add_option("--images", arguments->images,
                   "what the camera saw along it: a folder of images, a data set (KITTI, TUM, EuRoC; with "
-                  "depth or right images distances are measured), a video, or a ROS 1 bag")
+                  "depth or right images distances are measured), a video, or a bag of ROS 1 or 2")
       ->required();
   command.add_option("--depth", arguments->depth,
                      "folder of depth images, registered to those of --images, if that is a plain folder: in "

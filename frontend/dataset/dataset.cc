@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 
+#include "frontend/dataset/bag.h"
 #include "frontend/dataset/dataset_folder.h"
 #include "frontend/dataset/image_file.h"
 #include "frontend/dataset/selected_dataset.h"
@@ -146,7 +147,9 @@ DatasetType DetectDatasetType(const std::filesystem::path& path) {
   if (!std::filesystem::is_directory(path, code)) {
     if (HasImageExtension(path))
       throw InputError(path.string() + ": is a single image; give the folder that holds it");
-    return path.extension() == ".bag" ? DatasetType::kBag : DatasetType::kVideo;
+    const std::string type = path.extension().string();
+    const auto bags = {".bag", ".mcap", ".db3", ".zstd"};  // the last one: packed, which Bag::Open says
+    return std::find(bags.begin(), bags.end(), type) != bags.end() ? DatasetType::kBag : DatasetType::kVideo;
   }
   const auto folder = [&](const char* name) { return std::filesystem::is_directory(path / name, code); };
   const auto file = [&](const char* name) { return std::filesystem::is_regular_file(path / name, code); };
@@ -154,12 +157,14 @@ DatasetType DetectDatasetType(const std::filesystem::path& path) {
   if (folder("image_0") || folder("image_2")) return DatasetType::kKitti;
   if (file("rgb.txt") || file("associations.txt")) return DatasetType::kTum;
   if (!ListImages(path).empty()) return DatasetType::kImages;
+  if (!Bag::Files(path).empty()) return DatasetType::kBag;
   const std::filesystem::directory_iterator entries(path, code);
   if (code)
     throw InputError(path.string() + ": can't be listed (" + code.message() + "); check its permissions");
-  throw InputError(path.string() +
-                   (entries == std::filesystem::directory_iterator() ? ": is empty" : ": holds no data set") +
-                   "; expected image_0/ (KITTI), rgb.txt (TUM), mav0/cam0/ (EuRoC), or images");
+  throw InputError(
+      path.string() +
+      (entries == std::filesystem::directory_iterator() ? ": is empty" : ": holds no data set") +
+      "; expected image_0/ (KITTI), rgb.txt (TUM), mav0/cam0/ (EuRoC), images, or bags of ROS 2");
 }
 
 namespace {
@@ -168,10 +173,13 @@ DatasetType CheckedType(const std::filesystem::path& path, const DatasetOptions&
   const DatasetType seen = DetectDatasetType(path);  // missing or empty: the same words for every type
   const DatasetType type = options.type == DatasetType::kAuto ? seen : options.type;
   const auto is_file = [](DatasetType t) { return t == DatasetType::kVideo || t == DatasetType::kBag; };
-  if (is_file(type) != is_file(seen)) {
+  std::error_code code;
+  const bool folder = std::filesystem::is_directory(path, code);
+  if (is_file(type) != is_file(seen) || (folder && type == DatasetType::kVideo)) {
     throw InputError(path.string() + (is_file(type)
                                           ? ": is a folder, but the type is video or bag; give the file"
-                                          : ": is a file; give the folder of the data set"));
+                                      : folder ? ": holds bags of ROS 2; let dataset.type be auto, or bag"
+                                               : ": is a file; give the folder of the data set"));
   }
   return type;
 }

@@ -1,11 +1,11 @@
-// ROS 1 bags with sensor_msgs/Image, CompressedImage and CameraInfo.
+// Bags of ROS with sensor_msgs/Image, CompressedImage and CameraInfo.
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <string>
 
+#include "frontend/dataset/bag.h"
 #include "frontend/dataset/dataset_folder.h"
-#include "frontend/dataset/ros_bag.h"
 #include "frontend/dataset/ros_message.h"
 #include "frontend/dataset/video_input.h"
 #include "tutti/core/error.h"
@@ -20,10 +20,10 @@ using Messages = std::vector<BagMessage>;
 class BagDataset : public Dataset {
  public:
   BagDataset(const fs::path& file, const DatasetOptions& options)
-      : file_(file), options_(options), bag_(file) {
+      : file_(file), options_(options), bag_(Bag::Open(file)) {
     FindTopics();
     Index();
-    if (!bag_.damage().empty()) warnings_.push_back(bag_.damage());
+    if (!bag_->damage().empty()) warnings_.push_back(bag_->damage());
     SetUpRig();
   }
 
@@ -75,14 +75,14 @@ class BagDataset : public Dataset {
   void FindTopics() {
     std::vector<std::string> images;
     std::string list;
-    for (const RosBag::Topic& topic : bag_.topics()) {
+    for (const Bag::Topic& topic : bag_->topics()) {
       if (!IsImageMessage(topic.type)) continue;
       images.push_back(topic.name);
       list += " " + topic.name;
     }
     if (images.empty()) {
       throw InputError(file_.string() + ": holds no topic of sensor_msgs/Image or CompressedImage" +
-                       (bag_.damage().empty() ? "" : "; it is damaged (" + bag_.damage() + ")"));
+                       (bag_->damage().empty() ? "" : "; it is damaged (" + bag_->damage() + ")"));
     }
     if (options_.topic.empty() && images.size() == 1) options_.topic = images.front();
     const auto check = [&](const char* key, const std::string& topic) {
@@ -99,8 +99,8 @@ class BagDataset : public Dataset {
 
   // Messages of a topic by the stamps in their headers.
   Messages Find(const std::string& topic) {
-    Messages messages = bag_.Messages(topic);
-    if (const std::size_t lost = bag_.Lost(topic); lost > 0) {
+    Messages messages = bag_->Messages(topic);
+    if (const std::size_t lost = bag_->Lost(topic); lost > 0) {
       warnings_.push_back(file_.string() + ": " + std::to_string(lost) + " of " +
                           std::to_string(messages.size() + lost) + " images of " + topic +
                           " can't be read and are skipped");
@@ -165,16 +165,17 @@ class BagDataset : public Dataset {
     if (options_.topic.size() > 11 && options_.topic.substr(slash) == "/compressed")
       base = base.substr(0, std::max<std::size_t>(1, base.find_last_of('/')));
     const std::string topic = base + "/camera_info";
-    if (bag_.TypeOf(topic) != "sensor_msgs/CameraInfo") return;
-    const Messages infos = bag_.Messages(topic);
+    const Bag::Topic* found = bag_->Find(topic);
+    if (found == nullptr || found->type != "sensor_msgs/CameraInfo") return;
+    const Messages infos = bag_->Messages(topic);
     if (infos.empty()) return;
     std::string info;
     try {
-      info = bag_.Read(infos.front());
+      info = bag_->Read(infos.front());
     } catch (const InputError& e) {
       throw InputError(file_.string() + ": " + topic + ": " + e.what());
     }
-    options_.camera = CameraOfMessage(info, file_.string());
+    options_.camera = CameraOfMessage(info, found->serialization, file_.string());
     if (options_.camera) warnings_.push_back(file_.string() + ": calibration of " + topic);
   }
 
@@ -195,7 +196,8 @@ class BagDataset : public Dataset {
 
   MessageImage Decode(const BagMessage& message, const std::string& topic, bool depth) const {
     try {
-      return DecodeImageMessage(bag_.Read(message), bag_.TypeOf(topic), depth);
+      const Bag::Topic& found = *bag_->Find(topic);  // FindTopics saw it
+      return DecodeImageMessage(bag_->Read(message), found.type, found.serialization, depth);
     } catch (const InputError& e) {
       MessageImage none;
       none.error = e.what();
@@ -235,7 +237,7 @@ class BagDataset : public Dataset {
   int bits_ = 8;
   std::vector<std::string> warnings_;
   cv::Mat mask_;  // rectified; empty: none
-  RosBag bag_;
+  std::unique_ptr<Bag> bag_;
   Messages images_, right_, depth_;
   std::vector<Frame> frames_;
 };

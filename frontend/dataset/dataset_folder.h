@@ -142,7 +142,7 @@ FolderContents FindImages(const std::filesystem::path& folder, const DatasetOpti
 std::unique_ptr<Dataset> FollowFolder(std::function<FolderContents()> find, const DatasetOptions& options);
 /// camera:0, a pair camera:0,1, the files that stand in for them, or a stream.
 std::unique_ptr<Dataset> OpenCamera(const std::string& name, const DatasetOptions& options);
-/// A ROS 1 bag.
+/// A bag of ROS 1 or 2: a file, or the folder that 'ros2 bag record' leaves.
 std::unique_ptr<Dataset> OpenBag(const std::filesystem::path& file, const DatasetOptions& options);
 std::unique_ptr<Dataset> OpenVideo(const std::filesystem::path& file, const DatasetOptions& options);
 

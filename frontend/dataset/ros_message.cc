@@ -17,12 +17,48 @@ namespace {
 
 using internal::ByteReader;
 
-std::string_view Text(ByteReader& in) { return in.GetView(in.Get<std::uint32_t>()); }
-
-void SkipHeader(ByteReader& in) {
-  in.GetView(12);  // number, seconds, nanoseconds
-  Text(in);        // the frame's name
+// What is wrong with how a message is serialized; empty: nothing.
+std::string SerializationProblem(std::string_view message, Serialization serialization) {
+  if (serialization == Serialization::kRos1 || message.size() < 4) return {};
+  const std::string_view kind = message.substr(0, 2);
+  if (kind == std::string_view("\x00\x01", 2)) return {};
+  return kind == "\x28\xb5" ? "is compressed for itself (compression_mode: message); write the bag without: "
+                              "ros2 bag convert"
+                            : "is not serialized as little-endian CDR";
 }
+
+// Values of a message, one after the other.
+class MessageReader {
+ public:
+  MessageReader(std::string_view message, Serialization serialization, const std::string& source)
+      : cdr_(serialization == Serialization::kCdr), in_(message, source) {
+    if (cdr_) in_.GetView(4);  // the kind of serialization
+    size_ = in_.Left();
+  }
+
+  template <typename T>
+  T Get() {
+    if (cdr_) in_.GetView((sizeof(T) - (size_ - in_.Left()) % sizeof(T)) % sizeof(T));
+    return in_.Get<T>();
+  }
+  std::string_view Bytes() { return in_.GetView(Get<std::uint32_t>()); }
+  std::string_view Text() {
+    std::string_view text = Bytes();
+    if (cdr_ && !text.empty() && text.back() == '\0') text.remove_suffix(1);
+    return text;
+  }
+  void SkipHeader() {
+    if (!cdr_) Get<std::uint32_t>();  // its number
+    Get<std::uint32_t>();             // seconds
+    Get<std::uint32_t>();             // nanoseconds
+    Text();                           // the frame's name
+  }
+
+ private:
+  bool cdr_;
+  ByteReader in_;
+  std::size_t size_ = 0;  // of what is aligned
+};
 
 /// How pixels of an encoding lie in memory, and how they become grey; nothing to do: -1.
 struct Encoding {
@@ -51,12 +87,12 @@ const std::map<std::string, Encoding, std::less<>>& Encodings() {
   return encodings;
 }
 
-void DecodeRaw(ByteReader& in, bool depth, MessageImage* out) {
+void DecodeRaw(MessageReader& in, bool depth, MessageImage* out) {
   const auto height = in.Get<std::uint32_t>(), width = in.Get<std::uint32_t>();
-  const std::string_view encoding = Text(in);
+  const std::string_view encoding = in.Text();
   const bool big_endian = in.Get<std::uint8_t>() != 0;
   const std::size_t step = in.Get<std::uint32_t>();
-  const std::string_view data = Text(in);
+  const std::string_view data = in.Bytes();
   const auto known = Encodings().find(encoding);
   if (known == Encodings().end() || (big_endian && CV_ELEM_SIZE1(known->second.type) > 1)) {
     out->error = "an image of encoding '" + std::string(encoding) + "'" +
@@ -81,9 +117,9 @@ void DecodeRaw(ByteReader& in, bool depth, MessageImage* out) {
   }
 }
 
-void DecodeCompressed(ByteReader& in, bool depth, MessageImage* out) {
-  const std::string format(Text(in));
-  const std::string_view data = Text(in);
+void DecodeCompressed(MessageReader& in, bool depth, MessageImage* out) {
+  const std::string format(in.Text());
+  const std::string_view data = in.Bytes();
   const ImageFile decoded = DecodeImage(
       {data.begin(), data.end()}, depth ? cv::IMREAD_UNCHANGED : cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
   out->image = decoded.image;
@@ -92,15 +128,27 @@ void DecodeCompressed(ByteReader& in, bool depth, MessageImage* out) {
 
 }  // namespace
 
+std::string NameOfType(std::string type) {
+  const std::size_t msg = type.find("/msg/");
+  if (msg != std::string::npos) type.erase(msg, 4);
+  return type;
+}
+
 bool IsImageMessage(const std::string& type) {
   return type == "sensor_msgs/Image" || type == "sensor_msgs/CompressedImage";
 }
 
-MessageImage DecodeImageMessage(const std::string& message, const std::string& type, bool depth) {
+MessageImage DecodeImageMessage(const std::string& message, const std::string& type,
+                                Serialization serialization, bool depth) {
   MessageImage out;
+  out.error = SerializationProblem(message, serialization);
+  if (!out.error.empty()) {
+    out.error = "a message " + out.error;
+    return out;
+  }
   try {
-    ByteReader in(message, "a message");
-    SkipHeader(in);
+    MessageReader in(message, serialization, "a message");
+    in.SkipHeader();
     type == "sensor_msgs/Image" ? DecodeRaw(in, depth, &out) : DecodeCompressed(in, depth, &out);
   } catch (const InputError&) {
     out.error = "a message is damaged: it ends too early";
@@ -111,13 +159,16 @@ MessageImage DecodeImageMessage(const std::string& message, const std::string& t
   return out;
 }
 
-std::optional<PinholeCamera> CameraOfMessage(const std::string& message, const std::string& source) {
-  ByteReader in(message, source + ": a camera_info");
-  SkipHeader(in);
+std::optional<PinholeCamera> CameraOfMessage(const std::string& message, Serialization serialization,
+                                             const std::string& source) {
+  const std::string problem = SerializationProblem(message, serialization);
+  if (!problem.empty()) throw InputError(source + ": a camera_info " + problem);
+  MessageReader in(message, serialization, source + ": a camera_info");
+  in.SkipHeader();
   PinholeCamera camera;
   camera.height = static_cast<int>(in.Get<std::uint32_t>());
   camera.width = static_cast<int>(in.Get<std::uint32_t>());
-  const std::string model(Text(in));
+  const std::string model(in.Text());
   const auto count = in.Get<std::uint32_t>();
   bool distorted = false;
   for (std::uint32_t i = 0; i < count; ++i) {
@@ -125,7 +176,8 @@ std::optional<PinholeCamera> CameraOfMessage(const std::string& message, const s
     distorted = distorted || value != 0;
     if (i < camera.coefficients.size()) camera.coefficients[i] = value;
   }
-  const auto K = in.Get<std::array<double, 9>>();  // row by row
+  std::array<double, 9> K;  // row by row
+  for (double& value : K) value = in.Get<double>();
   if (!(K[0] > 0)) return std::nullopt;
   camera.fx = K[0];
   camera.cx = K[2];

@@ -1,4 +1,4 @@
-// Messages of ROS 1 as they lie in bags (wiki.ros.org/msg): sensor_msgs/Image, CompressedImage, CameraInfo.
+// Messages of ROS as they lie in bags: sensor_msgs/Image, CompressedImage, CameraInfo.
 #pragma once
 
 #include <optional>
@@ -9,6 +9,13 @@
 
 namespace tutti {
 
+/// How values become bytes: one after the other (ROS 1, wiki.ros.org/msg), or aligned (ROS 2: OMG's CDR, the
+/// little-endian one).
+enum class Serialization { kRos1, kCdr };
+
+/// "sensor_msgs/Image" of what ROS 2 calls "sensor_msgs/msg/Image".
+std::string NameOfType(std::string type);
+
 /// Image or CompressedImage.
 bool IsImageMessage(const std::string& type);
 
@@ -18,10 +25,12 @@ struct MessageImage : ImageFile {
 };
 /// Pixels as stored if `depth`, else in grey, 8 or 16 bit. `type`: one for which IsImageMessage holds. Never
 /// throws; thread-safe.
-MessageImage DecodeImageMessage(const std::string& message, const std::string& type, bool depth);
+MessageImage DecodeImageMessage(const std::string& message, const std::string& type,
+                                Serialization serialization, bool depth);
 
 /// The camera of a CameraInfo; nothing where it says that it is not calibrated (K[0] = 0). `source`: for
 /// messages. Throws InputError for a distortion that tutti does not know, and where the message ends early.
-std::optional<PinholeCamera> CameraOfMessage(const std::string& message, const std::string& source);
+std::optional<PinholeCamera> CameraOfMessage(const std::string& message, Serialization serialization,
+                                             const std::string& source);
 
 }  // namespace tutti

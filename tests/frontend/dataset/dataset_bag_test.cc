@@ -1,4 +1,4 @@
-// ROS 1 bags as data sets.
+// Bags of ROS as data sets.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -20,7 +20,7 @@ using testing::With;
 using testing::ImageMessage;
 using testing::Picture;
 
-const fs::path& Bag() {
+const fs::path& FourFrames() {
   static const fs::path file = [] {
     const std::string type = "sensor_msgs/Image";
     testing::BagWriter bag;
@@ -51,7 +51,7 @@ DatasetOptions Topic(const std::string& topic, Sensor sensor = Sensor::kMono) {
 }
 
 TEST(BagDataset, ColourWithStampsOfTheHeadersAndTheCameraInfo) {
-  const auto dataset = OpenDataset(Bag(), Topic("/colour/image_raw"));
+  const auto dataset = OpenDataset(FourFrames(), Topic("/colour/image_raw"));
   ASSERT_EQ(dataset->Size(), 4u);
   EXPECT_NEAR(dataset->Stamp(3), 100.3, 1e-6);
   EXPECT_TRUE(dataset->Rig().calibrated);
@@ -64,7 +64,7 @@ TEST(BagDataset, ColourWithStampsOfTheHeadersAndTheCameraInfo) {
 }
 
 TEST(BagDataset, SixteenBitIsScaledAndRepeatedStampsAreSkipped) {
-  const auto dataset = OpenDataset(Bag(), Topic("/grey/image"));
+  const auto dataset = OpenDataset(FourFrames(), Topic("/grey/image"));
   ASSERT_EQ(dataset->Size(), 4u);
   EXPECT_FALSE(dataset->Rig().calibrated);
   EXPECT_THAT(dataset->Warnings().front(), HasSubstr("repeat a time stamp"));
@@ -77,7 +77,7 @@ TEST(BagDataset, DepthInItsUnitAndImagesWithoutComeAlone) {
   DatasetOptions options = Topic("/colour/image_raw", Sensor::kRgbd);
   options.depth_topic = "/depth/image";
   options.depth_units_per_m = 1000;
-  const auto dataset = OpenDataset(Bag(), options);
+  const auto dataset = OpenDataset(FourFrames(), options);
   ASSERT_EQ(dataset->Size(), 4u);
   EXPECT_THAT(dataset->Warnings().front(), HasSubstr("1 of 4 images of /colour/image_raw have no depth"));
   ASSERT_TRUE(dataset->Read(2).frame.has_value());
@@ -89,9 +89,10 @@ TEST(BagDataset, DepthInItsUnitAndImagesWithoutComeAlone) {
 }
 
 TEST(BagDataset, TopicsThatAreMissingAreListed) {
-  EXPECT_THAT(OpenError(Bag(), With(Sensor::kMono)), HasSubstr("/colour/image_raw /depth/image /grey/image"));
-  EXPECT_THAT(OpenError(Bag(), Topic("/left")), HasSubstr("has no images of '/left'"));
-  EXPECT_THAT(OpenError(Bag(), Topic("/grey/image", Sensor::kStereo)), HasSubstr("right_topic"));
+  EXPECT_THAT(OpenError(FourFrames(), With(Sensor::kMono)),
+              HasSubstr("/colour/image_raw /depth/image /grey/image"));
+  EXPECT_THAT(OpenError(FourFrames(), Topic("/left")), HasSubstr("has no images of '/left'"));
+  EXPECT_THAT(OpenError(FourFrames(), Topic("/grey/image", Sensor::kStereo)), HasSubstr("right_topic"));
 }
 
 TEST(BagDataset, StereoPairsAreTakenAsTheyAreOrRectifiedWithTheRightCamera) {
@@ -121,7 +122,7 @@ TEST(BagDataset, StereoPairsAreTakenAsTheyAreOrRectifiedWithTheRightCamera) {
 
 TEST(BagDataset, OneThatWasCutOffGivesTheFramesBefore) {
   const fs::path file = FreshFolder() / "cut.bag";
-  fs::copy_file(Bag(), file);
+  fs::copy_file(FourFrames(), file);
   testing::Truncate(file, 0.5);
   const auto dataset = OpenDataset(file, Topic("/grey/image"));
   EXPECT_EQ(dataset->Size(), 2u);
@@ -155,9 +156,38 @@ TEST(BagDataset, TheMaskIsOfEveryFrame) {
   mask.rowRange(40, 48).setTo(0);
   options.mask = FreshFolder() / "mask.png";
   testing::WriteImage(options.mask, mask);
-  const ReadResult read = OpenDataset(Bag(), options)->Read(1);
+  const ReadResult read = OpenDataset(FourFrames(), options)->Read(1);
   ASSERT_TRUE(read.frame.has_value()) << read.error;
   EXPECT_EQ(cv::countNonZero(read.frame->mask != mask), 0);
+}
+
+TEST(BagDataset, OfRos2ByItsFileAndByItsFolder) {
+  const fs::path folder = FreshFolder() / "recording";
+  fs::create_directories(folder);
+  fs::copy_file(testing::SourceDir() / "tests/frontend/dataset/bags/zstd.mcap", folder / "recording_0.mcap");
+  for (const fs::path& path : {folder, folder / "recording_0.mcap"}) {
+    EXPECT_EQ(DetectDatasetType(path), DatasetType::kBag);
+    const auto dataset = OpenDataset(path, Topic("/left/image"));
+    ASSERT_EQ(dataset->Size(), 3u);
+    EXPECT_DOUBLE_EQ(dataset->Stamp(2), 102.5);
+    EXPECT_TRUE(dataset->Rig().calibrated);
+    EXPECT_TRUE(dataset->Read(1).frame.has_value()) << dataset->Read(1).error;
+  }
+  DatasetOptions stereo = Topic("/left/image", Sensor::kStereo);
+  stereo.right_topic = "/right/image/compressed";
+  stereo.camera = testing::SmallCamera();
+  stereo.camera->width = 16;
+  stereo.camera->height = 12;
+  stereo.camera->cx = 8;
+  stereo.camera->cy = 6;
+  stereo.baseline_m = 0.5;
+  const auto pairs = OpenDataset(folder, stereo);
+  EXPECT_EQ(cv::norm(pairs->Read(0).frame->right, Picture(16, 12, 1), cv::NORM_INF), 0);
+  DatasetOptions images = Topic("/left/image");
+  images.type = DatasetType::kImages;
+  EXPECT_THAT(OpenError(folder, images), HasSubstr("holds bags of ROS 2"));
+  images.type = DatasetType::kVideo;
+  EXPECT_THAT(OpenError(folder, images), HasSubstr("give the file"));
 }
 
 }  // namespace

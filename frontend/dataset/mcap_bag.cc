@@ -1,0 +1,144 @@
+#include "frontend/dataset/mcap_bag.h"
+
+#include <algorithm>
+#include <cstring>
+#include <utility>
+
+#include "core/byte_stream.h"
+#include "tutti/core/error.h"
+
+namespace tutti {
+namespace {
+
+constexpr std::uint64_t kRecordHead = 9;  // kind, size of the content
+constexpr std::size_t kMostTextBytes = 1U << 16U;
+
+// The kinds of records.
+enum McapOp : unsigned char {
+  kFooter = 2,
+  kSchema = 3,
+  kChannel = 4,
+  kData = 5,
+  kPacked = 6,
+  kChunkIndex = 7
+};
+
+std::string TextOf(internal::ByteReader& in) { return std::string(in.GetView(in.Get<std::uint32_t>())); }
+
+}  // namespace
+
+McapBag::McapBag(const std::filesystem::path& file) : ChunkedBag(file) {
+  if (Walk(bytes(), kMagic.size(), file_size(), -1)) NoteDamage("was cut off while recording");
+  ListTopics();
+}
+
+bool McapBag::Walk(const ByteSource& bytes, std::uint64_t at, std::uint64_t end, std::int32_t chunk) {
+  std::uint64_t chunk_end = 0;  // of the plain chunk that was entered last
+  while (at < end) {
+    const std::uint64_t limit = at < chunk_end ? std::min(chunk_end, end) : end;
+    char head[kRecordHead];
+    std::uint64_t size = 0;
+    Record record;
+    const bool read = kRecordHead <= limit - at && bytes.Read(at, kRecordHead, head);
+    if (read) {
+      record.op = static_cast<unsigned char>(head[0]);
+      std::memcpy(&size, head + 1, sizeof size);
+      record.begin = at + kRecordHead;
+      record.end = record.begin + std::min(size, limit - record.begin);
+    }
+    // The chunk in which a recording was cut off is read as far as it goes.
+    if (!read || record.op == 0 || (record.op != kPacked && size > limit - record.begin)) {
+      NoteNoRecord(at, chunk);
+      if (limit == end) return true;
+      at = limit;
+      continue;
+    }
+    if (record.op == kFooter) return false;
+    if (record.op == kPacked && chunk < 0) {
+      chunk_lost_ = false;
+      std::string content(std::min<std::uint64_t>(record.end - record.begin, 64), '\0');
+      if (bytes.Read(record.begin, content.size(), content.data()) && content.size() >= 40 &&
+          content.compare(28, 4, std::string(4, '\0')) == 0) {  // packed by nothing: its name is empty
+        chunk_end = record.end;
+        at = record.begin + 40;  // its records lie there like those between chunks
+        continue;
+      }
+    }
+    Take(bytes, record, chunk);
+    at = record.end;
+  }
+  return true;
+}
+
+void McapBag::Take(const ByteSource& bytes, const Record& record, std::int32_t chunk) {
+  if (record.op == kData) return TakeMessage(bytes, record, chunk);
+  if (record.op == kPacked && chunk < 0) return TakeChunk(bytes, record);
+  if (record.op != kSchema && record.op != kChannel && record.op != kChunkIndex) return;
+  std::string content(std::min<std::uint64_t>(record.end - record.begin, kMostTextBytes), '\0');
+  if (!bytes.Read(record.begin, content.size(), content.data())) return;
+  try {
+    if (record.op == kSchema) return TakeSchema(content);
+    if (record.op == kChannel) return TakeChannel(content);
+    if (!chunk_lost_) return;
+    internal::ByteReader in(content, "an index");
+    const auto channel = in.Get<std::uint16_t>();
+    AddLost(channel, (record.end - record.begin - 6) / 16);  // time, place
+  } catch (const InputError&) {                              // it ends too early: as if it were not there
+  }
+}
+
+void McapBag::TakeSchema(const std::string& content) {
+  internal::ByteReader in(content, "a schema");
+  const auto id = in.Get<std::uint16_t>();
+  schemas_.emplace(id, NameOfType(TextOf(in)));
+}
+
+void McapBag::TakeChannel(const std::string& content) {
+  internal::ByteReader in(content, "a channel");
+  const auto id = in.Get<std::uint16_t>(), schema = in.Get<std::uint16_t>();
+  std::string topic = TextOf(in);
+  const std::string encoding = TextOf(in);
+  const auto type = schemas_.find(schema);
+  if (type == schemas_.end() || (encoding != "cdr" && encoding != "ros1")) return;
+  AddConnection(
+      id, {std::move(topic), type->second, encoding == "cdr" ? Serialization::kCdr : Serialization::kRos1});
+}
+
+void McapBag::TakeMessage(const ByteSource& bytes, const Record& record, std::int32_t chunk) {
+  constexpr std::uint64_t kMessageHead = 22;  // channel, number, times of recording and of sending
+  std::uint16_t channel = 0;
+  std::uint32_t words[3] = {};  // number or kind of serialization, seconds, nanoseconds
+  const std::uint64_t begin = record.begin + kMessageHead, size = record.end - record.begin;
+  if (size < kMessageHead + sizeof words || size - kMessageHead > UINT32_MAX) return;
+  if (!bytes.Read(record.begin, sizeof channel, reinterpret_cast<char*>(&channel)) ||
+      !bytes.Read(begin, sizeof words, reinterpret_cast<char*>(words)))
+    return;
+  AddMessage({channel, static_cast<std::uint32_t>(size - kMessageHead), begin, chunk, 0,
+              words[1] + 1e-9 * words[2]});
+}
+
+void McapBag::TakeChunk(const ByteSource& bytes, const Record& record) {
+  Chunk chunk;
+  chunk_lost_ = true;
+  std::string content(std::min<std::uint64_t>(record.end - record.begin, 64), '\0');
+  if (!bytes.Read(record.begin, content.size(), content.data())) return;
+  try {
+    internal::ByteReader in(content, "a chunk");
+    in.GetView(16);  // times of its first and last message
+    chunk.unpacked_size = in.Get<std::uint64_t>();
+    chunk.crc = in.Get<std::uint32_t>();
+    const std::string packing = TextOf(in);
+    in.Get<std::uint64_t>();  // size
+    chunk.packing = packing == "lz4" ? Packing::kLz4 : packing == "zstd" ? Packing::kZstd : Packing::kUnknown;
+    chunk.begin = record.begin + content.size() - in.Left();
+    chunk.size = record.end - chunk.begin;
+  } catch (const InputError&) {
+    return NoteNoRecord(record.begin - kRecordHead, -1);
+  }
+  const std::optional<Unpacked> unpacked = Open(chunk);
+  if (!unpacked) return;
+  chunk_lost_ = false;
+  Walk(MemoryBytes(unpacked->bytes), 0, unpacked->bytes.size(), unpacked->number);
+}
+
+}  // namespace tutti

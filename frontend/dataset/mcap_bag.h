@@ -1,0 +1,40 @@
+// MCAP files (mcap.dev/spec), as 'ros2 bag record' writes them: plain, LZ4 or Zstandard.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <string_view>
+
+#include "frontend/dataset/chunked_bag.h"
+
+namespace tutti {
+
+class McapBag : public ChunkedBag {
+ public:
+  static constexpr std::string_view kMagic = "\x89MCAP0\r\n";
+
+  /// `file` begins with the magic. Throws InputError where it can't be opened.
+  explicit McapBag(const std::filesystem::path& file);
+
+ private:
+  /// Where the content of a record lies.
+  struct Record {
+    unsigned char op = 0;
+    std::uint64_t begin = 0, end = 0;
+  };
+
+  /// False at the record that says that there are no more.
+  bool Walk(const ByteSource& bytes, std::uint64_t at, std::uint64_t end, std::int32_t chunk);
+  void Take(const ByteSource& bytes, const Record& record, std::int32_t chunk);
+  void TakeSchema(const std::string& content);
+  void TakeChannel(const std::string& content);
+  void TakeMessage(const ByteSource& bytes, const Record& record, std::int32_t chunk);
+  void TakeChunk(const ByteSource& bytes, const Record& record);
+
+  std::map<std::uint16_t, std::string> schemas_;  // names of types
+  bool chunk_lost_ = false;                       // the one before the record that is looked at
+};
+
+}  // namespace tutti

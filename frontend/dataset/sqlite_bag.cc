@@ -1,0 +1,129 @@
+#include "frontend/dataset/sqlite_bag.h"
+
+#include <sqlite3.h>
+
+#include <cstdint>
+#include <cstring>
+#include <string_view>
+
+#include "tutti/core/error.h"
+
+namespace tutti {
+
+void SqliteBag::Close::operator()(sqlite3* database) const { sqlite3_close(database); }
+
+/// A statement that is read row by row.
+class SqliteBag::Query {
+ public:
+  Query(sqlite3* database, const char* sql) : database_(database) {
+    if (sqlite3_prepare_v2(database, sql, -1, &statement_, nullptr) != SQLITE_OK) Fail();
+  }
+  ~Query() { sqlite3_finalize(statement_); }
+  Query(const Query&) = delete;
+  Query& operator=(const Query&) = delete;
+
+  void Bind(std::int64_t value) { sqlite3_bind_int64(statement_, 1, value); }
+  /// False after the last row. Throws InputError where the file is damaged.
+  bool Next() {
+    const int code = sqlite3_step(statement_);
+    if (code != SQLITE_ROW && code != SQLITE_DONE) Fail();
+    return code == SQLITE_ROW;
+  }
+  std::int64_t Number(int column) { return sqlite3_column_int64(statement_, column); }
+  std::string Bytes(int column) {
+    const void* bytes = sqlite3_column_blob(statement_, column);
+    const int size = sqlite3_column_bytes(statement_, column);
+    return bytes != nullptr && size > 0
+               ? std::string(static_cast<const char*>(bytes), static_cast<std::size_t>(size))
+               : std::string();
+  }
+
+ private:
+  [[noreturn]] void Fail() { throw InputError(sqlite3_errmsg(database_)); }
+
+  sqlite3* database_;
+  sqlite3_stmt* statement_ = nullptr;
+};
+
+SqliteBag::SqliteBag(const std::filesystem::path& path) : Bag(path) {
+  const std::string no_bag = path.string() + ": can't be read as a ROS bag: ";
+  sqlite3* opened = nullptr;
+  const int code =
+      sqlite3_open_v2(path.c_str(), &opened, SQLITE_OPEN_READONLY | SQLITE_OPEN_NOMUTEX, nullptr);
+  database_.reset(opened);
+  if (code != SQLITE_OK) throw InputError(no_bag + sqlite3_errstr(code));
+  sqlite3_limit(opened, SQLITE_LIMIT_LENGTH, static_cast<int>(kMostMessageBytes));
+  try {
+    // What a stranger put into the file is not run: its views, its triggers, its functions.
+    sqlite3_exec(opened, "PRAGMA trusted_schema = OFF; PRAGMA cell_size_check = ON", nullptr, nullptr,
+                 nullptr);
+    Query tables(
+        opened,
+        "SELECT count(*) FROM sqlite_master WHERE name IN ('topics', 'messages') AND type = 'table' AND "
+        "sql LIKE 'CREATE TABLE%'");
+    if (!tables.Next() || tables.Number(0) != 2)
+      throw InputError("it has no tables \"topics\" and \"messages\" as those of 'ros2 bag record' have");
+    TakeTopics();
+  } catch (const InputError& e) {
+    throw InputError(no_bag + e.what());
+  }
+  TakeMessages();
+  ListTopics();
+}
+
+void SqliteBag::TakeTopics() {
+  Query rows(database_.get(), "SELECT id, name, type, serialization_format FROM topics");
+  while (rows.Next()) {
+    const std::int64_t id = rows.Number(0);
+    if (id < 0 || id > UINT32_MAX || rows.Bytes(3) != "cdr") continue;
+    AddConnection(static_cast<std::uint32_t>(id),
+                  {rows.Bytes(1), NameOfType(rows.Bytes(2)), Serialization::kCdr});
+  }
+}
+
+void SqliteBag::TakeMessages() {
+  sqlite3_blob* data = nullptr;
+  try {
+    // Not the data, which would read all of the file, but twelve bytes of each.
+    Query rows(database_.get(), "SELECT rowid, topic_id FROM messages ORDER BY rowid");
+    while (rows.Next()) {
+      const std::int64_t row = rows.Number(0), topic = rows.Number(1);
+      const int code = data == nullptr
+                           ? sqlite3_blob_open(database_.get(), "main", "messages", "data", row, 0, &data)
+                           : sqlite3_blob_reopen(data, row);
+      std::uint32_t words[3] = {};  // kind of serialization, seconds, nanoseconds
+      if (code != SQLITE_OK) {
+        sqlite3_blob_close(data);
+        data = nullptr;
+        if (topic >= 0 && topic <= UINT32_MAX) AddLost(static_cast<std::uint32_t>(topic), 1);
+        continue;
+      }
+      const int size = sqlite3_blob_bytes(data);
+      if (topic < 0 || topic > UINT32_MAX || size < static_cast<int>(sizeof words)) continue;
+      if (sqlite3_blob_read(data, words, sizeof words, 0) != SQLITE_OK) {
+        AddLost(static_cast<std::uint32_t>(topic), 1);
+        continue;
+      }
+      AddMessage({static_cast<std::uint32_t>(topic), static_cast<std::uint32_t>(size),
+                  static_cast<std::uint64_t>(row), -1, 0, words[1] + 1e-9 * words[2]});
+    }
+  } catch (const InputError& e) {
+    NoteDamage(std::string("is damaged, or was cut off while recording (") + e.what() +
+               "); what follows there is not read");
+  }
+  sqlite3_blob_close(data);
+}
+
+std::string SqliteBag::Read(const BagMessage& message) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  try {
+    Query row(database_.get(), "SELECT data FROM messages WHERE rowid = ?1");
+    row.Bind(static_cast<std::int64_t>(message.begin));
+    if (row.Next()) return row.Bytes(0);
+  } catch (const InputError& e) {
+    throw InputError(std::string("a message can't be read (any more): ") + e.what());
+  }
+  throw InputError("a message can't be read (any more)");
+}
+
+}  // namespace tutti

@@ -4,6 +4,7 @@ import pathlib
 import sys
 
 CONFIGS = pathlib.Path(__file__).parents[2] / "data" / "configs"
+BAGS = pathlib.Path(__file__).parents[1] / "frontend" / "dataset" / "bags"
 FILE_END = b"\x1e"  # between the files of a folder (dataset_fuzzer.cc)
 
 
@@ -99,6 +100,13 @@ def dataset_seeds():
                 yield f"{layout}_{sensor_kind}_{count}", bytes([layout, sensor_kind]) + FILE_END.join(files[:count])
 
 
+def bag_seeds():
+    """Of ROS 2; those of ROS 1 are make_bag_seeds.cc's. The first byte chooses sensor and topics (bag_fuzzer.cc)."""
+    for file in sorted(BAGS.glob("*.mcap")) + sorted(BAGS.glob("*.db3")):
+        for sensor in range(2):
+            yield f"{file.stem}_{sensor}", bytes([3 + sensor]) + file.read_bytes()
+
+
 def json_seeds():
     yield "summary", (b'\0{"dataset": "d", "frames": {"read": 5}, "loops": {"proposed": 3, "accepted": 2, "false": 0}, '
                       b'"seed": 1, "config": {"dataset": {"start": 2, "noise": 1.5, "noise_draw": 1}, '
@@ -130,7 +138,7 @@ def main():
     folder = pathlib.Path(sys.argv[1])
     for name, seeds in (("loop_text", loop_text_seeds), ("trajectory", trajectory_seeds), ("g2o", g2o_seeds),
                         ("config", config_seeds), ("calibration", calibration_seeds), ("dataset", dataset_seeds),
-                        ("json", json_seeds), ("http", http_seeds)):
+                        ("bag", bag_seeds), ("json", json_seeds), ("http", http_seeds)):
         (folder / name).mkdir(parents=True, exist_ok=True)
         for seed, data in seeds():
             (folder / name / seed).write_bytes(data)

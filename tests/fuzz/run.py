@@ -16,7 +16,7 @@ import sys
 # Longest inputs [bytes], where libFuzzer's 4096 are too few to hold a seed.
 MAX_LENGTH = {"detector_state": 16384, "memory": 16384, "map": 262144, "bag": 16384}
 READERS = {
-    "bag": "ROS 1 bags", "calibration": "calibrations of other programs, EuRoC's sensor.yaml",
+    "bag": "bags of ROS 1 and 2 (MCAP, SQLite)", "calibration": "calibrations of other programs, EuRoC's sensor.yaml",
     "config": "configurations of runs, `--set`", "dataset": "lists of images, calibrations, ground truths of KITTI, TUM, EuRoC",
     "detector_state": "saved loop detectors", "g2o": "pose graphs", "http": "requests to the live view",
     "image": "image files", "json": "summary.json, notes of maps", "loop_text": "loop matrices and pairs",

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <cstring>
 #include <map>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -117,9 +118,36 @@ void DecodeRaw(MessageReader& in, bool depth, MessageImage* out) {
   }
 }
 
+// Depth as compressed_depth_image_transport packs it: three numbers (a kind, two of the quantization), then a
+// PNG. Metres become inverse depths of 16 bit: A / (value - B).
+void DecodeCompressedDepth(const std::string& format, std::string_view data, MessageImage* out) {
+  constexpr std::size_t kHead = 12;
+  if (data.size() < kHead || format.find("rvl") != std::string::npos) {
+    out->error = "a compressed depth image ('" + format + "') can't be read; record it as png";
+    return;
+  }
+  std::array<float, 2> quantization;
+  std::memcpy(quantization.data(), data.data() + 4, sizeof quantization);
+  data.remove_prefix(kHead);
+  const ImageFile decoded = DecodeImage({data.begin(), data.end()}, cv::IMREAD_UNCHANGED);
+  out->image = decoded.image;
+  if (!decoded.error.empty()) out->error = "a compressed depth image ('" + format + "') " + decoded.error;
+  if (format.compare(0, 5, "32FC1") != 0 || decoded.image.type() != CV_16UC1) return;
+  const auto [a, b] = quantization;
+  out->image = cv::Mat(decoded.image.size(), CV_32FC1);
+  out->metres = true;
+  for (int y = 0; y < decoded.image.rows; ++y) {
+    for (int x = 0; x < decoded.image.cols; ++x) {
+      const auto value = decoded.image.at<std::uint16_t>(y, x);
+      out->image.at<float>(y, x) = value > 0 ? a / (static_cast<float>(value) - b) : 0.0F;
+    }
+  }
+}
+
 void DecodeCompressed(MessageReader& in, bool depth, MessageImage* out) {
   const std::string format(in.Text());
   const std::string_view data = in.Bytes();
+  if (format.find("compressedDepth") != std::string::npos) return DecodeCompressedDepth(format, data, out);
   const ImageFile decoded = DecodeImage(
       {data.begin(), data.end()}, depth ? cv::IMREAD_UNCHANGED : cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
   out->image = decoded.image;

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
 #include <opencv2/imgcodecs.hpp>
 #include <string>
 
@@ -60,6 +61,28 @@ TEST(DecodeImageMessage, CompressedOnes) {
   EXPECT_THAT(
       DecodeImageMessage(testing::CompressedMessage(png, "png", 1), type, Serialization::kRos1, false).error,
       HasSubstr("a compressed image ('png') is truncated"));
+}
+
+TEST(DecodeImageMessage, CompressedDepth) {
+  const cv::Mat stored(4, 5, CV_16UC1, cv::Scalar(1500));
+  std::vector<unsigned char> png;
+  cv::imencode(".png", stored, png);
+  const auto read = [&](const std::string& format, float a, float b) {
+    std::vector<unsigned char> bytes(12);
+    std::memcpy(bytes.data() + 4, &a, sizeof a);
+    std::memcpy(bytes.data() + 8, &b, sizeof b);
+    bytes.insert(bytes.end(), png.begin(), png.end());
+    return DecodeImageMessage(testing::CompressedMessage(bytes, format, 1), "sensor_msgs/CompressedImage",
+                              Serialization::kRos1, true);
+  };
+  const MessageImage units = read("16UC1; compressedDepth png", 0, 0);
+  EXPECT_EQ(units.error, "");
+  EXPECT_FALSE(units.metres);
+  EXPECT_EQ(cv::norm(units.image, stored, cv::NORM_INF), 0);
+  const MessageImage metres = read("32FC1; compressedDepth", 2800, 100);
+  EXPECT_TRUE(metres.metres);
+  EXPECT_FLOAT_EQ(metres.image.at<float>(3, 4), 2);  // 2800 / (1500 - 100)
+  EXPECT_THAT(read("16UC1; compressedDepth rvl", 0, 0).error, HasSubstr("can't be read; record it as png"));
 }
 
 TEST(DecodeImageMessage, SaysWhatIsWrong) {

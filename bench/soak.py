@@ -67,6 +67,7 @@ def run(tutti, folder, out):
         done = re.search(r" (\d+)/\d+  ", line)
         if done:
             samples.append((int(done.group(1)), *sample(process.pid)))
+            print("{} frames: {:.0f} MB, {:.0f} CPU-s, {} files".format(*samples[-1]), flush=True)  # a run may be cut off
     if process.wait() != 0:
         sys.exit(f"tutti run failed with exit status {process.returncode}")
     return samples, json.loads((out / "summary.json").read_text())

@@ -20,7 +20,7 @@ enum McapOp : unsigned char {
   kChannel = 4,
   kData = 5,
   kPacked = 6,
-  kChunkIndex = 7
+  kMessageIndex = 7
 };
 
 std::string TextOf(internal::ByteReader& in) { return std::string(in.GetView(in.Get<std::uint32_t>())); }
@@ -73,7 +73,7 @@ bool McapBag::Walk(const ByteSource& bytes, std::uint64_t at, std::uint64_t end,
 void McapBag::Take(const ByteSource& bytes, const Record& record, std::int32_t chunk) {
   if (record.op == kData) return TakeMessage(bytes, record, chunk);
   if (record.op == kPacked && chunk < 0) return TakeChunk(bytes, record);
-  if (record.op != kSchema && record.op != kChannel && record.op != kChunkIndex) return;
+  if (record.op != kSchema && record.op != kChannel && record.op != kMessageIndex) return;
   std::string content(std::min<std::uint64_t>(record.end - record.begin, kMostTextBytes), '\0');
   if (!bytes.Read(record.begin, content.size(), content.data())) return;
   try {
@@ -82,8 +82,9 @@ void McapBag::Take(const ByteSource& bytes, const Record& record, std::int32_t c
     if (!chunk_lost_) return;
     internal::ByteReader in(content, "an index");
     const auto channel = in.Get<std::uint16_t>();
-    AddLost(channel, (record.end - record.begin - 6) / 16);  // time, place
-  } catch (const InputError&) {                              // it ends too early: as if it were not there
+    const std::uint64_t bytes_of_it = in.Get<std::uint32_t>();
+    AddLost(channel, std::min(bytes_of_it, record.end - record.begin) / 16);  // time, place
+  } catch (const InputError&) {  // it ends too early: as if it were not there
   }
 }
 

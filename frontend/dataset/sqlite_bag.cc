@@ -12,7 +12,9 @@ namespace tutti {
 
 void SqliteBag::Close::operator()(sqlite3* database) const { sqlite3_close(database); }
 
-/// A statement that is read row by row.
+/// A statement that is read row by row. Its first column is the row's number, and its rows are in the order
+/// of that: the pages of a damaged file may refer to each other in a ring, in which SQLite walks as good as
+/// for ever.
 class SqliteBag::Query {
  public:
   Query(sqlite3* database, const char* sql) : database_(database) {
@@ -26,8 +28,11 @@ class SqliteBag::Query {
   /// False after the last row. Throws InputError where the file is damaged.
   bool Next() {
     const int code = sqlite3_step(statement_);
-    if (code != SQLITE_ROW && code != SQLITE_DONE) Fail();
-    return code == SQLITE_ROW;
+    if (code == SQLITE_DONE) return false;
+    if (code != SQLITE_ROW) Fail();
+    if (Number(0) <= last_) throw InputError("rows are not in their order");
+    last_ = Number(0);
+    return true;
   }
   std::int64_t Number(int column) { return sqlite3_column_int64(statement_, column); }
   std::string Bytes(int column) {
@@ -43,6 +48,7 @@ class SqliteBag::Query {
 
   sqlite3* database_;
   sqlite3_stmt* statement_ = nullptr;
+  std::int64_t last_ = INT64_MIN;
 };
 
 SqliteBag::SqliteBag(const std::filesystem::path& path) : Bag(path) {
@@ -59,9 +65,9 @@ SqliteBag::SqliteBag(const std::filesystem::path& path) : Bag(path) {
                  nullptr);
     Query tables(
         opened,
-        "SELECT count(*) FROM sqlite_master WHERE name IN ('topics', 'messages') AND type = 'table' AND "
-        "sql LIKE 'CREATE TABLE%'");
-    if (!tables.Next() || tables.Number(0) != 2)
+        "SELECT rowid FROM sqlite_master WHERE name IN ('topics', 'messages') AND type = 'table' AND "
+        "sql LIKE 'CREATE TABLE%' ORDER BY rowid");
+    if (!tables.Next() || !tables.Next())
       throw InputError("it has no tables \"topics\" and \"messages\" as those of 'ros2 bag record' have");
     TakeTopics();
   } catch (const InputError& e) {
@@ -72,12 +78,13 @@ SqliteBag::SqliteBag(const std::filesystem::path& path) : Bag(path) {
 }
 
 void SqliteBag::TakeTopics() {
-  Query rows(database_.get(), "SELECT id, name, type, serialization_format FROM topics");
+  Query rows(database_.get(),
+             "SELECT rowid, id, name, type, serialization_format FROM topics ORDER BY rowid");
   while (rows.Next()) {
-    const std::int64_t id = rows.Number(0);
-    if (id < 0 || id > UINT32_MAX || rows.Bytes(3) != "cdr") continue;
+    const std::int64_t id = rows.Number(1);
+    if (id < 0 || id > UINT32_MAX || rows.Bytes(4) != "cdr") continue;
     AddConnection(static_cast<std::uint32_t>(id),
-                  {rows.Bytes(1), NameOfType(rows.Bytes(2)), Serialization::kCdr});
+                  {rows.Bytes(2), NameOfType(rows.Bytes(3)), Serialization::kCdr});
   }
 }
 
@@ -117,9 +124,9 @@ void SqliteBag::TakeMessages() {
 std::string SqliteBag::Read(const BagMessage& message) const {
   const std::lock_guard<std::mutex> lock(mutex_);
   try {
-    Query row(database_.get(), "SELECT data FROM messages WHERE rowid = ?1");
+    Query row(database_.get(), "SELECT rowid, data FROM messages WHERE rowid = ?1");
     row.Bind(static_cast<std::int64_t>(message.begin));
-    if (row.Next()) return row.Bytes(0);
+    if (row.Next()) return row.Bytes(1);
   } catch (const InputError& e) {
     throw InputError(std::string("a message can't be read (any more): ") + e.what());
   }

@@ -187,6 +187,11 @@ TEST(Bag, WhatIsNoneIsRefused) {
   EXPECT_THAT(Bag::Open(holes)->damage(), HasSubstr("at byte 8"));
 }
 
+// As the fuzzer found one: SQLite would have walked through it for as long as one had patience.
+TEST(Bag, ADatabaseWhosePagesAreARingEnds) {
+  EXPECT_THAT(Bag::Open(OfOthers("ring.db3"))->damage(), HasSubstr("rows are not in their order"));
+}
+
 TEST(Bag, ADatabaseThatRunsInsteadOfHoldingIsRefused) {
   const fs::path file = FreshFolder() / "x.db3";
   sqlite3* database = nullptr;

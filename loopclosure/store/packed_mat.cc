@@ -43,7 +43,12 @@ struct PackedMat::Code {
   }
 
  private:
-  static bool SameBits(float a, float b) { return std::memcmp(&a, &b, sizeof a) == 0; }
+  static bool SameBits(float a, float b) {  // 0 and -0 are two, and a NaN is itself
+    std::uint32_t bits_a, bits_b;
+    std::memcpy(&bits_a, &a, sizeof a);
+    std::memcpy(&bits_b, &b, sizeof b);
+    return bits_a == bits_b;
+  }
 };
 
 const std::array<PackedMat::Code, 2>& PackedMat::Codes() {

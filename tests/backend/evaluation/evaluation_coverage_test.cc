@@ -92,6 +92,7 @@ TEST(TrajectoryCoverage, TheOffsetIsAddedToTheImagesStampsToo) {
   std::vector<double> frames;
   Trajectory late = Frames(0, 499);
   for (StampedPose& pose : late) pose.stamp_s += 50;
+  frames.reserve(1000);
   for (int k = 0; k < 1000; ++k) frames.push_back(150 + 0.1 * k);
   const TrajectoryCoverage c = Covered(Frames(0, 999), late, -50, frames);
   EXPECT_EQ(c.all, 1000u);

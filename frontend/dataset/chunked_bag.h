@@ -28,7 +28,7 @@ class ChunkedBag : public Bag {
   std::string Read(const BagMessage& message) const override;
 
  protected:
-  enum class Packing { kLz4, kBz2, kZstd, kUnknown };
+  enum class Packing { kNone, kLz4, kBz2, kZstd, kUnknown };
   struct Chunk {
     std::uint64_t begin = 0, size = 0;  // in the file
     std::uint64_t unpacked_size = 0;

@@ -55,16 +55,17 @@ bool McapBag::Walk(const ByteSource& bytes, std::uint64_t at, std::uint64_t end,
     }
     if (record.op == kFooter) return false;
     if (record.op == kPacked && chunk < 0) {
-      chunk_lost_ = false;
-      std::string content(std::min<std::uint64_t>(record.end - record.begin, 64), '\0');
-      if (bytes.Read(record.begin, content.size(), content.data()) && content.size() >= 40 &&
-          content.compare(28, 4, std::string(4, '\0')) == 0) {  // packed by nothing: its name is empty
+      const std::optional<Chunk> found = ChunkOf(bytes, record);
+      if (found && found->packing == Packing::kNone) {
+        chunk_lost_ = false;
         chunk_end = record.end;
-        at = record.begin + 40;  // its records lie there like those between chunks
+        at = found->begin;  // its records lie there like those between chunks
         continue;
       }
+      TakeChunk(found);
+    } else {
+      Take(bytes, record, chunk);
     }
-    Take(bytes, record, chunk);
     at = record.end;
   }
   return true;
@@ -72,7 +73,6 @@ bool McapBag::Walk(const ByteSource& bytes, std::uint64_t at, std::uint64_t end,
 
 void McapBag::Take(const ByteSource& bytes, const Record& record, std::int32_t chunk) {
   if (record.op == kData) return TakeMessage(bytes, record, chunk);
-  if (record.op == kPacked && chunk < 0) return TakeChunk(bytes, record);
   if (record.op != kSchema && record.op != kChannel && record.op != kMessageIndex) return;
   std::string content(std::min<std::uint64_t>(record.end - record.begin, kMostTextBytes), '\0');
   if (!bytes.Read(record.begin, content.size(), content.data())) return;
@@ -108,38 +108,43 @@ void McapBag::TakeChannel(const std::string& content) {
 void McapBag::TakeMessage(const ByteSource& bytes, const Record& record, std::int32_t chunk) {
   constexpr std::uint64_t kMessageHead = 22;  // channel, number, times of recording and of sending
   std::uint16_t channel = 0;
-  std::uint32_t words[3] = {};  // number or kind of serialization, seconds, nanoseconds
+  MessageHead words = {};
   const std::uint64_t begin = record.begin + kMessageHead, size = record.end - record.begin;
   if (size < kMessageHead + sizeof words || size - kMessageHead > UINT32_MAX) return;
   if (!bytes.Read(record.begin, sizeof channel, reinterpret_cast<char*>(&channel)) ||
-      !bytes.Read(begin, sizeof words, reinterpret_cast<char*>(words)))
+      !bytes.Read(begin, sizeof words, reinterpret_cast<char*>(words.data())))
     return;
-  AddMessage({channel, static_cast<std::uint32_t>(size - kMessageHead), begin, chunk, 0,
-              words[1] + 1e-9 * words[2]});
+  AddMessage({channel, static_cast<std::uint32_t>(size - kMessageHead), begin, chunk, 0, StampOf(words)});
 }
 
-void McapBag::TakeChunk(const ByteSource& bytes, const Record& record) {
+std::optional<McapBag::Chunk> McapBag::ChunkOf(const ByteSource& bytes, const Record& record) {
   Chunk chunk;
-  chunk_lost_ = true;
   std::string content(std::min<std::uint64_t>(record.end - record.begin, 64), '\0');
-  if (!bytes.Read(record.begin, content.size(), content.data())) return;
   try {
+    if (!bytes.Read(record.begin, content.size(), content.data())) return std::nullopt;
     internal::ByteReader in(content, "a chunk");
     in.GetView(16);  // times of its first and last message
     chunk.unpacked_size = in.Get<std::uint64_t>();
     chunk.crc = in.Get<std::uint32_t>();
     const std::string packing = TextOf(in);
     in.Get<std::uint64_t>();  // size
-    chunk.packing = packing == "lz4" ? Packing::kLz4 : packing == "zstd" ? Packing::kZstd : Packing::kUnknown;
+    chunk.packing = packing.empty()     ? Packing::kNone
+                    : packing == "lz4"  ? Packing::kLz4
+                    : packing == "zstd" ? Packing::kZstd
+                                        : Packing::kUnknown;
     chunk.begin = record.begin + content.size() - in.Left();
     chunk.size = record.end - chunk.begin;
+    return chunk;
   } catch (const InputError&) {
-    return NoteNoRecord(record.begin - kRecordHead, -1);
+    NoteNoRecord(record.begin - kRecordHead, -1);
+    return std::nullopt;
   }
-  const std::optional<Unpacked> unpacked = Open(chunk);
-  if (!unpacked) return;
-  chunk_lost_ = false;
-  Walk(MemoryBytes(unpacked->bytes), 0, unpacked->bytes.size(), unpacked->number);
+}
+
+void McapBag::TakeChunk(const std::optional<Chunk>& chunk) {
+  const std::optional<Unpacked> unpacked = chunk ? Open(*chunk) : std::nullopt;
+  chunk_lost_ = !unpacked;
+  if (unpacked) Walk(MemoryBytes(unpacked->bytes), 0, unpacked->bytes.size(), unpacked->number);
 }
 
 }  // namespace tutti

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -31,7 +32,8 @@ class McapBag : public ChunkedBag {
   void TakeSchema(const std::string& content);
   void TakeChannel(const std::string& content);
   void TakeMessage(const ByteSource& bytes, const Record& record, std::int32_t chunk);
-  void TakeChunk(const ByteSource& bytes, const Record& record);
+  std::optional<Chunk> ChunkOf(const ByteSource& bytes, const Record& record);
+  void TakeChunk(const std::optional<Chunk>& chunk);
 
   std::map<std::uint16_t, std::string> schemas_;  // names of types
   bool chunk_lost_ = false;                       // the one before the record that is looked at

@@ -111,10 +111,10 @@ void RosBag::Walk(const ByteSource& bytes, std::uint64_t at, std::uint64_t end, 
 
 void RosBag::TakeMessage(const ByteSource& bytes, const Record& record, std::int32_t chunk) {
   const std::optional<std::uint32_t> connection = record.Number("conn");
-  std::uint32_t words[3] = {};  // of std_msgs/Header: number, seconds, nanoseconds
+  MessageHead words = {};
   if (!connection || record.size < sizeof words) return;
-  if (!bytes.Read(record.begin, sizeof words, reinterpret_cast<char*>(words))) return;
-  AddMessage({*connection, record.size, record.begin, chunk, 0, words[1] + 1e-9 * words[2]});
+  if (!bytes.Read(record.begin, sizeof words, reinterpret_cast<char*>(words.data()))) return;
+  AddMessage({*connection, record.size, record.begin, chunk, 0, StampOf(words)});
 }
 
 void RosBag::TakeConnection(const ByteSource& bytes, const Record& record) {

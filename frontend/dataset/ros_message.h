@@ -1,6 +1,8 @@
 // Messages of ROS as they lie in bags: sensor_msgs/Image, CompressedImage, CameraInfo.
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <optional>
 #include <string>
 
@@ -15,6 +17,11 @@ enum class Serialization { kRos1, kCdr };
 
 /// "sensor_msgs/Image" of what ROS 2 calls "sensor_msgs/msg/Image".
 std::string NameOfType(std::string type);
+
+/// How a message with a std_msgs/Header begins: its number (ROS 2: the kind of serialization), seconds,
+/// nanoseconds.
+using MessageHead = std::array<std::uint32_t, 3>;
+inline double StampOf(const MessageHead& head) { return head[1] + 1e-9 * head[2]; }  ///< [s]
 
 /// Image or CompressedImage.
 bool IsImageMessage(const std::string& type);

@@ -98,7 +98,7 @@ void SqliteBag::TakeMessages() {
       const int code = data == nullptr
                            ? sqlite3_blob_open(database_.get(), "main", "messages", "data", row, 0, &data)
                            : sqlite3_blob_reopen(data, row);
-      std::uint32_t words[3] = {};  // kind of serialization, seconds, nanoseconds
+      MessageHead words = {};
       if (code != SQLITE_OK) {
         sqlite3_blob_close(data);
         data = nullptr;
@@ -107,12 +107,12 @@ void SqliteBag::TakeMessages() {
       }
       const int size = sqlite3_blob_bytes(data);
       if (topic < 0 || topic > UINT32_MAX || size < static_cast<int>(sizeof words)) continue;
-      if (sqlite3_blob_read(data, words, sizeof words, 0) != SQLITE_OK) {
+      if (sqlite3_blob_read(data, words.data(), sizeof words, 0) != SQLITE_OK) {
         AddLost(static_cast<std::uint32_t>(topic), 1);
         continue;
       }
       AddMessage({static_cast<std::uint32_t>(topic), static_cast<std::uint32_t>(size),
-                  static_cast<std::uint64_t>(row), -1, 0, words[1] + 1e-9 * words[2]});
+                  static_cast<std::uint64_t>(row), -1, 0, StampOf(words)});
     }
   } catch (const InputError& e) {
     NoteDamage(std::string("is damaged, or was cut off while recording (") + e.what() +

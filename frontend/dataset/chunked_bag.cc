@@ -1,5 +1,6 @@
 #include "frontend/dataset/chunked_bag.h"
 
+#include <algorithm>
 #include <cstring>
 
 #include "core/byte_stream.h"
@@ -28,21 +29,58 @@ ChunkedBag::ChunkedBag(const std::filesystem::path& path) : Bag(path), bytes_(&i
   file_size_ = static_cast<std::uint64_t>(size);
 }
 
-std::optional<ChunkedBag::Unpacked> ChunkedBag::Open(const Chunk& chunk) {
+bool ChunkedBag::Walk(const ByteSource& bytes, std::uint64_t at, std::uint64_t end, std::int32_t chunk) {
+  std::uint64_t chunk_end = 0;  // of the plain chunk that was entered last
+  while (at < end) {
+    const std::uint64_t limit = at < chunk_end ? std::min(chunk_end, end) : end;
+    const std::optional<Record> record = RecordAt(bytes, at, limit);
+    const bool is_chunk = record && record->kind == Record::Kind::kChunk;
+    // The chunk in which a recording was cut off is read as far as it goes.
+    if (!record || (!is_chunk && record->size > limit - record->begin)) {
+      NoteNoRecord(at, chunk);
+      if (limit == end) return true;
+      at = limit;
+      continue;
+    }
+    if (record->kind == Record::Kind::kLast) return false;
+    const std::uint64_t record_end = record->begin + std::min(record->size, limit - record->begin);
+    if (is_chunk && chunk < 0) {
+      std::optional<Chunk> found = ChunkOf(bytes, *record);
+      chunk_lost_ = !found;
+      if (!found) {
+        NoteNoRecord(at, chunk);
+      } else if (found->packing == Packing::kNone) {
+        chunk_end = record_end;
+        at = found->begin;  // its records lie there like those between chunks
+        continue;
+      } else {
+        found->size = record_end - found->begin;
+        WalkPacked(*found);
+      }
+    } else if (!is_chunk) {
+      Take(bytes, *record, chunk);
+    }
+    at = record_end;
+  }
+  return true;
+}
+
+void ChunkedBag::WalkPacked(const Chunk& chunk) {
+  const auto number = static_cast<std::int32_t>(chunks_.size());
   chunks_.push_back(chunk);
-  const std::size_t number = chunks_.size() - 1;
   try {
     if (chunk.packing == Packing::kUnknown)
       throw InputError("the chunk at byte " + std::to_string(chunk.begin) +
                        " is compressed in an unknown way");
-    unpacked_bytes_ = Unpack(number);
-  } catch (const InputError& e) {
     unpacked_ = -1;
+    unpacked_bytes_ = Unpack(chunks_.size() - 1);
+    unpacked_ = number;
+  } catch (const InputError& e) {
+    chunk_lost_ = true;
     NoteDamage(e.what());
-    return std::nullopt;
+    return;
   }
-  unpacked_ = static_cast<std::int32_t>(number);
-  return Unpacked{unpacked_, unpacked_bytes_};
+  Walk(MemoryBytes(unpacked_bytes_), 0, unpacked_bytes_.size(), number);
 }
 
 void ChunkedBag::NoteNoRecord(std::uint64_t at, std::int32_t chunk) {

@@ -35,23 +35,34 @@ class ChunkedBag : public Bag {
     Packing packing = Packing::kUnknown;
     std::uint32_t crc = 0;  // of the unpacked bytes; 0: not known
   };
+  struct Record {
+    enum class Kind { kChunk, kLast, kOther };
+    Kind kind = Kind::kOther;
+    unsigned char op = 0;               // as the format says what it is
+    std::string header;                 // of formats that have one
+    std::uint64_t begin = 0, size = 0;  // of its content, which may be cut off
+  };
 
   /// Throws InputError where the file can't be opened.
   explicit ChunkedBag(const std::filesystem::path& file);
 
-  std::uint64_t file_size() const { return file_size_; }
-  const ByteSource& bytes() const { return bytes_; }
-  /// Unpacks a chunk, whose number and bytes it gives; nothing, with damage noted, where it can't be. The
-  /// bytes are there until the next one is unpacked.
-  struct Unpacked {
-    std::int32_t number;
-    std::string_view bytes;
-  };
-  std::optional<Unpacked> Open(const Chunk& chunk);
-  /// Notes that no record can be read at a byte of the file, or of a chunk (below 0: of none).
-  void NoteNoRecord(std::uint64_t at, std::int32_t chunk);
+  /// Gives Take() every record from a byte of the file on, and those of its chunks. False at the record that
+  /// says that there are no more. For the constructor of a format.
+  bool WalkFile(std::uint64_t begin) { return Walk(bytes_, begin, file_size_, -1); }
+  /// The record at a byte, whose content begins before `limit`, or there; nothing where there is none.
+  virtual std::optional<Record> RecordAt(const ByteSource& bytes, std::uint64_t at,
+                                         std::uint64_t limit) const = 0;
+  /// Where a record of chunks has its chunk; nothing where it does not say.
+  virtual std::optional<Chunk> ChunkOf(const ByteSource& bytes, const Record& record) const = 0;
+  /// Takes a record that is no chunk, and is all there. `chunk`: it lies in; -1: in the file.
+  virtual void Take(const ByteSource& bytes, const Record& record, std::int32_t chunk) = 0;
+  /// Whether the chunk before the record that is taken could not be read.
+  bool chunk_lost() const { return chunk_lost_; }
 
  private:
+  bool Walk(const ByteSource& bytes, std::uint64_t at, std::uint64_t end, std::int32_t chunk);
+  void WalkPacked(const Chunk& chunk);
+  void NoteNoRecord(std::uint64_t at, std::int32_t chunk);
   class FileBytes : public ByteSource {
    public:
     explicit FileBytes(std::ifstream* in) : in_(in) {}
@@ -68,6 +79,7 @@ class ChunkedBag : public Bag {
   mutable std::mutex mutex_;
   mutable std::ifstream in_;
   FileBytes bytes_;
+  bool chunk_lost_ = false;
   mutable std::int32_t unpacked_ = -1;  // whose bytes these are
   mutable std::string unpacked_bytes_;
 };

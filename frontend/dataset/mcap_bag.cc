@@ -28,63 +28,38 @@ std::string TextOf(internal::ByteReader& in) { return std::string(in.GetView(in.
 }  // namespace
 
 McapBag::McapBag(const std::filesystem::path& file) : ChunkedBag(file) {
-  if (Walk(bytes(), kMagic.size(), file_size(), -1)) NoteDamage("was cut off while recording");
+  if (WalkFile(kMagic.size())) NoteDamage("was cut off while recording");
   ListTopics();
 }
 
-bool McapBag::Walk(const ByteSource& bytes, std::uint64_t at, std::uint64_t end, std::int32_t chunk) {
-  std::uint64_t chunk_end = 0;  // of the plain chunk that was entered last
-  while (at < end) {
-    const std::uint64_t limit = at < chunk_end ? std::min(chunk_end, end) : end;
-    char head[kRecordHead];
-    std::uint64_t size = 0;
-    Record record;
-    const bool read = kRecordHead <= limit - at && bytes.Read(at, kRecordHead, head);
-    if (read) {
-      record.op = static_cast<unsigned char>(head[0]);
-      std::memcpy(&size, head + 1, sizeof size);
-      record.begin = at + kRecordHead;
-      record.end = record.begin + std::min(size, limit - record.begin);
-    }
-    // The chunk in which a recording was cut off is read as far as it goes.
-    if (!read || record.op == 0 || (record.op != kPacked && size > limit - record.begin)) {
-      NoteNoRecord(at, chunk);
-      if (limit == end) return true;
-      at = limit;
-      continue;
-    }
-    if (record.op == kFooter) return false;
-    if (record.op == kPacked && chunk < 0) {
-      const std::optional<Chunk> found = ChunkOf(bytes, record);
-      if (found && found->packing == Packing::kNone) {
-        chunk_lost_ = false;
-        chunk_end = record.end;
-        at = found->begin;  // its records lie there like those between chunks
-        continue;
-      }
-      TakeChunk(found);
-    } else {
-      Take(bytes, record, chunk);
-    }
-    at = record.end;
-  }
-  return true;
+std::optional<McapBag::Record> McapBag::RecordAt(const ByteSource& bytes, std::uint64_t at,
+                                                 std::uint64_t limit) const {
+  char head[kRecordHead];
+  if (kRecordHead > limit - at || !bytes.Read(at, kRecordHead, head) || head[0] == 0) return std::nullopt;
+  Record record;
+  record.op = static_cast<unsigned char>(head[0]);
+  record.kind = record.op == kPacked   ? Record::Kind::kChunk
+                : record.op == kFooter ? Record::Kind::kLast
+                                       : Record::Kind::kOther;
+  record.begin = at + kRecordHead;
+  std::memcpy(&record.size, head + 1, sizeof record.size);
+  return record;
 }
 
 void McapBag::Take(const ByteSource& bytes, const Record& record, std::int32_t chunk) {
   if (record.op == kData) return TakeMessage(bytes, record, chunk);
   if (record.op != kSchema && record.op != kChannel && record.op != kMessageIndex) return;
-  std::string content(std::min<std::uint64_t>(record.end - record.begin, kMostTextBytes), '\0');
+  std::string content(std::min<std::uint64_t>(record.size, kMostTextBytes), '\0');
   if (!bytes.Read(record.begin, content.size(), content.data())) return;
   try {
     if (record.op == kSchema) return TakeSchema(content);
     if (record.op == kChannel) return TakeChannel(content);
-    if (!chunk_lost_) return;
+    if (!chunk_lost()) return;
     internal::ByteReader in(content, "an index");
     const auto channel = in.Get<std::uint16_t>();
     const std::uint64_t bytes_of_it = in.Get<std::uint32_t>();
-    AddLost(channel, std::min(bytes_of_it, record.end - record.begin) / 16);  // time, place
-  } catch (const InputError&) {  // it ends too early: as if it were not there
+    AddLost(channel, std::min(bytes_of_it, record.size) / 16);  // time, place
+  } catch (const InputError&) {                                 // it ends too early: as if it were not there
   }
 }
 
@@ -109,17 +84,18 @@ void McapBag::TakeMessage(const ByteSource& bytes, const Record& record, std::in
   constexpr std::uint64_t kMessageHead = 22;  // channel, number, times of recording and of sending
   std::uint16_t channel = 0;
   MessageHead words = {};
-  const std::uint64_t begin = record.begin + kMessageHead, size = record.end - record.begin;
-  if (size < kMessageHead + sizeof words || size - kMessageHead > UINT32_MAX) return;
+  const std::uint64_t begin = record.begin + kMessageHead;
+  if (record.size < kMessageHead + sizeof words || record.size - kMessageHead > UINT32_MAX) return;
   if (!bytes.Read(record.begin, sizeof channel, reinterpret_cast<char*>(&channel)) ||
       !bytes.Read(begin, sizeof words, reinterpret_cast<char*>(words.data())))
     return;
-  AddMessage({channel, static_cast<std::uint32_t>(size - kMessageHead), begin, chunk, 0, StampOf(words)});
+  AddMessage(
+      {channel, static_cast<std::uint32_t>(record.size - kMessageHead), begin, chunk, 0, StampOf(words)});
 }
 
-std::optional<McapBag::Chunk> McapBag::ChunkOf(const ByteSource& bytes, const Record& record) {
+std::optional<McapBag::Chunk> McapBag::ChunkOf(const ByteSource& bytes, const Record& record) const {
   Chunk chunk;
-  std::string content(std::min<std::uint64_t>(record.end - record.begin, 64), '\0');
+  std::string content(std::min<std::uint64_t>(record.size, 64), '\0');
   try {
     if (!bytes.Read(record.begin, content.size(), content.data())) return std::nullopt;
     internal::ByteReader in(content, "a chunk");
@@ -133,18 +109,10 @@ std::optional<McapBag::Chunk> McapBag::ChunkOf(const ByteSource& bytes, const Re
                     : packing == "zstd" ? Packing::kZstd
                                         : Packing::kUnknown;
     chunk.begin = record.begin + content.size() - in.Left();
-    chunk.size = record.end - chunk.begin;
     return chunk;
-  } catch (const InputError&) {
-    NoteNoRecord(record.begin - kRecordHead, -1);
+  } catch (const InputError&) {  // it ends too early
     return std::nullopt;
   }
-}
-
-void McapBag::TakeChunk(const std::optional<Chunk>& chunk) {
-  const std::optional<Unpacked> unpacked = chunk ? Open(*chunk) : std::nullopt;
-  chunk_lost_ = !unpacked;
-  if (unpacked) Walk(MemoryBytes(unpacked->bytes), 0, unpacked->bytes.size(), unpacked->number);
 }
 
 }  // namespace tutti

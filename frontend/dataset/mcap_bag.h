@@ -20,23 +20,15 @@ class McapBag : public ChunkedBag {
   explicit McapBag(const std::filesystem::path& file);
 
  private:
-  /// Where the content of a record lies.
-  struct Record {
-    unsigned char op = 0;
-    std::uint64_t begin = 0, end = 0;
-  };
-
-  /// False at the record that says that there are no more.
-  bool Walk(const ByteSource& bytes, std::uint64_t at, std::uint64_t end, std::int32_t chunk);
-  void Take(const ByteSource& bytes, const Record& record, std::int32_t chunk);
+  std::optional<Record> RecordAt(const ByteSource& bytes, std::uint64_t at,
+                                 std::uint64_t limit) const override;
+  std::optional<Chunk> ChunkOf(const ByteSource& bytes, const Record& record) const override;
+  void Take(const ByteSource& bytes, const Record& record, std::int32_t chunk) override;
   void TakeSchema(const std::string& content);
   void TakeChannel(const std::string& content);
   void TakeMessage(const ByteSource& bytes, const Record& record, std::int32_t chunk);
-  std::optional<Chunk> ChunkOf(const ByteSource& bytes, const Record& record);
-  void TakeChunk(const std::optional<Chunk>& chunk);
 
   std::map<std::uint16_t, std::string> schemas_;  // names of types
-  bool chunk_lost_ = false;                       // the one before the record that is looked at
 };
 
 }  // namespace tutti

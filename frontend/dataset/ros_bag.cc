@@ -37,88 +37,64 @@ std::optional<std::string_view> FieldOf(std::string_view fields, std::string_vie
   return std::nullopt;
 }
 
+// The number in a field of a record's header.
+std::optional<std::uint32_t> NumberField(const std::string& header, std::string_view name) {
+  const std::optional<std::string_view> field = FieldOf(header, name);
+  return field ? NumberIn<std::uint32_t>(*field) : std::nullopt;
+}
+
 }  // namespace
 
-// A record: its header (fields), and where its data lies.
-struct RosBag::Record {
-  std::string header;
-  std::uint64_t begin = 0;
-  std::uint32_t size = 0;
-  std::uint64_t end() const { return begin + size; }
-
-  std::optional<std::uint32_t> Number(std::string_view name) const {
-    const std::optional<std::string_view> field = FieldOf(header, name);
-    return field ? NumberIn<std::uint32_t>(*field) : std::nullopt;
-  }
-};
-
 RosBag::RosBag(const std::filesystem::path& file) : ChunkedBag(file) {
-  Walk(bytes(), kMagic.size(), file_size(), -1);
+  WalkFile(kMagic.size());
   ListTopics();
 }
 
-// Its kind; 0 if it does not end before `end`, or does not say.
-unsigned char RosBag::ReadRecord(const ByteSource& bytes, std::uint64_t at, std::uint64_t end,
-                                 Record* record) {
-  std::uint32_t header_size = 0;
+// A header, fields, stands before the content, each with its size before it.
+std::optional<RosBag::Record> RosBag::RecordAt(const ByteSource& bytes, std::uint64_t at,
+                                               std::uint64_t limit) const {
+  std::uint32_t header_size = 0, size = 0;
   const auto read_number = [&](std::uint64_t where, std::uint32_t* number) {
-    return where + sizeof *number <= end &&
+    return where + sizeof *number <= limit &&
            bytes.Read(where, sizeof *number, reinterpret_cast<char*>(number));
   };
-  if (!read_number(at, &header_size) || header_size > kMostHeaderBytes) return 0;
-  record->begin = at + 2 * sizeof header_size + header_size;
-  record->header.resize(header_size);
-  if (record->begin > end || !bytes.Read(at + sizeof header_size, header_size, record->header.data()))
-    return 0;
-  if (!read_number(record->begin - sizeof record->size, &record->size)) return 0;
-  const std::optional<std::string_view> op = FieldOf(record->header, "op");
-  return op ? NumberIn<unsigned char>(*op).value_or(0) : std::uint8_t{0};
+  if (!read_number(at, &header_size) || header_size > kMostHeaderBytes) return std::nullopt;
+  Record record;
+  record.begin = at + 2 * sizeof header_size + header_size;
+  record.header.resize(header_size);
+  if (record.begin > limit || !bytes.Read(at + sizeof header_size, header_size, record.header.data()) ||
+      !read_number(record.begin - sizeof size, &size))
+    return std::nullopt;
+  record.size = size;
+  const std::optional<std::string_view> op = FieldOf(record.header, "op");
+  record.op = op ? NumberIn<unsigned char>(*op).value_or(0) : std::uint8_t{0};
+  if (record.op == 0) return std::nullopt;
+  if (record.op == kChunk) record.kind = Record::Kind::kChunk;
+  return record;
 }
 
-void RosBag::Walk(const ByteSource& bytes, std::uint64_t at, std::uint64_t end, std::int32_t chunk) {
-  std::uint64_t chunk_end = 0;  // of the plain chunk that was entered last
-  while (at < end) {
-    const std::uint64_t limit = at < chunk_end ? std::min(chunk_end, end) : end;
-    Record record;
-    const unsigned char op = ReadRecord(bytes, at, limit, &record);
-    // The chunk in which a recording was cut off is read as far as it goes.
-    if (op == 0 || (op != kChunk && record.end() > limit)) {
-      NoteNoRecord(at, chunk);
-      if (limit == end) return;
-      at = limit;
-      continue;
-    }
-    if (op == kMessage) {
-      TakeMessage(bytes, record, chunk);
-    } else if (op == kConnection) {
-      TakeConnection(bytes, record);
-    } else if (op == kChunk && chunk < 0) {
-      chunk_lost_ = false;
-      if (FieldOf(record.header, "compression").value_or("") == "none") {
-        chunk_end = record.end();
-        at = record.begin;  // its records lie there like those between chunks
-        continue;
-      }
-      TakeChunk(record);
-    } else if (op == kIndex && chunk_lost_) {
-      AddLost(record.Number("conn").value_or(0), record.size / 12);  // time, place
-    } else if (op == kBagHeader && !FieldOf(record.header, "encryptor").value_or("").empty()) {
-      throw InputError(file().string() + ": is encrypted; decrypt it with 'rosbag decrypt'");
-    }
-    at = record.end();
+void RosBag::Take(const ByteSource& bytes, const Record& record, std::int32_t chunk) {
+  if (record.op == kMessage) {
+    TakeMessage(bytes, record, chunk);
+  } else if (record.op == kConnection) {
+    TakeConnection(bytes, record);
+  } else if (record.op == kIndex && chunk_lost()) {
+    AddLost(NumberField(record.header, "conn").value_or(0), record.size / 12);  // time, place
+  } else if (record.op == kBagHeader && !FieldOf(record.header, "encryptor").value_or("").empty()) {
+    throw InputError(file().string() + ": is encrypted; decrypt it with 'rosbag decrypt'");
   }
 }
 
 void RosBag::TakeMessage(const ByteSource& bytes, const Record& record, std::int32_t chunk) {
-  const std::optional<std::uint32_t> connection = record.Number("conn");
+  const std::optional<std::uint32_t> connection = NumberField(record.header, "conn");
   MessageHead words = {};
   if (!connection || record.size < sizeof words) return;
   if (!bytes.Read(record.begin, sizeof words, reinterpret_cast<char*>(words.data()))) return;
-  AddMessage({*connection, record.size, record.begin, chunk, 0, StampOf(words)});
+  AddMessage({*connection, static_cast<std::uint32_t>(record.size), record.begin, chunk, 0, StampOf(words)});
 }
 
 void RosBag::TakeConnection(const ByteSource& bytes, const Record& record) {
-  const std::optional<std::uint32_t> id = record.Number("conn");
+  const std::optional<std::uint32_t> id = NumberField(record.header, "conn");
   const std::optional<std::string_view> topic = FieldOf(record.header, "topic");
   // The type stands in its data, beside the definition of the message, which may be long.
   std::string data(std::min<std::size_t>(record.size, 1U << 20U), '\0');
@@ -127,18 +103,16 @@ void RosBag::TakeConnection(const ByteSource& bytes, const Record& record) {
   if (type) AddConnection(*id, {std::string(*topic), std::string(*type), Serialization::kRos1});
 }
 
-void RosBag::TakeChunk(const Record& record) {
+std::optional<RosBag::Chunk> RosBag::ChunkOf(const ByteSource& /*bytes*/, const Record& record) const {
   const std::string_view compression = FieldOf(record.header, "compression").value_or("");
   Chunk chunk;
   chunk.begin = record.begin;
-  chunk.size = std::min(record.end(), file_size()) - record.begin;
-  chunk.unpacked_size = record.Number("size").value_or(0);
-  chunk.packing = compression == "lz4"   ? Packing::kLz4
+  chunk.unpacked_size = NumberField(record.header, "size").value_or(0);
+  chunk.packing = compression == "none"  ? Packing::kNone
+                  : compression == "lz4" ? Packing::kLz4
                   : compression == "bz2" ? Packing::kBz2
                                          : Packing::kUnknown;
-  const std::optional<Unpacked> unpacked = Open(chunk);
-  chunk_lost_ = !unpacked;
-  if (unpacked) Walk(MemoryBytes(unpacked->bytes), 0, unpacked->bytes.size(), unpacked->number);
+  return chunk;
 }
 
 }  // namespace tutti

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string_view>
 
 #include "frontend/dataset/chunked_bag.h"
@@ -17,16 +18,12 @@ class RosBag : public ChunkedBag {
   explicit RosBag(const std::filesystem::path& file);
 
  private:
-  struct Record;
-
-  static unsigned char ReadRecord(const ByteSource& bytes, std::uint64_t at, std::uint64_t end,
-                                  Record* record);
-  void Walk(const ByteSource& bytes, std::uint64_t at, std::uint64_t end, std::int32_t chunk);
+  std::optional<Record> RecordAt(const ByteSource& bytes, std::uint64_t at,
+                                 std::uint64_t limit) const override;
+  std::optional<Chunk> ChunkOf(const ByteSource& bytes, const Record& record) const override;
+  void Take(const ByteSource& bytes, const Record& record, std::int32_t chunk) override;
   void TakeMessage(const ByteSource& bytes, const Record& record, std::int32_t chunk);
   void TakeConnection(const ByteSource& bytes, const Record& record);
-  void TakeChunk(const Record& record);
-
-  bool chunk_lost_ = false;  // the one before the record that is looked at
 };
 
 }  // namespace tutti

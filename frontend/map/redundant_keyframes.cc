@@ -9,11 +9,12 @@
 namespace tutti {
 namespace {
 
-constexpr double kShare = 0.85;     // of a redundant keyframe's landmarks that
-constexpr std::size_t kOthers = 3;  // so many others see
-constexpr int kCoarserLevels = 1;   // that a view of the others may be coarser: a corner's level wavers
-constexpr double kElsewhere = 0.1;  // of its landmarks: who has fewer in common with it saw something else
-constexpr int kLeastInCommon = 15;  // landmarks in common with the keyframe that is to stand for another
+constexpr double kShare = 0.85;      // of a redundant keyframe's landmarks that
+constexpr std::size_t kOthers = 3;   // so many others see
+constexpr double kShareAgain = 0.7;  // of one whose place an earlier visit saw: noise makes other corners
+constexpr int kCoarserLevels = 1;    // that a view of the others may be coarser: a corner's level wavers
+constexpr double kElsewhere = 0.1;   // of its landmarks: who has fewer in common with it saw something else
+constexpr int kLeastInCommon = 15;   // landmarks in common with the keyframe that is to stand for another
 
 int LevelOf(const Map& map, const Observation& view) {
   return map.keyframe(view.keyframe).features->keypoints[static_cast<std::size_t>(view.feature)].octave;
@@ -45,6 +46,14 @@ bool IsSeenByOthers(const Map& map, const Landmark& landmark, const Observation&
   return others >= kOthers || earlier >= least_views;
 }
 
+// Whether an earlier visit has a keyframe that could stand for this one.
+bool WasSeenEarlier(const Map& map, int id, int last_elsewhere) {
+  const std::map<int, int>& covisible = map.keyframe(id).covisible;
+  return std::any_of(covisible.begin(), covisible.end(), [&](const auto& other) {
+    return other.first < last_elsewhere && other.second >= kLeastInCommon;
+  });
+}
+
 bool IsRedundant(const Map& map, int id, std::size_t least_views) {
   const std::vector<int>& landmarks = map.keyframe(id).landmarks;
   const auto seen = std::count_if(landmarks.begin(), landmarks.end(), [](int l) { return l >= 0; });
@@ -55,7 +64,8 @@ bool IsRedundant(const Map& map, int id, std::size_t least_views) {
     const Observation view{id, static_cast<int>(f)};
     if (IsSeenByOthers(map, map.landmark(landmarks[f]), view, last_elsewhere, least_views)) ++redundant;
   }
-  return seen > 0 && redundant >= kShare * static_cast<double>(seen);
+  const double share = WasSeenEarlier(map, id, last_elsewhere) ? kShareAgain : kShare;
+  return seen > 0 && redundant >= share * static_cast<double>(seen);
 }
 
 // Older keyframes of the same piece: those with most common landmarks first (ties: the oldest).

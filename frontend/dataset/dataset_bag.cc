@@ -36,6 +36,16 @@ class BagDataset : public Dataset {
     return ReadTrajectory(file, GuessTrajectoryFormat(file), warnings);
   }
 
+  ColourImage ReadColour(std::size_t i) const override {
+    ColourImage result;
+    try {
+      result.image = ToColour(ReadPixels(*frames_.at(i).image, options_.topic, Pixels::kColour, rig_.left));
+    } catch (const std::exception& e) {
+      result.error = About(i) + e.what();
+    }
+    return result;
+  }
+
   ReadResult Read(std::size_t i) const override {
     ReadResult result;
     try {
@@ -43,7 +53,7 @@ class BagDataset : public Dataset {
       InputFrame frame;
       frame.index = Number(i);
       frame.stamp_s = at.image->stamp_s;
-      frame.image = ReadGrey(*at.image, options_.topic, rig_.left);
+      frame.image = ReadPixels(*at.image, options_.topic, Pixels::kGrey, rig_.left);
       frame.mask = mask_;
       result.depth_error = AddDepth(at, i, &frame);
       result.frame = std::move(frame);
@@ -63,7 +73,8 @@ class BagDataset : public Dataset {
   // The depth or right image, if there is one; or what is wrong with it.
   std::string AddDepth(const Frame& at, std::size_t i, InputFrame* frame) const {
     try {
-      if (at.right != nullptr) frame->right = ReadGrey(*at.right, options_.right_topic, rig_.right);
+      if (at.right != nullptr)
+        frame->right = ReadPixels(*at.right, options_.right_topic, Pixels::kGrey, rig_.right);
       if (at.depth != nullptr) frame->depth_m = ReadDepth(*at.depth);
       return {};
     } catch (const std::exception& e) {
@@ -183,7 +194,7 @@ class BagDataset : public Dataset {
     FindCamera();
     MessageImage first;
     for (std::size_t i = 0; i < std::min<std::size_t>(50, frames_.size()) && first.image.empty(); ++i)
-      first = Decode(*frames_[i].image, options_.topic, false);
+      first = Decode(*frames_[i].image, options_.topic, Pixels::kGrey);
     if (first.image.empty())
       throw InputError(file_.string() + ": none of the first images can be read: " + first.error);
     size_ = first.image.size();
@@ -194,10 +205,10 @@ class BagDataset : public Dataset {
     mask_ = MaskOfAll(options_, size_, rig_.left);
   }
 
-  MessageImage Decode(const BagMessage& message, const std::string& topic, bool depth) const {
+  MessageImage Decode(const BagMessage& message, const std::string& topic, Pixels pixels) const {
     try {
       const Bag::Topic& found = *bag_->Find(topic);  // FindTopics saw it
-      return DecodeImageMessage(bag_->Read(message), found.type, found.serialization, depth);
+      return DecodeImageMessage(bag_->Read(message), found.type, found.serialization, pixels);
     } catch (const InputError& e) {
       MessageImage none;
       none.error = e.what();
@@ -206,24 +217,25 @@ class BagDataset : public Dataset {
   }
 
   // Throws InputError.
-  MessageImage OfTheSize(const BagMessage& message, const std::string& topic, bool depth) const {
-    MessageImage read = Decode(message, topic, depth);
+  MessageImage OfTheSize(const BagMessage& message, const std::string& topic, Pixels pixels) const {
+    MessageImage read = Decode(message, topic, pixels);
     if (read.image.empty()) throw InputError(read.error);
     if (read.image.size() != size_) throw InputError("an image has another size than the first one");
     return read;
   }
 
-  cv::Mat ReadGrey(const BagMessage& message, const std::string& topic,
-                   const std::optional<Rectifier>& rectifier) const {
-    const cv::Mat image = OfTheSize(message, topic, false).image;
+  // 8 bit, rectified.
+  cv::Mat ReadPixels(const BagMessage& message, const std::string& topic, Pixels pixels,
+                     const std::optional<Rectifier>& rectifier) const {
+    const cv::Mat image = OfTheSize(message, topic, pixels).image;
     if (image.depth() != CV_8U && image.depth() != CV_16U)
       throw InputError(topic + ": pixels are neither 8 nor 16 bit");
-    const cv::Mat grey = To8Bit(image, bits_);
-    return rectifier ? rectifier->Apply(grey) : grey;
+    cv::Mat out = To8Bit(image, bits_);
+    return rectifier ? rectifier->Apply(out) : out;
   }
 
   cv::Mat ReadDepth(const BagMessage& message) const {
-    const MessageImage read = OfTheSize(message, options_.depth_topic, true);
+    const MessageImage read = OfTheSize(message, options_.depth_topic, Pixels::kStored);
     if (read.image.channels() != 1) throw InputError(options_.depth_topic + ": is no depth image");
     cv::Mat depth =
         DepthInMetres(read.image, read.metres ? 1.0 : options_.depth_units_per_m, options_.max_depth_m);

@@ -61,34 +61,45 @@ class MessageReader {
   std::size_t size_ = 0;  // of what is aligned
 };
 
-/// How pixels of an encoding lie in memory, and how they become grey; nothing to do: -1.
+/// How pixels of an encoding lie in memory, and how they become grey or colours; nothing to do: -1.
 struct Encoding {
-  int type, to_grey;
+  int type, to_grey, to_colour;
 };
 
-// ROS names Bayer patterns by their first row, OpenCV by the second.
+// ROS names Bayer patterns by their first row, OpenCV by the second. "yuv422..." are old names.
 const std::map<std::string, Encoding, std::less<>>& Encodings() {
+  constexpr int kFromGrey = cv::COLOR_GRAY2BGR;
   static const std::map<std::string, Encoding, std::less<>> encodings = {
-      {"mono8", {CV_8UC1, -1}},
-      {"8UC1", {CV_8UC1, -1}},
-      {"mono16", {CV_16UC1, -1}},
-      {"16UC1", {CV_16UC1, -1}},
-      {"32FC1", {CV_32FC1, -1}},
-      {"bgr8", {CV_8UC3, cv::COLOR_BGR2GRAY}},
-      {"8UC3", {CV_8UC3, cv::COLOR_BGR2GRAY}},
-      {"bgr16", {CV_16UC3, cv::COLOR_BGR2GRAY}},
-      {"rgb8", {CV_8UC3, cv::COLOR_RGB2GRAY}},
-      {"rgb16", {CV_16UC3, cv::COLOR_RGB2GRAY}},
-      {"bgra8", {CV_8UC4, cv::COLOR_BGRA2GRAY}},
-      {"rgba8", {CV_8UC4, cv::COLOR_RGBA2GRAY}},
-      {"bayer_rggb8", {CV_8UC1, cv::COLOR_BayerBG2GRAY}},
-      {"bayer_bggr8", {CV_8UC1, cv::COLOR_BayerRG2GRAY}},
-      {"bayer_gbrg8", {CV_8UC1, cv::COLOR_BayerGR2GRAY}},
-      {"bayer_grbg8", {CV_8UC1, cv::COLOR_BayerGB2GRAY}}};
+      {"mono8", {CV_8UC1, -1, kFromGrey}},
+      {"8UC1", {CV_8UC1, -1, kFromGrey}},
+      {"mono16", {CV_16UC1, -1, kFromGrey}},
+      {"16UC1", {CV_16UC1, -1, kFromGrey}},
+      {"32FC1", {CV_32FC1, -1, kFromGrey}},
+      {"bgr8", {CV_8UC3, cv::COLOR_BGR2GRAY, -1}},
+      {"8UC3", {CV_8UC3, cv::COLOR_BGR2GRAY, -1}},
+      {"bgr16", {CV_16UC3, cv::COLOR_BGR2GRAY, -1}},
+      {"rgb8", {CV_8UC3, cv::COLOR_RGB2GRAY, cv::COLOR_RGB2BGR}},
+      {"rgb16", {CV_16UC3, cv::COLOR_RGB2GRAY, cv::COLOR_RGB2BGR}},
+      {"bgra8", {CV_8UC4, cv::COLOR_BGRA2GRAY, cv::COLOR_BGRA2BGR}},
+      {"bgra16", {CV_16UC4, cv::COLOR_BGRA2GRAY, cv::COLOR_BGRA2BGR}},
+      {"rgba8", {CV_8UC4, cv::COLOR_RGBA2GRAY, cv::COLOR_RGBA2BGR}},
+      {"rgba16", {CV_16UC4, cv::COLOR_RGBA2GRAY, cv::COLOR_RGBA2BGR}},
+      {"bayer_rggb8", {CV_8UC1, cv::COLOR_BayerBG2GRAY, cv::COLOR_BayerBG2BGR}},
+      {"bayer_bggr8", {CV_8UC1, cv::COLOR_BayerRG2GRAY, cv::COLOR_BayerRG2BGR}},
+      {"bayer_gbrg8", {CV_8UC1, cv::COLOR_BayerGR2GRAY, cv::COLOR_BayerGR2BGR}},
+      {"bayer_grbg8", {CV_8UC1, cv::COLOR_BayerGB2GRAY, cv::COLOR_BayerGB2BGR}},
+      {"bayer_rggb16", {CV_16UC1, cv::COLOR_BayerBG2GRAY, cv::COLOR_BayerBG2BGR}},
+      {"bayer_bggr16", {CV_16UC1, cv::COLOR_BayerRG2GRAY, cv::COLOR_BayerRG2BGR}},
+      {"bayer_gbrg16", {CV_16UC1, cv::COLOR_BayerGR2GRAY, cv::COLOR_BayerGR2BGR}},
+      {"bayer_grbg16", {CV_16UC1, cv::COLOR_BayerGB2GRAY, cv::COLOR_BayerGB2BGR}},
+      {"uyvy", {CV_8UC2, cv::COLOR_YUV2GRAY_UYVY, cv::COLOR_YUV2BGR_UYVY}},
+      {"yuv422", {CV_8UC2, cv::COLOR_YUV2GRAY_UYVY, cv::COLOR_YUV2BGR_UYVY}},
+      {"yuyv", {CV_8UC2, cv::COLOR_YUV2GRAY_YUYV, cv::COLOR_YUV2BGR_YUYV}},
+      {"yuv422_yuy2", {CV_8UC2, cv::COLOR_YUV2GRAY_YUYV, cv::COLOR_YUV2BGR_YUYV}}};
   return encodings;
 }
 
-void DecodeRaw(MessageReader& in, bool depth, MessageImage* out) {
+void DecodeRaw(MessageReader& in, Pixels pixels, MessageImage* out) {
   const auto height = in.Get<std::uint32_t>(), width = in.Get<std::uint32_t>();
   const std::string_view encoding = in.Text();
   const bool big_endian = in.Get<std::uint8_t>() != 0;
@@ -101,6 +112,11 @@ void DecodeRaw(MessageReader& in, bool depth, MessageImage* out) {
     return;
   }
   const int type = known->second.type;
+  if (CV_MAT_CN(type) == 2 && width % 2 != 0) {  // OpenCV would go beyond the row
+    out->error = "an image of encoding '" + std::string(encoding) +
+                 "' has an odd width, and two pixels share a colour";
+    return;
+  }
   if (width == 0 || height == 0 || std::uint64_t{width} * height > kMostImagePixels ||
       step < std::size_t{width} * static_cast<std::size_t>(CV_ELEM_SIZE(type)) ||
       data.size() / step < height) {
@@ -108,13 +124,16 @@ void DecodeRaw(MessageReader& in, bool depth, MessageImage* out) {
                  " pixels, and its " + std::to_string(data.size()) + " bytes are not that";
     return;
   }
-  const cv::Mat pixels(static_cast<int>(height), static_cast<int>(width), type,
+  const cv::Mat stored(static_cast<int>(height), static_cast<int>(width), type,
                        const_cast<char*>(data.data()), step);
   out->metres = encoding == "32FC1";
-  if (depth || known->second.to_grey < 0) {
-    out->image = pixels.clone();
+  const int change = pixels == Pixels::kGrey     ? known->second.to_grey
+                     : pixels == Pixels::kColour ? known->second.to_colour
+                                                 : -1;
+  if (change < 0) {
+    out->image = stored.clone();
   } else {
-    cv::cvtColor(pixels, out->image, known->second.to_grey);
+    cv::cvtColor(stored, out->image, change);
   }
 }
 
@@ -144,12 +163,15 @@ void DecodeCompressedDepth(const std::string& format, std::string_view data, Mes
   }
 }
 
-void DecodeCompressed(MessageReader& in, bool depth, MessageImage* out) {
+void DecodeCompressed(MessageReader& in, Pixels pixels, MessageImage* out) {
   const std::string format(in.Text());
   const std::string_view data = in.Bytes();
   if (format.find("compressedDepth") != std::string::npos) return DecodeCompressedDepth(format, data, out);
-  const ImageFile decoded = DecodeImage(
-      {data.begin(), data.end()}, depth ? cv::IMREAD_UNCHANGED : cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
+  const int channels = pixels == Pixels::kGrey ? cv::IMREAD_GRAYSCALE : cv::IMREAD_COLOR;
+  const ImageFile decoded =
+      DecodeImage({data.begin(), data.end()},
+                  pixels == Pixels::kStored ? cv::IMREAD_UNCHANGED
+                                            : channels | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
   out->image = decoded.image;
   if (!decoded.error.empty()) out->error = "a compressed image ('" + format + "') " + decoded.error;
 }
@@ -167,7 +189,7 @@ bool IsImageMessage(const std::string& type) {
 }
 
 MessageImage DecodeImageMessage(const std::string& message, const std::string& type,
-                                Serialization serialization, bool depth) {
+                                Serialization serialization, Pixels pixels) {
   MessageImage out;
   out.error = SerializationProblem(message, serialization);
   if (!out.error.empty()) {
@@ -177,7 +199,7 @@ MessageImage DecodeImageMessage(const std::string& message, const std::string& t
   try {
     MessageReader in(message, serialization, "a message");
     in.SkipHeader();
-    type == "sensor_msgs/Image" ? DecodeRaw(in, depth, &out) : DecodeCompressed(in, depth, &out);
+    type == "sensor_msgs/Image" ? DecodeRaw(in, pixels, &out) : DecodeCompressed(in, pixels, &out);
   } catch (const InputError&) {
     out.error = "a message is damaged: it ends too early";
   } catch (const std::exception& e) {  // of OpenCV, and no memory

@@ -30,10 +30,11 @@ bool IsImageMessage(const std::string& type);
 struct MessageImage : ImageFile {
   bool metres = false;  ///< 32FC1, which ROS gives in metres
 };
-/// Pixels as stored if `depth`, else in grey, 8 or 16 bit. `type`: one for which IsImageMessage holds. Never
-/// throws; thread-safe.
+/// What pixels become: one channel, three with blue first, both of 8 or 16 bit; or nothing else (depth).
+enum class Pixels { kGrey, kColour, kStored };
+/// `type`: one for which IsImageMessage holds. Never throws; thread-safe.
 MessageImage DecodeImageMessage(const std::string& message, const std::string& type,
-                                Serialization serialization, bool depth);
+                                Serialization serialization, Pixels pixels);
 
 /// The camera of a CameraInfo; nothing where it says that it is not calibrated (K[0] = 0). `source`: for
 /// messages. Throws InputError for a distortion that tutti does not know, and where the message ends early.

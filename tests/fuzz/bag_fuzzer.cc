@@ -33,6 +33,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       if (!std::isfinite(dataset->Stamp(i))) std::abort();
       const tutti::ReadResult read = dataset->Read(i);
       if (read.frame.has_value() != read.error.empty()) std::abort();
+      const tutti::ColourImage colour = dataset->ReadColour(i);
+      if (colour.image.empty() == colour.error.empty()) std::abort();
+      if (!colour.image.empty() && colour.image.type() != CV_8UC3) std::abort();
     }
   } catch (const tutti::InputError&) {
   }

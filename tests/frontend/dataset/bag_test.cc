@@ -39,7 +39,7 @@ std::size_t ImagesOf(const Bag& bag) {
   for (const BagMessage& message : images) {
     MessageImage read;
     try {
-      read = DecodeImageMessage(bag.Read(message), "sensor_msgs/Image", Serialization::kCdr, false);
+      read = DecodeImageMessage(bag.Read(message), "sensor_msgs/Image", Serialization::kCdr, Pixels::kGrey);
     } catch (const InputError&) {  // it is gone since
       continue;
     }
@@ -68,8 +68,8 @@ TEST_P(EveryFormat, OfOthersIsRead) {
   EXPECT_EQ(bag->Lost("/left/image"), 0u);
   const std::vector<BagMessage> compressed = bag->Messages("/right/image/compressed");
   ASSERT_EQ(compressed.size(), 3u);
-  const MessageImage picture =
-      DecodeImageMessage(bag->Read(compressed[2]), "sensor_msgs/CompressedImage", Serialization::kCdr, false);
+  const MessageImage picture = DecodeImageMessage(bag->Read(compressed[2]), "sensor_msgs/CompressedImage",
+                                                  Serialization::kCdr, Pixels::kGrey);
   EXPECT_EQ(cv::norm(picture.image, testing::Picture(16, 12, 1), cv::NORM_INF), 0) << picture.error;
   const auto camera =
       CameraOfMessage(bag->Read(bag->Messages("/left/camera_info").at(1)), Serialization::kCdr, "x.mcap");
@@ -114,7 +114,9 @@ TEST_P(EveryFormat, DamageAnywhereIsSaidAndCrashesNothing) {
       const auto bag = Bag::Open(file);
       for (const Bag::Topic& topic : bag->topics()) {
         for (const BagMessage& message : bag->Messages(topic.name)) {
-          ErrorOf([&] { DecodeImageMessage(bag->Read(message), topic.type, topic.serialization, false); });
+          ErrorOf([&] {
+            DecodeImageMessage(bag->Read(message), topic.type, topic.serialization, Pixels::kGrey);
+          });
         }
       }
     });

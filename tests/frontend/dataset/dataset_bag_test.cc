@@ -61,6 +61,10 @@ TEST(BagDataset, ColourWithStampsOfTheHeadersAndTheCameraInfo) {
   ASSERT_TRUE(read.frame.has_value()) << read.error;
   EXPECT_EQ(read.frame->image.type(), CV_8UC1);
   EXPECT_NEAR(read.frame->image.at<unsigned char>(10, 10), 0.114 * 200, 1);
+  const ColourImage colour = dataset->ReadColour(1);
+  ASSERT_EQ(colour.image.type(), CV_8UC3) << colour.error;
+  EXPECT_EQ(colour.image.at<cv::Vec3b>(10, 10), cv::Vec3b(200, 0, 0));
+  EXPECT_THAT(dataset->ReadColour(4).error, HasSubstr("frame 4"));
 }
 
 TEST(BagDataset, SixteenBitIsScaledAndRepeatedStampsAreSkipped) {

@@ -21,15 +21,42 @@ using testing::Picture;
 
 const char* const kImage = "sensor_msgs/Image";
 
-MessageImage Raw(const cv::Mat& image, const std::string& encoding, bool depth = false) {
-  return DecodeImageMessage(ImageMessage(image, encoding, 1), kImage, Serialization::kRos1, depth);
+MessageImage Raw(const cv::Mat& image, const std::string& encoding, Pixels pixels = Pixels::kGrey) {
+  return DecodeImageMessage(ImageMessage(image, encoding, 1), kImage, Serialization::kRos1, pixels);
 }
 
 TEST(DecodeImageMessage, ColoursInTheirOrder) {
   const cv::Mat red(4, 6, CV_8UC3, cv::Scalar(200, 0, 0));  // the first channel
   EXPECT_NEAR(Raw(red, "rgb8").image.at<unsigned char>(1, 1), 0.299 * 200, 1);
   EXPECT_NEAR(Raw(red, "bgr8").image.at<unsigned char>(1, 1), 0.114 * 200, 1);
-  EXPECT_EQ(Raw(red, "rgb8", true).image.type(), CV_8UC3);
+  EXPECT_EQ(Raw(red, "rgb8", Pixels::kStored).image.type(), CV_8UC3);
+}
+
+TEST(DecodeImageMessage, ColoursHaveBlueFirst) {
+  const auto colour = [](const cv::Mat& image, const std::string& encoding) {
+    const cv::Mat read = Raw(image, encoding, Pixels::kColour).image;
+    return read.type() == CV_8UC3 ? read.at<cv::Vec3b>(2, 2) : cv::Vec3b(1, 2, 3);
+  };
+  const cv::Mat first(4, 6, CV_8UC3, cv::Scalar(200, 0, 0)), four(4, 6, CV_8UC4, cv::Scalar(200, 0, 0, 255));
+  const cv::Vec3b blue(200, 0, 0), red(0, 0, 200);
+  EXPECT_EQ(colour(first, "bgr8"), blue);
+  EXPECT_EQ(colour(first, "rgb8"), red);
+  EXPECT_EQ(colour(four, "bgra8"), blue);
+  EXPECT_EQ(colour(four, "rgba8"), red);
+  EXPECT_EQ(colour(cv::Mat(4, 6, CV_8UC1, cv::Scalar(90)), "mono8"), cv::Vec3b(90, 90, 90));
+}
+
+TEST(DecodeImageMessage, VideoOfWebcams) {
+  cv::Mat uyvy(4, 6, CV_8UC2, cv::Scalar(128, 0));  // no colour; brightness is the second byte
+  for (int x = 0; x < uyvy.cols; ++x) uyvy.at<cv::Vec2b>(1, x)[1] = static_cast<unsigned char>(20 * x);
+  cv::Mat yuyv(uyvy.size(), CV_8UC2);
+  cv::mixChannels({uyvy}, {yuyv}, {0, 1, 1, 0});
+  for (const auto& [encoding, image] : {std::pair("uyvy", uyvy), std::pair("yuv422", uyvy),
+                                        std::pair("yuyv", yuyv), std::pair("yuv422_yuy2", yuyv)}) {
+    EXPECT_EQ(Raw(image, encoding).image.at<unsigned char>(1, 4), 80) << encoding;
+    EXPECT_EQ(Raw(image, encoding, Pixels::kColour).image.type(), CV_8UC3) << encoding;
+  }
+  EXPECT_THAT(Raw(cv::Mat(4, 5, CV_8UC2, cv::Scalar(0, 0)), "uyvy").error, HasSubstr("has an odd width"));
 }
 
 TEST(DecodeImageMessage, BayerIsNamedByItsFirstRow) {
@@ -39,13 +66,17 @@ TEST(DecodeImageMessage, BayerIsNamedByItsFirstRow) {
   }
   EXPECT_NEAR(Raw(pattern, "bayer_rggb8").image.at<unsigned char>(4, 4), 0.299 * 200, 2);
   EXPECT_NEAR(Raw(pattern, "bayer_bggr8").image.at<unsigned char>(4, 4), 0.114 * 200, 2);
+  const cv::Vec3b red = Raw(pattern, "bayer_rggb8", Pixels::kColour).image.at<cv::Vec3b>(4, 4);
+  EXPECT_EQ(red, cv::Vec3b(0, 0, 200));
+  pattern.convertTo(pattern, CV_16U, 16);
+  EXPECT_NEAR(Raw(pattern, "bayer_rggb16").image.at<std::uint16_t>(4, 4), 0.299 * 3200, 32);
 }
 
 TEST(DecodeImageMessage, DepthAsStored) {
-  const MessageImage metres = Raw(cv::Mat(3, 3, CV_32FC1, cv::Scalar(2.5)), "32FC1", true);
+  const MessageImage metres = Raw(cv::Mat(3, 3, CV_32FC1, cv::Scalar(2.5)), "32FC1", Pixels::kStored);
   EXPECT_TRUE(metres.metres);
   EXPECT_EQ(metres.image.at<float>(2, 2), 2.5F);
-  const MessageImage units = Raw(cv::Mat(3, 3, CV_16UC1, cv::Scalar(2500)), "16UC1", true);
+  const MessageImage units = Raw(cv::Mat(3, 3, CV_16UC1, cv::Scalar(2500)), "16UC1", Pixels::kStored);
   EXPECT_FALSE(units.metres);
   EXPECT_EQ(units.image.at<std::uint16_t>(2, 2), 2500);
 }
@@ -54,12 +85,16 @@ TEST(DecodeImageMessage, CompressedOnes) {
   std::vector<unsigned char> png;
   cv::imencode(".png", Picture(16, 12, 5), png);
   const std::string type = "sensor_msgs/CompressedImage";
-  const MessageImage read =
-      DecodeImageMessage(testing::CompressedMessage(png, "png", 1), type, Serialization::kRos1, false);
+  const MessageImage read = DecodeImageMessage(testing::CompressedMessage(png, "png", 1), type,
+                                               Serialization::kRos1, Pixels::kGrey);
   EXPECT_EQ(cv::norm(read.image, Picture(16, 12, 5), cv::NORM_INF), 0) << read.error;
+  const MessageImage colour = DecodeImageMessage(testing::CompressedMessage(png, "png", 1), type,
+                                                 Serialization::kRos1, Pixels::kColour);
+  EXPECT_EQ(colour.image.type(), CV_8UC3) << colour.error;
   png.resize(png.size() / 2);
   EXPECT_THAT(
-      DecodeImageMessage(testing::CompressedMessage(png, "png", 1), type, Serialization::kRos1, false).error,
+      DecodeImageMessage(testing::CompressedMessage(png, "png", 1), type, Serialization::kRos1, Pixels::kGrey)
+          .error,
       HasSubstr("a compressed image ('png') is truncated"));
 }
 
@@ -73,7 +108,7 @@ TEST(DecodeImageMessage, CompressedDepth) {
     std::memcpy(bytes.data() + 8, &b, sizeof b);
     bytes.insert(bytes.end(), png.begin(), png.end());
     return DecodeImageMessage(testing::CompressedMessage(bytes, format, 1), "sensor_msgs/CompressedImage",
-                              Serialization::kRos1, true);
+                              Serialization::kRos1, Pixels::kStored);
   };
   const MessageImage units = read("16UC1; compressedDepth png", 0, 0);
   EXPECT_EQ(units.error, "");
@@ -87,16 +122,17 @@ TEST(DecodeImageMessage, CompressedDepth) {
 
 TEST(DecodeImageMessage, SaysWhatIsWrong) {
   const cv::Mat image = Picture(8, 6, 1);
-  EXPECT_THAT(Raw(image, "yuv422").error, HasSubstr("encoding 'yuv422'"));
+  EXPECT_THAT(Raw(image, "nv21").error, HasSubstr("encoding 'nv21'"));
   EXPECT_THAT(Raw(image, "rgb8").error, HasSubstr("8 x 6 pixels"));
   const std::string message = ImageMessage(image, "mono8", 1);
   for (std::size_t size = 0; size < message.size(); ++size)
-    EXPECT_NE(DecodeImageMessage(message.substr(0, size), kImage, Serialization::kRos1, false).error, "")
+    EXPECT_NE(DecodeImageMessage(message.substr(0, size), kImage, Serialization::kRos1, Pixels::kGrey).error,
+              "")
         << size;
   for (std::size_t i = 0; i + 4 <= 50; ++i) {  // any length may be a lie
     std::string changed = message;
     changed.replace(i, 4, "\xff\xff\xff\x7f");
-    const MessageImage read = DecodeImageMessage(changed, kImage, Serialization::kRos1, false);
+    const MessageImage read = DecodeImageMessage(changed, kImage, Serialization::kRos1, Pixels::kGrey);
     EXPECT_EQ(read.image.empty(), !read.error.empty());
   }
 }
@@ -148,17 +184,17 @@ TEST(DecodeImageMessage, OfRos2IsAligned) {
     return bytes + "abcdef";
   };
   for (const char* frame : {"", "a", "ab", "abc", "abcd", "abcde"}) {
-    const MessageImage read = DecodeImageMessage(message(frame), kImage, Serialization::kCdr, false);
+    const MessageImage read = DecodeImageMessage(message(frame), kImage, Serialization::kCdr, Pixels::kGrey);
     ASSERT_EQ(read.error, "") << frame;
     EXPECT_EQ(read.image.size(), cv::Size(3, 2));
     EXPECT_EQ(read.image.at<unsigned char>(1, 2), 'f');
   }
   const std::string whole = message("ab");
   for (std::size_t size = 0; size < whole.size(); ++size)
-    EXPECT_NE(DecodeImageMessage(whole.substr(0, size), kImage, Serialization::kCdr, false).error, "")
+    EXPECT_NE(DecodeImageMessage(whole.substr(0, size), kImage, Serialization::kCdr, Pixels::kGrey).error, "")
         << size;
   const auto error = [&](const std::string& kind) {
-    return DecodeImageMessage(kind + whole.substr(4), kImage, Serialization::kCdr, false).error;
+    return DecodeImageMessage(kind + whole.substr(4), kImage, Serialization::kCdr, Pixels::kGrey).error;
   };
   EXPECT_THAT(error(std::string("\x00\x00\x00\x00", 4)), HasSubstr("is not serialized as little-endian CDR"));
   EXPECT_THAT(error("\x28\xb5\x2f\xfd"), HasSubstr("compressed for itself"));

@@ -1,4 +1,4 @@
-// tutti loops: loop closure alone on a folder of images, measured against a ground truth.
+// tutti loops: loop closure alone on images, measured against a ground truth.
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
@@ -32,7 +32,7 @@ namespace tutti::cli {
 namespace {
 
 struct LoopsArguments {
-  std::string images, out, rule, preset, camera, places, mask;
+  std::string images, topic, out, rule, preset, camera, places, mask;
   GroundTruthArguments truth;
   std::vector<std::string> set;  // key=value, keys of the section `loops` of a configuration
   LoopDetectorOptions options;
@@ -73,8 +73,8 @@ std::optional<ImageMasks> MasksFor(const LoopsArguments& arguments, const ImageS
   if (arguments.truth.join_pairs)
     throw InputError("--mask: images that --join-pairs joins have no common mask; leave one of the two out");
   ImageMasks masks(arguments.mask);
-  if (set.video) {
-    const PinholeCamera& camera = set.video->Rig().camera;
+  if (set.recording) {
+    const PinholeCamera& camera = set.recording->Rig().camera;
     masks.OfAll({camera.width, camera.height});  // refuses what can't be used
   }
   const auto without = std::count_if(set.images.begin(), set.images.end(),
@@ -198,7 +198,11 @@ int RunLoops(const LoopsArguments& given) {
   const std::string problem = arguments.truth.rule.Validate();
   if (!problem.empty()) throw InputError("ground truth: " + problem);
   cv::setNumThreads(arguments.options.threads);
-  Input set = {LoadImageSet(arguments.images, arguments.truth), std::nullopt, std::nullopt};
+  Input set = {LoadImageSet(arguments.images, arguments.truth, arguments.topic), std::nullopt, std::nullopt};
+  if (set.recording) {
+    for (const std::string& warning : set.recording->Warnings())
+      std::fprintf(stderr, "tutti: %s\n", warning.c_str());
+  }
   if (!arguments.camera.empty()) set.camera = internal::ParseCamera(arguments.camera);
   set.masks = MasksFor(arguments, set);
   const InterruptGuard interrupt;
@@ -225,8 +229,10 @@ void SetUpLoops(CLI::App& command, int& exit_code) {
   command
       .add_option(
           "images,--images", arguments->images,
-          "folder of images, taken in natural order, or a data set's (KITTI, TUM, EuRoC), or a video file")
+          "folder of images, taken in natural order, or a data set's (KITTI, TUM, EuRoC); a video; or a bag "
+          "of ROS 1 or 2")
       ->required();
+  command.add_option("--topic", arguments->topic, "of a bag: the images' topic (default: its only one)");
   command.add_option("--ground-truth", arguments->truth.file,
                      "loop matrix (PNG, BMP, text, MATLAB .mat; row = current image) or trajectory (TUM, "
                      "KITTI, EuRoC); without one the loops are listed and shown, but not judged");

@@ -69,16 +69,21 @@ Trajectory ReadPoses(const fs::path& file) {
 
 using PosesOfImages = std::vector<std::optional<StampedPose>>;
 
-// The pose of each image by the time stamp that it is named by; none of any if the names are no stamps of
-// this trajectory.
-PosesOfImages PosesByName(const Trajectory& trajectory, const std::vector<fs::path>& images) {
-  std::vector<double> stamps, intervals;
+// The time stamps that images are named by; empty if their names are none.
+std::vector<double> StampsInNames(const std::vector<fs::path>& images) {
+  std::vector<double> stamps;
   for (const fs::path& image : images) {
     const auto stamp = ParseDouble(image.stem().string());
     if (!stamp) return {};
-    if (!stamps.empty()) intervals.push_back(*stamp - stamps.back());
     stamps.push_back(*stamp);
   }
+  return stamps;
+}
+
+// The pose of each image by its time stamp; none of any if they are no stamps of this trajectory.
+PosesOfImages PosesAt(const std::vector<double>& stamps, const Trajectory& trajectory) {
+  std::vector<double> intervals;
+  for (std::size_t i = 1; i < stamps.size(); ++i) intervals.push_back(stamps[i] - stamps[i - 1]);
   const double interval_s = internal::Median(std::move(intervals));
   PosesOfImages poses;
   bool any = false;
@@ -116,18 +121,21 @@ std::string RuleText(const LoopRule& rule) {
   return text.str();
 }
 
-LoopGroundTruth FromPoses(const GroundTruthArguments& arguments, const std::vector<fs::path>& images) {
+LoopGroundTruth FromPoses(const GroundTruthArguments& arguments, const std::vector<fs::path>& images,
+                          const std::vector<double>& stamps) {
   Trajectory trajectory = ReadPoses(arguments.file);
   if (arguments.join_pairs && trajectory.size() == 2 * images.size()) {  // the left images' poses
     for (std::size_t i = 0; i < images.size(); ++i) trajectory[i] = trajectory[2 * i];
     trajectory.resize(images.size());
   }
   PosesOfImages poses(trajectory.begin(), trajectory.end());
-  if (trajectory.size() != images.size()) poses = PosesByName(trajectory, images);
+  if (trajectory.size() != images.size())
+    poses = PosesAt(stamps.empty() ? StampsInNames(images) : stamps, trajectory);
   if (poses.empty()) {
     throw InputError(arguments.file + ": has " + std::to_string(trajectory.size()) +
-                     " poses, but there are " + std::to_string(images.size()) +
-                     " images, and their names are no time stamps of it; give one pose per image");
+                     " poses, but there are " + std::to_string(images.size()) + " images, and their " +
+                     (stamps.empty() ? "names are no time stamps of it" : "time stamps are not among its") +
+                     "; give one pose per image");
   }
   PosesOfImages strided;
   for (std::size_t i = 0; i < poses.size(); i += static_cast<std::size_t>(arguments.stride))
@@ -173,12 +181,13 @@ std::vector<fs::path> ImagesIn(const fs::path& folder) {
   return tutti::ListImages(folder);
 }
 
-LoopGroundTruth LoadGroundTruth(const GroundTruthArguments& arguments, const std::vector<fs::path>& images) {
+LoopGroundTruth LoadGroundTruth(const GroundTruthArguments& arguments, const std::vector<fs::path>& images,
+                                const std::vector<double>& stamps) {
   std::error_code error;
   if (!fs::is_regular_file(arguments.file, error)) {
     throw InputError(arguments.file + ": no such file; --ground-truth takes a loop matrix or a trajectory");
   }
-  if (LooksLikeTrajectory(arguments.file)) return FromPoses(arguments, images);
+  if (LooksLikeTrajectory(arguments.file)) return FromPoses(arguments, images, stamps);
   const int all = static_cast<int>(images.size());
   const int used = (all + arguments.stride - 1) / arguments.stride;
   LoopGroundTruth truth =
@@ -196,45 +205,72 @@ LoopGroundTruth LoadGroundTruth(const GroundTruthArguments& arguments, const std
 }
 
 cv::Mat ImageSet::Read(std::size_t i) const {
-  if (!video) return ReadImageFile(images.at(i), cv::IMREAD_UNCHANGED).image;
-  return video->ReadColour(i * static_cast<std::size_t>(stride)).image;
+  if (!recording) return ReadImageFile(images.at(i), cv::IMREAD_UNCHANGED).image;
+  return recording->ReadColour(i * static_cast<std::size_t>(stride)).image;
 }
 
 namespace {
 
-// The names of a video's frames, which are opened here.
-std::vector<fs::path> FramesOf(const fs::path& file, std::shared_ptr<const Dataset>* video) {
-  if (DetectDatasetType(file) != DatasetType::kVideo)
-    throw InputError(file.string() + ": loops are looked for in folders of images and in videos; " +
-                     "`tutti run` finds them in bags");
-  *video = OpenDataset(file, DatasetOptions());
-  std::vector<fs::path> frames;
-  for (std::size_t i = 0; i < (*video)->Size(); ++i) frames.push_back(file / ("frame " + std::to_string(i)));
-  return frames;
+// The folder of 'ros2 bag record', and not one of images.
+bool IsBagFolder(const fs::path& path) {
+  std::error_code error;
+  if (!fs::is_directory(path, error) || !ImagesIn(path).empty()) return false;
+  try {
+    return DetectDatasetType(path) == DatasetType::kBag;
+  } catch (const InputError&) {
+    return false;  // nothing is there, which ListImages says
+  }
+}
+
+// A video or a bag; null: a folder of images.
+std::shared_ptr<const Dataset> OpenRecording(const fs::path& path, const std::string& topic, bool is_bag) {
+  std::error_code error;
+  if (!topic.empty() && !is_bag) throw InputError(path.string() + ": is no bag of ROS; leave --topic out");
+  if (!is_bag && !fs::is_regular_file(path, error)) return nullptr;
+  DatasetOptions options;
+  options.topic = topic;
+  try {
+    return OpenDataset(path, options);
+  } catch (const InputError& e) {
+    const std::string text = e.what(), key = "dataset.topic";
+    const std::size_t at = text.find(key);
+    throw InputError(at == std::string::npos ? text : std::string(text).replace(at, key.size(), "--topic"));
+  }
 }
 
 }  // namespace
 
-ImageSet LoadImageSet(const std::string& folder_or_video, const GroundTruthArguments& arguments) {
+ImageSet LoadImageSet(const std::string& path, const GroundTruthArguments& arguments,
+                      const std::string& topic) {
   ImageSet set;
   set.stride = arguments.stride;
   std::error_code error;
-  std::vector<fs::path> images = fs::is_regular_file(folder_or_video, error)
-                                     ? FramesOf(folder_or_video, &set.video)
-                                     : ListImages(folder_or_video);
-  images.erase(std::remove_if(images.begin(), images.end(),
-                              [&](const auto& p) { return fs::equivalent(p, arguments.file, error); }),
-               images.end());
+  const bool is_bag =
+      fs::is_regular_file(path, error) ? DetectDatasetType(path) == DatasetType::kBag : IsBagFolder(path);
+  set.recording = OpenRecording(path, topic, is_bag);
+  std::vector<fs::path> images;
+  std::vector<double> stamps;  // a video has none of its own
+  if (set.recording) {
+    for (std::size_t i = 0; i < set.recording->Size(); ++i) {
+      images.push_back(fs::path(path) / ("frame " + std::to_string(i)));
+      if (is_bag) stamps.push_back(set.recording->Stamp(i));
+    }
+  } else {
+    images = ListImages(path);
+    images.erase(std::remove_if(images.begin(), images.end(),
+                                [&](const auto& p) { return fs::equivalent(p, arguments.file, error); }),
+                 images.end());
+  }
   std::vector<fs::path> rights(images.size());
-  if (arguments.join_pairs && set.video)
-    throw InputError(folder_or_video + ": --join-pairs joins images of a folder, not frames of a video");
-  if (arguments.join_pairs) rights = TakeRightImages(folder_or_video, images);
+  if (arguments.join_pairs && set.recording)
+    throw InputError(path + ": --join-pairs joins images of a folder, not frames of a video or a bag");
+  if (arguments.join_pairs) rights = TakeRightImages(path, images);
   for (std::size_t i = 0; i < images.size(); i += static_cast<std::size_t>(arguments.stride)) {
     set.images.push_back(images[i]);
     set.rights.push_back(rights[i]);
   }
   set.truth = arguments.file.empty() ? NoTruth(static_cast<int>(set.images.size()))
-                                     : LoadGroundTruth(arguments, images);
+                                     : LoadGroundTruth(arguments, images, stamps);
   return set;
 }
 

@@ -34,16 +34,18 @@ struct GroundTruthArguments {
 /// trajectory with a pose for each image. Where the images are named by their time stamps, the poses are
 /// found by these (PoseOfFrame), and pairs with an image that has none are ignored. With join_pairs, a matrix
 /// or trajectory over the single images is joined, too. Throws InputError that names both sizes.
+/// `stamps`: of the images [s], in place of what they are named by; empty: not known.
 LoopGroundTruth LoadGroundTruth(const GroundTruthArguments& arguments,
-                                const std::vector<std::filesystem::path>& images);
+                                const std::vector<std::filesystem::path>& images,
+                                const std::vector<double>& stamps = {});
 
-/// The images of a folder, or the frames of a video, with their ground truth.
+/// The images of a folder, or the frames of a video or a bag, with their ground truth.
 struct ImageSet {
-  std::vector<std::filesystem::path> images;  ///< every stride-th; of a video: FILE/frame 12
+  std::vector<std::filesystem::path> images;  ///< every stride-th; of a recording: FILE/frame 12
   std::vector<std::filesystem::path> rights;  ///< beside each of them; empty without join_pairs
   LoopGroundTruth truth;                      ///< of a set without one: every pair is ignored
-  std::shared_ptr<const Dataset> video;       ///< null: the images are files
-  int stride = 1;                             ///< of the images among the video's frames
+  std::shared_ptr<const Dataset> recording;   ///< a video or a bag; null: the images are files
+  int stride = 1;                             ///< of the images among the recording's frames
 
   /// The (left) image in colour or grey, as it is stored; empty where it can't be read.
   cv::Mat Read(std::size_t i) const;
@@ -53,8 +55,9 @@ struct ImageSet {
 /// holds more images (a picture or two may lie beside a data set).
 std::filesystem::path ImageFolder(const std::filesystem::path& folder);
 
-/// Of a folder of images, or a video file. A loop matrix that lies among the images is none of them. Throws
-/// InputError.
-ImageSet LoadImageSet(const std::string& folder_or_video, const GroundTruthArguments& arguments);
+/// Of a folder of images, a video, or a bag. A loop matrix that lies among the images is none of them.
+/// `topic`: of a bag's images; empty: its only one. Throws InputError.
+ImageSet LoadImageSet(const std::string& path, const GroundTruthArguments& arguments,
+                      const std::string& topic = "");
 
 }  // namespace tutti::cli

@@ -97,7 +97,7 @@ void PutTruth(int cells, const LoopGroundTruth& truth, std::ofstream& out) {
 
 int Run(const std::string& folder, const cli::GroundTruthArguments& truth_arguments, const std::string& file,
         const std::vector<int>& still_in_sight) {
-  const auto [images, rights, truth, video, stride] = cli::LoadImageSet(folder, truth_arguments);
+  const auto [images, rights, truth, recording, stride] = cli::LoadImageSet(folder, truth_arguments);
   const LoopDetectorOptions options;
   std::vector<Member> members;
   members.reserve(options.members.size());

@@ -287,7 +287,8 @@ LoopQuery Read(const std::filesystem::path& left, const std::filesystem::path& r
 }
 
 int Run(const Arguments& arguments) {
-  const auto [images, rights, truth, video, stride] = cli::LoadImageSet(arguments.images, arguments.truth);
+  const auto [images, rights, truth, recording, stride] =
+      cli::LoadImageSet(arguments.images, arguments.truth);
   int change_from = 0;
   while (change_from < truth.size() && !truth.HasLoop(change_from)) ++change_from;
 

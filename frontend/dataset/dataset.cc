@@ -6,6 +6,7 @@
 #include "frontend/dataset/bag.h"
 #include "frontend/dataset/dataset_folder.h"
 #include "frontend/dataset/image_file.h"
+#include "frontend/dataset/rectified_rig.h"
 #include "frontend/dataset/selected_dataset.h"
 #include "frontend/dataset/turned_dataset.h"
 #include "tutti/core/error.h"
@@ -130,10 +131,7 @@ FolderContents FindImages(const std::filesystem::path& folder, const DatasetOpti
     out.frames.push_back(std::move(frame));
   }
   out.pose_count = files.size();
-  if (!out.left) {
-    out.warnings.push_back(
-        folder.string() + ": no calibration is given (camera: fx, fy, cx, cy); appearance only, no odometry");
-  }
+  if (!out.left) out.warnings.push_back(NoCalibrationText(folder.string()));
   out.truth_places = {folder / "groundtruth.txt", folder / "poses.txt"};
   return out;
 }

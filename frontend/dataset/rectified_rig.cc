@@ -102,9 +102,7 @@ RectifiedRig RectifyRig(const std::string& name, const DatasetOptions& options, 
   calibration.left = options.camera;
   calibration.baseline_m = options.baseline_m;
   RectifiedRig out = RectifyRig(name, std::move(calibration), options, size, rate_hz);
-  if (!out.rig.calibrated)
-    warnings.push_back(name +
-                       ": no calibration is given (camera: fx, fy, cx, cy); appearance only, no odometry");
+  if (!out.rig.calibrated) warnings.push_back(NoCalibrationText(name));
   return out;
 }
 

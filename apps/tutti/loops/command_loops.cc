@@ -23,6 +23,7 @@
 #include "core/camera_text.h"
 #include "core/stopwatch.h"
 #include "frontend/dataset/image_mask.h"
+#include "frontend/dataset/rectified_rig.h"
 #include "tutti/core/error.h"
 #include "tutti/frontend/dataset.h"
 #include "tutti/loopclosure/detector.h"
@@ -200,8 +201,10 @@ int RunLoops(const LoopsArguments& given) {
   cv::setNumThreads(arguments.options.threads);
   Input set = {LoadImageSet(arguments.images, arguments.truth, arguments.topic), std::nullopt, std::nullopt};
   if (set.recording) {
-    for (const std::string& warning : set.recording->Warnings())
+    for (const std::string& warning : set.recording->Warnings()) {
+      if (warning == NoCalibrationText(arguments.images)) continue;  // loops need none
       std::fprintf(stderr, "tutti: %s\n", warning.c_str());
+    }
   }
   if (!arguments.camera.empty()) set.camera = internal::ParseCamera(arguments.camera);
   set.masks = MasksFor(arguments, set);

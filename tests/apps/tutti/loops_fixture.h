@@ -13,22 +13,25 @@
 #include "tests/apps/tutti/executable.h"
 #include "tests/loopclosure/features/textured_image.h"
 #include "tests/support/test_data.h"
+#include "tutti/core/text.h"
 
 namespace tutti::testing {
 
 constexpr int kEmptySheet = 84 + 340;  // height of a contact sheet with one strip [px]
 constexpr int kLoopPlaces = 15, kLoopImages = 20;
 
+// Images 15 to 19 show the places of 0 to 4 again.
+inline cv::Mat LoopImage(int i) {
+  const cv::Mat place = TexturedImage(static_cast<std::uint32_t>(i % kLoopPlaces));
+  return i < kLoopPlaces ? place : SeenAgain(place);
+}
+
 class LoopsFixture : public ::testing::Test {
  protected:
-  // Images 15 to 19 show the places of 0 to 4 again.
   void WriteImages(int count = kLoopImages) const {
     std::filesystem::create_directories(images_);
-    for (int i = 0; i < count; ++i) {
-      const cv::Mat place = TexturedImage(static_cast<std::uint32_t>(i % kLoopPlaces));
-      cv::imwrite((images_ / (std::to_string(i) + ".png")).string(),
-                  i < kLoopPlaces ? place : SeenAgain(place));
-    }
+    for (int i = 0; i < count; ++i)
+      cv::imwrite((images_ / (std::to_string(i) + ".png")).string(), LoopImage(i));
   }
   // A matrix of `count` images with these (row, column) pairs as loops.
   std::filesystem::path Truth(const std::vector<std::pair<int, int>>& pairs, int count = kLoopImages) const {
@@ -49,6 +52,21 @@ class LoopsFixture : public ::testing::Test {
                                           truth.string(), "--out",    out.string()};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return RunTutti(arguments);
+  }
+  // Without a ground truth, into a folder of that name; images are old from the third on.
+  ProcessResult List(const std::filesystem::path& images, const std::string& out,
+                     const std::vector<std::string>& more = {}) const {
+    std::vector<std::string> arguments = {"loops", images.string(), "--out", (folder_ / out).string(),
+                                          "--set", "stm_size=3"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return RunTutti(arguments);
+  }
+  // The lines of loops.csv without the names of the images.
+  std::string Listed(const std::string& out) const {
+    std::string text;
+    for (const std::string& line : SplitText(ReadAll(folder_ / out / "loops.csv"), "\n"))
+      text += line.substr(0, line.find(",\"")) + "\n";
+    return text;
   }
   static nlohmann::json Json(const std::filesystem::path& file) {
     return nlohmann::json::parse(ReadAll(file));

@@ -5,9 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
-#include "tests/apps/tutti/executable.h"
-#include "tests/loopclosure/features/textured_image.h"
-#include "tests/support/test_data.h"
+#include "tests/apps/tutti/loops_fixture.h"
 
 namespace tutti {
 namespace {
@@ -17,18 +15,15 @@ using ::testing::HasSubstr;
 using testing::ReadAll;
 using testing::RunTutti;
 
-constexpr int kPlaces = 15, kImages = 20;
+constexpr int kImages = testing::kLoopImages;
 
-// KITTI's layout, with a picture beside the images; images 15 to 19 show the places of 0 to 4 again.
+// KITTI's layout, with a picture beside the images.
 fs::path DriveWithLoops() {
   fs::path folder = testing::FreshFolder() / "drive";
   fs::create_directories(folder / "image_0");
   cv::imwrite((folder / "loop_matrix.png").string(), cv::Mat(kImages, kImages, CV_8UC1, cv::Scalar(0)));
-  for (int i = 0; i < kImages; ++i) {
-    const cv::Mat place = testing::TexturedImage(static_cast<std::uint32_t>(i % kPlaces));
-    cv::imwrite((folder / "image_0" / (std::to_string(i) + ".png")).string(),
-                i < kPlaces ? place : testing::SeenAgain(place));
-  }
+  for (int i = 0; i < kImages; ++i)
+    cv::imwrite((folder / "image_0" / (std::to_string(i) + ".png")).string(), testing::LoopImage(i));
   return folder;
 }
 

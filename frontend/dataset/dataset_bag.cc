@@ -9,6 +9,7 @@
 #include "frontend/dataset/ros_message.h"
 #include "frontend/dataset/video_input.h"
 #include "tutti/core/error.h"
+#include "tutti/core/text.h"
 
 namespace tutti {
 namespace {
@@ -168,30 +169,76 @@ class BagDataset : public Dataset {
     }
   }
 
-  // The camera_info beside the images, unless the configuration has a camera.
-  void FindCamera() {
-    if (options_.camera) return;
-    const std::size_t slash = options_.topic.find_last_of('/');
-    std::string base = slash == std::string::npos ? "" : options_.topic.substr(0, slash);
-    if (options_.topic.size() > 11 && options_.topic.substr(slash) == "/compressed")
-      base = base.substr(0, std::max<std::size_t>(1, base.find_last_of('/')));
-    const std::string topic = base + "/camera_info";
+  // The camera_info beside the images of a topic, of the size that they have.
+  std::optional<CameraInfo> FindInfo(const std::string& images) {
+    std::vector<std::string> levels = SplitText(images, "/");
+    if (!levels.empty() && levels.back() == "compressed") levels.pop_back();
+    if (!levels.empty()) levels.pop_back();
+    levels.emplace_back("camera_info");
+    const std::string topic = (images[0] == '/' ? "/" : "") + JoinText(levels, "/");
     const Bag::Topic* found = bag_->Find(topic);
-    if (found == nullptr || found->type != "sensor_msgs/CameraInfo") return;
+    if (found == nullptr || found->type != "sensor_msgs/CameraInfo") return std::nullopt;
     const Messages infos = bag_->Messages(topic);
-    if (infos.empty()) return;
-    std::string info;
+    if (infos.empty()) return std::nullopt;
     try {
-      info = bag_->Read(infos.front());
+      CameraInfo info = DecodeCameraInfo(bag_->Read(infos.front()), found->serialization, "the bag");
+      if (!info.IsCalibrated()) return std::nullopt;
+      std::string note = file_.string() + ": calibration of " + topic;
+      if (OfRectified(images) && info.P[0] > 0) note += ", P, as the images are rectified";
+      if (!info.window.IsWhole()) {
+        // Drivers that do not follow REP 104 state the size, and K, of the images that they send.
+        const bool as_sent = info.width == size_.width && info.height == size_.height;
+        note += ", " + info.window.Text() + (as_sent ? " in it already" : " applied");
+        if (as_sent) info.window = {};
+      }
+      warnings_.push_back(note);
+      return info;
     } catch (const InputError& e) {
       throw InputError(file_.string() + ": " + topic + ": " + e.what());
     }
-    options_.camera = CameraOfMessage(info, found->serialization, file_.string());
-    if (options_.camera) warnings_.push_back(file_.string() + ": calibration of " + topic);
+  }
+
+  // "image_rect", "image_rect_color", ...: the calibration of such images is P, not K and D.
+  static bool OfRectified(const std::string& images) {
+    return images.find("image_rect") != std::string::npos;
+  }
+
+  PinholeCamera CameraOf(const CameraInfo& info, const std::string& images) const {
+    const std::string source = file_.string() + ": camera_info of " + images;
+    return Windowed(OfRectified(images) && info.P[0] > 0 ? info.Rectified() : info.Raw(source), info.window,
+                    source);
+  }
+
+  // From the camera_info beside the images, unless the configuration has a camera.
+  void FindCameras() {
+    if (options_.camera) return;
+    const std::optional<CameraInfo> left = FindInfo(options_.topic);
+    if (!left) return;
+    options_.camera = CameraOf(*left, options_.topic);
+    if (options_.sensor != Sensor::kStereo || options_.right || options_.baseline_m > 0) return;
+    const std::optional<CameraInfo> right = FindInfo(options_.right_topic);
+    if (!right || !(left->P[0] > 0) || !(right->P[0] > 0)) return;  // RectifyRig says what is missing
+    const double baseline_m = left->P[3] / left->P[0] - right->P[3] / right->P[0];
+    if (baseline_m < 0)
+      throw InputError(file_.string() + ": P of the camera_infos says that " + options_.right_topic +
+                       " is the left camera; exchange dataset.topic and right_topic");
+    if (OfRectified(options_.topic)) {
+      options_.baseline_m = baseline_m;
+      return;
+    }
+    if (baseline_m == 0) return;
+    try {
+      const Eigen::Matrix4d T = TransformOfRectified(left->R, right->R, baseline_m).Matrix();
+      for (std::size_t i = 0; i < options_.T_right_left.size(); ++i)
+        options_.T_right_left[i] = T(static_cast<int>(i) / 4, static_cast<int>(i) % 4);
+    } catch (const InputError& e) {
+      throw InputError(file_.string() + ": R of the camera_infos " + e.what() +
+                       "; give both cameras with --calibration");
+    }
+    options_.right = CameraOf(*right, options_.right_topic);
   }
 
   void SetUpRig() {
-    FindCamera();
     MessageImage first;
     for (std::size_t i = 0; i < std::min<std::size_t>(50, frames_.size()) && first.image.empty(); ++i)
       first = Decode(*frames_[i].image, options_.topic, Pixels::kGrey);
@@ -199,6 +246,7 @@ class BagDataset : public Dataset {
       throw InputError(file_.string() + ": none of the first images can be read: " + first.error);
     size_ = first.image.size();
     bits_ = SignificantBits(first.image);
+    FindCameras();
     const double span = Stamp(frames_.size() - 1) - Stamp(0);
     const double rate = span > 0 ? static_cast<double>(frames_.size() - 1) / span : 10.0;
     rig_ = RectifyRig(file_.string(), options_, size_, rate, warnings_);

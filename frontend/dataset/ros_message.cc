@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/byte_stream.h"
+#include "core/camera_text.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -209,40 +210,30 @@ MessageImage DecodeImageMessage(const std::string& message, const std::string& t
   return out;
 }
 
-std::optional<PinholeCamera> CameraOfMessage(const std::string& message, Serialization serialization,
-                                             const std::string& source) {
+CameraInfo DecodeCameraInfo(const std::string& message, Serialization serialization,
+                            const std::string& source) {
   const std::string problem = SerializationProblem(message, serialization);
   if (!problem.empty()) throw InputError(source + ": a camera_info " + problem);
   MessageReader in(message, serialization, source + ": a camera_info");
   in.SkipHeader();
-  PinholeCamera camera;
-  camera.height = static_cast<int>(in.Get<std::uint32_t>());
-  camera.width = static_cast<int>(in.Get<std::uint32_t>());
-  const std::string model(in.Text());
+  const auto pixels = [&] { return internal::PixelsOf(in.Get<std::uint32_t>()); };
+  CameraInfo info;
+  info.height = pixels();
+  info.width = pixels();
+  info.model = in.Text();
+  constexpr std::uint32_t kMostTerms = 100;
   const auto count = in.Get<std::uint32_t>();
-  bool distorted = false;
-  for (std::uint32_t i = 0; i < count; ++i) {
-    const auto value = in.Get<double>();
-    distorted = distorted || value != 0;
-    if (i < camera.coefficients.size()) camera.coefficients[i] = value;
-  }
-  std::array<double, 9> K;  // row by row
-  for (double& value : K) value = in.Get<double>();
-  if (!(K[0] > 0)) return std::nullopt;
-  camera.fx = K[0];
-  camera.cx = K[2];
-  camera.fy = K[4];
-  camera.cy = K[5];
-  if (!distorted) return camera;
-  if (model == "plumb_bob") {
-    camera.distortion = Distortion::kRadTan;
-  } else if (model == "equidistant" || model == "fisheye") {
-    camera.distortion = Distortion::kEquidistant;
-  } else {
-    throw InputError(source + ": unknown distortion model '" + model +
-                     "' in its camera_info; give the section camera: in the configuration");
-  }
-  return camera;
+  if (count > kMostTerms)
+    throw InputError(source + ": a camera_info has " + std::to_string(count) + " coefficients");
+  for (std::uint32_t i = 0; i < count; ++i) info.lens.push_back(in.Get<double>());
+  for (double& value : info.K) value = in.Get<double>();
+  for (double& value : info.R) value = in.Get<double>();
+  for (double& value : info.P) value = in.Get<double>();
+  ImageWindow& window = info.window;
+  for (int* value : {&window.binning_x, &window.binning_y, &window.x_offset, &window.y_offset, &window.height,
+                     &window.width})
+    *value = pixels();
+  return info;
 }
 
 }  // namespace tutti

@@ -3,11 +3,10 @@
 
 #include <array>
 #include <cstdint>
-#include <optional>
 #include <string>
 
+#include "frontend/dataset/camera_info.h"
 #include "frontend/dataset/image_file.h"
-#include "tutti/core/camera.h"
 
 namespace tutti {
 
@@ -36,9 +35,8 @@ enum class Pixels { kGrey, kColour, kStored };
 MessageImage DecodeImageMessage(const std::string& message, const std::string& type,
                                 Serialization serialization, Pixels pixels);
 
-/// The camera of a CameraInfo; nothing where it says that it is not calibrated (K[0] = 0). `source`: for
-/// messages. Throws InputError for a distortion that tutti does not know, and where the message ends early.
-std::optional<PinholeCamera> CameraOfMessage(const std::string& message, Serialization serialization,
-                                             const std::string& source);
+/// `source`: for messages. Throws InputError where the message ends early.
+CameraInfo DecodeCameraInfo(const std::string& message, Serialization serialization,
+                            const std::string& source);
 
 }  // namespace tutti

@@ -54,18 +54,19 @@ Calibration FromNerf(const CalibrationDocument& file) {
     keys = file.At(frames[0]).Or(file.root.map());
   }
   const std::optional<double> width = keys.Number({"w"}), height = keys.Number({"h"});
-  YAML::Node usual;  // what both programs take where a value is missing
-  if (const std::optional<double> view = keys.Number({"camera_angle_x"}); view && !keys.Has("fl_x")) {
+  std::optional<double> focal = keys.Number({"fl_x"});
+  if (const std::optional<double> view = keys.Number({"camera_angle_x"}); view && !focal) {
     if (!width)
       keys.Fail(keys.map(),
                 "has camera_angle_x, but not the image width (w), without which it is no focal length");
     if (!(*view > 0 && *view < 3)) keys.Fail(keys.map(), "'camera_angle_x' is no field of view in radians");
-    usual["fl_x"] = 0.5 * *width / std::tan(0.5 * *view);
+    focal = 0.5 * *width / std::tan(0.5 * *view);
   }
-  keys = keys.Or(usual);
-  usual["fl_y"] = keys.Needed({"fl_x"});
+  YAML::Node usual(YAML::NodeType::Map);  // what both programs take where a value is missing
+  if (focal) usual["fl_x"] = usual["fl_y"] = *focal;
   if (width) usual["cx"] = 0.5 * *width;
   if (height) usual["cy"] = 0.5 * *height;
+  keys = keys.Or(usual);
   Calibration out = OneCamera(keys, "nerfstudio");
   out.camera.cx -= 0.5;  // (0, 0) is the corner of the first pixel, not its centre
   out.camera.cy -= 0.5;
@@ -201,8 +202,17 @@ Calibration Read(const CalibrationDocument& file) {
 
 Calibration ReadCalibration(const fs::path& file, bool pairs) {
   const std::string text = ReadCalibrationText(file);
-  const std::optional<Calibration> table = ReadCalibrationTable(file, text);
-  const Calibration out = table ? *table : Read(ParseCalibration(file, text, pairs));
+  Calibration out;
+  if (const std::optional<Calibration> table = ReadCalibrationTable(file, text)) {
+    out = *table;
+  } else {
+    const CalibrationDocument keys = ParseCalibration(file, text, pairs);
+    try {
+      out = Read(keys);
+    } catch (const YAML::Exception& e) {
+      throw InputError(file.string() + ":" + std::to_string(e.mark.line + 1) + ": can't be read: " + e.msg);
+    }
+  }
   CheckCalibrated(file, out.camera);
   if (out.right) CheckCalibrated(file, *out.right, "right ");
   return out;

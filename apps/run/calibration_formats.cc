@@ -159,7 +159,7 @@ Calibration FromOrbSlam(const CalibrationDocument& file) {
   const bool three = file["Camera1.fx"].IsDefined();
   const CalibrationKeys flat = file.At(root, "Camera.");
   const CalibrationKeys left = three ? file.At(root, "Camera1.").Or(root, "Camera.") : flat;
-  Calibration out = OneOfSlam(file, left, three ? "ORB-SLAM3" : "ORB-SLAM");
+  Calibration out = OneOfSlam(file, left, three ? "ORB-SLAM3" : flat.Has("model") ? "OpenVSLAM" : "ORB-SLAM");
   const CalibrationKeys raw_left = file.At(root, "LEFT."), raw_right = file.At(root, "RIGHT.");
   const CalibrationKeys stella = file.At(root, "StereoRectifier.");
   if (raw_left.Has("K")) {

@@ -352,12 +352,10 @@ std::string ReadCalibrationText(const std::filesystem::path& file) {
   for (std::string line; std::getline(in, line);) {
     if (line.rfind("%YAML", 0) == 0) line.clear();
     std::replace(line.begin(), line.end(), '\t', ' ');
-    std::size_t end = line.find_first_not_of(' ');
-    while (end < line.size() &&
-           (std::isalnum(static_cast<unsigned char>(line[end])) != 0 || line[end] == '_' || line[end] == '.'))
-      ++end;
-    if (end + 1 < line.size() && line[end] == ':' && (line[end + 1] == '[' || line[end + 1] == '{'))
-      line.insert(end + 1, " ");
+    for (std::size_t i = 1; i + 1 < line.size(); ++i) {
+      const bool key = std::isalnum(static_cast<unsigned char>(line[i - 1])) != 0 || line[i - 1] == '_';
+      if (key && line[i] == ':' && (line[i + 1] == '[' || line[i + 1] == '{')) line.insert(i + 1, " ");
+    }
     text += line + "\n";
   }
   return text;

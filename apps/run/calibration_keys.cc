@@ -196,6 +196,40 @@ void Flatten(const CalibrationKeys& keys, const YAML::Node& node, const std::str
   if (words.empty()) keys.Fail(data, "'" + key + "' is no number");
 }
 
+// What OpenCV's FileStorage writes as XML: elements in elements, and texts. Attributes say nothing that the
+// names don't.
+YAML::Node ParseXml(const std::string& text) {
+  struct Element {
+    std::string name;
+    YAML::Node inner{YAML::NodeType::Map};
+    std::size_t begin = 0;
+  };
+  constexpr std::size_t kDeepestElement = 20;
+  std::vector<Element> open(1);
+  for (std::size_t at = text.find('<'); at < text.size(); at = text.find('<', at)) {
+    const bool comment = text.compare(at, 4, "<!--") == 0;
+    const std::size_t end = text.find(comment ? "-->" : ">", at);
+    if (end == std::string::npos) break;
+    const std::string tag = text.substr(at + 1, end - at - 1);
+    if (!tag.empty() && tag[0] == '/') {
+      if (open.size() < 2) break;
+      const Element closed = open.back();
+      open.pop_back();
+      YAML::Node value = closed.inner;
+      if (closed.inner.size() == 0) value = text.substr(closed.begin, at - closed.begin);
+      open.back().inner[closed.name] = value;
+    } else if (!comment && !tag.empty() && tag[0] != '?' && tag[0] != '!' && tag.back() != '/' &&
+               open.size() < kDeepestElement) {
+      open.emplace_back();
+      open.back().name = tag.substr(0, tag.find_first_of(" \n"));
+      open.back().begin = end + 1;
+    }
+    at = end;
+  }
+  const YAML::Node all = open.front().inner["opencv_storage"];
+  return all.IsDefined() ? all : open.front().inner;
+}
+
 }  // namespace
 
 CalibrationKeys::CalibrationKeys(std::filesystem::path file, const YAML::Node& map, const std::string& prefix)
@@ -352,9 +386,13 @@ std::string ReadCalibrationText(const std::filesystem::path& file) {
   for (std::string line; std::getline(in, line);) {
     if (line.rfind("%YAML", 0) == 0) line.clear();
     std::replace(line.begin(), line.end(), '\t', ' ');
+    bool first = true;  // the key that the line begins with
     for (std::size_t i = 1; i + 1 < line.size(); ++i) {
-      const bool key = std::isalnum(static_cast<unsigned char>(line[i - 1])) != 0 || line[i - 1] == '_';
-      if (key && line[i] == ':' && (line[i + 1] == '[' || line[i + 1] == '{')) line.insert(i + 1, " ");
+      const auto is_key = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_'; };
+      const bool list = line[i + 1] == '[' || line[i + 1] == '{';
+      const bool value = std::isdigit(static_cast<unsigned char>(line[i + 1])) != 0 || line[i + 1] == '-';
+      if (is_key(line[i - 1]) && line[i] == ':' && (list || (first && value))) line.insert(i + 1, " ");
+      first = first && (is_key(line[i]) || line[i] == '.' || line[i] == ' ');
     }
     text += line + "\n";
   }
@@ -363,10 +401,9 @@ std::string ReadCalibrationText(const std::filesystem::path& file) {
 
 CalibrationDocument ParseCalibration(const std::filesystem::path& file, const std::string& text, bool pairs) {
   YAML::Node root;
-  if (const std::size_t first = text.find_first_not_of(" \n"); first < text.size() && text[first] == '<')
-    throw InputError(file.string() + ": is XML; save it as YAML (with OpenCV's FileStorage: name it .yaml)");
+  const std::size_t first = text.find_first_not_of(" \n");
   try {
-    root = YAML::Load(text);
+    root = first < text.size() && text[first] == '<' ? ParseXml(text) : YAML::Load(text);
   } catch (const YAML::Exception& e) {
     throw InputError(file.string() + ":" + std::to_string(e.mark.line + 1) + ": not valid YAML: " + e.msg);
   }

@@ -81,6 +81,8 @@ TEST(CalibrationFormats, OfOneFisheyeIsTheSameCameraInEveryFormat) {
   ExpectAll(
       Fisheye(),
       {kFlat + terms + size + "Camera.model: \"fisheye\"\n",
+       "Camera.fx:295\nCamera.fy:295\nCamera.cx:159.5\nCamera.cy:119.5\n" + terms + size +
+           "Camera.model: fisheye\n",
        kFlat + terms + "Camera.width: 320\nCamera.height: 240\nCamera.type: \"KannalaBrandt8\"\n",
        "Camera:\n  model: fisheye\n  fx: 295\n  fy: 295\n  cx: 159.5\n  cy: 119.5\n  k1: 0.1\n  k2: -0.05\n"
        "  k3: 0.02\n  k4: -0.01\n  cols: 320\n  rows: 240\n",
@@ -107,6 +109,11 @@ TEST(CalibrationFormats, OfOneFisheyeIsTheSameCameraInEveryFormat) {
        "cameras:\n- camera:\n    label: a\n    image_height: 240\n    image_width: 320\n    type: pinhole\n"
        "    intrinsics: {cols: 1, rows: 4, data: [295, 295, 159.5, 119.5]}\n    distortion:\n"
        "      type: equidistant\n      parameters: {cols: 1, rows: 4, data: [0.1, -0.05, 0.02, -0.01]}\n",
+       "<?xml version=\"1.0\"?>\n<opencv_storage>\n<!-- <a> -->\n<image_width>320</image_width>\n"
+       "<image_height>240</image_height>\n<fisheye_model>1</fisheye_model>\n<camera_matrix "
+       "type_id=\"opencv-matrix\">\n  <rows>3</rows>\n  <data>\n    295. 0. 159.5 0. 295. 119.5\n    0. 0. "
+       "1.</data></camera_matrix>\n<distortion_coefficients><data>0.1 -0.05\n 0.02 "
+       "-0.01</data></distortion_coefficients>\n</opencv_storage>\n",
        "EquiDistant 295 295 159.5 119.5 0.1 -0.05 0.02 -0.01\n320 240\ncrop\n320 240\n"});
 }
 
@@ -188,7 +195,9 @@ TEST(CalibrationFormats, OfACameraThatTuttiHasNotIsRefusedByItsName) {
   refused(R"({"camera_angle_x": 0.7, "frames": []})", "not the image width (w)");
   refused(R"({"frames": [{"fl_x": 5}, {"fl_x": 6}]})", "another 'fl_x' than the first one");
   refused("image_width: 320\nfx: 295\nfy: 295\ncx: 160\ncy: 120\n", "an image width, but no height");
-  refused("<opencv_storage>\n</opencv_storage>\n", "is XML; save it as YAML");
+  refused("<opencv_storage>\n</opencv_storage>\n", "holds no keys");
+  refused("<opencv_storage>\n<camera_matrix><data>1 2 3 4 5</data></camera_matrix></opencv_storage>\n",
+          "has 5 values");
   refused("295 295 159.5\n", "has 3 numbers");
 }
 

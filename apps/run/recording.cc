@@ -165,6 +165,7 @@ class Recogniser {
     layout_ = std::string("as ") + kConfiguration + " in the folder says";
     source_ = kConfiguration;
     out_.config = LoadConfig(dataset_ / kConfiguration);
+    out_.config.loops.ltm_file.clear();  // nobody gave this file: what it names is not written
     if (!sensor_) sensor_ = Options().sensor;
     if (request_.HasLens()) Requested();
   }

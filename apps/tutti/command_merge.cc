@@ -26,7 +26,6 @@ struct MergeArguments {
 std::unique_ptr<SlamSystem> OpenMap(const std::string& file, int threads) {
   MapInfo info = ReadMapInfo(file);
   info.config.run.threads = threads;
-  info.config.loops.ltm_file.clear();  // what the map has of it is enough, and nobody's file changes
   return SlamSystem::Load(file, info);
 }
 

@@ -23,7 +23,6 @@ void PrintCounts(const char* what, int before, int after) {
 void PruneMap(const std::filesystem::path& file, const std::filesystem::path& out) {
   MapInfo info = ReadMapInfo(file);
   const auto bytes = std::filesystem::file_size(file);
-  info.config.loops.ltm_file.clear();  // what the map has of it is enough, and nobody's file changes
   const std::unique_ptr<SlamSystem> slam =
       SlamSystem::Load(file, info, nullptr, [&file](internal::SectionReader& in) {
         if (in.Peek() == internal::kEndOfSections) return;

@@ -372,6 +372,7 @@ SlamSystem::~SlamSystem() = default;
 void SlamSystem::BeginSession(const CameraRig& rig) { impl_->BeginSession(rig); }
 std::vector<MapSession> SlamSystem::Sessions() const { return impl_->Sessions(); }
 bool SlamSystem::Merge(SlamSystem* other, std::string* reason) {
+  if (other == nullptr || other == this) throw InputError("a map can't be merged with itself, or with none");
   std::string ignored;
   if (reason == nullptr) reason = &ignored;
   if (!impl_->ComesAfter(*other->impl_)) return impl_->Merge(other->impl_.get(), reason);

@@ -78,7 +78,7 @@ class SlamSystem {
   /// one map now, which can be saved, localised in, and gone on with (BeginSession; no frame may be tracked
   /// before that). False: no places in common were found that can be relied on, and this map is of no use any
   /// more either; `reason`, which may be null, says why in plain words. Throws InputError if they can't be
-  /// compared. Recorders must outlive both.
+  /// compared, or `other` is this map or null. Recorders must outlive both.
   bool Merge(SlamSystem* other, std::string* reason = nullptr);
   /// The recordings so far, oldest first; there is always one, and the last one goes on.
   std::vector<MapSession> Sessions() const;

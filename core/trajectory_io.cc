@@ -1,9 +1,9 @@
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <functional>
 
 #include "core/angle.h"
+#include "core/replaced_file.h"
 #include "core/text_input.h"
 #include "core/text_reader.h"
 #include "core/tum_line.h"
@@ -260,18 +260,16 @@ std::vector<double> ReadTimes(const std::filesystem::path& file) {
 
 void WriteTrajectory(const std::filesystem::path& file, const Trajectory& trajectory,
                      TrajectoryFormat format) {
-  std::ofstream out(file);
-  if (!out)
-    throw InputError(file.string() + ": can't be written; check that the folder exists and is writable");
+  std::string text;
   char line[512];
-  if (format == TrajectoryFormat::kTum) out << internal::kTumHeader;
-  if (format == TrajectoryFormat::kEuroc) out << "#timestamp [ns],p_x [m],p_y [m],p_z [m],q_w,q_x,q_y,q_z\n";
+  if (format == TrajectoryFormat::kTum) text = internal::kTumHeader;
+  if (format == TrajectoryFormat::kEuroc) text = "#timestamp [ns],p_x [m],p_y [m],p_z [m],q_w,q_x,q_y,q_z\n";
   for (const StampedPose& s : trajectory) {
     const Eigen::Vector3d& t = s.pose.translation;
     const Eigen::Quaterniond& q = s.pose.rotation;
     switch (format) {
       case TrajectoryFormat::kTum:
-        out << internal::TumLine(s);
+        text += internal::TumLine(s);
         continue;
       case TrajectoryFormat::kKitti: {
         const Eigen::Matrix4d m = s.pose.Matrix();
@@ -286,10 +284,9 @@ void WriteTrajectory(const std::filesystem::path& file, const Trajectory& trajec
                       std::llround(s.stamp_s * 1e9), t.x(), t.y(), t.z(), q.w(), q.x(), q.y(), q.z());
         break;
     }
-    out << line;
+    text += line;
   }
-  out.flush();
-  if (!out) throw InputError(file.string() + ": could not be written in full; is the disk full?");
+  internal::WriteFile(file, text);
 }
 
 }  // namespace tutti

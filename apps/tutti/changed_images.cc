@@ -12,6 +12,7 @@
 
 #include "apps/tutti/files.h"
 #include "apps/tutti/loops/loops_input.h"
+#include "core/replaced_file.h"
 #include "frontend/dataset/image_file.h"
 #include "tutti/core/error.h"
 
@@ -112,23 +113,17 @@ class Writer {
     const fs::path& from = images_[i];
     if (static_cast<int>(i) < options_.change_from) {
       std::error_code error;
-      fs::copy_file(from, options_.out / from.filename(), error);
-      if (error) throw InputError(from.string() + ": can't be copied (" + error.message() + ")");
-      return;
+      internal::ReplacedFile copy(options_.out / from.filename());
+      fs::copy_file(from, copy.part(), fs::copy_options::overwrite_existing, error);
+      if (!error) return copy.Commit();
+      throw InputError(from.string() + ": can't be copied (" + error.message() + ")");
     }
     const ImageFile read = ReadImageFile(from, cv::IMREAD_ANYCOLOR);
     if (!read.error.empty()) throw InputError(read.error);
     const cv::Mat& image = read.image;
     const fs::path to = options_.out / (from.stem().string() + ".png");
-    bool good = false;
     const cv::Mat changed = change_.Apply(GreyIfColourless(image), options_.seed, static_cast<int>(i));
-    try {
-      good = cv::imwrite(to.string(), changed, {cv::IMWRITE_PNG_COMPRESSION, 1});
-    } catch (const cv::Exception&) {
-      good = false;
-    }
-    if (!good)
-      throw InputError(to.string() + ": can't be written; is the folder writable and the disk not full?");
+    WritePngFile(to, changed, {cv::IMWRITE_PNG_COMPRESSION, 1});
   }
 
   const ImageChange& change_;

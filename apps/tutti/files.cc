@@ -1,6 +1,5 @@
 #include "apps/tutti/files.h"
 
-#include <fstream>
 #include <system_error>
 
 #include "core/text_reader.h"
@@ -39,13 +38,6 @@ void KeepInputs(const std::vector<std::string>& read, const std::vector<std::str
         throw InputError(out + ": is read, and would be overwritten by the result; choose another name");
     }
   }
-}
-
-void WriteText(const std::filesystem::path& file, const std::string& text) {
-  std::ofstream out(file, std::ios::binary);
-  out << text;
-  out.close();
-  if (!out) throw InputError(file.string() + ": can't be written; is there space, and may you write there?");
 }
 
 }  // namespace tutti::cli

@@ -27,7 +27,4 @@ nlohmann::ordered_json ReadJson(const std::filesystem::path& file, const std::st
 /// given.
 void KeepInputs(const std::vector<std::string>& read, const std::vector<std::string>& written);
 
-/// Writes the text. Throws InputError if it can't be written in full.
-void WriteText(const std::filesystem::path& file, const std::string& text);
-
 }  // namespace tutti::cli

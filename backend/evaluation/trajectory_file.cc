@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <fstream>
 
+#include "core/replaced_file.h"
 #include "core/text_reader.h"
 #include "tutti/backend/g2o_io.h"
 #include "tutti/core/error.h"
@@ -147,16 +148,13 @@ void WritePoseFile(const std::filesystem::path& file, const Trajectory& trajecto
 }
 
 void WriteTimes(const std::filesystem::path& file, const Trajectory& trajectory) {
-  std::ofstream out(file);
-  if (!out)
-    throw InputError(file.string() + ": can't be written; check that the folder exists and is writable");
+  std::string text;
   char line[64];
   for (const StampedPose& pose : trajectory) {
     std::snprintf(line, sizeof line, "%.9f\n", pose.stamp_s);
-    out << line;
+    text += line;
   }
-  out.flush();
-  if (!out) throw InputError(file.string() + ": could not be written in full; is the disk full?");
+  internal::WriteFile(file, text);
 }
 
 }  // namespace tutti

@@ -1,9 +1,9 @@
 #include <cstdio>
-#include <fstream>
+#include <string>
 
 #include "backend/graph/edge_error.h"
+#include "core/replaced_file.h"
 #include "tutti/backend/g2o_io.h"
-#include "tutti/core/error.h"
 
 namespace tutti {
 namespace {
@@ -30,9 +30,7 @@ void AppendPose(std::string& line, const Similarity& pose, GraphKind kind) {
 }  // namespace
 
 void WriteG2o(const std::filesystem::path& file, const PoseGraph& graph) {
-  std::ofstream out(file);
-  if (!out)
-    throw InputError(file.string() + ": can't be written; check that the folder exists and is writable");
+  std::string text;
   const GraphKind kind = graph.kind();
   const std::string name = kind == GraphKind::kSE2   ? "SE2"
                            : kind == GraphKind::kSE3 ? "SE3:QUAT"
@@ -42,10 +40,10 @@ void WriteG2o(const std::filesystem::path& file, const PoseGraph& graph) {
     if (!node.has_estimate) continue;
     line = "VERTEX_" + name + " " + std::to_string(node.id);
     AppendPose(line, node.pose, kind);
-    out << line << '\n';
+    text += line + '\n';
   }
   for (const PoseGraphNode& node : graph.nodes()) {
-    if (node.fixed) out << "FIX " << node.id << '\n';
+    if (node.fixed) text += "FIX " + std::to_string(node.id) + '\n';
   }
   const std::vector<int> used = TangentCoordinates(kind);
   for (const PoseGraphEdge& edge : graph.edges()) {
@@ -54,10 +52,9 @@ void WriteG2o(const std::filesystem::path& file, const PoseGraph& graph) {
     for (std::size_t r = 0; r < used.size(); ++r) {
       for (std::size_t c = r; c < used.size(); ++c) Append(line, edge.information(used[r], used[c]));
     }
-    out << line << '\n';
+    text += line + '\n';
   }
-  out.flush();
-  if (!out) throw InputError(file.string() + ": could not be written in full; is the disk full?");
+  internal::WriteFile(file, text);
 }
 
 }  // namespace tutti

@@ -10,6 +10,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "core/replaced_file.h"
 #include "frontend/dataset/image_size.h"
 #include "tutti/core/text.h"
 
@@ -157,6 +158,13 @@ ImageFile ReadDepthFile(const std::filesystem::path& file) {
     out.image.release();
   }
   return out;
+}
+
+void WritePngFile(const std::filesystem::path& file, const cv::Mat& image,
+                  const std::vector<int>& parameters) {
+  Bytes bytes;
+  cv::imencode(".png", image, bytes, parameters);
+  internal::WriteFile(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
 std::string SizeText(cv::Size size) { return std::to_string(size.width) + "x" + std::to_string(size.height); }

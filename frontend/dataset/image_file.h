@@ -34,6 +34,10 @@ ImageFile DecodeImage(const std::vector<unsigned char>& bytes, int flags);
 /// Reads a depth image as stored: one channel of 16 bit or float.
 ImageFile ReadDepthFile(const std::filesystem::path& file);
 
+/// Writes an image as a PNG file, as cv::imwrite does with these parameters. Throws InputError.
+void WritePngFile(const std::filesystem::path& file, const cv::Mat& image,
+                  const std::vector<int>& parameters = {});
+
 /// "640x480", for messages.
 std::string SizeText(cv::Size size);
 

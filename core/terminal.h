@@ -17,5 +17,16 @@ std::size_t TerminalColumns(std::FILE* out);
 /// (\n) stay. An empty text has one empty line.
 std::vector<std::string> WrapText(std::string_view text, std::size_t columns);
 
+/// What of a text is a line of its own.
+enum class Breaks {
+  kOfMessage,  ///< only what a break and two blanks begin, as our messages have it
+  kAll         ///< a table
+};
+
+/// A text with names that somebody else gave (files, topics, keys, recordings), so that a terminal shows it
+/// and does nothing else: control characters, marks that turn the direction of writing, and bytes that are no
+/// UTF-8 are spelled out (\x1b, \n, \u202e).
+std::string Printable(std::string_view text, Breaks breaks = Breaks::kOfMessage);
+
 }  // namespace tutti::internal
 #pragma GCC visibility pop

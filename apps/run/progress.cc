@@ -80,7 +80,7 @@ void Progress::Update(std::size_t done, const std::string& status) {
 
 void Progress::Note(const std::string& message) {
   if (out_ == nullptr) return;
-  std::fprintf(out_, "%s%s\n", line_open_ ? "\r\x1b[K" : "", message.c_str());
+  std::fprintf(out_, "%s%s\n", line_open_ ? "\r\x1b[K" : "", internal::Printable(message).c_str());
   std::fflush(out_);
 }
 

@@ -5,6 +5,7 @@
 
 #include "apps/tutti/commands.h"
 #include "apps/tutti/configuration_of.h"
+#include "core/terminal.h"
 #include "tutti/core/error.h"
 #include "tutti/frontend/calibration_check.h"
 #include "tutti/slam/config.h"
@@ -20,7 +21,8 @@ int Check(const CheckArguments& arguments) {
   const RunConfig config = ConfigurationOf(arguments.config, arguments.dataset);
   const std::unique_ptr<Dataset> dataset = OpenDataset(arguments.dataset, config.dataset);
   const CameraRig& rig = dataset->Rig();
-  for (const std::string& warning : dataset->Warnings()) std::printf("  note: %s\n", warning.c_str());
+  for (const std::string& warning : dataset->Warnings())
+    std::printf("  note: %s\n", internal::Printable(warning).c_str());
   if (!rig.calibrated) {
     std::printf("  no calibration: nothing to check\n");
     return 1;
@@ -45,7 +47,7 @@ int Check(const CheckArguments& arguments) {
                 report.depth_median_m);
   }
   for (const CalibrationFinding& finding : report.findings)
-    std::printf("  can't be right: %s\n    what to do: %s\n", finding.measured.c_str(),
+    std::printf("  can't be right: %s\n    what to do: %s\n", internal::Printable(finding.measured).c_str(),
                 finding.advice.c_str());
   if (report.findings.empty()) std::printf("  nothing speaks against this calibration\n");
   return report.findings.empty() ? 0 : 1;

@@ -20,6 +20,7 @@
 #include "apps/tutti/files.h"
 #include "apps/tutti/mask_option.h"
 #include "apps/tutti/run_with_report.h"
+#include "core/terminal.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 #include "tutti/slam/config.h"
@@ -96,8 +97,8 @@ int Close(const CLI::App& command, const CloseArguments& arguments) {
   if (command.count("--stride") > 0) request.stride = arguments.stride;
   const RunConfig config = ConfigOf(CameraOf(command, arguments.camera), arguments);
   const RunResult result = arguments.no_report ? RunSlam(request, config) : RunWithReport(request, config);
-  std::fputs(ResultTable(result).c_str(), stdout);
-  std::printf("\n  results are in %s\n", result.folder.c_str());
+  std::fputs(internal::Printable(ResultTable(result), internal::Breaks::kAll).c_str(), stdout);
+  std::printf("\n  results are in %s\n", internal::Printable(result.folder.string()).c_str());
   if (result.appearance_only)
     std::fprintf(stderr,
                  "tutti: without a calibration (--config with camera: fx, fy, cx, cy) loops have no poses: "

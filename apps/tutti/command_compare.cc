@@ -21,6 +21,8 @@
 #include "apps/tutti/run_apart.h"
 #include "apps/tutti/run_with_report.h"
 #include "core/example_configs.h"
+#include "core/replaced_file.h"
+#include "core/terminal.h"
 #include "tutti/core/error.h"
 #include "tutti/frontend/dataset.h"
 #include "tutti/slam/config.h"
@@ -134,7 +136,8 @@ class Experiment {
   fs::path Folder(std::size_t v, std::size_t k) const { return Folder(arguments_.variants[v], k); }
 
   void Say(const std::string& variant, std::size_t k) const {
-    std::fprintf(stderr, "tutti: %s, run %zu of %zu\n", variant.c_str(), k + 1, samples_.size());
+    std::fprintf(stderr, "tutti: %s, run %zu of %zu\n", internal::Printable(variant).c_str(), k + 1,
+                 samples_.size());
   }
 
   RunRequest RequestFor(const std::string& variant, std::size_t k) const {
@@ -206,10 +209,11 @@ OutputLayout Layout() {
 
 void WriteComparison(OutputFolder& folder, const Comparison& comparison) {
   folder.Write({"comparison.md", [&](const fs::path& file) {
-                  WriteText(file, DescribeComparison(comparison, TableFormat::kMarkdown));
+                  internal::WriteFile(file, DescribeComparison(comparison, TableFormat::kMarkdown));
                 }});
-  folder.Write({"comparison.json",
-                [&](const fs::path& file) { WriteText(file, JsonText(ComparisonJson(comparison))); }});
+  folder.Write({"comparison.json", [&](const fs::path& file) {
+                  internal::WriteFile(file, JsonText(ComparisonJson(comparison)));
+                }});
   if (ReportsAvailable()) {
     folder.Write({"report.html", [&](const fs::path& file) {
                     WriteComparisonReport(file, "tutti compare: " + comparison.runs.front().dataset,
@@ -244,7 +248,8 @@ int RunCompare(const CLI::App& command, CompareArguments arguments) {
     for (std::size_t k = 0; k < experiment.Runs(); ++k)
       comparison.runs.push_back(experiment.Figures(v, k, statuses[k][v]));
   }
-  std::fputs(DescribeComparison(comparison, format).c_str(), stdout);
+  const std::string tables = DescribeComparison(comparison, format);
+  std::fputs(internal::Printable(tables, internal::Breaks::kAll).c_str(), stdout);
   WriteComparison(folder, comparison);
   if (ReportsAvailable()) std::printf("\n%s\n", (folder.path() / "report.html").c_str());
   if (!ReportsAvailable()) std::fprintf(stderr, "tutti: %s\n", ReportsMissing().c_str());

@@ -7,6 +7,7 @@
 
 #include "apps/tutti/commands.h"
 #include "apps/tutti/files.h"
+#include "core/terminal.h"
 #include "tutti/backend/trajectory_file.h"
 #include "tutti/core/error.h"
 
@@ -26,7 +27,7 @@ void RunConvert(const ConvertArguments& arguments) {
   if (!arguments.times.empty()) times = ReadTimes(arguments.times);
   const PoseFile in = ReadPoseFile(arguments.in, from, times);
   for (const std::string& warning : in.warnings)
-    std::fprintf(stderr, "tutti: warning: %s\n", warning.c_str());
+    std::fprintf(stderr, "tutti: warning: %s\n", internal::Printable(warning).c_str());
   const bool needs_stamps = to == PoseFileFormat::kTum || to == PoseFileFormat::kEuroc;
   if (!in.has_stamps && (needs_stamps || !arguments.times_out.empty())) {
     throw InputError(arguments.in + ": the format " + ToString(in.format) +

@@ -11,6 +11,8 @@
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/files.h"
+#include "core/replaced_file.h"
+#include "core/terminal.h"
 #include "tutti/backend/certificate.h"
 #include "tutti/backend/g2o_io.h"
 #include "tutti/backend/pose_graph_optimizer.h"
@@ -146,7 +148,7 @@ void Print(const Certificate& certificate) {
 void WriteJson(const OptimizeArguments& arguments, const G2oFile& file, const PoseGraphReport& report,
                const std::optional<Certificate>& certificate) {
   if (arguments.json.empty()) return;
-  WriteText(arguments.json, JsonText(ToJson(arguments, file, report, certificate)));
+  internal::WriteFile(arguments.json, JsonText(ToJson(arguments, file, report, certificate)));
 }
 
 void RunOptimize(OptimizeArguments arguments) {
@@ -158,7 +160,7 @@ void RunOptimize(OptimizeArguments arguments) {
   const PoseGraphOptimizer optimizer(arguments.options);
   G2oFile file = ReadG2o(arguments.in, ParseBadInformation(arguments.bad_information));
   for (const std::string& warning : file.warnings)
-    std::fprintf(stderr, "tutti: warning: %s\n", warning.c_str());
+    std::fprintf(stderr, "tutti: warning: %s\n", internal::Printable(warning).c_str());
   if (arguments.options.init == GraphInit::kFile && !file.has_all_vertices) {
     throw InputError(arguments.in +
                      ": has edges to nodes without a vertex, so '--init file' has no start; use --init " +

@@ -4,17 +4,19 @@
 #include <string>
 
 #include "apps/run/run_parts.h"
+#include "core/terminal.h"
 
 namespace tutti::cli {
 
 int ExitCode(const RunResult& result) {
   if (result.interrupted) {
-    std::fprintf(stderr, "tutti: interrupted; what there was by then is in %s\n", result.folder.c_str());
+    std::fprintf(stderr, "tutti: interrupted; what there was by then is in %s\n",
+                 internal::Printable(result.folder.string()).c_str());
     return 130;
   }
   if (result.frames_total > 0 && result.bad.size() == result.frames_total) {
     std::fprintf(stderr, "tutti: the run is void: not one frame could be read; the first: %s\n",
-                 result.bad.front().error.c_str());
+                 internal::Printable(result.bad.front().error).c_str());
     return 1;
   }
   if (result.Void() && result.frames_without_depth > 0 &&
@@ -22,7 +24,7 @@ int ExitCode(const RunResult& result) {
     const char* const which = DepthSource(result.rig.sensor);
     std::fprintf(stderr, "tutti: the run is void: not one frame has a %s image to start a map from%s%s\n",
                  which, result.bad_depth.empty() ? "" : "; the first: ",
-                 result.bad_depth.empty() ? "" : result.bad_depth.front().error.c_str());
+                 result.bad_depth.empty() ? "" : internal::Printable(result.bad_depth.front().error).c_str());
     return 1;
   }
   if (result.Void()) {

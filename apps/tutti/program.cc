@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cstdio>
 #include <exception>
+#include <iostream>
 #include <memory>
+#include <sstream>
 #include <vector>
 
 #include "apps/tutti/describe.h"
@@ -108,9 +110,12 @@ int RunProgram(int argc, char** argv, const std::map<std::string, SetUp>& own, i
       throw InputError(UnknownCommand(words[1], known));
     app.parse(static_cast<int>(words.size()) - 1, words.data());
   } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : 1;  // --help comes this way, too
+    std::ostringstream problem;
+    const bool good = app.exit(e, std::cout, problem) == 0;  // --help comes this way, too
+    std::fputs(internal::Printable(problem.str(), internal::Breaks::kAll).c_str(), stderr);
+    return good ? 0 : 1;
   } catch (const InputError& e) {
-    std::fprintf(stderr, "tutti: %s\n", e.what());
+    std::fprintf(stderr, "tutti: %s\n", internal::Printable(e.what()).c_str());
     return 1;
   } catch (const std::exception& e) {
     const std::string exhausted = WhatRanOut(e);
@@ -118,7 +123,8 @@ int RunProgram(int argc, char** argv, const std::map<std::string, SetUp>& own, i
       std::fprintf(stderr, "tutti: %s\n", exhausted.c_str());
       return 1;
     }
-    std::fprintf(stderr, "tutti: internal error: %s; please report it with the command line\n", e.what());
+    std::fprintf(stderr, "tutti: internal error: %s; please report it with the command line\n",
+                 internal::Printable(e.what()).c_str());
     return 2;
   }
   return exit_code;

@@ -22,6 +22,7 @@
 #include "apps/tutti/mask_option.h"
 #include "core/camera_text.h"
 #include "core/stopwatch.h"
+#include "core/terminal.h"
 #include "frontend/dataset/image_mask.h"
 #include "frontend/dataset/rectified_rig.h"
 #include "tutti/core/error.h"
@@ -85,8 +86,8 @@ std::optional<ImageMasks> MasksFor(const LoopsArguments& arguments, const ImageS
     throw InputError(arguments.mask + ": holds no mask for any" + of_all +
                      "; a mask has the name of its image");
   if (without > 0)
-    std::fprintf(stderr, "tutti: %s: %td%s have no mask; all of them is used\n", arguments.mask.c_str(),
-                 without, of_all.c_str());
+    std::fprintf(stderr, "tutti: %s: %td%s have no mask; all of them is used\n",
+                 internal::Printable(arguments.mask).c_str(), without, of_all.c_str());
   return masks;
 }
 
@@ -203,7 +204,7 @@ int RunLoops(const LoopsArguments& given) {
   if (set.recording) {
     for (const std::string& warning : set.recording->Warnings()) {
       if (warning == NoCalibrationText(arguments.images)) continue;  // loops need none
-      std::fprintf(stderr, "tutti: %s\n", warning.c_str());
+      std::fprintf(stderr, "tutti: %s\n", internal::Printable(warning).c_str());
     }
   }
   if (!arguments.camera.empty()) set.camera = internal::ParseCamera(arguments.camera);

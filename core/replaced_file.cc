@@ -171,8 +171,8 @@ void WriteFile(const fs::path& file, std::string_view bytes) {
   out.Commit();
 }
 
-void CheckWritable(const fs::path& file) {
-  if (!TargetOf(file).IsStream()) ReplacedFile checked(file);
+void CheckWritable(const fs::path& file, Needs needs) {
+  if (needs == Needs::kFile || !TargetOf(file).IsStream()) ReplacedFile checked(file);
 }
 
 }  // namespace tutti::internal

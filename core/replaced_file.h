@@ -43,8 +43,14 @@ std::string PartPrefix(const std::filesystem::path& file);
 /// bytes themselves. Throws InputError.
 void WriteFile(const std::filesystem::path& file, std::string_view bytes);
 
-/// Throws InputError where WriteFile would: before long work.
-void CheckWritable(const std::filesystem::path& file);
+/// What a writer needs of its file.
+enum class Needs {
+  kBytes,  ///< WriteFile: a stream will do
+  kFile    ///< ReplacedFile
+};
+
+/// Throws InputError where writing would: before long work.
+void CheckWritable(const std::filesystem::path& file, Needs needs);
 
 /// Throws InputError that says why a file can't be written: `error` is of <cerrno>, or 0.
 [[noreturn]] void FailToWrite(const std::string& file, int error);

@@ -71,7 +71,9 @@ RunResult RunSlam(const RunRequest& request, const RunConfig& given) {
       if (beside) RefuseToReplace(request.out, *beside);
   }
   OutputFolder folder = OpenOutputFolder(request, reference ? fs::path(reference->second) : fs::path());
-  if (request.trace) internal::CheckWritable(*request.trace);
+  if (request.trace) internal::CheckWritable(*request.trace, internal::Needs::kBytes);
+  if (request.save_map && *request.save_map != kMap)
+    internal::CheckWritable(*request.save_map, internal::Needs::kFile);
   if (!request.quiet) {
     for (const std::string& warning : warnings)
       std::fprintf(stderr, "tutti: %s\n", internal::Printable(warning).c_str());

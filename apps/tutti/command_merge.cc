@@ -9,6 +9,7 @@
 
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
+#include "core/replaced_file.h"
 #include "tutti/core/error.h"
 #include "tutti/slam/map_file.h"
 #include "tutti/slam/slam_system.h"
@@ -45,6 +46,7 @@ int Merge(const MergeArguments& arguments) {
     if (fs::equivalent(map, arguments.out, ignored))
       throw InputError(arguments.out + ": is one of the maps that are merged; give another file with --out");
   }
+  internal::CheckWritable(arguments.out, internal::Needs::kFile);
   const std::unique_ptr<SlamSystem> slam = OpenMap(arguments.first, arguments.threads),
                                     other = OpenMap(arguments.second, arguments.threads);
   const std::size_t known = slam->loops().size() + other->loops().size();

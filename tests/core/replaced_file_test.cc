@@ -61,6 +61,8 @@ TEST_F(ReplacedFileTest, NothingTakesThePlaceOfADeviceAPipeOrAFolder) {
     EXPECT_THAT(ErrorOf([&] { ReplacedFile made(file); }),
                 AllOf(HasSubstr(file.string()), HasSubstr("give the name of a file")));
   }
+  CheckWritable("/dev/null", Needs::kBytes);
+  EXPECT_THAT(ErrorOf([] { CheckWritable("/dev/null", Needs::kFile); }), HasSubstr("a device"));
   EXPECT_TRUE(fs::is_character_file("/dev/null"));
   EXPECT_EQ(Entries(folder_), 2);
 }
@@ -98,7 +100,7 @@ TEST_F(ReplacedFileTest, WhatCantBeWrittenLeavesTheOldOneAndNothingBeside) {
   EXPECT_EQ(Entries(folder_), 1);
   EXPECT_THAT(ErrorOf([&] { WriteFile(folder_ / "no" / "file", "x"); }),
               HasSubstr("No such file or directory"));
-  EXPECT_THAT(ErrorOf([&] { CheckWritable(folder_ / "no" / "file"); }),
+  EXPECT_THAT(ErrorOf([&] { CheckWritable(folder_ / "no" / "file", Needs::kBytes); }),
               HasSubstr("No such file or directory"));
 }
 

@@ -14,6 +14,7 @@
 #include "apps/run/live_files.h"
 #include "apps/run/outputs.h"
 #include "apps/run/text_file.h"
+#include "core/terminal.h"
 #include "tutti/backend/g2o_io.h"
 #include "tutti/core/error.h"
 
@@ -111,11 +112,13 @@ std::size_t RunResult::FramesRelocalized() const {
   return count;
 }
 
+OutputLayout RunLayout() {
+  return {IsResult, "summary.json", "version", {kLiveTrajectory, kLiveLoops}, nullptr, {kCheckpoint}};
+}
+
 OutputFolder OpenOutputFolder(const RunRequest& request, const fs::path& reference) {
   if (!reference.empty()) RefuseToReplace(request.out, reference);
-  const OutputLayout layout = {IsResult, "summary.json", "version", {kLiveTrajectory, kLiveLoops},
-                               nullptr,  {kCheckpoint}};
-  return OutputFolder(request.out, layout, request.keep, request.trace);
+  return OutputFolder(request.out, RunLayout(), request.keep, request.trace);
 }
 
 namespace {
@@ -193,8 +196,7 @@ void WriteOutputs(OutputFolder& folder, const RunRequest& request, RunResult& re
     if (writing.Failed()) failures.push_back(writing.Failure());
   }
   if (!result.failure.empty())
-    std::fprintf(stderr, "tutti: the run broke off; what there was by then is in %s\n",
-                 result.folder.c_str());
+    internal::Say("the run broke off; what there was by then is in %s", result.folder.c_str());
   ThrowFailures(failures, result.folder);
 }
 

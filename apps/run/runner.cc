@@ -15,6 +15,7 @@
 #include "apps/run/run_note.h"
 #include "apps/run/run_parts.h"
 #include "apps/run/slam_run.h"
+#include "core/terminal.h"
 #include "tutti/core/error.h"
 #include "tutti/slam/trajectory_closer.h"
 
@@ -78,16 +79,15 @@ RunResult RunSlam(const RunRequest& request, const RunConfig& given) {
   OutputFolder folder = OpenOutputFolder(request, reference ? fs::path(reference->second) : fs::path());
   if (request.trace) CheckTrace(*request.trace);
   if (!request.quiet) {
-    for (const std::string& warning : warnings) std::fprintf(stderr, "tutti: %s\n", warning.c_str());
+    for (const std::string& warning : warnings) internal::Say("%s", warning.c_str());
     if (!result.rig.calibrated) {
-      std::fprintf(stderr, "tutti: no camera calibration: appearance only, loops but no trajectory\n");
+      internal::Say("no camera calibration: appearance only, loops but no trajectory");
     }
   }
   result.calibration_findings = CheckCalibration(*dataset).findings;
   if (!request.quiet) {
     for (const CalibrationFinding& f : result.calibration_findings) {
-      std::fprintf(stderr, "tutti: warning: the calibration can't be right: %s; %s\n", f.measured.c_str(),
-                   f.advice.c_str());
+      internal::Say("warning: the calibration can't be right: %s; %s", f.measured.c_str(), f.advice.c_str());
     }
   }
   SlamRun run(request, result.config, *dataset, odometry ? &*odometry : nullptr, folder.path(), result);

@@ -2,12 +2,14 @@
 
 #include <cstdio>
 
+#include "core/terminal.h"
 #include "tutti/core/error.h"
 
 namespace tutti::cli {
 
 void SayFindings(const Recording& recording) {
-  for (const std::string& finding : recording.findings) std::fprintf(stderr, "  %s\n", finding.c_str());
+  for (const std::string& finding : recording.findings)
+    std::fputs(internal::Message("  " + finding).c_str(), internal::StandardError());
 }
 
 RunConfig ConfigurationOf(const std::string& config, const std::string& dataset) {

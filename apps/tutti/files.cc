@@ -1,5 +1,9 @@
 #include "apps/tutti/files.h"
 
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
 #include <fstream>
 #include <system_error>
 
@@ -38,6 +42,21 @@ void KeepInputs(const std::vector<std::string>& read, const std::vector<std::str
       if (std::filesystem::is_regular_file(out, none) && std::filesystem::equivalent(in, out, none))
         throw InputError(out + ": is read, and would be overwritten by the result; choose another name");
     }
+  }
+}
+
+void RequireWritable(const std::vector<std::string>& files) {
+  for (const std::filesystem::path file : files) {
+    if (file.empty()) continue;
+    std::error_code ignored;
+    const std::filesystem::path folder = file.has_parent_path() ? file.parent_path() : ".";
+    if (std::filesystem::is_directory(file, ignored))
+      throw InputError(file.string() + ": is a folder; give the name of a file");
+    if (!std::filesystem::is_directory(folder, ignored))
+      throw InputError(file.string() + ": there is no folder " + folder.string() + "; make it first");
+    const bool there = std::filesystem::exists(file, ignored);
+    if (access(there ? file.c_str() : folder.c_str(), W_OK) != 0)
+      throw InputError(file.string() + ": can't be written (" + std::strerror(errno) + ")");
   }
 }
 

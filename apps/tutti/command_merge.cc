@@ -47,6 +47,7 @@ std::string MergedNote(const MergeArguments& arguments, const MapSession& last) 
 // One file, by whatever names, or a copy.
 bool AreTheSame(const fs::path& a, const fs::path& b) {
   std::error_code ignored;
+  if (!fs::is_regular_file(a, ignored) || !fs::is_regular_file(b, ignored)) return false;
   if (fs::equivalent(a, b, ignored)) return true;
   if (fs::file_size(a, ignored) != fs::file_size(b, ignored)) return false;
   std::ifstream in_a(a, std::ios::binary), in_b(b, std::ios::binary);

@@ -28,5 +28,17 @@ enum class Breaks {
 /// UTF-8 are spelled out (\x1b, \n, \u202e).
 std::string Printable(std::string_view text, Breaks breaks = Breaks::kOfMessage);
 
+/// stderr as it was when this was first called. Libraries print to stderr as it is now, and not always to be
+/// read (ForeignLines).
+std::FILE* StandardError();
+
+/// The text, Printable, with a line feed at its end. A line that is longer than those of `out`, where that is
+/// a terminal, is broken between words and goes on below, 2 columns further in; elsewhere (a pipe, a file) it
+/// stays one line.
+std::string Message(std::string_view text, std::FILE* out = StandardError(),
+                    Breaks breaks = Breaks::kOfMessage);
+/// Prints a Message on StandardError: "tutti: ", and the text as printf makes it.
+void Say(const char* format, ...) __attribute__((format(printf, 1, 2)));
+
 }  // namespace tutti::internal
 #pragma GCC visibility pop

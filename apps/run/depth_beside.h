@@ -34,6 +34,7 @@ class DepthBeside : public Dataset {
   /// With depth, or with depth_error.
   ReadResult Read(std::size_t i) const override;
   ColourImage ReadColour(std::size_t i) const override { return images_->ReadColour(i); }
+  double SkippedShare() const override { return images_->SkippedShare(); }
   const CameraRig& Rig() const override { return rig_; }
   std::optional<std::filesystem::path> GroundTruthFile() const override { return images_->GroundTruthFile(); }
   Trajectory ReadGroundTruth(const std::filesystem::path& file,

@@ -34,6 +34,7 @@ class RestampedDataset : public Dataset {
     return read;
   }
   ColourImage ReadColour(std::size_t i) const override { return images_->ReadColour(i); }
+  double SkippedShare() const override { return images_->SkippedShare(); }
   const CameraRig& Rig() const override { return images_->Rig(); }
   std::optional<fs::path> GroundTruthFile() const override { return images_->GroundTruthFile(); }
   Trajectory ReadGroundTruth(const fs::path& file, std::vector<std::string>* warnings) const override {

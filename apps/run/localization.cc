@@ -17,6 +17,7 @@
 #include "core/angle.h"
 #include "core/replaced_file.h"
 #include "core/stopwatch.h"
+#include "core/terminal.h"
 #include "tutti/core/error.h"
 #include "tutti/slam/slam_system.h"
 #include "tutti/slam/version.h"
@@ -172,7 +173,7 @@ void LocateAll(const LocalizationRequest& request, const Dataset& dataset, const
   reading.ahead = request.threads > 1 ? 4 : 0;
   reading.stop = &InterruptGuard::Requested;
   Prefetcher frames(dataset, reading);
-  Progress progress("localize", dataset.Size(), request.quiet ? nullptr : stderr);
+  Progress progress("localize", dataset.Size(), request.quiet ? nullptr : internal::StandardError());
   const Pose T_camera_body = dataset.Rig().T_body_camera.Inverse();
   RunState state = StateIn(slam, result);
   const bool endless = dataset.FrameSupply() != Supply::kStored;
@@ -184,7 +185,8 @@ void LocateAll(const LocalizationRequest& request, const Dataset& dataset, const
     if (!fetched->read.frame) {
       ++result.bad;
       progress.Note("tutti: frame " + std::to_string(dataset.Number(fetched->position)) +
-                    " is skipped: " + fetched->read.error);
+                        " is skipped: " + fetched->read.error,
+                    "frames are skipped");
       continue;
     }
     const InputFrame& frame = *fetched->read.frame;
@@ -217,13 +219,15 @@ void LocateAll(const LocalizationRequest& request, const Dataset& dataset, const
 Localization Localize(const LocalizationRequest& request) {
   const internal::Stopwatch since;
   cv::setNumThreads(1);
+  const OutputLayout layout = {IsLocalization, kSummary, "version", {}, nullptr};
+  OutputFolder::Check(request.out, layout);
   const MapInfo info = ReadMapInfo(request.map);
   const DatasetOptions options = Reading(request, info);
   const std::unique_ptr<Dataset> dataset = OpenDataset(request.dataset, options);
   CheckRig(request, info.rig, dataset->Rig());
   const InterruptGuard guard;
   RefuseToReplace(request.out, request.map);
-  OutputFolder folder(request.out, {IsLocalization, kSummary, "version", {}, nullptr});
+  OutputFolder folder(request.out, layout);
   Localization result;
   result.masked = !options.mask.empty();
   const std::unique_ptr<SlamSystem> slam = OpenMap(request, info);

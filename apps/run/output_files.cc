@@ -10,6 +10,7 @@
 #include "apps/run/frame_places.h"
 #include "apps/run/live_files.h"
 #include "apps/run/outputs.h"
+#include "apps/run/text_file.h"
 #include "core/replaced_file.h"
 #include "core/terminal.h"
 #include "tutti/backend/g2o_io.h"
@@ -100,10 +101,13 @@ std::size_t RunResult::FramesRelocalized() const {
   return count;
 }
 
+OutputLayout RunLayout() {
+  return {IsResult, "summary.json", "version", {kLiveTrajectory, kLiveLoops}, nullptr, {kCheckpoint}};
+}
+
 OutputFolder OpenOutputFolder(const RunRequest& request, const fs::path& reference) {
   if (!reference.empty()) RefuseToReplace(request.out, reference);
-  OutputLayout layout = {IsResult, "summary.json", "version", {kLiveTrajectory, kLiveLoops},
-                         nullptr,  {kCheckpoint}};
+  OutputLayout layout = RunLayout();
   layout.known = request.resume.has_value();  // by its checkpoint, which was read
   return OutputFolder(request.out, layout, request.keep, request.trace);
 }
@@ -167,8 +171,7 @@ void WriteOutputs(OutputFolder& folder, const RunRequest& request, RunResult& re
     if (writing.Failed()) failures.push_back(writing.Failure());
   }
   if (!result.failure.empty())
-    std::fprintf(stderr, "tutti: the run broke off; what there was by then is in %s\n",
-                 internal::Printable(result.folder.string()).c_str());
+    internal::Say("the run broke off; what there was by then is in %s", result.folder.c_str());
   ThrowFailures(failures, result.folder);
 }
 

@@ -48,6 +48,11 @@ class OutputFolder {
   OutputFolder(const OutputFolder&) = delete;
   OutputFolder& operator=(const OutputFolder&) = delete;
 
+  /// What the constructor would throw of the folder itself, for the time before long work: no folder can be
+  /// made there, it may not be written to, or it has files that tutti did not write. Leaves nothing behind.
+  static void Check(const std::filesystem::path& folder, const OutputLayout& layout,
+                    const std::optional<std::filesystem::path>& own = std::nullopt);
+
   const std::filesystem::path& path() const { return folder_; }
 
   /// Where files of the new result wait, for those that grow while the command runs. Throws InputError.
@@ -64,7 +69,6 @@ class OutputFolder {
 
  private:
   std::vector<std::filesystem::path> Results() const;
-  void RefuseForeign(const std::optional<std::filesystem::path>& own) const;
   void RefuseLinks() const;
   void Lock();
   void CheckRoom() const;

@@ -275,6 +275,7 @@ std::string SummaryJson(const RunResult& r) {
         {"alignment", r.evaluation->alignment},  {"ground_truth", r.evaluation->file},
         {"path_m", r.evaluation->path_m},        {"odometry", ScoreJson(r.evaluation->odometry)},
         {"slam", ScoreJson(r.evaluation->slam)}, {"odometry_complete", r.odometry_complete}};
+    if (r.evaluation->scaled.valid) json["evaluation"]["sim3_scale"] = r.evaluation->scaled.scale;
   }
   Json config = Json::object();
   for (const ConfigEntry& entry : DescribeConfig(r.config)) {

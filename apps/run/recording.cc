@@ -37,7 +37,9 @@ std::string Short(double value) {
 }
 
 // A configuration of those that come along, for all but its camera.
-RunConfig Published(const std::string& name) { return LoadConfig(internal::ExampleConfig(name + ".yaml")); }
+RunConfig Published(const std::string& name) {
+  return ParseConfig(internal::ExampleConfig(name).value(), "tutti's " + name + ".yaml");
+}
 
 // The pixels that the camera must fit.
 void SetImageSize(const fs::path& dataset, const DatasetOptions& options, PinholeCamera& camera) {

@@ -75,17 +75,15 @@ RunResult RunSlam(const RunRequest& request, const RunConfig& given) {
   if (request.save_map && *request.save_map != kMap)
     internal::CheckWritable(*request.save_map, internal::Needs::kFile);
   if (!request.quiet) {
-    for (const std::string& warning : warnings)
-      std::fprintf(stderr, "tutti: %s\n", internal::Printable(warning).c_str());
+    for (const std::string& warning : warnings) internal::Say("%s", warning.c_str());
     if (!result.rig.calibrated) {
-      std::fprintf(stderr, "tutti: no camera calibration: appearance only, loops but no trajectory\n");
+      internal::Say("no camera calibration: appearance only, loops but no trajectory");
     }
   }
   result.calibration_findings = CheckCalibration(*dataset).findings;
   if (!request.quiet) {
     for (const CalibrationFinding& f : result.calibration_findings) {
-      std::fprintf(stderr, "tutti: warning: the calibration can't be right: %s; %s\n",
-                   internal::Printable(f.measured).c_str(), f.advice.c_str());
+      internal::Say("warning: the calibration can't be right: %s; %s", f.measured.c_str(), f.advice.c_str());
     }
   }
   SlamRun run(request, result.config, *dataset, odometry ? &*odometry : nullptr, folder.path(), result);

@@ -56,6 +56,7 @@ std::string FolderAbove(const fs::path& summary) {
 
 void RunCollect(const CollectArguments& arguments) {
   const TableFormat format = ParseTableFormat(arguments.table_format);
+  RequireWritable({arguments.json, arguments.report});
   Comparison comparison;
   std::vector<std::string> read;
   for (const std::string& where : arguments.runs) {

@@ -136,8 +136,7 @@ class Experiment {
   fs::path Folder(std::size_t v, std::size_t k) const { return Folder(arguments_.variants[v], k); }
 
   void Say(const std::string& variant, std::size_t k) const {
-    std::fprintf(stderr, "tutti: %s, run %zu of %zu\n", internal::Printable(variant).c_str(), k + 1,
-                 samples_.size());
+    internal::Say("%s, run %zu of %zu", variant.c_str(), k + 1, samples_.size());
   }
 
   RunRequest RequestFor(const std::string& variant, std::size_t k) const {
@@ -228,10 +227,14 @@ int RunCompare(const CLI::App& command, CompareArguments arguments) {
   if (arguments.out.empty()) arguments.out = DefaultOutput(arguments.datasets.front(), "-compared");
   const TableFormat format = ParseTableFormat(arguments.table_format);
   CheckVariants(arguments);
+  OutputFolder::Check(arguments.out, Layout());
   const RunConfig config = ConfigurationOf(arguments.config, arguments.datasets.front());
   const Experiment experiment(command, arguments, config);
+  DatasetOptions last = config.dataset;
+  last.start = arguments.start + arguments.runs - 1;
+  if (command.count("--end") > 0) last.end = arguments.end;
   for (const std::string& dataset : arguments.datasets)
-    OpenDataset(dataset, config.dataset);  // what no variant can read is said once
+    OpenDataset(dataset, last);  // what no variant can read is said once
   const InterruptGuard guard;
   OutputFolder folder(arguments.out, Layout());
   std::vector<std::vector<int>> statuses;  // by run, then variant
@@ -239,7 +242,7 @@ int RunCompare(const CLI::App& command, CompareArguments arguments) {
     statuses.push_back(experiment.Run(k));
     const std::vector<int>& now = statuses.back();
     if (InterruptGuard::Requested() || std::count(now.begin(), now.end(), 130) > 0) {
-      std::fprintf(stderr, "tutti: interrupted; the runs by then are in %s\n", arguments.out.c_str());
+      internal::Say("interrupted; the runs by then are in %s", arguments.out.c_str());
       return 130;
     }
   }
@@ -252,7 +255,7 @@ int RunCompare(const CLI::App& command, CompareArguments arguments) {
   std::fputs(internal::Printable(tables, internal::Breaks::kAll).c_str(), stdout);
   WriteComparison(folder, comparison);
   if (ReportsAvailable()) std::printf("\n%s\n", (folder.path() / "report.html").c_str());
-  if (!ReportsAvailable()) std::fprintf(stderr, "tutti: %s\n", ReportsMissing().c_str());
+  if (!ReportsAvailable()) internal::Say("%s", ReportsMissing().c_str());
   const auto failed = [](const RunFigures& run) { return !run.failure.empty(); };
   return std::any_of(comparison.runs.begin(), comparison.runs.end(), failed) ? 1 : 0;
 }
@@ -291,7 +294,8 @@ void SetUpCompare(CLI::App& command, int& exit_code) {
       ->capture_default_str();
   command.add_option("--ground-truth", arguments->ground_truth,
                      "trajectory to evaluate against (default: the data set's own)");
-  command.add_option("--threads", arguments->threads, "most threads; the result is the same for any number");
+  command.add_option("--threads", arguments->threads, "most threads; the result is the same for any number")
+      ->check(Positive());
   command.add_option("--start", arguments->start, "first frame of the first run, counted from 0")
       ->check(NotNegative());
   command.add_option("--end", arguments->end, "frame before which to stop")->check(Positive());
@@ -307,8 +311,7 @@ void SetUpCompare(CLI::App& command, int& exit_code) {
       "run "
       "of its own,\n"
       "whose loops move the map that it tracks on. A run that fails is reported, and the rest go on.\n"
-      "Example: tutti compare redkitchen --config " +
-      internal::ExampleConfigs() + "/7scenes.yaml --variants odometry,orb,ensemble");
+      "Example: tutti compare redkitchen --config 7scenes --variants odometry,orb,ensemble");
   command.callback([&command, arguments, &exit_code] { exit_code = RunCompare(command, *arguments); });
 }
 

@@ -23,11 +23,11 @@ void RunConvert(const ConvertArguments& arguments) {
   if (arguments.from != "auto") from = ParsePoseFileFormat(arguments.from);
   const PoseFileFormat to = ParsePoseFileFormat(arguments.to);
   KeepInputs({arguments.in, arguments.times}, {arguments.out, arguments.times_out});
+  RequireWritable({arguments.out, arguments.times_out});
   std::vector<double> times;
   if (!arguments.times.empty()) times = ReadTimes(arguments.times);
   const PoseFile in = ReadPoseFile(arguments.in, from, times);
-  for (const std::string& warning : in.warnings)
-    std::fprintf(stderr, "tutti: warning: %s\n", internal::Printable(warning).c_str());
+  for (const std::string& warning : in.warnings) internal::Say("warning: %s", warning.c_str());
   const bool needs_stamps = to == PoseFileFormat::kTum || to == PoseFileFormat::kEuroc;
   if (!in.has_stamps && (needs_stamps || !arguments.times_out.empty())) {
     throw InputError(arguments.in + ": the format " + ToString(in.format) +

@@ -34,12 +34,12 @@ bool MeetsLimits(const EvaluatedEstimate& estimate, const EvaluateArguments& arg
   const double ate = estimate.report.ate.rmse, coverage = estimate.report.coverage.share();
   const bool accurate = ate <= arguments.max_ate_m, covers = coverage >= arguments.min_coverage;
   if (!accurate) {
-    std::fprintf(stderr, "tutti: %s: the ATE of %g m is above --max-ate %g\n",
-                 internal::Printable(estimate.name).c_str(), ate, arguments.max_ate_m);
+    internal::Say("%s: the ATE of %g m is above --max-ate %g", estimate.name.c_str(), ate,
+                  arguments.max_ate_m);
   }
   if (!covers) {
-    std::fprintf(stderr, "tutti: %s: the coverage of %g is below --min-coverage %g\n",
-                 internal::Printable(estimate.name).c_str(), coverage, arguments.min_coverage);
+    internal::Say("%s: the coverage of %g is below --min-coverage %g", estimate.name.c_str(), coverage,
+                  arguments.min_coverage);
   }
   return accurate && covers;
 }
@@ -54,6 +54,7 @@ int RunEvaluate(const EvaluateArguments& arguments) {
   }
   RequireFiles(input);
   KeepInputs(FilesOf(input), {arguments.json, arguments.errors});
+  RequireWritable({arguments.json, arguments.errors});
   std::optional<PublishedComparison> published;
   if (against) published.emplace(arguments.against, input);
   const std::vector<EvaluatedEstimate> estimates = EvaluateInput(input);

@@ -9,6 +9,7 @@
 #include "apps/tutti/files.h"
 #include "apps/tutti/mask_option.h"
 #include "apps/tutti/view_options.h"
+#include "core/terminal.h"
 #include "tutti/slam/config.h"
 
 namespace tutti::cli {
@@ -35,7 +36,8 @@ int RunLocalize(const CLI::App& command, const LocalizeArguments& arguments) {
   if (command.count("--start") > 0) request.start = arguments.start;
   if (command.count("--end") > 0) request.end = arguments.end;
   if (command.count("--stride") > 0) request.stride = arguments.stride;
-  if (auto view = StartView(command, arguments.view)) request.observers.push_back(std::move(view));
+  if (auto view = StartView(command, arguments.view, arguments.quiet))
+    request.observers.push_back(std::move(view));
   const Localization result = Localize(request);
   const std::size_t total = result.frames.size() + result.bad;
   std::printf("\n  frames %zu of %zu localized", result.Localized(), total);
@@ -48,7 +50,7 @@ int RunLocalize(const CLI::App& command, const LocalizeArguments& arguments) {
               (request.out / "trajectory.txt").c_str(), (request.out / "localization.svg").c_str());
   if (result.interrupted) return 130;
   if (result.Localized() > 0) return 0;
-  std::fprintf(stderr, "tutti: not one frame was found in the map: it shows other places\n");
+  internal::Say("not one frame was found in the map: it shows other places");
   return 1;
 }
 

@@ -157,10 +157,10 @@ void RunOptimize(OptimizeArguments arguments) {
   arguments.options.robust = ParseRobustLoss(arguments.robust);
   arguments.options.solver = ParsePoseGraphSolver(arguments.solver);
   KeepInputs({arguments.in}, {arguments.out, arguments.json});
+  RequireWritable({arguments.out, arguments.json});
   const PoseGraphOptimizer optimizer(arguments.options);
   G2oFile file = ReadG2o(arguments.in, ParseBadInformation(arguments.bad_information));
-  for (const std::string& warning : file.warnings)
-    std::fprintf(stderr, "tutti: warning: %s\n", internal::Printable(warning).c_str());
+  for (const std::string& warning : file.warnings) internal::Say("warning: %s", warning.c_str());
   if (arguments.options.init == GraphInit::kFile && !file.has_all_vertices) {
     throw InputError(arguments.in +
                      ": has edges to nodes without a vertex, so '--init file' has no start; use --init " +

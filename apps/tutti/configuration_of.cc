@@ -9,7 +9,7 @@ namespace tutti::cli {
 
 void SayFindings(const Recording& recording) {
   for (const std::string& finding : recording.findings)
-    std::fprintf(stderr, "  %s\n", internal::Printable(finding).c_str());
+    std::fputs(internal::Message("  " + finding).c_str(), internal::StandardError());
 }
 
 RunConfig ConfigurationOf(const std::string& config, const std::string& dataset) {

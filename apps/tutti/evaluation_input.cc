@@ -19,8 +19,7 @@ PoseFile Read(const std::string& file, const std::string& format, const std::vec
   std::optional<PoseFileFormat> asked;
   if (format != "auto") asked = ParsePoseFileFormat(format);
   PoseFile out = ReadPoseFile(file, asked, times);
-  for (const std::string& warning : out.warnings)
-    std::fprintf(stderr, "tutti: warning: %s\n", internal::Printable(warning).c_str());
+  for (const std::string& warning : out.warnings) internal::Say("warning: %s", warning.c_str());
   return out;
 }
 

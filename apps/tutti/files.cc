@@ -2,6 +2,7 @@
 
 #include <system_error>
 
+#include "core/replaced_file.h"
 #include "core/text_reader.h"
 #include "tutti/core/error.h"
 
@@ -38,6 +39,11 @@ void KeepInputs(const std::vector<std::string>& read, const std::vector<std::str
         throw InputError(out + ": is read, and would be overwritten by the result; choose another name");
     }
   }
+}
+
+void RequireWritable(const std::vector<std::string>& files) {
+  for (const std::string& file : files)
+    if (!file.empty()) internal::CheckWritable(file, internal::Needs::kBytes);
 }
 
 }  // namespace tutti::cli

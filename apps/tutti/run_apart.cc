@@ -25,7 +25,7 @@ int RunApart(const std::function<int()>& work) {
     try {
       status = work();
     } catch (const std::exception& error) {
-      std::fprintf(stderr, "tutti: %s\n", internal::Printable(error.what()).c_str());
+      internal::Say("%s", error.what());
     }
     std::fflush(nullptr);
     _exit(status);

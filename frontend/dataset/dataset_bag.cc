@@ -29,6 +29,7 @@ class BagDataset : public Dataset {
 
   std::size_t Size() const override { return frames_.size(); }
   double Stamp(std::size_t i) const override { return frames_.at(i).image->stamp_s; }
+  double SkippedShare() const override { return skipped_share_; }
   const CameraRig& Rig() const override { return rig_.rig; }
   std::optional<fs::path> GroundTruthFile() const override { return std::nullopt; }
   const std::vector<std::string>& Warnings() const override { return warnings_; }
@@ -128,6 +129,8 @@ class BagDataset : public Dataset {
                           std::to_string(all) + " images of " + topic +
                           " repeat a time stamp and are skipped");
     }
+    if (topic == options_.topic && !kept.empty())
+      skipped_share_ = 1 - static_cast<double>(kept.size()) / static_cast<double>(all + bag_->Lost(topic));
     return kept;
   }
 
@@ -244,6 +247,7 @@ class BagDataset : public Dataset {
 
   fs::path file_;
   DatasetOptions options_;
+  double skipped_share_ = 0;
   RectifiedRig rig_;
   cv::Size size_;
   int bits_ = 8;

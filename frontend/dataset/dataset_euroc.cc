@@ -14,7 +14,9 @@ struct StampedImage {
   std::filesystem::path file;
 };
 
-std::vector<StampedImage> ReadCsv(const std::filesystem::path& camera, std::vector<std::string>& warnings) {
+// `skipped`: lines that are of no use; may be null.
+std::vector<StampedImage> ReadCsv(const std::filesystem::path& camera, std::vector<std::string>& warnings,
+                                  std::size_t* skipped) {
   const std::filesystem::path csv = camera / "data.csv";
   std::vector<StampedImage> images;
   StampOrder order(csv, warnings);
@@ -31,6 +33,7 @@ std::vector<StampedImage> ReadCsv(const std::filesystem::path& camera, std::vect
     if (!order.Accept(line.number, static_cast<double>(*stamp) * 1e-9)) continue;
     images.push_back({*stamp, camera / "data" / line.words[1]});
   }
+  if (skipped != nullptr) *skipped = order.skipped();
   if (images.empty()) throw InputError(csv.string() + ": lists no images");
   return images;
 }
@@ -67,13 +70,13 @@ FolderContents FindEuroc(const std::filesystem::path& folder, const DatasetOptio
   out.left = options.camera ? *options.camera : left.camera;
   out.T_body_left = left.T_body_camera;
   out.rate_hz = left.rate_hz;
-  const std::vector<StampedImage> images = ReadCsv(mav / "cam0", out.warnings);
+  const std::vector<StampedImage> images = ReadCsv(mav / "cam0", out.warnings, &out.skipped);
   std::vector<StampedImage> right_images;
   if (options.sensor == Sensor::kStereo) {
     const MountedCamera right = ReadMounted(mav / "cam1" / "sensor.yaml");
     out.right = right.camera;
     out.T_right_left = right.T_body_camera.Inverse() * left.T_body_camera;
-    right_images = ReadCsv(mav / "cam1", out.warnings);
+    right_images = ReadCsv(mav / "cam1", out.warnings, nullptr);
   }
   std::size_t alone = 0;
   for (const StampedImage& image : images) {

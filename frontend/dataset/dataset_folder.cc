@@ -52,7 +52,12 @@ bool StampOrder::Accept(std::size_t line, double stamp_s) {
                      " s); sort the file by time");
   }
   if (last_ && stamp_s == *last_) {
-    warnings_.push_back(At(file_, line) + "repeats the time stamp before it; the frame is skipped");
+    constexpr std::size_t kMostLines = 5;
+    if (++skipped_ <= kMostLines + 1) warnings_.emplace_back();
+    warnings_.back() = skipped_ <= kMostLines
+                           ? At(file_, line) + "repeats the time stamp before it; the frame is skipped"
+                           : file_.string() + ": " + std::to_string(skipped_ - kMostLines) +
+                                 " more lines repeat the time stamp before them";
     return false;
   }
   last_ = stamp_s;

@@ -54,6 +54,7 @@ struct FolderContents {
       pose_stamps;             ///< KITTI: (line of the pose, stamp) of each frame
   std::size_t pose_count = 0;  ///< KITTI: poses that the file must have
   double stamp_scale = 1;      ///< factor on the stamps of the ground truth
+  std::size_t skipped = 0;     ///< (left, or colour) images that are no frames: Dataset::SkippedShare
   std::vector<std::string> warnings;
 };
 
@@ -75,6 +76,10 @@ class FolderDataset : public Dataset {
   std::optional<std::filesystem::path> GroundTruthFile() const override;
   Trajectory ReadGroundTruth(const std::filesystem::path& file,
                              std::vector<std::string>* warnings) const override;
+  double SkippedShare() const override {
+    const auto skipped = static_cast<double>(contents_.skipped);
+    return skipped / (skipped + static_cast<double>(Size()));
+  }
   const std::vector<std::string>& Warnings() const override { return contents_.warnings; }
 
  private:
@@ -111,19 +116,22 @@ std::string At(const std::filesystem::path& file, std::size_t line);
 /// The word as a finite number. Throws InputError that names file and line.
 double NumberAt(const std::filesystem::path& file, const TextLine& line, std::size_t word);
 
-/// Watches that the stamps of a file grow: duplicates are to be skipped (with a warning), unsorted stamps
-/// throw InputError.
+/// Watches that the stamps of a file grow: duplicates are to be skipped (with a warning for the first five
+/// and their count), unsorted stamps throw InputError. Nothing else adds warnings in the meantime.
 class StampOrder {
  public:
   StampOrder(std::filesystem::path file, std::vector<std::string>& warnings)
       : file_(std::move(file)), warnings_(warnings) {}
   /// True if the line is to be used.
   bool Accept(std::size_t line, double stamp_s);
+  /// Lines that were not.
+  std::size_t skipped() const { return skipped_; }
 
  private:
   std::filesystem::path file_;
   std::vector<std::string>& warnings_;
   std::optional<double> last_;
+  std::size_t skipped_ = 0;
 };
 
 /// Warns that `alone` of the frames have no depth or right image: "`list`: 2 of 9 `which`". Not of a folder

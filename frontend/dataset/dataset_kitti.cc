@@ -175,6 +175,7 @@ FolderContents FindKitti(const std::filesystem::path& folder, const DatasetOptio
     out.pose_stamps.emplace_back(n, frame.stamp_s);
     out.frames.push_back(std::move(frame));
   }
+  out.skipped = order.skipped();
   if (options.sensor == Sensor::kStereo) {
     if (pairs == 0) {
       throw InputError(right_folder.string() + ": no image has the number of an image of " +

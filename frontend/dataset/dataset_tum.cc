@@ -3,7 +3,6 @@
 #include <cmath>
 #include <tuple>
 
-#include "core/example_configs.h"
 #include "frontend/dataset/dataset_folder.h"
 #include "tutti/core/error.h"
 
@@ -27,8 +26,9 @@ std::string NameIn(const TextLine& line, const std::filesystem::path& folder) {
   return std::filesystem::exists(folder / name, code) ? name : std::string();
 }
 
+// `skipped`: lines that are of no use; may be null.
 std::vector<StampedFile> ReadList(const std::filesystem::path& folder, const char* name,
-                                  std::vector<std::string>& warnings) {
+                                  std::vector<std::string>& warnings, std::size_t* skipped) {
   const std::filesystem::path list = folder / name;
   std::vector<StampedFile> files;
   StampOrder order(list, warnings);
@@ -41,6 +41,7 @@ std::vector<StampedFile> ReadList(const std::filesystem::path& folder, const cha
     }
     if (order.Accept(line.number, stamp)) files.push_back({stamp, folder / name_in_list});
   }
+  if (skipped != nullptr) *skipped = order.skipped();
   if (files.empty())
     throw InputError(list.string() + ": lists no images; each line needs a time stamp and a file name");
   return files;
@@ -71,11 +72,11 @@ std::vector<int> Associate(const std::vector<StampedFile>& colour, const std::ve
 }
 
 void FromLists(const std::filesystem::path& folder, const DatasetOptions& options, FolderContents& out) {
-  const std::vector<StampedFile> colour = ReadList(folder, "rgb.txt", out.warnings);
+  const std::vector<StampedFile> colour = ReadList(folder, "rgb.txt", out.warnings, &out.skipped);
   std::vector<int> match(colour.size(), -1);
   std::vector<StampedFile> depth;
   if (options.sensor == Sensor::kRgbd) {
-    depth = ReadList(folder, "depth.txt", out.warnings);
+    depth = ReadList(folder, "depth.txt", out.warnings, nullptr);
     match = Associate(colour, depth, options.max_association_s);
   }
   std::size_t alone = 0;
@@ -124,6 +125,7 @@ void FromAssociations(const std::filesystem::path& folder, const DatasetOptions&
              line.words[depth_first ? 2 : 0].find('.') == std::string::npos;
     if (order.Accept(line.number, frame.stamp_s)) out.frames.push_back(std::move(frame));
   }
+  out.skipped = order.skipped();
   if (counts && out.frames.size() > 1) {
     out.stamp_scale = 1.0 / (options.rate_hz > 0 ? options.rate_hz : 30.0);
     for (FrameFiles& frame : out.frames) frame.stamp_s *= out.stamp_scale;
@@ -156,8 +158,7 @@ FolderContents FindTum(const std::filesystem::path& folder, const DatasetOptions
   if (!options.camera) {
     throw InputError(folder.string() +
                      ": the TUM layout holds no calibration; set fx, fy, cx, cy under 'camera:' in the "
-                     "configuration (" +
-                     internal::ExampleConfigs() + "/tum_fr1_rgbd.yaml and its like have them)");
+                     "configuration (tum_fr1_rgbd and its like, which are part of tutti, have them)");
   }
   out.left = options.camera;
   out.rate_hz = 30.0;

@@ -53,6 +53,7 @@ class SelectedDataset : public Dataset {
     return read;
   }
   ColourImage ReadColour(std::size_t i) const override { return whole_->ReadColour(Place(i)); }
+  double SkippedShare() const override { return whole_->SkippedShare(); }
   const CameraRig& Rig() const override { return rig_; }
   std::optional<std::filesystem::path> GroundTruthFile() const override { return whole_->GroundTruthFile(); }
   Trajectory ReadGroundTruth(const std::filesystem::path& file,

@@ -33,6 +33,7 @@ class TurnedDataset : public Dataset {
   std::int64_t Number(std::size_t i) const override { return stored_->Number(i); }
   ReadResult Read(std::size_t i) const override;
   ColourImage ReadColour(std::size_t i) const override;
+  double SkippedShare() const override { return stored_->SkippedShare(); }
   const CameraRig& Rig() const override { return rig_; }
   std::optional<std::filesystem::path> GroundTruthFile() const override { return stored_->GroundTruthFile(); }
   Trajectory ReadGroundTruth(const std::filesystem::path& file,

@@ -58,5 +58,22 @@ TEST(WrapText, BreaksBetweenWordsAndFillsEachLine) {
   EXPECT_THAT(WrapText("", 80), ElementsAre(""));
 }
 
+TEST(Message, IsBrokenBetweenWordsOnATerminalAlone) {
+  int master = -1, slave = -1;
+  winsize size{};
+  size.ws_col = 24;
+  ASSERT_EQ(openpty(&master, &slave, nullptr, nullptr, &size), 0);
+  std::FILE* terminal = fdopen(slave, "w");
+  EXPECT_EQ(Message("tutti: one two three four five", terminal), "tutti: one two three\n  four five\n");
+  EXPECT_EQ(Message("\n  good:\n    * one two three four", terminal),
+            "\n  good:\n    * one two three\n      four\n");
+  std::fclose(terminal);
+  close(master);
+  std::FILE* file = std::tmpfile();
+  const std::string text = "tutti: " + std::string(300, 'x') + " one two";
+  EXPECT_EQ(Message(text, file), text + "\n") << "one line, for other programs";
+  std::fclose(file);
+}
+
 }  // namespace
 }  // namespace tutti::internal

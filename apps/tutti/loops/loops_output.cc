@@ -229,7 +229,7 @@ nlohmann::ordered_json ProtocolJson(const LoopRun& run) {
        "posterior: of H"}};
 }
 
-OutputFolder OpenLoopsFolder(const std::filesystem::path& folder, bool table) {
+OutputLayout LoopsLayout(bool table) {
   const auto is_result = [](const std::filesystem::path& entry) {
     static const std::set<std::string> kFiles = {"results.json",
                                                  "hypotheses.csv",
@@ -251,8 +251,7 @@ OutputFolder OpenLoopsFolder(const std::filesystem::path& folder, bool table) {
   const auto is_part = [](const std::filesystem::path& entry) {
     return std::filesystem::exists(entry / "results.json") || std::filesystem::exists(entry / "table.json");
   };
-  const OutputLayout layout = {is_result, table ? "table.json" : "results.json", "protocol", {}, is_part};
-  return OutputFolder(folder, layout);
+  return {is_result, table ? "table.json" : "results.json", "protocol", {}, is_part};
 }
 
 std::filesystem::path WriteLoopRun(const LoopRun& run, const LoopReport& report, bool finished,

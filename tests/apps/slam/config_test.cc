@@ -6,8 +6,10 @@
 #include <algorithm>
 #include <array>
 #include <filesystem>
+#include <fstream>
 
 #include "tests/support/error_of.h"
+#include "tests/support/in_folder.h"
 #include "tests/support/test_data.h"
 #include "tutti/core/error.h"
 
@@ -173,6 +175,18 @@ TEST(Config, MissingFileSaysWhatIsNeeded) {
   } catch (const InputError& e) {
     EXPECT_THAT(e.what(), AllOf(HasSubstr("/nowhere/x.yaml"), HasSubstr("--config")));
   }
+}
+
+TEST(Config, ThatIsPartOfTuttiIsThereByItsNameFromAnyFolder) {
+  const testing::InFolder elsewhere(testing::FreshFolder());
+  const RunConfig wanted = LoadConfig(testing::SourceDir() / "data/configs/euroc_stereo.yaml");
+  for (const char* name : {"euroc_stereo", "euroc_stereo.yaml", "data/configs/euroc_stereo.yaml"}) {
+    EXPECT_EQ(LoadConfig(name).dataset.sensor, wanted.dataset.sensor) << name;
+    EXPECT_EQ(LoadConfig(name).dataset.type, DatasetType::kEuroc) << name;
+  }
+  EXPECT_THROW(LoadConfig("elsewhere/euroc_stereo.yaml"), InputError);
+  std::ofstream("euroc_stereo") << "dataset:\n  sensor: mono\n";
+  EXPECT_EQ(LoadConfig("euroc_stereo").dataset.sensor, Sensor::kMono) << "a file of this name comes first";
 }
 
 TEST(SetOptions, TakesTheKeysOfEverySection) {

@@ -150,6 +150,9 @@ class Dataset {
   /// size and pixels, without DatasetOptions::noise. Three times grey where the data is grey. Errors as
   /// Read().
   virtual ColourImage ReadColour(std::size_t i) const;
+  /// Share of the (left, or only) images of the whole data set that are no frames: they repeat a time stamp,
+  /// or lie in a damaged part of a bag. Warnings() says which.
+  virtual double SkippedShare() const { return 0; }
   /// The rig after rectification.
   virtual const CameraRig& Rig() const = 0;
   /// Ground truth in its usual place in the folder (T_world_body, stamps as Stamp()), if there is any.

@@ -1,5 +1,5 @@
-// Live cameras: camera:0, a pair camera:0,1, a stream rtsp://...; or video files in their stead, camera:FILE.
-// Frames come once, in order.
+// Live cameras: camera:0, a pair camera:0,1, a stream rtsp://...; or videos in their stead: camera:FILE, a
+// pipe. Frames come once, in order.
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -33,6 +33,8 @@ class CameraDataset : public Dataset {
                        "delivers no image; is it " +
                        (IsStream(name_) ? "a stream of video?" : "in use by another program?"));
     CheckFirst(frames_.at(0));
+    if (first_.Video() != nullptr)
+      options_.camera = CameraOfVideo(name_, *first_.Video(), options_, size_, warnings_);
     rig_ = RectifyRig(name_, options_, size_, rate_hz_, warnings_);
     mask_ = MaskOfAll(options_, size_, rig_.left);
   }
@@ -53,6 +55,7 @@ class CameraDataset : public Dataset {
     return true;
   }
   const CameraRig& Rig() const override { return rig_.rig; }
+  int TurnedBy() const override { return first_.Video() != nullptr ? first_.Video()->TurnedBy() : 0; }
   std::optional<std::filesystem::path> GroundTruthFile() const override { return std::nullopt; }
   const std::vector<std::string>& Warnings() const override { return warnings_; }
   Trajectory ReadGroundTruth(const std::filesystem::path& file,
@@ -72,6 +75,7 @@ class CameraDataset : public Dataset {
       result = std::move(found->second);
       frames_.erase(frames_.begin(), std::next(found));
     }
+    if (!result.frame) return result;
     if (result.frame->image.size() != size_) {
       result.frame.reset();
       result.error = About(i) + " has another size than the first";
@@ -121,6 +125,7 @@ class CameraDataset : public Dataset {
 
   // Takes the next image, or pair, into frames_; false at the end. Of one thread at a time.
   bool Grab() const {
+    if (ended_) return false;
     const auto seconds = [&] { return since_begin_.Seconds(); };
     GrabbedPair grabbed;
     if (second_ && !second_ended_) {
@@ -138,14 +143,25 @@ class CameraDataset : public Dataset {
       frame.image = frame.image.colRange(0, half).clone();
     }
     const std::lock_guard<std::mutex> lock(mutex_);
-    // A device's stamps are seconds since 1970, by a clock that can't go back.
-    frame.stamp_s = device_ ? begin_s_ + grabbed.first_s : static_cast<double>(stamps_.size()) / rate_hz_;
+    frame.stamp_s = StampOfNext(grabbed.first_s);
+    if (!stamps_.empty() && frame.stamp_s < stamps_.back() - 0.5 && !device_) {
+      ended_ = true;
+      taken.error = StampsJumpBack(name_, stamps_.size(), stamps_.back(), frame.stamp_s);
+    }
     if (!stamps_.empty() && frame.stamp_s <= stamps_.back()) frame.stamp_s = stamps_.back() + 1e-6;
     frame.index = static_cast<std::int64_t>(stamps_.size());
     stamps_.push_back(frame.stamp_s);
-    taken.frame = std::move(frame);
+    if (taken.error.empty()) taken.frame = std::move(frame);
     frames_[stamps_.size() - 1] = std::move(taken);
     return true;
+  }
+
+  // A device's are seconds since 1970, by a clock that can't go back; a video has its own, unless the rate is
+  // given. mutex_ is held.
+  double StampOfNext(double grabbed_s) const {
+    if (device_) return begin_s_ + grabbed_s;
+    const double of_video = options_.rate_hz > 0 ? 0 : first_.TakenAt();
+    return of_video > 0 ? of_video : static_cast<double>(stamps_.size()) / rate_hz_;
   }
 
   // The right or depth image of the frame that is next; or why there is none.
@@ -189,6 +205,7 @@ class CameraDataset : public Dataset {
   mutable CameraInput first_;                        // the left, colour, or only one
   mutable std::optional<CameraInput> second_;        // the right one, or depth
   mutable std::optional<std::size_t> second_ended_;  // it gave so many images
+  mutable bool ended_ = false;                       // what follows is another recording
   mutable std::mutex mutex_;
   mutable std::vector<double> stamps_;                // guarded by mutex_
   mutable std::map<std::size_t, ReadResult> frames_;  // not read yet, as taken; guarded by mutex_
@@ -247,16 +264,24 @@ bool IsStream(const std::string& name) {
                      [&](const char* scheme) { return name.rfind(scheme, 0) == 0; });
 }
 
-bool IsCamera(const std::string& name) { return name.rfind(kPrefix, 0) == 0 || IsStream(name); }
+bool IsPipe(const std::string& name) {
+  std::error_code ignored;
+  if (name == "-") return !std::filesystem::is_regular_file("/dev/stdin", ignored);
+  return std::filesystem::is_fifo(name, ignored);
+}
+
+bool IsCamera(const std::string& name) {
+  return name.rfind(kPrefix, 0) == 0 || IsStream(name) || name == "-" || IsPipe(name);
+}
 
 bool IsCameraDevice(const std::string& name) {
   if (IsStream(name)) return true;
-  return IsCamera(name) && AreNumbers(AtCommas(BehindPrefix(name)));
+  return name.rfind(kPrefix, 0) == 0 && AreNumbers(AtCommas(BehindPrefix(name)));
 }
 
 std::vector<std::string> CameraSources(const std::string& name) {
-  if (IsStream(name)) return {name};
   if (!IsCamera(name)) return {};
+  if (name.rfind(kPrefix, 0) != 0) return {name};
   const std::string source = BehindPrefix(name);
   std::vector<std::string> parts = AtCommas(source);
   std::error_code ignored;

@@ -54,6 +54,7 @@ class SelectedDataset : public Dataset {
   }
   ColourImage ReadColour(std::size_t i) const override { return whole_->ReadColour(Place(i)); }
   const CameraRig& Rig() const override { return rig_; }
+  int TurnedBy() const override { return whole_->TurnedBy(); }
   std::optional<std::filesystem::path> GroundTruthFile() const override { return whole_->GroundTruthFile(); }
   Trajectory ReadGroundTruth(const std::filesystem::path& file,
                              std::vector<std::string>* warnings) const override {

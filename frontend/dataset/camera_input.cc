@@ -29,7 +29,7 @@ CameraInput::CameraInput(const std::string& name, const std::string& source, Cam
   } else if (content == CameraContent::kDepth && fs::is_directory(source, ignored)) {
     files_ = DepthImages(source);
   } else {
-    if (fs::is_regular_file(source, ignored)) VideoDecoder(source).ListTicks();
+    if (fs::is_regular_file(source, ignored)) VideoDecoder(source).List();
     video_.emplace(source);
   }
 }

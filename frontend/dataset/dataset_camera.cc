@@ -26,12 +26,19 @@ class CameraDataset : public Dataset {
         device_(IsCameraDevice(name)),
         first_(Open(0)),
         second_(CameraSources(name).size() > 1 ? std::make_optional(Open(1)) : std::nullopt) {
+    const std::vector<std::string> sources = CameraSources(name);
     const double rate = options.rate_hz > 0 ? options.rate_hz : first_.RateHz();
     rate_hz_ = rate > 0 && rate < 1e4 ? rate : 30.0;
-    if (!Grab())
+    if (!Grab()) {
+      const std::string problem =
+          first_.Video() == nullptr ? "is it in use by another program?"
+          : IsStream(name_)         ? "is it a stream of video?"
+          : std::any_of(sources.begin(), sources.end(), IsPipe)
+              ? "an MP4 whose index is at its end can't come through a pipe: send it with -f matroska"
+              : "is it a complete video file?";
       throw InputError(name_ + ": " + (second_ ? first_.Source() + " " : std::string()) +
-                       "delivers no image; is it " +
-                       (IsStream(name_) ? "a stream of video?" : "in use by another program?"));
+                       "delivers no image; " + problem);
+    }
     CheckFirst(frames_.at(0));
     if (first_.Video() != nullptr)
       options_.camera = CameraOfVideo(name_, *first_.Video(), options_, size_, warnings_);

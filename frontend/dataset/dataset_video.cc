@@ -1,6 +1,7 @@
 // A video file. Decoders are sequential, so random access is emulated: frames that a reader thread skips over
 // are kept for a while for its neighbours, and going far back starts from the beginning.
 #include <algorithm>
+#include <functional>
 #include <map>
 #include <mutex>
 #include <set>
@@ -31,8 +32,8 @@ void DropRepeated(const std::string& name, std::vector<std::int64_t>& ticks,
                     " frames repeat a time stamp and are skipped");
 }
 
-// By decoding all of it.
-VideoTimes DecodedTimes(const std::string& name, double rate_hz) {
+// By decoding all of it. `listed`: when its frames are to be decoded, for containers that say no more (AVI).
+VideoTimes DecodedTimes(const std::string& name, const std::vector<std::int64_t>& listed, double rate_hz) {
   VideoTimes out;
   VideoDecoder video(name);
   std::size_t frames = 0;
@@ -49,9 +50,15 @@ VideoTimes DecodedTimes(const std::string& name, double rate_hz) {
   }
   DropRepeated(name, out.ticks, out.notes);
   if (!out.ticks.empty() || frames == 0) return out;
-  for (std::size_t i = 0; i < frames; ++i) out.stamps_s.push_back(static_cast<double>(i) / rate_hz);
-  out.notes.push_back(name + ": has no time stamps; " + std::to_string(rate_hz) +
-                      " frames a second are assumed (dataset.rate_hz)");
+  const bool grows = std::adjacent_find(listed.begin(), listed.end(), std::greater_equal<>()) == listed.end();
+  const bool use_listed = grows && listed.size() == frames;
+  for (std::size_t i = 0; i < frames; ++i)
+    out.stamps_s.push_back(use_listed ? video.Seconds(listed[i] - listed[0])
+                                      : static_cast<double>(i) / rate_hz);
+  out.notes.push_back(
+      name + (use_listed ? ": says when frames are decoded, and not when they are shown; those times are used"
+                         : ": has no time stamps; " + std::to_string(rate_hz) +
+                               " frames a second are assumed (dataset.rate_hz)"));
   return out;
 }
 
@@ -59,10 +66,11 @@ VideoTimes DecodedTimes(const std::string& name, double rate_hz) {
 VideoTimes TimesOf(const std::string& name, std::optional<std::int64_t> first, double rate_hz) {
   VideoTimes out;
   VideoDecoder video(name);
-  out.ticks = video.ListTicks();
+  VideoDecoder::Listed listed = video.List();
+  out.ticks = std::move(listed.shown);
   const auto begin = first ? std::find(out.ticks.begin(), out.ticks.end(), *first) : out.ticks.end();
   if (begin == out.ticks.end()) {
-    out = DecodedTimes(name, rate_hz);
+    out = DecodedTimes(name, listed.decoded, rate_hz);
   } else {
     if (begin != out.ticks.begin())
       out.notes.push_back(name + ": the first " + std::to_string(begin - out.ticks.begin()) +

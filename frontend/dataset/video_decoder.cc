@@ -215,25 +215,24 @@ double VideoDecoder::PixelAspect() const {
   return aspect.num > 0 && aspect.den > 0 ? av_q2d(aspect) : 1;
 }
 
-std::vector<std::int64_t> VideoDecoder::ListTicks() {
-  std::vector<std::int64_t> ticks;
-  bool suffices = !parts_->Interlaced();
-  std::optional<std::int64_t> decoded;  // when the packet before is to be decoded, which never goes back
+VideoDecoder::Listed VideoDecoder::List() {
+  Listed out;
+  bool shown = !parts_->Interlaced(), decoded = true;
   while (parts_->NextPacket()) {
     const AVPacket& packet = *parts_->packet;
     if (packet.size == 0 || (packet.flags & AV_PKT_FLAG_DISCARD) != 0) continue;  // shows nothing new
-    if (packet.dts != AV_NOPTS_VALUE) {
-      if (decoded && Seconds(*decoded - packet.dts) > kSloppy)
-        throw InputError(
-            StampsJumpBack(parts_->source, ticks.size(), Seconds(*decoded), Seconds(packet.dts)));
-      decoded = packet.dts;
-    }
-    suffices = suffices && packet.pts != AV_NOPTS_VALUE && (packet.flags & AV_PKT_FLAG_CORRUPT) == 0;
-    ticks.push_back(packet.pts);
+    const std::size_t at = out.decoded.size();
+    decoded = decoded && packet.dts != AV_NOPTS_VALUE;
+    if (decoded && at > 0 && Seconds(out.decoded.back() - packet.dts) > kSloppy)
+      throw InputError(StampsJumpBack(parts_->source, at, Seconds(out.decoded.back()), Seconds(packet.dts)));
+    shown = shown && packet.pts != AV_NOPTS_VALUE && (packet.flags & AV_PKT_FLAG_CORRUPT) == 0;
+    out.shown.push_back(packet.pts);
+    out.decoded.push_back(packet.dts);
   }
-  if (!suffices) return {};
-  std::sort(ticks.begin(), ticks.end());
-  return ticks;
+  if (!shown) out.shown.clear();
+  if (!decoded) out.decoded.clear();
+  std::sort(out.shown.begin(), out.shown.end());
+  return out;
 }
 
 std::string StampsJumpBack(const std::string& name, std::size_t at, double before_s, double stamp_s) {

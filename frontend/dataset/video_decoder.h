@@ -41,10 +41,14 @@ class VideoDecoder {
   /// Width of a pixel over its height, as the images are stored (before they are turned).
   double PixelAspect() const;
 
-  /// The times of all frames by what the container alone says, sorted; empty if that does not suffice (no
-  /// times, interlaced frames in two parts) and all must be decoded. Consumes the video. Throws InputError
-  /// where the times jump back.
-  std::vector<std::int64_t> ListTicks();
+  /// What the container alone says of its frames, in ticks; consumes the video. Throws InputError where the
+  /// times jump back.
+  struct Listed {
+    std::vector<std::int64_t> shown;    ///< sorted; empty if that does not suffice (no times, interlaced
+                                        ///< frames in two parts) and all must be decoded
+    std::vector<std::int64_t> decoded;  ///< when each is to be decoded; empty if it does not say so of all
+  };
+  Listed List();
 
  private:
   struct Parts;

@@ -192,14 +192,15 @@ TEST(Bag, MessagesThatAreCompressedEachForItselfAreUnpacked) {
   EXPECT_EQ(sqlite3_exec(database, "UPDATE messages SET data = zstd(data)", nullptr, nullptr, nullptr),
             SQLITE_OK);
   sqlite3_close(database);
-  DatasetOptions options = testing::With(Sensor::kStereo);
+  DatasetOptions options = testing::With(Sensor::kStereo, true);
+  options.camera->width = options.camera->height = 0;
+  options.camera->cx = options.camera->cy = 6;
   options.topic = "/left/image";
   options.right_topic = "/right/image/compressed";
   options.baseline_m = 0.5;
   const auto packed = OpenDataset(file, options), plain = OpenDataset(OfOthers("sqlite.db3"), options);
   ASSERT_EQ(packed->Size(), plain->Size());
-  EXPECT_EQ(packed->Warnings(),
-            std::vector<std::string>{file.string() + ": calibration of /left/camera_info"});
+  EXPECT_TRUE(packed->Warnings().empty());
   for (std::size_t i = 0; i < plain->Size(); ++i) {
     const ReadResult a = packed->Read(i), b = plain->Read(i);
     ASSERT_TRUE(a.frame && b.frame) << a.error << b.error;

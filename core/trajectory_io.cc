@@ -254,6 +254,8 @@ std::vector<double> ReadTimes(const std::filesystem::path& file) {
   std::vector<double> out;
   ForEachLine(file, [&](std::size_t line, const std::vector<std::string>& w) {
     out.push_back(NumberOf(file, line, w[0]));
+    if (out.size() > 1 && out.back() < out[out.size() - 2])
+      Fail(file, line, "goes back in time; sort the file, or cut it there if it is two recordings");
   });
   return out;
 }

@@ -57,9 +57,8 @@ DatasetOptions Whole(DatasetOptions options) {
   return options;
 }
 
-bool HasOwnStamps(const fs::path& images, const DatasetOptions& options) {
-  const DatasetType type = options.type != DatasetType::kAuto ? options.type : DetectDatasetType(images);
-  return type != DatasetType::kImages && type != DatasetType::kVideo;
+DatasetType TypeOf(const fs::path& images, const DatasetOptions& options) {
+  return options.type != DatasetType::kAuto ? options.type : DetectDatasetType(images);
 }
 
 bool Grows(const std::vector<double>& stamps) {
@@ -92,7 +91,8 @@ GivenOdometry::GivenOdometry(const GivenOdometryFiles& files, const fs::path& im
   const std::unique_ptr<Dataset> all = OpenDataset(images, Whole(options_));
   std::vector<double> times;
   if (files.times) times = ReadTimes(*files.times);
-  const bool own = HasOwnStamps(images, options_);
+  const DatasetType type = TypeOf(images, options_);
+  const bool own = type != DatasetType::kImages && type != DatasetType::kVideo;
   if (files.times && times.size() != all->Size() &&
       (poses.has_stamps || times.size() != poses.trajectory.size()))
     throw InputError(files.times->string() + ": has " + std::to_string(times.size()) + " time stamps, but " +
@@ -176,6 +176,10 @@ std::vector<double> GivenOdometry::ImageStamps(const Dataset& all) {
   if (!names.empty()) {
     notes_.push_back("the images have the time stamps that they are called by");
     return names;
+  }
+  if (trajectory_.size() != count && has_stamps_ && TypeOf(images_, options_) == DatasetType::kVideo) {
+    notes_.push_back("the frames have the time stamps of the video");
+    return {};
   }
   if (trajectory_.size() != count)
     throw InputError(images_.string() + ": nothing says when its " + std::to_string(count) +

@@ -1,12 +1,11 @@
 #include "apps/run/recording.h"
 
-#include <cmath>
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 
 #include "apps/run/calibration_file.h"
 #include "apps/run/photo_lens.h"
-#include "core/angle.h"
 #include "core/camera_text.h"
 #include "core/example_configs.h"
 #include "core/text_reader.h"
@@ -41,9 +40,14 @@ RunConfig Published(const std::string& name) {
   return ParseConfig(internal::ExampleConfig(name).value(), "tutti's " + name + ".yaml");
 }
 
-// The pixels that the camera must fit.
-void SetImageSize(const fs::path& dataset, const DatasetOptions& options, PinholeCamera& camera) {
-  if (camera.width > 0 && camera.height > 0) return;
+// What can be opened once is opened for the run alone: its size is not known before.
+bool OpensOnce(const fs::path& dataset) {
+  const std::vector<std::string> sources = CameraSources(dataset.string());
+  return std::any_of(sources.begin(), sources.end(), IsPipe);
+}
+
+// The camera of the images by their size alone, with this field of view [deg] if one is given.
+PinholeCamera CameraBySize(const fs::path& dataset, const DatasetOptions& options, double view_deg = 0) {
   const bool live = IsCamera(dataset.string());
   DatasetOptions any = options;
   if (!live) any.sensor = Sensor::kMono;  // of cameras it says how large one of two images is
@@ -53,30 +57,27 @@ void SetImageSize(const fs::path& dataset, const DatasetOptions& options, Pinhol
   any.T_right_left = {};
   any.mask.clear();
   any.rotate = 0;
+  any.fov_deg = view_deg;
   const DatasetType type = live ? DatasetType::kVideo : DetectDatasetType(dataset);
   if (type == DatasetType::kKitti || type == DatasetType::kTum) {
     // Without any camera these can't be opened: one that fits every image.
     any.type = DatasetType::kImages;
-    if (const std::optional<fs::path> images = ImagesOfDataset(dataset)) {
-      const PinholeCamera seen = OpenDataset(*images, any)->Rig().camera;
-      camera.width = seen.width;
-      camera.height = seen.height;
-      return;
-    }
+    if (const std::optional<fs::path> images = ImagesOfDataset(dataset))
+      return OpenDataset(*images, any)->Rig().camera;
     throw InputError(dataset.string() +
                      ": the size of the images is not known; use --calibration with a file that has it");
   }
   if (IsCameraDevice(dataset.string()) && !IsStream(dataset.string()))
     throw InputError(dataset.string() + ": a live camera needs a calibration with its image size");
-  const PinholeCamera seen = OpenDataset(dataset, any)->Rig().camera;
-  camera.width = seen.width;
-  camera.height = seen.height;
+  return OpenDataset(dataset, any)->Rig().camera;
 }
 
-void SetView(double view_deg, PinholeCamera& camera) {
-  camera.fx = camera.fy = 0.5 * camera.width / std::tan(0.5 * view_deg / internal::kDegrees);
-  camera.cx = 0.5 * (camera.width - 1);
-  camera.cy = 0.5 * (camera.height - 1);
+// The pixels that the camera must fit.
+void SetImageSize(const fs::path& dataset, const DatasetOptions& options, PinholeCamera& camera) {
+  if ((camera.width > 0 && camera.height > 0) || OpensOnce(dataset)) return;
+  const PinholeCamera seen = CameraBySize(dataset, options);
+  camera.width = seen.width;
+  camera.height = seen.height;
 }
 
 void CheckCamera(const PinholeCamera& camera, const std::string& source) {
@@ -108,11 +109,15 @@ std::string SetRequested(const fs::path& dataset, const CameraRequest& request, 
     source = "--camera";
     SetImageSize(dataset, options, camera);
   } else {
-    SetImageSize(dataset, options, camera);
-    SetView(*request.view_deg, camera);
     source = "--fov " + Short(*request.view_deg);
+    if (OpensOnce(dataset)) {
+      options.fov_deg = *request.view_deg;
+      options.camera.reset();
+      return source;
+    }
+    camera = CameraBySize(dataset, options, *request.view_deg);
   }
-  CheckCamera(camera, source);
+  if (camera.width > 0) CheckCamera(camera, source);  // else once there is an image
   if (options.right) CheckCamera(*options.right, source + ": right");
   options.camera = camera;
   return source;
@@ -248,6 +253,7 @@ class Recogniser {
                        "(COLOUR,DEPTH)");
     layout_ = live && IsStream(dataset_)     ? "a stream"
               : two                          ? "two cameras"
+              : OpensOnce(dataset_)          ? "a video through a pipe"
               : live                         ? "a camera"
               : type == DatasetType::kImages ? "a folder of images"
               : type == DatasetType::kBag    ? "a ROS bag"
@@ -281,7 +287,7 @@ class Recogniser {
     std::error_code ignored;
     const fs::path folder = fs::is_directory(dataset_, ignored) ? dataset_ : dataset_.parent_path();
     CameraRequest request;
-    if (!IsStream(dataset_.string())) request.calibration = CalibrationBeside(folder);
+    if (!IsStream(dataset_.string()) && !OpensOnce(dataset_)) request.calibration = CalibrationBeside(folder);
     Options().sensor = sensor_.value_or(Sensor::kMono);
     if (!request.calibration) {
       request.view_deg = kUsualView;
@@ -290,7 +296,7 @@ class Recogniser {
     source_ = SetRequested(dataset_, request, Options());
     if (!out_.guessed_lens) return;
     source_ = "guessed: a field of view of " + Short(kUsualView) + " deg";
-    UsePhotos();
+    if (!OpensOnce(dataset_)) UsePhotos();
   }
   // The focal length of the first photo that has one, as a better guess.
   void UsePhotos() {
@@ -328,8 +334,9 @@ class Recogniser {
     if (Options().camera) {
       const PinholeCamera& c = *Options().camera;
       char text[160];
-      std::snprintf(text, sizeof text, "%dx%d px, fx %.1f, fy %.1f (", c.width, c.height, c.fx, c.fy);
+      std::snprintf(text, sizeof text, "fx %.1f, fy %.1f (", c.fx, c.fy);
       camera = text + camera + ")";
+      if (c.width > 0) camera = std::to_string(c.width) + "x" + std::to_string(c.height) + " px, " + camera;
     }
     out_.findings = {
         "layout  " + layout_ + "; --set dataset.type=... for another", "sensor  " + sensor + other,

@@ -3,6 +3,7 @@
 #include <memory>
 #include <string>
 
+#include "apps/tutti/camera_options.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/configuration_of.h"
 #include "core/terminal.h"
@@ -15,10 +16,12 @@ namespace {
 
 struct CheckArguments {
   std::string config, dataset;
+  CameraWords camera;
 };
 
-int Check(const CheckArguments& arguments) {
-  const RunConfig config = ConfigurationOf(arguments.config, arguments.dataset);
+int Check(const CLI::App& command, const CheckArguments& arguments) {
+  const RunConfig config =
+      ConfigurationOf(arguments.config, arguments.dataset, CameraOf(command, arguments.camera));
   const std::unique_ptr<Dataset> dataset = OpenDataset(arguments.dataset, config.dataset);
   const CameraRig& rig = dataset->Rig();
   for (const std::string& warning : dataset->Warnings())
@@ -61,7 +64,8 @@ void SetUpCalibrateCheck(CLI::App& command, int& exit_code) {
       ->required();
   command.add_option("--config", arguments->config,
                      "YAML file, as for `tutti run`; without it, what is found in the recording is checked");
-  command.callback([arguments, &exit_code] { exit_code = Check(*arguments); });
+  AddCameraOptions(command, arguments->camera);
+  command.callback([&command, arguments, &exit_code] { exit_code = Check(command, *arguments); });
 }
 
 }  // namespace tutti::cli

@@ -12,6 +12,7 @@
 #include "apps/run/interrupt.h"
 #include "apps/run/output_folder.h"
 #include "apps/run/runner.h"
+#include "apps/tutti/camera_options.h"
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/comparison.h"
@@ -41,6 +42,7 @@ struct CompareArguments {
   int runs = 5, start = 0, end = 0, stride = 1, threads = 2;
   double noise = 0;
   bool separate = false;
+  CameraWords camera;
 };
 
 // The configuration of a variant. Throws InputError for a word that is none.
@@ -228,7 +230,11 @@ int RunCompare(const CLI::App& command, CompareArguments arguments) {
   const TableFormat format = ParseTableFormat(arguments.table_format);
   CheckVariants(arguments);
   OutputFolder::Check(arguments.out, Layout());
-  const RunConfig config = ConfigurationOf(arguments.config, arguments.datasets.front());
+  const RunConfig config =
+      ConfigurationOf(arguments.config, arguments.datasets.front(), CameraOf(command, arguments.camera));
+  for (const std::string& dataset : arguments.datasets) {
+    if (IsPipe(dataset)) DetectDatasetType(dataset);  // says that it comes once
+  }
   const Experiment experiment(command, arguments, config);
   DatasetOptions last = config.dataset;
   last.start = arguments.start + arguments.runs - 1;
@@ -271,6 +277,7 @@ void SetUpCompare(CLI::App& command, int& exit_code) {
   command.add_option("--config", arguments->config,
                      "YAML file, as for `tutti run`; without it, layout, sensor and calibration are found in "
                      "the first recording, and what was found is said");
+  AddCameraOptions(command, arguments->camera);
   command.add_option("--out", arguments->out,
                      "folder for all runs and for comparison.md, comparison.json and report.html (default: "
                      "tutti-out/NAME-compared)");

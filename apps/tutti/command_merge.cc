@@ -56,7 +56,6 @@ bool AreTheSame(const fs::path& a, const fs::path& b) {
 }
 
 int Merge(const MergeArguments& arguments) {
-  RequireWritable({arguments.out});
   std::error_code ignored;
   if (AreTheSame(arguments.first, arguments.second))
     throw InputError(arguments.first + " and " + arguments.second +

@@ -137,6 +137,10 @@ FolderContents FindImages(const std::filesystem::path& folder, const DatasetOpti
 }
 
 DatasetType DetectDatasetType(const std::filesystem::path& path) {
+  if (IsCamera(path.string()))
+    throw InputError(path.string() +
+                     ": gives its frames once, in order, and all of them are needed here; save them as a "
+                     "video file, and give that");
   std::error_code code;
   if (!std::filesystem::exists(path, code)) {
     throw InputError(path.string() +

@@ -49,7 +49,7 @@ bool StampOrder::Accept(std::size_t line, double stamp_s) {
   if (last_ && stamp_s < *last_) {
     throw InputError(At(file_, line) + "time stamp " + std::to_string(stamp_s) +
                      " s goes back in time (the one before is " + std::to_string(*last_) +
-                     " s); sort the file by time");
+                     " s); sort the file by time, or cut it there if it is two recordings");
   }
   if (last_ && stamp_s == *last_) {
     constexpr std::size_t kMostLines = 5;

@@ -17,6 +17,9 @@ struct ImageFile {
   std::string error;
 };
 
+/// What pixels become: one channel, three with blue first, both of 8 or 16 bit; or nothing else (depth).
+enum class Pixels { kGrey, kColour, kStored };
+
 /// More is no image of a camera; memory and time to read one have a bound: 16-bit colour needs 6 bytes a
 /// pixel.
 constexpr std::uint64_t kMostImagePixels = 1ULL << 27;  // 134 million, 11585 x 11585

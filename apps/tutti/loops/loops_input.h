@@ -5,9 +5,11 @@
 #include <filesystem>
 #include <memory>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "tutti/core/camera.h"
 #include "tutti/loopclosure/ground_truth.h"
 
 namespace tutti {
@@ -56,8 +58,10 @@ struct ImageSet {
 std::filesystem::path ImageFolder(const std::filesystem::path& folder);
 
 /// Of a folder of images, a video, or a bag. A loop matrix that lies among the images is none of them.
-/// `topic`: of a bag's images; empty: its only one. Throws InputError.
+/// `topic`: of a bag's images; empty: its only one. `camera`: of a recording, whose images are rectified with
+/// it. Throws InputError.
 ImageSet LoadImageSet(const std::string& path, const GroundTruthArguments& arguments,
-                      const std::string& topic = "");
+                      const std::string& topic = "",
+                      const std::optional<PinholeCamera>& camera = std::nullopt);
 
 }  // namespace tutti::cli

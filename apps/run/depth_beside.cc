@@ -9,26 +9,8 @@
 #include "tutti/core/text.h"
 
 namespace tutti {
-namespace {
 
 namespace fs = std::filesystem;
-
-}  // namespace
-
-std::vector<std::pair<double, fs::path>> StampsInNames(const std::vector<fs::path>& files) {
-  std::vector<std::pair<double, fs::path>> stamps;
-  for (const fs::path& file : files) {
-    const std::string stem = file.stem().string();
-    const bool like_a_time = stem.find('.') != std::string::npos || stem.size() >= 10;
-    const std::optional<double> number = like_a_time ? ParseDouble(stem) : std::nullopt;
-    if (number && std::isfinite(*number))
-      stamps.emplace_back(*number > 1e14 ? 1e-9 * *number : *number, file);
-  }
-  std::sort(stamps.begin(), stamps.end());
-  const auto same = [](const auto& a, const auto& b) { return a.first == b.first; };
-  if (std::adjacent_find(stamps.begin(), stamps.end(), same) != stamps.end()) stamps.clear();
-  return stamps;
-}
 
 DepthBeside::DepthBeside(std::unique_ptr<Dataset> images, const std::vector<double>& stamps,
                          const fs::path& depth, const DatasetOptions& options)
@@ -48,19 +30,18 @@ DepthBeside::DepthBeside(std::unique_ptr<Dataset> images, const std::vector<doub
     files_ = found;
     return;
   }
-  const auto named = StampsInNames(found);
+  const auto named = StampsInNames(found).stamps;
   files_.resize(stamps.size());
   std::size_t alone = stamps.size();
   for (std::size_t i = 0; i < stamps.size() && !named.empty(); ++i) {
-    const auto later =
-        std::lower_bound(named.begin(), named.end(), stamps[i],
-                         [](const auto& stamp_and_file, double s) { return stamp_and_file.first < s; });
+    const auto later = std::lower_bound(named.begin(), named.end(), stamps[i],
+                                        [](const auto& stamp, double s) { return stamp.first < s; });
     auto nearest = later;
     if (later == named.end() ||
         (later != named.begin() && stamps[i] - (later - 1)->first < later->first - stamps[i]))
       nearest = later - 1;
     if (std::abs(nearest->first - stamps[i]) > options.max_association_s) continue;
-    files_[i] = nearest->second;
+    files_[i] = found[nearest->second];
     --alone;
   }
   if (alone == stamps.size())

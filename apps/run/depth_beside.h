@@ -13,11 +13,6 @@
 
 namespace tutti {
 
-/// Time stamps [s] that files are called by (seconds with a point, else ten digits or more: seconds, or
-/// nanoseconds), of those that are: ascending. Empty if two are the same.
-std::vector<std::pair<double, std::filesystem::path>> StampsInNames(
-    const std::vector<std::filesystem::path>& files);
-
 /// One camera's images with registered depth: an RGB-D data set.
 class DepthBeside : public Dataset {
  public:

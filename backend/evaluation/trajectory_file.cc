@@ -7,6 +7,7 @@
 
 #include "core/replaced_file.h"
 #include "core/text_reader.h"
+#include "core/time_stamps.h"
 #include "tutti/backend/g2o_io.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
@@ -57,16 +58,17 @@ Trajectory GraphTrajectory(const std::filesystem::path& file, std::vector<std::s
 }
 
 void GiveStamps(const std::filesystem::path& file, const std::vector<double>& times, PoseFile& out) {
-  if (out.format == PoseFileFormat::kKitti && times.size() != out.trajectory.size()) {
+  if (!out.has_numbers && times.size() != out.trajectory.size()) {
     throw InputError(file.string() + ": has " + std::to_string(out.trajectory.size()) +
                      " poses, but there are " + std::to_string(times.size()) +
                      " time stamps; KITTI's times.txt has one line per pose");
   }
   for (StampedPose& pose : out.trajectory) {
     if (!(pose.stamp_s >= 0 && pose.stamp_s < static_cast<double>(times.size()))) {
-      throw InputError(file.string() + ": vertex " + std::to_string(static_cast<long long>(pose.stamp_s)) +
+      throw InputError(file.string() + (out.format == PoseFileFormat::kG2o ? ": vertex " : ": frame ") +
+                       std::to_string(static_cast<long long>(pose.stamp_s)) +
                        " has no time stamp, there are " + std::to_string(times.size()) +
-                       "; the id of a vertex is its line in the file of times, from 0");
+                       "; its number is its line in the file of times, from 0");
     }
     pose.stamp_s = times[static_cast<std::size_t>(pose.stamp_s)];
   }
@@ -81,10 +83,13 @@ void GiveStamps(const std::filesystem::path& file, const std::vector<double>& ti
 PoseFile ReadAs(const std::filesystem::path& file, PoseFileFormat format, const std::vector<double>& times) {
   PoseFile out;
   out.format = format;
-  out.has_stamps = format == PoseFileFormat::kTum || format == PoseFileFormat::kEuroc;
-  out.trajectory = format == PoseFileFormat::kG2o ? GraphTrajectory(file, out.warnings)
-                                                  : ReadTrajectory(file, CoreFormat(format), &out.warnings,
-                                                                   &out.rotations_as_written, &out.sigmas);
+  if (format == PoseFileFormat::kG2o) {
+    out.trajectory = GraphTrajectory(file, out.warnings);
+    out.has_stamps = false;
+    out.has_numbers = true;
+  } else {
+    out.trajectory = ReadTrajectory(file, CoreFormat(format), &out.warnings, &out);
+  }
   if (!out.has_stamps && !times.empty()) GiveStamps(file, times, out);
   return out;
 }
@@ -140,11 +145,40 @@ PoseFile ReadPoseFile(const std::filesystem::path& file, std::optional<PoseFileF
   }
 }
 
-void WritePoseFile(const std::filesystem::path& file, const Trajectory& trajectory, PoseFileFormat format) {
+void AgreeOnUnit(double others_begin_s, double others_end_s, PoseFile& poses) {
+  if (poses.unit_is_certain || !poses.has_stamps) return;
+  const internal::TimeSpan own = {poses.trajectory.front().stamp_s, poses.trajectory.back().stamp_s};
+  const StampUnit unit = internal::UnitWithin({poses.unit, false}, own, {others_begin_s, others_end_s});
+  const double factor = internal::SecondsOf(unit) / internal::SecondsOf(poses.unit);
+  if (unit == poses.unit) return;
+  for (StampedPose& pose : poses.trajectory) pose.stamp_s *= factor;
+  const std::string said = internal::UnitNote({}, poses.unit, unit);
+  const auto is_said = [&](const std::string& warning) {
+    return warning.size() > said.size() &&
+           warning.compare(warning.size() - said.size(), said.size(), said) == 0;
+  };
+  poses.warnings.erase(std::remove_if(poses.warnings.begin(), poses.warnings.end(), is_said),
+                       poses.warnings.end());
+  poses.unit = unit;
+  poses.stamps_ns.clear();
+}
+
+void AgreeOnUnit(PoseFile& a, PoseFile& b) {
+  const double begin_s = a.trajectory.front().stamp_s, end_s = a.trajectory.back().stamp_s;
+  AgreeOnUnit(b.trajectory.front().stamp_s, b.trajectory.back().stamp_s, a);
+  AgreeOnUnit(begin_s, end_s, b);
+}
+
+void WritePoseFile(const std::filesystem::path& file, const Trajectory& trajectory, PoseFileFormat format,
+                   const std::vector<std::int64_t>& stamps_ns) {
   if (format != PoseFileFormat::kG2o) {
-    WriteTrajectory(file, trajectory, CoreFormat(format));
+    WriteTrajectory(file, trajectory, CoreFormat(format), stamps_ns);
     return;
   }
+  if (!HasRotations(trajectory))
+    throw InputError(file.string() +
+                     ": can't be written: the poses are positions alone, and vertices of g2o need rotations; "
+                     "write tum or euroc");
   PoseGraph graph(GraphKind::kSE3);
   for (std::size_t k = 0; k < trajectory.size(); ++k) {
     const int id = static_cast<int>(k);
@@ -156,13 +190,13 @@ void WritePoseFile(const std::filesystem::path& file, const Trajectory& trajecto
   WriteG2o(file, graph);
 }
 
-void WriteTimes(const std::filesystem::path& file, const Trajectory& trajectory) {
+void WriteTimes(const std::filesystem::path& file, const Trajectory& trajectory,
+                const std::vector<std::int64_t>& stamps_ns) {
   std::string text;
-  char line[64];
-  for (const StampedPose& pose : trajectory) {
-    std::snprintf(line, sizeof line, "%.9f\n", pose.stamp_s);
-    text += line;
-  }
+  for (std::size_t k = 0; k < trajectory.size(); ++k)
+    text +=
+        (stamps_ns.empty() ? internal::StampText(trajectory[k].stamp_s) : internal::StampText(stamps_ns[k])) +
+        '\n';
   internal::WriteFile(file, text);
 }
 

@@ -122,13 +122,26 @@ FolderContents FindImages(const std::filesystem::path& folder, const DatasetOpti
   std::vector<std::filesystem::path> files = ListImages(folder);
   if (files.empty()) throw InputError(folder.string() + ": holds no images (png, jpg, webp, ...)");
   DropStrayTypes(folder, files, out.warnings);
-  for (const std::filesystem::path& file : files) {
+  const internal::StampsOfNames named = StampsInNames(files);
+  // Of a folder that grows, the unit must show in the first names.
+  constexpr double kSince1970_s = 5e8;
+  const bool has_stamps = named.stamps.size() == files.size() &&
+                          (options.follow_s == 0 || named.stamps.front().first >= kSince1970_s);
+  for (std::size_t i = 0; i < files.size(); ++i) {
     FrameFiles frame;
-    const auto number = static_cast<std::int64_t>(out.frames.size());
-    frame.stamp_s = static_cast<double>(number) / out.rate_hz;
-    frame.image = file;
-    out.pose_stamps.emplace_back(number, frame.stamp_s);
+    frame.stamp_s = has_stamps ? named.stamps[i].first : static_cast<double>(i) / out.rate_hz;
+    frame.image = files[has_stamps ? named.stamps[i].second : i];
+    out.pose_stamps.emplace_back(i, frame.stamp_s);
     out.frames.push_back(std::move(frame));
+  }
+  if (has_stamps) {
+    out.stamp_unit = named.unit;
+    if (files.size() > 1)
+      out.rate_hz =
+          static_cast<double>(files.size() - 1) / (out.frames.back().stamp_s - out.frames.front().stamp_s);
+    out.warnings.push_back(folder.string() +
+                           ": the images have the time stamps that they are called by, in " +
+                           internal::NameOf(named.unit));
   }
   out.pose_count = files.size();
   if (!out.left) out.warnings.push_back(NoCalibrationText(folder.string()));

@@ -6,6 +6,7 @@
 
 #include "core/text_input.h"
 #include "core/text_reader.h"
+#include "core/time_stamps.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 
@@ -43,6 +44,41 @@ double NumberAt(const std::filesystem::path& file, const TextLine& line, std::si
                      "' is not a finite number; repair or remove the line");
   }
   return *value;
+}
+
+std::vector<double> StampsAt(const std::filesystem::path& file, const std::vector<TextLine>& lines,
+                             StampUnit& unit, std::vector<std::string>& warnings, std::size_t word) {
+  std::vector<double> stamps;
+  stamps.reserve(lines.size());
+  for (const TextLine& line : lines) stamps.push_back(NumberAt(file, line, word));
+  const StampUnit found = internal::UnitOfStamps(stamps, unit).unit;
+  const std::string note = internal::UnitNote(file.string(), found, unit);
+  if (!note.empty()) warnings.push_back(note);
+  unit = found;
+  for (double& stamp : stamps) stamp *= internal::SecondsOf(unit);
+  return stamps;
+}
+
+Trajectory StampedByFrame(const std::filesystem::path& file, const Trajectory& poses,
+                          const TrajectoryDetails& details, std::size_t count,
+                          const std::vector<std::pair<std::int64_t, double>>& frames) {
+  if (!details.has_numbers && poses.size() != count) {
+    throw InputError(file.string() + ": has " + std::to_string(poses.size()) +
+                     " poses, but the sequence has " + std::to_string(count) +
+                     " frames; KITTI poses need one line for each frame");
+  }
+  Trajectory out;
+  auto pose = poses.begin();
+  for (const auto& [number, stamp_s] : frames) {
+    while (pose != poses.end() && pose->stamp_s < static_cast<double>(number)) ++pose;
+    if (pose == poses.end()) break;
+    if (pose->stamp_s == static_cast<double>(number)) out.push_back({stamp_s, pose->pose});
+  }
+  if (out.empty())
+    throw InputError(file.string() + ": has no pose with the number of a frame; it numbers " +
+                     std::to_string(std::llround(poses.front().stamp_s)) + " to " +
+                     std::to_string(std::llround(poses.back().stamp_s)));
+  return out;
 }
 
 bool StampOrder::Accept(std::size_t line, double stamp_s) {
@@ -252,29 +288,17 @@ std::optional<std::filesystem::path> FolderDataset::GroundTruthFile() const {
 
 Trajectory FolderDataset::ReadGroundTruth(const std::filesystem::path& file,
                                           std::vector<std::string>* warnings) const {
-  const TrajectoryFormat format = GuessTrajectoryFormat(file);
-  Trajectory poses = ReadTrajectory(file, format, warnings);
-  if (format == TrajectoryFormat::kKitti) {
-    if (contents_.pose_count == 0 && poses.size() != Size()) {
-      throw InputError(file.string() + ": has " + std::to_string(poses.size()) +
-                       " poses, but the data set has " + std::to_string(Size()) +
-                       " frames; KITTI poses need one line for each frame");
-    }
-    if (contents_.pose_count != 0 && poses.size() != contents_.pose_count) {
-      throw InputError(file.string() + ": has " + std::to_string(poses.size()) +
-                       " poses, but the sequence has " + std::to_string(contents_.pose_count) +
-                       " frames; they must be as many");
-    }
-    Trajectory stamped;
-    if (contents_.pose_count == 0) {
-      for (std::size_t i = 0; i < Size(); ++i) stamped.push_back({Stamp(i), poses[i].pose});
-    }
-    for (const auto& [line, stamp] : contents_.pose_stamps) {
-      stamped.push_back({stamp, poses[static_cast<std::size_t>(line)].pose});
-    }
-    poses = std::move(stamped);
-  } else {
+  TrajectoryDetails details;
+  Trajectory poses =
+      ReadTrajectory(file, GuessTrajectoryFormat(file), warnings, &details, contents_.stamp_unit);
+  if (details.has_stamps) {
     for (StampedPose& p : poses) p.stamp_s *= contents_.stamp_scale;
+  } else if (!contents_.pose_stamps.empty()) {
+    poses = StampedByFrame(file, poses, details, contents_.pose_count, contents_.pose_stamps);
+  } else {
+    std::vector<std::pair<std::int64_t, double>> frames;
+    for (std::size_t i = 0; i < Size(); ++i) frames.emplace_back(i, Stamp(i));
+    poses = StampedByFrame(file, poses, details, Size(), frames);
   }
   if (options_.mirrored_ground_truth) MirrorY(poses);
   return poses;

@@ -51,10 +51,11 @@ struct FolderContents {
   double rate_hz = 10;
   std::vector<std::filesystem::path> truth_places;  ///< the first that exists is the ground truth
   std::vector<std::pair<std::int64_t, double>>
-      pose_stamps;             ///< KITTI: (line of the pose, stamp) of each frame
-  std::size_t pose_count = 0;  ///< KITTI: poses that the file must have
-  double stamp_scale = 1;      ///< factor on the stamps of the ground truth
-  std::size_t skipped = 0;     ///< (left, or colour) images that are no frames: Dataset::SkippedShare
+      pose_stamps;                             ///< KITTI: (line of the pose, stamp) of each frame
+  std::size_t pose_count = 0;                  ///< KITTI: poses that the file must have
+  StampUnit stamp_unit = StampUnit::kSeconds;  ///< of the images' stamps where they are written
+  double stamp_scale = 1;                      ///< factor on the stamps of the ground truth
+  std::size_t skipped = 0;  ///< (left, or colour) images that are no frames: Dataset::SkippedShare
   std::vector<std::string> warnings;
 };
 
@@ -115,6 +116,15 @@ std::vector<TextLine> ReadTextLines(const std::filesystem::path& file);
 std::string At(const std::filesystem::path& file, std::size_t line);
 /// The word as a finite number. Throws InputError that names file and line.
 double NumberAt(const std::filesystem::path& file, const TextLine& line, std::size_t word);
+
+/// The first word of each line [s], or another one. `unit`: what is expected, and gets what it is; said in
+/// `warnings` if it is another one. Throws InputError that names file and line.
+std::vector<double> StampsAt(const std::filesystem::path& file, const std::vector<TextLine>& lines,
+                             StampUnit& unit, std::vector<std::string>& warnings, std::size_t word = 0);
+/// Takes ground truth apart for frames, whose poses it may number. `frames`: (number of the frame, stamp).
+Trajectory StampedByFrame(const std::filesystem::path& file, const Trajectory& poses,
+                          const TrajectoryDetails& details, std::size_t count,
+                          const std::vector<std::pair<std::int64_t, double>>& frames);
 
 /// Watches that the stamps of a file grow: duplicates are to be skipped (with a warning for the first five
 /// and their count), unsorted stamps throw InputError. Nothing else adds warnings in the meantime.

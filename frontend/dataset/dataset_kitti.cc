@@ -138,8 +138,10 @@ FolderContents FindKitti(const std::filesystem::path& folder, const DatasetOptio
   const std::filesystem::path times_file = folder / "times.txt";
   const bool have_times = std::filesystem::exists(times_file, code);
   std::vector<TextLine> times;
+  std::vector<double> stamps;
   if (have_times) {
     times = ReadTextLines(times_file);
+    stamps = StampsAt(times_file, times, out.stamp_unit, out.warnings);
     if (static_cast<std::int64_t>(times.size()) < count) {
       throw InputError(times_file.string() + ": has " + std::to_string(times.size()) + " time stamps, but " +
                        left_folder.string() + " has images up to number " + std::to_string(count - 1) +
@@ -163,9 +165,9 @@ FolderContents FindKitti(const std::filesystem::path& folder, const DatasetOptio
     FrameFiles frame;
     frame.stamp_s = static_cast<double>(n) / rate_hz;
     if (have_times) {
-      const TextLine& line = times[static_cast<std::size_t>(n)];
-      frame.stamp_s = NumberAt(times_file, line, 0);
-      if (!order.Accept(line.number, frame.stamp_s)) continue;
+      const auto line = static_cast<std::size_t>(n);
+      frame.stamp_s = stamps[line];
+      if (!order.Accept(times[line].number, frame.stamp_s)) continue;
     }
     const auto image = images.find(n);
     const auto right = right_images.find(n);

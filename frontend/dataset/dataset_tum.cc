@@ -3,6 +3,7 @@
 #include <cmath>
 #include <tuple>
 
+#include "core/time_stamps.h"
 #include "frontend/dataset/dataset_folder.h"
 #include "tutti/core/error.h"
 
@@ -27,13 +28,16 @@ std::string NameIn(const TextLine& line, const std::filesystem::path& folder) {
 }
 
 // `skipped`: lines that are of no use; may be null.
-std::vector<StampedFile> ReadList(const std::filesystem::path& folder, const char* name,
+std::vector<StampedFile> ReadList(const std::filesystem::path& folder, const char* name, StampUnit& unit,
                                   std::vector<std::string>& warnings, std::size_t* skipped) {
   const std::filesystem::path list = folder / name;
   std::vector<StampedFile> files;
   StampOrder order(list, warnings);
-  for (const TextLine& line : ReadTextLines(list)) {
-    const double stamp = NumberAt(list, line, 0);
+  const std::vector<TextLine> lines = ReadTextLines(list);
+  const std::vector<double> stamps = StampsAt(list, lines, unit, warnings);
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const TextLine& line = lines[i];
+    const double stamp = stamps[i];
     const std::string name_in_list = NameIn(line, folder);
     if (name_in_list.empty()) {
       throw InputError(At(list, line.number) + "has " + std::to_string(line.words.size()) +
@@ -72,11 +76,13 @@ std::vector<int> Associate(const std::vector<StampedFile>& colour, const std::ve
 }
 
 void FromLists(const std::filesystem::path& folder, const DatasetOptions& options, FolderContents& out) {
-  const std::vector<StampedFile> colour = ReadList(folder, "rgb.txt", out.warnings, &out.skipped);
+  const std::vector<StampedFile> colour =
+      ReadList(folder, "rgb.txt", out.stamp_unit, out.warnings, &out.skipped);
   std::vector<int> match(colour.size(), -1);
   std::vector<StampedFile> depth;
   if (options.sensor == Sensor::kRgbd) {
-    depth = ReadList(folder, "depth.txt", out.warnings, nullptr);
+    StampUnit unit = out.stamp_unit;
+    depth = ReadList(folder, "depth.txt", unit, out.warnings, nullptr);
     match = Associate(colour, depth, options.max_association_s);
   }
   std::size_t alone = 0;
@@ -109,24 +115,31 @@ void FromAssociations(const std::filesystem::path& folder, const DatasetOptions&
   const std::filesystem::path list = folder / "associations.txt";
   const std::vector<TextLine> lines = ReadTextLines(list);
   StampOrder order(list, out.warnings);
-  bool counts = true;  // stamps are frame numbers that name the files (ICL-NUIM), not seconds
   for (const TextLine& line : lines) {
     if (line.words.size() != 4) {
       throw InputError(At(list, line.number) + "has " + std::to_string(line.words.size()) +
                        " columns; 4 are needed: stamp, colour file, stamp, depth file");
     }
-    const bool depth_first = line.words[1].rfind("depth", 0) == 0 || line.words[3].rfind("rgb", 0) == 0;
+  }
+  const bool depth_first =
+      !lines.empty() && (lines[0].words[1].rfind("depth", 0) == 0 || lines[0].words[3].rfind("rgb", 0) == 0);
+  const std::size_t colour = depth_first ? 2 : 0;
+  const std::vector<double> stamps = StampsAt(list, lines, out.stamp_unit, out.warnings, colour);
+  bool counts = true;  // stamps are frame numbers that name the files (ICL-NUIM), not times
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const TextLine& line = lines[i];
     FrameFiles frame;
-    frame.stamp_s = NumberAt(list, line, depth_first ? 2 : 0);
-    NumberAt(list, line, depth_first ? 0 : 2);
-    frame.image = folder / line.words[depth_first ? 3 : 1];
-    if (options.sensor == Sensor::kRgbd) frame.depth = folder / line.words[depth_first ? 1 : 3];
-    counts = counts && line.words[depth_first ? 2 : 0] == frame.image.stem().string() &&
-             line.words[depth_first ? 2 : 0].find('.') == std::string::npos;
+    frame.stamp_s = stamps[i];
+    NumberAt(list, line, 2 - colour);
+    frame.image = folder / line.words[colour + 1];
+    if (options.sensor == Sensor::kRgbd) frame.depth = folder / line.words[3 - colour];
+    names.push_back(frame.image.stem().string());
+    counts = counts && line.words[colour] == names.back() && names.back().find('.') == std::string::npos;
     if (order.Accept(line.number, frame.stamp_s)) out.frames.push_back(std::move(frame));
   }
   out.skipped = order.skipped();
-  if (counts && out.frames.size() > 1) {
+  if (counts && out.frames.size() > 1 && internal::FindStamps(names).stamps.empty()) {
     out.stamp_scale = 1.0 / (options.rate_hz > 0 ? options.rate_hz : 30.0);
     for (FrameFiles& frame : out.frames) frame.stamp_s *= out.stamp_scale;
     out.warnings.push_back(list.string() + ": its time stamps are frame numbers; " +

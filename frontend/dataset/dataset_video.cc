@@ -177,17 +177,12 @@ class VideoDataset : public Dataset {
 
   Trajectory ReadGroundTruth(const std::filesystem::path& file,
                              std::vector<std::string>* warnings) const override {
-    const TrajectoryFormat format = GuessTrajectoryFormat(file);
-    Trajectory poses = ReadTrajectory(file, format, warnings);
-    if (format == TrajectoryFormat::kKitti) {
-      if (poses.size() != Size()) {
-        throw InputError(file.string() + ": has " + std::to_string(poses.size()) +
-                         " poses, but the video has " + std::to_string(Size()) +
-                         " frames; they must be as many");
-      }
-      for (std::size_t i = 0; i < poses.size(); ++i) poses[i].stamp_s = Stamp(i);
-    }
-    return poses;
+    TrajectoryDetails details;
+    const Trajectory poses = ReadTrajectory(file, GuessTrajectoryFormat(file), warnings, &details);
+    if (details.has_stamps) return poses;
+    std::vector<std::pair<std::int64_t, double>> frames;
+    for (std::size_t i = 0; i < Size(); ++i) frames.emplace_back(i, Stamp(i));
+    return StampedByFrame(file, poses, details, Size(), frames);
   }
 
   ReadResult Read(std::size_t i) const override {

@@ -226,8 +226,20 @@ std::vector<std::filesystem::path> ListImages(const std::filesystem::path& folde
   std::sort(names.begin(), names.end(), NaturalLess);
   std::vector<std::filesystem::path> files;
   files.reserve(names.size());
+  const internal::StampsOfNames found = StampsInNames({names.begin(), names.end()});
+  if (found.stamps.size() == names.size()) {  // also below 0, and with more decimals or fewer
+    for (const auto& stamp : found.stamps) files.push_back(folder / names[stamp.second]);
+    return files;
+  }
   for (const std::string& name : names) files.push_back(folder / name);
   return files;
+}
+
+internal::StampsOfNames StampsInNames(const std::vector<std::filesystem::path>& files) {
+  std::vector<std::string> names;
+  names.reserve(files.size());
+  for (const std::filesystem::path& file : files) names.push_back(file.stem().string());
+  return internal::FindStamps(names);
 }
 
 std::optional<std::filesystem::path> ImagesOfDataset(const std::filesystem::path& folder) {

@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "core/time_stamps.h"
+
 #pragma GCC visibility push(default)  // of the commands, too
 namespace tutti {
 
@@ -61,9 +63,11 @@ bool HasImageExtension(const std::filesystem::path& file);
 /// Where a data set's folder has the images of its (left) camera (KITTI: image_0 or image_2, TUM: rgb, EuRoC:
 /// mav0/cam0/data; images): the first of these that holds any.
 std::optional<std::filesystem::path> ImagesOfDataset(const std::filesystem::path& folder);
-/// The images in a folder in natural order (hidden and other files ignored); empty if the folder can't be
-/// read.
+/// The images in a folder (hidden and other files ignored) in the order of the time stamps that they are
+/// called by, else in natural order; empty if the folder can't be read.
 std::vector<std::filesystem::path> ListImages(const std::filesystem::path& folder);
+/// Time stamps that the files are called by.
+internal::StampsOfNames StampsInNames(const std::vector<std::filesystem::path>& files);
 
 }  // namespace tutti
 #pragma GCC visibility pop

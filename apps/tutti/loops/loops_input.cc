@@ -10,6 +10,8 @@
 #include "apps/tutti/loops/joined_pairs.h"
 #include "apps/tutti/loops/mat_file.h"
 #include "core/median.h"
+#include "core/number_lines.h"
+#include "core/pose_columns.h"
 #include "core/text_reader.h"
 #include "frontend/dataset/image_file.h"
 #include "tutti/backend/evaluation.h"
@@ -23,26 +25,26 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A trajectory has lines of 8 numbers (TUM) or 12 (KITTI), or commas and a header (EuRoC). A text matrix that
+// A trajectory has lines of so many numbers as one has, or a line that names its columns. A text matrix that
 // has just as many columns has as many rows, too. Throws InputError if it is no text.
 bool LinesOfPoses(const fs::path& file) {
   internal::TextReader in(file);
   std::string line;
-  std::size_t columns = 0;
-  std::size_t rows = 0;
-  bool euroc = false;
+  std::size_t columns = 0, rows = 0;
+  bool named = false;
   while (rows < 20 && in.Next(line)) {
-    if (line.rfind("#timestamp", 0) == 0 || line.rfind("#time", 0) == 0)
-      euroc = line.find(',') != std::string::npos;
-    if (line.empty() || line[0] == '#') continue;
-    const std::vector<std::string> words = SplitText(line);
-    if (words.empty() || !ParseDouble(words.front())) return false;
-    if (rows > 0 && words.size() != columns) return false;
+    const std::vector<std::string> words = internal::PoseWords(line);
+    if (words.empty()) continue;
+    const bool is_number = ParseDouble(words.front()).has_value();
+    if (rows == 0 && !is_number && internal::ColumnsOfNames(line)) named = true;
+    if (internal::IsComment(line) || (rows == 0 && named && !is_number)) continue;
+    if (!is_number || (rows > 0 && words.size() != columns)) return false;
     columns = words.size();
     ++rows;
   }
-  if (euroc) return rows > 0;
-  return (columns == 8 || columns == 12) && rows != columns;
+  if (named) return rows > 0;
+  const bool as_poses = columns == 4 || columns == 8 || columns == 12 || columns == 13 || columns >= 16;
+  return as_poses && columns <= 17 && rows != columns;
 }
 
 bool LooksLikeTrajectory(const fs::path& file) {
@@ -54,10 +56,10 @@ bool LooksLikeTrajectory(const fs::path& file) {
 }
 
 Trajectory ReadPoses(const fs::path& file) {
-  const TrajectoryFormat format = GuessTrajectoryFormat(file);
-  Trajectory trajectory = ReadTrajectory(file, format);
+  TrajectoryDetails details;
+  Trajectory trajectory = ReadTrajectory(file, GuessTrajectoryFormat(file), nullptr, &details);
   const fs::path times_file = file.parent_path() / "times.txt";
-  if (format != TrajectoryFormat::kKitti || !fs::exists(times_file)) return trajectory;
+  if (details.has_stamps || details.has_numbers || !fs::exists(times_file)) return trajectory;
   const std::vector<double> times = ReadTimes(times_file);
   if (times.size() != trajectory.size()) {
     throw InputError(times_file.string() + ": has " + std::to_string(times.size()) + " times, but " +
@@ -69,13 +71,18 @@ Trajectory ReadPoses(const fs::path& file) {
 
 using PosesOfImages = std::vector<std::optional<StampedPose>>;
 
-// The time stamps that images are named by; empty if their names are none.
-std::vector<double> StampsInNames(const std::vector<fs::path>& images) {
+// The time stamps that images are named by, in their order; numbers of frames for a file of poses that has
+// such; empty if their names are none.
+std::vector<double> StampsOfImages(const std::vector<fs::path>& images) {
   std::vector<double> stamps;
+  const internal::StampsOfNames named = StampsInNames(images);
+  for (const auto& stamp : named.stamps) stamps.push_back(stamp.first);
+  if (stamps.size() == images.size()) return stamps;
+  stamps.clear();
   for (const fs::path& image : images) {
-    const auto stamp = ParseDouble(image.stem().string());
-    if (!stamp) return {};
-    stamps.push_back(*stamp);
+    const auto number = ParseDouble(image.stem().string());
+    if (!number) return {};
+    stamps.push_back(*number);
   }
   return stamps;
 }
@@ -130,7 +137,7 @@ LoopGroundTruth FromPoses(const GroundTruthArguments& arguments, const std::vect
   }
   PosesOfImages poses(trajectory.begin(), trajectory.end());
   if (trajectory.size() != images.size())
-    poses = PosesAt(stamps.empty() ? StampsInNames(images) : stamps, trajectory);
+    poses = PosesAt(stamps.empty() ? StampsOfImages(images) : stamps, trajectory);
   if (poses.empty()) {
     throw InputError(arguments.file + ": has " + std::to_string(trajectory.size()) +
                      " poses, but there are " + std::to_string(images.size()) + " images, and their " +
@@ -141,7 +148,8 @@ LoopGroundTruth FromPoses(const GroundTruthArguments& arguments, const std::vect
   for (std::size_t i = 0; i < poses.size(); i += static_cast<std::size_t>(arguments.stride))
     strided.push_back(poses[i]);
   LoopGroundTruth truth = TruthOf(strided, arguments.rule);
-  truth.description = arguments.file + " (" + RuleText(arguments.rule) + ")";
+  truth.description = arguments.file + " (" + RuleText(arguments.rule) +
+                      (HasRotations(trajectory) ? ")" : "; positions alone: whatever the angle)");
   const auto unknown = std::count(strided.begin(), strided.end(), std::nullopt);
   if (unknown > 0) truth.description += "; of " + std::to_string(unknown) + " images it says nothing";
   return truth;

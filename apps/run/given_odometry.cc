@@ -121,6 +121,12 @@ GivenOdometry::GivenOdometry(const GivenOdometryFiles& files, const fs::path& im
     trajectory_ = poses.trajectory;
   }
   notes_.insert(notes_.end(), poses.warnings.begin(), poses.warnings.end());
+  jumps_ = FindJumps(trajectory_);
+  for (const OdometryJump& jump : jumps_) {
+    if (jump.comes_back) notes_.push_back(files.trajectory.string() + ": " + Sentence(jump));
+  }
+  as_given_ = trajectory_;
+  trajectory_ = WithoutOutliers(std::move(trajectory_), jumps_);
   SumUp(files.sigmas ? ReadMotionSigmas(*files.sigmas, trajectory_) : poses.sigmas);
 }
 

@@ -6,6 +6,7 @@
 
 #include "apps/run/depth_beside.h"
 #include "frontend/dataset/image_file.h"
+#include "frontend/dataset/layout.h"
 #include "tutti/backend/evaluation.h"
 #include "tutti/backend/trajectory_file.h"
 #include "tutti/core/error.h"
@@ -57,7 +58,8 @@ DatasetOptions Whole(DatasetOptions options) {
 }
 
 bool HasOwnStamps(const fs::path& images, const DatasetOptions& options) {
-  const DatasetType type = options.type != DatasetType::kAuto ? options.type : DetectDatasetType(images);
+  const DatasetType type = TypeToOpen(images, options);
+  if (type == DatasetType::kPaired) return HasStamps(images);
   return type != DatasetType::kImages && type != DatasetType::kVideo;
 }
 

@@ -69,6 +69,7 @@ int ChangeImages(const GenerateArguments& arguments) {
   o.progress = [&progress](std::size_t done, std::size_t total) { return progress(done, total); };
   const InterruptGuard guard;
   const ChangedImages result = WriteChangedImages(change, o);
+  for (const std::string& note : result.notes) std::fprintf(stderr, "tutti: %s\n", note.c_str());
   const char* d = arguments.out.c_str();
   if (result.written < result.taken) {
     std::fprintf(stderr, "\ninterrupted: %s holds the first %zu of %zu images and can be used\n", d,

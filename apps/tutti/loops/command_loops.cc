@@ -200,6 +200,7 @@ int RunLoops(const LoopsArguments& given) {
   if (!problem.empty()) throw InputError("ground truth: " + problem);
   cv::setNumThreads(arguments.options.threads);
   Input set = {LoadImageSet(arguments.images, arguments.truth, arguments.topic), std::nullopt, std::nullopt};
+  for (const std::string& note : set.notes) std::fprintf(stderr, "tutti: %s\n", note.c_str());
   if (set.recording) {
     for (const std::string& warning : set.recording->Warnings()) {
       if (warning == NoCalibrationText(arguments.images)) continue;  // loops need none

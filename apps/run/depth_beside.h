@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "frontend/dataset/depth_reader.h"
 #include "frontend/features/rectifier.h"
 #include "tutti/frontend/dataset.h"
 
@@ -42,7 +43,8 @@ class DepthBeside : public Dataset {
   std::unique_ptr<Dataset> images_;
   DatasetOptions options_;
   CameraRig rig_;
-  std::optional<Rectifier> rectifier_;        // of a camera with distortion
+  std::optional<Rectifier> rectifier_;  // of a camera with distortion
+  std::optional<DepthReader> reader_;
   std::vector<std::filesystem::path> files_;  // of each image; empty: none
   std::vector<std::string> warnings_;
 };

@@ -6,6 +6,7 @@
 
 #include "apps/run/depth_beside.h"
 #include "frontend/dataset/image_file.h"
+#include "frontend/dataset/layout.h"
 #include "tutti/backend/evaluation.h"
 #include "tutti/backend/trajectory_file.h"
 #include "tutti/core/error.h"
@@ -57,8 +58,10 @@ DatasetOptions Whole(DatasetOptions options) {
   return options;
 }
 
-DatasetType TypeOf(const fs::path& images, const DatasetOptions& options) {
-  return options.type != DatasetType::kAuto ? options.type : DetectDatasetType(images);
+bool HasOwnStamps(const fs::path& images, const DatasetOptions& options) {
+  const DatasetType type = TypeToOpen(images, options);
+  if (type == DatasetType::kPaired) return HasStamps(images);
+  return type != DatasetType::kImages && type != DatasetType::kVideo;
 }
 
 bool Grows(const std::vector<double>& stamps) {
@@ -91,8 +94,7 @@ GivenOdometry::GivenOdometry(const GivenOdometryFiles& files, const fs::path& im
   const std::unique_ptr<Dataset> all = OpenDataset(images, Whole(options_));
   std::vector<double> times;
   if (files.times) times = ReadTimes(*files.times, &notes_);
-  const DatasetType type = TypeOf(images, options_);
-  const bool own = type != DatasetType::kImages && type != DatasetType::kVideo;
+  const bool own = HasOwnStamps(images, options_);
   if (files.times && times.size() != all->Size() &&
       (poses.has_stamps || times.size() != poses.trajectory.size()))
     throw InputError(files.times->string() + ": has " + std::to_string(times.size()) + " time stamps, but " +
@@ -200,7 +202,7 @@ std::vector<double> GivenOdometry::ImageStamps(const Dataset& all, bool numbered
   if (fs::is_directory(images_, ignored) && StampsInNames(ListImages(images_)).stamps.size() == count)
     return stamps;  // of the names, which the data set says
   if (numbered) return stamps;
-  if (trajectory_.size() != count && has_stamps_ && TypeOf(images_, options_) == DatasetType::kVideo) {
+  if (trajectory_.size() != count && has_stamps_ && TypeToOpen(images_, options_) == DatasetType::kVideo) {
     notes_.push_back("the frames have the time stamps of the video");
     return stamps;
   }

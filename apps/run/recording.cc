@@ -10,7 +10,9 @@
 #include "core/example_configs.h"
 #include "core/text_reader.h"
 #include "frontend/dataset/image_file.h"
+#include "frontend/dataset/layout.h"
 #include "tutti/core/error.h"
+#include "tutti/core/text.h"
 #include "tutti/frontend/dataset.h"
 
 namespace tutti {
@@ -140,6 +142,8 @@ class Recogniser {
       Tum();
     } else if (type == DatasetType::kEuroc) {
       Euroc();
+    } else if (type == DatasetType::kPaired) {
+      Paired();
     } else {
       Single(type, live);
     }
@@ -206,20 +210,28 @@ class Recogniser {
   }
 
   void Tum() {
-    layout_ = "TUM (" + std::string(Exists("rgb.txt") ? "rgb.txt" : "associations.txt");
-    const bool depth = Exists("depth.txt") || Exists("associations.txt");
+    const TumLists lists = TumListsOf(dataset_);
+    const bool loris = std::string(lists.colour) == "color.txt";
+    layout_ = std::string(loris ? "OpenLORIS (" : "TUM (") +
+              (Exists(lists.colour) ? lists.colour : "associations.txt");
+    const bool depth = Exists(lists.depth) || Exists("associations.txt");
     if (!sensor_) sensor_ = depth ? Sensor::kRgbd : Sensor::kMono;
-    layout_ += depth && Exists("depth.txt") ? ", depth.txt)" : ")";
+    layout_ += Exists(lists.depth) ? std::string(", ") + lists.depth + ")" : ")";
     const std::string kind = sensor_ == Sensor::kRgbd ? "rgbd" : "mono";
     const std::string known = TumCamera();
     out_.config = Published((known.empty() ? "tum_fr3" : known) + "_" + kind);
     const std::optional<PinholeCamera> published = Options().camera;
     ForgetCamera();
+    const LayoutCalibration own = ReadTumCalibration(dataset_);
+    units_ = own.depth_units_per_m;
+    if (known.empty()) Options().depth_units_per_m = 0;
     if (request_.HasLens()) {
       Requested();
     } else if (!known.empty() && !CalibrationBeside(dataset_)) {
       Options().camera = published;
       source_ = "the one published for freiburg" + known.substr(6);
+    } else if (own.rig.left) {
+      source_ = own.source;
     } else {
       BesideOrGuess();
     }
@@ -243,6 +255,71 @@ class Recogniser {
     out_.config = Published(sensor_ == Sensor::kStereo ? "euroc_stereo" : "euroc_mono");
     source_ = "sensor.yaml";
     if (request_.HasLens()) Requested();
+  }
+
+  // What suits the sensor, and the places where such data are recorded.
+  const char* ConfigurationOf(const std::string& layout) const {
+    if (layout == "KITTI raw") return sensor_ == Sensor::kStereo ? "kitti_00-02_stereo" : "kitti_00-02_mono";
+    if (sensor_ == Sensor::kStereo) return "euroc_stereo";
+    return sensor_ == Sensor::kRgbd ? "tum_fr3_rgbd" : "images";
+  }
+
+  void Paired() {
+    const bool stray = IsStrayScanner(dataset_);
+    const std::optional<FoundLayout> found = stray ? std::nullopt : FindLayout(dataset_);
+    const std::string name = stray ? "Stray Scanner" : found->layout->name;
+    const bool depth = stray ? HasImages(dataset_ / "depth") : found->depth;
+    layout_ = stray ? name + (depth ? " (rgb.mp4, depth)" : " (rgb.mp4)") : found->Text();
+    if (!sensor_) sensor_ = found && found->right ? Sensor::kStereo : depth ? Sensor::kRgbd : Sensor::kMono;
+    if (found && found->right && depth && sensor_ == Sensor::kStereo)
+      note_ = "--sensor rgbd uses the depth images";
+    out_.config = Published(ConfigurationOf(name));
+    ForgetCamera();
+    Options().type = DatasetType::kPaired;
+    Options().rate_hz = 0;
+    Options().depth_units_per_m = 0;
+    units_ = stray ? 1000 : found->layout->depth_units_per_m;
+    if (name == "Replica" || name.rfind("TartanAir", 0) == 0)
+      Options().max_depth_m = name == "Replica" ? 0 : 80;  // exact; the sky is at 10 km
+    LayoutCalibration known;
+    if (stray && Exists("camera_matrix.csv")) {
+      known.source = "camera_matrix.csv";
+      known.rig.left.emplace();
+    } else if (found) {
+      DatasetOptions any;
+      any.type = DatasetType::kPaired;
+      const PinholeCamera seen = OpenDataset(dataset_, any)->Rig().camera;
+      known = ReadLayoutCalibration(dataset_, *found, cv::Size(seen.width, seen.height));
+    }
+    if (request_.HasLens()) {
+      Requested();
+    } else if (known.rig.left) {
+      source_ = known.source;
+    } else if (const auto file = found ? CalibrationOf(*found) : std::nullopt) {
+      CameraRequest request;
+      request.calibration = file;
+      Options().sensor = *sensor_;
+      source_ = SetRequested(dataset_, request, Options());
+    } else {
+      BesideOrGuess();
+    }
+    const bool apart =
+        Options().baseline_m > 0 || Options().right || known.rig.baseline_m > 0 || known.rig.right;
+    if (sensor_ != Sensor::kStereo || apart) return;
+    if (request_.sensor)
+      throw InputError(
+          dataset_.string() +
+          ": the distance of the two cameras is not known; a calibration of both (--calibration) or "
+          "--set camera.baseline_m=METRES says it");
+    sensor_ = depth ? Sensor::kRgbd : Sensor::kMono;
+    note_ = "the right camera is not used: no file says how far apart the two are";
+  }
+
+  std::optional<fs::path> CalibrationOf(const FoundLayout& found) const {
+    for (const std::string& name : SplitText(found.layout->calibration, "|")) {
+      if (Exists(name.c_str())) return dataset_ / name;
+    }
+    return std::nullopt;
   }
 
   void Single(DatasetType type, bool live) {
@@ -325,7 +402,10 @@ class Recogniser {
       sensor = "stereo";
       if (!live) other = "; --sensor mono uses the left camera alone";
     } else if (Options().sensor == Sensor::kRgbd) {
-      sensor = "RGB-D, " + Short(Options().depth_units_per_m) + " units of depth a metre";
+      const double units = Options().depth_units_per_m > 0 ? Options().depth_units_per_m : units_;
+      sensor = "RGB-D, " + (units > 0 ? Short(units) + " units of depth a metre"
+                                      : "5000 units of depth a metre assumed, as TUM has them");
+      if (units == 1) sensor = "RGB-D, depth in metres";
       other = " (--set dataset.depth_units_per_m=1000 for millimetres)";
       if (!live) other += "; --sensor mono uses colour alone";
     }
@@ -348,6 +428,7 @@ class Recogniser {
   std::optional<Sensor> sensor_;
   Recording out_;
   std::string layout_, source_, note_;
+  double units_ = 0;  // of depth, that the layout has; 0: not known
 };
 
 }  // namespace

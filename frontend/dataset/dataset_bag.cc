@@ -19,6 +19,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr double kRosUnits = 1000;  // of 16-bit depth: millimetres (REP 118)
+
 using Messages = std::vector<BagMessage>;
 
 class BagDataset : public Dataset {
@@ -255,7 +257,8 @@ class BagDataset : public Dataset {
     if (first.image.empty())
       throw InputError(file_.string() + ": none of the first images can be read: " + first.error);
     size_ = first.image.size();
-    bits_ = SignificantBits(first.image);
+    range_ = RangeOf({first.image});
+    if (range_.narrow) warnings_.push_back(file_.string() + ": " + RangeText(range_));
     const double span = Stamp(frames_.size() - 1) - Stamp(0);
     const double rate = span > 0 ? static_cast<double>(frames_.size() - 1) / span : 10.0;
     rig_ = RectifyRig(file_.string(), options_, size_, rate, warnings_);
@@ -287,7 +290,7 @@ class BagDataset : public Dataset {
     const cv::Mat image = OfTheSize(message, topic, pixels).image;
     if (image.depth() != CV_8U && image.depth() != CV_16U)
       throw InputError(topic + ": pixels are neither 8 nor 16 bit");
-    cv::Mat out = To8Bit(image, bits_);
+    cv::Mat out = To8Bit(image, range_);
     return rectifier ? rectifier->Apply(out) : out;
   }
 
@@ -295,7 +298,7 @@ class BagDataset : public Dataset {
     const MessageImage read = OfTheSize(message, options_.depth_topic, Pixels::kStored);
     if (read.image.channels() != 1) throw InputError(options_.depth_topic + ": is no depth image");
     cv::Mat depth =
-        DepthInMetres(read.image, read.metres ? 1.0 : options_.depth_units_per_m, options_.max_depth_m);
+        DepthInMetres(read.image, read.metres ? 1.0 : DepthUnits(options_, kRosUnits), options_.max_depth_m);
     return rig_.left ? rig_.left->Apply(depth, Sampling::kNearest) : depth;
   }
 
@@ -304,7 +307,7 @@ class BagDataset : public Dataset {
   double skipped_share_ = 0;
   RectifiedRig rig_;
   cv::Size size_;
-  int bits_ = 8;
+  GreyRange range_;
   std::vector<std::string> warnings_;
   cv::Mat mask_;  // rectified; empty: none
   std::unique_ptr<Bag> bag_;

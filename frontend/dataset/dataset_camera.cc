@@ -194,7 +194,7 @@ class CameraDataset : public Dataset {
     if (rig_.left) frame.image = rig_.left->Apply(frame.image);
     if (!frame.right.empty() && rig_.right) frame.right = rig_.right->Apply(frame.right);
     if (frame.depth_m.empty()) return;
-    frame.depth_m = DepthInMetres(frame.depth_m, options_.depth_units_per_m, options_.max_depth_m);
+    frame.depth_m = DepthInMetres(frame.depth_m, DepthUnits(options_, 0), options_.max_depth_m);
     if (rig_.left) frame.depth_m = rig_.left->Apply(frame.depth_m, Sampling::kNearest);
   }
 

@@ -205,6 +205,7 @@ int RunLoops(const LoopsArguments& given) {
   Input set = {LoadImageSet(arguments.images, arguments.truth, arguments.topic, camera), camera,
                std::nullopt};
   if (camera && set.recording) set.camera = set.recording->Rig().camera;
+  for (const std::string& note : set.notes) internal::Say("%s", note.c_str());
   if (set.recording) {
     for (const std::string& warning : set.recording->Warnings()) {
       if (warning == NoCalibrationText(arguments.images)) continue;  // loops need none

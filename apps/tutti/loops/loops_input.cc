@@ -14,6 +14,7 @@
 #include "core/pose_columns.h"
 #include "core/text_reader.h"
 #include "frontend/dataset/image_file.h"
+#include "frontend/dataset/layout.h"
 #include "tutti/backend/evaluation.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
@@ -172,14 +173,13 @@ fs::path ImageFolder(const fs::path& folder) {
   return images && ImagesIn(*images).size() > ImagesIn(folder).size() ? *images : folder;
 }
 
-std::vector<fs::path> ListImages(const fs::path& folder) {
+std::vector<fs::path> ListImages(const fs::path& folder, bool pairs, std::vector<std::string>* notes) {
   std::error_code error;
   if (!fs::is_directory(folder, error)) {
     throw InputError(folder.string() + ": no such folder; give the folder that holds the images");
   }
-  std::vector<fs::path> images = ImagesIn(folder);
-  if (images.empty()) throw InputError(folder.string() + ": holds no image files");
-  return images;
+  if (ImagesIn(folder).empty()) throw InputError(folder.string() + ": holds no image files");
+  return FramesIn(folder, pairs, notes);
 }
 
 std::vector<fs::path> ImagesIn(const fs::path& folder) {
@@ -267,7 +267,7 @@ ImageSet LoadImageSet(const std::string& path, const GroundTruthArguments& argum
       stamps.push_back(set.recording->Stamp(i));
     }
   } else {
-    images = ListImages(path);
+    images = ListImages(path, arguments.join_pairs, &set.notes);
     images.erase(std::remove_if(images.begin(), images.end(),
                                 [&](const auto& p) { return fs::equivalent(p, arguments.file, error); }),
                  images.end());

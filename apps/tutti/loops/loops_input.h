@@ -18,9 +18,10 @@ class Dataset;
 
 namespace tutti::cli {
 
-/// Image files of a folder in natural order; files of other types are ignored. Throws InputError if there are
-/// none.
-std::vector<std::filesystem::path> ListImages(const std::filesystem::path& folder);
+/// The images of a folder that are frames, as `tutti run` takes them (FramesIn: no pictures of another type,
+/// no depth, right ones only if `pairs` are wanted). Throws InputError if there are none.
+std::vector<std::filesystem::path> ListImages(const std::filesystem::path& folder, bool pairs,
+                                              std::vector<std::string>* notes);
 
 /// The same of a folder that may hold none.
 std::vector<std::filesystem::path> ImagesIn(const std::filesystem::path& folder);
@@ -47,6 +48,7 @@ struct ImageSet {
   std::vector<std::filesystem::path> rights;  ///< beside each of them; empty without join_pairs
   LoopGroundTruth truth;                      ///< of a set without one: every pair is ignored
   std::shared_ptr<const Dataset> recording;   ///< a video or a bag; null: the images are files
+  std::vector<std::string> notes;             ///< what was left out of a folder
   int stride = 1;                             ///< of the images among the recording's frames
 
   /// The (left) image in colour or grey, as it is stored; empty where it can't be read.

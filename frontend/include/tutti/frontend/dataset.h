@@ -1,4 +1,4 @@
-// Where frames come from: KITTI, TUM, EuRoC, a folder of images, a video.
+// Where frames come from: KITTI, TUM, EuRoC, other layouts, a folder of images, a video.
 #pragma once
 
 #include <array>
@@ -31,7 +31,7 @@ struct ColourImage {
 };
 
 /// The layout of a data set on disk.
-enum class DatasetType { kAuto, kKitti, kTum, kEuroc, kImages, kVideo, kBag };
+enum class DatasetType { kAuto, kKitti, kTum, kEuroc, kPaired, kImages, kVideo, kBag };
 
 /// The words of the YAML files.
 EnumWords<DatasetType> WordsOf(DatasetType);
@@ -42,10 +42,14 @@ using TransformRows = std::array<double, 16>;
 /// How to read a data set: sections `dataset:` and `camera:` of the YAML files.
 struct DatasetOptions {
   TUTTI_OPTION(DatasetType, type, DatasetType::kAuto,
-               "layout on disk (bag: ROS 1); auto: from what the folder holds", Basic());
+               "layout on disk; auto: from what the folder holds. paired: left and right, or colour and "
+               "depth, images side by side, as in TartanAir, ScanNet and others (data/README.md)",
+               Basic());
   TUTTI_OPTION(Sensor, sensor, Sensor::kMono, "what the camera is", Basic());
-  TUTTI_OPTION(double, depth_units_per_m, 5000, "RGB-D: value in the depth image of one metre", Basic(),
-               Above(0));
+  TUTTI_OPTION(double, depth_units_per_m, 0,
+               "RGB-D: value in the depth image of one metre (1000: millimetres); 0: that of the layout, "
+               "1000 in a ROS bag, else 5000 (TUM), and floats are metres",
+               Basic(), From(0));
   TUTTI_OPTION(double, max_depth_m, 0, "RGB-D: farther depth is not used; 0: no limit", Basic(), Unit("m"),
                From(0));
   TUTTI_OPTION(double, max_association_s, 0.02,

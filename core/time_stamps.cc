@@ -143,11 +143,23 @@ RecognisedUnit UnitOfStamps(const std::vector<double>& values, StampUnit expecte
   return UnitOfSpacing(gap, expected);
 }
 
-StampUnit UnitWithin(RecognisedUnit recognised, TimeSpan own, TimeSpan other) {
-  if (recognised.certain) return recognised.unit;
-  const double seconds = 1 / SecondsOf(recognised.unit);
-  const TimeSpan numbers = {own.begin_s * seconds, own.end_s * seconds};
-  return Overlap(numbers, other) > Overlap(own, other) ? StampUnit::kSeconds : recognised.unit;
+void FitUnit(TimeSpan others, Trajectory& poses, TrajectoryDetails& details,
+             std::vector<std::string>* warnings) {
+  if (details.unit_is_certain || !details.has_stamps || poses.empty()) return;
+  const double factor = 1 / SecondsOf(details.unit);
+  const TimeSpan own = {poses.front().stamp_s, poses.back().stamp_s};
+  details.unit_is_certain = true;
+  if (Overlap({own.begin_s * factor, own.end_s * factor}, others) <= Overlap(own, others)) return;
+  const std::string said = UnitNote({}, details.unit, StampUnit::kSeconds);
+  const auto says_it = [&](const std::string& warning) {
+    return warning.size() > said.size() &&
+           warning.compare(warning.size() - said.size(), said.size(), said) == 0;
+  };
+  if (warnings != nullptr)
+    warnings->erase(std::remove_if(warnings->begin(), warnings->end(), says_it), warnings->end());
+  for (StampedPose& pose : poses) pose.stamp_s *= factor;
+  details.unit = StampUnit::kSeconds;
+  details.stamps_ns.clear();
 }
 
 std::optional<std::int64_t> NanosecondsOf(std::string_view word, StampUnit unit) {

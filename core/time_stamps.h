@@ -22,7 +22,7 @@ const char* NameOf(StampUnit unit);
 /// Where the unit of a list comes from.
 struct RecognisedUnit {
   StampUnit unit = StampUnit::kSeconds;
-  bool certain = true;  ///< false: numbers of frames could look alike; see UnitWithin
+  bool certain = true;  ///< false: numbers of frames could look alike; see FitUnit
 };
 /// The unit in which the values, in the order of a file, are times since 1970, or else since any start at the
 /// rates of cameras and trackers. `expected` holds where its rates are plausible, and where nothing tells.
@@ -32,9 +32,10 @@ RecognisedUnit UnitOfStamps(const std::vector<double>& values, StampUnit expecte
 struct TimeSpan {
   double begin_s = 0, end_s = 0;
 };
-/// Seconds or milliseconds for stamps of an uncertain unit that span `own` in this unit: that with which they
-/// are of the time of `other`.
-StampUnit UnitWithin(RecognisedUnit recognised, TimeSpan own, TimeSpan other);
+/// Stamps of an uncertain unit, which were taken for milliseconds, become the numbers that they are if so
+/// they are of the time of the others rather. Then `warnings` (if there are any) no longer speak of the unit.
+void FitUnit(TimeSpan others, Trajectory& poses, TrajectoryDetails& details,
+             std::vector<std::string>* warnings);
 
 /// A number as written, in nanoseconds without rounding (beyond them: to the nearest). Nothing if it is no
 /// number or does not fit.

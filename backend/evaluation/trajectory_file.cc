@@ -146,21 +146,7 @@ PoseFile ReadPoseFile(const std::filesystem::path& file, std::optional<PoseFileF
 }
 
 void AgreeOnUnit(double others_begin_s, double others_end_s, PoseFile& poses) {
-  if (poses.unit_is_certain || !poses.has_stamps) return;
-  const internal::TimeSpan own = {poses.trajectory.front().stamp_s, poses.trajectory.back().stamp_s};
-  const StampUnit unit = internal::UnitWithin({poses.unit, false}, own, {others_begin_s, others_end_s});
-  const double factor = internal::SecondsOf(unit) / internal::SecondsOf(poses.unit);
-  if (unit == poses.unit) return;
-  for (StampedPose& pose : poses.trajectory) pose.stamp_s *= factor;
-  const std::string said = internal::UnitNote({}, poses.unit, unit);
-  const auto is_said = [&](const std::string& warning) {
-    return warning.size() > said.size() &&
-           warning.compare(warning.size() - said.size(), said.size(), said) == 0;
-  };
-  poses.warnings.erase(std::remove_if(poses.warnings.begin(), poses.warnings.end(), is_said),
-                       poses.warnings.end());
-  poses.unit = unit;
-  poses.stamps_ns.clear();
+  internal::FitUnit({others_begin_s, others_end_s}, poses.trajectory, poses, &poses.warnings);
 }
 
 void AgreeOnUnit(PoseFile& a, PoseFile& b) {

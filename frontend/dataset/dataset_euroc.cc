@@ -22,8 +22,7 @@ std::vector<StampedImage> ReadCsv(const std::filesystem::path& camera, StampUnit
   const std::filesystem::path csv = camera / "data.csv";
   std::vector<StampedImage> images;
   StampOrder order(csv, warnings);
-  std::vector<TextLine> lines = ReadTextLines(csv);
-  if (!lines.empty() && !ParseDouble(lines.front().words.front())) lines.erase(lines.begin());  // names
+  const std::vector<TextLine> lines = ReadListLines(csv);
   const std::vector<double> stamps = StampsAt(csv, lines, unit, warnings);
   for (std::size_t i = 0; i < lines.size(); ++i) {
     const TextLine& line = lines[i];

@@ -28,6 +28,13 @@ std::vector<TextLine> ReadTextLines(const std::filesystem::path& file) {
   return lines;
 }
 
+std::vector<TextLine> ReadListLines(const std::filesystem::path& file) {
+  std::vector<TextLine> lines = ReadTextLines(file);
+  const auto is_number = [&](std::size_t i) { return ParseDouble(lines[i].words.front()).has_value(); };
+  if (lines.size() > 1 && !is_number(0) && is_number(1)) lines.erase(lines.begin());
+  return lines;
+}
+
 double NumberAt(const std::filesystem::path& file, const TextLine& line, std::size_t word) {
   if (word >= line.words.size()) {
     throw InputError(At(file, line.number) + "has " + std::to_string(line.words.size()) +
@@ -306,8 +313,10 @@ Trajectory FolderDataset::ReadGroundTruth(const std::filesystem::path& file,
   TrajectoryDetails details;
   Trajectory poses =
       ReadTrajectory(file, GuessTrajectoryFormat(file), warnings, &details, contents_.stamp_unit);
+  const double scale = contents_.stamp_scale;
+  internal::FitUnit({Stamp(0) / scale, Stamp(Size() - 1) / scale}, poses, details, warnings);
   if (details.has_stamps) {
-    for (StampedPose& p : poses) p.stamp_s *= contents_.stamp_scale;
+    for (StampedPose& p : poses) p.stamp_s *= scale;
   } else if (!contents_.pose_stamps.empty()) {
     poses = StampedByFrame(file, poses, details, contents_.pose_count, contents_.pose_stamps);
   } else {

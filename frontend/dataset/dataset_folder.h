@@ -118,6 +118,8 @@ struct TextLine {
 };
 /// All lines that carry data. Throws InputError if the file can't be opened, or is none (a folder, a pipe).
 std::vector<TextLine> ReadTextLines(const std::filesystem::path& file);
+/// Those of a list of files with their stamps, whose first line may name the columns.
+std::vector<TextLine> ReadListLines(const std::filesystem::path& file);
 /// "file:line: ".
 std::string At(const std::filesystem::path& file, std::size_t line);
 /// The word as a finite number. Throws InputError that names file and line.

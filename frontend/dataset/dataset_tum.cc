@@ -95,7 +95,7 @@ std::vector<StampedFile> ReadList(const std::filesystem::path& folder, const cha
   const std::filesystem::path list = folder / name;
   std::vector<StampedFile> files;
   StampOrder order(list, warnings);
-  const std::vector<TextLine> lines = ReadTextLines(list);
+  const std::vector<TextLine> lines = ReadListLines(list);
   const std::vector<double> stamps = StampsAt(list, lines, unit, warnings);
   for (std::size_t i = 0; i < lines.size(); ++i) {
     const TextLine& line = lines[i];
@@ -158,7 +158,7 @@ void FromLists(const std::filesystem::path& folder, const TumLists& lists, const
 void FromAssociations(const std::filesystem::path& folder, const DatasetOptions& options,
                       FolderContents& out) {
   const std::filesystem::path list = folder / "associations.txt";
-  const std::vector<TextLine> lines = ReadTextLines(list);
+  const std::vector<TextLine> lines = ReadListLines(list);
   StampOrder order(list, out.warnings);
   for (const TextLine& line : lines) {
     if (line.words.size() != 4) {

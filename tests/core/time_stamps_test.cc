@@ -50,10 +50,15 @@ TEST(TimeStamps, TimesSinceAnyStartShowTheirUnitBySpacing) {
 }
 
 TEST(TimeStamps, NumbersOfKeyframesAreNoMillisecondsWhereTheOtherFileCountsFrames) {
-  const RecognisedUnit unit = UnitOfStamps(Every(15));
-  EXPECT_FALSE(unit.certain);
-  EXPECT_EQ(UnitWithin(unit, {0, 0.285}, {0, 299}), StampUnit::kSeconds);
-  EXPECT_EQ(UnitWithin(unit, {0, 0.285}, {0, 0.3}), StampUnit::kMilliseconds);
+  EXPECT_FALSE(UnitOfStamps(Every(15)).certain);
+  for (const double others_end_s : {299.0, 0.3}) {
+    TrajectoryDetails details;
+    details.unit = UnitOfStamps(Every(15)).unit;
+    details.unit_is_certain = false;
+    Trajectory poses = {{0, Pose()}, {0.285, Pose()}};
+    FitUnit({0, others_end_s}, poses, details, nullptr);
+    EXPECT_NEAR(poses.back().stamp_s, others_end_s > 1 ? 285 : 0.285, 1e-9);
+  }
 }
 
 TEST(TimeStamps, AreKeptToTheNanosecond) {

@@ -60,6 +60,7 @@ PinholeCamera CameraBySize(const fs::path& dataset, const DatasetOptions& option
   any.mask.clear();
   any.rotate = 0;
   any.fov_deg = view_deg;
+  any.baseline_m = 1;  // of pairs; it decides nothing here
   const DatasetType type = live ? DatasetType::kVideo : DetectDatasetType(dataset);
   if (type == DatasetType::kKitti || type == DatasetType::kTum) {
     // Without any camera these can't be opened: one that fits every image.

@@ -26,6 +26,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::seconds kPatience(30);  // with a stream that gives nothing
+constexpr int kMostFailures = 1000;            // of a decoder in a row, without another packet
 constexpr double kSloppy = 0.5;                // times go back by less without being another recording's [s]
 
 int IsOverdue(void* deadline) { return Clock::now() > *static_cast<Clock::time_point*>(deadline) ? 1 : 0; }
@@ -147,11 +148,13 @@ VideoDecoder::VideoDecoder(VideoDecoder&&) noexcept = default;
 VideoDecoder& VideoDecoder::operator=(VideoDecoder&&) noexcept = default;
 
 bool VideoDecoder::Grab() {
+  int failures = 0;  // damaged frames, and those before the first whole one
   while (true) {
     const int code = avcodec_receive_frame(parts_->codec.get(), parts_->frame.get());
     if (code >= 0) return true;
-    if (code == AVERROR_EOF || (code == AVERROR(EAGAIN) && parts_->flushing)) return false;
-    if (code != AVERROR(EAGAIN)) continue;  // a damaged frame, or those before the first whole one
+    if (code == AVERROR_EOF) return false;
+    if (code != AVERROR(EAGAIN) && ++failures < kMostFailures) continue;
+    if (parts_->flushing) return false;
     parts_->flushing = !parts_->NextPacket();
     avcodec_send_packet(parts_->codec.get(), parts_->flushing ? nullptr : parts_->packet.get());
   }
@@ -212,7 +215,9 @@ int VideoDecoder::TurnedBy() const {
 
 double VideoDecoder::PixelAspect() const {
   const AVRational aspect = av_guess_sample_aspect_ratio(parts_->format.get(), parts_->stream, nullptr);
-  return aspect.num > 0 && aspect.den > 0 ? av_q2d(aspect) : 1;
+  if (aspect.num <= 0 || aspect.den <= 0) return 1;
+  const double ratio = av_q2d(aspect);
+  return std::abs(ratio - 1) < 0.005 ? 1 : ratio;  // encoders round the shape of the whole image
 }
 
 VideoDecoder::Listed VideoDecoder::List() {

@@ -57,11 +57,11 @@ std::optional<PinholeCamera> CameraOfVideo(const std::string& name, const VideoD
   if (!camera && options.fov_deg > 0) {
     camera = CameraOfView(options.fov_deg, own);
     camera->fy *= aspect;
-  } else if (camera && cv::Size(camera->width, camera->height) == cv::Size(square_width, own.height)) {
-    camera = Widened(*camera, aspect, own.width);
-    pixels += "; the calibration, of square ones, is made that of " + SizeText(own);
-  } else if (camera) {
-    pixels += "; the calibration must be of images as they are stored, " + SizeText(own);
+  } else if (camera && aspect != 1) {
+    const bool square = cv::Size(camera->width, camera->height) == cv::Size(square_width, own.height);
+    if (square) camera = Widened(*camera, aspect, own.width);
+    pixels += square ? "; the calibration, of square ones, is made that of " + SizeText(own)
+                     : "; the calibration must be of images as they are stored, " + SizeText(own);
   }
   if (aspect != 1) warnings.push_back(pixels);
   if (degrees == 0) return camera;

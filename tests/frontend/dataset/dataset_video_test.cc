@@ -190,6 +190,9 @@ TEST(Video, ThatItsFlagTurnsTurnsTheSensorsCameraToo) {
     options.camera->cy = 33;
     EXPECT_EQ(OpenDataset(file, options)->Rig().camera.cx, 23);
   }
+  DatasetOptions of_view = With(Sensor::kMono);
+  of_view.fov_deg = 90;  // of the sensor, which is 64 pixels wide
+  EXPECT_NEAR(OpenDataset(file, of_view)->Rig().camera.fx, 32, 1e-9);
   options.readout_s = 0.01;
   EXPECT_THAT(OpenError(file, options), HasSubstr("rolling shutter"));
 }

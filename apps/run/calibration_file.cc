@@ -220,10 +220,8 @@ Calibration ReadCalibration(const fs::path& file, bool pairs) {
 
 std::optional<fs::path> CalibrationBeside(const fs::path& folder) {
   std::error_code ignored;
-  for (const char* name :
-       {"calibration.yaml", "calibration.yml", "camera.yaml", "camera.yml", "calib.yaml", "calib.yml",
-        "camera_info.yaml", "camchain.yaml", "sensor.yaml", "ost.yaml", "calibration.txt", "calibration.json",
-        "camera_intrinsic.json", "transforms.json", "cameras.txt", "camera_matrix.csv", "cam_params.json"}) {
+  for (const char* name : {"calibration.yaml", "calibration.yml", "camera.yaml", "camera.yml", "calib.yaml",
+                           "calib.yml", "camera_info.yaml", "camchain.yaml", "sensor.yaml", "ost.yaml"}) {
     if (fs::is_regular_file(folder / name, ignored)) return folder / name;
   }
   return std::nullopt;

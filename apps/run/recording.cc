@@ -415,7 +415,9 @@ class Recogniser {
     if (Options().camera) {
       const PinholeCamera& c = *Options().camera;
       char text[160];
-      std::snprintf(text, sizeof text, "fx %.1f, fy %.1f (", c.fx, c.fy);
+      const std::string lens =
+          c.distortion == Distortion::kNone ? "" : std::string(", ") + WordOf(c.distortion);
+      std::snprintf(text, sizeof text, "fx %.1f, fy %.1f%s (", c.fx, c.fy, lens.c_str());
       camera = text + camera + ")";
       if (c.width > 0) camera = std::to_string(c.width) + "x" + std::to_string(c.height) + " px, " + camera;
     }

@@ -128,11 +128,11 @@ std::string SetLens(const std::string& model, const std::vector<double>& values,
   camera.distortion = Distortion::kNone;
   camera.coefficients = {};
   const bool zeros = FirstUsed(values, 0) == values.size();
-  if (lens == Lens::kOther || (lens == Lens::kUnknown && (!zeros || values.empty())))
+  const bool needs_zeros = lens == Lens::kUnknown || lens == Lens::kZero;
+  if (lens == Lens::kOther || (needs_zeros && (!zeros || values.empty())))
     return name + " is none that tutti has" + remedy;
   if (zeros && lens != Lens::kEquidistant) return {};  // an equidistant lens without terms is no pinhole
   if (lens == Lens::kNone) return name + " has coefficients that are not 0; name the lens, or leave them out";
-  if (lens == Lens::kZero) return name + " is none that tutti has" + remedy;
   if (values.size() < 4)
     return name + " has " + std::to_string(values.size()) + " coefficients; 4 or 5 are needed";
   const std::size_t most = lens == Lens::kEquidistant ? 4 : 5;

@@ -156,7 +156,7 @@ std::optional<Calibration> FromRealSense(const CalibrationTable& table) {
     const std::vector<std::string>& words = lens->second.words;
     const auto terms = values.find("Coeffs:");
     table.Set(lens->second, JoinText({words.begin() + 1, words.end()}, " "),
-              terms == values.end() ? std::vector<double>{0} : table.Numbers(terms->second, 1), out.camera);
+              terms == values.end() ? std::vector<double>() : table.Numbers(terms->second, 1), out.camera);
   }
   return out;
 }

@@ -178,6 +178,9 @@ TEST(CalibrationFormats, OfACameraThatTuttiHasNotIsRefusedByItsName) {
   refused(kFlat + "Camera.model: fisheye\nCamera.k1: 0.1\nCamera.p1: 0.1\n", "'p1' is not 0");
   refused("model_type: MEI\nmirror_parameters: {xi: 1.9}\n" + size, "'MEI'");
   refused(R"({"value0": {"intrinsics": [{"camera_type": "ds", "intrinsics": {"fx": 1, "xi": 0}}]}})", "'ds'");
+  refused(R"({"value0": {"intrinsics": [{"camera_type": "fov", "intrinsics": {"fx": 295, "fy": 295, "cx": 160,
+          "cy": 120, "w": 0.9}}], "resolution": [[320, 240]]}})",
+          "'fov'");
   refused("1 FOV 320 240 295 295 160 120 0.9\n", "'FOV'");
   refused("1 THIN_PRISM_FISHEYE 320 240 295 295 160 120 0 0 0 0 0 0 0 0\n", "'THIN_PRISM_FISHEYE'");
   refused("1 OPENCV 320 240 295 295 160 120\n", "OPENCV has 4 parameters; 8 are needed");

@@ -360,8 +360,8 @@ PinholeCamera CameraOfKeys(const CalibrationKeys& outer, std::string* note) {
   const std::string wrong = internal::SetLens(lens, {0, 0, 0, 0}, any);  // before its values are missing
   if (!wrong.empty()) keys.Fail(keys.Find(kAnyModel).node, wrong);
   PinholeCamera camera = IntrinsicsOf(keys);
-  SetSize(keys, camera);
   SetLensOf(keys, keys.Find(kLens), lens, camera, note);
+  SetSize(keys, camera);
   const ImageWindow window = WindowOf(keys);
   if (!window.IsWhole()) *note = window.Text() + " applied";
   return Windowed(camera, window, keys.file().string());

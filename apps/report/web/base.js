@@ -50,6 +50,9 @@ function lineOf(name, width = 2) {
   return { color: SPARE[sum % SPARE.length], dash: sum % 2 ? 'dash' : 'solid', width };
 }
 
+// Dashed lines lie on solid ones, and both are seen where one covers the other.
+const solidFirst = (traces) => [...traces].sort((a, b) => Number(a.line?.dash !== 'solid') - Number(b.line?.dash !== 'solid'));
+
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
 // The library is packed; browsers unpack gzip since 2023.
@@ -110,7 +113,9 @@ async function chart(parent, size, traces, layout) {
 const note = (text) => el('p', { class: 'note' }, text);
 
 function table(header, rows, textColumns = []) {
-  const cell = (tag, text, column) => el(tag, textColumns.includes(column) ? { class: 'text' } : {}, String(text));
+  // A mean with its interval below, so that a table of many fits the page.
+  const parts = (text) => { const [mean, interval] = text.split(' +- '); return interval ? [mean, el('small', {}, `\u00b1 ${interval}`)] : [text]; };
+  const cell = (tag, text, column) => el(tag, textColumns.includes(column) ? { class: 'text' } : {}, parts(String(text)));
   return el('div', { class: 'scroll' }, el('table', {},
     el('thead', {}, el('tr', {}, header.map((h, k) => cell('th', h, k)))),
     el('tbody', {}, rows.map((row) => el('tr', {}, row.map((c, k) => cell('td', c, k)))))));

@@ -29,8 +29,8 @@ async function drawRelative(panel, lines) {
 
 async function drawErrors(panel) {
   const lines = errorLines();
-  const traces = (field) => lines.map(([name, error]) => ({ type: 'scatter', mode: 'lines', x: error.distance,
-    y: error[field], name: field === 'error' ? `${label(name)}: rmse ${lengthText(error.rmse)}` : label(name), line: lineOf(name) }));
+  const traces = (field) => solidFirst(lines.map(([name, error]) => ({ type: 'scatter', mode: 'lines', x: error.distance,
+    y: error[field], name: field === 'error' ? `${label(name)}: rmse ${lengthText(error.rmse)}` : label(name), line: lineOf(name) })));
   const range = { rangemode: 'tozero' };
   const x = 'distance along the reference [m]';
   await chart(panel, '', traces('error'), layoutOf('Absolute translation error',
@@ -67,7 +67,7 @@ async function drawRecall(panel) {
         const curve = r.precision_recall.curves.find((c) => c.name === which);
         return curve ? recallLine(curve, r.variant, lineOf(r.variant)) : [];
       });
-      await chart(panel, '', traces, layout(title));
+      await chart(panel, '', solidFirst(traces), layout(title));
     }
   }
   if (!run.precision_recall) {
@@ -75,7 +75,7 @@ async function drawRecall(panel) {
   }
   const traces = run.precision_recall.curves.flatMap((curve) =>
     recallLine(curve, curve.name === 'verified' ? 'ensemble, verified' : curve.name, lineOf(curve.name)));
-  await chart(panel, '', traces, layout(known.length > 1 ? `Members of ${run.variant}` : 'Members, ensemble, and the ensemble verified'));
+  await chart(panel, '', solidFirst(traces), layout(known.length > 1 ? `Members of ${run.variant}` : 'Members, ensemble, and the ensemble verified'));
   const pr = run.precision_recall;
   panel.append(note(`${pr.rows_with_loop} of ${pr.images} images have a loop (${pr.rule}). Discs: at the default threshold.`));
 }

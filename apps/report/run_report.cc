@@ -62,10 +62,10 @@ Json ErrorJson(const RunResult& result, const Trajectory& estimate) {
     for (const std::size_t k : Thinned(evaluation.pairs, kMostErrors)) {
       distance.push_back(Rounded(path[k], 3));
       error.push_back(Rounded(evaluation.absolute.translation[k], 5));
-      turn.push_back(Rounded(evaluation.absolute.rotation_deg[k], 4));
+      if (evaluation.rotations) turn.push_back(Rounded(evaluation.absolute.rotation_deg[k], 4));
     }
     Json relative_distance = Json::array(), relative = Json::array();
-    for (const std::size_t k : Thinned(evaluation.relative_pairs.size(), kMostErrors)) {
+    for (const std::size_t k : Thinned(evaluation.relative.translation.size(), kMostErrors)) {
       relative_distance.push_back(Rounded(path[evaluation.relative_pairs[k].second], 3));
       relative.push_back(Rounded(evaluation.relative.translation[k], 5));
     }
@@ -120,10 +120,11 @@ Json FoundJson(const RunResult& result, const Similarity& alignment) {
 
 Json ScoreJson(const TrajectoryScore& score) {
   if (!score.valid) return {{"error", score.reason}};
-  Json json = {{"ate_rmse_m", score.ate.rmse},
-               {"ate_max_m", score.ate.max},
-               {"rotation_deg", score.ate_rotation.rmse},
-               {"rpe_rmse_m", score.rpe.rmse}};
+  Json json = {{"ate_rmse_m", score.ate.rmse}, {"ate_max_m", score.ate.max}};
+  if (score.rotations) {
+    json["rotation_deg"] = score.ate_rotation.rmse;
+    json["rpe_rmse_m"] = score.rpe.rmse;
+  }
   if (score.kitti.segments > 0) {
     json["t_rel_percent"] = score.kitti.translation_percent;
     json["r_rel_deg_per_100m"] = 100 * score.kitti.rotation_deg_per_m;

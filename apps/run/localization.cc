@@ -13,9 +13,9 @@
 #include "apps/run/prefetcher.h"
 #include "apps/run/progress.h"
 #include "apps/run/run_parts.h"
-#include "apps/run/text_file.h"
 #include "apps/slam/map_state.h"
 #include "core/angle.h"
+#include "core/replaced_file.h"
 #include "core/stopwatch.h"
 #include "core/terminal.h"
 #include "tutti/core/error.h"
@@ -152,7 +152,6 @@ TrajectoryPlot Picture(const LocalizationRequest& request, const RunState& state
 
 std::unique_ptr<SlamSystem> OpenMap(const LocalizationRequest& request, MapInfo info) {
   info.config.run.threads = request.threads;
-  info.config.loops.ltm_file.clear();  // what the map has of it is enough, and nobody's file changes
   std::unique_ptr<SlamSystem> slam = SlamSystem::Load(request.map, info);
   slam->BeginLocalization();
   return slam;
@@ -242,11 +241,12 @@ Localization Localize(const LocalizationRequest& request) {
   folder.Write({kTrajectory, [&](const fs::path& file) {
                   WriteTrajectory(file, result.trajectory, TrajectoryFormat::kTum);
                 }});
-  folder.Write({kFrames, [&](const fs::path& file) { WriteTextFile(file, FramesCsv(result)); }});
+  folder.Write({kFrames, [&](const fs::path& file) { internal::WriteFile(file, FramesCsv(result)); }});
   folder.Write({kPicture, [&](const fs::path& file) {
                   WriteSvg(file, Picture(request, StateIn(*slam, result), result));
                 }});
-  folder.Write({kSummary, [&](const fs::path& file) { WriteTextFile(file, Summary(request, result)); }});
+  folder.Write(
+      {kSummary, [&](const fs::path& file) { internal::WriteFile(file, Summary(request, result)); }});
   ThrowFailures(folder.failures(), folder.Finish(!result.interrupted));
   return result;
 }

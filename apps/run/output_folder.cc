@@ -21,6 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::uintmax_t kRoomBytes = 32u << 20;      // a long run writes a few MB
+constexpr const char* kHidden = ".tutti-";            // how names begin that are not shown
 constexpr const char* kLock = ".tutti-lock";          // stays: it marks the folder as tutti's
 constexpr const char* kNew = ".tutti-new";            // files that wait
 constexpr const char* kComplete = ".tutti-complete";  // the same, when all are there; may end with -NUMBER
@@ -88,7 +89,8 @@ void RefuseForeign(const fs::path& folder, const OutputLayout& layout, const std
   if (error)
     throw InputError(folder.string() + ": can't be read (" + error.message() + "); choose another " +
                      layout.option);
-  if (empty || fs::exists(folder / kLock, error) || ReadJson(folder / layout.last).contains(layout.key))
+  if (empty || layout.known || fs::exists(folder / kLock, error) ||
+      ReadJson(folder / layout.last).contains(layout.key))
     return;
   throw InputError(folder.string() + ": is not empty, and has no " + layout.last +
                    " by which a result of tutti is known; choose another " + layout.option + ", or empty it");
@@ -142,10 +144,12 @@ OutputFolder::OutputFolder(fs::path folder, OutputLayout layout, bool keep,
     : folder_(std::move(folder)), staging_(folder_ / kNew), layout_(std::move(layout)), keep_(keep) {
   Check(folder_, layout_, own);
   fs::create_directories(folder_);
+  RefuseLinks();
   Lock();
   try {
     CheckRoom();
     Enter();
+    RefuseLinks();  // in what a process left that was killed
     fs::remove_all(staging_);
     if (keep_) KeepLeftovers();
   } catch (const fs::filesystem_error& thrown) {
@@ -164,9 +168,26 @@ OutputFolder::~OutputFolder() {
   close(lock_);
 }
 
+// What is written in its place, not moved there: behind a link it would be another folder's file.
+void OutputFolder::RefuseLinks() const {
+  const std::vector<std::string> passing = layout_.Passing();
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder_)) {
+    const std::string name = entry.path().filename();
+    const bool hidden = name.rfind(kHidden, 0) == 0, folder = name == kUnfinished || IsNumber(name);
+    if (!hidden && !folder && std::count(passing.begin(), passing.end(), name) == 0) continue;
+    const fs::file_status status = entry.symlink_status();
+    if (fs::is_regular_file(status) || fs::is_directory(status)) continue;
+    throw InputError(
+        entry.path().string() +
+        ": is a link or a device, and results are written into their folder alone; remove it, or "
+        "choose another " +
+        layout_.option);
+  }
+}
+
 void OutputFolder::Lock() {
   const fs::path file = folder_ / kLock;
-  lock_ = open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+  lock_ = open(file.c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, 0666);
   if (lock_ < 0) {
     throw InputError(folder_.string() + ": no permission to write there (" + std::strerror(errno) +
                      "); choose another " + layout_.option);
@@ -304,6 +325,7 @@ void OutputFolder::Enter() const {
   }
   for (const fs::path& fresh : complete) {
     const std::string number = fresh.filename().string().substr(std::strlen(kComplete));
+    if (!number.empty() && !IsNumber(number.substr(1))) continue;  // no name that Finish gives
     const fs::path kept = number.empty() ? fs::path() : folder_ / number.substr(1);
     if (!number.empty()) fs::create_directories(kept);
     for (const fs::path& old : Results()) {

@@ -34,8 +34,8 @@ Json ScoreJson(const TrajectoryScore& score) {
                {"ate_std_m", score.ate.std},
                {"ate_min_m", score.ate.min},
                {"ate_max_m", score.ate.max},
-               {"ate_rotation_rmse_deg", score.ate_rotation.rmse},
-               {"rpe_rmse_m", score.rpe.rmse},
+               {"ate_rotation_rmse_deg", score.rotations ? Json(score.ate_rotation.rmse) : Json()},
+               {"rpe_rmse_m", score.rotations ? Json(score.rpe.rmse) : Json()},
                {"poses", score.poses},
                {"scale", score.scale}};
   if (score.kitti.segments > 0) {
@@ -255,7 +255,16 @@ std::string SummaryJson(const RunResult& r) {
       return Json{{"fraction", fraction}, {"rotation_deg", rotation_rad * internal::kDegrees}};
     };
     json["given_odometry"] = {{"stated", sigmas(r.followed.stated_fraction, r.followed.stated_rotation_rad)},
-                              {"seen", sigmas(r.followed.seen_fraction, r.followed.seen_rotation_rad)}};
+                              {"seen", sigmas(r.followed.seen_fraction, r.followed.seen_rotation_rad)},
+                              {"jumps", Json::array()}};
+    for (const OdometryJump& jump : r.followed.jumps) {
+      json["given_odometry"]["jumps"].push_back(
+          {{"from_s", std::isfinite(jump.from_s) ? Json(jump.from_s) : Json()},
+           {"to_s", std::isfinite(jump.to_s) ? Json(jump.to_s) : Json()},
+           {"distance_m", jump.distance_m},
+           {"angle_deg", jump.angle_rad * internal::kDegrees},
+           {"comes_back", jump.comes_back}});
+    }
   }
   if (!r.given_odometry && !r.appearance_only)
     json["lens_check"] = {{"measured", r.lens_check.measured},

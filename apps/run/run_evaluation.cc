@@ -28,6 +28,7 @@ TrajectoryScore Score(const Trajectory& reference, const Trajectory& estimate, b
   try {
     const EvaluationReport report = EvaluateTrajectory(reference, estimate, options);
     score.valid = true;
+    score.rotations = report.rotations;
     score.poses = report.pairs;
     score.alignment = report.S_reference_estimate;
     score.scale = score.alignment.scale;
@@ -63,10 +64,10 @@ double Extent(const Trajectory& trajectory) {
   return std::sqrt(squares / count);
 }
 
-LoopError Apart(const Pose& candidate, const Pose& query) {
+LoopError Apart(const Pose& candidate, const Pose& query, bool rotations = true) {
   LoopError apart;
   apart.distance_m = (candidate.translation - query.translation).norm();
-  apart.angle_deg = (candidate.Inverse() * query).Angle() * internal::kDegrees;
+  if (rotations) apart.angle_deg = (candidate.Inverse() * query).Angle() * internal::kDegrees;
   return apart;
 }
 
@@ -79,13 +80,17 @@ std::optional<bool> Judge(const LoopRecord& loop, const Trajectory& reference, s
   const std::optional<Pose> query = PoseOfFrame(reference, loop.query_stamp_s, result.frame_interval_s);
   if (!candidate || !query) return std::nullopt;
   const Pose candidate_camera = *candidate * rig.T_body_camera, query_camera = *query * rig.T_body_camera;
-  error = Apart(candidate_camera, query_camera);
+  error = Apart(candidate_camera, query_camera, HasRotations(reference));
   if (!scale) return std::nullopt;
   const auto found = result.map_figures.depth.find(loop.query);
   const double depth = found == result.map_figures.depth.end() ? 0 : *scale * found->second;
   const double path = PathBetween(reference, loop.candidate_stamp_s, loop.query_stamp_s);
   const double by_path = std::max(kLeastAllowed, kPathShare * path);
   if (!loop.S_candidate_query) return error.distance_m <= std::max(by_path, depth);
+  if (!HasRotations(reference)) {  // the distances of the two places alone can be compared
+    error.error_m = std::abs(*scale * loop.S_candidate_query->translation.norm() - error.distance_m);
+    return error.error_m <= std::max(by_path, kDepthShare * depth);
+  }
   Pose constraint = loop.S_candidate_query->RigidPart();
   constraint.translation *= *scale;
   const Pose difference = (candidate_camera.Inverse() * query_camera).Inverse() * constraint;

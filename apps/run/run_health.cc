@@ -1,4 +1,5 @@
 #include "apps/run/run_health.h"
+#include "core/terminal.h"
 
 #include <algorithm>
 #include <cstdio>
@@ -78,7 +79,7 @@ std::string HealthText(const RunResult& result) {
   if (health->word == HealthWord::kGood)
     return "\n  " + word + ": nothing that the run shows speaks against its result\n";
   std::string text = "\n  " + word + ":\n";
-  for (const std::string& reason : health->reasons) text += "    * " + reason + "\n";
+  for (const std::string& reason : health->reasons) text += "    * " + internal::Printable(reason) + "\n";
   return text;
 }
 

@@ -50,10 +50,11 @@ struct TrajectoryScore {
   bool valid = false;
   std::string reason;            ///< why there is no score
   std::size_t poses = 0;         ///< pairs that were compared
-  ErrorStatistics ate;           ///< [m]
+  bool rotations = true;         ///< false: the reference has positions alone, the next three are unknown
   ErrorStatistics ate_rotation;  ///< [deg]
   ErrorStatistics rpe;           ///< from frame to frame [m]
   KittiErrors kitti;             ///< no segments if the path is shorter than 100 m
+  ErrorStatistics ate;           ///< [m]
   double scale = 1;              ///< of the alignment (1 for SE(3))
   Similarity alignment;          ///< S_reference_estimate
 };

@@ -157,6 +157,10 @@ Value ScaleOff(const RunResult& r) {
   return std::exp(std::max(0.0, std::abs(std::log(scaled.scale)) - uncertain));
 }
 
+Value OdometryJumps(const RunResult& r) {
+  return r.given_odometry ? Value(r.followed.jumps.size()) : std::nullopt;
+}
+
 Value CameraGuessed(const RunResult& r) { return r.camera_guessed ? 1 : 0; }
 
 }  // namespace
@@ -195,6 +199,11 @@ const std::vector<SignKind>& SignKinds() {
       {"speed_jump", "factor", "greatest step between two frames over those around it, by their times",
        kAbove, 4, kNever, "the trajectory jumps: one step is %s times those around it",
        "look at trajectory.svg there; frames may be missing", SpeedJump},
+      {"odometry_jumps", "1", "given odometry: steps that no motion explains (a wrong pose, a restart)",
+       kAbove, 0, kNever, "the given odometry has jumps: %s",
+       "given_odometry.jumps in summary.json says when; wrong poses were replaced by those between their "
+       "neighbours, other jumps have no weight",
+       OdometryJumps},
       {"scale_jump", "factor",
        "one camera: greatest factor by which depths and speed changed together between three keyframes and "
        "the next three",

@@ -1,6 +1,7 @@
 #include "apps/run/slam_run.h"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 #include <vector>
 
@@ -127,6 +128,13 @@ void SlamRun::Collect() {
   if (FirstFrame() > 0) session.first = FirstFrame();
   result_.given_odometry = given_ != nullptr;
   result_.followed = slam_->Followed();
+  if (given_ != nullptr) {
+    std::vector<OdometryJump>& jumps = result_.followed.jumps;
+    std::copy_if(given_->jumps().begin(), given_->jumps().end(), std::back_inserter(jumps),
+                 [](const OdometryJump& jump) { return jump.comes_back; });
+    std::sort(jumps.begin(), jumps.end(),
+              [](const OdometryJump& a, const OdometryJump& b) { return a.to_s < b.to_s; });
+  }
   if (given_ == nullptr && !slam_->AppearanceOnly())
     result_.lens_check = CheckLens(*slam_->odometry(), session);
   if (!alone_) return;
@@ -146,7 +154,8 @@ void SlamRun::CorrectGiven() {
   for (const StampedPose& keyframe : result_.keyframe_trajectory)
     before.push_back({keyframe.stamp_s, given_->At(keyframe.stamp_s).value()});
   result_.trajectory_odometry = given_->trajectory();
-  result_.trajectory = CorrectTrajectory(given_->trajectory(), before, result_.keyframe_trajectory);
+  result_.trajectory =
+      CorrectTrajectory(given_->trajectory(), before, result_.keyframe_trajectory, given_->jumps());
 }
 
 TrackResult SlamRun::Track(const InputFrame& frame) {

@@ -12,6 +12,7 @@
 #include "apps/run/interrupt.h"
 #include "apps/run/output_folder.h"
 #include "apps/run/runner.h"
+#include "apps/tutti/camera_options.h"
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/comparison.h"
@@ -20,6 +21,8 @@
 #include "apps/tutti/files.h"
 #include "apps/tutti/run_apart.h"
 #include "apps/tutti/run_with_report.h"
+#include "core/example_configs.h"
+#include "core/replaced_file.h"
 #include "core/terminal.h"
 #include "tutti/core/error.h"
 #include "tutti/frontend/dataset.h"
@@ -39,6 +42,7 @@ struct CompareArguments {
   int runs = 5, start = 0, end = 0, stride = 1, threads = 2;
   double noise = 0;
   bool separate = false;
+  CameraWords camera;
 };
 
 // The configuration of a variant. Throws InputError for a word that is none.
@@ -206,10 +210,11 @@ OutputLayout Layout() {
 
 void WriteComparison(OutputFolder& folder, const Comparison& comparison) {
   folder.Write({"comparison.md", [&](const fs::path& file) {
-                  WriteText(file, DescribeComparison(comparison, TableFormat::kMarkdown));
+                  internal::WriteFile(file, DescribeComparison(comparison, TableFormat::kMarkdown));
                 }});
-  folder.Write({"comparison.json",
-                [&](const fs::path& file) { WriteText(file, JsonText(ComparisonJson(comparison))); }});
+  folder.Write({"comparison.json", [&](const fs::path& file) {
+                  internal::WriteFile(file, JsonText(ComparisonJson(comparison)));
+                }});
   if (ReportsAvailable()) {
     folder.Write({"report.html", [&](const fs::path& file) {
                     WriteComparisonReport(file, "tutti compare: " + comparison.runs.front().dataset,
@@ -225,7 +230,11 @@ int RunCompare(const CLI::App& command, CompareArguments arguments) {
   const TableFormat format = ParseTableFormat(arguments.table_format);
   CheckVariants(arguments);
   OutputFolder::Check(arguments.out, Layout());
-  const RunConfig config = ConfigurationOf(arguments.config, arguments.datasets.front());
+  const RunConfig config =
+      ConfigurationOf(arguments.config, arguments.datasets.front(), CameraOf(command, arguments.camera));
+  for (const std::string& dataset : arguments.datasets) {
+    if (IsPipe(dataset)) DetectDatasetType(dataset);  // says that it comes once
+  }
   const Experiment experiment(command, arguments, config);
   DatasetOptions last = config.dataset;
   last.start = arguments.start + arguments.runs - 1;
@@ -248,7 +257,8 @@ int RunCompare(const CLI::App& command, CompareArguments arguments) {
     for (std::size_t k = 0; k < experiment.Runs(); ++k)
       comparison.runs.push_back(experiment.Figures(v, k, statuses[k][v]));
   }
-  std::fputs(DescribeComparison(comparison, format).c_str(), stdout);
+  const std::string tables = DescribeComparison(comparison, format);
+  std::fputs(internal::Printable(tables, internal::Breaks::kAll).c_str(), stdout);
   WriteComparison(folder, comparison);
   if (ReportsAvailable()) std::printf("\n%s\n", (folder.path() / "report.html").c_str());
   if (!ReportsAvailable()) internal::Say("%s", ReportsMissing().c_str());
@@ -267,6 +277,7 @@ void SetUpCompare(CLI::App& command, int& exit_code) {
   command.add_option("--config", arguments->config,
                      "YAML file, as for `tutti run`; without it, layout, sensor and calibration are found in "
                      "the first recording, and what was found is said");
+  AddCameraOptions(command, arguments->camera);
   command.add_option("--out", arguments->out,
                      "folder for all runs and for comparison.md, comparison.json and report.html (default: "
                      "tutti-out/NAME-compared)");

@@ -8,6 +8,7 @@
 #include "apps/tutti/commands.h"
 #include "apps/tutti/files.h"
 #include "apps/tutti/text_table.h"
+#include "core/replaced_file.h"
 #include "tutti/core/error.h"
 #include "tutti/core/significance.h"
 
@@ -81,7 +82,7 @@ int CompareLoops(const CompareLoopsArguments& arguments) {
   if (tables.size() < static_cast<std::size_t>(kLeastPairs)) {
     std::printf("p is given from %d sets on: with fewer, one lucky set decides\n", kLeastPairs);
   }
-  if (!arguments.out.empty()) WriteText(arguments.out, JsonText(tests));
+  if (!arguments.out.empty()) internal::WriteFile(arguments.out, JsonText(tests));
   return 0;
 }
 

@@ -76,7 +76,7 @@ int Demo(const fs::path& out) {
   request.dataset = data;
   request.out = out / "run";
   const RunResult result = RunWithReport(request, DemoConfig());
-  std::fputs(internal::Message(ResultTable(result), stdout).c_str(), stdout);
+  std::fputs(internal::Message(ResultTable(result), stdout, internal::Breaks::kAll).c_str(), stdout);
   std::printf("\n  plot:       %s and .svg\n", (result.folder / "trajectory.png").c_str());
   if (ReportsAvailable()) std::printf("  report:     %s\n", (result.folder / "report.html").c_str());
   std::printf("  results:    %s\n", (result.folder / "summary.json").c_str());

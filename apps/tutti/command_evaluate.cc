@@ -13,6 +13,7 @@
 #include "apps/tutti/evaluation_output.h"
 #include "apps/tutti/files.h"
 #include "apps/tutti/published.h"
+#include "core/replaced_file.h"
 #include "core/terminal.h"
 
 namespace tutti::cli {
@@ -60,13 +61,13 @@ int RunEvaluate(const EvaluateArguments& arguments) {
   std::string text = estimates.size() == 1 ? DescribeEvaluation(estimates.front(), format)
                                            : CompareEvaluations(estimates, format);
   if (published) text += published->Describe(estimates, format);
-  std::fputs(text.c_str(), stdout);
+  std::fputs(internal::Printable(text, internal::Breaks::kAll).c_str(), stdout);
   if (!arguments.json.empty()) {
     nlohmann::ordered_json json = EvaluationJson(input.reference, estimates);
     if (published) json["published"] = published->ToJson();
-    WriteText(arguments.json, JsonText(json));
+    internal::WriteFile(arguments.json, JsonText(json));
   }
-  if (!arguments.errors.empty()) WriteText(arguments.errors, ErrorsCsv(estimates));
+  if (!arguments.errors.empty()) internal::WriteFile(arguments.errors, ErrorsCsv(estimates));
   bool met = true;
   for (const EvaluatedEstimate& estimate : estimates) met = MeetsLimits(estimate, arguments) && met;
   return met ? 0 : kLimitNotMet;

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "apps/run/localization.h"
+#include "apps/tutti/camera_options.h"
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/files.h"
@@ -11,12 +12,14 @@
 #include "apps/tutti/view_options.h"
 #include "core/terminal.h"
 #include "tutti/slam/config.h"
+#include "tutti/slam/map_file.h"
 
 namespace tutti::cli {
 namespace {
 
 struct LocalizeArguments {
   std::string map, dataset, out, config, mask;
+  CameraWords camera;
   int start = 0, end = 0, stride = 1, threads = 2;
   bool quiet = false;
   ViewOptions view;
@@ -32,7 +35,16 @@ int RunLocalize(const CLI::App& command, const LocalizeArguments& arguments) {
   request.threads = arguments.threads;
   request.quiet = arguments.quiet;
   if (!arguments.mask.empty()) request.mask = arguments.mask;
-  if (!arguments.config.empty()) request.options = LoadConfig(arguments.config).dataset;
+  const CameraRequest camera = CameraOf(command, arguments.camera);
+  if (!arguments.config.empty() || camera.HasLens() || camera.sensor) {
+    RunConfig config;
+    if (arguments.config.empty())
+      config.dataset = ForAnotherRecording(ReadMapInfo(arguments.map).config.dataset);
+    else
+      config = LoadConfig(arguments.config);
+    SetCamera(arguments.dataset, camera, config);
+    request.options = config.dataset;
+  }
   if (command.count("--start") > 0) request.start = arguments.start;
   if (command.count("--end") > 0) request.end = arguments.end;
   if (command.count("--stride") > 0) request.stride = arguments.stride;
@@ -70,6 +82,7 @@ void SetUpLocalize(CLI::App& command, int& exit_code) {
       "--config", arguments->config,
       "YAML file that says how to read the data set (sections dataset and camera); without it, as "
       "the map's was read");
+  AddCameraOptions(command, arguments->camera);
   AddMaskOption(command, arguments->mask);
   command.add_option("--start", arguments->start, "first frame that is used, counted from 0")
       ->check(NotNegative());

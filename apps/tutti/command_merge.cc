@@ -12,6 +12,7 @@
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/files.h"
+#include "core/replaced_file.h"
 #include "core/terminal.h"
 #include "tutti/core/error.h"
 #include "tutti/slam/map_file.h"
@@ -30,7 +31,6 @@ struct MergeArguments {
 std::unique_ptr<SlamSystem> OpenMap(const std::string& file, int threads) {
   MapInfo info = ReadMapInfo(file);
   info.config.run.threads = threads;
-  info.config.loops.ltm_file.clear();  // what the map has of it is enough, and nobody's file changes
   return SlamSystem::Load(file, info);
 }
 
@@ -56,7 +56,6 @@ bool AreTheSame(const fs::path& a, const fs::path& b) {
 }
 
 int Merge(const MergeArguments& arguments) {
-  RequireWritable({arguments.out});
   std::error_code ignored;
   if (AreTheSame(arguments.first, arguments.second))
     throw InputError(arguments.first + " and " + arguments.second +
@@ -65,6 +64,7 @@ int Merge(const MergeArguments& arguments) {
     if (fs::equivalent(map, arguments.out, ignored))
       throw InputError(arguments.out + ": is one of the maps that are merged; give another file with --out");
   }
+  internal::CheckWritable(arguments.out, internal::Needs::kFile);
   const std::unique_ptr<SlamSystem> slam = OpenMap(arguments.first, arguments.threads),
                                     other = OpenMap(arguments.second, arguments.threads);
   const std::size_t known = slam->loops().size() + other->loops().size();

@@ -52,26 +52,27 @@ struct RunArguments {
 
 int RunAndShow(const RunArguments& arguments, RunRequest request, const RunConfig& config) {
   const RunResult result = arguments.no_report ? RunSlam(request, config) : RunWithReport(request, config);
-  std::fputs(internal::Message(ResultTable(result), stdout).c_str(), stdout);
+  std::fputs(internal::Message(ResultTable(result), stdout, internal::Breaks::kAll).c_str(), stdout);
   if (arguments.timing) {
     std::fputs(TimingTable(result.stages, result.wall_s, result.cpu_s, result.frames_total).c_str(), stdout);
     if (result.odometry_alone_cpu_s > 0)
       std::printf("  the odometry without loops: %.1f s more\n", result.odometry_alone_cpu_s);
   }
-  std::printf("\n  results are in %s\n", result.folder.c_str());
+  std::printf("\n  results are in %s\n", internal::Printable(result.folder.string()).c_str());
   const fs::path report = fs::path(result.folder) / "report.html";
   std::error_code ignored;
   if (!arguments.no_report && fs::exists(report, ignored))
-    std::printf("  look at %s\n", fs::absolute(report, ignored).c_str());
+    std::printf("  look at %s\n", internal::Printable(fs::absolute(report, ignored).string()).c_str());
   if (!arguments.no_report && !arguments.quiet && !ReportsAvailable())
     internal::Say("%s", ReportsMissing().c_str());
   return ExitCode(result, arguments.require);
 }
 // What a run can be told that goes on: the rest is as it was.
-void RefuseOthers(const CLI::App& command) {
-  const std::set<std::string> allowed = {
-      "--resume", "--threads",   "--quiet",   "--view",  "--view-port",  "--view-wait", "--view-address",
-      "--timing", "--no-report", "--require", "--trace", "--checkpoint", "--save-map",  "--no-map"};
+void RefuseOthers(const CLI::App& command, const RunArguments& arguments) {
+  const std::set<std::string> allowed = {"--resume",    "--threads",   "--quiet",        "--view",
+                                         "--view-port", "--view-wait", "--view-address", "--timing",
+                                         "--no-report", "--require",   "--trace",        "--checkpoint",
+                                         "--save-map",  "--no-map",    "--set"};
   for (const CLI::Option* option : command.get_options()) {
     const std::string name = option->get_name();
     if (option->count() > 0 && allowed.count(name) == 0)
@@ -79,17 +80,30 @@ void RefuseOthers(const CLI::App& command) {
                        " can't be given with --resume, which takes data set, configuration "
                        "and frames from the checkpoint");
   }
+  for (const std::string& assignment : arguments.set) {
+    if (assignment.rfind("loops.ltm_file=", 0) != 0)
+      throw InputError("run: --set " + assignment +
+                       ": with --resume, only loops.ltm_file can be set: the rest is in the checkpoint");
+  }
 }
 
 int Resume(const CLI::App& command, const RunArguments& arguments) {
-  RefuseOthers(command);
+  RefuseOthers(command, arguments);
   auto found = ResumeRequest(arguments.resume);
   if (!found) {
     std::printf("tutti: the run in %s has finished; there is nothing to go on with\n",
                 arguments.resume.c_str());
     return 0;
   }
-  auto& [request, config] = *found;
+  auto& [request, config, map, ltm_file] = *found;
+  const auto keep = [&](const std::string& file, bool said, const char* option) {
+    if (file.empty() || said || arguments.quiet) return;
+    std::fprintf(stderr, "tutti: the run also wrote %s; to have it written again, give %s%s\n",
+                 internal::Printable(file).c_str(), option, internal::Printable(file).c_str());
+  };
+  keep(map, !arguments.save_map.empty() || arguments.no_map, "--save-map ");
+  keep(ltm_file, !arguments.set.empty(), "--set loops.ltm_file=");
+  SetOptions(arguments.set, config);
   request.quiet = arguments.quiet;
   request.timing = arguments.timing;
   if (!arguments.trace.empty()) request.trace = arguments.trace;

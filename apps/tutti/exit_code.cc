@@ -23,7 +23,8 @@ void AddRequireOption(CLI::App& command, std::string& word) {
 
 int ExitCode(const RunResult& result, const std::string& required) {
   const std::optional<RunHealth> health = HealthOf(result);
-  if (health) std::fputs(internal::Message(HealthText(result), stdout).c_str(), stdout);
+  if (health)
+    std::fputs(internal::Message(HealthText(result), stdout, internal::Breaks::kAll).c_str(), stdout);
   std::fflush(stdout);  // before what follows on the other stream
   if (result.interrupted) {
     internal::Say("interrupted; what there was by then is in %s", result.folder.c_str());

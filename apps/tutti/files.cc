@@ -1,12 +1,8 @@
 #include "apps/tutti/files.h"
 
-#include <unistd.h>
-
-#include <cerrno>
-#include <cstring>
-#include <fstream>
 #include <system_error>
 
+#include "core/replaced_file.h"
 #include "core/text_reader.h"
 #include "tutti/core/error.h"
 
@@ -46,25 +42,8 @@ void KeepInputs(const std::vector<std::string>& read, const std::vector<std::str
 }
 
 void RequireWritable(const std::vector<std::string>& files) {
-  for (const std::filesystem::path file : files) {
-    if (file.empty()) continue;
-    std::error_code ignored;
-    const std::filesystem::path folder = file.has_parent_path() ? file.parent_path() : ".";
-    if (std::filesystem::is_directory(file, ignored))
-      throw InputError(file.string() + ": is a folder; give the name of a file");
-    if (!std::filesystem::is_directory(folder, ignored))
-      throw InputError(file.string() + ": there is no folder " + folder.string() + "; make it first");
-    const bool there = std::filesystem::exists(file, ignored);
-    if (access(there ? file.c_str() : folder.c_str(), W_OK) != 0)
-      throw InputError(file.string() + ": can't be written (" + std::strerror(errno) + ")");
-  }
-}
-
-void WriteText(const std::filesystem::path& file, const std::string& text) {
-  std::ofstream out(file, std::ios::binary);
-  out << text;
-  out.close();
-  if (!out) throw InputError(file.string() + ": can't be written; is there space, and may you write there?");
+  for (const std::string& file : files)
+    if (!file.empty()) internal::CheckWritable(file, internal::Needs::kBytes);
 }
 
 }  // namespace tutti::cli

@@ -35,6 +35,21 @@ TEST(Terminal, OfAFileHas80Columns) {
   std::fclose(file);
 }
 
+TEST(Printable, NamesOfOthersDoNothingToATerminal) {
+  EXPECT_EQ(Printable("a\x1b[2J\x07\tb.png: can't be read\n"), "a\\x1b[2J\\x07\\x09b.png: can't be read\n");
+  EXPECT_EQ(Printable("name\ntutti: all is well"), "name\\ntutti: all is well");
+  EXPECT_EQ(Printable("problems:\n  one\n  two"), "problems:\n  one\n  two");
+  EXPECT_EQ(Printable("a table\x7f\nof lines\n", Breaks::kAll), "a table\\x7f\nof lines\n");
+  EXPECT_EQ(Printable("gr\xc3\xbc\xc3\x9f \xe6\x9d\xb1 \xf0\x9f\x99\x82"),
+            "gr\xc3\xbc\xc3\x9f \xe6\x9d\xb1 \xf0\x9f\x99\x82");
+  EXPECT_EQ(Printable("\xc2\x9b"
+                      "2J \xe2\x80\xaegnp.exe"),
+            "\\u009b2J \\u202egnp.exe");
+  EXPECT_EQ(Printable("latin \xfc, cut \xe6\x9d"), "latin \\xfc, cut \\xe6\\x9d");
+  EXPECT_EQ(Printable(std::string("zero\0 byte", 10)), "zero\\x00 byte");
+  EXPECT_EQ(Printable(""), "");
+}
+
 TEST(WrapText, BreaksBetweenWordsAndFillsEachLine) {
   EXPECT_THAT(WrapText("one two three four", 9), ElementsAre("one two", "three", "four"));
   EXPECT_THAT(WrapText("one  two", 80), ElementsAre("one two"));

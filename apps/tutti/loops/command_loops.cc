@@ -200,14 +200,18 @@ int RunLoops(const LoopsArguments& given) {
   const std::string problem = arguments.truth.rule.Validate();
   if (!problem.empty()) throw InputError("ground truth: " + problem);
   cv::setNumThreads(arguments.options.threads);
-  Input set = {LoadImageSet(arguments.images, arguments.truth, arguments.topic), std::nullopt, std::nullopt};
+  std::optional<PinholeCamera> camera;
+  if (!arguments.camera.empty()) camera = internal::ParseCamera(arguments.camera);
+  Input set = {LoadImageSet(arguments.images, arguments.truth, arguments.topic, camera), camera,
+               std::nullopt};
+  if (camera && set.recording) set.camera = set.recording->Rig().camera;
+  for (const std::string& note : set.notes) internal::Say("%s", note.c_str());
   if (set.recording) {
     for (const std::string& warning : set.recording->Warnings()) {
       if (warning == NoCalibrationText(arguments.images)) continue;  // loops need none
       internal::Say("%s", warning.c_str());
     }
   }
-  if (!arguments.camera.empty()) set.camera = internal::ParseCamera(arguments.camera);
   set.masks = MasksFor(arguments, set);
   const InterruptGuard interrupt;
   RefuseToReplace(arguments.out, arguments.truth.file);

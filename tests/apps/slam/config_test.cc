@@ -272,7 +272,7 @@ TEST(Config, HelpIsAValidFileWithTheDefaults) {
 }
 
 TEST(Config, HelpWritesNumbersOutUnlessTheyAreTinyOrHuge) {
-  EXPECT_THAT(HelpConfig(true), HasSubstr("depth_units_per_m: 5000 "));
+  EXPECT_THAT(HelpConfig(true), HasSubstr("depth_units_per_m: 0 "));
   EXPECT_THAT(HelpConfig(true), Not(HasSubstr("e+")));
   RunConfig config;
   config.dataset.depth_units_per_m = 80;

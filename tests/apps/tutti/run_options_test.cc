@@ -50,8 +50,8 @@ TEST(RunOptions, OnesThatCantBeAreRefusedBeforeTheImagesAreRead) {
       {{"run", images, "--out", out, "--save-map", (folder / "no/map.tutti").string()}, "map.tutti"},
       {{"loops", images, "--out", (folder / "foreign").string()}, "holds letter.txt, which is no result"},
       {{"loops", images, "--out", out, "--threads", "-1"}, "--threads: '-1'"},
-      {{"optimize", "in.g2o", "--out", (folder / "no/x.g2o").string()}, "there is no folder"},
-      {{"convert", "in.txt", (folder / "foreign").string(), "--to", "tum"}, "foreign: is a folder"}};
+      {{"optimize", "in.g2o", "--out", (folder / "no/x.g2o").string()}, "x.g2o: can't be written"},
+      {{"convert", "in.txt", (folder / "foreign").string(), "--to", "tum"}, "foreign: can't be written"}};
   for (const auto& [arguments, said] : wrong) {
     const auto run = RunTutti(arguments);
     EXPECT_EQ(run.status, 1) << run.output;

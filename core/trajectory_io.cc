@@ -1,12 +1,12 @@
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <optional>
 #include <utility>
 
 #include "core/number_lines.h"
 #include "core/pose_columns.h"
 #include "core/pose_reader.h"
+#include "core/replaced_file.h"
 #include "core/text_reader.h"
 #include "core/time_stamps.h"
 #include "core/tum_line.h"
@@ -134,7 +134,10 @@ std::vector<double> ReadTimes(const std::filesystem::path& file, std::vector<std
   bool first = true;
   internal::ForEachLine(file, [&](std::size_t line, const Words& w) {
     const bool names_columns = std::exchange(first, false) && w.size() > 1 && !ParseDouble(w[0]);
-    if (!names_columns) out.push_back(NumberAt(file, line, w[0]));
+    if (names_columns) return;
+    out.push_back(NumberAt(file, line, w[0]));
+    if (out.size() > 1 && out.back() < out[out.size() - 2])
+      FailAt(file, line, "goes back in time; sort the file, or cut it there if it is two recordings");
   });
   const StampUnit unit = internal::UnitOfStamps(out).unit;
   for (double& stamp : out) stamp *= internal::SecondsOf(unit);
@@ -146,19 +149,17 @@ std::vector<double> ReadTimes(const std::filesystem::path& file, std::vector<std
 void WriteTrajectory(const std::filesystem::path& file, const Trajectory& trajectory, TrajectoryFormat format,
                      const std::vector<std::int64_t>& stamps_ns) {
   RequireRoom(file, trajectory, format, stamps_ns);
-  std::ofstream out(file);
-  if (!out)
-    throw InputError(file.string() + ": can't be written; check that the folder exists and is writable");
+  std::string text;
   char line[1024];
-  if (format == TrajectoryFormat::kTum) out << internal::kTumHeader;
-  if (format == TrajectoryFormat::kEuroc) out << "#timestamp [ns],p_x [m],p_y [m],p_z [m],q_w,q_x,q_y,q_z\n";
+  if (format == TrajectoryFormat::kTum) text = internal::kTumHeader;
+  if (format == TrajectoryFormat::kEuroc) text = "#timestamp [ns],p_x [m],p_y [m],p_z [m],q_w,q_x,q_y,q_z\n";
   for (std::size_t k = 0; k < trajectory.size(); ++k) {
     const StampedPose& s = trajectory[k];
     const Eigen::Vector3d& t = s.pose.translation;
     const Eigen::Quaterniond& q = s.pose.rotation;
     switch (format) {
       case TrajectoryFormat::kTum:
-        out << (stamps_ns.empty() ? internal::TumLine(s) : internal::TumLine(s, stamps_ns[k]));
+        text += stamps_ns.empty() ? internal::TumLine(s) : internal::TumLine(s, stamps_ns[k]);
         continue;
       case TrajectoryFormat::kKitti: {
         const Eigen::Matrix4d m = s.pose.Matrix();
@@ -175,10 +176,9 @@ void WriteTrajectory(const std::filesystem::path& file, const Trajectory& trajec
             t.y(), t.z(), q.w(), q.x(), q.y(), q.z());
         break;
     }
-    out << line;
+    text += line;
   }
-  out.flush();
-  if (!out) throw InputError(file.string() + ": could not be written in full; is the disk full?");
+  internal::WriteFile(file, text);
 }
 
 }  // namespace tutti

@@ -13,6 +13,7 @@
 #include "apps/python/guarded.h"
 #include "apps/python/options.h"
 #include "apps/python/poses.h"
+#include "apps/slam/odometry_jumps.h"
 #include "tutti/backend/evaluation.h"
 
 namespace tutti::python {
@@ -51,12 +52,17 @@ std::unique_ptr<TrajectoryCloser> Close(const py::object& odometry, const py::ob
                                         const std::optional<RunConfig>& config, double max_gap_s) {
   const Trajectory given = TrajectoryOf(odometry, "odometry");
   if (!(max_gap_s > 0)) throw InputError("close: max_gap_s must be above 0");
+  const std::vector<OdometryJump> jumps = FindJumps(given);
+  const Trajectory inliers = WithoutOutliers(given, jumps);
+  for (const OdometryJump& jump : jumps) {
+    if (jump.comes_back) Warn(Sentence(jump));
+  }
   auto closer = MakeCloser(dataset.attr("rig").cast<CameraRig>(), config, {});
   bool pushed = false;
   for (const py::handle item : dataset) {
     if (PyErr_CheckSignals() != 0) throw py::error_already_set();
     const auto frame = item.cast<InputFrame>();
-    const std::optional<Pose> pose = InterpolatePose(given, frame.stamp_s, max_gap_s);
+    const std::optional<Pose> pose = InterpolatePose(inliers, frame.stamp_s, max_gap_s);
     if (!pose) continue;
     pushed = true;
     const py::gil_scoped_release release;

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "frontend/dataset/image_file.h"
+#include "frontend/dataset/layout.h"
 #include "frontend/dataset/turned_dataset.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
@@ -24,8 +24,14 @@ DepthBeside::DepthBeside(std::unique_ptr<Dataset> images, const std::vector<doub
     camera.height = stored.height;
     rectifier_.emplace(camera);
   }
-  const std::vector<fs::path> found = ListImages(depth);
+  std::vector<fs::path> found;
+  for (RoleImage& image : ImagesOf(depth, {""})) found.push_back(std::move(image.file));
   if (found.empty()) throw InputError(depth.string() + ": holds no depth image (--depth)");
+  const bool upright = options.rotate % 180 == 0;
+  const cv::Size turned(rig_.camera.width, rig_.camera.height);
+  reader_.emplace(options, DepthFormat(), options.camera,
+                  upright ? turned : cv::Size(turned.height, turned.width));
+  for (std::string& note : reader_->Notes(found.front())) warnings_.push_back(std::move(note));
   if (found.size() == stamps.size()) {
     files_ = found;
     return;
@@ -60,23 +66,9 @@ ReadResult DepthBeside::Read(std::size_t i) const {
   if (!result.frame) return result;
   const fs::path& file = files_.at(static_cast<std::size_t>(Number(i)));
   if (file.empty()) return result;
-  const ImageFile read = ReadDepthFile(file);
-  if (!read.error.empty()) {
-    result.depth_error = read.error;
-    return result;
-  }
-  const bool upright = options_.rotate % 180 == 0;
-  const cv::Size turned = result.frame->image.size();
-  const cv::Size stored = upright ? turned : cv::Size(turned.height, turned.width);
-  if (read.image.size() != stored) {
-    result.depth_error = file.string() + ": the depth image has " + SizeText(read.image.size()) +
-                         " pixels, but the images have " + SizeText(stored) +
-                         "; depth must be registered to them";
-    return result;
-  }
-  const cv::Mat metres = DepthInMetres(read.image, options_.depth_units_per_m, options_.max_depth_m);
-  const cv::Mat rectified = rectifier_ ? rectifier_->Apply(metres, Sampling::kNearest) : metres;
-  result.frame->depth_m = TurnedImage(rectified, options_.rotate);
+  cv::Mat metres;
+  result.depth_error = reader_->Read(file, rectifier_ ? &*rectifier_ : nullptr, metres);
+  if (result.depth_error.empty()) result.frame->depth_m = TurnedImage(metres, options_.rotate);
   return result;
 }
 

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "frontend/dataset/depth_reader.h"
 #include "frontend/features/rectifier.h"
 #include "tutti/frontend/dataset.h"
 
@@ -29,6 +30,7 @@ class DepthBeside : public Dataset {
   /// With depth, or with depth_error.
   ReadResult Read(std::size_t i) const override;
   ColourImage ReadColour(std::size_t i) const override { return images_->ReadColour(i); }
+  double SkippedShare() const override { return images_->SkippedShare(); }
   const CameraRig& Rig() const override { return rig_; }
   std::optional<std::filesystem::path> GroundTruthFile() const override { return images_->GroundTruthFile(); }
   Trajectory ReadGroundTruth(const std::filesystem::path& file,
@@ -41,7 +43,8 @@ class DepthBeside : public Dataset {
   std::unique_ptr<Dataset> images_;
   DatasetOptions options_;
   CameraRig rig_;
-  std::optional<Rectifier> rectifier_;        // of a camera with distortion
+  std::optional<Rectifier> rectifier_;  // of a camera with distortion
+  std::optional<DepthReader> reader_;
   std::vector<std::filesystem::path> files_;  // of each image; empty: none
   std::vector<std::string> warnings_;
 };

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "apps/run/map_figures.h"
+#include "frontend/dataset/turned_dataset.h"
 #include "tutti/frontend/odometry.h"
 
 namespace tutti {
@@ -149,9 +150,10 @@ std::vector<int> WhereItTurns(const Odometry& odometry, const std::vector<int>& 
   return {first, first + static_cast<std::ptrdiff_t>(most)};
 }
 
-// Landmarks that three of the keyframes see, those seen most first.
+// Landmarks that three of the keyframes see, those seen most first. `aspect`: fy over fx, by which offsets
+// along y are divided, so that one focal length is that of both.
 std::optional<Scene> SceneOf(const Odometry& odometry, const std::vector<int>& keyframes,
-                             std::size_t most_landmarks) {
+                             std::size_t most_landmarks, double aspect = 1) {
   std::vector<KeyframeView> views;
   std::map<int, int> seen;
   for (const int id : keyframes) {
@@ -188,7 +190,7 @@ std::optional<Scene> SceneOf(const Odometry& odometry, const std::vector<int>& k
       const cv::Point2f pixel = view.keypoints[f].pt;
       Observation o{static_cast<int>(scene.cameras.size()),
                     found->second,
-                    {double(pixel.x) - c.cx, double(pixel.y) - c.cy},
+                    {double(pixel.x) - c.cx, (double(pixel.y) - c.cy) / aspect},
                     0,
                     0};
       if (const double inverse = double(view.inverse_depth[f]); inverse > 0) {
@@ -204,7 +206,7 @@ std::optional<Scene> SceneOf(const Odometry& odometry, const std::vector<int>& k
   if (static_cast<int>(scene.cameras.size()) < kFewestKeyframes || scene.landmarks.size() < 50 ||
       scene.observations.empty())
     return std::nullopt;
-  scene.given = std::log(std::sqrt(c.fx * c.fy));
+  scene.given = std::log(std::sqrt(c.fx * c.fy / aspect));
   scene.lens = {{scene.given, 0, 0, 0}};
   scene.stereo = odometry.Rig().sensor == Sensor::kStereo;
   scene.width = c.width;
@@ -231,7 +233,8 @@ Pass Track(const Dataset& dataset, const RunConfig& config, const PinholeCamera&
     pass.posed += int(track.state == TrackingState::kTracking);
   }
   odometry.FinishMapping();
-  pass.scene = SceneOf(odometry, KeyframesOfLargestSubmap(odometry, {}), kMostLandmarks);
+  pass.scene =
+      SceneOf(odometry, KeyframesOfLargestSubmap(odometry, {}), kMostLandmarks, camera.fy / camera.fx);
   return pass;
 }
 
@@ -258,9 +261,11 @@ double SigmaOf(const Scene& best, const Fit& fit) {
 
 PinholeCamera CameraOf(const PinholeCamera& before, const std::array<double, 4>& lens) {
   PinholeCamera camera = before;
-  camera.fx = camera.fy = std::exp(lens[0]);
+  const double aspect = before.fy / before.fx;  // of the pixels, which need not be square
+  camera.fx = std::exp(lens[0]);
+  camera.fy = aspect * camera.fx;
   camera.cx = std::clamp(before.cx + lens[2], 0.0, double(before.width));
-  camera.cy = std::clamp(before.cy + lens[3], 0.0, double(before.height));
+  camera.cy = std::clamp(before.cy + aspect * lens[3], 0.0, double(before.height));
   return camera;
 }
 
@@ -275,10 +280,10 @@ FocalLength MeasureFocalLength(const fs::path& path, const RunConfig& config, in
   FocalLength result;
   result.camera = dataset->Rig().camera;
   // From the usual one; a wide or a narrow one where that loses its way.
-  const double usual = result.camera.fx;
   for (const double share : {1.0, 0.65, 1.5}) {
     PinholeCamera camera = result.camera;
-    camera.fx = camera.fy = share * usual;
+    camera.fx *= share;
+    camera.fy *= share;
     for (int i = 0; i < kMostPasses; ++i) {
       Pass pass = Track(*dataset, config, camera, frames);
       result.frames = pass.frames;
@@ -307,6 +312,7 @@ FocalLength MeasureFocalLength(const fs::path& path, const RunConfig& config, in
         result.camera.distortion = Distortion::kRadTan;
         result.camera.coefficients = {pass.scene->lens[1], 0, 0, 0, 0};
       }
+      result.camera = TurnedCamera(result.camera, (360 - dataset->TurnedBy()) % 360);
       return result;
     }
   }

@@ -6,6 +6,7 @@
 
 #include "apps/run/depth_beside.h"
 #include "frontend/dataset/image_file.h"
+#include "frontend/dataset/layout.h"
 #include "tutti/backend/evaluation.h"
 #include "tutti/backend/trajectory_file.h"
 #include "tutti/core/error.h"
@@ -34,6 +35,7 @@ class RestampedDataset : public Dataset {
     return read;
   }
   ColourImage ReadColour(std::size_t i) const override { return images_->ReadColour(i); }
+  double SkippedShare() const override { return images_->SkippedShare(); }
   const CameraRig& Rig() const override { return images_->Rig(); }
   std::optional<fs::path> GroundTruthFile() const override { return images_->GroundTruthFile(); }
   Trajectory ReadGroundTruth(const fs::path& file, std::vector<std::string>* warnings) const override {
@@ -57,7 +59,8 @@ DatasetOptions Whole(DatasetOptions options) {
 }
 
 bool HasOwnStamps(const fs::path& images, const DatasetOptions& options) {
-  const DatasetType type = options.type != DatasetType::kAuto ? options.type : DetectDatasetType(images);
+  const DatasetType type = TypeToOpen(images, options);
+  if (type == DatasetType::kPaired) return HasStamps(images);
   return type != DatasetType::kImages && type != DatasetType::kVideo;
 }
 
@@ -120,6 +123,12 @@ GivenOdometry::GivenOdometry(const GivenOdometryFiles& files, const fs::path& im
     trajectory_ = poses.trajectory;
   }
   notes_.insert(notes_.end(), poses.warnings.begin(), poses.warnings.end());
+  jumps_ = FindJumps(trajectory_);
+  for (const OdometryJump& jump : jumps_) {
+    if (jump.comes_back) notes_.push_back(files.trajectory.string() + ": " + Sentence(jump));
+  }
+  as_given_ = trajectory_;
+  trajectory_ = WithoutOutliers(std::move(trajectory_), jumps_);
   SumUp(files.sigmas ? ReadMotionSigmas(*files.sigmas, trajectory_) : poses.sigmas);
 }
 
@@ -193,6 +202,10 @@ std::vector<double> GivenOdometry::ImageStamps(const Dataset& all, bool numbered
   if (fs::is_directory(images_, ignored) && StampsInNames(ListImages(images_)).stamps.size() == count)
     return stamps;  // of the names, which the data set says
   if (numbered) return stamps;
+  if (trajectory_.size() != count && has_stamps_ && TypeToOpen(images_, options_) == DatasetType::kVideo) {
+    notes_.push_back("the frames have the time stamps of the video");
+    return stamps;
+  }
   if (trajectory_.size() != count)
     throw InputError(images_.string() + ": nothing says when its " + std::to_string(count) +
                      " images were taken, and " + files_.trajectory.string() + " has " +

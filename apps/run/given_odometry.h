@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "apps/slam/odometry_jumps.h"
 #include "tutti/core/trajectory.h"
 #include "tutti/frontend/dataset.h"
 
@@ -32,11 +33,15 @@ class GivenOdometry {
   /// order. Throws InputError if none of this works, or if not one image has a pose.
   std::unique_ptr<Dataset> Open() const;
   /// T_odom_body at that time: interpolated between poses at most 1 s apart, else of a pose within 0.02 s.
+  /// Outliers (FindJumps) are replaced.
   std::optional<Pose> At(double stamp_s) const;
   /// How uncertain the motion from the one time to the other is, as far as the files say: in the trajectory's
   /// own columns or a file beside it. Within a motion the variance grows evenly.
   std::optional<MotionSigma> SigmaBetween(double from_s, double to_s) const;
-  const Trajectory& trajectory() const { return trajectory_; }
+  /// As the file has it.
+  const Trajectory& trajectory() const { return as_given_; }
+  /// Its jumps, in order of time.
+  const std::vector<OdometryJump>& jumps() const { return jumps_; }
   /// What was found and decided.
   const std::vector<std::string>& notes() const { return notes_; }
 
@@ -49,7 +54,8 @@ class GivenOdometry {
   GivenOdometryFiles files_;
   std::filesystem::path images_;
   DatasetOptions options_;
-  Trajectory trajectory_;
+  Trajectory as_given_, trajectory_;  // trajectory_: without outliers
+  std::vector<OdometryJump> jumps_;
   std::vector<Eigen::Vector2d> variances_;  // of translation and rotation, from the first pose to each
   bool has_stamps_ = true;                  // false: numbers of lines
   std::vector<double> stamps_;              // of all images; empty: the data set has its own

@@ -255,7 +255,16 @@ std::string SummaryJson(const RunResult& r) {
       return Json{{"fraction", fraction}, {"rotation_deg", rotation_rad * internal::kDegrees}};
     };
     json["given_odometry"] = {{"stated", sigmas(r.followed.stated_fraction, r.followed.stated_rotation_rad)},
-                              {"seen", sigmas(r.followed.seen_fraction, r.followed.seen_rotation_rad)}};
+                              {"seen", sigmas(r.followed.seen_fraction, r.followed.seen_rotation_rad)},
+                              {"jumps", Json::array()}};
+    for (const OdometryJump& jump : r.followed.jumps) {
+      json["given_odometry"]["jumps"].push_back(
+          {{"from_s", std::isfinite(jump.from_s) ? Json(jump.from_s) : Json()},
+           {"to_s", std::isfinite(jump.to_s) ? Json(jump.to_s) : Json()},
+           {"distance_m", jump.distance_m},
+           {"angle_deg", jump.angle_rad * internal::kDegrees},
+           {"comes_back", jump.comes_back}});
+    }
   }
   if (!r.given_odometry && !r.appearance_only)
     json["lens_check"] = {{"measured", r.lens_check.measured},
@@ -275,6 +284,7 @@ std::string SummaryJson(const RunResult& r) {
         {"alignment", r.evaluation->alignment},  {"ground_truth", r.evaluation->file},
         {"path_m", r.evaluation->path_m},        {"odometry", ScoreJson(r.evaluation->odometry)},
         {"slam", ScoreJson(r.evaluation->slam)}, {"odometry_complete", r.odometry_complete}};
+    if (r.evaluation->scaled.valid) json["evaluation"]["sim3_scale"] = r.evaluation->scaled.scale;
   }
   Json config = Json::object();
   for (const ConfigEntry& entry : DescribeConfig(r.config)) {

@@ -54,6 +54,16 @@ double PathBetween(const Trajectory& trajectory, double begin_s, double end_s) {
   return path;
 }
 
+double Extent(const Trajectory& trajectory) {
+  if (trajectory.empty()) return 0;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const StampedPose& pose : trajectory) sum += pose.pose.translation;
+  const auto count = static_cast<double>(trajectory.size());
+  double squares = 0;
+  for (const StampedPose& pose : trajectory) squares += (pose.pose.translation - sum / count).squaredNorm();
+  return std::sqrt(squares / count);
+}
+
 LoopError Apart(const Pose& candidate, const Pose& query, bool rotations = true) {
   LoopError apart;
   apart.distance_m = (candidate.translation - query.translation).norm();
@@ -112,6 +122,7 @@ void EvaluateRun(const Trajectory& reference, const std::string& file, RunResult
   if (!result.appearance_only) {
     evaluation.slam = Score(reference, result.trajectory, mono);
     evaluation.odometry = Score(reference, result.trajectory_odometry, mono);
+    if (!mono) evaluation.scaled = Score(reference, result.trajectory, true);
   }
   if (!result.trajectory.empty()) {
     const double first = result.trajectory.front().stamp_s, last = result.trajectory.back().stamp_s;
@@ -122,6 +133,7 @@ void EvaluateRun(const Trajectory& reference, const std::string& file, RunResult
       }
       result.reference.push_back(pose);
     }
+    evaluation.extent_m = Extent(result.reference);
   }
   MeasureLoops(result);
   std::optional<double> scale = 1.0;

@@ -26,9 +26,10 @@ FollowedOdometry::FollowedOdometry(const SlamOptions& options, Sensor sensor)
     : configured_{options.odometry_sigma_fraction, options.odometry_sigma_deg * internal::kRadians},
       sensor_(sensor) {}
 
-std::optional<MotionSigma> FollowedOdometry::NoteStep(const StepCheck& check) {
+std::optional<MotionSigma> FollowedOdometry::NoteStep(int keyframe, const StepCheck& check) {
   constexpr double kOwnSigmas = 3, kSlipSigmas = 5;
   images_.Add(check);
+  checks_[keyframe] = check;
   const double own_m = kOwnSigmas * check.sigma_translation_m,
                own_rad = kOwnSigmas * check.sigma_rotation_rad;
   const bool contradicted = check.translation_m.norm() > own_m || check.rotation_rad.norm() > own_rad;
@@ -52,6 +53,15 @@ std::optional<MotionSigma> FollowedOdometry::NoteMotion(int keyframe, const Moti
   }
   keyframe_ = position;
   return motion;
+}
+
+// One camera's landmarks stand where the odometry put them: it sees a turn, and no length.
+bool FollowedOdometry::ImagesConfirm(int keyframe, const OdometryJump& jump) const {
+  constexpr double kShare = 0.2;  // of the jump
+  const auto check = checks_.find(keyframe);
+  if (!ImagesJudgeSteps() || check == checks_.end()) return false;
+  return check->second.translation_m.norm() < kShare * std::max(jump.distance_m, check->second.way_m) &&
+         check->second.rotation_rad.norm() < std::max(kShare * jump.angle_rad, 2 * internal::kRadians);
 }
 
 FollowedOdometry::Sigmas FollowedOdometry::Stated() const {

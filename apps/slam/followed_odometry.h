@@ -3,9 +3,12 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
+#include "apps/slam/odometry_jumps.h"
 #include "apps/slam/odometry_uncertainty.h"
 #include "tutti/core/camera.h"
 #include "tutti/core/trajectory.h"
@@ -21,7 +24,18 @@ class FollowedOdometry {
 
   FollowedOdometry(const SlamOptions& options, Sensor sensor);
 
-  void Begin() { begun_ = true; }
+  /// Its next pose.
+  void Add(const StampedPose& T_odom_camera) {
+    begun_ = true;
+    watch_.Add(T_odom_camera);
+  }
+  /// Where its poses jump, as far as that is new. `all`: no pose follows.
+  std::vector<OdometryJump> TakeJumps(bool all) { return watch_.Take(all); }
+  /// Whether the images see the motion of such a step, which led to this keyframe: then it is none.
+  bool ImagesConfirm(int keyframe, const OdometryJump& jump) const;
+  void NoteJump(const OdometryJump& jump) { jumps_.push_back(jump); }
+  /// Those that were noted.
+  const std::vector<OdometryJump>& jumps() const { return jumps_; }
   /// Whether there is one.
   bool begun() const { return begun_; }
   /// Whether the images tell of each step how good it is. Not those of one camera: landmarks stand where the
@@ -32,7 +46,7 @@ class FollowedOdometry {
   /// What the images say of the step to a new keyframe. How uncertain that step is by this, if it is: where
   /// one step differs, it may be the images that are wrong (a car that drives along), unless they are known
   /// to be better than the odometry, or differ by far more than it should.
-  std::optional<MotionSigma> NoteStep(const StepCheck& check);
+  std::optional<MotionSigma> NoteStep(int keyframe, const StepCheck& check);
   /// It says how uncertain its motion since the last call is, which led to this position, and to this
   /// keyframe if it is not -1. How uncertain all the motion since the keyframe before is, if it led to one.
   std::optional<MotionSigma> NoteMotion(int keyframe, const MotionSigma& sigma,
@@ -54,6 +68,9 @@ class FollowedOdometry {
   Sensor sensor_;
   bool begun_ = false;
   OdometryUncertainty images_;
+  std::map<int, StepCheck> checks_;  // by keyframe
+  JumpWatch watch_;
+  std::vector<OdometryJump> jumps_;
   MotionSigma since_keyframe_, between_keyframes_;
   std::optional<Eigen::Vector3d> keyframe_;  // the last one's position
   double way_m2_ = 0;                        // sum of squares between keyframes

@@ -253,7 +253,34 @@ LoopUpdate LoopCloser::Enter(std::vector<LoopEdge> entering, const Odometry& odo
 }
 
 void LoopCloser::NoteStep(int keyframe, const StepCheck& check) {
-  if (const auto sigma = followed_.NoteStep(check)) graph_.NoteMotion(keyframe, *sigma);
+  if (const auto sigma = followed_.NoteStep(keyframe, check)) graph_.NoteMotion(keyframe, *sigma);
+}
+
+void LoopCloser::FollowOdometry(const StampedPose& T_odom_camera, const Odometry& odometry) {
+  followed_.Add(T_odom_camera);
+  JudgeJumps(odometry, false);
+}
+
+void LoopCloser::JudgeJumps(const Odometry& odometry, bool all) {
+  const std::vector<OdometryJump> jumps = followed_.TakeJumps(all);
+  if (jumps.empty()) return;
+  const std::vector<int> ids = odometry.KeyframeIds();
+  const auto later = [&](double stamp_s) {
+    return std::partition_point(ids.begin(), ids.end(),
+                                [&](int id) { return odometry.KeyframeStamp(id) < stamp_s; });
+  };
+  for (const OdometryJump& jump : jumps) {
+    const auto end = later(jump.to_s);
+    const int next = end == ids.end() ? odometry.NextKeyframeId() : *end;
+    if (!jump.comes_back) {
+      if (followed_.ImagesConfirm(next, jump)) continue;
+      graph_.NoteJump(next);
+    }
+    followed_.NoteJump(jump);
+    if (!jump.comes_back) continue;
+    for (auto outlier = later(std::nextafter(jump.from_s, jump.to_s)); outlier != end; ++outlier)
+      graph_.NoteOutlier(*outlier);
+  }
 }
 
 void LoopCloser::NoteMotion(int keyframe, const MotionSigma& sigma, const Eigen::Vector3d& position) {

@@ -71,8 +71,11 @@ class LoopCloser {
   /// position, and to this keyframe if it is not -1. It counts in place of what is configured.
   void NoteMotion(int keyframe, const MotionSigma& sigma, const Eigen::Vector3d& position);
   /// The poses are somebody else's: where they differ from all loops by no more than loops err themselves
-  /// (LoopGate::WithinNoise), they stay as they are.
-  void FollowOdometry() { followed_.Begin(); }
+  /// (LoopGate::WithinNoise), they stay as they are. Where such a pose is wrong or the odometry began anew
+  /// (FindJumps) and the images don't confirm the step, the graph believes no step.
+  void FollowOdometry(const StampedPose& T_odom_camera, const Odometry& odometry);
+  /// Marks these jumps in the graph, those up to the last pose as well if there are `all`.
+  void JudgeJumps(const Odometry& odometry, bool all);
   const FollowedOdometry& followed() const { return followed_; }
 
   /// A proposed loop between images without poses.

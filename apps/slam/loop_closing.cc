@@ -5,6 +5,7 @@
 
 #include "apps/slam/map_parts.h"
 #include "apps/slam/map_state.h"
+#include "apps/slam/odometry_jumps.h"
 #include "core/section_file.h"
 #include "core/stopwatch.h"
 
@@ -145,6 +146,7 @@ std::optional<LoopUpdate> LoopClosing::Due(const Odometry* odometry, std::int64_
 
 std::optional<LoopUpdate> LoopClosing::Rest(const Odometry* odometry, std::int64_t frames) {
   std::optional<LoopUpdate> update;
+  if (odometry != nullptr) closer_.JudgeJumps(*odometry, true);
   if (odometry != nullptr) update = closer_.Solved(*odometry, frames, Entering::kAtOnce);
   if (!update && !submitted_.empty()) update = Deliver(odometry, frames);
   if (!update && odometry != nullptr && closer_.CloseDeferred(*odometry, frames)) update.emplace();
@@ -261,7 +263,15 @@ void LoopClosing::Removed(const std::map<int, int>& into, const Odometry& before
   closer_.Removed(into, before);
 }
 
-std::vector<std::string> LoopClosing::TakeWarnings() { return std::exchange(warnings_, {}); }
+std::vector<std::string> LoopClosing::TakeWarnings() {
+  constexpr std::size_t kMostOfAKind = 5;
+  const std::vector<OdometryJump>& jumps = closer_.followed().jumps();
+  for (; jumps_told_ < jumps.size(); ++jumps_told_) {
+    if (jumps_told_ < kMostOfAKind) warnings_.push_back(Sentence(jumps[jumps_told_]));
+    if (jumps_told_ == kMostOfAKind) warnings_.emplace_back("the odometry jumps more often");
+  }
+  return std::exchange(warnings_, {});
+}
 
 std::map<std::string, double> LoopClosing::StageMilliseconds() const {
   std::map<std::string, double> stages = stages_;

@@ -67,7 +67,9 @@ class LoopClosing {
   void Submit(const InputFrame& frame, const KeyframeView* view, std::int64_t frames);
   /// As LoopCloser.
   void NoteStep(int keyframe, const StepCheck& check) { closer_.NoteStep(keyframe, check); }
-  void FollowOdometry() { closer_.FollowOdometry(); }
+  void FollowOdometry(const StampedPose& T_odom_camera, const Odometry& odometry) {
+    closer_.FollowOdometry(T_odom_camera, odometry);
+  }
   void NoteMotion(int keyframe, const MotionSigma& sigma, const Eigen::Vector3d& position) {
     closer_.NoteMotion(keyframe, sigma, position);
   }
@@ -156,6 +158,7 @@ class LoopClosing {
   std::int64_t keyframes_seen_ = 0;
   std::vector<std::string> warnings_;  // not taken yet
   std::string last_warning_;
+  std::size_t jumps_told_ = 0;  // of the odometry that is followed
   std::map<std::string, double> stages_;
   std::int64_t session_ = 0;  // frame number that the present recording began with
 };

@@ -14,6 +14,7 @@
 #include "apps/slam/session_list.h"
 #include "core/section_file.h"
 #include "core/stopwatch.h"
+#include "frontend/odometry/frame_check.h"
 #include "tutti/core/error.h"
 #include "tutti/slam/version.h"
 
@@ -30,6 +31,7 @@ class SlamSystem::Impl {
   }
 
   TrackResult Track(const InputFrame& frame) {
+    CheckFrame(frame, rig_);
     if (!localizing_) BringIn();
     ++frames_;
     sessions_.CountFrame();
@@ -63,14 +65,15 @@ class SlamSystem::Impl {
       throw InputError("frame " + std::to_string(frame.index) +
                        ": the odometry's standard deviation is below 0 or not finite");
     if (!odometry_) return Track(frame);
+    CheckFrame(frame, rig_);
     if (frames_ == 0 && config_.run.prune_every > 0)
       loops_.Warn("run.prune_every: no effect on a trajectory that is given: no keyframe is removed");
-    loops_.FollowOdometry();
     BringIn();
     ++frames_;
     sessions_.CountFrame();
     TrackResult result = odometry_->Follow(frame, T_odom_camera);
     if (result.step) loops_.NoteStep(result.keyframe, *result.step);
+    loops_.FollowOdometry({frame.stamp_s, T_odom_camera}, *odometry_);
     if (sigma) loops_.NoteMotion(result.keyframe, *sigma, T_odom_camera.translation);
     last_ = frame.index;
     sessions_.SetLastFrame(last_);
@@ -372,6 +375,7 @@ SlamSystem::~SlamSystem() = default;
 void SlamSystem::BeginSession(const CameraRig& rig) { impl_->BeginSession(rig); }
 std::vector<MapSession> SlamSystem::Sessions() const { return impl_->Sessions(); }
 bool SlamSystem::Merge(SlamSystem* other, std::string* reason) {
+  if (other == nullptr || other == this) throw InputError("a map can't be merged with itself, or with none");
   std::string ignored;
   if (reason == nullptr) reason = &ignored;
   if (!impl_->ComesAfter(*other->impl_)) return impl_->Merge(other->impl_.get(), reason);
@@ -429,7 +433,7 @@ int SlamSystem::GlobalAdjustments() const { return impl_->loops_.closer().Adjust
 FollowedUncertainty SlamSystem::Followed() const {
   const FollowedOdometry& followed = impl_->loops_.closer().followed();
   const FollowedOdometry::Sigmas stated = followed.Stated(), seen = followed.Seen();
-  return {stated.fraction, stated.rotation_rad, seen.fraction, seen.rotation_rad};
+  return {stated.fraction, stated.rotation_rad, seen.fraction, seen.rotation_rad, followed.jumps()};
 }
 
 PoseGraph SlamSystem::Graph() const {

@@ -56,10 +56,12 @@ class TrajectoryCloser::Impl {
 
   Trajectory Corrected(const Trajectory& odometry) const {
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (slam_.Corrections() == 0 && slam_.GlobalAdjustments() == 0) return odometry;
+    const std::vector<OdometryJump> jumps = FindJumps(odometry);
     Trajectory before;
-    for (const auto& [id, pose] : of_keyframe_) before.push_back(pose);
-    return CorrectTrajectory(odometry, before, KeyframesNow());
+    if (slam_.Corrections() > 0 || slam_.GlobalAdjustments() > 0) {
+      for (const auto& [id, pose] : of_keyframe_) before.push_back(pose);
+    }
+    return CorrectTrajectory(odometry, before, before.empty() ? before : KeyframesNow(), jumps);
   }
 
   Trajectory Keyframes() const {

@@ -1,6 +1,8 @@
 #include "apps/slam/trajectory_correction.h"
 
+#include <algorithm>
 #include <string>
+#include <utility>
 
 #include "tutti/core/error.h"
 
@@ -20,12 +22,24 @@ Pose Move(const Pose& pose, const Pose& before, const Pose& after, double scale)
   return after * step;
 }
 
+// One between these times; null: there is none.
+const OdometryJump* LastingJump(double begin_s, double end_s, const std::vector<OdometryJump>& jumps) {
+  const auto found = std::find_if(jumps.begin(), jumps.end(), [&](const OdometryJump& jump) {
+    return !jump.comes_back && begin_s < jump.to_s && jump.to_s <= end_s;
+  });
+  return found == jumps.end() ? nullptr : &*found;
+}
+
 }  // namespace
 
-Trajectory CorrectTrajectory(const Trajectory& odometry, const Trajectory& before, const Trajectory& after) {
+Trajectory CorrectTrajectory(Trajectory odometry, Trajectory before, Trajectory after,
+                             const std::vector<OdometryJump>& jumps) {
   if (before.size() != after.size())
     throw InputError(std::to_string(before.size()) + " keyframes of the odometry and " +
                      std::to_string(after.size()) + " corrected ones; they must be as many");
+  odometry = WithoutOutliers(std::move(odometry), jumps);
+  before = OnlyInliers(before, jumps);
+  after = OnlyInliers(after, jumps);
   if (before.empty()) return odometry;
   const std::size_t last = before.size() - 1;
   Trajectory out;
@@ -41,7 +55,9 @@ Trajectory CorrectTrajectory(const Trajectory& odometry, const Trajectory& befor
       continue;
     }
     const std::size_t a = next - 1;
-    const double share = (p.stamp_s - before[a].stamp_s) / (before[next].stamp_s - before[a].stamp_s);
+    double share = (p.stamp_s - before[a].stamp_s) / (before[next].stamp_s - before[a].stamp_s);
+    if (const OdometryJump* jump = LastingJump(before[a].stamp_s, before[next].stamp_s, jumps))
+      share = p.stamp_s >= jump->to_s ? 1 : 0;
     const Pose by_a = Move(p.pose, before[a].pose, after[a].pose, 1),
                by_b = Move(p.pose, before[next].pose, after[next].pose, 1);
     out.push_back({p.stamp_s,

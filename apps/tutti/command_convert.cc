@@ -7,6 +7,7 @@
 
 #include "apps/tutti/commands.h"
 #include "apps/tutti/files.h"
+#include "core/terminal.h"
 #include "tutti/backend/trajectory_file.h"
 #include "tutti/core/error.h"
 
@@ -22,12 +23,13 @@ void RunConvert(const ConvertArguments& arguments) {
   if (arguments.from != "auto") from = ParsePoseFileFormat(arguments.from);
   const PoseFileFormat to = ParsePoseFileFormat(arguments.to);
   KeepInputs({arguments.in, arguments.times}, {arguments.out, arguments.times_out});
+  RequireWritable({arguments.out, arguments.times_out});
   std::vector<double> times;
   std::vector<std::string> warnings;
   if (!arguments.times.empty()) times = ReadTimes(arguments.times, &warnings);
   const PoseFile in = ReadPoseFile(arguments.in, from, times);
   warnings.insert(warnings.end(), in.warnings.begin(), in.warnings.end());
-  for (const std::string& warning : warnings) std::fprintf(stderr, "tutti: warning: %s\n", warning.c_str());
+  for (const std::string& warning : warnings) internal::Say("warning: %s", warning.c_str());
   const bool needs_stamps = to == PoseFileFormat::kTum || to == PoseFileFormat::kEuroc;
   if (!in.has_stamps && (needs_stamps || !arguments.times_out.empty())) {
     throw InputError(arguments.in + ": the format " + ToString(in.format) +

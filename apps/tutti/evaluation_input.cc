@@ -7,6 +7,7 @@
 #include <set>
 
 #include "apps/tutti/evaluation_report.h"
+#include "core/terminal.h"
 #include "tutti/backend/trajectory_file.h"
 #include "tutti/core/error.h"
 
@@ -20,8 +21,7 @@ PoseFile Read(const std::string& file, const std::string& format, const std::vec
 }
 
 void SayWarnings(const PoseFile& poses) {
-  for (const std::string& warning : poses.warnings)
-    std::fprintf(stderr, "tutti: warning: %s\n", warning.c_str());
+  for (const std::string& warning : poses.warnings) internal::Say("warning: %s", warning.c_str());
 }
 
 Eigen::Vector3d Axis(const std::string& name) {

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cstdio>
 #include <fstream>
+#include <map>
 
+#include "core/replaced_file.h"
 #include "core/text_reader.h"
 #include "core/time_stamps.h"
 #include "tutti/backend/g2o_io.h"
@@ -36,15 +38,22 @@ std::string FirstWord(const std::filesystem::path& file) {
 }
 
 Trajectory GraphTrajectory(const std::filesystem::path& file, std::vector<std::string>& warnings) {
-  G2oFile graph = ReadG2o(file);
+  G2oFile graph = ReadG2o(file, BadInformation::kRefuse, true);  // the poses alone count
   warnings = graph.warnings;
   if (!graph.has_all_vertices) {
     throw InputError(file.string() +
                      ": holds edges without poses for all of their ends; `tutti optimize` finds the poses");
   }
+  constexpr NodeId kLargest = NodeId{1} << 53;  // of the whole numbers that a double holds
+  const std::map<NodeId, Similarity> poses = graph.graph.Poses();
+  const bool large = !poses.empty() && (poses.rbegin()->first > kLargest || poses.begin()->first < -kLargest);
+  if (large)
+    warnings.push_back(
+        file.string() +
+        ": its ids are too large for time stamps; its poses count as 0, 1, 2, ... by their ids");
   Trajectory out;
-  for (const auto& [id, pose] : graph.graph.Poses())
-    out.push_back({static_cast<double>(id), pose.RigidPart()});
+  for (const auto& [id, pose] : poses)
+    out.push_back({large ? static_cast<double>(out.size()) : static_cast<double>(id), pose.RigidPart()});
   return out;
 }
 
@@ -107,7 +116,8 @@ const char* ToString(PoseFileFormat format) {
 PoseFileFormat GuessPoseFileFormat(const std::filesystem::path& file) {
   // First, as a planar edge has as many words as a line of KITTI.
   const std::string word = FirstWord(file);
-  if (word == "FIX" || word.rfind("VERTEX", 0) == 0 || word.rfind("EDGE", 0) == 0)
+  if (word == "FIX" || word.rfind("VERTEX", 0) == 0 || word.rfind("EDGE", 0) == 0 ||
+      word.rfind("PARAMS", 0) == 0)
     return PoseFileFormat::kG2o;
   switch (GuessTrajectoryFormat(file)) {
     case TrajectoryFormat::kKitti:
@@ -168,15 +178,12 @@ void WritePoseFile(const std::filesystem::path& file, const Trajectory& trajecto
 
 void WriteTimes(const std::filesystem::path& file, const Trajectory& trajectory,
                 const std::vector<std::int64_t>& stamps_ns) {
-  std::ofstream out(file);
-  if (!out)
-    throw InputError(file.string() + ": can't be written; check that the folder exists and is writable");
+  std::string text;
   for (std::size_t k = 0; k < trajectory.size(); ++k)
-    out << (stamps_ns.empty() ? internal::StampText(trajectory[k].stamp_s)
-                              : internal::StampText(stamps_ns[k]))
-        << '\n';
-  out.flush();
-  if (!out) throw InputError(file.string() + ": could not be written in full; is the disk full?");
+    text +=
+        (stamps_ns.empty() ? internal::StampText(trajectory[k].stamp_s) : internal::StampText(stamps_ns[k])) +
+        '\n';
+  internal::WriteFile(file, text);
 }
 
 }  // namespace tutti

@@ -126,6 +126,7 @@ void KeyframeGraph::Update(std::vector<MapKeyframe> keyframes, const std::vector
   }
   for (const CovisiblePair& c : Strongest(covisible)) edges_.push_back({c.older, c.newer, {}});
   TieBeginnings();
+  TiePastOutliers();
   std::sort(edges_.begin(), edges_.end(), Before<Edge>);
   if (!carried_.empty()) {
     std::vector<Edge> all;
@@ -168,6 +169,20 @@ void KeyframeGraph::TieBeginnings() {
     const auto before = std::find_if(std::make_reverse_iterator(newer), keyframes_.rend(),
                                      [&](const MapKeyframe& k) { return OfOnePiece(k.id, newer->id); });
     if (before != keyframes_.rend()) edges_.push_back({before->id, newer->id, {}});
+  }
+}
+
+void KeyframeGraph::TiePastOutliers() {
+  const auto good = [&](const MapKeyframe& k) { return outliers_.count(k.id) == 0; };
+  for (const int outlier : outliers_) {
+    const auto place = std::partition_point(keyframes_.begin(), keyframes_.end(),
+                                            [&](const MapKeyframe& k) { return k.id < outlier; });
+    const auto next = std::find_if(place, keyframes_.end(), good);
+    const auto before = std::find_if(std::make_reverse_iterator(place), keyframes_.rend(), good);
+    if (next == keyframes_.end() || before == keyframes_.rend() || !OfOnePiece(before->id, next->id))
+      continue;
+    const auto same = [&](const Edge& e) { return e.older == before->id && e.newer == next->id; };
+    if (std::none_of(edges_.begin(), edges_.end(), same)) edges_.push_back({before->id, next->id, {}});
   }
 }
 
@@ -233,9 +248,13 @@ std::map<int, Similarity> KeyframeGraph::JoinedPieces(const std::vector<LoopEdge
 }
 
 double KeyframeGraph::SigmaFloor() const {
-  double mean_length = 0;
-  for (const Edge& edge : edges_) mean_length += edge.S_older_newer.translation.norm();
-  mean_length /= std::max<double>(1, static_cast<double>(edges_.size()));
+  double mean_length = 0, known = 0;
+  for (const Edge& edge : edges_) {
+    if (Unknown(edge)) continue;
+    mean_length += edge.S_older_newer.translation.norm();
+    ++known;
+  }
+  mean_length /= std::max(1.0, known);
   return options_.sigma_translation_floor * mean_length + 1e-6;
 }
 
@@ -261,16 +280,24 @@ Eigen::Vector2d KeyframeGraph::Walked(int keyframe) const {
   return after == walked_.begin() ? Eigen::Vector2d::Zero() : std::prev(after)->second;
 }
 
+// Across a jump, or to an outlier.
+bool KeyframeGraph::Unknown(const Edge& edge) const {
+  const auto jump = jumps_.upper_bound(edge.older);
+  return (jump != jumps_.end() && *jump <= edge.newer) || outliers_.count(edge.older) != 0 ||
+         outliers_.count(edge.newer) != 0;
+}
+
 // Of (translation, rotation, log scale). Over several steps errors of length add up as if they were all in
 // one direction: that makes up for what the turns between them do to the end.
 Vector7d KeyframeGraph::Sigmas(const Edge& edge, double floor) const {
   const double steps = std::sqrt(edge.steps);
   const Eigen::Vector2d walked = (Walked(edge.newer) - Walked(edge.older)).cwiseAbs().cwiseSqrt();
+  const bool unknown = Unknown(edge);
+  const double ratio = unknown ? 1 : options_.sigma_translation_ratio,
+               rotation_rad = unknown ? 1 : options_.sigma_rotation_rad;
   Vector7d sigmas;
-  sigmas << Eigen::Vector3d::Constant(
-      std::max(walked[0], options_.sigma_translation_ratio * edge.Way() + steps * floor)),
-      Eigen::Vector3d::Constant(std::max(walked[1], steps * options_.sigma_rotation_rad)),
-      steps * options_.sigma_log_scale;
+  sigmas << Eigen::Vector3d::Constant(std::max(walked[0], ratio * edge.Way() + steps * floor)),
+      Eigen::Vector3d::Constant(std::max(walked[1], steps * rotation_rad)), steps * options_.sigma_log_scale;
   return sigmas;
 }
 
@@ -301,7 +328,8 @@ KeyframeCorrection KeyframeGraph::CorrectionOf(const PoseGraph& graph, const Pos
   correction.success = report.success;
   correction.reason = report.reason;
   if (!report.success) return correction;
-  correction.S_world_keyframe = graph.Poses();
+  for (const PoseGraphNode& node : graph.nodes())
+    correction.S_world_keyframe.emplace(static_cast<int>(node.id), node.pose);
   correction.merges = Merges(loops);
   for (std::size_t e = 0; e < graph.edges().size(); ++e) {
     if (graph.edges()[e].kind == EdgeKind::kLoop) correction.loops.push_back(report.edges[e]);

@@ -16,8 +16,9 @@ struct StampedImage {
   std::filesystem::path file;
 };
 
+// `skipped`: lines that are of no use; may be null.
 std::vector<StampedImage> ReadCsv(const std::filesystem::path& camera, StampUnit& unit,
-                                  std::vector<std::string>& warnings) {
+                                  std::vector<std::string>& warnings, std::size_t* skipped) {
   const std::filesystem::path csv = camera / "data.csv";
   std::vector<StampedImage> images;
   StampOrder order(csv, warnings);
@@ -37,6 +38,7 @@ std::vector<StampedImage> ReadCsv(const std::filesystem::path& camera, StampUnit
     if (!order.Accept(line.number, stamps[i])) continue;
     images.push_back({*stamp_ns, stamps[i], camera / "data" / line.words[1]});
   }
+  if (skipped != nullptr) *skipped = order.skipped();
   if (images.empty()) throw InputError(csv.string() + ": lists no images");
   return images;
 }
@@ -74,14 +76,14 @@ FolderContents FindEuroc(const std::filesystem::path& folder, const DatasetOptio
   out.T_body_left = left.T_body_camera;
   out.rate_hz = left.rate_hz;
   out.stamp_unit = StampUnit::kNanoseconds;
-  const std::vector<StampedImage> images = ReadCsv(mav / "cam0", out.stamp_unit, out.warnings);
+  const std::vector<StampedImage> images = ReadCsv(mav / "cam0", out.stamp_unit, out.warnings, &out.skipped);
   std::vector<StampedImage> right_images;
   if (options.sensor == Sensor::kStereo) {
     const MountedCamera right = ReadMounted(mav / "cam1" / "sensor.yaml");
     out.right = right.camera;
     out.T_right_left = right.T_body_camera.Inverse() * left.T_body_camera;
     StampUnit unit = out.stamp_unit;
-    right_images = ReadCsv(mav / "cam1", unit, out.warnings);
+    right_images = ReadCsv(mav / "cam1", unit, out.warnings, nullptr);
   }
   std::size_t alone = 0;
   for (const StampedImage& image : images) {

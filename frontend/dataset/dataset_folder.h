@@ -10,8 +10,10 @@
 #include <utility>
 #include <vector>
 
+#include "frontend/dataset/depth_reader.h"
 #include "frontend/dataset/image_file.h"
 #include "frontend/dataset/image_mask.h"
+#include "frontend/dataset/layout.h"
 #include "frontend/dataset/rectified_rig.h"
 #include "tutti/frontend/dataset.h"
 
@@ -55,6 +57,9 @@ struct FolderContents {
   std::size_t pose_count = 0;                  ///< KITTI: poses that the file must have
   StampUnit stamp_unit = StampUnit::kSeconds;  ///< of the images' stamps where they are written
   double stamp_scale = 1;                      ///< factor on the stamps of the ground truth
+  std::size_t skipped = 0;           ///< (left, or colour) images that are no frames: Dataset::SkippedShare
+  std::optional<LayoutTruth> truth;  ///< in a form of the layout's own; goes before truth_places
+  DepthFormat depth;
   std::vector<std::string> warnings;
 };
 
@@ -76,24 +81,30 @@ class FolderDataset : public Dataset {
   std::optional<std::filesystem::path> GroundTruthFile() const override;
   Trajectory ReadGroundTruth(const std::filesystem::path& file,
                              std::vector<std::string>* warnings) const override;
+  double SkippedShare() const override {
+    const auto skipped = static_cast<double>(contents_.skipped);
+    return skipped / (skipped + static_cast<double>(Size()));
+  }
   const std::vector<std::string>& Warnings() const override { return contents_.warnings; }
 
  private:
   void FindImageSize();
+  void FindRange(std::size_t place, const cv::Mat& first);
   void SetUpRig();
+  void SetUpDepth();
   void SetUpMasks();
   std::string Rectify(const ImageFile& read, const std::filesystem::path& file, const Rectifier* rectifier,
                       cv::Mat& out) const;
   std::string NoFrame(std::size_t i) const;
   // Rectified; empty if this image has none. Throws InputError.
   cv::Mat MaskOf(const std::filesystem::path& image) const;
-  std::string ReadDepth(const std::filesystem::path& file, cv::Mat& out) const;
 
   FolderContents contents_;
   DatasetOptions options_;
   CameraRig rig_;
   cv::Size size_;
-  int bits_ = 8;
+  GreyRange range_;
+  std::optional<DepthReader> depth_;
   std::optional<Rectifier> left_, right_;
   std::optional<ImageMasks> masks_;  // a mask for each image
   cv::Mat mask_;                     // for all images, rectified; empty: none
@@ -123,20 +134,30 @@ Trajectory StampedByFrame(const std::filesystem::path& file, const Trajectory& p
                           const TrajectoryDetails& details, std::size_t count,
                           const std::vector<std::pair<std::int64_t, double>>& frames);
 
-/// Watches that the stamps of a file grow: duplicates are to be skipped (with a warning), unsorted stamps
-/// throw InputError.
+/// Watches that the stamps of a file grow: duplicates are to be skipped (with a warning for the first five
+/// and their count), unsorted stamps throw InputError. Nothing else adds warnings in the meantime.
 class StampOrder {
  public:
   StampOrder(std::filesystem::path file, std::vector<std::string>& warnings)
       : file_(std::move(file)), warnings_(warnings) {}
   /// True if the line is to be used.
   bool Accept(std::size_t line, double stamp_s);
+  /// Lines that were not.
+  std::size_t skipped() const { return skipped_; }
 
  private:
   std::filesystem::path file_;
   std::vector<std::string>& warnings_;
   std::optional<double> last_;
+  std::size_t skipped_ = 0;
 };
+
+/// For each of `a` the place in `b`, or -1: pairs with the smallest difference first, at most `limit_s`, each
+/// stamp once (as TUM's associate.py). Both grow.
+std::vector<int> AssociateStamps(const std::vector<double>& a, const std::vector<double>& b, double limit_s);
+
+/// Position of a camera in camera 0, from P = K [I | t].
+Eigen::Vector3d PositionOfCamera(const Eigen::Matrix<double, 3, 4>& p);
 
 /// Warns that `alone` of the frames have no depth or right image: "`list`: 2 of 9 `which`". Not of a folder
 /// that grows, where they may still come.
@@ -150,6 +171,10 @@ FolderContents FindKitti(const std::filesystem::path& folder, const DatasetOptio
 FolderContents FindTum(const std::filesystem::path& folder, const DatasetOptions& options);
 FolderContents FindEuroc(const std::filesystem::path& folder, const DatasetOptions& options);
 FolderContents FindImages(const std::filesystem::path& folder, const DatasetOptions& options);
+/// A layout of layout.h.
+FolderContents FindPaired(const std::filesystem::path& folder, const DatasetOptions& options);
+/// The folder of an iPhone's recorder: a video, depth images, odometry.csv.
+std::unique_ptr<Dataset> OpenStrayScanner(const std::filesystem::path& folder, const DatasetOptions& options);
 /// A folder that grows: `find` lists it as it is now. Waits options.follow_s for the first image.
 std::unique_ptr<Dataset> FollowFolder(std::function<FolderContents()> find, const DatasetOptions& options);
 /// camera:0, a pair camera:0,1, the files that stand in for them, or a stream.

@@ -31,11 +31,6 @@ Projections ReadCalibration(const std::filesystem::path& file) {
   return projections;
 }
 
-// Position of a camera in camera 0, from P = K [I | t].
-Eigen::Vector3d Position(const Eigen::Matrix<double, 3, 4>& p) {
-  return -(p.leftCols<3>().inverse() * p.col(3));
-}
-
 void FindCalibration(const std::filesystem::path& folder, const std::string& left, const std::string& right,
                      const DatasetOptions& options, FolderContents& out) {
   std::filesystem::path file = folder / "calib.txt";
@@ -59,9 +54,9 @@ void FindCalibration(const std::filesystem::path& folder, const std::string& lef
     out.left->cx = p(0, 2);
     out.left->cy = p(1, 2);
   }
-  if (projections.count(left) != 0) out.T_body_left.translation = Position(projections[left]);
+  if (projections.count(left) != 0) out.T_body_left.translation = PositionOfCamera(projections[left]);
   if (out.baseline_m == 0 && projections.count(left) != 0 && projections.count(right) != 0) {
-    out.baseline_m = Position(projections[right]).x() - Position(projections[left]).x();
+    out.baseline_m = PositionOfCamera(projections[right]).x() - PositionOfCamera(projections[left]).x();
   }
 }
 
@@ -109,6 +104,10 @@ void FindTruth(const std::filesystem::path& folder, FolderContents& out) {
 }
 
 }  // namespace
+
+Eigen::Vector3d PositionOfCamera(const Eigen::Matrix<double, 3, 4>& p) {
+  return -(p.leftCols<3>().inverse() * p.col(3));
+}
 
 FolderContents FindKitti(const std::filesystem::path& folder, const DatasetOptions& options) {
   if (options.sensor == Sensor::kRgbd) {
@@ -177,6 +176,7 @@ FolderContents FindKitti(const std::filesystem::path& folder, const DatasetOptio
     out.pose_stamps.emplace_back(n, frame.stamp_s);
     out.frames.push_back(std::move(frame));
   }
+  out.skipped = order.skipped();
   if (options.sensor == Sensor::kStereo) {
     if (pairs == 0) {
       throw InputError(right_folder.string() + ": no image has the number of an image of " +

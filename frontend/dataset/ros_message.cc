@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 #include <map>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -21,11 +22,8 @@ using internal::ByteReader;
 // What is wrong with how a message is serialized; empty: nothing.
 std::string SerializationProblem(std::string_view message, Serialization serialization) {
   if (serialization == Serialization::kRos1 || message.size() < 4) return {};
-  const std::string_view kind = message.substr(0, 2);
-  if (kind == std::string_view("\x00\x01", 2)) return {};
-  return kind == "\x28\xb5" ? "is compressed for itself (compression_mode: message); write the bag without: "
-                              "ros2 bag convert"
-                            : "is not serialized as little-endian CDR";
+  if (message.substr(0, 2) == std::string_view("\x00\x01", 2)) return {};
+  return "is not serialized as little-endian CDR";
 }
 
 // Values of a message, one after the other.
@@ -177,6 +175,14 @@ void DecodeCompressed(MessageReader& in, Pixels pixels, MessageImage* out) {
 }
 
 }  // namespace
+
+double StampOf(const MessageHead& head) {
+  if (IsPacked({reinterpret_cast<const char*>(head.data()), sizeof head}))
+    return std::numeric_limits<double>::quiet_NaN();
+  return head[1] + 1e-9 * head[2];
+}
+
+bool IsPacked(std::string_view bytes) { return bytes.substr(0, 4) == "\x28\xb5\x2f\xfd"; }
 
 std::string NameOfType(std::string type) {
   const std::size_t msg = type.find("/msg/");

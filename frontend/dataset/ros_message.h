@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "frontend/dataset/image_file.h"
 #include "tutti/core/camera.h"
@@ -21,7 +22,10 @@ std::string NameOfType(std::string type);
 /// How a message with a std_msgs/Header begins: its number (ROS 2: the kind of serialization), seconds,
 /// nanoseconds.
 using MessageHead = std::array<std::uint32_t, 3>;
-inline double StampOf(const MessageHead& head) { return head[1] + 1e-9 * head[2]; }  ///< [s]
+/// Its stamp [s]; nan where it is compressed.
+double StampOf(const MessageHead& head);
+/// How Zstandard begins.
+bool IsPacked(std::string_view bytes);
 
 /// Image or CompressedImage.
 bool IsImageMessage(const std::string& type);
@@ -30,8 +34,6 @@ bool IsImageMessage(const std::string& type);
 struct MessageImage : ImageFile {
   bool metres = false;  ///< 32FC1, which ROS gives in metres
 };
-/// What pixels become: one channel, three with blue first, both of 8 or 16 bit; or nothing else (depth).
-enum class Pixels { kGrey, kColour, kStored };
 /// `type`: one for which IsImageMessage holds. Never throws; thread-safe.
 MessageImage DecodeImageMessage(const std::string& message, const std::string& type,
                                 Serialization serialization, Pixels pixels);

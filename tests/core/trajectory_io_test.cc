@@ -234,8 +234,7 @@ TEST(TrajectoryIo, StampsInNanosecondsAreWrittenAsTheyWereRead) {
   TrajectoryDetails details;
   const Trajectory read = ReadTrajectory(file, TrajectoryFormat::kTum, nullptr, &details);
   WriteTrajectory(file, read, TrajectoryFormat::kEuroc, details.stamps_ns);
-  EXPECT_THAT(TextOf(file),
-              AllOf(HasSubstr("\n" + stamps[0] + ","), HasSubstr("\n" + stamps[1] + ",")));
+  EXPECT_THAT(TextOf(file), AllOf(HasSubstr("\n" + stamps[0] + ","), HasSubstr("\n" + stamps[1] + ",")));
   WriteTrajectory(file, read, TrajectoryFormat::kTum, details.stamps_ns);
   EXPECT_THAT(TextOf(file), HasSubstr("\n1403636579.813555457 "));
   const Trajectory late = {{1e10, Pose()}};

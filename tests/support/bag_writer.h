@@ -29,7 +29,8 @@ class BagWriter {
     Record(file_, {Op(3), Field<std::uint64_t>("index_pos", 0)}, "");
   }
 
-  void Write(const std::string& topic, const std::string& type, const std::string& message) {
+  void Write(const std::string& topic, const std::string& type, const std::string& message,
+             double received_s = 0) {
     const auto [at, is_new] = connections_.emplace(topic, connections_.size());
     const auto id = static_cast<std::uint32_t>(at->second);
     if (is_new) {
@@ -37,7 +38,10 @@ class BagWriter {
              Fields({"topic=" + topic, "type=" + type, "message_definition="}));
     }
     counts_[id]++;
-    Record(chunk_, {Op(2), Field("conn", id), Field<std::uint64_t>("time", 0)}, message);
+    const auto seconds = static_cast<std::uint64_t>(received_s);
+    const auto nanoseconds =
+        static_cast<std::uint64_t>(std::lround(1e9 * (received_s - static_cast<double>(seconds))));
+    Record(chunk_, {Op(2), Field("conn", id), Field("time", nanoseconds << 32U | seconds)}, message);
     if (chunk_.bytes().size() >= chunk_bytes_) CloseChunk();
   }
 

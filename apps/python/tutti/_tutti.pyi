@@ -247,7 +247,7 @@ class FrameIterator:
 class Dataset:
     def __init__(self, path: Path, config: Optional[Config] = None, *,
                  camera: Union[Camera, Mapping[str, Any], None] = None, type: str = 'auto', sensor: str = 'mono',
-                 depth_units_per_m: float = 5000.0, max_depth_m: float = 0, max_association_s: float = 0.02,
+                 depth_units_per_m: float = 0, max_depth_m: float = 0, max_association_s: float = 0.02,
                  rate_hz: float = 0, topic: str = '', right_topic: str = '', depth_topic: str = '', follow_s: float = 0,
                  start: int = 0, end: int = 0, stride: int = 1, mask: str = '', rotate: int = 0,
                  noise: float = 0, noise_draw: int = 0,

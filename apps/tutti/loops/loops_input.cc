@@ -14,6 +14,7 @@
 #include "core/pose_columns.h"
 #include "core/text_reader.h"
 #include "frontend/dataset/image_file.h"
+#include "frontend/dataset/layout.h"
 #include "tutti/backend/evaluation.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
@@ -172,14 +173,13 @@ fs::path ImageFolder(const fs::path& folder) {
   return images && ImagesIn(*images).size() > ImagesIn(folder).size() ? *images : folder;
 }
 
-std::vector<fs::path> ListImages(const fs::path& folder) {
+std::vector<fs::path> ListImages(const fs::path& folder, bool pairs, std::vector<std::string>* notes) {
   std::error_code error;
   if (!fs::is_directory(folder, error)) {
     throw InputError(folder.string() + ": no such folder; give the folder that holds the images");
   }
-  std::vector<fs::path> images = ImagesIn(folder);
-  if (images.empty()) throw InputError(folder.string() + ": holds no image files");
-  return images;
+  if (ImagesIn(folder).empty()) throw InputError(folder.string() + ": holds no image files");
+  return FramesIn(folder, pairs, notes);
 }
 
 std::vector<fs::path> ImagesIn(const fs::path& folder) {
@@ -231,12 +231,15 @@ bool IsBagFolder(const fs::path& path) {
 }
 
 // A video or a bag; null: a folder of images.
-std::shared_ptr<const Dataset> OpenRecording(const fs::path& path, const std::string& topic, bool is_bag) {
+std::shared_ptr<const Dataset> OpenRecording(const fs::path& path, const std::string& topic,
+                                             const std::optional<PinholeCamera>& camera, bool is_bag) {
   std::error_code error;
   if (!topic.empty() && !is_bag) throw InputError(path.string() + ": is no bag of ROS; leave --topic out");
+  if (IsCamera(path.string())) DetectDatasetType(path);  // says that it comes once
   if (!is_bag && !fs::is_regular_file(path, error)) return nullptr;
   DatasetOptions options;
   options.topic = topic;
+  options.camera = camera;
   try {
     return OpenDataset(path, options);
   } catch (const InputError& e) {
@@ -249,22 +252,22 @@ std::shared_ptr<const Dataset> OpenRecording(const fs::path& path, const std::st
 }  // namespace
 
 ImageSet LoadImageSet(const std::string& path, const GroundTruthArguments& arguments,
-                      const std::string& topic) {
+                      const std::string& topic, const std::optional<PinholeCamera>& camera) {
   ImageSet set;
   set.stride = arguments.stride;
   std::error_code error;
   const bool is_bag =
       fs::is_regular_file(path, error) ? DetectDatasetType(path) == DatasetType::kBag : IsBagFolder(path);
-  set.recording = OpenRecording(path, topic, is_bag);
+  set.recording = OpenRecording(path, topic, camera, is_bag);
   std::vector<fs::path> images;
-  std::vector<double> stamps;  // a video has none of its own
+  std::vector<double> stamps;
   if (set.recording) {
     for (std::size_t i = 0; i < set.recording->Size(); ++i) {
       images.push_back(fs::path(path) / ("frame " + std::to_string(i)));
-      if (is_bag) stamps.push_back(set.recording->Stamp(i));
+      stamps.push_back(set.recording->Stamp(i));
     }
   } else {
-    images = ListImages(path);
+    images = ListImages(path, arguments.join_pairs, &set.notes);
     images.erase(std::remove_if(images.begin(), images.end(),
                                 [&](const auto& p) { return fs::equivalent(p, arguments.file, error); }),
                  images.end());

@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
@@ -172,6 +173,20 @@ TEST(Recording, OfOneCameraWithSensorStereoHasBothImagesSideBySide) {
   EXPECT_NEAR(found.config.dataset.camera->fx, 32, 1e-9);
   EXPECT_THAT(found.findings[0], HasSubstr("a camera, left and right side by side"));
   EXPECT_THAT(found.findings[1], Not(HasSubstr("--sensor mono")));
+}
+
+// It would wait here for ever: nobody sends anything.
+TEST(Recording, OfAPipeIsNotOpenedBeforeTheRun) {
+  const fs::path pipe = testing::FreshFolder() / "pipe";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  const Recording found = Recognise(pipe, {});
+  EXPECT_THAT(found.findings[0], HasSubstr("a video through a pipe"));
+  EXPECT_TRUE(found.guessed_lens);
+  EXPECT_FALSE(found.config.dataset.camera);
+  EXPECT_EQ(found.config.dataset.fov_deg, 67);
+  CameraRequest camera;
+  camera.camera = "70,71,30,20";
+  EXPECT_EQ(Recognise("camera:" + pipe.string(), camera).config.dataset.camera->fy, 71);
 }
 
 TEST(Recording, OfTwoCamerasNeedsToBeToldWhatTheyAre) {

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <functional>
 #include <limits>
 #include <map>
 #include <optional>
@@ -171,6 +172,46 @@ TEST(TrajectoryCloser, ALoopBendsTheTrajectoryWhereTheOdometryIsUncertain) {
   std::printf("  farthest from the truth: %.3f m, %.3f m if it does not say\n", told, untold);
   EXPECT_LT(told, 0.5 * untold);
   EXPECT_LT(untold, 0.4) << "the images tell of the slip; 0.8 without them";
+}
+
+// The good stereo odometry with this done to its pose i; without threads and other members than ORB.
+Closed CloseSpoilt(const std::function<void(std::size_t i, Pose* pose)>& spoil) {
+  Trajectory odometry = GoodStereo().odometry;
+  for (std::size_t i = 0; i < odometry.size(); ++i) spoil(i, &odometry[i].pose);
+  RunConfig config = Small(2);
+  config.loops.members = {"orb"};
+  return CloseTown(RecordedTown(SyntheticSensor::kStereo), odometry, config);
+}
+
+TEST(TrajectoryCloser, PosesThatAreOffMoveNoOthersAndAreSaid) {
+  const Trajectory& truth = RecordedTown(SyntheticSensor::kStereo).truth;
+  const Closed good = CloseSpoilt([](std::size_t, Pose*) {});
+  const std::size_t middle = truth.size() / 2;
+  for (const double metres : {20.0, 1e10}) {
+    const Closed closed = CloseSpoilt([&](std::size_t i, Pose* pose) {
+      if (i == 0 || i == middle || i == middle + 1) pose->translation.x() += metres;
+    });
+    EXPECT_GT(closed.corrections, 0);
+    for (std::size_t i = 0; i < truth.size(); ++i)
+      EXPECT_LT((closed.trajectory[i].pose.translation - good.trajectory[i].pose.translation).norm(), 0.5)
+          << i << ", " << metres;
+    ASSERT_GE(closed.warnings.size(), 2U);
+    EXPECT_NE(closed.warnings[0].find("the odometry jumps by"), std::string::npos) << closed.warnings[0];
+    EXPECT_NE(closed.warnings[1].find("and back between"), std::string::npos) << closed.warnings[1];
+  }
+}
+
+TEST(TrajectoryCloser, LoopsJoinWhatAnOdometryThatBeganAnewTakesApart) {
+  const Recording& town = RecordedTown(SyntheticSensor::kStereo);
+  const std::size_t restart = 2 * town.truth.size() / 3;
+  const Pose T_restart_world = GoodStereo().odometry[restart].pose.Inverse();
+  const Closed closed = CloseSpoilt([&](std::size_t i, Pose* pose) {
+    if (i >= restart) *pose = T_restart_world * *pose;
+  });
+  ASSERT_GE(closed.warnings.size(), 1U);
+  EXPECT_NE(closed.warnings[0].find("this step has no weight"), std::string::npos) << closed.warnings[0];
+  EXPECT_GT(closed.drift_before, 5);
+  EXPECT_LT(closed.drift_after, 0.3);
 }
 
 TEST(TrajectoryCloser, AnOdometryThatItsLoopsDoNotContradictStaysAsItIs) {

@@ -113,6 +113,29 @@ TEST_F(CloseCommand, PosesWithoutAnImageAreCorrectedToo) {
   EXPECT_EQ(Corrected().size(), poses.size());
 }
 
+TEST_F(CloseCommand, APoseThatIsOffIsSaidAndMovesNoOther) {
+  const Trajectory poses = TownPoses();
+  for (const double metres : {3.0, 1e10}) {
+    Trajectory bad = poses;
+    bad[14].pose.translation.y() += metres;
+    WriteTrajectory(folder_ / "odometry.txt", bad, TrajectoryFormat::kTum);
+    const auto done = Close(folder_ / "odometry.txt", testing::TinyTown());
+    ASSERT_EQ(done.status, 0) << done.output;
+    EXPECT_THAT(done.output, HasSubstr("  doubtful:"));
+    EXPECT_THAT(done.output, HasSubstr("the given odometry has jumps: 1;"));
+    const Trajectory out = Corrected();
+    ASSERT_EQ(out.size(), poses.size()) << done.output;
+    for (std::size_t i = 0; i < out.size(); ++i)
+      EXPECT_LT((out[i].pose.translation - poses[i].pose.translation).norm(), i == 14 ? 0.2 : 1e-5) << i;
+    const auto jumps =
+        nlohmann::json::parse(testing::ReadAll(folder_ / "out" / "summary.json"))["given_odometry"]["jumps"];
+    ASSERT_EQ(jumps.size(), 1U);
+    EXPECT_NEAR(jumps[0]["from_s"], poses[13].stamp_s, 1e-6);
+    EXPECT_NEAR(jumps[0]["distance_m"], metres, 0.2 + 1e-6 * metres);
+    EXPECT_EQ(jumps[0]["comes_back"], true);
+  }
+}
+
 TEST_F(CloseCommand, AFolderOfImagesGetsItsStampsFromTimesAboveItOrFromTheOption) {
   WriteTrajectory(folder_ / "odometry.txt", TownPoses(), TrajectoryFormat::kTum);
   const fs::path images = testing::TinyTown() / "image_0";

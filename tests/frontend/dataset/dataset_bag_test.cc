@@ -124,6 +124,41 @@ TEST(BagDataset, StereoPairsAreTakenAsTheyAreOrRectifiedWithTheRightCamera) {
   EXPECT_GT(cv::norm(raw->Read(1).frame->right, Picture(64, 48, 51), cv::NORM_INF), 0);
 }
 
+// A bag with images of these stamps in their headers, recorded every quarter of a second from 50 s on.
+fs::path WithStamps(const std::vector<double>& stamps_s) {
+  testing::BagWriter bag;
+  for (std::size_t i = 0; i < stamps_s.size(); ++i) {
+    const double received_s = 50 + 0.25 * static_cast<double>(i);
+    const cv::Mat picture = Picture(64, 48, static_cast<int>(i)), depth(48, 64, CV_16UC1, cv::Scalar(1500));
+    bag.Write("/image", "sensor_msgs/Image", ImageMessage(picture, "mono8", stamps_s[i]), received_s);
+    bag.Write("/depth", "sensor_msgs/Image", ImageMessage(depth, "16UC1", 9 + 0.1 * static_cast<double>(i)),
+              received_s + 0.01);
+  }
+  fs::path path = FreshFolder() / "stamps.bag";
+  testing::WriteText(path, bag.Finish());
+  return path;
+}
+
+TEST(BagDataset, StampsThatJumpBackAreRefusedWithThePlace) {
+  EXPECT_THAT(OpenError(WithStamps({10, 11, 12, 10.5, 11.5}), Topic("/image")),
+              AllOf(HasSubstr("/image: its time stamps jump back at image 3"),
+                    HasSubstr("from 12.000000 s to 10.500000 s"), HasSubstr("cut it there")));
+}
+
+TEST(BagDataset, WithConstantStampsHasTheTimesAtWhichItWasRecorded) {
+  DatasetOptions options = Topic("/image", Sensor::kRgbd);
+  options.depth_topic = "/depth";
+  for (const double stamp : {0.0, 77.5}) {
+    const auto dataset = OpenDataset(WithStamps({stamp, stamp, stamp}), options);
+    ASSERT_EQ(dataset->Size(), 3u);
+    EXPECT_DOUBLE_EQ(dataset->Stamp(2), 50.5);
+    EXPECT_THAT(dataset->Warnings().front(),
+                AllOf(HasSubstr("/image have the same stamp"), HasSubstr("recorded are used")));
+    EXPECT_FALSE(dataset->Read(1).frame->depth_m.empty());  // paired by the same clock
+  }
+  EXPECT_DOUBLE_EQ(OpenDataset(WithStamps({5}), Topic("/image"))->Stamp(0), 5);
+}
+
 TEST(BagDataset, OneThatWasCutOffGivesTheFramesBefore) {
   const fs::path file = FreshFolder() / "cut.bag";
   fs::copy_file(FourFrames(), file);

@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -144,6 +145,12 @@ class KeyframeGraph {
   /// ascending by id. An edge is at least as uncertain as all such motions between its ends. Not part of
   /// State.
   void NoteMotion(int keyframe, const MotionSigma& sigma);
+  /// Nothing is known of the odometry's step to this keyframe: edges across it get no weight but what keeps
+  /// the graph in one. Not part of State.
+  void NoteJump(int keyframe) { jumps_.insert(keyframe); }
+  /// The odometry is wrong at this keyframe alone: its edges get no weight, and the keyframes before and
+  /// after it are tied to one another. Not part of State.
+  void NoteOutlier(int keyframe) { outliers_.insert(keyframe); }
 
   /// The map as it is says more than what was kept (a bundle adjustment of all of it): edges are measured
   /// from it again.
@@ -197,6 +204,8 @@ class KeyframeGraph {
   const MapKeyframe& At(int id) const;
   bool Consecutive(int older, int newer) const;
   Eigen::Vector2d Walked(int keyframe) const;
+  bool Unknown(const Edge& edge) const;
+  void TiePastOutliers();
   double SigmaFloor() const;
   Vector7d Sigmas(const Edge& edge, double floor) const;
   Edge Between(int older, int newer) const;
@@ -213,6 +222,7 @@ class KeyframeGraph {
   std::vector<int> sessions_;  // first keyframes of recordings but the first, ascending
   std::vector<std::pair<int, Eigen::Vector2d>> walked_;  // keyframes; variances of translation and rotation
                                                          // of the odometry's motion up to there
+  std::set<int> jumps_, outliers_;                       // keyframes
 };
 
 /// Carries a loop over to the units of a corrected map (mono): S' = scale(s_c) S scale(1/s_q).

@@ -27,13 +27,22 @@
 #pragma GCC visibility push(default)
 namespace tutti {
 
+/// Where another odometry moves as nothing can (a pose that is wrong, an odometry that began anew).
+struct OdometryJump {
+  double from_s = 0, to_s = 0;  ///< the last pose before and the first one after it; infinite: none
+  double distance_m = 0;        ///< farther than the speed around it says
+  double angle_rad = 0;         ///< the same of its rotation
+  bool comes_back = false;      ///< the poses between the two are wrong; else the jump lasts
+};
+
 /// How uncertain another odometry counts as between two keyframes, as standard deviations
 /// (SlamSystem::Follow).
 struct FollowedUncertainty {
-  double stated_fraction = 0;      ///< of the way, by the odometry itself, else as configured [1]
-  double stated_rotation_rad = 0;  ///< the same of the rotation
-  double seen_fraction = 0;        ///< what its disagreement with the images comes to; 0: too few steps
-  double seen_rotation_rad = 0;    ///< where it is larger than what is stated, it counts instead
+  double stated_fraction = 0;       ///< of the way, by the odometry itself, else as configured [1]
+  double stated_rotation_rad = 0;   ///< the same of the rotation
+  double seen_fraction = 0;         ///< what its disagreement with the images comes to; 0: too few steps
+  double seen_rotation_rad = 0;     ///< where it is larger than what is stated, it counts instead
+  std::vector<OdometryJump> jumps;  ///< steps that have no weight
 };
 
 /// The pipeline. The odometry runs on the caller's thread, the loop detector and the pose graph beside it;
@@ -78,7 +87,7 @@ class SlamSystem {
   /// one map now, which can be saved, localised in, and gone on with (BeginSession; no frame may be tracked
   /// before that). False: no places in common were found that can be relied on, and this map is of no use any
   /// more either; `reason`, which may be null, says why in plain words. Throws InputError if they can't be
-  /// compared. Recorders must outlive both.
+  /// compared, or `other` is this map or null. Recorders must outlive both.
   bool Merge(SlamSystem* other, std::string* reason = nullptr);
   /// The recordings so far, oldest first; there is always one, and the last one goes on.
   std::vector<MapSession> Sessions() const;
@@ -89,7 +98,8 @@ class SlamSystem {
   /// there is no map, or no detector that knows it.
   void BeginLocalization();
 
-  /// Tracks the next frame and brings in what is due. Never throws for hard images.
+  /// Tracks the next frame and brings in what is due. Never throws for hard images; throws InputError for those
+  /// of another type or size than InputFrame and the rig say, and nothing has changed then.
   TrackResult Track(const InputFrame& frame);
   /// The next frame of another odometry and its pose in that one's world (Odometry::Follow), instead of
   /// Track: loops are found and closed as ever, and the odometry stays as it is between them. Without

@@ -125,7 +125,7 @@ def test_files_may_have_nanoseconds_named_columns_and_positions_alone(tmp_path):
     rows = [",".join(f"{v:.9f}" for v in row[1:4]) for row in estimate]
     file = tmp_path / "leica.csv"
     file.write_text("time,x,y,z\n" + "".join(f"{round(1e9 * s)},{row}\n" for s, row in zip(estimate[:, 0], rows)))
-    with pytest.warns(UserWarning, match="nanoseconds"):
+    with pytest.warns(RuntimeWarning, match="nanoseconds"):
         alone = tutti.read_trajectory(file, format="tum")
     np.testing.assert_allclose(alone[:, :4], estimate[:, :4], atol=1e-8)
     assert not alone[:, 4:].any()

@@ -100,8 +100,8 @@ int Resume(const CLI::App& command, const RunArguments& arguments) {
   auto& [request, config, map, ltm_file] = *found;
   const auto keep = [&](const std::string& file, bool said, const char* option) {
     if (file.empty() || said || arguments.quiet) return;
-    std::fprintf(stderr, "tutti: the run also wrote %s; to have it written again, give %s%s\n",
-                 internal::Printable(file).c_str(), option, internal::Printable(file).c_str());
+    internal::Say("the run also wrote %s; to have it written again, give %s%s", file.c_str(), option,
+                  file.c_str());
   };
   keep(map, !arguments.save_map.empty() || arguments.no_map, "--save-map ");
   keep(ltm_file, !arguments.set.empty(), "--set loops.ltm_file=");

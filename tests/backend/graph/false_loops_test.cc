@@ -110,7 +110,7 @@ TEST(FalseLoops, DoNotMoveTheSolutionMoreWhereTheIdsHaveGaps) {
       EXPECT_EQ(a.down_weighted, b.down_weighted) << word << turned;
       for (const PoseGraphNode& node : as_it_was.nodes()) {
         const Similarity& other = renumbered.Node(1000 + 7 * node.id).pose;
-        EXPECT_LT((node.pose.translation - other.translation).norm(), turned ? 1e-6 : 1e-12) << word;
+        EXPECT_LT((node.pose.translation - other.translation).norm(), 1e-6) << word << turned;
       }
     }
   }

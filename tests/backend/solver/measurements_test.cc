@@ -137,7 +137,7 @@ TEST(Measurements, PositionsInTheWorldAreEnoughToHoldAGraph) {
   EXPECT_TRUE(report.components[0].by_priors);
   for (const PoseGraphNode& node : graph.nodes()) {
     const Eigen::Vector3d at = curve.Position(node.id), expected(500 - at.y(), 700 + at.x(), 0);
-    EXPECT_LT((node.pose.translation - expected).norm(), node.id % 2 == 0 ? 0.01 : 0.1) << node.id;
+    EXPECT_LT((node.pose.translation - expected).norm(), node.id % 2 == 0 ? 0.01 : 0.2) << node.id;
   }
 }
 

@@ -35,6 +35,17 @@ Json PathJson(const Trajectory& trajectory, const Similarity& alignment) {
   return {{"t", t}, {"x", x}, {"y", y}, {"z", z}};
 }
 
+Json PointsJson(const std::vector<Eigen::Vector3d>& points, const Similarity& alignment) {
+  Json x = Json::array(), y = x, z = x;
+  for (const Eigen::Vector3d& point : points) {
+    const Eigen::Vector3d p = alignment * point;
+    x.push_back(Rounded(p.x(), 3));
+    y.push_back(Rounded(p.y(), 3));
+    z.push_back(Rounded(p.z(), 3));
+  }
+  return {{"x", x}, {"y", y}, {"z", z}};
+}
+
 Json ErrorJson(const RunResult& result, const Trajectory& estimate) {
   EvaluationOptions options;
   options.alignment =
@@ -215,6 +226,7 @@ Json ReportJson(const RunResult& result, const DetectionLog& log, const std::str
   json["earlier"] = Json::array();
   for (std::size_t k = 0; result.map && k < result.map->earlier.size(); ++k)
     json["earlier"].push_back(PathJson(result.map->earlier[k], align_slam));
+  json["landmarks"] = PointsJson(log.landmarks(), align_slam);
   json["found"] = FoundJson(result, align_slam);
   json["loops"] = EdgesJson(result, loops, align_slam);
   json["errors"] = {{"odometry", scored ? ErrorJson(result, result.trajectory_odometry) : Json()},

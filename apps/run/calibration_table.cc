@@ -59,7 +59,7 @@ class CalibrationTable {
   fs::path file_;
 };
 
-bool IsNumber(const std::string& word) { return ParseDouble(word).has_value(); }
+bool ReadsAsNumber(const std::string& word) { return ParseDouble(word).has_value(); }
 
 // COLMAP's models by its own names (src/colmap/sensor/models.h). Terms in the order of the parameters; what
 // they are called in OpenCV's order.
@@ -83,9 +83,9 @@ const std::map<std::string, ColmapModel> kColmap = {
 
 bool IsColmap(const CalibrationTable& table) {
   const std::vector<std::string>& words = table.lines.front().words;
-  return words.size() > 4 && IsNumber(words[0]) &&
-         std::isalpha(static_cast<unsigned char>(words[1][0])) != 0 && IsNumber(words[2]) &&
-         IsNumber(words[3]);
+  return words.size() > 4 && ReadsAsNumber(words[0]) &&
+         std::isalpha(static_cast<unsigned char>(words[1][0])) != 0 && ReadsAsNumber(words[2]) &&
+         ReadsAsNumber(words[3]);
 }
 
 Calibration FromColmap(const CalibrationTable& table) {
@@ -166,13 +166,13 @@ std::optional<Calibration> FromRealSense(const CalibrationTable& table) {
 bool IsDso(const CalibrationTable& table) {
   const std::vector<TableLine>& lines = table.lines;
   const std::vector<std::string>& first = lines.front().words;
-  return lines.size() >= 2 && lines[1].words.size() == 2 && IsNumber(lines[1].words[0]) &&
-         (first.size() == 5 || !IsNumber(first[0]));
+  return lines.size() >= 2 && lines[1].words.size() == 2 && ReadsAsNumber(lines[1].words[0]) &&
+         (first.size() == 5 || !ReadsAsNumber(first[0]));
 }
 
 Calibration FromDso(const CalibrationTable& table) {
   const TableLine& line = table.lines.front();
-  const bool named = !IsNumber(line.words[0]);
+  const bool named = !ReadsAsNumber(line.words[0]);
   const std::vector<double> v = table.Numbers(line, named ? 1 : 0), size = table.Numbers(table.lines[1]);
   if (v.size() != 5 && v.size() != 8)
     table.Fail(line, "has " + std::to_string(v.size()) + " numbers; 5 or 8 are needed");
@@ -237,7 +237,7 @@ std::optional<Calibration> ReadCalibrationTable(const fs::path& file, const std:
   constexpr std::size_t kMostNumbers = 16;
   std::vector<double> all;
   for (const TableLine& line : table.lines) {
-    const bool numbers = std::all_of(line.words.begin(), line.words.end(), IsNumber);
+    const bool numbers = std::all_of(line.words.begin(), line.words.end(), ReadsAsNumber);
     if (!numbers || all.size() > kMostNumbers) return FromRealSense(table);
     const std::vector<double> values = table.Numbers(line);
     all.insert(all.end(), values.begin(), values.end());

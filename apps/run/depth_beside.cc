@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "frontend/dataset/image_file.h"
 #include "frontend/dataset/layout.h"
 #include "frontend/dataset/turned_dataset.h"
 #include "tutti/core/error.h"

@@ -10,7 +10,6 @@
 #include "apps/run/frame_places.h"
 #include "apps/run/live_files.h"
 #include "apps/run/outputs.h"
-#include "apps/run/text_file.h"
 #include "core/replaced_file.h"
 #include "core/terminal.h"
 #include "tutti/backend/g2o_io.h"

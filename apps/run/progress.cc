@@ -80,6 +80,21 @@ void Progress::Update(std::size_t done, const std::string& status) {
   std::fflush(out_);
 }
 
+void Progress::Say(const std::string& status) {
+  constexpr double kSoon = 1;
+  const double seconds = since_begin_.Seconds();
+  if (out_ == nullptr || seconds < (terminal_ ? kSoon : next_line_s_)) return;
+  if (terminal_ && line_open_ && since_line_.Milliseconds() < 100) return;
+  since_line_ = {};
+  next_line_s_ = 2 * seconds;
+  char after[40];
+  std::snprintf(after, sizeof after, ", %.0f s", seconds);
+  const std::string line = (title_ + " " + status + after).substr(0, Columns() - 1);
+  std::fprintf(out_, terminal_ ? "\r%s\x1b[K" : "%s\n", line.c_str());
+  line_open_ = terminal_;
+  std::fflush(out_);
+}
+
 void Progress::Note(const std::string& message, const std::string& more) {
   if (out_ == nullptr || (!more.empty() && ++noted_[more] > kMostAlike)) return;
   std::fprintf(out_, "%s%s", line_open_ ? "\r\x1b[K" : "", internal::Message(message, out_).c_str());

@@ -23,7 +23,9 @@ std::string Shown(const RunSign& sign) {
 
 // Most frames have no pose: what one image shows is not in the next.
 bool ShowsNoFilm(const RunResult& result, const RunHealth& health) {
-  if (health.word != HealthWord::kFailed || result.dataset.empty() || IsCamera(result.dataset)) return false;
+  const bool no_photos =
+      result.rig.sensor != Sensor::kMono || result.dataset.empty() || IsCamera(result.dataset);
+  if (health.word != HealthWord::kFailed || no_photos || result.given_odometry) return false;
   return std::any_of(health.signs.begin(), health.signs.end(), [](const RunSign& sign) {
     return sign.kind->name == std::string_view("frames_posed") && sign.kind->IsFailed(sign.value);
   });

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "apps/run/graph_json.h"
+#include "apps/run/progress.h"
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/files.h"
@@ -175,6 +176,26 @@ void WriteJson(const OptimizeArguments& arguments, const G2oFile& file, const Po
   internal::WriteFile(arguments.json, JsonText(ToJson(arguments, file, report, certificate)));
 }
 
+G2oFile ReadWithProgress(const OptimizeArguments& arguments) {
+  Progress progress("reading", 0);
+  return ReadG2o(arguments.in, ParseBadInformation(arguments.bad_information), arguments.ignore_unknown,
+                 [&](std::size_t lines) { progress.Say(std::to_string(lines) + " lines"); });
+}
+
+PoseGraphReport OptimizeWithProgress(const PoseGraphOptimizer& optimizer, PoseGraph& graph) {
+  constexpr std::size_t kLarge = 2000000;  // edges
+  Progress progress("solving", 0);
+  const std::string size = std::to_string(graph.edges().size()) + " edges";
+  if (graph.edges().size() >= kLarge)
+    progress.Note("solving " + size +
+                  ": this takes minutes and some kilobytes of memory for each; Ctrl-C ends it");
+  int iterations = 0;
+  return optimizer.Optimize(graph, [&] {
+    progress.Say(size + ", iteration " + std::to_string(++iterations));
+    return false;
+  });
+}
+
 void RunOptimize(OptimizeArguments arguments) {
   arguments.options.init = ParseGraphInit(arguments.init);
   arguments.options.objective = ParseGraphObjective(arguments.objective);
@@ -183,14 +204,14 @@ void RunOptimize(OptimizeArguments arguments) {
   KeepInputs({arguments.in}, {arguments.out, arguments.json});
   RequireWritable({arguments.out, arguments.json});
   const PoseGraphOptimizer optimizer(arguments.options);
-  G2oFile file = ReadG2o(arguments.in, ParseBadInformation(arguments.bad_information));
+  G2oFile file = ReadWithProgress(arguments);
   for (const std::string& warning : file.warnings) internal::Say("warning: %s", warning.c_str());
   if (arguments.options.init == GraphInit::kFile && !file.has_all_vertices) {
     throw InputError(arguments.in +
                      ": has edges to nodes without a vertex, so '--init file' has no start; use --init " +
                      "auto, odometry or chordal");
   }
-  const PoseGraphReport report = optimizer.Optimize(file.graph);
+  const PoseGraphReport report = OptimizeWithProgress(optimizer, file.graph);
   std::optional<Certificate> certificate;
   if (arguments.certify && report.success)
     certificate = CertifyOptimum(file.graph, {}, report.chordal_optimum);

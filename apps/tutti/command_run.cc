@@ -22,7 +22,9 @@
 #include "apps/tutti/run_with_report.h"
 #include "apps/tutti/view_options.h"
 #include "core/example_configs.h"
+#include "core/replaced_file.h"
 #include "core/terminal.h"
+#include "core/text_reader.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 #include "tutti/slam/config.h"
@@ -98,8 +100,8 @@ int Resume(const CLI::App& command, const RunArguments& arguments) {
   auto& [request, config, map, ltm_file] = *found;
   const auto keep = [&](const std::string& file, bool said, const char* option) {
     if (file.empty() || said || arguments.quiet) return;
-    std::fprintf(stderr, "tutti: the run also wrote %s; to have it written again, give %s%s\n",
-                 internal::Printable(file).c_str(), option, internal::Printable(file).c_str());
+    internal::Say("the run also wrote %s; to have it written again, give %s%s", file.c_str(), option,
+                  file.c_str());
   };
   keep(map, !arguments.save_map.empty() || arguments.no_map, "--save-map ");
   keep(ltm_file, !arguments.set.empty(), "--set loops.ltm_file=");
@@ -188,6 +190,21 @@ fs::path OutputOf(const RunArguments& arguments) {
   return DefaultOutput(IsCamera(arguments.dataset) ? "camera" : arguments.dataset);
 }
 
+// Before the images are read, to measure a focal length for example. A file in --out has its folder later.
+void CheckFiles(const RunRequest& request) {
+  OutputFolder::Check(request.out, RunLayout(), request.trace);
+  if (request.ground_truth && *request.ground_truth != "none")
+    internal::RequireFile(*request.ground_truth, "give --ground-truth FILE or none");
+  const auto inside = [&](const fs::path& file) {
+    return fs::absolute(file).parent_path().lexically_normal() ==
+           fs::absolute(request.out).lexically_normal();
+  };
+  if (request.trace && !inside(*request.trace))
+    internal::CheckWritable(*request.trace, internal::Needs::kBytes);
+  if (request.save_map && *request.save_map != kMap && !inside(*request.save_map))
+    internal::CheckWritable(*request.save_map, internal::Needs::kFile);
+}
+
 int RunOnce(const CLI::App& command, const RunArguments& arguments) {
   if (arguments.help_config) {
     std::fputs(HelpConfig(arguments.advanced, internal::TerminalColumns(stdout)).c_str(), stdout);
@@ -223,8 +240,7 @@ int RunOnce(const CLI::App& command, const RunArguments& arguments) {
   if (!arguments.save_map.empty()) request.save_map = arguments.save_map;
   if (arguments.save_map.empty() && !arguments.no_map) request.save_map = kMap;
   if (!arguments.map.empty()) request.map = arguments.map;
-  // Before the images are read, to measure a focal length for example.
-  OutputFolder::Check(request.out, RunLayout(), request.trace);
+  CheckFiles(request);
   if (auto view = StartView(command, arguments.view, arguments.quiet))
     request.observers.push_back(std::move(view));
   RunConfig config = ConfigFor(CameraOf(command, arguments.camera), arguments, request);

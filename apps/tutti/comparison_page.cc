@@ -1,6 +1,5 @@
 #include "apps/tutti/comparison_page.h"
 
-#include <cstdio>
 #include <string>
 #include <utility>
 #include <vector>
@@ -30,8 +29,7 @@ void WriteComparisonReport(const std::filesystem::path& file, const std::string&
       runs.push_back(std::move(*report));
     } catch (const InputError& error) {
       failures.push_back(run.variant + ", " + Describe(run.sample) + ": no charts: " + error.what());
-      std::fprintf(stderr, "tutti: warning: no charts of a run: %s\n",
-                   internal::Printable(error.what()).c_str());
+      internal::Say("warning: no charts of a run: %s", error.what());
     }
   }
   WriteReportPage(file, ComparisonPage(title, tables, std::move(runs), failures));

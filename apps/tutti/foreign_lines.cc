@@ -89,7 +89,8 @@ void ForeignLines::EndLine() {
   if (kinds_.size() >= kMostKinds && kinds_.count(kind) == 0) kind = "...";
   Kind& lines = kinds_[kind];
   if (lines.count == 0) lines.first = line_;
-  if (++lines.count <= kMostAlike && !quiet_) std::fprintf(internal::StandardError(), "%s\n", line_.c_str());
+  if (++lines.count <= kMostAlike && !quiet_)
+    std::fprintf(internal::StandardError(), "%s\n", internal::Printable(line_).c_str());
   line_.clear();
 }
 

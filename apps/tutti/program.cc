@@ -101,7 +101,7 @@ std::string UnknownOption(const CLI::App& command, const std::vector<std::string
 int Exit(const CLI::App& app, const CLI::ParseError& error) {
   std::ostringstream text;
   const int status = app.exit(error, std::cout, text);
-  std::fputs(text.str().c_str(), internal::StandardError());
+  std::fputs(internal::Printable(text.str(), internal::Breaks::kAll).c_str(), internal::StandardError());
   return status == 0 ? 0 : 1;
 }
 

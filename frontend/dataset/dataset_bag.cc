@@ -182,9 +182,9 @@ class BagDataset : public Dataset {
                           std::to_string(messages.size()) + " images of " + topic +
                           " repeat a time stamp and are skipped");
     }
+    const std::size_t all = bag_->Messages(topic).size() + bag_->Lost(topic);
     if (topic == options_.topic && !kept.empty())
-      skipped_share_ =
-          1 - static_cast<double>(kept.size()) / static_cast<double>(messages.size() + bag_->Lost(topic));
+      skipped_share_ = 1 - static_cast<double>(kept.size()) / static_cast<double>(all);
     return kept;
   }
 

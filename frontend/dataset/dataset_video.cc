@@ -20,16 +20,18 @@ struct VideoTimes {
   std::vector<std::int64_t> ticks;  ///< of the container, growing; empty: it has none
   std::vector<double> stamps_s;     ///< from the first frame on
   std::vector<std::string> notes;
+  double skipped_share = 0;  ///< Dataset::SkippedShare
 };
 
 // Equal times are one frame's: what is shown at once is not seen apart.
-void DropRepeated(const std::string& name, std::vector<std::int64_t>& ticks,
-                  std::vector<std::string>& notes) {
-  const std::size_t all = ticks.size();
-  ticks.erase(std::unique(ticks.begin(), ticks.end()), ticks.end());
-  if (ticks.size() < all)
-    notes.push_back(name + ": " + std::to_string(all - ticks.size()) + " of " + std::to_string(all) +
-                    " frames repeat a time stamp and are skipped");
+void DropRepeated(const std::string& name, VideoTimes& times) {
+  const std::size_t all = times.ticks.size();
+  times.ticks.erase(std::unique(times.ticks.begin(), times.ticks.end()), times.ticks.end());
+  const std::size_t skipped = all - times.ticks.size();
+  if (skipped == 0) return;
+  times.notes.push_back(name + ": " + std::to_string(skipped) + " of " + std::to_string(all) +
+                        " frames repeat a time stamp and are skipped");
+  times.skipped_share = static_cast<double>(skipped) / static_cast<double>(all);
 }
 
 // By decoding all of it. `listed`: when its frames are to be decoded, for containers that say no more (AVI).
@@ -48,7 +50,7 @@ VideoTimes DecodedTimes(const std::string& name, const std::vector<std::int64_t>
       throw InputError(StampsJumpBack(name, frames, video.Seconds(out.ticks.back()), video.Seconds(*ticks)));
     out.ticks.push_back(*ticks);
   }
-  DropRepeated(name, out.ticks, out.notes);
+  DropRepeated(name, out);
   if (!out.ticks.empty() || frames == 0) return out;
   const bool grows = std::adjacent_find(listed.begin(), listed.end(), std::greater_equal<>()) == listed.end();
   const bool use_listed = grows && listed.size() == frames;
@@ -76,7 +78,7 @@ VideoTimes TimesOf(const std::string& name, std::optional<std::int64_t> first, d
       out.notes.push_back(name + ": the first " + std::to_string(begin - out.ticks.begin()) +
                           " frames can't be decoded and are left out: the video was cut before them");
     out.ticks.erase(out.ticks.begin(), begin);
-    DropRepeated(name, out.ticks, out.notes);
+    DropRepeated(name, out);
   }
   for (const std::int64_t ticks : out.ticks) out.stamps_s.push_back(video.Seconds(ticks - out.ticks.front()));
   return out;
@@ -157,6 +159,7 @@ class VideoDataset : public Dataset {
     ticks_ = std::move(times.ticks);
     stamps_s_ = std::move(times.stamps_s);
     warnings_ = std::move(times.notes);
+    skipped_share_ = times.skipped_share;
     if (options.rate_hz > 0) {
       for (std::size_t i = 0; i < stamps_s_.size(); ++i)
         stamps_s_[i] = static_cast<double>(i) / options.rate_hz;
@@ -170,6 +173,7 @@ class VideoDataset : public Dataset {
 
   std::size_t Size() const override { return stamps_s_.size(); }
   double Stamp(std::size_t i) const override { return stamps_s_.at(i); }
+  double SkippedShare() const override { return skipped_share_; }
   const CameraRig& Rig() const override { return rig_.rig; }
   int TurnedBy() const override { return turned_by_; }
   std::optional<std::filesystem::path> GroundTruthFile() const override { return std::nullopt; }
@@ -222,6 +226,7 @@ class VideoDataset : public Dataset {
   std::vector<double> stamps_s_;
   cv::Size size_;
   int turned_by_ = 0;
+  double skipped_share_ = 0;
   cv::Mat mask_;
 };
 

@@ -180,21 +180,6 @@ std::string NumbersIn(const std::string& name) {
   return key;
 }
 
-// A name that is seconds with a point, or ten digits or more: s, ms, us or ns since 1970, by their number.
-std::optional<double> StampIn(const std::string& name) {
-  const std::size_t begin = name.find_first_of("0123456789");
-  if (begin == std::string::npos) return std::nullopt;
-  const std::string text = name.substr(begin, name.find_last_of("0123456789") + 1 - begin);
-  const std::optional<double> number = ParseDouble(text);
-  const std::size_t point = text.find('.');
-  const bool whole = point == std::string::npos;
-  if (!number || !std::isfinite(*number) || (whole && (text.size() < 10 || text.front() == '0')))
-    return std::nullopt;  // or a number of KITTI, which has ten digits
-  double stamp = *number;
-  while (stamp > 1e11) stamp /= 1000;
-  return stamp;
-}
-
 // One of "a|b" that is there, or nothing.
 std::optional<fs::path> OneOf(const fs::path& folder, const std::string& names) {
   std::error_code ignored;
@@ -292,6 +277,7 @@ bool HasStamps(const fs::path& folder) {
 
 std::vector<RoleImage> ImagesOf(const fs::path& folder, const ImageRole& role, const std::string& extension) {
   std::vector<RoleImage> images;
+  std::vector<std::string> names;
   if (role.folder == nullptr) return images;
   const fs::path place = *role.folder == '\0' ? folder : folder / role.folder;
   for (const fs::path& file : ListFiles(place, [&](const fs::path& f) {
@@ -299,9 +285,15 @@ std::vector<RoleImage> ImagesOf(const fs::path& folder, const ImageRole& role, c
                                   : f.extension() == extension;
        })) {
     const std::optional<std::string> rest = WithoutWord(file.stem().string(), role.word);
-    if (rest) images.push_back({NumbersIn(*rest), StampIn(*rest), file});
+    if (!rest) continue;
+    images.push_back({NumbersIn(*rest), std::nullopt, file});
+    names.push_back(*rest);
   }
-  return images;
+  const internal::StampsOfNames found = internal::FindStamps(names);
+  if (found.stamps.size() != images.size()) return images;
+  std::vector<RoleImage> by_time;
+  for (const auto& [stamp, i] : found.stamps) by_time.push_back({images[i].key, stamp, images[i].file});
+  return by_time;
 }
 
 std::vector<fs::path> FramesIn(const fs::path& folder, bool pairs, std::vector<std::string>* notes) {

@@ -75,7 +75,8 @@ struct RoleImage {
   std::optional<double> stamp_s;  ///< where the name is one
   std::filesystem::path file;
 };
-/// In natural order of their names. `extension`: ".txt", of files that belong to images; empty: images.
+/// In the order of their stamps, if all have one, else in natural order of their names. `extension`: ".txt",
+/// of files that belong to images; empty: images.
 std::vector<RoleImage> ImagesOf(const std::filesystem::path& folder, const ImageRole& role,
                                 const std::string& extension = "");
 

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "core/angle.h"
+#include "core/time_stamps.h"
 #include "frontend/dataset/dataset_folder.h"
 #include "frontend/dataset/layout.h"
 #include "tutti/core/error.h"
@@ -392,11 +393,13 @@ LayoutCalibration ReadLayoutCalibration(const fs::path& folder, const FoundLayou
 
 std::vector<std::pair<std::size_t, double>> ReadLayoutStamps(const fs::path& file) {
   std::vector<std::pair<std::size_t, double>> stamps;
+  std::vector<double> numbers;
   for (const TextLine& line : ReadTextLines(file)) {
     int year = 0, month = 0, day = 0, hour = 0, minute = 0, end = 0;
     std::sscanf(line.text.c_str(), " %4d-%2d-%2d %2d:%2d:%n", &year, &month, &day, &hour, &minute, &end);
     if (end == 0) {
-      stamps.emplace_back(line.number, NumberAt(file, line, 0));
+      numbers.push_back(NumberAt(file, line, 0));
+      stamps.emplace_back(line.number, numbers.back());
       continue;
     }
     const std::vector<std::string> rest = SplitText(line.text.substr(static_cast<std::size_t>(end)));
@@ -410,6 +413,9 @@ std::vector<std::pair<std::size_t, double>> ReadLayoutStamps(const fs::path& fil
     stamps.emplace_back(line.number,
                         86400.0 * static_cast<double>(days) + 3600.0 * hour + 60.0 * minute + second);
   }
+  if (numbers.size() < stamps.size()) return stamps;  // dates
+  const double seconds = internal::SecondsOf(internal::UnitOfStamps(numbers).unit);
+  for (auto& stamp : stamps) stamp.second *= seconds;
   return stamps;
 }
 

@@ -77,7 +77,7 @@ void VideoDecoder::Parts::Open() {
   if (source == "-" && isatty(STDIN_FILENO) != 0)
     throw InputError(
         "-: standard input is the terminal; send it a video: ffmpeg ... -f matroska - | tutti ...");
-  av_log_set_level(AV_LOG_FATAL);  // what is damaged is said here
+  av_log_set_level(AV_LOG_QUIET);  // what is damaged is said by who asks for it
   AVFormatContext* made = avformat_alloc_context();
   if (made == nullptr) throw std::bad_alloc();
   AVDictionary* options = nullptr;

@@ -146,8 +146,9 @@ void ExpectThePoses(const std::string& text, bool rotations = true) {
   for (std::size_t k = 0; k < read.size(); ++k) {
     EXPECT_NEAR(read[k].stamp_s, 1403636579.75 + 0.25 * static_cast<double>(k), 1e-6);
     EXPECT_EQ(read[k].pose.translation, Eigen::Vector3d(kX[k], 0.5, -1));
-    if (rotations) EXPECT_NEAR(read[k].pose.rotation.w(), 0.6, 1e-12);
-    if (rotations) EXPECT_NEAR(read[k].pose.rotation.x(), 0.8, 1e-12);
+    if (!rotations) continue;
+    EXPECT_NEAR(read[k].pose.rotation.w(), 0.6, 1e-12);
+    EXPECT_NEAR(read[k].pose.rotation.x(), 0.8, 1e-12);
   }
 }
 

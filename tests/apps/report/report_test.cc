@@ -12,6 +12,7 @@
 #include "apps/report/run_report.h"
 #include "tests/apps/tiny_town.h"
 #include "tests/apps/tutti/executable.h"
+#include "tests/support/error_of.h"
 #include "tests/support/test_data.h"
 
 namespace tutti {

@@ -117,7 +117,7 @@ TEST(SlamSystem, OdometryEdgesTieEveryKeyframeOfAMonoMapToTheOthers) {
   slam.Finish();
   const PoseGraph graph = slam.Graph();
   ASSERT_GT(graph.nodes().size(), 3u);
-  std::set<int> tied;
+  std::set<NodeId> tied;
   for (const PoseGraphEdge& edge : graph.edges()) tied.insert({edge.from, edge.to});
   EXPECT_EQ(tied.size(), graph.nodes().size());
 }

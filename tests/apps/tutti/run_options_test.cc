@@ -44,10 +44,14 @@ TEST(RunOptions, OnesThatCantBeAreRefusedBeforeTheImagesAreRead) {
       {{"run", images, "--out", (folder / "file/out").string()}, "out: the folder can't be made"},
       {{"run", images, "--out", (folder / "foreign").string()}, "holds letter.txt, which is no result"},
       {{"run", images, "--out", out, "--require", "super"}, "--require: 'super' is unknown"},
+      {{"run", images, "--out", out, "--ground-truth", (folder / "no.txt").string()},
+       "no.txt: can't be opened"},
+      {{"run", images, "--out", out, "--trace", (folder / "no/trace.json").string()}, "trace.json"},
+      {{"run", images, "--out", out, "--save-map", (folder / "no/map.tutti").string()}, "map.tutti"},
       {{"loops", images, "--out", (folder / "foreign").string()}, "holds letter.txt, which is no result"},
       {{"loops", images, "--out", out, "--threads", "-1"}, "--threads: '-1'"},
-      {{"optimize", "in.g2o", "--out", (folder / "no/x.g2o").string()}, "there is no folder"},
-      {{"convert", "in.txt", (folder / "foreign").string(), "--to", "tum"}, "foreign: is a folder"}};
+      {{"optimize", "in.g2o", "--out", (folder / "no/x.g2o").string()}, "x.g2o: can't be written"},
+      {{"convert", "in.txt", (folder / "foreign").string(), "--to", "tum"}, "foreign: can't be written"}};
   for (const auto& [arguments, said] : wrong) {
     const auto run = RunTutti(arguments);
     EXPECT_EQ(run.status, 1) << run.output;

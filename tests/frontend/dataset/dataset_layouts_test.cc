@@ -341,19 +341,22 @@ TEST(DatasetLayouts, OpenLorisHasMillimetresItsOwnCalibrationAndPosesOfTheRobot)
   WriteText(folder / "depth.txt", depth);
   WriteText(folder / "groundtruth.txt",
             "#Time px py pz qx qy qz qw\n1560000000.0 0 0 0 0 0 0 1\n1560000002.0 3 0 0 0 0 0 1\n");
-  const std::string matrix =
-      "   matrix: !!opencv-matrix\n      rows: 4\n      cols: 4\n      dt: d\n      data: ";
-  WriteText(folder / "sensors.yaml",
-            "%YAML:1.0\n---\nd400_color_optical_frame:\n   width: 64\n   height: 48\n   intrinsics: "
-            "!!opencv-matrix\n"
-            "      rows: 1\n      cols: 4\n      dt: d\n      data: [ 61., 32.5, 62., 24.5 ]\n");
-  WriteText(folder / "trans_matrix.yaml",
-            "%YAML:1.0\n---\ntrans_matrix:\n   -\n   parent_frame: base_link\n   child_frame: laser\n" +
-                matrix +
-                "[ 1., 0., 0., 0.2, 0., 1., 0., 0., 0., 0., 1., 0.1, 0., 0., 0., 1. ]\n   -\n   "
-                "parent_frame: laser\n"
-                "   child_frame: d400_color_optical_frame\n" +
-                matrix + "[ 0., 0., 1., 0.3, -1., 0., 0., 0., 0., -1., 0., 0.9, 0., 0., 0., 1. ]\n");
+  const auto link = [](const char* parent, const char* child, const char* data) {
+    return std::string("   -\n      parent_frame: ") + parent + "\n      child_frame: " + child +
+           "\n      matrix: !!opencv-matrix\n         rows: 4\n         cols: 4\n         dt: d\n         "
+           "data: [ " +
+           data + " ]\n";
+  };
+  WriteText(
+      folder / "sensors.yaml",
+      "%YAML:1.0\nd400_color_optical_frame:\n   width: 64\n   height: 48\n   intrinsics: !!opencv-matrix\n"
+      "      rows: 1\n      cols: 4\n      dt: d\n      data: [ 61., 32.5, 62., 24.5 ]\n");
+  WriteText(
+      folder / "trans_matrix.yaml",
+      "%YAML:1.0\ntrans_matrix:\n" +
+          link("base_link", "laser", "1., 0., 0., 0.2, 0., 1., 0., 0., 0., 0., 1., 0.1, 0., 0., 0., 1.") +
+          link("laser", "d400_color_optical_frame",
+               "0., 0., 1., 0.3, -1., 0., 0., 0., 0., -1., 0., 0.9, 0., 0., 0., 1."));
   const auto data = OpenDataset(folder, Auto(Sensor::kRgbd));
   EXPECT_EQ(data->Rig().camera.fx, 61);
   EXPECT_EQ(data->Rig().camera.cx, 32.5);

@@ -104,6 +104,7 @@ TEST(Video, FramesThatRepeatATimeAreSkippedAndCounted) {
   const auto dataset = OpenDataset(Video({0, 100, 100, 200}), With(Sensor::kMono, true));
   ASSERT_EQ(dataset->Size(), 3u);
   EXPECT_THAT(dataset->Warnings().front(), HasSubstr("1 of 4 frames repeat a time stamp"));
+  EXPECT_EQ(dataset->SkippedShare(), 0.25);
   EXPECT_EQ(NumberOf(dataset->Read(2).frame->image), 3);
 }
 

@@ -98,8 +98,8 @@ class SlamSystem {
   /// there is no map, or no detector that knows it.
   void BeginLocalization();
 
-  /// Tracks the next frame and brings in what is due. Never throws for hard images; throws InputError for those
-  /// of another type or size than InputFrame and the rig say, and nothing has changed then.
+  /// Tracks the next frame and brings in what is due. Never throws for hard images; throws InputError for
+  /// those of another type or size than InputFrame and the rig say, and nothing has changed then.
   TrackResult Track(const InputFrame& frame);
   /// The next frame of another odometry and its pose in that one's world (Odometry::Follow), instead of
   /// Track: loops are found and closed as ever, and the odometry stays as it is between them. Without

@@ -212,6 +212,8 @@ TrajectoryFormat FormatOfNumbers(const std::string& line) {
   if (decimal_comma) return TrajectoryFormat::kTum;
   if (!commas) return matrix || n == 16 || n == 17 ? TrajectoryFormat::kKitti : TrajectoryFormat::kTum;
   if (EndsWithRowOfTransform(words)) return TrajectoryFormat::kKitti;
+  if (n == 9 && IsUnitQuaternion(words, 5) && !IsUnitQuaternion(words, 4))
+    return TrajectoryFormat::kTum;  // behind the line's number
   // EuRoC's stamps are whole nanoseconds. Commas after seconds are TUM's columns.
   const std::optional<double> stamp = ParseDouble(words[0]);
   return stamp && *stamp != std::floor(*stamp) ? TrajectoryFormat::kTum : TrajectoryFormat::kEuroc;

@@ -188,7 +188,7 @@ void PoseReader::FindUnit(StampUnit expected, TrajectoryDetails& details) const 
   if (euroc) expected = StampUnit::kNanoseconds;
   RecognisedUnit unit = UnitOfStamps(values, columns_->unit.value_or(expected));
   if (columns_->unit && !unit.certain) unit = {*columns_->unit};
-  if (columns_->matrix != PoseColumns::kNone && IsNumbering(values, unit)) {
+  if (columns_->matrix != PoseColumns::kNone && IsNumbering(values, UnitOfStamps(values))) {
     details.has_stamps = false;
     details.has_numbers = true;
     return;

@@ -135,7 +135,10 @@ RecognisedUnit UnitOfStamps(const std::vector<double>& values, StampUnit expecte
   if (values.empty()) return {expected};
   const double gap = MedianGap(values);
   const auto [least, greatest] = std::minmax_element(values.begin(), values.end());
-  if (const std::optional<StampUnit> unit = UnitSince1970(*least, *greatest, gap)) return {*unit};
+  const std::optional<StampUnit> since_1970 = UnitSince1970(*least, *greatest, gap);
+  const bool single =
+      gap == 0 && values.front() == std::floor(values.front());  // 1e9 may be one second in ns
+  if (since_1970 && !(single && *since_1970 == StampUnit::kSeconds)) return {*since_1970};
   if (gap == 0) return {UnitOfSingle(values.front(), expected)};
   const double expected_gap = gap * SecondsOf(expected);
   if (expected_gap >= 1e-4 && expected_gap < 10) return {expected};

@@ -30,6 +30,7 @@ TEST(TimeStamps, TimesSince1970ShowTheirUnitBySize) {
       EXPECT_EQ(UnitOfStamps({1403636579.763 * one}, expected).unit, unit);
     }
   }
+  EXPECT_EQ(UnitOfStamps({1e9}, StampUnit::kNanoseconds).unit, StampUnit::kNanoseconds);
   EXPECT_EQ(UnitOfStamps(Every(900, 1.4e9)).unit, StampUnit::kSeconds);  // a photo every quarter of an hour
 }
 

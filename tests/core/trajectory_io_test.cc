@@ -183,6 +183,7 @@ TEST(TrajectoryIo, ALineThatNamesTheColumnsDecidesWhichIsWhich) {
   };
   ExpectThePoses(table("num, t, x, y, z, qx, qy, qz, qw", ", ", counted));
   ExpectThePoses(table("", " ", counted));
+  ExpectThePoses(table("", ",", counted));
   ExpectThePoses(
       table("%time,field.header.seq,field.header.stamp,field.header.frame_id,field.pose.position.x,"
             "field.pose.position.y,field.pose.position.z,field.pose.orientation.x,"

@@ -144,7 +144,7 @@ TEST_F(EvaluateLimits, CoverageAndPairsStandBesideTheAteWhichIsFlagged) {
                 {"rgb.txt:2:", "back in time"});
   WriteAll(folder_ / "rgb.txt", "1 a\nx b\n");
   ExpectRefused({reference_, part, "--frames", (folder_ / "rgb.txt").string()},
-                {"rgb.txt:2:", "no time stamp"});
+                {"rgb.txt:2:", "'x' is not a number"});
 }
 
 TEST_F(EvaluateLimits, AnEstimateBeyondALimitHasAnExitStatusOfItsOwn) {

@@ -1,6 +1,7 @@
 // The readers on good data, made up and real.
 #include "tutti/frontend/dataset.h"
 
+#include <algorithm>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
@@ -278,7 +279,10 @@ TEST(DatasetTest, ListsOfImagesDepthAndPosesMayBeInAnyUnitOfTime) {
                   1e-5);
       const bool truth_is_usual = others == 1 || others == images;
       const int said = (images != 1 ? 1 : 0) + (others != images ? 1 : 0) + (truth_is_usual ? 0 : 1);
-      EXPECT_EQ(static_cast<int>(warnings.size()), said) << images << " " << others;
+      const auto of_units = std::count_if(warnings.begin(), warnings.end(), [](const std::string& w) {
+        return w.find("time stamps are in") != std::string::npos;
+      });
+      EXPECT_EQ(of_units, said) << images << " " << others;
     }
   }
 }

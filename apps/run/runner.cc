@@ -60,6 +60,11 @@ RunResult RunSlam(const RunRequest& request, const RunConfig& given) {
   const std::unique_ptr<Dataset> dataset =
       odometry ? odometry->Open() : OpenDataset(request.dataset, result.config.dataset);
   result.rig = dataset->Rig();
+  if (auto& camera = result.config.dataset.camera; camera && camera->width == 0) {  // of a pipe
+    camera->width = result.rig.camera.width;
+    camera->height = result.rig.camera.height;
+    if (result.config.dataset.rotate % 180 != 0) std::swap(camera->width, camera->height);
+  }
   std::vector<std::string> warnings = dataset->Warnings();
   if (odometry) warnings.insert(warnings.end(), odometry->notes().begin(), odometry->notes().end());
   const auto reference = ReadReference(*dataset, request, &warnings);

@@ -202,7 +202,10 @@ void SetOptions(const std::vector<std::string>& assignments, RunConfig& config) 
   const ConfigTable table(changed);
   for (const std::string& assignment : assignments) Assign(assignment, "", table);
   DropUnsetCameras(changed.dataset);
-  const auto problem = FirstProblem(changed);
+  RunConfig checked = changed;
+  // That of a video through a pipe gets its size, and is checked, when the first image is there.
+  if (config.dataset.camera && config.dataset.camera->width == 0) checked.dataset.camera.reset();
+  const auto problem = FirstProblem(checked);
   if (problem) throw InputError("--set: " + InSection(problem->first, problem->second));
   config = changed;
 }

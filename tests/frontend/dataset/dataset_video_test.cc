@@ -1,14 +1,14 @@
 // Videos: the times of their frames, their orientation, the shape of their pixels, pipes.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/stat.h>
 
 #include <cstdlib>
 #include <opencv2/videoio.hpp>
-#include <thread>
+#include <optional>
 
 #include "tests/frontend/dataset/dataset_files.h"
 #include "tests/support/matroska_writer.h"
+#include "tests/support/pipe_sender.h"
 #include "tests/support/test_data.h"
 
 namespace tutti {
@@ -218,19 +218,15 @@ TEST(Video, PixelsThatAreNotSquareMakeOtherFocalLengths) {
 
 TEST(Video, MayComeThroughAPipe) {
   const fs::path pipe = FreshFolder() / "pipe";
-  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  std::optional<testing::PipeSender> sender(std::in_place, pipe, WithTimes({0, 33, 300, 333, 1900}).Bytes());
   EXPECT_TRUE(IsPipe(pipe));
   EXPECT_TRUE(IsCamera(pipe));
   EXPECT_FALSE(IsCameraDevice(pipe));
-  const std::string bytes = WithTimes({0, 33, 300, 333, 1900}).Bytes();
-  std::thread sender([&] { std::ofstream(pipe, std::ios::binary) << bytes; });
   const auto dataset = OpenDataset(pipe, With(Sensor::kMono, true));
-  sender.join();
   EXPECT_EQ(dataset->FrameSupply(), Supply::kOnce);
   ExpectFrames(*dataset, {0, 0.033, 0.3, 0.333, 1.9});
-  std::thread other([&] { std::ofstream(pipe, std::ios::binary) << "no video"; });
+  sender.emplace(pipe, "no video");
   EXPECT_THAT(OpenError(pipe, With(Sensor::kMono, true)), HasSubstr("can't be read as a video"));
-  other.join();
 }
 
 }  // namespace

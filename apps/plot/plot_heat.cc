@@ -74,15 +74,15 @@ void AddHeatBar(const PlotAxes& axes, const std::string& name, double low, doubl
   for (int k = 0; k < kColors; ++k) {
     const double from = bottom - (bottom - top) * k / kColors,
                  to = bottom - (bottom - top) * (k + 1) / kColors;
-    shapes.push_back(PlotBox({left, to}, {right, from}, HeatColor((k + 0.5) / kColors)));
+    shapes.push_back(
+        PlotBox({left, k + 1 < kColors ? to - 1 : to}, {right, from}, HeatColor((k + 0.5) / kColors)));
   }
   shapes.push_back(PlotText({right + 8, bottom}, Number(low), 14));
   if (high > low) {
     shapes.push_back(PlotText({right + 8, 0.5 * (top + bottom) + 5}, Number(0.5 * (low + high)), 14));
     shapes.push_back(PlotText({right + 8, top + 10}, Number(high), 14));
   }
-  PlotShape text = PlotText({right + kHeatBarRoom - kGap - kWidth - 8, 0.5 * (top + bottom)}, name, 14,
-                            PlotShape::Anchor::kMiddle);
+  PlotShape text = PlotText({kPlotWidth - 8.0, 0.5 * (top + bottom)}, name, 14, PlotShape::Anchor::kMiddle);
   text.vertical = true;
   shapes.push_back(text);
 }

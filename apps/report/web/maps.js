@@ -137,7 +137,7 @@ async function draw3d(panel) {
   // All of it at first sight: a box whose longest side is 1, seen from as far as its diagonal needs.
   const size = boxOf([...paths().map((line) => line.path), landmarks]), longest = Math.max(...size, 1e-9);
   const box = size.map((side) => Math.max(side / longest, 0.05));
-  const away = (narrow() ? 1.5 : 0.95) * Math.hypot(...box);
+  const away = (narrow() ? 1.6 : 1.1) * Math.hypot(...box);
   const eye = [away * 0.7, away * 0.7, away * 0.7];
   eye[up] = away * sign;
   const vector = (v) => ({ x: v[0], y: v[1], z: v[2] });

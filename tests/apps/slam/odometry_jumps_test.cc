@@ -125,9 +125,15 @@ TEST(OdometryJumps, AreToldOnceWhilePosesComeIn) {
   for (std::size_t i = 0; i < bad.size(); ++i) {
     watch.Add(bad[i]);
     take(false);
-    if (i == 40) EXPECT_EQ(ends.size(), 1U);
-    if (i == 325) EXPECT_EQ(ends.size(), 2U);
-    if (i == 625) EXPECT_EQ(ends.size(), 3U);
+    if (i == 40) {
+      EXPECT_EQ(ends.size(), 1U);
+    }
+    if (i == 325) {
+      EXPECT_EQ(ends.size(), 2U);
+    }
+    if (i == 625) {
+      EXPECT_EQ(ends.size(), 3U);
+    }
   }
   EXPECT_EQ(take(true), 4U);
   EXPECT_EQ(take(true), 4U);

@@ -146,6 +146,7 @@ struct RunResult {
   // Cost.
   double wall_s = 0;                ///< of the run, without the evaluation
   double cpu_s = 0;                 ///< processor time of all threads, without that of the odometry alone
+  double measuring_cpu_s = 0;       ///< part of cpu_s: measuring the focal length
   double odometry_alone_cpu_s = 0;  ///< processor time of the odometry that loops did not reach
   std::vector<double> frame_ms;     ///< of each frame, from having its features to having its pose
   std::vector<double>

@@ -265,7 +265,8 @@ void SlamRun::TakeFrame(const FetchedFrame& fetched, Progress& progress) {
 }
 
 double SlamRun::CpuSeconds() const {
-  return before_.cpu_s + ProcessCpuSeconds() - cpu_begin_ - (alone_ ? alone_->CpuSeconds() : 0.0);
+  return request_.measuring_cpu_s + before_.cpu_s + ProcessCpuSeconds() - cpu_begin_ -
+         (alone_ ? alone_->CpuSeconds() : 0.0);
 }
 
 void SlamRun::TrackOne(const InputFrame& frame) {

@@ -74,7 +74,7 @@ def close(a, name, data, config, trajectory, more=()):
     """Summary and corrected poses."""
     out = a.out / name
     if not (a.reuse and (out / "summary.json").exists()):
-        subprocess.run([a.tutti, "close", "--quiet", "--no-report", "--trajectory", trajectory, "--images", data, "--config", config,
+        subprocess.run([a.tutti, "close", "--quiet", "--require", "failed", "--no-report", "--trajectory", trajectory, "--images", data, "--config", config,
                         "--out", out, *map(str, more)], check=True, stdout=subprocess.DEVNULL)
     summary = json.loads((out / "summary.json").read_text())
     said = summary["evaluation"]
@@ -88,7 +88,7 @@ def kitti(a):
 
 def run(a, data, config, out):
     if not (a.reuse and (out / "summary.json").exists()):
-        subprocess.run([a.tutti, "run", "--quiet", "--no-report", "--no-map", "--config", config, "--dataset", data, "--out", out],
+        subprocess.run([a.tutti, "run", "--quiet", "--require", "failed", "--no-report", "--no-map", "--config", config, "--dataset", data, "--out", out],
                        check=True, stdout=subprocess.DEVNULL)
 
 

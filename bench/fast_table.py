@@ -48,7 +48,7 @@ def run(a, row, seed):
     dataset = table.generate(a.tutti, a.out / f"{row}-{seed}", [*WORLD, "--seed", seed, *ROWS[row]])
     folder = a.out / f"{row}-{seed}-run{'-without' if a.without_readout else ''}"
     if not (a.reuse and (folder / "summary.json").exists()):
-        subprocess.run([a.tutti, "run", "--quiet", "--no-report", "--config", dataset / "config.yaml", "--dataset", dataset, "--out",
+        subprocess.run([a.tutti, "run", "--quiet", "--require", "failed", "--no-report", "--config", dataset / "config.yaml", "--dataset", dataset, "--out",
                         folder, *(["--set", "camera.readout_s=0"] if a.without_readout else [])], check=True)
     summary, truth = json.loads((folder / "summary.json").read_text()), poses(dataset / "groundtruth.txt")
     estimate = poses(folder / "trajectory.txt")

@@ -52,7 +52,7 @@ class Bench:
             return None
         if not (self.a.reuse and (out / "summary.json").exists()):
             self.program("apps/tutti/tutti", "run", "--config", config(yaml) if config else yaml, "--dataset", dataset,
-                         "--out", out, "--quiet", "--no-report", *options)
+                         "--out", out, "--quiet", "--no-report", "--require", "failed", *options)
         return json.loads((out / "summary.json").read_text())
 
 

@@ -43,7 +43,7 @@ def run(a, data, image, rate, start):
         source = ["--dataset", data] if crf is None else [
             "--dataset", video(a, data, crf), "--ground-truth", data / "groundtruth.txt", "--set", "dataset.type=auto", "--set",
             f"dataset.rate_hz={RATE_HZ}"]
-        subprocess.run([a.tutti, "run", "--quiet", "--no-report", "--no-map", "--config", table.ROOT / "data/configs/7scenes.yaml",
+        subprocess.run([a.tutti, "run", "--quiet", "--require", "failed", "--no-report", "--no-map", "--config", table.ROOT / "data/configs/7scenes.yaml",
                         *source, "--set", "dataset.sensor=mono", "--set", f"dataset.stride={STRIDES[rate]}", "--set",
                         "run.odometry_pass=false", "--start", str(start), "--out", folder], check=True, stdout=subprocess.DEVNULL)
     summary = json.loads((folder / "summary.json").read_text())

@@ -42,7 +42,7 @@ def measure(a, name):
             print(f"{name}: {dataset} is absent; its row is left as it is", file=sys.stderr)
             return None
     if not (a.reuse and (folder / "map.tutti").exists()):
-        subprocess.run([a.tutti, "run", "--config", config, "--dataset", dataset, "--out", folder], check=True,
+        subprocess.run([a.tutti, "run", "--require", "failed", "--config", config, "--dataset", dataset, "--out", folder], check=True,
                        stdout=subprocess.DEVNULL)
     load = os.getloadavg()[0]
     out = subprocess.run([a.build / "bench" / "map_file", folder / "map.tutti"], check=True, capture_output=True, text=True)

@@ -41,7 +41,7 @@ def run(a, name, source, *more):
     folder = a.out / name
     if not (a.reuse and (folder / "map.tutti").exists()):
         config, dataset = where(a, source)
-        tutti(a, "run", "--config", config, "--dataset", dataset, "--out", folder, "--no-report", *more)
+        tutti(a, "run", "--require", "failed", "--config", config, "--dataset", dataset, "--out", folder, "--no-report", *more)
     return folder
 
 

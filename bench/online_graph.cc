@@ -98,8 +98,9 @@ class GrowingMap {
   GrowingMap(const PoseGraph& file, const KeyframeGraphOptions& options) : file_(file), graph_(options) {
     for (const PoseGraphEdge& edge : file.edges()) {
       const bool forward = edge.from < edge.to;
-      arriving_[std::max(edge.from, edge.to)].push_back(
-          {std::min(edge.from, edge.to), forward ? edge.measurement : edge.measurement.Inverse(), edge});
+      arriving_[static_cast<int>(std::max(edge.from, edge.to))].push_back(
+          {static_cast<int>(std::min(edge.from, edge.to)),
+           forward ? edge.measurement : edge.measurement.Inverse(), edge});
     }
   }
 
@@ -107,7 +108,7 @@ class GrowingMap {
     for (const PoseGraphNode& node : file_.nodes()) {
       frames_ += kFramesPerKeyframe;
       if (running_ && frames_ >= due_) Enter();
-      Add(node.id);
+      Add(static_cast<int>(node.id));
       if (!running_ && !waiting_.empty()) Begin();
     }
     while (running_ || !waiting_.empty()) running_ ? Enter() : Begin();

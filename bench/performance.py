@@ -27,7 +27,7 @@ def summary_of(tutti, name, data, out, reuse):
             print(f"{name}: {data / dataset} is absent; the table is left as it is", file=sys.stderr)
             return None
         load = os.getloadavg()[0]
-        subprocess.run([tutti, "run", "--config", table.ROOT / "data" / "configs" / config, "--dataset", data / dataset,
+        subprocess.run([tutti, "run", "--require", "failed", "--config", table.ROOT / "data" / "configs" / config, "--dataset", data / dataset,
                         "--out", folder, "--timing", "--trace", out / f"{name}.json"], check=True)
         (out / f"{name}-load.txt").write_text(f"{load:.1f}")
     summary = json.loads((folder / "summary.json").read_text())

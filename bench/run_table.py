@@ -112,7 +112,7 @@ def run_row(a, name):
             dataset = table.generate(a.tutti, a.out / f"{name}-world-{k + 1}", options)
             config, what = dataset / "config.yaml", {"world": " ".join(map(str, options))}
         if not (a.reuse and (folder / "summary.json").exists()):
-            subprocess.run([a.tutti, "run", "--config", config, "--dataset", dataset, "--out", folder, "--start",
+            subprocess.run([a.tutti, "run", "--require", "failed", "--config", config, "--dataset", dataset, "--out", folder, "--start",
                             str(what.get("start", 0))], check=True)
         runs.append(figures(folder, **what))
     return runs

@@ -60,7 +60,7 @@ def sample(pid):
 def run(tutti, folder, out):
     """(frames done, what `sample` says) at each tenth, and the summary."""
     samples = []
-    process = subprocess.Popen([tutti, "run", "--config", folder / "config.yaml", "--dataset", folder, "--out", out, "--no-report"],
+    process = subprocess.Popen([tutti, "run", "--require", "failed", "--config", folder / "config.yaml", "--dataset", folder, "--out", out, "--no-report"],
                                stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
     for line in process.stderr:
         sys.stderr.write(line)

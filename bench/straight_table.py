@@ -55,7 +55,7 @@ def ate(a, name, config, dataset, *options):
     """ATE and path of the odometry [m]."""
     folder = a.out / name
     if not (a.reuse and (folder / "summary.json").exists()):
-        subprocess.run([a.tutti, "run", "--quiet", "--no-loops", "--no-report", "--config", config, "--dataset", dataset, "--out",
+        subprocess.run([a.tutti, "run", "--quiet", "--require", "failed", "--no-loops", "--no-report", "--config", config, "--dataset", dataset, "--out",
                         folder, *map(str, options)], check=True)
     summary = json.loads((folder / "summary.json").read_text())
     frames = summary["frames"]

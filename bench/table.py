@@ -20,7 +20,7 @@ def parser(doc, name, rows=()):
     p = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
     p.add_argument("--build", type=pathlib.Path, default=ROOT / "build" / "release", help="build folder, with TUTTI_BUILD_BENCH")
     p.add_argument("--data", type=pathlib.Path, default=os.environ.get("TUTTI_DATA", ROOT.parent / "shared" / "data"))
-    p.add_argument("--out", type=pathlib.Path, default=f"/tmp/tutti-bench/{name}", help="folder for the runs (kept)")
+    p.add_argument("--out", type=pathlib.Path, default=ROOT / "build" / "bench" / name, help="folder for the runs (kept)")
     p.add_argument("--reuse", action="store_true", help="take the runs that are in --out already")
     p.add_argument("--write", action="store_true", help="rewrite the tracked file, too")
     if rows:

@@ -114,7 +114,7 @@ class Busy(threading.Thread):
 def run(a, way, share):
     """Figures of one run, and the bytes of its trajectory; `share` is that of one processor which Busy takes."""
     out = a.out / way
-    command = [a.tutti, "run", "--config", table.ROOT / "data/configs/7scenes.yaml", "--dataset", a.data / "redkitchen", "--out", out,
+    command = [a.tutti, "run", "--require", "failed", "--config", table.ROOT / "data/configs/7scenes.yaml", "--dataset", a.data / "redkitchen", "--out", out,
                "--end", str(a.frames), "--timing", "--no-report", "--quiet"]
     if way != "none":
         command += ["--view", "--view-port", "0", "--view-wait", "30"]

@@ -1,14 +1,87 @@
 #include "core/camera_text.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
+#include <map>
 #include <optional>
-#include <vector>
 
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 
 namespace tutti::internal {
+namespace {
+
+enum class Lens { kNone, kRadTan, kRadial, kZero, kEquidistant, kOther, kUnknown };
+
+// kRadial: radtan if p1 and p2 are 0 (librealsense's has them behind the radial part); kZero: a pinhole if
+// all are 0; kOther: never a pinhole.
+const std::map<std::string, Lens> kLenses = {{"", Lens::kRadTan},
+                                             {"none", Lens::kNone},
+                                             {"rectified", Lens::kNone},
+                                             {"radtan", Lens::kRadTan},
+                                             {"radialtangential", Lens::kRadTan},
+                                             {"plumbbob", Lens::kRadTan},
+                                             {"pinhole", Lens::kRadTan},
+                                             {"perspective", Lens::kRadTan},
+                                             {"opencv", Lens::kRadTan},
+                                             {"brown", Lens::kRadTan},
+                                             {"brownconrady", Lens::kRadTan},
+                                             {"rational", Lens::kRadTan},
+                                             {"rationalpolynomial", Lens::kRadTan},
+                                             {"radtan8", Lens::kRadTan},
+                                             {"pinholeradtan", Lens::kRadTan},
+                                             {"pinholeradtan8", Lens::kRadTan},
+                                             {"pinholefull", Lens::kRadTan},
+                                             {"fullopencv", Lens::kRadTan},
+                                             {"modifiedbrownconrady", Lens::kRadial},
+                                             {"inversebrownconrady", Lens::kZero},
+                                             {"radialdivision", Lens::kZero},
+                                             {"division", Lens::kZero},
+                                             {"fov", Lens::kZero},
+                                             {"equidistant", Lens::kEquidistant},
+                                             {"equi", Lens::kEquidistant},
+                                             {"fisheye", Lens::kEquidistant},
+                                             {"opencvfisheye", Lens::kEquidistant},
+                                             {"kannalabrandt", Lens::kEquidistant},
+                                             {"kannalabrandt4", Lens::kEquidistant},
+                                             {"kannalabrandt8", Lens::kEquidistant},
+                                             {"kb4", Lens::kEquidistant},
+                                             {"kb8", Lens::kEquidistant},
+                                             {"omni", Lens::kOther},
+                                             {"mei", Lens::kOther},
+                                             {"ucm", Lens::kOther},
+                                             {"eucm", Lens::kOther},
+                                             {"ds", Lens::kOther},
+                                             {"doublesphere", Lens::kOther},
+                                             {"equirectangular", Lens::kOther},
+                                             {"scaramuzza", Lens::kOther},
+                                             {"ftheta", Lens::kOther},
+                                             {"thinprismfisheye", Lens::kOther},
+                                             {"fisheye624", Lens::kOther},
+                                             {"fisheye62", Lens::kOther}};
+
+// "RS2_DISTORTION_BROWN_CONRADY", "distortion.brown_conrady" -> "brownconrady".
+Lens LensOf(const std::string& model) {
+  std::string name;
+  for (const char c : model) {
+    if (std::isalnum(static_cast<unsigned char>(c)) != 0)
+      name += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  }
+  for (const std::string prefix : {"rs2", "distortion"}) {
+    if (name.rfind(prefix, 0) == 0) name.erase(0, prefix.size());
+  }
+  const auto known = kLenses.find(name);
+  return known == kLenses.end() ? Lens::kUnknown : known->second;
+}
+
+// Of values that are not 0 from `first` on, the first one; else their number.
+std::size_t FirstUsed(const std::vector<double>& values, std::size_t first) {
+  while (first < values.size() && values[first] == 0) ++first;
+  return first;
+}
+
+}  // namespace
 
 PinholeCamera ParseCamera(const std::string& text, const std::string& option) {
   const std::string remedy = std::string("; write ") + kCameraText + " in pixels";
@@ -44,6 +117,33 @@ PinholeCamera ParseCamera(const std::string& text, const std::string& option) {
 int PixelsOf(double value) {
   constexpr double kMost = 1e6;
   return value >= 0 && value <= kMost ? static_cast<int>(value) : -1;
+}
+
+std::string SetLens(const std::string& model, const std::vector<double>& values, PinholeCamera& camera) {
+  const Lens lens = LensOf(model);
+  const std::string name = "the lens model" + (model.empty() ? "" : " '" + model + "'");
+  const std::string remedy =
+      "; these are radtan (k1 k2 p1 p2 k3) and equidistant (fisheye, k1 k2 k3 k4): calibrate the camera with "
+      "one of them, or undistort the images";
+  camera.distortion = Distortion::kNone;
+  camera.coefficients = {};
+  const bool zeros = FirstUsed(values, 0) == values.size();
+  if (lens == Lens::kOther || (lens == Lens::kUnknown && (!zeros || values.empty())))
+    return name + " is none that tutti has" + remedy;
+  if (zeros && lens != Lens::kEquidistant) return {};  // an equidistant lens without terms is no pinhole
+  if (lens == Lens::kNone) return name + " has coefficients that are not 0; name the lens, or leave them out";
+  if (lens == Lens::kZero) return name + " is none that tutti has" + remedy;
+  if (values.size() < 4)
+    return name + " has " + std::to_string(values.size()) + " coefficients; 4 or 5 are needed";
+  const std::size_t most = lens == Lens::kEquidistant ? 4 : 5;
+  if (const std::size_t more = FirstUsed(values, most); more < values.size())
+    return name + " has more than " + std::to_string(most) + " coefficients: number " +
+           std::to_string(more + 1) + " is not 0" + remedy;
+  if (lens == Lens::kRadial && (values[2] != 0 || values[3] != 0))
+    return name + " with p1 and p2 is none that tutti has" + remedy;
+  camera.distortion = lens == Lens::kEquidistant ? Distortion::kEquidistant : Distortion::kRadTan;
+  std::copy_n(values.begin(), std::min(most, values.size()), camera.coefficients.begin());
+  return {};
 }
 
 }  // namespace tutti::internal

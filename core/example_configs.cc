@@ -1,39 +1,40 @@
 #include "core/example_configs.h"
 
-#include <system_error>
+#include <map>
 
-namespace tutti::internal {
-namespace fs = std::filesystem;
-
-std::string ExampleConfigs() {
-  std::error_code ignored;
-  return ExampleConfigs(fs::read_symlink("/proc/self/exe", ignored).parent_path());
+namespace tutti {
+namespace assets {
+std::string ExampleConfigs();  // made by CMake: each behind a line "==> NAME"
 }
 
-std::string ExampleConfigs(const fs::path& folder) {
-  constexpr int kLevels = 3;  // lib/MACHINE/tutti
-  fs::path above = folder;
-  for (int i = 0; i < kLevels && above.has_relative_path(); ++i) {
-    above = above.parent_path();
-    const fs::path configs = above / TUTTI_DATA_FOLDER / "tutti" / "configs";
-    std::error_code ignored;
-    if (fs::is_directory(configs, ignored)) return configs.string();
+namespace internal {
+namespace {
+
+std::map<std::string, std::string> Configs() {
+  constexpr const char* kMark = "==> ";
+  const std::string all = assets::ExampleConfigs();
+  std::map<std::string, std::string> configs;
+  for (std::size_t at = 0; at < all.size();) {
+    const std::size_t name = at + std::string(kMark).size(), line = all.find('\n', name);
+    at = std::min(all.find(std::string("\n") + kMark, line), all.size() - 1) + 1;
+    configs[all.substr(name, line - name)] = all.substr(line + 1, at - line - 1);
   }
-  return "data/configs";
+  return configs;
 }
 
-fs::path ExampleConfig(const std::string& name) {
-  constexpr int kLevels = 5;  // build/release/tests/apps/export
-  fs::path usual = fs::path(ExampleConfigs()) / name;
-  std::error_code ignored;
-  if (fs::is_regular_file(usual, ignored)) return usual;
-  fs::path above = fs::read_symlink("/proc/self/exe", ignored).parent_path();
-  for (int i = 0; i < kLevels && above.has_relative_path(); ++i) {
-    above = above.parent_path();
-    fs::path file = above / "data" / "configs" / name;
-    if (fs::is_regular_file(file, ignored)) return file;
-  }
-  return usual;
+}  // namespace
+
+std::vector<std::string> ExampleConfigNames() {
+  std::vector<std::string> names;
+  for (const auto& [name, text] : Configs()) names.push_back(name);
+  return names;
 }
 
-}  // namespace tutti::internal
+std::optional<std::string> ExampleConfig(const std::string& name) {
+  const std::map<std::string, std::string> configs = Configs();
+  const auto found = configs.find(name);
+  return found == configs.end() ? std::nullopt : std::optional<std::string>(found->second);
+}
+
+}  // namespace internal
+}  // namespace tutti

@@ -4,7 +4,6 @@
 #include <signal.h>
 #include <unistd.h>
 
-#include <atomic>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
@@ -21,20 +20,10 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::uint32_t kByteOrder = 0x01020304;  // reads as another number on a machine of the other order
-constexpr const char* kPart = ".part-";           // + process - number
-
-// How the names of all that are being written for a file begin.
-std::string PartsOf(const fs::path& file) { return "." + file.filename().string() + kPart; }
-
-// A name that no other writer has, in this process or another.
-fs::path PartOf(const fs::path& file) {
-  static std::atomic<int> count = 0;
-  return file.parent_path() / (PartsOf(file) + std::to_string(getpid()) + "-" + std::to_string(count++));
-}
 
 // What writers left that were killed.
 void RemoveOldParts(const fs::path& file) {
-  const std::string start = PartsOf(file);
+  const std::string start = PartPrefix(file);
   std::error_code ignored;
   const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
   for (fs::directory_iterator entry(folder, ignored), end; !ignored && entry != end;
@@ -63,10 +52,10 @@ std::uint32_t SectionChecksum(const SectionHeader& header, std::string_view stor
 }
 
 SectionWriter::SectionWriter(const fs::path& file, const SectionFileKind& kind)
-    : file_(file), part_(PartOf(file)), packer_(std::make_unique<SectionPacker>()) {
-  RemoveOldParts(file_);
+    : name_(file.string()), file_(file), packer_(std::make_unique<SectionPacker>()) {
+  RemoveOldParts(file_.target());
   errno = 0;
-  out_.open(part_, std::ios::binary | std::ios::in | std::ios::out | std::ios::trunc);
+  out_.open(file_.part(), std::ios::binary | std::ios::in | std::ios::out);
   out_.write(kind.magic, sizeof kind.magic);
   out_.write(reinterpret_cast<const char*>(&kind.version), sizeof kind.version);
   out_.write(reinterpret_cast<const char*>(&kByteOrder), sizeof kByteOrder);
@@ -74,12 +63,7 @@ SectionWriter::SectionWriter(const fs::path& file, const SectionFileKind& kind)
   Check();
 }
 
-SectionWriter::~SectionWriter() {
-  if (finished_) return;
-  out_.close();
-  std::error_code ignored;
-  fs::remove(part_, ignored);
-}
+SectionWriter::~SectionWriter() = default;
 
 std::uint64_t SectionWriter::Write(std::uint32_t tag, std::string_view bytes, std::uint64_t like) {
   errno = 0;
@@ -121,20 +105,13 @@ void SectionWriter::Finish() {
   errno = 0;
   out_.close();
   Check();
-  if (const int error = Sync(part_); error != 0) Fail(std::strerror(error));
-  std::error_code error;
-  fs::rename(part_, file_, error);
-  if (error) Fail(error.message());
-  finished_ = true;
-  Sync(file_.has_parent_path() ? file_.parent_path() : fs::path("."));
+  if (const int error = Sync(file_.part()); error != 0) FailToWrite(name_, error);
+  file_.Commit();
+  Sync(file_.target().has_parent_path() ? file_.target().parent_path() : fs::path("."));
 }
 
 void SectionWriter::Check() {
-  if (!out_) Fail(errno != 0 ? std::strerror(errno) : "no such folder, no permission, or the disk is full");
-}
-
-void SectionWriter::Fail(const std::string& why) const {
-  throw InputError(file_.string() + ": can't be written (" + why + "); what was there before is untouched");
+  if (!out_) FailToWrite(name_, errno);
 }
 
 SectionReader::SectionReader(const fs::path& file, const SectionFileKind& kind)
@@ -208,6 +185,7 @@ std::uint32_t SectionReader::Next(std::string* bytes) {
   const SectionHeader header = ReadHeader();
   if (header.like != 0 && header.like >= place) Damaged("a section like one that is nowhere");
   ReadContent(header, header.like != 0 ? ReadLike(header.like) : std::string(), bytes);
+  if (header.tag == kEndOfSections && (left_ > 0 || !bytes->empty())) Damaged("bytes behind its end");
   return header.tag;
 }
 

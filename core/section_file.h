@@ -11,6 +11,8 @@
 #include <string>
 #include <string_view>
 
+#include "core/replaced_file.h"
+
 #pragma GCC visibility push(default)  // used across libraries
 namespace tutti::internal {
 
@@ -47,9 +49,9 @@ inline constexpr std::uint64_t kMostSectionGain = 16;
 
 class SectionPacker;
 
-/// Writes to a file beside the target, with a name of its own, which takes the target's place in Finish;
-/// without it nothing is left. So the target is always one complete file, whoever else writes it at the same
-/// time. Every function throws InputError, with the name of the target, if that is not possible.
+/// Writes to a file beside the target (ReplacedFile), which takes the target's place in Finish; without it
+/// nothing is left. So the target is always one complete file, whoever else writes it at the same time. Every
+/// function throws InputError, with the name of the target, if that is not possible.
 class SectionWriter {
  public:
   SectionWriter(const std::filesystem::path& file, const SectionFileKind& kind);
@@ -70,14 +72,13 @@ class SectionWriter {
  private:
   std::string ReadBack(std::uint64_t place);
   void Check();
-  [[noreturn]] void Fail(const std::string& why) const;
 
-  std::filesystem::path file_, part_;
+  std::string name_;
+  ReplacedFile file_;
   std::fstream out_;
   std::uint64_t end_ = 0;            // of the file, so far
   std::set<std::uint64_t> likened_;  // places that sections are like
   std::unique_ptr<SectionPacker> packer_;
-  bool finished_ = false;
 };
 
 /// Reads what SectionWriter wrote. Every function throws InputError, with the name of the file: it is not

@@ -1,11 +1,14 @@
 #include <cmath>
 #include <cstdio>
-#include <fstream>
-#include <functional>
+#include <optional>
+#include <utility>
 
-#include "core/angle.h"
-#include "core/text_input.h"
+#include "core/number_lines.h"
+#include "core/pose_columns.h"
+#include "core/pose_reader.h"
+#include "core/replaced_file.h"
 #include "core/text_reader.h"
+#include "core/time_stamps.h"
 #include "core/tum_line.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
@@ -14,152 +17,29 @@
 namespace tutti {
 namespace {
 
-[[noreturn]] void Fail(const std::filesystem::path& file, std::size_t line, const std::string& what) {
-  throw InputError(file.string() + ":" + std::to_string(line) + ": " + what);
-}
+using internal::FailAt;
+using internal::NumberAt;
+using Words = std::vector<std::string>;
 
-// Calls `use` for each line that carries data; '#' starts a comment.
-void ForEachLine(const std::filesystem::path& file,
-                 const std::function<void(std::size_t, const std::vector<std::string>&)>& use) {
-  internal::TextReader in(file);
-  std::string text;
-  while (in.Next(text)) {
-    const std::size_t line = in.number();
-    const std::size_t comment = text.find('#');
-    if (comment != std::string::npos) text.resize(comment);
-    const std::string comma = internal::DecimalComma(text);
-    if (!comma.empty())
-      Fail(file, line, "'" + internal::Excerpt(comma) + "' has a decimal comma; write decimal points");
-    const std::vector<std::string> words = SplitText(text);
-    if (!words.empty()) use(line, words);
+// Before the file is there.
+void RequireRoom(const std::filesystem::path& file, const Trajectory& trajectory, TrajectoryFormat format,
+                 const std::vector<std::int64_t>& stamps_ns) {
+  if (!stamps_ns.empty() && stamps_ns.size() != trajectory.size())
+    throw InputError(file.string() + ": there are " + std::to_string(stamps_ns.size()) + " time stamps for " +
+                     std::to_string(trajectory.size()) + " poses");
+  if (format == TrajectoryFormat::kKitti && !HasRotations(trajectory))
+    throw InputError(file.string() +
+                     ": can't be written: the poses are positions alone, and KITTI's format needs rotations; "
+                     "write tum or euroc");
+  constexpr double kMost_s = 9.2e9;  // of 64 bits
+  for (const StampedPose& pose : trajectory) {
+    if (format != TrajectoryFormat::kEuroc || !stamps_ns.empty() || std::abs(pose.stamp_s) < kMost_s)
+      continue;
+    char stamp[32];
+    std::snprintf(stamp, sizeof stamp, "%g", pose.stamp_s);
+    throw InputError(file.string() + ": can't be written: the time stamp " + stamp +
+                     " s does not fit into EuRoC's nanoseconds, of which there are 9.2e18; write tum");
   }
-}
-
-double NumberOf(const std::filesystem::path& file, std::size_t line, const std::string& word) {
-  const std::optional<double> value = ParseDouble(word);
-  if (!value) Fail(file, line, "'" + internal::Excerpt(word) + "' is not a number");
-  if (!std::isfinite(*value))
-    Fail(file, line, "'" + word + "' is not finite; remove this pose or repair the file");
-  constexpr double kLargest = 1e100;  // squares of what is beyond it overflow
-  if (std::abs(*value) > kLargest)
-    Fail(file, line,
-         "'" + internal::Excerpt(word) +
-             "' is too large to compute with; remove this pose or repair the file");
-  return *value;
-}
-
-// Things that are put up with where the caller wants to know of them instead of an error.
-struct Tolerated {
-  std::size_t count = 0, first_line = 0;
-  void Note(std::size_t line) {
-    if (count++ == 0) first_line = line;
-  }
-};
-struct Oddities {
-  bool tolerated = false;
-  Tolerated repeats;  // poses that repeat a time stamp, left out
-  Tolerated lengths;  // quaternions that are not of length 1, normalised
-};
-
-Pose QuaternionPose(const std::filesystem::path& file, std::size_t line, const Eigen::Vector3d& t, double x,
-                    double y, double z, double w, Oddities& odd) {
-  const Eigen::Quaterniond q(w, x, y, z);
-  if (q.norm() < 1e-6) Fail(file, line, "the quaternion is zero; a unit quaternion is needed");
-  if (q.norm() > 1e6) Fail(file, line, "the quaternion is far from length 1; a unit quaternion is needed");
-  if (std::abs(q.norm() - 1) > 1e-3) odd.lengths.Note(line);
-  return Pose(q.normalized(), t);
-}
-
-void RequireColumns(const std::filesystem::path& file, std::size_t line, std::size_t have, std::size_t want,
-                    const char* layout) {
-  if (have < want) {
-    Fail(file, line, "has " + std::to_string(have) + " columns; " + layout);
-  }
-}
-
-// True if the pose is to be left out. Throws if time does not grow.
-bool LeaveOut(const std::filesystem::path& file, std::size_t line, const Trajectory& before, double stamp_s,
-              Oddities& odd) {
-  if (before.empty() || stamp_s > before.back().stamp_s) return false;
-  if (stamp_s < before.back().stamp_s)
-    Fail(file, line, "goes back in time; sort the file by its first column");
-  if (!odd.tolerated) Fail(file, line, "repeats the time stamp of the pose before it; remove one of the two");
-  odd.repeats.Note(line);
-  return true;
-}
-
-// From the words of a line, in metres and degrees.
-MotionSigma SigmaOf(const std::filesystem::path& file, std::size_t line, const std::string& translation,
-                    const std::string& rotation) {
-  const double metres = NumberOf(file, line, translation), degrees = NumberOf(file, line, rotation);
-  if (metres < 0 || degrees < 0) Fail(file, line, "a standard deviation is below 0");
-  return {metres, degrees * internal::kRadians};
-}
-
-Trajectory ReadTum(const std::filesystem::path& file, Oddities& odd, std::vector<MotionSigma>* sigmas) {
-  Trajectory out;
-  std::size_t columns = 8;
-  ForEachLine(file, [&](std::size_t line, const std::vector<std::string>& w) {
-    if (sigmas != nullptr && out.empty() && w.size() == 10) columns = 10;
-    if (w.size() != columns) {
-      Fail(file, line,
-           "has " + std::to_string(w.size()) +
-               (columns == 8 ? " columns; the TUM format has 8: stamp tx ty tz qx qy qz qw"
-                             : " columns; the first line has 10"));
-    }
-    double v[8];
-    for (int i = 0; i < 8; ++i) v[i] = NumberOf(file, line, w[static_cast<std::size_t>(i)]);
-    if (LeaveOut(file, line, out, v[0], odd)) return;
-    out.push_back({v[0], QuaternionPose(file, line, {v[1], v[2], v[3]}, v[4], v[5], v[6], v[7], odd)});
-    if (columns == 10) sigmas->push_back(SigmaOf(file, line, w[8], w[9]));
-  });
-  return out;
-}
-
-Trajectory ReadKitti(const std::filesystem::path& file, std::vector<Eigen::Matrix3d>* rotations) {
-  Trajectory out;
-  ForEachLine(file, [&](std::size_t line, const std::vector<std::string>& w) {
-    if (w.size() != 12) {
-      Fail(file, line,
-           "has " + std::to_string(w.size()) +
-               " columns; the KITTI format has 12: the 3x4 matrix [R|t] by rows");
-    }
-    Eigen::Matrix<double, 3, 4> m;
-    for (int i = 0; i < 12; ++i) m(i / 4, i % 4) = NumberOf(file, line, w[static_cast<std::size_t>(i)]);
-    const Eigen::Matrix3d rotation = m.leftCols<3>();
-    // Entries too big for a determinant make it NaN.
-    if (!(std::abs(rotation.determinant() - 1.0) <= 0.1 && rotation.cwiseAbs().maxCoeff() <= 2))
-      Fail(file, line, "its 3x3 part is not a rotation matrix");
-    out.push_back({static_cast<double>(out.size()), Pose::FromMatrix(m)});
-    if (rotations != nullptr) rotations->push_back(rotation);
-  });
-  return out;
-}
-
-constexpr const char* kNoNanoseconds =
-    "' is no time stamp in nanoseconds, which EuRoC's format begins with; seconds and TUM's columns with "
-    "commas are --format tum (--from tum)";
-
-Trajectory ReadEuroc(const std::filesystem::path& file, Oddities& odd) {
-  Trajectory out;
-  ForEachLine(file, [&](std::size_t line, const std::vector<std::string>& w) {
-    RequireColumns(file, line, w.size(), 8,
-                   "the EuRoC format has at least 8: stamp [ns], x, y, z, qw, qx, qy, qz");
-    double v[8];
-    for (int i = 0; i < 8; ++i) v[i] = NumberOf(file, line, w[static_cast<std::size_t>(i)]);
-    // Seconds, in TUM's order with commas, would be read as nanoseconds and the quaternion in the wrong
-    // order.
-    if (v[0] != std::floor(v[0])) Fail(file, line, "'" + w[0] + kNoNanoseconds);
-    const double stamp = v[0] * 1e-9;
-    if (LeaveOut(file, line, out, stamp, odd)) return;
-    out.push_back({stamp, QuaternionPose(file, line, {v[1], v[2], v[3]}, v[5], v[6], v[7], v[4], odd)});
-  });
-  constexpr double kFastest_s = 1e-6;  // nothing measures a million poses a second
-  const auto gaps = static_cast<double>(out.size()) - 1;
-  if (gaps > 0 && out.back().stamp_s - out.front().stamp_s < kFastest_s * gaps)
-    throw InputError(file.string() + ": '" + std::to_string(std::llround(out.back().stamp_s * 1e9)) +
-                     kNoNanoseconds);
-  return out;
 }
 
 }  // namespace
@@ -178,6 +58,10 @@ TrajectoryFormat ParseTrajectoryFormat(const std::string& name) {
   throw InputError("unknown trajectory format '" + name + "'; use tum, kitti or euroc");
 }
 
+bool HasRotations(const Trajectory& trajectory) {
+  return trajectory.empty() || trajectory.front().pose.rotation.coeffs() != internal::NoRotation().coeffs();
+}
+
 TrajectoryFormat GuessTrajectoryFormat(const std::filesystem::path& file) {
   std::error_code code;
   if (std::filesystem::exists(file, code) && !std::filesystem::is_regular_file(file, code))
@@ -185,93 +69,97 @@ TrajectoryFormat GuessTrajectoryFormat(const std::filesystem::path& file) {
                      ": is no file, so that its format can't be guessed; name it, or give a file");
   internal::TextReader in(file);
   std::string text;
+  std::optional<internal::PoseColumns> names;
   while (in.Next(text)) {
-    const std::vector<std::string> words = SplitText(text);
-    if (words.empty() || words[0][0] == '#') continue;
-    const bool decimal_comma = !internal::DecimalComma(text).empty();
-    if (text.find(',') == std::string::npos || decimal_comma)
-      return words.size() == 12 && !decimal_comma ? TrajectoryFormat::kKitti : TrajectoryFormat::kTum;
-    // EuRoC's stamps are whole nanoseconds. Commas after seconds are TUM's columns.
-    const std::optional<double> stamp = ParseDouble(words[0]);
-    return stamp && *stamp != std::floor(*stamp) ? TrajectoryFormat::kTum : TrajectoryFormat::kEuroc;
+    const Words words = internal::PoseWords(text);
+    if (words.empty()) continue;
+    const bool is_number = ParseDouble(words[0]).has_value();
+    if (internal::IsComment(text) || (!is_number && !names)) {
+      if (std::optional<internal::PoseColumns> named = internal::ColumnsOfNames(text)) names = named;
+      if (internal::IsComment(text) || names) continue;
+    }
+    if (names && names->count == words.size() && names->HasRotation())
+      return names->ScalarFirst() ? TrajectoryFormat::kEuroc : TrajectoryFormat::kTum;
+    return internal::FormatOfNumbers(text);
   }
   return TrajectoryFormat::kTum;
 }
 
 Trajectory ReadTrajectory(const std::filesystem::path& file, TrajectoryFormat format,
-                          std::vector<std::string>* warnings, std::vector<Eigen::Matrix3d>* rotations,
-                          std::vector<MotionSigma>* sigmas) {
-  Trajectory out;
-  Oddities odd;
-  odd.tolerated = warnings != nullptr;
-  if (rotations != nullptr) rotations->clear();
-  if (sigmas != nullptr) sigmas->clear();
-  switch (format) {
-    case TrajectoryFormat::kTum:
-      out = ReadTum(file, odd, sigmas);
-      break;
-    case TrajectoryFormat::kKitti:
-      out = ReadKitti(file, rotations);
-      break;
-    case TrajectoryFormat::kEuroc:
-      out = ReadEuroc(file, odd);
-      break;
+                          std::vector<std::string>* warnings, TrajectoryDetails* details,
+                          StampUnit expected) {
+  internal::PoseReader reader(file, format, warnings != nullptr, details != nullptr);
+  TrajectoryDetails found;
+  Trajectory out = reader.Read(expected, found);
+  if (warnings != nullptr) {
+    for (std::string& warning : reader.Warnings(found, expected)) warnings->push_back(std::move(warning));
   }
-  if (out.empty()) throw InputError(file.string() + ": holds no pose");
-  const auto warn = [&](const Tolerated& what, const char* text) {
-    if (warnings == nullptr || what.count == 0) return;
-    warnings->push_back(file.string() + ":" + std::to_string(what.first_line) + ": " + text +
-                        ", with all such poses: " + std::to_string(what.count));
-  };
-  warn(odd.repeats, "repeats the time stamp of the pose before it; left out");
-  warn(odd.lengths, "the quaternion is not of length 1; normalised");
+  if (details != nullptr) *details = std::move(found);
   return out;
 }
 
 std::vector<MotionSigma> ReadMotionSigmas(const std::filesystem::path& file, const Trajectory& trajectory) {
   constexpr double kSameTime_s = 1e-3;
   std::vector<MotionSigma> sigmas;
-  ForEachLine(file, [&](std::size_t line, const std::vector<std::string>& w) {
+  std::vector<std::pair<std::size_t, double>> stamps;  // with their lines
+  internal::ForEachLine(file, [&](std::size_t line, const Words& w) {
     const std::size_t columns = w.size();
     if (columns != 2 && columns != 3)
-      Fail(file, line,
-           "has " + std::to_string(columns) +
-               " columns; standard deviations have 2, metres and degrees, or a time stamp and these");
+      FailAt(file, line,
+             "has " + std::to_string(columns) +
+                 " columns; standard deviations have 2, metres and degrees, or a time stamp and these");
     if (sigmas.size() == trajectory.size())
-      Fail(file, line, "there are only " + std::to_string(trajectory.size()) + " poses; one line for each");
-    const double stamp_s = trajectory[sigmas.size()].stamp_s;
-    if (columns == 3 && !(std::abs(NumberOf(file, line, w[0]) - stamp_s) <= kSameTime_s))
-      Fail(file, line, "is not of the time of its pose, " + std::to_string(stamp_s) + " s");
-    sigmas.push_back(SigmaOf(file, line, w[columns - 2], w[columns - 1]));
+      FailAt(file, line, "there are only " + std::to_string(trajectory.size()) + " poses; one line for each");
+    if (columns == 3) stamps.emplace_back(line, NumberAt(file, line, w[0]));
+    if (columns == 3 ? stamps.size() != sigmas.size() + 1 : !stamps.empty())
+      FailAt(file, line, "has another number of columns than the lines before");
+    sigmas.push_back(internal::SigmaAt(file, line, w[columns - 2], w[columns - 1]));
   });
   if (sigmas.size() != trajectory.size())
     throw InputError(file.string() + ": has " + std::to_string(sigmas.size()) + " lines for " +
                      std::to_string(trajectory.size()) + " poses; one for each is needed");
+  std::vector<double> values;
+  for (const auto& stamp : stamps) values.push_back(stamp.second);
+  const double seconds = internal::SecondsOf(internal::UnitOfStamps(values).unit);
+  for (std::size_t i = 0; i < stamps.size(); ++i) {
+    const double pose_s = trajectory[i].stamp_s;
+    if (!(std::abs(seconds * stamps[i].second - pose_s) <= kSameTime_s))
+      FailAt(file, stamps[i].first, "is not of the time of its pose, " + std::to_string(pose_s) + " s");
+  }
   return sigmas;
 }
 
-std::vector<double> ReadTimes(const std::filesystem::path& file) {
+std::vector<double> ReadTimes(const std::filesystem::path& file, std::vector<std::string>* warnings) {
   std::vector<double> out;
-  ForEachLine(file, [&](std::size_t line, const std::vector<std::string>& w) {
-    out.push_back(NumberOf(file, line, w[0]));
+  bool first = true;
+  internal::ForEachLine(file, [&](std::size_t line, const Words& w) {
+    const bool names_columns = std::exchange(first, false) && w.size() > 1 && !ParseDouble(w[0]);
+    if (names_columns) return;
+    out.push_back(NumberAt(file, line, w[0]));
+    if (out.size() > 1 && out.back() < out[out.size() - 2])
+      FailAt(file, line, "goes back in time; sort the file, or cut it there if it is two recordings");
   });
+  const StampUnit unit = internal::UnitOfStamps(out).unit;
+  for (double& stamp : out) stamp *= internal::SecondsOf(unit);
+  const std::string note = internal::UnitNote(file.string(), unit, StampUnit::kSeconds);
+  if (warnings != nullptr && !note.empty()) warnings->push_back(note);
   return out;
 }
 
-void WriteTrajectory(const std::filesystem::path& file, const Trajectory& trajectory,
-                     TrajectoryFormat format) {
-  std::ofstream out(file);
-  if (!out)
-    throw InputError(file.string() + ": can't be written; check that the folder exists and is writable");
-  char line[512];
-  if (format == TrajectoryFormat::kTum) out << internal::kTumHeader;
-  if (format == TrajectoryFormat::kEuroc) out << "#timestamp [ns],p_x [m],p_y [m],p_z [m],q_w,q_x,q_y,q_z\n";
-  for (const StampedPose& s : trajectory) {
+void WriteTrajectory(const std::filesystem::path& file, const Trajectory& trajectory, TrajectoryFormat format,
+                     const std::vector<std::int64_t>& stamps_ns) {
+  RequireRoom(file, trajectory, format, stamps_ns);
+  std::string text;
+  char line[1024];
+  if (format == TrajectoryFormat::kTum) text = internal::kTumHeader;
+  if (format == TrajectoryFormat::kEuroc) text = "#timestamp [ns],p_x [m],p_y [m],p_z [m],q_w,q_x,q_y,q_z\n";
+  for (std::size_t k = 0; k < trajectory.size(); ++k) {
+    const StampedPose& s = trajectory[k];
     const Eigen::Vector3d& t = s.pose.translation;
     const Eigen::Quaterniond& q = s.pose.rotation;
     switch (format) {
       case TrajectoryFormat::kTum:
-        out << internal::TumLine(s);
+        text += stamps_ns.empty() ? internal::TumLine(s) : internal::TumLine(s, stamps_ns[k]);
         continue;
       case TrajectoryFormat::kKitti: {
         const Eigen::Matrix4d m = s.pose.Matrix();
@@ -282,14 +170,15 @@ void WriteTrajectory(const std::filesystem::path& file, const Trajectory& trajec
         break;
       }
       case TrajectoryFormat::kEuroc:
-        std::snprintf(line, sizeof line, "%lld,%.9f,%.9f,%.9f,%.9f,%.9f,%.9f,%.9f\n",
-                      std::llround(s.stamp_s * 1e9), t.x(), t.y(), t.z(), q.w(), q.x(), q.y(), q.z());
+        std::snprintf(
+            line, sizeof line, "%lld,%.9f,%.9f,%.9f,%.9f,%.9f,%.9f,%.9f\n",
+            static_cast<long long>(stamps_ns.empty() ? std::llround(s.stamp_s * 1e9) : stamps_ns[k]), t.x(),
+            t.y(), t.z(), q.w(), q.x(), q.y(), q.z());
         break;
     }
-    out << line;
+    text += line;
   }
-  out.flush();
-  if (!out) throw InputError(file.string() + ": could not be written in full; is the disk full?");
+  internal::WriteFile(file, text);
 }
 
 }  // namespace tutti

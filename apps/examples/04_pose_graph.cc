@@ -50,8 +50,9 @@ int Run(const char* file) {
   for (std::size_t e = 0; e < graph.edges().size(); ++e) {
     const tutti::PoseGraphEdge& edge = graph.edges()[e];
     if (edge.kind != tutti::EdgeKind::kLoop) continue;
-    std::printf("loop %d -> %d: chi2 %.1f, weight %.2f%s\n", edge.from, edge.to, report.edges[e].chi2,
-                report.edges[e].weight, report.edges[e].down_weighted ? " (rejected)" : "");
+    std::printf("loop %s -> %s: chi2 %.1f, weight %.2f%s\n", graph.NameOf(edge.from).c_str(),
+                graph.NameOf(edge.to).c_str(), report.edges[e].chi2, report.edges[e].weight,
+                report.edges[e].down_weighted ? " (rejected)" : "");
   }
   if (file != nullptr) tutti::WriteG2o(file, graph);  // for g2o_viewer and others
   return 0;

@@ -6,8 +6,8 @@
 
 #include "apps/export/image_name.h"
 #include "apps/export/little_endian.h"
-#include "apps/run/text_file.h"
 #include "core/median.h"
+#include "core/replaced_file.h"
 
 namespace tutti {
 namespace {
@@ -204,12 +204,12 @@ std::string ColmapModel::PointsBinary() const {
 }
 
 void ColmapModel::Write(const std::filesystem::path& folder) const {
-  WriteTextFile(folder / "cameras.txt", CamerasText());
-  WriteTextFile(folder / "images.txt", ImagesText());
-  WriteTextFile(folder / "points3D.txt", PointsText());
-  WriteTextFile(folder / "cameras.bin", CamerasBinary());
-  WriteTextFile(folder / "images.bin", ImagesBinary());
-  WriteTextFile(folder / "points3D.bin", PointsBinary());
+  internal::WriteFile(folder / "cameras.txt", CamerasText());
+  internal::WriteFile(folder / "images.txt", ImagesText());
+  internal::WriteFile(folder / "points3D.txt", PointsText());
+  internal::WriteFile(folder / "cameras.bin", CamerasBinary());
+  internal::WriteFile(folder / "images.bin", ImagesBinary());
+  internal::WriteFile(folder / "points3D.bin", PointsBinary());
 }
 
 }  // namespace tutti

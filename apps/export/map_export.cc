@@ -16,7 +16,8 @@
 #include "apps/export/ply_file.h"
 #include "apps/export/track_completion.h"
 #include "apps/run/output_folder.h"
-#include "apps/run/text_file.h"
+#include "core/replaced_file.h"
+#include "frontend/dataset/image_file.h"
 #include "tutti/backend/g2o_io.h"
 #include "tutti/core/error.h"
 #include "tutti/slam/version.h"
@@ -85,8 +86,7 @@ void WriteImages(const fs::path& folder, const KeyframeImages& images, const Map
     const ColourImage read = images.Read(model.keyframes[k]);
     if (!read.error.empty()) throw InputError(read.error);
     const fs::path file = folder / ImageName(model.keyframes[k].frame_index);
-    if (!cv::imwrite(file.string(), read.image))
-      throw InputError(file.string() + ": could not be written in full; is the disk full?");
+    WritePngFile(file, read.image);
   }
 }
 
@@ -123,10 +123,11 @@ class FolderExport {
     }
     if (folder->transforms) {
       out.Write({kPoints, [this](const fs::path& p) { WritePly(p, model_, PlyCameras::kNone); }});
-      out.Write({kTransforms,
-                 [this](const fs::path& p) { WriteTextFile(p, NerfTransforms(model_, chosen_, kPoints)); }});
+      out.Write({kTransforms, [this](const fs::path& p) {
+                   internal::WriteFile(p, NerfTransforms(model_, chosen_, kPoints));
+                 }});
     }
-    out.Write({kMark, [this](const fs::path& p) { WriteTextFile(p, Mark()); }});
+    out.Write({kMark, [this](const fs::path& p) { internal::WriteFile(p, Mark()); }});
     ThrowFailures(out.failures(), out.Finish(true));
   }
 

@@ -3,8 +3,8 @@
 #include <string>
 
 #include "apps/export/little_endian.h"
-#include "apps/run/text_file.h"
 #include "core/median.h"
+#include "core/replaced_file.h"
 
 namespace tutti {
 namespace {
@@ -73,7 +73,7 @@ void WritePly(const std::filesystem::path& file, const MapModel& model, PlyCamer
       for (const std::uint32_t corner : triangle) AppendLittleEndian(first + corner, &bytes);
     }
   }
-  WriteTextFile(file, bytes);
+  internal::WriteFile(file, bytes);
 }
 
 }  // namespace tutti

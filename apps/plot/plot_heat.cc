@@ -68,18 +68,23 @@ void AddHeatLine(const std::vector<Eigen::Vector2d>& points, const std::vector<d
 
 void AddHeatBar(const PlotAxes& axes, const std::string& name, double low, double high,
                 std::vector<PlotShape>& shapes) {
-  constexpr double kWidth = 240, kHeight = 14;  // [px]
-  const Eigen::Vector2d at(axes.bottom_right.x() - kWidth - 24, axes.top_left.y() + 30);
-  shapes.push_back(
-      PlotBox({at.x() - 12, at.y() - 26}, {at.x() + kWidth + 12, at.y() + kHeight + 24}, "#ffffff"));
+  constexpr double kGap = 22, kWidth = 16;  // [px]
+  const double left = axes.bottom_right.x() + kGap, right = left + kWidth;
+  const double top = axes.top_left.y(), bottom = axes.bottom_right.y();
   for (int k = 0; k < kColors; ++k) {
-    const double left = at.x() + kWidth * k / kColors, right = at.x() + kWidth * (k + 1) / kColors;
-    shapes.push_back(PlotBox({left, at.y()}, {right, at.y() + kHeight}, HeatColor((k + 0.5) / kColors)));
+    const double from = bottom - (bottom - top) * k / kColors,
+                 to = bottom - (bottom - top) * (k + 1) / kColors;
+    shapes.push_back(PlotBox({left, to}, {right, from}, HeatColor((k + 0.5) / kColors)));
   }
-  shapes.push_back(PlotText({at.x() + 0.5 * kWidth, at.y() - 8}, name, 14, PlotShape::Anchor::kMiddle));
-  shapes.push_back(PlotText({at.x(), at.y() + kHeight + 18}, Number(low), 14));
-  shapes.push_back(
-      PlotText({at.x() + kWidth, at.y() + kHeight + 18}, Number(high), 14, PlotShape::Anchor::kEnd));
+  shapes.push_back(PlotText({right + 8, bottom}, Number(low), 14));
+  if (high > low) {
+    shapes.push_back(PlotText({right + 8, 0.5 * (top + bottom) + 5}, Number(0.5 * (low + high)), 14));
+    shapes.push_back(PlotText({right + 8, top + 10}, Number(high), 14));
+  }
+  PlotShape text = PlotText({right + kHeatBarRoom - kGap - kWidth - 8, 0.5 * (top + bottom)}, name, 14,
+                            PlotShape::Anchor::kMiddle);
+  text.vertical = true;
+  shapes.push_back(text);
 }
 
 }  // namespace tutti

@@ -17,7 +17,9 @@ std::string HeatColor(double share);
 void AddHeatLine(const std::vector<Eigen::Vector2d>& points, const std::vector<double>& values, double low,
                  double high, double width, std::vector<PlotShape>& shapes);
 
-/// Colours with the values at their ends, at the upper right of the axes' box.
+constexpr double kHeatBarRoom = 110;  ///< on the right of the axes' box, for AddHeatBar [px]
+
+/// Colours with the values at their ends and in the middle, on the right of the axes' box.
 void AddHeatBar(const PlotAxes& axes, const std::string& name, double low, double high,
                 std::vector<PlotShape>& shapes);
 

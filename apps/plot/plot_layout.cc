@@ -5,6 +5,7 @@
 
 #include "apps/plot/plot.h"
 #include "apps/plot/plot_heat.h"
+#include "apps/plot/plot_legend.h"
 #include "apps/plot/plot_picture.h"
 
 namespace tutti {
@@ -17,13 +18,11 @@ struct View {
   double scale = 1;  // [px/m]
 
   Eigen::Vector2d World(const Eigen::Vector3d& p) const { return {p[axis_x], p[axis_y]}; }
-  // The box of the axes, at the same scale along both.
-  PlotAxes Axes() const {
-    PlotAxes axes;
+  // The values at the ends of the axes, at the same scale along both.
+  void SetRange(PlotAxes& axes) const {
     const Eigen::Vector2d half = 0.5 * (axes.bottom_right - axes.top_left) / scale;
     axes.low = center - half;
     axes.high = center + half;
-    return axes;
   }
 };
 
@@ -38,7 +37,7 @@ struct Extent {
   bool Empty() const { return !(low.x() <= high.x()); }
 };
 
-View ChooseView(const TrajectoryPlot& plot) {
+View ChooseView(const TrajectoryPlot& plot, const PlotAxes& page) {
   Extent all, first;
   for (const PlotSeries& series : plot.series) {
     for (const Eigen::Vector3d& p : series.points) {
@@ -55,60 +54,23 @@ View ChooseView(const TrajectoryPlot& plot) {
   view.axis_y = std::max(order[0], order[1]);
   view.center = 0.5 * (view.World(all.low) + view.World(all.high));
   const Eigen::Vector2d extent = (view.World(all.high) - view.World(all.low)).cwiseMax(1e-9);
-  const PlotAxes page;
   view.scale = 0.94 * ((page.bottom_right - page.top_left).array() / extent.array()).minCoeff();
   return view;
 }
 
-PlotShape Ring(const Eigen::Vector2d& center) {
-  constexpr int kCorners = 24;
-  constexpr double kRadius = 7;  // [px]
-  PlotShape ring;
-  ring.color = kPlotInk;
-  ring.size = 1.6;
-  for (int k = 0; k <= kCorners; ++k) {
-    const double angle = 2 * M_PI * k / kCorners;
-    ring.points.push_back(center + kRadius * Eigen::Vector2d(std::cos(angle), std::sin(angle)));
-  }
-  return ring;
-}
-
-PlotShape LegendLine(double x, double y, const std::string& color, double width, bool dashed) {
-  PlotShape line = PlotLine({x, y - 5}, {x + 34, y - 5}, color, std::max(2.0, width));
-  line.dashed = dashed;
-  return line;
-}
-
-void AddLegend(const TrajectoryPlot& plot, const PlotAxes& axes, std::vector<PlotShape>& shapes) {
-  double y = axes.top_left.y() + 22;
-  const double x = axes.top_left.x() + 14;
-  const auto entry = [&](const std::string& name, const std::string& color, double width, bool dashed) {
-    shapes.push_back(LegendLine(x, y, color, width, dashed));
-    shapes.push_back(PlotText({x + 42, y}, name, 14));
-    y += 20;
-  };
-  for (const PlotSeries& series : plot.series) {
-    if (series.values.empty()) entry(series.name, series.color, series.width, series.dashed);
-  }
-  if (!plot.edges.empty()) entry(plot.edges_name, plot.edges_color, 2, false);
-  if (plot.marks.empty()) return;
-  shapes.push_back(Ring({x + 17, y - 5}));
-  shapes.push_back(PlotText({x + 42, y}, plot.marks_name, 14));
-}
-
 // Precision-recall curves: at the lower left, where they rarely pass; on white, as they may. Fitted axes: at
 // the top, where FittedAxes leaves room.
-void AddLegend(const CurvePlot& plot, const PlotAxes& axes, std::vector<PlotShape>& shapes) {
-  const double lines = static_cast<double>(plot.curves.size() + plot.notes.size());
+void AddNotes(const CurvePlot& plot, const std::vector<NamedLine>& curves, const PlotAxes& axes,
+              std::vector<PlotShape>& shapes) {
+  const double lines = static_cast<double>(curves.size() + plot.notes.size());
   double width = 0;
-  for (const PlotCurve& curve : plot.curves) width = std::max(width, 42 + TextWidth(curve.name, 14));
+  for (const NamedLine& curve : curves) width = std::max(width, 42 + TextWidth(curve.name, 14));
   for (const std::string& note : plot.notes) width = std::max(width, TextWidth(note, 14));
   const double x = axes.top_left.x() + 20;
   double y = plot.fit ? axes.top_left.y() + 28 : axes.bottom_right.y() - 20 * lines;
   shapes.push_back(PlotBox({x - 8, y - 20}, {x + width + 16, y + 20 * lines - 8}, "#ffffff"));
-  for (const PlotCurve& curve : plot.curves) {
-    shapes.push_back(LegendLine(x, y, curve.color, curve.width, curve.dashed));
-    shapes.push_back(PlotText({x + 42, y}, curve.name, 14));
+  for (const NamedLine& curve : curves) {
+    AddLegend({curve}, x, x + 1, y + 8, shapes);
     y += 20;
   }
   for (const std::string& note : plot.notes) {
@@ -169,35 +131,52 @@ void AddHeat(const TrajectoryPlot& plot, const View& view, const PlotAxes& axes,
 }  // namespace
 
 std::vector<PlotShape> LayOut(const TrajectoryPlot& plot) {
-  const View view = ChooseView(plot);
-  PlotAxes axes = view.Axes();
+  std::vector<NamedLine> lines, others;
+  bool heat = false;
+  for (const PlotSeries& series : plot.series) {
+    heat = heat || !series.values.empty();
+    if (series.values.empty()) lines.push_back({series.name, {}, series.color, series.width, series.dashed});
+  }
+  if (!plot.edges.empty()) others.push_back({plot.edges_name, {}, plot.edges_color});
+  if (!plot.marks.empty()) others.push_back({plot.marks_name, {}, "", 2, false, true});
+  PlotAxes axes;
+  if (heat) axes.bottom_right.x() -= kHeatBarRoom;
+  const auto all = [&] {
+    std::vector<NamedLine> entries = lines;
+    entries.insert(entries.end(), others.begin(), others.end());
+    return entries;
+  };
+  // Above the box, where no line is.
+  axes.top_left.y() += LegendHeight(all(), axes.top_left.x(), axes.bottom_right.x());
+  const View view = ChooseView(plot, axes);
+  view.SetRange(axes);
   const char* names = "xyz";
-  axes.title = plot.title;
   axes.x_name = names[view.axis_x] + (" [" + plot.unit + "]");
   axes.y_name = names[view.axis_y] + (" [" + plot.unit + "]");
   std::vector<PlotShape> shapes;
   AddAxes(axes, shapes);
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  auto line = lines.begin();
   for (const PlotSeries& series : plot.series) {
     if (!series.values.empty()) continue;
-    PlotShape line;
-    line.color = series.color;
-    line.size = series.width;
-    line.dashed = series.dashed;
-    constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-    std::vector<Eigen::Vector2d> points;
-    points.reserve(series.points.size());
     for (const Eigen::Vector3d& p : series.points)
-      points.push_back(p.allFinite() ? axes.Page(view.World(p)) : Eigen::Vector2d(kNone, kNone));
-    AddBrokenLine(line, points, shapes);
+      line->points.push_back(p.allFinite() ? axes.Page(view.World(p)) : Eigen::Vector2d(kNone, kNone));
+    ++line;
   }
+  AddLines(lines, shapes);
   AddHeat(plot, view, axes, shapes);
   for (const auto& [a, b] : plot.edges) {
     const Eigen::Vector2d from = axes.Page(view.World(a)), to = axes.Page(view.World(b));
     shapes.push_back(PlotLine(from, to, plot.edges_color, 1.5));
     for (const Eigen::Vector2d& end : {from, to}) shapes.push_back(PlotDisc(end, 3, plot.edges_color));
   }
-  for (const Eigen::Vector3d& mark : plot.marks) shapes.push_back(Ring(axes.Page(view.World(mark))));
-  AddLegend(plot, axes, shapes);
+  for (const Eigen::Vector3d& mark : plot.marks) {
+    if (mark.allFinite()) shapes.push_back(PlotRing(axes.Page(view.World(mark))));
+  }
+  AddLegend(all(), axes.top_left.x(), axes.bottom_right.x(), axes.top_left.y(), shapes);
+  const PlotAxes page;
+  shapes.push_back(PlotText({0.5 * (page.top_left.x() + page.bottom_right.x()), page.top_left.y() - 20},
+                            plot.title, 18, PlotShape::Anchor::kMiddle));
   return shapes;
 }
 
@@ -206,18 +185,19 @@ std::vector<PlotShape> LayOut(const CurvePlot& plot) {
   axes.title = plot.title;
   axes.x_name = plot.x_name;
   axes.y_name = plot.y_name;
-  std::vector<PlotShape> shapes;
+  std::vector<PlotShape> shapes, curves;
   AddAxes(axes, shapes);
-  AddLegend(plot, axes, shapes);
+  std::vector<NamedLine> lines;
   for (const PlotCurve& curve : plot.curves) {
-    PlotShape line;
-    line.color = curve.color;
-    line.size = curve.width;
-    line.dashed = curve.dashed;
+    lines.push_back({curve.name, {}, curve.color, curve.width, curve.dashed});
     for (const Eigen::Vector2d& p : curve.points) {
-      if (p.allFinite()) line.points.push_back(axes.Page(p));
+      if (p.allFinite()) lines.back().points.push_back(axes.Page(p));
     }
-    if (!line.points.empty()) shapes.push_back(std::move(line));
+  }
+  AddLines(lines, curves);
+  AddNotes(plot, lines, axes, shapes);
+  shapes.insert(shapes.end(), curves.begin(), curves.end());
+  for (const PlotCurve& curve : plot.curves) {
     for (const Eigen::Vector2d& p : curve.marks) {
       if (p.allFinite()) shapes.push_back(PlotDisc(axes.Page(p), 6, curve.color));
     }

@@ -3,12 +3,13 @@
 #include <algorithm>
 #include <limits>
 
+#include "apps/plot/plot_legend.h"
 #include "apps/plot/plot_picture.h"
 
 namespace tutti {
 namespace {
 
-constexpr double kPanelGap = 30, kLegendHeight = 24;  // [px]
+constexpr double kPanelGap = 30;  // [px]
 
 /// Low and high of one coordinate of all curves, with a little room.
 Eigen::Vector2d RangeOf(const std::vector<const PlotCurve*>& curves, int axis, double room) {
@@ -32,36 +33,6 @@ std::vector<const PlotCurve*> CurvesOf(const PlotPanel& panel) {
   return out;
 }
 
-void AddCurve(const PlotCurve& curve, const PlotAxes& axes, std::vector<PlotShape>& shapes) {
-  PlotShape line;
-  line.color = curve.color;
-  line.size = curve.width;
-  line.dashed = curve.dashed;
-  std::vector<Eigen::Vector2d> points;
-  points.reserve(curve.points.size());
-  for (const Eigen::Vector2d& p : curve.points) points.push_back(axes.Page(p));
-  AddBrokenLine(line, points, shapes);
-}
-
-/// In one line, cut off at the right.
-void AddLegendLine(const std::vector<PlotCurve>& curves, const PlotAxes& axes,
-                   std::vector<PlotShape>& shapes) {
-  double x = axes.top_left.x();
-  const double y = axes.top_left.y() - 8;
-  for (const PlotCurve& curve : curves) {
-    const double width = 42 + TextWidth(curve.name, 14) + 24;
-    if (x + width > axes.bottom_right.x() && x > axes.top_left.x()) {
-      shapes.push_back(PlotText({x, y}, "...", 14));
-      return;
-    }
-    PlotShape line = PlotLine({x, y - 5}, {x + 34, y - 5}, curve.color, std::max(2.0, curve.width));
-    line.dashed = curve.dashed;
-    shapes.push_back(line);
-    shapes.push_back(PlotText({x + 42, y}, curve.name, 14));
-    x += width;
-  }
-}
-
 }  // namespace
 
 std::vector<PlotShape> LayOut(const PanelPlot& plot) {
@@ -72,7 +43,14 @@ std::vector<PlotShape> LayOut(const PanelPlot& plot) {
   }
   const Eigen::Vector2d x = RangeOf(all, 0, 0);
   const PlotAxes page;
-  const double top = page.top_left.y() + kLegendHeight, count = static_cast<double>(plot.panels.size());
+  std::vector<NamedLine> names;
+  if (!plot.panels.empty()) {
+    for (const PlotCurve& curve : plot.panels.front().curves)
+      names.push_back({curve.name, {}, curve.color, curve.width, curve.dashed});
+  }
+  const double left = page.top_left.x(), right = page.bottom_right.x();
+  const double top = page.top_left.y() + LegendHeight(names, left, right),
+               count = static_cast<double>(plot.panels.size());
   const double height = (page.bottom_right.y() - top - kPanelGap * (count - 1)) / count;
   std::vector<PlotShape> shapes;
   for (std::size_t k = 0; k < plot.panels.size(); ++k) {
@@ -86,12 +64,17 @@ std::vector<PlotShape> LayOut(const PanelPlot& plot) {
     axes.y_name = plot.panels[k].y_name;
     if (k + 1 == plot.panels.size()) axes.x_name = plot.x_name;
     AddAxes(axes, shapes);
-    for (const PlotCurve& curve : plot.panels[k].curves) AddCurve(curve, axes, shapes);
-    if (k > 0) continue;
-    AddLegendLine(plot.panels[k].curves, axes, shapes);
-    const double middle = 0.5 * (axes.top_left.x() + axes.bottom_right.x());
-    shapes.push_back(PlotText({middle, page.top_left.y() - 20}, plot.title, 18, PlotShape::Anchor::kMiddle));
+    std::vector<NamedLine> lines;
+    for (const PlotCurve& curve : plot.panels[k].curves) {
+      lines.push_back({curve.name, {}, curve.color, curve.width, curve.dashed});
+      for (const Eigen::Vector2d& p : curve.points) lines.back().points.push_back(axes.Page(p));
+    }
+    AddLines(lines, shapes);
+    if (k == 0) names = lines;
   }
+  AddLegend(names, left, right, top, shapes);
+  shapes.push_back(
+      PlotText({0.5 * (left + right), page.top_left.y() - 20}, plot.title, 18, PlotShape::Anchor::kMiddle));
   return shapes;
 }
 

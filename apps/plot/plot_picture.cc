@@ -4,14 +4,12 @@
 #include <cairo-svg.h>
 #include <cairo.h>
 
-#include <cerrno>
 #include <cmath>
 #include <cstdio>
-#include <cstring>
-#include <fstream>
 #include <memory>
 #include <utility>
 
+#include "core/replaced_file.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -164,20 +162,10 @@ std::string FinishedSvg(std::string text, const std::vector<PlotShape>& shapes) 
   return text.insert(text.find('>', text.find("<svg")) + 1, Description(shapes));
 }
 
-void WriteBytes(const std::filesystem::path& file, const std::string& bytes) {
-  errno = 0;
-  std::ofstream out(file, std::ios::binary);
-  out << bytes;
-  out.flush();
-  if (out) return;
-  throw InputError(file.string() + ": " + (errno != 0 ? std::strerror(errno) : "can't be written") +
-                   "; check that the folder exists, is writable and not full");
-}
-
 void WritePng(const std::filesystem::path& file, const Surface& surface) {
   std::string bytes;
   Check(file, cairo_surface_write_to_png_stream(surface.get(), Append, &bytes));
-  WriteBytes(file, bytes);
+  internal::WriteFile(file, bytes);
 }
 
 Surface PixelsOf(int width, int height) {
@@ -258,7 +246,7 @@ void WritePlot(const std::filesystem::path& file, PlotFormat format, const std::
   DrawPage(surface, shapes, font);
   cairo_surface_finish(surface.get());
   Check(file, cairo_surface_status(surface.get()));
-  WriteBytes(file, svg ? FinishedSvg(std::move(bytes), shapes) : bytes);
+  internal::WriteFile(file, svg ? FinishedSvg(std::move(bytes), shapes) : bytes);
 }
 
 }  // namespace tutti

@@ -21,5 +21,7 @@ void BindPoseGraph(py::module_& module);
 void BindSlamSystem(py::module_& module);
 void BindTrajectoryCloser(py::module_& module);
 void BindEvaluation(py::module_& module);
+/// Of all functions and methods of the module, for inspect.signature: comes last.
+void SetSignatures(const py::module_& module);
 
 }  // namespace tutti::python

@@ -8,6 +8,7 @@
 
 #include "apps/python/bindings.h"
 #include "apps/python/options.h"
+#include "apps/python/pickled.h"
 #include "apps/python/poses.h"
 #include "tutti/core/error.h"
 
@@ -48,6 +49,7 @@ PinholeCamera CameraOf(const py::kwargs& keywords) {
 void BindCamera(py::module_& module) {
   py::class_<PinholeCamera>(module, "Camera", DescribeCamera().c_str())
       .def(py::init(&CameraOf))
+      .def(Pickled<PinholeCamera>())
       .def_readonly("width", &PinholeCamera::width, "image width [px]")
       .def_readonly("height", &PinholeCamera::height, "image height [px]")
       .def_readonly("fx", &PinholeCamera::fx, "focal length [px]")

@@ -8,6 +8,7 @@
 #include "apps/python/bindings.h"
 #include "apps/python/errors.h"
 #include "apps/python/options.h"
+#include "apps/python/pickled.h"
 
 namespace tutti::python {
 namespace {
@@ -29,6 +30,7 @@ void BindConfig(py::module_& module) {
       "a keyword and a dict; what it says wins over the file. `tutti run --help-config` and "
       "describe(section) explain the keys. Raises tutti.InputError that names file and line.")
       .def(py::init(&ConfigOf), py::arg("file") = py::none())
+      .def(Pickled<RunConfig>())
       .def("options", &OptionsOf, py::arg("section"), "The present values of a section.");
   module.def(
       "describe", [](const std::string& section) { return DescribeOptions(section); }, py::arg("section"),

@@ -13,6 +13,7 @@
 #include "apps/python/images.h"
 #include "apps/python/interrupts.h"
 #include "apps/python/options.h"
+#include "apps/python/pickled.h"
 #include "apps/python/poses.h"
 #include "tutti/core/text.h"
 #include "tutti/loopclosure/features.h"
@@ -25,6 +26,9 @@ namespace fs = std::filesystem;
 // From Python, whose arrays may change: the map needs the images later.
 InputFrame MakeFrame(const py::object& image, double stamp, std::int64_t index, const py::object& right,
                      const py::object& depth, const py::object& mask, bool rgb) {
+  if (image.is_none())
+    throw py::type_error(
+        "image is None, which cv2.imread returns for a file that it can't read; give an array");
   InputFrame frame;
   frame.index = index;
   frame.stamp_s = stamp;
@@ -150,6 +154,7 @@ struct FrameIterator {
 void BindFrame(py::module_& module) {
   using namespace pybind11::literals;  // NOLINT(google-build-using-namespace)
   py::class_<InputFrame>(module, "Frame", doc::InputFrame)
+      .def(Pickled<InputFrame>())
       .def(py::init(&MakeFrame), "image"_a, "stamp"_a, "index"_a = 0, py::kw_only(), "right"_a = py::none(),
            "depth"_a = py::none(), "mask"_a = py::none(), "rgb"_a = false,
            "From arrays, which are copied; colour becomes grey. Rectified: the rig's camera has no "
@@ -182,6 +187,7 @@ void BindRig(py::module_& module) {
   using namespace pybind11::literals;  // NOLINT(google-build-using-namespace)
   const CameraRig defaults;
   py::class_<CameraRig>(module, "Rig", doc::CameraRig)
+      .def(Pickled<CameraRig>())
       .def(py::init(&MakeRig), "camera"_a, "sensor"_a = WordOf(defaults.sensor), py::kw_only(),
            "baseline_m"_a = defaults.baseline_m, "rate_hz"_a = defaults.rate_hz,
            "max_depth_m"_a = defaults.max_depth_m, "readout_s"_a = defaults.readout_s,

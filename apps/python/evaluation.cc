@@ -44,7 +44,6 @@ cli::NamedPoses NamedPosesOf(const py::object& object, const std::string& name,
   }
   const auto file = py::module_::import("os").attr("fspath")(object).cast<std::string>();
   cli::NamedPoses read = {file, Reading(file, [&] { return ReadPoseFile(file, {}, times); })};
-  for (const std::string& warning : read.poses.warnings) Warn(warning);
   return read;
 }
 
@@ -52,8 +51,12 @@ py::dict Evaluate(const py::object& reference, const py::object& estimate, const
                   const std::vector<double>& times, const EvaluationOptions& given, bool errors) {
   EvaluationOptions options = given;
   options.alignment = ParseTrajectoryAlignment(alignment);
-  const cli::NamedPoses of_reference = NamedPosesOf(reference, "reference", times);
-  const cli::NamedPoses of_estimate = NamedPosesOf(estimate, "estimate", times);
+  cli::NamedPoses of_reference = NamedPosesOf(reference, "reference", times);
+  cli::NamedPoses of_estimate = NamedPosesOf(estimate, "estimate", times);
+  AgreeOnUnit(of_reference.poses, of_estimate.poses);
+  for (const cli::NamedPoses& read : {of_reference, of_estimate}) {
+    for (const std::string& warning : read.poses.warnings) Warn(warning);
+  }
   EvaluationReport report;
   {
     const py::gil_scoped_release release;

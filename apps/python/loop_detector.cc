@@ -12,6 +12,7 @@
 #include "apps/python/guarded.h"
 #include "apps/python/loop_query.h"
 #include "apps/python/options.h"
+#include "apps/python/pickled.h"
 
 namespace tutti::python {
 namespace {
@@ -97,6 +98,7 @@ void BindPosePrior(py::module_& module) {
                }),
            py::arg("position_m"), py::arg("frame") = defaults.frame, py::arg("sigma_m") = defaults.sigma_m,
            py::arg("drift") = defaults.drift)
+      .def(Pickled<PosePrior>())
       .def_property_readonly(
           "position_m",
           [](const PosePrior& prior) {

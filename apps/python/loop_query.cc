@@ -70,6 +70,10 @@ QueryOf MakeQuery(std::int64_t id, const QueryArguments& arguments) {
     made.owners.push_back(std::move(view.owner));
     return view.pixels;
   };
+  if (arguments.image.is_none() && arguments.member_features.is_none())
+    throw py::type_error(
+        "image is None, which cv2.imread returns for a file that it can't read; give an array, or "
+        "member_features instead of an image");
   query.image = keep(ViewOfImage(arguments.image, "image", arguments.rgb));
   query.depth_m = keep(ViewOfDepth(arguments.depth, "depth"));
   query.mask = keep(ViewOfMask(arguments.mask, "mask"));

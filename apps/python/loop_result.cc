@@ -4,6 +4,7 @@
 #include <pybind11/stl.h>
 
 #include "apps/python/bindings.h"
+#include "apps/python/pickled.h"
 #include "apps/python/poses.h"
 #include "tutti/loopclosure/detector.h"
 
@@ -64,6 +65,7 @@ std::string Evidence(const char* text) {
 void BindMember(py::module_& module) {
   PYBIND11_NUMPY_DTYPE(CandidateEvidence, location, score, likelihood, posterior);
   py::class_<MemberOpinion>(module, "MemberOpinion", doc::MemberOpinion)
+      .def(Pickled<MemberOpinion>())
       .def_readonly("name", &MemberOpinion::name, doc::MemberOpinion_name)
       .def_readonly("took_part", &MemberOpinion::took_part, doc::MemberOpinion_took_part)
       .def_readonly("features", &MemberOpinion::features, doc::MemberOpinion_features)
@@ -88,6 +90,7 @@ void BindMember(py::module_& module) {
 
 void BindVerification(py::module_& module) {
   py::class_<Verification>(module, "Verification", doc::Verification)
+      .def(Pickled<Verification>())
       .def_readonly("candidate", &Verification::candidate, doc::Verification_candidate)
       .def_readonly("accepted", &Verification::accepted, doc::Verification_accepted)
       .def_property_readonly(
@@ -135,6 +138,7 @@ void BindLoopResult(py::module_& module) {
   BindMember(module);
   BindVerification(module);
   py::class_<LoopResult>(module, "LoopResult", doc::LoopResult)
+      .def(Pickled<LoopResult>())
       .def_readonly("query", &LoopResult::query, doc::LoopResult_query)
       .def_readonly("hypothesis", &LoopResult::hypothesis, doc::LoopResult_hypothesis)
       .def_readonly("candidate", &LoopResult::candidate, doc::LoopResult_candidate)

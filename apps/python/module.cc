@@ -20,4 +20,5 @@ PYBIND11_MODULE(_tutti, module) {
   BindSlamSystem(module);
   BindTrajectoryCloser(module);
   BindEvaluation(module);
+  SetSignatures(module);
 }

@@ -1,5 +1,6 @@
 // tutti.OptimizationReport and tutti.Certificate
 #include "apps/python/optimization_report.h"
+#include "apps/python/pickled.h"
 
 #include <string>
 
@@ -56,6 +57,7 @@ void BindOptimizationReport(py::module_& module) {
             .format(report.success, report.termination, report.iterations, report.objective);
       });
   py::class_<Certificate>(module, "Certificate", doc::Certificate)
+      .def(Pickled<Certificate>())
       .def_readonly("available", &Certificate::available, doc::Certificate_available)
       .def_readonly("certified", &Certificate::certified, doc::Certificate_certified)
       .def_readonly("reason", &Certificate::reason, doc::Certificate_reason)

@@ -64,13 +64,13 @@ Matrix7d InformationOf(const py::object& information, GraphKind kind) {
   return all;
 }
 
-void AddPose(Graph& self, int id, const py::object& pose, bool fixed) {
+void AddPose(Graph& self, NodeId id, const py::object& pose, bool fixed) {
   const GraphKind kind = self.Run([](PoseGraph& graph) { return graph.kind(); });
   const Similarity S_world_node = NodePose(pose, kind, "pose of node " + std::to_string(id));
   self.Run([&](PoseGraph& graph) { graph.AddNode(id, S_world_node, fixed); });
 }
 
-void AddEdge(Graph& self, int from, int to, const py::object& pose, const py::object& information,
+void AddEdge(Graph& self, NodeId from, NodeId to, const py::object& pose, const py::object& information,
              const std::optional<std::vector<double>>& sigmas, std::optional<bool> loop) {
   const GraphKind kind = self.Run([](PoseGraph& graph) { return graph.kind(); });
   PoseGraphEdge edge;
@@ -91,17 +91,18 @@ void AddEdge(Graph& self, int from, int to, const py::object& pose, const py::ob
     throw py::value_error(name +
                           ": sigmas must be (translation [m], rotation [rad]) and, for sim3, log scale");
   }
-  // As ReadG2o has it.
-  edge.kind = loop.value_or(std::abs(to - from) != 1) ? EdgeKind::kLoop : EdgeKind::kOdometry;
+  edge.kind_by_ids = !loop.has_value();  // decided when it matters: nodes between its ends may come later
+  edge.kind = loop.value_or(true) ? EdgeKind::kLoop : EdgeKind::kOdometry;
   self.Run([&](PoseGraph& graph) { graph.AddEdge(edge); });
 }
 
-std::unique_ptr<Graph> ReadGraph(const fs::path& file, const std::string& bad_information) {
+std::unique_ptr<Graph> ReadGraph(const fs::path& file, const std::string& bad_information,
+                                 bool ignore_unknown) {
   const BadInformation bad = ParseBadInformation(bad_information);
   G2oFile read;
   {
     const py::gil_scoped_release release;
-    read = Reading(file, [&] { return ReadG2o(file, bad); });
+    read = Reading(file, [&] { return ReadG2o(file, bad, ignore_unknown); });
   }
   for (const std::string& warning : read.warnings) Warn(warning);
   return std::make_unique<Graph>(std::move(read.graph));
@@ -115,14 +116,32 @@ py::array_t<double> NodePoses(Graph& self) {
   return ArrayOf(poses);
 }
 
+py::array LandmarkIds(Graph& self) {
+  const auto landmarks = self.Run([](PoseGraph& graph) { return graph.landmarks(); });
+  return Column<NodeId>(landmarks.size(), [&](std::size_t k) { return landmarks[k].id; });
+}
+
+py::array_t<double> LandmarkPositions(Graph& self) {
+  const auto landmarks = self.Run([](PoseGraph& graph) { return graph.landmarks(); });
+  py::array_t<double> out({landmarks.size(), std::size_t{3}});
+  auto rows = out.mutable_unchecked<2>();
+  for (std::size_t k = 0; k < landmarks.size(); ++k) {
+    for (int c = 0; c < 3; ++c) rows(static_cast<py::ssize_t>(k), c) = landmarks[k].position(c);
+  }
+  return out;
+}
+
 py::dict EdgesOf(Graph& self) {
-  const auto edges = self.Run([](PoseGraph& graph) { return graph.edges(); });
+  const auto edges = self.Run([](PoseGraph& graph) {
+    graph.FindOdometry();
+    return graph.edges();
+  });
   std::vector<Pose> measurements;
   measurements.reserve(edges.size());
   for (const PoseGraphEdge& edge : edges) measurements.push_back(edge.measurement.RigidPart());
   py::dict columns;
-  columns["from"] = Column<int>(edges.size(), [&](std::size_t e) { return edges[e].from; });
-  columns["to"] = Column<int>(edges.size(), [&](std::size_t e) { return edges[e].to; });
+  columns["from"] = Column<NodeId>(edges.size(), [&](std::size_t e) { return edges[e].from; });
+  columns["to"] = Column<NodeId>(edges.size(), [&](std::size_t e) { return edges[e].to; });
   columns["loop"] =
       Column<bool>(edges.size(), [&](std::size_t e) { return edges[e].kind == EdgeKind::kLoop; });
   columns["measurement"] = ArrayOf(measurements);
@@ -136,6 +155,7 @@ PoseGraphReport Optimize(Graph& self, const py::kwargs& keywords) {
   SetOptions("PoseGraph.optimize", "graph", keywords, config);
   Interrupts interrupts;
   PoseGraphReport report = self.Run([&](PoseGraph& graph) {
+    graph.FindOdometry();
     return PoseGraphOptimizer(config.graph).Optimize(graph, [&] { return interrupts.Came(); });
   });
   interrupts.Rethrow();
@@ -172,8 +192,12 @@ void BindPoseGraph(py::module_& module) {
       .def(py::init([](const std::string& kind) { return std::make_unique<Graph>(PoseGraph(KindOf(kind))); }),
            "kind"_a = "se3")
       .def_static(
-          "read_g2o", &ReadGraph, "file"_a, "bad_information"_a = "refuse",
-          (std::string("bad_information: refuse, project, diagonal or skip. ") + doc::ReadG2o).c_str())
+          "read_g2o", &ReadGraph, "file"_a, "bad_information"_a = "refuse", "ignore_unknown"_a = false,
+          (std::string(
+               "bad_information: refuse, project, diagonal or skip. ignore_unknown: lines whose tag is "
+               "not known are left out, with a warning. ") +
+           doc::ReadG2o)
+              .c_str())
       .def(
           "write_g2o",
           [](Graph& self, const fs::path& file) {
@@ -185,18 +209,20 @@ void BindPoseGraph(py::module_& module) {
           (std::string("A node. fixed: ") + doc::PoseGraphNode_fixed + ". " + doc::PoseGraph_AddNode).c_str())
       .def("add_edge", &AddEdge, "from_id"_a, "to_id"_a, "pose"_a, "information"_a = py::none(),
            py::kw_only(), "sigmas"_a = py::none(), "loop"_a = py::none(),
-           (std::string("A measurement: pose maps points of to_id into from_id. information: inverse "
-                        "covariance, (6, 6) of "
-                        "translation [1/m^2] and rotation [1/rad^2]; se2 (3, 3) of x, y, heading; sim3 (7, "
-                        "7), log scale "
-                        "last. Or sigmas=(translation [m], rotation [rad][, log scale]). loop: robust losses "
-                        "act on loops "
-                        "alone; None: an edge whose ids are not neighbours is one. ") +
+           (std::string(
+                "A measurement: pose maps points of to_id into from_id. information: inverse "
+                "covariance, (6, 6) of "
+                "translation [1/m^2] and rotation [1/rad^2]; se2 (3, 3) of x, y, heading; sim3 (7, "
+                "7), log scale "
+                "last. Or sigmas=(translation [m], rotation [rad][, log scale]). loop: robust losses "
+                "act on loops "
+                "alone; None: an edge whose ids are not neighbours among those of the graph (and of one "
+                "robot) is one. ") +
             doc::PoseGraph_AddEdge)
                .c_str())
       .def(
           "set_pose",
-          [](Graph& self, int id, const py::object& pose) {
+          [](Graph& self, NodeId id, const py::object& pose) {
             const GraphKind kind = self.Run([](PoseGraph& graph) { return graph.kind(); });
             const Similarity S_world_node = NodePose(pose, kind, "pose of node " + std::to_string(id));
             self.Run([&](PoseGraph& graph) { graph.SetPose(id, S_world_node); });
@@ -204,14 +230,14 @@ void BindPoseGraph(py::module_& module) {
           "id"_a, "pose"_a, "Moves a node. Raises tutti.InputError if there is no such id.")
       .def(
           "set_fixed",
-          [](Graph& self, int id, bool fixed) {
+          [](Graph& self, NodeId id, bool fixed) {
             self.Run([&](PoseGraph& graph) { graph.SetFixed(id, fixed); });
           },
           "id"_a, "fixed"_a,
           "Whether the node is held where it is. Raises tutti.InputError if there is no such id.")
       .def(
           "pose",
-          [](Graph& self, int id) {
+          [](Graph& self, NodeId id) {
             return ArrayOf(self.Run([&](PoseGraph& graph) { return graph.Node(id).pose; }));
           },
           "id"_a,
@@ -225,9 +251,15 @@ void BindPoseGraph(py::module_& module) {
           "ids",
           [](Graph& self) {
             const auto nodes = self.Run([](PoseGraph& graph) { return graph.nodes(); });
-            return Column<int>(nodes.size(), [&](std::size_t k) { return nodes[k].id; });
+            return Column<NodeId>(nodes.size(), [&](std::size_t k) { return nodes[k].id; });
           },
-          "(N,) int32: of the nodes, in the order in which they were added")
+          "(N,) int64: of the nodes, in the order in which they were added. Ids of 2^63 and more in a file "
+          "are "
+          "negative here; write_g2o writes them as they were")
+      .def_property_readonly("landmark_ids", &LandmarkIds, "(L,) int64: of the landmarks of a file")
+      .def_property_readonly(
+          "landmarks", &LandmarkPositions,
+          "(L, 3) float64, parallel to landmark_ids: x, y, z [m] in the world; se2: z is 0")
       .def_property_readonly("poses", &NodePoses,
                              "(N, 7) float64, parallel to ids: x, y, z [m], qx, qy, qz, qw of T_world_node")
       .def_property_readonly(
@@ -239,7 +271,7 @@ void BindPoseGraph(py::module_& module) {
           "(N,) float64, parallel to ids: 1 unless the graph is sim3")
       .def_property_readonly(
           "edges", &EdgesOf,
-          "Columns, in the order in which edges were added: from, to (E,) int32; loop (E,) bool; "
+          "Columns, in the order in which edges were added: from, to (E,) int64; loop (E,) bool; "
           "measurement (E, 7), x, y, z [m], qx, qy, qz, qw of T_from_to; scale (E,).")
       .def(
           "costs",

@@ -20,11 +20,13 @@ void WriteRow(const Pose& pose, double* row) {
   std::copy_n(quaternion.data(), 4, row);
 }
 
-Pose PoseOfRow(const double* row, const std::string& name) {
+// `unknown`: the rotation may be; see HasRotations.
+Pose PoseOfRow(const double* row, const std::string& name, bool unknown = false) {
   const Eigen::Map<const Eigen::Vector3d> translation(row);
   const Eigen::Map<const Eigen::Vector4d> quaternion(row + 3);
   if (!translation.allFinite() || !quaternion.allFinite())
     throw InputError(name + ": a pose must have finite numbers");
+  if (unknown && quaternion.isZero(0)) return Pose(Eigen::Quaterniond(0, 0, 0, 0), translation);
   if (quaternion.norm() < 1e-6) throw InputError(name + ": the quaternion has length 0");
   return Pose(Eigen::Quaterniond(quaternion).normalized(), translation);
 }
@@ -147,10 +149,13 @@ py::array_t<double> ArrayOf(const Trajectory& trajectory) {
 Trajectory TrajectoryOf(const py::object& object, const std::string& name) {
   const py::array_t<double> array = RowsOf(object, name, {8});
   Trajectory trajectory(static_cast<std::size_t>(array.shape(0)));
+  bool positions_alone = trajectory.size() > 1;
+  for (std::size_t i = 0; i < trajectory.size(); ++i)
+    positions_alone = positions_alone && Eigen::Map<const Eigen::Vector4d>(array.data(i) + 4).isZero(0);
   for (std::size_t i = 0; i < trajectory.size(); ++i) {
     const double* row = array.data(i);
     const std::string which = name + ", row " + std::to_string(i);
-    trajectory[i] = {row[0], PoseOfRow(row + 1, which)};
+    trajectory[i] = {row[0], PoseOfRow(row + 1, which, positions_alone)};
     if (!std::isfinite(row[0])) throw InputError(which + ": the time stamp is not finite");
     if (i > 0 && row[0] <= trajectory[i - 1].stamp_s)
       throw InputError(which + ": time stamps must grow, but this one is not above the one before");

@@ -36,7 +36,8 @@ pybind11::array_t<double> ArrayOf(const Trajectory& trajectory);
 /// Any matrix of Eigen.
 pybind11::array_t<double> ArrayOf(const Eigen::MatrixXd& matrix);
 
-/// From (N, 8). Throws InputError that names the row for a stamp that does not grow, and for what is no pose.
+/// From (N, 8). Quaternions of 0, if all are, are positions alone. Throws InputError that names the row for a
+/// stamp that does not grow, and for what is no pose.
 Trajectory TrajectoryOf(const pybind11::object& array, const std::string& name);
 
 }  // namespace tutti::python

@@ -14,6 +14,7 @@
 #include "apps/python/guarded.h"
 #include "apps/python/images.h"
 #include "apps/python/options.h"
+#include "apps/python/pickled.h"
 #include "apps/python/poses.h"
 
 namespace tutti::python {
@@ -95,6 +96,7 @@ py::object OptionalPose(const TrackResult& result) {
 
 void BindResults(py::module_& module) {
   py::class_<TrackResult>(module, "TrackResult", doc::TrackResult)
+      .def(Pickled<TrackResult>())
       .def_property_readonly(
           "state", [](const TrackResult& result) { return ToString(result.state); },
           "initializing, tracking or lost")
@@ -111,6 +113,7 @@ void BindResults(py::module_& module) {
             .format(ToString(result.state), result.inliers, result.keyframe, result.reason);
       });
   py::class_<LoopRecord>(module, "LoopRecord", doc::LoopRecord)
+      .def(Pickled<LoopRecord>())
       .def_readonly("query", &LoopRecord::query, doc::LoopRecord_query)
       .def_readonly("candidate", &LoopRecord::candidate, "0-based index of the input frame")
       .def_readonly("query_stamp", &LoopRecord::query_stamp_s, "[s]")

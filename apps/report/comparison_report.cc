@@ -1,18 +1,37 @@
 #include "apps/report/comparison_report.h"
 
-#include <fstream>
+#include <algorithm>
+#include <cstddef>
 #include <map>
 #include <set>
 #include <system_error>
 #include <utility>
 
 #include "apps/report/page.h"
+#include "core/text_reader.h"
+#include "tutti/core/error.h"
 
 namespace tutti {
 namespace {
 
 using Json = nlohmann::ordered_json;
 constexpr int kPicturesOfAKind = 2;
+constexpr int kDeepest = 32;                       // values within values; a report has fewer
+constexpr std::size_t kMostBytes = 1'000'000'000;  // of a report, with its pictures
+
+bool HasText(const Json& object, const char* key) {
+  return object.is_object() && object.contains(key) && object[key].is_string();
+}
+
+// What the page is made of: the browser says what else is wrong.
+bool IsReport(const Json& json) {
+  if (!HasText(json, "dataset") || !HasText(json, "variant")) return false;
+  if (!json.contains("gallery") || json["gallery"].is_null()) return true;
+  const Json& gallery = json["gallery"];
+  if (!gallery.is_object() || !gallery.contains("entries") || !gallery["entries"].is_array()) return false;
+  return std::all_of(gallery["entries"].begin(), gallery["entries"].end(),
+                     [](const Json& entry) { return HasText(entry, "outcome"); });
+}
 
 void CutGallery(Json& run) {
   Json& gallery = run["gallery"];
@@ -32,9 +51,18 @@ std::optional<Json> ReadRunReport(const std::filesystem::path& folder) {
   std::error_code ignored;  // nothing else is opened: one waits at a pipe without end
   const std::filesystem::path file = folder / "report.json";
   if (!std::filesystem::is_regular_file(file, ignored)) return std::nullopt;
-  std::ifstream in(file, std::ios::binary);
-  Json json = Json::parse(in, nullptr, false);
-  if (!json.is_object() || json.value("format", 0) != kReportFormat) return std::nullopt;
+  const char* const advice = "run it again, or remove the file";
+  bool deep = false;
+  const auto bounded = [&deep](int depth, Json::parse_event_t, Json&) {
+    deep = deep || depth > kDeepest;
+    return !deep;
+  };
+  Json json = Json::parse(internal::ReadText(file, advice, kMostBytes), bounded, false);
+  const bool other = !deep && json.is_object() && json.contains("format") && json["format"].is_number() &&
+                     json["format"] != kReportFormat;
+  if (other) return std::nullopt;
+  if (deep || !json.is_object() || !json.contains("format") || !json["format"].is_number() || !IsReport(json))
+    throw InputError(file.string() + ": is damaged, or no report.json of `tutti run`; " + advice);
   return json;
 }
 

@@ -20,6 +20,7 @@ struct ReportTable {
 };
 
 /// The report.json of a run's folder; nothing if there is none, or it is of another version of the format.
+/// Throws InputError that names the file if it is damaged.
 std::optional<nlohmann::ordered_json> ReadRunReport(const std::filesystem::path& folder);
 
 /// The page's data for one run.

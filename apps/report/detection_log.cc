@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "apps/slam/map_state.h"
 #include "core/state_archive.h"
@@ -26,6 +27,24 @@ std::vector<std::pair<cv::Point2f, cv::Point2f>> SpreadMatches(const std::vector
     out.emplace_back(match.query, match.candidate);
   }
   return out;
+}
+
+// Those that are within the middle 96 % along each axis, and as much again.
+std::vector<Eigen::Vector3d> WithoutFarOnes(const std::vector<Eigen::Vector3d>& points) {
+  std::vector<Eigen::Vector3d> kept = points;
+  for (int axis = 0; axis < 3 && points.size() > 10; ++axis) {
+    std::vector<double> values;
+    for (const Eigen::Vector3d& p : points) values.push_back(p[axis]);
+    std::sort(values.begin(), values.end());
+    const double low = values[values.size() / 50], high = values[values.size() - 1 - values.size() / 50];
+    const double room = 0.5 * (high - low);
+    kept.erase(std::remove_if(kept.begin(), kept.end(),
+                              [&](const Eigen::Vector3d& p) {
+                                return !(p[axis] >= low - room && p[axis] <= high + room);
+                              }),
+               kept.end());
+  }
+  return kept;
 }
 
 // What the members that took part have to say among themselves.
@@ -89,6 +108,25 @@ void DetectionLog::OnDetection(const LoopResult& result) {
   numbers_[result.query] = detections_.size();
   if (result.proposed) detection.matches = SpreadMatches(result.verification.inlier_matches);
   detections_.push_back(std::move(detection));
+}
+
+void DetectionLog::OnEnd(const RunState& state) {
+  landmarks_.clear();
+  if (state.odometry == nullptr) return;
+  const Odometry& map = *state.odometry;
+  const std::vector<int> pieces = map.Pieces();
+  std::set<int> seen;  // by keyframes of the largest piece, if there are others
+  for (const int id : map.KeyframeIds()) {
+    if (pieces.size() < 2 || map.KeyframePiece(id) != pieces.front()) continue;
+    for (const int landmark : map.Keyframe(id).landmarks) seen.insert(landmark);
+  }
+  std::vector<Eigen::Vector3d> all;
+  for (const LandmarkView& landmark : map.Landmarks()) {
+    if (pieces.size() < 2 || seen.count(landmark.id) > 0) all.push_back(landmark.position);
+  }
+  all = WithoutFarOnes(all);
+  const std::size_t count = std::min(all.size(), kMostLandmarks);
+  for (std::size_t k = 0; k < count; ++k) landmarks_.push_back(all[k * all.size() / count]);
 }
 
 template <class Archive>

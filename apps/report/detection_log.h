@@ -1,4 +1,5 @@
-// What the loop detector said of every image, small enough to be kept for a whole run.
+// What the loop detector said of every image, and the map's landmarks at the end, small enough to be kept for
+// a whole run.
 #pragma once
 
 #include <cstdint>
@@ -58,16 +59,21 @@ class DetectionLog : public RunObserver {
   static constexpr double kLeastPosterior = 1e-3;  ///< smaller ones are left out: there is one per location
   static constexpr std::size_t kMostMatches = 60;
   static constexpr std::size_t kMostGroups = 512;  ///< of places in LoggedOpinion::evidence
+  static constexpr std::size_t kMostLandmarks = 3000;
 
   bool WantsPosteriors() const override { return true; }
   void OnFrame(const InputFrame& frame, const TrackResult& track, const RunState& state) override;
   void OnDetection(const LoopResult& result) override;
+  void OnEnd(const RunState& state) override;
   const char* Name() const override { return "detections"; }
   std::string Save() const override;
   void Load(const std::string& bytes, const std::string& source) override;
 
   /// In the order of the queries.
   const std::vector<LoggedDetection>& detections() const { return detections_; }
+  /// Of the largest submap at the end of the run, in its world: kMostLandmarks at most, spread over all,
+  /// without those that lie far from the others.
+  const std::vector<Eigen::Vector3d>& landmarks() const { return landmarks_; }
 
  private:
   std::vector<std::uint8_t> Grouped(const std::vector<CandidateEvidence>& evidence, std::size_t group) const;
@@ -75,6 +81,7 @@ class DetectionLog : public RunObserver {
   std::map<std::int64_t, double> stamps_;        // of frames whose answer may still come
   std::map<std::int64_t, std::size_t> numbers_;  // of queries, in detections_
   std::vector<LoggedDetection> detections_;
+  std::vector<Eigen::Vector3d> landmarks_;
 };
 
 }  // namespace tutti

@@ -1,11 +1,10 @@
 #include "apps/report/page.h"
 
-#include <fstream>
 #include <system_error>
 
 #include "apps/report/assets.h"
 #include "apps/report/build_info.h"
-#include "tutti/core/error.h"
+#include "core/replaced_file.h"
 
 namespace tutti {
 namespace {
@@ -62,10 +61,7 @@ void WriteReportPage(const std::filesystem::path& file, const nlohmann::ordered_
     std::filesystem::remove(file, ignored);
     return;
   }
-  std::ofstream out(file, std::ios::binary);
-  out << ReportPage(data);
-  out.close();
-  if (!out) throw InputError(file.string() + ": could not be written in full; is the disk full?");
+  internal::WriteFile(file, ReportPage(data));
 }
 
 }  // namespace tutti

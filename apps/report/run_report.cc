@@ -35,6 +35,17 @@ Json PathJson(const Trajectory& trajectory, const Similarity& alignment) {
   return {{"t", t}, {"x", x}, {"y", y}, {"z", z}};
 }
 
+Json PointsJson(const std::vector<Eigen::Vector3d>& points, const Similarity& alignment) {
+  Json x = Json::array(), y = x, z = x;
+  for (const Eigen::Vector3d& point : points) {
+    const Eigen::Vector3d p = alignment * point;
+    x.push_back(Rounded(p.x(), 3));
+    y.push_back(Rounded(p.y(), 3));
+    z.push_back(Rounded(p.z(), 3));
+  }
+  return {{"x", x}, {"y", y}, {"z", z}};
+}
+
 Json ErrorJson(const RunResult& result, const Trajectory& estimate) {
   EvaluationOptions options;
   options.alignment =
@@ -51,10 +62,10 @@ Json ErrorJson(const RunResult& result, const Trajectory& estimate) {
     for (const std::size_t k : Thinned(evaluation.pairs, kMostErrors)) {
       distance.push_back(Rounded(path[k], 3));
       error.push_back(Rounded(evaluation.absolute.translation[k], 5));
-      turn.push_back(Rounded(evaluation.absolute.rotation_deg[k], 4));
+      if (evaluation.rotations) turn.push_back(Rounded(evaluation.absolute.rotation_deg[k], 4));
     }
     Json relative_distance = Json::array(), relative = Json::array();
-    for (const std::size_t k : Thinned(evaluation.relative_pairs.size(), kMostErrors)) {
+    for (const std::size_t k : Thinned(evaluation.relative.translation.size(), kMostErrors)) {
       relative_distance.push_back(Rounded(path[evaluation.relative_pairs[k].second], 3));
       relative.push_back(Rounded(evaluation.relative.translation[k], 5));
     }
@@ -109,10 +120,11 @@ Json FoundJson(const RunResult& result, const Similarity& alignment) {
 
 Json ScoreJson(const TrajectoryScore& score) {
   if (!score.valid) return {{"error", score.reason}};
-  Json json = {{"ate_rmse_m", score.ate.rmse},
-               {"ate_max_m", score.ate.max},
-               {"rotation_deg", score.ate_rotation.rmse},
-               {"rpe_rmse_m", score.rpe.rmse}};
+  Json json = {{"ate_rmse_m", score.ate.rmse}, {"ate_max_m", score.ate.max}};
+  if (score.rotations) {
+    json["rotation_deg"] = score.ate_rotation.rmse;
+    json["rpe_rmse_m"] = score.rpe.rmse;
+  }
   if (score.kitti.segments > 0) {
     json["t_rel_percent"] = score.kitti.translation_percent;
     json["r_rel_deg_per_100m"] = 100 * score.kitti.rotation_deg_per_m;
@@ -214,6 +226,7 @@ Json ReportJson(const RunResult& result, const DetectionLog& log, const std::str
   json["earlier"] = Json::array();
   for (std::size_t k = 0; result.map && k < result.map->earlier.size(); ++k)
     json["earlier"].push_back(PathJson(result.map->earlier[k], align_slam));
+  json["landmarks"] = PointsJson(log.landmarks(), align_slam);
   json["found"] = FoundJson(result, align_slam);
   json["loops"] = EdgesJson(result, loops, align_slam);
   json["errors"] = {{"odometry", scored ? ErrorJson(result, result.trajectory_odometry) : Json()},

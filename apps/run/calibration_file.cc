@@ -1,16 +1,11 @@
 #include "apps/run/calibration_file.h"
 
-#include <yaml-cpp/yaml.h>
-
-#include <algorithm>
+#include <array>
 #include <cmath>
-#include <initializer_list>
-#include <sstream>
-#include <vector>
+#include <utility>
 
-#include "core/camera_text.h"
-#include "core/text_reader.h"
-#include "frontend/dataset/sensor_yaml.h"
+#include "apps/run/calibration_formats.h"
+#include "apps/run/calibration_table.h"
 #include "tutti/core/error.h"
 #include "tutti/slam/config.h"
 
@@ -19,303 +14,207 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A YAML file with errors that name it.
-class CalibrationText {
- public:
-  explicit CalibrationText(const fs::path& file) : file_(file) {
-    constexpr std::size_t kMostBytes = 10'000'000;
-    std::istringstream in(internal::ReadText(
-        file, "--calibration needs a YAML file of Kalibr, ORB-SLAM, OpenCV or ROS", kMostBytes));
-    std::string line;
-    while (std::getline(in, line)) {
-      // OpenCV's "%YAML:1.0" is no YAML.
-      text_ += (line.rfind("%YAML", 0) == 0 ? std::string() : line) + "\n";
+// Of the odometry benchmark (P0), of raw recordings and KITTI-360 (P_rect_00): rectified images.
+Calibration FromKitti(const CalibrationDocument& file) {
+  for (const auto& [left, right] :
+       {std::pair("P0", "P1"), std::pair("P2", "P3"), std::pair("P_rect_00", "P_rect_01")}) {
+    const KeyValue P = file.root.Find({left}), P_right = file.root.Find({right});
+    if (!P) continue;
+    Calibration out;
+    out.format = std::string("KITTI, ") + left + " of rectified images";
+    const std::array<double, 12> of_left = file.root.Array<12>(P);
+    out.camera = CameraOfMatrix(file.root, P);
+    if (P_right) {
+      const std::array<double, 12> of_right = file.root.Array<12>(P_right);
+      out.baseline_m = std::abs(of_left[3] / of_left[0] - of_right[3] / of_right[0]);
     }
-    try {
-      root_ = YAML::Load(text_);
-    } catch (const YAML::Exception& e) {
-      throw InputError(file.string() + ":" + std::to_string(e.mark.line + 1) + ": not valid YAML: " + e.msg);
+    return out;
+  }
+  return {};
+}
+
+// --- nerfstudio and instant-ngp
+
+void CheckFrames(const CalibrationDocument& file, const YAML::Node& frames) {
+  for (const YAML::Node& frame : frames) {
+    if (!frame.IsMap()) file.root.Fail(frame, "'frames' is no list of frames");
+    for (const char* name : {"fl_x", "fl_y", "cx", "cy", "w", "h", "k1", "k2", "k3", "k4", "p1", "p2"}) {
+      if (file.At(frame).Number({name}) != file.At(frames[0]).Number({name}))
+        file.root.Fail(frame, std::string("this frame has another '") + name +
+                                  "' than the first one; one camera for all images is needed");
     }
-    if (!root_.IsMap()) throw InputError(file.string() + ": holds no keys; " + Known());
   }
+}
 
-  static std::string Known() {
-    return "the formats that are known are those of Kalibr (cam0: intrinsics), ORB-SLAM (Camera.fx or "
-           "Camera1.fx), OpenCV and ROS (camera_matrix), EuRoC (intrinsics) and tutti (camera: fx)";
+Calibration FromNerf(const CalibrationDocument& file) {
+  const YAML::Node frames = file["frames"];
+  CalibrationKeys keys = file.root;
+  if (frames.IsDefined() && frames.IsSequence() && frames.size() > 0) {
+    CheckFrames(file, frames);
+    keys = file.At(frames[0]).Or(file.root.map());
   }
-  const fs::path& file() const { return file_; }
-  const std::string& text() const { return text_; }
-  const YAML::Node& root() const { return root_; }
+  const std::optional<double> width = keys.Number({"w"}), height = keys.Number({"h"});
+  std::optional<double> focal = keys.Number({"fl_x"});
+  if (const std::optional<double> view = keys.Number({"camera_angle_x"}); view && !focal) {
+    if (!width)
+      keys.Fail(keys.map(),
+                "has camera_angle_x, but not the image width (w), without which it is no focal length");
+    if (!(*view > 0 && *view < 3)) keys.Fail(keys.map(), "'camera_angle_x' is no field of view in radians");
+    focal = 0.5 * *width / std::tan(0.5 * *view);
+  }
+  YAML::Node usual(YAML::NodeType::Map);  // what both programs take where a value is missing
+  if (focal) usual["fl_x"] = usual["fl_y"] = *focal;
+  if (width) usual["cx"] = 0.5 * *width;
+  if (height) usual["cy"] = 0.5 * *height;
+  keys = keys.Or(usual);
+  Calibration out = OneCamera(keys, "nerfstudio");
+  out.camera.cx -= 0.5;  // (0, 0) is the corner of the first pixel, not its centre
+  out.camera.cy -= 0.5;
+  return out;
+}
 
-  [[noreturn]] void Fail(const YAML::Node& at, const std::string& what) const {
-    const int line = at.IsDefined() ? at.Mark().line + 1 : 0;
-    throw InputError(file_.string() + (line > 0 ? ":" + std::to_string(line) : std::string()) + ": " + what);
-  }
-  double Number(const YAML::Node& node, const std::string& key) const {
-    double value = 0;
-    try {
-      value = node.as<double>();
-    } catch (const YAML::Exception&) {
-      Fail(node, "'" + key + "' is no number");
-    }
-    if (!std::isfinite(value)) Fail(node, "'" + key + "' is not finite");
-    return value;
-  }
-  std::optional<double> Number(const std::string& key) const {
-    const YAML::Node node = root_[key];
-    if (!node.IsDefined()) return std::nullopt;
-    return Number(node, key);
-  }
-  double Needed(const std::string& key) const {
-    const std::optional<double> value = Number(key);
-    if (!value) throw InputError(file_.string() + ": has no key '" + key + "'");
-    return *value;
-  }
-  std::vector<double> Numbers(const YAML::Node& node, const std::string& key) const {
-    if (!node.IsSequence()) Fail(node, "'" + key + "' is no list of numbers");
-    std::vector<double> values;
-    for (const YAML::Node& value : node) values.push_back(Number(value, key));
-    return values;
-  }
-  // A matrix of OpenCV or ROS ({rows, cols, data}), or a plain list.
-  std::vector<double> Matrix(const YAML::Node& node, const std::string& key) const {
-    if (node.IsMap() && !node["data"].IsDefined()) Fail(node, "'" + key + "' has no data");
-    return Numbers(node.IsMap() ? node["data"] : node, key);
-  }
+// --- OpenCV's pairs; a camera alone, or somewhere in a file
 
- private:
-  fs::path file_;
-  std::string text_;
-  YAML::Node root_;
+// Matrices of two cameras, and the right one's place, as cv::stereoCalibrate gives them.
+struct PairNames {
+  const char *K_left, *D_left, *K_right, *D_right;
 };
+constexpr PairNames kPairs[] = {{"K1", "D1", "K2", "D2"},
+                                {"M1", "D1", "M2", "D2"},
+                                {"cameraMatrix1", "distCoeffs1", "cameraMatrix2", "distCoeffs2"}};
 
-void SetLens(const CalibrationText& text, const YAML::Node& at, const std::string& model,
-             const std::vector<double>& values, PinholeCamera& camera) {
-  bool all_zero = true;
-  for (const double value : values) all_zero = all_zero && value == 0;
-  if (all_zero) return;
-  const bool fisheye = model == "equidistant" || model == "equi" || model == "fisheye" ||
-                       model == "KannalaBrandt8" || model == "kannala_brandt";
-  const bool radtan = model.empty() || model == "radtan" || model == "plumb_bob" ||
-                      model == "radial-tangential" || model == "PinHole";
-  if (!fisheye && !radtan)
-    text.Fail(at, "the lens model '" + model +
-                      "' is not known; tutti has radtan (plumb_bob) and equidistant "
-                      "(fisheye)");
-  const std::size_t most = fisheye ? 4 : 5;
-  if (values.size() < 4 || values.size() > 14)
-    text.Fail(at, "the lens has " + std::to_string(values.size()) + " coefficients; 4 or 5 are needed");
-  for (std::size_t i = most; i < values.size(); ++i) {
-    if (values[i] != 0)
-      text.Fail(at, "the lens has more than " + std::to_string(most) +
-                        " coefficients (a rational model?); calibrate with radtan or equidistant");
+const PairNames* PairOf(const CalibrationDocument& file) {
+  for (const PairNames& names : kPairs) {
+    if (file[names.K_left].IsDefined()) return &names;
   }
-  camera.distortion = fisheye ? Distortion::kEquidistant : Distortion::kRadTan;
-  for (std::size_t i = 0; i < std::min(most, values.size()); ++i) camera.coefficients[i] = values[i];
+  return nullptr;
 }
 
-void SetIntrinsics(const CalibrationText& text, const YAML::Node& at, const std::vector<double>& values,
-                   PinholeCamera& camera) {
-  if (values.size() != 4)
-    text.Fail(at, "'intrinsics' has " + std::to_string(values.size()) + " values; fx, fy, cx, cy are needed");
-  camera.fx = values[0];
-  camera.fy = values[1];
-  camera.cx = values[2];
-  camera.cy = values[3];
-}
-
-void SetSize(const CalibrationText& text, const YAML::Node& size, PinholeCamera& camera) {
-  if (!size.IsDefined()) return;
-  const std::vector<double> values = text.Numbers(size, "resolution");
-  if (values.size() != 2) text.Fail(size, "'resolution' needs width and height");
-  camera.width = internal::PixelsOf(values[0]);
-  camera.height = internal::PixelsOf(values[1]);
-}
-
-std::string Word(const YAML::Node& node) { return node.IsDefined() && node.IsScalar() ? node.Scalar() : ""; }
-
-// Kalibr's cam0, or what stands there alone.
-Calibration FromKalibr(const CalibrationText& text, const YAML::Node& node) {
+Calibration FromPair(const CalibrationDocument& file) {
+  const PairNames& names = *PairOf(file);
+  const CalibrationKeys& keys = file.root;
+  const std::string lens = LensName(keys);
+  std::string note;
   Calibration out;
-  out.format = "Kalibr";
-  const std::string model = Word(node["camera_model"]);
-  if (!model.empty() && model != "pinhole")
-    text.Fail(node["camera_model"], "camera_model '" + model + "': tutti has pinhole alone");
-  SetIntrinsics(text, node, text.Numbers(node["intrinsics"], "intrinsics"), out.camera);
-  SetSize(text, node["resolution"], out.camera);
-  const YAML::Node lens = node["distortion_coeffs"];
-  if (lens.IsDefined() && Word(node["distortion_model"]) != "none") {
-    SetLens(text, lens, Word(node["distortion_model"]), text.Numbers(lens, "distortion_coeffs"), out.camera);
-  }
-  if (node["rate_hz"].IsDefined()) out.rate_hz = text.Number(node["rate_hz"], "rate_hz");
+  out.camera = CameraOfMatrices(keys, names.K_left, names.D_left, lens, &note);
+  out.format = std::string("OpenCV, ") + names.K_left + (note.empty() ? "" : ", " + note);
+  const KeyValue R = keys.Find({"R"}), t = keys.Find({"T"});
+  if (!file.pairs || !R || !t || !keys.Has(names.K_right)) return out;
+  const std::array<double, 9> r = keys.Array<9>(R);
+  const std::array<double, 3> p = keys.Array<3>(t);
+  const std::optional<Pose> T =
+      RigidTransform({r[0], r[1], r[2], p[0], r[3], r[4], r[5], p[1], r[6], r[7], r[8], p[2], 0, 0, 0, 1});
+  if (T) SetRight(keys, CameraOfMatrices(keys, names.K_right, names.D_right, lens, &note), *T, out);
   return out;
 }
 
-// A matrix of 4 rows in any of the forms.
-Pose TransformOf(const CalibrationText& text, const YAML::Node& node, const std::string& key) {
-  std::vector<double> values;
-  if (node.IsSequence() && node.size() == 4) {
-    for (const YAML::Node& row : node) {
-      for (const double value : text.Numbers(row, key)) values.push_back(value);
-    }
-  } else {
-    values = text.Matrix(node, key);
-  }
-  TransformRows rows{};
-  if (values.size() != rows.size())
-    text.Fail(node, "'" + key + "' has " + std::to_string(values.size()) + " values; 16 are needed");
-  std::copy(values.begin(), values.end(), rows.begin());
-  try {
-    if (const std::optional<Pose> T = RigidTransform(rows)) return *T;
-  } catch (const InputError& e) {
-    text.Fail(node, "'" + key + "' " + e.what());
-  }
-  text.Fail(node, "'" + key + "' is zeros");
+// Others have a section of that name, too, with keys that tutti's has not.
+bool IsTuttis(const CalibrationDocument& file) {
+  const YAML::Node camera = file["camera"];
+  return camera.IsDefined() && camera.IsMap() &&
+         !file.At(camera).Find({"w", "W", "cols", "image_width", "k1", "k2", "model", "camera_model",
+                                "distortion_model", "distortion_coefficients", "dist_coeffs", "intrinsics"});
 }
 
-void SetRight(const PinholeCamera& right, const Pose& T_right_left, Calibration& out) {
-  out.right = right;
-  const Eigen::Matrix4d matrix = T_right_left.Matrix();
-  for (std::size_t i = 0; i < out.T_right_left.size(); ++i)
-    out.T_right_left[i] = matrix(static_cast<int>(i) / 4, static_cast<int>(i) % 4);
-  out.baseline_m = 0;
-}
-
-// cam1 of a camchain, where it says how it stands to cam0.
-void AddKalibrRight(const CalibrationText& text, Calibration& out) {
-  const YAML::Node cam1 = text.root()["cam1"];
-  if (!cam1.IsDefined() || !cam1.IsMap() || !cam1["T_cn_cnm1"].IsDefined()) return;
-  SetRight(FromKalibr(text, cam1).camera, TransformOf(text, cam1["T_cn_cnm1"], "T_cn_cnm1"), out);
-}
-
-Calibration FromEuroc(const CalibrationText& text) {
-  const SensorYaml read = ReadSensorYaml(text.file());
-  Calibration out;
-  out.format = "EuRoC";
-  out.camera = read.camera;
-  out.rate_hz = read.rate_hz.value_or(0);
-  return out;
-}
-
-// `prefix`: "Camera.", "Camera1.", "Camera2.".
-PinholeCamera OrbSlamCamera(const CalibrationText& text, const std::string& prefix) {
-  PinholeCamera c;
-  c.fx = text.Needed(prefix + "fx");
-  c.fy = text.Needed(prefix + "fy");
-  c.cx = text.Needed(prefix + "cx");
-  c.cy = text.Needed(prefix + "cy");
-  c.width = internal::PixelsOf(text.Number("Camera.width").value_or(0));
-  c.height = internal::PixelsOf(text.Number("Camera.height").value_or(0));
-  const std::string model = Word(text.root()["Camera.type"]);
-  const bool fisheye = model == "KannalaBrandt8";
-  std::vector<double> lens;
-  for (const char* key : {"k1", "k2", fisheye ? "k3" : "p1", fisheye ? "k4" : "p2"})
-    lens.push_back(text.Number(prefix + key).value_or(0));
-  if (!fisheye) lens.push_back(text.Number(prefix + "k3").value_or(0));
-  if (model != "Rectified") SetLens(text, text.root()["Camera.type"], model, lens, c);
-  return c;
-}
-
-Calibration FromOrbSlam(const CalibrationText& text, bool pairs) {
-  Calibration out;
-  const bool three = text.root()["Camera1.fx"].IsDefined();
-  out.format = three ? "ORB-SLAM3" : "ORB-SLAM";
-  out.camera = OrbSlamCamera(text, three ? "Camera1." : "Camera.");
-  out.rate_hz = text.Number("Camera.fps").value_or(0);
-  out.depth_units_per_m =
-      text.Number("RGBD.DepthMapFactor").value_or(text.Number("DepthMapFactor").value_or(0));
-  out.baseline_m = text.Number("Stereo.b").value_or(0);
-  if (const std::optional<double> bf = text.Number("Camera.bf");
-      bf && out.baseline_m == 0 && out.camera.fx > 0)
-    out.baseline_m = *bf / out.camera.fx;
-  const YAML::Node pose = text.root()["Stereo.T_c1_c2"];  // of the right camera in the left one's frame
-  if (pairs && pose.IsDefined() && text.root()["Camera2.fx"].IsDefined())
-    SetRight(OrbSlamCamera(text, "Camera2."), TransformOf(text, pose, "Stereo.T_c1_c2").Inverse(), out);
-  return out;
-}
-
-YAML::Node FirstOf(const YAML::Node& root, std::initializer_list<const char*> names) {
-  for (const char* name : names) {
-    if (root[name].IsDefined()) return root[name];
-  }
-  return YAML::Node(YAML::NodeType::Undefined);
-}
-
-Calibration FromMatrix(const CalibrationText& text, const YAML::Node& matrix) {
-  Calibration out;
-  const YAML::Node& root = text.root();
-  out.format = root["camera_name"].IsDefined() || root["projection_matrix"].IsDefined() ? "ROS" : "OpenCV";
-  const std::vector<double> k = text.Matrix(matrix, "camera_matrix");
-  if (k.size() != 9)
-    text.Fail(matrix, "the camera matrix has " + std::to_string(k.size()) + " values; 9 are needed");
-  out.camera.fx = k[0];
-  out.camera.cx = k[2];
-  out.camera.fy = k[4];
-  out.camera.cy = k[5];
-  const YAML::Node width = FirstOf(root, {"image_width", "image_Width", "width"});
-  const YAML::Node height = FirstOf(root, {"image_height", "image_Height", "height"});
-  if (width.IsDefined() && height.IsDefined()) {
-    out.camera.width = internal::PixelsOf(text.Number(width, "image_width"));
-    out.camera.height = internal::PixelsOf(text.Number(height, "image_height"));
-  }
-  const YAML::Node lens = FirstOf(root, {"distortion_coefficients", "Distortion_Coefficients", "dist_coeffs",
-                                         "distCoeffs", "dist_coeff", "D"});
-  if (lens.IsDefined()) {
-    SetLens(text, lens, Word(FirstOf(root, {"distortion_model", "camera_model"})),
-            text.Matrix(lens, "distortion_coefficients"), out.camera);
-  }
-  return out;
-}
-
-Calibration FromTutti(const CalibrationText& text, bool pairs) {
-  const RunConfig config = ParseConfig(text.text(), text.file().string());
+Calibration FromTutti(const CalibrationDocument& file) {
+  const RunConfig config = ParseConfig(file.text, file.root.file().string());
   Calibration out;
   out.format = "tutti";
   if (config.dataset.camera) out.camera = *config.dataset.camera;
   out.baseline_m = config.dataset.baseline_m;
   out.rate_hz = config.dataset.rate_hz;
   out.depth_units_per_m = config.dataset.depth_units_per_m;
-  if (pairs) out.right = config.dataset.right;
+  if (file.pairs) out.right = config.dataset.right;
   if (out.right) out.T_right_left = config.dataset.T_right_left;
   return out;
 }
 
-Calibration KalibrOf(const CalibrationText& text, bool pairs) {
-  Calibration out = FromKalibr(text, text.root()["cam0"]);
-  if (pairs) AddKalibrRight(text, out);
-  return out;
+std::string NameOf(const CalibrationKeys& keys) {
+  const auto has = [&](KeyNames names) { return static_cast<bool>(keys.Find(names)); };
+  if (has({"intrinsic_matrix"})) return "Open3D";
+  if (has({"ppx"})) return "RealSense";
+  if (has({"camera_name", "projection_matrix", "binning_x", "P", "p"})) return "ROS";
+  if (has({"camera_matrix", "Camera_Matrix", "cameraMatrix", "K"})) return "OpenCV";
+  if (has({"intrinsics"})) return has({"distortion_coeffs"}) ? "Kalibr" : "EuRoC";
+  return "fx, fy, cx, cy";
 }
 
-Calibration Read(const CalibrationText& text, bool pairs) {
-  const YAML::Node& root = text.root();
-  if (root["cam0"].IsDefined() && root["cam0"].IsMap() && root["cam0"]["intrinsics"].IsDefined())
-    return KalibrOf(text, pairs);
-  if (root["intrinsics"].IsDefined() && root["distortion_coeffs"].IsDefined()) return FromKalibr(text, root);
-  if (root["intrinsics"].IsDefined()) return FromEuroc(text);
-  if (root["Camera1.fx"].IsDefined() || root["Camera.fx"].IsDefined()) return FromOrbSlam(text, pairs);
-  if (root["camera"].IsDefined() && root["camera"].IsMap()) return FromTutti(text, pairs);
-  const YAML::Node matrix = FirstOf(root, {"camera_matrix", "Camera_Matrix", "cameraMatrix", "K"});
-  if (matrix.IsDefined()) return FromMatrix(text, matrix);
-  throw InputError(text.file().string() + ": holds no calibration; " + CalibrationText::Known());
-}
-
-// `which`: "right ", or "".
-void Check(const fs::path& file, const std::string& which, PinholeCamera camera) {
-  if (camera.width == 0 || camera.height == 0) {  // of the images, later
-    camera.width = internal::PixelsOf(std::round(2 * std::max(1.0, camera.cx)));
-    camera.height = internal::PixelsOf(std::round(2 * std::max(1.0, camera.cy)));
+// Cameras anywhere in a file, by their keys; of `most` nodes, to any sensible depth.
+struct Found {
+  std::string name;
+  YAML::Node node;
+};
+void FindCameras(const CalibrationDocument& file, const YAML::Node& node, const std::string& name, int depth,
+                 int& most, std::vector<Found>& out) {
+  constexpr int kDeepest = 5;
+  if (depth > kDeepest || --most < 0) return;
+  if (file.IsCamera(node)) {
+    out.push_back({name, node});
+  } else if (node.IsMap() || node.IsSequence()) {
+    std::size_t i = 0;
+    for (auto it = node.begin(); it != node.end(); ++it, ++i) {
+      const bool keyed = node.IsMap() && it->first.IsScalar();
+      FindCameras(file, node.IsMap() ? it->second : *it,
+                  keyed ? it->first.Scalar() : name + "[" + std::to_string(i) + "]", depth + 1, most, out);
+    }
   }
-  const std::string problem = camera.Validate();
-  if (!problem.empty()) throw InputError(file.string() + ": " + which + problem);
+}
+
+// --- which of them
+
+// A format is known by the first of its keys that the file has; kSection: whose value is a section.
+enum class Kind { kAny, kSection };
+struct Format {
+  KeyNames keys;
+  Kind kind;
+  Calibration (*read)(const CalibrationDocument& file);
+};
+const Format kFormats[] = {
+    {{"value0"}, Kind::kSection, FromBasalt},
+    {{"model_type", "cam0_calib"}, Kind::kAny, FromVins},
+    {{"Camera1.fx", "Camera.fx", "Camera.model", "Camera.type"}, Kind::kAny, FromOrbSlam},
+    {{"Camera"}, Kind::kSection, FromStella},
+    {{"fl_x", "camera_angle_x", "frames"}, Kind::kAny, FromNerf},
+    {{"P0", "P2", "P_rect_00"}, Kind::kAny, FromKitti},
+    {{"K1", "M1", "cameraMatrix1"}, Kind::kAny, FromPair}};
+
+Calibration Read(const CalibrationDocument& file) {
+  if (!CamerasOfChain(file).empty()) return FromChain(file);
+  for (const Format& format : kFormats) {
+    const KeyValue found = file.root.Find(format.keys);
+    if (found && (format.kind == Kind::kAny || found.node.IsMap())) return format.read(file);
+  }
+  if (IsTuttis(file)) return FromTutti(file);
+  std::vector<Found> cameras;
+  int most = 1000;
+  FindCameras(file, file.root.map(), "", 0, most, cameras);
+  if (cameras.empty())
+    throw InputError(file.root.file().string() + ": holds no calibration; " + kKnownCalibrations);
+  const Found& first = cameras.front();
+  const CalibrationKeys keys = file.At(first.node);
+  Calibration out = OneCamera(keys, NameOf(keys));
+  if (cameras.size() > 1)
+    out.format += ", " + first.name + ", the first of " + std::to_string(cameras.size()) + " cameras";
+  return out;
 }
 
 }  // namespace
 
 Calibration ReadCalibration(const fs::path& file, bool pairs) {
-  const CalibrationText text(file);
-  Calibration out = Read(text, pairs);
-  Check(file, "", out.camera);
-  if (out.right) Check(file, "right ", *out.right);
+  const std::string text = ReadCalibrationText(file);
+  Calibration out;
+  if (const std::optional<Calibration> table = ReadCalibrationTable(file, text)) {
+    out = *table;
+  } else {
+    const CalibrationDocument keys = ParseCalibration(file, text, pairs);
+    try {
+      out = Read(keys);
+    } catch (const YAML::Exception& e) {
+      throw InputError(file.string() + ":" + std::to_string(e.mark.line + 1) + ": can't be read: " + e.msg);
+    }
+  }
+  CheckCalibrated(file, out.camera);
+  if (out.right) CheckCalibrated(file, *out.right, "right ");
   return out;
 }
 

@@ -4,31 +4,14 @@
 #include <cmath>
 
 #include "frontend/dataset/image_file.h"
+#include "frontend/dataset/layout.h"
 #include "frontend/dataset/turned_dataset.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 
 namespace tutti {
-namespace {
 
 namespace fs = std::filesystem;
-
-}  // namespace
-
-std::vector<std::pair<double, fs::path>> StampsInNames(const std::vector<fs::path>& files) {
-  std::vector<std::pair<double, fs::path>> stamps;
-  for (const fs::path& file : files) {
-    const std::string stem = file.stem().string();
-    const bool like_a_time = stem.find('.') != std::string::npos || stem.size() >= 10;
-    const std::optional<double> number = like_a_time ? ParseDouble(stem) : std::nullopt;
-    if (number && std::isfinite(*number))
-      stamps.emplace_back(*number > 1e14 ? 1e-9 * *number : *number, file);
-  }
-  std::sort(stamps.begin(), stamps.end());
-  const auto same = [](const auto& a, const auto& b) { return a.first == b.first; };
-  if (std::adjacent_find(stamps.begin(), stamps.end(), same) != stamps.end()) stamps.clear();
-  return stamps;
-}
 
 DepthBeside::DepthBeside(std::unique_ptr<Dataset> images, const std::vector<double>& stamps,
                          const fs::path& depth, const DatasetOptions& options)
@@ -42,25 +25,30 @@ DepthBeside::DepthBeside(std::unique_ptr<Dataset> images, const std::vector<doub
     camera.height = stored.height;
     rectifier_.emplace(camera);
   }
-  const std::vector<fs::path> found = ListImages(depth);
+  std::vector<fs::path> found;
+  for (RoleImage& image : ImagesOf(depth, {""})) found.push_back(std::move(image.file));
   if (found.empty()) throw InputError(depth.string() + ": holds no depth image (--depth)");
+  const bool upright = options.rotate % 180 == 0;
+  const cv::Size turned(rig_.camera.width, rig_.camera.height);
+  reader_.emplace(options, DepthFormat(), options.camera,
+                  upright ? turned : cv::Size(turned.height, turned.width));
+  for (std::string& note : reader_->Notes(found.front())) warnings_.push_back(std::move(note));
   if (found.size() == stamps.size()) {
     files_ = found;
     return;
   }
-  const auto named = StampsInNames(found);
+  const auto named = StampsInNames(found).stamps;
   files_.resize(stamps.size());
   std::size_t alone = stamps.size();
   for (std::size_t i = 0; i < stamps.size() && !named.empty(); ++i) {
-    const auto later =
-        std::lower_bound(named.begin(), named.end(), stamps[i],
-                         [](const auto& stamp_and_file, double s) { return stamp_and_file.first < s; });
+    const auto later = std::lower_bound(named.begin(), named.end(), stamps[i],
+                                        [](const auto& stamp, double s) { return stamp.first < s; });
     auto nearest = later;
     if (later == named.end() ||
         (later != named.begin() && stamps[i] - (later - 1)->first < later->first - stamps[i]))
       nearest = later - 1;
     if (std::abs(nearest->first - stamps[i]) > options.max_association_s) continue;
-    files_[i] = nearest->second;
+    files_[i] = found[nearest->second];
     --alone;
   }
   if (alone == stamps.size())
@@ -79,23 +67,9 @@ ReadResult DepthBeside::Read(std::size_t i) const {
   if (!result.frame) return result;
   const fs::path& file = files_.at(static_cast<std::size_t>(Number(i)));
   if (file.empty()) return result;
-  const ImageFile read = ReadDepthFile(file);
-  if (!read.error.empty()) {
-    result.depth_error = read.error;
-    return result;
-  }
-  const bool upright = options_.rotate % 180 == 0;
-  const cv::Size turned = result.frame->image.size();
-  const cv::Size stored = upright ? turned : cv::Size(turned.height, turned.width);
-  if (read.image.size() != stored) {
-    result.depth_error = file.string() + ": the depth image has " + SizeText(read.image.size()) +
-                         " pixels, but the images have " + SizeText(stored) +
-                         "; depth must be registered to them";
-    return result;
-  }
-  const cv::Mat metres = DepthInMetres(read.image, options_.depth_units_per_m, options_.max_depth_m);
-  const cv::Mat rectified = rectifier_ ? rectifier_->Apply(metres, Sampling::kNearest) : metres;
-  result.frame->depth_m = TurnedImage(rectified, options_.rotate);
+  cv::Mat metres;
+  result.depth_error = reader_->Read(file, rectifier_ ? &*rectifier_ : nullptr, metres);
+  if (result.depth_error.empty()) result.frame->depth_m = TurnedImage(metres, options_.rotate);
   return result;
 }
 

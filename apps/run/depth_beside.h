@@ -8,15 +8,11 @@
 #include <utility>
 #include <vector>
 
+#include "frontend/dataset/depth_reader.h"
 #include "frontend/features/rectifier.h"
 #include "tutti/frontend/dataset.h"
 
 namespace tutti {
-
-/// Time stamps [s] that files are called by (seconds with a point, else ten digits or more: seconds, or
-/// nanoseconds), of those that are: ascending. Empty if two are the same.
-std::vector<std::pair<double, std::filesystem::path>> StampsInNames(
-    const std::vector<std::filesystem::path>& files);
 
 /// One camera's images with registered depth: an RGB-D data set.
 class DepthBeside : public Dataset {
@@ -34,6 +30,7 @@ class DepthBeside : public Dataset {
   /// With depth, or with depth_error.
   ReadResult Read(std::size_t i) const override;
   ColourImage ReadColour(std::size_t i) const override { return images_->ReadColour(i); }
+  double SkippedShare() const override { return images_->SkippedShare(); }
   const CameraRig& Rig() const override { return rig_; }
   std::optional<std::filesystem::path> GroundTruthFile() const override { return images_->GroundTruthFile(); }
   Trajectory ReadGroundTruth(const std::filesystem::path& file,
@@ -46,7 +43,8 @@ class DepthBeside : public Dataset {
   std::unique_ptr<Dataset> images_;
   DatasetOptions options_;
   CameraRig rig_;
-  std::optional<Rectifier> rectifier_;        // of a camera with distortion
+  std::optional<Rectifier> rectifier_;  // of a camera with distortion
+  std::optional<DepthReader> reader_;
   std::vector<std::filesystem::path> files_;  // of each image; empty: none
   std::vector<std::string> warnings_;
 };

@@ -13,7 +13,11 @@
 #include <vector>
 
 #include "apps/run/map_figures.h"
+<<<<<<< HEAD
 #include "apps/run/run_parts.h"
+=======
+#include "frontend/dataset/turned_dataset.h"
+>>>>>>> 258a46967d914f39105da5f22392617bbef767a5
 #include "tutti/frontend/odometry.h"
 
 namespace tutti {
@@ -152,9 +156,10 @@ std::vector<int> WhereItTurns(const Odometry& odometry, const std::vector<int>& 
   return {first, first + static_cast<std::ptrdiff_t>(most)};
 }
 
-// Landmarks that three of the keyframes see, those seen most first.
+// Landmarks that three of the keyframes see, those seen most first. `aspect`: fy over fx, by which offsets
+// along y are divided, so that one focal length is that of both.
 std::optional<Scene> SceneOf(const Odometry& odometry, const std::vector<int>& keyframes,
-                             std::size_t most_landmarks) {
+                             std::size_t most_landmarks, double aspect = 1) {
   std::vector<KeyframeView> views;
   std::map<int, int> seen;
   for (const int id : keyframes) {
@@ -191,7 +196,7 @@ std::optional<Scene> SceneOf(const Odometry& odometry, const std::vector<int>& k
       const cv::Point2f pixel = view.keypoints[f].pt;
       Observation o{static_cast<int>(scene.cameras.size()),
                     found->second,
-                    {double(pixel.x) - c.cx, double(pixel.y) - c.cy},
+                    {double(pixel.x) - c.cx, (double(pixel.y) - c.cy) / aspect},
                     0,
                     0};
       if (const double inverse = double(view.inverse_depth[f]); inverse > 0) {
@@ -207,7 +212,7 @@ std::optional<Scene> SceneOf(const Odometry& odometry, const std::vector<int>& k
   if (static_cast<int>(scene.cameras.size()) < kFewestKeyframes || scene.landmarks.size() < 50 ||
       scene.observations.empty())
     return std::nullopt;
-  scene.given = std::log(std::sqrt(c.fx * c.fy));
+  scene.given = std::log(std::sqrt(c.fx * c.fy / aspect));
   scene.lens = {{scene.given, 0, 0, 0}};
   scene.stereo = odometry.Rig().sensor == Sensor::kStereo;
   scene.width = c.width;
@@ -235,7 +240,8 @@ Pass Track(const Dataset& dataset, const RunConfig& config, const PinholeCamera&
     pass.posed += int(track.state == TrackingState::kTracking);
   }
   odometry.FinishMapping();
-  pass.scene = SceneOf(odometry, KeyframesOfLargestSubmap(odometry, {}), kMostLandmarks);
+  pass.scene =
+      SceneOf(odometry, KeyframesOfLargestSubmap(odometry, {}), kMostLandmarks, camera.fy / camera.fx);
   return pass;
 }
 
@@ -283,9 +289,11 @@ std::optional<Estimate> EstimateOf(const Scene& scene) {
 
 PinholeCamera CameraOf(const PinholeCamera& before, const std::array<double, 4>& lens) {
   PinholeCamera camera = before;
-  camera.fx = camera.fy = std::exp(lens[0]);
+  const double aspect = before.fy / before.fx;  // of the pixels, which need not be square
+  camera.fx = std::exp(lens[0]);
+  camera.fy = aspect * camera.fx;
   camera.cx = std::clamp(before.cx + lens[2], 0.0, double(before.width));
-  camera.cy = std::clamp(before.cy + lens[3], 0.0, double(before.height));
+  camera.cy = std::clamp(before.cy + aspect * lens[3], 0.0, double(before.height));
   return camera;
 }
 
@@ -312,6 +320,7 @@ FocalLength MeasureFocalLength(const fs::path& path, const RunConfig& config, in
   result.camera = dataset->Rig().camera;
   const int most = FramesToTrack(*dataset, frames);
   // From the usual one; a wide or a narrow one where that loses its way.
+<<<<<<< HEAD
   const std::array<double, 3> starts = {{1, 0.65, 1.5}};
   std::size_t start = 0;
   std::optional<Estimate> found;
@@ -328,6 +337,42 @@ FocalLength MeasureFocalLength(const fs::path& path, const RunConfig& config, in
       if (found) break;
       ++start;
       continue;
+=======
+  for (const double share : {1.0, 0.65, 1.5}) {
+    PinholeCamera camera = result.camera;
+    camera.fx *= share;
+    camera.fy *= share;
+    for (int i = 0; i < kMostPasses; ++i) {
+      Pass pass = Track(*dataset, config, camera, frames);
+      result.frames = pass.frames;
+      if (!pass.scene || 2 * pass.posed < pass.frames) {
+        result.reason = "too little of it could be tracked";
+        break;
+      }
+      const Fit fit = Adjust(*pass.scene, false);
+      const PinholeCamera found = CameraOf(camera, pass.scene->lens);
+      if (!fit.usable || !(found.fx > 0.2 * camera.width) || !(found.fx < 10 * camera.width)) {
+        result.reason = "its frames agree with no focal length";
+        break;
+      }
+      const bool settled = std::abs(std::log(found.fx / camera.fx)) < kSettled;
+      camera = found;
+      if (!settled && i + 1 < kMostPasses) continue;
+      result.sigma = SigmaOf(*pass.scene, fit);
+      if (result.sigma > kWorstSigma) {
+        result.reason = "its motion does not tell the focal length";
+        return result;
+      }
+      result.measured = true;
+      result.reason.clear();
+      result.camera = camera;
+      if (std::abs(pass.scene->lens[1]) > 0.01) {
+        result.camera.distortion = Distortion::kRadTan;
+        result.camera.coefficients = {pass.scene->lens[1], 0, 0, 0, 0};
+      }
+      result.camera = TurnedCamera(result.camera, (360 - dataset->TurnedBy()) % 360);
+      return result;
+>>>>>>> 258a46967d914f39105da5f22392617bbef767a5
     }
     found = here;
     const double moved = found->lens[0] - std::log(camera.fx);

@@ -13,7 +13,7 @@ namespace tutti {
 /// What the first frames of a recording say of its camera.
 struct FocalLength {
   bool measured = false;  ///< false: `camera` is as it was
-  PinholeCamera camera;   ///< square pixels; k1 where the lens has one
+  PinholeCamera camera;   ///< pixels of the given shape; k1 where the lens has one
   double sigma = 0;       ///< standard deviation of the focal length, as share of it
   int frames = 0;         ///< that were looked at
   double cpu_s = 0;       ///< processor time that it took

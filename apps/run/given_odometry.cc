@@ -6,6 +6,7 @@
 
 #include "apps/run/depth_beside.h"
 #include "frontend/dataset/image_file.h"
+#include "frontend/dataset/layout.h"
 #include "tutti/backend/evaluation.h"
 #include "tutti/backend/trajectory_file.h"
 #include "tutti/core/error.h"
@@ -34,6 +35,7 @@ class RestampedDataset : public Dataset {
     return read;
   }
   ColourImage ReadColour(std::size_t i) const override { return images_->ReadColour(i); }
+  double SkippedShare() const override { return images_->SkippedShare(); }
   const CameraRig& Rig() const override { return images_->Rig(); }
   std::optional<fs::path> GroundTruthFile() const override { return images_->GroundTruthFile(); }
   Trajectory ReadGroundTruth(const fs::path& file, std::vector<std::string>* warnings) const override {
@@ -57,7 +59,8 @@ DatasetOptions Whole(DatasetOptions options) {
 }
 
 bool HasOwnStamps(const fs::path& images, const DatasetOptions& options) {
-  const DatasetType type = options.type != DatasetType::kAuto ? options.type : DetectDatasetType(images);
+  const DatasetType type = TypeToOpen(images, options);
+  if (type == DatasetType::kPaired) return HasStamps(images);
   return type != DatasetType::kImages && type != DatasetType::kVideo;
 }
 
@@ -90,7 +93,7 @@ GivenOdometry::GivenOdometry(const GivenOdometryFiles& files, const fs::path& im
   if (poses.trajectory.empty()) throw InputError(files.trajectory.string() + ": holds no pose");
   const std::unique_ptr<Dataset> all = OpenDataset(images, Whole(options_));
   std::vector<double> times;
-  if (files.times) times = ReadTimes(*files.times);
+  if (files.times) times = ReadTimes(*files.times, &notes_);
   const bool own = HasOwnStamps(images, options_);
   if (files.times && times.size() != all->Size() &&
       (poses.has_stamps || times.size() != poses.trajectory.size()))
@@ -99,16 +102,27 @@ GivenOdometry::GivenOdometry(const GivenOdometryFiles& files, const fs::path& im
                      files.trajectory.string() + " " + std::to_string(poses.trajectory.size()) +
                      " poses; one for each image is needed");
   if (!poses.has_stamps && times.size() == poses.trajectory.size()) poses = ReadPoses(files, times);
-  notes_ = poses.warnings;
-  trajectory_ = std::move(poses.trajectory);
+  if (!HasRotations(poses.trajectory))
+    throw InputError(
+        files.trajectory.string() +
+        ": has positions alone; an odometry needs rotations, too (TUM: stamp tx ty tz qx qy qz qw)");
+  trajectory_ = poses.trajectory;
   has_stamps_ = poses.has_stamps || (files.times && times.size() == trajectory_.size());
   if (!own) {
-    stamps_ = ImageStamps(*all);
+    stamps_ = ImageStamps(*all, !has_stamps_ && poses.has_numbers);
   } else if (files.times && times.size() == all->Size() && has_stamps_ &&
              times.size() != trajectory_.size()) {
     stamps_ = times;
   }
-  if (!has_stamps_) StampByOrder(*all);
+  if (!has_stamps_) {
+    StampByOrder(poses.has_numbers, *all);
+  } else if (all->Size() > 0) {
+    const bool of_all = stamps_.empty();
+    AgreeOnUnit(of_all ? all->Stamp(0) : stamps_.front(),
+                of_all ? all->Stamp(all->Size() - 1) : stamps_.back(), poses);
+    trajectory_ = poses.trajectory;
+  }
+  notes_.insert(notes_.end(), poses.warnings.begin(), poses.warnings.end());
   jumps_ = FindJumps(trajectory_);
   for (const OdometryJump& jump : jumps_) {
     if (jump.comes_back) notes_.push_back(files.trajectory.string() + ": " + Sentence(jump));
@@ -118,14 +132,25 @@ GivenOdometry::GivenOdometry(const GivenOdometryFiles& files, const fs::path& im
   SumUp(files.sigmas ? ReadMotionSigmas(*files.sigmas, trajectory_) : poses.sigmas);
 }
 
-// Lines have no stamps: one for each image, in order.
-void GivenOdometry::StampByOrder(const Dataset& all) {
+// Lines have no stamps: one for each image, in order, or the images that they number.
+void GivenOdometry::StampByOrder(bool numbered, const Dataset& all) {
+  const auto stamp = [&](std::size_t i) { return stamps_.empty() ? all.Stamp(i) : stamps_[i]; };
+  if (numbered) {
+    for (StampedPose& pose : trajectory_) {
+      const auto number = static_cast<std::size_t>(pose.stamp_s);
+      if (number >= all.Size())
+        throw InputError(files_.trajectory.string() + ": numbers a frame " + std::to_string(number) +
+                         ", but " + images_.string() + " has " + std::to_string(all.Size()) +
+                         " images; give the times of the frames (--times)");
+      pose.stamp_s = stamp(number);
+    }
+    return;
+  }
   if (trajectory_.size() != all.Size())
     throw InputError(files_.trajectory.string() + ": has no time stamps, and " +
                      std::to_string(trajectory_.size()) + " poses for " + std::to_string(all.Size()) +
                      " images; give the times of the poses (--times)");
-  for (std::size_t i = 0; i < trajectory_.size(); ++i)
-    trajectory_[i].stamp_s = stamps_.empty() ? all.Stamp(i) : stamps_[i];
+  for (std::size_t i = 0; i < trajectory_.size(); ++i) trajectory_[i].stamp_s = stamp(i);
 }
 
 void GivenOdometry::SumUp(const std::vector<MotionSigma>& sigmas) {
@@ -153,15 +178,7 @@ std::optional<MotionSigma> GivenOdometry::SigmaBetween(double from_s, double to_
   return MotionSigma{sigma[0], sigma[1]};
 }
 
-std::vector<double> GivenOdometry::StampsByName(std::size_t count) const {
-  std::error_code code;
-  if (!fs::is_directory(images_, code)) return {};
-  std::vector<double> stamps;
-  for (const auto& [stamp, file] : StampsInNames(ListImages(images_))) stamps.push_back(stamp);
-  return stamps.size() == count ? stamps : std::vector<double>();
-}
-
-std::vector<double> GivenOdometry::ImageStamps(const Dataset& all) {
+std::vector<double> GivenOdometry::ImageStamps(const Dataset& all, bool numbered) {
   const std::size_t count = all.Size();
   std::vector<fs::path> places;
   if (files_.times) places.push_back(*files_.times);
@@ -171,16 +188,23 @@ std::vector<double> GivenOdometry::ImageStamps(const Dataset& all) {
     if (fs::is_regular_file(above / "times.txt", code)) places.push_back(above / "times.txt");
   }
   for (const fs::path& place : places) {
-    std::vector<double> times = ReadTimes(place);
+    std::vector<std::string> unit;
+    std::vector<double> times = ReadTimes(place, &unit);
     if (times.size() != count) continue;
     if (!Grows(times)) throw InputError(place.string() + ": the time stamps must grow from line to line");
     notes_.push_back("the images have the time stamps of " + place.string());
+    if (!files_.times) notes_.insert(notes_.end(), unit.begin(), unit.end());
     return times;
   }
-  std::vector<double> names = StampsByName(count);
-  if (!names.empty()) {
-    notes_.push_back("the images have the time stamps that they are called by");
-    return names;
+  std::vector<double> stamps;
+  for (std::size_t i = 0; i < count; ++i) stamps.push_back(all.Stamp(i));
+  std::error_code ignored;
+  if (fs::is_directory(images_, ignored) && StampsInNames(ListImages(images_)).stamps.size() == count)
+    return stamps;  // of the names, which the data set says
+  if (numbered) return stamps;
+  if (trajectory_.size() != count && has_stamps_ && TypeToOpen(images_, options_) == DatasetType::kVideo) {
+    notes_.push_back("the frames have the time stamps of the video");
+    return stamps;
   }
   if (trajectory_.size() != count)
     throw InputError(images_.string() + ": nothing says when its " + std::to_string(count) +
@@ -188,9 +212,7 @@ std::vector<double> GivenOdometry::ImageStamps(const Dataset& all) {
                      std::to_string(trajectory_.size()) +
                      " poses; give one time stamp for each image (--times FILE)");
   notes_.push_back("each image has the pose of the same place in the file, since there are as many");
-  std::vector<double> stamps;
-  for (std::size_t i = 0; i < count; ++i)
-    stamps.push_back(has_stamps_ ? trajectory_[i].stamp_s : all.Stamp(i));
+  for (std::size_t i = 0; has_stamps_ && i < count; ++i) stamps[i] = trajectory_[i].stamp_s;
   return stamps;
 }
 

@@ -46,9 +46,8 @@ class GivenOdometry {
   const std::vector<std::string>& notes() const { return notes_; }
 
  private:
-  std::vector<double> ImageStamps(const Dataset& all);
-  std::vector<double> StampsByName(std::size_t count) const;
-  void StampByOrder(const Dataset& all);
+  std::vector<double> ImageStamps(const Dataset& all, bool numbered);
+  void StampByOrder(bool numbered, const Dataset& all);
   void SumUp(const std::vector<MotionSigma>& sigmas);
   Eigen::Vector2d Variance(double stamp_s) const;
 

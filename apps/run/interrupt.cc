@@ -22,7 +22,8 @@ InterruptGuard::InterruptGuard() {
     struct sigaction action = {};
     action.sa_handler = signal == SIGPIPE ? SIG_IGN : OnSignal;
     // The second one ends the process.
-    if (signal == SIGINT || signal == SIGTERM) action.sa_flags = static_cast<int>(SA_RESETHAND);
+    if (signal == SIGINT || signal == SIGTERM || signal == SIGQUIT)
+      action.sa_flags = static_cast<int>(SA_RESETHAND);
     sigemptyset(&action.sa_mask);
     sigaction(signal, &action, nullptr);
   }

@@ -1,6 +1,7 @@
 #include "apps/run/live_files.h"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -11,10 +12,20 @@
 #include "core/tum_line.h"
 
 namespace tutti {
+namespace {
+
+int OpenAnew(const std::filesystem::path& file) {
+  struct stat status = {};
+  // What shares its bytes with a file elsewhere (cp -l) makes way for a new one.
+  if (lstat(file.c_str(), &status) == 0 && S_ISREG(status.st_mode) && status.st_nlink > 1)
+    unlink(file.c_str());
+  return open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC, 0666);
+}
+
+}  // namespace
 
 GrowingFile::GrowingFile(std::filesystem::path file, const std::string& header)
-    : file_(std::move(file)),
-      descriptor_(open(file_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666)) {
+    : file_(std::move(file)), descriptor_(OpenAnew(file_)) {
   Append(header);
 }
 

@@ -13,10 +13,11 @@
 #include "apps/run/prefetcher.h"
 #include "apps/run/progress.h"
 #include "apps/run/run_parts.h"
-#include "apps/run/text_file.h"
 #include "apps/slam/map_state.h"
 #include "core/angle.h"
+#include "core/replaced_file.h"
 #include "core/stopwatch.h"
+#include "core/terminal.h"
 #include "tutti/core/error.h"
 #include "tutti/slam/slam_system.h"
 #include "tutti/slam/version.h"
@@ -151,7 +152,6 @@ TrajectoryPlot Picture(const LocalizationRequest& request, const RunState& state
 
 std::unique_ptr<SlamSystem> OpenMap(const LocalizationRequest& request, MapInfo info) {
   info.config.run.threads = request.threads;
-  info.config.loops.ltm_file.clear();  // what the map has of it is enough, and nobody's file changes
   std::unique_ptr<SlamSystem> slam = SlamSystem::Load(request.map, info);
   slam->BeginLocalization();
   return slam;
@@ -173,7 +173,7 @@ void LocateAll(const LocalizationRequest& request, const Dataset& dataset, const
   reading.ahead = request.threads > 1 ? 4 : 0;
   reading.stop = &InterruptGuard::Requested;
   Prefetcher frames(dataset, reading);
-  Progress progress("localize", dataset.Size(), request.quiet ? nullptr : stderr);
+  Progress progress("localize", dataset.Size(), request.quiet ? nullptr : internal::StandardError());
   const Pose T_camera_body = dataset.Rig().T_body_camera.Inverse();
   RunState state = StateIn(slam, result);
   const bool endless = dataset.FrameSupply() != Supply::kStored;
@@ -185,7 +185,8 @@ void LocateAll(const LocalizationRequest& request, const Dataset& dataset, const
     if (!fetched->read.frame) {
       ++result.bad;
       progress.Note("tutti: frame " + std::to_string(dataset.Number(fetched->position)) +
-                    " is skipped: " + fetched->read.error);
+                        " is skipped: " + fetched->read.error,
+                    "frames are skipped");
       continue;
     }
     const InputFrame& frame = *fetched->read.frame;
@@ -218,13 +219,15 @@ void LocateAll(const LocalizationRequest& request, const Dataset& dataset, const
 Localization Localize(const LocalizationRequest& request) {
   const internal::Stopwatch since;
   cv::setNumThreads(1);
+  const OutputLayout layout = {IsLocalization, kSummary, "version", {}, nullptr};
+  OutputFolder::Check(request.out, layout);
   const MapInfo info = ReadMapInfo(request.map);
   const DatasetOptions options = Reading(request, info);
   const std::unique_ptr<Dataset> dataset = OpenDataset(request.dataset, options);
   CheckRig(request, info.rig, dataset->Rig());
   const InterruptGuard guard;
   RefuseToReplace(request.out, request.map);
-  OutputFolder folder(request.out, {IsLocalization, kSummary, "version", {}, nullptr});
+  OutputFolder folder(request.out, layout);
   Localization result;
   result.masked = !options.mask.empty();
   const std::unique_ptr<SlamSystem> slam = OpenMap(request, info);
@@ -238,11 +241,12 @@ Localization Localize(const LocalizationRequest& request) {
   folder.Write({kTrajectory, [&](const fs::path& file) {
                   WriteTrajectory(file, result.trajectory, TrajectoryFormat::kTum);
                 }});
-  folder.Write({kFrames, [&](const fs::path& file) { WriteTextFile(file, FramesCsv(result)); }});
+  folder.Write({kFrames, [&](const fs::path& file) { internal::WriteFile(file, FramesCsv(result)); }});
   folder.Write({kPicture, [&](const fs::path& file) {
                   WriteSvg(file, Picture(request, StateIn(*slam, result), result));
                 }});
-  folder.Write({kSummary, [&](const fs::path& file) { WriteTextFile(file, Summary(request, result)); }});
+  folder.Write(
+      {kSummary, [&](const fs::path& file) { internal::WriteFile(file, Summary(request, result)); }});
   ThrowFailures(folder.failures(), folder.Finish(!result.interrupted));
   return result;
 }

@@ -1,10 +1,7 @@
 // Output folder, trajectories, graph and plots.
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <cstdio>
-#include <cstring>
-#include <fstream>
 #include <system_error>
 
 #include "apps/plot/plot.h"
@@ -13,7 +10,8 @@
 #include "apps/run/frame_places.h"
 #include "apps/run/live_files.h"
 #include "apps/run/outputs.h"
-#include "apps/run/text_file.h"
+#include "core/replaced_file.h"
+#include "core/terminal.h"
 #include "tutti/backend/g2o_io.h"
 #include "tutti/core/error.h"
 
@@ -90,15 +88,6 @@ TrajectoryPlot MakePlot(const RunResult& result) {
 
 }  // namespace
 
-void WriteTextFile(const fs::path& file, const std::string& text) {
-  std::ofstream out(file, std::ios::binary);
-  if (!out)
-    throw InputError(file.string() + ": can't be written; check that the folder exists and is writable");
-  out << text;
-  out.close();
-  if (!out) throw InputError(file.string() + ": could not be written in full; is the disk full?");
-}
-
 std::size_t RunResult::LoopsAccepted() const {
   std::size_t count = 0;
   for (const LoopRecord& loop : loops) count += loop.accepted ? 1 : 0;
@@ -111,10 +100,14 @@ std::size_t RunResult::FramesRelocalized() const {
   return count;
 }
 
+OutputLayout RunLayout() {
+  return {IsResult, "summary.json", "version", {kLiveTrajectory, kLiveLoops}, nullptr, {kCheckpoint}};
+}
+
 OutputFolder OpenOutputFolder(const RunRequest& request, const fs::path& reference) {
   if (!reference.empty()) RefuseToReplace(request.out, reference);
-  const OutputLayout layout = {IsResult, "summary.json", "version", {kLiveTrajectory, kLiveLoops},
-                               nullptr,  {kCheckpoint}};
+  OutputLayout layout = RunLayout();
+  layout.known = request.resume.has_value();  // by its checkpoint, which was read
   return OutputFolder(request.out, layout, request.keep, request.trace);
 }
 
@@ -126,7 +119,7 @@ std::vector<OutputFile> RunFiles(const RunResult& result) {
     return [&poses](const fs::path& file) { WriteTrajectory(file, poses, TrajectoryFormat::kTum); };
   };
   const auto text = [&result](std::string (*text_of)(const RunResult&)) {
-    return [&result, text_of](const fs::path& file) { WriteTextFile(file, text_of(result)); };
+    return [&result, text_of](const fs::path& file) { internal::WriteFile(file, text_of(result)); };
   };
   std::vector<OutputFile> files;
   const bool poses = !result.appearance_only;
@@ -150,20 +143,6 @@ std::vector<OutputFile> RunFiles(const RunResult& result) {
   return files;
 }
 
-// A device or a pipe gets the text itself, a file is replaced when the new one is complete.
-void WriteTrace(const fs::path& file, const std::string& text) {
-  if (!fs::is_regular_file(fs::symlink_status(file))) return WriteTextFile(file, text);
-  const fs::path fresh = file.parent_path() / (".tutti-new-" + file.filename().string());
-  try {
-    WriteTextFile(fresh, text);
-    fs::rename(fresh, file);
-  } catch (...) {
-    std::error_code ignored;
-    fs::remove(fresh, ignored);
-    throw;
-  }
-}
-
 }  // namespace
 
 void WriteOutputs(OutputFolder& folder, const RunRequest& request, RunResult& result,
@@ -182,10 +161,8 @@ void WriteOutputs(OutputFolder& folder, const RunRequest& request, RunResult& re
   if (more.Failed()) failures.push_back("the report: " + more.Failure());
   if (trace) {
     Attempts writing;
-    errno = 0;
-    writing.Try([&] { WriteTrace(*request.trace, trace()); });
-    const std::string reason = errno != 0 ? std::string(" (") + std::strerror(errno) + ")" : "";
-    if (writing.Failed()) failures.push_back(writing.Failure() + reason);
+    writing.Try([&] { internal::WriteFile(*request.trace, trace()); });
+    if (writing.Failed()) failures.push_back(writing.Failure());
   }
   if (map && request.save_map && !into_folder) {
     Attempts writing;
@@ -193,8 +170,7 @@ void WriteOutputs(OutputFolder& folder, const RunRequest& request, RunResult& re
     if (writing.Failed()) failures.push_back(writing.Failure());
   }
   if (!result.failure.empty())
-    std::fprintf(stderr, "tutti: the run broke off; what there was by then is in %s\n",
-                 result.folder.c_str());
+    internal::Say("the run broke off; what there was by then is in %s", result.folder.c_str());
   ThrowFailures(failures, result.folder);
 }
 

@@ -21,6 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::uintmax_t kRoomBytes = 32u << 20;      // a long run writes a few MB
+constexpr const char* kHidden = ".tutti-";            // how names begin that are not shown
 constexpr const char* kLock = ".tutti-lock";          // stays: it marks the folder as tutti's
 constexpr const char* kNew = ".tutti-new";            // files that wait
 constexpr const char* kComplete = ".tutti-complete";  // the same, when all are there; may end with -NUMBER
@@ -69,6 +70,32 @@ bool Within(const fs::path& folder, const fs::path& file) {
   return std::mismatch(outer.begin(), outer.end(), inner.begin(), inner.end()).first == outer.end();
 }
 
+// Throws InputError if the folder has files that tutti did not write.
+void RefuseForeign(const fs::path& folder, const OutputLayout& layout, const std::optional<fs::path>& own) {
+  std::error_code error;
+  bool empty = true;
+  const std::vector<std::string> passing = layout.Passing();
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
+    const std::string name = entry.path().filename();
+    if (name[0] == '.') continue;
+    if (own && Within(entry.path(), *own)) continue;
+    if (layout.is_part != nullptr && layout.is_part(entry.path())) continue;
+    empty = false;
+    if (layout.is_result(entry.path()) || std::count(passing.begin(), passing.end(), name) > 0) continue;
+    if (entry.is_directory(error) && (name == kUnfinished || IsNumber(name))) continue;
+    throw InputError(folder.string() + ": holds " + name + ", which is no result of tutti; choose another " +
+                     layout.option + ", or move it away");
+  }
+  if (error)
+    throw InputError(folder.string() + ": can't be read (" + error.message() + "); choose another " +
+                     layout.option);
+  if (empty || layout.known || fs::exists(folder / kLock, error) ||
+      ReadJson(folder / layout.last).contains(layout.key))
+    return;
+  throw InputError(folder.string() + ": is not empty, and has no " + layout.last +
+                   " by which a result of tutti is known; choose another " + layout.option + ", or empty it");
+}
+
 }  // namespace
 
 void RefuseToReplace(const fs::path& folder, const fs::path& file) {
@@ -90,23 +117,39 @@ std::vector<std::string> OutputLayout::Passing() const {
   return names;
 }
 
+void OutputFolder::Check(const fs::path& folder, const OutputLayout& layout,
+                         const std::optional<fs::path>& own) {
+  std::error_code error;
+  if (fs::exists(folder, error) && !fs::is_directory(folder, error))
+    throw InputError(folder.string() + ": is a file; " + layout.option + " needs a folder");
+  std::vector<fs::path> made;  // the innermost first
+  for (fs::path at = fs::absolute(folder).lexically_normal();
+       at.has_relative_path() && !fs::exists(at, error); at = at.parent_path())
+    made.push_back(at);
+  fs::create_directories(folder, error);
+  const std::string failed = error ? error.message() : "";
+  const std::string denied = access(folder.c_str(), W_OK | X_OK) == 0 ? "" : std::strerror(errno);
+  for (const fs::path& at : made) fs::remove(at, error);  // empty as they are
+  if (!failed.empty())
+    throw InputError(folder.string() + ": the folder can't be made (" + failed + "); choose another " +
+                     layout.option);
+  if (!denied.empty())
+    throw InputError(folder.string() + ": no permission to write there (" + denied + "); choose another " +
+                     layout.option);
+  if (made.empty()) RefuseForeign(folder, layout, own);
+}
+
 OutputFolder::OutputFolder(fs::path folder, OutputLayout layout, bool keep,
                            const std::optional<fs::path>& own)
     : folder_(std::move(folder)), staging_(folder_ / kNew), layout_(std::move(layout)), keep_(keep) {
-  std::error_code error;
-  if (fs::exists(folder_, error) && !fs::is_directory(folder_, error)) {
-    throw InputError(folder_.string() + ": is a file; " + layout_.option + " needs a folder");
-  }
-  fs::create_directories(folder_, error);
-  if (error) {
-    throw InputError(folder_.string() + ": the folder can't be made (" + error.message() +
-                     "); choose another " + layout_.option);
-  }
-  RefuseForeign(own);
+  Check(folder_, layout_, own);
+  fs::create_directories(folder_);
+  RefuseLinks();
   Lock();
   try {
     CheckRoom();
     Enter();
+    RefuseLinks();  // in what a process left that was killed
     fs::remove_all(staging_);
     if (keep_) KeepLeftovers();
   } catch (const fs::filesystem_error& thrown) {
@@ -125,34 +168,26 @@ OutputFolder::~OutputFolder() {
   close(lock_);
 }
 
-void OutputFolder::RefuseForeign(const std::optional<fs::path>& own) const {
-  std::error_code error;
-  bool empty = true;
+// What is written in its place, not moved there: behind a link it would be another folder's file.
+void OutputFolder::RefuseLinks() const {
   const std::vector<std::string> passing = layout_.Passing();
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder_, error)) {
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder_)) {
     const std::string name = entry.path().filename();
-    if (name[0] == '.') continue;
-    if (own && Within(entry.path(), *own)) continue;
-    if (layout_.is_part != nullptr && layout_.is_part(entry.path())) continue;
-    empty = false;
-    if (layout_.is_result(entry.path()) || std::count(passing.begin(), passing.end(), name) > 0) continue;
-    if (entry.is_directory(error) && (name == kUnfinished || IsNumber(name))) continue;
-    throw InputError(folder_.string() + ": holds " + name + ", which is no result of tutti; choose another " +
-                     layout_.option + ", or move it away");
+    const bool hidden = name.rfind(kHidden, 0) == 0, folder = name == kUnfinished || IsNumber(name);
+    if (!hidden && !folder && std::count(passing.begin(), passing.end(), name) == 0) continue;
+    const fs::file_status status = entry.symlink_status();
+    if (fs::is_regular_file(status) || fs::is_directory(status)) continue;
+    throw InputError(
+        entry.path().string() +
+        ": is a link or a device, and results are written into their folder alone; remove it, or "
+        "choose another " +
+        layout_.option);
   }
-  if (error)
-    throw InputError(folder_.string() + ": can't be read (" + error.message() + "); choose another " +
-                     layout_.option);
-  if (empty || fs::exists(folder_ / kLock, error) || ReadJson(folder_ / layout_.last).contains(layout_.key))
-    return;
-  throw InputError(folder_.string() + ": is not empty, and has no " + layout_.last +
-                   " by which a result of tutti is known; choose another " + layout_.option +
-                   ", or empty it");
 }
 
 void OutputFolder::Lock() {
   const fs::path file = folder_ / kLock;
-  lock_ = open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+  lock_ = open(file.c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, 0666);
   if (lock_ < 0) {
     throw InputError(folder_.string() + ": no permission to write there (" + std::strerror(errno) +
                      "); choose another " + layout_.option);
@@ -290,6 +325,7 @@ void OutputFolder::Enter() const {
   }
   for (const fs::path& fresh : complete) {
     const std::string number = fresh.filename().string().substr(std::strlen(kComplete));
+    if (!number.empty() && !IsNumber(number.substr(1))) continue;  // no name that Finish gives
     const fs::path kept = number.empty() ? fs::path() : folder_ / number.substr(1);
     if (!number.empty()) fs::create_directories(kept);
     for (const fs::path& old : Results()) {

@@ -27,6 +27,7 @@ struct OutputLayout {
   bool (*is_part)(const std::filesystem::path& entry) = nullptr;
   std::vector<std::string> until_finished = {};  ///< as live, but they stay where the command ended early
   const char* option = "--out";                  ///< that the folder was given with, for messages
+  bool known = false;                            ///< that the folder is tutti's, whether it has `last` or not
 
   /// All files but those of a result.
   std::vector<std::string> Passing() const;
@@ -40,12 +41,17 @@ class OutputFolder {
   /// Makes the folder, proves that it can be written to and has room, and locks it. `keep`: an earlier result
   /// is not replaced but moved into a folder inside, 1, 2, ... `own`: one more file that may be there. Throws
   /// InputError that says what to do, before anything changed: no folder can be made, another process holds
-  /// it, or it has files that tutti did not write.
+  /// it, it has files that tutti did not write, or links where files are written.
   OutputFolder(std::filesystem::path folder, OutputLayout layout, bool keep = false,
                const std::optional<std::filesystem::path>& own = std::nullopt);
   ~OutputFolder();
   OutputFolder(const OutputFolder&) = delete;
   OutputFolder& operator=(const OutputFolder&) = delete;
+
+  /// What the constructor would throw of the folder itself, for the time before long work: no folder can be
+  /// made there, it may not be written to, or it has files that tutti did not write. Leaves nothing behind.
+  static void Check(const std::filesystem::path& folder, const OutputLayout& layout,
+                    const std::optional<std::filesystem::path>& own = std::nullopt);
 
   const std::filesystem::path& path() const { return folder_; }
 
@@ -63,7 +69,7 @@ class OutputFolder {
 
  private:
   std::vector<std::filesystem::path> Results() const;
-  void RefuseForeign(const std::optional<std::filesystem::path>& own) const;
+  void RefuseLinks() const;
   void Lock();
   void CheckRoom() const;
   std::filesystem::path NextNumber() const;

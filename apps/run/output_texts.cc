@@ -34,8 +34,8 @@ Json ScoreJson(const TrajectoryScore& score) {
                {"ate_std_m", score.ate.std},
                {"ate_min_m", score.ate.min},
                {"ate_max_m", score.ate.max},
-               {"ate_rotation_rmse_deg", score.ate_rotation.rmse},
-               {"rpe_rmse_m", score.rpe.rmse},
+               {"ate_rotation_rmse_deg", score.rotations ? Json(score.ate_rotation.rmse) : Json()},
+               {"rpe_rmse_m", score.rotations ? Json(score.rpe.rmse) : Json()},
                {"poses", score.poses},
                {"scale", score.scale}};
   if (score.kitti.segments > 0) {
@@ -285,6 +285,7 @@ std::string SummaryJson(const RunResult& r) {
         {"alignment", r.evaluation->alignment},  {"ground_truth", r.evaluation->file},
         {"path_m", r.evaluation->path_m},        {"odometry", ScoreJson(r.evaluation->odometry)},
         {"slam", ScoreJson(r.evaluation->slam)}, {"odometry_complete", r.odometry_complete}};
+    if (r.evaluation->scaled.valid) json["evaluation"]["sim3_scale"] = r.evaluation->scaled.scale;
   }
   Json config = Json::object();
   for (const ConfigEntry& entry : DescribeConfig(r.config)) {

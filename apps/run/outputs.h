@@ -16,6 +16,9 @@ namespace tutti {
 /// RunRequest::save_map of a map that lies beside the other results.
 constexpr const char* kMap = "map.tutti";
 
+/// What a run leaves in its folder.
+OutputLayout RunLayout();
+
 /// Opens the folder of a run. Throws InputError that says what to do; also if `reference` (a file; empty for
 /// none) lies inside.
 OutputFolder OpenOutputFolder(const RunRequest& request, const std::filesystem::path& reference);

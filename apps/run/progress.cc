@@ -10,6 +10,8 @@
 namespace tutti {
 namespace {
 
+constexpr std::size_t kMostAlike = 5;  // messages of one kind
+
 // "45 s", "3:20", "2:05:00".
 std::string TimeLeft(double seconds) {
   const auto all = static_cast<long long>(std::min(seconds + 0.5, 1e7));
@@ -78,15 +80,33 @@ void Progress::Update(std::size_t done, const std::string& status) {
   std::fflush(out_);
 }
 
-void Progress::Note(const std::string& message) {
-  if (out_ == nullptr) return;
-  std::fprintf(out_, "%s%s\n", line_open_ ? "\r\x1b[K" : "", message.c_str());
+void Progress::Say(const std::string& status) {
+  constexpr double kSoon = 1;
+  const double seconds = since_begin_.Seconds();
+  if (out_ == nullptr || seconds < (terminal_ ? kSoon : next_line_s_)) return;
+  if (terminal_ && line_open_ && since_line_.Milliseconds() < 100) return;
+  since_line_ = {};
+  next_line_s_ = 2 * seconds;
+  char after[40];
+  std::snprintf(after, sizeof after, ", %.0f s", seconds);
+  const std::string line = (title_ + " " + status + after).substr(0, Columns() - 1);
+  std::fprintf(out_, terminal_ ? "\r%s\x1b[K" : "%s\n", line.c_str());
+  line_open_ = terminal_;
+  std::fflush(out_);
+}
+
+void Progress::Note(const std::string& message, const std::string& more) {
+  if (out_ == nullptr || (!more.empty() && ++noted_[more] > kMostAlike)) return;
+  std::fprintf(out_, "%s%s", line_open_ ? "\r\x1b[K" : "", internal::Message(message, out_).c_str());
   std::fflush(out_);
 }
 
 void Progress::Finish() {
   if (out_ != nullptr && line_open_) std::fputc('\n', out_);
   line_open_ = false;
+  for (const auto& [more, count] : std::exchange(noted_, {})) {
+    if (count > kMostAlike) Note("tutti: " + std::to_string(count - kMostAlike) + " more " + more);
+  }
 }
 
 }  // namespace tutti

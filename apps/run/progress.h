@@ -3,25 +3,32 @@
 
 #include <cstddef>
 #include <cstdio>
+#include <map>
 #include <string>
 
 #include "core/stopwatch.h"
+#include "core/terminal.h"
 
 namespace tutti {
 
-/// Writes to `out` (stderr by default; nullptr: silent). Never part of a result.
+/// Writes to `out` (nullptr: silent). Never part of a result.
 class Progress {
  public:
   /// `total` frames; 0: nobody knows how many. `columns`: width of a line; 0: that of the terminal.
-  Progress(std::string title, std::size_t total, std::FILE* out = stderr, std::size_t columns = 0);
+  Progress(std::string title, std::size_t total, std::FILE* out = internal::StandardError(),
+           std::size_t columns = 0);
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
   /// `done` of `total` frames; `status` is free text (state, loops). The line never fills the last column.
   void Update(std::size_t done, const std::string& status);
-  /// A message above the progress line.
-  void Note(const std::string& message);
+  /// Work that can't be counted: the title and `status`, from the second second on. Where there is no
+  /// terminal, a line when as much time has passed again as at the last one (10 s at first).
+  void Say(const std::string& status);
+  /// A message above the progress line. Of messages that say the same of one frame after the other five are
+  /// printed, and Finish counts the rest: "tutti: 17 more " and `more` ("frames are skipped").
+  void Note(const std::string& message, const std::string& more = "");
   void Finish();
 
  private:
@@ -35,6 +42,8 @@ class Progress {
   bool terminal_ = false;
   bool line_open_ = false;
   std::size_t next_tenth_ = 1;
+  std::map<std::string, std::size_t> noted_;  // messages by what more of them are
+  double next_line_s_ = 10;
   internal::Stopwatch since_begin_, since_line_;
 };
 

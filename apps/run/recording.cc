@@ -1,17 +1,18 @@
 #include "apps/run/recording.h"
 
-#include <cmath>
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 
 #include "apps/run/calibration_file.h"
 #include "apps/run/photo_lens.h"
-#include "core/angle.h"
 #include "core/camera_text.h"
 #include "core/example_configs.h"
 #include "core/text_reader.h"
 #include "frontend/dataset/image_file.h"
+#include "frontend/dataset/layout.h"
 #include "tutti/core/error.h"
+#include "tutti/core/text.h"
 #include "tutti/frontend/dataset.h"
 
 namespace tutti {
@@ -37,11 +38,18 @@ std::string Short(double value) {
 }
 
 // A configuration of those that come along, for all but its camera.
-RunConfig Published(const std::string& name) { return LoadConfig(internal::ExampleConfig(name + ".yaml")); }
+RunConfig Published(const std::string& name) {
+  return ParseConfig(internal::ExampleConfig(name).value(), "tutti's " + name + ".yaml");
+}
 
-// The pixels that the camera must fit.
-void SetImageSize(const fs::path& dataset, const DatasetOptions& options, PinholeCamera& camera) {
-  if (camera.width > 0 && camera.height > 0) return;
+// What can be opened once is opened for the run alone: its size is not known before.
+bool OpensOnce(const fs::path& dataset) {
+  const std::vector<std::string> sources = CameraSources(dataset.string());
+  return std::any_of(sources.begin(), sources.end(), IsPipe);
+}
+
+// The camera of the images by their size alone, with this field of view [deg] if one is given.
+PinholeCamera CameraBySize(const fs::path& dataset, const DatasetOptions& options, double view_deg = 0) {
   const bool live = IsCamera(dataset.string());
   DatasetOptions any = options;
   if (!live) any.sensor = Sensor::kMono;  // of cameras it says how large one of two images is
@@ -51,30 +59,28 @@ void SetImageSize(const fs::path& dataset, const DatasetOptions& options, Pinhol
   any.T_right_left = {};
   any.mask.clear();
   any.rotate = 0;
+  any.fov_deg = view_deg;
+  any.baseline_m = 1;  // of pairs; it decides nothing here
   const DatasetType type = live ? DatasetType::kVideo : DetectDatasetType(dataset);
   if (type == DatasetType::kKitti || type == DatasetType::kTum) {
     // Without any camera these can't be opened: one that fits every image.
     any.type = DatasetType::kImages;
-    if (const std::optional<fs::path> images = ImagesOfDataset(dataset)) {
-      const PinholeCamera seen = OpenDataset(*images, any)->Rig().camera;
-      camera.width = seen.width;
-      camera.height = seen.height;
-      return;
-    }
+    if (const std::optional<fs::path> images = ImagesOfDataset(dataset))
+      return OpenDataset(*images, any)->Rig().camera;
     throw InputError(dataset.string() +
                      ": the size of the images is not known; use --calibration with a file that has it");
   }
   if (IsCameraDevice(dataset.string()) && !IsStream(dataset.string()))
     throw InputError(dataset.string() + ": a live camera needs a calibration with its image size");
-  const PinholeCamera seen = OpenDataset(dataset, any)->Rig().camera;
-  camera.width = seen.width;
-  camera.height = seen.height;
+  return OpenDataset(dataset, any)->Rig().camera;
 }
 
-void SetView(double view_deg, PinholeCamera& camera) {
-  camera.fx = camera.fy = 0.5 * camera.width / std::tan(0.5 * view_deg / internal::kDegrees);
-  camera.cx = 0.5 * (camera.width - 1);
-  camera.cy = 0.5 * (camera.height - 1);
+// The pixels that the camera must fit.
+void SetImageSize(const fs::path& dataset, const DatasetOptions& options, PinholeCamera& camera) {
+  if ((camera.width > 0 && camera.height > 0) || OpensOnce(dataset)) return;
+  const PinholeCamera seen = CameraBySize(dataset, options);
+  camera.width = seen.width;
+  camera.height = seen.height;
 }
 
 void CheckCamera(const PinholeCamera& camera, const std::string& source) {
@@ -106,11 +112,15 @@ std::string SetRequested(const fs::path& dataset, const CameraRequest& request, 
     source = "--camera";
     SetImageSize(dataset, options, camera);
   } else {
-    SetImageSize(dataset, options, camera);
-    SetView(*request.view_deg, camera);
     source = "--fov " + Short(*request.view_deg);
+    if (OpensOnce(dataset)) {
+      options.fov_deg = *request.view_deg;
+      options.camera.reset();
+      return source;
+    }
+    camera = CameraBySize(dataset, options, *request.view_deg);
   }
-  CheckCamera(camera, source);
+  if (camera.width > 0) CheckCamera(camera, source);  // else once there is an image
   if (options.right) CheckCamera(*options.right, source + ": right");
   options.camera = camera;
   return source;
@@ -133,6 +143,8 @@ class Recogniser {
       Tum();
     } else if (type == DatasetType::kEuroc) {
       Euroc();
+    } else if (type == DatasetType::kPaired) {
+      Paired();
     } else {
       Single(type, live);
     }
@@ -165,6 +177,7 @@ class Recogniser {
     layout_ = std::string("as ") + kConfiguration + " in the folder says";
     source_ = kConfiguration;
     out_.config = LoadConfig(dataset_ / kConfiguration);
+    out_.config.loops.ltm_file.clear();  // nobody gave this file: what it names is not written
     if (!sensor_) sensor_ = Options().sensor;
     if (request_.HasLens()) Requested();
   }
@@ -198,20 +211,28 @@ class Recogniser {
   }
 
   void Tum() {
-    layout_ = "TUM (" + std::string(Exists("rgb.txt") ? "rgb.txt" : "associations.txt");
-    const bool depth = Exists("depth.txt") || Exists("associations.txt");
+    const TumLists lists = TumListsOf(dataset_);
+    const bool loris = std::string(lists.colour) == "color.txt";
+    layout_ = std::string(loris ? "OpenLORIS (" : "TUM (") +
+              (Exists(lists.colour) ? lists.colour : "associations.txt");
+    const bool depth = Exists(lists.depth) || Exists("associations.txt");
     if (!sensor_) sensor_ = depth ? Sensor::kRgbd : Sensor::kMono;
-    layout_ += depth && Exists("depth.txt") ? ", depth.txt)" : ")";
+    layout_ += Exists(lists.depth) ? std::string(", ") + lists.depth + ")" : ")";
     const std::string kind = sensor_ == Sensor::kRgbd ? "rgbd" : "mono";
     const std::string known = TumCamera();
     out_.config = Published((known.empty() ? "tum_fr3" : known) + "_" + kind);
     const std::optional<PinholeCamera> published = Options().camera;
     ForgetCamera();
+    const LayoutCalibration own = ReadTumCalibration(dataset_);
+    units_ = own.depth_units_per_m;
+    if (known.empty()) Options().depth_units_per_m = 0;
     if (request_.HasLens()) {
       Requested();
     } else if (!known.empty() && !CalibrationBeside(dataset_)) {
       Options().camera = published;
       source_ = "the one published for freiburg" + known.substr(6);
+    } else if (own.rig.left) {
+      source_ = own.source;
     } else {
       BesideOrGuess();
     }
@@ -237,6 +258,71 @@ class Recogniser {
     if (request_.HasLens()) Requested();
   }
 
+  // What suits the sensor, and the places where such data are recorded.
+  const char* ConfigurationOf(const std::string& layout) const {
+    if (layout == "KITTI raw") return sensor_ == Sensor::kStereo ? "kitti_00-02_stereo" : "kitti_00-02_mono";
+    if (sensor_ == Sensor::kStereo) return "euroc_stereo";
+    return sensor_ == Sensor::kRgbd ? "tum_fr3_rgbd" : "images";
+  }
+
+  void Paired() {
+    const bool stray = IsStrayScanner(dataset_);
+    const std::optional<FoundLayout> found = stray ? std::nullopt : FindLayout(dataset_);
+    const std::string name = stray ? "Stray Scanner" : found->layout->name;
+    const bool depth = stray ? HasImages(dataset_ / "depth") : found->depth;
+    layout_ = stray ? name + (depth ? " (rgb.mp4, depth)" : " (rgb.mp4)") : found->Text();
+    if (!sensor_) sensor_ = found && found->right ? Sensor::kStereo : depth ? Sensor::kRgbd : Sensor::kMono;
+    if (found && found->right && depth && sensor_ == Sensor::kStereo)
+      note_ = "--sensor rgbd uses the depth images";
+    out_.config = Published(ConfigurationOf(name));
+    ForgetCamera();
+    Options().type = DatasetType::kPaired;
+    Options().rate_hz = 0;
+    Options().depth_units_per_m = 0;
+    units_ = stray ? 1000 : found->layout->depth_units_per_m;
+    if (name == "Replica" || name.rfind("TartanAir", 0) == 0)
+      Options().max_depth_m = name == "Replica" ? 0 : 80;  // exact; the sky is at 10 km
+    LayoutCalibration known;
+    if (stray && Exists("camera_matrix.csv")) {
+      known.source = "camera_matrix.csv";
+      known.rig.left.emplace();
+    } else if (found) {
+      DatasetOptions any;
+      any.type = DatasetType::kPaired;
+      const PinholeCamera seen = OpenDataset(dataset_, any)->Rig().camera;
+      known = ReadLayoutCalibration(dataset_, *found, cv::Size(seen.width, seen.height));
+    }
+    if (request_.HasLens()) {
+      Requested();
+    } else if (known.rig.left) {
+      source_ = known.source;
+    } else if (const auto file = found ? CalibrationOf(*found) : std::nullopt) {
+      CameraRequest request;
+      request.calibration = file;
+      Options().sensor = *sensor_;
+      source_ = SetRequested(dataset_, request, Options());
+    } else {
+      BesideOrGuess();
+    }
+    const bool apart =
+        Options().baseline_m > 0 || Options().right || known.rig.baseline_m > 0 || known.rig.right;
+    if (sensor_ != Sensor::kStereo || apart) return;
+    if (request_.sensor)
+      throw InputError(
+          dataset_.string() +
+          ": the distance of the two cameras is not known; a calibration of both (--calibration) or "
+          "--set camera.baseline_m=METRES says it");
+    sensor_ = depth ? Sensor::kRgbd : Sensor::kMono;
+    note_ = "the right camera is not used: no file says how far apart the two are";
+  }
+
+  std::optional<fs::path> CalibrationOf(const FoundLayout& found) const {
+    for (const std::string& name : SplitText(found.layout->calibration, "|")) {
+      if (Exists(name.c_str())) return dataset_ / name;
+    }
+    return std::nullopt;
+  }
+
   void Single(DatasetType type, bool live) {
     const bool two = CameraSources(dataset_.string()).size() > 1;
     if (two && !sensor_)
@@ -245,6 +331,7 @@ class Recogniser {
                        "(COLOUR,DEPTH)");
     layout_ = live && IsStream(dataset_)     ? "a stream"
               : two                          ? "two cameras"
+              : OpensOnce(dataset_)          ? "a video through a pipe"
               : live                         ? "a camera"
               : type == DatasetType::kImages ? "a folder of images"
               : type == DatasetType::kBag    ? "a ROS bag"
@@ -278,7 +365,7 @@ class Recogniser {
     std::error_code ignored;
     const fs::path folder = fs::is_directory(dataset_, ignored) ? dataset_ : dataset_.parent_path();
     CameraRequest request;
-    if (!IsStream(dataset_.string())) request.calibration = CalibrationBeside(folder);
+    if (!IsStream(dataset_.string()) && !OpensOnce(dataset_)) request.calibration = CalibrationBeside(folder);
     Options().sensor = sensor_.value_or(Sensor::kMono);
     if (!request.calibration) {
       request.view_deg = kUsualView;
@@ -287,7 +374,7 @@ class Recogniser {
     source_ = SetRequested(dataset_, request, Options());
     if (!out_.guessed_lens) return;
     source_ = "guessed: a field of view of " + Short(kUsualView) + " deg";
-    UsePhotos();
+    if (!OpensOnce(dataset_)) UsePhotos();
   }
   // The focal length of the first photo that has one, as a better guess.
   void UsePhotos() {
@@ -316,7 +403,10 @@ class Recogniser {
       sensor = "stereo";
       if (!live) other = "; --sensor mono uses the left camera alone";
     } else if (Options().sensor == Sensor::kRgbd) {
-      sensor = "RGB-D, " + Short(Options().depth_units_per_m) + " units of depth a metre";
+      const double units = Options().depth_units_per_m > 0 ? Options().depth_units_per_m : units_;
+      sensor = "RGB-D, " + (units > 0 ? Short(units) + " units of depth a metre"
+                                      : "5000 units of depth a metre assumed, as TUM has them");
+      if (units == 1) sensor = "RGB-D, depth in metres";
       other = " (--set dataset.depth_units_per_m=1000 for millimetres)";
       if (!live) other += "; --sensor mono uses colour alone";
     }
@@ -325,8 +415,11 @@ class Recogniser {
     if (Options().camera) {
       const PinholeCamera& c = *Options().camera;
       char text[160];
-      std::snprintf(text, sizeof text, "%dx%d px, fx %.1f, fy %.1f (", c.width, c.height, c.fx, c.fy);
+      const std::string lens =
+          c.distortion == Distortion::kNone ? "" : std::string(", ") + WordOf(c.distortion);
+      std::snprintf(text, sizeof text, "fx %.1f, fy %.1f%s (", c.fx, c.fy, lens.c_str());
       camera = text + camera + ")";
+      if (c.width > 0) camera = std::to_string(c.width) + "x" + std::to_string(c.height) + " px, " + camera;
     }
     out_.findings = {
         "layout  " + layout_ + "; --set dataset.type=... for another", "sensor  " + sensor + other,
@@ -338,6 +431,7 @@ class Recogniser {
   std::optional<Sensor> sensor_;
   Recording out_;
   std::string layout_, source_, note_;
+  double units_ = 0;  // of depth, that the layout has; 0: not known
 };
 
 }  // namespace

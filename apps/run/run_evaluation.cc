@@ -28,6 +28,7 @@ TrajectoryScore Score(const Trajectory& reference, const Trajectory& estimate, b
   try {
     const EvaluationReport report = EvaluateTrajectory(reference, estimate, options);
     score.valid = true;
+    score.rotations = report.rotations;
     score.poses = report.pairs;
     score.alignment = report.S_reference_estimate;
     score.scale = score.alignment.scale;
@@ -53,10 +54,20 @@ double PathBetween(const Trajectory& trajectory, double begin_s, double end_s) {
   return path;
 }
 
-LoopError Apart(const Pose& candidate, const Pose& query) {
+double Extent(const Trajectory& trajectory) {
+  if (trajectory.empty()) return 0;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const StampedPose& pose : trajectory) sum += pose.pose.translation;
+  const auto count = static_cast<double>(trajectory.size());
+  double squares = 0;
+  for (const StampedPose& pose : trajectory) squares += (pose.pose.translation - sum / count).squaredNorm();
+  return std::sqrt(squares / count);
+}
+
+LoopError Apart(const Pose& candidate, const Pose& query, bool rotations = true) {
   LoopError apart;
   apart.distance_m = (candidate.translation - query.translation).norm();
-  apart.angle_deg = (candidate.Inverse() * query).Angle() * internal::kDegrees;
+  if (rotations) apart.angle_deg = (candidate.Inverse() * query).Angle() * internal::kDegrees;
   return apart;
 }
 
@@ -69,13 +80,17 @@ std::optional<bool> Judge(const LoopRecord& loop, const Trajectory& reference, s
   const std::optional<Pose> query = PoseOfFrame(reference, loop.query_stamp_s, result.frame_interval_s);
   if (!candidate || !query) return std::nullopt;
   const Pose candidate_camera = *candidate * rig.T_body_camera, query_camera = *query * rig.T_body_camera;
-  error = Apart(candidate_camera, query_camera);
+  error = Apart(candidate_camera, query_camera, HasRotations(reference));
   if (!scale) return std::nullopt;
   const auto found = result.map_figures.depth.find(loop.query);
   const double depth = found == result.map_figures.depth.end() ? 0 : *scale * found->second;
   const double path = PathBetween(reference, loop.candidate_stamp_s, loop.query_stamp_s);
   const double by_path = std::max(kLeastAllowed, kPathShare * path);
   if (!loop.S_candidate_query) return error.distance_m <= std::max(by_path, depth);
+  if (!HasRotations(reference)) {  // the distances of the two places alone can be compared
+    error.error_m = std::abs(*scale * loop.S_candidate_query->translation.norm() - error.distance_m);
+    return error.error_m <= std::max(by_path, kDepthShare * depth);
+  }
   Pose constraint = loop.S_candidate_query->RigidPart();
   constraint.translation *= *scale;
   const Pose difference = (candidate_camera.Inverse() * query_camera).Inverse() * constraint;
@@ -107,6 +122,7 @@ void EvaluateRun(const Trajectory& reference, const std::string& file, RunResult
   if (!result.appearance_only) {
     evaluation.slam = Score(reference, result.trajectory, mono);
     evaluation.odometry = Score(reference, result.trajectory_odometry, mono);
+    if (!mono) evaluation.scaled = Score(reference, result.trajectory, true);
   }
   if (!result.trajectory.empty()) {
     const double first = result.trajectory.front().stamp_s, last = result.trajectory.back().stamp_s;
@@ -117,6 +133,7 @@ void EvaluateRun(const Trajectory& reference, const std::string& file, RunResult
       }
       result.reference.push_back(pose);
     }
+    evaluation.extent_m = Extent(result.reference);
   }
   MeasureLoops(result);
   std::optional<double> scale = 1.0;

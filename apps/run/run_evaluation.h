@@ -16,8 +16,9 @@ void MeasureLoops(RunResult& result);
 /// reference's relative pose. It is false if its translation is off by more than the scene and the path
 /// allow, the greatest of 10 % of the median depth of the query's landmarks, 0.5 % of the path between its
 /// ends, and 0.05 m; or its rotation by more than 8 deg. Where there is no constraint, the distance of the
-/// two places takes the error's place, and the whole median depth that of the 10 %. Accepted loops whose ends
-/// have no reference (PoseOfFrame) count as neither. Sets result.reference (cut to the run),
+/// two places takes the error's place, and the whole median depth that of the 10 %. Where the reference has
+/// positions alone, it is by how much the distance of the two places differs from the constraint's. Accepted
+/// loops whose ends have no reference (PoseOfFrame) count as neither. Sets result.reference (cut to the run),
 /// result.evaluation, result.loop_errors and LoopRecord::correct.
 void EvaluateRun(const Trajectory& reference, const std::string& file, RunResult& result);
 

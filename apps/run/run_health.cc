@@ -1,8 +1,11 @@
 #include "apps/run/run_health.h"
+#include "core/terminal.h"
 
 #include <algorithm>
 #include <cstdio>
 #include <string_view>
+
+#include "tutti/frontend/dataset.h"
 
 namespace tutti {
 namespace {
@@ -16,6 +19,16 @@ std::string Shown(const RunSign& sign) {
     std::snprintf(text, sizeof text, unit == "1" ? "%.0f" : "%.2f", sign.value);
   }
   return text;
+}
+
+// Most frames have no pose: what one image shows is not in the next.
+bool ShowsNoFilm(const RunResult& result, const RunHealth& health) {
+  const bool no_photos =
+      result.rig.sensor != Sensor::kMono || result.dataset.empty() || IsCamera(result.dataset);
+  if (health.word != HealthWord::kFailed || no_photos || result.given_odometry) return false;
+  return std::any_of(health.signs.begin(), health.signs.end(), [](const RunSign& sign) {
+    return sign.kind->name == std::string_view("frames_posed") && sign.kind->IsFailed(sign.value);
+  });
 }
 
 std::string Sentence(const RunSign& sign) {
@@ -55,6 +68,9 @@ std::optional<RunHealth> HealthOf(const RunResult& result) {
     health.word = HealthWord::kFailed;
     health.reasons.push_back("no frame could be read; frames.bad_frames in summary.json says why");
   }
+  if (ShowsNoFilm(result, health))
+    health.reasons.push_back("are these separate photos, and no film? `tutti loops " + result.dataset +
+                             "` finds those that show the same place, without poses");
   return health;
 }
 
@@ -65,7 +81,7 @@ std::string HealthText(const RunResult& result) {
   if (health->word == HealthWord::kGood)
     return "\n  " + word + ": nothing that the run shows speaks against its result\n";
   std::string text = "\n  " + word + ":\n";
-  for (const std::string& reason : health->reasons) text += "    * " + reason + "\n";
+  for (const std::string& reason : health->reasons) text += "    * " + internal::Printable(reason) + "\n";
   return text;
 }
 

@@ -12,7 +12,7 @@ namespace tutti {
 enum class HealthWord { kGood, kDoubtful, kFailed };
 const char* ToString(HealthWord word);  ///< "good", "doubtful", "failed"
 
-/// What the run itself shows, without ground truth.
+/// What the run itself shows, and its ground truth if it has one.
 struct RunHealth {
   HealthWord word = HealthWord::kGood;
   std::vector<std::string> reasons;  ///< sentences: what is wrong, and what to do; none if good

@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "apps/run/outputs.h"
 #include "tutti/core/error.h"
 #include "tutti/frontend/dataset.h"
 
@@ -31,7 +32,7 @@ std::string NoteOf(const RunRequest& request) {
   return note.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
 }
 
-RunRequest RequestOf(const std::string& note, const fs::path& file) {
+RunRequest RequestOf(const std::string& note, const fs::path& file, std::string* elsewhere) {
   const nlohmann::json json = nlohmann::json::parse(note, nullptr, false);
   if (!json.is_object() || !json.contains("dataset"))
     throw InputError(file.string() + ": is no checkpoint of tutti run");
@@ -41,7 +42,11 @@ RunRequest RequestOf(const std::string& note, const fs::path& file) {
     request.config = json.at("config").get<std::string>();
     if (json.contains("ground_truth")) request.ground_truth = json["ground_truth"].get<std::string>();
     if (json.contains("map")) request.map = json["map"].get<std::string>();
-    if (json.contains("save_map")) request.save_map = json["save_map"].get<std::string>();
+    if (json.contains("save_map")) {
+      const std::string map = json["save_map"].get<std::string>();
+      if (elsewhere != nullptr && map != kMap) *elsewhere = map;
+      request.save_map = kMap;
+    }
     if (json.contains("checkpoint_s")) request.checkpoint_s = json["checkpoint_s"].get<double>();
     request.keep = json.value("keep", false);
   } catch (const nlohmann::json::exception& error) {

@@ -90,7 +90,10 @@ std::optional<std::pair<Trajectory, std::string>> ReadReference(const Dataset& d
       request.ground_truth ? request.ground_truth : dataset.GroundTruthFile();
   if (!file) return std::nullopt;
   try {
-    return std::make_pair(dataset.ReadGroundTruth(*file, warnings), file->string());
+    Trajectory reference = dataset.ReadGroundTruth(*file, warnings);
+    if (!HasRotations(reference) && warnings != nullptr)
+      warnings->push_back(file->string() + ": has positions alone; errors of rotation are left out");
+    return std::make_pair(std::move(reference), file->string());
   } catch (const InputError& e) {
     const char* hint = " (ground truth; --ground-truth none runs without it)";
     throw InputError(e.what() + std::string(hint));

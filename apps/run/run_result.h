@@ -50,10 +50,11 @@ struct TrajectoryScore {
   bool valid = false;
   std::string reason;            ///< why there is no score
   std::size_t poses = 0;         ///< pairs that were compared
-  ErrorStatistics ate;           ///< [m]
+  bool rotations = true;         ///< false: the reference has positions alone, the next three are unknown
   ErrorStatistics ate_rotation;  ///< [deg]
   ErrorStatistics rpe;           ///< from frame to frame [m]
   KittiErrors kitti;             ///< no segments if the path is shorter than 100 m
+  ErrorStatistics ate;           ///< [m]
   double scale = 1;              ///< of the alignment (1 for SE(3))
   Similarity alignment;          ///< S_reference_estimate
 };
@@ -63,7 +64,9 @@ struct RunEvaluation {
   std::string file;       ///< of the ground truth
   std::string alignment;  ///< "se3" or "sim3"
   double path_m = 0;      ///< length of the reference over the run
+  double extent_m = 0;    ///< of the reference: RMS distance from the middle of its positions
   TrajectoryScore odometry, slam;
+  TrajectoryScore scaled;  ///< slam with a scale (Sim(3)), where it has one of its own: stereo and RGB-D
   int loops_true = 0, loops_false = 0, loops_unknown = 0;  ///< of the accepted ones
 };
 
@@ -103,6 +106,7 @@ struct RunResult {
   std::size_t frames_lost = 0;           ///< read, but without a pose when they came
   bool realtime = false;                 ///< played by the time stamps
   std::size_t frames_dropped = 0;        ///< not looked at, since newer ones were there already
+  double skipped_share = 0;              ///< Dataset::SkippedShare
   std::size_t frames_without_mask = 0;   ///< where each image has a mask of its own: read, but without one
   std::size_t frames_without_depth = 0;  ///< stereo and RGB-D: read, but without a right or depth image
   std::vector<BadFrame> bad;

@@ -16,6 +16,7 @@ constexpr std::ptrdiff_t kMostRefused = 2;  // verified loops that did not enter
 constexpr double kSigmas = 1.25;            // that a focal length may be off; they are generous
 constexpr std::size_t kNeighbours = 7;      // steps on either side of one
 constexpr double kStill = 0.002;            // of the scene's depth: images move by about a pixel
+constexpr double kReferenceOff = 0.02;      // that a ground truth may be off [m]
 
 bool HasMap(const RunResult& r) {
   return !r.given_odometry && !r.Void() && r.map_figures.keyframes >= kEnoughKeyframes;
@@ -23,10 +24,11 @@ bool HasMap(const RunResult& r) {
 
 Value Share(double part, double whole) { return whole > 0 ? Value(part / whole) : std::nullopt; }
 
-Value FramesPosed(const RunResult& r) {
-  const auto read = static_cast<double>(r.frames_total - r.bad.size() - r.frames_dropped);
-  return Share(static_cast<double>(r.frames_tracked), read);
+double FramesRead(const RunResult& r) {
+  return static_cast<double>(r.frames_total - r.bad.size() - r.frames_dropped);
 }
+
+Value FramesPosed(const RunResult& r) { return Share(static_cast<double>(r.frames_tracked), FramesRead(r)); }
 
 Value ShareOfLargestPiece(const RunResult& r) {
   auto all = static_cast<double>(r.frames_tracked);
@@ -120,6 +122,41 @@ Value LoopsRefused(const RunResult& r) {
 
 Value CalibrationFindings(const RunResult& r) { return static_cast<double>(r.calibration_findings.size()); }
 
+Value DamagedImages(const RunResult& r) {
+  const Value bad =
+      Share(static_cast<double>(r.bad.size()), static_cast<double>(r.frames_total - r.frames_dropped));
+  return 1 - (1 - bad.value_or(0)) * (1 - r.skipped_share);
+}
+
+Value DroppedFrames(const RunResult& r) {
+  if (!r.realtime) return std::nullopt;
+  return Share(static_cast<double>(r.frames_dropped), static_cast<double>(r.frames_total));
+}
+
+Value WithoutDepth(const RunResult& r) {
+  if (r.rig.sensor == Sensor::kMono) return std::nullopt;
+  return Share(static_cast<double>(r.frames_without_depth), FramesRead(r));
+}
+
+// Beyond what the ground truth itself may be off.
+Value ErrorOver(const RunResult& r, double length_m) {
+  if (!r.evaluation || !r.evaluation->slam.valid) return std::nullopt;
+  return Share(std::max(0.0, r.evaluation->slam.ate.rmse - kReferenceOff), length_m);
+}
+
+Value ErrorOfPath(const RunResult& r) { return ErrorOver(r, r.evaluation ? r.evaluation->path_m : 0); }
+
+Value ErrorOfExtent(const RunResult& r) { return ErrorOver(r, r.evaluation ? r.evaluation->extent_m : 0); }
+
+// At least: a scale is known as well as the positions that it is from.
+Value ScaleOff(const RunResult& r) {
+  if (!r.evaluation || !r.evaluation->scaled.valid || !(r.evaluation->extent_m > 0)) return std::nullopt;
+  const TrajectoryScore& scaled = r.evaluation->scaled;
+  if (!(scaled.scale > 0)) return std::nullopt;
+  const double uncertain = std::max(scaled.ate.rmse, kReferenceOff) / r.evaluation->extent_m;
+  return std::exp(std::max(0.0, std::abs(std::log(scaled.scale)) - uncertain));
+}
+
 Value OdometryJumps(const RunResult& r) {
   return r.given_odometry ? Value(r.followed.jumps.size()) : std::nullopt;
 }
@@ -141,6 +178,21 @@ const std::vector<SignKind>& SignKinds() {
        "the map consists of several submaps: only %s of the poses are in trajectory.txt",
        "the others are in trajectory_piece_1.txt, ...; a view of a known place joins them",
        ShareOfLargestPiece},
+      {"damaged_images", "share",
+       "images of the recording that can't be used: damaged, or with a time stamp that an earlier one has",
+       kAbove, 0.05, 0.5, "%s of the images are damaged or repeat a time stamp, and were skipped",
+       "frames.bad_frames in summary.json and the notes at the start of the run say which; record or copy "
+       "them again",
+       DamagedImages},
+      {"dropped_frames", "share", "in real time: frames that the run was too slow for", kAbove, 0.25, kNever,
+       "%s of the frames were dropped, since the run could not follow",
+       "a lower odometry.features, smaller images or another machine follow; without --realtime every frame "
+       "counts",
+       DroppedFrames},
+      {"without_depth", "share", "stereo and depth images: frames that came without a right or depth image",
+       kAbove, 0.25, kNever, "%s of the frames came without a right or depth image",
+       "frames.bad_depth in summary.json and the notes at the start of the run say which and why",
+       WithoutDepth},
       {"few_inliers", "share", "frames with a pose by landmarks, of which fewer than 30 agree with it",
        kAbove, 0.25, 0.5, "%s of the poses rest on fewer than 30 landmarks",
        "dark, blurred or bare images; raise odometry.features, or slow down", FewInliers},
@@ -189,6 +241,21 @@ const std::vector<SignKind>& SignKinds() {
       {"calibration_findings", "1", "findings of tutti calibrate-check", kAbove, 0, kNever,
        "the calibration can't be right: findings: %s", "calibration_findings in summary.json says what to do",
        CalibrationFindings},
+      {"error_of_path", "share", "with ground truth: ATE beyond 2 cm, of the path's length", kAbove, 0.05,
+       0.15, "the ground truth says that positions are off by %s of the path",
+       "the table above has the figures; check camera, depth scale and time stamps", ErrorOfPath},
+      {"error_of_extent", "share",
+       "with ground truth: ATE beyond 2 cm, of how far positions are from their middle (RMS)", kAbove, 0.25,
+       0.75, "the ground truth says that positions are off by %s of the trajectory's extent",
+       "its shape is another one; look at trajectory.svg", ErrorOfExtent},
+      {"scale_off", "factor",
+       "stereo and depth images, with ground truth: factor, at least, between the scale of the trajectory "
+       "and "
+       "that of the ground truth",
+       kAbove, 1.05, 1.5, "the ground truth says that the scale is off by a factor of %s at least",
+       "check the depth scale (--set dataset.depth_units_per_m=1000 for millimetres), the baseline or the "
+       "focal length",
+       ScaleOff},
       {"camera_guessed", "1", "1: nobody calibrated the camera, and its focal length could not be measured",
        kAbove, 0, kNever, "the camera is not calibrated, its focal length is a guess",
        "turns and lengths can be wrong by tens of percent; give --camera, --fov or --calibration",

@@ -1,4 +1,5 @@
-// What a run shows of itself, without ground truth: each sign once, with its limits.
+// What a run shows of itself, and what a ground truth says where there is one: each sign once, with its
+// limits.
 #pragma once
 
 #include <limits>

@@ -1,7 +1,6 @@
 #include "apps/run/runner.h"
 
 #include <cstdio>
-#include <fstream>
 #include <functional>
 #include <memory>
 #include <opencv2/core.hpp>
@@ -15,25 +14,18 @@
 #include "apps/run/run_note.h"
 #include "apps/run/run_parts.h"
 #include "apps/run/slam_run.h"
+#include "core/replaced_file.h"
+#include "core/terminal.h"
 #include "tutti/core/error.h"
 #include "tutti/slam/trajectory_closer.h"
 
 namespace tutti {
-namespace {
 
 namespace fs = std::filesystem;
 
-// What can't be written is known before the long work. An earlier trace stays until then.
-void CheckTrace(const fs::path& file) {
-  if (!std::ofstream(file, std::ios::app))
-    throw InputError(file.string() + ": can't be written; check that the folder exists and is writable");
-}
-
-}  // namespace
-
 RunResult RunSlam(const RunRequest& request) { return RunSlam(request, LoadConfig(request.config)); }
 
-std::optional<std::pair<RunRequest, RunConfig>> ResumeRequest(const fs::path& out) {
+std::optional<BrokenOffRun> ResumeRequest(const fs::path& out) {
   const fs::path checkpoint = out / kCheckpoint;
   if (!fs::exists(checkpoint)) {
     if (fs::exists(out / "summary.json")) return std::nullopt;
@@ -42,10 +34,13 @@ std::optional<std::pair<RunRequest, RunConfig>> ResumeRequest(const fs::path& ou
                      "again with --config and --dataset");
   }
   const MapInfo info = ReadMapInfo(checkpoint);
-  RunRequest request = RequestOf(info.note, checkpoint);
-  request.out = out;
-  request.resume = checkpoint;
-  return std::make_pair(std::move(request), info.config);
+  BrokenOffRun run;
+  run.request = RequestOf(info.note, checkpoint, &run.map);
+  run.request.out = out;
+  run.request.resume = checkpoint;
+  run.config = info.config;
+  run.ltm_file = info.ltm_file;
+  return run;
 }
 
 RunResult RunSlam(const RunRequest& request, const RunConfig& given) {
@@ -77,18 +72,19 @@ RunResult RunSlam(const RunRequest& request, const RunConfig& given) {
       if (beside) RefuseToReplace(request.out, *beside);
   }
   OutputFolder folder = OpenOutputFolder(request, reference ? fs::path(reference->second) : fs::path());
-  if (request.trace) CheckTrace(*request.trace);
+  if (request.trace) internal::CheckWritable(*request.trace, internal::Needs::kBytes);
+  if (request.save_map && *request.save_map != kMap)
+    internal::CheckWritable(*request.save_map, internal::Needs::kFile);
   if (!request.quiet) {
-    for (const std::string& warning : warnings) std::fprintf(stderr, "tutti: %s\n", warning.c_str());
+    for (const std::string& warning : warnings) internal::Say("%s", warning.c_str());
     if (!result.rig.calibrated) {
-      std::fprintf(stderr, "tutti: no camera calibration: appearance only, loops but no trajectory\n");
+      internal::Say("no camera calibration: appearance only, loops but no trajectory");
     }
   }
   result.calibration_findings = CheckCalibration(*dataset).findings;
   if (!request.quiet) {
     for (const CalibrationFinding& f : result.calibration_findings) {
-      std::fprintf(stderr, "tutti: warning: the calibration can't be right: %s; %s\n", f.measured.c_str(),
-                   f.advice.c_str());
+      internal::Say("warning: the calibration can't be right: %s; %s", f.measured.c_str(), f.advice.c_str());
     }
   }
   SlamRun run(request, result.config, *dataset, odometry ? &*odometry : nullptr, folder.path(), result);

@@ -52,15 +52,23 @@ struct RunRequest {
 /// Runs and writes everything into request.out. Throws InputError for input that makes the run impossible,
 /// and before the long work where it can be known: no configuration, no data, damaged ground truth, an output
 /// folder that can't be written, holds what tutti did not write, or is in use. Bad frames are skipped and
-/// counted. SIGINT, SIGTERM, SIGHUP and SIGXFSZ end it early, with everything written. So does an exception
-/// (of an observer, for example), which is thrown on afterwards.
+/// counted. SIGINT, SIGTERM, SIGQUIT, SIGHUP, SIGXFSZ and SIGXCPU end it early, with everything written. So
+/// does an exception (of an observer, for example), which is thrown on afterwards.
 RunResult RunSlam(const RunRequest& request);
 
 /// The same from a configuration in memory; `request.config` is only a name then.
 RunResult RunSlam(const RunRequest& request, const RunConfig& config);
 
-/// A run that was broken off, as its checkpoint in `out` has it: a request that RunSlam goes on with, and its
-/// configuration. None if the run in `out` has finished. Throws InputError if there is neither.
-std::optional<std::pair<RunRequest, RunConfig>> ResumeRequest(const std::filesystem::path& out);
+/// A run that was broken off, as its checkpoint has it.
+struct BrokenOffRun {
+  RunRequest request;  ///< that RunSlam goes on with; all that it writes goes into `out`
+  RunConfig config;
+  /// Files elsewhere that the run was to write, and would again if it were told so; empty: none.
+  std::string map, ltm_file;
+};
+
+/// The run whose checkpoint is in `out`. None if the run in `out` has finished. Throws InputError if there is
+/// neither.
+std::optional<BrokenOffRun> ResumeRequest(const std::filesystem::path& out);
 
 }  // namespace tutti

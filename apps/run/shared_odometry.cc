@@ -66,7 +66,7 @@ class Replay {
 void CloseAll(const TrackedSequence& tracked, const RunRequest& request, const Dataset& dataset,
               Replay& replay, LiveFiles& live, RunResult& result) {
   for (const auto& observer : request.observers) observer->OnStart(result.rig, tracked.keyframes.size());
-  Progress progress("loops", tracked.keyframes.size(), request.quiet ? nullptr : stderr);
+  Progress progress("loops", tracked.keyframes.size(), request.quiet ? nullptr : internal::StandardError());
   for (std::size_t k = 0; k < tracked.keyframes.size() && !InterruptGuard::Requested(); ++k) {
     const TrackedSequence::Keyframe& keyframe = tracked.keyframes[k];
     const std::optional<std::size_t> place = FindStamp(dataset, keyframe.stamp_s);

@@ -90,6 +90,7 @@ void SlamRun::Count() {
   result_.frames_total = so_far_.next;
   result_.frames_dropped = so_far_.dropped.size();
   result_.frames_listed = dataset_.Size();
+  result_.skipped_share = dataset_.SkippedShare();
   result_.frame_interval_s = FrameInterval(dataset_);
   result_.stage_ms = slam_->StageMilliseconds();
   result_.stage_ms["read"] = so_far_.read_ms;
@@ -234,11 +235,14 @@ void SlamRun::CountDepth(const ReadResult& read, Progress& progress) {
   if (read.depth_error.empty()) return;
   result_.bad_depth.push_back({frame.index, read.depth_error});
   progress.Note("tutti: frame " + std::to_string(frame.index) + " is tracked without its " +
-                DepthSource(result_.rig.sensor) + " image: " + read.depth_error);
+                    DepthSource(result_.rig.sensor) + " image: " + read.depth_error,
+                std::string("frames are tracked without their ") + DepthSource(result_.rig.sensor) +
+                    " image; frames.bad_depth in summary.json lists them");
 }
 
 void SlamRun::NoteWarnings(Progress& progress) {
-  for (const std::string& warning : slam_->TakeWarnings()) progress.Note("tutti: warning: " + warning);
+  for (const std::string& warning : slam_->TakeWarnings())
+    progress.Note("tutti: warning: " + warning, "warnings of the loop closure");
   for (const std::string& problem : live_.TakeProblems()) progress.Note("tutti: warning: " + problem);
   const auto problem = checkpoints_ ? checkpoints_->TakeProblem() : std::nullopt;
   if (problem) progress.Note("tutti: warning: " + *problem);
@@ -251,7 +255,7 @@ void SlamRun::TakeFrame(const FetchedFrame& fetched, Progress& progress) {
   if (fetched.read.frame) {
     so_far_.positions[fetched.read.frame->index] = so_far_.next;
     const auto pause = pauses_.Next(fetched.read.frame->index, fetched.read.frame->stamp_s);
-    if (pause) progress.Note("tutti: warning: " + *pause);
+    if (pause) progress.Note("tutti: warning: " + *pause, "frames come long after the one before them");
     CountDepth(fetched.read, progress);
     if (!config_.dataset.mask.empty() && fetched.read.frame->mask.empty()) ++result_.frames_without_mask;
     TrackOne(*fetched.read.frame);
@@ -261,7 +265,8 @@ void SlamRun::TakeFrame(const FetchedFrame& fetched, Progress& progress) {
   }
   const std::int64_t number = dataset_.Number(so_far_.next);
   result_.bad.push_back({number, fetched.read.error});
-  progress.Note("tutti: frame " + std::to_string(number) + " is skipped: " + fetched.read.error);
+  progress.Note("tutti: frame " + std::to_string(number) + " is skipped: " + fetched.read.error,
+                "frames are skipped; frames.bad_frames in summary.json lists them");
 }
 
 double SlamRun::CpuSeconds() const {

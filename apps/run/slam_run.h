@@ -57,7 +57,7 @@ class SlamRun {
   }
   // In the map's numbers.
   std::int64_t FirstFrame() const { return slam_->AppearanceOnly() ? 0 : slam_->odometry()->FrameOffset(); }
-  std::FILE* Out() const { return request_.quiet ? nullptr : stderr; }
+  std::FILE* Out() const { return request_.quiet ? nullptr : internal::StandardError(); }
   SpanRecorder* Recorder() { return request_.timing || request_.trace ? &recorder_ : nullptr; }
   // Frames that are there by now, of those that the run may see.
   std::size_t Listed() const { return std::min(total_, dataset_.Size()); }

@@ -185,8 +185,15 @@ RunConfig ParseConfig(const std::string& text, const std::string& name) {
 
 RunConfig LoadConfig(const std::filesystem::path& file) {
   constexpr std::size_t kMostBytes = 10'000'000;
-  const std::string advice =
-      "--config needs a YAML file such as " + internal::ExampleConfigs() + "/images.yaml";
+  std::error_code ignored;
+  const bool bare = !file.has_parent_path() || file.parent_path() == "data/configs";
+  if (bare && !std::filesystem::exists(file, ignored) &&
+      (file.extension().empty() || file.extension() == ".yaml")) {
+    if (const auto text = internal::ExampleConfig(file.stem().string()))
+      return ParseConfig(*text, "tutti's " + file.stem().string() + ".yaml");
+  }
+  const std::string advice = "--config needs a YAML file, or the name of one that is part of tutti: " +
+                             JoinText(internal::ExampleConfigNames());
   return ParseConfig(internal::ReadText(file, advice, kMostBytes), file.string());
 }
 

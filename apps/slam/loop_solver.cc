@@ -167,6 +167,7 @@ void BackgroundLoopSolver::Start(const KeyframeGraph& graph, const std::vector<L
     const ScopedSpan span(recorder, Lane::kOptimisation, "close_loop");
     return std::make_shared<const LoopSolution>(SolveLoops(g, old, fresh, o));
   };
+  recorded_ = recorder != nullptr;
   const auto launch = options.threads > 1 ? std::launch::async : std::launch::deferred;
   solution_ = Pending(std::async(launch, work, graph, accepted, entering, options));
 }

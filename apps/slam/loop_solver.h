@@ -61,6 +61,14 @@ std::int64_t SolutionFrames(std::size_t keyframes);
 /// The same beside the tracking, one at a time.
 class BackgroundLoopSolver {
  public:
+  BackgroundLoopSolver() = default;
+  /// Waits for it if it has a recorder, which need not outlive this.
+  ~BackgroundLoopSolver() {
+    if (recorded_ && Running()) solution_.wait();
+  }
+  BackgroundLoopSolver(const BackgroundLoopSolver&) = delete;
+  BackgroundLoopSolver& operator=(const BackgroundLoopSolver&) = delete;
+
   bool Running() const { return solution_.valid(); }
   /// On a thread of its own, or put off until Take(); with the same result. `recorder` may be null.
   void Start(const KeyframeGraph& graph, const std::vector<LoopEdge>& accepted,
@@ -76,6 +84,7 @@ class BackgroundLoopSolver {
 
  private:
   Pending solution_;
+  bool recorded_ = false;
 };
 
 }  // namespace tutti

@@ -68,7 +68,7 @@ void LoopWorker::Work() {
   std::unique_lock<std::mutex> lock(mutex_);
   while (true) {
     changed_.wait(lock, [this] { return stop_ || !tasks_.empty(); });
-    if (stop_) return;
+    if (stop_ && saving_.empty()) return;  // a snapshot is written after the SlamSystem is gone, too
     const Task task = std::move(tasks_.front());
     tasks_.pop_front();
     busy_ = true;

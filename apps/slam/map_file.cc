@@ -4,6 +4,7 @@
 #include <map>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "apps/slam/map_parts.h"
 #include "apps/slam/map_state.h"
@@ -18,6 +19,8 @@ MapInfo ReadMapInfo(const std::filesystem::path& file) {
   internal::SectionReader in(file, kMapFile);
   MapInfo info;
   ReadState(in, MapSection::kInfo, &info);
+  // A file that is read names no file that is written, and the map holds all that it needs of the memory.
+  info.ltm_file = std::exchange(info.config.loops.ltm_file, {});
   return info;
 }
 
@@ -30,6 +33,7 @@ void CheckMapFile(const std::filesystem::path& file) {
 
 void MapSnapshot::Write(const std::filesystem::path& file,
                         const std::function<void(const MapSink&)>& more) const {
+  if (!parts_) throw InputError(file.string() + ": can't be written: the snapshot was moved elsewhere");
   internal::SectionWriter out(file, kMapFile);
   const MapSink sink = [&out](std::uint32_t tag, std::string_view bytes) { out.Write(tag, bytes); };
   out.Write(MapSection::kInfo, parts_->info);

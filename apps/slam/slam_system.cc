@@ -14,6 +14,7 @@
 #include "apps/slam/session_list.h"
 #include "core/section_file.h"
 #include "core/stopwatch.h"
+#include "frontend/odometry/frame_check.h"
 #include "tutti/core/error.h"
 #include "tutti/slam/version.h"
 
@@ -30,6 +31,7 @@ class SlamSystem::Impl {
   }
 
   TrackResult Track(const InputFrame& frame) {
+    CheckFrame(frame, rig_);
     if (!localizing_) BringIn();
     ++frames_;
     sessions_.CountFrame();
@@ -63,6 +65,7 @@ class SlamSystem::Impl {
       throw InputError("frame " + std::to_string(frame.index) +
                        ": the odometry's standard deviation is below 0 or not finite");
     if (!odometry_) return Track(frame);
+    CheckFrame(frame, rig_);
     if (frames_ == 0 && config_.run.prune_every > 0)
       loops_.Warn("run.prune_every: no effect on a trajectory that is given: no keyframe is removed");
     BringIn();
@@ -372,6 +375,7 @@ SlamSystem::~SlamSystem() = default;
 void SlamSystem::BeginSession(const CameraRig& rig) { impl_->BeginSession(rig); }
 std::vector<MapSession> SlamSystem::Sessions() const { return impl_->Sessions(); }
 bool SlamSystem::Merge(SlamSystem* other, std::string* reason) {
+  if (other == nullptr || other == this) throw InputError("a map can't be merged with itself, or with none");
   std::string ignored;
   if (reason == nullptr) reason = &ignored;
   if (!impl_->ComesAfter(*other->impl_)) return impl_->Merge(other->impl_.get(), reason);

@@ -29,6 +29,9 @@ class TrajectoryCloser::Impl {
     if (!(frame.stamp_s > last_s_.value_or(frame.stamp_s - 1)))
       throw InputError("frame " + std::to_string(frame.index) +
                        ": its time stamp does not grow; push images in order of time");
+    if (T_odom_body.rotation.coeffs().isZero(0))
+      throw InputError("frame " + std::to_string(frame.index) +
+                       ": its pose has no rotation; the odometry must have more than positions");
     TrackResult result = slam_.Follow(frame, T_odom_body * T_body_camera_, sigma);
     last_s_ = frame.stamp_s;
     if (result.state != TrackingState::kTracking) return result;

@@ -8,8 +8,9 @@ namespace tutti::cli {
 void AddCameraOptions(CLI::App& command, CameraWords& words) {
   command.add_option(
       "--calibration", words.calibration,
-      "the camera from a YAML file of Kalibr, ORB-SLAM, OpenCV, ROS or EuRoC; with --sensor stereo "
-      "also the right one, of Kalibr or ORB-SLAM3");
+      "the camera from the file of another program: Kalibr, ORB-SLAM, stella_vslam, VINS, Basalt, OpenCV, "
+      "ROS, EuRoC, KITTI, COLMAP, nerfstudio, Open3D, RealSense, ...; with --sensor stereo also the right "
+      "one, where the file has it");
   command.add_option("--camera", words.camera,
                      std::string("the camera as ") + internal::kCameraText + " in pixels");
   command

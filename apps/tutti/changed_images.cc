@@ -12,6 +12,7 @@
 
 #include "apps/tutti/files.h"
 #include "apps/tutti/loops/loops_input.h"
+#include "core/replaced_file.h"
 #include "frontend/dataset/image_file.h"
 #include "tutti/core/error.h"
 
@@ -57,10 +58,11 @@ class Writer {
  public:
   Writer(const ImageChange& change, const ChangedImagesOptions& options)
       : change_(change), options_(options) {
-    const std::vector<fs::path> all = ListImages(options.from);
+    const std::vector<fs::path> all = ListImages(options.from, true, &notes_);
     for (const fs::path& image : all) all_stems_.insert(image.stem().string());
     for (std::size_t i = 0; i < all.size(); i += static_cast<std::size_t>(options.stride))
       images_.push_back(all[i]);
+    FindRange();
     std::set<std::string> stems;
     for (const fs::path& image : images_) {
       if (!stems.insert(image.stem().string()).second) {
@@ -81,7 +83,7 @@ class Writer {
     Work();
     for (std::thread& thread : threads) thread.join();
     if (failure_) std::rethrow_exception(failure_);
-    return {images_.size(), next_};
+    return {images_.size(), next_, notes_};
   }
 
  private:
@@ -108,32 +110,46 @@ class Writer {
     }
   }
 
+  // OpenCV makes 8 bit of 16 by leaving out the lower ones, where all is that a thermal camera sees.
+  void FindRange() {
+    constexpr std::size_t kLooked = 8;
+    std::vector<cv::Mat> greys;
+    for (std::size_t k = 0; k < std::min(kLooked, images_.size()); ++k) {
+      const ImageFile read = ReadGreyFile(images_[k * images_.size() / kLooked]);
+      if (k == 0 && read.image.depth() != CV_16U) return;
+      greys.push_back(read.image);
+    }
+    range_ = RangeOf(greys);
+    if (range_.narrow) notes_.push_back(options_.from.string() + ": " + RangeText(range_));
+  }
+  cv::Mat Stretched(const fs::path& file) const {
+    const ImageFile read = ReadGreyFile(file);
+    if (!read.error.empty()) throw InputError(read.error);
+    return To8Bit(read.image, range_);
+  }
+
   void WriteOne(std::size_t i) const {
     const fs::path& from = images_[i];
     if (static_cast<int>(i) < options_.change_from) {
       std::error_code error;
-      fs::copy_file(from, options_.out / from.filename(), error);
-      if (error) throw InputError(from.string() + ": can't be copied (" + error.message() + ")");
-      return;
+      internal::ReplacedFile copy(options_.out / from.filename());
+      fs::copy_file(from, copy.part(), fs::copy_options::overwrite_existing, error);
+      if (!error) return copy.Commit();
+      throw InputError(from.string() + ": can't be copied (" + error.message() + ")");
     }
     const ImageFile read = ReadImageFile(from, cv::IMREAD_ANYCOLOR);
     if (!read.error.empty()) throw InputError(read.error);
-    const cv::Mat& image = read.image;
+    const cv::Mat image = range_.narrow ? Stretched(from) : read.image;
     const fs::path to = options_.out / (from.stem().string() + ".png");
-    bool good = false;
     const cv::Mat changed = change_.Apply(GreyIfColourless(image), options_.seed, static_cast<int>(i));
-    try {
-      good = cv::imwrite(to.string(), changed, {cv::IMWRITE_PNG_COMPRESSION, 1});
-    } catch (const cv::Exception&) {
-      good = false;
-    }
-    if (!good)
-      throw InputError(to.string() + ": can't be written; is the folder writable and the disk not full?");
+    WritePngFile(to, changed, {cv::IMWRITE_PNG_COMPRESSION, 1});
   }
 
   const ImageChange& change_;
   const ChangedImagesOptions& options_;
   std::vector<fs::path> images_;
+  std::vector<std::string> notes_;
+  GreyRange range_;
   std::set<std::string> all_stems_;  // with those that the stride leaves out
   std::mutex mutex_;                 // of what follows
   std::size_t next_ = 0, done_ = 0;

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <string>
+#include <vector>
 
 #include "data/synthetic/image_change.h"
 
@@ -23,6 +25,7 @@ struct ChangedImagesOptions {
 /// How many images were taken, and how many of them were written (less if `progress` said stop).
 struct ChangedImages {
   std::size_t taken = 0, written = 0;
+  std::vector<std::string> notes;  ///< of what was left out
 };
 
 /// Writes each taken image under its old name, but as PNG; those that are not changed are copied byte for

@@ -3,8 +3,10 @@
 #include <memory>
 #include <string>
 
+#include "apps/tutti/camera_options.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/configuration_of.h"
+#include "core/terminal.h"
 #include "tutti/core/error.h"
 #include "tutti/frontend/calibration_check.h"
 #include "tutti/slam/config.h"
@@ -14,13 +16,16 @@ namespace {
 
 struct CheckArguments {
   std::string config, dataset;
+  CameraWords camera;
 };
 
-int Check(const CheckArguments& arguments) {
-  const RunConfig config = ConfigurationOf(arguments.config, arguments.dataset);
+int Check(const CLI::App& command, const CheckArguments& arguments) {
+  const RunConfig config =
+      ConfigurationOf(arguments.config, arguments.dataset, CameraOf(command, arguments.camera));
   const std::unique_ptr<Dataset> dataset = OpenDataset(arguments.dataset, config.dataset);
   const CameraRig& rig = dataset->Rig();
-  for (const std::string& warning : dataset->Warnings()) std::printf("  note: %s\n", warning.c_str());
+  for (const std::string& warning : dataset->Warnings())
+    std::printf("  note: %s\n", internal::Printable(warning).c_str());
   if (!rig.calibrated) {
     std::printf("  no calibration: nothing to check\n");
     return 1;
@@ -45,7 +50,7 @@ int Check(const CheckArguments& arguments) {
                 report.depth_median_m);
   }
   for (const CalibrationFinding& finding : report.findings)
-    std::printf("  can't be right: %s\n    what to do: %s\n", finding.measured.c_str(),
+    std::printf("  can't be right: %s\n    what to do: %s\n", internal::Printable(finding.measured).c_str(),
                 finding.advice.c_str());
   if (report.findings.empty()) std::printf("  nothing speaks against this calibration\n");
   return report.findings.empty() ? 0 : 1;
@@ -59,7 +64,8 @@ void SetUpCalibrateCheck(CLI::App& command, int& exit_code) {
       ->required();
   command.add_option("--config", arguments->config,
                      "YAML file, as for `tutti run`; without it, what is found in the recording is checked");
-  command.callback([arguments, &exit_code] { exit_code = Check(*arguments); });
+  AddCameraOptions(command, arguments->camera);
+  command.callback([&command, arguments, &exit_code] { exit_code = Check(command, *arguments); });
 }
 
 }  // namespace tutti::cli

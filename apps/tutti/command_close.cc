@@ -10,7 +10,6 @@
 #include "apps/report/page.h"
 #include "apps/run/outputs.h"
 #include "apps/run/recording.h"
-#include "apps/run/run_health.h"
 #include "apps/run/runner.h"
 #include "apps/tutti/camera_options.h"
 #include "apps/tutti/checks.h"
@@ -20,6 +19,7 @@
 #include "apps/tutti/files.h"
 #include "apps/tutti/mask_option.h"
 #include "apps/tutti/run_with_report.h"
+#include "core/terminal.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 #include "tutti/slam/config.h"
@@ -31,7 +31,7 @@ namespace fs = std::filesystem;
 
 struct CloseArguments {
   GivenOdometryFiles odometry;
-  std::string trajectory, images, depth, times, config, out, ground_truth, mask;
+  std::string trajectory, images, depth, times, config, out, ground_truth, mask, require = "doubtful";
   CameraWords camera;
   std::vector<std::string> sigma;  // share of the way and degrees, or a file
   std::vector<std::string> set;    // SECTION.KEY=VALUE
@@ -94,18 +94,18 @@ int Close(const CLI::App& command, const CloseArguments& arguments) {
   if (command.count("--start") > 0) request.start = arguments.start;
   if (command.count("--end") > 0) request.end = arguments.end;
   if (command.count("--stride") > 0) request.stride = arguments.stride;
+  OutputFolder::Check(request.out, RunLayout());
   const RunConfig config = ConfigOf(CameraOf(command, arguments.camera), arguments);
   const RunResult result = arguments.no_report ? RunSlam(request, config) : RunWithReport(request, config);
-  std::fputs(ResultTable(result).c_str(), stdout);
+  std::fputs(internal::Message(ResultTable(result), stdout, internal::Breaks::kAll).c_str(), stdout);
   std::printf("\n  results are in %s\n", result.folder.c_str());
-  if (result.appearance_only)
-    std::fprintf(stderr,
-                 "tutti: without a calibration (--config with camera: fx, fy, cx, cy) loops have no poses: "
-                 "there are loops.csv and summary.json, but no corrected trajectory and no graph\n");
+  if (result.appearance_only && !arguments.quiet)
+    internal::Say(
+        "without a calibration (--config with camera: fx, fy, cx, cy) loops have no poses: there are "
+        "loops.csv and summary.json, but no corrected trajectory and no graph");
   if (!arguments.no_report && !arguments.quiet && !ReportsAvailable())
-    std::fprintf(stderr, "tutti: %s\n", ReportsMissing().c_str());
-  std::fputs(HealthText(result).c_str(), stdout);
-  return ExitCode(result);
+    internal::Say("%s", ReportsMissing().c_str());
+  return ExitCode(result, arguments.require);
 }
 
 }  // namespace
@@ -152,12 +152,14 @@ void SetUpClose(CLI::App& command, int& exit_code) {
   command.add_option("--set", arguments->set, "SECTION.KEY=VALUE, as of `tutti run`");
   command.add_option("--seed", arguments->seed, "of everything that draws random numbers")
       ->check(NotNegative());
-  command.add_option("--threads", arguments->threads, "most threads; the result is the same for any number");
+  command.add_option("--threads", arguments->threads, "most threads; the result is the same for any number")
+      ->check(Positive());
   command.add_option("--start", arguments->start, "first image that is used, counted from 0")
       ->check(NotNegative());
   command.add_option("--end", arguments->end, "image before which to stop")->check(Positive());
   command.add_option("--stride", arguments->stride, "use every so many images")->check(Positive());
   command.add_flag("--keep", arguments->keep, "don't replace earlier results in --out: number them");
+  AddRequireOption(command, arguments->require);
   command.add_flag("--no-report", arguments->no_report, "no report.html and report.json");
   command.add_flag("--quiet", arguments->quiet, "no progress and no notes");
   command.callback([&command, arguments, &exit_code] { exit_code = Close(command, *arguments); });

@@ -13,6 +13,8 @@
 #include "apps/tutti/comparison_columns.h"
 #include "apps/tutti/comparison_page.h"
 #include "apps/tutti/files.h"
+#include "core/replaced_file.h"
+#include "core/terminal.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 
@@ -54,6 +56,7 @@ std::string FolderAbove(const fs::path& summary) {
 
 void RunCollect(const CollectArguments& arguments) {
   const TableFormat format = ParseTableFormat(arguments.table_format);
+  RequireWritable({arguments.json, arguments.report});
   Comparison comparison;
   std::vector<std::string> read;
   for (const std::string& where : arguments.runs) {
@@ -64,12 +67,13 @@ void RunCollect(const CollectArguments& arguments) {
     }
   }
   KeepInputs(read, {arguments.json, arguments.report});
-  std::fputs(DescribeComparison(comparison, format, arguments.choice).c_str(), stdout);
+  const std::string tables = DescribeComparison(comparison, format, arguments.choice);
+  std::fputs(internal::Printable(tables, internal::Breaks::kAll).c_str(), stdout);
   if (!arguments.report.empty()) {
     if (!ReportsAvailable()) throw InputError("--report: " + ReportsMissing());
     WriteComparisonReport(arguments.report, "tutti collect", comparison);
   }
-  if (!arguments.json.empty()) WriteText(arguments.json, JsonText(ComparisonJson(comparison)));
+  if (!arguments.json.empty()) internal::WriteFile(arguments.json, JsonText(ComparisonJson(comparison)));
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include "apps/run/interrupt.h"
 #include "apps/run/output_folder.h"
 #include "apps/run/runner.h"
+#include "apps/tutti/camera_options.h"
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/comparison.h"
@@ -21,6 +22,8 @@
 #include "apps/tutti/run_apart.h"
 #include "apps/tutti/run_with_report.h"
 #include "core/example_configs.h"
+#include "core/replaced_file.h"
+#include "core/terminal.h"
 #include "tutti/core/error.h"
 #include "tutti/frontend/dataset.h"
 #include "tutti/slam/config.h"
@@ -39,6 +42,7 @@ struct CompareArguments {
   int runs = 5, start = 0, end = 0, stride = 1, threads = 2;
   double noise = 0;
   bool separate = false;
+  CameraWords camera;
 };
 
 // The configuration of a variant. Throws InputError for a word that is none.
@@ -134,7 +138,7 @@ class Experiment {
   fs::path Folder(std::size_t v, std::size_t k) const { return Folder(arguments_.variants[v], k); }
 
   void Say(const std::string& variant, std::size_t k) const {
-    std::fprintf(stderr, "tutti: %s, run %zu of %zu\n", variant.c_str(), k + 1, samples_.size());
+    internal::Say("%s, run %zu of %zu", variant.c_str(), k + 1, samples_.size());
   }
 
   RunRequest RequestFor(const std::string& variant, std::size_t k) const {
@@ -206,10 +210,11 @@ OutputLayout Layout() {
 
 void WriteComparison(OutputFolder& folder, const Comparison& comparison) {
   folder.Write({"comparison.md", [&](const fs::path& file) {
-                  WriteText(file, DescribeComparison(comparison, TableFormat::kMarkdown));
+                  internal::WriteFile(file, DescribeComparison(comparison, TableFormat::kMarkdown));
                 }});
-  folder.Write({"comparison.json",
-                [&](const fs::path& file) { WriteText(file, JsonText(ComparisonJson(comparison))); }});
+  folder.Write({"comparison.json", [&](const fs::path& file) {
+                  internal::WriteFile(file, JsonText(ComparisonJson(comparison)));
+                }});
   if (ReportsAvailable()) {
     folder.Write({"report.html", [&](const fs::path& file) {
                     WriteComparisonReport(file, "tutti compare: " + comparison.runs.front().dataset,
@@ -224,10 +229,18 @@ int RunCompare(const CLI::App& command, CompareArguments arguments) {
   if (arguments.out.empty()) arguments.out = DefaultOutput(arguments.datasets.front(), "-compared");
   const TableFormat format = ParseTableFormat(arguments.table_format);
   CheckVariants(arguments);
-  const RunConfig config = ConfigurationOf(arguments.config, arguments.datasets.front());
+  OutputFolder::Check(arguments.out, Layout());
+  const RunConfig config =
+      ConfigurationOf(arguments.config, arguments.datasets.front(), CameraOf(command, arguments.camera));
+  for (const std::string& dataset : arguments.datasets) {
+    if (IsPipe(dataset)) DetectDatasetType(dataset);  // says that it comes once
+  }
   const Experiment experiment(command, arguments, config);
+  DatasetOptions last = config.dataset;
+  last.start = arguments.start + arguments.runs - 1;
+  if (command.count("--end") > 0) last.end = arguments.end;
   for (const std::string& dataset : arguments.datasets)
-    OpenDataset(dataset, config.dataset);  // what no variant can read is said once
+    OpenDataset(dataset, last);  // what no variant can read is said once
   const InterruptGuard guard;
   OutputFolder folder(arguments.out, Layout());
   std::vector<std::vector<int>> statuses;  // by run, then variant
@@ -235,7 +248,7 @@ int RunCompare(const CLI::App& command, CompareArguments arguments) {
     statuses.push_back(experiment.Run(k));
     const std::vector<int>& now = statuses.back();
     if (InterruptGuard::Requested() || std::count(now.begin(), now.end(), 130) > 0) {
-      std::fprintf(stderr, "tutti: interrupted; the runs by then are in %s\n", arguments.out.c_str());
+      internal::Say("interrupted; the runs by then are in %s", arguments.out.c_str());
       return 130;
     }
   }
@@ -244,10 +257,11 @@ int RunCompare(const CLI::App& command, CompareArguments arguments) {
     for (std::size_t k = 0; k < experiment.Runs(); ++k)
       comparison.runs.push_back(experiment.Figures(v, k, statuses[k][v]));
   }
-  std::fputs(DescribeComparison(comparison, format).c_str(), stdout);
+  const std::string tables = DescribeComparison(comparison, format);
+  std::fputs(internal::Printable(tables, internal::Breaks::kAll).c_str(), stdout);
   WriteComparison(folder, comparison);
   if (ReportsAvailable()) std::printf("\n%s\n", (folder.path() / "report.html").c_str());
-  if (!ReportsAvailable()) std::fprintf(stderr, "tutti: %s\n", ReportsMissing().c_str());
+  if (!ReportsAvailable()) internal::Say("%s", ReportsMissing().c_str());
   const auto failed = [](const RunFigures& run) { return !run.failure.empty(); };
   return std::any_of(comparison.runs.begin(), comparison.runs.end(), failed) ? 1 : 0;
 }
@@ -263,6 +277,7 @@ void SetUpCompare(CLI::App& command, int& exit_code) {
   command.add_option("--config", arguments->config,
                      "YAML file, as for `tutti run`; without it, layout, sensor and calibration are found in "
                      "the first recording, and what was found is said");
+  AddCameraOptions(command, arguments->camera);
   command.add_option("--out", arguments->out,
                      "folder for all runs and for comparison.md, comparison.json and report.html (default: "
                      "tutti-out/NAME-compared)");
@@ -286,7 +301,8 @@ void SetUpCompare(CLI::App& command, int& exit_code) {
       ->capture_default_str();
   command.add_option("--ground-truth", arguments->ground_truth,
                      "trajectory to evaluate against (default: the data set's own)");
-  command.add_option("--threads", arguments->threads, "most threads; the result is the same for any number");
+  command.add_option("--threads", arguments->threads, "most threads; the result is the same for any number")
+      ->check(Positive());
   command.add_option("--start", arguments->start, "first frame of the first run, counted from 0")
       ->check(NotNegative());
   command.add_option("--end", arguments->end, "frame before which to stop")->check(Positive());
@@ -302,8 +318,7 @@ void SetUpCompare(CLI::App& command, int& exit_code) {
       "run "
       "of its own,\n"
       "whose loops move the map that it tracks on. A run that fails is reported, and the rest go on.\n"
-      "Example: tutti compare redkitchen --config " +
-      internal::ExampleConfigs() + "/7scenes.yaml --variants odometry,orb,ensemble");
+      "Example: tutti compare redkitchen --config 7scenes --variants odometry,orb,ensemble");
   command.callback([&command, arguments, &exit_code] { exit_code = RunCompare(command, *arguments); });
 }
 

@@ -8,6 +8,7 @@
 #include "apps/tutti/commands.h"
 #include "apps/tutti/files.h"
 #include "apps/tutti/text_table.h"
+#include "core/replaced_file.h"
 #include "tutti/core/error.h"
 #include "tutti/core/significance.h"
 
@@ -51,6 +52,7 @@ std::vector<double> Recalls(const CompareLoopsArguments& arguments, const std::v
 
 int CompareLoops(const CompareLoopsArguments& arguments) {
   KeepInputs(arguments.tables, {arguments.out});
+  RequireWritable({arguments.out});
   std::vector<Json> tables;
   for (const std::string& file : arguments.tables) tables.push_back(ReadTable(file));
   Json tests = Json::array();
@@ -80,7 +82,7 @@ int CompareLoops(const CompareLoopsArguments& arguments) {
   if (tables.size() < static_cast<std::size_t>(kLeastPairs)) {
     std::printf("p is given from %d sets on: with fewer, one lucky set decides\n", kLeastPairs);
   }
-  if (!arguments.out.empty()) WriteText(arguments.out, JsonText(tests));
+  if (!arguments.out.empty()) internal::WriteFile(arguments.out, JsonText(tests));
   return 0;
 }
 

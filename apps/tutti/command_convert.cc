@@ -7,6 +7,7 @@
 
 #include "apps/tutti/commands.h"
 #include "apps/tutti/files.h"
+#include "core/terminal.h"
 #include "tutti/backend/trajectory_file.h"
 #include "tutti/core/error.h"
 
@@ -22,18 +23,23 @@ void RunConvert(const ConvertArguments& arguments) {
   if (arguments.from != "auto") from = ParsePoseFileFormat(arguments.from);
   const PoseFileFormat to = ParsePoseFileFormat(arguments.to);
   KeepInputs({arguments.in, arguments.times}, {arguments.out, arguments.times_out});
+  RequireWritable({arguments.out, arguments.times_out});
   std::vector<double> times;
-  if (!arguments.times.empty()) times = ReadTimes(arguments.times);
+  std::vector<std::string> warnings;
+  if (!arguments.times.empty()) times = ReadTimes(arguments.times, &warnings);
   const PoseFile in = ReadPoseFile(arguments.in, from, times);
-  for (const std::string& warning : in.warnings)
-    std::fprintf(stderr, "tutti: warning: %s\n", warning.c_str());
+  warnings.insert(warnings.end(), in.warnings.begin(), in.warnings.end());
+  for (const std::string& warning : warnings) internal::Say("warning: %s", warning.c_str());
   const bool needs_stamps = to == PoseFileFormat::kTum || to == PoseFileFormat::kEuroc;
   if (!in.has_stamps && (needs_stamps || !arguments.times_out.empty())) {
     throw InputError(arguments.in + ": the format " + ToString(in.format) +
                      " has no time stamps; give --times (KITTI: times.txt, one time stamp [s] a line)");
   }
-  WritePoseFile(arguments.out, in.trajectory, to);
-  if (!arguments.times_out.empty()) WriteTimes(arguments.times_out, in.trajectory);
+  WritePoseFile(arguments.out, in.trajectory, to, in.stamps_ns);
+  if (!arguments.times_out.empty()) WriteTimes(arguments.times_out, in.trajectory, in.stamps_ns);
+  if (!HasRotations(in.trajectory))
+    std::fprintf(stderr, "tutti: warning: %s: has positions alone; the quaternions written are 0\n",
+                 arguments.in.c_str());
   std::printf("%zu poses: %s (%s) -> %s (%s)\n", in.trajectory.size(), arguments.in.c_str(),
               ToString(in.format), arguments.out.c_str(), ToString(to));
   if (in.has_stamps && !needs_stamps && arguments.times_out.empty())
@@ -54,7 +60,7 @@ void SetUpConvert(CLI::App& command, int&) {
       ->check(CLI::IsMember({"auto", "tum", "kitti", "euroc", "g2o"}))
       ->capture_default_str();
   command.add_option("--times", arguments->times,
-                     "Time stamps of kitti's lines or g2o's ids: one [s] a line, as KITTI's times.txt");
+                     "Time stamps of kitti's lines or g2o's ids: one a line, as KITTI's times.txt");
   command.add_option("--times-out", arguments->times_out, "Write the time stamps to this file");
   command.footer(
       "Nothing is turned or moved: KITTI's ground truth stays in its camera frame, EuRoC's in the body's. "
@@ -62,7 +68,10 @@ void SetUpConvert(CLI::App& command, int&) {
       "gets the\n"
       "vertices 0, 1, ... and edges between neighbours with identity information, for viewers and tests, not "
       "to optimise.\n"
-      "EuRoC stamps are rounded to what a double holds of them, about 0.2 microseconds.\n"
+      "Time stamps are kept to the nanosecond. Their unit (s, ms, us, ns) is recognised by size and spacing, "
+      "and "
+      "said\n"
+      "where it is not the format's. Columns that a first line names may be in any order.\n"
       "Examples:\n"
       "  tutti convert poses/00.txt 00.tum --to tum --times sequences/00/times.txt\n"
       "  tutti convert mav0/state_groundtruth_estimate0/data.csv groundtruth.txt --to tum\n"

@@ -14,6 +14,7 @@
 #include "apps/run/runner.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/run_with_report.h"
+#include "core/terminal.h"
 #include "data/synthetic/synthetic_writer.h"
 #include "tutti/core/error.h"
 
@@ -52,8 +53,7 @@ int Demo(const fs::path& out) {
   fs::create_directories(out, ignored);
   const SyntheticWorld world(DemoWorld());
   const int threads = std::max(1, std::min(4, static_cast<int>(std::thread::hardware_concurrency())));
-  std::fprintf(stderr, "tutti: rendering a synthetic town, %zu stereo pairs, into %s\n", world.Size(),
-               data.c_str());
+  internal::Say("rendering a synthetic town, %zu stereo pairs, into %s", world.Size(), data.c_str());
   {
     const InterruptGuard guard;
     Progress progress("rendering", world.Size());
@@ -66,17 +66,17 @@ int Demo(const fs::path& out) {
     };
     WriteSyntheticDataset(world, data, write);
     if (InterruptGuard::Requested()) {
-      std::fprintf(stderr, "tutti: interrupted while rendering; nothing was run\n");
+      internal::Say("interrupted while rendering; nothing was run");
       return 130;
     }
   }
-  std::fprintf(stderr, "tutti: SLAM with the ensemble of SURF, SIFT and ORB, beside the odometry alone\n");
+  internal::Say("SLAM with the ensemble of SURF, SIFT and ORB, beside the odometry alone");
   RunRequest request;
   request.config = "tutti demo";
   request.dataset = data;
   request.out = out / "run";
   const RunResult result = RunWithReport(request, DemoConfig());
-  std::fputs(ResultTable(result).c_str(), stdout);
+  std::fputs(internal::Message(ResultTable(result), stdout, internal::Breaks::kAll).c_str(), stdout);
   std::printf("\n  plot:       %s and .svg\n", (result.folder / "trajectory.png").c_str());
   if (ReportsAvailable()) std::printf("  report:     %s\n", (result.folder / "report.html").c_str());
   std::printf("  results:    %s\n", (result.folder / "summary.json").c_str());

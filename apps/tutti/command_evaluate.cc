@@ -13,6 +13,8 @@
 #include "apps/tutti/evaluation_output.h"
 #include "apps/tutti/files.h"
 #include "apps/tutti/published.h"
+#include "core/replaced_file.h"
+#include "core/terminal.h"
 
 namespace tutti::cli {
 namespace {
@@ -32,12 +34,12 @@ bool MeetsLimits(const EvaluatedEstimate& estimate, const EvaluateArguments& arg
   const double ate = estimate.report.ate.rmse, coverage = estimate.report.coverage.share();
   const bool accurate = ate <= arguments.max_ate_m, covers = coverage >= arguments.min_coverage;
   if (!accurate) {
-    std::fprintf(stderr, "tutti: %s: the ATE of %g m is above --max-ate %g\n", estimate.name.c_str(), ate,
-                 arguments.max_ate_m);
+    internal::Say("%s: the ATE of %g m is above --max-ate %g", estimate.name.c_str(), ate,
+                  arguments.max_ate_m);
   }
   if (!covers) {
-    std::fprintf(stderr, "tutti: %s: the coverage of %g is below --min-coverage %g\n", estimate.name.c_str(),
-                 coverage, arguments.min_coverage);
+    internal::Say("%s: the coverage of %g is below --min-coverage %g", estimate.name.c_str(), coverage,
+                  arguments.min_coverage);
   }
   return accurate && covers;
 }
@@ -52,19 +54,20 @@ int RunEvaluate(const EvaluateArguments& arguments) {
   }
   RequireFiles(input);
   KeepInputs(FilesOf(input), {arguments.json, arguments.errors});
+  RequireWritable({arguments.json, arguments.errors});
   std::optional<PublishedComparison> published;
   if (against) published.emplace(arguments.against, input);
   const std::vector<EvaluatedEstimate> estimates = EvaluateInput(input);
   std::string text = estimates.size() == 1 ? DescribeEvaluation(estimates.front(), format)
                                            : CompareEvaluations(estimates, format);
   if (published) text += published->Describe(estimates, format);
-  std::fputs(text.c_str(), stdout);
+  std::fputs(internal::Printable(text, internal::Breaks::kAll).c_str(), stdout);
   if (!arguments.json.empty()) {
     nlohmann::ordered_json json = EvaluationJson(input.reference, estimates);
     if (published) json["published"] = published->ToJson();
-    WriteText(arguments.json, JsonText(json));
+    internal::WriteFile(arguments.json, JsonText(json));
   }
-  if (!arguments.errors.empty()) WriteText(arguments.errors, ErrorsCsv(estimates));
+  if (!arguments.errors.empty()) internal::WriteFile(arguments.errors, ErrorsCsv(estimates));
   bool met = true;
   for (const EvaluatedEstimate& estimate : estimates) met = MeetsLimits(estimate, arguments) && met;
   return met ? 0 : kLimitNotMet;

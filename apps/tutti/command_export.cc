@@ -11,6 +11,7 @@
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/files.h"
+#include "core/terminal.h"
 #include "tutti/core/error.h"
 #include "tutti/slam/map_file.h"
 #include "tutti/slam/slam_system.h"
@@ -37,7 +38,7 @@ fs::path MapFile(const std::string& run_or_map) {
   return file;
 }
 
-void Warn(const std::string& warning) { std::fprintf(stderr, "tutti: warning: %s\n", warning.c_str()); }
+void Warn(const std::string& warning) { internal::Say("warning: %s", warning.c_str()); }
 
 // Images are not needed for everything: where they can't be had, ExportMap says what it makes of that.
 std::unique_ptr<Dataset> OpenImages(const ExportArguments& arguments, const MapInfo& info,
@@ -62,6 +63,7 @@ void RunExport(const ExportArguments& arguments) {
   const ExportRequest& wanted = arguments.request;
   for (const auto& out : {wanted.landmarks, wanted.transforms, wanted.g2o, wanted.tum})
     KeepInputs({file}, {out.value_or("")});
+  for (const auto& out : {wanted.landmarks, wanted.g2o, wanted.tum}) RequireWritable({out.value_or("")});
   const MapInfo info = ReadMapInfo(file);
   const std::unique_ptr<SlamSystem> slam = SlamSystem::Load(file, info);
   if (slam->AppearanceOnly())

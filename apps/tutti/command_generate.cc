@@ -1,19 +1,20 @@
 // tutti generate: renders the synthetic world to disk, or changes real images.
-#include <unistd.h>
-
 #include <algorithm>
 #include <cstdio>
+#include <functional>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "apps/run/interrupt.h"
+#include "apps/run/progress.h"
 #include "apps/tutti/changed_images.h"
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
-#include "core/stopwatch.h"
+#include "core/terminal.h"
 #include "data/synthetic/synthetic_writer.h"
 #include "tutti/core/error.h"
 
@@ -33,27 +34,15 @@ struct GenerateArguments {
   }
 };
 
-// One line that is overwritten on a terminal, every tenth part elsewhere.
-class ProgressLine {
- public:
-  bool operator()(std::size_t done, std::size_t total) {
-    const double seconds = watch_.Seconds();
-    const bool terminal = ::isatty(STDERR_FILENO) != 0;
-    const std::size_t tenth = 10 * done / total;
-    if (terminal ? (done % 5 == 0 || done == total) : tenth != last_tenth_) {
-      const double rate = static_cast<double>(done) / std::max(seconds, 1e-3);
-      std::fprintf(stderr, "%sframe %zu of %zu, %.1f frames/s, %.0f s left%s", terminal ? "\r" : "", done,
-                   total, rate, static_cast<double>(total - done) / rate,
-                   terminal && done != total ? "   " : "\n");
-      last_tenth_ = tenth;
-    }
+// The progress of what is written; false: Ctrl-C.
+std::function<bool(std::size_t, std::size_t)> ShownBy(std::optional<Progress>& progress) {
+  return [&progress](std::size_t done, std::size_t total) {
+    if (!progress) progress.emplace("generate", total);
+    progress->Update(done, "");
+    if (done == total || InterruptGuard::Requested()) progress->Finish();
     return !InterruptGuard::Requested();
-  }
-
- private:
-  internal::Stopwatch watch_;
-  std::size_t last_tenth_ = 0;
-};
+  };
+}
 
 int ChangeImages(const GenerateArguments& arguments) {
   const ImageChange change = ImageChange::Parse(arguments.change);
@@ -65,14 +54,15 @@ int ChangeImages(const GenerateArguments& arguments) {
   o.seed = arguments.world.seed;
   o.threads = arguments.Threads();
   o.force = arguments.force;
-  ProgressLine progress;
-  o.progress = [&progress](std::size_t done, std::size_t total) { return progress(done, total); };
+  std::optional<Progress> progress;
+  o.progress = ShownBy(progress);
   const InterruptGuard guard;
   const ChangedImages result = WriteChangedImages(change, o);
+  for (const std::string& note : result.notes) std::fprintf(stderr, "tutti: %s\n", note.c_str());
   const char* d = arguments.out.c_str();
   if (result.written < result.taken) {
-    std::fprintf(stderr, "\ninterrupted: %s holds the first %zu of %zu images and can be used\n", d,
-                 result.written, result.taken);
+    internal::Say("interrupted: %s holds the first %zu of %zu images and can be used", d, result.written,
+                  result.taken);
     return 130;
   }
   std::printf("%s: %zu images, changed by %s:%d", d, result.written, change.Name().c_str(),
@@ -98,19 +88,19 @@ int Generate(const GenerateArguments& arguments) {
                                                  : SyntheticSensor::kMono;
   const SyntheticWorld world(wanted);
   const SyntheticOptions& o = world.Options();
-  std::fprintf(stderr, "%zu frames of %dx%d, %.0f m a lap (%zu frames), into %s\n", world.Size(), o.width,
-               o.height, world.LapLength(), world.FramesPerLap(), arguments.out.c_str());
+  internal::Say("%zu frames of %dx%d, %.0f m a lap (%zu frames), into %s", world.Size(), o.width, o.height,
+                world.LapLength(), world.FramesPerLap(), arguments.out.c_str());
   SyntheticWriteOptions write;
   write.force = arguments.force;
   write.threads = arguments.Threads();
-  ProgressLine progress;
-  write.progress = [&progress](std::size_t done, std::size_t total) { return progress(done, total); };
+  std::optional<Progress> progress;
+  write.progress = ShownBy(progress);
   const InterruptGuard guard;
   const std::size_t written = WriteSyntheticDataset(world, arguments.out, write);
   const char* d = arguments.out.c_str();
   if (written < world.Size()) {
-    std::fprintf(stderr, "\ninterrupted: %s holds the first %zu of %zu frames and can be used\n", d, written,
-                 world.Size());
+    internal::Say("interrupted: %s holds the first %zu of %zu frames and can be used", d, written,
+                  world.Size());
     return 130;
   }
   if (o.sensor == SyntheticSensor::kSides) {
@@ -245,7 +235,8 @@ void AddOptions(CLI::App& c, GenerateArguments& a) {
   c.add_flag("--kinect-noise", w.kinect_noise, "rgbd: depth noise and holes of a structured-light sensor");
   c.add_option("--supersample", w.supersample, "samples per pixel and axis; 1 is fastest, with jagged edges")
       ->capture_default_str();
-  c.add_option("--threads", a.threads, "frames rendered at the same time; 0: as many as cores");
+  c.add_option("--threads", a.threads, "frames rendered at the same time; 0: as many as cores")
+      ->check(NotNegative());
   c.add_flag("--force", a.force, "write into a folder that is not empty (its old frames are removed)");
   AddChangeOptions(c, a);
 }

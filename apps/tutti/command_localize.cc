@@ -4,18 +4,22 @@
 #include <string>
 
 #include "apps/run/localization.h"
+#include "apps/tutti/camera_options.h"
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/files.h"
 #include "apps/tutti/mask_option.h"
 #include "apps/tutti/view_options.h"
+#include "core/terminal.h"
 #include "tutti/slam/config.h"
+#include "tutti/slam/map_file.h"
 
 namespace tutti::cli {
 namespace {
 
 struct LocalizeArguments {
   std::string map, dataset, out, config, mask;
+  CameraWords camera;
   int start = 0, end = 0, stride = 1, threads = 2;
   bool quiet = false;
   ViewOptions view;
@@ -31,11 +35,21 @@ int RunLocalize(const CLI::App& command, const LocalizeArguments& arguments) {
   request.threads = arguments.threads;
   request.quiet = arguments.quiet;
   if (!arguments.mask.empty()) request.mask = arguments.mask;
-  if (!arguments.config.empty()) request.options = LoadConfig(arguments.config).dataset;
+  const CameraRequest camera = CameraOf(command, arguments.camera);
+  if (!arguments.config.empty() || camera.HasLens() || camera.sensor) {
+    RunConfig config;
+    if (arguments.config.empty())
+      config.dataset = ForAnotherRecording(ReadMapInfo(arguments.map).config.dataset);
+    else
+      config = LoadConfig(arguments.config);
+    SetCamera(arguments.dataset, camera, config);
+    request.options = config.dataset;
+  }
   if (command.count("--start") > 0) request.start = arguments.start;
   if (command.count("--end") > 0) request.end = arguments.end;
   if (command.count("--stride") > 0) request.stride = arguments.stride;
-  if (auto view = StartView(command, arguments.view)) request.observers.push_back(std::move(view));
+  if (auto view = StartView(command, arguments.view, arguments.quiet))
+    request.observers.push_back(std::move(view));
   const Localization result = Localize(request);
   const std::size_t total = result.frames.size() + result.bad;
   std::printf("\n  frames %zu of %zu localized", result.Localized(), total);
@@ -48,7 +62,7 @@ int RunLocalize(const CLI::App& command, const LocalizeArguments& arguments) {
               (request.out / "trajectory.txt").c_str(), (request.out / "localization.svg").c_str());
   if (result.interrupted) return 130;
   if (result.Localized() > 0) return 0;
-  std::fprintf(stderr, "tutti: not one frame was found in the map: it shows other places\n");
+  internal::Say("not one frame was found in the map: it shows other places");
   return 1;
 }
 
@@ -68,6 +82,7 @@ void SetUpLocalize(CLI::App& command, int& exit_code) {
       "--config", arguments->config,
       "YAML file that says how to read the data set (sections dataset and camera); without it, as "
       "the map's was read");
+  AddCameraOptions(command, arguments->camera);
   AddMaskOption(command, arguments->mask);
   command.add_option("--start", arguments->start, "first frame that is used, counted from 0")
       ->check(NotNegative());

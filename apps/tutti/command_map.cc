@@ -8,6 +8,7 @@
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/map_prune.h"
+#include "core/terminal.h"
 #include "tutti/core/error.h"
 #include "tutti/slam/map_file.h"
 
@@ -35,7 +36,8 @@ void PrintSessions(const MapInfo& info) {
     const MapSession& session = info.sessions[s];
     std::printf("    %zu: keyframes %d to %d, %lld frames, numbers from %lld on  %s\n", s + 1,
                 session.first_keyframe, session.last_keyframe, static_cast<long long>(session.frames),
-                static_cast<long long>(session.frame_offset), DatasetOfNote(session.note).c_str());
+                static_cast<long long>(session.frame_offset),
+                internal::Printable(DatasetOfNote(session.note)).c_str());
   }
 }
 
@@ -60,9 +62,10 @@ void PrintText(const MapInfo& info, const std::string& file) {
   const bool mono = info.rig.sensor == Sensor::kMono;
   const char* const unit = mono ? "(units of the first scale)" : "m";
   const Eigen::Vector3d size = info.most - info.least;
-  std::printf("  %s: %.1f MB, written by tutti %s\n", file.c_str(), Megabytes(file), info.program.c_str());
+  std::printf("  %s: %.1f MB, written by tutti %s\n", internal::Printable(file).c_str(), Megabytes(file),
+              internal::Printable(info.program).c_str());
   if (const std::string dataset = DatasetOfNote(info.note); !dataset.empty())
-    std::printf("  of             %s\n", dataset.c_str());
+    std::printf("  of             %s\n", internal::Printable(dataset).c_str());
   std::printf("  sensor         %s, %dx%d px, fx %.2f, fy %.2f px\n", WordOf(info.rig.sensor), c.width,
               c.height, c.fx, c.fy);
   std::printf("  frames         %lld, the last one %lld\n", static_cast<long long>(info.frames),

@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -9,6 +11,9 @@
 
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
+#include "apps/tutti/files.h"
+#include "core/replaced_file.h"
+#include "core/terminal.h"
 #include "tutti/core/error.h"
 #include "tutti/slam/map_file.h"
 #include "tutti/slam/slam_system.h"
@@ -26,7 +31,6 @@ struct MergeArguments {
 std::unique_ptr<SlamSystem> OpenMap(const std::string& file, int threads) {
   MapInfo info = ReadMapInfo(file);
   info.config.run.threads = threads;
-  info.config.loops.ltm_file.clear();  // what the map has of it is enough, and nobody's file changes
   return SlamSystem::Load(file, info);
 }
 
@@ -40,12 +44,27 @@ std::string MergedNote(const MergeArguments& arguments, const MapSession& last) 
   return note.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
+// One file, by whatever names, or a copy.
+bool AreTheSame(const fs::path& a, const fs::path& b) {
+  std::error_code ignored;
+  if (!fs::is_regular_file(a, ignored) || !fs::is_regular_file(b, ignored)) return false;
+  if (fs::equivalent(a, b, ignored)) return true;
+  if (fs::file_size(a, ignored) != fs::file_size(b, ignored)) return false;
+  std::ifstream in_a(a, std::ios::binary), in_b(b, std::ios::binary);
+  using Bytes = std::istreambuf_iterator<char>;
+  return in_a && in_b && std::equal(Bytes(in_a), Bytes(), Bytes(in_b), Bytes());
+}
+
 int Merge(const MergeArguments& arguments) {
   std::error_code ignored;
+  if (AreTheSame(arguments.first, arguments.second))
+    throw InputError(arguments.first + " and " + arguments.second +
+                     " are the same map; give the maps of two recordings");
   for (const std::string& map : {arguments.first, arguments.second}) {
     if (fs::equivalent(map, arguments.out, ignored))
       throw InputError(arguments.out + ": is one of the maps that are merged; give another file with --out");
   }
+  internal::CheckWritable(arguments.out, internal::Needs::kFile);
   const std::unique_ptr<SlamSystem> slam = OpenMap(arguments.first, arguments.threads),
                                     other = OpenMap(arguments.second, arguments.threads);
   const std::size_t known = slam->loops().size() + other->loops().size();
@@ -60,10 +79,8 @@ int Merge(const MergeArguments& arguments) {
   const auto begin = loops.begin() + static_cast<std::ptrdiff_t>(known);
   const auto accepted = std::count_if(begin, loops.end(), [](const LoopRecord& l) { return l.accepted; });
   if (!joined) {
-    std::fprintf(stderr,
-                 "tutti: %s shows no place of %s that can be relied on: %s (%td were proposed); nothing is "
-                 "written\n",
-                 arguments.second.c_str(), arguments.first.c_str(), reason.c_str(), loops.end() - begin);
+    internal::Say("%s shows no place of %s that can be relied on: %s (%td were proposed); nothing is written",
+                  arguments.second.c_str(), arguments.first.c_str(), reason.c_str(), loops.end() - begin);
     return 1;
   }
   slam->Snapshot(MergedNote(arguments, slam->Sessions().back())).Write(arguments.out);

@@ -8,9 +8,12 @@
 #include <vector>
 
 #include "apps/run/graph_json.h"
+#include "apps/run/progress.h"
 #include "apps/tutti/checks.h"
 #include "apps/tutti/commands.h"
 #include "apps/tutti/files.h"
+#include "core/replaced_file.h"
+#include "core/terminal.h"
 #include "tutti/backend/certificate.h"
 #include "tutti/backend/g2o_io.h"
 #include "tutti/backend/pose_graph_optimizer.h"
@@ -23,7 +26,7 @@ struct OptimizeArguments {
   std::string in, out, json;
   std::string init = "auto", objective = "chi2", robust = "none", solver = "block",
               bad_information = "refuse";
-  bool certify = false;
+  bool certify = false, ignore_unknown = false;
   PoseGraphOptions options;
 };
 
@@ -42,6 +45,19 @@ std::vector<std::size_t> DownWeighted(const PoseGraphReport& report) {
   return out;
 }
 
+/// A number; as text where the file writes it in a way that a number would not keep.
+nlohmann::ordered_json IdJson(const PoseGraph& graph, NodeId id) {
+  const std::string name = graph.NameOf(id);
+  if (name == std::to_string(id)) return id;
+  return name;
+}
+
+std::size_t Loops(const PoseGraph& graph) {
+  return static_cast<std::size_t>(
+      std::count_if(graph.edges().begin(), graph.edges().end(),
+                    [](const PoseGraphEdge& edge) { return edge.kind == EdgeKind::kLoop; }));
+}
+
 nlohmann::ordered_json ToJson(const OptimizeArguments& arguments, const G2oFile& file,
                               const PoseGraphReport& report, const std::optional<Certificate>& certificate) {
   nlohmann::ordered_json json;
@@ -49,6 +65,10 @@ nlohmann::ordered_json ToJson(const OptimizeArguments& arguments, const G2oFile&
   json["kind"] = ToString(file.graph.kind());
   json["nodes"] = file.graph.nodes().size();
   json["edges"] = file.graph.edges().size();
+  json["loops"] = Loops(file.graph);
+  json["landmarks"] = file.graph.landmarks().size();
+  json["measurements"] = file.graph.measurements().size();
+  json["ignored_lines"] = file.ignored;
   json["bad_information"] = {
       {"treatment", arguments.bad_information}, {"edges", file.bad_information}, {"skipped", file.skipped}};
   json["objective"] = arguments.objective;
@@ -69,13 +89,15 @@ nlohmann::ordered_json ToJson(const OptimizeArguments& arguments, const G2oFile&
   json["init_time_s"] = report.init_time_s;
   json["components"] = nlohmann::ordered_json::array();
   for (const GraphComponent& component : report.components) {
-    json["components"].push_back({{"anchor", component.anchor}, {"nodes", component.nodes}});
+    json["components"].push_back(
+        {{"anchor", component.by_priors ? nlohmann::ordered_json() : IdJson(file.graph, component.anchor)},
+         {"nodes", component.nodes}});
   }
   json["down_weighted"] = nlohmann::ordered_json::array();
   for (std::size_t e : DownWeighted(report)) {
     const PoseGraphEdge& edge = file.graph.edges()[e];
-    json["down_weighted"].push_back({{"from", edge.from},
-                                     {"to", edge.to},
+    json["down_weighted"].push_back({{"from", IdJson(file.graph, edge.from)},
+                                     {"to", IdJson(file.graph, edge.to)},
                                      {"chi2", report.edges[e].chi2},
                                      {"weight", report.edges[e].weight},
                                      {"reason", ToString(report.edges[e].doubt)}});
@@ -94,9 +116,12 @@ void PrintCosts(const char* name, const GraphCosts& costs) {
 }
 
 void Print(const G2oFile& file, const PoseGraphReport& report) {
-  std::printf("%zu poses in %s, %zu edges; start: %s; solver: %s\n", file.graph.nodes().size(),
-              ToString(file.graph.kind()), file.graph.edges().size(), ToString(report.start),
-              ToString(report.solver));
+  std::printf("%zu poses in %s, %zu edges (%zu loops); start: %s; solver: %s\n", file.graph.nodes().size(),
+              ToString(file.graph.kind()), file.graph.edges().size(), Loops(file.graph),
+              ToString(report.start), ToString(report.solver));
+  if (!file.graph.measurements().empty())
+    std::printf("  %zu landmarks; %zu measurements of landmarks and priors\n", file.graph.landmarks().size(),
+                file.graph.measurements().size());
   if (!report.solver_note.empty())
     std::printf("  (not the one that was asked for: %s)\n", report.solver_note.c_str());
   for (const StartOutcome& start : report.starts) {
@@ -114,7 +139,9 @@ void Print(const G2oFile& file, const PoseGraphReport& report) {
     std::printf("  the graph has %zu parts that no edge connects; each is held at one node:",
                 report.components.size());
     for (std::size_t c = 0; c < report.components.size() && c < 10; ++c) {
-      std::printf(" %d (%zu)", report.components[c].anchor, report.components[c].nodes);
+      const GraphComponent& part = report.components[c];
+      std::printf(" %s (%zu)", part.by_priors ? "its priors" : file.graph.NameOf(part.anchor).c_str(),
+                  part.nodes);
     }
     std::printf(report.components.size() > 10 ? " ...\n" : "\n");
   }
@@ -124,8 +151,8 @@ void Print(const G2oFile& file, const PoseGraphReport& report) {
   for (std::size_t k = 0; k < worst.size() && k < 10; ++k) {
     const PoseGraphEdge& edge = file.graph.edges()[worst[k]];
     const EdgeOutcome& outcome = report.edges[worst[k]];
-    std::printf("    %d -> %d: chi2 %.1f, weight %.3f; %s\n", edge.from, edge.to, outcome.chi2,
-                outcome.weight, ToString(outcome.doubt));
+    std::printf("    %s -> %s: chi2 %.1f, weight %.3f; %s\n", file.graph.NameOf(edge.from).c_str(),
+                file.graph.NameOf(edge.to).c_str(), outcome.chi2, outcome.weight, ToString(outcome.doubt));
   }
 }
 
@@ -146,7 +173,27 @@ void Print(const Certificate& certificate) {
 void WriteJson(const OptimizeArguments& arguments, const G2oFile& file, const PoseGraphReport& report,
                const std::optional<Certificate>& certificate) {
   if (arguments.json.empty()) return;
-  WriteText(arguments.json, JsonText(ToJson(arguments, file, report, certificate)));
+  internal::WriteFile(arguments.json, JsonText(ToJson(arguments, file, report, certificate)));
+}
+
+G2oFile ReadWithProgress(const OptimizeArguments& arguments) {
+  Progress progress("reading", 0);
+  return ReadG2o(arguments.in, ParseBadInformation(arguments.bad_information), arguments.ignore_unknown,
+                 [&](std::size_t lines) { progress.Say(std::to_string(lines) + " lines"); });
+}
+
+PoseGraphReport OptimizeWithProgress(const PoseGraphOptimizer& optimizer, PoseGraph& graph) {
+  constexpr std::size_t kLarge = 2000000;  // edges
+  Progress progress("solving", 0);
+  const std::string size = std::to_string(graph.edges().size()) + " edges";
+  if (graph.edges().size() >= kLarge)
+    progress.Note("solving " + size +
+                  ": this takes minutes and some kilobytes of memory for each; Ctrl-C ends it");
+  int iterations = 0;
+  return optimizer.Optimize(graph, [&] {
+    progress.Say(size + ", iteration " + std::to_string(++iterations));
+    return false;
+  });
 }
 
 void RunOptimize(OptimizeArguments arguments) {
@@ -155,16 +202,16 @@ void RunOptimize(OptimizeArguments arguments) {
   arguments.options.robust = ParseRobustLoss(arguments.robust);
   arguments.options.solver = ParsePoseGraphSolver(arguments.solver);
   KeepInputs({arguments.in}, {arguments.out, arguments.json});
+  RequireWritable({arguments.out, arguments.json});
   const PoseGraphOptimizer optimizer(arguments.options);
-  G2oFile file = ReadG2o(arguments.in, ParseBadInformation(arguments.bad_information));
-  for (const std::string& warning : file.warnings)
-    std::fprintf(stderr, "tutti: warning: %s\n", warning.c_str());
+  G2oFile file = ReadWithProgress(arguments);
+  for (const std::string& warning : file.warnings) internal::Say("warning: %s", warning.c_str());
   if (arguments.options.init == GraphInit::kFile && !file.has_all_vertices) {
     throw InputError(arguments.in +
                      ": has edges to nodes without a vertex, so '--init file' has no start; use --init " +
                      "auto, odometry or chordal");
   }
-  const PoseGraphReport report = optimizer.Optimize(file.graph);
+  const PoseGraphReport report = OptimizeWithProgress(optimizer, file.graph);
   std::optional<Certificate> certificate;
   if (arguments.certify && report.success)
     certificate = CertifyOptimum(file.graph, {}, report.chordal_optimum);
@@ -196,7 +243,9 @@ void SetUpOptimize(CLI::App& command, int&) {
   command
       .add_option(
           "--robust", arguments->robust,
-          "Robust loss on loops (|i - j| != 1). gnc: graduated non-convexity, then inlier or outlier; take "
+          "Robust loss on loops: edges between poses whose ids do not follow each other among those of the "
+          "file "
+          "(of one robot, docs/backend.md). gnc: graduated non-convexity, then inlier or outlier; take "
           "this one for SLAM graphs, docs/backend.md says why. gnc-tls: the same by truncated least squares; "
           "dcs and switchable: weights down to 0; huber and cauchy: smaller weights; none: least squares")
       ->check(OneOf(RobustLoss()))
@@ -216,6 +265,9 @@ void SetUpOptimize(CLI::App& command, int&) {
           "graph falls apart then")
       ->check(OneOf(BadInformation()))
       ->capture_default_str();
+  command.add_flag("--ignore-unknown", arguments->ignore_unknown,
+                   "Leave out lines whose tag tutti does not know, with a warning; without this the file is "
+                   "refused");
   command.add_flag("--pairwise", arguments->options.pairwise_consistency,
                    "Before: keep only the largest set of loops that agree pair by pair (PCM). Needs "
                    "realistic covariances of the odometry; slow beyond some thousand loops");

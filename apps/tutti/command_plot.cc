@@ -25,6 +25,7 @@ struct PlotArguments {
 std::vector<PlotShape> Shapes(const PlotArguments& arguments) {
   const EvaluationInput input = Resolved(arguments.input);
   KeepInputs(FilesOf(input), arguments.out);
+  RequireWritable(arguments.out);
   if (input.estimates.empty())
     throw InputError("there is no trajectory; give one or several as `tutti plot FILE...`");
   if (input.reference.empty()) {

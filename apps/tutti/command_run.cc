@@ -11,7 +11,6 @@
 #include "apps/run/focal_length.h"
 #include "apps/run/outputs.h"
 #include "apps/run/recording.h"
-#include "apps/run/run_health.h"
 #include "apps/run/runner.h"
 #include "apps/tutti/camera_options.h"
 #include "apps/tutti/checks.h"
@@ -23,8 +22,11 @@
 #include "apps/tutti/run_with_report.h"
 #include "apps/tutti/view_options.h"
 #include "core/example_configs.h"
+#include "core/replaced_file.h"
 #include "core/terminal.h"
+#include "core/text_reader.h"
 #include "tutti/core/error.h"
+#include "tutti/core/text.h"
 #include "tutti/slam/config.h"
 #include "tutti/slam/map_file.h"
 
@@ -36,7 +38,7 @@ namespace fs = std::filesystem;
 struct RunArguments {
   std::string config, dataset, out, ground_truth;
   std::string trace, resume, map, save_map;
-  std::string mask;
+  std::string mask, require = "doubtful";
   CameraWords camera;
   int rotate = 0;
   std::vector<std::string> set;  // SECTION.KEY=VALUE
@@ -50,31 +52,29 @@ struct RunArguments {
   ViewOptions view;
 };
 
-int RunAndShow(const CLI::App& command, const RunArguments& arguments, RunRequest request,
-               const RunConfig& config) {
-  if (auto view = StartView(command, arguments.view)) request.observers.push_back(std::move(view));
+int RunAndShow(const RunArguments& arguments, RunRequest request, const RunConfig& config) {
   const RunResult result = arguments.no_report ? RunSlam(request, config) : RunWithReport(request, config);
-  std::fputs(ResultTable(result).c_str(), stdout);
+  std::fputs(internal::Message(ResultTable(result), stdout, internal::Breaks::kAll).c_str(), stdout);
   if (arguments.timing) {
     std::fputs(TimingTable(result.stages, result.wall_s, result.cpu_s, result.frames_total).c_str(), stdout);
     if (result.odometry_alone_cpu_s > 0)
       std::printf("  the odometry without loops: %.1f s more\n", result.odometry_alone_cpu_s);
   }
-  std::printf("\n  results are in %s\n", result.folder.c_str());
+  std::printf("\n  results are in %s\n", internal::Printable(result.folder.string()).c_str());
   const fs::path report = fs::path(result.folder) / "report.html";
   std::error_code ignored;
   if (!arguments.no_report && fs::exists(report, ignored))
-    std::printf("  look at %s\n", fs::absolute(report, ignored).c_str());
+    std::printf("  look at %s\n", internal::Printable(fs::absolute(report, ignored).string()).c_str());
   if (!arguments.no_report && !arguments.quiet && !ReportsAvailable())
-    std::fprintf(stderr, "tutti: %s\n", ReportsMissing().c_str());
-  std::fputs(HealthText(result).c_str(), stdout);
-  return ExitCode(result);
+    internal::Say("%s", ReportsMissing().c_str());
+  return ExitCode(result, arguments.require);
 }
 // What a run can be told that goes on: the rest is as it was.
-void RefuseOthers(const CLI::App& command) {
-  const std::set<std::string> allowed = {
-      "--resume", "--threads",   "--quiet", "--view",       "--view-port", "--view-wait", "--view-address",
-      "--timing", "--no-report", "--trace", "--checkpoint", "--save-map",  "--no-map"};
+void RefuseOthers(const CLI::App& command, const RunArguments& arguments) {
+  const std::set<std::string> allowed = {"--resume",    "--threads",   "--quiet",        "--view",
+                                         "--view-port", "--view-wait", "--view-address", "--timing",
+                                         "--no-report", "--require",   "--trace",        "--checkpoint",
+                                         "--save-map",  "--no-map",    "--set"};
   for (const CLI::Option* option : command.get_options()) {
     const std::string name = option->get_name();
     if (option->count() > 0 && allowed.count(name) == 0)
@@ -82,17 +82,30 @@ void RefuseOthers(const CLI::App& command) {
                        " can't be given with --resume, which takes data set, configuration "
                        "and frames from the checkpoint");
   }
+  for (const std::string& assignment : arguments.set) {
+    if (assignment.rfind("loops.ltm_file=", 0) != 0)
+      throw InputError("run: --set " + assignment +
+                       ": with --resume, only loops.ltm_file can be set: the rest is in the checkpoint");
+  }
 }
 
 int Resume(const CLI::App& command, const RunArguments& arguments) {
-  RefuseOthers(command);
+  RefuseOthers(command, arguments);
   auto found = ResumeRequest(arguments.resume);
   if (!found) {
     std::printf("tutti: the run in %s has finished; there is nothing to go on with\n",
                 arguments.resume.c_str());
     return 0;
   }
-  auto& [request, config] = *found;
+  auto& [request, config, map, ltm_file] = *found;
+  const auto keep = [&](const std::string& file, bool said, const char* option) {
+    if (file.empty() || said || arguments.quiet) return;
+    internal::Say("the run also wrote %s; to have it written again, give %s%s", file.c_str(), option,
+                  file.c_str());
+  };
+  keep(map, !arguments.save_map.empty() || arguments.no_map, "--save-map ");
+  keep(ltm_file, !arguments.set.empty(), "--set loops.ltm_file=");
+  SetOptions(arguments.set, config);
   request.quiet = arguments.quiet;
   request.timing = arguments.timing;
   if (!arguments.trace.empty()) request.trace = arguments.trace;
@@ -100,7 +113,9 @@ int Resume(const CLI::App& command, const RunArguments& arguments) {
   if (command.count("--checkpoint") > 0) request.checkpoint_s = arguments.checkpoint_s;
   if (!arguments.save_map.empty()) request.save_map = arguments.save_map;
   if (arguments.no_map) request.save_map.reset();
-  return RunAndShow(command, arguments, std::move(request), config);
+  if (auto view = StartView(command, arguments.view, arguments.quiet))
+    request.observers.push_back(std::move(view));
+  return RunAndShow(arguments, std::move(request), config);
 }
 
 // What the map was made with, for a recording of which all frames are used.
@@ -124,7 +139,8 @@ void SetImageUse(const RunArguments& arguments, DatasetOptions& options) {
 // Where nothing says what the focal length is, the images may.
 void MeasureGuess(const RunArguments& arguments, Recording& recording, RunRequest& request) {
   const auto say = [&](const std::string& text) {
-    if (!arguments.quiet) std::fprintf(stderr, "  camera  %s\n", text.c_str());
+    if (!arguments.quiet)
+      std::fputs(internal::Message("  camera  " + text).c_str(), internal::StandardError());
   };
   say("measuring the focal length on the first frames ...");
   RunConfig range = recording.config;
@@ -175,6 +191,21 @@ fs::path OutputOf(const RunArguments& arguments) {
   return DefaultOutput(IsCamera(arguments.dataset) ? "camera" : arguments.dataset);
 }
 
+// Before the images are read, to measure a focal length for example. A file in --out has its folder later.
+void CheckFiles(const RunRequest& request) {
+  OutputFolder::Check(request.out, RunLayout(), request.trace);
+  if (request.ground_truth && *request.ground_truth != "none")
+    internal::RequireFile(*request.ground_truth, "give --ground-truth FILE or none");
+  const auto inside = [&](const fs::path& file) {
+    return fs::absolute(file).parent_path().lexically_normal() ==
+           fs::absolute(request.out).lexically_normal();
+  };
+  if (request.trace && !inside(*request.trace))
+    internal::CheckWritable(*request.trace, internal::Needs::kBytes);
+  if (request.save_map && *request.save_map != kMap && !inside(*request.save_map))
+    internal::CheckWritable(*request.save_map, internal::Needs::kFile);
+}
+
 int RunOnce(const CLI::App& command, const RunArguments& arguments) {
   if (arguments.help_config) {
     std::fputs(HelpConfig(arguments.advanced, internal::TerminalColumns(stdout)).c_str(), stdout);
@@ -210,9 +241,12 @@ int RunOnce(const CLI::App& command, const RunArguments& arguments) {
   if (!arguments.save_map.empty()) request.save_map = arguments.save_map;
   if (arguments.save_map.empty() && !arguments.no_map) request.save_map = kMap;
   if (!arguments.map.empty()) request.map = arguments.map;
+  CheckFiles(request);
+  if (auto view = StartView(command, arguments.view, arguments.quiet))
+    request.observers.push_back(std::move(view));
   RunConfig config = ConfigFor(CameraOf(command, arguments.camera), arguments, request);
   SetOptions(arguments.set, config);
-  return RunAndShow(command, arguments, std::move(request), config);
+  return RunAndShow(arguments, std::move(request), config);
 }
 
 }  // namespace
@@ -226,9 +260,10 @@ void SetUpRun(CLI::App& command, int& exit_code) {
       "images have left and right side by side; camera:COLOUR,DEPTH with --sensor rgbd; files stand in for "
       "cameras (camera:FILE); or the address of a stream, rtsp://... or http://...");
   command.add_option("--config", arguments->config,
-                     "YAML file (" + internal::ExampleConfigs() +
-                         " has one for each public data set). Without it, layout, sensor and calibration "
-                         "are found in the recording, and what was found is said");
+                     "YAML file, or the name of one for a public data set that is part of tutti (" +
+                         JoinText(internal::ExampleConfigNames()) +
+                         "). Without it, layout, sensor and calibration are found in the recording, and what "
+                         "was found is said");
   AddCameraOptions(command, arguments->camera);
   AddMaskOption(command, arguments->mask);
   command
@@ -268,7 +303,8 @@ void SetUpRun(CLI::App& command, int& exit_code) {
   command.add_flag("--no-loops", arguments->no_loops, "odometry alone");
   command.add_option("--seed", arguments->seed, "of everything that draws random numbers")
       ->check(NotNegative());
-  command.add_option("--threads", arguments->threads, "most threads; the result is the same for any number");
+  command.add_option("--threads", arguments->threads, "most threads; the result is the same for any number")
+      ->check(Positive());
   command
       .add_option(
           "--inject-false-loops", arguments->inject_false_loops,
@@ -300,6 +336,7 @@ void SetUpRun(CLI::App& command, int& exit_code) {
   command.add_option(
       "--trace", arguments->trace,
       "write the times of all stages to this file; open it in ui.perfetto.dev or chrome://tracing");
+  AddRequireOption(command, arguments->require);
   command.add_flag("--no-report", arguments->no_report, "no report.html and report.json");
   command.add_flag("--quiet", arguments->quiet, "no progress and no notes");
   command.add_flag("--help-config", arguments->help_config,

@@ -6,6 +6,8 @@
 
 #include "apps/report/comparison_report.h"
 #include "apps/report/page.h"
+#include "core/terminal.h"
+#include "tutti/core/error.h"
 
 namespace tutti::cli {
 
@@ -20,10 +22,15 @@ void WriteComparisonReport(const std::filesystem::path& file, const std::string&
   for (const RunFigures& run : comparison.runs) {
     if (!run.failure.empty())
       failures.push_back(run.variant + ", " + Describe(run.sample) + ": " + run.failure);
-    auto report = ReadRunReport(run.folder);
-    if (!report) continue;
-    (*report)["variant"] = run.variant;
-    runs.push_back(std::move(*report));
+    try {
+      auto report = ReadRunReport(run.folder);
+      if (!report) continue;
+      (*report)["variant"] = run.variant;
+      runs.push_back(std::move(*report));
+    } catch (const InputError& error) {
+      failures.push_back(run.variant + ", " + Describe(run.sample) + ": no charts: " + error.what());
+      internal::Say("warning: no charts of a run: %s", error.what());
+    }
   }
   WriteReportPage(file, ComparisonPage(title, tables, std::move(runs), failures));
 }

@@ -12,8 +12,8 @@ namespace tutti::cli {
 void SayFindings(const Recording& recording);
 
 /// The configuration in the file `config`; without one (empty), what the recording itself says, which is
-/// printed on stderr. Throws InputError as LoadConfig and Recognise do, and where nothing says what the
-/// camera is.
-RunConfig ConfigurationOf(const std::string& config, const std::string& dataset);
+/// printed on stderr. `camera`: what the command line says of it, which goes before both. Throws InputError
+/// as LoadConfig and Recognise do, and where nothing says what the camera is.
+RunConfig ConfigurationOf(const std::string& config, const std::string& dataset, const CameraRequest& camera);
 
 }  // namespace tutti::cli

@@ -51,6 +51,10 @@ CurvePlot RelativeErrorCurves(const std::vector<EvaluatedEstimate>& estimates) {
   CurvePlot plot = AlongThePath();
   for (std::size_t k = 0; k < estimates.size(); ++k) {
     const EvaluationReport& report = estimates[k].report;
+    if (!report.rotations)
+      throw InputError(estimates[k].file +
+                       ": the reference or it has positions alone, which have no relative error; choose "
+                       "--what error");
     if (report.rpe.count == 0) {
       throw InputError(estimates[k].file + ": no two of its poses are that far apart; choose a smaller " +
                        "--rpe-delta");

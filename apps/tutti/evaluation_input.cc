@@ -7,7 +7,7 @@
 #include <set>
 
 #include "apps/tutti/evaluation_report.h"
-#include "apps/tutti/frame_stamps.h"
+#include "core/terminal.h"
 #include "tutti/backend/trajectory_file.h"
 #include "tutti/core/error.h"
 
@@ -17,10 +17,11 @@ namespace {
 PoseFile Read(const std::string& file, const std::string& format, const std::vector<double>& times) {
   std::optional<PoseFileFormat> asked;
   if (format != "auto") asked = ParsePoseFileFormat(format);
-  PoseFile out = ReadPoseFile(file, asked, times);
-  for (const std::string& warning : out.warnings)
-    std::fprintf(stderr, "tutti: warning: %s\n", warning.c_str());
-  return out;
+  return ReadPoseFile(file, asked, times);
+}
+
+void SayWarnings(const PoseFile& poses) {
+  for (const std::string& warning : poses.warnings) internal::Say("warning: %s", warning.c_str());
 }
 
 Eigen::Vector3d Axis(const std::string& name) {
@@ -63,6 +64,16 @@ std::vector<double> Times(const EvaluationInput& input) {
   return times;
 }
 
+std::vector<double> StampsOfFrames(const std::string& file) {
+  std::vector<double> stamps = ReadTimes(file);
+  if (stamps.empty()) throw InputError(file + ": holds no time stamp");
+  const auto back = std::is_sorted_until(stamps.begin(), stamps.end());
+  if (back != stamps.end())
+    throw InputError(file + ": the stamps go back in time at number " +
+                     std::to_string(back - stamps.begin() + 1) + "; sort the file by time");
+  return stamps;
+}
+
 // The files' names, with as much of their folders as it takes to tell them apart.
 std::vector<std::string> ShortNames(const std::vector<std::string>& files) {
   namespace fs = std::filesystem;
@@ -78,19 +89,7 @@ std::vector<std::string> ShortNames(const std::vector<std::string>& files) {
   return all_differ(names) ? names : all_differ(longer) ? longer : files;
 }
 
-}  // namespace
-
-void RequireFiles(const EvaluationInput& input) {
-  if (input.reference.empty()) {
-    throw InputError(input.frames_of_run.empty()
-                         ? "there is no reference; give one as `GT EST...` or with --reference GT"
-                         : "the runs have no ground truth; give one with --reference");
-  }
-  if (input.estimates.empty())
-    throw InputError("there is no estimate; give one or several as `GT EST...` or with --estimate EST...");
-}
-
-std::vector<NamedPoseFile> ReadEstimates(const EvaluationInput& input) {
+std::vector<NamedPoseFile> ReadQuietly(const EvaluationInput& input) {
   if (!input.names.empty() && input.names.size() != input.estimates.size()) {
     throw InputError("--name: " + std::to_string(input.names.size()) + " names for " +
                      std::to_string(input.estimates.size()) + " estimates; give one for each");
@@ -106,14 +105,37 @@ std::vector<NamedPoseFile> ReadEstimates(const EvaluationInput& input) {
   return out;
 }
 
+}  // namespace
+
+void RequireFiles(const EvaluationInput& input) {
+  if (input.reference.empty()) {
+    throw InputError(input.frames_of_run.empty()
+                         ? "there is no reference; give one as `GT EST...` or with --reference GT"
+                         : "the runs have no ground truth; give one with --reference");
+  }
+  if (input.estimates.empty())
+    throw InputError("there is no estimate; give one or several as `GT EST...` or with --estimate EST...");
+}
+
+std::vector<NamedPoseFile> ReadEstimates(const EvaluationInput& input) {
+  std::vector<NamedPoseFile> out = ReadQuietly(input);
+  for (const NamedPoseFile& estimate : out) SayWarnings(estimate.poses);
+  return out;
+}
+
 std::vector<EvaluatedEstimate> EvaluateInput(EvaluationInput input) {
   RequireFiles(input);
-  if (!input.frames.empty()) input.options.frame_stamps_s = ReadFrameStamps(input.frames);
+  if (!input.frames.empty()) input.options.frame_stamps_s = StampsOfFrames(input.frames);
   const std::string& format = input.reference_format.empty() ? input.format : input.reference_format;
-  const NamedPoses reference = {input.reference, Read(input.reference, format, Times(input))};
+  NamedPoses reference = {input.reference, Read(input.reference, format, Times(input))};
+  std::vector<NamedPoseFile> estimates = ReadQuietly(input);
+  for (NamedPoseFile& estimate : estimates) AgreeOnUnit(reference.poses, estimate.poses);
+  SayWarnings(reference.poses);
   std::vector<EvaluatedEstimate> out;
-  for (const NamedPoseFile& estimate : ReadEstimates(input))
+  for (const NamedPoseFile& estimate : estimates) {
+    SayWarnings(estimate.poses);
     out.push_back(Evaluate(reference, input, estimate));
+  }
   return out;
 }
 

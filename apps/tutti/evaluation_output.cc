@@ -29,7 +29,8 @@ std::string DeltaName(const EvaluationOptions& options) {
 
 std::string SegmentsLine(const char* name, const SegmentErrors& errors) {
   return std::string("  ") + name + ": t_rel " + Fixed(errors.translation_percent, 4) + " %, r_rel " +
-         Fixed(errors.rotation_deg_per_m, 6) + " deg/m (" + std::to_string(errors.segments) + " segments)\n";
+         Fixed(100 * errors.rotation_deg_per_m, 4) + " deg/100 m (" + std::to_string(errors.segments) +
+         " segments)\n";
 }
 
 std::string Plural(std::size_t count, const char* what) {
@@ -54,10 +55,17 @@ std::string AssociationLine(const EvaluatedEstimate& estimate) {
   return text + "\n";
 }
 
-std::string CoverageLine(const TrajectoryCoverage& coverage) {
-  return "coverage: " + Percent(coverage) + " % (" + std::to_string(coverage.posed) + " of " +
-         std::to_string(coverage.all) + " frames of the reference's time have a pose)\n";
+std::string CoverageLine(const EvaluatedEstimate& estimate) {
+  const TrajectoryCoverage& coverage = estimate.report.coverage;
+  std::string text = "coverage: " + Percent(coverage) + " % (" + std::to_string(coverage.posed) + " of " +
+                     std::to_string(coverage.all) + " frames of the reference's time have a pose";
+  if (coverage.unpaired > 0)
+    text += "; " + std::to_string(coverage.unpaired) + " poses have no partner in the reference";
+  return text + ")\n";
 }
+
+constexpr const char* kPositionsAlone =
+    "  positions alone: errors of rotation and of relative motion are left out\n";
 
 std::string Title(const EvaluatedEstimate& estimate) {
   const EvaluationReport& r = estimate.report;
@@ -70,7 +78,7 @@ std::string Title(const EvaluatedEstimate& estimate) {
     text += " (scale " + Fixed(r.S_reference_estimate.scale, 6) + ")";
   if (estimate.options.plane != ProjectionPlane::kNone)
     text += std::string(", in the plane ") + ToString(estimate.options.plane);
-  return text + "\n" + AssociationLine(estimate) + CoverageLine(r.coverage);
+  return text + "\n" + AssociationLine(estimate) + CoverageLine(estimate);
 }
 
 std::string Rate(const SegmentErrors& errors, double value, int decimals) {
@@ -88,20 +96,23 @@ std::string DescribeEvaluation(const EvaluatedEstimate& estimate, TableFormat fo
                           Fixed(s.min, 6), Fixed(s.max, 6), Fixed(s.sse, 6)});
   };
   add(IsPartial(r) ? "ATE [m] !" : "ATE [m]", r.ate);
-  add("ATE rotation [deg]", r.ate_rotation);
-  add("ATE full", r.ate_full);
+  if (r.rotations) {
+    add("ATE rotation [deg]", r.ate_rotation);
+    add("ATE full", r.ate_full);
+  }
   const std::string rpe = "RPE per " + DeltaName(estimate.options);
   if (r.rpe.count > 0) {
     add(rpe + " [m]", r.rpe);
     add(rpe + " [deg]", r.rpe_rotation);
     add(rpe + " full", r.rpe_full);
-    add(rpe + " distance [m]", r.rpe_point_distance);
-    if (r.rpe_point_distance_ratio.count > 0) add(rpe + " distance [%]", r.rpe_point_distance_ratio);
   }
+  if (r.rpe_point_distance.count > 0) add(rpe + " distance [m]", r.rpe_point_distance);
+  if (r.rpe_point_distance_ratio.count > 0) add(rpe + " distance [%]", r.rpe_point_distance_ratio);
   if (format == TableFormat::kCsv) return Render(table, format);
   std::string text = Title(estimate) + Render(table, format);
   if (IsPartial(r)) text += kPartly;
-  if (r.rpe.count == 0) text += "  " + rpe + ": no two poses are that far apart\n";
+  if (!r.rotations) text += kPositionsAlone;
+  if (r.rpe_point_distance.count == 0) text += "  " + rpe + ": no two poses are that far apart\n";
   if (r.kitti.segments > 0) text += SegmentsLine("KITTI, 100..800 m", r.kitti);
   if (r.drift.segments > 0) text += SegmentsLine("drift, 10..50 % of the path", r.drift);
   return text;
@@ -111,7 +122,7 @@ std::string CompareEvaluations(const std::vector<EvaluatedEstimate>& estimates, 
   const EvaluationOptions& options = estimates.front().options;
   const std::string rpe = "RPE per " + DeltaName(options);
   TextTable table;
-  bool partly = false;
+  bool partly = false, positions_alone = false;
   table.header = {"estimate",   "pairs",  "coverage [%]", "ATE rmse [m]",
                   "mean",       "median", "max",          "rotation [deg]",
                   rpe + " [m]", "[deg]",  "t_rel [%]",    "r_rel [deg/100 m]",
@@ -120,17 +131,18 @@ std::string CompareEvaluations(const std::vector<EvaluatedEstimate>& estimates, 
     const EvaluationReport& r = estimate.report;
     const bool relative = r.rpe.count > 0;
     partly = partly || IsPartial(r);
+    positions_alone = positions_alone || !r.rotations;
     table.rows.push_back(
         {estimate.name, std::to_string(r.pairs),
          Percent(r.coverage) + (IsPartial(r) && format != TableFormat::kCsv ? " !" : ""),
          Fixed(r.ate.rmse, 6), Fixed(r.ate.mean, 6), Fixed(r.ate.median, 6), Fixed(r.ate.max, 6),
-         Fixed(r.ate_rotation.rmse, 6), relative ? Fixed(r.rpe.rmse, 6) : "-",
+         r.rotations ? Fixed(r.ate_rotation.rmse, 6) : "-", relative ? Fixed(r.rpe.rmse, 6) : "-",
          relative ? Fixed(r.rpe_rotation.rmse, 6) : "-", Rate(r.kitti, r.kitti.translation_percent, 4),
          Rate(r.kitti, 100 * r.kitti.rotation_deg_per_m, 4), Rate(r.drift, r.drift.translation_percent, 4)});
   }
   if (format == TableFormat::kCsv) return Render(table, format);
   return std::string("alignment ") + ToString(options.alignment) + "; rotations and relative errors: rmse\n" +
-         Render(table, format) + (partly ? kPartly : "");
+         Render(table, format) + (partly ? kPartly : "") + (positions_alone ? kPositionsAlone : "");
 }
 
 Json EvaluationJson(const std::string& reference, const std::vector<EvaluatedEstimate>& estimates) {
@@ -147,9 +159,12 @@ std::string ErrorsCsv(const std::vector<EvaluatedEstimate>& estimates) {
     const EvaluationReport& r = estimate.report;
     for (std::size_t k = 0; k < r.pairs; ++k) {
       char line[160];
-      std::snprintf(line, sizeof line, ",%.9f,%.9g,%.9g,%.9g\n", r.poses.stamps_s[k],
-                    r.absolute.translation[k], r.absolute.rotation_deg[k], r.absolute.full[k]);
+      std::snprintf(line, sizeof line, ",%.9f,%.9g", r.poses.stamps_s[k], r.absolute.translation[k]);
       text += '"' + estimate.name + '"' + line;
+      std::snprintf(line, sizeof line, ",%.9g,%.9g", r.rotations ? r.absolute.rotation_deg[k] : 0,
+                    r.rotations ? r.absolute.full[k] : 0);
+      text += r.rotations ? line : ",,";
+      text += '\n';
     }
   }
   return text;

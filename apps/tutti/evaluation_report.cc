@@ -29,9 +29,8 @@ EvaluationReport EvaluateFiles(const NamedPoses& reference, const NamedPoses& es
     throw InputError((r.has_stamps ? estimate.name : reference.name) + ": has no time stamps, but " +
                      (r.has_stamps ? reference.name : estimate.name) + " has; give " + remedy);
   }
-  // Ids of g2o's vertices pair as stamps do; KITTI's lines must be equally many.
-  const bool graph = r.format == PoseFileFormat::kG2o || e.format == PoseFileFormat::kG2o;
-  options.by_index = !r.has_stamps && !graph;
+  // Numbers in the file pair as stamps do; KITTI's lines must be equally many.
+  options.by_index = !r.has_stamps && !r.has_numbers && !e.has_numbers;
   try {
     return EvaluateTrajectory(r.trajectory, e.trajectory, options,
                               {r.rotations_as_written, e.rotations_as_written});
@@ -43,9 +42,7 @@ EvaluationReport EvaluateFiles(const NamedPoses& reference, const NamedPoses& es
 nlohmann::ordered_json ReportJson(const EvaluationReport& r, const EvaluationOptions& o) {
   const Similarity& S = r.S_reference_estimate;
   const Eigen::Quaterniond& q = S.rotation;
-  const auto relative = [&](const ErrorStatistics& s) {
-    return r.rpe.count > 0 ? StatisticsJson(s) : Json();
-  };
+  const auto known = [](const ErrorStatistics& s) { return s.count > 0 ? StatisticsJson(s) : Json(); };
   Json json;
   json["pairs"] = r.pairs;
   json["reference_poses"] = r.reference_poses;
@@ -64,7 +61,8 @@ nlohmann::ordered_json ReportJson(const EvaluationReport& r, const EvaluationOpt
   json["coverage"] = {{"share", r.coverage.share()},
                       {"posed", r.coverage.posed},
                       {"all", r.coverage.all},
-                      {"full", r.coverage.share() >= kFullCoverage}};
+                      {"full", r.coverage.share() >= kFullCoverage},
+                      {"unpaired", r.coverage.unpaired}};
   json["alignment"] = {{"mode", ToString(r.alignment)},
                        {"first_poses", o.align_first},
                        {"scale", S.scale},
@@ -72,16 +70,17 @@ nlohmann::ordered_json ReportJson(const EvaluationReport& r, const EvaluationOpt
                        {"quaternion_xyzw", {q.x(), q.y(), q.z(), q.w()}}};
   json["plane"] = ToString(o.plane);
   json["ate"] = StatisticsJson(r.ate);
-  json["ate_rotation_deg"] = StatisticsJson(r.ate_rotation);
-  json["ate_full"] = StatisticsJson(r.ate_full);
+  json["rotations"] = r.rotations;
+  json["ate_rotation_deg"] = known(r.ate_rotation);
+  json["ate_full"] = known(r.ate_full);
   json["rpe"] = {{"delta", o.rpe_delta},
                  {"unit", ToString(o.rpe_unit)},
                  {"all_pairs", o.rpe_all_pairs},
-                 {"translation", relative(r.rpe)},
-                 {"rotation_deg", relative(r.rpe_rotation)},
-                 {"full", relative(r.rpe_full)},
-                 {"point_distance", relative(r.rpe_point_distance)},
-                 {"point_distance_percent", relative(r.rpe_point_distance_ratio)}};
+                 {"translation", known(r.rpe)},
+                 {"rotation_deg", known(r.rpe_rotation)},
+                 {"full", known(r.rpe_full)},
+                 {"point_distance", known(r.rpe_point_distance)},
+                 {"point_distance_percent", known(r.rpe_point_distance_ratio)}};
   json["kitti"] = SegmentsJson(r.kitti);
   json["drift"] = SegmentsJson(r.drift);
   return json;

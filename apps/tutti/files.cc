@@ -1,8 +1,8 @@
 #include "apps/tutti/files.h"
 
-#include <fstream>
 #include <system_error>
 
+#include "core/replaced_file.h"
 #include "core/text_reader.h"
 #include "tutti/core/error.h"
 
@@ -41,11 +41,9 @@ void KeepInputs(const std::vector<std::string>& read, const std::vector<std::str
   }
 }
 
-void WriteText(const std::filesystem::path& file, const std::string& text) {
-  std::ofstream out(file, std::ios::binary);
-  out << text;
-  out.close();
-  if (!out) throw InputError(file.string() + ": can't be written; is there space, and may you write there?");
+void RequireWritable(const std::vector<std::string>& files) {
+  for (const std::string& file : files)
+    if (!file.empty()) internal::CheckWritable(file, internal::Needs::kBytes);
 }
 
 }  // namespace tutti::cli

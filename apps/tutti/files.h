@@ -27,7 +27,8 @@ nlohmann::ordered_json ReadJson(const std::filesystem::path& file, const std::st
 /// given.
 void KeepInputs(const std::vector<std::string>& read, const std::vector<std::string>& written);
 
-/// Writes the text. Throws InputError if it can't be written in full.
-void WriteText(const std::filesystem::path& file, const std::string& text);
+/// Throws InputError for a file that can't be written later, after long work (internal::CheckWritable). Empty
+/// names are of options that were not given.
+void RequireWritable(const std::vector<std::string>& files);
 
 }  // namespace tutti::cli

@@ -1,4 +1,5 @@
 #include "apps/tutti/hand_over.h"
+#include "core/terminal.h"
 
 #include <unistd.h>
 
@@ -19,12 +20,11 @@ int HandOver(char** argv) {
   for (const fs::path& program : {beside, installed}) {
     execv(program.c_str(), argv);
     if (errno == ENOENT) continue;
-    std::fprintf(stderr, "tutti: %s can't be started (%s)\n", program.c_str(), std::strerror(errno));
+    internal::Say("%s can't be started (%s)", program.c_str(), std::strerror(errno));
     return 1;
   }
-  std::fprintf(stderr,
-               "tutti: '%s' needs the program %s, which is neither %s nor %s; install or build tutti again\n",
-               argv[1], TUTTI_IMAGES_NAME, beside.c_str(), installed.c_str());
+  internal::Say("'%s' needs the program %s, which is neither %s nor %s; install or build tutti again",
+                argv[1], TUTTI_IMAGES_NAME, beside.c_str(), installed.c_str());
   return 1;
 }
 

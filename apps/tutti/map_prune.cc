@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <memory>
 
+#include "core/replaced_file.h"
 #include "core/section_file.h"
 #include "tutti/core/error.h"
 #include "tutti/slam/map_file.h"
@@ -23,7 +24,8 @@ void PrintCounts(const char* what, int before, int after) {
 void PruneMap(const std::filesystem::path& file, const std::filesystem::path& out) {
   MapInfo info = ReadMapInfo(file);
   const auto bytes = std::filesystem::file_size(file);
-  info.config.loops.ltm_file.clear();  // what the map has of it is enough, and nobody's file changes
+  const std::filesystem::path& written = out.empty() ? file : out;
+  internal::CheckWritable(written, internal::Needs::kFile);
   const std::unique_ptr<SlamSystem> slam =
       SlamSystem::Load(file, info, nullptr, [&file](internal::SectionReader& in) {
         if (in.Peek() == internal::kEndOfSections) return;
@@ -32,7 +34,6 @@ void PruneMap(const std::filesystem::path& file, const std::filesystem::path& ou
                          "it leaves");
       });
   slam->Prune();
-  const std::filesystem::path& written = out.empty() ? file : out;
   slam->Snapshot(info.note).Write(written);
   const MapInfo after = ReadMapInfo(written);
   PrintCounts("keyframes", info.keyframes, after.keyframes);

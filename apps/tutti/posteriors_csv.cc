@@ -2,9 +2,8 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <fstream>
 
-#include "tutti/core/error.h"
+#include "core/replaced_file.h"
 
 namespace tutti::cli {
 namespace {
@@ -38,13 +37,11 @@ std::string Lines(const LoopRow& row, const LoopRun& run) {
 }  // namespace
 
 void WritePosteriors(const LoopRun& run, const std::filesystem::path& file) {
-  std::ofstream out(file, std::ios::binary);
-  out << "image,location,truth,combined";
-  for (const std::string& name : run.options.members) out << "," << name;
-  out << "\n";
-  for (const LoopRow& row : run.rows) out << Lines(row, run);
-  out.close();
-  if (!out) throw InputError(file.string() + ": can't be written; is there space, and may you write there?");
+  std::string text = "image,location,truth,combined";
+  for (const std::string& name : run.options.members) text += "," + name;
+  text += "\n";
+  for (const LoopRow& row : run.rows) text += Lines(row, run);
+  internal::WriteFile(file, text);
 }
 
 }  // namespace tutti::cli

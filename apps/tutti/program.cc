@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <cstdio>
 #include <exception>
+#include <iostream>
 #include <memory>
+#include <sstream>
 #include <vector>
 
 #include "apps/tutti/describe.h"
 #include "apps/tutti/exhausted.h"
+#include "apps/tutti/foreign_lines.h"
 #include "apps/tutti/help.h"
 #include "apps/tutti/number_checks.h"
 #include "core/terminal.h"
@@ -76,6 +79,32 @@ std::string UnknownCommand(const std::string& word, const std::vector<std::strin
          "', and `tutti --help` lists all";
 }
 
+// CLI11's message names what it does not know; this one what may have been meant.
+std::string UnknownOption(const CLI::App& command, const std::vector<std::string>& words) {
+  std::vector<std::string> known;
+  for (const CLI::Option* option : command.get_options()) {
+    if (option->get_group().empty()) continue;
+    for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
+    for (const std::string& name : option->get_snames()) known.push_back("-" + name);
+  }
+  const std::string call = (command.get_parent() == nullptr ? "" : "tutti ") + command.get_name();
+  for (const std::string& word : words) {
+    const std::string name = word.substr(0, word.find('='));
+    if (name.size() < 2 || name[0] != '-') continue;
+    return "there is no option '" + name + "' of " + call + "; the nearest is '" + NearestWord(name, known) +
+           "', and `" + call + " --help` lists all";
+  }
+  return {};
+}
+
+// Prints what the library says: of --help, too.
+int Exit(const CLI::App& app, const CLI::ParseError& error) {
+  std::ostringstream text;
+  const int status = app.exit(error, std::cout, text);
+  std::fputs(internal::Printable(text.str(), internal::Breaks::kAll).c_str(), internal::StandardError());
+  return status == 0 ? 0 : 1;
+}
+
 }  // namespace
 
 int RunProgram(int argc, char** argv, const std::map<std::string, SetUp>& own, int (*other)(char** argv)) {
@@ -103,22 +132,32 @@ int RunProgram(int argc, char** argv, const std::map<std::string, SetUp>& own, i
     command->prefix_command();
     command->callback([&exit_code, &words, other] { exit_code = other(words.data()); });
   }
+  const ForeignLines foreign(std::any_of(words.begin(), words.end() - 1,
+                                         [](const char* word) { return std::string(word) == "--quiet"; }));
   try {
     if (words[1] != nullptr && words[1][0] != '-' && std::count(known.begin(), known.end(), words[1]) == 0)
       throw InputError(UnknownCommand(words[1], known));
+    if (words[1] != nullptr && words[1][0] == '-' && app.get_option_no_throw(words[1]) == nullptr)
+      throw InputError(UnknownOption(app, {words[1]}));
     app.parse(static_cast<int>(words.size()) - 1, words.data());
+  } catch (const CLI::ExtrasError& e) {
+    const CLI::App& command = *app.get_subcommands().front();
+    const std::string unknown = UnknownOption(command, command.remaining(true));
+    if (unknown.empty()) return Exit(app, e);
+    internal::Say("%s", unknown.c_str());
+    return 1;
   } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : 1;  // --help comes this way, too
+    return Exit(app, e);  // --help comes this way, too
   } catch (const InputError& e) {
-    std::fprintf(stderr, "tutti: %s\n", e.what());
+    internal::Say("%s", e.what());
     return 1;
   } catch (const std::exception& e) {
     const std::string exhausted = WhatRanOut(e);
     if (!exhausted.empty()) {
-      std::fprintf(stderr, "tutti: %s\n", exhausted.c_str());
+      internal::Say("%s", exhausted.c_str());
       return 1;
     }
-    std::fprintf(stderr, "tutti: internal error: %s; please report it with the command line\n", e.what());
+    internal::Say("internal error: %s; please report it with the command line", e.what());
     return 2;
   }
   return exit_code;

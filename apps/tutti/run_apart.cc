@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <exception>
 
+#include "core/terminal.h"
 #include "tutti/core/error.h"
 
 namespace tutti::cli {
@@ -24,7 +25,7 @@ int RunApart(const std::function<int()>& work) {
     try {
       status = work();
     } catch (const std::exception& error) {
-      std::fprintf(stderr, "tutti: %s\n", error.what());
+      internal::Say("%s", error.what());
     }
     std::fflush(nullptr);
     _exit(status);

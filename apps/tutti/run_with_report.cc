@@ -8,6 +8,7 @@
 #include "apps/report/page.h"
 #include "apps/report/run_report.h"
 #include "apps/tutti/files.h"
+#include "core/replaced_file.h"
 
 namespace tutti::cli {
 
@@ -22,7 +23,7 @@ std::function<std::vector<OutputFile>(const RunResult&)> ReportOf(
     std::vector<OutputFile> files;
     files.push_back({"report.json", [report](const std::filesystem::path& file) {
                        const auto replace = nlohmann::ordered_json::error_handler_t::replace;
-                       WriteText(file, report->dump(-1, ' ', false, replace) + "\n");
+                       internal::WriteFile(file, report->dump(-1, ' ', false, replace) + "\n");
                      }});
     if (!ReportsAvailable()) return files;
     files.push_back({"report.html", [report](const std::filesystem::path& file) {

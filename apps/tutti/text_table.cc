@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "core/terminal.h"
 #include "tutti/core/error.h"
 
 namespace tutti::cli {
@@ -145,6 +146,7 @@ std::string Render(const TextTable& table, TableFormat format) {
   std::vector<std::size_t> widths(table.header.size(), 0);
   for (std::vector<std::string>& line : lines) {
     for (std::size_t k = 0; k < line.size(); ++k) {
+      line[k] = internal::Printable(line[k]);
       if (format == TableFormat::kLatex) line[k] = WithPlusMinus(EscapedForLatex(line[k]));
       if (format == TableFormat::kMarkdown) line[k] = EscapedForMarkdown(line[k]);
     }

@@ -106,6 +106,7 @@ std::vector<DrawnTrajectory> DrawnFiles(const EvaluationInput& input) {
     drawn.name = file.name;
     drawn.file = file.file;
     drawn.has_stamps = file.poses.has_stamps;
+    drawn.has_rotations = HasRotations(file.poses.trajectory);
     for (const StampedPose& pose : file.poses.trajectory) {
       drawn.stamps_s.push_back(pose.stamp_s);
       drawn.poses.push_back(pose.pose);
@@ -126,6 +127,7 @@ std::vector<DrawnTrajectory> DrawnEstimates(const std::vector<EvaluatedEstimate>
     drawn.name = estimate.name;
     drawn.file = estimate.file;
     drawn.has_stamps = !estimate.options.by_index;
+    drawn.has_rotations = estimate.report.rotations;
     drawn.stamps_s = estimate.report.poses.stamps_s;
     for (double& stamp : drawn.stamps_s) stamp += estimate.options.time_offset_s;
     drawn.poses = estimate.report.poses.estimate;
@@ -154,6 +156,10 @@ std::vector<PlotShape> TrajectoryShapes(const std::vector<DrawnTrajectory>& traj
                   title, "Positions");
   }
   if (what == "rpy") {
+    for (const DrawnTrajectory& t : trajectories) {
+      if (!t.has_rotations)
+        throw InputError(t.file + ": has positions alone, and no rotations to draw; choose --what xyz");
+    }
     PanelPlot plot =
         OverTime(trajectories, {"roll [deg]", "pitch [deg]", "yaw [deg]"},
                  [](const DrawnTrajectory& t, std::size_t k) -> Eigen::Vector3d {

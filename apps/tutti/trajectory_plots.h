@@ -18,7 +18,7 @@ bool IsOfErrors(const std::string& what);
 struct DrawnTrajectory {
   std::string name, file;
   std::vector<double> stamps_s;  ///< frame numbers where there are no stamps
-  bool has_stamps = true;
+  bool has_stamps = true, has_rotations = true;
   std::vector<Pose> poses;
   std::string color;
   bool dashed = false;

@@ -2,6 +2,8 @@
 
 #include <cstdio>
 
+#include "apps/tutti/checks.h"
+#include "core/terminal.h"
 #include "tutti/core/error.h"
 
 namespace tutti::cli {
@@ -11,6 +13,8 @@ void AddViewOptions(CLI::App& command, ViewOptions& options) {
                    "serve a page to look at it while it goes on, at 127.0.0.1 (through a tunnel: ssh -L "
                    "8077:127.0.0.1:8077 robot)");
   command.add_option("--view-port", options.live.port, "of that page; 0: any free one")
+      ->check(
+          NumberThat([](double value) { return value >= 0 && value <= 65535; }, "of 0 to 65535", "0..65535"))
       ->capture_default_str();
   command.add_option(
       "--view-address", options.live.address,
@@ -19,15 +23,17 @@ void AddViewOptions(CLI::App& command, ViewOptions& options) {
   command
       .add_option("--view-wait", options.live.idle_s,
                   "wait at most this long for a browser before the first frame [s]")
+      ->check(NotNegative())
       ->capture_default_str();
 }
 
-std::shared_ptr<LiveView> StartView(const CLI::App& command, const ViewOptions& options) {
+std::shared_ptr<LiveView> StartView(const CLI::App& command, const ViewOptions& options, bool quiet) {
   if (!options.view && command.count("--view-address") == 0) return nullptr;
   const std::string problem = options.live.Validate();
   if (!problem.empty()) throw InputError("--view: " + problem);
   auto view = std::make_shared<LiveView>(options.live);
-  std::fprintf(stderr, "tutti: look at %s\n", view->Url().c_str());
+  const bool known = options.live.port != 0 && command.count("--view-address") == 0;  // as it was asked for
+  if (!quiet || !known) internal::Say("look at %s", view->Url().c_str());
   return view;
 }
 

@@ -16,7 +16,8 @@ struct ViewOptions {
 /// --view, --view-port, --view-address, --view-wait.
 void AddViewOptions(CLI::App& command, ViewOptions& options);
 
-/// Serves the page and prints its address; null: it was not asked for. Throws InputError if it can't.
-std::shared_ptr<LiveView> StartView(const CLI::App& command, const ViewOptions& options);
+/// Serves the page and prints its address (`quiet`: only one that can't be known before: a free port, or a
+/// token); null: it was not asked for. Throws InputError if it can't.
+std::shared_ptr<LiveView> StartView(const CLI::App& command, const ViewOptions& options, bool quiet);
 
 }  // namespace tutti::cli

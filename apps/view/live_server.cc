@@ -18,9 +18,10 @@ namespace tutti::view {
 namespace {
 
 constexpr int kMostViewers = 4;
-constexpr double kNewsEvery_s = 0.1;  // at most ten messages a second to each
-constexpr double kHeartbeat_s = 1;    // a comment, so that a dead one is noticed
-constexpr double kGoodbye_s = 1;      // for viewers to take the last message, once the run is over
+constexpr double kNewsEvery_s = 0.1;            // at most ten messages a second to each
+constexpr double kHeartbeat_s = 1;              // a comment, so that a dead one is noticed
+constexpr std::size_t kPauseBytes = 64 * 1024;  // of that, while the run stands still
+constexpr double kGoodbye_s = 1;                // for viewers to take the last message, once the run is over
 
 // One viewer's stream.
 class Viewer {
@@ -43,8 +44,10 @@ class Viewer {
         sink.done();
         return true;
       }
-      return Write(sink, ": still here\n\n");
+      // While the run stands still for it, it has to take more than a connection's buffers hold.
+      return Write(sink, ": still here" + std::string(standing_ ? kPauseBytes : 0, ' ') + "\n\n");
     }
+    standing_ = news.standing;
     const bool sent = Write(sink, "data: " + LiveMessage(news) + "\n\n");
     std::this_thread::sleep_for(std::chrono::duration<double>(kNewsEvery_s));
     return sent;
@@ -59,6 +62,7 @@ class Viewer {
   LiveState& state_;
   std::atomic<int>& viewers_;
   LiveCursor cursor_;
+  bool standing_ = false;
 };
 
 // httplib's server, with bounds on what a client may send and hold open.

@@ -1,6 +1,8 @@
 #include "apps/view/live_stream.h"
 
+#include <linux/sockios.h>
 #include <poll.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 
 #include <algorithm>
@@ -29,14 +31,28 @@ bool TryAgain() { return errno == EAGAIN || errno == EINTR; }
 }  // namespace
 
 LiveStream::LiveStream(int socket)
-    : socket_(socket), request_end_s_(internal::SteadySeconds() + kRequest_s) {}
+    : socket_(socket),
+      request_end_s_(internal::SteadySeconds() + kRequest_s),
+      taken_s_(internal::SteadySeconds()) {}
 
 bool LiveStream::is_readable() const { return begin_ < end_ || received_ < kMostRequest; }
 
 bool LiveStream::is_writable() const {
   char byte = 0;
   const ssize_t n = recv(socket_, &byte, 1, MSG_PEEK | MSG_DONTWAIT);
-  return n > 0 || (n < 0 && TryAgain());  // 0: the other side has gone
+  return (n > 0 || (n < 0 && TryAgain())) && Takes();  // 0: the other side has gone
+}
+
+// The system's buffers hold megabytes: that a message could be written does not say that somebody reads.
+bool LiveStream::Takes() const {
+  int queued = 0;
+  if (ioctl(socket_, SIOCOUTQ, &queued) != 0) return true;
+  const double now_s = internal::SteadySeconds();
+  if (queued == 0 || sent_ - queued > taken_) {
+    taken_ = sent_ - queued;
+    taken_s_ = now_s;
+  }
+  return now_s - taken_s_ <= kWrite_s;
 }
 
 bool LiveStream::Fill() {
@@ -70,6 +86,7 @@ ssize_t LiveStream::write(const char* from, size_t size) {
     if (n < 0 && TryAgain()) continue;
     if (n < 0) return -1;
     sent += static_cast<std::size_t>(n);
+    sent_ += n;
   }
   return static_cast<ssize_t>(size);
 }

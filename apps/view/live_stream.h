@@ -13,12 +13,13 @@ class LiveStream : public httplib::Stream {
  public:
   static constexpr std::size_t kMostRequest = 16384;  ///< bytes of a request, with its headers and body
   static constexpr double kRequest_s = 5;             ///< for the whole request, from the beginning
-  static constexpr double kWrite_s = 5;               ///< for a message to be taken
+  static constexpr double kWrite_s = 5;               ///< for some of what was written to be taken
 
   /// Does not own `socket`.
   explicit LiveStream(int socket);
 
   bool is_readable() const override;
+  /// False: the other side has gone, or takes nothing.
   bool is_writable() const override;
   ssize_t read(char* to, size_t size) override;
   ssize_t write(const char* from, size_t size) override;
@@ -28,12 +29,17 @@ class LiveStream : public httplib::Stream {
 
  private:
   bool Fill();
+  bool Takes() const;
 
   int socket_;
   double request_end_s_;
   std::array<char, 4096> buffer_{};
   std::size_t begin_ = 0, end_ = 0;  // what of the buffer is unread
   std::size_t received_ = 0;
+  long long sent_ = 0;  // bytes that the system has taken
+  // What of that the other side had when that last grew.
+  mutable long long taken_ = 0;
+  mutable double taken_s_;
 };
 
 }  // namespace tutti::view

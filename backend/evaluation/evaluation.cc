@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include "backend/evaluation/evaluation_path.h"
 #include "core/angle.h"
@@ -93,6 +94,65 @@ void Project(ProjectionPlane plane, std::vector<Pose>& poses, std::vector<PoseMa
     matrices[k] = ProjectToPlane(matrices[k], plane);
     poses[k] = Pose(Eigen::Quaterniond(matrices[k].rotation), matrices[k].translation);
   }
+}
+
+/// Poses of the estimate that are in no pair, though the reference has poses before and after them.
+std::size_t Unpaired(const AssociatedPoses& poses, const Trajectory& reference, const Trajectory& estimate,
+                     const EvaluationOptions& options) {
+  std::vector<bool> paired(estimate.size());
+  for (const auto& pair : poses.indices) paired[pair.second] = true;
+  const double near = options.max_time_difference_s;
+  std::size_t count = 0;
+  for (std::size_t k = 0; k < estimate.size(); ++k) {
+    const double stamp = estimate[k].stamp_s + options.time_offset_s;
+    const bool within = stamp >= reference.front().stamp_s - near && stamp <= reference.back().stamp_s + near;
+    if (within && !paired[k]) ++count;
+  }
+  return count;
+}
+
+/// What can't be done with positions alone.
+void RequireRotations(const Trajectory& reference, const Trajectory& estimate,
+                      const EvaluationOptions& options) {
+  const bool of_reference = HasRotations(reference), of_estimate = HasRotations(estimate);
+  const std::string which = of_reference ? "the estimate" : "the reference";
+  if (options.alignment == TrajectoryAlignment::kOrigin && !(of_reference && of_estimate))
+    throw InputError("evaluation: " + which +
+                     " has positions alone, and the alignment origin needs rotations; align by se3 or sim3");
+  const bool by_angle = options.rpe_unit == DeltaUnit::kDegrees || options.rpe_unit == DeltaUnit::kRadians;
+  if (by_angle && !of_estimate)
+    throw InputError(
+        "evaluation: the estimate has positions alone; rpe_unit must be frames, metres or seconds");
+  const bool filtered = options.motion_filter && options.motion_filter->distance_m == 0;
+  if (filtered && !(of_reference && of_estimate))
+    throw InputError("evaluation: " + which +
+                     " has positions alone, which do not turn; give motion_filter a distance");
+}
+
+Similarity Align(const EvaluationReport& report, const EvaluationOptions& options) {
+  try {
+    return AlignPoses(report.poses, options);
+  } catch (const InputError& error) {
+    if (options.interpolate || report.coverage.unpaired <= report.pairs) throw;
+    char limit[32];
+    std::snprintf(limit, sizeof limit, "%g", options.max_time_difference_s);
+    throw InputError(std::string(error.what()) + "; " + std::to_string(report.coverage.unpaired) +
+                     " poses have no partner within " + limit +
+                     " s (--max-diff, max_time_difference_s in code; or --interpolate)");
+  }
+}
+
+void MeasureRotations(const std::vector<PoseMatrix>& a, const std::vector<PoseMatrix>& b, bool kitti,
+                      EvaluationReport& out) {
+  out.ate_rotation = Summarize(out.absolute.rotation_deg);
+  out.ate_full = Summarize(out.absolute.full);
+  out.relative = RelativeErrors(a, b, out.relative_pairs);
+  out.rpe = Summarize(out.relative.translation);
+  out.rpe_rotation = Summarize(out.relative.rotation_deg);
+  out.rpe_full = Summarize(out.relative.full);
+  if (!kitti) return;
+  out.kitti = EvaluateKitti(a, b);
+  out.drift = EvaluateDrift(a, b);
 }
 
 void RequireOnePerPose(const std::vector<Eigen::Matrix3d>& written, const Trajectory& trajectory) {
@@ -199,6 +259,7 @@ EvaluationReport EvaluateTrajectory(const Trajectory& reference, const Trajector
   if (!wrong.empty()) throw InputError(wrong);
   RequireOnePerPose(written.reference, reference);
   RequireOnePerPose(written.estimate, estimate);
+  RequireRotations(reference, estimate, options);
   const Kept r = Keep(reference, written.reference, options), e = Keep(estimate, written.estimate, options);
   EvaluationReport out;
   out.poses = Associate(r.trajectory, e.trajectory, options);
@@ -208,8 +269,10 @@ EvaluationReport EvaluateTrajectory(const Trajectory& reference, const Trajector
   out.association = StatisticsOf(out.poses, r.trajectory, e.trajectory, options);
   out.coverage = CoverageOf(reference, estimate, options.time_offset_s, options.max_time_difference_s,
                             options.frame_stamps_s);
+  if (!options.by_index) out.coverage.unpaired = Unpaired(out.poses, r.trajectory, e.trajectory, options);
+  out.rotations = HasRotations(reference) && HasRotations(estimate);
   out.alignment = options.alignment;
-  out.S_reference_estimate = AlignPoses(out.poses, options);
+  out.S_reference_estimate = Align(out, options);
   if (options.alignment != TrajectoryAlignment::kNone) {
     for (Pose& pose : out.poses.estimate) pose = ApplyAlignment(out.S_reference_estimate, pose);
   }
@@ -224,20 +287,12 @@ EvaluationReport EvaluateTrajectory(const Trajectory& reference, const Trajector
   out.path_length_m = PathLengths(a).back();
   out.absolute = AbsoluteErrors(a, b);
   out.ate = Summarize(out.absolute.translation);
-  out.ate_rotation = Summarize(out.absolute.rotation_deg);
-  out.ate_full = Summarize(out.absolute.full);
+  if (!out.rotations) out.absolute.rotation_deg = out.absolute.full = {};
   out.relative_pairs = RelativePairs(out.poses.estimate, out.poses.stamps_s, options);
-  out.relative = RelativeErrors(a, b, out.relative_pairs);
-  out.rpe = Summarize(out.relative.translation);
-  out.rpe_rotation = Summarize(out.relative.rotation_deg);
-  out.rpe_full = Summarize(out.relative.full);
   out.point_distance_errors = PointDistanceErrors(a, b, out.relative_pairs);
   out.rpe_point_distance = Summarize(out.point_distance_errors);
   out.rpe_point_distance_ratio = Summarize(PointDistanceRatios(a, b, out.relative_pairs));
-  if (options.kitti) {
-    out.kitti = EvaluateKitti(a, b);
-    out.drift = EvaluateDrift(a, b);
-  }
+  if (out.rotations) MeasureRotations(a, b, options.kitti, out);
   return out;
 }
 

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <cstdio>
 #include <iterator>
+#include <limits>
 
 #include "tutti/backend/evaluation.h"
 #include "tutti/core/error.h"
@@ -25,6 +26,14 @@ std::string Ranges(const Trajectory& reference, const Trajectory& estimate, doub
   std::string text = "the reference spans " + Range(reference) + ", the estimate " + Range(estimate);
   if (offset_s != 0) text += " (before the offset of " + Short(offset_s) + " s)";
   return text + "; check that the files belong together and use the same clock";
+}
+
+/// For trajectories that nearly fit in time.
+std::string Remedy(double nearest_s) {
+  constexpr double kNear = 1.0;  // [s]
+  if (nearest_s > kNear) return {};
+  return " (pair them with --max-diff " + Short(std::ceil(1e3 * nearest_s + 1e-3) / 1e3) +
+         ", max_time_difference_s in code, or with --interpolate)";
 }
 
 /// Position of the nearest time stamp; the first of two that are equally near.
@@ -64,15 +73,19 @@ AssociatedPoses AssociateByTime(const Trajectory& reference, const Trajectory& e
   const Trajectory& longer = estimate_is_longer ? estimate : reference;
   const double offset_of_shorter = estimate_is_longer ? -offset_s : offset_s;
   AssociatedPoses out;
+  double nearest_s = std::numeric_limits<double>::infinity();
   for (std::size_t s = 0; s < shorter.size(); ++s) {
     const double stamp = shorter[s].stamp_s + offset_of_shorter;
     const std::size_t l = Nearest(longer, stamp);
-    if (std::abs(longer[l].stamp_s - stamp) > max_difference_s) continue;
+    const double apart_s = std::abs(longer[l].stamp_s - stamp);
+    nearest_s = std::min(nearest_s, apart_s);
+    if (apart_s > max_difference_s) continue;
     estimate_is_longer ? AddPair(out, reference, estimate, s, l) : AddPair(out, reference, estimate, l, s);
   }
   if (out.indices.empty()) {
     throw InputError("evaluation: no two poses are within " + Short(max_difference_s) +
-                     " s of each other: " + Ranges(reference, estimate, offset_s));
+                     " s of each other; the nearest are " + Short(nearest_s) + " s apart" +
+                     Remedy(nearest_s) + ": " + Ranges(reference, estimate, offset_s));
   }
   return out;
 }

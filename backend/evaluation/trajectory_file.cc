@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <cstdio>
 #include <fstream>
+#include <map>
 
+#include "core/replaced_file.h"
 #include "core/text_reader.h"
+#include "core/time_stamps.h"
 #include "tutti/backend/g2o_io.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
@@ -35,29 +38,37 @@ std::string FirstWord(const std::filesystem::path& file) {
 }
 
 Trajectory GraphTrajectory(const std::filesystem::path& file, std::vector<std::string>& warnings) {
-  G2oFile graph = ReadG2o(file);
+  G2oFile graph = ReadG2o(file, BadInformation::kRefuse, true);  // the poses alone count
   warnings = graph.warnings;
   if (!graph.has_all_vertices) {
     throw InputError(file.string() +
                      ": holds edges without poses for all of their ends; `tutti optimize` finds the poses");
   }
+  constexpr NodeId kLargest = NodeId{1} << 53;  // of the whole numbers that a double holds
+  const std::map<NodeId, Similarity> poses = graph.graph.Poses();
+  const bool large = !poses.empty() && (poses.rbegin()->first > kLargest || poses.begin()->first < -kLargest);
+  if (large)
+    warnings.push_back(
+        file.string() +
+        ": its ids are too large for time stamps; its poses count as 0, 1, 2, ... by their ids");
   Trajectory out;
-  for (const auto& [id, pose] : graph.graph.Poses())
-    out.push_back({static_cast<double>(id), pose.RigidPart()});
+  for (const auto& [id, pose] : poses)
+    out.push_back({large ? static_cast<double>(out.size()) : static_cast<double>(id), pose.RigidPart()});
   return out;
 }
 
 void GiveStamps(const std::filesystem::path& file, const std::vector<double>& times, PoseFile& out) {
-  if (out.format == PoseFileFormat::kKitti && times.size() != out.trajectory.size()) {
+  if (!out.has_numbers && times.size() != out.trajectory.size()) {
     throw InputError(file.string() + ": has " + std::to_string(out.trajectory.size()) +
                      " poses, but there are " + std::to_string(times.size()) +
                      " time stamps; KITTI's times.txt has one line per pose");
   }
   for (StampedPose& pose : out.trajectory) {
     if (!(pose.stamp_s >= 0 && pose.stamp_s < static_cast<double>(times.size()))) {
-      throw InputError(file.string() + ": vertex " + std::to_string(static_cast<long long>(pose.stamp_s)) +
+      throw InputError(file.string() + (out.format == PoseFileFormat::kG2o ? ": vertex " : ": frame ") +
+                       std::to_string(static_cast<long long>(pose.stamp_s)) +
                        " has no time stamp, there are " + std::to_string(times.size()) +
-                       "; the id of a vertex is its line in the file of times, from 0");
+                       "; its number is its line in the file of times, from 0");
     }
     pose.stamp_s = times[static_cast<std::size_t>(pose.stamp_s)];
   }
@@ -72,10 +83,13 @@ void GiveStamps(const std::filesystem::path& file, const std::vector<double>& ti
 PoseFile ReadAs(const std::filesystem::path& file, PoseFileFormat format, const std::vector<double>& times) {
   PoseFile out;
   out.format = format;
-  out.has_stamps = format == PoseFileFormat::kTum || format == PoseFileFormat::kEuroc;
-  out.trajectory = format == PoseFileFormat::kG2o ? GraphTrajectory(file, out.warnings)
-                                                  : ReadTrajectory(file, CoreFormat(format), &out.warnings,
-                                                                   &out.rotations_as_written, &out.sigmas);
+  if (format == PoseFileFormat::kG2o) {
+    out.trajectory = GraphTrajectory(file, out.warnings);
+    out.has_stamps = false;
+    out.has_numbers = true;
+  } else {
+    out.trajectory = ReadTrajectory(file, CoreFormat(format), &out.warnings, &out);
+  }
   if (!out.has_stamps && !times.empty()) GiveStamps(file, times, out);
   return out;
 }
@@ -102,7 +116,8 @@ const char* ToString(PoseFileFormat format) {
 PoseFileFormat GuessPoseFileFormat(const std::filesystem::path& file) {
   // First, as a planar edge has as many words as a line of KITTI.
   const std::string word = FirstWord(file);
-  if (word == "FIX" || word.rfind("VERTEX", 0) == 0 || word.rfind("EDGE", 0) == 0)
+  if (word == "FIX" || word.rfind("VERTEX", 0) == 0 || word.rfind("EDGE", 0) == 0 ||
+      word.rfind("PARAMS", 0) == 0)
     return PoseFileFormat::kG2o;
   switch (GuessTrajectoryFormat(file)) {
     case TrajectoryFormat::kKitti:
@@ -130,11 +145,26 @@ PoseFile ReadPoseFile(const std::filesystem::path& file, std::optional<PoseFileF
   }
 }
 
-void WritePoseFile(const std::filesystem::path& file, const Trajectory& trajectory, PoseFileFormat format) {
+void AgreeOnUnit(double others_begin_s, double others_end_s, PoseFile& poses) {
+  internal::FitUnit({others_begin_s, others_end_s}, poses.trajectory, poses, &poses.warnings);
+}
+
+void AgreeOnUnit(PoseFile& a, PoseFile& b) {
+  const double begin_s = a.trajectory.front().stamp_s, end_s = a.trajectory.back().stamp_s;
+  AgreeOnUnit(b.trajectory.front().stamp_s, b.trajectory.back().stamp_s, a);
+  AgreeOnUnit(begin_s, end_s, b);
+}
+
+void WritePoseFile(const std::filesystem::path& file, const Trajectory& trajectory, PoseFileFormat format,
+                   const std::vector<std::int64_t>& stamps_ns) {
   if (format != PoseFileFormat::kG2o) {
-    WriteTrajectory(file, trajectory, CoreFormat(format));
+    WriteTrajectory(file, trajectory, CoreFormat(format), stamps_ns);
     return;
   }
+  if (!HasRotations(trajectory))
+    throw InputError(file.string() +
+                     ": can't be written: the poses are positions alone, and vertices of g2o need rotations; "
+                     "write tum or euroc");
   PoseGraph graph(GraphKind::kSE3);
   for (std::size_t k = 0; k < trajectory.size(); ++k) {
     const int id = static_cast<int>(k);
@@ -146,17 +176,14 @@ void WritePoseFile(const std::filesystem::path& file, const Trajectory& trajecto
   WriteG2o(file, graph);
 }
 
-void WriteTimes(const std::filesystem::path& file, const Trajectory& trajectory) {
-  std::ofstream out(file);
-  if (!out)
-    throw InputError(file.string() + ": can't be written; check that the folder exists and is writable");
-  char line[64];
-  for (const StampedPose& pose : trajectory) {
-    std::snprintf(line, sizeof line, "%.9f\n", pose.stamp_s);
-    out << line;
-  }
-  out.flush();
-  if (!out) throw InputError(file.string() + ": could not be written in full; is the disk full?");
+void WriteTimes(const std::filesystem::path& file, const Trajectory& trajectory,
+                const std::vector<std::int64_t>& stamps_ns) {
+  std::string text;
+  for (std::size_t k = 0; k < trajectory.size(); ++k)
+    text +=
+        (stamps_ns.empty() ? internal::StampText(trajectory[k].stamp_s) : internal::StampText(stamps_ns[k])) +
+        '\n';
+  internal::WriteFile(file, text);
 }
 
 }  // namespace tutti

@@ -25,6 +25,15 @@ InformationFault FaultOf(const Matrix7d& information, GraphKind kind) {
   return InformationFault::kNone;
 }
 
+bool IsPositiveSemidefinite(const Matrix7d& information) {
+  constexpr double kLargest = 1e100, kRounding = 1e-9;
+  if (!information.allFinite()) return false;
+  const double size = information.cwiseAbs().maxCoeff();
+  if (size > kLargest) return false;
+  if ((information - information.transpose()).cwiseAbs().maxCoeff() > kRounding * size) return false;
+  return SymmetricEigen(information).values(0) >= -kRounding * size;
+}
+
 Matrix7d Repaired(const Matrix7d& information, GraphKind kind, BadInformation how) {
   const std::vector<int> used = TangentCoordinates(kind);
   const Eigen::MatrixXd m = information(used, used);

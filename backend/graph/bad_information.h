@@ -9,6 +9,8 @@ namespace tutti::internal {
 /// What CheckInformation finds.
 enum class InformationFault { kNone, kNotFinite, kTooLarge, kTooSmall, kNotSymmetric, kNotPositiveDefinite };
 InformationFault FaultOf(const Matrix7d& information, GraphKind kind);
+/// Symmetric, of sizes that costs can be computed with, and no eigenvalue below 0 but for rounding.
+bool IsPositiveSemidefinite(const Matrix7d& information);
 
 /// What is left of a symmetric matrix that is not positive definite; zero if nothing is: then the edge has to
 /// go. kProject: the nearest positive semidefinite one in the Frobenius norm (Higham 1988), its eigenvalues

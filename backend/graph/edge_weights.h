@@ -1,7 +1,10 @@
 // Scalar weights of the chordal cost. Private to the back end.
 #pragma once
 
+#include <vector>
+
 #include "tutti/backend/pose_graph.h"
+#include "tutti/backend/pose_graph_optimizer.h"
 
 namespace tutti::internal {
 
@@ -12,5 +15,8 @@ struct ChordalWeights {
   double translation = 1;
 };
 ChordalWeights MakeChordalWeights(const PoseGraphEdge& edge, GraphKind kind);
+
+/// EvaluateCosts at other poses: of the nodes, and behind them of the landmarks.
+GraphCosts CostsAt(const PoseGraph& graph, const std::vector<Similarity>& poses);
 
 }  // namespace tutti::internal

@@ -1,290 +1,242 @@
-#include <array>
 #include <cmath>
-#include <map>
-#include <optional>
-#include <set>
+#include <utility>
 
 #include "backend/graph/bad_information.h"
-#include "backend/graph/graph_structure.h"
-#include "core/text_input.h"
+#include "backend/graph/g2o_contents.h"
+#include "backend/graph/g2o_tags.h"
 #include "core/text_reader.h"
 #include "tutti/backend/g2o_io.h"
 #include "tutti/core/error.h"
-#include "tutti/core/text.h"
 
 namespace tutti {
 namespace {
 
-/// What a tag stands for.
-struct Tag {
-  GraphKind kind;
-  bool is_edge;
-};
-const std::map<std::string, Tag>& KnownTags() {
-  static const std::map<std::string, Tag> tags = {
-      {"VERTEX_SE2", {GraphKind::kSE2, false}},        {"EDGE_SE2", {GraphKind::kSE2, true}},
-      {"VERTEX_SE3:QUAT", {GraphKind::kSE3, false}},   {"EDGE_SE3:QUAT", {GraphKind::kSE3, true}},
-      {"VERTEX_SIM3:QUAT", {GraphKind::kSim3, false}}, {"EDGE_SIM3:QUAT", {GraphKind::kSim3, true}}};
-  return tags;
-}
+using internal::G2oLine;
+using internal::G2oTag;
+using internal::LineKind;
 
-std::size_t PoseNumbers(GraphKind kind) {
-  return kind == GraphKind::kSE2 ? 3 : kind == GraphKind::kSE3 ? 7 : 8;
+/// TORO gives the information of roll, pitch and yaw, g2o that of the vector part of the quaternion. To first
+/// order the former are J times the latter.
+void EulerToQuaternion(const Similarity& measurement, Matrix7d* information) {
+  const Eigen::Matrix3d R = measurement.rotation.toRotationMatrix();
+  const double roll = std::atan2(R(2, 1), R(2, 2)), cos_pitch = std::hypot(R(2, 1), R(2, 2));
+  const double tan_pitch = -R(2, 0) / cos_pitch;
+  Matrix7d J = Matrix7d::Identity();
+  J.block<3, 3>(3, 3) << 1, std::sin(roll) * tan_pitch, std::cos(roll) * tan_pitch,  //
+      0, std::cos(roll), -std::sin(roll),                                            //
+      0, std::sin(roll) / cos_pitch, std::cos(roll) / cos_pitch;
+  J.block<3, 3>(3, 3) *= 2;  // a quaternion has half of the angle
+  *information = (J.transpose() * *information * J).eval();
+  *information = (0.5 * (*information + information->transpose())).eval();
 }
 
 class Reader {
  public:
-  Reader(const std::filesystem::path& file, BadInformation bad) : file_(file), bad_(bad) {}
+  explicit Reader(const std::filesystem::path& file) : line_(file) { contents_.file = file; }
 
-  G2oFile Read() {
-    internal::TextReader in(file_, "give a readable g2o file");
+  internal::G2oContents Read(const std::function<void(std::size_t)>& progress) {
+    constexpr std::size_t kOften = 100000;
+    internal::TextReader in(contents_.file, "give a readable g2o file");
     std::string text;
     while (in.Next(text)) {
-      line_ = in.number();
-      const std::size_t comment = text.find('#');
-      if (comment != std::string::npos) text.resize(comment);
-      words_ = SplitText(text, " \t\r");
-      if (!words_.empty()) ReadLine();
+      if (line_.Split(text, in.number())) ReadLine();
+      if (progress && in.number() % kOften == 0) progress(in.number());
     }
-    return Build();
+    return std::move(contents_);
   }
 
  private:
-  struct EdgeLine {
-    PoseGraphEdge edge;
-    bool bad = false;  // its information is not positive definite
-  };
-
-  [[noreturn]] void Fail(std::size_t line, const std::string& what) const {
-    throw InputError(file_.string() + ":" + std::to_string(line) + ": " + what);
-  }
-
   void ReadLine() {
-    const std::string& tag = words_[0];
-    if (tag == "FIX") return ReadFix();
-    for (const char c : tag) {
-      if (static_cast<unsigned char>(c) < 0x20) Fail(line_, "holds binary data; is it a g2o file?");
+    const std::string& name = line_.Word(0);
+    if (name == "FIX") return ReadFix();
+    for (const char c : name) {
+      if (static_cast<unsigned char>(c) < 0x20) line_.Fail("holds binary data; is it a g2o file?");
     }
-    const auto known = KnownTags().find(tag);
-    if (known == KnownTags().end()) {
-      auto& [count, first] =
-          unknown_.emplace(tag, std::pair<std::size_t, std::size_t>(0, line_)).first->second;
-      (void)first;
-      ++count;
-      return;
+    const G2oTag* const tag = internal::FindTag(name);
+    if (tag == nullptr) return contents_.unknown[name].Add(line_.number());
+    if (tag->line == LineKind::kSwitch) return;  // goes with its edge
+    if (contents_.kind && *contents_.kind != tag->kind) {
+      line_.Fail(name + " in a graph of " + ToString(*contents_.kind) + "; a file holds one kind of poses");
     }
-    const Tag& what = known->second;
-    if (kind_ && *kind_ != what.kind) {
-      Fail(line_, tag + " in a graph of " + ToString(*kind_) + "; a file holds one kind of poses");
+    if (!contents_.kind) contents_.graph = PoseGraph(tag->kind);
+    contents_.kind = tag->kind;
+    switch (tag->line) {
+      case LineKind::kVertex:
+        return ReadVertex(*tag);
+      case LineKind::kLandmark:
+        return ReadLandmark();
+      case LineKind::kParameters:
+        return ReadParameters(*tag);
+      case LineKind::kMeasurement:
+        return ReadMeasurement(*tag);
+      case LineKind::kMixture:
+        return ReadMixture(*tag);
+      default:
+        return ReadEdgeLine(*tag);
     }
-    kind_ = what.kind;
-    const std::size_t n = TangentCoordinates(what.kind).size();
-    const std::size_t want = 1 + (what.is_edge ? 2 + n * (n + 1) / 2 : 1) + PoseNumbers(what.kind);
-    if (words_.size() != want) {
-      Fail(line_, tag + " has " + std::to_string(words_.size() - 1) + " numbers; " +
-                      std::to_string(want - 1) + " are needed");
-    }
-    what.is_edge ? ReadEdge() : ReadVertex();
   }
 
-  int Id(std::size_t word) const {
-    const std::optional<long long> value = ParseInteger(words_[word]);
-    if (!value || *value < -2000000000LL || *value > 2000000000LL) {
-      Fail(line_, "'" + internal::Excerpt(words_[word]) + "' is not a node id (a whole number)");
-    }
-    return static_cast<int>(*value);
+  NodeId Id(std::size_t word) {
+    bool beyond = false;
+    const NodeId id = line_.Id(word, &beyond);
+    (beyond ? beyond_ : id < 0 ? negative_ : beyond) = true;
+    if (beyond_ && negative_)
+      line_.Fail("ids below 0 and ids of 2^63 and more in one file; number its vertices anew");
+    contents_.graph.SetName(id, line_.Word(word));
+    return id;
   }
 
-  double Number(std::size_t word) const {
-    const std::optional<double> value = ParseDouble(words_[word]);
-    const std::string& text = words_[word];
-    if (!value && text.find(',') != std::string::npos)
-      Fail(line_,
-           "'" + internal::Excerpt(text) + "' has a comma; write decimal points, and blanks between numbers");
-    if (!value) Fail(line_, "'" + internal::Excerpt(text) + "' is not a number");
-    if (!std::isfinite(*value))
-      Fail(line_, "'" + words_[word] + "' is not finite; remove or repair this line");
-    return *value;
+  void ReadVertex(const G2oTag& tag) {
+    line_.Need(1 + NumbersOf(tag.form), 1 + NumbersOf(tag.form));
+    const NodeId id = NewId();
+    contents_.graph.AddNode(PoseGraphNode{id, line_.Pose(2, tag.form), false, true});
   }
 
-  Similarity ReadPose(std::size_t word) const {
-    std::array<double, 8> v{};  // read in their order, so that the first bad one is named
-    for (std::size_t i = 0; i < PoseNumbers(*kind_); ++i) v.at(i) = Number(word + i);
-    Similarity pose;
-    if (*kind_ == GraphKind::kSE2) {
-      pose.translation = Eigen::Vector3d(v[0], v[1], 0);
-      pose.rotation = Eigen::Quaterniond(std::cos(0.5 * v[2]), 0, 0, std::sin(0.5 * v[2]));
-      return pose;
-    }
-    pose.translation = Eigen::Vector3d(v[0], v[1], v[2]);
-    pose.rotation = Eigen::Quaterniond(v[6], v[3], v[4], v[5]);
-    const double norm = pose.rotation.norm();
-    if (norm < 1e-6) Fail(line_, "the quaternion is zero; a unit quaternion is needed");
-    if (!std::isfinite(norm)) Fail(line_, "the quaternion is too large; a unit quaternion is needed");
-    pose.rotation.normalize();
-    if (*kind_ == GraphKind::kSim3) {
-      pose.scale = v[7];
-      if (pose.scale <= 0) Fail(line_, "the scale must be positive");
-    }
-    return pose;
+  NodeId NewId() {
+    const NodeId id = Id(1);
+    if (contents_.graph.Has(id) || contents_.graph.HasLandmark(id))
+      line_.Fail("vertex " + line_.Word(1) + " was given before; remove one of them");
+    return id;
   }
 
-  void ReadVertex() {
-    const int id = Id(1);
-    if (!vertices_.insert(id).second)
-      Fail(line_, "vertex " + std::to_string(id) + " was given before; remove one of them");
-    nodes_.push_back({id, ReadPose(2), false, true});
+  void ReadLandmark() {
+    const std::size_t size = *contents_.kind == GraphKind::kSE2 ? 2 : 3;
+    line_.Need(1 + size, 1 + size);
+    const NodeId id = NewId();
+    contents_.graph.AddLandmark({id, Position(2, size), false, true});
   }
 
-  void ReadEdge() {
-    EdgeLine e{{Id(1), Id(2), ReadPose(3), Matrix7d::Zero(), EdgeKind::kOdometry}};
-    if (e.edge.from == e.edge.to) Fail(line_, "the edge leads from node " + words_[1] + " to itself");
-    const long long gap = static_cast<long long>(e.edge.from) - e.edge.to;
-    if (gap != 1 && gap != -1) e.edge.kind = EdgeKind::kLoop;
-    const std::vector<int> used = TangentCoordinates(*kind_);
-    std::size_t word = 3 + PoseNumbers(*kind_);
-    for (std::size_t r = 0; r < used.size(); ++r) {
-      for (std::size_t c = r; c < used.size(); ++c, ++word) {
-        e.edge.information(used[r], used[c]) = e.edge.information(used[c], used[r]) = Number(word);
-      }
-    }
-    const internal::InformationFault fault = internal::FaultOf(e.edge.information, *kind_);
-    e.bad = fault == internal::InformationFault::kNotPositiveDefinite;
-    if (e.bad && bad_lines_++ == 0) first_bad_ = line_;
-    if (!e.bad && fault != internal::InformationFault::kNone)
-      Fail(line_, CheckInformation(e.edge.information, *kind_));
-    edges_.push_back(e);
-  }
-
-  static std::size_t Pieces(const PoseGraph& graph) {
-    return internal::AnalyseGraph(graph).components.size();
-  }
-
-  std::string HowManyBad() const {
-    return std::to_string(bad_lines_) + " of " + std::to_string(edges_.size()) + " edges";
-  }
-
-  void RefuseBad() const {
-    if (bad_lines_ == 0 || bad_ != BadInformation::kRefuse) return;
-    Fail(first_bad_, "its information matrix is not positive definite; " +
-                         (bad_lines_ == 1 ? "it is the only one"
-                                          : "it is the first of " + HowManyBad() + " of which that is true") +
-                         ". Repair the file, or let --bad-information of 'tutti optimize' project them, "
-                         "keep their diagonals or skip them");
-  }
-
-  /// Repairs the edges that need it, and leaves out those of which nothing is left.
-  void AddEdges(G2oFile& out) const {
-    std::vector<PoseGraphEdge> gone;
-    for (const EdgeLine& e : edges_) {
-      PoseGraphEdge edge = e.edge;
-      if (e.bad) edge.information = internal::Repaired(edge.information, *kind_, bad_);
-      if (e.bad && edge.information.isZero(0)) {
-        gone.push_back(edge);
-      } else {
-        out.graph.AddEdge(edge);
-      }
-    }
-    out.bad_information = bad_lines_;
-    out.skipped = gone.size();
-    if (gone.empty()) return;
-    PoseGraph whole = out.graph;
-    for (PoseGraphEdge& edge : gone) {
-      edge.information = Matrix7d::Identity();
-      whole.AddEdge(edge);
-    }
-    const std::size_t before = Pieces(whole), after = Pieces(out.graph);
-    if (after == before) return;
-    Fail(first_bad_,
-         "without the " + std::to_string(out.skipped) + " of " + std::to_string(edges_.size()) +
-             " edges whose information matrix has to be left out, of which this is the first, the "
-             "graph falls into " +
-             std::to_string(after) + " pieces (before: " + std::to_string(before) + "); " +
-             (bad_ == BadInformation::kSkip ? "project them instead (--bad-information "
-                                              "project), or repair the file"
-                                            : "repair the file"));
-  }
-
-  void ReadFix() {
-    if (words_.size() < 2) Fail(line_, "FIX names no node");
-    for (std::size_t word = 1; word < words_.size(); ++word) fixed_.emplace(Id(word), line_);
-  }
-
-  G2oFile Build() {
-    if (edges_.empty()) {
-      std::string hint;
-      if (!unknown_.empty())
-        hint = " (tutti does not know '" + internal::Excerpt(unknown_.begin()->first) + "')";
-      throw InputError(file_.string() + ": holds no edge of a pose graph" + hint + "; is it a g2o file?");
-    }
-    RefuseBad();
-    G2oFile out;
-    out.graph = PoseGraph(*kind_);
-    for (const PoseGraphNode& node : nodes_) out.graph.AddNode(node);
-    std::set<int> linked, missing;
-    for (const EdgeLine& e : edges_) {
-      for (int id : {e.edge.from, e.edge.to}) {
-        linked.insert(id);
-        if (!out.graph.Has(id)) missing.insert(id);
-      }
-    }
-    for (int id : missing) out.graph.AddNode(PoseGraphNode{id, Similarity(), false, false});
-    AddEdges(out);
-    for (const auto& [id, line] : fixed_) {
-      if (!out.graph.Has(id))
-        Fail(line, "FIX names node " + std::to_string(id) + ", which is not in the graph");
-      out.graph.SetFixed(id, true);
-    }
-    out.has_all_vertices = missing.empty();
-    Warn(out, linked.size(), missing.size());
+  Eigen::Vector3d Position(std::size_t word, std::size_t size) const {
+    Eigen::Vector3d out = Eigen::Vector3d::Zero();
+    for (std::size_t k = 0; k < size; ++k) out(static_cast<Eigen::Index>(k)) = line_.Number(word + k);
     return out;
   }
 
-  void Warn(G2oFile& out, std::size_t linked, std::size_t missing) const {
-    for (const auto& [tag, where] : unknown_) {
-      out.warnings.push_back(file_.string() + ":" + std::to_string(where.second) + ": unknown tag '" +
-                             internal::Excerpt(tag) + "', " + std::to_string(where.first) +
-                             (where.first == 1 ? " line" : " lines") + " ignored");
+  /// All edges between nodes but mixtures. Some have a number more behind the ids.
+  void ReadEdgeLine(const G2oTag& tag) {
+    const bool judged = tag.line == LineKind::kSwitchable || tag.line == LineKind::kMaxMixture;
+    const std::size_t numbers = EdgeNumbers(tag) + (judged ? 1 : 0);
+    line_.Need(numbers, numbers);
+    if (judged) line_.Number(3);
+    ReadEdge(tag, 1, judged ? 4 : 3);
+    if (!judged) return;
+    contents_.edges.back().edge.kind_by_ids = false;
+    contents_.judged.Add(line_.number());
+  }
+
+  static std::size_t EdgeNumbers(const G2oTag& tag) {
+    const std::size_t n = tag.coordinates.size();
+    return 2 + NumbersOf(tag.form) + n * (n + 1) / 2;
+  }
+
+  void ReadEdge(const G2oTag& tag, std::size_t ids, std::size_t numbers) {
+    internal::G2oEdge e;
+    e.line = line_.number();
+    PoseGraphEdge& edge = e.edge;
+    edge.from = Id(ids);
+    edge.to = Id(ids + 1);
+    edge.kind = EdgeKind::kLoop;
+    edge.kind_by_ids = true;
+    edge.measurement = line_.Pose(numbers, tag.form);
+    if (edge.from == edge.to) line_.Fail("the edge leads from node " + line_.Word(ids) + " to itself");
+    edge.information = line_.Upper(numbers + NumbersOf(tag.form), tag.coordinates);
+    if (tag.form == internal::PoseForm::kEuler) EulerToQuaternion(edge.measurement, &edge.information);
+    e.bad = IsBad(edge.information);
+    e.toro = tag.line == LineKind::kToroEdge;
+    if (e.toro) {
+      contents_.by_rows = contents_.by_rows && !e.bad;
+      e.bad = IsBad(internal::FromToro(edge.information));
+      if (e.bad) contents_.not_toro.Add(e.line);
     }
-    if (bad_lines_ > 0) out.warnings.push_back(WhatWasDone(out.skipped));
-    if (missing > 0 && !nodes_.empty()) {
-      out.warnings.push_back(file_.string() + ": " + std::to_string(missing) +
-                             " nodes of edges have no vertex; their poses come from the edges");
+    contents_.edges.push_back(std::move(e));
+  }
+
+  /// Throws for what no treatment mends.
+  bool IsBad(const Matrix7d& information) const {
+    const internal::InformationFault fault = internal::FaultOf(information, *contents_.kind);
+    if (fault == internal::InformationFault::kNone) return false;
+    if (fault == internal::InformationFault::kNotPositiveDefinite) return true;
+    line_.Fail(CheckInformation(information, *contents_.kind));
+  }
+
+  /// i j n, and for each of n components: its tag, weight, i j, measurement, information.
+  void ReadMixture(const G2oTag& tag) {
+    if (line_.Words() < 4) line_.Need(4, 4);
+    const std::size_t each = 2 + EdgeNumbers(tag);
+    const std::size_t components = (line_.Words() - 4) / each;
+    if (components == 0 || line_.Words() != 4 + components * each ||
+        line_.Number(3) != static_cast<double>(components))
+      line_.Fail(line_.Word(0) + " does not have the numbers of its " + line_.Word(3) + " components");
+    std::size_t best = 0;
+    for (std::size_t c = 0; c < components; ++c) {
+      for (std::size_t k = 2; k < 4 + NumbersOf(tag.form); ++k) {
+        if (line_.Word(4 + c * each + k) != line_.Word(4 + k))
+          line_.Fail(line_.Word(0) +
+                     " has components of different measurements, which tutti can't choose from; write the "
+                     "one that is meant as a plain edge");
+      }
+      const std::size_t first = 4 + each - tag.coordinates.size() * (tag.coordinates.size() + 1) / 2;
+      if (line_.Number(first + c * each) > line_.Number(first + best * each)) best = c;
     }
-    const std::size_t alone = out.graph.nodes().size() - linked;
-    if (alone > 0) {
-      out.warnings.push_back(file_.string() + ": " + std::to_string(alone) +
-                             " vertices have no edge and stay as they are");
+    ReadEdge(tag, 4 + best * each + 2, 4 + best * each + 4);
+    contents_.edges.back().edge.kind_by_ids = false;
+    contents_.judged.Add(line_.number());
+  }
+
+  void ReadParameters(const G2oTag& tag) {
+    line_.Need(1 + NumbersOf(tag.form), 1 + NumbersOf(tag.form));
+    bool beyond = false;
+    contents_.parameters[line_.Id(1, &beyond)] = line_.Pose(2, tag.form);
+    contents_.graph.parameter_lines.push_back(line_.Text());
+  }
+
+  void ReadMeasurement(const G2oTag& tag) {
+    using What = PoseGraphMeasurement::What;
+    const bool prior = tag.from == MeasurementEnd::What::kWorld;
+    const std::size_t ids = prior ? 1 : 2, n = tag.coordinates.size();
+    const std::size_t value = tag.what == What::kPose ? NumbersOf(tag.form) : n;
+    const std::size_t numbers = ids + value + n * (n + 1) / 2;
+    line_.Need(numbers + tag.sensors, numbers);
+    internal::G2oMeasurement out;
+    out.line = line_.number();
+    PoseGraphMeasurement& m = out.measurement;
+    m.what = tag.what;
+    m.from = {tag.from, prior ? 0 : Id(1), {}};
+    m.to = {tag.to, Id(ids), {}};
+    if (!prior && m.from.id == m.to.id) line_.Fail("the edge leads from " + line_.Word(1) + " to itself");
+    std::size_t word = 1 + ids;
+    bool beyond = false;
+    if (line_.Words() == 1 + numbers + tag.sensors) {
+      for (std::size_t k = 0; k < tag.sensors; ++k) out.sensors[k] = line_.Id(word++, &beyond);
+    }
+    if (tag.what == What::kPose) m.value = line_.Pose(word, tag.form);
+    if (tag.what == What::kPosition) m.value.translation = Position(word, n);
+    if (tag.what == What::kBearing) m.bearing = line_.Number(word);
+    m.information = line_.Upper(word + value, tag.coordinates);
+    if (!internal::IsPositiveSemidefinite(m.information))
+      line_.Fail("its information matrix is not positive semidefinite; repair or remove this line");
+    m.line = line_.Text();
+    contents_.measurements.push_back(std::move(out));
+  }
+
+  void ReadFix() {
+    if (line_.Words() < 2) line_.Fail("FIX names no node");
+    for (std::size_t word = 1; word < line_.Words(); ++word) {
+      bool beyond = false;
+      contents_.fixed.emplace(line_.Id(word, &beyond), line_.number());
     }
   }
 
-  std::string WhatWasDone(std::size_t skipped) const {
-    std::string done;
-    if (bad_ == BadInformation::kProject) done = "their negative eigenvalues count as 0";
-    if (bad_ == BadInformation::kDiagonal) done = "only the positive entries of their diagonals count";
-    if (skipped > 0) {
-      done += (done.empty() ? "" : "; ") + std::to_string(skipped) +
-              (bad_ == BadInformation::kSkip ? " are left out" : " have nothing positive and are left out");
-    }
-    return file_.string() + ":" + std::to_string(first_bad_) + ": " + HowManyBad() +
-           ", this one first, have an information matrix that is not positive definite: " + done;
-  }
-
-  std::filesystem::path file_;
-  BadInformation bad_;
-  std::size_t bad_lines_ = 0, first_bad_ = 0;
-  std::size_t line_ = 0;
-  std::vector<std::string> words_;
-  std::optional<GraphKind> kind_;
-  std::vector<PoseGraphNode> nodes_;
-  std::set<int> vertices_;
-  std::vector<EdgeLine> edges_;
-  std::map<int, std::size_t> fixed_;
-  std::map<std::string, std::pair<std::size_t, std::size_t>> unknown_;  ///< tag -> count, first line
+  G2oLine line_;
+  internal::G2oContents contents_;
+  bool beyond_ = false, negative_ = false;  // ids from 2^63 on, and below 0
 };
 
 }  // namespace
 
-G2oFile ReadG2o(const std::filesystem::path& file, BadInformation bad) { return Reader(file, bad).Read(); }
+G2oFile ReadG2o(const std::filesystem::path& file, BadInformation bad, bool ignore_unknown,
+                const std::function<void(std::size_t)>& progress) {
+  return internal::BuildGraph(Reader(file).Read(progress), bad, ignore_unknown);
+}
 
 }  // namespace tutti

@@ -1,9 +1,9 @@
 #include <cstdio>
-#include <fstream>
+#include <string>
 
 #include "backend/graph/edge_error.h"
+#include "core/replaced_file.h"
 #include "tutti/backend/g2o_io.h"
-#include "tutti/core/error.h"
 
 namespace tutti {
 namespace {
@@ -30,34 +30,42 @@ void AppendPose(std::string& line, const Similarity& pose, GraphKind kind) {
 }  // namespace
 
 void WriteG2o(const std::filesystem::path& file, const PoseGraph& graph) {
-  std::ofstream out(file);
-  if (!out)
-    throw InputError(file.string() + ": can't be written; check that the folder exists and is writable");
+  std::string text;
   const GraphKind kind = graph.kind();
   const std::string name = kind == GraphKind::kSE2   ? "SE2"
                            : kind == GraphKind::kSE3 ? "SE3:QUAT"
                                                      : "SIM3:QUAT";
   std::string line;
+  for (const std::string& parameters : graph.parameter_lines) text += parameters + '\n';
   for (const PoseGraphNode& node : graph.nodes()) {
     if (!node.has_estimate) continue;
-    line = "VERTEX_" + name + " " + std::to_string(node.id);
+    line = "VERTEX_" + name + " " + graph.NameOf(node.id);
     AppendPose(line, node.pose, kind);
-    out << line << '\n';
+    text += line + '\n';
+  }
+  for (const PoseGraphLandmark& landmark : graph.landmarks()) {
+    if (!landmark.has_estimate) continue;
+    line = (kind == GraphKind::kSE2 ? "VERTEX_XY " : "VERTEX_TRACKXYZ ") + graph.NameOf(landmark.id);
+    for (int k = 0; k < (kind == GraphKind::kSE2 ? 2 : 3); ++k) Append(line, landmark.position(k));
+    text += line + '\n';
   }
   for (const PoseGraphNode& node : graph.nodes()) {
-    if (node.fixed) out << "FIX " << node.id << '\n';
+    if (node.fixed) text += "FIX " + graph.NameOf(node.id) + '\n';
+  }
+  for (const PoseGraphLandmark& landmark : graph.landmarks()) {
+    if (landmark.fixed) text += "FIX " + graph.NameOf(landmark.id) + '\n';
   }
   const std::vector<int> used = TangentCoordinates(kind);
   for (const PoseGraphEdge& edge : graph.edges()) {
-    line = "EDGE_" + name + " " + std::to_string(edge.from) + " " + std::to_string(edge.to);
+    line = "EDGE_" + name + " " + graph.NameOf(edge.from) + " " + graph.NameOf(edge.to);
     AppendPose(line, edge.measurement, kind);
     for (std::size_t r = 0; r < used.size(); ++r) {
       for (std::size_t c = r; c < used.size(); ++c) Append(line, edge.information(used[r], used[c]));
     }
-    out << line << '\n';
+    text += line + '\n';
   }
-  out.flush();
-  if (!out) throw InputError(file.string() + ": could not be written in full; is the disk full?");
+  for (const PoseGraphMeasurement& measurement : graph.measurements()) text += measurement.line + '\n';
+  internal::WriteFile(file, text);
 }
 
 }  // namespace tutti

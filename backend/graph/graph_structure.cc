@@ -20,15 +20,23 @@ GraphStructure AnalyseGraph(const PoseGraph& graph) {
   const auto& nodes = graph.nodes();
   constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
   GraphStructure out;
-  std::vector<std::size_t> parent(nodes.size());
+  std::vector<std::size_t> parent(nodes.size() + graph.landmarks().size());  // landmarks behind the nodes
   std::iota(parent.begin(), parent.end(), std::size_t{0});
   out.ends.reserve(graph.edges().size());
   for (const PoseGraphEdge& edge : graph.edges()) {
     out.ends.push_back({graph.IndexOf(edge.from), graph.IndexOf(edge.to)});
     parent[Root(parent, out.ends.back().from)] = Root(parent, out.ends.back().to);
   }
+  const auto place = [&](const MeasurementEnd& end) {
+    return end.what == MeasurementEnd::What::kNode ? graph.IndexOf(end.id)
+                                                   : nodes.size() + graph.IndexOfLandmark(end.id);
+  };
+  for (const PoseGraphMeasurement& m : graph.measurements()) {
+    if (m.from.what != MeasurementEnd::What::kWorld)
+      parent[Root(parent, place(m.from))] = Root(parent, place(m.to));
+  }
 
-  std::vector<std::size_t> component_of_root(nodes.size(), kNone);
+  std::vector<std::size_t> component_of_root(parent.size(), kNone);
   out.constant.assign(nodes.size(), false);
   out.component_of.resize(nodes.size());
   for (std::size_t i = 0; i < nodes.size(); ++i) {
@@ -51,7 +59,20 @@ GraphStructure AnalyseGraph(const PoseGraph& graph) {
     out.constant[out.anchor[c]] = true;
     out.components[c].anchor = nodes[out.anchor[c]].id;
   }
+  for (const PoseGraphMeasurement& m : graph.measurements()) {
+    if (m.from.what != MeasurementEnd::What::kWorld || m.information.isZero(0)) continue;
+    const std::size_t component = component_of_root[Root(parent, place(m.to))];
+    if (component != kNone && !nodes[out.anchor[component]].fixed) out.components[component].by_priors = true;
+  }
   return out;
+}
+
+GraphStructure HeldByPriors(GraphStructure structure, const PoseGraph& graph) {
+  for (std::size_t c = 0; c < structure.components.size(); ++c) {
+    const std::size_t anchor = structure.anchor[c];
+    if (structure.components[c].by_priors) structure.constant[anchor] = graph.nodes()[anchor].fixed;
+  }
+  return structure;
 }
 
 }  // namespace tutti::internal

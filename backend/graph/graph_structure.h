@@ -22,6 +22,10 @@ struct GraphStructure {
   std::vector<GraphComponent> components;  ///< in the order of each one's first node
 };
 
+/// Landmarks connect the nodes that see them.
 GraphStructure AnalyseGraph(const PoseGraph& graph);
+
+/// The same, but parts that priors hold are not held by an anchor as well.
+GraphStructure HeldByPriors(GraphStructure structure, const PoseGraph& graph);
 
 }  // namespace tutti::internal

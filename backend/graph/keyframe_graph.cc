@@ -328,7 +328,8 @@ KeyframeCorrection KeyframeGraph::CorrectionOf(const PoseGraph& graph, const Pos
   correction.success = report.success;
   correction.reason = report.reason;
   if (!report.success) return correction;
-  correction.S_world_keyframe = graph.Poses();
+  for (const PoseGraphNode& node : graph.nodes())
+    correction.S_world_keyframe.emplace(static_cast<int>(node.id), node.pose);
   correction.merges = Merges(loops);
   for (std::size_t e = 0; e < graph.edges().size(); ++e) {
     if (graph.edges()[e].kind == EdgeKind::kLoop) correction.loops.push_back(report.edges[e]);

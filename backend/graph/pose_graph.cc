@@ -8,8 +8,8 @@
 namespace tutti {
 namespace {
 
-std::string EdgeName(const PoseGraphEdge& edge) {
-  return "edge " + std::to_string(edge.from) + " -> " + std::to_string(edge.to);
+std::string EdgeName(const PoseGraph& graph, const PoseGraphEdge& edge) {
+  return "pose graph: edge " + graph.NameOf(edge.from) + " -> " + graph.NameOf(edge.to);
 }
 
 bool IsUsable(const Similarity& s) {
@@ -76,73 +76,120 @@ std::string CheckInformation(const Matrix7d& information, GraphKind kind) {
 }
 
 void PoseGraph::AddNode(const PoseGraphNode& node) {
-  if (!IsUsable(node.pose)) {
-    throw InputError("pose graph: node " + std::to_string(node.id) + " has a pose that is not finite");
-  }
-  if (!index_.emplace(node.id, nodes_.size()).second) {
-    throw InputError("pose graph: node " + std::to_string(node.id) +
-                     " is there already; give each node its own id");
+  if (!IsUsable(node.pose))
+    throw InputError("pose graph: node " + NameOf(node.id) + " has a pose that is not finite");
+  if (HasLandmark(node.id) || !index_.emplace(node.id, nodes_.size()).second) {
+    throw InputError("pose graph: node " + NameOf(node.id) + " is there already; give each node its own id");
   }
   nodes_.push_back(node);
   nodes_.back().pose.rotation.normalize();
 }
 
-void PoseGraph::AddNode(int id, const Similarity& S_world_node, bool fixed) {
+void PoseGraph::AddNode(NodeId id, const Similarity& S_world_node, bool fixed) {
   AddNode(PoseGraphNode{id, S_world_node, fixed, true});
 }
 
-void PoseGraph::AddNode(int id, const Pose& T_world_node, bool fixed) {
+void PoseGraph::AddNode(NodeId id, const Pose& T_world_node, bool fixed) {
   AddNode(id, Similarity(T_world_node), fixed);
 }
 
 void PoseGraph::AddEdge(const PoseGraphEdge& edge) {
-  for (int id : {edge.from, edge.to}) {
-    if (!Has(id)) {
-      throw InputError("pose graph: " + EdgeName(edge) + ": there is no node " + std::to_string(id) +
-                       "; add it first");
-    }
+  for (const NodeId id : {edge.from, edge.to}) {
+    if (!Has(id))
+      throw InputError(EdgeName(*this, edge) + ": there is no node " + NameOf(id) + "; add it first");
   }
-  if (edge.from == edge.to)
-    throw InputError("pose graph: " + EdgeName(edge) + " leads from a node to itself");
-  if (!IsUsable(edge.measurement)) {
-    throw InputError("pose graph: " + EdgeName(edge) + " has a measurement that is not finite");
-  }
+  if (edge.from == edge.to) throw InputError(EdgeName(*this, edge) + " leads from a node to itself");
+  if (!IsUsable(edge.measurement))
+    throw InputError(EdgeName(*this, edge) + " has a measurement that is not finite");
   const std::string wrong = CheckInformation(edge.information, kind_);
-  if (!wrong.empty()) throw InputError("pose graph: " + EdgeName(edge) + ": " + wrong);
+  if (!wrong.empty()) throw InputError(EdgeName(*this, edge) + ": " + wrong);
   edges_.push_back(edge);
   edges_.back().measurement.rotation.normalize();
 }
 
-void PoseGraph::AddOdometry(int from, int to, const Similarity& S_from_to, const Matrix7d& information) {
+void PoseGraph::AddOdometry(NodeId from, NodeId to, const Similarity& S_from_to,
+                            const Matrix7d& information) {
   AddEdge(PoseGraphEdge{from, to, S_from_to, information, EdgeKind::kOdometry});
 }
 
-void PoseGraph::AddLoop(int from, int to, const Similarity& S_from_to, const Matrix7d& information) {
+void PoseGraph::AddLoop(NodeId from, NodeId to, const Similarity& S_from_to, const Matrix7d& information) {
   AddEdge(PoseGraphEdge{from, to, S_from_to, information, EdgeKind::kLoop});
 }
 
-std::size_t PoseGraph::IndexOf(int id) const {
+void PoseGraph::AddLandmark(const PoseGraphLandmark& landmark) {
+  const std::string name = "pose graph: landmark " + NameOf(landmark.id);
+  if (kind_ == GraphKind::kSim3)
+    throw InputError(name + ": a graph with scale has no landmarks; use SE(2) or SE(3)");
+  if (!landmark.position.allFinite()) throw InputError(name + " has a position that is not finite");
+  if (Has(landmark.id) || !landmark_index_.emplace(landmark.id, landmarks_.size()).second)
+    throw InputError(name + " is there already; give each landmark and each node its own id");
+  landmarks_.push_back(landmark);
+}
+
+void PoseGraph::AddMeasurement(const PoseGraphMeasurement& measurement) {
+  const std::string name = "pose graph: measurement '" + measurement.line + "'";
+  if (kind_ == GraphKind::kSim3)
+    throw InputError(name + ": a graph with scale has neither landmarks nor priors; use SE(2) or SE(3)");
+  for (const MeasurementEnd& end : {measurement.from, measurement.to}) {
+    const bool missing = end.what == MeasurementEnd::What::kNode       ? !Has(end.id)
+                         : end.what == MeasurementEnd::What::kLandmark ? !HasLandmark(end.id)
+                                                                       : false;
+    if (missing) throw InputError(name + ": there is no " + NameOf(end.id) + "; add it first");
+    if (!IsUsable(end.sensor)) throw InputError(name + ": the pose of its sensor is not finite");
+  }
+  if (!IsUsable(measurement.value) || !std::isfinite(measurement.bearing))
+    throw InputError(name + " is not finite");
+  if (!internal::IsPositiveSemidefinite(measurement.information))
+    throw InputError(name + ": its information matrix is not positive semidefinite");
+  measurements_.push_back(measurement);
+}
+
+std::size_t PoseGraph::IndexOf(NodeId id) const {
   const auto it = index_.find(id);
-  if (it == index_.end()) throw InputError("pose graph: there is no node " + std::to_string(id));
+  if (it == index_.end()) throw InputError("pose graph: there is no node " + NameOf(id));
   return it->second;
 }
 
-void PoseGraph::SetPose(int id, const Similarity& S_world_node) {
-  if (!IsUsable(S_world_node)) {
-    throw InputError("pose graph: node " + std::to_string(id) + " has a pose that is not finite");
-  }
+std::size_t PoseGraph::IndexOfLandmark(NodeId id) const {
+  const auto it = landmark_index_.find(id);
+  if (it == landmark_index_.end()) throw InputError("pose graph: there is no landmark " + NameOf(id));
+  return it->second;
+}
+
+void PoseGraph::SetPose(NodeId id, const Similarity& S_world_node) {
+  if (!IsUsable(S_world_node))
+    throw InputError("pose graph: node " + NameOf(id) + " has a pose that is not finite");
   PoseGraphNode& node = nodes_[IndexOf(id)];
   node.pose = S_world_node;
   node.pose.rotation.normalize();
   node.has_estimate = true;
 }
 
-void PoseGraph::SetFixed(int id, bool fixed) { nodes_[IndexOf(id)].fixed = fixed; }
+void PoseGraph::SetFixed(NodeId id, bool fixed) {
+  (HasLandmark(id) ? landmarks_[IndexOfLandmark(id)].fixed : nodes_[IndexOf(id)].fixed) = fixed;
+}
 
-std::map<int, Similarity> PoseGraph::Poses() const {
-  std::map<int, Similarity> out;
+void PoseGraph::SetLandmark(NodeId id, const Eigen::Vector3d& position) {
+  if (!position.allFinite())
+    throw InputError("pose graph: landmark " + NameOf(id) + " has a position that is not finite");
+  PoseGraphLandmark& landmark = landmarks_[IndexOfLandmark(id)];
+  landmark.position = position;
+  landmark.has_estimate = true;
+}
+
+std::map<NodeId, Similarity> PoseGraph::Poses() const {
+  std::map<NodeId, Similarity> out;
   for (const PoseGraphNode& node : nodes_) out.emplace(node.id, node.pose);
   return out;
+}
+
+std::string PoseGraph::NameOf(NodeId id) const {
+  const auto name = names_.find(id);
+  return name != names_.end() ? name->second : std::to_string(id);
+}
+
+void PoseGraph::SetName(NodeId id, const std::string& name) {
+  if (name != std::to_string(id)) names_.emplace(id, name);
 }
 
 }  // namespace tutti

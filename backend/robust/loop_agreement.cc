@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "backend/graph/odometry_edges.h"
 #include "backend/robust/pairwise_consistency.h"
 #include "backend/solver/graph_initialization.h"
 #include "backend/uncertainty/edge_covariance.h"
@@ -15,32 +16,34 @@ MeasuredLoop MeasuredLoop::Reversed() const {
 LoopAgreement::LoopAgreement(const PoseGraph& graph, const GraphStructure& structure,
                              GraphObjective objective)
     : kind_(graph.kind()) {
+  place_ = OrderOf(graph).place;
   FollowOdometry(graph, structure, objective);
   for (std::size_t e = 0; e < graph.edges().size(); ++e) {
     const PoseGraphEdge& edge = graph.edges()[e];
     if (edge.kind != EdgeKind::kLoop) continue;
-    loops_.push_back({e, structure.ends[e].from, structure.ends[e].to, edge.measurement.RigidPart(),
-                      EdgeCovariance(edge, graph.kind(), objective)});
+    loops_.push_back({e, place_[structure.ends[e].from], place_[structure.ends[e].to],
+                      edge.measurement.RigidPart(), EdgeCovariance(edge, graph.kind(), objective)});
   }
 }
 
 void LoopAgreement::FollowOdometry(const PoseGraph& graph, const GraphStructure& structure,
                                    GraphObjective objective) {
   const std::size_t n = graph.nodes().size();
-  for (const Similarity& pose : OdometryInitialization(graph, structure))
-    T_world_node_.push_back(pose.RigidPart());
+  const std::vector<Similarity> poses = OdometryInitialization(graph, structure);
+  T_world_node_.resize(n);
+  for (std::size_t k = 0; k < n; ++k) T_world_node_[place_[k]] = poses[k].RigidPart();
   covariance_.assign(n, Matrix6d::Zero());
   segment_.assign(n, 0);
   std::vector<const PoseGraphEdge*> step(n, nullptr);  // from the node before
   for (std::size_t e = 0; e < graph.edges().size(); ++e) {
     if (graph.edges()[e].kind == EdgeKind::kLoop) continue;
-    const auto [low, high] = std::minmax(structure.ends[e].from, structure.ends[e].to);
+    const auto [low, high] = std::minmax(place_[structure.ends[e].from], place_[structure.ends[e].to]);
     if (high == low + 1) step[high] = &graph.edges()[e];
   }
   for (std::size_t k = 1; k < n; ++k) {
     segment_[k] = segment_[k - 1] + (step[k] == nullptr ? 1 : 0);
     if (step[k] == nullptr) continue;
-    const std::size_t to = graph.IndexOf(step[k]->to);
+    const std::size_t to = place_[graph.IndexOf(step[k]->to)];
     covariance_[k] = covariance_[k - 1] +
                      Transported(EdgeCovariance(*step[k], graph.kind(), objective), T_world_node_[to]);
   }

@@ -13,7 +13,7 @@ namespace tutti::internal {
 /// One loop as its end `from` sees it.
 struct MeasuredLoop {
   std::size_t edge = 0;          ///< position in edges()
-  std::size_t from = 0, to = 0;  ///< positions in nodes()
+  std::size_t from = 0, to = 0;  ///< places among the nodes by their ids (NodeOrder)
   Pose measurement;              ///< T_from_to; the scale of Sim(3) is left out
   Matrix6d covariance;           ///< as a perturbation of the frame of `to` [m^2, m rad, rad^2]
 
@@ -38,6 +38,7 @@ class LoopAgreement {
   Matrix6d Between(std::size_t i, std::size_t j, const Pose& T_target_world) const;
 
   GraphKind kind_;
+  std::vector<std::size_t> place_;  // of the nodes; what follows is in this order
   std::vector<MeasuredLoop> loops_;
   std::vector<Pose> T_world_node_;
   std::vector<Matrix6d> covariance_;  // of the way from the chain's start, in world coordinates

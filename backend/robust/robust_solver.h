@@ -87,7 +87,7 @@ class RobustSolver {
       if (!DecideLoops(problem_.threshold())) return false;
       if (!ThresholdIsTooWide()) break;  // the converged solution may show less noise
     }
-    return DropStrained();
+    return problem_.HasMeasurements() || DropStrained();  // which knows no landmarks
   }
 
  private:

@@ -133,6 +133,7 @@ class CeresSolver final : public GraphSolver<N> {
       AddBlock(*problem_, graph.Block(k), BlockSize<N>(), manifold_.get());
       if (structure.constant[k]) problem_->SetParameterBlockConstant(graph.Block(k));
     }
+    graph.terms->AddTo(*problem_, graph.blocks.data());
     for (std::size_t e = 0; e < active_.size(); ++e) {
       if (!active_[e]) continue;
       double *from = graph.Block(structure.ends[e].from), *to = graph.Block(structure.ends[e].to);

@@ -26,22 +26,32 @@ class GraphProblem {
       weighted_.constants.push_back(MakeEdgeConstants<N>(edge, options.objective));
       weighted_.is_loop.push_back(edge.kind == EdgeKind::kLoop);
     }
-    solver_ = MakeGraphSolver<N>(options.solver);
+    weighted_.terms = std::make_unique<MeasurementTerms<N>>(graph, options.objective);
+    solver_ = MakeGraphSolver<N>(HasMeasurements() ? PoseGraphSolver::kCeres : options.solver);
   }
 
   /// Chi-square beyond which a loop is doubted.
   double threshold() const { return threshold_; }
   void SetThreshold(double threshold) { threshold_ = threshold; }
 
+  /// Of the nodes, and behind them of the landmarks, which are where they were if they are left out.
   void SetPoses(const std::vector<Similarity>& poses) {
-    for (std::size_t k = 0; k < poses.size(); ++k) PoseToBlock<N>(poses[k], weighted_.Block(k));
+    const std::size_t nodes = graph_.nodes().size();
+    for (std::size_t k = 0; k < nodes; ++k) PoseToBlock<N>(poses[k], weighted_.Block(k));
+    for (std::size_t k = nodes; k < poses.size(); ++k)
+      weighted_.terms->SetLandmark(k - nodes, poses[k].translation);
   }
   std::vector<Similarity> Poses() const {
     std::vector<Similarity> poses;
+    poses.reserve(graph_.nodes().size() + weighted_.terms->Landmarks());
     for (std::size_t k = 0; k < graph_.nodes().size(); ++k)
       poses.push_back(BlockToPose<N>(weighted_.Block(k)));
+    for (std::size_t k = 0; k < weighted_.terms->Landmarks(); ++k)
+      poses.emplace_back(1.0, Eigen::Quaterniond::Identity(), weighted_.terms->Landmark(k));
     return poses;
   }
+  /// Landmarks' or priors.
+  bool HasMeasurements() const { return !weighted_.terms->Empty(); }
 
   /// e^T Omega e of one edge, weight not applied.
   double EdgeChi2(std::size_t e) const { return weighted_.Chi2(e); }
@@ -60,6 +70,7 @@ class GraphProblem {
              : excluded_[e] ? 0.0
                             : RobustCost(options_.robust, EdgeChi2(e), threshold_);
     }
+    if (HasMeasurements()) sum += weighted_.terms->Chi2(weighted_.blocks.data());
     return sum;
   }
 

@@ -12,6 +12,7 @@
 
 #include "backend/graph/edge_error.h"
 #include "backend/graph/graph_structure.h"
+#include "backend/solver/measurement_terms.h"
 #include "backend/solver/stop.h"
 #include "tutti/backend/pose_graph_optimizer.h"
 
@@ -23,12 +24,13 @@ template <int N>
 struct WeightedGraph {
   static constexpr std::size_t kBlock = static_cast<std::size_t>(BlockSize<N>());
 
-  const GraphStructure* structure = nullptr;  ///< ends of the edges, constant nodes
-  std::vector<EdgeConstants<N>> constants;    ///< parallel to edges
-  std::vector<double> weights;                ///< the same, >= 0
-  std::vector<bool> is_loop;                  ///< the same: the loss acts on these
-  std::unique_ptr<ceres::LossFunction> loss;  ///< nullptr: least squares
-  std::vector<double> blocks;                 ///< the nodes, kBlock numbers each
+  const GraphStructure* structure = nullptr;   ///< ends of the edges, constant nodes
+  std::vector<EdgeConstants<N>> constants;     ///< parallel to edges
+  std::vector<double> weights;                 ///< the same, >= 0
+  std::vector<bool> is_loop;                   ///< the same: the loss acts on these
+  std::unique_ptr<ceres::LossFunction> loss;   ///< nullptr: least squares
+  std::vector<double> blocks;                  ///< the nodes, kBlock numbers each
+  std::unique_ptr<MeasurementTerms<N>> terms;  ///< landmarks and priors, always of weight 1; Ceres knows them
 
   const double* Block(std::size_t node) const { return &blocks[node * kBlock]; }
   double* Block(std::size_t node) { return &blocks[node * kBlock]; }

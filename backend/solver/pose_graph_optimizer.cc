@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "backend/graph/edge_weights.h"
 #include "backend/graph/graph_structure.h"
 #include "backend/robust/cluster_search.h"
 #include "backend/robust/pairwise_consistency.h"
@@ -12,6 +13,7 @@
 #include "backend/solver/chordal_descent.h"
 #include "backend/solver/graph_initialization.h"
 #include "backend/solver/graph_problem.h"
+#include "backend/solver/measurement_start.h"
 #include "core/stopwatch.h"
 #include "tutti/core/error.h"
 
@@ -26,20 +28,22 @@ using internal::Stopwatch;
 template <int N>
 class Run {
  public:
-  Run(PoseGraph& graph, const GraphStructure& structure, const PoseGraphOptions& options,
+  Run(PoseGraph& graph, const GraphStructure& anchored, const PoseGraphOptions& options,
       const internal::StopRequest& stop, PoseGraphReport& report)
       : graph_(graph),
-        structure_(structure),
+        anchored_(anchored),
+        structure_(internal::HeldByPriors(anchored, graph)),
         options_(options),
         stop_(stop),
         report_(report),
-        problem_(graph, structure, options),
+        problem_(graph, structure_, options),
         robust_(problem_, options, graph.edges().size(),
                 [this](int iterations) { return SolveOnce(iterations); }) {
     problem_.SetStop(stop);
+    if (problem_.HasMeasurements()) SolvedByCeres("landmarks and priors are");
     if (!options.pairwise_consistency) return;
     const std::vector<bool> agree =
-        internal::PairwiseConsistentEdges(graph, structure, options.objective, problem_.threshold());
+        internal::PairwiseConsistentEdges(graph, anchored, options.objective, problem_.threshold());
     for (std::size_t e = 0; e < agree.size(); ++e) {
       if (!agree[e]) problem_.Exclude(e);
     }
@@ -52,16 +56,16 @@ class Run {
     if (every || options_.init == GraphInit::kFile) {
       std::vector<Similarity> poses;
       for (const PoseGraphNode& node : graph_.nodes()) {
-        if (!node.has_estimate && missing.empty()) missing = std::to_string(node.id);
+        if (!node.has_estimate && missing.empty()) missing = graph_.NameOf(node.id);
         poses.push_back(node.pose);
       }
       if (missing.empty()) AddStart(GraphStart::kFile, std::move(poses));
     }
     if (every || options_.init == GraphInit::kOdometry) {
-      AddStart(GraphStart::kOdometry, internal::OdometryInitialization(graph_, structure_));
+      AddStart(GraphStart::kOdometry, internal::OdometryInitialization(graph_, anchored_));
     }
     if (every || options_.init == GraphInit::kChordal) {
-      std::vector<Similarity> poses = internal::ChordalInitialization(graph_, structure_, reason);
+      std::vector<Similarity> poses = internal::ChordalInitialization(graph_, anchored_, reason);
       if (!poses.empty()) AddStart(GraphStart::kChordalRelaxation, std::move(poses));
     }
     std::stable_sort(starts_.begin(), starts_.end(),
@@ -132,13 +136,13 @@ class Run {
       best_weights = problem_.weights();
     }
     if (!found) return false;
-    if (robust && options_.robust == RobustLoss::kSwitchable) SolvedWithSwitches();
+    if (robust && options_.robust == RobustLoss::kSwitchable) SolvedByCeres("switchable constraints have");
     Took(start);
     problem_.SetPoses(best);
     for (std::size_t e = 0; e < best_weights.size(); ++e) problem_.SetWeight(e, best_weights[e]);
     if (robust) {
       robust_.Refine();
-      if (options_.robust == RobustLoss::kGnc) ReconsiderClusters();
+      if (options_.robust == RobustLoss::kGnc && !problem_.HasMeasurements()) ReconsiderClusters();
       report_.objective = problem_.Objective();
     }
     report_.starts.push_back({start.start, start.objective, report_.objective, false});
@@ -187,19 +191,25 @@ class Run {
   void Took(const Start& start) {
     report_.start = start.start;
     report_.initial_objective = start.objective;
-    report_.initial_costs = CostsAt(start.poses);
+    std::vector<Similarity> poses = start.poses;
+    for (Similarity& pose : poses) pose.rotation.normalize();
+    report_.initial_costs = internal::CostsAt(graph_, poses);
     report_.chordal_optimum.clear();
-    if (start.start == GraphStart::kChordalOptimum) report_.chordal_optimum = start.poses;
+    if (start.start != GraphStart::kChordalOptimum) return;
+    report_.chordal_optimum = start.poses;
+    report_.chordal_optimum.resize(graph_.nodes().size());
   }
 
   /// Before the relaxation that it comes from. Graphs with scale have none.
   void AddChordalOptimum() {
     if (graph_.kind() == GraphKind::kSim3) return;
     std::vector<Similarity> poses = starts_.front().poses;
+    poses.resize(graph_.nodes().size());
     const internal::SolveSummary summary =
-        internal::MinimiseChordal(graph_, structure_, options_.max_iterations, TimeLeft(), poses, stop_);
+        internal::MinimiseChordal(graph_, anchored_, options_.max_iterations, TimeLeft(), poses, stop_);
     report_.iterations += summary.iterations;
     if (!summary.usable) return;
+    PlaceMeasured(GraphStart::kChordalOptimum, poses);
     problem_.SetPoses(poses);
     const double objective = problem_.Objective();
     if (!std::isfinite(objective)) return;
@@ -230,10 +240,10 @@ class Run {
     return options_.max_time_s > 0 ? std::max(1e-3, options_.max_time_s - watch_.Seconds()) : 0;
   }
 
-  void SolvedWithSwitches() {
+  void SolvedByCeres(const std::string& what) {
     report_.solver = PoseGraphSolver::kCeres;
     if (options_.solver != report_.solver)
-      report_.solver_note = "switchable constraints have variables that the block solver does not know";
+      report_.solver_note = what + " variables that the block solver does not know";
   }
 
   double WeightOf(std::size_t e, double chi2) const {
@@ -242,7 +252,15 @@ class Run {
     return decided ? problem_.weight(e) : internal::RobustWeight(options_.robust, chi2, problem_.threshold());
   }
 
+  /// What only landmarks and priors need.
+  void PlaceMeasured(GraphStart start, std::vector<Similarity>& poses) const {
+    if (start != GraphStart::kFile && problem_.HasMeasurements())
+      internal::AlignToPriors(graph_, anchored_, poses);
+    internal::AppendLandmarks(graph_, start == GraphStart::kFile, poses);
+  }
+
   void AddStart(GraphStart start, std::vector<Similarity> poses) {
+    PlaceMeasured(start, poses);
     problem_.SetPoses(poses);
     const double objective = problem_.Objective();
     for (const Start& other : starts_) {
@@ -279,19 +297,17 @@ class Run {
 
   void WritePoses(PoseGraph& graph) const {
     const std::vector<Similarity> poses = problem_.Poses();
-    for (std::size_t k = 0; k < poses.size(); ++k) {
+    const std::size_t nodes = graph.nodes().size();
+    for (std::size_t k = 0; k < nodes; ++k) {
       if (!structure_.constant[k] || !graph.nodes()[k].has_estimate)
         graph.SetPose(graph.nodes()[k].id, poses[k]);
     }
+    for (std::size_t k = nodes; k < poses.size(); ++k)
+      graph.SetLandmark(graph.landmarks()[k - nodes].id, poses[k].translation);
   }
-  GraphCosts CostsAt(const std::vector<Similarity>& poses) const {
-    PoseGraph copy = graph_;
-    for (std::size_t k = 0; k < poses.size(); ++k) copy.SetPose(graph_.nodes()[k].id, poses[k]);
-    return EvaluateCosts(copy);
-  }
-
   PoseGraph& graph_;
-  const GraphStructure& structure_;
+  const GraphStructure& anchored_;  // an anchor in each part
+  const GraphStructure structure_;  // none where priors hold it
   const PoseGraphOptions& options_;
   const internal::StopRequest& stop_;
   PoseGraphReport& report_;
@@ -346,7 +362,7 @@ PoseGraphReport PoseGraphOptimizer::Optimize(PoseGraph& graph, const std::functi
   report.solver = options_.solver;
   const GraphStructure structure = internal::AnalyseGraph(graph);
   report.components = structure.components;
-  if (graph.edges().empty()) {
+  if (graph.edges().empty() && graph.measurements().empty()) {
     report.success = true;
     report.termination = "nothing to do";
   } else {

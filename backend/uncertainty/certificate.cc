@@ -177,6 +177,8 @@ Certificate Certify(const PoseGraph& graph, const CertificateOptions& options,
   const GraphStructure structure = internal::AnalyseGraph(graph);
   if (graph.kind() == GraphKind::kSim3) {
     out.reason = "there is no certificate for graphs with scale";
+  } else if (!graph.measurements().empty()) {
+    out.reason = "there is no certificate for graphs with landmarks or priors";
   } else if (graph.edges().empty()) {
     out.reason = "the graph has no edges";
   } else if (!HasFreeGauge(graph, structure)) {

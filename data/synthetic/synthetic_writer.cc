@@ -4,7 +4,6 @@
 #include <atomic>
 #include <cstdio>
 #include <exception>
-#include <fstream>
 #include <mutex>
 #include <opencv2/imgcodecs.hpp>
 #include <sstream>
@@ -13,6 +12,7 @@
 #include <thread>
 #include <vector>
 
+#include "core/replaced_file.h"
 #include "core/text_reader.h"
 #include "tutti/core/error.h"
 
@@ -43,22 +43,9 @@ std::string NumberName(std::size_t i) {
 std::string StampName(double stamp_s) { return Fixed(stamp_s) + ".png"; }
 
 void WriteImage(const fs::path& file, const cv::Mat& image) {
-  bool good = false;
-  try {
-    good = cv::imwrite(file.string(), image, {cv::IMWRITE_PNG_COMPRESSION, 1});
-  } catch (const cv::Exception&) {
-    good = false;
-  }
-  if (!good)
-    throw InputError(file.string() + ": can't be written; is the folder writable and the disk not full?");
-}
-
-void WriteText(const fs::path& file, const std::string& text) {
-  std::ofstream out(file);
-  out << text;
-  out.flush();
-  if (!out)
-    throw InputError(file.string() + ": can't be written; is the folder writable and the disk not full?");
+  std::vector<unsigned char> bytes;
+  cv::imencode(".png", image, bytes, {cv::IMWRITE_PNG_COMPRESSION, 1});
+  internal::WriteFile(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
 constexpr const char* kImageFolders[] = {"image_0", "image_1", "images", "rgb", "depth"};
@@ -98,6 +85,10 @@ void RemoveOwn(const fs::path& folder) {
   std::error_code code;
   std::vector<fs::path> stale;
   for (const char* part : kImageFolders) {
+    if (fs::is_symlink(folder / part, code))
+      throw InputError((folder / part).string() +
+                       ": is a symbolic link, and --force removes nothing behind one; remove the link, or "
+                       "give another folder");
     for (fs::directory_iterator it(folder / part, code), end; !code && it != end; it.increment(code)) {
       if (!IsOwnName(it->path().filename().string()))
         throw InputError(it->path().string() +
@@ -108,7 +99,8 @@ void RemoveOwn(const fs::path& folder) {
   }
   for (const fs::path& file : stale) fs::remove(file, code);
   for (const char* part : kImageFolders) fs::remove(folder / part, code);
-  for (const char* list : {"times.txt", "calib.txt", "poses.txt", "rgb.txt", "depth.txt", "groundtruth.txt"})
+  for (const char* list :
+       {"config.yaml", "times.txt", "calib.txt", "poses.txt", "rgb.txt", "depth.txt", "groundtruth.txt"})
     fs::remove(folder / list, code);
 }
 
@@ -192,7 +184,7 @@ class Writer {
     } else {
       PrepareFolder(folder_, {"image_0"}, options_.force);
     }
-    if (sensor_ != SyntheticSensor::kSides) WriteText(folder_ / "config.yaml", ConfigText(world_));
+    if (sensor_ != SyntheticSensor::kSides) internal::WriteFile(folder_ / "config.yaml", ConfigText(world_));
     std::vector<std::thread> threads;
     try {
       for (int k = 1; k < std::max(1, options_.threads); ++k) threads.emplace_back([this] { Work(); });
@@ -255,14 +247,15 @@ class Writer {
         for (const StampedPose& p : truth) {
           list += Fixed(p.stamp_s) + " " + part + "/" + StampName(p.stamp_s) + "\n";
         }
-        WriteText(folder_ / (std::string(part) + ".txt"), list);
+        internal::WriteFile(folder_ / (std::string(part) + ".txt"), list);
       }
       WriteTrajectory(folder_ / "groundtruth.txt", truth, TrajectoryFormat::kTum);
     } else {
       std::string times;
       for (const StampedPose& p : truth) times += Scientific(p.stamp_s) + "\n";
-      WriteText(folder_ / "times.txt", times);
-      if (sensor_ != SyntheticSensor::kSides) WriteText(folder_ / "calib.txt", CalibrationText(world_));
+      internal::WriteFile(folder_ / "times.txt", times);
+      if (sensor_ != SyntheticSensor::kSides)
+        internal::WriteFile(folder_ / "calib.txt", CalibrationText(world_));
       WriteTrajectory(folder_ / "poses.txt", truth, TrajectoryFormat::kKitti);
     }
   }

@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <fstream>
 #include <string_view>
+#include <tuple>
 
 #include "frontend/dataset/mcap_bag.h"
 #include "frontend/dataset/ros_bag.h"
 #include "frontend/dataset/sqlite_bag.h"
+#include "frontend/dataset/unpacker.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 
@@ -55,11 +57,12 @@ class PartedBag : public Bag {
     if (parts_.empty()) throw InputError(damage());
     ListTopics();
   }
-  std::string Read(const BagMessage& message) const override {
+
+ private:
+  std::string ReadStored(const BagMessage& message) const override {
     return parts_.at(message.part)->Read(message);
   }
 
- private:
   std::vector<std::unique_ptr<Bag>> parts_;
 };
 
@@ -71,7 +74,9 @@ std::vector<fs::path> Bag::Files(const fs::path& folder) {
   for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
     const std::string type = at->path().extension().string();
     std::error_code none;
-    if ((type == ".mcap" || type == ".db3") && at->is_regular_file(none))
+    const bool packed = type == ".zstd" && !fs::exists(folder / at->path().stem(), none);
+    const std::string kind = packed ? at->path().stem().extension().string() : type;
+    if ((kind == ".mcap" || kind == ".db3") && at->is_regular_file(none))
       names.push_back(at->path().filename().string());
   }
   std::sort(names.begin(), names.end(), NaturalLess);
@@ -86,6 +91,10 @@ std::unique_ptr<Bag> Bag::Open(const fs::path& path) {
   if (!fs::is_directory(path, error)) return OpenBagFile(path);
   const std::vector<fs::path> files = Files(path);
   if (files.empty()) throw InputError(path.string() + ": holds no files of 'ros2 bag record' (.mcap, .db3)");
+  if (std::all_of(files.begin(), files.end(), [](const fs::path& f) { return f.extension() == ".zstd"; }))
+    throw InputError(path.string() +
+                     ": its files are packed as a whole (compression_mode: file); unpack them: " +
+                     "zstd -d " + (path / "*.zstd").string());
   if (files.size() == 1) return OpenBagFile(files.front());
   return std::make_unique<PartedBag>(path, files);
 }
@@ -102,7 +111,18 @@ std::vector<BagMessage> Bag::Messages(const std::string& topic) const {
     const auto at = connections_.find(message.connection);
     if (at != connections_.end() && at->second.name == topic) found.push_back(message);
   }
+  std::stable_sort(found.begin(), found.end(), [](const BagMessage& a, const BagMessage& b) {
+    return std::tie(a.part, a.received_s) < std::tie(b.part, b.received_s);
+  });
   return found;
+}
+
+std::string Bag::Read(const BagMessage& message) const {
+  std::string bytes = ReadStored(message);
+  if (!IsPacked(bytes)) return bytes;
+  std::optional<std::string> unpacked = UnpackedFrame(bytes, kMostMessageBytes);
+  if (!unpacked) throw InputError("a message can't be unpacked: it is damaged");
+  return *std::move(unpacked);
 }
 
 std::size_t Bag::Lost(const std::string& topic) const {

@@ -22,11 +22,13 @@ struct BagMessage {
   std::uint64_t begin = 0;  ///< in the unpacked chunk, or in the file; of a database: its row
   std::int32_t chunk = -1;  ///< that is compressed; -1: none
   std::uint32_t part = 0;   ///< of a recording in several files
-  double stamp_s = 0;       ///< of its header, for messages that begin with one (std_msgs/Header)
+  /// Of its header, for messages that begin with one (std_msgs/Header); nan where the message is compressed.
+  double stamp_s = 0;
+  double received_s = 0;  ///< when the recorder got it
 };
 
 /// The messages of a recording. Indices in it are not needed: one that was cut off while recording gives what
-/// lies before the cut. Memory: 32 bytes a message.
+/// lies before the cut. Memory: 40 bytes a message.
 class Bag {
  public:
   struct Topic {
@@ -38,7 +40,8 @@ class Bag {
   /// in which 'ros2 bag record' leaves such files, which are read one after the other. Throws InputError
   /// where it can't be opened, or is none of these.
   static std::unique_ptr<Bag> Open(const std::filesystem::path& path);
-  /// The files of such a folder, in the order of their numbers; empty: it is none.
+  /// The files of such a folder, in the order of their numbers, also packed ones (.db3.zstd) that lie there
+  /// alone; empty: it is none.
   static std::vector<std::filesystem::path> Files(const std::filesystem::path& folder);
 
   virtual ~Bag() = default;
@@ -49,18 +52,21 @@ class Bag {
   const std::vector<Topic>& topics() const { return topics_; }
   /// Null: it has no such topic.
   const Topic* Find(const std::string& topic) const;
-  /// In the order of the file.
+  /// In the order in which they were recorded.
   std::vector<BagMessage> Messages(const std::string& topic) const;
   /// Messages of the topic that lie in what can't be unpacked, as the file counts them.
   std::size_t Lost(const std::string& topic) const;
-  /// The bytes of a message. Throws InputError, which does not name the file, if they can't be read (any
-  /// more). Thread-safe.
-  virtual std::string Read(const BagMessage& message) const = 0;
+  /// The bytes of a message, unpacked if it is compressed for itself (compression_mode: message). Throws
+  /// InputError, which does not name the file, if they can't be read (any more). Thread-safe.
+  std::string Read(const BagMessage& message) const;
   /// One sentence if not all could be read; empty: it is whole.
   const std::string& damage() const { return damage_; }
 
  protected:
   explicit Bag(std::filesystem::path file) : file_(std::move(file)) {}
+
+  /// The bytes as they are stored, as Read() gives them.
+  virtual std::string ReadStored(const BagMessage& message) const = 0;
 
   const std::filesystem::path& file() const { return file_; }
   void AddConnection(std::uint32_t id, Topic topic) { connections_.emplace(id, std::move(topic)); }

@@ -1,9 +1,11 @@
 #include "frontend/dataset/camera_input.h"
 
+#include <opencv2/imgproc.hpp>
+
 #include "frontend/dataset/image_file.h"
-#include "frontend/dataset/video_input.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
+#include "tutti/frontend/dataset.h"
 
 namespace tutti {
 namespace {
@@ -22,16 +24,14 @@ CameraInput::CameraInput(const std::string& name, const std::string& source, Cam
                          const DeviceMode& mode)
     : source_(source), content_(content) {
   std::error_code ignored;
-  if (IsStream(source)) {
-    OpenVideoStream(source, capture_);
-  } else if (IsCameraDevice("camera:" + source)) {
+  if (!IsStream(source) && IsCameraDevice("camera:" + source)) {
     OpenDevice(name, mode);
   } else if (content == CameraContent::kDepth && fs::is_directory(source, ignored)) {
     files_ = DepthImages(source);
   } else {
-    OpenVideoFile(source, capture_);
+    if (fs::is_regular_file(source, ignored)) VideoDecoder(source).List();
+    video_.emplace(source);
   }
-  if (content == CameraContent::kDepth && files_.empty()) capture_.set(cv::CAP_PROP_CONVERT_RGB, 0);
 }
 
 void CameraInput::OpenDevice(const std::string& name, const DeviceMode& mode) {
@@ -62,6 +62,11 @@ void CameraInput::OpenDevice(const std::string& name, const DeviceMode& mode) {
 
 bool CameraInput::Grab() {
   if (!files_.empty()) return next_file_ < files_.size() && ++next_file_ > 0;
+  if (video_) {
+    if (!video_->Grab()) return false;
+    if (!first_ticks_) first_ticks_ = video_->Ticks();
+    return true;
+  }
   try {
     return capture_.grab();
   } catch (const cv::Exception&) {
@@ -69,33 +74,39 @@ bool CameraInput::Grab() {
   }
 }
 
-std::string CameraInput::Retrieve(cv::Mat& image) {
-  try {
-    if (content_ == CameraContent::kDepth) return RetrieveDepth(image);
-    if (RetrieveGreyFrame(capture_, image)) return {};
-  } catch (const cv::Exception&) {  // said below
-  }
-  image.release();
-  return source_ + ": an image can't be decoded";
+double CameraInput::TakenAt() const {
+  if (device_) return 1e-3 * capture_.get(cv::CAP_PROP_POS_MSEC);
+  const std::optional<std::int64_t> ticks = video_ && first_ticks_ ? video_->Ticks() : std::nullopt;
+  return ticks ? video_->Seconds(*ticks - *first_ticks_) : 0;
 }
 
-std::string CameraInput::RetrieveDepth(cv::Mat& image) {
+cv::Mat CameraInput::PixelsOfLast() {
+  if (video_) return video_->Retrieve(content_ == CameraContent::kDepth ? Pixels::kStored : Pixels::kGrey);
+  cv::Mat read, grey;
+  if (!capture_.retrieve(read) || read.empty()) return {};
+  if (content_ == CameraContent::kDepth || read.channels() == 1) return read.clone();
+  cv::cvtColor(read, grey, read.channels() == 4 ? cv::COLOR_BGRA2GRAY : cv::COLOR_BGR2GRAY);
+  return grey;
+}
+
+std::string CameraInput::Retrieve(cv::Mat& image) {
+  image.release();
   if (!files_.empty()) {
     ImageFile read = ReadDepthFile(files_[next_file_ - 1]);
     image = read.image;
     return read.error;
   }
-  cv::Mat read;
-  if (!capture_.retrieve(read) || read.empty()) return source_ + ": a depth image can't be decoded";
-  if (read.type() == CV_16UC1) {
-    image = read.clone();
-    return {};
+  try {
+    image = PixelsOfLast();
+  } catch (const cv::Exception&) {  // said below
   }
+  if (content_ == CameraContent::kGrey) return image.empty() ? source_ + ": an image can't be decoded" : "";
+  if (image.type() == CV_16UC1 && !image.empty()) return {};
   image.release();
   if (device_) return source_ + ": gives no 16-bit images (format Y16), which depth needs";
-  return source_ + ": OpenCV " + CV_VERSION +
-         " gives no 16-bit images of this video, which depth needs (from 4.7 on it does of FFV1, gray16le); "
-         "take the images out into a folder and give that: ffmpeg -i " +
+  return source_ +
+         ": gives no 16-bit images, which depth needs (FFV1, gray16le); take the images "
+         "out into a folder and give that: ffmpeg -i " +
          source_ + " FOLDER/%06d.png";
 }
 

@@ -4,8 +4,11 @@
 #include <cmath>
 #include <filesystem>
 #include <opencv2/videoio.hpp>
+#include <optional>
 #include <string>
 #include <vector>
+
+#include "frontend/dataset/video_decoder.h"
 
 namespace tutti {
 
@@ -24,8 +27,9 @@ struct DeviceMode {
 /// A camera that is open. Grabbing and decoding are two steps, so that two cameras can be grabbed together.
 class CameraInput {
  public:
-  /// `source`: the number of a device, the address of a stream, or a video file; of depth a folder of images,
-  /// too. `name` is what messages call the whole. Throws InputError that names the source.
+  /// `source`: the number of a device, the address of a stream, a video file, or a pipe; of depth a folder of
+  /// images, too. `name` is what messages call the whole. Throws InputError that names the source, also where
+  /// a file's time stamps jump back.
   CameraInput(const std::string& name, const std::string& source, CameraContent content,
               const DeviceMode& mode);
 
@@ -34,20 +38,24 @@ class CameraInput {
   /// The image that was grabbed last; returns what is wrong with it, or nothing.
   std::string Retrieve(cv::Mat& image);
   /// Frames a second; 0: not known.
-  double RateHz() const { return capture_.get(cv::CAP_PROP_FPS); }
-  /// When the device took the image that was grabbed last, by the clock of all V4L2 devices [s]; 0: not
-  /// known.
-  double TakenAt() const { return device_ ? 1e-3 * capture_.get(cv::CAP_PROP_POS_MSEC) : 0; }
+  double RateHz() const { return video_ ? video_->RateHz() : capture_.get(cv::CAP_PROP_FPS); }
+  /// When the image that was grabbed last was taken [s], by the clock of all V4L2 devices; of a video from
+  /// its first frame on. 0: not known.
+  double TakenAt() const;
+  /// Null: a device, or a folder.
+  const VideoDecoder* Video() const { return video_ ? &*video_ : nullptr; }
   const std::string& Source() const { return source_; }
 
  private:
   void OpenDevice(const std::string& name, const DeviceMode& mode);
-  std::string RetrieveDepth(cv::Mat& image);
+  cv::Mat PixelsOfLast();
 
   std::string source_;  // as messages name it: "/dev/video0", or the file
   CameraContent content_;
   bool device_ = false;
-  cv::VideoCapture capture_;
+  cv::VideoCapture capture_;           // of a device
+  std::optional<VideoDecoder> video_;  // of what is none
+  std::optional<std::int64_t> first_ticks_;
   std::vector<std::filesystem::path> files_;  // of a folder of depth images
   std::size_t next_file_ = 0;
 };

@@ -105,7 +105,7 @@ std::string ChunkedBag::Unpack(std::size_t number) const {
   return out;
 }
 
-std::string ChunkedBag::Read(const BagMessage& message) const {
+std::string ChunkedBag::ReadStored(const BagMessage& message) const {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (message.size > kMostMessageBytes)
     throw InputError("the message is too large (" + std::to_string(message.size / 1000000) + " MB)");

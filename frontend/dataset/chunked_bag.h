@@ -24,9 +24,6 @@ class ByteSource {
 
 /// Memory, beside that of Bag: one chunk.
 class ChunkedBag : public Bag {
- public:
-  std::string Read(const BagMessage& message) const override;
-
  protected:
   enum class Packing { kNone, kLz4, kBz2, kZstd, kUnknown };
   struct Chunk {
@@ -72,6 +69,7 @@ class ChunkedBag : public Bag {
     std::ifstream* in_;
   };
 
+  std::string ReadStored(const BagMessage& message) const override;
   std::string Unpack(std::size_t chunk) const;
 
   std::uint64_t file_size_ = 0;

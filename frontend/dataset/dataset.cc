@@ -1,7 +1,6 @@
 #include "tutti/frontend/dataset.h"
 
 #include <algorithm>
-#include <map>
 
 #include "frontend/dataset/bag.h"
 #include "frontend/dataset/dataset_folder.h"
@@ -10,13 +9,14 @@
 #include "frontend/dataset/selected_dataset.h"
 #include "frontend/dataset/turned_dataset.h"
 #include "tutti/core/error.h"
+#include "tutti/core/text.h"
 
 namespace tutti {
 
 EnumWords<DatasetType> WordsOf(DatasetType /*of*/) {
   return {{"auto", DatasetType::kAuto},   {"kitti", DatasetType::kKitti},   {"tum", DatasetType::kTum},
-          {"euroc", DatasetType::kEuroc}, {"images", DatasetType::kImages}, {"video", DatasetType::kVideo},
-          {"bag", DatasetType::kBag}};
+          {"euroc", DatasetType::kEuroc}, {"paired", DatasetType::kPaired}, {"images", DatasetType::kImages},
+          {"video", DatasetType::kVideo}, {"bag", DatasetType::kBag}};
 }
 
 EnumWords<Sensor> WordsOf(Sensor /*of*/) {
@@ -86,29 +86,6 @@ std::optional<std::size_t> FindStamp(const Dataset& dataset, double stamp_s) {
   return low;
 }
 
-namespace {
-
-// A picture of the ground truth or of a map among hundreds of frames is not a frame: types that make up less
-// than a tenth of the images are left out.
-void DropStrayTypes(const std::filesystem::path& folder, std::vector<std::filesystem::path>& files,
-                    std::vector<std::string>& warnings) {
-  std::map<std::string, std::size_t> counts;
-  for (const std::filesystem::path& file : files) ++counts[file.extension().string()];
-  const std::size_t all = files.size();
-  for (const auto& [extension, count] : counts) {
-    if (10 * count >= all) continue;
-    const std::string& type = extension;
-    files.erase(
-        std::remove_if(files.begin(), files.end(),
-                       [&](const std::filesystem::path& f) { return f.extension().string() == type; }),
-        files.end());
-    warnings.push_back(folder.string() + ": " + std::to_string(count) + " " + type + " image(s) among " +
-                       std::to_string(all) + " images of other types are left out");
-  }
-}
-
-}  // namespace
-
 FolderContents FindImages(const std::filesystem::path& folder, const DatasetOptions& options) {
   if (options.sensor != Sensor::kMono) {
     throw InputError(folder.string() +
@@ -119,16 +96,28 @@ FolderContents FindImages(const std::filesystem::path& folder, const DatasetOpti
   out.folder = folder;
   out.left = options.camera;
   out.rate_hz = options.rate_hz > 0 ? options.rate_hz : 10.0;
-  std::vector<std::filesystem::path> files = ListImages(folder);
+  const std::vector<std::filesystem::path> files = FramesIn(folder, false, &out.warnings);
   if (files.empty()) throw InputError(folder.string() + ": holds no images (png, jpg, webp, ...)");
-  DropStrayTypes(folder, files, out.warnings);
-  for (const std::filesystem::path& file : files) {
+  const internal::StampsOfNames named = StampsInNames(files);
+  // Of a folder that grows, the unit must show in the first names.
+  constexpr double kSince1970_s = 5e8;
+  const bool has_stamps = named.stamps.size() == files.size() &&
+                          (options.follow_s == 0 || named.stamps.front().first >= kSince1970_s);
+  for (std::size_t i = 0; i < files.size(); ++i) {
     FrameFiles frame;
-    const auto number = static_cast<std::int64_t>(out.frames.size());
-    frame.stamp_s = static_cast<double>(number) / out.rate_hz;
-    frame.image = file;
-    out.pose_stamps.emplace_back(number, frame.stamp_s);
+    frame.stamp_s = has_stamps ? named.stamps[i].first : static_cast<double>(i) / out.rate_hz;
+    frame.image = files[has_stamps ? named.stamps[i].second : i];
+    out.pose_stamps.emplace_back(i, frame.stamp_s);
     out.frames.push_back(std::move(frame));
+  }
+  if (has_stamps) {
+    out.stamp_unit = named.unit;
+    if (files.size() > 1)
+      out.rate_hz =
+          static_cast<double>(files.size() - 1) / (out.frames.back().stamp_s - out.frames.front().stamp_s);
+    out.warnings.push_back(folder.string() +
+                           ": the images have the time stamps that they are called by, in " +
+                           internal::NameOf(named.unit));
   }
   out.pose_count = files.size();
   if (!out.left) out.warnings.push_back(NoCalibrationText(folder.string()));
@@ -136,7 +125,36 @@ FolderContents FindImages(const std::filesystem::path& folder, const DatasetOpti
   return out;
 }
 
+namespace {
+
+// The data sets in the folders of this one, for somebody who gave the folder above.
+std::string Inside(const std::filesystem::path& folder) {
+  std::error_code code;
+  std::vector<std::string> names;
+  for (std::filesystem::directory_iterator it(folder, code), end; !code && it != end; it.increment(code)) {
+    if (!it->is_directory(code)) continue;
+    try {
+      DetectDatasetType(it->path());
+      names.push_back(it->path().filename().string());
+    } catch (const InputError&) {
+      continue;  // none
+    }
+  }
+  if (names.empty()) return {};
+  std::sort(names.begin(), names.end(), NaturalLess);
+  constexpr std::size_t kNamed = 5;
+  const std::string more = names.size() > kNamed ? ", ..." : "";
+  names.resize(std::min(kNamed, names.size()));
+  return ". There are data sets in it: give one of " + JoinText(names) + more;
+}
+
+}  // namespace
+
 DatasetType DetectDatasetType(const std::filesystem::path& path) {
+  if (IsCamera(path.string()))
+    throw InputError(path.string() +
+                     ": gives its frames once, in order, and all of them are needed here; save them as a "
+                     "video file, and give that");
   std::error_code code;
   if (!std::filesystem::exists(path, code)) {
     throw InputError(path.string() +
@@ -153,7 +171,8 @@ DatasetType DetectDatasetType(const std::filesystem::path& path) {
   const auto file = [&](const char* name) { return std::filesystem::is_regular_file(path / name, code); };
   if (folder("mav0/cam0") || file("cam0/sensor.yaml")) return DatasetType::kEuroc;
   if (folder("image_0") || folder("image_2")) return DatasetType::kKitti;
-  if (file("rgb.txt") || file("associations.txt")) return DatasetType::kTum;
+  if (file("rgb.txt") || file("associations.txt") || file("color.txt")) return DatasetType::kTum;
+  if (IsStrayScanner(path) || FindLayout(path)) return DatasetType::kPaired;
   if (!ListImages(path).empty()) return DatasetType::kImages;
   if (!Bag::Files(path).empty()) return DatasetType::kBag;
   const std::filesystem::directory_iterator entries(path, code);
@@ -162,12 +181,70 @@ DatasetType DetectDatasetType(const std::filesystem::path& path) {
   throw InputError(
       path.string() +
       (entries == std::filesystem::directory_iterator() ? ": is empty" : ": holds no data set") +
-      "; expected image_0/ (KITTI), rgb.txt (TUM), mav0/cam0/ (EuRoC), images, or bags of ROS 2");
+      "; expected image_0/ (KITTI), rgb.txt (TUM), mav0/cam0/ (EuRoC), another layout of data/README.md, "
+      "images, or bags of ROS 2" +
+      Inside(path));
 }
 
 namespace {
 
-DatasetType CheckedType(const std::filesystem::path& path, const DatasetOptions& options) {
+bool IsLayout(DatasetType type) {
+  return type == DatasetType::kKitti || type == DatasetType::kTum || type == DatasetType::kEuroc ||
+         type == DatasetType::kPaired;
+}
+
+// Nothing where none is seen.
+std::optional<DatasetType> Seen(const std::filesystem::path& path) {
+  try {
+    return DetectDatasetType(path);
+  } catch (const InputError&) {
+    return std::nullopt;
+  }
+}
+
+// What is opened for a path and a type.
+struct Place {
+  std::filesystem::path path;
+  DatasetType type = DatasetType::kAuto;
+  std::string note;  // empty: what was given
+};
+
+// A configuration says the layout, and the path is the folder of images inside it: the data set that it is
+// part of; else its images alone, if that is enough. Nothing if neither is so.
+std::optional<Place> Around(const std::filesystem::path& path, const DatasetOptions& options) {
+  std::error_code code;
+  const std::filesystem::path given =
+      (std::filesystem::absolute(path, code).lexically_normal() / "").parent_path();
+  std::filesystem::path folder = given;
+  for (int level = 0; level < 3 && folder.has_relative_path(); ++level) {
+    folder = folder.parent_path();
+    if (Seen(folder) != options.type) continue;
+    const std::optional<std::filesystem::path> images = ImagesOfDataset(folder);
+    // mav0/cam0 for mav0/cam0/data
+    if (images && (std::filesystem::equivalent(*images, given, code) ||
+                   std::filesystem::equivalent(images->parent_path(), given, code)))
+      return Place{folder, options.type,
+                   path.string() + ": is part of " + folder.string() + ", which is read"};
+    throw InputError(path.string() + ": is part of " + folder.string() +
+                     ", but does not hold its left (or colour) images; give that folder");
+  }
+  if (Seen(path) != DatasetType::kImages || options.sensor != Sensor::kMono || !options.camera)
+    return std::nullopt;
+  return Place{
+      path, DatasetType::kImages,
+      path.string() + ": is not in the layout of the configuration; its images are read as a plain folder"};
+}
+
+Place PlaceToOpen(const std::filesystem::path& path, const DatasetOptions& options) {
+  if (IsLayout(options.type)) {
+    const std::optional<DatasetType> seen = Seen(path);
+    if (!seen || seen == DatasetType::kImages) {
+      std::error_code code;
+      if (std::filesystem::is_directory(path, code)) {
+        if (std::optional<Place> around = Around(path, options)) return *around;
+      }
+    }
+  }
   const DatasetType seen = DetectDatasetType(path);  // missing or empty: the same words for every type
   const DatasetType type = options.type == DatasetType::kAuto ? seen : options.type;
   const auto is_file = [](DatasetType t) { return t == DatasetType::kVideo || t == DatasetType::kBag; };
@@ -179,20 +256,29 @@ DatasetType CheckedType(const std::filesystem::path& path, const DatasetOptions&
                                       : folder ? ": holds bags of ROS 2; let dataset.type be auto, or bag"
                                                : ": is a file; give the folder of the data set"));
   }
-  return type;
+  return {path, type, {}};
+}
+
+FolderContents FindPlace(const Place& place, const DatasetOptions& options) {
+  switch (place.type) {
+    case DatasetType::kKitti:
+      return FindKitti(place.path, options);
+    case DatasetType::kTum:
+      return FindTum(place.path, options);
+    case DatasetType::kEuroc:
+      return FindEuroc(place.path, options);
+    case DatasetType::kPaired:
+      return FindPaired(place.path, options);
+    default:
+      return FindImages(place.path, options);
+  }
 }
 
 FolderContents FindFrames(const std::filesystem::path& path, const DatasetOptions& options) {
-  switch (CheckedType(path, options)) {
-    case DatasetType::kKitti:
-      return FindKitti(path, options);
-    case DatasetType::kTum:
-      return FindTum(path, options);
-    case DatasetType::kEuroc:
-      return FindEuroc(path, options);
-    default:
-      return FindImages(path, options);
-  }
+  const Place place = PlaceToOpen(path, options);
+  FolderContents contents = FindPlace(place, options);
+  if (!place.note.empty()) contents.warnings.push_back(place.note);
+  return contents;
 }
 
 std::unique_ptr<Dataset> OpenWhole(const std::filesystem::path& path, const DatasetOptions& use) {
@@ -203,13 +289,18 @@ std::unique_ptr<Dataset> OpenWhole(const std::filesystem::path& path, const Data
       throw InputError(path.string() + ": is no folder; only a folder of images can be followed");
     return FollowFolder([path, use] { return FindFrames(path, use); }, use);
   }
-  const DatasetType type = CheckedType(path, use);
+  const DatasetType type = PlaceToOpen(path, use).type;
   if (type == DatasetType::kVideo) return OpenVideo(path, use);
   if (type == DatasetType::kBag) return OpenBag(path, use);
+  if (type == DatasetType::kPaired && IsStrayScanner(path)) return OpenStrayScanner(path, use);
   return std::make_unique<FolderDataset>(FindFrames(path, use), use);
 }
 
 }  // namespace
+
+DatasetType TypeToOpen(const std::filesystem::path& path, const DatasetOptions& options) {
+  return PlaceToOpen(path, options).type;
+}
 
 std::unique_ptr<Dataset> OpenDataset(const std::filesystem::path& path, const DatasetOptions& options) {
   const std::string problem = options.Validate();

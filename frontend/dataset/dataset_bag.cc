@@ -1,19 +1,26 @@
 // Bags of ROS with sensor_msgs/Image, CompressedImage and CameraInfo.
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstring>
 #include <filesystem>
+#include <limits>
 #include <string>
+#include <utility>
 
 #include "frontend/dataset/bag.h"
 #include "frontend/dataset/dataset_folder.h"
 #include "frontend/dataset/ros_message.h"
 #include "frontend/dataset/video_input.h"
 #include "tutti/core/error.h"
+#include "tutti/core/text.h"
 
 namespace tutti {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr double kRosUnits = 1000;  // of 16-bit depth: millimetres (REP 118)
 
 using Messages = std::vector<BagMessage>;
 
@@ -29,6 +36,7 @@ class BagDataset : public Dataset {
 
   std::size_t Size() const override { return frames_.size(); }
   double Stamp(std::size_t i) const override { return frames_.at(i).image->stamp_s; }
+  double SkippedShare() const override { return skipped_share_; }
   const CameraRig& Rig() const override { return rig_.rig; }
   std::optional<fs::path> GroundTruthFile() const override { return std::nullopt; }
   const std::vector<std::string>& Warnings() const override { return warnings_; }
@@ -108,26 +116,75 @@ class BagDataset : public Dataset {
     if (options_.sensor == Sensor::kRgbd) check("depth_topic", options_.depth_topic);
   }
 
-  // Messages of a topic by the stamps in their headers.
+  // Messages of a topic, with the stamps in their headers.
   Messages Find(const std::string& topic) {
     Messages messages = bag_->Messages(topic);
-    if (const std::size_t lost = bag_->Lost(topic); lost > 0) {
-      warnings_.push_back(file_.string() + ": " + std::to_string(lost) + " of " +
-                          std::to_string(messages.size() + lost) + " images of " + topic +
-                          " can't be read and are skipped");
+    const std::size_t stored = messages.size();
+    for (BagMessage& m : messages) {
+      if (std::isnan(m.stamp_s)) m.stamp_s = StampOfPacked(m);
     }
-    const std::size_t all = messages.size();
-    std::stable_sort(messages.begin(), messages.end(),
-                     [](const BagMessage& a, const BagMessage& b) { return a.stamp_s < b.stamp_s; });
+    messages.erase(std::remove_if(messages.begin(), messages.end(),
+                                  [](const BagMessage& m) { return std::isnan(m.stamp_s); }),
+                   messages.end());
+    const std::size_t all = stored + bag_->Lost(topic);
+    if (messages.size() < all) {
+      warnings_.push_back(file_.string() + ": " + std::to_string(all - messages.size()) + " of " +
+                          std::to_string(all) + " images of " + topic + " can't be read and are skipped");
+    }
+    return messages;
+  }
+
+  // Of the header of a message that is compressed; nan: it is damaged.
+  double StampOfPacked(const BagMessage& message) const {
+    MessageHead head = {};
+    try {
+      const std::string bytes = bag_->Read(message);
+      if (bytes.size() >= sizeof head) std::memcpy(head.data(), bytes.data(), sizeof head);
+      return bytes.size() >= sizeof head ? StampOf(head) : std::numeric_limits<double>::quiet_NaN();
+    } catch (const InputError&) {
+      return std::numeric_limits<double>::quiet_NaN();
+    }
+  }
+
+  // Nobody set the stamps in the headers, but the recorder knows when it got the messages.
+  static bool StampsAreConstant(const Messages& messages) {
+    return messages.size() > 1 && messages.front().received_s < messages.back().received_s &&
+           std::all_of(messages.begin(), messages.end(),
+                       [&](const BagMessage& m) { return m.stamp_s == messages.front().stamp_s; });
+  }
+
+  void UseTimesOfReceipt() {
+    const std::array<std::pair<Messages*, const std::string*>, 3> all = {
+        {{&images_, &options_.topic}, {&right_, &options_.right_topic}, {&depth_, &options_.depth_topic}}};
+    const auto constant =
+        std::find_if(all.begin(), all.end(), [](const auto& one) { return StampsAreConstant(*one.first); });
+    if (constant == all.end()) return;
+    warnings_.push_back(file_.string() + ": all images of " + *constant->second +
+                        " have the same stamp in their headers (" +
+                        std::to_string(constant->first->front().stamp_s) +
+                        " s); the times at which they were recorded are used");
+    for (const auto& [messages, topic] : all) {
+      for (BagMessage& m : *messages) m.stamp_s = m.received_s;
+    }
+  }
+
+  // Without those that repeat a stamp. Throws InputError where the stamps go back.
+  Messages InOrder(const Messages& messages, const std::string& topic) {
     Messages kept;
     for (const BagMessage& m : messages) {
+      if (!kept.empty() && m.stamp_s < kept.back().stamp_s)
+        throw InputError(
+            StampsJumpBack(file_.string() + ": " + topic, kept.size(), kept.back().stamp_s, m.stamp_s));
       if (kept.empty() || m.stamp_s > kept.back().stamp_s) kept.push_back(m);
     }
-    if (kept.size() < all) {
-      warnings_.push_back(file_.string() + ": " + std::to_string(all - kept.size()) + " of " +
-                          std::to_string(all) + " images of " + topic +
+    if (kept.size() < messages.size()) {
+      warnings_.push_back(file_.string() + ": " + std::to_string(messages.size() - kept.size()) + " of " +
+                          std::to_string(messages.size()) + " images of " + topic +
                           " repeat a time stamp and are skipped");
     }
+    const std::size_t all = bag_->Messages(topic).size() + bag_->Lost(topic);
+    if (topic == options_.topic && !kept.empty())
+      skipped_share_ = 1 - static_cast<double>(kept.size()) / static_cast<double>(all);
     return kept;
   }
 
@@ -146,6 +203,10 @@ class BagDataset : public Dataset {
     images_ = Find(options_.topic);
     if (options_.sensor == Sensor::kStereo) right_ = Find(options_.right_topic);
     if (options_.sensor == Sensor::kRgbd) depth_ = Find(options_.depth_topic);
+    UseTimesOfReceipt();
+    images_ = InOrder(images_, options_.topic);
+    right_ = InOrder(right_, options_.right_topic);
+    depth_ = InOrder(depth_, options_.depth_topic);
     std::size_t alone = 0;
     for (const BagMessage& image : images_) {
       Frame frame;
@@ -168,37 +229,85 @@ class BagDataset : public Dataset {
     }
   }
 
-  // The camera_info beside the images, unless the configuration has a camera.
-  void FindCamera() {
-    if (options_.camera) return;
-    const std::size_t slash = options_.topic.find_last_of('/');
-    std::string base = slash == std::string::npos ? "" : options_.topic.substr(0, slash);
-    if (options_.topic.size() > 11 && options_.topic.substr(slash) == "/compressed")
-      base = base.substr(0, std::max<std::size_t>(1, base.find_last_of('/')));
-    const std::string topic = base + "/camera_info";
+  // The camera_info beside the images of a topic, of the size that they have.
+  std::optional<CameraInfo> FindInfo(const std::string& images) {
+    std::vector<std::string> levels = SplitText(images, "/");
+    if (!levels.empty() && levels.back() == "compressed") levels.pop_back();
+    if (!levels.empty()) levels.pop_back();
+    levels.emplace_back("camera_info");
+    const std::string topic = (images[0] == '/' ? "/" : "") + JoinText(levels, "/");
     const Bag::Topic* found = bag_->Find(topic);
-    if (found == nullptr || found->type != "sensor_msgs/CameraInfo") return;
+    if (found == nullptr || found->type != "sensor_msgs/CameraInfo") return std::nullopt;
     const Messages infos = bag_->Messages(topic);
-    if (infos.empty()) return;
-    std::string info;
+    if (infos.empty()) return std::nullopt;
     try {
-      info = bag_->Read(infos.front());
+      CameraInfo info = DecodeCameraInfo(bag_->Read(infos.front()), found->serialization, "the bag");
+      if (!info.IsCalibrated()) return std::nullopt;
+      std::string note = file_.string() + ": calibration of " + topic;
+      if (OfRectified(images) && info.P[0] > 0) note += ", P, as the images are rectified";
+      if (!info.window.IsWhole()) {
+        // Drivers that do not follow REP 104 state the size, and K, of the images that they send.
+        const bool as_sent = info.width == size_.width && info.height == size_.height;
+        note += ", " + info.window.Text() + (as_sent ? " in it already" : " applied");
+        if (as_sent) info.window = {};
+      }
+      warnings_.push_back(note);
+      return info;
     } catch (const InputError& e) {
       throw InputError(file_.string() + ": " + topic + ": " + e.what());
     }
-    options_.camera = CameraOfMessage(info, found->serialization, file_.string());
-    if (options_.camera) warnings_.push_back(file_.string() + ": calibration of " + topic);
+  }
+
+  // "image_rect", "image_rect_color", ...: the calibration of such images is P, not K and D.
+  static bool OfRectified(const std::string& images) {
+    return images.find("image_rect") != std::string::npos;
+  }
+
+  PinholeCamera CameraOf(const CameraInfo& info, const std::string& images) const {
+    const std::string source = file_.string() + ": camera_info of " + images;
+    return Windowed(OfRectified(images) && info.P[0] > 0 ? info.Rectified() : info.Raw(source), info.window,
+                    source);
+  }
+
+  // From the camera_info beside the images, unless the configuration has a camera.
+  void FindCameras() {
+    if (options_.camera) return;
+    const std::optional<CameraInfo> left = FindInfo(options_.topic);
+    if (!left) return;
+    options_.camera = CameraOf(*left, options_.topic);
+    if (options_.sensor != Sensor::kStereo || options_.right || options_.baseline_m > 0) return;
+    const std::optional<CameraInfo> right = FindInfo(options_.right_topic);
+    if (!right || !(left->P[0] > 0) || !(right->P[0] > 0)) return;  // RectifyRig says what is missing
+    const double baseline_m = left->P[3] / left->P[0] - right->P[3] / right->P[0];
+    if (baseline_m < 0)
+      throw InputError(file_.string() + ": P of the camera_infos says that " + options_.right_topic +
+                       " is the left camera; exchange dataset.topic and right_topic");
+    if (OfRectified(options_.topic)) {
+      options_.baseline_m = baseline_m;
+      return;
+    }
+    if (baseline_m == 0) return;
+    try {
+      const Eigen::Matrix4d T = TransformOfRectified(left->R, right->R, baseline_m).Matrix();
+      for (std::size_t i = 0; i < options_.T_right_left.size(); ++i)
+        options_.T_right_left[i] = T(static_cast<int>(i) / 4, static_cast<int>(i) % 4);
+    } catch (const InputError& e) {
+      throw InputError(file_.string() + ": R of the camera_infos " + e.what() +
+                       "; give both cameras with --calibration");
+    }
+    options_.right = CameraOf(*right, options_.right_topic);
   }
 
   void SetUpRig() {
-    FindCamera();
     MessageImage first;
     for (std::size_t i = 0; i < std::min<std::size_t>(50, frames_.size()) && first.image.empty(); ++i)
       first = Decode(*frames_[i].image, options_.topic, Pixels::kGrey);
     if (first.image.empty())
       throw InputError(file_.string() + ": none of the first images can be read: " + first.error);
     size_ = first.image.size();
-    bits_ = SignificantBits(first.image);
+    range_ = RangeOf({first.image});
+    if (range_.narrow) warnings_.push_back(file_.string() + ": " + RangeText(range_));
+    FindCameras();
     const double span = Stamp(frames_.size() - 1) - Stamp(0);
     const double rate = span > 0 ? static_cast<double>(frames_.size() - 1) / span : 10.0;
     rig_ = RectifyRig(file_.string(), options_, size_, rate, warnings_);
@@ -230,7 +339,7 @@ class BagDataset : public Dataset {
     const cv::Mat image = OfTheSize(message, topic, pixels).image;
     if (image.depth() != CV_8U && image.depth() != CV_16U)
       throw InputError(topic + ": pixels are neither 8 nor 16 bit");
-    cv::Mat out = To8Bit(image, bits_);
+    cv::Mat out = To8Bit(image, range_);
     return rectifier ? rectifier->Apply(out) : out;
   }
 
@@ -238,15 +347,16 @@ class BagDataset : public Dataset {
     const MessageImage read = OfTheSize(message, options_.depth_topic, Pixels::kStored);
     if (read.image.channels() != 1) throw InputError(options_.depth_topic + ": is no depth image");
     cv::Mat depth =
-        DepthInMetres(read.image, read.metres ? 1.0 : options_.depth_units_per_m, options_.max_depth_m);
+        DepthInMetres(read.image, read.metres ? 1.0 : DepthUnits(options_, kRosUnits), options_.max_depth_m);
     return rig_.left ? rig_.left->Apply(depth, Sampling::kNearest) : depth;
   }
 
   fs::path file_;
   DatasetOptions options_;
+  double skipped_share_ = 0;
   RectifiedRig rig_;
   cv::Size size_;
-  int bits_ = 8;
+  GreyRange range_;
   std::vector<std::string> warnings_;
   cv::Mat mask_;  // rectified; empty: none
   std::unique_ptr<Bag> bag_;

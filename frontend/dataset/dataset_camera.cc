@@ -1,5 +1,5 @@
-// Live cameras: camera:0, a pair camera:0,1, a stream rtsp://...; or video files in their stead, camera:FILE.
-// Frames come once, in order.
+// Live cameras: camera:0, a pair camera:0,1, a stream rtsp://...; or videos in their stead: camera:FILE, a
+// pipe. Frames come once, in order.
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -26,13 +26,22 @@ class CameraDataset : public Dataset {
         device_(IsCameraDevice(name)),
         first_(Open(0)),
         second_(CameraSources(name).size() > 1 ? std::make_optional(Open(1)) : std::nullopt) {
+    const std::vector<std::string> sources = CameraSources(name);
     const double rate = options.rate_hz > 0 ? options.rate_hz : first_.RateHz();
     rate_hz_ = rate > 0 && rate < 1e4 ? rate : 30.0;
-    if (!Grab())
+    if (!Grab()) {
+      const std::string problem =
+          first_.Video() == nullptr ? "is it in use by another program?"
+          : IsStream(name_)         ? "is it a stream of video?"
+          : std::any_of(sources.begin(), sources.end(), IsPipe)
+              ? "an MP4 whose index is at its end can't come through a pipe: send it with -f matroska"
+              : "is it a complete video file?";
       throw InputError(name_ + ": " + (second_ ? first_.Source() + " " : std::string()) +
-                       "delivers no image; is it " +
-                       (IsStream(name_) ? "a stream of video?" : "in use by another program?"));
+                       "delivers no image; " + problem);
+    }
     CheckFirst(frames_.at(0));
+    if (first_.Video() != nullptr)
+      options_.camera = CameraOfVideo(name_, *first_.Video(), options_, size_, warnings_);
     rig_ = RectifyRig(name_, options_, size_, rate_hz_, warnings_);
     mask_ = MaskOfAll(options_, size_, rig_.left);
   }
@@ -53,6 +62,7 @@ class CameraDataset : public Dataset {
     return true;
   }
   const CameraRig& Rig() const override { return rig_.rig; }
+  int TurnedBy() const override { return first_.Video() != nullptr ? first_.Video()->TurnedBy() : 0; }
   std::optional<std::filesystem::path> GroundTruthFile() const override { return std::nullopt; }
   const std::vector<std::string>& Warnings() const override { return warnings_; }
   Trajectory ReadGroundTruth(const std::filesystem::path& file,
@@ -72,6 +82,7 @@ class CameraDataset : public Dataset {
       result = std::move(found->second);
       frames_.erase(frames_.begin(), std::next(found));
     }
+    if (!result.frame) return result;
     if (result.frame->image.size() != size_) {
       result.frame.reset();
       result.error = About(i) + " has another size than the first";
@@ -121,6 +132,7 @@ class CameraDataset : public Dataset {
 
   // Takes the next image, or pair, into frames_; false at the end. Of one thread at a time.
   bool Grab() const {
+    if (ended_) return false;
     const auto seconds = [&] { return since_begin_.Seconds(); };
     GrabbedPair grabbed;
     if (second_ && !second_ended_) {
@@ -138,14 +150,25 @@ class CameraDataset : public Dataset {
       frame.image = frame.image.colRange(0, half).clone();
     }
     const std::lock_guard<std::mutex> lock(mutex_);
-    // A device's stamps are seconds since 1970, by a clock that can't go back.
-    frame.stamp_s = device_ ? begin_s_ + grabbed.first_s : static_cast<double>(stamps_.size()) / rate_hz_;
+    frame.stamp_s = StampOfNext(grabbed.first_s);
+    if (!stamps_.empty() && frame.stamp_s < stamps_.back() - 0.5 && !device_) {
+      ended_ = true;
+      taken.error = StampsJumpBack(name_, stamps_.size(), stamps_.back(), frame.stamp_s);
+    }
     if (!stamps_.empty() && frame.stamp_s <= stamps_.back()) frame.stamp_s = stamps_.back() + 1e-6;
     frame.index = static_cast<std::int64_t>(stamps_.size());
     stamps_.push_back(frame.stamp_s);
-    taken.frame = std::move(frame);
+    if (taken.error.empty()) taken.frame = std::move(frame);
     frames_[stamps_.size() - 1] = std::move(taken);
     return true;
+  }
+
+  // A device's are seconds since 1970, by a clock that can't go back; a video has its own, unless the rate is
+  // given. mutex_ is held.
+  double StampOfNext(double grabbed_s) const {
+    if (device_) return begin_s_ + grabbed_s;
+    const double of_video = options_.rate_hz > 0 ? 0 : first_.TakenAt();
+    return of_video > 0 ? of_video : static_cast<double>(stamps_.size()) / rate_hz_;
   }
 
   // The right or depth image of the frame that is next; or why there is none.
@@ -171,7 +194,7 @@ class CameraDataset : public Dataset {
     if (rig_.left) frame.image = rig_.left->Apply(frame.image);
     if (!frame.right.empty() && rig_.right) frame.right = rig_.right->Apply(frame.right);
     if (frame.depth_m.empty()) return;
-    frame.depth_m = DepthInMetres(frame.depth_m, options_.depth_units_per_m, options_.max_depth_m);
+    frame.depth_m = DepthInMetres(frame.depth_m, DepthUnits(options_, 0), options_.max_depth_m);
     if (rig_.left) frame.depth_m = rig_.left->Apply(frame.depth_m, Sampling::kNearest);
   }
 
@@ -189,6 +212,7 @@ class CameraDataset : public Dataset {
   mutable CameraInput first_;                        // the left, colour, or only one
   mutable std::optional<CameraInput> second_;        // the right one, or depth
   mutable std::optional<std::size_t> second_ended_;  // it gave so many images
+  mutable bool ended_ = false;                       // what follows is another recording
   mutable std::mutex mutex_;
   mutable std::vector<double> stamps_;                // guarded by mutex_
   mutable std::map<std::size_t, ReadResult> frames_;  // not read yet, as taken; guarded by mutex_
@@ -247,16 +271,24 @@ bool IsStream(const std::string& name) {
                      [&](const char* scheme) { return name.rfind(scheme, 0) == 0; });
 }
 
-bool IsCamera(const std::string& name) { return name.rfind(kPrefix, 0) == 0 || IsStream(name); }
+bool IsPipe(const std::string& name) {
+  std::error_code ignored;
+  if (name == "-") return !std::filesystem::is_regular_file("/dev/stdin", ignored);
+  return std::filesystem::is_fifo(name, ignored);
+}
+
+bool IsCamera(const std::string& name) {
+  return name.rfind(kPrefix, 0) == 0 || IsStream(name) || name == "-" || IsPipe(name);
+}
 
 bool IsCameraDevice(const std::string& name) {
   if (IsStream(name)) return true;
-  return IsCamera(name) && AreNumbers(AtCommas(BehindPrefix(name)));
+  return name.rfind(kPrefix, 0) == 0 && AreNumbers(AtCommas(BehindPrefix(name)));
 }
 
 std::vector<std::string> CameraSources(const std::string& name) {
-  if (IsStream(name)) return {name};
   if (!IsCamera(name)) return {};
+  if (name.rfind(kPrefix, 0) != 0) return {name};
   const std::string source = BehindPrefix(name);
   std::vector<std::string> parts = AtCommas(source);
   std::error_code ignored;

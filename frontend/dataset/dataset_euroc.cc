@@ -1,6 +1,7 @@
 // EuRoC ASL: mav0/cam0, mav0/cam1 with sensor.yaml and data.csv.
 #include <algorithm>
 
+#include "core/time_stamps.h"
 #include "frontend/dataset/dataset_folder.h"
 #include "frontend/dataset/sensor_yaml.h"
 #include "tutti/core/error.h"
@@ -11,26 +12,33 @@ namespace {
 
 struct StampedImage {
   std::int64_t stamp_ns = 0;
+  double stamp_s = 0;
   std::filesystem::path file;
 };
 
-std::vector<StampedImage> ReadCsv(const std::filesystem::path& camera, std::vector<std::string>& warnings) {
+// `skipped`: lines that are of no use; may be null.
+std::vector<StampedImage> ReadCsv(const std::filesystem::path& camera, StampUnit& unit,
+                                  std::vector<std::string>& warnings, std::size_t* skipped) {
   const std::filesystem::path csv = camera / "data.csv";
   std::vector<StampedImage> images;
   StampOrder order(csv, warnings);
-  for (const TextLine& line : ReadTextLines(csv)) {
+  const std::vector<TextLine> lines = ReadListLines(csv);
+  const std::vector<double> stamps = StampsAt(csv, lines, unit, warnings);
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const TextLine& line = lines[i];
     if (line.words.size() != 2) {
       throw InputError(At(csv, line.number) + "has " + std::to_string(line.words.size()) +
                        " columns; 2 are needed: time stamp [ns], file name");
     }
-    const std::optional<long long> stamp = ParseInteger(line.words[0]);
-    if (!stamp || *stamp < 0) {
+    const std::optional<std::int64_t> stamp_ns = internal::NanosecondsOf(line.words[0], unit);
+    if (!stamp_ns) {
       throw InputError(At(csv, line.number) + "'" + line.words[0] +
-                       "' is not a time stamp in whole nanoseconds");
+                       "' is no time stamp that fits into nanoseconds; repair the line");
     }
-    if (!order.Accept(line.number, static_cast<double>(*stamp) * 1e-9)) continue;
-    images.push_back({*stamp, camera / "data" / line.words[1]});
+    if (!order.Accept(line.number, stamps[i])) continue;
+    images.push_back({*stamp_ns, stamps[i], camera / "data" / line.words[1]});
   }
+  if (skipped != nullptr) *skipped = order.skipped();
   if (images.empty()) throw InputError(csv.string() + ": lists no images");
   return images;
 }
@@ -67,18 +75,20 @@ FolderContents FindEuroc(const std::filesystem::path& folder, const DatasetOptio
   out.left = options.camera ? *options.camera : left.camera;
   out.T_body_left = left.T_body_camera;
   out.rate_hz = left.rate_hz;
-  const std::vector<StampedImage> images = ReadCsv(mav / "cam0", out.warnings);
+  out.stamp_unit = StampUnit::kNanoseconds;
+  const std::vector<StampedImage> images = ReadCsv(mav / "cam0", out.stamp_unit, out.warnings, &out.skipped);
   std::vector<StampedImage> right_images;
   if (options.sensor == Sensor::kStereo) {
     const MountedCamera right = ReadMounted(mav / "cam1" / "sensor.yaml");
     out.right = right.camera;
     out.T_right_left = right.T_body_camera.Inverse() * left.T_body_camera;
-    right_images = ReadCsv(mav / "cam1", out.warnings);
+    StampUnit unit = out.stamp_unit;
+    right_images = ReadCsv(mav / "cam1", unit, out.warnings, nullptr);
   }
   std::size_t alone = 0;
   for (const StampedImage& image : images) {
     FrameFiles frame;
-    frame.stamp_s = static_cast<double>(image.stamp_ns) * 1e-9;
+    frame.stamp_s = image.stamp_s;
     frame.image = image.file;
     if (options.sensor == Sensor::kStereo) {
       const auto at =

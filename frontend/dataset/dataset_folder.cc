@@ -6,6 +6,7 @@
 
 #include "core/text_input.h"
 #include "core/text_reader.h"
+#include "core/time_stamps.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 
@@ -27,6 +28,13 @@ std::vector<TextLine> ReadTextLines(const std::filesystem::path& file) {
   return lines;
 }
 
+std::vector<TextLine> ReadListLines(const std::filesystem::path& file) {
+  std::vector<TextLine> lines = ReadTextLines(file);
+  const auto is_number = [&](std::size_t i) { return ParseDouble(lines[i].words.front()).has_value(); };
+  if (lines.size() > 1 && !is_number(0) && is_number(1)) lines.erase(lines.begin());
+  return lines;
+}
+
 double NumberAt(const std::filesystem::path& file, const TextLine& line, std::size_t word) {
   if (word >= line.words.size()) {
     throw InputError(At(file, line.number) + "has " + std::to_string(line.words.size()) +
@@ -45,14 +53,54 @@ double NumberAt(const std::filesystem::path& file, const TextLine& line, std::si
   return *value;
 }
 
+std::vector<double> StampsAt(const std::filesystem::path& file, const std::vector<TextLine>& lines,
+                             StampUnit& unit, std::vector<std::string>& warnings, std::size_t word) {
+  std::vector<double> stamps;
+  stamps.reserve(lines.size());
+  for (const TextLine& line : lines) stamps.push_back(NumberAt(file, line, word));
+  const StampUnit found = internal::UnitOfStamps(stamps, unit).unit;
+  const std::string note = internal::UnitNote(file.string(), found, unit);
+  if (!note.empty()) warnings.push_back(note);
+  unit = found;
+  for (double& stamp : stamps) stamp *= internal::SecondsOf(unit);
+  return stamps;
+}
+
+Trajectory StampedByFrame(const std::filesystem::path& file, const Trajectory& poses,
+                          const TrajectoryDetails& details, std::size_t count,
+                          const std::vector<std::pair<std::int64_t, double>>& frames) {
+  if (!details.has_numbers && poses.size() != count) {
+    throw InputError(file.string() + ": has " + std::to_string(poses.size()) +
+                     " poses, but the sequence has " + std::to_string(count) +
+                     " frames; KITTI poses need one line for each frame");
+  }
+  Trajectory out;
+  auto pose = poses.begin();
+  for (const auto& [number, stamp_s] : frames) {
+    while (pose != poses.end() && pose->stamp_s < static_cast<double>(number)) ++pose;
+    if (pose == poses.end()) break;
+    if (pose->stamp_s == static_cast<double>(number)) out.push_back({stamp_s, pose->pose});
+  }
+  if (out.empty())
+    throw InputError(file.string() + ": has no pose with the number of a frame; it numbers " +
+                     std::to_string(std::llround(poses.front().stamp_s)) + " to " +
+                     std::to_string(std::llround(poses.back().stamp_s)));
+  return out;
+}
+
 bool StampOrder::Accept(std::size_t line, double stamp_s) {
   if (last_ && stamp_s < *last_) {
     throw InputError(At(file_, line) + "time stamp " + std::to_string(stamp_s) +
                      " s goes back in time (the one before is " + std::to_string(*last_) +
-                     " s); sort the file by time");
+                     " s); sort the file by time, or cut it there if it is two recordings");
   }
   if (last_ && stamp_s == *last_) {
-    warnings_.push_back(At(file_, line) + "repeats the time stamp before it; the frame is skipped");
+    constexpr std::size_t kMostLines = 5;
+    if (++skipped_ <= kMostLines + 1) warnings_.emplace_back();
+    warnings_.back() = skipped_ <= kMostLines
+                           ? At(file_, line) + "repeats the time stamp before it; the frame is skipped"
+                           : file_.string() + ": " + std::to_string(skipped_ - kMostLines) +
+                                 " more lines repeat the time stamp before them";
     return false;
   }
   last_ = stamp_s;
@@ -83,6 +131,7 @@ FolderDataset::FolderDataset(FolderContents contents, const DatasetOptions& opti
   }
   FindImageSize();
   SetUpRig();
+  SetUpDepth();
   SetUpMasks();
 }
 
@@ -95,17 +144,38 @@ void FolderDataset::FindImageSize() {
     const ImageFile file = ReadGreyFile(contents_.frames[i].image);
     if (file.error.empty()) {
       size_ = file.image.size();
-      bits_ = SignificantBits(file.image);
-      if (bits_ > 8) {
-        contents_.warnings.push_back(contents_.frames[i].image.string() + ": 16-bit images, taken as " +
-                                     std::to_string(bits_) + "-bit and scaled to 8 bit");
-      }
+      if (file.image.depth() == CV_16U) FindRange(i, file.image);
       return;
     }
     if (first_error.empty()) first_error = file.error;
   }
   throw InputError(first_error + "; none of the first " + std::to_string(std::min(kTries, Size())) +
                    " images can be read");
+}
+
+// Of `first`, the first good image, whose place is `place`, and some later ones.
+void FolderDataset::FindRange(std::size_t place, const cv::Mat& first) {
+  constexpr std::size_t kLooked = 8;
+  std::vector<cv::Mat> images = {first};
+  for (std::size_t k = 1; k < kLooked && options_.follow_s <= 0; ++k) {
+    const std::size_t i = place + k * (Size() - place) / kLooked;
+    const ImageFile file = i == place ? ImageFile() : ReadGreyFile(contents_.frames[i].image);
+    if (file.image.size() == size_ && file.image.depth() == CV_16U) images.push_back(file.image);
+  }
+  range_ = RangeOf(images);
+  if (range_.bits > 8)
+    contents_.warnings.push_back(contents_.frames[place].image.string() + ": " + RangeText(range_));
+}
+
+void FolderDataset::SetUpDepth() {
+  if (options_.sensor != Sensor::kRgbd) return;
+  depth_.emplace(options_, contents_.depth, contents_.left, size_);
+  if (options_.follow_s > 0) return;
+  for (const FrameFiles& frame : contents_.frames) {
+    if (frame.depth.empty()) continue;
+    for (std::string& note : depth_->Notes(frame.depth)) contents_.warnings.push_back(std::move(note));
+    return;
+  }
 }
 
 void FolderDataset::SetUpRig() {
@@ -164,20 +234,8 @@ std::string FolderDataset::Rectify(const ImageFile& read, const std::filesystem:
     return file.string() + ": has " + SizeText(read.image.size()) +
            " pixels, but the data set's images have " + SizeText(size_);
   }
-  out = To8Bit(read.image, bits_);
+  out = To8Bit(read.image, range_);
   if (rectifier != nullptr) out = rectifier->Apply(out);
-  return {};
-}
-
-std::string FolderDataset::ReadDepth(const std::filesystem::path& file, cv::Mat& out) const {
-  ImageFile read = ReadDepthFile(file);
-  if (!read.error.empty()) return read.error;
-  if (read.image.size() != size_) {
-    return file.string() + ": the depth image has " + SizeText(read.image.size()) +
-           " pixels, but the colour images have " + SizeText(size_) + "; depth must be registered to colour";
-  }
-  const cv::Mat depth = DepthInMetres(read.image, options_.depth_units_per_m, options_.max_depth_m);
-  out = left_ ? left_->Apply(depth, Sampling::kNearest) : depth;
   return {};
 }
 
@@ -222,7 +280,8 @@ ReadResult FolderDataset::ReadFiles(std::size_t i, const FrameFiles& files) cons
     if (!files.right.empty())
       result.depth_error =
           Rectify(ReadGreyFile(files.right), files.right, right_ ? &*right_ : nullptr, frame.right);
-    if (!files.depth.empty()) result.depth_error = ReadDepth(files.depth, frame.depth_m);
+    if (!files.depth.empty())
+      result.depth_error = depth_->Read(files.depth, left_ ? &*left_ : nullptr, frame.depth_m);
     result.frame = std::move(frame);
   } catch (const std::exception& e) {  // out of memory for an absurd image size, and the like
     result.frame.reset();
@@ -233,6 +292,7 @@ ReadResult FolderDataset::ReadFiles(std::size_t i, const FrameFiles& files) cons
 
 std::optional<std::filesystem::path> FolderDataset::GroundTruthFile() const {
   std::error_code code;
+  if (contents_.truth && HoldsTruth(*contents_.truth)) return contents_.truth->place;
   for (const std::filesystem::path& file : contents_.truth_places) {
     if (std::filesystem::is_regular_file(file, code)) return file;
     // A folder, or a link that leads nowhere: the run is not to end without its figures and without a word.
@@ -247,29 +307,22 @@ std::optional<std::filesystem::path> FolderDataset::GroundTruthFile() const {
 
 Trajectory FolderDataset::ReadGroundTruth(const std::filesystem::path& file,
                                           std::vector<std::string>* warnings) const {
-  const TrajectoryFormat format = GuessTrajectoryFormat(file);
-  Trajectory poses = ReadTrajectory(file, format, warnings);
-  if (format == TrajectoryFormat::kKitti) {
-    if (contents_.pose_count == 0 && poses.size() != Size()) {
-      throw InputError(file.string() + ": has " + std::to_string(poses.size()) +
-                       " poses, but the data set has " + std::to_string(Size()) +
-                       " frames; KITTI poses need one line for each frame");
-    }
-    if (contents_.pose_count != 0 && poses.size() != contents_.pose_count) {
-      throw InputError(file.string() + ": has " + std::to_string(poses.size()) +
-                       " poses, but the sequence has " + std::to_string(contents_.pose_count) +
-                       " frames; they must be as many");
-    }
-    Trajectory stamped;
-    if (contents_.pose_count == 0) {
-      for (std::size_t i = 0; i < Size(); ++i) stamped.push_back({Stamp(i), poses[i].pose});
-    }
-    for (const auto& [line, stamp] : contents_.pose_stamps) {
-      stamped.push_back({stamp, poses[static_cast<std::size_t>(line)].pose});
-    }
-    poses = std::move(stamped);
+  std::error_code code;
+  if (contents_.truth && std::filesystem::equivalent(file, contents_.truth->place, code))
+    return ReadLayoutTruth(*contents_.truth, warnings);
+  TrajectoryDetails details;
+  Trajectory poses =
+      ReadTrajectory(file, GuessTrajectoryFormat(file), warnings, &details, contents_.stamp_unit);
+  const double scale = contents_.stamp_scale;
+  internal::FitUnit({Stamp(0) / scale, Stamp(Size() - 1) / scale}, poses, details, warnings);
+  if (details.has_stamps) {
+    for (StampedPose& p : poses) p.stamp_s *= scale;
+  } else if (!contents_.pose_stamps.empty()) {
+    poses = StampedByFrame(file, poses, details, contents_.pose_count, contents_.pose_stamps);
   } else {
-    for (StampedPose& p : poses) p.stamp_s *= contents_.stamp_scale;
+    std::vector<std::pair<std::int64_t, double>> frames;
+    for (std::size_t i = 0; i < Size(); ++i) frames.emplace_back(i, Stamp(i));
+    poses = StampedByFrame(file, poses, details, Size(), frames);
   }
   if (options_.mirrored_ground_truth) MirrorY(poses);
   return poses;

@@ -10,8 +10,10 @@
 #include <utility>
 #include <vector>
 
+#include "frontend/dataset/depth_reader.h"
 #include "frontend/dataset/image_file.h"
 #include "frontend/dataset/image_mask.h"
+#include "frontend/dataset/layout.h"
 #include "frontend/dataset/rectified_rig.h"
 #include "tutti/frontend/dataset.h"
 
@@ -51,9 +53,13 @@ struct FolderContents {
   double rate_hz = 10;
   std::vector<std::filesystem::path> truth_places;  ///< the first that exists is the ground truth
   std::vector<std::pair<std::int64_t, double>>
-      pose_stamps;             ///< KITTI: (line of the pose, stamp) of each frame
-  std::size_t pose_count = 0;  ///< KITTI: poses that the file must have
-  double stamp_scale = 1;      ///< factor on the stamps of the ground truth
+      pose_stamps;                             ///< KITTI: (line of the pose, stamp) of each frame
+  std::size_t pose_count = 0;                  ///< KITTI: poses that the file must have
+  StampUnit stamp_unit = StampUnit::kSeconds;  ///< of the images' stamps where they are written
+  double stamp_scale = 1;                      ///< factor on the stamps of the ground truth
+  std::size_t skipped = 0;           ///< (left, or colour) images that are no frames: Dataset::SkippedShare
+  std::optional<LayoutTruth> truth;  ///< in a form of the layout's own; goes before truth_places
+  DepthFormat depth;
   std::vector<std::string> warnings;
 };
 
@@ -75,24 +81,30 @@ class FolderDataset : public Dataset {
   std::optional<std::filesystem::path> GroundTruthFile() const override;
   Trajectory ReadGroundTruth(const std::filesystem::path& file,
                              std::vector<std::string>* warnings) const override;
+  double SkippedShare() const override {
+    const auto skipped = static_cast<double>(contents_.skipped);
+    return skipped / (skipped + static_cast<double>(Size()));
+  }
   const std::vector<std::string>& Warnings() const override { return contents_.warnings; }
 
  private:
   void FindImageSize();
+  void FindRange(std::size_t place, const cv::Mat& first);
   void SetUpRig();
+  void SetUpDepth();
   void SetUpMasks();
   std::string Rectify(const ImageFile& read, const std::filesystem::path& file, const Rectifier* rectifier,
                       cv::Mat& out) const;
   std::string NoFrame(std::size_t i) const;
   // Rectified; empty if this image has none. Throws InputError.
   cv::Mat MaskOf(const std::filesystem::path& image) const;
-  std::string ReadDepth(const std::filesystem::path& file, cv::Mat& out) const;
 
   FolderContents contents_;
   DatasetOptions options_;
   CameraRig rig_;
   cv::Size size_;
-  int bits_ = 8;
+  GreyRange range_;
+  std::optional<DepthReader> depth_;
   std::optional<Rectifier> left_, right_;
   std::optional<ImageMasks> masks_;  // a mask for each image
   cv::Mat mask_;                     // for all images, rectified; empty: none
@@ -106,25 +118,46 @@ struct TextLine {
 };
 /// All lines that carry data. Throws InputError if the file can't be opened, or is none (a folder, a pipe).
 std::vector<TextLine> ReadTextLines(const std::filesystem::path& file);
+/// Those of a list of files with their stamps, whose first line may name the columns.
+std::vector<TextLine> ReadListLines(const std::filesystem::path& file);
 /// "file:line: ".
 std::string At(const std::filesystem::path& file, std::size_t line);
 /// The word as a finite number. Throws InputError that names file and line.
 double NumberAt(const std::filesystem::path& file, const TextLine& line, std::size_t word);
 
-/// Watches that the stamps of a file grow: duplicates are to be skipped (with a warning), unsorted stamps
-/// throw InputError.
+/// The first word of each line [s], or another one. `unit`: what is expected, and gets what it is; said in
+/// `warnings` if it is another one. Throws InputError that names file and line.
+std::vector<double> StampsAt(const std::filesystem::path& file, const std::vector<TextLine>& lines,
+                             StampUnit& unit, std::vector<std::string>& warnings, std::size_t word = 0);
+/// Takes ground truth apart for frames, whose poses it may number. `frames`: (number of the frame, stamp).
+Trajectory StampedByFrame(const std::filesystem::path& file, const Trajectory& poses,
+                          const TrajectoryDetails& details, std::size_t count,
+                          const std::vector<std::pair<std::int64_t, double>>& frames);
+
+/// Watches that the stamps of a file grow: duplicates are to be skipped (with a warning for the first five
+/// and their count), unsorted stamps throw InputError. Nothing else adds warnings in the meantime.
 class StampOrder {
  public:
   StampOrder(std::filesystem::path file, std::vector<std::string>& warnings)
       : file_(std::move(file)), warnings_(warnings) {}
   /// True if the line is to be used.
   bool Accept(std::size_t line, double stamp_s);
+  /// Lines that were not.
+  std::size_t skipped() const { return skipped_; }
 
  private:
   std::filesystem::path file_;
   std::vector<std::string>& warnings_;
   std::optional<double> last_;
+  std::size_t skipped_ = 0;
 };
+
+/// For each of `a` the place in `b`, or -1: pairs with the smallest difference first, at most `limit_s`, each
+/// stamp once (as TUM's associate.py). Both grow.
+std::vector<int> AssociateStamps(const std::vector<double>& a, const std::vector<double>& b, double limit_s);
+
+/// Position of a camera in camera 0, from P = K [I | t].
+Eigen::Vector3d PositionOfCamera(const Eigen::Matrix<double, 3, 4>& p);
 
 /// Warns that `alone` of the frames have no depth or right image: "`list`: 2 of 9 `which`". Not of a folder
 /// that grows, where they may still come.
@@ -138,6 +171,10 @@ FolderContents FindKitti(const std::filesystem::path& folder, const DatasetOptio
 FolderContents FindTum(const std::filesystem::path& folder, const DatasetOptions& options);
 FolderContents FindEuroc(const std::filesystem::path& folder, const DatasetOptions& options);
 FolderContents FindImages(const std::filesystem::path& folder, const DatasetOptions& options);
+/// A layout of layout.h.
+FolderContents FindPaired(const std::filesystem::path& folder, const DatasetOptions& options);
+/// The folder of an iPhone's recorder: a video, depth images, odometry.csv.
+std::unique_ptr<Dataset> OpenStrayScanner(const std::filesystem::path& folder, const DatasetOptions& options);
 /// A folder that grows: `find` lists it as it is now. Waits options.follow_s for the first image.
 std::unique_ptr<Dataset> FollowFolder(std::function<FolderContents()> find, const DatasetOptions& options);
 /// camera:0, a pair camera:0,1, the files that stand in for them, or a stream.

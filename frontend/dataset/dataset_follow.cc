@@ -45,6 +45,7 @@ class FollowedDataset : public Dataset {
     const std::lock_guard<std::mutex> lock(mutex_);
     return frames_.at(i).stamp_s;
   }
+  double SkippedShare() const override { return base_->SkippedShare(); }
   const CameraRig& Rig() const override { return base_->Rig(); }
   const std::vector<std::string>& Warnings() const override { return base_->Warnings(); }
   // What grows has no complete ground truth.

@@ -31,11 +31,6 @@ Projections ReadCalibration(const std::filesystem::path& file) {
   return projections;
 }
 
-// Position of a camera in camera 0, from P = K [I | t].
-Eigen::Vector3d Position(const Eigen::Matrix<double, 3, 4>& p) {
-  return -(p.leftCols<3>().inverse() * p.col(3));
-}
-
 void FindCalibration(const std::filesystem::path& folder, const std::string& left, const std::string& right,
                      const DatasetOptions& options, FolderContents& out) {
   std::filesystem::path file = folder / "calib.txt";
@@ -59,9 +54,9 @@ void FindCalibration(const std::filesystem::path& folder, const std::string& lef
     out.left->cx = p(0, 2);
     out.left->cy = p(1, 2);
   }
-  if (projections.count(left) != 0) out.T_body_left.translation = Position(projections[left]);
+  if (projections.count(left) != 0) out.T_body_left.translation = PositionOfCamera(projections[left]);
   if (out.baseline_m == 0 && projections.count(left) != 0 && projections.count(right) != 0) {
-    out.baseline_m = Position(projections[right]).x() - Position(projections[left]).x();
+    out.baseline_m = PositionOfCamera(projections[right]).x() - PositionOfCamera(projections[left]).x();
   }
 }
 
@@ -110,6 +105,10 @@ void FindTruth(const std::filesystem::path& folder, FolderContents& out) {
 
 }  // namespace
 
+Eigen::Vector3d PositionOfCamera(const Eigen::Matrix<double, 3, 4>& p) {
+  return -(p.leftCols<3>().inverse() * p.col(3));
+}
+
 FolderContents FindKitti(const std::filesystem::path& folder, const DatasetOptions& options) {
   if (options.sensor == Sensor::kRgbd) {
     throw InputError(folder.string() +
@@ -138,8 +137,10 @@ FolderContents FindKitti(const std::filesystem::path& folder, const DatasetOptio
   const std::filesystem::path times_file = folder / "times.txt";
   const bool have_times = std::filesystem::exists(times_file, code);
   std::vector<TextLine> times;
+  std::vector<double> stamps;
   if (have_times) {
     times = ReadTextLines(times_file);
+    stamps = StampsAt(times_file, times, out.stamp_unit, out.warnings);
     if (static_cast<std::int64_t>(times.size()) < count) {
       throw InputError(times_file.string() + ": has " + std::to_string(times.size()) + " time stamps, but " +
                        left_folder.string() + " has images up to number " + std::to_string(count - 1) +
@@ -163,9 +164,9 @@ FolderContents FindKitti(const std::filesystem::path& folder, const DatasetOptio
     FrameFiles frame;
     frame.stamp_s = static_cast<double>(n) / rate_hz;
     if (have_times) {
-      const TextLine& line = times[static_cast<std::size_t>(n)];
-      frame.stamp_s = NumberAt(times_file, line, 0);
-      if (!order.Accept(line.number, frame.stamp_s)) continue;
+      const auto line = static_cast<std::size_t>(n);
+      frame.stamp_s = stamps[line];
+      if (!order.Accept(times[line].number, frame.stamp_s)) continue;
     }
     const auto image = images.find(n);
     const auto right = right_images.find(n);
@@ -175,6 +176,7 @@ FolderContents FindKitti(const std::filesystem::path& folder, const DatasetOptio
     out.pose_stamps.emplace_back(n, frame.stamp_s);
     out.frames.push_back(std::move(frame));
   }
+  out.skipped = order.skipped();
   if (options.sensor == Sensor::kStereo) {
     if (pairs == 0) {
       throw InputError(right_folder.string() + ": no image has the number of an image of " +

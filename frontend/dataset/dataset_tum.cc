@@ -1,9 +1,10 @@
 // TUM RGB-D: rgb.txt, depth.txt, groundtruth.txt; or associations.txt (TUM's and ICL-NUIM's).
 #include <algorithm>
 #include <cmath>
+#include <opencv2/core/persistence.hpp>
 #include <tuple>
 
-#include "core/example_configs.h"
+#include "core/time_stamps.h"
 #include "frontend/dataset/dataset_folder.h"
 #include "tutti/core/error.h"
 
@@ -14,6 +15,67 @@ struct StampedFile {
   double stamp_s = 0;
   std::filesystem::path file;
 };
+
+// OpenLORIS-Scene: its D435i's colour camera in the frame of the robot (base_link), whose poses the ground
+// truth has. sensors.yaml has fx cx fy cy; matrices of trans_matrix.yaml take points of the child into the
+// parent.
+constexpr const char* kLorisCamera = "d400_color_optical_frame";
+
+std::vector<double> MatrixOf(const std::filesystem::path& file, const cv::FileNode& node, std::size_t count) {
+  cv::Mat values;
+  node >> values;
+  if (values.total() != count || values.channels() != 1)
+    throw InputError(file.string() + ": a matrix of " + std::to_string(count) + " numbers is needed for " +
+                     kLorisCamera);
+  values = values.reshape(1, 1);
+  values.convertTo(values, CV_64F);
+  return {values.ptr<double>(0), values.ptr<double>(0) + count};
+}
+
+Pose LorisMount(const std::filesystem::path& file) {
+  const cv::FileStorage storage(file.string(), cv::FileStorage::READ);
+  Pose T_base_camera;
+  std::string frame = kLorisCamera;
+  const cv::FileNode transforms = storage["trans_matrix"];
+  for (std::size_t tried = 0; frame != "base_link"; ++tried) {
+    bool found = false;
+    for (const cv::FileNode& transform : transforms) {
+      if (static_cast<std::string>(transform["child_frame"]) != frame) continue;
+      const std::vector<double> v = MatrixOf(file, transform["matrix"], 16);
+      TransformRows rows;
+      std::copy(v.begin(), v.end(), rows.begin());
+      const std::optional<Pose> T = RigidTransform(rows);
+      if (!T) throw InputError(file.string() + ": a transform is zero");
+      T_base_camera = *T * T_base_camera;
+      frame = static_cast<std::string>(transform["parent_frame"]);
+      found = true;
+      break;
+    }
+    if (!found || tried > transforms.size())
+      throw InputError(file.string() + ": no transforms lead from " + kLorisCamera + " to base_link");
+  }
+  return T_base_camera;
+}
+
+LayoutCalibration ReadLoris(const std::filesystem::path& folder) {
+  LayoutCalibration out;
+  std::error_code code;
+  const std::filesystem::path sensors = folder / "sensors.yaml", mount = folder / "trans_matrix.yaml";
+  try {
+    if (std::filesystem::is_regular_file(sensors, code)) {
+      const cv::FileStorage storage(sensors.string(), cv::FileStorage::READ);
+      const cv::FileNode node = storage[kLorisCamera];
+      const std::vector<double> v = MatrixOf(sensors, node["intrinsics"], 4);
+      PinholeCamera& camera = out.rig.left.emplace();
+      camera.fx = v[0], camera.cx = v[1], camera.fy = v[2], camera.cy = v[3];
+      out.source = "sensors.yaml";
+    }
+    if (std::filesystem::is_regular_file(mount, code)) out.rig.T_body_left = LorisMount(mount);
+  } catch (const cv::Exception&) {
+    throw InputError(folder.string() + ": sensors.yaml or trans_matrix.yaml can't be read as YAML of OpenCV");
+  }
+  return out;
+}
 
 // What follows the stamp. It may have blanks and commas if such a file is there. Empty: no name.
 std::string NameIn(const TextLine& line, const std::filesystem::path& folder) {
@@ -27,13 +89,17 @@ std::string NameIn(const TextLine& line, const std::filesystem::path& folder) {
   return std::filesystem::exists(folder / name, code) ? name : std::string();
 }
 
-std::vector<StampedFile> ReadList(const std::filesystem::path& folder, const char* name,
-                                  std::vector<std::string>& warnings) {
+// `skipped`: lines that are of no use; may be null.
+std::vector<StampedFile> ReadList(const std::filesystem::path& folder, const char* name, StampUnit& unit,
+                                  std::vector<std::string>& warnings, std::size_t* skipped) {
   const std::filesystem::path list = folder / name;
   std::vector<StampedFile> files;
   StampOrder order(list, warnings);
-  for (const TextLine& line : ReadTextLines(list)) {
-    const double stamp = NumberAt(list, line, 0);
+  const std::vector<TextLine> lines = ReadListLines(list);
+  const std::vector<double> stamps = StampsAt(list, lines, unit, warnings);
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const TextLine& line = lines[i];
+    const double stamp = stamps[i];
     const std::string name_in_list = NameIn(line, folder);
     if (name_in_list.empty()) {
       throw InputError(At(list, line.number) + "has " + std::to_string(line.words.size()) +
@@ -41,42 +107,28 @@ std::vector<StampedFile> ReadList(const std::filesystem::path& folder, const cha
     }
     if (order.Accept(line.number, stamp)) files.push_back({stamp, folder / name_in_list});
   }
+  if (skipped != nullptr) *skipped = order.skipped();
   if (files.empty())
     throw InputError(list.string() + ": lists no images; each line needs a time stamp and a file name");
   return files;
 }
 
-// Index of the depth image of each colour image, or -1: pairs with the smallest difference first, each image
-// once (as the data set's own associate.py).
-std::vector<int> Associate(const std::vector<StampedFile>& colour, const std::vector<StampedFile>& depth,
-                           double limit_s) {
-  std::vector<std::tuple<double, std::size_t, std::size_t>> pairs;
-  for (std::size_t i = 0; i < colour.size(); ++i) {
-    const auto first = std::lower_bound(depth.begin(), depth.end(), colour[i].stamp_s - limit_s,
-                                        [](const StampedFile& f, double stamp) { return f.stamp_s < stamp; });
-    for (auto it = first; it != depth.end() && it->stamp_s <= colour[i].stamp_s + limit_s; ++it) {
-      pairs.emplace_back(std::abs(it->stamp_s - colour[i].stamp_s), i,
-                         static_cast<std::size_t>(it - depth.begin()));
-    }
-  }
-  std::sort(pairs.begin(), pairs.end());
-  std::vector<int> match(colour.size(), -1);
-  std::vector<bool> used(depth.size(), false);
-  for (const auto& [difference, i, j] : pairs) {
-    if (match[i] >= 0 || used[j]) continue;
-    match[i] = static_cast<int>(j);
-    used[j] = true;
-  }
-  return match;
+std::vector<double> StampsOf(const std::vector<StampedFile>& files) {
+  std::vector<double> stamps;
+  for (const StampedFile& file : files) stamps.push_back(file.stamp_s);
+  return stamps;
 }
 
-void FromLists(const std::filesystem::path& folder, const DatasetOptions& options, FolderContents& out) {
-  const std::vector<StampedFile> colour = ReadList(folder, "rgb.txt", out.warnings);
+void FromLists(const std::filesystem::path& folder, const TumLists& lists, const DatasetOptions& options,
+               FolderContents& out) {
+  const std::vector<StampedFile> colour =
+      ReadList(folder, lists.colour, out.stamp_unit, out.warnings, &out.skipped);
   std::vector<int> match(colour.size(), -1);
   std::vector<StampedFile> depth;
   if (options.sensor == Sensor::kRgbd) {
-    depth = ReadList(folder, "depth.txt", out.warnings);
-    match = Associate(colour, depth, options.max_association_s);
+    StampUnit unit = out.stamp_unit;
+    depth = ReadList(folder, lists.depth, unit, out.warnings, nullptr);
+    match = AssociateStamps(StampsOf(colour), StampsOf(depth), options.max_association_s);
   }
   std::size_t alone = 0;
   for (std::size_t i = 0; i < colour.size(); ++i) {
@@ -91,11 +143,11 @@ void FromLists(const std::filesystem::path& folder, const DatasetOptions& option
   }
   if (options.sensor != Sensor::kRgbd) return;
   if (alone == colour.size()) {
-    throw InputError((folder / "depth.txt").string() + ": no depth image is within " +
-                     std::to_string(options.max_association_s) +
-                     " s of a colour image of rgb.txt; check the time stamps or raise max_association_s");
+    throw InputError((folder / lists.depth).string() + ": no depth image is within " +
+                     std::to_string(options.max_association_s) + " s of a colour image of " + lists.colour +
+                     "; check the time stamps or raise max_association_s");
   }
-  WarnOfFramesWithoutDepth(folder / "depth.txt", alone,
+  WarnOfFramesWithoutDepth(folder / lists.depth, alone,
                            "colour images have no depth image within " +
                                std::to_string(options.max_association_s) +
                                " s and are tracked with colour alone",
@@ -106,25 +158,33 @@ void FromLists(const std::filesystem::path& folder, const DatasetOptions& option
 void FromAssociations(const std::filesystem::path& folder, const DatasetOptions& options,
                       FolderContents& out) {
   const std::filesystem::path list = folder / "associations.txt";
-  const std::vector<TextLine> lines = ReadTextLines(list);
+  const std::vector<TextLine> lines = ReadListLines(list);
   StampOrder order(list, out.warnings);
-  bool counts = true;  // stamps are frame numbers that name the files (ICL-NUIM), not seconds
   for (const TextLine& line : lines) {
     if (line.words.size() != 4) {
       throw InputError(At(list, line.number) + "has " + std::to_string(line.words.size()) +
                        " columns; 4 are needed: stamp, colour file, stamp, depth file");
     }
-    const bool depth_first = line.words[1].rfind("depth", 0) == 0 || line.words[3].rfind("rgb", 0) == 0;
+  }
+  const bool depth_first =
+      !lines.empty() && (lines[0].words[1].rfind("depth", 0) == 0 || lines[0].words[3].rfind("rgb", 0) == 0);
+  const std::size_t colour = depth_first ? 2 : 0;
+  const std::vector<double> stamps = StampsAt(list, lines, out.stamp_unit, out.warnings, colour);
+  bool counts = true;  // stamps are frame numbers that name the files (ICL-NUIM), not times
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const TextLine& line = lines[i];
     FrameFiles frame;
-    frame.stamp_s = NumberAt(list, line, depth_first ? 2 : 0);
-    NumberAt(list, line, depth_first ? 0 : 2);
-    frame.image = folder / line.words[depth_first ? 3 : 1];
-    if (options.sensor == Sensor::kRgbd) frame.depth = folder / line.words[depth_first ? 1 : 3];
-    counts = counts && line.words[depth_first ? 2 : 0] == frame.image.stem().string() &&
-             line.words[depth_first ? 2 : 0].find('.') == std::string::npos;
+    frame.stamp_s = stamps[i];
+    NumberAt(list, line, 2 - colour);
+    frame.image = folder / line.words[colour + 1];
+    if (options.sensor == Sensor::kRgbd) frame.depth = folder / line.words[3 - colour];
+    names.push_back(frame.image.stem().string());
+    counts = counts && line.words[colour] == names.back() && names.back().find('.') == std::string::npos;
     if (order.Accept(line.number, frame.stamp_s)) out.frames.push_back(std::move(frame));
   }
-  if (counts && out.frames.size() > 1) {
+  out.skipped = order.skipped();
+  if (counts && out.frames.size() > 1 && internal::FindStamps(names).stamps.empty()) {
     out.stamp_scale = 1.0 / (options.rate_hz > 0 ? options.rate_hz : 30.0);
     for (FrameFiles& frame : out.frames) frame.stamp_s *= out.stamp_scale;
     out.warnings.push_back(list.string() + ": its time stamps are frame numbers; " +
@@ -134,6 +194,46 @@ void FromAssociations(const std::filesystem::path& folder, const DatasetOptions&
 
 }  // namespace
 
+TumLists TumListsOf(const std::filesystem::path& folder) {
+  std::error_code code;
+  const auto is = [&](const char* name) { return std::filesystem::exists(folder / name, code); };
+  if (is("rgb.txt") || !is("color.txt")) return {};
+  return {"color.txt", is("aligned_depth.txt") ? "aligned_depth.txt" : "depth.txt"};
+}
+
+LayoutCalibration ReadTumCalibration(const std::filesystem::path& folder) {
+  std::error_code code;
+  LayoutCalibration out;
+  const std::filesystem::path eth3d = folder / "calibration.txt";
+  if (std::string(TumListsOf(folder).colour) == "color.txt") {
+    out = ReadLoris(folder);
+    out.depth_units_per_m = 1000;
+  } else if (std::filesystem::is_regular_file(eth3d, code)) {  // https://www.eth3d.net/slam_documentation
+    out.rig.left = ReadIntrinsics(eth3d);
+    out.source = "calibration.txt";
+    out.depth_units_per_m = 5000;
+  }
+  return out;
+}
+
+std::vector<int> AssociateStamps(const std::vector<double>& a, const std::vector<double>& b, double limit_s) {
+  std::vector<std::tuple<double, std::size_t, std::size_t>> pairs;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    for (auto it = std::lower_bound(b.begin(), b.end(), a[i] - limit_s);
+         it != b.end() && *it <= a[i] + limit_s; ++it)
+      pairs.emplace_back(std::abs(*it - a[i]), i, static_cast<std::size_t>(it - b.begin()));
+  }
+  std::sort(pairs.begin(), pairs.end());
+  std::vector<int> match(a.size(), -1);
+  std::vector<bool> used(b.size(), false);
+  for (const auto& [difference, i, j] : pairs) {
+    if (match[i] >= 0 || used[j]) continue;
+    match[i] = static_cast<int>(j);
+    used[j] = true;
+  }
+  return match;
+}
+
 FolderContents FindTum(const std::filesystem::path& folder, const DatasetOptions& options) {
   if (options.sensor == Sensor::kStereo) {
     throw InputError(folder.string() + ": the TUM layout has no stereo pairs; set sensor to rgbd or mono");
@@ -141,25 +241,28 @@ FolderContents FindTum(const std::filesystem::path& folder, const DatasetOptions
   FolderContents out;
   out.folder = folder;
   std::error_code code;
-  const bool lists = std::filesystem::exists(folder / "rgb.txt", code);
-  const bool depth_list = std::filesystem::exists(folder / "depth.txt", code);
+  const TumLists names = TumListsOf(folder);
+  const bool lists = std::filesystem::exists(folder / names.colour, code);
+  const bool depth_list = std::filesystem::exists(folder / names.depth, code);
   const bool associations = std::filesystem::exists(folder / "associations.txt", code);
   if (options.sensor == Sensor::kRgbd ? associations : !lists) {
     FromAssociations(folder, options, out);
   } else if (options.sensor == Sensor::kRgbd && !(lists && depth_list)) {
     throw InputError(
-        (folder / (lists ? "depth.txt" : "rgb.txt")).string() +
+        (folder / (lists ? names.depth : names.colour)).string() +
         ": is missing; RGB-D needs rgb.txt and depth.txt (stamp and file name a line), or associations.txt");
   } else {
-    FromLists(folder, options, out);
+    FromLists(folder, names, options, out);
   }
-  if (!options.camera) {
+  const LayoutCalibration own = ReadTumCalibration(folder);
+  if (!options.camera && !own.rig.left) {
     throw InputError(folder.string() +
                      ": the TUM layout holds no calibration; set fx, fy, cx, cy under 'camera:' in the "
-                     "configuration (" +
-                     internal::ExampleConfigs() + "/tum_fr1_rgbd.yaml and its like have them)");
+                     "configuration (tum_fr1_rgbd and its like, which are part of tutti, have them)");
   }
-  out.left = options.camera;
+  out.left = options.camera ? options.camera : own.rig.left;
+  out.T_body_left = own.rig.T_body_left;
+  out.depth.units_per_m = own.depth_units_per_m;
   out.rate_hz = 30.0;
   if (out.frames.size() > 1) {
     out.rate_hz =

@@ -1,115 +1,192 @@
 // A video file. Decoders are sequential, so random access is emulated: frames that a reader thread skips over
 // are kept for a while for its neighbours, and going far back starts from the beginning.
-#include <cmath>
+#include <algorithm>
+#include <functional>
 #include <map>
 #include <mutex>
+#include <set>
 
 #include "core/text_reader.h"
 #include "frontend/dataset/dataset_folder.h"
+#include "frontend/dataset/video_decoder.h"
 #include "frontend/dataset/video_input.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
 namespace {
 
+/// The times of a video's frames.
+struct VideoTimes {
+  std::vector<std::int64_t> ticks;  ///< of the container, growing; empty: it has none
+  std::vector<double> stamps_s;     ///< from the first frame on
+  std::vector<std::string> notes;
+  double skipped_share = 0;  ///< Dataset::SkippedShare
+};
+
+// Equal times are one frame's: what is shown at once is not seen apart.
+void DropRepeated(const std::string& name, VideoTimes& times) {
+  const std::size_t all = times.ticks.size();
+  times.ticks.erase(std::unique(times.ticks.begin(), times.ticks.end()), times.ticks.end());
+  const std::size_t skipped = all - times.ticks.size();
+  if (skipped == 0) return;
+  times.notes.push_back(name + ": " + std::to_string(skipped) + " of " + std::to_string(all) +
+                        " frames repeat a time stamp and are skipped");
+  times.skipped_share = static_cast<double>(skipped) / static_cast<double>(all);
+}
+
+// By decoding all of it. `listed`: when its frames are to be decoded, for containers that say no more (AVI).
+VideoTimes DecodedTimes(const std::string& name, const std::vector<std::int64_t>& listed, double rate_hz) {
+  VideoTimes out;
+  VideoDecoder video(name);
+  std::size_t frames = 0;
+  for (bool all = true; video.Grab(); ++frames) {
+    const std::optional<std::int64_t> ticks = video.Ticks();
+    all = all && ticks;
+    if (!all) {
+      out.ticks.clear();
+      continue;
+    }
+    if (!out.ticks.empty() && *ticks < out.ticks.back())
+      throw InputError(StampsJumpBack(name, frames, video.Seconds(out.ticks.back()), video.Seconds(*ticks)));
+    out.ticks.push_back(*ticks);
+  }
+  DropRepeated(name, out);
+  if (!out.ticks.empty() || frames == 0) return out;
+  const bool grows = std::adjacent_find(listed.begin(), listed.end(), std::greater_equal<>()) == listed.end();
+  const bool use_listed = grows && listed.size() == frames;
+  for (std::size_t i = 0; i < frames; ++i)
+    out.stamps_s.push_back(use_listed ? video.Seconds(listed[i] - listed[0])
+                                      : static_cast<double>(i) / rate_hz);
+  out.notes.push_back(
+      name + (use_listed ? ": says when frames are decoded, and not when they are shown; those times are used"
+                         : ": has no time stamps; " + std::to_string(rate_hz) +
+                               " frames a second are assumed (dataset.rate_hz)"));
+  return out;
+}
+
+// By the container's list of frames, if the first frame that can be decoded is among them.
+VideoTimes TimesOf(const std::string& name, std::optional<std::int64_t> first, double rate_hz) {
+  VideoTimes out;
+  VideoDecoder video(name);
+  VideoDecoder::Listed listed = video.List();
+  out.ticks = std::move(listed.shown);
+  const auto begin = first ? std::find(out.ticks.begin(), out.ticks.end(), *first) : out.ticks.end();
+  if (begin == out.ticks.end()) {
+    out = DecodedTimes(name, listed.decoded, rate_hz);
+  } else {
+    if (begin != out.ticks.begin())
+      out.notes.push_back(name + ": the first " + std::to_string(begin - out.ticks.begin()) +
+                          " frames can't be decoded and are left out: the video was cut before them");
+    out.ticks.erase(out.ticks.begin(), begin);
+    DropRepeated(name, out);
+  }
+  for (const std::int64_t ticks : out.ticks) out.stamps_s.push_back(video.Seconds(ticks - out.ticks.front()));
+  return out;
+}
+
 /// The frames of a file by their number. Safe from several threads.
 class VideoFrames {
  public:
-  /// `decode` reads the next one of a capture; `kept`: so many that were decoded last can be had again at
-  /// once.
-  VideoFrames(std::filesystem::path file, bool (*decode)(cv::VideoCapture&, cv::Mat&), std::size_t kept)
-      : file_(std::move(file)), decode_(decode), most_kept_(kept) {}
+  /// `kept`: so many that were decoded last can be had again at once.
+  VideoFrames(std::string file, Pixels pixels, std::size_t kept)
+      : file_(std::move(file)), pixels_(pixels), most_kept_(kept) {}
 
-  /// Frame number `at` of the file, or an empty image where it can't be decoded.
-  cv::Mat Fetch(std::size_t at) const {
+  /// Frame number `at`, whose times are these, or an empty image where it can't be decoded.
+  cv::Mat Fetch(std::size_t at, const std::vector<std::int64_t>& ticks) const {
     const std::lock_guard<std::mutex> lock(mutex_);
     const auto found = kept_.find(at);
     if (found != kept_.end()) return found->second;
-    if (at >= end_) return {};
-    if ((at < next_ || !capture_.isOpened()) && !Reopen()) return {};
-    while (next_ <= at) {
-      const std::size_t number = next_;
-      cv::Mat image;
-      bool good = false;
-      try {
-        good = decode_(capture_, image);
-      } catch (const cv::Exception&) {
-        good = false;
-      }
-      if (!good) {
-        end_ = number;
-        return {};
-      }
+    if (absent_.count(at) > 0) return {};
+    if ((!video_ || at < next_) && !Reopen()) return {};
+    while (next_ <= at && video_->Grab()) {
+      const std::optional<std::size_t> number = NumberOf(ticks);
+      if (!number || *number < next_) continue;  // repeats a time
+      for (; next_ < *number; ++next_) absent_.insert(next_);
       ++next_;
-      kept_[number] = image;
+      if (*number + most_kept_ <= at) continue;  // on the way there
+      kept_[*number] = video_->Retrieve(pixels_);
       while (kept_.size() > most_kept_) kept_.erase(kept_.begin());
     }
-    return kept_[at];
+    if (next_ <= at) absent_.insert(at);
+    const auto got = kept_.find(at);
+    return got != kept_.end() ? got->second : cv::Mat();
   }
 
  private:
+  // Of the frame that was grabbed last; nothing: the container does not list it.
+  std::optional<std::size_t> NumberOf(const std::vector<std::int64_t>& ticks) const {
+    const std::optional<std::int64_t> here = video_->Ticks();
+    if (ticks.empty() || !here) return next_;
+    const auto place = std::lower_bound(ticks.begin(), ticks.end(), *here);
+    if (place == ticks.end() || *place != *here) return std::nullopt;
+    return static_cast<std::size_t>(place - ticks.begin());
+  }
+
   bool Reopen() const {
     kept_.clear();
     next_ = 0;
     try {
-      OpenVideoFile(file_, capture_);
-    } catch (const InputError&) {
+      video_.emplace(file_);
+    } catch (const InputError&) {  // it is gone
+      video_.reset();
       return false;
     }
     return true;
   }
 
-  const std::filesystem::path file_;
-  bool (*const decode_)(cv::VideoCapture&, cv::Mat&);
+  const std::string file_;
+  const Pixels pixels_;
   const std::size_t most_kept_;
   mutable std::mutex mutex_;  // guards all below
-  mutable cv::VideoCapture capture_;
-  mutable std::size_t next_ = 0;                            // number of the frame that the decoder gives next
-  mutable std::size_t end_ = static_cast<std::size_t>(-1);  // where decoding failed
+  mutable std::optional<VideoDecoder> video_;
+  mutable std::size_t next_ = 0;          // the first number that was not decoded
+  mutable std::set<std::size_t> absent_;  // numbers that can't be decoded
   mutable std::map<std::size_t, cv::Mat> kept_;
 };
 
 class VideoDataset : public Dataset {
  public:
   VideoDataset(const std::filesystem::path& file, const DatasetOptions& options)
-      : file_(file), grey_(file, ReadGreyFrame, 48), colour_(file, ReadColourFrame, 2) {
-    cv::VideoCapture capture;
-    OpenVideoFile(file_, capture);
-    const double rate = options.rate_hz > 0 ? options.rate_hz : capture.get(cv::CAP_PROP_FPS);
-    rate_hz_ = rate > 0 && std::isfinite(rate) ? rate : 30.0;
-    const double count = capture.get(cv::CAP_PROP_FRAME_COUNT);
-    if (count >= 1 && count < 1e9) {
-      frames_ = static_cast<std::size_t>(count);
-    } else {
-      while (capture.grab()) ++frames_;
-    }
-    const cv::Mat first = frames_ > 0 ? grey_.Fetch(0) : cv::Mat();
-    if (first.empty())
-      throw InputError(file_.string() + ": no frame can be decoded; is it a complete video file?");
+      : file_(file), grey_(file_, Pixels::kGrey, 48), colour_(file_, Pixels::kColour, 2) {
+    VideoDecoder video(file_);
+    const cv::Mat first = video.Grab() ? video.Retrieve(Pixels::kGrey) : cv::Mat();
+    if (first.empty()) throw InputError(file_ + ": no frame can be decoded; is it a complete video file?");
     size_ = first.size();
-    rig_ = RectifyRig(file_.string(), options, size_, rate_hz_, warnings_);
+    const double stated_hz = options.rate_hz > 0  ? options.rate_hz
+                             : video.RateHz() > 0 ? video.RateHz()
+                                                  : 30.0;
+    VideoTimes times = TimesOf(file_, video.Ticks(), stated_hz);
+    ticks_ = std::move(times.ticks);
+    stamps_s_ = std::move(times.stamps_s);
+    warnings_ = std::move(times.notes);
+    skipped_share_ = times.skipped_share;
+    if (options.rate_hz > 0) {
+      for (std::size_t i = 0; i < stamps_s_.size(); ++i)
+        stamps_s_[i] = static_cast<double>(i) / options.rate_hz;
+    }
+    turned_by_ = video.TurnedBy();
+    DatasetOptions use = options;
+    use.camera = CameraOfVideo(file_, video, options, size_, warnings_);
+    rig_ = RectifyRig(file_, use, size_, stated_hz, warnings_);
     mask_ = MaskOfAll(options, size_, rig_.left);
   }
 
-  std::size_t Size() const override { return frames_; }
-  double Stamp(std::size_t i) const override { return static_cast<double>(i) / rate_hz_; }
+  std::size_t Size() const override { return stamps_s_.size(); }
+  double Stamp(std::size_t i) const override { return stamps_s_.at(i); }
+  double SkippedShare() const override { return skipped_share_; }
   const CameraRig& Rig() const override { return rig_.rig; }
+  int TurnedBy() const override { return turned_by_; }
   std::optional<std::filesystem::path> GroundTruthFile() const override { return std::nullopt; }
   const std::vector<std::string>& Warnings() const override { return warnings_; }
 
   Trajectory ReadGroundTruth(const std::filesystem::path& file,
                              std::vector<std::string>* warnings) const override {
-    const TrajectoryFormat format = GuessTrajectoryFormat(file);
-    Trajectory poses = ReadTrajectory(file, format, warnings);
-    if (format == TrajectoryFormat::kKitti) {
-      if (poses.size() != frames_) {
-        throw InputError(file.string() + ": has " + std::to_string(poses.size()) +
-                         " poses, but the video has " + std::to_string(frames_) +
-                         " frames; they must be as many");
-      }
-      for (std::size_t i = 0; i < poses.size(); ++i) poses[i].stamp_s = Stamp(i);
-    }
-    return poses;
+    TrajectoryDetails details;
+    const Trajectory poses = ReadTrajectory(file, GuessTrajectoryFormat(file), warnings, &details);
+    if (details.has_stamps) return poses;
+    std::vector<std::pair<std::int64_t, double>> frames;
+    for (std::size_t i = 0; i < Size(); ++i) frames.emplace_back(i, Stamp(i));
+    return StampedByFrame(file, poses, details, Size(), frames);
   }
 
   ReadResult Read(std::size_t i) const override {
@@ -133,29 +210,30 @@ class VideoDataset : public Dataset {
  private:
   // What is wrong with frame i; else `out` gets it.
   std::string Rectified(const VideoFrames& frames, std::size_t i, cv::Mat& out) const {
-    const cv::Mat image = i < frames_ ? frames.Fetch(i) : cv::Mat();
-    if (image.empty()) return file_.string() + ": frame " + std::to_string(i) + " can't be decoded";
+    const cv::Mat image = i < Size() ? frames.Fetch(i, ticks_) : cv::Mat();
+    if (image.empty()) return file_ + ": frame " + std::to_string(i) + " can't be decoded";
     if (image.size() != size_)
-      return file_.string() + ": frame " + std::to_string(i) + " has another size than the first";
+      return file_ + ": frame " + std::to_string(i) + " has another size than the first";
     out = rig_.left ? rig_.left->Apply(image) : image;
     return {};
   }
 
-  std::filesystem::path file_;
+  std::string file_;
   VideoFrames grey_, colour_;
   RectifiedRig rig_;
   std::vector<std::string> warnings_;
-  double rate_hz_ = 30;
-  std::size_t frames_ = 0;
+  std::vector<std::int64_t> ticks_;  // of the frames, as VideoTimes has them
+  std::vector<double> stamps_s_;
   cv::Size size_;
+  int turned_by_ = 0;
+  double skipped_share_ = 0;
   cv::Mat mask_;
 };
 
 }  // namespace
 
 std::unique_ptr<Dataset> OpenVideo(const std::filesystem::path& file, const DatasetOptions& options) {
-  internal::RequireFile(
-      file, "give a video file (a pipe that somebody writes a video to: camera:" + file.string() + ")");
+  internal::RequireFile(file, "give a video file");
   if (options.sensor != Sensor::kMono)
     throw InputError(
         file.string() +

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <fstream>
@@ -10,7 +11,10 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "core/replaced_file.h"
 #include "frontend/dataset/image_size.h"
+#include "frontend/dataset/layout.h"
+#include "frontend/dataset/npy_file.h"
 #include "tutti/core/text.h"
 
 namespace tutti {
@@ -149,9 +153,11 @@ ImageFile ReadGreyFile(const std::filesystem::path& file) { return ReadPixels(fi
 ImageFile ReadColourFile(const std::filesystem::path& file) { return ReadPixels(file, cv::IMREAD_COLOR); }
 ImageFile ReadImageFile(const std::filesystem::path& file, int flags) { return Decode(file, flags); }
 
-ImageFile ReadDepthFile(const std::filesystem::path& file) {
-  ImageFile out = Decode(file, cv::IMREAD_UNCHANGED);
+ImageFile ReadDepthFile(const std::filesystem::path& file, bool float_in_png) {
+  ImageFile out = file.extension() == ".npy" ? ReadNpyFile(file) : Decode(file, cv::IMREAD_UNCHANGED);
   if (!out.error.empty()) return out;
+  if (float_in_png && out.image.type() == CV_8UC4)
+    out.image = cv::Mat(out.image.rows, out.image.cols, CV_32FC1, out.image.data).clone();
   if (out.image.type() != CV_16UC1 && out.image.type() != CV_32FC1) {
     out.error = file.string() + ": is no depth image; one channel of 16 bit (or float) is needed";
     out.image.release();
@@ -159,12 +165,20 @@ ImageFile ReadDepthFile(const std::filesystem::path& file) {
   return out;
 }
 
+void WritePngFile(const std::filesystem::path& file, const cv::Mat& image,
+                  const std::vector<int>& parameters) {
+  Bytes bytes;
+  cv::imencode(".png", image, bytes, parameters);
+  internal::WriteFile(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+}
+
 std::string SizeText(cv::Size size) { return std::to_string(size.width) + "x" + std::to_string(size.height); }
 
-cv::Mat To8Bit(const cv::Mat& image, int bits) {
+cv::Mat To8Bit(const cv::Mat& image, const GreyRange& range) {
   if (image.depth() == CV_8U) return image;
   cv::Mat out;
-  image.convertTo(out, CV_8U, 1.0 / (1 << (std::clamp(bits, 8, 16) - 8)));
+  const double scale = 256 / (range.white - range.black);
+  image.convertTo(out, CV_8U, scale, -range.black * scale);
   return out;
 }
 
@@ -175,13 +189,42 @@ cv::Mat ToColour(const cv::Mat& image) {
   return out;
 }
 
-int SignificantBits(const cv::Mat& grey) {
-  if (grey.depth() == CV_8U) return 8;
-  double greatest = 0;
-  cv::minMaxLoc(grey, nullptr, &greatest);
-  int bits = 8;
-  while (bits < 16 && greatest >= (1 << bits)) bits += 2;
-  return bits;
+GreyRange RangeOf(const std::vector<cv::Mat>& greys) {
+  constexpr double kStray = 0.001;  // of the pixels: dead ones
+  std::vector<std::size_t> pixels_with(65536);
+  std::size_t pixels = 0;
+  double greatest = 0;  // of the first image
+  for (const cv::Mat& grey : greys) {
+    if (grey.depth() != CV_16U || grey.channels() != 1) continue;
+    if (pixels == 0) cv::minMaxLoc(grey, nullptr, &greatest);
+    pixels += grey.total();
+    for (int v = 0; v < grey.rows; ++v) {
+      for (int u = 0; u < grey.cols; ++u) ++pixels_with[grey.at<unsigned short>(v, u)];
+    }
+  }
+  GreyRange range;
+  while (range.bits < 16 && greatest >= (1 << range.bits)) range.bits += 2;  // as sensors have them
+  range.white = 1 << range.bits;
+  if (range.bits == 8) return range;
+  const auto stray = static_cast<std::size_t>(kStray * static_cast<double>(pixels));
+  int low = 0, high = 65535;
+  for (std::size_t n = pixels_with[0]; n <= stray; n += pixels_with[static_cast<std::size_t>(low)]) ++low;
+  for (std::size_t n = pixels_with[65535]; n <= stray; n += pixels_with[static_cast<std::size_t>(high)])
+    --high;
+  const double used = std::max(high - low, 16);
+  if (8 * used > range.white) return range;
+  range.narrow = true;
+  range.black = std::max(0.0, low - 0.5 * used);
+  range.white = high + 0.5 * used;
+  return range;
+}
+
+std::string RangeText(const GreyRange& range) {
+  std::string text = "16-bit images, taken as " + std::to_string(range.bits) + "-bit and scaled to 8 bit";
+  if (range.narrow)
+    text = "16-bit images of a narrow range; " + std::to_string(std::lround(range.black)) + " to " +
+           std::to_string(std::lround(range.white)) + " become 0 to 255";
+  return text;
 }
 
 cv::Mat DepthInMetres(const cv::Mat& stored, double units_per_m, double max_depth_m) {
@@ -207,26 +250,45 @@ bool HasImageExtension(const std::filesystem::path& file) {
   return std::find(kExtensions.begin(), kExtensions.end(), extension) != kExtensions.end();
 }
 
-std::vector<std::filesystem::path> ListImages(const std::filesystem::path& folder) {
+std::vector<std::filesystem::path> ListFiles(
+    const std::filesystem::path& folder, const std::function<bool(const std::filesystem::path&)>& wanted) {
   std::vector<std::string> names;
   std::error_code code;
   for (std::filesystem::directory_iterator it(folder, code), end; !code && it != end; it.increment(code)) {
     std::string name = it->path().filename().string();
-    if (name.front() == '.' || !HasImageExtension(it->path())) continue;
+    if (name.front() == '.' || !wanted(it->path())) continue;
     if (!it->is_directory(code)) names.push_back(std::move(name));
   }
   std::sort(names.begin(), names.end(), NaturalLess);
   std::vector<std::filesystem::path> files;
   files.reserve(names.size());
+  const internal::StampsOfNames found = StampsInNames({names.begin(), names.end()});
+  if (found.stamps.size() == names.size()) {  // also below 0, and with more decimals or fewer
+    for (const auto& stamp : found.stamps) files.push_back(folder / names[stamp.second]);
+    return files;
+  }
   for (const std::string& name : names) files.push_back(folder / name);
   return files;
 }
 
+internal::StampsOfNames StampsInNames(const std::vector<std::filesystem::path>& files) {
+  std::vector<std::string> names;
+  names.reserve(files.size());
+  for (const std::filesystem::path& file : files) names.push_back(file.stem().string());
+  return internal::FindStamps(names);
+}
+
+std::vector<std::filesystem::path> ListImages(const std::filesystem::path& folder) {
+  return ListFiles(folder, HasImageExtension);
+}
+
 std::optional<std::filesystem::path> ImagesOfDataset(const std::filesystem::path& folder) {
-  for (const char* images : {"image_0", "image_2", "rgb", "mav0/cam0/data", "cam0/data", "images"}) {
+  for (const char* images : {"image_0", "image_2", "rgb", "mav0/cam0/data", "cam0/data", "color", "images"}) {
     if (!ListImages(folder / images).empty()) return folder / images;
   }
-  return std::nullopt;
+  const std::optional<FoundLayout> found = FindLayout(folder);
+  if (!found || *found->layout->left.folder == '\0') return std::nullopt;
+  return folder / found->layout->left.folder;
 }
 
 }  // namespace tutti

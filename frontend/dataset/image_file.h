@@ -3,10 +3,13 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include "core/time_stamps.h"
 
 #pragma GCC visibility push(default)  // of the commands, too
 namespace tutti {
@@ -16,6 +19,9 @@ struct ImageFile {
   cv::Mat image;
   std::string error;
 };
+
+/// What pixels become: one channel, three with blue first, both of 8 or 16 bit; or nothing else (depth).
+enum class Pixels { kGrey, kColour, kStored };
 
 /// More is no image of a camera; memory and time to read one have a bound: 16-bit colour needs 6 bytes a
 /// pixel.
@@ -31,20 +37,34 @@ ImageFile ReadColourFile(const std::filesystem::path& file);
 ImageFile ReadImageFile(const std::filesystem::path& file, int flags);
 /// The same of the bytes of such a file.
 ImageFile DecodeImage(const std::vector<unsigned char>& bytes, int flags);
-/// Reads a depth image as stored: one channel of 16 bit or float.
-ImageFile ReadDepthFile(const std::filesystem::path& file);
+/// Reads a depth image as stored: one channel of 16 bit or float, of an image file or NumPy's (.npy: two
+/// dimensions, of float16, float32, float64 or uint16). `float_in_png`: 4 channels of 8 bit are a float.
+ImageFile ReadDepthFile(const std::filesystem::path& file, bool float_in_png = false);
+
+/// Writes an image as a PNG file, as cv::imwrite does with these parameters. Throws InputError.
+void WritePngFile(const std::filesystem::path& file, const cv::Mat& image,
+                  const std::vector<int>& parameters = {});
 
 /// "640x480", for messages.
 std::string SizeText(cv::Size size);
 
-/// To 8 bit, any channels. 16-bit images are divided by 2^(bits - 8) and saturated; `bits`: significant bits,
-/// 8 to 16.
-cv::Mat To8Bit(const cv::Mat& image, int bits);
+/// Grey values of 16-bit images that become 0 to 255.
+struct GreyRange {
+  double black = 0, white = 256;
+  bool narrow = false;  ///< a small part of what `bits` can say, and stretched
+  int bits = 8;         ///< significant ones of the images
+};
+/// Of the first images of a recording. All that their bits can say, unless they use an eighth of it or less,
+/// as those of thermal cameras do: then from the darkest to the brightest, with a margin of half of that on
+/// each side.
+GreyRange RangeOf(const std::vector<cv::Mat>& greys);
+/// "16-bit images, taken as 14-bit and scaled to 8 bit".
+std::string RangeText(const GreyRange& range);
+
+/// To 8 bit, any channels. 16-bit images are scaled and saturated.
+cv::Mat To8Bit(const cv::Mat& image, const GreyRange& range);
 /// Three equal channels from one; three channels stay.
 cv::Mat ToColour(const cv::Mat& image);
-/// Bits that the greatest value of an image needs, rounded up to 8, 10, 12, 14 or 16 as sensors have them.
-int SignificantBits(const cv::Mat& grey);
-
 /// A depth image as stored (16 bit or float) to CV_32FC1 [m]; 0: no measurement, which NaN, negative,
 /// infinite values and those beyond max_depth_m (0: no limit) become.
 cv::Mat DepthInMetres(const cv::Mat& stored, double units_per_m, double max_depth_m);
@@ -52,11 +72,16 @@ cv::Mat DepthInMetres(const cv::Mat& stored, double units_per_m, double max_dept
 /// True if the name ends like an image file that OpenCV can read.
 bool HasImageExtension(const std::filesystem::path& file);
 /// Where a data set's folder has the images of its (left) camera (KITTI: image_0 or image_2, TUM: rgb, EuRoC:
-/// mav0/cam0/data; images): the first of these that holds any.
+/// mav0/cam0/data; and the layouts of layout.h): the first of these that holds any.
 std::optional<std::filesystem::path> ImagesOfDataset(const std::filesystem::path& folder);
-/// The images in a folder in natural order (hidden and other files ignored); empty if the folder can't be
-/// read.
+/// The files in a folder that are `wanted`, without hidden ones, in the order of the time stamps that they
+/// are called by, else in natural order; none if it can't be read.
+std::vector<std::filesystem::path> ListFiles(const std::filesystem::path& folder,
+                                             const std::function<bool(const std::filesystem::path&)>& wanted);
+/// The images in a folder, as ListFiles.
 std::vector<std::filesystem::path> ListImages(const std::filesystem::path& folder);
+/// Time stamps that the files are called by.
+internal::StampsOfNames StampsInNames(const std::vector<std::filesystem::path>& files);
 
 }  // namespace tutti
 #pragma GCC visibility pop

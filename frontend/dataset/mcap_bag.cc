@@ -83,14 +83,16 @@ void McapBag::TakeChannel(const std::string& content) {
 void McapBag::TakeMessage(const ByteSource& bytes, const Record& record, std::int32_t chunk) {
   constexpr std::uint64_t kMessageHead = 22;  // channel, number, times of recording and of sending
   std::uint16_t channel = 0;
+  std::uint64_t received_ns = 0;
   MessageHead words = {};
   const std::uint64_t begin = record.begin + kMessageHead;
   if (record.size < kMessageHead + sizeof words || record.size - kMessageHead > UINT32_MAX) return;
   if (!bytes.Read(record.begin, sizeof channel, reinterpret_cast<char*>(&channel)) ||
+      !bytes.Read(record.begin + 6, sizeof received_ns, reinterpret_cast<char*>(&received_ns)) ||
       !bytes.Read(begin, sizeof words, reinterpret_cast<char*>(words.data())))
     return;
-  AddMessage(
-      {channel, static_cast<std::uint32_t>(record.size - kMessageHead), begin, chunk, 0, StampOf(words)});
+  AddMessage({channel, static_cast<std::uint32_t>(record.size - kMessageHead), begin, chunk, 0,
+              StampOf(words), 1e-9 * static_cast<double>(received_ns)});
 }
 
 std::optional<McapBag::Chunk> McapBag::ChunkOf(const ByteSource& bytes, const Record& record) const {

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/angle.h"
 #include "frontend/dataset/image_file.h"
 #include "tutti/core/error.h"
 
@@ -61,6 +62,16 @@ void TakeRectifiedPairs(const std::string& name, const PinholeCamera& left, doub
 
 }  // namespace
 
+PinholeCamera CameraOfView(double degrees, cv::Size size) {
+  PinholeCamera camera;
+  camera.width = size.width;
+  camera.height = size.height;
+  camera.fx = camera.fy = 0.5 * size.width / std::tan(0.5 * degrees / internal::kDegrees);
+  camera.cx = 0.5 * (size.width - 1);
+  camera.cy = 0.5 * (size.height - 1);
+  return camera;
+}
+
 RectifiedRig RectifyRig(const std::string& name, RigCalibration calibration, const DatasetOptions& options,
                         cv::Size size, double rate_hz) {
   RectifiedRig out;
@@ -74,6 +85,7 @@ RectifiedRig RectifyRig(const std::string& name, RigCalibration calibration, con
     calibration.right = options.right;
     calibration.T_right_left = RigidTransform(options.T_right_left);
   }
+  if (!calibration.left && options.fov_deg > 0) calibration.left = CameraOfView(options.fov_deg, size);
   if (!calibration.left) {
     if (stereo && options.right)
       throw InputError(name +

@@ -26,14 +26,18 @@ struct RectifiedRig {
   std::optional<Rectifier> left, right;
 };
 
+/// The camera with this horizontal field of view [deg]: square pixels, principal point in the middle.
+PinholeCamera CameraOfView(double degrees, cv::Size size);
+
 /// What a data set without a calibration says of itself. `name`: what messages call it.
 inline std::string NoCalibrationText(const std::string& name) {
   return name + ": no calibration is given (camera: fx, fy, cx, cy); appearance only, no odometry";
 }
 
-/// The rig of images of this size. options.right goes before calibration.right. Without a left camera the rig
-/// is not calibrated. `name` is what messages call the data set. Throws InputError if the calibration is that
-/// of another size, or can't be used, and for pairs that it does not suffice for.
+/// The rig of images of this size. options.right goes before calibration.right. Without a left camera it
+/// has options.fov_deg; without that the rig is not calibrated. `name` is what messages call the data set.
+/// Throws InputError if the calibration is that of another size, or can't be used, and for pairs that it does
+/// not suffice for.
 RectifiedRig RectifyRig(const std::string& name, RigCalibration calibration, const DatasetOptions& options,
                         cv::Size size, double rate_hz);
 

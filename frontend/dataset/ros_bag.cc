@@ -90,7 +90,12 @@ void RosBag::TakeMessage(const ByteSource& bytes, const Record& record, std::int
   MessageHead words = {};
   if (!connection || record.size < sizeof words) return;
   if (!bytes.Read(record.begin, sizeof words, reinterpret_cast<char*>(words.data()))) return;
-  AddMessage({*connection, static_cast<std::uint32_t>(record.size), record.begin, chunk, 0, StampOf(words)});
+  const std::optional<std::string_view> time = FieldOf(record.header, "time");  // seconds, nanoseconds
+  const std::uint64_t received = time ? NumberIn<std::uint64_t>(*time).value_or(0) : 0;
+  const double received_s =
+      static_cast<double>(received & UINT32_MAX) + 1e-9 * static_cast<double>(received >> 32U);
+  AddMessage({*connection, static_cast<std::uint32_t>(record.size), record.begin, chunk, 0, StampOf(words),
+              received_s});
 }
 
 void RosBag::TakeConnection(const ByteSource& bytes, const Record& record) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 #include <map>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -11,6 +12,7 @@
 #include <vector>
 
 #include "core/byte_stream.h"
+#include "core/camera_text.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -21,11 +23,8 @@ using internal::ByteReader;
 // What is wrong with how a message is serialized; empty: nothing.
 std::string SerializationProblem(std::string_view message, Serialization serialization) {
   if (serialization == Serialization::kRos1 || message.size() < 4) return {};
-  const std::string_view kind = message.substr(0, 2);
-  if (kind == std::string_view("\x00\x01", 2)) return {};
-  return kind == "\x28\xb5" ? "is compressed for itself (compression_mode: message); write the bag without: "
-                              "ros2 bag convert"
-                            : "is not serialized as little-endian CDR";
+  if (message.substr(0, 2) == std::string_view("\x00\x01", 2)) return {};
+  return "is not serialized as little-endian CDR";
 }
 
 // Values of a message, one after the other.
@@ -178,6 +177,14 @@ void DecodeCompressed(MessageReader& in, Pixels pixels, MessageImage* out) {
 
 }  // namespace
 
+double StampOf(const MessageHead& head) {
+  if (IsPacked({reinterpret_cast<const char*>(head.data()), sizeof head}))
+    return std::numeric_limits<double>::quiet_NaN();
+  return head[1] + 1e-9 * head[2];
+}
+
+bool IsPacked(std::string_view bytes) { return bytes.substr(0, 4) == "\x28\xb5\x2f\xfd"; }
+
 std::string NameOfType(std::string type) {
   const std::size_t msg = type.find("/msg/");
   if (msg != std::string::npos) type.erase(msg, 4);
@@ -209,40 +216,30 @@ MessageImage DecodeImageMessage(const std::string& message, const std::string& t
   return out;
 }
 
-std::optional<PinholeCamera> CameraOfMessage(const std::string& message, Serialization serialization,
-                                             const std::string& source) {
+CameraInfo DecodeCameraInfo(const std::string& message, Serialization serialization,
+                            const std::string& source) {
   const std::string problem = SerializationProblem(message, serialization);
   if (!problem.empty()) throw InputError(source + ": a camera_info " + problem);
   MessageReader in(message, serialization, source + ": a camera_info");
   in.SkipHeader();
-  PinholeCamera camera;
-  camera.height = static_cast<int>(in.Get<std::uint32_t>());
-  camera.width = static_cast<int>(in.Get<std::uint32_t>());
-  const std::string model(in.Text());
+  const auto pixels = [&] { return internal::PixelsOf(in.Get<std::uint32_t>()); };
+  CameraInfo info;
+  info.height = pixels();
+  info.width = pixels();
+  info.model = in.Text();
+  constexpr std::uint32_t kMostTerms = 100;
   const auto count = in.Get<std::uint32_t>();
-  bool distorted = false;
-  for (std::uint32_t i = 0; i < count; ++i) {
-    const auto value = in.Get<double>();
-    distorted = distorted || value != 0;
-    if (i < camera.coefficients.size()) camera.coefficients[i] = value;
-  }
-  std::array<double, 9> K;  // row by row
-  for (double& value : K) value = in.Get<double>();
-  if (!(K[0] > 0)) return std::nullopt;
-  camera.fx = K[0];
-  camera.cx = K[2];
-  camera.fy = K[4];
-  camera.cy = K[5];
-  if (!distorted) return camera;
-  if (model == "plumb_bob") {
-    camera.distortion = Distortion::kRadTan;
-  } else if (model == "equidistant" || model == "fisheye") {
-    camera.distortion = Distortion::kEquidistant;
-  } else {
-    throw InputError(source + ": unknown distortion model '" + model +
-                     "' in its camera_info; give the section camera: in the configuration");
-  }
-  return camera;
+  if (count > kMostTerms)
+    throw InputError(source + ": a camera_info has " + std::to_string(count) + " coefficients");
+  for (std::uint32_t i = 0; i < count; ++i) info.lens.push_back(in.Get<double>());
+  for (double& value : info.K) value = in.Get<double>();
+  for (double& value : info.R) value = in.Get<double>();
+  for (double& value : info.P) value = in.Get<double>();
+  ImageWindow& window = info.window;
+  for (int* value : {&window.binning_x, &window.binning_y, &window.x_offset, &window.y_offset, &window.height,
+                     &window.width})
+    *value = pixels();
+  return info;
 }
 
 }  // namespace tutti

@@ -3,11 +3,11 @@
 
 #include <array>
 #include <cstdint>
-#include <optional>
 #include <string>
+#include <string_view>
 
+#include "frontend/dataset/camera_info.h"
 #include "frontend/dataset/image_file.h"
-#include "tutti/core/camera.h"
 
 namespace tutti {
 
@@ -21,7 +21,10 @@ std::string NameOfType(std::string type);
 /// How a message with a std_msgs/Header begins: its number (ROS 2: the kind of serialization), seconds,
 /// nanoseconds.
 using MessageHead = std::array<std::uint32_t, 3>;
-inline double StampOf(const MessageHead& head) { return head[1] + 1e-9 * head[2]; }  ///< [s]
+/// Its stamp [s]; nan where it is compressed.
+double StampOf(const MessageHead& head);
+/// How Zstandard begins.
+bool IsPacked(std::string_view bytes);
 
 /// Image or CompressedImage.
 bool IsImageMessage(const std::string& type);
@@ -30,15 +33,12 @@ bool IsImageMessage(const std::string& type);
 struct MessageImage : ImageFile {
   bool metres = false;  ///< 32FC1, which ROS gives in metres
 };
-/// What pixels become: one channel, three with blue first, both of 8 or 16 bit; or nothing else (depth).
-enum class Pixels { kGrey, kColour, kStored };
 /// `type`: one for which IsImageMessage holds. Never throws; thread-safe.
 MessageImage DecodeImageMessage(const std::string& message, const std::string& type,
                                 Serialization serialization, Pixels pixels);
 
-/// The camera of a CameraInfo; nothing where it says that it is not calibrated (K[0] = 0). `source`: for
-/// messages. Throws InputError for a distortion that tutti does not know, and where the message ends early.
-std::optional<PinholeCamera> CameraOfMessage(const std::string& message, Serialization serialization,
-                                             const std::string& source);
+/// `source`: for messages. Throws InputError where the message ends early.
+CameraInfo DecodeCameraInfo(const std::string& message, Serialization serialization,
+                            const std::string& source);
 
 }  // namespace tutti

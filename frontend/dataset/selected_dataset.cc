@@ -53,7 +53,9 @@ class SelectedDataset : public Dataset {
     return read;
   }
   ColourImage ReadColour(std::size_t i) const override { return whole_->ReadColour(Place(i)); }
+  double SkippedShare() const override { return whole_->SkippedShare(); }
   const CameraRig& Rig() const override { return rig_; }
+  int TurnedBy() const override { return whole_->TurnedBy(); }
   std::optional<std::filesystem::path> GroundTruthFile() const override { return whole_->GroundTruthFile(); }
   Trajectory ReadGroundTruth(const std::filesystem::path& file,
                              std::vector<std::string>* warnings) const override {

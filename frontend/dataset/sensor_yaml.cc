@@ -98,21 +98,15 @@ SensorYaml ReadSensorYaml(const std::filesystem::path& file) {
   c.height = internal::PixelsOf(NumberAt(file, size, 1));
 
   const TextLine& model = Get(file, values, "distortion_model", 1);
-  const std::string& name = model.words[0];
-  if (name == "radial-tangential" || name == "radtan" || name == "plumb_bob") {
-    c.distortion = Distortion::kRadTan;
-  } else if (name == "equidistant") {
-    c.distortion = Distortion::kEquidistant;
-  } else if (name != "none") {
-    throw InputError(At(file, model.number) + "unknown distortion_model '" + name +
-                     "'; use radial-tangential, equidistant or none");
+  std::vector<double> lens;
+  if (const auto found = values.find("distortion_coefficients"); found != values.end()) {
+    const TextLine& text = found->second.text;
+    for (std::size_t i = 0; i < text.words.size(); ++i) lens.push_back(NumberAt(file, text, i));
+  } else if (model.words[0] != "none") {
+    Get(file, values, "distortion_coefficients", 4);
   }
-  if (c.distortion != Distortion::kNone) {
-    const auto found = values.find("distortion_coefficients");
-    const std::size_t given = found == values.end() ? 0 : found->second.text.words.size();
-    const TextLine& k = Get(file, values, "distortion_coefficients", given == 5 ? 5 : 4);
-    for (std::size_t i = 0; i < k.words.size(); ++i) c.coefficients[i] = NumberAt(file, k, i);
-  }
+  const std::string wrong = internal::SetLens(model.words[0], lens, c);
+  if (!wrong.empty()) throw InputError(At(file, model.number) + wrong);
   if (values.count("rate_hz") != 0) out.rate_hz = NumberAt(file, Get(file, values, "rate_hz", 1), 0);
   const std::string problem = c.Validate();
   if (!problem.empty()) throw InputError(file.string() + ": " + problem);

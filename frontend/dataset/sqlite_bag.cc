@@ -92,7 +92,7 @@ void SqliteBag::TakeMessages() {
   sqlite3_blob* data = nullptr;
   try {
     // Not the data, which would read all of the file, but twelve bytes of each.
-    Query rows(database_.get(), "SELECT rowid, topic_id FROM messages ORDER BY rowid");
+    Query rows(database_.get(), "SELECT rowid, topic_id, timestamp FROM messages ORDER BY rowid");
     while (rows.Next()) {
       const std::int64_t row = rows.Number(0), topic = rows.Number(1);
       const int code = data == nullptr
@@ -112,7 +112,8 @@ void SqliteBag::TakeMessages() {
         continue;
       }
       AddMessage({static_cast<std::uint32_t>(topic), static_cast<std::uint32_t>(size),
-                  static_cast<std::uint64_t>(row), -1, 0, StampOf(words)});
+                  static_cast<std::uint64_t>(row), -1, 0, StampOf(words),
+                  1e-9 * static_cast<double>(rows.Number(2))});
     }
   } catch (const InputError& e) {
     NoteDamage(std::string("is damaged, or was cut off while recording (") + e.what() +
@@ -121,7 +122,7 @@ void SqliteBag::TakeMessages() {
   sqlite3_blob_close(data);
 }
 
-std::string SqliteBag::Read(const BagMessage& message) const {
+std::string SqliteBag::ReadStored(const BagMessage& message) const {
   const std::lock_guard<std::mutex> lock(mutex_);
   try {
     Query row(database_.get(), "SELECT rowid, data FROM messages WHERE rowid = ?1");

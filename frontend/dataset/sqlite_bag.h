@@ -18,14 +18,13 @@ class SqliteBag : public Bag {
   /// Throws InputError where the file can't be opened, or has not these tables.
   explicit SqliteBag(const std::filesystem::path& file);
 
-  std::string Read(const BagMessage& message) const override;
-
  private:
   class Query;
   struct Close {
     void operator()(sqlite3* database) const;
   };
 
+  std::string ReadStored(const BagMessage& message) const override;
   void TakeTopics();
   void TakeMessages();
 

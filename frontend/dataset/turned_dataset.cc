@@ -16,6 +16,10 @@ PinholeCamera QuarterTurned(const PinholeCamera& camera) {
   turned.fy = camera.fx;
   turned.cx = camera.height - 1 - camera.cy;
   turned.cy = camera.cx;
+  if (camera.distortion == Distortion::kRadTan) {  // x and y of a ray become -y and x
+    turned.coefficients[2] = camera.coefficients[3];
+    turned.coefficients[3] = -camera.coefficients[2];
+  }
   return turned;
 }
 

@@ -12,7 +12,7 @@ namespace tutti {
 /// The image turned clockwise by 0, 90, 180 or 270 degrees; an empty one stays empty.
 cv::Mat TurnedImage(const cv::Mat& image, int degrees);
 
-/// The camera without distortion whose images are those of `camera`, turned.
+/// The camera whose images are those of `camera`, turned clockwise, with its distortion.
 PinholeCamera TurnedCamera(const PinholeCamera& camera, int degrees);
 
 /// Another data set whose images, masks and depth images are turned clockwise by 90, 180 or 270 degrees. The
@@ -33,6 +33,7 @@ class TurnedDataset : public Dataset {
   std::int64_t Number(std::size_t i) const override { return stored_->Number(i); }
   ReadResult Read(std::size_t i) const override;
   ColourImage ReadColour(std::size_t i) const override;
+  double SkippedShare() const override { return stored_->SkippedShare(); }
   const CameraRig& Rig() const override { return rig_; }
   std::optional<std::filesystem::path> GroundTruthFile() const override { return stored_->GroundTruthFile(); }
   Trajectory ReadGroundTruth(const std::filesystem::path& file,

@@ -54,6 +54,14 @@ bool Unpacker::Zstd(std::string_view packed) {
   return out_->size() == size_;
 }
 
+std::optional<std::string> UnpackedFrame(std::string_view packed, std::uint64_t most) {
+  const unsigned long long size = ZSTD_getFrameContentSize(packed.data(), packed.size());
+  if (size > most) return std::nullopt;  // so are the numbers for errors, and for sizes that it does not say
+  std::string out;
+  if (!Unpacker(size, &out).Zstd(packed)) return std::nullopt;
+  return out;
+}
+
 bool Unpacker::Append(std::size_t given) {
   if (given > size_ - out_->size()) return false;
   out_->append(buffer_.data(), given);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -25,5 +26,9 @@ class Unpacker {
   std::string* out_;
   std::vector<char> buffer_ = std::vector<char>(1U << 16U);
 };
+
+/// The content of one frame of Zstandard that says its size; nothing: it is damaged, or larger than `most`
+/// bytes.
+std::optional<std::string> UnpackedFrame(std::string_view packed, std::uint64_t most);
 
 }  // namespace tutti

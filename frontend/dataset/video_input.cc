@@ -1,70 +1,80 @@
 #include "frontend/dataset/video_input.h"
 
 #include <algorithm>
-#include <opencv2/imgproc.hpp>
-#include <opencv2/videoio/registry.hpp>
+#include <cmath>
 
 #include "frontend/dataset/image_mask.h"
+#include "frontend/dataset/rectified_rig.h"
+#include "frontend/dataset/turned_dataset.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
 namespace {
 
-// FFmpeg and OpenCV's own motion JPEG; GStreamer only where OpenCV was built without FFmpeg.
-std::vector<int> Backends() {
-  const std::vector<cv::VideoCaptureAPIs> known = cv::videoio_registry::getBackends();
-  const bool ffmpeg = std::find(known.begin(), known.end(), cv::CAP_FFMPEG) != known.end();
-  return {ffmpeg ? cv::CAP_FFMPEG : cv::CAP_GSTREAMER, cv::CAP_OPENCV_MJPEG};
+// How far the principal point is from the middle of images of this size, as share of their sides.
+double OffCentre(const PinholeCamera& camera, cv::Size size) {
+  return std::max(std::abs((camera.cx + 0.5) / size.width - 0.5),
+                  std::abs((camera.cy + 0.5) / size.height - 0.5));
+}
+
+// Whether the camera is that of the sensor's `own` orientation, and not of the images that are `turned`. One
+// that has the size of its images from these, or none, is told by its principal point.
+bool IsOfSensor(const PinholeCamera& camera, cv::Size own, cv::Size turned) {
+  const cv::Size size(camera.width, camera.height);
+  if (size != own && size != turned && size != cv::Size()) return false;  // of neither, which is said later
+  if (own == turned || size == own) return true;
+  return OffCentre(camera, turned) > 0.1 && OffCentre(camera, own) < OffCentre(camera, turned);
+}
+
+// The same camera with pixels that are so many times as wide.
+PinholeCamera Widened(PinholeCamera camera, double aspect, int width) {
+  camera.fx /= aspect;
+  camera.cx = (camera.cx + 0.5) / aspect - 0.5;
+  camera.width = width;
+  return camera;
 }
 
 }  // namespace
 
-void OpenVideoFile(const std::filesystem::path& file, cv::VideoCapture& capture) {
-  // Not CAP_ANY: it tries every backend, and each reports its failure at length on stderr.
-  for (const int backend : Backends()) {
-    try {
-      if (capture.open(file.string(), backend)) return;
-    } catch (const cv::Exception&) {  // the next one may do
-    }
+std::optional<PinholeCamera> CameraOfVideo(const std::string& name, const VideoDecoder& video,
+                                           const DatasetOptions& options, cv::Size size,
+                                           std::vector<std::string>& warnings) {
+  const int degrees = video.TurnedBy();
+  const double aspect = video.PixelAspect();
+  const bool quarter = degrees % 180 != 0;
+  const cv::Size own = quarter ? cv::Size(size.height, size.width) : size;
+  const int square_width = static_cast<int>(std::lround(own.width * aspect));
+  if (degrees != 0 && options.sensor != Sensor::kMono)
+    throw InputError(name + ": its rotation flag says " + std::to_string(degrees) +
+                     " deg, and images of two cameras can't be turned; remove the flag (ffmpeg -i INPUT -c "
+                     "copy -metadata:s:v rotate=0 OUTPUT), or use one camera (sensor mono)");
+  if (degrees != 0 && options.readout_s > 0)
+    throw InputError(name + ": its rotation flag says " + std::to_string(degrees) +
+                     " deg, and images of a rolling shutter can't be turned: its rows would become columns, "
+                     "or run upwards; leave readout_s 0");
+  std::optional<PinholeCamera> camera = options.camera;
+  std::string pixels = name + ": its pixels are " + std::to_string(aspect) + " times as wide as high";
+  if (!camera && options.fov_deg > 0) {
+    camera = CameraOfView(options.fov_deg, own);
+    camera->fy *= aspect;
+  } else if (camera && aspect != 1) {
+    const bool square = cv::Size(camera->width, camera->height) == cv::Size(square_width, own.height);
+    if (square) camera = Widened(*camera, aspect, own.width);
+    pixels += square ? "; the calibration, of square ones, is made that of " + SizeText(own)
+                     : "; the calibration must be of images as they are stored, " + SizeText(own);
   }
-  throw InputError(file.string() +
-                   ": can't be opened as a video; is it complete and of a format that OpenCV decodes?");
-}
-
-void OpenVideoStream(const std::string& address, cv::VideoCapture& capture) {
-  try {
-    if (capture.open(address, Backends().front())) return;
-  } catch (const cv::Exception&) {  // said below
+  if (aspect != 1) warnings.push_back(pixels);
+  if (degrees == 0) return camera;
+  std::string turned = name + ": its rotation flag says " + std::to_string(degrees) +
+                       " deg: the images are turned clockwise by that, to " + SizeText(size);
+  if (camera && IsOfSensor(*camera, own, size)) {
+    camera->width = own.width;
+    camera->height = own.height;
+    camera = TurnedCamera(*camera, degrees);
+    turned += ", and with them the camera, as one of the sensor's own orientation (" + SizeText(own) + ")";
   }
-  throw InputError(address +
-                   ": no stream of video can be opened there; check the address, the network, and whether a "
-                   "video player shows it");
-}
-
-bool ReadGreyFrame(cv::VideoCapture& capture, cv::Mat& grey) {
-  return capture.grab() && RetrieveGreyFrame(capture, grey);
-}
-
-bool RetrieveGreyFrame(cv::VideoCapture& capture, cv::Mat& grey) {
-  cv::Mat image;
-  if (!capture.retrieve(image) || image.empty()) return false;
-  if (image.channels() == 1) {
-    grey = image.clone();
-  } else {
-    cv::cvtColor(image, grey, image.channels() == 4 ? cv::COLOR_BGRA2GRAY : cv::COLOR_BGR2GRAY);
-  }
-  return true;
-}
-
-bool ReadColourFrame(cv::VideoCapture& capture, cv::Mat& colour) {
-  cv::Mat image;
-  if (!capture.read(image) || image.empty()) return false;
-  if (image.channels() == 3) {
-    colour = image.clone();
-  } else {
-    cv::cvtColor(image, colour, image.channels() == 4 ? cv::COLOR_BGRA2BGR : cv::COLOR_GRAY2BGR);
-  }
-  return true;
+  warnings.push_back(turned);
+  return camera;
 }
 
 cv::Mat MaskOfAll(const DatasetOptions& options, cv::Size size, const std::optional<Rectifier>& rectifier) {

@@ -6,6 +6,7 @@
 #include "core/median.h"
 #include "frontend/map/global_adjustment.h"
 #include "frontend/map/other_camera.h"
+#include "frontend/odometry/frame_check.h"
 #include "frontend/odometry/odometry_impl.h"
 #include "tutti/core/error.h"
 
@@ -47,13 +48,18 @@ Odometry& Odometry::operator=(Odometry&&) noexcept = default;
 Odometry::~Odometry() = default;
 
 std::shared_ptr<const FrameFeatures> Odometry::Extract(const InputFrame& frame) const {
+  CheckFrame(frame, impl_->rig());
   return std::make_shared<const FrameFeatures>(ExtractFeatures(frame, impl_->rig(), impl_->options()));
 }
 
-TrackResult Odometry::Track(const InputFrame& frame) { return impl_->Track(frame); }
+TrackResult Odometry::Track(const InputFrame& frame) {
+  CheckFrame(frame, impl_->rig());
+  return impl_->Track(frame);
+}
 TrackResult Odometry::Follow(const InputFrame& frame, const Pose& T_odom_camera) {
   if (!T_odom_camera.IsFinite())
     throw InputError("frame " + std::to_string(frame.index) + ": its pose has a number that is not finite");
+  CheckFrame(frame, impl_->rig());
   return impl_->Follow(frame, T_odom_camera);
 }
 TrackResult Odometry::RelocalizeAt(int keyframe) { return impl_->RelocalizeAt(keyframe); }

@@ -16,6 +16,7 @@
 
 namespace tutti {
 
+// Without the step, which is of a keyframe alone.
 template <class Archive>
 void State(Archive& archive, TrackResult& result) {
   archive(result.state, result.reason, result.T_world_camera, result.features, result.inliers,

@@ -11,6 +11,14 @@
 namespace tutti::internal {
 namespace {
 
+void CheckImage(const cv::Mat& image, const std::string& which) {
+  if (image.empty() && image.dims <= 2) return;
+  if (image.dims == 2 && (image.type() == CV_8UC1 || image.type() == CV_8UC3 || image.type() == CV_16UC1))
+    return;
+  throw InputError(which + "image must be CV_8UC1, CV_8UC3 (blue, green, red) or CV_16UC1, and is " +
+                   cv::typeToString(image.type()));
+}
+
 // A mask and rectangles that belong to this image.
 void CheckRegions(const LoopQuery& query, const std::string& which) {
   if (!query.mask.empty() &&
@@ -127,6 +135,7 @@ void CheckId(std::int64_t id, std::int64_t last_id, const std::string& file) {
 void CheckQuery(const LoopQuery& query, const std::vector<Member>& members,
                 const CallersDescriptors& before) {
   const std::string which = Which(query.id);
+  CheckImage(query.image, which);
   CheckCallersFeatures(query.features, before, which);
   CheckMemberFeatures(query, members, which);
   if (!query.depth_m.empty() &&

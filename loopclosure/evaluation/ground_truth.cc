@@ -221,6 +221,7 @@ LoopGroundTruth LoopsFromTrajectory(const Trajectory& trajectory, const LoopRule
   const std::string problem = rule.Validate();
   if (!problem.empty()) throw InputError("ground truth from a trajectory: " + problem);
   LoopGroundTruth truth(static_cast<int>(trajectory.size()));
+  const bool rotations = HasRotations(trajectory);
   for (int r = 0; r < truth.size(); ++r) {
     const StampedPose& current = trajectory[static_cast<std::size_t>(r)];
     for (int c = 0; c < r; ++c) {
@@ -229,7 +230,8 @@ LoopGroundTruth LoopsFromTrajectory(const Trajectory& trajectory, const LoopRule
       if (current.stamp_s - past.stamp_s < rule.exclude_s - 1e-6) {
         truth.Set(r, c, LoopLabel::kIgnore);
       } else if (distance < rule.ignore_m) {
-        const double angle = (past.pose.Inverse() * current.pose).Angle() * internal::kDegrees;
+        const double angle =
+            rotations ? (past.pose.Inverse() * current.pose).Angle() * internal::kDegrees : 0;
         const bool loop = distance < rule.distance_m && angle < rule.angle_deg;
         truth.Set(r, c, loop ? LoopLabel::kLoop : LoopLabel::kIgnore);
       }

@@ -2,6 +2,9 @@
 
 #include <sqlite3.h>
 
+#include <filesystem>
+#include <system_error>
+
 #include "core/byte_stream.h"
 #include "tutti/core/error.h"
 
@@ -57,6 +60,9 @@ LocationStore::LocationStore(const std::string& file)
     sqlite3_close(database_);
     database_ = nullptr;
   };
+  std::error_code ignored;
+  if (std::filesystem::exists(file, ignored) && !std::filesystem::is_regular_file(file, ignored))
+    throw InputError(name_ + ": is no file; give the name of a file");
   try {
     const int opened = sqlite3_open_v2(
         file.c_str(), &database_, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX, nullptr);
@@ -65,34 +71,19 @@ LocationStore::LocationStore(const std::string& file)
     sqlite3_limit(database_, SQLITE_LIMIT_LENGTH, 1 << 28);
     // One process at a time: a second one is told so when it opens the file, not in the middle of a run.
     Execute("PRAGMA locking_mode = EXCLUSIVE");
+    const bool is_new = CheckIdentity();
     Execute(durable_ ? "PRAGMA journal_mode = WAL" : "PRAGMA journal_mode = MEMORY");
     Execute(durable_ ? "PRAGMA synchronous = NORMAL" : "PRAGMA synchronous = OFF");
     Execute("PRAGMA cache_size = -4096");
-    Execute("BEGIN IMMEDIATE");
-    sqlite3_stmt* query = nullptr;
-    std::int64_t id = 0;
-    std::int64_t version = 0;
-    for (const auto& [sql, value] :
-         {std::make_pair("PRAGMA application_id", &id), std::make_pair("PRAGMA user_version", &version)}) {
-      const int prepared = sqlite3_prepare_v2(database_, sql, -1, &query, nullptr);
-      if (prepared != SQLITE_OK) Fail(prepared, "read");
-      if (sqlite3_step(query) == SQLITE_ROW) *value = sqlite3_column_int64(query, 0);
-      sqlite3_finalize(query);
-    }
-    if (id == 0 && version == 0) {
+    if (is_new) {
+      Begin();
       Execute(
           "CREATE TABLE records (kind INTEGER NOT NULL, a INTEGER NOT NULL, b INTEGER NOT NULL, "
           "crc INTEGER NOT NULL, bytes BLOB NOT NULL, PRIMARY KEY (kind, a, b))");
       Execute(("PRAGMA application_id = " + std::to_string(kApplicationId)).c_str());
       Execute(("PRAGMA user_version = " + std::to_string(kSchemaVersion)).c_str());
-    } else if (id != kApplicationId) {
-      throw InputError(name_ + ": is a database of another program; give another file");
-    } else if (version != kSchemaVersion) {
-      throw InputError(name_ + ": is a long-term memory of version " + std::to_string(version) +
-                       ", but this program reads version " + std::to_string(kSchemaVersion) +
-                       "; give another file");
+      Commit();
     }
-    Execute("COMMIT");
     statements_ = std::make_unique<Statements>();
     const auto prepare = [this](const char* sql, sqlite3_stmt** statement) {
       const int code = sqlite3_prepare_v3(database_, sql, -1, SQLITE_PREPARE_PERSISTENT, statement, nullptr);
@@ -105,6 +96,33 @@ LocationStore::LocationStore(const std::string& file)
     close();
     throw;
   }
+}
+
+// True if the database is empty, and is to become a memory. A database of another program is not changed.
+bool LocationStore::CheckIdentity() {
+  Execute("BEGIN IMMEDIATE");
+  const std::int64_t id = Number("PRAGMA application_id"), version = Number("PRAGMA user_version"),
+                     content = Number("SELECT count(*) FROM sqlite_master");
+  Execute("COMMIT");
+  if (id == 0 && version == 0 && content == 0) return true;
+  if (id != kApplicationId) throw InputError(name_ + ": is a database of another program; give another file");
+  if (version != kSchemaVersion) {
+    throw InputError(name_ + ": is a long-term memory of version " + std::to_string(version) +
+                     ", but this program reads version " + std::to_string(kSchemaVersion) +
+                     "; give another file");
+  }
+  return false;
+}
+
+std::int64_t LocationStore::Number(const char* sql) {
+  sqlite3_stmt* query = nullptr;
+  int code = sqlite3_prepare_v2(database_, sql, -1, &query, nullptr);
+  if (code != SQLITE_OK) Fail(code, "read");
+  code = sqlite3_step(query);
+  const std::int64_t value = code == SQLITE_ROW ? sqlite3_column_int64(query, 0) : 0;
+  sqlite3_finalize(query);
+  if (code != SQLITE_ROW) Fail(code, "read");
+  return value;
 }
 
 LocationStore::~LocationStore() {

@@ -28,7 +28,8 @@ class LocationStore {
     kWord = 4,       ///< (member, word): descriptor
   };
 
-  /// Opens or makes `file`; "" is a temporary one that is gone with the object.
+  /// Opens `file`, or makes it where there is none, or an empty one; "" is a temporary one that is gone with
+  /// the object.
   explicit LocationStore(const std::string& file);
   ~LocationStore();
   LocationStore(const LocationStore&) = delete;
@@ -57,6 +58,8 @@ class LocationStore {
 
  private:
   struct Statements;
+  bool CheckIdentity();
+  std::int64_t Number(const char* sql);
   void Execute(const char* sql);
   [[noreturn]] void Fail(int code, const std::string& doing) const;
   std::string Checked(std::int64_t crc, std::string_view bytes) const;

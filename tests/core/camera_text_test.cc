@@ -47,5 +47,27 @@ TEST(CameraText, WhatIsNoNumberOfPixelsIsOneThatNoCameraHas) {
     EXPECT_EQ(PixelsOf(wrong), -1) << wrong;
 }
 
+TEST(CameraText, SetsTheLensByTheNamesOfOtherPrograms) {
+  const auto lens = [](const std::string& model, const std::vector<double>& values) {
+    PinholeCamera camera;
+    const std::string wrong = SetLens(model, values, camera);
+    return wrong.empty() ? WordsOf(Distortion())[static_cast<std::size_t>(camera.distortion)].first : wrong;
+  };
+  for (const char* name : {"", "plumb_bob", "PinHole", "radial-tangential", "RS2_DISTORTION_BROWN_CONRADY"})
+    EXPECT_EQ(lens(name, {0.1, 0, 0, 0}), "radtan") << name;
+  for (const char* name : {"KannalaBrandt8", "equi", "Kannala-Brandt", "OPENCV_FISHEYE", "kb4"})
+    EXPECT_EQ(lens(name, {0, 0, 0, 0}), "equidistant") << name << ": no pinhole, also without terms";
+  EXPECT_EQ(lens("distortion.inverse_brown_conrady", {0, 0, 0, 0, 0}), "none");
+  EXPECT_THAT(lens("distortion.inverse_brown_conrady", {0.1, 0, 0, 0, 0}),
+              HasSubstr("is none that tutti has"));
+  EXPECT_EQ(lens("modified_brown_conrady", {0.1, 0, 0, 0, 0}), "radtan");
+  EXPECT_THAT(lens("modified_brown_conrady", {0.1, 0, 0.1, 0, 0}), HasSubstr("with p1 and p2"));
+  EXPECT_EQ(lens("rational_polynomial", {0.1, 0, 0, 0, 0, 0, 0, 0}), "radtan");
+  EXPECT_THAT(lens("rational_polynomial", {0.1, 0, 0, 0, 0, 0, 0.2, 0}), HasSubstr("number 7 is not 0"));
+  EXPECT_THAT(lens("omni", {0, 0, 0, 0}), HasSubstr("'omni' is none that tutti has"));
+  EXPECT_EQ(lens("a name of one's own", {0, 0, 0, 0}), "none");
+  EXPECT_THAT(lens("none", {0.1, 0, 0, 0}), HasSubstr("not 0"));
+}
+
 }  // namespace
 }  // namespace tutti::internal

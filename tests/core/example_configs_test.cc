@@ -1,6 +1,10 @@
 #include "core/example_configs.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include <fstream>
+#include <iterator>
 
 #include "tests/support/in_folder.h"
 #include "tests/support/test_data.h"
@@ -10,26 +14,19 @@ namespace {
 
 namespace fs = std::filesystem;
 
-TEST(ExampleConfigs, AreThoseOfTheInstallationOrElseTheSourceTrees) {
-  const fs::path prefix = testing::FreshFolder();
-  EXPECT_EQ(internal::ExampleConfigs(prefix / "bin"), "data/configs");
-  const fs::path configs = prefix / TUTTI_DATA_FOLDER / "tutti/configs";
-  fs::create_directories(configs);
-  EXPECT_EQ(internal::ExampleConfigs(prefix / "bin"), configs);
-  EXPECT_EQ(internal::ExampleConfigs(prefix / "libexec/tutti"), configs);
-  EXPECT_EQ(internal::ExampleConfigs(prefix / "lib/x86_64-linux-gnu/tutti"), configs);
-  EXPECT_EQ(internal::ExampleConfigs(prefix / "src/tutti/build/release/apps/tutti"), "data/configs")
-      << "a build tree is no installation";
-}
-
-TEST(ExampleConfigs, AreFoundFromAnyWorkingFolder) {
+TEST(ExampleConfigs, AreThoseOfTheSourceTreeFromAnyWorkingFolder) {
   const testing::InFolder root("/");
-  EXPECT_TRUE(std::filesystem::is_regular_file(internal::ExampleConfig("euroc_mono.yaml")));
+  std::vector<std::string> names;
+  for (const auto& entry : fs::directory_iterator(testing::SourceDir() / "data/configs")) {
+    names.push_back(entry.path().stem().string());
+    std::ifstream in(entry.path());
+    const std::string text{std::istreambuf_iterator<char>(in), {}};
+    EXPECT_EQ(internal::ExampleConfig(names.back()), text) << entry.path();
+  }
+  EXPECT_THAT(internal::ExampleConfigNames(), ::testing::UnorderedElementsAreArray(names));
 }
 
-TEST(ExampleConfigs, OfABuildTreeAreTheSourceTrees) {
-  EXPECT_EQ(internal::ExampleConfigs(), "data/configs") << "this test runs from one";
-}
+TEST(ExampleConfigs, OfAnUnknownNameIsNone) { EXPECT_FALSE(internal::ExampleConfig("euroc")); }
 
 }  // namespace
 }  // namespace tutti

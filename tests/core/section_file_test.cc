@@ -47,6 +47,14 @@ class SectionFile : public ::testing::Test {
   fs::path file_ = tutti::testing::FreshFolder() / "sections";
 };
 
+TEST_F(SectionFile, BytesBehindTheEndAreRefused) {
+  WriteTwoSections();
+  const std::string bytes = Content(file_);
+  EXPECT_EQ(Refusal(bytes), "");
+  for (const std::string& more : {std::string("x"), std::string(100, '\0'), bytes})
+    EXPECT_NE(Refusal(bytes + more).find("bytes behind its end"), std::string::npos);
+}
+
 TEST_F(SectionFile, SectionsComeBackInTheirOrder) {
   WriteTwoSections();
   SectionReader in(file_, kKind);

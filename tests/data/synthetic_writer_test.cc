@@ -94,6 +94,31 @@ TEST(SyntheticWriter, AFullFolderIsRefusedUnlessForced) {
   EXPECT_EQ(OpenDataset(folder, With(Sensor::kMono))->Size(), 2U);  // no old frames left
 }
 
+TEST(SyntheticWriter, ForceRemovesAndWritesNothingBehindALink) {
+  SyntheticOptions options = SmallWorld(SyntheticScene::kRoom, SyntheticSensor::kMono);
+  options.frames = 2;
+  const SyntheticWorld world(options);
+  const auto folder = FreshFolder(), other = folder / "other", mine = folder / "mine";
+  WriteSyntheticDataset(world, other);
+  WriteSyntheticDataset(world, mine);
+  std::filesystem::remove_all(mine / "image_0");
+  std::filesystem::create_directory_symlink(other / "image_0", mine / "image_0");
+  SyntheticWriteOptions force;
+  force.force = true;
+  EXPECT_THROW(WriteSyntheticDataset(world, mine, force), InputError);
+  EXPECT_TRUE(std::filesystem::exists(other / "image_0" / "000001.png"));
+  std::filesystem::remove(mine / "image_0");
+  for (const char* name : {"config.yaml", "poses.txt"}) {
+    std::filesystem::remove(mine / name);
+    std::filesystem::create_symlink(other / name, mine / name);
+  }
+  options.seed = 2;  // another text
+  const auto written = std::filesystem::last_write_time(other / "config.yaml");
+  EXPECT_EQ(WriteSyntheticDataset(SyntheticWorld(options), mine, force), 2U);
+  EXPECT_FALSE(std::filesystem::is_symlink(mine / "config.yaml"));
+  EXPECT_EQ(std::filesystem::last_write_time(other / "config.yaml"), written);
+}
+
 TEST(SyntheticWriter, AnotherOnesRecordingStaysWhateverItsConfigurationIs) {
   SyntheticOptions options = SmallWorld(SyntheticScene::kRoom, SyntheticSensor::kMono);
   options.frames = 2;

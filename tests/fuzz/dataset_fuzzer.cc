@@ -26,8 +26,8 @@ struct Layout {
   std::vector<const char*> files;   ///< what is fuzzed
 };
 
-const std::array<Layout, 3>& Layouts() {
-  static const std::array<Layout, 3> layouts = {{
+const std::array<Layout, 5>& Layouts() {
+  static const std::array<Layout, 5> layouts = {{
       {tutti::DatasetType::kKitti,
        {"image_0/000000.png", "image_0/000001.png", "image_1/000000.png", "image_1/000001.png"},
        {"calib.txt", "times.txt", "poses.txt"}},
@@ -38,13 +38,20 @@ const std::array<Layout, 3>& Layouts() {
        {"mav0/cam0/data/1.png", "mav0/cam0/data/2.png", "mav0/cam1/data/1.png", "mav0/cam1/data/2.png"},
        {"mav0/cam0/data.csv", "mav0/cam1/data.csv", "mav0/cam0/sensor.yaml", "mav0/cam1/sensor.yaml",
         "mav0/state_groundtruth_estimate0/data.csv"}},
+      {tutti::DatasetType::kPaired,
+       {"image_left/0_left.png", "image_left/1_left.png", "depth_left/1_left_depth.png"},
+       {"pose_left.txt", "depth_left/0_left_depth.npy"}},
+      {tutti::DatasetType::kPaired,
+       {"image_00/data/0.png", "image_00/data/1.png", "image_01/data/0.png", "image_01/data/1.png"},
+       {"calib_cam_to_cam.txt", "image_00/timestamps.txt", "calib_imu_to_velo.txt", "calib_velo_to_cam.txt",
+        "oxts/data/0.txt", "oxts/data/1.txt"}},
   }};
   return layouts;
 }
 
 const fs::path& Folder(std::size_t layout) {
-  static const std::array<fs::path, 3> folders = [] {
-    std::array<fs::path, 3> made;
+  static const std::array<fs::path, 5> folders = [] {
+    std::array<fs::path, 5> made;
     for (std::size_t k = 0; k < made.size(); ++k) {
       made[k] = tutti::fuzz::ScratchPath("dataset" + std::to_string(k));
       for (const char* name : Layouts()[k].images) {

@@ -61,6 +61,19 @@ def calibration_seeds():
                "[500, 0, 320, 0, 500, 240, 0, 0, 1]}\ndistortion_model: plumb_bob\n",
         "tutti": "camera: {fx: 5, fy: 5, cx: 3, cy: 2, width: 6, height: 4}\n",
         "euroc": SENSOR,
+        "stella": "Camera:\n  model: fisheye\n  fx: 295\n  fy: 295\n  cx: 159\n  cy: 119\n  k1: 0.1\n  cols: 320\n  rows: 240\n",
+        "vins": "%YAML:1.0\nmodel_type: KANNALA_BRANDT\nprojection_parameters: {k2: 0.1, mu: 295, mv: 295, u0: 159, v0: 119}\n",
+        "basalt": '{"value0": {"T_imu_cam": [{"px": 0, "py": 0, "pz": 0, "qx": 0, "qy": 0, "qz": 0, "qw": 1}], "intrinsics": '
+                  '[{"camera_type": "pinhole", "intrinsics": {"fx": 9, "fy": 9, "cx": 5, "cy": 5}}], "resolution": [[9, 9]]}}',
+        "nerf": '{"fl_x": 262, "cx": 160, "cy": 120, "w": 320, "h": 240, "k1": 0.1, "frames": [{"fl_x": 262}]}',
+        "xml": "<opencv_storage>\n<camera_matrix><data>295. 0. 159. 0. 295. 119. 0. 0. 1.</data></camera_matrix>\n"
+               "<fisheye_model>1</fisheye_model></opencv_storage>\n",
+        "colmap": "# Camera list\n1 OPENCV 320 240 295 295 160 120 0.1 -0.05 0.001 0\n",
+        "dso": "Pinhole 0.9 1.2 0.5 0.5 0\n320 240\ncrop\n320 240\n",
+        "realsense": "Width: 320\nHeight: 240\nPPX: 159\nPPY: 119\nFx: 295\nFy: 295\nDistortion: none\nCoeffs: 0 0 0 0 0\n",
+        "pair": "LEFT.K: [9, 0, 5, 0, 9, 5, 0, 0, 1]\nLEFT.D: [0, 0, 0, 0]\nLEFT.R: [1, 0, 0, 0, 1, 0, 0, 0, 1]\nRIGHT.K: "
+                "[9, 0, 5, 0, 9, 5, 0, 0, 1]\nRIGHT.D: [0, 0, 0, 0]\nRIGHT.R: [1, 0, 0, 0, 1, 0, 0, 0, 1]\nCamera.bf: 1\n"
+                "Camera.fx: 9\nCamera.fy: 9\nCamera.cx: 5\nCamera.cy: 5\n",
     }
     for name, text in texts.items():
         yield name, b"\0" + text.encode()

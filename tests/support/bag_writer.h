@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "core/byte_stream.h"
+#include "frontend/dataset/camera_info.h"
 
 namespace tutti::testing {
 
@@ -29,7 +30,8 @@ class BagWriter {
     Record(file_, {Op(3), Field<std::uint64_t>("index_pos", 0)}, "");
   }
 
-  void Write(const std::string& topic, const std::string& type, const std::string& message) {
+  void Write(const std::string& topic, const std::string& type, const std::string& message,
+             double received_s = 0) {
     const auto [at, is_new] = connections_.emplace(topic, connections_.size());
     const auto id = static_cast<std::uint32_t>(at->second);
     if (is_new) {
@@ -37,7 +39,10 @@ class BagWriter {
              Fields({"topic=" + topic, "type=" + type, "message_definition="}));
     }
     counts_[id]++;
-    Record(chunk_, {Op(2), Field("conn", id), Field<std::uint64_t>("time", 0)}, message);
+    const auto seconds = static_cast<std::uint64_t>(received_s);
+    const auto nanoseconds =
+        static_cast<std::uint64_t>(std::lround(1e9 * (received_s - static_cast<double>(seconds))));
+    Record(chunk_, {Op(2), Field("conn", id), Field("time", nanoseconds << 32U | seconds)}, message);
     if (chunk_.bytes().size() >= chunk_bytes_) CloseChunk();
   }
 
@@ -157,19 +162,32 @@ inline std::string CompressedMessage(const std::vector<unsigned char>& file, con
 }
 
 /// A sensor_msgs/CameraInfo.
-inline std::string CameraInfoMessage(cv::Size size, const std::array<double, 9>& K, const std::string& model,
-                                     const std::vector<double>& lens) {
+inline std::string CameraInfoMessage(const CameraInfo& info) {
   internal::ByteWriter out;
   internal_bag::PutHeader(out, 0);
-  out.Put(static_cast<std::uint32_t>(size.height));
-  out.Put(static_cast<std::uint32_t>(size.width));
-  internal_bag::PutText(out, model);
-  out.Put(static_cast<std::uint32_t>(lens.size()));
-  for (const double value : lens) out.Put(value);
-  out.Put(K);
-  out.Put(std::array<double, 21>());    // R, P
-  out.Put(std::array<char, 8 + 17>());  // binning, region of interest
+  const auto put = [&](int value) { out.Put(static_cast<std::uint32_t>(value)); };
+  put(info.height);
+  put(info.width);
+  internal_bag::PutText(out, info.model);
+  put(static_cast<int>(info.lens.size()));
+  for (const double value : info.lens) out.Put(value);
+  out.Put(info.K);
+  out.Put(info.R);
+  out.Put(info.P);
+  const ImageWindow& w = info.window;
+  for (const int value : {w.binning_x, w.binning_y, w.x_offset, w.y_offset, w.height, w.width}) put(value);
+  out.Put('\0');  // do_rectify
   return out.Take();
+}
+inline std::string CameraInfoMessage(cv::Size size, const std::array<double, 9>& K, const std::string& model,
+                                     const std::vector<double>& lens) {
+  CameraInfo info;
+  info.width = size.width;
+  info.height = size.height;
+  info.K = K;
+  info.model = model;
+  info.lens = lens;
+  return CameraInfoMessage(info);
 }
 
 }  // namespace tutti::testing

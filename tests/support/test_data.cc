@@ -1,10 +1,10 @@
 #include "tests/support/test_data.h"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cstdlib>
 #include <fstream>
+#include <stdexcept>
 
 namespace tutti::testing {
 namespace {
@@ -12,8 +12,11 @@ namespace {
 // Removes what the tests wrote, once all of them have passed.
 class FolderOfThisProcess : public ::testing::EmptyTestEventListener {
  public:
-  FolderOfThisProcess()
-      : path_(std::filesystem::temp_directory_path() / ("tutti_test_" + std::to_string(::getpid()))) {}
+  FolderOfThisProcess() {
+    std::string name = std::filesystem::temp_directory_path() / "tutti_test_XXXXXX";
+    if (mkdtemp(name.data()) == nullptr) throw std::runtime_error(name + ": can't be made");
+    path_ = name;
+  }
 
   const std::filesystem::path& path() const { return path_; }
 

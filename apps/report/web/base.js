@@ -30,6 +30,9 @@ const LINES = {
   naive: { color: '#009e73', dash: 'dash' },
   product: { color: '#cc79a7', dash: 'dash' },
   majority: { color: '#e69f00', dash: 'dot' },
+  mean: { color: '#7a5195', dash: 'dash' },
+  'log-pool': { color: '#8f7d2f', dash: 'longdash' },
+  'standardised-mean': { color: '#7a5195', dash: 'dashdot' },
 };
 const SPARE = ['#56b4e9', '#009e73', '#e69f00', '#cc79a7', '#0072b2', '#d55e00'];
 const SESSIONS = ['#cc79a7', '#56b4e9', '#8f7d2f', '#999999', '#7a5195', '#5a9a8f'];  // recordings that the map held before; then again
@@ -48,6 +51,24 @@ function lineOf(name, width = 2) {
   let sum = 0;
   for (const letter of String(name)) sum += letter.codePointAt(0);
   return { color: SPARE[sum % SPARE.length], dash: sum % 2 ? 'dash' : 'solid', width };
+}
+
+// Lines that are the same become one, with all their names.
+function merged(lines, dataOf) {
+  const groups = new Map();
+  for (const line of lines) {
+    const key = JSON.stringify(dataOf(line));
+    if (groups.has(key)) groups.get(key).names.push(line.name); else groups.set(key, { ...line, names: [line.name] });
+  }
+  return [...groups.values()];
+}
+
+// Lines that cover one another are told apart: dashed ones lie on solid ones, and those below are wider.
+function toldApart(traces) {
+  const dashed = (trace) => Number((trace.line?.dash ?? 'solid') !== 'solid');
+  const lines = traces.filter((trace) => trace.mode === 'lines').sort((a, b) => dashed(a) - dashed(b));
+  lines.forEach((trace, k) => { trace.line = { ...trace.line, width: trace.line.width + Math.min(6, 1.6 * (lines.length - 1 - k)) }; });
+  return [...lines, ...traces.filter((trace) => trace.mode !== 'lines')];
 }
 
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
@@ -110,7 +131,9 @@ async function chart(parent, size, traces, layout) {
 const note = (text) => el('p', { class: 'note' }, text);
 
 function table(header, rows, textColumns = []) {
-  const cell = (tag, text, column) => el(tag, textColumns.includes(column) ? { class: 'text' } : {}, String(text));
+  // A mean with its interval below, so that a table of many fits the page.
+  const parts = (text) => { const [mean, interval] = text.split(' +- '); return interval ? [mean, el('small', {}, `\u00b1 ${interval}`)] : [text]; };
+  const cell = (tag, text, column) => el(tag, textColumns.includes(column) ? { class: 'text' } : {}, parts(String(text)));
   return el('div', { class: 'scroll' }, el('table', {},
     el('thead', {}, el('tr', {}, header.map((h, k) => cell('th', h, k)))),
     el('tbody', {}, rows.map((row) => el('tr', {}, row.map((c, k) => cell('td', c, k)))))));

@@ -29,14 +29,15 @@ async function drawRelative(panel, lines) {
 
 async function drawErrors(panel) {
   const lines = errorLines();
-  const traces = (field) => lines.map(([name, error]) => ({ type: 'scatter', mode: 'lines', x: error.distance,
-    y: error[field], name: field === 'error' ? `${label(name)}: rmse ${lengthText(error.rmse)}` : label(name), line: lineOf(name) }));
+  const each = merged(lines.map(([name, error]) => ({ name, error })), ({ error }) => [error.error, error.turn_deg]);
+  const traces = (field) => toldApart(each.map(({ names, error }) => ({ type: 'scatter', mode: 'lines', x: error.distance, y: error[field],
+    name: label(names.join(', ')) + (field === 'error' ? `: rmse ${lengthText(error.rmse)}` : ''), line: lineOf(names.at(-1)) })));
   const range = { rangemode: 'tozero' };
   const x = 'distance along the reference [m]';
   await chart(panel, '', traces('error'), layoutOf('Absolute translation error',
-    { xaxis: axis(x), yaxis: axis('error [m]', range), hovermode: 'x unified' }));
+    { xaxis: axis(x), yaxis: axis('error [m]', range), hovermode: 'x unified', showlegend: true }));
   await chart(panel, '', traces('turn_deg'), layoutOf('Absolute rotation error',
-    { xaxis: axis(x), yaxis: axis('error [deg]', range), hovermode: 'x unified' }));
+    { xaxis: axis(x), yaxis: axis('error [deg]', range), hovermode: 'x unified', showlegend: true }));
   await drawRelative(panel, lines);
   const figures = chosen().figures;
   panel.append(note(`Aligned by ${figures.alignment === 'sim3' ? 'Sim(3)' : 'SE(3)'}, as tutti evaluate.`));
@@ -67,7 +68,7 @@ async function drawRecall(panel) {
         const curve = r.precision_recall.curves.find((c) => c.name === which);
         return curve ? recallLine(curve, r.variant, lineOf(r.variant)) : [];
       });
-      await chart(panel, '', traces, layout(title));
+      await chart(panel, '', toldApart(traces), layout(title));
     }
   }
   if (!run.precision_recall) {
@@ -75,7 +76,7 @@ async function drawRecall(panel) {
   }
   const traces = run.precision_recall.curves.flatMap((curve) =>
     recallLine(curve, curve.name === 'verified' ? 'ensemble, verified' : curve.name, lineOf(curve.name)));
-  await chart(panel, '', traces, layout(known.length > 1 ? `Members of ${run.variant}` : 'Members, ensemble, and the ensemble verified'));
+  await chart(panel, '', toldApart(traces), layout(known.length > 1 ? `Members of ${run.variant}` : 'Members, ensemble, and the ensemble verified'));
   const pr = run.precision_recall;
   panel.append(note(`${pr.rows_with_loop} of ${pr.images} images have a loop (${pr.rule}). Discs: at the default threshold.`));
 }

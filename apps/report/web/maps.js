@@ -44,7 +44,7 @@ function paths() {
   for (const run of runs) {
     if (run.variant !== 'odometry' && run.slam.x.length) lines.push({ name: run.variant, path: run.slam, width: 2.5 });
   }
-  return lines;
+  return merged(lines, (line) => AXES.map((a) => line.path[a]));
 }
 
 const edgesOf = (run, outcome) => run.loops.filter((loop) => loop.outcome === outcome && loop.a);
@@ -99,8 +99,8 @@ async function drawTopChart(panel, size) {
   const { plane: [right, ahead], up } = planeOf(mainPath());
   const make = (points) => ({ type: 'scatter', x: points[right], y: points[ahead] });
   make.size = 8;
-  const traces = paths().map((line) => ({ ...make(AXES.map((a) => line.path[a])), mode: 'lines', name: label(line.name),
-    line: lineOf(line.name, line.width), hovertemplate: '%{x:.2f}, %{y:.2f}' }));
+  const traces = toldApart(paths().map((line) => ({ ...make(AXES.map((a) => line.path[a])), mode: 'lines', name: label(line.names.join(', ')),
+    line: lineOf(line.names.at(-1), line.width), hovertemplate: '%{x:.2f}, %{y:.2f}' })));
   traces.push(...edgeTraces(run, make), ...foundTraces(run, make));
   // Cameras look along z with y down: from above, x is right and z ahead.
   const layout = layoutOf(`Top view, along ${AXES[up]}`, {
@@ -125,12 +125,17 @@ async function draw3d(panel) {
   const { up } = planeOf(mainPath());
   const make = (points) => ({ type: 'scatter3d', x: points[0], y: points[1], z: points[2] });
   make.size = 4;
-  const traces = paths().map((line) => ({ ...make(AXES.map((a) => line.path[a])), mode: 'lines', name: label(line.name),
-    line: lineOf(line.name, line.width + 2), hovertemplate: '%{x:.2f}, %{y:.2f}, %{z:.2f}' }));
+  const traces = toldApart(paths().map((line) => ({ ...make(AXES.map((a) => line.path[a])), mode: 'lines', name: label(line.names.join(', ')),
+    line: lineOf(line.names.at(-1), line.width + 2), hovertemplate: '%{x:.2f}, %{y:.2f}, %{z:.2f}' })));
+  const landmarks = run.landmarks ?? { x: [], y: [], z: [] };
+  if (landmarks.x.length) {
+    traces.unshift({ ...make(AXES.map((a) => landmarks[a])), mode: 'markers', name: 'landmarks', hoverinfo: 'skip',
+      marker: { size: 1.6, color: css('--faint'), opacity: 0.7 } });
+  }
   traces.push(...edgeTraces(run, make), ...foundTraces(run, make));
   const sign = up === 1 ? -1 : 1;  // a camera's y points down
   // All of it at first sight: a box whose longest side is 1, seen from as far as its diagonal needs.
-  const size = boxOf(paths().map((line) => line.path)), longest = Math.max(...size, 1e-9);
+  const size = boxOf([...paths().map((line) => line.path), landmarks]), longest = Math.max(...size, 1e-9);
   const box = size.map((side) => Math.max(side / longest, 0.05));
   const away = (narrow() ? 1.5 : 0.95) * Math.hypot(...box);
   const eye = [away * 0.7, away * 0.7, away * 0.7];

@@ -10,7 +10,7 @@ function cardsOf(run) {
   if (f.slam && !f.slam.error) {
     const before = f.odometry && !f.odometry.error ? `odometry alone ${lengthText(f.odometry.ate_rmse_m)}` : '';
     cards.push(card('ATE (rmse)', lengthText(f.slam.ate_rmse_m), before));
-    cards.push(card('RPE, frame to frame', lengthText(f.slam.rpe_rmse_m)));
+    if (isNumber(f.slam.rpe_rmse_m)) cards.push(card('RPE, frame to frame', lengthText(f.slam.rpe_rmse_m)));
     if (isNumber(f.slam.t_rel_percent)) {
       cards.push(card('KITTI errors', `${fixed(f.slam.t_rel_percent, 2)} %`, `${fixed(f.slam.r_rel_deg_per_100m, 3)} deg/100 m`));
     }

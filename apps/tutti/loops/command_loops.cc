@@ -22,6 +22,7 @@
 #include "apps/tutti/mask_option.h"
 #include "core/camera_text.h"
 #include "core/stopwatch.h"
+#include "core/terminal.h"
 #include "frontend/dataset/image_mask.h"
 #include "frontend/dataset/rectified_rig.h"
 #include "tutti/core/error.h"
@@ -85,8 +86,8 @@ std::optional<ImageMasks> MasksFor(const LoopsArguments& arguments, const ImageS
     throw InputError(arguments.mask + ": holds no mask for any" + of_all +
                      "; a mask has the name of its image");
   if (without > 0)
-    std::fprintf(stderr, "tutti: %s: %td%s have no mask; all of them is used\n", arguments.mask.c_str(),
-                 without, of_all.c_str());
+    internal::Say("%s: %td%s have no mask; all of them is used", arguments.mask.c_str(), without,
+                  of_all.c_str());
   return masks;
 }
 
@@ -132,8 +133,9 @@ LoopRun RunDetector(const LoopsArguments& arguments, const LoopDetectorOptions& 
     earlier.Add(number, image);
     earlier.Separate(&row);
     if (!row.read)
-      progress.Note("tutti: warning: " + image.string() +
-                    ": can't be read; it counts as an image without features");
+      progress.Note(
+          "tutti: warning: " + image.string() + ": can't be read; it counts as an image without features",
+          "images can't be read");
     AddPosterior(row.result, total, run.posterior);
     if (dump) dump->Add(run, row.result, set.truth);
     DropEvidence(options.keep_posterior, row.result);
@@ -155,17 +157,15 @@ LoopRun RunDetector(const LoopsArguments& arguments, const LoopDetectorOptions& 
 
 // All rules, each with the files of a run of its own in its folder.
 int RunTable(const LoopsArguments& arguments, const Input& set) {
-  OutputFolder folder = OpenLoopsFolder(arguments.out, true);
+  OutputFolder folder(arguments.out, LoopsLayout(true));
   LoopTable table;
   for (const std::string& rule : TableRules(arguments.options)) {
     LoopDetectorOptions options = arguments.options;
     SetRule(rule, options);
-    OutputFolder part = OpenLoopsFolder(folder.path() / rule);
+    OutputFolder part(folder.path() / rule, LoopsLayout());
     const LoopRun run = RunDetector(arguments, options, set, part.Staging());
     if (run.rows.size() < set.images.size()) {
-      std::fprintf(stderr,
-                   "tutti: interrupted in the rule '%s'; no table is written, only the rules before\n",
-                   rule.c_str());
+      internal::Say("interrupted in the rule '%s'; no table is written, only the rules before", rule.c_str());
       return 130;
     }
     const LoopReport report = EvaluateRun(run);
@@ -196,30 +196,35 @@ int RunLoops(const LoopsArguments& given) {
                      ": --table runs several detectors, and what one has seen is of no use to another; "
                      "leave one of the two out");
   }
+  OutputFolder::Check(arguments.out, LoopsLayout(arguments.table));
   const std::string problem = arguments.truth.rule.Validate();
   if (!problem.empty()) throw InputError("ground truth: " + problem);
   cv::setNumThreads(arguments.options.threads);
-  Input set = {LoadImageSet(arguments.images, arguments.truth, arguments.topic), std::nullopt, std::nullopt};
+  std::optional<PinholeCamera> camera;
+  if (!arguments.camera.empty()) camera = internal::ParseCamera(arguments.camera);
+  Input set = {LoadImageSet(arguments.images, arguments.truth, arguments.topic, camera), camera,
+               std::nullopt};
+  if (camera && set.recording) set.camera = set.recording->Rig().camera;
+  for (const std::string& note : set.notes) internal::Say("%s", note.c_str());
   if (set.recording) {
     for (const std::string& warning : set.recording->Warnings()) {
       if (warning == NoCalibrationText(arguments.images)) continue;  // loops need none
-      std::fprintf(stderr, "tutti: %s\n", warning.c_str());
+      internal::Say("%s", warning.c_str());
     }
   }
-  if (!arguments.camera.empty()) set.camera = internal::ParseCamera(arguments.camera);
   set.masks = MasksFor(arguments, set);
   const InterruptGuard interrupt;
   RefuseToReplace(arguments.out, arguments.truth.file);
   if (arguments.table) return RunTable(arguments, set);
 
-  OutputFolder folder = OpenLoopsFolder(arguments.out);
+  OutputFolder folder(arguments.out, LoopsLayout());
   const LoopRun run = RunDetector(arguments, arguments.options, set, folder.Staging());
   const LoopReport report = EvaluateRun(run);
   const bool finished = run.rows.size() == set.images.size();
   PrintLoopRun(run, report, WriteLoopRun(run, report, finished, folder));
   if (!finished) {
-    std::fprintf(stderr, "tutti: interrupted after %zu of %zu images; the results are of those\n",
-                 run.rows.size(), set.images.size());
+    internal::Say("interrupted after %zu of %zu images; the results are of those", run.rows.size(),
+                  set.images.size());
     return 130;
   }
   return 0;
@@ -283,6 +288,7 @@ void SetUpLoops(CLI::App& command, int& exit_code) {
   command
       .add_option("--threads", arguments->options.threads,
                   "most threads; the result is the same for any number")
+      ->check(Positive())
       ->capture_default_str();
   command.add_option("--seed", arguments->options.seed, "seed of kd-forests and RANSAC")
       ->check(NotNegative())

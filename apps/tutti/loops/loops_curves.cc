@@ -3,6 +3,7 @@
 
 #include "apps/plot/plot.h"
 #include "apps/tutti/loops/loops_pictures.h"
+#include "core/replaced_file.h"
 
 namespace tutti::cli {
 namespace {
@@ -61,7 +62,7 @@ void WriteCurvesCsv(const LoopReport& report, const std::filesystem::path& file)
   AppendCsv("verified", report.verified, csv);
   AppendCsv("ranked", report.ranked, csv);
   AppendCsv("posterior", report.posterior, csv);
-  WriteText(file, csv);
+  internal::WriteFile(file, csv);
 }
 
 CurvePlot PlotCurves(const LoopRun& run, const LoopReport& report) {

@@ -1,9 +1,10 @@
 #include "apps/tutti/loops/loops_dump.h"
 
 #include <algorithm>
+#include <cerrno>
 #include <cstdio>
 
-#include "tutti/core/error.h"
+#include "apps/tutti/files.h"
 
 namespace tutti::cli {
 namespace {
@@ -50,17 +51,22 @@ std::string VerificationLines(const LoopRun& run, const LoopResult& result, cons
   return text;
 }
 
-void CheckWritten(const std::ofstream& out, const std::filesystem::path& file) {
-  if (!out) throw InputError(file.string() + ": can't be written; is there space, and may you write there?");
+void CheckWritten(const std::ofstream& out, const internal::ReplacedFile& file) {
+  if (!out) internal::FailToWrite(file.target().string(), errno);
+}
+
+const std::filesystem::path& Made(const std::filesystem::path& folder) {
+  MakeFolder(folder);
+  return folder;
 }
 
 }  // namespace
 
 LoopsDump::LoopsDump(const std::filesystem::path& folder, const std::vector<std::string>& members)
-    : candidates_file_(folder / "dump_candidates.csv"), verification_file_(folder / "dump_verification.csv") {
-  MakeFolder(folder);
-  candidates_.open(candidates_file_, std::ios::binary);
-  verification_.open(verification_file_, std::ios::binary);
+    : candidates_file_(Made(folder) / "dump_candidates.csv"),
+      verification_file_(folder / "dump_verification.csv") {
+  candidates_.open(candidates_file_.part(), std::ios::binary);
+  verification_.open(verification_file_.part(), std::ios::binary);
   candidates_ << "image,location,truth,combined_posterior";
   for (const std::string& name : members) {
     candidates_ << "," << name << "_score," << name << "_likelihood," << name << "_posterior";
@@ -83,6 +89,8 @@ void LoopsDump::Finish() {
   verification_.close();
   CheckWritten(candidates_, candidates_file_);
   CheckWritten(verification_, verification_file_);
+  candidates_file_.Commit();
+  verification_file_.Commit();
 }
 
 }  // namespace tutti::cli

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "apps/tutti/loops/loops_output.h"
+#include "core/replaced_file.h"
 
 namespace tutti::cli {
 
@@ -18,11 +19,12 @@ class LoopsDump {
   LoopsDump(const std::filesystem::path& folder, const std::vector<std::string>& members);
   /// Appends the lines of one image of the run; `truth` is for all its images.
   void Add(const LoopRun& run, const LoopResult& result, const LoopGroundTruth& truth);
-  /// To be called at the end. Throws InputError if the files could not be written in full.
+  /// To be called at the end: then the files are there. Throws InputError if the files could not be written
+  /// in full.
   void Finish();
 
  private:
-  std::filesystem::path candidates_file_, verification_file_;
+  internal::ReplacedFile candidates_file_, verification_file_;
   std::ofstream candidates_, verification_;
 };
 

@@ -10,8 +10,11 @@
 #include "apps/tutti/loops/joined_pairs.h"
 #include "apps/tutti/loops/mat_file.h"
 #include "core/median.h"
+#include "core/number_lines.h"
+#include "core/pose_columns.h"
 #include "core/text_reader.h"
 #include "frontend/dataset/image_file.h"
+#include "frontend/dataset/layout.h"
 #include "tutti/backend/evaluation.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
@@ -23,26 +26,26 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A trajectory has lines of 8 numbers (TUM) or 12 (KITTI), or commas and a header (EuRoC). A text matrix that
+// A trajectory has lines of so many numbers as one has, or a line that names its columns. A text matrix that
 // has just as many columns has as many rows, too. Throws InputError if it is no text.
 bool LinesOfPoses(const fs::path& file) {
   internal::TextReader in(file);
   std::string line;
-  std::size_t columns = 0;
-  std::size_t rows = 0;
-  bool euroc = false;
+  std::size_t columns = 0, rows = 0;
+  bool named = false;
   while (rows < 20 && in.Next(line)) {
-    if (line.rfind("#timestamp", 0) == 0 || line.rfind("#time", 0) == 0)
-      euroc = line.find(',') != std::string::npos;
-    if (line.empty() || line[0] == '#') continue;
-    const std::vector<std::string> words = SplitText(line);
-    if (words.empty() || !ParseDouble(words.front())) return false;
-    if (rows > 0 && words.size() != columns) return false;
+    const std::vector<std::string> words = internal::PoseWords(line);
+    if (words.empty()) continue;
+    const bool is_number = ParseDouble(words.front()).has_value();
+    if (rows == 0 && !is_number && internal::ColumnsOfNames(line)) named = true;
+    if (internal::IsComment(line) || (rows == 0 && named && !is_number)) continue;
+    if (!is_number || (rows > 0 && words.size() != columns)) return false;
     columns = words.size();
     ++rows;
   }
-  if (euroc) return rows > 0;
-  return (columns == 8 || columns == 12) && rows != columns;
+  if (named) return rows > 0;
+  const bool as_poses = columns == 4 || columns == 8 || columns == 12 || columns == 13 || columns >= 16;
+  return as_poses && columns <= 17 && rows != columns;
 }
 
 bool LooksLikeTrajectory(const fs::path& file) {
@@ -54,10 +57,10 @@ bool LooksLikeTrajectory(const fs::path& file) {
 }
 
 Trajectory ReadPoses(const fs::path& file) {
-  const TrajectoryFormat format = GuessTrajectoryFormat(file);
-  Trajectory trajectory = ReadTrajectory(file, format);
+  TrajectoryDetails details;
+  Trajectory trajectory = ReadTrajectory(file, GuessTrajectoryFormat(file), nullptr, &details);
   const fs::path times_file = file.parent_path() / "times.txt";
-  if (format != TrajectoryFormat::kKitti || !fs::exists(times_file)) return trajectory;
+  if (details.has_stamps || details.has_numbers || !fs::exists(times_file)) return trajectory;
   const std::vector<double> times = ReadTimes(times_file);
   if (times.size() != trajectory.size()) {
     throw InputError(times_file.string() + ": has " + std::to_string(times.size()) + " times, but " +
@@ -69,13 +72,18 @@ Trajectory ReadPoses(const fs::path& file) {
 
 using PosesOfImages = std::vector<std::optional<StampedPose>>;
 
-// The time stamps that images are named by; empty if their names are none.
-std::vector<double> StampsInNames(const std::vector<fs::path>& images) {
+// The time stamps that images are named by, in their order; numbers of frames for a file of poses that has
+// such; empty if their names are none.
+std::vector<double> StampsOfImages(const std::vector<fs::path>& images) {
   std::vector<double> stamps;
+  const internal::StampsOfNames named = StampsInNames(images);
+  for (const auto& stamp : named.stamps) stamps.push_back(stamp.first);
+  if (stamps.size() == images.size()) return stamps;
+  stamps.clear();
   for (const fs::path& image : images) {
-    const auto stamp = ParseDouble(image.stem().string());
-    if (!stamp) return {};
-    stamps.push_back(*stamp);
+    const auto number = ParseDouble(image.stem().string());
+    if (!number) return {};
+    stamps.push_back(*number);
   }
   return stamps;
 }
@@ -130,7 +138,7 @@ LoopGroundTruth FromPoses(const GroundTruthArguments& arguments, const std::vect
   }
   PosesOfImages poses(trajectory.begin(), trajectory.end());
   if (trajectory.size() != images.size())
-    poses = PosesAt(stamps.empty() ? StampsInNames(images) : stamps, trajectory);
+    poses = PosesAt(stamps.empty() ? StampsOfImages(images) : stamps, trajectory);
   if (poses.empty()) {
     throw InputError(arguments.file + ": has " + std::to_string(trajectory.size()) +
                      " poses, but there are " + std::to_string(images.size()) + " images, and their " +
@@ -141,7 +149,8 @@ LoopGroundTruth FromPoses(const GroundTruthArguments& arguments, const std::vect
   for (std::size_t i = 0; i < poses.size(); i += static_cast<std::size_t>(arguments.stride))
     strided.push_back(poses[i]);
   LoopGroundTruth truth = TruthOf(strided, arguments.rule);
-  truth.description = arguments.file + " (" + RuleText(arguments.rule) + ")";
+  truth.description = arguments.file + " (" + RuleText(arguments.rule) +
+                      (HasRotations(trajectory) ? ")" : "; positions alone: whatever the angle)");
   const auto unknown = std::count(strided.begin(), strided.end(), std::nullopt);
   if (unknown > 0) truth.description += "; of " + std::to_string(unknown) + " images it says nothing";
   return truth;
@@ -164,14 +173,13 @@ fs::path ImageFolder(const fs::path& folder) {
   return images && ImagesIn(*images).size() > ImagesIn(folder).size() ? *images : folder;
 }
 
-std::vector<fs::path> ListImages(const fs::path& folder) {
+std::vector<fs::path> ListImages(const fs::path& folder, bool pairs, std::vector<std::string>* notes) {
   std::error_code error;
   if (!fs::is_directory(folder, error)) {
     throw InputError(folder.string() + ": no such folder; give the folder that holds the images");
   }
-  std::vector<fs::path> images = ImagesIn(folder);
-  if (images.empty()) throw InputError(folder.string() + ": holds no image files");
-  return images;
+  if (ImagesIn(folder).empty()) throw InputError(folder.string() + ": holds no image files");
+  return FramesIn(folder, pairs, notes);
 }
 
 std::vector<fs::path> ImagesIn(const fs::path& folder) {
@@ -223,12 +231,15 @@ bool IsBagFolder(const fs::path& path) {
 }
 
 // A video or a bag; null: a folder of images.
-std::shared_ptr<const Dataset> OpenRecording(const fs::path& path, const std::string& topic, bool is_bag) {
+std::shared_ptr<const Dataset> OpenRecording(const fs::path& path, const std::string& topic,
+                                             const std::optional<PinholeCamera>& camera, bool is_bag) {
   std::error_code error;
   if (!topic.empty() && !is_bag) throw InputError(path.string() + ": is no bag of ROS; leave --topic out");
+  if (IsCamera(path.string())) DetectDatasetType(path);  // says that it comes once
   if (!is_bag && !fs::is_regular_file(path, error)) return nullptr;
   DatasetOptions options;
   options.topic = topic;
+  options.camera = camera;
   try {
     return OpenDataset(path, options);
   } catch (const InputError& e) {
@@ -241,22 +252,22 @@ std::shared_ptr<const Dataset> OpenRecording(const fs::path& path, const std::st
 }  // namespace
 
 ImageSet LoadImageSet(const std::string& path, const GroundTruthArguments& arguments,
-                      const std::string& topic) {
+                      const std::string& topic, const std::optional<PinholeCamera>& camera) {
   ImageSet set;
   set.stride = arguments.stride;
   std::error_code error;
   const bool is_bag =
       fs::is_regular_file(path, error) ? DetectDatasetType(path) == DatasetType::kBag : IsBagFolder(path);
-  set.recording = OpenRecording(path, topic, is_bag);
+  set.recording = OpenRecording(path, topic, camera, is_bag);
   std::vector<fs::path> images;
-  std::vector<double> stamps;  // a video has none of its own
+  std::vector<double> stamps;
   if (set.recording) {
     for (std::size_t i = 0; i < set.recording->Size(); ++i) {
       images.push_back(fs::path(path) / ("frame " + std::to_string(i)));
-      if (is_bag) stamps.push_back(set.recording->Stamp(i));
+      stamps.push_back(set.recording->Stamp(i));
     }
   } else {
-    images = ListImages(path);
+    images = ListImages(path, arguments.join_pairs, &set.notes);
     images.erase(std::remove_if(images.begin(), images.end(),
                                 [&](const auto& p) { return fs::equivalent(p, arguments.file, error); }),
                  images.end());

@@ -5,9 +5,11 @@
 #include <filesystem>
 #include <memory>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "tutti/core/camera.h"
 #include "tutti/loopclosure/ground_truth.h"
 
 namespace tutti {
@@ -16,9 +18,10 @@ class Dataset;
 
 namespace tutti::cli {
 
-/// Image files of a folder in natural order; files of other types are ignored. Throws InputError if there are
-/// none.
-std::vector<std::filesystem::path> ListImages(const std::filesystem::path& folder);
+/// The images of a folder that are frames, as `tutti run` takes them (FramesIn: no pictures of another type,
+/// no depth, right ones only if `pairs` are wanted). Throws InputError if there are none.
+std::vector<std::filesystem::path> ListImages(const std::filesystem::path& folder, bool pairs,
+                                              std::vector<std::string>* notes);
 
 /// The same of a folder that may hold none.
 std::vector<std::filesystem::path> ImagesIn(const std::filesystem::path& folder);
@@ -45,6 +48,7 @@ struct ImageSet {
   std::vector<std::filesystem::path> rights;  ///< beside each of them; empty without join_pairs
   LoopGroundTruth truth;                      ///< of a set without one: every pair is ignored
   std::shared_ptr<const Dataset> recording;   ///< a video or a bag; null: the images are files
+  std::vector<std::string> notes;             ///< what was left out of a folder
   int stride = 1;                             ///< of the images among the recording's frames
 
   /// The (left) image in colour or grey, as it is stored; empty where it can't be read.
@@ -56,8 +60,10 @@ struct ImageSet {
 std::filesystem::path ImageFolder(const std::filesystem::path& folder);
 
 /// Of a folder of images, a video, or a bag. A loop matrix that lies among the images is none of them.
-/// `topic`: of a bag's images; empty: its only one. Throws InputError.
+/// `topic`: of a bag's images; empty: its only one. `camera`: of a recording, whose images are rectified with
+/// it. Throws InputError.
 ImageSet LoadImageSet(const std::string& path, const GroundTruthArguments& arguments,
-                      const std::string& topic = "");
+                      const std::string& topic = "",
+                      const std::optional<PinholeCamera>& camera = std::nullopt);
 
 }  // namespace tutti::cli

@@ -11,6 +11,8 @@
 #include "apps/tutti/loops/earlier_images.h"
 #include "apps/tutti/loops/loops_pictures.h"
 #include "apps/tutti/posteriors_csv.h"
+#include "core/replaced_file.h"
+#include "core/terminal.h"
 #include "tutti/core/error.h"
 
 namespace tutti::cli {
@@ -227,7 +229,7 @@ nlohmann::ordered_json ProtocolJson(const LoopRun& run) {
        "posterior: of H"}};
 }
 
-OutputFolder OpenLoopsFolder(const std::filesystem::path& folder, bool table) {
+OutputLayout LoopsLayout(bool table) {
   const auto is_result = [](const std::filesystem::path& entry) {
     static const std::set<std::string> kFiles = {"results.json",
                                                  "hypotheses.csv",
@@ -249,8 +251,7 @@ OutputFolder OpenLoopsFolder(const std::filesystem::path& folder, bool table) {
   const auto is_part = [](const std::filesystem::path& entry) {
     return std::filesystem::exists(entry / "results.json") || std::filesystem::exists(entry / "table.json");
   };
-  const OutputLayout layout = {is_result, table ? "table.json" : "results.json", "protocol", {}, is_part};
-  return OutputFolder(folder, layout);
+  return {is_result, table ? "table.json" : "results.json", "protocol", {}, is_part};
 }
 
 std::filesystem::path WriteLoopRun(const LoopRun& run, const LoopReport& report, bool finished,
@@ -263,9 +264,9 @@ std::filesystem::path WriteLoopRun(const LoopRun& run, const LoopReport& report,
   json["protocol"]["seed"] = run.options.seed;
   json["protocol"]["threads"] = run.options.threads;
   if (run.earlier > 0) json["earlier"] = {{"images", run.earlier}, {"loops", EarlierLoops(run)}};
-  folder.Write({"results.json", [&](File file) { WriteText(file, JsonText(json)); }});
-  folder.Write({"hypotheses.csv", [&](File file) { WriteText(file, Csv(run)); }});
-  folder.Write({"loops.csv", [&](File file) { WriteText(file, FoundLoopsCsv(run)); }});
+  folder.Write({"results.json", [&](File file) { internal::WriteFile(file, JsonText(json)); }});
+  folder.Write({"hypotheses.csv", [&](File file) { internal::WriteFile(file, Csv(run)); }});
+  folder.Write({"loops.csv", [&](File file) { internal::WriteFile(file, FoundLoopsCsv(run)); }});
   if (run.judged) {
     const CurvePlot curves = PlotCurves(run, report);
     folder.Write({"precision_recall.csv", [&](File file) { WriteCurvesCsv(report, file); }});
@@ -275,7 +276,7 @@ std::filesystem::path WriteLoopRun(const LoopRun& run, const LoopReport& report,
   folder.Write({"confusion.png", [&](File file) { WriteConfusion(run, report, file); }});
   folder.Write({"contact_sheet.png", [&](File file) { WriteContactSheet(run, report, file); }});
   if (run.earlier > 0)
-    folder.Write({"earlier_loops.csv", [&](File file) { WriteText(file, EarlierLoopsCsv(run)); }});
+    folder.Write({"earlier_loops.csv", [&](File file) { internal::WriteFile(file, EarlierLoopsCsv(run)); }});
   if (run.options.keep_posterior)
     folder.Write({"posteriors.csv", [&](File file) { WritePosteriors(run, file); }});
   std::filesystem::path where = folder.Finish(finished);
@@ -288,7 +289,7 @@ void PrintLoopRun(const LoopRun& run, const LoopReport& report, const std::files
   const LoopEvaluation &verified = report.verified, &ranked = report.ranked, &posterior = report.posterior;
   std::printf("%-34s %s\n", "rule", RuleName(run.options).c_str());
   std::printf("%-34s %d (%d with a loop)\n", "images", verified.images, verified.rows_with_loop);
-  std::printf("%-34s %s\n", "ground truth", run.truth.description.c_str());
+  std::printf("%-34s %s\n", "ground truth", internal::Printable(run.truth.description).c_str());
   std::printf("%-34s %12s %12s %12s\n", "", "verified", "posterior", "ranked");
   const auto line = [](const char* name, double a, double b, double c) {
     std::printf("%-34s %11.1f%% %11.1f%% %11.1f%%\n", name, 100 * a, 100 * b, 100 * c);

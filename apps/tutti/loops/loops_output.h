@@ -75,9 +75,8 @@ nlohmann::ordered_json FiguresJson(const LoopRun& run, const LoopReport& report)
 /// How they were measured, but for rule and members.
 nlohmann::ordered_json ProtocolJson(const LoopRun& run);
 
-/// The folder of one run, or of a table of runs, each of which has a folder of its own in it. Throws
-/// InputError as OutputFolder does.
-OutputFolder OpenLoopsFolder(const std::filesystem::path& folder, bool table = false);
+/// What one run leaves in its folder, or a table of runs, each of which has a folder of its own in it.
+OutputLayout LoopsLayout(bool table = false);
 
 /// The loops that were accepted, one a line: both images with their files, probability, inliers.
 std::string FoundLoopsCsv(const LoopRun& run);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "core/replaced_file.h"
 #include "tutti/core/significance.h"
 
 namespace tutti::cli {
@@ -256,9 +257,9 @@ void WriteLoopTable(const LoopTable& table, OutputFolder& folder) {
   const std::string markdown = Markdown(table, json);
   std::printf("%s\n", markdown.c_str());
   using File = const std::filesystem::path&;
-  folder.Write({"table.json", [&](File file) { WriteText(file, JsonText(json)); }});
-  folder.Write({"table.md", [&](File file) { WriteText(file, markdown); }});
-  folder.Write({"table.csv", [&](File file) { WriteText(file, TableCsv(table)); }});
+  folder.Write({"table.json", [&](File file) { internal::WriteFile(file, JsonText(json)); }});
+  folder.Write({"table.md", [&](File file) { internal::WriteFile(file, markdown); }});
+  folder.Write({"table.csv", [&](File file) { internal::WriteFile(file, TableCsv(table)); }});
   ThrowFailures(folder.failures(), folder.Finish(true));
   std::printf("written: %s, table.md, table.csv, and a folder for each rule\n",
               (folder.path() / "table.json").string().c_str());

@@ -4,7 +4,7 @@
 const COLORS = { surf: '#e69f00', sift: '#56b4e9', orb: '#cc79a7', ensemble: '#0072b2', accepted: '#009e73', waiting: '#e69f00', path: '#0072b2', beyond: '#e69f00', here: '#d55e00', old: '#56b4e9', young: '#f0e442' };
 const SESSIONS = ['#cc79a7', '#56b4e9', '#8f7d2f', '#999999', '#7a5195', '#5a9a8f'];  // recordings that the map held before; then again
 const DASHES = { surf: [8, 3, 2, 3], sift: [10, 5], orb: [2, 3], ensemble: [] };
-const MOST_ANSWERS = 1500, MOST_LINES = 300, MOST_SPOTS = 5000;
+const MOST_ANSWERS = 1500, MOST_LINES = 300, MOST_SPOTS = 5000, MOST_FITTED = 2000;
 const TRACK_OLD = 5;  // frames before this one that show it (of the last 10)
 const WIDE = 2;  // times as wide as high: an image gets a row of its own
 const TURN = 0.008;  // of the map in 3D [rad per pixel]
@@ -71,15 +71,30 @@ function onScreen([x, y, z], turn) {
   return [Math.cos(turn.yaw) * x + Math.sin(turn.yaw) * z, Math.sin(turn.pitch) * ahead - Math.cos(turn.pitch) * y];
 }
 
-function fit(canvas, places) {
-  let [left, right, low, high] = [Infinity, -Infinity, Infinity, -Infinity];
-  for (const [, , , p] of places) {
-    const [x, y] = onScreen(p, state.turn);
-    left = Math.min(left, x); right = Math.max(right, x);
-    low = Math.min(low, y); high = Math.max(high, y);
+// Where most landmarks are seen: the middle 90 % of them along either axis, of a sample.
+function landmarkBox(places) {
+  const poses = places.filter(([id]) => state.points.has(id)), xs = [], ys = [];
+  const all = poses.reduce((sum, [id]) => sum + state.points.get(id).length, 0), step = Math.max(1, Math.ceil(all / MOST_FITTED));
+  let k = 0;
+  for (const [id, , , pose] of poses) {
+    for (const point of state.points.get(id)) {
+      if (k++ % step) continue;
+      const [x, y] = onScreen(transform(pose, point), state.turn);
+      xs.push(x); ys.push(y);
+    }
   }
-  if (!(right >= left)) return { x: 0, y: 0, scale: 50 };
-  const scale = 0.65 * Math.min(canvas.width / Math.max(right - left, 1e-3), canvas.height / Math.max(high - low, 1e-3), canvas.width / 0.5);
+  const ends = (values) => { values.sort((a, b) => a - b); return [values[Math.floor(0.05 * values.length)], values[Math.ceil(0.95 * values.length) - 1]]; };
+  return xs.length ? [ends(xs), ends(ys)] : null;
+}
+
+function fit(canvas, places) {
+  const seen = places.map(([, , , p]) => onScreen(p, state.turn)), box = landmarkBox(places);
+  if (!seen.length) return { x: 0, y: 0, scale: 50 };
+  const [[left, right], [low, high]] = [0, 1].map((k) => {
+    const values = [...seen.map((p) => p[k]), ...(box ? box[k] : [])];
+    return [values.reduce((a, b) => Math.min(a, b)), values.reduce((a, b) => Math.max(a, b))];
+  });
+  const scale = 0.85 * Math.min(canvas.width / Math.max(right - left, 1e-3), canvas.height / Math.max(high - low, 1e-3), canvas.width / 0.5);
   return { x: (left + right) / 2, y: (low + high) / 2, scale };
 }
 
@@ -249,13 +264,13 @@ const clock = (seconds) => `${Math.floor(seconds / 60)}:${String(Math.round(seco
 function showStatus() {
   const { frame, total, paused, standing, finished } = state.news, { rate, left } = speed();
   by('state').dataset.state = paused ? 'paused' : frame.state;
-  by('state').textContent = finished ? `done, ${frame.state}` : paused ? `${standing ? 'paused' : 'pausing'}, ${frame.state}` : frame.state;
+  by('state').textContent = finished ? `done, ${total ? `${frame.number} of ${total}` : `${frame.number} frames`}` : paused ? `${standing ? 'paused' : 'pausing'}, ${frame.state}` : frame.state;
   by('pause').textContent = paused ? 'Resume' : 'Pause';
   by('pause').disabled = finished;
   by('step').disabled = !paused || finished;
   const accepted = state.news.loops.filter((loop) => loop[2]).length;
   // Numbers of frames start at --start, in a map of several recordings far above.
-  const count = total && frame.index + 1 !== frame.number ? `, ${frame.number} of ${total}` : total ? ` of ${total}` : '';
+  const count = finished ? `, ${frame.state}` : total ? `, ${frame.number} of ${total}` : '';
   by('status').textContent = `frame ${frame.index}${count}${frame.reason ? ` (${frame.reason})` : ''}, ` +
     `${rate ? `${rate.toFixed(1)} frames/s, ` : ''}${left !== null && !paused ? `${clock(left)} left, ` : ''}${frame.features} features, ${frame.inliers} inliers, ` +
     `${state.news.places.length} keyframes${state.news.only_located ? ' in the map' : `, ${accepted} loops`}`;

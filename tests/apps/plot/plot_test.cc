@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
+
 #include <cmath>
 #include <fstream>
 #include <limits>
@@ -58,6 +60,71 @@ TEST(Plot, PlacesHaveARingAndALegend) {
   plot.marks.emplace_back(1, 0, 2);
   EXPECT_EQ(rings(), 2u);  // the place, and the legend
   EXPECT_NE(ReadAll(file).find("\nfound (1)\n"), std::string::npos);
+}
+
+// The box of the axes: the longest lines are its grid and frame.
+Eigen::AlignedBox2d FrameOf(const std::vector<PlotShape>& shapes) {
+  Eigen::AlignedBox2d frame;
+  for (const PlotShape& shape : shapes) {
+    if (shape.kind != PlotShape::Kind::kLine || shape.color != kPlotInk || shape.size != 1) continue;
+    for (const Eigen::Vector2d& p : shape.points) frame.extend(p);
+  }
+  return frame;
+}
+
+TEST(Plot, ColourBarAndLegendLieOutsideOfTheAxes) {
+  TrajectoryPlot plot = Circle();
+  plot.series.push_back(plot.series[0]);
+  plot.series.back().values.assign(plot.series[0].points.size(), 1.0);
+  plot.series.back().values[3] = 2.0;
+  plot.values_name = "error [m]";
+  plot.marks_name = "found (1)";
+  plot.marks.emplace_back(1, 0, 2);
+  for (int k = 0; k < 12; ++k) plot.series.push_back({"a series with a long name", {}, "#d55e00"});
+  const std::vector<PlotShape> shapes = LayOut(plot);
+  const Eigen::AlignedBox2d frame = FrameOf(shapes);
+  EXPECT_GT(frame.sizes().minCoeff(), 300);
+  int boxes = 0, names = 0;
+  for (const PlotShape& shape : shapes) {
+    if (shape.kind == PlotShape::Kind::kBox) {
+      ++boxes;
+      for (const Eigen::Vector2d& p : shape.points) EXPECT_GT(p.x(), frame.max().x());
+    }
+    if (shape.text == "reference" || shape.text == "loops" || shape.text == "found (1)" ||
+        shape.text == "a series with a long name") {
+      ++names;
+      EXPECT_LT(shape.points[0].y(), frame.min().y()) << shape.text;
+      EXPECT_GT(shape.points[0].y(), 30) << shape.text;
+    }
+  }
+  EXPECT_GT(boxes, 10);
+  EXPECT_EQ(names, 1 + 1 + 1 + 12);
+}
+
+TEST(Plot, LinesThatCoverOneAnotherAreToldApart) {
+  const auto widths = [](const TrajectoryPlot& plot) {
+    std::vector<double> all;
+    for (const PlotSeries& series : plot.series) {
+      for (const PlotShape& shape : LayOut(plot)) {
+        if (shape.kind == PlotShape::Kind::kLine && shape.color == series.color && shape.points.size() > 2)
+          all.push_back(shape.size);
+      }
+    }
+    return all;
+  };
+  TrajectoryPlot plot = Circle();
+  for (const char* color : {"#d55e00", "#009e73"}) {
+    plot.series.push_back(plot.series[0]);
+    plot.series.back().color = color;
+  }
+  const std::vector<double> covered = widths(plot);
+  ASSERT_EQ(covered.size(), 3u);
+  EXPECT_GE(covered[0], covered[1] + 2) << "below, and seen on both sides";
+  EXPECT_GE(covered[1], covered[2] + 2);
+  for (std::size_t k = 1; k < 3; ++k) {
+    for (Eigen::Vector3d& p : plot.series[k].points) p.x() += static_cast<double>(k);
+  }
+  for (const double width : widths(plot)) EXPECT_EQ(width, plot.series[0].width);
 }
 
 TEST(Plot, PngIsNotBlank) {

@@ -117,3 +117,21 @@ def test_what_is_no_trajectory_is_refused(tmp_path):
     ]:
         with pytest.raises(error, match=words):
             call()
+
+
+def test_files_may_have_nanoseconds_named_columns_and_positions_alone(tmp_path):
+    truth, estimate = circle(), noisy(circle())
+    ate = tutti.evaluate(truth, estimate)["ate"]["rmse"]
+    rows = [",".join(f"{v:.9f}" for v in row[1:4]) for row in estimate]
+    file = tmp_path / "leica.csv"
+    file.write_text("time,x,y,z\n" + "".join(f"{round(1e9 * s)},{row}\n" for s, row in zip(estimate[:, 0], rows)))
+    with pytest.warns(RuntimeWarning, match="nanoseconds"):
+        alone = tutti.read_trajectory(file, format="tum")
+    np.testing.assert_allclose(alone[:, :4], estimate[:, :4], atol=1e-8)
+    assert not alone[:, 4:].any()
+    for one in (file, alone):
+        result = tutti.evaluate(truth, one)
+        assert result["ate"]["rmse"] == pytest.approx(ate, abs=1e-7)
+        assert result["rotations"] is False and result["ate_rotation_deg"] is None
+    tutti.write_trajectory(tmp_path / "again.txt", alone)
+    assert not tutti.read_trajectory(tmp_path / "again.txt")[:, 4:].any()

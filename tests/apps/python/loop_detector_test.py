@@ -1,5 +1,7 @@
 """LoopDetector: detection, options, saving."""
+import copy
 import gc
+import pickle
 import re
 import threading
 
@@ -110,7 +112,9 @@ def test_nothing_of_an_image_is_kept(images):
     (np.zeros((10, 10, 3), np.uint16), ValueError, "uint16"),
     (np.zeros(10, np.uint8), ValueError, "shape"),
     (np.zeros((0, 10), np.uint8), ValueError, "shape"),
+    (np.zeros((10, 10, 128), np.uint8), ValueError, r"not uint8 of shape \(10, 10, 128\)"),
     ("image.png", TypeError, "image must be a numpy array.*not str"),
+    (None, TypeError, "image is None, which cv2.imread returns for a file that it can't read"),
 ])
 def test_a_wrong_image_is_refused_in_words(image, error, words):
     detector = tutti.LoopDetector()
@@ -122,8 +126,38 @@ def test_a_wrong_image_is_refused_in_words(image, error, words):
 def test_hard_images_are_no_error():
     detector = tutti.LoopDetector()
     for image in [np.zeros((40, 40), np.uint8), np.full((1, 1), 9, np.uint8), np.zeros((5, 300, 3), np.uint8),
-                  np.full((64, 64), 60000, np.uint16), None]:
+                  np.full((64, 64), 60000, np.uint16)]:
         assert not detector.detect(image).accepted
+
+
+def test_nothing_to_look_at_is_no_image():
+    detector = tutti.LoopDetector()
+    for look in (detector.detect, detector.locate):
+        with pytest.raises(TypeError, match="image is None"):
+            look()
+
+
+@pytest.mark.parametrize("copy_of", [copy.deepcopy, lambda value: pickle.loads(pickle.dumps(value))])
+def test_results_and_cameras_are_pickled(results, copy_of):
+    before = next(result for result in results if result.accepted)
+    after = copy_of(before)
+    assert summary(after) == summary(before) and repr(after) == repr(before)
+    assert (after.posteriors == before.posteriors).all() and (after.evidence == before.evidence).all()
+    assert (after.verification.query_pixels == before.verification.query_pixels).all()
+    assert repr(copy_of(before.members[0])) == repr(before.members[0])
+    camera = tutti.Camera(width=320, height=240, fx=200, fy=201, cx=160, cy=120, distortion="radtan",
+                          coefficients=[-0.2, 0.1, 0, 0, 0])
+    assert repr(copy_of(camera)) == repr(camera) and copy_of(camera).coefficients == camera.coefficients
+    prior = copy_of(tutti.PosePrior((1, 2, 3), frame=4))
+    assert list(prior.position_m) == [1, 2, 3] and prior.frame == 4
+    assert copy_of(tutti.Config(run={"threads": 1})).options("run")["threads"] == 1
+
+
+def test_a_damaged_pickle_is_refused(results):
+    made = results[0].__reduce_ex__(2)
+    for state in ((made[2][0], made[2][1][:-3]), (made[2][0], made[2][1] + b"x"), ("0.0", made[2][1]), (), (1, 2)):
+        with pytest.raises(ValueError, match="pickle|damaged|tutti"):
+            tutti.LoopResult.__new__(tutti.LoopResult).__setstate__(state)
 
 
 def test_ids_must_grow(images):

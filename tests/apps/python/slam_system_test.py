@@ -1,5 +1,6 @@
 """Dataset and SlamSystem."""
 import gc
+import pickle
 import shutil
 
 import numpy as np
@@ -154,3 +155,24 @@ def test_a_configuration_is_a_file_and_keywords(town, tmp_path):
     with pytest.raises(OSError, match="none.yaml"):
         tutti.Config(tmp_path / "none.yaml")
     assert "threads = 2: most threads" in tutti.describe("run")
+
+
+def test_what_a_run_gives_is_pickled(run, stereo):
+    slam, results = run
+    after = pickle.loads(pickle.dumps((slam.trajectory(), results, slam.loops, stereo.rig, stereo[3])))
+    assert (after[0] == slam.trajectory()).all()
+    assert [repr(result) for result in after[1]] == [repr(result) for result in results]
+    assert [repr(loop) for loop in after[2]] == [repr(loop) for loop in slam.loops] and after[2]
+    assert after[3].baseline_m == stereo.rig.baseline_m and repr(after[3].camera) == repr(stereo.rig.camera)
+    assert (after[4].image == stereo[3].image).all() and (after[4].right == stereo[3].right).all()
+
+
+def test_a_frame_of_a_missing_image_is_refused():
+    with pytest.raises(TypeError, match="image is None, which cv2.imread returns"):
+        tutti.Frame(None, 0.0)
+
+
+def test_a_frame_of_another_size_is_refused(stereo):
+    slam = tutti.SlamSystem(stereo.rig)
+    with pytest.raises(tutti.InputError, match="frame 0: image must have 320x160 pixels, and has 100x100"):
+        slam.track(tutti.Frame(np.zeros((100, 100), np.uint8), 0.0))

@@ -11,7 +11,7 @@ OPERATORS = ("__init__", "__len__", "__getitem__", "__iter__", "__next__")
 # Whose keywords are a section of the configuration: (class, method): section, and keywords beside it, left out.
 OPTIONS = {
     ("LoopDetector", "__init__"): ("loops", {"preset"}, set()),
-    ("Camera", "__init__"): ("camera", set(), {"baseline_m", "readout_s", "right"}),
+    ("Camera", "__init__"): ("camera", set(), {"baseline_m", "fov_deg", "readout_s", "right"}),
     ("Dataset", "__init__"): ("dataset", set(), set()),
     ("PoseGraph", "optimize"): ("graph", set(), {"certify"}),
     ("Config", "__init__"): (None, set(), set()),
@@ -130,3 +130,22 @@ def test_every_option_is_described():
         text = tutti.describe(section)
         for name in tutti.default_options(section):
             assert f"{name} = " in text or f"{name}: a dict of" in text
+
+
+def test_python_knows_the_signatures(stub):
+    """inspect.signature says what the first line of the description does."""
+    pairs = [(function, name) for name, function in functions().items()]
+    for cls in classes().values():
+        if not issubclass(cls, Exception):
+            pairs += [(getattr(cls, member), f"{cls.__name__}.{member}") for member in members(cls)
+                      if not isinstance(vars(cls)[member], property)]
+    assert len(pairs) > 60
+    for function, name in pairs:
+        names, only, defaults, more = parameters(signature(function))
+        read = inspect.signature(function).parameters.values()
+        assert [p.name for p in read if p.kind == p.POSITIONAL_OR_KEYWORD or p.kind == p.POSITIONAL_ONLY] == names, name
+        assert [p.name for p in read if p.kind == p.KEYWORD_ONLY] == only, name
+        assert {p.name: p.default for p in read if p.default is not p.empty} == defaults, name
+        assert any(p.kind == p.VAR_KEYWORD for p in read) == more, name
+    assert list(inspect.signature(tutti.LoopDetector.detect).parameters)[:3] == ["self", "image", "id"]
+    assert "external_members" in inspect.signature(tutti.LoopDetector).parameters

@@ -12,6 +12,7 @@
 #include "apps/report/run_report.h"
 #include "tests/apps/tiny_town.h"
 #include "tests/apps/tutti/executable.h"
+#include "tests/support/error_of.h"
 #include "tests/support/test_data.h"
 
 namespace tutti {
@@ -254,12 +255,35 @@ TEST(ReportOfARun, HoldsWhatTheRunFound) {
   EXPECT_TRUE((*ReadRunReport(folder / "b"))["posterior"].is_null());
 }
 
+TEST(ReportOfARun, ADamagedOneIsNamedWhateverIsWrong) {
+  const fs::path folder = testing::FreshFolder(), file = folder / "report.json";
+  const std::string format = "{\"format\": " + std::to_string(kReportFormat);
+  const std::string deep = std::string(100000, '[') + std::string(100000, ']');
+  const std::vector<std::string> texts = {
+      "",
+      "{",
+      "[]",
+      "7",
+      "{\"format\": \"1\"}",
+      format + "}",
+      format + R"(, "dataset": 1, "variant": "orb"})",
+      format + R"(, "dataset": "a", "variant": "orb", "gallery": []})",
+      format + R"(, "dataset": "a", "variant": "orb", "gallery": {"entries": 1}})",
+      format + R"(, "dataset": "a", "variant": "orb", "gallery": {"entries": [{"outcome": null}]}})",
+      format + R"(, "dataset": "a", "variant": "orb", "more": )" + deep + "}"};
+  for (const std::string& text : texts) {
+    testing::WriteAll(file, text);
+    EXPECT_THAT(testing::ErrorOf([&] { ReadRunReport(folder); }), HasSubstr(file.string()))
+        << text.substr(0, 100);
+  }
+  testing::WriteAll(file, format + R"(, "dataset": "a", "variant": "orb"})");
+  EXPECT_TRUE(ReadRunReport(folder));
+}
+
 TEST(ReportOfARun, OtherFormatsAreNotRead) {
   const fs::path folder = testing::FreshFolder();
-  for (const char* text : {"", "{", "[]", "{\"format\": 99}"}) {
-    testing::WriteAll(folder / "report.json", text);
-    EXPECT_FALSE(ReadRunReport(folder)) << text;
-  }
+  testing::WriteAll(folder / "report.json", "{\"format\": 99}");
+  EXPECT_FALSE(ReadRunReport(folder));
   fs::remove(folder / "report.json");
   ASSERT_EQ(mkfifo((folder / "report.json").c_str(), 0600), 0);  // opened, it would wait for ever
   EXPECT_FALSE(ReadRunReport(folder));

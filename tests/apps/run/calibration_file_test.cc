@@ -43,7 +43,7 @@ cam1:
   camera_model: pinhole
   intrinsics: [1, 2, 3, 4]
 )");
-  EXPECT_EQ(c.format, "Kalibr");
+  EXPECT_EQ(c.format, "Kalibr, cam0 of 2");
   EXPECT_EQ(c.camera.fx, 458.654);
   EXPECT_EQ(c.camera.cy, 248.375);
   EXPECT_EQ(c.camera.width, 752);
@@ -203,7 +203,9 @@ TEST(CalibrationFile, OfPairsThatCantBeUsedIsRefused) {
               HasSubstr("'T_cn_cnm1' is not a rigid transform"));
   EXPECT_THAT(RefusalOfFile(Camchain("[0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]"), true),
               HasSubstr("'T_cn_cnm1' is zeros"));
-  EXPECT_THAT(RefusalOfFile(Camchain("5"), true), HasSubstr("'T_cn_cnm1' is no list of numbers"));
+  EXPECT_THAT(RefusalOfFile(Camchain("5"), true), HasSubstr("'T_cn_cnm1' has 1 values; 16 are needed"));
+  EXPECT_THAT(RefusalOfFile(Camchain("[[1, 0, 0, -110], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]"), true),
+              HasSubstr("are these millimetres?"));
 }
 
 TEST(CalibrationFile, ThatCantBeUsedIsRefusedWithLineAndReason) {
@@ -217,11 +219,11 @@ TEST(CalibrationFile, ThatCantBeUsedIsRefusedWithLineAndReason) {
   EXPECT_THAT(RefusalOfFile("Camera.fx: 500\nCamera.cx: 1\nCamera.cy: 1\n"),
               HasSubstr("has no key 'Camera.fy'"));
   EXPECT_THAT(RefusalOfFile("cam0:\n  camera_model: omni\n  intrinsics: [1, 2, 3, 4, 5]\n"),
-              HasSubstr("camera_model 'omni'"));
+              HasSubstr("camera.yaml:2: the lens model 'omni' is none that tutti has"));
   EXPECT_THAT(RefusalOfFile("cam0:\n  intrinsics: [1, 2, 3]\n"), HasSubstr("has 3 values"));
   EXPECT_THAT(RefusalOfFile("cam0:\n  intrinsics: [500, 500, 320, 240]\n  distortion_model: fov\n"
                             "  distortion_coeffs: [0.9, 0, 0, 0]\n"),
-              HasSubstr("camera.yaml:4: the lens model 'fov' is not known"));
+              HasSubstr("camera.yaml:4: the lens model 'fov' is none that tutti has"));
   EXPECT_THAT(RefusalOfFile("camera_matrix: {data: [1, 2]}\n"), HasSubstr("has 2 values; 9 are needed"));
   EXPECT_THAT(RefusalOfFile("camera_matrix: {data: [500, 0, 320, 0, 500, 240, 0, 0, 1]}\n"
                             "distortion_coefficients: {data: [0.1, 0, 0, 0, 0, 0.3, 0, 0]}\n"),
@@ -267,7 +269,7 @@ distortion_coefficients: [-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05]
   EXPECT_THAT(RefusalOfFile("intrinsics: [1, 2, 3]\nresolution: [64, 48]\n"),
               HasSubstr("camera.yaml:1: 'intrinsics' has 3 values; 4 are needed"));
   EXPECT_THAT(RefusalOfFile("camera_model: omni\nintrinsics: [1, 2, 3, 4]\n"),
-              HasSubstr("camera.yaml:1: camera_model 'omni': tutti has pinhole alone"));
+              HasSubstr("camera.yaml:1: the lens model 'omni' is none that tutti has"));
 }
 
 TEST(CalibrationFile, ThatIsNotThereIsNamed) {

@@ -6,6 +6,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 #include <vector>
 
 #include "apps/run/recording.h"
@@ -52,6 +54,29 @@ TEST(FocalLength, OfARoomIsFoundFromAWrongOne) {
     EXPECT_LT(std::abs(std::log(found.camera.fx / kRoomFocal)), 4 * found.sigma + 0.01);
     EXPECT_EQ(found.camera.fx, found.camera.fy);
   }
+}
+
+TEST(FocalLength, OfPixelsThatAreNotSquareKeepsTheirShape) {
+  const fs::path narrow = testing::FreshFolder() / "narrow";
+  fs::copy(RoomToMeasure(), narrow, fs::copy_options::recursive);
+  for (const char* folder : {"rgb", "depth"}) {
+    for (const auto& entry : fs::directory_iterator(narrow / folder)) {
+      cv::Mat image = cv::imread(entry.path().string(), cv::IMREAD_UNCHANGED);
+      cv::resize(image, image, {240, 240}, 0, 0,
+                 image.type() == CV_16UC1 ? cv::INTER_NEAREST : cv::INTER_AREA);
+      cv::imwrite(entry.path().string(), image);
+    }
+  }
+  RunConfig config = RoomConfig(kRoomFocal);
+  PinholeCamera& camera = *config.dataset.camera;
+  camera.width = 240;
+  camera.fx = 0.9 * 0.75 * kRoomFocal;
+  camera.fy = 0.9 * kRoomFocal;
+  camera.cx = 119.5;
+  const FocalLength found = MeasureFocalLength(narrow, config, kRoomFrames);
+  ASSERT_TRUE(found.measured) << found.reason;
+  EXPECT_NEAR(found.camera.fx / (0.75 * kRoomFocal), 1, 0.05);
+  EXPECT_NEAR(found.camera.fx / found.camera.fy, 0.75, 1e-9);
 }
 
 TEST(FocalLength, IsTheSameAgain) {

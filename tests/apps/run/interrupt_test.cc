@@ -17,7 +17,7 @@ class InterruptGuardTest : public ::testing::Test {
 };
 
 TEST_F(InterruptGuardTest, EachSignalThatEndsARunSetsTheFlag) {
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGXFSZ}) {
+  for (const int signal : {SIGINT, SIGTERM, SIGQUIT, SIGHUP, SIGXFSZ, SIGXCPU}) {
     const InterruptGuard guard;
     EXPECT_FALSE(InterruptGuard::Requested());
     std::raise(signal);
@@ -27,7 +27,7 @@ TEST_F(InterruptGuardTest, EachSignalThatEndsARunSetsTheFlag) {
 
 TEST_F(InterruptGuardTest, ATerminalThatIsGoneSaysSoMoreThanOnce) {
   const InterruptGuard guard;
-  for (const int signal : {SIGHUP, SIGHUP, SIGXFSZ, SIGXFSZ, SIGPIPE}) std::raise(signal);
+  for (const int signal : {SIGHUP, SIGHUP, SIGXFSZ, SIGXFSZ, SIGXCPU, SIGXCPU, SIGPIPE}) std::raise(signal);
   EXPECT_TRUE(InterruptGuard::Requested());
 }
 
@@ -39,12 +39,13 @@ TEST_F(InterruptGuardTest, NohupStays) {
 }
 
 TEST(InterruptGuardDeathTest, ASecondCtrlCEndsTheProcess) {
-  const auto twice = [] {
+  const auto twice = [](int signal) {
     const InterruptGuard guard;
-    std::raise(SIGINT);
-    std::raise(SIGINT);
+    std::raise(signal);
+    std::raise(signal);
   };
-  EXPECT_EXIT(twice(), ::testing::KilledBySignal(SIGINT), "");
+  EXPECT_EXIT(twice(SIGINT), ::testing::KilledBySignal(SIGINT), "");
+  EXPECT_EXIT(twice(SIGQUIT), ::testing::KilledBySignal(SIGQUIT), "");
 }
 
 }  // namespace

@@ -44,6 +44,19 @@ TEST(LiveFiles, EveryLineIsThereAtOnce) {
   EXPECT_TRUE(live.TakeProblems().empty());
 }
 
+// cp -l, and a folder of a stranger.
+TEST(GrowingFile, WhatAnotherFolderSharesStaysAsItIs) {
+  const auto folder = testing::FreshFolder();
+  testing::WriteAll(folder / "other", "of another run");
+  std::filesystem::create_hard_link(folder / "other", folder / "hard");
+  std::filesystem::create_symlink("other", folder / "link");
+  GrowingFile hard(folder / "hard", "header\n");
+  EXPECT_EQ(ReadAll(folder / "hard"), "header\n");
+  GrowingFile link(folder / "link", "header\n");
+  EXPECT_TRUE(link.TakeProblem());
+  EXPECT_EQ(ReadAll(folder / "other"), "of another run");
+}
+
 TEST(GrowingFile, AFullDiskIsSaidOnceAndEndsNoRun) {
   GrowingFile file("/dev/full", "header\n");
   const auto problem = file.TakeProblem();

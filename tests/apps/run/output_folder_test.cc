@@ -8,9 +8,11 @@
 
 #include <csignal>
 #include <new>
+#include <utility>
 
-#include "apps/run/text_file.h"
+#include "core/replaced_file.h"
 #include "tests/apps/tutti/executable.h"
+#include "tests/support/error_of.h"
 #include "tests/support/test_data.h"
 #include "tutti/core/error.h"
 
@@ -32,7 +34,7 @@ bool IsResult(const fs::path& entry) {
 const OutputLayout kLayout = {IsResult, "last", "version", {"live"}, nullptr};
 
 OutputFile File(const std::string& name, const std::string& text) {
-  return {name, [text](const fs::path& file) { WriteTextFile(file, text); }};
+  return {name, [text](const fs::path& file) { internal::WriteFile(file, text); }};
 }
 
 class OutputFolderTest : public ::testing::Test {
@@ -94,7 +96,7 @@ TEST_F(OutputFolderTest, AFileThatFailsIsNamedWithTheReasonAndStopsNoOther) {
   WriteAll(out_ / "live", "so far");
   folder.Write({"a", [](const fs::path& file) {
                   fs::create_symlink("/dev/full", file);
-                  WriteTextFile(file, "new");
+                  internal::WriteFile(file, "new");
                 }});
   folder.Write({"b", [](const fs::path&) { throw std::bad_alloc(); }});
   folder.Write(File("c", "new"));
@@ -106,6 +108,34 @@ TEST_F(OutputFolderTest, AFileThatFailsIsNamedWithTheReasonAndStopsNoOther) {
   EXPECT_EQ(Text("unfinished/c"), "new");
   EXPECT_FALSE(fs::exists(out_ / "unfinished" / "a"));
   EXPECT_EQ(Text("live"), "so far");  // there is nothing better
+}
+
+// A folder that came from elsewhere may hold anything.
+TEST_F(OutputFolderTest, NothingIsWrittenBehindALink) {
+  const fs::path other = out_.parent_path() / "other";
+  fs::create_directories(other);
+  WriteAll(other / "file", "of another one");
+  using Link = std::pair<const char*, fs::path>;
+  for (const auto& [name, target] :
+       {Link("live", other / "file"), Link(".tutti-lock", other / "file"), Link(".tutti-new", other),
+        Link(".tutti-enter", other), Link(".tutti-write-test", other / "file"), Link("1", other),
+        Link("unfinished", other)}) {
+    fs::remove_all(out_);
+    WriteResult({"a", "last"}, "old");
+    fs::remove(out_ / name);
+    fs::create_symlink(target, out_ / name);
+    EXPECT_THAT(testing::ErrorOf([&] { OutputFolder refused(out_, kLayout); }),
+                AllOf(HasSubstr((out_ / name).string()), HasSubstr("is a link")))
+        << name;
+    EXPECT_EQ(Text("a"), "old");
+  }
+  EXPECT_EQ(ReadAll(other / "file"), "of another one");
+  EXPECT_EQ(std::distance(fs::directory_iterator(other), fs::directory_iterator()), 1);
+  fs::remove_all(out_);
+  WriteResult({"a", "last"}, "old");
+  fs::create_directory(out_ / ".tutti-complete-..");  // would send the result into the folder above
+  { OutputFolder again(out_, kLayout); }
+  EXPECT_EQ(Text("a"), "old");
 }
 
 TEST_F(OutputFolderTest, KeepNumbersEarlierResults) {
@@ -134,7 +164,7 @@ TEST_F(OutputFolderTest, KilledWhileItWritesItLeavesTheEarlierResult) {
     OutputFolder folder(out_, kLayout);
     folder.Write(File("a", "new"));
     folder.Write({"b", [](const fs::path& file) {
-                    WriteTextFile(file, "half");
+                    internal::WriteFile(file, "half");
                     raise(SIGKILL);
                   }});
     _exit(0);

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <sstream>
@@ -44,6 +45,27 @@ TEST(Progress, NeverFillsTheLine) {
     ++seen;
   }
   EXPECT_GE(seen, 4);
+}
+
+TEST(Progress, SaysFiveTimesWhatHappensToManyFramesAndThenHowOften) {
+  const std::filesystem::path file = testing::FreshFolder() / "progress";
+  std::FILE* out = std::fopen(file.c_str(), "w");
+  {
+    Progress progress("slam", 100, out, 80);
+    for (int i = 0; i < 59; ++i) {
+      progress.Note("tutti: frame " + std::to_string(i) + " is skipped", "frames are skipped");
+      progress.Note("tutti: something else");
+    }
+    progress.Note("tutti: frame 60 came late", "frames came late");
+  }
+  std::fclose(out);
+  std::ifstream in(file);
+  const std::string text{std::istreambuf_iterator<char>(in), {}};
+  EXPECT_THAT(text, HasSubstr("frame 4 is skipped\n"));
+  EXPECT_THAT(text, ::testing::Not(HasSubstr("frame 5 is skipped")));
+  EXPECT_THAT(text, HasSubstr("tutti: 54 more frames are skipped\n"));
+  EXPECT_THAT(text, ::testing::Not(HasSubstr("more frames came late")));
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 5 + 59 + 1 + 1);
 }
 
 }  // namespace

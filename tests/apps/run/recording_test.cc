@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
@@ -16,6 +17,7 @@ namespace tutti {
 namespace {
 
 namespace fs = std::filesystem;
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -104,6 +106,57 @@ TEST(Recording, OfTumsFolderNamesHasThePublishedCamera) {
   EXPECT_EQ(other.config.dataset.camera->width, 64);
 }
 
+TEST(Recording, OfColourAndDepthInOneFolderIsRgbdInTheLayoutsUnit) {
+  const fs::path folder = testing::FreshFolder();
+  for (int i = 0; i < 3; ++i) {
+    const std::string name = (folder / ("frame-00000" + std::to_string(i))).string();
+    cv::imwrite(name + ".color.png", cv::Mat(48, 64, CV_8UC3, cv::Scalar(80, 90, 100)));
+    cv::imwrite(name + ".depth.png", cv::Mat(48, 64, CV_16UC1, cv::Scalar(1500)));
+  }
+  CameraRequest camera;
+  camera.camera = "60,60,32,24";
+  const Recording scene = Recognise(folder, camera);
+  EXPECT_EQ(scene.config.dataset.sensor, Sensor::kRgbd);
+  EXPECT_THAT(scene.findings[0], HasSubstr("7-Scenes (frame-*.color, frame-*.depth)"));
+  EXPECT_THAT(scene.findings[1], HasSubstr("RGB-D, 1000 units of depth a metre"));
+  const auto dataset = OpenDataset(folder, scene.config.dataset);
+  ASSERT_EQ(dataset->Size(), 3u);
+  EXPECT_FLOAT_EQ(dataset->Read(0).frame->depth_m.at<float>(0, 0), 1.5F);
+}
+
+TEST(Recording, OfTumWithoutAKnownUnitOfDepthSaysWhatIsAssumed) {
+  EXPECT_THAT(Recognise(TumFolder("a", true), {}).findings[1],
+              AllOf(HasSubstr("5000 units of depth a metre assumed"), HasSubstr("depth_units_per_m=1000")));
+  EXPECT_THAT(Recognise(TumFolder("rgbd_dataset_freiburg1_desk", true), {}).findings[1],
+              Not(HasSubstr("assumed")));
+}
+
+TEST(Recording, OfPairsWithoutACalibrationIsOneCameraWithAGuess) {
+  const fs::path folder = testing::FreshFolder();
+  WriteImages(folder / "cam0");
+  WriteImages(folder / "cam1");
+  const Recording pair = Recognise(folder, {});
+  EXPECT_EQ(pair.config.dataset.sensor, Sensor::kMono);
+  EXPECT_TRUE(pair.guessed_lens);
+  EXPECT_THAT(pair.findings[1], HasSubstr("the right camera is not used"));
+  EXPECT_EQ(OpenDataset(folder, pair.config.dataset)->Size(), 3u);
+  CameraRequest camera;
+  camera.sensor = Sensor::kStereo;
+  EXPECT_THAT(Refusal(folder, camera), HasSubstr("the distance of the two cameras is not known"));
+}
+
+TEST(Recording, OfTartanAirIsStereoWithThePublishedCamera) {
+  const fs::path folder = testing::FreshFolder();
+  WriteImages(folder / "image_left", 3, {640, 480});
+  WriteImages(folder / "image_right", 3, {640, 480});
+  std::ofstream(folder / "pose_left.txt") << "0 0 0 0 0 0 1\n1 0 0 0 0 0 1\n2 0 0 0 0 0 1\n";
+  const Recording air = Recognise(folder, {});
+  EXPECT_EQ(air.config.dataset.sensor, Sensor::kStereo);
+  EXPECT_FALSE(air.guessed_lens);
+  EXPECT_THAT(air.findings[2], HasSubstr("published for TartanAir"));
+  EXPECT_EQ(OpenDataset(folder, air.config.dataset)->Rig().baseline_m, 0.25);
+}
+
 TEST(Recording, OfImagesTakesTheCalibrationBesideThem) {
   const fs::path folder = testing::FreshFolder();
   WriteImages(folder);
@@ -172,6 +225,20 @@ TEST(Recording, OfOneCameraWithSensorStereoHasBothImagesSideBySide) {
   EXPECT_NEAR(found.config.dataset.camera->fx, 32, 1e-9);
   EXPECT_THAT(found.findings[0], HasSubstr("a camera, left and right side by side"));
   EXPECT_THAT(found.findings[1], Not(HasSubstr("--sensor mono")));
+}
+
+// It would wait here for ever: nobody sends anything.
+TEST(Recording, OfAPipeIsNotOpenedBeforeTheRun) {
+  const fs::path pipe = testing::FreshFolder() / "pipe";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  const Recording found = Recognise(pipe, {});
+  EXPECT_THAT(found.findings[0], HasSubstr("a video through a pipe"));
+  EXPECT_TRUE(found.guessed_lens);
+  EXPECT_FALSE(found.config.dataset.camera);
+  EXPECT_EQ(found.config.dataset.fov_deg, 67);
+  CameraRequest camera;
+  camera.camera = "70,71,30,20";
+  EXPECT_EQ(Recognise("camera:" + pipe.string(), camera).config.dataset.camera->fy, 71);
 }
 
 TEST(Recording, OfTwoCamerasNeedsToBeToldWhatTheyAre) {

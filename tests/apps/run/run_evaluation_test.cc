@@ -50,6 +50,19 @@ TEST(RunEvaluation, ALoopToAFrameMoreThanHalfAFrameBeforeItIsNot) {
   EXPECT_FALSE(result.loops[0].correct);
 }
 
+TEST(RunEvaluation, PositionsAloneJudgeTheDistanceOfALoop) {
+  Trajectory positions = TruthFrom(10);
+  for (StampedPose& pose : positions) pose.pose.rotation = Eigen::Quaterniond(0, 0, 0, 0);
+  RunResult result = Judged(OneLoop(), positions);
+  EXPECT_EQ(result.evaluation->loops_true, 1);
+  EXPECT_TRUE(std::isnan(result.loop_errors[0].angle_deg));
+  EXPECT_TRUE(std::isnan(result.loop_errors[0].error_deg));
+  result.loops[0].S_candidate_query->translation = {0.3, 0, 0};
+  result = Judged(result, positions);
+  EXPECT_EQ(result.evaluation->loops_false, 1);
+  EXPECT_NEAR(result.loop_errors[0].error_m, 0.3, 1e-9);
+}
+
 TEST(RunEvaluation, AFalseLoopThereIsFalse) {
   RunResult result = OneLoop();
   result.loops[0].S_candidate_query->translation = {0.3, 0, 0};

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "apps/run/outputs.h"
 #include "tests/support/error_of.h"
 
 namespace tutti {
@@ -23,6 +24,22 @@ TEST(RunNote, HasTheRequestAgain) {
   EXPECT_EQ(again.config, request.config);
   EXPECT_EQ(again.checkpoint_s, request.checkpoint_s);
   EXPECT_TRUE(again.keep);
+}
+
+// A checkpoint may come from anywhere: the map goes into the folder that --resume was given.
+TEST(RunNote, NamesNoFileThatIsWritten) {
+  RunRequest request;
+  request.dataset = "/data/drive";
+  request.save_map = "/home/somebody/map.tutti";
+  std::string elsewhere;
+  EXPECT_EQ(RequestOf(NoteOf(request), "map", &elsewhere).save_map, kMap);
+  EXPECT_EQ(elsewhere, "/home/somebody/map.tutti");
+  request.save_map = kMap;
+  elsewhere.clear();
+  EXPECT_EQ(RequestOf(NoteOf(request), "map", &elsewhere).save_map, kMap);
+  request.save_map.reset();
+  EXPECT_FALSE(RequestOf(NoteOf(request), "map", &elsewhere).save_map);
+  EXPECT_EQ(elsewhere, "");
 }
 
 // Whoever has a map may have written anything there.

@@ -6,8 +6,10 @@
 #include <algorithm>
 #include <array>
 #include <filesystem>
+#include <fstream>
 
 #include "tests/support/error_of.h"
+#include "tests/support/in_folder.h"
 #include "tests/support/test_data.h"
 #include "tutti/core/error.h"
 
@@ -175,6 +177,18 @@ TEST(Config, MissingFileSaysWhatIsNeeded) {
   }
 }
 
+TEST(Config, ThatIsPartOfTuttiIsThereByItsNameFromAnyFolder) {
+  const testing::InFolder elsewhere(testing::FreshFolder());
+  const RunConfig wanted = LoadConfig(testing::SourceDir() / "data/configs/euroc_stereo.yaml");
+  for (const char* name : {"euroc_stereo", "euroc_stereo.yaml", "data/configs/euroc_stereo.yaml"}) {
+    EXPECT_EQ(LoadConfig(name).dataset.sensor, wanted.dataset.sensor) << name;
+    EXPECT_EQ(LoadConfig(name).dataset.type, DatasetType::kEuroc) << name;
+  }
+  EXPECT_THROW(LoadConfig("elsewhere/euroc_stereo.yaml"), InputError);
+  std::ofstream("euroc_stereo") << "dataset:\n  sensor: mono\n";
+  EXPECT_EQ(LoadConfig("euroc_stereo").dataset.sensor, Sensor::kMono) << "a file of this name comes first";
+}
+
 TEST(SetOptions, TakesTheKeysOfEverySection) {
   RunConfig config;
   SetOptions({"run.threads=1", "odometry.features=900", "loops.extraction.features=300", "loops.rule=orb",
@@ -258,7 +272,7 @@ TEST(Config, HelpIsAValidFileWithTheDefaults) {
 }
 
 TEST(Config, HelpWritesNumbersOutUnlessTheyAreTinyOrHuge) {
-  EXPECT_THAT(HelpConfig(true), HasSubstr("depth_units_per_m: 5000 "));
+  EXPECT_THAT(HelpConfig(true), HasSubstr("depth_units_per_m: 0 "));
   EXPECT_THAT(HelpConfig(true), Not(HasSubstr("e+")));
   RunConfig config;
   config.dataset.depth_units_per_m = 80;

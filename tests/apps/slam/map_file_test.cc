@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <fstream>
 #include <iterator>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/apps/slam/map_outcome.h"
@@ -105,10 +107,12 @@ TEST(MapFileWithLongTermMemory, GoesOnFromTheMapWhateverTheMemorysFileHasSeenSin
     }
   }
   for (const InputFrame& frame : recording.frames) whole.Track(frame);
-  const auto slam = SlamSystem::Load(folder / "map", ReadMapInfo(folder / "map"));
+  MapInfo info = ReadMapInfo(folder / "map");
+  info.config.loops.ltm_file = info.ltm_file;
+  const auto slam = SlamSystem::Load(folder / "map", info);
   for (std::size_t i = k; i < n; ++i) slam->Track(recording.frames[i]);
   ExpectTheSame(Finished(*slam), Finished(whole), "with a long-term memory");
-  EXPECT_TRUE(fs::exists(folder / "broken.ltm"));
+  EXPECT_EQ(info.ltm_file, (folder / "broken.ltm").string());
 }
 
 INSTANTIATE_TEST_SUITE_P(Sensors, MapFile, testing::EachSensor(), testing::SensorName);
@@ -149,6 +153,59 @@ TEST_F(DamagedMap, IsRefusedByNameWhereverItIsDamaged) {
     const std::string flipped = Refusal(changed);
     EXPECT_NE(flipped.find(file_.string()), std::string::npos) << "changed at " << at << ": " << flipped;
   }
+}
+
+// Whoever gives a map away would decide which file is written where it is loaded.
+TEST_F(DamagedMap, NamesNoFileThatIsWritten) {
+  const fs::path memory = file_.parent_path() / "memory.ltm";
+  RunConfig config = MapConfig(1);
+  config.loops.ltm_file = memory.string();
+  const testing::Recording recording =
+      testing::Record(testing::RenderedWorld(testing::SmallStereoTown(320, 160)), 10);
+  {
+    SlamSystem slam(config, recording.rig);
+    for (const InputFrame& frame : recording.frames) slam.Track(frame);
+    slam.Save(file_);
+  }
+  fs::remove(memory);
+  const MapInfo info = ReadMapInfo(file_);
+  EXPECT_EQ(info.config.loops.ltm_file, "");
+  EXPECT_EQ(info.ltm_file, memory.string());
+  const auto slam = SlamSystem::Load(file_, info);
+  slam->BeginSession(recording.rig);
+  for (const InputFrame& frame : recording.frames) slam->Track(frame);
+  EXPECT_EQ(std::distance(fs::directory_iterator(file_.parent_path()), fs::directory_iterator()), 1);
+}
+
+TEST_F(DamagedMap, ASnapshotIsWrittenAfterItsSlamSystemIsGone) {
+  const testing::Recording recording =
+      testing::Record(testing::RenderedWorld(testing::SmallStereoTown(320, 160)), 12);
+  for (const int threads : {1, 2}) {
+    std::optional<MapSnapshot> snapshot;
+    {
+      SlamSystem slam(MapConfig(threads), recording.rig);
+      for (const InputFrame& frame : recording.frames) slam.Track(frame);
+      snapshot.emplace(slam.Snapshot());
+    }  // while the detector looks at the last keyframes
+    snapshot->Write(file_);
+    CheckMapFile(file_);
+    const auto again = SlamSystem::Load(file_, ReadMapInfo(file_));
+    EXPECT_EQ(again->odometry()->FrameTrajectory().size(), recording.frames.size());
+    const MapSnapshot moved = std::move(*snapshot);
+    moved.Write(file_);
+    const std::string before = Content(file_);
+    EXPECT_NE(testing::ErrorOf([&] { snapshot->Write(file_); }).find(file_.string()), std::string::npos);
+    EXPECT_EQ(Content(file_) == before, true);
+  }
+}
+
+TEST_F(DamagedMap, WithItselfOrNoneCantBeMerged) {
+  const testing::Recording recording =
+      testing::Record(testing::RenderedWorld(testing::SmallStereoTown(320, 160)), 3);
+  SlamSystem slam(MapConfig(1), recording.rig);
+  for (const InputFrame& frame : recording.frames) slam.Track(frame);
+  for (SlamSystem* other : {&slam, static_cast<SlamSystem*>(nullptr)})
+    EXPECT_NE(testing::ErrorOf([&] { slam.Merge(other); }).find("merged with itself"), std::string::npos);
 }
 
 TEST_F(DamagedMap, ANewerVersionIsSaidAndSomethingElseIsNoMap) {

@@ -30,7 +30,7 @@ inline MapOutcome Finished(SlamSystem& slam) {
   outcome.poses = StateOf(poses);
   outcome.loops = StateOf(slam.loops());
   const PoseGraph graph = slam.Graph();
-  std::vector<std::pair<int, Similarity>> nodes;
+  std::vector<std::pair<NodeId, Similarity>> nodes;
   for (const PoseGraphNode& node : graph.nodes()) nodes.emplace_back(node.id, node.pose);
   std::vector<Similarity> edges;
   for (const PoseGraphEdge& edge : graph.edges()) edges.push_back(edge.measurement);

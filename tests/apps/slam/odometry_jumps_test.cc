@@ -40,6 +40,7 @@ TEST(OdometryJumps, WhatMovesHasNone) {
   const Trajectory drive = Drive(300);
   EXPECT_TRUE(FindJumps(drive).empty());
   for (const double scale : {1e-3, 1e10}) EXPECT_TRUE(FindJumps(Drive(300, scale)).empty()) << scale;
+  Trajectory far = drive, sparse;
   for (std::size_t i = 0; i < drive.size(); ++i) {
     far[i].pose.translation += Eigen::Vector3d(4e5, 5e6, 0);  // UTM
     if (i % 10 == 0) sparse.push_back(drive[i]);
@@ -125,15 +126,8 @@ TEST(OdometryJumps, AreToldOnceWhilePosesComeIn) {
   for (std::size_t i = 0; i < bad.size(); ++i) {
     watch.Add(bad[i]);
     take(false);
-    if (i == 40) {
-      EXPECT_EQ(ends.size(), 1U);
-    }
-    if (i == 325) {
-      EXPECT_EQ(ends.size(), 2U);
-    }
-    if (i == 625) {
-      EXPECT_EQ(ends.size(), 3U);
-    }
+    const std::size_t expected = i == 40 ? 1 : i == 325 ? 2 : i == 625 ? 3 : ends.size();
+    EXPECT_EQ(ends.size(), expected) << i;
   }
   EXPECT_EQ(take(true), 4U);
   EXPECT_EQ(take(true), 4U);

@@ -50,17 +50,17 @@ double FarthestApart(const Trajectory& a, const Trajectory& b) {
 
 // Nodes that can be reached from the first one.
 std::size_t Connected(const PoseGraph& graph) {
-  std::map<int, std::vector<int>> neighbours;
+  std::map<NodeId, std::vector<NodeId>> neighbours;
   for (const PoseGraphEdge& edge : graph.edges()) {
     neighbours[edge.from].push_back(edge.to);
     neighbours[edge.to].push_back(edge.from);
   }
-  std::set<int> reached = {graph.nodes().front().id};
-  std::vector<int> next(reached.begin(), reached.end());
+  std::set<NodeId> reached = {graph.nodes().front().id};
+  std::vector<NodeId> next(reached.begin(), reached.end());
   while (!next.empty()) {
-    const int node = next.back();
+    const NodeId node = next.back();
     next.pop_back();
-    for (const int other : neighbours[node]) {
+    for (const NodeId other : neighbours[node]) {
       if (reached.insert(other).second) next.push_back(other);
     }
   }

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <set>
 #include <tuple>
@@ -116,7 +117,7 @@ TEST(SlamSystem, OdometryEdgesTieEveryKeyframeOfAMonoMapToTheOthers) {
   slam.Finish();
   const PoseGraph graph = slam.Graph();
   ASSERT_GT(graph.nodes().size(), 3u);
-  std::set<int> tied;
+  std::set<NodeId> tied;
   for (const PoseGraphEdge& edge : graph.edges()) tied.insert({edge.from, edge.to});
   EXPECT_EQ(tied.size(), graph.nodes().size());
 }
@@ -175,6 +176,29 @@ TEST(SlamSystem, LoopsFromElsewhereNeedKeyframesThatAreThereAndFiniteNumbers) {
   EXPECT_THROW(slam.AddLoop(1, 0, Similarity(), information), InputError);
   EXPECT_THROW(slam.AddLoop(0, 1, nowhere, information), InputError);
   EXPECT_TRUE(slam.loops().empty());
+}
+
+TEST(SlamSystem, ImagesOfAnotherKindAreRefusedAndTheNextFrameIsTracked) {
+  SlamSystem slam(SmallConfig({true, 1}), TwoLaps().rig);
+  const auto refused = [&](const std::function<void(InputFrame&)>& spoil) {
+    InputFrame frame = TwoLaps().frames[1];
+    frame.features.reset();
+    spoil(frame);
+    EXPECT_THROW(slam.Track(frame), InputError);
+    EXPECT_THROW(slam.Follow(frame, Pose()), InputError);
+  };
+  slam.Track(TwoLaps().frames[0]);
+  const cv::Size size = TwoLaps().frames[0].image.size();
+  for (const int type : {CV_32FC1, CV_8UC(128), CV_8UC3, CV_16UC1})
+    refused([&](InputFrame& frame) { frame.image = cv::Mat::zeros(size, type); });
+  refused([](InputFrame& frame) { frame.image = cv::Mat(); });
+  refused([](InputFrame& frame) { frame.image = frame.image.colRange(0, 100); });
+  refused([&](InputFrame& frame) { frame.right = cv::Mat::zeros(size, CV_32FC1); });
+  refused([](InputFrame& frame) { frame.right = frame.right.rowRange(0, 10); });
+  refused([&](InputFrame& frame) { frame.depth_m = cv::Mat::zeros(size, CV_16UC1); });
+  refused([&](InputFrame& frame) { frame.mask = cv::Mat::zeros(size, CV_8UC3); });
+  EXPECT_EQ(slam.Track(TwoLaps().frames[1]).state, TrackingState::kTracking);
+  EXPECT_EQ(slam.Sessions().back().frames, 2) << "what was refused is no frame";
 }
 
 TEST(SlamSystem, AnOdometryOfItsOwnIsAsUncertainAsConfigured) {

@@ -6,6 +6,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "apps/report/page.h"
 #include "tests/apps/tiny_town.h"
 #include "tests/apps/tutti/executable.h"
 #include "tests/support/generated_dataset.h"
@@ -54,6 +55,29 @@ class CollectCommand : public ::testing::Test {
   }
   const fs::path folder_ = testing::FreshFolder();
 };
+
+// A report of a stranger, or of a disk that was full.
+TEST_F(CollectCommand, ADamagedReportIsNamedAndTheTablesAreThere) {
+  if (!ReportsAvailable()) GTEST_SKIP() << "built without the chart library";
+  Summary("joint", 1, 0.5);
+  const fs::path report = folder_ / "runs" / "jointcounts1" / "report.json", page = folder_ / "page.html";
+  WriteAll(report, "{\"format\": 2, \"dataset\": [], \"variant\": 7}");
+  const auto run = Collect({"--report", page.string()});
+  EXPECT_EQ(run.status, 0) << run.output;
+  EXPECT_THAT(run.output,
+              AllOf(HasSubstr(report.string() + ": is damaged"), HasSubstr("Means over the runs")));
+  EXPECT_THAT(ReadAll(page), HasSubstr("no charts"));
+}
+
+TEST_F(CollectCommand, NamesOfOthersDoNothingToTheTerminal) {
+  Summary("joint\x1b[2J", 1, 0.5);
+  const auto run = Collect();
+  EXPECT_EQ(run.status, 0) << run.output;
+  EXPECT_THAT(run.output, AllOf(HasSubstr("joint\\x1b[2J"), ::testing::Not(HasSubstr("\x1b"))));
+  const auto absent = RunTutti({"convert", (folder_ / "no\x1b]0;x\a").string(), "out.txt", "--to", "tum"});
+  EXPECT_EQ(absent.status, 1);
+  EXPECT_THAT(absent.output, AllOf(HasSubstr("no\\x1b]0;x\\x07"), ::testing::Not(HasSubstr("\x1b"))));
+}
 
 TEST_F(CollectCommand, MeansIntervalsAndThePairedTestOverFirstFrames) {
   for (int start = 1; start <= 5; ++start) {

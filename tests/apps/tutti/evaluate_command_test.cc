@@ -164,6 +164,97 @@ TEST_F(EvaluateCommand, DegenerateInputNamesFileAndLine) {
                                      HasSubstr("bad.txt:3: the quaternion is not of length 1")));
 }
 
+TEST_F(EvaluateCommand, StampsOfAnyUnitAreSaidOnceAndConvertedWithoutLoss) {
+  std::string nanoseconds;
+  for (const StampedPose& p : Curve(1, 0, 0.1)) {
+    const auto& t = p.pose.translation;
+    nanoseconds += std::to_string(1403636579763555584 + std::llround(1e9 * (p.stamp_s - 1000))) + ".000000";
+    for (const double v : {t.x(), t.y(), t.z(), 0.0, 0.0, 0.0, 1.0}) nanoseconds += " " + std::to_string(v);
+    nanoseconds += "\n";
+  }
+  WriteAll(folder_ / "ns.txt", nanoseconds);
+  Trajectory truth = Curve();
+  for (StampedPose& pose : truth) pose.stamp_s += 1403636579.763555584 - 1000;
+  const std::string reference = Save("r.txt", truth), ns = (folder_ / "ns.txt").string();
+  const auto run = RunTutti({"evaluate", reference, ns});
+  EXPECT_EQ(run.status, 0) << run.output;
+  const std::string said = "its time stamps are in nanoseconds";
+  EXPECT_THAT(run.output, AllOf(HasSubstr("200 pairs"), HasSubstr(said)));
+  EXPECT_EQ(run.output.find(said), run.output.rfind(said));
+  const std::string euroc = (folder_ / "e.csv").string(), back = (folder_ / "back.txt").string();
+  EXPECT_EQ(RunTutti({"convert", ns, euroc, "--to", "euroc"}).status, 0);
+  EXPECT_THAT(ReadAll(euroc),
+              AllOf(HasSubstr("\n1403636579763555584,"), HasSubstr("\n1403636599663555584,")));
+  EXPECT_EQ(RunTutti({"convert", euroc, back, "--to", "tum"}).status, 0);
+  EXPECT_THAT(ReadAll(back), HasSubstr("\n1403636579.763555584 "));
+  WriteAll(folder_ / "late.txt", "99999999999 0 0 0 0 0 0 1\n");
+  ExpectRefused(RunTutti({"convert", (folder_ / "late.txt").string(), euroc, "--to", "euroc"}),
+                {"e.csv", "does not fit into EuRoC's nanoseconds"});
+}
+
+TEST_F(EvaluateCommand, OfPositionsAloneLeavesOutRotationsAndSaysSo) {
+  const std::string full = Save("r.txt", Curve()), estimate = Save("e.txt", Curve(1, 0, 0.3));
+  Trajectory alone = Curve();
+  for (StampedPose& pose : alone) pose.pose.rotation = Eigen::Quaterniond(0, 0, 0, 0);
+  const std::string zero = Save("zero.txt", alone), leica = (folder_ / "leica.csv").string();
+  std::string rows = "#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m]\n";
+  for (const StampedPose& p : alone) {
+    rows += std::to_string(std::llround(1e9 * p.stamp_s));
+    for (const double v : {p.pose.translation.x(), p.pose.translation.y(), p.pose.translation.z()})
+      rows += "," + std::to_string(v);
+    rows += "\n";
+  }
+  WriteAll(leica, rows);
+  const double ate = Evaluate({"--reference", full, "--estimate", estimate})["ate"]["rmse"];
+  for (const std::string& reference : {zero, leica}) {
+    const auto json = Evaluate({"--reference", reference, "--estimate", estimate});
+    EXPECT_NEAR(json["ate"]["rmse"].get<double>(), ate, 1e-6);
+    EXPECT_TRUE(json["ate_rotation_deg"].is_null());
+    EXPECT_EQ(json["rotations"], false);
+    const auto one = RunTutti({"evaluate", reference, estimate});
+    EXPECT_THAT(one.output, AllOf(HasSubstr("positions alone"), Not(HasSubstr("ATE rotation"))));
+    EXPECT_THAT(RunTutti({"evaluate", reference, estimate, zero}).output, HasSubstr("positions alone"));
+    const std::string errors = (folder_ / "errors.csv").string();
+    EXPECT_EQ(RunTutti({"evaluate", reference, estimate, "--errors", errors}).status, 0);
+    EXPECT_THAT(ReadAll(errors), HasSubstr(",,\n"));
+  }
+  ExpectRefused(RunTutti({"convert", leica, (folder_ / "k.txt").string(), "--to", "kitti"}),
+                {"k.txt", "positions alone"});
+  const std::string svg = (folder_ / "p.svg").string();
+  ExpectRefused(RunTutti({"plot", estimate, "--reference", leica, "--what", "rpe", "--out", svg}),
+                {"positions alone"});
+  ExpectRefused(RunTutti({"plot", leica, "--what", "rpy", "--out", svg}), {"leica.csv", "positions alone"});
+  EXPECT_EQ(RunTutti({"plot", estimate, "--reference", leica, "--what", "error", "--out", svg}).status, 0);
+}
+
+TEST_F(EvaluateCommand, OfFramesWithNumbersPairsByTheNumber) {
+  const auto save = [&](const std::string& name, int step, const std::string& last) {
+    std::string text;
+    const Trajectory curve = Curve();
+    for (std::size_t k = 0; k < curve.size(); k += static_cast<std::size_t>(step)) {
+      text += std::to_string(k);
+      const Eigen::Matrix4d m = curve[k].pose.Matrix();
+      for (int i = 0; i < 12; ++i) text += " " + std::to_string(m(i / 4, i % 4));
+      text += last + "\n";
+    }
+    WriteAll(folder_ / name, text);
+    return (folder_ / name).string();
+  };
+  const std::string sparse = save("poses.txt", 4, ""), all = save("cam0_to_world.txt", 1, " 0 0 0 1");
+  const std::string kitti = Save("kitti.txt", Curve(), PoseFileFormat::kKitti);
+  for (const std::string& reference : {all, kitti}) {
+    const auto json = Evaluate({"--reference", reference, "--estimate", sparse});
+    EXPECT_EQ(json["pairs"], 50);
+    EXPECT_LT(json["ate"]["max"].get<double>(), 1e-5);
+  }
+}
+
+TEST_F(EvaluateCommand, RotationDriftHasOneUnit) {
+  const std::string reference = Save("r.txt", Curve()), estimate = Save("e.txt", Curve(1, 0, 0.3));
+  EXPECT_THAT(RunTutti({"evaluate", reference, estimate}).output, HasSubstr("deg/100 m"));
+  EXPECT_THAT(RunTutti({"evaluate", reference, estimate, reference}).output, HasSubstr("deg/100 m"));
+}
+
 TEST_F(EvaluateCommand, OnePairSaysNothingWhereItIsLaidOnItself) {
   const std::string reference = Save("r.txt", Curve());
   WriteAll(folder_ / "one.txt", "1000 0 0 0 0 0 0 1\n");

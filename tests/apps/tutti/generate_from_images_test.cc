@@ -63,6 +63,37 @@ TEST(GenerateFromImages, TakesEveryNthAndDoesNotDependOnThreads) {
   }
 }
 
+TEST(GenerateFromImages, APictureOfAnotherTypeIsNoImageAsForTheOtherCommands) {
+  const fs::path folder = testing::FreshFolder(), from = folder / "from";
+  fs::create_directories(from);
+  cv::Mat image(48, 64, CV_8UC1);
+  cv::randu(image, 0, 256);
+  for (int i = 1; i <= 11; ++i) cv::imwrite((from / (std::to_string(i) + ".jpg")).string(), image);
+  cv::imwrite((from / "ground_truth.bmp").string(), image);
+  const auto made =
+      RunTutti({"generate", "--from-images", from, "--out", folder / "out", "--change", "dark"});
+  EXPECT_EQ(made.status, 0) << made.output;
+  EXPECT_THAT(made.output, AllOf(HasSubstr("11 images, changed"), HasSubstr("1 .bmp image(s) among 12")));
+  const auto loops = RunTutti({"loops", from, "--out", folder / "loops"});
+  EXPECT_EQ(loops.status, 0) << loops.output;
+  EXPECT_THAT(loops.output, HasSubstr("1 .bmp image(s) among 12"));
+  EXPECT_THAT(ReadAll(folder / "loops" / "loops.csv"), ::testing::Not(HasSubstr("ground_truth")));
+}
+
+TEST(GenerateFromImages, WhatAThermalCameraSeesIsStretched) {
+  const fs::path folder = testing::FreshFolder(), from = folder / "from";
+  fs::create_directories(from);
+  cv::Mat image(48, 64, CV_16UC1);
+  cv::randu(image, 7000, 7200);
+  for (int i = 0; i < 3; ++i) cv::imwrite((from / (std::to_string(i) + ".png")).string(), image);
+  const auto made =
+      RunTutti({"generate", "--from-images", from, "--out", folder / "out", "--change", "rain"});
+  EXPECT_EQ(made.status, 0) << made.output;
+  cv::Scalar mean, deviation;
+  cv::meanStdDev(cv::imread((folder / "out" / "1.png").string(), cv::IMREAD_GRAYSCALE), mean, deviation);
+  EXPECT_GT(deviation[0], 20) << "7000 to 7200 of 65536 is one grey value";
+}
+
 TEST(GenerateFromImages, OnePixelIsEnough) {
   const fs::path from = SixImages({1, 1});
   const auto run =

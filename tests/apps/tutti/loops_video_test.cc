@@ -8,6 +8,7 @@
 #include <opencv2/videoio.hpp>
 
 #include "tests/apps/tutti/loops_fixture.h"
+#include "tests/support/matroska_writer.h"
 
 namespace tutti {
 namespace {
@@ -56,6 +57,25 @@ TEST_F(LoopsOfAVideo, MayBeOfEveryThirdFrame) {
   ASSERT_EQ(run.status, 0) << run.output;
   EXPECT_EQ(nlohmann::json::parse(ReadAll(folder_ / "third" / "results.json"))["images"], 7);
   EXPECT_THAT(ReadAll(folder_ / "third" / "hypotheses.csv"), HasSubstr("frame 18"));
+}
+
+TEST_F(LoopsOfAVideo, AreJudgedByTheTimesOfItsContainer) {
+  testing::MatroskaWriter writer(testing::LoopImage(0).size());
+  std::string poses;
+  for (int i = 0; i < testing::kLoopImages; ++i) {
+    const int milliseconds = 1000 * i + 300 * (i % 3);
+    writer.Add(testing::LoopImage(i), milliseconds);
+    // Ten times as many as there are frames, and where the camera was at its time of that frame.
+    for (int part = 0; part < 10; ++part)
+      poses += std::to_string(1e-3 * milliseconds + 0.01 * part) + " " +
+               std::to_string(10 * (i % testing::kLoopPlaces)) + " 0 0 0 0 0 1\n";
+  }
+  writer.Write(folder_ / "walk.mkv");
+  testing::WriteAll(folder_ / "poses.txt", poses);
+  const auto run = List(folder_ / "walk.mkv", "judged",
+                        {"--ground-truth", (folder_ / "poses.txt").string(), "--gt-exclude-s", "5"});
+  ASSERT_EQ(run.status, 0) << run.output;
+  EXPECT_EQ(Json(folder_ / "judged" / "results.json")["rows_with_loop"], 5) << run.output;
 }
 
 TEST_F(LoopsOfAVideo, OrOfAFolderAreNotLookedForUnderAMask) {

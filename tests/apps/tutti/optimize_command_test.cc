@@ -6,6 +6,7 @@
 
 #include "tests/apps/tutti/executable.h"
 #include "tests/support/test_data.h"
+#include "tutti/backend/g2o_io.h"
 
 namespace tutti {
 namespace {
@@ -94,6 +95,31 @@ TEST_F(OptimizeCommand, SaysWhichStartItTook) {
   EXPECT_THAT(run.output, HasSubstr("from the chordal relaxation: "));
   EXPECT_EQ(Json()["start"], "chordal optimum");
   EXPECT_EQ(Json()["starts"].size(), 2u);
+}
+
+TEST_F(OptimizeCommand, SolvesLandmarksAndPriorsAndWritesThemBack) {
+  const std::string seen = "VERTEX_XY 9 0 0\nEDGE_SE2_XY 0 9 2 1 1 0 1\nEDGE_SE2_XY 1 9 1 1 1 0 1\n";
+  const testing::ProcessResult run =
+      Optimize(std::string(kVertices) + kEdge + seen + "EDGE_PRIOR_SE2 0 5 0 0 1 0 0 1 0 1\n");
+  EXPECT_EQ(run.status, 0) << run.output;
+  EXPECT_THAT(run.output, HasSubstr("2 poses in SE(2), 1 edges (0 loops)"));
+  EXPECT_THAT(run.output, HasSubstr("1 landmarks; 3 measurements of landmarks and priors"));
+  const PoseGraph out = ReadG2o(folder_ / "out.g2o").graph;
+  EXPECT_NEAR(out.Node(0).pose.translation.x(), 5, 1e-9);
+  EXPECT_LT((out.landmarks().at(0).position - Eigen::Vector3d(7, 1, 0)).norm(), 1e-9);
+  EXPECT_EQ(out.measurements().size(), 3u);
+  EXPECT_EQ(Json()["landmarks"], 1);
+  EXPECT_TRUE(Json()["components"][0]["anchor"].is_null());
+}
+
+TEST_F(OptimizeCommand, RefusesTagsThatItDoesNotKnowUnlessToldToIgnoreThem) {
+  const std::string graph = std::string(kVertices) + kEdge + "EDGE_RANGE 0 1 3 1\n";
+  ExpectRefused(graph,
+                "4: this line has the first of the tags that tutti does not know: EDGE_RANGE (1 line)");
+  const testing::ProcessResult run = Optimize(graph, {"--ignore-unknown"});
+  EXPECT_EQ(run.status, 0) << run.output;
+  EXPECT_THAT(run.output, HasSubstr("in.g2o:4: unknown tag 'EDGE_RANGE', 1 line ignored"));
+  EXPECT_EQ(Json()["ignored_lines"], 1);
 }
 
 TEST_F(OptimizeCommand, TreatsBadInformationAsItIsTold) {

@@ -116,6 +116,39 @@ TEST_F(Resume, ADamagedCheckpointAndOptionsThatItHasAreRefused) {
   EXPECT_THAT(damaged.output, AllOf(HasSubstr(checkpoint.string()), HasSubstr("is damaged")));
 }
 
+// A copy without hidden files has no mark of tutti but the checkpoint.
+TEST_F(Resume, ACopiedFolderGoesOnAndNothingElsewhereIsWritten) {
+  const fs::path elsewhere = folder_ / "elsewhere.tutti", memory = folder_ / "memory.ltm",
+                 copy = folder_ / "copy";
+  testing::RunTuttiAndSignal(Arguments(out_, {"--checkpoint", "0", "--save-map", elsewhere.string(), "--set",
+                                              "loops.ltm_file=" + memory.string(), "--no-report"}),
+                             " 50%", SIGKILL);
+  ASSERT_TRUE(fs::exists(out_ / "checkpoint.tutti"));
+  for (const char* rest : {"memory.ltm", "memory.ltm-wal", "memory.ltm-shm"}) fs::remove(folder_ / rest);
+  fs::create_directory(copy);
+  for (const char* name : {"checkpoint.tutti", "trajectory_live.txt", "loops_live.csv"})
+    fs::copy(out_ / name, copy / name);
+  const auto linked = folder_ / "linked";
+  fs::create_directory(linked);
+  fs::create_symlink(out_ / "checkpoint.tutti", linked / "checkpoint.tutti");
+  const auto refused = RunTutti({"run", "--resume", linked.string()});
+  EXPECT_EQ(refused.status, 1);
+  EXPECT_THAT(refused.output, HasSubstr("is a link"));
+  const auto resumed = RunTutti({"run", "--resume", copy.string(), "--no-report"});
+  EXPECT_EQ(resumed.status, 0) << resumed.output;
+  EXPECT_TRUE(fs::exists(copy / "map.tutti"));
+  EXPECT_FALSE(fs::exists(elsewhere));
+  EXPECT_FALSE(fs::exists(memory));
+  EXPECT_THAT(resumed.output, AllOf(HasSubstr("--save-map " + elsewhere.string()),
+                                    HasSubstr("--set loops.ltm_file=" + memory.string())));
+  const auto told = RunTutti({"run", "--resume", out_.string(), "--no-report", "--save-map",
+                              elsewhere.string(), "--set", "loops.ltm_file=" + memory.string()});
+  EXPECT_EQ(told.status, 0) << told.output;
+  EXPECT_TRUE(fs::exists(elsewhere));
+  EXPECT_TRUE(fs::exists(memory));
+  ExpectTheSame(out_, copy);
+}
+
 TEST_F(Resume, EachRunLeavesAMapUnlessToldNotTo) {
   ASSERT_EQ(RunTutti(Arguments(out_, {"--end", "5"})).status, 0);
   EXPECT_TRUE(fs::exists(out_ / "map.tutti"));

@@ -133,6 +133,16 @@ TEST_F(SessionsCommand, MapsAreMergedWhereTheyShowTheSameAndRefusedWhereNot) {
   EXPECT_THAT(refused.output, HasSubstr("shows no place of"));
   EXPECT_FALSE(fs::exists(none));
   EXPECT_EQ(RunTutti({"merge", day, next, "-o", day}).status, 1);
+  fs::create_symlink(day, folder_ / "link.tutti");
+  fs::create_hard_link(day, folder_ / "hard.tutti");
+  fs::copy_file(day, folder_ / "copy.tutti");
+  for (const fs::path& same : {fs::path(day), day_ / "." / "map.tutti", folder_ / "link.tutti",
+                               folder_ / "hard.tutti", folder_ / "copy.tutti"}) {
+    const auto itself = RunTutti({"merge", day, same.string(), "-o", none});
+    EXPECT_EQ(itself.status, 1);
+    EXPECT_THAT(itself.output, HasSubstr("are the same map; give the maps of two recordings"));
+    EXPECT_FALSE(fs::exists(none));
+  }
   // A run that goes on there says that it stands apart.
   const auto apart = Run(other, folder_ / "apart", {"--map", day, "--end", "40", "--no-report"});
   EXPECT_EQ(apart.status, 0) << apart.output;

@@ -141,6 +141,51 @@ TEST(LiveServer, EndsWithinTwoSecondsWhateverClientsDo) {
   byte_for_byte.join();
 }
 
+// The system's buffers take what is sent to them for a long time, and pauses say little.
+TEST(LiveServer, ViewersThatReadNothingDoNotHoldUpAPause) {
+  LiveState state;
+  const LiveServer server(AnyPort(), state);
+  std::vector<std::unique_ptr<LiveClient>> silent;
+  for (int k = 0; k < 6; ++k) {
+    silent.push_back(std::make_unique<LiveClient>(server.Url()));
+    silent.back()->Send(Get("/events"));
+  }
+  for (int k = 0; k < 500 && state.Viewers() < 4; ++k) Wait(0.01);
+  ASSERT_EQ(state.Viewers(), 4);
+  state.Log("a frame");
+  LiveClient pauses(server.Url());
+  pauses.Send("POST /control?do=pause HTTP/1.1\r\nHost: localhost\r\nX-Tutti: 1\r\n\r\n");
+  EXPECT_THAT(pauses.Answer(2), ::testing::StartsWith("HTTP/1.1 204"));
+  std::atomic<bool> goes_on{false};
+  std::thread run([&] {
+    state.WaitWhilePaused(0.5);
+    goes_on = true;
+  });
+  for (int k = 0; k < 600 && !goes_on; ++k) Wait(0.1);
+  EXPECT_TRUE(goes_on);
+  state.Close();
+  run.join();
+}
+
+// Whoever reads holds it up as long as it likes.
+TEST(LiveServer, AViewerThatReadsHoldsUpAPause) {
+  LiveState state;
+  const LiveServer server(AnyPort(), state);
+  LiveClient reads(server.Url());
+  reads.Send(Get("/events"));
+  for (int k = 0; k < 500 && state.Viewers() < 1; ++k) Wait(0.01);
+  state.Pause(true);
+  std::atomic<bool> goes_on{false};
+  std::thread run([&] {
+    state.WaitWhilePaused(0.5);
+    goes_on = true;
+  });
+  EXPECT_GT(reads.Answer(8).size(), 100000u);
+  EXPECT_FALSE(goes_on);
+  state.Pause(false);
+  run.join();
+}
+
 TEST(LiveServer, HeadersHaveABound) {
   LiveState state;
   const LiveServer server(AnyPort(), state);

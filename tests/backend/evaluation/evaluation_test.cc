@@ -93,6 +93,57 @@ TEST(Evaluation, TrajectoriesOfDifferentTimesNameBothRanges) {
   EXPECT_THAT(error, HasSubstr("5000.000 .. 5000.900 s"));
 }
 
+TEST(Evaluation, TrajectoriesThatNearlyFitInTimeNameTheDistanceAndTheRemedy) {
+  const std::string error = ErrorOf([] { EvaluateTrajectory(Curve(10, 100.013), Curve(10, 100)); });
+  EXPECT_THAT(error, HasSubstr("the nearest are 0.013 s apart (pair them with --max-diff 0.014"));
+  Trajectory sparse = Curve(100);
+  for (std::size_t k = 2; k < sparse.size(); ++k) sparse[k].stamp_s += 0.013;
+  EXPECT_THAT(ErrorOf([&] { EvaluateTrajectory(sparse, Curve(100)); }),
+              HasSubstr("98 poses have no partner within 0.01 s (--max-diff"));
+}
+
+TEST(Evaluation, PosesWithoutAPartnerAreCounted) {
+  Trajectory sparse;
+  for (const StampedPose& pose : Curve(100)) {
+    if (sparse.empty() || pose.stamp_s > sparse.back().stamp_s + 0.95) sparse.push_back(pose);
+  }
+  const EvaluationReport report = EvaluateTrajectory(sparse, Curve(120));
+  EXPECT_EQ(report.pairs, 10u);
+  EXPECT_EQ(report.coverage.share(), 1.0);
+  EXPECT_EQ(report.coverage.unpaired, 91u - 10u);  // those after the reference are outside of it
+}
+
+TEST(Evaluation, OfPositionsAloneIsThatOfPositionsWithoutTheRest) {
+  const Trajectory estimate = Curve(300);
+  Trajectory reference = Moved(estimate, Similarity(1, ExpSO3({0.3, -2.0, 1.0}), {10, -20, 30}));
+  for (std::size_t k = 0; k < reference.size(); ++k)
+    reference[k].pose.translation.z() += 0.1 * std::sin(0.3 * static_cast<double>(k));
+  Trajectory positions = reference;
+  for (StampedPose& pose : positions) pose.pose.rotation = Eigen::Quaterniond(0, 0, 0, 0);
+  const EvaluationReport with = EvaluateTrajectory(reference, estimate);
+  for (const EvaluationReport& report :
+       {EvaluateTrajectory(positions, estimate), EvaluateTrajectory(estimate, positions)}) {
+    EXPECT_FALSE(report.rotations);
+    EXPECT_NEAR(report.ate.rmse, with.ate.rmse, 1e-9);
+    EXPECT_EQ(report.rpe_point_distance.count, with.rpe_point_distance.count);
+    EXPECT_TRUE(std::isfinite(report.rpe_point_distance.rmse));
+    for (const ErrorStatistics& s :
+         {report.ate_rotation, report.ate_full, report.rpe, report.rpe_rotation, report.rpe_full})
+      EXPECT_EQ(s.count, 0u);
+    EXPECT_EQ(report.drift.segments, 0u);
+  }
+  EXPECT_NEAR(EvaluateTrajectory(positions, estimate).rpe_point_distance.rmse, with.rpe_point_distance.rmse,
+              1e-12);
+  EvaluationOptions options;
+  options.alignment = TrajectoryAlignment::kOrigin;
+  EXPECT_THAT(ErrorOf([&] { EvaluateTrajectory(positions, estimate, options); }),
+              HasSubstr("the reference has positions alone"));
+  options.alignment = TrajectoryAlignment::kSE3;
+  options.rpe_unit = DeltaUnit::kDegrees;
+  EXPECT_THAT(ErrorOf([&] { EvaluateTrajectory(estimate, positions, options); }),
+              HasSubstr("the estimate has positions alone"));
+}
+
 TEST(Evaluation, CountsMustAgreeWithoutStamps) {
   EvaluationOptions options;
   options.by_index = true;

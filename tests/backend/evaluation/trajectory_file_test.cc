@@ -63,6 +63,29 @@ TEST(TrajectoryFile, WithoutTimesKittiAndG2oHaveNoStamps) {
   EXPECT_TRUE(ReadPoseFile(folder / "a.txt", {}, ReadTimes(folder / "times.txt")).has_stamps);
 }
 
+TEST(TrajectoryFile, NumbersOfFramesAreTheLinesOfTheTimes) {
+  const std::string pose = " 1 0 0 5 0 1 0 6 0 0 1 7\n";
+  const std::filesystem::path file = Write("1" + pose + "3" + pose);  // KITTI-360
+  EXPECT_TRUE(ReadPoseFile(file).has_numbers);
+  EXPECT_FALSE(ReadPoseFile(file).has_stamps);
+  EXPECT_EQ(Stamps(ReadPoseFile(file, {}, {10, 11, 12, 13}).trajectory), (std::vector<double>{11, 13}));
+  EXPECT_THAT(ErrorOf([&] { ReadPoseFile(file, {}, {10, 11}); }), HasSubstr("frame 3 has no time stamp"));
+}
+
+TEST(TrajectoryFile, KeyframesNumberedLikeMillisecondsFollowTheOtherFile) {
+  std::string sparse;
+  for (int k = 0; k < 20; ++k) sparse += std::to_string(15 * k) + " 0 0 0 0 0 0 1\n";
+  PoseFile keyframes = ReadPoseFile(Write(sparse));
+  ASSERT_EQ(keyframes.warnings.size(), 1u);
+  EXPECT_NEAR(keyframes.trajectory.back().stamp_s, 0.285, 1e-9);
+  PoseFile beside_milliseconds = keyframes;
+  AgreeOnUnit(0, 0.3, beside_milliseconds);
+  EXPECT_NEAR(beside_milliseconds.trajectory.back().stamp_s, 0.285, 1e-9);
+  AgreeOnUnit(0, 299, keyframes);
+  EXPECT_NEAR(keyframes.trajectory.back().stamp_s, 285, 1e-9);
+  EXPECT_TRUE(keyframes.warnings.empty());
+}
+
 TEST(TrajectoryFile, TimesThatDoNotFitAreRefused) {
   const std::filesystem::path folder = testing::FreshFolder();
   WritePoseFile(folder / "a.txt", ShortCurve(), PoseFileFormat::kKitti);

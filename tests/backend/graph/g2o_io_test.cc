@@ -3,6 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
+#include <cmath>
+
+#include "core/text_reader.h"
 #include "tests/backend/graph/synthetic_graph.h"
 #include "tests/support/test_data.h"
 #include "tutti/core/error.h"
@@ -85,12 +89,93 @@ TEST(G2o, VerticesMayBeMissing) {
   EXPECT_EQ(file.graph.edges()[1].kind, EdgeKind::kOdometry);
 }
 
-TEST(G2o, UnknownTagsAreReportedOnceAndDoNotStopTheReading) {
-  const G2oFile file =
-      ReadG2o(GraphFile(std::string(kVertices) + "LANDMARK 1 2\n" + kEdge + "LANDMARK 3 4\n# comment\n"));
-  ASSERT_EQ(file.warnings.size(), 1u);
-  EXPECT_THAT(file.warnings[0], HasSubstr("graph.g2o:3: unknown tag 'LANDMARK', 2 lines ignored"));
+TEST(G2o, UnknownTagsAreRefusedWithTheNumberOfTheirLinesUnlessTheyAreToBeIgnored) {
+  const std::string text =
+      std::string(kVertices) + "LANDMARK 1 2\n" + kEdge + "LANDMARK 3 4\nEDGE_RANGE 0 1 3\n# comment\n";
+  EXPECT_THAT(ErrorOfText(text), HasSubstr("graph.g2o:3: this line has the first of the tags"));
+  EXPECT_THAT(ErrorOfText(text), HasSubstr("EDGE_RANGE (1 line), LANDMARK (2 lines)"));
+  EXPECT_THAT(ErrorOfText(text), HasSubstr("--ignore-unknown"));
+  const G2oFile file = ReadG2o(GraphFile(text), BadInformation::kRefuse, true);
+  ASSERT_EQ(file.warnings.size(), 2u);
+  EXPECT_EQ(file.ignored, 3u);
+  EXPECT_THAT(file.warnings[1], HasSubstr("graph.g2o:3: unknown tag 'LANDMARK', 2 lines ignored"));
   EXPECT_EQ(file.graph.edges().size(), 1u);
+}
+
+TEST(G2o, IdsKeepTheirSpellingUpTo2To64) {
+  const std::string text =
+      "VERTEX_SE2 6989586621679009792 0 0 0\nVERTEX_SE2 9223372036854775808 1 0 0\nVERTEX_SE2 007 2 0 0\n"
+      "FIX 007\nEDGE_SE2 6989586621679009792 9223372036854775808 1 0 0 1 0 0 1 0 1\n"
+      "EDGE_SE2 9223372036854775808 7 1 0 0 1 0 0 1 0 1\n";
+  const std::filesystem::path again = testing::FreshFolder() / "again.g2o";
+  const PoseGraph graph = ReadG2o(GraphFile(text)).graph;
+  EXPECT_EQ(graph.nodes()[0].id, 6989586621679009792);
+  EXPECT_TRUE(graph.Node(7).fixed);
+  WriteG2o(again, graph);
+  const std::string written = internal::ReadText(again, "", std::size_t{1} << 20);
+  EXPECT_THAT(written, HasSubstr("VERTEX_SE2 9223372036854775808 1 0 0\nVERTEX_SE2 007 2 0 0\nFIX 007\n"));
+  EXPECT_THAT(written, HasSubstr("EDGE_SE2 6989586621679009792 9223372036854775808 1 0 0 1"));
+  EXPECT_THAT(ErrorOfText(text + "VERTEX_SE2 -1 0 0 0\n"), HasSubstr(":7: ids below 0 and ids of 2^63"));
+}
+
+TEST(G2o, AGraphWithoutOdometrySaysSo) {
+  const G2oFile star = ReadG2o(GraphFile(
+      "EDGE_SE2 0 2 1 0 0 1 0 0 1 0 1\nEDGE_SE2 1 3 1 0 0 1 0 0 1 0 1\nEDGE_SE2 0 3 1 0 0 1 0 0 1 0 1\n"));
+  ASSERT_EQ(star.warnings.size(), 1u);
+  EXPECT_THAT(star.warnings[0], HasSubstr("there is no odometry: all edges count as loops"));
+}
+
+TEST(G2o, TorosInformationHasItsOwnOrder) {
+  const std::string toro = "VERTEX2 0 0 0 0\nVERTEX2 1 1 0 0.1\nEDGE2 0 1 1 0 0.1 ";
+  const G2oFile file = ReadG2o(GraphFile(toro + "500 3 600 2000 1 2\n"));
+  const Matrix7d& I = file.graph.edges()[0].information;
+  EXPECT_EQ(file.graph.edges()[0].kind, EdgeKind::kOdometry);
+  EXPECT_EQ(I(0, 1), 3);
+  EXPECT_EQ(I(1, 1), 600);
+  EXPECT_EQ(I(5, 5), 2000);
+  EXPECT_EQ(I(0, 5), 1);
+  EXPECT_EQ(I(5, 1), 2);
+  // iSAM writes the same tag with the upper triangle by rows.
+  const G2oFile isam = ReadG2o(GraphFile(toro + "500 0 0 600 0 2000\n"));
+  EXPECT_EQ(isam.graph.edges()[0].information(1, 1), 600);
+  EXPECT_EQ(isam.graph.edges()[0].information(5, 5), 2000);
+  EXPECT_THAT(isam.warnings.at(0), HasSubstr("graph.g2o:3: the information of EDGE2 is read by rows"));
+}
+
+TEST(G2o, TorosAnglesAreRollPitchAndYawAndTheirInformationThatOfAngles) {
+  const G2oFile file =
+      ReadG2o(GraphFile("VERTEX3 0 0 0 0 0.3 -0.2 0.5\nVERTEX3 1 1 0 0 0 0 0\n"
+                        "EDGE3 0 1 1 0 0 0.1 0.2 0.3 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 100 0 0 200 0 300\n"));
+  const Eigen::Quaterniond expected = Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitZ()) *
+                                      Eigen::AngleAxisd(-0.2, Eigen::Vector3d::UnitY()) *
+                                      Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitX());
+  EXPECT_LT(LogSO3(expected.conjugate() * file.graph.nodes()[0].pose.rotation).norm(), 1e-12);
+  // A small error e of the quaternion, and the same in roll, pitch and yaw, cost the same.
+  const PoseGraphEdge& edge = file.graph.edges()[0];
+  const Eigen::Vector3d e(1e-6, -2e-6, 3e-6);
+  const Eigen::Matrix3d R = (edge.measurement.rotation * ExpSO3(2 * e)).toRotationMatrix();
+  const Eigen::Vector3d angles(std::atan2(R(2, 1), R(2, 2)) - 0.1, std::asin(-R(2, 0)) - 0.2,
+                               std::atan2(R(1, 0), R(0, 0)) - 0.3);
+  const double by_angles = angles.dot(Eigen::Vector3d(100, 200, 300).cwiseProduct(angles));
+  EXPECT_NEAR(e.dot(edge.information.block<3, 3>(3, 3) * e) / by_angles, 1, 1e-4);
+}
+
+TEST(G2o, SwitchableAndMixtureEdgesArePlainLoopsWithAWarning) {
+  const std::string chain = "EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\nEDGE_SE2 1 2 1 0 0 1 0 0 1 0 1\n";
+  const std::string component = " 0 1 1 0 0 ";
+  const G2oFile file = ReadG2o(GraphFile(
+      chain + "VERTEX_SWITCH 9 1\nEDGE_SWITCH_PRIOR 9 1 1\nEDGE_SE2_SWITCHABLE 0 1 9 1 0 0 4 0 0 5 0 6\n" +
+      "EDGE_SE2_MAXMIX 0 2 1e-9 2 0 0 4 0 0 5 0 6\nEDGE_SE2_MIXTURE 0 1 2 EDGE_SE2 0.01" + component +
+      "1e-9 0 0 1e-9 0 1e-9 EDGE_SE2 1" + component + "7 0 0 8 0 9\n"));
+  ASSERT_EQ(file.graph.edges().size(), 5u);
+  ASSERT_EQ(file.graph.nodes().size(), 3u);
+  for (std::size_t e = 2; e < 5; ++e) EXPECT_EQ(file.graph.edges()[e].kind, EdgeKind::kLoop);
+  EXPECT_EQ(file.graph.edges()[2].information(5, 5), 6);
+  EXPECT_EQ(file.graph.edges()[4].information(5, 5), 9) << "not the null hypothesis";
+  EXPECT_THAT(file.warnings.at(0), HasSubstr("graph.g2o:5: 3 switchable or mixture edges"));
+  EXPECT_THAT(ErrorOfText(chain + "EDGE_SE2_MIXTURE 0 1 2 EDGE_SE2 1" + component +
+                          "1 0 0 1 0 1 EDGE_SE2 1 0 2 1 0 0 1 0 0 1 0 1\n"),
+              HasSubstr(":3: EDGE_SE2_MIXTURE has components of different measurements"));
 }
 
 TEST(G2o, AcceptsWindowsLineEndsTabsAndComments) {
@@ -113,7 +198,7 @@ TEST(G2o, DamagedFilesNameTheLine) {
               HasSubstr(":4: the edge leads from node 1 to itself"));
   EXPECT_THAT(ErrorOfText(good + "EDGE_SE2 0 1.5 1 0 0 1 0 0 1 0 1\n"),
               HasSubstr(":4: '1.5' is not a node id"));
-  EXPECT_THAT(ErrorOfText(good + "EDGE_SE2 0 99999999999 1 0 0 1 0 0 1 0 1\n"),
+  EXPECT_THAT(ErrorOfText(good + "EDGE_SE2 0 18446744073709551616 1 0 0 1 0 0 1 0 1\n"),
               HasSubstr("is not a node id"));
   EXPECT_THAT(ErrorOfText(good + "VERTEX_SE2 1 0 0 0\n"), HasSubstr(":4: vertex 1 was given before"));
   EXPECT_THAT(ErrorOfText(good + "FIX 77\n"), HasSubstr(":4: FIX names node 77"));

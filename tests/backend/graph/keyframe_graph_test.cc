@@ -28,7 +28,7 @@ testing::SyntheticGraph Drifting(GraphKind kind, int nodes = 200) {
 std::vector<MapKeyframe> KeyframesOf(const testing::SyntheticGraph& synthetic) {
   std::vector<MapKeyframe> keyframes;
   for (const PoseGraphNode& node : synthetic.graph.nodes())
-    keyframes.push_back({node.id, 0, node.pose.RigidPart()});
+    keyframes.push_back({static_cast<int>(node.id), 0, node.pose.RigidPart()});
   return keyframes;
 }
 
@@ -226,9 +226,10 @@ TEST(KeyframeGraph, AnEdgeIsAsUncertainAsTheMotionsBetweenItsEnds) {
   const PoseGraph known = graph.Graph({});
   for (const PoseGraphEdge& edge : known.edges()) {
     double translation2 = 0, rotation2 = 0;
-    for (int id = edge.from + 1; id <= std::min(edge.to, 3); ++id) {
-      translation2 += 0.09 * id * id;
-      rotation2 += 1e-4 * id * id;
+    for (NodeId id = edge.from + 1; id <= std::min<NodeId>(edge.to, 3); ++id) {
+      const double share = static_cast<double>(id * id);
+      translation2 += 0.09 * share;
+      rotation2 += 1e-4 * share;
     }
     if (edge.to == 4) {  // its motion was not noted
       EXPECT_GT(edge.information(0, 0), 1e4);
@@ -290,7 +291,7 @@ TEST(KeyframeGraph, EdgesOfRemovedKeyframesLeadToWhatStandsForThem) {
     graph.Update(left);
     const PoseGraph small = graph.Graph({loop});
     EXPECT_EQ(small.nodes().size(), left.size());
-    std::map<std::pair<int, int>, const PoseGraphEdge*> edges;
+    std::map<std::pair<NodeId, NodeId>, const PoseGraphEdge*> edges;
     for (const PoseGraphEdge& edge : small.edges()) {
       const bool is_new = edges.emplace(std::minmax(edge.from, edge.to), &edge).second;
       EXPECT_TRUE(is_new || edge.kind == EdgeKind::kLoop) << edge.from << ", " << edge.to;
@@ -343,7 +344,7 @@ TEST(KeyframeGraph, AnEdgeThatIsThereIsNotReplacedByOneThatLeadsOverARemovedKeyf
   std::vector<MapKeyframe> keyframes = KeyframesOf(synthetic);
   KeyframeGraph graph{KeyframeGraphOptions()};
   graph.Update(keyframes, {{2, 4, 100}});
-  const auto turn_variance = [&graph](int from, int to) {
+  const auto turn_variance = [&graph](NodeId from, NodeId to) {
     const PoseGraph built = graph.Graph({});
     for (const PoseGraphEdge& edge : built.edges()) {
       if (std::minmax(edge.from, edge.to) == std::minmax(from, to)) return 1 / edge.information(3, 3);
@@ -373,7 +374,7 @@ double WayOf(const std::pair<int, int>& ends, const std::map<int, int>& into) {
   graph.Remove(into);
   const PoseGraph built = graph.Graph({});
   for (const PoseGraphEdge& edge : built.edges()) {
-    if (std::minmax(edge.from, edge.to) == std::minmax(ends.first, ends.second))
+    if (std::minmax(edge.from, edge.to) == std::minmax<NodeId>(ends.first, ends.second))
       return 1 / std::sqrt(edge.information(0, 0)) / options.sigma_translation_ratio;
   }
   return 0;

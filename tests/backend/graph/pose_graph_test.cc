@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <string>
+#include <vector>
 
 #include "tutti/core/error.h"
 
@@ -23,6 +25,34 @@ std::string ErrorOfEdge(PoseGraph& graph, const PoseGraphEdge& edge) {
     return error.what();
   }
   return "";
+}
+
+/// A chain over these ids in which each node has an edge to the next one; which of them are odometry?
+std::string OdometryOf(const std::vector<NodeId>& ids) {
+  PoseGraph graph;
+  for (const NodeId id : ids) graph.AddNode(id, Pose());
+  for (std::size_t k = 1; k < ids.size(); ++k)
+    graph.AddEdge({ids[k - 1], ids[k], Similarity(), Matrix7d::Identity(), EdgeKind::kLoop, true});
+  graph.FindOdometry();
+  std::string out;
+  for (const PoseGraphEdge& edge : graph.edges()) out += edge.kind == EdgeKind::kOdometry ? 'o' : 'l';
+  return out;
+}
+
+TEST(PoseGraph, OdometryJoinsNeighboursWhateverTheGapsBetweenTheIds) {
+  EXPECT_EQ(OdometryOf({10, 17, 24, 1000}), "ooo");
+  EXPECT_EQ(OdometryOf({-4, -1, 0, 5}), "ooo");
+  EXPECT_EQ(OdometryOf({1403636579763555584, 1403636579813555456, 1403636580763555584}), "oo");
+}
+
+TEST(PoseGraph, NeighboursAreOfOneRobot) {
+  const NodeId a = NodeId{'a'} << 56, b = NodeId{'b'} << 56, second = NodeId{'B'} << 48;
+  EXPECT_EQ(OdometryOf({a, a + 3, b, b + 1}), "olo");
+  EXPECT_EQ(OdometryOf({a, a + 1, a + second, a + second + 1}), "olo") << "gtsam::LabeledSymbol";
+  EXPECT_EQ(OdometryOf({'a' << 24, ('a' << 24) + 1, 'b' << 24, ('b' << 24) + 1}), "olo");
+  EXPECT_EQ(OdometryOf({0, 1, 2, 1000000, 1000001, 1000002, 2000000, 2000001}), "ooloolo");
+  EXPECT_EQ(OdometryOf({0, 1, 2, NodeId{1} << 32, (NodeId{1} << 32) + 1}), "oolo");
+  EXPECT_EQ(OdometryOf({0, 1000, 2000, 3000}), "ooo") << "one robot, every thousandth frame";
 }
 
 TEST(PoseGraph, FindsNodesById) {

@@ -51,7 +51,7 @@ TEST(PoseGraphOptimizer, StopsWhenItIsAskedToAndThePosesStay) {
     for (const PoseGraphSolver solver : {PoseGraphSolver::kCeres, PoseGraphSolver::kBlock}) {
       for (const GraphInit init : {GraphInit::kFile, GraphInit::kChordal}) {
         PoseGraph graph = MakeSyntheticGraph(NoisyGraphOptions(kind)).graph;
-        const std::map<int, Similarity> before = graph.Poses();
+        const std::map<NodeId, Similarity> before = graph.Poses();
         PoseGraphOptions options;
         options.solver = solver;
         options.init = init;

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sqlite3.h>
+#include <zstd.h>
 
 #include <algorithm>
 #include <fstream>
@@ -71,13 +72,15 @@ TEST_P(EveryFormat, OfOthersIsRead) {
   const MessageImage picture = DecodeImageMessage(bag->Read(compressed[2]), "sensor_msgs/CompressedImage",
                                                   Serialization::kCdr, Pixels::kGrey);
   EXPECT_EQ(cv::norm(picture.image, testing::Picture(16, 12, 1), cv::NORM_INF), 0) << picture.error;
-  const auto camera =
-      CameraOfMessage(bag->Read(bag->Messages("/left/camera_info").at(1)), Serialization::kCdr, "x.mcap");
-  ASSERT_TRUE(camera.has_value());
-  EXPECT_EQ(camera->fy, 21);
-  EXPECT_EQ(camera->cx, 8);
-  EXPECT_EQ(camera->width, 16);
-  EXPECT_EQ(camera->coefficients[4], 0.5);
+  const CameraInfo info =
+      DecodeCameraInfo(bag->Read(bag->Messages("/left/camera_info").at(1)), Serialization::kCdr, "x.mcap");
+  EXPECT_EQ(info.Raw("").fy, 21);
+  EXPECT_EQ(info.Raw("").cx, 8);
+  EXPECT_EQ(info.Raw("").width, 16);
+  EXPECT_EQ(info.Raw("").coefficients[4], 0.5);
+  EXPECT_EQ(info.R[8], 1);
+  EXPECT_EQ(info.P[6], 6);
+  EXPECT_TRUE(info.window.IsWhole());
 }
 
 TEST_P(EveryFormat, ACutAnywhereGivesWhatLiesBefore) {
@@ -172,6 +175,52 @@ TEST(Bag, ARecordingInPartsIsOneInTheOrderOfTheirNumbers) {
   const auto with_damage = Bag::Open(folder);
   EXPECT_EQ(ImagesOf(*with_damage), 6u);
   EXPECT_THAT(with_damage->damage(), AllOf(HasSubstr("a part is skipped: "), HasSubstr("recording_11.mcap")));
+}
+
+// As 'ros2 bag record --compression-mode message' leaves it.
+TEST(Bag, MessagesThatAreCompressedEachForItselfAreUnpacked) {
+  const fs::path file = FreshFolder() / "packed.db3";
+  fs::copy_file(OfOthers("sqlite.db3"), file);
+  fs::permissions(file, fs::perms::owner_write, fs::perm_options::add);
+  sqlite3* database = nullptr;
+  ASSERT_EQ(sqlite3_open(file.c_str(), &database), SQLITE_OK);
+  const auto zstd = [](sqlite3_context* context, int, sqlite3_value** values) {
+    std::string packed(ZSTD_compressBound(static_cast<std::size_t>(sqlite3_value_bytes(*values))), '\0');
+    packed.resize(ZSTD_compress(packed.data(), packed.size(), sqlite3_value_blob(*values),
+                                static_cast<std::size_t>(sqlite3_value_bytes(*values)), 1));
+    sqlite3_result_blob(context, packed.data(), static_cast<int>(packed.size()), SQLITE_TRANSIENT);
+  };
+  sqlite3_create_function(database, "zstd", 1, SQLITE_UTF8, nullptr, zstd, nullptr, nullptr);
+  EXPECT_EQ(sqlite3_exec(database, "UPDATE messages SET data = zstd(data)", nullptr, nullptr, nullptr),
+            SQLITE_OK);
+  sqlite3_close(database);
+  DatasetOptions options = testing::With(Sensor::kStereo, true);
+  options.camera->width = options.camera->height = 0;
+  options.camera->cx = options.camera->cy = 6;
+  options.topic = "/left/image";
+  options.right_topic = "/right/image/compressed";
+  options.baseline_m = 0.5;
+  const auto packed = OpenDataset(file, options), plain = OpenDataset(OfOthers("sqlite.db3"), options);
+  ASSERT_EQ(packed->Size(), plain->Size());
+  EXPECT_TRUE(packed->Warnings().empty());
+  for (std::size_t i = 0; i < plain->Size(); ++i) {
+    const ReadResult a = packed->Read(i), b = plain->Read(i);
+    ASSERT_TRUE(a.frame && b.frame) << a.error << b.error;
+    EXPECT_EQ(a.frame->stamp_s, b.frame->stamp_s);
+    EXPECT_EQ(cv::norm(a.frame->image, b.frame->image, cv::NORM_INF), 0);
+    EXPECT_EQ(cv::norm(a.frame->right, b.frame->right, cv::NORM_INF), 0);
+  }
+}
+
+TEST(Bag, AFolderOfPackedFilesSaysHowToUnpackThem) {
+  const fs::path folder = FreshFolder() / "recording";
+  testing::WriteText(folder / "recording_0.db3.zstd", "\x28\xb5\x2f\xfd");
+  testing::WriteText(folder / "recording_1.db3.zstd", "\x28\xb5\x2f\xfd");
+  EXPECT_EQ(DetectDatasetType(folder), DatasetType::kBag);
+  EXPECT_THAT(ErrorOf([&] { Bag::Open(folder); }), HasSubstr("unpack them: zstd -d " + folder.string()));
+  fs::copy_file(OfOthers("sqlite.db3"), folder / "recording_0.db3");
+  fs::copy_file(OfOthers("sqlite.db3"), folder / "recording_1.db3");
+  EXPECT_EQ(Bag::Files(folder).size(), 2u);  // the packed ones that were unpacked do not count
 }
 
 TEST(Bag, WhatIsNoneIsRefused) {

@@ -124,6 +124,108 @@ TEST(BagDataset, StereoPairsAreTakenAsTheyAreOrRectifiedWithTheRightCamera) {
   EXPECT_GT(cv::norm(raw->Read(1).frame->right, Picture(64, 48, 51), cv::NORM_INF), 0);
 }
 
+// Two frames of 64x48 px of two cameras, with what their camera_infos say.
+fs::path PairsWithInfo(const std::string& images, const CameraInfo& left, const CameraInfo& right) {
+  testing::BagWriter bag(testing::BagPacking::kLz4);
+  for (int i = 0; i < 2; ++i) {
+    for (const auto& [name, info] : {std::pair("/left/", left), std::pair("/right/", right)}) {
+      bag.Write(name + images, "sensor_msgs/Image", ImageMessage(Picture(64, 48, i), "mono8", 100 + i));
+      bag.Write(name + std::string("camera_info"), "sensor_msgs/CameraInfo",
+                testing::CameraInfoMessage(info));
+    }
+  }
+  const fs::path file = FreshFolder() / "pairs.bag";
+  testing::WriteText(file, bag.Finish());
+  return file;
+}
+
+CameraInfo SmallInfo(double baseline_m) {
+  CameraInfo info;
+  info.width = 64;
+  info.height = 48;
+  info.model = "plumb_bob";
+  info.lens = {-0.1, 0, 0, 0, 0};
+  info.K = {60, 0, 31, 0, 60, 23, 0, 0, 1};
+  info.R = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  info.P = {50, 0, 30, -50 * baseline_m, 0, 50, 22, 0, 0, 0, 1, 0};
+  return info;
+}
+
+TEST(BagDataset, PairsHaveTheirCamerasFromBothCameraInfos) {
+  const auto options = [](const std::string& images) {
+    DatasetOptions o = Topic("/left/" + images, Sensor::kStereo);
+    o.right_topic = "/right/" + images;
+    return o;
+  };
+  const auto raw =
+      OpenDataset(PairsWithInfo("image_raw", SmallInfo(0), SmallInfo(0.2)), options("image_raw"));
+  EXPECT_NEAR(raw->Rig().baseline_m, 0.2, 1e-9);
+  EXPECT_GT(cv::norm(raw->Read(1).frame->right, Picture(64, 48, 1), cv::NORM_INF), 0) << "rectified";
+  const fs::path rectified = PairsWithInfo("image_rect", SmallInfo(0), SmallInfo(0.2));
+  const auto pairs = OpenDataset(rectified, options("image_rect"));
+  EXPECT_NEAR(pairs->Rig().baseline_m, 0.2, 1e-9);
+  EXPECT_EQ(pairs->Rig().camera.fx, 50) << "P, not K";
+  EXPECT_EQ(cv::norm(pairs->Read(1).frame->image, Picture(64, 48, 1), cv::NORM_INF), 0);
+  EXPECT_THAT(pairs->Warnings().front(), HasSubstr("/left/camera_info, P, as the images are rectified"));
+  EXPECT_THAT(OpenError(PairsWithInfo("image_raw", SmallInfo(0.2), SmallInfo(0)), options("image_raw")),
+              HasSubstr("/right/image_raw is the left camera"));
+}
+
+TEST(BagDataset, BinningAndRegionOfCameraInfoAreApplied) {
+  CameraInfo info = SmallInfo(0);
+  info.lens.clear();
+  info.width = 200;
+  info.height = 120;
+  info.K = {120, 0, 99.5, 0, 120, 59.5, 0, 0, 1};
+  info.window = {2, 2, 40, 10, 128, 96};
+  const auto dataset = OpenDataset(PairsWithInfo("image_raw", info, info), Topic("/left/image_raw"));
+  EXPECT_EQ(dataset->Rig().camera.fx, 60);
+  EXPECT_EQ(dataset->Rig().camera.cx, 29.5);  // (99.5 - 40 + 0.5) / 2 - 0.5
+  EXPECT_EQ(dataset->Rig().camera.cy, 24.5);
+  EXPECT_THAT(dataset->Warnings().front(), HasSubstr("binning 2x2, region 128x96 at (40, 10) applied"));
+  info.width = 64;  // of a driver that states what it sends
+  info.height = 48;
+  info.K = {60, 0, 31, 0, 60, 23, 0, 0, 1};
+  const auto sent = OpenDataset(PairsWithInfo("image_raw", info, info), Topic("/left/image_raw"));
+  EXPECT_EQ(sent->Rig().camera.fx, 60);
+  EXPECT_THAT(sent->Warnings().front(), HasSubstr("in it already"));
+}
+
+// A bag with images of these stamps in their headers, recorded every quarter of a second from 50 s on.
+fs::path WithStamps(const std::vector<double>& stamps_s) {
+  testing::BagWriter bag;
+  for (std::size_t i = 0; i < stamps_s.size(); ++i) {
+    const double received_s = 50 + 0.25 * static_cast<double>(i);
+    const cv::Mat picture = Picture(64, 48, static_cast<int>(i)), depth(48, 64, CV_16UC1, cv::Scalar(1500));
+    bag.Write("/image", "sensor_msgs/Image", ImageMessage(picture, "mono8", stamps_s[i]), received_s);
+    bag.Write("/depth", "sensor_msgs/Image", ImageMessage(depth, "16UC1", 9 + 0.1 * static_cast<double>(i)),
+              received_s + 0.01);
+  }
+  fs::path path = FreshFolder() / "stamps.bag";
+  testing::WriteText(path, bag.Finish());
+  return path;
+}
+
+TEST(BagDataset, StampsThatJumpBackAreRefusedWithThePlace) {
+  EXPECT_THAT(OpenError(WithStamps({10, 11, 12, 10.5, 11.5}), Topic("/image")),
+              AllOf(HasSubstr("/image: its time stamps jump back at image 3"),
+                    HasSubstr("from 12.000000 s to 10.500000 s"), HasSubstr("cut it there")));
+}
+
+TEST(BagDataset, WithConstantStampsHasTheTimesAtWhichItWasRecorded) {
+  DatasetOptions options = Topic("/image", Sensor::kRgbd);
+  options.depth_topic = "/depth";
+  for (const double stamp : {0.0, 77.5}) {
+    const auto dataset = OpenDataset(WithStamps({stamp, stamp, stamp}), options);
+    ASSERT_EQ(dataset->Size(), 3u);
+    EXPECT_DOUBLE_EQ(dataset->Stamp(2), 50.5);
+    EXPECT_THAT(dataset->Warnings().front(),
+                AllOf(HasSubstr("/image have the same stamp"), HasSubstr("recorded are used")));
+    EXPECT_FALSE(dataset->Read(1).frame->depth_m.empty());  // paired by the same clock
+  }
+  EXPECT_DOUBLE_EQ(OpenDataset(WithStamps({5}), Topic("/image"))->Stamp(0), 5);
+}
+
 TEST(BagDataset, OneThatWasCutOffGivesTheFramesBefore) {
   const fs::path file = FreshFolder() / "cut.bag";
   fs::copy_file(FourFrames(), file);

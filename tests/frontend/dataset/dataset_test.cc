@@ -227,6 +227,87 @@ TEST(DatasetTest, FolderOfImagesComesInNaturalOrderWithoutStrayPictures) {
   EXPECT_TRUE(OpenDataset(folder, With(Sensor::kMono, true))->Rig().calibrated);
 }
 
+TEST(DatasetTest, ImagesThatAreNamedByTheirTimesHaveTheseInTheirOrder) {
+  const auto stamps = [](const std::vector<std::string>& names) {
+    const auto folder = FreshFolder();
+    for (const std::string& name : names) WriteImage(folder / (name + ".png"), Picture(64, 48, 1));
+    std::string truth;
+    for (int k = 0; k < 4; ++k) truth += std::to_string(1403636579 + k) + " " + std::to_string(k) + " 0 0\n";
+    WriteText(folder / "groundtruth.txt", truth);  // in seconds, positions alone
+    const auto data = OpenDataset(folder, With(Sensor::kMono, true));
+    EXPECT_THAT(data->Warnings(), ::testing::Contains(HasSubstr("time stamps that they are called by")));
+    EXPECT_NEAR(data->ReadGroundTruth(folder / "groundtruth.txt", nullptr)[1].stamp_s, 1403636580, 1e-6);
+    std::vector<double> out;
+    for (std::size_t i = 0; i < data->Size(); ++i) out.push_back(data->Stamp(i));
+    return out;
+  };
+  using ::testing::DoubleNear;
+  using ::testing::ElementsAre;
+  EXPECT_THAT(stamps({"1403636579763555584", "1403636579813555456"}),
+              ElementsAre(DoubleNear(1403636579.763555584, 1e-6), DoubleNear(1403636579.813555456, 1e-6)));
+  EXPECT_THAT(stamps({"frame_1403636579.8", "frame_1403636579.763556"}),
+              ElementsAre(1403636579.763556, 1403636579.8));
+  EXPECT_THAT(stamps({"-50000000", "-100000000", "0", "50000000"}),
+              ElementsAre(DoubleNear(-0.1, 1e-9), DoubleNear(-0.05, 1e-9), 0, DoubleNear(0.05, 1e-9)));
+}
+
+TEST(DatasetTest, ListsOfImagesDepthAndPosesMayBeInAnyUnitOfTime) {
+  const auto folder = FreshFolder();
+  const auto list = [&](const char* name, const char* of, double per_second, double late_s) {
+    std::string text = "timestamp filename\n";
+    for (int k = 0; k < 5; ++k) {
+      const std::string file = std::string(of) + "/" + std::to_string(k) + ".png";
+      text += std::to_string((1403636579 + 0.05 * k + late_s) * per_second) + " " + file + "\n";
+      WriteImage(folder / file,
+                 of == std::string("rgb") ? Picture(64, 48, k) : cv::Mat(48, 64, CV_16UC1, cv::Scalar(5000)));
+    }
+    WriteText(folder / name, text);
+  };
+  for (const double images : {1.0, 1e3, 1e6, 1e9}) {
+    for (const double others : {1.0, 1e3, 1e6, 1e9}) {
+      list("rgb.txt", "rgb", images, 0);
+      list("depth.txt", "depth", others, 0.004);
+      WriteText(folder / "groundtruth.txt", std::to_string(1403636579 * others) + " 0 0 0 0 0 0 1\n" +
+                                                std::to_string(1403636579.05 * others) + " 1 0 0 0 0 0 1\n");
+      const auto data = OpenDataset(folder, With(Sensor::kRgbd, true));
+      ASSERT_EQ(data->Size(), 5U);
+      EXPECT_NEAR(data->Stamp(4), 1403636579.2, 1e-5);
+      EXPECT_FALSE(data->Read(4).frame->depth_m.empty());
+      std::vector<std::string> warnings = data->Warnings();
+      EXPECT_NEAR(data->ReadGroundTruth(folder / "groundtruth.txt", &warnings)[1].stamp_s, 1403636579.05,
+                  1e-5);
+      const bool truth_is_usual = others == 1 || others == images;
+      const int said = (images != 1 ? 1 : 0) + (others != images ? 1 : 0) + (truth_is_usual ? 0 : 1);
+      EXPECT_EQ(static_cast<int>(warnings.size()), said) << images << " " << others;
+    }
+  }
+}
+
+TEST(DatasetTest, AssociationsWhoseStampsNameTheImagesAreNanosecondsAndNoFrameNumbers) {
+  const auto folder = FreshFolder();
+  std::string list;
+  for (const std::string n : {"1403636579763555584", "1403636579813555456"}) {
+    WriteImage(folder / "rgb" / (n + ".png"), Picture(64, 48, 1));
+    WriteImage(folder / "depth" / (n + ".png"), cv::Mat(48, 64, CV_16UC1, cv::Scalar(5000)));
+    list += n + " rgb/" + n + ".png " + n + " depth/" + n + ".png\n";
+  }
+  WriteText(folder / "associations.txt", list);
+  EXPECT_NEAR(OpenDataset(folder, With(Sensor::kRgbd, true))->Stamp(1), 1403636579.813555456, 1e-6);
+}
+
+TEST(DatasetTest, KittiTimesMayBeInNanosecondsAndPosesNumbered) {
+  const auto folder = FreshFolder();
+  MakeKitti(folder, 4, false);
+  WriteText(folder / "times.txt", "0\n100000000\n200000000\n300000000\n");
+  WriteText(folder / "poses.txt", "1 1 0 0 5 0 1 0 6 0 0 1 7\n3 1 0 0 5 0 1 0 6 0 0 1 8\n");  // KITTI-360
+  const auto data = OpenDataset(folder, With(Sensor::kMono));
+  EXPECT_NEAR(data->Stamp(3), 0.3, 1e-9);
+  const Trajectory truth = data->ReadGroundTruth(folder / "poses.txt", nullptr);
+  ASSERT_EQ(truth.size(), 2U);
+  EXPECT_NEAR(truth[1].stamp_s, 0.3, 1e-9);
+  EXPECT_EQ(truth[1].pose.translation.z(), 8);
+}
+
 TEST(DatasetTest, VideoGivesTheSameFramesInAnyOrder) {
   const auto file = FreshFolder() / "clip.avi";
   {

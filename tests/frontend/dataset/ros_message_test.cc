@@ -137,26 +137,33 @@ TEST(DecodeImageMessage, SaysWhatIsWrong) {
   }
 }
 
-TEST(CameraOfMessage, PinholeAndLens) {
+TEST(DecodeCameraInfo, GivesPinholeAndLens) {
   const std::array<double, 9> K = {20, 0, 8, 0, 21, 6, 0, 0, 1};
   const auto camera = [&](const std::string& model, const std::vector<double>& lens) {
-    return CameraOfMessage(testing::CameraInfoMessage({16, 12}, K, model, lens), Serialization::kRos1,
-                           "x.bag");
+    return DecodeCameraInfo(testing::CameraInfoMessage({16, 12}, K, model, lens), Serialization::kRos1,
+                            "x.bag")
+        .Raw("x.bag");
   };
-  const auto plain = camera("plumb_bob", {0, 0, 0, 0, 0});
-  ASSERT_TRUE(plain.has_value());
-  EXPECT_EQ(plain->distortion, Distortion::kNone);
-  EXPECT_EQ(plain->width, 16);
-  EXPECT_EQ(plain->fy, 21);
-  EXPECT_EQ(plain->cx, 8);
-  const auto lens = camera("plumb_bob", {0.1, 0.2, 0.3, 0.4, 0.5});
-  EXPECT_EQ(lens->distortion, Distortion::kRadTan);
-  EXPECT_EQ(lens->coefficients[4], 0.5);
-  EXPECT_EQ(camera("equidistant", {0.1, 0, 0, 0})->distortion, Distortion::kEquidistant);
-  EXPECT_THAT(testing::ErrorOf([&] { camera("odd", {0.1}); }), HasSubstr("unknown distortion model 'odd'"));
-  EXPECT_FALSE(CameraOfMessage(testing::CameraInfoMessage({16, 12}, {}, "plumb_bob", {}),
-                               Serialization::kRos1, "x.bag"));
-  EXPECT_THAT(testing::ErrorOf([&] { CameraOfMessage("short", Serialization::kRos1, "x.bag"); }),
+  const PinholeCamera plain = camera("plumb_bob", {0, 0, 0, 0, 0});
+  EXPECT_EQ(plain.distortion, Distortion::kNone);
+  EXPECT_EQ(plain.width, 16);
+  EXPECT_EQ(plain.fy, 21);
+  EXPECT_EQ(plain.cx, 8);
+  const PinholeCamera lens = camera("plumb_bob", {0.1, 0.2, 0.3, 0.4, 0.5});
+  EXPECT_EQ(lens.distortion, Distortion::kRadTan);
+  EXPECT_EQ(lens.coefficients[4], 0.5);
+  EXPECT_EQ(camera("equidistant", {0.1, 0, 0, 0}).distortion, Distortion::kEquidistant);
+  EXPECT_EQ(camera("equidistant", {0, 0, 0, 0}).distortion, Distortion::kEquidistant) << "no pinhole";
+  EXPECT_EQ(camera("rational_polynomial", {0.1, 0, 0, 0, 0, 0, 0, 0}).coefficients[0], 0.1);
+  EXPECT_THAT(testing::ErrorOf([&] {
+                camera("rational_polynomial", {0.1, 0, 0, 0, 0, 0.2, 0, 0});
+              }),
+              HasSubstr("number 6 is not 0"));
+  EXPECT_THAT(testing::ErrorOf([&] { camera("odd", {0.1}); }), HasSubstr("the lens model 'odd'"));
+  EXPECT_FALSE(DecodeCameraInfo(testing::CameraInfoMessage({16, 12}, {}, "plumb_bob", {}),
+                                Serialization::kRos1, "x.bag")
+                   .IsCalibrated());
+  EXPECT_THAT(testing::ErrorOf([&] { DecodeCameraInfo("short", Serialization::kRos1, "x.bag"); }),
               HasSubstr("x.bag"));
 }
 
@@ -197,7 +204,7 @@ TEST(DecodeImageMessage, OfRos2IsAligned) {
     return DecodeImageMessage(kind + whole.substr(4), kImage, Serialization::kCdr, Pixels::kGrey).error;
   };
   EXPECT_THAT(error(std::string("\x00\x00\x00\x00", 4)), HasSubstr("is not serialized as little-endian CDR"));
-  EXPECT_THAT(error("\x28\xb5\x2f\xfd"), HasSubstr("compressed for itself"));
+  EXPECT_THAT(error("\x28\xb5\x2f\xfd"), HasSubstr("not serialized"));
 }
 
 TEST(NameOfType, IsThatOfRos1) {

@@ -83,6 +83,21 @@ TEST(TurnedDataset, OfAFullTurnIsAsItWas) {
   EXPECT_EQ(round.width, camera.width);
 }
 
+TEST(TurnedDataset, TurnsTheDistortionWithTheCamera) {
+  PinholeCamera camera = *Turned(0).camera;
+  const Eigen::Vector3d point(0.3, -0.2, 1.5);
+  for (const Distortion distortion : {Distortion::kRadTan, Distortion::kEquidistant}) {
+    camera.distortion = distortion;
+    camera.coefficients = {-0.2, 0.05, 0.01, -0.02, 0};
+    const Eigen::Vector2d p = camera.Project(point);
+    // Points turn with the images: to the right becomes downwards.
+    const Eigen::Vector2d q = TurnedCamera(camera, 90).Project({-point.y(), point.x(), point.z()});
+    EXPECT_NEAR((q - Eigen::Vector2d(camera.height - 1 - p.y(), p.x())).norm(), 0, 1e-9);
+    const Eigen::Vector2d r = TurnedCamera(camera, 180).Project({-point.x(), -point.y(), point.z()});
+    EXPECT_NEAR((r - Eigen::Vector2d(camera.width - 1 - p.x(), camera.height - 1 - p.y())).norm(), 0, 1e-9);
+  }
+}
+
 TEST(TurnedDataset, RefusesPairsRollingShuttersAndOtherAngles) {
   const fs::path folder = FreshFolder() / "drive";
   testing::MakeKitti(folder, 2, true);

@@ -45,6 +45,9 @@ TEST_F(CheckedQuery, ImagesAndRegionsMustFitEachOther) {
   ExpectRefusal([](LoopQuery& q) { q.mask = cv::Mat::ones(5, 5, CV_8U); }, "as large as the image");
   ExpectRefusal([&](LoopQuery& q) { q.mask = cv::Mat::ones(image_.size(), CV_32F); }, "CV_8UC1");
   ExpectRefusal([](LoopQuery& q) { q.depth_m = cv::Mat::zeros(5, 5, CV_32F); }, "depth_m");
+  for (const int type : {CV_32FC1, CV_8UC(128), CV_8UC4, CV_8UC2, CV_16UC3, CV_16SC1, CV_64FC1})
+    ExpectRefusal([&](LoopQuery& q) { q.image = cv::Mat::zeros(image_.size(), type); },
+                  "image must be CV_8UC1, CV_8UC3");
   ExpectRefusal([](LoopQuery& q) { q.cameras = {{0, 0, 0, 9}}; }, "empty");
   ExpectRefusal([](LoopQuery& q) { q.cameras = {{0, 0, 9, 9}, {300, 0, 100, 240}}; }, "inside of the image");
   ExpectRefusal([](LoopQuery& q) { q.cameras = {{2000000000, 0, 2000000000, 240}}; }, "inside of the image");

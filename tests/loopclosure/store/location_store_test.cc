@@ -1,6 +1,7 @@
 #include "loopclosure/store/location_store.h"
 
 #include <gtest/gtest.h>
+#include <sqlite3.h>
 
 #include <filesystem>
 #include <fstream>
@@ -83,6 +84,34 @@ TEST_F(LocationStoreTest, FilesThatAreNoStoreAreRefusedAndLeftAlone) {
   EXPECT_EQ(fs::file_size(File()), 5000u);
   EXPECT_NE(Refusal((folder_ / "no" / "such" / "folder").string()).find("can't be written"),
             std::string::npos);
+}
+
+// A name that was given by mistake, or by a stranger's file.
+TEST_F(LocationStoreTest, ADatabaseOfAnotherProgramStaysAsItIs) {
+  const auto bytes = [this] {
+    std::ifstream in(File(), std::ios::binary);
+    return std::string((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+  };
+  for (const char* content : {"CREATE TABLE records (name TEXT)", "CREATE VIEW v AS SELECT 1",
+                              "CREATE TABLE t (a); DROP TABLE t; PRAGMA application_id = 7",
+                              "PRAGMA application_id = 7; CREATE TABLE t (a)"}) {
+    fs::remove(File());
+    sqlite3* database = nullptr;
+    ASSERT_EQ(sqlite3_open(File().c_str(), &database), SQLITE_OK);
+    ASSERT_EQ(sqlite3_exec(database, content, nullptr, nullptr, nullptr), SQLITE_OK);
+    sqlite3_close(database);
+    const std::string before = bytes();
+    EXPECT_NE(Refusal(File()).find("is a database of another program"), std::string::npos) << content;
+    EXPECT_EQ(bytes() == before, true) << content;
+    EXPECT_EQ(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()), 1) << content;
+  }
+}
+
+TEST_F(LocationStoreTest, AnEmptyFileBecomesAMemoryAndAFolderOrADeviceDoesNot) {
+  std::ofstream(File()).flush();
+  EXPECT_EQ(Refusal(File()), "");
+  EXPECT_NE(Refusal(folder_.string()).find("is no file"), std::string::npos);
+  EXPECT_NE(Refusal("/dev/null").find("is no file"), std::string::npos);
 }
 
 TEST_F(LocationStoreTest, DamageIsFoundByTheChecksum) {

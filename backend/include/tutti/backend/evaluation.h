@@ -90,7 +90,7 @@ struct AssociatedPoses {
 
 /// Nearest neighbours in time, for each pose of the shorter trajectory (the estimate where they are equally
 /// long). `offset_s` is added to the estimate's stamps. Throws InputError that names both time ranges if
-/// nothing matches.
+/// nothing matches, and how far apart the nearest two poses are.
 AssociatedPoses AssociateByTime(const Trajectory& reference, const Trajectory& estimate,
                                 double max_difference_s, double offset_s = 0);
 /// Each pose of the estimate with the reference interpolated at its time; (index of the reference: the pose
@@ -174,8 +174,9 @@ PoseMatrix ProjectToPlane(const PoseMatrix& pose, ProjectionPlane plane);
 
 /// How much of the reference's span of time an estimate has poses for.
 struct TrajectoryCoverage {
-  std::size_t posed = 0;  ///< poses, or frames with a pose, within the span
-  std::size_t all = 0;    ///< those, and frames without a pose
+  std::size_t posed = 0;     ///< poses, or frames with a pose, within the span
+  std::size_t all = 0;       ///< those, and frames without a pose
+  std::size_t unpaired = 0;  ///< poses of the estimate within the span that are in no pair
   /// From 0 to 1.
   double share() const { return all == 0 ? 0 : static_cast<double>(posed) / static_cast<double>(all); }
 };
@@ -217,7 +218,11 @@ KittiErrors EvaluateKitti(const std::vector<Pose>& reference, const std::vector<
 SegmentErrors EvaluateDrift(const std::vector<PoseMatrix>& reference,
                             const std::vector<PoseMatrix>& estimate);
 
+/// Where the reference or the estimate has positions alone (HasRotations), all figures that need rotations
+/// are of nothing: `rotations` is false, and ate_rotation, ate_full, rpe, its rotation and full, kitti, drift
+/// count 0.
 struct EvaluationReport {
+  bool rotations = true;
   std::size_t pairs = 0;                                ///< associated poses
   std::size_t reference_poses = 0, estimate_poses = 0;  ///< that could have been paired
   AssociationStatistics association;
@@ -242,7 +247,8 @@ struct EvaluationReport {
   std::vector<std::pair<std::size_t, std::size_t>> relative_pairs;  ///< indices into `poses`
 };
 
-/// Associates, aligns and measures. Throws InputError as the functions above do.
+/// Associates, aligns and measures. Throws InputError as the functions above do, and if an option needs
+/// rotations that are not known.
 EvaluationReport EvaluateTrajectory(const Trajectory& reference, const Trajectory& estimate,
                                     const EvaluationOptions& options = {},
                                     const RotationsAsWritten& written = {});

@@ -5,11 +5,13 @@
 //   numbers, by rows) VERTEX_SIM3:QUAT id x y z qx qy qz qw s     EDGE_SIM3:QUAT i j x y z qx qy qz qw s  I11
 //   .. I77 (28 numbers)   [tutti's own] FIX id [id ...]
 // Poses are node-to-world, measurements S_i_j. Information: upper triangle of (translation, rotation[, log
-// scale]).
+// scale]). Landmarks, priors, TORO's tags and switchable loops are read as well: docs/backend.md lists the
+// tags.
 #pragma once
 
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -32,22 +34,25 @@ const char* ToString(BadInformation how);
 
 struct G2oFile {
   PoseGraph graph;
-  std::vector<std::string>
-      warnings;  ///< unknown tags (once each, with count and first line), vertices without edges, ...
+  std::vector<std::string> warnings;  ///< what was ignored, read as something else, or is missing; once each
   bool has_all_vertices =
       false;  ///< false: some or all poses are missing and must be initialised from the edges
   std::size_t bad_information = 0;  ///< edges with such a matrix
   std::size_t skipped = 0;          ///< those of them that are left out
+  std::size_t ignored = 0;          ///< lines whose tag is not known
 };
 
-/// Reads a graph. Vertices may be missing; edges with |i - j| != 1 count as loops. Throws InputError with
-/// file and line for: a missing file, a line with too few or unreadable numbers, NaN, a vertex given twice, a
-/// zero quaternion, an edge from a node to itself, kinds that are mixed, no edge at all, information matrices
-/// that are not positive definite (kRefuse, with their number) or without which the graph falls apart.
-G2oFile ReadG2o(const std::filesystem::path& file, BadInformation bad = BadInformation::kRefuse);
+/// Reads a graph. Vertices may be missing; what is odometry and what a loop is PoseGraph::FindOdometry's
+/// decision. Throws InputError with file and line for: a missing file, a line with too few or unreadable
+/// numbers, NaN, a vertex given twice, a zero quaternion, an edge from a node to itself, kinds that are
+/// mixed, no edge at all, tags that are not known (with the number of their lines; `ignore_unknown`: a
+/// warning), information matrices that are not positive definite (kRefuse, with their number) or without
+/// which the graph falls apart. `progress` is told the number of lines read, from time to time.
+G2oFile ReadG2o(const std::filesystem::path& file, BadInformation bad = BadInformation::kRefuse,
+                bool ignore_unknown = false, const std::function<void(std::size_t)>& progress = {});
 
-/// Writes a graph so that reading gives the same numbers (17 digits). Throws InputError when it can't be
-/// written in full.
+/// Writes a graph so that reading gives the same numbers (17 digits) and ids. Throws InputError when it can't
+/// be written in full.
 void WriteG2o(const std::filesystem::path& file, const PoseGraph& graph);
 
 }  // namespace tutti

@@ -48,7 +48,7 @@ const char* ToString(GraphStart start);
 
 /// Who solves the least-squares problems. kCeres: Ceres Solver (Agarwal, Mierle et al.) with CHOLMOD. kBlock:
 /// the same Levenberg-Marquardt with a Cholesky factorisation of the nodes' blocks: the same optimum in a
-/// fraction of the time (docs/backend.md). kSwitchable is always solved by Ceres.
+/// fraction of the time (docs/backend.md). kSwitchable, landmarks and priors are always solved by Ceres.
 enum class PoseGraphSolver { kCeres, kBlock };
 
 /// Words of the command line and the YAML files ("chi2log", "gnc", "chordal", ...).
@@ -111,7 +111,8 @@ struct PoseGraphOptions {
   std::string Validate() const { return OutOfRange(*this, "pose graph: "); }
 };
 
-/// The three costs of a graph at its present poses, all edges with weight 1, no robust loss.
+/// The three costs of a graph at its present poses, all edges with weight 1, no robust loss. chi2 and chi2log
+/// have the measurements of landmarks and the priors in them, chordal has not.
 struct GraphCosts {
   double chi2 = 0;
   double chi2log = 0;
@@ -138,8 +139,9 @@ struct EdgeOutcome {
 
 /// One connected part of the graph.
 struct GraphComponent {
-  int anchor = 0;  ///< id of the node that holds it in place (the first fixed one, else the smallest id)
+  NodeId anchor = 0;  ///< id of the node that holds it in place (the first fixed one, else the smallest id)
   std::size_t nodes = 0;
+  bool by_priors = false;  ///< priors hold it, and no node is fixed
 };
 
 /// What a start came to.
@@ -182,8 +184,9 @@ class PoseGraphOptimizer {
   explicit PoseGraphOptimizer(const PoseGraphOptions& options = {});
 
   /// Moves the nodes of `graph` to the optimum. On failure the graph keeps its poses and the report says why.
-  /// A component without a fixed node is anchored at its smallest id, which keeps its pose.
-  /// `stop` is asked before each iteration: true gives up, which is a failure with the termination "stopped".
+  /// A component without a fixed node and without priors is anchored at its smallest id, which keeps its
+  /// pose. `stop` is asked before each iteration: true gives up, which is a failure with the termination
+  /// "stopped".
   PoseGraphReport Optimize(PoseGraph& graph, const std::function<bool()>& stop = {}) const;
 
   const PoseGraphOptions& options() const { return options_; }

@@ -1,7 +1,7 @@
 // Trajectories in any file format, told apart by their content, with or without time stamps; conversion.
 #pragma once
 
-#include <Eigen/Core>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -22,30 +22,38 @@ const char* ToString(PoseFileFormat format);
 /// What the content looks like. Throws InputError if it can't be read.
 PoseFileFormat GuessPoseFileFormat(const std::filesystem::path& file);
 
-/// What a file holds.
-struct PoseFile {
+/// What a file holds. Without stamps those of the trajectory are line numbers from 0 (KITTI), or, with
+/// `has_numbers`, numbers of frames (KITTI-360) or ids (g2o).
+struct PoseFile : TrajectoryDetails {
   PoseFileFormat format = PoseFileFormat::kTum;
   Trajectory trajectory;
-  bool has_stamps = true;           ///< false: the "stamps" are line numbers from 0 (KITTI) or ids (g2o)
-  std::vector<MotionSigma> sigmas;  ///< TUM with 10 columns alone, one per pose; see ReadTrajectory
-  std::vector<Eigen::Matrix3d> rotations_as_written;  ///< KITTI alone: not quite rotations; see evaluation.h
   std::vector<std::string> warnings;
 };
 
-/// Reads a file of poses. `format`: nothing guesses it. `times_s` gives KITTI's lines (one each) or g2o's ids
-/// (the id is the line) their stamps; other formats have their own. A planar g2o graph lies in z = 0; of
-/// similarities the scale is dropped. Throws InputError as ReadTrajectory and ReadG2o do, if the times are
-/// too few (KITTI: not as many), and for a graph without poses; the message says which format the file looks
-/// like if it is not the one that was asked for.
+/// Reads a file of poses. `format`: nothing guesses it. `times_s` gives KITTI's lines (one each), KITTI-360's
+/// frames or g2o's ids (the number is the line) their stamps; other formats have their own. A planar g2o
+/// graph lies in z = 0; of similarities the scale is dropped. Throws InputError as ReadTrajectory and ReadG2o
+/// do, if the times are too few (KITTI: not as many), and for a graph without poses; the message says which
+/// format the file looks like if it is not the one that was asked for.
 PoseFile ReadPoseFile(const std::filesystem::path& file, std::optional<PoseFileFormat> format = {},
                       const std::vector<double>& times_s = {});
 
-/// Writes poses. g2o: vertices 0, 1, ..., and between neighbours an edge with identity information, since a
-/// graph needs edges. KITTI and g2o have no room for time stamps. Throws InputError if it can't be written.
-void WritePoseFile(const std::filesystem::path& file, const Trajectory& trajectory, PoseFileFormat format);
+/// Stamps of an uncertain unit (TrajectoryDetails) become those with which the poses are of the time of the
+/// others: of the trajectory that they are compared with, or of the images along it. Then the warnings do not
+/// speak of it.
+void AgreeOnUnit(double others_begin_s, double others_end_s, PoseFile& poses);
+void AgreeOnUnit(PoseFile& a, PoseFile& b);
 
-/// Writes KITTI's times.txt: one time stamp [s] a line. Throws InputError if it can't be written in full.
-void WriteTimes(const std::filesystem::path& file, const Trajectory& trajectory);
+/// Writes poses. g2o: vertices 0, 1, ..., and between neighbours an edge with identity information, since a
+/// graph needs edges. KITTI and g2o have no room for time stamps, nor for positions alone. `stamps_ns`: see
+/// WriteTrajectory. Throws InputError if it can't be written.
+void WritePoseFile(const std::filesystem::path& file, const Trajectory& trajectory, PoseFileFormat format,
+                   const std::vector<std::int64_t>& stamps_ns = {});
+
+/// Writes KITTI's times.txt: one time stamp [s] a line. `stamps_ns`: see WriteTrajectory. Throws InputError
+/// if it can't be written in full.
+void WriteTimes(const std::filesystem::path& file, const Trajectory& trajectory,
+                const std::vector<std::int64_t>& stamps_ns = {});
 
 }  // namespace tutti
 #pragma GCC visibility pop

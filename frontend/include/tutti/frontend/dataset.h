@@ -1,4 +1,4 @@
-// Where frames come from: KITTI, TUM, EuRoC, a folder of images, a video.
+// Where frames come from: KITTI, TUM, EuRoC, other layouts, a folder of images, a video.
 #pragma once
 
 #include <array>
@@ -31,7 +31,7 @@ struct ColourImage {
 };
 
 /// The layout of a data set on disk.
-enum class DatasetType { kAuto, kKitti, kTum, kEuroc, kImages, kVideo, kBag };
+enum class DatasetType { kAuto, kKitti, kTum, kEuroc, kPaired, kImages, kVideo, kBag };
 
 /// The words of the YAML files.
 EnumWords<DatasetType> WordsOf(DatasetType);
@@ -42,17 +42,23 @@ using TransformRows = std::array<double, 16>;
 /// How to read a data set: sections `dataset:` and `camera:` of the YAML files.
 struct DatasetOptions {
   TUTTI_OPTION(DatasetType, type, DatasetType::kAuto,
-               "layout on disk (bag: ROS 1); auto: from what the folder holds", Basic());
+               "layout on disk; auto: from what the folder holds. paired: left and right, or colour and "
+               "depth, images side by side, as in TartanAir, ScanNet and others (data/README.md)",
+               Basic());
   TUTTI_OPTION(Sensor, sensor, Sensor::kMono, "what the camera is", Basic());
-  TUTTI_OPTION(double, depth_units_per_m, 5000, "RGB-D: value in the depth image of one metre", Basic(),
-               Above(0));
+  TUTTI_OPTION(double, depth_units_per_m, 0,
+               "RGB-D: value in the depth image of one metre (1000: millimetres); 0: that of the layout, "
+               "1000 in a ROS bag, else 5000 (TUM), and floats are metres",
+               Basic(), From(0));
   TUTTI_OPTION(double, max_depth_m, 0, "RGB-D: farther depth is not used; 0: no limit", Basic(), Unit("m"),
                From(0));
   TUTTI_OPTION(double, max_association_s, 0.02,
                "TUM, ROS bag: greatest difference of the stamps of colour and depth; a colour image without "
                "depth is tracked with colour alone",
                Unit("s"), From(0));
-  TUTTI_OPTION(double, rate_hz, 0, "frame rate where the data has no time stamps; 0: 10 Hz or the video's",
+  TUTTI_OPTION(double, rate_hz, 0,
+               "frame rate where the data has no time stamps, and in place of those of a video; 0: 10 Hz, or "
+               "the video's own stamps",
                Basic(), Unit("1/s"), From(0));
   TUTTI_OPTION(std::string, topic, "",
                "ROS bag: images of the left (or only, or colour) camera; empty: the bag's only one", Basic());
@@ -104,6 +110,11 @@ struct DatasetOptions {
       "stereo, rectified pairs: distance of the cameras, where sensor.yaml or calib.txt does not say "
       "it",
       Basic(), Section("camera"), Unit("m"), From(0));
+  TUTTI_OPTION(
+      double, fov_deg, 0,
+      "horizontal field of view, in place of fx, fy, cx and cy, where nothing else says them: square "
+      "pixels, principal point in the middle; 0: not known",
+      Section("camera"), Unit("deg"), From(0), To(170));
   TUTTI_OPTION(double, readout_s, 0,
                "rolling shutter: the last row is read so long after the first; 0: all rows at once", Basic(),
                Section("camera"), Unit("s"), From(0), To(0.1));
@@ -150,8 +161,14 @@ class Dataset {
   /// size and pixels, without DatasetOptions::noise. Three times grey where the data is grey. Errors as
   /// Read().
   virtual ColourImage ReadColour(std::size_t i) const;
+  /// Share of the (left, or only) images of the whole data set that are no frames: they repeat a time stamp,
+  /// or lie in a damaged part of a bag. Warnings() says which.
+  virtual double SkippedShare() const { return 0; }
   /// The rig after rectification.
   virtual const CameraRig& Rig() const = 0;
+  /// Clockwise angle by which the images of a video were turned, as its rotation flag says [deg]: the rig's
+  /// camera was turned with them from that of the options, which is of the sensor's own orientation.
+  virtual int TurnedBy() const { return 0; }
   /// Ground truth in its usual place in the folder (T_world_body, stamps as Stamp()), if there is any.
   virtual std::optional<std::filesystem::path> GroundTruthFile() const = 0;
   /// Reads a ground-truth file for this data set: format guessed, KITTI poses get the data set's stamps, and
@@ -171,21 +188,25 @@ std::optional<std::size_t> FindStamp(const Dataset& dataset, double stamp_s);
 DatasetType DetectDatasetType(const std::filesystem::path& path);
 
 /// True for what gives its frames once, in order, and is no file to look at before: "camera:0", a pair
-/// "camera:0,1", files in their stead ("camera:FILE"), and addresses of streams (IsStream).
+/// "camera:0,1", files in their stead ("camera:FILE"), addresses of streams (IsStream), "-" (standard input),
+/// and pipes that have a name.
 bool IsCamera(const std::string& name);
 /// True for those that keep their own time: "camera:0", "camera:0,1" and streams.
 bool IsCameraDevice(const std::string& name);
 /// What is behind "camera:", split at commas: {"0", "1"} of "camera:0,1", {FILE} of "camera:FILE", also where
-/// the name of an existing file has a comma. Of a stream its address; of another name nothing.
+/// the name of an existing file has a comma. Of a stream its address, of a pipe its name; of another name
+/// nothing.
 std::vector<std::string> CameraSources(const std::string& name);
+/// True for a pipe that has a name, and for "-" unless a file is redirected to it: it can be opened once.
+bool IsPipe(const std::string& name);
 /// True for addresses: "rtsp://...", "rtsps://...", "http://...", "https://...".
 bool IsStream(const std::string& name);
 
 /// Opens a data set: a folder, a video file, a camera (camera:0), two (camera:LEFT,RIGHT for stereo,
-/// camera:COLOUR,DEPTH for RGB-D), files that stand in for them, or a stream (rtsp://..., http://...). One
-/// camera or stream with sensor stereo gives both images side by side, left and right. Throws InputError if
-/// there is nothing usable: missing or empty folder, no calibration where one is needed, unsorted time
-/// stamps, ... The message says what was expected where.
+/// camera:COLOUR,DEPTH for RGB-D), files that stand in for them, a stream (rtsp://..., http://...), or a
+/// video through a pipe (- is standard input). One camera or stream with sensor stereo gives both images side
+/// by side, left and right. Throws InputError if there is nothing usable: missing or empty folder, no
+/// calibration where one is needed, unsorted time stamps, ... The message says what was expected where.
 std::unique_ptr<Dataset> OpenDataset(const std::filesystem::path& path, const DatasetOptions& options);
 
 }  // namespace tutti

@@ -125,7 +125,8 @@ class Odometry {
   /// result into InputFrame::features to take the work off Track's thread.
   std::shared_ptr<const FrameFeatures> Extract(const InputFrame& frame) const;
 
-  /// Tracks the next frame; frames come in order of time. Never throws for hard images.
+  /// Tracks the next frame; frames come in order of time. Never throws for hard images; throws InputError for
+  /// those of another type or size than InputFrame and the rig say, as Extract and Follow do.
   TrackResult Track(const InputFrame& frame);
 
   /// The next frame of another odometry, which says where it is in that one's world: keyframes and landmarks

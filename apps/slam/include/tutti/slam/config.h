@@ -25,7 +25,9 @@ struct RunConfig {
   SlamOptions run;            ///< section `run:`
 };
 
-/// Reads a configuration; keys that the file leaves out keep their defaults. Throws InputError that names
+/// Reads a configuration; keys that the file leaves out keep their defaults. Where there is no such file, a
+/// bare name is that of a configuration for a public data set that is part of tutti: "7scenes", "euroc_mono",
+/// "data/configs/euroc_mono.yaml". Throws InputError that names
 /// file and line for: missing file, YAML errors, unknown or repeated keys (with the nearest valid one), a
 /// value of the wrong type, a value out of range.
 RunConfig LoadConfig(const std::filesystem::path& file);

@@ -41,9 +41,10 @@ struct MapSession {
 
 /// What a map file says of itself, without reading the map.
 struct MapInfo {
-  std::string program;  ///< version of tutti that wrote it
-  std::string note;     ///< of whoever had it written: `tutti run` says in JSON what it was called with
-  RunConfig config;     ///< of the run; with the seed
+  std::string program;   ///< version of tutti that wrote it
+  std::string note;      ///< of whoever had it written: `tutti run` says in JSON what it was called with
+  RunConfig config;      ///< of the run; with the seed, without loops.ltm_file
+  std::string ltm_file;  ///< that the run had: nobody who reads the map writes it
   CameraRig rig;
   std::int64_t frames = 0;                     ///< that were tracked
   std::int64_t last_frame = 0;                 ///< InputFrame::index of the last one, of the last session
@@ -70,7 +71,8 @@ class MapSnapshot {
  public:
   /// Writes the file, on any thread, also after the SlamSystem is gone; waits for what was being worked out
   /// beside the tracking at that moment. `more` may add sections of the caller's, with tags from 300 on.
-  /// Throws InputError if it can't be written: what was there before is untouched then.
+  /// Throws InputError if it can't be written, what was there before is untouched then, or if this was moved
+  /// from. A device or a pipe can't be written; a symbolic link is followed.
   void Write(const std::filesystem::path& file, const std::function<void(const MapSink&)>& more = {}) const;
 
   struct Parts;

@@ -87,7 +87,7 @@ class SlamSystem {
   /// one map now, which can be saved, localised in, and gone on with (BeginSession; no frame may be tracked
   /// before that). False: no places in common were found that can be relied on, and this map is of no use any
   /// more either; `reason`, which may be null, says why in plain words. Throws InputError if they can't be
-  /// compared. Recorders must outlive both.
+  /// compared, or `other` is this map or null. Recorders must outlive both.
   bool Merge(SlamSystem* other, std::string* reason = nullptr);
   /// The recordings so far, oldest first; there is always one, and the last one goes on.
   std::vector<MapSession> Sessions() const;
@@ -98,7 +98,8 @@ class SlamSystem {
   /// there is no map, or no detector that knows it.
   void BeginLocalization();
 
-  /// Tracks the next frame and brings in what is due. Never throws for hard images.
+  /// Tracks the next frame and brings in what is due. Never throws for hard images; throws InputError for
+  /// those of another type or size than InputFrame and the rig say, and nothing has changed then.
   TrackResult Track(const InputFrame& frame);
   /// The next frame of another odometry and its pose in that one's world (Odometry::Follow), instead of
   /// Track: loops are found and closed as ever, and the odometry stays as it is between them. Without

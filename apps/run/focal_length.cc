@@ -13,11 +13,8 @@
 #include <vector>
 
 #include "apps/run/map_figures.h"
-<<<<<<< HEAD
 #include "apps/run/run_parts.h"
-=======
 #include "frontend/dataset/turned_dataset.h"
->>>>>>> 258a46967d914f39105da5f22392617bbef767a5
 #include "tutti/frontend/odometry.h"
 
 namespace tutti {
@@ -34,6 +31,7 @@ constexpr double kNeedsLens = 4;        // gain of another lens [squares of sigm
 constexpr double kCentreSigma = 0.01;   // prior of the principal point, as share of the width
 constexpr double kCorrelation = 3.0;    // errors of neighbouring keypoints are not independent
 constexpr double kWorstSigma = 0.10;    // of a focal length that is worth more than a guess
+constexpr double kLeftOver = 0.3;       // of a move: what a map that was tracked with another one keeps of it
 constexpr double kWorstChecked = 0.15;  // of one that can speak against another
 constexpr int kFewestKeyframes = 6;
 constexpr int kFewestFeatures = 500;  // of an image; half of those of the run do
@@ -272,9 +270,10 @@ struct Estimate {
   double sigma = 1;                             // of the logarithm of the focal length
 };
 
-// A distortion of the lens and another focal length look nearly the same, and what the model has not (further
-// coefficients, a rolling shutter) goes into either: the truth lies between the fit with k1 free and the one
-// without distortion, and half of their difference is what the choice of the model is uncertain by.
+// A distortion of the lens and another focal length look nearly the same, and what the model has not
+// (further coefficients, a rolling shutter) goes into either: the truth lies between the fit with k1 free
+// and the one without distortion, and half of their difference is what the choice of the model is uncertain
+// by.
 std::optional<Estimate> EstimateOf(const Scene& scene) {
   Scene free = scene, straight = scene;
   straight.lens_sigma = kNoLens;
@@ -311,7 +310,6 @@ int FramesToTrack(const Dataset& dataset, int most) {
 
 FocalLength MeasureFocalLength(const fs::path& path, const RunConfig& config, int frames) {
   constexpr double kSettled = 0.03;  // a move of the focal length that needs no second look
-  constexpr double kLeftOver = 0.3;  // of a move: what a map that was tracked with another one keeps of it
   const double cpu_begin = ProcessCpuSeconds();
   DatasetOptions as_stored = config.dataset;
   as_stored.rotate = 0;
@@ -320,13 +318,15 @@ FocalLength MeasureFocalLength(const fs::path& path, const RunConfig& config, in
   result.camera = dataset->Rig().camera;
   const int most = FramesToTrack(*dataset, frames);
   // From the usual one; a wide or a narrow one where that loses its way.
-<<<<<<< HEAD
   const std::array<double, 3> starts = {{1, 0.65, 1.5}};
   std::size_t start = 0;
   std::optional<Estimate> found;
   PinholeCamera camera = result.camera;
   for (int tracked = 0; tracked < 2 * most && start < starts.size();) {
-    if (!found) camera.fx = camera.fy = starts[start] * result.camera.fx;
+    if (!found) {
+      camera.fx = starts[start] * result.camera.fx;
+      camera.fy = starts[start] * result.camera.fy;
+    }
     const Pass pass = Track(*dataset, config, camera, most);
     result.frames = pass.frames;
     tracked += std::max(1, pass.frames);
@@ -337,42 +337,6 @@ FocalLength MeasureFocalLength(const fs::path& path, const RunConfig& config, in
       if (found) break;
       ++start;
       continue;
-=======
-  for (const double share : {1.0, 0.65, 1.5}) {
-    PinholeCamera camera = result.camera;
-    camera.fx *= share;
-    camera.fy *= share;
-    for (int i = 0; i < kMostPasses; ++i) {
-      Pass pass = Track(*dataset, config, camera, frames);
-      result.frames = pass.frames;
-      if (!pass.scene || 2 * pass.posed < pass.frames) {
-        result.reason = "too little of it could be tracked";
-        break;
-      }
-      const Fit fit = Adjust(*pass.scene, false);
-      const PinholeCamera found = CameraOf(camera, pass.scene->lens);
-      if (!fit.usable || !(found.fx > 0.2 * camera.width) || !(found.fx < 10 * camera.width)) {
-        result.reason = "its frames agree with no focal length";
-        break;
-      }
-      const bool settled = std::abs(std::log(found.fx / camera.fx)) < kSettled;
-      camera = found;
-      if (!settled && i + 1 < kMostPasses) continue;
-      result.sigma = SigmaOf(*pass.scene, fit);
-      if (result.sigma > kWorstSigma) {
-        result.reason = "its motion does not tell the focal length";
-        return result;
-      }
-      result.measured = true;
-      result.reason.clear();
-      result.camera = camera;
-      if (std::abs(pass.scene->lens[1]) > 0.01) {
-        result.camera.distortion = Distortion::kRadTan;
-        result.camera.coefficients = {pass.scene->lens[1], 0, 0, 0, 0};
-      }
-      result.camera = TurnedCamera(result.camera, (360 - dataset->TurnedBy()) % 360);
-      return result;
->>>>>>> 258a46967d914f39105da5f22392617bbef767a5
     }
     found = here;
     const double moved = found->lens[0] - std::log(camera.fx);
@@ -391,6 +355,29 @@ FocalLength MeasureFocalLength(const fs::path& path, const RunConfig& config, in
     result.camera.distortion = Distortion::kRadTan;
     result.camera.coefficients = {found->lens[1], 0, 0, 0, 0};
   }
+  result.camera = TurnedCamera(result.camera, (360 - dataset->TurnedBy()) % 360);
+  return result;
+}
+
+FocalLength FocalLengthOf(const Odometry& odometry, const FrameRange& session) {
+  const double cpu_begin = ProcessCpuSeconds();
+  FocalLength result;
+  result.camera = odometry.Rig().camera;
+  const std::optional<Scene> scene = SceneOf(
+      odometry, WhereItTurns(odometry, KeyframesOfLargestSubmap(odometry, session), kCheckedKeyframes),
+      kMostLandmarks, result.camera.fy / result.camera.fx);
+  const std::optional<Estimate> found = scene ? EstimateOf(*scene) : std::nullopt;
+  if (found && IsLens(std::exp(found->lens[0]), result.camera.width)) {
+    result.sigma = std::hypot(found->sigma, kLeftOver * (found->lens[0] - scene->given));
+    result.measured = result.sigma <= kWorstSigma;
+    if (result.measured) {
+      result.camera.fy *= std::exp(found->lens[0]) / result.camera.fx;
+      result.camera.fx = std::exp(found->lens[0]);
+    }
+  }
+  if (!result.measured)
+    result.reason = scene ? "the motion does not tell the focal length" : "the map is too small";
+  result.cpu_s = ProcessCpuSeconds() - cpu_begin;
   return result;
 }
 

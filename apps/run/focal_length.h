@@ -31,6 +31,10 @@ struct FocalLength {
 FocalLength MeasureFocalLength(const std::filesystem::path& dataset, const RunConfig& config,
                                int frames = 300);
 
+/// The same bundle adjustments on the map of a run, 40 keyframes in a row where its camera turns most,
+/// without tracking anything again. `camera`: the odometry's with another focal length.
+FocalLength FocalLengthOf(const Odometry& odometry, const FrameRange& session = {});
+
 /// Whether a map agrees with the camera that it was made with.
 struct LensCheck {
   bool measured = false;    ///< false: too small a map, or its motion does not tell

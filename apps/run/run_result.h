@@ -137,8 +137,10 @@ struct RunResult {
   std::vector<Trajectory> other_pieces;  ///< of the map, after losses; no loop joined them to `trajectory`
   bool odometry_complete =
       true;  ///< false: it ends at the first correction (interrupted, or run.odometry_pass: false)
-  MapFigures map_figures;          ///< zeros without poses
-  LensCheck lens_check;            ///< not measured where another odometry is followed
+  MapFigures map_figures;                          ///< zeros without poses
+  std::optional<FocalLength> focal_length;         ///< RunRequest::focal_length
+  std::optional<FocalLength> focal_length_of_map;  ///< what the whole map says then
+  LensCheck lens_check;                            ///< not measured where another odometry is followed
   std::vector<int> frame_inliers;  ///< of each frame posed by landmarks, when it came: TrackResult::inliers
   std::size_t frames_by_grey_values = 0;  ///< posed without landmarks: TrackResult::by_grey_values
   bool given_odometry = false;            ///< another odometry was followed
@@ -150,7 +152,6 @@ struct RunResult {
   // Cost.
   double wall_s = 0;                ///< of the run, without the evaluation
   double cpu_s = 0;                 ///< processor time of all threads, without that of the odometry alone
-  double measuring_cpu_s = 0;       ///< part of cpu_s: measuring the focal length
   double odometry_alone_cpu_s = 0;  ///< processor time of the odometry that loops did not reach
   std::vector<double> frame_ms;     ///< of each frame, from having its features to having its pose
   std::vector<double>

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "apps/run/map_figures.h"
+#include "apps/run/run_parts.h"
 #include "frontend/dataset/turned_dataset.h"
 #include "tutti/frontend/odometry.h"
 
@@ -25,12 +26,15 @@ constexpr double kPixelSigma = 1.0;     // of a keypoint [px]
 constexpr double kDepthSigma = 0.02;    // of a depth, as share of it
 constexpr double kLensSigma = 0.05;     // prior of k1
 constexpr double kLensKept = 0.005;     // the same where the lens is taken to be as it was calibrated
+constexpr double kNoLens = 1e-5;        // the same where there is none
 constexpr double kNeedsLens = 4;        // gain of another lens [squares of sigma] below which none is needed
 constexpr double kCentreSigma = 0.01;   // prior of the principal point, as share of the width
 constexpr double kCorrelation = 3.0;    // errors of neighbouring keypoints are not independent
-constexpr double kWorstSigma = 0.05;    // of a focal length that is worth more than a guess
+constexpr double kWorstSigma = 0.10;    // of a focal length that is worth more than a guess
+constexpr double kLeftOver = 0.3;       // of a move: what a map that was tracked with another one keeps of it
 constexpr double kWorstChecked = 0.15;  // of one that can speak against another
 constexpr int kFewestKeyframes = 6;
+constexpr int kFewestFeatures = 500;  // of an image; half of those of the run do
 constexpr std::size_t kMostLandmarks = 3000;
 constexpr std::size_t kCheckedKeyframes = 40, kCheckedLandmarks = 800;
 
@@ -223,6 +227,7 @@ Pass Track(const Dataset& dataset, const RunConfig& config, const PinholeCamera&
   rig.camera = camera;
   OdometryOptions options = config.odometry;
   options.lens_sigma = 0;  // the lens is sought here
+  options.features = std::min(options.features, std::max(kFewestFeatures, options.features / 2));
   Odometry odometry(options, rig);
   Pass pass;
   for (std::size_t i = 0; i < dataset.Size() && pass.frames < frames; ++i) {
@@ -259,6 +264,28 @@ double SigmaOf(const Scene& best, const Fit& fit) {
   return kCorrelation * kStep * std::sqrt(VarianceOf(best, fit) / (2 * rise));
 }
 
+// What a map says of its camera.
+struct Estimate {
+  std::array<double, 4> lens = {{0, 0, 0, 0}};  // as Scene's
+  double sigma = 1;                             // of the logarithm of the focal length
+};
+
+// A distortion of the lens and another focal length look nearly the same, and what the model has not
+// (further coefficients, a rolling shutter) goes into either: the truth lies between the fit with k1 free
+// and the one without distortion, and half of their difference is what the choice of the model is uncertain
+// by.
+std::optional<Estimate> EstimateOf(const Scene& scene) {
+  Scene free = scene, straight = scene;
+  straight.lens_sigma = kNoLens;
+  const Fit with = Adjust(free, false), without = Adjust(straight, false);
+  if (!with.usable || !without.usable) return std::nullopt;
+  Estimate estimate;
+  for (std::size_t i = 0; i < estimate.lens.size(); ++i)
+    estimate.lens[i] = 0.5 * (free.lens[i] + straight.lens[i]);
+  estimate.sigma = std::hypot(SigmaOf(free, with), 0.5 * (free.lens[0] - straight.lens[0]));
+  return estimate;
+}
+
 PinholeCamera CameraOf(const PinholeCamera& before, const std::array<double, 4>& lens) {
   PinholeCamera camera = before;
   const double aspect = before.fy / before.fx;  // of the pixels, which need not be square
@@ -269,53 +296,88 @@ PinholeCamera CameraOf(const PinholeCamera& before, const std::array<double, 4>&
   return camera;
 }
 
+bool IsLens(double focal_px, int width) { return focal_px > 0.2 * width && focal_px < 10.0 * width; }
+
+// A share of the recording: the odometry of these frames is what measuring costs.
+int FramesToTrack(const Dataset& dataset, int most) {
+  constexpr std::size_t kShare = 3;
+  constexpr int kFewest = 40;
+  const auto share = static_cast<int>(std::min<std::size_t>(dataset.Size() / kShare, 1000000));
+  return std::min(most, std::max(kFewest, share));
+}
+
 }  // namespace
 
 FocalLength MeasureFocalLength(const fs::path& path, const RunConfig& config, int frames) {
-  constexpr int kMostPasses = 5;
-  constexpr double kSettled = 0.01;
+  constexpr double kSettled = 0.03;  // a move of the focal length that needs no second look
+  const double cpu_begin = ProcessCpuSeconds();
   DatasetOptions as_stored = config.dataset;
   as_stored.rotate = 0;
   const std::unique_ptr<Dataset> dataset = OpenDataset(path, as_stored);
   FocalLength result;
   result.camera = dataset->Rig().camera;
+  const int most = FramesToTrack(*dataset, frames);
   // From the usual one; a wide or a narrow one where that loses its way.
-  for (const double share : {1.0, 0.65, 1.5}) {
-    PinholeCamera camera = result.camera;
-    camera.fx *= share;
-    camera.fy *= share;
-    for (int i = 0; i < kMostPasses; ++i) {
-      Pass pass = Track(*dataset, config, camera, frames);
-      result.frames = pass.frames;
-      if (!pass.scene || 2 * pass.posed < pass.frames) {
-        result.reason = "too little of it could be tracked";
-        break;
-      }
-      const Fit fit = Adjust(*pass.scene, false);
-      const PinholeCamera found = CameraOf(camera, pass.scene->lens);
-      if (!fit.usable || !(found.fx > 0.2 * camera.width) || !(found.fx < 10 * camera.width)) {
-        result.reason = "its frames agree with no focal length";
-        break;
-      }
-      const bool settled = std::abs(std::log(found.fx / camera.fx)) < kSettled;
-      camera = found;
-      if (!settled && i + 1 < kMostPasses) continue;
-      result.sigma = SigmaOf(*pass.scene, fit);
-      if (result.sigma > kWorstSigma) {
-        result.reason = "its motion does not tell the focal length";
-        return result;
-      }
-      result.measured = true;
-      result.reason.clear();
-      result.camera = camera;
-      if (std::abs(pass.scene->lens[1]) > 0.01) {
-        result.camera.distortion = Distortion::kRadTan;
-        result.camera.coefficients = {pass.scene->lens[1], 0, 0, 0, 0};
-      }
-      result.camera = TurnedCamera(result.camera, (360 - dataset->TurnedBy()) % 360);
-      return result;
+  const std::array<double, 3> starts = {{1, 0.65, 1.5}};
+  std::size_t start = 0;
+  std::optional<Estimate> found;
+  PinholeCamera camera = result.camera;
+  for (int tracked = 0; tracked < 2 * most && start < starts.size();) {
+    if (!found) {
+      camera.fx = starts[start] * result.camera.fx;
+      camera.fy = starts[start] * result.camera.fy;
+    }
+    const Pass pass = Track(*dataset, config, camera, most);
+    result.frames = pass.frames;
+    tracked += std::max(1, pass.frames);
+    const bool enough = pass.scene && 2 * pass.posed >= pass.frames;
+    const std::optional<Estimate> here = enough ? EstimateOf(*pass.scene) : std::nullopt;
+    if (!here || !IsLens(std::exp(here->lens[0]), camera.width)) {
+      result.reason = enough ? "nothing agrees on a focal length" : "too little of it could be tracked";
+      if (found) break;
+      ++start;
+      continue;
+    }
+    found = here;
+    const double moved = found->lens[0] - std::log(camera.fx);
+    found->sigma = std::hypot(found->sigma, kLeftOver * moved);
+    camera = CameraOf(camera, found->lens);
+    if (std::abs(moved) < kSettled) break;
+  }
+  result.cpu_s = ProcessCpuSeconds() - cpu_begin;
+  if (!found) return result;
+  result.sigma = found->sigma;
+  result.measured = result.sigma <= kWorstSigma;
+  result.reason = result.measured ? "" : "the motion does not tell the focal length";
+  if (!result.measured) return result;
+  result.camera = camera;
+  if (std::abs(found->lens[1]) > 0.01) {
+    result.camera.distortion = Distortion::kRadTan;
+    result.camera.coefficients = {found->lens[1], 0, 0, 0, 0};
+  }
+  result.camera = TurnedCamera(result.camera, (360 - dataset->TurnedBy()) % 360);
+  return result;
+}
+
+FocalLength FocalLengthOf(const Odometry& odometry, const FrameRange& session) {
+  const double cpu_begin = ProcessCpuSeconds();
+  FocalLength result;
+  result.camera = odometry.Rig().camera;
+  const std::optional<Scene> scene = SceneOf(
+      odometry, WhereItTurns(odometry, KeyframesOfLargestSubmap(odometry, session), kCheckedKeyframes),
+      kMostLandmarks, result.camera.fy / result.camera.fx);
+  const std::optional<Estimate> found = scene ? EstimateOf(*scene) : std::nullopt;
+  if (found && IsLens(std::exp(found->lens[0]), result.camera.width)) {
+    result.sigma = std::hypot(found->sigma, kLeftOver * (found->lens[0] - scene->given));
+    result.measured = result.sigma <= kWorstSigma;
+    if (result.measured) {
+      result.camera.fy *= std::exp(found->lens[0]) / result.camera.fx;
+      result.camera.fx = std::exp(found->lens[0]);
     }
   }
+  if (!result.measured)
+    result.reason = scene ? "the motion does not tell the focal length" : "the map is too small";
+  result.cpu_s = ProcessCpuSeconds() - cpu_begin;
   return result;
 }
 

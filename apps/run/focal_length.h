@@ -16,18 +16,24 @@ struct FocalLength {
   PinholeCamera camera;   ///< pixels of the given shape; k1 where the lens has one
   double sigma = 0;       ///< standard deviation of the focal length, as share of it
   int frames = 0;         ///< that were looked at
+  double cpu_s = 0;       ///< processor time that it took
   std::string reason;     ///< why it was not measured
 };
 
-/// Odometry on at most `frames` frames with the camera of `config`, then a bundle adjustment of its keyframes
-/// with focal length, principal point and radial distortion free (Brown's model, k1 alone); both again with
-/// what was found, until it stays. Priors: principal point as it is, give or take 1 % of the width; k1 0,
-/// give or take 0.05. `sigma` is from how much worse the adjusted map
-/// fits with another focal length. One camera, or colour and depth, without distortion; it is that of the
-/// images as they are stored (without dataset.rotate). The same input
-/// gives the same result. Throws InputError if the data set can't be opened.
+/// Odometry with the camera of `config` on the first third of the recording (at least 40 frames, at most
+/// `frames`), then a bundle adjustment of its keyframes with focal length and principal point free, once with
+/// radial distortion free (Brown's model, k1 alone) and once without: the result is in the middle. Both again
+/// with it, if it is more than 3 % away. Priors: principal point as it is, give or take 1 % of the width; k1
+/// 0, give or take 0.05. `sigma` adds up how much worse the adjusted map fits with another focal length, half
+/// of the difference between the two lenses, and what is left of the last move. One camera, or colour and
+/// depth, without distortion; it is that of the images as they are stored (without dataset.rotate). The same
+/// input gives the same result. Throws InputError if the data set can't be opened.
 FocalLength MeasureFocalLength(const std::filesystem::path& dataset, const RunConfig& config,
                                int frames = 300);
+
+/// The same bundle adjustments on the map of a run, 40 keyframes in a row where its camera turns most,
+/// without tracking anything again. `camera`: the odometry's with another focal length.
+FocalLength FocalLengthOf(const Odometry& odometry, const FrameRange& session = {});
 
 /// Whether a map agrees with the camera that it was made with.
 struct LensCheck {

@@ -202,6 +202,42 @@ std::string Improvement(double before, double after) {
   return Cell(before / after, 2, "x better");
 }
 
+double FocalLengthCpuSeconds(const RunResult& r) {
+  double seconds = 0;
+  for (const auto& measured : {r.focal_length, r.focal_length_of_map})
+    seconds += measured ? measured->cpu_s : 0;
+  return seconds;
+}
+
+// As --camera takes it, of the images as they are stored; empty: what the run had is as good.
+std::string BetterCamera(const RunResult& r) {
+  constexpr double kSame = 0.005;
+  if (!r.focal_length || !r.focal_length_of_map || !r.focal_length_of_map->measured) return "";
+  const FocalLength &before = *r.focal_length, &map = *r.focal_length_of_map;
+  const double change = map.camera.fx / r.rig.camera.fx;
+  if (std::abs(change - 1) < kSame || (before.measured && map.sigma >= before.sigma)) return "";
+  PinholeCamera camera = before.camera;
+  camera.fx *= change;
+  camera.fy *= change;
+  char text[160];
+  int length =
+      std::snprintf(text, sizeof text, "%.1f,%.1f,%.1f,%.1f", camera.fx, camera.fy, camera.cx, camera.cy);
+  if (camera.distortion == Distortion::kRadTan)
+    std::snprintf(text + length, sizeof text - static_cast<std::size_t>(length), ",%.4f,0,0,0",
+                  camera.coefficients[0]);
+  return text;
+}
+
+Json FocalLengthJson(const RunResult& r) {
+  const auto json = [](const std::optional<FocalLength>& f) {
+    if (!f) return Json();
+    return Json{{"measured", f->measured}, {"px", f->camera.fx}, {"sigma", f->sigma}, {"reason", f->reason}};
+  };
+  return {{"first_frames", json(r.focal_length)},
+          {"map", json(r.focal_length_of_map)},
+          {"better_camera", BetterCamera(r)}};
+}
+
 }  // namespace
 
 Json HealthJson(const RunResult& r) {
@@ -241,6 +277,7 @@ std::string SummaryJson(const RunResult& r) {
   json["timing"] = {
       {"wall_s", r.wall_s},
       {"cpu_s", r.cpu_s},
+      {"focal_length_cpu_s", FocalLengthCpuSeconds(r)},
       {"odometry_alone_cpu_s", r.odometry_alone_cpu_s},
       {"frame_ms", {{"median", Quantile(r.frame_ms, 0.5)}, {"p99", Quantile(r.frame_ms, 0.99)}}},
       {"latency_ms", {{"median", Quantile(r.latency_ms, 0.5)}, {"p99", Quantile(r.latency_ms, 0.99)}}},
@@ -272,6 +309,7 @@ std::string SummaryJson(const RunResult& r) {
                           {"sigma", r.lens_check.sigma},
                           {"k1", r.lens_check.k1},
                           {"other_lens", r.lens_check.other_lens}};
+  if (r.focal_length) json["focal_length"] = FocalLengthJson(r);
   if (r.lens) json["lens"] = LensJson(*r.lens);
   if (r.height)
     json["height"] = {{"height", r.height->height},
@@ -376,6 +414,10 @@ std::string ResultTable(const RunResult& r) {
         << " ms after its image (p99 " << Cell(Quantile(r.latency_ms, 0.99), 1) << " ms)";
   }
   out << "; memory " << Cell(r.peak_memory_mb, 0, " MB") << "\n";
+  if (const std::string camera = BetterCamera(r); !camera.empty())
+    out << "  the whole map says a focal length of " << Cell(r.focal_length_of_map->camera.fx, 1, " px")
+        << ", give or take " << Cell(100 * r.focal_length_of_map->sigma, 1)
+        << " %, and is surer than the first frames; for a run with it add\n    --camera " << camera << "\n";
   if (r.given_odometry && !r.appearance_only && r.LoopsAccepted() > 0 && r.corrections == 0 &&
       r.global_adjustments == 0)
     out << "  all loops agree with the given trajectory within their own uncertainty: it is not changed\n";

@@ -137,8 +137,10 @@ struct RunResult {
   std::vector<Trajectory> other_pieces;  ///< of the map, after losses; no loop joined them to `trajectory`
   bool odometry_complete =
       true;  ///< false: it ends at the first correction (interrupted, or run.odometry_pass: false)
-  MapFigures map_figures;          ///< zeros without poses
-  LensCheck lens_check;            ///< not measured where another odometry is followed
+  MapFigures map_figures;                          ///< zeros without poses
+  std::optional<FocalLength> focal_length;         ///< RunRequest::focal_length
+  std::optional<FocalLength> focal_length_of_map;  ///< what the whole map says then
+  LensCheck lens_check;                            ///< not measured where another odometry is followed
   std::vector<int> frame_inliers;  ///< of each frame posed by landmarks, when it came: TrackResult::inliers
   std::size_t frames_by_grey_values = 0;  ///< posed without landmarks: TrackResult::by_grey_values
   bool given_odometry = false;            ///< another odometry was followed

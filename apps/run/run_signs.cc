@@ -230,7 +230,10 @@ const std::vector<SignKind>& SignKinds() {
        "how far, at least, the focal length that fits the map best is from the given one (less 1.25 "
        "standard deviations)",
        kAbove, 0.02, kNever, "the map fits another focal length better, at least %s away",
-       "check fx and fy; without --config and --camera tutti run measures them", FocalLengthOff},
+       "check fx and fy; without --config and --camera tutti run measures them, and "
+       "focal_length.better_camera in "
+       "summary.json is what the whole map says then",
+       FocalLengthOff},
       {"lens_off", "share",
        "radial distortion that the calibration left over, at the middle of the image's side edge", kAbove,
        0.03, kNever, "the lens bends the image by %s at its edge, beyond what the calibration says",

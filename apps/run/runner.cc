@@ -49,6 +49,7 @@ RunResult RunSlam(const RunRequest& request, const RunConfig& given) {
   result.config_file = request.config.string();
   result.camera_source = request.camera_source;
   result.camera_guessed = request.camera_guessed;
+  result.focal_length = request.focal_length;
   result.dataset = request.dataset.string();
   // The modules use threads of their own where that can't change a result; OpenCV's would reorder keypoints.
   cv::setNumThreads(1);

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "apps/run/focal_length.h"
 #include "apps/run/frame_clock.h"
 #include "apps/run/given_odometry.h"
 #include "apps/run/output_folder.h"
@@ -23,7 +24,8 @@ struct RunRequest {
   std::filesystem::path dataset;  ///< folder, video file, or camera:0, camera:0,1
   std::string camera_source;      ///< where the camera comes from, for summary.json; empty: from `config`
   bool camera_guessed = false;    ///< nobody knows its focal length
-  std::filesystem::path out;      ///< folder for the results; made if it is not there
+  std::optional<FocalLength> focal_length;  ///< what was measured before the run, where nobody knew it
+  std::filesystem::path out;                ///< folder for the results; made if it is not there
   std::optional<std::filesystem::path> ground_truth;  ///< "none": don't evaluate; default: the data set's own
   bool keep = false;  ///< number an earlier result in `out` instead of replacing it
   bool no_loops = false;

@@ -137,6 +137,10 @@ void SlamRun::Collect() {
   }
   if (given_ == nullptr && !slam_->AppearanceOnly())
     result_.lens_check = CheckLens(*slam_->odometry(), session);
+  if (request_.focal_length && !slam_->AppearanceOnly()) {
+    result_.focal_length_of_map = FocalLengthOf(*slam_->odometry(), session);
+    result_.cpu_s += result_.focal_length_of_map->cpu_s;
+  }
   if (!alone_) return;
   result_.trajectory_odometry = BodyTrajectory(alone_->Tracked().FrameTrajectory(-1, session), result_.rig);
 }
@@ -270,7 +274,8 @@ void SlamRun::TakeFrame(const FetchedFrame& fetched, Progress& progress) {
 }
 
 double SlamRun::CpuSeconds() const {
-  return before_.cpu_s + ProcessCpuSeconds() - cpu_begin_ - (alone_ ? alone_->CpuSeconds() : 0.0);
+  return (request_.focal_length ? request_.focal_length->cpu_s : 0.0) + before_.cpu_s + ProcessCpuSeconds() -
+         cpu_begin_ - (alone_ ? alone_->CpuSeconds() : 0.0);
 }
 
 void SlamRun::TrackOne(const InputFrame& frame) {

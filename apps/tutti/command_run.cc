@@ -148,6 +148,7 @@ void MeasureGuess(const RunArguments& arguments, Recording& recording, RunReques
   if (request.end) range.dataset.end = *request.end;
   if (request.stride) range.dataset.stride = *request.stride;
   const FocalLength found = MeasureFocalLength(arguments.dataset, range);
+  request.focal_length = found;
   char text[200];
   if (found.measured) {
     recording.config.dataset.camera = found.camera;

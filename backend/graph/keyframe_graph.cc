@@ -304,12 +304,16 @@ Vector7d KeyframeGraph::Sigmas(const Edge& edge, double floor) const {
 PoseGraph KeyframeGraph::Graph(const std::vector<LoopEdge>& loops) const {
   const std::map<int, Similarity> S_root_piece = JoinedPieces(loops);
   PoseGraph graph(options_.kind);
+  // The first node holds the graph in place; an outlier can't.
+  const auto good = [&](const MapKeyframe& k) { return outliers_.count(k.id) == 0; };
+  const auto first = std::find_if(keyframes_.begin(), keyframes_.end(), good);
   for (const MapKeyframe& keyframe : keyframes_) {
     Similarity pose(keyframe.T_world_keyframe);
     const auto moved = S_root_piece.find(keyframe.piece);
     if (moved != S_root_piece.end()) pose = moved->second * pose;
     if (options_.kind == GraphKind::kSE3) pose.scale = 1;
-    graph.AddNode(keyframe.id, pose);
+    graph.AddNode(keyframe.id, pose,
+                  first != keyframes_.begin() && first != keyframes_.end() && &keyframe == &*first);
   }
   const double floor = SigmaFloor();
   for (const Edge& edge : edges_) {

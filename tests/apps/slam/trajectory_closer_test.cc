@@ -183,6 +183,11 @@ Closed CloseSpoilt(const std::function<void(std::size_t i, Pose* pose)>& spoil) 
   return CloseTown(RecordedTown(SyntheticSensor::kStereo), odometry, config);
 }
 
+bool Warned(const Closed& closed, const std::string& words) {
+  return std::any_of(closed.warnings.begin(), closed.warnings.end(),
+                     [&](const std::string& warning) { return warning.find(words) != std::string::npos; });
+}
+
 TEST(TrajectoryCloser, PosesThatAreOffMoveNoOthersAndAreSaid) {
   const Trajectory& truth = RecordedTown(SyntheticSensor::kStereo).truth;
   const Closed good = CloseSpoilt([](std::size_t, Pose*) {});
@@ -195,9 +200,8 @@ TEST(TrajectoryCloser, PosesThatAreOffMoveNoOthersAndAreSaid) {
     for (std::size_t i = 0; i < truth.size(); ++i)
       EXPECT_LT((closed.trajectory[i].pose.translation - good.trajectory[i].pose.translation).norm(), 0.5)
           << i << ", " << metres;
-    ASSERT_GE(closed.warnings.size(), 2U);
-    EXPECT_NE(closed.warnings[0].find("the odometry jumps by"), std::string::npos) << closed.warnings[0];
-    EXPECT_NE(closed.warnings[1].find("and back between"), std::string::npos) << closed.warnings[1];
+    EXPECT_TRUE(Warned(closed, "its poses before that are replaced"));
+    EXPECT_TRUE(Warned(closed, "and back between"));
   }
 }
 
@@ -208,8 +212,7 @@ TEST(TrajectoryCloser, LoopsJoinWhatAnOdometryThatBeganAnewTakesApart) {
   const Closed closed = CloseSpoilt([&](std::size_t i, Pose* pose) {
     if (i >= restart) *pose = T_restart_world * *pose;
   });
-  ASSERT_GE(closed.warnings.size(), 1U);
-  EXPECT_NE(closed.warnings[0].find("this step has no weight"), std::string::npos) << closed.warnings[0];
+  EXPECT_TRUE(Warned(closed, "this step has no weight"));
   EXPECT_GT(closed.drift_before, 5);
   EXPECT_LT(closed.drift_after, 0.3);
 }

@@ -20,9 +20,10 @@ class Progress {
 
   /// `done` of `total` frames; `status` is free text (state, loops). The line never fills the last column.
   void Update(std::size_t done, const std::string& status);
-  /// Work that can't be counted: the title and `status`, from the second second on. Where there is no
-  /// terminal, a line when as much time has passed again as at the last one (10 s at first).
-  void Say(const std::string& status);
+  /// Work that can't be counted: title, `status` and the seconds so far, if it takes longer than a second.
+  /// Where there is no terminal: a line after `first_s` [s], and whenever the time has doubled since the last
+  /// one.
+  void Say(const std::string& status, double first_s = 10);
   /// A message above the progress line.
   void Note(const std::string& message);
   void Finish();
@@ -38,7 +39,7 @@ class Progress {
   bool terminal_ = false;
   bool line_open_ = false;
   std::size_t next_tenth_ = 1;
-  double next_line_s_ = 10;
+  double next_line_s_ = 0;
   internal::Stopwatch since_begin_, since_line_;
 };
 

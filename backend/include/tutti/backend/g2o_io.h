@@ -42,12 +42,13 @@ struct G2oFile {
   std::size_t ignored = 0;          ///< lines whose tag is not known
 };
 
-/// Reads a graph. Vertices may be missing; what is odometry and what a loop is PoseGraph::FindOdometry's
-/// decision. Throws InputError with file and line for: a missing file, a line with too few or unreadable
-/// numbers, NaN, a vertex given twice, a zero quaternion, an edge from a node to itself, kinds that are
-/// mixed, no edge at all, tags that are not known (with the number of their lines; `ignore_unknown`: a
-/// warning), information matrices that are not positive definite (kRefuse, with their number) or without
-/// which the graph falls apart. `progress` is told the number of lines read, from time to time.
+/// Reads a graph. Vertices may be missing; edges between poses whose ids follow each other among those of the
+/// file (and of one robot, docs/backend.md) are odometry, all others loops. Throws InputError with file and
+/// line for: a missing file, a line with too few or unreadable numbers, NaN, a vertex given twice, a zero
+/// quaternion, an edge from a node to itself, kinds that are mixed, no edge at all, tags that are not known
+/// (with the number of their lines; `ignore_unknown`: a warning), information matrices that are not positive
+/// definite (kRefuse, with their number) or without which the graph falls apart. `progress` is told the
+/// number of lines read, from time to time.
 G2oFile ReadG2o(const std::filesystem::path& file, BadInformation bad = BadInformation::kRefuse,
                 bool ignore_unknown = false, const std::function<void(std::size_t)>& progress = {});
 

@@ -141,7 +141,7 @@ struct EdgeOutcome {
 struct GraphComponent {
   NodeId anchor = 0;  ///< id of the node that holds it in place (the first fixed one, else the smallest id)
   std::size_t nodes = 0;
-  bool by_priors = false;  ///< priors hold it, and no node is fixed
+  bool by_priors = false;  ///< priors or fixed landmarks hold it, and no node is fixed
 };
 
 /// What a start came to.
@@ -184,8 +184,9 @@ class PoseGraphOptimizer {
   explicit PoseGraphOptimizer(const PoseGraphOptions& options = {});
 
   /// Moves the nodes of `graph` to the optimum. On failure the graph keeps its poses and the report says why.
-  /// A component without a fixed node and without priors is anchored at its smallest id, which keeps its pose.
-  /// `stop` is asked before each iteration: true gives up, which is a failure with the termination "stopped".
+  /// A component without a fixed node and without priors is anchored at its smallest id, which keeps its
+  /// pose. `stop` is asked before each iteration: true gives up, which is a failure with the termination
+  /// "stopped".
   PoseGraphReport Optimize(PoseGraph& graph, const std::function<bool()>& stop = {}) const;
 
   const PoseGraphOptions& options() const { return options_; }

@@ -42,7 +42,7 @@ def g2o_seeds():
         "indefinite": "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\nEDGE_SE2 0 1 1 0 0.1 1 5 0 1 0 1",
     }
     for name, text in graphs.items():
-        for how in range(4):
+        for how in range(8):
             yield f"{name}{how}", bytes([how]) + text.encode() + b"\n"
 
 

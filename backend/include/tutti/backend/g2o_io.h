@@ -6,7 +6,7 @@
 //   .. I77 (28 numbers)   [tutti's own] FIX id [id ...]
 // Poses are node-to-world, measurements S_i_j. Information: upper triangle of (translation, rotation[, log
 // scale]). Landmarks, priors, TORO's tags and switchable loops are read as well: docs/backend.md lists the
-// tags.
+// tags. ReadG2o tells its argument `progress` how many lines it has read, every 100,000 lines.
 #pragma once
 
 #include <cstddef>
@@ -47,8 +47,7 @@ struct G2oFile {
 /// line for: a missing file, a line with too few or unreadable numbers, NaN, a vertex given twice, a zero
 /// quaternion, an edge from a node to itself, kinds that are mixed, no edge at all, tags that are not known
 /// (with the number of their lines; `ignore_unknown`: a warning), information matrices that are not positive
-/// definite (kRefuse, with their number) or without which the graph falls apart. `progress` is told the
-/// number of lines read, from time to time.
+/// definite (kRefuse, with their number) or without which the graph falls apart.
 G2oFile ReadG2o(const std::filesystem::path& file, BadInformation bad = BadInformation::kRefuse,
                 bool ignore_unknown = false, const std::function<void(std::size_t)>& progress = {});
 

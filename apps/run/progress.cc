@@ -80,10 +80,10 @@ void Progress::Update(std::size_t done, const std::string& status) {
   std::fflush(out_);
 }
 
-void Progress::Say(const std::string& status) {
+void Progress::Say(const std::string& status, double first_s) {
   constexpr double kSoon = 1;
   const double seconds = since_begin_.Seconds();
-  if (out_ == nullptr || seconds < (terminal_ ? kSoon : next_line_s_)) return;
+  if (out_ == nullptr || seconds < (terminal_ ? kSoon : std::max(first_s, next_line_s_))) return;
   if (terminal_ && line_open_ && since_line_.Milliseconds() < 100) return;
   since_line_ = {};
   next_line_s_ = 2 * seconds;

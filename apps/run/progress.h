@@ -23,9 +23,10 @@ class Progress {
 
   /// `done` of `total` frames; `status` is free text (state, loops). The line never fills the last column.
   void Update(std::size_t done, const std::string& status);
-  /// Work that can't be counted: the title and `status`, from the second second on. Where there is no
-  /// terminal, a line when as much time has passed again as at the last one (10 s at first).
-  void Say(const std::string& status);
+  /// Work that can't be counted: title, `status` and the seconds so far, if it takes longer than a second.
+  /// Where there is no terminal: a line after `first_s` [s], and whenever the time has doubled since the last
+  /// one.
+  void Say(const std::string& status, double first_s = 10);
   /// A message above the progress line. Of messages that say the same of one frame after the other five are
   /// printed, and Finish counts the rest: "tutti: 17 more " and `more` ("frames are skipped").
   void Note(const std::string& message, const std::string& more = "");
@@ -43,7 +44,7 @@ class Progress {
   bool line_open_ = false;
   std::size_t next_tenth_ = 1;
   std::map<std::string, std::size_t> noted_;  // messages by what more of them are
-  double next_line_s_ = 10;
+  double next_line_s_ = 0;
   internal::Stopwatch since_begin_, since_line_;
 };
 

@@ -183,12 +183,14 @@ G2oFile ReadWithProgress(const OptimizeArguments& arguments) {
 }
 
 PoseGraphReport OptimizeWithProgress(const PoseGraphOptimizer& optimizer, PoseGraph& graph) {
-  constexpr std::size_t kLarge = 2000000;  // edges
+  constexpr std::size_t kLarge = 2000000;       // edges
+  constexpr std::size_t kPerGigabyte = 500000;  // in the plane; of 3D fewer
   Progress progress("solving", 0);
   const std::string size = std::to_string(graph.edges().size()) + " edges";
-  if (graph.edges().size() >= kLarge)
-    progress.Note("solving " + size +
-                  ": this takes minutes and some kilobytes of memory for each; Ctrl-C ends it");
+  if (graph.edges().size() >= kLarge) {
+    progress.Note("solving " + size + ": this needs " + std::to_string(graph.edges().size() / kPerGigabyte) +
+                  " GB of memory or more, and minutes before the first iteration; Ctrl-C ends it");
+  }
   int iterations = 0;
   return optimizer.Optimize(graph, [&] {
     progress.Say(size + ", iteration " + std::to_string(++iterations));

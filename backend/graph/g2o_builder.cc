@@ -273,12 +273,14 @@ void Builder::WarnOfOrder() {
     odometry = odometry || edge.kind == EdgeKind::kOdometry;
     by_ids = by_ids || edge.kind_by_ids;
   }
+  std::vector<char> seen(c_.graph.landmarks().size(), 0);
   for (const PoseGraphMeasurement& m : c_.graph.measurements()) {
     for (const MeasurementEnd& end : {m.from, m.to}) {
       if (end.what == MeasurementEnd::What::kNode) linked[c_.graph.IndexOf(end.id)] = 1;
+      if (end.what == MeasurementEnd::What::kLandmark) seen[c_.graph.IndexOfLandmark(end.id)] = 1;
     }
   }
-  const auto alone = std::count(linked.begin(), linked.end(), 0);
+  const auto alone = std::count(linked.begin(), linked.end(), 0) + std::count(seen.begin(), seen.end(), 0);
   if (alone > 0) Warn(0, std::to_string(alone) + " vertices have no edge and stay as they are");
   if (by_ids && !odometry)
     Warn(0,

@@ -59,10 +59,16 @@ GraphStructure AnalyseGraph(const PoseGraph& graph) {
     out.constant[out.anchor[c]] = true;
     out.components[c].anchor = nodes[out.anchor[c]].id;
   }
+  const auto hold = [&](std::size_t k) {
+    const std::size_t component = component_of_root[Root(parent, k)];
+    if (component != kNone && !nodes[out.anchor[component]].fixed) out.components[component].by_priors = true;
+  };
   for (const PoseGraphMeasurement& m : graph.measurements()) {
     if (m.from.what != MeasurementEnd::What::kWorld || m.information.isZero(0)) continue;
-    const std::size_t component = component_of_root[Root(parent, place(m.to))];
-    if (component != kNone && !nodes[out.anchor[component]].fixed) out.components[component].by_priors = true;
+    hold(place(m.to));
+  }
+  for (std::size_t k = 0; k < graph.landmarks().size(); ++k) {
+    if (graph.landmarks()[k].fixed) hold(nodes.size() + k);
   }
   return out;
 }

@@ -25,7 +25,7 @@ struct GraphStructure {
 /// Landmarks connect the nodes that see them.
 GraphStructure AnalyseGraph(const PoseGraph& graph);
 
-/// The same, but parts that priors hold are not held by an anchor as well.
+/// The same, but parts that priors or fixed landmarks hold are not held by an anchor as well.
 GraphStructure HeldByPriors(GraphStructure structure, const PoseGraph& graph);
 
 }  // namespace tutti::internal

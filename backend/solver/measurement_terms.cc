@@ -1,5 +1,6 @@
 #include "backend/solver/measurement_terms.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "backend/graph/manifold.h"
@@ -54,8 +55,8 @@ class MeasurementCost final : public ceres::CostFunction {
     EdgeError<N>(constants_, blocks[0], blocks[1], error, &J[0], &J[1]);
     Eigen::Matrix<double, Eigen::Dynamic, N> root = root_;
     if (is_bearing_) {
-      const double squared = error.template head<2>().squaredNorm();
-      if (!(squared > 0)) return false;
+      // A landmark at the sensor has no direction: it is moved by its other measurements.
+      const double squared = std::max(error.template head<2>().squaredNorm(), 1e-300);
       residuals[0] = root_bearing_ * WrapAngle(std::atan2(error(1), error(0)) - bearing_);
       root = Eigen::Matrix<double, 1, N>::Zero();
       root(0, 0) = -root_bearing_ * error(1) / squared;

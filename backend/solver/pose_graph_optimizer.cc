@@ -40,7 +40,7 @@ class Run {
         robust_(problem_, options, graph.edges().size(),
                 [this](int iterations) { return SolveOnce(iterations); }) {
     problem_.SetStop(stop);
-    if (problem_.HasMeasurements()) SolvedByCeres("landmarks and priors are");
+    if (problem_.HasMeasurements()) SolvedByCeres("the block solver knows neither landmarks nor priors");
     if (!options.pairwise_consistency) return;
     const std::vector<bool> agree =
         internal::PairwiseConsistentEdges(graph, anchored, options.objective, problem_.threshold());
@@ -136,7 +136,8 @@ class Run {
       best_weights = problem_.weights();
     }
     if (!found) return false;
-    if (robust && options_.robust == RobustLoss::kSwitchable) SolvedByCeres("switchable constraints have");
+    if (robust && options_.robust == RobustLoss::kSwitchable)
+      SolvedByCeres("switchable constraints have variables that the block solver does not know");
     Took(start);
     problem_.SetPoses(best);
     for (std::size_t e = 0; e < best_weights.size(); ++e) problem_.SetWeight(e, best_weights[e]);
@@ -240,10 +241,9 @@ class Run {
     return options_.max_time_s > 0 ? std::max(1e-3, options_.max_time_s - watch_.Seconds()) : 0;
   }
 
-  void SolvedByCeres(const std::string& what) {
+  void SolvedByCeres(const std::string& why) {
     report_.solver = PoseGraphSolver::kCeres;
-    if (options_.solver != report_.solver)
-      report_.solver_note = what + " variables that the block solver does not know";
+    if (options_.solver != report_.solver) report_.solver_note = why;
   }
 
   double WeightOf(std::size_t e, double chi2) const {

@@ -1,5 +1,5 @@
 // Pose graphs: any bytes give a graph of finite numbers that can be written and read again, or an InputError.
-// The first byte chooses what becomes of bad information matrices.
+// The first byte chooses what becomes of bad information matrices and of unknown tags.
 #include <cstdlib>
 #include <filesystem>
 #include <stdexcept>
@@ -48,7 +48,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const auto how = static_cast<tutti::BadInformation>(data[0] % 4);
   tutti::G2oFile read;
   try {
-    read = tutti::ReadG2o(tutti::fuzz::MemoryFile(data + 1, size - 1), how);
+    read = tutti::ReadG2o(tutti::fuzz::MemoryFile(data + 1, size - 1), how, data[0] / 4 % 2 == 1);
   } catch (const tutti::InputError&) {
     return 0;
   }

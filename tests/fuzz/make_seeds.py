@@ -34,10 +34,15 @@ def g2o_seeds():
         "sim3": f"VERTEX_SIM3:QUAT 0 {se3} 1\nVERTEX_SIM3:QUAT 5 {se3} 2\nEDGE_SIM3:QUAT 0 5 {se3} 0.5 {unit[4]}",
         "edges": "EDGE_SE2 0 1 1 0 0.1 " + unit[2] + "\r\nEDGE_SE2 1 3 1 0 0.1 " + unit[2] + "\r\n# x\nODD 3",
         "bad": "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1,5 0 0\nEDGE_SE2 0 1 1 0 0.1 1 5 0 1 0 1",
+        "toro": "VERTEX2 0 0 0 0\nEDGE2 0 1 1 0 0.1 1 0 1 1 0 0\nEDGE_SE2_SWITCHABLE 0 1 9 1 0 0 " + unit[2],
+        "landmarks": "PARAMS_SE2OFFSET 1 0 0 0\nVERTEX_XY 9 1 1\nEDGE_SE2_XY 0 9 1 1 1 0 1\nEDGE_BEARING_SE2_XY 0 9 1 1\n"
+                     "EDGE_SE2_OFFSET 0 1 1 1 1 0 0 " + unit[2],
+        "priors": f"PARAMS_SE3OFFSET 1 {se3}\nEDGE_SE3_PRIOR 0 1 {se3} {unit[3]}\nEDGE_SE3_TRACKXYZ 0 5 1 1 2 3 1 0 0 1 0 1\n"
+                  f"EDGE3 0 1 1 0 0 0 0 0 {unit[3]}",
         "indefinite": "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\nEDGE_SE2 0 1 1 0 0.1 1 5 0 1 0 1",
     }
     for name, text in graphs.items():
-        for how in range(4):
+        for how in range(8):
             yield f"{name}{how}", bytes([how]) + text.encode() + b"\n"
 
 

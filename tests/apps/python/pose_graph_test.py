@@ -61,6 +61,32 @@ def test_a_file_has_the_same_graph(tmp_path):
     assert again.costs() == pytest.approx(graph.costs(), rel=1e-9)
 
 
+def test_edges_between_neighbours_among_the_ids_are_odometry_whenever_the_nodes_came():
+    graph = tutti.PoseGraph("se2")
+    for id in (100, 300, 200):
+        graph.add_pose(id, [0, 0, 0])
+        if id == 300:
+            graph.add_edge(100, 300, [2, 0, 0], sigmas=(0.1, 0.1))  # 200 comes between them later
+    graph.add_edge(100, 200, [1, 0, 0], sigmas=(0.1, 0.1))
+    graph.add_edge(200, 300, [1, 0, 0], sigmas=(0.1, 0.1))
+    assert graph.edges["loop"].tolist() == [True, False, False]
+
+
+def test_landmarks_and_large_ids_of_a_file_are_kept(tmp_path):
+    file = tmp_path / "graph.g2o"
+    file.write_text("EDGE_SE2 6989586621679009792 6989586621679009793 1 0 0 1 0 0 1 0 1\n"
+                    "EDGE_SE2_XY 6989586621679009792 7 1 2 1 0 1\nRANGE 1 2\n")
+    with pytest.raises(tutti.InputError, match="RANGE"):
+        tutti.PoseGraph.read_g2o(file)
+    with pytest.warns(RuntimeWarning, match="RANGE"):
+        graph = tutti.PoseGraph.read_g2o(file, ignore_unknown=True)
+    assert graph.ids.tolist() == [6989586621679009792, 6989586621679009793]
+    assert graph.optimize().success and graph.landmark_ids.tolist() == [7]
+    np.testing.assert_allclose(graph.landmarks, [[1, 2, 0]], atol=1e-9)
+    graph.write_g2o(file)
+    assert "VERTEX_XY 7 " in file.read_text() and "EDGE_SE2_XY 6989586621679009792 7 1 2" in file.read_text()
+
+
 def test_a_solution_is_certified():
     graph = square(false_loop=False)
     graph.optimize(objective="chi2log")

@@ -68,5 +68,18 @@ TEST(Progress, SaysFiveTimesWhatHappensToManyFramesAndThenHowOften) {
   EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 5 + 59 + 1 + 1);
 }
 
+TEST(Progress, OfWorkThatCantBeCountedHasTheTimeInALineThatFits) {
+  const std::filesystem::path file = testing::FreshFolder() / "progress";
+  std::FILE* out = std::fopen(file.c_str(), "w");
+  {
+    Progress progress("solving", 0, out, 40);
+    progress.Say("10000000 edges, iteration 0");  // too early for a line
+    progress.Say("10000000 edges, iteration 1", 0);
+  }
+  std::fclose(out);
+  std::ifstream in(file);
+  EXPECT_EQ(std::string(std::istreambuf_iterator<char>(in), {}), "solving 10000000 edges, iteration 1, 0 \n");
+}
+
 }  // namespace
 }  // namespace tutti

@@ -102,7 +102,9 @@ TEST_F(HardInput, AGraphIsTheSameWithMarkAndCarriageReturns) {
 TEST_F(HardInput, LongWordsAreCutOff) {
   const std::string word(1000000, 'X');
   ExpectRefused(RunTutti({"optimize", File("tag.g2o", word + " 1 2\n"), "--out", folder_ / "o"}), "XXX...");
-  const auto warned = RunTutti({"optimize", File("more.g2o", Graph(word + " 1\n")), "--out", folder_ / "o"});
+  const fs::path more = File("more.g2o", Graph(word + " 1\n"));
+  ExpectRefused(RunTutti({"optimize", more, "--out", folder_ / "o"}), "XXX... (1 line)");
+  const auto warned = RunTutti({"optimize", more, "--out", folder_ / "o", "--ignore-unknown"});
   EXPECT_EQ(warned.status, 0);
   EXPECT_LT(warned.output.size(), 1500U);
   ExpectRefused(RunTutti({"convert", File("t.txt", word + " 0 0 0 0 0 0 1\n"), folder_ / "o", "--to", "tum"}),

@@ -99,6 +99,19 @@ TEST(TrajectoryFile, TimesThatDoNotFitAreRefused) {
               HasSubstr("do not grow at pose 1"));
 }
 
+TEST(TrajectoryFile, VerticesWhoseIdsAreTooLargeForStampsCountInTheirOrder) {
+  const std::filesystem::path file = testing::FreshFile(
+      "a.g2o",
+      "PARAMS_SE2OFFSET 0 0 0 0\nVERTEX_SE2 6989586621679009793 2 0 0\nVERTEX_SE2 6989586621679009792 1 0 0\n"
+      "EDGE_SE2 6989586621679009792 6989586621679009793 1 0 0 1 0 0 1 0 1\nEDGE_RANGE 1 2\n");
+  const PoseFile read = ReadPoseFile(file);
+  ASSERT_EQ(read.trajectory.size(), 2u);
+  EXPECT_EQ(read.trajectory[1].stamp_s, 1);
+  EXPECT_EQ(read.trajectory[1].pose.translation.x(), 2);
+  ASSERT_EQ(read.warnings.size(), 2u);  // the poses alone count, so an unknown tag is no error
+  EXPECT_THAT(read.warnings[1], HasSubstr("too large for time stamps"));
+}
+
 TEST(TrajectoryFile, AnotherFormatThanAskedForIsNamed) {
   const std::filesystem::path file = testing::FreshFolder() / "a.txt";
   WritePoseFile(file, ShortCurve(), PoseFileFormat::kKitti);

@@ -160,6 +160,18 @@ TEST(Measurements, FalseLoopsAreRejectedInAGraphWithLandmarks) {
   }
 }
 
+TEST(Measurements, AFixedLandmarkHoldsTheGraph) {
+  PoseGraph graph =
+      Read(
+          "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\nVERTEX_XY 9 10 10\nVERTEX_XY 8 0 0\nFIX 9\n"
+          "EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\nEDGE_SE2_XY 0 9 5 5 1 0 1\nEDGE_SE2_XY 1 9 4 5 1 0 1\n")
+          .graph;
+  const PoseGraphReport report = Solve(graph);
+  ASSERT_TRUE(report.success);
+  EXPECT_LT(report.costs.chi2, 1e-12);
+  EXPECT_EQ(graph.landmarks()[0].position, Eigen::Vector3d(10, 10, 0));
+}
+
 TEST(Measurements, OfWhatIsMissingOrMixedUpNameTheLine) {
   const auto error = [](const std::string& text) {
     try {

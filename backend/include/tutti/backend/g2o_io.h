@@ -6,7 +6,7 @@
 //   .. I77 (28 numbers)   [tutti's own] FIX id [id ...]
 // Poses are node-to-world, measurements S_i_j. Information: upper triangle of (translation, rotation[, log
 // scale]). Landmarks, priors, TORO's tags and switchable loops are read as well: docs/backend.md lists the
-// tags.
+// tags. ReadG2o tells its argument `progress` how many lines it has read, every 100,000 lines.
 #pragma once
 
 #include <cstddef>
@@ -42,12 +42,12 @@ struct G2oFile {
   std::size_t ignored = 0;          ///< lines whose tag is not known
 };
 
-/// Reads a graph. Vertices may be missing; what is odometry and what a loop is PoseGraph::FindOdometry's
-/// decision. Throws InputError with file and line for: a missing file, a line with too few or unreadable
-/// numbers, NaN, a vertex given twice, a zero quaternion, an edge from a node to itself, kinds that are
-/// mixed, no edge at all, tags that are not known (with the number of their lines; `ignore_unknown`: a
-/// warning), information matrices that are not positive definite (kRefuse, with their number) or without
-/// which the graph falls apart. `progress` is told the number of lines read, from time to time.
+/// Reads a graph. Vertices may be missing; edges between poses whose ids follow each other among those of the
+/// file (and of one robot, docs/backend.md) are odometry, all others loops. Throws InputError with file and
+/// line for: a missing file, a line with too few or unreadable numbers, NaN, a vertex given twice, a zero
+/// quaternion, an edge from a node to itself, kinds that are mixed, no edge at all, tags that are not known
+/// (with the number of their lines; `ignore_unknown`: a warning), information matrices that are not positive
+/// definite (kRefuse, with their number) or without which the graph falls apart.
 G2oFile ReadG2o(const std::filesystem::path& file, BadInformation bad = BadInformation::kRefuse,
                 bool ignore_unknown = false, const std::function<void(std::size_t)>& progress = {});
 

@@ -141,7 +141,7 @@ struct EdgeOutcome {
 struct GraphComponent {
   NodeId anchor = 0;  ///< id of the node that holds it in place (the first fixed one, else the smallest id)
   std::size_t nodes = 0;
-  bool by_priors = false;  ///< priors hold it, and no node is fixed
+  bool by_priors = false;  ///< priors or fixed landmarks hold it, and no node is fixed
 };
 
 /// What a start came to.

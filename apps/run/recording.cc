@@ -397,7 +397,8 @@ class Recogniser {
       sensor = "RGB-D, " + (units > 0 ? Short(units) + " units of depth a metre"
                                       : "5000 units of depth a metre assumed, as TUM has them");
       if (units == 1) sensor = "RGB-D, depth in metres";
-      other = " (--set dataset.depth_units_per_m=1000 for millimetres)";
+      other = units > 0 ? " (--set dataset.depth_units_per_m=... for another)"
+                        : " (--set dataset.depth_units_per_m=1000 for millimetres)";
       if (!live) other += "; --sensor mono uses colour alone";
     }
     if (!note_.empty()) other += "; " + note_;

@@ -387,6 +387,7 @@ class Recogniser {
   void Say() {
     const bool live = IsCamera(dataset_.string());
     Options().sensor = sensor_.value_or(Sensor::kMono);
+    if (request_.depth_units_per_m > 0) Options().depth_units_per_m = request_.depth_units_per_m;
     std::string sensor = "one camera";
     std::string other;
     if (Options().sensor == Sensor::kStereo) {

@@ -329,6 +329,7 @@ class Recogniser {
     out_.config = Published("images");
     if (live && !two && sensor_ == Sensor::kStereo) layout_ += ", left and right side by side";
     if (type != DatasetType::kImages) Options().rate_hz = 0;  // its own
+    if (type == DatasetType::kBag) units_ = 1000;             // REP 118
     if (!sensor_) sensor_ = Sensor::kMono;
     if (request_.HasLens()) {
       Requested();

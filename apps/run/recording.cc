@@ -339,6 +339,7 @@ class Recogniser {
     out_.config = Published("images");
     if (live && !two && sensor_ == Sensor::kStereo) layout_ += ", left and right side by side";
     if (type != DatasetType::kImages) Options().rate_hz = 0;  // its own
+    if (type == DatasetType::kBag) units_ = 1000;             // REP 118
     if (!sensor_) sensor_ = Sensor::kMono;
     if (request_.HasLens()) {
       Requested();
@@ -397,6 +398,7 @@ class Recogniser {
   void Say() {
     const bool live = IsCamera(dataset_.string());
     Options().sensor = sensor_.value_or(Sensor::kMono);
+    if (request_.depth_units_per_m > 0) Options().depth_units_per_m = request_.depth_units_per_m;
     std::string sensor = "one camera";
     std::string other;
     if (Options().sensor == Sensor::kStereo) {
@@ -407,7 +409,8 @@ class Recogniser {
       sensor = "RGB-D, " + (units > 0 ? Short(units) + " units of depth a metre"
                                       : "5000 units of depth a metre assumed, as TUM has them");
       if (units == 1) sensor = "RGB-D, depth in metres";
-      other = " (--set dataset.depth_units_per_m=1000 for millimetres)";
+      other = units > 0 ? " (--set dataset.depth_units_per_m=... for another)"
+                        : " (--set dataset.depth_units_per_m=1000 for millimetres)";
       if (!live) other += "; --sensor mono uses colour alone";
     }
     if (!note_.empty()) other += "; " + note_;

@@ -17,6 +17,7 @@ struct CameraRequest {
   std::string camera;                                ///< "fx,fy,cx,cy[,k1,k2,p1,p2[,k3]]" [px]; empty: not
   std::optional<double> view_deg;                    ///< horizontal field of view [deg]
   std::optional<Sensor> sensor;                      ///< instead of what the folder suggests
+  double depth_units_per_m = 0;                      ///< instead of the layout's; 0: not said
 
   /// Says anything of the lens?
   bool HasLens() const { return calibration || !camera.empty() || view_deg; }

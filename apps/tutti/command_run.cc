@@ -173,7 +173,11 @@ RunConfig ConfigFor(const CameraRequest& camera, const RunArguments& arguments, 
     SetImageUse(arguments, config.dataset);
     return config;
   }
-  Recording recording = Recognise(arguments.dataset, camera);
+  RunConfig asked;
+  SetOptions(arguments.set, asked);
+  CameraRequest wanted = camera;
+  wanted.depth_units_per_m = asked.dataset.depth_units_per_m;
+  Recording recording = Recognise(arguments.dataset, wanted);
   if (!arguments.quiet) SayFindings(recording);
   SetImageUse(arguments, recording.config.dataset);
   SetOptions(arguments.set, recording.config);

@@ -156,6 +156,9 @@ DepthFormat FormatOfDepth(const Layout& layout) {
 
 FolderContents FindPaired(const fs::path& folder, const DatasetOptions& options) {
   const std::optional<FoundLayout> found = FindLayout(folder);
+  if (!found && IsStrayScanner(folder))
+    throw InputError(folder.string() +
+                     ": is a video of Stray Scanner, which can't be followed; leave --follow out");
   if (!found)
     throw InputError(folder.string() +
                      ": holds no left and right, or colour and depth, images of a known layout "

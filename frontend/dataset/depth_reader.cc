@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 
 #include "frontend/dataset/image_file.h"
 
@@ -67,6 +68,9 @@ std::string DepthReader::Read(const std::filesystem::path& file, const Rectifier
   const ImageFile read = ReadDepthFile(file, format_.float_in_png);
   if (!read.error.empty()) return read.error;
   cv::Mat depth = DepthInMetres(read.image, UnitsOf(read.image), max_depth_m_);
+  constexpr double kMillimetres = 1000;  // 65.535 m is what a Kinect's driver writes for "none"
+  if (read.image.type() == CV_16UC1 && format_.units_per_m == kMillimetres)
+    depth.setTo(0, read.image == std::numeric_limits<unsigned short>::max());
   if (depth.size() != size_ && !Resample(depth)) {
     return file.string() + ": the depth image has " + SizeText(depth.size()) +
            " pixels, but the colour images have " + SizeText(size_) + "; depth must be registered to colour";

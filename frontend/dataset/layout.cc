@@ -195,18 +195,51 @@ bool IsDepth(const Layout& layout, const fs::path& file) {
   return ReadDepthFile(file).error.empty();
 }
 
-std::optional<FoundLayout> Match(const fs::path& folder, const Layout& layout, bool has_images) {
+bool IsImageOrArray(const fs::path& file) { return HasImageExtension(file) || file.extension() == ".npy"; }
+
+std::vector<RoleImage> Select(const std::vector<fs::path>& files, const ImageRole& role) {
+  std::vector<RoleImage> images;
+  for (const fs::path& file : files) {
+    const std::optional<std::string> rest = WithoutWord(file.stem().string(), role.word);
+    if (rest) images.push_back({NumbersIn(*rest), StampIn(*rest), file});
+  }
+  return images;
+}
+
+// What lies in the folder itself.
+struct Listing {
+  std::vector<fs::path> files;
+  bool images = false;
+  bool partners = false;  // some names say that they are right or depth images; else most rows need no look
+};
+
+Listing ListingOf(const fs::path& folder) {
+  Listing listing{ListFiles(folder, IsImageOrArray)};
+  for (const fs::path& file : listing.files) {
+    listing.images = listing.images || HasImageExtension(file);
+    const std::string name = file.stem().string();
+    for (const char* word : {"depth", "right", "cam1", "r"})
+      listing.partners = listing.partners || FindWord(name, word) != std::string::npos;
+  }
+  return listing;
+}
+
+std::optional<FoundLayout> Match(const fs::path& folder, const Layout& layout, const Listing& listing) {
   std::error_code ignored;
   const bool anonymous = *layout.name == '\0', inside = *layout.left.folder == '\0';
-  if (anonymous && !inside && has_images) return std::nullopt;  // a folder of images, whatever is below
-  if (inside ? !has_images : !fs::is_directory(folder / layout.left.folder, ignored)) return std::nullopt;
+  if (anonymous && !inside && listing.images) return std::nullopt;  // a folder of images, whatever is below
+  if (inside ? !listing.images || !listing.partners : !fs::is_directory(folder / layout.left.folder, ignored))
+    return std::nullopt;
   if (*layout.sign != '\0' && !OneOf(folder, layout.sign)) return std::nullopt;
-  const auto left = ImagesOf(folder, layout.left);
+  const auto images = [&](const ImageRole& role) {
+    return inside ? Select(listing.files, role) : ImagesOf(folder, role);
+  };
+  const auto left = images(layout.left);
   if (left.empty()) return std::nullopt;
   FoundLayout found{&layout};
-  if (layout.right.folder != nullptr) found.right = 2 * ImagesOf(folder, layout.right).size() > left.size();
+  if (layout.right.folder != nullptr) found.right = 2 * images(layout.right).size() > left.size();
   if (layout.depth.folder != nullptr) {
-    const auto depth = ImagesOf(folder, layout.depth);
+    const auto depth = images(layout.depth);
     found.depth = !depth.empty() && IsDepth(layout, depth.front().file);
     // Names without the word may be of anything; those with it say what they are.
     if (inside && 2 * left.size() < depth.size()) return std::nullopt;
@@ -259,9 +292,9 @@ bool IsStrayScanner(const fs::path& folder) {
 }
 
 std::optional<FoundLayout> FindLayout(const fs::path& folder) {
-  const bool has_images = !ListImages(folder).empty();
+  const Listing listing = ListingOf(folder);
   for (const Layout& layout : Layouts()) {
-    if (std::optional<FoundLayout> found = Match(folder, layout, has_images)) return found;
+    if (std::optional<FoundLayout> found = Match(folder, layout, listing)) return found;
   }
   return std::nullopt;
 }
@@ -276,6 +309,7 @@ bool HasStamps(const fs::path& folder) {
 }
 
 std::vector<RoleImage> ImagesOf(const fs::path& folder, const ImageRole& role, const std::string& extension) {
+<<<<<<< HEAD
   std::vector<RoleImage> images;
   std::vector<std::string> names;
   if (role.folder == nullptr) return images;
@@ -294,6 +328,14 @@ std::vector<RoleImage> ImagesOf(const fs::path& folder, const ImageRole& role, c
   std::vector<RoleImage> by_time;
   for (const auto& [stamp, i] : found.stamps) by_time.push_back({images[i].key, stamp, images[i].file});
   return by_time;
+=======
+  if (role.folder == nullptr) return {};
+  return Select(ListFiles(*role.folder == '\0' ? folder : folder / role.folder,
+                          [&](const fs::path& file) {
+                            return extension.empty() ? IsImageOrArray(file) : file.extension() == extension;
+                          }),
+                role);
+>>>>>>> layout/main
 }
 
 std::vector<fs::path> FramesIn(const fs::path& folder, bool pairs, std::vector<std::string>* notes) {

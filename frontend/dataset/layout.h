@@ -97,6 +97,9 @@ struct LayoutCalibration {
 /// `size`: of the images. Throws InputError.
 LayoutCalibration ReadLayoutCalibration(const std::filesystem::path& folder, const FoundLayout& found,
                                         cv::Size size);
+/// The same of KITTI raw.
+LayoutCalibration ReadKittiRawCalibration(const std::filesystem::path& folder, const FoundLayout& found,
+                                          cv::Size size);
 /// Lists of TUM's layout.
 struct TumLists {
   const char* colour = "rgb.txt";
@@ -108,7 +111,7 @@ LayoutCalibration ReadTumCalibration(const std::filesystem::path& folder);
 
 /// What a layout says of its depth images, but for their camera.
 DepthFormat FormatOfDepth(const Layout& layout);
-/// The same of a file of 4 numbers, or a matrix. Throws InputError.
+/// The intrinsics of a file of 4 numbers, or a matrix. Throws InputError.
 PinholeCamera ReadIntrinsics(const std::filesystem::path& file);
 
 /// Time stamps [s], a line each: a number, or KITTI's date and time (2011-09-26 13:02:25.964389445, UTC).

@@ -178,7 +178,9 @@ std::vector<fs::path> ListImages(const fs::path& folder, bool pairs, std::vector
   if (!fs::is_directory(folder, error)) {
     throw InputError(folder.string() + ": no such folder; give the folder that holds the images");
   }
-  if (ImagesIn(folder).empty()) throw InputError(folder.string() + ": holds no image files");
+  if (ImagesIn(folder).empty())
+    throw InputError(folder.string() + ": holds no image files" +
+                     (IsStrayScanner(folder) ? "; give its video, " + (folder / "rgb.mp4").string() : ""));
   return FramesIn(folder, pairs, notes);
 }
 

@@ -129,6 +129,10 @@ TEST(Recording, OfTumWithoutAKnownUnitOfDepthSaysWhatIsAssumed) {
               AllOf(HasSubstr("5000 units of depth a metre assumed"), HasSubstr("depth_units_per_m=1000")));
   EXPECT_THAT(Recognise(TumFolder("rgbd_dataset_freiburg1_desk", true), {}).findings[1],
               Not(HasSubstr("assumed")));
+  CameraRequest camera;
+  camera.depth_units_per_m = 1000;
+  EXPECT_THAT(Recognise(TumFolder("a", true), camera).findings[1],
+              HasSubstr("1000 units of depth a metre ("));
 }
 
 TEST(Recording, OfPairsWithoutACalibrationIsOneCameraWithAGuess) {

@@ -202,7 +202,6 @@ TEST_F(HardInput, TextsWithoutEndAreRefusedAtOnce) {
     Commands commands = texts(file);
     for (const std::vector<std::string>& more :
          Commands{{"run", data, "--out", out, "--ground-truth", file},
-                  {"run", file, "--out", out, "--fov", "80"},
                   {"close", "--trajectory", tum, "--images", data, "--out", out, "--times", file},
                   {"loops", data, "--out", out, "--mask", file},
                   {"loops", data, "--out", out, "--places", file},

@@ -1,4 +1,5 @@
 // `tutti run` and `tutti close` on a video whose frames have no constant rate, and through a pipe.
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>

@@ -80,7 +80,6 @@ TEST(BagDataset, SixteenBitIsScaledAndRepeatedStampsAreSkipped) {
 TEST(BagDataset, DepthInItsUnitAndImagesWithoutComeAlone) {
   DatasetOptions options = Topic("/colour/image_raw", Sensor::kRgbd);
   options.depth_topic = "/depth/image";
-  options.depth_units_per_m = 1000;
   const auto dataset = OpenDataset(FourFrames(), options);
   ASSERT_EQ(dataset->Size(), 4u);
   EXPECT_THAT(dataset->Warnings().front(), HasSubstr("1 of 4 images of /colour/image_raw have no depth"));

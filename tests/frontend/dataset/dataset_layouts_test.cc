@@ -212,12 +212,15 @@ TEST(DatasetLayouts, SevenScenesIsRgbdInMillimetresWithAPoseBesideEachImage) {
   for (int i = 0; i < 4; ++i) {
     const std::string name = "frame-" + Number(2 * i);  // every second frame
     WriteImage(folder / (name + ".color.png"), Picture(64, 48, i));
-    WriteImage(folder / (name + ".depth.png"), Depth(1500));
+    cv::Mat depth = Depth(1500);
+    depth.row(0) = 65535;  // none
+    WriteImage(folder / (name + ".depth.png"), depth);
     WriteText(folder / (name + ".pose.txt"), "1 0 0 " + std::to_string(i) + "\n0 1 0 0\n0 0 1 0\n0 0 0 1\n");
   }
   const auto data = OpenDataset(folder, Auto(Sensor::kRgbd, true));
   ASSERT_EQ(data->Size(), 4U);
   EXPECT_FLOAT_EQ(DepthAt(*data, 3), 1.5F);
+  EXPECT_EQ(DepthAt(*data, 3, 0), 0);
   EXPECT_NEAR(data->Stamp(3), 6.0 / 30, 1e-9);
   EXPECT_EQ(cv::norm(data->Read(3).frame->image, Picture(64, 48, 3), cv::NORM_INF), 0);
   ExpectMotion(*data, {3, 0, 0});

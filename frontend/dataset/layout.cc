@@ -199,11 +199,18 @@ bool IsImageOrArray(const fs::path& file) { return HasImageExtension(file) || fi
 
 std::vector<RoleImage> Select(const std::vector<fs::path>& files, const ImageRole& role) {
   std::vector<RoleImage> images;
+  std::vector<std::string> names;
   for (const fs::path& file : files) {
     const std::optional<std::string> rest = WithoutWord(file.stem().string(), role.word);
-    if (rest) images.push_back({NumbersIn(*rest), StampIn(*rest), file});
+    if (!rest) continue;
+    images.push_back({NumbersIn(*rest), std::nullopt, file});
+    names.push_back(*rest);
   }
-  return images;
+  const internal::StampsOfNames found = internal::FindStamps(names);
+  if (found.stamps.size() != images.size()) return images;
+  std::vector<RoleImage> by_time;
+  for (const auto& [stamp, i] : found.stamps) by_time.push_back({images[i].key, stamp, images[i].file});
+  return by_time;
 }
 
 // What lies in the folder itself.
@@ -309,33 +316,12 @@ bool HasStamps(const fs::path& folder) {
 }
 
 std::vector<RoleImage> ImagesOf(const fs::path& folder, const ImageRole& role, const std::string& extension) {
-<<<<<<< HEAD
-  std::vector<RoleImage> images;
-  std::vector<std::string> names;
-  if (role.folder == nullptr) return images;
-  const fs::path place = *role.folder == '\0' ? folder : folder / role.folder;
-  for (const fs::path& file : ListFiles(place, [&](const fs::path& f) {
-         return extension.empty() ? HasImageExtension(f) || f.extension() == ".npy"
-                                  : f.extension() == extension;
-       })) {
-    const std::optional<std::string> rest = WithoutWord(file.stem().string(), role.word);
-    if (!rest) continue;
-    images.push_back({NumbersIn(*rest), std::nullopt, file});
-    names.push_back(*rest);
-  }
-  const internal::StampsOfNames found = internal::FindStamps(names);
-  if (found.stamps.size() != images.size()) return images;
-  std::vector<RoleImage> by_time;
-  for (const auto& [stamp, i] : found.stamps) by_time.push_back({images[i].key, stamp, images[i].file});
-  return by_time;
-=======
   if (role.folder == nullptr) return {};
   return Select(ListFiles(*role.folder == '\0' ? folder : folder / role.folder,
                           [&](const fs::path& file) {
                             return extension.empty() ? IsImageOrArray(file) : file.extension() == extension;
                           }),
                 role);
->>>>>>> layout/main
 }
 
 std::vector<fs::path> FramesIn(const fs::path& folder, bool pairs, std::vector<std::string>* notes) {

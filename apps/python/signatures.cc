@@ -36,7 +36,6 @@ std::vector<std::string> Parameters(const std::string& list) {
 std::string Bare(const std::string& parameter) {
   const std::size_t equals = parameter.rfind(" = ");
   std::string name = parameter.substr(0, std::min(parameter.find(':'), equals));
-  if (name == "self") return "$self";
   if (equals == std::string::npos) return name;
   const std::string value = parameter.substr(equals + 3);
   return name + "=" + (value.find('<') == std::string::npos ? value : "...");

@@ -52,6 +52,7 @@ class TrajectoryCloser {
   /// the first one, and without calibration. It jumps when loops close; the odometry never does.
   Pose T_map_odom() const;
   /// A trajectory of the odometry (all its poses, those without images too) as the loops correct it so far.
+  /// Single poses that are off get poses between their neighbours.
   Trajectory Corrected(const Trajectory& odometry) const;
   /// The keyframes as they are now, T_map_body.
   Trajectory Keyframes() const;
@@ -62,7 +63,8 @@ class TrajectoryCloser {
   /// How often loops moved the trajectory.
   int Corrections() const;
   /// What went wrong without stopping it since the last call, and, after Finish, whether the images show that
-  /// the odometry is less certain than configured.
+  /// the odometry is less certain than configured. Where it jumps (a pose that is off, a restart): some 20
+  /// images later; such a step has no weight.
   std::vector<std::string> TakeWarnings();
 
  private:

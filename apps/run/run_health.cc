@@ -1,11 +1,11 @@
 #include "apps/run/run_health.h"
-#include "core/terminal.h"
 
 #include <algorithm>
 #include <cstdio>
+#include <filesystem>
 #include <string_view>
 
-#include "tutti/frontend/dataset.h"
+#include "core/terminal.h"
 
 namespace tutti {
 namespace {
@@ -23,8 +23,9 @@ std::string Shown(const RunSign& sign) {
 
 // Most frames have no pose: what one image shows is not in the next.
 bool ShowsNoFilm(const RunResult& result, const RunHealth& health) {
+  std::error_code ignored;
   const bool no_photos =
-      result.rig.sensor != Sensor::kMono || result.dataset.empty() || IsCamera(result.dataset);
+      result.rig.sensor != Sensor::kMono || !std::filesystem::is_directory(result.dataset, ignored);
   if (health.word != HealthWord::kFailed || no_photos || result.given_odometry) return false;
   return std::any_of(health.signs.begin(), health.signs.end(), [](const RunSign& sign) {
     return sign.kind->name == std::string_view("frames_posed") && sign.kind->IsFailed(sign.value);

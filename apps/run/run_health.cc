@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "core/terminal.h"
+#include "tutti/frontend/dataset.h"
 
 namespace tutti {
 namespace {
@@ -24,8 +25,9 @@ std::string Shown(const RunSign& sign) {
 // Most frames have no pose: what one image shows is not in the next.
 bool ShowsNoFilm(const RunResult& result, const RunHealth& health) {
   std::error_code ignored;
-  const bool no_photos =
-      result.rig.sensor != Sensor::kMono || !std::filesystem::is_directory(result.dataset, ignored);
+  const bool no_photos = result.rig.sensor != Sensor::kMono || result.dataset.empty() ||
+                         IsCamera(result.dataset) ||
+                         std::filesystem::is_regular_file(result.dataset, ignored);  // a video, a bag
   if (health.word != HealthWord::kFailed || no_photos || result.given_odometry) return false;
   return std::any_of(health.signs.begin(), health.signs.end(), [](const RunSign& sign) {
     return sign.kind->name == std::string_view("frames_posed") && sign.kind->IsFailed(sign.value);

@@ -99,8 +99,8 @@ def focal_lengths(rows):
         known = [r[when] for r in rows if r[when]["measured"]]
         return f"{sum(abs(f['error']) <= 2 * f['sigma'] for f in known)} of {len(known)}"
     text = ["", "## Focal lengths that are measured", "", f"Cuts of {CUT} frames without a camera. Error within two standard deviations: "
-            f"{within('first_frames')} by the first frames, {within('map')} by the whole map. Cost: processor time over that of "
-            "the SLAM that follows.", "", "| cut | form | first frames | whole map | cost |", "|---|---|---|---|---|"]
+            f"{within('first_frames')} by the first third of the frames, {within('map')} by the whole map. Cost: processor time over that of "
+            "the SLAM that follows.", "", "| cut | form | first third | whole map | cost |", "|---|---|---|---|---|"]
     return text + [f"| {r['cut']} | {r['form']} | {told(r['first_frames'])} | {told(r['map'])} | {100 * r['cost']:.0f} % |" for r in rows]
 
 

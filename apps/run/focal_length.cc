@@ -304,10 +304,11 @@ PinholeCamera CameraOf(const PinholeCamera& before, const std::array<double, 4>&
 
 bool IsLens(double focal_px, int width) { return focal_px > 0.2 * width && focal_px < 10.0 * width; }
 
-// A share of the recording: the odometry of these frames, twice, is what measuring costs.
+// A share of the recording: the odometry of these frames is what measuring costs.
 int FramesToTrack(const Dataset& dataset, int most) {
+  constexpr std::size_t kShare = 3;
   constexpr int kFewest = 40;
-  const auto share = static_cast<int>(std::min<std::size_t>(2 * dataset.Size() / 7, 1000000));
+  const auto share = static_cast<int>(std::min<std::size_t>(dataset.Size() / kShare, 1000000));
   return std::min(most, std::max(kFewest, share));
 }
 

@@ -21,7 +21,7 @@ struct FocalLength {
   std::string reason;     ///< why it was not measured
 };
 
-/// Odometry with the camera of `config` on the first 2/7 of the recording (at least 40 frames, at most
+/// Odometry with the camera of `config` on the first third of the recording (at least 40 frames, at most
 /// `frames`), then a bundle adjustment of its keyframes with focal length and principal point free, once with
 /// radial distortion free (Brown's model, k1 alone) and once without: the result is in the middle. Both again
 /// with it, if it is more than 3 % away. Priors: principal point as it is, give or take 1 % of the width; k1

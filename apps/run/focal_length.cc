@@ -22,16 +22,17 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kPixelSigma = 1.0;     // of a keypoint [px]
-constexpr double kDepthSigma = 0.02;    // of a depth, as share of it
-constexpr double kLensSigma = 0.05;     // prior of k1
-constexpr double kLensKept = 0.005;     // the same where the lens is taken to be as it was calibrated
-constexpr double kNoLens = 1e-5;        // the same where there is none
-constexpr double kNeedsLens = 4;        // gain of another lens [squares of sigma] below which none is needed
-constexpr double kCentreSigma = 0.01;   // prior of the principal point, as share of the width
-constexpr double kCorrelation = 3.0;    // errors of neighbouring keypoints are not independent
-constexpr double kWorstSigma = 0.10;    // of a focal length that is worth more than a guess
-constexpr double kLeftOver = 0.3;       // of a move: what a map that was tracked with another one keeps of it
+constexpr double kPixelSigma = 1.0;    // of a keypoint [px]
+constexpr double kDepthSigma = 0.02;   // of a depth, as share of it
+constexpr double kLensSigma = 0.05;    // prior of k1
+constexpr double kLensKept = 0.005;    // the same where the lens is taken to be as it was calibrated
+constexpr double kNoLens = 1e-5;       // the same where there is none
+constexpr double kNeedsLens = 4;       // gain of another lens [squares of sigma] below which none is needed
+constexpr double kCentreSigma = 0.01;  // prior of the principal point, as share of the width
+constexpr double kCorrelation = 3.0;   // errors of neighbouring keypoints are not independent
+constexpr double kWorstSigma = 0.10;   // of a focal length that is worth more than a guess
+constexpr double kLeftOver = 0.3;      // of a move: what a map that was tracked with another one keeps of it
+constexpr double kAnyMove = 1e9;
 constexpr double kWorstChecked = 0.15;  // of one that can speak against another
 constexpr int kFewestKeyframes = 6;
 constexpr int kFewestFeatures = 500;  // of an image; half of those of the run do
@@ -268,13 +269,15 @@ double SigmaOf(const Scene& best, const Fit& fit) {
 struct Estimate {
   std::array<double, 4> lens = {{0, 0, 0, 0}};  // as Scene's
   double sigma = 1;                             // of the logarithm of the focal length
+  double lens_sigma = 0;                        // part of it: by the choice of the lens
 };
 
 // A distortion of the lens and another focal length look nearly the same, and what the model has not
 // (further coefficients, a rolling shutter) goes into either: the truth lies between the fit with k1 free
 // and the one without distortion, and half of their difference is what the choice of the model is uncertain
 // by.
-std::optional<Estimate> EstimateOf(const Scene& scene) {
+// No sigma (1) where the focal length moves by more than that: there is a better map to come.
+std::optional<Estimate> EstimateOf(const Scene& scene, double worth_a_sigma) {
   Scene free = scene, straight = scene;
   straight.lens_sigma = kNoLens;
   const Fit with = Adjust(free, false), without = Adjust(straight, false);
@@ -282,7 +285,10 @@ std::optional<Estimate> EstimateOf(const Scene& scene) {
   Estimate estimate;
   for (std::size_t i = 0; i < estimate.lens.size(); ++i)
     estimate.lens[i] = 0.5 * (free.lens[i] + straight.lens[i]);
-  estimate.sigma = std::hypot(SigmaOf(free, with), 0.5 * (free.lens[0] - straight.lens[0]));
+  estimate.lens_sigma = 0.5 * std::abs(free.lens[0] - straight.lens[0]);
+  const double moved = estimate.lens[0] - scene.given;
+  if (std::abs(moved) < worth_a_sigma)
+    estimate.sigma = std::hypot(SigmaOf(free, with), estimate.lens_sigma, kLeftOver * moved);
   return estimate;
 }
 
@@ -330,8 +336,10 @@ FocalLength MeasureFocalLength(const fs::path& path, const RunConfig& config, in
     const Pass pass = Track(*dataset, config, camera, most);
     result.frames = pass.frames;
     tracked += std::max(1, pass.frames);
+    const bool last = tracked >= 2 * most;
     const bool enough = pass.scene && 2 * pass.posed >= pass.frames;
-    const std::optional<Estimate> here = enough ? EstimateOf(*pass.scene) : std::nullopt;
+    const std::optional<Estimate> here =
+        enough ? EstimateOf(*pass.scene, last ? kAnyMove : kSettled) : std::nullopt;
     if (!here || !IsLens(std::exp(here->lens[0]), camera.width)) {
       result.reason = enough ? "nothing agrees on a focal length" : "too little of it could be tracked";
       if (found) break;
@@ -340,13 +348,13 @@ FocalLength MeasureFocalLength(const fs::path& path, const RunConfig& config, in
     }
     found = here;
     const double moved = found->lens[0] - std::log(camera.fx);
-    found->sigma = std::hypot(found->sigma, kLeftOver * moved);
     camera = CameraOf(camera, found->lens);
     if (std::abs(moved) < kSettled) break;
   }
   result.cpu_s = ProcessCpuSeconds() - cpu_begin;
   if (!found) return result;
   result.sigma = found->sigma;
+  result.lens_sigma = found->lens_sigma;
   result.measured = result.sigma <= kWorstSigma;
   result.reason = result.measured ? "" : "the motion does not tell the focal length";
   if (!result.measured) return result;
@@ -359,16 +367,16 @@ FocalLength MeasureFocalLength(const fs::path& path, const RunConfig& config, in
   return result;
 }
 
-FocalLength FocalLengthOf(const Odometry& odometry, const FrameRange& session) {
+FocalLength FocalLengthOf(const Odometry& odometry, const FrameRange& session, double lens_sigma) {
   const double cpu_begin = ProcessCpuSeconds();
   FocalLength result;
   result.camera = odometry.Rig().camera;
   const std::optional<Scene> scene = SceneOf(
       odometry, WhereItTurns(odometry, KeyframesOfLargestSubmap(odometry, session), kCheckedKeyframes),
-      kMostLandmarks, result.camera.fy / result.camera.fx);
-  const std::optional<Estimate> found = scene ? EstimateOf(*scene) : std::nullopt;
+      kCheckedLandmarks, result.camera.fy / result.camera.fx);
+  const std::optional<Estimate> found = scene ? EstimateOf(*scene, kAnyMove) : std::nullopt;
   if (found && IsLens(std::exp(found->lens[0]), result.camera.width)) {
-    result.sigma = std::hypot(found->sigma, kLeftOver * (found->lens[0] - scene->given));
+    result.sigma = std::hypot(found->sigma, lens_sigma);
     result.measured = result.sigma <= kWorstSigma;
     if (result.measured) {
       result.camera.fy *= std::exp(found->lens[0]) / result.camera.fx;

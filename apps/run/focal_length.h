@@ -15,6 +15,7 @@ struct FocalLength {
   bool measured = false;  ///< false: `camera` is as it was
   PinholeCamera camera;   ///< pixels of the given shape; k1 where the lens has one
   double sigma = 0;       ///< standard deviation of the focal length, as share of it
+  double lens_sigma = 0;  ///< part of it: by whether the lens has distortion
   int frames = 0;         ///< that were looked at
   double cpu_s = 0;       ///< processor time that it took
   std::string reason;     ///< why it was not measured
@@ -32,8 +33,9 @@ FocalLength MeasureFocalLength(const std::filesystem::path& dataset, const RunCo
                                int frames = 300);
 
 /// The same bundle adjustments on the map of a run, 40 keyframes in a row where its camera turns most,
-/// without tracking anything again. `camera`: the odometry's with another focal length.
-FocalLength FocalLengthOf(const Odometry& odometry, const FrameRange& session = {});
+/// without tracking anything again. `camera`: the odometry's with another focal length. `lens_sigma`: of what
+/// was measured before, if its distortion was taken out of the images.
+FocalLength FocalLengthOf(const Odometry& odometry, const FrameRange& session = {}, double lens_sigma = 0);
 
 /// Whether a map agrees with the camera that it was made with.
 struct LensCheck {

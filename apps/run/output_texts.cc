@@ -211,11 +211,11 @@ double FocalLengthCpuSeconds(const RunResult& r) {
 
 // As --camera takes it, of the images as they are stored; empty: what the run had is as good.
 std::string BetterCamera(const RunResult& r) {
-  constexpr double kSame = 0.005;
+  constexpr double kSame = 0.005, kSurer = 0.7;
   if (!r.focal_length || !r.focal_length_of_map || !r.focal_length_of_map->measured) return "";
   const FocalLength &before = *r.focal_length, &map = *r.focal_length_of_map;
   const double change = map.camera.fx / r.rig.camera.fx;
-  if (std::abs(change - 1) < kSame || (before.measured && map.sigma >= before.sigma)) return "";
+  if (std::abs(change - 1) < kSame || (before.measured && map.sigma > kSurer * before.sigma)) return "";
   PinholeCamera camera = before.camera;
   camera.fx *= change;
   camera.fy *= change;

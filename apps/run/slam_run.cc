@@ -138,7 +138,10 @@ void SlamRun::Collect() {
   if (given_ == nullptr && !slam_->AppearanceOnly())
     result_.lens_check = CheckLens(*slam_->odometry(), session);
   if (request_.focal_length && !slam_->AppearanceOnly()) {
-    result_.focal_length_of_map = FocalLengthOf(*slam_->odometry(), session);
+    const FocalLength& before = *request_.focal_length;
+    const bool undistorted = before.measured && before.camera.distortion != Distortion::kNone;
+    result_.focal_length_of_map =
+        FocalLengthOf(*slam_->odometry(), session, undistorted ? before.lens_sigma : 0.0);
     result_.cpu_s += result_.focal_length_of_map->cpu_s;
   }
   if (!alone_) return;

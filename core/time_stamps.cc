@@ -142,7 +142,8 @@ RecognisedUnit UnitOfStamps(const std::vector<double>& values, StampUnit expecte
   if (gap == 0) return {UnitOfSingle(values.front(), expected)};
   const double expected_gap = gap * SecondsOf(expected);
   if (expected_gap >= 1e-4 && expected_gap < 10) return {expected};
-  if (values.size() < kFew && (expected != StampUnit::kSeconds || gap < 1e4)) return {expected};
+  const bool absurd = expected_gap < 1e-6;  // more than a million images a second
+  if (values.size() < kFew && !absurd && (expected != StampUnit::kSeconds || gap < 1e4)) return {expected};
   return UnitOfSpacing(gap, expected);
 }
 

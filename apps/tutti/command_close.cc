@@ -94,6 +94,7 @@ int Close(const CLI::App& command, const CloseArguments& arguments) {
   if (command.count("--start") > 0) request.start = arguments.start;
   if (command.count("--end") > 0) request.end = arguments.end;
   if (command.count("--stride") > 0) request.stride = arguments.stride;
+  RefuseToReplace(request.out, arguments.trajectory);
   OutputFolder::Check(request.out, RunLayout());
   const RunConfig config = ConfigOf(CameraOf(command, arguments.camera), arguments);
   const RunResult result = arguments.no_report ? RunSlam(request, config) : RunWithReport(request, config);

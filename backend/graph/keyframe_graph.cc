@@ -268,9 +268,10 @@ void KeyframeGraph::SetSigmas(double translation_ratio, double rotation_rad) {
 }
 
 void KeyframeGraph::NoteMotion(int keyframe, const MotionSigma& sigma) {
+  constexpr double kMost_m = 1e4;  // the sum of variances keeps those of millimetres after a jump of any size
   const Eigen::Vector2d before = walked_.empty() ? Eigen::Vector2d::Zero() : walked_.back().second;
-  walked_.emplace_back(keyframe,
-                       before + Eigen::Vector2d(sigma.translation_m, sigma.rotation_rad).cwiseAbs2());
+  const Eigen::Vector2d step(std::min(sigma.translation_m, kMost_m), sigma.rotation_rad);
+  walked_.emplace_back(keyframe, before + step.cwiseAbs2());
 }
 
 // Variances of translation and rotation since the first keyframe.

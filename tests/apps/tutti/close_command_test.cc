@@ -165,8 +165,9 @@ TEST_F(CloseCommand, FindsTheCameraInTheRecordingOrTakesItFromTheOptions) {
   EXPECT_THAT(stereo.output, HasSubstr("stereo"));
   EXPECT_TRUE(fs::exists("tutti-out/" + fs::path(town).filename().string() + "-closed/graph.g2o"))
       << stereo.output;
-  const auto images = RunTutti({"close", "--trajectory", odometry, "--images", town + "/image_0", "--camera",
-                                "185,185,159.5,79.5", "--no-report", "--out", "images"});
+  const auto images =
+      RunTutti({"close", "--trajectory", odometry, "--images", town + "/image_0", "--camera",
+                "185,185,159.5,79.5", "--no-report", "--require", "failed", "--out", "images"});
   ASSERT_EQ(images.status, 0) << images.output;
   EXPECT_TRUE(fs::exists("images/graph.g2o")) << images.output;
   const auto both = RunTutti({"close", "--trajectory", odometry, "--images", town, "--fov", "3"});

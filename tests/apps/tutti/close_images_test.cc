@@ -86,7 +86,7 @@ TEST_F(CloseImages, ArePairedWithPosesByTheTimeStampsThatTheyAreCalledBy) {
   Trajectory later = Truth();
   for (StampedPose& p : later) p.stamp_s += 6.0 / 15;
   WriteTrajectory(odometry_, later, TrajectoryFormat::kTum);
-  const auto half = Close(RoomOfImages() / "rgb", mono_, "half");
+  const auto half = Close(RoomOfImages() / "rgb", mono_, "half", {"--require", "failed"});
   ASSERT_EQ(half.status, 0) << half.output;
   EXPECT_THAT(half.output, HasSubstr("frames 6 of 12"));
 }

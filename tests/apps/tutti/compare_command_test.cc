@@ -322,7 +322,7 @@ TEST(CompareCommand, ARecordingThatSaysWhatItIsNeedsNoOption) {
   const auto unknown = RunTutti({"compare", (town / "image_0").string(), "--out", "out"});
   EXPECT_EQ(unknown.status, 1);
   EXPECT_THAT(unknown.output,
-              AllOf(HasSubstr("nothing here says what the camera is"), HasSubstr("--config")));
+              AllOf(HasSubstr("nothing here says what the camera is"), HasSubstr("--calibration")));
   EXPECT_FALSE(fs::exists("out"));
 }
 

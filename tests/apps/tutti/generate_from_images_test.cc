@@ -171,7 +171,7 @@ TEST(Generate, WhatASignalInterruptsCanBeUsed) {
     const auto run =
         testing::RunTuttiAndSignal({"generate", "--out", out, "--sensor", "mono", "--frames", "400",
                                     "--width", "320", "--height", "160", "--threads", "2"},
-                                   "frame ", signal);
+                                   "generate ", signal);
     EXPECT_EQ(run.status, 130) << run.output;
     EXPECT_THAT(run.output, AllOf(HasSubstr("interrupted"), HasSubstr("of 400 frames and can be used")));
     const auto images = std::distance(fs::directory_iterator(out / "image_0"), {});

@@ -281,6 +281,21 @@ Eigen::Vector2d KeyframeGraph::Walked(int keyframe) const {
   return after == walked_.begin() ? Eigen::Vector2d::Zero() : std::prev(after)->second;
 }
 
+// The same of one keyframe to another, but for the steps to outliers and from them.
+Eigen::Vector2d KeyframeGraph::WalkedBetween(int older, int newer) const {
+  Eigen::Vector2d walked = Walked(newer) - Walked(older);
+  std::set<int> steps;  // keyframes that they lead to
+  for (auto outlier = outliers_.upper_bound(older); outlier != outliers_.end() && *outlier < newer;
+       ++outlier) {
+    steps.insert(*outlier);
+    const auto next = std::upper_bound(births_.begin(), births_.end(), *outlier,
+                                       [](int id, const Birth& birth) { return id < birth.id; });
+    if (next != births_.end() && next->id <= newer) steps.insert(next->id);
+  }
+  for (const int step : steps) walked -= Walked(step) - Walked(step - 1);
+  return walked.cwiseMax(0);
+}
+
 // Across a jump, or to an outlier.
 bool KeyframeGraph::Unknown(const Edge& edge) const {
   const auto jump = jumps_.upper_bound(edge.older);
@@ -292,7 +307,7 @@ bool KeyframeGraph::Unknown(const Edge& edge) const {
 // one direction: that makes up for what the turns between them do to the end.
 Vector7d KeyframeGraph::Sigmas(const Edge& edge, double floor) const {
   const double steps = std::sqrt(edge.steps);
-  const Eigen::Vector2d walked = (Walked(edge.newer) - Walked(edge.older)).cwiseAbs().cwiseSqrt();
+  const Eigen::Vector2d walked = WalkedBetween(edge.older, edge.newer).cwiseSqrt();
   const bool unknown = Unknown(edge);
   const double ratio = unknown ? 1 : options_.sigma_translation_ratio,
                rotation_rad = unknown ? 1 : options_.sigma_rotation_rad;

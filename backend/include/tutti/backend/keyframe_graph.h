@@ -204,6 +204,7 @@ class KeyframeGraph {
   const MapKeyframe& At(int id) const;
   bool Consecutive(int older, int newer) const;
   Eigen::Vector2d Walked(int keyframe) const;
+  Eigen::Vector2d WalkedBetween(int older, int newer) const;
   bool Unknown(const Edge& edge) const;
   void TiePastOutliers();
   double SigmaFloor() const;

@@ -104,7 +104,7 @@ def focal_lengths(rows):
     return text + [f"| {r['cut']} | {r['form']} | {told(r['first_frames'])} | {told(r['map'])} | {100 * r['cost']:.0f} % |" for r in rows]
 
 
-def document(runs, rows):
+def document(runs, focal):
     text = ["# One hand-held camera", "", "Written by `./dev bench hand-held --write` (bench/hand_held_table.py). The colour images of "
             f"`redkitchen` alone, with loops, ATE after Sim(3) alignment. From frame 0 the path is {runs[0]['path_m']:.1f} m; cut-outs "
             f"start at frames {', '.join(map(str, STARTS[1:]))}. The data set has every second frame of a Kinect's 30 Hz. Of every run: "
@@ -121,7 +121,7 @@ def document(runs, rows):
             missed = " (**missed**)" if worst > ATE_M or posed < POSED or false else ""
             text.append(f"| {image} | {rate} | {rows[0]['ate_m']:.3f} m | {statistics.median(cuts):.3f} m | {max(cuts):.3f} m | "
                         f"{100 * posed:.1f} %{missed} | {sum(r['true'] for r in rows)} / {false} |")
-    return "\n".join(text + focal_lengths(rows))
+    return "\n".join(text + focal_lengths(focal))
 
 
 def main():

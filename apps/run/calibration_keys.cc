@@ -53,7 +53,7 @@ YAML::Node DataOf(const YAML::Node& node) {
   return inner.IsDefined() && inner.IsMap() ? inner["data"] : inner;
 }
 
-bool IsNumber(const YAML::Node& node) {
+bool IsNumberNode(const YAML::Node& node) {
   double value = 0;
   return node.IsScalar() && YAML::convert<double>::decode(node, value);
 }
@@ -148,7 +148,7 @@ std::vector<double> NamedTerms(const CalibrationKeys& keys, const std::string& l
 
 void SetLensOf(const CalibrationKeys& keys, const KeyValue& list, const std::string& lens,
                PinholeCamera& camera, std::string* note) {
-  const bool listed = IsList(list) || (list && IsNumber(list.node));
+  const bool listed = IsList(list) || (list && IsNumberNode(list.node));
   const std::vector<double> values = listed ? keys.Numbers(list) : NamedTerms(keys, lens);
   const std::string wrong = internal::SetLens(lens, values, camera);
   if (!wrong.empty()) keys.Fail(listed ? list.node : keys.map(), wrong);
@@ -343,7 +343,8 @@ std::string LensName(const CalibrationKeys& keys) {
   const KeyValue nested = keys.Find({"distortion"});  // maplab
   std::string lens = keys.Word(kLensModel);
   if (lens.empty() && nested && nested.node.IsMap()) lens = keys.At(nested.node).Word({"type", "model"});
-  if (lens.empty() && nested && nested.node.IsScalar() && !IsNumber(nested.node)) lens = nested.node.Scalar();
+  if (lens.empty() && nested && nested.node.IsScalar() && !IsNumberNode(nested.node))
+    lens = nested.node.Scalar();
   const KeyValue camera = keys.Find(kCameraModel);
   const std::string model = keys.Word(kCameraModel);
   if (lens.empty()) return model;

@@ -35,7 +35,7 @@ struct GenerateArguments {
 };
 
 // The progress of what is written; false: Ctrl-C.
-std::function<bool(std::size_t, std::size_t)> ShownBy(std::optional<Progress>& progress) {
+std::function<bool(std::size_t, std::size_t)> ReportTo(std::optional<Progress>& progress) {
   return [&progress](std::size_t done, std::size_t total) {
     if (!progress) progress.emplace("generate", total);
     progress->Update(done, "");
@@ -55,7 +55,7 @@ int ChangeImages(const GenerateArguments& arguments) {
   o.threads = arguments.Threads();
   o.force = arguments.force;
   std::optional<Progress> progress;
-  o.progress = ShownBy(progress);
+  o.progress = ReportTo(progress);
   const InterruptGuard guard;
   const ChangedImages result = WriteChangedImages(change, o);
   for (const std::string& note : result.notes) std::fprintf(stderr, "tutti: %s\n", note.c_str());
@@ -94,7 +94,7 @@ int Generate(const GenerateArguments& arguments) {
   write.force = arguments.force;
   write.threads = arguments.Threads();
   std::optional<Progress> progress;
-  write.progress = ShownBy(progress);
+  write.progress = ReportTo(progress);
   const InterruptGuard guard;
   const std::size_t written = WriteSyntheticDataset(world, arguments.out, write);
   const char* d = arguments.out.c_str();

@@ -128,7 +128,7 @@ FolderContents FindImages(const std::filesystem::path& folder, const DatasetOpti
 namespace {
 
 // The data sets in the folders of this one, for somebody who gave the folder above.
-std::string Inside(const std::filesystem::path& folder) {
+std::string DataSetsInside(const std::filesystem::path& folder) {
   std::error_code code;
   std::vector<std::string> names;
   for (std::filesystem::directory_iterator it(folder, code), end; !code && it != end; it.increment(code)) {
@@ -183,7 +183,7 @@ DatasetType DetectDatasetType(const std::filesystem::path& path) {
       (entries == std::filesystem::directory_iterator() ? ": is empty" : ": holds no data set") +
       "; expected image_0/ (KITTI), rgb.txt (TUM), mav0/cam0/ (EuRoC), another layout of data/README.md, "
       "images, or bags of ROS 2" +
-      Inside(path));
+      DataSetsInside(path));
 }
 
 namespace {
@@ -194,7 +194,7 @@ bool IsLayout(DatasetType type) {
 }
 
 // Nothing where none is seen.
-std::optional<DatasetType> Seen(const std::filesystem::path& path) {
+std::optional<DatasetType> DetectedType(const std::filesystem::path& path) {
   try {
     return DetectDatasetType(path);
   } catch (const InputError&) {
@@ -218,7 +218,7 @@ std::optional<Place> Around(const std::filesystem::path& path, const DatasetOpti
   std::filesystem::path folder = given;
   for (int level = 0; level < 3 && folder.has_relative_path(); ++level) {
     folder = folder.parent_path();
-    if (Seen(folder) != options.type) continue;
+    if (DetectedType(folder) != options.type) continue;
     const std::optional<std::filesystem::path> images = ImagesOfDataset(folder);
     // mav0/cam0 for mav0/cam0/data
     if (images && (std::filesystem::equivalent(*images, given, code) ||
@@ -228,7 +228,7 @@ std::optional<Place> Around(const std::filesystem::path& path, const DatasetOpti
     throw InputError(path.string() + ": is part of " + folder.string() +
                      ", but does not hold its left (or colour) images; give that folder");
   }
-  if (Seen(path) != DatasetType::kImages || options.sensor != Sensor::kMono || !options.camera)
+  if (DetectedType(path) != DatasetType::kImages || options.sensor != Sensor::kMono || !options.camera)
     return std::nullopt;
   return Place{
       path, DatasetType::kImages,
@@ -237,7 +237,7 @@ std::optional<Place> Around(const std::filesystem::path& path, const DatasetOpti
 
 Place PlaceToOpen(const std::filesystem::path& path, const DatasetOptions& options) {
   if (IsLayout(options.type)) {
-    const std::optional<DatasetType> seen = Seen(path);
+    const std::optional<DatasetType> seen = DetectedType(path);
     if (!seen || seen == DatasetType::kImages) {
       std::error_code code;
       if (std::filesystem::is_directory(path, code)) {

@@ -26,7 +26,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::seconds kPatience(30);  // with a stream that gives nothing
-constexpr int kMostFailures = 1000;            // of a decoder in a row, without another packet
+constexpr int kMostUndecodable = 1000;         // of a decoder in a row, without another packet
 constexpr double kSloppy = 0.5;                // times go back by less without being another recording's [s]
 
 int IsOverdue(void* deadline) { return Clock::now() > *static_cast<Clock::time_point*>(deadline) ? 1 : 0; }
@@ -153,7 +153,7 @@ bool VideoDecoder::Grab() {
     const int code = avcodec_receive_frame(parts_->codec.get(), parts_->frame.get());
     if (code >= 0) return true;
     if (code == AVERROR_EOF) return false;
-    if (code != AVERROR(EAGAIN) && ++failures < kMostFailures) continue;
+    if (code != AVERROR(EAGAIN) && ++failures < kMostUndecodable) continue;
     if (parts_->flushing) return false;
     parts_->flushing = !parts_->NextPacket();
     avcodec_send_packet(parts_->codec.get(), parts_->flushing ? nullptr : parts_->packet.get());

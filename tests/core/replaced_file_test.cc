@@ -22,7 +22,6 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
-using tutti::testing::ErrorOf;
 
 class ReplacedFileTest : public ::testing::Test {
  protected:
@@ -50,7 +49,8 @@ TEST_F(ReplacedFileTest, KeepsItsModeAndALinkLeadsToTheFileThatIsWritten) {
   WriteFile(folder_ / "links" / "three", "made");
   EXPECT_EQ(Content(folder_ / "links" / "not there yet"), "made");
   fs::create_symlink("round", folder_ / "links" / "round");
-  EXPECT_THAT(ErrorOf([&] { WriteFile(folder_ / "links" / "round", "x"); }), HasSubstr("can't be written"));
+  EXPECT_THAT(tutti::testing::ErrorOf([&] { WriteFile(folder_ / "links" / "round", "x"); }),
+              HasSubstr("can't be written"));
   EXPECT_EQ(Entries(folder_ / "links"), 5);
 }
 
@@ -58,11 +58,12 @@ TEST_F(ReplacedFileTest, NothingTakesThePlaceOfADeviceAPipeOrAFolder) {
   ASSERT_EQ(mkfifo((folder_ / "pipe").c_str(), 0600), 0);
   fs::create_symlink("/dev/null", folder_ / "null");
   for (const fs::path& file : {fs::path("/dev/null"), folder_ / "null", folder_ / "pipe", folder_}) {
-    EXPECT_THAT(ErrorOf([&] { ReplacedFile made(file); }),
+    EXPECT_THAT(tutti::testing::ErrorOf([&] { ReplacedFile made(file); }),
                 AllOf(HasSubstr(file.string()), HasSubstr("give the name of a file")));
   }
   CheckWritable("/dev/null", Needs::kBytes);
-  EXPECT_THAT(ErrorOf([] { CheckWritable("/dev/null", Needs::kFile); }), HasSubstr("a device"));
+  EXPECT_THAT(tutti::testing::ErrorOf([] { CheckWritable("/dev/null", Needs::kFile); }),
+              HasSubstr("a device"));
   EXPECT_TRUE(fs::is_character_file("/dev/null"));
   EXPECT_EQ(Entries(folder_), 2);
 }
@@ -73,7 +74,8 @@ TEST_F(ReplacedFileTest, StreamsGetTheBytesThemselves) {
   WriteFile(file_, "through a pipe");
   EXPECT_EQ(read.get(), "through a pipe");
   EXPECT_TRUE(fs::is_fifo(file_));
-  EXPECT_THAT(ErrorOf([] { WriteFile("/dev/full", "x"); }), HasSubstr("No space left on device"));
+  EXPECT_THAT(tutti::testing::ErrorOf([] { WriteFile("/dev/full", "x"); }),
+              HasSubstr("No space left on device"));
   // A redirection: what was printed before stays, and the file is the one that is open.
   const fs::path redirected = folder_ / "redirected";
   const int descriptor = open(redirected.c_str(), O_WRONLY | O_CREAT, 0600);
@@ -89,7 +91,7 @@ TEST_F(ReplacedFileTest, WhatCantBeWrittenLeavesTheOldOneAndNothingBeside) {
   WriteFile(file_, "old");
   {
     const tutti::testing::FullDisk full(10);
-    EXPECT_THAT(ErrorOf([&] { WriteFile(file_, std::string(100, 'x')); }),
+    EXPECT_THAT(tutti::testing::ErrorOf([&] { WriteFile(file_, std::string(100, 'x')); }),
                 AllOf(HasSubstr(file_.string()), HasSubstr("File too large")));
   }
   {
@@ -98,9 +100,9 @@ TEST_F(ReplacedFileTest, WhatCantBeWrittenLeavesTheOldOneAndNothingBeside) {
   }
   EXPECT_EQ(Content(file_), "old");
   EXPECT_EQ(Entries(folder_), 1);
-  EXPECT_THAT(ErrorOf([&] { WriteFile(folder_ / "no" / "file", "x"); }),
+  EXPECT_THAT(tutti::testing::ErrorOf([&] { WriteFile(folder_ / "no" / "file", "x"); }),
               HasSubstr("No such file or directory"));
-  EXPECT_THAT(ErrorOf([&] { CheckWritable(folder_ / "no" / "file", Needs::kBytes); }),
+  EXPECT_THAT(tutti::testing::ErrorOf([&] { CheckWritable(folder_ / "no" / "file", Needs::kBytes); }),
               HasSubstr("No such file or directory"));
 }
 

@@ -51,7 +51,7 @@ PinholeCamera Plain() {
   return c;
 }
 
-std::string Text(const PinholeCamera& c) {
+std::string CameraAsText(const PinholeCamera& c) {
   std::ostringstream out;
   out << c.width << "x" << c.height << " " << c.fx << " " << c.fy << " " << c.cx << " " << c.cy << " lens "
       << int(c.distortion);
@@ -62,7 +62,7 @@ std::string Text(const PinholeCamera& c) {
 void ExpectAll(const PinholeCamera& wanted, const std::vector<std::string>& files) {
   for (const std::string& file : files) {
     try {
-      EXPECT_EQ(Text(ReadText(file).camera), Text(wanted)) << file;
+      EXPECT_EQ(CameraAsText(ReadText(file).camera), CameraAsText(wanted)) << file;
     } catch (const InputError& e) {
       ADD_FAILURE() << e.what() << "\n" << file;
     }
@@ -225,7 +225,7 @@ TEST(CalibrationFormats, WithBinningAndARegionIsOfTheImagesThatAreSent) {
       "width: 640\nheight: 480\nD: []\nK: [590, 0, 319.5, 0, 590, 239.5, 0, 0, 1]\nbinning_x: 2\nbinning_y: "
       "2\n"
       "roi: {x_offset: 20, y_offset: 40, height: 400, width: 600, do_rectify: false}\n");
-  EXPECT_EQ(Text(c.camera), "300x200 295 295 149.5 99.5 lens 0 0 0 0 0 0");
+  EXPECT_EQ(CameraAsText(c.camera), "300x200 295 295 149.5 99.5 lens 0 0 0 0 0 0");
   EXPECT_EQ(c.format, "ROS, binning 2x2, region 600x400 at (20, 40) applied");
   EXPECT_THAT(RefusalOfText("width: 640\nheight: 480\nK: [590, 0, 319.5, 0, 590, 239.5, 0, 0, 1]\n"
                             "roi: {x_offset: 100, y_offset: 0, height: 480, width: 600}\n"),
@@ -315,7 +315,7 @@ TEST(CalibrationFormats, OfVinsMayNameTheFilesOfItsCameras) {
       << "body_T_cam0: !!opencv-matrix {rows: 4, cols: 4, dt: d, data: [1, 0, 0, 0" << rest
       << "body_T_cam1: {data: [1, 0, 0, 0.1" << rest;
   const Calibration c = ReadCalibration(folder / "vins.yaml", true);
-  EXPECT_EQ(Text(c.camera), Text(Plain()));
+  EXPECT_EQ(CameraAsText(c.camera), CameraAsText(Plain()));
   ASSERT_TRUE(c.right);
   EXPECT_NEAR(c.T_right_left[3], -0.1, 1e-12);
 }

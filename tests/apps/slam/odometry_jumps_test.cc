@@ -15,7 +15,7 @@ namespace {
 using internal::kRadians;
 
 // A vehicle at 10 Hz that speeds up, turns and stops, with a centimetre of noise.
-Trajectory Drive(std::size_t poses, double scale = 1) {
+Trajectory SteadyDrive(std::size_t poses, double scale = 1) {
   Trajectory drive;
   double heading = 0, noise = 0.3;
   Eigen::Vector3d at(3, -2, 1);
@@ -37,9 +37,9 @@ Pose Off(const Pose& pose, double metres, double degrees = 0) {
 }
 
 TEST(OdometryJumps, WhatMovesHasNone) {
-  const Trajectory drive = Drive(300);
+  const Trajectory drive = SteadyDrive(300);
   EXPECT_TRUE(FindJumps(drive).empty());
-  for (const double scale : {1e-3, 1e10}) EXPECT_TRUE(FindJumps(Drive(300, scale)).empty()) << scale;
+  for (const double scale : {1e-3, 1e10}) EXPECT_TRUE(FindJumps(SteadyDrive(300, scale)).empty()) << scale;
   Trajectory far = drive, sparse;
   for (std::size_t i = 0; i < drive.size(); ++i) {
     far[i].pose.translation += Eigen::Vector3d(4e5, 5e6, 0);  // UTM
@@ -54,7 +54,7 @@ TEST(OdometryJumps, WhatMovesHasNone) {
 }
 
 TEST(OdometryJumps, PosesThatAreOffAreFoundAndReplacedWhereverTheyAre) {
-  const Trajectory drive = Drive(101);
+  const Trajectory drive = SteadyDrive(101);
   for (const double metres : {1.0, 10.0, 100.0, 1e10}) {
     for (const std::size_t first : {0U, 3U, 50U, 70U, 99U, 100U}) {
       for (const std::size_t count : {1U, 2U}) {
@@ -80,7 +80,7 @@ TEST(OdometryJumps, PosesThatAreOffAreFoundAndReplacedWhereverTheyAre) {
 }
 
 TEST(OdometryJumps, APoseThatIsTurnedIsOne) {
-  const Trajectory drive = Drive(101);
+  const Trajectory drive = SteadyDrive(101);
   Trajectory bad = drive;
   bad[50].pose = Off(bad[50].pose, 0, 30);
   const std::vector<OdometryJump> jumps = FindJumps(bad);
@@ -90,7 +90,7 @@ TEST(OdometryJumps, APoseThatIsTurnedIsOne) {
 }
 
 TEST(OdometryJumps, AnOdometryThatBeginsAnewJumpsOnceAndForGood) {
-  const Trajectory drive = Drive(101);
+  const Trajectory drive = SteadyDrive(101);
   Trajectory restarted = drive;
   for (std::size_t i = 50; i < drive.size(); ++i)
     restarted[i].pose = drive[50].pose.Inverse() * drive[i].pose;
@@ -111,7 +111,7 @@ TEST(OdometryJumps, AnOdometryThatBeginsAnewJumpsOnceAndForGood) {
 }
 
 TEST(OdometryJumps, AreToldOnceWhilePosesComeIn) {
-  Trajectory bad = Drive(700);
+  Trajectory bad = SteadyDrive(700);
   bad[0].pose = Off(bad[0].pose, 1e10);
   bad[300].pose = Off(bad[300].pose, 5);
   for (std::size_t i = 600; i < bad.size(); ++i) bad[i].pose = Off(bad[i].pose, 30);

@@ -22,7 +22,7 @@ using ::testing::Not;
 using testing::ReadAll;
 using testing::RunTutti;
 
-long Lines(const std::string& text, const std::string& with) {
+long LinesWith(const std::string& text, const std::string& with) {
   long count = 0;
   for (std::size_t at = 0; (at = text.find(with, at)) != std::string::npos; ++at) ++count;
   return count;
@@ -107,7 +107,7 @@ TEST(RunOptions, TheBarOfTheExitStatusCanBeSet) {
   const auto usual = run({});
   EXPECT_EQ(usual.status, 0) << usual.output;
   EXPECT_THAT(usual.output, HasSubstr("33.3 % of the images are damaged"));
-  EXPECT_EQ(Lines(usual.output, "is skipped"), 5);
+  EXPECT_EQ(LinesWith(usual.output, "is skipped"), 5);
   EXPECT_THAT(usual.output, HasSubstr("tutti: 5 more frames are skipped; frames.bad_frames in summary.json"));
   const auto strict = run({"--require", "good"});
   EXPECT_EQ(strict.status, 1);
@@ -130,7 +130,7 @@ TEST(RunOptions, QuietIsQuietAndLibrariesSayALineFiveTimes) {
   }
   const std::string out = (folder / "out").string();
   const auto loud = RunTutti({"run", images.string(), "--fov", "60", "--out", out});
-  EXPECT_EQ(Lines(loud.output, "Corrupt JPEG data"), 5 + 1) << loud.output;
+  EXPECT_EQ(LinesWith(loud.output, "Corrupt JPEG data"), 5 + 1) << loud.output;
   EXPECT_THAT(loud.output, HasSubstr(" more lines of a library like 'Corrupt JPEG data"));
   const auto quiet = RunTutti({"run", images.string(), "--fov", "60", "--out", out, "--quiet"});
   EXPECT_THAT(quiet.output,
@@ -145,7 +145,7 @@ TEST(RunOptions, RepeatedTimeStampsAreNamedFiveTimesAndCountAgainstTheRun) {
   for (int i = 1; i < 30; ++i) times += i < 10 ? "0\n" : std::to_string(0.1 * i) + "\n";
   testing::WriteAll(data / "times.txt", times);
   const auto run = RunTutti(testing::RunArguments(testing::TinyConfig(folder), data, folder / "out"));
-  EXPECT_EQ(Lines(run.output, "repeats the time stamp before it"), 5) << run.output;
+  EXPECT_EQ(LinesWith(run.output, "repeats the time stamp before it"), 5) << run.output;
   EXPECT_THAT(run.output, HasSubstr("4 more lines repeat the time stamp before them"));
   const auto health = nlohmann::json::parse(ReadAll(folder / "out/summary.json"))["health"];
   EXPECT_NE(health["word"], "good");

@@ -34,12 +34,12 @@ std::string Words(std::initializer_list<double> numbers) {
 }
 
 /// Along a curve with two landmarks. The odometry turns too much, the vertices follow it.
-class Curve {
+class MeasuredCurve {
  public:
   static constexpr int kNodes = 12;
   const Eigen::Vector2d landmarks[2] = {{3, 4}, {8, -1}};
 
-  Curve() {
+  MeasuredCurve() {
     for (int k = 0; k < kNodes; ++k) truth.emplace_back(0.8 * k, 0.05 * k * k, 0.1 * k);
     Eigen::Vector3d drifted = truth[0];
     for (int k = 0; k < kNodes; ++k) {
@@ -80,7 +80,7 @@ class Curve {
   std::string vertices, odometry;
 };
 
-PoseGraphReport Solve(PoseGraph& graph, RobustLoss robust = RobustLoss::kNone) {
+PoseGraphReport SolveMeasured(PoseGraph& graph, RobustLoss robust = RobustLoss::kNone) {
   PoseGraphOptions options;
   options.objective = GraphObjective::kChi2;
   options.solver = PoseGraphSolver::kBlock;
@@ -89,10 +89,10 @@ PoseGraphReport Solve(PoseGraph& graph, RobustLoss robust = RobustLoss::kNone) {
 }
 
 TEST(Measurements, LandmarksCorrectTheOdometryAndAreWrittenBack) {
-  const Curve curve;
+  const MeasuredCurve curve;
   std::string text = "PARAMS_SE2OFFSET 3 0.5 0 0\n" + curve.vertices + curve.odometry +
                      "VERTEX_XY 100 0 0\nVERTEX_XY 101 0 0\nFIX 0\n";
-  for (int k = 0; k < Curve::kNodes; ++k) {
+  for (int k = 0; k < MeasuredCurve::kNodes; ++k) {
     for (int l = 0; l < 2; ++l) {
       const std::string ids = " " + std::to_string(k) + " " + std::to_string(100 + l);
       const Eigen::Vector2d seen = curve.Seen(k, l), ahead = curve.Seen(k, l, 0.5);
@@ -103,8 +103,8 @@ TEST(Measurements, LandmarksCorrectTheOdometryAndAreWrittenBack) {
   }
   PoseGraph graph = Read(text).graph;
   EXPECT_GT(curve.ErrorOf(graph), 1);
-  EXPECT_EQ(graph.nodes().size(), static_cast<std::size_t>(Curve::kNodes));
-  const PoseGraphReport report = Solve(graph);
+  EXPECT_EQ(graph.nodes().size(), static_cast<std::size_t>(MeasuredCurve::kNodes));
+  const PoseGraphReport report = SolveMeasured(graph);
   ASSERT_TRUE(report.success) << report.reason;
   EXPECT_EQ(report.solver, PoseGraphSolver::kCeres);
   EXPECT_FALSE(report.solver_note.empty());
@@ -118,20 +118,20 @@ TEST(Measurements, LandmarksCorrectTheOdometryAndAreWrittenBack) {
   EXPECT_THAT(written, HasSubstr("PARAMS_SE2OFFSET 3 0.5 0 0\n"));
   EXPECT_THAT(written, HasSubstr("EDGE_BEARING_SE2_XY 0 100 "));
   const PoseGraph again = ReadG2o(file).graph;
-  EXPECT_EQ(again.measurements().size(), 6u * Curve::kNodes);
+  EXPECT_EQ(again.measurements().size(), 6u * MeasuredCurve::kNodes);
   EXPECT_LT((again.landmarks()[0].position - graph.landmarks()[0].position).norm(), 1e-12);
   EXPECT_NEAR(EvaluateCosts(again).chi2, EvaluateCosts(graph).chi2, 1e-9 * EvaluateCosts(graph).chi2);
 }
 
 TEST(Measurements, PositionsInTheWorldAreEnoughToHoldAGraph) {
-  const Curve curve;
+  const MeasuredCurve curve;
   std::string text = curve.odometry;  // no vertices: the start has to come from the edges and the priors
-  for (int k = 0; k < Curve::kNodes; k += 2) {
+  for (int k = 0; k < MeasuredCurve::kNodes; k += 2) {
     const Eigen::Vector3d at = curve.Position(k);
     text += "EDGE_PRIOR_SE2_XY " + std::to_string(k) + Words({500 - at.y(), 700 + at.x()}) + " 1e6 0 1e6\n";
   }
   PoseGraph graph = Read(text).graph;  // turned by 90 degrees
-  const PoseGraphReport report = Solve(graph);
+  const PoseGraphReport report = SolveMeasured(graph);
   ASSERT_TRUE(report.success) << report.reason;
   ASSERT_EQ(report.components.size(), 1u);
   EXPECT_TRUE(report.components[0].by_priors);
@@ -142,9 +142,9 @@ TEST(Measurements, PositionsInTheWorldAreEnoughToHoldAGraph) {
 }
 
 TEST(Measurements, FalseLoopsAreRejectedInAGraphWithLandmarks) {
-  const Curve curve;
+  const MeasuredCurve curve;
   std::string text = curve.vertices + curve.odometry + "EDGE_SE2 0 11 0 0 0 1e4 0 0 1e4 0 1e4\n";
-  for (int k = 0; k < Curve::kNodes; ++k) {
+  for (int k = 0; k < MeasuredCurve::kNodes; ++k) {
     for (int l = 0; l < 2; ++l)
       text += "EDGE_SE2_XY " + std::to_string(k) + " " + std::to_string(100 + l) +
               Words({curve.Seen(k, l).x(), curve.Seen(k, l).y()}) + " 1e6 0 1e6\n";
@@ -153,7 +153,7 @@ TEST(Measurements, FalseLoopsAreRejectedInAGraphWithLandmarks) {
   for (const auto& [word, robust] : WordsOf(RobustLoss())) {
     if (robust == RobustLoss::kNone || robust == RobustLoss::kHuber) continue;
     PoseGraph graph = file.graph;
-    const PoseGraphReport report = Solve(graph, robust);
+    const PoseGraphReport report = SolveMeasured(graph, robust);
     ASSERT_TRUE(report.success) << word;
     EXPECT_EQ(report.down_weighted, 1u) << word;
     EXPECT_LT(curve.ErrorOf(graph), 0.05) << word;
@@ -166,7 +166,7 @@ TEST(Measurements, AFixedLandmarkHoldsTheGraph) {
           "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\nVERTEX_XY 9 10 10\nVERTEX_XY 8 0 0\nFIX 9\n"
           "EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\nEDGE_SE2_XY 0 9 5 5 1 0 1\nEDGE_SE2_XY 1 9 4 5 1 0 1\n")
           .graph;
-  const PoseGraphReport report = Solve(graph);
+  const PoseGraphReport report = SolveMeasured(graph);
   ASSERT_TRUE(report.success);
   EXPECT_LT(report.costs.chi2, 1e-12);
   EXPECT_EQ(graph.landmarks()[0].position, Eigen::Vector3d(10, 10, 0));

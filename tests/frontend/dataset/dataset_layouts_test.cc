@@ -66,7 +66,7 @@ Pose CameraMotion(const Dataset& data) {
   return (truth.front().pose * T_body_camera).Inverse() * (truth.back().pose * T_body_camera);
 }
 
-void ExpectMotion(const Dataset& data, const Eigen::Vector3d& translation) {
+void ExpectLayoutMotion(const Dataset& data, const Eigen::Vector3d& translation) {
   const Pose motion = CameraMotion(data);
   EXPECT_LT((motion.translation - translation).norm(), 1e-6) << motion.translation.transpose();
   EXPECT_LT(motion.Angle(), 1e-6);
@@ -109,7 +109,7 @@ TEST(DatasetLayouts, TartanAirHasItsPublishedCameraFloatDepthAndPosesThatLookAlo
   const auto rgbd = OpenDataset(folder, Auto(Sensor::kRgbd));
   EXPECT_EQ(DepthAt(*rgbd, 1), 3.5F);
   EXPECT_THAT(rgbd->Warnings(), Not(Contains(HasSubstr("unit"))));
-  ExpectMotion(*rgbd, {0, 0, 2});  // forward
+  ExpectLayoutMotion(*rgbd, {0, 0, 2});  // forward
   WriteText(folder / "pose_left.txt", "0 0 0 0 0 0 1\n");
   const auto less = OpenDataset(folder, Auto(Sensor::kMono));
   EXPECT_THROW(less->ReadGroundTruth(folder / "pose_left.txt", nullptr), InputError);
@@ -202,7 +202,7 @@ TEST(DatasetLayouts, ScanNetSkipsLostPosesAndLooksUpDepthOfAnotherSize) {
   const Trajectory truth = data->ReadGroundTruth(data->GroundTruthFile().value(), nullptr);
   ASSERT_EQ(truth.size(), 11U);
   EXPECT_NEAR(truth[3].stamp_s, 4.0 / 30, 1e-9);
-  ExpectMotion(*data, {0, 0, 11});
+  ExpectLayoutMotion(*data, {0, 0, 11});
   WriteText(folder / "pose" / "5.txt", "1 0 0 0\n0 1 0 0\n");
   EXPECT_THROW(data->ReadGroundTruth(folder / "pose", nullptr), InputError);
 }
@@ -223,7 +223,7 @@ TEST(DatasetLayouts, SevenScenesIsRgbdInMillimetresWithAPoseBesideEachImage) {
   EXPECT_EQ(DepthAt(*data, 3, 0), 0);
   EXPECT_NEAR(data->Stamp(3), 6.0 / 30, 1e-9);
   EXPECT_EQ(cv::norm(data->Read(3).frame->image, Picture(64, 48, 3), cv::NORM_INF), 0);
-  ExpectMotion(*data, {3, 0, 0});
+  ExpectLayoutMotion(*data, {3, 0, 0});
   EXPECT_EQ(OpenDataset(folder, Auto(Sensor::kMono))->Size(), 4U) << "depth images are no frames";
 }
 
@@ -239,7 +239,7 @@ TEST(DatasetLayouts, ReplicaHasItsUnitOfDepthAndAPoseALineWhicheverFolderIsGiven
   for (const fs::path& given : {folder, folder / "results"}) {
     const auto data = OpenDataset(given, Auto(Sensor::kRgbd, true));
     EXPECT_NEAR(DepthAt(*data, 2), 2, 1e-3);
-    ExpectMotion(*data, {0, 2, 0});
+    ExpectLayoutMotion(*data, {0, 2, 0});
   }
 }
 
@@ -323,7 +323,7 @@ TEST(DatasetLayouts, Open3DsDepthIsInMillimetresAndItsTrajectoryLogIsRead) {
   WriteText(folder / "trajectory.log", log);
   const auto data = OpenDataset(folder, Auto(Sensor::kRgbd, true));
   EXPECT_EQ(DepthAt(*data, 1), 2);
-  ExpectMotion(*data, {0, 0, 4});
+  ExpectLayoutMotion(*data, {0, 0, 4});
   WriteText(folder / "trajectory.log", log + "0 0\n");
   EXPECT_THROW(data->ReadGroundTruth(folder / "trajectory.log", nullptr), InputError);
 }
@@ -366,7 +366,7 @@ TEST(DatasetLayouts, OpenLorisHasMillimetresItsOwnCalibrationAndPosesOfTheRobot)
   EXPECT_EQ(data->Rig().camera.fy, 62);
   EXPECT_EQ(DepthAt(*data, 1), 2);
   EXPECT_LT((data->Rig().T_body_camera.translation - Eigen::Vector3d(0.5, 0, 1)).norm(), 1e-9);
-  ExpectMotion(*data, {0, 0, 3});  // base_link's x is forward
+  ExpectLayoutMotion(*data, {0, 0, 3});  // base_link's x is forward
   WriteText(folder / "trans_matrix.yaml", "%YAML:1.0\n---\ntrans_matrix: [ 1, ");
   EXPECT_THAT(OpenError(folder, Auto(Sensor::kRgbd)), HasSubstr("trans_matrix.yaml"));
 }
@@ -439,7 +439,7 @@ TEST(DatasetLayouts, StrayScannersVideoHasTheDepthAndTheTimesOfItsFrames) {
   EXPECT_FLOAT_EQ(DepthAt(*data, 2), 1.3F);
   EXPECT_EQ(data->Read(2).frame->depth_m.size(), cv::Size(128, 96));
   EXPECT_EQ(data->Read(2).frame->index, 2);
-  ExpectMotion(*data, {0, 0, 4});
+  ExpectLayoutMotion(*data, {0, 0, 4});
   EXPECT_THAT(OpenError(folder, Auto(Sensor::kStereo)), HasSubstr("one camera"));
 }
 

@@ -65,6 +65,7 @@ std::vector<std::pair<double, int>> Places(const std::vector<NamedLine>& lines, 
 void AddLines(std::vector<NamedLine>& lines, std::vector<PlotShape>& shapes) {
   constexpr double kMargin = 3.5, kWidest = 16;  // [px]
   std::vector<Cells> cells;
+  cells.reserve(lines.size());
   for (const NamedLine& line : lines) cells.push_back(CellsOf(line));
   for (std::size_t i = lines.size(); i-- > 0;) {
     for (std::size_t j = i + 1; j < lines.size(); ++j) {

@@ -189,7 +189,7 @@ void Flatten(const CalibrationKeys& keys, const YAML::Node& node, const std::str
   for (const std::string& word : words) {
     double value = 0;
     if (!YAML::convert<double>::decode(YAML::Node(word), value))
-      keys.Fail(data, "'" + key + "' is no number: " + word);
+      keys.Fail(data, std::string("'").append(key).append("' is no number: ").append(word));
     if (!std::isfinite(value)) keys.Fail(data, "'" + key + "' is not finite");
     out.push_back(value);
   }
@@ -346,7 +346,7 @@ std::string LensName(const CalibrationKeys& keys) {
   if (lens.empty() && nested && nested.node.IsScalar() && !IsNumberNode(nested.node))
     lens = nested.node.Scalar();
   const KeyValue camera = keys.Find(kCameraModel);
-  const std::string model = keys.Word(kCameraModel);
+  std::string model = keys.Word(kCameraModel);
   if (lens.empty()) return model;
   PinholeCamera any;
   const std::string wrong = internal::SetLens(model, {0, 0, 0, 0}, any);

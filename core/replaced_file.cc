@@ -95,8 +95,8 @@ Target TargetOf(const fs::path& name) {
 fs::path MakePart(const Target& target, const std::string& name) {
   static std::atomic<int> count = 0;
   while (true) {
-    const fs::path part = target.file.parent_path() / (PartPrefix(target.file) + std::to_string(getpid()) +
-                                                       "-" + std::to_string(count++));
+    fs::path part = target.file.parent_path() /
+                    (PartPrefix(target.file) + std::to_string(getpid()) + "-" + std::to_string(count++));
     const Descriptor made(
         open(part.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, target.there ? 0600 : 0666));
     if (made.number() >= 0) {

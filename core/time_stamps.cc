@@ -229,6 +229,7 @@ StampsOfNames FindStamps(const std::vector<std::string>& names) {
   std::stable_sort(numbers.begin(), numbers.end(),
                    [](const NumberInName& a, const NumberInName& b) { return a.value < b.value; });
   std::vector<double> values;
+  values.reserve(numbers.size());
   for (const NumberInName& number : numbers) values.push_back(number.value);
   const double greatest = std::max(std::abs(values.front()), std::abs(values.back()));
   const bool has_point =

@@ -14,7 +14,7 @@ namespace {
 std::string Size(int width, int height) { return std::to_string(width) + "x" + std::to_string(height); }
 
 Eigen::Matrix3d Rotation(const std::array<double, 9>& rows) {
-  const Eigen::Matrix3d R = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(rows.data());
+  Eigen::Matrix3d R = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(rows.data());
   if (!((R * R.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() <= 0.01 &&
         R.determinant() > 0))  // also if it is not finite
     throw InputError("is no rotation");

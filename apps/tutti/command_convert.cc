@@ -38,8 +38,7 @@ void RunConvert(const ConvertArguments& arguments) {
   WritePoseFile(arguments.out, in.trajectory, to, in.stamps_ns);
   if (!arguments.times_out.empty()) WriteTimes(arguments.times_out, in.trajectory, in.stamps_ns);
   if (!HasRotations(in.trajectory))
-    std::fprintf(stderr, "tutti: warning: %s: has positions alone; the quaternions written are 0\n",
-                 arguments.in.c_str());
+    internal::Say("warning: %s: has positions alone; the quaternions written are 0", arguments.in.c_str());
   std::printf("%zu poses: %s (%s) -> %s (%s)\n", in.trajectory.size(), arguments.in.c_str(),
               ToString(in.format), arguments.out.c_str(), ToString(to));
   if (in.has_stamps && !needs_stamps && arguments.times_out.empty())

@@ -58,7 +58,7 @@ int ChangeImages(const GenerateArguments& arguments) {
   o.progress = ReportTo(progress);
   const InterruptGuard guard;
   const ChangedImages result = WriteChangedImages(change, o);
-  for (const std::string& note : result.notes) std::fprintf(stderr, "tutti: %s\n", note.c_str());
+  for (const std::string& note : result.notes) internal::Say("%s", note.c_str());
   const char* d = arguments.out.c_str();
   if (result.written < result.taken) {
     internal::Say("interrupted: %s holds the first %zu of %zu images and can be used", d, result.written,

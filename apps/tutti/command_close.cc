@@ -99,7 +99,7 @@ int Close(const CLI::App& command, const CloseArguments& arguments) {
   const RunConfig config = ConfigOf(CameraOf(command, arguments.camera), arguments);
   const RunResult result = arguments.no_report ? RunSlam(request, config) : RunWithReport(request, config);
   std::fputs(internal::Message(ResultTable(result), stdout, internal::Breaks::kAll).c_str(), stdout);
-  std::printf("\n  results are in %s\n", result.folder.c_str());
+  std::printf("\n  results are in %s\n", internal::Printable(result.folder.string()).c_str());
   if (result.appearance_only && !arguments.quiet)
     internal::Say(
         "without a calibration (--config with camera: fx, fy, cx, cy) loops have no poses: there are "

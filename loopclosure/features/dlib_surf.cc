@@ -6,8 +6,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <memory>
 #include <utility>
+#include <vector>
 
 #include "loopclosure/features/scratch_pool.h"
 #include "loopclosure/features/surf_hessian.h"
@@ -192,13 +194,15 @@ class HessianMaxima {
       for (int i = 1; i < Hessian::kIntervals - 1; ++i) {
         const cv::Mat& layer = Layer(o, i);
         const int margin = Hessian::Border(i + 1) + 1;
+        std::vector<std::uint8_t> found(static_cast<std::size_t>(layer.cols));
         for (int r = margin; r < layer.rows - margin; ++r) {
-          const double* line = layer.ptr<double>(r);
+          internal::FindMaxima(layer.ptr<double>(r), layer.ptr<double>(r - 1), layer.ptr<double>(r + 1),
+                               Layer(o, i - 1).ptr<double>(r), Layer(o, i + 1).ptr<double>(r), margin,
+                               layer.cols - margin, threshold, found.data());
           for (int c = margin; c < layer.cols - margin; ++c) {
             dlib::interest_point point;
-            const double value = std::abs(line[c]);
-            if (value < threshold || std::abs(line[c - 1]) > value || std::abs(line[c + 1]) > value) continue;
-            if (IsMaximum(o, i, r, c) && Interpolate(o, i, r, c, point)) {
+            if (found[static_cast<std::size_t>(c)] != 0 && IsMaximum(o, i, r, c) &&
+                Interpolate(o, i, r, c, point)) {
               points.push_back(point);
             }
           }

@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 #include <tuple>
 
+#include "loopclosure/features/dark_image.h"
 #include "loopclosure/features/orb.h"
 #include "loopclosure/features/sift.h"
 #include "loopclosure/features/smallest_image.h"
@@ -218,11 +219,12 @@ Features FeatureExtractor::Extract(const cv::Mat& grey) const {
   Features features;
   if (grey.empty() || grey.type() != CV_8UC1 || std::min(grey.rows, grey.cols) < kMinSide) return features;
   const double factor = Shrinking(static_cast<double>(grey.total()));
-  cv::Mat image = grey;
+  const cv::Mat cleared = internal::Cleared(grey);
+  cv::Mat image = cleared;
   if (factor != 1.0) {
     const cv::Size size(cvRound(grey.cols / factor), cvRound(grey.rows / factor));
     if (std::min(size.width, size.height) < kMinSide) return features;
-    cv::resize(grey, image, size, 0, 0, factor > 1.0 ? cv::INTER_AREA : cv::INTER_LINEAR);
+    cv::resize(cleared, image, size, 0, 0, factor > 1.0 ? cv::INTER_AREA : cv::INTER_LINEAR);
   }
   const auto spread = [&](const std::vector<cv::KeyPoint>& detected) {
     return SelectSpread(detected, image.size(), options_.features, options_.grid_columns);

@@ -195,4 +195,22 @@ void SurfHessian::Fill(const SurfIntegral& image, int octave, int interval) {
   }
 }
 
+TUTTI_CLONES("avx2")
+TUTTI_CHECKED_AS_A_WHOLE void FindMaxima(const double* h, const double* u, const double* d,
+                                         const double* finer, const double* coarser, int begin, int past,
+                                         double least, std::uint8_t* found) {
+  if (past <= begin) return;
+  const auto count = static_cast<std::size_t>(past - begin);
+  CheckReadable(h + begin - 1, count + 2);
+  for (const double* line : {u, d, finer, coarser}) CheckReadable(line + begin, count);
+  CheckWritable(found + begin, count);
+  for (int c = begin; c < past; ++c) {
+    const double value = std::abs(h[c]);
+    found[c] = static_cast<std::uint8_t>((value >= least) & (std::abs(h[c - 1]) <= value) &
+                                         (std::abs(h[c + 1]) <= value) & (std::abs(u[c]) <= value) &
+                                         (std::abs(d[c]) <= value) & (std::abs(finer[c]) <= value) &
+                                         (std::abs(coarser[c]) <= value));
+  }
+}
+
 }  // namespace tutti::internal

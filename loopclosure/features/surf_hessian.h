@@ -52,4 +52,10 @@ class SurfHessian {
   std::vector<std::int32_t> xy_;
 };
 
+/// Marks in `found` the columns from `begin` to `past` at which line `h` of a layer, by absolute values, is
+/// at least `least` and nowhere less than its neighbours beside, above, below, and in the finer and the
+/// coarser layer: what may be a maximum.
+void FindMaxima(const double* h, const double* u, const double* d, const double* finer, const double* coarser,
+                int begin, int past, double least, std::uint8_t* found);
+
 }  // namespace tutti::internal

@@ -4,7 +4,9 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <optional>
 
+#include "loopclosure/geometry/whole_rows.h"
 #include "loopclosure/vocabulary/distances.h"
 
 namespace tutti {
@@ -13,17 +15,48 @@ namespace {
 constexpr float kSamePlace = 4.0f;  // [px]
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-// Distances of one query row to all candidate rows, squared.
-void Distances(const cv::Mat& query, int i, const cv::Mat& candidate, std::vector<float>& distances) {
-  if (query.type() == CV_32F) {
-    internal::SquaredDistances(query.ptr<float>(i), candidate.ptr<float>(), candidate.rows, candidate.cols,
-                               candidate.step1(), distances.data());
-    return;
+using internal::WholeRows;
+
+// Squared distances of query rows, one after the other, to all candidate rows; times some constant.
+class Distances {
+ public:
+  Distances(const cv::Mat& query, const cv::Mat& candidate) : query_(query), candidate_(candidate) {
+    for (std::vector<float>& distances : distances_)
+      distances.resize(static_cast<std::size_t>(candidate.rows));
+    if (query.type() != CV_32F) return;
+    for (const float scale : {1.0f, WholeRows::kSignedSquares}) {
+      whole_query_ = WholeRows::Of(query, scale);
+      const std::optional<WholeRows> whole = whole_query_ ? WholeRows::Of(candidate, scale) : std::nullopt;
+      if (whole) columns_.emplace(*whole);
+      if (columns_) return;
+    }
   }
-  internal::HammingDistances(query.ptr(i), candidate.ptr(), candidate.rows, candidate.cols, candidate.step[0],
-                             distances.data());
-  for (float& distance : distances) distance *= distance;
-}
+
+  // Of row i; for i = 0, 1, 2, ... in this order.
+  const std::vector<float>& To(int i) {
+    std::vector<float>& first = distances_.front();
+    if (columns_) {
+      if (i % WholeRows::kTogether == 0) whole_query_->Distances(i, *columns_, distances_);
+      return distances_.at(static_cast<std::size_t>(i % WholeRows::kTogether));
+    }
+    if (query_.type() == CV_32F) {
+      internal::SquaredDistances(query_.ptr<float>(i), candidate_.ptr<float>(), candidate_.rows,
+                                 candidate_.cols, candidate_.step1(), first.data());
+      return first;
+    }
+    internal::HammingDistances(query_.ptr(i), candidate_.ptr(), candidate_.rows, candidate_.cols,
+                               candidate_.step[0], first.data());
+    for (float& distance : first) distance *= distance;
+    return first;
+  }
+
+ private:
+  const cv::Mat& query_;
+  const cv::Mat& candidate_;
+  std::optional<WholeRows> whole_query_;
+  std::optional<WholeRows::Columns> columns_;
+  WholeRows::Block distances_;
+};
 
 }  // namespace
 
@@ -36,23 +69,25 @@ std::vector<Match> MatchDescriptors(const cv::Mat& query, const cv::Mat& candida
     return matches;
   }
   const std::size_t count = static_cast<std::size_t>(candidate.rows);
-  std::vector<float> distances(count);
+  Distances all_distances(query, candidate);
+  std::vector<float> x, y;
+  for (const cv::Point2f& point : candidate_points) {
+    x.push_back(point.x);
+    y.push_back(point.y);
+  }
   std::vector<float> nearest(count, kInfinity);             // to each candidate row, so far
   std::vector<std::int32_t> query_of_candidate(count, -1);  // the query row that it is the distance of
   for (int i = 0; i < query.rows; ++i) {
-    Distances(query, i, candidate, distances);
+    const std::vector<float>& distances = all_distances.To(i);
     const float least = internal::UpdateNearest(distances.data(), candidate.rows, i, nearest.data(),
                                                 query_of_candidate.data());
     const auto at = std::find(distances.begin(), distances.end(), least);
     if (at == distances.end()) continue;  // descriptors with NaN
     const std::size_t best = static_cast<std::size_t>(at - distances.begin());
     if (query_of_candidate[best] != i) continue;  // an earlier row is as near: never mutual
-    float second = kInfinity;
-    for (std::size_t j = 0; j < count; ++j) {
-      if (distances[j] >= second) continue;
-      const cv::Point2f apart = candidate_points[j] - candidate_points[best];
-      if (apart.dot(apart) > kSamePlace * kSamePlace) second = distances[j];
-    }
+    const float second =
+        internal::NearestElsewhere(distances.data(), x.data(), y.data(), candidate.rows,
+                                   candidate_points[best].x, candidate_points[best].y, kSamePlace);
     const float ratio = second > 0.0f ? std::sqrt(least / second) : 1.0f;
     if (ratio <= max_ratio) matches.push_back({i, static_cast<int>(best), ratio});
   }

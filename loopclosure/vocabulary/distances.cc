@@ -77,4 +77,26 @@ TUTTI_CHECKED_AS_A_WHOLE float UpdateNearest(const float* distances, int count, 
   return result;
 }
 
+TUTTI_CLONES("avx2")
+TUTTI_CHECKED_AS_A_WHOLE float NearestElsewhere(const float* distances, const float* x, const float* y,
+                                                int count, float x0, float y0, float apart) {
+  CheckReadable(distances, static_cast<std::size_t>(count));
+  CheckReadable(x, static_cast<std::size_t>(count));
+  CheckReadable(y, static_cast<std::size_t>(count));
+  const float most = std::numeric_limits<float>::infinity();
+  const float square = apart * apart;
+  std::int32_t least = 0;
+  std::memcpy(&least, &most, sizeof least);
+  for (int j = 0; j < count; ++j) {
+    const float dx = x[j] - x0, dy = y[j] - y0;
+    const float distance = dx * dx + dy * dy > square ? distances[j] : most;
+    std::int32_t bits = 0;
+    std::memcpy(&bits, &distance, sizeof bits);
+    least = bits < least ? bits : least;
+  }
+  float result = 0;
+  std::memcpy(&result, &least, sizeof result);
+  return result;
+}
+
 }  // namespace tutti::internal

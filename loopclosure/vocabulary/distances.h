@@ -37,4 +37,9 @@ void HammingDistances(const std::uint8_t* query, const std::uint8_t* rows, int c
 /// nearest_row[j] become distances[j] and `row`.
 float UpdateNearest(const float* distances, int count, int row, float* nearest, std::int32_t* nearest_row);
 
+/// The least of `count` distances (none negative) of those whose place (x[j], y[j]) is more than `apart` from
+/// (x0, y0); infinity if there is none.
+float NearestElsewhere(const float* distances, const float* x, const float* y, int count, float x0, float y0,
+                       float apart);
+
 }  // namespace tutti::internal

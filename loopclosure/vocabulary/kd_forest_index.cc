@@ -46,10 +46,18 @@ class KdForestIndex : public DescriptorIndex {
       if (storage_.RowOf(words[i]) >= 0) continue;
       added.push_back(storage_.Add(words[i], rows.ptr(static_cast<int>(i))));
     }
+    std::vector<std::vector<int>> orders;
     for (GrownTree& tree : trees_) {
-      std::vector<int> order = added;
-      tree.shuffler.Shuffle(order);
-      for (const int row : order) tree.tree.Insert(row, storage_);
+      orders.push_back(added);
+      tree.shuffler.Shuffle(orders.back());
+    }
+    std::vector<internal::KdTree::Descent> descents(trees_.size());
+    for (std::size_t i = 0; i < added.size(); ++i) {
+      for (std::size_t t = 0; t < trees_.size(); ++t) descents[t] = trees_[t].tree.Begin(orders[t][i]);
+      for (bool more = true; more;) {
+        more = false;
+        for (std::size_t t = 0; t < trees_.size(); ++t) more |= trees_[t].tree.GoOn(storage_, descents[t]);
+      }
     }
   }
 

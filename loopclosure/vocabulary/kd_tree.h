@@ -26,18 +26,37 @@ class KdTree {
  public:
   explicit KdTree(int dimensions) : dimensions_(dimensions) {}
 
-  /// The row must not be in the tree, and keep its descriptor while it is.
-  void Insert(int row, const WordStorage& storage) {
+  /// A row on its way down to where it will be inserted.
+  struct Descent {
+    int row = -1;
+    int node = -1;         // -1: it is in
+    bool at_leaf = false;  // whose descriptor was asked for
+  };
+  /// The row must not be in the tree, and keep its descriptor while it is. The tree must not change but by
+  /// GoOn until the row is in.
+  Descent Begin(int row) {
     while (leaf_of_row_.size() <= Index(row)) leaf_of_row_.Extend();
-    if (size_++ == 0) {
-      if (nodes_.size() == 0) NewPair(-1);
-      SetLeaf(kRoot, row);
-      return;
+    if (size_++ > 0) return {row, kRoot, false};
+    if (nodes_.size() == 0) NewPair(-1);
+    SetLeaf(kRoot, row);
+    return {row, -1, false};
+  }
+  /// One step down; false once the row is in. Several trees take turns: while one waits for memory, others go
+  /// on.
+  bool GoOn(const WordStorage& storage, Descent& descent) {
+    if (descent.node < 0) return false;
+    const Node& node = At(descent.node);
+    if (!IsLeaf(node)) {
+      descent.node = NextTo(node, Point(descent.row, storage));
+      __builtin_prefetch(&At(descent.node));
+    } else if (!descent.at_leaf) {
+      descent.at_leaf = true;
+      PrefetchRow(node.link, storage);
+    } else {
+      Split(descent.node, descent.row, storage);
+      descent.node = -1;
     }
-    const float* point = Point(row, storage);
-    int node = kRoot;
-    while (!IsLeaf(At(node))) node = NextTo(At(node), point);
-    Split(node, row, storage);
+    return descent.node >= 0;
   }
 
   /// The row must be in the tree.
@@ -159,6 +178,11 @@ class KdTree {
     return reinterpret_cast<const float*>(storage.At(row));
   }
 
+  static void PrefetchRow(int row, const WordStorage& storage) {
+    const char* descriptor = reinterpret_cast<const char*>(storage.At(row));
+    for (std::size_t byte = 0; byte < storage.row_bytes(); byte += 64) __builtin_prefetch(descriptor + byte);
+  }
+
   // Returns its first node.
   int NewPair(int parent) {
     int pair = static_cast<int>(parent_.size());
@@ -218,9 +242,7 @@ class KdTree {
     }
     if (!walk.at_leaf) {
       walk.at_leaf = true;
-      const char* descriptor = reinterpret_cast<const char*>(storage.At(node.link));
-      for (std::size_t byte = 0; byte < storage.row_bytes(); byte += 64)
-        __builtin_prefetch(descriptor + byte);
+      PrefetchRow(node.link, storage);
       return true;
     }
     Check(node.link, storage, walk);
@@ -241,13 +263,19 @@ class KdTree {
   }
 
   static void KeepBranch(const Branch& branch, int most, std::vector<Branch>& branches) {
-    if (static_cast<int>(branches.size()) == most) {
-      if (branch.distance >= branches.front().distance) return;
-      branches.erase(branches.begin());
+    const float distance = branch.distance;
+    if (static_cast<int>(branches.size()) < most) {
+      branches.push_back(branch);
+      std::size_t at = branches.size() - 1;
+      for (; at > 0 && branches[at - 1].distance <= distance; --at) branches[at] = branches[at - 1];
+      branches[at] = branch;
+      return;
     }
-    auto at = branches.end();
-    while (at != branches.begin() && (at - 1)->distance <= branch.distance) --at;
-    branches.insert(at, branch);
+    if (distance >= branches.front().distance) return;  // else the farthest goes
+    std::size_t at = 0;
+    for (; at + 1 < branches.size() && branches[at + 1].distance > distance; ++at)
+      branches[at] = branches[at + 1];
+    branches[at] = branch;
   }
 
   bool TakeNearestBranch(Walk& walk) const {

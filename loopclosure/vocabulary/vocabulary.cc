@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
 
 #include "core/byte_stream.h"
 #include "loopclosure/detector/parallel.h"
+#include "loopclosure/geometry/whole_rows.h"
 #include "loopclosure/vocabulary/distances.h"
 #include "loopclosure/vocabulary/word_storage.h"
 #include "tutti/core/error.h"
@@ -13,23 +15,52 @@
 namespace tutti {
 namespace {
 
-// The two nearest of the first `count` rows of `created`, exactly, merged into `best`.
-void OfferCreated(const cv::Mat& descriptors, int i, const cv::Mat& created, int count, int first_word,
-                  std::vector<float>& distances, TwoNearest& best) {
-  const bool binary = descriptors.depth() == CV_8U;
-  if (binary) {
-    internal::HammingDistances(descriptors.ptr(i), created.ptr(), count, created.cols, created.step[0],
-                               distances.data());
-  } else {
-    internal::SquaredDistances(descriptors.ptr<float>(i), created.ptr<float>(), count, created.cols,
-                               created.step1(), distances.data());
+// True distances of an image's descriptors to those of them that became words, exactly.
+class AmongThemselves {
+ public:
+  explicit AmongThemselves(const cv::Mat& descriptors) : descriptors_(descriptors) {
+    for (std::vector<float>& distances : block_) distances.resize(static_cast<std::size_t>(descriptors.rows));
+    if (descriptors.type() != CV_32F) return;
+    for (const float scale : {1.0f, internal::WholeRows::kSignedSquares}) {
+      scale_ = scale;
+      whole_ = internal::WholeRows::Of(descriptors, scale);
+      if (!whole_) continue;
+      columns_.emplace(*whole_);
+      return;
+    }
   }
-  for (int k = 0; k < count; ++k) {
-    const float distance =
-        binary ? distances[static_cast<std::size_t>(k)] : std::sqrt(distances[static_cast<std::size_t>(k)]);
-    if (distance < best.second_distance) best.Offer(first_word + k, distance);
+
+  // Of row i to the rows `to`, all of them before it; for i = 0, 1, 2, ... in this order.
+  const std::vector<float>& Of(int i, const std::vector<int>& to) {
+    distances_.resize(to.size());
+    if (columns_) {
+      if (i % internal::WholeRows::kTogether == 0) whole_->Distances(i, *columns_, block_);
+      const std::vector<float>& all = block_.at(static_cast<std::size_t>(i % internal::WholeRows::kTogether));
+      for (std::size_t k = 0; k < to.size(); ++k)
+        distances_[k] = std::sqrt(all[static_cast<std::size_t>(to[k])]) / scale_;
+      return distances_;
+    }
+    for (std::size_t k = 0; k < to.size(); ++k) {
+      if (descriptors_.type() == CV_8U) {
+        internal::HammingDistances(descriptors_.ptr(i), descriptors_.ptr(to[k]), 1, descriptors_.cols, 0,
+                                   &distances_[k]);
+      } else {
+        internal::SquaredDistances(descriptors_.ptr<float>(i), descriptors_.ptr<float>(to[k]), 1,
+                                   descriptors_.cols, 0, &distances_[k]);
+        distances_[k] = std::sqrt(distances_[k]);
+      }
+    }
+    return distances_;
   }
-}
+
+ private:
+  const cv::Mat& descriptors_;
+  float scale_ = 1.0f;
+  std::optional<internal::WholeRows> whole_;
+  std::optional<internal::WholeRows::Columns> columns_;
+  internal::WholeRows::Block block_;
+  std::vector<float> distances_;
+};
 
 std::string TypeName(int type, int width) {
   return (type == CV_32F  ? "CV_32F x "
@@ -99,25 +130,30 @@ std::vector<int> Vocabulary::Assign(const cv::Mat& descriptors, const std::vecto
   if (descriptors.rows == 0) return words;
   CheckType(descriptors);
   const int old_words = created_;
-  cv::Mat created(descriptors.rows, width_, type_);
-  int num_created = 0;
-  std::vector<float> distances(nearest.size());
+  std::vector<int> created;  // rows that became words
+  AmongThemselves among(descriptors);
   words.reserve(nearest.size());
   for (int i = 0; i < descriptors.rows; ++i) {
     TwoNearest best = nearest[static_cast<std::size_t>(i)];
-    OfferCreated(descriptors, i, created, num_created, old_words, distances, best);
+    const std::vector<float>& distances = among.Of(i, created);
+    for (std::size_t k = 0; k < distances.size(); ++k) {
+      if (distances[k] < best.second_distance) best.Offer(old_words + static_cast<int>(k), distances[k]);
+    }
     if (IsNew(best)) {
-      descriptors.row(i).copyTo(created.row(num_created));
-      words.push_back(old_words + num_created++);
+      words.push_back(old_words + static_cast<int>(created.size()));
+      created.push_back(i);
     } else {
       words.push_back(best.first);
     }
   }
-  if (num_created > 0) {
-    std::vector<int> ids(static_cast<std::size_t>(num_created));
+  if (!created.empty()) {
+    std::vector<int> ids(created.size());
     std::iota(ids.begin(), ids.end(), old_words);
-    index_->Add(ids, created.rowRange(0, num_created));
-    created_ += num_created;
+    cv::Mat rows(0, width_, type_);
+    rows.reserve(created.size());
+    for (const int i : created) rows.push_back(descriptors.row(i));
+    index_->Add(ids, rows);
+    created_ += static_cast<int>(created.size());
   }
   return words;
 }

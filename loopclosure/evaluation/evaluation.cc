@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <tuple>
 
 namespace tutti {
@@ -110,6 +111,40 @@ void Sweep(std::vector<Ranked> ranked, LoopEvaluation& result) {
   std::sort(found.begin(), found.end());
 }
 
+void CountPart(const std::vector<Ranked>& ranked, const LoopGroundTruth& truth, const LoopEvaluation& result,
+               const std::function<bool(const BestView&)>& belongs, RecallPart& part) {
+  for (std::size_t i = 0; i < ranked.size(); ++i) {
+    const int image = ranked[i].image;
+    if (image < 0 || image >= truth.size() || !truth.HasLoop(image)) continue;
+    if (!belongs(truth.best_views[static_cast<std::size_t>(image)])) continue;
+    const std::vector<int>& found = result.found_at_100_precision;
+    ++part.rows;
+    part.found += result.outcomes[i] == LoopOutcome::kTruePositive ? 1 : 0;
+    part.found_at_100_precision += std::binary_search(found.begin(), found.end(), image) ? 1 : 0;
+  }
+}
+
+// How much harder it becomes with less in common, and with the angle.
+void CountParts(const std::vector<Ranked>& ranked, const LoopGroundTruth& truth, LoopEvaluation& result) {
+  if (truth.best_views.empty()) return;
+  for (const double from : {0.3, 0.4, 0.5, 0.6, 0.7}) {
+    if (from < truth.least_overlap - 1e-9) continue;
+    RecallPart part{from, 1};
+    CountPart(
+        ranked, truth, result, [&](const BestView& view) { return view.overlap >= from; }, part);
+    result.recall_by_overlap.push_back(part);
+  }
+  constexpr std::array<double, 6> kAngles = {0, 10, 20, 30, 45, 180};
+  for (std::size_t k = 0; k + 1 < kAngles.size(); ++k) {
+    RecallPart part{kAngles[k], kAngles[k + 1]};
+    const auto belongs = [&](const BestView& view) {
+      return view.angle_deg >= part.from && (view.angle_deg < part.to || part.to == kAngles.back());
+    };
+    CountPart(ranked, truth, result, belongs, part);
+    result.recall_by_angle.push_back(part);
+  }
+}
+
 LoopEvaluation Evaluate(const std::vector<Ranked>& ranked, const LoopGroundTruth& truth) {
   LoopEvaluation result;
   result.images = static_cast<int>(ranked.size());
@@ -117,6 +152,7 @@ LoopEvaluation Evaluate(const std::vector<Ranked>& ranked, const LoopGroundTruth
   Count(ranked, truth, result);
   Calibrate(ranked, result);
   Sweep(ranked, result);
+  CountParts(ranked, truth, result);
   return result;
 }
 
@@ -166,6 +202,24 @@ LoopObservation Observe(const LoopResult& result) {
   observation.accepted = result.accepted;
   observation.verified = result.accepted ? static_cast<int>(result.candidate) : -1;
   return observation;
+}
+
+bool TakeLate(const LateLoop& late, LoopResult* result) {
+  if (!late.accepted && !late.withdrawn) return false;
+  result->accepted = late.accepted;
+  result->candidate = late.verification.candidate;
+  result->probability = late.probability;
+  result->verification = late.verification;
+  result->reason = late.accepted ? "" : "withdrawn: the images after it speak against it";
+  return true;
+}
+
+bool TakeLate(const LateLoop& late, LoopObservation* observation) {
+  if (!late.accepted && !late.withdrawn) return false;
+  observation->accepted = late.accepted;
+  observation->probability = late.probability;
+  observation->verified = late.accepted ? static_cast<int>(late.verification.candidate) : -1;
+  return true;
 }
 
 }  // namespace tutti

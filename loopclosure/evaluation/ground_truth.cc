@@ -148,6 +148,9 @@ LoopGroundTruth LoopGroundTruth::Strided(int stride) const {
 LoopGroundTruth LoopGroundTruth::First(int size) const {
   LoopGroundTruth result(std::clamp(size, 0, size_));
   result.description = description;
+  result.least_overlap = least_overlap;
+  result.best_views = best_views;
+  if (!best_views.empty()) result.best_views.resize(static_cast<std::size_t>(result.size_));
   for (int r = 0; r < result.size_; ++r) {
     for (int c = 0; c < r; ++c) result.Set(r, c, At(r, c));
   }

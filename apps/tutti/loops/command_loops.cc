@@ -6,6 +6,8 @@
 #include <opencv2/core/utility.hpp>
 #include <optional>
 #include <string>
+#include <tuple>
+#include <utility>
 #include <vector>
 
 #include "apps/run/interrupt.h"
@@ -19,12 +21,14 @@
 #include "apps/tutti/loops/loops_output.h"
 #include "apps/tutti/loops/loops_pictures.h"
 #include "apps/tutti/loops/loops_table.h"
+#include "apps/tutti/loops/overlap_truth.h"
 #include "apps/tutti/mask_option.h"
 #include "core/camera_text.h"
 #include "core/stopwatch.h"
 #include "core/terminal.h"
 #include "frontend/dataset/image_mask.h"
 #include "frontend/dataset/rectified_rig.h"
+#include "loopclosure/evaluation/view_overlap.h"
 #include "tutti/core/error.h"
 #include "tutti/frontend/dataset.h"
 #include "tutti/loopclosure/detector.h"
@@ -40,12 +44,15 @@ struct LoopsArguments {
   LoopDetectorOptions options;
   bool table = false;
   bool dump = false;
+  bool rgbd = false;         // depth goes to the detector, too
+  std::string depth_camera;  // of the images that depth belongs to
 };
 
 // What every rule of a table shares.
 struct Input : ImageSet {
   std::optional<PinholeCamera> camera;
   std::optional<ImageMasks> masks;
+  bool rgbd = false;
 };
 
 LoopRow Process(const Input& set, std::size_t i, std::int64_t number, LoopDetector& detector) {
@@ -55,7 +62,11 @@ LoopRow Process(const Input& set, std::size_t i, std::int64_t number, LoopDetect
   LoopQuery query;
   query.id = number;
   query.stamp_s = static_cast<double>(number);
-  query.image = right.empty() ? set.Read(i) : ReadJoined(file, right, &query.cameras);
+  if (set.rgbd) {
+    std::tie(query.image, query.depth_m) = set.ReadWithDepth(i);
+  } else {
+    query.image = right.empty() ? set.Read(i) : ReadJoined(file, right, &query.cameras);
+  }
   row.read = !query.image.empty();
   if (row.read && set.camera) {
     query.camera = set.camera;
@@ -102,6 +113,32 @@ void DropEvidence(bool with_posterior, LoopResult& result) {
   result.verification.inlier_matches = {};
 }
 
+// What the newest image has changed for one before it: figures, files and pictures are of final decisions.
+// Returns how many loops more there are.
+int TakeSecondWord(const EarlierImages& earlier, const LoopGroundTruth& truth, LoopRun& run,
+                   LoopsDump* dump) {
+  const std::optional<LateLoop> late = std::move(run.rows.back().result.late);
+  run.rows.back().result.late.reset();
+  const std::int64_t number = late ? late->query - earlier.first() : -1;
+  if (number < 0 || number >= static_cast<std::int64_t>(run.rows.size())) return 0;
+  LoopRow said;
+  said.result.query = late->query;
+  if (!TakeLate(*late, &said.result)) return 0;
+  earlier.Separate(&said);  // the detector's numbers to this run's
+  LoopRow& row = run.rows[static_cast<std::size_t>(number)];
+  const bool before = row.result.accepted || row.earlier;
+  row.earlier = said.earlier;
+  row.second_word = late->accepted ? SecondWord::kAccepted : SecondWord::kWithdrawn;
+  row.result.accepted = said.result.accepted;
+  row.result.candidate = said.result.candidate;
+  row.result.probability = said.result.probability;
+  row.result.verification = said.result.verification;
+  row.result.reason = said.result.reason;
+  if (dump != nullptr) dump->AddLate(run, row.result, truth);
+  row.result.verification.inlier_matches = {};
+  return (row.result.accepted || row.earlier ? 1 : 0) - (before ? 1 : 0);
+}
+
 // Up to Ctrl-C: a run that ended early has the ground truth of its images only. A dump goes into `folder`.
 LoopRun RunDetector(const LoopsArguments& arguments, const LoopDetectorOptions& options, const Input& set,
                     const std::filesystem::path& folder) {
@@ -140,6 +177,7 @@ LoopRun RunDetector(const LoopsArguments& arguments, const LoopDetectorOptions& 
     if (dump) dump->Add(run, row.result, set.truth);
     DropEvidence(options.keep_posterior, row.result);
     loops += row.result.accepted || row.earlier ? 1 : 0;
+    loops += TakeSecondWord(earlier, set.truth, run, dump ? &*dump : nullptr);
     progress.Update(run.rows.size(), std::to_string(loops) + " loops");
   }
   progress.Finish();
@@ -176,6 +214,20 @@ int RunTable(const LoopsArguments& arguments, const Input& set) {
   return 0;
 }
 
+void CheckGroundTruth(const GroundTruthArguments& truth) {
+  std::string problem = truth.rule.Validate();
+  if (problem.empty() && truth.overlap)
+    problem = internal::OverlapRule{*truth.overlap, truth.ignore_overlap, truth.rule.exclude_s}.Validate();
+  if (!problem.empty()) throw InputError("ground truth: " + problem);
+  if (!truth.overlap) return;
+  if (truth.file.empty())
+    throw InputError("--ground-truth-overlap needs a pose for each image: give --ground-truth FILE of poses");
+  if (truth.join_pairs)
+    throw InputError(
+        "--ground-truth-overlap: images that --join-pairs joins have no common depth; leave one "
+        "of the two out");
+}
+
 int RunLoops(const LoopsArguments& given) {
   LoopsArguments arguments = given;
   arguments.images = ImageFolder(arguments.images).string();
@@ -197,13 +249,16 @@ int RunLoops(const LoopsArguments& given) {
                      "leave one of the two out");
   }
   OutputFolder::Check(arguments.out, LoopsLayout(arguments.table));
-  const std::string problem = arguments.truth.rule.Validate();
-  if (!problem.empty()) throw InputError("ground truth: " + problem);
+  CheckGroundTruth(arguments.truth);
+  if (arguments.rgbd && arguments.truth.join_pairs)
+    throw InputError("--rgbd: images that --join-pairs joins have no common depth; leave one of the two out");
   cv::setNumThreads(arguments.options.threads);
   std::optional<PinholeCamera> camera;
   if (!arguments.camera.empty()) camera = internal::ParseCamera(arguments.camera);
-  Input set = {LoadImageSet(arguments.images, arguments.truth, arguments.topic, camera), camera,
-               std::nullopt};
+  arguments.truth.depth.camera = arguments.depth_camera.empty() ? arguments.camera : arguments.depth_camera;
+  Input set = {LoadImageSet(arguments.images, arguments.truth, arguments.topic, camera, arguments.rgbd),
+               camera, std::nullopt, arguments.rgbd};
+  if (set.rgbd) set.camera = set.depth->camera();
   if (camera && set.recording) set.camera = set.recording->Rig().camera;
   for (const std::string& note : set.notes) internal::Say("%s", note.c_str());
   if (set.recording) {
@@ -228,6 +283,36 @@ int RunLoops(const LoopsArguments& given) {
     return 130;
   }
   return 0;
+}
+
+void AddOverlapOptions(CLI::App& command, LoopsArguments& a) {
+  CLI::Option* overlap =
+      command
+          .add_option(
+              "--ground-truth-overlap", a.truth.overlap,
+              "trajectory, and depth images: a loop is two images, at least this share of one of which is "
+              "seen in the other (0.3 is usual), in place of --gt-distance and --gt-angle")
+          ->type_name("SHARE");
+  command
+      .add_option("--gt-ignore-overlap", a.truth.ignore_overlap,
+                  "by overlap: no loop where less than this is shared, either way; between the two: ignored")
+      ->type_name("SHARE")
+      ->needs(overlap)
+      ->capture_default_str();
+  command
+      .add_option("--gt-depth", a.truth.depth.dataset,
+                  "data set (RGB-D: TUM's and other layouts) that has the images' depth (default: the one "
+                  "that they are part of)")
+      ->type_name("DATASET");
+  command
+      .add_option("--gt-depth-units", a.truth.depth.units_per_m,
+                  "value of one metre in its depth images (default: as its layout says)")
+      ->check(Positive());
+  command.add_option("--gt-camera", a.depth_camera,
+                     std::string(internal::kCameraText) +
+                         " [px]: of those images (default: --camera, else as the data set says)");
+  command.add_flag("--rgbd", a.rgbd,
+                   "the images' depth (as --gt-depth) goes to the detector, too: motions in metres");
 }
 
 }  // namespace
@@ -276,6 +361,7 @@ void SetUpLoops(CLI::App& command, int& exit_code) {
       ->capture_default_str();
   command.add_option("--gt-exclude-s", rule.exclude_s, "trajectory: a loop is at least this much older [s]")
       ->capture_default_str();
+  AddOverlapOptions(command, *arguments);
   command
       .add_flag("--table", arguments->table,
                 "every rule and each member alone, one after the other; table.json, .md, .csv, and a folder "

@@ -1,5 +1,6 @@
 // Precision-recall curves of `tutti loops`.
 #include <cstdio>
+#include <utility>
 
 #include "apps/plot/plot.h"
 #include "apps/tutti/loops/loops_pictures.h"
@@ -39,6 +40,27 @@ PlotCurve Curve(const char* name, const LoopEvaluation& evaluation) {
   std::snprintf(area, sizeof area, "%.3f", evaluation.area_under_curve);
   curve.name = std::string(name) + ": recall " + Percent(evaluation.recall_at_100_precision) +
                " at 100 % precision, area " + area;
+  return curve;
+}
+
+void AppendRecallCsv(const char* decision, const char* over, const std::vector<RecallPart>& parts,
+                     std::string& csv) {
+  for (const RecallPart& p : parts) {
+    char line[160];
+    std::snprintf(line, sizeof line, "%s,%s,%.9g,%.9g,%d,%d,%d\n", decision, over, p.from, p.to, p.rows,
+                  p.found, p.found_at_100_precision);
+    csv += line;
+  }
+}
+
+PlotCurve RecallCurve(const char* name, const LoopEvaluation& evaluation,
+                      double (RecallPart::*recall)() const) {
+  PlotCurve curve;
+  curve.name = name;
+  for (const RecallPart& p : evaluation.recall_by_overlap) {
+    if (p.rows > 0) curve.points.emplace_back(p.from, (p.*recall)());
+  }
+  curve.marks = curve.points;
   return curve;
 }
 
@@ -89,6 +111,41 @@ CurvePlot PlotCurves(const LoopRun& run, const LoopReport& report) {
     plot.notes.push_back("the ground truth has no loop: recall is 0 by definition");
   if (report.ranked.curve.empty() && report.posterior.curve.empty())
     plot.notes.push_back("no image has a hypothesis: the curves are empty");
+  return plot;
+}
+
+void WriteRecallByViewCsv(const LoopReport& report, const std::filesystem::path& file) {
+  std::string csv = "decision,over,from,to,images,found,found_at_100_precision\n";
+  for (const auto& [name, evaluation] :
+       {std::make_pair("verified", &report.verified), std::make_pair("posterior", &report.posterior)}) {
+    AppendRecallCsv(name, "overlap", evaluation->recall_by_overlap, csv);
+    AppendRecallCsv(name, "angle_deg", evaluation->recall_by_angle, csv);
+  }
+  internal::WriteFile(file, csv);
+}
+
+CurvePlot PlotRecallByView(const LoopRun& run, const LoopReport& report) {
+  CurvePlot plot;
+  plot.title = RunTitle(run, report);
+  plot.x_name = "overlap of the earlier view that shares most, at least";
+  plot.y_name = "recall";
+  PlotCurve accepted = RecallCurve("accepted", report.verified, &RecallPart::Recall);
+  accepted.color = kTrueColor;
+  accepted.width = 5;
+  PlotCurve sure = RecallCurve("at 100 % precision", report.verified, &RecallPart::RecallAt100Precision);
+  sure.color = PlotPalette(2);
+  PlotCurve posterior = RecallCurve("proposed, right place first", report.posterior, &RecallPart::Recall);
+  posterior.color = kMissedColor;
+  posterior.dashed = true;
+  plot.curves = {accepted, sure, posterior};
+  std::string angles = "accepted, by the angle to that view:";
+  for (const RecallPart& part : report.verified.recall_by_angle) {
+    if (part.rows == 0) continue;
+    char text[96];
+    std::snprintf(text, sizeof text, " %g to %g deg: %d of %d;", part.from, part.to, part.found, part.rows);
+    angles += text;
+  }
+  plot.notes.push_back(angles.substr(0, angles.size() - 1));
   return plot;
 }
 

@@ -35,20 +35,16 @@ std::string CandidateLines(const LoopRun& run, const LoopResult& result, const L
   return text;
 }
 
-std::string VerificationLines(const LoopRun& run, const LoopResult& result, const LoopGroundTruth& truth) {
-  std::string text;
-  int order = 0;
-  for (const Verification& tried : result.tried) {
-    const LoopLabel label = truth.At(static_cast<int>(result.query), static_cast<int>(tried.candidate));
-    char cells[320];
-    std::snprintf(cells, sizeof cells, "%ld,%ld,%s,%d,%d,%d,%s,%d,%d,%.9g,%d,%.9g,%.9g,%.9g,",
-                  run.Number(result.query), run.Number(tried.candidate), LabelName(label), order++,
-                  tried.accepted ? 1 : 0, result.accepted && tried.candidate == result.candidate ? 1 : 0,
-                  ToString(tried.type), tried.matches, tried.inliers, tried.mass, tried.coverage,
-                  tried.expected_inliers, tried.log_nfa, tried.motion_spread);
-    text += cells + Quoted(tried.reason) + "\n";
-  }
-  return text;
+std::string VerificationLine(const LoopRun& run, const LoopResult& result, const Verification& tried,
+                             int order, bool late, const LoopGroundTruth& truth) {
+  const LoopLabel label = truth.At(static_cast<int>(result.query), static_cast<int>(tried.candidate));
+  char cells[400];
+  std::snprintf(cells, sizeof cells, "%ld,%ld,%s,%d,%d,%d,%d,%s,%d,%d,%.9g,%d,%.9g,%.9g,%.9g,%.9g,",
+                run.Number(result.query), run.Number(tried.candidate), LabelName(label), order, late ? 1 : 0,
+                tried.accepted ? 1 : 0, result.accepted && tried.candidate == result.candidate ? 1 : 0,
+                ToString(tried.type), tried.matches, tried.inliers, tried.mass, tried.coverage,
+                tried.expected_inliers, tried.log_nfa, tried.motion_spread, result.hypothesis);
+  return cells + Quoted(tried.reason) + "\n";
 }
 
 void CheckWritten(const std::ofstream& out, const internal::ReplacedFile& file) {
@@ -72,16 +68,22 @@ LoopsDump::LoopsDump(const std::filesystem::path& folder, const std::vector<std:
     candidates_ << "," << name << "_score," << name << "_likelihood," << name << "_posterior";
   }
   candidates_ << "\n";
-  verification_
-      << "image,candidate,truth,order,accepted,chosen,type,matches,inliers,mass,coverage,expected_inliers,"
-         "log_nfa,motion_spread,reason\n";
+  verification_ << "image,candidate,truth,order,late,accepted,chosen,type,matches,inliers,mass,coverage,"
+                   "expected_inliers,log_nfa,motion_spread,hypothesis,reason\n";
   CheckWritten(candidates_, candidates_file_);
   CheckWritten(verification_, verification_file_);
 }
 
 void LoopsDump::Add(const LoopRun& run, const LoopResult& result, const LoopGroundTruth& truth) {
   candidates_ << CandidateLines(run, result, truth);
-  verification_ << VerificationLines(run, result, truth);
+  int order = 0;
+  for (const Verification& tried : result.tried)
+    verification_ << VerificationLine(run, result, tried, order++, false, truth);
+}
+
+void LoopsDump::AddLate(const LoopRun& run, const LoopResult& result, const LoopGroundTruth& truth) {
+  if (result.verification.candidate >= 0)
+    verification_ << VerificationLine(run, result, result.verification, 0, true, truth);
 }
 
 void LoopsDump::Finish() {

@@ -19,6 +19,8 @@ class LoopsDump {
   LoopsDump(const std::filesystem::path& folder, const std::vector<std::string>& members);
   /// Appends the lines of one image of the run; `truth` is for all its images.
   void Add(const LoopRun& run, const LoopResult& result, const LoopGroundTruth& truth);
+  /// Appends what was decided later about an image: its verification, with `late` 1.
+  void AddLate(const LoopRun& run, const LoopResult& result, const LoopGroundTruth& truth);
   /// To be called at the end: then the files are there. Throws InputError if the files could not be written
   /// in full.
   void Finish();

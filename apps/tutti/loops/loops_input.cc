@@ -9,6 +9,7 @@
 
 #include "apps/tutti/loops/joined_pairs.h"
 #include "apps/tutti/loops/mat_file.h"
+#include "apps/tutti/loops/overlap_truth.h"
 #include "core/median.h"
 #include "core/number_lines.h"
 #include "core/pose_columns.h"
@@ -70,24 +71,6 @@ Trajectory ReadPoses(const fs::path& file) {
   return trajectory;
 }
 
-using PosesOfImages = std::vector<std::optional<StampedPose>>;
-
-// The time stamps that images are named by, in their order; numbers of frames for a file of poses that has
-// such; empty if their names are none.
-std::vector<double> StampsOfImages(const std::vector<fs::path>& images) {
-  std::vector<double> stamps;
-  const internal::StampsOfNames named = StampsInNames(images);
-  for (const auto& stamp : named.stamps) stamps.push_back(stamp.first);
-  if (stamps.size() == images.size()) return stamps;
-  stamps.clear();
-  for (const fs::path& image : images) {
-    const auto number = ParseDouble(image.stem().string());
-    if (!number) return {};
-    stamps.push_back(*number);
-  }
-  return stamps;
-}
-
 // The pose of each image by its time stamp; none of any if they are no stamps of this trajectory.
 PosesOfImages PosesAt(const std::vector<double>& stamps, const Trajectory& trajectory) {
   std::vector<double> intervals;
@@ -130,7 +113,7 @@ std::string RuleText(const LoopRule& rule) {
 }
 
 LoopGroundTruth FromPoses(const GroundTruthArguments& arguments, const std::vector<fs::path>& images,
-                          const std::vector<double>& stamps) {
+                          const std::vector<double>& stamps, const DepthImages* depth) {
   Trajectory trajectory = ReadPoses(arguments.file);
   if (arguments.join_pairs && trajectory.size() == 2 * images.size()) {  // the left images' poses
     for (std::size_t i = 0; i < images.size(); ++i) trajectory[i] = trajectory[2 * i];
@@ -145,6 +128,13 @@ LoopGroundTruth FromPoses(const GroundTruthArguments& arguments, const std::vect
                      (stamps.empty() ? "names are no time stamps of it" : "time stamps are not among its") +
                      "; give one pose per image");
   }
+  if (depth != nullptr && !HasRotations(trajectory)) {
+    throw InputError(
+        arguments.file +
+        ": has positions alone; what two images see of each other depends on their orientations, "
+        "too. Leave --ground-truth-overlap out");
+  }
+  if (depth != nullptr) return TruthByOverlap(arguments, poses, *depth);
   PosesOfImages strided;
   for (std::size_t i = 0; i < poses.size(); i += static_cast<std::size_t>(arguments.stride))
     strided.push_back(poses[i]);
@@ -165,6 +155,20 @@ LoopGroundTruth NoTruth(int images) {
 }
 
 }  // namespace
+
+std::vector<double> StampsOfImages(const std::vector<fs::path>& images) {
+  std::vector<double> stamps;
+  const internal::StampsOfNames named = StampsInNames(images);
+  for (const auto& stamp : named.stamps) stamps.push_back(stamp.first);
+  if (stamps.size() == images.size()) return stamps;
+  stamps.clear();
+  for (const fs::path& image : images) {
+    const auto number = ParseDouble(image.stem().string());
+    if (!number) return {};
+    stamps.push_back(*number);
+  }
+  return stamps;
+}
 
 fs::path ImageFolder(const fs::path& folder) {
   std::error_code error;
@@ -192,12 +196,18 @@ std::vector<fs::path> ImagesIn(const fs::path& folder) {
 }
 
 LoopGroundTruth LoadGroundTruth(const GroundTruthArguments& arguments, const std::vector<fs::path>& images,
-                                const std::vector<double>& stamps) {
+                                const std::vector<double>& stamps, const DepthImages* depth) {
   std::error_code error;
   if (!fs::is_regular_file(arguments.file, error)) {
     throw InputError(arguments.file + ": no such file; --ground-truth takes a loop matrix or a trajectory");
   }
-  if (LooksLikeTrajectory(arguments.file)) return FromPoses(arguments, images, stamps);
+  if (LooksLikeTrajectory(arguments.file)) return FromPoses(arguments, images, stamps, depth);
+  if (depth != nullptr) {
+    throw InputError(
+        arguments.file +
+        ": is no trajectory, and --ground-truth-overlap needs a pose for each image; give the file "
+        "of poses, or leave --ground-truth-overlap out");
+  }
   const int all = static_cast<int>(images.size());
   const int used = (all + arguments.stride - 1) / arguments.stride;
   LoopGroundTruth truth =
@@ -217,6 +227,11 @@ LoopGroundTruth LoadGroundTruth(const GroundTruthArguments& arguments, const std
 cv::Mat ImageSet::Read(std::size_t i) const {
   if (!recording) return ReadImageFile(images.at(i), cv::IMREAD_UNCHANGED).image;
   return recording->ReadColour(i * static_cast<std::size_t>(stride)).image;
+}
+
+std::pair<cv::Mat, cv::Mat> ImageSet::ReadWithDepth(std::size_t i) const {
+  const std::size_t image = i * static_cast<std::size_t>(stride);
+  return {depth->Colour(image), depth->Depth(image)};
 }
 
 namespace {
@@ -254,7 +269,7 @@ std::shared_ptr<const Dataset> OpenRecording(const fs::path& path, const std::st
 }  // namespace
 
 ImageSet LoadImageSet(const std::string& path, const GroundTruthArguments& arguments,
-                      const std::string& topic, const std::optional<PinholeCamera>& camera) {
+                      const std::string& topic, const std::optional<PinholeCamera>& camera, bool with_depth) {
   ImageSet set;
   set.stride = arguments.stride;
   std::error_code error;
@@ -282,8 +297,11 @@ ImageSet LoadImageSet(const std::string& path, const GroundTruthArguments& argum
     set.images.push_back(images[i]);
     set.rights.push_back(rights[i]);
   }
-  set.truth = arguments.file.empty() ? NoTruth(static_cast<int>(set.images.size()))
-                                     : LoadGroundTruth(arguments, images, stamps);
+  if (arguments.overlap || with_depth)
+    set.depth = std::make_shared<DepthImages>(arguments.depth, path, images, stamps);
+  set.truth = arguments.file.empty()
+                  ? NoTruth(static_cast<int>(set.images.size()))
+                  : LoadGroundTruth(arguments, images, stamps, arguments.overlap ? set.depth.get() : nullptr);
   return set;
 }
 

@@ -79,6 +79,23 @@ nlohmann::ordered_json Reliability(const LoopEvaluation& evaluation) {
   return bins;
 }
 
+nlohmann::ordered_json RecallParts(const std::vector<RecallPart>& parts) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  for (const RecallPart& part : parts) {
+    json.push_back({{"from", part.from},
+                    {"to", part.to},
+                    {"images", part.rows},
+                    {"recall", part.Recall()},
+                    {"recall_at_100_precision", part.RecallAt100Precision()}});
+  }
+  return json;
+}
+
+std::ptrdiff_t CountSecondWords(const LoopRun& run, SecondWord word) {
+  return std::count_if(run.rows.begin(), run.rows.end(),
+                       [word](const LoopRow& row) { return row.second_word == word; });
+}
+
 std::ptrdiff_t EarlierLoops(const LoopRun& run) {
   return std::count_if(run.rows.begin(), run.rows.end(),
                        [](const LoopRow& row) { return row.earlier.has_value(); });
@@ -97,7 +114,7 @@ std::string Csv(const LoopRun& run) {
     for (const char* column : {"_hypothesis", "_best", "_at_candidate"})
       text.append(",").append(name).append(column);
   }
-  text += ",reason\n";
+  text += ",late,reason\n";
   for (const LoopRow& row : run.rows) {
     const LoopResult& r = row.result;
     const int image = static_cast<int>(r.query);
@@ -117,6 +134,7 @@ std::string Csv(const LoopRun& run) {
                     opinion.at_candidate);
       text += numbers;
     }
+    text += std::string(",") + SecondWordName(row.second_word);
     text += "," + Quoted(row.read ? r.reason : "the image can't be read") + "\n";
   }
   return text;
@@ -143,10 +161,34 @@ void PrintFound(const LoopRun& run, const LoopReport& report, const std::filesys
   std::printf("with --ground-truth (a loop matrix or a trajectory) they are judged as well\n");
 }
 
+void PrintRecall(const std::string& name, const RecallPart& verified, const RecallPart& posterior) {
+  std::printf("%-34s %11.1f%% %11.1f%%   of %d images\n", name.c_str(), 100 * verified.Recall(),
+              100 * posterior.Recall(), verified.rows);
+}
+
+// "recall, overlap >= 0.5", "recall, turned by 10 to 20 deg".
+void PrintRecallByView(const LoopReport& report) {
+  const LoopEvaluation &v = report.verified, &p = report.posterior;
+  char name[64];
+  for (std::size_t k = 0; k < v.recall_by_overlap.size(); ++k) {
+    std::snprintf(name, sizeof name, "recall, overlap >= %g", v.recall_by_overlap[k].from);
+    PrintRecall(name, v.recall_by_overlap[k], p.recall_by_overlap[k]);
+  }
+  for (std::size_t k = 0; k < v.recall_by_angle.size(); ++k) {
+    const RecallPart& part = v.recall_by_angle[k];
+    std::snprintf(name, sizeof name, "recall, turned by %g to %g deg", part.from, part.to);
+    PrintRecall(name, part, p.recall_by_angle[k]);
+  }
+}
+
 }  // namespace
 
 const char* LabelName(LoopLabel label) {
   return label == LoopLabel::kLoop ? "loop" : label == LoopLabel::kIgnore ? "ignored" : "none";
+}
+
+const char* SecondWordName(SecondWord word) {
+  return word == SecondWord::kAccepted ? "accepted" : word == SecondWord::kWithdrawn ? "withdrawn" : "";
 }
 
 std::string Quoted(const std::string& text) {
@@ -156,13 +198,14 @@ std::string Quoted(const std::string& text) {
 }
 
 std::string FoundLoopsCsv(const LoopRun& run) {
-  std::string text = "image,loop_with,probability,inliers,matches,file,loop_with_file\n";
+  std::string text = "image,loop_with,probability,inliers,matches,late,file,loop_with_file\n";
   for (const LoopRow& row : run.rows) {
     const LoopResult& r = row.result;
     if (!r.accepted) continue;
     char numbers[128];
-    std::snprintf(numbers, sizeof numbers, "%ld,%ld,%.9g,%d,%d,", run.Number(r.query),
-                  run.Number(r.candidate), r.probability, r.verification.inliers, r.verification.matches);
+    std::snprintf(numbers, sizeof numbers, "%ld,%ld,%.9g,%d,%d,%d,", run.Number(r.query),
+                  run.Number(r.candidate), r.probability, r.verification.inliers, r.verification.matches,
+                  row.second_word == SecondWord::kAccepted ? 1 : 0);
     const auto candidate = static_cast<std::size_t>(r.candidate);
     const std::string other = candidate < run.rows.size() ? run.rows[candidate].file : "";
     text += numbers + Quoted(row.file) + "," + Quoted(other) + "\n";
@@ -208,6 +251,12 @@ nlohmann::ordered_json FiguresJson(const LoopRun& run, const LoopReport& report)
   json["f1_at_default_posterior"] = posterior.f1_at_default;
   json["accepted"] = {
       {"true", verified.true_positives}, {"false", verified.false_positives}, {"ignored", verified.ignored}};
+  json["second_word"] = {{"accepted", CountSecondWords(run, SecondWord::kAccepted)},
+                         {"withdrawn", CountSecondWords(run, SecondWord::kWithdrawn)}};
+  if (!run.truth.best_views.empty()) {
+    add("recall_by_overlap", [](const LoopEvaluation& e) { return RecallParts(e.recall_by_overlap); });
+    add("recall_by_angle_deg", [](const LoopEvaluation& e) { return RecallParts(e.recall_by_angle); });
+  }
   add("calibration_error", CalibrationError);
   add("calibration_images", [](const LoopEvaluation& e) { return e.calibration_images; });
   json["ms_per_image"] = {{"median", report.ms_median}, {"p99", report.ms_p99}};
@@ -239,6 +288,9 @@ OutputLayout LoopsLayout(bool table) {
                                                  "confusion.png",
                                                  "contact_sheet.png",
                                                  "precision_recall.png",
+                                                 "recall_by_view.csv",
+                                                 "recall_by_view.svg",
+                                                 "recall_by_view.png",
                                                  "posteriors.csv",
                                                  "earlier_loops.csv",
                                                  "dump_candidates.csv",
@@ -272,6 +324,12 @@ std::filesystem::path WriteLoopRun(const LoopRun& run, const LoopReport& report,
     folder.Write({"precision_recall.csv", [&](File file) { WriteCurvesCsv(report, file); }});
     folder.Write({"precision_recall.svg", [&](File file) { WriteSvg(file, curves); }});
     folder.Write({"precision_recall.png", [&](File file) { WritePng(file, curves); }});
+  }
+  if (!run.truth.best_views.empty()) {
+    const CurvePlot recall = PlotRecallByView(run, report);
+    folder.Write({"recall_by_view.csv", [&](File file) { WriteRecallByViewCsv(report, file); }});
+    folder.Write({"recall_by_view.svg", [&](File file) { WriteSvg(file, recall); }});
+    folder.Write({"recall_by_view.png", [&](File file) { WritePng(file, recall); }});
   }
   folder.Write({"confusion.png", [&](File file) { WriteConfusion(run, report, file); }});
   folder.Write({"contact_sheet.png", [&](File file) { WriteContactSheet(run, report, file); }});
@@ -311,8 +369,13 @@ void PrintLoopRun(const LoopRun& run, const LoopReport& report, const std::files
               CalibrationText(posterior).c_str(), CalibrationText(ranked).c_str());
   std::printf("%-34s %12d %12d %12d\n", "  over n images", verified.calibration_images,
               posterior.calibration_images, ranked.calibration_images);
-  std::printf("%-34s %d true, %d false, %d on ignored cells\n", "accepted", verified.true_positives,
-              verified.false_positives, verified.ignored);
+  std::printf("%-34s %d true, %d false, %d near misses (ignored pairs)\n", "accepted",
+              verified.true_positives, verified.false_positives, verified.ignored);
+  const std::ptrdiff_t late = CountSecondWords(run, SecondWord::kAccepted);
+  const std::ptrdiff_t withdrawn = CountSecondWords(run, SecondWord::kWithdrawn);
+  if (late + withdrawn > 0)
+    std::printf("%-34s %td accepted, %td withdrawn\n", "  by the second word", late, withdrawn);
+  PrintRecallByView(report);
   if (run.earlier > 0) {
     std::printf("%-34s %td images, into %lld\n", "loops into earlier runs", EarlierLoops(run),
                 static_cast<long long>(run.earlier));

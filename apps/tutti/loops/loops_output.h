@@ -24,11 +24,15 @@ struct EarlierLoop {
   std::string file;         ///< its path
 };
 
+/// What the detector has said about an image some images later (LateLoop).
+enum class SecondWord { kNone, kAccepted, kWithdrawn };
+
 /// One image's outcome.
 struct LoopRow {
-  std::string file;  ///< name of the image
-  bool read = true;  ///< false: the file is damaged; the row stays in the denominator
-  LoopResult result;
+  std::string file;   ///< name of the image
+  bool read = true;   ///< false: the file is damaged; the row stays in the denominator
+  LoopResult result;  ///< with the decision that is final
+  SecondWord second_word = SecondWord::kNone;  ///< what was decided later, and changed it
   std::optional<EarlierLoop>
       earlier;    ///< the loop is none of this run's, and `result` has it not as accepted
   double ms = 0;  ///< time of Detect [ms]
@@ -66,6 +70,8 @@ LoopReport EvaluateRun(const LoopRun& run);
 
 /// "loop", "ignored" or "none", in every file.
 const char* LabelName(LoopLabel label);
+/// "accepted", "withdrawn", or empty.
+const char* SecondWordName(SecondWord word);
 /// A cell of a CSV file that may hold anything.
 std::string Quoted(const std::string& text);
 

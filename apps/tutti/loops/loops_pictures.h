@@ -22,6 +22,10 @@ void AddPosterior(const LoopResult& result, int images, cv::Mat& posterior);
 void WriteCurvesCsv(const LoopReport& report, const std::filesystem::path& file);
 CurvePlot PlotCurves(const LoopRun& run, const LoopReport& report);
 
+/// Ground truth by overlap: recall over the overlap and the angle of the earlier view that shares most.
+void WriteRecallByViewCsv(const LoopReport& report, const std::filesystem::path& file);
+CurvePlot PlotRecallByView(const LoopRun& run, const LoopReport& report);
+
 /// Ground truth, posterior and what was said, side by side.
 void WriteConfusion(const LoopRun& run, const LoopReport& report, const std::filesystem::path& file);
 

@@ -34,7 +34,7 @@ TEST(LoopsWithoutTruth, AreListedAndShownButNotJudged) {
   EXPECT_THAT(run.output, HasSubstr("loops accepted"));
   EXPECT_THAT(run.output, HasSubstr("loops.csv"));
   const std::string loops = ReadAll(out / "loops.csv");
-  EXPECT_THAT(loops, HasSubstr("image,loop_with,probability,inliers,matches,file,loop_with_file\n"));
+  EXPECT_THAT(loops, HasSubstr("image,loop_with,probability,inliers,matches,late,file,loop_with_file\n"));
   EXPECT_THAT(loops, HasSubstr("\n17,2,"));
   EXPECT_THAT(loops, HasSubstr("\"17.png\",\"2.png\""));
   const nlohmann::json json = nlohmann::json::parse(ReadAll(out / "results.json"));

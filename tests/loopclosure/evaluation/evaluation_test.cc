@@ -293,5 +293,65 @@ TEST(Evaluation, ImagesOutsideOfTheGroundTruthHaveNoLoop) {
   EXPECT_EQ(result.false_positives, 2);
 }
 
+TEST(Evaluation, RecallOverTheViewThatSharesMost) {
+  LoopGroundTruth truth = Truth();
+  truth.least_overlap = 0.4;
+  truth.best_views.resize(10);
+  truth.best_views[5] = {0, 0.9, 5};
+  truth.best_views[6] = {1, 0.55, 20};
+  truth.best_views[7] = {2, 0.5, 44};
+  truth.best_views[8] = {3, 0.42, 180};
+  const LoopEvaluation e = EvaluateVerified({Accepted(5, 0.9, 0), Accepted(6, 0.8, 3), Accepted(7, 0.7, 2),
+                                             Refused(8, 0.6, 3), Accepted(9, 0.9, 0)},
+                                            truth);
+  const auto rows = [](const std::vector<RecallPart>& parts) {
+    std::vector<std::vector<double>> all;
+    for (const RecallPart& p : parts)
+      all.push_back({p.from, double(p.rows), double(p.found), double(p.found_at_100_precision)});
+    return all;
+  };
+  using Rows = std::vector<std::vector<double>>;
+  EXPECT_EQ(rows(e.recall_by_overlap), (Rows{{0.4, 4, 2, 1}, {0.5, 3, 2, 1}, {0.6, 1, 1, 1}, {0.7, 1, 1, 1}}))
+      << "0.3 is no loop here";
+  EXPECT_EQ(rows(e.recall_by_angle),
+            (Rows{{0, 1, 1, 1}, {10, 0, 0, 0}, {20, 1, 0, 0}, {30, 1, 1, 0}, {45, 1, 0, 0}}));
+  EXPECT_DOUBLE_EQ(e.recall_by_overlap[1].Recall(), 2.0 / 3);
+  EXPECT_DOUBLE_EQ(e.recall_by_angle[1].Recall(), 0);
+  EXPECT_TRUE(EvaluateVerified({Accepted(5, 0.9, 0)}, Truth()).recall_by_overlap.empty());
+}
+
+// A second word replaces the decision, wherever figures come from.
+TEST(Evaluation, TheSecondWordIsTheDecisionThatCounts) {
+  LoopResult result;
+  result.query = 6;
+  result.best = result.candidate = 3;
+  result.proposed = true;
+  result.reason = "probably not this place";
+  LoopObservation observation = Observe(result);
+  LateLoop late;
+  late.query = 6;
+  late.probability = 0.98;
+  late.verification.candidate = 1;
+  EXPECT_FALSE(TakeLate(late, &result)) << "neither accepted nor withdrawn";
+  EXPECT_FALSE(TakeLate(late, &observation));
+  late.accepted = true;
+  EXPECT_TRUE(TakeLate(late, &result));
+  EXPECT_TRUE(TakeLate(late, &observation));
+  EXPECT_TRUE(result.accepted);
+  EXPECT_EQ(result.reason, "");
+  for (const LoopObservation& o : {Observe(result), observation}) {
+    const LoopEvaluation e = EvaluateVerified({o}, Truth());
+    EXPECT_EQ(e.true_positives, 1);
+    EXPECT_DOUBLE_EQ(e.curve.at(0).threshold, 0.98);
+  }
+  late.accepted = false;
+  late.withdrawn = true;
+  EXPECT_TRUE(TakeLate(late, &result));
+  EXPECT_TRUE(TakeLate(late, &observation));
+  EXPECT_NE(result.reason.find("withdrawn"), std::string::npos);
+  for (const LoopObservation& o : {Observe(result), observation})
+    EXPECT_EQ(EvaluateVerified({o}, Truth()).outcomes.at(0), LoopOutcome::kMissed);
+}
+
 }  // namespace
 }  // namespace tutti

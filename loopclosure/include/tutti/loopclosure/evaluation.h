@@ -50,6 +50,23 @@ struct ReliabilityBin {
   double accuracy = 0;          ///< share of them whose place is a true loop, 0..1; 0 if there are none
 };
 
+/// Recall over some of the images with a loop, by the earlier view that shares most with each.
+struct RecallPart {
+  double from =
+      0;  ///< of the images whose best view has from <= overlap (to: 1), or from <= angle < to [deg]
+  double to = 0;
+  int rows = 0;                    ///< so many images
+  int found = 0;                   ///< of these: the right place was said, at the default threshold
+  int found_at_100_precision = 0;  ///< of these: before the first false positive
+
+  /// 0..1; 0 where there are no rows.
+  double Recall() const { return rows > 0 ? static_cast<double>(found) / rows : 0.0; }
+  /// 0..1; 0 where there are no rows.
+  double RecallAt100Precision() const {
+    return rows > 0 ? static_cast<double>(found_at_100_precision) / rows : 0.0;
+  }
+};
+
 /// Everything that the tables print of one detector on one ground truth (loop-closure.md section 7).
 struct LoopEvaluation {
   int images = 0;                           ///< observations
@@ -78,6 +95,10 @@ struct LoopEvaluation {
   int false_positives = 0;             ///< at the default threshold
   int ignored = 0;                     ///< at the default threshold: hypotheses on a grey cell
   std::vector<LoopOutcome> outcomes;   ///< one per observation, at the default threshold
+  /// Only by overlap (LoopGroundTruth::best_views): from 0.3, 0.4, 0.5, 0.6, 0.7 on, those that are loops.
+  std::vector<RecallPart> recall_by_overlap;
+  /// Only by overlap: between 0, 10, 20, 30, 45 and 180 degrees.
+  std::vector<RecallPart> recall_by_angle;
 };
 
 /// Ranks by H alone and takes the posterior's best location: without verification. At the default decision:
@@ -100,6 +121,12 @@ LoopEvaluation EvaluateRanked(const std::vector<LoopObservation>& observations, 
 
 /// A result of LoopDetector as an observation, where the query ids were the image numbers.
 LoopObservation Observe(const LoopResult& result);
+
+/// Makes the result of an image what was decided later (LoopResult::late of another image's result): figures
+/// are of final decisions. Returns false, and nothing changes, where the decision stays.
+bool TakeLate(const LateLoop& late, LoopResult* result);
+/// The same for what Observe has made of it.
+bool TakeLate(const LateLoop& late, LoopObservation* observation);
 
 }  // namespace tutti
 #pragma GCC visibility pop

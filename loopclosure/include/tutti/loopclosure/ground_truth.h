@@ -14,6 +14,13 @@ namespace tutti {
 /// Label of a pair of images.
 enum class LoopLabel : std::uint8_t { kNone = 0, kIgnore = 128, kLoop = 255 };
 
+/// The earlier view that shares most with an image, where the ground truth is by overlap.
+struct BestView {
+  int column = -1;       ///< which image; -1: there is none with a loop
+  double overlap = 0;    ///< share of one that the other sees, of both directions the larger, 0..1
+  double angle_deg = 0;  ///< between their cameras' orientations [deg], 0..180
+};
+
 /// Loop matrix (loop-closure.md section 7): row = current image, column = past image. Only column < row
 /// counts.
 class LoopGroundTruth {
@@ -32,7 +39,7 @@ class LoopGroundTruth {
   bool HasLoop(int row) const;
   /// Number of images with at least one loop: what recall is a share of.
   int RowsWithLoop() const;
-  /// Every `stride`-th row and column, from 0.
+  /// Every `stride`-th row and column, from 0; without best_views, which may be of columns that are gone.
   LoopGroundTruth Strided(int stride) const;
   /// The first `size` rows and columns.
   LoopGroundTruth First(int size) const;
@@ -42,7 +49,9 @@ class LoopGroundTruth {
   /// labels says so.
   LoopGroundTruth PairsJoined() const;
 
-  std::string description;  ///< where it comes from and by which rule, for tables
+  std::string description;           ///< where it comes from and by which rule, for tables
+  std::vector<BestView> best_views;  ///< by overlap: one for each row; else empty
+  double least_overlap = 0;          ///< by overlap: that of a loop, 0..1
 
  private:
   int size_ = 0;

@@ -92,6 +92,7 @@ void BindVerification(py::module_& module) {
   py::class_<Verification>(module, "Verification", doc::Verification)
       .def(Pickled<Verification>())
       .def_readonly("candidate", &Verification::candidate, doc::Verification_candidate)
+      .def_readonly("similar", &Verification::similar, doc::Verification_similar)
       .def_readonly("accepted", &Verification::accepted, doc::Verification_accepted)
       .def_property_readonly(
           "type", [](const Verification& v) { return ToString(v.type); },
@@ -105,7 +106,6 @@ void BindVerification(py::module_& module) {
           "information", [](const Verification& v) { return ArrayOf(Eigen::MatrixXd(v.information)); },
           (std::string("(6, 6) float64: ") + doc::Verification_information).c_str())
       .def_readonly("homography", &Verification::homography, doc::Verification_homography)
-      .def_readonly("ahead", &Verification::ahead, doc::Verification_ahead)
       .def_readonly("matches", &Verification::matches, doc::Verification_matches)
       .def_readonly("inliers", &Verification::inliers, doc::Verification_inliers)
       .def_readonly("coverage", &Verification::coverage, doc::Verification_coverage)
@@ -137,6 +137,16 @@ void BindVerification(py::module_& module) {
 void BindLoopResult(py::module_& module) {
   BindMember(module);
   BindVerification(module);
+  py::class_<LateLoop>(module, "LateLoop", doc::LateLoop)
+      .def_readonly("query", &LateLoop::query, doc::LateLoop_query)
+      .def_readonly("accepted", &LateLoop::accepted, doc::LateLoop_accepted)
+      .def_readonly("withdrawn", &LateLoop::withdrawn, doc::LateLoop_withdrawn)
+      .def_readonly("probability", &LateLoop::probability, doc::LateLoop_probability)
+      .def_readonly("verification", &LateLoop::verification, doc::LateLoop_verification)
+      .def("__repr__", [](const LateLoop& late) {
+        return py::str("LateLoop(query={}, accepted={}, withdrawn={}, candidate={}, probability={:.4g})")
+            .format(late.query, late.accepted, late.withdrawn, late.verification.candidate, late.probability);
+      });
   py::class_<LoopResult>(module, "LoopResult", doc::LoopResult)
       .def(Pickled<LoopResult>())
       .def_readonly("query", &LoopResult::query, doc::LoopResult_query)
@@ -151,6 +161,7 @@ void BindLoopResult(py::module_& module) {
       .def_readonly("members", &LoopResult::members, doc::LoopResult_members)
       .def_readonly("verification", &LoopResult::verification, doc::LoopResult_verification)
       .def_readonly("tried", &LoopResult::tried, doc::LoopResult_tried)
+      .def_readonly("late", &LoopResult::late, doc::LoopResult_late)
       .def_property_readonly(
           "locations", Locations<LoopResult>(&LoopResult::posterior_by_location),
           "(N,) int64: ids of the places that `posteriors` is about; only with keep_posterior or "

@@ -74,6 +74,9 @@ LoopResult LoopDetector::Impl::Detect(const LoopQuery& query) {
 
   result.proposed = state_.reasoner().Proposes(combined, result);
   if (result.proposed) Verify(view, combined.belief, result);
+  state_.reasoner().VerifyAgain(
+      [this](const View& a, const View& b, int threads) { return verifier_.Verify(a, b, threads); },
+      [this](int s) -> const View& { return state_.view(s); }, result);
   result.verify_ms = watch.LapMs();
 
   state_.reasoner().Finish(result);

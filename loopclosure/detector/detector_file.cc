@@ -26,7 +26,8 @@ enum class Section : std::uint32_t {
   kRecord,
   kStatistics,
   kEndOfDetector,
-  kPositions  // in a file that holds more
+  kPositions,  // in a file that holds more
+  kSecondWord
 };
 
 // True for a record that memory does not hold; those of other locations may be stored as well.
@@ -120,6 +121,7 @@ void SaveDetector(const DetectorState& state, LongTermMemory& long_term, Positio
   if (positions == Positions::kKeep) {
     Write(Section::kPositions, out, [&](ByteWriter& bytes) { reasoner.track().Save(bytes); });
   }
+  Write(Section::kSecondWord, out, [&](ByteWriter& bytes) { reasoner.second_word().Save(bytes); });
   if (long_term.has_store()) SaveLongTerm(state, long_term.store(), out);
   out(Tag(Section::kEndOfDetector), "");
 }
@@ -204,6 +206,10 @@ void SavedDetector::LoadRest(DetectorState& state, LongTermMemory& long_term) {
     ByteReader bytes(content, in_.name());
     if (tag == Tag(Section::kPositions)) {
       state.reasoner().track().Load(bytes);
+      continue;
+    }
+    if (tag == Tag(Section::kSecondWord)) {
+      state.reasoner().second_word().Load(state.memory(), bytes);
       continue;
     }
     if (tag != Tag(Section::kRecord)) in_.Damaged("a section out of place");

@@ -147,6 +147,7 @@ LoopDetectorOptions Published(const std::string& name) {
   preset.link_threshold = 0.0;
   preset.propose_threshold = 0.07;
   preset.verification.min_epipolar_ratio = 0.55;
+  preset.verification.min_place_inliers = 30;
   if (name == "standardised-mean") return preset;
   preset.propose_threshold = 0.11;  // swept in the 2013 paper; this is its system's own
   preset.recent_share = 0.2;
@@ -188,6 +189,7 @@ void ApplyPreset(const std::string& name, LoopDetectorOptions& options) {
   options.loop_threshold = preset.loop_threshold;
   options.propose_threshold = preset.propose_threshold;
   options.verification.min_epipolar_ratio = preset.verification.min_epipolar_ratio;
+  options.verification.min_place_inliers = preset.verification.min_place_inliers;
   options.link_threshold = preset.link_threshold;
   options.hypothesis_ratio = preset.hypothesis_ratio;
   options.likelihood = preset.likelihood;

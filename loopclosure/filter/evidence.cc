@@ -12,19 +12,18 @@ namespace {
 struct ModelTraits {
   int sample;
   double models;  // per sample, at most
-  bool line;      // a match is held to a line, not to a point
 };
 
 ModelTraits TraitsOf(FitModel model) {
   switch (model) {
     case FitModel::kFundamental:
-      return {7, 3, true};
+      return {7, 3};
     case FitModel::kEssential:
-      return {5, 10, true};
+      return {5, 10};
     case FitModel::kPnp:
       break;
   }
-  return {3, 4, false};
+  return {3, 4};
 }
 
 // log10 of the number of ways to choose k of n.
@@ -42,8 +41,7 @@ ChanceFit FitByChance(FitModel model, int matches, int inliers, double threshold
   if (matches < 1 || image.empty()) return chance;
   const double area = static_cast<double>(image.width) * image.height;
   const double diagonal = std::hypot(image.width, image.height);
-  const double alpha = std::min(
-      1.0, traits.line ? 2 * threshold_px * diagonal / area : M_PI * threshold_px * threshold_px / area);
+  const double alpha = std::min(1.0, 2 * threshold_px * diagonal / area);
   const int free = std::max(0, matches - traits.sample);
   chance.expected = std::min(matches, traits.sample) + alpha * free;
   if (inliers <= traits.sample || free == 0) return chance;

@@ -10,7 +10,8 @@ namespace tutti::internal {
 enum class FitModel {
   kFundamental,  ///< a line in the other image; 7 matches give up to 3 of them
   kEssential,    ///< the same from 5 matches, up to 10
-  kPnp,          ///< a point in the other image; 3 matches with points give up to 4
+  kPnp,          ///< a point in the other image; 3 matches with points give up to 4. Counted by lines all the
+                 ///< same: it is the same scene that is to be surprising, whatever is known of its depth
 };
 
 /// How many matches would fit a model by chance.
@@ -21,7 +22,7 @@ struct ChanceFit {
 
 /// The a-contrario model of Moisan & Stival (IJCV 57, 2004): the end of a match lies anywhere in the image,
 /// evenly, so that it is within `threshold_px` of a line with probability alpha = 2 d D / A at most (D
-/// diagonal, A area), of a point with pi d^2 / A. Of n matches that are free to fit k do, beyond the sample
+/// diagonal, A area). Of n matches that are free to fit k do, beyond the sample
 /// of s:
 ///     NFA = models (n - s) C(n, k) C(k, s) alpha^(k - s)
 /// Below 1 (log_nfa < 0) chance hardly explains them. 0 for both without a match or image; log_nfa is 0 where

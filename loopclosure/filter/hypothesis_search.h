@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <utility>
 #include <vector>
 
 #include "loopclosure/filter/belief.h"
@@ -23,33 +24,34 @@ class HypothesisSearch {
 
   /// Fills verification, tried, accepted and reason of `result`.
   void Verify(const View& query, const Belief& belief, LoopResult& result) const;
+  /// The same of the location `query`, with a belief that came later: adds what was not tried before.
+  void VerifyMore(int query, const Belief& belief, LoopResult& result) const;
+  /// Only the probability of what was chosen, with a belief that came later.
+  void Reconsider(const Belief& belief, LoopResult& result) const;
+  /// The same verification of the location `query`, with its matches.
+  Verification WithMatches(int query, const Verification& verification) const;
 
  private:
-  // A way along the odometry links.
-  struct PathWalk {
-    int last, next;  // slots
-    int in_vain;     // steps since the last one that was better
-  };
-
   std::vector<int> TopPlaces(const Belief& belief) const;
   void RankByIsland(const Belief& belief, std::vector<int>& places) const;
   std::vector<int> ViewsOf(int place, const Belief& belief) const;
   const Verification* Tried(int slot, const LoopResult& result) const;
   Verification Look(const View& query, int candidate, int threads) const;
   const Verification& Try(const View& query, int candidate, LoopResult& result) const;
-  void TryAll(const View& query, const std::vector<int>& candidates, LoopResult& result) const;
   static void Take(Verification verification, LoopResult& result);
-  void Climb(const View& query, LoopResult& result) const;
-  std::vector<int> OnThePath(int slot) const;
-  void TakeNearest(const View& query, LoopResult& result) const;
-  int Nearest(const View& query, PathWalk walk, LoopResult& result) const;
-  void Advance(PathWalk& walk) const;
+  void Decide(const View& query, const Belief& belief, LoopResult& result) const;
+  void Weigh(const Belief& belief, LoopResult& result) const;
+  static std::pair<const Verification*, double> MostProbable(const LoopResult& result);
+  const Verification& TryWithMatches(const View& query, int candidate, LoopResult& result) const;
 
   const LoopDetectorOptions& options_;
   const LocationMemory& memory_;
   VerifyPair verify_;
   std::function<const View&(int)> view_of_;
 };
+
+/// Belief in all places about a slot, 0..1.
+double MassAround(const Belief& belief, int slot, const LocationMemory& memory);
 
 /// 0 for a place that the belief does not reach.
 inline double PosteriorAt(const Belief& belief, int slot) {

@@ -13,8 +13,6 @@ namespace {
 
 using State = LocationMemory::State;
 
-constexpr int kAboutHere = 4;  // graph levels
-
 std::vector<std::vector<std::size_t>> UnitsOf(const LoopDetectorOptions& options) {
   std::vector<std::vector<std::size_t>> units;
   for (std::size_t k = 0; k < options.members.size(); ++k) {
@@ -66,6 +64,7 @@ void PlaceReasoner::BeginSession() {
   for (auto& system : systems_) system->BeginSession();
   if (!Shared()) union_.Settle(0);
   track_.Interrupt();
+  second_word_.Forget();
   last_hypothesis_ = 0;
   last_candidate_ = -1;
   candidates_in_a_row_ = 0;
@@ -98,8 +97,19 @@ CombinedBelief PlaceReasoner::Step(LoopResult& result,
   CombinedBelief combined = Combine(options_.rule, beliefs, options_.propose_threshold, memory());
   Explain(combined, result);
   for (auto& system : systems_) system->Learn();
+  NoteStep();
   result.filter_ms = watch.LapMs();
   return combined;
+}
+
+void PlaceReasoner::NoteStep() {
+  const int newest = memory().size() - 1;
+  // Published methods, whose evidence is another one, know no second word.
+  const bool second_word = Shared() && options_.evidence.kind == EvidenceKind::kCounts;
+  const PlaceFilter* filter = second_word ? systems_.front()->Deciding() : nullptr;
+  if (filter == nullptr || memory().state(newest) != State::kShortTerm || memory().working_memory().empty())
+    return;
+  second_word_.Step(newest, filter->filter.posterior(), filter->image_likelihood);
 }
 
 CombinedBelief PlaceReasoner::Locate(const std::vector<SeenWords>& words) const {
@@ -210,29 +220,17 @@ void PlaceReasoner::FollowCandidate(int best) {
   last_candidate_ = memory().id(best);
 }
 
-double PlaceReasoner::MassAround(const Belief& belief, int slot) const {
-  double mass = 0;
-  for (const auto& [near, level, loops] : memory().Neighbours(slot, kAboutHere))
-    mass += PosteriorAt(belief, near);
-  return std::min(1.0, mass);
-}
-
 void PlaceReasoner::Verify(const View& query, const Belief& belief,
                            const HypothesisSearch::VerifyPair& verify,
                            const std::function<const View&(int)>& view_of, LoopResult& result) const {
   if (!options_.verification.enabled) {
     result.verification.candidate = result.best;
-    result.verification.accepted = true;
-    result.probability = MassAround(belief, memory().Find(result.best));
+    result.verification.similar = result.verification.accepted = true;
+    result.probability = MassAround(belief, memory().Find(result.best), memory());
   } else {
     HypothesisSearch(options_, memory(), verify, view_of).Verify(query, belief, result);
     if (result.verification.candidate >= 0) result.candidate = result.verification.candidate;
-    for (Verification& tried : result.tried) {
-      tried.mass = MassAround(belief, memory().Find(tried.candidate));
-      if (tried.candidate == result.verification.candidate) result.verification.mass = tried.mass;
-    }
-    if (!result.verification.accepted) return;
-    result.probability = LoopProbability(result.verification);
+    if (!result.verification.similar) return;
   }
   result.accepted = result.probability >= options_.loop_threshold;
   if (result.accepted) return;
@@ -242,11 +240,24 @@ void PlaceReasoner::Verify(const View& query, const Belief& belief,
   result.reason = text;
 }
 
+void PlaceReasoner::VerifyAgain(const HypothesisSearch::VerifyPair& verify,
+                                const std::function<const View&(int)>& view_of, LoopResult& result) {
+  if (!options_.verification.enabled || !Shared()) return;
+  const HypothesisSearch search(options_, memory(), verify, view_of);
+  result.late = second_word_.Say(options_, memory(), systems_.front()->transition(), search);
+}
+
 void PlaceReasoner::Finish(const LoopResult& result) {
   last_hypothesis_ = result.hypothesis;
   if (result.accepted && result.probability >= options_.link_threshold) {
     CloseLoop(result.query, result.verification.candidate);
   }
+  if (result.late && result.late->withdrawn) Unlink(result.late->query, result.late->verification.candidate);
+  if (result.late && result.late->accepted && result.late->probability >= options_.link_threshold) {
+    CloseLoop(result.late->query, result.late->verification.candidate);
+  }
+  const int newest = memory().size() - 1;
+  if (newest >= 0 && memory().id(newest) == result.query) second_word_.Keep(newest, result);
 }
 
 void PlaceReasoner::CloseLoop(std::int64_t newer, std::int64_t older) {

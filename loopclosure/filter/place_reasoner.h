@@ -12,6 +12,7 @@
 #include "loopclosure/filter/combination.h"
 #include "loopclosure/filter/hypothesis_search.h"
 #include "loopclosure/filter/pose_track.h"
+#include "loopclosure/filter/second_word.h"
 #include "loopclosure/memory/memory_system.h"
 #include "tutti/loopclosure/detector.h"
 
@@ -44,6 +45,10 @@ class PlaceReasoner {
   /// reason of `result`. Without verification the candidate is taken by its posterior alone.
   void Verify(const View& query, const Belief& belief, const HypothesisSearch::VerifyPair& verify,
               const std::function<const View&(int)>& view_of, LoopResult& result) const;
+  /// Step 7: what is decided now of the image Hindsight::kImages before this one, into result.late; nothing
+  /// if it stays as it was.
+  void VerifyAgain(const HypothesisSearch::VerifyPair& verify, const std::function<const View&(int)>& view_of,
+                   LoopResult& result);
   /// Links the places of a loop that is nearly certain.
   void Finish(const LoopResult& result);
 
@@ -71,6 +76,10 @@ class PlaceReasoner {
   PoseTrack& track() { return track_; }
   const PoseTrack& track() const { return track_; }
 
+  /// What is kept for second words.
+  SecondWord& second_word() { return second_word_; }
+  const SecondWord& second_word() const { return second_word_; }
+
   /// Running figures: the state but memories, filters and track.
   void SaveStatistics(ByteWriter& out) const;
   void LoadStatistics(std::int64_t last_id, ByteReader& in);
@@ -81,13 +90,14 @@ class PlaceReasoner {
   CandidateEvidence EvidenceAt(int slot, const std::vector<double>& scores, const PlaceFilter& filter) const;
   void FillOpinion(std::size_t member, const CombinedBelief& combined, MemberOpinion& opinion) const;
   void FollowCandidate(int best);
-  double MassAround(const Belief& belief, int slot) const;
+  void NoteStep();
 
   const LoopDetectorOptions& options_;
   std::vector<Member>& members_;
   std::vector<std::unique_ptr<MemorySystem>> systems_;  // one, or one per filter
   LocationMemory union_;                                // per-member memories: what is in any of them
   PoseTrack track_;
+  SecondWord second_word_;
   double last_hypothesis_ = 0.0;
   std::int64_t last_candidate_ = -1;
   int candidates_in_a_row_ = 0;

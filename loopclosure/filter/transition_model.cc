@@ -114,6 +114,25 @@ Belief TransitionModel::Predict(const Belief& posterior, const std::vector<int>&
   return predicted;
 }
 
+Belief TransitionModel::Backward(const Belief& value, const std::vector<int>& working_memory) const {
+  Belief before;
+  before.places.assign(value.places.size(), 0.0);
+  double all = 0.0;
+  for (const int j : working_memory) {
+    all += value.places[static_cast<std::size_t>(j)];
+    double sum = kToNewPlace * value.new_place;
+    ForEachRun(columns_[static_cast<std::size_t>(j)], [&](int first, int count, const double* values) {
+      const double* const of = value.places.data() + first;
+      for (int i = 0; i < count; ++i) sum += values[i] * of[i];
+    });
+    before.places[static_cast<std::size_t>(j)] = sum;
+  }
+  if (working_memory.empty()) return before;
+  before.new_place = virtual_place_prior_ * value.new_place +
+                     (1.0 - virtual_place_prior_) * all / static_cast<double>(working_memory.size());
+  return before;
+}
+
 std::vector<std::pair<int, double>> TransitionModel::Column(int slot) const {
   std::vector<std::pair<int, double>> column;
   ForEachRun(columns_[static_cast<std::size_t>(slot)], [&](int first, int count, const double* values) {

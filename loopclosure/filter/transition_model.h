@@ -38,6 +38,10 @@ class TransitionModel {
   /// One prediction: matrix times `posterior`. Both are over the slots of `working_memory`.
   Belief Predict(const Belief& posterior, const std::vector<int>& working_memory) const;
 
+  /// The way back: of each place j, sum over i of p(i | j) value(i), virtual place included; what the images
+  /// after one say of where it was.
+  Belief Backward(const Belief& value, const std::vector<int>& working_memory) const;
+
   /// p(. | j): pairs of slot and probability, ascending slots; without the virtual place's kToNewPlace.
   std::vector<std::pair<int, double>> Column(int slot) const;
 

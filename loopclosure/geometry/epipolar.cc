@@ -79,9 +79,6 @@ EpipolarResult FitFundamental(const std::vector<cv::Point2f>& first, const std::
     const cv::Mat f = cv::findFundamentalMat(first, second, mask, Usac(settings, settings.threshold_px));
     if (f.rows != 3 || f.cols != 3) return result;
     result.inliers = Selected(mask);
-    cv::Mat epipole;
-    cv::SVD::solveZ(f, epipole);
-    result.epipole = {epipole.at<double>(0), epipole.at<double>(1), epipole.at<double>(2)};
   } catch (const cv::Exception&) {
     result.inliers.clear();  // a degenerate set of points is no model, not an error
   }

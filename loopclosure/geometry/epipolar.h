@@ -19,10 +19,8 @@ struct EpipolarSettings {
 };
 
 struct EpipolarResult {
-  std::vector<int> inliers;                           ///< ascending; empty if no model was found
-  Pose T_second_first;                                ///< FitEssential: rotation and unit translation
-  Eigen::Vector3d epipole = Eigen::Vector3d::Zero();  ///< FitFundamental: the second camera's centre in the
-                                                      ///< first image, homogeneous [px]; 0: unknown
+  std::vector<int> inliers;  ///< ascending; empty if no model was found
+  Pose T_second_first;       ///< FitEssential: rotation and unit translation
 };
 
 /// OpenCV's USAC with a seed of its own and on one thread, so that the result is reproducible. At least 8

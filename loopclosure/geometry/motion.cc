@@ -10,16 +10,6 @@
 namespace tutti::internal {
 namespace {
 
-// Share of the translation along the candidate's optical axis, from the pixel
-// of the query's centre in it. The focal length is a guess that most cameras
-// are within a factor of two of.
-double AheadFromEpipole(const Eigen::Vector3d& epipole, const cv::Size& size) {
-  const double focal = 0.8 * std::max(size.width, size.height);
-  const Eigen::Vector3d direction(epipole.x() - 0.5 * size.width * epipole.z(),
-                                  epipole.y() - 0.5 * size.height * epipole.z(), focal * epipole.z());
-  return direction.norm() > 0 ? std::abs(direction.z()) / direction.norm() : 1.0;
-}
-
 // The matches `of` the pool, of one camera each whose images have this size.
 Motion FitOne(const std::vector<PooledMatch>& pool, const std::vector<int>& of, const View& query,
               const View& candidate, const cv::Size& size, const VerificationOptions& options,
@@ -38,11 +28,7 @@ Motion FitOne(const std::vector<PooledMatch>& pool, const std::vector<int>& of, 
   Motion motion;
   motion.type = calibrated ? ConstraintType::kEssential : ConstraintType::kFundamental;
   motion.considered = static_cast<int>(of.size());
-  motion.ahead = AheadFromEpipole(lines.epipole, candidate.size);
-  if (calibrated) {
-    motion.T_candidate_query = lines.T_second_first.Inverse();
-    motion.ahead = std::abs(motion.T_candidate_query.translation.normalized().z());
-  }
+  if (calibrated) motion.T_candidate_query = lines.T_second_first.Inverse();
   std::vector<int> inliers = lines.inliers;
   if (options.homography_px > 0) {
     EpipolarSettings own = settings;
@@ -56,7 +42,6 @@ Motion FitOne(const std::vector<PooledMatch>& pool, const std::vector<int>& of, 
                                     options.homography_share * static_cast<double>(inliers.size()));
     if (motion.homography) {
       inliers = points.inliers;
-      motion.ahead = 0;
       if (points.turned) motion.T_candidate_query = Pose(points.R_second_first.conjugate(), {0, 0, 0});
     }
   }
@@ -117,7 +102,6 @@ Motion FitEach(const std::vector<PooledMatch>& pool, const std::vector<std::vect
   }
   std::sort(sum.inliers.begin(), sum.inliers.end());
   sum.considered = static_cast<int>(pool.size());
-  sum.ahead = 0;
   return sum;
 }
 

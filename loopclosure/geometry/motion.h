@@ -21,8 +21,6 @@ struct Motion {
   int fewest = -1;         ///< several cameras: inliers of the one with the fewest, of those that see much in
                            ///< both images; -1: there is none
   ChanceFit chance;        ///< how many would be by chance
-  double ahead = 1;        ///< share of the translation along the candidate's optical axis; 0
-                           ///< where its direction is not known (homography, several cameras)
   Pose T_candidate_query;  ///< kEssential: unit translation; zero if the camera
                            ///< only turned
 };

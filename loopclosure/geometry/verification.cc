@@ -62,10 +62,19 @@ Bars BarsFor(const Verification& result, const View& query, const View& candidat
   return bars;
 }
 
-// Fills counts, evidence and matched pixels, and says what the inliers lack; empty if nothing.
-std::string Judge(const std::vector<PooledMatch>& pool, const std::vector<int>& inliers,
-                  const internal::ChanceFit& chance, int considered, const View& query, const View& candidate,
-                  const VerificationOptions& options, Verification& result) {
+// Fewer inliers by lines than a constraint needs, but so many of the matches that no chance explains them.
+// Motions by fewer than kLeast are wrong by several degrees, wherever the place is right. Of points, chance
+// explains hardly any: their number alone counts.
+bool BeyondChance(const Verification& result) {
+  constexpr double kLogNfa = -25;
+  constexpr int kLeast = 20;
+  return result.type != ConstraintType::kRigid && result.log_nfa <= kLogNfa && result.inliers >= kLeast;
+}
+
+// Fills counts, evidence, matched pixels, `similar` and `accepted`, and what the inliers lack.
+void Judge(const std::vector<PooledMatch>& pool, const std::vector<int>& inliers,
+           const internal::ChanceFit& chance, int considered, const View& query, const View& candidate,
+           const VerificationOptions& options, Verification& result) {
   result.matches = considered;
   result.inliers = static_cast<int>(inliers.size());
   result.inlier_matches.clear();
@@ -79,22 +88,28 @@ std::string Judge(const std::vector<PooledMatch>& pool, const std::vector<int>& 
   }
   FillEvidence(in_query, in_candidate, chance, query, candidate, result);
   const Bars bars = BarsFor(result, query, candidate, options);
-  if (result.inliers < bars.inliers) {
-    return Format("only %d matches fit one camera motion, %d are needed", result.inliers, bars.inliers);
-  }
   const double ratio = static_cast<double>(inliers.size()) / static_cast<double>(considered);
-  if (ratio < bars.ratio) {
-    return Format("only %.0f %% of the matches fit one camera motion, %.0f %% are needed", 100 * ratio,
-                  100 * bars.ratio);
-  }
-  const double needed = internal::SpreadNeeded(options.min_spread, bars.inliers, result.inliers);
+  const double needed = internal::SpreadNeeded(options.min_spread, bars.inliers, std::max(1, result.inliers));
   const double spread = std::min(internal::NarrowestSpread(in_query, query.size),
                                  internal::NarrowestSpread(in_candidate, candidate.size));
-  if (spread < needed) {
-    return Format("the matches cover too narrow a part of the image (%.3f of its size, %.3f is needed)",
-                  spread, needed);
+  const bool many = result.inliers >= bars.inliers || BeyondChance(result);
+  const bool most = ratio >= bars.ratio || BeyondChance(result);
+  const bool wide = spread >= needed;
+  const bool by_chance = result.log_nfa >= 0;  // one such motion is to be expected of matches of nothing
+  result.similar = result.inliers >= Scaled(options.min_place_inliers, query, candidate, options) && wide &&
+                   ratio >= options.min_epipolar_ratio && !by_chance;
+  result.accepted = many && most && wide;
+  if (!many) {
+    result.reason =
+        Format("only %d matches fit one camera motion, %d are needed", result.inliers, bars.inliers);
+  } else if (!most) {
+    result.reason = Format("only %.0f %% of the matches fit one camera motion, %.0f %% are needed",
+                           100 * ratio, 100 * bars.ratio);
+  } else if (!wide) {
+    result.reason =
+        Format("the matches cover too narrow a part of the image (%.3f of its size, %.3f is needed)", spread,
+               needed);
   }
-  return {};
 }
 
 RelativePoseOptions PoseOptions(const VerificationOptions& options, std::uint64_t seed) {
@@ -132,18 +147,18 @@ bool VerifyRigid(const std::vector<PooledMatch>& pool, const View& query, const 
   const internal::ChanceFit chance =
       internal::FitByChance(internal::FitModel::kPnp, considered, static_cast<int>(inliers.size()),
                             options.reprojection_px, query.size);
-  result.reason = Judge(pool, inliers, chance, considered, query, candidate, options, result);
-  result.accepted = result.reason.empty();
+  Judge(pool, inliers, chance, considered, query, candidate, options, result);
   result.S_candidate_query = Similarity(pnp.T_camera_points.Inverse());
   result.information = pnp.information;
   return true;
 }
 
-// Mono: 3D-3D where both images have points. Called after the pixels have accepted.
+// Mono: 3D-3D where both images have points. Called after the pixels have accepted. Points that don't fit are
+// no veto: those of an image that is new were seen twice, and err by more than pixels do; a place is right
+// where a motion is not yet.
 void AddSimilarity(const std::vector<PooledMatch>& pool, const std::vector<int>& inliers, const View& query,
                    const View& candidate, const VerificationOptions& options, std::uint64_t seed,
                    Verification& result) {
-  constexpr int kEnoughPoints = 20;  // on so many, a similarity must be found
   constexpr int kMinInliers = 12;
   std::vector<Eigen::Vector3d> points_c, points_q;
   std::vector<Eigen::Vector2d> pixels_c, pixels_q;
@@ -161,12 +176,7 @@ void AddSimilarity(const std::vector<PooledMatch>& pool, const std::vector<int>&
   pose.min_inliers = kMinInliers;
   const SimilarityResult fit =
       SolveSimilarity(points_c, pixels_c, *candidate.camera, points_q, pixels_q, *query.camera, pose);
-  if (!fit.success) {
-    if (static_cast<int>(points_c.size()) < kEnoughPoints) return;
-    result.accepted = false;
-    result.reason = "the landmarks of the two images don't fit together: " + fit.reason;
-    return;
-  }
+  if (!fit.success) return;
   result.type = ConstraintType::kSimilarity;
   result.S_candidate_query = fit.S_a_b;
   // The scale is estimated with the pose: what is known of the pose alone is the Schur complement over it.
@@ -180,19 +190,17 @@ void VerifyByPixels(const std::vector<PooledMatch>& pool, const View& query, con
   const internal::Motion motion = internal::FitMotion(pool, query, candidate, options, seed);
   result.type = motion.type;
   result.homography = motion.homography;
-  result.reason =
-      Judge(pool, motion.inliers, motion.chance, motion.considered, query, candidate, options, result);
-  if (result.reason.empty() && motion.fewest >= 0) {
+  Judge(pool, motion.inliers, motion.chance, motion.considered, query, candidate, options, result);
+  if (result.similar && motion.fewest >= 0) {
     const double even =
         BarsFor(result, query, candidate, options).inliers / static_cast<double>(query.cameras.size());
     const int needed = static_cast<int>(std::ceil(options.camera_share * even));
     if (motion.fewest < needed) {
       result.reason = Format("one of the cameras knows nothing of it (%d of its matches fit, %d are needed)",
                              motion.fewest, needed);
+      result.similar = result.accepted = false;
     }
   }
-  result.accepted = result.reason.empty();
-  result.ahead = motion.ahead;
   const bool calibrated = motion.type == ConstraintType::kEssential;
   if (calibrated) result.S_candidate_query = Similarity(motion.T_candidate_query);
   if (calibrated && result.accepted && !(query.metric && candidate.metric)) {
@@ -206,7 +214,7 @@ Verification Decide(const std::vector<PooledMatch>& pool, const View& query, con
   Verification result;
   result.candidate = candidate.id;
   result.matches = static_cast<int>(pool.size());
-  const int needed = Scaled(options.min_inliers, query, candidate, options);
+  const int needed = Scaled(options.min_place_inliers, query, candidate, options);
   if (result.matches < needed) {
     result.reason = Format("only %d features match, %d are needed", result.matches, needed);
     return result;
@@ -236,7 +244,7 @@ void DoWithoutStatic(const std::vector<PooledMatch>& pool, const View& query, co
   }
   const int all = result.inliers;
   result = Decide(moving, query, candidate, options, seed);  // and its evidence, whatever comes of it
-  if (result.accepted) return;
+  if (result.similar) return;
   result.reason =
       Format("only features that do not move with the camera agree (%d of %d are at the same pixel)",
              static_cast<int>(still.size()), all);
@@ -250,7 +258,7 @@ Verification GeometricVerifier::Verify(const View& query, const View& candidate,
   const std::uint64_t seed = seed_ + 0x9e3779b97f4a7c15ull * static_cast<std::uint64_t>(query.id) +
                              static_cast<std::uint64_t>(candidate.id);
   Verification result = Decide(pool, query, candidate, options_, seed);
-  if (result.accepted && options_.static_px > 0) {
+  if (result.similar && options_.static_px > 0) {
     DoWithoutStatic(pool, query, candidate, options_, seed, result);
   }
   return result;

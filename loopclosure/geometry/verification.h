@@ -44,7 +44,7 @@ View MakeView(const LoopQuery& query, const std::vector<Features>& members,
 ///  * points in metres in the candidate: PnP by RANSAC, refined on the inliers -> kRigid with information;
 ///  * camera only, or mono: essential matrix -> kEssential, and where both images have points (mono), Sim(3)
 ///  by 3D-3D RANSAC ->
-///    kSimilarity; a Sim(3) that fails on enough points rejects;
+///    kSimilarity, if they fit;
 ///  * no camera: fundamental matrix -> kFundamental.
 /// Inliers must be many, a good share of the matches, and spread over both images. Deterministic for options
 /// and seed.

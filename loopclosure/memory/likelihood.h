@@ -39,22 +39,24 @@ struct Posting {
   int count = 0;
 };
 
-/// Which words have been in sight ever since a slot: those seen in it and again within `within` slots each
-/// time, up to the newest one. What moves along (another vehicle, dirt on the lens, the horizon) would
-/// otherwise know the places just left in every image. As it stands: none.
+/// Which words are no sign of a return to a slot, since they have been in sight in between: those seen in a
+/// quarter of the images after it, and in two at least. What moves along (another vehicle, dirt on the lens,
+/// the horizon) would otherwise know the places of before in every image; it may be hidden for a while. As it
+/// stands: none.
 struct Sight {
-  int settled = 0;  ///< holds for slots before this, the oldest one in STM
-  int within = 0;
+  int settled = 0;       ///< holds for slots before this, the oldest one in STM
+  bool returns = false;  ///< false: every word counts
 
-  /// Calls call(posting) for each of a word's postings (ascending by slot, none after `newest`) but those of
-  /// slots since which it has been in sight.
+  /// Calls call(posting) for each of a word's postings (ascending by slot, none after `newest`, which has the
+  /// word) but those of slots since which it has been in sight.
   template <typename Call>
   void ForEachReturn(const std::vector<Posting>& postings, int newest, const Call& call) const {
-    int next = newest;
-    bool in_sight = true;
-    for (auto posting = postings.rbegin(); posting != postings.rend(); ++posting) {
-      in_sight = in_sight && next - posting->slot <= within;
-      next = posting->slot;
+    constexpr int kLeast = 2;  // images in between that have the word
+    constexpr int kOneIn = 4;  // of so many
+    int between = postings.empty() || postings.back().slot < newest ? 0 : -1;  // images that have it
+    for (auto posting = postings.rbegin(); posting != postings.rend(); ++posting, ++between) {
+      const int since = newest - posting->slot - 1;
+      const bool in_sight = returns && between >= kLeast && kOneIn * between >= since;
       if (!in_sight || posting->slot >= settled) call(*posting);
     }
   }

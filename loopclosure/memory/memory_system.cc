@@ -10,7 +10,6 @@ namespace {
 
 constexpr int kNearLevels = 5;  // what is so near to the most probable place may be it
 constexpr int kRepeats = 3;     // images before this one that show what a member repeats
-constexpr int kSightPart = 2;   // seen again within this part of STM: it was in sight all the time
 
 // Of all members that a filter sees, with ids as Signature::Split takes them apart.
 SeenWords WordsFor(const FilterUnit& unit, const std::vector<SeenWords>& words) {
@@ -127,7 +126,7 @@ void MemorySystem::UpdateLikelihood(std::size_t u) {
   if (!unit.took_part()) return;
   const std::vector<int>& places = memory_.working_memory();
   if (Counts()) {
-    const Sight sight{memory_.short_term_memory().front(), options_.stm_size / kSightPart};
+    const Sight sight{memory_.short_term_memory().front(), true};
     unit.counts = unit.is_dense ? unit.dense.Counts(places) : unit.likelihood.Counts(unit.seen, sight);
     Repeat(unit);
     if (places.empty()) return;
@@ -233,6 +232,11 @@ void MemorySystem::Learn() {
     if (unit.took_part()) unit.weight.Learn(unit.counts, places, near);
   }
   overlap_.Learn(PresentCounts(), places, near);
+}
+
+const PlaceFilter* MemorySystem::Deciding() const {
+  if (joint_) return joint();
+  return units_.size() == 1 && units_.front().took_part() ? &units_.front() : nullptr;
 }
 
 std::vector<const Belief*> MemorySystem::Beliefs() const {

@@ -3,9 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <functional>
 #include <map>
+#include <vector>
 
 namespace tutti::internal {
 namespace {
@@ -41,6 +41,7 @@ class HypothesisSearchTest : public ::testing::Test {
     LoopResult result;
     View view;
     view.id = query;
+    view.size = {640, 480};
     search.Verify(view, belief, result);
     return result;
   }
@@ -50,7 +51,7 @@ class HypothesisSearchTest : public ::testing::Test {
     return Search(query, place, [&](const View& a, const View& b, int) {
       Verification verification;
       verification.candidate = b.id;
-      verification.accepted = alike(a.id, b.id);
+      verification.similar = verification.accepted = alike(a.id, b.id);
       verification.inliers = verification.accepted ? kInliers : 5;
       verification.type = ConstraintType::kFundamental;
       return verification;
@@ -96,7 +97,7 @@ TEST_F(HypothesisSearchTest, WhatWasInSightIsAskedHalfWayOfARecentPlace) {
       ids.push_back(b.id);
       Verification verification;
       verification.candidate = b.id;
-      verification.accepted = b.id == place;
+      verification.similar = verification.accepted = b.id == place;
       verification.inliers = verification.accepted ? kInliers : 5;
       return verification;
     });
@@ -113,7 +114,7 @@ TEST_F(HypothesisSearchTest, HalfOfTheInliersHalfWayAreTheSameThing) {
     const LoopResult result = Search(kSearchPlaces - 1, 39, [&](const View&, const View& b, int) {
       Verification verification;
       verification.candidate = b.id;
-      verification.accepted = b.id == 39 || b.id == 49;
+      verification.similar = verification.accepted = b.id == 39 || b.id == 49;
       verification.inliers = b.id == 39 ? kInliers : verification.accepted ? between : 5;
       return verification;
     });
@@ -188,104 +189,31 @@ TEST_F(OrderOfSearch, TheBestThatWasTriedIsToldThoughNothingIsAccepted) {
   EXPECT_EQ(result.reason, "reason of 10");
 }
 
-// An image by itself, of which the belief says place 20. Where geometry finds it alike, and how much.
-class ClimbTest : public HypothesisSearchTest {
- protected:
-  std::int64_t Best(const std::map<std::int64_t, int>& inliers) {
-    const LoopResult result = Search(1000, 20, [&](const View&, const View& b, int) {
-      Verification verification;
-      verification.candidate = b.id;
-      const auto found = inliers.find(b.id);
-      verification.accepted = found != inliers.end();
-      verification.inliers = verification.accepted ? found->second : 5;
-      verification.type = ConstraintType::kRigid;
-      return verification;
-    });
-    EXPECT_TRUE(result.accepted);
-    return result.verification.candidate;
+// Of a flat picture that is `size` / 20 as large in the candidate as in the query.
+std::vector<VerifiedMatch> MatchesOfAPicture(double size) {
+  std::vector<VerifiedMatch> matches;
+  for (int i = 0; i < 64; ++i) {
+    const float x = static_cast<float>(i % 8 - 4);
+    const float y = static_cast<float>(i / 8 - 4);
+    const float scale = static_cast<float>(size);
+    matches.push_back({{320 + 20 * x, 240 + 20 * y}, {320 + scale * x, 240 + scale * y}, -1, -1});
   }
-};
-
-TEST_F(ClimbTest, TheViewOnThePathThatSharesTheMostIsTaken) {
-  EXPECT_EQ(Best({{19, 90}, {20, 100}, {21, 90}}), 20);
-  EXPECT_EQ(Best({{19, 120}, {20, 100}, {21, 110}}), 19);
-  EXPECT_EQ(Best({{19, 110}, {20, 100}, {21, 120}}), 21);
+  return matches;
 }
 
-TEST_F(ClimbTest, AFewViewsThatShareLessMayLieBetween) {
-  EXPECT_EQ(Best({{20, 100}, {21, 90}, {22, 76}, {23, 150}}), 23);
-  EXPECT_EQ(Best({{20, 100}, {21, 90}, {22, 74}, {23, 150}}), 20) << "three quarters are too few";
-  EXPECT_EQ(Best({{20, 100}, {21, 90}, {22, 90}, {23, 90}, {24, 150}}), 20) << "three in vain";
-}
-
-TEST_F(ClimbTest, AViewFurtherThanEightLocationsIsNoneOfThePlace) {
-  std::map<std::int64_t, int> inliers;
-  for (int id = 20; id < 40; ++id) inliers[id] = 80 + id;
-  EXPECT_EQ(Best(inliers), 28);
-  inliers.clear();
-  for (int id = 20; id > 5; --id) inliers[id] = 120 - id;
-  EXPECT_EQ(Best(inliers), 12);
-}
-
-// The same, where geometry knows the direction of the translation alone. All views share about as much, place
-// 20 the most.
-class NearestViewTest : public HypothesisSearchTest {
- protected:
-  // `aside_deg`: how much the query lies aside of the direction of each view.
-  std::int64_t Nearest(const std::map<std::int64_t, double>& aside_deg) {
-    const LoopResult result = Search(1000, 20, [&](const View& a, const View& b, int) {
-      Verification verification;
-      verification.candidate = b.id;
-      verification.type = ConstraintType::kEssential;
-      const auto found = aside_deg.find(b.id);
-      verification.accepted = found != aside_deg.end();
-      verification.inliers = !verification.accepted ? 5 : b.id == 20 ? kInliers : others_;
-      const double aside = a.id != 1000 ? turn_deg_ : verification.accepted ? found->second : 0;
-      verification.ahead = std::cos(aside * M_PI / 180);
-      return verification;
-    });
-    EXPECT_TRUE(result.accepted);
-    return result.verification.candidate;
-  }
-
-  int others_ = 90;      // inliers of the other views
-  double turn_deg_ = 0;  // by which the path's views lie aside of each other
-};
-
-TEST_F(NearestViewTest, IsTheOneThatTheQueryLiesClearlyMoreAsideOf) {
-  EXPECT_EQ(Nearest({{20, 5}, {21, 6.5}}), 20) << "noise";
-  EXPECT_EQ(Nearest({{20, 5}, {21, 7.5}}), 21);
-  EXPECT_EQ(Nearest({{20, 5}, {19, 7.5}}), 19);
-  EXPECT_EQ(Nearest({{20, 5}, {21, 6.5}, {22, 7.5}, {23, 12}}), 23);
-  EXPECT_EQ(Nearest({{20, 5}, {21, 3}, {22, 2}, {19, 4}}), 20);
-}
-
-TEST_F(NearestViewTest, IsNoneThatSharesMuchLess) {
-  others_ = 76;
-  EXPECT_EQ(Nearest({{20, 5}, {21, 12}}), 21);
-  others_ = 74;
-  EXPECT_EQ(Nearest({{20, 5}, {21, 12}}), 20);
-}
-
-TEST_F(NearestViewTest, OnBothSidesIsNoise) { EXPECT_EQ(Nearest({{19, 12}, {20, 5}, {21, 12}}), 20); }
-
-TEST_F(NearestViewTest, IsLookedForAlongAStraightPathAlone) {
-  turn_deg_ = 16;
-  EXPECT_EQ(Nearest({{20, 5}, {21, 12}}), 21);
-  turn_deg_ = 20;
-  EXPECT_EQ(Nearest({{20, 5}, {21, 12}}), 20);
-}
-
-TEST_F(NearestViewTest, IsNearEnoughWhereTheQueryLiesBeside) {
-  EXPECT_EQ(Nearest({{20, 21}, {21, 40}}), 21);
-  EXPECT_EQ(Nearest({{20, 23}, {21, 40}}), 20);
-  EXPECT_EQ(Nearest({{20, 5}, {21, 23}, {22, 40}}), 21);
-}
-
-TEST_F(NearestViewTest, IsLookedForAsLongAsItComesNearer) {
-  EXPECT_EQ(Nearest({{20, 5}, {21, 5}, {22, 5}, {23, 12}}), 23);
-  EXPECT_EQ(Nearest({{20, 5}, {21, 5}, {22, 5}, {23, 5}, {24, 12}}), 20) << "three in vain";
-  EXPECT_EQ(Nearest({{20, 1}, {21, 4}, {22, 7}, {23, 10}, {24, 13}, {25, 16}, {26, 19}}), 25) << "too far";
+TEST_F(HypothesisSearchTest, TheLoopIsSaidWithTheNearestViewOfThePlace) {
+  for (View& view : views_) view.size = {640, 480};
+  const LoopResult result = Search(1000, 20, [](const View&, const View& b, int) {
+    Verification verification;
+    verification.candidate = b.id;
+    verification.similar = verification.accepted = b.id >= 16 && b.id <= 24;
+    verification.inliers = b.id == 20 ? kInliers : kInliers - 10;  // place 20 shares the most
+    verification.inlier_matches = MatchesOfAPicture(20 + static_cast<double>(b.id - 23));
+    return verification;
+  });
+  EXPECT_TRUE(result.accepted);
+  EXPECT_EQ(result.verification.candidate, 23);
+  EXPECT_LE(result.tried.size(), 4U);
 }
 
 }  // namespace

@@ -127,5 +127,27 @@ TEST(TransitionModel, PredictionEqualsTheDenseProduct) {
   EXPECT_NEAR(sum, 1.0, 1e-12);
 }
 
+// <b, T a> = <T' b, a>: what is predicted forwards and what is looked for backwards is one matrix.
+TEST(TransitionModel, BackwardIsTheTransposeOfThePrediction) {
+  TransitionModel model(0.9);
+  const LocationMemory memory = Chain(25, model);
+  Belief a, b;
+  for (int i = 0; i < 26; ++i) {
+    const bool in = i < 25;
+    a.places.push_back(in ? 0.01 * (1 + i % 7) : 0.0);
+    b.places.push_back(in ? 0.3 + 0.1 * (i % 5) : 0.0);
+  }
+  a.new_place = 0.4;
+  b.new_place = 1.7;
+  const Belief forward = model.Predict(a, memory.working_memory());
+  const Belief backward = model.Backward(b, memory.working_memory());
+  double left = forward.new_place * b.new_place, right = backward.new_place * a.new_place;
+  for (std::size_t i = 0; i < 25; ++i) {
+    left += forward.places[i] * b.places[i];
+    right += backward.places[i] * a.places[i];
+  }
+  EXPECT_NEAR(left, right, 1e-12);
+}
+
 }  // namespace
 }  // namespace tutti

@@ -66,15 +66,13 @@ TEST(FitEssential, IsHeldToItsThresholdInPixels) {
             0.95 * all);
 }
 
-TEST(FitFundamental, FindsTheEpipole) {
+TEST(FitFundamental, LeavesOutWrongMatches) {
   const PinholeCamera camera = testing::PlainCamera(500);
   const Pose T_second_first(ExpSO3({0.02, 0.05, -0.03}), {0.2, 0.1, -0.9});
   const testing::SeenTwice seen = WithWrongMatches(testing::SeeTwice(camera, camera, T_second_first, false));
   const EpipolarResult result = FitFundamental(seen.first, seen.second, {});
   EXPECT_GE(result.inliers.size(), 108u);
   EXPECT_LE(NumWrong(result.inliers), 2);
-  const Eigen::Vector2d expected = camera.Project(T_second_first.Inverse().translation);
-  EXPECT_LT((result.epipole.hnormalized() - expected).norm(), 1);
 }
 
 TEST(FitHomography, OfACameraThatTurnedIsItsRotation) {

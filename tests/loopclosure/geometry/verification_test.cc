@@ -78,25 +78,6 @@ TEST(GeometricVerifier, WithCalibrationAloneTheDirectionIsKnown) {
   EXPECT_NEAR(std::abs(v.S_candidate_query.translation.normalized().x()), 1.0, 0.02);
 }
 
-class Ahead : public ::testing::TestWithParam<bool> {};
-INSTANTIATE_TEST_SUITE_P(Calibrated, Ahead, ::testing::Bool());
-
-TEST_P(Ahead, IsOneForAQueryFurtherOnAndSmallForOneBeside) {
-  const GeometricVerifier verifier({}, 1);
-  const View candidate = See(Pose(), 1, GetParam(), false);
-  const auto ahead = [&](const Pose& query) {
-    const Verification v = verifier.Verify(See(query, 9, GetParam(), false), candidate);
-    EXPECT_TRUE(v.accepted) << v.reason;
-    return v.ahead;
-  };
-  EXPECT_GT(ahead(PoseAt(0.0, 1.5)), 0.97);
-  EXPECT_GT(ahead(PoseAt(0.0, -1.5)), 0.97);
-  EXPECT_LT(ahead(PoseAt(1.0, 0.0)), 0.25);
-  // Along a path that passes by, it falls towards the nearest point and rises again.
-  EXPECT_GT(ahead(PoseAt(0.7, -2.0)), ahead(PoseAt(0.7, -0.5)));
-  EXPECT_GT(ahead(PoseAt(0.7, 2.0)), ahead(PoseAt(0.7, 0.5)));
-}
-
 TEST(GeometricVerifier, AnotherPlaceIsRefusedWithAReason) {
   const GeometricVerifier verifier({}, 1);
   View other = See(Pose(), 1, true, true);
@@ -111,7 +92,7 @@ TEST(GeometricVerifier, AnotherPlaceIsRefusedWithAReason) {
 
 TEST(GeometricVerifier, EvidencePartsOnePlaceFromChanceWhateverIsDecided) {
   VerificationOptions strict;
-  strict.min_epipolar_inliers = 1000;  // nothing is accepted
+  strict.min_spread = 0.9;  // nothing is accepted
   View chance = See(Pose(), 1, false, false);
   std::mt19937 generator(3);
   for (cv::Point2f& p : chance.members[0].pixels) {
@@ -130,12 +111,12 @@ TEST(GeometricVerifier, EvidencePartsOnePlaceFromChanceWhateverIsDecided) {
   EXPECT_GT(same.motion_spread, 0.005);  // parallax: 4 to 12 m away
 }
 
-TEST(GeometricVerifier, WithMetricPointsEvidenceIsByPixels) {
+TEST(GeometricVerifier, WithMetricPointsEvidenceIsByLinesAsWithout) {
   const Verification v =
       GeometricVerifier({}, 1).Verify(See(PoseAt(0.4, 0.2, 0.05), 9, true, true), See(Pose(), 1, true, true));
   ASSERT_EQ(v.type, ConstraintType::kRigid);
-  EXPECT_LT(v.expected_inliers, 3.1);  // the sample of three
-  EXPECT_LT(v.log_nfa, -300);
+  EXPECT_LT(v.expected_inliers, 0.1 * v.matches);
+  EXPECT_LT(v.log_nfa, -100);
   EXPECT_GT(v.coverage, 24);
 }
 
@@ -247,7 +228,6 @@ TEST_P(Turned, OnTheSpotIsAcceptedByItsHomography) {
   ASSERT_TRUE(v.accepted) << v.reason;
   EXPECT_TRUE(v.homography);
   EXPECT_GT(v.inliers, 0.9 * v.matches);
-  EXPECT_EQ(v.ahead, 0);
   EXPECT_EQ(v.type, GetParam() ? ConstraintType::kEssential : ConstraintType::kFundamental);
   if (GetParam()) {
     EXPECT_EQ(v.S_candidate_query.translation.norm(), 0);
@@ -329,7 +309,6 @@ TEST_P(OfTwoCameras, ImagesHaveAGeometryEachAndTheirEvidenceAddsUp) {
   EXPECT_GT(each.inliers, 0.85 * each.matches);
   EXPECT_GT(each.inliers, 1.2 * one.inliers);
   EXPECT_LT(each.log_nfa, one.log_nfa);
-  EXPECT_EQ(each.ahead, 0);
 }
 
 TEST(GeometricVerifier, OneCameraDoesNotSpeakForTheOtherUnlessThatSeesNothing) {
@@ -363,8 +342,8 @@ TEST(GeometricVerifier, OneCameraDoesNotSpeakForTheOtherUnlessThatSeesNothing) {
 TEST(GeometricVerifier, TheBarIsScaledToTheMembersThatPool) {
   VerificationOptions options;
   View query = See(PoseAt(0.5, 0.3), 9, false, false), candidate = See(Pose(), 1, false, false);
-  query.members[0].pixels.resize(28);
-  query.members[0].descriptors = query.members[0].descriptors.Unpacked().rowRange(0, 28).clone();
+  query.members[0].pixels.resize(18);
+  query.members[0].descriptors = query.members[0].descriptors.Unpacked().rowRange(0, 18).clone();
   EXPECT_FALSE(GeometricVerifier(options, 1).Verify(query, candidate).accepted);
   options.scale_bar = true;  // 10 for one member
   const Verification scaled = GeometricVerifier(options, 1).Verify(query, candidate);
@@ -379,7 +358,7 @@ TEST(GeometricVerifier, IsDeterministicForASeedAndAnyNumberOfThreads) {
   const View query = See(PoseAt(0.5, 0.3), 9, false, false), candidate = See(Pose(), 1, false, false);
   const Verification a = verifier.Verify(query, candidate, 1), b = verifier.Verify(query, candidate, 2);
   EXPECT_EQ(a.inliers, b.inliers);
-  EXPECT_EQ(a.ahead, b.ahead);
+  EXPECT_EQ(a.log_nfa, b.log_nfa);
 }
 
 }  // namespace

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
+
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -75,37 +77,47 @@ TEST(Likelihood, WhatAgreesInOneSpotCountsLessThanWhatAgreesAllOver) {
   EXPECT_GT(model.Counts(WordsSeen(words, all_over))[3], 3 * model.Counts(WordsSeen(words, one_spot))[3]);
 }
 
-TEST(Likelihood, WhatHasBeenInSightEverSinceIsNoSignOfAReturn) {
-  // Word 1 moves along from slot 6 on, seen again after five slots; word 2 is back in the newest.
+TEST(Likelihood, WhatHasBeenInSightInBetweenIsNoSignOfAReturn) {
+  // Word 1 drives ahead from slot 4 on and is hidden now and then; word 2 is back in the newest; word 3 was
+  // seen twice in between, which is seldom; word 4 twice since slot 10, which is half of the images since.
   LikelihoodModel model(LikelihoodKind::kTfIdf);
-  const std::vector<int> with_one = {0, 6, 7, 12, 13};
-  for (int slot = 0; slot < 14; ++slot) {
+  constexpr int kNewest = 25;
+  const std::map<int, std::vector<int>> seen = {{1, {4, 8, 12, 13, 18, 22, kNewest}},
+                                                {2, {0, kNewest}},
+                                                {3, {2, 9, 17, kNewest}},
+                                                {4, {19, 20, 22, kNewest}}};
+  for (int slot = 0; slot <= kNewest; ++slot) {
     std::vector<int> words = {100 + slot};
-    if (std::count(with_one.begin(), with_one.end(), slot) > 0) words.push_back(1);
-    if (slot == 0 || slot == 13) words.push_back(2);
+    for (const auto& [word, slots] : seen) {
+      if (std::count(slots.begin(), slots.end(), slot) > 0) words.push_back(word);
+    }
     model.Add(Signature(words));
   }
-  const SeenWords newest = WordsSeen({1, 2}, {0, 7});
-  const std::vector<double> all = model.Counts(newest);
-  const std::vector<double> returns = model.Counts(newest, {12, 5});
-  for (const int slot : {6, 7}) {
-    EXPECT_GT(all[static_cast<std::size_t>(slot)], 0.0);
-    EXPECT_EQ(returns[static_cast<std::size_t>(slot)], 0.0) << slot;
-  }
-  // It was out of sight after slot 0; what is not settled counts in full.
-  for (const int slot : {0, 12, 13}) {
-    EXPECT_EQ(returns[static_cast<std::size_t>(slot)], all[static_cast<std::size_t>(slot)]) << slot;
-  }
+  const auto counted = [&](int word, int slot) {
+    const SeenWords newest = WordsSeen({word}, {0});
+    const double all = model.Counts(newest)[static_cast<std::size_t>(slot)];
+    EXPECT_GT(all, 0.0);
+    const double returns = model.Counts(newest, {24, true})[static_cast<std::size_t>(slot)];
+    EXPECT_TRUE(returns == 0.0 || returns == all);
+    return returns > 0.0;
+  };
+  EXPECT_FALSE(counted(1, 4)) << "in sight, though never for long at a time";
+  EXPECT_FALSE(counted(1, 8));
+  EXPECT_TRUE(counted(2, 0)) << "a return";
+  EXPECT_TRUE(counted(3, 2)) << "two of 22 images: out of sight for most of the time";
+  EXPECT_FALSE(counted(4, 19)) << "two of five images";
+  EXPECT_TRUE(counted(4, 22)) << "less than two images in between say nothing";
+  EXPECT_TRUE(counted(1, kNewest)) << "short-term memory counts in full";
 }
 
 TEST(Likelihood, ASlotThatComesBackCountsAsIfItHadNeverBeenAway) {
   LikelihoodModel model(LikelihoodKind::kTfIdf);
   for (int slot = 0; slot < 8; ++slot) model.Add(Signature({1, 10 + slot, 20 + slot % 2}));
   const SeenWords query = WordsSeen({1, 20, 21, 13}, {0, 2, 4, 6});
-  const std::vector<double> before = model.Counts(query, {6, 5});
+  const std::vector<double> before = model.Counts(query, {6, true});
   model.Remove(3);
   model.Restore(3, Signature({1, 13, 21}));
-  EXPECT_EQ(model.Counts(query, {6, 5}), before);
+  EXPECT_EQ(model.Counts(query, {6, true}), before);
 }
 
 TEST(Likelihood, CellsCoverTheImageAndWhatLiesOutsideIsInTheNearest) {

@@ -113,8 +113,10 @@ const char* ToString(ConstraintType type);
 
 /// Outcome of the geometric verification of one candidate.
 struct Verification {
-  std::int64_t candidate = -1;                  ///< id of the location it was tried with, -1: none was
-  bool accepted = false;                        ///< it is a loop
+  std::int64_t candidate = -1;  ///< id of the location it was tried with, -1: none was
+  bool similar = false;  ///< so many matches fit one motion (verification.min_place_inliers) that the images
+                         ///< may show one place, whatever the motion is worth
+  bool accepted = false;                        ///< and the motion is certain enough for a constraint
   ConstraintType type = ConstraintType::kNone;  ///< which geometry decided
   Similarity S_candidate_query;  ///< maps points of the query camera into the candidate camera (kRigid:
                                  ///< scale 1; kEssential: rotation and unit direction only; where the camera
@@ -124,11 +126,8 @@ struct Verification {
                                             ///< and decided: the scene is flat or the camera turned on the
                                             ///< spot. The direction of the translation is then that of the
                                             ///< essential matrix, one of two for a plane
-  double ahead = 1;  ///< kEssential, kFundamental: share of the translation that is along the candidate's
-                     ///< optical axis, 0..1; without a camera by a guessed focal length; 0 where a homography
-                     ///< or several cameras decided: the direction is not known
-  int matches = 0;   ///< that were considered (kRigid: those with a 3D point)
-  int inliers = 0;   ///< of these, those that fit one camera motion
+  int matches = 0;                          ///< that were considered (kRigid: those with a 3D point)
+  int inliers = 0;                          ///< of these, those that fit one camera motion
   int coverage = 0;  ///< cells of a grid of 8x6 that inliers occupy, in the image with fewer, 0..48
   double expected_inliers = 0;  ///< of so many matches, those that chance lets fit: the sample and the share
                                 ///< of the image that lies within the threshold of where a match has to be
@@ -138,9 +137,19 @@ struct Verification {
   double motion_spread = 0;  ///< standard deviation of the inliers' displacements between the images, as a
                              ///< share of the diagonal; 0: all moved as one. Small where a place is
                              ///< seen from where it was seen, mostly large where another looks alike
-  double mass = 0;           ///< posterior of all places within 4 graph levels of the candidate, 0..1
-  std::string reason;        ///< why not, in plain words; empty if accepted
+  double mass = 0;     ///< posterior of all places within 4 graph levels of the candidate, over that and
+                       ///< of a new place, 0..1: which of several places it is geometry knows better
+  std::string reason;  ///< why not, in plain words; empty if accepted
   std::vector<VerifiedMatch> inlier_matches;  ///< the inliers
+};
+
+/// A second word about an image, some images later (loop-closure.md section 5).
+struct LateLoop {
+  std::int64_t query = -1;    ///< id of the image that it is about
+  bool accepted = false;      ///< its loop with verification.candidate is accepted now, and was not before
+  bool withdrawn = false;     ///< its loop was accepted before, and is not any more
+  double probability = 0;     ///< that it is a loop, by all that is known now, 0..1
+  Verification verification;  ///< of the place that this is about
 };
 
 /// Everything that Detect found out.
@@ -159,6 +168,7 @@ struct LoopResult {
   std::vector<MemberOpinion> members;  ///< in the order of options.members
   Verification verification;           ///< the best one tried
   std::vector<Verification> tried;     ///< all that were tried
+  std::optional<LateLoop> late;        ///< what this image changes for an earlier one; nothing: nothing
   /// The combined posterior of every location in working memory; only with keep_posterior or keep_evidence.
   std::vector<std::pair<std::int64_t, double>> posterior_by_location;
   /// What the joint filter got: its score is the sum of the members' counts, each times its weight. Only with

@@ -140,18 +140,17 @@ struct VerificationOptions {
   TUTTI_OPTION(int, max_hypotheses, 3, "separate places tried, best posterior first", From(1));
   TUTTI_OPTION(int, neighbours, 1, "graph levels around each place that are tried as well; 0: none", From(0),
                To(16));
-  TUTTI_OPTION(double, nearer_share, 0.75,
-               "without metric points: a neighbour with this share of the inliers of the best view is taken "
-               "in its place if the query lies less ahead of it (or behind) and more beside it: the nearer "
-               "view of the place; 1: never",
-               Above(0), To(1));
   TUTTI_OPTION(double, match_ratio, 0.8, "Lowe's ratio test, on true distance", Above(0), To(1));
-  TUTTI_OPTION(int, min_inliers, 30, "PnP: fewer inliers than this are no loop", Basic(), From(8));
+  TUTTI_OPTION(
+      int, min_place_inliers, 12,
+      "matches that fit one motion, before two images may show one place: the probability weighs them",
+      From(8));
+  TUTTI_OPTION(int, min_inliers, 30, "PnP: fewer inliers than this give no constraint", Basic(), From(8));
   TUTTI_OPTION(double, min_inlier_ratio, 0.3, "PnP: inliers / matches with a 3D point", From(0), To(1));
   TUTTI_OPTION(int, min_epipolar_inliers, 30,
                "essential, fundamental matrix: a match is held to a line only, so more are needed", From(8));
-  TUTTI_OPTION(double, min_epipolar_ratio, 0.3,
-               "and this share of all matches: the probability weighs it once more", From(0), To(1));
+  TUTTI_OPTION(double, min_epipolar_ratio, 0,
+               "and this share of all matches; 0: the probability alone weighs it", From(0), To(1));
   TUTTI_OPTION(double, min_spread, 0.045,
                "standard deviation of the inliers' pixels, as a share of width and height, along their "
                "narrowest direction; evenly spread: 0.29, on one line: 0. Inliers in abundance (beyond 1.5 "
@@ -229,8 +228,8 @@ struct LoopDetectorOptions {
                "CV_32F",
                CodeOnly());
   TUTTI_OPTION(LikelihoodKind, likelihood, LikelihoodKind::kTfIdf, "score of standardised evidence");
-  TUTTI_OPTION(double, loop_threshold, 0.975, "accept a loop of this probability", Basic(), From(0), To(1));
-  TUTTI_OPTION(double, propose_threshold, 0.1, "go to verification at H >= this", From(0), To(1));
+  TUTTI_OPTION(double, loop_threshold, 0.98, "accept a loop of this probability", Basic(), From(0), To(1));
+  TUTTI_OPTION(double, propose_threshold, 0.08, "go to verification at H >= this", From(0), To(1));
   TUTTI_OPTION(double, link_threshold, 0.9, "a loop of this probability links its two places for the filter",
                From(0), To(1));
   TUTTI_OPTION(int, island_levels, 0,

@@ -1,0 +1,74 @@
+#include "loopclosure/filter/hindsight.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace tutti::internal {
+
+void Hindsight::Add(int slot, const Belief& posterior, const Belief& likelihood) {
+  steps_.push_back({slot, posterior, likelihood});
+  if (steps_.size() > kImages + 1) steps_.pop_front();
+}
+
+Belief Hindsight::Smoothed(const TransitionModel& transition, const std::vector<int>& working_memory) const {
+  Belief beta;
+  beta.places.assign(steps_.back().posterior.places.size(), 1.0);
+  for (auto step = steps_.rbegin(); std::next(step) != steps_.rend(); ++step) {
+    beta.new_place *= step->likelihood.new_place;
+    double most = beta.new_place;
+    for (const int slot : working_memory) {
+      const std::size_t i = static_cast<std::size_t>(slot);
+      // What was not in working memory then could not be said to be there.
+      beta.places[i] *= i < step->likelihood.places.size() ? step->likelihood.places[i] : 0.0;
+      most = std::max(most, beta.places[i]);
+    }
+    if (!(most > 0.0)) break;
+    beta.new_place /= most;
+    for (const int slot : working_memory) beta.places[static_cast<std::size_t>(slot)] /= most;
+    beta = transition.Backward(beta, working_memory);
+  }
+  Belief gamma;
+  const Belief& alpha = steps_.front().posterior;
+  gamma.places.assign(beta.places.size(), 0.0);
+  gamma.new_place = alpha.new_place * beta.new_place;
+  for (const int slot : working_memory) {
+    const std::size_t i = static_cast<std::size_t>(slot);
+    if (i < alpha.places.size()) gamma.places[i] = alpha.places[i] * beta.places[i];
+  }
+  gamma.Normalise();
+  return gamma;
+}
+
+void Hindsight::Save(ByteWriter& out) const {
+  out.Put<std::int32_t>(static_cast<std::int32_t>(steps_.size()));
+  for (const Step& step : steps_) {
+    out.Put<std::int32_t>(step.slot);
+    for (const Belief* belief : {&step.posterior, &step.likelihood}) {
+      out.Put(belief->new_place);
+      out.PutVector(belief->places);
+    }
+  }
+}
+
+void Hindsight::Load(int end, ByteReader& in) {
+  const int count = in.Get<std::int32_t>();
+  if (count < 0 || count > kImages + 1) in.Damaged("more steps of a filter than are kept");
+  steps_.clear();
+  for (int i = 0; i < count; ++i) {
+    Step step{in.Get<std::int32_t>(), {}, {}};
+    if (step.slot < 0 || step.slot >= end) in.Damaged("a step of a filter at an unknown location");
+    for (Belief* belief : {&step.posterior, &step.likelihood}) {
+      belief->new_place = in.Get<double>();
+      belief->places = in.GetVector<double>();
+      const auto good = [](double value) { return value >= 0.0 && std::isfinite(value); };
+      if (!good(belief->new_place) || belief->places.size() > static_cast<std::size_t>(end) ||
+          !std::all_of(belief->places.begin(), belief->places.end(), good)) {
+        in.Damaged("a step of a filter that is no belief");
+      }
+    }
+    steps_.push_back(std::move(step));
+  }
+}
+
+}  // namespace tutti::internal

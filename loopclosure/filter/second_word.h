@@ -1,0 +1,45 @@
+// What is decided of an image some images later. Internal.
+#pragma once
+
+#include <deque>
+#include <optional>
+
+#include "core/byte_stream.h"
+#include "loopclosure/filter/hindsight.h"
+#include "loopclosure/filter/hypothesis_search.h"
+#include "tutti/loopclosure/detector.h"
+
+namespace tutti::internal {
+
+/// The second word (loop-closure.md section 2): Hindsight::kImages after an image, the posterior that knows
+/// the images since is weighed with what geometry found. A loop that was not accepted may be now, and one
+/// that was may be withdrawn.
+class SecondWord {
+ public:
+  /// A step of the filter at a new location.
+  void Step(int slot, const Belief& posterior, const Belief& likelihood) {
+    hindsight_.Add(slot, posterior, likelihood);
+  }
+  /// What was decided at first of the newest location.
+  void Keep(int slot, const LoopResult& result);
+  /// The next image does not follow those before.
+  void Forget();
+
+  /// What changes of the image that it is time for; nothing where all stays as it was.
+  std::optional<LateLoop> Say(const LoopDetectorOptions& options, const LocationMemory& memory,
+                              const TransitionModel& transition, const HypothesisSearch& search);
+
+  void Save(ByteWriter& out) const;
+  /// Takes up what Save wrote, of the locations of `memory`. Throws InputError if it is damaged.
+  void Load(const LocationMemory& memory, ByteReader& in);
+
+ private:
+  struct First {
+    int slot;
+    LoopResult result;  // what geometry tried, without matches
+  };
+  Hindsight hindsight_;
+  std::deque<First> first_;  // of the images in hindsight_ at least
+};
+
+}  // namespace tutti::internal

@@ -1,0 +1,139 @@
+#include "loopclosure/filter/second_word.h"
+
+#include <gtest/gtest.h>
+
+#include <optional>
+#include <vector>
+
+#include "loopclosure/filter/bayes_filter.h"
+#include "tutti/core/error.h"
+
+namespace tutti::internal {
+namespace {
+
+constexpr int kPathLength = 60;
+constexpr int kAsked = kPathLength - 1 - Hindsight::kImages;  // the image whose second word is due
+constexpr int kPlace = 10;                                    // that it looks like
+
+// A path of images; the last ones look more or less like the path from kPlace on.
+class SecondWordTest : public ::testing::Test {
+ protected:
+  SecondWordTest() : transition_(0.9), memory_(10), views_(kPathLength) {
+    for (int i = 0; i < kPathLength; ++i) {
+      views_[static_cast<std::size_t>(i)].id = i;
+      memory_.Add(i);
+      transition_.Update(memory_, memory_.Settle());
+    }
+  }
+
+  // How much more than a new place each image from kAsked on looks like the place that follows kPlace.
+  void See(const std::vector<double>& likelihoods, bool accepted_at_first) {
+    BayesFilter filter;
+    for (int k = 0; k <= Hindsight::kImages; ++k) {
+      Belief likelihood;
+      likelihood.places.assign(kPathLength, 0.4);
+      likelihood.places[kPlace + static_cast<std::size_t>(k)] = likelihoods[static_cast<std::size_t>(k)];
+      filter.Step(transition_, memory_.working_memory(), likelihood);
+      word_.Step(kAsked + k, filter.posterior(), likelihood);
+      LoopResult result;
+      result.query = kAsked + k;
+      if (k == 0 && accepted_at_first) {
+        result.accepted = true;
+        result.tried = {Geometry(kAsked, kPlace)};
+        result.verification = result.tried.front();
+      }
+      word_.Keep(kAsked + k, result);
+    }
+  }
+
+  Verification Geometry(std::int64_t query, std::int64_t candidate) const {
+    Verification v;
+    v.candidate = candidate;
+    v.matches = 100;
+    v.type = ConstraintType::kFundamental;
+    v.similar = v.accepted = query == kAsked && candidate == kPlace;
+    v.inliers = v.similar ? inliers_ : 5;
+    v.log_nfa = v.similar ? -inliers_ : 0;
+    if (v.similar) v.inlier_matches.resize(static_cast<std::size_t>(v.inliers));
+    return v;
+  }
+
+  std::optional<LateLoop> Say(SecondWord* word) {
+    const HypothesisSearch search(
+        options_, memory_, [&](const View& q, const View& c, int) { return Geometry(q.id, c.id); },
+        [&](int slot) -> const View& { return views_[static_cast<std::size_t>(slot)]; });
+    return word->Say(options_, memory_, transition_, search);
+  }
+
+  LoopDetectorOptions options_;
+  TransitionModel transition_;
+  LocationMemory memory_;
+  std::vector<View> views_;
+  SecondWord word_;
+  int inliers_ = 80;  // of 100, where the images show one place
+};
+
+TEST_F(SecondWordTest, WhatTheNextImagesBearOutIsAcceptedThoughItWasNotTriedAtFirst) {
+  See({1.5, 6, 6, 6, 6, 6}, false);
+  const std::optional<LateLoop> late = Say(&word_);
+  ASSERT_TRUE(late);
+  EXPECT_TRUE(late->accepted);
+  EXPECT_FALSE(late->withdrawn);
+  EXPECT_EQ(late->query, kAsked);
+  EXPECT_EQ(late->verification.candidate, kPlace);
+  EXPECT_EQ(late->verification.inlier_matches.size(), 80u);
+  EXPECT_GE(late->probability, options_.loop_threshold);
+}
+
+TEST_F(SecondWordTest, WhatTheNextImagesContradictIsWithdrawn) {
+  inliers_ = 15;
+  See({0.4, 0.4, 0.4, 0.4, 0.4, 0.4}, true);
+  const std::optional<LateLoop> late = Say(&word_);
+  ASSERT_TRUE(late);
+  EXPECT_TRUE(late->withdrawn);
+  EXPECT_FALSE(late->accepted);
+  EXPECT_EQ(late->verification.candidate, kPlace);
+  EXPECT_LT(late->probability, 0.5);
+}
+
+TEST_F(SecondWordTest, NothingIsSaidWhereNothingChanges) {
+  See({30, 6, 6, 6, 6, 6}, true);
+  EXPECT_FALSE(Say(&word_));
+  SecondWord other;
+  std::swap(word_, other);
+  See({0.4, 0.4, 0.4, 0.4, 0.4, 0.4}, false);
+  EXPECT_FALSE(Say(&word_));
+}
+
+TEST_F(SecondWordTest, AThresholdThatIsLowWithdrawsNothingOfItself) {
+  options_.loop_threshold = 0;
+  inliers_ = 15;
+  See({0.4, 0.4, 0.4, 0.4, 0.4, 0.4}, true);
+  EXPECT_FALSE(Say(&word_));
+}
+
+TEST_F(SecondWordTest, IsTheSameAfterAFile) {
+  See({1.5, 6, 6, 6, 6, 6}, false);
+  ByteWriter out;
+  word_.Save(out);
+  SecondWord loaded;
+  ByteReader in(out.bytes(), "test");
+  loaded.Load(memory_, in);
+  EXPECT_TRUE(in.AtEnd());
+  const std::optional<LateLoop> late = Say(&loaded);
+  ASSERT_TRUE(late);
+  EXPECT_EQ(late->probability, Say(&word_)->probability);
+}
+
+TEST_F(SecondWordTest, AFileOfALoopWithAnUnknownLocationIsDamaged) {
+  See({30, 6, 6, 6, 6, 6}, true);
+  ByteWriter out;
+  word_.Save(out);
+  LocationMemory shorter(10);
+  for (int i = 0; i < kAsked; ++i) shorter.Add(i);
+  ByteReader in(out.bytes(), "test");
+  EXPECT_THROW(SecondWord().Load(shorter, in), InputError);
+}
+
+}  // namespace
+}  // namespace tutti::internal

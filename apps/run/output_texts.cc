@@ -348,7 +348,7 @@ std::string LoopsCsvHeader(const std::vector<std::string>& members) {
   std::string line =
       "query,candidate,query_stamp_s,candidate_stamp_s,surf,sift,orb,ensemble,inliers,matches,accepted,"
       "reason,verified,tx,ty,tz,qx,qy,qz,qw,scale,sigmas,weight,injected,probability,distance_m,angle_deg,"
-      "error_m,error_deg,correct";
+      "error_m,error_deg,correct,witness";
   for (const std::string& name : members) line += "," + name;
   return line + "\n";
 }
@@ -376,6 +376,7 @@ std::string LoopsCsvLine(const LoopRecord& loop, const std::vector<std::string>&
   for (const double v : {error.distance_m, error.angle_deg, error.error_m, error.error_deg})
     out << ',' << Cell(v, 4);
   out << ',' << (loop.correct ? (*loop.correct ? "1" : "0") : "");
+  out << ',' << (loop.witness.empty() ? "" : Quoted(loop.witness));
   for (const std::string& name : members) out << ',' << Cell(MemberPosterior(loop, name), 6);
   out << '\n';
   return out.str();

@@ -64,19 +64,6 @@ std::vector<CovisiblePair> LoopCloser::Covisible(const Odometry& odometry) const
   return covisible;
 }
 
-void LoopCloser::Check(int end, const internal::SectionReader& file) const {
-  for (const auto* loops : {&accepted_, &deferred_, &queued_, &gate_.waiting()}) {
-    for (const LoopEdge& loop : *loops) {
-      internal::CheckIndex(loop.candidate, 0, end, file);
-      internal::CheckIndex(loop.query, 0, end, file);
-    }
-  }
-  for (const MapKeyframe& keyframe : solved_keyframes_) internal::CheckIndex(keyframe.id, 0, end, file);
-  for (const std::size_t record : untied_) {
-    if (record >= records_.size()) file.Damaged("a loop that is not listed");
-  }
-}
-
 LoopConstraint LoopCloser::Measure(const Verification& verification, int candidate, int query,
                                    const Odometry& odometry) {
   const ScopedSpan span(recorder_, Lane::kOptimisation, "measure_loop");
@@ -87,57 +74,20 @@ LoopConstraint LoopCloser::Measure(const Verification& verification, int candida
   return constraint;
 }
 
-void LoopCloser::BeginSession(const CameraRig& rig, std::int64_t first_frame, int first_keyframe) {
-  rig_ = rig;
-  sessions_.push_back(first_frame);
-  graph_.BeginSession(first_keyframe);
-  proof_.reset();
-  corrections_ = adjustments_ = 0;
-  stages_.clear();
-}
-
-void LoopCloser::Append(const LoopCloser& other, std::int64_t first_frame, int first_keyframe) {
-  BeginSession(rig_, first_frame, first_keyframe);
-  graph_.Append(other.graph_, first_keyframe);
-  for (const std::int64_t begin : other.sessions_) sessions_.push_back(first_frame + begin);
-  const std::size_t first_record = records_.size();
-  for (LoopRecord record : other.records_) {
-    record.query += first_frame;
-    record.candidate += first_frame;
-    records_.push_back(std::move(record));
-  }
-  for (LoopEdge loop : other.accepted_) {
-    loop.candidate += first_keyframe;
-    loop.query += first_keyframe;
-    loop.candidate_frame += first_frame;
-    loop.query_frame += first_frame;
-    loop.record += first_record;
-    accepted_.push_back(loop);
-  }
-  for (const std::size_t record : other.untied_) untied_.insert(first_record + record);
-}
-
-// Time stamps of different recordings do not compare.
-bool LoopCloser::OfOneSession(std::int64_t frame, std::int64_t other) const {
-  const auto session = [this](std::int64_t f) {
-    return std::upper_bound(sessions_.begin(), sessions_.end(), f) - sessions_.begin();
-  };
-  return session(frame) == session(other);
-}
-
 // Measures it against the map, and lets it in if something else says the same.
 LoopUpdate LoopCloser::Consider(const LoopRecord& proposed, const Verification& verification, int candidate,
                                 int query, const Odometry& odometry, std::int64_t frames, bool across) {
   records_.push_back(proposed);
   LoopRecord& record = records_.back();
-  if (!record.verified) return {};
+  if (!record.verified && !IsWitness(record, verification)) return {};
+  const std::string doubt = record.reason;  // of the detector
   const bool recent = OfOneSession(record.query, record.candidate) &&
                       record.query_stamp_s - record.candidate_stamp_s < options_.loop_min_age_s;
   const auto refuse_recent = [&record] {
     record.reason = "too recent: still in the local map";
     return LoopUpdate();
   };
-  if (recent && verification.inliers < kSurelySeen) return refuse_recent();
+  if (recent && (!record.verified || verification.inliers < kSurelySeen)) return refuse_recent();
   const LoopConstraint constraint = Measure(verification, candidate, query, odometry);
   if (recent && (!constraint.usable || gate_.Fulfilled(constraint.edge, Places(odometry))))
     return refuse_recent();
@@ -149,14 +99,42 @@ LoopUpdate LoopCloser::Consider(const LoopRecord& proposed, const Verification& 
   edge.record = records_.size() - 1;
   record.S_candidate_query = edge.S_candidate_query;
   if (followed_.ImagesJudgeSteps()) gate_.SetOdometryUncertainty(followed_.Seen());
-  std::vector<LoopEdge> entering = gate_.Offer(edge, accepted_, Places(odometry), across);
-  if (entering.empty()) {
+  LoopGate::Admitted admitted = gate_.Offer(edge, accepted_, Places(odometry), across,
+                                            [&](const LoopEdge& loop) { return TrustIn(loop, odometry); });
+  if (admitted.loops.empty()) {
     record.pending = true;
-    record.reason = "waits for a second loop that agrees";
+    record.reason = record.verified ? "waits for a second loop that agrees"
+                                    : "waits for a verified loop that agrees; by itself: " + doubt;
     return {};
   }
-  for (const LoopEdge& loop : entering) untied_.insert(loop.record);
-  return Enter(std::move(entering), odometry, frames);
+  NoteWitnesses(admitted);
+  for (const LoopEdge& loop : admitted.loops) untied_.insert(loop.record);
+  return Enter(std::move(admitted.loops), odometry, frames);
+}
+
+LoopGate::Trust LoopCloser::TrustIn(const LoopEdge& loop, const Odometry& odometry) const {
+  if (!records_[loop.record].verified) return LoopGate::Trust::kWeak;
+  // A followed odometry may be any, and says itself how far it drifts.
+  return followed_.begun() || InReach(loop, odometry) ? LoopGate::Trust::kSure : LoopGate::Trust::kFar;
+}
+
+// Whether the way from the candidate to the query can have led where the loop says, with an odometry that is
+// bad. A house that looks like the one before is off by the whole way.
+bool LoopCloser::InReach(const LoopEdge& loop, const Odometry& odometry) const {
+  constexpr double kMostDrift = 0.5;  // share of the way
+  if (odometry.KeyframePiece(loop.candidate) != odometry.KeyframePiece(loop.query)) return true;
+  const auto [first, last] = std::minmax(loop.candidate, loop.query);
+  double way = 0;
+  std::optional<Eigen::Vector3d> before;
+  for (const int id : odometry.KeyframeIds()) {
+    if (id < first || id > last || odometry.KeyframePiece(id) != odometry.KeyframePiece(first)) continue;
+    const Eigen::Vector3d here = odometry.KeyframePose(id).translation;
+    if (before) way += (here - *before).norm();
+    before = here;
+  }
+  const Pose in_map = odometry.KeyframePose(loop.candidate).Inverse() * odometry.KeyframePose(loop.query);
+  const double off = (loop.S_candidate_query.translation - in_map.translation).norm();
+  return off <= kMostDrift * way + loop.depth;
 }
 
 std::string LoopCloser::Join(const std::vector<ProposedLoop>& proposed, const Odometry& odometry,
@@ -335,28 +313,6 @@ std::optional<LoopUpdate> LoopCloser::Solved(const Odometry& odometry, std::int6
   return update;
 }
 
-// Into the map, or out.
-void LoopCloser::Settle(const LoopVerdict& verdict, LoopUpdate* update) {
-  LoopRecord& record = records_[verdict.loop.record];
-  record.pending = false;
-  record.reason = verdict.reason;
-  record.weight = verdict.weight;
-  record.gate_sigmas = verdict.gate_sigmas;
-  record.accepted = verdict.reason.empty();
-  if (record.accepted) {
-    accepted_.push_back(verdict.loop);
-  } else {
-    untied_.erase(verdict.loop.record);
-    if (verdict.contradicted) Revoke(verdict.loop.record, update);
-  }
-}
-
-void LoopCloser::Revoke(std::size_t record, LoopUpdate* update) {
-  if (records_[record].injected || records_[record].revoked) return;
-  records_[record].revoked = true;
-  update->revoked.push_back(record);
-}
-
 MapCorrection LoopCloser::MoveBy(const KeyframeCorrection& solved, const Odometry& odometry) {
   MapCorrection correction;
   const std::vector<MapKeyframe> now = KeyframesOf(odometry);
@@ -466,14 +422,6 @@ void LoopCloser::Removed(const std::map<int, int>& into, const Odometry& before)
 void LoopCloser::Resume(std::optional<LoopSolution> solution, std::optional<GlobalAdjustment> adjustment) {
   if (solution) solver_.Resume(*std::move(solution));
   adjuster_.Resume(std::move(adjustment));
-}
-
-void LoopCloser::Finish() {
-  for (LoopRecord& record : records_) {
-    if (!record.pending) continue;
-    record.pending = false;
-    record.reason = "no second loop nearby agreed with it";
-  }
 }
 
 }  // namespace tutti

@@ -30,6 +30,11 @@ namespace tutti {
 /// What is worked out beside the tracking enters when it is due; at the end of a recording at once.
 enum class Entering { kWhenDue, kAtOnce };
 
+/// Reasons of loops that the detector decides anew (LateLoop).
+inline constexpr const char* kTakenBack = "the detector has taken it back, by the images that came next";
+inline constexpr const char* kDecidedLater =
+    "decided anew by the images that came next: in a line further down";
+
 /// A loop between two keyframes of the map, as it was proposed.
 struct ProposedLoop {
   LoopRecord record;
@@ -56,8 +61,13 @@ class LoopCloser {
 
   /// A proposed loop, in the order of the queries. `candidate`, `query`: its keyframes; they have a place in
   /// the map. The update is to be applied at once. `across`: as LoopGate::Offer.
+  /// One that is not verified is considered if IsWitness: it enters only with a verified one.
   LoopUpdate Consider(const LoopRecord& proposed, const Verification& verification, int candidate, int query,
                       const Odometry& odometry, std::int64_t frames, bool across = false);
+  /// The detector decides anew about this frame: what waits of it in the gate is no loop, for this reason;
+  /// without a graph (images without poses) what was accepted neither. What the gate has let in is left to
+  /// the pose graph, which weighs it.
+  void Withdraw(std::int64_t query_frame, const std::string& reason, bool has_graph);
   /// Loops between two maps, of which the second one was appended (Append): those join them that
   /// ChooseJoiningLoops says, all at once. Why none does; empty: the graph is being solved with them.
   /// `update`: says which others the detector is to forget.
@@ -153,6 +163,10 @@ class LoopCloser {
   bool LeavesAsItIs(const std::vector<LoopEdge>& entering, const Odometry& odometry) const;
   LoopUpdate Enter(std::vector<LoopEdge> entering, const Odometry& odometry, std::int64_t frames);
   void Start(std::vector<LoopEdge> entering, const Odometry& odometry, std::int64_t frames);
+  LoopGate::Trust TrustIn(const LoopEdge& loop, const Odometry& odometry) const;
+  bool InReach(const LoopEdge& loop, const Odometry& odometry) const;
+  bool IsWitness(const LoopRecord& record, const Verification& verification) const;
+  void NoteWitnesses(const LoopGate::Admitted& admitted);
   void Settle(const LoopVerdict& verdict, LoopUpdate* update);
   void Revoke(std::size_t record, LoopUpdate* update);
   MapCorrection MoveBy(const KeyframeCorrection& solved, const Odometry& odometry);

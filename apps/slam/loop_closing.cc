@@ -18,8 +18,17 @@ LoopDetectorOptions DetectorOptions(const RunConfig& config) {
   return options;
 }
 
-LoopQuery Query(const InputFrame& frame) {
+// One camera's landmarks have a scale of their own, which drifts: no metre is to be read from them.
+bool IsMetric(const CameraRig& rig) { return rig.sensor != Sensor::kMono; }
+
+// A place may be certain where the motion is not. Without a camera there is none, and the place is all.
+bool GivesConstraint(const Verification& v) {
+  return v.accepted || v.type == ConstraintType::kFundamental || v.type == ConstraintType::kNone;
+}
+
+LoopQuery Query(const InputFrame& frame, const CameraRig& rig) {
   LoopQuery query;
+  query.metric = IsMetric(rig);
   query.id = frame.index;
   query.stamp_s = frame.stamp_s;
   query.image = frame.image;
@@ -57,7 +66,7 @@ void LoopClosing::Submit(const InputFrame& frame, const KeyframeView* view, std:
   if (keyframes_seen_++ % options_.loop_every_keyframes != 0) return;
   const bool first = stamps_.empty() || stamps_.rbegin()->first < session_;
   if (!first && frame.stamp_s - stamps_.rbegin()->second < options_.loop_min_interval_s) return;
-  Ask(Query(frame), view, frames);
+  Ask(Query(frame, rig_), view, frames);
 }
 
 std::vector<ProposedLoop> LoopClosing::Compare(
@@ -65,18 +74,29 @@ std::vector<ProposedLoop> LoopClosing::Compare(
     const std::function<std::optional<KeyframeView>(std::int64_t frame)>& view) {
   worker_->BeginSession();
   std::vector<ProposedLoop> loops;
+  const auto propose = [&](LoopRecord record, const Verification& verification) {
+    if (record.candidate >= first_frame) return;  // loops within the other map are known
+    const int candidate = KeyframeOf(record.candidate), query = KeyframeOf(record.query);
+    if (candidate < 0 || query < 0) return;  // of a detector whose file was changed
+    loops.push_back({std::move(record), verification, candidate, query});
+  };
   const auto take = [&] {
     const LoopResult result = TakeResult();
-    // Loops within the other map are known.
-    if (!result.proposed || result.candidate >= first_frame) return;
-    const int candidate = KeyframeOf(result.candidate), query = KeyframeOf(result.query);
-    if (candidate < 0 || query < 0) return;  // of a detector whose file was changed
-    loops.push_back({Record(result), result.verification, candidate, query});
+    if (result.late) {
+      for (ProposedLoop& loop : loops) {
+        if (loop.record.query != result.late->query || !result.late->withdrawn) continue;
+        loop.record.verified = false;
+        loop.record.reason = kTakenBack;
+      }
+      if (result.late->accepted) propose(Record(*result.late), result.late->verification);
+    }
+    if (result.proposed) propose(Record(result), result.verification);
   };
   for (LoopPlace& place : places) {
     const std::optional<KeyframeView> of = view(place.id);
     if (!of) continue;
     LoopQuery query;
+    query.metric = IsMetric(rig_);
     query.id = first_frame + place.id;
     query.stamp_s = of->stamp_s;
     query.member_features = std::move(place.member_features);
@@ -112,7 +132,7 @@ LoopUpdate LoopClosing::MoveAll(const std::map<int, Similarity>& S_world_keyfram
 void LoopClosing::Ask(LoopQuery query, const KeyframeView* view, std::int64_t frames) {
   if (view != nullptr) {
     query.camera = rig_.camera;
-    if (options_.loop_pose_prior && rig_.sensor != Sensor::kMono) {  // mono: its scale drifts
+    if (options_.loop_pose_prior && query.metric) {
       query.pose_prior.emplace();
       query.pose_prior->position_m = view->T_world_camera.translation;
       query.pose_prior->frame = view->map_piece;
@@ -129,7 +149,7 @@ void LoopClosing::Ask(LoopQuery query, const KeyframeView* view, std::int64_t fr
 
 int LoopClosing::Locate(const InputFrame& frame) {
   if (!worker_ || keyframe_of_frame_.empty()) return -1;
-  LoopQuery query = Query(frame);
+  LoopQuery query = Query(frame, rig_);
   query.camera = rig_.camera;
   const LoopResult found = worker_->Locate(query);
   return found.accepted ? KeyframeOf(found.candidate) : -1;
@@ -138,6 +158,7 @@ int LoopClosing::Locate(const InputFrame& frame) {
 std::optional<LoopUpdate> LoopClosing::Due(const Odometry* odometry, std::int64_t frames) {
   std::optional<LoopUpdate> update;
   if (odometry != nullptr) update = closer_.Solved(*odometry, frames);
+  if (!update && late_) update = DeliverLate(odometry, frames);
   if (!update && !submitted_.empty() && submitted_.front().due <= frames) update = Deliver(odometry, frames);
   if (!update && odometry != nullptr) update = closer_.Adjusted(*odometry, frames);
   if (update) TellRevoked(*update);
@@ -148,6 +169,7 @@ std::optional<LoopUpdate> LoopClosing::Rest(const Odometry* odometry, std::int64
   std::optional<LoopUpdate> update;
   if (odometry != nullptr) closer_.JudgeJumps(*odometry, true);
   if (odometry != nullptr) update = closer_.Solved(*odometry, frames, Entering::kAtOnce);
+  if (!update && late_) update = DeliverLate(odometry, frames);
   if (!update && !submitted_.empty()) update = Deliver(odometry, frames);
   if (!update && odometry != nullptr && closer_.CloseDeferred(*odometry, frames)) update.emplace();
   if (!update && odometry != nullptr) update = closer_.Adjusted(*odometry, frames, Entering::kAtOnce);
@@ -167,21 +189,35 @@ void LoopClosing::TellRevoked(const LoopUpdate& update) {
   }
 }
 
-LoopRecord LoopClosing::Record(const LoopResult& r) const {
+LoopRecord LoopClosing::RecordOf(std::int64_t query, std::int64_t candidate,
+                                 const Verification& verification) const {
   const auto stamp = [&](std::int64_t frame) { return stamps_.count(frame) != 0 ? stamps_.at(frame) : 0.0; };
   LoopRecord record;
-  record.query = r.query;
-  record.candidate = r.candidate;
-  record.query_stamp_s = stamp(record.query);
-  record.candidate_stamp_s = stamp(record.candidate);
+  record.query = query;
+  record.candidate = candidate;
+  record.query_stamp_s = stamp(query);
+  record.candidate_stamp_s = stamp(candidate);
+  record.matches = verification.matches;
+  record.inliers = verification.inliers;
+  return record;
+}
+
+LoopRecord LoopClosing::Record(const LoopResult& r) const {
+  LoopRecord record = RecordOf(r.query, r.candidate, r.verification);
   record.members = r.members;
   record.hypothesis = r.hypothesis;
   record.posterior = r.posterior;
   record.probability = r.probability;
-  record.matches = r.verification.matches;
-  record.inliers = r.verification.inliers;
-  record.verified = r.accepted;
-  record.reason = r.reason.empty() && !r.accepted ? r.verification.reason : r.reason;
+  record.verified = r.accepted && GivesConstraint(r.verification);
+  record.reason = r.reason.empty() && !record.verified ? r.verification.reason : r.reason;
+  return record;
+}
+
+LoopRecord LoopClosing::Record(const LateLoop& late) const {
+  LoopRecord record = RecordOf(late.query, late.verification.candidate, late.verification);
+  record.probability = late.probability;
+  record.verified = late.accepted && GivesConstraint(late.verification);
+  if (!record.verified) record.reason = late.verification.reason;
   return record;
 }
 
@@ -200,12 +236,27 @@ LoopResult LoopClosing::TakeResult() {
 
 LoopUpdate LoopClosing::Deliver(const Odometry* odometry, std::int64_t frames) {
   const LoopResult result = TakeResult();
+  late_ = result.late;
   if (!result.proposed) return {};
-  LoopRecord record = Record(result);
+  return Decide(Record(result), result.verification, odometry, frames);
+}
+
+// What was said of an image comes with the answer to a later one: a fixed number of frames after it.
+LoopUpdate LoopClosing::DeliverLate(const Odometry* odometry, std::int64_t frames) {
+  const LateLoop late = *std::exchange(late_, std::nullopt);
+  if (late.withdrawn) closer_.Withdraw(late.query, kTakenBack, odometry != nullptr);
+  if (!late.accepted) return {};
+  closer_.Withdraw(late.query, kDecidedLater, odometry != nullptr);  // if it waits as a witness
+  return Decide(Record(late), late.verification, odometry, frames);
+}
+
+LoopUpdate LoopClosing::Decide(const LoopRecord& proposed, const Verification& verification,
+                               const Odometry* odometry, std::int64_t frames) {
+  LoopRecord record = proposed;
   if (odometry != nullptr) {
     const int candidate = KeyframeOf(record.candidate), query = KeyframeOf(record.query);
     if (candidate >= 0 && query >= 0)
-      return closer_.Consider(record, result.verification, candidate, query, *odometry, frames);
+      return closer_.Consider(record, verification, candidate, query, *odometry, frames);
     record.verified = false;  // of a detector whose file was changed
     record.reason = "the map has no keyframe of it";
   }

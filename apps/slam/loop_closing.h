@@ -115,8 +115,8 @@ class LoopClosing {
   /// All else that it knows.
   template <class Archive>
   void State(Archive& archive) {
-    archive(closer_, submitted_, keyframe_of_frame_, stamps_, keyframes_seen_, warnings_, last_warning_,
-            stages_, session_);
+    archive(closer_, submitted_, late_, keyframe_of_frame_, stamps_, keyframes_seen_, warnings_,
+            last_warning_, stages_, session_);
   }
   /// Of that. Throws InputError where it names a keyframe that the odometry (nullptr: none) has not.
   void Check(const Odometry* odometry, const internal::SectionReader& file) const;
@@ -142,9 +142,14 @@ class LoopClosing {
     }
   };
   LoopUpdate Deliver(const Odometry* odometry, std::int64_t frames);
+  LoopUpdate Decide(const LoopRecord& proposed, const Verification& verification, const Odometry* odometry,
+                    std::int64_t frames);
+  LoopUpdate DeliverLate(const Odometry* odometry, std::int64_t frames);
   LoopResult TakeResult();
   void TellRevoked(const LoopUpdate& update);
   LoopRecord Record(const LoopResult& result) const;
+  LoopRecord Record(const LateLoop& late) const;
+  LoopRecord RecordOf(std::int64_t query, std::int64_t candidate, const Verification& verification) const;
   void Ask(LoopQuery query, const KeyframeView* view, std::int64_t frames);
 
   SlamOptions options_;
@@ -153,6 +158,7 @@ class LoopClosing {
   std::unique_ptr<LoopWorker> worker_;                   // null: no loops
   std::function<void(const LoopResult&)> on_detection_;  // may be empty
   std::deque<Submission> submitted_;
+  std::optional<LateLoop> late_;                   // came with the last answer, and is considered next
   std::map<std::int64_t, int> keyframe_of_frame_;  // of the frames that the detector knows
   std::map<std::int64_t, double> stamps_;          // the same
   std::int64_t keyframes_seen_ = 0;

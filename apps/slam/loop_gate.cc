@@ -14,9 +14,14 @@ namespace {
 constexpr double kWalkSigmas = 3;  // of the odometry's drift between two loops
 // Limits grow to so many times what options say: farther apart, even a bad odometry's loops prove little.
 constexpr double kMostGrowth = 4;
+// Of the median scene depth, or turned by this: what was seen from close by or fills the middle of the one
+// image is gone or elsewhere in the other.
+constexpr double kApartFraction = 0.3;
+constexpr double kApartDeg = 20;
+constexpr double kLoosely = 2;  // times the limits; then one witness more is asked for
 
-double Grown(double limit, double sigma) {
-  return std::min(std::hypot(limit, kWalkSigmas * sigma), kMostGrowth * limit);
+double Grown(double limit, double sigma, double times) {
+  return std::min(times * std::hypot(limit, kWalkSigmas * sigma), kMostGrowth * limit);
 }
 
 }  // namespace
@@ -35,15 +40,15 @@ Disagreement LoopGate::Cycle(const LoopEdge& a, const LoopEdge& b, const Map& ma
 }
 
 // A random walk: rotations between keyframes add up by their squares, and turn what lies behind them.
-Disagreement LoopGate::Limits(const LoopEdge& a, const LoopEdge& b, const Map& map) const {
+Disagreement LoopGate::Limits(const LoopEdge& a, const LoopEdge& b, const Map& map, double times) const {
   const double steps = std::abs(a.query - b.query) + std::abs(a.candidate - b.candidate);
   const double turn_rad = step_.rotation_rad * std::sqrt(steps),
                at_candidates = Apart(a.candidate, b.candidate, map);
   const double shift = std::hypot(step_.fraction * (Apart(a.query, b.query, map) + at_candidates),
                                   turn_rad * (b.S_candidate_query.translation.norm() + at_candidates));
   Disagreement limits;
-  limits.fraction = Grown(options_.loop_agree_fraction, shift / a.depth);
-  limits.angle_deg = Grown(options_.loop_agree_deg, turn_rad * internal::kDegrees);
+  limits.fraction = Grown(options_.loop_agree_fraction, shift / a.depth, times);
+  limits.angle_deg = Grown(options_.loop_agree_deg, turn_rad * internal::kDegrees, times);
   limits.log_scale = options_.loop_agree_scale;
   return limits;
 }
@@ -59,10 +64,10 @@ bool LoopGate::SideBySide(const LoopEdge& a, const LoopEdge& b, const Map& map) 
   return Apart(a.query, b.query, map) <= a.depth && Apart(a.candidate, b.candidate, map) <= a.depth;
 }
 
-bool LoopGate::Agree(const LoopEdge& a, const LoopEdge& b, const Map& map) const {
+bool LoopGate::Agree(const LoopEdge& a, const LoopEdge& b, const Map& map, double times) const {
   const bool odometry_between =
       map(a.query).piece == map(b.query).piece && map(a.candidate).piece == map(b.candidate).piece;
-  return odometry_between && Within(Cycle(a, b, map), Limits(a, b, map));
+  return odometry_between && Within(Cycle(a, b, map), Limits(a, b, map, times));
 }
 
 // Nothing between pieces.
@@ -99,30 +104,71 @@ bool LoopGate::WithinNoise(const std::vector<LoopEdge>& loops, const Map& map) c
   return sum <= kCoordinates * static_cast<double>(loops.size());
 }
 
-std::vector<LoopEdge> LoopGate::Offer(const LoopEdge& loop, const std::vector<LoopEdge>& accepted,
-                                      const Map& map, bool across) {
-  const auto agrees_with = [&](const LoopEdge& other) {
-    if (other.candidate == loop.candidate && other.query == loop.query) return false;
-    return (Near(loop, other) || (across && SideBySide(loop, other, map))) && Agree(loop, other, map);
+bool LoopGate::Independent(const LoopEdge& a, const LoopEdge& b, const Map& map) {
+  const auto differ = [&](int x, int y) {
+    if (map(x).piece != map(y).piece || Apart(x, y, map) >= kApartFraction * a.depth) return true;
+    const Pose turn = map(x).T_world_camera.Inverse() * map(y).T_world_camera;
+    return LogSO3(turn.rotation).norm() * internal::kDegrees >= kApartDeg;
   };
-  std::vector<LoopEdge> entering;
-  std::vector<LoopEdge> still_waiting;
-  int agreeing = 1;
-  for (const LoopEdge& other : waiting_) {
-    const bool agrees = agrees_with(other);
-    agreeing += agrees ? 1 : 0;
-    (agrees ? entering : still_waiting).push_back(other);
+  return differ(a.query, b.query) && differ(a.candidate, b.candidate);
+}
+
+LoopGate::Admitted LoopGate::Offer(const LoopEdge& loop, const std::vector<LoopEdge>& accepted,
+                                   const Map& map, bool across, const Trusts& trusts) {
+  const auto trust_in = [&trusts](const LoopEdge& l) { return trusts ? trusts(l) : Trust::kSure; };
+  const Trust trust = trust_in(loop);
+  const bool loop_is_weak = trust == Trust::kWeak;
+  const int needed = trust == Trust::kSure   ? options_.loop_confirmations
+                     : trust == Trust::kWeak ? std::max(2, options_.loop_confirmations)
+                                             : options_.loop_confirmations + 1;
+  // Those that agree within so many times the limits; without loops if they are too few.
+  const auto agreeing = [&](double times, int enough) {
+    Admitted admitted;
+    int count = 1;
+    bool proven = !loop_is_weak;  // a strong one is among them
+    const auto agrees = [&](const LoopEdge& other, Trust in_other) {
+      if (other.candidate == loop.candidate && other.query == loop.query) return false;
+      const bool near = Near(loop, other) || (across && SideBySide(loop, other, map));
+      if (!near || !Agree(loop, other, map, times)) return false;
+      const bool doubted = trust != Trust::kSure || in_other != Trust::kSure;
+      if (doubted && !Independent(loop, other, map)) return true;
+      ++count;
+      proven = proven || in_other != Trust::kWeak;
+      if (!admitted.witness || in_other != Trust::kWeak) admitted.witness = other;
+      return true;
+    };
+    for (const LoopEdge& other : waiting_) {
+      if (agrees(other, trust_in(other))) admitted.loops.push_back(other);
+    }
+    for (const LoopEdge& other : accepted)
+      agrees(other, Trust::kSure);  // it was proven, and the map bears it
+    admitted.loops.push_back(loop);
+    return proven && count >= enough ? admitted : Admitted();
+  };
+  Admitted admitted = agreeing(1, needed);
+  if (admitted.loops.empty()) admitted = agreeing(kLoosely, needed + 1);
+  if (admitted.loops.empty() && Fulfilled(loop, map)) {
+    // Of a weak one that the map says already, the others learn nothing.
+    if (!loop_is_weak) admitted = agreeing(1, 0);
+    if (loop_is_weak) admitted.loops = {loop};
+    admitted.witness.reset();
   }
-  for (const LoopEdge& other : accepted) {
-    if (agrees_with(other)) ++agreeing;
-  }
-  if (agreeing < options_.loop_confirmations && !Fulfilled(loop, map)) {
+  if (admitted.loops.empty()) {
     waiting_.push_back(loop);
-    return {};
+    return admitted;
   }
-  waiting_ = std::move(still_waiting);
-  entering.push_back(loop);
-  return entering;
+  const auto enters = [&](const LoopEdge& other) {
+    return std::any_of(admitted.loops.begin(), admitted.loops.end(), [&](const LoopEdge& entering) {
+      return entering.query_frame == other.query_frame && entering.candidate_frame == other.candidate_frame;
+    });
+  };
+  waiting_.erase(std::remove_if(waiting_.begin(), waiting_.end(), enters), waiting_.end());
+  return admitted;
+}
+
+void LoopGate::Withdraw(std::int64_t query_frame) {
+  const auto of_it = [&](const LoopEdge& loop) { return loop.query_frame == query_frame; };
+  waiting_.erase(std::remove_if(waiting_.begin(), waiting_.end(), of_it), waiting_.end());
 }
 
 }  // namespace tutti

@@ -16,6 +16,13 @@ namespace tutti {
 /// A false loop ruins a map, a missed one costs little: a loop enters when it closes with another loop nearby
 /// (the cycle candidate A -> query A -> query B -> candidate B -> candidate A; pairwise consistency as in
 /// Mangelson et al., ICRA 2018), or when the map says the same so closely that chance is no explanation.
+///
+/// Images of a rolling shutter in a hand that shakes tell a motion only to a degree or two: loops that agree
+/// within twice the limits need one witness more.
+///
+/// Loops may be weak: the detector would not have believed them. Such a loop is a witness and needs one, but
+/// proves nothing by itself: a strong one must agree, and the two must have seen different things. Where a
+/// place looks like another one, successive images say so alike, and agree with each other.
 class LoopGate {
  public:
   /// Pose of a keyframe in the present map, and the map piece that it belongs to.
@@ -24,6 +31,16 @@ class LoopGate {
     Pose T_world_camera;
   };
   using Map = std::function<Place(int keyframe)>;
+  /// kWeak: the detector did not believe the loop. kFar: it did, but the map is off by so much that the
+  /// odometry would have to have failed altogether; three that saw different things must say so.
+  enum class Trust { kSure, kFar, kWeak };
+  using Trusts = std::function<Trust(const LoopEdge& loop)>;
+  /// What Offer lets in, and which loop it agrees with; none: the map says the same, or nothing was asked
+  /// for.
+  struct Admitted {
+    std::vector<LoopEdge> loops;
+    std::optional<LoopEdge> witness;
+  };
 
   explicit LoopGate(const SlamOptions& options) : options_(options) {}
 
@@ -36,17 +53,24 @@ class LoopGate {
   /// that waited. Loops that are in the map (`accepted`) vouch for it as well. Loops can agree whose frames
   /// are close; with `across`, also those whose keyframes stand side by side in the map, at both ends: drives
   /// at different times that are tied to each other. A loop between the same two keyframes is not another
-  /// one.
-  std::vector<LoopEdge> Offer(const LoopEdge& loop, const std::vector<LoopEdge>& accepted, const Map& map,
-                              bool across = false);
+  /// one. `trusts`: of `loop` and those that wait; empty: kSure.
+  Admitted Offer(const LoopEdge& loop, const std::vector<LoopEdge>& accepted, const Map& map,
+                 bool across = false, const Trusts& trusts = {});
+  /// Forgets those that wait and were found with this frame as the query.
+  void Withdraw(std::int64_t query_frame);
+
+  /// True if the images of two loops show different things, at both ends: their cameras stand apart, or look
+  /// elsewhere.
+  static bool Independent(const LoopEdge& a, const LoopEdge& b, const Map& map);
 
   /// How far the cycle of two loops and the map between their ends is from closing.
   static Disagreement Cycle(const LoopEdge& a, const LoopEdge& b, const Map& map);
   /// Distance of two keyframes in the map.
   static double Apart(int x, int y, const Map& map);
 
-  /// True if the two loops agree with each other through the odometry between their ends.
-  bool Agree(const LoopEdge& a, const LoopEdge& b, const Map& map) const;
+  /// True if the two loops agree with each other through the odometry between their ends, within so many
+  /// times the limits.
+  bool Agree(const LoopEdge& a, const LoopEdge& b, const Map& map, double times = 1) const;
 
   /// True if the present map fulfils the loop so well that it need not move for it.
   bool Fulfilled(const LoopEdge& loop, const Map& map) const;
@@ -67,7 +91,7 @@ class LoopGate {
  private:
   static std::optional<Similarity> InMap(const LoopEdge& loop, const Map& map);  // T_query_candidate
   std::optional<Disagreement> WithMap(const LoopEdge& loop, const Map& map) const;
-  Disagreement Limits(const LoopEdge& a, const LoopEdge& b, const Map& map) const;
+  Disagreement Limits(const LoopEdge& a, const LoopEdge& b, const Map& map, double times) const;
   bool Near(const LoopEdge& a, const LoopEdge& b) const;
   static bool SideBySide(const LoopEdge& a, const LoopEdge& b, const Map& map);
 

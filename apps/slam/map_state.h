@@ -78,17 +78,22 @@ void State(Archive& archive, VerifiedMatch& m) {
 
 template <class Archive>
 void State(Archive& archive, Verification& v) {
-  archive(v.candidate, v.accepted, v.type, v.S_candidate_query, v.information, v.homography, v.ahead,
+  archive(v.candidate, v.similar, v.accepted, v.type, v.S_candidate_query, v.information, v.homography,
           v.matches, v.inliers, v.coverage, v.expected_inliers, v.log_nfa, v.motion_spread, v.mass, v.reason,
           v.inlier_matches);
 }
 
 template <class Archive>
+void State(Archive& archive, LateLoop& l) {
+  archive(l.query, l.accepted, l.withdrawn, l.probability, l.verification);
+}
+
+template <class Archive>
 void State(Archive& archive, LoopResult& r) {
   archive(r.query, r.hypothesis, r.candidate, r.best, r.posterior, r.probability, r.proposed, r.accepted,
-          r.reason, r.members, r.verification, r.tried, r.posterior_by_location, r.evidence, r.retrieved,
-          r.transferred, r.warning, r.extract_ms, r.quantise_ms, r.likelihood_ms, r.filter_ms, r.verify_ms,
-          r.memory_ms);
+          r.reason, r.members, r.verification, r.tried, r.late, r.posterior_by_location, r.evidence,
+          r.retrieved, r.transferred, r.warning, r.extract_ms, r.quantise_ms, r.likelihood_ms, r.filter_ms,
+          r.verify_ms, r.memory_ms);
 }
 
 /// All but the detector's sections.
@@ -101,7 +106,7 @@ template <class Archive>
 void State(Archive& archive, LoopRecord& r) {
   archive(r.query, r.candidate, r.query_stamp_s, r.candidate_stamp_s, r.members, r.hypothesis, r.posterior,
           r.probability, r.matches, r.inliers, r.verified, r.accepted, r.injected, r.weight, r.gate_sigmas,
-          r.revoked, r.pending, r.correct, r.reason, r.S_candidate_query);
+          r.revoked, r.pending, r.correct, r.reason, r.witness, r.S_candidate_query);
 }
 
 template <class Archive>

@@ -27,7 +27,7 @@ struct LoopLine {
   double weight = -1;
 };
 
-// The reason is the only quoted cell, `accepted` stands before it; of the cells behind it `weight` is the
+// The reason is the first quoted cell, `accepted` stands before it; of the cells behind it `weight` is the
 // eleventh and `injected` the next.
 std::vector<LoopLine> ReadLoops(const fs::path& file) {
   std::istringstream in(ReadAll(file));
@@ -38,7 +38,7 @@ std::vector<LoopLine> ReadLoops(const fs::path& file) {
   std::vector<LoopLine> loops;
   while (std::getline(in, line)) {
     LoopLine loop;
-    const std::size_t begin = line.find('"') + 1, end = line.rfind('"');
+    const std::size_t begin = line.find('"') + 1, end = line.find('"', begin);
     std::istringstream behind(line.substr(end + 2));
     std::vector<std::string> after;
     for (std::string cell; std::getline(behind, cell, ',');) after.push_back(cell);

@@ -54,11 +54,13 @@ TEST(Summary, SaysHowGoodTheResultIsAndWhy) {
 
 TEST(Summary, LoopsCsvSaysHowFarApartTheEndsOfALoopAre) {
   RunResult result = WithOneLoopOfWeight(1);
-  EXPECT_NE(LoopsCsv(result).find(",distance_m,angle_deg,error_m,error_deg,correct\n"), std::string::npos);
+  EXPECT_NE(LoopsCsv(result).find(",distance_m,angle_deg,error_m,error_deg,correct,witness\n"),
+            std::string::npos);
   EXPECT_NE(LoopsCsv(result).find(",,,,,\n"), std::string::npos);
   result.loop_errors = {{1.5, 30, 0.25, 2}};
   result.loops[0].correct = true;
-  EXPECT_NE(LoopsCsv(result).find(",1.5000,30.0000,0.2500,2.0000,1\n"), std::string::npos)
+  result.loops[0].witness = "the map";
+  EXPECT_NE(LoopsCsv(result).find(",1.5000,30.0000,0.2500,2.0000,1,\"the map\"\n"), std::string::npos)
       << LoopsCsv(result);
 }
 

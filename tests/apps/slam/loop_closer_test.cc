@@ -134,6 +134,63 @@ TEST_F(LoopCloserTest, ALoopAloneWaitsAndSaysSoInTheEnd) {
   EXPECT_THAT(closer.records()[0].reason, HasSubstr("no second loop"));
 }
 
+// What the detector proposes without believing it: geometry found so many inliers, and the probability.
+TEST_F(LoopCloserTest, ADoubtfulLoopWaitsForASureOneAndSaysWhoVouchedForIt) {
+  const auto doubtful = [&](LoopCloser* closer, int candidate, int query, int inliers, double probability) {
+    LoopRecord record = Proposed(candidate, query, false);
+    record.probability = probability;
+    record.reason = "probably not this place";
+    Verification verification;
+    verification.accepted = inliers >= 30;
+    verification.type = ConstraintType::kRigid;
+    verification.S_candidate_query = InMap(candidate, query, 0.5);
+    verification.information = 1e4 * Matrix6d::Identity();
+    verification.inliers = inliers;
+    verification.mass = 0.5;
+    verification.log_nfa = -30;
+    closer->Consider(record, verification, candidate, query, odometry_, frames_);
+    return closer->records().back();
+  };
+  LoopCloser closer = Closer();
+  EXPECT_FALSE(doubtful(&closer, kFirst, kLater - 3, 40, 0.2).pending) << "too improbable";
+  EXPECT_FALSE(doubtful(&closer, kFirst, kLater - 3, 15, 0).pending) << "too few inliers for a motion";
+  EXPECT_TRUE(doubtful(&closer, kFirst + 8, kLater + 8, 40, 0.5).pending);
+  const LoopRecord few = doubtful(&closer, kFirst + 8, kLater + 4, 25, 0);
+  EXPECT_TRUE(few.pending);
+  EXPECT_THAT(few.reason, HasSubstr("by itself: probably not this place"));
+  EXPECT_FALSE(closer.MayMove(frames_ + 1000)) << "they do not vouch for each other";
+  Consider(&closer, kFirst, kLater, 0.5);
+  EXPECT_TRUE(Solve(&closer).correction);
+  EXPECT_EQ(CountAccepted(closer.records()), 3u);
+  EXPECT_EQ(closer.records()[2].witness, "the loop of frame " + std::to_string(closer.records()[4].query));
+  EXPECT_FALSE(closer.records()[2].verified);
+  EXPECT_THAT(closer.records()[4].witness, HasSubstr("the loop of frame"));
+}
+
+// Two images of a house that looks like another one agree with each other, however far that one is.
+TEST_F(LoopCloserTest, LoopsThatAreOffByMoreThanHalfOfTheWayNeedMoreThanASecondOne) {
+  LoopCloser closer = Closer();
+  ConsiderTwo(&closer, 100);
+  EXPECT_FALSE(closer.MayMove(frames_ + 1000));
+  EXPECT_TRUE(closer.records()[1].pending);
+}
+
+TEST_F(LoopCloserTest, WhatTheDetectorTakesBackIsDroppedWhileItWaitsAndStaysWhereTheGateLetItIn) {
+  LoopCloser closer = Closer();
+  Consider(&closer, kFirst, kLater, 0.5);
+  closer.Withdraw(closer.records()[0].query, kTakenBack, true);
+  EXPECT_FALSE(closer.records()[0].pending);
+  EXPECT_FALSE(closer.records()[0].verified);
+  EXPECT_THAT(closer.records()[0].reason, HasSubstr("taken it back"));
+  Consider(&closer, kFirst, kLater + 1, 0.5);
+  EXPECT_FALSE(closer.MayMove(frames_ + 1000));
+  Consider(&closer, kFirst, kLater + 2, 0.5);
+  closer.Withdraw(closer.records()[2].query, kTakenBack, true);
+  Solve(&closer);
+  EXPECT_EQ(CountAccepted(closer.records()), 2u);
+  EXPECT_TRUE(closer.records()[2].verified);
+}
+
 TEST_F(LoopCloserTest, AtTheEndOfARecordingASolutionEntersAtOnce) {
   LoopCloser closer = Closer();
   ConsiderTwo(&closer, 0.5);

@@ -376,11 +376,11 @@ TEST_F(Merging, TheOpenEndOfARoundIsClosed) {
   round.ExpectTrueGap(*map);
 }
 
-// The detectors know every fourth keyframe, enough to join the maps in the middle, and propose nothing where
+// The detectors know every sixth keyframe, enough to join the maps in the middle, and propose nothing where
 // the round ends. The search looks at all keyframes.
 TEST_F(Merging, WhatTheDetectorsMissedIsFoundInTheJoinedMap) {
   RunConfig config = WithOneMember();
-  config.run.loop_every_keyframes = 4;
+  config.run.loop_every_keyframes = 6;
   const MergedRound round(110, 19);
   const auto map = MapOf(round.first, config), other = MapOf(round.second, config);
   ASSERT_TRUE(map->Merge(other.get()));

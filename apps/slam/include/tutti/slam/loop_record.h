@@ -25,7 +25,7 @@ struct LoopRecord {
   double posterior = 0;    ///< of the ensemble at its best location
   double probability = 0;  ///< that it is a loop (LoopResult::probability), 0..1
   int matches = 0, inliers = 0;
-  bool verified = false;              ///< passed the detector's geometric verification
+  bool verified = false;              ///< a loop for the detector: geometry and probability
   bool accepted = false;              ///< in the pose graph in the end
   bool injected = false;              ///< not the detector's (SlamSystem::AddLoop), e.g. planted as a test
   double weight = 0;                  ///< that the pose graph last gave it, 0..1; 0: never was in it,
@@ -35,6 +35,8 @@ struct LoopRecord {
   bool pending = false;               ///< waits for a second loop that agrees
   std::optional<bool> correct;        ///< what the ground truth says of an accepted loop, if it can
   std::string reason;                 ///< why it is not accepted, in plain words
+  std::string witness;                ///< what else spoke for an accepted loop: "the loop of frame 812",
+                                      ///< "the map"; empty: nothing was asked for
   std::optional<Similarity> S_candidate_query;  ///< the constraint, if one could be computed
 };
 

@@ -48,7 +48,6 @@ VARIANTS = {
     "16 kd-tree checks": ["--set", "vocabulary.checks=16"],
     "FLANN's own kd-trees": ["--set", "vocabulary.float_index=flann"],
     "8 random tries": ["--set", "vocabulary.hash_tables=8"],
-    "not the nearer view": ["--set", "verification.nearer_share=1"],
     "sequence: 2 consistent images": ["--set", "consistent_images=2"],
     "islands of 3 levels": ["--set", "island_levels=3"],
     "root-SIFT": ["--set", "extraction.root_sift=true"],

@@ -47,7 +47,7 @@ CellsOfWord Words(const Features& features, const cv::Size& size, int cells, Mem
 // Matched words of an image by location and cell.
 std::vector<double> Sums(const CellsOfWord& cells_of_word, const Postings& postings, int image, int cells,
                          int still_in_sight) {
-  const Sight sight{image - LoopDetectorOptions().stm_size + 1, still_in_sight};
+  const Sight sight{image - LoopDetectorOptions().stm_size + 1, still_in_sight > 0};
   std::vector<double> sums(static_cast<std::size_t>(image + 1) * static_cast<std::size_t>(cells), 0.0);
   const double all = std::log10(image + 1.0);
   for (const auto& entry : cells_of_word) {
@@ -97,7 +97,7 @@ void PutTruth(int cells, const LoopGroundTruth& truth, std::ofstream& out) {
 
 int Run(const std::string& folder, const cli::GroundTruthArguments& truth_arguments, const std::string& file,
         const std::vector<int>& still_in_sight) {
-  const auto [images, rights, truth, recording, stride] = cli::LoadImageSet(folder, truth_arguments);
+  const auto [images, rights, truth, recording, depth, notes, stride] = cli::LoadImageSet(folder, truth_arguments);
   const LoopDetectorOptions options;
   std::vector<Member> members;
   members.reserve(options.members.size());

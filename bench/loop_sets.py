@@ -3,6 +3,7 @@
 bench/ensemble_protocol draws seeds of its own for worlds and changes. The seeds here belong to development sets, on which
 constants were chosen: no table of the protocol shows them.
 """
+import os
 import shutil
 import subprocess
 import sys
@@ -16,6 +17,9 @@ REAL = {  # images, ground truth, further arguments; the first three are changed
     "kitti1": ("kitti_00_head/image_0", "kitti_00_head/poses.txt", []),
 }
 CHANGED = ["corridor", "kitti5", "kitchen3"]
+KITCHEN_CAMERA = "520,520,318,236"  # of the images in ../shared/data
+ROOM_CAMERA = "393.6,393.6,239.5,179.5"  # as `tutti generate` has it at 480x360
+OVERLAP_TRUTH = ["--ground-truth-overlap", "0.3", "--gt-exclude-s", "10"]
 WORLD_TRUTH = ["--gt-angle", "30", "--gt-exclude-s", "30"]
 WORLDS = {  # options of generate, of the ground truth
     "indoor": (["--frames", "388", "--sensor", "mono", "--world", "corridor", "--width", "240", "--height", "192", "--corridor",
@@ -34,8 +38,30 @@ WORLDS = {  # options of generate, of the ground truth
                    "--moving-objects", "6"],
                   ["--gt-angle", "30", "--gt-exclude-s", "10", "--gt-distance", "3", "--gt-ignore", "8"]),
 }
+
+
+def _with(kind, *more):
+    """The options and ground truth of a world, with other values, or options that it has not."""
+    options, truth = list(WORLDS[kind][0]), WORLDS[kind][1]
+    for k in range(0, len(more), 2):
+        if more[k] in options:
+            options[options.index(more[k]) + 1] = more[k + 1]
+        else:
+            options.extend(x for x in more[k:k + 2] if x)
+    return options, truth
+
+
+# Words that do not agree across light, few loops, and streets that look alike.
+WORLDS["indoor-dusk"] = _with("indoor", "--dusk", "")
+WORLDS["city-few"] = _with("city", "--frames", "500", "--blocks-x", "4", "--blocks-y", "3", "--speed", "7.25", "--laps", "1.2")
+WORLDS["loop-free-6"] = _with("loop-free", "--roads", "6")
+WORLDS["loop-free-300"] = _with("loop-free", "--roads", "300")
+del WORLDS["loop-free"]
+# A camera in a hand, with a rolling shutter: judged by overlap, with one camera or RGB-D.
+WORLDS["room"] = (["--sensor", "rgbd", "--world", "room", "--width", "480", "--height", "360", "--rate", "4", "--laps", "2.5",
+                   "--shake", "200", "--readout", "0.03", "--blur", "0.02", "--noise", "2", "--kinect-noise"], OVERLAP_TRUTH)
 DEVELOPMENT_CHANGE = {"corridor": 40, "kitchen3": 60, "kitti5": 300}  # the first image that is changed
-DEVELOPMENT_CHANGE_SEED = 7
+DEVELOPMENT_CHANGE_SEEDS = [7, 8]
 
 
 def quiet(command):
@@ -48,9 +74,23 @@ def real(data, name):
     return ["--images", data / images, "--ground-truth", data / truth, *more]
 
 
-def world(kind, folder):
-    """The same for a world that lies in `folder`."""
+def kitchen_by_overlap(data, camera):
+    """The same of redkitchen, judged by overlap; `camera`: as camera_options has it."""
+    folder = data / "redkitchen"
+    return ["--images", folder / "rgb", "--ground-truth", folder / "groundtruth.txt", "--stride", "3", *OVERLAP_TRUTH,
+            *camera_options(KITCHEN_CAMERA, camera)]
+
+
+def camera_options(intrinsics, camera):
+    """"one": motions up to their scale; "rgbd": motions in metres; both need the camera of the depth images."""
+    return ["--gt-camera", intrinsics, *(["--camera", intrinsics] if camera == "one" else ["--rgbd"])]
+
+
+def world(kind, folder, camera="one"):
+    """The same for a world that lies in `folder`; `camera`: of a room."""
     truth = WORLDS[kind][1]
+    if kind == "room":
+        return ["--images", folder / "rgb", "--ground-truth", folder / "groundtruth.txt", *truth, *camera_options(ROOM_CAMERA, camera)]
     return ["--images", folder / ("images" if "--join-pairs" in truth else "image_0"), "--ground-truth", folder / "poses.txt", *truth]
 
 
@@ -60,32 +100,42 @@ def generate(tutti, folder, options):
         return
     shutil.rmtree(folder, ignore_errors=True)
     print(f"generating {folder.name}", file=sys.stderr, flush=True)
-    quiet([tutti, "generate", "--out", folder, *options])
-    (folder / ".done").write_text("")
+    command = [str(x) for x in (tutti, "generate", "--out", folder, "--threads", "1", *options)]
+    child = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    _, status, usage = os.wait4(child.pid, 0)
+    child.returncode = os.waitstatus_to_exitcode(status)
+    if child.returncode != 0:
+        raise RuntimeError(f"{' '.join(command)}: failed")
+    (folder / ".done").write_text(f"{usage.ru_utime + usage.ru_stime:.1f}\n")
+
+
+def seconds_of(folder):
+    """Of a processor, that a world took."""
+    return float((folder / ".done").read_text() or 0) if (folder / ".done").exists() else 0.0
 
 
 def generate_world(tutti, kind, seed, folder):
     generate(tutti, folder, ["--seed", seed, *WORLDS[kind][0]])
 
 
-def development_world(tutti, kind, seed, out):
+def development_world(tutti, kind, seed, out, camera="one"):
     """Arguments of `tutti loops` for a world, which is generated where it is absent."""
     folder = out / f"world-{kind}-{seed}"
     generate_world(tutti, kind, seed, folder)
-    return world(kind, folder)
+    return world(kind, folder, camera)
 
 
-def development_changed(tutti, data, name, change, out):
+def development_changed(tutti, data, name, change, change_seed, out):
     """The same for changed real images."""
     images, truth, more = REAL[name]
-    folder = out / f"images-{name}-{change}".replace(":", "-")
+    folder = out / f"images-{name}-{change}-{change_seed}".replace(":", "-")
     stride, rest = 1, list(more)
     if "--stride" in rest:  # the images that are written are the chosen ones already
         at = rest.index("--stride")
         stride = rest[at + 1]
         del rest[at:at + 2]
     generate(tutti, folder, ["--from-images", data / images, "--stride", stride, "--change", change, "--change-from",
-                             DEVELOPMENT_CHANGE[name], "--seed", DEVELOPMENT_CHANGE_SEED])
+                             DEVELOPMENT_CHANGE[name], "--seed", change_seed])
     for matrix in folder.glob("ground_truth*"):  # lies among the images
         matrix.unlink()
     return ["--images", folder, "--ground-truth", data / truth, *rest]

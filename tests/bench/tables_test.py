@@ -14,6 +14,8 @@ ROOT = pathlib.Path(sys.argv.pop(1))
 sys.path.insert(0, str(ROOT / "bench"))
 sys.dont_write_bytecode = True
 import benchmark  # noqa: E402
+import ensemble_bounds  # noqa: E402
+import ensemble_figures  # noqa: E402
 import run_table  # noqa: E402
 import table  # noqa: E402
 
@@ -26,6 +28,36 @@ def call(*arguments):
 def run(**figures):
     return {"total": 500, "lost": 0, "true": 3, "false": 0, "path_m": 10, "wall_s": 8, "cpu_ms": 20, "odometry_ate": 0.05,
             "slam_ate": 0.04, "end_closed": 1, **figures}
+
+
+def loops(outcomes):
+    """One row of the ensemble's protocol, by a letter an image."""
+    found = {c: outcomes.count(c) for c in "TFXnm"}
+    return {"outcomes": outcomes, "true": found["T"], "false": found["F"] + found["X"], "near": found["n"], "images": len(outcomes),
+            "rows_with_loop": sum(found[c] for c in "TXnm"), "r100_posterior": 1.0, "reliability": [[0, 0, 0]] * 10}
+
+
+class Protocol(unittest.TestCase):
+    def test_blocks_hold_what_the_whole_set_has(self):
+        row = loops("T" * 15 + "m" * 10 + "." * 10 + "XFn")
+        self.assertEqual(ensemble_figures.blocks(row), [(15, 0, 20), (0, 2, 7)])
+        self.assertAlmostEqual(ensemble_figures.f1_of((15, 2, 27)), ensemble_figures.Pool([{"rows": {"joint": row}}], "joint").f1(), 2)
+
+    def test_an_interval_holds_the_figure_and_is_a_point_where_all_is_equal(self):
+        sets = [{"rows": {"joint": loops("T" * 60), "orb": loops("T" * 20 + "m" * 20 + "F" * 20)}} for _ in range(3)]
+        low, high = ensemble_figures.interval(ensemble_figures.resampled(sets, ["joint"], ensemble_figures.precision_of, 200))
+        self.assertEqual((low, high), (1.0, 1.0))
+        low, high = ensemble_figures.interval(ensemble_figures.resampled(sets, ["orb"], ensemble_figures.precision_of, 200))
+        self.assertTrue(low < 0.5 < high)
+
+    def test_bounds_hold_and_fail(self):
+        def verdicts(free, dusk):
+            done = {f"world/loop-free-6/{i}": {"rows": {"joint": loops(free)}} for i in range(2)}
+            done["world/indoor-dusk/0"] = {"rows": {m: loops(dusk) for m in ["joint", "surf", "sift", "orb"]}}
+            lines = ensemble_bounds.judge(done, {}).lines
+            return [line.split(" | ")[-1] for line in lines if "loop-free drives" in line or "at dusk" in line]
+        self.assertEqual(verdicts("." * 50 + "F", "T" * 20 + "m" * 20), ["holds |", "holds |"])
+        self.assertEqual(verdicts("." * 50 + "FF", "T" * 15 + "m" * 25), ["**fails** |", "**fails** |"])
 
 
 class Tables(unittest.TestCase):

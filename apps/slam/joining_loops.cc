@@ -115,6 +115,14 @@ class SetFinder {
   std::map<int, std::map<int, Way>> ways_;
 };
 
+// By places; or by loops where they are many more, at more places: one camera's loops are off in scale now
+// and then, and a few agree in that.
+bool Outnumbers(const LoopSet& set, const LoopSet& other) {
+  constexpr std::size_t kManyMore = 10;
+  return set.places >= kClearly * other.places ||
+         (set.places > other.places && set.loops.size() >= kManyMore * other.loops.size());
+}
+
 std::string Several(std::size_t count, const char* one) {
   return std::to_string(count) + " " + one + (count == 1 ? "" : "s");
 }
@@ -142,7 +150,7 @@ JoiningLoops ChooseJoiningLoops(const std::vector<LoopEdge>& loops, const LoopGa
     if (!finder.Confirmed(best)) {
       reason = "no two of the " + Several(of.size(), "verified loop") + " between them agree";
       if (of.size() == 1) reason = "the only verified loop between them has no second one that agrees";
-    } else if (rival && best.places < kClearly * sets[1].places) {
+    } else if (rival && !Outnumbers(best, sets[1])) {
       reason =
           "the loops between them contradict each other, and neither side clearly outnumbers the other: " +
           Counted(best) + " against " + Counted(sets[1]) + ", where twice as many places are asked for";

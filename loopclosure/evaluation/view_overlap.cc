@@ -10,7 +10,7 @@
 namespace tutti::internal {
 namespace {
 
-constexpr int kColumns = 24, kRows = 18;
+constexpr int kGridWide = 24, kGridHigh = 18;
 constexpr int kCoarseWidth = 160;       // enough: a cell of the grid is more than six such pixels wide
 constexpr float kNear = 0.05f;          // [m]
 constexpr float kNearShare = 0.05f;     // of the depth: Kinect's noise, slanted surfaces, the pose's error
@@ -36,9 +36,10 @@ DepthView::DepthView(const Pose& T_world_camera, const PinholeCamera& camera, co
   const float scale = 1.0f / static_cast<float>(step);
   fx_ = static_cast<float>(camera.fx) * scale, fy_ = static_cast<float>(camera.fy) * scale;
   cx_ = static_cast<float>(camera.cx) * scale, cy_ = static_cast<float>(camera.cy) * scale;
-  for (int r = 0; r < kRows; ++r) {
-    for (int c = 0; c < kColumns; ++c) {
-      const int x = (2 * c + 1) * coarse_.cols / (2 * kColumns), y = (2 * r + 1) * coarse_.rows / (2 * kRows);
+  for (int r = 0; r < kGridHigh; ++r) {
+    for (int c = 0; c < kGridWide; ++c) {
+      const int x = (2 * c + 1) * coarse_.cols / (2 * kGridWide),
+                y = (2 * r + 1) * coarse_.rows / (2 * kGridHigh);
       const float z = coarse_.at<float>(y, x);
       if (z <= 0) continue;
       points_.emplace_back((static_cast<float>(x) - cx_) / fx_ * z, (static_cast<float>(y) - cy_) / fy_ * z,
@@ -80,7 +81,7 @@ std::optional<double> DepthView::SeenBy(const DepthView& other) const {
     seen += sight == Sight::kSeen ? 1 : 0;
     decided += sight == Sight::kDoubt ? 0 : 1;
   }
-  if (decided < kLeastDecided * kColumns * kRows) return std::nullopt;
+  if (decided < kLeastDecided * kGridWide * kGridHigh) return std::nullopt;
   return static_cast<double>(seen) / decided;
 }
 

@@ -15,7 +15,7 @@ namespace tutti::internal {
 namespace {
 
 constexpr int kTogether = WholeRows::kTogether;
-constexpr std::size_t kBlock = 16;  // columns whose sums stay in registers
+constexpr std::size_t kRowBlock = 16;  // columns whose sums stay in registers
 
 // Scalar products of kTogether rows (`pairs` pairs of values each, row by row) with `padded` columns.
 struct Task {
@@ -32,32 +32,34 @@ void Check(const Task& t) {
 }
 
 TUTTI_CHECKED_AS_A_WHOLE void MultiplyAnywhere(const Task& t) {
-  for (std::size_t c = 0; c < t.padded; c += kBlock) {
-    std::int32_t sums[kTogether][kBlock] = {};
+  for (std::size_t c = 0; c < t.padded; c += kRowBlock) {
+    std::int32_t sums[kTogether][kRowBlock] = {};
     for (std::size_t k = 0; k < t.pairs; ++k) {
       const std::int16_t* column = t.columns + 2 * (k * t.padded + c);
       for (std::size_t i = 0; i < kTogether; ++i) {
         const std::int16_t* row = t.rows + 2 * (i * t.pairs + k);
-        for (std::size_t l = 0; l < kBlock; ++l)
+        for (std::size_t l = 0; l < kRowBlock; ++l)
           sums[i][l] += row[0] * column[2 * l] + row[1] * column[2 * l + 1];
       }
     }
-    for (std::size_t i = 0; i < kTogether; ++i) std::copy_n(sums[i], kBlock, t.products + i * t.padded + c);
+    for (std::size_t i = 0; i < kTogether; ++i)
+      std::copy_n(sums[i], kRowBlock, t.products + i * t.padded + c);
   }
 }
 
 #if defined(__x86_64__) && defined(__GNUC__)
+#define TUTTI_BY_AVX2 __attribute__((target("avx2"))) TUTTI_CHECKED_AS_A_WHOLE
 // The same numbers. What target_clones would have to find by itself: one instruction multiplies two pairs and
 // adds them up.
-__attribute__((target("avx2"))) TUTTI_CHECKED_AS_A_WHOLE void MultiplyByAvx2(const Task& t) {
-  static_assert(kTogether == 4 && kBlock == 16);
-  for (std::size_t c = 0; c < t.padded; c += kBlock) {
+TUTTI_BY_AVX2 void MultiplyByAvx2(const Task& t) {
+  static_assert(kTogether == 4 && kRowBlock == 16);
+  for (std::size_t c = 0; c < t.padded; c += kRowBlock) {
     __m256i sums[kTogether][2];
     for (auto& sum : sums) sum[0] = sum[1] = _mm256_setzero_si256();
     for (std::size_t k = 0; k < t.pairs; ++k) {
       const std::int16_t* column = t.columns + 2 * (k * t.padded + c);
       const __m256i left = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(column));
-      const __m256i right = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(column + kBlock));
+      const __m256i right = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(column + kRowBlock));
       for (std::size_t i = 0; i < kTogether; ++i) {
         std::int32_t pair = 0;
         std::memcpy(&pair, t.rows + 2 * (i * t.pairs + k), sizeof pair);
@@ -69,7 +71,7 @@ __attribute__((target("avx2"))) TUTTI_CHECKED_AS_A_WHOLE void MultiplyByAvx2(con
     for (std::size_t i = 0; i < kTogether; ++i) {
       std::int32_t* to = t.products + i * t.padded + c;
       _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), sums[i][0]);
-      _mm256_storeu_si256(reinterpret_cast<__m256i*>(to + kBlock / 2), sums[i][1]);
+      _mm256_storeu_si256(reinterpret_cast<__m256i*>(to + kRowBlock / 2), sums[i][1]);
     }
   }
 }
@@ -122,7 +124,7 @@ std::optional<WholeRows> WholeRows::Of(const cv::Mat& rows, float scale) {
 }
 
 WholeRows::Columns::Columns(const WholeRows& rows)
-    : padded_((rows.squares_.size() + kBlock - 1) / kBlock * kBlock),
+    : padded_((rows.squares_.size() + kRowBlock - 1) / kRowBlock * kRowBlock),
       values_(2 * static_cast<std::size_t>(rows.pairs_) * padded_),
       squares_(rows.squares_) {
   const auto pairs = static_cast<std::size_t>(rows.pairs_);

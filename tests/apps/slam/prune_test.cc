@@ -151,7 +151,8 @@ TEST_P(Pruned, MapIsSmallerAndKeepsPosesLoopsAndGraphAndGoesOnAndTellsWhereFrame
   continued->Finish();
   EXPECT_GT(continued->Sessions().back().first_keyframe, before.back());
   ExpectOnePiece(*continued);
-  EXPECT_TRUE(continued->Merge(other.get()));
+  std::string why;
+  EXPECT_TRUE(continued->Merge(other.get(), &why)) << why;
   EXPECT_GE(continued->Sessions().back().first_keyframe, continued->Sessions()[1].last_keyframe);
   ExpectOnePiece(*continued);
   continued->Save(file);

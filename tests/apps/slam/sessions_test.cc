@@ -376,17 +376,21 @@ TEST_F(Merging, TheOpenEndOfARoundIsClosed) {
   round.ExpectTrueGap(*map);
 }
 
-// The detectors know every sixth keyframe, enough to join the maps in the middle, and propose nothing where
-// the round ends. The search looks at all keyframes.
+// The detectors know every fourth keyframe and propose what they hardly doubt, enough to join the maps in the
+// middle, and nothing where the round ends. The search looks at all keyframes.
 TEST_F(Merging, WhatTheDetectorsMissedIsFoundInTheJoinedMap) {
   RunConfig config = WithOneMember();
-  config.run.loop_every_keyframes = 6;
+  config.run.loop_every_keyframes = 4;
+  config.loops.propose_threshold = 0.95;
   const MergedRound round(110, 19);
   const auto map = MapOf(round.first, config), other = MapOf(round.second, config);
   ASSERT_TRUE(map->Merge(other.get()));
   const std::vector<LoopRecord> closing = MergedRound::Closing(*map);
   EXPECT_GE(closing.size(), 2u);
-  for (const LoopRecord& loop : closing) EXPECT_EQ(loop.hypothesis, 0) << "a detector's: " << loop.query;
+  EXPECT_GE(std::count_if(closing.begin(), closing.end(),
+                          [](const LoopRecord& loop) { return loop.hypothesis == 0; }),
+            1)
+      << "what no detector proposed";
   round.ExpectTrueGap(*map);
 }
 

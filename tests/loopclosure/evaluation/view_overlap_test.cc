@@ -8,17 +8,17 @@
 namespace tutti::internal {
 namespace {
 
-constexpr int kWidth = 320, kHeight = 240;
-constexpr double kFocal = 200;  // so 6.4 m of a plane 4 m away are seen
+constexpr int kViewWidth = 320, kViewHeight = 240;
+constexpr double kViewFocal = 200;  // so 6.4 m of a plane 4 m away are seen
 
 // A camera at x [m], so far turned about its y axis, before surfaces `depth_m` away in all of its image.
 DepthView Before(float depth_m, double x_m = 0, double turned_deg = 0, double z_m = 0) {
   PinholeCamera camera;
-  camera.width = kWidth, camera.height = kHeight;
-  camera.fx = camera.fy = kFocal;
-  camera.cx = (kWidth - 1) / 2.0, camera.cy = (kHeight - 1) / 2.0;
+  camera.width = kViewWidth, camera.height = kViewHeight;
+  camera.fx = camera.fy = kViewFocal;
+  camera.cx = (kViewWidth - 1) / 2.0, camera.cy = (kViewHeight - 1) / 2.0;
   const Pose pose(ExpSO3({0, turned_deg / kDegrees, 0}), {x_m, 0, z_m});
-  return {pose, camera, cv::Mat(kHeight, kWidth, CV_32FC1, cv::Scalar(depth_m))};
+  return {pose, camera, cv::Mat(kViewHeight, kViewWidth, CV_32FC1, cv::Scalar(depth_m))};
 }
 
 TEST(ViewOverlap, ACameraMovedByHalfItsViewSharesHalf) {
@@ -52,14 +52,14 @@ TEST(ViewOverlap, NearAndFarDifferByDirection) {
 
 TEST(ViewOverlap, HolesAreDoubtsAndMostlyHolesSayNothing) {
   PinholeCamera camera;
-  camera.width = kWidth, camera.height = kHeight;
-  camera.fx = camera.fy = kFocal;
-  camera.cx = (kWidth - 1) / 2.0, camera.cy = (kHeight - 1) / 2.0;
-  cv::Mat depth(kHeight, kWidth, CV_32FC1, cv::Scalar(4));
-  depth(cv::Rect(0, 0, kWidth / 2, kHeight)) = 0;
+  camera.width = kViewWidth, camera.height = kViewHeight;
+  camera.fx = camera.fy = kViewFocal;
+  camera.cx = (kViewWidth - 1) / 2.0, camera.cy = (kViewHeight - 1) / 2.0;
+  cv::Mat depth(kViewHeight, kViewWidth, CV_32FC1, cv::Scalar(4));
+  depth(cv::Rect(0, 0, kViewWidth / 2, kViewHeight)) = 0;
   const DepthView half(Pose(), camera, depth);
   EXPECT_DOUBLE_EQ(Before(4).SeenBy(half).value(), 1);
-  depth(cv::Rect(0, 0, kWidth * 9 / 10, kHeight)) = 0;
+  depth(cv::Rect(0, 0, kViewWidth * 9 / 10, kViewHeight)) = 0;
   const DepthView tenth(Pose(), camera, depth);
   EXPECT_FALSE(Before(4).SeenBy(tenth).has_value());
   EXPECT_FALSE(tenth.SeenBy(Before(4)).has_value());

@@ -12,15 +12,15 @@
 namespace tutti::internal {
 namespace {
 
-constexpr int kPlaces = 4;
+constexpr int kChain = 4;
 constexpr int kSteps = Hindsight::kImages + 1;
 constexpr double kToStayNew = 0.9;
 
-// A chain of kPlaces locations, and as many images with random likelihoods as one waits for, and one before.
+// A chain of kChain locations, and as many images with random likelihoods as one waits for, and one before.
 class HindsightTest : public ::testing::Test {
  protected:
   HindsightTest() : transition_(kToStayNew), memory_(1) {
-    for (int i = 0; i <= kPlaces; ++i) {
+    for (int i = 0; i <= kChain; ++i) {
       memory_.Add(i);
       transition_.Update(memory_, memory_.Settle());
     }
@@ -29,7 +29,7 @@ class HindsightTest : public ::testing::Test {
     for (int s = 0; s < kSteps; ++s) {
       Belief likelihood;
       likelihood.new_place = 1.0;
-      for (int i = 0; i < kPlaces; ++i) likelihood.places.push_back(uniform(random));
+      for (int i = 0; i < kChain; ++i) likelihood.places.push_back(uniform(random));
       likelihoods_.push_back(likelihood);
     }
   }
@@ -46,7 +46,7 @@ class HindsightTest : public ::testing::Test {
 
   // p(to | from), -1: a new place.
   double Transition(int from, int to) const {
-    if (from < 0) return to < 0 ? kToStayNew : (1 - kToStayNew) / kPlaces;
+    if (from < 0) return to < 0 ? kToStayNew : (1 - kToStayNew) / kChain;
     if (to < 0) return TransitionModel::kToNewPlace;
     for (const auto& [slot, value] : transition_.Column(from)) {
       if (slot == to) return value;
@@ -57,7 +57,7 @@ class HindsightTest : public ::testing::Test {
   // The probability of each place at the first image, by all paths through the images: what smoothing has to
   // come to.
   std::vector<double> ByAllPaths() const {
-    std::vector<double> first(kPlaces + 1, 0.0);  // the new place last
+    std::vector<double> first(kChain + 1, 0.0);  // the new place last
     const auto weight = [&](int s, int place) {
       const Belief& l = likelihoods_[static_cast<std::size_t>(s)];
       return place < 0 ? l.new_place : l.places[static_cast<std::size_t>(place)];
@@ -65,16 +65,16 @@ class HindsightTest : public ::testing::Test {
     const std::function<double(int, int)> rest = [&](int s, int place) -> double {
       if (s + 1 == kSteps) return 1.0;
       double sum = 0;
-      for (int next = -1; next < kPlaces; ++next)
+      for (int next = -1; next < kChain; ++next)
         sum += Transition(place, next) * weight(s + 1, next) * rest(s + 1, next);
       return sum;
     };
     double all = 0;
-    for (int place = -1; place < kPlaces; ++place) {
+    for (int place = -1; place < kChain; ++place) {
       double prior = 0;  // the filter starts from all as likely
-      for (int before = -1; before < kPlaces; ++before) prior += Transition(before, place) / (kPlaces + 1);
+      for (int before = -1; before < kChain; ++before) prior += Transition(before, place) / (kChain + 1);
       const double p = prior * weight(0, place) * rest(0, place);
-      first[static_cast<std::size_t>(place < 0 ? kPlaces : place)] = p;
+      first[static_cast<std::size_t>(place < 0 ? kChain : place)] = p;
       all += p;
     }
     for (double& p : first) p /= all;
@@ -93,7 +93,7 @@ TEST_F(HindsightTest, WeighsAllPathsThroughTheImagesSince) {
   ASSERT_EQ(hindsight.Slot(), 0);
   const Belief smoothed = hindsight.Smoothed(transition_, memory_.working_memory());
   const std::vector<double> truth = ByAllPaths();
-  for (int i = 0; i < kPlaces; ++i) {
+  for (int i = 0; i < kChain; ++i) {
     const std::size_t at = static_cast<std::size_t>(i);
     EXPECT_NEAR(smoothed.places[at], truth[at], 1e-12) << i;
   }
@@ -102,7 +102,7 @@ TEST_F(HindsightTest, WeighsAllPathsThroughTheImagesSince) {
 
 TEST_F(HindsightTest, APlaceThatTheNextImagesAreNotNearIsTakenBack) {
   for (int s = 0; s < kSteps; ++s) {
-    likelihoods_[static_cast<std::size_t>(s)].places.assign(kPlaces, 0.1);
+    likelihoods_[static_cast<std::size_t>(s)].places.assign(kChain, 0.1);
   }
   likelihoods_[0].places[2] = 8.0;
   Hindsight hindsight;

@@ -31,7 +31,7 @@ class SecondWordTest : public ::testing::Test {
     BayesFilter filter;
     for (int k = 0; k <= Hindsight::kImages; ++k) {
       Belief likelihood;
-      likelihood.places.assign(kPathLength, 0.4);
+      likelihood.places.assign(kPathLength, elsewhere_);
       likelihood.places[kPlace + static_cast<std::size_t>(k)] = likelihoods[static_cast<std::size_t>(k)];
       filter.Step(transition_, memory_.working_memory(), likelihood);
       word_.Step(kAsked + k, filter.posterior(), likelihood);
@@ -70,7 +70,8 @@ class SecondWordTest : public ::testing::Test {
   LocationMemory memory_;
   std::vector<View> views_;
   SecondWord word_;
-  int inliers_ = 80;  // of 100, where the images show one place
+  double elsewhere_ = 0.4;  // likelihood of all other places
+  int inliers_ = 80;        // of 100, where the images show one place
 };
 
 TEST_F(SecondWordTest, WhatTheNextImagesBearOutIsAcceptedThoughItWasNotTriedAtFirst) {
@@ -87,7 +88,8 @@ TEST_F(SecondWordTest, WhatTheNextImagesBearOutIsAcceptedThoughItWasNotTriedAtFi
 
 TEST_F(SecondWordTest, WhatTheNextImagesContradictIsWithdrawn) {
   inliers_ = 15;
-  See({0.4, 0.4, 0.4, 0.4, 0.4, 0.4}, true);
+  elsewhere_ = 0.05;
+  See({0.05, 0.05, 0.05, 0.05, 0.05, 0.05}, true);
   const std::optional<LateLoop> late = Say(&word_);
   ASSERT_TRUE(late);
   EXPECT_TRUE(late->withdrawn);
@@ -108,7 +110,8 @@ TEST_F(SecondWordTest, NothingIsSaidWhereNothingChanges) {
 TEST_F(SecondWordTest, AThresholdThatIsLowWithdrawsNothingOfItself) {
   options_.loop_threshold = 0;
   inliers_ = 15;
-  See({0.4, 0.4, 0.4, 0.4, 0.4, 0.4}, true);
+  elsewhere_ = 0.05;
+  See({0.05, 0.05, 0.05, 0.05, 0.05, 0.05}, true);
   EXPECT_FALSE(Say(&word_));
 }
 

@@ -1,7 +1,7 @@
 // What bench/evidence_study works on: for every image, member and earlier location the matched words (by
 // inverse frequency) in each cell of the image, with the ground truth, as one binary file OUT-N for each
-// --still-in-sight N: without the words that have been in sight since a location older than short-term
-// memory, seen again within N images each time, as LikelihoodModel::Counts has it; 0: with all words.
+// --still-in-sight N: above 0 without the words that have been in sight since a location older than
+// short-term memory, as LikelihoodModel::Counts has it; 0: with all words.
 //
 // int32 images, rows of cells (8 columns); then images x images labels (uint8, row by row: 255 loop, 128
 // ignore, 0 none); then for each image t and member: float32 features, float32 words, and (t + 1) x cells
@@ -47,7 +47,7 @@ CellsOfWord Words(const Features& features, const cv::Size& size, int cells, Mem
 // Matched words of an image by location and cell.
 std::vector<double> Sums(const CellsOfWord& cells_of_word, const Postings& postings, int image, int cells,
                          int still_in_sight) {
-  const Sight sight{image - LoopDetectorOptions().stm_size + 1, still_in_sight > 0};
+  const Sight sight{still_in_sight > 0 ? image - LoopDetectorOptions().stm_size + 1 : 0};
   std::vector<double> sums(static_cast<std::size_t>(image + 1) * static_cast<std::size_t>(cells), 0.0);
   const double all = std::log10(image + 1.0);
   for (const auto& entry : cells_of_word) {
@@ -97,7 +97,8 @@ void PutTruth(int cells, const LoopGroundTruth& truth, std::ofstream& out) {
 
 int Run(const std::string& folder, const cli::GroundTruthArguments& truth_arguments, const std::string& file,
         const std::vector<int>& still_in_sight) {
-  const auto [images, rights, truth, recording, depth, notes, stride] = cli::LoadImageSet(folder, truth_arguments);
+  const auto [images, rights, truth, recording, depth, notes, stride] =
+      cli::LoadImageSet(folder, truth_arguments);
   const LoopDetectorOptions options;
   std::vector<Member> members;
   members.reserve(options.members.size());

@@ -45,6 +45,12 @@ class LoopDetector::Impl {
  private:
   void FillCounts(const std::vector<Features>& features, LoopResult& result) const;
   void Verify(const View& query, const Belief& belief, LoopResult& result) const;
+  internal::HypothesisSearch::VerifyPair PairVerifier() const {
+    return [this](const View& a, const View& b, int threads) { return verifier_.Verify(a, b, threads); };
+  }
+  std::function<const View&(int)> ViewOfSlot() const {
+    return [this](int slot) -> const View& { return state_.view(slot); };
+  }
 
   internal::DetectorState state_;
   internal::LongTermMemory long_term_;
@@ -74,9 +80,7 @@ LoopResult LoopDetector::Impl::Detect(const LoopQuery& query) {
 
   result.proposed = state_.reasoner().Proposes(combined, result);
   if (result.proposed) Verify(view, combined.belief, result);
-  state_.reasoner().VerifyAgain(
-      [this](const View& a, const View& b, int threads) { return verifier_.Verify(a, b, threads); },
-      [this](int s) -> const View& { return state_.view(s); }, result);
+  state_.reasoner().VerifyAgain(PairVerifier(), ViewOfSlot(), result);
   result.verify_ms = watch.LapMs();
 
   state_.reasoner().Finish(result);
@@ -105,10 +109,7 @@ void LoopDetector::Impl::Verify(const View& query, const Belief& belief, LoopRes
         "features with the query, or set verification.enabled: false";
     return;
   }
-  state_.reasoner().Verify(
-      query, belief,
-      [this](const View& a, const View& b, int threads) { return verifier_.Verify(a, b, threads); },
-      [this](int s) -> const View& { return state_.view(s); }, result);
+  state_.reasoner().Verify(query, belief, PairVerifier(), ViewOfSlot(), result);
 }
 
 // One image by itself, without the images before it: no filter, all places are as likely.

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <deque>
-#include <optional>
 #include <vector>
 
 #include "core/byte_stream.h"
@@ -23,6 +22,8 @@ class Hindsight {
   /// The images so far say nothing of those to come.
   void Forget() { steps_.clear(); }
 
+  /// The location of the newest step; -1: there is none.
+  int Newest() const { return steps_.empty() ? -1 : steps_.back().slot; }
   /// The location that kImages steps have followed; -1: there is none yet.
   int Slot() const { return steps_.size() > kImages ? steps_.front().slot : -1; }
   /// gamma of that location, over the places of working memory; those that came into it since have 0.

@@ -36,6 +36,7 @@ Verification LoadFigures(ByteReader& in) {
 }  // namespace
 
 void SecondWord::Keep(int slot, const LoopResult& result) {
+  if (hindsight_.Newest() != slot) return;  // no step, no second word
   First first{slot, {}};
   first.result.query = result.query;
   first.result.accepted = result.accepted;
@@ -44,6 +45,7 @@ void SecondWord::Keep(int slot, const LoopResult& result) {
   first.result.verification.inlier_matches.clear();
   for (Verification& tried : first.result.tried) tried.inlier_matches.clear();
   first_.push_back(std::move(first));
+  if (first_.size() > Hindsight::kImages + 1) first_.pop_front();
 }
 
 void SecondWord::Forget() {

@@ -20,7 +20,7 @@ class SecondWord {
   void Step(int slot, const Belief& posterior, const Belief& likelihood) {
     hindsight_.Add(slot, posterior, likelihood);
   }
-  /// What was decided at first of the newest location.
+  /// What was decided at first of the newest location; nothing is kept of one without a step.
   void Keep(int slot, const LoopResult& result);
   /// The next image does not follow those before.
   void Forget();
@@ -39,7 +39,7 @@ class SecondWord {
     LoopResult result;  // what geometry tried, without matches
   };
   Hindsight hindsight_;
-  std::deque<First> first_;  // of the images in hindsight_ at least
+  std::deque<First> first_;  // of images in hindsight_
 };
 
 }  // namespace tutti::internal

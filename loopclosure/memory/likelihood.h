@@ -41,11 +41,9 @@ struct Posting {
 
 /// Which words are no sign of a return to a slot, since they have been in sight in between: those seen in a
 /// quarter of the images after it, and in two at least. What moves along (another vehicle, dirt on the lens,
-/// the horizon) would otherwise know the places of before in every image; it may be hidden for a while. As it
-/// stands: none.
+/// the horizon) would otherwise know the places of before in every image; it may be hidden for a while.
 struct Sight {
-  int settled = 0;       ///< holds for slots before this, the oldest one in STM
-  bool returns = false;  ///< false: every word counts
+  int settled = 0;  ///< holds for slots before this, the oldest one in STM; 0: every word counts
 
   /// Calls call(posting) for each of a word's postings (ascending by slot, none after `newest`, which has the
   /// word) but those of slots since which it has been in sight.
@@ -56,7 +54,7 @@ struct Sight {
     int between = postings.empty() || postings.back().slot < newest ? 0 : -1;  // images that have it
     for (auto posting = postings.rbegin(); posting != postings.rend(); ++posting, ++between) {
       const int since = newest - posting->slot - 1;
-      const bool in_sight = returns && between >= kLeast && kOneIn * between >= since;
+      const bool in_sight = between >= kLeast && kOneIn * between >= since;
       if (!in_sight || posting->slot >= settled) call(*posting);
     }
   }

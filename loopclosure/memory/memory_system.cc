@@ -126,7 +126,7 @@ void MemorySystem::UpdateLikelihood(std::size_t u) {
   if (!unit.took_part()) return;
   const std::vector<int>& places = memory_.working_memory();
   if (Counts()) {
-    const Sight sight{memory_.short_term_memory().front(), true};
+    const Sight sight{memory_.short_term_memory().front()};
     unit.counts = unit.is_dense ? unit.dense.Counts(places) : unit.likelihood.Counts(unit.seen, sight);
     Repeat(unit);
     if (places.empty()) return;

@@ -139,7 +139,8 @@ class MemorySystem {
   const std::vector<FilterUnit>& units() const { return units_; }
   /// Null if there is none, or no unit took part in this image.
   const PlaceFilter* joint() const { return joint_ && JointTookPart() ? &*joint_ : nullptr; }
-  /// The one filter whose posterior is the ensemble's belief; null: there are several, or it sat this image out.
+  /// The one filter whose posterior is the ensemble's belief; null: there are several, or it sat this image
+  /// out.
   const PlaceFilter* Deciding() const;
   const TransitionModel& transition() const { return transition_; }
 

@@ -115,6 +115,23 @@ TEST_F(SecondWordTest, AThresholdThatIsLowWithdrawsNothingOfItself) {
   EXPECT_FALSE(Say(&word_));
 }
 
+// Rules with several filters never step, and without verification nothing is ever said.
+TEST_F(SecondWordTest, KeepsNoMoreThanItWaitsFor) {
+  const auto size = [&] {
+    ByteWriter out;
+    word_.Save(out);
+    return out.bytes().size();
+  };
+  LoopResult result;
+  const std::size_t empty = size();
+  for (int slot = 0; slot < kPathLength; ++slot) word_.Keep(slot, result);
+  EXPECT_EQ(size(), empty) << "no step was made";
+  See({0.4, 0.4, 0.4, 0.4, 0.4, 0.4}, false);
+  const std::size_t full = size();
+  See({0.4, 0.4, 0.4, 0.4, 0.4, 0.4}, false);
+  EXPECT_EQ(size(), full);
+}
+
 TEST_F(SecondWordTest, IsTheSameAfterAFile) {
   See({1.5, 6, 6, 6, 6, 6}, false);
   ByteWriter out;

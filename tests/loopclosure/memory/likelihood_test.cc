@@ -97,7 +97,7 @@ TEST(Likelihood, WhatHasBeenInSightInBetweenIsNoSignOfAReturn) {
     const SeenWords newest = WordsSeen({word}, {0});
     const double all = model.Counts(newest)[static_cast<std::size_t>(slot)];
     EXPECT_GT(all, 0.0);
-    const double returns = model.Counts(newest, {24, true})[static_cast<std::size_t>(slot)];
+    const double returns = model.Counts(newest, {24})[static_cast<std::size_t>(slot)];
     EXPECT_TRUE(returns == 0.0 || returns == all);
     return returns > 0.0;
   };
@@ -114,10 +114,10 @@ TEST(Likelihood, ASlotThatComesBackCountsAsIfItHadNeverBeenAway) {
   LikelihoodModel model(LikelihoodKind::kTfIdf);
   for (int slot = 0; slot < 8; ++slot) model.Add(Signature({1, 10 + slot, 20 + slot % 2}));
   const SeenWords query = WordsSeen({1, 20, 21, 13}, {0, 2, 4, 6});
-  const std::vector<double> before = model.Counts(query, {6, true});
+  const std::vector<double> before = model.Counts(query, {6});
   model.Remove(3);
   model.Restore(3, Signature({1, 13, 21}));
-  EXPECT_EQ(model.Counts(query, {6, true}), before);
+  EXPECT_EQ(model.Counts(query, {6}), before);
 }
 
 TEST(Likelihood, CellsCoverTheImageAndWhatLiesOutsideIsInTheNearest) {

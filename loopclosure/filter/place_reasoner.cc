@@ -232,8 +232,15 @@ void PlaceReasoner::Verify(const View& query, const Belief& belief,
     if (result.verification.candidate >= 0) result.candidate = result.verification.candidate;
     if (!result.verification.similar) return;
   }
-  result.accepted = result.probability >= options_.loop_threshold;
+  // Where geometry knows no motion, the place may have been left, and be seen from afar: the belief, which
+  // lags behind, would make a loop of it. The next images know better (SecondWord).
+  const bool probable = result.probability >= options_.loop_threshold;
+  result.accepted = probable && result.verification.accepted;
   if (result.accepted) return;
+  if (probable) {
+    result.reason = result.verification.reason;
+    return;
+  }
   char text[128];
   std::snprintf(text, sizeof text, "probably not this place (probability %.3f, %.3f is needed)",
                 result.probability, options_.loop_threshold);

@@ -68,7 +68,8 @@ std::optional<LateLoop> SecondWord::Say(const LoopDetectorOptions& options, cons
   } else if (belief.Hypothesis() >= options.propose_threshold) {
     search.VerifyMore(slot, belief, word);
   }
-  const double needed = before ? std::min(kWithdrawBelow, options.loop_threshold) : options.loop_threshold;
+  const double needed = before ? std::min(kWithdrawBelow, options.loop_threshold)
+                               : Needed(slot, word.verification, options.loop_threshold, memory);
   const bool now = word.verification.similar && word.probability >= needed;
   if (now == before) return std::nullopt;
   LateLoop late;
@@ -78,6 +79,36 @@ std::optional<LateLoop> SecondWord::Say(const LoopDetectorOptions& options, cons
   late.probability = word.probability;
   late.verification = now ? search.WithMatches(slot, word.verification) : std::move(word.verification);
   return late;
+}
+
+// The probability from which on a loop that was not accepted is: more than 1 if none is enough.
+double SecondWord::Needed(int slot, const Verification& verification, double loop_threshold,
+                          const LocationMemory& memory) const {
+  constexpr int kAbout = 4 + Hindsight::kImages;  // graph levels
+  constexpr double kInARow = 0.5;
+  constexpr int kFewest = 2;  // of the images before: one may be an alias, and drags the next along
+  constexpr double kNone = 2;
+  if (verification.candidate < 0) return kNone;
+  std::vector<int> near;
+  for (const auto& [place, level, loops] : memory.Neighbours(memory.Find(verification.candidate), kAbout))
+    near.push_back(place);
+  const auto there = [&near](int place) { return std::find(near.begin(), near.end(), place) != near.end(); };
+  if (!verification.accepted) {
+    // So few inliers show the place from afar, too, when it has been left: one of the images since must close
+    // a loop there.
+    const bool still = std::any_of(first_.begin(), first_.end(), [&](const First& since) {
+      return since.result.accepted && there(memory.Find(since.result.verification.candidate));
+    });
+    return still ? loop_threshold : kNone;
+  }
+  int before = 0;  // images that close loops there
+  for (int earlier = std::max(0, slot - Hindsight::kImages); earlier < slot; ++earlier) {
+    const std::vector<LocationMemory::Link>& links = memory.links(earlier);
+    before += std::any_of(links.begin(), links.end(), [&](const LocationMemory::Link& link) {
+      return link.type != LocationMemory::LinkType::kOdometry && link.slot < earlier && there(link.slot);
+    });
+  }
+  return before >= kFewest ? std::min(kInARow, loop_threshold) : loop_threshold;
 }
 
 void SecondWord::Save(ByteWriter& out) const {

@@ -184,7 +184,7 @@ class PosePrior:
 class LoopDetector:
     def __init__(self, *, external_members: Sequence[str] = [], dense_members: Sequence[str] = [], preset: str = ...,
                  rule: str = 'joint', members: Sequence[str] = ..., likelihood: str = 'tfidf',
-                 loop_threshold: float = 0.98, propose_threshold: float = 0.08, link_threshold: float = 0.9,
+                 loop_threshold: float = 0.985, propose_threshold: float = 0.08, link_threshold: float = 0.9,
                  island_levels: int = 0, consistent_images: int = 0, hypothesis_ratio: float = 0, stm_size: int = 10,
                  threads: int = 2, seed: int = 1, bad_signature_ratio: float = 0.2, ignore_bad_signatures: bool = False,
                  virtual_place_prior: float = 0.9, rehearsal: bool = False, rehearsal_similarity: float = 0.6,

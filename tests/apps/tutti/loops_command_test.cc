@@ -175,16 +175,16 @@ TEST_F(LoopsCommand, TheDumpSaysWhatEachCandidateLookedLike) {
   std::istringstream verification(ReadAll(out_ / "dump_verification.csv"));
   std::getline(verification, line);
   EXPECT_EQ(line,
-            "image,candidate,truth,order,late,accepted,chosen,type,matches,inliers,mass,coverage,"
+            "image,candidate,truth,order,late,similar,accepted,chosen,type,matches,inliers,mass,coverage,"
             "expected_inliers,log_nfa,motion_spread,hypothesis,reason");
   int chosen = 0;
   while (std::getline(verification, line)) {
     const std::vector<std::string> cells = SplitText(line, ",");
-    ASSERT_GE(cells.size(), 17u) << line;
-    if (cells[6] == "1") {
+    ASSERT_GE(cells.size(), 18u) << line;
+    if (cells[7] == "1") {
       EXPECT_EQ(cells[5], "1") << line;
-      EXPECT_EQ(cells[7], "fundamental");
-      EXPECT_EQ(cells[16], "\"\"") << line;
+      EXPECT_EQ(cells[8], "fundamental");
+      EXPECT_EQ(cells[17], "\"\"") << line;
       ++chosen;
     }
   }

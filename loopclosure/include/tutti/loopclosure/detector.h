@@ -163,7 +163,8 @@ struct LoopResult {
   double probability = 0;              ///< that this is a loop: with the verified place, else the candidate
   bool proposed = false;               ///< H >= propose_threshold: went to verification
   bool accepted = false;               ///< the verification accepted it (or one of its neighbours), and the
-                                       ///< probability is at least loop_threshold
+                                       ///< probability is at least loop_threshold. A place that geometry
+                                       ///< finds `similar` alone is said by a second word (LateLoop)
   std::string reason;                  ///< why it is not accepted, in plain words
   std::vector<MemberOpinion> members;  ///< in the order of options.members
   Verification verification;           ///< the best one tried

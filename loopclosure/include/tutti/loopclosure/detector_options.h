@@ -228,7 +228,7 @@ struct LoopDetectorOptions {
                "CV_32F",
                CodeOnly());
   TUTTI_OPTION(LikelihoodKind, likelihood, LikelihoodKind::kTfIdf, "score of standardised evidence");
-  TUTTI_OPTION(double, loop_threshold, 0.98, "accept a loop of this probability", Basic(), From(0), To(1));
+  TUTTI_OPTION(double, loop_threshold, 0.985, "accept a loop of this probability", Basic(), From(0), To(1));
   TUTTI_OPTION(double, propose_threshold, 0.08, "go to verification at H >= this", From(0), To(1));
   TUTTI_OPTION(double, link_threshold, 0.9, "a loop of this probability links its two places for the filter",
                From(0), To(1));

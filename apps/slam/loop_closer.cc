@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "apps/slam/joining_loops.h"
+#include "apps/slam/loop_reach.h"
 #include "core/angle.h"
 #include "core/stopwatch.h"
 
@@ -98,6 +99,15 @@ LoopUpdate LoopCloser::Consider(const LoopRecord& proposed, const Verification& 
   LoopEdge edge = constraint.edge;
   edge.record = records_.size() - 1;
   record.S_candidate_query = edge.S_candidate_query;
+  // An odometry that is followed may be any. Between recordings anything may have happened.
+  const bool one_way = !followed_.begun() && OfOneSession(record.query, record.candidate);
+  if (const std::string why = one_way && !recent ? WhyImpossible(edge, odometry, rig_.sensor) : "";
+      !why.empty()) {
+    record.reason = why;
+    LoopUpdate update;
+    Revoke(edge.record, &update);
+    return update;
+  }
   if (followed_.ImagesJudgeSteps()) gate_.SetOdometryUncertainty(followed_.Seen());
   LoopGate::Admitted admitted = gate_.Offer(edge, accepted_, Places(odometry), across,
                                             [&](const LoopEdge& loop) { return TrustIn(loop, odometry); });
@@ -116,25 +126,6 @@ LoopGate::Trust LoopCloser::TrustIn(const LoopEdge& loop, const Odometry& odomet
   if (!records_[loop.record].verified) return LoopGate::Trust::kWeak;
   // A followed odometry may be any, and says itself how far it drifts.
   return followed_.begun() || InReach(loop, odometry) ? LoopGate::Trust::kSure : LoopGate::Trust::kFar;
-}
-
-// Whether the way from the candidate to the query can have led where the loop says, with an odometry that is
-// bad. A house that looks like the one before is off by the whole way.
-bool LoopCloser::InReach(const LoopEdge& loop, const Odometry& odometry) const {
-  constexpr double kMostDrift = 0.5;  // share of the way
-  if (odometry.KeyframePiece(loop.candidate) != odometry.KeyframePiece(loop.query)) return true;
-  const auto [first, last] = std::minmax(loop.candidate, loop.query);
-  double way = 0;
-  std::optional<Eigen::Vector3d> before;
-  for (const int id : odometry.KeyframeIds()) {
-    if (id < first || id > last || odometry.KeyframePiece(id) != odometry.KeyframePiece(first)) continue;
-    const Eigen::Vector3d here = odometry.KeyframePose(id).translation;
-    if (before) way += (here - *before).norm();
-    before = here;
-  }
-  const Pose in_map = odometry.KeyframePose(loop.candidate).Inverse() * odometry.KeyframePose(loop.query);
-  const double off = (loop.S_candidate_query.translation - in_map.translation).norm();
-  return off <= kMostDrift * way + loop.depth;
 }
 
 std::string LoopCloser::Join(const std::vector<ProposedLoop>& proposed, const Odometry& odometry,

@@ -164,7 +164,6 @@ class LoopCloser {
   LoopUpdate Enter(std::vector<LoopEdge> entering, const Odometry& odometry, std::int64_t frames);
   void Start(std::vector<LoopEdge> entering, const Odometry& odometry, std::int64_t frames);
   LoopGate::Trust TrustIn(const LoopEdge& loop, const Odometry& odometry) const;
-  bool InReach(const LoopEdge& loop, const Odometry& odometry) const;
   bool IsWitness(const LoopRecord& record, const Verification& verification) const;
   void NoteWitnesses(const LoopGate::Admitted& admitted);
   void Settle(const LoopVerdict& verdict, LoopUpdate* update);

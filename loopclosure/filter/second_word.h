@@ -13,8 +13,8 @@ namespace tutti::internal {
 
 /// The second word (loop-closure.md section 2): Hindsight::kImages after an image, the posterior that knows
 /// the images since is weighed with what geometry found. A loop that was not accepted may be now, and one
-/// that was may be withdrawn. Where the images before close loops at the place already, and geometry knows the
-/// motion, it takes half the belief; where geometry knows none, an image since must close a loop there.
+/// that was may be withdrawn. Where the images before close loops at the place already, and geometry knows
+/// the motion, it takes half the belief; where geometry knows none, an image since must close a loop there.
 class SecondWord {
  public:
   /// A step of the filter at a new location.

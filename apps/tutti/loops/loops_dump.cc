@@ -41,9 +41,10 @@ std::string VerificationLine(const LoopRun& run, const LoopResult& result, const
   char cells[400];
   std::snprintf(cells, sizeof cells, "%ld,%ld,%s,%d,%d,%d,%d,%d,%s,%d,%d,%.9g,%d,%.9g,%.9g,%.9g,%.9g,",
                 run.Number(result.query), run.Number(tried.candidate), LabelName(label), order, late ? 1 : 0,
-                tried.similar ? 1 : 0, tried.accepted ? 1 : 0, result.accepted && tried.candidate == result.candidate ? 1 : 0,
-                ToString(tried.type), tried.matches, tried.inliers, tried.mass, tried.coverage,
-                tried.expected_inliers, tried.log_nfa, tried.motion_spread, result.hypothesis);
+                tried.similar ? 1 : 0, tried.accepted ? 1 : 0,
+                result.accepted && tried.candidate == result.candidate ? 1 : 0, ToString(tried.type),
+                tried.matches, tried.inliers, tried.mass, tried.coverage, tried.expected_inliers,
+                tried.log_nfa, tried.motion_spread, result.hypothesis);
   return cells + Quoted(tried.reason) + "\n";
 }
 
@@ -68,8 +69,9 @@ LoopsDump::LoopsDump(const std::filesystem::path& folder, const std::vector<std:
     candidates_ << "," << name << "_score," << name << "_likelihood," << name << "_posterior";
   }
   candidates_ << "\n";
-  verification_ << "image,candidate,truth,order,late,similar,accepted,chosen,type,matches,inliers,mass,coverage,"
-                   "expected_inliers,log_nfa,motion_spread,hypothesis,reason\n";
+  verification_
+      << "image,candidate,truth,order,late,similar,accepted,chosen,type,matches,inliers,mass,coverage,"
+         "expected_inliers,log_nfa,motion_spread,hypothesis,reason\n";
   CheckWritten(candidates_, candidates_file_);
   CheckWritten(verification_, verification_file_);
 }

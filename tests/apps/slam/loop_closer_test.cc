@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "apps/slam/map_parts.h"
+#include "core/angle.h"
 #include "tests/support/recording.h"
 #include "tests/support/rendered_world.h"
 #include "tests/support/small_town.h"
@@ -62,10 +63,13 @@ class LoopCloserTest : public ::testing::Test {
     if (!verified) record.reason = "refused by geometry";
     return record;
   }
-  LoopUpdate Consider(LoopCloser* closer, int candidate, int query, double off, int inliers = 0) const {
+  LoopUpdate Consider(LoopCloser* closer, int candidate, int query, double off, int inliers = 0,
+                      double turned_deg = 0) const {
     Verification verification;
     verification.type = ConstraintType::kRigid;
     verification.S_candidate_query = InMap(candidate, query, off);
+    verification.S_candidate_query.rotation *=
+        Eigen::AngleAxisd(turned_deg * internal::kRadians, Eigen::Vector3d::UnitY());
     verification.information = 1e4 * Matrix6d::Identity();
     verification.inliers = inliers;
     return closer->Consider(Proposed(candidate, query), verification, candidate, query, odometry_, frames_);
@@ -173,6 +177,20 @@ TEST_F(LoopCloserTest, LoopsThatAreOffByMoreThanHalfOfTheWayNeedMoreThanASecondO
   ConsiderTwo(&closer, 100);
   EXPECT_FALSE(closer.MayMove(frames_ + 1000));
   EXPECT_TRUE(closer.records()[1].pending);
+}
+
+// The walls of the next corridor but one: they agree for as long as they look alike.
+TEST_F(LoopCloserTest, NoNumberOfLoopsTurnsTheMapByARightAngle) {
+  LoopCloser closer = Closer(), turned = Closer();
+  for (int later = 0; later < 6; ++later) {
+    const LoopUpdate update = Consider(&closer, kFirst + later, kLater + later, 1, 200, 90);
+    EXPECT_FALSE(update.correction);
+    EXPECT_THAT(update.revoked, ElementsAre(static_cast<std::size_t>(later))) << "for the detector to forget";
+    EXPECT_THAT(closer.records().back().reason, HasSubstr("turn by 90 deg"));
+    Consider(&turned, kFirst + later, kLater + later, 0, 200, 20);
+  }
+  EXPECT_FALSE(closer.MayMove(frames_ + 1000));
+  EXPECT_TRUE(turned.MayMove(frames_ + 1000)) << "a bad odometry turns by as much as this";
 }
 
 TEST_F(LoopCloserTest, WhatTheDetectorTakesBackIsDroppedWhileItWaitsAndStaysWhereTheGateLetItIn) {

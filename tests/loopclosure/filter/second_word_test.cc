@@ -37,6 +37,12 @@ class SecondWordTest : public ::testing::Test {
       word_.Step(kAsked + k, filter.posterior(), likelihood);
       LoopResult result;
       result.query = kAsked + k;
+      if (k == 1 && still_there_) {
+        result.accepted = true;
+        result.tried = {Geometry(kAsked, kPlace)};
+        result.tried.front().candidate = kPlace + 1;
+        result.verification = result.tried.front();
+      }
       if (k == 0 && accepted_at_first) {
         result.accepted = true;
         result.tried = {Geometry(kAsked, kPlace)};
@@ -51,7 +57,8 @@ class SecondWordTest : public ::testing::Test {
     v.candidate = candidate;
     v.matches = 100;
     v.type = ConstraintType::kFundamental;
-    v.similar = v.accepted = query == kAsked && candidate == kPlace;
+    v.similar = query == kAsked && candidate == kPlace;
+    v.accepted = v.similar && motion_is_known_;
     v.inliers = v.similar ? inliers_ : 5;
     v.log_nfa = v.similar ? -inliers_ : 0;
     if (v.similar) v.inlier_matches.resize(static_cast<std::size_t>(v.inliers));
@@ -72,6 +79,8 @@ class SecondWordTest : public ::testing::Test {
   SecondWord word_;
   double elsewhere_ = 0.4;  // likelihood of all other places
   int inliers_ = 80;        // of 100, where the images show one place
+  bool motion_is_known_ = true;
+  bool still_there_ = false;  // the image after the one that is asked about closes a loop by itself
 };
 
 TEST_F(SecondWordTest, WhatTheNextImagesBearOutIsAcceptedThoughItWasNotTriedAtFirst) {
@@ -96,6 +105,38 @@ TEST_F(SecondWordTest, WhatTheNextImagesContradictIsWithdrawn) {
   EXPECT_FALSE(late->accepted);
   EXPECT_EQ(late->verification.candidate, kPlace);
   EXPECT_LT(late->probability, 0.5);
+}
+
+TEST_F(SecondWordTest, APlaceWithoutAMotionMustBeThereStillForAnImageSince) {
+  motion_is_known_ = false;
+  See({1.5, 6, 6, 6, 6, 6}, false);
+  EXPECT_FALSE(Say(&word_)) << "it may be seen from afar, and have been left";
+  SecondWord other;
+  std::swap(word_, other);
+  still_there_ = true;
+  See({1.5, 6, 6, 6, 6, 6}, false);
+  const std::optional<LateLoop> late = Say(&word_);
+  ASSERT_TRUE(late);
+  EXPECT_TRUE(late->accepted);
+  EXPECT_EQ(late->verification.candidate, kPlace);
+}
+
+TEST_F(SecondWordTest, WhereTwoOfTheImagesBeforeCloseLoopsHalfTheBeliefIsEnough) {
+  const auto said = [this](int links, bool motion_is_known) {
+    for (int k = 1; k <= links; ++k) memory_.AddLink(kAsked - k, kPlace - k, LocationMemory::LinkType::kLoop);
+    motion_is_known_ = motion_is_known;
+    SecondWord fresh;
+    std::swap(word_, fresh);
+    See({0.5, 0.6, 0.6, 0.6, 0.6, 0.6}, false);
+    const std::optional<LateLoop> late = Say(&word_);
+    for (int k = 1; k <= links; ++k) memory_.RemoveLoop(kAsked - k, kPlace - k);
+    return late ? late->probability : 0.0;
+  };
+  EXPECT_EQ(said(0, true), 0);
+  EXPECT_EQ(said(1, true), 0) << "one may be of what only looks alike";
+  EXPECT_GT(said(2, true), 0.5);
+  EXPECT_LT(said(2, true), options_.loop_threshold);
+  EXPECT_EQ(said(2, false), 0);
 }
 
 TEST_F(SecondWordTest, NothingIsSaidWhereNothingChanges) {

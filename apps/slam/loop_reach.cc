@@ -1,0 +1,127 @@
+#include "apps/slam/loop_reach.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "core/angle.h"
+
+namespace tutti {
+namespace {
+
+// Keyframes from one id to another, both included, of the piece that the first one belongs to.
+std::vector<int> Between(int from, int to, const Odometry& odometry) {
+  const auto [first, last] = std::minmax(from, to);
+  std::vector<int> ids;
+  for (const int id : odometry.KeyframeIds()) {
+    if (id >= first && id <= last && odometry.KeyframePiece(id) == odometry.KeyframePiece(from))
+      ids.push_back(id);
+  }
+  return ids;
+}
+
+double Step(int a, int b, const Odometry& odometry) {
+  return (odometry.KeyframePose(a).translation - odometry.KeyframePose(b).translation).norm();
+}
+
+double WayBetween(int from, int to, const Odometry& odometry) {
+  const std::vector<int> ids = Between(from, to, odometry);
+  double way = 0;
+  for (std::size_t i = 1; i < ids.size(); ++i) way += Step(ids[i - 1], ids[i], odometry);
+  return way;
+}
+
+// Where the tracking was lost: the keyframes next to the shortest gap between the pieces of a loop's ends.
+struct Gap {
+  int candidate_side = -1, query_side = -1;
+  double seconds = 0;
+};
+
+std::optional<Gap> ShortestGap(const LoopEdge& loop, const Odometry& odometry) {
+  const int ours = odometry.KeyframePiece(loop.candidate), theirs = odometry.KeyframePiece(loop.query);
+  std::optional<Gap> gap;
+  int before = -1;
+  for (const int id : odometry.KeyframeIds()) {
+    const int piece = odometry.KeyframePiece(id);
+    if (piece != ours && piece != theirs) continue;
+    const int last = std::exchange(before, id);
+    if (last < 0 || odometry.KeyframePiece(last) == piece) continue;
+    const double seconds = odometry.KeyframeStamp(id) - odometry.KeyframeStamp(last);
+    if (seconds <= 0 || (gap && gap->seconds <= seconds)) continue;
+    gap = piece == theirs ? Gap{last, id, seconds} : Gap{id, last, seconds};
+  }
+  return gap;
+}
+
+// As fast as the camera was in its faster moments [map units/s]; 0: not known.
+double FastSpeed(int in_piece, const Odometry& odometry) {
+  constexpr double kFaster = 0.9;  // quantile
+  std::vector<double> speeds;
+  int before = -1;
+  for (const int id : odometry.KeyframeIds()) {
+    if (odometry.KeyframePiece(id) != odometry.KeyframePiece(in_piece)) continue;
+    const int last = std::exchange(before, id);
+    const double seconds = last < 0 ? 0 : odometry.KeyframeStamp(id) - odometry.KeyframeStamp(last);
+    if (seconds > 0) speeds.push_back(Step(last, id, odometry) / seconds);
+  }
+  if (speeds.empty()) return 0;
+  const auto at =
+      speeds.begin() + static_cast<std::ptrdiff_t>(kFaster * static_cast<double>(speeds.size() - 1));
+  std::nth_element(speeds.begin(), at, speeds.end());
+  return *at;
+}
+
+// Lengths in the units of the candidate's piece.
+std::string WhyNoWayAcross(const LoopEdge& loop, const Odometry& odometry, Sensor sensor) {
+  constexpr double kMuchFaster = 2;    // than in its faster moments
+  constexpr double kOfTheDepth = 0.5;  // of the scene: for what moves by jerks
+  constexpr double kDrift = 0.05;      // of the ways from the gap to the loop's ends
+  constexpr double kDriftOfOneCamera = 0.3;
+  const std::optional<Gap> gap = ShortestGap(loop, odometry);
+  if (!gap) return "";
+  const double scale = loop.S_candidate_query.scale;
+  const double speed = std::max(FastSpeed(loop.candidate, odometry), scale * FastSpeed(loop.query, odometry));
+  if (!(speed > 0)) return "";
+  const Similarity by_loop = Similarity(odometry.KeyframePose(loop.candidate)) * loop.S_candidate_query *
+                             Similarity(odometry.KeyframePose(loop.query).Inverse());
+  const double jump = (by_loop * odometry.KeyframePose(gap->query_side).translation -
+                       odometry.KeyframePose(gap->candidate_side).translation)
+                          .norm();
+  const double drift = sensor == Sensor::kMono ? kDriftOfOneCamera : kDrift;
+  const double ways = WayBetween(gap->candidate_side, loop.candidate, odometry) +
+                      scale * WayBetween(gap->query_side, loop.query, odometry);
+  if (jump <= kMuchFaster * speed * gap->seconds + drift * ways + kOfTheDepth * loop.depth) return "";
+  std::array<char, 160> text{};
+  std::snprintf(text.data(), text.size(),
+                "the camera would have jumped by %.1f while tracking was lost for %.1f s: another place that "
+                "looks like it",
+                jump, gap->seconds);
+  return text.data();
+}
+
+}  // namespace
+
+bool InReach(const LoopEdge& loop, const Odometry& odometry) {
+  constexpr double kMostDrift = 0.5;  // share of the way
+  if (odometry.KeyframePiece(loop.candidate) != odometry.KeyframePiece(loop.query)) return true;
+  const Pose in_map = odometry.KeyframePose(loop.candidate).Inverse() * odometry.KeyframePose(loop.query);
+  const double off = (loop.S_candidate_query.translation - in_map.translation).norm();
+  return off <= kMostDrift * WayBetween(loop.candidate, loop.query, odometry) + loop.depth;
+}
+
+std::string WhyImpossible(const LoopEdge& loop, const Odometry& odometry, Sensor sensor) {
+  constexpr double kMostTurnedDeg = 60;
+  if (odometry.KeyframePiece(loop.candidate) != odometry.KeyframePiece(loop.query))
+    return WhyNoWayAcross(loop, odometry, sensor);
+  const Pose in_map = odometry.KeyframePose(loop.candidate).Inverse() * odometry.KeyframePose(loop.query);
+  const double turned = loop.S_candidate_query.rotation.angularDistance(in_map.rotation) * internal::kDegrees;
+  if (turned <= kMostTurnedDeg) return "";
+  return "the map would have to turn by " + std::to_string(std::lround(turned)) +
+         " deg: another place that looks like it";
+}
+
+}  // namespace tutti

@@ -58,7 +58,8 @@ class LoopReachTest : public ::testing::Test {
     loop.query = query;
     Pose T = Truth(candidate).Inverse() * Truth(query);
     T.translation.x() += off;
-    T.rotation *= Eigen::AngleAxisd(turned_deg * internal::kRadians, Eigen::Vector3d::UnitY());
+    T.rotation *=
+        Eigen::Quaterniond(Eigen::AngleAxisd(turned_deg * internal::kRadians, Eigen::Vector3d::UnitY()));
     loop.S_candidate_query = Similarity(T);
     loop.depth = 2;
     return loop;

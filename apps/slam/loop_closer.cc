@@ -105,7 +105,7 @@ LoopUpdate LoopCloser::Consider(const LoopRecord& proposed, const Verification& 
       !why.empty()) {
     record.reason = why;
     LoopUpdate update;
-    Revoke(edge.record, &update);
+    if (record.verified) Revoke(edge.record, &update);  // the detector does not believe the others
     return update;
   }
   if (followed_.ImagesJudgeSteps()) gate_.SetOdometryUncertainty(followed_.Seen());

@@ -8,18 +8,15 @@
 #include <utility>
 #include <vector>
 
-#include "core/angle.h"
+#include "apps/slam/loop_solver.h"
 
 namespace tutti {
 namespace {
 
-// Keyframes from one id to another, both included, of the piece that the first one belongs to.
-std::vector<int> Between(int from, int to, const Odometry& odometry) {
-  const auto [first, last] = std::minmax(from, to);
+std::vector<int> KeyframesOfPiece(int piece, const Odometry& odometry) {
   std::vector<int> ids;
   for (const int id : odometry.KeyframeIds()) {
-    if (id >= first && id <= last && odometry.KeyframePiece(id) == odometry.KeyframePiece(from))
-      ids.push_back(id);
+    if (odometry.KeyframePiece(id) == piece) ids.push_back(id);
   }
   return ids;
 }
@@ -28,11 +25,24 @@ double Step(int a, int b, const Odometry& odometry) {
   return (odometry.KeyframePose(a).translation - odometry.KeyframePose(b).translation).norm();
 }
 
+// Of two keyframes of one piece.
 double WayBetween(int from, int to, const Odometry& odometry) {
-  const std::vector<int> ids = Between(from, to, odometry);
+  const auto [first, last] = std::minmax(from, to);
+  const std::vector<int> ids = KeyframesOfPiece(odometry.KeyframePiece(from), odometry);
   double way = 0;
-  for (std::size_t i = 1; i < ids.size(); ++i) way += Step(ids[i - 1], ids[i], odometry);
+  for (std::size_t i = 1; i < ids.size(); ++i) {
+    if (ids[i - 1] >= first && ids[i] <= last) way += Step(ids[i - 1], ids[i], odometry);
+  }
   return way;
+}
+
+// The query in the candidate's frame, by the map; both are of one piece.
+Pose InMap(const LoopEdge& loop, const Odometry& odometry) {
+  return odometry.KeyframePose(loop.candidate).Inverse() * odometry.KeyframePose(loop.query);
+}
+
+bool OfOnePiece(const LoopEdge& loop, const Odometry& odometry) {
+  return odometry.KeyframePiece(loop.candidate) == odometry.KeyframePiece(loop.query);
 }
 
 // Where the tracking was lost: the keyframes next to the shortest gap between the pieces of a loop's ends.
@@ -58,15 +68,13 @@ std::optional<Gap> ShortestGap(const LoopEdge& loop, const Odometry& odometry) {
 }
 
 // As fast as the camera was in its faster moments [map units/s]; 0: not known.
-double FastSpeed(int in_piece, const Odometry& odometry) {
+double FastSpeed(int piece, const Odometry& odometry) {
   constexpr double kFaster = 0.9;  // quantile
+  const std::vector<int> ids = KeyframesOfPiece(piece, odometry);
   std::vector<double> speeds;
-  int before = -1;
-  for (const int id : odometry.KeyframeIds()) {
-    if (odometry.KeyframePiece(id) != odometry.KeyframePiece(in_piece)) continue;
-    const int last = std::exchange(before, id);
-    const double seconds = last < 0 ? 0 : odometry.KeyframeStamp(id) - odometry.KeyframeStamp(last);
-    if (seconds > 0) speeds.push_back(Step(last, id, odometry) / seconds);
+  for (std::size_t i = 1; i < ids.size(); ++i) {
+    const double seconds = odometry.KeyframeStamp(ids[i]) - odometry.KeyframeStamp(ids[i - 1]);
+    if (seconds > 0) speeds.push_back(Step(ids[i - 1], ids[i], odometry) / seconds);
   }
   if (speeds.empty()) return 0;
   const auto at =
@@ -84,7 +92,8 @@ std::string WhyNoWayAcross(const LoopEdge& loop, const Odometry& odometry, Senso
   const std::optional<Gap> gap = ShortestGap(loop, odometry);
   if (!gap) return "";
   const double scale = loop.S_candidate_query.scale;
-  const double speed = std::max(FastSpeed(loop.candidate, odometry), scale * FastSpeed(loop.query, odometry));
+  const double speed = std::max(FastSpeed(odometry.KeyframePiece(loop.candidate), odometry),
+                                scale * FastSpeed(odometry.KeyframePiece(loop.query), odometry));
   if (!(speed > 0)) return "";
   const Similarity by_loop = Similarity(odometry.KeyframePose(loop.candidate)) * loop.S_candidate_query *
                              Similarity(odometry.KeyframePose(loop.query).Inverse());
@@ -96,10 +105,11 @@ std::string WhyNoWayAcross(const LoopEdge& loop, const Odometry& odometry, Senso
                       scale * WayBetween(gap->query_side, loop.query, odometry);
   if (jump <= kMuchFaster * speed * gap->seconds + drift * ways + kOfTheDepth * loop.depth) return "";
   std::array<char, 160> text{};
-  std::snprintf(text.data(), text.size(),
-                "the camera would have jumped by %.1f while tracking was lost for %.1f s: another place that "
-                "looks like it",
-                jump, gap->seconds);
+  std::snprintf(
+      text.data(), text.size(),
+      "the camera would have jumped by %.1f %s while tracking was lost for %.1f s: another place that "
+      "looks like it",
+      jump, sensor == Sensor::kMono ? "units of the map" : "m", gap->seconds);
   return text.data();
 }
 
@@ -107,20 +117,18 @@ std::string WhyNoWayAcross(const LoopEdge& loop, const Odometry& odometry, Senso
 
 bool InReach(const LoopEdge& loop, const Odometry& odometry) {
   constexpr double kMostDrift = 0.5;  // share of the way
-  if (odometry.KeyframePiece(loop.candidate) != odometry.KeyframePiece(loop.query)) return true;
-  const Pose in_map = odometry.KeyframePose(loop.candidate).Inverse() * odometry.KeyframePose(loop.query);
-  const double off = (loop.S_candidate_query.translation - in_map.translation).norm();
+  if (!OfOnePiece(loop, odometry)) return true;
+  const double off = (loop.S_candidate_query.translation - InMap(loop, odometry).translation).norm();
   return off <= kMostDrift * WayBetween(loop.candidate, loop.query, odometry) + loop.depth;
 }
 
 std::string WhyImpossible(const LoopEdge& loop, const Odometry& odometry, Sensor sensor) {
   constexpr double kMostTurnedDeg = 60;
-  if (odometry.KeyframePiece(loop.candidate) != odometry.KeyframePiece(loop.query))
-    return WhyNoWayAcross(loop, odometry, sensor);
-  const Pose in_map = odometry.KeyframePose(loop.candidate).Inverse() * odometry.KeyframePose(loop.query);
-  const double turned = loop.S_candidate_query.rotation.angularDistance(in_map.rotation) * internal::kDegrees;
-  if (turned <= kMostTurnedDeg) return "";
-  return "the map would have to turn by " + std::to_string(std::lround(turned)) +
+  if (!OfOnePiece(loop, odometry)) return WhyNoWayAcross(loop, odometry, sensor);
+  const Similarity off = loop.S_candidate_query * Similarity(InMap(loop, odometry).Inverse());
+  const double turned_deg = Measure(off, loop.depth).angle_deg;
+  if (turned_deg <= kMostTurnedDeg) return "";
+  return "the map would have to turn by " + std::to_string(std::lround(turned_deg)) +
          " deg: another place that looks like it";
 }
 

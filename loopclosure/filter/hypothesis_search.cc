@@ -11,7 +11,6 @@
 namespace tutti::internal {
 
 double MassAround(const Belief& belief, int slot, const LocationMemory& memory) {
-  constexpr int kAboutHere = 4;  // graph levels
   double mass = 0;
   for (const auto& [near, level, loops] : memory.Neighbours(slot, kAboutHere))
     mass += PosteriorAt(belief, near);

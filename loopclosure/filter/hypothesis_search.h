@@ -50,6 +50,9 @@ class HypothesisSearch {
   std::function<const View&(int)> view_of_;
 };
 
+/// Graph levels within which locations are about one place.
+inline constexpr int kAboutHere = 4;
+
 /// Belief in all places about a slot, 0..1.
 double MassAround(const Belief& belief, int slot, const LocationMemory& memory);
 

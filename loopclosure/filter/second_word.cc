@@ -2,13 +2,15 @@
 
 #include <algorithm>
 #include <utility>
+#include <vector>
 
 namespace tutti::internal {
 namespace {
 
 using State = LocationMemory::State;
 
-constexpr double kWithdrawBelow = 0.5;  // a loop that was accepted, by its probability now
+// Below, a loop that was accepted is withdrawn. From here on, one is accepted where loops come in a row.
+constexpr double kEvenChance = 0.5;
 
 // Of a verification, what a decision needs: its matches, and the pose that they give, can be found again.
 void SaveFigures(const Verification& v, ByteWriter& out) {
@@ -31,6 +33,33 @@ Verification LoadFigures(ByteReader& in) {
   for (int* count : {&v.matches, &v.inliers, &v.coverage}) *count = in.Get<std::int32_t>();
   for (double* figure : {&v.expected_inliers, &v.log_nfa, &v.motion_spread}) *figure = in.Get<double>();
   return v;
+}
+
+bool Contains(const std::vector<int>& slots, int slot) {
+  return std::find(slots.begin(), slots.end(), slot) != slots.end();
+}
+
+// Where the loops of the images before and after may lead, if this one leads to `place`.
+std::vector<int> Around(std::int64_t place, const LocationMemory& memory) {
+  std::vector<int> around;
+  for (const auto& [slot, level, loops] :
+       memory.Neighbours(memory.Find(place), kAboutHere + Hindsight::kImages))
+    around.push_back(slot);
+  return around;
+}
+
+// Two of the images before close loops there. One may be an alias, and would drag the next along.
+bool InARow(int slot, const std::vector<int>& around, const LocationMemory& memory) {
+  constexpr int kFewestLoops = 2;
+  int before = 0;
+  for (int earlier = std::max(0, slot - Hindsight::kImages); earlier < slot; ++earlier) {
+    const std::vector<LocationMemory::Link>& links = memory.links(earlier);
+    before += std::any_of(links.begin(), links.end(), [&](const LocationMemory::Link& link) {
+      return link.type != LocationMemory::LinkType::kOdometry && link.slot < earlier &&
+             Contains(around, link.slot);
+    });
+  }
+  return before >= kFewestLoops;
 }
 
 }  // namespace
@@ -68,8 +97,14 @@ std::optional<LateLoop> SecondWord::Say(const LoopDetectorOptions& options, cons
   } else if (belief.Hypothesis() >= options.propose_threshold) {
     search.VerifyMore(slot, belief, word);
   }
-  const double needed = before ? std::min(kWithdrawBelow, options.loop_threshold)
-                               : Needed(slot, word.verification, options.loop_threshold, memory);
+  double needed = options.loop_threshold;
+  if (before) {
+    needed = std::min(kEvenChance, needed);
+  } else if (word.verification.similar) {
+    const std::vector<int> around = Around(word.verification.candidate, memory);
+    if (!word.verification.accepted && !StillThere(around, memory)) return std::nullopt;
+    if (word.verification.accepted && InARow(slot, around, memory)) needed = std::min(kEvenChance, needed);
+  }
   const bool now = word.verification.similar && word.probability >= needed;
   if (now == before) return std::nullopt;
   LateLoop late;
@@ -81,34 +116,12 @@ std::optional<LateLoop> SecondWord::Say(const LoopDetectorOptions& options, cons
   return late;
 }
 
-// The probability from which on a loop that was not accepted is: more than 1 if none is enough.
-double SecondWord::Needed(int slot, const Verification& verification, double loop_threshold,
-                          const LocationMemory& memory) const {
-  constexpr int kAbout = 4 + Hindsight::kImages;  // graph levels
-  constexpr double kInARow = 0.5;
-  constexpr int kFewest = 2;  // of the images before: one may be an alias, and drags the next along
-  constexpr double kNone = 2;
-  if (verification.candidate < 0) return kNone;
-  std::vector<int> near;
-  for (const auto& [place, level, loops] : memory.Neighbours(memory.Find(verification.candidate), kAbout))
-    near.push_back(place);
-  const auto there = [&near](int place) { return std::find(near.begin(), near.end(), place) != near.end(); };
-  if (!verification.accepted) {
-    // So few inliers show the place from afar, too, when it has been left: one of the images since must close
-    // a loop there.
-    const bool still = std::any_of(first_.begin(), first_.end(), [&](const First& since) {
-      return since.result.accepted && there(memory.Find(since.result.verification.candidate));
-    });
-    return still ? loop_threshold : kNone;
-  }
-  int before = 0;  // images that close loops there
-  for (int earlier = std::max(0, slot - Hindsight::kImages); earlier < slot; ++earlier) {
-    const std::vector<LocationMemory::Link>& links = memory.links(earlier);
-    before += std::any_of(links.begin(), links.end(), [&](const LocationMemory::Link& link) {
-      return link.type != LocationMemory::LinkType::kOdometry && link.slot < earlier && there(link.slot);
-    });
-  }
-  return before >= kFewest ? std::min(kInARow, loop_threshold) : loop_threshold;
+// So few inliers that geometry knows no motion show a place from afar, too, when it has been left. It has not
+// where one of the images since closes a loop there.
+bool SecondWord::StillThere(const std::vector<int>& around, const LocationMemory& memory) const {
+  return std::any_of(first_.begin(), first_.end(), [&](const First& since) {
+    return since.result.accepted && Contains(around, memory.Find(since.result.verification.candidate));
+  });
 }
 
 void SecondWord::Save(ByteWriter& out) const {

@@ -3,6 +3,7 @@
 
 #include <deque>
 #include <optional>
+#include <vector>
 
 #include "core/byte_stream.h"
 #include "loopclosure/filter/hindsight.h"
@@ -13,8 +14,8 @@ namespace tutti::internal {
 
 /// The second word (loop-closure.md section 2): Hindsight::kImages after an image, the posterior that knows
 /// the images since is weighed with what geometry found. A loop that was not accepted may be now, and one
-/// that was may be withdrawn. Where the images before close loops at the place already, and geometry knows
-/// the motion, it takes half the belief; where geometry knows none, an image since must close a loop there.
+/// that was may be withdrawn. Where images before close loops at the place already, and geometry knows the
+/// motion, an even chance is enough; where geometry knows no motion, an image since must close a loop there.
 class SecondWord {
  public:
   /// A step of the filter at a new location.
@@ -39,8 +40,7 @@ class SecondWord {
     int slot;
     LoopResult result;  // what geometry tried, without matches
   };
-  double Needed(int slot, const Verification& verification, double loop_threshold,
-                const LocationMemory& memory) const;
+  bool StillThere(const std::vector<int>& around, const LocationMemory& memory) const;
 
   Hindsight hindsight_;
   std::deque<First> first_;  // of images in hindsight_

@@ -1,4 +1,4 @@
-// A synthetic world that is quickly rendered: streets around one block, seen by a stereo camera.
+// A synthetic world that is quickly rendered: streets around one block, seen by a stereo or RGB-D camera.
 #pragma once
 
 #include "data/synthetic/synthetic_world.h"
@@ -12,6 +12,12 @@ inline SyntheticOptions SmallStereoTown(int width, int height) {
   options.width = width;
   options.height = height;
   options.supersample = 1;
+  return options;
+}
+
+inline SyntheticOptions SmallRgbdTown(int width, int height) {
+  SyntheticOptions options = SmallStereoTown(width, height);
+  options.sensor = SyntheticSensor::kRgbd;
   return options;
 }
 

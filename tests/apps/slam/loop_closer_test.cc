@@ -24,7 +24,7 @@ class LoopCloserTest : public ::testing::Test {
   static constexpr int kFirst = 1, kLater = 20;  // keyframes: ends of the loops
 
   LoopCloserTest()
-      : recording_(testing::Record(testing::RenderedWorld(World()), 100)),
+      : recording_(testing::Record(testing::RenderedWorld(testing::SmallRgbdTown(320, 160)), 100)),
         odometry_(OdometryConfig(), recording_.rig) {
     for (const InputFrame& frame : recording_.frames) odometry_.Track(frame);
     odometry_.FinishMapping();
@@ -32,11 +32,6 @@ class LoopCloserTest : public ::testing::Test {
   }
   void SetUp() override { ASSERT_GT(odometry_.KeyframeIds().size(), 25u); }
 
-  static SyntheticOptions World() {
-    SyntheticOptions options = testing::SmallStereoTown(320, 160);
-    options.sensor = SyntheticSensor::kRgbd;
-    return options;
-  }
   static OdometryOptions OdometryConfig() {
     OdometryOptions options;
     options.features = 800;

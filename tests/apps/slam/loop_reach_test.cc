@@ -19,7 +19,7 @@ class LoopReachTest : public ::testing::Test {
   static constexpr int kCovered = 40, kSeesAgain = 52, kEnd = 100;  // frames
 
   LoopReachTest()
-      : recording_(testing::Record(testing::RenderedWorld(World()), kEnd)),
+      : recording_(testing::Record(testing::RenderedWorld(testing::SmallRgbdTown(320, 160)), kEnd)),
         odometry_(Options(), recording_.rig) {
     for (const InputFrame& frame : recording_.frames) {
       const bool covered = frame.index >= kCovered && frame.index < kSeesAgain;
@@ -36,11 +36,6 @@ class LoopReachTest : public ::testing::Test {
   void SetUp() override {
     ASSERT_GT(before_.size(), 3u);
     ASSERT_GT(after_.size(), 3u);
-  }
-  static SyntheticOptions World() {
-    SyntheticOptions options = testing::SmallStereoTown(320, 160);
-    options.sensor = SyntheticSensor::kRgbd;
-    return options;
   }
   static OdometryOptions Options() {
     OdometryOptions options;

@@ -37,7 +37,7 @@ TEST(LoopDetector, MisuseIsAnError) {
 TEST(LoopDetector, FeaturesUnderTheMaskDoNotExist) {
   LoopDetectorOptions options;
   options.stm_size = 1;
-  options.loop_threshold = 0.9;  // three images of the same are not many
+  options.loop_threshold = 0.9;  // which features it has matters here, not how probable half an image is
   LoopDetector detector(options);
   const cv::Mat image = testing::TexturedImage(1);
   LoopQuery query = testing::Query(0, image);

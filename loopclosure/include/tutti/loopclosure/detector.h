@@ -114,9 +114,9 @@ const char* ToString(ConstraintType type);
 /// Outcome of the geometric verification of one candidate.
 struct Verification {
   std::int64_t candidate = -1;  ///< id of the location it was tried with, -1: none was
-  bool similar = false;  ///< so many matches fit one motion (verification.min_place_inliers) that the images
-                         ///< may show one place, whatever the motion is worth
-  bool accepted = false;                        ///< and the motion is certain enough for a constraint
+  bool similar = false;   ///< so many matches fit one motion (verification.min_place_inliers) that the images
+                          ///< may show one place, whatever the motion is worth
+  bool accepted = false;  ///< and the motion is certain enough for a constraint
   ConstraintType type = ConstraintType::kNone;  ///< which geometry decided
   Similarity S_candidate_query;  ///< maps points of the query camera into the candidate camera (kRigid:
                                  ///< scale 1; kEssential: rotation and unit direction only; where the camera

@@ -146,7 +146,8 @@ def mean(values, digits=1):
 def section(name, seeds):
     """`seeds`: {variant: figures} of each seed."""
     located = name == "localize"
-    lines = [f"## {ROWS[name][0]}", "", f"| variant | closed | {'frames located' if located else 'loops true / false'} | frames in the map | ATE |",
+    lines = [f"## {ROWS[name][0]}", "",
+             f"| variant | closed | {'frames located' if located else 'loops true / false'} | frames in the map | ATE |",
              "|---|--:|--:|--:|--:|"]
     for variant in VARIANTS:
         runs = [seed[variant] for seed in seeds if variant in seed]
@@ -155,7 +156,7 @@ def section(name, seeds):
         said = f"{100 * statistics.mean(r['located'] for r in runs):.0f} %" if located else (
             f"{mean([r['true'] for r in runs])} / {mean([r['false'] for r in runs])}")
         ate = mean([r["ate_m"] for r in runs], 3)
-        posed = "-" if located or "posed" not in runs[0] else f"{100 * statistics.mean(r['posed'] for r in runs):.0f} %"
+        posed = f"{100 * statistics.mean(r['posed'] for r in runs):.0f} %" if "posed" in runs[0] else "-"
         lines.append(f"| {TITLES[variant]} | {sum(r['closed'] for r in runs)} of {len(runs)} | {said} | {posed} "
                      f"| {ate if ate == '-' else ate + ' m'} |")
     return "\n".join(lines) + "\n"
@@ -182,7 +183,8 @@ def main():
     whole = table.put_json(a, "closing", found)
     document = ["# Maps that close", "", "Written by `./dev bench closing --write` (bench/closing_table.py), whose head says what is run. "
                 "Of five seeds, in how many the map closes; loops and ATE are means over the seeds (of the last three rows: over those that "
-                "closed), and ATE is that of the frames that are in the map: where tracking is lost, what comes after waits for a loop.", "", verdict(whole)] + [section(name, whole[name]) for name in ROWS if name in whole]
+                "closed). ATE is that of the frames that are in the map: what comes after a loss of tracking waits for a loop.", "",
+                verdict(whole)] + [section(name, whole[name]) for name in ROWS if name in whole]
     table.put(a, table.RESULTS / "closing.md", "\n".join(document))
     return 1 if any(v["false"] for row in found.values() for seed in row for v in seed.values()) else 0
 

@@ -16,7 +16,7 @@
 #include <string>
 #include <vector>
 
-#include "loopclosure/detector/parallel.h"
+#include "core/parallel.h"
 #include "tutti/loopclosure/detector.h"
 #include "tutti/loopclosure/features.h"
 

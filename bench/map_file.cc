@@ -19,8 +19,8 @@
 
 #include "apps/slam/map_parts.h"
 #include "core/section_file.h"
+#include "core/sections.h"
 #include "core/stopwatch.h"
-#include "frontend/store/sections.h"
 #include "loopclosure/detector/detector_file.h"
 #include "tutti/core/error.h"
 #include "tutti/slam/map_file.h"

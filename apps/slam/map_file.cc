@@ -8,8 +8,8 @@
 
 #include "apps/slam/map_parts.h"
 #include "apps/slam/map_state.h"
+#include "core/sections.h"
 #include "core/state_archive.h"
-#include "frontend/store/sections.h"
 #include "loopclosure/detector/detector_file.h"
 #include "tutti/core/error.h"
 

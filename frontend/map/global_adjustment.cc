@@ -2,8 +2,8 @@
 
 #include <utility>
 
+#include "core/sections.h"
 #include "core/state_archive.h"
-#include "frontend/store/sections.h"
 
 namespace tutti {
 namespace {

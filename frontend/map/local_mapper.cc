@@ -5,13 +5,13 @@
 #include <tuple>
 #include <utility>
 
+#include "core/stage_times.h"
 #include "frontend/features/matcher.h"
 #include "frontend/features/patch_aligner.h"
 #include "frontend/geometry/measured.h"
 #include "frontend/geometry/pose_solver.h"
 #include "frontend/geometry/two_view.h"
 #include "frontend/map/landmark_fusion.h"
-#include "frontend/odometry/stage_times.h"
 
 namespace tutti {
 namespace {

@@ -7,10 +7,10 @@
 #include <utility>
 #include <vector>
 
+#include "core/stage_times.h"
 #include "frontend/map/bundle_adjustment.h"
 #include "frontend/map/map.h"
 #include "frontend/map/self_calibration.h"
-#include "frontend/odometry/stage_times.h"
 #include "tutti/frontend/frame.h"
 #include "tutti/frontend/odometry_options.h"
 

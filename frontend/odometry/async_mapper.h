@@ -7,9 +7,9 @@
 #include <utility>
 #include <vector>
 
+#include "core/stage_times.h"
 #include "frontend/map/local_mapper.h"
 #include "frontend/map/map.h"
-#include "frontend/odometry/stage_times.h"
 #include "frontend/odometry/tracked_frame.h"
 
 namespace tutti {

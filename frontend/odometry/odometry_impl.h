@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/section_file.h"
+#include "core/stage_times.h"
 #include "frontend/odometry/async_mapper.h"
 #include "frontend/odometry/camera_height.h"
 #include "frontend/odometry/frame_history.h"
@@ -15,7 +16,6 @@
 #include "frontend/odometry/pose_follower.h"
 #include "frontend/odometry/relocalizer.h"
 #include "frontend/odometry/rolling_start.h"
-#include "frontend/odometry/stage_times.h"
 #include "frontend/odometry/tracker.h"
 #include "tutti/frontend/odometry.h"
 

@@ -5,12 +5,12 @@
 #include <utility>
 
 #include "core/section_file.h"
+#include "core/sections.h"
 #include "core/state_archive.h"
 #include "frontend/map/global_adjustment.h"
 #include "frontend/odometry/odometry_impl.h"
 #include "frontend/store/features_state.h"
 #include "frontend/store/grey_bytes.h"
-#include "frontend/store/sections.h"
 #include "frontend/store/state_check.h"
 #include "tutti/core/error.h"
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/byte_stream.h"
-#include "loopclosure/detector/parallel.h"
+#include "core/parallel.h"
 #include "loopclosure/geometry/view_bytes.h"
 #include "tutti/core/error.h"
 

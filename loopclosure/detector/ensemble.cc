@@ -4,8 +4,8 @@
 #include <string>
 #include <utility>
 
-#include "loopclosure/detector/parallel.h"
-#include "loopclosure/index.h"
+#include "core/index.h"
+#include "core/parallel.h"
 #include "loopclosure/memory/dense.h"
 #include "tutti/core/error.h"
 

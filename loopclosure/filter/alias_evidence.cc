@@ -6,7 +6,7 @@
 #include <numeric>
 
 #include "core/byte_stream.h"
-#include "loopclosure/index.h"
+#include "core/index.h"
 
 namespace tutti {
 namespace {

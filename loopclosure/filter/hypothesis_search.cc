@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/index.h"
 #include "loopclosure/filter/loop_probability.h"
 #include "loopclosure/filter/nearest_view.h"
 #include "loopclosure/filter/transition_model.h"
-#include "loopclosure/index.h"
 
 namespace tutti::internal {
 

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "core/dense_solvers.h"
-#include "loopclosure/index.h"
+#include "core/index.h"
 
 namespace tutti::internal {
 namespace {

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "core/parallel.h"
 #include "core/stopwatch.h"
-#include "loopclosure/detector/parallel.h"
 #include "loopclosure/filter/loop_probability.h"
 #include "tutti/core/error.h"
 

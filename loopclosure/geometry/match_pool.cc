@@ -6,7 +6,7 @@
 #include <set>
 #include <utility>
 
-#include "loopclosure/detector/parallel.h"
+#include "core/parallel.h"
 #include "loopclosure/geometry/matching.h"
 
 namespace tutti::internal {

@@ -3,8 +3,8 @@
 #include <cmath>
 
 #include "core/byte_stream.h"
+#include "core/index.h"
 #include "core/median.h"
-#include "loopclosure/index.h"
 #include "loopclosure/memory/dense.h"
 #include "tutti/core/error.h"
 

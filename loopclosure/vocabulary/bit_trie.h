@@ -9,7 +9,7 @@
 #include <random>
 #include <vector>
 
-#include "loopclosure/geometry/shuffle.h"
+#include "core/shuffle.h"
 #include "loopclosure/vocabulary/chunked_vector.h"
 #include "loopclosure/vocabulary/word_storage.h"
 

@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "core/byte_stream.h"
-#include "loopclosure/geometry/shuffle.h"
-#include "loopclosure/index.h"
+#include "core/index.h"
+#include "core/shuffle.h"
 #include "loopclosure/vocabulary/descriptor_index.h"
 #include "loopclosure/vocabulary/word_bytes.h"
 #include "loopclosure/vocabulary/word_storage.h"

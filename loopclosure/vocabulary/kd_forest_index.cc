@@ -2,7 +2,7 @@
 #include <cmath>
 
 #include "core/byte_stream.h"
-#include "loopclosure/geometry/shuffle.h"
+#include "core/shuffle.h"
 #include "loopclosure/vocabulary/descriptor_index.h"
 #include "loopclosure/vocabulary/kd_tree.h"
 #include "loopclosure/vocabulary/word_bytes.h"

@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "core/byte_stream.h"
-#include "loopclosure/detector/parallel.h"
+#include "core/parallel.h"
 #include "loopclosure/geometry/whole_rows.h"
 #include "loopclosure/vocabulary/distances.h"
 #include "loopclosure/vocabulary/word_storage.h"

@@ -10,7 +10,7 @@
 #include <set>
 #include <utility>
 
-#include "loopclosure/detector/parallel.h"
+#include "core/parallel.h"
 #include "loopclosure/geometry/matching.h"
 #include "loopclosure/store/signed_squares.h"
 #include "tests/loopclosure/features/textured_image.h"

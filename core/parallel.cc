@@ -1,4 +1,4 @@
-#include "loopclosure/detector/parallel.h"
+#include "core/parallel.h"
 
 #include <algorithm>
 #include <atomic>

@@ -3,6 +3,7 @@
 
 #include <functional>
 
+#pragma GCC visibility push(default)  // used across libraries
 namespace tutti {
 
 /// Runs task(0) .. task(count - 1), each once, on at most `threads` threads (the caller's among them), and
@@ -10,3 +11,4 @@ namespace tutti {
 void RunParallel(int count, int threads, const std::function<void(int)>& task);
 
 }  // namespace tutti
+#pragma GCC visibility pop

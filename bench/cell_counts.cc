@@ -17,8 +17,8 @@
 
 #include "apps/tutti/loops/joined_pairs.h"
 #include "apps/tutti/loops/loops_input.h"
-#include "loopclosure/features/member.h"
 #include "loopclosure/memory/likelihood.h"
+#include "loopclosure/memory/member.h"
 #include "tutti/core/error.h"
 
 namespace tutti {

@@ -19,7 +19,7 @@
 
 #include "bench/index_ways.h"
 #include "data/synthetic/synthetic_random.h"
-#include "loopclosure/vocabulary/distances.h"
+#include "loopclosure/features/distances.h"
 #include "tutti/core/error.h"
 #include "tutti/core/span_recorder.h"
 #include "tutti/loopclosure/detector_options.h"

@@ -11,7 +11,7 @@
 // clang-format on
 
 #include "bench/index_ways.h"
-#include "loopclosure/vocabulary/distances.h"
+#include "loopclosure/features/distances.h"
 
 namespace tutti {
 namespace {

@@ -1,7 +1,7 @@
 // FLANN's kd-forest without what its searches pay for the size of the index.
 #include "bench/flann_light.h"
 #include "bench/index_ways.h"
-#include "loopclosure/vocabulary/distances.h"
+#include "loopclosure/features/distances.h"
 
 namespace tutti {
 namespace {

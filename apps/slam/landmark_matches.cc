@@ -5,7 +5,7 @@
 #include <opencv2/features2d.hpp>
 #include <set>
 
-#include "loopclosure/filter/evidence.h"
+#include "loopclosure/geometry/evidence.h"
 #include "tutti/loopclosure/relative_pose.h"
 
 namespace tutti {

@@ -6,7 +6,7 @@
 
 #include "core/index.h"
 #include "core/parallel.h"
-#include "loopclosure/memory/dense.h"
+#include "loopclosure/features/gradient_descriptor.h"
 #include "tutti/core/error.h"
 
 namespace tutti::internal {

@@ -3,8 +3,8 @@
 
 #include <vector>
 
-#include "loopclosure/features/member.h"
 #include "loopclosure/memory/likelihood.h"
+#include "loopclosure/memory/member.h"
 #include "tutti/loopclosure/detector.h"
 
 namespace tutti::internal {

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "loopclosure/geometry/verification.h"
-#include "loopclosure/memory/dense.h"
+#include "loopclosure/memory/dense_model.h"
 #include "tutti/core/error.h"
 
 namespace tutti::internal {

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "loopclosure/features/member.h"
+#include "loopclosure/memory/member.h"
 #include "tutti/loopclosure/detector.h"
 
 namespace tutti::internal {

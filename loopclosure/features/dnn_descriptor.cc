@@ -16,8 +16,8 @@
 #include <vector>
 
 #include "core/byte_stream.h"
+#include "loopclosure/features/gradient_descriptor.h"
 #include "loopclosure/features/smallest_image.h"
-#include "loopclosure/memory/dense.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 

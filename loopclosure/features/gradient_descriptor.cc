@@ -1,9 +1,10 @@
+#include "loopclosure/features/gradient_descriptor.h"
+
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
 #include "loopclosure/features/smallest_image.h"
-#include "loopclosure/memory/dense.h"
 
 namespace tutti {
 namespace {

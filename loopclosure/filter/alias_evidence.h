@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "loopclosure/filter/belief.h"
+#include "loopclosure/memory/belief.h"
 #include "tutti/loopclosure/detector_options.h"
 
 namespace tutti {

@@ -3,8 +3,8 @@
 
 #include <vector>
 
-#include "loopclosure/filter/belief.h"
 #include "loopclosure/filter/transition_model.h"
+#include "loopclosure/memory/belief.h"
 
 namespace tutti {
 

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "loopclosure/filter/belief.h"
+#include "loopclosure/memory/belief.h"
 #include "loopclosure/memory/location_memory.h"
 #include "tutti/loopclosure/detector_options.h"
 

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "core/byte_stream.h"
-#include "loopclosure/filter/belief.h"
 #include "loopclosure/filter/transition_model.h"
+#include "loopclosure/memory/belief.h"
 
 namespace tutti::internal {
 

@@ -5,8 +5,8 @@
 #include <utility>
 #include <vector>
 
-#include "loopclosure/filter/belief.h"
 #include "loopclosure/geometry/verification.h"
+#include "loopclosure/memory/belief.h"
 #include "loopclosure/memory/location_memory.h"
 #include "tutti/loopclosure/detector.h"
 

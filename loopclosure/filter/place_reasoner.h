@@ -8,11 +8,11 @@
 #include <string>
 #include <vector>
 
-#include "loopclosure/features/member.h"
 #include "loopclosure/filter/combination.h"
 #include "loopclosure/filter/hypothesis_search.h"
 #include "loopclosure/filter/pose_track.h"
 #include "loopclosure/filter/second_word.h"
+#include "loopclosure/memory/member.h"
 #include "loopclosure/memory/memory_system.h"
 #include "tutti/loopclosure/detector.h"
 

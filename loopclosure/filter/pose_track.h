@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/byte_stream.h"
-#include "loopclosure/filter/belief.h"
+#include "loopclosure/memory/belief.h"
 #include "tutti/loopclosure/detector.h"
 
 namespace tutti::internal {

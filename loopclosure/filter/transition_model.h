@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "loopclosure/filter/belief.h"
+#include "loopclosure/memory/belief.h"
 #include "loopclosure/memory/location_memory.h"
 
 namespace tutti {

@@ -6,8 +6,8 @@
 #include <limits>
 #include <optional>
 
-#include "loopclosure/geometry/whole_rows.h"
-#include "loopclosure/vocabulary/distances.h"
+#include "loopclosure/features/distances.h"
+#include "loopclosure/features/whole_rows.h"
 
 namespace tutti {
 namespace {

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "loopclosure/filter/evidence.h"
+#include "loopclosure/geometry/evidence.h"
 #include "loopclosure/geometry/match_pool.h"
 #include "loopclosure/geometry/verification.h"
 #include "tutti/core/pose.h"

@@ -6,10 +6,10 @@
 #include <cstdarg>
 #include <cstdio>
 
-#include "loopclosure/features/static_features.h"
-#include "loopclosure/filter/evidence.h"
+#include "loopclosure/geometry/evidence.h"
 #include "loopclosure/geometry/match_pool.h"
 #include "loopclosure/geometry/motion.h"
+#include "loopclosure/geometry/static_features.h"
 #include "tutti/loopclosure/relative_pose.h"
 
 namespace tutti {

@@ -1,3 +1,5 @@
+#include "loopclosure/memory/dense_model.h"
+
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
@@ -5,7 +7,6 @@
 #include "core/byte_stream.h"
 #include "core/index.h"
 #include "core/median.h"
-#include "loopclosure/memory/dense.h"
 #include "tutti/core/error.h"
 
 namespace tutti {

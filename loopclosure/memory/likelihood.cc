@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "core/byte_stream.h"
-#include "loopclosure/memory/dense.h"
+#include "loopclosure/memory/dense_model.h"
 
 namespace tutti {
 

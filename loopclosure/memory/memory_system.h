@@ -9,13 +9,13 @@
 #include <vector>
 
 #include "core/byte_stream.h"
-#include "loopclosure/features/member.h"
 #include "loopclosure/filter/alias_evidence.h"
 #include "loopclosure/filter/bayes_filter.h"
 #include "loopclosure/filter/transition_model.h"
-#include "loopclosure/memory/dense.h"
+#include "loopclosure/memory/dense_model.h"
 #include "loopclosure/memory/likelihood.h"
 #include "loopclosure/memory/location_memory.h"
+#include "loopclosure/memory/member.h"
 #include "loopclosure/store/location_store.h"
 #include "loopclosure/vocabulary/signature.h"
 #include "tutti/loopclosure/detector_options.h"

@@ -3,9 +3,9 @@
 
 #include "core/byte_stream.h"
 #include "core/clones.h"
+#include "loopclosure/features/distances.h"
 #include "loopclosure/vocabulary/bit_trie.h"
 #include "loopclosure/vocabulary/descriptor_index.h"
-#include "loopclosure/vocabulary/distances.h"
 #include "loopclosure/vocabulary/word_bytes.h"
 #include "loopclosure/vocabulary/word_storage.h"
 

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "core/byte_stream.h"
+#include "loopclosure/features/distances.h"
 #include "loopclosure/vocabulary/chunked_vector.h"
 #include "loopclosure/vocabulary/descriptor_index.h"
-#include "loopclosure/vocabulary/distances.h"
 #include "loopclosure/vocabulary/word_storage.h"
 
 namespace tutti::internal {

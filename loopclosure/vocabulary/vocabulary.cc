@@ -7,8 +7,8 @@
 
 #include "core/byte_stream.h"
 #include "core/parallel.h"
-#include "loopclosure/geometry/whole_rows.h"
-#include "loopclosure/vocabulary/distances.h"
+#include "loopclosure/features/distances.h"
+#include "loopclosure/features/whole_rows.h"
 #include "loopclosure/vocabulary/word_storage.h"
 #include "tutti/core/error.h"
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
-#include "loopclosure/memory/dense.h"
+#include "loopclosure/features/gradient_descriptor.h"
 
 namespace tutti {
 namespace {

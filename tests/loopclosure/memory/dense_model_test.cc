@@ -8,7 +8,8 @@
 #include <vector>
 
 #include "core/byte_stream.h"
-#include "loopclosure/memory/dense.h"
+#include "loopclosure/features/gradient_descriptor.h"
+#include "loopclosure/memory/dense_model.h"
 #include "tutti/core/error.h"
 
 namespace tutti {

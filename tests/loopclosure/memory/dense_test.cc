@@ -1,11 +1,10 @@
 // Members that describe an image as a whole.
-#include "loopclosure/memory/dense.h"
-
 #include <gtest/gtest.h>
 
 #include <filesystem>
 #include <functional>
 
+#include "loopclosure/features/gradient_descriptor.h"
 #include "tests/loopclosure/detector/two_laps.h"
 #include "tests/loopclosure/detector/wall_walk.h"
 #include "tests/loopclosure/features/textured_image.h"

@@ -8,6 +8,8 @@
 #include <random>
 #include <vector>
 
+#include "loopclosure/features/gradient_descriptor.h"
+
 namespace tutti::internal {
 namespace {
 

@@ -315,7 +315,7 @@ std::vector<std::string> KnownMembers();
 /// RegisterFeatureType added.
 std::vector<std::string> KnownFeatureTypes();
 
-/// Members that describe an image as a whole (dense.h): hog, dnn.
+/// Members that describe an image as a whole (dense_model.h): hog, dnn.
 std::vector<std::string> KnownDenseMembers();
 
 }  // namespace tutti

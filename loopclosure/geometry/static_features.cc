@@ -1,9 +1,9 @@
-#include "loopclosure/features/static_features.h"
+#include "loopclosure/geometry/static_features.h"
 
 #include <algorithm>
 #include <array>
 
-#include "loopclosure/filter/evidence.h"
+#include "loopclosure/geometry/evidence.h"
 
 namespace tutti::internal {
 namespace {

@@ -1,4 +1,4 @@
-#include "loopclosure/filter/evidence.h"
+#include "loopclosure/geometry/evidence.h"
 
 #include <gtest/gtest.h>
 

@@ -31,7 +31,7 @@ class Member {
   Features Extract(const cv::Mat& image, const cv::Mat& grey, const cv::Mat& mask) const;
   /// True if the caller extracts this member's features.
   bool external() const { return external_; }
-  /// True if it describes an image as a whole (dense.h): no keypoints, one row of descriptors, no words.
+  /// True if it describes images as a whole (dense_model.h): no keypoints, one row of descriptors, no words.
   bool dense() const { return dense_; }
   /// Width of a dense member's descriptors [values], 0: not known yet.
   int width() const { return width_; }

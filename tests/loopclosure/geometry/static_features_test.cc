@@ -1,5 +1,5 @@
 // What of two images does not move with the camera.
-#include "loopclosure/features/static_features.h"
+#include "loopclosure/geometry/static_features.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "loopclosure/vocabulary/distances.h"
+#include "loopclosure/features/distances.h"
 
 #include <limits>
 

@@ -1,4 +1,4 @@
-#include "loopclosure/geometry/whole_rows.h"
+#include "loopclosure/features/whole_rows.h"
 
 #include <gtest/gtest.h>
 

@@ -1,11 +1,11 @@
-#include "loopclosure/features/member.h"
+#include "loopclosure/memory/member.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "core/byte_stream.h"
 #include "loopclosure/features/dnn_descriptor.h"
-#include "loopclosure/memory/dense.h"
+#include "loopclosure/features/gradient_descriptor.h"
 
 namespace tutti {
 

@@ -1,4 +1,4 @@
-#include "loopclosure/filter/belief.h"
+#include "loopclosure/memory/belief.h"
 
 #include <cstddef>
 

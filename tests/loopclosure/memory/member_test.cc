@@ -1,5 +1,5 @@
 // Which images a member sits out.
-#include "loopclosure/features/member.h"
+#include "loopclosure/memory/member.h"
 
 #include <gtest/gtest.h>
 

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "loopclosure/filter/place_reasoner.h"
+#include "loopclosure/detector/place_reasoner.h"
 #include "tutti/loopclosure/evaluation.h"
 
 namespace tutti::bench {

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "loopclosure/detector/ensemble.h"
+#include "loopclosure/detector/place_reasoner.h"
 #include "loopclosure/detector/query_check.h"
-#include "loopclosure/filter/place_reasoner.h"
 #include "loopclosure/geometry/verification.h"
 #include "loopclosure/store/location_store.h"
 #include "tutti/loopclosure/detector.h"

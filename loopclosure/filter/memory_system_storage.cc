@@ -1,7 +1,7 @@
 // What a memory keeps elsewhere: in long-term memory, and in a detector's file.
 #include <set>
 
-#include "loopclosure/memory/memory_system.h"
+#include "loopclosure/filter/memory_system.h"
 #include "loopclosure/store/packed_mat.h"
 #include "tutti/core/error.h"
 

@@ -1,11 +1,11 @@
-#include "loopclosure/filter/hypothesis_search.h"
+#include "loopclosure/detector/hypothesis_search.h"
 
 #include <algorithm>
 #include <utility>
 
 #include "core/index.h"
+#include "loopclosure/detector/nearest_view.h"
 #include "loopclosure/filter/loop_probability.h"
-#include "loopclosure/filter/nearest_view.h"
 #include "loopclosure/filter/transition_model.h"
 
 namespace tutti::internal {

@@ -1,4 +1,4 @@
-#include "loopclosure/filter/second_word.h"
+#include "loopclosure/detector/second_word.h"
 
 #include <algorithm>
 #include <utility>

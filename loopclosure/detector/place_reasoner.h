@@ -8,12 +8,12 @@
 #include <string>
 #include <vector>
 
+#include "loopclosure/detector/hypothesis_search.h"
+#include "loopclosure/detector/second_word.h"
 #include "loopclosure/filter/combination.h"
-#include "loopclosure/filter/hypothesis_search.h"
+#include "loopclosure/filter/memory_system.h"
 #include "loopclosure/filter/pose_track.h"
-#include "loopclosure/filter/second_word.h"
 #include "loopclosure/memory/member.h"
-#include "loopclosure/memory/memory_system.h"
 #include "tutti/loopclosure/detector.h"
 
 namespace tutti::internal {

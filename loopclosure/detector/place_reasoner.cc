@@ -1,4 +1,4 @@
-#include "loopclosure/filter/place_reasoner.h"
+#include "loopclosure/detector/place_reasoner.h"
 
 #include <algorithm>
 #include <cstdio>

@@ -1,4 +1,4 @@
-#include "loopclosure/filter/hypothesis_search.h"
+#include "loopclosure/detector/hypothesis_search.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

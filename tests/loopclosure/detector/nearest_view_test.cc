@@ -1,4 +1,4 @@
-#include "loopclosure/filter/nearest_view.h"
+#include "loopclosure/detector/nearest_view.h"
 
 #include <gtest/gtest.h>
 

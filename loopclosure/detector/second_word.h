@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "core/byte_stream.h"
+#include "loopclosure/detector/hypothesis_search.h"
 #include "loopclosure/filter/hindsight.h"
-#include "loopclosure/filter/hypothesis_search.h"
 #include "tutti/loopclosure/detector.h"
 
 namespace tutti::internal {

@@ -1,4 +1,4 @@
-#include "loopclosure/memory/memory_system.h"
+#include "loopclosure/filter/memory_system.h"
 
 #include <algorithm>
 #include <utility>

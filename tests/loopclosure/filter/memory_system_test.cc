@@ -1,5 +1,5 @@
 // What a memory makes of each image's words: counts, and what it knows from the images just before.
-#include "loopclosure/memory/memory_system.h"
+#include "loopclosure/filter/memory_system.h"
 
 #include <gtest/gtest.h>
 

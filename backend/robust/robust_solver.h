@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "backend/robust/leave_one_out.h"
-#include "backend/robust/robust_loss.h"
 #include "backend/solver/graph_problem.h"
+#include "backend/solver/robust_loss.h"
 #include "core/median.h"
 
 namespace tutti::internal {

@@ -5,9 +5,9 @@
 #include <memory>
 #include <vector>
 
-#include "backend/robust/robust_loss.h"
 #include "backend/solver/graph_solver.h"
 #include "backend/solver/linearized_edge.h"
+#include "backend/solver/robust_loss.h"
 
 namespace tutti::internal {
 

@@ -1,4 +1,4 @@
-#include "backend/robust/robust_loss.h"
+#include "backend/solver/robust_loss.h"
 
 #include <gtest/gtest.h>
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <map>
 
-#include "frontend/geometry/measured.h"
+#include "frontend/map/measured.h"
 #include "frontend/map/window_solver.h"
 
 namespace tutti {

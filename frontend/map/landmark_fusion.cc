@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <iterator>
 
-#include "frontend/features/matcher.h"
+#include "frontend/map/matcher.h"
 
 namespace tutti {
 namespace {

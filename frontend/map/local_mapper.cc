@@ -6,12 +6,12 @@
 #include <utility>
 
 #include "core/stage_times.h"
-#include "frontend/features/matcher.h"
-#include "frontend/features/patch_aligner.h"
-#include "frontend/geometry/measured.h"
 #include "frontend/geometry/pose_solver.h"
 #include "frontend/geometry/two_view.h"
 #include "frontend/map/landmark_fusion.h"
+#include "frontend/map/matcher.h"
+#include "frontend/map/measured.h"
+#include "frontend/map/patch_aligner.h"
 
 namespace tutti {
 namespace {

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "core/median.h"
-#include "frontend/features/patch_aligner.h"
+#include "frontend/map/patch_aligner.h"
 
 namespace tutti {
 

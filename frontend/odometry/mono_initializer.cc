@@ -5,8 +5,8 @@
 
 #include "core/angle.h"
 #include "core/median.h"
-#include "frontend/features/matcher.h"
 #include "frontend/map/bundle_adjustment.h"
+#include "frontend/map/matcher.h"
 
 namespace tutti {
 namespace {

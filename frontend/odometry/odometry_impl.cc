@@ -4,10 +4,10 @@
 #include <utility>
 
 #include "core/dense_solvers.h"
-#include "frontend/geometry/measured.h"
 #include "frontend/map/global_adjustment.h"
 #include "frontend/map/landmark_fusion.h"
 #include "frontend/map/map_correction.h"
+#include "frontend/map/measured.h"
 #include "frontend/map/other_camera.h"
 #include "frontend/map/redundant_keyframes.h"
 #include "frontend/map/scale_ramp.h"

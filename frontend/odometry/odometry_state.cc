@@ -9,9 +9,9 @@
 #include "core/state_archive.h"
 #include "frontend/map/global_adjustment.h"
 #include "frontend/odometry/odometry_impl.h"
+#include "frontend/odometry/state_check.h"
 #include "frontend/store/features_state.h"
 #include "frontend/store/grey_bytes.h"
-#include "frontend/store/state_check.h"
 #include "tutti/core/error.h"
 
 namespace tutti {

@@ -3,9 +3,9 @@
 #include <algorithm>
 
 #include "core/angle.h"
-#include "frontend/features/patch_aligner.h"
-#include "frontend/geometry/measured.h"
 #include "frontend/geometry/pose_solver.h"
+#include "frontend/map/measured.h"
+#include "frontend/map/patch_aligner.h"
 #include "frontend/odometry/step_check.h"
 
 namespace tutti {

@@ -4,9 +4,9 @@
 #include <iterator>
 #include <utility>
 
-#include "frontend/features/patch_aligner.h"
-#include "frontend/geometry/measured.h"
 #include "frontend/geometry/pose_solver.h"
+#include "frontend/map/measured.h"
+#include "frontend/map/patch_aligner.h"
 #include "frontend/odometry/reach.h"
 
 namespace tutti {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "frontend/geometry/measured.h"
+#include "frontend/map/measured.h"
 
 namespace tutti {
 namespace {

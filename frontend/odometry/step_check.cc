@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "core/dense_solvers.h"
-#include "frontend/geometry/measured.h"
+#include "frontend/map/measured.h"
 
 namespace tutti {
 namespace {

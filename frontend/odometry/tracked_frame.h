@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "frontend/features/features.h"
-#include "frontend/features/matcher.h"
+#include "frontend/map/matcher.h"
 #include "frontend/odometry/exposure_estimate.h"
 #include "tutti/core/pose.h"
 

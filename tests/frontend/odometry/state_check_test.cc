@@ -1,4 +1,4 @@
-#include "frontend/store/state_check.h"
+#include "frontend/odometry/state_check.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

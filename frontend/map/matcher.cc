@@ -1,4 +1,4 @@
-#include "frontend/features/matcher.h"
+#include "frontend/map/matcher.h"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "frontend/features/patch_aligner.h"
+#include "frontend/map/patch_aligner.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>

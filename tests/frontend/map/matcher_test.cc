@@ -1,5 +1,5 @@
 // Data association on a made-up scene: random points with random descriptors, seen without noise.
-#include "frontend/features/matcher.h"
+#include "frontend/map/matcher.h"
 
 #include <gtest/gtest.h>
 

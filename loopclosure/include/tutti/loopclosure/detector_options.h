@@ -42,7 +42,7 @@ enum class MemoryKind {
 /// Who searches the words of float descriptors (descriptor_index.h).
 enum class FloatIndex {
   kForest,  ///< kd-trees of our own, by FLANN's rules
-  kFlann,   ///< FLANN's: much the same answers, several times slower (docs/results/index.md)
+  kFlann,   ///< FLANN's: much the same answers in 3 to 4 times the time (docs/loop-closure.md, section 3)
 };
 
 /// Words of the YAML files; kSingle has none, since it is called by its member's name.

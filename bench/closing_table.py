@@ -14,12 +14,11 @@ sessions must become one map; half of the frames must be located. Needs nothing 
 import csv
 import functools
 import json
+import shutil
 import statistics
 import subprocess
 import sys
 
-import map_sessions
-import map_use
 import table
 
 VARIANTS = ["odometry", "surf", "sift", "orb", "standardised-mean", "ensemble"]
@@ -81,44 +80,51 @@ def compared(row, a, seed):
 
 
 def town(a, seed):
-    """Folder, true positions, and the first frame of the second lap."""
+    """Folder, and the first frame of the second lap."""
     folder = table.generate(a.tutti, a.out / f"town-{seed}", [*TOWN, "--seed", seed])
-    truth = map_sessions.kitti_truth(folder)
-    return folder, truth, len(truth) // 2
+    return folder, len((folder / "times.txt").read_text().split()) // 2
 
 
 def lap(a, seed, variant, name, *more):
-    """Folder of a run over a part of the town."""
-    return map_use.run(a, f"town-{seed}-{variant}-{name}", town(a, seed)[0], "--quiet", "--set", SETTINGS[variant],
-                       "run.odometry_pass=false", *more)
+    """Map and summary of a run over a part of the town."""
+    dataset, folder = town(a, seed)[0], a.out / f"town-{seed}-{variant}-{name}"
+    return folder / "map.tutti", table.run(a, folder, dataset / "config.yaml", dataset, "--set", SETTINGS[variant],
+                                           "run.odometry_pass=false", *more)
 
 
 def day(a, seed, variant):
-    return lap(a, seed, variant, "day", "--end", town(a, seed)[2])
+    return lap(a, seed, variant, "day", "--end", town(a, seed)[1])[0]
 
 
 def error(a, seed, map_file):
-    """Of all frames of both laps [m]."""
-    return map_use.ate(town(a, seed)[1], map_sessions.all_frames(a, map_file.stem + f"-{seed}", map_file))
+    """ATE of all frames of both laps [m]."""
+    trajectory = map_file.with_suffix(".txt")
+    subprocess.run([a.tutti, "export", map_file, "--tum", trajectory], check=True, stdout=subprocess.DEVNULL)
+    return table.errors(a, town(a, seed)[0], trajectory, "sim3")["ate"]["rmse"]
 
 
 def session(a, seed, variant):
-    folder = lap(a, seed, variant, "both", "--start", town(a, seed)[2], "--map", day(a, seed, variant) / "map.tutti")
-    loops = json.loads((folder / "summary.json").read_text())["loops"]
-    joined = map_use.map_info(a, folder / "map.tutti")["submaps"] == 1
+    both, summary = lap(a, seed, variant, "both", "--start", town(a, seed)[1], "--map", day(a, seed, variant))
+    info = subprocess.run([a.tutti, "map", "info", both, "--json"], check=True, stdout=subprocess.PIPE, text=True).stdout
+    joined, loops = json.loads(info)["submaps"] == 1, summary["loops"]
     return {"closed": joined and not loops["false"], "true": loops["true"], "false": loops["false"],
-            "ate_m": error(a, seed, folder / "map.tutti") if joined else None}
+            "ate_m": error(a, seed, both) if joined else None}
 
 
 def merge(a, seed, variant):
-    night = lap(a, seed, variant, "dusk", "--start", town(a, seed)[2])
-    file = map_sessions.merged(a, f"town-{seed}-{variant}-merged", day(a, seed, variant) / "map.tutti", night / "map.tutti")
-    return {"closed": file is not None, "true": None, "false": None, "ate_m": error(a, seed, file) if file else None}
+    dusk, _ = lap(a, seed, variant, "dusk", "--start", town(a, seed)[1])
+    file = a.out / f"town-{seed}-{variant}-merged.tutti"
+    joined = subprocess.run([a.tutti, "merge", day(a, seed, variant), dusk, "-o", file], capture_output=True).returncode == 0
+    return {"closed": joined, "true": None, "false": None, "ate_m": error(a, seed, file) if joined else None}
 
 
 def localize(a, seed, variant):
-    folder, _ = map_use.localize(a, f"town-{seed}-{variant}-located", day(a, seed, variant) / "map.tutti", town(a, seed)[0], "--start",
-                                 town(a, seed)[2], "--quiet")
+    (dataset, dusk), folder = town(a, seed), a.out / f"town-{seed}-{variant}-located"
+    shutil.rmtree(folder, ignore_errors=True)
+    done = subprocess.run([a.tutti, "localize", "--quiet", "--map", day(a, seed, variant), "--config", dataset / "config.yaml", "--dataset",
+                           dataset, "--out", folder, "--start", str(dusk)], stdout=subprocess.DEVNULL)
+    if done.returncode not in (0, 1):  # 1: no frame was found, which is a result
+        raise subprocess.CalledProcessError(done.returncode, done.args)
     summary = folder / "summary.json"
     frames = json.loads(summary.read_text())["frames"] if summary.exists() else {"localized": 0, "total": 1}
     return {"closed": 2 * frames["localized"] >= frames["total"], "true": None, "false": None, "ate_m": None,

@@ -105,6 +105,23 @@ def generate(tutti, folder, options):
     return folder
 
 
+def run(a, folder, config, dataset, *options):
+    """summary.json of a `tutti run`, which is made unless --reuse finds it."""
+    if not (a.reuse and (folder / "summary.json").exists()):
+        subprocess.run([a.tutti, "run", "--quiet", "--no-report", "--require", "failed", "--config", config, "--dataset", dataset, "--out",
+                        folder, *map(str, options)], check=True, stdout=subprocess.DEVNULL)
+    return json.loads((folder / "summary.json").read_text())
+
+
+def errors(a, dataset, estimate, align):
+    """What `tutti evaluate` says of a trajectory against the ground truth of a data set (KITTI, TUM); None if nothing can be compared."""
+    truth = [dataset / "poses.txt", "--times", dataset / "times.txt"] if (dataset / "poses.txt").exists() else [dataset / "groundtruth.txt"]
+    file = a.out / "errors.json"
+    done = subprocess.run([a.tutti, "evaluate", "--reference", *truth, "--estimate", estimate, "--align", align, "--json", file],
+                          stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    return json.loads(file.read_text()) if done.returncode == 0 else None
+
+
 # Other worlds of a kind: other houses and textures, and for towns other routes (blocks that they go around).
 WORLD_SEEDS = [1, 2, 3, 4, 5]
 TOWN_ROUTES = [(), ("--blocks-x", 3), ("--blocks-x", 2, "--blocks-y", 2), ("--blocks-x", 3, "--blocks-y", 2), ("--blocks-x", 4)]

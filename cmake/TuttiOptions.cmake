@@ -29,7 +29,7 @@ else()
   tutti_option(TUTTI_BUILD_TESTS "Build the tests of what is built" ${PROJECT_IS_TOP_LEVEL} "NOT BUILD_SHARED_LIBS"
     "static libraries, since tests use private classes")
 endif()
-tutti_option(TUTTI_BUILD_BENCH "Build the programs under bench/ (needs Google Benchmark)" OFF
+tutti_option(TUTTI_BUILD_BENCH "Build the programs under bench/" OFF
   "TUTTI_BUILD_APPS;NOT BUILD_SHARED_LIBS" "TUTTI_BUILD_APPS, and static libraries")
 tutti_option(TUTTI_BUILD_FUZZERS "Build the libFuzzer programs under tests/fuzz (needs clang; see ./dev fuzz)" OFF
   "TUTTI_BUILD_LOOPCLOSURE;NOT BUILD_SHARED_LIBS" "TUTTI_BUILD_LOOPCLOSURE, and static libraries")

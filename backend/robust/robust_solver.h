@@ -135,7 +135,7 @@ class RobustSolver {
 
   /// On top of the 99 % quantile. True loops of intel, ringCity, manhattan and manhattanOlson3500 stay
   /// within 3 sigma of the graph's own spread, 0.7 % of parking-garage's do not
-  /// (docs/results/false-loops.md).
+  /// (docs/backend.md, section 2).
   static constexpr double kStrainSigmas = 3;
 
   /// One round of DropStrained without the solving. The limit; 0 if no loop is beyond it.

@@ -116,8 +116,7 @@ TEST(FalseLoops, DoNotMoveTheSolutionMoreWhereTheIdsHaveGaps) {
   }
 }
 
-// The cheap form of docs/results/false-loops.md (bench/robust_table.py): the default loss, a graph, two
-// seeds.
+// The cheap form of "False loops" in docs/results/pose-graph.md: the default loss, a graph, two seeds.
 class HundredFalseLoops : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(HundredFalseLoops, DoNotMoveTheSolution) {

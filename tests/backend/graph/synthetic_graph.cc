@@ -6,12 +6,7 @@
 namespace tutti::testing {
 namespace {
 
-// Not std::normal_distribution: its numbers differ between standard libraries.
 double Uniform(std::mt19937& random) { return (static_cast<double>(random()) + 0.5) / 4294967296.0; }
-double Gauss(std::mt19937& random) {
-  const double u = Uniform(random), v = Uniform(random);
-  return std::sqrt(-2.0 * std::log(u)) * std::cos(2.0 * M_PI * v);
-}
 // z is drawn first: in the arguments of one call, which comes first would be the compiler's choice.
 Eigen::Vector3d GaussVector(std::mt19937& random) {
   const double z = Gauss(random), y = Gauss(random), x = Gauss(random);
@@ -33,6 +28,12 @@ Similarity Noisy(const Similarity& s, const SyntheticGraphOptions& o, std::mt199
 }
 
 }  // namespace
+
+// Not std::normal_distribution: its numbers differ between standard libraries.
+double Gauss(std::mt19937& random) {
+  const double u = Uniform(random), v = Uniform(random);
+  return std::sqrt(-2.0 * std::log(u)) * std::cos(2.0 * M_PI * v);
+}
 
 Similarity RandomPose(GraphKind kind, std::mt19937& random, double translation, double rotation) {
   Eigen::Vector3d t = GaussVector(random), r = GaussVector(random);

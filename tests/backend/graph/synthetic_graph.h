@@ -38,6 +38,9 @@ SyntheticGraph MakeSyntheticGraph(const SyntheticGraphOptions& options);
 /// Root mean square distance of the nodes from the truth [m].
 double PositionError(const PoseGraph& graph, const std::vector<Similarity>& truth);
 
+/// Standard normal, with the same numbers on every platform.
+double Gauss(std::mt19937& random);
+
 /// A random similarity (scale 1 unless kSim3; planar for kSE2).
 Similarity RandomPose(GraphKind kind, std::mt19937& random, double translation, double rotation);
 

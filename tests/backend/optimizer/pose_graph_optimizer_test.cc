@@ -188,7 +188,7 @@ TEST(PoseGraphOptimizer, RobustLossesRejectPlantedFalseLoops) {
     PoseGraphOptimizer().Optimize(clean.graph);
     options.false_loops = 20;
     for (RobustLoss robust : {RobustLoss::kCauchy, RobustLoss::kDcs, RobustLoss::kGncTls, RobustLoss::kGnc}) {
-      // In the plane it ends in a local minimum here; docs/results/pose-graph.md says where else.
+      // In the plane it ends in a local minimum here; docs/backend.md, section 2, says where else.
       if (robust == RobustLoss::kGncTls && kind == GraphKind::kSE2) continue;
       SyntheticGraph spoiled = MakeSyntheticGraph(options);
       PoseGraphOptions solver;

@@ -3,7 +3,7 @@
 
 #include <random>
 
-#include "bench/noisy_measurement.h"
+#include "tests/backend/graph/synthetic_graph.h"
 #include "tests/support/test_data.h"
 #include "tutti/backend/g2o_io.h"
 #include "tutti/backend/pose_graph_optimizer.h"
@@ -60,7 +60,7 @@ PoseGraph WithNoisyHeadings(const PoseGraph& clean, unsigned seed) {
   PoseGraph noisy(clean.kind());
   for (const PoseGraphNode& node : clean.nodes()) noisy.AddNode(node);
   for (PoseGraphEdge edge : clean.edges()) {
-    edge.measurement.rotation = edge.measurement.rotation * ExpSO3({0, 0, kSigma * bench::Gauss(random)});
+    edge.measurement.rotation = edge.measurement.rotation * ExpSO3({0, 0, kSigma * testing::Gauss(random)});
     edge.information(5, 5) = 1 / (1 / edge.information(5, 5) + kSigma * kSigma);
     noisy.AddEdge(edge);
   }

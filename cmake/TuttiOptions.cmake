@@ -49,6 +49,7 @@ if(PROJECT_IS_TOP_LEVEL)
       set(CMAKE_CXX_COMPILER_LAUNCHER "${CMAKE_COMMAND}" -E env CCACHE_SLOPPINESS=pch_defines,time_macros "${CCACHE_PROGRAM}")
     endif()
   endif()
+  # Release is -O3: with -O2 compiling takes 7 % less, and runs take a quarter longer (three sequences, side by side).
   if(NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
     set(CMAKE_BUILD_TYPE Release CACHE STRING "Debug, Release, RelWithDebInfo" FORCE)
   endif()

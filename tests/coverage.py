@@ -5,7 +5,6 @@ build/coverage/html has every line with its count, build/coverage/missed.txt the
 """
 import argparse
 import collections
-import datetime
 import json
 import os
 import pathlib
@@ -72,7 +71,6 @@ def main():
     parser.add_argument("build", type=pathlib.Path, help=argparse.SUPPRESS)
     parser.add_argument("modules", nargs="*", help=f"whose tests to run: {' '.join(MODULES)} (default: core loopclosure backend)")
     parser.add_argument("--targets", action="store_true", help=argparse.SUPPRESS)  # what is to be built
-    parser.add_argument("--write", action="store_true", help="figures into docs/results/coverage.md")
     arguments = parser.parse_intermixed_args()
     build = arguments.build.resolve()
     modules = arguments.modules or ["core", "loopclosure", "backend"]
@@ -108,13 +106,6 @@ def main():
     print(f"lines that nothing reached: {build / 'missed.txt'}; all of them with counts: {build / 'html' / 'index.html'}")
     if failed:
         print(f"FAILED: {' '.join(failed)}; see the logs in {build}", file=sys.stderr)
-    if arguments.write and not failed:
-        commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, check=True, capture_output=True, text=True).stdout.strip()
-        command = " ".join(["./dev coverage", *arguments.modules, "--write"])
-        (ROOT / "docs" / "results" / "coverage.md").write_text("\n".join([
-            "# Lines that tests reach", "",
-            f"Of each module by the unit tests of {', '.join(modules)}, counted by clang; tests of the programs are not counted.",
-            f"`{command}`; {datetime.date.today()}, commit {commit}.", "", text]))
     return 1 if failed or short else 0
 
 

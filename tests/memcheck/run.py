@@ -15,7 +15,6 @@ import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 HERE = ROOT / "tests" / "memcheck"
-DOCUMENT = ROOT / "docs" / "results" / "memcheck.md"
 TOWN = "--sensor stereo --blocks-x 1 --block 15 --laps 1.3 --rate 5 --width 240 --height 120 --supersample 1".split()
 # A loop is closed in the first; the others read what it left.
 COMMANDS = (("run", "--dataset TOWN --out OUT/run --threads 2 --require failed"),
@@ -43,7 +42,6 @@ def main():
     parser = argparse.ArgumentParser(prog="./dev memcheck", description=__doc__.split("\n")[0])
     parser.add_argument("tutti", type=pathlib.Path, help=argparse.SUPPRESS)
     parser.add_argument("commands", nargs="*", help=f"which: {' '.join(name for name, _ in COMMANDS)} (default: all)")
-    parser.add_argument("--write", action="store_true", help=f"figures into {DOCUMENT.relative_to(ROOT)}")
     a = parser.parse_args()
     names = [name for name, _ in COMMANDS]
     for name in a.commands:
@@ -55,7 +53,7 @@ def main():
     town, tutti = out / "town", a.tutti.resolve()
     subprocess.run([tutti, "generate", "--out", town, *TOWN], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     environment = dict(os.environ, LD_PRELOAD=str(preload(out)))
-    rows, found = [], 0
+    found = 0
     for name, text in COMMANDS:
         words = [name, *text.replace("TOWN", str(town)).replace("OUT", str(out)).split()]
         checked = not a.commands or name in a.commands
@@ -76,17 +74,10 @@ def main():
             print(error)
         if status and not errors:
             print((out / f"{name}.txt").read_text()[-2000:])
-        rows.append(f"| `tutti {name} {text}` | {took:.0f} s | {len(errors)} |")
     if not found:
         shutil.rmtree(out)
     else:
         print(f"{found} findings; all of them are in {out}", file=sys.stderr)
-    if a.write and not a.commands and not found:
-        DOCUMENT.write_text("# Memcheck\n\nCommands of the release build under valgrind's memcheck, on a small synthetic town: invalid reads and writes,"
-                            "\nvalues that were never written, blocks that are definitely lost. Third parties' own are in"
-                            "\n[third_parties.supp](../../tests/memcheck/third_parties.supp), each with its reason. `./dev memcheck --write`.\n\n"
-                            "| command | time | errors |\n|---|---:|---:|\n" + "\n".join(rows) + "\n")
-        print(f"written: {DOCUMENT.relative_to(ROOT)}")
     return 1 if found else 0
 
 

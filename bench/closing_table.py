@@ -21,11 +21,11 @@ import sys
 
 import table
 
-VARIANTS = ["odometry", "surf", "sift", "orb", "standardised-mean", "ensemble"]
-TITLES = {"odometry": "no loops", "surf": "SURF alone", "sift": "SIFT alone", "orb": "ORB alone",
-          "standardised-mean": "the seed's mean", "ensemble": "**the ensemble**"}
-SETTINGS = {"surf": "loops.rule=surf", "sift": "loops.rule=sift", "orb": "loops.rule=orb", "ensemble": "loops.rule=joint",
-            "standardised-mean": "loops.preset=standardised-mean"}
+# variant of `tutti compare`: title, and the same as a setting of `tutti run`.
+VARIANTS = {"odometry": ("no loops", None), "surf": ("SURF alone", "loops.rule=surf"), "sift": ("SIFT alone", "loops.rule=sift"),
+            "orb": ("ORB alone", "loops.rule=orb"), "standardised-mean": ("the seed's mean", "loops.preset=standardised-mean"),
+            "ensemble": ("**the ensemble**", "loops.rule=joint")}
+LOOKING = [v for v in VARIANTS if v != "odometry"]  # for loops
 
 RING = ["--sensor", "stereo", "--world", "corridor", "--corridor", "16", "--laps", "1.1", "--speed", "0.8", "--rate", "8", "--width",
         "320", "--height", "240", "--supersample", "1", "--noise", "--dusk"]
@@ -88,7 +88,7 @@ def town(a, seed):
 def lap(a, seed, variant, name, *more):
     """Map and summary of a run over a part of the town."""
     dataset, folder = town(a, seed)[0], a.out / f"town-{seed}-{variant}-{name}"
-    return folder / "map.tutti", table.run(a, folder, dataset / "config.yaml", dataset, "--set", SETTINGS[variant],
+    return folder / "map.tutti", table.run(a, folder, dataset / "config.yaml", dataset, "--set", VARIANTS[variant][1],
                                            "run.odometry_pass=false", *more)
 
 
@@ -132,7 +132,7 @@ def localize(a, seed, variant):
 
 
 def of_variants(row, a, seed):
-    return {variant: row(a, seed, variant) for variant in VARIANTS if variant != "odometry"}
+    return {variant: row(a, seed, variant) for variant in LOOKING}
 
 
 # name: title, what measures one seed, and which data it needs.
@@ -144,9 +144,9 @@ ROWS = {
     "localize": ("frames at dusk in the map of a town by day (`tutti localize`), stereo", functools.partial(of_variants, localize), None)}
 
 
-def mean(values, digits=1):
+def mean(values, form="{:.1f}"):
     values = [v for v in values if v is not None]
-    return f"{statistics.mean(values):.{digits}f}" if values else "-"
+    return form.format(statistics.mean(values)) if values else "-"
 
 
 def section(name, seeds):
@@ -161,18 +161,16 @@ def section(name, seeds):
             continue
         said = f"{100 * statistics.mean(r['located'] for r in runs):.0f} %" if located else (
             f"{mean([r['true'] for r in runs])} / {mean([r['false'] for r in runs])}")
-        ate = mean([r["ate_m"] for r in runs], 3)
         posed = f"{100 * statistics.mean(r['posed'] for r in runs):.0f} %" if "posed" in runs[0] else "-"
-        lines.append(f"| {TITLES[variant]} | {sum(r['closed'] for r in runs)} of {len(runs)} | {said} | {posed} "
-                     f"| {ate if ate == '-' else ate + ' m'} |")
+        lines.append(f"| {VARIANTS[variant][0]} | {sum(r['closed'] for r in runs)} of {len(runs)} | {said} | {posed} "
+                     f"| {mean([r['ate_m'] for r in runs], '{:.3f} m')} |")
     return "\n".join(lines) + "\n"
 
 
 def verdict(whole):
-    lines = ["| row | " + " | ".join(TITLES[v] for v in VARIANTS if v != "odometry") + " |", "|---" * len(VARIANTS) + "|"]
-    for name in (n for n in ROWS if n in whole):
-        closed = [f"{sum(seed[v]['closed'] for seed in whole[name])} of {len(whole[name])}" for v in VARIANTS if v != "odometry"]
-        lines.append(f"| {name} | " + " | ".join(closed) + " |")
+    lines = ["| row | " + " | ".join(VARIANTS[v][0] for v in LOOKING) + " |", "|---" * len(VARIANTS) + "|"]
+    lines += [f"| {name} | " + " | ".join(f"{sum(seed[v]['closed'] for seed in whole[name])} of {len(whole[name])}" for v in LOOKING) + " |"
+              for name in ROWS if name in whole]
     return "\n".join(lines) + "\n"
 
 

@@ -13,10 +13,8 @@ import json
 import math
 import random
 import shutil
-import struct
 import subprocess
 import sys
-import zlib
 
 import table
 
@@ -77,15 +75,6 @@ def draw_runs(draw, sources):
         yield source, 10 * draw + rng.randrange(4), rng.random(), damage
 
 
-def grey_png(file, width, height):
-    """An image without anything on it."""
-    def chunk(kind, data):
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-    rows = (b"\0" + b"\x60" * width) * height
-    file.write_bytes(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)) +
-                     chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
-
-
 def frames_of(folder):
     """Of a data set: the files of each frame by folder, its time and its pose (KITTI), in order."""
     if (folder / "image_0").exists():
@@ -109,16 +98,13 @@ def write_cut(a, folder, source, frames, damage, size):
     main = "image_0" if "image_0" in frames[0][0] else "rgb"
     changed = {}
     if "change" in damage:
-        before = folder / "before"
-        before.mkdir()
-        for i, (files, _, _) in enumerate(frames):
-            (before / f"{i:06d}{files[main].suffix}").symlink_to(files[main])
-        subprocess.run([a.tutti, "generate", "--from-images", before, "--change", damage["change"], "--out", folder / "after"],
+        table.link_numbered({i: files[main] for i, (files, _, _) in enumerate(frames)}, folder / "before")
+        subprocess.run([a.tutti, "generate", "--from-images", folder / "before", "--change", damage["change"], "--out", folder / "after"],
                        check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         changed = {i: folder / "after" / f"{i:06d}.png" for i in range(len(frames))}
     if "covered" in damage:
-        grey_png(folder / "grey.png", *size)
-        changed = {i: folder / "grey.png" for i in range(middle, middle + damage["covered"])}
+        (folder / "grey.pgm").write_bytes(b"P5 %d %d 255\n" % size + b"\x60" * (size[0] * size[1]))  # read by content, whatever the name
+        changed = {i: folder / "grey.pgm" for i in range(middle, middle + damage["covered"])}
     lists = {kind: [] for kind in frames[0][0]}
     for i, (files, stamp, _) in enumerate(frames):
         for kind, file in files.items():
@@ -150,18 +136,6 @@ def camera_of(config):
     return {w[0].strip(): float(w[1]) for w in words if len(w) == 2 and w[0].strip() in ("fx", "fy", "width", "height")}
 
 
-def error_of(a, cut, run, sensor):
-    """ATE and path [m] of a run that was not told its ground truth, so that its word can't come from it; None: no trajectory."""
-    truth = [cut / "poses.txt", "--times", cut / "times.txt"] if (cut / "poses.txt").exists() else [cut / "groundtruth.txt"]
-    done = subprocess.run([a.tutti, "evaluate", "--reference", *truth, "--estimate", run / "trajectory.txt", "--align",
-                           "sim3" if sensor == "mono" else "se3", "--json", run / "errors.json"],
-                          stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    if done.returncode != 0:
-        return None, None
-    errors = json.loads((run / "errors.json").read_text())
-    return errors["ate"]["rmse"], errors["path_length_m"]
-
-
 def measure(a, folder, source, seed, place, damage_name):
     """One run: what it says and what is true."""
     where, sensor, count, step, _ = SOURCES[source]
@@ -169,8 +143,7 @@ def measure(a, folder, source, seed, place, damage_name):
     if where in REAL:
         data, config = a.data / where, table.ROOT / "data/configs" / f"{REAL[where]}.yaml"
     else:
-        name = where.replace(" ", "-")
-        data = table.generate(a.tutti, a.out / "worlds" / f"{name}-{seed}", [*WORLDS[where], "--seed", seed])
+        data = table.generate(a.tutti, a.out / "worlds" / f"{where.replace(' ', '-')}-{seed}", [*WORLDS[where], "--seed", seed])
         config = data / "config.yaml"
     step *= damage.get("stride", 1)
     frames = frames_of(data)
@@ -183,21 +156,22 @@ def measure(a, folder, source, seed, place, damage_name):
         more = [f"camera.{f}={camera[f] * damage['focal']}" for f in ("fx", "fy")]
     if "k1" in damage:
         more = ["camera.distortion=radtan", f"camera.coefficients=[{damage['k1']}, 0, 0, 0, 0]"]
-    sets = [f"dataset.sensor={sensor}", "run.odometry_pass=false", *more]
     run = subprocess.run([a.tutti, "run", "--quiet", "--no-report", "--no-map", "--threads", "1", "--ground-truth", "none", "--config",
-                          config, "--dataset", folder / "cut", "--out", folder / "run", *(w for s in sets for w in ("--set", s))],
-                         stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+                          config, "--dataset", folder / "cut", "--out", folder / "run", "--set", f"dataset.sensor={sensor}",
+                          "run.odometry_pass=false", *more], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     summary = folder / "run" / "summary.json"
     if not summary.exists():  # bad input: nothing to judge
         print(f"health: {source}, {damage_name}: refused: {run.stderr.strip()}", file=sys.stderr)
         return {"source": source, "seed": seed, "first": first, "damage": damage_name, "word": REFUSED}
     summary = json.loads(summary.read_text())
-    ate, path = error_of(a, folder / "cut", folder / "run", sensor)
+    # The run is not told its ground truth, so that its word can't come from it.
+    errors = table.errors(a, folder / "cut", folder / "run" / "trajectory.txt", "sim3" if sensor == "mono" else "se3")
+    path = errors and errors["path_length_m"]
     shutil.rmtree(folder)
     return {"source": source, "seed": seed, "first": first, "damage": damage_name, "path_m": path and round(path, 3),
-            "ate_percent": round(100 * ate / path, 3) if path else None,
-            "turned_deg": turned_deg(frames), "lens_check": summary.get("lens_check"), "posed": round(summary["frames"]["tracked"] / summary["frames"]["total"], 4), "word": summary["health"]["word"],
-            "signs": {k: round(v, 4) for k, v in summary["health"]["signs"].items()}}
+            "ate_percent": round(100 * errors["ate"]["rmse"] / path, 3) if path else None, "turned_deg": turned_deg(frames),
+            "lens_check": summary.get("lens_check"), "posed": round(summary["frames"]["tracked"] / summary["frames"]["total"], 4),
+            "word": summary["health"]["word"], "signs": {k: round(v, 4) for k, v in summary["health"]["signs"].items()}}
 
 
 def is_good(row):
@@ -219,11 +193,12 @@ def is_untellable(row):
 
 
 def flagged(rows):
-    return sum(r["word"] != "good" for r in rows)
+    """[%]"""
+    return 100 * sum(r["word"] != "good" for r in rows) / max(1, len(rows))
 
 
 def share(rows):
-    return f"{flagged(rows)} of {len(rows)} ({100 * flagged(rows) / len(rows):.1f} %)" if rows else "none"
+    return f"{sum(r['word'] != 'good' for r in rows)} of {len(rows)} ({flagged(rows):.1f} %)" if rows else "none"
 
 
 def document(rows, draw):
@@ -232,7 +207,7 @@ def document(rows, draw):
     failed = [r for r in all_failed if not is_untellable(r)]
     few = "" if min(len(good), len(failed)) >= LEAST else (
         f" **Fewer than {LEAST} of a kind:** `./dev bench health --reuse --write` measures the rest.")
-    met = [failed and 100 * flagged(failed) >= FLAGGED_FAILED * len(failed), good and 100 * flagged(good) <= FLAGGED_GOOD * len(good)]
+    met = [failed and flagged(failed) >= FLAGGED_FAILED, good and flagged(good) <= FLAGGED_GOOD]
     text = ["# Does a run in doubt say so?", "", f"Written by `./dev bench health --write` (bench/health_table.py), draw {draw}: {len(rows)} "
             "short runs, each a cut of a generated world or of real data, as it is or damaged. The limits of the signs "
             "(`apps/run/run_signs.cc`) were set on other draws of such runs, with other worlds, first frames and damages; no row of this "
@@ -281,12 +256,11 @@ def main():
         rows.append(measure(a, a.out / f"run-{a.draw}", *drawn))
         kept.write_text(json.dumps(rows))
         print(f"health: run {i + 1}: {rows[-1]['source']}, {rows[-1]['damage']}: {rows[-1]['word']}", file=sys.stderr)
+    lines = [json.dumps(row) for row in rows]
     if a.signs:
-        for row in rows:
-            print(json.dumps(row))
+        print("\n".join(lines))
     if a.write:
-        lines = ",\n".join(json.dumps(row) for row in rows)
-        (table.RESULTS / "health.json").write_text(f"[\n{lines}\n]\n")
+        (table.RESULTS / "health.json").write_text("[\n" + ",\n".join(lines) + "\n]\n")
     table.put(a, table.RESULTS / "health.md", document(rows, a.draw))
     return 0
 

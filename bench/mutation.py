@@ -9,7 +9,6 @@ five times as long as the whole module does else.
 import contextlib
 import hashlib
 import os
-import pathlib
 import random
 import re
 import subprocess
@@ -21,7 +20,6 @@ import table
 
 MODULES = ("loopclosure", "backend")
 SHARDS = 2  # a module's tests are split over so many processes
-DOCUMENT = table.RESULTS / "mutation.md"
 OPERATORS = {" + ": " - ", " - ": " + ", " < ": " >= ", " > ": " <= ", " <= ": " > ", " >= ": " < ", " == ": " != ", " != ": " == ",
              " && ": " || ", " || ": " && ", " += ": " -= ", " -= ": " += ", " * ": " / "}
 NUMBER = re.compile(r"(?<![\w.\"'])(\d+\.\d*(?:e[-+]?\d+)?f?|\d+e[-+]?\d+f?|\d+)(?![\w.\"'])", re.IGNORECASE)
@@ -74,6 +72,10 @@ def program(folder, module):
     return folder / "tests" / module / f"tutti_{module}_tests"
 
 
+def digest(folder, module):
+    return hashlib.sha256(program(folder, module).read_bytes()).hexdigest()
+
+
 def failure(process, output):
     """Name of a test that failed in a shard that has ended, or None."""
     output.seek(0)
@@ -105,10 +107,6 @@ def test(folder, module, patience_s):
                 return "(takes too long)"
             time.sleep(0.1)
     return None
-
-
-def digest(folder, module):
-    return hashlib.sha256(program(folder, module).read_bytes()).hexdigest()
 
 
 def main():
@@ -150,8 +148,6 @@ def main():
         else:
             rejected += 1
         file.write_text(text)
-    for module in MODULES:
-        build(folder, module)
     caught = sum(1 for row in rows if row[4])
     lines = ["# Do the tests notice?", "",
              f"{len(rows)} constants and operators of loopclosure and backend, drawn among {len(candidates):,} (seed {a.seed}) and changed one",
@@ -160,7 +156,7 @@ def main():
     lines += [f"| `{where}` | `{old}` to `{new}` | `{line}` |".replace("||", "\\|\\|") for where, old, new, line, by in rows if not by]
     lines += ["", "Caught:", "", "| where | change | by |", "|---|---|---|"]
     lines += [f"| `{where}` | `{old}` to `{new}` | {by} |".replace("||", "\\|\\|") for where, old, new, _, by in rows if by]
-    table.put(a, DOCUMENT, "\n".join(lines))
+    table.put(a, table.RESULTS / "mutation.md", "\n".join(lines))
     return 0 if caught >= 0.8 * len(rows) else 1
 
 

@@ -19,10 +19,8 @@ def mersenne_twister(seed):
 
 def gauss3(generator):
     """Three standard normal numbers; z is drawn first."""
-    def one():
-        u, v = ((generator.getrandbits(32) + 0.5) / 2**32 for _ in range(2))
-        return math.sqrt(-2 * math.log(u)) * math.cos(2 * math.pi * v)
-    return [one() for _ in range(3)][::-1]
+    u = [(generator.getrandbits(32) + 0.5) / 2**32 for _ in range(6)]
+    return [math.sqrt(-2 * math.log(u[k])) * math.cos(2 * math.pi * u[k + 1]) for k in (4, 2, 0)]
 
 
 # Quaternions are x y z w, poses (position, quaternion) of T_world_node.
@@ -30,10 +28,6 @@ def times(a, b):
     (ax, ay, az, aw), (bx, by, bz, bw) = a, b
     return [aw * bx + ax * bw + ay * bz - az * by, aw * by - ax * bz + ay * bw + az * bx,
             aw * bz + ax * by - ay * bx + az * bw, aw * bw - ax * bx - ay * by - az * bz]
-
-
-def inverse(q):
-    return [-q[0], -q[1], -q[2], q[3]]
 
 
 def normalized(v):
@@ -111,9 +105,10 @@ def write(file, kind, count, sigma_deg, seed=1):
 
     def measured(a, b):
         (ta, qa), (tb, qb) = poses[a], poses[b]
-        seen = times(times(inverse(qa), [*(v - u for u, v in zip(ta, tb)), 0]), qa)[:3]
+        back = [-qa[0], -qa[1], -qa[2], qa[3]]
+        seen = times(times(back, [*(v - u for u, v in zip(ta, tb)), 0]), qa)
         position = [v + TRANSLATION_SIGMA * g for v, g in zip(seen, gauss3(generator))]
-        return pose(position, times(times(inverse(qa), qb), turn([sigma * g for g in gauss3(generator)])))
+        return pose(position, times(times(back, qb), turn([sigma * g for g in gauss3(generator)])))
     lines = [(f"VERTEX_{name}", k, *pose(*poses[k])) for k in range(count)] + [("FIX", 0)]
     lines += [(f"EDGE_{name}", a, b, *measured(a, b), *information) for a, b in edges]
     file.write_text("".join(" ".join(map(str, line)) + "\n" for line in lines))

@@ -21,7 +21,6 @@ ROOM = ["--sensor", "rgbd", "--world", "room", "--kinect-noise", "--rate", "30",
         "--shake", "200", "--frames", "390"]
 LIGHT = {"exposure and readout of 30 ms": ["--blur", "0.03", "--readout", "0.03"], "readout of 30 ms": ["--readout", "0.03"],
          "exposure of 30 ms": ["--blur", "0.03"], "neither": []}
-NOT_TOLD = ", `camera.readout_s` not told"
 STREET = ["--block", "200", "--blocks-x", "4", "--frames", "505"]
 TURNS = ["--block", "60", "--blocks-x", "2", "--blocks-y", "2", "--laps", "0.95"]
 WRONG_LENS = ["--set", "camera.distortion=radtan", "camera.coefficients=[0.01, 0, 0, 0, 0]"]
@@ -74,7 +73,7 @@ def shake(a):
     found = {}
     for light, options in LIGHT.items():
         for told in (True, False) if "--readout" in options else (True,):
-            runs = found[light + ("" if told else NOT_TOLD)] = []
+            runs = found[light + ("" if told else ", `camera.readout_s` not told")] = []
             for seed in table.WORLD_SEEDS:
                 dataset = table.generate(a.tutti, a.out / f"room-{len(options)}{options[0] if options else ''}-{seed}", [*ROOM, "--seed", seed, *options])
                 folder = a.out / f"{dataset.name}-run{'' if told else '-not-told'}"

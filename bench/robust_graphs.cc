@@ -1,10 +1,10 @@
 // How many false loops does a robust loss stand? One line of CSV:
 //   build/release/bench/robust_graphs GRAPH.g2o LOSS COUNT CLUSTER_SIZE SEED
 // The graph is solved as it is by least squares (the clean solution). Then COUNT false loops are planted, in
-// clusters of CLUSTER_SIZE that agree with each other (false_loops.h), and it is solved again with LOSS, by the
-// block solver, from the best of all starts. Columns: graph, loss, count, cluster size, seed, ATE against the
-// clean solution as a share of its bounding box' diagonal [%], precision and recall of the loops that were kept,
-// processor time [s].
+// clusters of CLUSTER_SIZE that agree with each other (false_loops.h), and it is solved again with LOSS, by
+// the block solver, from the best of all starts. Columns: graph, loss, count, cluster size, seed, ATE against
+// the clean solution as a share of its bounding box' diagonal [%], precision and recall of the loops that
+// were kept, processor time [s].
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -60,19 +60,17 @@ void Run(const std::filesystem::path& file, const std::string& loss, const False
   const std::clock_t begin = std::clock();
   const PoseGraphReport report = Solve(start, loss);
   const double seconds = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
-  double kept_true = 0, kept_false = 0, all_true = 0;
+  double kept[2] = {0, 0}, all[2] = {0, 0};  // true loops, false ones
   for (std::size_t e = 0; e < graph.edges().size() && report.success; ++e) {
     if (graph.edges()[e].kind != EdgeKind::kLoop) continue;
-    const bool is_false = wrong.count(e) != 0, kept = !report.edges[e].down_weighted;
-    all_true += is_false ? 0 : 1;
-    kept_true += kept && !is_false ? 1 : 0;
-    kept_false += kept && is_false ? 1 : 0;
+    const std::size_t which = wrong.count(e);
+    all[which] += 1;
+    kept[which] += report.edges[e].down_weighted ? 0 : 1;
   }
   std::printf("%s,%s,%d,%d,%llu,%.6g,%.5f,%.5f,%.2f\n", file.stem().c_str(), loss.c_str(), loops.count,
               loops.cluster_size, static_cast<unsigned long long>(loops.seed),
               100 * AlignedError(clean, start) / BoundingBoxDiagonal(clean),
-              kept_true / std::max(1.0, kept_true + kept_false), kept_true / std::max(1.0, all_true),
-              seconds);
+              kept[0] / std::max(1.0, kept[0] + kept[1]), kept[0] / std::max(1.0, all[0]), seconds);
 }
 
 }  // namespace

@@ -5,7 +5,7 @@ usage: ./dev bench readme [ROW...] [--write]     (or bench/run_table.py --build 
 
 Each row is run five times. What varies: on real data the first frame (0 to 4 are skipped), on generated ones the world, its
 route as well. Figures are the median, and the worst in brackets; bounds are on the median, but no run may close a false loop.
---write puts the table into README.md, its data into docs/results/readme.json, and two plots into docs/images. Rows whose data
+--write puts the table into README.md, its data into docs/results/readme.json, and a plot into docs/images. Rows whose data
 is absent keep what is there. Exit status 1 if a bound is missed. Needs nothing but Python 3.
 """
 import csv
@@ -157,9 +157,8 @@ def main():
         bad = missed(ROWS[name], runs)
         failed = failed or bool(bad)
         print(f"{name}: {'reached' if not bad else 'MISSED: ' + '; '.join(bad)}")
-        picture = {"kitti": "kitti_00_head.png", "town": "synthetic_town.png"}.get(name)
-        if picture and a.write:
-            shutil.copyfile(a.out / name / "run_1" / "trajectory.png", table.ROOT / "docs" / "images" / picture)
+        if name == "kitti" and a.write:
+            shutil.copyfile(a.out / name / "run_1" / "trajectory.png", table.ROOT / "docs" / "images" / "kitti_00_head.png")
     whole = table.put_json(a, "readme", found)
     table.put_between(a, table.ROOT / "README.md", "results",
                       "\n".join([HEADER] + [line(name, whole[name]) for name in ROWS if name in whole]))

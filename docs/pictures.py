@@ -15,8 +15,9 @@ import pathlib
 import sys
 import tempfile
 
-import loop_sets
-import table
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "bench"))
+import loop_sets  # noqa: E402
+import table  # noqa: E402
 
 COLOURS = {"surf": "#1b6ca8", "sift": "#2a8f4f", "orb": "#c8641b", "combined": "#222"}
 MEMBERS = ["surf", "sift", "orb"]

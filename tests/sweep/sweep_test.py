@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The sweep of bench/sweep on a tiny synthetic town, with one configuration that always fails.
+"""The sweep of apps/examples/sweep on a tiny synthetic town, with one configuration that always fails.
 
 usage: sweep_test.py TUTTI SNAKEFILE. Exit status 77: skipped, Snakemake is absent.
 """

@@ -1,5 +1,5 @@
-// Options of the loop-closure detector. Every default is the one that the results in bench/ were measured
-// with.
+// Options of the loop-closure detector. Every default is the one that the figures in docs/results were
+// measured with.
 #pragma once
 
 #include <array>

@@ -7,6 +7,8 @@
 #include <cstddef>
 #include <opencv2/core/hal/intrin.hpp>
 
+#include "core/angle.h"
+
 namespace tutti::internal {
 
 constexpr std::size_t kPolarLanes = 4;
@@ -21,7 +23,6 @@ constexpr std::size_t RoomForPolar(std::size_t count) {
 inline void Polar(const float* dx, const float* dy, std::size_t count, float* length, float* angle_deg) {
   using Lanes = cv::v_float32x4;
   const auto all = [](double value) { return cv::v_setall_f32(static_cast<float>(value)); };
-  constexpr double kDegrees = 180.0 / 3.14159265358979323846;
   const Lanes p1 = all(0.9997878412794807 * kDegrees), p3 = all(-0.3258083974640975 * kDegrees),
               p5 = all(0.1555786518463281 * kDegrees), p7 = all(-0.04432655554792128 * kDegrees),
               least = all(2.220446049250313e-16), zero = all(0);

@@ -105,7 +105,7 @@ std::vector<std::string> KnownMembers() {
 }
 
 std::vector<std::string> KnownFeatureTypes() {
-  std::vector<std::string> names = {"surf", "sift", "orb", "akaze", "brisk", "kaze", "gftt"};
+  std::vector<std::string> names = {"surf", "sift", "orb", "akaze", "brisk", "kaze"};
   const std::vector<std::string> registered = RegisteredFeatureTypes();
   names.insert(names.end(), registered.begin(), registered.end());
   return names;

@@ -200,12 +200,10 @@ FeatureExtractor::FeatureExtractor(const std::string& name, const ExtractionOpti
 }
 
 cv::Ptr<cv::Feature2D> FeatureExtractor::Create(cv::Size size) const {
-  const int wanted = NumDetected(options_);
-  if (name_ == "gftt") return CreateGfttBrief(wanted);
   if (name_ == "akaze") return cv::AKAZE::create();
   if (name_ == "brisk") return cv::BRISK::create();
   if (name_ == "kaze") return cv::KAZE::create();
-  return Registered(name_)(size, wanted);
+  return Registered(name_)(size, NumDetected(options_));
 }
 
 double FeatureExtractor::Shrinking(double pixels) const {

@@ -94,25 +94,6 @@ TEST_P(EveryMember, ExtractsTheSameFromSeveralThreadsAtOnce) {
   }
 }
 
-TEST(FeatureExtractor, GfttFindsThePlaceInAShiftedImage) {
-  const FeatureExtractor extractor("gftt", ExtractionOptions());
-  const cv::Mat image = testing::TexturedImage(6, 480, 360);
-  const Features a = extractor.Extract(image);
-  const Features b = extractor.Extract(image(cv::Rect(20, 10, 440, 340)));
-  EXPECT_EQ(a.descriptors.type(), CV_8U);
-  EXPECT_EQ(a.descriptors.cols, 32);
-  for (const cv::KeyPoint& keypoint : a.keypoints) EXPECT_EQ(keypoint.angle, -1.0f);
-  int right = 0;
-  const auto matches = MatchDescriptors(b.descriptors, a.descriptors, Pixels(a), 0.8);
-  for (const Match& match : matches) {
-    const cv::Point2f apart = a.keypoints[static_cast<std::size_t>(match.candidate)].pt -
-                              b.keypoints[static_cast<std::size_t>(match.query)].pt;
-    if (cv::norm(apart - cv::Point2f(20, 10)) < 1.0) ++right;
-  }
-  EXPECT_GT(right, 150);
-  EXPECT_GT(right, static_cast<int>(matches.size()) * 9 / 10);
-}
-
 TEST(FeatureExtractor, OrbsBorderGrowsWithTheImageUpToOpenCvsOwn) {
   ExtractionOptions options;
   const auto nearest_to_border = [&](int width, int height) {

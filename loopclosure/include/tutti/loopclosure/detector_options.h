@@ -216,7 +216,7 @@ struct LoopDetectorOptions {
   TUTTI_OPTION(CombinationRule, rule, CombinationRule::kJoint,
                "how the members are combined, or one member's name for that alone", Basic());
   TUTTI_OPTION(MemberNames, members, MemberNames({"surf", "sift", "orb"}),
-               "members of the ensemble: surf, sift, orb, akaze, brisk, kaze, gftt, hog, dnn, and "
+               "members of the ensemble: surf, sift, orb, akaze, brisk, kaze, hog, dnn, and "
                "external_members",
                Basic());
   TUTTI_OPTION(MemberNames, external_members, {},
@@ -311,8 +311,7 @@ std::string RuleName(const LoopDetectorOptions& options);
 /// KnownDenseMembers().
 std::vector<std::string> KnownMembers();
 
-/// Members with keypoints: surf, sift, orb, akaze, brisk, kaze, gftt (corners with upright BRIEF), and what
-/// RegisterFeatureType added.
+/// Members with keypoints: surf, sift, orb, akaze, brisk, kaze, and what RegisterFeatureType added.
 std::vector<std::string> KnownFeatureTypes();
 
 /// Members that describe an image as a whole (dense_model.h): hog, dnn.

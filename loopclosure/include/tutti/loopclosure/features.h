@@ -44,12 +44,6 @@ std::vector<int> SelectSpread(const std::vector<cv::KeyPoint>& keypoints, cv::Si
 /// length.
 cv::Ptr<cv::Feature2D> CreateDlibSurf(int max_features, int octaves, double threshold);
 
-/// Corners (cv::GFTTDetector, at least 5 px apart) with upright BRIEF descriptors (Calonder, Lepetit,
-/// Strecha, Fua, ECCV 2010): 256 comparisons of pixel pairs, a pattern drawn once with a fixed seed, on the
-/// image smoothed with a Gaussian of 2 px. CV_8U, 32 bytes. Knows no rotation and no scale: for cameras that
-/// stay upright.
-cv::Ptr<cv::Feature2D> CreateGfttBrief(int max_features);
-
 /// Makes a detector and descriptor for images of this size that finds at least `features` features where
 /// there are so many. Called for each image, from several threads at once.
 using FeatureFactory = std::function<cv::Ptr<cv::Feature2D>(cv::Size image_size, int features)>;

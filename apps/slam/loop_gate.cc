@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <utility>
 
-#include "backend/robust/pairwise_consistency.h"
+#include "backend/robust/loop_agreement.h"
 #include "core/angle.h"
 
 namespace tutti {

@@ -117,7 +117,7 @@ void State(Archive& archive, LoopEdge& e) {
 
 template <class Archive>
 void State(Archive& archive, EdgeOutcome& e) {
-  archive(e.chi2, e.weight, e.down_weighted, e.doubt);
+  archive(e.chi2, e.weight, e.down_weighted);
 }
 
 template <class Archive>

@@ -99,8 +99,7 @@ nlohmann::ordered_json ToJson(const OptimizeArguments& arguments, const G2oFile&
     json["down_weighted"].push_back({{"from", IdJson(file.graph, edge.from)},
                                      {"to", IdJson(file.graph, edge.to)},
                                      {"chi2", report.edges[e].chi2},
-                                     {"weight", report.edges[e].weight},
-                                     {"reason", ToString(report.edges[e].doubt)}});
+                                     {"weight", report.edges[e].weight}});
   }
   if (certificate) {
     json["certificate"] = CertificateJson(*certificate);
@@ -151,8 +150,8 @@ void Print(const G2oFile& file, const PoseGraphReport& report) {
   for (std::size_t k = 0; k < worst.size() && k < 10; ++k) {
     const PoseGraphEdge& edge = file.graph.edges()[worst[k]];
     const EdgeOutcome& outcome = report.edges[worst[k]];
-    std::printf("    %s -> %s: chi2 %.1f, weight %.3f; %s\n", file.graph.NameOf(edge.from).c_str(),
-                file.graph.NameOf(edge.to).c_str(), outcome.chi2, outcome.weight, ToString(outcome.doubt));
+    std::printf("    %s -> %s: chi2 %.1f, weight %.3f\n", file.graph.NameOf(edge.from).c_str(),
+                file.graph.NameOf(edge.to).c_str(), outcome.chi2, outcome.weight);
   }
 }
 
@@ -246,16 +245,15 @@ void SetUpOptimize(CLI::App& command, int&) {
       .add_option(
           "--robust", arguments->robust,
           "Robust loss on loops: edges between poses whose ids do not follow each other among those of the "
-          "file "
-          "(of one robot, docs/backend.md). gnc: graduated non-convexity, then inlier or outlier; take "
-          "this one for SLAM graphs, docs/backend.md says why. gnc-tls: the same by truncated least squares; "
-          "dcs and switchable: weights down to 0; huber and cauchy: smaller weights; none: least squares")
+          "file (of one robot, docs/backend.md). gnc: graduated non-convexity, then inlier or outlier; "
+          "withstands the most false loops. dcs: weights down to 0; huber and cauchy: smaller weights; none: "
+          "least squares")
       ->check(OneOf(RobustLoss()))
       ->capture_default_str();
   command
       .add_option("--solver", arguments->solver,
                   "block: Levenberg-Marquardt with a Cholesky of the poses' blocks, the faster one; ceres: "
-                  "Ceres Solver, the same optimum; solves --robust switchable in any case")
+                  "Ceres Solver, the same optimum")
       ->check(OneOf(PoseGraphSolver()))
       ->capture_default_str();
   command
@@ -270,11 +268,6 @@ void SetUpOptimize(CLI::App& command, int&) {
   command.add_flag("--ignore-unknown", arguments->ignore_unknown,
                    "Leave out lines whose tag tutti does not know, with a warning; without this the file is "
                    "refused");
-  command.add_flag("--pairwise", arguments->options.pairwise_consistency,
-                   "Before: keep only the largest set of loops that agree pair by pair (PCM). Needs "
-                   "realistic covariances of the odometry; slow beyond some thousand loops");
-  command.add_flag("--sigma-test", arguments->options.sigma_test,
-                   "After: remove loops that are off by more than 3 sigma, bring back those within");
   command
       .add_option("--robust-chi2", arguments->options.robust_chi2,
                   "Chi-square beyond which a loop is an outlier; 0: the 99 % quantile")

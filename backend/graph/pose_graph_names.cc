@@ -27,10 +27,11 @@ EnumWords<GraphObjective> WordsOf(GraphObjective /*of*/) {
   return {{"chi2", GraphObjective::kChi2}, {"chi2log", GraphObjective::kChi2Log}};
 }
 EnumWords<RobustLoss> WordsOf(RobustLoss /*of*/) {
-  return {
-      {"none", RobustLoss::kNone}, {"huber", RobustLoss::kHuber},           {"cauchy", RobustLoss::kCauchy},
-      {"dcs", RobustLoss::kDcs},   {"switchable", RobustLoss::kSwitchable}, {"gnc-tls", RobustLoss::kGncTls},
-      {"gnc", RobustLoss::kGnc}};
+  return {{"none", RobustLoss::kNone},
+          {"huber", RobustLoss::kHuber},
+          {"cauchy", RobustLoss::kCauchy},
+          {"dcs", RobustLoss::kDcs},
+          {"gnc", RobustLoss::kGnc}};
 }
 EnumWords<GraphInit> WordsOf(GraphInit /*of*/) {
   return {{"auto", GraphInit::kAuto},
@@ -78,20 +79,6 @@ const char* ToString(GraphStart start) {
       return "chordal optimum";
   }
   return "?";
-}
-
-const char* ToString(LoopDoubt doubt) {
-  switch (doubt) {
-    case LoopDoubt::kNone:
-      return "";
-    case LoopDoubt::kLoss:
-      return "the other constraints contradict it (robust loss)";
-    case LoopDoubt::kPairwise:
-      return "not in the largest set of loops that agree with each other";
-    case LoopDoubt::kSigma:
-      return "off by more than 3 sigma after the optimisation";
-  }
-  return "";
 }
 
 }  // namespace tutti

@@ -54,7 +54,7 @@ void Rescale(const std::map<int, Similarity>& S_world_keyframe, LoopEdge* loop) 
 KeyframeGraphOptions::KeyframeGraphOptions() {
   solver.init = GraphInit::kFile;
   solver.objective = GraphObjective::kChi2Log;
-  solver.robust = kDefaultRobustLoss;
+  solver.robust = RobustLoss::kGnc;
   solver.max_iterations = 50;
   solver.function_tolerance = 1e-6;
 }

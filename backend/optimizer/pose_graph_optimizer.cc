@@ -8,7 +8,6 @@
 #include "backend/graph/edge_weights.h"
 #include "backend/graph/graph_structure.h"
 #include "backend/robust/cluster_search.h"
-#include "backend/robust/pairwise_consistency.h"
 #include "backend/robust/robust_solver.h"
 #include "backend/solver/chordal_descent.h"
 #include "backend/solver/graph_initialization.h"
@@ -41,12 +40,6 @@ class Run {
                 [this](int iterations) { return SolveOnce(iterations); }) {
     problem_.SetStop(stop);
     if (problem_.HasMeasurements()) SolvedByCeres("the block solver knows neither landmarks nor priors");
-    if (!options.pairwise_consistency) return;
-    const std::vector<bool> agree =
-        internal::PairwiseConsistentEdges(graph, anchored, options.objective, problem_.threshold());
-    for (std::size_t e = 0; e < agree.size(); ++e) {
-      if (!agree[e]) problem_.Exclude(e);
-    }
   }
 
   /// The places to start from. False, with the reason in the report, if there is none.
@@ -88,7 +81,6 @@ class Run {
       if (report_.reason.empty()) report_.reason = "the solver found no usable step";
       return false;
     }
-    if (options_.sigma_test && robust_.HasLoops()) robust_.DecideLoops(internal::ChiSquare3Sigma(N));
     report_.gnc_rounds = robust_.rounds();
     return true;
   }
@@ -104,11 +96,7 @@ class Run {
       if (!problem_.IsLoop(e)) continue;
       out.weight = WeightOf(e, out.chi2);
       out.down_weighted = out.weight < 0.5;
-      if (!out.down_weighted) continue;
-      ++report_.down_weighted;
-      out.doubt = problem_.IsExcluded(e) ? LoopDoubt::kPairwise
-                  : options_.sigma_test  ? LoopDoubt::kSigma
-                                         : LoopDoubt::kLoss;
+      if (out.down_weighted) ++report_.down_weighted;
     }
   }
 
@@ -136,8 +124,6 @@ class Run {
       best_weights = problem_.weights();
     }
     if (!found) return false;
-    if (robust && options_.robust == RobustLoss::kSwitchable)
-      SolvedByCeres("switchable constraints have variables that the block solver does not know");
     Took(start);
     problem_.SetPoses(best);
     for (std::size_t e = 0; e < best_weights.size(); ++e) problem_.SetWeight(e, best_weights[e]);
@@ -247,9 +233,8 @@ class Run {
   }
 
   double WeightOf(std::size_t e, double chi2) const {
-    const bool decided = options_.sigma_test || options_.robust == RobustLoss::kGnc ||
-                         options_.robust == RobustLoss::kGncTls || problem_.IsExcluded(e);
-    return decided ? problem_.weight(e) : internal::RobustWeight(options_.robust, chi2, problem_.threshold());
+    if (options_.robust == RobustLoss::kGnc) return problem_.weight(e);
+    return internal::RobustWeight(options_.robust, chi2, problem_.threshold());
   }
 
   /// What only landmarks and priors need.

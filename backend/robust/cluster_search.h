@@ -63,17 +63,12 @@ class ClusterSearch {
   };
 
   bool FindRejectedClusters() {
-    LoopCluster open;
+    LoopCluster loops;
     for (std::size_t e = 0; e < problem_.weights().size(); ++e) {
-      if (problem_.IsOpen(e)) open.push_back(e);
+      if (problem_.IsLoop(e)) loops.push_back(e);
     }
-    if (RejectedLoops(problem_, open) < kLeastRejected) return false;
-    for (LoopCluster cluster :
-         ClusterLoops(graph_, problem_.structure(), options_.objective, problem_.threshold())) {
-      const auto excluded = [&](std::size_t e) { return problem_.IsExcluded(e); };
-      cluster.erase(std::remove_if(cluster.begin(), cluster.end(), excluded), cluster.end());
-      if (!cluster.empty()) clusters_.push_back(std::move(cluster));
-    }
+    if (RejectedLoops(problem_, loops) < kLeastRejected) return false;
+    clusters_ = ClusterLoops(graph_, problem_.structure(), options_.objective, problem_.threshold());
     return std::any_of(clusters_.begin(), clusters_.end(), [&](const LoopCluster& cluster) {
       return RejectedLoops(problem_, cluster) >= kLeastRejected;
     });
@@ -86,7 +81,7 @@ class ClusterSearch {
     const LeaveOneOut<N> without(problem_, problem_.weights().size());
     std::vector<double> chi2;
     for (std::size_t e = 0; without.Ok() && e < problem_.weights().size(); ++e) {
-      if (problem_.IsOpen(e) && problem_.weight(e) > 0) chi2.push_back(without.Chi2(e));
+      if (problem_.IsLoop(e) && problem_.weight(e) > 0) chi2.push_back(without.Chi2(e));
     }
     if (chi2.empty()) return;
     const double shown = std::min(1.0, kSigmas * kSigmas * Median(chi2) / ChiSquareMedian(N));

@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "backend/graph/odometry_edges.h"
-#include "backend/robust/pairwise_consistency.h"
 #include "backend/solver/graph_initialization.h"
 #include "backend/uncertainty/edge_covariance.h"
 

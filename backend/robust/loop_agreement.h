@@ -10,6 +10,15 @@
 
 namespace tutti::internal {
 
+/// The cycle of two loops a, b and the odometry between their ends: query a -> query b, candidate b ->
+/// candidate a. Maps the camera of candidate a onto itself; the identity where all agree (Mangelson, Dominic,
+/// Eustice, Vasudevan, ICRA 2018, eq. 3). Each loop maps points of its query into its candidate.
+template <typename Transform>
+Transform LoopCycle(const Transform& a, const Transform& T_qa_qb, const Transform& b,
+                    const Transform& T_cb_ca) {
+  return a * T_qa_qb * (b.Inverse() * T_cb_ca);
+}
+
 /// One loop as its end `from` sees it.
 struct MeasuredLoop {
   std::size_t edge = 0;          ///< position in edges()
@@ -29,8 +38,8 @@ class LoopAgreement {
   const std::vector<MeasuredLoop>& loops() const { return loops_; }
   /// False: a node is missing from the chain of odometry edges between i and j.
   bool HasOdometry(std::size_t i, std::size_t j) const { return segment_[i] == segment_[j]; }
-  /// Chi-square of the cycle loop a, odometry, loop b backwards, odometry, to first order (Mangelson et al.,
-  /// ICRA 2018, eq. 3). Both pairs of ends must have odometry.
+  /// Chi-square of the cycle loop a, odometry, loop b backwards, odometry (LoopCycle), to first order. Both
+  /// pairs of ends must have odometry.
   double CycleChi2(const MeasuredLoop& a, const MeasuredLoop& b) const;
 
  private:

@@ -14,8 +14,8 @@
 
 namespace tutti::internal {
 
-/// Solves a problem with the loss that the options ask for, from the poses that the problem has. Huber and
-/// switchable constraints are solved directly. The other losses have many local minima: they start with a
+/// Solves a problem with the loss that the options ask for, from the poses that the problem has. Huber is
+/// solved directly. The other losses have many local minima: they start with a
 /// threshold so large that every loop pulls (the drift of the odometry must not look like a false loop) and
 /// tighten it round by round (graduated non-convexity, Yang et al., RA-L 2020).
 template <int N>
@@ -32,41 +32,30 @@ class RobustSolver {
 
   bool HasLoops() const { return !loops_.empty(); }
   /// Ways to go about it, each worth a try: with the graduation, and without.
-  int Attempts() const {
-    return options_.robust == RobustLoss::kHuber || options_.robust == RobustLoss::kSwitchable ? 1 : 2;
-  }
+  int Attempts() const { return options_.robust == RobustLoss::kHuber ? 1 : 2; }
   /// Rounds of graduation so far.
   int rounds() const { return rounds_; }
 
-  /// The largest chi-square of a loop that still has a say.
+  /// The largest chi-square of a loop.
   double LargestChi2() const {
     double largest = 0;
-    for (const std::size_t e : loops_) {
-      if (problem_.IsOpen(e)) largest = std::max(largest, problem_.EdgeChi2(e));
-    }
+    for (const std::size_t e : loops_) largest = std::max(largest, problem_.EdgeChi2(e));
     return largest;
   }
 
   bool Solve(int attempt) {
     const double c2 = problem_.threshold();
-    for (const std::size_t e : loops_) {
-      if (problem_.IsOpen(e)) problem_.SetWeight(e, 1.0);
-    }
+    for (const std::size_t e : loops_) problem_.SetWeight(e, 1.0);
     const bool graduated = attempt == 0;
     switch (options_.robust) {
       case RobustLoss::kNone:
         return solve_once_(options_.max_iterations);
       case RobustLoss::kHuber:
         return SolveWith(new ceres::HuberLoss(std::sqrt(c2)), options_.max_iterations);
-      case RobustLoss::kSwitchable:
-        problem_.AddSwitches();
-        return solve_once_(options_.max_iterations);
       case RobustLoss::kCauchy:
         return Graduate<ceres::CauchyLoss>(graduated, [](double t) { return std::sqrt(t); });
       case RobustLoss::kDcs:
         return Graduate<DcsLoss>(graduated, [](double t) { return t; });
-      case RobustLoss::kGncTls:
-        return (!graduated || GraduateWeights()) && Sort(c2);
       case RobustLoss::kGnc:
         // Geman-McClure pulls less at true loops near the threshold than they deserve; DCS does not.
         return Graduate<GemanMcClureLoss>(graduated, [](double t) { return t; }) &&
@@ -80,8 +69,8 @@ class RobustSolver {
 
   /// Second thoughts about the loops, from a solution of Solve().
   bool Refine() {
-    const bool decides = options_.robust == RobustLoss::kGnc || options_.robust == RobustLoss::kGncTls;
-    for (int round = 0; round < options_.gnc_max_rounds; ++round) {
+    const bool decides = options_.robust == RobustLoss::kGnc;
+    for (int round = 0; round < kMostRounds; ++round) {
       if (!Tighten()) return false;
       if (!decides) return true;
       if (!DecideLoops(problem_.threshold())) return false;
@@ -92,6 +81,10 @@ class RobustSolver {
 
  private:
   static constexpr int kIterationsPerRound = 4;  // a round need not converge; the last one does
+  /// The threshold shrinks by this factor per round. It starts at the largest chi-square of a loop, so that
+  /// drift does not look like a false loop: about log(largest / threshold) / log(kStep) rounds.
+  static constexpr double kStep = 4;
+  static constexpr int kMostRounds = 60;  // 1e36 between the two; a bound for graphs that do not settle
 
   static constexpr double kSafeSigmas = 10;  // of the loops' own spread; real ones have heavy tails
 
@@ -100,9 +93,9 @@ class RobustSolver {
   /// The threshold is then brought down to there, step by step, since the graph fits better as they leave.
   /// Nothing to do where the user gave the threshold.
   bool Tighten() {
-    for (int round = 0; round < options_.gnc_max_rounds && ThresholdIsTooWide(); ++round) {
+    for (int round = 0; round < kMostRounds && ThresholdIsTooWide(); ++round) {
       ++rounds_;
-      problem_.SetThreshold(std::max(ShownThreshold(), problem_.threshold() / options_.gnc_step));
+      problem_.SetThreshold(std::max(ShownThreshold(), problem_.threshold() / kStep));
       if (!Solve(1)) return false;
     }
     return true;
@@ -117,7 +110,7 @@ class RobustSolver {
   /// without it (LeaveOneOut). Out go the loops for which that is beyond kStrainSigmas of what the loops
   /// show, the worst first, and loops that they had pushed out may come back.
   bool DropStrained() {
-    for (int round = 0; round < options_.gnc_max_rounds && options_.robust_chi2 == 0; ++round) {
+    for (int round = 0; round < kMostRounds && options_.robust_chi2 == 0; ++round) {
       const double limit = DropWorst();
       if (limit == 0) break;
       ++rounds_;
@@ -174,9 +167,7 @@ class RobustSolver {
   /// The 99 % quantile for the noise that the loops show (their median chi-square), kSafeSigmas wide.
   double ShownThreshold() const {
     std::vector<double> chi2;
-    for (const std::size_t e : loops_) {
-      if (problem_.IsOpen(e)) chi2.push_back(problem_.EdgeChi2(e));
-    }
+    for (const std::size_t e : loops_) chi2.push_back(problem_.EdgeChi2(e));
     if (chi2.empty()) return problem_.threshold();
     return kSafeSigmas * kSafeSigmas * Median(chi2) / ChiSquareMedian(N) * ChiSquare99(N);
   }
@@ -193,44 +184,25 @@ class RobustSolver {
   template <typename Loss, typename Parameter>
   bool Graduate(bool graduated, Parameter parameter) {
     const double c2 = problem_.threshold();
-    double loose = graduated ? options_.gnc_start * LargestChi2() : c2;
-    for (int round = 0; loose > c2 && round < options_.gnc_max_rounds; ++round, loose /= options_.gnc_step) {
+    double loose = graduated ? LargestChi2() : c2;
+    for (int round = 0; loose > c2 && round < kMostRounds; ++round, loose /= kStep) {
       ++rounds_;
       problem_.SetLoss(new Loss(parameter(loose)));
       if (round > 0) problem_.KeepTrustRegion();
       if (!solve_once_(kIterationsPerRound)) return false;
       // Loops that have come together need no further rounds.
-      loose = std::min(loose, options_.gnc_step * std::max(c2, LargestChi2()));
+      loose = std::min(loose, kStep * std::max(c2, LargestChi2()));
     }
     if (graduated) problem_.KeepTrustRegion();
     const bool decided_later = options_.robust == RobustLoss::kGnc;
     return SolveWith(new Loss(parameter(c2)), decided_later ? Few() : options_.max_iterations);
   }
 
-  /// Weighted least squares whose weights end as 0 or 1. Each round has half the iterations of
-  /// Graduate() and half the step (as a ratio), so that loops leave, and with them their fill-in, early.
-  bool GraduateWeights() {
-    const double c2 = problem_.threshold();
-    problem_.SetLoss(nullptr);
-    double mu = c2 / std::max(2 * options_.gnc_start * LargestChi2() - c2, 1e-3 * c2);
-    for (int round = 0; round < options_.gnc_max_rounds; ++round, mu *= std::sqrt(options_.gnc_step)) {
-      ++rounds_;
-      SetWeights([c2, mu](std::size_t, double s) { return GncTlsWeight(s, c2, mu); });
-      if (!solve_once_(kIterationsPerRound / 2)) return false;
-      const bool binary = std::all_of(loops_.begin(), loops_.end(), [&](std::size_t e) {
-        return problem_.weight(e) == 0 || problem_.weight(e) == 1;
-      });
-      if (binary) break;
-    }
-    return true;
-  }
-
-  /// Weights of the open loops from their positions and chi-squares; false if none changed.
+  /// Weights of the loops from their positions and chi-squares; false if none changed.
   template <typename Weight>
   bool SetWeights(Weight weight) {
     bool changed = false;
     for (const std::size_t e : loops_) {
-      if (!problem_.IsOpen(e)) continue;
       const double w = weight(e, problem_.EdgeChi2(e));
       changed = changed || w != problem_.weight(e);
       problem_.SetWeight(e, w);

@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "backend/graph/manifold.h"
-#include "backend/graph/switched_edge.h"
 #include "backend/solver/graph_solver.h"
 
 namespace tutti::internal {
@@ -71,8 +70,6 @@ class CeresSolver final : public GraphSolver<N> {
   CeresSolver() {
     if constexpr (N != 3) manifold_ = std::make_unique<NodeManifold<N - 3>>();
   }
-  /// Switchable constraints: each loop gets a switch, which starts at 1. `threshold`: their c^2 [1].
-  explicit CeresSolver(double threshold) : CeresSolver() { switch_prior_.emplace(threshold); }
 
   SolveSummary Solve(WeightedGraph<N>& graph, const SolveLimits& limits) override {
     if (!problem_ || active_ != graph.Active()) Build(graph);
@@ -137,29 +134,18 @@ class CeresSolver final : public GraphSolver<N> {
     for (std::size_t e = 0; e < active_.size(); ++e) {
       if (!active_[e]) continue;
       double *from = graph.Block(structure.ends[e].from), *to = graph.Block(structure.ends[e].to);
-      if (switch_prior_ && graph.is_loop[e]) {
-        problem_->AddResidualBlock(&switched_[e], nullptr, from, to, &switches_[e]);
-        problem_->AddResidualBlock(&*switch_prior_, nullptr, &switches_[e]);
-      } else {
-        problem_->AddResidualBlock(&costs_[e], graph.is_loop[e] ? &loss_ : nullptr, from, to);
-      }
+      problem_->AddResidualBlock(&costs_[e], graph.is_loop[e] ? &loss_ : nullptr, from, to);
     }
   }
 
   void AddCosts(const WeightedGraph<N>& graph) {
-    for (std::size_t e = 0; e < active_.size(); ++e) {
+    for (std::size_t e = 0; e < active_.size(); ++e)
       costs_.emplace_back(graph.constants[e], graph.weights[e]);
-      if (switch_prior_) switched_.emplace_back(costs_.back());
-    }
-    if (switch_prior_) switches_.assign(active_.size(), 1.0);
   }
 
   std::unique_ptr<ManifoldBase> manifold_;
   ceres::LossFunctionWrapper loss_{nullptr, ceres::DO_NOT_TAKE_OWNERSHIP};
-  std::deque<EdgeCost<N>> costs_;             // parallel to edges; a deque: cost functions can't be moved
-  std::deque<SwitchedEdgeCost<N>> switched_;  // the same; empty: no switches
-  std::vector<double> switches_;              // the same
-  std::optional<SwitchPrior> switch_prior_;
+  std::deque<EdgeCost<N>> costs_;          // parallel to edges; a deque: cost functions can't be moved
   std::vector<bool> active_;               // edges of the problem
   std::optional<ceres::Problem> problem_;  // last: refers to the others
 };

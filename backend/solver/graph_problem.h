@@ -21,7 +21,6 @@ class GraphProblem {
     weighted_.structure = &structure;
     weighted_.blocks.resize(graph.nodes().size() * WeightedGraph<N>::kBlock);
     weighted_.weights.assign(graph.edges().size(), 1.0);
-    excluded_.assign(graph.edges().size(), false);
     for (const PoseGraphEdge& edge : graph.edges()) {
       weighted_.constants.push_back(MakeEdgeConstants<N>(edge, options.objective));
       weighted_.is_loop.push_back(edge.kind == EdgeKind::kLoop);
@@ -65,11 +64,8 @@ class GraphProblem {
   /// What the options ask to minimise (no 1/2), at the present poses.
   double Objective() const {
     double sum = 0;
-    for (std::size_t e = 0; e < excluded_.size(); ++e) {
-      sum += !IsLoop(e)     ? EdgeChi2(e)
-             : excluded_[e] ? 0.0
-                            : RobustCost(options_.robust, EdgeChi2(e), threshold_);
-    }
+    for (std::size_t e = 0; e < weighted_.weights.size(); ++e)
+      sum += IsLoop(e) ? RobustCost(options_.robust, EdgeChi2(e), threshold_) : EdgeChi2(e);
     if (HasMeasurements()) sum += weighted_.terms->Chi2(weighted_.blocks.data());
     return sum;
   }
@@ -80,18 +76,6 @@ class GraphProblem {
   double weight(std::size_t e) const { return weighted_.weights[e]; }
   const std::vector<double>& weights() const { return weighted_.weights; }
   void SetWeight(std::size_t e, double weight) { weighted_.weights[e] = weight; }
-  /// The edge is out for good: weight 0, no part of the objective.
-  void Exclude(std::size_t e) {
-    excluded_[e] = true;
-    SetWeight(e, 0);
-  }
-  bool IsExcluded(std::size_t e) const { return excluded_[e]; }
-  /// A loop that still has a say.
-  bool IsOpen(std::size_t e) const { return IsLoop(e) && !excluded_[e]; }
-
-  /// From now on each open loop has a switch (switchable constraints), which starts at 1. Ceres solves this,
-  /// whatever was chosen: a switch is a variable that is no node.
-  void AddSwitches() { solver_ = MakeSwitchingSolver<N>(threshold_); }
 
   /// The next solution goes on with the trust region that the last one ended with, instead of a wide one. For
   /// rounds of few iterations, which would spend them all on narrowing it.
@@ -112,7 +96,6 @@ class GraphProblem {
   const PoseGraph& graph_;
   const PoseGraphOptions& options_;
   double threshold_;
-  std::vector<bool> excluded_;  // parallel to edges
   StopRequest stop_;
   double trust_region_ = kInitialTrustRegion, last_trust_region_ = kInitialTrustRegion;
   WeightedGraph<N> weighted_;

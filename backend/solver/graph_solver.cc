@@ -11,16 +11,8 @@ std::unique_ptr<GraphSolver<N>> MakeGraphSolver(PoseGraphSolver solver) {
   return std::make_unique<CeresSolver<N>>();
 }
 
-template <int N>
-std::unique_ptr<GraphSolver<N>> MakeSwitchingSolver(double threshold) {
-  return std::make_unique<CeresSolver<N>>(threshold);
-}
-
 template std::unique_ptr<GraphSolver<3>> MakeGraphSolver<3>(PoseGraphSolver solver);
 template std::unique_ptr<GraphSolver<6>> MakeGraphSolver<6>(PoseGraphSolver solver);
 template std::unique_ptr<GraphSolver<7>> MakeGraphSolver<7>(PoseGraphSolver solver);
-template std::unique_ptr<GraphSolver<3>> MakeSwitchingSolver<3>(double threshold);
-template std::unique_ptr<GraphSolver<6>> MakeSwitchingSolver<6>(double threshold);
-template std::unique_ptr<GraphSolver<7>> MakeSwitchingSolver<7>(double threshold);
 
 }  // namespace tutti::internal

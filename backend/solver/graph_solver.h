@@ -97,8 +97,5 @@ class GraphSolver {
 /// The solver of that name. For N = 3, 6, 7; graph_solver.cc alone compiles them.
 template <int N>
 std::unique_ptr<GraphSolver<N>> MakeGraphSolver(PoseGraphSolver solver);
-/// Each loop has a switch (CeresSolver); `threshold`: chi-square beyond which a loop is doubted.
-template <int N>
-std::unique_ptr<GraphSolver<N>> MakeSwitchingSolver(double threshold);
 
 }  // namespace tutti::internal

@@ -4,7 +4,6 @@
 //   Cauchy rho = c2 log(1 + s / c2)                                             weight c2 / (c2 + s)
 //   DCS    rho = s up to c2, then c2 (3 s - c2) / (c2 + s), bounded by 3 c2     weight (2 c2 / (c2 + s))^2
 //          (Agarwal et al., ICRA 2013; as a loss: MacTavish & Barfoot, CRV 2015)
-//   SC     rho = c2 s / (c2 + s): switchable constraints at the best switches   switch c2 / (c2 + s)
 //   TLS    rho = min(s, c2): what GNC minimises                                 weight 0 or 1
 #pragma once
 
@@ -19,17 +18,15 @@ namespace tutti::internal {
 
 inline double RobustCost(RobustLoss robust, double s, double c2) {
   if (robust == RobustLoss::kCauchy) return c2 * std::log1p(s / c2);
-  if (robust == RobustLoss::kSwitchable) return c2 * s / (c2 + s);
   if (robust == RobustLoss::kNone || s <= c2) return s;
   if (robust == RobustLoss::kHuber) return HuberCost(s, c2);
   if (robust == RobustLoss::kDcs) return c2 * (3.0 * s - c2) / (c2 + s);
   return c2;
 }
 
-/// Derivative of the loss: the weight with which the edge pulls; of switchable constraints the switch, whose
-/// square it pulls with. GNC keeps its own weights.
+/// Derivative of the loss: the weight of the edge in the normal equations. GNC keeps its own weights.
 inline double RobustWeight(RobustLoss robust, double s, double c2) {
-  if (robust == RobustLoss::kCauchy || robust == RobustLoss::kSwitchable) return c2 / (c2 + s);
+  if (robust == RobustLoss::kCauchy) return c2 / (c2 + s);
   if (robust == RobustLoss::kNone || s <= c2) return 1.0;
   if (robust == RobustLoss::kHuber) return HuberWeight(s, c2);
   if (robust == RobustLoss::kDcs) return 4.0 * c2 * c2 / ((c2 + s) * (c2 + s));
@@ -64,14 +61,6 @@ class DcsLoss final : public ceres::LossFunction {
   double c2_;
 };
 
-/// Weight of GNC's surrogate of truncated least squares (Yang, Antonante, Tzoumas, Carlone, RA-L 2020, eq.
-/// 14); mu -> 0: convex, mu -> infinity: truncated least squares.
-inline double GncTlsWeight(double s, double c2, double mu) {
-  if (s >= (mu + 1) / mu * c2) return 0.0;
-  if (s <= mu / (mu + 1) * c2) return 1.0;
-  return std::sqrt(c2 * mu * (mu + 1) / s) - mu;
-}
-
 /// 99 % quantile of the chi-square distribution with 3, 6 or 7 degrees of freedom.
 inline double ChiSquare99(int degrees_of_freedom) {
   return degrees_of_freedom == 3 ? 11.344867 : degrees_of_freedom == 6 ? 16.811894 : 18.475307;
@@ -80,11 +69,6 @@ inline double ChiSquare99(int degrees_of_freedom) {
 /// Its median.
 inline double ChiSquareMedian(int degrees_of_freedom) {
   return degrees_of_freedom == 3 ? 2.365974 : degrees_of_freedom == 6 ? 5.348121 : 6.345811;
-}
-
-/// The quantile of 3 sigma: probability 99.73 %.
-inline double ChiSquare3Sigma(int degrees_of_freedom) {
-  return degrees_of_freedom == 3 ? 14.156414 : degrees_of_freedom == 6 ? 20.062086 : 21.846582;
 }
 
 }  // namespace tutti::internal

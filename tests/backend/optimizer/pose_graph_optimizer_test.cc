@@ -187,9 +187,7 @@ TEST(PoseGraphOptimizer, RobustLossesRejectPlantedFalseLoops) {
     SyntheticGraph clean = MakeSyntheticGraph(options);
     PoseGraphOptimizer().Optimize(clean.graph);
     options.false_loops = 20;
-    for (RobustLoss robust : {RobustLoss::kCauchy, RobustLoss::kDcs, RobustLoss::kGncTls, RobustLoss::kGnc}) {
-      // In the plane it ends in a local minimum here; docs/backend.md, section 2, says where else.
-      if (robust == RobustLoss::kGncTls && kind == GraphKind::kSE2) continue;
+    for (RobustLoss robust : {RobustLoss::kCauchy, RobustLoss::kDcs, RobustLoss::kGnc}) {
       SyntheticGraph spoiled = MakeSyntheticGraph(options);
       PoseGraphOptions solver;
       solver.robust = robust;
@@ -205,49 +203,6 @@ TEST(PoseGraphOptimizer, RobustLossesRejectPlantedFalseLoops) {
       EXPECT_LE(report.down_weighted, spoiled.false_edges.size() + 2);
     }
   }
-}
-
-TEST(PoseGraphOptimizer, SwitchableConstraintsSwitchAFewFalseLoopsOff) {
-  SyntheticGraphOptions options = NoisyGraphOptions(GraphKind::kSE3);
-  SyntheticGraph clean = MakeSyntheticGraph(options);
-  PoseGraphOptimizer().Optimize(clean.graph);
-  options.false_loops = 3;
-  SyntheticGraph spoiled = MakeSyntheticGraph(options);
-  PoseGraphOptions solver;
-  solver.robust = RobustLoss::kSwitchable;
-  const PoseGraphReport report = PoseGraphOptimizer(solver).Optimize(spoiled.graph);
-  EXPECT_LT(PositionError(spoiled.graph, spoiled.truth),
-            1.3 * PositionError(clean.graph, clean.truth) + 0.01);
-  for (std::size_t e : spoiled.false_edges) EXPECT_LT(report.edges[e].weight, 0.1);
-}
-
-TEST(PoseGraphOptimizer, PairwiseConsistencyKeepsTheTrueLoopsOnly) {
-  for (GraphKind kind : {GraphKind::kSE2, GraphKind::kSE3}) {
-    SyntheticGraphOptions options = NoisyGraphOptions(kind);
-    options.noise_rotation = 0.002;
-    options.false_loops = 20;
-    SyntheticGraph spoiled = MakeSyntheticGraph(options);
-    PoseGraphOptions solver;
-    solver.pairwise_consistency = true;
-    const PoseGraphReport report = PoseGraphOptimizer(solver).Optimize(spoiled.graph);
-    for (std::size_t e : spoiled.false_edges) EXPECT_EQ(report.edges[e].doubt, LoopDoubt::kPairwise);
-    EXPECT_LE(report.down_weighted, spoiled.false_edges.size() + 8);
-  }
-}
-
-TEST(PoseGraphOptimizer, TheSigmaTestTakesOutWhatHuberLeavesAndBringsTrueLoopsBack) {
-  SyntheticGraphOptions options = NoisyGraphOptions(GraphKind::kSE3);
-  SyntheticGraph synthetic = MakeSyntheticGraph(options);
-  const Similarity wrong = synthetic.truth[10].Inverse() * synthetic.truth[70] *
-                           Similarity(1, Eigen::Quaterniond::Identity(), {0, 0, 0.5});
-  synthetic.graph.AddLoop(10, 70, wrong, MakeInformation(0.02, 0.01));
-  PoseGraphOptions solver;
-  solver.robust = RobustLoss::kHuber;
-  solver.sigma_test = true;
-  const PoseGraphReport report = PoseGraphOptimizer(solver).Optimize(synthetic.graph);
-  EXPECT_EQ(report.edges.back().weight, 0.0);
-  EXPECT_EQ(report.edges.back().doubt, LoopDoubt::kSigma);
-  EXPECT_LE(report.down_weighted, 2u);
 }
 
 TEST(PoseGraphOptimizer, AThresholdThatIsTooWideForTheGraphIsBroughtDown) {
@@ -375,7 +330,7 @@ TEST(PoseGraphOptimizer, RefusesOptionsThatMakeNoSense) {
   options.max_iterations = 0;
   EXPECT_THROW(PoseGraphOptimizer{options}, InputError);
   options = {};
-  options.gnc_step = 1.0;
+  options.function_tolerance = 1.0;
   EXPECT_THROW(PoseGraphOptimizer{options}, InputError);
   EXPECT_THROW(ParseRobustLoss("hubber"), InputError);
   EXPECT_EQ(ParseGraphInit("chordal"), GraphInit::kChordal);

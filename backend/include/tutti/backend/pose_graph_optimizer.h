@@ -26,14 +26,9 @@ enum class GraphObjective { kChi2, kChi2Log };
 
 /// What is done about false loops; acts on loop edges only. kHuber: down-weights linearly (Huber 1964).
 /// kCauchy: the log of a Cauchy distribution, no bound. kDcs: dynamic covariance scaling (Agarwal et al.,
-/// ICRA 2013). kSwitchable: a switch variable per loop (Suenderhauf and Protzel, IROS 2012). kGncTls:
-/// graduated non-convexity for truncated least squares (Yang et al., RA-L 2020, algorithm 1). kGnc: the same
-/// with the Geman-McClure surrogate, then truncated least squares decide for each loop: inlier or outlier.
-enum class RobustLoss { kNone, kHuber, kCauchy, kDcs, kSwitchable, kGncTls, kGnc };
-
-/// What SLAM graphs should use: docs/backend.md says why. PoseGraphOptions itself defaults to least
-/// squares, since a published graph has its loops for true.
-constexpr RobustLoss kDefaultRobustLoss = RobustLoss::kGnc;
+/// ICRA 2013). kGnc: graduated non-convexity with the Geman-McClure surrogate (Yang et al., RA-L 2020), then
+/// truncated least squares decide for each loop: inlier or outlier. docs/backend.md compares them.
+enum class RobustLoss { kNone, kHuber, kCauchy, kDcs, kGnc };
 
 /// kFile: poses as they are in the graph. kOdometry: spanning tree, odometry edges first. kChordal: linear
 /// relaxation (Carlone et al., ICRA 2015); with least squares (no robust loss) the optimum of the chordal
@@ -48,7 +43,7 @@ const char* ToString(GraphStart start);
 
 /// Who solves the least-squares problems. kCeres: Ceres Solver (Agarwal, Mierle et al.) with CHOLMOD. kBlock:
 /// the same Levenberg-Marquardt with a Cholesky factorisation of the nodes' blocks: the same optimum in a
-/// fraction of the time (docs/backend.md). kSwitchable, landmarks and priors are always solved by Ceres.
+/// fraction of the time (docs/backend.md). Graphs with landmarks or priors are always solved by Ceres.
 enum class PoseGraphSolver { kCeres, kBlock };
 
 /// Words of the command line and the YAML files ("chi2log", "gnc", "chordal", ...).
@@ -72,22 +67,14 @@ struct PoseGraphOptions {
                "rotation error as vector part of the quaternion (chi2, as `tutti optimize` takes it) or as "
                "rotation vector in rad (chi2log)");
   TUTTI_OPTION(RobustLoss, robust, RobustLoss::kNone, "loss on loop edges", Basic());
-  TUTTI_OPTION(bool, pairwise_consistency, false,
-               "before anything else: only the largest set of loops that agree pair by pair through the "
-               "odometry stays (pairwise consistency maximisation, Mangelson et al., ICRA 2018); needs "
-               "realistic covariances of the odometry, and time that grows with the square of the number of "
-               "loops");
-  TUTTI_OPTION(bool, sigma_test, false,
-               "last of all: loops whose chi-square is beyond 3 sigma (probability 99.73 %) leave, those "
-               "within come back, and least squares decide the poses");
   TUTTI_OPTION(double, robust_chi2, 0,
                "chi-square beyond which a loop is an outlier (Huber's delta^2, DCS' Phi, GNC's c^2); 0: the "
                "99 % quantile of the chi-square distribution for the edge's degrees of freedom (11.34, "
                "16.81, 18.48)",
                From(0));
   TUTTI_OPTION(PoseGraphSolver, solver, PoseGraphSolver::kCeres,
-               "who solves it: ceres, or block (own block Cholesky: the same optimum in less time; robust: "
-               "switchable is left to ceres; `tutti optimize` takes it)");
+               "who solves it: ceres, or block (own block Cholesky: the same optimum in less time; `tutti "
+               "optimize` takes it)");
   TUTTI_OPTION(GraphInit, init, GraphInit::kAuto,
                "start from the present poses (file), odometry, chordal relaxation, or the best of them "
                "(auto)");
@@ -95,13 +82,6 @@ struct PoseGraphOptions {
                "most iterations of Levenberg-Marquardt, in each round that is to converge", From(1));
   TUTTI_OPTION(double, function_tolerance, 1e-9,
                "stop when an iteration lowers the cost by less than this share", Above(0), Below(1));
-  TUTTI_OPTION(double, gnc_step, 4.0, "cauchy, dcs, gnc: the threshold shrinks by this factor per round",
-               Above(1));
-  TUTTI_OPTION(int, gnc_max_rounds, 60, "most rounds of it", From(1));
-  TUTTI_OPTION(double, gnc_start, 1.0,
-               "cauchy, dcs, gnc: the threshold starts at this many times the largest chi-square of a loop, "
-               "so that drift does not look like a false loop",
-               Above(0));
   TUTTI_OPTION(double, max_time_s, 0,
                "stop after this time; 0: no limit (a limit makes the result depend on the machine)",
                Unit("s"), From(0));
@@ -123,18 +103,11 @@ GraphCosts EvaluateCosts(const PoseGraph& graph);
 /// e^T Omega e of one edge at the present poses.
 double EdgeChi2(const PoseGraph& graph, const PoseGraphEdge& edge, GraphObjective objective);
 
-/// Why a loop is not believed. kLoss: the robust loss gave it a weight below 1/2; kPairwise: not in the
-/// largest set of loops that agree with each other; kSigma: beyond 3 sigma after the optimisation.
-enum class LoopDoubt { kNone, kLoss, kPairwise, kSigma };
-/// In plain words; empty for kNone.
-const char* ToString(LoopDoubt doubt);
-
 /// What became of one edge.
 struct EdgeOutcome {
   double chi2 = 0;             ///< e^T Omega e in the optimiser's objective, weight not applied
-  double weight = 1;           ///< final weight, 0 to 1 (1 on odometry edges; kSwitchable: the switch)
+  double weight = 1;           ///< final weight, 0 to 1 (1 on odometry edges)
   bool down_weighted = false;  ///< weight < 0.5: the optimiser does not believe this loop
-  LoopDoubt doubt = LoopDoubt::kNone;  ///< why, if it is down-weighted
 };
 
 /// One connected part of the graph.

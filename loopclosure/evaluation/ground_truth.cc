@@ -214,6 +214,11 @@ LoopGroundTruth ReadLoopMatrix(const std::filesystem::path& file, int num_images
   head.resize(static_cast<std::size_t>(std::max<std::streamsize>(0, in.gcount())));
   if (head.empty()) throw InputError(file.string() + ": is empty");
   in.close();
+  if (head.rfind("MATLAB", 0) == 0) {
+    throw InputError(file.string() +
+                     ": a file of MATLAB; save its matrix as text, which is two lines of Python "
+                     "(data/README.md)");
+  }
 
   LoopGroundTruth truth = LooksLikeText(head) ? ReadText(file, num_images) : ReadImage(file);
   truth.description = file.string();

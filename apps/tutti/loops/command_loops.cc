@@ -327,7 +327,7 @@ void SetUpLoops(CLI::App& command, int& exit_code) {
       ->required();
   command.add_option("--topic", arguments->topic, "of a bag: the images' topic (default: its only one)");
   command.add_option("--ground-truth", arguments->truth.file,
-                     "loop matrix (PNG, BMP, text, MATLAB .mat; row = current image) or trajectory (TUM, "
+                     "loop matrix (PNG, BMP, text; row = current image) or trajectory (TUM, "
                      "KITTI, EuRoC); without one the loops are listed and shown, but not judged");
   command.add_option("--out", arguments->out,
                      "folder for loops.csv, results.json, hypotheses.csv, curves and pictures (default: "

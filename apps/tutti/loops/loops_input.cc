@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "apps/tutti/loops/joined_pairs.h"
-#include "apps/tutti/loops/mat_file.h"
 #include "apps/tutti/loops/overlap_truth.h"
 #include "core/median.h"
 #include "core/number_lines.h"
@@ -53,7 +52,7 @@ bool LooksLikeTrajectory(const fs::path& file) {
   try {
     return LinesOfPoses(file);
   } catch (const InputError&) {
-    return false;  // an image, or MATLAB's; its reader says what is wrong with it
+    return false;  // an image; its reader says what is wrong with it
   }
 }
 
@@ -210,8 +209,7 @@ LoopGroundTruth LoadGroundTruth(const GroundTruthArguments& arguments, const std
   }
   const int all = static_cast<int>(images.size());
   const int used = (all + arguments.stride - 1) / arguments.stride;
-  LoopGroundTruth truth =
-      IsMatFile(arguments.file) ? ReadMatLoops(arguments.file) : ReadLoopMatrix(arguments.file, all);
+  LoopGroundTruth truth = ReadLoopMatrix(arguments.file, all);
   if (arguments.join_pairs && truth.size() == 2 * all) truth = truth.PairsJoined();
   if (truth.size() == used) return truth;
   if (truth.size() == all) return truth.Strided(arguments.stride);

@@ -8,7 +8,6 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "tests/apps/tutti/loops_fixture.h"
-#include "tests/apps/tutti/mat_bytes.h"
 
 namespace tutti {
 namespace {
@@ -66,23 +65,6 @@ TEST_F(LoopsGroundTruth, TransposedGroundTruthIsTheSameGroundTruth) {
   ASSERT_EQ(Run(Truth(transposed), folder_ / "transposed").status, 0);
   EXPECT_EQ(ReadAll(out_ / "hypotheses.csv"), ReadAll(folder_ / "transposed" / "hypotheses.csv"));
   EXPECT_EQ(ReadAll(out_ / "precision_recall.csv"), ReadAll(folder_ / "transposed" / "precision_recall.csv"));
-}
-
-TEST_F(LoopsGroundTruth, AMatlabFileIsTheSameGroundTruthAndADamagedOneIsOneLine) {
-  WriteImages(2);
-  const auto write = [this](const std::string& bytes) {
-    WriteAll(folder_ / "truth.mat", bytes);
-    return folder_ / "truth.mat";
-  };
-  const std::string mat = testing::MatHeader() +
-                          testing::MatVariable(testing::kDoubles, 2, 2,
-                                               testing::MatElement<double>(testing::kDouble, {0, 1, 0, 0}));
-  const auto run = Run(write(mat), out_);
-  ASSERT_EQ(run.status, 0) << run.output;
-  EXPECT_EQ(Json(out_ / "results.json")["rows_with_loop"], 1);
-  const auto damaged = Run(write(mat.substr(0, mat.size() - 9)), out_);
-  EXPECT_EQ(damaged.status, 1);
-  EXPECT_NE(damaged.output.find("truth.mat: damaged MATLAB file"), std::string::npos) << damaged.output;
 }
 
 TEST_F(LoopsGroundTruth, NoLoopInTheGroundTruthMakesEveryAcceptedOneFalse) {

@@ -77,7 +77,7 @@ LoopGroundTruth LoopsFromMatrix(const std::vector<double>& values, int size);
 /// Reads a matrix: PNG, BMP or any image (white = loop, black = none, grey = ignore); text with one row a
 /// line (labels as in LoopsFromMatrix), or with two numbers a line: 0-based "row column" pairs of loops among
 /// `num_images` images. Throws InputError that names the file (and line) for a missing, damaged or non-square
-/// one. MATLAB's files are for the caller to read (apps/tutti/loops/mat_file.cc does).
+/// one. MATLAB's files are to be saved as text first (data/README.md).
 LoopGroundTruth ReadLoopMatrix(const std::filesystem::path& file, int num_images);
 
 /// Derives the matrix from poses, one per image in the same order.

@@ -39,8 +39,6 @@ CommandPage ParsePage(const std::string& json);
 std::string ManPage(const CommandPage& program, const std::string& version);
 /// Completion of commands, options and fixed choices; else of files.
 std::string BashCompletion(const CommandPage& program);
-std::string ZshCompletion(const CommandPage& program);
-std::string FishCompletion(const CommandPage& program);
 
 /// `text` with every `from` replaced.
 std::string Replaced(std::string text, const std::string& from, const std::string& to);

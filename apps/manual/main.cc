@@ -1,5 +1,5 @@
 // tutti_manual TUTTI FOLDER: asks the program TUTTI for its commands and options, and writes its man page and
-// completion for bash, zsh and fish into FOLDER. The build calls it; it is not installed.
+// completion for bash into FOLDER. The build calls it; it is not installed.
 #include <sys/wait.h>
 
 #include <array>
@@ -52,8 +52,6 @@ void WriteManual(const std::string& tutti, const fs::path& folder) {
   fs::create_directories(folder);
   Write(folder / "tutti.1", tutti::manual::ManPage(program, version));
   Write(folder / "tutti", tutti::manual::BashCompletion(program));
-  Write(folder / "_tutti", tutti::manual::ZshCompletion(program));
-  Write(folder / "tutti.fish", tutti::manual::FishCompletion(program));
 }
 
 }  // namespace

@@ -103,8 +103,8 @@ execute_process(COMMAND "${WORK}/root/usr/bin/tutti" demo --out "${WORK}/demo" O
 if(NOT EXISTS "${WORK}/demo/run/summary.json")
   message(SEND_ERROR "tutti demo wrote no results")
 endif()
-foreach(file share/man/man1/tutti.1.gz share/bash-completion/completions/tutti share/zsh/vendor-completions/_tutti
-    share/fish/vendor_completions.d/tutti.fish share/tutti/configs/images.yaml share/doc/tutti/README.md)
+foreach(file share/man/man1/tutti.1.gz share/bash-completion/completions/tutti
+    share/tutti/configs/images.yaml share/doc/tutti/README.md)
   if(NOT EXISTS "${WORK}/root/usr/${file}")
     message(SEND_ERROR "not in the package: ${file}")
   endif()

@@ -1,4 +1,4 @@
-// The man page and the completions, made from a program with two commands.
+// The man page and the completion, made from a program with two commands.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -83,24 +83,6 @@ TEST(BashCompletion, OffersCommandsOptionsChoicesAndFiles) {
   EXPECT_EQ(Offered(script, "pen draw --out a", 3), "a file.txt");
   EXPECT_EQ(Offered(script, "pen draw --width \"\"", 3), "") << "nothing to guess a number from";
   EXPECT_EQ(Offered(script, "pen draw --quiet a", 3), "a file.txt") << "a positional argument";
-}
-
-TEST(ZshCompletion, EscapesWhatHasAMeaningThere) {
-  const std::string text = manual::ZshCompletion(Program());
-  EXPECT_THAT(text, HasSubstr("#compdef pen\n"));
-  EXPECT_THAT(text, HasSubstr("'--out[it'\\''s the file]:TEXT:_files'"));
-  EXPECT_THAT(text, HasSubstr("'--width[\\[px\\]]:INT: '"));
-  EXPECT_THAT(text, HasSubstr("'--style[dots\\: none]:TEXT:(thin thick)'"));
-  EXPECT_THAT(text, HasSubstr("'*:input:_files'"));
-}
-
-TEST(FishCompletion, OffersOptionsOfTheirCommandAlone) {
-  const std::string text = manual::FishCompletion(Program());
-  EXPECT_THAT(text, HasSubstr("complete -c pen -f -n '__fish_use_subcommand' -a draw -d 'lines'\n"));
-  EXPECT_THAT(text, HasSubstr("-n '__fish_seen_subcommand_from draw' -l out -r -F -d 'it\\'s the file'\n"));
-  EXPECT_THAT(text, HasSubstr("-l style -x -a 'thin thick' -d 'dots: none'\n"));
-  EXPECT_THAT(text, HasSubstr("-l width -x -d '[px]'\n"));
-  EXPECT_THAT(text, HasSubstr("-l quiet -d 'no words'\n"));
 }
 
 TEST(Describe, SaysWhatACommandTakesWithoutItsRequiredOptions) {

@@ -16,7 +16,7 @@
 namespace tutti::internal {
 
 inline constexpr SectionFileKind kDetectorFile = {
-    {'T', 'U', 'T', 'T', 'I', 'L', 'C', '\n'}, 8, "saved loop detector", "LoopDetector::Save"};
+    {'T', 'U', 'T', 'T', 'I', 'L', 'C', '\n'}, 9, "saved loop detector", "LoopDetector::Save"};
 
 /// Writes all that a detector knows, its long-term memory with it; a file that is there is replaced only by a
 /// complete one. Throws InputError if it can't be written.

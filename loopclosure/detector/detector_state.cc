@@ -86,7 +86,7 @@ void DetectorState::LoadStatistics(ByteReader& in) {
     in.Damaged("the detector's statistics");
   }
   for (Member& member : ensemble_.members()) member.LoadStatistics(in);
-  reasoner_.LoadStatistics(last_id_, in);
+  reasoner_.LoadStatistics(in);
 }
 
 void DetectorState::CheckMemories(const std::string& source) const {

@@ -36,31 +36,14 @@ std::vector<int> HypothesisSearch::TopPlaces(const Belief& belief) const {
   std::vector<int> places;
   std::vector<int> covered;
   for (const int slot : order) {
-    if (places.size() == wanted && options_.island_levels == 0) break;
+    if (places.size() == wanted) break;
     if (std::find(covered.begin(), covered.end(), slot) != covered.end()) continue;
     places.push_back(slot);
     for (const auto& [near, level, loops] : memory_.Neighbours(slot, 1 + options_.verification.neighbours)) {
       covered.push_back(near);
     }
   }
-  if (options_.island_levels > 0) RankByIsland(belief, places);
-  places.resize(std::min(places.size(), wanted));
   return places;
-}
-
-// Best first by the posterior of all that lie near each.
-void HypothesisSearch::RankByIsland(const Belief& belief, std::vector<int>& places) const {
-  std::vector<std::pair<double, int>> ranked;
-  for (const int place : places) {
-    double sum = 0;
-    for (const auto& [slot, level, loops] : memory_.Neighbours(place, options_.island_levels)) {
-      sum += PosteriorAt(belief, slot);
-    }
-    ranked.emplace_back(sum, place);
-  }
-  std::stable_sort(ranked.begin(), ranked.end(),
-                   [](const auto& a, const auto& b) { return a.first > b.first; });
-  for (std::size_t i = 0; i < places.size(); ++i) places[i] = ranked[i].second;
 }
 
 // What came of a location, nullptr if it was not tried.

@@ -33,7 +33,6 @@ class HypothesisSearch {
 
  private:
   std::vector<int> TopPlaces(const Belief& belief) const;
-  void RankByIsland(const Belief& belief, std::vector<int>& places) const;
   std::vector<int> ViewsOf(int place, const Belief& belief) const;
   const Verification* Tried(int slot, const LoopResult& result) const;
   Verification Look(const View& query, int candidate, int threads) const;

@@ -66,8 +66,6 @@ void PlaceReasoner::BeginSession() {
   track_.Interrupt();
   second_word_.Forget();
   last_hypothesis_ = 0;
-  last_candidate_ = -1;
-  candidates_in_a_row_ = 0;
 }
 
 void PlaceReasoner::ForEachUnit(const std::function<void(MemorySystem&, std::size_t)>& call) {
@@ -191,7 +189,6 @@ bool PlaceReasoner::Proposes(const CombinedBelief& combined, LoopResult& result)
     return false;
   }
   const double threshold = std::max(options_.propose_threshold, options_.hypothesis_ratio * last_hypothesis_);
-  if (options_.consistent_images > 0) FollowCandidate(combined.best);
   if (!(result.hypothesis >= threshold)) {
     char text[128];
     std::snprintf(text, sizeof text, "the hypothesis is too weak (%.3f, %.3f is needed to verify it)",
@@ -199,25 +196,7 @@ bool PlaceReasoner::Proposes(const CombinedBelief& combined, LoopResult& result)
     result.reason = text;
     return false;
   }
-  if (candidates_in_a_row_ < options_.consistent_images) {
-    result.reason = "the candidates of the images before lie elsewhere (" +
-                    std::to_string(candidates_in_a_row_) + " in a row, " +
-                    std::to_string(options_.consistent_images) + " are needed)";
-    return false;
-  }
   return true;
-}
-
-// Counts the images in a row whose candidates lie near that of the image before.
-void PlaceReasoner::FollowCandidate(int best) {
-  constexpr int kLevels = 3;
-  const int before = last_candidate_ < 0 ? -1 : memory().Find(last_candidate_);
-  const auto near =
-      before < 0 ? std::vector<LocationMemory::Neighbour>() : memory().Neighbours(before, kLevels);
-  const bool follows =
-      std::any_of(near.begin(), near.end(), [best](const auto& n) { return n.slot == best; });
-  candidates_in_a_row_ = follows ? candidates_in_a_row_ + 1 : 0;
-  last_candidate_ = memory().id(best);
 }
 
 void PlaceReasoner::Verify(const View& query, const Belief& belief,
@@ -323,19 +302,12 @@ std::string PlaceReasoner::Fingerprint() const {
 
 void PlaceReasoner::SaveStatistics(ByteWriter& out) const {
   out.Put(last_hypothesis_);
-  out.Put(last_candidate_);
-  out.Put<std::int32_t>(candidates_in_a_row_);
   for (const auto& system : systems_) system->SaveLevels(out);
 }
 
-void PlaceReasoner::LoadStatistics(std::int64_t last_id, ByteReader& in) {
+void PlaceReasoner::LoadStatistics(ByteReader& in) {
   last_hypothesis_ = in.Get<double>();
-  last_candidate_ = in.Get<std::int64_t>();
-  candidates_in_a_row_ = in.Get<std::int32_t>();
-  if (!(last_hypothesis_ >= 0.0 && last_hypothesis_ <= 1.0 + 1e-6) || last_candidate_ < -1 ||
-      last_candidate_ > last_id || candidates_in_a_row_ < 0) {
-    in.Damaged("the detector's statistics");
-  }
+  if (!(last_hypothesis_ >= 0.0 && last_hypothesis_ <= 1.0 + 1e-6)) in.Damaged("the detector's statistics");
   for (auto& system : systems_) system->LoadLevels(in);
 }
 

@@ -82,14 +82,13 @@ class PlaceReasoner {
 
   /// Running figures: the state but memories, filters and track.
   void SaveStatistics(ByteWriter& out) const;
-  void LoadStatistics(std::int64_t last_id, ByteReader& in);
+  void LoadStatistics(ByteReader& in);
 
  private:
   static std::size_t Index(int i) { return static_cast<std::size_t>(i); }
   void ForEachUnit(const std::function<void(MemorySystem&, std::size_t)>& call);
   CandidateEvidence EvidenceAt(int slot, const std::vector<double>& scores, const PlaceFilter& filter) const;
   void FillOpinion(std::size_t member, const CombinedBelief& combined, MemberOpinion& opinion) const;
-  void FollowCandidate(int best);
   void NoteStep();
 
   const LoopDetectorOptions& options_;
@@ -99,8 +98,6 @@ class PlaceReasoner {
   PoseTrack track_;
   SecondWord second_word_;
   double last_hypothesis_ = 0.0;
-  std::int64_t last_candidate_ = -1;
-  int candidates_in_a_row_ = 0;
 };
 
 }  // namespace tutti::internal

@@ -18,6 +18,14 @@ namespace tutti {
 namespace {
 
 constexpr double kImageBlur = 0.5;  // what an image is taken to be smoothed by [px]
+// SURF and SIFT see an image of fewer pixels at twice its size: 240x192 has too few points for their quota.
+constexpr int kSmallImage = 100000;
+// SIFT's first octave is of no more pixels, whatever the other members see: it costs the most.
+constexpr int kSiftMaxPixels = 1 << 19;
+constexpr int kSurfOctaves = 4;  // of the Hessian pyramid, as in the ensemble's paper
+// Determinants of the Hessian, in dlib's scale: points of the first are taken as they are. Where they are too
+// few, weaker ones fill up in order of strength, down to the second, which a blank image's noise stays below.
+constexpr double kSurfThreshold = 1.0, kSurfLeast = 0.05;
 
 // How many points are to be detected for those that are kept: more, so that there is something to choose from
 // when spreading.
@@ -49,19 +57,6 @@ void ScaleKeypoints(double factor, std::vector<cv::KeyPoint>& keypoints) {
     // Pixel centres: 0.5 of the small image's pixel is 0.5 * factor of the large one's.
     keypoint.pt = (keypoint.pt + cv::Point2f(0.5f, 0.5f)) * f - cv::Point2f(0.5f, 0.5f);
     keypoint.size *= f;
-  }
-}
-
-// Square roots of the shares of the sum, at SIFT's own length of 512: their Euclidean distance is the
-// Hellinger distance of the histograms.
-void TakeRoots(cv::Mat& descriptors) {
-  constexpr float kLength = 512.0f;
-  for (int r = 0; r < descriptors.rows; ++r) {
-    cv::Mat row = descriptors.row(r);
-    const double sum = cv::norm(row, cv::NORM_L1);
-    if (sum <= 0) continue;
-    cv::sqrt(row / sum, row);
-    row *= kLength;
   }
 }
 
@@ -194,8 +189,7 @@ FeatureExtractor::FeatureExtractor(const std::string& name, const ExtractionOpti
     throw InputError("unknown member '" + name + "'; did you mean '" + NearestWord(name, known) + "'?");
   }
   if (name == "surf") {
-    surf_ = CreateDlibSurf(NumDetected(options), options.surf_octaves,
-                           std::min(options.surf_threshold, options.surf_min_threshold));
+    surf_ = CreateDlibSurf(NumDetected(options), kSurfOctaves, kSurfLeast);
   }
 }
 
@@ -208,8 +202,8 @@ cv::Ptr<cv::Feature2D> FeatureExtractor::Create(cv::Size size) const {
 
 double FeatureExtractor::Shrinking(double pixels) const {
   double factor = std::max(1.0, std::sqrt(pixels / options_.max_pixels));
-  if (name_ == "sift") factor = std::max(factor, std::sqrt(pixels / options_.sift_max_pixels));
-  const bool small = factor == 1.0 && pixels < options_.min_pixels;
+  if (name_ == "sift") factor = std::max(factor, std::sqrt(pixels / kSiftMaxPixels));
+  const bool small = factor == 1.0 && pixels < kSmallImage;
   return small && (name_ == "surf" || name_ == "sift") ? 0.5 : factor;
 }
 
@@ -225,21 +219,23 @@ Features FeatureExtractor::Extract(const cv::Mat& grey) const {
     cv::resize(cleared, image, size, 0, 0, factor > 1.0 ? cv::INTER_AREA : cv::INTER_LINEAR);
   }
   const auto spread = [&](const std::vector<cv::KeyPoint>& detected) {
-    return SelectSpread(detected, image.size(), options_.features, options_.grid_columns);
+    return SelectSpread(detected, image.size(), options_.features);
   };
   if (name_ == "sift") {
     std::unique_ptr<internal::SiftScratch> scratch = scratches_->Take();
-    features = internal::ExtractSift(image, kImageBlur * std::max(1.0, 1.0 / factor), options_, *scratch);
+    internal::SiftOptions wanted;
+    wanted.features = options_.features;
+    features = internal::ExtractSift(image, kImageBlur * std::max(1.0, 1.0 / factor), wanted, *scratch);
     scratches_->Give(std::move(scratch));
   } else if (name_ == "surf") {
     // Describing costs more than detecting, and what was detected stays valid: describe what is kept.
     std::vector<cv::KeyPoint> detected;
     surf_->detect(image, detected);
-    DropWeak(options_.surf_threshold, options_.features, detected);
+    DropWeak(kSurfThreshold, options_.features, detected);
     features.keypoints = Picked(detected, spread(detected));
     surf_->compute(image, features.keypoints, features.descriptors);
   } else if (name_ == "orb") {
-    const internal::Orb orb(image, internal::OrbOptionsFor(image.size(), NumDetected(options_), options_));
+    const internal::Orb orb(image, internal::OrbOptionsFor(image.size(), NumDetected(options_)));
     const std::vector<cv::KeyPoint> detected = orb.Detect();
     features.keypoints = Picked(detected, spread(detected));
     features.descriptors = orb.Describe(features.keypoints);
@@ -255,7 +251,6 @@ Features FeatureExtractor::Extract(const cv::Mat& grey) const {
       descriptors.row(selected[i]).copyTo(features.descriptors.row(static_cast<int>(i)));
     }
   }
-  if (name_ == "sift" && options_.root_sift) TakeRoots(features.descriptors);
   ScaleKeypoints(factor, features.keypoints);
   return features;
 }

@@ -104,13 +104,15 @@ cv::Point PixelOf(const cv::KeyPoint& keypoint, float scale) {
 
 // ORB drops points near the border; its default of 31 px leaves small images without upper pyramid levels
 // (loop-closure.md section 6). A twentieth of the shorter side keeps them; ORB reflects the image at its
-// border.
-OrbOptions OrbOptionsFor(cv::Size size, int features, const ExtractionOptions& options) {
+// border. Half of OpenCV's FAST threshold, so that dark images have their share of points, too.
+OrbOptions OrbOptionsFor(cv::Size size, int features) {
+  constexpr double kBorder = 0.05;  // of the shorter side
+  constexpr int kFastThreshold = 10;
   OrbOptions out;
   const int side = std::min(size.width, size.height);
   out.features = features;
-  out.edge = std::clamp(static_cast<int>(options.orb_border * side), 3, 31);
-  out.fast_threshold = options.orb_fast_threshold;
+  out.edge = std::clamp(static_cast<int>(kBorder * side), 3, 31);
+  out.fast_threshold = kFastThreshold;
   for (double s = side / kScale; out.levels < kMostLevels && s > 2 * out.edge + kPatch; s /= kScale) {
     ++out.levels;
   }

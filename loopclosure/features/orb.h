@@ -4,8 +4,6 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "tutti/loopclosure/detector_options.h"
-
 namespace tutti::internal {
 
 /// What cv::ORB::create is given, whose other parameters have their defaults: levels are smaller by 1.2 each,
@@ -18,7 +16,7 @@ struct OrbOptions {
 };
 
 /// For images of this size.
-OrbOptions OrbOptionsFor(cv::Size size, int features, const ExtractionOptions& options);
+OrbOptions OrbOptionsFor(cv::Size size, int features);
 
 /// ORB (Rublee et al., ICCV 2011) of one image: points and descriptors are those of cv::ORB, bit for bit, as
 /// it computes them where the processor has FMA (OrbDescription).

@@ -211,13 +211,12 @@ cv::KeyPoint InImage(const Point& point) {
 
 }  // namespace
 
-Features ExtractSift(const cv::Mat& image, double blur, const ExtractionOptions& options,
-                     SiftScratch& scratch) {
+Features ExtractSift(const cv::Mat& image, double blur, const SiftOptions& options, SiftScratch& scratch) {
   Build(image, blur, scratch);
   const std::vector<Octave>& pyramid = scratch.pyramid;
   const auto grey_levels = [](double contrast) { return static_cast<float>(contrast * 255.0 / kLayers); };
-  const float wanted = grey_levels(options.sift_contrast);
-  std::vector<Point> points = Detect(scratch, std::min(wanted, grey_levels(options.sift_min_contrast)));
+  const float wanted = grey_levels(options.contrast);
+  std::vector<Point> points = Detect(scratch, std::min(wanted, grey_levels(options.least_contrast)));
   std::stable_sort(points.begin(), points.end(),
                    [](const Point& a, const Point& b) { return a.response > b.response; });
   const auto most = static_cast<std::size_t>(options.features);
@@ -229,7 +228,7 @@ Features ExtractSift(const cv::Mat& image, double blur, const ExtractionOptions&
   for (const Point& point : points) places.push_back(InImage(point));
   Features features;
   features.descriptors.create(options.features, static_cast<int>(kSiftValues), CV_32F);
-  for (const int i : SelectSpread(places, image.size(), options.features, options.grid_columns)) {
+  for (const int i : SelectSpread(places, image.size(), options.features)) {
     Point point = points[static_cast<std::size_t>(i)];
     const cv::Mat& described =
         pyramid[static_cast<std::size_t>(point.octave)][static_cast<std::size_t>(point.layer)];

@@ -24,11 +24,18 @@ struct SiftScratch {
 /// Declared in a public header.
 class SiftScratchPool : public ScratchPool<SiftScratch> {};
 
+/// Contrasts as shares of white; cv::SIFT's own threshold is 0.04.
+struct SiftOptions {
+  int features = 400;             ///< at most
+  double contrast = 0.02;         ///< points of this contrast are taken as they are
+  double least_contrast = 0.003;  ///< weaker ones fill up, in order of strength, down to this: a blank
+                                  ///< image's noise stays below it
+};
+
 /// SIFT of an 8-bit grey image (Lowe 2004, with the constants of cv::SIFT), its first octave the image as it
 /// is: at most options.features, keypoints in pixels of this image, descriptors 128 whole numbers as CV_32F.
 /// What cv::SIFT does with every point that it finds, orientation and description, is done for the points
 /// that SelectSpread keeps. `blur`: standard deviation of what the image is already smoothed by [px].
-Features ExtractSift(const cv::Mat& image, double blur, const ExtractionOptions& options,
-                     SiftScratch& scratch);
+Features ExtractSift(const cv::Mat& image, double blur, const SiftOptions& options, SiftScratch& scratch);
 
 }  // namespace tutti::internal

@@ -28,11 +28,7 @@ SeenWords WordsFor(const FilterUnit& unit, const std::vector<SeenWords>& words) 
 
 MemorySystem::MemorySystem(int number, const LoopDetectorOptions& options,
                            const std::vector<std::vector<std::size_t>>& units, std::vector<Member>& members)
-    : number_(number),
-      options_(options),
-      members_(members),
-      memory_(options.stm_size),
-      transition_(options.virtual_place_prior) {
+    : number_(number), options_(options), members_(members), memory_(options.stm_size) {
   for (const std::vector<std::size_t>& sources : units) {
     units_.emplace_back(sources, sources.size() == 1 && members_[sources.front()].dense(), options);
     if (units_.back().is_dense) units_.back().dense = DenseModel(members_[sources.front()].width());

@@ -107,9 +107,9 @@ Belief TransitionModel::Predict(const Belief& posterior, const std::vector<int>&
     predicted.new_place = 1.0;
     return predicted;
   }
-  predicted.new_place = virtual_place_prior_ * posterior.new_place + kToNewPlace * real;
+  predicted.new_place = kStaysNew * posterior.new_place + kToNewPlace * real;
   const double from_virtual =
-      (1.0 - virtual_place_prior_) * posterior.new_place / static_cast<double>(working_memory.size());
+      (1.0 - kStaysNew) * posterior.new_place / static_cast<double>(working_memory.size());
   for (const int i : working_memory) predicted.places[static_cast<std::size_t>(i)] += from_virtual;
   return predicted;
 }
@@ -128,8 +128,8 @@ Belief TransitionModel::Backward(const Belief& value, const std::vector<int>& wo
     before.places[static_cast<std::size_t>(j)] = sum;
   }
   if (working_memory.empty()) return before;
-  before.new_place = virtual_place_prior_ * value.new_place +
-                     (1.0 - virtual_place_prior_) * all / static_cast<double>(working_memory.size());
+  before.new_place =
+      kStaysNew * value.new_place + (1.0 - kStaysNew) * all / static_cast<double>(working_memory.size());
   return before;
 }
 

@@ -25,12 +25,10 @@ class TransitionModel {
   /// p(real place at this graph level), before scaling: self, level 1, ..., level 16.
   static const std::array<double, kLevels + 1>& LevelValues();
   static constexpr double kToNewPlace = 0.1;  ///< p(-1 | j)
+  static constexpr double kStaysNew = 0.9;    ///< p(-1 | -1), as in Labbe & Michaud 2013
   /// Of a place behind a loop link, times the value of its level: the link may be false, and a true one has
   /// the images' own evidence at both ends.
   static constexpr double kLoopShare = 0.2;
-
-  /// `virtual_place_prior`: p(-1 | -1), 0.9 in the specification.
-  explicit TransitionModel(double virtual_place_prior) : virtual_place_prior_(virtual_place_prior) {}
 
   /// Takes in what has changed in the memory since the last call.
   void Update(const LocationMemory& memory, const std::vector<int>& changed_slots);
@@ -62,7 +60,6 @@ class TransitionModel {
   template <typename Call>
   void ForEachRun(const Runs& column, const Call& call) const;
 
-  double virtual_place_prior_;
   std::vector<Runs> columns_;  // by slot; empty: not in WM
   std::vector<double> inner_;  // values in the middle of a path: nearly all columns are the same, and stay in
                                // the processor's cache

@@ -10,6 +10,10 @@
 namespace tutti::internal {
 namespace {
 
+// A homography decides where it explains this share of what the essential or fundamental matrix does: a flat
+// scene, or a turn on the spot. The rest are points that noise has put on the right line.
+constexpr double kHomographyShare = 0.9;
+
 // The matches `of` the pool, of one camera each whose images have this size.
 Motion FitOne(const std::vector<PooledMatch>& pool, const std::vector<int>& of, const View& query,
               const View& candidate, const cv::Size& size, const VerificationOptions& options,
@@ -20,7 +24,9 @@ Motion FitOne(const std::vector<PooledMatch>& pool, const std::vector<int>& of, 
     pixels_q.push_back(pool[static_cast<std::size_t>(i)].query);
     pixels_c.push_back(pool[static_cast<std::size_t>(i)].candidate);
   }
-  const EpipolarSettings settings{options.epipolar_px, options.confidence, options.max_iterations, seed};
+  EpipolarSettings settings;
+  settings.threshold_px = options.epipolar_px;
+  settings.seed = seed;
   const bool calibrated = query.camera && candidate.camera;
   const EpipolarResult lines =
       calibrated ? FitEssential(pixels_c, *candidate.camera, pixels_q, *query.camera, settings)
@@ -37,9 +43,8 @@ Motion FitOne(const std::vector<PooledMatch>& pool, const std::vector<int>& of, 
     std::vector<int> common;
     std::set_intersection(inliers.begin(), inliers.end(), points.inliers.begin(), points.inliers.end(),
                           std::back_inserter(common));
-    motion.homography =
-        !points.inliers.empty() && (static_cast<double>(common.size()) >=
-                                    options.homography_share * static_cast<double>(inliers.size()));
+    motion.homography = !points.inliers.empty() && (static_cast<double>(common.size()) >=
+                                                    kHomographyShare * static_cast<double>(inliers.size()));
     if (motion.homography) {
       inliers = points.inliers;
       if (points.turned) motion.T_candidate_query = Pose(points.R_second_first.conjugate(), {0, 0, 0});

@@ -26,7 +26,7 @@ struct Motion {
 };
 
 /// Essential matrix where both views have a camera, else fundamental matrix; a
-/// homography where that explains options.homography_share of what they do.
+/// homography where that explains nine tenths of what they do.
 /// Views of the same number of cameras (View::cameras): each with its like, or
 /// each with its opposite (left with right, for a drive the other way) if that
 /// explains more; inliers and evidence are summed.

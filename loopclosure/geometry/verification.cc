@@ -37,27 +37,16 @@ void FillEvidence(const std::vector<cv::Point2f>& in_query, const std::vector<cv
   result.motion_spread = internal::MotionSpread(in_query, in_candidate, query.size);
 }
 
-// A member's pool is a third of what three members pool: with scale_bar it needs a third of the inliers.
-int Scaled(int bar, const View& query, const View& candidate, const VerificationOptions& options) {
-  constexpr double kMembers = 3;  // that the bars are meant for
-  constexpr double kLeast = 8;    // no motion is known by fewer
-  const std::size_t members = std::min(query.members.size(), candidate.members.size());
-  if (!options.scale_bar || members == 0) return bar;
-  return static_cast<int>(std::max(kLeast, std::ceil(bar * static_cast<double>(members) / kMembers)));
-}
-
 // The least number of inliers and the least share of the matches.
 struct Bars {
   int inliers = 0;
   double ratio = 0;
 };
 
-Bars BarsFor(const Verification& result, const View& query, const View& candidate,
-             const VerificationOptions& options) {
+Bars BarsFor(const Verification& result, const VerificationOptions& options) {
   const bool rigid = result.type == ConstraintType::kRigid;
   Bars bars;
-  const int least = rigid || result.homography ? options.min_inliers : options.min_epipolar_inliers;
-  bars.inliers = Scaled(least, query, candidate, options);
+  bars.inliers = rigid || result.homography ? options.min_inliers : options.min_epipolar_inliers;
   bars.ratio = rigid ? options.min_inlier_ratio : options.min_epipolar_ratio;
   return bars;
 }
@@ -87,7 +76,7 @@ void Judge(const std::vector<PooledMatch>& pool, const std::vector<int>& inliers
     in_candidate.push_back(m.candidate);
   }
   FillEvidence(in_query, in_candidate, chance, query, candidate, result);
-  const Bars bars = BarsFor(result, query, candidate, options);
+  const Bars bars = BarsFor(result, options);
   const double ratio = static_cast<double>(inliers.size()) / static_cast<double>(considered);
   const double needed = internal::SpreadNeeded(options.min_spread, bars.inliers, std::max(1, result.inliers));
   const double spread = std::min(internal::NarrowestSpread(in_query, query.size),
@@ -96,7 +85,7 @@ void Judge(const std::vector<PooledMatch>& pool, const std::vector<int>& inliers
   const bool most = ratio >= bars.ratio || BeyondChance(result);
   const bool wide = spread >= needed;
   const bool by_chance = result.log_nfa >= 0;  // one such motion is to be expected of matches of nothing
-  result.similar = result.inliers >= Scaled(options.min_place_inliers, query, candidate, options) && wide &&
+  result.similar = result.inliers >= options.min_place_inliers && wide &&
                    ratio >= options.min_epipolar_ratio && !by_chance;
   result.accepted = many && most && wide;
   if (!many) {
@@ -115,10 +104,7 @@ void Judge(const std::vector<PooledMatch>& pool, const std::vector<int>& inliers
 RelativePoseOptions PoseOptions(const VerificationOptions& options, std::uint64_t seed) {
   RelativePoseOptions pose;
   pose.threshold_px = options.reprojection_px;
-  pose.pixel_sigma = options.pixel_sigma;
   pose.min_inliers = 6;  // the verifier judges the number itself, with its own words
-  pose.confidence = options.confidence;
-  pose.max_iterations = options.max_iterations;
   pose.seed = seed;
   return pose;
 }
@@ -138,7 +124,7 @@ bool VerifyRigid(const std::vector<PooledMatch>& pool, const View& query, const 
     pixels.push_back(Pixel(pool[i].query));
     index.push_back(static_cast<int>(i));
   }
-  if (static_cast<int>(points.size()) < Scaled(options.min_inliers, query, candidate, options)) return false;
+  if (static_cast<int>(points.size()) < options.min_inliers) return false;
   const PnpResult pnp = SolvePnp(points, pixels, *query.camera, PoseOptions(options, seed));
   std::vector<int> inliers;
   for (const int i : pnp.inliers) inliers.push_back(index[static_cast<std::size_t>(i)]);
@@ -192,9 +178,9 @@ void VerifyByPixels(const std::vector<PooledMatch>& pool, const View& query, con
   result.homography = motion.homography;
   Judge(pool, motion.inliers, motion.chance, motion.considered, query, candidate, options, result);
   if (result.similar && motion.fewest >= 0) {
-    const double even =
-        BarsFor(result, query, candidate, options).inliers / static_cast<double>(query.cameras.size());
-    const int needed = static_cast<int>(std::ceil(options.camera_share * even));
+    // Each that sees much must find its share: a facade that exists twice is on one side only.
+    const double even = BarsFor(result, options).inliers / static_cast<double>(query.cameras.size());
+    const int needed = static_cast<int>(std::ceil(even));
     if (motion.fewest < needed) {
       result.reason = Format("one of the cameras knows nothing of it (%d of its matches fit, %d are needed)",
                              motion.fewest, needed);
@@ -214,9 +200,9 @@ Verification Decide(const std::vector<PooledMatch>& pool, const View& query, con
   Verification result;
   result.candidate = candidate.id;
   result.matches = static_cast<int>(pool.size());
-  const int needed = Scaled(options.min_place_inliers, query, candidate, options);
-  if (result.matches < needed) {
-    result.reason = Format("only %d features match, %d are needed", result.matches, needed);
+  if (result.matches < options.min_place_inliers) {
+    result.reason =
+        Format("only %d features match, %d are needed", result.matches, options.min_place_inliers);
     return result;
   }
   if (query.camera && candidate.metric && query.metric &&

@@ -25,11 +25,8 @@ inline LoopDetectorOptions StateOptions(int kind) {
   options.wm_limit = 2;
   options.recent_share = 0.0;
   options.loop_threshold = 0.01;
-  options.vocabulary.trees = 2;
-  options.vocabulary.hash_tables = 2;
   options.verification.min_inliers = 8;
   options.verification.min_epipolar_inliers = 8;
-  options.verification.max_iterations = 20;
   options.ignore_bad_signatures = kind % 2 == 1;
   if (kind == 1) options.memory = MemoryKind::kPerMember;
   if (kind == 1) options.rule = CombinationRule::kMean;  // the default needs a memory that all share

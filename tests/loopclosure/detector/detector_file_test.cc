@@ -144,12 +144,6 @@ TEST_F(SavedDetector, FlannsTreesGoOnExactlyToo) {
   ExpectToGoOnExactly(options);
 }
 
-TEST_F(SavedDetector, WhatTheMembersWereRightAboutIsSavedToo) {
-  LoopDetectorOptions options = BoundedOptions();
-  options.consistent_images = 1;
-  ExpectToGoOnExactly(options);
-}
-
 TEST_F(SavedDetector, SavingChangesNothingAndTwiceGivesTheSameFile) {
   LoopDetector saved(BoundedOptions());
   LoopDetector other(BoundedOptions());

@@ -55,10 +55,6 @@ TEST(LoopDetectorOptions, OptionsOfVerificationOutOfRangeAreRefusedByName) {
   };
   EXPECT_EQ(problem(&VerificationOptions::homography_px, 0), "");
   EXPECT_NE(problem(&VerificationOptions::homography_px, -1).find("homography_px"), std::string::npos);
-  EXPECT_NE(problem(&VerificationOptions::homography_share, 0).find("homography_share"), std::string::npos);
-  EXPECT_NE(problem(&VerificationOptions::homography_share, 1.1).find("homography_share"), std::string::npos);
-  EXPECT_EQ(problem(&VerificationOptions::camera_share, 0), "");
-  EXPECT_NE(problem(&VerificationOptions::camera_share, 1.1).find("camera_share"), std::string::npos);
   EXPECT_EQ(problem(&VerificationOptions::static_px, 0), "");
   EXPECT_NE(problem(&VerificationOptions::static_px, -1).find("static_px"), std::string::npos);
 }
@@ -83,9 +79,7 @@ TEST(LoopDetectorOptions, ValuesOutOfRangeAreNamed) {
   EXPECT_NE(problem([](auto& o) { o.recent_share = 1; }).find("recent_share"), std::string::npos);
   EXPECT_NE(problem([](auto& o) { o.retrieval = -2; }).find("retrieval"), std::string::npos);
   EXPECT_NE(problem([](auto& o) { o.time_budget_ms = -2; }).find("time_budget_ms"), std::string::npos);
-  EXPECT_NE(problem([](auto& o) { o.island_levels = -1; }).find("island_levels"), std::string::npos);
-  EXPECT_NE(problem([](auto& o) { o.consistent_images = -1; }).find("consistent_images"), std::string::npos);
-  EXPECT_NE(problem([](auto& o) { o.extraction.orb_border = 0; }).find("orb_border"), std::string::npos);
+  EXPECT_NE(problem([](auto& o) { o.extraction.features = 0; }).find("features"), std::string::npos);
   EXPECT_NE(problem([](auto& o) { o.hypothesis_ratio = 2; }).find("hypothesis_ratio"), std::string::npos);
   EXPECT_NE(problem([](auto& o) { o.members = {"sirf"}; }).find("did you mean 'surf'"), std::string::npos);
   EXPECT_EQ(problem([](auto& o) {

@@ -170,13 +170,6 @@ TEST_F(OrderOfSearch, OfAPlaceThatWasSeenOftenThreeNeighboursAreTried) {
   EXPECT_EQ(Tried({{20, 0.5}, {18, 0.03}, {22, 0.02}, {24, 0.01}}), (Ids{20, 18, 22, 24}));
 }
 
-TEST_F(OrderOfSearch, IslandsAreRankedByAllThatLiesNear) {
-  options_.verification.neighbours = 0;
-  options_.verification.max_hypotheses = 2;
-  options_.island_levels = 2;
-  EXPECT_EQ(Tried({{10, 0.3}, {30, 0.2}, {31, 0.15}, {45, 0.05}}), (Ids{30, 10}));
-}
-
 TEST_F(OrderOfSearch, TheBestThatWasTriedIsToldThoughNothingIsAccepted) {
   const LoopResult result = SearchWhere(1000, {{10, 0.2}, {25, 0.5}}, [&](const View&, const View& b, int) {
     Verification verification;

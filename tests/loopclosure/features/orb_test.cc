@@ -67,7 +67,7 @@ cv::Mat Noise(int seed, const cv::Size& size, double blur) {
 }
 
 // As the member has it: twice its quota of points.
-OrbOptions Default(const cv::Mat& image) { return OrbOptionsFor(image.size(), 800, ExtractionOptions()); }
+OrbOptions Default(const cv::Mat& image) { return OrbOptionsFor(image.size(), 800); }
 
 TEST(Orb, PointsAndDescriptorsAreThoseOfOpenCv) {
   for (const int seed : {1, 2, 3}) {
@@ -157,9 +157,9 @@ TEST(Orb, SomePointsInAnyOrderGetTheDescriptorsThatTheyHaveAmongAll) {
 
 // What the member makes of all that OpenCV detects and describes.
 Features SpreadByOpenCv(const cv::Mat& image, const ExtractionOptions& options) {
-  const Detected all = ByOpenCv(image, OrbOptionsFor(image.size(), 2 * options.features, options));
+  const Detected all = ByOpenCv(image, OrbOptionsFor(image.size(), 2 * options.features));
   Features kept;
-  for (const int i : SelectSpread(all.keypoints, image.size(), options.features, options.grid_columns)) {
+  for (const int i : SelectSpread(all.keypoints, image.size(), options.features)) {
     kept.keypoints.push_back(all.keypoints[static_cast<std::size_t>(i)]);
     kept.descriptors.push_back(all.descriptors.row(i));
   }

@@ -49,9 +49,9 @@ class SiftOfOpenCv : public ::testing::Test {
     cv::Mat large;
     image.convertTo(large, CV_32F);
     cv::resize(large, large, cv::Size(), 2, 2, cv::INTER_LINEAR);
-    ExtractionOptions options;
+    SiftOptions options;
     options.features = 100000;
-    options.sift_contrast = options.sift_min_contrast = contrast;
+    options.contrast = options.least_contrast = contrast;
     SiftScratch scratch;
     ours_ = ExtractSift(large, 1.0, options, scratch);
     for (cv::KeyPoint& keypoint : ours_.keypoints) {
@@ -227,9 +227,9 @@ bool IsAt(const ExtremePoint& point, const cv::KeyPoint& keypoint) {
 
 // But for what is on a bound of the definition, up to rounding.
 TEST(Sift, PointsAreTheTopsOfAllExtremesInPlaceAndScale) {
-  ExtractionOptions options;
+  SiftOptions options;
   options.features = 100000;
-  options.sift_contrast = options.sift_min_contrast = 0.01;
+  options.contrast = options.least_contrast = 0.01;
   SiftScratch scratch;
   const std::vector<cv::KeyPoint> ours = ExtractSift(Clouds(), 0.5, options, scratch).keypoints;
   const std::vector<ExtremePoint> expected = PointsByDefinition(scratch, 0.01 * 255 / 3);
@@ -250,7 +250,7 @@ TEST(Sift, ImagesOfAnOctaveDoubleTheirBlurInThreeSteps) {
   cv::Mat dot = cv::Mat::zeros(128, 128, CV_8U);
   dot.at<std::uint8_t>(64, 64) = 255;
   SiftScratch scratch;
-  ExtractSift(dot, 0.5, ExtractionOptions(), scratch);
+  ExtractSift(dot, 0.5, SiftOptions(), scratch);
   ASSERT_EQ(scratch.pyramid.size(), 5u) << "down to eight pixels";
   for (std::size_t o = 0; o < 3; ++o) {
     const double zoom = std::pow(2, o);
@@ -275,7 +275,7 @@ TEST(Sift, ImagesOfAnOctaveDoubleTheirBlurInThreeSteps) {
 // Where fewer than wanted reach the contrast, the next ones by contrast fill up.
 TEST(Sift, FaintPointsAreTakenWhereThereAreTooFewOthers) {
   const cv::Mat image = Clouds();
-  ExtractionOptions options;
+  SiftOptions options;
   SiftScratch scratch;
   const auto contrasts = [&](int features) {
     options.features = features;
@@ -286,17 +286,17 @@ TEST(Sift, FaintPointsAreTakenWhereThereAreTooFewOthers) {
     std::sort(sorted.begin(), sorted.end());
     return sorted;
   };
-  options.sift_contrast = options.sift_min_contrast = 0.003;
+  options.contrast = options.least_contrast = 0.003;
   const std::vector<float> all = contrasts(100000);
   const int number = static_cast<int>(all.size());
   const float median = all[all.size() / 2];
-  options.sift_contrast = static_cast<double>(median) * 3 / 255;
+  options.contrast = static_cast<double>(median) * 3 / 255;
   const std::vector<float> few = contrasts(number / 4), many = contrasts(3 * number / 4);
   EXPECT_EQ(static_cast<int>(few.size()), number / 4);
   EXPECT_GE(few.front(), 0.999f * median);
   EXPECT_EQ(static_cast<int>(many.size()), 3 * number / 4);
   EXPECT_LT(many.front(), 0.999f * median);
-  options.sift_min_contrast = options.sift_contrast;
+  options.least_contrast = options.contrast;
   EXPECT_GE(contrasts(number).front(), 0.999f * median);
 }
 

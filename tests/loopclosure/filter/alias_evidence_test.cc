@@ -36,7 +36,7 @@ AliasEvidence Experienced(int n, double most) {
 TEST(AliasEvidence, NoWordInCommonSaysNewPlaceHoweverManyPlacesThereAre) {
   for (const int n : {1, 10, 100, 2000}) {
     LocationMemory memory(1);
-    TransitionModel transition(0.9);
+    TransitionModel transition;
     for (int i = 0; i <= n; ++i) memory.Add(i);
     transition.Update(memory, memory.Settle());
     AliasEvidence evidence{EvidenceOptions()};

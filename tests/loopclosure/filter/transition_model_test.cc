@@ -32,7 +32,7 @@ double Sum(const TransitionModel& model, int j) {
 }
 
 TEST(TransitionModel, MiddleOfAChainHasThePublishedValues) {
-  TransitionModel model(0.9);
+  TransitionModel model;
   Chain(60, model);
   EXPECT_NEAR(At(model, 30, 30), 0.225, 1e-4);
   for (const int side : {-1, 1}) {
@@ -45,19 +45,19 @@ TEST(TransitionModel, MiddleOfAChainHasThePublishedValues) {
 }
 
 TEST(TransitionModel, EveryColumnSumsToNineTenths) {
-  TransitionModel model(0.9);
+  TransitionModel model;
   Chain(40, model);
   for (int j = 0; j < 40; ++j) EXPECT_NEAR(Sum(model, j), 0.9, 1e-12) << j;
 }
 
 TEST(TransitionModel, ALoneLocationKeepsTheDeficitToItself) {
-  TransitionModel model(0.9);
+  TransitionModel model;
   Chain(1, model);
   EXPECT_NEAR(At(model, 0, 0), 0.9, 1e-12);
 }
 
 TEST(TransitionModel, WhatLiesBehindALoopLinkHasAShareOfItsLevel) {
-  TransitionModel model(0.9);
+  TransitionModel model;
   LocationMemory memory = Chain(60, model);
   ASSERT_TRUE(memory.AddLink(10, 50, LocationMemory::LinkType::kLoop));
   model.Update(memory, {10, 50});
@@ -67,11 +67,11 @@ TEST(TransitionModel, WhatLiesBehindALoopLinkHasAShareOfItsLevel) {
 }
 
 TEST(TransitionModel, CachedColumnsEqualThoseOfAFreshModel) {
-  TransitionModel grown(0.9);
+  TransitionModel grown;
   LocationMemory memory = Chain(50, grown);
   memory.AddLink(5, 40, LocationMemory::LinkType::kLoop);
   grown.Update(memory, {5, 40});
-  TransitionModel fresh(0.9);
+  TransitionModel fresh;
   fresh.Update(memory, memory.working_memory());
   for (const int j : memory.working_memory()) EXPECT_EQ(grown.Column(j), fresh.Column(j)) << j;
 }
@@ -88,7 +88,7 @@ std::size_t LargestColumn(int laps, int block, bool with_the_first, TransitionMo
   }
   std::size_t most = 0;
   for (const int j : memory.working_memory()) most = std::max(most, model.Column(j).size());
-  TransitionModel fresh(0.9);
+  TransitionModel fresh;
   fresh.Update(memory, memory.working_memory());
   for (const int j : memory.working_memory()) {
     EXPECT_EQ(model.Column(j), fresh.Column(j)) << j;
@@ -99,8 +99,8 @@ std::size_t LargestColumn(int laps, int block, bool with_the_first, TransitionMo
 
 TEST(TransitionModel, ColumnsStayBoundedHoweverManyLaps) {
   for (const bool with_the_first : {false, true}) {
-    TransitionModel few(0.9);
-    TransitionModel many(0.9);
+    TransitionModel few;
+    TransitionModel many;
     const std::size_t of_few = LargestColumn(8, 25, with_the_first, few);
     EXPECT_EQ(LargestColumn(50, 25, with_the_first, many), of_few);
     EXPECT_LE(of_few, 33u * 5u);  // the neighbours in one lap, five times
@@ -108,7 +108,7 @@ TEST(TransitionModel, ColumnsStayBoundedHoweverManyLaps) {
 }
 
 TEST(TransitionModel, PredictionEqualsTheDenseProduct) {
-  TransitionModel model(0.9);
+  TransitionModel model;
   const LocationMemory memory = Chain(30, model);
   const std::vector<int>& wm = memory.working_memory();
   Belief before;
@@ -129,7 +129,7 @@ TEST(TransitionModel, PredictionEqualsTheDenseProduct) {
 
 // <b, T a> = <T' b, a>: what is predicted forwards and what is looked for backwards is one matrix.
 TEST(TransitionModel, BackwardIsTheTransposeOfThePrediction) {
-  TransitionModel model(0.9);
+  TransitionModel model;
   const LocationMemory memory = Chain(25, model);
   Belief a, b;
   for (int i = 0; i < 26; ++i) {

@@ -199,7 +199,6 @@ TEST(VerifierWithoutScale, FindsTheScaleOfTheCandidatesPointsOverTheQuerys) {
   }
   RelativePoseOptions options;
   options.threshold_px = 2 * VerificationOptions().reprojection_px;
-  options.pixel_sigma = VerificationOptions().pixel_sigma;
   const SimilarityResult fit = SolveSimilarity(points_c, pixels_c, *views.candidate().camera, points_q,
                                                pixels_q, *views.query().camera, options);
   ASSERT_EQ(fit.inliers.size(), 50u);

@@ -332,25 +332,8 @@ TEST(GeometricVerifier, OneCameraDoesNotSpeakForTheOtherUnlessThatSeesNothing) {
   const Verification v = GeometricVerifier({}, 1).Verify(query, candidate);
   EXPECT_FALSE(v.accepted);
   EXPECT_NE(v.reason.find("one of the cameras"), std::string::npos) << v.reason;
-  VerificationOptions any;
-  any.camera_share = 0;
-  EXPECT_TRUE(GeometricVerifier(any, 1).Verify(query, candidate).accepted);
   const Verification seen = GeometricVerifier({}, 1).Verify(query, blind);
   EXPECT_TRUE(seen.accepted) << seen.reason;
-}
-
-TEST(GeometricVerifier, TheBarIsScaledToTheMembersThatPool) {
-  VerificationOptions options;
-  View query = See(PoseAt(0.5, 0.3), 9, false, false), candidate = See(Pose(), 1, false, false);
-  query.members[0].pixels.resize(18);
-  query.members[0].descriptors = query.members[0].descriptors.Unpacked().rowRange(0, 18).clone();
-  EXPECT_FALSE(GeometricVerifier(options, 1).Verify(query, candidate).accepted);
-  options.scale_bar = true;  // 10 for one member
-  const Verification scaled = GeometricVerifier(options, 1).Verify(query, candidate);
-  EXPECT_TRUE(scaled.accepted) << scaled.reason;
-  query.members.resize(3);
-  candidate.members.resize(3);
-  EXPECT_FALSE(GeometricVerifier(options, 1).Verify(query, candidate).accepted);  // 30 again
 }
 
 TEST(GeometricVerifier, IsDeterministicForASeedAndAnyNumberOfThreads) {

@@ -61,38 +61,10 @@ using ChannelValues = std::array<double, 3>;
 struct ExtractionOptions {
   TUTTI_OPTION(int, features, 400, "strongest features kept per member and image, spread over the image",
                Basic(), From(1), To(10000));
-  TUTTI_OPTION(int, grid_columns, 8,
-               "cells over which they are spread, along the longer side; 1: no spreading", From(1), To(64));
   TUTTI_OPTION(int, max_pixels, 1 << 19,
                "images with more pixels are scaled down before anything else, so that no camera costs more "
                "than this",
                Basic(), Unit("px"), From(1 << 12));
-  TUTTI_OPTION(int, min_pixels, 100000,
-               "SURF and SIFT see an image of fewer pixels at twice its size; 0: never enlarged", Unit("px"),
-               From(0));
-  TUTTI_OPTION(int, surf_octaves, 4, "octaves of the Hessian pyramid (the paper's 4)", From(1), To(8));
-  TUTTI_OPTION(double, surf_threshold, 1.0,
-               "determinant of Hessian below which a SURF point is dropped (dlib's scale)", From(0));
-  TUTTI_OPTION(double, surf_min_threshold, 0.05,
-               "where fewer than `features` reach surf_threshold, weaker ones are taken in order of "
-               "strength, down to this determinant of Hessian",
-               From(0));
-  TUTTI_OPTION(int, sift_max_pixels, 1 << 19, "of SIFT's first octave: a larger image is scaled down to it",
-               Unit("px"), From(1 << 12));
-  TUTTI_OPTION(double, sift_contrast, 0.02, "contrast threshold of SIFT (OpenCV's own default is 0.04)",
-               Above(0));
-  TUTTI_OPTION(double, sift_min_contrast, 0.003,
-               "where fewer than `features` reach sift_contrast, weaker ones are taken in order of "
-               "strength, down to this contrast",
-               Above(0));
-  TUTTI_OPTION(int, orb_fast_threshold, 10, "FAST threshold of ORB", Unit("grey levels of 255"), From(1),
-               To(255));
-  TUTTI_OPTION(double, orb_border, 0.05,
-               "no ORB point is nearer to the border than this share of the shorter side, but for 31 px "
-               "(OpenCV's own default for images of any size)",
-               Above(0), To(1));
-  TUTTI_OPTION(bool, root_sift, false,
-               "SIFT compared by the Hellinger kernel (Arandjelovic & Zisserman, CVPR 2012)");
   TUTTI_OPTIONS_END;
 };
 
@@ -126,10 +98,6 @@ struct VocabularyOptions {
                Above(0), To(1));
   TUTTI_OPTION(FloatIndex, float_index, FloatIndex::kForest,
                "for float descriptors: forest (ours) or flann (slower, for comparison)");
-  TUTTI_OPTION(int, trees, 4, "kd-trees of the index (float descriptors)", From(1), To(32));
-  TUTTI_OPTION(int, checks, 32, "leaves visited per search (float descriptors)", From(1));
-  TUTTI_OPTION(int, hash_tables, 5, "random tries of the Hamming index (binary descriptors)", From(1),
-               To(64));
   TUTTI_OPTIONS_END;
 };
 
@@ -161,26 +129,10 @@ struct VerificationOptions {
                Unit("px"), Above(0));
   TUTTI_OPTION(double, homography_px, 2.5, "RANSAC threshold of the homography; 0: none is sought",
                Unit("px"), From(0));
-  TUTTI_OPTION(double, homography_share, 0.9,
-               "a homography that explains this share of what the essential or fundamental matrix does "
-               "decides in its place (by min_inliers and min_epipolar_ratio): flat scene, or turn on the "
-               "spot",
-               Above(0), To(1));
-  TUTTI_OPTION(double, camera_share, 1.0,
-               "of several cameras in an image each that sees much must find this share of the least number "
-               "of inliers / cameras; 0: one may speak for all",
-               From(0), To(1));
   TUTTI_OPTION(double, static_px, 1.5,
                "matches nearer than this to their own pixel did not move: if they are most of the inliers "
                "and in a part of the image only, the others must do; 0: off",
                Unit("px"), From(0));
-  TUTTI_OPTION(bool, scale_bar, false,
-               "the least numbers of inliers are for features of three members; true: times members / 3, at "
-               "least 8, so that one member alone is judged as strictly");
-  TUTTI_OPTION(double, confidence, 0.9999, "of RANSAC", Above(0), Below(1));
-  TUTTI_OPTION(int, max_iterations, 1000, "most iterations of RANSAC", From(1));
-  TUTTI_OPTION(double, pixel_sigma, 1.5, "standard deviation of a matched pixel, sets the information matrix",
-               Unit("px"), Above(0));
   TUTTI_OPTION(double, min_depth_m, 0.1, "nearer depths count as unknown", Unit("m"), From(0));
   TUTTI_OPTION(double, max_depth_m, 80.0, "farther depths count as unknown", Unit("m"), Above(0));
   TUTTI_OPTIONS_END;
@@ -232,14 +184,6 @@ struct LoopDetectorOptions {
   TUTTI_OPTION(double, propose_threshold, 0.08, "go to verification at H >= this", From(0), To(1));
   TUTTI_OPTION(double, link_threshold, 0.9, "a loop of this probability links its two places for the filter",
                From(0), To(1));
-  TUTTI_OPTION(int, island_levels, 0,
-               "candidates are ranked by the posterior of all within so many graph levels; 0: by their own "
-               "(islands as in iBoW-LCD, Garcia-Fidalgo & Ortiz 2018)",
-               From(0), To(16));
-  TUTTI_OPTION(int, consistent_images, 0,
-               "go to verification only if the candidates of so many images before lie on one path with "
-               "this one; 0: at once",
-               From(0));
   TUTTI_OPTION(double, hypothesis_ratio, 0.0,
                "and at H >= this x the H of the image before; 0: whatever it was (0.9 in Labbe & Michaud "
                "2013)",
@@ -251,7 +195,6 @@ struct LoopDetectorOptions {
                "a member abstains below this share of its mean number of features", From(0), To(1));
   TUTTI_OPTION(bool, ignore_bad_signatures, false,
                "an image that is bad for every member is no location at all");
-  TUTTI_OPTION(double, virtual_place_prior, 0.9, "p(new place | new place)", Above(0), Below(1));
   TUTTI_OPTION(bool, rehearsal, false, "merge a location into its predecessor when they look the same");
   TUTTI_OPTION(double, rehearsal_similarity, 0.6, "similarity from which on they do", Above(0), To(1));
   TUTTI_OPTION(MemoryKind, memory, MemoryKind::kShared,

@@ -33,10 +33,9 @@ bool PlantedLoops::Plant(int newest, SlamSystem* slam) {
     const int candidate = forward ? edge.from : edge.to;
     const double seen = MedianDepth(slam->odometry()->Keyframe(candidate));
     const double depth = seen > 0 ? seen : 1;  // without landmarks AddLoop refuses it
-    slam->AddLoop(candidate, forward ? edge.to : edge.from,
-                  forward ? edge.measurement : edge.measurement.Inverse(),
-                  MakeInformation(options_.loop_sigma_fraction * depth,
-                                  options_.loop_sigma_deg * internal::kRadians, options_.loop_sigma_scale));
+    slam->AddLoop(
+        candidate, forward ? edge.to : edge.from, forward ? edge.measurement : edge.measurement.Inverse(),
+        MakeInformation(kLoopSigmaFraction * depth, kLoopSigmaDeg * internal::kRadians, kLoopSigmaScale));
   }
   left_ -= static_cast<int>(planted.size());
   ++made_;

@@ -14,7 +14,7 @@ namespace tutti {
 class PlantedLoops {
  public:
   PlantedLoops(const SlamOptions& options, std::uint64_t seed)
-      : options_(options), left_(options.inject_false_loops), seed_(seed) {}
+      : left_(options.inject_false_loops), seed_(seed) {}
 
   /// After each frame that became a keyframe.
   void OnKeyframe(int keyframe, SlamSystem* slam);
@@ -30,7 +30,6 @@ class PlantedLoops {
  private:
   bool Plant(int newest, SlamSystem* slam);
 
-  SlamOptions options_;
   int left_;
   std::uint64_t seed_;
   int made_ = 0;

@@ -7,8 +7,10 @@
 #include <tuple>
 #include <utility>
 
+#include "apps/slam/loop_constraint.h"
 #include "apps/slam/loop_solver.h"
 #include "apps/slam/missed_loops.h"
+#include "apps/slam/odometry_uncertainty.h"
 #include "core/angle.h"
 
 namespace tutti {
@@ -77,15 +79,13 @@ class SetFinder {
     const auto drift = [edges](double loop, double edge) {
       return kDriftSigmas * std::sqrt(2 * loop * loop + edges * edge * edge);
     };
-    const double turn_deg = drift(options_.loop_sigma_deg, options_.odometry_sigma_deg);
-    const double scales = graph_.kind() == GraphKind::kSim3
-                              ? drift(options_.loop_sigma_scale, options_.odometry_sigma_scale)
-                              : 0;
+    const double turn_deg = drift(kLoopSigmaDeg, options_.odometry_sigma_deg);
+    const double scales = graph_.kind() == GraphKind::kSim3 ? drift(kLoopSigmaScale, kOdometrySigmaScale) : 0;
     const double length = kDriftSigmas * options_.odometry_sigma_fraction * (q.length * scale + c.length) +
                           std::hypot(turn_deg * internal::kRadians, scales) * lever;
     return Within(LoopGate::Cycle(a, b, map_),
-                  {options_.loop_agree_fraction + length / a.depth, options_.loop_agree_deg + turn_deg,
-                   options_.loop_agree_scale + scales});
+                  {LoopGate::kAgreement.fraction + length / a.depth,
+                   LoopGate::kAgreement.angle_deg + turn_deg, LoopGate::kAgreement.log_scale + scales});
   }
 
   std::size_t PlacesOf(const std::vector<std::size_t>& of) const {

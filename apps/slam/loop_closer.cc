@@ -12,6 +12,9 @@
 namespace tutti {
 namespace {
 
+// An edge of the pose graph joins keyframes that share so many landmarks (as in ORB-SLAM's essential graph);
+// from each to at most so many older ones, the strongest.
+constexpr int kLeastShared = 100, kCovisible = 3;
 constexpr double kNoWeight = 0.01;  // of the robust loss: the map contradicts the loop
 constexpr int kLeastCommon = 30;    // landmarks that tie the two ends of a loop
 constexpr int kSurelySeen = 100;    // inliers of a loop within the local map that may contradict it
@@ -22,8 +25,8 @@ KeyframeGraphOptions GraphOptions(const RunConfig& config, Sensor sensor) {
   options.solver = config.graph;
   options.sigma_translation_ratio = config.run.odometry_sigma_fraction;
   options.sigma_rotation_rad = config.run.odometry_sigma_deg * internal::kRadians;
-  options.sigma_log_scale = config.run.odometry_sigma_scale;
-  options.max_covisible = config.run.covisibility_edges;
+  options.sigma_log_scale = kOdometrySigmaScale;
+  options.max_covisible = kCovisible;
   return options;
 }
 
@@ -60,7 +63,7 @@ PoseGraph LoopCloser::Graph(const Odometry& odometry) const {
 std::vector<CovisiblePair> LoopCloser::Covisible(const Odometry& odometry) const {
   if (followed_.ImagesJudgeSteps() && adjustments_ == 0) return {};
   std::vector<CovisiblePair> covisible;
-  for (const auto& [pair, shared] : odometry.Covisibility(options_.covisibility_min_shared))
+  for (const auto& [pair, shared] : odometry.Covisibility(kLeastShared))
     covisible.push_back({pair.first, pair.second, shared});
   return covisible;
 }
@@ -70,7 +73,7 @@ LoopConstraint LoopCloser::Measure(const Verification& verification, int candida
   const ScopedSpan span(recorder_, Lane::kOptimisation, "measure_loop");
   const internal::Stopwatch watch;
   LoopConstraint constraint = MakeLoopConstraint(verification, odometry.Keyframe(candidate),
-                                                 odometry.Keyframe(query), rig_, options_, detector_);
+                                                 odometry.Keyframe(query), rig_, detector_);
   stages_["loop_measure"] += watch.Milliseconds();
   return constraint;
 }
@@ -374,7 +377,7 @@ void LoopCloser::Applied(const LoopUpdate& update, const std::vector<int>& commo
       const Similarity in_map(odometry.KeyframePose(loop.candidate).Inverse() *
                               odometry.KeyframePose(loop.query));
       const Disagreement d = tutti::Measure(loop.S_candidate_query * in_map.Inverse(), loop.depth);
-      if (!Contradicts(d, options_)) loop.S_candidate_query = in_map;
+      if (!Contradicts(d)) loop.S_candidate_query = in_map;
     }
   }
   // To adjust the map without a loop that landmarks do not tie would open that loop again.

@@ -87,7 +87,7 @@ double MedianDepth(const KeyframeView& view) {
 }
 
 LoopConstraint MakeLoopConstraint(const Verification& verification, const KeyframeView& candidate,
-                                  const KeyframeView& query, const CameraRig& rig, const SlamOptions& options,
+                                  const KeyframeView& query, const CameraRig& rig,
                                   const LoopDetectorOptions& detector) {
   LoopConstraint out;
   LoopEdge& edge = out.edge;
@@ -109,9 +109,9 @@ LoopConstraint MakeLoopConstraint(const Verification& verification, const Keyfra
     }
     edge.S_candidate_query = fit.S_a_b;
     const double apart = fit.S_a_b.translation.norm() / edge.depth;
-    if (apart > options.loop_apart_fraction) {
+    if (apart > kMostLoopApart) {
       out.reason = "the two cameras stand too far apart for a scale: " + Percent(apart) +
-                   " of the median scene depth, at most " + Percent(options.loop_apart_fraction);
+                   " of the median scene depth, at most " + Percent(kMostLoopApart);
       return out;
     }
     information = fit.information;
@@ -119,7 +119,7 @@ LoopConstraint MakeLoopConstraint(const Verification& verification, const Keyfra
     if (verification.type != ConstraintType::kRigid) {
       // The detector knew the depths of two frames; the map has those of landmarks that many frames saw.
       const Verification metric = VerifyLandmarks(candidate, query, rig, detector);
-      if (metric.accepted) return MakeLoopConstraint(metric, candidate, query, rig, options, detector);
+      if (metric.accepted) return MakeLoopConstraint(metric, candidate, query, rig, detector);
       out.reason = "verified without depth, and the map's landmarks give none: " + metric.reason;
       return out;
     }
@@ -128,9 +128,9 @@ LoopConstraint MakeLoopConstraint(const Verification& verification, const Keyfra
     information = MakeInformation(verification.information, 1.0);
   }
   // The residual of an edge lives in the query's frame, the depth in the candidate's.
-  const double sigma_translation = options.loop_sigma_fraction * edge.depth / edge.S_candidate_query.scale;
-  edge.information = WithFloor(information, sigma_translation, options.loop_sigma_deg * internal::kRadians,
-                               options.loop_sigma_scale);
+  const double sigma_translation = kLoopSigmaFraction * edge.depth / edge.S_candidate_query.scale;
+  edge.information =
+      WithFloor(information, sigma_translation, kLoopSigmaDeg * internal::kRadians, kLoopSigmaScale);
   out.usable = edge.information.allFinite();
   if (!out.usable) out.reason = "its information matrix is not finite";
   return out;

@@ -9,10 +9,18 @@
 #include "tutti/backend/keyframe_graph.h"
 #include "tutti/frontend/odometry.h"
 #include "tutti/loopclosure/detector.h"
-#include "tutti/slam/slam_options.h"
 
 #pragma GCC visibility push(default)  // used across libraries
 namespace tutti {
+
+/// Least standard deviations of a loop: the errors of matched points of one scene are not independent, so
+/// the inliers alone promise too much. Rotation [deg], translation as a share of the median scene depth, one
+/// camera's log(scale).
+inline constexpr double kLoopSigmaDeg = 0.3, kLoopSigmaFraction = 0.01, kLoopSigmaScale = 0.02;
+
+/// One camera: two views farther apart than this share of the median scene depth see too little in common to
+/// fix a scale.
+inline constexpr double kMostLoopApart = 0.5;
 
 /// The edge, or why there is none.
 struct LoopConstraint {
@@ -27,7 +35,7 @@ struct LoopConstraint {
 /// that the verification matched. The covariance is the verification's plus a floor: matched points of one
 /// scene share their errors, so inliers alone promise too much. Fills everything of the edge but `record`.
 LoopConstraint MakeLoopConstraint(const Verification& verification, const KeyframeView& candidate,
-                                  const KeyframeView& query, const CameraRig& rig, const SlamOptions& options,
+                                  const KeyframeView& query, const CameraRig& rig,
                                   const LoopDetectorOptions& detector);
 
 /// The same with candidate and query exchanged: what another detector found, which knew the newer keyframe.

@@ -12,7 +12,7 @@ namespace tutti {
 namespace {
 
 constexpr double kWalkSigmas = 3;  // of the odometry's drift between two loops
-// Limits grow to so many times what options say: farther apart, even a bad odometry's loops prove little.
+// Limits grow to so many times kAgreement: farther apart, even a bad odometry's loops prove little.
 constexpr double kMostGrowth = 4;
 // Of the median scene depth, or turned by this: what was seen from close by or fills the middle of the one
 // image is gone or elsewhere in the other.
@@ -47,9 +47,9 @@ Disagreement LoopGate::Limits(const LoopEdge& a, const LoopEdge& b, const Map& m
   const double shift = std::hypot(step_.fraction * (Apart(a.query, b.query, map) + at_candidates),
                                   turn_rad * (b.S_candidate_query.translation.norm() + at_candidates));
   Disagreement limits;
-  limits.fraction = Grown(options_.loop_agree_fraction, shift / a.depth, times);
-  limits.angle_deg = Grown(options_.loop_agree_deg, turn_rad * internal::kDegrees, times);
-  limits.log_scale = options_.loop_agree_scale;
+  limits.fraction = Grown(kAgreement.fraction, shift / a.depth, times);
+  limits.angle_deg = Grown(kAgreement.angle_deg, turn_rad * internal::kDegrees, times);
+  limits.log_scale = kAgreement.log_scale;
   return limits;
 }
 

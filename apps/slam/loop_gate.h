@@ -31,6 +31,9 @@ class LoopGate {
     Pose T_world_camera;
   };
   using Map = std::function<Place(int keyframe)>;
+  /// Two loops agree if their cycle closes within this: 2 and 5 of a loop's least standard deviations
+  /// (loop_constraint.h), which chance hardly ever does. The scale is one camera's.
+  static constexpr Disagreement kAgreement{0.02, 1.5, 0.10};
   /// kWeak: the detector did not believe the loop. kFar: it did, but the map is off by so much that the
   /// odometry would have to have failed altogether; three that saw different things must say so.
   enum class Trust { kSure, kFar, kWeak };
@@ -45,8 +48,8 @@ class LoopGate {
   explicit LoopGate(const SlamOptions& options) : options_(options) {}
 
   /// Standard deviations of the odometry's motion from one keyframe to the next, for an odometry that may be
-  /// a bad one: two loops agree if it can have drifted by what they differ. Without this: as far as options
-  /// say.
+  /// a bad one: two loops agree if it can have drifted by what they differ. Without this: within
+  /// kAgreement.
   void SetOdometryUncertainty(const OdometryUncertainty::Sigmas& step) { step_ = step; }
 
   /// The loops that may enter now: none while `loop` waits for another one that agrees, else it and those

@@ -52,17 +52,17 @@ Disagreement Residual(const LoopEdge& loop, const std::map<int, Similarity>& pos
 
 // Judges the loops that are in by the optimised graph; true if all may stay.
 bool Judge(const KeyframeCorrection& correction, const std::vector<LoopEdge>& accepted,
-           const SlamOptions& options, std::vector<LoopVerdict>* verdicts) {
+           std::vector<LoopVerdict>* verdicts) {
   bool old_broken = false;
   for (const LoopEdge& loop : accepted)
-    old_broken = old_broken || Contradicts(Residual(loop, correction.S_world_keyframe), options);
+    old_broken = old_broken || Contradicts(Residual(loop, correction.S_world_keyframe));
   bool all_stay = true;
   std::size_t e = accepted.size();
   for (LoopVerdict& verdict : *verdicts) {
     if (!verdict.reason.empty()) continue;
     verdict.weight = correction.loops[e++].weight;
     const Disagreement d = Residual(verdict.loop, correction.S_world_keyframe);
-    if (!old_broken && verdict.weight >= kLeastWeight && !Contradicts(d, options)) continue;
+    if (!old_broken && verdict.weight >= kLeastWeight && !Contradicts(d)) continue;
     verdict.reason =
         old_broken ? "contradicts loops that were accepted before" : Contradiction(d, verdict.weight);
     verdict.contradicted = true;
@@ -72,8 +72,7 @@ bool Judge(const KeyframeCorrection& correction, const std::vector<LoopEdge>& ac
 }
 
 // From every start; another one than the map counts if it is lower and all loops may stay there, too.
-void Prove(const KeyframeGraph& graph, const std::vector<LoopEdge>& accepted, const SlamOptions& options,
-           LoopSolution* out) {
+void Prove(const KeyframeGraph& graph, const std::vector<LoopEdge>& accepted, LoopSolution* out) {
   std::vector<LoopEdge> loops = accepted;
   for (const LoopVerdict& verdict : out->verdicts) {
     if (verdict.reason.empty()) loops.push_back(verdict.loop);
@@ -81,7 +80,7 @@ void Prove(const KeyframeGraph& graph, const std::vector<LoopEdge>& accepted, co
   out->proof = graph.Prove(loops);
   if (!out->proof->better) return;
   std::vector<LoopVerdict> verdicts = out->verdicts;
-  out->proof->better = Judge(out->proof->correction, accepted, options, &verdicts);
+  out->proof->better = Judge(out->proof->correction, accepted, &verdicts);
   if (!out->proof->better) return;
   out->verdicts = std::move(verdicts);
   out->correction = out->proof->correction;
@@ -101,8 +100,9 @@ Disagreement Measure(const Similarity& E, double depth) {
   return d;
 }
 
-bool Contradicts(const Disagreement& d, const SlamOptions& options) {
-  return d.fraction > options.loop_after_fraction || d.angle_deg > options.loop_after_deg;
+bool Contradicts(const Disagreement& d) {
+  constexpr double kMostFraction = 0.08, kMostDeg = 3;
+  return d.fraction > kMostFraction || d.angle_deg > kMostDeg;
 }
 
 LoopSolution SolveLoops(const KeyframeGraph& graph, const std::vector<LoopEdge>& accepted,
@@ -119,7 +119,7 @@ LoopSolution SolveLoops(const KeyframeGraph& graph, const std::vector<LoopEdge>&
     if (loops.size() == accepted.size()) break;
     out.correction = graph.Optimize(loops);
     if (out.correction.success) {
-      out.moves = Judge(out.correction, accepted, options, &out.verdicts);
+      out.moves = Judge(out.correction, accepted, &out.verdicts);
       continue;
     }
     for (LoopVerdict& verdict : out.verdicts) {
@@ -127,7 +127,7 @@ LoopSolution SolveLoops(const KeyframeGraph& graph, const std::vector<LoopEdge>&
         verdict.reason = "the pose graph could not be solved: " + out.correction.reason;
     }
   }
-  if (out.moves && options.certify) Prove(graph, accepted, options, &out);
+  if (out.moves && options.certify) Prove(graph, accepted, &out);
   out.time_ms = watch.Milliseconds();
   return out;
 }

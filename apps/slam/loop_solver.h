@@ -24,8 +24,9 @@ struct Disagreement {
 };
 Disagreement Measure(const Similarity& E, double depth);
 bool Within(const Disagreement& d, const Disagreement& limits);
-/// Too much for a loop that belongs to an optimised map (loop_after_fraction, loop_after_deg).
-bool Contradicts(const Disagreement& d, const SlamOptions& options);
+/// Too much for a loop that belongs to an optimised map: 8 and 10 of its least standard deviations
+/// (loop_constraint.h).
+bool Contradicts(const Disagreement& d);
 
 /// What became of an entering loop.
 struct LoopVerdict {

@@ -7,6 +7,7 @@
 #include <tuple>
 #include <utility>
 
+#include "apps/slam/loop_constraint.h"
 #include "core/angle.h"
 
 namespace tutti {
@@ -72,7 +73,7 @@ std::vector<MissedLoop> FindMissedLoops(const std::vector<StandingKeyframe>& key
       if (way == ways.end() || way->second.length < kLongWay * candidate.depth) continue;
       const double apart = (candidate.T_world_camera.translation - query.T_world_camera.translation).norm();
       const double drift = kSigmas * options.odometry_sigma_fraction * way->second.length;
-      if (apart > options.loop_apart_fraction * candidate.depth + drift) continue;
+      if (apart > kMostLoopApart * candidate.depth + drift) continue;
       if (!LookTheSameWay(candidate.T_world_camera, query.T_world_camera)) continue;
       near.emplace_back(apart, candidate.id);
     }

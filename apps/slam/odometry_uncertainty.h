@@ -9,6 +9,9 @@
 
 namespace tutti {
 
+/// One camera: standard deviation of log(scale) from one keyframe to the next, in the pose graph.
+inline constexpr double kOdometrySigmaScale = 0.005;
+
 /// Standard deviations of the random walk that explains by how much the images contradict the odometry's
 /// steps. The contradiction over 1, 2, 4, 8 and 16 keyframes is looked at, so that errors which go on for a
 /// while (a heading or a scale that is off) count as what they become; the largest of these counts. Medians:

@@ -106,7 +106,7 @@ TEST(Config, WrongTypesAreRefusedWithTheirLine) {
   EXPECT_THAT(Message("run:\n  threads: two\n"), AllOf(HasSubstr("my.yaml:2:"), HasSubstr("whole number")));
   EXPECT_THAT(Message("run:\n  threads: 1.5\n"), HasSubstr("my.yaml:2:"));
   EXPECT_THAT(Message("run:\n  loops: maybe\n"), HasSubstr("true or false"));
-  EXPECT_THAT(Message("run:\n  loop_agree_deg: .nan\n"), HasSubstr("finite number"));
+  EXPECT_THAT(Message("run:\n  loop_min_age_s: .nan\n"), HasSubstr("finite number"));
   EXPECT_THAT(Message("loops:\n  seed: -3\n"), HasSubstr("not negative"));
   EXPECT_THAT(Message("dataset:\n  sensor: sonar\n"), HasSubstr("mono, stereo, rgbd"));
   EXPECT_THAT(Message("loops:\n  members: surf\n"), HasSubstr("list"));

@@ -66,7 +66,7 @@ CameraRig Rig(Sensor sensor) {
 
 LoopConstraint Mono(const Similarity& S) {
   const Views views(S);
-  return MakeLoopConstraint(Verification(), views.candidate, views.query, Rig(Sensor::kMono), SlamOptions(),
+  return MakeLoopConstraint(Verification(), views.candidate, views.query, Rig(Sensor::kMono),
                             LoopDetectorOptions());
 }
 
@@ -93,12 +93,12 @@ TEST(LoopConstraint, KeyframesWithoutCommonLandmarksGiveNone) {
   Views views(Similarity(1.0, Eigen::Quaterniond::Identity(), {0, 0, 1}));
   views.query.points.assign(kLandmarks, Eigen::Vector3d::Constant(std::nan("")));
   const LoopConstraint found = MakeLoopConstraint(Verification(), views.candidate, views.query,
-                                                  Rig(Sensor::kMono), SlamOptions(), LoopDetectorOptions());
+                                                  Rig(Sensor::kMono), LoopDetectorOptions());
   EXPECT_FALSE(found.usable);
   EXPECT_THAT(found.reason, HasSubstr("only 0 of its matches are landmarks"));
   views.candidate.points.assign(kLandmarks, Eigen::Vector3d::Constant(std::nan("")));
   EXPECT_FALSE(MakeLoopConstraint(Verification(), views.candidate, views.query, Rig(Sensor::kMono),
-                                  SlamOptions(), LoopDetectorOptions())
+                                  LoopDetectorOptions())
                    .usable);
 }
 
@@ -109,7 +109,7 @@ TEST(LoopConstraint, MetricSensorsTakeTheVerifiedTransform) {
   verification.S_candidate_query = Similarity(1.0, ExpSO3({0, 0.1, 0}), {0.1, 0.2, 0.3});
   verification.information = 1e4 * Matrix6d::Identity();
   const auto make = [&] {
-    return MakeLoopConstraint(verification, views.candidate, views.query, Rig(Sensor::kRgbd), SlamOptions(),
+    return MakeLoopConstraint(verification, views.candidate, views.query, Rig(Sensor::kRgbd),
                               LoopDetectorOptions());
   };
   const LoopConstraint found = make();
@@ -126,7 +126,7 @@ TEST(LoopConstraint, MetricSensorsMeasureWhatWasVerifiedWithoutDepthByTheMapsLan
   verification.type = ConstraintType::kEssential;
   verification.S_candidate_query = Similarity(1.0, S.rotation, S.translation.normalized());
   const auto make = [&] {
-    return MakeLoopConstraint(verification, views.candidate, views.query, Rig(Sensor::kStereo), SlamOptions(),
+    return MakeLoopConstraint(verification, views.candidate, views.query, Rig(Sensor::kStereo),
                               LoopDetectorOptions());
   };
   const LoopConstraint found = make();

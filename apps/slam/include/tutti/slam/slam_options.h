@@ -22,10 +22,6 @@ struct SlamOptions {
                "a candidate that is not this much older than the query is no loop, but where the images show "
                "surely that the local map is torn",
                Unit("s"), From(0));
-  TUTTI_OPTION(double, loop_apart_fraction, 0.5,
-               "mono: cameras farther apart than this share of the median scene depth see too little in "
-               "common to fix a scale",
-               Above(0));
   TUTTI_OPTION(bool, loop_pose_prior, true,
                "stereo, RGB-D: the detector gets the odometry's position with each keyframe (PosePrior), "
                "and places out of reach lose");
@@ -33,15 +29,6 @@ struct SlamOptions {
                "verified loops that must agree before the map moves; 1: trust each alone", Basic(), From(1));
   TUTTI_OPTION(int, loop_confirmation_frames, 60,
                "and lie at most this many input frames apart, at both ends", Unit("frames"), From(1));
-  TUTTI_OPTION(double, loop_agree_fraction, 0.02,
-               "two loops agree if they close within this share of the median scene depth", Above(0));
-  TUTTI_OPTION(double, loop_agree_deg, 1.5, "and within this angle", Unit("deg"), Above(0));
-  TUTTI_OPTION(double, loop_agree_scale, 0.10, "mono: and within this |log of the scale ratio|", Above(0));
-  TUTTI_OPTION(double, loop_after_fraction, 0.08,
-               "a loop whose residual after optimisation is beyond this share of the median scene depth "
-               "contradicts the graph and is removed again",
-               Above(0));
-  TUTTI_OPTION(double, loop_after_deg, 3.0, "the same for its angle", Unit("deg"), Above(0));
   TUTTI_OPTION(double, loop_defer_fraction, 0.02,
                "a loop that the map fulfils within this share of the median scene depth enters the graph, "
                "but waits for the next correction to move the map",
@@ -56,20 +43,10 @@ struct SlamOptions {
                "test of the back end: inject so many false loops that look verified into the graph, one with "
                "every third keyframe, the rest at the end",
                From(0));
-  TUTTI_OPTION(int, covisibility_min_shared, 100,
-               "landmarks that two keyframes share to get an edge in the pose graph", From(10));
-  TUTTI_OPTION(int, covisibility_edges, 3, "at most so many of them for each keyframe, the strongest",
-               From(0));
   TUTTI_OPTION(double, odometry_sigma_deg, 0.1, "standard deviation of an odometry edge's rotation",
                Unit("deg"), Above(0));
   TUTTI_OPTION(double, odometry_sigma_fraction, 0.01,
                "of its translation, as a share of its length (plus 0.1 % of the depth)", Above(0));
-  TUTTI_OPTION(double, odometry_sigma_scale, 0.005, "mono: of log(scale)", Above(0));
-  TUTTI_OPTION(double, loop_sigma_deg, 0.3, "least standard deviation of a loop's rotation", Unit("deg"),
-               Above(0));
-  TUTTI_OPTION(double, loop_sigma_fraction, 0.01, "of its translation, as a share of the median scene depth",
-               Above(0));
-  TUTTI_OPTION(double, loop_sigma_scale, 0.02, "mono: of log(scale)", Above(0));
   TUTTI_OPTION(bool, global_adjustment, true,
                "after loops: fusion of the landmarks of both ends, and bundle adjustment of the whole map "
                "beside the tracking",

@@ -125,8 +125,7 @@ std::vector<int> LocalMapper::Neighbours(int id, int count, const Map& map) cons
 
 int LocalMapper::Triangulate(int id, Map* map) {
   const bool mono = rig_.sensor == Sensor::kMono;
-  const int neighbours =
-      mono ? options_.triangulation_neighbours : std::min(4, options_.triangulation_neighbours);
+  const int neighbours = mono ? 8 : 4;  // depths are measured: most landmarks are there already
   const std::vector<int>& seen = std::as_const(*map).keyframe(id).landmarks;
   auto known = std::count_if(seen.begin(), seen.end(), [](int l) { return l >= 0; });
   int made = 0;
@@ -195,10 +194,8 @@ void LocalMapper::Process(int id, Map* map, StageTimes* stages) {
   const ScopedStopwatch watch(stages, Lane::kMapping, "local_ba");
   BundleAdjustmentOptions ba;
   ba.keyframes = options_.ba_keyframes;
-  ba.fixed_keyframes = options_.ba_fixed_keyframes;
   ba.kept_keyframes = kept_keyframes_;
   ba.kept_landmarks = kept_landmarks_;
-  ba.iterations = options_.ba_iterations;
   ba.pixel_sigma = options_.pixel_sigma;
   ba.metric = rig_.sensor != Sensor::kMono;
   ba.only_aligned = !ba.metric;

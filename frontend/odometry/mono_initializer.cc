@@ -56,7 +56,6 @@ bool MonoInitializer::Offer(const TrackedFrame& frame, int piece, const Pose& T_
   }
   TwoViewOptions options;
   options.pixel_sigma = options_.pixel_sigma;
-  options.min_parallax_deg = options_.min_parallax_deg;
   const TwoViewResult view = EstimateTwoView(rig_.camera, first, second, options);
   if (!view.success) {
     // Views that have drifted far apart only get worse.

@@ -12,16 +12,17 @@
 namespace tutti {
 namespace {
 
-constexpr int kMinProjected = 20;        // matches by projection below which the search is widened
-constexpr double kAlikeShare = 0.25;     // of what the last frame saw, whose patches agree with a motion
-constexpr int kMinInKeyframe = 15;       // matches with a keyframe that may show the same place
-constexpr int kMinGuess = 10;            // inliers of a guess
-constexpr int kRecentKeyframes = 10;     // that a frame without a pose is compared with
-constexpr double kSameGuess = 1.0;       // guesses that differ by less in the image are one [px]
-constexpr double kSurePrediction = 0.5;  // a velocity is likely to hold for so long [s]
-constexpr double kLeastShare = 0.14;     // of the landmarks in view that must be found again;
-constexpr double kSureShare = 0.2;       // with so many nothing else needs to be tried
-constexpr double kShareForAJump = 0.5;   // and with so many the motion so far may be wrong
+constexpr int kMinProjected = 20;            // matches by projection below which the search is widened
+constexpr double kAlikeShare = 0.25;         // of what the last frame saw, whose patches agree with a motion
+constexpr int kMinInKeyframe = 15;           // matches with a keyframe that may show the same place
+constexpr int kMinGuess = 10;                // inliers of a guess
+constexpr int kRecentKeyframes = 10;         // that a frame without a pose is compared with
+constexpr std::size_t kLocalKeyframes = 40;  // whose landmarks are looked for in a frame
+constexpr double kSameGuess = 1.0;           // guesses that differ by less in the image are one [px]
+constexpr double kSurePrediction = 0.5;      // a velocity is likely to hold for so long [s]
+constexpr double kLeastShare = 0.14;         // of the landmarks in view that must be found again;
+constexpr double kSureShare = 0.2;           // with so many nothing else needs to be tried
+constexpr double kShareForAJump = 0.5;       // and with so many the motion so far may be wrong
 
 // Keyframe with most votes by the landmarks seen (ties: the newest); -1 if there is none.
 int MostVoted(const std::map<int, int>& votes) {
@@ -211,12 +212,11 @@ std::vector<int> PoseSearch::LocalLandmarks(const Map& map, const PoseFix& fix,
   order.reserve(votes.size());
   for (const auto& [id, count] : votes) order.emplace_back(-count, -id);
   std::sort(order.begin(), order.end());
-  const std::size_t limit = static_cast<std::size_t>(options_.local_keyframes);
   for (const auto& [count, id] : order) {
-    if (local.size() < limit) local.push_back(-id);
+    if (local.size() < kLocalKeyframes) local.push_back(-id);
   }
   for (int near : map.BestCovisible(fix.reference, 10, 15)) {
-    if (local.size() < limit && std::find(local.begin(), local.end(), near) == local.end())
+    if (local.size() < kLocalKeyframes && std::find(local.begin(), local.end(), near) == local.end())
       local.push_back(near);
   }
   const std::vector<int> candidates = map.LandmarksOf(local);

@@ -102,6 +102,10 @@ RunConfig ChangedConfig() {
   return config;
 }
 
+TEST(ConfigKeys, ThereAreFewEnoughToRead) {
+  EXPECT_LE(DescribeConfig(PlainConfig()).size(), 150u) << "a key that only a study varies is a constant";
+}
+
 TEST(ConfigKeys, EveryKeyIsReadAsItIsShown) {
   const RunConfig plain = PlainConfig(), changed = ChangedConfig(),
                   read = ParseConfig(FileOf(changed), "my.yaml");
@@ -161,8 +165,8 @@ TEST(ConfigKeys, EveryNumberOutOfItsRangeIsRefusedWithLineKeyAndRange) {
   const auto too_large = [](const OptionText& text, double) {
     return text.has_most ? std::optional<double>(text.most + (text.most_included ? 1 : 0)) : std::nullopt;
   };
-  EXPECT_GT(WithEachNumberAt(too_small, ExpectRefusedInItsLine), 100);
-  EXPECT_GT(WithEachNumberAt(too_large, ExpectRefusedInItsLine), 30);
+  EXPECT_GT(WithEachNumberAt(too_small, ExpectRefusedInItsLine), 80);
+  EXPECT_GT(WithEachNumberAt(too_large, ExpectRefusedInItsLine), 25);
 }
 
 TEST(ConfigKeys, NoNumberOfACallerMayBeNan) {
@@ -173,7 +177,7 @@ TEST(ConfigKeys, NoNumberOfACallerMayBeNan) {
     const std::string message = testing::ErrorOf([&] { SetOptions({}, config); });
     EXPECT_THAT(message, AllOf(HasSubstr(option.name), HasSubstr("not nan")));
   });
-  EXPECT_GT(checked, 60);
+  EXPECT_GT(checked, 50);
 }
 
 TEST(ConfigKeys, HelpShowsEveryBasicKeyOnce) {
@@ -190,8 +194,8 @@ TEST(ConfigKeys, HelpShowsEveryBasicKeyOnce) {
     EXPECT_EQ(shown, entry.advanced ? 0 : 1) << entry.section << "." << entry.name;
     basic += entry.advanced ? 0 : 1;
   }
-  EXPECT_GE(basic, 40);
-  EXPECT_LE(basic, 54);
+  EXPECT_GE(basic, 35);
+  EXPECT_LE(basic, 45) << "what users set; a key more is to replace one";
 }
 
 }  // namespace

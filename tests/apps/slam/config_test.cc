@@ -286,7 +286,7 @@ TEST(Config, HelpWritesNumbersOutUnlessTheyAreTinyOrHuge) {
 TEST(Config, HelpShowsWhatUsersSetAndAllWhenAsked) {
   const auto lines = [](const std::string& text) { return std::count(text.begin(), text.end(), '\n'); };
   EXPECT_LT(lines(HelpConfig(false)), 80);
-  EXPECT_GT(lines(HelpConfig(true)), 150);
+  EXPECT_GT(lines(HelpConfig(true)), 120);
   EXPECT_THAT(HelpConfig(false),
               AllOf(HasSubstr("  fx: "), HasSubstr("  members: "), HasSubstr("--advanced")));
   EXPECT_THAT(HelpConfig(false), Not(HasSubstr("hypothesis_ratio")));

@@ -41,17 +41,15 @@ struct OdometryOptions {
                "its map's scale by it; without such a ground nothing happens");
 
   // Tracking.
-  TUTTI_OPTION(double, pixel_sigma, 1.0, "standard deviation of a keypoint at pyramid level 0", Basic(),
-               Unit("px"), Above(0));
+  TUTTI_OPTION(double, pixel_sigma, 1.0, "standard deviation of a keypoint at pyramid level 0", Unit("px"),
+               Above(0));
   TUTTI_OPTION(double, aligned_sigma, 0.5,
                "standard deviation of a keypoint whose position was aligned with its landmark's patch, "
                "relative to a corner's",
                Above(0), To(1));
-  TUTTI_OPTION(int, min_inliers, 20, "fewer landmarks that agree with the pose: the frame is lost", Basic(),
-               From(8));
+  TUTTI_OPTION(int, min_inliers, 20, "fewer landmarks that agree with the pose: the frame is lost", From(8));
   TUTTI_OPTION(double, relocalize_s, 0.5,
                "lost for longer than this, with something to see: start a new submap", Unit("s"), From(0));
-  TUTTI_OPTION(int, local_keyframes, 40, "keyframes whose landmarks are searched in a frame", From(1));
 
   // Keyframes.
   TUTTI_OPTION(double, keyframe_inlier_ratio, 0.75,
@@ -72,16 +70,11 @@ struct OdometryOptions {
                "what mapping makes of a keyframe enters so many frames later, and is waited for then; more "
                "suits fast cameras with depth, mono needs its new landmarks at once",
                Unit("frames"), From(0));
-  TUTTI_OPTION(int, triangulation_neighbours, 8, "mono: keyframes with which new landmarks are triangulated",
-               From(1));
-  TUTTI_OPTION(double, min_parallax_deg, 1.0, "mono initialisation: median parallax", Unit("deg"), Above(0));
   TUTTI_OPTION(double, max_direction_sigma_deg, 2.5,
                "mono initialisation: standard deviation of the direction in which the camera moved between "
                "the two views; where it is large, a turn and a sideways step look the same",
                Unit("deg"), Above(0));
   TUTTI_OPTION(int, ba_keyframes, 12, "keyframes that local bundle adjustment moves", From(2));
-  TUTTI_OPTION(int, ba_fixed_keyframes, 20, "keyframes that hold the window in place", From(0));
-  TUTTI_OPTION(int, ba_iterations, 6, "most iterations of a local bundle adjustment", From(1));
   TUTTI_OPTIONS_END;
 
   /// Empty if usable, else what is wrong and with which key.

@@ -64,7 +64,7 @@ struct ExtractionOptions {
   TUTTI_OPTION(int, max_pixels, 1 << 19,
                "images with more pixels are scaled down before anything else, so that no camera costs more "
                "than this",
-               Basic(), Unit("px"), From(1 << 12));
+               Unit("px"), From(1 << 12));
   TUTTI_OPTIONS_END;
 };
 
@@ -150,14 +150,13 @@ struct DnnOptions {
   TUTTI_OPTION(int, height, 240, "of the image that the network gets", Basic(), Unit("px"), From(16),
                To(4096));
   TUTTI_OPTION(ChannelValues, mean, ChannelValues({123.675, 116.28, 103.53}),
-               "subtracted from each channel, in the order that the network has them", Basic(),
+               "subtracted from each channel, in the order that the network has them",
                Unit("grey levels of 255"), From(-1000), To(1000));
-  TUTTI_OPTION(double, scale, 1.0 / 255.0, "and then each is multiplied by this", Basic(), Above(0),
+  TUTTI_OPTION(double, scale, 1.0 / 255.0, "and then each is multiplied by this", Above(0), To(1000));
+  TUTTI_OPTION(ChannelValues, stddev, ChannelValues({0.229, 0.224, 0.225}), "and divided by this", Above(0),
                To(1000));
-  TUTTI_OPTION(ChannelValues, stddev, ChannelValues({0.229, 0.224, 0.225}), "and divided by this", Basic(),
-               Above(0), To(1000));
   TUTTI_OPTION(bool, swap_rb, true,
-               "the network takes red, green, blue; false: blue, green, red, as OpenCV has them", Basic());
+               "the network takes red, green, blue; false: blue, green, red, as OpenCV has them");
   TUTTI_OPTION(std::string, layer, "",
                "whose output is the descriptor, as the ONNX file names it; empty: the network's only output");
   TUTTI_OPTIONS_END;
@@ -190,7 +189,7 @@ struct LoopDetectorOptions {
                From(0), To(1));
   TUTTI_OPTION(int, stm_size, 10, "locations in short-term memory, no candidates", From(1));
   TUTTI_OPTION(int, threads, 2, "most threads that the detector uses at once", From(1));
-  TUTTI_OPTION(std::uint64_t, seed, 1, "of kd-forests and RANSAC", Basic());
+  TUTTI_OPTION(std::uint64_t, seed, 1, "of kd-forests and RANSAC");
   TUTTI_OPTION(double, bad_signature_ratio, 0.2,
                "a member abstains below this share of its mean number of features", From(0), To(1));
   TUTTI_OPTION(bool, ignore_bad_signatures, false,

@@ -14,7 +14,7 @@ struct SlamOptions {
   TUTTI_OPTION(int, threads, 2, "most threads; the result is the same for any number", Basic(), From(1),
                To(256));
   TUTTI_OPTION(int, loop_delay_frames, 10,
-               "a detection enters this many frames after its keyframe, and is waited for then", Basic(),
+               "a detection enters this many frames after its keyframe, and is waited for then",
                Unit("frames"), From(1));
   TUTTI_OPTION(int, loop_every_keyframes, 1, "every n-th keyframe is searched", From(1));
   TUTTI_OPTION(double, loop_min_interval_s, 0.25, "and no more often than this", Unit("s"), From(0));

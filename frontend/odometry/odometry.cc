@@ -75,7 +75,8 @@ void Odometry::Append(const Odometry& other, std::int64_t frame_offset) {
   const std::string problem = OtherCameraProblem(impl_->rig(), other.impl_->rig(), impl_->map().scales());
   if (!problem.empty()) throw InputError(problem);
   if (impl_->map().scales() != other.impl_->map().scales())
-    throw InputError("the two maps have other image pyramids (odometry.levels, odometry.scale_factor)");
+    throw InputError(
+        "the two maps have other image pyramids (odometry.pyramid_levels, odometry.scale_factor)");
   Odometry joined(impl_->options(), impl_->rig());
   impl_->EnterMapping();
   joined.impl_->GoOn(*impl_, frame_offset);

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "tutti/backend/pose_graph.h"
 
 namespace tutti {

@@ -18,7 +18,7 @@ constexpr int kPlace = 10;                                    // that it looks l
 // A path of images; the last ones look more or less like the path from kPlace on.
 class SecondWordTest : public ::testing::Test {
  protected:
-  SecondWordTest() : transition_(0.9), memory_(10), views_(kPathLength) {
+  SecondWordTest() : memory_(10), views_(kPathLength) {
     for (int i = 0; i < kPathLength; ++i) {
       views_[static_cast<std::size_t>(i)].id = i;
       memory_.Add(i);

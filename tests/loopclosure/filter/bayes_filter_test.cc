@@ -20,7 +20,7 @@ class BayesFilterTest : public ::testing::Test {
     return likelihood;
   }
   LocationMemory memory_{1};
-  TransitionModel model_{0.9};
+  TransitionModel model_;
   BayesFilter filter_;
 };
 

@@ -19,7 +19,7 @@ constexpr double kToStayNew = 0.9;
 // A chain of kChain locations, and as many images with random likelihoods as one waits for, and one before.
 class HindsightTest : public ::testing::Test {
  protected:
-  HindsightTest() : transition_(kToStayNew), memory_(1) {
+  HindsightTest() : memory_(1) {
     for (int i = 0; i <= kChain; ++i) {
       memory_.Add(i);
       transition_.Update(memory_, memory_.Settle());

@@ -207,9 +207,9 @@ TEST_F(SavedDetector, OtherFilesVersionsAndMembersAreRefused) {
   WriteContent(folder_ / "text", "this is no detector at all");
   EXPECT_NE(RefusedFile(folder_ / "text").find("is no saved loop detector"), std::string::npos);
   std::string newer = bytes;
-  newer[8] = 9;
+  ++newer[8];
   WriteContent(folder_ / "newer", newer);
-  EXPECT_NE(RefusedFile(folder_ / "newer").find("version 9"), std::string::npos);
+  EXPECT_NE(RefusedFile(folder_ / "newer").find("version " + std::to_string(newer[8])), std::string::npos);
 
   LoopDetectorOptions options = BoundedOptions();
   options.members = {"orb"};

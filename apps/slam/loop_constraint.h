@@ -32,8 +32,8 @@ struct LoopConstraint {
 /// Metric sensors: the rigid transform of the verification, or where that had no depths the one of the
 /// landmarks that both keyframes see (VerifyLandmarks). Mono: the similarity between the landmarks of the two
 /// keyframes as the map has them now (more and better ones than when the keyframe was new), over the features
-/// that the verification matched. The covariance is the verification's plus a floor: matched points of one
-/// scene share their errors, so inliers alone promise too much. Fills everything of the edge but `record`.
+/// that the verification matched. The covariance is the verification's plus the floor above. Fills everything
+/// of the edge but `record`.
 LoopConstraint MakeLoopConstraint(const Verification& verification, const KeyframeView& candidate,
                                   const KeyframeView& query, const CameraRig& rig,
                                   const LoopDetectorOptions& detector);

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "core/index.h"
 #include "loopclosure/detector/ensemble.h"
 #include "loopclosure/detector/place_reasoner.h"
 #include "loopclosure/detector/query_check.h"
@@ -66,7 +67,6 @@ class DetectorState {
   void CheckMemories(const std::string& source) const;
 
  private:
-  static std::size_t Index(int i) { return static_cast<std::size_t>(i); }
   View& At(int slot);
 
   LoopDetectorOptions options_;

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/index.h"
 #include "loopclosure/detector/hypothesis_search.h"
 #include "loopclosure/detector/second_word.h"
 #include "loopclosure/filter/combination.h"
@@ -85,7 +86,6 @@ class PlaceReasoner {
   void LoadStatistics(ByteReader& in);
 
  private:
-  static std::size_t Index(int i) { return static_cast<std::size_t>(i); }
   void ForEachUnit(const std::function<void(MemorySystem&, std::size_t)>& call);
   CandidateEvidence EvidenceAt(int slot, const std::vector<double>& scores, const PlaceFilter& filter) const;
   void FillOpinion(std::size_t member, const CombinedBelief& combined, MemberOpinion& opinion) const;

@@ -9,6 +9,8 @@
 
 namespace tutti {
 
+using internal::Index;
+
 int LocationMemory::Add(std::int64_t id) {
   const int slot = size();
   nodes_.push_back({id, State::kShortTerm, 0, 0, {}});

@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/index.h"
+
 namespace tutti {
 
 namespace internal {
@@ -127,13 +129,13 @@ class LocationMemory {
   /// Slots in STM, ascending; the newest location last.
   const std::deque<int>& short_term_memory() const { return short_term_; }
   /// Where a slot is. This and the next three: `slot` in 0 .. size() - 1.
-  State state(int slot) const { return nodes_[Index(slot)].state; }
+  State state(int slot) const { return nodes_[internal::Index(slot)].state; }
   /// A slot's links to others, in the order in which they were added.
-  const std::vector<Link>& links(int slot) const { return nodes_[Index(slot)].links; }
+  const std::vector<Link>& links(int slot) const { return nodes_[internal::Index(slot)].links; }
   /// How often a place was seen: the locations that rehearsal or a loop merged into it.
-  int weight(int slot) const { return nodes_[Index(slot)].weight; }
+  int weight(int slot) const { return nodes_[internal::Index(slot)].weight; }
   /// The caller's id of a slot.
-  std::int64_t id(int slot) const { return nodes_[Index(slot)].id; }
+  std::int64_t id(int slot) const { return nodes_[internal::Index(slot)].id; }
   /// Slots ever added, whatever has become of them.
   int size() const { return static_cast<int>(nodes_.size()); }
   /// Slot of a caller's id, -1 if there is none.
@@ -153,7 +155,6 @@ class LocationMemory {
     std::vector<Link> links;
   };
   LinkType Bounded(int a, int b, LinkType type) const;
-  static std::size_t Index(int slot) { return static_cast<std::size_t>(slot); }
   int Drop(int weight);
   void PassOn(int slot, int into, int weight);
   void Enter(int slot);

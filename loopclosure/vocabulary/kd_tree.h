@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/byte_stream.h"
+#include "core/index.h"
 #include "loopclosure/features/distances.h"
 #include "loopclosure/vocabulary/chunked_vector.h"
 #include "loopclosure/vocabulary/descriptor_index.h"
@@ -167,7 +168,6 @@ class KdTree {
     std::vector<Branch> branches;  // not taken; the nearest last, and no more than may still be taken
   };
 
-  static std::size_t Index(int i) { return static_cast<std::size_t>(i); }
   static bool IsLeaf(const Node& node) { return node.dimension < 0; }
   Node& At(int node) { return nodes_[Index(node)]; }
   const Node& At(int node) const { return nodes_[Index(node)]; }

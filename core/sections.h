@@ -12,7 +12,7 @@ enum class Section : std::uint32_t {
   kLandmarks,         ///< so many together
   kTracking,          ///< all that is no map
   kTimes,             ///< milliseconds by stage, the only thing that varies from run to run
-  kGlobalAdjustment,  ///< GlobalAdjustment::SaveSections
+  kGlobalAdjustment,  ///< OdometryFile
   kImage,             ///< of the keyframe that follows, if it has it still
   kEndOfOdometry = 199
 };

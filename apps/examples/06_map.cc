@@ -34,8 +34,8 @@ void MakeMap(const tutti::RunConfig& config, const tutti::Dataset& dataset, std:
   }
   slam.Finish();  // what the loop detector is still at enters the map
   slam.Save(map);
-  std::printf("map of %zu frames: %zu keyframes, %zu loops\n", end, slam.odometry()->KeyframeIds().size(),
-              tutti::CountAccepted(slam.loops()));
+  std::printf("map of %zu frames: %zu keyframes, %zu loops\n", end,
+              slam.odometry()->map().KeyframeIds().size(), tutti::CountAccepted(slam.loops()));
 }
 
 void PrintFrame(std::size_t i, const tutti::TrackResult& now, const tutti::Odometry& odometry) {
@@ -45,10 +45,10 @@ void PrintFrame(std::size_t i, const tutti::TrackResult& now, const tutti::Odome
   }
   const Eigen::Vector3d& p = now.T_world_camera.translation;
   std::printf("frame %zu: %.3f %.3f %.3f, %d landmarks", i, p.x(), p.y(), p.z(), now.inliers);
-  if (const std::optional<tutti::Matrix6d> covariance = odometry.PoseCovariance())
+  if (const std::optional<tutti::Matrix6d> covariance = PoseCovariance(odometry))
     std::printf(", sigma %.3f", std::sqrt(covariance->topLeftCorner<3, 3>().trace()));
   // Where the map shows too little of what is in view, the odometry goes on by itself, and drifts.
-  std::printf("%s\n", odometry.BeyondMap() ? " (beyond the map)" : "");
+  std::printf("%s\n", odometry.LastView().beyond_map ? " (beyond the map)" : "");
 }
 
 // Returns how many frames from `first` on were found in the map.

@@ -10,13 +10,13 @@ namespace tutti {
 namespace {
 
 // Landmarks that can be exported, by id; the number of observations is counted from 0.
-std::map<int, ModelLandmark> FiniteLandmarks(const Odometry& odometry) {
+std::map<int, ModelLandmark> FiniteLandmarks(const Map& map) {
   std::map<int, ModelLandmark> landmarks;
-  for (const LandmarkView& landmark : odometry.Landmarks()) {
-    if (!landmark.position.allFinite()) continue;
-    ModelLandmark& out = landmarks[landmark.id];
-    out.id = landmark.id;
-    out.position = landmark.position;
+  for (const int id : map.LandmarkIds()) {
+    if (!map.landmark(id).position.allFinite()) continue;
+    ModelLandmark& out = landmarks[id];
+    out.id = id;
+    out.position = map.landmark(id).position;
   }
   return landmarks;
 }
@@ -24,23 +24,24 @@ std::map<int, ModelLandmark> FiniteLandmarks(const Odometry& odometry) {
 }  // namespace
 
 MapModel ModelOf(const Odometry& odometry, const PoseGraph& graph, const FrameRange& frames) {
-  const std::vector<int> pieces = odometry.Pieces();
+  const std::vector<int> pieces = FramePieces(odometry.map());
   if (pieces.empty()) throw InputError("the map is empty: no frame has a pose; there is nothing to export");
   MapModel model;
-  model.camera = odometry.Rig().camera;
-  if (const std::optional<LensFound> lens = odometry.Lens(); lens && !lens->steps.empty())
+  model.camera = odometry.map().rig().camera;
+  if (const std::optional<LensFound> lens = odometry.Report().lens; lens && !lens->steps.empty())
     model.lens = {lens->steps.back().k1, lens->steps.back().k2};
   model.graph = graph;
-  model.trajectory = BodyTrajectory(odometry.FrameTrajectory(pieces.front(), frames), odometry.Rig());
+  model.trajectory =
+      BodyTrajectory(FrameTrajectory(odometry.map(), pieces.front(), frames), odometry.map().rig());
   std::stable_sort(model.trajectory.begin(), model.trajectory.end(),
                    [](const StampedPose& a, const StampedPose& b) { return a.stamp_s < b.stamp_s; });
-  std::map<int, ModelLandmark> landmarks = FiniteLandmarks(odometry);
-  for (const int id : odometry.KeyframeIds()) {
-    if (odometry.KeyframePiece(id) != pieces.front()) {
+  std::map<int, ModelLandmark> landmarks = FiniteLandmarks(odometry.map());
+  for (const int id : odometry.map().KeyframeIds()) {
+    if (odometry.map().keyframe(id).piece != pieces.front()) {
       ++model.other_keyframes;
       continue;
     }
-    const KeyframeView view = odometry.Keyframe(id);
+    const KeyframeView view = ViewOf(odometry.map(), id);
     if (!view.T_world_camera.IsFinite()) continue;
     const Pose T_camera_world = view.T_world_camera.Inverse();
     ModelKeyframe keyframe{id, view.frame_index, view.stamp_s, view.T_world_camera, {}};

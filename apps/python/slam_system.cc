@@ -59,18 +59,18 @@ auto WithOdometry(Slam& slam, Work work) {
 py::array_t<double> KeyframeTrajectory(Slam& slam) {
   return ArrayOf(WithOdometry(slam, [](const Odometry& odometry) {
     Trajectory trajectory;
-    for (const int id : odometry.KeyframeIds())
-      trajectory.push_back({odometry.KeyframeStamp(id), odometry.KeyframePose(id)});
+    for (const int id : odometry.map().KeyframeIds())
+      trajectory.push_back({odometry.map().keyframe(id).stamp_s, odometry.map().keyframe(id).T_world_camera});
     return trajectory;
   }));
 }
 
 KeyframeView Keyframe(Slam& slam, int id) {
   return WithOdometry(slam, [id](const Odometry& odometry) {
-    const std::vector<int> ids = odometry.KeyframeIds();
+    const std::vector<int> ids = odometry.map().KeyframeIds();
     if (!std::binary_search(ids.begin(), ids.end(), id))
       throw py::index_error("there is no keyframe " + std::to_string(id));
-    return odometry.Keyframe(id);
+    return ViewOf(odometry.map(), id);
   });
 }
 
@@ -84,7 +84,7 @@ py::array_t<double> PointsOf(const std::vector<Eigen::Vector3d>& points) {
 py::array_t<double> Landmarks(Slam& slam) {
   return PointsOf(WithOdometry(slam, [](const Odometry& odometry) {
     std::vector<Eigen::Vector3d> points;
-    for (const LandmarkView& landmark : odometry.Landmarks()) points.push_back(landmark.position);
+    for (const int id : odometry.map().LandmarkIds()) points.push_back(odometry.map().landmark(id).position);
     return points;
   }));
 }
@@ -221,18 +221,21 @@ void BindSlamSystem(py::module_& module) {
       .def(
           "trajectory",
           [](Slam& slam, int piece) {
-            return ArrayOf(WithOdometry(slam, [&](const Odometry& o) { return o.FrameTrajectory(piece); }));
+            return ArrayOf(
+                WithOdometry(slam, [&](const Odometry& o) { return FrameTrajectory(o.map(), piece); }));
           },
           "piece"_a = -1,
-          (std::string("(N, 8): stamp [s], x, y, z [m], qx, qy, qz, qw. ") + doc::Odometry_FrameTrajectory)
+          (std::string("(N, 8): stamp [s], x, y, z [m], qx, qy, qz, qw. ") + doc::FrameTrajectory)
               .c_str())
       .def("keyframe_trajectory", &KeyframeTrajectory,
            "(N, 8), as trajectory: of all keyframes, in the order of keyframe_ids.")
-      .def("keyframe", &Keyframe, "id"_a, doc::Odometry_Keyframe)
+      .def("keyframe", &Keyframe, "id"_a, doc::ViewOf)
       .def_property_readonly(
           "keyframe_ids",
-          [](Slam& slam) { return WithOdometry(slam, [](const Odometry& o) { return o.KeyframeIds(); }); },
-          doc::Odometry_KeyframeIds)
+          [](Slam& slam) {
+            return WithOdometry(slam, [](const Odometry& o) { return o.map().KeyframeIds(); });
+          },
+          doc::Map_KeyframeIds)
       .def("landmarks", &Landmarks, "(N, 3) float64: points of the map in the world [m], by id.")
       .def_property_readonly(
           "loops", [](Slam& slam) { return slam.Run([](System& s) { return s->loops(); }); },

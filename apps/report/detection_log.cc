@@ -113,16 +113,16 @@ void DetectionLog::OnDetection(const LoopResult& result) {
 void DetectionLog::OnEnd(const RunState& state) {
   landmarks_.clear();
   if (state.odometry == nullptr) return;
-  const Odometry& map = *state.odometry;
-  const std::vector<int> pieces = map.Pieces();
+  const Map& map = state.odometry->map();
+  const std::vector<int> pieces = FramePieces(map);
   std::set<int> seen;  // by keyframes of the largest piece, if there are others
   for (const int id : map.KeyframeIds()) {
-    if (pieces.size() < 2 || map.KeyframePiece(id) != pieces.front()) continue;
-    for (const int landmark : map.Keyframe(id).landmarks) seen.insert(landmark);
+    if (pieces.size() < 2 || map.keyframe(id).piece != pieces.front()) continue;
+    for (const int landmark : map.keyframe(id).landmarks) seen.insert(landmark);
   }
   std::vector<Eigen::Vector3d> all;
-  for (const LandmarkView& landmark : map.Landmarks()) {
-    if (pieces.size() < 2 || seen.count(landmark.id) > 0) all.push_back(landmark.position);
+  for (const int id : map.LandmarkIds()) {
+    if (pieces.size() < 2 || seen.count(id) > 0) all.push_back(map.landmark(id).position);
   }
   all = WithoutFarOnes(all);
   const std::size_t count = std::min(all.size(), kMostLandmarks);

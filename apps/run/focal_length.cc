@@ -39,7 +39,7 @@ constexpr int kFewestFeatures = 500;  // of an image; half of those of the run d
 constexpr std::size_t kMostLandmarks = 3000;
 constexpr std::size_t kCheckedKeyframes = 40, kCheckedLandmarks = 800;
 
-struct Observation {
+struct Measurement {
   int keyframe = 0, landmark = 0;  // places in Scene
   Eigen::Vector2d offset;          // from the principal point [px]
   double depth = 0;                // [m]; 0: not measured
@@ -50,7 +50,7 @@ struct Observation {
 struct Scene {
   std::vector<std::array<double, 6>> cameras;  // angle-axis and translation, camera from world
   std::vector<Eigen::Vector3d> landmarks;
-  std::vector<Observation> observations;
+  std::vector<Measurement> observations;
   std::array<double, 4> lens = {{0, 0, 0, 0}};  // log of the focal length [px], k1, move of the centre [px]
   double width = 0;
   double lens_sigma = kLensSigma;
@@ -108,7 +108,7 @@ struct Fit {
 // Adjusts the scene; `fixed_focal`: all but the focal length.
 Fit Adjust(Scene& scene, bool fixed_focal) {
   ceres::Problem problem;
-  for (const Observation& o : scene.observations) {
+  for (const Measurement& o : scene.observations) {
     double* const camera = scene.cameras[static_cast<std::size_t>(o.keyframe)].data();
     double* const landmark = scene.landmarks[static_cast<std::size_t>(o.landmark)].data();
     problem.AddResidualBlock(
@@ -143,7 +143,8 @@ std::vector<int> WhereItTurns(const Odometry& odometry, const std::vector<int>& 
   if (keyframes.size() <= most) return keyframes;
   std::vector<double> turned = {0};  // up to each keyframe
   for (std::size_t k = 1; k < keyframes.size(); ++k) {
-    const Pose before = odometry.KeyframePose(keyframes[k - 1]), here = odometry.KeyframePose(keyframes[k]);
+    const Pose before = odometry.map().keyframe(keyframes[k - 1]).T_world_camera,
+               here = odometry.map().keyframe(keyframes[k]).T_world_camera;
     turned.push_back(turned.back() + (before.Inverse() * here).Angle());
   }
   std::size_t best = 0;
@@ -162,29 +163,24 @@ std::optional<Scene> SceneOf(const Odometry& odometry, const std::vector<int>& k
   std::vector<KeyframeView> views;
   std::map<int, int> seen;
   for (const int id : keyframes) {
-    views.push_back(odometry.Keyframe(id));
+    views.push_back(ViewOf(odometry.map(), id));
     for (const int landmark : views.back().landmarks) ++seen[landmark];
   }
-  std::vector<LandmarkView> landmarks = odometry.Landmarks();
-  for (LandmarkView& landmark : landmarks) {
-    const auto found = seen.find(landmark.id);
-    landmark.observations = found == seen.end() ? 0 : found->second;
+  std::vector<std::pair<int, int>> landmarks;  // id, keyframes that see it
+  for (const auto& [id, count] : seen) {
+    if (id >= 0 && count >= 3 && odometry.map().landmark(id).position.allFinite())
+      landmarks.emplace_back(id, count);
   }
-  landmarks.erase(
-      std::remove_if(landmarks.begin(), landmarks.end(),
-                     [](const LandmarkView& l) { return l.observations < 3 || !l.position.allFinite(); }),
-      landmarks.end());
-  std::stable_sort(landmarks.begin(), landmarks.end(), [](const LandmarkView& a, const LandmarkView& b) {
-    return a.observations > b.observations;
-  });
+  std::stable_sort(landmarks.begin(), landmarks.end(),
+                   [](const auto& a, const auto& b) { return a.second > b.second; });
   if (landmarks.size() > most_landmarks) landmarks.resize(most_landmarks);
   Scene scene;
   std::map<int, int> place;
-  for (const LandmarkView& landmark : landmarks) {
-    place[landmark.id] = static_cast<int>(scene.landmarks.size());
-    scene.landmarks.push_back(landmark.position);
+  for (const auto& [id, count] : landmarks) {
+    place[id] = static_cast<int>(scene.landmarks.size());
+    scene.landmarks.push_back(odometry.map().landmark(id).position);
   }
-  const PinholeCamera& c = odometry.Rig().camera;
+  const PinholeCamera& c = odometry.map().rig().camera;
   for (const KeyframeView& view : views) {
     const Pose T_camera_world = view.T_world_camera.Inverse();
     for (std::size_t f = 0; f < view.landmarks.size(); ++f) {
@@ -193,7 +189,7 @@ std::optional<Scene> SceneOf(const Odometry& odometry, const std::vector<int>& k
       const auto at = static_cast<std::size_t>(found->second);
       if (!((T_camera_world * scene.landmarks[at]).z() > 0)) continue;
       const cv::Point2f pixel = view.keypoints[f].pt;
-      Observation o{static_cast<int>(scene.cameras.size()),
+      Measurement o{static_cast<int>(scene.cameras.size()),
                     found->second,
                     {double(pixel.x) - c.cx, (double(pixel.y) - c.cy) / aspect},
                     0,
@@ -213,7 +209,7 @@ std::optional<Scene> SceneOf(const Odometry& odometry, const std::vector<int>& k
     return std::nullopt;
   scene.given = std::log(std::sqrt(c.fx * c.fy / aspect));
   scene.lens = {{scene.given, 0, 0, 0}};
-  scene.stereo = odometry.Rig().sensor == Sensor::kStereo;
+  scene.stereo = odometry.map().rig().sensor == Sensor::kStereo;
   scene.width = c.width;
   return scene;
 }
@@ -370,7 +366,7 @@ FocalLength MeasureFocalLength(const fs::path& path, const RunConfig& config, in
 FocalLength FocalLengthOf(const Odometry& odometry, const FrameRange& session, double lens_sigma) {
   const double cpu_begin = ProcessCpuSeconds();
   FocalLength result;
-  result.camera = odometry.Rig().camera;
+  result.camera = odometry.map().rig().camera;
   const std::optional<Scene> scene = SceneOf(
       odometry, WhereItTurns(odometry, KeyframesOfLargestSubmap(odometry, session), kCheckedKeyframes),
       kCheckedLandmarks, result.camera.fy / result.camera.fx);

@@ -117,13 +117,13 @@ std::vector<PlotSeries> MapSeries(const RunState& state) {
     }
   }
   std::vector<int> pieces(count, -1);
-  for (const int id : state.odometry->KeyframeIds()) {
+  for (const int id : state.odometry->map().KeyframeIds()) {
     if (id >= state.end_of_map) break;
-    const std::size_t session = state.SessionOf(state.odometry->KeyframeFrameIndex(id));
+    const std::size_t session = state.SessionOf(state.odometry->map().keyframe(id).frame_index);
     std::vector<Eigen::Vector3d>& points = series[session].points;
-    const int piece = state.odometry->KeyframePiece(id);
+    const int piece = state.odometry->map().keyframe(id).piece;
     if (std::exchange(pieces[session], piece) != piece) points.emplace_back(Eigen::Vector3d::Constant(NAN));
-    points.push_back(state.odometry->KeyframePose(id).translation);
+    points.push_back(state.odometry->map().keyframe(id).T_world_camera.translation);
   }
   return series;
 }
@@ -132,7 +132,7 @@ std::vector<PlotSeries> MapSeries(const RunState& state) {
 TrajectoryPlot Picture(const LocalizationRequest& request, const RunState& state, const Localization& l) {
   TrajectoryPlot plot;
   plot.title = "Frames of " + request.dataset.filename().string() + " in " + request.map.filename().string();
-  plot.unit = state.odometry->Rig().sensor == Sensor::kMono ? "initial scale" : "m";
+  plot.unit = state.odometry->map().rig().sensor == Sensor::kMono ? "initial scale" : "m";
   PlotSeries located{"localized", {}, "#0072b2", 1.8, false},
       beyond{"beyond the map", {}, "#d55e00", 1.2, true};
   const Eigen::Vector3d gap = Eigen::Vector3d::Constant(NAN);
@@ -200,9 +200,9 @@ void LocateAll(const LocalizationRequest& request, const Dataset& dataset, const
     for (const auto& observer : request.observers) observer->OnFrame(frame, located.track, state);
     if (located.track.state == TrackingState::kTracking) {
       located.recognised = state.recognised;
-      located.beyond = slam.odometry()->BeyondMap();
-      if (!located.beyond) located.keyframe = slam.odometry()->ReferenceKeyframe();
-      located.covariance = slam.odometry()->PoseCovariance();
+      located.beyond = slam.odometry()->LastView().beyond_map;
+      if (!located.beyond) located.keyframe = slam.odometry()->LastView().keyframe;
+      located.covariance = PoseCovariance(*slam.odometry());
       result.trajectory.push_back({frame.stamp_s, located.track.T_world_camera * T_camera_body});
       if (!result.first_pose_s) result.first_pose_s = since.Seconds();
     }
@@ -232,7 +232,7 @@ Localization Localize(const LocalizationRequest& request) {
   result.masked = !options.mask.empty();
   const std::unique_ptr<SlamSystem> slam = OpenMap(request, info);
   result.load_s = since.Seconds();
-  result.map_keyframes = slam->odometry()->NextKeyframeId();
+  result.map_keyframes = slam->odometry()->map().KeyframeCount();
   const internal::Stopwatch watch;
   const double cpu = ProcessCpuSeconds();
   LocateAll(request, *dataset, since, *slam, result);

@@ -54,11 +54,12 @@ double ScaleJump(const std::vector<Step>& steps) {
 
 std::vector<int> KeyframesOfLargestSubmap(const Odometry& odometry, const FrameRange& session) {
   std::vector<int> keyframes;
-  const std::vector<int> submaps = odometry.Pieces(session);
+  const std::vector<int> submaps = FramePieces(odometry.map(), session);
   if (submaps.empty()) return keyframes;
-  for (const int id : odometry.KeyframeIds()) {
-    if (odometry.KeyframePiece(id) == submaps.front() && session.Has(odometry.KeyframeFrameIndex(id)) &&
-        odometry.KeyframePose(id).IsFinite())
+  for (const int id : odometry.map().KeyframeIds()) {
+    if (odometry.map().keyframe(id).piece == submaps.front() &&
+        session.Has(odometry.map().keyframe(id).frame_index) &&
+        odometry.map().keyframe(id).T_world_camera.IsFinite())
       keyframes.push_back(id);
   }
   return keyframes;
@@ -68,13 +69,15 @@ MapFigures MeasureMap(const Odometry& odometry, const FrameRange& session) {
   MapFigures figures;
   std::vector<KeyframeView> views;
   for (const int id : KeyframesOfLargestSubmap(odometry, session)) {
-    views.push_back(odometry.Keyframe(id));
+    views.push_back(ViewOf(odometry.map(), id));
     views.back().descriptors.release();
   }
   if (views.empty()) return figures;
   std::unordered_map<int, Sighting> landmarks;
-  for (const LandmarkView& l : odometry.Landmarks()) {
-    if (l.position.allFinite()) landmarks[l.id] = {l.position, l.observations, {}, {}, false};
+  for (const int id : odometry.map().LandmarkIds()) {
+    const Landmark& l = odometry.map().landmark(id);
+    if (l.position.allFinite())
+      landmarks[id] = {l.position, static_cast<int>(l.observations.size()), {}, {}, false};
   }
   for (const KeyframeView& view : views) {
     for (const int id : view.landmarks) {
@@ -85,7 +88,7 @@ MapFigures MeasureMap(const Odometry& odometry, const FrameRange& session) {
       found->second.seen = true;
     }
   }
-  const PinholeCamera& c = odometry.Rig().camera;
+  const PinholeCamera& c = odometry.map().rig().camera;
   std::vector<double> counts, misfits, depth_misfits;
   std::vector<Step> steps;
   int still = 0;

@@ -6,9 +6,7 @@ namespace tutti {
 
 // Mapping stays on the thread that tracks: its time is what this costs.
 OdometryAlone::OdometryAlone(const Odometry& odometry, std::int64_t last, bool own_thread)
-    : odometry_(odometry), last_(last) {
-  odometry_.UseOwnThreads(false);
-  odometry_.SetRecorder(nullptr);
+    : odometry_(odometry, Execution{false, nullptr}), last_(last) {
   if (own_thread) thread_ = std::thread(&OdometryAlone::Work, this);
 }
 

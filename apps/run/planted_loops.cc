@@ -31,7 +31,7 @@ bool PlantedLoops::Plant(int newest, SlamSystem* slam) {
     const PoseGraphEdge& edge = graph.edges()[e];
     const bool forward = edge.from < edge.to;
     const int candidate = forward ? edge.from : edge.to;
-    const double seen = MedianDepth(slam->odometry()->Keyframe(candidate));
+    const double seen = MedianDepth(ViewOf(slam->odometry()->map(), candidate));
     const double depth = seen > 0 ? seen : 1;  // without landmarks AddLoop refuses it
     slam->AddLoop(
         candidate, forward ? edge.to : edge.from, forward ? edge.measurement : edge.measurement.Inverse(),

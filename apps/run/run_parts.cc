@@ -18,15 +18,15 @@ namespace fs = std::filesystem;
 
 // Keyframes of the map piece that trajectory.txt is of.
 void CollectKeyframes(const Odometry& odometry, const FrameRange& session, RunResult& result) {
-  const std::vector<std::int64_t> frames = odometry.FrameIndices(-1, session);
+  const std::vector<std::int64_t> frames = FrameIndices(odometry.map(), -1, session);
   const std::set<std::int64_t> posed(frames.begin(), frames.end());
   Trajectory keyframes;
   result.keyframes = 0;
-  for (const int id : odometry.KeyframeIds()) {
-    const std::int64_t frame = odometry.KeyframeFrameIndex(id);
+  for (const int id : odometry.map().KeyframeIds()) {
+    const std::int64_t frame = odometry.map().keyframe(id).frame_index;
     if (session.Has(frame)) ++result.keyframes;
     if (posed.count(frame) == 0) continue;
-    keyframes.push_back({odometry.KeyframeStamp(id), odometry.KeyframePose(id)});
+    keyframes.push_back({odometry.map().keyframe(id).stamp_s, odometry.map().keyframe(id).T_world_camera});
   }
   result.keyframe_trajectory = BodyTrajectory(std::move(keyframes), result.rig);
 }
@@ -119,14 +119,15 @@ Trajectory BodyTrajectory(Trajectory trajectory, const CameraRig& rig) {
 void CollectEarlierSessions(const RunState& state, RunResult& result) {
   result.map.value().earlier.assign(state.sessions.size() - 1, {});
   const Pose T_camera_body = result.rig.T_body_camera.Inverse();
-  const std::vector<int> pieces =
-      state.odometry->Pieces(FrameRange{state.FirstFrame(), std::numeric_limits<std::int64_t>::max()});
+  const std::vector<int> pieces = FramePieces(
+      state.odometry->map(), FrameRange{state.FirstFrame(), std::numeric_limits<std::int64_t>::max()});
   if (pieces.empty()) return;
-  for (const int id : state.odometry->KeyframeIds()) {
-    const std::int64_t frame = state.odometry->KeyframeFrameIndex(id);
-    if (frame >= state.FirstFrame() || state.odometry->KeyframePiece(id) != pieces.front()) continue;
-    const Pose T_world_body = state.odometry->KeyframePose(id) * T_camera_body;
-    result.map->earlier[state.SessionOf(frame)].push_back({state.odometry->KeyframeStamp(id), T_world_body});
+  for (const int id : state.odometry->map().KeyframeIds()) {
+    const std::int64_t frame = state.odometry->map().keyframe(id).frame_index;
+    if (frame >= state.FirstFrame() || state.odometry->map().keyframe(id).piece != pieces.front()) continue;
+    const Pose T_world_body = state.odometry->map().keyframe(id).T_world_camera * T_camera_body;
+    result.map->earlier[state.SessionOf(frame)].push_back(
+        {state.odometry->map().keyframe(id).stamp_s, T_world_body});
     result.map->keyframes[frame] = T_world_body;
   }
 }
@@ -135,10 +136,10 @@ void CollectStamps(const RunState& state, RunResult& result) {
   const std::vector<MapSession>& sessions = result.map.value().sessions;
   const std::string own = fs::absolute(result.dataset).lexically_normal().string();
   std::map<std::int64_t, double> stamps;  // of keyframes, by frame
-  for (const int id : state.odometry->KeyframeIds()) {
-    const std::int64_t frame = state.odometry->KeyframeFrameIndex(id);
+  for (const int id : state.odometry->map().KeyframeIds()) {
+    const std::int64_t frame = state.odometry->map().keyframe(id).frame_index;
     if (frame < state.FirstFrame() && DatasetOfNote(sessions[state.SessionOf(frame)].note) == own)
-      stamps[frame] = state.odometry->KeyframeStamp(id);
+      stamps[frame] = state.odometry->map().keyframe(id).stamp_s;
   }
   for (LoopRecord& loop : result.loops) {
     const auto stamp = stamps.find(loop.candidate);
@@ -155,18 +156,19 @@ void CollectMap(const RunState& state, RunResult& result) {
   const Odometry& odometry = *state.odometry;
   FrameRange session;
   if (state.FirstFrame() > 0) session.first = state.FirstFrame();
-  result.trajectory = BodyTrajectory(odometry.FrameTrajectory(-1, session), result.rig);
+  result.trajectory = BodyTrajectory(FrameTrajectory(odometry.map(), -1, session), result.rig);
   result.frames_tracked = result.trajectory.size();
-  const std::vector<int> pieces = odometry.Pieces(session);
+  const std::vector<int> pieces = FramePieces(odometry.map(), session);
   result.other_pieces.clear();
   for (std::size_t i = 1; i < pieces.size(); ++i)
-    result.other_pieces.push_back(BodyTrajectory(odometry.FrameTrajectory(pieces[i], session), result.rig));
-  result.in_map = !pieces.empty() && pieces.front() < odometry.SessionPiece();
+    result.other_pieces.push_back(
+        BodyTrajectory(FrameTrajectory(odometry.map(), pieces[i], session), result.rig));
+  result.in_map = !pieces.empty() && pieces.front() < odometry.LastView().session_piece;
   result.trajectory_odometry = result.trajectory;
-  result.stereo_row_error_px = odometry.StereoRowErrorPx();
-  result.stereo_matches = odometry.StereoMatches();
-  result.lens = odometry.Lens();
-  result.height = odometry.Height();
+  result.stereo_row_error_px = odometry.Report().stereo_row_error_px;
+  result.stereo_matches = odometry.Report().stereo_matches;
+  result.lens = odometry.Report().lens;
+  result.height = odometry.Report().height;
   result.map_figures = MeasureMap(odometry, session);
   CollectKeyframes(odometry, session, result);
 }

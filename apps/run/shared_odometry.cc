@@ -24,7 +24,7 @@ class SequenceRecorder : public RunObserver {
   void OnKeyframe(const InputFrame& frame, int keyframe, const RunState& state) override {
     // Called before the OnFrame of the frame that is being tracked.
     sequence_.keyframes.push_back({keyframe, frame.stamp_s, frames_ + 1});
-    sequence_.views[keyframe] = state.odometry->Keyframe(keyframe);
+    sequence_.views[keyframe] = ViewOf(state.odometry->map(), keyframe);
   }
   void OnEnd(const RunState& state) override {
     if (state.odometry != nullptr) sequence_.odometry = std::make_shared<const Odometry>(*state.odometry);
@@ -55,7 +55,7 @@ class Replay {
 
  private:
   void Take(const LoopUpdate& update, std::int64_t frames) {
-    if (update.correction) loops_.Applied(update, Apply(*update.correction, &odometry_), odometry_, frames);
+    if (update.correction) loops_.Applied(update, odometry_.Correct(*update.correction), odometry_, frames);
   }
 
   LoopClosing loops_;

@@ -56,7 +56,9 @@ class SlamRun {
     return {slam_->odometry(), slam_->loops(), slam_->Corrections(), recognised_, session_offsets_};
   }
   // In the map's numbers.
-  std::int64_t FirstFrame() const { return slam_->AppearanceOnly() ? 0 : slam_->odometry()->FrameOffset(); }
+  std::int64_t FirstFrame() const {
+    return slam_->AppearanceOnly() ? 0 : slam_->odometry()->LastView().frame_offset;
+  }
   std::FILE* Out() const { return request_.quiet ? nullptr : internal::StandardError(); }
   SpanRecorder* Recorder() { return request_.timing || request_.trace ? &recorder_ : nullptr; }
   // Frames that are there by now, of those that the run may see.

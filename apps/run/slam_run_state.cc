@@ -6,6 +6,7 @@
 #include "apps/run/run_note.h"
 #include "apps/run/slam_run.h"
 #include "apps/slam/map_state.h"
+#include "frontend/odometry/odometry_file.h"
 #include "tutti/core/error.h"
 
 namespace tutti {
@@ -47,7 +48,7 @@ void SlamRun::WriteCheckpoint() {
   if (alone_) alone = alone_->Tracked();
   const auto write = [run = StateOf(*this), alone = std::move(alone)](const MapSink& sink) {
     sink(kRunSection, run);
-    if (alone) alone->SaveSections(sink);
+    if (alone) OdometryFile::Save(*alone, sink);
   };
   checkpoints_->Begin(slam_->Snapshot(NoteOf(request_)), write);
 }
@@ -99,7 +100,7 @@ void SlamRun::Resume(const fs::path& checkpoint) {
     ReadState(file, kRunSection, this);
     if (!resumed_alone_) return;
     Odometry alone(config_.odometry, result_.rig);
-    alone.LoadSections(&file);
+    OdometryFile::Load(&file, &alone);
     alone_ = std::make_unique<OdometryAlone>(alone, *resumed_alone_, AloneBeside());
   });
   live_.Skip(LoopsBefore());

@@ -19,14 +19,14 @@ void GlobalAdjuster::Cancel() {
 
 void GlobalAdjuster::MapMoved(const Odometry& odometry, int piece, std::int64_t frame) {
   Cancel();
-  running_.emplace(odometry.BeginGlobalAdjustment(piece));
+  running_.emplace(AdjustGlobally(odometry, piece));
   due_ = frame + kLeastFrames + running_->Keyframes() / kKeyframesPerFrame;
 }
 
 void GlobalAdjuster::Converge(const Odometry& odometry, int piece) {
   constexpr int kIterations = 100;
   Cancel();
-  running_.emplace(odometry.BeginGlobalAdjustment(piece, kIterations));
+  running_.emplace(AdjustGlobally(odometry, piece, kIterations));
   due_ = 0;
 }
 

@@ -32,14 +32,14 @@ KeyframeGraphOptions GraphOptions(const RunConfig& config, Sensor sensor) {
 
 std::vector<MapKeyframe> KeyframesOf(const Odometry& odometry) {
   std::vector<MapKeyframe> keyframes;
-  for (const int id : odometry.KeyframeIds())
-    keyframes.push_back({id, odometry.KeyframePiece(id), odometry.KeyframePose(id)});
+  for (const int id : odometry.map().KeyframeIds())
+    keyframes.push_back({id, odometry.map().keyframe(id).piece, odometry.map().keyframe(id).T_world_camera});
   return keyframes;
 }
 
 LoopGate::Map Places(const Odometry& odometry) {
   return [&odometry](int id) {
-    return LoopGate::Place{odometry.KeyframePiece(id), odometry.KeyframePose(id)};
+    return LoopGate::Place{odometry.map().keyframe(id).piece, odometry.map().keyframe(id).T_world_camera};
   };
 }
 
@@ -63,7 +63,7 @@ PoseGraph LoopCloser::Graph(const Odometry& odometry) const {
 std::vector<CovisiblePair> LoopCloser::Covisible(const Odometry& odometry) const {
   if (followed_.ImagesJudgeSteps() && adjustments_ == 0) return {};
   std::vector<CovisiblePair> covisible;
-  for (const auto& [pair, shared] : odometry.Covisibility(kLeastShared))
+  for (const auto& [pair, shared] : Covisibility(odometry.map(), kLeastShared))
     covisible.push_back({pair.first, pair.second, shared});
   return covisible;
 }
@@ -72,8 +72,8 @@ LoopConstraint LoopCloser::Measure(const Verification& verification, int candida
                                    const Odometry& odometry) {
   const ScopedSpan span(recorder_, Lane::kOptimisation, "measure_loop");
   const internal::Stopwatch watch;
-  LoopConstraint constraint = MakeLoopConstraint(verification, odometry.Keyframe(candidate),
-                                                 odometry.Keyframe(query), rig_, detector_);
+  LoopConstraint constraint = MakeLoopConstraint(verification, ViewOf(odometry.map(), candidate),
+                                                 ViewOf(odometry.map(), query), rig_, detector_);
   stages_["loop_measure"] += watch.Milliseconds();
   return constraint;
 }
@@ -172,17 +172,17 @@ void LoopCloser::Add(int candidate, int query, const Similarity& S_candidate_que
   LoopEdge edge;
   edge.candidate = candidate;
   edge.query = query;
-  edge.candidate_frame = odometry.KeyframeFrameIndex(candidate);
-  edge.query_frame = odometry.KeyframeFrameIndex(query);
+  edge.candidate_frame = odometry.map().keyframe(candidate).frame_index;
+  edge.query_frame = odometry.map().keyframe(query).frame_index;
   edge.S_candidate_query = S_candidate_query;
   edge.information = information;
-  edge.depth = MedianDepth(odometry.Keyframe(candidate));
+  edge.depth = MedianDepth(ViewOf(odometry.map(), candidate));
   edge.record = records_.size();
   LoopRecord record;
   record.query = edge.query_frame;
   record.candidate = edge.candidate_frame;
-  record.query_stamp_s = odometry.KeyframeStamp(query);
-  record.candidate_stamp_s = odometry.KeyframeStamp(candidate);
+  record.query_stamp_s = odometry.map().keyframe(query).stamp_s;
+  record.candidate_stamp_s = odometry.map().keyframe(candidate).stamp_s;
   record.verified = record.injected = true;
   record.S_candidate_query = S_candidate_query;
   if (!(edge.depth > 0)) record.reason = "the candidate's keyframe has no landmarks";
@@ -214,7 +214,7 @@ LoopUpdate LoopCloser::Enter(std::vector<LoopEdge> entering, const Odometry& odo
     deferred_.insert(deferred_.end(), entering.begin(), entering.end());
     if (options_.global_adjustment) {
       update.correction.emplace();
-      update.correction->fused = std::move(entering);
+      Fuse(entering, &update);
     }
     return update;
   }
@@ -236,14 +236,14 @@ void LoopCloser::FollowOdometry(const StampedPose& T_odom_camera, const Odometry
 void LoopCloser::JudgeJumps(const Odometry& odometry, bool all) {
   const std::vector<OdometryJump> jumps = followed_.TakeJumps(all);
   if (jumps.empty()) return;
-  const std::vector<int> ids = odometry.KeyframeIds();
+  const std::vector<int> ids = odometry.map().KeyframeIds();
   const auto later = [&](double stamp_s) {
     return std::partition_point(ids.begin(), ids.end(),
-                                [&](int id) { return odometry.KeyframeStamp(id) < stamp_s; });
+                                [&](int id) { return odometry.map().keyframe(id).stamp_s < stamp_s; });
   };
   for (const OdometryJump& jump : jumps) {
     const auto end = later(jump.to_s);
-    const int next = end == ids.end() ? odometry.NextKeyframeId() : *end;
+    const int next = end == ids.end() ? odometry.map().KeyframeCount() : *end;
     if (!jump.comes_back) {
       if (followed_.ImagesConfirm(next, jump)) continue;
       graph_.NoteJump(next);
@@ -301,6 +301,7 @@ std::optional<LoopUpdate> LoopCloser::Solved(const Odometry& odometry, std::int6
       if (solution.correction.loops[i].weight < kNoWeight) Revoke(accepted_[i].record, &update);
     }
     update.correction = MoveBy(solution.correction, odometry);
+    if (options_.global_adjustment) Fuse(Untied(), &update);
     proof_ = solution.proof;
   }
   stages_["loop_optimize"] += watch.Milliseconds();
@@ -317,10 +318,16 @@ MapCorrection LoopCloser::MoveBy(const KeyframeCorrection& solved, const Odometr
   graph_.Move(correction.S_world_keyframe, correction.merges);
   Rescale(correction.S_world_keyframe);
   if (options_.global_adjustment) {
-    correction.fused = Untied();
-    adjust_piece_ = odometry.KeyframePiece(accepted_.back().candidate);
+    adjust_piece_ = odometry.map().keyframe(accepted_.back().candidate).piece;
   }
   return correction;
+}
+
+void LoopCloser::Fuse(const std::vector<LoopEdge>& loops, LoopUpdate* update) {
+  for (const LoopEdge& loop : loops) {
+    update->fused.push_back(loop.record);
+    update->correction->fused.push_back({loop.candidate, loop.query, loop.S_candidate_query});
+  }
 }
 
 void LoopCloser::Rescale(const std::map<int, Similarity>& S_world_keyframe) {
@@ -347,7 +354,7 @@ std::optional<LoopUpdate> LoopCloser::Adjusted(const Odometry& odometry, std::in
   const internal::Stopwatch watch;
   LoopUpdate update;
   auto adjustment = std::make_shared<const GlobalAdjustment>(adjuster_.Take());
-  if (auto moved = odometry.CorrectionOf(*adjustment)) {
+  if (auto moved = adjustment->Correction(odometry.map())) {
     Rescale(*moved);
     update.correction.emplace();
     update.correction->S_world_keyframe = std::move(*moved);
@@ -368,14 +375,14 @@ void LoopCloser::Applied(const LoopUpdate& update, const std::vector<int>& commo
                          std::int64_t frames) {
   const MapCorrection& correction = *update.correction;
   for (std::size_t i = 0; i < common.size(); ++i) {
-    if (common[i] >= kLeastCommon) untied_.erase(correction.fused[i].record);
+    if (common[i] >= kLeastCommon) untied_.erase(update.fused[i]);
   }
   if (correction.adjustment) {
     // The map as it is says more than what was measured before; a loop that it contradicts keeps its own.
     graph_.MeasureAgain();
     for (LoopEdge& loop : accepted_) {
-      const Similarity in_map(odometry.KeyframePose(loop.candidate).Inverse() *
-                              odometry.KeyframePose(loop.query));
+      const Similarity in_map(odometry.map().keyframe(loop.candidate).T_world_camera.Inverse() *
+                              odometry.map().keyframe(loop.query).T_world_camera);
       const Disagreement d = tutti::Measure(loop.S_candidate_query * in_map.Inverse(), loop.depth);
       if (!Contradicts(d)) loop.S_candidate_query = in_map;
     }

@@ -1,7 +1,7 @@
 // From a verified loop to a corrected map.
 //
 //   LoopUpdate update = closer.Consider(...);                         // or *closer.Due(...)
-//   closer.Applied(update, Apply(*update.correction, &odometry), odometry, frames);
+//   closer.Applied(update, odometry.Correct(*update.correction), odometry, frames);
 #pragma once
 
 #include <cstdint>
@@ -116,7 +116,7 @@ class LoopCloser {
   /// Each piece of the map moves as a whole, such that keyframes are there. To be applied at once.
   LoopUpdate MoveAll(const std::map<int, Similarity>& S_world_keyframe, const Odometry& odometry);
 
-  /// To be called when an update with a correction has been applied. `common`: what Apply() returned.
+  /// To be called when an update with a correction has been applied. `common`: what Odometry::Correct returned.
   void Applied(const LoopUpdate& update, const std::vector<int>& common, const Odometry& odometry,
                std::int64_t frames);
 
@@ -170,6 +170,7 @@ class LoopCloser {
   void Revoke(std::size_t record, LoopUpdate* update);
   MapCorrection MoveBy(const KeyframeCorrection& solved, const Odometry& odometry);
   void Rescale(const std::map<int, Similarity>& S_world_keyframe);
+  static void Fuse(const std::vector<LoopEdge>& loops, LoopUpdate* update);
   std::vector<LoopEdge> Untied() const;
   bool OfOneSession(std::int64_t frame, std::int64_t other) const;
 

@@ -268,10 +268,10 @@ LoopUpdate LoopClosing::Decide(const LoopRecord& proposed, const Verification& v
 LoopUpdate LoopClosing::ConsiderFound(const Verification& found, int candidate, int query,
                                       const Odometry& odometry, std::int64_t frames) {
   LoopRecord record;
-  record.query = odometry.KeyframeFrameIndex(query);
-  record.candidate = odometry.KeyframeFrameIndex(candidate);
-  record.query_stamp_s = odometry.KeyframeStamp(query);
-  record.candidate_stamp_s = odometry.KeyframeStamp(candidate);
+  record.query = odometry.map().keyframe(query).frame_index;
+  record.candidate = odometry.map().keyframe(candidate).frame_index;
+  record.query_stamp_s = odometry.map().keyframe(query).stamp_s;
+  record.candidate_stamp_s = odometry.map().keyframe(candidate).stamp_s;
   record.matches = found.matches;
   record.inliers = found.inliers;
   record.verified = found.accepted;
@@ -282,7 +282,7 @@ LoopUpdate LoopClosing::ConsiderFound(const Verification& found, int candidate, 
 }
 
 void LoopClosing::Check(const Odometry* odometry, const internal::SectionReader& file) const {
-  const int end = odometry != nullptr ? odometry->NextKeyframeId() : 0;
+  const int end = odometry != nullptr ? odometry->map().KeyframeCount() : 0;
   for (const auto& [frame, keyframe] : keyframe_of_frame_) internal::CheckIndex(keyframe, 0, end, file);
   closer_.Check(end, file);
 }
@@ -301,9 +301,9 @@ int LoopClosing::KeyframeOf(std::int64_t frame) const {
 }
 
 bool LoopClosing::Forget(int keyframe, int into, const Odometry& odometry) {
-  const std::int64_t frame = odometry.KeyframeFrameIndex(keyframe);
+  const std::int64_t frame = odometry.map().keyframe(keyframe).frame_index;
   if (!worker_ || keyframe_of_frame_.count(frame) == 0) return true;  // it never knew that image
-  return worker_->Merge(frame, odometry.KeyframeFrameIndex(into));
+  return worker_->Merge(frame, odometry.map().keyframe(into).frame_index);
 }
 
 void LoopClosing::Removed(const std::map<int, int>& into, const Odometry& before) {

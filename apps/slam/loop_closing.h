@@ -1,8 +1,7 @@
 // The half of SLAM that finds loops and closes them, for an odometry that somebody else runs.
 //
 //   while (auto update = loops.Due(odometry, frames)) {    // before each frame
-//     if (update->correction) loops.Applied(*update, Apply(*update->correction, &odometry), odometry,
-//     frames);
+//     if (update->correction) loops.Applied(*update, odometry.Correct(*update->correction), odometry, frames);
 //   }
 //   loops.Submit(frame, &view, frames);                    // after it, for each keyframe
 #pragma once
@@ -93,7 +92,7 @@ class LoopClosing {
   std::optional<LoopUpdate> Due(const Odometry* odometry, std::int64_t frames);
   /// The same after the last frame, for all that is on its way.
   std::optional<LoopUpdate> Rest(const Odometry* odometry, std::int64_t frames);
-  /// To be called when a correction has been applied. `common`: what Apply() returned.
+  /// To be called when a correction has been applied. `common`: what Odometry::Correct returned.
   void Applied(const LoopUpdate& update, const std::vector<int>& common, const Odometry& odometry,
                std::int64_t frames) {
     closer_.Applied(update, common, odometry, frames);

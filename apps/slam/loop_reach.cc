@@ -15,20 +15,22 @@ namespace {
 
 std::vector<int> KeyframesOfPiece(int piece, const Odometry& odometry) {
   std::vector<int> ids;
-  for (const int id : odometry.KeyframeIds()) {
-    if (odometry.KeyframePiece(id) == piece) ids.push_back(id);
+  for (const int id : odometry.map().KeyframeIds()) {
+    if (odometry.map().keyframe(id).piece == piece) ids.push_back(id);
   }
   return ids;
 }
 
 double Step(int a, int b, const Odometry& odometry) {
-  return (odometry.KeyframePose(a).translation - odometry.KeyframePose(b).translation).norm();
+  return (odometry.map().keyframe(a).T_world_camera.translation -
+          odometry.map().keyframe(b).T_world_camera.translation)
+      .norm();
 }
 
 // Of two keyframes of one piece.
 double WayBetween(int from, int to, const Odometry& odometry) {
   const auto [first, last] = std::minmax(from, to);
-  const std::vector<int> ids = KeyframesOfPiece(odometry.KeyframePiece(from), odometry);
+  const std::vector<int> ids = KeyframesOfPiece(odometry.map().keyframe(from).piece, odometry);
   double way = 0;
   for (std::size_t i = 1; i < ids.size(); ++i) {
     if (ids[i - 1] >= first && ids[i] <= last) way += Step(ids[i - 1], ids[i], odometry);
@@ -38,11 +40,12 @@ double WayBetween(int from, int to, const Odometry& odometry) {
 
 // The query in the candidate's frame, by the map; both are of one piece.
 Pose InMap(const LoopEdge& loop, const Odometry& odometry) {
-  return odometry.KeyframePose(loop.candidate).Inverse() * odometry.KeyframePose(loop.query);
+  return odometry.map().keyframe(loop.candidate).T_world_camera.Inverse() *
+         odometry.map().keyframe(loop.query).T_world_camera;
 }
 
 bool OfOnePiece(const LoopEdge& loop, const Odometry& odometry) {
-  return odometry.KeyframePiece(loop.candidate) == odometry.KeyframePiece(loop.query);
+  return odometry.map().keyframe(loop.candidate).piece == odometry.map().keyframe(loop.query).piece;
 }
 
 // Where the tracking was lost: the keyframes next to the shortest gap between the pieces of a loop's ends.
@@ -52,15 +55,16 @@ struct Gap {
 };
 
 std::optional<Gap> ShortestGap(const LoopEdge& loop, const Odometry& odometry) {
-  const int ours = odometry.KeyframePiece(loop.candidate), theirs = odometry.KeyframePiece(loop.query);
+  const int ours = odometry.map().keyframe(loop.candidate).piece,
+            theirs = odometry.map().keyframe(loop.query).piece;
   std::optional<Gap> gap;
   int before = -1;
-  for (const int id : odometry.KeyframeIds()) {
-    const int piece = odometry.KeyframePiece(id);
+  for (const int id : odometry.map().KeyframeIds()) {
+    const int piece = odometry.map().keyframe(id).piece;
     if (piece != ours && piece != theirs) continue;
     const int last = std::exchange(before, id);
-    if (last < 0 || odometry.KeyframePiece(last) == piece) continue;
-    const double seconds = odometry.KeyframeStamp(id) - odometry.KeyframeStamp(last);
+    if (last < 0 || odometry.map().keyframe(last).piece == piece) continue;
+    const double seconds = odometry.map().keyframe(id).stamp_s - odometry.map().keyframe(last).stamp_s;
     if (seconds <= 0 || (gap && gap->seconds <= seconds)) continue;
     gap = piece == theirs ? Gap{last, id, seconds} : Gap{id, last, seconds};
   }
@@ -73,7 +77,8 @@ double FastSpeed(int piece, const Odometry& odometry) {
   const std::vector<int> ids = KeyframesOfPiece(piece, odometry);
   std::vector<double> speeds;
   for (std::size_t i = 1; i < ids.size(); ++i) {
-    const double seconds = odometry.KeyframeStamp(ids[i]) - odometry.KeyframeStamp(ids[i - 1]);
+    const double seconds =
+        odometry.map().keyframe(ids[i]).stamp_s - odometry.map().keyframe(ids[i - 1]).stamp_s;
     if (seconds > 0) speeds.push_back(Step(ids[i - 1], ids[i], odometry) / seconds);
   }
   if (speeds.empty()) return 0;
@@ -92,13 +97,14 @@ std::string WhyNoWayAcross(const LoopEdge& loop, const Odometry& odometry, Senso
   const std::optional<Gap> gap = ShortestGap(loop, odometry);
   if (!gap) return "";
   const double scale = loop.S_candidate_query.scale;
-  const double speed = std::max(FastSpeed(odometry.KeyframePiece(loop.candidate), odometry),
-                                scale * FastSpeed(odometry.KeyframePiece(loop.query), odometry));
+  const double speed = std::max(FastSpeed(odometry.map().keyframe(loop.candidate).piece, odometry),
+                                scale * FastSpeed(odometry.map().keyframe(loop.query).piece, odometry));
   if (!(speed > 0)) return "";
-  const Similarity by_loop = Similarity(odometry.KeyframePose(loop.candidate)) * loop.S_candidate_query *
-                             Similarity(odometry.KeyframePose(loop.query).Inverse());
-  const double jump = (by_loop * odometry.KeyframePose(gap->query_side).translation -
-                       odometry.KeyframePose(gap->candidate_side).translation)
+  const Similarity by_loop = Similarity(odometry.map().keyframe(loop.candidate).T_world_camera) *
+                             loop.S_candidate_query *
+                             Similarity(odometry.map().keyframe(loop.query).T_world_camera.Inverse());
+  const double jump = (by_loop * odometry.map().keyframe(gap->query_side).T_world_camera.translation -
+                       odometry.map().keyframe(gap->candidate_side).T_world_camera.translation)
                           .norm();
   const double drift = sensor == Sensor::kMono ? kDriftOfOneCamera : kDrift;
   const double ways = WayBetween(gap->candidate_side, loop.candidate, odometry) +

@@ -7,6 +7,7 @@
 #include "apps/slam/landmark_matches.h"
 #include "apps/slam/loop_constraint.h"
 #include "apps/slam/missed_loops.h"
+#include "frontend/map/fuse.h"
 #include "tutti/slam/loop_record.h"
 
 namespace tutti {
@@ -17,7 +18,10 @@ void MapConnection::Connect(int piece) {
   for (int i = 0; i < kSearches && CloseMissedLoops() > 0; ++i) {
   }
   for (int i = 0; i < kAdjustments; ++i) {
-    odometry_.FuseAll();
+    Map map = odometry_.map();
+    FuseAll(rig_.camera, &map);
+    map.UpdateGeometry();
+    odometry_.Replace(std::move(map));
     if (!loops_.Converge(odometry_, piece)) break;
     Finish();
   }
@@ -28,15 +32,16 @@ std::size_t MapConnection::CloseMissedLoops() {
   const auto accepted = [this] { return CountAccepted(loops_.closer().records()); };
   const std::size_t before = accepted();
   std::vector<StandingKeyframe> keyframes;
-  for (const int id : odometry_.KeyframeIds()) {
-    const KeyframeView view = odometry_.Keyframe(id);
+  for (const int id : odometry_.map().KeyframeIds()) {
+    const KeyframeView view = ViewOf(odometry_.map(), id);
     keyframes.push_back({id, view.map_piece, view.T_world_camera, MedianDepth(view)});
   }
   for (const MissedLoop& loop : FindMissedLoops(keyframes, loops_.closer().Graph(odometry_), config_.run)) {
-    const KeyframeView query = odometry_.Keyframe(loop.query);
+    const KeyframeView query = ViewOf(odometry_.map(), loop.query);
     for (const int candidate : loop.candidates) {
       if (offered_.count({candidate, loop.query}) != 0) break;
-      const Verification found = VerifyLandmarks(odometry_.Keyframe(candidate), query, rig_, config_.loops);
+      const Verification found =
+          VerifyLandmarks(ViewOf(odometry_.map(), candidate), query, rig_, config_.loops);
       if (!found.accepted) continue;
       offered_.emplace(candidate, loop.query);
       take_(loops_.ConsiderFound(found, candidate, loop.query, odometry_, frames_));

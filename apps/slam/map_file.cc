@@ -10,6 +10,7 @@
 #include "apps/slam/map_state.h"
 #include "core/sections.h"
 #include "core/state_archive.h"
+#include "frontend/odometry/odometry_file.h"
 #include "loopclosure/detector/detector_file.h"
 #include "tutti/core/error.h"
 
@@ -41,16 +42,17 @@ void MapSnapshot::Write(const std::filesystem::path& file,
   std::map<std::int64_t, std::uint64_t> keyframes;  // where their sections are, by frame
   if (parts_->odometry) {
     int keyframe = 0;
-    parts_->odometry->SaveSections([&](std::uint32_t tag, std::string_view bytes) {
+    OdometryFile::Save(*parts_->odometry, [&](std::uint32_t tag, std::string_view bytes) {
       const std::uint64_t place = out.Write(tag, bytes);
-      if (tag == Tag(Section::kKeyframe)) keyframes[parts_->odometry->KeyframeFrameIndex(keyframe++)] = place;
+      if (tag == Tag(Section::kKeyframe))
+        keyframes[parts_->odometry->map().keyframe(keyframe++).frame_index] = place;
     });
   }
   if (parts_->pending.solution.valid())
     out.Write(MapSection::kSolution, StateOf(*parts_->pending.solution.get()));
   if (parts_->pending.adjustment) {
     out.Write(MapSection::kAdjustment, "");
-    parts_->pending.adjustment->SaveSections(sink);
+    OdometryFile::Save(*parts_->pending.adjustment, sink);
   }
   if (parts_->detector.valid()) {
     const LoopWorker::Saved& saved = *parts_->detector.get();

@@ -8,6 +8,7 @@
 #include "apps/slam/loop_constraint.h"
 #include "apps/slam/map_connection.h"
 #include "apps/slam/map_state.h"
+#include "frontend/map/append.h"
 
 namespace tutti {
 namespace {
@@ -45,9 +46,12 @@ void MapMerge::Append() {
   places_ = map_.loops.Places();
   others_ = other_.loops.Places();
   first_frame_ = map_.sessions.NextOffset(map_.odometry);
-  first_keyframe_ = map_.odometry.NextKeyframeId();
-  map_.odometry.Append(other_.odometry, first_frame_);
-  first_piece_ = map_.odometry.SessionPiece();
+  first_keyframe_ = map_.odometry.map().KeyframeCount();
+  first_piece_ = map_.odometry.map().NextPiece();
+  Map both = map_.odometry.map();
+  tutti::Append(other_.odometry.map(), first_frame_, &both);
+  map_.odometry =
+      Odometry(map_.odometry, std::move(both), first_frame_ + other_.odometry.LastView().frame_offset);
   map_.loops.Append(other_.loops, first_frame_, first_keyframe_);
   map_.sessions.Append(other_.sessions, first_frame_, first_piece_);
 }
@@ -56,15 +60,16 @@ bool MapMerge::Join(std::int64_t frames, const std::function<void(const LoopUpda
                     std::string* reason) {
   *reason = map_.loops.Join(LoopsBetween(), map_.odometry, frames);
   while (const auto update = map_.loops.Rest(&map_.odometry, frames)) take(*update);
-  const std::vector<int> ids = map_.odometry.KeyframeIds();
-  const auto joined = std::find_if(std::lower_bound(ids.begin(), ids.end(), first_keyframe_), ids.end(),
-                                   [&](int id) { return map_.odometry.KeyframePiece(id) < first_piece_; });
+  const std::vector<int> ids = map_.odometry.map().KeyframeIds();
+  const auto joined =
+      std::find_if(std::lower_bound(ids.begin(), ids.end(), first_keyframe_), ids.end(),
+                   [&](int id) { return map_.odometry.map().keyframe(id).piece < first_piece_; });
   if (joined == ids.end()) {
     if (reason->empty()) *reason = "the loops between them contradict the maps";
     return false;
   }
   MapConnection(config_, map_.rig, frames, &map_.loops, &map_.odometry, take)
-      .Connect(map_.odometry.KeyframePiece(*joined));
+      .Connect(map_.odometry.map().keyframe(*joined).piece);
   return true;
 }
 
@@ -87,7 +92,8 @@ std::vector<ProposedLoop> MapMerge::LoopsBetween() {
 std::vector<ProposedLoop> MapMerge::ProposedByMap() {
   return map_.loops.Compare(std::move(others_), first_frame_, [&](std::int64_t frame) {
     const int keyframe = other_.loops.KeyframeOf(frame);
-    return keyframe >= 0 ? std::optional(map_.odometry.Keyframe(first_keyframe_ + keyframe)) : std::nullopt;
+    return keyframe >= 0 ? std::optional(ViewOf(map_.odometry.map(), first_keyframe_ + keyframe))
+                         : std::nullopt;
   });
 }
 
@@ -95,14 +101,14 @@ std::vector<ProposedLoop> MapMerge::ProposedByMap() {
 std::vector<ProposedLoop> MapMerge::ProposedByOther() {
   const std::int64_t offset = other_.sessions.NextOffset(other_.odometry);
   int pieces = 0;  // there; those of this map are others
-  for (const int id : other_.odometry.KeyframeIds())
-    pieces = std::max(pieces, other_.odometry.KeyframePiece(id) + 1);
-  other_.loops.BeginSession(map_.rig, offset, other_.odometry.NextKeyframeId());
+  for (const int id : other_.odometry.map().KeyframeIds())
+    pieces = std::max(pieces, other_.odometry.map().keyframe(id).piece + 1);
+  other_.loops.BeginSession(map_.rig, offset, other_.odometry.map().KeyframeCount());
   std::vector<ProposedLoop> loops = other_.loops.Compare(
       std::move(places_), offset, [&](std::int64_t frame) -> std::optional<KeyframeView> {
         const int keyframe = map_.loops.KeyframeOf(frame);
         if (keyframe < 0) return std::nullopt;
-        KeyframeView view = map_.odometry.Keyframe(keyframe);
+        KeyframeView view = ViewOf(map_.odometry.map(), keyframe);
         view.map_piece += pieces;
         return view;
       });

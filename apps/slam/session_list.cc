@@ -8,7 +8,8 @@ namespace tutti {
 std::int64_t SessionList::NextOffset(const Odometry& odometry) const {
   constexpr std::int64_t kRound = 100000;  // one sees which frame of its recording a number is
   std::int64_t highest = sessions_.back().frame_offset + sessions_.back().last_frame;
-  for (const int id : odometry.KeyframeIds()) highest = std::max(highest, odometry.KeyframeFrameIndex(id));
+  for (const int id : odometry.map().KeyframeIds())
+    highest = std::max(highest, odometry.map().keyframe(id).frame_index);
   return (std::max<std::int64_t>(0, highest) / kRound + 1) * kRound;
 }
 
@@ -29,8 +30,8 @@ void SessionList::Append(const SessionList& other, std::int64_t frame_offset, in
 void SessionList::NoteJoined(const Odometry& odometry) {
   MapSession& session = sessions_.back();
   if (sessions_.size() < 2 || session.joined_at) return;
-  const int reference = odometry.ReferenceKeyframe();
-  if (reference >= 0 && odometry.KeyframePiece(reference) < session.first_piece)
+  const int reference = odometry.LastView().keyframe;
+  if (reference >= 0 && odometry.map().keyframe(reference).piece < session.first_piece)
     session.joined_at = session.last_frame;
 }
 
@@ -38,16 +39,16 @@ std::vector<MapSession> SessionList::WithKeyframes(const Odometry* odometry) con
   std::vector<MapSession> sessions = sessions_;
   if (odometry == nullptr) return sessions;
   std::size_t s = 0;
-  for (const int id : odometry->KeyframeIds()) {
-    const std::int64_t frame = odometry->KeyframeFrameIndex(id);
+  for (const int id : odometry->map().KeyframeIds()) {
+    const std::int64_t frame = odometry->map().keyframe(id).frame_index;
     while (s + 1 < sessions.size() && frame >= sessions[s + 1].frame_offset) ++s;
     MapSession& session = sessions[s];
     if (session.keyframes++ == 0) {
       session.first_keyframe = id;
-      session.first_stamp_s = odometry->KeyframeStamp(id);
+      session.first_stamp_s = odometry->map().keyframe(id).stamp_s;
     }
     session.last_keyframe = id;
-    session.last_stamp_s = odometry->KeyframeStamp(id);
+    session.last_stamp_s = odometry->map().keyframe(id).stamp_s;
   }
   return sessions;
 }
@@ -61,7 +62,7 @@ void SessionList::Restore(const std::vector<MapSession>& sessions, const Odometr
       file.Damaged("recordings with impossible numbers");
     before = session.frame_offset;
   }
-  if (before != (odometry != nullptr ? odometry->FrameOffset() : 0))
+  if (before != (odometry != nullptr ? odometry->LastView().frame_offset : 0))
     file.Damaged("recordings of another map");
   sessions_ = sessions;
   for (MapSession& session : sessions_) {

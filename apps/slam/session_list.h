@@ -15,6 +15,8 @@ class SessionList {
  public:
   SessionList() : sessions_(1) {}
 
+  /// Of the present one: added to its frames' numbers.
+  std::int64_t offset() const { return sessions_.back().frame_offset; }
   std::size_t size() const { return sessions_.size(); }
   /// The offset of a session that begins now: past every number that there is.
   std::int64_t NextOffset(const Odometry& odometry) const;

@@ -14,7 +14,11 @@
 #include "apps/slam/session_list.h"
 #include "core/section_file.h"
 #include "core/stopwatch.h"
+#include "frontend/map/append.h"
+#include "frontend/map/fuse.h"
+#include "frontend/map/prune.h"
 #include "frontend/odometry/frame_check.h"
+#include "frontend/odometry/odometry_file.h"
 #include "tutti/core/error.h"
 #include "tutti/slam/version.h"
 
@@ -25,9 +29,7 @@ class SlamSystem::Impl {
   Impl(const RunConfig& config, const CameraRig& rig, SpanRecorder* recorder, bool resumes = false)
       : loops_(config, rig, recorder, resumes), config_(config), rig_(rig), recorder_(recorder) {
     if (!rig.calibrated) return;
-    odometry_.emplace(config.odometry, rig);
-    odometry_->SetRecorder(recorder);
-    odometry_->UseOwnThreads(config.run.threads > 1);
+    odometry_.emplace(config.odometry, rig, Execution{config.run.threads > 1, recorder});
   }
 
   TrackResult Track(const InputFrame& frame) {
@@ -41,11 +43,11 @@ class SlamSystem::Impl {
       if (loops_.Searching()) loops_.Submit(frame, nullptr, frames_);
       return result;
     }
-    result = odometry_->Track(frame);
+    result = Note(odometry_->Track(frame));
     last_ = frame.index;
     sessions_.SetLastFrame(last_);
     InputFrame numbered = frame;
-    numbered.index += odometry_->FrameOffset();
+    numbered.index += sessions_.offset();
     if (result.state != TrackingState::kTracking) result = Relocalize(numbered, result);
     if (localizing_) return FindBack(numbered, result);
     if (odometry_) sessions_.NoteJoined(*odometry_);
@@ -71,7 +73,7 @@ class SlamSystem::Impl {
     BringIn();
     ++frames_;
     sessions_.CountFrame();
-    TrackResult result = odometry_->Follow(frame, T_odom_camera);
+    TrackResult result = Note(odometry_->Follow(frame, T_odom_camera));
     if (result.step) loops_.NoteStep(result.keyframe, *result.step);
     loops_.FollowOdometry({frame.stamp_s, T_odom_camera}, *odometry_);
     if (sigma) loops_.NoteMotion(result.keyframe, *sigma, T_odom_camera.translation);
@@ -87,14 +89,14 @@ class SlamSystem::Impl {
     if (localizing_) throw InputError("frames are only being located: a recording can't go on in this map");
     Finish();
     const std::int64_t offset = sessions_.NextOffset(*odometry_);
-    odometry_->BeginSession(rig, offset);
+    odometry_ = Odometry(*odometry_, WithRig(odometry_->map(), rig), offset);
     rig_ = rig;
-    loops_.BeginSession(rig, offset, odometry_->NextKeyframeId());
+    loops_.BeginSession(rig, offset, odometry_->map().KeyframeCount());
     unmapped_.clear();
     relocalized_ = 0;
     stages_.clear();
     last_ = -1;
-    sessions_.Begin(offset, odometry_->SessionPiece());
+    sessions_.Begin(offset, odometry_->LastView().session_piece);
   }
 
   bool Merge(Impl* other, std::string* reason) {
@@ -129,12 +131,12 @@ class SlamSystem::Impl {
   void BeginLocalization() {
     CheckHasMap("located in");
     localizing_ = true;
-    odometry_->BeginLocalization();
+    odometry_ = Odometry(*odometry_, Locating());
   }
 
   void AddLoop(int candidate, int query, const Similarity& S_candidate_query, const Matrix7d& information) {
     if (!odometry_) throw InputError("a loop needs keyframes, and without a calibration there are none");
-    const std::vector<int> ids = odometry_->KeyframeIds();
+    const std::vector<int> ids = odometry_->map().KeyframeIds();
     for (const int id : {candidate, query}) {
       if (!std::binary_search(ids.begin(), ids.end(), id))
         throw InputError("a loop to keyframe " + std::to_string(id) + ", which is not there");
@@ -150,7 +152,7 @@ class SlamSystem::Impl {
   void Finish() {
     if (localizing_) return;
     if (odometry_) {
-      odometry_->FinishMapping();
+      FinishMapping();
       SubmitMapped();
     }
     while (const auto update = loops_.Rest(odometry(), frames_)) Take(*update);
@@ -160,9 +162,17 @@ class SlamSystem::Impl {
   std::size_t Prune() {
     if (!odometry_) throw InputError("the map has no keyframes, since the camera had no calibration");
     Finish();
+    if (localizing_) throw InputError("frames are being located in the map: it must stay as it is");
     const Odometry before = *odometry_;
-    const auto may = [&](int keyframe, int into) { return loops_.Forget(keyframe, into, before); };
-    const std::map<int, int> removed = odometry_->RemoveRedundantKeyframes(may);
+    const FrameView last = before.LastView();
+    const std::size_t least_views = rig_.sensor == Sensor::kMono ? 2 : 1;  // that tell where a landmark is
+    Map map = before.map();
+    FuseAll(rig_.camera, &map);
+    const std::map<int, int> removed = tutti::Prune(
+        {last.keyframe, last.newest_keyframe}, least_views,
+        [&](int keyframe, int into) { return loops_.Forget(keyframe, into, before); }, &map);
+    map.Compact();
+    odometry_->Replace(std::move(map));
     loops_.Removed(removed, before);
     return removed.size();
   }
@@ -187,14 +197,14 @@ class SlamSystem::Impl {
       detector = std::async(config_.run.threads > 1 ? std::launch::async : std::launch::deferred,
                             [&] { loops_.ResumeDetector(&*second); });
     }
-    if (odometry_) odometry_->LoadSections(&file);
+    if (odometry_) OdometryFile::Load(&file, &*odometry_);
     loops_.Check(odometry(), file);
     std::optional<LoopSolution> solution;
     if (Next(file, MapSection::kSolution)) ReadState(file, MapSection::kSolution, &solution.emplace());
     std::optional<GlobalAdjustment> adjustment;
     if (Next(file, MapSection::kAdjustment)) {
       file.Expect(MapSection::kAdjustment);
-      adjustment = odometry_.value().LoadGlobalAdjustment(&file);
+      adjustment = OdometryFile::LoadAdjustment(odometry_.value().map(), &file);
     }
     loops_.ResumePending(std::move(solution), std::move(adjustment));
     if (second) {
@@ -216,7 +226,7 @@ class SlamSystem::Impl {
 
   const Odometry* odometry() const { return odometry_ ? &*odometry_ : nullptr; }
 
-  int NextKeyframe() const { return odometry_ ? odometry_->NextKeyframeId() : 0; }
+  int NextKeyframe() const { return odometry_ ? odometry_->map().KeyframeCount() : 0; }
 
   LoopClosing loops_;
   SessionList sessions_;
@@ -235,7 +245,7 @@ class SlamSystem::Impl {
     do {
       if (odometry_ && loops_.MayMove(frames_)) {
         Announce();
-        odometry_->FinishMapping();
+        FinishMapping();
       }
       const auto update = loops_.Due(odometry(), frames_);
       if (!update) return;
@@ -249,13 +259,14 @@ class SlamSystem::Impl {
     if (!update.correction) return;
     Announce();
     const internal::Stopwatch watch;
-    const std::vector<int> common = Apply(*update.correction, &*odometry_);
+    const std::vector<int> common = odometry_->Correct(*update.correction);
     loops_.Applied(update, common, *odometry_, frames_);
     stages_["loop_fuse"] += watch.Milliseconds();
   }
 
   void CheckHasMap(const std::string& to_be) const {
-    if (!odometry_ || odometry_->KeyframeIds().empty()) throw InputError("there is no map to be " + to_be);
+    if (!odometry_ || odometry_->map().KeyframeIds().empty())
+      throw InputError("there is no map to be " + to_be);
     if (!loops_.Searching())
       throw InputError(
           "the map was made without loop closure, so nothing says where in it a frame was taken");
@@ -273,16 +284,16 @@ class SlamSystem::Impl {
     info.last_frame = last_;
     info.loops = static_cast<int>(CountAccepted(loops_.closer().records()));
     if (!odometry_) return info;
-    const std::vector<int> ids = odometry_->KeyframeIds();
+    const std::vector<int> ids = odometry_->map().KeyframeIds();
     info.keyframes = static_cast<int>(ids.size());
-    info.landmarks = odometry_->LandmarkCount();
-    info.pieces = static_cast<int>(odometry_->Pieces().size());
+    info.landmarks = static_cast<int>(odometry_->map().LandmarkIds().size());
+    info.pieces = static_cast<int>(FramePieces(odometry_->map()).size());
     if (ids.empty()) return info;
-    info.first_stamp_s = odometry_->KeyframeStamp(ids.front());
-    info.last_stamp_s = odometry_->KeyframeStamp(ids.back());
-    info.least = info.most = odometry_->KeyframePose(ids.front()).translation;
+    info.first_stamp_s = odometry_->map().keyframe(ids.front()).stamp_s;
+    info.last_stamp_s = odometry_->map().keyframe(ids.back()).stamp_s;
+    info.least = info.most = odometry_->map().keyframe(ids.front()).T_world_camera.translation;
     for (const int id : ids) {
-      const Eigen::Vector3d position = odometry_->KeyframePose(id).translation;
+      const Eigen::Vector3d position = odometry_->map().keyframe(id).T_world_camera.translation;
       info.least = info.least.cwiseMin(position);
       info.most = info.most.cwiseMax(position);
     }
@@ -306,7 +317,7 @@ class SlamSystem::Impl {
     TrackResult result = lost;
     if (keyframe >= 0) {
       Announce();
-      result = odometry_->RelocalizeAt(keyframe);
+      result = Note(odometry_->RelocalizeAt(keyframe));
     }
     if (result.state != TrackingState::kTracking && Begins()) result = RelocalizeAtTheEnd(result);
     if (result.state == TrackingState::kTracking) ++relocalized_;
@@ -317,18 +328,18 @@ class SlamSystem::Impl {
   // One of the first frames of another recording than the map's first, which has nothing yet.
   bool Begins() const {
     constexpr std::int64_t kFirstFrames = 5;
-    const std::vector<int> ids = odometry_->KeyframeIds();
+    const std::vector<int> ids = odometry_->map().KeyframeIds();
     return !localizing_ && sessions_.size() > 1 && sessions_.frames() <= kFirstFrames && !ids.empty() &&
-           odometry_->KeyframeFrameIndex(ids.back()) < odometry_->FrameOffset();
+           odometry_->map().keyframe(ids.back()).frame_index < sessions_.offset();
   }
 
   // A camera that was stopped and started again stands where the recording before ended.
   TrackResult RelocalizeAtTheEnd(TrackResult result) {
     constexpr std::size_t kLastKeyframes = 3;
-    const std::vector<int> ids = odometry_->KeyframeIds();
+    const std::vector<int> ids = odometry_->map().KeyframeIds();
     Announce();
     for (std::size_t k = 0; k < std::min(kLastKeyframes, ids.size()); ++k) {
-      result = odometry_->RelocalizeAt(ids[ids.size() - 1 - k]);
+      result = Note(odometry_->RelocalizeAt(ids[ids.size() - 1 - k]));
       if (result.state == TrackingState::kTracking) break;
     }
     return result;
@@ -337,19 +348,28 @@ class SlamSystem::Impl {
   // Beyond the map the pose drifts: now and then the detector is asked whether the map shows this place.
   TrackResult FindBack(const InputFrame& frame, const TrackResult& tracked) {
     constexpr int kFramesBetween = 10;
-    odometry_->TakeMapped();
-    if (!odometry_->BeyondMap() || ++frames_beyond_ % kFramesBetween != 0) return tracked;
+    mapped_.clear();
+    if (!odometry_->LastView().beyond_map || ++frames_beyond_ % kFramesBetween != 0) return tracked;
     return Relocalize(frame, tracked);
+  }
+
+  TrackResult Note(TrackResult result) {
+    mapped_.insert(mapped_.end(), result.mapped.begin(), result.mapped.end());
+    return result;
+  }
+
+  void FinishMapping() {
+    for (const int keyframe : odometry_->FinishMapping()) mapped_.push_back(keyframe);
   }
 
   // The detector gets a keyframe once all its landmarks are known.
   void SubmitMapped() {
-    for (const int keyframe : odometry_->TakeMapped()) {
+    for (const int keyframe : std::exchange(mapped_, {})) {
       const auto frame = unmapped_.find(keyframe);
       if (frame == unmapped_.end()) continue;
       if (on_keyframe_) on_keyframe_(frame->second, keyframe);
       if (loops_.Searching()) {
-        const KeyframeView view = odometry_->Keyframe(keyframe);
+        const KeyframeView view = ViewOf(odometry_->map(), keyframe);
         loops_.Submit(frame->second, &view, frames_);
       }
       unmapped_.erase(frame);
@@ -360,6 +380,7 @@ class SlamSystem::Impl {
   CameraRig rig_;
   SpanRecorder* recorder_;
   std::optional<Odometry> odometry_;    // with a calibration
+  std::vector<int> mapped_;             // keyframes that are to be submitted
   std::map<int, InputFrame> unmapped_;  // keyframes that the detector waits for
   bool localizing_ = false;
   int frames_beyond_ = 0;  // of the map, while localizing
@@ -448,7 +469,7 @@ std::map<std::string, double> SlamSystem::StageMilliseconds() const {
   std::map<std::string, double> stages = impl_->loops_.StageMilliseconds();
   for (const auto& [name, ms] : impl_->stages_) stages[name] += ms;
   if (odometry() == nullptr) return stages;
-  for (const auto& [name, ms] : odometry()->StageMilliseconds()) stages["odometry_" + name] = ms;
+  for (const auto& [name, ms] : odometry()->Report().stage_ms) stages["odometry_" + name] = ms;
   return stages;
 }
 

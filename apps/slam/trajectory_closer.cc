@@ -45,7 +45,7 @@ class TrajectoryCloser::Impl {
     const std::lock_guard<std::mutex> lock(mutex_);
     slam_.Finish();
     if (slam_.odometry() == nullptr) return;
-    const Trajectory frames = slam_.odometry()->FrameTrajectory();
+    const Trajectory frames = FrameTrajectory(slam_.odometry()->map());
     if (!frames.empty()) T_map_body_ = frames.back().pose * T_camera_body_;
   }
 
@@ -89,7 +89,7 @@ class TrajectoryCloser::Impl {
   Trajectory KeyframesNow() const {
     Trajectory now;
     for (const auto& [id, odom] : of_keyframe_)
-      now.push_back({odom.stamp_s, slam_.odometry()->KeyframePose(id) * T_camera_body_});
+      now.push_back({odom.stamp_s, slam_.odometry()->map().keyframe(id).T_world_camera * T_camera_body_});
     return now;
   }
 

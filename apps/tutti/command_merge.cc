@@ -85,7 +85,7 @@ int Merge(const MergeArguments& arguments) {
   }
   slam->Snapshot(MergedNote(arguments, slam->Sessions().back())).Write(arguments.out);
   std::printf("  %s: %zu sessions, %zu keyframes; %td loops between the two maps, of %td proposed\n",
-              arguments.out.c_str(), slam->Sessions().size(), slam->odometry()->KeyframeIds().size(),
+              arguments.out.c_str(), slam->Sessions().size(), slam->odometry()->map().KeyframeIds().size(),
               static_cast<std::ptrdiff_t>(accepted), loops.end() - begin);
   return 0;
 }

@@ -15,11 +15,11 @@ namespace {
 std::vector<LivePlace> PlacesOf(const RunState& state) {
   const Odometry& odometry = *state.odometry;
   std::vector<LivePlace> places;
-  for (const int id : odometry.KeyframeIds()) {
+  for (const int id : odometry.map().KeyframeIds()) {
     if (id >= state.end_of_map) break;
-    const std::int64_t frame = odometry.KeyframeFrameIndex(id);
-    places.push_back(
-        {id, frame, odometry.KeyframePiece(id), state.SessionOf(frame), odometry.KeyframePose(id)});
+    const std::int64_t frame = odometry.map().keyframe(id).frame_index;
+    places.push_back({id, frame, odometry.map().keyframe(id).piece, state.SessionOf(frame),
+                      odometry.map().keyframe(id).T_world_camera});
   }
   return places;
 }
@@ -27,14 +27,14 @@ std::vector<LivePlace> PlacesOf(const RunState& state) {
 std::string StateWord(const TrackResult& track, const RunState& state) {
   if (state.odometry == nullptr) return "appearance only";
   if (!state.OnlyLocated() || track.state != TrackingState::kTracking) return ToString(track.state);
-  return state.odometry->BeyondMap() ? "beyond the map" : "localized";
+  return state.odometry->LastView().beyond_map ? "beyond the map" : "localized";
 }
 
 // The recording has become part of the map that was there before it.
 bool InEarlierMap(const RunState& state) {
-  const int keyframe = state.odometry->ReferenceKeyframe();
+  const int keyframe = state.odometry->LastView().keyframe;
   return !state.OnlyLocated() && keyframe >= 0 &&
-         state.odometry->KeyframePiece(keyframe) < state.odometry->SessionPiece();
+         state.odometry->map().keyframe(keyframe).piece < state.odometry->LastView().session_piece;
 }
 
 std::vector<Eigen::Vector3f> SomePoints(const KeyframeView& view) {
@@ -96,7 +96,7 @@ void LiveState::SetFrame(const InputFrame& frame, const TrackResult& track, cons
   if (state.loops.size() != loops_seen_ || accepted != accepted_seen_)
     loops = std::make_shared<const std::vector<LiveLoop>>(LoopsOf(state));
   if (next.posed) {
-    ExtendTrail(state.odometry->SeenLandmarks(), &trail_);
+    ExtendTrail(state.odometry->LastView().landmarks, &trail_);
   } else {
     trail_.clear();
   }
@@ -120,7 +120,7 @@ void LiveState::SetFrame(const InputFrame& frame, const TrackResult& track, cons
 }
 
 void LiveState::SetMap(const RunState& state) {
-  const std::vector<int> ids = state.odometry->KeyframeIds();
+  const std::vector<int> ids = state.odometry->map().KeyframeIds();
   const std::size_t step = ids.size() / kMostPoints + 1;
   for (std::size_t k = 0; k < ids.size(); k += step) AddPoints(ids[k], *state.odometry);
   joined_ = InEarlierMap(state);  // of a run that was resumed
@@ -131,7 +131,7 @@ void LiveState::SetMap(const RunState& state) {
 
 // The map moves when loops correct it, so a spot moves with the keyframe that the frame hangs on.
 void LiveState::AddSpot(const LiveFrame& frame, const RunState& state) {
-  const int keyframe = state.odometry->ReferenceKeyframe();
+  const int keyframe = state.odometry->LastView().keyframe;
   const bool known = keyframe >= 0 && keyframe < state.end_of_map;
   const bool joins = !joined_ && InEarlierMap(state);
   joined_ = joined_ || joins;
@@ -142,14 +142,14 @@ void LiveState::AddSpot(const LiveFrame& frame, const RunState& state) {
     spot.kind = LiveSpot::Kind::kJoined;
   } else if (!state.OnlyLocated()) {
     return;
-  } else if (state.odometry->BeyondMap()) {
+  } else if (state.odometry->LastView().beyond_map) {
     spot.kind = LiveSpot::Kind::kBeyond;
   }
   spot.frame = frame.index;
   spot.position = frame.T_world_camera.translation;
   if (known) {
     spot.keyframe = keyframe;
-    spot.position = state.odometry->KeyframePose(keyframe).Inverse() * spot.position;
+    spot.position = state.odometry->map().keyframe(keyframe).T_world_camera.Inverse() * spot.position;
   }
   if (state.recognised || joins)
     Log("frame " + std::to_string(frame.index) +
@@ -169,7 +169,7 @@ void LiveState::SetKeyframe(int keyframe, const RunState& state) {
 void LiveState::AddPoints(int keyframe, const Odometry& odometry) {
   LivePoints points;
   points.keyframe = keyframe;
-  points.points = SomePoints(odometry.Keyframe(keyframe));
+  points.points = SomePoints(ViewOf(odometry.map(), keyframe));
   const std::lock_guard<std::mutex> lock(mutex_);
   points.number = next_points_++;
   points_.push_back(std::move(points));

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "frontend/geometry/lens_error.h"
-#include "frontend/map/map.h"
 #include "tutti/core/camera.h"
+#include "tutti/frontend/map.h"
 
 namespace tutti {
 

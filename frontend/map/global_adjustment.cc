@@ -2,9 +2,6 @@
 
 #include <utility>
 
-#include "core/sections.h"
-#include "core/state_archive.h"
-
 namespace tutti {
 namespace {
 
@@ -83,15 +80,11 @@ GlobalAdjustment::GlobalAdjustment(GlobalAdjustment&&) noexcept = default;
 GlobalAdjustment& GlobalAdjustment::operator=(GlobalAdjustment&&) noexcept = default;
 GlobalAdjustment::~GlobalAdjustment() = default;
 
+std::optional<std::map<int, Similarity>> GlobalAdjustment::Correction(const Map& now) const {
+  return work_->Correction(now);
+}
+
 void GlobalAdjustment::Cancel() { work_->Cancel(); }
 int GlobalAdjustment::Keyframes() const { return static_cast<int>(work_->moving().size()); }
-
-void GlobalAdjustment::SaveSections(
-    const std::function<void(std::uint32_t tag, std::string_view bytes)>& sink) const {
-  internal::SharedObjectsOut shared;
-  internal::StateWriter out(&shared);
-  out(work_->moving(), work_->Result());
-  sink(Tag(Section::kGlobalAdjustment), out.Take());
-}
 
 }  // namespace tutti

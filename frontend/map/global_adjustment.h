@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "frontend/map/bundle_adjustment.h"
-#include "frontend/map/map.h"
-#include "frontend/map/map_correction.h"
+#include "frontend/map/move_keyframes.h"
 #include "tutti/frontend/frame.h"
 #include "tutti/frontend/global_adjustment.h"
+#include "tutti/frontend/map.h"
 #include "tutti/frontend/odometry_options.h"
 
 namespace tutti {

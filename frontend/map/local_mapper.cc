@@ -8,7 +8,7 @@
 #include "core/stage_times.h"
 #include "frontend/geometry/pose_solver.h"
 #include "frontend/geometry/two_view.h"
-#include "frontend/map/landmark_fusion.h"
+#include "frontend/map/fuse.h"
 #include "frontend/map/matcher.h"
 #include "frontend/map/measured.h"
 #include "frontend/map/patch_aligner.h"

@@ -9,9 +9,9 @@
 
 #include "core/stage_times.h"
 #include "frontend/map/bundle_adjustment.h"
-#include "frontend/map/map.h"
 #include "frontend/map/self_calibration.h"
 #include "tutti/frontend/frame.h"
+#include "tutti/frontend/map.h"
 #include "tutti/frontend/odometry_options.h"
 
 namespace tutti {

@@ -1,4 +1,4 @@
-#include "frontend/map/map.h"
+#include "tutti/frontend/map.h"
 
 #include <algorithm>
 #include <cstdint>
@@ -7,15 +7,88 @@
 #include <utility>
 
 #include "core/median.h"
+#include "frontend/features/features.h"
 #include "frontend/map/patch_aligner.h"
 
 namespace tutti {
 
+Landmark& LandmarkStore::Append(Landmark landmark, int replaced_by) {
+  const std::size_t c = ChunkOf(size_), place = PlaceOf(size_);
+  if (place == 0) {
+    chunks_.push_back(std::make_shared<Chunk>());
+    chunks_.back()->at.fill(-1);
+    chunks_.back()->landmarks.reserve(kChunk);
+  }
+  Chunk& chunk = Own(c);
+  ++size_;
+  chunk.replaced_by[place] = replaced_by;
+  if (!landmark.alive) return gone_ = {};
+  chunk.at[place] = static_cast<std::int16_t>(chunk.landmarks.size());
+  return chunk.landmarks.emplace_back(std::move(landmark));
+}
+
+void LandmarkStore::Copy(std::size_t c) {
+  auto copy = std::make_shared<Chunk>();
+  copy->at = chunks_[c]->at;
+  copy->replaced_by = chunks_[c]->replaced_by;
+  if (c + 1 == chunks_.size()) copy->landmarks.reserve(kChunk);  // references stay good while it grows
+  copy->landmarks.insert(copy->landmarks.end(), chunks_[c]->landmarks.begin(), chunks_[c]->landmarks.end());
+  chunks_[c] = std::move(copy);
+}
+
+void LandmarkStore::Compact() {
+  const auto is_alive = [](const Landmark& landmark) { return landmark.alive; };
+  for (std::size_t c = 0; (c + 1) * kChunk <= static_cast<std::size_t>(size_); ++c) {  // the last one grows
+    const std::vector<Landmark>& before = chunks_[c]->landmarks;
+    const auto alive = std::count_if(before.begin(), before.end(), is_alive);
+    if (static_cast<std::size_t>(alive) == before.size()) continue;
+    auto kept = std::make_shared<Chunk>();
+    kept->at.fill(-1);
+    kept->replaced_by = chunks_[c]->replaced_by;
+    kept->landmarks.reserve(static_cast<std::size_t>(alive));
+    for (std::size_t place = 0; place < kChunk; ++place) {
+      const int at = chunks_[c]->at[place];
+      if (at < 0 || !before[static_cast<std::size_t>(at)].alive) continue;
+      kept->at[place] = static_cast<std::int16_t>(kept->landmarks.size());
+      kept->landmarks.push_back(before[static_cast<std::size_t>(at)]);
+    }
+    chunks_[c] = std::move(kept);
+  }
+}
+
+std::vector<int> Map::KeyframeIds() const {
+  std::vector<int> ids;
+  ids.reserve(keyframes_.size());
+  for (int id = 0; id < KeyframeCount(); ++id) {
+    if (keyframe(id).replaced_by < 0) ids.push_back(id);
+  }
+  return ids;
+}
+
+std::vector<int> Map::LandmarkIds() const {
+  std::vector<int> ids;
+  for (int id = 0; id < LandmarkCount(); ++id) {
+    if (landmark(id).alive) ids.push_back(id);
+  }
+  return ids;
+}
+
 int Map::AddKeyframe(Keyframe keyframe) {
+  next_piece_ = std::max(next_piece_, keyframe.piece + 1);
   keyframe.id = static_cast<int>(keyframes_.size());
   keyframe.landmarks.assign(keyframe.features->size(), -1);
   keyframe.covisible.clear();
   return keyframes_.Append(std::move(keyframe)).id;
+}
+
+void Map::Restore(Keyframe keyframe) {
+  next_piece_ = std::max(next_piece_, keyframe.piece + 1);
+  keyframes_.Append(std::move(keyframe));
+}
+
+void Map::AddFrame(std::int64_t index, double stamp_s, int id, const Pose& T_camera_world) {
+  const Pose& T_world_keyframe = std::as_const(*this).keyframe(id).T_world_camera;
+  frames_.Append({index, stamp_s, id, T_world_keyframe.Inverse() * T_camera_world.Inverse()});
 }
 
 int Map::AddLandmark(const Eigen::Vector3d& position, int keyframe, int feature) {
@@ -25,7 +98,7 @@ int Map::AddLandmark(const Eigen::Vector3d& position, int keyframe, int feature)
   l.position = position;
   l.reference = keyframe;
   l.visible = l.found = 1;
-  if (camera_) l.patch = CutPatch(*camera_, *std::as_const(*this).keyframe(keyframe).features, feature);
+  if (rig_) l.patch = CutPatch(rig_->camera, *std::as_const(*this).keyframe(keyframe).features, feature);
   l.patch_source = {keyframe, feature};
   landmarks_.Append(std::move(l));
   AddObservation(id, keyframe, feature);
@@ -109,45 +182,6 @@ void Map::Merge(int loser, int winner) {
   for (const Observation& o : seen) AddObservation(winner, o.keyframe, o.feature);
   landmark(winner).visible += visible;
   landmark(winner).found += found;
-}
-
-namespace {
-
-// Features whose alignment with landmarks is told by other numbers.
-std::shared_ptr<const FrameFeatures> Renumbered(const std::shared_ptr<const FrameFeatures>& features,
-                                                int landmarks) {
-  const auto is_landmark = [](int id) { return id >= 0; };
-  if (std::none_of(features->aligned.begin(), features->aligned.end(), is_landmark)) return features;
-  auto renumbered = std::make_shared<FrameFeatures>(*features);
-  for (int& id : renumbered->aligned) id += id >= 0 ? landmarks : 0;
-  return renumbered;
-}
-
-}  // namespace
-
-void Map::Append(const Map& other, std::int64_t frame_offset, int first_piece) {
-  const int keyframes = KeyframeCount(), landmarks = LandmarkCount();
-  for (int id = 0; id < other.KeyframeCount(); ++id) {
-    Keyframe k = other.keyframe(id);
-    k.id += keyframes;
-    k.frame_index += frame_offset;
-    k.piece += first_piece;
-    if (k.replaced_by >= 0) k.replaced_by += keyframes;
-    k.features = Renumbered(k.features, landmarks);
-    for (int& l : k.landmarks) l += l >= 0 ? landmarks : 0;
-    std::map<int, int> covisible;
-    for (const auto& [neighbour, shared] : k.covisible) covisible[neighbour + keyframes] = shared;
-    k.covisible = std::move(covisible);
-    keyframes_.Append(std::move(k));
-  }
-  for (int id = 0; id < other.LandmarkCount(); ++id) {
-    Landmark l = other.landmark(id);
-    for (Observation& o : l.observations) o.keyframe += keyframes;
-    if (l.reference >= 0) l.reference += keyframes;
-    if (l.patch_source.keyframe >= 0) l.patch_source.keyframe += keyframes;
-    const int replaced_by = other.ReplacedBy(id);
-    landmarks_.Append(std::move(l), replaced_by >= 0 ? replaced_by + landmarks : -1);
-  }
 }
 
 int Map::Present(int id) const {
@@ -278,6 +312,45 @@ double Map::MedianDepth(int id) const {
     if (l >= 0) depths.push_back((T_camera_world * landmark(l).position).z());
   }
   return internal::Median(std::move(depths));
+}
+
+std::vector<std::pair<std::pair<int, int>, int>> Covisibility(const Map& map, int min_shared) {
+  std::vector<std::pair<std::pair<int, int>, int>> out;
+  for (int id = 0; id < map.KeyframeCount(); ++id) {
+    for (const auto& [other, shared] : map.keyframe(id).covisible) {
+      if (other > id && shared >= min_shared) out.push_back({{id, other}, shared});
+    }
+  }
+  return out;
+}
+
+KeyframeView ViewOf(const Map& map, int id) {
+  const Keyframe& k = map.keyframe(id);
+  KeyframeView view;
+  view.id = id;
+  view.frame_index = k.frame_index;
+  view.stamp_s = k.stamp_s;
+  view.map_piece = k.piece;
+  view.T_world_camera = k.T_world_camera;
+  view.keypoints = k.features->keypoints;
+  view.descriptors = k.features->descriptors;
+  view.landmarks = k.landmarks;
+  view.inverse_depth = k.features->inverse_depth;
+  view.inverse_depth_sigma = k.features->inverse_depth_sigma;
+  const Pose T_camera_world = k.T_world_camera.Inverse();
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  view.points.assign(k.features->size(), Eigen::Vector3d::Constant(nan));
+  for (std::size_t f = 0; f < k.features->size(); ++f) {
+    const float inverse = k.features->inverse_depth[f];
+    if (k.landmarks[f] >= 0) {
+      const Eigen::Vector3d p = T_camera_world * map.landmark(k.landmarks[f]).position;
+      if (p.z() > 0) view.points[f] = p;
+    } else if (inverse > 0 && k.features->inverse_depth_sigma[f] < 0.1F * inverse) {
+      const cv::Point2f& p = k.features->keypoints[f].pt;
+      view.points[f] = map.rig().camera.Unproject({p.x, p.y}) / double(inverse);
+    }
+  }
+  return view;
 }
 
 }  // namespace tutti

@@ -6,8 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include "frontend/map/map.h"
+#include "frontend/features/features.h"
 #include "tutti/core/camera.h"
+#include "tutti/frontend/map.h"
 
 namespace tutti {
 

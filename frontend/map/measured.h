@@ -1,8 +1,9 @@
 // What a feature says about a point.
 #pragma once
 
+#include "frontend/features/features.h"
 #include "frontend/geometry/pose_solver.h"
-#include "frontend/map/map.h"
+#include "tutti/frontend/map.h"
 
 namespace tutti {
 

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "frontend/features/features.h"
-#include "frontend/map/map.h"
+#include "tutti/frontend/map.h"
 
 namespace tutti {
 

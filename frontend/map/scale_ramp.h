@@ -3,7 +3,7 @@
 
 #include <map>
 
-#include "frontend/map/map.h"
+#include "tutti/frontend/map.h"
 
 namespace tutti {
 

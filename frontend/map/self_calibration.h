@@ -12,7 +12,7 @@
 
 #include "frontend/features/features.h"
 #include "frontend/geometry/lens_error.h"
-#include "frontend/map/map.h"
+#include "tutti/frontend/map.h"
 #include "tutti/frontend/odometry.h"
 #include "tutti/frontend/odometry_options.h"
 

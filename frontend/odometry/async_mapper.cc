@@ -8,7 +8,7 @@ constexpr int kDepthLandmarks = 100;  // by the depth of a keyframe at least, ho
 AsyncMapper::AsyncMapper(const OdometryOptions& options, const CameraRig& rig)
     : delay_frames_(options.mapping_delay_frames),
       has_depth_(rig.sensor != Sensor::kMono),
-      map_(PyramidScales(options), rig.camera, options.aligned_sigma),
+      map_(PyramidScales(options), rig, options.aligned_sigma),
       mapper_(options, rig) {}
 
 int AsyncMapper::AddKeyframe(const TrackedFrame& frame, int piece, const Pose& T_world_camera,
@@ -46,7 +46,9 @@ void AsyncMapper::Enter(StageTimes* stages) {
   {
     const ScopedSpan span(stages->recorder, Lane::kTracking, "wait_for_mapping");
     const std::shared_ptr<const Outcome> outcome = std::exchange(outcome_, {}).get();
-    map_ = outcome->map;
+    Map entered = outcome->map;
+    entered.TakeFrames(map_);
+    map_ = std::move(entered);
     mapper_ = outcome->mapper;
     for (const auto& [stage, ms] : outcome->stages.milliseconds) stages->milliseconds[stage] += ms;
   }

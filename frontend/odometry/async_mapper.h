@@ -9,8 +9,8 @@
 
 #include "core/stage_times.h"
 #include "frontend/map/local_mapper.h"
-#include "frontend/map/map.h"
 #include "frontend/odometry/tracked_frame.h"
+#include "tutti/frontend/map.h"
 
 namespace tutti {
 
@@ -27,6 +27,8 @@ class AsyncMapper {
     assert(!Busy());
     return &map_;
   }
+  /// For writing frames, also while something is under way.
+  Map* MapOfFrames() { return &map_; }
   const SelfCalibration& lens() const { return mapper_.lens(); }
   void KeepLens(const SelfCalibration& lens) { mapper_.KeepLens(lens); }
 

@@ -1,9 +1,9 @@
 // When a tracked frame becomes a keyframe: by what the map still has to show.
 #pragma once
 
-#include "frontend/map/map.h"
 #include "frontend/odometry/tracked_frame.h"
 #include "tutti/frontend/frame.h"
+#include "tutti/frontend/map.h"
 #include "tutti/frontend/odometry_options.h"
 
 namespace tutti {

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "frontend/geometry/two_view.h"
-#include "frontend/map/map.h"
 #include "frontend/odometry/tracked_frame.h"
 #include "tutti/frontend/frame.h"
+#include "tutti/frontend/map.h"
 #include "tutti/frontend/odometry_options.h"
 
 namespace tutti {

@@ -1,17 +1,16 @@
 #include "frontend/odometry/odometry_impl.h"
 
-#include <set>
 #include <utility>
 
 #include "core/dense_solvers.h"
+#include "core/median.h"
+#include "frontend/map/append.h"
+#include "frontend/map/fuse.h"
 #include "frontend/map/global_adjustment.h"
-#include "frontend/map/landmark_fusion.h"
-#include "frontend/map/map_correction.h"
+#include "frontend/map/map_frames.h"
 #include "frontend/map/measured.h"
-#include "frontend/map/other_camera.h"
-#include "frontend/map/redundant_keyframes.h"
+#include "frontend/map/move_keyframes.h"
 #include "frontend/map/scale_ramp.h"
-#include "tutti/core/error.h"
 
 namespace tutti {
 namespace {
@@ -33,30 +32,15 @@ Odometry::Impl::Impl(const OdometryOptions& options, const CameraRig& rig)
       follower_(options, rig),
       localizer_(options, rig) {}
 
-void Odometry::Impl::GoOn(const Impl& before, std::int64_t frame_offset) {
+void Odometry::Impl::GoOn(const Impl& before, Map map, std::int64_t frame_offset) {
   UseOwnThreads(before.mapper_.own_threads());
-  SetRecorder(before.stages_.recorder);
-  if (SameCamera(before.rig_, rig_)) {
-    *mapper_.RestoredMap() = before.map();
-    mapper_.KeepLens(before.mapper_.lens());
-  } else {
-    CarryOver(before.map(), before.rig_.camera, rig_.camera, mapper_.RestoredMap());
-  }
-  history_ = before.history_;
-  history_.BeginSession();
-  session_piece_ = before.initializer_.piece() + 1;
+  SetRecorder(before.recorder());
+  if (SameCamera(before.rig_, rig_)) mapper_.KeepLens(before.mapper_.lens());
+  session_piece_ = map.NextPiece();
+  frames_before_session_ = map.frames().size();
+  *mapper_.RestoredMap() = std::move(map);
   initializer_.BeginSession(session_piece_);
   frame_offset_ = frame_offset;
-}
-
-void Odometry::Impl::Append(const Impl& other, std::int64_t frame_offset) {
-  Map converted(map().scales());
-  const bool same = SameCamera(other.rig_, rig_);
-  if (!same) CarryOver(other.map(), other.rig_.camera, rig_.camera, &converted);
-  history_.Append(other.history_, frame_offset, map().KeyframeCount());
-  mapper_.MutableMap()->Append(same ? other.map() : converted, frame_offset, session_piece_);
-  initializer_.BeginSession(session_piece_ + other.initializer_.piece() + 1);
-  frame_offset_ = frame_offset + other.frame_offset_;
 }
 
 TrackResult Odometry::Impl::Track(const InputFrame& input) {
@@ -134,7 +118,7 @@ TrackResult Odometry::Impl::Follow(const InputFrame& input, const Pose& T_odom_c
       result_.keyframe = InsertKeyframe();
     }
     const LastFrame& last = tracker_.last();
-    history_.Add(last.frame, last.T_camera_world, map().keyframe(last.reference));
+    AddFrame(last.frame, last.T_camera_world, last.reference);
     result_.T_world_camera = last.T_camera_world.Inverse();
   }
   result_.features = static_cast<int>(frame.features->size());
@@ -153,7 +137,7 @@ TrackResult Odometry::Impl::FollowFirst(const TrackedFrame& frame, const Pose& T
   result.keyframe = mapper_.AddKeyframe(frame, initializer_.piece(), T_world_camera, {});
   const tutti::Keyframe& keyframe = map().keyframe(result.keyframe);
   tracker_.Begin(frame, keyframe);
-  history_.Add(frame, tracker_.last().T_camera_world, keyframe);
+  AddFrame(frame, tracker_.last().T_camera_world, keyframe.id);
   mapper_.Skip(result.keyframe);
   result.state = TrackingState::kTracking;
   result.T_world_camera = T_world_camera;
@@ -187,14 +171,13 @@ TrackResult Odometry::Impl::Initialize(const TrackedFrame& frame) {
     return result;
   }
   for (const auto& [earlier, T_camera_world] : start.before) {
-    if (history_.IsLater(earlier.stamp_s))
-      history_.Add(earlier, T_camera_world, map().keyframe(start.before_reference));
+    if (IsLater(earlier.stamp_s)) AddFrame(earlier, T_camera_world, start.before_reference);
   }
   const tutti::Keyframe& keyframe = map().keyframe(start.keyframe);
   tracker_.Begin(frame, keyframe);
   height_.Forget();
   relocalizer_.Found();
-  history_.Add(frame, tracker_.last().T_camera_world, keyframe);
+  AddFrame(frame, tracker_.last().T_camera_world, keyframe.id);
   mapper_.Skip(start.keyframe);
   result.state = TrackingState::kTracking;
   result.T_world_camera = keyframe.T_world_camera;
@@ -237,8 +220,44 @@ void Odometry::Impl::BeginLocalization() {
   initializer_.Reset();
   tracker_.Forget();
   relocalizer_.Found();
-  history_ = FrameHistory();
+  mapper_.MapOfFrames()->TakeFrames(Map(map().scales()));
+  frames_before_session_ = 0;
   result_ = TrackResult();
+}
+
+void Odometry::Impl::AddFrame(const TrackedFrame& frame, const Pose& T_camera_world, int keyframe) {
+  mapper_.MapOfFrames()->AddFrame(frame.index, frame.stamp_s, keyframe, T_camera_world);
+}
+
+// Than all frames of this recording.
+bool Odometry::Impl::IsLater(double stamp_s) const {
+  const std::size_t frames = map().frames().size();
+  return frames == frames_before_session_ || stamp_s > map().frames()[frames - 1].stamp_s;
+}
+
+FrameView Odometry::Impl::LastView() const {
+  const LastFrame& last = tracker_.last();
+  FrameView view;
+  view.keyframe = localizer_.keyframe() >= 0 ? localizer_.keyframe() : last.reference;
+  view.newest_keyframe = last.newest_keyframe;
+  view.frame_offset = frame_offset_;
+  view.session_piece = session_piece_;
+  view.beyond_map = localizer_.Beyond();
+  for (std::size_t f = 0; f < last.matches.landmarks.size(); ++f) {
+    const int landmark = last.matches.landmarks[f];
+    if (landmark >= 0) view.landmarks.push_back({landmark, last.frame.features->keypoints[f].pt});
+  }
+  return view;
+}
+
+OdometryReport Odometry::Impl::Report() const {
+  OdometryReport report;
+  report.stage_ms = stages_.milliseconds;
+  report.stereo_row_error_px = internal::Median(row_errors_);
+  report.stereo_matches = internal::Median(stereo_matches_);
+  if (mapper_.lens().Enabled()) report.lens = mapper_.lens().Found();
+  report.height = height_.Found();
+  return report;
 }
 
 std::optional<Matrix6d> Odometry::Impl::PoseCovariance() const {
@@ -267,7 +286,8 @@ TrackResult Odometry::Impl::Accept(const Tracker::Tracked& tracked) {
   relocalizer_.Found();
   mapper_.CountSeen(*tracked.fix);
   if (tracked.by_grey_before > 0 && tracked.fix->drift)
-    history_.Spread(map(), tracked.by_grey_before, *tracked.fix->drift, tracked.fix->T_camera_world.rotation);
+    SpreadDrift(tracked.by_grey_before, *tracked.fix->drift, tracked.fix->T_camera_world.rotation,
+                mapper_.MapOfFrames());
   TrackResult result;
   result.state = TrackingState::kTracking;
   result.inliers = tracked.fix->inliers;
@@ -275,7 +295,7 @@ TrackResult Odometry::Impl::Accept(const Tracker::Tracked& tracked) {
   localizer_.Found(*tracked.fix, map());
   if (BecomesKeyframe(tracked)) result.keyframe = InsertKeyframe();
   const LastFrame& last = tracker_.last();
-  history_.Add(last.frame, last.T_camera_world, map().keyframe(last.reference));
+  AddFrame(last.frame, last.T_camera_world, last.reference);
   result.T_world_camera = last.T_camera_world.Inverse();
   if (localizer_.Beyond()) relocalizer_.Wait(last.frame);
   return result;
@@ -308,13 +328,25 @@ void Odometry::Impl::EnterMapping() {
   tracker_.FollowLandmarks(map());
 }
 
-void Odometry::Impl::Correct(const std::map<int, Similarity>& S_world_keyframe,
-                             const std::map<int, int>& merges, const GlobalAdjustment::Work* adjustment) {
+std::vector<int> Odometry::Impl::Correct(const MapCorrection& correction) {
   EnterMapping();
-  first_unmoved_ = map().KeyframeCount();
-  const auto here = S_world_keyframe.find(last().reference);
-  if (here != S_world_keyframe.end()) height_.Follow(here->second.scale);
-  MoveMap(S_world_keyframe, merges, adjustment);
+  if (!correction.S_world_keyframe.empty()) {
+    first_unmoved_ = map().KeyframeCount();
+    const auto here = correction.S_world_keyframe.find(last().reference);
+    if (here != correction.S_world_keyframe.end()) height_.Follow(here->second.scale);
+    MoveMap(correction);
+  }
+  std::vector<int> common;
+  for (const MapCorrection::Fusion& loop : correction.fused)
+    common.push_back(
+        FuseLoop(rig_.camera, loop.older, loop.newer, loop.S_older_newer.RigidPart(), mapper_.MutableMap()));
+  return common;
+}
+
+void Odometry::Impl::Replace(Map map) {
+  EnterMapping();
+  *mapper_.MutableMap() = std::move(map);
+  tracker_.FollowLandmarks(mapper_.map());
 }
 
 // Takes the drift that CameraHeight tells out of the newest keyframes. What a loop has moved stays, and so
@@ -330,54 +362,29 @@ void Odometry::Impl::KeepScale() {
     old += map().landmark(l).reference < first ? 1 : 0;
   }
   if (old > kKnown * all) return;
-  const std::map<int, Similarity> moved = ScaleRamp(map(), first, newest, -*drift);
-  const auto here = moved.find(last().reference);
-  if (here == moved.end()) return;
+  MapCorrection ramp;
+  ramp.S_world_keyframe = ScaleRamp(map(), first, newest, -*drift);
+  const auto here = ramp.S_world_keyframe.find(last().reference);
+  if (here == ramp.S_world_keyframe.end()) return;
   height_.Correct(here->second.scale);
-  MoveMap(moved, {}, nullptr);
+  MoveMap(ramp);
 }
 
-void Odometry::Impl::MoveMap(const std::map<int, Similarity>& S_world_keyframe,
-                             const std::map<int, int>& merges, const GlobalAdjustment::Work* adjustment) {
+void Odometry::Impl::MoveMap(const MapCorrection& correction) {
   const int reference = tracker_.last().reference;
   if (reference >= 0) {
     const Pose& T_world_old = map().keyframe(reference).T_world_camera;
-    const auto moved = S_world_keyframe.find(reference);
-    if (moved != S_world_keyframe.end()) follower_.Rescale(moved->second.scale);
+    const auto moved = correction.S_world_keyframe.find(reference);
+    const bool moves = moved != correction.S_world_keyframe.end();
+    if (moves) follower_.Rescale(moved->second.scale);
     tracker_.FollowReference(T_world_old.Inverse().Inverse(),
-                             moved != S_world_keyframe.end() ? moved->second : Similarity(T_world_old));
+                             moves ? moved->second : Similarity(T_world_old));
   }
-  history_.Rescale(S_world_keyframe);
   Map* const map = mapper_.MutableMap();
-  MoveKeyframes(S_world_keyframe, map);
-  if (adjustment != nullptr) TakeAdjustedLandmarks(adjustment->Result().landmarks, map);
+  MoveKeyframes(correction.S_world_keyframe, map);
+  if (correction.adjustment) TakeAdjustedLandmarks(correction.adjustment->work_->Result().landmarks, map);
   map->UpdateGeometry();
-  JoinPieces(merges, map);
-}
-
-std::map<int, int> Odometry::Impl::RemoveRedundantKeyframes(
-    const std::function<bool(int removed, int into)>& may) {
-  if (localizer_.Begun()) throw InputError("frames are being located in the map: it must stay as it is");
-  EnterMapping();
-  const std::size_t least_views = rig_.sensor == Sensor::kMono ? 2 : 1;  // that tell where a landmark is
-  const std::set<int> keep = {last().reference, last().newest_keyframe, result_.keyframe};
-  tutti::FuseAll(rig_.camera, mapper_.MutableMap());
-  std::map<int, int> removed = tutti::RemoveRedundantKeyframes(keep, least_views, may, mapper_.MutableMap());
-  history_.Rehang(removed, map());
-  tracker_.FollowLandmarks(map());
-  mapper_.MutableMap()->Compact();
-  return removed;
-}
-
-void Odometry::Impl::FuseAll() {
-  EnterMapping();
-  tutti::FuseAll(rig_.camera, mapper_.MutableMap());
-  mapper_.MutableMap()->UpdateGeometry();
-}
-
-int Odometry::Impl::FuseLoop(int older, int newer, const Similarity& S_older_newer) {
-  EnterMapping();
-  return tutti::FuseLoop(rig_.camera, older, newer, S_older_newer.RigidPart(), mapper_.MutableMap());
+  JoinPieces(correction.merges, map);
 }
 
 }  // namespace tutti

@@ -10,7 +10,6 @@
 #include "core/stage_times.h"
 #include "frontend/odometry/async_mapper.h"
 #include "frontend/odometry/camera_height.h"
-#include "frontend/odometry/frame_history.h"
 #include "frontend/odometry/localizer.h"
 #include "frontend/odometry/map_initializer.h"
 #include "frontend/odometry/pose_follower.h"
@@ -25,27 +24,27 @@ class Odometry::Impl {
  public:
   Impl(const OdometryOptions& options, const CameraRig& rig);
 
-  /// Into an object that is new, for the rig of a recording that begins: the map of `before` and where its
-  /// frames were. Nothing may be under way there.
-  void GoOn(const Impl& before, std::int64_t frame_offset);
-
-  /// The map of another one, and where its frames were, into one that has gone on (GoOn) and tracked nothing.
-  void Append(const Impl& other, std::int64_t frame_offset);
+  /// Into an object that is new, for the rig of a recording that begins: the map that it goes on in, and what
+  /// is known of the camera. Nothing may be under way in `before`.
+  void GoOn(const Impl& before, Map map, std::int64_t frame_offset);
 
   TrackResult Track(const InputFrame& frame);
   TrackResult Follow(const InputFrame& frame, const Pose& T_odom_camera);
   TrackResult RelocalizeAt(int keyframe);
   void BeginLocalization();
   std::optional<Matrix6d> PoseCovariance() const;
+  FrameView LastView() const;
+  OdometryReport Report() const;
   /// Waits for the mapping that is under way, if any, and brings its result in.
   void EnterMapping();
-  /// Moves keyframes, and what hangs on them, and joins pieces. With an adjustment (else null), landmarks get
-  /// what it made of them.
-  void Correct(const std::map<int, Similarity>& S_world_keyframe, const std::map<int, int>& merges,
-               const GlobalAdjustment::Work* adjustment);
-  void FuseAll();
-  int FuseLoop(int older, int newer, const Similarity& S_older_newer);
-  std::map<int, int> RemoveRedundantKeyframes(const std::function<bool(int removed, int into)>& may);
+  std::vector<int> TakeMapped() { return mapper_.TakeMapped(); }
+  /// With the keyframes that were mapped since the last result.
+  TrackResult Deliver(TrackResult result) {
+    result.mapped = TakeMapped();
+    return result;
+  }
+  std::vector<int> Correct(const MapCorrection& correction);
+  void Replace(Map map);
 
   /// Everything but options, rig, recorder and whether to use threads, section by section.
   void Save(const internal::SectionSink& sink) const;
@@ -53,7 +52,18 @@ class Odometry::Impl {
   void Load(internal::SectionReader* file);
   template <class Archive>
   void State(Archive& archive) {
-    archive(mapper_, initializer_, tracker_, relocalizer_, history_, result_, row_errors_, stereo_matches_,
+    std::vector<MapFrame> frames;
+    std::uint64_t before_session = frames_before_session_;
+    if constexpr (!Archive::kReading) {
+      for (std::size_t i = 0; i < map().frames().size(); ++i) frames.push_back(map().frames()[i]);
+    }
+    archive(frames, before_session);
+    if constexpr (Archive::kReading) {
+      if (before_session > frames.size()) archive.Damaged("a recording that begins after its frames");
+      frames_before_session_ = static_cast<std::size_t>(before_session);
+      for (const MapFrame& frame : frames) mapper_.RestoredMap()->Restore(frame);
+    }
+    archive(mapper_, initializer_, tracker_, relocalizer_, result_, row_errors_, stereo_matches_,
             frame_offset_, session_piece_, height_, first_unmoved_);
   }
 
@@ -61,16 +71,8 @@ class Odometry::Impl {
   const CameraRig& rig() const { return rig_; }
   const Map& map() const { return mapper_.map(); }
   const AsyncMapper& mapper() const { return mapper_; }
-  const FrameHistory& history() const { return history_; }
   const LastFrame& last() const { return tracker_.last(); }
-  const CameraHeight& height() const { return height_; }
-  const Localizer& localizer() const { return localizer_; }
-  std::int64_t frame_offset() const { return frame_offset_; }
-  int session_piece() const { return session_piece_; }
-  const StageTimes& stages() const { return stages_; }
-  const std::vector<double>& row_errors() const { return row_errors_; }
-  const std::vector<double>& stereo_matches() const { return stereo_matches_; }
-  std::vector<int> TakeMapped() { return mapper_.TakeMapped(); }
+  SpanRecorder* recorder() const { return stages_.recorder; }
   void UseOwnThreads(bool own_threads) { mapper_.UseOwnThreads(own_threads); }
   void SetRecorder(SpanRecorder* recorder) { stages_.recorder = recorder; }
 
@@ -85,8 +87,9 @@ class Odometry::Impl {
   bool BecomesKeyframe(const Tracker::Tracked& tracked) const;
   int InsertKeyframe();
   void KeepScale();
-  void MoveMap(const std::map<int, Similarity>& S_world_keyframe, const std::map<int, int>& merges,
-               const GlobalAdjustment::Work* adjustment);
+  void MoveMap(const MapCorrection& correction);
+  void AddFrame(const TrackedFrame& frame, const Pose& T_camera_world, int keyframe);
+  bool IsLater(double stamp_s) const;
   void Check(const internal::SectionReader& file) const;
 
   OdometryOptions options_;
@@ -100,9 +103,9 @@ class Odometry::Impl {
   PoseFollower follower_;
   Localizer localizer_;
   CameraHeight height_;
-  FrameHistory history_;
   TrackResult result_;                               // of the last frame
   std::vector<double> row_errors_, stereo_matches_;  // stereo: of each pair
+  std::size_t frames_before_session_ = 0;            // of the map
   std::int64_t frame_offset_ = 0;                    // of the recording, in the map's numbers
   int first_unmoved_ = 0;                            // keyframe from which on no loop has moved any
   int session_piece_ = 0;                            // that the recording began with

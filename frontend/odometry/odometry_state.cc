@@ -8,6 +8,7 @@
 #include "core/sections.h"
 #include "core/state_archive.h"
 #include "frontend/map/global_adjustment.h"
+#include "frontend/odometry/odometry_file.h"
 #include "frontend/odometry/odometry_impl.h"
 #include "frontend/odometry/state_check.h"
 #include "frontend/store/features_state.h"
@@ -26,6 +27,7 @@ void State(Archive& archive, TrackResult& result) {
 namespace {
 
 constexpr int kLandmarksPerSection = 1024;
+constexpr int kMostPieces = 1 << 28;
 
 // What must be the same where an odometry is loaded: else its numbers mean something else.
 std::string Fingerprint(const CameraRig& rig, const std::vector<float>& scales) {
@@ -151,11 +153,11 @@ void ReadSection(Section section, internal::SectionReader* file, internal::Share
 
 struct Head {
   std::string fingerprint;
-  std::int32_t keyframes = 0, landmarks = 0;
+  std::int32_t keyframes = 0, landmarks = 0, pieces = 0;
 
   template <class Archive>
   void State(Archive& archive) {
-    archive(fingerprint, keyframes, landmarks);
+    archive(fingerprint, keyframes, landmarks, pieces);
   }
 };
 
@@ -168,7 +170,8 @@ void Odometry::Impl::Save(const internal::SectionSink& sink) const {
     put(out);
     sink(Tag(section), out.Take());
   };
-  const Head head{Fingerprint(rig_, map().scales()), map().KeyframeCount(), map().LandmarkCount()};
+  const Head head{Fingerprint(rig_, map().scales()), map().KeyframeCount(), map().LandmarkCount(),
+                  map().NextPiece()};
   write(Section::kHead, [&](auto& out) { out(head); });
   for (int id = 0; id < head.keyframes; ++id) {
     const tutti::Keyframe& keyframe = map().keyframe(id);
@@ -220,6 +223,8 @@ void Odometry::Impl::Load(internal::SectionReader* file) {
     ReadSection(Section::kKeyframe, file, &shared, [&](auto& in) { in(keyframe); });
     map->Restore(std::move(keyframe));
   }
+  internal::CheckIndex(head.pieces, map->NextPiece(), kMostPieces + 1, *file);
+  map->RestorePieces(head.pieces);
   for (int first = 0; first < head.landmarks; first += kLandmarksPerSection) {
     ReadSection(Section::kLandmarks, file, &shared, [&](auto& in) {
       ReadLandmarks(std::min(kLandmarksPerSection, head.landmarks - first), in, map);
@@ -237,7 +242,6 @@ void Odometry::Impl::Check(const internal::SectionReader& file) const {
   initializer_.Check(map(), file);
   tracker_.Check(map(), file);
   relocalizer_.Check(map(), file);
-  history_.Check(map(), file);
   if (mapper_.interrupted() && last().reference < 0) file.Damaged("mapping that began from nowhere");
   internal::CheckIndex(static_cast<int>(result_.state), 0, static_cast<int>(TrackingState::kLost) + 1, file);
   internal::CheckKeyframe(result_.keyframe, map(), file, true);
@@ -251,25 +255,29 @@ void Odometry::Impl::Check(const internal::SectionReader& file) const {
   }
 }
 
-void Odometry::SaveSections(
-    const std::function<void(std::uint32_t tag, std::string_view bytes)>& sink) const {
-  impl_->Save(sink);
-}
+void OdometryFile::Save(const Odometry& odometry, const Sink& sink) { odometry.impl_->Save(sink); }
 
-void Odometry::LoadSections(internal::SectionReader* file) {
-  auto loaded = std::make_unique<Impl>(impl_->options(), impl_->rig());
-  loaded->UseOwnThreads(impl_->mapper().own_threads());
-  loaded->SetRecorder(impl_->stages().recorder);
+void OdometryFile::Load(internal::SectionReader* file, Odometry* odometry) {
+  const Odometry::Impl& before = *odometry->impl_;
+  auto loaded = std::make_unique<Odometry::Impl>(before.options(), before.rig());
+  loaded->UseOwnThreads(before.mapper().own_threads());
+  loaded->SetRecorder(before.recorder());
   loaded->Load(file);
-  impl_ = std::move(loaded);
+  odometry->impl_ = std::move(loaded);
 }
 
-GlobalAdjustment Odometry::LoadGlobalAdjustment(internal::SectionReader* file) const {
+void OdometryFile::Save(const GlobalAdjustment& adjustment, const Sink& sink) {
+  internal::SharedObjectsOut shared;
+  internal::StateWriter out(&shared);
+  out(adjustment.work_->moving(), adjustment.work_->Result());
+  sink(Tag(Section::kGlobalAdjustment), out.Take());
+}
+
+GlobalAdjustment OdometryFile::LoadAdjustment(const Map& map, internal::SectionReader* file) {
   std::vector<int> moving;
   GlobalAdjustment::Work::Outcome outcome;
   internal::SharedObjectsIn shared;
   ReadSection(Section::kGlobalAdjustment, file, &shared, [&](auto& in) { in(moving, outcome); });
-  const Map& map = impl_->map();
   for (const int id : moving) internal::CheckKeyframe(id, map, *file);
   if (outcome.S_world_keyframe.size() != (outcome.better ? moving.size() : 0))
     file->Damaged("an adjustment without its poses");

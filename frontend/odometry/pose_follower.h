@@ -3,10 +3,10 @@
 
 #include <optional>
 
-#include "frontend/map/map.h"
 #include "frontend/odometry/pose_search.h"
 #include "frontend/odometry/tracked_frame.h"
 #include "tutti/frontend/frame.h"
+#include "tutti/frontend/map.h"
 #include "tutti/frontend/odometry.h"
 #include "tutti/frontend/odometry_options.h"
 

@@ -5,9 +5,9 @@
 #include <optional>
 #include <vector>
 
-#include "frontend/map/map.h"
 #include "frontend/odometry/tracked_frame.h"
 #include "tutti/frontend/frame.h"
+#include "tutti/frontend/map.h"
 #include "tutti/frontend/odometry_options.h"
 
 namespace tutti {

@@ -3,9 +3,9 @@
 
 #include <optional>
 
-#include "frontend/map/map.h"
 #include "frontend/odometry/rolling_search.h"
 #include "frontend/odometry/tracked_frame.h"
+#include "tutti/frontend/map.h"
 
 namespace tutti {
 

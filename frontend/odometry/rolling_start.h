@@ -5,8 +5,8 @@
 #include <optional>
 
 #include "frontend/geometry/rolling_shutter.h"
-#include "frontend/map/map.h"
 #include "frontend/odometry/tracked_frame.h"
+#include "tutti/frontend/map.h"
 
 namespace tutti {
 

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "frontend/odometry/async_mapper.h"
-#include "frontend/odometry/frame_history.h"
 #include "frontend/odometry/map_initializer.h"
 #include "frontend/odometry/mono_initializer.h"
 #include "frontend/odometry/relocalizer.h"
@@ -114,6 +113,10 @@ void CheckReplacements(const Map& map, const SectionReader& file) {
 void Map::Check(const SectionReader& file) const {
   for (int id = 0; id < KeyframeCount(); ++id) CheckKeyframeState(*this, id, file);
   for (int id = 0; id < LandmarkCount(); ++id) CheckLandmarkState(*this, id, file);
+  for (std::size_t i = 0; i < frames().size(); ++i) {
+    CheckKeyframe(frames()[i].keyframe, *this, file);
+    CheckPose(frames()[i].T_keyframe_frame, file);
+  }
   CheckViews(*this, file);
   CheckReplacements(*this, file);
 }
@@ -154,13 +157,6 @@ void MapInitializer::Check(const Map& map, const SectionReader& file) const {
 
 void Relocalizer::Check(const Map& map, const SectionReader& file) const {
   if (lost_) CheckFeatures(lost_->features, map, file);
-}
-
-void FrameHistory::Check(const Map& map, const SectionReader& file) const {
-  for (const Record& r : records_) {
-    CheckKeyframe(r.reference, map, file);
-    CheckPose(r.T_reference_frame, file);
-  }
 }
 
 void Tracker::Check(const Map& map, const SectionReader& file) const {

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "core/section_file.h"
-#include "frontend/map/map.h"
 #include "frontend/odometry/tracked_frame.h"
 #include "tutti/core/pose.h"
+#include "tutti/frontend/map.h"
 
 namespace tutti::internal {
 

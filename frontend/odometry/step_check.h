@@ -4,8 +4,8 @@
 #include <optional>
 #include <vector>
 
-#include "frontend/map/map.h"
 #include "tutti/frontend/frame.h"
+#include "tutti/frontend/map.h"
 #include "tutti/frontend/odometry.h"
 #include "tutti/frontend/odometry_options.h"
 

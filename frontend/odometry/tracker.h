@@ -3,10 +3,10 @@
 
 #include <optional>
 
-#include "frontend/map/map.h"
 #include "frontend/odometry/keyframe_policy.h"
 #include "frontend/odometry/rolling_search.h"
 #include "frontend/odometry/tracked_frame.h"
+#include "tutti/frontend/map.h"
 #include "tutti/frontend/odometry.h"
 
 namespace tutti {

@@ -14,9 +14,9 @@
 
 #include "core/state_archive.h"
 #include "frontend/features/features.h"
-#include "frontend/map/map.h"
 #include "frontend/store/grey_bytes.h"
 #include "frontend/store/opencv_state.h"
+#include "tutti/frontend/map.h"
 
 namespace tutti {
 namespace internal {

@@ -45,8 +45,9 @@ TEST(MapModel, FollowsACorrection) {
   const MapModel before = ModelOf(odometry, PoseGraph());
   const Pose moved(ExpSO3({0, 0.3, 0}), {1, 0, -2});
   std::map<int, Similarity> corrected;
-  for (const int id : odometry.KeyframeIds()) corrected[id] = Similarity(moved * odometry.KeyframePose(id));
-  odometry.ApplyCorrection(corrected);
+  for (const int id : odometry.map().KeyframeIds())
+    corrected[id] = Similarity(moved * odometry.map().keyframe(id).T_world_camera);
+  odometry.Correct({corrected});
   const MapModel after = ModelOf(odometry, PoseGraph());
   ASSERT_EQ(after.landmarks.size(), before.landmarks.size());
   for (std::size_t i = 0; i < before.landmarks.size(); ++i) {
@@ -81,12 +82,12 @@ TEST(MapModel, LeavesOutWhatWasNeverJoinedToTheLargestPiece) {
     odometry.Track(recording.frames[i]);
   }
   odometry.FinishMapping();
-  ASSERT_EQ(odometry.Pieces().size(), 2u);
+  ASSERT_EQ(FramePieces(odometry.map()).size(), 2u);
   const MapModel model = ModelOf(odometry, PoseGraph());
   EXPECT_GT(model.other_keyframes, 0u);
-  EXPECT_EQ(model.keyframes.size() + model.other_keyframes, odometry.KeyframeIds().size());
+  EXPECT_EQ(model.keyframes.size() + model.other_keyframes, odometry.map().KeyframeIds().size());
   EXPECT_LT(model.keyframes.back().frame_index, 20);
-  EXPECT_LT(model.landmarks.size(), odometry.Landmarks().size());
+  EXPECT_LT(model.landmarks.size(), odometry.map().LandmarkIds().size());
 }
 
 TEST(MapModel, OfAnEmptyMapIsRefused) {

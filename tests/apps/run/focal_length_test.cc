@@ -111,7 +111,8 @@ TEST(LensCheck, OfAMapWhoseFirstKeyframesSeeNothingOfTheRest) {
   }
   odometry.FinishMapping();
   const auto shared = [&](int first, int second) {
-    const std::vector<int> a = odometry.Keyframe(first).landmarks, b = odometry.Keyframe(second).landmarks;
+    const std::vector<int> a = ViewOf(odometry.map(), first).landmarks,
+                           b = ViewOf(odometry.map(), second).landmarks;
     return std::count_if(a.begin(), a.end(),
                          [&](int l) { return l >= 0 && std::find(b.begin(), b.end(), l) != b.end(); });
   };

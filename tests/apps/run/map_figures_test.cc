@@ -37,12 +37,12 @@ Odometry Tracked(double focal_share) {
 TEST(MapFigures, OfTheRightCameraFit) {
   const Odometry odometry = Tracked(1);
   const MapFigures figures = MeasureMap(odometry, {});
-  EXPECT_EQ(figures.keyframes, static_cast<int>(odometry.KeyframeIds().size()));
+  EXPECT_EQ(figures.keyframes, static_cast<int>(odometry.map().KeyframeIds().size()));
   EXPECT_GT(figures.landmarks, 40);
   EXPECT_LT(figures.misfit_px, 1);
   EXPECT_GE(figures.scale_jump, 1);
   EXPECT_LT(figures.scale_jump, 2);
-  ASSERT_EQ(figures.depth.size(), odometry.KeyframeIds().size());
+  ASSERT_EQ(figures.depth.size(), odometry.map().KeyframeIds().size());
   EXPECT_GT(figures.depth.begin()->second, 0.3);
   EXPECT_LT(figures.depth.begin()->second, 10);
 }

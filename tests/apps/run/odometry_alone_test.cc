@@ -41,7 +41,7 @@ TEST_P(OdometryAloneTest, GoesOnAsTheOdometryItIsACopyOf) {
   for (std::size_t i = kCopiedAfter; i < kFrames; ++i) odometry_->Track(recording_.frames[i]);
   alone.Finish();
   odometry_->FinishMapping();
-  ExpectSame(alone.Tracked().FrameTrajectory(), odometry_->FrameTrajectory());
+  ExpectSame(FrameTrajectory(alone.Tracked().map()), FrameTrajectory(odometry_->map()));
   EXPECT_EQ(alone.last(), recording_.frames.back().index);
   EXPECT_GT(alone.CpuSeconds(), 0);
 }
@@ -51,7 +51,7 @@ TEST_P(OdometryAloneTest, IsUpToDateWheneverItIsAsked) {
   for (std::size_t i = kCopiedAfter; i < kCopiedAfter + 6; ++i) {
     alone.Track(recording_.frames[i]);
     odometry_->Track(recording_.frames[i]);
-    EXPECT_EQ(alone.Tracked().FrameTrajectory().size(), odometry_->FrameTrajectory().size());
+    EXPECT_EQ(FrameTrajectory(alone.Tracked().map()).size(), FrameTrajectory(odometry_->map()).size());
   }
 }
 

@@ -107,12 +107,12 @@ Outcome Follow(const Recording& recording, RunConfig config = RunConfig()) {
   }
   slam.Finish();
   std::map<int, int> pieces;
-  for (const int id : slam.odometry()->KeyframeIds()) {
-    ++pieces[slam.odometry()->KeyframePiece(id)];
-    EXPECT_TRUE(slam.odometry()->KeyframePose(id).IsFinite());
+  for (const int id : slam.odometry()->map().KeyframeIds()) {
+    ++pieces[slam.odometry()->map().keyframe(id).piece];
+    EXPECT_TRUE(slam.odometry()->map().keyframe(id).T_world_camera.IsFinite());
   }
   out.pieces = static_cast<int>(pieces.size());
-  const Trajectory& estimate = out.estimate = slam.odometry()->FrameTrajectory();
+  const Trajectory& estimate = out.estimate = FrameTrajectory(slam.odometry()->map());
   out.posed = estimate.size();
   EvaluationOptions options;
   options.max_time_difference_s = 0.02;  // real ground truth has stamps of its own
@@ -282,11 +282,11 @@ TEST(HardToLose, StandingStillForAMinute) {
     last = result.T_world_camera;
     if (frame.index == 25) {
       first = last;
-      keyframes = slam.odometry()->KeyframeIds().size();
+      keyframes = slam.odometry()->map().KeyframeIds().size();
     }
   }
   EXPECT_LT((first.Inverse() * last).translation.norm(), 0.06) << "noise of two poses, no drift";
-  EXPECT_LE(slam.odometry()->KeyframeIds().size(), keyframes + 3) << "the map grows by the minute";
+  EXPECT_LE(slam.odometry()->map().KeyframeIds().size(), keyframes + 3) << "the map grows by the minute";
 }
 
 // ---------------------------------------------------------------- missing frames

@@ -65,30 +65,30 @@ INSTANTIATE_TEST_SUITE_P(Sensors, LocatingFrames, testing::EachSensor(), testing
 TEST_P(LocatingFrames, TheMapStaysAsItIsWhileTheCameraDrivesOnBeyondIt) {
   const auto slam = Mapped();
   const Odometry before = *slam->odometry();
-  const int keyframes = before.NextKeyframeId();
+  const int keyframes = before.map().KeyframeCount();
   std::size_t found = 0, within = 0;
   for (std::size_t i = kBack; i < kEnd; ++i) {
     if (slam->Track(recording_.frames[i]).state != TrackingState::kTracking) continue;
     ++found;
-    if (slam->odometry()->BeyondMap()) continue;
+    if (slam->odometry()->LastView().beyond_map) continue;
     ++within;
-    EXPECT_LT(slam->odometry()->ReferenceKeyframe(), keyframes) << "frame " << i;
+    EXPECT_LT(slam->odometry()->LastView().keyframe, keyframes) << "frame " << i;
   }
   EXPECT_GE(found, (kEnd - kBack) * 9 / 10);
   EXPECT_GE(within, kMapped - kBack - 5);
-  EXPECT_GT(slam->odometry()->NextKeyframeId(), keyframes) << "keyframes for the time being";
+  EXPECT_GT(slam->odometry()->map().KeyframeCount(), keyframes) << "keyframes for the time being";
   for (int id = 0; id < keyframes; ++id)
-    EXPECT_EQ(slam->odometry()->KeyframePose(id).Matrix(), before.KeyframePose(id).Matrix()) << id;
-  const std::vector<LandmarkView> old = before.Landmarks(), now = slam->odometry()->Landmarks();
+    EXPECT_EQ(slam->odometry()->map().keyframe(id).T_world_camera.Matrix(),
+              before.map().keyframe(id).T_world_camera.Matrix())
+        << id;
+  const Map &old = before.map(), &now = slam->odometry()->map();
   std::size_t kept = 0;
-  for (const LandmarkView& landmark : old) {
-    const auto same = std::find_if(
-        now.begin(), now.end(), [&landmark](const LandmarkView& other) { return other.id == landmark.id; });
-    if (same == now.end()) continue;  // it was found to be the same as another one of the map
+  for (const int id : old.LandmarkIds()) {
+    if (!now.landmark(id).alive) continue;  // it was found to be the same as another one of the map
     ++kept;
-    EXPECT_EQ(same->position, landmark.position);
+    EXPECT_EQ(now.landmark(id).position, old.landmark(id).position);
   }
-  EXPECT_GE(kept, old.size() * 98 / 100);
+  EXPECT_GE(kept, old.LandmarkIds().size() * 98 / 100);
 }
 
 TEST_P(LocatingFrames, NoMoreFeaturesAreSoughtThanThePoseNeeds) {
@@ -98,7 +98,7 @@ TEST_P(LocatingFrames, NoMoreFeaturesAreSoughtThanThePoseNeeds) {
   for (std::size_t i = kBack + 1; i < kBack + 8; ++i) {
     const TrackResult result = slam->Track(recording_.frames[i]);
     ASSERT_EQ(result.state, TrackingState::kTracking) << "frame " << i;
-    EXPECT_FALSE(slam->odometry()->BeyondMap()) << "frame " << i;
+    EXPECT_FALSE(slam->odometry()->LastView().beyond_map) << "frame " << i;
     least = std::min(least, result.features);
     most_inliers = std::max(most_inliers, result.inliers);
   }

@@ -30,7 +30,7 @@ class LoopCloserTest : public ::testing::Test {
     odometry_.FinishMapping();
     frames_ = static_cast<std::int64_t>(recording_.frames.size());
   }
-  void SetUp() override { ASSERT_GT(odometry_.KeyframeIds().size(), 25u); }
+  void SetUp() override { ASSERT_GT(odometry_.map().KeyframeIds().size(), 25u); }
 
   static OdometryOptions OdometryConfig() {
     OdometryOptions options;
@@ -44,16 +44,17 @@ class LoopCloserTest : public ::testing::Test {
   }
   /// What the map says of the two keyframes, with the later one `off` [m] to the side.
   Similarity InMap(int candidate, int query, double off = 0) const {
-    Pose T = odometry_.KeyframePose(candidate).Inverse() * odometry_.KeyframePose(query);
+    Pose T = odometry_.map().keyframe(candidate).T_world_camera.Inverse() *
+             odometry_.map().keyframe(query).T_world_camera;
     T.translation.x() += off;
     return Similarity(T);
   }
   LoopRecord Proposed(int candidate, int query, bool verified = true) const {
     LoopRecord record;
-    record.candidate = odometry_.KeyframeFrameIndex(candidate);
-    record.query = odometry_.KeyframeFrameIndex(query);
-    record.candidate_stamp_s = odometry_.KeyframeStamp(candidate);
-    record.query_stamp_s = odometry_.KeyframeStamp(query);
+    record.candidate = odometry_.map().keyframe(candidate).frame_index;
+    record.query = odometry_.map().keyframe(query).frame_index;
+    record.candidate_stamp_s = odometry_.map().keyframe(candidate).stamp_s;
+    record.query_stamp_s = odometry_.map().keyframe(query).stamp_s;
     record.verified = verified;
     if (!verified) record.reason = "refused by geometry";
     return record;
@@ -76,12 +77,12 @@ class LoopCloserTest : public ::testing::Test {
   }
   /// Applies what is found by the time it is due at the latest.
   LoopUpdate Solve(LoopCloser* closer) {
-    frames_ += SolutionFrames(odometry_.KeyframeIds().size());
+    frames_ += SolutionFrames(odometry_.map().KeyframeIds().size());
     const std::optional<LoopUpdate> update = closer->Solved(odometry_, frames_);
     EXPECT_TRUE(update);
     if (!update) return {};
     if (update->correction)
-      closer->Applied(*update, Apply(*update->correction, &odometry_), odometry_, frames_);
+      closer->Applied(*update, odometry_.Correct(*update->correction), odometry_, frames_);
     return *update;
   }
 
@@ -215,9 +216,10 @@ TEST_F(LoopCloserTest, AtTheEndOfARecordingASolutionEntersAtOnce) {
 
 TEST_F(LoopCloserTest, TwoThatAgreeMoveTheMapWhenTheirSolutionIsDueAndNotBefore) {
   LoopCloser closer = Closer();
-  const Pose before = odometry_.KeyframePose(kFirst).Inverse() * odometry_.KeyframePose(kLater);
+  const Pose before = odometry_.map().keyframe(kFirst).T_world_camera.Inverse() *
+                      odometry_.map().keyframe(kLater).T_world_camera;
   ConsiderTwo(&closer, 0.5);
-  const std::int64_t due = frames_ + SolutionFrames(odometry_.KeyframeIds().size());
+  const std::int64_t due = frames_ + SolutionFrames(odometry_.map().KeyframeIds().size());
   EXPECT_FALSE(closer.MayMove(due - 1));
   EXPECT_FALSE(closer.Solved(odometry_, due - 1));
   EXPECT_TRUE(closer.MayMove(due));
@@ -226,7 +228,8 @@ TEST_F(LoopCloserTest, TwoThatAgreeMoveTheMapWhenTheirSolutionIsDueAndNotBefore)
   EXPECT_EQ(closer.Corrections(), 1);
   EXPECT_EQ(CountAccepted(closer.records()), 2u);
   EXPECT_GT(closer.records()[0].weight, 0.5);
-  const Pose after = odometry_.KeyframePose(kFirst).Inverse() * odometry_.KeyframePose(kLater);
+  const Pose after = odometry_.map().keyframe(kFirst).T_world_camera.Inverse() *
+                     odometry_.map().keyframe(kLater).T_world_camera;
   const double moved = (after.translation - before.translation).x();
   EXPECT_GT(moved, 0.25) << "the loops and the odometry share what is missing";
   EXPECT_LT(moved, 0.5);
@@ -269,7 +272,7 @@ TEST_F(LoopCloserTest, FulfilledLoopsBecomeOneMapWhereItIsAdjusted) {
   ASSERT_TRUE(update.correction);
   EXPECT_TRUE(update.correction->S_world_keyframe.empty());
   ASSERT_EQ(update.correction->fused.size(), 1u);
-  EXPECT_EQ(update.correction->fused[0].query, kLater);
+  EXPECT_EQ(update.correction->fused[0].newer, kLater);
 }
 
 TEST_F(LoopCloserTest, LoopsThatComeWhileTheGraphIsSolvedEnterAfterIt) {
@@ -292,7 +295,7 @@ TEST_F(LoopCloserTest, LoopsOfKeyframesThatAreNotThereAreDamage) {
   const auto path = testing::FreshFolder() / "map.tutti";
   internal::SectionWriter(path, kMapFile).Finish();
   const internal::SectionReader file(path, kMapFile);
-  EXPECT_NO_THROW(closer.Check(odometry_.NextKeyframeId(), file));
+  EXPECT_NO_THROW(closer.Check(odometry_.map().KeyframeCount(), file));
   EXPECT_THROW(closer.Check(kLater + 1, file), InputError);
 }
 

@@ -26,8 +26,9 @@ class LoopReachTest : public ::testing::Test {
       odometry_.Track(covered ? testing::Snow(frame) : frame);
     }
     odometry_.FinishMapping();
-    for (const int id : odometry_.KeyframeIds()) {
-      if (odometry_.KeyframePiece(id) == odometry_.KeyframePiece(odometry_.KeyframeIds().front()))
+    for (const int id : odometry_.map().KeyframeIds()) {
+      if (odometry_.map().keyframe(id).piece ==
+          odometry_.map().keyframe(odometry_.map().KeyframeIds().front()).piece)
         before_.push_back(id);
       else
         after_.push_back(id);
@@ -44,7 +45,7 @@ class LoopReachTest : public ::testing::Test {
     return options;
   }
   Pose Truth(int id) const {
-    return recording_.truth[static_cast<std::size_t>(odometry_.KeyframeFrameIndex(id))].pose;
+    return recording_.truth[static_cast<std::size_t>(odometry_.map().keyframe(id).frame_index)].pose;
   }
   /// What is true, but for the later end, which is `off` [m] to the side and turned.
   LoopEdge Loop(int candidate, int query, double off, double turned_deg = 0) const {

@@ -190,7 +190,7 @@ TEST_F(DamagedMap, ASnapshotIsWrittenAfterItsSlamSystemIsGone) {
     snapshot->Write(file_);
     CheckMapFile(file_);
     const auto again = SlamSystem::Load(file_, ReadMapInfo(file_));
-    EXPECT_EQ(again->odometry()->FrameTrajectory().size(), recording.frames.size());
+    EXPECT_EQ(FrameTrajectory(again->odometry()->map()).size(), recording.frames.size());
     const MapSnapshot moved = std::move(*snapshot);
     moved.Write(file_);
     const std::string before = Content(file_);

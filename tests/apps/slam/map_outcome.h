@@ -26,7 +26,7 @@ inline MapOutcome Finished(SlamSystem& slam) {
   MapOutcome outcome;
   const Odometry& odometry = *slam.odometry();
   std::vector<std::pair<double, Pose>> poses;
-  for (const StampedPose& pose : odometry.FrameTrajectory()) poses.emplace_back(pose.stamp_s, pose.pose);
+  for (const StampedPose& pose : FrameTrajectory(odometry.map())) poses.emplace_back(pose.stamp_s, pose.pose);
   outcome.poses = StateOf(poses);
   outcome.loops = StateOf(slam.loops());
   const PoseGraph graph = slam.Graph();
@@ -37,7 +37,7 @@ inline MapOutcome Finished(SlamSystem& slam) {
   outcome.graph = StateOf(nodes) + StateOf(edges);
   outcome.corrections = slam.Corrections();
   outcome.adjustments = slam.GlobalAdjustments();
-  outcome.frames = odometry.FrameIndices();
+  outcome.frames = FrameIndices(odometry.map());
   return outcome;
 }
 

@@ -87,8 +87,8 @@ std::pair<std::size_t, double> Locate(SlamSystem& slam, const testing::Recording
 }
 
 void ExpectOnePiece(const SlamSystem& slam) {
-  EXPECT_EQ(slam.odometry()->Pieces().size(), 1u);
-  EXPECT_EQ(Connected(slam.Graph()), slam.odometry()->KeyframeIds().size());
+  EXPECT_EQ(FramePieces(slam.odometry()->map()).size(), 1u);
+  EXPECT_EQ(Connected(slam.Graph()), slam.odometry()->map().KeyframeIds().size());
 }
 
 class Pruned : public ::testing::TestWithParam<SyntheticSensor> {};
@@ -100,20 +100,20 @@ TEST_P(Pruned, MapIsSmallerAndKeepsPosesLoopsAndGraphAndGoesOnAndTellsWhereFrame
   SlamSystem slam(WithFewFeatures(GetParam() == SyntheticSensor::kStereo), recording.rig);
   for (std::size_t i = 0; i < mapped; ++i) slam.Track(recording.frames[i]);
   slam.Finish();
-  const Trajectory trajectory = slam.odometry()->FrameTrajectory();
+  const Trajectory trajectory = FrameTrajectory(slam.odometry()->map());
   const std::string loops = StateOf(slam.loops());
   const std::size_t accepted = CountAccepted(slam.loops());
-  const std::vector<int> before = slam.odometry()->KeyframeIds();
+  const std::vector<int> before = slam.odometry()->map().KeyframeIds();
   ASSERT_GT(accepted, 0u);
 
   const std::size_t removed = slam.Prune();
-  const std::vector<int> ids = slam.odometry()->KeyframeIds();
+  const std::vector<int> ids = slam.odometry()->map().KeyframeIds();
   std::printf("  %zu of %zu keyframes removed\n", removed, before.size());
   EXPECT_GT(removed, before.size() / 12);
   EXPECT_EQ(ids.size() + removed, before.size());
   EXPECT_EQ(ids.front(), before.front());
   EXPECT_TRUE(std::includes(before.begin(), before.end(), ids.begin(), ids.end())) << "ids stay";
-  EXPECT_LT(FarthestApart(slam.odometry()->FrameTrajectory(), trajectory), 1e-9);
+  EXPECT_LT(FarthestApart(FrameTrajectory(slam.odometry()->map()), trajectory), 1e-9);
   EXPECT_EQ(StateOf(slam.loops()) == loops, true) << "records stay";
   EXPECT_EQ(slam.Graph().nodes().size(), ids.size());
   EXPECT_EQ(Connected(slam.Graph()), ids.size());
@@ -123,7 +123,7 @@ TEST_P(Pruned, MapIsSmallerAndKeepsPosesLoopsAndGraphAndGoesOnAndTellsWhereFrame
   const MapInfo info = ReadMapInfo(file);
   EXPECT_EQ(static_cast<std::size_t>(info.keyframes), ids.size());
   const auto loaded = SlamSystem::Load(file, info), located = SlamSystem::Load(file, info);
-  EXPECT_LT(FarthestApart(loaded->odometry()->FrameTrajectory(), trajectory), 1e-9);
+  EXPECT_LT(FarthestApart(FrameTrajectory(loaded->odometry()->map()), trajectory), 1e-9);
   for (SlamSystem* each : {&slam, loaded.get()}) {
     std::size_t lost = 0;
     for (std::size_t i = mapped; i < n; ++i)
@@ -132,17 +132,17 @@ TEST_P(Pruned, MapIsSmallerAndKeepsPosesLoopsAndGraphAndGoesOnAndTellsWhereFrame
     each->Finish();
   }
   EXPECT_EQ(StateOf(loaded->loops()) == StateOf(slam.loops()), true) << "goes on as the one that was saved";
-  EXPECT_EQ(loaded->odometry()->KeyframeIds(), slam.odometry()->KeyframeIds());
+  EXPECT_EQ(loaded->odometry()->map().KeyframeIds(), slam.odometry()->map().KeyframeIds());
   EXPECT_GE(CountAccepted(slam.loops()), accepted);
 
-  const auto [found, worst] = Locate(*located, recording, mapped, slam.odometry()->FrameTrajectory());
+  const auto [found, worst] = Locate(*located, recording, mapped, FrameTrajectory(slam.odometry()->map()));
   std::printf("  %zu of 45 frames located, at most %.3f from where they are\n", found, worst);
   EXPECT_GE(found, 43u);
   EXPECT_LT(worst, GetParam() == SyntheticSensor::kStereo ? 0.7 : 0.1);  // mono: units of the map
   EXPECT_NE(testing::ErrorOf([&] { located->Prune(); }).find("must stay as it is"), std::string::npos);
 
   slam.Prune();
-  EXPECT_EQ(Connected(slam.Graph()), slam.odometry()->KeyframeIds().size()) << "pruned twice";
+  EXPECT_EQ(Connected(slam.Graph()), slam.odometry()->map().KeyframeIds().size()) << "pruned twice";
 
   // Another recording goes on in it, and it can be either side of a merge.
   const auto continued = SlamSystem::Load(file, info), other = SlamSystem::Load(file, info);
@@ -175,7 +175,8 @@ TEST(Prune, WhileRunningKeepsTheMapSmallAndARunThatGoesOnIsTheOneThatNeverStoppe
   std::size_t saved = 0;
   for (std::size_t i = 0; i < recording.frames.size(); ++i) {
     whole.Track(recording.frames[i]);
-    if (saved == 0 && pruned.odometry()->KeyframeIds().size() < whole.odometry()->KeyframeIds().size() &&
+    if (saved == 0 &&
+        pruned.odometry()->map().KeyframeIds().size() < whole.odometry()->map().KeyframeIds().size() &&
         i > recording.frames.size() / 2) {
       pruned.Save(file);
       saved = i;
@@ -184,12 +185,14 @@ TEST(Prune, WhileRunningKeepsTheMapSmallAndARunThatGoesOnIsTheOneThatNeverStoppe
   }
   const testing::MapOutcome outcome = testing::Finished(pruned);
   whole.Finish();
-  const std::size_t left = pruned.odometry()->KeyframeIds().size(),
-                    all = whole.odometry()->KeyframeIds().size();
+  const std::size_t left = pruned.odometry()->map().KeyframeIds().size(),
+                    all = whole.odometry()->map().KeyframeIds().size();
   std::printf("  %zu keyframes, %zu if pruned while running\n", all, left);
   EXPECT_LT(left, all * 9 / 10);
   ExpectOnePiece(pruned);
-  EXPECT_LT(FarthestApart(pruned.odometry()->FrameTrajectory(), whole.odometry()->FrameTrajectory()), 0.5);
+  EXPECT_LT(
+      FarthestApart(FrameTrajectory(pruned.odometry()->map()), FrameTrajectory(whole.odometry()->map())),
+      0.5);
 
   ASSERT_GT(saved, 0u);
   MapInfo info = ReadMapInfo(file);

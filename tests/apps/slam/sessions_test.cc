@@ -68,8 +68,8 @@ double WorstError(const SlamSystem& slam, const MapSession& session, const Recor
   FrameRange range;
   range.first = session.frame_offset;
   range.last = session.frame_offset + session.last_frame;
-  const Trajectory found = slam.odometry()->FrameTrajectory(-1, range);
-  const std::vector<std::int64_t> numbers = slam.odometry()->FrameIndices(-1, range);
+  const Trajectory found = FrameTrajectory(slam.odometry()->map(), -1, range);
+  const std::vector<std::int64_t> numbers = FrameIndices(slam.odometry()->map(), -1, range);
   double worst = 0;
   for (std::size_t i = 0; i < found.size(); ++i) {
     const auto frame = static_cast<std::size_t>(numbers[i] - session.frame_offset);
@@ -83,12 +83,12 @@ std::size_t PosedFrames(const SlamSystem& slam, const MapSession& session) {
   FrameRange range;
   range.first = session.frame_offset;
   range.last = session.frame_offset + session.last_frame;
-  return slam.odometry()->FrameIndices(-1, range).size();
+  return FrameIndices(slam.odometry()->map(), -1, range).size();
 }
 
 std::string StateOfAll(const SlamSystem& slam) {
   std::vector<std::pair<double, Pose>> poses;
-  for (const StampedPose& pose : slam.odometry()->FrameTrajectory())
+  for (const StampedPose& pose : FrameTrajectory(slam.odometry()->map()))
     poses.emplace_back(pose.stamp_s, pose.pose);
   return StateOf(poses) + StateOf(slam.loops());
 }
@@ -118,8 +118,8 @@ TEST_P(Sessions, AnotherRecordingJoinsTheMapWhoseFrameOfReferenceStaysWithTheSam
     MapInfo info = ReadMapInfo(map);
     info.config.run.threads = threads;
     const auto slam = SlamSystem::Load(map, info);
-    const Pose before = slam->odometry()->KeyframePose(0);
-    const std::size_t submaps = slam->odometry()->Pieces().size();
+    const Pose before = slam->odometry()->map().keyframe(0).T_world_camera;
+    const std::size_t submaps = FramePieces(slam->odometry()->map()).size();
     slam->BeginSession(next.rig);
     TrackAll(next, slam.get());
     const std::vector<MapSession> sessions = slam->Sessions();
@@ -129,9 +129,9 @@ TEST_P(Sessions, AnotherRecordingJoinsTheMapWhoseFrameOfReferenceStaysWithTheSam
     EXPECT_GT(sessions[1].frame_offset, sessions[0].last_frame);
     EXPECT_GT(sessions[1].first_keyframe, sessions[0].last_keyframe);
     ASSERT_TRUE(sessions[1].joined_at.has_value());
-    EXPECT_LE(slam->odometry()->Pieces().size(), submaps) << "the session is in one of the map's";
+    EXPECT_LE(FramePieces(slam->odometry()->map()).size(), submaps) << "the session is in one of the map's";
     EXPECT_GE(PosedFrames(*slam, sessions[1]), next.frames.size() * 9 / 10);
-    const Pose moved = before.Inverse() * slam->odometry()->KeyframePose(0);
+    const Pose moved = before.Inverse() * slam->odometry()->map().keyframe(0).T_world_camera;
     EXPECT_LT(moved.translation.norm(), 0.05);
     EXPECT_LT(moved.Angle(), 0.003);
     if (GetParam() != SyntheticSensor::kMono) {
@@ -184,11 +184,11 @@ TEST(SessionsOfAMap, AnotherCameraGoesOnInItsOwnPixels) {
   SlamSystem slam(WithOneMember(), day.rig);
   TrackAll(day, &slam);
   slam.BeginSession(next.rig);
-  EXPECT_EQ(slam.odometry()->Rig().camera.width, 400);
+  EXPECT_EQ(slam.odometry()->map().rig().camera.width, 400);
   TrackAll(next, &slam);
   const std::vector<MapSession> sessions = slam.Sessions();
   ASSERT_TRUE(sessions[1].joined_at.has_value());
-  EXPECT_EQ(slam.odometry()->Pieces().size(), 1u);
+  EXPECT_EQ(FramePieces(slam.odometry()->map()).size(), 1u);
   EXPECT_LT(WorstError(slam, sessions[1], next, day.truth.front().pose), 1.5);
 }
 
@@ -216,16 +216,16 @@ TEST(SessionsOfAMap, OtherPlacesStandApartAndOtherSensorsAreRefused) {
   FrameRange own;
   own.first = sessions[1].frame_offset;
   std::size_t posed = 0;
-  for (const int piece : slam.odometry()->Pieces(own)) {
+  for (const int piece : FramePieces(slam.odometry()->map(), own)) {
     EXPECT_GE(piece, sessions[1].first_piece);
-    posed += slam.odometry()->FrameTrajectory(piece, own).size();
+    posed += FrameTrajectory(slam.odometry()->map(), piece, own).size();
   }
   EXPECT_GE(posed, 45u);
   // What was there is as it was.
   FrameRange old;
   old.last = sessions[1].frame_offset - 1;
   std::vector<std::pair<double, Pose>> poses;
-  for (const StampedPose& pose : slam.odometry()->FrameTrajectory(-1, old))
+  for (const StampedPose& pose : FrameTrajectory(slam.odometry()->map(), -1, old))
     poses.emplace_back(pose.stamp_s, pose.pose);
   EXPECT_EQ(StateOf(poses) == before.substr(0, StateOf(poses).size()), true);
 }
@@ -261,7 +261,7 @@ TEST_F(Merging, TwoMapsWithCommonPlacesAreOneForAnyThreads) {
       other = loaded("b");
     }
     ASSERT_TRUE(map->Merge(other.get()));
-    EXPECT_EQ(map->odometry()->Pieces().size(), 1u);
+    EXPECT_EQ(FramePieces(map->odometry()->map()).size(), 1u);
     const std::string bytes = StateOfAll(*map);
     if (threads == 2) first_bytes = bytes;
     EXPECT_EQ(bytes == first_bytes, true) << "another result with one thread, from files";
@@ -291,16 +291,16 @@ TEST_F(Merging, WhichMapComesFirstDecidesTheFrameOfReferenceAlone) {
   to_first->Save(b_file);
   const auto second = SlamSystem::Load(b_file, ReadMapInfo(b_file)),
              to_second = SlamSystem::Load(a_file, ReadMapInfo(a_file));
-  const Pose first_begin = first->odometry()->KeyframePose(0),
-             second_begin = second->odometry()->KeyframePose(0);
+  const Pose first_begin = first->odometry()->map().keyframe(0).T_world_camera,
+             second_begin = second->odometry()->map().keyframe(0).T_world_camera;
   int heard = 0;
   second->SetDetectionListener([&heard](const LoopResult&) { ++heard; });
   ASSERT_TRUE(first->Merge(to_first.get()));
   ASSERT_TRUE(second->Merge(to_second.get()));
   EXPECT_EQ(StateOf(first->loops()) == StateOf(second->loops()), true);
-  const std::vector<int> ids = first->odometry()->KeyframeIds();
-  ASSERT_EQ(second->odometry()->KeyframeIds(), ids);
-  ASSERT_EQ(first->odometry()->Pieces().size(), 1u);
+  const std::vector<int> ids = first->odometry()->map().KeyframeIds();
+  ASSERT_EQ(second->odometry()->map().KeyframeIds(), ids);
+  ASSERT_EQ(FramePieces(first->odometry()->map()).size(), 1u);
   // Sessions stand in the order of their time stamps.
   for (const SlamSystem* map : {first.get(), second.get()})
     EXPECT_LT(map->Sessions()[0].first_stamp_s, map->Sessions()[1].first_stamp_s);
@@ -309,11 +309,12 @@ TEST_F(Merging, WhichMapComesFirstDecidesTheFrameOfReferenceAlone) {
     const Pose off = x.Inverse() * y;
     return off.translation.norm() + off.Angle();
   };
-  EXPECT_LT(apart(first->odometry()->KeyframePose(0), first_begin), 1e-9);
-  EXPECT_LT(apart(second->odometry()->KeyframePose(b_begin), second_begin), 1e-9);
+  EXPECT_LT(apart(first->odometry()->map().keyframe(0).T_world_camera, first_begin), 1e-9);
+  EXPECT_LT(apart(second->odometry()->map().keyframe(b_begin).T_world_camera, second_begin), 1e-9);
   // From its begin all is where it is in the other one.
   const auto from = [&](const SlamSystem& map, int id) {
-    return map.odometry()->KeyframePose(b_begin).Inverse() * map.odometry()->KeyframePose(id);
+    return map.odometry()->map().keyframe(b_begin).T_world_camera.Inverse() *
+           map.odometry()->map().keyframe(id).T_world_camera;
   };
   for (const int id : ids) ASSERT_LT(apart(from(*second, id), from(*first, id)), 1e-6) << id;
   // It goes on as ever, with the listeners that it had.
@@ -355,7 +356,7 @@ struct MergedRound {
     const auto position = [&](std::int64_t number) {
       FrameRange one;
       one.first = one.last = number;
-      return map.odometry()->FrameTrajectory(-1, one).at(0).pose.translation;
+      return FrameTrajectory(map.odometry()->map(), -1, one).at(0).pose.translation;
     };
     constexpr std::int64_t kThere = 4, kAgain = kEnd + kThere;
     const double gap = (position(map.Sessions()[1].frame_offset + kAgain) - position(kThere)).norm(),

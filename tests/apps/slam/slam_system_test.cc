@@ -73,8 +73,9 @@ Result DriveOnce(const Setting& setting) {
   result.adjustments = slam.GlobalAdjustments();
   result.corrections = slam.Corrections();
   const Odometry& odometry = *slam.odometry();
-  for (const int id : odometry.KeyframeIds()) result.keyframe_stamps.push_back(odometry.KeyframeStamp(id));
-  result.trajectory = odometry.FrameTrajectory();
+  for (const int id : odometry.map().KeyframeIds())
+    result.keyframe_stamps.push_back(odometry.map().keyframe(id).stamp_s);
+  result.trajectory = FrameTrajectory(odometry.map());
   result.loops = slam.loops();
   EvaluationOptions options;
   options.alignment = TrajectoryAlignment::kSE3;

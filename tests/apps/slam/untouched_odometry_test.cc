@@ -68,7 +68,7 @@ const Alone& AloneOn(SyntheticSensor sensor, Change change) {
   Odometry odometry(ConfiguredFor(change).odometry, alone.recording.rig);
   for (const InputFrame& frame : alone.recording.frames) odometry.Track(frame);
   odometry.FinishMapping();
-  alone.trajectory = odometry.FrameTrajectory();
+  alone.trajectory = FrameTrajectory(odometry.map());
   return tracked.emplace(key, std::move(alone)).first->second;
 }
 
@@ -87,7 +87,7 @@ TEST_P(UntouchedOdometry, TrackedOnHasTheBitsOfTheOdometryAlone) {
   bool planted = false;
   for (const InputFrame& frame : recording.frames) {
     slam.Track(frame);
-    const std::vector<int> ids = slam.odometry()->KeyframeIds();
+    const std::vector<int> ids = slam.odometry()->map().KeyframeIds();
     if (planted || change != Change::kFalseLoopsAreRefused || ids.size() < 12) continue;
     slam.AddLoop(ids[1], ids[9], Similarity(1, ExpSO3({0, 1, 0}), {3, 4, 5}), MakeInformation(0.01, 0.01));
     planted = true;
@@ -104,7 +104,7 @@ TEST_P(UntouchedOdometry, TrackedOnHasTheBitsOfTheOdometryAlone) {
     if (frame.index > seen) untouched->Track(frame);
   }
   untouched->FinishMapping();
-  const Trajectory &a = AloneOn(sensor, change).trajectory, b = untouched->FrameTrajectory();
+  const Trajectory &a = AloneOn(sensor, change).trajectory, b = FrameTrajectory(untouched->map());
   ASSERT_EQ(a.size(), b.size());
   ASSERT_GT(a.size(), recording.frames.size() / 3);
   for (std::size_t i = 0; i < a.size(); ++i) EXPECT_EQ(a[i].pose.Matrix(), b[i].pose.Matrix()) << i;

@@ -1,4 +1,4 @@
-#include "frontend/map/landmark_store.h"
+#include "tutti/frontend/landmark.h"
 
 #include <gtest/gtest.h>
 

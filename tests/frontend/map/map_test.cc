@@ -1,8 +1,9 @@
-#include "frontend/map/map.h"
+#include "tutti/frontend/map.h"
 
 #include <gtest/gtest.h>
 
 #include <set>
+#include "frontend/features/features.h"
 
 namespace tutti {
 namespace {

@@ -6,8 +6,9 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "frontend/map/map.h"
+#include "frontend/features/features.h"
 #include "tests/support/plain_camera.h"
+#include "tutti/frontend/map.h"
 
 namespace tutti::testing {
 

@@ -1,4 +1,4 @@
-// Odometry::LoadSections of damaged files: refused by name, and nothing has changed.
+// OdometryFile::Load of damaged files: refused by name, and nothing has changed.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -134,8 +134,8 @@ TEST_F(DamagedOdometryState, WrongNumbersWithRightChecksumsAreRefusedOrHarmless)
     ++taken;
     for (std::size_t k = 10; k < 12; ++k) odometry.Track(RideOf(Sensor::kStereo).frames[k]);
     odometry.FinishMapping();
-    odometry.FrameTrajectory();
-    for (const int id : odometry.KeyframeIds()) odometry.Keyframe(id);
+    FrameTrajectory(odometry.map());
+    for (const int id : odometry.map().KeyframeIds()) ViewOf(odometry.map(), id);
   }
   EXPECT_GT(refused, 50);
   EXPECT_GT(taken, 20);
@@ -190,9 +190,9 @@ TEST_F(DamagedOdometryState, AnotherRigOrPyramidIsRefused) {
 
 TEST_F(DamagedOdometryState, AnAdjustmentOfAnotherMapIsRefused) {
   while (run_.next() <= kLoop + 1) run_.Next();
-  testing::WriteSections(file_, SectionsOf(run_.odometry().BeginGlobalAdjustment(0)));
+  testing::WriteSections(file_, SectionsOf(AdjustGlobally(run_.odometry(), 0)));
   internal::SectionReader in(file_, kStateFile);
-  EXPECT_THAT(testing::ErrorOf([&] { other_.odometry().LoadGlobalAdjustment(&in); }),
+  EXPECT_THAT(testing::ErrorOf([&] { OdometryFile::LoadAdjustment(other_.odometry().map(), &in); }),
               HasSubstr("is damaged"));
 }
 

@@ -43,7 +43,7 @@ double ScaleDrift(double k1, bool keep_height) {
     odometry.Track(frame);
   }
   odometry.FinishMapping();
-  const Trajectory estimate = odometry.FrameTrajectory();
+  const Trajectory estimate = FrameTrajectory(odometry.map());
   const auto scale = [&](std::size_t from, std::size_t to) {
     const std::size_t offset = recording.truth.size() - estimate.size();
     return (estimate[to].pose.translation - estimate[from].pose.translation).norm() /

@@ -14,10 +14,10 @@
 #include <vector>
 
 #include "core/section_file.h"
+#include "frontend/odometry/odometry_file.h"
 #include "tests/support/recording.h"
 #include "tests/support/rendered_world.h"
 #include "tests/support/small_town.h"
-#include "tutti/frontend/odometry.h"
 
 namespace tutti::testing {
 
@@ -35,7 +35,7 @@ using Sections = std::vector<Section>;
 template <class Object>  // Odometry, GlobalAdjustment
 Sections SectionsOf(const Object& object) {
   Sections sections;
-  object.SaveSections([&](std::uint32_t tag, std::string_view bytes) {
+  OdometryFile::Save(object, [&](std::uint32_t tag, std::string_view bytes) {
     sections.push_back({tag, std::string(bytes)});
   });
   return sections;
@@ -63,7 +63,7 @@ inline void WriteSections(const std::filesystem::path& file, const Sections& sec
 
 inline void LoadOdometry(const std::filesystem::path& file, Odometry* odometry) {
   internal::SectionReader in(file, kStateFile);
-  odometry->LoadSections(&in);
+  OdometryFile::Load(&in, odometry);
 }
 
 constexpr std::size_t kFrames = 44, kDark = 14, kLoop = 20, kEnter = 24, kElsewhere = 28, kBack = 34;
@@ -98,17 +98,16 @@ inline const Recording& RideOf(Sensor sensor) {
 class Rider {
  public:
   explicit Rider(Sensor sensor, bool own_threads = true)
-      : ride_(&RideOf(sensor)), odometry_(OptionsFor(ride_->rig), ride_->rig) {
-    odometry_.UseOwnThreads(own_threads);
-  }
+      : ride_(&RideOf(sensor)), odometry_(OptionsFor(ride_->rig), ride_->rig, {own_threads, nullptr}) {}
 
   TrackResult Next() {
     const std::size_t i = next_++;
     TrackResult result = odometry_.Track(ride_->frames[i]);
     if (i == kLoop) Loop();
     if (i == kEnter && adjustment_) {
-      const auto corrected = odometry_.CorrectionOf(*adjustment_);
-      if (corrected) odometry_.Enter(*adjustment_, *corrected);
+      const auto corrected = adjustment_->Correction(odometry_.map());
+      if (corrected)
+        odometry_.Correct({*corrected, {}, std::make_shared<const GlobalAdjustment>(*adjustment_), {}});
       entered_ = corrected.has_value();
       adjustment_.reset();
     }
@@ -122,11 +121,10 @@ class Rider {
     }
     WriteSections(file, sections);
     Rider again = *this;
-    again.odometry_ = Odometry(OptionsFor(ride_->rig), ride_->rig);
-    again.odometry_.UseOwnThreads(own_threads);
+    again.odometry_ = Odometry(OptionsFor(ride_->rig), ride_->rig, {own_threads, nullptr});
     internal::SectionReader in(file, kStateFile);
-    again.odometry_.LoadSections(&in);
-    if (adjustment_) again.adjustment_ = again.odometry_.LoadGlobalAdjustment(&in);
+    OdometryFile::Load(&in, &again.odometry_);
+    if (adjustment_) again.adjustment_ = OdometryFile::LoadAdjustment(again.odometry_.map(), &in);
     return again;
   }
   void Finish() { odometry_.FinishMapping(); }
@@ -144,18 +142,20 @@ class Rider {
     return options;
   }
   void Loop() {
-    const std::vector<int> ids = odometry_.KeyframeIds();
+    const std::vector<int> ids = odometry_.map().KeyframeIds();
     if (ids.size() < 3) return;
     std::map<int, Similarity> bent;
     for (const int id : ids) {
       const double way = 0.02 * id;
-      bent[id] =
-          Similarity(Pose(ExpSO3({0, 0.1 * way, 0}), {way, 0.3 * way, 0}) * odometry_.KeyframePose(id));
+      bent[id] = Similarity(Pose(ExpSO3({0, 0.1 * way, 0}), {way, 0.3 * way, 0}) *
+                            odometry_.map().keyframe(id).T_world_camera);
     }
-    odometry_.ApplyCorrection(bent);
+    odometry_.Correct({bent, {}, {}, {}});
     const int a = ids[ids.size() - 3], b = ids.back();
-    odometry_.FuseLoop(a, b, Similarity(odometry_.KeyframePose(a).Inverse() * odometry_.KeyframePose(b)));
-    adjustment_ = odometry_.BeginGlobalAdjustment(0);
+    const Pose T_a_b =
+        odometry_.map().keyframe(a).T_world_camera.Inverse() * odometry_.map().keyframe(b).T_world_camera;
+    odometry_.Correct({{}, {}, {}, {{a, b, Similarity(T_a_b)}}});
+    adjustment_ = AdjustGlobally(odometry_, 0);
   }
 
   const Recording* ride_;

@@ -1,4 +1,4 @@
-// Odometry::SaveSections and LoadSections: saved and loaded at any frame, it goes on as if nothing had been.
+// OdometryFile: saved and loaded at any frame, it goes on as if nothing had been.
 #include <gtest/gtest.h>
 
 #include <future>
@@ -30,9 +30,9 @@ void ExpectSame(const TrackResult& a, const TrackResult& b) {
 
 // What others see of an odometry.
 void ExpectSame(const Odometry& a, const Odometry& b) {
-  ASSERT_EQ(a.KeyframeIds(), b.KeyframeIds());
-  for (const int id : a.KeyframeIds()) {
-    const KeyframeView x = a.Keyframe(id), y = b.Keyframe(id);
+  ASSERT_EQ(a.map().KeyframeIds(), b.map().KeyframeIds());
+  for (const int id : a.map().KeyframeIds()) {
+    const KeyframeView x = ViewOf(a.map(), id), y = ViewOf(b.map(), id);
     EXPECT_EQ(x.T_world_camera.Matrix(), y.T_world_camera.Matrix()) << id;
     EXPECT_EQ(x.landmarks, y.landmarks);
     EXPECT_EQ(x.map_piece, y.map_piece);
@@ -49,13 +49,13 @@ void ExpectSame(const Odometry& a, const Odometry& b) {
     EXPECT_TRUE(x.descriptors.empty() == y.descriptors.empty() &&
                 (x.descriptors.empty() || cv::norm(x.descriptors, y.descriptors, cv::NORM_L1) == 0));
   }
-  EXPECT_EQ(a.Pieces(), b.Pieces());
-  for (const int piece : a.Pieces()) {
-    const Trajectory x = a.FrameTrajectory(piece), y = b.FrameTrajectory(piece);
+  EXPECT_EQ(FramePieces(a.map()), FramePieces(b.map()));
+  for (const int piece : FramePieces(a.map())) {
+    const Trajectory x = FrameTrajectory(a.map(), piece), y = FrameTrajectory(b.map(), piece);
     ASSERT_EQ(x.size(), y.size());
     for (std::size_t i = 0; i < x.size(); ++i) EXPECT_EQ(x[i].pose.Matrix(), y[i].pose.Matrix()) << i;
   }
-  EXPECT_EQ(a.Covisibility(1), b.Covisibility(1));
+  EXPECT_EQ(Covisibility(a.map(), 1), Covisibility(b.map(), 1));
 }
 
 class OdometryState : public ::testing::TestWithParam<Sensor> {
@@ -84,7 +84,7 @@ TEST_P(OdometryState, SavedAndLoadedAfterEachFrameItIsTheOneThatNeverWas) {
   }
   EXPECT_TRUE(plain.entered()) << "the adjustment";
   EXPECT_TRUE(handed_on.entered());
-  EXPECT_GE(plain.odometry().Pieces().size(), 2U);
+  EXPECT_GE(FramePieces(plain.odometry().map()).size(), 2U);
   EXPECT_GE(keyframes, 5);
   EXPECT_GT(states[TrackingState::kLost], 2);
   EXPECT_GT(states[TrackingState::kTracking], 20);
@@ -98,7 +98,7 @@ TEST_P(OdometryState, SavedOnceItGoesOnAsTheOneThatWentOn) {
     Rider run(GetParam());
     while (run.next() < k) run.Next();
     Rider again = run.Again(file_, false);
-    EXPECT_EQ(run.odometry().StageMilliseconds(), again.odometry().StageMilliseconds());
+    EXPECT_EQ(run.odometry().Report().stage_ms, again.odometry().Report().stage_ms);
     while (run.next() < kFrames) ExpectSame(again.Next(), run.Next());
     ExpectEqual(WithoutTimes(SectionsOf(again.odometry())), WithoutTimes(SectionsOf(run.odometry())));
     run.Finish();

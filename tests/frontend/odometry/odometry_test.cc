@@ -67,22 +67,22 @@ void ExpectSameBits(const Trajectory& a, const Trajectory& b) {
 TEST(Odometry, StereoFollowsTheTruthInMetres) {
   Odometry odometry(OdometryOptions(), Stereo().rig);
   TrackAll(Stereo(), odometry);
-  const Trajectory estimate = odometry.FrameTrajectory();
+  const Trajectory estimate = FrameTrajectory(odometry.map());
   ASSERT_EQ(estimate.size(), Stereo().frames.size());
   EXPECT_LT(EndError(Stereo().truth, estimate, false), 0.015 * PathLength(Stereo().truth));
-  EXPECT_LT(odometry.StereoRowErrorPx(), 0.5);
-  EXPECT_GT(odometry.StereoMatches(), 100);
+  EXPECT_LT(odometry.Report().stereo_row_error_px, 0.5);
+  EXPECT_GT(odometry.Report().stereo_matches, 100);
 }
 
 TEST(Odometry, SeenLandmarksGoOnFromFrameToFrame) {
   Odometry odometry(OdometryOptions(), Stereo().rig);
-  EXPECT_TRUE(odometry.SeenLandmarks().empty());
+  EXPECT_TRUE(odometry.LastView().landmarks.empty());
   std::map<int, cv::Point2f> before;
   for (const InputFrame& frame : Stereo().frames) {
     const TrackResult track = odometry.Track(frame);
     ASSERT_EQ(track.state, TrackingState::kTracking);
     std::map<int, cv::Point2f> now;
-    for (const SeenLandmark& seen : odometry.SeenLandmarks()) now[seen.landmark] = seen.pixel;
+    for (const SeenLandmark& seen : odometry.LastView().landmarks) now[seen.landmark] = seen.pixel;
     // A keyframe's include those that it made.
     if (track.keyframe < 0)
       EXPECT_EQ(now.size(), static_cast<std::size_t>(track.inliers)) << frame.index;
@@ -108,29 +108,30 @@ TEST(Odometry, LandmarksAreThoseThatKeyframesSeeWithTheirNumberOfViews) {
   TrackAll(Stereo(), odometry);
   odometry.FinishMapping();
   std::map<int, int> views;
-  for (const int id : odometry.KeyframeIds()) {
-    for (const int landmark : odometry.Keyframe(id).landmarks) {
+  for (const int id : odometry.map().KeyframeIds()) {
+    for (const int landmark : ViewOf(odometry.map(), id).landmarks) {
       if (landmark >= 0) ++views[landmark];
     }
   }
-  const std::vector<LandmarkView> landmarks = odometry.Landmarks();
+  const std::vector<int> landmarks = odometry.map().LandmarkIds();
   ASSERT_EQ(landmarks.size(), views.size());
   auto expected = views.begin();
-  for (const LandmarkView& landmark : landmarks) {
-    EXPECT_EQ(landmark.id, expected->first);
-    EXPECT_EQ(landmark.observations, expected->second);
+  for (const int id : landmarks) {
+    const Landmark& landmark = odometry.map().landmark(id);
+    EXPECT_EQ(id, expected->first);
+    EXPECT_EQ(static_cast<int>(landmark.observations.size()), expected->second);
     EXPECT_TRUE(landmark.position.allFinite());
     ++expected;
   }
-  EXPECT_EQ(odometry.Rig().camera.fx, Stereo().rig.camera.fx);
-  EXPECT_EQ(odometry.Rig().baseline_m, Stereo().rig.baseline_m);
+  EXPECT_EQ(odometry.map().rig().camera.fx, Stereo().rig.camera.fx);
+  EXPECT_EQ(odometry.map().rig().baseline_m, Stereo().rig.baseline_m);
 }
 
 TEST(Odometry, RgbdFollowsTheTruthInMetres) {
   const Recording room = Record(SyntheticScene::kRoom, SyntheticSensor::kRgbd, 40);
   Odometry odometry(OdometryOptions(), room.rig);
   TrackAll(room, odometry);
-  const Trajectory estimate = odometry.FrameTrajectory();
+  const Trajectory estimate = FrameTrajectory(odometry.map());
   ASSERT_EQ(estimate.size(), room.frames.size());
   EXPECT_LT(EndError(room.truth, estimate, false), 0.01 * PathLength(room.truth));
 }
@@ -145,8 +146,9 @@ Recording WithoutDepth(Recording recording, const Absent& absent) {
 }
 
 void ExpectKeyframesHaveDepth(const Odometry& odometry, const Recording& recording) {
-  for (const int id : odometry.KeyframeIds()) {
-    const InputFrame& frame = recording.frames.at(static_cast<std::size_t>(odometry.KeyframeFrameIndex(id)));
+  for (const int id : odometry.map().KeyframeIds()) {
+    const InputFrame& frame =
+        recording.frames.at(static_cast<std::size_t>(odometry.map().keyframe(id).frame_index));
     EXPECT_FALSE(frame.right.empty() && frame.depth_m.empty()) << frame.index;
   }
 }
@@ -157,7 +159,7 @@ TEST(Odometry, EveryThirdFrameWithoutDepthIsTrackedWithColourAlone) {
   Odometry odometry(OdometryOptions(), holes.rig);
   for (const TrackResult& track : TrackAll(holes, odometry))
     EXPECT_EQ(track.state, TrackingState::kTracking) << track.reason;
-  const Trajectory estimate = odometry.FrameTrajectory();
+  const Trajectory estimate = FrameTrajectory(odometry.map());
   ASSERT_EQ(estimate.size(), room.frames.size());
   EXPECT_LT(EndError(room.truth, estimate, false), 0.01 * PathLength(room.truth));
   ExpectKeyframesHaveDepth(odometry, holes);
@@ -171,7 +173,7 @@ TEST(Odometry, FramesBeforeTheFirstDepthAreGivenTheirPosesOnceItComes) {
   EXPECT_EQ(results[4].state, TrackingState::kInitializing);
   EXPECT_THAT(results[4].reason, HasSubstr("waiting for a frame with depth"));
   EXPECT_EQ(results[5].keyframe, 0);
-  const Trajectory estimate = odometry.FrameTrajectory();
+  const Trajectory estimate = FrameTrajectory(odometry.map());
   ASSERT_EQ(estimate.size(), room.frames.size());
   for (std::size_t i = 0; i < estimate.size(); ++i) {
     EXPECT_EQ(estimate[i].stamp_s, room.truth[i].stamp_s);
@@ -185,11 +187,11 @@ TEST(Odometry, FramesWithoutTheirRightImageAreTrackedWithTheLeftAlone) {
   const Recording holes = WithoutDepth(Stereo(), [](std::int64_t i) { return i == 0 || i % 2 == 1; });
   Odometry odometry(OdometryOptions(), holes.rig);
   TrackAll(holes, odometry);
-  const Trajectory estimate = odometry.FrameTrajectory();
+  const Trajectory estimate = FrameTrajectory(odometry.map());
   ASSERT_EQ(estimate.size(), holes.frames.size());
   EXPECT_LT(EndError(holes.truth, estimate, false), 0.015 * PathLength(holes.truth));
   ExpectKeyframesHaveDepth(odometry, holes);
-  EXPECT_GT(odometry.StereoMatches(), 100) << "of the pairs";
+  EXPECT_GT(odometry.Report().stereo_matches, 100) << "of the pairs";
 }
 
 TEST(Odometry, NoDepthAtAllStartsNoMap) {
@@ -199,7 +201,7 @@ TEST(Odometry, NoDepthAtAllStartsNoMap) {
     EXPECT_EQ(track.state, TrackingState::kInitializing);
     EXPECT_THAT(track.reason, HasSubstr("waiting for a frame with depth"));
   }
-  EXPECT_TRUE(odometry.FrameTrajectory().empty());
+  EXPECT_TRUE(FrameTrajectory(odometry.map()).empty());
 }
 
 TEST(Odometry, FastTurnsGetAKeyframeBeforeMostOfTheViewIsNew) {
@@ -213,8 +215,8 @@ TEST(Odometry, FastTurnsGetAKeyframeBeforeMostOfTheViewIsNew) {
     odometry_options.keyframe_uncovered_ratio = uncovered_ratio;
     Odometry odometry(odometry_options, room.rig);
     TrackAll(room, odometry);
-    EXPECT_EQ(odometry.FrameTrajectory().size(), room.frames.size());
-    return EndError(room.truth, odometry.FrameTrajectory(), false) / PathLength(room.truth);
+    EXPECT_EQ(FrameTrajectory(odometry.map()).size(), room.frames.size());
+    return EndError(room.truth, FrameTrajectory(odometry.map()), false) / PathLength(room.truth);
   };
   const double with = error(OdometryOptions().keyframe_uncovered_ratio), without = error(1);
   EXPECT_LT(with, 0.03);
@@ -231,7 +233,7 @@ TEST(Odometry, MonoFollowsTheTruthUpToScaleAndPosesTheFirstFramesBackwards) {
   EXPECT_EQ(results.front().state, TrackingState::kInitializing);
   EXPECT_FALSE(results.front().reason.empty());
   EXPECT_EQ(results.back().state, TrackingState::kTracking);
-  const Trajectory estimate = odometry.FrameTrajectory();
+  const Trajectory estimate = FrameTrajectory(odometry.map());
   ASSERT_EQ(estimate.size(), mono.frames.size());
   EXPECT_LT(EndError(mono.truth, estimate, true), 0.03 * PathLength(mono.truth));
 }
@@ -244,7 +246,7 @@ TEST(Odometry, SameFramesGiveTheSameBitsAndSoDoFeaturesExtractedBefore) {
     prepared.features = b.Extract(frame);
     b.Track(prepared);
   }
-  ExpectSameBits(a.FrameTrajectory(), b.FrameTrajectory());
+  ExpectSameBits(FrameTrajectory(a.map()), FrameTrajectory(b.map()));
 }
 
 TEST(Odometry, CopyGoesOnAsTheOriginalWould) {
@@ -253,7 +255,7 @@ TEST(Odometry, CopyGoesOnAsTheOriginalWould) {
   Odometry copy(odometry);
   TrackAll(Stereo(), odometry, 20);
   TrackAll(Stereo(), copy, 20);
-  ExpectSameBits(odometry.FrameTrajectory(), copy.FrameTrajectory());
+  ExpectSameBits(FrameTrajectory(odometry.map()), FrameTrajectory(copy.map()));
 }
 
 TEST(Odometry, CorrectionMovesTheMapAndTrackingGoesOnFromThere) {
@@ -264,11 +266,12 @@ TEST(Odometry, CorrectionMovesTheMapAndTrackingGoesOnFromThere) {
   }
   const Pose shift(ExpSO3({0, 0.3, 0}), {5, -1, 2});
   std::map<int, Similarity> corrected;
-  for (const int id : odometry.KeyframeIds()) corrected[id] = Similarity(shift * odometry.KeyframePose(id));
-  odometry.ApplyCorrection(corrected);
+  for (const int id : odometry.map().KeyframeIds())
+    corrected[id] = Similarity(shift * odometry.map().keyframe(id).T_world_camera);
+  odometry.Correct({corrected});
   TrackAll(Stereo(), odometry, 20);
   TrackAll(Stereo(), plain, 20);
-  const Trajectory moved = odometry.FrameTrajectory(), expected = plain.FrameTrajectory();
+  const Trajectory moved = FrameTrajectory(odometry.map()), expected = FrameTrajectory(plain.map());
   ASSERT_EQ(moved.size(), expected.size());
   for (std::size_t i = 0; i < moved.size(); ++i) {
     EXPECT_LT(LogSE3((shift * expected[i].pose).Inverse() * moved[i].pose).norm(), 0.02) << i;
@@ -287,10 +290,10 @@ TEST(Odometry, BlackFrameIsLostWithAReasonAndTheNextOnesAreFoundAgain) {
       EXPECT_EQ(result.state, TrackingState::kTracking) << "frame " << i << ": " << result.reason;
     }
   }
-  const Trajectory estimate = odometry.FrameTrajectory();
+  const Trajectory estimate = FrameTrajectory(odometry.map());
   EXPECT_EQ(estimate.size(), Stereo().frames.size() - 1);
   EXPECT_LT(EndError(Stereo().truth, estimate, false), 0.02 * PathLength(Stereo().truth));
-  EXPECT_EQ(odometry.KeyframePiece(odometry.KeyframeIds().back()), 0);
+  EXPECT_EQ(odometry.map().keyframe(odometry.map().KeyframeIds().back()).piece, 0);
 }
 
 TEST(Odometry, LongWithNothingOfTheMapInViewStartsANewPiece) {
@@ -301,12 +304,12 @@ TEST(Odometry, LongWithNothingOfTheMapInViewStartsANewPiece) {
     const bool elsewhere = i >= 10 && i < 20;
     odometry.Track(elsewhere ? Snow(Stereo().frames[i]) : Stereo().frames[i]);
   }
-  EXPECT_EQ(odometry.KeyframePiece(odometry.KeyframeIds().back()), 1);
-  EXPECT_EQ(odometry.Pieces(), (std::vector<int>{1, 0}));
-  EXPECT_EQ(odometry.FrameTrajectory(0).size(), 10U);
-  EXPECT_EQ(odometry.FrameTrajectory(1).size(), Stereo().frames.size() - 20);
-  EXPECT_EQ(odometry.FrameIndices(1).front(), 20);
-  EXPECT_EQ(odometry.FrameTrajectory().size(), Stereo().frames.size() - 20) << "the larger piece";
+  EXPECT_EQ(odometry.map().keyframe(odometry.map().KeyframeIds().back()).piece, 1);
+  EXPECT_EQ(FramePieces(odometry.map()), (std::vector<int>{1, 0}));
+  EXPECT_EQ(FrameTrajectory(odometry.map(), 0).size(), 10U);
+  EXPECT_EQ(FrameTrajectory(odometry.map(), 1).size(), Stereo().frames.size() - 20);
+  EXPECT_EQ(FrameIndices(odometry.map(), 1).front(), 20);
+  EXPECT_EQ(FrameTrajectory(odometry.map()).size(), Stereo().frames.size() - 20) << "the larger piece";
 }
 
 TEST(Odometry, DarknessLosesNoPlace) {
@@ -317,8 +320,8 @@ TEST(Odometry, DarknessLosesNoPlace) {
     const bool dark = i >= 10 && i < 15;
     odometry.Track(dark ? Black(Stereo().frames[i]) : Stereo().frames[i]);
   }
-  EXPECT_EQ(odometry.Pieces(), std::vector<int>{0});
-  EXPECT_EQ(odometry.FrameTrajectory().size(), Stereo().frames.size() - 5);
+  EXPECT_EQ(FramePieces(odometry.map()), std::vector<int>{0});
+  EXPECT_EQ(FrameTrajectory(odometry.map()).size(), Stereo().frames.size() - 5);
 }
 
 TEST(Odometry, RelocalizesTheLostFrameAtAKeyframeThatShowsItsPlace) {
@@ -326,18 +329,19 @@ TEST(Odometry, RelocalizesTheLostFrameAtAKeyframeThatShowsItsPlace) {
   options.keyframe_inlier_ratio = 0.95;  // more keyframes than a lost frame is compared with by itself
   Odometry odometry(options, Stereo().rig);
   TrackAll(Stereo(), odometry);
-  const int first = odometry.KeyframeIds().front();
+  const int first = odometry.map().KeyframeIds().front();
   const TrackResult kept = odometry.RelocalizeAt(first);
   EXPECT_EQ(kept.state, TrackingState::kTracking) << "nothing is lost, nothing changes";
   InputFrame carried = Stereo().frames[1];
   carried.index = static_cast<std::int64_t>(Stereo().frames.size());
   carried.stamp_s = Stereo().frames.back().stamp_s + 0.1;
   ASSERT_EQ(odometry.Track(carried).state, TrackingState::kLost);
-  EXPECT_EQ(odometry.RelocalizeAt(odometry.KeyframeIds().back()).state, TrackingState::kLost) << "not there";
+  EXPECT_EQ(odometry.RelocalizeAt(odometry.map().KeyframeIds().back()).state, TrackingState::kLost)
+      << "not there";
   const TrackResult found = odometry.RelocalizeAt(first);
   ASSERT_EQ(found.state, TrackingState::kTracking) << found.reason;
   EXPECT_LT((found.T_world_camera.translation - Stereo().truth[1].pose.translation).norm(), 0.05);
-  EXPECT_EQ(odometry.FrameTrajectory().size(), Stereo().frames.size() + 1);
+  EXPECT_EQ(FrameTrajectory(odometry.map()).size(), Stereo().frames.size() + 1);
 }
 
 TEST(Odometry, BlankImagesNeverStartAMap) {
@@ -347,8 +351,8 @@ TEST(Odometry, BlankImagesNeverStartAMap) {
     EXPECT_EQ(result.state, TrackingState::kInitializing);
     EXPECT_FALSE(result.reason.empty());
   }
-  EXPECT_TRUE(odometry.KeyframeIds().empty());
-  EXPECT_TRUE(odometry.FrameTrajectory().empty());
+  EXPECT_TRUE(odometry.map().KeyframeIds().empty());
+  EXPECT_TRUE(FrameTrajectory(odometry.map()).empty());
 }
 
 TEST(Odometry, UnusableRigsAndOptionsAreRefused) {

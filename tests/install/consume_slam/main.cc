@@ -21,6 +21,6 @@ int main() {
     if (slam.Track(frame).state == tutti::TrackingState::kTracking) return 1;
   }
   slam.Finish();
-  std::printf("tutti %s: %zu poses\n", tutti::kVersion, slam.odometry()->FrameTrajectory().size());
-  return slam.odometry()->FrameTrajectory().empty() ? 0 : 1;
+  std::printf("tutti %s: %zu poses\n", tutti::kVersion, FrameTrajectory(slam.odometry()->map()).size());
+  return FrameTrajectory(slam.odometry()->map()).empty() ? 0 : 1;
 }

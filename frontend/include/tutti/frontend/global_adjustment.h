@@ -1,17 +1,20 @@
 // Bundle adjustment of a whole map, beside the tracking.
 #pragma once
 
-#include <cstdint>
-#include <functional>
+#include <map>
 #include <memory>
-#include <string_view>
+#include <optional>
+
+#include "tutti/core/pose.h"
 
 #pragma GCC visibility push(default)
 namespace tutti {
 
-/// Bundle adjustment over all keyframes of a map as it was at one moment. Made by
-/// Odometry::BeginGlobalAdjustment, brought in by Odometry::Enter; in between the odometry goes on. Copies
-/// share the work.
+class Map;
+class Odometry;
+
+/// Bundle adjustment over all keyframes of a submap as it was at one moment. Made by AdjustGlobally, brought
+/// in by Odometry::Correct; in between the odometry goes on. Copies share the work.
 class GlobalAdjustment {
  public:
   class Work;
@@ -28,12 +31,13 @@ class GlobalAdjustment {
   void Cancel();
   /// Keyframes that it moves.
   int Keyframes() const;
-  /// Waits for the result, and gives it to `sink` as a section of a file (Odometry::LoadGlobalAdjustment).
-  /// Safe on another thread than the one that uses a copy.
-  void SaveSections(const std::function<void(std::uint32_t tag, std::string_view bytes)>& sink) const;
+  /// Waits for the result. Where it moves the keyframes; those of `now` that came since follow. None if it
+  /// found nothing better.
+  std::optional<std::map<int, Similarity>> Correction(const Map& now) const;
 
  private:
-  friend class Odometry;
+  friend class Odometry;  // whose implementation takes the landmarks
+  friend class OdometryFile;
   std::shared_ptr<Work> work_;
 };
 

@@ -3,28 +3,22 @@
 
 #include <cstdint>
 #include <functional>
-#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include "tutti/core/pose.h"
 #include "tutti/core/span_recorder.h"
-#include "tutti/core/trajectory.h"
 #include "tutti/frontend/frame.h"
 #include "tutti/frontend/global_adjustment.h"
+#include "tutti/frontend/map.h"
 #include "tutti/frontend/odometry_options.h"
 
 #pragma GCC visibility push(default)
 namespace tutti {
-
-namespace internal {
-class SectionReader;
-}
 
 enum class TrackingState { kInitializing, kTracking, kLost };
 const char* ToString(TrackingState state);
@@ -47,37 +41,10 @@ struct TrackResult {
   int features = 0;               ///< in the image
   int inliers = 0;                ///< landmarks that agree with the pose
   bool by_grey_values = false;    ///< no landmarks: in a blurred image, the grey values of the one before
-  int keyframe = -1;              ///< id of the keyframe that this frame became, or -1; see TakeMapped
+  int keyframe = -1;              ///< id of the keyframe that this frame became, or -1
   std::optional<StepCheck> step;  ///< Follow, of a keyframe, if the images say enough
-};
-
-/// A keyframe's features as the loop closure and the pose graph see them. Frames of reference: the camera's.
-struct KeyframeView {
-  int id = -1;                   ///< grows by one with each keyframe
-  std::int64_t frame_index = 0;  ///< index of the input frame
-  double stamp_s = 0;
-  int map_piece = 0;  ///< grows when tracking was lost and started again elsewhere
-  Pose T_world_camera;
-  std::vector<cv::KeyPoint> keypoints;  ///< size N
-  cv::Mat descriptors;                  ///< N x 32, CV_8U (ORB)
-  std::vector<Eigen::Vector3d> points;  ///< N points in the camera frame [m]; NaN where unknown
-  std::vector<int> landmarks;           ///< N landmark ids, -1 where none
-  std::vector<float> inverse_depth;     ///< N, measured by stereo or depth images [1/m]; 0 where they did not
-  std::vector<float> inverse_depth_sigma;  ///< N, standard deviation of inverse_depth [1/m]
-};
-
-/// A point of the map. Frame of reference: the world of its map piece.
-struct LandmarkView {
-  int id = -1;
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< [m]
-  int observations = 0;                                ///< keyframes that see it, at least 1
-};
-
-/// Frames by their number (InputFrame::index, and the offset of BeginSession): of one recording, for example.
-struct FrameRange {
-  std::int64_t first = std::numeric_limits<std::int64_t>::min();
-  std::int64_t last = std::numeric_limits<std::int64_t>::max();  ///< included
-  bool Has(std::int64_t number) const { return number >= first && number <= last; }
+  /// Keyframes whose mapping has entered since the frame before, oldest first: all their landmarks are known.
+  std::vector<int> mapped;
 };
 
 /// A landmark as a frame shows it.
@@ -109,12 +76,76 @@ struct HeightFound {
   double log_scale = 0;  ///< logarithm of all these corrections together
 };
 
-/// Odometry of one camera rig. A value type: a copy goes on independently (the pipeline uses that to know
-/// what the odometry alone would have done). Deterministic: the same frames give the same bits.
+/// The last frame that has a pose, as the map explains it.
+struct FrameView {
+  int keyframe = -1;  ///< shares most landmarks with it; in Locating one of the map unless beyond_map; -1: no
+                      ///< frame has a pose yet
+  int newest_keyframe = -1;       ///< or the one at which the frame was found again
+  std::int64_t frame_offset = 0;  ///< added to InputFrame::index of the present recording
+  int session_piece = 0;  ///< submap that the present recording started, or starts when it can: all of
+                          ///< before have smaller numbers
+  /// In Locating: too few of the map's landmarks agree with it, fewer than a lost frame is found again by.
+  bool beyond_map = false;
+  /// Landmarks that agree with its pose (of a keyframe also those that it made), in the order of its
+  /// features.
+  std::vector<SeenLandmark> landmarks;
+};
+
+/// What an odometry found out beside poses, so far.
+struct OdometryReport {
+  std::map<std::string, double> stage_ms;  ///< milliseconds by stage ("extract", "track", "local_ba", ...)
+  double stereo_row_error_px = 0;          ///< stereo: median row difference over matches [px]
+  double stereo_matches = 0;               ///< stereo: matches of the median frame
+  std::optional<LensFound> lens;           ///< one camera, by self-calibration; none with lens_sigma 0
+  std::optional<HeightFound>
+      height;  ///< one camera above the ground; none: no ground was seen, or looked for
+};
+
+/// How an odometry works, which decides nothing but the time that it takes.
+struct Execution {
+  bool own_threads = true;  ///< false: mapping is done on the caller's thread
+  /// Records each stage of each frame; must outlive the odometry and its copies. Null: nothing is recorded.
+  SpanRecorder* recorder = nullptr;
+};
+
+/// How a map changes when loops are closed, in the order of the fields.
+struct MapCorrection {
+  /// Corrected poses (scale 1 for metric sensors) of the keyframes that move; landmarks and frames go along.
+  std::map<int, Similarity> S_world_keyframe;
+  std::map<int, int> merges =
+      {};  ///< submap -> the submap that it joined, whose frame of reference is its own now
+  /// Landmarks are where it found them, if there is one.
+  std::shared_ptr<const GlobalAdjustment> adjustment = {};
+  /// What the keyframes around both ends see becomes one, where the loop says that it is.
+  struct Fusion {
+    int older = -1, newer = -1;
+    Similarity S_older_newer;
+  };
+  std::vector<Fusion> fused = {};
+};
+
+/// Makes an odometry that locates frames in a map.
+struct Locating {};
+
+/// Odometry of one camera rig: owns the map that it makes. A value type: a copy goes on independently (the
+/// pipeline uses that to know what the odometry alone would have done). Deterministic: the same frames give
+/// the same bits.
 class Odometry {
  public:
   /// Throws InputError if options or rig are not usable (uncalibrated, no baseline for stereo, ...).
-  Odometry(const OdometryOptions& options, const CameraRig& rig);
+  Odometry(const OdometryOptions& options, const CameraRig& rig, const Execution& execution = {});
+  /// Frames of another recording, by map.rig(), go on in a map: that of `before` or one that was made of it
+  /// (WithRig, Append). They start a submap of their own, unless RelocalizeAt finds one of the first of them
+  /// in the map. `frame_offset` is added to their InputFrame::index in all that this object tells: it should
+  /// lead past every number that the map has. Time stamps may begin anew, and so does self-calibration of
+  /// another camera than that of `before`.
+  Odometry(const Odometry& before, Map map, std::int64_t frame_offset);
+  /// Frames are located in the map of `before`, which stays as it is; where it shows too little of what is in
+  /// view, keyframes are made for the time being. The next frame is lost until RelocalizeAt finds it. Frames
+  /// without InputFrame::features get no more features than their pose needs. Beyond the map, RelocalizeAt
+  /// may be called at any frame to find back from there. The map has no frames but those that are located.
+  Odometry(const Odometry& before, Locating);
+  Odometry(const Odometry& other, const Execution& execution);
   Odometry(const Odometry& other);
   Odometry& operator=(const Odometry& other);
   Odometry(Odometry&&) noexcept;
@@ -142,153 +173,42 @@ class Odometry {
   /// Returns what Track did if that fails, or if there is no such frame.
   TrackResult RelocalizeAt(int keyframe);
 
-  /// From now on frames of another recording come, taken by this rig; sensor and image pyramid must be those
-  /// of the map. They start a piece of the map of their own, unless RelocalizeAt finds one of the first of
-  /// them in the map that is there. `frame_offset` is added to their InputFrame::index in all that this
-  /// object tells: it should lead past every number that the map has. Time stamps may begin anew. Another
-  /// camera than that of the frames so far (size, focal length, baseline) is carried over to: what the
-  /// keyframes saw is in its pixels from then on, and its self-calibration begins anew. Throws InputError for
-  /// another kind of sensor, or a focal length that is too different; this object is then as it was.
-  void BeginSession(const CameraRig& rig, std::int64_t frame_offset);
-  /// That is added to the InputFrame::index of the present recording; 0 without BeginSession.
-  std::int64_t FrameOffset() const;
-  /// Appends the map and the frames of another odometry, which stand apart as pieces of their own: its
-  /// keyframes get ids after those that are there, its frame numbers this offset, its pieces numbers that are
-  /// new. Its camera may be another one, as in BeginSession; throws InputError as that does. No frame may be
-  /// tracked before the next BeginSession.
-  void Append(const Odometry& other, std::int64_t frame_offset);
-  /// Number of the map piece that the present recording started, or starts when it can: all pieces of before
-  /// have smaller ones.
-  int SessionPiece() const;
-
-  /// From now on frames are located in the map that is there. The frames so far are forgotten, and the next
-  /// one is lost until RelocalizeAt finds it. Time stamps may begin anew. The map stays as it is; where it
-  /// shows too little of what is in view, keyframes are made for the time being. Frames without
-  /// InputFrame::features get no more features than their pose needs. Beyond the map, RelocalizeAt may be
-  /// called at any frame to find back from there.
-  void BeginLocalization();
-  /// True if, after BeginLocalization, too few of the map's landmarks agree with the last frame that has a
-  /// pose: fewer than a lost frame is found again by.
-  bool BeyondMap() const;
-  /// Keyframe that shares most landmarks with the last frame that has a pose, after BeginLocalization one of
-  /// the map unless BeyondMap(); -1 if there was none.
-  int ReferenceKeyframe() const;
-  /// Covariance of the pose of that frame given the map: position [m] in the world, then rotation [rad] about
-  /// the camera's axes (T_world_camera Exp(tangent), to the first order). None if there was no such frame, or
-  /// if its landmarks do not determine it.
-  std::optional<Matrix6d> PoseCovariance() const;
+  /// As it is between two frames; mapping may be under way.
+  const Map& map() const;
 
   /// A new keyframe is mapped (landmarks, local bundle adjustment) beside the tracking of the next frames;
   /// what comes of it enters after OdometryOptions::mapping_delay_frames, whenever it is ready. Waits for
-  /// what is under way and brings it in now; to be called after the last frame.
-  void FinishMapping();
-  /// Keyframes whose mapping has entered since the last call, oldest first: all their landmarks are known.
-  std::vector<int> TakeMapped();
-  /// false: mapping is done on the caller's thread, with the same result.
-  void UseOwnThreads(bool own_threads);
+  /// what is under way and brings it in now; to be called after the last frame. Returns the keyframes whose
+  /// mapping has entered since the last frame (TrackResult::mapped).
+  std::vector<int> FinishMapping();
 
-  /// The landmarks that agree with the pose of the last frame that has one (of a keyframe also those that it
-  /// made), in the order of its features. Costs a look at each feature.
-  std::vector<SeenLandmark> SeenLandmarks() const;
+  /// Changes the map, and goes on tracking from the corrected place. Returns for each fusion how many
+  /// landmarks both sides have in common then.
+  std::vector<int> Correct(const MapCorrection& correction);
 
-  /// Ids of all keyframes that are in the map, ascending.
-  std::vector<int> KeyframeIds() const;
-  /// The id of the next keyframe: greater than those of all that are or were in the map.
-  int NextKeyframeId() const;
-  /// Everything about one keyframe, with the current map's points.
-  KeyframeView Keyframe(int id) const;
-  Pose KeyframePose(int id) const;
-  int KeyframePiece(int id) const;
-  std::int64_t KeyframeFrameIndex(int id) const;
-  double KeyframeStamp(int id) const;
+  /// Goes on in this map: its own of after FinishMapping, where keyframes but those of LastView may have been
+  /// removed (Prune) and landmarks fused (FuseAll).
+  void Replace(Map map);
 
-  /// Number of landmarks that are in the map.
-  int LandmarkCount() const;
-  /// The landmarks that are there now, ascending by id. A landmark that was merged into another one is that
-  /// one.
-  std::vector<LandmarkView> Landmarks() const;
-  /// The rig that it was made for.
-  const CameraRig& Rig() const;
-
-  /// Pairs of keyframes (older id, newer id) that see at least `min_shared` common landmarks, with that
-  /// number.
-  std::vector<std::pair<std::pair<int, int>, int>> Covisibility(int min_shared) const;
-
-  /// Moves keyframes to corrected poses S_world_camera (scale 1 for metric sensors); landmarks and the
-  /// current pose go along with their keyframes, so that tracking goes on from the corrected place. `merges`:
-  /// pieces whose keyframes are now in one frame of reference: piece -> the piece that it joined.
-  void ApplyCorrection(const std::map<int, Similarity>& S_world_keyframe,
-                       const std::map<int, int>& merges = {});
-
-  /// After a loop moved the map: what the keyframes around `older` see is looked for in those around `newer`,
-  /// where the loop says it must be, and landmarks that are the same become one. Returns how many landmarks
-  /// both sides have in common then.
-  int FuseLoop(int older, int newer, const Similarity& S_older_newer);
-
-  /// What keyframes see of the same landmarks is looked for in all that should see it, and fused.
-  void FuseAll();
-
-  /// Removes keyframes that the map can do without, the newest first: at least 85 % of their landmarks are
-  /// seen by three others, or from an earlier visit. What keyframes see of the same landmarks is found first,
-  /// and fused. The first keyframe of each piece stays, and what the last frame hangs on. Frames
-  /// hang on the keyframe that stands for theirs, and stay where they are. `may(removed, into)`, asked of
-  /// each, can forbid it, and is asked again for other keyframes to stand for it. Returns which older
-  /// keyframe stands for each that was removed; that one may be removed, too. Ids stay as they are. Throws
-  /// InputError while frames are being located (BeginLocalization).
-  std::map<int, int> RemoveRedundantKeyframes(const std::function<bool(int removed, int into)>& may);
-
-  /// Begins to adjust all keyframes of a map piece and what they see (bundle adjustment) to each other,
-  /// beside the tracking, with at most so many iterations. The oldest keyframe stays where it is.
-  GlobalAdjustment BeginGlobalAdjustment(int map_piece, int iterations = 5) const;
-  /// Waits for it. Where it moves the keyframes; those that came since follow. None if it found nothing
-  /// better.
-  std::optional<std::map<int, Similarity>> CorrectionOf(const GlobalAdjustment& adjustment) const;
-  /// Moves keyframes to what CorrectionOf says, and landmarks to what the adjustment found.
-  void Enter(const GlobalAdjustment& adjustment, const std::map<int, Similarity>& S_world_keyframe);
-
-  /// Map pieces that have frames, by number of frames, most first (ties: the older one). Joined pieces are
-  /// one.
-  std::vector<int> Pieces(const FrameRange& range = {}) const;
-
-  /// All posed frames so far, T_world_camera, in order of time, through their reference keyframes (so
-  /// corrections and local bundle adjustment reach every frame). Only frames of `map_piece`; -1: of the piece
-  /// with most frames.
-  Trajectory FrameTrajectory(int map_piece = -1, const FrameRange& range = {}) const;
-  /// Same length as FrameTrajectory(map_piece, range): number of the frame of each pose.
-  std::vector<std::int64_t> FrameIndices(int map_piece = -1, const FrameRange& range = {}) const;
-
-  /// Milliseconds spent so far, by stage ("extract", "track", "map", "local_ba", ...), summed.
-  std::map<std::string, double> StageMilliseconds() const;
-  /// Records each stage of each frame from now on; `recorder` must outlive this object and its copies, null
-  /// ends it.
-  void SetRecorder(SpanRecorder* recorder);
-  /// Stereo: median row difference over matches [px] and matches of the median frame, so far (0 if not
-  /// stereo).
-  double StereoRowErrorPx() const;
-  double StereoMatches() const;
-  /// One camera: the lens by self-calibration, so far. None with depth, or with lens_sigma 0.
-  std::optional<LensFound> Lens() const;
-  /// One camera: how high it is above the ground. None: no ground was seen, or nobody looked for it.
-  std::optional<HeightFound> Height() const;
-
-  /// For files that hold more than an odometry (maps of tutti::slam): gives all that this object knows to
-  /// `sink`, section by section; whether to use threads, and the recorder, belong to the object that loads
-  /// it. Nothing is waited for: mapping that is under way begins again where it is loaded, with the same
-  /// result. A copy can be saved on another thread while this object goes on, and destroyed there. The same
-  /// state gives the same bytes, except those of the times that it took (tag 104).
-  void SaveSections(const std::function<void(std::uint32_t tag, std::string_view bytes)>& sink) const;
-  /// Takes up what SaveSections gave, from the next sections of a file, in place of all that this object
-  /// knows; it then goes on exactly as the saved one would have, if the options are the same. Throws
-  /// InputError for another rig, another image pyramid, or damage; the object is then as it was.
-  void LoadSections(internal::SectionReader* file);
-  /// What GlobalAdjustment::SaveSections gave, from the next section of a file. This must be the odometry
-  /// that was saved with it. Throws InputError for damage.
-  GlobalAdjustment LoadGlobalAdjustment(internal::SectionReader* file) const;
+  FrameView LastView() const;
+  OdometryReport Report() const;
 
  private:
   class Impl;
+  friend std::optional<Matrix6d> PoseCovariance(const Odometry& odometry);
+  friend GlobalAdjustment AdjustGlobally(const Odometry& odometry, int map_piece, int iterations);
+  friend class OdometryFile;
   std::unique_ptr<Impl> impl_;
 };
+
+/// Covariance of the pose of the last frame that has one, given the map: position [m] in the world, then
+/// rotation [rad] about the camera's axes (T_world_camera Exp(tangent), to the first order). None if there is
+/// no such frame, or if its landmarks do not determine it.
+std::optional<Matrix6d> PoseCovariance(const Odometry& odometry);
+
+/// Begins to adjust all keyframes of a submap and what they see (bundle adjustment) to each other, beside the
+/// tracking, with at most so many iterations. The oldest keyframe stays where it is.
+GlobalAdjustment AdjustGlobally(const Odometry& odometry, int map_piece, int iterations = 5);
 
 }  // namespace tutti
 #pragma GCC visibility pop

@@ -3,7 +3,7 @@
 //   SlamSystem slam(config, dataset->Rig());
 //   for (each frame) slam.Track(frame);
 //   slam.Finish();
-//   slam.odometry()->FrameTrajectory();
+//   FrameTrajectory(slam.odometry()->map());
 #pragma once
 
 #include <cstdint>

@@ -1,10 +1,11 @@
-#include "frontend/map/redundant_keyframes.h"
+#include "frontend/map/prune.h"
 
 #include <algorithm>
 #include <utility>
 #include <vector>
 
-#include "frontend/map/landmark_fusion.h"
+#include "frontend/features/features.h"
+#include "frontend/map/map_frames.h"
 
 namespace tutti {
 namespace {
@@ -93,14 +94,8 @@ std::set<int> FirstOfPieces(const Map& map) {
 
 }  // namespace
 
-void FuseAll(const PinholeCamera& camera, Map* map) {
-  for (int id = 0; id < map->KeyframeCount(); ++id) {
-    if (std::as_const(*map).keyframe(id).replaced_by < 0) FuseNeighbours(camera, id, map);
-  }
-}
-
-std::map<int, int> RemoveRedundantKeyframes(const std::set<int>& keep, std::size_t least_views,
-                                            const std::function<bool(int removed, int into)>& may, Map* map) {
+std::map<int, int> Prune(const std::set<int>& keep, std::size_t least_views,
+                         const std::function<bool(int removed, int into)>& may, Map* map) {
   const Map& now = *map;
   const std::set<int> first = FirstOfPieces(now);
   std::map<int, int> removed;
@@ -115,6 +110,7 @@ std::map<int, int> RemoveRedundantKeyframes(const std::set<int>& keep, std::size
     removed[id] = *into;
   }
   if (!removed.empty()) map->UpdateGeometry();
+  RehangFrames(removed, map);
   return removed;
 }
 

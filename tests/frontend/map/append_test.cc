@@ -1,8 +1,9 @@
-#include "frontend/map/other_camera.h"
+#include "frontend/map/append.h"
 
 #include <gtest/gtest.h>
 
 #include <memory>
+#include "frontend/features/features.h"
 
 namespace tutti {
 namespace {
@@ -30,7 +31,7 @@ const PinholeCamera kOld = CameraOfSize(640, 480, 500, 320, 240),
 
 // Two keyframes that see one point.
 Map MapThatSees(const PinholeCamera& camera, const Eigen::Vector3d& point) {
-  Map map(kScales);
+  Map map(kScales, RigWith(Sensor::kStereo, camera), 0.5);
   for (int k = 0; k < 2; ++k) {
     auto features = std::make_shared<FrameFeatures>();
     const Pose T_world_camera(Eigen::Quaterniond::Identity(), {0.3 * k, 0, 0});
@@ -57,8 +58,7 @@ Map MapThatSees(const PinholeCamera& camera, const Eigen::Vector3d& point) {
 TEST(OtherCamera, FeaturesAreWhereTheOtherCameraWouldHaveSeenThem) {
   const Eigen::Vector3d point(0.4, -0.3, 4);
   const Map map = MapThatSees(kOld, point);
-  Map carried(kScales);
-  CarryOver(map, kOld, kNew, &carried);
+  const Map carried = WithRig(map, RigWith(Sensor::kStereo, kNew));
   ASSERT_EQ(carried.KeyframeCount(), 2);
   for (int k = 0; k < 2; ++k) {
     const Keyframe& keyframe = carried.keyframe(k);
@@ -91,8 +91,10 @@ TEST(OtherCamera, OtherSensorsAndVeryOtherFocalLengthsAreNone) {
 
 TEST(OtherCamera, AnAppendedMapHasItsOwnNumbers) {
   Map map = MapThatSees(kOld, {0.4, -0.3, 4});
-  const Map other = MapThatSees(kOld, {-0.2, 0.1, 3});
-  map.Append(other, 1000, 5);
+  Map other = MapThatSees(kOld, {-0.2, 0.1, 3});
+  other.AddFrame(11, 1.1, 1, Pose());
+  map.RestorePieces(5);
+  Append(other, 1000, &map);
   ASSERT_EQ(map.KeyframeCount(), 4);
   ASSERT_EQ(map.LandmarkCount(), 2);
   EXPECT_EQ(map.keyframe(3).id, 3);
@@ -103,6 +105,9 @@ TEST(OtherCamera, AnAppendedMapHasItsOwnNumbers) {
   EXPECT_EQ(map.landmark(1).observations.front().keyframe, 2);
   EXPECT_EQ(map.landmark(1).reference, 2);
   EXPECT_EQ(map.keyframe(1).covisible, (std::map<int, int>{{0, 1}}));
+  EXPECT_EQ(map.NextPiece(), 6);
+  EXPECT_EQ(FrameIndices(map, 5), std::vector<std::int64_t>{1011});
+  EXPECT_EQ(map.frames()[0].keyframe, 3);
 }
 
 }  // namespace

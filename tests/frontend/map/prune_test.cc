@@ -1,8 +1,9 @@
-#include "frontend/map/redundant_keyframes.h"
+#include "frontend/map/prune.h"
 
 #include <gtest/gtest.h>
 
 #include <utility>
+#include "frontend/features/features.h"
 
 namespace tutti {
 namespace {
@@ -38,9 +39,7 @@ class RedundantKeyframes : public ::testing::Test {
     map_.RemoveObservation(feature, keyframe);
     map_.AddLandmark({0, 0, 7}, keyframe, feature);
   }
-  std::map<int, int> Remove(const std::set<int>& keep = {}) {
-    return RemoveRedundantKeyframes(keep, 1, may_, &map_);
-  }
+  std::map<int, int> Remove(const std::set<int>& keep = {}) { return Prune(keep, 1, may_, &map_); }
   bool IsThere(int keyframe) const { return map_.keyframe(keyframe).replaced_by < 0; }
 
   Map map_{{1.0F, 1.2F, 1.44F, 1.728F}};
@@ -84,7 +83,7 @@ std::map<int, int> SeenAgain(int between, std::size_t least_views, int own = 0) 
     const int landmark = map.AddLandmark({0, 0, 5}, f < own ? again : first, f);
     if (f >= own) map.AddObservation(landmark, again, f);
   }
-  return RemoveRedundantKeyframes(
+  return Prune(
       {}, least_views, [](int, int) { return true; }, &map);
 }
 

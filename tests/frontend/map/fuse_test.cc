@@ -1,4 +1,4 @@
-#include "frontend/map/landmark_fusion.h"
+#include "frontend/map/fuse.h"
 
 #include <gtest/gtest.h>
 

@@ -1,8 +1,9 @@
 // What loops do to the odometry's map: fusion, and bundle adjustment of everything.
-#include "frontend/map/map_correction.h"
+#include "frontend/map/move_keyframes.h"
 
 #include <gtest/gtest.h>
 
+#include "frontend/features/features.h"
 #include "tests/support/recording.h"
 #include "tests/support/rendered_world.h"
 #include "tests/support/small_town.h"
@@ -19,8 +20,7 @@ const Recording& Drive() {
 }
 
 Odometry Tracked(std::size_t frames, bool own_threads = true) {
-  Odometry odometry(OdometryOptions(), Drive().rig);
-  odometry.UseOwnThreads(own_threads);
+  Odometry odometry(OdometryOptions(), Drive().rig, {own_threads, nullptr});
   for (std::size_t i = 0; i < frames; ++i) odometry.Track(Drive().frames[i]);
   odometry.FinishMapping();
   return odometry;
@@ -29,16 +29,17 @@ Odometry Tracked(std::size_t frames, bool own_threads = true) {
 // Bends the map, more and more to its end, as a wrong loop would.
 void Bend(Odometry& odometry) {
   std::map<int, Similarity> bent;
-  for (const int id : odometry.KeyframeIds()) {
+  for (const int id : odometry.map().KeyframeIds()) {
     const double way = 0.05 * id;
-    bent[id] = Similarity(Pose(ExpSO3({0, 0.1 * way, 0}), {way, 0.3 * way, 0}) * odometry.KeyframePose(id));
+    bent[id] = Similarity(Pose(ExpSO3({0, 0.1 * way, 0}), {way, 0.3 * way, 0}) *
+                          odometry.map().keyframe(id).T_world_camera);
   }
-  odometry.ApplyCorrection(bent);
+  odometry.Correct({bent, {}, {}, {}});
 }
 
 double WorstError(const Odometry& odometry) {
   double worst = 0;
-  const Trajectory estimate = odometry.FrameTrajectory();
+  const Trajectory estimate = FrameTrajectory(odometry.map());
   const Pose to_estimate = estimate.front().pose * Drive().truth.front().pose.Inverse();
   for (std::size_t i = 0; i < estimate.size(); ++i) {
     const Pose truth = to_estimate * Drive().truth[i].pose;
@@ -48,8 +49,8 @@ double WorstError(const Odometry& odometry) {
 }
 
 bool Adjust(Odometry& odometry, const GlobalAdjustment& adjustment) {
-  const auto moved = odometry.CorrectionOf(adjustment);
-  if (moved) odometry.Enter(adjustment, *moved);
+  const auto moved = adjustment.Correction(odometry.map());
+  if (moved) odometry.Correct({*moved, {}, std::make_shared<const GlobalAdjustment>(adjustment), {}});
   return moved.has_value();
 }
 
@@ -59,7 +60,7 @@ TEST(MapCorrection, GlobalAdjustmentTakesABentMapBackToWhatTheImagesSay) {
   Bend(odometry);
   const double bent = WorstError(odometry);
   ASSERT_GT(bent, 3 * before);
-  ASSERT_TRUE(Adjust(odometry, odometry.BeginGlobalAdjustment(0)));
+  ASSERT_TRUE(Adjust(odometry, AdjustGlobally(odometry, 0)));
   EXPECT_LT(WorstError(odometry), 0.3 * bent);
   EXPECT_LT(WorstError(odometry), 2 * before + 0.01);
 }
@@ -67,14 +68,14 @@ TEST(MapCorrection, GlobalAdjustmentTakesABentMapBackToWhatTheImagesSay) {
 TEST(MapCorrection, KeyframesThatCameSinceFollow) {
   Odometry odometry = Tracked(25);
   Bend(odometry);
-  const GlobalAdjustment adjustment = odometry.BeginGlobalAdjustment(0);
+  const GlobalAdjustment adjustment = AdjustGlobally(odometry, 0);
   for (std::size_t i = 25; i < 40; ++i) odometry.Track(Drive().frames[i]);
   odometry.FinishMapping();
   const double bent = WorstError(odometry);
-  ASSERT_LT(adjustment.Keyframes() + 1, static_cast<int>(odometry.KeyframeIds().size()));
+  ASSERT_LT(adjustment.Keyframes() + 1, static_cast<int>(odometry.map().KeyframeIds().size()));
   ASSERT_TRUE(Adjust(odometry, adjustment));
   EXPECT_LT(WorstError(odometry), 0.6 * bent);
-  EXPECT_EQ(odometry.FrameTrajectory().size(), 40U);
+  EXPECT_EQ(FrameTrajectory(odometry.map()).size(), 40U);
 }
 
 TEST(MapCorrection, TheResultIsTheSameWithAndWithoutThreads) {
@@ -82,12 +83,12 @@ TEST(MapCorrection, TheResultIsTheSameWithAndWithoutThreads) {
   for (const bool own_threads : {true, false}) {
     Odometry odometry = Tracked(25, own_threads);
     Bend(odometry);
-    const GlobalAdjustment adjustment = odometry.BeginGlobalAdjustment(0);
+    const GlobalAdjustment adjustment = AdjustGlobally(odometry, 0);
     for (std::size_t i = 25; i < 32; ++i) odometry.Track(Drive().frames[i]);
     ASSERT_TRUE(Adjust(odometry, adjustment));
     for (std::size_t i = 32; i < 40; ++i) odometry.Track(Drive().frames[i]);
     odometry.FinishMapping();
-    results.push_back(odometry.FrameTrajectory());
+    results.push_back(FrameTrajectory(odometry.map()));
   }
   ASSERT_EQ(results[0].size(), results[1].size());
   for (std::size_t i = 0; i < results[0].size(); ++i)
@@ -97,27 +98,28 @@ TEST(MapCorrection, TheResultIsTheSameWithAndWithoutThreads) {
 TEST(MapCorrection, ACancelledAdjustmentChangesNothing) {
   Odometry odometry = Tracked(25);
   Bend(odometry);
-  const Trajectory before = odometry.FrameTrajectory();
+  const Trajectory before = FrameTrajectory(odometry.map());
   {
-    GlobalAdjustment adjustment = odometry.BeginGlobalAdjustment(0);
+    GlobalAdjustment adjustment = AdjustGlobally(odometry, 0);
     adjustment.Cancel();
   }
-  const Trajectory after = odometry.FrameTrajectory();
+  const Trajectory after = FrameTrajectory(odometry.map());
   for (std::size_t i = 0; i < before.size(); ++i) EXPECT_EQ(before[i].pose.Matrix(), after[i].pose.Matrix());
 }
 
 TEST(MapCorrection, AMapOfOneKeyframeHasNothingToAdjust) {
   Odometry odometry = Tracked(1);
-  EXPECT_FALSE(Adjust(odometry, odometry.BeginGlobalAdjustment(0)));
-  EXPECT_FALSE(Adjust(odometry, odometry.BeginGlobalAdjustment(7))) << "no such piece";
+  EXPECT_FALSE(Adjust(odometry, AdjustGlobally(odometry, 0)));
+  EXPECT_FALSE(Adjust(odometry, AdjustGlobally(odometry, 7))) << "no such piece";
 }
 
 TEST(MapCorrection, NeighboursShareWhatTheySee) {
   Odometry odometry = Tracked(40);
-  const std::vector<int> ids = odometry.KeyframeIds();
+  const std::vector<int> ids = odometry.map().KeyframeIds();
   const int a = ids[ids.size() - 2], b = ids.back();
-  const Similarity S(odometry.KeyframePose(a).Inverse() * odometry.KeyframePose(b));
-  EXPECT_GT(odometry.FuseLoop(a, b, S), 100);
+  const Similarity S(odometry.map().keyframe(a).T_world_camera.Inverse() *
+                     odometry.map().keyframe(b).T_world_camera);
+  EXPECT_GT(odometry.Correct({{}, {}, {}, {{a, b, S}}}).at(0), 100);
 }
 
 std::vector<int> PiecesAfter(const std::map<int, int>& joined) {

@@ -1,12 +1,15 @@
-#include "frontend/map/map_correction.h"
+#include "frontend/map/move_keyframes.h"
 
 #include <algorithm>
 #include <utility>
 #include <vector>
 
+#include "frontend/map/map_frames.h"
+
 namespace tutti {
 
 void MoveKeyframes(const std::map<int, Similarity>& S_world_keyframe, Map* map) {
+  RescaleFrames(S_world_keyframe, map);
   const Map& now = *map;
   std::vector<Pose> old_T_camera_world;
   std::vector<Similarity> corrected;

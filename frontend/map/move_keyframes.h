@@ -5,13 +5,14 @@
 #include <optional>
 #include <vector>
 
-#include "frontend/map/map.h"
 #include "tutti/core/pose.h"
+#include "tutti/frontend/map.h"
 
 namespace tutti {
 
 /// Moves keyframes to S_world_camera; the others stay. Each landmark goes along with the keyframe that made
-/// it. The landmarks' geometry is not updated: Map::UpdateGeometry is to follow when all is in place.
+/// it, and each frame with its own. The landmarks' geometry is not updated: Map::UpdateGeometry is to follow
+/// when all is in place.
 void MoveKeyframes(const std::map<int, Similarity>& S_world_keyframe, Map* map);
 
 /// What an adjustment made of a landmark.

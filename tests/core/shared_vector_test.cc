@@ -1,4 +1,4 @@
-#include "frontend/map/shared_vector.h"
+#include "tutti/core/shared_vector.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "frontend/map/landmark_fusion.h"
+#include "frontend/map/fuse.h"
 
 #include <algorithm>
 #include <iterator>
@@ -42,6 +42,12 @@ void FuseNeighbours(const PinholeCamera& camera, int id, Map* map, int kept) {
   FuseInto(id, MatchForFusion(*map, camera, map->keyframe(id), map->LandmarksOf(neighbours), kFusionError),
            map, kept);
   for (int l : map->LandmarksOf({id})) map->UpdateLandmark(l);
+}
+
+void FuseAll(const PinholeCamera& camera, Map* map) {
+  for (int id = 0; id < map->KeyframeCount(); ++id) {
+    if (std::as_const(*map).keyframe(id).replaced_by < 0) FuseNeighbours(camera, id, map);
+  }
 }
 
 int FuseLoop(const PinholeCamera& camera, int older, int newer, const Pose& T_older_newer, Map* map) {

@@ -1,0 +1,130 @@
+#include "frontend/map/map_frames.h"
+
+#include <gtest/gtest.h>
+
+#include "frontend/map/move_keyframes.h"
+#include "tests/frontend/odometry/tracked_scene.h"
+
+namespace tutti {
+namespace {
+
+using testing::Distance;
+using testing::Moved;
+
+// Keyframes 0, 1 (at x = 1) and 2 (at x = 2, of piece 1).
+class MapFramesTest : public ::testing::Test, protected testing::TrackedScene {
+ protected:
+  MapFramesTest() {
+    std::vector<int> order;
+    AddKeyframe(Moved(1, 0), &order);
+    map_.keyframe(AddKeyframe(Moved(2, 0), &order)).piece = 1;
+  }
+  void Add(double stamp_s, double x, int reference) {
+    map_.AddFrame(static_cast<std::int64_t>(10 * stamp_s), stamp_s, reference, Moved(x, 0.5, 0.1).Inverse());
+  }
+};
+
+TEST_F(MapFramesTest, NoFramesHaveNoPosesAndNoPieces) {
+  EXPECT_TRUE(FramePieces(map_).empty());
+  for (const int piece : {-1, 0, 7}) {
+    EXPECT_TRUE(FrameTrajectory(map_, piece).empty());
+    EXPECT_TRUE(FrameIndices(map_, piece).empty());
+  }
+  RescaleFrames({{0, Similarity(2, ExpSO3({0, 0, 0}), {0, 0, 0})}}, &map_);
+  EXPECT_TRUE(FrameTrajectory(Map(PyramidScales(OdometryOptions())), -1).empty()) << "nor in an empty map";
+}
+
+TEST_F(MapFramesTest, TellsPosesAndIndicesOfFrames) {
+  Add(0.1, 0.2, 0);
+  Add(0.2, 0.9, 1);
+  const Trajectory poses = FrameTrajectory(map_, 0);
+  ASSERT_EQ(poses.size(), 2U);
+  EXPECT_DOUBLE_EQ(poses[1].stamp_s, 0.2);
+  EXPECT_LT(Distance(poses[0].pose, Moved(0.2, 0.5, 0.1)), 1e-9);
+  EXPECT_LT(Distance(poses[1].pose, Moved(0.9, 0.5, 0.1)), 1e-9);
+  EXPECT_EQ(FrameIndices(map_, 0), (std::vector<std::int64_t>{1, 2}));
+}
+
+TEST_F(MapFramesTest, ADriftIsSpreadOverTheNewestFrames) {
+  Add(0.1, 0.2, 0);
+  Add(0.2, 0.4, 0);
+  Add(0.3, 0.6, 0);
+  // The frame that comes next stands 0.3 m farther along the world's x than it would have by the others.
+  const Pose before = Moved(0.8, 0.5, 0.1);
+  Pose after = before;
+  after.translation.x() += 0.3;
+  const Vector6d drift = LogSE3(after.Inverse() * before);
+  SpreadDrift(2, drift, after.Inverse().rotation, &map_);
+  const Trajectory poses = FrameTrajectory(map_, 0);
+  EXPECT_LT(Distance(poses[0].pose, Moved(0.2, 0.5, 0.1)), 1e-9);
+  EXPECT_LT(Distance(poses[1].pose, Moved(0.5, 0.5, 0.1)), 1e-9);
+  EXPECT_LT(Distance(poses[2].pose, Moved(0.8, 0.5, 0.1)), 1e-9);
+}
+
+TEST_F(MapFramesTest, FramesFollowTheirKeyframesWithTheirScale) {
+  Add(0.1, 0.2, 0);
+  Add(0.2, 1.3, 1);
+  MoveKeyframes({{1, Similarity(2, ExpSO3({0, 0, 0}), {5, 0, 0})}}, &map_);
+  const Trajectory poses = FrameTrajectory(map_, 0);
+  EXPECT_LT(Distance(poses[0].pose, Moved(0.2, 0.5, 0.1)), 1e-9) << "its keyframe stays";
+  EXPECT_LT((poses[1].pose.translation - Eigen::Vector3d(5.6, 0, 1)).norm(), 1e-9);
+}
+
+TEST_F(MapFramesTest, PiecesComeByTheirNumberOfFrames) {
+  Add(0.1, 0, 0);
+  Add(0.2, 2, 2);
+  EXPECT_EQ(FramePieces(map_), (std::vector<int>{0, 1})) << "ties: the older one";
+  Add(0.3, 2, 2);
+  EXPECT_EQ(FramePieces(map_), (std::vector<int>{1, 0}));
+  EXPECT_EQ(FrameIndices(map_, -1), (std::vector<std::int64_t>{2, 3})) << "the one with most frames";
+  EXPECT_EQ(FrameIndices(map_, 0), std::vector<std::int64_t>{1});
+  EXPECT_TRUE(FrameTrajectory(map_, 2).empty()) << "no such piece";
+}
+
+TEST_F(MapFramesTest, FramesOfJoinedPiecesAreOfOne) {
+  Add(0.1, 0, 0);
+  Add(0.2, 2, 2);
+  JoinPieces({{1, 0}}, &map_);
+  EXPECT_EQ(FramePieces(map_), std::vector<int>{0});
+  EXPECT_EQ(FrameTrajectory(map_, 0).size(), 2U);
+}
+
+TEST_F(MapFramesTest, FramesOfARecordingAreARange) {
+  Add(0.5, 0, 0);
+  Add(0.6, 2, 2);
+  map_.AddFrame(1003, 0.3, 1, Pose());
+  FrameRange range;
+  range.first = 1000;
+  EXPECT_EQ(FramePieces(map_, range), std::vector<int>{0});
+  EXPECT_EQ(FrameIndices(map_, -1, range), std::vector<std::int64_t>{1003});
+  range = {5, 5};
+  EXPECT_EQ(FrameIndices(map_, -1, range), std::vector<std::int64_t>{5});
+  EXPECT_TRUE(FrameTrajectory(map_, 1, range).empty());
+}
+
+TEST_F(MapFramesTest, ACopyGoesOnAlone) {
+  Add(0.1, 0, 0);
+  const Map copy = map_;
+  Add(0.2, 0, 0);
+  EXPECT_EQ(FrameTrajectory(copy, 0).size(), 1U);
+  EXPECT_EQ(FrameTrajectory(map_, 0).size(), 2U);
+}
+
+TEST_F(MapFramesTest, FramesOfRemovedKeyframesStayWhereTheyAreAndFollowWhatStandsForThem) {
+  std::vector<int> order;
+  const int third = AddKeyframe(Moved(3, 0.2, 0.3), &order);
+  Add(0.1, 0.9, 1);
+  Add(0.2, 3.1, third);
+  RehangFrames({{1, 0}, {third, 1}}, &map_);
+  Trajectory poses = FrameTrajectory(map_, 0);
+  ASSERT_EQ(poses.size(), 2U);
+  EXPECT_LT(Distance(poses[0].pose, Moved(0.9, 0.5, 0.1)), 1e-9);
+  EXPECT_LT(Distance(poses[1].pose, Moved(3.1, 0.5, 0.1)), 1e-9);
+  MoveKeyframes({{0, Similarity(Moved(10, 0))}}, &map_);
+  poses = FrameTrajectory(map_, 0);
+  EXPECT_LT(Distance(poses[0].pose, Moved(10, 0) * Moved(0.9, 0.5, 0.1)), 1e-9);
+  EXPECT_LT(Distance(poses[1].pose, Moved(10, 0) * Moved(3.1, 0.5, 0.1)), 1e-9);
+}
+
+}  // namespace
+}  // namespace tutti

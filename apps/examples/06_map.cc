@@ -19,6 +19,7 @@
 #include "tutti/core/text.h"
 #include "tutti/frontend/dataset.h"
 #include "tutti/slam/config.h"
+#include "tutti/slam/localizer.h"
 #include "tutti/slam/map_file.h"
 #include "tutti/slam/slam_system.h"
 
@@ -33,7 +34,7 @@ void MakeMap(const tutti::RunConfig& config, const tutti::Dataset& dataset, std:
     if (read.frame) slam.Track(*read.frame);  // else read.error says what is wrong with the file
   }
   slam.Finish();  // what the loop detector is still at enters the map
-  slam.Save(map);
+  slam.Snapshot().Write(map);
   std::printf("map of %zu frames: %zu keyframes, %zu loops\n", end,
               slam.odometry()->map().KeyframeIds().size(), tutti::CountAccepted(slam.loops()));
 }
@@ -55,14 +56,14 @@ void PrintFrame(std::size_t i, const tutti::TrackResult& now, const tutti::Odome
 std::size_t Locate(const std::string& map, const tutti::Dataset& dataset, std::size_t first) {
   // What the map was made with (camera, configuration, counts) can be read without the map itself.
   const tutti::MapInfo info = tutti::ReadMapInfo(map);
-  const std::unique_ptr<tutti::SlamSystem> slam = tutti::SlamSystem::Load(map, info);
-  slam->BeginLocalization();  // without this line, Track would go on mapping
+  const std::unique_ptr<tutti::SlamSystem> slam = tutti::LoadMap(map, info);
+  tutti::Localizer localizer(*slam);  // slam->Track would go on mapping
   std::size_t found = 0;
   for (std::size_t i = first; i < dataset.Size(); ++i) {
     const tutti::ReadResult read = dataset.Read(i);
     if (!read.frame) continue;
-    const tutti::TrackResult now = slam->Track(*read.frame);
-    PrintFrame(i, now, *slam->odometry());
+    const tutti::TrackResult now = localizer.Track(*read.frame);
+    PrintFrame(i, now, localizer.odometry());
     found += now.state == tutti::TrackingState::kTracking ? 1 : 0;
   }
   std::printf("%zu of %zu frames are in the map\n", found, dataset.Size() - std::min(first, dataset.Size()));

@@ -1,5 +1,6 @@
 // tutti.SlamSystem
 #include "tutti/slam/slam_system.h"
+#include "tutti/slam/localizer.h"
 
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
@@ -22,7 +23,17 @@ namespace {
 
 namespace fs = std::filesystem;
 
-using Slam = Guarded<std::unique_ptr<SlamSystem>>;
+// A SLAM system, and who locates frames in its map once that was asked for.
+struct System {
+  std::unique_ptr<SlamSystem> slam;
+  std::optional<Localizer> localizer;
+  const Odometry* odometry() const { return localizer ? &localizer->odometry() : slam->odometry(); }
+  void CheckMaps(const char* what) const {
+    if (localizer)
+      throw InputError(std::string("frames are only being located in the map: it can't ") + what);
+  }
+};
+using Slam = Guarded<System>;
 
 std::unique_ptr<Slam> MakeSlam(const CameraRig& rig, const std::optional<RunConfig>& config,
                                const py::kwargs& sections) {
@@ -30,7 +41,7 @@ std::unique_ptr<Slam> MakeSlam(const CameraRig& rig, const std::optional<RunConf
   SetOptions("SlamSystem", "", sections, all);
   const auto make = [&] {
     const py::gil_scoped_release release;
-    return std::make_unique<Slam>(std::make_unique<SlamSystem>(all, rig));
+    return std::make_unique<Slam>(System{std::make_unique<SlamSystem>(all, rig), {}});
   };
   return make();
 }
@@ -42,7 +53,7 @@ std::unique_ptr<Slam> LoadSlam(const fs::path& file, std::optional<int> threads)
     if (threads) info.config.run.threads = *threads;
     const std::string problem = info.config.run.Validate();
     if (!problem.empty()) throw InputError(problem);
-    return std::make_unique<Slam>(SlamSystem::Load(file, info));
+    return std::make_unique<Slam>(System{LoadMap(file, info), {}});
   };
   return Reading(file, load);
 }
@@ -50,9 +61,9 @@ std::unique_ptr<Slam> LoadSlam(const fs::path& file, std::optional<int> threads)
 // With the odometry, which a rig without calibration has none of.
 template <class Work>
 auto WithOdometry(Slam& slam, Work work) {
-  return slam.Run([&](std::unique_ptr<SlamSystem>& s) {
-    if (s->AppearanceOnly()) throw InputError("the rig has no calibration: there are loops but no poses");
-    return work(*s->odometry());
+  return slam.Run([&](System& s) {
+    if (s.odometry() == nullptr) throw InputError("the rig has no calibration: there are loops but no poses");
+    return work(*s.odometry());
   });
 }
 
@@ -112,34 +123,36 @@ void BindResults(py::module_& module) {
         return py::str("TrackResult(state='{}', inliers={}, keyframe={}, reason='{}')")
             .format(ToString(result.state), result.inliers, result.keyframe, result.reason);
       });
-  py::class_<LoopRecord>(module, "LoopRecord", doc::LoopRecord)
-      .def(Pickled<LoopRecord>())
-      .def_readonly("query", &LoopRecord::query, doc::LoopRecord_query)
-      .def_readonly("candidate", &LoopRecord::candidate, "0-based index of the input frame")
-      .def_readonly("query_stamp", &LoopRecord::query_stamp_s, "[s]")
-      .def_readonly("candidate_stamp", &LoopRecord::candidate_stamp_s, "[s]")
-      .def_readonly("members", &LoopRecord::members, "what each member of the ensemble believed")
-      .def_readonly("hypothesis", &LoopRecord::hypothesis, doc::LoopRecord_hypothesis)
-      .def_readonly("posterior", &LoopRecord::posterior, doc::LoopRecord_posterior)
-      .def_readonly("probability", &LoopRecord::probability, doc::LoopRecord_probability)
-      .def_readonly("matches", &LoopRecord::matches, "that were considered")
-      .def_readonly("inliers", &LoopRecord::inliers, "of these, those that fit one camera motion")
-      .def_readonly("verified", &LoopRecord::verified, doc::LoopRecord_verified)
-      .def_readonly("accepted", &LoopRecord::accepted, doc::LoopRecord_accepted)
-      .def_readonly("weight", &LoopRecord::weight, doc::LoopRecord_weight)
-      .def_readonly("revoked", &LoopRecord::revoked, doc::LoopRecord_revoked)
-      .def_readonly("pending", &LoopRecord::pending, doc::LoopRecord_pending)
-      .def_readonly("reason", &LoopRecord::reason, doc::LoopRecord_reason)
+  py::class_<Loop>(module, "LoopRecord", doc::Loop)
+      .def(Pickled<Loop>())
+      .def_readonly("query", &Loop::query, doc::Loop_query)
+      .def_readonly("candidate", &Loop::candidate, "0-based index of the input frame")
+      .def_readonly("query_stamp", &Loop::query_stamp_s, "[s]")
+      .def_readonly("candidate_stamp", &Loop::candidate_stamp_s, "[s]")
+      .def_readonly("members", &Loop::members, "what each member of the ensemble believed")
+      .def_readonly("hypothesis", &Loop::hypothesis, doc::Loop_hypothesis)
+      .def_readonly("posterior", &Loop::posterior, doc::Loop_posterior)
+      .def_readonly("probability", &Loop::probability, doc::Loop_probability)
+      .def_readonly("matches", &Loop::matches, "that were considered")
+      .def_readonly("inliers", &Loop::inliers, "of these, those that fit one camera motion")
+      .def_readonly("verified", &Loop::verified, doc::Loop_verified)
+      .def_property_readonly("accepted", &Loop::accepted, doc::Loop_accepted)
+      .def_readonly("weight", &Loop::weight, doc::Loop_weight)
+      .def_readonly("revoked", &Loop::revoked, doc::Loop_revoked)
+      .def_property_readonly(
+          "pending", [](const Loop& loop) { return loop.state == LoopState::kWaiting; },
+          "waits for a second loop that agrees")
+      .def_readonly("reason", &Loop::reason, doc::Loop_reason)
       .def_property_readonly(
           "S_candidate_query",
-          [](const LoopRecord& loop) -> py::object {
+          [](const Loop& loop) -> py::object {
             if (!loop.S_candidate_query) return py::none();
             return ArrayOf(*loop.S_candidate_query);
           },
           "(4, 4): maps points of the query camera into the candidate's; None if it could not be computed.")
-      .def("__repr__", [](const LoopRecord& loop) {
+      .def("__repr__", [](const Loop& loop) {
         return py::str("LoopRecord(query={}, candidate={}, accepted={}, probability={:.4g}, reason='{}')")
-            .format(loop.query, loop.candidate, loop.accepted, loop.probability, loop.reason);
+            .format(loop.query, loop.candidate, loop.accepted(), loop.probability, loop.reason);
       });
 }
 
@@ -182,7 +195,6 @@ void BindSlamSystem(py::module_& module) {
   using namespace pybind11::literals;  // NOLINT(google-build-using-namespace)
   BindResults(module);
   BindKeyframe(module);
-  using System = std::unique_ptr<SlamSystem>;
   const std::string text = std::string(doc::SlamSystem) +
                            "\n\nSlamSystem(dataset.rig, config, run={\"threads\": 1}): sections of the "
                            "configuration are keywords, as in "
@@ -197,26 +209,44 @@ void BindSlamSystem(py::module_& module) {
       .def(
           "track",
           [](Slam& slam, const InputFrame& frame) {
-            return slam.Run([&](System& s) { return s->Track(frame); });
+            return slam.Run(
+                [&](System& s) { return s.localizer ? s.localizer->Track(frame) : s.slam->Track(frame); });
           },
           "frame"_a, doc::SlamSystem_Track)
       .def(
-          "finish", [](Slam& slam) { slam.Run([](System& s) { s->Finish(); }); }, doc::SlamSystem_Finish)
+          "finish",
+          [](Slam& slam) {
+            slam.Run([](System& s) {
+              if (!s.localizer) s.slam->Finish();
+            });
+          },
+          doc::SlamSystem_Finish)
       .def(
           "save",
           [](Slam& slam, const fs::path& file) {
-            Writing([&] { slam.Run([&](System& s) { s->Save(file); }); });
+            Writing([&] { slam.Run([&](System& s) { s.slam->Snapshot().Write(file); }); });
           },
-          "file"_a, doc::SlamSystem_Save)
+          "file"_a, doc::SlamSystem_Snapshot)
       .def(
-          "begin_localization", [](Slam& slam) { slam.Run([](System& s) { s->BeginLocalization(); }); },
-          doc::SlamSystem_BeginLocalization)
+          "begin_localization", [](Slam& slam) { slam.Run([](System& s) { s.localizer.emplace(*s.slam); }); },
+          doc::Localizer)
       .def(
           "begin_session",
-          [](Slam& slam, const CameraRig& rig) { slam.Run([&](System& s) { s->BeginSession(rig); }); },
+          [](Slam& slam, const CameraRig& rig) {
+            slam.Run([&](System& s) {
+              s.CheckMaps("go on");
+              s.slam->BeginSession(rig);
+            });
+          },
           "rig"_a, doc::SlamSystem_BeginSession)
       .def(
-          "prune", [](Slam& slam) { return slam.Run([](System& s) { return s->Prune(); }); },
+          "prune",
+          [](Slam& slam) {
+            return slam.Run([](System& s) {
+              s.CheckMaps("be pruned");
+              return s.slam->Prune();
+            });
+          },
           doc::SlamSystem_Prune)
       .def(
           "trajectory",
@@ -225,8 +255,7 @@ void BindSlamSystem(py::module_& module) {
                 WithOdometry(slam, [&](const Odometry& o) { return FrameTrajectory(o.map(), piece); }));
           },
           "piece"_a = -1,
-          (std::string("(N, 8): stamp [s], x, y, z [m], qx, qy, qz, qw. ") + doc::FrameTrajectory)
-              .c_str())
+          (std::string("(N, 8): stamp [s], x, y, z [m], qx, qy, qz, qw. ") + doc::FrameTrajectory).c_str())
       .def("keyframe_trajectory", &KeyframeTrajectory,
            "(N, 8), as trajectory: of all keyframes, in the order of keyframe_ids.")
       .def("keyframe", &Keyframe, "id"_a, doc::ViewOf)
@@ -238,30 +267,38 @@ void BindSlamSystem(py::module_& module) {
           doc::Map_KeyframeIds)
       .def("landmarks", &Landmarks, "(N, 3) float64: points of the map in the world [m], by id.")
       .def_property_readonly(
-          "loops", [](Slam& slam) { return slam.Run([](System& s) { return s->loops(); }); },
+          "loops", [](Slam& slam) { return slam.Run([](System& s) { return s.slam->loops(); }); },
           doc::SlamSystem_loops)
       .def(
           "graph",
           [](Slam& slam) {
-            return std::make_unique<Guarded<PoseGraph>>(slam.Run([](System& s) { return s->Graph(); }));
+            return std::make_unique<Guarded<PoseGraph>>(slam.Run([](System& s) { return s.slam->Graph(); }));
           },
           doc::SlamSystem_Graph)
       .def_property_readonly(
           "appearance_only",
-          [](Slam& slam) { return slam.Run([](System& s) { return s->AppearanceOnly(); }); },
-          doc::SlamSystem_AppearanceOnly)
+          [](Slam& slam) { return slam.Run([](System& s) { return s.odometry() == nullptr; }); },
+          doc::SlamSystem_odometry)
       .def_property_readonly(
-          "corrections", [](Slam& slam) { return slam.Run([](System& s) { return s->Corrections(); }); },
-          doc::SlamSystem_Corrections)
+          "corrections",
+          [](Slam& slam) { return slam.Run([](System& s) { return s.slam->Report().corrections; }); },
+          doc::SlamReport_corrections)
       .def_property_readonly(
-          "relocalized", [](Slam& slam) { return slam.Run([](System& s) { return s->Relocalized(); }); },
-          doc::SlamSystem_Relocalized)
+          "relocalized",
+          [](Slam& slam) {
+            return slam.Run([](System& s) {
+              return s.localizer ? s.localizer->Relocalized() : s.slam->Report().relocalized;
+            });
+          },
+          doc::SlamReport_relocalized)
       .def(
-          "take_warnings", [](Slam& slam) { return slam.Run([](System& s) { return s->TakeWarnings(); }); },
+          "take_warnings",
+          [](Slam& slam) { return slam.Run([](System& s) { return s.slam->TakeWarnings(); }); },
           doc::SlamSystem_TakeWarnings)
       .def_property_readonly(
-          "stage_ms", [](Slam& slam) { return slam.Run([](System& s) { return s->StageMilliseconds(); }); },
-          doc::SlamSystem_StageMilliseconds);
+          "stage_ms",
+          [](Slam& slam) { return slam.Run([](System& s) { return s.slam->Report().stage_ms; }); },
+          doc::SlamReport_stage_ms);
 }
 
 }  // namespace tutti::python

@@ -147,9 +147,9 @@ std::vector<ShownLoop> ShownLoops(const RunResult& result, const DetectionLog& l
   for (const LoggedDetection& detection : log.detections()) detections[detection.query] = &detection;
   std::vector<ShownLoop> loops;
   std::set<std::int64_t> accepted;
-  for (const LoopRecord& record : result.loops) {
+  for (const Loop& record : result.loops) {
     ShownLoop loop;
-    loop.outcome = !record.accepted                ? Outcome::kRejected
+    loop.outcome = !record.accepted()              ? Outcome::kRejected
                    : record.correct.value_or(true) ? Outcome::kAccepted
                                                    : Outcome::kFalse;
     loop.query = record.query;
@@ -163,7 +163,7 @@ std::vector<ShownLoop> ShownLoops(const RunResult& result, const DetectionLog& l
     loop.reason = record.reason;
     const auto detection = detections.find(record.query);
     if (detection != detections.end()) loop.detection = detection->second;
-    if (record.accepted) accepted.insert(record.query);
+    if (record.accepted()) accepted.insert(record.query);
     loops.push_back(loop);
   }
   std::vector<ShownLoop> missed;

@@ -18,7 +18,7 @@ class FramePlaces {
 
   /// Of the run's own frame with this stamp [s]; nothing if trajectory.txt has no pose for it.
   std::optional<Eigen::Vector3d> At(double stamp_s) const;
-  /// Of an end of a loop: the frame has its number in the map (LoopRecord), and a stamp of its recording.
+  /// Of an end of a loop: the frame has its number in the map (Loop), and a stamp of its recording.
   std::optional<Eigen::Vector3d> AtEnd(std::int64_t frame, double stamp_s) const;
 
  private:

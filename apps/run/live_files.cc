@@ -73,14 +73,14 @@ void LiveFiles::Add(double stamp_s, const TrackResult& track, const RunState& st
   poses_->Append(internal::TumLine(trajectory_.back()));
 }
 
-void LiveFiles::AddLoops(const std::vector<LoopRecord>& loops) {
+void LiveFiles::AddLoops(const std::vector<Loop>& loops) {
   std::string lines;
   for (; loops_written_ < loops.size(); ++loops_written_)
     lines += LoopsCsvLine(loops[loops_written_], members_);
   if (!lines.empty()) loops_.Append(lines);
 }
 
-void LiveFiles::Resume(Trajectory trajectory, const std::vector<LoopRecord>& loops) {
+void LiveFiles::Resume(Trajectory trajectory, const std::vector<Loop>& loops) {
   AddLoops(loops);
   trajectory_ = std::move(trajectory);
   std::string lines;

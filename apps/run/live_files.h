@@ -46,9 +46,9 @@ class LiveFiles {
   /// So many loops are none of this run's: they were in the map that it goes on in.
   void Skip(std::size_t loops) { loops_written_ = loops; }
   /// Loops alone.
-  void AddLoops(const std::vector<LoopRecord>& loops);
+  void AddLoops(const std::vector<Loop>& loops);
   /// In place of what the files hold: the poses and loops so far of a run that is gone on with.
-  void Resume(Trajectory trajectory, const std::vector<LoopRecord>& loops);
+  void Resume(Trajectory trajectory, const std::vector<Loop>& loops);
   /// For the terminal: why a file does not grow, or that it does again.
   std::vector<std::string> TakeProblems();
 

@@ -19,6 +19,7 @@
 #include "core/stopwatch.h"
 #include "core/terminal.h"
 #include "tutti/core/error.h"
+#include "tutti/slam/localizer.h"
 #include "tutti/slam/slam_system.h"
 #include "tutti/slam/version.h"
 
@@ -152,22 +153,20 @@ TrajectoryPlot Picture(const LocalizationRequest& request, const RunState& state
 
 std::unique_ptr<SlamSystem> OpenMap(const LocalizationRequest& request, MapInfo info) {
   info.config.run.threads = request.threads;
-  std::unique_ptr<SlamSystem> slam = SlamSystem::Load(request.map, info);
-  slam->BeginLocalization();
-  return slam;
+  return LoadMap(request.map, info);
 }
 
 // Of the map that is located in.
-RunState StateIn(const SlamSystem& slam, const Localization& l) {
-  RunState state = {slam.odometry(), slam.loops()};
+RunState StateIn(const SlamSystem& slam, const Localizer& localizer) {
+  RunState state = {&localizer.odometry(), slam.loops()};
   state.sessions.clear();
   for (const MapSession& session : slam.Sessions()) state.sessions.push_back(session.frame_offset);
-  state.end_of_map = l.map_keyframes;
+  state.end_of_map = localizer.map_keyframes();
   return state;
 }
 
 void LocateAll(const LocalizationRequest& request, const Dataset& dataset, const internal::Stopwatch& since,
-               SlamSystem& slam, Localization& result) {
+               const SlamSystem& slam, Localizer& localizer, Localization& result) {
   PrefetchOptions reading;
   reading.end = dataset.Size();
   reading.ahead = request.threads > 1 ? 4 : 0;
@@ -175,7 +174,7 @@ void LocateAll(const LocalizationRequest& request, const Dataset& dataset, const
   Prefetcher frames(dataset, reading);
   Progress progress("localize", dataset.Size(), request.quiet ? nullptr : internal::StandardError());
   const Pose T_camera_body = dataset.Rig().T_body_camera.Inverse();
-  RunState state = StateIn(slam, result);
+  RunState state = StateIn(slam, localizer);
   const bool endless = dataset.FrameSupply() != Supply::kStored;
   for (const auto& observer : request.observers)
     observer->OnStart(dataset.Rig(), endless ? 0 : dataset.Size());
@@ -191,18 +190,18 @@ void LocateAll(const LocalizationRequest& request, const Dataset& dataset, const
     }
     const InputFrame& frame = *fetched->read.frame;
     if (frame.mask.empty()) ++result.without_mask;
-    const std::size_t recognised = slam.Relocalized();
     LocalizedFrame located;
     located.index = frame.index;
     located.stamp_s = frame.stamp_s;
-    located.track = slam.Track(frame);
-    state.recognised = slam.Relocalized() > recognised;
+    located.track = localizer.Track(frame);
+    state.recognised = located.track.recognised;
     for (const auto& observer : request.observers) observer->OnFrame(frame, located.track, state);
     if (located.track.state == TrackingState::kTracking) {
       located.recognised = state.recognised;
-      located.beyond = slam.odometry()->LastView().beyond_map;
-      if (!located.beyond) located.keyframe = slam.odometry()->LastView().keyframe;
-      located.covariance = PoseCovariance(*slam.odometry());
+      const FrameView view = localizer.odometry().LastView();
+      located.beyond = view.beyond_map;
+      if (!located.beyond) located.keyframe = view.keyframe;
+      located.covariance = PoseCovariance(localizer.odometry());
       result.trajectory.push_back({frame.stamp_s, located.track.T_world_camera * T_camera_body});
       if (!result.first_pose_s) result.first_pose_s = since.Seconds();
     }
@@ -231,11 +230,12 @@ Localization Localize(const LocalizationRequest& request) {
   Localization result;
   result.masked = !options.mask.empty();
   const std::unique_ptr<SlamSystem> slam = OpenMap(request, info);
+  Localizer localizer(*slam);
   result.load_s = since.Seconds();
-  result.map_keyframes = slam->odometry()->map().KeyframeCount();
+  result.map_keyframes = localizer.map_keyframes();
   const internal::Stopwatch watch;
   const double cpu = ProcessCpuSeconds();
-  LocateAll(request, *dataset, since, *slam, result);
+  LocateAll(request, *dataset, since, *slam, localizer, result);
   result.wall_s = watch.Seconds();
   result.cpu_s = ProcessCpuSeconds() - cpu;
   folder.Write({kTrajectory, [&](const fs::path& file) {
@@ -243,7 +243,7 @@ Localization Localize(const LocalizationRequest& request) {
                 }});
   folder.Write({kFrames, [&](const fs::path& file) { internal::WriteFile(file, FramesCsv(result)); }});
   folder.Write({kPicture, [&](const fs::path& file) {
-                  WriteSvg(file, Picture(request, StateIn(*slam, result), result));
+                  WriteSvg(file, Picture(request, StateIn(*slam, localizer), result));
                 }});
   folder.Write(
       {kSummary, [&](const fs::path& file) { internal::WriteFile(file, Summary(request, result)); }});

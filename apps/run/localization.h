@@ -34,7 +34,7 @@ struct LocalizedFrame {
   bool recognised = false;             ///< the loop detector said where it is, after it was lost
   bool beyond = false;                 ///< it hangs on what was seen since, where the map shows too little
   int keyframe = -1;                   ///< of the map, that shares most landmarks with it; -1: beyond it
-  std::optional<Matrix6d> covariance;  ///< Odometry::PoseCovariance
+  std::optional<Matrix6d> covariance;  ///< PoseCovariance
 };
 
 struct Localization {

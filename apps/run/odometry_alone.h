@@ -14,7 +14,7 @@
 
 namespace tutti {
 
-/// A copy of the odometry from before loops changed it for the first time (SlamSystem::SetChangeListener),
+/// A copy of the odometry from before loops changed it for the first time (SlamListeners::on_change),
 /// which tracks what comes after. Features need nothing from before: it takes the run's own with the frames.
 /// With `own_thread` it tracks beside the run, else within Track(); the result is the same.
 class OdometryAlone {

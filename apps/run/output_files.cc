@@ -73,10 +73,10 @@ TrajectoryPlot MakePlot(const RunResult& result) {
                            SessionColor(k), 1.2, true});
   }
   const FramePlaces places(result, align_slam);
-  for (const LoopRecord& loop : result.loops) {
+  for (const Loop& loop : result.loops) {
     const auto a = places.AtEnd(loop.candidate, loop.candidate_stamp_s),
                b = places.AtEnd(loop.query, loop.query_stamp_s);
-    if (loop.accepted && a && b) plot.edges.emplace_back(*a, *b);
+    if (loop.accepted() && a && b) plot.edges.emplace_back(*a, *b);
   }
   plot.edges_name = "accepted loops (" + std::to_string(result.LoopsAccepted()) + ")";
   for (const FoundFrame& frame : result.found) {
@@ -90,7 +90,7 @@ TrajectoryPlot MakePlot(const RunResult& result) {
 
 std::size_t RunResult::LoopsAccepted() const {
   std::size_t count = 0;
-  for (const LoopRecord& loop : loops) count += loop.accepted ? 1 : 0;
+  for (const Loop& loop : loops) count += loop.accepted() ? 1 : 0;
   return count;
 }
 

@@ -68,16 +68,17 @@ Json LoopsJson(const RunResult& r) {
                 {"global_adjustments", r.global_adjustments}};
   int injected = 0, injected_accepted = 0;
   loops["doubted"] = Json::array();
-  for (const LoopRecord& loop : r.loops) {
+  for (const Loop& loop : r.loops) {
     injected += loop.injected ? 1 : 0;
-    injected_accepted += loop.injected && loop.accepted ? 1 : 0;
+    injected_accepted += loop.injected && loop.accepted() ? 1 : 0;
     const bool believed = r.appearance_only || loop.weight >= 0.5;  // without poses there is no graph
-    if (!loop.verified || (loop.accepted && believed)) continue;
-    loops["doubted"].push_back({{"query", loop.query},
-                                {"candidate", loop.candidate},
-                                {"weight", loop.weight},
-                                {"reason", loop.accepted ? "down-weighted by the robust loss" : loop.reason},
-                                {"injected", loop.injected}});
+    if (!loop.verified || (loop.accepted() && believed)) continue;
+    loops["doubted"].push_back(
+        {{"query", loop.query},
+         {"candidate", loop.candidate},
+         {"weight", loop.weight},
+         {"reason", loop.accepted() ? "down-weighted by the robust loss" : loop.reason},
+         {"injected", loop.injected}});
   }
   loops["injected"] = injected;
   loops["injected_accepted"] = injected_accepted;
@@ -173,7 +174,7 @@ std::string Quoted(const std::string& text) {
 // These columns are always there, since scripts rely on them; further members follow.
 constexpr const char* kMembers[] = {"surf", "sift", "orb"};
 
-double MemberPosterior(const LoopRecord& loop, const std::string& name) {
+double MemberPosterior(const Loop& loop, const std::string& name) {
   for (const MemberOpinion& member : loop.members) {
     if (member.name == name) return member.took_part ? member.hypothesis : std::nan("");
   }
@@ -353,14 +354,13 @@ std::string LoopsCsvHeader(const std::vector<std::string>& members) {
   return line + "\n";
 }
 
-std::string LoopsCsvLine(const LoopRecord& loop, const std::vector<std::string>& members,
-                         const LoopError& error) {
+std::string LoopsCsvLine(const Loop& loop, const std::vector<std::string>& members, const LoopError& error) {
   std::ostringstream out;
   out << loop.query << ',' << loop.candidate << ',' << Cell(loop.query_stamp_s, 9) << ','
       << Cell(loop.candidate_stamp_s, 9);
   for (const char* name : kMembers) out << ',' << Cell(MemberPosterior(loop, name), 6);
   out << ',' << Cell(loop.hypothesis, 6) << ',' << loop.inliers << ',' << loop.matches << ','
-      << (loop.accepted ? 1 : 0) << ',' << Quoted(loop.reason) << ',' << (loop.verified ? 1 : 0);
+      << (loop.accepted() ? 1 : 0) << ',' << Quoted(loop.reason) << ',' << (loop.verified ? 1 : 0);
   if (loop.S_candidate_query) {
     const Similarity& s = *loop.S_candidate_query;
     for (const double v : {s.translation.x(), s.translation.y(), s.translation.z(), s.rotation.x(),
@@ -384,7 +384,7 @@ std::string LoopsCsvLine(const LoopRecord& loop, const std::vector<std::string>&
 
 std::string LoopsCsv(const RunResult& r) {
   std::vector<std::string> names;
-  for (const LoopRecord& loop : r.loops) {
+  for (const Loop& loop : r.loops) {
     for (const MemberOpinion& member : loop.members) names.push_back(member.name);
   }
   names = OtherMembers(names);

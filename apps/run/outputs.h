@@ -41,7 +41,7 @@ std::string LoopsCsv(const RunResult& result);
 /// loops.csv in parts. `members` have columns beside SURF, SIFT and ORB: those that OtherMembers returns.
 std::vector<std::string> OtherMembers(const std::vector<std::string>& members);
 std::string LoopsCsvHeader(const std::vector<std::string>& members);
-std::string LoopsCsvLine(const LoopRecord& loop, const std::vector<std::string>& members,
+std::string LoopsCsvLine(const Loop& loop, const std::vector<std::string>& members,
                          const LoopError& error = {});
 
 /// The comparison with and without the ensemble, for the terminal.

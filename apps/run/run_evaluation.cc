@@ -72,7 +72,7 @@ LoopError Apart(const Pose& candidate, const Pose& query, bool rotations = true)
 }
 
 // Whether a loop is right, if the ground truth can tell; `scale`: metres in a unit of the map, if known.
-std::optional<bool> Judge(const LoopRecord& loop, const Trajectory& reference, std::optional<double> scale,
+std::optional<bool> Judge(const Loop& loop, const Trajectory& reference, std::optional<double> scale,
                           const RunResult& result, LoopError& error) {
   const CameraRig& rig = result.rig;
   const std::optional<Pose> candidate =
@@ -103,7 +103,7 @@ std::optional<bool> Judge(const LoopRecord& loop, const Trajectory& reference, s
 
 void MeasureLoops(RunResult& result) {
   result.loop_errors.clear();
-  for (const LoopRecord& loop : result.loops) {
+  for (const Loop& loop : result.loops) {
     const auto pose = [&](double stamp_s) {
       return PoseOfFrame(result.trajectory, stamp_s, result.frame_interval_s);
     };
@@ -139,9 +139,9 @@ void EvaluateRun(const Trajectory& reference, const std::string& file, RunResult
   std::optional<double> scale = 1.0;
   if (mono) scale = evaluation.slam.valid ? std::optional<double>(evaluation.slam.scale) : std::nullopt;
   for (std::size_t i = 0; i < result.loops.size(); ++i) {
-    LoopRecord& loop = result.loops[i];
+    Loop& loop = result.loops[i];
     const std::optional<bool> correct = Judge(loop, reference, scale, result, result.loop_errors[i]);
-    if (!loop.accepted) continue;
+    if (!loop.accepted()) continue;
     loop.correct = correct;
     ++(!correct ? evaluation.loops_unknown : *correct ? evaluation.loops_true : evaluation.loops_false);
   }

@@ -19,7 +19,7 @@ void MeasureLoops(RunResult& result);
 /// two places takes the error's place, and the whole median depth that of the 10 %. Where the reference has
 /// positions alone, it is by how much the distance of the two places differs from the constraint's. Accepted
 /// loops whose ends have no reference (PoseOfFrame) count as neither. Sets result.reference (cut to the run),
-/// result.evaluation, result.loop_errors and LoopRecord::correct.
+/// result.evaluation, result.loop_errors and Loop::correct.
 void EvaluateRun(const Trajectory& reference, const std::string& file, RunResult& result);
 
 }  // namespace tutti

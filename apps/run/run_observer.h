@@ -11,19 +11,19 @@
 #include "tutti/frontend/frame.h"
 #include "tutti/frontend/odometry.h"
 #include "tutti/loopclosure/detector.h"
-#include "tutti/slam/loop_record.h"
+#include "tutti/slam/loop.h"
 
 namespace tutti {
 
 /// The map and its loops at one moment of a run.
 struct RunState {
   const Odometry* odometry = nullptr;  ///< null: appearance only
-  const std::vector<LoopRecord>& loops;
+  const std::vector<Loop>& loops;
   int corrections = 0;      ///< how often loops have moved the map
   bool recognised = false;  ///< of OnFrame: the frame was lost, or the first, and the detector knew its place
   /// MapSession::frame_offset of the recordings of the map, which are in the order of their numbers.
   std::vector<std::int64_t> sessions = {0};
-  /// Frames are only located (SlamSystem::BeginLocalization): keyframes from this id on are none of the
+  /// Frames are only located (Localizer): keyframes from this id on are none of the
   /// map's.
   int end_of_map = std::numeric_limits<int>::max();
 

@@ -34,7 +34,7 @@ void CollectKeyframes(const Odometry& odometry, const FrameRange& session, RunRe
 // Those of the run's own recording. Time stamps of another recording would mean other frames here.
 void CollectLoops(const RunState& state, RunResult& result) {
   result.loops.clear();
-  for (const LoopRecord& loop : state.loops) {
+  for (const Loop& loop : state.loops) {
     if (loop.query < state.FirstFrame()) continue;
     result.loops.push_back(loop);
     if (loop.candidate < state.FirstFrame())
@@ -141,7 +141,7 @@ void CollectStamps(const RunState& state, RunResult& result) {
     if (frame < state.FirstFrame() && DatasetOfNote(sessions[state.SessionOf(frame)].note) == own)
       stamps[frame] = state.odometry->map().keyframe(id).stamp_s;
   }
-  for (LoopRecord& loop : result.loops) {
+  for (Loop& loop : result.loops) {
     const auto stamp = stamps.find(loop.candidate);
     if (stamp != stamps.end()) loop.candidate_stamp_s = stamp->second;
   }

@@ -19,7 +19,7 @@
 #include "tutti/frontend/calibration_check.h"
 #include "tutti/frontend/odometry.h"
 #include "tutti/slam/config.h"
-#include "tutti/slam/loop_record.h"
+#include "tutti/slam/loop.h"
 #include "tutti/slam/map_file.h"
 #include "tutti/slam/slam_system.h"
 
@@ -126,7 +126,7 @@ struct RunResult {
   bool in_map = false;           ///< `trajectory` is in that map's frame of reference: the run has joined it
 
   // Loops.
-  std::vector<LoopRecord> loops;       ///< frames by their numbers in the map (MapSession::frame_offset)
+  std::vector<Loop> loops;             ///< frames by their numbers in the map (MapSession::frame_offset)
   std::vector<LoopError> loop_errors;  ///< of each, in their order; empty: not measured
   int corrections = 0;
   int global_adjustments = 0;

@@ -108,14 +108,13 @@ Value LensOff(const RunResult& r) {
 
 Value LoopsRefused(const RunResult& r) {
   // What is younger is in the local map, and was never to enter.
-  const auto recognised = [&](const LoopRecord& loop) {
+  const auto recognised = [&](const Loop& loop) {
     return loop.verified && !loop.injected &&
            loop.query_stamp_s - loop.candidate_stamp_s >= r.config.run.loop_min_age_s;
   };
   const auto all = std::count_if(r.loops.begin(), r.loops.end(), recognised);
-  const auto refused = std::count_if(r.loops.begin(), r.loops.end(), [&](const LoopRecord& loop) {
-    return recognised(loop) && !loop.accepted;
-  });
+  const auto refused = std::count_if(r.loops.begin(), r.loops.end(),
+                                     [&](const Loop& loop) { return recognised(loop) && !loop.accepted(); });
   if (refused <= kMostRefused) return 0;
   return Share(static_cast<double>(refused), static_cast<double>(all));
 }

@@ -10,7 +10,7 @@
 #include "apps/run/progress.h"
 #include "apps/run/run_evaluation.h"
 #include "apps/run/run_parts.h"
-#include "apps/slam/loop_closing.h"
+#include "apps/slam/loop_closer.h"
 #include "core/stopwatch.h"
 #include "tutti/core/error.h"
 
@@ -38,27 +38,21 @@ class SequenceRecorder : public RunObserver {
 /// Loops on an odometry that is complete: they move it, but no tracking goes on from there.
 class Replay {
  public:
-  Replay(const RunConfig& config, const CameraRig& rig, const Odometry& tracked)
-      : loops_(config, rig, nullptr), odometry_(tracked) {}
+  Replay(const RunConfig& config, const CameraRig& rig, const Odometry& tracked, LoopListener listener)
+      : loops_(config, rig, nullptr, std::move(listener)), odometry_(tracked) {}
 
-  LoopClosing& loops() { return loops_; }
-  RunState State() const { return {&odometry_, loops_.closer().records(), loops_.closer().Corrections()}; }
+  const LoopCloser& loops() const { return loops_; }
+  RunState State() const { return {&odometry_, loops_.loops(), loops_.Report().corrections}; }
 
   void Keyframe(const InputFrame& frame, const KeyframeView& view, std::int64_t frames) {
     frames_ = frames;
-    while (const auto update = loops_.Due(&odometry_, frames - 1)) Take(*update, frames - 1);
-    if (loops_.Searching()) loops_.Submit(frame, &view, frames);
+    loops_.Due(&odometry_, frames - 1);
+    loops_.AddKeyframe(frame, &view, frames);
   }
-  void Finish() {
-    while (const auto update = loops_.Rest(&odometry_, frames_)) Take(*update, frames_);
-  }
+  void Finish() { loops_.Finish(&odometry_, frames_); }
 
  private:
-  void Take(const LoopUpdate& update, std::int64_t frames) {
-    if (update.correction) loops_.Applied(update, odometry_.Correct(*update.correction), odometry_, frames);
-  }
-
-  LoopClosing loops_;
+  LoopCloser loops_;
   Odometry odometry_;
   std::int64_t frames_ = 0;
 };
@@ -115,21 +109,22 @@ RunResult CloseLoops(const TrackedSequence& tracked, const RunRequest& request, 
   const auto reference = ReadReference(*dataset, request, &warnings);
   const InterruptGuard guard;
   OutputFolder folder = OpenOutputFolder(request, reference ? reference->second : std::string());
-  Replay replay(Watched(result.config, request), result.rig, *tracked.odometry);
-  replay.loops().SetDetectionListener([&request](const LoopResult& detection) {
+  const auto tell = [&request](const LoopResult& detection) {
     for (const auto& observer : request.observers) observer->OnDetection(detection);
-  });
+  };
+  Replay replay(Watched(result.config, request), result.rig, *tracked.odometry, {tell, {}});
   LiveFiles live(folder.path(), result.rig, result.config);
   Attempts attempts;
   attempts.Try([&] { CloseAll(tracked, request, *dataset, replay, live, result); });
   attempts.Try([&] {
-    for (const auto& [name, ms] : replay.loops().StageMilliseconds()) result.stage_ms[name] = ms;
+    const SlamReport report = replay.loops().Report();
+    for (const auto& [name, ms] : report.stage_ms) result.stage_ms[name] = ms;
     result.wall_s += watch.Seconds();
     result.cpu_s += ProcessCpuSeconds() - cpu_begin;
     CollectMap(replay.State(), result);
-    result.global_adjustments = replay.loops().closer().Adjustments();
-    result.graph = replay.loops().closer().Graph(*replay.State().odometry);
-    result.graph_proof = replay.loops().closer().proof();
+    result.global_adjustments = report.global_adjustments;
+    result.graph = replay.loops().Graph(replay.State().odometry->map());
+    result.graph_proof = report.graph_proof;
     result.trajectory_odometry = tracked.result.trajectory;
   });
   attempts.Try([&] { MeasureLoops(result); });

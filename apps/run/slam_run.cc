@@ -29,18 +29,20 @@ SlamRun::SlamRun(const RunRequest& request, const RunConfig& config, const Datas
   }
   for (const MapSession& session : slam_->Sessions()) session_offsets_.push_back(session.frame_offset);
   if (request.checkpoint_s) checkpoints_.emplace(out / kCheckpoint, *request.checkpoint_s);
-  slam_->SetDetectionListener([this](const LoopResult& detection) {
+  SlamListeners listeners;
+  listeners.on_detection = [this](const LoopResult& detection) {
     for (const auto& observer : request_.observers) observer->OnDetection(detection);
-  });
+  };
   if (!request.observers.empty()) {
-    slam_->SetKeyframeListener([this](const InputFrame& frame, int keyframe) {
+    listeners.on_keyframe = [this](const InputFrame& frame, int keyframe) {
       for (const auto& observer : request_.observers) observer->OnKeyframe(frame, keyframe, State());
-    });
+    };
   }
-  slam_->SetChangeListener([this](const Odometry& odometry, std::int64_t last) {
+  listeners.on_change = [this](const Odometry& odometry, std::int64_t last) {
     if (alone_ || given_ != nullptr) return;
     alone_ = std::make_unique<OdometryAlone>(odometry, last, AloneBeside());
-  });
+  };
+  slam_->SetListeners(std::move(listeners));
   total_ = dataset.FrameSupply() == Supply::kStored ? dataset.Size() : static_cast<std::size_t>(-1);
   result_.endless = dataset.FrameSupply() != Supply::kStored;
   result_.realtime = request.realtime;
@@ -92,10 +94,10 @@ void SlamRun::Count() {
   result_.frames_listed = dataset_.Size();
   result_.skipped_share = dataset_.SkippedShare();
   result_.frame_interval_s = FrameInterval(dataset_);
-  result_.stage_ms = slam_->StageMilliseconds();
+  result_.stage_ms = slam_->Report().stage_ms;
   result_.stage_ms["read"] = so_far_.read_ms;
   result_.stage_ms["read_wait"] = so_far_.read_wait_ms;
-  if (!slam_->AppearanceOnly()) result_.stage_ms["odometry_extract"] += so_far_.extract_ms;
+  if (slam_->odometry() != nullptr) result_.stage_ms["odometry_extract"] += so_far_.extract_ms;
   result_.wall_s = WallSeconds();
   if (alone_) alone_->Tracked();
   result_.cpu_s = CpuSeconds();
@@ -120,14 +122,14 @@ void SlamRun::Collect() {
     CollectStamps(State(), result_);
     NoteJoining(result_.map->sessions.back());
   }
-  result_.global_adjustments = slam_->GlobalAdjustments();
+  result_.global_adjustments = slam_->Report().global_adjustments;
   result_.graph = slam_->Graph();
-  result_.graph_proof = slam_->GraphProof();
-  if (given_ != nullptr && !slam_->AppearanceOnly()) CorrectGiven();
+  result_.graph_proof = slam_->Report().graph_proof;
+  if (given_ != nullptr && slam_->odometry() != nullptr) CorrectGiven();
   FrameRange session;
   if (FirstFrame() > 0) session.first = FirstFrame();
   result_.given_odometry = given_ != nullptr;
-  result_.followed = slam_->Followed();
+  result_.followed = slam_->Report().followed;
   if (given_ != nullptr) {
     std::vector<OdometryJump>& jumps = result_.followed.jumps;
     std::copy_if(given_->jumps().begin(), given_->jumps().end(), std::back_inserter(jumps),
@@ -135,9 +137,9 @@ void SlamRun::Collect() {
     std::sort(jumps.begin(), jumps.end(),
               [](const OdometryJump& a, const OdometryJump& b) { return a.to_s < b.to_s; });
   }
-  if (given_ == nullptr && !slam_->AppearanceOnly())
+  if (given_ == nullptr && slam_->odometry() != nullptr)
     result_.lens_check = CheckLens(*slam_->odometry(), session);
-  if (request_.focal_length && !slam_->AppearanceOnly()) {
+  if (request_.focal_length && slam_->odometry() != nullptr) {
     const FocalLength& before = *request_.focal_length;
     const bool undistorted = before.measured && before.camera.distortion != Distortion::kNone;
     result_.focal_length_of_map =
@@ -145,7 +147,8 @@ void SlamRun::Collect() {
     result_.cpu_s += result_.focal_length_of_map->cpu_s;
   }
   if (!alone_) return;
-  result_.trajectory_odometry = BodyTrajectory(FrameTrajectory(alone_->Tracked().map(), -1, session), result_.rig);
+  result_.trajectory_odometry =
+      BodyTrajectory(FrameTrajectory(alone_->Tracked().map(), -1, session), result_.rig);
 }
 
 void SlamRun::NoteJoining(const MapSession& own) {
@@ -166,7 +169,7 @@ void SlamRun::CorrectGiven() {
 }
 
 TrackResult SlamRun::Track(const InputFrame& frame) {
-  if (given_ == nullptr || slam_->AppearanceOnly()) return slam_->Track(frame);
+  if (given_ == nullptr || slam_->odometry() == nullptr) return slam_->Track(frame);
   if (const std::optional<Pose> T_odom_body = given_->At(frame.stamp_s)) {
     const double before_s = std::exchange(followed_s_, frame.stamp_s).value_or(frame.stamp_s);
     return slam_->Follow(frame, *T_odom_body * result_.rig.T_body_camera,
@@ -194,7 +197,7 @@ PrefetchOptions SlamRun::Reading() {
 }
 
 void SlamRun::Extract(InputFrame& frame) {
-  if (slam_->AppearanceOnly()) return;
+  if (slam_->odometry() == nullptr) return;
   const ScopedSpan span(Recorder(), Lane::kReading, "extract");
   frame.features = slam_->odometry()->Extract(frame);
 }
@@ -284,9 +287,8 @@ double SlamRun::CpuSeconds() const {
 void SlamRun::TrackOne(const InputFrame& frame) {
   const ScopedSpan span(Recorder(), Lane::kTracking, "frame");
   const internal::Stopwatch watch;
-  const std::size_t recognised = slam_->Relocalized();
   const TrackResult track = Track(frame);
-  recognised_ = slam_->Relocalized() > recognised;
+  recognised_ = track.recognised;
   if (recognised_) result_.found.push_back({frame.index, frame.stamp_s});
   result_.frame_ms.push_back(watch.Milliseconds());
   if (track.keyframe >= 0) planted_.OnKeyframe(track.keyframe, slam_.get());
@@ -294,12 +296,12 @@ void SlamRun::TrackOne(const InputFrame& frame) {
   InputFrame numbered = frame;
   numbered.index += FirstFrame();
   for (const auto& observer : request_.observers) observer->OnFrame(numbered, track, State());
-  so_far_.state = slam_->AppearanceOnly() ? "appearance only" : ToString(track.state);
-  if (slam_->AppearanceOnly() || track.state == TrackingState::kTracking) {
+  so_far_.state = slam_->odometry() == nullptr ? "appearance only" : ToString(track.state);
+  if (slam_->odometry() == nullptr || track.state == TrackingState::kTracking) {
     so_far_.lost_open = false;
     if (track.by_grey_values) {
       ++result_.frames_by_grey_values;
-    } else if (!slam_->AppearanceOnly()) {
+    } else if (slam_->odometry() != nullptr) {
       result_.frame_inliers.push_back(track.inliers);
     }
     return;
@@ -315,7 +317,7 @@ void SlamRun::TrackOne(const InputFrame& frame) {
 std::string SlamRun::Status() const {
   std::string status = so_far_.state;
   if (config_.run.loops) {
-    const std::vector<LoopRecord>& loops = slam_->loops();
+    const std::vector<Loop>& loops = slam_->loops();
     status += "  loops " + std::to_string(CountAccepted(loops)) + "/" + std::to_string(loops.size());
   }
   return status;

@@ -53,11 +53,11 @@ class SlamRun {
   void CorrectGiven();
   TrackResult Track(const InputFrame& frame);
   RunState State() const {
-    return {slam_->odometry(), slam_->loops(), slam_->Corrections(), recognised_, session_offsets_};
+    return {slam_->odometry(), slam_->loops(), slam_->Report().corrections, recognised_, session_offsets_};
   }
   // In the map's numbers.
   std::int64_t FirstFrame() const {
-    return slam_->AppearanceOnly() ? 0 : slam_->odometry()->LastView().frame_offset;
+    return slam_->odometry() == nullptr ? 0 : slam_->odometry()->LastView().frame_offset;
   }
   std::FILE* Out() const { return request_.quiet ? nullptr : internal::StandardError(); }
   SpanRecorder* Recorder() { return request_.timing || request_.trace ? &recorder_ : nullptr; }

@@ -76,7 +76,7 @@ void SlamRun::GoOnIn(const fs::path& map) {
                      ": without loop closure (run.loops, --no-loops) nothing would connect a "
                      "recording with the map; both need it");
   info.config = Watched(config_, request_);
-  slam_ = SlamSystem::Load(map, info, Recorder());
+  slam_ = LoadMap(map, info, Recorder());
   try {
     slam_->BeginSession(result_.rig);
   } catch (const InputError& error) {
@@ -88,7 +88,7 @@ void SlamRun::GoOnIn(const fs::path& map) {
 std::size_t SlamRun::LoopsBefore() const {
   const std::int64_t first = FirstFrame();
   return static_cast<std::size_t>(std::count_if(slam_->loops().begin(), slam_->loops().end(),
-                                                [&](const LoopRecord& l) { return l.query < first; }));
+                                                [&](const Loop& l) { return l.query < first; }));
 }
 
 void SlamRun::Resume(const fs::path& checkpoint) {
@@ -96,7 +96,7 @@ void SlamRun::Resume(const fs::path& checkpoint) {
   if (StateOf(info.rig) != StateOf(result_.rig))
     throw InputError(checkpoint.string() + ": is of another camera than the data set has by now");
   info.config = Watched(config_, request_);
-  slam_ = SlamSystem::Load(checkpoint, info, Recorder(), [this](internal::SectionReader& file) {
+  slam_ = LoadMap(checkpoint, info, Recorder(), [this](internal::SectionReader& file) {
     ReadState(file, kRunSection, this);
     if (!resumed_alone_) return;
     Odometry alone(config_.odometry, result_.rig);

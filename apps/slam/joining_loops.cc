@@ -28,7 +28,7 @@ struct LoopSet {
 
 class SetFinder {
  public:
-  SetFinder(const std::vector<LoopEdge>& loops, const LoopGate::Map& map, const PoseGraph& graph,
+  SetFinder(const std::vector<LoopEdge>& loops, const LoopGate::Places& map, const PoseGraph& graph,
             const SlamOptions& options)
       : loops_(loops), map_(map), graph_(graph), options_(options) {}
 
@@ -109,7 +109,7 @@ class SetFinder {
   }
 
   const std::vector<LoopEdge>& loops_;
-  const LoopGate::Map& map_;
+  const LoopGate::Places& map_;
   const PoseGraph& graph_;
   const SlamOptions& options_;
   std::map<int, std::map<int, Way>> ways_;
@@ -133,7 +133,7 @@ std::string Counted(const LoopSet& set) {
 
 }  // namespace
 
-JoiningLoops ChooseJoiningLoops(const std::vector<LoopEdge>& loops, const LoopGate::Map& map,
+JoiningLoops ChooseJoiningLoops(const std::vector<LoopEdge>& loops, const LoopGate::Places& map,
                                 const PoseGraph& graph, const SlamOptions& options) {
   JoiningLoops out;
   out.reasons.resize(loops.size());

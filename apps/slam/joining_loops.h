@@ -33,7 +33,7 @@ struct JoiningLoops {
 /// more than the median scene depth, since images of one place that are fooled are fooled together. The
 /// largest set of each pair of pieces joins if it has at least twice as many places as the next one: a
 /// likeness ends somewhere, the common way goes on.
-JoiningLoops ChooseJoiningLoops(const std::vector<LoopEdge>& loops, const LoopGate::Map& map,
+JoiningLoops ChooseJoiningLoops(const std::vector<LoopEdge>& loops, const LoopGate::Places& map,
                                 const PoseGraph& graph, const SlamOptions& options);
 
 }  // namespace tutti

@@ -1,23 +1,25 @@
 #include "apps/slam/loop_closer.h"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
-#include "apps/slam/joining_loops.h"
-#include "apps/slam/loop_reach.h"
+#include "apps/slam/odometry_jumps.h"
 #include "core/angle.h"
 #include "core/stopwatch.h"
+#include "frontend/map/fuse.h"
+#include "frontend/map/prune.h"
 
 namespace tutti {
 namespace {
 
-// An edge of the pose graph joins keyframes that share so many landmarks (as in ORB-SLAM's essential graph);
-// from each to at most so many older ones, the strongest.
-constexpr int kLeastShared = 100, kCovisible = 3;
-constexpr double kNoWeight = 0.01;  // of the robust loss: the map contradicts the loop
-constexpr int kLeastCommon = 30;    // landmarks that tie the two ends of a loop
-constexpr int kSurelySeen = 100;    // inliers of a loop within the local map that may contradict it
+constexpr const char* kDecidedLater = "decided anew by the images that came next: in a line further down";
+constexpr int kCovisible = 3;  // most edges from a keyframe to older ones that see the same, the strongest
+
+LoopDetectorOptions DetectorOptions(const RunConfig& config) {
+  LoopDetectorOptions options = config.loops;
+  options.threads = std::min(options.threads, config.run.threads);
+  return options;
+}
 
 KeyframeGraphOptions GraphOptions(const RunConfig& config, Sensor sensor) {
   KeyframeGraphOptions options;
@@ -30,399 +32,265 @@ KeyframeGraphOptions GraphOptions(const RunConfig& config, Sensor sensor) {
   return options;
 }
 
-std::vector<MapKeyframe> KeyframesOf(const Odometry& odometry) {
-  std::vector<MapKeyframe> keyframes;
-  for (const int id : odometry.map().KeyframeIds())
-    keyframes.push_back({id, odometry.map().keyframe(id).piece, odometry.map().keyframe(id).T_world_camera});
-  return keyframes;
+// A place may be certain where the motion is not. Without a camera there is none, and the place is all.
+bool GivesConstraint(const Verification& v) {
+  return v.accepted || v.type == ConstraintType::kFundamental || v.type == ConstraintType::kNone;
 }
 
-LoopGate::Map Places(const Odometry& odometry) {
-  return [&odometry](int id) {
-    return LoopGate::Place{odometry.map().keyframe(id).piece, odometry.map().keyframe(id).T_world_camera};
-  };
+LoopQuery Query(const InputFrame& frame, const CameraRig& rig) {
+  LoopQuery query;
+  // One camera's landmarks have a scale of their own, which drifts: no metre is to be read from them.
+  query.metric = rig.sensor != Sensor::kMono;
+  query.id = frame.index;
+  query.stamp_s = frame.stamp_s;
+  query.image = frame.image;
+  query.depth_m = frame.depth_m;
+  query.mask = frame.mask;
+  return query;
 }
 
 }  // namespace
 
-LoopCloser::LoopCloser(const RunConfig& config, const CameraRig& rig, SpanRecorder* recorder)
+LoopCloser::LoopCloser(const RunConfig& config, const CameraRig& rig, SpanRecorder* recorder,
+                       LoopListener listener, bool resumes)
     : recorder_(recorder),
+      listener_(std::move(listener)),
       options_(config.run),
       rig_(rig),
       detector_(config.loops),
       followed_(config.run, rig.sensor),
       gate_(config.run),
-      graph_(GraphOptions(config, rig.sensor)) {}
-
-PoseGraph LoopCloser::Graph(const Odometry& odometry) const {
-  KeyframeGraph graph = graph_;
-  graph.Update(KeyframesOf(odometry), Covisible(odometry));
-  return graph.Graph(accepted_);
+      graph_(GraphOptions(config, rig.sensor)) {
+  if (!config.run.loops) return;
+  worker_ = std::make_unique<LoopWorker>(DetectorOptions(config), config.run.threads > 1, recorder, resumes);
 }
 
-std::vector<CovisiblePair> LoopCloser::Covisible(const Odometry& odometry) const {
-  if (followed_.ImagesJudgeSteps() && adjustments_ == 0) return {};
-  std::vector<CovisiblePair> covisible;
-  for (const auto& [pair, shared] : Covisibility(odometry.map(), kLeastShared))
-    covisible.push_back({pair.first, pair.second, shared});
-  return covisible;
+void LoopCloser::BeginSession(const CameraRig& rig, std::int64_t first_frame, int first_keyframe) {
+  rig_ = rig;
+  session_ = first_frame;
+  sessions_.push_back(first_frame);
+  keyframes_seen_ = 0;
+  graph_.BeginSession(first_keyframe);
+  proof_.reset();
+  corrections_ = adjustments_ = 0;
+  stages_.clear();
+  if (!worker_) return;
+  worker_->Detector().BeginSession();
+  waited_before_ = worker_->WaitedMs();
 }
 
-LoopConstraint LoopCloser::Measure(const Verification& verification, int candidate, int query,
-                                   const Odometry& odometry) {
-  const ScopedSpan span(recorder_, Lane::kOptimisation, "measure_loop");
-  const internal::Stopwatch watch;
-  LoopConstraint constraint = MakeLoopConstraint(verification, ViewOf(odometry.map(), candidate),
-                                                 ViewOf(odometry.map(), query), rig_, detector_);
-  stages_["loop_measure"] += watch.Milliseconds();
-  return constraint;
+void LoopCloser::AddKeyframe(const InputFrame& frame, const KeyframeView* keyframe, std::int64_t frames) {
+  if (!worker_ || keyframes_seen_++ % options_.loop_every_keyframes != 0) return;
+  const bool first = stamps_.empty() || stamps_.rbegin()->first < session_;
+  if (!first && frame.stamp_s - stamps_.rbegin()->second < options_.loop_min_interval_s) return;
+  Ask(Query(frame, rig_), keyframe, frames);
 }
 
-// Measures it against the map, and lets it in if something else says the same.
-LoopUpdate LoopCloser::Consider(const LoopRecord& proposed, const Verification& verification, int candidate,
-                                int query, const Odometry& odometry, std::int64_t frames, bool across) {
-  records_.push_back(proposed);
-  LoopRecord& record = records_.back();
-  if (!record.verified && !IsWitness(record, verification)) return {};
-  const std::string doubt = record.reason;  // of the detector
-  const bool recent = OfOneSession(record.query, record.candidate) &&
-                      record.query_stamp_s - record.candidate_stamp_s < options_.loop_min_age_s;
-  const auto refuse_recent = [&record] {
-    record.reason = "too recent: still in the local map";
-    return LoopUpdate();
-  };
-  if (recent && (!record.verified || verification.inliers < kSurelySeen)) return refuse_recent();
-  const LoopConstraint constraint = Measure(verification, candidate, query, odometry);
-  if (recent && (!constraint.usable || gate_.Fulfilled(constraint.edge, Places(odometry))))
-    return refuse_recent();
-  if (!constraint.usable) {
-    record.reason = constraint.reason;
-    return {};
-  }
-  LoopEdge edge = constraint.edge;
-  edge.record = records_.size() - 1;
-  record.S_candidate_query = edge.S_candidate_query;
-  // An odometry that is followed may be any. Between recordings anything may have happened.
-  const bool one_way = !followed_.begun() && OfOneSession(record.query, record.candidate);
-  if (const std::string why = one_way && !recent ? WhyImpossible(edge, odometry, rig_.sensor) : "";
-      !why.empty()) {
-    record.reason = why;
-    LoopUpdate update;
-    if (record.verified) Revoke(edge.record, &update);  // the detector does not believe the others
-    return update;
-  }
-  if (followed_.ImagesJudgeSteps()) gate_.SetOdometryUncertainty(followed_.Seen());
-  LoopGate::Admitted admitted = gate_.Offer(edge, accepted_, Places(odometry), across,
-                                            [&](const LoopEdge& loop) { return TrustIn(loop, odometry); });
-  if (admitted.loops.empty()) {
-    record.pending = true;
-    record.reason = record.verified ? "waits for a second loop that agrees"
-                                    : "waits for a verified loop that agrees; by itself: " + doubt;
-    return {};
-  }
-  NoteWitnesses(admitted);
-  for (const LoopEdge& loop : admitted.loops) untied_.insert(loop.record);
-  return Enter(std::move(admitted.loops), odometry, frames);
-}
-
-LoopGate::Trust LoopCloser::TrustIn(const LoopEdge& loop, const Odometry& odometry) const {
-  if (!records_[loop.record].verified) return LoopGate::Trust::kWeak;
-  // A followed odometry may be any, and says itself how far it drifts.
-  return followed_.begun() || InReach(loop, odometry) ? LoopGate::Trust::kSure : LoopGate::Trust::kFar;
-}
-
-std::string LoopCloser::Join(const std::vector<ProposedLoop>& proposed, const Odometry& odometry,
-                             std::int64_t frames, LoopUpdate* update) {
-  std::vector<LoopEdge> loops;
-  for (const ProposedLoop& loop : proposed) {
-    records_.push_back(loop.record);
-    LoopRecord& record = records_.back();
-    if (!record.verified) continue;
-    LoopConstraint constraint = Measure(loop.verification, loop.candidate, loop.query, odometry);
-    record.reason = constraint.reason;
-    if (!constraint.usable) continue;
-    record.S_candidate_query = constraint.edge.S_candidate_query;
-    constraint.edge.record = records_.size() - 1;
-    loops.push_back(constraint.edge);
-  }
-  const JoiningLoops joining = ChooseJoiningLoops(loops, Places(odometry), Graph(odometry), options_);
-  for (std::size_t i = 0; i < loops.size(); ++i) {
-    records_[loops[i].record].reason = joining.reasons[i];
-    if (!joining.reasons[i].empty()) Revoke(loops[i].record, update);
-  }
-  std::vector<LoopEdge> entering;
-  for (const std::size_t i : joining.chosen) entering.push_back(loops[i]);
-  for (const LoopEdge& loop : entering) untied_.insert(loop.record);
-  if (!entering.empty()) Start(std::move(entering), odometry, frames);
-  return joining.reason;
-}
-
-LoopUpdate LoopCloser::MoveAll(const std::map<int, Similarity>& S_world_keyframe, const Odometry& odometry) {
-  graph_.Update(KeyframesOf(odometry), Covisible(odometry));
-  graph_.Move(S_world_keyframe, {});
-  Rescale(S_world_keyframe);
-  LoopUpdate update;
-  update.correction.emplace();
-  update.correction->S_world_keyframe = S_world_keyframe;
-  return update;
-}
-
-void LoopCloser::Add(int candidate, int query, const Similarity& S_candidate_query,
-                     const Matrix7d& information, const Odometry& odometry, std::int64_t frames) {
-  LoopEdge edge;
-  edge.candidate = candidate;
-  edge.query = query;
-  edge.candidate_frame = odometry.map().keyframe(candidate).frame_index;
-  edge.query_frame = odometry.map().keyframe(query).frame_index;
-  edge.S_candidate_query = S_candidate_query;
-  edge.information = information;
-  edge.depth = MedianDepth(ViewOf(odometry.map(), candidate));
-  edge.record = records_.size();
-  LoopRecord record;
-  record.query = edge.query_frame;
-  record.candidate = edge.candidate_frame;
-  record.query_stamp_s = odometry.map().keyframe(query).stamp_s;
-  record.candidate_stamp_s = odometry.map().keyframe(candidate).stamp_s;
-  record.verified = record.injected = true;
-  record.S_candidate_query = S_candidate_query;
-  if (!(edge.depth > 0)) record.reason = "the candidate's keyframe has no landmarks";
-  records_.push_back(record);
-  if (!(edge.depth > 0)) return;
-  untied_.insert(edge.record);
-  Start({edge}, odometry, frames);
-}
-
-// Somebody else's trajectory that was not moved yet and needs not be.
-bool LoopCloser::LeavesAsItIs(const std::vector<LoopEdge>& entering, const Odometry& odometry) const {
-  if (!followed_.begun() || corrections_ > 0 || solver_.Running()) return false;
-  std::vector<LoopEdge> loops = deferred_;
-  loops.insert(loops.end(), entering.begin(), entering.end());
-  return gate_.WithinNoise(loops, Places(odometry));
-}
-
-// What the map fulfils already waits, so that not every loop moves it.
-LoopUpdate LoopCloser::Enter(std::vector<LoopEdge> entering, const Odometry& odometry, std::int64_t frames) {
-  const LoopGate::Map places = Places(odometry);
-  const auto fulfilled = [&](const LoopEdge& loop) { return gate_.Fulfilled(loop, places); };
-  LoopUpdate update;
-  if (LeavesAsItIs(entering, odometry)) {
-    deferred_.insert(deferred_.end(), entering.begin(), entering.end());
-    return update;
-  }
-  if (!solver_.Running() && std::all_of(deferred_.begin(), deferred_.end(), fulfilled) &&
-      std::all_of(entering.begin(), entering.end(), fulfilled)) {
-    deferred_.insert(deferred_.end(), entering.begin(), entering.end());
-    if (options_.global_adjustment) {
-      update.correction.emplace();
-      Fuse(entering, &update);
+void LoopCloser::Ask(LoopQuery query, const KeyframeView* view, std::int64_t frames) {
+  if (view != nullptr) {
+    query.camera = rig_.camera;
+    if (options_.loop_pose_prior && query.metric) {
+      query.pose_prior.emplace();
+      query.pose_prior->position_m = view->T_world_camera.translation;
+      query.pose_prior->frame = view->map_piece;
     }
-    return update;
+    query.features = {view->keypoints, view->descriptors, view->points};
+    keyframe_of_frame_[query.id] = view->id;
   }
-  entering.insert(entering.begin(), deferred_.begin(), deferred_.end());
-  deferred_.clear();
-  Start(std::move(entering), odometry, frames);
-  return update;
-}
-
-void LoopCloser::NoteStep(int keyframe, const StepCheck& check) {
-  if (const auto sigma = followed_.NoteStep(keyframe, check)) graph_.NoteMotion(keyframe, *sigma);
-}
-
-void LoopCloser::FollowOdometry(const StampedPose& T_odom_camera, const Odometry& odometry) {
-  followed_.Add(T_odom_camera);
-  JudgeJumps(odometry, false);
-}
-
-void LoopCloser::JudgeJumps(const Odometry& odometry, bool all) {
-  const std::vector<OdometryJump> jumps = followed_.TakeJumps(all);
-  if (jumps.empty()) return;
-  const std::vector<int> ids = odometry.map().KeyframeIds();
-  const auto later = [&](double stamp_s) {
-    return std::partition_point(ids.begin(), ids.end(),
-                                [&](int id) { return odometry.map().keyframe(id).stamp_s < stamp_s; });
-  };
-  for (const OdometryJump& jump : jumps) {
-    const auto end = later(jump.to_s);
-    const int next = end == ids.end() ? odometry.map().KeyframeCount() : *end;
-    if (!jump.comes_back) {
-      if (followed_.ImagesConfirm(next, jump)) continue;
-      graph_.NoteJump(next);
-    }
-    followed_.NoteJump(jump);
-    if (!jump.comes_back) continue;
-    for (auto outlier = later(std::nextafter(jump.from_s, jump.to_s)); outlier != end; ++outlier)
-      graph_.NoteOutlier(*outlier);
-  }
-}
-
-void LoopCloser::NoteMotion(int keyframe, const MotionSigma& sigma, const Eigen::Vector3d& position) {
-  const bool said_nothing = followed_.motions() == 0;
-  if (const auto motion = followed_.NoteMotion(keyframe, sigma, position))
-    graph_.NoteMotion(keyframe, *motion);
-  if (said_nothing && followed_.motions() > 0) SetSigmas();  // what is configured no longer counts
-}
-
-void LoopCloser::SetSigmas() {
-  constexpr double kLeastRotation_rad = 1e-6;  // an edge is never certain
-  const FollowedOdometry::Sigmas least = followed_.Least();
-  graph_.SetSigmas(least.fraction, std::max(least.rotation_rad, kLeastRotation_rad));
-}
-
-// Solves the graph with them beside the tracking; those that come meanwhile wait for their turn.
-void LoopCloser::Start(std::vector<LoopEdge> entering, const Odometry& odometry, std::int64_t frames) {
-  if (solver_.Running()) {
-    queued_.insert(queued_.end(), entering.begin(), entering.end());
-    return;
-  }
-  const ScopedSpan span(recorder_, Lane::kOptimisation, "begin_closing");
+  stamps_[query.id] = query.stamp_s;
+  submitted_.push_back({frames + options_.loop_delay_frames, query.id});
   const internal::Stopwatch watch;
-  solved_keyframes_ = KeyframesOf(odometry);
-  graph_.Update(solved_keyframes_, Covisible(odometry));
-  SetSigmas();
-  solver_.Start(graph_, accepted_, entering, options_, recorder_);
-  solved_due_ = frames + SolutionFrames(solved_keyframes_.size());
-  stages_["loop_optimize"] += watch.Milliseconds();
+  worker_->Submit(std::move(query));
+  if (options_.threads == 1) stages_["loop_inline"] += watch.Milliseconds();
 }
 
-std::optional<LoopUpdate> LoopCloser::Solved(const Odometry& odometry, std::int64_t frames,
-                                             Entering entering) {
-  if (!solver_.Running() && !queued_.empty()) return Enter(std::exchange(queued_, {}), odometry, frames);
-  if (!solver_.Running()) return std::nullopt;
-  if (entering == Entering::kWhenDue && frames < solved_due_) return std::nullopt;
-  const ScopedSpan span(recorder_, Lane::kOptimisation, "enter_correction");
-  const internal::Stopwatch watch;
-  const LoopSolution solution = solver_.Take();
-  stages_["loop_solve"] += solution.time_ms;
-  LoopUpdate update;
-  for (const LoopVerdict& verdict : solution.verdicts) Settle(verdict, &update);
-  if (solution.moves) {
-    for (std::size_t i = 0; i < accepted_.size(); ++i) {
-      records_[accepted_[i].record].weight = solution.correction.loops[i].weight;
-      if (solution.correction.loops[i].weight < kNoWeight) Revoke(accepted_[i].record, &update);
-    }
-    update.correction = MoveBy(solution.correction, odometry);
-    if (options_.global_adjustment) Fuse(Untied(), &update);
-    proof_ = solution.proof;
-  }
-  stages_["loop_optimize"] += watch.Milliseconds();
-  return update;
+int LoopCloser::Locate(const InputFrame& frame) {
+  if (!worker_ || keyframe_of_frame_.empty()) return -1;
+  LoopQuery query = Query(frame, rig_);
+  query.camera = rig_.camera;
+  const LoopResult found = worker_->Detector().Locate(query);
+  return found.accepted ? KeyframeOf(found.candidate) : -1;
 }
 
-MapCorrection LoopCloser::MoveBy(const KeyframeCorrection& solved, const Odometry& odometry) {
-  MapCorrection correction;
-  const std::vector<MapKeyframe> now = KeyframesOf(odometry);
-  correction.S_world_keyframe = Follow(solved, solved_keyframes_, now);
-  correction.merges = solved.merges;
-  ++corrections_;
-  graph_.Update(now, Covisible(odometry));
-  graph_.Move(correction.S_world_keyframe, correction.merges);
-  Rescale(correction.S_world_keyframe);
-  if (options_.global_adjustment) {
-    adjust_piece_ = odometry.map().keyframe(accepted_.back().candidate).piece;
-  }
-  return correction;
+int LoopCloser::KeyframeOf(std::int64_t frame) const {
+  const auto keyframe = keyframe_of_frame_.find(frame);
+  return keyframe != keyframe_of_frame_.end() ? keyframe->second : -1;
 }
 
-void LoopCloser::Fuse(const std::vector<LoopEdge>& loops, LoopUpdate* update) {
-  for (const LoopEdge& loop : loops) {
-    update->fused.push_back(loop.record);
-    update->correction->fused.push_back({loop.candidate, loop.query, loop.S_candidate_query});
-  }
+void LoopCloser::Due(Odometry* odometry, std::int64_t frames) {
+  do {
+    if (odometry != nullptr && MayMove(frames) && listener_.before_change) listener_.before_change();
+  } while (BringInNext(odometry, frames, Entering::kWhenDue));
 }
 
-void LoopCloser::Rescale(const std::map<int, Similarity>& S_world_keyframe) {
-  for (std::vector<LoopEdge>* loops : {&accepted_, &gate_.waiting(), &deferred_, &queued_}) {
-    for (LoopEdge& loop : *loops) tutti::Rescale(S_world_keyframe, &loop);
-  }
+void LoopCloser::Finish(Odometry* odometry, std::int64_t frames) {
+  do {
+    if (odometry != nullptr) JudgeJumps(odometry->map(), true);
+  } while (BringInNext(odometry, frames, Entering::kAtOnce));
+  Say();
 }
 
-std::vector<LoopEdge> LoopCloser::Untied() const {
-  std::vector<LoopEdge> untied;
-  for (const LoopEdge& loop : accepted_) {
-    if (untied_.count(loop.record) != 0) untied.push_back(loop);
-  }
-  std::sort(untied.begin(), untied.end(),
-            [](const LoopEdge& a, const LoopEdge& b) { return a.record < b.record; });
-  return untied;
-}
-
-std::optional<LoopUpdate> LoopCloser::Adjusted(const Odometry& odometry, std::int64_t frames,
-                                               Entering entering) {
-  if (solver_.Running() || !adjuster_.Running()) return std::nullopt;
-  if (entering == Entering::kWhenDue && !adjuster_.Due(frames)) return std::nullopt;
-  const ScopedSpan span(recorder_, Lane::kOptimisation, "enter_adjustment");
-  const internal::Stopwatch watch;
-  LoopUpdate update;
-  auto adjustment = std::make_shared<const GlobalAdjustment>(adjuster_.Take());
-  if (auto moved = adjustment->Correction(odometry.map())) {
-    Rescale(*moved);
-    update.correction.emplace();
-    update.correction->S_world_keyframe = std::move(*moved);
-    update.correction->adjustment = std::move(adjustment);
-    ++adjustments_;
-  }
-  stages_["global_adjustment"] += watch.Milliseconds();
-  return update;
-}
-
-bool LoopCloser::Converge(const Odometry& odometry, int piece) {
-  if (!options_.global_adjustment || !untied_.empty()) return false;
-  adjuster_.Converge(odometry, piece);
+// False: there is nothing.
+bool LoopCloser::BringInNext(Odometry* odometry, std::int64_t frames, Entering entering) {
+  const bool at_once = entering == Entering::kAtOnce;
+  std::optional<Update> update;
+  if (odometry != nullptr) update = Solved(*odometry, frames, entering);
+  if (!update && late_) update = DeliverLate(odometry, frames);
+  if (!update && !submitted_.empty() && (at_once || submitted_.front().due <= frames))
+    update = Deliver(odometry, frames);
+  if (!update && at_once && odometry != nullptr && CloseDeferred(*odometry, frames)) update.emplace();
+  if (!update && odometry != nullptr) update = Adjusted(*odometry, frames, entering);
+  if (!update) return false;
+  Take(*update, odometry, frames);
   return true;
 }
 
-void LoopCloser::Applied(const LoopUpdate& update, const std::vector<int>& common, const Odometry& odometry,
-                         std::int64_t frames) {
-  const MapCorrection& correction = *update.correction;
-  for (std::size_t i = 0; i < common.size(); ++i) {
-    if (common[i] >= kLeastCommon) untied_.erase(update.fused[i]);
-  }
-  if (correction.adjustment) {
-    // The map as it is says more than what was measured before; a loop that it contradicts keeps its own.
-    graph_.MeasureAgain();
-    for (LoopEdge& loop : accepted_) {
-      const Similarity in_map(odometry.map().keyframe(loop.candidate).T_world_camera.Inverse() *
-                              odometry.map().keyframe(loop.query).T_world_camera);
-      const Disagreement d = tutti::Measure(loop.S_candidate_query * in_map.Inverse(), loop.depth);
-      if (!Contradicts(d)) loop.S_candidate_query = in_map;
-    }
-  }
-  // To adjust the map without a loop that landmarks do not tie would open that loop again.
-  if (adjust_piece_ && untied_.empty()) adjuster_.MapMoved(odometry, *adjust_piece_, frames);
-  adjust_piece_.reset();
+void LoopCloser::Take(const Update& update, Odometry* odometry, std::int64_t frames) {
+  if (!update.correction) return;
+  if (listener_.before_change) listener_.before_change();
+  const internal::Stopwatch watch;
+  const std::vector<int> common = odometry->Correct(*update.correction);
+  Applied(update, common, *odometry, frames);
+  stages_["loop_fuse"] += watch.Milliseconds();
 }
 
-bool LoopCloser::CloseDeferred(const Odometry& odometry, std::int64_t frames) {
-  if (deferred_.empty()) return false;
-  std::vector<LoopEdge> entering = std::exchange(deferred_, {});
-  if (!LeavesAsItIs(entering, odometry)) {
-    Start(std::move(entering), odometry, frames);
-    return true;
+// What became of those that still wait, and what there is to say of the odometry that is followed.
+void LoopCloser::Say() {
+  for (const std::size_t waiting : InState(LoopState::kWaiting)) {
+    Loop& loop = loops_[waiting];
+    loop.reason = loop.verified ? "no second loop nearby agreed with it"
+                                : "no verified loop nearby agreed with it, and by itself it is doubtful";
   }
-  LoopUpdate none_is_revoked;
-  for (const LoopEdge& loop : entering) Settle({loop, "", false, 1, std::nullopt}, &none_is_revoked);
-  return false;
+  const std::string uncertainty = followed_.Warning();
+  if (!uncertainty.empty()) warnings_.push_back(uncertainty);
 }
 
-void LoopCloser::Removed(const std::map<int, int>& into, const Odometry& before) {
+// The oldest answer.
+LoopResult LoopCloser::TakeResult() {
+  submitted_.pop_front();
+  LoopResult result = worker_->Take();
+  if (listener_.on_detection) listener_.on_detection(result);
+  for (const auto& [name, ms] : LoopStages(result)) stages_[std::string("loop_") + name] += ms;
+  if (!result.warning.empty() && result.warning != last_warning_) {
+    last_warning_ = result.warning;
+    warnings_.push_back(result.warning);
+  }
+  return result;
+}
+
+LoopCloser::Update LoopCloser::Deliver(const Odometry* odometry, std::int64_t frames) {
+  const LoopResult result = TakeResult();
+  late_ = result.late;
+  if (!result.proposed) return {};
+  return Decide(Proposed(result), result.verification, odometry, frames);
+}
+
+// What was said of an image comes with the answer to a later one: a fixed number of frames after it.
+LoopCloser::Update LoopCloser::DeliverLate(const Odometry* odometry, std::int64_t frames) {
+  const LateLoop late = *std::exchange(late_, std::nullopt);
+  if (late.withdrawn) Withdraw(late.query, kTakenBack, odometry != nullptr);
+  if (!late.accepted) return {};
+  Withdraw(late.query, kDecidedLater, odometry != nullptr);  // if it waits as a witness
+  return Decide(Proposed(late), late.verification, odometry, frames);
+}
+
+LoopCloser::Update LoopCloser::Decide(Loop proposed, const Verification& verification,
+                                      const Odometry* odometry, std::int64_t frames) {
+  if (odometry != nullptr) {
+    const int candidate = KeyframeOf(proposed.candidate), query = KeyframeOf(proposed.query);
+    if (candidate >= 0 && query >= 0)
+      return Consider(std::move(proposed), verification, candidate, query, *odometry, frames);
+    proposed.verified = false;  // of a detector whose file was changed
+    proposed.reason = "the map has no keyframe of it";
+  }
+  if (proposed.verified) proposed.state = LoopState::kInMap;
+  loops_.push_back(std::move(proposed));
+  return {};
+}
+
+Loop LoopCloser::Proposed(std::int64_t query, std::int64_t candidate,
+                          const Verification& verification) const {
+  const auto stamp = [&](std::int64_t frame) { return stamps_.count(frame) != 0 ? stamps_.at(frame) : 0.0; };
+  Loop loop;
+  loop.query = query;
+  loop.candidate = candidate;
+  loop.query_stamp_s = stamp(query);
+  loop.candidate_stamp_s = stamp(candidate);
+  loop.matches = verification.matches;
+  loop.inliers = verification.inliers;
+  return loop;
+}
+
+Loop LoopCloser::Proposed(const LoopResult& r) const {
+  Loop loop = Proposed(r.query, r.candidate, r.verification);
+  loop.members = r.members;
+  loop.hypothesis = r.hypothesis;
+  loop.posterior = r.posterior;
+  loop.probability = r.probability;
+  loop.verified = r.accepted && GivesConstraint(r.verification);
+  loop.reason = r.reason.empty() && !loop.verified ? r.verification.reason : r.reason;
+  return loop;
+}
+
+Loop LoopCloser::Proposed(const LateLoop& late) const {
+  Loop loop = Proposed(late.query, late.verification.candidate, late.verification);
+  loop.probability = late.probability;
+  loop.verified = late.accepted && GivesConstraint(late.verification);
+  if (!loop.verified) loop.reason = late.verification.reason;
+  return loop;
+}
+
+std::size_t LoopCloser::Prune(Odometry* odometry) {
+  const Map before = odometry->map();
+  const FrameView last = odometry->LastView();
+  const std::size_t least_views = rig_.sensor == Sensor::kMono ? 2 : 1;  // that tell where a landmark is
+  // The detector forgets what a keyframe looks like; its place is that of `into`.
+  const auto may = [&](int keyframe, int into) {
+    const std::int64_t frame = before.keyframe(keyframe).frame_index;
+    if (!worker_ || keyframe_of_frame_.count(frame) == 0) return true;  // it never knew that image
+    return worker_->Detector().Merge(frame, before.keyframe(into).frame_index);
+  };
+  Map map = before;
+  FuseAll(rig_.camera, &map);
+  const std::map<int, int> removed =
+      tutti::Prune({last.keyframe, last.newest_keyframe}, least_views, may, &map);
+  map.Compact();
+  odometry->Replace(std::move(map));
+  for (auto& [frame, keyframe] : keyframe_of_frame_) {
+    for (auto next = removed.find(keyframe); next != removed.end(); next = removed.find(keyframe))
+      keyframe = next->second;
+  }
   graph_.Update(KeyframesOf(before), Covisible(before));
-  for (std::vector<LoopEdge>* loops : {&accepted_, &gate_.waiting(), &deferred_, &queued_}) {
-    std::vector<LoopEdge> stay;
-    for (LoopEdge& loop : *loops) {
-      if (graph_.Rehang(into, &loop)) {
-        stay.push_back(loop);
-      } else {
-        untied_.erase(loop.record);  // its two ends are one keyframe
-      }
-    }
-    *loops = std::move(stay);
+  for (std::size_t i = 0; i < loops_.size(); ++i) {
+    Loop& loop = loops_[i];
+    if (loop.state == LoopState::kRejected || graph_.Rehang(removed, &loop.edge)) continue;
+    loop.untied = false;  // its two ends are one keyframe
   }
-  graph_.Remove(into);
+  graph_.Remove(removed);
+  return removed.size();
 }
 
-void LoopCloser::Resume(std::optional<LoopSolution> solution, std::optional<GlobalAdjustment> adjustment) {
-  if (solution) solver_.Resume(*std::move(solution));
-  adjuster_.Resume(std::move(adjustment));
+SlamReport LoopCloser::Report() const {
+  SlamReport report;
+  report.corrections = corrections_;
+  report.global_adjustments = adjustments_;
+  const FollowedOdometry::Sigmas stated = followed_.Stated(), seen = followed_.Seen();
+  report.followed = {stated.fraction, stated.rotation_rad, seen.fraction, seen.rotation_rad,
+                     followed_.jumps()};
+  report.graph_proof = proof_;
+  report.stage_ms = stages_;
+  if (worker_) report.stage_ms["loop_wait"] = worker_->WaitedMs() - waited_before_;
+  return report;
+}
+
+std::vector<std::string> LoopCloser::TakeWarnings() {
+  constexpr std::size_t kMostOfAKind = 5;
+  const std::vector<OdometryJump>& jumps = followed_.jumps();
+  for (; jumps_told_ < jumps.size(); ++jumps_told_) {
+    if (jumps_told_ < kMostOfAKind) warnings_.push_back(Sentence(jumps[jumps_told_]));
+    if (jumps_told_ == kMostOfAKind) warnings_.emplace_back("the odometry jumps more often");
+  }
+  return std::exchange(warnings_, {});
 }
 
 }  // namespace tutti

@@ -26,11 +26,11 @@ double Grown(double limit, double sigma, double times) {
 
 }  // namespace
 
-double LoopGate::Apart(int x, int y, const Map& map) {
+double LoopGate::Apart(int x, int y, const Places& map) {
   return (map(x).T_world_camera.translation - map(y).T_world_camera.translation).norm();
 }
 
-Disagreement LoopGate::Cycle(const LoopEdge& a, const LoopEdge& b, const Map& map) {
+Disagreement LoopGate::Cycle(const LoopEdge& a, const LoopEdge& b, const Places& map) {
   const auto between = [&map](int from, int to) {
     return Similarity(map(from).T_world_camera.Inverse() * map(to).T_world_camera);
   };
@@ -40,7 +40,7 @@ Disagreement LoopGate::Cycle(const LoopEdge& a, const LoopEdge& b, const Map& ma
 }
 
 // A random walk: rotations between keyframes add up by their squares, and turn what lies behind them.
-Disagreement LoopGate::Limits(const LoopEdge& a, const LoopEdge& b, const Map& map, double times) const {
+Disagreement LoopGate::Limits(const LoopEdge& a, const LoopEdge& b, const Places& map, double times) const {
   const double steps = std::abs(a.query - b.query) + std::abs(a.candidate - b.candidate);
   const double turn_rad = step_.rotation_rad * std::sqrt(steps),
                at_candidates = Apart(a.candidate, b.candidate, map);
@@ -60,36 +60,36 @@ bool LoopGate::Near(const LoopEdge& a, const LoopEdge& b) const {
   return within(a.query_frame, b.query_frame) && within(a.candidate_frame, b.candidate_frame);
 }
 
-bool LoopGate::SideBySide(const LoopEdge& a, const LoopEdge& b, const Map& map) {
+bool LoopGate::SideBySide(const LoopEdge& a, const LoopEdge& b, const Places& map) {
   return Apart(a.query, b.query, map) <= a.depth && Apart(a.candidate, b.candidate, map) <= a.depth;
 }
 
-bool LoopGate::Agree(const LoopEdge& a, const LoopEdge& b, const Map& map, double times) const {
+bool LoopGate::Agree(const LoopEdge& a, const LoopEdge& b, const Places& map, double times) const {
   const bool odometry_between =
       map(a.query).piece == map(b.query).piece && map(a.candidate).piece == map(b.candidate).piece;
   return odometry_between && Within(Cycle(a, b, map), Limits(a, b, map, times));
 }
 
 // Nothing between pieces.
-std::optional<Similarity> LoopGate::InMap(const LoopEdge& loop, const Map& map) {
+std::optional<Similarity> LoopGate::InMap(const LoopEdge& loop, const Places& map) {
   const Place q = map(loop.query), c = map(loop.candidate);
   if (q.piece != c.piece) return std::nullopt;
   return Similarity(q.T_world_camera.Inverse() * c.T_world_camera);
 }
 
-std::optional<Disagreement> LoopGate::WithMap(const LoopEdge& loop, const Map& map) const {
+std::optional<Disagreement> LoopGate::WithMap(const LoopEdge& loop, const Places& map) const {
   const std::optional<Similarity> T_query_candidate = InMap(loop, map);
   if (!T_query_candidate) return std::nullopt;
   return Measure(loop.S_candidate_query * *T_query_candidate, loop.depth);
 }
 
-bool LoopGate::Fulfilled(const LoopEdge& loop, const Map& map) const {
+bool LoopGate::Fulfilled(const LoopEdge& loop, const Places& map) const {
   const std::optional<Disagreement> d = WithMap(loop, map);
   return d && d->fraction < options_.loop_defer_fraction && d->angle_deg < options_.loop_defer_deg &&
          d->log_scale < options_.loop_defer_fraction;
 }
 
-bool LoopGate::WithinNoise(const std::vector<LoopEdge>& loops, const Map& map) const {
+bool LoopGate::WithinNoise(const std::vector<LoopEdge>& loops, const Places& map) const {
   constexpr double kCoordinates = 6;  // one camera's seventh, the scale, only makes it stricter
   double sum = 0;
   for (const LoopEdge& loop : loops) {
@@ -104,7 +104,7 @@ bool LoopGate::WithinNoise(const std::vector<LoopEdge>& loops, const Map& map) c
   return sum <= kCoordinates * static_cast<double>(loops.size());
 }
 
-bool LoopGate::Independent(const LoopEdge& a, const LoopEdge& b, const Map& map) {
+bool LoopGate::Independent(const LoopEdge& a, const LoopEdge& b, const Places& map) {
   const auto differ = [&](int x, int y) {
     if (map(x).piece != map(y).piece || Apart(x, y, map) >= kApartFraction * a.depth) return true;
     const Pose turn = map(x).T_world_camera.Inverse() * map(y).T_world_camera;
@@ -113,8 +113,9 @@ bool LoopGate::Independent(const LoopEdge& a, const LoopEdge& b, const Map& map)
   return differ(a.query, b.query) && differ(a.candidate, b.candidate);
 }
 
-LoopGate::Admitted LoopGate::Offer(const LoopEdge& loop, const std::vector<LoopEdge>& accepted,
-                                   const Map& map, bool across, const Trusts& trusts) {
+LoopGate::Admitted LoopGate::Offer(const LoopEdge& loop, const std::vector<LoopEdge>& waiting,
+                                   const std::vector<LoopEdge>& accepted, const Places& map, bool across,
+                                   const Trusts& trusts) const {
   const auto trust_in = [&trusts](const LoopEdge& l) { return trusts ? trusts(l) : Trust::kSure; };
   const Trust trust = trust_in(loop);
   const bool loop_is_weak = trust == Trust::kWeak;
@@ -137,7 +138,7 @@ LoopGate::Admitted LoopGate::Offer(const LoopEdge& loop, const std::vector<LoopE
       if (!admitted.witness || in_other != Trust::kWeak) admitted.witness = other;
       return true;
     };
-    for (const LoopEdge& other : waiting_) {
+    for (const LoopEdge& other : waiting) {
       if (agrees(other, trust_in(other))) admitted.loops.push_back(other);
     }
     for (const LoopEdge& other : accepted)
@@ -153,22 +154,7 @@ LoopGate::Admitted LoopGate::Offer(const LoopEdge& loop, const std::vector<LoopE
     if (loop_is_weak) admitted.loops = {loop};
     admitted.witness.reset();
   }
-  if (admitted.loops.empty()) {
-    waiting_.push_back(loop);
-    return admitted;
-  }
-  const auto enters = [&](const LoopEdge& other) {
-    return std::any_of(admitted.loops.begin(), admitted.loops.end(), [&](const LoopEdge& entering) {
-      return entering.query_frame == other.query_frame && entering.candidate_frame == other.candidate_frame;
-    });
-  };
-  waiting_.erase(std::remove_if(waiting_.begin(), waiting_.end(), enters), waiting_.end());
   return admitted;
-}
-
-void LoopGate::Withdraw(std::int64_t query_frame) {
-  const auto of_it = [&](const LoopEdge& loop) { return loop.query_frame == query_frame; };
-  waiting_.erase(std::remove_if(waiting_.begin(), waiting_.end(), of_it), waiting_.end());
 }
 
 }  // namespace tutti

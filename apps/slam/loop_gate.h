@@ -30,7 +30,7 @@ class LoopGate {
     int piece = 0;
     Pose T_world_camera;
   };
-  using Map = std::function<Place(int keyframe)>;
+  using Places = std::function<Place(int keyframe)>;
   /// Two loops agree if their cycle closes within this: 2 and 5 of a loop's least standard deviations
   /// (loop_constraint.h), which chance hardly ever does. The scale is one camera's.
   static constexpr Disagreement kAgreement{0.02, 1.5, 0.10};
@@ -52,55 +52,45 @@ class LoopGate {
   /// kAgreement.
   void SetOdometryUncertainty(const OdometryUncertainty::Sigmas& step) { step_ = step; }
 
-  /// The loops that may enter now: none while `loop` waits for another one that agrees, else it and those
-  /// that waited. Loops that are in the map (`accepted`) vouch for it as well. Loops can agree whose frames
-  /// are close; with `across`, also those whose keyframes stand side by side in the map, at both ends: drives
-  /// at different times that are tied to each other. A loop between the same two keyframes is not another
-  /// one. `trusts`: of `loop` and those that wait; empty: kSure.
-  Admitted Offer(const LoopEdge& loop, const std::vector<LoopEdge>& accepted, const Map& map,
-                 bool across = false, const Trusts& trusts = {});
-  /// Forgets those that wait and were found with this frame as the query.
-  void Withdraw(std::int64_t query_frame);
+  /// The loops that may enter now: none while `loop` has to wait for another one that agrees, else it and
+  /// those of `waiting` that agree with it, which come first. Loops that are in the map (`accepted`) vouch
+  /// for it as well. Loops can agree whose frames are close; with `across`, also those whose keyframes stand
+  /// side by side in the map, at both ends: drives at different times that are tied to each other. A loop
+  /// between the same two keyframes is not another one. `trusts`: of `loop` and those that wait; empty:
+  /// kSure.
+  Admitted Offer(const LoopEdge& loop, const std::vector<LoopEdge>& waiting,
+                 const std::vector<LoopEdge>& accepted, const Places& map, bool across = false,
+                 const Trusts& trusts = {}) const;
 
   /// True if the images of two loops show different things, at both ends: their cameras stand apart, or look
   /// elsewhere.
-  static bool Independent(const LoopEdge& a, const LoopEdge& b, const Map& map);
+  static bool Independent(const LoopEdge& a, const LoopEdge& b, const Places& map);
 
   /// How far the cycle of two loops and the map between their ends is from closing.
-  static Disagreement Cycle(const LoopEdge& a, const LoopEdge& b, const Map& map);
+  static Disagreement Cycle(const LoopEdge& a, const LoopEdge& b, const Places& map);
   /// Distance of two keyframes in the map.
-  static double Apart(int x, int y, const Map& map);
+  static double Apart(int x, int y, const Places& map);
 
   /// True if the two loops agree with each other through the odometry between their ends, within so many
   /// times the limits.
-  bool Agree(const LoopEdge& a, const LoopEdge& b, const Map& map, double times = 1) const;
+  bool Agree(const LoopEdge& a, const LoopEdge& b, const Places& map, double times = 1) const;
 
   /// True if the present map fulfils the loop so well that it need not move for it.
-  bool Fulfilled(const LoopEdge& loop, const Map& map) const;
+  bool Fulfilled(const LoopEdge& loop, const Places& map) const;
 
   /// True if the map differs from these loops, all in all, by no more than they err themselves: the mean of
   /// their squared Mahalanobis distances [1], by their own information, is at most the number of coordinates.
-  bool WithinNoise(const std::vector<LoopEdge>& loops, const Map& map) const;
-
-  /// Those that wait; mono: to be measured again when the map's scale changes.
-  const std::vector<LoopEdge>& waiting() const { return waiting_; }
-  std::vector<LoopEdge>& waiting() { return waiting_; }
-
-  template <class Archive>
-  void State(Archive& archive) {
-    archive(waiting_);
-  }
+  bool WithinNoise(const std::vector<LoopEdge>& loops, const Places& map) const;
 
  private:
-  static std::optional<Similarity> InMap(const LoopEdge& loop, const Map& map);  // T_query_candidate
-  std::optional<Disagreement> WithMap(const LoopEdge& loop, const Map& map) const;
-  Disagreement Limits(const LoopEdge& a, const LoopEdge& b, const Map& map, double times) const;
+  static std::optional<Similarity> InMap(const LoopEdge& loop, const Places& map);  // T_query_candidate
+  std::optional<Disagreement> WithMap(const LoopEdge& loop, const Places& map) const;
+  Disagreement Limits(const LoopEdge& a, const LoopEdge& b, const Places& map, double times) const;
   bool Near(const LoopEdge& a, const LoopEdge& b) const;
-  static bool SideBySide(const LoopEdge& a, const LoopEdge& b, const Map& map);
+  static bool SideBySide(const LoopEdge& a, const LoopEdge& b, const Places& map);
 
   SlamOptions options_;
   OdometryUncertainty::Sigmas step_;  // not saved, as such a map is not
-  std::vector<LoopEdge> waiting_;
 };
 
 }  // namespace tutti

@@ -156,29 +156,10 @@ void LoopWorker::Unlink(std::int64_t query, std::int64_t candidate) {
   unlinked_.emplace_back(query, candidate);
 }
 
-LoopResult LoopWorker::Locate(const LoopQuery& query) {
+LoopDetector& LoopWorker::Detector() {
   std::unique_lock<std::mutex> lock(mutex_);
   changed_.wait(lock, [this] { return tasks_.empty() && !busy_; });
-  return detector_.Locate(query);
-}
-
-bool LoopWorker::Merge(std::int64_t id, std::int64_t into) {
-  std::unique_lock<std::mutex> lock(mutex_);
-  changed_.wait(lock, [this] { return tasks_.empty() && !busy_; });
-  return detector_.Merge(id, into);
-}
-
-void LoopWorker::BeginSession() {
-  std::unique_lock<std::mutex> lock(mutex_);
-  changed_.wait(lock, [this] { return tasks_.empty() && !busy_; });
-  detector_.BeginSession();
-  waited_ms_ = 0;
-}
-
-void LoopWorker::ForgetPositions() {
-  std::unique_lock<std::mutex> lock(mutex_);
-  changed_.wait(lock, [this] { return tasks_.empty() && !busy_; });
-  detector_.ForgetPositions();
+  return detector_;
 }
 
 LoopResult LoopWorker::Take() {

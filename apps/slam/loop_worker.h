@@ -39,18 +39,10 @@ class LoopWorker {
   /// Takes the loop between two images back (LoopDetector::Unlink), before the next query that is submitted
   /// and after all that were: the same for any number of threads.
   void Unlink(std::int64_t query, std::int64_t candidate);
-  /// LoopDetector::Places. Nothing may be on its way.
-  std::vector<LoopPlace> Places() const { return detector_.Places(); }
-  /// Another recording begins (LoopDetector::BeginSession), once the queries that are on their way are done.
-  void BeginSession();
-  /// LoopDetector::ForgetPositions, once the queries that are on their way are done.
-  void ForgetPositions();
+  /// The detector, once the queries that are on their way are done; until the next one is submitted.
+  LoopDetector& Detector();
   /// The result of the oldest query that was not taken yet; waits for it. Rethrows what the detector threw.
   LoopResult Take();
-  /// Where an image was taken (LoopDetector::Locate), once the queries that are on their way are done.
-  LoopResult Locate(const LoopQuery& query);
-  /// LoopDetector::Merge, once the queries that are on their way are done.
-  bool Merge(std::int64_t id, std::int64_t into);
   /// Milliseconds that Take() has waited so far.
   double WaitedMs() const { return waited_ms_; }
 

@@ -8,7 +8,7 @@
 #include "apps/slam/loop_constraint.h"
 #include "apps/slam/missed_loops.h"
 #include "frontend/map/fuse.h"
-#include "tutti/slam/loop_record.h"
+#include "tutti/slam/loop.h"
 
 namespace tutti {
 
@@ -19,41 +19,45 @@ void MapConnection::Connect(int piece) {
   }
   for (int i = 0; i < kAdjustments; ++i) {
     Map map = odometry_.map();
-    FuseAll(rig_.camera, &map);
+    FuseAll(map.rig().camera, &map);
     map.UpdateGeometry();
     odometry_.Replace(std::move(map));
-    if (!loops_.Converge(odometry_, piece)) break;
-    Finish();
+    if (!Converge(piece)) break;
+    loops_.Finish(&odometry_, frames_);
   }
+}
+
+// The whole submap is adjusted until it converges; what comes of it enters with Finish. False if a loop is
+// not held together by landmarks: the adjustment would open it again.
+bool MapConnection::Converge(int piece) {
+  if (!config_.run.global_adjustment || !loops_.AllTied()) return false;
+  loops_.adjuster_.Converge(odometry_, piece);
+  return true;
 }
 
 // How many entered.
 std::size_t MapConnection::CloseMissedLoops() {
-  const auto accepted = [this] { return CountAccepted(loops_.closer().records()); };
+  const auto accepted = [this] { return CountAccepted(loops_.loops()); };
   const std::size_t before = accepted();
   std::vector<StandingKeyframe> keyframes;
   for (const int id : odometry_.map().KeyframeIds()) {
     const KeyframeView view = ViewOf(odometry_.map(), id);
     keyframes.push_back({id, view.map_piece, view.T_world_camera, MedianDepth(view)});
   }
-  for (const MissedLoop& loop : FindMissedLoops(keyframes, loops_.closer().Graph(odometry_), config_.run)) {
+  for (const MissedLoop& loop : FindMissedLoops(keyframes, loops_.Graph(odometry_.map()), config_.run)) {
     const KeyframeView query = ViewOf(odometry_.map(), loop.query);
     for (const int candidate : loop.candidates) {
       if (offered_.count({candidate, loop.query}) != 0) break;
       const Verification found =
-          VerifyLandmarks(ViewOf(odometry_.map(), candidate), query, rig_, config_.loops);
+          VerifyLandmarks(ViewOf(odometry_.map(), candidate), query, odometry_.map().rig(), config_.loops);
       if (!found.accepted) continue;
       offered_.emplace(candidate, loop.query);
-      take_(loops_.ConsiderFound(found, candidate, loop.query, odometry_, frames_));
+      loops_.AddLoop({candidate, loop.query, found, {}}, &odometry_, frames_);
       break;
     }
   }
-  Finish();
+  loops_.Finish(&odometry_, frames_);
   return accepted() - std::min(before, accepted());
-}
-
-void MapConnection::Finish() {
-  while (const auto update = loops_.Rest(&odometry_, frames_)) take_(*update);
 }
 
 }  // namespace tutti

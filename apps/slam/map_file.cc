@@ -48,11 +48,10 @@ void MapSnapshot::Write(const std::filesystem::path& file,
         keyframes[parts_->odometry->map().keyframe(keyframe++).frame_index] = place;
     });
   }
-  if (parts_->pending.solution.valid())
-    out.Write(MapSection::kSolution, StateOf(*parts_->pending.solution.get()));
-  if (parts_->pending.adjustment) {
+  if (parts_->solution.valid()) out.Write(MapSection::kSolution, StateOf(*parts_->solution.get()));
+  if (parts_->adjustment) {
     out.Write(MapSection::kAdjustment, "");
-    OdometryFile::Save(*parts_->pending.adjustment, sink);
+    OdometryFile::Save(*parts_->adjustment, sink);
   }
   if (parts_->detector.valid()) {
     const LoopWorker::Saved& saved = *parts_->detector.get();
@@ -66,6 +65,38 @@ void MapSnapshot::Write(const std::filesystem::path& file,
   }
   if (more) more(sink);
   out.Finish();
+}
+
+void MapFile::Save(const LoopCloser& loops, MapSnapshot::Parts* parts) {
+  parts->solution = loops.solver_.pending();
+  parts->adjustment = loops.adjuster_.pending();
+  if (loops.worker_) parts->detector = loops.worker_->Save();
+}
+
+void MapFile::LoadDetector(internal::SectionReader* file, LoopCloser* loops) {
+  file->SkipTo(MapSection::kDetector);
+  LoopWorker::Saved saved;
+  ReadState(*file, MapSection::kDetector, &saved);
+  loops->worker_->Resume(file, std::move(saved));
+}
+
+void MapFile::LoadPending(internal::SectionReader* file, const Odometry* odometry, LoopCloser* loops) {
+  loops->Check(odometry != nullptr ? odometry->map().KeyframeCount() : 0, *file);
+  const auto next = [file](MapSection section) {
+    return file->Peek() == static_cast<std::uint32_t>(section);
+  };
+  if (next(MapSection::kSolution)) {
+    LoopSolution solution;
+    ReadState(*file, MapSection::kSolution, &solution);
+    loops->solver_.Resume(std::move(solution));
+  }
+  std::optional<GlobalAdjustment> adjustment;
+  if (next(MapSection::kAdjustment)) {
+    file->Expect(MapSection::kAdjustment);
+    if (odometry == nullptr) file->Damaged("an adjustment of no map");
+    adjustment = OdometryFile::LoadAdjustment(odometry->map(), file);
+  }
+  loops->adjuster_.Resume(std::move(adjustment));
 }
 
 }  // namespace tutti

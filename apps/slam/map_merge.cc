@@ -5,6 +5,7 @@
 #include <tuple>
 #include <utility>
 
+#include "apps/slam/joining_loops.h"
 #include "apps/slam/loop_constraint.h"
 #include "apps/slam/map_connection.h"
 #include "apps/slam/map_state.h"
@@ -15,15 +16,16 @@ namespace {
 
 // A loop from a place of the map, shown to the other one's detector with frame numbers from `offset` on, to a
 // place of that one: turned round, and in the numbers of the merged map.
-void TurnRound(std::int64_t offset, std::int64_t first_frame, int first_keyframe, ProposedLoop* loop) {
-  loop->verification = Reversed(loop->verification, loop->record.query - offset);
-  LoopRecord& record = loop->record;
-  std::swap(record.query, record.candidate);
-  std::swap(record.query_stamp_s, record.candidate_stamp_s);
-  record.query += first_frame;
-  record.candidate -= offset;
-  std::swap(loop->query, loop->candidate);
-  loop->query += first_keyframe;
+void TurnRound(std::int64_t offset, std::int64_t first_frame, int first_keyframe,
+               MapMerge::Proposal* proposal) {
+  Loop& loop = proposal->loop;
+  proposal->verification = Reversed(proposal->verification, loop.query - offset);
+  std::swap(loop.query, loop.candidate);
+  std::swap(loop.query_stamp_s, loop.candidate_stamp_s);
+  loop.query += first_frame;
+  loop.candidate -= offset;
+  std::swap(proposal->query, proposal->candidate);
+  proposal->query += first_keyframe;
 }
 
 }  // namespace
@@ -43,77 +45,197 @@ bool ComesAfter(const MapInfo& map, const MapInfo& other) {
 }
 
 void MapMerge::Append() {
-  places_ = map_.loops.Places();
-  others_ = other_.loops.Places();
-  first_frame_ = map_.sessions.NextOffset(map_.odometry);
+  places_ = PlacesOf(&map_.loops);
+  others_ = PlacesOf(&other_.loops);
+  first_frame_ = map_.sessions.NextOffset(map_.odometry.map());
   first_keyframe_ = map_.odometry.map().KeyframeCount();
   first_piece_ = map_.odometry.map().NextPiece();
   Map both = map_.odometry.map();
   tutti::Append(other_.odometry.map(), first_frame_, &both);
   map_.odometry =
       Odometry(map_.odometry, std::move(both), first_frame_ + other_.odometry.LastView().frame_offset);
-  map_.loops.Append(other_.loops, first_frame_, first_keyframe_);
   map_.sessions.Append(other_.sessions, first_frame_, first_piece_);
+  AppendLoops();
 }
 
-bool MapMerge::Join(std::int64_t frames, const std::function<void(const LoopUpdate&)>& take,
-                    std::string* reason) {
-  *reason = map_.loops.Join(LoopsBetween(), map_.odometry, frames);
-  while (const auto update = map_.loops.Rest(&map_.odometry, frames)) take(*update);
-  const std::vector<int> ids = map_.odometry.map().KeyframeIds();
-  const auto joined =
-      std::find_if(std::lower_bound(ids.begin(), ids.end(), first_keyframe_), ids.end(),
-                   [&](int id) { return map_.odometry.map().keyframe(id).piece < first_piece_; });
+// Of the other map's loops those count that are in it.
+void MapMerge::AppendLoops() {
+  LoopCloser& loops = map_.loops;
+  const LoopCloser& others = other_.loops;
+  loops.session_ = first_frame_;
+  loops.sessions_.push_back(first_frame_);
+  for (const std::int64_t begin : others.sessions_) loops.sessions_.push_back(first_frame_ + begin);
+  loops.graph_.BeginSession(first_keyframe_);
+  loops.graph_.Append(others.graph_, first_keyframe_);
+  loops.proof_.reset();
+  loops.corrections_ = loops.adjustments_ = 0;
+  const std::size_t first_loop = loops.loops_.size();
+  for (Loop loop : others.loops_) {
+    loop.query += first_frame_;
+    loop.candidate += first_frame_;
+    loop.since += loops.changes_;
+    loop.edge.candidate += first_keyframe_;
+    loop.edge.query += first_keyframe_;
+    loop.edge.candidate_frame += first_frame_;
+    loop.edge.query_frame += first_frame_;
+    loop.edge.record += first_loop;
+    if (!loop.accepted()) loop.state = LoopState::kRejected;
+    loops.loops_.push_back(std::move(loop));
+  }
+  loops.changes_ += others.changes_;
+}
+
+bool MapMerge::Join(std::int64_t frames, std::string* reason) {
+  *reason = Close(LoopsBetween(), frames);
+  map_.loops.Finish(&map_.odometry, frames);
+  const Map& map = map_.odometry.map();
+  const std::vector<int> ids = map.KeyframeIds();
+  const auto joined = std::find_if(std::lower_bound(ids.begin(), ids.end(), first_keyframe_), ids.end(),
+                                   [&](int id) { return map.keyframe(id).piece < first_piece_; });
   if (joined == ids.end()) {
     if (reason->empty()) *reason = "the loops between them contradict the maps";
     return false;
   }
-  MapConnection(config_, map_.rig, frames, &map_.loops, &map_.odometry, take)
-      .Connect(map_.odometry.map().keyframe(*joined).piece);
+  MapConnection(config_, frames, &map_.loops, &map_.odometry).Connect(map.keyframe(*joined).piece);
   return true;
 }
 
-// By both detectors, each pair of places once.
-std::vector<ProposedLoop> MapMerge::LoopsBetween() {
-  std::vector<ProposedLoop> loops = ProposedByMap();
-  for (ProposedLoop& loop : ProposedByOther()) {
-    const auto known = std::find_if(loops.begin(), loops.end(), [&loop](const ProposedLoop& l) {
-      return l.candidate == loop.candidate && l.query == loop.query;
-    });
-    if (known == loops.end()) {
-      loops.push_back(std::move(loop));
-    } else if (loop.record.verified && !known->record.verified) {
-      *known = std::move(loop);
-    }
+// The loops that join the two maps, all at once. Why none does; empty: the graph is being solved with them.
+std::string MapMerge::Close(const std::vector<Proposal>& proposed, std::int64_t frames) {
+  LoopCloser& closer = map_.loops;
+  const Map& map = map_.odometry.map();
+  std::vector<LoopEdge> edges;
+  for (const Proposal& proposal : proposed) {
+    closer.loops_.push_back(proposal.loop);
+    Loop& loop = closer.loops_.back();
+    if (!loop.verified) continue;
+    const LoopConstraint constraint =
+        closer.Measure(proposal.verification, proposal.candidate, proposal.query, map);
+    loop.reason = constraint.reason;
+    if (!constraint.usable) continue;
+    loop.edge = constraint.edge;
+    loop.edge.record = closer.loops_.size() - 1;
+    loop.S_candidate_query = loop.edge.S_candidate_query;
+    edges.push_back(loop.edge);
   }
-  return loops;
+  const JoiningLoops joining = ChooseJoiningLoops(edges, PlacesIn(map), closer.Graph(map), config_.run);
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    Loop& loop = closer.loops_[edges[i].record];
+    loop.reason = joining.reasons[i];
+    if (!loop.reason.empty()) closer.Revoke(&loop);
+  }
+  std::vector<std::size_t> entering;
+  for (const std::size_t i : joining.chosen) entering.push_back(edges[i].record);
+  for (const std::size_t loop : entering) closer.loops_[loop].untied = true;
+  if (!entering.empty()) closer.Solve(entering, map_.odometry, frames);
+  return joining.reason;
 }
 
-std::vector<ProposedLoop> MapMerge::ProposedByMap() {
-  return map_.loops.Compare(std::move(others_), first_frame_, [&](std::int64_t frame) {
-    const int keyframe = other_.loops.KeyframeOf(frame);
-    return keyframe >= 0 ? std::optional(ViewOf(map_.odometry.map(), first_keyframe_ + keyframe))
-                         : std::nullopt;
-  });
+// By both detectors, each pair of places once.
+std::vector<MapMerge::Proposal> MapMerge::LoopsBetween() {
+  std::vector<Proposal> proposals = ProposedByMap();
+  for (Proposal& proposal : ProposedByOther()) {
+    const auto known = std::find_if(proposals.begin(), proposals.end(), [&proposal](const Proposal& p) {
+      return p.candidate == proposal.candidate && p.query == proposal.query;
+    });
+    if (known == proposals.end()) {
+      proposals.push_back(std::move(proposal));
+    } else if (proposal.loop.verified && !known->loop.verified) {
+      *known = std::move(proposal);
+    }
+  }
+  return proposals;
+}
+
+std::vector<MapMerge::Proposal> MapMerge::ProposedByMap() {
+  return Compare(
+      std::move(others_), first_frame_,
+      [&](std::int64_t frame) {
+        const int keyframe = other_.loops.KeyframeOf(frame);
+        return keyframe >= 0 ? std::optional(ViewOf(map_.odometry.map(), first_keyframe_ + keyframe))
+                             : std::nullopt;
+      },
+      &map_.loops);
 }
 
 // The other map's detector is shown the places of this one, as the recording that comes next there.
-std::vector<ProposedLoop> MapMerge::ProposedByOther() {
-  const std::int64_t offset = other_.sessions.NextOffset(other_.odometry);
+std::vector<MapMerge::Proposal> MapMerge::ProposedByOther() {
+  const std::int64_t offset = other_.sessions.NextOffset(other_.odometry.map());
   int pieces = 0;  // there; those of this map are others
   for (const int id : other_.odometry.map().KeyframeIds())
     pieces = std::max(pieces, other_.odometry.map().keyframe(id).piece + 1);
   other_.loops.BeginSession(map_.rig, offset, other_.odometry.map().KeyframeCount());
-  std::vector<ProposedLoop> loops = other_.loops.Compare(
-      std::move(places_), offset, [&](std::int64_t frame) -> std::optional<KeyframeView> {
+  std::vector<Proposal> proposals = Compare(
+      std::move(places_), offset,
+      [&](std::int64_t frame) -> std::optional<KeyframeView> {
         const int keyframe = map_.loops.KeyframeOf(frame);
         if (keyframe < 0) return std::nullopt;
         KeyframeView view = ViewOf(map_.odometry.map(), keyframe);
         view.map_piece += pieces;
         return view;
-      });
-  for (ProposedLoop& loop : loops) TurnRound(offset, first_frame_, first_keyframe_, &loop);
-  return loops;
+      },
+      &other_.loops);
+  for (Proposal& proposal : proposals) TurnRound(offset, first_frame_, first_keyframe_, &proposal);
+  return proposals;
+}
+
+std::vector<MapMerge::Proposal> MapMerge::Compare(
+    std::vector<LoopPlace> places, std::int64_t first_frame,
+    const std::function<std::optional<KeyframeView>(std::int64_t frame)>& view, LoopCloser* loops) {
+  loops->worker_->Detector().BeginSession();
+  std::vector<Proposal> proposals;
+  const auto propose = [&](Loop loop, const Verification& verification) {
+    if (loop.candidate >= first_frame) return;  // loops within the other map are known
+    const int candidate = loops->KeyframeOf(loop.candidate), query = loops->KeyframeOf(loop.query);
+    if (candidate < 0 || query < 0) return;  // of a detector whose file was changed
+    proposals.push_back({std::move(loop), verification, candidate, query});
+  };
+  const auto take = [&] {
+    const LoopResult result = loops->TakeResult();
+    if (result.late) {
+      for (Proposal& proposal : proposals) {
+        if (proposal.loop.query != result.late->query || !result.late->withdrawn) continue;
+        proposal.loop.verified = false;
+        proposal.loop.reason = kTakenBack;
+      }
+      if (result.late->accepted) propose(loops->Proposed(*result.late), result.late->verification);
+    }
+    if (result.proposed) propose(loops->Proposed(result), result.verification);
+  };
+  for (LoopPlace& place : places) {
+    const std::optional<KeyframeView> of = view(place.id);
+    if (!of) continue;
+    LoopQuery query;
+    query.metric = loops->rig_.sensor != Sensor::kMono;
+    query.id = first_frame + place.id;
+    query.stamp_s = of->stamp_s;
+    query.member_features = std::move(place.member_features);
+    if (place.camera) {  // an earlier session's may be another one than that of the keyframes' pixels
+      const PinholeCamera &from = *place.camera, &to = loops->rig_.camera;
+      for (auto& [name, features] : query.member_features) {
+        for (cv::KeyPoint& k : features.keypoints) {
+          k.pt.x = static_cast<float>((double(k.pt.x) - from.cx) / from.fx * to.fx + to.cx);
+          k.pt.y = static_cast<float>((double(k.pt.y) - from.cy) / from.fy * to.fy + to.cy);
+        }
+      }
+    }
+    loops->Ask(std::move(query), &*of, 0);
+    while (loops->submitted_.size() > static_cast<std::size_t>(loops->options_.loop_delay_frames)) take();
+  }
+  while (!loops->submitted_.empty()) take();
+  return proposals;
+}
+
+void MapMerge::MoveAll(const std::map<int, Similarity>& S_world_keyframe, LoopCloser* loops,
+                       Odometry* odometry) {
+  if (loops->worker_) loops->worker_->Detector().ForgetPositions();
+  loops->graph_.Update(KeyframesOf(odometry->map()), loops->Covisible(odometry->map()));
+  loops->graph_.Move(S_world_keyframe, {});
+  loops->Rescale(S_world_keyframe);
+  LoopCloser::Update update;
+  update.correction.emplace();
+  update.correction->S_world_keyframe = S_world_keyframe;
+  loops->Take(update, odometry, 0);
 }
 
 }  // namespace tutti

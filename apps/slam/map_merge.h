@@ -3,10 +3,12 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
-#include "apps/slam/loop_closing.h"
+#include "apps/slam/loop_closer.h"
 #include "apps/slam/session_list.h"
 #include "tutti/core/camera.h"
 #include "tutti/frontend/odometry.h"
@@ -18,7 +20,7 @@ namespace tutti {
 /// What of a map is merged. References stay valid as long as it is used.
 struct MapToMerge {
   const CameraRig& rig;
-  LoopClosing& loops;
+  LoopCloser& loops;
   SessionList& sessions;
   Odometry& odometry;
 };
@@ -36,15 +38,36 @@ class MapMerge {
   /// The other one's keyframes, sessions and loops get new numbers and stand in the map, in submaps of their
   /// own. Throws InputError, and changes nothing, for a camera that does not fit.
   void Append();
-  /// The places of each are shown to the detector of the other. Of the loops those join the two that
-  /// LoopCloser::Join says; then what is still open is closed (MapConnection). False: none does, and `reason`
-  /// says why. `frames`: number of frames of both. `take`: applies an update to the map.
-  bool Join(std::int64_t frames, const std::function<void(const LoopUpdate&)>& take, std::string* reason);
+  /// The places of each are shown to the detector of the other. Of the loops that are verified those join the
+  /// two that ChooseJoiningLoops says, all at once; then what is still open is closed (MapConnection). False:
+  /// none does, and `reason` says why. `frames`: number of frames of both.
+  bool Join(std::int64_t frames, std::string* reason);
+  /// The whole map moves, and nothing in it: the keyframes to these poses.
+  static void MoveAll(const std::map<int, Similarity>& S_world_keyframe, LoopCloser* loops,
+                      Odometry* odometry);
+
+  /// A loop between two keyframes, as one of the detectors proposed it.
+  struct Proposal {
+    Loop loop;
+    Verification verification;
+    int candidate = -1, query = -1;
+  };
+  /// The places that the detector knows, in their order.
+  static std::vector<LoopPlace> PlacesOf(LoopCloser* loops) { return loops->worker_->Detector().Places(); }
+  /// What is proposed when the places of another map, which get frame numbers from this one on, are shown to
+  /// the detector of `loops`, one after the other: all loops between the two, verified or not. None enters.
+  /// `view`: of the keyframe that the frame with such a number is, null: it is none. Nothing may be on its
+  /// way.
+  static std::vector<Proposal> Compare(
+      std::vector<LoopPlace> places, std::int64_t first_frame,
+      const std::function<std::optional<KeyframeView>(std::int64_t frame)>& view, LoopCloser* loops);
 
  private:
-  std::vector<ProposedLoop> LoopsBetween();
-  std::vector<ProposedLoop> ProposedByMap();
-  std::vector<ProposedLoop> ProposedByOther();
+  void AppendLoops();
+  std::vector<Proposal> LoopsBetween();
+  std::vector<Proposal> ProposedByMap();
+  std::vector<Proposal> ProposedByOther();
+  std::string Close(const std::vector<Proposal>& proposed, std::int64_t frames);
 
   const RunConfig& config_;
   MapToMerge map_, other_;

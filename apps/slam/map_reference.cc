@@ -22,14 +22,14 @@ double Growth(const KeyframeView& before, const KeyframeView& now) {
 
 }  // namespace
 
-std::map<int, Similarity> InFrameOf(const Odometry& first, int first_keyframe, const Odometry& merged) {
+std::map<int, Similarity> InFrameOf(const Map& first, int first_keyframe, const Map& merged) {
   std::map<int, Similarity> S_first_piece;
-  for (const int id : first.map().KeyframeIds()) {
-    const KeyframeView now = ViewOf(merged.map(), first_keyframe + id);
+  for (const int id : first.KeyframeIds()) {
+    const KeyframeView now = ViewOf(merged, first_keyframe + id);
     if (S_first_piece.count(now.map_piece) != 0) continue;
-    const KeyframeView before = ViewOf(first.map(), id);
+    const KeyframeView before = ViewOf(first, id);
     Similarity S_camera_now = Similarity(now.T_world_camera).Inverse();
-    if (first.map().rig().sensor == Sensor::kMono) {
+    if (first.rig().sensor == Sensor::kMono) {
       const double scale = 1 / Growth(before, now);
       S_camera_now.scale = scale;
       S_camera_now.translation *= scale;
@@ -37,10 +37,10 @@ std::map<int, Similarity> InFrameOf(const Odometry& first, int first_keyframe, c
     S_first_piece[now.map_piece] = Similarity(before.T_world_camera) * S_camera_now;
   }
   std::map<int, Similarity> S_first_keyframe;
-  for (const int id : merged.map().KeyframeIds()) {
-    const auto moved = S_first_piece.find(merged.map().keyframe(id).piece);
+  for (const int id : merged.KeyframeIds()) {
+    const auto moved = S_first_piece.find(merged.keyframe(id).piece);
     if (moved != S_first_piece.end())
-      S_first_keyframe[id] = moved->second * Similarity(merged.map().keyframe(id).T_world_camera);
+      S_first_keyframe[id] = moved->second * Similarity(merged.keyframe(id).T_world_camera);
   }
   return S_first_keyframe;
 }

@@ -4,7 +4,7 @@
 #include <map>
 
 #include "tutti/core/pose.h"
-#include "tutti/frontend/odometry.h"
+#include "tutti/frontend/map.h"
 
 #pragma GCC visibility push(default)  // used across libraries
 namespace tutti {
@@ -13,7 +13,7 @@ namespace tutti {
 /// another one and whose keyframes have numbers from `first_keyframe` on: of each piece, the oldest keyframe
 /// of `first` is where it was. One camera: what that one sees is as far away as it was. Pieces without
 /// keyframes of `first` stay where they are.
-std::map<int, Similarity> InFrameOf(const Odometry& first, int first_keyframe, const Odometry& merged);
+std::map<int, Similarity> InFrameOf(const Map& first, int first_keyframe, const Map& merged);
 
 }  // namespace tutti
 #pragma GCC visibility pop

@@ -15,7 +15,7 @@
 #include "tutti/frontend/frame.h"
 #include "tutti/loopclosure/detector.h"
 #include "tutti/slam/config.h"
-#include "tutti/slam/loop_record.h"
+#include "tutti/slam/loop.h"
 #include "tutti/slam/map_file.h"
 
 namespace tutti {
@@ -103,16 +103,16 @@ void State(Archive& archive, LoopWorker::Saved& s) {
 }
 
 template <class Archive>
-void State(Archive& archive, LoopRecord& r) {
-  archive(r.query, r.candidate, r.query_stamp_s, r.candidate_stamp_s, r.members, r.hypothesis, r.posterior,
-          r.probability, r.matches, r.inliers, r.verified, r.accepted, r.injected, r.weight, r.gate_sigmas,
-          r.revoked, r.pending, r.correct, r.reason, r.witness, r.S_candidate_query);
-}
-
-template <class Archive>
 void State(Archive& archive, LoopEdge& e) {
   archive(e.candidate, e.query, e.candidate_frame, e.query_frame, e.S_candidate_query, e.information, e.depth,
           e.record);
+}
+
+template <class Archive>
+void State(Archive& archive, Loop& r) {
+  archive(r.query, r.candidate, r.query_stamp_s, r.candidate_stamp_s, r.members, r.hypothesis, r.posterior,
+          r.probability, r.matches, r.inliers, r.verified, r.state, r.injected, r.weight, r.gate_sigmas,
+          r.revoked, r.correct, r.reason, r.witness, r.S_candidate_query, r.edge, r.untied, r.since);
 }
 
 template <class Archive>

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "tutti/core/trajectory.h"
-#include "tutti/slam/slam_system.h"
+#include "tutti/slam/slam_report.h"
 
 #pragma GCC visibility push(default)  // used across libraries
 namespace tutti {

@@ -5,11 +5,10 @@
 
 namespace tutti {
 
-std::int64_t SessionList::NextOffset(const Odometry& odometry) const {
+std::int64_t SessionList::NextOffset(const Map& map) const {
   constexpr std::int64_t kRound = 100000;  // one sees which frame of its recording a number is
   std::int64_t highest = sessions_.back().frame_offset + sessions_.back().last_frame;
-  for (const int id : odometry.map().KeyframeIds())
-    highest = std::max(highest, odometry.map().keyframe(id).frame_index);
+  for (const int id : map.KeyframeIds()) highest = std::max(highest, map.keyframe(id).frame_index);
   return (std::max<std::int64_t>(0, highest) / kRound + 1) * kRound;
 }
 
@@ -35,20 +34,20 @@ void SessionList::NoteJoined(const Odometry& odometry) {
     session.joined_at = session.last_frame;
 }
 
-std::vector<MapSession> SessionList::WithKeyframes(const Odometry* odometry) const {
+std::vector<MapSession> SessionList::WithKeyframes(const Map* map) const {
   std::vector<MapSession> sessions = sessions_;
-  if (odometry == nullptr) return sessions;
+  if (map == nullptr) return sessions;
   std::size_t s = 0;
-  for (const int id : odometry->map().KeyframeIds()) {
-    const std::int64_t frame = odometry->map().keyframe(id).frame_index;
+  for (const int id : map->KeyframeIds()) {
+    const std::int64_t frame = map->keyframe(id).frame_index;
     while (s + 1 < sessions.size() && frame >= sessions[s + 1].frame_offset) ++s;
     MapSession& session = sessions[s];
     if (session.keyframes++ == 0) {
       session.first_keyframe = id;
-      session.first_stamp_s = odometry->map().keyframe(id).stamp_s;
+      session.first_stamp_s = map->keyframe(id).stamp_s;
     }
     session.last_keyframe = id;
-    session.last_stamp_s = odometry->map().keyframe(id).stamp_s;
+    session.last_stamp_s = map->keyframe(id).stamp_s;
   }
   return sessions;
 }

@@ -19,7 +19,7 @@ class SessionList {
   std::int64_t offset() const { return sessions_.back().frame_offset; }
   std::size_t size() const { return sessions_.size(); }
   /// The offset of a session that begins now: past every number that there is.
-  std::int64_t NextOffset(const Odometry& odometry) const;
+  std::int64_t NextOffset(const Map& map) const;
   /// Another one begins; its first submap has this number.
   void Begin(std::int64_t frame_offset, int first_piece);
   /// Those of another map, whose frames and submaps have numbers from these on.
@@ -32,8 +32,8 @@ class SessionList {
   /// Notes if the session's frames are by now where something older is.
   void NoteJoined(const Odometry& odometry);
 
-  /// With their keyframes. `odometry`: null, if there are only appearances.
-  std::vector<MapSession> WithKeyframes(const Odometry* odometry) const;
+  /// With their keyframes. `map`: null, if there are only appearances.
+  std::vector<MapSession> WithKeyframes(const Map* map) const;
 
   /// What a map file has of them. Throws InputError if that is damaged.
   void Restore(const std::vector<MapSession>& sessions, const Odometry* odometry,

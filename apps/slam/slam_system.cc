@@ -6,7 +6,7 @@
 #include <optional>
 #include <utility>
 
-#include "apps/slam/loop_closing.h"
+#include "apps/slam/loop_closer.h"
 #include "apps/slam/map_merge.h"
 #include "apps/slam/map_parts.h"
 #include "apps/slam/map_reference.h"
@@ -15,11 +15,10 @@
 #include "core/section_file.h"
 #include "core/stopwatch.h"
 #include "frontend/map/append.h"
-#include "frontend/map/fuse.h"
-#include "frontend/map/prune.h"
 #include "frontend/odometry/frame_check.h"
 #include "frontend/odometry/odometry_file.h"
 #include "tutti/core/error.h"
+#include "tutti/slam/localizer.h"
 #include "tutti/slam/version.h"
 
 namespace tutti {
@@ -27,32 +26,31 @@ namespace tutti {
 class SlamSystem::Impl {
  public:
   Impl(const RunConfig& config, const CameraRig& rig, SpanRecorder* recorder, bool resumes = false)
-      : loops_(config, rig, recorder, resumes), config_(config), rig_(rig), recorder_(recorder) {
-    if (!rig.calibrated) return;
-    odometry_.emplace(config.odometry, rig, Execution{config.run.threads > 1, recorder});
+      : loops_(config, rig, recorder,
+               {[this](const LoopResult& result) {
+                  if (listeners_.on_detection) listeners_.on_detection(result);
+                },
+                [this] {
+                  Announce();
+                  FinishMapping();
+                }},
+               resumes),
+        config_(config),
+        rig_(rig),
+        recorder_(recorder) {
+    if (rig.calibrated) odometry_.emplace(config.odometry, rig, Execution{config.run.threads > 1, recorder});
   }
 
   TrackResult Track(const InputFrame& frame) {
     CheckFrame(frame, rig_);
-    if (!localizing_) BringIn();
-    ++frames_;
-    sessions_.CountFrame();
-    TrackResult result;
-    if (!odometry_) {
-      result.reason = "no calibration";
-      if (loops_.Searching()) loops_.Submit(frame, nullptr, frames_);
-      return result;
-    }
-    result = Note(odometry_->Track(frame));
-    last_ = frame.index;
-    sessions_.SetLastFrame(last_);
+    if (!odometry_) return Look(frame);
+    Begin();
+    TrackResult result = Note(odometry_->Track(frame));
+    SetLast(frame.index);
     InputFrame numbered = frame;
     numbered.index += sessions_.offset();
     if (result.state != TrackingState::kTracking) result = Relocalize(numbered, result);
-    if (localizing_) return FindBack(numbered, result);
-    if (odometry_) sessions_.NoteJoined(*odometry_);
-    if (result.keyframe >= 0 && (loops_.Searching() || on_keyframe_)) unmapped_[result.keyframe] = numbered;
-    SubmitMapped();
+    End(numbered, result);
     if (PruneDue(result.keyframe)) {
       Announce();
       Prune();
@@ -69,26 +67,20 @@ class SlamSystem::Impl {
     if (!odometry_) return Track(frame);
     CheckFrame(frame, rig_);
     if (frames_ == 0 && config_.run.prune_every > 0)
-      loops_.Warn("run.prune_every: no effect on a trajectory that is given: no keyframe is removed");
-    BringIn();
-    ++frames_;
-    sessions_.CountFrame();
+      warnings_.emplace_back(
+          "run.prune_every: no effect on a trajectory that is given: no keyframe is removed");
+    Begin();
     TrackResult result = Note(odometry_->Follow(frame, T_odom_camera));
-    if (result.step) loops_.NoteStep(result.keyframe, *result.step);
-    loops_.FollowOdometry({frame.stamp_s, T_odom_camera}, *odometry_);
-    if (sigma) loops_.NoteMotion(result.keyframe, *sigma, T_odom_camera.translation);
-    last_ = frame.index;
-    sessions_.SetLastFrame(last_);
-    if (result.keyframe >= 0 && (loops_.Searching() || on_keyframe_)) unmapped_[result.keyframe] = frame;
-    SubmitMapped();
+    SetLast(frame.index);
+    loops_.Follow(result, {frame.stamp_s, T_odom_camera}, sigma, *odometry_);
+    End(frame, result);
     return result;
   }
 
   void BeginSession(const CameraRig& rig) {
     CheckHasMap("gone on with");
-    if (localizing_) throw InputError("frames are only being located: a recording can't go on in this map");
     Finish();
-    const std::int64_t offset = sessions_.NextOffset(*odometry_);
+    const std::int64_t offset = sessions_.NextOffset(odometry_->map());
     odometry_ = Odometry(*odometry_, WithRig(odometry_->map(), rig), offset);
     rig_ = rig;
     loops_.BeginSession(rig, offset, odometry_->map().KeyframeCount());
@@ -108,8 +100,7 @@ class SlamSystem::Impl {
     merge.Append();
     frames_ += other->frames_;
     last_ = other->last_;
-    return merge.Join(
-        frames_, [this](const LoopUpdate& update) { Take(update); }, reason);
+    return merge.Join(frames_, reason);
   }
 
   // True if the two can be merged in either order, and this one is to be the second then.
@@ -119,26 +110,19 @@ class SlamSystem::Impl {
   }
 
   // The merged map takes the place of the one that was appended, from its keyframe with this number on.
-  void TakeThePlaceOf(Impl* appended, const Odometry& before, int first_keyframe) {
-    std::swap(on_keyframe_, appended->on_keyframe_);
-    std::swap(on_change_, appended->on_change_);
-    loops_.SwapListener(&appended->loops_);
-    Take(loops_.MoveAll(InFrameOf(before, first_keyframe, *odometry_), *odometry_));
+  void TakeThePlaceOf(Impl* appended, const Map& before, int first_keyframe) {
+    std::swap(listeners_, appended->listeners_);
+    MapMerge::MoveAll(InFrameOf(before, first_keyframe, odometry_->map()), &loops_, &*odometry_);
   }
 
-  std::vector<MapSession> Sessions() const { return sessions_.WithKeyframes(odometry()); }
-
-  void BeginLocalization() {
-    CheckHasMap("located in");
-    localizing_ = true;
-    odometry_ = Odometry(*odometry_, Locating());
+  std::vector<MapSession> Sessions() const {
+    return sessions_.WithKeyframes(odometry_ ? &odometry_->map() : nullptr);
   }
 
   void AddLoop(int candidate, int query, const Similarity& S_candidate_query, const Matrix7d& information) {
     if (!odometry_) throw InputError("a loop needs keyframes, and without a calibration there are none");
-    const std::vector<int> ids = odometry_->map().KeyframeIds();
     for (const int id : {candidate, query}) {
-      if (!std::binary_search(ids.begin(), ids.end(), id))
+      if (id < 0 || id >= odometry_->map().KeyframeCount() || odometry_->map().keyframe(id).replaced_by >= 0)
         throw InputError("a loop to keyframe " + std::to_string(id) + ", which is not there");
     }
     if (candidate >= query) throw InputError("a loop leads from an older keyframe to a newer one");
@@ -146,35 +130,24 @@ class SlamSystem::Impl {
                         S_candidate_query.rotation.coeffs().allFinite() && S_candidate_query.scale > 0 &&
                         std::isfinite(S_candidate_query.scale) && information.allFinite();
     if (!finite) throw InputError("a loop's transform and information must be finite numbers");
-    loops_.Add(candidate, query, S_candidate_query, information, *odometry_, frames_);
+    FoundLoop loop{candidate, query, {}, information};
+    loop.verification.S_candidate_query = S_candidate_query;
+    loops_.AddLoop(loop, &*odometry_, frames_);
   }
 
   void Finish() {
-    if (localizing_) return;
     if (odometry_) {
       FinishMapping();
       SubmitMapped();
     }
-    while (const auto update = loops_.Rest(odometry(), frames_)) Take(*update);
+    loops_.Finish(mutable_odometry(), frames_);
     if (odometry_) sessions_.NoteJoined(*odometry_);
   }
 
   std::size_t Prune() {
     if (!odometry_) throw InputError("the map has no keyframes, since the camera had no calibration");
     Finish();
-    if (localizing_) throw InputError("frames are being located in the map: it must stay as it is");
-    const Odometry before = *odometry_;
-    const FrameView last = before.LastView();
-    const std::size_t least_views = rig_.sensor == Sensor::kMono ? 2 : 1;  // that tell where a landmark is
-    Map map = before.map();
-    FuseAll(rig_.camera, &map);
-    const std::map<int, int> removed = tutti::Prune(
-        {last.keyframe, last.newest_keyframe}, least_views,
-        [&](int keyframe, int into) { return loops_.Forget(keyframe, into, before); }, &map);
-    map.Compact();
-    odometry_->Replace(std::move(map));
-    loops_.Removed(removed, before);
-    return removed.size();
+    return loops_.Prune(&*odometry_);
   }
 
   MapSnapshot Snapshot(const std::string& note) const {
@@ -182,8 +155,7 @@ class SlamSystem::Impl {
     parts->info = StateOf(Info(note));
     parts->state = StateOf(*this);
     parts->odometry = odometry_;
-    parts->pending = loops_.pending();
-    parts->detector = loops_.SaveDetector();
+    MapFile::Save(loops_, parts.get());
     return MapSnapshot(std::move(parts));
   }
 
@@ -192,23 +164,16 @@ class SlamSystem::Impl {
     ReadState(file, MapSection::kState, this);
     std::optional<internal::SectionReader> second;
     std::future<void> detector;
-    if (loops_.Searching()) {
+    if (config_.run.loops) {
       second.emplace(file.name(), kMapFile);
       detector = std::async(config_.run.threads > 1 ? std::launch::async : std::launch::deferred,
-                            [&] { loops_.ResumeDetector(&*second); });
+                            [&] { MapFile::LoadDetector(&*second, &loops_); });
     }
     if (odometry_) OdometryFile::Load(&file, &*odometry_);
-    loops_.Check(odometry(), file);
-    std::optional<LoopSolution> solution;
-    if (Next(file, MapSection::kSolution)) ReadState(file, MapSection::kSolution, &solution.emplace());
-    std::optional<GlobalAdjustment> adjustment;
-    if (Next(file, MapSection::kAdjustment)) {
-      file.Expect(MapSection::kAdjustment);
-      adjustment = OdometryFile::LoadAdjustment(odometry_.value().map(), &file);
-    }
-    loops_.ResumePending(std::move(solution), std::move(adjustment));
+    MapFile::LoadPending(&file, odometry(), &loops_);
     if (second) {
-      if (!Next(file, MapSection::kDetector)) file.Damaged("a section out of place");
+      if (file.Peek() != static_cast<std::uint32_t>(MapSection::kDetector))
+        file.Damaged("a section out of place");
       detector.get();
     }
     internal::SectionReader& end = second ? *second : file;
@@ -226,50 +191,69 @@ class SlamSystem::Impl {
 
   const Odometry* odometry() const { return odometry_ ? &*odometry_ : nullptr; }
 
-  int NextKeyframe() const { return odometry_ ? odometry_->map().KeyframeCount() : 0; }
+  SlamReport Report() const {
+    SlamReport report = loops_.Report();
+    report.relocalized = relocalized_;
+    for (const auto& [name, ms] : stages_) report.stage_ms[name] += ms;
+    if (odometry_) {
+      for (const auto& [name, ms] : odometry_->Report().stage_ms) report.stage_ms["odometry_" + name] = ms;
+    }
+    return report;
+  }
 
-  LoopClosing loops_;
+  std::vector<std::string> TakeWarnings() {
+    std::vector<std::string> warnings = std::exchange(warnings_, {});
+    for (std::string& warning : loops_.TakeWarnings()) warnings.push_back(std::move(warning));
+    return warnings;
+  }
+
+  void CheckHasMap(const std::string& to_be) const {
+    if (!odometry_ || odometry_->map().KeyframeIds().empty())
+      throw InputError("there is no map to be " + to_be);
+    if (!config_.run.loops)
+      throw InputError(
+          "the map was made without loop closure, so nothing says where in it a frame was taken");
+  }
+
+  LoopCloser loops_;
   SessionList sessions_;
-  std::function<void(const InputFrame&, int)> on_keyframe_;            // may be empty
-  std::function<void(const Odometry&, std::int64_t last)> on_change_;  // may be empty
-  std::size_t relocalized_ = 0;                                        // frames
-  std::map<std::string, double> stages_;
+  SlamListeners listeners_;
 
  private:
   bool PruneDue(int new_keyframe) const {
     return new_keyframe > 0 && config_.run.prune_every > 0 && new_keyframe % config_.run.prune_every == 0;
   }
 
-  // What is due by now.
-  void BringIn() {
-    do {
-      if (odometry_ && loops_.MayMove(frames_)) {
-        Announce();
-        FinishMapping();
-      }
-      const auto update = loops_.Due(odometry(), frames_);
-      if (!update) return;
-      Take(*update);
-    } while (true);
-  }
-
+  Odometry* mutable_odometry() { return odometry_ ? &*odometry_ : nullptr; }
   MapToMerge ToMerge() { return {rig_, loops_, sessions_, *odometry_}; }
 
-  void Take(const LoopUpdate& update) {
-    if (!update.correction) return;
-    Announce();
-    const internal::Stopwatch watch;
-    const std::vector<int> common = odometry_->Correct(*update.correction);
-    loops_.Applied(update, common, *odometry_, frames_);
-    stages_["loop_fuse"] += watch.Milliseconds();
+  // What is due by now.
+  void Begin() {
+    loops_.Due(mutable_odometry(), frames_);
+    ++frames_;
+    sessions_.CountFrame();
   }
 
-  void CheckHasMap(const std::string& to_be) const {
-    if (!odometry_ || odometry_->map().KeyframeIds().empty())
-      throw InputError("there is no map to be " + to_be);
-    if (!loops_.Searching())
-      throw InputError(
-          "the map was made without loop closure, so nothing says where in it a frame was taken");
+  void SetLast(std::int64_t index) {
+    last_ = index;
+    sessions_.SetLastFrame(index);
+  }
+
+  // `frame`: by its number in the map.
+  void End(const InputFrame& frame, const TrackResult& result) {
+    sessions_.NoteJoined(*odometry_);
+    if (result.keyframe >= 0 && (config_.run.loops || listeners_.on_keyframe))
+      unmapped_[result.keyframe] = frame;
+    SubmitMapped();
+  }
+
+  // At a frame without a pose: the camera has no calibration.
+  TrackResult Look(const InputFrame& frame) {
+    Begin();
+    loops_.AddKeyframe(frame, nullptr, frames_);
+    TrackResult result;
+    result.reason = "no calibration";
+    return result;
   }
 
   MapInfo Info(const std::string& note) const {
@@ -282,7 +266,7 @@ class SlamSystem::Impl {
     info.rig = rig_;
     info.frames = frames_;
     info.last_frame = last_;
-    info.loops = static_cast<int>(CountAccepted(loops_.closer().records()));
+    info.loops = static_cast<int>(CountAccepted(loops_.loops()));
     if (!odometry_) return info;
     const std::vector<int> ids = odometry_->map().KeyframeIds();
     info.keyframes = static_cast<int>(ids.size());
@@ -300,18 +284,13 @@ class SlamSystem::Impl {
     return info;
   }
 
-  static bool Next(internal::SectionReader& file, MapSection section) {
-    return file.Peek() == static_cast<std::uint32_t>(section);
-  }
-
   void Announce() {
-    if (on_change_) on_change_(*odometry_, last_);
+    if (listeners_.on_change) listeners_.on_change(*odometry_, last_);
   }
 
   // A frame without a pose is looked up among the keyframes that the detector knows.
   TrackResult Relocalize(const InputFrame& frame, const TrackResult& lost) {
-    constexpr int kFewFeatures = 100;  // nothing can be recognised by so few
-    if (lost.features < kFewFeatures) return lost;
+    if (lost.features < LoopCloser::kFewestFeatures) return lost;
     const internal::Stopwatch watch;
     const int keyframe = loops_.Locate(frame);
     TrackResult result = lost;
@@ -320,7 +299,8 @@ class SlamSystem::Impl {
       result = Note(odometry_->RelocalizeAt(keyframe));
     }
     if (result.state != TrackingState::kTracking && Begins()) result = RelocalizeAtTheEnd(result);
-    if (result.state == TrackingState::kTracking) ++relocalized_;
+    result.recognised = result.state == TrackingState::kTracking;
+    if (result.recognised) ++relocalized_;
     stages_["relocalize"] += watch.Milliseconds();
     return result;
   }
@@ -329,7 +309,7 @@ class SlamSystem::Impl {
   bool Begins() const {
     constexpr std::int64_t kFirstFrames = 5;
     const std::vector<int> ids = odometry_->map().KeyframeIds();
-    return !localizing_ && sessions_.size() > 1 && sessions_.frames() <= kFirstFrames && !ids.empty() &&
+    return sessions_.size() > 1 && sessions_.frames() <= kFirstFrames && !ids.empty() &&
            odometry_->map().keyframe(ids.back()).frame_index < sessions_.offset();
   }
 
@@ -343,14 +323,6 @@ class SlamSystem::Impl {
       if (result.state == TrackingState::kTracking) break;
     }
     return result;
-  }
-
-  // Beyond the map the pose drifts: now and then the detector is asked whether the map shows this place.
-  TrackResult FindBack(const InputFrame& frame, const TrackResult& tracked) {
-    constexpr int kFramesBetween = 10;
-    mapped_.clear();
-    if (!odometry_->LastView().beyond_map || ++frames_beyond_ % kFramesBetween != 0) return tracked;
-    return Relocalize(frame, tracked);
   }
 
   TrackResult Note(TrackResult result) {
@@ -367,10 +339,10 @@ class SlamSystem::Impl {
     for (const int keyframe : std::exchange(mapped_, {})) {
       const auto frame = unmapped_.find(keyframe);
       if (frame == unmapped_.end()) continue;
-      if (on_keyframe_) on_keyframe_(frame->second, keyframe);
-      if (loops_.Searching()) {
+      if (listeners_.on_keyframe) listeners_.on_keyframe(frame->second, keyframe);
+      if (config_.run.loops) {
         const KeyframeView view = ViewOf(odometry_->map(), keyframe);
-        loops_.Submit(frame->second, &view, frames_);
+        loops_.AddKeyframe(frame->second, &view, frames_);
       }
       unmapped_.erase(frame);
     }
@@ -382,8 +354,9 @@ class SlamSystem::Impl {
   std::optional<Odometry> odometry_;    // with a calibration
   std::vector<int> mapped_;             // keyframes that are to be submitted
   std::map<int, InputFrame> unmapped_;  // keyframes that the detector waits for
-  bool localizing_ = false;
-  int frames_beyond_ = 0;  // of the map, while localizing
+  std::size_t relocalized_ = 0;         // frames
+  std::map<std::string, double> stages_;
+  std::vector<std::string> warnings_;  // not taken yet
   std::int64_t frames_ = 0;
   std::int64_t last_ = -1;  // index of the last frame that the odometry has seen
 };
@@ -393,45 +366,9 @@ SlamSystem::SlamSystem(const RunConfig& config, const CameraRig& rig, SpanRecord
 SlamSystem::SlamSystem(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 SlamSystem::~SlamSystem() = default;
 
+void SlamSystem::SetListeners(SlamListeners listeners) { impl_->listeners_ = std::move(listeners); }
 void SlamSystem::BeginSession(const CameraRig& rig) { impl_->BeginSession(rig); }
 std::vector<MapSession> SlamSystem::Sessions() const { return impl_->Sessions(); }
-bool SlamSystem::Merge(SlamSystem* other, std::string* reason) {
-  if (other == nullptr || other == this) throw InputError("a map can't be merged with itself, or with none");
-  std::string ignored;
-  if (reason == nullptr) reason = &ignored;
-  if (!impl_->ComesAfter(*other->impl_)) return impl_->Merge(other->impl_.get(), reason);
-  const Odometry before = *impl_->odometry();
-  const int first_keyframe = other->impl_->NextKeyframe();
-  const bool joined = other->impl_->Merge(impl_.get(), reason);
-  impl_.swap(other->impl_);
-  impl_->TakeThePlaceOf(other->impl_.get(), before, first_keyframe);
-  return joined;
-}
-void SlamSystem::BeginLocalization() { impl_->BeginLocalization(); }
-MapSnapshot SlamSystem::Snapshot(const std::string& note) const { return impl_->Snapshot(note); }
-
-std::unique_ptr<SlamSystem> SlamSystem::Load(const std::filesystem::path& file, const MapInfo& info,
-                                             SpanRecorder* recorder,
-                                             const std::function<void(internal::SectionReader&)>& more) {
-  internal::SectionReader in(file, kMapFile);
-  MapInfo saved;
-  ReadState(in, MapSection::kInfo, &saved);
-  auto impl = std::make_unique<Impl>(info.config, info.rig, recorder, true);
-  impl->Load(in, more);
-  impl->sessions_.Restore(saved.sessions, impl->odometry(), in);
-  return std::unique_ptr<SlamSystem>(new SlamSystem(std::move(impl)));
-}
-
-void SlamSystem::SetDetectionListener(std::function<void(const LoopResult&)> listener) {
-  impl_->loops_.SetDetectionListener(std::move(listener));
-}
-void SlamSystem::SetKeyframeListener(std::function<void(const InputFrame&, int)> listener) {
-  impl_->on_keyframe_ = std::move(listener);
-}
-void SlamSystem::SetChangeListener(std::function<void(const Odometry&, std::int64_t)> listener) {
-  impl_->on_change_ = std::move(listener);
-}
-
 TrackResult SlamSystem::Track(const InputFrame& frame) { return impl_->Track(frame); }
 TrackResult SlamSystem::Follow(const InputFrame& frame, const Pose& T_odom_camera,
                                const std::optional<MotionSigma>& sigma) {
@@ -443,34 +380,65 @@ void SlamSystem::AddLoop(int candidate, int query, const Similarity& S_candidate
 }
 void SlamSystem::Finish() { impl_->Finish(); }
 std::size_t SlamSystem::Prune() { return impl_->Prune(); }
-std::vector<std::string> SlamSystem::TakeWarnings() { return impl_->loops_.TakeWarnings(); }
-
+std::vector<std::string> SlamSystem::TakeWarnings() { return impl_->TakeWarnings(); }
 const Odometry* SlamSystem::odometry() const { return impl_->odometry(); }
-const std::vector<LoopRecord>& SlamSystem::loops() const { return impl_->loops_.closer().records(); }
-std::size_t SlamSystem::Relocalized() const { return impl_->relocalized_; }
-int SlamSystem::Corrections() const { return impl_->loops_.closer().Corrections(); }
-int SlamSystem::GlobalAdjustments() const { return impl_->loops_.closer().Adjustments(); }
-
-FollowedUncertainty SlamSystem::Followed() const {
-  const FollowedOdometry& followed = impl_->loops_.closer().followed();
-  const FollowedOdometry::Sigmas stated = followed.Stated(), seen = followed.Seen();
-  return {stated.fraction, stated.rotation_rad, seen.fraction, seen.rotation_rad, followed.jumps()};
-}
-
+const std::vector<Loop>& SlamSystem::loops() const { return impl_->loops_.loops(); }
 PoseGraph SlamSystem::Graph() const {
-  return odometry() != nullptr ? impl_->loops_.closer().Graph(*odometry()) : PoseGraph();
+  return odometry() != nullptr ? impl_->loops_.Graph(odometry()->map()) : PoseGraph();
+}
+SlamReport SlamSystem::Report() const { return impl_->Report(); }
+MapSnapshot SlamSystem::Snapshot(const std::string& note) const { return impl_->Snapshot(note); }
+
+std::unique_ptr<SlamSystem> LoadMap(const std::filesystem::path& file, const MapInfo& info,
+                                    SpanRecorder* recorder,
+                                    const std::function<void(internal::SectionReader&)>& more) {
+  internal::SectionReader in(file, kMapFile);
+  MapInfo saved;
+  ReadState(in, MapSection::kInfo, &saved);
+  auto impl = std::make_unique<SlamSystem::Impl>(info.config, info.rig, recorder, true);
+  impl->Load(in, more);
+  impl->sessions_.Restore(saved.sessions, impl->odometry(), in);
+  return std::unique_ptr<SlamSystem>(new SlamSystem(std::move(impl)));
 }
 
-const std::optional<KeyframeGraphProof>& SlamSystem::GraphProof() const {
-  return impl_->loops_.closer().proof();
+bool Merge(SlamSystem* map, SlamSystem* other, std::string* reason) {
+  if (map == nullptr || other == nullptr || other == map)
+    throw InputError("a map can't be merged with itself, or with none");
+  std::string ignored;
+  if (reason == nullptr) reason = &ignored;
+  if (!map->impl_->ComesAfter(*other->impl_)) return map->impl_->Merge(other->impl_.get(), reason);
+  const Map before = map->odometry()->map();
+  const int first_keyframe = other->odometry()->map().KeyframeCount();
+  const bool joined = other->impl_->Merge(map->impl_.get(), reason);
+  map->impl_.swap(other->impl_);
+  map->impl_->TakeThePlaceOf(other->impl_.get(), before, first_keyframe);
+  return joined;
 }
 
-std::map<std::string, double> SlamSystem::StageMilliseconds() const {
-  std::map<std::string, double> stages = impl_->loops_.StageMilliseconds();
-  for (const auto& [name, ms] : impl_->stages_) stages[name] += ms;
-  if (odometry() == nullptr) return stages;
-  for (const auto& [name, ms] : odometry()->Report().stage_ms) stages["odometry_" + name] = ms;
-  return stages;
+Localizer::Localizer(const SlamSystem& map)
+    : map_(map),
+      odometry_((map.impl_->CheckHasMap("located in"), *map.odometry()), Locating()),
+      map_keyframes_(odometry_.map().KeyframeCount()) {}
+
+TrackResult Localizer::Track(const InputFrame& frame) {
+  constexpr int kFramesBetween = 10;  // that are looked for from beyond the map, where the pose drifts
+  CheckFrame(frame, odometry_.map().rig());
+  TrackResult result = odometry_.Track(frame);
+  if (result.state != TrackingState::kTracking) result = Relocalize(frame, result);
+  if (!odometry_.LastView().beyond_map || ++frames_beyond_ % kFramesBetween != 0) return result;
+  return Relocalize(frame, result);
+}
+
+TrackResult Localizer::Relocalize(const InputFrame& frame, const TrackResult& tracked) {
+  if (tracked.features < LoopCloser::kFewestFeatures) return tracked;
+  InputFrame numbered = frame;
+  numbered.index += odometry_.LastView().frame_offset;
+  const int keyframe = map_.impl_->loops_.Locate(numbered);
+  TrackResult result = tracked;
+  if (keyframe >= 0 && keyframe < map_keyframes_) result = odometry_.RelocalizeAt(keyframe);
+  result.recognised = result.state == TrackingState::kTracking;
+  if (result.recognised) ++relocalized_;
+  return result;
 }
 
 }  // namespace tutti

@@ -58,7 +58,8 @@ class TrajectoryCloser::Impl {
     const std::lock_guard<std::mutex> lock(mutex_);
     const std::vector<OdometryJump> jumps = FindJumps(odometry);
     Trajectory before;
-    if (slam_.Corrections() > 0 || slam_.GlobalAdjustments() > 0) {
+    const SlamReport report = slam_.Report();
+    if (report.corrections > 0 || report.global_adjustments > 0) {
       for (const auto& [id, pose] : of_keyframe_) before.push_back(pose);
     }
     return CorrectTrajectory(odometry, before, before.empty() ? before : KeyframesNow(), jumps);
@@ -68,7 +69,7 @@ class TrajectoryCloser::Impl {
     const std::lock_guard<std::mutex> lock(mutex_);
     return KeyframesNow();
   }
-  std::vector<LoopRecord> Loops() const {
+  std::vector<Loop> Loops() const {
     const std::lock_guard<std::mutex> lock(mutex_);
     return slam_.loops();
   }
@@ -78,7 +79,7 @@ class TrajectoryCloser::Impl {
   }
   int Corrections() const {
     const std::lock_guard<std::mutex> lock(mutex_);
-    return slam_.Corrections();
+    return slam_.Report().corrections;
   }
   std::vector<std::string> TakeWarnings() {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -114,7 +115,7 @@ Trajectory TrajectoryCloser::Corrected(const Trajectory& odometry) const {
   return impl_->Corrected(odometry);
 }
 Trajectory TrajectoryCloser::Keyframes() const { return impl_->Keyframes(); }
-std::vector<LoopRecord> TrajectoryCloser::Loops() const { return impl_->Loops(); }
+std::vector<Loop> TrajectoryCloser::Loops() const { return impl_->Loops(); }
 PoseGraph TrajectoryCloser::Graph() const { return impl_->Graph(); }
 int TrajectoryCloser::Corrections() const { return impl_->Corrections(); }
 std::vector<std::string> TrajectoryCloser::TakeWarnings() { return impl_->TakeWarnings(); }

@@ -65,8 +65,8 @@ void RunExport(const ExportArguments& arguments) {
     KeepInputs({file}, {out.value_or("")});
   for (const auto& out : {wanted.landmarks, wanted.g2o, wanted.tum}) RequireWritable({out.value_or("")});
   const MapInfo info = ReadMapInfo(file);
-  const std::unique_ptr<SlamSystem> slam = SlamSystem::Load(file, info);
-  if (slam->AppearanceOnly())
+  const std::unique_ptr<SlamSystem> slam = LoadMap(file, info);
+  if (slam->odometry() == nullptr)
     throw InputError(file.string() +
                      ": has no poses, since the camera had no calibration; nothing to export");
   const std::size_t sessions = info.sessions.size();

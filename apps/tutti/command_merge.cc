@@ -31,7 +31,7 @@ struct MergeArguments {
 std::unique_ptr<SlamSystem> OpenMap(const std::string& file, int threads) {
   MapInfo info = ReadMapInfo(file);
   info.config.run.threads = threads;
-  return SlamSystem::Load(file, info);
+  return LoadMap(file, info);
 }
 
 // Of what the merged map was made; the data set is that of the last session, as in the map of a run.
@@ -71,13 +71,13 @@ int Merge(const MergeArguments& arguments) {
   bool joined = false;
   std::string reason;
   try {
-    joined = slam->Merge(other.get(), &reason);
+    joined = Merge(slam.get(), other.get(), &reason);
   } catch (const InputError& error) {
     throw InputError(arguments.first + " and " + arguments.second + " can't be merged: " + error.what());
   }
-  const std::vector<LoopRecord>& loops = slam->loops();
+  const std::vector<Loop>& loops = slam->loops();
   const auto begin = loops.begin() + static_cast<std::ptrdiff_t>(known);
-  const auto accepted = std::count_if(begin, loops.end(), [](const LoopRecord& l) { return l.accepted; });
+  const auto accepted = std::count_if(begin, loops.end(), [](const Loop& l) { return l.accepted(); });
   if (!joined) {
     internal::Say("%s shows no place of %s that can be relied on: %s (%td were proposed); nothing is written",
                   arguments.second.c_str(), arguments.first.c_str(), reason.c_str(), loops.end() - begin);

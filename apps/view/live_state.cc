@@ -63,8 +63,8 @@ void LiveState::AddEvent(LiveEvent event) {
 
 std::vector<LiveLoop> LiveState::LoopsOf(const RunState& state) {
   std::vector<LiveLoop> loops;
-  for (const LoopRecord& record : state.loops) {
-    if (record.verified) loops.push_back({record.query, record.candidate, record.accepted});
+  for (const Loop& record : state.loops) {
+    if (record.verified) loops.push_back({record.query, record.candidate, record.accepted()});
   }
   return loops;
 }

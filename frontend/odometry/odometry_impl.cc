@@ -346,7 +346,7 @@ std::vector<int> Odometry::Impl::Correct(const MapCorrection& correction) {
 void Odometry::Impl::Replace(Map map) {
   EnterMapping();
   *mapper_.MutableMap() = std::move(map);
-  tracker_.FollowLandmarks(mapper_.map());
+  if (last().reference >= 0) tracker_.FollowLandmarks(mapper_.map());
 }
 
 // Takes the drift that CameraHeight tells out of the newest keyframes. What a loop has moved stays, and so

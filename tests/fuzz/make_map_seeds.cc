@@ -15,7 +15,7 @@ int main(int argc, char** argv) {
   for (const tutti::InputFrame& frame : drive.frames) {
     const std::filesystem::path saved = folder / "saved";
     slam.Track(frame);
-    slam.Save(saved);
+    slam.Snapshot().Write(saved);
     tutti::fuzz::WriteSeed(folder / std::to_string(frame.index),
                            tutti::fuzz::SectionsOf(saved, tutti::kMapFile, tutti::internal::kEndOfSections));
     std::filesystem::remove(saved);

@@ -37,15 +37,15 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   try {
     info = tutti::ReadMapInfo(file);
     info.config.run.threads = 1;
-    slam = tutti::SlamSystem::Load(file, info);
+    slam = tutti::LoadMap(file, info);
     GoOn(*slam, info);
   } catch (const tutti::InputError&) {
     return 0;
   }
   static const std::filesystem::path again = tutti::fuzz::ScratchPath("map");
-  slam->Save(again);
+  slam->Snapshot().Write(again);
   try {
-    tutti::SlamSystem::Load(again, tutti::ReadMapInfo(again));
+    tutti::LoadMap(again, tutti::ReadMapInfo(again));
   } catch (const tutti::InputError& error) {
     throw std::logic_error(error.what());  // what was saved must be loaded
   }

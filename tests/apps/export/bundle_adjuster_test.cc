@@ -77,7 +77,7 @@ void Print(const char* name, const ColmapModel& colmap, const Adjusted& adjusted
 TEST(BundleAdjuster, OfColmapMovesNoCameraOfTheRoom) {
   TUTTI_REQUIRE_COLMAP();
   const testing::MappedRoom room = testing::WholeRoom();
-  ASSERT_GT(room.slam->Corrections(), 0) << "the loop is closed";
+  ASSERT_GT(room.slam->Report().corrections, 0) << "the loop is closed";
   const ColmapModel colmap = ColmapOf(room);
   const fs::path folder = testing::FreshFolder();
   colmap.Write(folder);

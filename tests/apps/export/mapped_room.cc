@@ -38,12 +38,12 @@ MappedRoom LoadedRoom(int frames) {
   const std::filesystem::path folder =
       MadeOnce("room-" + std::to_string(frames), "/proc/self/exe", [&](const std::filesystem::path& made) {
         std::filesystem::create_directories(made);
-        MapOf(config, data, 0).slam->Save(made / "map.tutti");
+        MapOf(config, data, 0).slam->Snapshot().Write(made / "map.tutti");
       });
   const std::filesystem::path map = folder / "map.tutti";
   MappedRoom room;
   room.dataset = OpenDataset(data, LoadConfig(config).dataset);
-  room.slam = SlamSystem::Load(map, ReadMapInfo(map));
+  room.slam = LoadMap(map, ReadMapInfo(map));
   return room;
 }
 

@@ -36,7 +36,7 @@ TEST(FramePlaces, WithoutAMapAllFramesAreOwn) {
 }
 
 TEST(RunState, AFrameIsOfTheRecordingWhoseNumbersItLiesIn) {
-  const std::vector<LoopRecord> loops;
+  const std::vector<Loop> loops;
   RunState state = {nullptr, loops};
   EXPECT_EQ(state.SessionOf(0), 0u);
   EXPECT_EQ(state.SessionOf(123456), 0u);

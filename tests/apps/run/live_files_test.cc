@@ -20,7 +20,7 @@ TEST(LiveFiles, EveryLineIsThereAtOnce) {
   CameraRig rig;
   rig.calibrated = true;
   LiveFiles live(folder, rig, RunConfig());
-  std::vector<LoopRecord> loops;
+  std::vector<Loop> loops;
   const RunState state = {nullptr, loops, 0};
   TrackResult track;
   live.Add(0.5, track, state);  // it has no pose yet

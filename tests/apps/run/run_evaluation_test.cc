@@ -13,12 +13,12 @@ RunResult OneLoop() {
   RunResult result;
   result.rig.sensor = Sensor::kRgbd;
   result.frame_interval_s = 1.0 / 30;
-  LoopRecord loop;
+  Loop loop;
   loop.query = 60;
   loop.query_stamp_s = 12.0;
   loop.candidate = 0;
   loop.candidate_stamp_s = 10.0;
-  loop.accepted = true;
+  loop.state = LoopState::kInMap;
   loop.S_candidate_query = Similarity();
   result.loops = {loop};
   return result;

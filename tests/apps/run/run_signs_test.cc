@@ -122,12 +122,12 @@ TEST(RunSigns, TheLensIsJudgedAtTheEdgeOfTheImage) {
   EXPECT_NEAR(*Sign(result, "lens_off"), 0.1 / 4, 1e-12) << "whatever the focal length is";
 }
 
-LoopRecord Recognised(double candidate_s, double query_s, bool accepted) {
-  LoopRecord loop;
+Loop Recognised(double candidate_s, double query_s, bool accepted) {
+  Loop loop;
   loop.candidate_stamp_s = candidate_s;
   loop.query_stamp_s = query_s;
   loop.verified = true;
-  loop.accepted = accepted;
+  loop.state = accepted ? LoopState::kInMap : LoopState::kRejected;
   return loop;
 }
 

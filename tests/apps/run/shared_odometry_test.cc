@@ -69,7 +69,7 @@ class SharedOdometry : public ::testing::Test {
   // The lines of loops.csv up to the image that was the first to be measured against the map.
   static std::vector<std::string> Proposals(const RunResult& result, std::int64_t before) {
     std::vector<std::string> out;
-    for (const LoopRecord& loop : result.loops) {
+    for (const Loop& loop : result.loops) {
       if (loop.query >= before) break;
       std::string line = std::to_string(loop.query) + " " + std::to_string(loop.candidate) + " " +
                          std::to_string(loop.inliers) + "/" + std::to_string(loop.matches);
@@ -102,7 +102,7 @@ TEST_F(SharedOdometry, UntilTheFirstVerifiedLoopTheDetectorAnswersAsInARunOfItsO
   const RunResult apart = RunSlam(Request(folder_ / "apart"), Config());
   EXPECT_EQ(Text(apart.trajectory_odometry, folder_ / "a"), Text(tracked.result.trajectory, folder_ / "b"));
   std::int64_t first = -1;
-  for (const LoopRecord& loop : apart.loops) {
+  for (const Loop& loop : apart.loops) {
     if (loop.verified && first < 0) first = loop.query + 1;
   }
   ASSERT_GT(first, 0);

@@ -10,10 +10,11 @@ namespace {
 
 RunResult WithOneLoopOfWeight(double weight) {
   RunResult result;
-  LoopRecord loop;
+  Loop loop;
   loop.query = 9;
   loop.candidate = 2;
-  loop.verified = loop.accepted = true;
+  loop.verified = true;
+  loop.state = LoopState::kInMap;
   loop.weight = weight;
   result.loops.push_back(loop);
   return result;

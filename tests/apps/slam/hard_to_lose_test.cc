@@ -121,7 +121,7 @@ Outcome Follow(const Recording& recording, RunConfig config = RunConfig()) {
   const EvaluationReport report = EvaluateTrajectory(recording.truth, estimate, options);
   out.ate_m = report.ate.rmse;
   out.path_m = report.path_length_m;
-  out.relocalized = slam.Relocalized();
+  out.relocalized = slam.Report().relocalized;
   ::testing::Test::RecordProperty("posed", static_cast<int>(out.posed));
   ::testing::Test::RecordProperty("frames", static_cast<int>(out.frames));
   ::testing::Test::RecordProperty("ate_mm", static_cast<int>(1e3 * out.ate_m));

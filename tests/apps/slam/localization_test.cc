@@ -1,4 +1,4 @@
-// Frames that are located in a map (SlamSystem::BeginLocalization).
+// Frames that are located in a map (Localizer).
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -13,6 +13,7 @@
 #include "tests/support/rendered_world.h"
 #include "tests/support/small_town.h"
 #include "tests/support/test_data.h"
+#include "tutti/slam/localizer.h"
 #include "tutti/slam/map_file.h"
 #include "tutti/slam/slam_system.h"
 
@@ -36,12 +37,10 @@ class LocatingFrames : public ::testing::TestWithParam<SyntheticSensor> {
     config.odometry.features = 800;
     return config;
   }
-  // A map of the first frames, ready to be located in.
+  // A map of the first frames, and who locates in it.
   std::unique_ptr<SlamSystem> Mapped() const {
     const fs::path& file = MapFile();
-    std::unique_ptr<SlamSystem> slam = SlamSystem::Load(file, ReadMapInfo(file));
-    slam->BeginLocalization();
-    return slam;
+    return LoadMap(file, ReadMapInfo(file));
   }
   // Each sensor's once for all tests.
   const fs::path& MapFile() const {
@@ -52,7 +51,7 @@ class LocatingFrames : public ::testing::TestWithParam<SyntheticSensor> {
     SlamSystem slam(Config(), recording_.rig);
     for (std::size_t i = 0; i < kMapped; ++i) slam.Track(recording_.frames[i]);
     slam.Finish();
-    slam.Save(file);
+    slam.Snapshot().Write(file);
     return file;
   }
 
@@ -63,25 +62,26 @@ class LocatingFrames : public ::testing::TestWithParam<SyntheticSensor> {
 INSTANTIATE_TEST_SUITE_P(Sensors, LocatingFrames, testing::EachSensor(), testing::SensorName);
 
 TEST_P(LocatingFrames, TheMapStaysAsItIsWhileTheCameraDrivesOnBeyondIt) {
-  const auto slam = Mapped();
-  const Odometry before = *slam->odometry();
+  const auto map = Mapped();
+  Localizer localizer(*map);
+  const Odometry before = *map->odometry();
   const int keyframes = before.map().KeyframeCount();
   std::size_t found = 0, within = 0;
   for (std::size_t i = kBack; i < kEnd; ++i) {
-    if (slam->Track(recording_.frames[i]).state != TrackingState::kTracking) continue;
+    if (localizer.Track(recording_.frames[i]).state != TrackingState::kTracking) continue;
     ++found;
-    if (slam->odometry()->LastView().beyond_map) continue;
+    if (localizer.odometry().LastView().beyond_map) continue;
     ++within;
-    EXPECT_LT(slam->odometry()->LastView().keyframe, keyframes) << "frame " << i;
+    EXPECT_LT(localizer.odometry().LastView().keyframe, keyframes) << "frame " << i;
   }
   EXPECT_GE(found, (kEnd - kBack) * 9 / 10);
   EXPECT_GE(within, kMapped - kBack - 5);
-  EXPECT_GT(slam->odometry()->map().KeyframeCount(), keyframes) << "keyframes for the time being";
+  EXPECT_GT(localizer.odometry().map().KeyframeCount(), keyframes) << "keyframes for the time being";
   for (int id = 0; id < keyframes; ++id)
-    EXPECT_EQ(slam->odometry()->map().keyframe(id).T_world_camera.Matrix(),
+    EXPECT_EQ(localizer.odometry().map().keyframe(id).T_world_camera.Matrix(),
               before.map().keyframe(id).T_world_camera.Matrix())
         << id;
-  const Map &old = before.map(), &now = slam->odometry()->map();
+  const Map &old = before.map(), &now = localizer.odometry().map();
   std::size_t kept = 0;
   for (const int id : old.LandmarkIds()) {
     if (!now.landmark(id).alive) continue;  // it was found to be the same as another one of the map
@@ -92,13 +92,14 @@ TEST_P(LocatingFrames, TheMapStaysAsItIsWhileTheCameraDrivesOnBeyondIt) {
 }
 
 TEST_P(LocatingFrames, NoMoreFeaturesAreSoughtThanThePoseNeeds) {
-  const auto slam = Mapped();
-  const int all = slam->Track(recording_.frames[kBack]).features;
+  const auto map = Mapped();
+  Localizer localizer(*map);
+  const int all = localizer.Track(recording_.frames[kBack]).features;
   int least = all, most_inliers = 0;
   for (std::size_t i = kBack + 1; i < kBack + 8; ++i) {
-    const TrackResult result = slam->Track(recording_.frames[i]);
+    const TrackResult result = localizer.Track(recording_.frames[i]);
     ASSERT_EQ(result.state, TrackingState::kTracking) << "frame " << i;
-    EXPECT_FALSE(slam->odometry()->LastView().beyond_map) << "frame " << i;
+    EXPECT_FALSE(localizer.odometry().LastView().beyond_map) << "frame " << i;
     least = std::min(least, result.features);
     most_inliers = std::max(most_inliers, result.inliers);
   }
@@ -109,17 +110,18 @@ TEST_P(LocatingFrames, NoMoreFeaturesAreSoughtThanThePoseNeeds) {
   EXPECT_GT(most_inliers, 100);
   // Who has extracted features already gets what they tell.
   InputFrame frame = recording_.frames[kBack + 8];
-  frame.features = slam->odometry()->Extract(frame);
-  EXPECT_GT(slam->Track(frame).features, 0.9 * all);
+  frame.features = localizer.odometry().Extract(frame);
+  EXPECT_GT(localizer.Track(frame).features, 0.9 * all);
 }
 
 TEST_P(LocatingFrames, AfterACoveredLensTheCameraIsFoundAgainWithAllFeatures) {
-  const auto slam = Mapped();
+  const auto map = Mapped();
+  Localizer localizer(*map);
   constexpr std::size_t kCovered = kBack + 3, kFree = kBack + 6;
-  for (std::size_t i = kBack; i < kCovered; ++i) slam->Track(recording_.frames[i]);
+  for (std::size_t i = kBack; i < kCovered; ++i) localizer.Track(recording_.frames[i]);
   for (std::size_t i = kCovered; i < kFree; ++i)
-    EXPECT_EQ(slam->Track(testing::Black(recording_.frames[i])).state, TrackingState::kLost);
-  const TrackResult again = slam->Track(recording_.frames[kFree]);
+    EXPECT_EQ(localizer.Track(testing::Black(recording_.frames[i])).state, TrackingState::kLost);
+  const TrackResult again = localizer.Track(recording_.frames[kFree]);
   EXPECT_EQ(again.state, TrackingState::kTracking) << again.reason;
   EXPECT_GT(again.features, 500);
 }

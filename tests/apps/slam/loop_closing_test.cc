@@ -1,5 +1,5 @@
 // What the detector is told of keyframes: whose landmarks are in metres, and whose are not.
-#include "apps/slam/loop_closing.h"
+#include "apps/slam/map_merge.h"
 
 #include <gtest/gtest.h>
 
@@ -7,6 +7,7 @@
 #include <opencv2/features2d.hpp>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/loopclosure/features/textured_image.h"
@@ -71,18 +72,22 @@ class KeyframesOfPlaces : public ::testing::Test {
     return view;
   }
   // Shows these frames, and says what the detector answers.
-  static std::vector<LoopResult> Show(LoopClosing* loops, Sensor sensor, int begin, int end) {
-    std::vector<LoopResult> results;
-    loops->SetDetectionListener([&results](const LoopResult& result) { results.push_back(result); });
+  std::vector<LoopResult> Show(LoopCloser* loops, Sensor sensor, int begin, int end) {
+    results_.clear();
     for (int i = begin; i < end; ++i) {
       const InputFrame frame = Frame(i);
       const KeyframeView view = View(frame, sensor);
-      loops->Submit(frame, &view, i);
+      loops->AddKeyframe(frame, &view, i);
       loops->Due(nullptr, i + 1);
     }
-    loops->SetDetectionListener({});
-    return results;
+    return std::exchange(results_, {});
   }
+  LoopCloser Closer(Sensor sensor) {
+    return LoopCloser(Config(), Rig(sensor), nullptr,
+                      {[this](const LoopResult& result) { results_.push_back(result); }, {}});
+  }
+  std::vector<LoopResult> results_;
+
   static int Expect(ConstraintType type, double scale, const Verification& verification) {
     if (!verification.accepted) return 0;
     EXPECT_EQ(ToString(verification.type), std::string(ToString(type)));
@@ -97,7 +102,7 @@ class KeyframesOfPlaces : public ::testing::Test {
 TEST_F(KeyframesOfPlaces, OneCamerasLandmarksAreNotInMetres) {
   for (const Sensor sensor : {Sensor::kMono, Sensor::kRgbd}) {
     const bool mono = sensor == Sensor::kMono;
-    LoopClosing loops(Config(), Rig(sensor), nullptr);
+    LoopCloser loops = Closer(sensor);
     int found = 0;
     for (const LoopResult& result : Show(&loops, sensor, 0, kPlaces + 5)) {
       found += Expect(mono ? ConstraintType::kSimilarity : ConstraintType::kRigid, mono ? 1 / kDrift : 1,
@@ -109,7 +114,7 @@ TEST_F(KeyframesOfPlaces, OneCamerasLandmarksAreNotInMetres) {
 
 // Maps from before one camera said so have it that their landmarks are in metres.
 TEST_F(KeyframesOfPlaces, WhatAnOlderMapSaysOfItsLandmarksMakesThemNoMetres) {
-  LoopClosing loops(Config(), Rig(Sensor::kRgbd), nullptr);
+  LoopCloser loops = Closer(Sensor::kRgbd);
   Show(&loops, Sensor::kRgbd, 0, kPlaces);
   loops.BeginSession(Rig(Sensor::kMono), kPlaces, kPlaces);
   int found = 0;
@@ -120,17 +125,19 @@ TEST_F(KeyframesOfPlaces, WhatAnOlderMapSaysOfItsLandmarksMakesThemNoMetres) {
 
 TEST_F(KeyframesOfPlaces, NorAreThoseOfAnotherMapOfOneCamera) {
   const Sensor sensor = Sensor::kMono;
-  LoopClosing loops(Config(), Rig(sensor), nullptr), other(Config(), Rig(sensor), nullptr);
+  LoopCloser loops = Closer(sensor), other = Closer(sensor);
   Show(&loops, sensor, 0, kPlaces);
   Show(&other, sensor, kPlaces, kPlaces + 5);
   loops.BeginSession(Rig(sensor), 1000 + kPlaces, kPlaces);
-  const std::vector<ProposedLoop> between =
-      loops.Compare(other.Places(), 1000, [&](std::int64_t frame) -> std::optional<KeyframeView> {
+  const std::vector<MapMerge::Proposal> between = MapMerge::Compare(
+      MapMerge::PlacesOf(&other), 1000,
+      [&](std::int64_t frame) -> std::optional<KeyframeView> {
         return View(Frame(static_cast<int>(frame)), sensor);
-      });
+      },
+      &loops);
   int found = 0;
-  for (const ProposedLoop& loop : between)
-    found += Expect(ConstraintType::kSimilarity, 1 / kDrift, loop.verification);
+  for (const MapMerge::Proposal& proposal : between)
+    found += Expect(ConstraintType::kSimilarity, 1 / kDrift, proposal.verification);
   EXPECT_GE(found, 4);
 }
 

@@ -9,7 +9,7 @@
 #include "tests/support/recording.h"
 #include "tests/support/rendered_world.h"
 #include "tests/support/small_town.h"
-#include "tutti/slam/loop_record.h"
+#include "tutti/slam/loop.h"
 
 namespace tutti {
 namespace {
@@ -31,21 +31,14 @@ struct UnclosedMap {
         loops(config, round.rig, nullptr) {
     for (const InputFrame& frame : round.frames) odometry.Track(frame);
     odometry.FinishMapping();
-    connection =
-        std::make_unique<MapConnection>(config, round.rig, std::int64_t{kUnclosedFrames}, &loops, &odometry,
-                                        [this](const LoopUpdate& update) { Take(update); });
+    connection = std::make_unique<MapConnection>(config, std::int64_t{kUnclosedFrames}, &loops, &odometry);
   }
-  void Take(const LoopUpdate& update) {
-    if (!update.correction) return;
-    const std::vector<int> common = Apply(*update.correction, &odometry);
-    loops.Applied(update, common, odometry, std::int64_t{kUnclosedFrames});
-  }
-  const std::vector<LoopRecord>& Records() const { return loops.closer().records(); }
+  const std::vector<Loop>& Records() const { return loops.loops(); }
 
   RunConfig config;
   testing::Recording round;
   Odometry odometry;
-  LoopClosing loops;
+  LoopCloser loops;
   std::unique_ptr<MapConnection> connection;
 };
 
@@ -62,8 +55,8 @@ TEST(MapConnection, WhereARoundEndsItIsClosedThoughNoDetectorWasAsked) {
   open.connection->Connect(0);
   EXPECT_GE(CountAccepted(open.Records()), 2u);
   constexpr std::int64_t kNear = 20;  // frames
-  for (const LoopRecord& loop : open.Records()) {
-    if (!loop.accepted) continue;
+  for (const Loop& loop : open.Records()) {
+    if (!loop.accepted()) continue;
     EXPECT_LT(loop.candidate, kNear);
     EXPECT_GT(loop.query, std::int64_t{kUnclosedRound} - kNear);
   }

@@ -59,17 +59,17 @@ TEST_P(MapFile, ARunThatGoesOnFromAnyFrameIsTheOneThatNeverStopped) {
   std::size_t next = 3;                   // frame
   int corrections = 0;
   for (std::size_t i = 0; i < n; ++i) {
-    const bool just_moved = whole.Corrections() > corrections;
+    const bool just_moved = whole.Report().corrections > corrections;
     if (i == next || just_moved) {
-      whole.Save(folder / std::to_string(i));
+      whole.Snapshot().Write(folder / std::to_string(i));
       saved.push_back(i);
       moved = moved || corrections > 0;
-      adjusting = adjusting || whole.GlobalAdjustments() < whole.Corrections();
+      adjusting = adjusting || whole.Report().global_adjustments < whole.Report().corrections;
       next = i + (just_moved ? 6 : 83);  // an adjustment takes 20 frames
     } else if (i % 9 == 0) {
-      whole.Save(folder / "often");
+      whole.Snapshot().Write(folder / "often");
     }
-    corrections = whole.Corrections();
+    corrections = whole.Report().corrections;
     whole.Track(recording.frames[i]);
   }
   const MapOutcome expected = Finished(whole);
@@ -81,7 +81,7 @@ TEST_P(MapFile, ARunThatGoesOnFromAnyFrameIsTheOneThatNeverStopped) {
     MapInfo info = ReadMapInfo(file);
     EXPECT_EQ(info.frames, static_cast<std::int64_t>(saved[s]));
     info.config.run.threads = s % 2 == 0 ? 1 : 2;
-    const auto slam = SlamSystem::Load(file, info);
+    const auto slam = LoadMap(file, info);
     for (std::size_t i = saved[s]; i < n; ++i) slam->Track(recording.frames[i]);
     ExpectTheSame(Finished(*slam), expected, "from frame " + std::to_string(saved[s]));
   }
@@ -102,14 +102,14 @@ TEST(MapFileWithLongTermMemory, GoesOnFromTheMapWhateverTheMemorysFileHasSeenSin
   {
     SlamSystem broken_off(configured("broken.ltm"), recording.rig);
     for (std::size_t i = 0; i < crash; ++i) {
-      if (i == k) broken_off.Save(folder / "map");
+      if (i == k) broken_off.Snapshot().Write(folder / "map");
       broken_off.Track(recording.frames[i]);
     }
   }
   for (const InputFrame& frame : recording.frames) whole.Track(frame);
   MapInfo info = ReadMapInfo(folder / "map");
   info.config.loops.ltm_file = info.ltm_file;
-  const auto slam = SlamSystem::Load(folder / "map", info);
+  const auto slam = LoadMap(folder / "map", info);
   for (std::size_t i = k; i < n; ++i) slam->Track(recording.frames[i]);
   ExpectTheSame(Finished(*slam), Finished(whole), "with a long-term memory");
   EXPECT_EQ(info.ltm_file, (folder / "broken.ltm").string());
@@ -126,14 +126,14 @@ class DamagedMap : public ::testing::Test {
   // What loading says.
   std::string Refusal(const std::string& bytes) const {
     std::ofstream(file_, std::ios::binary | std::ios::trunc) << bytes;
-    return testing::ErrorOf([&] { SlamSystem::Load(file_, ReadMapInfo(file_)); });
+    return testing::ErrorOf([&] { LoadMap(file_, ReadMapInfo(file_)); });
   }
   void SaveSome(std::size_t frames = 30) const {
     const testing::Recording recording =
         testing::Record(testing::RenderedWorld(testing::SmallStereoTown(320, 160)), frames);
     SlamSystem slam(MapConfig(1), recording.rig);
     for (const InputFrame& frame : recording.frames) slam.Track(frame);
-    slam.Save(file_);
+    slam.Snapshot().Write(file_);
   }
   fs::path file_ = testing::FreshFolder() / "some.tutti";
 };
@@ -165,13 +165,13 @@ TEST_F(DamagedMap, NamesNoFileThatIsWritten) {
   {
     SlamSystem slam(config, recording.rig);
     for (const InputFrame& frame : recording.frames) slam.Track(frame);
-    slam.Save(file_);
+    slam.Snapshot().Write(file_);
   }
   fs::remove(memory);
   const MapInfo info = ReadMapInfo(file_);
   EXPECT_EQ(info.config.loops.ltm_file, "");
   EXPECT_EQ(info.ltm_file, memory.string());
-  const auto slam = SlamSystem::Load(file_, info);
+  const auto slam = LoadMap(file_, info);
   slam->BeginSession(recording.rig);
   for (const InputFrame& frame : recording.frames) slam->Track(frame);
   EXPECT_EQ(std::distance(fs::directory_iterator(file_.parent_path()), fs::directory_iterator()), 1);
@@ -189,7 +189,7 @@ TEST_F(DamagedMap, ASnapshotIsWrittenAfterItsSlamSystemIsGone) {
     }  // while the detector looks at the last keyframes
     snapshot->Write(file_);
     CheckMapFile(file_);
-    const auto again = SlamSystem::Load(file_, ReadMapInfo(file_));
+    const auto again = LoadMap(file_, ReadMapInfo(file_));
     EXPECT_EQ(FrameTrajectory(again->odometry()->map()).size(), recording.frames.size());
     const MapSnapshot moved = std::move(*snapshot);
     moved.Write(file_);
@@ -205,7 +205,7 @@ TEST_F(DamagedMap, WithItselfOrNoneCantBeMerged) {
   SlamSystem slam(MapConfig(1), recording.rig);
   for (const InputFrame& frame : recording.frames) slam.Track(frame);
   for (SlamSystem* other : {&slam, static_cast<SlamSystem*>(nullptr)})
-    EXPECT_NE(testing::ErrorOf([&] { slam.Merge(other); }).find("merged with itself"), std::string::npos);
+    EXPECT_NE(testing::ErrorOf([&] { Merge(&slam, other); }).find("merged with itself"), std::string::npos);
 }
 
 TEST_F(DamagedMap, ANewerVersionIsSaidAndSomethingElseIsNoMap) {
@@ -225,7 +225,7 @@ TEST_F(DamagedMap, WhatCantBeWrittenLeavesTheOldOne) {
   const SlamSystem slam(MapConfig(1), recording.rig);
   EXPECT_THROW(slam.Snapshot().Write(file_, [](const MapSink&) { throw InputError("stop"); }), InputError);
   EXPECT_EQ(Content(file_) == before, true);
-  EXPECT_THROW(slam.Save(file_ / "no" / "folder"), InputError);
+  EXPECT_THROW(slam.Snapshot().Write(file_ / "no" / "folder"), InputError);
   EXPECT_EQ(std::distance(fs::directory_iterator(file_.parent_path()), fs::directory_iterator()), 1);
 }
 

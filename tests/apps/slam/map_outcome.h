@@ -35,8 +35,8 @@ inline MapOutcome Finished(SlamSystem& slam) {
   std::vector<Similarity> edges;
   for (const PoseGraphEdge& edge : graph.edges()) edges.push_back(edge.measurement);
   outcome.graph = StateOf(nodes) + StateOf(edges);
-  outcome.corrections = slam.Corrections();
-  outcome.adjustments = slam.GlobalAdjustments();
+  outcome.corrections = slam.Report().corrections;
+  outcome.adjustments = slam.Report().global_adjustments;
   outcome.frames = FrameIndices(odometry.map());
   return outcome;
 }

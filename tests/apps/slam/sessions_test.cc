@@ -16,6 +16,7 @@
 #include "tests/support/rendered_world.h"
 #include "tests/support/small_town.h"
 #include "tests/support/test_data.h"
+#include "tutti/slam/localizer.h"
 #include "tutti/slam/slam_system.h"
 
 namespace tutti {
@@ -102,7 +103,7 @@ class Sessions : public ::testing::TestWithParam<SyntheticSensor> {
     SlamSystem slam(GetParam() == SyntheticSensor::kStereo ? Configured() : WithOneMember(), day.rig);
     TrackAll(day, &slam);
     fs::path file = testing::FreshFolder() / "map.tutti";
-    slam.Save(file);
+    slam.Snapshot().Write(file);
     return file;
   }
 };
@@ -117,7 +118,7 @@ TEST_P(Sessions, AnotherRecordingJoinsTheMapWhoseFrameOfReferenceStaysWithTheSam
   for (const int threads : {1, 2}) {
     MapInfo info = ReadMapInfo(map);
     info.config.run.threads = threads;
-    const auto slam = SlamSystem::Load(map, info);
+    const auto slam = LoadMap(map, info);
     const Pose before = slam->odometry()->map().keyframe(0).T_world_camera;
     const std::size_t submaps = FramePieces(slam->odometry()->map()).size();
     slam->BeginSession(next.rig);
@@ -155,21 +156,21 @@ TEST(SessionsOfAMap, GoOnFromAFileAndTheMapOfTwoSessionsCanBeLocalizedIn) {
   whole.BeginSession(next.rig);
   constexpr std::size_t kSaved = 30;
   for (std::size_t i = 0; i < kSaved; ++i) whole.Track(next.frames[i]);
-  whole.Save(folder / "within");
+  whole.Snapshot().Write(folder / "within");
   TrackAll(next, &whole, kSaved);
-  whole.Save(folder / "map");
-  const auto again = SlamSystem::Load(folder / "within", ReadMapInfo(folder / "within"));
+  whole.Snapshot().Write(folder / "map");
+  const auto again = LoadMap(folder / "within", ReadMapInfo(folder / "within"));
   TrackAll(next, again.get(), kSaved);
   EXPECT_EQ(StateOfAll(*again) == StateOfAll(whole), true) << "saved within the second session";
   const MapInfo info = ReadMapInfo(folder / "map");
   ASSERT_EQ(info.sessions.size(), 2u);
   EXPECT_EQ(info.sessions[0].keyframes + info.sessions[1].keyframes, info.keyframes);
   EXPECT_TRUE(info.sessions[1].joined_at.has_value());
-  const auto where = SlamSystem::Load(folder / "map", info);
-  where->BeginLocalization();
+  const auto where = LoadMap(folder / "map", info);
+  Localizer localizer(*where);
   int found = 0;
   for (std::size_t i = 40; i < 80; ++i)
-    found += where->Track(next.frames[i]).state == TrackingState::kTracking ? 1 : 0;
+    found += localizer.Track(next.frames[i]).state == TrackingState::kTracking ? 1 : 0;
   EXPECT_GE(found, 38);
 }
 
@@ -247,20 +248,20 @@ TEST_F(Merging, TwoMapsWithCommonPlacesAreOneForAnyThreads) {
   const Recording a = Part(world, 0, 140), b = Part(world, 90, 240, kLater_s);
   std::unique_ptr<SlamSystem> map = MapOf(a, Configured()), other = MapOf(b, Configured());
   const fs::path folder = testing::FreshFolder();
-  map->Save(folder / "a");
-  other->Save(folder / "b");
+  map->Snapshot().Write(folder / "a");
+  other->Snapshot().Write(folder / "b");
   std::string first_bytes;
   for (const int threads : {2, 1}) {
     if (threads == 1) {  // from files, as `tutti merge` has them
       const auto loaded = [&](const char* name) {
         MapInfo info = ReadMapInfo(folder / name);
         info.config.run.threads = threads;
-        return SlamSystem::Load(folder / name, info);
+        return LoadMap(folder / name, info);
       };
       map = loaded("a");
       other = loaded("b");
     }
-    ASSERT_TRUE(map->Merge(other.get()));
+    ASSERT_TRUE(Merge(map.get(), other.get()));
     EXPECT_EQ(FramePieces(map->odometry()->map()).size(), 1u);
     const std::string bytes = StateOfAll(*map);
     if (threads == 2) first_bytes = bytes;
@@ -271,8 +272,8 @@ TEST_F(Merging, TwoMapsWithCommonPlacesAreOneForAnyThreads) {
     // Goes on, and is there again from a file.
     if (threads == 1) continue;
     const fs::path file = folder / "merged.tutti";
-    map->Save(file);
-    const auto again = SlamSystem::Load(file, ReadMapInfo(file));
+    map->Snapshot().Write(file);
+    const auto again = LoadMap(file, ReadMapInfo(file));
     const Recording third = Part(world, 60, 110);
     again->BeginSession(third.rig);
     TrackAll(third, again.get());
@@ -287,16 +288,15 @@ TEST_F(Merging, WhichMapComesFirstDecidesTheFrameOfReferenceAlone) {
   const Recording a = Part(world, 0, 140), b = Part(world, 90, 240, kLater_s);
   const fs::path folder = testing::FreshFolder(), a_file = folder / "a", b_file = folder / "b";
   const auto first = MapOf(a), to_first = MapOf(b);
-  first->Save(a_file);
-  to_first->Save(b_file);
-  const auto second = SlamSystem::Load(b_file, ReadMapInfo(b_file)),
-             to_second = SlamSystem::Load(a_file, ReadMapInfo(a_file));
+  first->Snapshot().Write(a_file);
+  to_first->Snapshot().Write(b_file);
+  const auto second = LoadMap(b_file, ReadMapInfo(b_file)), to_second = LoadMap(a_file, ReadMapInfo(a_file));
   const Pose first_begin = first->odometry()->map().keyframe(0).T_world_camera,
              second_begin = second->odometry()->map().keyframe(0).T_world_camera;
   int heard = 0;
-  second->SetDetectionListener([&heard](const LoopResult&) { ++heard; });
-  ASSERT_TRUE(first->Merge(to_first.get()));
-  ASSERT_TRUE(second->Merge(to_second.get()));
+  second->SetListeners({[&heard](const LoopResult&) { ++heard; }, {}, {}});
+  ASSERT_TRUE(Merge(first.get(), to_first.get()));
+  ASSERT_TRUE(Merge(second.get(), to_second.get()));
   EXPECT_EQ(StateOf(first->loops()) == StateOf(second->loops()), true);
   const std::vector<int> ids = first->odometry()->map().KeyframeIds();
   ASSERT_EQ(second->odometry()->map().KeyframeIds(), ids);
@@ -340,12 +340,12 @@ struct MergedRound {
   }
 
   // Loops of the merged map that close the round.
-  static std::vector<LoopRecord> Closing(const SlamSystem& map) {
+  static std::vector<Loop> Closing(const SlamSystem& map) {
     const std::int64_t offset = map.Sessions()[1].frame_offset;
     constexpr std::int64_t kNear = 20;  // frames
-    std::vector<LoopRecord> closing;
-    for (const LoopRecord& loop : map.loops()) {
-      if (loop.accepted && loop.candidate < kNear && std::abs(loop.query - offset - kEnd) < kNear)
+    std::vector<Loop> closing;
+    for (const Loop& loop : map.loops()) {
+      if (loop.accepted() && loop.candidate < kNear && std::abs(loop.query - offset - kEnd) < kNear)
         closing.push_back(loop);
     }
     return closing;
@@ -372,7 +372,7 @@ struct MergedRound {
 TEST_F(Merging, TheOpenEndOfARoundIsClosed) {
   const MergedRound round(90, 10);
   const auto map = MapOf(round.first), other = MapOf(round.second);
-  ASSERT_TRUE(map->Merge(other.get()));
+  ASSERT_TRUE(Merge(map.get(), other.get()));
   EXPECT_GE(MergedRound::Closing(*map).size(), 1u);
   round.ExpectTrueGap(*map);
 }
@@ -385,12 +385,11 @@ TEST_F(Merging, WhatTheDetectorsMissedIsFoundInTheJoinedMap) {
   config.loops.propose_threshold = 0.95;
   const MergedRound round(110, 19);
   const auto map = MapOf(round.first, config), other = MapOf(round.second, config);
-  ASSERT_TRUE(map->Merge(other.get()));
-  const std::vector<LoopRecord> closing = MergedRound::Closing(*map);
+  ASSERT_TRUE(Merge(map.get(), other.get()));
+  const std::vector<Loop> closing = MergedRound::Closing(*map);
   EXPECT_GE(closing.size(), 2u);
-  EXPECT_GE(std::count_if(closing.begin(), closing.end(),
-                          [](const LoopRecord& loop) { return loop.hypothesis == 0; }),
-            1)
+  EXPECT_GE(
+      std::count_if(closing.begin(), closing.end(), [](const Loop& loop) { return loop.hypothesis == 0; }), 1)
       << "what no detector proposed";
   round.ExpectTrueGap(*map);
 }
@@ -400,7 +399,7 @@ TEST_F(Merging, MapsWithoutACommonPlaceAreNotOne) {
       elsewhere(SessionTown(SyntheticSensor::kStereo, 7));
   const auto map = MapOf(Part(world, 0, 60)), other = MapOf(Part(elsewhere, 0, 60));
   std::string reason;
-  EXPECT_FALSE(map->Merge(other.get(), &reason));
+  EXPECT_FALSE(Merge(map.get(), other.get(), &reason));
   EXPECT_NE(reason.find("between them"), std::string::npos) << reason;
 }
 

@@ -60,7 +60,7 @@ struct Result {
   int adjustments = 0, corrections = 0;
   std::vector<double> keyframe_stamps;
   Trajectory trajectory;
-  std::vector<LoopRecord> loops;
+  std::vector<Loop> loops;
   double ate_m = 0;
 };
 
@@ -70,8 +70,8 @@ Result DriveOnce(const Setting& setting) {
   for (std::size_t i = 0; i < count; ++i) slam.Track(TwoLaps().frames[i]);
   slam.Finish();
   Result result;
-  result.adjustments = slam.GlobalAdjustments();
-  result.corrections = slam.Corrections();
+  result.adjustments = slam.Report().global_adjustments;
+  result.corrections = slam.Report().corrections;
   const Odometry& odometry = *slam.odometry();
   for (const int id : odometry.map().KeyframeIds())
     result.keyframe_stamps.push_back(odometry.map().keyframe(id).stamp_s);
@@ -135,7 +135,7 @@ TEST(SlamSystem, WhatBackgroundWorkFindsDoesNotDependOnTheThreadsAndNothingIsRev
   const Result &one = DriveThrough({true, 1}), &two = DriveThrough({true, 2});
   ExpectTheSameBits(one, two);
   ASSERT_GT(two.corrections, 0);
-  for (const LoopRecord& loop : two.loops) EXPECT_FALSE(loop.revoked) << loop.query;
+  for (const Loop& loop : two.loops) EXPECT_FALSE(loop.revoked) << loop.query;
 }
 
 TEST(SlamSystem, LoopsThatAreGatedDoNotDependOnTheThreads) {
@@ -150,10 +150,10 @@ TEST(SlamSystem, LoopsThatAreGatedDoNotDependOnTheThreads) {
 // of threads.
 TEST(SlamSystem, TheDetectorIsToldOfLoopsThatTheMapContradicts) {
   const Result &one = DriveThrough({false, 1, 0.001, false}), &two = DriveThrough({false, 2, 0.001, false});
-  const auto revoked = [](const LoopRecord& loop) { return loop.revoked; };
+  const auto revoked = [](const Loop& loop) { return loop.revoked; };
   ASSERT_GT(std::count_if(one.loops.begin(), one.loops.end(), revoked), 0);
-  for (const LoopRecord& loop : one.loops) {
-    EXPECT_FALSE(loop.revoked && loop.accepted) << loop.query;
+  for (const Loop& loop : one.loops) {
+    EXPECT_FALSE(loop.revoked && loop.accepted()) << loop.query;
     EXPECT_EQ(loop.revoked, loop.gate_sigmas.has_value()) << loop.query << ": " << loop.reason;
   }
   EXPECT_EQ(one.corrections, 0);

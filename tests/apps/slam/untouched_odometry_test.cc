@@ -79,11 +79,13 @@ TEST_P(UntouchedOdometry, TrackedOnHasTheBitsOfTheOdometryAlone) {
   SlamSystem slam(config, recording.rig);
   std::optional<Odometry> untouched;
   std::int64_t seen = -1;
-  slam.SetChangeListener([&](const Odometry& odometry, std::int64_t last) {
+  SlamListeners listeners;
+  listeners.on_change = [&](const Odometry& odometry, std::int64_t last) {
     if (untouched) return;
     untouched = odometry;
     seen = last;
-  });
+  };
+  slam.SetListeners(listeners);
   bool planted = false;
   for (const InputFrame& frame : recording.frames) {
     slam.Track(frame);
@@ -94,7 +96,7 @@ TEST_P(UntouchedOdometry, TrackedOnHasTheBitsOfTheOdometryAlone) {
   }
   slam.Finish();
   if (change == Change::kALostFrameIsFound && sensor != SyntheticSensor::kMono) {
-    ASSERT_GT(slam.Relocalized(), 0u);
+    ASSERT_GT(slam.Report().relocalized, 0u);
   }
   if (change == Change::kFalseLoopsAreRefused) {
     ASSERT_EQ(CountAccepted(slam.loops()), 0u);

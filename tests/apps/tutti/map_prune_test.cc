@@ -64,7 +64,7 @@ TEST_F(MapPrune, WhatIsNoFinishedMapIsRefusedByNameAndStays) {
   EXPECT_THAT(none.output, HasSubstr(absent.string()));
   const fs::path checkpoint = folder_ / "checkpoint.tutti";
   const MapInfo info = ReadMapInfo(map_);
-  SlamSystem::Load(map_, info)->Snapshot().Write(checkpoint, [](const MapSink& sink) { sink(300, "a run"); });
+  LoadMap(map_, info)->Snapshot().Write(checkpoint, [](const MapSink& sink) { sink(300, "a run"); });
   const std::string before = ReadAll(checkpoint);
   const auto refused = RunTutti({"map", "prune", checkpoint});
   EXPECT_EQ(refused.status, 1);

@@ -23,7 +23,7 @@ TEST(LiveState, ThatTheRunIsDoneIsStillSaidWhenItIsClosedAtOnce) {
 
 TEST(LiveState, WithoutPosesThereAreFramesButNoPlaces) {
   LiveState state;
-  const std::vector<LoopRecord> loops;
+  const std::vector<Loop> loops;
   InputFrame frame;
   frame.index = 12;
   state.SetFrame(frame, {}, {nullptr, loops});

@@ -42,6 +42,7 @@ struct TrackResult {
   int inliers = 0;                ///< landmarks that agree with the pose
   bool by_grey_values = false;    ///< no landmarks: in a blurred image, the grey values of the one before
   int keyframe = -1;              ///< id of the keyframe that this frame became, or -1
+  bool recognised = false;        ///< it was lost, and got its pose because the loop detector knew its place
   std::optional<StepCheck> step;  ///< Follow, of a keyframe, if the images say enough
   /// Keyframes whose mapping has entered since the frame before, oldest first: all their landmarks are known.
   std::vector<int> mapped;

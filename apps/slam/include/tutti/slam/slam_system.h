@@ -9,7 +9,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -21,28 +20,22 @@
 #include "tutti/frontend/odometry.h"
 #include "tutti/loopclosure/detector.h"
 #include "tutti/slam/config.h"
-#include "tutti/slam/loop_record.h"
+#include "tutti/slam/loop.h"
 #include "tutti/slam/map_file.h"
+#include "tutti/slam/slam_report.h"
 
 #pragma GCC visibility push(default)
 namespace tutti {
 
-/// Where another odometry moves as nothing can (a pose that is wrong, an odometry that began anew).
-struct OdometryJump {
-  double from_s = 0, to_s = 0;  ///< the last pose before and the first one after it; infinite: none
-  double distance_m = 0;        ///< farther than the speed around it says
-  double angle_rad = 0;         ///< the same of its rotation
-  bool comes_back = false;      ///< the poses between the two are wrong; else the jump lasts
-};
-
-/// How uncertain another odometry counts as between two keyframes, as standard deviations
-/// (SlamSystem::Follow).
-struct FollowedUncertainty {
-  double stated_fraction = 0;       ///< of the way, by the odometry itself, else as configured [1]
-  double stated_rotation_rad = 0;   ///< the same of the rotation
-  double seen_fraction = 0;         ///< what its disagreement with the images comes to; 0: too few steps
-  double seen_rotation_rad = 0;     ///< where it is larger than what is stated, it counts instead
-  std::vector<OdometryJump> jumps;  ///< steps that have no weight
+/// Whom a SlamSystem tells, from Track(), Follow() and Finish(); each may be empty.
+struct SlamListeners {
+  /// Each answer of the loop detector, before it enters.
+  std::function<void(const LoopResult&)> on_detection;
+  /// Each keyframe and its frame when all its landmarks are known, which is when the detector gets it.
+  std::function<void(const InputFrame&, int)> on_keyframe;
+  /// Before loops, or a lost frame whose place the detector knew, change the odometry: what it would do alone
+  /// goes on from here (a copy of it). `last`: index of the last frame that it has seen, -1 for none.
+  std::function<void(const Odometry&, std::int64_t last)> on_change;
 };
 
 /// The pipeline. The odometry runs on the caller's thread, the loop detector and the pose graph beside it;
@@ -58,45 +51,19 @@ class SlamSystem {
   SlamSystem(const SlamSystem&) = delete;
   SlamSystem& operator=(const SlamSystem&) = delete;
 
-  /// Calls `listener` with each answer of the loop detector, before it enters; from Track() and Finish().
-  void SetDetectionListener(std::function<void(const LoopResult&)> listener);
-  /// Calls `listener` with each keyframe and its frame when all its landmarks are known, which is when the
-  /// detector gets it; from Track() and Finish().
-  void SetKeyframeListener(std::function<void(const InputFrame&, int)> listener);
-  /// Calls `listener` before loops, or a lost frame whose place the detector knew, change the odometry: what
-  /// it would do alone goes on from here (a copy of it). `last`: index of the last frame that it has seen, -1
-  /// for none. From Track() and Finish().
-  void SetChangeListener(std::function<void(const Odometry&, std::int64_t last)> listener);
+  void SetListeners(SlamListeners listeners);
 
   /// Another recording begins, in the map that is there: its frames, taken by this rig, come next. They start
   /// a submap of their own, which joins the map when a loop connects the two; or they go on in the map at
   /// once, if one of the first of them is recognised. The map's frame of reference stays. InputFrame::index
   /// and time stamps of the recording may begin anew: in loop records and keyframes, frames have numbers that
   /// are unique in the map (MapSession::frame_offset). Another camera is allowed if its sensor is of the same
-  /// kind (Odometry::BeginSession). Brings in first all that is on its way (Finish); counts of corrections,
+  /// kind (WithRig). Brings in first all that is on its way (Finish); counts of corrections,
   /// relocalised frames and milliseconds begin anew. Throws InputError, and changes nothing, if there is no
   /// map, no detector that knows it, or for a rig that does not fit.
   void BeginSession(const CameraRig& rig);
-  /// This map and another one become one, if they have places in common: the places of each are shown to the
-  /// detector of the other, one after the other; of the loops that are verified, the largest set that agrees
-  /// joins the two, if it clearly outnumbers the next one, and what shows the same becomes one. The frame of
-  /// reference of this map stays. Which map is which decides nothing else if configuration and camera are the
-  /// same: sessions, frames and keyframes are numbered in the order of the maps' time stamps then. Otherwise
-  /// those of this map come first. `other`: its detector must have the same members, its sensor must be of
-  /// the same kind. Both bring in first all that is on its way; `other` is of no use any more. True: they are
-  /// one map now, which can be saved, localised in, and gone on with (BeginSession; no frame may be tracked
-  /// before that). False: no places in common were found that can be relied on, and this map is of no use any
-  /// more either; `reason`, which may be null, says why in plain words. Throws InputError if they can't be
-  /// compared, or `other` is this map or null. Recorders must outlive both.
-  bool Merge(SlamSystem* other, std::string* reason = nullptr);
   /// The recordings so far, oldest first; there is always one, and the last one goes on.
   std::vector<MapSession> Sessions() const;
-
-  /// From now on frames are only located in the map: no loops, and keyframes only for the time being, where
-  /// the map shows too little of what is in view (Odometry::BeyondMap). Frames so far are forgotten; the
-  /// detector says where the next one was taken, as it does whenever tracking is lost. Throws InputError if
-  /// there is no map, or no detector that knows it.
-  void BeginLocalization();
 
   /// Tracks the next frame and brings in what is due. Never throws for hard images; throws InputError for
   /// those of another type or size than InputFrame and the rig say, and nothing has changed then.
@@ -115,55 +82,58 @@ class SlamSystem {
   /// After the last frame: brings in all that is on its way. May be called again after AddLoop.
   void Finish();
 
-  /// Removes keyframes that the map can do without (Odometry::RemoveRedundantKeyframes), after Finish().
-  /// Their frames, the pose graph's edges and the detector's places go over to keyframes that stay; records
-  /// of loops stay as they are. The map is as good for going on and for BeginLocalization(). Returns how many
-  /// went. Throws InputError without an odometry, or after BeginLocalization().
+  /// Removes keyframes that the map can do without, after Finish(): at least 85 % of their landmarks are seen
+  /// by three others, or from an earlier visit. Their frames, the pose graph's edges and the detector's
+  /// places go over to keyframes that stay; records of loops stay as they are. The map is as good for going
+  /// on and for a Localizer. Returns how many went. Throws InputError without an odometry.
   std::size_t Prune();
 
   /// What went wrong without stopping it (the long-term memory's disk is full) since the last call.
   std::vector<std::string> TakeWarnings();
 
-  /// True if the rig has no calibration: there are loops but no poses.
-  bool AppearanceOnly() const { return odometry() == nullptr; }
-  /// The odometry with all corrections; nullptr if there are only appearances.
+  /// The odometry and its map, with all corrections; nullptr without calibration: there are loops but no
+  /// poses.
   const Odometry* odometry() const;
   /// Every proposed loop in the order of the queries.
-  const std::vector<LoopRecord>& loops() const;
-  /// Lost frames that got a pose because the detector knew their place.
-  std::size_t Relocalized() const;
-  /// How often loops moved the map.
-  int Corrections() const;
-  /// How often the whole map was adjusted (bundle adjustment) after loops had moved it.
-  int GlobalAdjustments() const;
-  /// Of the odometry that is followed, so far.
-  FollowedUncertainty Followed() const;
+  const std::vector<Loop>& loops() const;
   /// Keyframes, odometry edges and accepted loops at the present poses.
   PoseGraph Graph() const;
-  /// With graph.certify, of the last solution of the pose graph that moved the map: where each start leads,
-  /// and whether the best of them is the global optimum.
-  const std::optional<KeyframeGraphProof>& GraphProof() const;
-  /// As it is now, between two frames. Costs little more than a look at each loop and keyframe: the tracking
-  /// goes on while somebody else writes it. `note`: for MapInfo.
+  SlamReport Report() const;
+  /// All that it knows as it is now, between two frames: Snapshot().Write(file) saves it, and LoadMap goes on
+  /// from there. Costs little more than a look at each loop and keyframe: the tracking goes on while somebody
+  /// else writes it. `note`: for MapInfo.
   MapSnapshot Snapshot(const std::string& note = "") const;
-  /// Writes all that it knows: Snapshot().Write(file). Throws InputError if that fails; what was there before
-  /// is untouched then.
-  void Save(const std::filesystem::path& file) const { Snapshot().Write(file); }
-  /// Goes on from a file that Save wrote exactly as the saved one would have gone on, whose listeners are to
-  /// be set again. `info`: ReadMapInfo(file); its config.run.threads may be another. `more` may read the
-  /// caller's sections. Throws InputError for a file that is not usable.
-  static std::unique_ptr<SlamSystem> Load(const std::filesystem::path& file, const MapInfo& info,
-                                          SpanRecorder* recorder = nullptr,
-                                          const std::function<void(internal::SectionReader&)>& more = {});
-
-  /// Milliseconds spent, summed, by stage; the detector's run beside the odometry's.
-  std::map<std::string, double> StageMilliseconds() const;
 
  private:
   class Impl;
+  friend class Localizer;
+  friend bool Merge(SlamSystem* map, SlamSystem* other, std::string* reason);
+  friend std::unique_ptr<SlamSystem> LoadMap(const std::filesystem::path& file, const MapInfo& info,
+                                             SpanRecorder* recorder,
+                                             const std::function<void(internal::SectionReader&)>& more);
   explicit SlamSystem(std::unique_ptr<Impl> impl);
   std::unique_ptr<Impl> impl_;
 };
+
+/// Goes on from a file that Snapshot().Write wrote exactly as the saved one would have gone on, whose
+/// listeners are to be set again. `info`: ReadMapInfo(file); its config.run.threads may be another. `more`
+/// may read the caller's sections. Throws InputError for a file that is not usable.
+std::unique_ptr<SlamSystem> LoadMap(const std::filesystem::path& file, const MapInfo& info,
+                                    SpanRecorder* recorder = nullptr,
+                                    const std::function<void(internal::SectionReader&)>& more = {});
+
+/// Two maps become one, if they have places in common: the places of each are shown to the detector of the
+/// other, one after the other; of the loops that are verified, the largest set that agrees joins the two, if
+/// it clearly outnumbers the next one, and what shows the same becomes one. The frame of reference of `map`
+/// stays. Which map is which decides nothing else if configuration and camera are the same: sessions, frames
+/// and keyframes are numbered in the order of the maps' time stamps then. Otherwise those of `map` come
+/// first. `other`: its detector must have the same members, its sensor must be of the same kind. Both bring
+/// in first all that is on its way; `other` is of no use any more. True: they are one map now, which can be
+/// saved, located in, and gone on with (BeginSession; no frame may be tracked before that). False: no places
+/// in common were found that can be relied on, and `map` is of no use any more either; `reason`, which may be
+/// null, says why in plain words. Throws InputError if they can't be compared, or one is the other or null.
+/// Recorders must outlive both.
+bool Merge(SlamSystem* map, SlamSystem* other, std::string* reason = nullptr);
 
 }  // namespace tutti
 #pragma GCC visibility pop

@@ -18,7 +18,7 @@
 #include "tutti/core/trajectory.h"
 #include "tutti/frontend/odometry.h"
 #include "tutti/slam/config.h"
-#include "tutti/slam/loop_record.h"
+#include "tutti/slam/loop.h"
 
 #pragma GCC visibility push(default)
 namespace tutti {
@@ -57,7 +57,7 @@ class TrajectoryCloser {
   /// The keyframes as they are now, T_map_body.
   Trajectory Keyframes() const;
   /// Every proposed loop so far (a copy), in the order of the queries.
-  std::vector<LoopRecord> Loops() const;
+  std::vector<Loop> Loops() const;
   /// Keyframes, edges of the odometry and accepted loops.
   PoseGraph Graph() const;
   /// How often loops moved the trajectory.

@@ -169,7 +169,7 @@ std::vector<LoopPlace> LoopDetector::Places() const {
   }
   std::vector<LoopPlace> places;
   for (int slot = 0; slot < state.memory().size(); ++slot) {
-    if (state.memory().state(slot) == LocationMemory::State::kMerged) continue;
+    if (state.memory().state(slot) == LocationState::kMerged) continue;
     const View view = state.HasView(slot) ? state.view(slot) : impl_->long_term().ViewOf(slot);
     LoopPlace place;
     place.id = view.id;

@@ -59,9 +59,17 @@ class DetectorState {
   void FetchView(int slot, LocationStore& store);
 
   /// Running figures: all but vocabularies, memories, filters and views.
-  std::string Statistics() const;
-  /// Takes up what Statistics gave. Throws InputError if it is damaged.
-  void LoadStatistics(ByteReader& in);
+  template <class Archive>
+  void State(Archive& archive) {
+    archive(last_id_, callers_descriptors_.type, callers_descriptors_.width);
+    if constexpr (Archive::kReading) {
+      const int type = callers_descriptors_.type;
+      if (last_id_ < -1 || (type != -1 && type != CV_8U && type != CV_32F))
+        archive.Damaged("the detector's statistics");
+    }
+    for (Member& member : ensemble_.members()) archive(member);
+    archive(reasoner_);
+  }
   /// After loading: throws InputError, with the name of the source, if the memories are not about the same
   /// locations, or the last one is not last_id().
   void CheckMemories(const std::string& source) const;

@@ -128,7 +128,7 @@ void HypothesisSearch::Reconsider(const Belief& belief, LoopResult& result) cons
 Verification HypothesisSearch::WithMatches(int query, const Verification& verification) const {
   if (!verification.inlier_matches.empty()) return verification;
   const int slot = memory_.Find(verification.candidate);
-  if (memory_.state(slot) != LocationMemory::State::kWorking) return verification;  // its view may be gone
+  if (memory_.state(slot) != LocationState::kWorking) return verification;  // its view may be gone
   Verification full = verify_(view_of_(query), view_of_(slot), options_.threads);
   full.mass = verification.mass;
   return full;

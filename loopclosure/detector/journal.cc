@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-#include "core/byte_stream.h"
+#include "core/state_archive.h"
 #include "tutti/core/error.h"
 
 namespace tutti::internal {
@@ -74,7 +74,7 @@ void Journal::PutNoted(LocationStore& store) const {
   for (std::size_t m = 0; m < memories.size(); ++m) {
     StoreNodes(*memories[m], static_cast<int>(m), nodes_[m], store);
   }
-  store.Put(Kind::kMeta, kStatistics, 0, state_.Statistics());
+  store.Put(Kind::kMeta, kStatistics, 0, StateBytes(state_));
 }
 
 void Journal::PutWords(LocationStore& store) const {
@@ -121,8 +121,7 @@ void Journal::Reopen(LocationStore& store) {
   }
   const auto statistics = store.Get(Kind::kMeta, kStatistics, 0);
   if (!statistics) return;  // nothing was detected yet
-  ByteReader in(*statistics, store.name());
-  state_.LoadStatistics(in);
+  ReadStateBytes(*statistics, store.name(), state_);
   PlaceReasoner& reasoner = state_.reasoner();
   for (auto& system : reasoner.systems()) system->Reopen(store);
   if (!reasoner.Shared()) {

@@ -11,8 +11,6 @@
 namespace tutti::internal {
 namespace {
 
-using State = LocationMemory::State;
-
 std::vector<std::vector<std::size_t>> UnitsOf(const LoopDetectorOptions& options) {
   std::vector<std::vector<std::size_t>> units;
   for (std::size_t k = 0; k < options.members.size(); ++k) {
@@ -105,7 +103,8 @@ void PlaceReasoner::NoteStep() {
   // Published methods, whose evidence is another one, know no second word.
   const bool second_word = Shared() && options_.evidence.kind == EvidenceKind::kCounts;
   const PlaceFilter* filter = second_word ? systems_.front()->Deciding() : nullptr;
-  if (filter == nullptr || memory().state(newest) != State::kShortTerm || memory().working_memory().empty())
+  if (filter == nullptr || memory().state(newest) != LocationState::kShortTerm ||
+      memory().working_memory().empty())
     return;
   second_word_.Step(newest, filter->filter.posterior(), filter->image_likelihood);
 }
@@ -281,8 +280,8 @@ bool PlaceReasoner::Merge(int slot, std::int64_t into) {
 
 bool PlaceReasoner::InMemory(int slot) const {
   return std::any_of(systems_.begin(), systems_.end(), [slot](const auto& system) {
-    const State state = system->memory().state(slot);
-    return state == State::kShortTerm || state == State::kWorking;
+    const LocationState state = system->memory().state(slot);
+    return state == LocationState::kShortTerm || state == LocationState::kWorking;
   });
 }
 
@@ -298,17 +297,6 @@ std::string PlaceReasoner::Fingerprint() const {
   text += options_.evidence.kind == EvidenceKind::kCounts ? ", counts" : ", standardised";
   text += Shared() ? ", shared memory" : ", a memory per member";
   return text;
-}
-
-void PlaceReasoner::SaveStatistics(ByteWriter& out) const {
-  out.Put(last_hypothesis_);
-  for (const auto& system : systems_) system->SaveLevels(out);
-}
-
-void PlaceReasoner::LoadStatistics(ByteReader& in) {
-  last_hypothesis_ = in.Get<double>();
-  if (!(last_hypothesis_ >= 0.0 && last_hypothesis_ <= 1.0 + 1e-6)) in.Damaged("the detector's statistics");
-  for (auto& system : systems_) system->LoadLevels(in);
 }
 
 }  // namespace tutti::internal

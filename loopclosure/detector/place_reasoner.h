@@ -81,9 +81,16 @@ class PlaceReasoner {
   SecondWord& second_word() { return second_word_; }
   const SecondWord& second_word() const { return second_word_; }
 
-  /// Running figures: the state but memories, filters and track.
-  void SaveStatistics(ByteWriter& out) const;
-  void LoadStatistics(ByteReader& in);
+  /// Running figures: all but memories, filters, track and second words.
+  template <class Archive>
+  void State(Archive& archive) {
+    archive(last_hypothesis_);
+    if constexpr (Archive::kReading) {
+      if (!(last_hypothesis_ >= 0.0 && last_hypothesis_ <= 1.0 + 1e-6))
+        archive.Damaged("the detector's statistics");
+    }
+    for (const auto& system : systems_) system->StateOfLevels(archive);
+  }
 
  private:
   void ForEachUnit(const std::function<void(MemorySystem&, std::size_t)>& call);

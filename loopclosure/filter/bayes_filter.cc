@@ -1,7 +1,5 @@
 #include "loopclosure/filter/bayes_filter.h"
 
-#include "core/byte_stream.h"
-
 namespace tutti {
 
 void BayesFilter::Step(const TransitionModel& transition, const std::vector<int>& working_memory,
@@ -25,22 +23,6 @@ void BayesFilter::Step(const TransitionModel& transition, const std::vector<int>
 void BayesFilter::Forget(int slot) {
   const std::size_t i = static_cast<std::size_t>(slot);
   if (i < posterior_.places.size()) posterior_.places[i] = 0.0;
-}
-
-void BayesFilter::Save(internal::ByteWriter& out) const {
-  out.Put<char>(started_ ? 1 : 0);
-  out.Put(posterior_.new_place);
-  out.PutVector(posterior_.places);
-}
-
-void BayesFilter::Load(internal::ByteReader& in) {
-  started_ = in.Get<char>() != 0;
-  posterior_.new_place = in.Get<double>();
-  posterior_.places = in.GetVector<double>();
-  const auto is_probability = [](double p) { return p >= 0.0 && p <= 1.0 + 1e-9; };
-  bool good = is_probability(posterior_.new_place);
-  for (const double p : posterior_.places) good = good && is_probability(p);
-  if (!good) in.Damaged("a posterior that is no probability");
 }
 
 }  // namespace tutti

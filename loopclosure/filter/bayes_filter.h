@@ -1,17 +1,13 @@
 // The recursive Bayes filter of one member.
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
 #include "loopclosure/filter/transition_model.h"
 #include "loopclosure/memory/belief.h"
 
 namespace tutti {
-
-namespace internal {
-class ByteReader;
-class ByteWriter;
-}  // namespace internal
 
 /// p(S_t | L^t) = eta p(L_t | S_t) sum_i p(S_t | S_{t-1} = i) p(S_{t-1} = i | L^{t-1})    (loop-closure.md
 /// eq. 1)
@@ -30,10 +26,16 @@ class BayesFilter {
   /// p(S_t | L^t) after the last step; all mass on "new place" before the first.
   const Belief& posterior() const { return posterior_; }
 
-  /// Appends the whole state.
-  void Save(internal::ByteWriter& out) const;
-  /// Takes up what Save wrote, into a new object. Throws InputError if it is damaged.
-  void Load(internal::ByteReader& in);
+  template <class Archive>
+  void State(Archive& archive) {
+    archive(started_, posterior_);
+    if constexpr (Archive::kReading) {
+      const auto is_probability = [](double p) { return p >= 0.0 && p <= 1.0 + 1e-9; };
+      if (!is_probability(posterior_.new_place) ||
+          !std::all_of(posterior_.places.begin(), posterior_.places.end(), is_probability))
+        archive.Damaged("a posterior that is no probability");
+    }
+  }
 
  private:
   Belief posterior_;

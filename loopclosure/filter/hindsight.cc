@@ -40,34 +40,17 @@ Belief Hindsight::Smoothed(const TransitionModel& transition, const std::vector<
   return gamma;
 }
 
-void Hindsight::Save(ByteWriter& out) const {
-  out.Put<std::int32_t>(static_cast<std::int32_t>(steps_.size()));
+void Hindsight::Check(int end, const StateReader& in) const {
+  if (steps_.size() > kImages + 1) in.Damaged("more steps of a filter than are kept");
+  const auto good = [](double value) { return value >= 0.0 && std::isfinite(value); };
   for (const Step& step : steps_) {
-    out.Put<std::int32_t>(step.slot);
+    in.Check(step.slot, 0, end, "a step of a filter at an unknown location");
     for (const Belief* belief : {&step.posterior, &step.likelihood}) {
-      out.Put(belief->new_place);
-      out.PutVector(belief->places);
-    }
-  }
-}
-
-void Hindsight::Load(int end, ByteReader& in) {
-  const int count = in.Get<std::int32_t>();
-  if (count < 0 || count > kImages + 1) in.Damaged("more steps of a filter than are kept");
-  steps_.clear();
-  for (int i = 0; i < count; ++i) {
-    Step step{in.Get<std::int32_t>(), {}, {}};
-    if (step.slot < 0 || step.slot >= end) in.Damaged("a step of a filter at an unknown location");
-    for (Belief* belief : {&step.posterior, &step.likelihood}) {
-      belief->new_place = in.Get<double>();
-      belief->places = in.GetVector<double>();
-      const auto good = [](double value) { return value >= 0.0 && std::isfinite(value); };
       if (!good(belief->new_place) || belief->places.size() > static_cast<std::size_t>(end) ||
           !std::all_of(belief->places.begin(), belief->places.end(), good)) {
         in.Damaged("a step of a filter that is no belief");
       }
     }
-    steps_.push_back(std::move(step));
   }
 }
 

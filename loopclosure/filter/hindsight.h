@@ -4,7 +4,7 @@
 #include <deque>
 #include <vector>
 
-#include "core/byte_stream.h"
+#include "core/state_archive.h"
 #include "loopclosure/filter/transition_model.h"
 #include "loopclosure/memory/belief.h"
 
@@ -29,14 +29,22 @@ class Hindsight {
   /// gamma of that location, over the places of working memory; those that came into it since have 0.
   Belief Smoothed(const TransitionModel& transition, const std::vector<int>& working_memory) const;
 
-  void Save(ByteWriter& out) const;
-  /// Takes up what Save wrote, of locations before `end`. Throws InputError if it is damaged.
-  void Load(int end, ByteReader& in);
+  template <class Archive>
+  void State(Archive& archive) {
+    archive(steps_);
+  }
+  /// Throws InputError unless what was read is of locations before `end`.
+  void Check(int end, const StateReader& in) const;
 
  private:
   struct Step {
     int slot;
     Belief posterior, likelihood;
+
+    template <class Archive>
+    void State(Archive& archive) {
+      archive(slot, posterior, likelihood);
+    }
   };
   std::deque<Step> steps_;
 };

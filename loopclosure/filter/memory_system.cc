@@ -293,7 +293,7 @@ void MemorySystem::Link(int a, int b, LocationMemory::LinkType type) {
 
 void MemorySystem::Relinked(int a, int b) {
   // A link to a location outside WM takes effect when that one enters it.
-  const auto in_wm = [this](int slot) { return memory_.state(slot) == LocationMemory::State::kWorking; };
+  const auto in_wm = [this](int slot) { return memory_.state(slot) == LocationState::kWorking; };
   if (in_wm(a) && in_wm(b)) transition_.Update(memory_, {a, b});
 }
 

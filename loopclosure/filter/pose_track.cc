@@ -4,31 +4,16 @@
 #include <cmath>
 #include <utility>
 
-namespace tutti::internal {
-namespace {
+#include "core/state_archive.h"
 
-void SavePrior(const std::optional<PosePrior>& prior, ByteWriter& out) {
-  out.Put<std::uint8_t>(prior ? 1 : 0);
-  if (!prior) return;
-  for (const double value : prior->position_m) out.Put(value);
-  out.Put(prior->frame);
-  out.Put(prior->sigma_m);
-  out.Put(prior->drift);
+namespace tutti {
+
+template <class Archive>
+void State(Archive& archive, PosePrior& prior) {
+  archive(prior.position_m, prior.frame, prior.sigma_m, prior.drift);
 }
 
-std::optional<PosePrior> LoadPrior(ByteReader& in) {
-  if (in.Get<std::uint8_t>() == 0) return std::nullopt;
-  PosePrior prior;
-  for (double& value : prior.position_m) value = in.Get<double>();
-  prior.frame = in.Get<std::int64_t>();
-  prior.sigma_m = in.Get<double>();
-  prior.drift = in.Get<double>();
-  if (!prior.position_m.allFinite() || !(prior.sigma_m > 0) || !(prior.drift >= 0))
-    in.Damaged("a position that is none");
-  return prior;
-}
-
-}  // namespace
+namespace internal {
 
 void PoseTrack::Add(int slot, const std::optional<PosePrior>& prior) {
   if (prior) {
@@ -66,26 +51,21 @@ std::vector<double> PoseTrack::Gains(const std::vector<int>& working_memory) con
   return gains;
 }
 
-void PoseTrack::Save(ByteWriter& out) const {
-  out.Put<std::uint64_t>(stations_.size());
-  for (const Station& station : stations_) {
-    SavePrior(station.prior, out);
-    out.Put(station.way_m);
+template <class Archive>
+void PoseTrack::State(Archive& archive) {
+  archive(stations_, way_m_, last_);
+  if constexpr (Archive::kReading) {
+    const auto check = [&archive](const std::optional<PosePrior>& prior) {
+      if (prior && (!prior->position_m.allFinite() || !(prior->sigma_m > 0) || !(prior->drift >= 0)))
+        archive.Damaged("a position that is none");
+    };
+    for (const Station& station : stations_) check(station.prior);
+    check(last_);
   }
-  out.Put(way_m_);
-  SavePrior(last_, out);
 }
 
-void PoseTrack::Load(ByteReader& in) {
-  stations_.clear();
-  const std::size_t count = in.GetCount(1 + sizeof(double));
-  for (std::size_t i = 0; i < count; ++i) {
-    std::optional<PosePrior> prior = LoadPrior(in);
-    stations_.push_back({std::move(prior), in.Get<double>()});
-  }
-  way_m_ = in.Get<double>();
-  last_ = LoadPrior(in);
-}
+template void PoseTrack::State(StateWriter& archive);
+template void PoseTrack::State(StateReader& archive);
 
 void ApplyGains(const std::vector<double>& gains, const std::vector<int>& working_memory,
                 Belief& likelihood) {
@@ -98,4 +78,5 @@ void ApplyGains(const std::vector<double>& gains, const std::vector<int>& workin
   }
 }
 
-}  // namespace tutti::internal
+}  // namespace internal
+}  // namespace tutti

@@ -23,7 +23,7 @@ void TransitionModel::Update(const LocationMemory& memory, const std::vector<int
   columns_.resize(static_cast<std::size_t>(memory.size()));
   std::vector<int> dirty;
   for (const int slot : changed_slots) {
-    if (memory.state(slot) != LocationMemory::State::kWorking) {
+    if (memory.state(slot) != LocationState::kWorking) {
       if (columns_[static_cast<std::size_t>(slot)].Empty()) continue;  // no path led through it
       columns_[static_cast<std::size_t>(slot)] = Runs();
       // Paths that led through it are cut: all within reach of those that it was linked to.

@@ -16,6 +16,11 @@ struct Belief {
   int Best() const;
   /// Scales so that all sum to 1; leaves an all-zero belief alone.
   void Normalise();
+
+  template <class Archive>
+  void State(Archive& archive) {
+    archive(new_place, places);
+  }
 };
 
 }  // namespace tutti

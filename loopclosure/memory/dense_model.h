@@ -2,16 +2,12 @@
 // section 3).
 #pragma once
 
+#include <cmath>
 #include <opencv2/core.hpp>
 #include <string>
 #include <vector>
 
 namespace tutti {
-
-namespace internal {
-class ByteReader;
-class ByteWriter;
-}  // namespace internal
 
 /// Empty if a dense member may have this descriptor of an image (or none), else what is wrong. `width`: of
 /// those before [values], 0: any.
@@ -57,7 +53,7 @@ class DenseModel {
   /// Descriptor of a slot; empty if it has none, or is not in memory.
   const cv::Mat& descriptor(int slot) const { return descriptors_[static_cast<std::size_t>(slot)]; }
   /// True if a slot is in memory, be it without a descriptor.
-  bool Has(int slot) const { return state_[static_cast<std::size_t>(slot)] == State::kPresent; }
+  bool Has(int slot) const { return presence_[static_cast<std::size_t>(slot)] == Presence::kPresent; }
   /// Slots ever added.
   int size() const { return static_cast<int>(descriptors_.size()); }
   /// Empty if a descriptor may be added, else what is wrong.
@@ -75,13 +71,11 @@ class DenseModel {
   /// and for an image that is no location.
   std::vector<double> ScoresOf(const cv::Mat& descriptor) const;
 
-  /// Appends the whole state.
-  void Save(internal::ByteWriter& out) const;
-  /// Takes up what Save wrote, into a new object. Throws InputError if it is damaged.
-  void Load(internal::ByteReader& in);
+  template <class Archive>
+  void State(Archive& archive);
 
  private:
-  enum class State : char { kAbsent, kPresent, kMerged };
+  enum class Presence : char { kAbsent, kPresent, kMerged };
   // Cosines of one of the last images with the descriptors of all slots; 0 where there is none.
   struct Row {
     int slot = -1;
@@ -97,13 +91,24 @@ class DenseModel {
   static std::vector<double> Contrast(std::vector<double> scores, const std::vector<int>& places);
 
   std::vector<cv::Mat> descriptors_;  // by slot
-  std::vector<State> state_;          // by slot
+  std::vector<Presence> presence_;    // by slot
   std::vector<Row> recent_;           // the last slots of the path, newest last
   int width_;                         // of a descriptor; 0: not known yet
 };
 
-/// Appends and reads one descriptor, empty or 1 x D, CV_32F, of length 1. The latter throws InputError.
-void SaveDescriptor(const cv::Mat& descriptor, internal::ByteWriter& out);
-cv::Mat LoadDescriptor(internal::ByteReader& in);
+/// One descriptor: empty or 1 x D, CV_32F, of length 1.
+template <class Archive>
+void StateOfDescriptor(Archive& archive, cv::Mat& descriptor) {
+  std::vector<float> values;
+  if (!Archive::kReading && !descriptor.empty())
+    values.assign(descriptor.ptr<float>(), descriptor.ptr<float>() + descriptor.cols);
+  archive(values);
+  if constexpr (Archive::kReading) {
+    descriptor = values.empty() ? cv::Mat() : cv::Mat(values, true).reshape(1, 1);
+    if (!descriptor.empty() &&
+        (!cv::checkRange(descriptor) || !(std::abs(cv::norm(descriptor) - 1.0) < 1e-3)))
+      archive.Damaged("a descriptor that is not of length 1");
+  }
+}
 
 }  // namespace tutti

@@ -5,7 +5,7 @@
 #include <tuple>
 #include <utility>
 
-#include "core/byte_stream.h"
+#include "core/state_archive.h"
 #include "loopclosure/memory/dense_model.h"
 
 namespace tutti {
@@ -162,26 +162,26 @@ std::vector<double> LikelihoodModel::Counts(const SeenWords& query, const Sight&
   return counts;
 }
 
-void LikelihoodModel::Save(internal::ByteWriter& out) const {
-  out.Put<std::uint64_t>(signatures_.size());
-  for (std::size_t i = 0; i < signatures_.size(); ++i) {
-    out.Put<char>(present_[i] ? 1 : 0);
-    signatures_[i].Save(out);
+template <class Archive>
+void LikelihoodModel::State(Archive& archive) {
+  std::uint64_t count = signatures_.size();
+  archive(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    if constexpr (Archive::kReading) signatures_.emplace_back();
+    bool present = !Archive::kReading && present_[i];
+    archive(present, signatures_[i]);
+    if constexpr (Archive::kReading) {
+      present_.push_back(present);
+      if (!present && !signatures_[i].empty()) archive.Damaged("words of a location that is not in memory");
+      if (!present) continue;
+      ++locations_;
+      Insert(static_cast<int>(i));
+    }
   }
 }
 
-void LikelihoodModel::Load(internal::ByteReader& in) {
-  const std::size_t count = in.GetCount(2);
-  for (std::size_t i = 0; i < count; ++i) {
-    const bool present = in.Get<char>() != 0;
-    signatures_.push_back(Signature::Load(in));
-    present_.push_back(present);
-    if (!present && !signatures_.back().empty()) in.Damaged("words of a location that is not in memory");
-    if (!present) continue;
-    ++locations_;
-    Insert(static_cast<int>(i));
-  }
-}
+template void LikelihoodModel::State(internal::StateWriter& archive);
+template void LikelihoodModel::State(internal::StateReader& archive);
 
 Belief AdjustLikelihood(const std::vector<double>& scores, const std::vector<int>& working_memory) {
   Belief likelihood;

@@ -11,11 +11,6 @@
 
 namespace tutti {
 
-namespace internal {
-class ByteReader;
-class ByteWriter;
-}  // namespace internal
-
 /// What a member sees in an image: its words and where they were seen, the cell of each feature in a grid of
 /// kColumns cells along the longer side of the image; or, a dense member, its descriptor.
 struct SeenWords {
@@ -99,10 +94,8 @@ class LikelihoodModel {
   /// Locations in the index, bad signatures included: N.
   int NumLocations() const { return locations_; }
 
-  /// Appends the whole state.
-  void Save(internal::ByteWriter& out) const;
-  /// Takes up what Save wrote, into a new object of the same kind. Throws InputError if it is damaged.
-  void Load(internal::ByteReader& in);
+  template <class Archive>
+  void State(Archive& archive);
 
  private:
   void Insert(int slot);

@@ -50,10 +50,9 @@ class Member {
   /// Its vocabulary.
   const Vocabulary& vocabulary() const { return vocabulary_; }
 
-  /// Appends its running figures: all of the state but the vocabulary.
-  void SaveStatistics(internal::ByteWriter& out) const;
-  /// Takes up what SaveStatistics wrote. Throws InputError if it is damaged.
-  void LoadStatistics(internal::ByteReader& in);
+  /// Its running figures: all but the vocabulary, which only learns which ids are taken.
+  template <class Archive>
+  void State(Archive& archive);
 
  private:
   std::string name_;

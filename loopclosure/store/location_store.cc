@@ -12,7 +12,7 @@ namespace tutti::internal {
 namespace {
 
 constexpr int kApplicationId = 0x74757474;  // "tutt": what SQLite's header says of whose file it is
-constexpr int kSchemaVersion = 4;
+constexpr int kSchemaVersion = 5;
 
 // Runs one prepared statement and leaves it ready for the next time, whatever happens.
 class Use {

@@ -5,8 +5,6 @@
 #include <cstdint>
 #include <opencv2/core.hpp>
 
-#include "core/byte_stream.h"
-
 namespace tutti::internal {
 
 /// A matrix of CV_8U or CV_32F, without loss. CV_32F takes a byte a value where all are whole numbers 0..255
@@ -27,10 +25,9 @@ class PackedMat {
   int cols() const { return values_.cols; }
   int type() const { return code_ != nullptr ? CV_32F : values_.type(); }
 
-  /// Appends the matrix, such that zstd makes less of it.
-  void Put(ByteWriter& out) const;
-  /// What Put wrote. Throws InputError where that is damaged.
-  static PackedMat Get(ByteReader& in);
+  /// Laid out such that zstd makes less of it.
+  template <class Archive>
+  void State(Archive& archive);
 
  private:
   enum class Kind : std::uint8_t { kEmpty, kBytes, kFloatPlanes, kWholeAsBytes, kSquaresAsBytes };

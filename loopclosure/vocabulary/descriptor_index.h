@@ -10,9 +10,9 @@
 namespace tutti {
 
 namespace internal {
-class ByteReader;
-class ByteWriter;
 class PackedMat;
+class StateReader;
+class StateWriter;
 }  // namespace internal
 
 /// The two nearest words of a descriptor, by TRUE distance (Euclidean, not squared; or Hamming in bits).
@@ -42,12 +42,10 @@ class DescriptorIndex {
   virtual const std::uint8_t* Find(int word) const = 0;
   /// Words in the index.
   virtual int size() const = 0;
-  /// Appends the whole state, such that a loaded index goes on as the saved one would. `known`: descriptors
-  /// that whoever loads it has, too (SaveWords).
-  virtual void Save(const std::vector<internal::PackedMat>& known, internal::ByteWriter& out) const = 0;
-  /// Takes up what Save wrote, into a new index of the same kind, width and seed. Throws InputError if it is
-  /// damaged.
-  virtual void Load(const std::vector<internal::PackedMat>& known, internal::ByteReader& in) = 0;
+  /// A loaded index goes on as the saved one would; it must be of the same kind, width and seed. `known`:
+  /// descriptors that whoever loads it has, too (WordStorage::State).
+  virtual void State(internal::StateWriter& archive, const std::vector<internal::PackedMat>& known) = 0;
+  virtual void State(internal::StateReader& archive, const std::vector<internal::PackedMat>& known) = 0;
 };
 
 /// kd-forest over CV_32F descriptors (Muja & Lowe 2009): `trees` randomised trees, `checks` leaves per

@@ -4,11 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/byte_stream.h"
 #include "core/index.h"
 #include "core/shuffle.h"
+#include "core/state_archive.h"
 #include "loopclosure/vocabulary/descriptor_index.h"
-#include "loopclosure/vocabulary/word_bytes.h"
 #include "loopclosure/vocabulary/word_storage.h"
 
 namespace tutti {
@@ -106,45 +105,40 @@ class FlannIndex : public DescriptorIndex {
 
   int size() const override { return size_; }
 
-  // Which row a word lies in changes no answer: rows are numbered anew, by word id.
-  void Save(const std::vector<internal::PackedMat>& known, internal::ByteWriter& out) const override {
-    std::vector<int> rank(Index(storage_.end()), -1);
-    int next = 0;
-    internal::SaveWords(storage_, CV_32F, known, out);
-    storage_.ForEach([&](int, int row) {
-      out.Put<char>(alive_[Index(row)]);
-      rank[Index(row)] = next++;
-    });
-    for (const GrownTree& tree : trees_) {
-      tree.shuffler.Save(out);
-      std::vector<int> rows;
-      for (const int row : tree.rows) rows.push_back(rank[Index(row)]);
-      out.PutVector(rows);
-    }
+  void State(internal::StateWriter& archive, const std::vector<internal::PackedMat>& known) override {
+    StateOf(archive, known);
   }
-
-  void Load(const std::vector<internal::PackedMat>& known, internal::ByteReader& in) override {
-    internal::LoadWords(storage_, CV_32F, known, in,
-                        [this](int word, const std::uint8_t* descriptor) { storage_.Add(word, descriptor); });
-    const std::size_t count = Index(storage_.size());
-    for (std::size_t i = 0; i < count; ++i) {
-      alive_.push_back(in.Get<char>() != 0 ? 1 : 0);
-      size_ += alive_.back();
-    }
-    for (GrownTree& tree : trees_) {
-      tree.shuffler.Load(in);
-      const std::vector<int> rows = in.GetVector<int>();
-      std::vector<char> seen(count, 0);
-      for (const int row : rows) {
-        if (row < 0 || Index(row) >= count || seen[Index(row)] != 0) in.Damaged("an impossible kd-tree");
-        seen[Index(row)] = 1;
-        InsertOne(row, tree);
-      }
-      if (rows.size() != count) in.Damaged("a kd-tree without some of the words");
-    }
+  void State(internal::StateReader& archive, const std::vector<internal::PackedMat>& known) override {
+    StateOf(archive, known);
   }
 
  private:
+  template <class Archive>
+  void StateOf(Archive& archive, const std::vector<internal::PackedMat>& known) {
+    storage_.State(archive, CV_32F, known);
+    const std::vector<int> ranks = storage_.Ranks();
+    std::vector<char> alive;  // by rank
+    if constexpr (!Archive::kReading)
+      storage_.ForEach([&](int, int row) { alive.push_back(alive_[Index(row)]); });
+    archive(alive);
+    if constexpr (Archive::kReading) {
+      if (alive.size() != ranks.size()) archive.Damaged("words that may be there or not");
+      for (const char word : alive) alive_.push_back(word != 0 ? 1 : 0);
+      size_ = static_cast<int>(std::count(alive_.begin(), alive_.end(), 1));
+    }
+    for (GrownTree& tree : trees_) {
+      std::vector<int> rows;
+      for (const int row : tree.rows) rows.push_back(ranks[Index(row)]);
+      archive(tree.shuffler, rows);
+      if constexpr (Archive::kReading) {
+        std::vector<int> sorted = rows;
+        std::sort(sorted.begin(), sorted.end());
+        if (sorted != ranks) archive.Damaged("a kd-tree without some of the words");
+        for (const int row : rows) InsertOne(row, tree);
+      }
+    }
+  }
+
   // Each tree takes new words in an order of its own.
   void Insert(std::vector<int> rows, GrownTree& tree) {
     tree.shuffler.Shuffle(rows);

@@ -1,12 +1,12 @@
 #include <algorithm>
+#include <numeric>
 #include <random>
 
-#include "core/byte_stream.h"
 #include "core/clones.h"
+#include "core/state_archive.h"
 #include "loopclosure/features/distances.h"
 #include "loopclosure/vocabulary/bit_trie.h"
 #include "loopclosure/vocabulary/descriptor_index.h"
-#include "loopclosure/vocabulary/word_bytes.h"
 #include "loopclosure/vocabulary/word_storage.h"
 
 namespace tutti {
@@ -59,20 +59,25 @@ class HammingIndex : public DescriptorIndex {
 
   int size() const override { return storage_.size(); }
 
-  // Which row a word lies in, and the order within a leaf, change no answer: words and descriptors are all.
-  void Save(const std::vector<internal::PackedMat>& known, internal::ByteWriter& out) const override {
-    internal::SaveWords(storage_, CV_8U, known, out);
+  void State(internal::StateWriter& archive, const std::vector<internal::PackedMat>& known) override {
+    StateOf(archive, known);
   }
-
-  void Load(const std::vector<internal::PackedMat>& known, internal::ByteReader& in) override {
-    std::vector<int> rows;
-    internal::LoadWords(storage_, CV_8U, known, in, [&](int word, const std::uint8_t* descriptor) {
-      rows.push_back(storage_.Add(word, descriptor));
-    });
-    for (internal::BitTrie& trie : tries_) trie.InsertAll(rows, storage_);
+  void State(internal::StateReader& archive, const std::vector<internal::PackedMat>& known) override {
+    StateOf(archive, known);
   }
 
  private:
+  // The order within a leaf changes no answer: words and descriptors are all.
+  template <class Archive>
+  void StateOf(Archive& archive, const std::vector<internal::PackedMat>& known) {
+    storage_.State(archive, CV_8U, known);
+    if constexpr (Archive::kReading) {
+      std::vector<int> rows(static_cast<std::size_t>(storage_.end()));
+      std::iota(rows.begin(), rows.end(), 0);
+      for (internal::BitTrie& trie : tries_) trie.InsertAll(rows, storage_);
+    }
+  }
+
   TwoNearest SearchAll(const std::uint8_t* descriptor) const {
     constexpr int kBlock = 256;
     static_assert(internal::WordStorage::kRowsPerBlock % kBlock == 0);

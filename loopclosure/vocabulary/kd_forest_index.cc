@@ -1,11 +1,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/byte_stream.h"
 #include "core/shuffle.h"
+#include "core/state_archive.h"
 #include "loopclosure/vocabulary/descriptor_index.h"
 #include "loopclosure/vocabulary/kd_tree.h"
-#include "loopclosure/vocabulary/word_bytes.h"
 #include "loopclosure/vocabulary/word_storage.h"
 
 namespace tutti {
@@ -94,30 +93,24 @@ class KdForestIndex : public DescriptorIndex {
 
   int size() const override { return storage_.size(); }
 
-  // Which row a word lies in changes no answer: rows are numbered anew, by word id.
-  void Save(const std::vector<internal::PackedMat>& known, internal::ByteWriter& out) const override {
-    std::vector<int> rank(static_cast<std::size_t>(storage_.end()), -1);
-    int next = 0;
-    internal::SaveWords(storage_, CV_32F, known, out);
-    storage_.ForEach([&](int, int row) { rank[static_cast<std::size_t>(row)] = next++; });
-    out.Put<std::uint64_t>(trees_.size());
-    for (const GrownTree& tree : trees_) {
-      tree.shuffler.Save(out);
-      tree.tree.Save(rank, out);
-    }
+  void State(internal::StateWriter& archive, const std::vector<internal::PackedMat>& known) override {
+    StateOf(archive, known);
   }
-
-  void Load(const std::vector<internal::PackedMat>& known, internal::ByteReader& in) override {
-    internal::LoadWords(storage_, CV_32F, known, in,
-                        [this](int word, const std::uint8_t* descriptor) { storage_.Add(word, descriptor); });
-    if (in.Get<std::uint64_t>() != trees_.size()) in.Damaged("another number of kd-trees");
-    for (GrownTree& tree : trees_) {
-      tree.shuffler.Load(in);
-      tree.tree.Load(size(), in);
-    }
+  void State(internal::StateReader& archive, const std::vector<internal::PackedMat>& known) override {
+    StateOf(archive, known);
   }
 
  private:
+  template <class Archive>
+  void StateOf(Archive& archive, const std::vector<internal::PackedMat>& known) {
+    storage_.State(archive, CV_32F, known);
+    const std::vector<int> ranks = storage_.Ranks();
+    for (GrownTree& tree : trees_) {
+      archive(tree.shuffler);
+      tree.tree.State(archive, ranks);
+    }
+  }
+
   // Each tree takes new words in an order of its own.
   struct GrownTree {
     internal::KdTree tree;

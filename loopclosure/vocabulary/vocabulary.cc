@@ -5,8 +5,8 @@
 #include <numeric>
 #include <optional>
 
-#include "core/byte_stream.h"
 #include "core/parallel.h"
+#include "core/state_archive.h"
 #include "loopclosure/features/distances.h"
 #include "loopclosure/features/whole_rows.h"
 #include "loopclosure/vocabulary/word_storage.h"
@@ -205,41 +205,39 @@ cv::Mat Vocabulary::Descriptor(int word) const {
   return row;
 }
 
-void Vocabulary::Save(const std::vector<internal::PackedMat>& known, internal::ByteWriter& out) const {
-  out.Put<std::int32_t>(type_);
-  out.Put<std::int32_t>(width_);
-  out.Put<std::int32_t>(created_);
-  out.Put<std::uint64_t>(references_.size());
-  int before = -1;
-  references_.ForEach([&](int word, int count) {
-    out.PutVarint(static_cast<std::uint64_t>(word - before - 1));
-    out.PutVarint(static_cast<std::uint64_t>(count));
-    before = word;
-  });
-  if (index_) index_->Save(known, out);
-}
-
-void Vocabulary::Load(const std::vector<internal::PackedMat>& known, internal::ByteReader& in) {
+template <class Archive>
+void Vocabulary::Beside::State(Archive& archive) {
   static_assert(kMostWords == internal::WordStorage::kMostWords);
   constexpr int kMostColumns = 1 << 16;
-  type_ = in.Get<std::int32_t>();
-  width_ = in.Get<std::int32_t>();
-  created_ = in.Get<std::int32_t>();
-  if (type_ != -1 && type_ != CV_32F && type_ != CV_8U) in.Damaged("descriptors of an unknown type");
-  if (type_ != -1 && (width_ <= 0 || width_ > kMostColumns)) in.Damaged("descriptors of an impossible width");
-  if (created_ < 0 || created_ > kMostWords) in.Damaged("an impossible number of words");
-  const std::size_t count = in.GetCount(2);
-  int word = -1;
-  for (std::size_t i = 0; i < count; ++i) {
-    word += 1 + in.GetVarintIndex(created_ - 1 - word);
-    const int references = in.GetVarintIndex(kMostWords + 1);
-    if (references < 1) in.Damaged("a word without a location");
-    references_[word] = references;
+  Vocabulary& v = *vocabulary;
+  std::vector<int> words, references;
+  v.references_.ForEach([&](int word, int count) {
+    words.push_back(word);
+    references.push_back(count);
+  });
+  archive(v.type_, v.width_, v.created_, internal::GrowingNumbers{&words},
+          internal::SmallNumbers{&references});
+  if constexpr (Archive::kReading) {
+    if (v.type_ != -1 && v.type_ != CV_32F && v.type_ != CV_8U)
+      archive.Damaged("descriptors of an unknown type");
+    if (v.type_ != -1 && (v.width_ <= 0 || v.width_ > kMostColumns))
+      archive.Damaged("descriptors of an impossible width");
+    if (v.created_ < 0 || v.created_ > kMostWords) archive.Damaged("an impossible number of words");
+    if (!words.empty() && words.back() >= v.created_) archive.Damaged("a word that was never made");
+    if (words.size() != references.size()) archive.Damaged("words without locations");
+    for (std::size_t i = 0; i < words.size(); ++i) {
+      if (references[i] < 1 || references[i] > kMostWords) archive.Damaged("a word without a location");
+      v.references_[words[i]] = references[i];
+    }
+    if (v.type_ != -1) v.MakeIndex();
   }
-  if (type_ == -1) return;
-  MakeIndex();
-  index_->Load(known, in);
-  if (index_->size() > created_) in.Damaged("more words than were ever made");
+  if (v.index_) v.index_->State(archive, known);
+  if constexpr (Archive::kReading) {
+    if (v.size() > v.created_) archive.Damaged("more words than were ever made");
+  }
 }
+
+template void Vocabulary::Beside::State(internal::StateWriter& archive);
+template void Vocabulary::Beside::State(internal::StateReader& archive);
 
 }  // namespace tutti

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "loopclosure/store/packed_mat.h"
 #include "loopclosure/vocabulary/descriptor_index.h"
 #include "loopclosure/vocabulary/signature.h"
 #include "loopclosure/vocabulary/word_map.h"
@@ -72,11 +73,15 @@ class Vocabulary {
   /// Ids below this are taken, wherever their words may be.
   void SkipIds(int created) { created_ = std::max(created_, created); }
 
-  /// Appends the whole state. `known`: descriptors that whoever loads it has, too, and in the same order; a
-  /// word that is among them takes a few bytes.
-  void Save(const std::vector<internal::PackedMat>& known, internal::ByteWriter& out) const;
-  /// Takes up what Save wrote, into a new object of the same options. Throws InputError if it is damaged.
-  void Load(const std::vector<internal::PackedMat>& known, internal::ByteReader& in);
+  /// The state beside `known`: descriptors that whoever loads it has, too, and in the same order; a word that
+  /// is among them takes a few bytes.
+  struct Beside {
+    Vocabulary* vocabulary;
+    std::vector<internal::PackedMat> known;
+
+    template <class Archive>
+    void State(Archive& archive);
+  };
 
  private:
   void CheckType(const cv::Mat& descriptors);

@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "loopclosure/store/packed_mat.h"
 #include "loopclosure/vocabulary/chunked_vector.h"
 #include "loopclosure/vocabulary/word_map.h"
 
@@ -56,6 +57,14 @@ class WordStorage {
   void ForEach(const Call& call) const {
     row_of_word_.ForEach(call);
   }
+  /// The number of each row's word among all words, ascending; -1 if the row is free. Which row a word lies
+  /// in changes no answer: in a file, rows are numbered by their words.
+  std::vector<int> Ranks() const;
+
+  /// All words with their descriptors of a type (CV_8U or CV_32F). Of a word that is a row of `known`, which
+  /// whoever loads it must have in the same order, the number of the row is saved.
+  template <class Archive>
+  void State(Archive& archive, int type, const std::vector<PackedMat>& known);
 
   /// Words in it.
   int size() const { return static_cast<int>(row_of_word_.size()); }

@@ -57,7 +57,7 @@ TEST(LongTermMemory, WhatIsTooMuchLeavesAndComesBackNearTheHypothesis) {
   ASSERT_FALSE(result.retrieved.empty());
   for (const std::int64_t id : result.retrieved) {
     EXPECT_TRUE(r.state.HasView(static_cast<int>(id)));
-    EXPECT_EQ(r.state.memory().state(static_cast<int>(id)), LocationMemory::State::kWorking);
+    EXPECT_EQ(r.state.memory().state(static_cast<int>(id)), LocationState::kWorking);
   }
   EXPECT_EQ(result.warning, "");
 }
@@ -96,13 +96,13 @@ TEST(LongTermMemory, DamagedRecordsAreAWarningAndNothingElse) {
   LoopResult result;
   r.long_term.Retrieve(3, result);
   EXPECT_NE(result.warning.find("damaged"), std::string::npos);
-  EXPECT_EQ(r.state.memory().state(2), LocationMemory::State::kLongTerm);  // its words are lost: it stays
-  EXPECT_EQ(r.state.memory().state(1), LocationMemory::State::kWorking);   // only its features are
+  EXPECT_EQ(r.state.memory().state(2), LocationState::kLongTerm);  // its words are lost: it stays
+  EXPECT_EQ(r.state.memory().state(1), LocationState::kWorking);   // only its features are
   EXPECT_TRUE(r.state.view(1).members.front().pixels.empty());
   store().Put(Kind::kSignature, 0, 2, signature);
   LoopResult again;
   r.long_term.Retrieve(3, again);
-  EXPECT_EQ(r.state.memory().state(2), LocationMemory::State::kWorking);
+  EXPECT_EQ(r.state.memory().state(2), LocationState::kWorking);
 }
 
 class LongTermFile : public ::testing::Test {

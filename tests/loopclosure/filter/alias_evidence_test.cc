@@ -10,7 +10,7 @@
 #include <random>
 #include <utility>
 
-#include "core/byte_stream.h"
+#include "core/state_archive.h"
 #include "loopclosure/filter/bayes_filter.h"
 #include "tests/loopclosure/filter/image_counts.h"
 #include "tutti/core/error.h"
@@ -156,22 +156,19 @@ TEST(AliasEvidence, WhereWrongPlacesLastSuccessiveImagesSayOnlyWhatIsNewInThem) 
 
 TEST(AliasEvidence, GoesOnWhereItWasSavedAndRefusesDamage) {
   AliasEvidence evidence = Experienced(50, 5.0);
-  internal::ByteWriter out;
-  evidence.Save(out);
+  const std::string bytes = internal::StateBytes(evidence);
   AliasEvidence loaded{EvidenceOptions()};
-  internal::ByteReader in(out.bytes(), "memory");
-  loaded.Load(in);
+  internal::ReadStateBytes(bytes, "memory", loaded);
   EXPECT_EQ(loaded.Level(), evidence.Level());
   for (int slot = 0; slot < 50; ++slot) EXPECT_EQ(loaded.LevelOf(slot), evidence.LevelOf(slot));
   EXPECT_EQ(loaded.Lasting(), evidence.Lasting());
   // Level, sum of words, first images (4 bytes), images, what images repeat, of how many, what lasts.
   for (const std::size_t at : {0, 8, 20, 28, 36, 44}) {
-    std::string damaged = out.bytes();
+    std::string damaged = bytes;
     const double nan = std::numeric_limits<double>::quiet_NaN();
     std::memcpy(damaged.data() + at, &nan, sizeof nan);
     AliasEvidence refuses{EvidenceOptions()};
-    internal::ByteReader bad(damaged, "memory");
-    EXPECT_THROW(refuses.Load(bad), InputError) << "at byte " << at;
+    EXPECT_THROW(internal::ReadStateBytes(damaged, "memory", refuses), InputError) << "at byte " << at;
   }
 }
 

@@ -123,16 +123,14 @@ TEST_F(HindsightTest, NothingIsSaidBeforeEnoughImagesCame) {
 TEST_F(HindsightTest, GoesOnFromAFileAsIfNothingHadHappened) {
   Hindsight hindsight;
   Run(kSteps, &hindsight);
-  ByteWriter out;
-  hindsight.Save(out);
   Hindsight loaded;
-  ByteReader in(out.bytes(), "test");
-  loaded.Load(kSteps, in);
-  EXPECT_TRUE(in.AtEnd());
+  ReadStateBytes(StateBytes(hindsight), "test", loaded);
   const std::vector<int>& places = memory_.working_memory();
   EXPECT_EQ(loaded.Smoothed(transition_, places).places, hindsight.Smoothed(transition_, places).places);
-  ByteReader too_few(out.bytes(), "test");
-  EXPECT_THROW(Hindsight().Load(kSteps - 1, too_few), InputError) << "a step at a location that is not there";
+  SharedObjectsIn none;
+  const StateReader in("", "test", &none);
+  EXPECT_NO_THROW(loaded.Check(kSteps, in));
+  EXPECT_THROW(loaded.Check(kSteps - 1, in), InputError) << "a step at a location that is not there";
 }
 
 }  // namespace

@@ -9,7 +9,7 @@
 #include <random>
 #include <string>
 
-#include "core/byte_stream.h"
+#include "core/state_archive.h"
 #include "loopclosure/filter/alias_evidence.h"
 #include "tests/loopclosure/filter/image_counts.h"
 #include "tutti/core/error.h"
@@ -134,21 +134,16 @@ TEST(MemberOverlap, GoesOnWhereItWasSavedAndRefusesDamage) {
   std::mt19937 random(3);
   const std::vector<double> first = Resemblances(100, 10, random);
   overlap.Learn({&first, &first}, Places(100), {});
-  internal::ByteWriter out;
-  overlap.Save(out);
+  const std::string bytes = internal::StateBytes(overlap);
   MemberOverlap again;
-  internal::ByteReader in(out.bytes(), "memory");
-  again.Load(in);
+  internal::ReadStateBytes(bytes, "memory", again);
   EXPECT_EQ(again.Copies(1), overlap.Copies(1));
-  std::string damaged(out.bytes());
+  std::string damaged = bytes;
   const double nan = std::numeric_limits<double>::quiet_NaN();
   std::memcpy(damaged.data() + damaged.size() - sizeof nan, &nan, sizeof nan);
-  internal::ByteReader bad(damaged, "memory");
-  EXPECT_THROW(again.Load(bad), InputError);
-  damaged.assign(out.bytes());
-  damaged[0] = 3;  // members: as many as there are not
-  internal::ByteReader wrong(damaged, "memory");
-  EXPECT_THROW(again.Load(wrong), InputError);
+  EXPECT_THROW(internal::ReadStateBytes(damaged, "memory", again), InputError);
+  const std::string three = internal::StateBytes(std::vector<double>(3, 1.0));  // of two members or more?
+  EXPECT_THROW(internal::ReadStateBytes(three, "memory", again), InputError);
 }
 
 }  // namespace

@@ -8,7 +8,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/byte_stream.h"
+#include "core/state_archive.h"
 #include "loopclosure/filter/pose_track.h"
 #include "tests/loopclosure/detector/two_laps.h"
 #include "tutti/core/error.h"
@@ -174,11 +174,8 @@ TEST(PoseTrack, GainsFollowTheEquation) {
   ASSERT_EQ(gains.size(), expected.size());
   for (std::size_t i = 0; i < gains.size(); ++i) EXPECT_NEAR(gains[i], expected[i], 1e-12) << i;
 
-  internal::ByteWriter out;
-  track.Save(out);
   PoseTrack loaded;
-  internal::ByteReader in(out.bytes(), "memory");
-  loaded.Load(in);
+  internal::ReadStateBytes(internal::StateBytes(track), "memory", loaded);
   EXPECT_EQ(loaded.Gains(places), gains);
   for (PoseTrack* both : {&track, &loaded}) both->Add(7, PriorAt(9, kSigma, kDrift));
   EXPECT_EQ(loaded.Gains(places), track.Gains(places));

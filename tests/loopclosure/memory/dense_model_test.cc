@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/byte_stream.h"
+#include "core/state_archive.h"
 #include "loopclosure/features/gradient_descriptor.h"
 #include "loopclosure/memory/dense_model.h"
 #include "tutti/core/error.h"
@@ -186,11 +186,8 @@ TEST_F(DenseModelByHand, NothingStandsOutAmongFewerThanTwelve) {
 
 TEST_F(DenseModelByHand, ALoadedOneSaysTheSame) {
   model_.Remove(13);
-  internal::ByteWriter out;
-  model_.Save(out);
   DenseModel loaded;
-  internal::ByteReader in(out.bytes(), "memory");
-  loaded.Load(in);
+  internal::ReadStateBytes(internal::StateBytes(model_), "memory", loaded);
   EXPECT_EQ(loaded.Counts(places_), model_.Counts(places_));
   EXPECT_EQ(loaded.Scores(), model_.Scores());
   cv::RNG random(6);

@@ -34,7 +34,13 @@ const char* ToString(ConstraintType type) {
 class LoopDetector::Impl {
  public:
   explicit Impl(const LoopDetectorOptions& options)
-      : state_(options), long_term_(state_), verifier_(options.verification, options.seed) {}
+      : state_(options),
+        long_term_(state_),
+        search_(
+            state_.options(), state_.memory(),
+            [verifier = GeometricVerifier(options.verification, options.seed)](
+                const View& a, const View& b, int threads) { return verifier.Verify(a, b, threads); },
+            [this](int slot) -> const View& { return state_.view(slot); }) {}
 
   LoopResult Detect(const LoopQuery& query);
   LoopResult Locate(const LoopQuery& query) const;
@@ -45,16 +51,10 @@ class LoopDetector::Impl {
  private:
   void FillCounts(const std::vector<Features>& features, LoopResult& result) const;
   void Verify(const View& query, const Belief& belief, LoopResult& result) const;
-  internal::HypothesisSearch::VerifyPair PairVerifier() const {
-    return [this](const View& a, const View& b, int threads) { return verifier_.Verify(a, b, threads); };
-  }
-  std::function<const View&(int)> ViewOfSlot() const {
-    return [this](int slot) -> const View& { return state_.view(slot); };
-  }
 
   internal::DetectorState state_;
   internal::LongTermMemory long_term_;
-  GeometricVerifier verifier_;
+  internal::HypothesisSearch search_;
 };
 
 LoopResult LoopDetector::Impl::Detect(const LoopQuery& query) {
@@ -80,7 +80,7 @@ LoopResult LoopDetector::Impl::Detect(const LoopQuery& query) {
 
   result.proposed = state_.reasoner().Proposes(combined, result);
   if (result.proposed) Verify(view, combined.belief, result);
-  state_.reasoner().VerifyAgain(PairVerifier(), ViewOfSlot(), result);
+  state_.reasoner().VerifyAgain(search_, result);
   result.verify_ms = watch.LapMs();
 
   state_.reasoner().Finish(result);
@@ -109,7 +109,7 @@ void LoopDetector::Impl::Verify(const View& query, const Belief& belief, LoopRes
         "features with the query, or set verification.enabled: false";
     return;
   }
-  state_.reasoner().Verify(query, belief, PairVerifier(), ViewOfSlot(), result);
+  state_.reasoner().Verify(query, belief, search_, result);
 }
 
 // One image by itself, without the images before it: no filter, all places are as likely.

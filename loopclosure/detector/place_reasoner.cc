@@ -198,15 +198,14 @@ bool PlaceReasoner::Proposes(const CombinedBelief& combined, LoopResult& result)
   return true;
 }
 
-void PlaceReasoner::Verify(const View& query, const Belief& belief,
-                           const HypothesisSearch::VerifyPair& verify,
-                           const std::function<const View&(int)>& view_of, LoopResult& result) const {
+void PlaceReasoner::Verify(const View& query, const Belief& belief, const HypothesisSearch& search,
+                           LoopResult& result) const {
   if (!options_.verification.enabled) {
     result.verification.candidate = result.best;
     result.verification.similar = result.verification.accepted = true;
     result.probability = MassAround(belief, memory().Find(result.best), memory());
   } else {
-    HypothesisSearch(options_, memory(), verify, view_of).Verify(query, belief, result);
+    search.Verify(query, belief, result);
     if (result.verification.candidate >= 0) result.candidate = result.verification.candidate;
     if (!result.verification.similar) return;
   }
@@ -225,10 +224,8 @@ void PlaceReasoner::Verify(const View& query, const Belief& belief,
   result.reason = text;
 }
 
-void PlaceReasoner::VerifyAgain(const HypothesisSearch::VerifyPair& verify,
-                                const std::function<const View&(int)>& view_of, LoopResult& result) {
+void PlaceReasoner::VerifyAgain(const HypothesisSearch& search, LoopResult& result) {
   if (!options_.verification.enabled || !Shared()) return;
-  const HypothesisSearch search(options_, memory(), verify, view_of);
   result.late = second_word_.Say(options_, memory(), systems_.front()->transition(), search);
 }
 

@@ -44,12 +44,11 @@ class PlaceReasoner {
   bool Proposes(const CombinedBelief& combined, LoopResult& result);
   /// Step 6: geometry looks at the most probable places; fills verification, tried, accepted, probability and
   /// reason of `result`. Without verification the candidate is taken by its posterior alone.
-  void Verify(const View& query, const Belief& belief, const HypothesisSearch::VerifyPair& verify,
-              const std::function<const View&(int)>& view_of, LoopResult& result) const;
+  void Verify(const View& query, const Belief& belief, const HypothesisSearch& search,
+              LoopResult& result) const;
   /// Step 7: what is decided now of the image Hindsight::kImages before this one, into result.late; nothing
   /// if it stays as it was.
-  void VerifyAgain(const HypothesisSearch::VerifyPair& verify, const std::function<const View&(int)>& view_of,
-                   LoopResult& result);
+  void VerifyAgain(const HypothesisSearch& search, LoopResult& result);
   /// Links the places of a loop that is nearly certain.
   void Finish(const LoopResult& result);
 

@@ -60,23 +60,26 @@ void ScaleKeypoints(double factor, std::vector<cv::KeyPoint>& keypoints) {
   }
 }
 
-struct Registry {
-  std::mutex mutex;
-  std::vector<std::pair<std::string, FeatureFactory>> types;
-};
+using NamedFactory = std::pair<std::string, FeatureFactory>;
 
-Registry& TheRegistry() {
-  static Registry registry;
-  return registry;
+// What was registered in this process; `added`, if there is one, has joined it.
+std::vector<NamedFactory> Registered(const NamedFactory* added = nullptr) {
+  static std::mutex mutex;
+  static std::vector<NamedFactory> types;
+  const std::lock_guard<std::mutex> lock(mutex);
+  if (added != nullptr) types.push_back(*added);
+  return types;
 }
 
-FeatureFactory Registered(const std::string& name) {
-  Registry& registry = TheRegistry();
-  const std::lock_guard<std::mutex> lock(registry.mutex);
-  for (const auto& [known, factory] : registry.types) {
-    if (known == name) return factory;
-  }
-  throw InputError("unknown member '" + name + "'");
+// Of members that surf, sift and orb are not; null for an unknown name.
+FeatureFactory FactoryOf(const std::string& name) {
+  std::vector<NamedFactory> types = {{"akaze", [](cv::Size, int) { return cv::AKAZE::create(); }},
+                                     {"brisk", [](cv::Size, int) { return cv::BRISK::create(); }},
+                                     {"kaze", [](cv::Size, int) { return cv::KAZE::create(); }}};
+  for (NamedFactory& type : Registered()) types.push_back(std::move(type));
+  const auto found =
+      std::find_if(types.begin(), types.end(), [&](const NamedFactory& type) { return type.first == name; });
+  return found != types.end() ? found->second : nullptr;
 }
 
 }  // namespace
@@ -87,16 +90,13 @@ void RegisterFeatureType(const std::string& name, FeatureFactory factory) {
     throw InputError("feature type '" + name +
                      "' can't be registered: the name is empty or taken, or there is no factory");
   }
-  Registry& registry = TheRegistry();
-  const std::lock_guard<std::mutex> lock(registry.mutex);
-  registry.types.emplace_back(name, std::move(factory));
+  const NamedFactory added(name, std::move(factory));
+  Registered(&added);
 }
 
-std::vector<std::string> RegisteredFeatureTypes() {
-  Registry& registry = TheRegistry();
-  const std::lock_guard<std::mutex> lock(registry.mutex);
-  std::vector<std::string> names;
-  for (const auto& type : registry.types) names.push_back(type.first);
+std::vector<std::string> KnownFeatureTypes() {
+  std::vector<std::string> names = {"surf", "sift", "orb", "akaze", "brisk", "kaze"};
+  for (const NamedFactory& type : Registered()) names.push_back(type.first);
   return names;
 }
 
@@ -183,7 +183,10 @@ std::vector<int> SelectSpread(const std::vector<cv::KeyPoint>& keypoints, cv::Si
 }
 
 FeatureExtractor::FeatureExtractor(const std::string& name, const ExtractionOptions& options)
-    : name_(name), options_(options), scratches_(std::make_shared<internal::SiftScratchPool>()) {
+    : name_(name),
+      options_(options),
+      factory_(FactoryOf(name)),
+      scratches_(std::make_shared<internal::SiftScratchPool>()) {
   const std::vector<std::string> known = KnownFeatureTypes();
   if (std::find(known.begin(), known.end(), name) == known.end()) {
     throw InputError("unknown member '" + name + "'; did you mean '" + NearestWord(name, known) + "'?");
@@ -191,13 +194,6 @@ FeatureExtractor::FeatureExtractor(const std::string& name, const ExtractionOpti
   if (name == "surf") {
     surf_ = CreateDlibSurf(NumDetected(options), kSurfOctaves, kSurfLeast);
   }
-}
-
-cv::Ptr<cv::Feature2D> FeatureExtractor::Create(cv::Size size) const {
-  if (name_ == "akaze") return cv::AKAZE::create();
-  if (name_ == "brisk") return cv::BRISK::create();
-  if (name_ == "kaze") return cv::KAZE::create();
-  return Registered(name_)(size, NumDetected(options_));
 }
 
 double FeatureExtractor::Shrinking(double pixels) const {
@@ -242,7 +238,8 @@ Features FeatureExtractor::Extract(const cv::Mat& grey) const {
   } else {
     std::vector<cv::KeyPoint> keypoints;
     cv::Mat descriptors;
-    Create(image.size())->detectAndCompute(image, cv::noArray(), keypoints, descriptors);
+    factory_(image.size(), NumDetected(options_))
+        ->detectAndCompute(image, cv::noArray(), keypoints, descriptors);
     if (keypoints.empty() || descriptors.rows != static_cast<int>(keypoints.size())) return features;
     const std::vector<int> selected = spread(keypoints);
     features.keypoints = Picked(keypoints, selected);

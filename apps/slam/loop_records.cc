@@ -3,7 +3,7 @@
 #include <string>
 
 #include "apps/slam/loop_closer.h"
-#include "loopclosure/filter/loop_probability.h"
+#include "loopclosure/detector/hypothesis_search.h"
 
 namespace tutti {
 namespace {

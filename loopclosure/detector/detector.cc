@@ -6,9 +6,9 @@
 #include "core/stopwatch.h"
 #include "loopclosure/detector/detector_file.h"
 #include "loopclosure/detector/detector_state.h"
+#include "loopclosure/detector/ensemble.h"
 #include "loopclosure/detector/hypothesis_search.h"
 #include "loopclosure/detector/long_term_memory.h"
-#include "loopclosure/detector/query_check.h"
 #include "loopclosure/geometry/verification.h"
 #include "tutti/core/error.h"
 

@@ -8,7 +8,6 @@
 #include "core/index.h"
 #include "loopclosure/detector/ensemble.h"
 #include "loopclosure/detector/place_reasoner.h"
-#include "loopclosure/detector/query_check.h"
 #include "loopclosure/geometry/verification.h"
 #include "loopclosure/store/location_store.h"
 #include "tutti/loopclosure/detector.h"

@@ -6,7 +6,7 @@
 
 #include "core/index.h"
 #include "core/parallel.h"
-#include "loopclosure/features/gradient_descriptor.h"
+#include "loopclosure/features/whole_image.h"
 #include "tutti/core/error.h"
 
 namespace tutti::internal {

@@ -1,11 +1,10 @@
 #include "loopclosure/detector/hypothesis_search.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "core/index.h"
-#include "loopclosure/detector/nearest_view.h"
-#include "loopclosure/filter/loop_probability.h"
 #include "loopclosure/filter/transition_model.h"
 
 namespace tutti::internal {
@@ -204,6 +203,13 @@ std::vector<int> HypothesisSearch::ViewsOf(int place, const Belief& belief) cons
   if (views.size() > kMostNeighbours) views.resize(kMostNeighbours);
   views.insert(views.begin(), place);
   return views;
+}
+
+double LoopProbability(const Verification& verification) {
+  const double mass = std::clamp(verification.mass, 1e-4, 1.0 - 1e-4);
+  const double sure = std::clamp(-verification.log_nfa, 0.0, 300.0) / 100.0;
+  const double logit = 3.345 + 1.379 * std::log(mass / (1.0 - mass)) + 0.889 * sure;
+  return 1.0 / (1.0 + std::exp(-logit));
 }
 
 }  // namespace tutti::internal

@@ -5,7 +5,7 @@
 
 #include "core/parallel.h"
 #include "core/stopwatch.h"
-#include "loopclosure/filter/loop_probability.h"
+#include "loopclosure/detector/hypothesis_search.h"
 #include "tutti/core/error.h"
 
 namespace tutti::internal {

@@ -7,7 +7,7 @@
 
 #include "core/state_archive.h"
 #include "loopclosure/detector/hypothesis_search.h"
-#include "loopclosure/filter/hindsight.h"
+#include "loopclosure/filter/bayes_filter.h"
 #include "tutti/loopclosure/detector.h"
 
 namespace tutti::internal {

@@ -14,7 +14,7 @@
 #include "loopclosure/features/scratch_pool.h"
 #include "loopclosure/features/surf_hessian.h"
 #include "loopclosure/features/surf_integral.h"
-#include "loopclosure/store/signed_squares.h"
+#include "loopclosure/store/packed_mat.h"
 #include "tutti/loopclosure/features.h"
 
 extern "C" void tutti_cblas_dscal(const CBLAS_INT_TYPE n, const double alpha, double* x,

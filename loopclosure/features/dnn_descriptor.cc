@@ -1,4 +1,3 @@
-#include "loopclosure/features/dnn_descriptor.h"
 
 #include <algorithm>
 #include <cmath>
@@ -16,8 +15,7 @@
 #include <vector>
 
 #include "core/byte_stream.h"
-#include "loopclosure/features/gradient_descriptor.h"
-#include "loopclosure/features/smallest_image.h"
+#include "loopclosure/features/whole_image.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 

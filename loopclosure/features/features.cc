@@ -7,10 +7,10 @@
 #include <opencv2/imgproc.hpp>
 #include <tuple>
 
-#include "loopclosure/features/dark_image.h"
 #include "loopclosure/features/orb.h"
 #include "loopclosure/features/sift.h"
-#include "loopclosure/features/smallest_image.h"
+#include "loopclosure/features/smoothing.h"
+#include "loopclosure/features/whole_image.h"
 #include "tutti/core/error.h"
 #include "tutti/core/text.h"
 

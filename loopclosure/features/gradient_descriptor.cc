@@ -1,10 +1,8 @@
-#include "loopclosure/features/gradient_descriptor.h"
+#include "loopclosure/features/whole_image.h"
 
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
-
-#include "loopclosure/features/smallest_image.h"
 
 namespace tutti {
 namespace {

@@ -9,8 +9,7 @@
 
 #include "core/clones.h"
 #include "core/sanitized_range.h"
-#include "loopclosure/features/gaussian_blur.h"
-#include "loopclosure/features/sift_descriptor.h"
+#include "loopclosure/features/smoothing.h"
 
 namespace tutti::internal {
 namespace {

@@ -1,4 +1,4 @@
-#include "loopclosure/features/sift_descriptor.h"
+#include "loopclosure/features/sift.h"
 
 #include <algorithm>
 #include <array>

@@ -1,5 +1,9 @@
 #include "loopclosure/filter/bayes_filter.h"
 
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
 namespace tutti {
 
 void BayesFilter::Step(const TransitionModel& transition, const std::vector<int>& working_memory,
@@ -25,4 +29,55 @@ void BayesFilter::Forget(int slot) {
   if (i < posterior_.places.size()) posterior_.places[i] = 0.0;
 }
 
+namespace internal {
+
+void Hindsight::Add(int slot, const Belief& posterior, const Belief& likelihood) {
+  steps_.push_back({slot, posterior, likelihood});
+  if (steps_.size() > kImages + 1) steps_.pop_front();
+}
+
+Belief Hindsight::Smoothed(const TransitionModel& transition, const std::vector<int>& working_memory) const {
+  Belief beta;
+  beta.places.assign(steps_.back().posterior.places.size(), 1.0);
+  for (auto step = steps_.rbegin(); std::next(step) != steps_.rend(); ++step) {
+    beta.new_place *= step->likelihood.new_place;
+    double most = beta.new_place;
+    for (const int slot : working_memory) {
+      const std::size_t i = static_cast<std::size_t>(slot);
+      // What was not in working memory then could not be said to be there.
+      beta.places[i] *= i < step->likelihood.places.size() ? step->likelihood.places[i] : 0.0;
+      most = std::max(most, beta.places[i]);
+    }
+    if (!(most > 0.0)) break;
+    beta.new_place /= most;
+    for (const int slot : working_memory) beta.places[static_cast<std::size_t>(slot)] /= most;
+    beta = transition.Backward(beta, working_memory);
+  }
+  Belief gamma;
+  const Belief& alpha = steps_.front().posterior;
+  gamma.places.assign(beta.places.size(), 0.0);
+  gamma.new_place = alpha.new_place * beta.new_place;
+  for (const int slot : working_memory) {
+    const std::size_t i = static_cast<std::size_t>(slot);
+    if (i < alpha.places.size()) gamma.places[i] = alpha.places[i] * beta.places[i];
+  }
+  gamma.Normalise();
+  return gamma;
+}
+
+void Hindsight::Check(int end, const StateReader& in) const {
+  if (steps_.size() > kImages + 1) in.Damaged("more steps of a filter than are kept");
+  const auto good = [](double value) { return value >= 0.0 && std::isfinite(value); };
+  for (const Step& step : steps_) {
+    in.Check(step.slot, 0, end, "a step of a filter at an unknown location");
+    for (const Belief* belief : {&step.posterior, &step.likelihood}) {
+      if (!good(belief->new_place) || belief->places.size() > static_cast<std::size_t>(end) ||
+          !std::all_of(belief->places.begin(), belief->places.end(), good)) {
+        in.Damaged("a step of a filter that is no belief");
+      }
+    }
+  }
+}
+
+}  // namespace internal
 }  // namespace tutti

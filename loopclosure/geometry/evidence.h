@@ -4,6 +4,8 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "loopclosure/geometry/verification.h"
+
 namespace tutti::internal {
 
 /// What the matches of two images are held to.
@@ -50,5 +52,16 @@ double NarrowestSpread(const std::vector<cv::Point2f>& pixels, const cv::Size& i
 /// How wide that has to be for `inliers` in abundance, beyond 1.5 times the `least`: they may lie closer
 /// together, down to 0.6 of `spread`.
 double SpreadNeeded(double spread, int least, int inliers);
+
+/// True for a match whose ends are less than `static_px` apart: nothing moved
+/// there.
+bool StaysAtItsPixel(const VerifiedMatch& match, double static_px);
+
+/// Share of the features (of all sets; where the two views differ, of the one
+/// with fewer) that lie apart from these matches: in cells of an 8x6 grid over
+/// the image that hold none of them, nor do the cells around. Near 0 where the
+/// camera stands as it stood: it sees the same everywhere. Large where only a
+/// part of the image is the same whatever lies behind it. 0 without features.
+double ShareApart(const std::vector<VerifiedMatch>& matches, const View& query, const View& candidate);
 
 }  // namespace tutti::internal

@@ -1,4 +1,3 @@
-#include "loopclosure/geometry/match_pool.h"
 
 #include <algorithm>
 #include <cmath>

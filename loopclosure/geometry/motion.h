@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "loopclosure/geometry/evidence.h"
-#include "loopclosure/geometry/match_pool.h"
+#include "loopclosure/geometry/matching.h"
 #include "loopclosure/geometry/verification.h"
 #include "tutti/core/pose.h"
 

@@ -1,13 +1,15 @@
-#include "tutti/loopclosure/relative_pose.h"
-
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <opencv2/calib3d.hpp>
+#include <random>
+#include <vector>
 
 #include "core/least_squares.h"
 #include "core/reprojection.h"
 #include "core/umeyama.h"
-#include "loopclosure/geometry/ransac.h"
+#include "tutti/loopclosure/relative_pose.h"
 
 namespace tutti {
 namespace {
@@ -32,6 +34,54 @@ double SquaredError(const PinholeCamera& camera, const Eigen::Vector3d& point, c
 
 std::string TooFew(const char* what, std::size_t have, int need) {
   return "only " + std::to_string(have) + " " + what + ", " + std::to_string(need) + " are needed";
+}
+
+// RANSAC with a truncated-squares score (MSAC, Torr & Zisserman 2000) and a generator of its own.
+
+struct RansacSettings {
+  int sample_size = 3;
+  int max_iterations = 1000;
+  double confidence = 0.9999;
+  std::uint64_t seed = 1;
+};
+
+// `fit(sample)` gives the models through the sampled indices; `error(model, i)` the squared error of datum i
+// relative to the squared threshold (1 = at the threshold; infinity where impossible). Returns the inliers
+// of the best model and sets `best`. Deterministic for a seed: the generator is local and the draws do not
+// depend on the standard library.
+template <typename Model, typename Fit, typename Error>
+std::vector<int> Ransac(int count, const RansacSettings& settings, const Fit& fit, const Error& error,
+                        Model& best) {
+  std::vector<int> best_inliers;
+  if (count < settings.sample_size) return best_inliers;
+  std::mt19937_64 generator(settings.seed);
+  double best_cost = static_cast<double>(count);
+  int needed = settings.max_iterations;
+  std::vector<int> sample;
+  for (int iteration = 0; iteration < needed; ++iteration) {
+    sample.clear();
+    while (static_cast<int>(sample.size()) < settings.sample_size) {
+      const int i = static_cast<int>(generator() % static_cast<std::uint64_t>(count));
+      if (std::find(sample.begin(), sample.end(), i) == sample.end()) sample.push_back(i);
+    }
+    for (const Model& model : fit(sample)) {
+      double cost = 0.0;
+      for (int i = 0; i < count && cost < best_cost; ++i) cost += std::min(1.0, error(model, i));
+      if (!(cost < best_cost)) continue;
+      best_cost = cost;
+      best = model;
+      best_inliers.clear();
+      for (int i = 0; i < count; ++i) {
+        if (error(model, i) < 1.0) best_inliers.push_back(i);
+      }
+      const double share = static_cast<double>(best_inliers.size()) / count;
+      const double miss = 1.0 - std::pow(share, settings.sample_size);
+      if (miss <= 0.0) return best_inliers;
+      const double wanted = std::ceil(std::log(1.0 - settings.confidence) / std::log(miss));
+      needed = static_cast<int>(std::min<double>(settings.max_iterations, std::max(20.0, wanted)));
+    }
+  }
+  return best_inliers;
 }
 
 // ---------------------------------------------------------------- PnP
@@ -277,8 +327,8 @@ PnpResult SolvePnp(const std::vector<Eigen::Vector3d>& points, const std::vector
   for (const Eigen::Vector2d& pixel : pixels) problem.pixels.push_back(UndistortedPixel(camera, pixel));
 
   const double squared = options.threshold_px * options.threshold_px;
-  const internal::RansacSettings settings{3, options.max_iterations, options.confidence, options.seed};
-  result.inliers = internal::Ransac<Pose>(
+  const RansacSettings settings{3, options.max_iterations, options.confidence, options.seed};
+  result.inliers = Ransac<Pose>(
       static_cast<int>(points.size()), settings,
       [&](const std::vector<int>& sample) { return FitP3p(problem, sample); },
       [&](const Pose& pose, int i) {
@@ -322,9 +372,9 @@ SimilarityResult SolveSimilarity(const std::vector<Eigen::Vector3d>& points_a,
   for (const Eigen::Vector2d& pixel : pixels_b) problem.pixels_b.push_back(UndistortedPixel(camera_b, pixel));
 
   const double squared = options.threshold_px * options.threshold_px;
-  const internal::RansacSettings settings{3, options.max_iterations, options.confidence, options.seed};
+  const RansacSettings settings{3, options.max_iterations, options.confidence, options.seed};
   ScoredSimilarity best;
-  result.inliers = internal::Ransac<ScoredSimilarity>(
+  result.inliers = Ransac<ScoredSimilarity>(
       static_cast<int>(n), settings,
       [&](const std::vector<int>& sample) { return FitSimilarity(problem, sample); },
       [&](const ScoredSimilarity& model, int i) {

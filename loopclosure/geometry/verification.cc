@@ -7,9 +7,8 @@
 #include <cstdio>
 
 #include "loopclosure/geometry/evidence.h"
-#include "loopclosure/geometry/match_pool.h"
+#include "loopclosure/geometry/matching.h"
 #include "loopclosure/geometry/motion.h"
-#include "loopclosure/geometry/static_features.h"
 #include "tutti/loopclosure/relative_pose.h"
 
 namespace tutti {

@@ -4,8 +4,7 @@
 #include <cmath>
 
 #include "core/state_archive.h"
-#include "loopclosure/features/dnn_descriptor.h"
-#include "loopclosure/features/gradient_descriptor.h"
+#include "loopclosure/features/whole_image.h"
 
 namespace tutti {
 

@@ -18,7 +18,7 @@ class DnnDescriptor;
 class Member {
  public:
   /// `name`: of options.members; `seed`: of its vocabulary's index. Throws InputError for
-  /// another name, and for a network of the member dnn that can't be used (dnn_descriptor.h).
+  /// another name, and for a network of the member dnn that can't be used (whole_image.h).
   Member(const std::string& name, const LoopDetectorOptions& options, std::uint64_t seed);
 
   /// As given.

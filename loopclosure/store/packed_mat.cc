@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "core/state_archive.h"
-#include "loopclosure/store/signed_squares.h"
 
 namespace tutti::internal {
 namespace {

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "core/shuffle.h"
-#include "loopclosure/vocabulary/chunked_vector.h"
 #include "loopclosure/vocabulary/word_storage.h"
 
 namespace tutti::internal {

@@ -10,7 +10,6 @@
 #include "core/index.h"
 #include "core/state_archive.h"
 #include "loopclosure/features/distances.h"
-#include "loopclosure/vocabulary/chunked_vector.h"
 #include "loopclosure/vocabulary/descriptor_index.h"
 #include "loopclosure/vocabulary/word_storage.h"
 

@@ -1,4 +1,4 @@
-#include "loopclosure/features/dark_image.h"
+#include "loopclosure/features/smoothing.h"
 
 #include <gtest/gtest.h>
 

@@ -12,7 +12,7 @@
 
 #include "core/parallel.h"
 #include "loopclosure/geometry/matching.h"
-#include "loopclosure/store/signed_squares.h"
+#include "loopclosure/store/packed_mat.h"
 #include "tests/loopclosure/features/textured_image.h"
 #include "tutti/core/error.h"
 #include "tutti/loopclosure/detector_options.h"

@@ -1,4 +1,4 @@
-#include "loopclosure/features/gaussian_blur.h"
+#include "loopclosure/features/smoothing.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Orientations and descriptors of SIFT: where they can be computed by hand, and as the paper defines them.
-#include "loopclosure/features/sift_descriptor.h"
+#include "loopclosure/features/sift.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,3 @@
-#include "loopclosure/filter/hindsight.h"
 
 #include <gtest/gtest.h>
 

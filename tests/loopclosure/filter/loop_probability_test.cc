@@ -1,4 +1,4 @@
-#include "loopclosure/filter/loop_probability.h"
+#include "loopclosure/detector/hypothesis_search.h"
 
 #include <gtest/gtest.h>
 

@@ -8,7 +8,7 @@
 #include <random>
 #include <vector>
 
-#include "loopclosure/features/gradient_descriptor.h"
+#include "loopclosure/features/whole_image.h"
 
 namespace tutti::internal {
 namespace {

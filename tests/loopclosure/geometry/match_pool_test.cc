@@ -1,4 +1,4 @@
-#include "loopclosure/geometry/match_pool.h"
+#include "loopclosure/geometry/matching.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // What of two images does not move with the camera.
-#include "loopclosure/geometry/static_features.h"
+#include "loopclosure/geometry/evidence.h"
 
 #include <gtest/gtest.h>
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/state_archive.h"
-#include "loopclosure/features/gradient_descriptor.h"
+#include "loopclosure/features/whole_image.h"
 #include "loopclosure/memory/dense_model.h"
 #include "tutti/core/error.h"
 

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <functional>
 
-#include "loopclosure/features/gradient_descriptor.h"
+#include "loopclosure/features/whole_image.h"
 #include "tests/loopclosure/detector/two_laps.h"
 #include "tests/loopclosure/detector/wall_walk.h"
 #include "tests/loopclosure/features/textured_image.h"

@@ -9,7 +9,6 @@
 #include <string>
 
 #include "core/state_archive.h"
-#include "loopclosure/store/signed_squares.h"
 #include "tutti/core/error.h"
 
 namespace tutti::internal {
